@@ -1,0 +1,99 @@
+//! What a script returns: suites, tasks, experiments and plans as plain data.
+
+use serde::{Deserialize, Serialize};
+
+/// What the objects of a suite are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ObjectType {
+    /// Finite-element soft bodies; deformation is judged.
+    Deformable,
+    /// Rigid bodies; deformation is not applicable.
+    Rigid,
+}
+
+/// What varies between the tasks of a suite.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Variation {
+    /// The object.
+    Object,
+    /// The layout.
+    Spatial,
+}
+
+/// When a task is done.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum Goal {
+    /// `object` rests on `target`, released, for `hold_s`.
+    On {
+        /// Scene name of the object.
+        object: String,
+        /// Scene name of what it must rest on.
+        target: String,
+        /// How long it must stay, s.
+        hold_s: f64,
+    },
+    /// `object` rests inside `target`'s walls, released, for `hold_s`.
+    In {
+        /// Scene name of the object.
+        object: String,
+        /// Scene name of the container.
+        target: String,
+        /// How long it must stay, s.
+        hold_s: f64,
+    },
+}
+
+/// One task of a suite.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Task {
+    /// Index in the suite.
+    pub id: usize,
+    /// What the policy is told.
+    pub prompt: String,
+    /// Name of the layout; tasks that share it share initial states.
+    pub layout: String,
+    /// When it is done.
+    pub goal: Goal,
+    /// Control steps the policy has.
+    pub budget_steps: u32,
+}
+
+/// A set of tasks that are reported together.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Suite {
+    /// Name, as in results.
+    pub name: String,
+    /// What its objects are.
+    pub object_type: ObjectType,
+    /// What varies between its tasks.
+    pub variation: Variation,
+    /// Episodes a task by default.
+    pub episodes: u32,
+    /// The tasks, in order.
+    pub tasks: Vec<Task>,
+    /// Names of the shifts the suite declares.
+    pub shifts: Vec<String>,
+}
+
+/// What `softvt FILE.lua` does.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum Plan {
+    /// Evaluate a policy on one suite.
+    Suite(Suite),
+    /// Evaluate a policy on several suites.
+    Suites {
+        /// In order.
+        suites: Vec<Suite>,
+    },
+    /// Run a scripted experiment: a function of a grid of parameters that yields rows.
+    Experiment {
+        /// Name, as in results.
+        name: String,
+        /// Number of points of the grid.
+        points: usize,
+    },
+}

@@ -1,0 +1,15 @@
+//! Shapes and meshes: signed-distance shapes, imported meshes, skins, voxel meshes and surface samples.
+//!
+//! Everything here is in the *object frame* (`_o`), in metres, and knows nothing of materials or motion.
+
+pub mod shape;
+pub mod voxel;
+
+/// A point or vector, m unless said otherwise.
+pub type Vec3 = nalgebra::Vector3<f64>;
+/// A 3×3 matrix.
+pub type Mat3 = nalgebra::Matrix3<f64>;
+/// A unit quaternion.
+pub type Quat = nalgebra::UnitQuaternion<f64>;
+/// A rigid placement (rotation and translation).
+pub type Pose = nalgebra::Isometry3<f64>;

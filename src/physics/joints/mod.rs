@@ -1,0 +1,1 @@
+//! Joint trees: links joined by revolute and prismatic joints, on a fixed base.

@@ -1,0 +1,5 @@
+//! The mechanics: soft bodies, rigid bodies, joint trees, contact, and the one solve that moves them all.
+//!
+//! Knows no Lua, no files and no images. [`World`] owns the state; [`World::step`] is the whole algorithm.
+
+pub mod joints;

@@ -1,0 +1,122 @@
+//! A scene as plain data: assets, placed objects, the robot's place, regions. Knows no physics.
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use serde::{Deserialize, Serialize};
+
+use crate::geometry::{Pose, Vec3, shape::Shape};
+
+/// How an object moves.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum Body {
+    /// A finite-element soft body.
+    Soft(SoftMaterial),
+    /// A free rigid body of uniform density, kg/m³.
+    Rigid {
+        /// Density, kg/m³.
+        density: f64,
+    },
+    /// Part of the world; never moves.
+    Static,
+}
+
+/// Linear-elastic isotropic material and discretisation of a soft body.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SoftMaterial {
+    /// Young's modulus, Pa.
+    pub youngs_pa: f64,
+    /// Poisson's ratio, 0 ≤ ν < 0.5.
+    pub poisson: f64,
+    /// Density, kg/m³.
+    pub density: f64,
+    /// Voxels along the longest edge of the bounding box.
+    pub resolution: usize,
+    /// Spacing of the contact samples on surfaces that a gripper can reach, m.
+    pub grasp_spacing: f64,
+}
+
+/// Coulomb friction coefficients of a surface; a pair of surfaces takes the larger of each.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Friction {
+    /// Static coefficient.
+    pub static_mu: f64,
+    /// Dynamic coefficient, not above the static one.
+    pub dynamic_mu: f64,
+}
+
+impl Default for Friction {
+    /// 0.6 / 0.5, that of every object and surface but the pads.
+    fn default() -> Self {
+        Self { static_mu: 0.6, dynamic_mu: 0.5 }
+    }
+}
+
+/// What a surface looks like; rendered later, carried now.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Visual {
+    /// Base colour, linear RGB, 0..=1.
+    pub albedo: [f64; 3],
+    /// Roughness, 0..=1.
+    pub roughness: f64,
+    /// Metalness, 0..=1.
+    pub metalness: f64,
+}
+
+impl Default for Visual {
+    fn default() -> Self {
+        Self { albedo: [0.7, 0.7, 0.7], roughness: 0.6, metalness: 0.0 }
+    }
+}
+
+/// A kind of object: its shape at rest with its lowest point at z = 0 and its centre on the z axis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Asset {
+    /// Name, unique in a scene's library.
+    pub name: String,
+    /// Shape in the object frame, m.
+    pub shape: Shape,
+    /// How it moves.
+    pub body: Body,
+    /// Friction of its surface.
+    pub friction: Friction,
+    /// Appearances by material id of the shape (0 is the default).
+    pub visuals: Vec<Visual>,
+    /// Free-form hints for experts (grasp axis, height …), numbers only, read by scripts.
+    pub hints: BTreeMap<String, f64>,
+}
+
+/// An asset put somewhere.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Object {
+    /// Name in the scene, unique: "left", "right", "plate".
+    pub name: String,
+    /// What it is.
+    pub asset: Arc<Asset>,
+    /// Object frame in the world.
+    pub pose_w: Pose,
+}
+
+/// An axis-aligned box, world frame.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Region {
+    /// Lowest corner, m.
+    pub min: Vec3,
+    /// Highest corner, m.
+    pub max: Vec3,
+}
+
+/// Everything an episode starts from, before settling.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// Placed objects; the order is part of the scene.
+    pub objects: Vec<Object>,
+    /// Robot base in the world.
+    pub base_w: Pose,
+    /// Arm joint angles at the start, rad.
+    pub start_q: [f64; 7],
+    /// Gravity, m/s², world frame.
+    pub gravity: Vec3,
+    /// An object outside of this box has left the workspace.
+    pub workspace: Region,
+}
