@@ -1,5 +1,8 @@
 //! The mechanics: soft bodies, rigid bodies, joint trees, contact, and the one solve that moves them all.
 //!
-//! Knows no Lua, no files and no images. [`World`] owns the state; [`World::step`] is the whole algorithm.
+//! Knows no Lua, no files and no images.
 
+pub mod fem;
 pub mod joints;
+pub mod solver;
+pub mod sparse;

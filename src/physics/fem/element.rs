@@ -1,0 +1,158 @@
+//! The rest-state stiffness of one voxel: trilinear hexahedron with mean dilatation (B-bar).
+//!
+//! B-bar: Hughes, *The Finite Element Method* (1987), §4.5: the volumetric part of the strain operator is replaced by its
+//! mean over the element, which removes volumetric locking. A full voxel is integrated with 2×2×2 Gauss points; a
+//! partly filled one at the centres of its filled sub-cells, plus [`GHOST`] of the full stiffness so that a voxel that is
+//! almost empty stays regular.
+
+use crate::geometry::{
+    Vec3,
+    voxel::{Fill, SUB},
+};
+
+/// Stiffness of the empty part of a voxel relative to the full one.
+pub const GHOST: f64 = 0.01;
+
+/// A 24×24 matrix, column-major; degree of freedom `3 a + i` is axis `i` of corner `a`.
+pub type Stiffness = Box<[f64; 576]>;
+
+/// Local coordinates (each −1 or 1 over √3, mapped to `[0, 1]`) of the 2×2×2 Gauss points.
+pub fn gauss_points() -> [Vec3; 8] {
+    let at = |bit: usize| 0.5 + if bit == 1 { 0.5 } else { -0.5 } / 3f64.sqrt();
+    std::array::from_fn(|g| Vec3::new(at(g & 1), at(g >> 1 & 1), at(g >> 2 & 1)))
+}
+
+/// Gradients of the eight trilinear shape functions at local `xi` of a cube of edge `h`, 1/m.
+pub fn gradients(xi: &Vec3, h: f64) -> [Vec3; 8] {
+    std::array::from_fn(|corner| {
+        let side = |axis: usize| corner >> axis & 1 == 1;
+        let weight = |axis: usize| if side(axis) { xi[axis] } else { 1.0 - xi[axis] };
+        let slope = |axis: usize| if side(axis) { 1.0 / h } else { -1.0 / h };
+        Vec3::new(
+            slope(0) * weight(1) * weight(2),
+            weight(0) * slope(1) * weight(2),
+            weight(0) * weight(1) * slope(2),
+        )
+    })
+}
+
+/// Volume averages of the shape gradients over the whole cube: `±1/(4h)` on each axis.
+pub fn mean_gradients(h: f64) -> [Vec3; 8] {
+    std::array::from_fn(|corner| {
+        Vec3::from_fn(|axis, _| if corner >> axis & 1 == 1 { 0.25 / h } else { -0.25 / h })
+    })
+}
+
+/// Lamé parameters (λ, μ) in Pa.
+pub fn lame(youngs: f64, poisson: f64) -> (f64, f64) {
+    (youngs * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson)), youngs / (2.0 * (1.0 + poisson)))
+}
+
+/// Stiffness of a voxel of edge `h` of which `fill` is material.
+pub fn stiffness(h: f64, fill: &Fill, youngs: f64, poisson: f64) -> Stiffness {
+    let gauss: Vec<(Vec3, f64)> = gauss_points().iter().map(|xi| (*xi, h.powi(3) / 8.0)).collect();
+    let full = integrate(&gauss, h, youngs, poisson);
+    if *fill == Fill::full() {
+        return full;
+    }
+    let cells = SUB * SUB * SUB;
+    let points: Vec<(Vec3, f64)> = (0..cells)
+        .filter(|&cell| fill.contains(cell))
+        .map(|cell| (Fill::centre(cell), h.powi(3) / cells as f64))
+        .collect();
+    let mut part = integrate(&points, h, youngs, poisson);
+    part.iter_mut().zip(full.iter()).for_each(|(k, ghost)| *k += GHOST * ghost);
+    part
+}
+
+/// `Σ w Bᵀ C B` over the points, with the dilatation averaged over them.
+fn integrate(points: &[(Vec3, f64)], h: f64, youngs: f64, poisson: f64) -> Stiffness {
+    let (lambda, mu) = lame(youngs, poisson);
+    let volume: f64 = points.iter().map(|(_, w)| w).sum();
+    let mut mean = [Vec3::zeros(); 8];
+    for (xi, w) in points {
+        for (m, g) in mean.iter_mut().zip(gradients(xi, h)) {
+            *m += g * (w / volume);
+        }
+    }
+    let mut k = Box::new([0.0; 576]);
+    for (xi, w) in points {
+        add_point(&mut k, &gradients(xi, h), &mean, *w, lambda, mu);
+    }
+    k
+}
+
+/// Adds the deviatoric part of one point and the mean dilatation: `∫ 2μ dev ε : dev ε + κ tr̄²` with `κ = λ + 2μ/3`.
+fn add_point(k: &mut [f64; 576], g: &[Vec3; 8], mean: &[Vec3; 8], w: f64, lambda: f64, mu: f64) {
+    let kappa = lambda + 2.0 * mu / 3.0;
+    for a in 0..8 {
+        for b in 0..8 {
+            let dot = g[a].dot(&g[b]);
+            for i in 0..3 {
+                for j in 0..3 {
+                    let identity = if i == j { dot } else { 0.0 };
+                    let shear = mu * (identity + g[a][j] * g[b][i] - 2.0 / 3.0 * g[a][i] * g[b][j]);
+                    let bulk = kappa * mean[a][i] * mean[b][j];
+                    k[(3 * b + j) * 24 + 3 * a + i] += w * (shear + bulk);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn apply(k: &Stiffness, u: &[f64; 24]) -> [f64; 24] {
+        std::array::from_fn(|r| (0..24).map(|c| k[c * 24 + r] * u[c]).sum())
+    }
+
+    fn field(h: f64, f: impl Fn(Vec3) -> Vec3) -> [f64; 24] {
+        let mut u = [0.0; 24];
+        for a in 0..8 {
+            let x = Vec3::new((a & 1) as f64, (a >> 1 & 1) as f64, (a >> 2 & 1) as f64) * h;
+            u[3 * a..3 * a + 3].copy_from_slice(f(x).as_slice());
+        }
+        u
+    }
+
+    #[test]
+    fn rigid_motion_needs_no_force_and_stiffness_is_symmetric() {
+        let k = stiffness(0.01, &Fill::full(), 3e4, 0.45);
+        let scale = k.iter().cloned().fold(0.0, f64::max);
+        for u in [field(0.01, |_| Vec3::x()), field(0.01, |x| Vec3::new(0.3, -0.2, 0.5).cross(&x) * 100.0)] {
+            assert!(apply(&k, &u).iter().all(|f| f.abs() < 1e-12 * scale));
+        }
+        for r in 0..24 {
+            for c in 0..24 {
+                assert!((k[c * 24 + r] - k[r * 24 + c]).abs() < 1e-14 * scale);
+            }
+        }
+    }
+
+    #[test]
+    fn uniform_strain_stores_the_energy_of_hookes_law() {
+        let (h, youngs, poisson) = (0.013_f64, 4e4, 0.3);
+        let (lambda, mu) = lame(youngs, poisson);
+        let grad = nalgebra::Matrix3::new(1e-3, 2e-3, -1e-3, 0.5e-3, -2e-3, 1e-3, 1e-3, 0.0, 1.5e-3);
+        let strain = (grad + grad.transpose()) * 0.5;
+        let exact = 0.5 * h.powi(3) * (lambda * f64::powi(strain.trace(), 2) + 2.0 * mu * strain.norm_squared());
+        let u = field(h, |x| grad * x);
+        let k = stiffness(h, &Fill::full(), youngs, poisson);
+        let energy: f64 = 0.5 * apply(&k, &u).iter().zip(u).map(|(f, u)| f * u).sum::<f64>();
+        assert!((energy / exact - 1.0).abs() < 1e-12, "{energy} vs {exact}");
+    }
+
+    #[test]
+    fn a_half_filled_voxel_carries_half_the_uniform_energy_and_the_ghost() {
+        let mut half = Fill::default();
+        (0..SUB * SUB * SUB).filter(|cell| cell % SUB < SUB / 2).for_each(|cell| half.insert(cell));
+        let u = field(0.01, |x| Vec3::new(x.x, 0.0, 0.0));
+        let energy = |fill: &Fill| {
+            let k = stiffness(0.01, fill, 1e4, 0.2);
+            apply(&k, &u).iter().zip(u).map(|(f, u)| f * u).sum::<f64>()
+        };
+        assert!((energy(&half) / energy(&Fill::full()) - 0.5 - GHOST).abs() < 1e-12);
+    }
+}

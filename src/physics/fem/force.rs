@@ -1,0 +1,123 @@
+//! Elastic force of one element and its energy.
+
+use super::rotation::{polar, positive_inverse, stretch_hessian};
+use crate::geometry::{Mat3, Vec3};
+
+/// Corner positions or forces of an element.
+pub type Corners = [Vec3; 8];
+
+/// What one evaluation of an element gives.
+pub struct Elastic {
+    /// Rotation of the element.
+    pub rotation: Mat3,
+    /// Force on each corner, N, world frame: exactly `−∂U/∂x`.
+    pub force: Corners,
+    /// Stored energy, J.
+    pub energy: f64,
+}
+
+/// Force and energy of an element at world corner positions `x`.
+///
+/// `rest` are the corners at rest, `g` the mean shape gradients (1/m), `k0` the rest stiffness (N/m, column-major 24×24),
+/// `last` the rotation to start from. The force is `f_a = −R (p_a − q × g_a)` with `p = K₀ (y − X)`,
+/// `m = Σ y_a × p_a`, `S = Rᵀ F`, `q = (tr S I − S)⁻¹ m`: the second term is what the rotation's own change contributes;
+/// without it the force is not the derivative of the energy and has a spurious moment.
+pub fn elastic(x: &Corners, rest: &Corners, g: &[Vec3; 8], k0: &[f64; 576], last: Mat3) -> Elastic {
+    let f = deformation_gradient(x, g);
+    let r = polar(&f, last);
+    let mut u = [0.0; 24];
+    let mut y = [Vec3::zeros(); 8];
+    for a in 0..8 {
+        // Differences to one corner keep the digits far from the origin; translations cost nothing in K₀.
+        y[a] = r.tr_mul(&(x[a] - x[0]));
+        let d = y[a] - (rest[a] - rest[0]);
+        u[3 * a..3 * a + 3].copy_from_slice(d.as_slice());
+    }
+    let p = multiply(k0, &u);
+    let energy = 0.5 * p.iter().zip(&u).map(|(p, u)| p * u).sum::<f64>();
+    let corner = |a: usize| Vec3::new(p[3 * a], p[3 * a + 1], p[3 * a + 2]);
+    let moment: Vec3 = (1..8).map(|a| y[a].cross(&corner(a))).sum();
+    // An inverted or flattened element has no unique rotation; its projection term is left out there.
+    let q = positive_inverse(&stretch_hessian(&r.tr_mul(&f))).map_or(Vec3::zeros(), |inv| inv * moment);
+    let force = std::array::from_fn(|a| -(r * (corner(a) - q.cross(&g[a]))));
+    Elastic { rotation: r, force, energy }
+}
+
+/// Mean deformation gradient `F = Σ x_a ⊗ g_a`.
+pub fn deformation_gradient(x: &Corners, g: &[Vec3; 8]) -> Mat3 {
+    (1..8).fold(Mat3::zeros(), |f, a| f + (x[a] - x[0]) * g[a].transpose())
+}
+
+/// `K u` for a column-major 24×24 matrix.
+fn multiply(k: &[f64; 576], u: &[f64; 24]) -> [f64; 24] {
+    let mut p = [0.0; 24];
+    for (column, &value) in k.chunks_exact(24).zip(u) {
+        for (p, k) in p.iter_mut().zip(column) {
+            *p += k * value;
+        }
+    }
+    p
+}
+
+/// Least det F over the 2×2×2 Gauss points of a voxel of edge `h`; ≤ 0 means inverted.
+pub fn min_det(x: &Corners, gauss: &[[Vec3; 8]; 8]) -> f64 {
+    gauss.iter().map(|g| deformation_gradient(x, g).determinant()).fold(f64::INFINITY, f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        geometry::{Quat, voxel::Fill},
+        physics::fem::element::{mean_gradients, stiffness},
+    };
+    use proptest::prelude::*;
+
+    const H: f64 = 0.01;
+
+    fn cube() -> Corners {
+        std::array::from_fn(|a| Vec3::new((a & 1) as f64, (a >> 1 & 1) as f64, (a >> 2 & 1) as f64) * H)
+    }
+
+    fn evaluate(x: &Corners, last: Mat3) -> Elastic {
+        elastic(x, &cube(), &mean_gradients(H), &stiffness(H, &Fill::full(), 3e4, 0.4), last)
+    }
+
+    fn bent(e: &[f64]) -> Corners {
+        let mut x = cube();
+        x.iter_mut().enumerate().for_each(|(a, x)| *x += Vec3::from_column_slice(&e[3 * a..3 * a + 3]) * H);
+        x
+    }
+
+    #[test]
+    fn rigid_motion_gives_no_force_even_half_a_turn_away() {
+        for angle in [0.0, 0.3, std::f64::consts::FRAC_PI_2, std::f64::consts::PI] {
+            let turn = Quat::from_scaled_axis(Vec3::new(1.0, 2.0, -0.5).normalize() * angle);
+            let x = cube().map(|x| turn * x + Vec3::new(3.0, -2.0, 1.0));
+            let e = evaluate(&x, Mat3::identity());
+            let scale = 3e4 * H * H;
+            assert!(e.force.iter().all(|f| f.norm() < 1e-11 * scale), "at {angle}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn force_is_the_derivative_of_energy_without_net_force_or_moment(e in prop::collection::vec(-0.2f64..0.2, 24)) {
+            let x = bent(&e);
+            let at = evaluate(&x, Mat3::identity());
+            let scale = at.force.iter().map(|f| f.norm()).fold(0.0, f64::max);
+            let step = 1e-6 * H;
+            for a in 0..8 {
+                for i in 0..3 {
+                    let moved = |s: f64| { let mut y = x; y[a][i] += s; evaluate(&y, at.rotation).energy };
+                    // Fourth-order central difference: its own error is below 1e-8 of the scale.
+                    let slope = (8.0 * (moved(step) - moved(-step)) - (moved(2.0 * step) - moved(-2.0 * step))) / (12.0 * step);
+                    prop_assert!((at.force[a][i] + slope).abs() < 1e-7 * scale.max(1e-3), "{} vs {}", at.force[a][i], -slope);
+                }
+            }
+            let net: Vec3 = at.force.iter().sum();
+            let moment: Vec3 = (0..8).map(|a| x[a].cross(&at.force[a])).sum();
+            prop_assert!(net.norm() < 1e-12 * scale.max(1e-3) && moment.norm() < 1e-12 * scale.max(1e-3));
+        }
+    }
+}

@@ -1,0 +1,237 @@
+//! Velocities of points and the gather and scatter between points and blocks.
+
+use super::{
+    law::Answer,
+    problem::{Endpoint, Point, Problem},
+};
+use crate::geometry::{Mat3, Vec3};
+
+/// Rows of a patch's local system: up to two endpoints of eight nodes.
+const MAX_LOCAL: usize = 48;
+
+/// Local system of a patch: the endpoints' own coordinates (3 a node, 6 a screw), dense.
+pub struct Local {
+    size_a: usize,
+    size: usize,
+    gradient: [f64; MAX_LOCAL],
+    /// Column-major lower triangle of side `MAX_LOCAL`.
+    hessian: Vec<f64>,
+}
+
+impl Default for Local {
+    fn default() -> Self {
+        Self { size_a: 0, size: 0, gradient: [0.0; MAX_LOCAL], hessian: vec![0.0; MAX_LOCAL * MAX_LOCAL] }
+    }
+}
+
+fn size_of(end: &Endpoint) -> usize {
+    match end {
+        Endpoint::Known => 0,
+        Endpoint::Nodes { count, .. } => 3 * count,
+        Endpoint::Screw(_) => 6,
+    }
+}
+
+/// Velocities of an endpoint's own coordinates, gathered once a patch.
+pub fn gather(problem: &Problem, offsets: &[usize], end: &Endpoint, v: &[f64]) -> [Vec3; 8] {
+    let mut u = [Vec3::zeros(); 8];
+    match end {
+        Endpoint::Known => {}
+        Endpoint::Nodes { block, at, count } => {
+            for i in 0..*count {
+                let start = offsets[*block] + at[i] as usize;
+                u[i] = Vec3::new(v[start], v[start + 1], v[start + 2]);
+            }
+        }
+        Endpoint::Screw(screw) => {
+            let screw = &problem.screws[*screw];
+            let start = offsets[screw.block];
+            for (column, v) in screw.jacobian.chunks_exact(6).zip(&v[start..]) {
+                u[0] += Vec3::new(column[0], column[1], column[2]) * *v;
+                u[1] += Vec3::new(column[3], column[4], column[5]) * *v;
+            }
+        }
+    }
+    u
+}
+
+/// Velocity of a point on an endpoint.
+pub fn velocity(problem: &Problem, end: &Endpoint, u: &[Vec3; 8], weights: &[f64; 8], p: &Vec3) -> Vec3 {
+    match end {
+        Endpoint::Known => Vec3::zeros(),
+        Endpoint::Nodes { count, .. } => (0..*count).map(|i| u[i] * weights[i]).sum(),
+        Endpoint::Screw(screw) => u[0] + u[1].cross(&(p - problem.screws[*screw].origin)),
+    }
+}
+
+/// The 3 × 3 pieces by which an endpoint's coordinates move a point: `w I` for nodes, `I` and `−[r]×` for a screw.
+fn pieces(problem: &Problem, end: &Endpoint, weights: &[f64; 8], p: &Vec3, out: &mut [Piece; 8]) -> usize {
+    match end {
+        Endpoint::Known => 0,
+        Endpoint::Nodes { count, .. } => {
+            (0..*count).for_each(|i| out[i] = Piece::Scale(weights[i]));
+            *count
+        }
+        Endpoint::Screw(screw) => {
+            out[0] = Piece::Scale(1.0);
+            out[1] = Piece::Arm(p - problem.screws[*screw].origin);
+            2
+        }
+    }
+}
+
+#[derive(Clone, Copy)]
+enum Piece {
+    Scale(f64),
+    Arm(Vec3),
+}
+
+impl Piece {
+    /// `G · L`.
+    fn after(&self, g: &Mat3) -> Mat3 {
+        match self {
+            Self::Scale(w) => g * *w,
+            Self::Arm(r) => -(g * r.cross_matrix()),
+        }
+    }
+
+    /// `Lᵀ · M`.
+    fn before(&self, m: &Mat3) -> Mat3 {
+        match self {
+            Self::Scale(w) => m * *w,
+            Self::Arm(r) => r.cross_matrix() * m,
+        }
+    }
+
+    /// `Lᵀ · f`.
+    fn transpose_mul(&self, f: &Vec3) -> Vec3 {
+        match self {
+            Self::Scale(w) => f * *w,
+            Self::Arm(r) => r.cross(f),
+        }
+    }
+}
+
+impl Local {
+    /// Empties the local system for a patch between `a` and `b`.
+    pub fn start(&mut self, a: &Endpoint, b: &Endpoint) {
+        self.size_a = size_of(a);
+        self.size = self.size_a + size_of(b);
+        self.gradient[..self.size].fill(0.0);
+        for column in 0..self.size {
+            self.hessian[column * MAX_LOCAL..column * MAX_LOCAL + self.size].fill(0.0);
+        }
+    }
+
+    /// Adds one point's answer.
+    pub fn add(&mut self, problem: &Problem, a: &Endpoint, b: &Endpoint, point: &Point, answer: &Answer, curve: bool) {
+        let mut left = [Piece::Scale(0.0); 8];
+        let mut right = [Piece::Scale(0.0); 8];
+        let na = pieces(problem, a, &point.weights_a, &point.p, &mut left);
+        let nb = pieces(problem, b, &point.weights_b, &point.p, &mut right);
+        for (i, piece) in left[..na].iter().enumerate() {
+            self.add_gradient(3 * i, &-piece.transpose_mul(&answer.impulse));
+        }
+        for (i, piece) in right[..nb].iter().enumerate() {
+            self.add_gradient(self.size_a + 3 * i, &piece.transpose_mul(&answer.impulse));
+        }
+        if !curve {
+            return;
+        }
+        for j in 0..na {
+            let column = left[j].after(&answer.curvature);
+            (j..na).for_each(|i| self.add_block(3 * i, 3 * j, &left[i].before(&column)));
+            (0..nb).for_each(|i| self.add_block(self.size_a + 3 * i, 3 * j, &-right[i].before(&column)));
+        }
+        for j in 0..nb {
+            let column = right[j].after(&answer.curvature);
+            (j..nb).for_each(|i| self.add_block(self.size_a + 3 * i, self.size_a + 3 * j, &right[i].before(&column)));
+        }
+    }
+
+    fn add_gradient(&mut self, at: usize, g: &Vec3) {
+        self.gradient[at..at + 3].iter_mut().zip(g.iter()).for_each(|(x, g)| *x += g);
+    }
+
+    fn add_block(&mut self, row: usize, column: usize, m: &Mat3) {
+        for c in 0..3 {
+            let start = (column + c) * MAX_LOCAL + row;
+            self.hessian[start..start + 3].iter_mut().zip(m.column(c).iter()).for_each(|(h, m)| *h += m);
+        }
+    }
+
+    /// Adds the local system to the island's gradient and Hessian (side `n`, lower triangle).
+    pub fn scatter(&self, map: &Map, gradient: &mut [f64], hessian: Option<(&mut [f64], usize)>) {
+        map.scatter_vector(&self.gradient[..self.size], gradient);
+        if let Some((hessian, n)) = hessian {
+            map.scatter_matrix(|r, c| self.hessian[r.min(c) * MAX_LOCAL + r.max(c)], hessian, n);
+        }
+    }
+}
+
+/// How a patch's local coordinates read the island's velocities: each coordinate is a sparse row.
+#[derive(Default)]
+pub struct Map {
+    /// Per local coordinate: (island index, coefficient).
+    rows: Vec<Vec<(u32, f64)>>,
+    used: usize,
+}
+
+impl Map {
+    /// Sets the map for a patch.
+    pub fn set(&mut self, problem: &Problem, offsets: &[usize], a: &Endpoint, b: &Endpoint) {
+        self.used = 0;
+        [a, b].into_iter().for_each(|end| self.push(problem, offsets, end));
+    }
+
+    fn next(&mut self) -> &mut Vec<(u32, f64)> {
+        if self.used == self.rows.len() {
+            self.rows.push(Vec::new());
+        }
+        self.used += 1;
+        let row = &mut self.rows[self.used - 1];
+        row.clear();
+        row
+    }
+
+    fn push(&mut self, problem: &Problem, offsets: &[usize], end: &Endpoint) {
+        match end {
+            Endpoint::Known => {}
+            Endpoint::Nodes { block, at, count } => {
+                for (start, i) in at[..*count].iter().flat_map(|start| (0..3).map(move |i| (*start, i))) {
+                    let index = offsets[*block] as u32 + start + i;
+                    self.next().push((index, 1.0));
+                }
+            }
+            Endpoint::Screw(screw) => {
+                let screw = &problem.screws[*screw];
+                for row in 0..6 {
+                    let start = offsets[screw.block];
+                    let entries = screw.jacobian.iter().skip(row).step_by(6).enumerate();
+                    self.next().extend(
+                        entries.filter(|(_, j)| **j != 0.0).map(|(column, j)| ((start + column) as u32, *j)),
+                    );
+                }
+            }
+        }
+    }
+
+    fn scatter_vector(&self, local: &[f64], global: &mut [f64]) {
+        for (row, value) in self.rows[..self.used].iter().zip(local) {
+            row.iter().for_each(|(at, j)| global[*at as usize] += j * value);
+        }
+    }
+
+    fn scatter_matrix(&self, local: impl Fn(usize, usize) -> f64, global: &mut [f64], n: usize) {
+        for c in 0..self.used {
+            for r in 0..self.used {
+                let value = local(r, c);
+                for (column, jc) in &self.rows[c] {
+                    for (row, jr) in self.rows[r].iter().filter(|(row, _)| row >= column) {
+                        global[*column as usize * n + *row as usize] += jr * jc * value;
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,360 @@
+//! Newton's method with an exact line search on each island, and the lagged passes around it.
+
+use super::{
+    assemble::{Local, Map, gather, velocity},
+    law::contact,
+    problem::Problem,
+};
+use crate::physics::sparse::dense;
+
+/// Convergence of the gradient relative to the momenta in play (both scaled by `diag(A)^-1/2`).
+const RELATIVE: f64 = 1e-6;
+/// Convergence in absolute terms, √J.
+const ABSOLUTE: f64 = 1e-10;
+/// Most Newton steps a pass.
+const MAX_NEWTON: usize = 60;
+/// Most lagged passes.
+const MAX_PASSES: usize = 3;
+/// Change of the normal impulses that ends the passes.
+const PASS_CHANGE: f64 = 0.01;
+
+/// What a solve took.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Stats {
+    /// Newton steps over all passes and islands.
+    pub newton: u32,
+    /// Most Newton steps of one island.
+    pub newton_max: u32,
+}
+
+/// The solve did not converge: which block, and how far it was.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Failure {
+    /// A block of the island that failed.
+    pub block: usize,
+    /// Scaled gradient over tolerance.
+    pub excess: f64,
+}
+
+/// Buffers of the solver.
+#[derive(Default)]
+pub struct Solver {
+    offsets: Vec<usize>,
+    v: Vec<f64>,
+    trial: Vec<f64>,
+    step: Vec<f64>,
+    gradient: Vec<f64>,
+    trial_gradient: Vec<f64>,
+    product: Vec<f64>,
+    hessian: Vec<f64>,
+    scale: Vec<f64>,
+    local: Local,
+    map: Map,
+}
+
+/// The blocks, patches and scalars of one connected island.
+struct Island {
+    blocks: Vec<usize>,
+    patches: Vec<usize>,
+    scalars: Vec<usize>,
+    size: usize,
+}
+
+impl Solver {
+    /// Solves the problem in place: velocities in the blocks, impulses in points and scalars.
+    pub fn solve(&mut self, problem: &mut Problem) -> Result<Stats, Failure> {
+        let mut stats = Stats::default();
+        for island in islands(problem) {
+            let taken = self.solve_island(problem, &island)?;
+            stats.newton += taken;
+            stats.newton_max = stats.newton_max.max(taken);
+        }
+        Ok(stats)
+    }
+
+    fn solve_island(&mut self, problem: &mut Problem, island: &Island) -> Result<u32, Failure> {
+        self.prepare(problem, island);
+        let mut taken = 0;
+        for pass in 0..MAX_PASSES {
+            taken += self.newton(problem, island)?;
+            let (change, total) = self.record(problem, island);
+            if change <= PASS_CHANGE * total {
+                break;
+            }
+            if pass + 1 < MAX_PASSES {
+                island_points(problem, island).into_iter().for_each(|range| {
+                    problem.points[range].iter_mut().for_each(|p| p.lagged = p.normal_impulse);
+                });
+            }
+        }
+        for &block in &island.blocks {
+            let (start, dim) = (self.offsets[block], problem.blocks[block].dim);
+            problem.blocks[block].v.copy_from_slice(&self.v[start..start + dim]);
+        }
+        for &row in &island.scalars {
+            let scalar = &mut problem.scalars[row];
+            scalar.force = scalar.answer(problem.dt, self.v[self.offsets[scalar.block] + scalar.index]).0;
+        }
+        Ok(taken)
+    }
+
+    fn prepare(&mut self, problem: &Problem, island: &Island) {
+        self.offsets.resize(problem.blocks.len(), 0);
+        self.v.clear();
+        self.scale.clear();
+        for &block in &island.blocks {
+            self.offsets[block] = self.v.len();
+            let b = &problem.blocks[block];
+            self.v.extend_from_slice(&b.v);
+            self.scale.extend((0..b.dim).map(|i| 1.0 / b.matrix[i * b.dim + i].sqrt()));
+        }
+        for buffer in [&mut self.trial, &mut self.step, &mut self.gradient, &mut self.trial_gradient, &mut self.product] {
+            buffer.resize(island.size, 0.0);
+        }
+    }
+
+    /// Newton's method for one pass; the number of steps taken.
+    fn newton(&mut self, problem: &Problem, island: &Island) -> Result<u32, Failure> {
+        let mut excess = f64::INFINITY;
+        for taken in 0..MAX_NEWTON as u32 {
+            let n = island.size;
+            self.hessian.resize(n * n, 0.0);
+            let mut hessian = std::mem::take(&mut self.hessian);
+            let v = std::mem::take(&mut self.v);
+            let mut gradient = std::mem::take(&mut self.gradient);
+            let cost = self.evaluate(problem, island, &v, &mut gradient, Some(&mut hessian));
+            (self.hessian, self.v, self.gradient) = (hessian, v, gradient);
+            excess = self.excess(problem, island);
+            if excess <= 1.0 {
+                return Ok(taken);
+            }
+            self.step.iter_mut().zip(&self.gradient).for_each(|(s, g)| *s = -g);
+            if !excess.is_finite() || !dense::partial_cholesky(&mut self.hessian[..n * n], n, n) {
+                break;
+            }
+            dense::forward(&self.hessian, n, n, &mut self.step);
+            dense::backward(&self.hessian, n, n, &mut self.step);
+            if !self.line_search(problem, island, cost) {
+                // No descent left in floating point: as converged as it can be if it is near.
+                return if excess < 1e3 { Ok(taken) } else { Err(Failure { block: island.blocks[0], excess }) };
+            }
+        }
+        Err(Failure { block: island.blocks[0], excess })
+    }
+
+    /// Scaled gradient over tolerance.
+    fn excess(&self, problem: &Problem, island: &Island) -> f64 {
+        let norm = |values: &[f64]| {
+            values.iter().zip(&self.scale).map(|(g, s)| (g * s).powi(2)).sum::<f64>().sqrt()
+        };
+        let mut rhs = 0.0;
+        for &block in &island.blocks {
+            let start = self.offsets[block];
+            let b = &problem.blocks[block];
+            rhs += b.rhs.iter().zip(&self.scale[start..]).map(|(r, s)| (r * s).powi(2)).sum::<f64>();
+        }
+        let momentum = rhs.sqrt().max(norm(&self.product));
+        norm(&self.gradient) / (RELATIVE * momentum + ABSOLUTE)
+    }
+
+    /// Moves along `step` to a lower cost: the full step if it is good, else the minimum on the line.
+    fn line_search(&mut self, problem: &Problem, island: &Island, cost: f64) -> bool {
+        let slope: f64 = self.gradient.iter().zip(&self.step).map(|(g, s)| g * s).sum();
+        if slope.is_nan() || slope >= 0.0 {
+            return false;
+        }
+        let (mut low, mut high, mut at) = (0.0, f64::INFINITY, 1.0);
+        for _ in 0..40 {
+            let (value, along) = self.probe(problem, island, at);
+            let enough = value <= cost + 1e-4 * at * slope;
+            if enough && along.abs() <= 0.3 * slope.abs() {
+                break;
+            }
+            if along > 0.0 || !value.is_finite() {
+                high = at;
+            } else {
+                low = at;
+            }
+            if high.is_infinite() {
+                // Beyond the full step the model is exact enough: take it.
+                if enough {
+                    break;
+                }
+                at *= 1.5;
+            } else {
+                at = 0.5 * (low + high);
+            }
+            if high - low < 1e-9 {
+                if !(value <= cost) {
+                    return false;
+                }
+                break;
+            }
+        }
+        std::mem::swap(&mut self.v, &mut self.trial);
+        true
+    }
+
+    /// Cost and slope at `v + at · step`; leaves that point in `trial`.
+    fn probe(&mut self, problem: &Problem, island: &Island, at: f64) -> (f64, f64) {
+        self.trial.iter_mut().zip(&self.v).zip(&self.step).for_each(|((t, v), s)| *t = v + at * s);
+        let trial = std::mem::take(&mut self.trial);
+        let mut gradient = std::mem::take(&mut self.trial_gradient);
+        let value = self.evaluate(problem, island, &trial, &mut gradient, None);
+        let along = gradient.iter().zip(&self.step).map(|(g, s)| g * s).sum();
+        (self.trial, self.trial_gradient) = (trial, gradient);
+        (value, along)
+    }
+
+    /// Cost, gradient and, if asked, Hessian at `v`.
+    fn evaluate(
+        &mut self,
+        problem: &Problem,
+        island: &Island,
+        v: &[f64],
+        gradient: &mut [f64],
+        mut hessian: Option<&mut Vec<f64>>,
+    ) -> f64 {
+        let n = island.size;
+        let mut cost = self.momentum_terms(problem, island, v, gradient, hessian.as_deref_mut());
+        for &index in &island.patches {
+            let patch = &problem.patches[index];
+            let ua = gather(problem, &self.offsets, &patch.a, v);
+            let ub = gather(problem, &self.offsets, &patch.b, v);
+            self.local.start(&patch.a, &patch.b);
+            let mut touched = false;
+            for point in &problem.points[patch.first..patch.last] {
+                let relative = velocity(problem, &patch.a, &ua, &point.weights_a, &point.p)
+                    - velocity(problem, &patch.b, &ub, &point.weights_b, &point.p)
+                    - point.drift;
+                let answer = contact(point, problem.dt, problem.tau, &relative);
+                if answer.normal == 0.0 && point.lagged == 0.0 {
+                    continue;
+                }
+                touched = true;
+                cost += answer.cost;
+                self.local.add(problem, &patch.a, &patch.b, point, &answer, hessian.is_some());
+            }
+            if touched {
+                self.map.set(problem, &self.offsets, &patch.a, &patch.b);
+                self.local.scatter(&self.map, gradient, hessian.as_deref_mut().map(|h| (h.as_mut_slice(), n)));
+            }
+        }
+        for &row in &island.scalars {
+            let scalar = &problem.scalars[row];
+            let at = self.offsets[scalar.block] + scalar.index;
+            let (force, slope, value) = scalar.answer(problem.dt, v[at]);
+            cost += value;
+            gradient[at] -= problem.dt * force;
+            if let Some(h) = hessian.as_deref_mut() {
+                h[at * n + at] += slope;
+            }
+        }
+        cost
+    }
+
+    /// `½ vᵀA v − rᵀv`, its gradient and `A` itself.
+    fn momentum_terms(
+        &mut self,
+        problem: &Problem,
+        island: &Island,
+        v: &[f64],
+        gradient: &mut [f64],
+        mut hessian: Option<&mut Vec<f64>>,
+    ) -> f64 {
+        let n = island.size;
+        if let Some(h) = hessian.as_deref_mut() {
+            h[..n * n].fill(0.0);
+        }
+        let mut cost = 0.0;
+        for &block in &island.blocks {
+            let (b, start) = (&problem.blocks[block], self.offsets[block]);
+            let range = start..start + b.dim;
+            let product = &mut self.product[range.clone()];
+            dense::symmetric_multiply(&b.matrix, b.dim, &v[range.clone()], product);
+            for ((g, p), (r, v)) in
+                gradient[range.clone()].iter_mut().zip(product.iter()).zip(b.rhs.iter().zip(&v[range]))
+            {
+                *g = p - r;
+                cost += v * (0.5 * p - r);
+            }
+            if let Some(h) = hessian.as_deref_mut() {
+                for column in 0..b.dim {
+                    let target = (start + column) * n + start + column;
+                    let source = &b.matrix[column * b.dim + column..(column + 1) * b.dim];
+                    h[target..target + source.len()].copy_from_slice(source);
+                }
+            }
+        }
+        cost
+    }
+
+    /// Writes impulses into the points; returns (change against the lagged ones, total) of the normal impulses.
+    fn record(&mut self, problem: &mut Problem, island: &Island) -> (f64, f64) {
+        let (mut change, mut total) = (0.0, 0.0);
+        for &index in &island.patches {
+            let patch = problem.patches[index];
+            let ua = gather(problem, &self.offsets, &patch.a, &self.v);
+            let ub = gather(problem, &self.offsets, &patch.b, &self.v);
+            for at in patch.first..patch.last {
+                let point = &problem.points[at];
+                let relative = velocity(problem, &patch.a, &ua, &point.weights_a, &point.p)
+                    - velocity(problem, &patch.b, &ub, &point.weights_b, &point.p)
+                    - point.drift;
+                let answer = contact(point, problem.dt, problem.tau, &relative);
+                change += (answer.normal - point.lagged).abs();
+                total += answer.normal;
+                let point = &mut problem.points[at];
+                point.normal_impulse = answer.normal;
+                point.shear_impulse = answer.impulse - point.normal * answer.normal;
+                point.slipping = answer.slipping;
+            }
+        }
+        (change, total)
+    }
+}
+
+fn island_points(problem: &Problem, island: &Island) -> Vec<std::ops::Range<usize>> {
+    island.patches.iter().map(|&i| problem.patches[i].first..problem.patches[i].last).collect()
+}
+
+/// Splits a problem into islands of blocks that patches connect.
+fn islands(problem: &Problem) -> Vec<Island> {
+    let mut root: Vec<usize> = (0..problem.blocks.len()).collect();
+    fn find(root: &mut [usize], mut at: usize) -> usize {
+        while root[at] != at {
+            root[at] = root[root[at]];
+            at = root[at];
+        }
+        at
+    }
+    for patch in &problem.patches {
+        if let (Some(a), Some(b)) = (problem.block_of(&patch.a), problem.block_of(&patch.b)) {
+            let (a, b) = (find(&mut root, a), find(&mut root, b));
+            root[a.max(b)] = a.min(b);
+        }
+    }
+    let mut islands: Vec<Island> = Vec::new();
+    let mut of_root = vec![usize::MAX; root.len()];
+    for block in 0..problem.blocks.len() {
+        let r = find(&mut root, block);
+        if of_root[r] == usize::MAX {
+            of_root[r] = islands.len();
+            islands.push(Island { blocks: Vec::new(), patches: Vec::new(), scalars: Vec::new(), size: 0 });
+        }
+        islands[of_root[r]].blocks.push(block);
+        islands[of_root[r]].size += problem.blocks[block].dim;
+    }
+    for (index, patch) in problem.patches.iter().enumerate() {
+        if let Some(block) = problem.block_of(&patch.a).or(problem.block_of(&patch.b)) {
+            let r = find(&mut root, block);
+            islands[of_root[r]].patches.push(index);
+        }
+    }
+    for (index, scalar) in problem.scalars.iter().enumerate() {
+        let r = find(&mut root, scalar.block);
+        islands[of_root[r]].scalars.push(index);
+    }
+    islands.retain(|island| island.size > 0);
+    islands
+}
