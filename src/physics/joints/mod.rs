@@ -1,1 +1,22 @@
-//! Joint trees: links joined by revolute and prismatic joints, on a fixed base.
+//! Articulated mechanisms: trees of rigid links joined by one-degree-of-freedom joints.
+//!
+//! The equation of motion is `M(q) v̇ + bias(q, v) = τ + Σ Jᵀ f`: [`mass_matrix`] gives `M`, [`bias`] the
+//! Coriolis, centrifugal and gravity terms, [`jacobian`] and [`point_jacobian`] the `J` of what touches a link.
+//! Everything is computed in world coordinates from the link poses that [`forward`] returns, so that a step needs
+//! the kinematics once. Each function has an `_into` variant that writes to buffers of the caller.
+
+mod dynamics;
+mod kinematics;
+mod tree;
+
+pub use dynamics::{
+    Scratch, bias, bias_into, kinetic_energy, mass_matrix, mass_matrix_into, potential_energy,
+};
+pub use kinematics::{
+    LinkVelocity, forward, forward_into, jacobian, jacobian_into, point_jacobian, point_jacobian_into,
+    velocities, velocities_into,
+};
+pub use tree::{JointKind, Link, Tree, TreeError, TreeState};
+
+#[cfg(test)]
+mod tests;

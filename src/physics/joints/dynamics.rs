@@ -1,0 +1,187 @@
+//! Inertia and bias forces of a joint tree, by the composite-rigid-body and recursive Newton–Euler algorithms
+//! (Featherstone, Rigid Body Dynamics Algorithms, 2008, chapters 5 and 6), with every spatial vector taken at the
+//! world origin: no transform between links is then needed.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::{Tree, kinematics::joint_velocity, tree::point_inertia};
+use crate::geometry::{Mat3, Pose, Vec3};
+
+/// A spatial velocity, acceleration or (moment, force) pair at the world origin.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Spatial {
+    /// Angular velocity, or moment about the world origin.
+    turn: Vec3,
+    /// Velocity of the point at the world origin, or force.
+    push: Vec3,
+}
+
+impl Spatial {
+    fn plus(&self, other: &Self, scale: f64) -> Self {
+        Self { turn: self.turn + other.turn * scale, push: self.push + other.push * scale }
+    }
+
+    fn dot(&self, other: &Self) -> f64 {
+        self.turn.dot(&other.turn) + self.push.dot(&other.push)
+    }
+
+    /// Rate of change of the motion `other` carried along by `self` (Featherstone's ×).
+    fn cross_motion(&self, other: &Self) -> Self {
+        Self {
+            turn: self.turn.cross(&other.turn),
+            push: self.turn.cross(&other.push) + self.push.cross(&other.turn),
+        }
+    }
+
+    /// Rate of change of the momentum or force `other` carried along by `self` (Featherstone's ×*).
+    fn cross_force(&self, other: &Self) -> Self {
+        Self {
+            turn: self.turn.cross(&other.turn) + self.push.cross(&other.push),
+            push: self.turn.cross(&other.push),
+        }
+    }
+}
+
+/// Rigid-body inertia about the world origin, world axes.
+#[derive(Clone, Copy, Debug)]
+struct Inertia {
+    /// Mass, kg.
+    mass: f64,
+    /// Mass times centre of mass, kg m.
+    first: Vec3,
+    /// Second moment about the origin, kg m².
+    second: Mat3,
+}
+
+impl Inertia {
+    fn of(tree: &Tree, poses: &[Pose], index: usize) -> Self {
+        let link = &tree.links[index];
+        let com = poses[index].transform_point(&link.com.into()).coords;
+        let turn = poses[index].rotation.to_rotation_matrix();
+        let central = turn.matrix() * link.inertia * turn.matrix().transpose();
+        Self { mass: link.mass, first: com * link.mass, second: central + point_inertia(link.mass, &com) }
+    }
+
+    fn momentum(&self, motion: &Spatial) -> Spatial {
+        Spatial {
+            turn: self.second * motion.turn + self.first.cross(&motion.push),
+            push: motion.push * self.mass - self.first.cross(&motion.turn),
+        }
+    }
+}
+
+/// Buffers of the dynamics, kept by the caller so that a step allocates nothing.
+#[derive(Clone, Debug, Default)]
+pub struct Scratch {
+    axes: Vec<Spatial>,
+    inertias: Vec<Inertia>,
+    velocities: Vec<Spatial>,
+    accelerations: Vec<Spatial>,
+    forces: Vec<Spatial>,
+}
+
+impl Scratch {
+    fn load(&mut self, tree: &Tree, poses: &[Pose]) {
+        self.axes.clear();
+        self.inertias.clear();
+        for index in 0..tree.dofs() {
+            let (push, turn) = joint_velocity(tree, poses, index, &Vec3::zeros());
+            self.axes.push(Spatial { turn, push });
+            self.inertias.push(Inertia::of(tree, poses, index));
+        }
+    }
+}
+
+/// The joint-space mass matrix `M(q)`, n×n (kg m², kg m, kg by kinds of joint), symmetric positive definite.
+pub fn mass_matrix(tree: &Tree, poses: &[Pose]) -> DMatrix<f64> {
+    let mut out = DMatrix::zeros(tree.dofs(), tree.dofs());
+    mass_matrix_into(tree, poses, &mut Scratch::default(), &mut out);
+    out
+}
+
+/// As [`mass_matrix`], into an n×n matrix.
+pub fn mass_matrix_into(tree: &Tree, poses: &[Pose], scratch: &mut Scratch, out: &mut DMatrix<f64>) {
+    scratch.load(tree, poses);
+    out.fill(0.0);
+    for index in (0..tree.dofs()).rev() {
+        let composite = scratch.inertias[index];
+        if let Some(parent) = tree.links[index].parent {
+            let carrier = &mut scratch.inertias[parent];
+            carrier.mass += composite.mass;
+            carrier.first += composite.first;
+            carrier.second += composite.second;
+        }
+        let momentum = composite.momentum(&scratch.axes[index]);
+        let mut at = Some(index);
+        while let Some(ancestor) = at {
+            let entry = scratch.axes[ancestor].dot(&momentum);
+            out[(index, ancestor)] = entry;
+            out[(ancestor, index)] = entry;
+            at = tree.links[ancestor].parent;
+        }
+    }
+}
+
+/// The effort that keeps the joints from accelerating at speeds `v` under `gravity` (world, m/s²): Coriolis,
+/// centrifugal and gravity terms, N m or N. With `v = 0` it is the gravity compensation.
+pub fn bias(tree: &Tree, poses: &[Pose], v: &[f64], gravity: &Vec3) -> DVector<f64> {
+    let mut out = DVector::zeros(tree.dofs());
+    bias_into(tree, poses, v, gravity, &mut Scratch::default(), &mut out);
+    out
+}
+
+/// As [`bias`], into a vector of n entries.
+pub fn bias_into(
+    tree: &Tree,
+    poses: &[Pose],
+    v: &[f64],
+    gravity: &Vec3,
+    scratch: &mut Scratch,
+    out: &mut DVector<f64>,
+) {
+    scratch.load(tree, poses);
+    let Scratch { axes, inertias, velocities, accelerations, forces } = scratch;
+    velocities.clear();
+    accelerations.clear();
+    forces.clear();
+    // Weight enters as an upward acceleration of the base.
+    let base = (Spatial::default(), Spatial { turn: Vec3::zeros(), push: -gravity });
+    for (index, link) in tree.links.iter().enumerate() {
+        let (velocity, acceleration) =
+            link.parent.map_or(base, |parent| (velocities[parent], accelerations[parent]));
+        let velocity: Spatial = velocity.plus(&axes[index], v[index]);
+        let acceleration: Spatial = acceleration.plus(&velocity.cross_motion(&axes[index]), v[index]);
+        let inertia = &inertias[index];
+        let force =
+            inertia.momentum(&acceleration).plus(&velocity.cross_force(&inertia.momentum(&velocity)), 1.0);
+        velocities.push(velocity);
+        accelerations.push(acceleration);
+        forces.push(force);
+    }
+    for (index, link) in tree.links.iter().enumerate().rev() {
+        out[index] = axes[index].dot(&forces[index]);
+        if let Some(parent) = link.parent {
+            forces[parent] = forces[parent].plus(&forces[index], 1.0);
+        }
+    }
+}
+
+/// Kinetic energy at joint speeds `v`, J: the sum over links, independent of [`mass_matrix`].
+pub fn kinetic_energy(tree: &Tree, poses: &[Pose], v: &[f64]) -> f64 {
+    let velocities = super::velocities(tree, poses, v);
+    let energy = |index: usize| {
+        let (link, pose, velocity) = (&tree.links[index], &poses[index], &velocities[index]);
+        let com = velocity.at(pose, &pose.transform_point(&link.com.into()).coords);
+        let spin = pose.rotation.inverse_transform_vector(&velocity.angular);
+        0.5 * (link.mass * com.norm_squared() + spin.dot(&(link.inertia * spin)))
+    };
+    (0..tree.dofs()).map(energy).sum()
+}
+
+/// Potential energy under `gravity` (world, m/s²), zero with every centre of mass at the world origin, J.
+pub fn potential_energy(tree: &Tree, poses: &[Pose], gravity: &Vec3) -> f64 {
+    let energy = |(link, pose): (&super::Link, &Pose)| {
+        -link.mass * gravity.dot(&pose.transform_point(&link.com.into()).coords)
+    };
+    tree.links.iter().zip(poses).map(energy).sum()
+}
