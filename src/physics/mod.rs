@@ -2,4 +2,6 @@
 //!
 //! Knows no Lua, no files and no images. [`World`] owns the state; [`World::step`] is the whole algorithm.
 
+pub mod contact;
 pub mod joints;
+pub mod rigid;
