@@ -2,7 +2,9 @@
 //!
 //! Knows no Lua, no files and no images.
 
+pub mod contact;
 pub mod fem;
 pub mod joints;
+pub mod rigid;
 pub mod solver;
 pub mod sparse;

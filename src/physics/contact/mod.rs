@@ -1,0 +1,3 @@
+//! Contact: where bodies touch and how hard they rub.
+
+pub mod manifold;
