@@ -117,6 +117,7 @@ mod tests {
             lagged,
             normal_impulse: 0.0,
             shear_impulse: Vec3::zeros(),
+            velocity: Vec3::zeros(),
             slipping: false,
         }
     }

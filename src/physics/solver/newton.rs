@@ -308,6 +308,7 @@ impl Solver {
                 point.normal_impulse = answer.normal;
                 point.shear_impulse = answer.impulse - point.normal * answer.normal;
                 point.slipping = answer.slipping;
+                point.velocity = relative;
             }
         }
         (change, total)

@@ -87,6 +87,8 @@ pub struct Point {
     pub normal_impulse: f64,
     /// Result: tangential impulse on `a`, N s.
     pub shear_impulse: Vec3,
+    /// Result: relative velocity, m/s.
+    pub velocity: Vec3,
     /// Result: whether the friction bound was reached.
     pub slipping: bool,
 }

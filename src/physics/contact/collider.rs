@@ -1,0 +1,116 @@
+//! Colliders: surfaces that contact samples can meet, and what carries them.
+
+use std::{fmt::Debug, sync::Arc};
+
+use crate::geometry::{
+    Pose, Vec3,
+    shape::{Aabb, Contact, Shape},
+};
+
+/// A solid's surface as contact samples feel it, in its own frame.
+pub trait Surface: Debug + Send + Sync {
+    /// Contact of a square sample of edge `spacing` (m) at `p` whose own outward normal is `facing`.
+    fn contact(&self, p: &Vec3, facing: &Vec3, spacing: f64) -> Contact;
+    /// A box around the solid.
+    fn bounds(&self) -> Aabb;
+}
+
+impl Surface for Shape {
+    fn contact(&self, p: &Vec3, facing: &Vec3, spacing: f64) -> Contact {
+        Self::contact(self, p, facing, spacing)
+    }
+
+    fn bounds(&self) -> Aabb {
+        Self::bounds(self)
+    }
+}
+
+/// Index of a collider in its world.
+pub type ColliderId = usize;
+
+/// What carries a collider.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mover {
+    /// Nothing: part of the world.
+    Static,
+    /// A kinematic frame, by index: its motion is prescribed.
+    Kinematic(usize),
+    /// A free rigid body, by index (its object frame).
+    Rigid(usize),
+    /// A link of a joint tree.
+    Link {
+        /// Tree index.
+        tree: usize,
+        /// Link index in the tree.
+        link: usize,
+    },
+}
+
+/// Coulomb coefficients of one surface; a pair takes the larger of each.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Friction {
+    /// Static coefficient.
+    pub static_mu: f64,
+    /// Dynamic coefficient.
+    pub dynamic_mu: f64,
+}
+
+impl Friction {
+    /// The coefficients of a pair.
+    pub fn with(&self, other: &Self) -> Self {
+        Self {
+            static_mu: self.static_mu.max(other.static_mu),
+            dynamic_mu: self.dynamic_mu.max(other.dynamic_mu),
+        }
+    }
+}
+
+/// Stiffness of a surface layer per area, Pa/m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Layer {
+    /// Normal.
+    pub normal: f64,
+    /// Tangential.
+    pub shear: f64,
+}
+
+impl Layer {
+    /// Two layers in series.
+    pub fn in_series(&self, other: &Self) -> Self {
+        let series = |a: f64, b: f64| 1.0 / (1.0 / a + 1.0 / b);
+        Self { normal: series(self.normal, other.normal), shear: series(self.shear, other.shear) }
+    }
+}
+
+/// A surface somewhere in the world.
+#[derive(Clone, Debug)]
+pub struct Collider {
+    /// Name, for messages and logs.
+    pub name: String,
+    /// What carries it.
+    pub mover: Mover,
+    /// Its frame in that of its mover.
+    pub pose_in_mover: Pose,
+    /// Its surface.
+    pub surface: Arc<dyn Surface>,
+    /// Its friction.
+    pub friction: Friction,
+    /// Its compliance.
+    pub layer: Layer,
+    /// Its bounds, in its own frame.
+    pub bounds: Aabb,
+}
+
+impl Collider {
+    /// A collider of `surface` at `pose_in_mover` on `mover`.
+    pub fn new(
+        name: &str,
+        (mover, pose_in_mover): (Mover, Pose),
+        surface: Arc<dyn Surface>,
+        friction: Friction,
+        layer: Layer,
+    ) -> Self {
+        let bounds = surface.bounds();
+        Self { name: name.to_owned(), mover, pose_in_mover, surface, friction, layer, bounds }
+    }
+}

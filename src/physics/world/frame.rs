@@ -1,0 +1,140 @@
+//! What observers see: cheap copies of the state, and who touches whom.
+
+use super::{RowOf, World};
+use crate::{
+    geometry::{Pose, Vec3},
+    physics::solver::Point,
+};
+
+/// An immutable copy of the state after a step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frame {
+    /// Step, counted from 1.
+    pub step: u64,
+    /// Time, s.
+    pub time: f64,
+    /// Node positions of each soft body, m, world.
+    pub nodes: Vec<Vec<Vec3>>,
+    /// Object frames of the rigid bodies, world.
+    pub rigid: Vec<Pose>,
+    /// Joint coordinates of each tree.
+    pub joints: Vec<Vec<f64>>,
+    /// Link frames of each tree, world.
+    pub links: Vec<Vec<Pose>>,
+    /// Contacts of the colliders asked for.
+    pub patches: Vec<ContactPatch>,
+}
+
+/// Everything that touches one collider, in the collider's frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ContactPatch {
+    /// The collider.
+    pub collider: usize,
+    /// Its points with a normal impulse.
+    pub points: Vec<PatchPoint>,
+}
+
+/// One touching sample.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PatchPoint {
+    /// Soft body it belongs to.
+    pub body: usize,
+    /// Sample group (face or element) of that body.
+    pub face: usize,
+    /// Weights of the group's nodes.
+    pub weights: [f64; 8],
+    /// Position in the collider's frame, m.
+    pub p_p: Vec3,
+    /// Area it stands for, m², as far as the collider covers it.
+    pub area: f64,
+    /// Gap, m; negative is overlap.
+    pub gap: f64,
+    /// Normal traction, Pa.
+    pub pressure: f64,
+    /// Shear traction on the body in the collider's frame, Pa.
+    pub shear_p: Vec3,
+    /// Whether friction is at its bound.
+    pub slipping: bool,
+}
+
+/// What one collider does to one soft body, summed over the patch.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Touch {
+    /// Touching samples.
+    pub samples: usize,
+    /// Of those, samples at the friction bound.
+    pub slipping: usize,
+    /// Sum of the normal forces, N.
+    pub normal_force: f64,
+    /// Force on the body, N, world.
+    pub force_w: Vec3,
+    /// Sum of the friction bounds μ f_n in force, N: what the patch can hold.
+    pub capacity: f64,
+    /// Force-weighted mean distance that the anchors were dragged, m.
+    pub travel: f64,
+}
+
+impl World {
+    /// A copy of the state, with the contact patches of `colliders`.
+    pub fn snapshot(&self, colliders: &[usize]) -> Frame {
+        Frame {
+            step: self.step,
+            time: self.time(),
+            nodes: self.soft.iter().map(|s| s.body.x.clone()).collect(),
+            rigid: self.rigid.iter().map(|r| r.body.object_w()).collect(),
+            joints: self.trees.iter().map(|t| t.state.q.as_slice().to_vec()).collect(),
+            links: self.trees.iter().map(|t| t.poses.clone()).collect(),
+            patches: colliders.iter().map(|&c| self.patch(c)).collect(),
+        }
+    }
+
+    /// What touched a collider in the last step.
+    pub fn patch(&self, collider: usize) -> ContactPatch {
+        let dt = self.params.dt;
+        let rows = self.rows.iter().zip(&self.problem.points);
+        let points = rows
+            .filter(|(row, point)| row.partner as usize == collider && point.normal_impulse > 0.0)
+            .map(|(row, point)| {
+                let pose = &self.moving[collider].pose;
+                let rest = &self.soft[row.soft].body.rest;
+                let area = rest.samples[row.candidate.sample].surface.area * row.candidate.coverage;
+                PatchPoint {
+                    body: row.soft,
+                    face: row.candidate.group,
+                    weights: point.weights_a,
+                    p_p: pose.inverse_transform_point(&row.candidate.p.into()).coords,
+                    area,
+                    gap: point.gap,
+                    pressure: point.normal_impulse / dt / area,
+                    shear_p: pose.rotation.inverse_transform_vector(&point.shear_impulse) / dt / area,
+                    slipping: point.slipping,
+                }
+            })
+            .collect();
+        ContactPatch { collider, points }
+    }
+
+    /// What `collider` did to soft body `soft` in the last step in which the body was awake.
+    pub fn touch(&self, soft: usize, collider: usize) -> Touch {
+        let touches = &self.soft[soft].touches;
+        touches.iter().find(|(id, _)| *id as usize == collider).map_or(Touch::default(), |(_, touch)| *touch)
+    }
+}
+
+impl Touch {
+    /// Adds one point to the touch of its partner.
+    pub(super) fn add(touches: &mut Vec<(u32, Self)>, row: &RowOf, point: &Point, dt: f64) {
+        let at = touches.iter().position(|(id, _)| *id == row.partner).unwrap_or_else(|| {
+            touches.push((row.partner, Self::default()));
+            touches.len() - 1
+        });
+        let touch = &mut touches[at].1;
+        let force = point.normal_impulse / dt;
+        touch.samples += 1;
+        touch.slipping += usize::from(point.slipping);
+        touch.travel = (touch.travel * touch.normal_force + row.travel * force) / (touch.normal_force + force);
+        touch.normal_force += force;
+        touch.force_w += (point.normal * point.normal_impulse + point.shear_impulse) / dt;
+        touch.capacity += point.mu * force;
+    }
+}
