@@ -27,7 +27,10 @@ const REACH: (f64, f64) = (0.2, 0.6);
 const REACHED: (f64, f64) = (1e-4, 1e-3);
 
 /// Steps that [`DiffIk::solve`] takes from each start.
-const SOLVE_STEPS: usize = 150;
+const SOLVE_STEPS: usize = 100;
+
+/// Further starts of [`DiffIk::solve`] when the first fails.
+const POSTURES: u32 = 48;
 
 /// Differential inverse kinematics with its last command.
 #[derive(Clone, Debug)]
@@ -67,7 +70,8 @@ impl DiffIk {
     ///
     /// The command moves on from the last one (from `q_now` at first) no faster than the slowest joint's speed limit
     /// allows, all joints scaled alike so that the direction stays. Limiting the command and not its lead over
-    /// `q_now` keeps the full speed in spite of the drives' lag.
+    /// `q_now` keeps the full speed in spite of the drives' lag. All numbers must be finite: a policy's are checked
+    /// where they enter.
     pub fn step(&mut self, q_now: &ArmAngles, target_b: &Pose) -> ArmAngles {
         let q: Joints = (*q_now).into();
         let last = self.command.unwrap_or(q);
@@ -81,13 +85,13 @@ impl DiffIk {
         command.into()
     }
 
-    /// Joint angles that put the tool at `target_b`, searched from `seed` and then from a few fixed postures.
+    /// Joint angles that put the tool at `target_b`, searched from `seed` and then from postures all over the joints' ranges.
     ///
     /// # Errors
     /// The pose is out of reach: says by how much the nearest pose found misses it.
     pub fn solve(&self, seed: &ArmAngles, target_b: &Pose) -> Result<ArmAngles, Unreachable> {
         let mut nearest: Option<Unreachable> = None;
-        for start in std::iter::once((*seed).into()).chain(self.postures(target_b)) {
+        for start in std::iter::once((*seed).into()).chain(self.postures()) {
             let mut q = self.within_limits(&start);
             for _ in 0..SOLVE_STEPS {
                 q += self.increment(&q, target_b);
@@ -104,11 +108,17 @@ impl DiffIk {
         Err(nearest.unwrap_or_else(|| self.residual(&(*seed).into(), target_b)))
     }
 
-    /// Starts for a search: the elbow bent by three amounts, facing the target, the wrist turned three ways.
-    fn postures(&self, target_b: &Pose) -> impl Iterator<Item = Joints> {
-        let facing = target_b.translation.y.atan2(target_b.translation.x);
-        [(-0.6, -2.6, 2.0), (0.3, -2.0, 2.3), (0.9, -1.0, 1.9)].into_iter().flat_map(move |(q2, q4, q6)| {
-            [0.8, -1.2, 2.4].into_iter().map(move |q7| [facing, q2, 0.0, q4, 0.0, q6, q7].into())
+    /// Starts for a search, spread evenly over the joints' ranges by the additive recurrence of the generalised golden
+    /// ratio (Roberts, The unreasonable effectiveness of quasirandom sequences, 2018).
+    fn postures(&self) -> impl Iterator<Item = Joints> {
+        // The root above 1 of x⁸ = x + 1, for seven dimensions.
+        const RATIO: f64 = 1.096_981_557_798_56;
+        (1..=POSTURES).map(|turn| {
+            Joints::from_fn(|i, _| {
+                let share = (0.5 + f64::from(turn) * RATIO.powi(-(i as i32 + 1))).fract();
+                let link = &self.chain.links[i];
+                link.lower + share * (link.upper - link.lower)
+            })
         })
     }
 

@@ -14,7 +14,7 @@ pub mod spec;
 pub use gripper::{Encoding, Gripper, GripperError};
 pub use ik::{DiffIk, Unreachable};
 pub use pads::{BodyBox, PadContact, PadSurface};
-pub use spec::{ArmSpec, GripperSpec, IkSpec, RobotSpec, SpecError};
+pub use spec::{ArmSpec, GripperSpec, IkSpec, PadSpec, RobotSpec, SpecError};
 
 /// A finger, its pad and its tactile sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]

@@ -10,6 +10,8 @@ pub struct RobotSpec {
     pub arm: ArmSpec,
     /// Finger drives.
     pub gripper: GripperSpec,
+    /// Contact of the gel pads.
+    pub pads: PadSpec,
     /// Inverse kinematics.
     pub ik: IkSpec,
 }
@@ -25,25 +27,29 @@ impl RobotSpec {
     /// # Errors
     /// Names the first field that is not, its value and the range.
     pub fn validate(&self) -> Result<(), SpecError> {
-        let (arm, gripper, ik) = (&self.arm, &self.gripper, &self.ik);
+        let (arm, gripper, pads, ik) = (&self.arm, &self.gripper, &self.pads, &self.ik);
         positive("arm.kp", arm.kp, "N m/rad")?;
         positive("arm.kd", arm.kd, "N m s/rad")?;
-        positive("arm.effort_scale", arm.effort_scale, "1")?;
         positive("gripper.kp", gripper.kp, "N/m")?;
         positive("gripper.kd", gripper.kd, "N s/m")?;
         positive("gripper.effort", gripper.effort, "N")?;
         positive("gripper.speed", gripper.speed, "m/s")?;
         positive("gripper.finger_mass", gripper.finger_mass, "kg")?;
         positive("ik.lambda", ik.lambda, "1")?;
-        if !(0.0..=1.0).contains(&ik.posture_gain) {
-            return Err(SpecError {
-                field: "ik.posture_gain",
-                value: ik.posture_gain,
-                expected: "0 to 1".into(),
-            });
-        }
-        Ok(())
+        within("ik.posture_gain", ik.posture_gain, 1.0)?;
+        positive("pads.normal_modulus", pads.normal_modulus, "Pa/m")?;
+        positive("pads.tangential_modulus", pads.tangential_modulus, "Pa/m")?;
+        within("pads.static_mu", pads.static_mu, f64::MAX)?;
+        within("pads.dynamic_mu", pads.dynamic_mu, pads.static_mu)
     }
+}
+
+fn within(field: &'static str, value: f64, highest: f64) -> Result<(), SpecError> {
+    if (0.0..=highest).contains(&value) {
+        return Ok(());
+    }
+    let expected = if highest == f64::MAX { "0 or more".into() } else { format!("0 to {highest}") };
+    Err(SpecError { field, value, expected })
 }
 
 fn positive(field: &'static str, value: f64, unit: &str) -> Result<(), SpecError> {
@@ -65,8 +71,8 @@ pub struct SpecError {
     pub expected: String,
 }
 
-/// Joint drives of the arm: `τ = kp (q_target − q) − kd q̇`, within the torque limits, on top of an exact gravity
-/// compensation.
+/// Joint drives of the arm: `τ = kp (q_target − q) − kd q̇`, within the torque limits of the real arm (the effort
+/// limits of [`super::panda::tree`]), on top of an exact gravity compensation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ArmSpec {
@@ -74,13 +80,11 @@ pub struct ArmSpec {
     pub kp: f64,
     /// Damping, N m s/rad.
     pub kd: f64,
-    /// Factor on the torque limits of the real arm (87 N m, from the fifth joint on 12 N m).
-    pub effort_scale: f64,
 }
 
 impl Default for ArmSpec {
     fn default() -> Self {
-        Self { kp: 8000.0, kd: 800.0, effort_scale: 1.0 }
+        Self { kp: 8000.0, kd: 800.0 }
     }
 }
 
@@ -104,6 +108,27 @@ pub struct GripperSpec {
 impl Default for GripperSpec {
     fn default() -> Self {
         Self { kp: 2000.0, kd: 100.0, effort: 70.0, speed: 0.2, finger_mass: 0.1 }
+    }
+}
+
+/// How the gel pads touch: friction, and the give of gel and sensor a contact area (a wide-patch model of the 4 mm
+/// gel, which decides force and slip only).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PadSpec {
+    /// Normal stress per indentation, Pa/m.
+    pub normal_modulus: f64,
+    /// Shear stress per tangential displacement, Pa/m.
+    pub tangential_modulus: f64,
+    /// Static friction coefficient.
+    pub static_mu: f64,
+    /// Dynamic friction coefficient, not above the static one.
+    pub dynamic_mu: f64,
+}
+
+impl Default for PadSpec {
+    fn default() -> Self {
+        Self { normal_modulus: 3e8, tangential_modulus: 4e7, static_mu: 1.5, dynamic_mu: 1.2 }
     }
 }
 
@@ -139,6 +164,12 @@ mod tests {
         );
         spec = RobotSpec::default();
         spec.ik.posture_gain = f64::NAN;
-        assert!(spec.validate().expect_err("NaN").to_string().contains("ik.posture_gain"));
+        assert!(spec.validate().expect_err("NaN").to_string().contains("ik.posture_gain: expected 0 to 1"));
+        spec = RobotSpec::default();
+        spec.pads.dynamic_mu = 1.6;
+        assert_eq!(
+            spec.validate().expect_err("above static").to_string(),
+            "robot.pads.dynamic_mu: expected 0 to 1.5, got 1.6"
+        );
     }
 }
