@@ -1,0 +1,151 @@
+//! The gripper: from a policy's closure to finger targets.
+//!
+//! Three quantities, never mixed: *closure* is what is commanded (0 open … 1 shut), *width* is what is measured (m
+//! between the gel apexes), force is what the solve finds.
+
+use serde::{Deserialize, Serialize};
+
+use super::GripperSpec;
+
+/// Largest width between the gel apexes, m.
+pub const OPENING: f64 = 0.08;
+
+/// How a policy says how far to close.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Encoding {
+    /// The value is the closure, 0..=1; values beyond mean the nearer end.
+    #[default]
+    Continuous,
+    /// The value is a closure that is only asked whether it is above a half: open or shut, nothing between.
+    Binary,
+    /// The sign opens (positive) or shuts (zero and negative), as in SoftVTBench.
+    Sign,
+}
+
+impl Encoding {
+    /// The closure that `value` asks for, 0 (open) ..= 1 (shut).
+    ///
+    /// # Errors
+    /// A value that is no finite number asks for nothing.
+    pub fn closure(self, value: f64) -> Result<f64, GripperError> {
+        if !value.is_finite() {
+            return Err(GripperError { value });
+        }
+        let shut = match self {
+            Self::Continuous => return Ok(value.clamp(0.0, 1.0)),
+            Self::Binary => value > 0.5,
+            Self::Sign => value <= 0.0,
+        };
+        Ok(if shut { 1.0 } else { 0.0 })
+    }
+}
+
+/// A gripper command that is no number.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("gripper command is {value}, expected a finite number: a closure of 0 (open) to 1 (shut), or a sign")]
+pub struct GripperError {
+    /// What was commanded.
+    pub value: f64,
+}
+
+/// Target width of a closure in 0..=1, m.
+pub fn target_width(closure: f64) -> f64 {
+    OPENING * (1.0 - closure)
+}
+
+/// Closure whose target is `width` (m), 0..=1.
+pub fn closure_of_width(width: f64) -> f64 {
+    (1.0 - width / OPENING).clamp(0.0, 1.0)
+}
+
+/// Measured width: the distance between the gel apexes at finger coordinates left and right, m.
+pub fn width(fingers: [f64; 2]) -> f64 {
+    fingers[0] + fingers[1]
+}
+
+/// The moving target of the two fingers. Both get the same one, so that a light object off centre is pushed to the
+/// middle and a fixed one is held by unequal drive forces.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Gripper {
+    speed: f64,
+    goal: f64,
+    target: f64,
+}
+
+impl Gripper {
+    /// A gripper whose target is at rest at `width` (m).
+    pub fn new(spec: &GripperSpec, width: f64) -> Self {
+        let target = width.clamp(0.0, OPENING) / 2.0;
+        Self { speed: spec.speed, goal: target, target }
+    }
+
+    /// Takes a closure, 0 (open) ..= 1 (shut), as [`Encoding::closure`] gives it; it holds until the next one.
+    pub fn command(&mut self, closure: f64) {
+        self.goal = target_width(closure.clamp(0.0, 1.0)) / 2.0;
+    }
+
+    /// Moves the target on by `dt` (s) at no more than the finger speed.
+    pub fn advance(&mut self, dt: f64) {
+        let reach = self.speed * dt;
+        self.target += (self.goal - self.target).clamp(-reach, reach);
+    }
+
+    /// Target coordinate of each finger, m.
+    pub fn finger_target(&self) -> f64 {
+        self.target
+    }
+
+    /// Closure last commanded, 0..=1.
+    pub fn closure(&self) -> f64 {
+        closure_of_width(2.0 * self.goal)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn closure_and_target_width_are_inverse() {
+        for (closure, width) in [(0.0, 0.08), (0.25, 0.06), (1.0, 0.0)] {
+            assert!((target_width(closure) - width).abs() < 1e-15);
+            assert!((closure_of_width(width) - closure).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn each_encoding_reads_its_own_numbers() {
+        let read = |encoding: Encoding, value| encoding.closure(value).expect("finite");
+        assert_eq!(
+            [-0.2, 0.0, 0.3, 1.0, 1.7].map(|v| read(Encoding::Continuous, v)),
+            [0.0, 0.0, 0.3, 1.0, 1.0]
+        );
+        assert_eq!([0.0, 0.5, 0.51, 1.0].map(|v| read(Encoding::Binary, v)), [0.0, 0.0, 1.0, 1.0]);
+        assert_eq!([-1.0, 0.0, 1e-9, 1.0].map(|v| read(Encoding::Sign, v)), [1.0, 1.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn a_command_that_is_no_number_is_refused() {
+        for value in [f64::NAN, f64::INFINITY] {
+            let error = Encoding::Continuous.closure(value).expect_err("refused");
+            assert!(error.to_string().contains("expected a finite number"));
+        }
+    }
+
+    #[test]
+    fn the_target_moves_at_the_finger_speed_and_stops_at_its_goal() {
+        let mut gripper = Gripper::new(&GripperSpec::default(), OPENING);
+        gripper.command(0.5);
+        let dt = 1.0 / 60.0;
+        let mut path = Vec::new();
+        for _ in 0..10 {
+            gripper.advance(dt);
+            path.push(gripper.finger_target());
+        }
+        assert!((path[0] - (0.04 - 0.2 * dt)).abs() < 1e-15);
+        assert!(path.windows(2).all(|pair| pair[0] - pair[1] <= 0.2 * dt + 1e-15));
+        assert_eq!(path[9], 0.02);
+        assert!((gripper.closure() - 0.5).abs() < 1e-15);
+    }
+}

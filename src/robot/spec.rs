@@ -1,0 +1,175 @@
+//! The numbers of the robot that an experiment may want to change, in one place.
+
+use serde::{Deserialize, Serialize};
+
+/// All of them.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RobotSpec {
+    /// Joint drives of the arm.
+    pub arm: ArmSpec,
+    /// Finger drives.
+    pub gripper: GripperSpec,
+    /// Contact of the gel pads.
+    pub pads: PadSpec,
+    /// Inverse kinematics.
+    pub ik: IkSpec,
+}
+
+impl RobotSpec {
+    /// The profile `paper`: fingers as strong as in the paper's simulator, 200 N.
+    pub fn paper() -> Self {
+        Self { gripper: GripperSpec { effort: 200.0, ..GripperSpec::default() }, ..Self::default() }
+    }
+
+    /// Checks that every number is finite and in its range.
+    ///
+    /// # Errors
+    /// Names the first field that is not, its value and the range.
+    pub fn validate(&self) -> Result<(), SpecError> {
+        let (arm, gripper, pads, ik) = (&self.arm, &self.gripper, &self.pads, &self.ik);
+        positive("arm.kp", arm.kp, "N m/rad")?;
+        positive("arm.kd", arm.kd, "N m s/rad")?;
+        positive("gripper.kp", gripper.kp, "N/m")?;
+        positive("gripper.kd", gripper.kd, "N s/m")?;
+        positive("gripper.effort", gripper.effort, "N")?;
+        positive("gripper.speed", gripper.speed, "m/s")?;
+        positive("gripper.finger_mass", gripper.finger_mass, "kg")?;
+        positive("ik.lambda", ik.lambda, "1")?;
+        within("ik.posture_gain", ik.posture_gain, 1.0)?;
+        positive("pads.normal_modulus", pads.normal_modulus, "Pa/m")?;
+        positive("pads.tangential_modulus", pads.tangential_modulus, "Pa/m")?;
+        within("pads.static_mu", pads.static_mu, f64::MAX)?;
+        within("pads.dynamic_mu", pads.dynamic_mu, pads.static_mu)
+    }
+}
+
+fn within(field: &'static str, value: f64, highest: f64) -> Result<(), SpecError> {
+    if (0.0..=highest).contains(&value) {
+        return Ok(());
+    }
+    let expected = if highest == f64::MAX { "0 or more".into() } else { format!("0 to {highest}") };
+    Err(SpecError { field, value, expected })
+}
+
+fn positive(field: &'static str, value: f64, unit: &str) -> Result<(), SpecError> {
+    if value > 0.0 && value.is_finite() {
+        return Ok(());
+    }
+    Err(SpecError { field, value, expected: format!("a positive number ({unit})") })
+}
+
+/// A number of the robot out of its range.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("robot.{field}: expected {expected}, got {value}")]
+pub struct SpecError {
+    /// Path of the field.
+    pub field: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// What it may be.
+    pub expected: String,
+}
+
+/// Joint drives of the arm: `τ = kp (q_target − q) − kd q̇`, within the torque limits of the real arm (the effort
+/// limits of [`super::panda::tree`]), on top of an exact gravity compensation.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ArmSpec {
+    /// Stiffness, N m/rad.
+    pub kp: f64,
+    /// Damping, N m s/rad.
+    pub kd: f64,
+}
+
+impl Default for ArmSpec {
+    fn default() -> Self {
+        Self { kp: 8000.0, kd: 800.0 }
+    }
+}
+
+/// Finger drives: `f = kp (q_target − q) − kd q̇` a finger, within `effort`. How far the gripper opens is its
+/// geometry ([`super::gripper::OPENING`]), not a choice.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct GripperSpec {
+    /// Stiffness, N/m.
+    pub kp: f64,
+    /// Damping, N s/m.
+    pub kd: f64,
+    /// Largest force of a finger, N. The real hand holds 70 N continuously (Franka Emika, Hand data sheet).
+    pub effort: f64,
+    /// Speed of a finger's target, m/s.
+    pub speed: f64,
+    /// Mass of a finger with its sensor, kg.
+    pub finger_mass: f64,
+}
+
+impl Default for GripperSpec {
+    fn default() -> Self {
+        Self { kp: 2000.0, kd: 100.0, effort: 70.0, speed: 0.2, finger_mass: 0.1 }
+    }
+}
+
+/// How the gel pads touch: friction, and the give of gel and sensor a contact area (a wide-patch model of the 4 mm
+/// gel, which decides force and slip only).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PadSpec {
+    /// Normal stress per indentation, Pa/m.
+    pub normal_modulus: f64,
+    /// Shear stress per tangential displacement, Pa/m.
+    pub tangential_modulus: f64,
+    /// Static friction coefficient.
+    pub static_mu: f64,
+    /// Dynamic friction coefficient, not above the static one.
+    pub dynamic_mu: f64,
+}
+
+impl Default for PadSpec {
+    fn default() -> Self {
+        Self { normal_modulus: 3e8, tangential_modulus: 4e7, static_mu: 1.5, dynamic_mu: 1.2 }
+    }
+}
+
+/// Differential inverse kinematics.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct IkSpec {
+    /// Damping λ of the least squares, in the mixed unit of the Jacobian's singular values.
+    pub lambda: f64,
+    /// Share of the way to the rest posture that the null space takes each control step, 0..=1.
+    pub posture_gain: f64,
+}
+
+impl Default for IkSpec {
+    fn default() -> Self {
+        Self { lambda: 0.01, posture_gain: 0.0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn defaults_are_valid_and_bad_numbers_are_named() {
+        RobotSpec::default().validate().expect("defaults");
+        RobotSpec::paper().validate().expect("paper");
+        let mut spec = RobotSpec::default();
+        spec.gripper.kp = -1.0;
+        assert_eq!(
+            spec.validate().expect_err("negative").to_string(),
+            "robot.gripper.kp: expected a positive number (N/m), got -1"
+        );
+        spec = RobotSpec::default();
+        spec.ik.posture_gain = f64::NAN;
+        assert!(spec.validate().expect_err("NaN").to_string().contains("ik.posture_gain: expected 0 to 1"));
+        spec = RobotSpec::default();
+        spec.pads.dynamic_mu = 1.6;
+        assert_eq!(
+            spec.validate().expect_err("above static").to_string(),
+            "robot.pads.dynamic_mu: expected 0 to 1.5, got 1.6"
+        );
+    }
+}
