@@ -215,3 +215,10 @@ impl World {
         &self.colliders
     }
 }
+
+impl Soft {
+    /// How often the body's system was factored.
+    pub fn refills(&self) -> u64 {
+        self.system.refills
+    }
+}
