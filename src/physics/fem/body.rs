@@ -150,7 +150,8 @@ fn group_samples(mesh: &VoxelMesh, samples: Vec<SurfaceSample>) -> (Vec<Sample>,
     };
     let mut keyed: Vec<((u32, u8), SurfaceSample)> = samples.into_iter().map(|s| (key(&s), s)).collect();
     keyed.sort_by_key(|(key, _)| *key);
-    let (mut out, mut groups): (Vec<Sample>, Vec<SampleGroup>) = (Vec::with_capacity(keyed.len()), Vec::new());
+    let (mut out, mut groups): (Vec<Sample>, Vec<SampleGroup>) =
+        (Vec::with_capacity(keyed.len()), Vec::new());
     let mut last_key = None;
     for (key, surface) in keyed {
         let corners: Vec<usize> = (0..8).filter(|c| key.1 >> c & 1 == 1).collect();
@@ -194,7 +195,8 @@ pub struct SoftBody {
 impl SoftBody {
     /// Puts a body at rest at `pose`.
     pub fn new(rest: Arc<Rest>, pose: &Pose) -> Self {
-        let x: Vec<Vec3> = rest.mesh.nodes.iter().map(|p| pose * nalgebra::Point3::from(*p)).map(|p| p.coords).collect();
+        let x: Vec<Vec3> =
+            rest.mesh.nodes.iter().map(|p| pose * nalgebra::Point3::from(*p)).map(|p| p.coords).collect();
         let r = *pose.rotation.to_rotation_matrix().matrix();
         let nodes = x.len();
         Self {

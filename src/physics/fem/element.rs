@@ -137,7 +137,8 @@ mod tests {
         let (lambda, mu) = lame(youngs, poisson);
         let grad = nalgebra::Matrix3::new(1e-3, 2e-3, -1e-3, 0.5e-3, -2e-3, 1e-3, 1e-3, 0.0, 1.5e-3);
         let strain = (grad + grad.transpose()) * 0.5;
-        let exact = 0.5 * h.powi(3) * (lambda * f64::powi(strain.trace(), 2) + 2.0 * mu * strain.norm_squared());
+        let exact =
+            0.5 * h.powi(3) * (lambda * f64::powi(strain.trace(), 2) + 2.0 * mu * strain.norm_squared());
         let u = field(h, |x| grad * x);
         let k = stiffness(h, &Fill::full(), youngs, poisson);
         let energy: f64 = 0.5 * apply(&k, &u).iter().zip(u).map(|(f, u)| f * u).sum::<f64>();

@@ -12,4 +12,3 @@ pub mod rotation;
 pub mod system;
 
 pub use body::{Material, Rest, SoftBody};
-

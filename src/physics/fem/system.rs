@@ -38,6 +38,7 @@ pub struct System {
     last_used: Vec<u64>,
     kept: Vec<u32>,
     kept_index: Vec<u32>,
+    kept_version: u64,
     work: Vec<f64>,
     /// Factorisations done so far (for profiles and tests).
     pub refills: u64,
@@ -161,6 +162,7 @@ impl System {
             last_used: vec![0; nodes],
             kept: Vec::new(),
             kept_index: vec![u32::MAX; nodes],
+            kept_version: 0,
             work: vec![0.0; 3 * nodes],
             refills: 0,
         }
@@ -176,6 +178,11 @@ impl System {
         &self.kept
     }
 
+    /// Changes whenever the kept nodes do.
+    pub fn kept_version(&self) -> u64 {
+        self.kept_version
+    }
+
     /// Index of a node among the kept ones.
     pub fn kept_index(&self, node: u32) -> usize {
         self.kept_index[node as usize] as usize
@@ -188,7 +195,8 @@ impl System {
             self.plan = Some(Symbolic::new(&self.blocks.neighbours, &self.kept));
         }
         let to_body = body.frame.transpose();
-        let stale = |(r, old): (&Mat3, &Mat3)| (to_body * r - old).norm_squared() > STALE_ROTATION * STALE_ROTATION;
+        let stale =
+            |(r, old): (&Mat3, &Mat3)| (to_body * r - old).norm_squared() > STALE_ROTATION * STALE_ROTATION;
         let fresh = !new_plan
             && self.coefficients == Some(*c)
             && !body.rotation.iter().zip(&self.factored).any(stale);
@@ -214,6 +222,7 @@ impl System {
         if !missing && !bloated {
             return false;
         }
+        self.kept_version += 1;
         self.kept.clear();
         let recent = |used: u64| used > 0 && used + KEEP_STEPS >= step;
         self.kept.extend((0..self.last_used.len() as u32).filter(|&n| recent(self.last_used[n as usize])));

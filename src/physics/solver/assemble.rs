@@ -124,7 +124,15 @@ impl Local {
     }
 
     /// Adds one point's answer.
-    pub fn add(&mut self, problem: &Problem, a: &Endpoint, b: &Endpoint, point: &Point, answer: &Answer, curve: bool) {
+    pub fn add(
+        &mut self,
+        problem: &Problem,
+        a: &Endpoint,
+        b: &Endpoint,
+        point: &Point,
+        answer: &Answer,
+        curve: bool,
+    ) {
         let mut left = [Piece::Scale(0.0); 8];
         let mut right = [Piece::Scale(0.0); 8];
         let na = pieces(problem, a, &point.weights_a, &point.p, &mut left);
@@ -145,7 +153,9 @@ impl Local {
         }
         for j in 0..nb {
             let column = right[j].after(&answer.curvature);
-            (j..nb).for_each(|i| self.add_block(self.size_a + 3 * i, self.size_a + 3 * j, &right[i].before(&column)));
+            (j..nb).for_each(|i| {
+                self.add_block(self.size_a + 3 * i, self.size_a + 3 * j, &right[i].before(&column))
+            });
         }
     }
 

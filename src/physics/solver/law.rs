@@ -92,7 +92,11 @@ impl Scalar {
         let force = free.clamp(self.range.0, self.range.1);
         let inside = free > self.range.0 && free < self.range.1;
         // d(cost)/dv = −dt force; outside of the range the cost goes on linearly.
-        let cost = if gain > 0.0 { dt / gain * (0.5 * force * force + force * (free - force)) } else { -dt * force * v };
+        let cost = if gain > 0.0 {
+            dt / gain * (0.5 * force * force + force * (free - force))
+        } else {
+            -dt * force * v
+        };
         (force, if inside { dt * gain } else { 0.0 }, cost)
     }
 }

@@ -8,6 +8,7 @@
 //! matrix with a right-hand side, a *patch* is a set of contact samples between two endpoints.
 
 mod assemble;
+mod island;
 mod law;
 mod newton;
 mod problem;

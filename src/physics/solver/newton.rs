@@ -2,6 +2,7 @@
 
 use super::{
     assemble::{Local, Map, gather, velocity},
+    island::{Cache, Island, islands},
     law::contact,
     problem::Problem,
 };
@@ -17,6 +18,9 @@ const MAX_NEWTON: usize = 60;
 const MAX_PASSES: usize = 3;
 /// Change of the normal impulses that ends the passes.
 const PASS_CHANGE: f64 = 0.01;
+
+/// An old factor is kept while a step with it brings the scaled gradient down by this much.
+const KEEP_FACTOR: f64 = 0.3;
 
 /// What a solve took.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -46,18 +50,10 @@ pub struct Solver {
     gradient: Vec<f64>,
     trial_gradient: Vec<f64>,
     product: Vec<f64>,
-    hessian: Vec<f64>,
     scale: Vec<f64>,
+    cache: Cache,
     local: Local,
     map: Map,
-}
-
-/// The blocks, patches and scalars of one connected island.
-struct Island {
-    blocks: Vec<usize>,
-    patches: Vec<usize>,
-    scalars: Vec<usize>,
-    size: usize,
 }
 
 impl Solver {
@@ -108,45 +104,77 @@ impl Solver {
             self.v.extend_from_slice(&b.v);
             self.scale.extend((0..b.dim).map(|i| 1.0 / b.matrix[i * b.dim + i].sqrt()));
         }
-        for buffer in [&mut self.trial, &mut self.step, &mut self.gradient, &mut self.trial_gradient, &mut self.product] {
+        for buffer in
+            [&mut self.trial, &mut self.step, &mut self.gradient, &mut self.trial_gradient, &mut self.product]
+        {
             buffer.resize(island.size, 0.0);
         }
     }
 
     /// Newton's method for one pass; the number of steps taken.
+    ///
+    /// The cost is piecewise quadratic and mostly the same from step to step, so an old factor of its Hessian is used
+    /// for as long as it brings the gradient down well; the gradient itself is always exact.
     fn newton(&mut self, problem: &Problem, island: &Island) -> Result<u32, Failure> {
-        let mut excess = f64::INFINITY;
+        let mut cost = self.gradient_at_v(problem, island);
+        let mut excess = self.excess(problem, island);
+        let mut usable = self.cache.matches(problem, island);
         for taken in 0..MAX_NEWTON as u32 {
-            let n = island.size;
-            self.hessian.resize(n * n, 0.0);
-            let mut hessian = std::mem::take(&mut self.hessian);
-            let v = std::mem::take(&mut self.v);
-            let mut gradient = std::mem::take(&mut self.gradient);
-            let cost = self.evaluate(problem, island, &v, &mut gradient, Some(&mut hessian));
-            (self.hessian, self.v, self.gradient) = (hessian, v, gradient);
-            excess = self.excess(problem, island);
             if excess <= 1.0 {
                 return Ok(taken);
             }
-            self.step.iter_mut().zip(&self.gradient).for_each(|(s, g)| *s = -g);
-            if !excess.is_finite() || !dense::partial_cholesky(&mut self.hessian[..n * n], n, n) {
+            let fresh = !usable;
+            if fresh && !(excess.is_finite() && self.refactor(problem, island)) {
                 break;
             }
-            dense::forward(&self.hessian, n, n, &mut self.step);
-            dense::backward(&self.hessian, n, n, &mut self.step);
-            if !self.line_search(problem, island, cost) {
+            self.step.iter_mut().zip(&self.gradient).for_each(|(s, g)| *s = -g);
+            self.cache.solve(island, &mut self.step);
+            let Some(lower) = self.line_search(problem, island, cost) else {
+                if !fresh {
+                    usable = false;
+                    continue;
+                }
                 // No descent left in floating point: as converged as it can be if it is near.
-                return if excess < 1e3 { Ok(taken) } else { Err(Failure { block: island.blocks[0], excess }) };
-            }
+                return if excess < 1e3 {
+                    Ok(taken)
+                } else {
+                    Err(Failure { block: island.blocks[0], excess })
+                };
+            };
+            cost = lower;
+            let before = excess;
+            excess = self.excess(problem, island);
+            usable = excess < KEEP_FACTOR * before;
         }
         Err(Failure { block: island.blocks[0], excess })
     }
 
+    /// Cost and gradient at the present velocities.
+    fn gradient_at_v(&mut self, problem: &Problem, island: &Island) -> f64 {
+        let v = std::mem::take(&mut self.v);
+        let mut gradient = std::mem::take(&mut self.gradient);
+        let cost = self.evaluate(problem, island, &v, &mut gradient, None);
+        (self.v, self.gradient) = (v, gradient);
+        cost
+    }
+
+    /// Assembles and factors the Hessian at the present velocities.
+    fn refactor(&mut self, problem: &Problem, island: &Island) -> bool {
+        let mut hessian = self.cache.take(island);
+        let v = std::mem::take(&mut self.v);
+        let mut gradient = std::mem::take(&mut self.trial_gradient);
+        self.evaluate(problem, island, &v, &mut gradient, Some(&mut hessian));
+        (self.v, self.trial_gradient) = (v, gradient);
+        let n = island.size;
+        let sound = dense::partial_cholesky(&mut hessian[..n * n], n, n);
+        self.cache.give(hessian, sound);
+        sound
+    }
+
     /// Scaled gradient over tolerance.
     fn excess(&self, problem: &Problem, island: &Island) -> f64 {
-        let norm = |values: &[f64]| {
-            values.iter().zip(&self.scale).map(|(g, s)| (g * s).powi(2)).sum::<f64>().sqrt()
-        };
+        let norm =
+            |values: &[f64]| values.iter().zip(&self.scale).map(|(g, s)| (g * s).powi(2)).sum::<f64>().sqrt();
         let mut rhs = 0.0;
         for &block in &island.blocks {
             let start = self.offsets[block];
@@ -157,17 +185,21 @@ impl Solver {
         norm(&self.gradient) / (RELATIVE * momentum + ABSOLUTE)
     }
 
-    /// Moves along `step` to a lower cost: the full step if it is good, else the minimum on the line.
-    fn line_search(&mut self, problem: &Problem, island: &Island, cost: f64) -> bool {
+    /// Moves along `step` to a lower cost, which it returns with the gradient there: the full step if it is good, else
+    /// the minimum on the line.
+    fn line_search(&mut self, problem: &Problem, island: &Island, cost: f64) -> Option<f64> {
         let slope: f64 = self.gradient.iter().zip(&self.step).map(|(g, s)| g * s).sum();
         if slope.is_nan() || slope >= 0.0 {
-            return false;
+            return None;
         }
         let (mut low, mut high, mut at) = (0.0, f64::INFINITY, 1.0);
+        let mut value = f64::INFINITY;
         for _ in 0..40 {
-            let (value, along) = self.probe(problem, island, at);
+            let along;
+            (value, along) = self.probe(problem, island, at);
             let enough = value <= cost + 1e-4 * at * slope;
-            if enough && along.abs() <= 0.3 * slope.abs() {
+            // Beyond the full step the model is exact enough: take it.
+            if enough && (along.abs() <= 0.3 * slope.abs() || along <= 0.0) {
                 break;
             }
             if along > 0.0 || !value.is_finite() {
@@ -175,24 +207,17 @@ impl Solver {
             } else {
                 low = at;
             }
-            if high.is_infinite() {
-                // Beyond the full step the model is exact enough: take it.
-                if enough {
-                    break;
-                }
-                at *= 1.5;
-            } else {
-                at = 0.5 * (low + high);
-            }
             if high - low < 1e-9 {
-                if !(value <= cost) {
-                    return false;
-                }
                 break;
             }
+            at = if high.is_finite() { 0.5 * (low + high) } else { 1.5 * at };
+        }
+        if value.is_nan() || value > cost {
+            return None;
         }
         std::mem::swap(&mut self.v, &mut self.trial);
-        true
+        std::mem::swap(&mut self.gradient, &mut self.trial_gradient);
+        Some(value)
     }
 
     /// Cost and slope at `v + at · step`; leaves that point in `trial`.
@@ -237,7 +262,11 @@ impl Solver {
             }
             if touched {
                 self.map.set(problem, &self.offsets, &patch.a, &patch.b);
-                self.local.scatter(&self.map, gradient, hessian.as_deref_mut().map(|h| (h.as_mut_slice(), n)));
+                self.local.scatter(
+                    &self.map,
+                    gradient,
+                    hessian.as_deref_mut().map(|h| (h.as_mut_slice(), n)),
+                );
             }
         }
         for &row in &island.scalars {
@@ -317,45 +346,4 @@ impl Solver {
 
 fn island_points(problem: &Problem, island: &Island) -> Vec<std::ops::Range<usize>> {
     island.patches.iter().map(|&i| problem.patches[i].first..problem.patches[i].last).collect()
-}
-
-/// Splits a problem into islands of blocks that patches connect.
-fn islands(problem: &Problem) -> Vec<Island> {
-    let mut root: Vec<usize> = (0..problem.blocks.len()).collect();
-    fn find(root: &mut [usize], mut at: usize) -> usize {
-        while root[at] != at {
-            root[at] = root[root[at]];
-            at = root[at];
-        }
-        at
-    }
-    for patch in &problem.patches {
-        if let (Some(a), Some(b)) = (problem.block_of(&patch.a), problem.block_of(&patch.b)) {
-            let (a, b) = (find(&mut root, a), find(&mut root, b));
-            root[a.max(b)] = a.min(b);
-        }
-    }
-    let mut islands: Vec<Island> = Vec::new();
-    let mut of_root = vec![usize::MAX; root.len()];
-    for block in 0..problem.blocks.len() {
-        let r = find(&mut root, block);
-        if of_root[r] == usize::MAX {
-            of_root[r] = islands.len();
-            islands.push(Island { blocks: Vec::new(), patches: Vec::new(), scalars: Vec::new(), size: 0 });
-        }
-        islands[of_root[r]].blocks.push(block);
-        islands[of_root[r]].size += problem.blocks[block].dim;
-    }
-    for (index, patch) in problem.patches.iter().enumerate() {
-        if let Some(block) = problem.block_of(&patch.a).or(problem.block_of(&patch.b)) {
-            let r = find(&mut root, block);
-            islands[of_root[r]].patches.push(index);
-        }
-    }
-    for (index, scalar) in problem.scalars.iter().enumerate() {
-        let r = find(&mut root, scalar.block);
-        islands[of_root[r]].scalars.push(index);
-    }
-    islands.retain(|island| island.size > 0);
-    islands
 }

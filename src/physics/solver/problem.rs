@@ -14,6 +14,8 @@ pub struct Block {
     pub rhs: Vec<f64>,
     /// Start value, and the solution afterwards.
     pub v: Vec<f64>,
+    /// Says what the velocities mean: two blocks with the same identity and size are the same one in two steps.
+    pub identity: u64,
 }
 
 /// The motion of a rigid frame as a linear function of a block's velocity.

@@ -169,7 +169,8 @@ mod tests {
 
         fn block(&self, row: u32, column: u32) -> [f64; 9] {
             let (low, high) = (row.min(column) as f64, row.max(column) as f64);
-            let mut block: [f64; 9] = std::array::from_fn(|e| ((low * 3.0 + high * 7.0 + e as f64).sin()) * 0.3);
+            let mut block: [f64; 9] =
+                std::array::from_fn(|e| ((low * 3.0 + high * 7.0 + e as f64).sin()) * 0.3);
             if row == column {
                 block = [0.0; 9];
                 (0..3).for_each(|i| block[4 * i] = 30.0 + i as f64);

@@ -68,7 +68,9 @@ fn elimination_order(neighbours: &[Vec<u32>], keep: &[u32]) -> Vec<u32> {
     inner.iter().enumerate().for_each(|(i, &n)| local[n as usize] = i);
     let (mut starts, mut rows) = (vec![0usize], Vec::new());
     for &node in &inner {
-        rows.extend(neighbours[node as usize].iter().map(|&n| local[n as usize]).filter(|&n| n != usize::MAX));
+        rows.extend(
+            neighbours[node as usize].iter().map(|&n| local[n as usize]).filter(|&n| n != usize::MAX),
+        );
         starts.push(rows.len());
     }
     let permutation = match amd::order(inner.len(), &starts, &rows, &amd::Control::default()) {
@@ -152,7 +154,14 @@ fn build_fronts(structure: &[Vec<u32>], inner: usize, total: usize) -> Vec<Front
         offset += size;
     }
     let kept = (inner as u32..total as u32).collect();
-    fronts.push(Front { first: inner, pivots: 0, rows: kept, children: Vec::new(), into_parent: Vec::new(), offset });
+    fronts.push(Front {
+        first: inner,
+        pivots: 0,
+        rows: kept,
+        children: Vec::new(),
+        into_parent: Vec::new(),
+        offset,
+    });
     link(&mut fronts, &front_of);
     fronts
 }
@@ -183,7 +192,9 @@ fn link(fronts: &mut [Front], front_of: &[usize]) {
         let below = &fronts[index].rows[fronts[index].pivots..];
         let into: Vec<u32> = below
             .iter()
-            .map(|row| fronts[parent].rows.binary_search(row).expect("a child's rows lie in its parent") as u32)
+            .map(|row| {
+                fronts[parent].rows.binary_search(row).expect("a child's rows lie in its parent") as u32
+            })
             .collect();
         fronts[index].into_parent = into;
         fronts[parent].children.push(index);

@@ -113,7 +113,7 @@ impl World {
     fn soft_blocks(&mut self) -> Result<(), StepFailure> {
         let c = StepCoefficients { dt: self.params.dt, alpha: self.params.alpha, beta: self.params.beta };
         self.layout.soft.clear();
-        for soft in &mut self.soft {
+        for (index, soft) in self.soft.iter_mut().enumerate() {
             if soft.asleep {
                 self.layout.soft.push(None);
                 continue;
@@ -125,10 +125,13 @@ impl World {
             let momentum = &mut self.layout.momentum;
             momentum.clear();
             momentum.extend(
-                (0..body.x.len()).map(|n| (body.v[n] + self.gravity * c.dt) * body.rest.mass[n] + body.force[n] * c.dt),
+                (0..body.x.len())
+                    .map(|n| (body.v[n] + self.gravity * c.dt) * body.rest.mass[n] + body.force[n] * c.dt),
             );
             let dim = 3 * soft.system.kept().len();
-            let mut block = Block { dim, matrix: vec![0.0; dim * dim], rhs: vec![0.0; dim], v: vec![0.0; dim] };
+            let identity = (index as u64) << 40 | soft.system.kept_version();
+            let mut block =
+                Block { dim, matrix: vec![0.0; dim * dim], rhs: vec![0.0; dim], v: vec![0.0; dim], identity };
             soft.system.reduce(&body.frame, momentum, &mut block.matrix, &mut block.rhs);
             for (i, &node) in soft.system.kept().iter().enumerate() {
                 block.v[3 * i..3 * i + 3].copy_from_slice(body.v[node as usize].as_slice());
@@ -162,6 +165,7 @@ impl World {
                 matrix,
                 rhs: stack(&linear, &angular),
                 v: stack(&body.v, &body.w),
+                identity: 1 << 60 | self.layout.rigid.len() as u64,
             });
         }
     }
@@ -187,6 +191,7 @@ impl World {
                 matrix: mass.as_slice().to_vec(),
                 rhs: rhs.as_slice().to_vec(),
                 v: tree.state.v.as_slice().to_vec(),
+                identity: 1 << 61 | self.layout.trees.len() as u64,
             });
         }
     }
@@ -197,9 +202,14 @@ impl World {
         let mut at = 0;
         while at < candidates.len() {
             let (soft, id, first) = candidates[at];
-            let end = at + candidates[at..].iter().take_while(|c| (c.0, c.1, c.2.group) == (soft, id, first.group)).count();
+            let end = at
+                + candidates[at..]
+                    .iter()
+                    .take_while(|c| (c.0, c.1, c.2.group) == (soft, id, first.group))
+                    .count();
             let Some(block) = self.layout.soft[soft] else { break };
-            let (a, b) = (self.nodes_of(soft, first.group, block), self.endpoint_of(self.colliders[id].mover));
+            let (a, b) =
+                (self.nodes_of(soft, first.group, block), self.endpoint_of(self.colliders[id].mover));
             let start = self.problem.points.len();
             for (_, _, candidate) in &candidates[at..end] {
                 self.push_row(soft, id, candidate, &b);
@@ -275,7 +285,13 @@ impl World {
             velocity: Vec3::zeros(),
             slipping: false,
         });
-        self.rows.push(RowOf { soft, candidate: *candidate, partner: id as u32, anchor: slot.anchor, travel: slot.travel });
+        self.rows.push(RowOf {
+            soft,
+            candidate: *candidate,
+            partner: id as u32,
+            anchor: slot.anchor,
+            travel: slot.travel,
+        });
     }
 }
 
@@ -299,8 +315,8 @@ fn joint_rows(
         range,
         force: 0.0,
     };
-    let drive = tree.drives[joint]
-        .map(|d| row(d.kp, d.kd, d.target - q, d.target_velocity, (-d.effort, d.effort)));
+    let drive =
+        tree.drives[joint].map(|d| row(d.kp, d.kd, d.target - q, d.target_velocity, (-d.effort, d.effort)));
     // A stop answers within about two steps whatever the inertia: k dt² and c dt are of the order of it.
     let (k, c) = (STOP_RATE * inertia / (dt * dt), STOP_RATE * inertia / dt);
     let near = |distance: f64| distance < 2.0 * v.abs() * dt + 0.02 * (link.upper - link.lower).min(1.0);

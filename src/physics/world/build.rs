@@ -49,7 +49,14 @@ impl World {
     }
 
     /// Adds a joint tree at coordinates `q`; its index.
-    pub fn add_tree(&mut self, name: &str, tree: Tree, q: &[f64], drives: Vec<Option<Drive>>, gravity: bool) -> usize {
+    pub fn add_tree(
+        &mut self,
+        name: &str,
+        tree: Tree,
+        q: &[f64],
+        drives: Vec<Option<Drive>>,
+        gravity: bool,
+    ) -> usize {
         let poses = joints::forward(&tree, q);
         self.trees.push(Articulation {
             name: name.to_owned(),
@@ -77,7 +84,10 @@ impl World {
 
     /// The layer of a collider without a soft surface.
     pub fn rigid_layer(&self) -> Layer {
-        Layer { normal: self.params.rigid_modulus, shear: self.params.shear_ratio * self.params.rigid_modulus }
+        Layer {
+            normal: self.params.rigid_modulus,
+            shear: self.params.shear_ratio * self.params.rigid_modulus,
+        }
     }
 
     /// Says where a prescribed frame will be after the next step.

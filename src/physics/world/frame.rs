@@ -132,7 +132,8 @@ impl Touch {
         let force = point.normal_impulse / dt;
         touch.samples += 1;
         touch.slipping += usize::from(point.slipping);
-        touch.travel = (touch.travel * touch.normal_force + row.travel * force) / (touch.normal_force + force);
+        touch.travel =
+            (touch.travel * touch.normal_force + row.travel * force) / (touch.normal_force + force);
         touch.normal_force += force;
         touch.force_w += (point.normal * point.normal_impulse + point.shear_impulse) / dt;
         touch.capacity += point.mu * force;

@@ -83,10 +83,16 @@ impl World {
             if let Some(node) = soft.body.x.iter().position(|x| !x.iter().all(|c| c.is_finite())) {
                 return Err(StepFailure::NotFinite { step, body: soft.name.clone(), node });
             }
-            soft.inverted_for = if soft.min_det_f.0 <= 0.0 { soft.inverted_for + self.params.dt } else { 0.0 };
+            soft.inverted_for =
+                if soft.min_det_f.0 <= 0.0 { soft.inverted_for + self.params.dt } else { 0.0 };
             if soft.inverted_for > self.params.inverted_after {
                 let (body, element) = (soft.name.clone(), soft.min_det_f.1);
-                return Err(StepFailure::Inverted { step, body, element, seconds: self.params.inverted_after });
+                return Err(StepFailure::Inverted {
+                    step,
+                    body,
+                    element,
+                    seconds: self.params.inverted_after,
+                });
             }
         }
         Ok(())

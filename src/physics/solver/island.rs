@@ -1,0 +1,123 @@
+//! Connected islands of a problem, and the factors that they keep between steps.
+
+use super::problem::Problem;
+use crate::physics::sparse::dense;
+
+/// The blocks, patches and scalars of one connected island.
+pub struct Island {
+    /// Blocks, ascending.
+    pub blocks: Vec<usize>,
+    /// Patches that touch them.
+    pub patches: Vec<usize>,
+    /// Scalar rows on them.
+    pub scalars: Vec<usize>,
+    /// Velocities in all.
+    pub size: usize,
+}
+
+/// Splits a problem into islands of blocks that patches connect.
+pub fn islands(problem: &Problem) -> Vec<Island> {
+    let mut root: Vec<usize> = (0..problem.blocks.len()).collect();
+    for patch in &problem.patches {
+        if let (Some(a), Some(b)) = (problem.block_of(&patch.a), problem.block_of(&patch.b)) {
+            let (a, b) = (find(&mut root, a), find(&mut root, b));
+            root[a.max(b)] = a.min(b);
+        }
+    }
+    let mut islands: Vec<Island> = Vec::new();
+    let mut of_root = vec![usize::MAX; root.len()];
+    for block in 0..problem.blocks.len() {
+        let r = find(&mut root, block);
+        if of_root[r] == usize::MAX {
+            of_root[r] = islands.len();
+            islands.push(Island { blocks: Vec::new(), patches: Vec::new(), scalars: Vec::new(), size: 0 });
+        }
+        islands[of_root[r]].blocks.push(block);
+        islands[of_root[r]].size += problem.blocks[block].dim;
+    }
+    for (index, patch) in problem.patches.iter().enumerate() {
+        if let Some(block) = problem.block_of(&patch.a).or(problem.block_of(&patch.b)) {
+            islands[of_root[find(&mut root, block)]].patches.push(index);
+        }
+    }
+    for (index, scalar) in problem.scalars.iter().enumerate() {
+        islands[of_root[find(&mut root, scalar.block)]].scalars.push(index);
+    }
+    islands.retain(|island| island.size > 0);
+    islands
+}
+
+fn find(root: &mut [usize], mut at: usize) -> usize {
+    while root[at] != at {
+        root[at] = root[root[at]];
+        at = root[at];
+    }
+    at
+}
+
+/// A factored Hessian and what it belongs to.
+#[derive(Default)]
+struct Entry {
+    /// Identity and size of each block.
+    key: Vec<(u64, usize)>,
+    factor: Vec<f64>,
+    sound: bool,
+}
+
+/// Factored Hessians by island, the most recently used first.
+#[derive(Default)]
+pub struct Cache {
+    entries: Vec<Entry>,
+}
+
+/// Islands whose factors are remembered.
+const REMEMBERED: usize = 6;
+
+impl Cache {
+    /// Whether there is a factor for the island; it becomes the current one.
+    pub fn matches(&mut self, problem: &Problem, island: &Island) -> bool {
+        let found = self.entries.iter().position(|entry| same(entry, problem, island));
+        if let Some(found) = found {
+            self.entries[..=found].rotate_right(1);
+            return self.entries[0].sound;
+        }
+        if self.entries.len() < REMEMBERED {
+            self.entries.push(Entry::default());
+        }
+        self.entries.rotate_right(1);
+        let entry = &mut self.entries[0];
+        entry.key.clear();
+        entry.key.extend(island.blocks.iter().map(|&b| (problem.blocks[b].identity, problem.blocks[b].dim)));
+        entry.sound = false;
+        false
+    }
+
+    /// The buffer of the current factor, to be filled anew.
+    pub fn take(&mut self, island: &Island) -> Vec<f64> {
+        let mut factor = std::mem::take(&mut self.entries[0].factor);
+        factor.resize(island.size * island.size, 0.0);
+        factor
+    }
+
+    /// Puts the factored buffer back.
+    pub fn give(&mut self, factor: Vec<f64>, sound: bool) {
+        self.entries[0].factor = factor;
+        self.entries[0].sound = sound;
+    }
+
+    /// Solves with the current factor in place.
+    pub fn solve(&self, island: &Island, b: &mut [f64]) {
+        let n = island.size;
+        dense::forward(&self.entries[0].factor, n, n, b);
+        dense::backward(&self.entries[0].factor, n, n, b);
+    }
+}
+
+fn same(entry: &Entry, problem: &Problem, island: &Island) -> bool {
+    entry.key.len() == island.blocks.len()
+        && entry
+            .key
+            .iter()
+            .zip(&island.blocks)
+            .all(|(key, &b)| *key == (problem.blocks[b].identity, problem.blocks[b].dim))
+}
