@@ -1,10 +1,14 @@
 //! A fixed quadrature of a body's surface, embedded in its voxel mesh.
 //!
-//! Boxes are sampled by regular grids per face and bodies of revolution by rings, both with exact areas.
+//! Boxes are sampled by regular grids per face and bodies of revolution by rings, both with exact areas; other shapes
+//! by gathering the triangles of a fine skin.
+
+use std::collections::BTreeMap;
 
 use super::{
     Quat, Vec3,
     shape::{Profile, Shape},
+    skin::skin,
     voxel::{SurfaceSample, VoxelMesh},
 };
 
@@ -41,10 +45,26 @@ struct Patch {
     area: f64,
 }
 
+/// Triangles of a skin that become one sample.
+#[derive(Default)]
+struct Gathered {
+    moment: Vec3,
+    normals: Vec3,
+    area: f64,
+}
+
+impl Gathered {
+    fn patch(&self, shape: &Shape) -> Patch {
+        let middle = self.moment / self.area;
+        let p = shape.project(&middle, self.area.sqrt()).unwrap_or(middle);
+        Patch { p, n: self.normals.normalize(), area: self.area }
+    }
+}
+
 /// Samples the surface of `shape` and embeds the samples in its voxel mesh, sorted by element.
 pub fn surface_samples(shape: &Shape, mesh: &VoxelMesh, spec: &SampleSpec) -> Vec<SurfaceSample> {
     let mut samples: Vec<SurfaceSample> = exact_patches(shape, &Quat::identity(), spec)
-        .unwrap_or_default()
+        .unwrap_or_else(|| skin_patches(shape, spec))
         .into_iter()
         .filter_map(|Patch { p, n, area }| Some(SurfaceSample { at: mesh.locate(&p)?, p_o: p, n_o: n, area }))
         .collect();
@@ -68,6 +88,31 @@ fn exact_patches(shape: &Shape, turn: &Quat, spec: &SampleSpec) -> Option<Vec<Pa
         Shape::Paint { shape, .. } => exact_patches(shape, turn, spec),
         _ => Some(generators(shape)?.iter().flat_map(|piece| piece.revolve(turn, spec)).collect()),
     }
+}
+
+/// Gathers the triangles of a skin by cells of the wanted spacing and by the side that they face, so that the two sides
+/// of an edge are not mixed; the area of the skin is kept exactly.
+fn skin_patches(shape: &Shape, spec: &SampleSpec) -> Vec<Patch> {
+    let skin = skin(shape, spec.grasp_spacing.min(spec.other_spacing));
+    let mut cells: BTreeMap<(usize, [i64; 3]), Gathered> = BTreeMap::new();
+    for triangle in &skin.mesh.triangles {
+        let [a, b, c] = triangle.map(|v| skin.mesh.vertices[v as usize]);
+        let normal_area = 0.5 * (b - a).cross(&(c - a));
+        let area = normal_area.norm();
+        if area <= 0.0 {
+            continue;
+        }
+        let normal = normal_area / area;
+        let centre = (a + b + c) / 3.0;
+        let side = 2 * normal.iamax() + usize::from(normal[normal.iamax()] > 0.0);
+        let cell = centre / spec.spacing(&normal);
+        let key = (side, [cell.x, cell.y, cell.z].map(|x| x.floor() as i64));
+        let gathered = cells.entry(key).or_default();
+        gathered.moment += centre * area;
+        gathered.normals += normal_area;
+        gathered.area += area;
+    }
+    cells.into_values().map(|gathered| gathered.patch(shape)).collect()
 }
 
 fn box_patches(half: &Vec3, turn: &Quat, spec: &SampleSpec) -> Vec<Patch> {

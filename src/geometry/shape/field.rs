@@ -52,7 +52,7 @@ impl Shape {
     }
 
     /// First-order distance `f/|∇f|` and unit gradient, by the chain rule through the tree.
-    pub(super) fn estimate(&self, p: &Vec3) -> (f64, Vec3) {
+    pub(in crate::geometry) fn estimate(&self, p: &Vec3) -> (f64, Vec3) {
         match self {
             Self::Box { half } => primitive::cuboid(p, half),
             Self::Sphere { radius } => primitive::sphere(p, *radius),
