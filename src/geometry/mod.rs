@@ -2,6 +2,7 @@
 //!
 //! Everything here is in the *object frame* (`_o`), in metres, and knows nothing of materials or motion.
 
+pub mod convex;
 pub mod shape;
 pub mod voxel;
 

@@ -21,7 +21,9 @@ pub enum RigidError {
     #[error("a rigid body needs a positive, finite mass, got {0} kg; check its density and shape")]
     Mass(f64),
     /// The inertia is not symmetric positive definite, or breaks the triangle inequality of real bodies.
-    #[error("a rigid body needs the inertia of a real solid, got principal moments {0:?} kg m²; check its shape")]
+    #[error(
+        "a rigid body needs the inertia of a real solid, got principal moments {0:?} kg m²; check its shape"
+    )]
     Inertia([f64; 3]),
 }
 

@@ -6,8 +6,11 @@ const GRAVITY: Vec3 = Vec3::new(0.0, 0.0, -9.81);
 fn brick() -> RigidBody {
     let (mass, size): (f64, _) = (0.6, Vec3::new(0.12, 0.08, 0.04));
     let moment = |a: f64, b: f64| mass / 12.0 * (a * a + b * b);
-    let inertia =
-        Mat3::from_diagonal(&Vec3::new(moment(size.y, size.z), moment(size.x, size.z), moment(size.x, size.y)));
+    let inertia = Mat3::from_diagonal(&Vec3::new(
+        moment(size.y, size.z),
+        moment(size.x, size.z),
+        moment(size.x, size.y),
+    ));
     let pose = Pose::new(Vec3::new(0.3, -0.2, 0.5), Vec3::new(0.4, -0.7, 0.2));
     RigidBody::new(&pose, Vec3::new(0.01, 0.02, -0.03), mass, inertia).expect("a real brick")
 }
@@ -29,7 +32,11 @@ fn tumbling_about_the_middle_axis_keeps_momentum_and_energy() {
         let (energy, momentum) = (body.kinetic_energy(), body.inertia_w() * body.w);
         for _ in 0..1200 {
             drift(&mut body, dt, 1);
-            assert!((body.kinetic_energy() / energy - 1.0).abs() < 1e-10, "energy {}", body.kinetic_energy() / energy);
+            assert!(
+                (body.kinetic_energy() / energy - 1.0).abs() < 1e-10,
+                "energy {}",
+                body.kinetic_energy() / energy
+            );
             let lost = (body.inertia_w() * body.w - momentum).norm() / momentum.norm();
             assert!(lost < 1e-10, "angular momentum moved by {lost}");
         }
