@@ -17,9 +17,11 @@ const PREFER_FACES_SHARE: f64 = 0.01;
 pub(super) struct Axis {
     /// Unit, from the first piece to the second, world.
     pub n_w: Vec3,
-    /// Gap along it, m; the true distance, or a lower bound of it for two boxes apart corner to corner.
+    /// Gap along it, m.
     pub gap: f64,
-    /// The touching points if they came from an iteration.
+    /// Whether some pair of points is really this far apart; two boxes corner to corner are farther.
+    pub true_gap: bool,
+    /// The touching points, where an iteration looked for them.
     pub closest: Option<Closest>,
 }
 
@@ -30,44 +32,47 @@ pub(super) fn contact_axis(a: &Piece, pose_a: &Pose, b: &Piece, pose_b: &Pose, m
         let (ahead, behind) = (gap_along(axis), gap_along(&-axis));
         if ahead >= behind { (ahead, *axis) } else { (behind, -axis) }
     };
-    let (mut gap, mut n_w) = (f64::NEG_INFINITY, Vec3::z());
-    for candidate in faces(a, pose_a).iter().chain(&faces(b, pose_b)) {
-        let found =
-            if matches!(a, Piece::Plane) { (gap_along(candidate), *candidate) } else { signed(candidate) };
-        if found.0 > gap {
-            (gap, n_w) = found;
-        }
-        if matches!(a, Piece::Plane) {
-            break;
-        }
-    }
+    let (mut gap, mut n_w) = if matches!(a, Piece::Plane) {
+        let n_w = faces(a, pose_a)[0];
+        (gap_along(&n_w), n_w)
+    } else {
+        faces(a, pose_a)
+            .iter()
+            .chain(&faces(b, pose_b))
+            .map(signed)
+            .fold((f64::NEG_INFINITY, Vec3::z()), |best, found| if found.0 > best.0 { found } else { best })
+    };
     if gap >= margin {
         return None;
     }
-    let bias = PREFER_FACES_M + PREFER_FACES_SHARE * gap.abs();
-    let (face_gap, mut edge_gap) = (gap, gap + bias);
+    if matches!(a, Piece::Plane) {
+        return Some(Axis { n_w, gap, closest: None, true_gap: true });
+    }
+    let mut to_beat = gap + PREFER_FACES_M + PREFER_FACES_SHARE * gap.abs();
     for edge_a in edges(a, pose_a) {
         for edge_b in edges(b, pose_b) {
             let Some(cross) = edge_a.cross(&edge_b).try_normalize(1e-6) else { continue };
             let found = signed(&cross);
-            if found.0 > edge_gap && found.0 > face_gap + bias {
+            if found.0 > to_beat {
                 (gap, n_w) = found;
-                edge_gap = found.0;
+                to_beat = gap;
             }
         }
     }
     if gap >= margin {
         return None;
     }
-    let exact = matches!(a, Piece::Plane) || matches!((a, b), (Piece::Box { .. }, Piece::Box { .. }));
-    let refined = if exact { None } else { refine(a, pose_a, b, pose_b, margin) };
-    match refined {
-        Some(found) if gap_along(&found.n_w) > gap + PREFER_FACES_M => {
-            let gap = gap_along(&found.n_w);
-            (gap < margin).then_some(Axis { n_w: found.n_w, gap, closest: Some(found) })
-        }
-        _ => Some(Axis { n_w, gap, closest: None }),
+    if matches!((a, b), (Piece::Box { .. }, Piece::Box { .. })) {
+        return Some(Axis { n_w, gap, closest: None, true_gap: gap <= 0.0 });
     }
+    let closest = refine(a, pose_a, b, pose_b, margin);
+    if let Some(found) = closest {
+        let refined = gap_along(&found.n_w);
+        if refined > gap + PREFER_FACES_M {
+            (gap, n_w) = (refined, found.n_w);
+        }
+    }
+    (gap < margin).then_some(Axis { n_w, gap, closest, true_gap: true })
 }
 
 /// The closest points of the pieces themselves, from those of their cores.

@@ -70,22 +70,25 @@ pub(super) fn inside(
     polygon: &[Corner],
     slack: f64,
 ) -> Option<[(f64, Option<usize>); 2]> {
+    let length = |p: &[f64; 2], q: &[f64; 2]| (q[0] - p[0]).hypot(q[1] - p[1]);
     let (mut first, mut last) = ((0.0, None), (1.0, None));
     for j in 0..polygon.len() {
         let (from, to) = (polygon[j].p, polygon[(j + 1) % polygon.len()].p);
-        let slack = slack * (to[0] - from[0]).hypot(to[1] - from[1]);
-        let (h0, h1) = (turn(&from, &to, &ends[0]) + slack, turn(&from, &to, &ends[1]) + slack);
-        if h0 < 0.0 && h1 < 0.0 {
+        let (h0, h1) = (turn(&from, &to, &ends[0]), turn(&from, &to, &ends[1]));
+        let allowed = -slack * length(&from, &to);
+        if h0 < allowed && h1 < allowed {
             return None;
         }
-        let cut = h0 / (h0 - h1);
-        if h0 < 0.0 && cut > first.0 {
-            first = (cut, Some(j));
-        } else if h1 < 0.0 && cut < last.0 {
-            last = (cut, Some(j));
+        // An end within the slack counts as on the edge.
+        if h0 < allowed {
+            let cut = if h1 > 0.0 { h0 / (h0 - h1) } else { 1.0 };
+            first = if cut > first.0 { (cut, Some(j)) } else { first };
+        } else if h1 < allowed {
+            let cut = if h0 > 0.0 { h0 / (h0 - h1) } else { 0.0 };
+            last = if cut < last.0 { (cut, Some(j)) } else { last };
         }
     }
-    (first.0 <= last.0).then_some([first, last])
+    ((first.0 - last.0) * length(&ends[0], &ends[1]) <= slack).then_some([first, last])
 }
 
 /// Twice the signed area of a polygon, m²; positive if it turns counter-clockwise.

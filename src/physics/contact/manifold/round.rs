@@ -94,7 +94,9 @@ pub(super) fn capsules(
         phi
     };
     let ends_a = [0, 1].map(|i| push(core_a[i], on_segment(&core_b, &core_a[i]).0, 1.0, i as u32));
-    [0, 1].map(|i| push(on_segment(&core_a, &core_b[i]).0, core_b[i], 1.0, 2 + i as u32));
+    for i in [0, 1] {
+        push(on_segment(&core_a, &core_b[i]).0, core_b[i], 1.0, 2 + i as u32);
+    }
     let (on_a, on_b, t) = between_segments(&core_a, &core_b);
     let phi = (on_b - on_a).norm() - ra - rb;
     let straight = ends_a[0] + (ends_a[1] - ends_a[0]) * t;

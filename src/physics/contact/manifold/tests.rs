@@ -178,10 +178,11 @@ fn swapping_the_bodies_flips_the_normals_only() {
             let back = meet(&b, &pose_b, &a, &pose_a, 0.001);
             assert_eq!(there.len(), back.len(), "{a:?} {b:?}");
             for p in &there {
+                // Two cylinders rim to rim: either order keeps a normal that is within PREFER_FACES_M of the best.
+                let (near, level) = if a == b { (2e-5, 2e-6) } else { (1e-12, 1e-12) };
                 let twin = back.iter().any(|q| {
-                    (p.p_w - q.p_w).norm() < 1e-7
-                        && (p.n_w + q.n_w).norm() < 1e-5
-                        && (p.phi - q.phi).abs() < 1e-8
+                    let apart = (p.p_w - q.p_w).norm().max((p.n_w + q.n_w).norm());
+                    apart < near && (p.phi - q.phi).abs() < level
                 });
                 assert!(twin, "{a:?} {b:?}: {p:?} has no twin in {back:?}");
             }

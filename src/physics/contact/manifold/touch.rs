@@ -2,7 +2,7 @@
 
 use super::{
     ContactPoint, MOVING, POINT_AREA, Piece,
-    axis::{Axis, contact_axis},
+    axis::{Axis, contact_axis, support},
     clip::{self, Corner},
     feature::{Face, Features, Line, facing},
 };
@@ -89,16 +89,18 @@ pub(super) fn features(
             out.push(ContactPoint { p_w, n_w: axis.n_w, phi, area, feature });
         }
     }
-    if least > axis.gap + MISSED_M {
-        out.extend(witness(&axis));
+    if axis.true_gap && least > axis.gap + MISSED_M {
+        out.push(witness(a, pose_a, b, pose_b, &axis));
     }
 }
 
 /// The closest points themselves, where no overlap of features holds them (a rim against an edge, end against end).
-fn witness(axis: &Axis) -> Option<ContactPoint> {
-    let touch = axis.closest?;
-    let p_w = 0.5 * (touch.a_w + touch.b_w);
-    Some(ContactPoint { p_w, n_w: axis.n_w, phi: axis.gap, area: POINT_AREA, feature: WITNESS })
+fn witness(a: &Piece, pose_a: &Pose, b: &Piece, pose_b: &Pose, axis: &Axis) -> ContactPoint {
+    let p_w = match axis.closest {
+        Some(touch) => 0.5 * (touch.a_w + touch.b_w),
+        None => 0.5 * (support(a, pose_a, &axis.n_w) + support(b, pose_b, &-axis.n_w)),
+    };
+    ContactPoint { p_w, n_w: axis.n_w, phi: axis.gap, area: POINT_AREA, feature: WITNESS }
 }
 
 fn meetings(cross: &Cross, a: &Features, b: &Features) -> Vec<Meeting> {
@@ -173,9 +175,10 @@ fn line_line(cross: &Cross, a: &Line, b: &Line, found: &mut Vec<Meeting>) {
     let apart = nalgebra::Vector2::new(flat_b[0][0] - flat_a[0][0], flat_b[0][1] - flat_a[0][1]);
     let mut push = |ta: f64, tb: f64, weight: f64, name: u32| {
         let lerp = |h: &[f64; 2], t: f64| h[0] + (h[1] - h[0]) * t;
+        let (on_a, on_b) =
+            (clip::between(&flat_a[0], &flat_a[1], ta), clip::between(&flat_b[0], &flat_b[1], tb));
         let area = POINT_AREA * weight * a.weight * b.weight;
-        let q = clip::between(&flat_a[0], &flat_a[1], ta);
-        found.push((q, lerp(&height_a, ta), lerp(&height_b, tb), area, name));
+        found.push((clip::between(&on_a, &on_b, 0.5), lerp(&height_a, ta), lerp(&height_b, tb), area, name));
     };
     if crossed > 0.0 {
         let (ta, tb) = (apart.perp(&along_b) / det, apart.perp(&along_a) / det);
@@ -184,14 +187,15 @@ fn line_line(cross: &Cross, a: &Line, b: &Line, found: &mut Vec<Meeting>) {
             push(ta, tb, crossed, clip::crossing(a.name, b.name));
         }
     }
-    // Places of b's ends along a, and the overlap of the two.
-    let place =
-        |q: &[f64; 2]| along_a.dot(&(nalgebra::Vector2::from(*q) - nalgebra::Vector2::from(flat_a[0])));
-    let [p0, p1] = flat_b.map(|q| place(&q) / (length_a * length_a));
-    let (low, high) = (p0.min(p1).max(0.0), p0.max(p1).min(1.0));
-    if crossed < 1.0 && low <= high {
-        for (ta, end) in [(low, 0), (high, 1)] {
-            push(ta, (ta - p0) / (p1 - p0), 1.0 - crossed, a.names[end]);
+    if crossed < 1.0 {
+        // Places along the mean direction, from a's first end.
+        let same_way = along_a.dot(&along_b).signum();
+        let mean = (along_a / length_a + along_b * (same_way / length_b)).normalize();
+        let (span_a, start_b, span_b) = (mean.dot(&along_a), mean.dot(&apart), mean.dot(&along_b));
+        let low = start_b.min(start_b + span_b).max(0.0);
+        let high = start_b.max(start_b + span_b).min(span_a);
+        for (place, end) in [(low, 0), (high, 1)].into_iter().filter(|_| low <= high) {
+            push(place / span_a, (place - start_b) / span_b, 1.0 - crossed, a.names[end]);
         }
     }
 }
