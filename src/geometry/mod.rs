@@ -3,8 +3,11 @@
 //! Everything here is in the *object frame* (`_o`), in metres, and knows nothing of materials or motion.
 
 pub mod convex;
+pub mod mesh;
+pub mod samples;
 pub mod shape;
 pub mod voxel;
+pub mod voxelise;
 
 /// A point or vector, m unless said otherwise.
 pub type Vec3 = nalgebra::Vector3<f64>;

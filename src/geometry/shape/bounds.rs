@@ -1,0 +1,244 @@
+//! Bounding boxes.
+
+use super::{Axis, Pose, Shape, Vec3};
+
+/// An axis-aligned box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aabb {
+    /// Lowest corner, m.
+    pub min: Vec3,
+    /// Highest corner, m.
+    pub max: Vec3,
+}
+
+impl Aabb {
+    /// The smallest box around points; `None` for none.
+    pub fn around<'a>(points: impl IntoIterator<Item = &'a Vec3>) -> Option<Self> {
+        points.into_iter().fold(None, |sofar, p| {
+            let Self { min, max } = sofar.unwrap_or(Self { min: *p, max: *p });
+            Some(Self { min: min.inf(p), max: max.sup(p) })
+        })
+    }
+
+    /// Edge lengths, m.
+    pub fn size(&self) -> Vec3 {
+        self.max - self.min
+    }
+
+    /// Its middle.
+    pub fn centre(&self) -> Vec3 {
+        0.5 * (self.min + self.max)
+    }
+
+    /// The box grown by `margin` (m) on every side.
+    pub fn grown(&self, margin: f64) -> Self {
+        Self { min: self.min.add_scalar(-margin), max: self.max.add_scalar(margin) }
+    }
+
+    /// The smallest box around both.
+    pub fn joined(&self, other: &Self) -> Self {
+        Self { min: self.min.inf(&other.min), max: self.max.sup(&other.max) }
+    }
+
+    /// The box around this one after it has been moved rigidly.
+    pub fn moved(&self, pose: &Pose) -> Self {
+        let centre = pose.rotation * self.centre() + pose.translation.vector;
+        let half = pose.rotation.to_rotation_matrix().into_inner().abs() * (0.5 * self.size());
+        Self { min: centre - half, max: centre + half }
+    }
+
+    fn symmetric(half: Vec3) -> Self {
+        Self { min: -half, max: half }
+    }
+}
+
+/// Cells along the longest edge in the search for the extreme points of a composite shape.
+const CELLS: f64 = 40.0;
+
+impl Shape {
+    /// The tight bounding box.
+    ///
+    /// Exact for primitives, placements, scalings, roundings and unions of them; for other kinds the extreme points are
+    /// searched on the surface to about 1 µm, which takes milliseconds: keep the answer.
+    pub fn bounds(&self) -> Aabb {
+        let exact = |axis: usize, sign: f64| self.support(&Vec3::ith(axis, sign)).map(|s| s * sign);
+        let corner = |sign: f64| Some(Vec3::new(exact(0, sign)?, exact(1, sign)?, exact(2, sign)?));
+        match (corner(-1.0), corner(1.0)) {
+            (Some(min), Some(max)) => Aabb { min, max },
+            _ => self.search_bounds(),
+        }
+    }
+
+    /// Largest value of `p · direction` over the shape, where a closed form is known.
+    fn support(&self, direction: &Vec3) -> Option<f64> {
+        let across = direction.x.hypot(direction.y);
+        match self {
+            Self::Box { half } => Some(half.dot(&direction.abs())),
+            Self::Sphere { radius } => Some(radius * direction.norm()),
+            Self::Ellipsoid { radii } => Some(radii.component_mul(direction).norm()),
+            Self::Capsule { radius, half_length } => {
+                Some(half_length * direction.z.abs() + radius * direction.norm())
+            }
+            Self::Cylinder { radius, half_height } => Some(radius * across + half_height * direction.z.abs()),
+            Self::Torus { major, minor } => Some(major * across + minor * direction.norm()),
+            Self::Prism { section, half_length } => section
+                .points()
+                .iter()
+                .map(|p| p[0] * direction.x + p[1] * direction.z)
+                .max_by(f64::total_cmp)
+                .map(|flat| flat + half_length * direction.y.abs()),
+            Self::Lathe(profile) => {
+                profile.points().iter().map(|p| p[0] * across + p[1] * direction.z).max_by(f64::total_cmp)
+            }
+            Self::Mesh(solid) => solid.mesh().vertices.iter().map(|v| v.dot(direction)).max_by(f64::total_cmp),
+            Self::Placed { shape, pose } => shape
+                .support(&pose.rotation.inverse_transform_vector(direction))
+                .map(|s| s + pose.translation.vector.dot(direction)),
+            Self::Scaled { shape, scale } => shape.support(&scale.component_mul(direction)),
+            Self::Rounded { shape, radius } => shape.support(direction).map(|s| s + radius * direction.norm()),
+            Self::Union(parts) => parts
+                .iter()
+                .map(|part| part.support(direction))
+                .try_fold(f64::NEG_INFINITY, |most, s| Some(most.max(s?))),
+            Self::Shell { shape, .. } | Self::Paint { shape, .. } => shape.support(direction),
+            _ => None,
+        }
+    }
+
+    /// A box that surely holds the shape, not tight.
+    pub(crate) fn reach(&self) -> Aabb {
+        match self {
+            Self::Placed { shape, pose } => shape.reach().moved(pose),
+            Self::Scaled { shape, scale } => {
+                let inner = shape.reach();
+                Aabb { min: inner.min.component_mul(scale), max: inner.max.component_mul(scale) }
+            }
+            Self::Rounded { shape, radius } => shape.reach().grown(*radius),
+            Self::Shell { shape, .. } | Self::Paint { shape, .. } => shape.reach(),
+            Self::Union(parts) => joined(parts),
+            Self::Intersect(parts) => parts
+                .iter()
+                .map(Self::reach)
+                .reduce(|a, b| Aabb { min: a.min.sup(&b.min), max: a.max.inf(&b.max).sup(&a.min.sup(&b.min)) })
+                .unwrap_or(Aabb::symmetric(Vec3::zeros())),
+            Self::Subtract { from, .. } | Self::SmoothSubtract { from, .. } => from.reach(),
+            // Each blend raises the seam by at most a quarter of its width, in first-order distance.
+            Self::SmoothUnion { parts, blend } => joined(parts).grown(0.5 * blend * parts.len() as f64),
+            Self::Twist { shape, axis, .. } => twisted(&shape.reach(), *axis),
+            Self::Bend { shape, along, towards, curvature } => {
+                bent(&shape.reach(), *along, *towards, *curvature)
+            }
+            Self::Displace { shape, reliefs } => {
+                shape.reach().grown(1.5 * reliefs.iter().map(super::Relief::reach).sum::<f64>())
+            }
+            _ => self.bounds(),
+        }
+    }
+
+    /// Projects grid points near the surface on it, keeps the extreme ones and lets them climb.
+    fn search_bounds(&self) -> Aabb {
+        let reach = self.reach();
+        let cell = reach.size().max() / CELLS;
+        let count = reach.size().map(|edge| (edge / cell).ceil() as usize + 1);
+        let mut extremes: [Option<Vec3>; 6] = [None; 6];
+        for index in 0..count.x * count.y * count.z {
+            let step = Vec3::new(
+                (index % count.x) as f64,
+                (index / count.x % count.y) as f64,
+                (index / count.x / count.y) as f64,
+            );
+            let p = reach.min + step * cell;
+            if self.distance(&p).abs() > 1.5 * cell {
+                continue;
+            }
+            let Some(q) = self.project(&p, 2.0 * cell) else { continue };
+            for (side, extreme) in extremes.iter_mut().enumerate() {
+                let height = |v: &Vec3| outward(side).dot(v);
+                if extreme.is_none_or(|e| height(&q) > height(&e)) {
+                    *extreme = Some(q);
+                }
+            }
+        }
+        let mut found = Aabb { min: reach.centre(), max: reach.centre() };
+        for (side, extreme) in extremes.into_iter().enumerate() {
+            if let Some(start) = extreme {
+                let top = self.climb(start, &outward(side), cell);
+                let corner = if side % 2 == 0 { &mut found.min } else { &mut found.max };
+                corner[side / 2] = top[side / 2];
+            }
+        }
+        found
+    }
+
+    /// The surface point that projections from `p` lead to, if that is within `reach` (m) of it.
+    pub(crate) fn project(&self, p: &Vec3, reach: f64) -> Option<Vec3> {
+        let mut q = *p;
+        for _ in 0..8 {
+            let (distance, normal) = self.estimate(&q);
+            q -= normal * distance;
+            if distance.abs() < 1e-9 {
+                break;
+            }
+        }
+        ((q - p).norm() <= reach && self.distance(&q).abs() < 1e-6).then_some(q)
+    }
+
+    /// Walks on the surface from `start` as far as possible along `direction`.
+    fn climb(&self, start: Vec3, direction: &Vec3, cell: f64) -> Vec3 {
+        let (mut at, mut step) = (start, cell);
+        while step > 1e-7 {
+            let normal = self.estimate(&at).1;
+            let slope = direction - normal * normal.dot(direction);
+            let next = (slope.norm() > 1e-9)
+                .then(|| self.project(&(at + slope.normalize() * step), 2.0 * step))
+                .flatten()
+                .filter(|q| (q - at).dot(direction) > 0.0);
+            match next {
+                Some(q) => at = q,
+                None => step *= 0.5,
+            }
+        }
+        at
+    }
+}
+
+fn outward(side: usize) -> Vec3 {
+    Vec3::ith(side / 2, if side.is_multiple_of(2) { -1.0 } else { 1.0 })
+}
+
+fn joined(parts: &[Shape]) -> Aabb {
+    parts.iter().map(Shape::reach).reduce(|a, b| a.joined(&b)).unwrap_or(Aabb::symmetric(Vec3::zeros()))
+}
+
+/// A twist keeps distances from the axis.
+fn twisted(inner: &Aabb, axis: Axis) -> Aabb {
+    let far = inner.min.abs().sup(&inner.max.abs());
+    let k = axis.index();
+    let radius = far[(k + 1) % 3].hypot(far[(k + 2) % 3]);
+    let mut outer = Aabb::symmetric(Vec3::repeat(radius));
+    (outer.min[k], outer.max[k]) = (inner.min[k], inner.max[k]);
+    outer
+}
+
+/// The images of a lattice on the two faces of the straight box that matter, and the bulge between them.
+fn bent(inner: &Aabb, along: Axis, towards: Axis, curvature: f64) -> Aabb {
+    if curvature.abs() < 1e-9 {
+        return *inner;
+    }
+    let (i, k) = (along.index(), towards.index());
+    let radius = 1.0 / curvature;
+    let steps = 64;
+    let mut outer: Option<Aabb> = None;
+    for step in 0..=steps {
+        let angle = (inner.min[i] + (inner.max[i] - inner.min[i]) * f64::from(step) / f64::from(steps)) / radius;
+        for level in [inner.min[k], inner.max[k]] {
+            let (mut low, mut high) = (inner.min, inner.max);
+            low[i] = (radius - level) * angle.sin();
+            low[k] = radius - (radius - level) * angle.cos();
+            (high[i], high[k]) = (low[i], low[k]);
+            let point = Aabb { min: low, max: high };
+            outer = Some(outer.map_or(point, |sofar| sofar.joined(&point)));
+        }
+    }
+    outer.map_or(*inner, |found| found.grown(0.01 * found.size().max()))
+}

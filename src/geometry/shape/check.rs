@@ -1,0 +1,215 @@
+//! Whether a shape can be built at all.
+
+use super::{Bumps, Mask, Relief, Ridges, Shape, Vec3};
+
+/// Why a shape cannot be.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ShapeError {
+    /// A size is not positive and finite.
+    #[error("{kind}: {field} is {value} m; give a finite length above 0")]
+    Size {
+        /// The kind of shape.
+        kind: &'static str,
+        /// The size.
+        field: &'static str,
+        /// Its value, m.
+        value: f64,
+    },
+    /// A number is outside of its range.
+    #[error("{kind}: {field} is {value}; {mend}")]
+    Number {
+        /// The kind of shape.
+        kind: &'static str,
+        /// The number.
+        field: &'static str,
+        /// Its value.
+        value: f64,
+        /// What would do.
+        mend: &'static str,
+    },
+    /// A combination has no parts.
+    #[error("{kind}: has no parts; give at least one")]
+    Empty {
+        /// The kind of shape.
+        kind: &'static str,
+    },
+    /// Too few corners.
+    #[error("profile: has {corners} corners; give at least 3")]
+    ProfileSize {
+        /// How many.
+        corners: usize,
+    },
+    /// A corner is not finite or lies on the wrong side of the axis.
+    #[error("profile: corner {index} is ({r}, {z}); give finite numbers, and r ≥ 0 for a lathe")]
+    ProfilePoint {
+        /// Index of the corner, from 0.
+        index: usize,
+        /// First coordinate, m.
+        r: f64,
+        /// Second coordinate, m.
+        z: f64,
+    },
+    /// Two neighbouring corners coincide.
+    #[error("profile: corner ({r}, {z}) is given twice in a row; leave one out (the last joins the first by itself)")]
+    ProfileRepeat {
+        /// First coordinate, m.
+        r: f64,
+        /// Second coordinate, m.
+        z: f64,
+    },
+    /// Nothing is enclosed.
+    #[error("profile: encloses no area; go around the cross-section, not along a line")]
+    ProfileArea,
+    /// Edges cross.
+    #[error("profile: its edges cross each other; list the corners in order around the cross-section")]
+    ProfileCrossing,
+}
+
+impl Shape {
+    /// Checks every number of the tree.
+    ///
+    /// # Errors
+    /// Names the first kind and field that cannot be, its value and the mend.
+    pub fn check(&self) -> Result<(), ShapeError> {
+        match self {
+            Self::Box { half } => sizes("box", "half extent", half),
+            Self::Sphere { radius } => size("sphere", "radius", *radius),
+            Self::Ellipsoid { radii } => sizes("ellipsoid", "semi-axis", radii),
+            Self::Capsule { radius, half_length } => {
+                size("capsule", "radius", *radius)?;
+                at_least_zero("capsule", "half length of the straight part", *half_length)
+            }
+            Self::Cylinder { radius, half_height } => {
+                size("cylinder", "radius", *radius)?;
+                size("cylinder", "half height", *half_height)
+            }
+            Self::Torus { major, minor } => {
+                size("torus", "minor radius", *minor)?;
+                let mend = "give a major radius larger than the minor one";
+                ensure(major.is_finite() && major > minor, "torus", "major radius", *major, mend)
+            }
+            Self::Prism { half_length, .. } => size("prism", "half length", *half_length),
+            Self::Lathe(_) | Self::Mesh(_) => Ok(()),
+            _ => self.check_composite(),
+        }
+    }
+
+    /// [`Shape::check`] of the kinds that hold others.
+    fn check_composite(&self) -> Result<(), ShapeError> {
+        match self {
+            Self::Placed { shape, pose } => {
+                let offset = pose.translation.vector;
+                finite("move", "offset", offset.sum() + pose.rotation.coords.sum())?;
+                shape.check()
+            }
+            Self::Scaled { shape, scale } => {
+                let mend = "give a finite factor above 0";
+                let worst = scale.min();
+                ensure(worst > 0.0 && scale.sum().is_finite(), "scale", "factor", worst, mend)?;
+                shape.check()
+            }
+            Self::Rounded { shape, radius } => {
+                at_least_zero("round", "radius", *radius)?;
+                shape.check()
+            }
+            Self::Shell { shape, thickness } => {
+                size("shell", "thickness", *thickness)?;
+                shape.check()
+            }
+            Self::Union(parts) => all("union", parts),
+            Self::Intersect(parts) => all("intersection", parts),
+            Self::Subtract { from, cut } => from.check().and_then(|()| cut.check()),
+            Self::SmoothUnion { parts, blend } => {
+                size("smooth union", "blend", *blend)?;
+                all("smooth union", parts)
+            }
+            Self::SmoothSubtract { from, cut, blend } => {
+                size("smooth subtraction", "blend", *blend)?;
+                from.check().and_then(|()| cut.check())
+            }
+            Self::Twist { shape, rate, .. } => {
+                finite("twist", "rate", *rate)?;
+                shape.check()
+            }
+            Self::Bend { shape, along, towards, curvature } => {
+                finite("bend", "curvature", *curvature)?;
+                let axis = towards.index() as f64;
+                ensure(along != towards, "bend", "towards axis", axis, "bend towards another axis than along")?;
+                shape.check()
+            }
+            Self::Displace { shape, reliefs } => {
+                reliefs.iter().try_for_each(Relief::check)?;
+                shape.check()
+            }
+            Self::Paint { shape, region, .. } => {
+                region.as_ref().map_or(Ok(()), |region| region.check())?;
+                shape.check()
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Relief {
+    fn check(&self) -> Result<(), ShapeError> {
+        match self {
+            Self::Ridges(Ridges { height, pitch, radial_pitch, phase, sharpness, mask, .. }) => {
+                finite("ridges", "height", *height)?;
+                finite("ridges", "phase", *phase)?;
+                let mend = "give a distance other than 0 (infinite for none)";
+                for (field, value) in [("pitch", *pitch), ("radial pitch", *radial_pitch)] {
+                    ensure(value.abs() > 0.0, "ridges", field, value, mend)?;
+                }
+                ensure((1.0..=8.0).contains(sharpness), "ridges", "sharpness", *sharpness, "give 1 to 8")?;
+                mask.as_ref().map_or(Ok(()), Mask::check)
+            }
+            Self::Bumps(Bumps { height, radius, spacing, mask, .. }) => {
+                finite("bumps", "height", *height)?;
+                size("bumps", "spacing", *spacing)?;
+                let mend = "give a radius above 0, at most half of the spacing";
+                ensure(*radius > 0.0 && *radius <= 0.5 * spacing, "bumps", "radius", *radius, mend)?;
+                mask.as_ref().map_or(Ok(()), Mask::check)
+            }
+        }
+    }
+}
+
+impl Mask {
+    fn check(&self) -> Result<(), ShapeError> {
+        let span = self.to - self.from;
+        ensure(span.is_finite() && span != 0.0, "mask", "to − from", span, "give two different finite places")
+    }
+}
+
+fn ensure(
+    good: bool,
+    kind: &'static str,
+    field: &'static str,
+    value: f64,
+    mend: &'static str,
+) -> Result<(), ShapeError> {
+    if good { Ok(()) } else { Err(ShapeError::Number { kind, field, value, mend }) }
+}
+
+fn size(kind: &'static str, field: &'static str, value: f64) -> Result<(), ShapeError> {
+    if value.is_finite() && value > 0.0 { Ok(()) } else { Err(ShapeError::Size { kind, field, value }) }
+}
+
+fn sizes(kind: &'static str, field: &'static str, values: &Vec3) -> Result<(), ShapeError> {
+    values.iter().try_for_each(|value| size(kind, field, *value))
+}
+
+fn at_least_zero(kind: &'static str, field: &'static str, value: f64) -> Result<(), ShapeError> {
+    ensure(value.is_finite() && value >= 0.0, kind, field, value, "give a finite length, 0 or more")
+}
+
+fn finite(kind: &'static str, field: &'static str, value: f64) -> Result<(), ShapeError> {
+    ensure(value.is_finite(), kind, field, value, "give a finite number")
+}
+
+fn all(kind: &'static str, parts: &[Shape]) -> Result<(), ShapeError> {
+    if parts.is_empty() {
+        return Err(ShapeError::Empty { kind });
+    }
+    parts.iter().try_for_each(Shape::check)
+}

@@ -1,0 +1,119 @@
+//! What a contact sample feels of a shape, with sharp faces covered in part.
+
+use super::{Shape, Vec3, primitive, to_local};
+
+/// A shape as a contact sample feels it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contact {
+    /// Signed distance, m; negative inside.
+    pub phi: f64,
+    /// Outward unit normal of the shape.
+    pub normal: Vec3,
+    /// Share of the sample's patch that lies over the face, 0..=1.
+    pub coverage: f64,
+}
+
+/// A face is felt by samples whose outward normal opposes its own by at least this cosine.
+const FACING: f64 = 0.3;
+
+/// One flat or round face of a sharp shape, as seen from a point.
+struct Face {
+    phi: f64,
+    normal: Vec3,
+    coverage: f64,
+    /// Half the thickness of the shape under the face: deeper than this, the far side is nearer.
+    depth: f64,
+}
+
+impl Shape {
+    /// The contact of a square sample of edge `spacing` (m) at `p_o` with outward normal `facing_o` (of the body that
+    /// carries the sample, in this shape's frame; zero if unknown).
+    ///
+    /// Boxes and cylinders have sharp edges. A sample belongs to the face that it faces, up to half a spacing beyond its
+    /// edge, with the covered share of its patch: so the total over a field of samples varies continuously as an edge
+    /// moves, and a deep sample near an edge is not taken for one of the side. All other shapes answer with
+    /// [`Shape::distance_and_normal`] and full coverage.
+    pub fn contact(&self, p_o: &Vec3, facing_o: &Vec3, spacing: f64) -> Contact {
+        match self {
+            Self::Box { half } => sharp(box_faces(p_o, half, spacing), facing_o)
+                .unwrap_or_else(|| full(primitive::cuboid(p_o, half))),
+            Self::Cylinder { radius, half_height } => {
+                sharp(cylinder_faces(p_o, *radius, *half_height, spacing), facing_o)
+                    .unwrap_or_else(|| full(primitive::cylinder(p_o, *radius, *half_height)))
+            }
+            Self::Placed { shape, pose } => {
+                let facing = pose.rotation.inverse_transform_vector(facing_o);
+                let contact = shape.contact(&to_local(pose, p_o), &facing, spacing);
+                Contact { normal: pose.rotation * contact.normal, ..contact }
+            }
+            Self::Paint { shape, .. } => shape.contact(p_o, facing_o, spacing),
+            Self::Union(parts) => union(parts, p_o, facing_o, spacing),
+            _ => full(self.distance_and_normal(p_o)),
+        }
+    }
+}
+
+fn full((phi, normal): (f64, Vec3)) -> Contact {
+    Contact { phi, normal, coverage: 1.0 }
+}
+
+/// The face that a sample feels: of those that it covers and faces, the one it faces most.
+fn sharp<const N: usize>(faces: [Face; N], facing: &Vec3) -> Option<Contact> {
+    faces
+        .into_iter()
+        .filter(|face| face.coverage > 0.0 && face.phi >= -face.depth)
+        .map(|face| (-facing.dot(&face.normal), face))
+        .filter(|(alignment, _)| *alignment > FACING)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, face)| Contact { phi: face.phi, normal: face.normal, coverage: face.coverage })
+}
+
+/// The covered share along one direction of a patch whose centre lies `inside` m within the edge.
+fn covered(inside: f64, spacing: f64) -> f64 {
+    (inside / spacing + 0.5).clamp(0.0, 1.0)
+}
+
+fn box_faces(p: &Vec3, half: &Vec3, spacing: f64) -> [Face; 3] {
+    let inside = half - p.abs();
+    std::array::from_fn(|axis| {
+        let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
+        Face {
+            phi: -inside[axis],
+            normal: Vec3::ith(axis, if p[axis] < 0.0 { -1.0 } else { 1.0 }),
+            coverage: covered(inside[i], spacing) * covered(inside[j], spacing),
+            depth: half[axis],
+        }
+    })
+}
+
+fn cylinder_faces(p: &Vec3, radius: f64, half_height: f64, spacing: f64) -> [Face; 2] {
+    let r = p.x.hypot(p.y);
+    let cap = Face {
+        phi: p.z.abs() - half_height,
+        normal: Vec3::z() * if p.z < 0.0 { -1.0 } else { 1.0 },
+        coverage: covered(radius - r, spacing),
+        depth: half_height,
+    };
+    let side = Face {
+        phi: r - radius,
+        normal: if r > 1e-12 { Vec3::new(p.x / r, p.y / r, 0.0) } else { Vec3::x() },
+        coverage: covered(half_height - p.z.abs(), spacing),
+        depth: radius,
+    };
+    [cap, side]
+}
+
+/// The deepest part, and all that agrees with it: flush parts cover a patch on their seam together.
+fn union(parts: &[Shape], p: &Vec3, facing: &Vec3, spacing: f64) -> Contact {
+    let mut best = Contact { phi: f64::INFINITY, normal: Vec3::z(), coverage: 1.0 };
+    for part in parts {
+        let contact = part.contact(p, facing, spacing);
+        let flush = (contact.phi - best.phi).abs() < 1e-3 * spacing && contact.normal.dot(&best.normal) > 0.999;
+        if flush {
+            best.coverage = (best.coverage + contact.coverage).min(1.0);
+        } else if contact.phi < best.phi {
+            best = contact;
+        }
+    }
+    best
+}

@@ -1,0 +1,159 @@
+//! Distance and normal of every kind of shape.
+
+use super::{Shape, Vec3, combine, primitive, relief::Relief, to_local, warp};
+
+/// Farther than this from the surface a first-order distance is good enough and is not refined, m.
+const BAND: f64 = 12e-3;
+/// Projections on the surface in a refinement.
+const ROUNDS: usize = 4;
+
+impl Shape {
+    /// First-order signed distance at `p_o`, m: right on the surface and in sign, cheaper than
+    /// [`Shape::distance_and_normal`] and less exact away from the surface.
+    pub fn distance(&self, p_o: &Vec3) -> f64 {
+        self.estimate(p_o).0
+    }
+
+    /// Signed distance φ (m, negative inside) at `p_o` and the outward unit normal there.
+    ///
+    /// Exact for the primitives and their rigid placements; within 5 % of the true distance up to 5 mm from the surface
+    /// for combinations and warps whose radii of curvature are larger than that.
+    pub fn distance_and_normal(&self, p_o: &Vec3) -> (f64, Vec3) {
+        match self {
+            Self::Placed { shape, pose } => {
+                let (distance, normal) = shape.distance_and_normal(&to_local(pose, p_o));
+                (distance, pose.rotation * normal)
+            }
+            Self::Rounded { shape, radius } => {
+                let (distance, normal) = shape.distance_and_normal(p_o);
+                (distance - radius, normal)
+            }
+            Self::Shell { shape, thickness } => shell(shape.distance_and_normal(p_o), *thickness),
+            Self::Paint { shape, .. } => shape.distance_and_normal(p_o),
+            Self::Union(parts) => fold(parts, |s| s.distance_and_normal(p_o), combine::unite),
+            Self::Intersect(parts) => fold(parts, |s| s.distance_and_normal(p_o), combine::intersect),
+            Self::Subtract { from, cut } => combine::intersect(
+                from.distance_and_normal(p_o),
+                combine::invert(cut.distance_and_normal(p_o)),
+            ),
+            Self::Scaled { shape, scale } if scale.max() - scale.min() <= 1e-12 * scale.max() => {
+                let (distance, normal) = shape.distance_and_normal(&(p_o / scale.x));
+                (distance * scale.x, normal)
+            }
+            Self::Ellipsoid { .. }
+            | Self::Scaled { .. }
+            | Self::SmoothUnion { .. }
+            | Self::SmoothSubtract { .. }
+            | Self::Twist { .. }
+            | Self::Bend { .. }
+            | Self::Displace { .. } => self.refine(p_o),
+            _ => self.estimate(p_o),
+        }
+    }
+
+    /// First-order distance `f/|∇f|` and unit gradient, by the chain rule through the tree.
+    pub(super) fn estimate(&self, p: &Vec3) -> (f64, Vec3) {
+        match self {
+            Self::Box { half } => primitive::cuboid(p, half),
+            Self::Sphere { radius } => primitive::sphere(p, *radius),
+            Self::Ellipsoid { radii } => primitive::ellipsoid(p, radii),
+            Self::Capsule { radius, half_length } => primitive::capsule(p, *radius, *half_length),
+            Self::Cylinder { radius, half_height } => primitive::cylinder(p, *radius, *half_height),
+            Self::Torus { major, minor } => primitive::torus(p, *major, *minor),
+            Self::Prism { section, half_length } => primitive::prism(p, section, *half_length),
+            Self::Lathe(profile) => primitive::lathe(p, profile),
+            Self::Mesh(solid) => solid.distance_and_normal(p),
+            Self::Placed { shape, pose } => {
+                let (distance, normal) = shape.estimate(&to_local(pose, p));
+                (distance, pose.rotation * normal)
+            }
+            Self::Scaled { shape, scale } => {
+                let (value, normal) = shape.estimate(&p.component_div(scale));
+                let gradient = normal.component_div(scale);
+                let slope = gradient.norm();
+                (value / slope, gradient / slope)
+            }
+            Self::Paint { shape, .. } => shape.estimate(p),
+            _ => self.estimate_composite(p),
+        }
+    }
+
+    /// [`Shape::estimate`] of the kinds that combine or warp others.
+    fn estimate_composite(&self, p: &Vec3) -> (f64, Vec3) {
+        match self {
+            Self::Rounded { shape, radius } => {
+                let (distance, normal) = shape.estimate(p);
+                (distance - radius, normal)
+            }
+            Self::Shell { shape, thickness } => shell(shape.estimate(p), *thickness),
+            Self::Union(parts) => fold(parts, |part| part.estimate(p), combine::unite),
+            Self::Intersect(parts) => fold(parts, |part| part.estimate(p), combine::intersect),
+            Self::Subtract { from, cut } => {
+                combine::intersect(from.estimate(p), combine::invert(cut.estimate(p)))
+            }
+            Self::SmoothUnion { parts, blend } => {
+                fold(parts, |part| part.estimate(p), |a, b| combine::unite_smoothly(a, b, *blend))
+            }
+            Self::SmoothSubtract { from, cut, blend } => {
+                combine::invert(combine::unite_smoothly(combine::invert(from.estimate(p)), cut.estimate(p), *blend))
+            }
+            Self::Twist { shape, axis, rate } => {
+                let (straight, jacobian) = warp::untwist(p, *axis, *rate);
+                let (value, normal) = shape.estimate(&straight);
+                combine::to_first_order(value, jacobian.tr_mul(&normal))
+            }
+            Self::Bend { shape, along, towards, curvature } => {
+                let (straight, jacobian) = warp::unbend(p, *along, *towards, *curvature);
+                let (value, normal) = shape.estimate(&straight);
+                combine::to_first_order(value, jacobian.tr_mul(&normal))
+            }
+            Self::Displace { shape, reliefs } => displace(shape.estimate(p), reliefs, p),
+            _ => (f64::INFINITY, Vec3::z()),
+        }
+    }
+
+    /// Finds the nearest point of the surface by projecting on it and sliding along it in turn; keeps the best.
+    fn refine(&self, p: &Vec3) -> (f64, Vec3) {
+        let (first, first_normal) = self.estimate(p);
+        if first.abs() > BAND {
+            return (first, first_normal);
+        }
+        let mut q = p - first_normal * first;
+        let mut best = (first.abs(), first_normal);
+        for round in 0..ROUNDS {
+            let (off, normal) = self.estimate(&q);
+            q -= normal * off;
+            let arm = p - q;
+            let length = arm.norm();
+            if round == 0 || length < best.0 {
+                best = (length, normal);
+            }
+            q += arm - normal * arm.dot(&normal);
+        }
+        (best.0.copysign(first), best.1)
+    }
+}
+
+/// Folds the fields of parts; nothing is infinitely far away.
+fn fold(
+    parts: &[Shape],
+    field: impl Fn(&Shape) -> combine::Field,
+    join: impl Fn(combine::Field, combine::Field) -> combine::Field,
+) -> combine::Field {
+    parts.iter().map(field).reduce(join).unwrap_or((f64::INFINITY, Vec3::z()))
+}
+
+fn shell((distance, normal): (f64, Vec3), thickness: f64) -> (f64, Vec3) {
+    let middle = distance + 0.5 * thickness;
+    (middle.abs() - 0.5 * thickness, if middle < 0.0 { -normal } else { normal })
+}
+
+fn displace((distance, normal): (f64, Vec3), reliefs: &[Relief], p: &Vec3) -> (f64, Vec3) {
+    let (mut value, mut gradient) = (distance, normal);
+    for relief in reliefs {
+        let (height, slope) = relief.height(p);
+        value -= height;
+        gradient -= slope;
+    }
+    combine::to_first_order(value, gradient)
+}

@@ -1,0 +1,79 @@
+//! Exact distance and normal of the primitives.
+
+use super::{Profile, Vec3};
+
+/// The x axis stands in for a normal that is not defined (the centre of a ball, the axis of a tube).
+fn unit_or_x(v: Vec3, length: f64) -> Vec3 {
+    if length > 1e-12 { v / length } else { Vec3::x() }
+}
+
+pub(super) fn cuboid(p: &Vec3, half: &Vec3) -> (f64, Vec3) {
+    let q = p.abs() - half;
+    let signed = |axis: usize, size: f64| if p[axis] < 0.0 { -size } else { size };
+    let outside = q.sup(&Vec3::zeros());
+    let length = outside.norm();
+    if length > 1e-12 {
+        return (length, Vec3::from_fn(|axis, _| signed(axis, outside[axis] / length)));
+    }
+    let axis = q.imax();
+    (q[axis], Vec3::ith(axis, signed(axis, 1.0)))
+}
+
+pub(super) fn sphere(p: &Vec3, radius: f64) -> (f64, Vec3) {
+    let length = p.norm();
+    (length - radius, unit_or_x(*p, length))
+}
+
+/// First-order distance `f / |∇f|` of `f = |p / radii| − 1`.
+pub(super) fn ellipsoid(p: &Vec3, radii: &Vec3) -> (f64, Vec3) {
+    let unit = p.component_div(radii);
+    let length = unit.norm();
+    if length < 1e-9 {
+        return (-radii.min(), Vec3::ith(radii.imin(), 1.0));
+    }
+    let gradient = unit.component_div(radii) / length;
+    let slope = gradient.norm();
+    ((length - 1.0) / slope, gradient / slope)
+}
+
+pub(super) fn capsule(p: &Vec3, radius: f64, half_length: f64) -> (f64, Vec3) {
+    sphere(&Vec3::new(p.x, p.y, p.z - p.z.clamp(-half_length, half_length)), radius)
+}
+
+pub(super) fn cylinder(p: &Vec3, radius: f64, half_height: f64) -> (f64, Vec3) {
+    let r = p.x.hypot(p.y);
+    let (side, cap) = (r - radius, p.z.abs() - half_height);
+    let radial = unit_or_x(Vec3::new(p.x, p.y, 0.0), r);
+    let up = Vec3::z() * if p.z < 0.0 { -1.0 } else { 1.0 };
+    if side > 0.0 && cap > 0.0 {
+        let length = side.hypot(cap);
+        return (length, (radial * side + up * cap) / length);
+    }
+    if side > cap { (side, radial) } else { (cap, up) }
+}
+
+pub(super) fn torus(p: &Vec3, major: f64, minor: f64) -> (f64, Vec3) {
+    let r = p.x.hypot(p.y);
+    let radial = unit_or_x(Vec3::new(p.x, p.y, 0.0), r);
+    let arm = radial * (r - major) + Vec3::z() * p.z;
+    let length = arm.norm();
+    (length - minor, unit_or_x(arm, length))
+}
+
+pub(super) fn prism(p: &Vec3, section: &Profile, half_length: f64) -> (f64, Vec3) {
+    let (flat, gradient) = section.distance([p.x, p.z]);
+    let side = p.y.abs() - half_length;
+    let across = Vec3::new(gradient[0], 0.0, gradient[1]);
+    let along = Vec3::y() * if p.y < 0.0 { -1.0 } else { 1.0 };
+    if flat > 0.0 && side > 0.0 {
+        let length = flat.hypot(side);
+        return (length, (across * flat + along * side) / length);
+    }
+    if flat > side { (flat, across) } else { (side, along) }
+}
+
+pub(super) fn lathe(p: &Vec3, profile: &Profile) -> (f64, Vec3) {
+    let r = p.x.hypot(p.y);
+    let (distance, gradient) = profile.distance([r, p.z]);
+    (distance, unit_or_x(Vec3::new(p.x, p.y, 0.0), r) * gradient[0] + Vec3::z() * gradient[1])
+}

@@ -1,0 +1,147 @@
+//! Exact signed distance to a closed polygon in a plane.
+
+use super::ShapeError;
+
+/// A simple closed polygon, counter-clockwise; for a lathe its coordinates are (r, z) with r ≥ 0.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Profile {
+    points: Vec<[f64; 2]>,
+    edges: Vec<Edge>,
+}
+
+/// An edge from `start` by `span`.
+#[derive(Clone, Debug, PartialEq)]
+struct Edge {
+    start: [f64; 2],
+    span: [f64; 2],
+    inverse_square: f64,
+    /// An edge on the axis of revolution separates inside from inside: it is no surface.
+    on_axis: bool,
+}
+
+impl Profile {
+    /// A profile to be revolved, from its corners (r, z), m, in order; the last is joined to the first.
+    ///
+    /// # Errors
+    /// If there are fewer than three corners, a coordinate is not finite or has r < 0, two neighbours coincide, edges
+    /// cross, or nothing is enclosed.
+    pub fn revolved(points: Vec<[f64; 2]>) -> Result<Self, ShapeError> {
+        if let Some(index) = points.iter().position(|p| !(p[0] >= 0.0 && p[0].is_finite() && p[1].is_finite())) {
+            return Err(ShapeError::ProfilePoint { index, r: points[index][0], z: points[index][1] });
+        }
+        Self::closed(points, true)
+    }
+
+    /// A profile that is not revolved, from its corners in order; the last is joined to the first.
+    ///
+    /// # Errors
+    /// As [`Profile::revolved`], but coordinates may be negative.
+    pub fn flat(points: Vec<[f64; 2]>) -> Result<Self, ShapeError> {
+        if let Some(index) = points.iter().position(|p| !(p[0].is_finite() && p[1].is_finite())) {
+            return Err(ShapeError::ProfilePoint { index, r: points[index][0], z: points[index][1] });
+        }
+        Self::closed(points, false)
+    }
+
+    fn closed(mut points: Vec<[f64; 2]>, revolved: bool) -> Result<Self, ShapeError> {
+        if points.len() < 3 {
+            return Err(ShapeError::ProfileSize { corners: points.len() });
+        }
+        let area = twice_area(&points);
+        if !(area.abs() > 1e-14) {
+            return Err(ShapeError::ProfileArea);
+        }
+        if area < 0.0 {
+            points.reverse();
+        }
+        let edges: Vec<Edge> = (0..points.len())
+            .map(|i| Edge::new(points[i], points[(i + 1) % points.len()], revolved))
+            .collect();
+        if let Some(index) = edges.iter().position(|edge| !edge.inverse_square.is_finite()) {
+            return Err(ShapeError::ProfileRepeat { r: points[index][0], z: points[index][1] });
+        }
+        if crosses_itself(&edges) {
+            return Err(ShapeError::ProfileCrossing);
+        }
+        Ok(Self { points, edges })
+    }
+
+    /// Its corners, counter-clockwise.
+    pub fn points(&self) -> &[[f64; 2]] {
+        &self.points
+    }
+
+    /// Its edges that are surface, each as its two ends.
+    pub(crate) fn walls(&self) -> impl Iterator<Item = ([f64; 2], [f64; 2])> + '_ {
+        self.edges
+            .iter()
+            .filter(|edge| !edge.on_axis)
+            .map(|e| (e.start, [e.start[0] + e.span[0], e.start[1] + e.span[1]]))
+    }
+
+    /// Signed distance at `p` and its gradient; exact everywhere.
+    pub(super) fn distance(&self, p: [f64; 2]) -> (f64, [f64; 2]) {
+        let mut best = f64::INFINITY;
+        let mut nearest = (&self.edges[0], [0.0; 2]);
+        let mut inside = false;
+        for edge in &self.edges {
+            let w = [p[0] - edge.start[0], p[1] - edge.start[1]];
+            if (w[1] >= 0.0) != (w[1] >= edge.span[1]) {
+                let left = edge.span[0] * w[1] - edge.span[1] * w[0];
+                inside ^= (edge.span[1] > 0.0) == (left > 0.0);
+            }
+            if edge.on_axis {
+                continue;
+            }
+            let t = ((w[0] * edge.span[0] + w[1] * edge.span[1]) * edge.inverse_square).clamp(0.0, 1.0);
+            let gap = [w[0] - t * edge.span[0], w[1] - t * edge.span[1]];
+            let square = gap[0] * gap[0] + gap[1] * gap[1];
+            if square < best {
+                best = square;
+                nearest = (edge, gap);
+            }
+        }
+        let sign = if inside { -1.0 } else { 1.0 };
+        let length = best.sqrt();
+        if length < 1e-12 {
+            let (edge, _) = nearest;
+            let scale = edge.inverse_square.sqrt();
+            return (0.0, [edge.span[1] * scale, -edge.span[0] * scale]);
+        }
+        (sign * length, nearest.1.map(|g| sign * g / length))
+    }
+}
+
+impl Edge {
+    fn new(a: [f64; 2], b: [f64; 2], revolved: bool) -> Self {
+        let span = [b[0] - a[0], b[1] - a[1]];
+        let on_axis = revolved && a[0] < 1e-9 && b[0] < 1e-9;
+        Self { start: a, span, inverse_square: 1.0 / (span[0] * span[0] + span[1] * span[1]), on_axis }
+    }
+
+    /// Which side of this edge a point lies on.
+    fn side(&self, p: [f64; 2]) -> f64 {
+        self.span[0] * (p[1] - self.start[1]) - self.span[1] * (p[0] - self.start[0])
+    }
+}
+
+/// Twice the signed area (shoelace formula).
+fn twice_area(points: &[[f64; 2]]) -> f64 {
+    (0..points.len())
+        .map(|i| {
+            let (a, b) = (points[i], points[(i + 1) % points.len()]);
+            a[0] * b[1] - a[1] * b[0]
+        })
+        .sum()
+}
+
+/// Whether two edges that are not neighbours cross properly.
+fn crosses_itself(edges: &[Edge]) -> bool {
+    let end = |e: &Edge| [e.start[0] + e.span[0], e.start[1] + e.span[1]];
+    (0..edges.len()).any(|i| {
+        (i + 1..edges.len()).any(|j| {
+            let (a, b) = (&edges[i], &edges[j]);
+            a.side(b.start) * a.side(end(b)) < 0.0 && b.side(a.start) * b.side(end(a)) < 0.0
+        })
+    })
+}

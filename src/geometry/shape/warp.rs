@@ -1,0 +1,42 @@
+//! Warps of space: where a point of the warped shape lies in the straight one, and how gradients come back.
+
+use super::{Axis, Vec3};
+use crate::geometry::Mat3;
+
+/// The straight point and the Jacobian ∂(straight)/∂(warped) of a twist of `rate` rad/m about `axis`.
+pub(super) fn untwist(p: &Vec3, axis: Axis, rate: f64) -> (Vec3, Mat3) {
+    let k = axis.index();
+    let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+    let (sin, cos) = (-rate * p[k]).sin_cos();
+    let mut straight = *p;
+    straight[i] = cos * p[i] - sin * p[j];
+    straight[j] = sin * p[i] + cos * p[j];
+    let mut jacobian = Mat3::identity();
+    (jacobian[(i, i)], jacobian[(i, j)]) = (cos, -sin);
+    (jacobian[(j, i)], jacobian[(j, j)]) = (sin, cos);
+    (jacobian[(i, k)], jacobian[(j, k)]) = (rate * straight[j], -rate * straight[i]);
+    (straight, jacobian)
+}
+
+/// The straight point and the Jacobian ∂(straight)/∂(bent) of a bend: `along` becomes the angle about the centre of the
+/// arc times its radius, `towards` the distance that is left to it.
+pub(super) fn unbend(p: &Vec3, along: Axis, towards: Axis, curvature: f64) -> (Vec3, Mat3) {
+    if curvature.abs() < 1e-9 {
+        return (*p, Mat3::identity());
+    }
+    let (i, k) = (along.index(), towards.index());
+    let radius = 1.0 / curvature;
+    let side = radius.signum();
+    let (x, y) = (p[i] * side, (radius - p[k]) * side);
+    let length = x.hypot(y).max(1e-9);
+    let (sin, cos) = (x / length, y / length);
+    let stretch = radius.abs() / length;
+    let mut straight = *p;
+    straight[i] = x.atan2(y) * radius;
+    straight[k] = radius - side * length;
+    let mut jacobian = Mat3::identity();
+    // d(angle) = (cos dx − sin dy) / length and d(length) = sin dx + cos dy, with dx = side dp_i, dy = −side dp_k.
+    (jacobian[(i, i)], jacobian[(i, k)]) = (stretch * cos, stretch * sin);
+    (jacobian[(k, i)], jacobian[(k, k)]) = (-sin, cos);
+    (straight, jacobian)
+}
