@@ -94,13 +94,13 @@ pub(super) fn capsules(
         phi
     };
     let ends_a = [0, 1].map(|i| push(core_a[i], on_segment(&core_b, &core_a[i]).0, 1.0, i as u32));
-    for i in [0, 1] {
-        push(on_segment(&core_a, &core_b[i]).0, core_b[i], 1.0, 2 + i as u32);
-    }
-    let (on_a, on_b, t) = between_segments(&core_a, &core_b);
+    let ends_b = [0, 1].map(|i| push(on_segment(&core_a, &core_b[i]).0, core_b[i], 1.0, 2 + i as u32));
+    let (on_a, on_b) = between_segments(&core_a, &core_b);
     let phi = (on_b - on_a).norm() - ra - rb;
-    let straight = ends_a[0] + (ends_a[1] - ends_a[0]) * t;
-    push(on_a, on_b, ((straight - phi) / WITNESS_FADE_M).clamp(0.0, 1.0), 4);
+    let straight = |ends: [f64; 2], t: f64| ends[0] + (ends[1] - ends[0]) * t;
+    let (along_a, along_b) = (on_segment(&core_a, &on_a).1, on_segment(&core_b, &on_b).1);
+    let closer = straight(ends_a, along_a).min(straight(ends_b, along_b)) - phi;
+    push(on_a, on_b, (closer / WITNESS_FADE_M).clamp(0.0, 1.0), 4);
 }
 
 fn core(pose: &Pose, half_height: f64) -> [Vec3; 2] {
@@ -116,9 +116,8 @@ fn on_segment(segment: &[Vec3; 2], p: &Vec3) -> (Vec3, f64) {
     (segment[0] + along * t, t)
 }
 
-/// The closest points of two segments and the place 0..=1 along the first (Ericson, Real-Time Collision Detection,
-/// 2005, 5.1.9).
-fn between_segments(a: &[Vec3; 2], b: &[Vec3; 2]) -> (Vec3, Vec3, f64) {
+/// The closest points of two segments (Ericson, Real-Time Collision Detection, 2005, 5.1.9).
+fn between_segments(a: &[Vec3; 2], b: &[Vec3; 2]) -> (Vec3, Vec3) {
     let (along_a, along_b, apart) = (a[1] - a[0], b[1] - b[0], a[0] - b[0]);
     let (aa, ab, bb) = (along_a.norm_squared(), along_a.dot(&along_b), along_b.norm_squared());
     let det = aa * bb - ab * ab;
@@ -128,6 +127,5 @@ fn between_segments(a: &[Vec3; 2], b: &[Vec3; 2]) -> (Vec3, Vec3, f64) {
         0.5
     };
     let on_b = on_segment(b, &(a[0] + along_a * t)).0;
-    let (on_a, t) = on_segment(a, &on_b);
-    (on_a, on_b, t)
+    (on_segment(a, &on_b).0, on_b)
 }
