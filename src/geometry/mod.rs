@@ -3,6 +3,7 @@
 //! Everything here is in the *object frame* (`_o`), in metres, and knows nothing of materials or motion.
 
 pub mod broad_phase;
+pub mod convex;
 pub mod import;
 pub mod mass;
 pub mod mesh;

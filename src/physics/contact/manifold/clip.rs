@@ -1,0 +1,109 @@
+//! Overlap of convex polygons and lines in the plane, with names that survive small changes.
+
+/// A corner of a convex polygon, counter-clockwise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Corner {
+    /// Place in the plane, m.
+    pub p: [f64; 2],
+    /// Name of the point.
+    pub name: u32,
+    /// Name of the edge from here to the next corner.
+    pub edge: u32,
+}
+
+/// The name of the point where an edge of the first body crosses one of the second; unlike any corner's name.
+pub(super) fn crossing(edge_a: u32, edge_b: u32) -> u32 {
+    const MOVING: u32 = super::MOVING;
+    (edge_a | edge_b) & MOVING | 2 << 28 | (edge_a & 0xfff) << 12 | edge_b & 0xfff
+}
+
+/// Twice the signed area of the triangle o, p, q, m².
+pub(super) fn turn(o: &[f64; 2], p: &[f64; 2], q: &[f64; 2]) -> f64 {
+    (p[0] - o[0]) * (q[1] - o[1]) - (p[1] - o[1]) * (q[0] - o[0])
+}
+
+/// The overlap of two convex counter-clockwise polygons (Sutherland & Hodgman, Comm. ACM 17, 1974); empty if they
+/// are apart.
+pub(super) fn overlap(a: &[Corner], b: &[Corner]) -> Vec<Corner> {
+    // Which polygon's edge leaves a corner (true: b's) and its index there: this decides what a new corner is.
+    let mut kept: Vec<(Corner, bool, usize)> = a.iter().enumerate().map(|(i, &c)| (c, false, i)).collect();
+    for j in 0..b.len() {
+        let (from, to) = (b[j].p, b[(j + 1) % b.len()].p);
+        let height = |c: &Corner| turn(&from, &to, &c.p);
+        let mut next = Vec::with_capacity(kept.len() + 1);
+        for i in 0..kept.len() {
+            let (here, of_b, index) = kept[i];
+            let there = kept[(i + 1) % kept.len()].0;
+            let (h0, h1) = (height(&here), height(&there));
+            if h0 >= 0.0 {
+                next.push(kept[i]);
+            }
+            if (h0 >= 0.0) == (h1 >= 0.0) {
+                continue;
+            }
+            let p = between(&here.p, &there.p, h0 / (h0 - h1));
+            let name = if of_b { corner_of(b, index, j) } else { crossing(here.edge, b[j].edge) };
+            next.push(if h0 >= 0.0 {
+                (Corner { p, name, edge: b[j].edge }, true, j)
+            } else {
+                (Corner { p, name, edge: here.edge }, of_b, index)
+            });
+        }
+        kept = next;
+    }
+    kept.into_iter().map(|(corner, ..)| corner).collect()
+}
+
+/// The corner of `b` between its edges `i` and `j`.
+fn corner_of(b: &[Corner], i: usize, j: usize) -> u32 {
+    if (i + 1) % b.len() == j { b[j].name } else { b[i].name }
+}
+
+pub(super) fn between(p: &[f64; 2], q: &[f64; 2], t: f64) -> [f64; 2] {
+    [p[0] + (q[0] - p[0]) * t, p[1] + (q[1] - p[1]) * t]
+}
+
+/// The part of the line `ends` inside of a convex counter-clockwise polygon: the two places along it (0..=1) and the
+/// index of the polygon's edge that cut there, if one did; `None` if it lies outside by more than `slack` (m).
+pub(super) fn inside(
+    ends: &[[f64; 2]; 2],
+    polygon: &[Corner],
+    slack: f64,
+) -> Option<[(f64, Option<usize>); 2]> {
+    let length = |p: &[f64; 2], q: &[f64; 2]| (q[0] - p[0]).hypot(q[1] - p[1]);
+    let (mut first, mut last) = ((0.0, None), (1.0, None));
+    for j in 0..polygon.len() {
+        let (from, to) = (polygon[j].p, polygon[(j + 1) % polygon.len()].p);
+        let (h0, h1) = (turn(&from, &to, &ends[0]), turn(&from, &to, &ends[1]));
+        let allowed = -slack * length(&from, &to);
+        if h0 < allowed && h1 < allowed {
+            return None;
+        }
+        // An end within the slack counts as on the edge.
+        if h0 < allowed {
+            let cut = if h1 > 0.0 { h0 / (h0 - h1) } else { 1.0 };
+            first = if cut > first.0 { (cut, Some(j)) } else { first };
+        } else if h1 < allowed {
+            let cut = if h0 > 0.0 { h0 / (h0 - h1) } else { 0.0 };
+            last = if cut < last.0 { (cut, Some(j)) } else { last };
+        }
+    }
+    ((first.0 - last.0) * length(&ends[0], &ends[1]) <= slack).then_some([first, last])
+}
+
+/// Twice the signed area of a polygon, m²; positive if it turns counter-clockwise.
+pub(super) fn area2(polygon: &[Corner]) -> f64 {
+    (1..polygon.len().max(2) - 1).map(|i| turn(&polygon[0].p, &polygon[i].p, &polygon[i + 1].p)).sum()
+}
+
+/// Each corner's share of a polygon's outline: half of the two edges that meet there. A corner that splits in two
+/// splits its share.
+pub(super) fn shares(polygon: &[Corner]) -> Vec<f64> {
+    let count = polygon.len();
+    let length = |i: usize| {
+        let (p, q) = (polygon[i % count].p, polygon[(i + 1) % count].p);
+        (q[0] - p[0]).hypot(q[1] - p[1])
+    };
+    let outline: f64 = (0..count).map(length).sum();
+    (0..count).map(|i| 0.5 * (length(i + count - 1) + length(i)) / outline).collect()
+}
