@@ -173,6 +173,10 @@ impl Reference {
             let weighted = x - moments.weighted_mean - weighted_fit * (rest - self.weighted_centre);
             weighted_sum += weight * weighted.norm_squared();
         }
+        // Finite nodes may still be so far away that their squares overflow.
+        if !(sum.is_finite() && weighted_sum.is_finite()) {
+            return Err(far_node(nodes));
+        }
         let percent = 100.0 / self.diagonal_m;
         Ok(Deformation {
             rms_pct: percent * (sum / nodes.len() as f64).sqrt(),
@@ -197,7 +201,7 @@ impl Reference {
             weighted_product += outer * *weight;
         }
         weighted_product -= weighted_sum * self.weighted_centre.transpose();
-        // Finite nodes so far apart that their products overflow are as useless as a NaN.
+        // An eigenvector search must not be given a NaN.
         if !product.iter().chain(weighted_product.iter()).all(|v| v.is_finite()) {
             return Err(first_bad_node(nodes).unwrap_or_else(|| far_node(nodes)));
         }
