@@ -1,0 +1,208 @@
+//! The safe interaction envelope of an asset, from its hold trials and its compression sweep.
+//!
+//! Lower bound: the smallest closure at which every grasp–lift–hold trial held. Upper: D_ref is the largest *stable*
+//! deformation of the sweep and τ = κ·D_ref (SoftVTBench, appendix C.3).
+
+use serde::{Deserialize, Serialize};
+
+use super::safety::{Limit, six_decimals};
+
+/// All trials at one closure of the lower-bound scan.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HoldRow {
+    /// Commanded closure, 0 open … 1 shut.
+    pub closure: f64,
+    /// Trials made.
+    pub trials: u32,
+    /// Trials that held without slip or drop.
+    pub held: u32,
+    /// Largest slip of the trials, mm.
+    pub slip_mm: f64,
+    /// Largest peak D of the trials, %.
+    pub d_peak_pct: f64,
+}
+
+/// One closure of the compression sweep.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SweepRow {
+    /// Commanded closure, 0 open … 1 shut.
+    pub closure: f64,
+    /// Measured apex-to-apex width, mm.
+    pub gripper_width_mm: f64,
+    /// Peak D, %.
+    pub d_peak_pct: f64,
+    /// Mean normal force of the pads at rest, N.
+    pub force_n: f64,
+    /// Smallest det F.
+    pub min_det_f: f64,
+    /// Largest node speed over the window at rest, m/s.
+    pub node_speed_m_s: f64,
+    /// Both pads touched at rest.
+    pub both_pads: bool,
+    /// Slip while squeezing, mm.
+    pub slip_mm: f64,
+    /// Whether it counts for D_ref.
+    pub stable: bool,
+}
+
+/// When a squeeze is stable.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct StableRule {
+    /// det F must stay above.
+    pub min_det_f: f64,
+    /// Node speed must stay below, m/s.
+    pub node_speed_m_s: f64,
+    /// Slip must stay below, mm.
+    pub slip_mm: f64,
+}
+
+impl Default for StableRule {
+    fn default() -> Self {
+        Self { min_det_f: 0.1, node_speed_m_s: 0.005, slip_mm: 2.0 }
+    }
+}
+
+impl StableRule {
+    /// Whether `row`, its own `stable` aside, is a stable squeeze. Numbers that are not finite are not stable.
+    pub fn accepts(&self, row: &SweepRow) -> bool {
+        row.both_pads
+            && row.d_peak_pct.is_finite()
+            && row.min_det_f > self.min_det_f
+            && row.node_speed_m_s < self.node_speed_m_s
+            && row.slip_mm < self.slip_mm
+    }
+}
+
+/// The envelope of an asset, with the rows it came from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Envelope {
+    /// Smallest closure that held in every trial; null when none did.
+    pub closure_lower: Option<f64>,
+    /// Closure at which D reaches τ; null when the sweep never does.
+    pub closure_at_tau: Option<f64>,
+    /// Closure of the row that gave D_ref; null without a stable squeeze.
+    pub closure_at_d_ref: Option<f64>,
+    /// Lower-bound scan, loose to tight.
+    pub holds: Vec<HoldRow>,
+    /// Compression sweep, loose to tight.
+    pub sweep: Vec<SweepRow>,
+}
+
+impl Envelope {
+    /// Finds the bounds in the rows, which are put in order of closure.
+    pub fn new(mut holds: Vec<HoldRow>, mut sweep: Vec<SweepRow>, kappa: f64) -> Self {
+        holds.sort_by(|a, b| a.closure.total_cmp(&b.closure));
+        sweep.sort_by(|a, b| a.closure.total_cmp(&b.closure));
+        let limit = limit(&sweep, kappa);
+        let reference = limit
+            .and_then(|l| sweep.iter().find(|row| row.stable && six_decimals(row.d_peak_pct) == l.d_ref_pct));
+        Self {
+            closure_lower: lower_bound(&holds),
+            closure_at_tau: limit.and_then(|l| closure_at(&sweep, l.tau_pct())),
+            closure_at_d_ref: reference.map(|row| row.closure),
+            holds,
+            sweep,
+        }
+    }
+
+    /// Whether some closure both holds and stays within τ.
+    pub fn has_safe_window(&self) -> bool {
+        match (self.closure_lower, self.closure_at_tau) {
+            (Some(lower), Some(upper)) => lower < upper,
+            _ => false,
+        }
+    }
+}
+
+/// The limit that a sweep gives; `None` when no squeeze with any deformation was stable.
+pub fn limit(sweep: &[SweepRow], kappa: f64) -> Option<Limit> {
+    let stable = sweep.iter().filter(|row| row.stable && row.d_peak_pct.is_finite());
+    let largest = stable.map(|row| row.d_peak_pct).fold(0.0_f64, f64::max);
+    (largest > 0.0).then_some(Limit { d_ref_pct: six_decimals(largest), kappa })
+}
+
+/// The smallest closure at which every trial held; `holds` in order of closure.
+pub fn lower_bound(holds: &[HoldRow]) -> Option<f64> {
+    holds.iter().find(|row| row.trials > 0 && row.held == row.trials).map(|row| row.closure)
+}
+
+/// The closure at which D first reaches `d_pct`, linear between the rows; `sweep` in order of closure. `None` when it
+/// starts above or never reaches it.
+pub fn closure_at(sweep: &[SweepRow], d_pct: f64) -> Option<f64> {
+    sweep.windows(2).find(|pair| pair[0].d_peak_pct <= d_pct && pair[1].d_peak_pct >= d_pct).map(|pair| {
+        let rise = pair[1].d_peak_pct - pair[0].d_peak_pct;
+        let share = if rise > 0.0 { (d_pct - pair[0].d_peak_pct) / rise } else { 0.0 };
+        pair[0].closure + share * (pair[1].closure - pair[0].closure)
+    })
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    pub(crate) fn hold(closure: f64, held: u32) -> HoldRow {
+        HoldRow { closure, trials: 5, held, slip_mm: 0.1, d_peak_pct: 0.5 }
+    }
+
+    pub(crate) fn squeeze(closure: f64, d: f64, stable: bool) -> SweepRow {
+        SweepRow {
+            closure,
+            gripper_width_mm: 80.0 * (1.0 - closure),
+            d_peak_pct: d,
+            force_n: 2.0,
+            min_det_f: 0.6,
+            node_speed_m_s: 1e-4,
+            both_pads: true,
+            slip_mm: 0.0,
+            stable,
+        }
+    }
+
+    #[test]
+    fn the_envelope_lies_between_the_loosest_sure_hold_and_the_closure_at_tau() {
+        let holds = vec![hold(0.34, 5), hold(0.30, 0), hold(0.32, 4)];
+        let sweep = vec![
+            squeeze(0.3, 0.0, true),
+            squeeze(0.4, 1.0, true),
+            squeeze(0.5, 3.0, true),
+            squeeze(0.6, 9.0, false),
+        ];
+        let envelope = Envelope::new(holds, sweep, 0.5);
+        assert_eq!(envelope.closure_lower, Some(0.34));
+        assert_eq!(envelope.closure_at_d_ref, Some(0.5));
+        assert!(
+            (envelope.closure_at_tau.unwrap() - 0.425).abs() < 1e-12,
+            "D = 1.5 lies a quarter of the way"
+        );
+        assert!(envelope.has_safe_window());
+        assert_eq!(limit(&envelope.sweep, 0.5), Some(Limit { d_ref_pct: 3.0, kappa: 0.5 }));
+    }
+
+    #[test]
+    fn without_a_stable_squeeze_or_a_sure_hold_there_is_no_window() {
+        let envelope = Envelope::new(vec![hold(0.3, 4)], vec![squeeze(0.3, 1.0, false)], 0.5);
+        assert_eq!((envelope.closure_lower, envelope.closure_at_tau), (None, None));
+        assert!(!envelope.has_safe_window());
+        assert_eq!(limit(&envelope.sweep, 0.5), None);
+        let late =
+            Envelope::new(vec![hold(0.5, 5)], vec![squeeze(0.3, 0.0, true), squeeze(0.4, 2.0, true)], 0.5);
+        assert!(!late.has_safe_window(), "it holds only beyond the limit");
+    }
+
+    #[test]
+    fn a_squeeze_is_stable_by_every_part_of_the_rule() {
+        let rule = StableRule::default();
+        let row = squeeze(0.3, 1.0, false);
+        assert!(rule.accepts(&row));
+        for bad in [
+            SweepRow { min_det_f: 0.1, ..row.clone() },
+            SweepRow { node_speed_m_s: 0.005, ..row.clone() },
+            SweepRow { both_pads: false, ..row.clone() },
+            SweepRow { slip_mm: 2.0, ..row.clone() },
+            SweepRow { d_peak_pct: f64::NAN, ..row.clone() },
+        ] {
+            assert!(!rule.accepts(&bad), "{bad:?}");
+        }
+    }
+}

@@ -1,0 +1,136 @@
+//! Rates with their uncertainty, and order statistics.
+
+use serde::{Deserialize, Serialize};
+
+/// Two-sided 95 % quantile of the normal distribution.
+const Z95: f64 = 1.959_963_984_540_054;
+
+/// A share of episodes, in percent.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Rate {
+    /// The share, %; null without episodes.
+    pub rate: Option<f64>,
+    /// Its 95 % Wilson score interval, %.
+    pub wilson95: Option<[f64; 2]>,
+}
+
+impl Rate {
+    /// The rate of `count` in `total`.
+    pub fn new(count: usize, total: usize) -> Self {
+        let rate = (total > 0).then(|| 100.0 * count as f64 / total as f64);
+        Self { rate, wilson95: wilson95(count, total) }
+    }
+
+    /// The share of `items` for which `test` holds.
+    pub fn of<T>(items: &[T], test: impl Fn(&T) -> bool) -> Self {
+        Self::new(items.iter().filter(|item| test(item)).count(), items.len())
+    }
+}
+
+/// Wilson score interval (Wilson, 1927) of `count` successes in `total` trials at 95 %, in percent; `None` without trials.
+pub fn wilson95(count: usize, total: usize) -> Option<[f64; 2]> {
+    if total == 0 {
+        return None;
+    }
+    let (n, p) = (total as f64, count as f64 / total as f64);
+    let z2 = Z95 * Z95;
+    let centre = (p + z2 / (2.0 * n)) / (1.0 + z2 / n);
+    let half = Z95 / (1.0 + z2 / n) * (p * (1.0 - p) / n + z2 / (4.0 * n * n)).sqrt();
+    // At the ends the interval touches 0 and 100 exactly; rounding must not leave a crumb.
+    let low = if count == 0 { 0.0 } else { 100.0 * (centre - half) };
+    let high = if count == total { 100.0 } else { 100.0 * (centre + half) };
+    Some([low, high])
+}
+
+/// The arithmetic mean; `None` of nothing.
+pub fn mean(values: &[f64]) -> Option<f64> {
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+}
+
+/// The `percent`-th percentile of `sorted` values, linear between order statistics (type 7 of Hyndman and Fan, 1996;
+/// numpy's default); `None` of nothing.
+pub fn percentile(sorted: &[f64], percent: f64) -> Option<f64> {
+    let last = sorted.len().checked_sub(1)?;
+    let at = percent.clamp(0.0, 100.0) / 100.0 * last as f64;
+    let (low, share) = (at.floor() as usize, at.fract());
+    let high = (low + 1).min(last);
+    Some(sorted[low] + share * (sorted[high] - sorted[low]))
+}
+
+/// How a quantity is distributed; all null when there is none of it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Distribution {
+    /// Mean.
+    pub mean: Option<f64>,
+    /// 5th percentile.
+    pub p5: Option<f64>,
+    /// Median.
+    pub median: Option<f64>,
+    /// 95th percentile.
+    pub p95: Option<f64>,
+    /// How many values.
+    pub n: usize,
+}
+
+impl Distribution {
+    /// The distribution of `values`, which are finite.
+    pub fn of(mut values: Vec<f64>) -> Self {
+        values.sort_by(f64::total_cmp);
+        Self {
+            mean: mean(&values),
+            p5: percentile(&values, 5.0),
+            median: percentile(&values, 50.0),
+            p95: percentile(&values, 95.0),
+            n: values.len(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wilson_agrees_with_values_computed_elsewhere() {
+        for (count, total, low, high) in
+            [(49, 50, 89.504_556, 99.646_074), (0, 10, 0.0, 27.753_280), (5, 10, 23.659_309, 76.340_691)]
+        {
+            let [l, h] = wilson95(count, total).unwrap();
+            assert!((l - low).abs() < 1e-6 && (h - high).abs() < 1e-6, "{count}/{total}: {l} {h}");
+        }
+        assert_eq!(wilson95(50, 50).unwrap()[1], 100.0);
+        assert_eq!(wilson95(0, 0), None);
+    }
+
+    #[test]
+    fn wilson_solves_its_defining_equation() {
+        for (count, total) in [(1, 7), (30, 500), (499, 500)] {
+            let p = count as f64 / total as f64;
+            for bound in wilson95(count, total).unwrap() {
+                let q = bound / 100.0;
+                let z = (p - q).abs() / (q * (1.0 - q) / total as f64).sqrt();
+                assert!((z - Z95).abs() < 1e-9, "{count}/{total}: z {z}");
+            }
+        }
+    }
+
+    #[test]
+    fn percentiles_interpolate_as_numpy_does() {
+        let values = [1.0, 2.0, 4.0, 8.0];
+        assert_eq!(percentile(&values, 0.0), Some(1.0));
+        assert_eq!(percentile(&values, 50.0), Some(3.0));
+        assert!((percentile(&values, 95.0).unwrap() - 7.4).abs() < 1e-12);
+        assert!((percentile(&values, 5.0).unwrap() - 1.15).abs() < 1e-12);
+        assert_eq!(percentile(&values, 100.0), Some(8.0));
+        assert_eq!(percentile(&[3.0], 95.0), Some(3.0));
+        assert_eq!(percentile(&[], 50.0), None);
+    }
+
+    #[test]
+    fn a_distribution_does_not_depend_on_the_order() {
+        let a = Distribution::of(vec![3.0, 1.0, 2.0]);
+        assert_eq!(a, Distribution::of(vec![1.0, 2.0, 3.0]));
+        assert_eq!((a.mean, a.median, a.n), (Some(2.0), Some(2.0), 3));
+        assert_eq!(Distribution::of(vec![]), Distribution::default());
+    }
+}

@@ -1,0 +1,152 @@
+//! The results table, in plain text of at most 100 columns.
+
+use std::fmt::Write;
+
+use crate::evaluation::{
+    safety::KAPPAS,
+    statistics::{Distribution, Rate},
+    summary::{Scores, Summary},
+};
+
+/// Columns of the task's name.
+const NAME: usize = 30;
+/// Columns of the whole table.
+const WIDTH: usize = 98;
+
+/// The results of one suite: a row a task, all together, and the rates with their intervals.
+pub fn table(summary: &Summary) -> String {
+    let mut out = String::new();
+    let scores = &summary.scores;
+    let soft = scores.deformation_ok_rate.is_some();
+    line(&mut out, &format!("{} · policy {} · {} episodes", summary.suite, summary.policy, scores.episodes));
+    rule(&mut out);
+    line(
+        &mut out,
+        &format!(
+            "{:>3} {:<NAME$} {:>6} {:>6} {:>6} {:>7} {:>6} {:>6} {:>6} {:>6} {:>6}",
+            "#", "task", "Goal", "NoDrop", "Safety", "D mean", "P5", "median", "P95", "τ", "inval."
+        ),
+    );
+    rule(&mut out);
+    let prompts: Vec<&str> = summary.by_task.iter().map(|t| t.prompt.as_str()).collect();
+    for (task, name) in summary.by_task.iter().zip(distinct_parts(&prompts)) {
+        let tau = summary.by_asset.get(&task.asset).and_then(|asset| asset.tau);
+        line(&mut out, &row(&task.task.to_string(), name, &task.scores, tau, soft));
+    }
+    rule(&mut out);
+    line(&mut out, &row("", "all", scores, None, soft));
+    rule(&mut out);
+    footer(&mut out, summary);
+    out
+}
+
+fn row(number: &str, name: &str, scores: &Scores, tau: Option<f64>, soft: bool) -> String {
+    let d: Distribution = scores.deformation;
+    let deformation = |value: Option<f64>| match value {
+        Some(value) => format!("{value:.2}"),
+        None if soft => "–".into(),
+        None => "N/A".into(),
+    };
+    format!(
+        "{number:>3} {:<NAME$} {:>6} {:>6} {:>6} {:>7} {:>6} {:>6} {:>6} {:>6} {:>6}",
+        shortened(name, NAME),
+        percent(&scores.goal_success_rate),
+        percent(&scores.no_drop_rate),
+        percent(&scores.safety_success_rate),
+        deformation(d.mean),
+        deformation(d.p5),
+        deformation(d.median),
+        deformation(d.p95),
+        tau.map_or_else(String::new, |tau| format!("{tau:.2}")),
+        scores.invalid,
+    )
+}
+
+fn footer(out: &mut String, summary: &Summary) {
+    let scores = &summary.scores;
+    let deformation_ok = scores.deformation_ok_rate;
+    for (name, rate) in [
+        ("Goal Success", Some(scores.goal_success_rate)),
+        ("NoDrop", Some(scores.no_drop_rate)),
+        ("Deformation within τ", deformation_ok),
+        ("Safety Success", Some(scores.safety_success_rate)),
+    ] {
+        line(out, &format!("{name:<22}{}", rate.map_or_else(|| "   N/A".into(), |rate| interval(&rate))));
+    }
+    let gap = scores.goal_safe_gap.map_or_else(|| "–".into(), |gap| format!("{gap:.1}"));
+    line(out, &format!("{:<22}{gap:>6} points", "Goal–safety gap"));
+    if !summary.kappa.is_empty() {
+        let at = KAPPAS.iter().filter_map(|kappa| summary.kappa.iter().find(|row| row.kappa == *kappa));
+        let text: Vec<String> =
+            at.map(|row| format!("κ {} {} %", row.kappa, percent(&row.safety_success_rate))).collect();
+        line(out, &format!("{:<22}{}", "Safety Success at", text.join(" · ")));
+        let (all, goal) = (scores.deformation.n, scores.deformation_goal);
+        let of_goal = goal.mean.map_or_else(|| "–".into(), |mean| format!("{mean:.2} %"));
+        line(
+            out,
+            &format!(
+                "D is the peak in % of the bounding-box diagonal; n {all}; mean {of_goal} over the {} at the goal",
+                goal.n
+            ),
+        );
+    }
+    if scores.safety_unknown > 0 {
+        line(
+            out,
+            &format!(
+                "{} valid episodes lack the evidence to judge safety (no threshold, or D not measured): not safe",
+                scores.safety_unknown
+            ),
+        );
+    }
+    if scores.invalid > 0 {
+        line(out, &format!("{} invalid episodes count as failures in every rate", scores.invalid));
+    }
+}
+
+fn percent(rate: &Rate) -> String {
+    rate.rate.map_or_else(|| "–".into(), |rate| format!("{rate:.1}"))
+}
+
+fn interval(rate: &Rate) -> String {
+    let bounds = rate.wilson95.map(|[low, high]| format!("  [{low:.1}, {high:.1}]")).unwrap_or_default();
+    format!("{:>6} %{bounds}", percent(rate))
+}
+
+fn line(out: &mut String, text: &str) {
+    out.push_str(text.trim_end());
+    out.push('\n');
+}
+
+fn rule(out: &mut String) {
+    // Writing to a String cannot fail.
+    let _ = writeln!(out, "{}", "─".repeat(WIDTH));
+}
+
+fn shortened(text: &str, width: usize) -> String {
+    if text.chars().count() <= width {
+        return text.into();
+    }
+    text.chars().take(width - 1).chain(['…']).collect()
+}
+
+/// What distinguishes the prompts: whole words that all begin or end with are left out.
+fn distinct_parts<'a>(prompts: &[&'a str]) -> Vec<&'a str> {
+    let words: Vec<Vec<&str>> = prompts.iter().map(|p| p.split(' ').collect()).collect();
+    let Some(shortest) = words.iter().map(Vec::len).min() else { return Vec::new() };
+    if words.iter().all(|w| *w == words[0]) {
+        return prompts.to_vec();
+    }
+    let same = |at: &dyn Fn(&[&'a str]) -> &'a str| words.iter().all(|w| at(w) == at(&words[0]));
+    let head = (0..shortest - 1).take_while(|i| same(&|w| w[*i])).count();
+    let tail = (1..shortest - head).take_while(|i| same(&|w| w[w.len() - *i])).count();
+    let length = |words: &[&str]| words.iter().map(|word| word.len() + 1).sum::<usize>();
+    let cut = |prompt: &'a str, w: &[&str]| {
+        &prompt[length(&w[..head])..prompt.len() - length(&w[w.len() - tail..])]
+    };
+    prompts.iter().zip(&words).map(|(prompt, w)| cut(prompt, w)).collect()
+}
+
+#[cfg(test)]
+#[path = "terminal_tests.rs"]
+mod tests;
