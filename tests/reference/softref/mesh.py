@@ -12,7 +12,7 @@ class Body:
 
     def __init__(self, inside, size, volume, samples, label):
         self.inside, self.volume, self.samples, self.label = inside, volume, samples, label
-        size = np.asarray(size, float)
+        self.size = size = np.asarray(size, float)
         self.bounds = np.array([[-size[0] / 2, -size[1] / 2, 0.0], [size[0] / 2, size[1] / 2, size[2]]])
 
 

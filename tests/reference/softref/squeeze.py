@@ -13,7 +13,7 @@ STICK = 1e3
 
 
 class Squeeze:
-    """One body between two pads on a table. Options: shape, size_m or radius_m (and length_m), youngs_pa, poisson,
+    """One body between two pads on a table, mirrored in x (one pad stands for both). Options: shape, size_m or radius_m (and length_m), youngs_pa, poisson,
     density, friction, resolution, pad_m, pad_offset_m (y, z)."""
 
     def __init__(self, **options):
@@ -27,8 +27,7 @@ class Squeeze:
         self.gap = self.width + 1e-4
         centre, half = (o["pad_offset_m"][0], self.width / 2 + o["pad_offset_m"][1]), o["pad_m"] / 2
         self.scene.add("table", Face(2, 1.0, 0.0), o["friction"])
-        for name, sign in (("left", 1.0), ("right", -1.0)):
-            self.scene.add(name, Face(0, sign, -sign * self.gap / 2, centre, half), o["friction"])
+        self.scene.add("pad", Face(0, 1.0, -self.gap / 2, centre, half), o["friction"])
         self._settle()
 
     def _settle(self):
@@ -45,10 +44,6 @@ class Squeeze:
                 continue
         raise NotConverged("settling")
 
-    def _place(self, gap):
-        for name, sign in (("left", 1.0), ("right", -1.0)):
-            self.scene.faces[name].at = -sign * gap / 2
-
     def close(self, gap):
         """Closes the pads to `gap` in steps of at most step_m, halved where Newton does not converge."""
         step = self.o["step_m"]
@@ -56,7 +51,7 @@ class Squeeze:
             target = max(gap, self.gap - step)
             saved = self.scene.save()
             try:
-                self._place(target)
+                self.scene.faces["pad"].at = -target / 2
                 self.answers = self.scene.solve()
                 self.gap = target
                 step = min(self.o["step_m"], 2 * step)
@@ -67,22 +62,21 @@ class Squeeze:
                     raise
 
     def state(self):
-        """Force, deformation and so on of the present state."""
+        """Force per pad, deformation and so on of the present state; the mirror counts both pads, hence the halves."""
         s, x = self.scene, self.scene.nodes()
-        left, table = s.totals(self.answers, "left"), s.totals(self.answers, "table")
+        pad, table = s.totals(self.answers, "pad"), s.totals(self.answers, "table")
         lumps = self.mesh.lumps
         real = self.mesh.fill[s.elastic.reps] >= 0.2
         det = s.elastic.batch.min_det(x[s.elastic.corners])
-        return dict(force_n=left["normal"], friction_z_n=float(left["force"][2]), table_n=float(table["force"][2]),
+        return dict(force_n=pad["normal"] / 2, friction_z_n=float(pad["force"][2]) / 2, table_n=float(table["force"][2]),
                     d_pct=deformation(self.mesh.nodes, x), d_volume_pct=deformation(self.mesh.nodes, x, lumps),
-                    min_det_f=float(det[real].min()), slipping=left["slipping"],
+                    min_det_f=float(det[real].min()), slipping=pad["slipping"],
                     centre_z_m=float(lumps @ x[:, 2] / lumps.sum()))
 
     def lift(self, mu, most=8e-3):
         """Lowers the table until it carries nothing; None if the body slides down with it (nothing holds it)."""
         s, saved, gap_answers = self.scene, self.scene.save(), self.answers
-        keep = dict(s.mu)
-        s.mu["left"] = s.mu["right"] = mu
+        keep, s.mu["pad"] = s.mu["pad"], mu
         step, down, held = 2e-5, 0.0, None
         try:
             while down < most:
@@ -105,7 +99,7 @@ class Squeeze:
                 if now["slipping"] == 1.0:
                     break
         finally:
-            s.mu = keep
+            s.mu["pad"] = keep
             s.load(saved)
             self.answers = gap_answers
         return held
@@ -119,7 +113,7 @@ class Squeeze:
                    pad_mm=round(1e3 * o["pad_m"], 4), pad_offset_mm=[round(1e3 * v, 4) for v in o["pad_offset_m"]],
                    youngs_pa=o["youngs_pa"], poisson=o["poisson"], density=o["density"], friction=o["friction"],
                    nodes=len(self.mesh.nodes), elements=len(self.mesh.elements), weight_n=s.weight_n,
-                   diagonal_mm=1e3 * self.mesh.diagonal())
+                   diagonal_nodes_mm=1e3 * self.mesh.diagonal(), diagonal_skin_mm=1e3 * float(np.linalg.norm(s.body.size)))
         out |= {f"{k}_m": o[f"{k}_m"] for k in ("size", "radius", "length") if f"{k}_m" in o}
         out |= dict(force_grip_n=grip["force_n"], d_grip_pct=grip["d_pct"], d_grip_volume_pct=grip["d_volume_pct"],
                     min_det_f_grip=grip["min_det_f"], slipping_grip=grip["slipping"], table_grip_n=grip["table_n"])
