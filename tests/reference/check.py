@@ -10,7 +10,7 @@ from softref import elements, small_strain
 from softref.squeeze import Squeeze
 from softref.statics import TOLERANCE
 
-LIMIT = 2e-4
+LIMIT = 1e-5
 
 
 def committed(group, **keys):

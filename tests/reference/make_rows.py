@@ -54,6 +54,24 @@ def round_rows():
         yield from squeeze([39, 38, 36, 32, 28], **CYLINDER, resolution=n)
 
 
+def refined_round_rows():
+    """The round shapes at resolution 18."""
+    yield from squeeze([46, 42, 38], **SPHERE, resolution=18, step_m=5e-4)
+    yield from squeeze([36, 32, 28], **CAPSULE, resolution=18, step_m=5e-4)
+    yield from squeeze([36, 32, 28], **CYLINDER, resolution=18, step_m=5e-4)
+
+
+def variant_rows():
+    """Other sizes, materials, pads, resolutions and friction."""
+    yield from squeeze([39, 38, 34], shape="cube", size_m=0.04, youngs_pa=1e4, poisson=0.45, density=500.0, pad_m=0.018,
+                       resolution=5)
+    yield from squeeze([49.5, 48, 44], **CUBE, friction=0.6)
+    yield from squeeze([48, 44], **CUBE, youngs_pa=1e5, poisson=0.3, resolution=8)
+    yield from squeeze([48, 42], **CUBE, pad_m=0.040)
+    yield from squeeze([57, 54, 48], shape="sphere", radius_m=0.03, youngs_pa=1e4, pad_m=0.020, resolution=8)
+    yield from squeeze([29, 27, 24], shape="capsule", radius_m=0.015, length_m=0.09, youngs_pa=3e4, poisson=0.3, resolution=9)
+
+
 def step_rows():
     """The cube with the load step halved twice: how far the rows depend on it."""
     for step in (1e-4, 5e-5, 2.5e-5):
@@ -67,10 +85,12 @@ GROUPS = {
     "small_strain": strain_rows,
     "cube": lambda: squeeze(LIGHT + DEEP, **CUBE),
     "cube_12": lambda: squeeze([49, 48, 46, 42, 38], **CUBE, resolution=12),
-    "cube_18": lambda: squeeze([48, 42], **CUBE, resolution=18),
-    "cube_24": lambda: squeeze([48, 42], **CUBE, resolution=24),
+    "cube_18": lambda: squeeze([48, 42], **CUBE, resolution=18, step_m=5e-4),
+    "cube_24": lambda: squeeze([48, 42], **CUBE, resolution=24, step_m=5e-4),
     "pads": pad_rows,
     "round": round_rows,
+    "round_18": refined_round_rows,
+    "variants": variant_rows,
     "steps": step_rows,
 }
 

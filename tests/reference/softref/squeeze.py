@@ -14,15 +14,15 @@ STICK = 1e3
 
 class Squeeze:
     """One body between two pads on a table, mirrored in x (one pad stands for both). Options: shape, size_m or radius_m (and length_m), youngs_pa, poisson,
-    density, friction, resolution, pad_m, pad_offset_m (y, z)."""
+    density, friction, resolution, pad_m, pad_offset_m (y, z), step_m of the gap, spacing_m of the samples."""
 
     def __init__(self, **options):
         o = self.o = dict(youngs_pa=3e4, poisson=0.4, density=300.0, friction=1.2, resolution=6, pad_m=0.022,
-                          pad_offset_m=(0.0, 0.0), step_m=1e-4) | options
+                          pad_offset_m=(0.0, 0.0), step_m=1e-4, spacing_m=0.75e-3) | options
         body = BODIES[o["shape"]](o)
         self.mesh = meshes.voxel_mesh(body, o["resolution"])
         mirrors = {0: 0.0} | ({1: 0.0} if o["pad_offset_m"][0] == 0 else {})
-        self.scene = Scene(self.mesh, body, o["youngs_pa"], o["poisson"], o["density"], mirrors)
+        self.scene = Scene(self.mesh, body, o["youngs_pa"], o["poisson"], o["density"], mirrors, o["spacing_m"])
         self.width = float(body.bounds[1][0] - body.bounds[0][0])
         self.gap = self.width + 1e-4
         centre, half = (o["pad_offset_m"][0], self.width / 2 + o["pad_offset_m"][1]), o["pad_m"] / 2

@@ -57,7 +57,7 @@ class Elastic:
 class Scene:
     """A soft body, its samples, and named faces; `q` is the state, `memory` the friction history."""
 
-    def __init__(self, mesh, body, youngs, poisson, density, mirrors, spacing=0.75e-3):
+    def __init__(self, mesh, body, youngs, poisson, density, mirrors, spacing):
         self.mesh, self.body = mesh, body
         self.elastic = Elastic(mesh, youngs, poisson, mirrors)
         points, area, cell = body.samples(spacing)
