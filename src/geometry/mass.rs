@@ -46,9 +46,8 @@ impl MassProperties {
 /// Mass properties at 1 kg/m³.
 fn unit_density(shape: &Shape) -> MassProperties {
     use std::f64::consts::PI;
-    let round = |mass: f64, across: f64, axial: f64| {
-        MassProperties::centred(mass, Vec3::new(across, across, axial))
-    };
+    let round =
+        |mass: f64, across: f64, axial: f64| MassProperties::centred(mass, Vec3::new(across, across, axial));
     match shape {
         Shape::Box { half } => {
             let s = half.component_mul(half) / 3.0;

@@ -41,7 +41,8 @@ pub fn skin(shape: &Shape, cell: f64) -> Skin {
     let top = grid.count.map(|n| n as u32 - 1);
     let array = RuntimeShape::<u32, 3>::new(grid.count.map(|n| n as u32));
     surface_nets(&values, &array, [0; 3], top, &mut buffer);
-    let vertices = buffer.surface_points.iter().map(|at| grid.vertex(shape, at.map(|i| i as usize))).collect();
+    let vertices =
+        buffer.surface_points.iter().map(|at| grid.vertex(shape, at.map(|i| i as usize))).collect();
     let triangles = buffer.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
     finish(shape, Mesh { vertices, triangles, uvs: Vec::new() })
 }
