@@ -155,7 +155,9 @@ impl Generator {
     /// Area per radian of revolution between two shares of the length (Pappus).
     fn area(&self, start: f64, end: f64) -> f64 {
         match self {
-            Self::Line { .. } => 0.5 * (self.at(start).0[0] + self.at(end).0[0]) * (end - start) * self.length(),
+            Self::Line { .. } => {
+                0.5 * (self.at(start).0[0] + self.at(end).0[0]) * (end - start) * self.length()
+            }
             Self::Arc { centre, radius, from, to } => {
                 let (a, b) = (from + start * (to - from), from + end * (to - from));
                 radius * (centre[0] * (b - a) + radius * (b.sin() - a.sin()))
@@ -169,7 +171,8 @@ impl Generator {
         let bands = (self.length() / spec.other_spacing - 1e-9).ceil().max(1.0);
         for band in 0..bands as usize {
             let (start, end) = (band as f64 / bands, (band + 1) as f64 / bands);
-            let radius = [start, 0.5 * (start + end), end].map(|s| self.at(s).0[0]).into_iter().fold(0.0, f64::max);
+            let radius =
+                [start, 0.5 * (start + end), end].map(|s| self.at(s).0[0]).into_iter().fold(0.0, f64::max);
             let turnaround = std::f64::consts::TAU * radius;
             let sectors = 4.0 * (turnaround / (4.0 * spec.other_spacing) - 1e-9).ceil().max(1.0);
             let width = std::f64::consts::TAU / sectors;

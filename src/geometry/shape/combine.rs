@@ -37,10 +37,7 @@ pub(super) fn unite(a: Field, b: Field) -> Field {
 pub(super) fn unite_smoothly(a: Field, b: Field, blend: f64) -> Field {
     let share = (0.5 + 0.5 * (b.0 - a.0) / blend).clamp(0.0, 1.0);
     // At this share the derivative of the value to the share vanishes, so the gradient is the plain mixture.
-    to_first_order(
-        b.0 + (a.0 - b.0) * share - blend * share * (1.0 - share),
-        b.1 + (a.1 - b.1) * share,
-    )
+    to_first_order(b.0 + (a.0 - b.0) * share - blend * share * (1.0 - share), b.1 + (a.1 - b.1) * share)
 }
 
 /// Divides a value by the length of its gradient. Half-way between facing surfaces the gradient vanishes; the bound

@@ -94,9 +94,11 @@ impl Shape {
             Self::SmoothUnion { parts, blend } => {
                 fold(parts, |part| part.estimate(p), |a, b| combine::unite_smoothly(a, b, *blend))
             }
-            Self::SmoothSubtract { from, cut, blend } => {
-                combine::invert(combine::unite_smoothly(combine::invert(from.estimate(p)), cut.estimate(p), *blend))
-            }
+            Self::SmoothSubtract { from, cut, blend } => combine::invert(combine::unite_smoothly(
+                combine::invert(from.estimate(p)),
+                cut.estimate(p),
+                *blend,
+            )),
             Self::Twist { shape, axis, rate } => {
                 let (straight, jacobian) = warp::untwist(p, *axis, *rate);
                 let (value, normal) = shape.estimate(&straight);

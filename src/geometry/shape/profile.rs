@@ -26,7 +26,9 @@ impl Profile {
     /// If there are fewer than three corners, a coordinate is not finite or has r < 0, two neighbours coincide, edges
     /// cross, or nothing is enclosed.
     pub fn revolved(points: Vec<[f64; 2]>) -> Result<Self, ShapeError> {
-        if let Some(index) = points.iter().position(|p| !(p[0] >= 0.0 && p[0].is_finite() && p[1].is_finite())) {
+        if let Some(index) =
+            points.iter().position(|p| !(p[0] >= 0.0 && p[0].is_finite() && p[1].is_finite()))
+        {
             return Err(ShapeError::ProfilePoint { index, r: points[index][0], z: points[index][1] });
         }
         Self::closed(points, true)
