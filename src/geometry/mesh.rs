@@ -34,7 +34,9 @@ pub enum MeshError {
         vertex: usize,
     },
     /// A triangle names a vertex that is not there.
-    #[error("triangle {triangle} names vertex {vertex}, but there are {vertices} vertices; export the mesh again")]
+    #[error(
+        "triangle {triangle} names vertex {vertex}, but there are {vertices} vertices; export the mesh again"
+    )]
     Index {
         /// Index of the triangle.
         triangle: usize,
@@ -50,7 +52,9 @@ pub enum MeshError {
         edges: usize,
     },
     /// Edges with more than two triangles, or two triangles that disagree on which side is out.
-    #[error("{edges} edges are shared by more than two triangles or by two of opposite orientation; make the surface a manifold with consistent normals")]
+    #[error(
+        "{edges} edges are shared by more than two triangles or by two of opposite orientation; make the surface a manifold with consistent normals"
+    )]
     NonManifold {
         /// How many.
         edges: usize,

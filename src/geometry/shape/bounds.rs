@@ -90,12 +90,16 @@ impl Shape {
             Self::Lathe(profile) => {
                 profile.points().iter().map(|p| p[0] * across + p[1] * direction.z).max_by(f64::total_cmp)
             }
-            Self::Mesh(solid) => solid.mesh().vertices.iter().map(|v| v.dot(direction)).max_by(f64::total_cmp),
+            Self::Mesh(solid) => {
+                solid.mesh().vertices.iter().map(|v| v.dot(direction)).max_by(f64::total_cmp)
+            }
             Self::Placed { shape, pose } => shape
                 .support(&pose.rotation.inverse_transform_vector(direction))
                 .map(|s| s + pose.translation.vector.dot(direction)),
             Self::Scaled { shape, scale } => shape.support(&scale.component_mul(direction)),
-            Self::Rounded { shape, radius } => shape.support(direction).map(|s| s + radius * direction.norm()),
+            Self::Rounded { shape, radius } => {
+                shape.support(direction).map(|s| s + radius * direction.norm())
+            }
             Self::Union(parts) => parts
                 .iter()
                 .map(|part| part.support(direction))
@@ -119,7 +123,10 @@ impl Shape {
             Self::Intersect(parts) => parts
                 .iter()
                 .map(Self::reach)
-                .reduce(|a, b| Aabb { min: a.min.sup(&b.min), max: a.max.inf(&b.max).sup(&a.min.sup(&b.min)) })
+                .reduce(|a, b| Aabb {
+                    min: a.min.sup(&b.min),
+                    max: a.max.inf(&b.max).sup(&a.min.sup(&b.min)),
+                })
                 .unwrap_or(Aabb::symmetric(Vec3::zeros())),
             Self::Subtract { from, .. } | Self::SmoothSubtract { from, .. } => from.reach(),
             // Each blend raises the seam by at most a quarter of its width, in first-order distance.
@@ -230,7 +237,8 @@ fn bent(inner: &Aabb, along: Axis, towards: Axis, curvature: f64) -> Aabb {
     let steps = 64;
     let mut outer: Option<Aabb> = None;
     for step in 0..=steps {
-        let angle = (inner.min[i] + (inner.max[i] - inner.min[i]) * f64::from(step) / f64::from(steps)) / radius;
+        let angle =
+            (inner.min[i] + (inner.max[i] - inner.min[i]) * f64::from(step) / f64::from(steps)) / radius;
         for level in [inner.min[k], inner.max[k]] {
             let (mut low, mut high) = (inner.min, inner.max);
             low[i] = (radius - level) * angle.sin();

@@ -17,8 +17,7 @@ impl Shape {
     /// If the triangle encloses nothing or a number is not finite.
     pub fn wedge(size: Vec3, apex: f64) -> Result<Self, ShapeError> {
         let half = 0.5 * size;
-        let section =
-            Profile::flat(vec![[-half.x, -half.z], [half.x, -half.z], [apex * half.x, half.z]])?;
+        let section = Profile::flat(vec![[-half.x, -half.z], [half.x, -half.z], [apex * half.x, half.z]])?;
         Ok(Self::Prism { section: Arc::new(section), half_length: half.y })
     }
 

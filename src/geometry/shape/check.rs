@@ -50,7 +50,9 @@ pub enum ShapeError {
         z: f64,
     },
     /// Two neighbouring corners coincide.
-    #[error("profile: corner ({r}, {z}) is given twice in a row; leave one out (the last joins the first by itself)")]
+    #[error(
+        "profile: corner ({r}, {z}) is given twice in a row; leave one out (the last joins the first by itself)"
+    )]
     ProfileRepeat {
         /// First coordinate, m.
         r: f64,
@@ -134,7 +136,13 @@ impl Shape {
             Self::Bend { shape, along, towards, curvature } => {
                 finite("bend", "curvature", *curvature)?;
                 let axis = towards.index() as f64;
-                ensure(along != towards, "bend", "towards axis", axis, "bend towards another axis than along")?;
+                ensure(
+                    along != towards,
+                    "bend",
+                    "towards axis",
+                    axis,
+                    "bend towards another axis than along",
+                )?;
                 shape.check()
             }
             Self::Displace { shape, reliefs } => {

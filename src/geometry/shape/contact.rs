@@ -108,7 +108,8 @@ fn union(parts: &[Shape], p: &Vec3, facing: &Vec3, spacing: f64) -> Contact {
     let mut best = Contact { phi: f64::INFINITY, normal: Vec3::z(), coverage: 1.0 };
     for part in parts {
         let contact = part.contact(p, facing, spacing);
-        let flush = (contact.phi - best.phi).abs() < 1e-3 * spacing && contact.normal.dot(&best.normal) > 0.999;
+        let flush =
+            (contact.phi - best.phi).abs() < 1e-3 * spacing && contact.normal.dot(&best.normal) > 0.999;
         if flush {
             best.coverage = (best.coverage + contact.coverage).min(1.0);
         } else if contact.phi < best.phi {
