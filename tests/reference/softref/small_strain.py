@@ -31,7 +31,7 @@ def row(resolution, pad=0.022, offset=(0.0, 0.0), near_rigid=False, edge=0.05, y
     reps, share, cover = reps[cover > 0], share[cover > 0], cover[cover > 0]
     c = 1e12 if near_rigid else contact.modulus(youngs, mesh.edge)
     spring = c * area[reps] * cover * share
-    element, w, _ = mesh.embed(points[reps])
+    element, w = mesh.embed(points[reps])
     at = np.repeat(np.arange(len(reps)), 8)
     embed = sp.csr_matrix((w.ravel(), (at, mesh.elements[element].ravel())), (len(reps), len(mesh.nodes)))
     j = (sp.kron(embed, sp.eye(3), format="csr") @ whole.t).tocsr()
