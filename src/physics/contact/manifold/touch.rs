@@ -14,6 +14,9 @@ const SLACK_M: f64 = 1e-6;
 const CROSSING: f64 = 0.05;
 /// If the features' overlap misses the closest points by this much, the closest points are added, m.
 const MISSED_M: f64 = 1e-5;
+/// From this overlap of two faces on, m², it counts as at least a point contact: a body on a sliver of its edge is no
+/// softer than one on a corner.
+const SLIVER_M2: f64 = 1e-6;
 /// Set in the name of a feature of the second piece.
 const OF_B: u32 = 1 << 28;
 /// The name of the closest points.
@@ -127,7 +130,8 @@ fn face_face(cross: &Cross, a: &Face, b: &Face, found: &mut Vec<Meeting>) {
         (false, true) => cross.polygon(a, 0),
         (false, false) => clip::overlap(&cross.polygon(a, 0), &cross.polygon(b, OF_B)),
     };
-    let area = 0.5 * clip::area2(&polygon) * a.weight * b.weight;
+    let overlap = 0.5 * clip::area2(&polygon);
+    let area = overlap.max(POINT_AREA * (overlap / SLIVER_M2).min(1.0)) * a.weight * b.weight;
     for (corner, share) in polygon.iter().zip(clip::shares(&polygon)) {
         let heights = (cross.height_of(a, &corner.p), cross.height_of(b, &corner.p));
         found.push((corner.p, heights.0, heights.1, area * share, corner.name));
