@@ -7,6 +7,7 @@ use crate::{
     geometry::{
         mass::mass_properties,
         samples::{SampleSpec, surface_samples},
+        shape::Shape,
         voxelise::{GeometryError, VoxelSpec, voxel_mesh},
     },
     physics::{
@@ -66,27 +67,31 @@ impl RestCache {
         {
             return Ok(rest.clone());
         }
-        let rest = make_rest(asset, material)?;
+        let rest = soft_rest(&asset.name, &asset.shape, material)?;
         made.push((asset.clone(), rest.clone()));
         Ok(rest)
     }
 }
 
-fn make_rest(asset: &Asset, material: &SoftMaterial) -> Result<Arc<Rest>, BuildError> {
-    check(asset, material)?;
+/// Rest data of a soft body of `shape`.
+///
+/// # Errors
+/// A shape that cannot be meshed, or a material number out of range; `name` is what messages call it.
+pub fn soft_rest(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<Arc<Rest>, BuildError> {
+    check(name, material)?;
     let spec = VoxelSpec { resolution: material.resolution };
-    let mesh = voxel_mesh(&asset.shape, &spec)
-        .map_err(|source| BuildError::Geometry { asset: asset.name.clone(), source })?;
+    let mesh =
+        voxel_mesh(shape, &spec).map_err(|source| BuildError::Geometry { asset: name.to_owned(), source })?;
     let spacing = SampleSpec { grasp_spacing: material.grasp_spacing, ..SampleSpec::default() };
-    let samples = surface_samples(&asset.shape, &mesh, &spacing);
-    let volume = mass_properties(&asset.shape, 1.0).mass;
+    let samples = surface_samples(shape, &mesh, &spacing);
+    let volume = mass_properties(shape, 1.0).mass;
     let law =
         Material { youngs_pa: material.youngs_pa, poisson: material.poisson, density: material.density };
     Ok(Rest::new(mesh, law, volume, samples))
 }
 
-fn check(asset: &Asset, m: &SoftMaterial) -> Result<(), BuildError> {
-    let wrong = |what: String| Err(BuildError::Material { asset: asset.name.clone(), what });
+fn check(name: &str, m: &SoftMaterial) -> Result<(), BuildError> {
+    let wrong = |what: String| Err(BuildError::Material { asset: name.to_owned(), what });
     if !(m.youngs_pa > 0.0 && m.youngs_pa.is_finite()) {
         return wrong(format!("Young's modulus is {} Pa, expected a positive number", m.youngs_pa));
     }

@@ -7,7 +7,7 @@ mod rig;
 pub mod simulation;
 mod trace;
 
-pub use build::{BuildError, RestCache};
+pub use build::{BuildError, RestCache, soft_rest};
 pub use episode::{ControlError, Controller, Episode, EpisodeSpec, Finished};
 pub use rig::Rig;
 pub use simulation::{Handle, Kind, SettleError, Simulation};

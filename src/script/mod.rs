@@ -2,6 +2,7 @@
 
 mod catalogue;
 mod catalogue_shapes;
+mod catalogue_world;
 mod deadline;
 mod error;
 mod experiment;
@@ -14,6 +15,8 @@ mod sandbox;
 pub mod schema;
 mod shapes;
 mod sources;
+mod timing;
+mod world_api;
 
 pub use deadline::{Clock, Deadline, OnStuck, Pause, end_process};
 pub use error::ScriptError;

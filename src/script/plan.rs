@@ -159,6 +159,7 @@ fn install(vm: &Vm, session: &Arc<Mutex<Session>>) -> mlua::Result<()> {
     options::install(lua, &vm.api, session)?;
     shapes::install(lua, &vm.api)?;
     pose::install(lua, &vm.api)?;
+    super::world_api::install(lua, &vm.api, &vm.clock)?;
     let names = schema::sorted_pairs(&vm.api).iter().filter_map(|(key, _)| key.to_string().ok()).collect();
     options::strict(lua, "softvt", vm.api.clone(), names)?;
     Ok(())
