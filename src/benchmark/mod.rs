@@ -1,6 +1,7 @@
 //! What a script returns: suites, tasks, experiments and plans as plain data.
 
 pub mod seed;
+pub mod settings;
 
 use serde::{Deserialize, Serialize};
 
@@ -95,6 +96,8 @@ pub struct Suite {
     pub tasks: Vec<Task>,
     /// The shifts that the suite declares.
     pub shifts: Vec<Shift>,
+    /// What the suite changes of the mechanics, the robot and the judge.
+    pub settings: settings::Settings,
 }
 
 /// What `softvt FILE.lua` does.

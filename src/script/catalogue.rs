@@ -229,6 +229,12 @@ pub static SUITE: Record = Record {
         ),
         field("tasks", Type::List(&Type::Made(&[&TASK])), Required, "The tasks, in order."),
         field("shifts", Type::List(&Type::Made(&[&SHIFT])), Optional, "Changes that a run may ask for."),
+        field(
+            "settings",
+            Type::Map(&Type::Map(&Type::Any)),
+            Optional,
+            "What it changes of the mechanics, the robot and the judge: { physics = {…}, robot = {…}, rules = {…} }.",
+        ),
     ],
 };
 
