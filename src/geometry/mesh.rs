@@ -17,8 +17,8 @@ pub struct Mesh {
     pub vertices: Vec<Vec3>,
     /// Corner indices, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
-    /// Texture coordinates by vertex, or empty.
-    pub uvs: Vec<[f64; 2]>,
+    /// Texture coordinates of the three corners of each triangle, or empty.
+    pub uvs: Vec<[[f64; 2]; 3]>,
 }
 
 /// Why a mesh bounds no solid.
@@ -102,12 +102,13 @@ impl Mesh {
                 })
             })
             .collect();
-        out.triangles = self
-            .triangles
-            .iter()
-            .map(|t| t.map(|v| renamed[v as usize]))
-            .filter(|[a, b, c]| a != b && b != c && c != a)
-            .collect();
+        for (index, triangle) in self.triangles.iter().enumerate() {
+            let [a, b, c] = triangle.map(|v| renamed[v as usize]);
+            if a != b && b != c && c != a {
+                out.triangles.push([a, b, c]);
+                out.uvs.extend(self.uvs.get(index));
+            }
+        }
         out
     }
 
@@ -187,6 +188,7 @@ impl MeshSolid {
         let volume = mesh.volume();
         if volume < 0.0 {
             mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+            mesh.uvs.iter_mut().for_each(|t| t.swap(1, 2));
         }
         if volume.abs() < 1e-6 * mesh.area().powf(1.5) {
             return Err(MeshError::Flat);

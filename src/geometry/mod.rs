@@ -2,9 +2,13 @@
 //!
 //! Everything here is in the *object frame* (`_o`), in metres, and knows nothing of materials or motion.
 
+pub mod broad_phase;
+pub mod import;
+pub mod mass;
 pub mod mesh;
 pub mod samples;
 pub mod shape;
+pub mod skin;
 pub mod voxel;
 pub mod voxelise;
 
@@ -16,3 +20,6 @@ pub type Mat3 = nalgebra::Matrix3<f64>;
 pub type Quat = nalgebra::UnitQuaternion<f64>;
 /// A rigid placement (rotation and translation).
 pub type Pose = nalgebra::Isometry3<f64>;
+
+#[cfg(test)]
+mod tests;

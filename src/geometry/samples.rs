@@ -1,10 +1,14 @@
 //! A fixed quadrature of a body's surface, embedded in its voxel mesh.
 //!
-//! Boxes are sampled by regular grids per face and bodies of revolution by rings, both with exact areas.
+//! Boxes are sampled by regular grids per face and bodies of revolution by rings, both with exact areas; other shapes
+//! by gathering the triangles of a fine skin.
+
+use std::collections::BTreeMap;
 
 use super::{
     Quat, Vec3,
     shape::{Profile, Shape},
+    skin::skin,
     voxel::{SurfaceSample, VoxelMesh},
 };
 
@@ -41,10 +45,26 @@ struct Patch {
     area: f64,
 }
 
+/// Triangles of a skin that become one sample.
+#[derive(Default)]
+struct Gathered {
+    moment: Vec3,
+    normals: Vec3,
+    area: f64,
+}
+
+impl Gathered {
+    fn patch(&self, shape: &Shape) -> Patch {
+        let middle = self.moment / self.area;
+        let p = shape.project(&middle, self.area.sqrt()).unwrap_or(middle);
+        Patch { p, n: self.normals.normalize(), area: self.area }
+    }
+}
+
 /// Samples the surface of `shape` and embeds the samples in its voxel mesh, sorted by element.
 pub fn surface_samples(shape: &Shape, mesh: &VoxelMesh, spec: &SampleSpec) -> Vec<SurfaceSample> {
     let mut samples: Vec<SurfaceSample> = exact_patches(shape, &Quat::identity(), spec)
-        .unwrap_or_default()
+        .unwrap_or_else(|| skin_patches(shape, spec))
         .into_iter()
         .filter_map(|Patch { p, n, area }| Some(SurfaceSample { at: mesh.locate(&p)?, p_o: p, n_o: n, area }))
         .collect();
@@ -56,6 +76,7 @@ pub fn surface_samples(shape: &Shape, mesh: &VoxelMesh, spec: &SampleSpec) -> Ve
 fn exact_patches(shape: &Shape, turn: &Quat, spec: &SampleSpec) -> Option<Vec<Patch>> {
     match shape {
         Shape::Box { half } => Some(box_patches(half, turn, spec)),
+        Shape::Prism { section, half_length } => Some(prism_patches(section, *half_length, turn, spec)),
         Shape::Placed { shape, pose } => {
             let patches = exact_patches(shape, &(turn * pose.rotation), spec)?;
             let moved = |Patch { p, n, area }| Patch {
@@ -68,6 +89,31 @@ fn exact_patches(shape: &Shape, turn: &Quat, spec: &SampleSpec) -> Option<Vec<Pa
         Shape::Paint { shape, .. } => exact_patches(shape, turn, spec),
         _ => Some(generators(shape)?.iter().flat_map(|piece| piece.revolve(turn, spec)).collect()),
     }
+}
+
+/// Gathers the triangles of a skin by cells of the wanted spacing and by the side that they face, so that the two sides
+/// of an edge are not mixed; the area of the skin is kept exactly.
+fn skin_patches(shape: &Shape, spec: &SampleSpec) -> Vec<Patch> {
+    let skin = skin(shape, spec.grasp_spacing.min(spec.other_spacing));
+    let mut cells: BTreeMap<(usize, [i64; 3]), Gathered> = BTreeMap::new();
+    for triangle in &skin.mesh.triangles {
+        let [a, b, c] = triangle.map(|v| skin.mesh.vertices[v as usize]);
+        let normal_area = 0.5 * (b - a).cross(&(c - a));
+        let area = normal_area.norm();
+        if area <= 0.0 {
+            continue;
+        }
+        let normal = normal_area / area;
+        let centre = (a + b + c) / 3.0;
+        let side = 2 * normal.iamax() + usize::from(normal[normal.iamax()] > 0.0);
+        let cell = centre / spec.spacing(&normal);
+        let key = (side, [cell.x, cell.y, cell.z].map(|x| x.floor() as i64));
+        let gathered = cells.entry(key).or_default();
+        gathered.moment += centre * area;
+        gathered.normals += normal_area;
+        gathered.area += area;
+    }
+    cells.into_values().map(|gathered| gathered.patch(shape)).collect()
 }
 
 fn box_patches(half: &Vec3, turn: &Quat, spec: &SampleSpec) -> Vec<Patch> {
@@ -87,6 +133,32 @@ fn box_patches(half: &Vec3, turn: &Quat, spec: &SampleSpec) -> Vec<Patch> {
             p[j] = at(j, index / rows as usize, columns);
             patches.push(Patch { p, n, area });
         }
+    }
+    patches
+}
+
+/// The walls of a prism by regular grids, its ends by a grid whose cells are clipped to the polygon.
+fn prism_patches(section: &Profile, half_length: f64, turn: &Quat, spec: &SampleSpec) -> Vec<Patch> {
+    let mut patches = Vec::new();
+    for (a, b) in section.walls() {
+        let span = [b[0] - a[0], b[1] - a[1]];
+        let length = span[0].hypot(span[1]);
+        let n = Vec3::new(span[1], 0.0, -span[0]) / length;
+        let spacing = spec.spacing(&(turn * n));
+        let count = |edge: f64| (edge / spacing - 1e-9).ceil().max(1.0);
+        let (rows, columns) = (count(length), count(2.0 * half_length));
+        for index in 0..(rows * columns) as usize {
+            let share = ((index % rows as usize) as f64 + 0.5) / rows;
+            let y = half_length * (((2 * (index / rows as usize)) as f64 + 1.0) / columns - 1.0);
+            let p = Vec3::new(a[0] + share * span[0], y, a[1] + share * span[1]);
+            patches.push(Patch { p, n, area: length * 2.0 * half_length / (rows * columns) });
+        }
+    }
+    for side in [-1.0, 1.0] {
+        let n = Vec3::y() * side;
+        let place =
+            |([x, z], area): ([f64; 2], f64)| Patch { p: Vec3::new(x, side * half_length, z), n, area };
+        patches.extend(section.cells(spec.spacing(&(turn * n))).into_iter().map(place));
     }
     patches
 }
