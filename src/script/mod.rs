@@ -1,6 +1,7 @@
 //! Lua: the only room that knows it. Sandbox, bindings, options, plans, experts, stubs.
 
 mod catalogue;
+mod catalogue_classes;
 mod catalogue_shapes;
 mod deadline;
 mod episode;
@@ -17,6 +18,7 @@ mod scene_api;
 pub mod schema;
 mod shapes;
 mod sources;
+pub mod stubs;
 
 pub use deadline::{Clock, Deadline, OnStuck, Pause, end_process};
 pub use episode::{Episode, EpisodeRequest, check_shift};

@@ -202,10 +202,45 @@ fn a_material_that_cannot_be_is_refused() {
         "suites/x.lua:1: asset.body.poisson: expected a number in 0..below 0.5, got 0.5"
     );
     assert!(
+        error_of(
+            "softvt.asset { name = 'a', shape = softvt.shape.sphere { radius = 1 }, body = softvt.static {}, \
+             friction = { static_mu = 0.1 } }"
+        )
+        .contains("asset.friction: dynamic_mu 0.5 is above static_mu 0.1")
+    );
+    assert!(
         error_of("softvt.shape.sphere { radius = -1 }")
             .contains("shape.sphere.radius: expected metres above 0, got -1")
     );
     assert!(error_of("softvt.shape.box { size = { 1, 0, 1 } }").contains("half extent is 0"));
+}
+
+#[test]
+fn a_mesh_that_is_no_solid_is_refused_with_its_file() {
+    let tetrahedron = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\n";
+    let project = Project::new(&[
+        ("open.obj", tetrahedron),
+        ("empty.obj", "v 0 0 0\n"),
+        ("good.obj", &format!("{tetrahedron}f 2 3 4\n")),
+        ("mesh.doc", ""),
+    ]);
+    let error = |file: &str| {
+        project.write("x.lua", format!("error(tostring(softvt.mesh {{ file = '{file}' }}), 0)").as_bytes());
+        project.error("x.lua", &[])
+    };
+    assert_eq!(
+        error("open.obj"),
+        "x.lua:1: mesh: open.obj: the mesh is open: 3 edges have a triangle on one side only; close its holes"
+    );
+    assert!(
+        error("empty.obj").starts_with("x.lua:1: mesh: empty.obj: the mesh is empty"),
+        "{}",
+        error("empty.obj")
+    );
+    assert!(error("mesh.doc").contains("\"doc\" is no known mesh format"));
+    assert!(error("../a.obj").contains("leads out of the project"));
+    assert!(error("none.obj").starts_with("x.lua:1: mesh.file: no file \"none.obj\" in "));
+    assert_eq!(error("good.obj"), "x.lua:1: softvt.Shape");
 }
 
 #[test]
