@@ -206,6 +206,18 @@ record!(
     ]
 );
 
+record!(
+    MESH,
+    "mesh",
+    "softvt.MeshSpec",
+    "A closed surface from an OBJ, STL or GLB file.",
+    &[
+        field("file", Type::Text, Required, "Path inside of the project."),
+        field("scale", LENGTH, Presence::Number(1.0), "Metres in a unit of the file: 0.001 for millimetres."),
+        field("z_up", Type::Boolean, Presence::Boolean(true), "Whether z is up in the file; otherwise y is."),
+    ]
+);
+
 /// Constructors `softvt.shape.name{…}`.
 pub static SHAPES: &[(&str, &Record)] = &[
     ("box", &BOX),

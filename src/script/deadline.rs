@@ -19,9 +19,6 @@ use super::error::ScriptError;
 /// Instructions between two looks at the clock; about 0.3 ms.
 const STRIDE: u32 = 20_000;
 
-/// How long after the limit the hook may still stop a script before the watchdog must.
-pub const GRACE: Duration = Duration::from_millis(1500);
-
 /// What the watchdog does with its message; ends the process unless a test says otherwise.
 pub type OnStuck = Arc<dyn Fn(&str) + Send + Sync>;
 
@@ -110,6 +107,7 @@ struct State {
     /// When the running call must be over; none while nothing runs or the clock is stopped.
     until: Option<Instant>,
     limit: Duration,
+    grace: Duration,
     file: String,
     slot: Option<Slot>,
     /// Time left when the clock was stopped, and the watchdog's entry.
@@ -147,9 +145,9 @@ impl Clock {
         })
     }
 
-    /// Gives the machine `limit` from now on, until the guard is dropped. `file` is named in messages. A call inside of
+    /// Gives the machine `limit` from now on, until the guard is dropped; the watchdog acts `grace` after it. `file` is named in messages. A call inside of
     /// a call keeps the outer limit.
-    pub fn start(&self, limit: Duration, file: &str, on_stuck: OnStuck) -> Deadline {
+    pub fn start(&self, limit: Duration, grace: Duration, file: &str, on_stuck: OnStuck) -> Deadline {
         let mut state = lock(&self.state);
         if state.until.is_some() || state.stopped.is_some() {
             return Deadline { clock: None };
@@ -157,13 +155,14 @@ impl Clock {
         let until = Instant::now() + limit;
         state.until = Some(until);
         state.limit = limit;
+        state.grace = grace;
         state.file = file.into();
         let message = format!(
             "{file}: the script called a library function that did not return within {}; \
              look for a hostile string pattern or a huge repeat count",
             seconds(limit)
         );
-        state.slot = Some(watchdog().add(until + GRACE, message, on_stuck));
+        state.slot = Some(watchdog().add(until + grace, message, on_stuck));
         Deadline { clock: Some(self.clone()) }
     }
 
@@ -212,8 +211,9 @@ impl Drop for Pause {
         let Some(clock) = &self.clock else { return };
         let mut state = lock(&clock.state);
         let Some((left, entry)) = state.stopped.take() else { return };
+        let grace = state.grace;
         let until = Instant::now() + left;
         state.until = Some(until);
-        state.slot = entry.map(|(message, on_stuck)| watchdog().add(until + GRACE, message, on_stuck));
+        state.slot = entry.map(|(message, on_stuck)| watchdog().add(until + grace, message, on_stuck));
     }
 }

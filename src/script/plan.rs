@@ -155,6 +155,7 @@ fn install(vm: &Vm, session: &Arc<Mutex<Session>>) -> mlua::Result<()> {
         let make = lua.create_function(move |lua, value: Value| schema::make(lua, record, &value))?;
         vm.api.set(*name, make)?;
     }
+    vm.api.set("asset", lua.create_function(asset)?)?;
     vm.api.set("layout", lua.create_function(layout)?)?;
     options::install(lua, &vm.api, session)?;
     shapes::install(lua, &vm.api)?;
@@ -163,6 +164,22 @@ fn install(vm: &Vm, session: &Arc<Mutex<Session>>) -> mlua::Result<()> {
     let names = schema::sorted_pairs(&vm.api).iter().filter_map(|(key, _)| key.to_string().ok()).collect();
     options::strict(lua, "softvt", vm.api.clone(), names)?;
     Ok(())
+}
+
+/// `softvt.asset{…}`, with what no single field can say.
+fn asset(lua: &Lua, value: Value) -> mlua::Result<Table> {
+    let made = schema::make(lua, &catalogue::ASSET, &value)?;
+    let friction: Table = made.get("friction")?;
+    let (most, least): (f64, f64) = (friction.get("static_mu")?, friction.get("dynamic_mu")?);
+    match least <= most {
+        true => Ok(made),
+        false => Err(fail(
+            lua,
+            format!(
+                "asset.friction: dynamic_mu {least} is above static_mu {most}; give the larger one to static_mu"
+            ),
+        )),
+    }
 }
 
 /// `softvt.layout(name, build)` or `softvt.layout{ name = …, build = … }`.

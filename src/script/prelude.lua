@@ -3,7 +3,7 @@
 local host = ...
 local raw_error, raw_tostring, raw_next, raw_format = error, tostring, next, string.format
 local raw_setmetatable, getmetatable, type, rawget, select = setmetatable, getmetatable, type, rawget, select
-local sort, math_type, pack, unpack, find = table.sort, math.type, table.pack, table.unpack, string.find
+local sort, pack, unpack, find, pcall = table.sort, table.pack, table.unpack, string.find, pcall
 
 -- An address differs from run to run, so it never becomes text.
 function tostring(...)
@@ -37,9 +37,18 @@ end
 -- Errors that are objects are described here, since Lua would later show their address alone.
 function error(object, level)
   level = level or 1
-  if type(object) == "table" then host.raised(object) end
+  if type(object) ~= "string" then host.raised(object) end
   if level > 0 then level = level + 1 end
   raw_error(object, level)
+end
+
+-- A handler that runs at the place of the error would run inside the hook that enforces the time limit, where no hook
+-- stops it; this one runs after the stack has unwound.
+function xpcall(f, handler, ...)
+  local results = pack(pcall(f, ...))
+  if results[1] then return unpack(results, 1, results.n) end
+  local _, handled = pcall(handler, results[2])
+  return false, handled
 end
 
 -- A finaliser runs where no time limit holds.

@@ -30,6 +30,8 @@ pub struct Limits {
     /// Lua time of one call: a layout, a shift, a control step of an expert, a point of an experiment (physics that a
     /// binding runs is not counted).
     pub call: Duration,
+    /// How long after a limit the script may still stop by itself before it counts as stuck.
+    pub grace: Duration,
     /// What happens when a library function does not return.
     pub on_stuck: OnStuck,
     /// Where `print` goes.
@@ -43,6 +45,7 @@ impl Default for Limits {
             memory_bytes: 256 << 20,
             load: Duration::from_secs(10),
             call: Duration::from_secs(5),
+            grace: Duration::from_millis(1500),
             on_stuck: end_process(),
             print: Arc::new(|text| eprintln!("{text}")),
         }
@@ -115,7 +118,8 @@ impl Vm {
         let text = locked(&self.shared.library).text(main)?;
         let _deadline = self.deadline(self.shared.limits.load);
         let chunk = self.lua.load(text).set_name(format!("@{main}")).set_mode(ChunkMode::Text);
-        chunk.eval().map_err(|e| self.explain(&e))
+        // Not `eval`, which would first try the text as an expression and lose the frame of `error(…)` in a tail call.
+        chunk.call(()).map_err(|e| self.explain(&e))
     }
 
     /// Calls a function of the script within the time of one call.
@@ -134,7 +138,8 @@ impl Vm {
     }
 
     fn deadline(&self, limit: Duration) -> Deadline {
-        self.clock.start(limit, &self.shared.main, self.shared.limits.on_stuck.clone())
+        let limits = &self.shared.limits;
+        self.clock.start(limit, limits.grace, &self.shared.main, limits.on_stuck.clone())
     }
 
     /// An error of the machine for people.
@@ -274,8 +279,8 @@ fn require(lua: &Lua, loaded: &Table, name: &Value) -> mlua::Result<Value> {
 }
 
 /// Keeps a description of an error object, since its address is all that would be left of it later.
-fn note_raised(lua: &Lua, object: Table) -> mlua::Result<()> {
-    let description = describe(&Value::Table(object), 0);
+fn note_raised(lua: &Lua, object: Value) -> mlua::Result<()> {
+    let description = describe(&object, 0);
     *locked(&shared(lua)?.raised) = Some(RaisedObject { description, file: here(lua) });
     Ok(())
 }

@@ -174,9 +174,11 @@ impl Fault {
 /// The candidate that the writer of `word` most likely meant, if any is close.
 pub fn closest<'a>(word: &str, candidates: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     let allowed = (word.chars().count() / 3).max(1);
+    let begins =
+        |candidate: &str| word.len() > 2 && (candidate.starts_with(word) || word.starts_with(candidate));
     candidates
         .map(|candidate| (strsim::damerau_levenshtein(word, candidate), candidate))
-        .filter(|(distance, _)| *distance <= allowed)
+        .filter(|(distance, candidate)| *distance <= allowed || begins(candidate))
         .min_by_key(|(distance, candidate)| (*distance, candidate.len()))
         .map(|(_, candidate)| candidate)
 }

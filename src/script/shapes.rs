@@ -4,11 +4,12 @@ use mlua::{FromLua, Lua, MetaMethod, Table, UserData, UserDataFields, UserDataMe
 
 use super::{
     catalogue_shapes as table,
-    sandbox::fail,
+    sandbox::{fail, locked, shared},
     schema::{self, Record},
 };
 use crate::geometry::{
     Quat, Vec3,
+    import::{ImportOptions, MeshFormat, import},
     shape::{Axis, Bumps, Mask, Relief, Ridges, Shape, ShapeError},
 };
 
@@ -37,7 +38,26 @@ pub(super) fn install(lua: &Lua, api: &Table) -> mlua::Result<()> {
         })?;
         shapes.set(*name, make)?;
     }
-    api.set("shape", shapes)
+    api.set("shape", shapes)?;
+    api.set("mesh", lua.create_function(|lua, value: Value| mesh(lua, &value))?)
+}
+
+/// `softvt.mesh{…}`: the file is read once, into the bundle; messages name it.
+fn mesh(lua: &Lua, value: &Value) -> mlua::Result<LuaShape> {
+    let spec = checked(lua, &table::MESH, value)?;
+    let path: String = spec.get("file")?;
+    let shared = shared(lua)?;
+    let bytes = {
+        let mut library = locked(&shared.library);
+        let file = library.data(&path).map_err(|message| fail(lua, format!("mesh.file: {message}")))?;
+        library.bytes(&file).unwrap_or_default()
+    };
+    let extension = path.rsplit_once('.').map_or("", |(_, extension)| extension);
+    let options = ImportOptions { scale: spec.get("scale")?, z_up: spec.get("z_up")? };
+    let shape = MeshFormat::of_extension(extension)
+        .and_then(|format| import(&bytes, format, &options))
+        .and_then(|mesh| Ok(mesh.into_shape()?));
+    shape.map(LuaShape).map_err(|error| fail(lua, format!("mesh: {path}: {error}")))
 }
 
 fn checked(lua: &Lua, record: &'static Record, value: &Value) -> mlua::Result<Table> {

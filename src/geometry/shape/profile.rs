@@ -50,7 +50,7 @@ impl Profile {
             return Err(ShapeError::ProfileSize { corners: points.len() });
         }
         let area = twice_area(&points);
-        if !(area.abs() > 1e-14) {
+        if area.abs() <= 1e-14 || !area.is_finite() {
             return Err(ShapeError::ProfileArea);
         }
         if area < 0.0 {

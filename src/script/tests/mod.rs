@@ -1,6 +1,7 @@
 //! What a script may and may not do, seen from outside.
 
 mod bad_input;
+mod episodes;
 mod options;
 
 use std::{fs, path::PathBuf, sync::Arc, time::Duration};
@@ -49,6 +50,7 @@ pub(super) fn limits() -> Limits {
         memory_bytes: 16 << 20,
         load: Duration::from_millis(300),
         call: Duration::from_millis(300),
+        grace: Duration::from_millis(50),
         on_stuck: Arc::new(|_| {}),
         print: Arc::new(|_| {}),
     }
