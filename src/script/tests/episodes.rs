@@ -71,6 +71,22 @@ fn a_suite_becomes_plain_data() {
 }
 
 #[test]
+fn a_list_of_suites_is_a_plan_and_tasks_are_found_by_name() {
+    let loaded = project("return { suite() }").load("x.lua", &[]).unwrap();
+    assert!(matches!(&loaded.plan, Plan::Suites { suites } if suites.len() == 1));
+    let open = |suite: &str, task| {
+        let request = EpisodeRequest { suite: suite.into(), task, ..request(0, 1) };
+        Episode::open(&loaded, &request).map(|e| e.scene.objects.len()).map_err(|e| (e.message, e.hint))
+    };
+    assert_eq!(open("test", 0), Ok(1));
+    assert_eq!(open("tst", 0), Err(("unknown suite \"tst\"; did you mean \"test\"?".into(), None)));
+    assert_eq!(
+        open("test", 3),
+        Err(("suite \"test\" has no task 3".into(), Some("its tasks are 0 to 0".into())))
+    );
+}
+
+#[test]
 fn an_episode_depends_on_its_seed_alone() {
     let loaded = project("return suite()").load("x.lua", &[]).unwrap();
     let scene = |episode, seed| Episode::open(&loaded, &request(episode, seed)).unwrap().scene;
