@@ -3,7 +3,7 @@ use crate::{
     benchmark::{Plan, seed::Split},
     geometry::{Pose, Vec3},
     scene::Body,
-    script::{Episode, EpisodeRequest, Expert, ExpertCommand, ExpertView, ObjectView},
+    script::{Episode, EpisodeRequest, Expert, ExpertCommand, ExpertView, ObjectView, check_shift},
 };
 
 fn request(episode: u64, base_seed: u64) -> EpisodeRequest {
@@ -138,6 +138,24 @@ fn shifts_change_the_scene_and_are_strict() {
     assert_eq!(
         open("scene.gravty = { 0, 0, 0 }", "stiffness").unwrap_err(),
         "scene: unknown key \"gravty\"; did you mean \"gravity\"?"
+    );
+}
+
+#[test]
+fn the_library_scales_stiffness_and_mass() {
+    let project =
+        project("local shifts = require 'shifts'\nreturn suite(nil, { shifts.stiffness, shifts.mass })");
+    let loaded = project.load("x.lua", &[]).unwrap();
+    assert!(loaded.bundle.files.contains_key("scripts/shifts.lua"));
+    let shifts = vec![("stiffness".into(), 0.5), ("mass".into(), 2.0)];
+    let scene = Episode::open(&loaded, &EpisodeRequest { shifts, ..request(0, 1) }).unwrap().scene;
+    let Body::Soft(soft) = &scene.objects[0].asset.body else { panic!("the ball is soft") };
+    assert_eq!((soft.youngs_pa, soft.density), (20e3, 400.0));
+    let Plan::Suite(suite) = &loaded.plan else { panic!("{:?}", loaded.plan) };
+    assert!(check_shift(&suite.shifts, "mass", 2.0).is_ok());
+    assert_eq!(
+        check_shift(&suite.shifts, "mass", 0.0),
+        Err("shift mass: expected a number in 0.01..100 (1), got 0".into())
     );
 }
 
