@@ -217,3 +217,38 @@ impl Drop for Pause {
         state.slot = entry.map(|(message, on_stuck)| watchdog().add(until + grace, message, on_stuck));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIMIT: Duration = Duration::from_millis(60);
+
+    /// Runs a Lua loop after `work`, which takes twice the limit, inside of a deadline.
+    fn outcome(work: impl Fn(&Clock)) -> mlua::Result<()> {
+        let (lua, clock) = (Lua::new(), Clock::default());
+        clock.install(&lua)?;
+        let _deadline = clock.start(LIMIT, LIMIT, "x.lua", Arc::new(|_| {}));
+        work(&clock);
+        lua.load("for i = 1, 2 * 20000 do end").exec()
+    }
+
+    #[test]
+    fn time_that_a_binding_spends_with_the_clock_stopped_does_not_count() {
+        assert!(outcome(|_| thread::sleep(2 * LIMIT)).is_err());
+        let paused = |clock: &Clock| {
+            let _pause = clock.pause();
+            thread::sleep(2 * LIMIT);
+        };
+        assert!(outcome(paused).is_ok());
+    }
+
+    #[test]
+    fn a_deadline_that_was_met_never_wakes_the_watchdog() {
+        let woken = Arc::new(Mutex::new(false));
+        let seen = woken.clone();
+        drop(Clock::default().start(LIMIT, LIMIT, "x.lua", Arc::new(move |_| *lock(&seen) = true)));
+        thread::sleep(3 * LIMIT);
+        assert!(!*lock(&woken));
+    }
+}

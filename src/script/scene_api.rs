@@ -53,12 +53,15 @@ pub(super) fn empty_scene() -> Scene {
     }
 }
 
+/// An asset's Lua table and what was read from it.
+type Known = (Table, Arc<Asset>);
+
 /// `softvt.Scene`.
 #[derive(Clone)]
 pub(super) struct LuaScene {
     pub scene: Arc<Mutex<Scene>>,
     /// Assets by the address of their Lua table, which the scene keeps alive: two objects of one asset share it.
-    assets: Arc<Mutex<Vec<(Table, Arc<Asset>)>>>,
+    assets: Arc<Mutex<Vec<Known>>>,
 }
 
 impl LuaScene {

@@ -3,7 +3,7 @@ use crate::{
     benchmark::{Plan, seed::Split},
     geometry::{Pose, Vec3},
     scene::Body,
-    script::{Episode, EpisodeRequest, Expert, ExpertCommand, ExpertView, ObjectView},
+    script::{Episode, EpisodeRequest, Expert, ExpertCommand, ExpertView, ObjectView, check_shift},
 };
 
 fn request(episode: u64, base_seed: u64) -> EpisodeRequest {
@@ -71,6 +71,22 @@ fn a_suite_becomes_plain_data() {
 }
 
 #[test]
+fn a_list_of_suites_is_a_plan_and_tasks_are_found_by_name() {
+    let loaded = project("return { suite() }").load("x.lua", &[]).unwrap();
+    assert!(matches!(&loaded.plan, Plan::Suites { suites } if suites.len() == 1));
+    let open = |suite: &str, task| {
+        let request = EpisodeRequest { suite: suite.into(), task, ..request(0, 1) };
+        Episode::open(&loaded, &request).map(|e| e.scene.objects.len()).map_err(|e| (e.message, e.hint))
+    };
+    assert_eq!(open("test", 0), Ok(1));
+    assert_eq!(open("tst", 0), Err(("unknown suite \"tst\"; did you mean \"test\"?".into(), None)));
+    assert_eq!(
+        open("test", 3),
+        Err(("suite \"test\" has no task 3".into(), Some("its tasks are 0 to 0".into())))
+    );
+}
+
+#[test]
 fn an_episode_depends_on_its_seed_alone() {
     let loaded = project("return suite()").load("x.lua", &[]).unwrap();
     let scene = |episode, seed| Episode::open(&loaded, &request(episode, seed)).unwrap().scene;
@@ -122,6 +138,24 @@ fn shifts_change_the_scene_and_are_strict() {
     assert_eq!(
         open("scene.gravty = { 0, 0, 0 }", "stiffness").unwrap_err(),
         "scene: unknown key \"gravty\"; did you mean \"gravity\"?"
+    );
+}
+
+#[test]
+fn the_library_scales_stiffness_and_mass() {
+    let project =
+        project("local shifts = require 'shifts'\nreturn suite(nil, { shifts.stiffness, shifts.mass })");
+    let loaded = project.load("x.lua", &[]).unwrap();
+    assert!(loaded.bundle.files.contains_key("scripts/shifts.lua"));
+    let shifts = vec![("stiffness".into(), 0.5), ("mass".into(), 2.0)];
+    let scene = Episode::open(&loaded, &EpisodeRequest { shifts, ..request(0, 1) }).unwrap().scene;
+    let Body::Soft(soft) = &scene.objects[0].asset.body else { panic!("the ball is soft") };
+    assert_eq!((soft.youngs_pa, soft.density), (20e3, 400.0));
+    let Plan::Suite(suite) = &loaded.plan else { panic!("{:?}", loaded.plan) };
+    assert!(check_shift(&suite.shifts, "mass", 2.0).is_ok());
+    assert_eq!(
+        check_shift(&suite.shifts, "mass", 0.0),
+        Err("shift mass: expected a number in 0.01..100 (1), got 0".into())
     );
 }
 

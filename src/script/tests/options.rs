@@ -73,3 +73,25 @@ fn rows_follow_the_grid_and_the_options() {
     let row = serde_json::to_string(&experiment.run(1).unwrap()).unwrap();
     assert_eq!(row, r#"[{"closure":0.25,"gap":40.0,"sleep":true}]"#);
 }
+
+proptest::proptest! {
+    #![proptest_config(proptest::prelude::ProptestConfig::with_cases(48))]
+
+    #[test]
+    fn a_number_arrives_as_it_was_written(closure in 0.0f64..=1.0) {
+        let arguments = [format!("--closure={closure}")];
+        proptest::prop_assert_eq!(value(&[&arguments[0]], "closure"), OptionValue::Number(closure));
+    }
+
+    #[test]
+    fn whatever_is_said_is_answered_with_the_name_of_the_file(
+        words in proptest::collection::vec("[-=a-z0-9_ .,{}()\"\n]{0,24}", 0..4),
+        text in "([a-z]{1,3}|[ =.,:(){}\\[\\]\"'#+-]|[0-9]|softvt|\n|return|function|end){0,20}",
+    ) {
+        let words: Vec<&str> = words.iter().map(String::as_str).collect();
+        let said = Project::new(&[("x.lua", SCRIPT)]).load("x.lua", &words).map_err(|e| e.file);
+        proptest::prop_assert!(said.is_ok() || said.is_err_and(|file| file.ends_with("x.lua")));
+        let said = Project::new(&[("x.lua", &text)]).load("x.lua", &[]).expect_err("gibberish is no plan");
+        proptest::prop_assert!(said.file.ends_with("x.lua"), "{}", said);
+    }
+}
