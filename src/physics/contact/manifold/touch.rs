@@ -12,9 +12,9 @@ use crate::geometry::{Pose, Vec3};
 const SLACK_M: f64 = 1e-6;
 /// Lines crossing at a larger angle (sine) touch at their crossing, lines more nearly parallel along their overlap.
 const CROSSING: f64 = 0.05;
-/// If the features' overlap misses the closest points by the first of these, m, the closest points are added; from the
-/// second on they count in full.
-const MISSED_M: [f64; 2] = [1e-5, 5e-5];
+/// A point counts as the deepest of its pair in full up to the first of these, m, and not at all from the second on.
+/// What the deepest points lack of the area of one point contact is given to the closest points.
+const DEEPEST_M: [f64; 2] = [1e-5, 5e-5];
 /// A shorter line of contact, m, counts less than two points, down to one for none.
 const SHORT_LINE_M: f64 = 1e-3;
 /// From this overlap of two faces on, m², it counts as at least a point contact: a body on a sliver of its edge is no
@@ -85,19 +85,20 @@ pub(super) fn features(
     let Some(axis) = contact_axis(a, pose_a, b, pose_b, margin) else { return };
     let cross = Cross::new(pose_b.translation.vector, axis.n_w);
     let (on_a, on_b) = (facing(a, pose_a, &axis.n_w), facing(b, pose_b, &-axis.n_w));
-    let mut least = f64::INFINITY;
+    let mut carried = 0.0;
     for (q, height_a, height_b, area, feature) in meetings(&cross, &on_a, &on_b) {
         let phi = height_b - height_a;
-        least = least.min(phi);
+        carried +=
+            area * (1.0 - ((phi - axis.gap - DEEPEST_M[0]) / (DEEPEST_M[1] - DEEPEST_M[0])).clamp(0.0, 1.0));
         if phi < margin && area > 0.0 {
             let p_w =
                 cross.origin + cross.u * q[0] + cross.v * q[1] + cross.n * (0.5 * (height_a + height_b));
             out.push(ContactPoint { p_w, n_w: axis.n_w, phi, area, feature });
         }
     }
-    let missed = ((least - axis.gap - MISSED_M[0]) / (MISSED_M[1] - MISSED_M[0])).min(1.0);
-    if axis.true_gap && missed > 0.0 {
-        out.push(ContactPoint { area: POINT_AREA * missed, ..witness(a, pose_a, b, pose_b, &axis) });
+    let lacking = POINT_AREA - carried;
+    if lacking > 0.0 && (axis.closest.is_some() || carried == 0.0) && axis.true_gap {
+        out.push(ContactPoint { area: lacking, ..witness(a, pose_a, b, pose_b, &axis) });
     }
 }
 
@@ -184,8 +185,7 @@ fn line_line(cross: &Cross, a: &Line, b: &Line, found: &mut Vec<Meeting>) {
     let apart = nalgebra::Vector2::new(flat_b[0][0] - flat_a[0][0], flat_b[0][1] - flat_a[0][1]);
     let (ta, tb) = (apart.perp(&along_b) / det, apart.perp(&along_a) / det);
     let on = |t: f64, length: f64| (-SLACK_M / length..=1.0 + SLACK_M / length).contains(&t);
-    let cross_within = on(ta, length_a) && on(tb, length_b);
-    let crossed = if cross_within { (det.abs() / (length_a * length_b) / CROSSING).min(1.0) } else { 0.0 };
+    let crossed = (det.abs() / (length_a * length_b) / CROSSING).min(1.0);
     let mut push = |ta: f64, tb: f64, weight: f64, name: u32| {
         let lerp = |h: &[f64; 2], t: f64| h[0] + (h[1] - h[0]) * t;
         let (on_a, on_b) =
@@ -193,7 +193,7 @@ fn line_line(cross: &Cross, a: &Line, b: &Line, found: &mut Vec<Meeting>) {
         let area = POINT_AREA * weight * a.weight * b.weight;
         found.push((clip::between(&on_a, &on_b, 0.5), lerp(&height_a, ta), lerp(&height_b, tb), area, name));
     };
-    if crossed > 0.0 {
+    if crossed > 0.0 && on(ta, length_a) && on(tb, length_b) {
         push(ta, tb, crossed, clip::crossing(a.name, b.name));
     }
     if crossed < 1.0 {
