@@ -40,7 +40,7 @@ fn main() {
         );
         let fr = Friction { static_mu: mu, dynamic_mu: mu };
         let nothing = Friction { static_mu: 0.0, dynamic_mu: 0.0 };
-        let body = world.add_soft("cube", rest.clone(), &Pose::translation(0.0, 0.0, 0.025), nothing);
+        let body = world.add_soft("cube", rest.clone(), None, &Pose::translation(0.0, 0.0, 0.025), nothing);
         let layer = world.rigid_layer();
         let table = Shape::Box { half: Vec3::new(0.5, 0.5, 0.05) };
         world.add_collider(Collider::new(
