@@ -1,1 +1,17 @@
-//! (room under construction)
+//! One episode: settle → observe → act → step → judge; and the batch of them.
+
+mod build;
+pub mod episode;
+mod evidence;
+mod rig;
+pub mod simulation;
+mod trace;
+
+pub use build::{BuildError, RestCache};
+pub use episode::{ControlError, Controller, Episode, EpisodeSpec, Finished};
+pub use rig::Rig;
+pub use simulation::{Handle, Kind, SettleError, Simulation};
+pub use trace::{ObjectTrace, StepTrace};
+
+/// Physics steps a control step: 60 Hz physics, 20 Hz control.
+pub const STEPS_PER_CONTROL: u32 = 3;

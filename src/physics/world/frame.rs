@@ -122,6 +122,11 @@ impl World {
 }
 
 impl Touch {
+    /// Size of the force along the patch, N (exact where its normals agree).
+    pub fn shear(&self) -> f64 {
+        (self.force_w.norm_squared() - self.normal_force.powi(2)).max(0.0).sqrt()
+    }
+
     /// Adds one point to the touch of its partner.
     pub(super) fn add(touches: &mut Vec<(u32, Self)>, row: &RowOf, point: &Point, dt: f64) {
         let at = touches.iter().position(|(id, _)| *id == row.partner).unwrap_or_else(|| {

@@ -11,6 +11,10 @@ pub(super) struct Corner {
     pub edge: u32,
 }
 
+/// A corner this little outside of the other polygon counts as inside, m: boxes stacked flush keep the same corners
+/// whatever the rounding of their poses.
+const SNAP_M: f64 = 1e-6;
+
 /// The name of the point where an edge of the first body crosses one of the second; unlike any corner's name.
 pub(super) fn crossing(edge_a: u32, edge_b: u32) -> u32 {
     const MOVING: u32 = super::MOVING;
@@ -29,21 +33,23 @@ pub(super) fn overlap(a: &[Corner], b: &[Corner]) -> Vec<Corner> {
     let mut kept: Vec<(Corner, bool, usize)> = a.iter().enumerate().map(|(i, &c)| (c, false, i)).collect();
     for j in 0..b.len() {
         let (from, to) = (b[j].p, b[(j + 1) % b.len()].p);
+        let snap = SNAP_M * (to[0] - from[0]).hypot(to[1] - from[1]);
         let height = |c: &Corner| turn(&from, &to, &c.p);
         let mut next = Vec::with_capacity(kept.len() + 1);
         for i in 0..kept.len() {
             let (here, of_b, index) = kept[i];
             let there = kept[(i + 1) % kept.len()].0;
             let (h0, h1) = (height(&here), height(&there));
-            if h0 >= 0.0 {
+            let (in0, in1) = (h0 >= -snap, h1 >= -snap);
+            if in0 {
                 next.push(kept[i]);
             }
-            if (h0 >= 0.0) == (h1 >= 0.0) {
+            if in0 == in1 {
                 continue;
             }
-            let p = between(&here.p, &there.p, h0 / (h0 - h1));
+            let p = between(&here.p, &there.p, (h0 / (h0 - h1)).clamp(0.0, 1.0));
             let name = if of_b { corner_of(b, index, j) } else { crossing(here.edge, b[j].edge) };
-            next.push(if h0 >= 0.0 {
+            next.push(if in0 {
                 (Corner { p, name, edge: b[j].edge }, true, j)
             } else {
                 (Corner { p, name, edge: here.edge }, of_b, index)

@@ -81,6 +81,22 @@ fn turned_square_on_square_meets_in_the_octagon() {
 }
 
 #[test]
+fn flush_boxes_keep_the_names_of_their_points_under_rounding() {
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let cube = Piece::Box { half: Vec3::repeat(0.02) };
+    let names =
+        |pose: &Pose| meet(&cube, &Pose::identity(), &cube, pose, 0.001).iter().map(|p| p.feature).collect();
+    let expected: Vec<u32> = names(&at(0.0, 0.0, 0.04));
+    assert_eq!(expected.len(), 4);
+    for _ in 0..200 {
+        let mut jitter = || Vec3::from_fn(|_, _| rng.random_range(-1e-8..1e-8));
+        let (shift, turn) = (jitter(), jitter());
+        let found: Vec<u32> = names(&turned(at(shift.x, shift.y, 0.04 + shift.z), turn));
+        assert_eq!(found, expected);
+    }
+}
+
+#[test]
 fn crossed_edges_touch_in_one_point() {
     let cube = Piece::Box { half: Vec3::repeat(0.02) };
     let lower = turned(at(0.0, 0.0, 0.0), Vec3::x() * std::f64::consts::FRAC_PI_4);
@@ -176,10 +192,11 @@ fn swapping_the_bodies_flips_the_normals_only() {
             let (pose_a, pose_b) = touching(&mut rng, &a, &b, 0.0004);
             let there = meet(&a, &pose_a, &b, &pose_b, 0.001);
             let back = meet(&b, &pose_b, &a, &pose_a, 0.001);
-            assert_eq!(there.len(), back.len(), "{a:?} {b:?}");
+            // Pairs of a kind: two cylinders rim to rim keep a normal within PREFER_FACES_M of the best, whichever it
+            // is; two boxes decide within SNAP_M, which may also name one corner twice.
+            let (near, level, share) = if a == b { (2e-5, 2e-6, 0.01) } else { (1e-12, 1e-12, 1e-12) };
+            assert!((area(&there) / area(&back) - 1.0).abs() < share, "{a:?} {b:?} {there:?} {back:?}");
             for p in &there {
-                // Two cylinders rim to rim: either order keeps a normal that is within PREFER_FACES_M of the best.
-                let (near, level) = if a == b { (2e-5, 2e-6) } else { (1e-12, 1e-12) };
                 let twin = back.iter().any(|q| {
                     let apart = (p.p_w - q.p_w).norm().max((p.n_w + q.n_w).norm());
                     apart < near && (p.phi - q.phi).abs() < level
@@ -266,4 +283,29 @@ fn a_can_leaning_on_a_wall_touches_its_edge_with_its_side() {
     assert_eq!(points.len(), 1, "{points:?}");
     assert!((points[0].phi + 2e-5).abs() < 1e-7 && (points[0].n_w - side).norm() < 1e-4, "{points:?}");
     assert!((points[0].p_w - Vec3::new(-0.005, 0.0, 0.03)).norm() < 5e-5, "{points:?}");
+}
+
+#[test]
+fn contacts_in_any_attitude_change_little_when_a_pose_changes_little() {
+    // Steps of 0.1 µm and 2 µrad. Where the best direction changes from one pair of features to another a jump is true
+    // of any shallowest way out; it must be rare. Rims against edges and rims carry the noise of an iteration.
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    for (a, b) in pairs() {
+        let mut jumps = 0;
+        for _ in 0..2000 {
+            let (pose_a, mut pose_b) = touching(&mut rng, &a, &b, 0.0002);
+            let before = push(&meet(&a, &pose_a, &b, &pose_b, 0.001)).0;
+            let step = Vec3::from_fn(|_, _| rng.random_range(-1.0..1.0)) * 1e-7;
+            pose_b.translation.vector += step;
+            pose_b.rotation = Quat::from_scaled_axis(step * 20.0) * pose_b.rotation;
+            let after = push(&meet(&a, &pose_a, &b, &pose_b, 0.001)).0;
+            jumps += u32::from((after - before).norm() > 0.05 * before.norm());
+        }
+        let allowed = match (a, b) {
+            (Piece::Box { .. }, Piece::Box { .. }) => 2,
+            (Piece::Box { .. } | Piece::Cylinder { .. }, Piece::Cylinder { .. }) => 30,
+            _ => 0,
+        };
+        assert!(jumps <= allowed, "{a:?} {b:?}: {jumps} jumps in 2000");
+    }
 }

@@ -12,8 +12,14 @@ use crate::geometry::{Pose, Vec3};
 const SLACK_M: f64 = 1e-6;
 /// Lines crossing at a larger angle (sine) touch at their crossing, lines more nearly parallel along their overlap.
 const CROSSING: f64 = 0.05;
-/// If the features' overlap misses the closest points by this much, the closest points are added, m.
-const MISSED_M: f64 = 1e-5;
+/// If the features' overlap misses the closest points by the first of these, m, the closest points are added; from the
+/// second on they count in full.
+const MISSED_M: [f64; 2] = [1e-5, 5e-5];
+/// A shorter line of contact, m, counts less than two points, down to one for none.
+const SHORT_LINE_M: f64 = 1e-3;
+/// From this overlap of two faces on, m², it counts as at least a point contact: a body on a sliver of its edge is no
+/// softer than one on a corner.
+const SLIVER_M2: f64 = 1e-6;
 /// Set in the name of a feature of the second piece.
 const OF_B: u32 = 1 << 28;
 /// The name of the closest points.
@@ -89,8 +95,9 @@ pub(super) fn features(
             out.push(ContactPoint { p_w, n_w: axis.n_w, phi, area, feature });
         }
     }
-    if axis.true_gap && least > axis.gap + MISSED_M {
-        out.push(witness(a, pose_a, b, pose_b, &axis));
+    let missed = ((least - axis.gap - MISSED_M[0]) / (MISSED_M[1] - MISSED_M[0])).min(1.0);
+    if axis.true_gap && missed > 0.0 {
+        out.push(ContactPoint { area: POINT_AREA * missed, ..witness(a, pose_a, b, pose_b, &axis) });
     }
 }
 
@@ -127,7 +134,8 @@ fn face_face(cross: &Cross, a: &Face, b: &Face, found: &mut Vec<Meeting>) {
         (false, true) => cross.polygon(a, 0),
         (false, false) => clip::overlap(&cross.polygon(a, 0), &cross.polygon(b, OF_B)),
     };
-    let area = 0.5 * clip::area2(&polygon) * a.weight * b.weight;
+    let overlap = 0.5 * clip::area2(&polygon);
+    let area = overlap.max(POINT_AREA * (overlap / SLIVER_M2).min(1.0)) * a.weight * b.weight;
     for (corner, share) in polygon.iter().zip(clip::shares(&polygon)) {
         let heights = (cross.height_of(a, &corner.p), cross.height_of(b, &corner.p));
         found.push((corner.p, heights.0, heights.1, area * share, corner.name));
@@ -141,11 +149,13 @@ fn line_face(cross: &Cross, line: &Line, face: &Face, face_is_a: bool, found: &m
     let ends = line.ends.map(|end| cross.flat(&end));
     let heights = line.ends.map(|end| cross.height(&end));
     let Some(part) = clip::inside(&ends, &polygon, SLACK_M) else { return };
+    let along = (ends[1][0] - ends[0][0]).hypot(ends[1][1] - ends[0][1]);
+    let length = (part[1].0 - part[0].0).max(0.0) * along;
+    let area = POINT_AREA * line.weight * face.weight * 0.5 * (1.0 + (length / SHORT_LINE_M).min(1.0));
     for (end, (t, cut)) in part.into_iter().enumerate() {
         let q = clip::between(&ends[0], &ends[1], t);
         let on_line = heights[0] + (heights[1] - heights[0]) * t;
         let on_face = cross.height_of(face, &q);
-        let area = POINT_AREA * line.weight * face.weight;
         let name = match cut {
             None => line.names[end] | line_owner,
             Some(edge) if face_is_a => clip::crossing(polygon[edge].edge, line.name),
@@ -171,8 +181,11 @@ fn line_line(cross: &Cross, a: &Line, b: &Line, found: &mut Vec<Meeting>) {
         return;
     }
     let det = along_a.perp(&along_b);
-    let crossed = (det.abs() / (length_a * length_b) / CROSSING).min(1.0);
     let apart = nalgebra::Vector2::new(flat_b[0][0] - flat_a[0][0], flat_b[0][1] - flat_a[0][1]);
+    let (ta, tb) = (apart.perp(&along_b) / det, apart.perp(&along_a) / det);
+    let on = |t: f64, length: f64| (-SLACK_M / length..=1.0 + SLACK_M / length).contains(&t);
+    let cross_within = on(ta, length_a) && on(tb, length_b);
+    let crossed = if cross_within { (det.abs() / (length_a * length_b) / CROSSING).min(1.0) } else { 0.0 };
     let mut push = |ta: f64, tb: f64, weight: f64, name: u32| {
         let lerp = |h: &[f64; 2], t: f64| h[0] + (h[1] - h[0]) * t;
         let (on_a, on_b) =
@@ -181,11 +194,7 @@ fn line_line(cross: &Cross, a: &Line, b: &Line, found: &mut Vec<Meeting>) {
         found.push((clip::between(&on_a, &on_b, 0.5), lerp(&height_a, ta), lerp(&height_b, tb), area, name));
     };
     if crossed > 0.0 {
-        let (ta, tb) = (apart.perp(&along_b) / det, apart.perp(&along_a) / det);
-        let on = |t: f64, length: f64| (-SLACK_M / length..=1.0 + SLACK_M / length).contains(&t);
-        if on(ta, length_a) && on(tb, length_b) {
-            push(ta, tb, crossed, clip::crossing(a.name, b.name));
-        }
+        push(ta, tb, crossed, clip::crossing(a.name, b.name));
     }
     if crossed < 1.0 {
         // Places along the mean direction, from a's first end.

@@ -1,0 +1,168 @@
+use std::f64::consts::FRAC_PI_2;
+
+use super::field::samples_vs_field;
+use super::*;
+use crate::geometry::{Quat, shape::Shape};
+
+fn touch(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64) -> Vec<ContactPoint> {
+    let mut out = Vec::new();
+    samples_vs_field(&skin_samples(a), a, pose_a, b, pose_b, margin, &mut out);
+    out
+}
+
+fn floor() -> (Shape, Pose) {
+    (Shape::cuboid(Vec3::new(1.0, 1.0, 0.04)), Pose::translation(0.0, 0.0, -0.02))
+}
+
+/// A bowl of 2 mm wall: foot ring of 25 mm, rim of 50 mm, 40 mm high; corners of the profile from the axis outwards.
+fn bowl() -> Shape {
+    let corners = vec![
+        [0.0, 0.003],
+        [0.022, 0.003],
+        [0.022, 0.0],
+        [0.025, 0.0],
+        [0.025, 0.003],
+        [0.05, 0.04],
+        [0.047, 0.04],
+        [0.022, 0.006],
+        [0.0, 0.006],
+    ];
+    Shape::lathe(corners).expect("a bowl")
+}
+
+#[test]
+fn the_lowest_point_of_a_smooth_body_is_found_to_a_micron() {
+    let (ground, ground_w) = floor();
+    let egg = Shape::Ellipsoid { radii: Vec3::new(0.02, 0.025, 0.035) };
+    let ball = Shape::Sphere { radius: 0.03 };
+    for (shape, radii) in [(ball, Vec3::repeat(0.03)), (egg, Vec3::new(0.02, 0.025, 0.035))] {
+        for k in 0..20 {
+            let turn = Quat::from_scaled_axis(Vec3::new(0.4, 0.3, -0.2) * f64::from(k));
+            // Support of an ellipsoid: its point R² d / |R d| for a direction d.
+            let d = turn.inverse() * -Vec3::z();
+            let lowest = radii.component_mul(&radii).component_mul(&d) / radii.component_mul(&d).norm();
+            let height = -(turn * lowest).z - 5e-5;
+            let pose = Pose::from_parts(nalgebra::Translation3::new(0.1, 0.2, height), turn);
+            let points = touch(&shape, &pose, &ground, &ground_w, 0.001);
+            let point = points.iter().min_by(|p, q| p.phi.total_cmp(&q.phi)).expect("a lowest point");
+            assert!((point.phi + 5e-5).abs() < 1e-9, "{shape:?}, turn {k}: gap {}", point.phi);
+            let aside = (point.p_w - (turn * lowest + pose.translation.vector)).xy().norm();
+            assert!(aside < 1e-6 && point.is_moving(), "{shape:?}, turn {k}: {aside} m aside");
+            assert!((point.n_w + Vec3::z()).norm() < 1e-12 && (point.area - POINT_AREA).abs() < 1e-12);
+            assert_eq!(points.len(), 1, "{points:?}");
+        }
+    }
+}
+
+#[test]
+fn a_bowl_stands_on_its_foot_ring_and_tips_onto_its_exact_rims() {
+    let ((ground, ground_w), bowl) = (floor(), bowl());
+    let standing = touch(&bowl, &Pose::translation(0.0, 0.0, -1e-5), &ground, &ground_w, 0.001);
+    let rims = [0.022, 0.025];
+    assert_eq!(
+        standing.len(),
+        2 * feature::RIM as usize,
+        "only the foot's two edges, no seeds under its hollow"
+    );
+    for p in &standing {
+        assert!((p.phi + 1e-5).abs() < 1e-12 && rims.iter().any(|r| (p.p_w.xy().norm() - r).abs() < 1e-9));
+    }
+    for heading in [0.0f64, 0.13, 1.7] {
+        let tilt = 0.5f64;
+        let turn = Quat::from_scaled_axis(Vec3::new(-heading.sin(), heading.cos(), 0.0) * tilt);
+        let points = touch(&bowl, &Pose::from_parts(Vec3::zeros().into(), turn), &ground, &ground_w, 0.02);
+        let least = points.iter().map(|p| p.phi).fold(f64::INFINITY, f64::min);
+        assert!((least + 0.025 * tilt.sin()).abs() < 1e-9, "{least}");
+    }
+}
+
+#[test]
+fn a_lathe_can_on_its_side_rolls_on_the_moving_points_of_both_rims() {
+    let ((ground, ground_w), profile) =
+        (floor(), vec![[0.0, -0.05], [0.033, -0.05], [0.033, 0.05], [0.0, 0.05]]);
+    let can = Shape::lathe(profile).expect("a can");
+    for roll in [0.0, 0.05, 0.11] {
+        let turn = Quat::from_scaled_axis(Vec3::y() * FRAC_PI_2) * Quat::from_scaled_axis(Vec3::z() * roll);
+        let pose = Pose::from_parts(nalgebra::Translation3::new(0.0, 0.0, 0.033 - 1e-5), turn);
+        let points = touch(&can, &pose, &ground, &ground_w, 5e-6);
+        for end in [-0.05, 0.05] {
+            let at_end = points.iter().filter(|p| (p.p_w.x - end).abs() < 1e-6);
+            let carried: Vec<_> = at_end.filter(|p| (p.phi + 1e-5).abs() < 1e-9).collect();
+            assert!(carried.iter().any(|p| p.p_w.y.abs() < 1e-6 && p.is_moving()), "roll {roll}: {points:?}");
+        }
+        // Nothing but that line: what carries elsewhere on it is true contact too.
+        assert!(points.iter().all(|p| p.p_w.y.abs() < 1e-4 && p.phi >= -1e-5 - 1e-9), "{points:?}");
+    }
+}
+
+#[test]
+fn sharp_edges_of_a_general_solid_are_found_where_they_are() {
+    // A block with a rectangular notch: 60 × 40 × 30 mm less 20 × 40+ × 10 mm from the top.
+    let notch = Shape::cuboid(Vec3::new(0.02, 0.1, 0.02)).translated(Vec3::new(0.0, 0.0, 0.015));
+    let block = Shape::cuboid(Vec3::new(0.06, 0.04, 0.03)).subtract(notch);
+    let turned = block.rotated(Quat::from_scaled_axis(Vec3::new(0.2, 0.3, 0.1)));
+    let Shape::Placed { shape, pose } = &turned else { panic!("a placed shape") };
+    let samples = skin_samples(&turned).fixed;
+    let own: Vec<Vec3> = samples.iter().map(|p| pose.inverse_transform_point(&(*p).into()).coords).collect();
+    let (distance_to_faces, step) = (
+        |p: &Vec3| {
+            let mut off = [
+                (p.x.abs() - 0.03).abs(),
+                (p.y.abs() - 0.02).abs(),
+                (p.z.abs() - 0.015).abs(),
+                // The notch's walls and floor.
+                (p.x.abs() - 0.01).abs(),
+                (p.z - 0.005).abs(),
+            ];
+            off.sort_by(f64::total_cmp);
+            off[1]
+        },
+        0.06 / 24.0,
+    );
+    for p in &own {
+        assert!(shape.distance_and_normal(p).0.abs() < 1e-9, "{p} is off the surface");
+        assert!(distance_to_faces(p) < 1e-5, "{p} lies on no edge");
+    }
+    // Along the sharp upper edges beside the notch, no gap wider than two cells.
+    for k in 0..=20 {
+        let y = -0.018 + 0.036 * f64::from(k) / 20.0;
+        for x in [-0.03, -0.01, 0.01, 0.03] {
+            let edge = Vec3::new(x, y, 0.015);
+            let near = own.iter().map(|p| (p - edge).norm()).fold(f64::INFINITY, f64::min);
+            assert!(near < step, "nothing within {near} m of {edge}");
+        }
+    }
+    let inner = own.iter().filter(|p| (p.z - 0.005).abs() < 1e-4 && p.x.abs() < 0.0101 && p.y.abs() < 0.019);
+    assert_eq!(inner.count(), 0, "samples in the notch's inner corners, which nothing can touch first");
+}
+
+#[test]
+fn a_cube_in_a_bowl_is_stopped_by_the_inner_wall() {
+    // Its lower corners reach the sloping wall: (0.022, 0.006) to (0.047, 0.04) in (r, z).
+    let (bowl, cube) = (bowl(), Shape::cuboid(Vec3::repeat(0.036)));
+    let corner_r = 0.018 * 2f64.sqrt();
+    let wall_z = 0.006 + (corner_r - 0.022) * (0.034 / 0.025);
+    let pose = Pose::translation(0.0, 0.0, wall_z + 0.018 - 1e-5);
+    let points = touch(&cube, &pose, &bowl, &Pose::identity(), 0.0005);
+    assert_eq!(points.len(), 4, "{points:?}");
+    let slope = 0.025 / f64::hypot(0.034, 0.025);
+    for p in &points {
+        assert!((p.phi + 1e-5 * slope).abs() < 1e-9 && (p.p_w.xy().norm() - corner_r).abs() < 1e-5);
+        assert!((p.n_w.z + slope).abs() < 1e-9, "from the cube into the wall: {}", p.n_w);
+    }
+}
+
+#[test]
+fn shapes_made_of_primitives_fall_into_pieces_and_others_do_not() {
+    let wall = Shape::cuboid(Vec3::new(0.2, 0.01, 0.1)).translated(Vec3::new(0.0, 0.1, 0.05));
+    let tray = Shape::cuboid(Vec3::new(0.2, 0.2, 0.01))
+        .union(wall)
+        .painted(2, None)
+        .rotated(Quat::from_scaled_axis(Vec3::z()));
+    let parts = pieces(&tray).expect("two boxes");
+    assert_eq!(parts.len(), 2);
+    let centre = Quat::from_scaled_axis(Vec3::z()) * Vec3::new(0.0, 0.1, 0.05);
+    assert!((parts[1].1.translation.vector - centre).norm() < 1e-15);
+    assert_eq!(parts[1].0, Piece::Box { half: Vec3::new(0.1, 0.005, 0.05) });
+    assert_eq!(pieces(&bowl()), None);
+}
