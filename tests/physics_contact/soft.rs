@@ -2,7 +2,10 @@
 
 use softvt::{
     geometry::{Pose, Vec3, shape::Shape},
-    physics::{World, contact::{Mover, Partner}},
+    physics::{
+        World,
+        contact::{Mover, Partner},
+    },
 };
 
 use crate::scene::*;
@@ -53,7 +56,10 @@ fn two_cubes_face_to_face_are_as_stiff_as_one_of_double_length() {
     // What one does to the other is what the other does to it, and what the plates do.
     let (on_left, on_right) =
         (two.touch_by(left, Partner::Soft(right)).force_w, two.touch_by(right, Partner::Soft(left)).force_w);
-    assert!((on_left + on_right).norm() < 1e-9 && (on_right.x / pair - 1.0).abs() < 0.01, "{on_left} {on_right}");
+    assert!(
+        (on_left + on_right).norm() < 1e-9 && (on_right.x / pair - 1.0).abs() < 0.01,
+        "{on_left} {on_right}"
+    );
 }
 
 #[test]
@@ -62,7 +68,8 @@ fn a_soft_collision_keeps_momentum() {
     let cube = cuboid(0.05, 0.05, 0.05);
     let rest = soft_rest(&cube, SOFT, 4, 3e-3);
     let a = soft(&mut world, &cube, &rest, at(-0.03, 0.0, 0.0), bread());
-    let b = soft(&mut world, &cube, &rest, turned(at(0.035, 0.012, 0.006), Vec3::new(0.2, 0.4, 0.3)), bread());
+    let b =
+        soft(&mut world, &cube, &rest, turned(at(0.035, 0.012, 0.006), Vec3::new(0.2, 0.4, 0.3)), bread());
     world.soft[a].body.v.iter_mut().for_each(|v| *v = Vec3::new(1.0, 0.1, 0.0));
     let sums = |world: &World| {
         let mut sums = (Vec3::zeros(), Vec3::zeros());
@@ -149,16 +156,28 @@ fn deepest(shape: &Shape, from: Pose, seconds: f64) -> (f64, Vec3) {
 
 #[test]
 fn a_soft_cube_dropped_at_two_metres_a_second_crosses_no_wall() {
-    let bowl = Shape::lathe(vec![[0.0, 0.0], [0.03, 0.0], [0.07, 0.05], [0.066, 0.05], [0.028, 0.004], [0.0, 0.004]])
-        .expect("a bowl");
+    let bowl = Shape::lathe(vec![
+        [0.0, 0.0],
+        [0.03, 0.0],
+        [0.07, 0.05],
+        [0.066, 0.05],
+        [0.028, 0.004],
+        [0.0, 0.004],
+    ])
+    .expect("a bowl");
     let plate = Shape::Cylinder { radius: 0.1, half_height: 0.002 }.translated(Vec3::z() * 0.002);
     let wall = |x: f64, y: f64, along: bool| {
         let size = if along { Vec3::new(0.124, 0.004, 0.06) } else { Vec3::new(0.004, 0.12, 0.06) };
         Shape::cuboid(size).translated(Vec3::new(x, y, 0.03))
     };
     let base = Shape::cuboid(Vec3::new(0.12, 0.12, 0.004)).translated(Vec3::z() * 0.002);
-    let basket =
-        Shape::Union(vec![base, wall(0.062, 0.0, false), wall(-0.062, 0.0, false), wall(0.0, 0.062, true), wall(0.0, -0.062, true)]);
+    let basket = Shape::Union(vec![
+        base,
+        wall(0.062, 0.0, false),
+        wall(-0.062, 0.0, false),
+        wall(0.0, 0.062, true),
+        wall(0.0, -0.062, true),
+    ]);
     let askew = turned(at(0.0, 0.0, 0.14), Vec3::new(0.3, 0.5, 0.2));
     let onto_rim = turned(at(0.045, 0.0, 0.14), Vec3::new(0.3, 0.5, 0.2));
     for (name, shape) in [("bowl", &bowl), ("plate", &plate), ("basket", &basket)] {

@@ -191,7 +191,7 @@ impl Scene {
         let mut world = World::new(params, Vec3::zeros());
         let smooth = Friction { static_mu: 0.0, dynamic_mu: 0.0 };
         let height = 0.5 * options.body.width();
-        world.add_soft("body", rest.clone(), &Pose::translation(0.0, 0.0, height), smooth);
+        world.add_soft("body", rest.clone(), None, &Pose::translation(0.0, 0.0, height), smooth);
         if options.grounded {
             world.gravity = -GRAVITY * Vec3::z();
             let table = Shape::cuboid(Vec3::new(1.0, 1.0, 0.1));

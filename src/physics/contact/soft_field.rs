@@ -155,9 +155,8 @@ impl<'a> SoftField<'a> {
 fn trilinear(corners: &[Vec3; 8], local: &Vec3) -> (Vec3, Mat3) {
     let (mut x, mut jacobian) = (Vec3::zeros(), Mat3::zeros());
     for (c, corner) in corners.iter().enumerate() {
-        let factor: [f64; 3] = std::array::from_fn(|axis| {
-            if c >> axis & 1 == 1 { local[axis] } else { 1.0 - local[axis] }
-        });
+        let factor: [f64; 3] =
+            std::array::from_fn(|axis| if c >> axis & 1 == 1 { local[axis] } else { 1.0 - local[axis] });
         let slope: [f64; 3] = std::array::from_fn(|axis| if c >> axis & 1 == 1 { 1.0 } else { -1.0 });
         x += corner * (factor[0] * factor[1] * factor[2]);
         let gradient = Vec3::new(
