@@ -50,7 +50,12 @@ pub static FUNCTIONS: &[Signature] = &[
         "Declares the script's options; gives their values, from the command line or by default.",
     ),
     method("world", &[("world?", "softvt.WorldSpec")], &["softvt.World"], "An empty world without a robot."),
-    method("simulate", &[("simulate", "softvt.SimulateSpec")], &["softvt.Simulation"], "A settled scene with the robot."),
+    method(
+        "simulate",
+        &[("simulate", "softvt.SimulateSpec")],
+        &["softvt.Simulation"],
+        "A settled scene with the robot.",
+    ),
     method(
         "envelope",
         &[("envelope", "softvt.EnvelopeSpec")],
@@ -58,7 +63,12 @@ pub static FUNCTIONS: &[Signature] = &[
         "What a calibration found: lower, closure_at_tau, safe_window, tau, d_ref, and as text: text (a plot), sweep \
          (JSON lines), json (a threshold file).",
     ),
-    method("stable", &[("row", "table")], &["boolean"], "Whether a row of a compression sweep is a stable squeeze."),
+    method(
+        "stable",
+        &[("row", "table")],
+        &["boolean"],
+        "Whether a row of a compression sweep is a stable squeeze.",
+    ),
     method("pose", &[("pose", "softvt.PoseSpec")], &["softvt.Pose"], "A pose in the world frame."),
     method("mesh", &[("mesh", "softvt.MeshSpec")], &["softvt.Shape"], "A shape from a mesh file."),
     method(

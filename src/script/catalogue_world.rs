@@ -18,12 +18,7 @@ pub static WORLD: Record = Record {
     kind: "softvt.WorldSpec",
     doc: "A world of soft bodies and prescribed or fixed solids, without a robot.",
     fields: &[
-        field(
-            "dt",
-            Type::Number("s", Range::closed(1e-5, 0.05)),
-            Presence::Number(1.0 / 60.0),
-            "Time step.",
-        ),
+        field("dt", Type::Number("s", Range::closed(1e-5, 0.05)), Presence::Number(1.0 / 60.0), "Time step."),
         field(
             "alpha",
             Type::Number("1/s", Range::closed(0.0, 1e3)),
@@ -53,7 +48,12 @@ pub static WORLD_SOFT: Record = Record {
         field("youngs_pa", Type::Number("Pa", Range::POSITIVE), Required, "Young's modulus."),
         field("poisson", Type::Number("", Range::below(0.0, 0.5)), Required, "Poisson's ratio."),
         field("density", Type::Number("kg/m³", Range::POSITIVE), Required, "Density."),
-        field("resolution", Type::Integer(Range::closed(1.0, 64.0)), Presence::Integer(6), "Voxels along the longest edge."),
+        field(
+            "resolution",
+            Type::Integer(Range::closed(1.0, 64.0)),
+            Presence::Integer(6),
+            "Voxels along the longest edge.",
+        ),
         field(
             "grasp_spacing",
             Type::Number("m", Range::closed(1e-4, 0.02)),

@@ -9,14 +9,29 @@ pub const WORLD: Class = Class {
     fields: &[],
     methods: &[
         method("soft", &[("spec", "softvt.WorldSoft")], &["softvt.Body"], "Adds a soft body."),
-        method("kinematic", &[("spec", "softvt.WorldSolid")], &["softvt.Solid"], "Adds a solid that move_to moves."),
-        method("static", &[("spec", "softvt.WorldSolid")], &["softvt.Solid"], "Adds a solid that never moves."),
+        method(
+            "kinematic",
+            &[("spec", "softvt.WorldSolid")],
+            &["softvt.Solid"],
+            "Adds a solid that move_to moves.",
+        ),
+        method(
+            "static",
+            &[("spec", "softvt.WorldSolid")],
+            &["softvt.Solid"],
+            "Adds a solid that never moves.",
+        ),
         method("step", &[], &["boolean", "string?"], "One time step; false and why once the state is void."),
         method("time", &[], &["number"], "Time, s."),
         method("newton", &[], &["number", "integer"], "Mean and largest number of Newton iterations a step."),
         method("energy", &[], &["number"], "Kinetic, elastic and potential energy, J."),
         method("phase", &[("name", "string")], &[], "From now on, CPU time goes to this phase."),
-        method("report_timing", &[], &[], "Prints CPU time per simulated time, by phase, to the standard error."),
+        method(
+            "report_timing",
+            &[],
+            &[],
+            "Prints CPU time per simulated time, by phase, to the standard error.",
+        ),
     ],
 };
 
@@ -32,13 +47,38 @@ pub const BODY: Class = Class {
         method("mass", &[], &["number"], "Mass, kg."),
         method("min_det_f", &[], &["number"], "Least det F of a filled element; 0 or less is inverted."),
         method("asleep", &[], &["boolean"], "Whether it sleeps."),
-        method("deformation", &[], &["table"], "rms_pct, weighted_pct and max_pct against the reference shape."),
+        method(
+            "deformation",
+            &[],
+            &["table"],
+            "rms_pct, weighted_pct and max_pct against the reference shape.",
+        ),
         method("extent", &[], &["number[]"], "Size of the bounding box of the nodes, m."),
-        method("set_reference", &[("which", "\"rest\"|\"now\"")], &[], "Measures deformation from the rest shape (default) or from now."),
+        method(
+            "set_reference",
+            &[("which", "\"rest\"|\"now\"")],
+            &[],
+            "Measures deformation from the rest shape (default) or from now.",
+        ),
         method("force", &[("solid", "softvt.Solid")], &["number"], "Normal force of a solid on the body, N."),
-        method("shear", &[("solid", "softvt.Solid")], &["number"], "Tangential force of a solid on the body, N."),
-        method("travel", &[("solid", "softvt.Solid")], &["number"], "How far the patch has slid on the solid, mm."),
-        method("slipping", &[("solid", "softvt.Solid")], &["number"], "Share of the patch's samples that slip, 0..1."),
+        method(
+            "shear",
+            &[("solid", "softvt.Solid")],
+            &["number"],
+            "Tangential force of a solid on the body, N.",
+        ),
+        method(
+            "travel",
+            &[("solid", "softvt.Solid")],
+            &["number"],
+            "How far the patch has slid on the solid, mm.",
+        ),
+        method(
+            "slipping",
+            &[("solid", "softvt.Solid")],
+            &["number"],
+            "Share of the patch's samples that slip, 0..1.",
+        ),
     ],
 };
 
@@ -67,7 +107,12 @@ pub const SIMULATION: Class = Class {
             &["boolean", "string?"],
             "Runs an expert to its end; false and why once the physics has failed.",
         ),
-        method("wait", &[("seconds", "number")], &["boolean", "string?"], "Holds the last command for a time."),
+        method(
+            "wait",
+            &[("seconds", "number")],
+            &["boolean", "string?"],
+            "Holds the last command for a time.",
+        ),
         method(
             "watch",
             &[("object", "string")],

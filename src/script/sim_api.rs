@@ -2,7 +2,10 @@
 
 use std::sync::{Arc, Mutex};
 
-use mlua::{Function, Lua, LuaSerdeExt, MetaMethod, MultiValue, Table, UserData, UserDataFields, UserDataMethods, Value};
+use mlua::{
+    Function, Lua, LuaSerdeExt, MetaMethod, MultiValue, Table, UserData, UserDataFields, UserDataMethods,
+    Value,
+};
 use serde::de::DeserializeOwned;
 
 use super::{
