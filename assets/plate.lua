@@ -20,8 +20,7 @@ return softvt.asset {
     material = 1,
     region = softvt.shape.torus { major = 67 * mm, minor = 3 * mm }:translate(0, 0, 18 * mm),
   },
-  body = softvt.static {},
-  hints = { surface_m = 13.5 * mm },
+  body = softvt.static(),
   visuals = {
     { albedo = { 0.82, 0.84, 0.84 }, roughness = 0.25 },
     { albedo = { 0.12, 0.25, 0.45 }, roughness = 0.25 },
