@@ -13,7 +13,7 @@ use crate::{
 };
 
 /// Change of an element's rotation (Frobenius norm, about √2 × radians) that makes the factor be refilled.
-const STALE_ROTATION: f64 = 0.02;
+const STALE_ROTATION: f64 = 0.04;
 /// Change of the body's rotation (same norm) that makes the reduced matrix be turned again.
 const STALE_TURN: f64 = 2e-3;
 /// Steps for which a node stays kept after its last contact.

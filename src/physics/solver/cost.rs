@@ -63,13 +63,7 @@ impl Solver {
     }
 
     /// `½ vᵀA v − rᵀv` and its gradient.
-    fn momentum_terms(
-        &mut self,
-        problem: &Problem,
-        island: &Island,
-        v: &[f64],
-        gradient: &mut [f64],
-    ) -> f64 {
+    fn momentum_terms(&mut self, problem: &Problem, island: &Island, v: &[f64], gradient: &mut [f64]) -> f64 {
         let mut cost = 0.0;
         for &block in &island.blocks {
             let (b, start) = (&problem.blocks[block], self.offsets[block]);

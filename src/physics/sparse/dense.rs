@@ -129,41 +129,53 @@ pub fn forward(l: &[f64], n: usize, k: usize, b: &mut [f64]) {
 pub fn backward(l: &[f64], n: usize, k: usize, x: &mut [f64]) {
     let whole = k - k % WIDE;
     for j in (whole..k).rev() {
-        let [dot] = dots([&l[j * n + j + 1..(j + 1) * n]], &x[j + 1..n]);
-        x[j] = (x[j] - dot) / l[j * n + j];
+        x[j] = (x[j] - dot(&l[j * n + j + 1..(j + 1) * n], &x[j + 1..n])) / l[j * n + j];
     }
     for j in (0..whole).step_by(WIDE).rev() {
         let dot = dots(wide(l, n, j, j + WIDE), &x[j + WIDE..n]);
         for c in (0..WIDE).rev() {
             let column = &l[(j + c) * n + j..(j + c) * n + j + WIDE];
-            let near: f64 = (c + 1..WIDE).map(|r| column[r] * x[j + r]).sum();
-            x[j + c] = (x[j + c] - dot[c] - near) / column[c];
-        }
-    }
-}
-
-/// Dot product in a fixed order.
-pub fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let [dot] = dots([a], b);
-    dot
-}
-
-/// Dot products of columns with `x`, each in four fixed lanes (one order on every machine, and fast).
-fn dots<const N: usize>(columns: [&[f64]; N], x: &[f64]) -> [f64; N] {
-    let mut lanes = [[0.0; 4]; N];
-    let (chunks, tail) = x.as_chunks::<4>();
-    let blocks = columns.map(|column| column[..x.len()].as_chunks::<4>());
-    for (i, x) in chunks.iter().enumerate() {
-        for (lanes, (block, _)) in lanes.iter_mut().zip(&blocks) {
-            for ((lane, a), x) in lanes.iter_mut().zip(&block[i]).zip(x) {
-                *lane += a * x;
+            let mut rest = x[j + c] - dot[c];
+            for r in c + 1..WIDE {
+                rest -= column[r] * x[j + r];
             }
+            x[j + c] = rest / column[c];
         }
     }
-    std::array::from_fn(|c| {
-        let rest: f64 = blocks[c].1.iter().zip(tail).map(|(a, x)| a * x).sum();
-        (lanes[c][0] + lanes[c][1]) + (lanes[c][2] + lanes[c][3]) + rest
-    })
+}
+
+/// Dot product in four fixed lanes: one order on every machine, and fast.
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
+    let mut lanes = [0.0; 4];
+    for (a, b) in a.iter().zip(b) {
+        (0..4).for_each(|i| lanes[i] += a[i] * b[i]);
+    }
+    let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
+    (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]) + rest
+}
+
+/// Dot products of [`WIDE`] columns with `x`, all at once.
+fn dots([a, b, c, d]: [&[f64]; WIDE], x: &[f64]) -> [f64; WIDE] {
+    let mut lanes = [[0.0; 4]; WIDE];
+    let whole = x.len() - x.len() % 4;
+    let chunks = |values| <[f64]>::as_chunks::<4>(values).0;
+    for ((((x, a), b), c), d) in chunks(x).iter().zip(chunks(a)).zip(chunks(b)).zip(chunks(c)).zip(chunks(d))
+    {
+        for i in 0..4 {
+            lanes[0][i] += a[i] * x[i];
+            lanes[1][i] += b[i] * x[i];
+            lanes[2][i] += c[i] * x[i];
+            lanes[3][i] += d[i] * x[i];
+        }
+    }
+    let mut sums = lanes.map(|l| (l[0] + l[1]) + (l[2] + l[3]));
+    for i in whole..x.len() {
+        for (sum, column) in sums.iter_mut().zip([a, b, c, d]) {
+            *sum += column[i] * x[i];
+        }
+    }
+    sums
 }
 
 /// `y = A x` for a symmetric matrix of which only the lower triangle is stored.
