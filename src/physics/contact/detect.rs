@@ -105,6 +105,7 @@ impl View {
 
 /// The nodes of a group as a collider sees them, in its frame.
 struct Seen {
+    count: usize,
     x: [Vec3; 8],
     v: [Vec3; 8],
     bounds: Aabb,
@@ -114,6 +115,7 @@ struct Seen {
 impl Seen {
     fn new(body: &SoftBody, nodes: &[u32], moving: &Moving, view: &View) -> Self {
         let mut seen = Self {
+            count: nodes.len(),
             x: [Vec3::zeros(); 8],
             v: [Vec3::zeros(); 8],
             bounds: Aabb { min: Vec3::repeat(f64::INFINITY), max: Vec3::repeat(f64::NEG_INFINITY) },
@@ -133,12 +135,14 @@ impl Seen {
 
     /// Speed of a sample against the mover, m/s.
     fn speed(&self, weights: &[f64; 8]) -> f64 {
-        mean(&self.v, weights).norm()
+        mean(self.count, &self.v, weights).norm()
     }
 }
 
-fn mean(values: &[Vec3; 8], weights: &[f64; 8]) -> Vec3 {
-    (1..8).fold(values[0] * weights[0], |sum, i| sum + values[i] * weights[i])
+/// Weighted mean over `count` nodes; with the four of a face known, the sum is unrolled.
+fn mean(count: usize, values: &[Vec3; 8], weights: &[f64; 8]) -> Vec3 {
+    let of = |n: usize| (1..n).fold(values[0] * weights[0], |sum, i| sum + values[i] * weights[i]);
+    if count <= 4 { of(4) } else { of(8) }
 }
 
 /// One sample against the surface, if it is within `look` of its bounds and the two face each other.
@@ -150,7 +154,7 @@ fn test(
     look: f64,
 ) -> Option<Candidate> {
     let data = &body.rest.samples[sample];
-    let local = mean(&seen.x, &data.weights);
+    let local = mean(seen.count, &seen.x, &data.weights);
     let bounds = &collider.bounds;
     if (0..3).any(|i| local[i] < bounds.min[i] - look || local[i] > bounds.max[i] + look) {
         return None;
