@@ -13,7 +13,9 @@ impl World {
         for (soft, block) in self.soft.iter_mut().zip(&self.layout.soft) {
             let Some(block) = block else { continue };
             let body = &mut soft.body;
-            soft.system.complete(&body.frame, &self.problem.blocks[*block].v, &mut body.v);
+            let block = &mut self.problem.blocks[*block];
+            soft.system.complete(&block.v, &mut body.v);
+            soft.system.give_back(std::mem::take(&mut block.matrix));
             body.x.iter_mut().zip(&body.v).for_each(|(x, v)| *x += v * dt);
             body.update_elastic();
             soft.min_det_f = body.min_det_f();

@@ -237,6 +237,11 @@ impl World {
 }
 
 impl Soft {
+    /// How many nodes the contact solve keeps at present.
+    pub fn kept(&self) -> usize {
+        self.system.kept().len()
+    }
+
     /// How often the body's system was factored.
     pub fn refills(&self) -> u64 {
         self.system.refills
