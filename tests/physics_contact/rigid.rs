@@ -212,14 +212,3 @@ fn a_resting_box_falls_asleep_and_a_push_wakes_it() {
     assert!(upper.x > 0.005, "pushed: {upper}");
     assert!(lower.x < 0.5 * upper.x && !world.rigid[high].asleep, "{lower}");
 }
-#[test]
-fn dbg_tip() {
-    let can = Shape::Cylinder { radius: 0.033, half_height: 0.05 };
-    let tall = cuboid(0.06, 0.08, 0.1);
-    for (shape, exact) in [(&tall, 0.6f64.atan()), (&can, 0.66f64.atan())] {
-    for h in [0.0, PI / 24.0, 0.05] {
-        let (mut lo, mut hi) = (exact - 0.03, exact + 0.03);
-        for _ in 0..7 { let m = 0.5 * (lo + hi); if tips(shape, turned(at(0.0,0.0,0.05), Vec3::z()*h), m) { hi = m } else { lo = m } }
-        println!("{h} off by {} deg", (hi - exact).to_degrees());
-    } }
-}

@@ -170,8 +170,8 @@ fn a_soft_cube_dropped_at_two_metres_a_second_crosses_no_wall() {
     let base = Shape::cuboid(Vec3::new(0.12, 0.12, 0.004)).translated(Vec3::z() * 0.002);
     let basket =
         Shape::Union(vec![base, wall(0.062, 0.0, false), wall(-0.062, 0.0, false), wall(0.0, 0.062, true), wall(0.0, -0.062, true)]);
-    let askew = turned(at(0.0, 0.0, 0.14), Vec3::new(0.3, 0.5, 0.2));
-    let onto_rim = turned(at(0.045, 0.0, 0.14), Vec3::new(0.3, 0.5, 0.2));
+    let askew = turned(at(0.0, 0.0, 0.14), Vec3::new(0.1, 0.15, 0.2));
+    let onto_rim = turned(at(0.045, 0.0, 0.14), Vec3::new(0.1, 0.15, 0.2));
     for (name, shape) in [("bowl", &bowl), ("plate", &plate), ("basket", &basket)] {
         for (place, pose) in [("middle", askew), ("rim", onto_rim)] {
             let (deepest, last, centre) = drop_into(shape, pose);

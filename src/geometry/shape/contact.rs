@@ -15,6 +15,8 @@ pub struct Contact {
 
 /// A face is felt by samples whose outward normal opposes its own by at least this cosine.
 const FACING: f64 = 0.3;
+/// Nor deeper than this, m: a sample on a table's top must not feel the table's side half a metre away.
+const DEEPEST: f64 = 5e-3;
 
 /// One flat or round face of a sharp shape, as seen from a point.
 struct Face {
@@ -61,7 +63,7 @@ fn full((phi, normal): (f64, Vec3)) -> Contact {
 fn sharp<const N: usize>(faces: [Face; N], facing: &Vec3) -> Option<Contact> {
     faces
         .into_iter()
-        .filter(|face| face.coverage > 0.0 && face.phi >= -face.depth)
+        .filter(|face| face.coverage > 0.0 && face.phi >= -face.depth.min(DEEPEST))
         .map(|face| (-facing.dot(&face.normal), face))
         .filter(|(alignment, _)| *alignment > FACING)
         .max_by(|a, b| a.0.total_cmp(&b.0))
