@@ -132,7 +132,10 @@ fn a_collision_keeps_momentum_and_makes_no_energy() {
     world.rigid[b].body.v = Vec3::new(-0.5, 0.0, 0.0);
     let sums = |world: &World| {
         let bodies = world.rigid.iter().map(|r| &r.body);
-        (bodies.clone().map(|b| b.momentum()).sum::<Vec3>(), bodies.map(|b| b.angular_momentum()).sum::<Vec3>())
+        (
+            bodies.clone().map(|b| b.momentum()).sum::<Vec3>(),
+            bodies.map(|b| b.angular_momentum()).sum::<Vec3>(),
+        )
     };
     let ((linear, angular), energy) = (sums(&world), world.energy().total());
     run(&mut world, 0.5);
@@ -164,7 +167,13 @@ fn a_prescribed_pusher_pushes_and_a_box_bigger_than_what_it_rests_on_is_held_by_
     let small = rigid(&mut world, &block, 0.2, at(0.0, 0.0, 0.02), friction(0.6, 0.5));
     let tray = rigid(&mut world, &cuboid(0.12, 0.12, 0.01), 0.2, at(0.0, 0.0, 0.045), friction(0.6, 0.5));
     let hand = world.add_kinematic(at(-0.03, 0.0, 0.02));
-    put(&mut world, "hand", (Mover::Kinematic(hand), Pose::identity()), &cuboid(0.02, 0.02, 0.02), friction(0.6, 0.5));
+    put(
+        &mut world,
+        "hand",
+        (Mover::Kinematic(hand), Pose::identity()),
+        &cuboid(0.02, 0.02, 0.02),
+        friction(0.6, 0.5),
+    );
     run(&mut world, 0.2);
     let speed = 0.05;
     for step in 0..60 {
@@ -205,7 +214,8 @@ fn a_resting_box_falls_asleep_and_a_push_wakes_it() {
     let high = rigid(&mut world, &shape, 0.3, at(0.0, 0.0, 0.076), friction(0.6, 0.5));
     run(&mut world, 2.0);
     assert!(world.rigid[low].asleep && world.rigid[high].asleep);
-    let ball = rigid(&mut world, &Shape::Sphere { radius: 0.02 }, 0.3, at(-0.1, 0.0, 0.075), friction(0.6, 0.5));
+    let ball =
+        rigid(&mut world, &Shape::Sphere { radius: 0.02 }, 0.3, at(-0.1, 0.0, 0.075), friction(0.6, 0.5));
     world.rigid[ball].body.v = Vec3::x() * 2.0;
     run(&mut world, 0.1);
     let (upper, lower) = (position(&world, high), position(&world, low));

@@ -52,7 +52,13 @@ pub fn turned(pose: Pose, turn: Vec3) -> Pose {
 }
 
 /// A collider of a hard shape.
-pub fn put(world: &mut World, name: &str, (mover, pose): (Mover, Pose), shape: &Shape, mu: Friction) -> usize {
+pub fn put(
+    world: &mut World,
+    name: &str,
+    (mover, pose): (Mover, Pose),
+    shape: &Shape,
+    mu: Friction,
+) -> usize {
     let layer = world.rigid_layer();
     world.add_collider(Collider::new(name, (mover, pose), Arc::new(shape.clone()), mu, layer))
 }

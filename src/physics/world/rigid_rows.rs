@@ -88,7 +88,8 @@ impl World {
     /// Pairs of colliders on different movers, of which at least one is free to move, that may touch within the step.
     fn near_pairs(&self, pairs: &mut Vec<Pair>) {
         pairs.clear();
-        let ids: Vec<usize> = (0..self.colliders.len()).filter(|&i| self.colliders[i].solid.is_some()).collect();
+        let ids: Vec<usize> =
+            (0..self.colliders.len()).filter(|&i| self.colliders[i].solid.is_some()).collect();
         let boxes: Vec<Candidate> = ids.iter().map(|&id| self.box_of(id)).collect();
         for (i, j) in candidate_pairs(&boxes) {
             let (i, j) = (ids[i], ids[j]);
