@@ -222,3 +222,32 @@ fn a_resting_box_falls_asleep_and_a_push_wakes_it() {
     assert!(upper.x > 0.005, "pushed: {upper}");
     assert!(lower.x < 0.5 * upper.x && !world.rigid[high].asleep, "{lower}");
 }
+
+#[test]
+fn fast_bodies_are_stopped_by_a_thin_shelf() {
+    let ball = Shape::Sphere { radius: 0.01 };
+    let die = cuboid(0.01, 0.01, 0.01);
+    let cone = Shape::lathe(vec![[0.0, -0.01], [0.01, 0.01], [0.0, 0.01]]).expect("a cone");
+    for (shape, carrier) in [(&ball, &ball), (&die, &die), (&cone, &ball)] {
+        let mut world = world();
+        put(
+            &mut world,
+            "shelf",
+            (Mover::Static, Pose::identity()),
+            &cuboid(0.2, 0.2, 0.004),
+            friction(0.6, 0.5),
+        );
+        let pose = turned(at(0.01, 0.02, 0.1), Vec3::new(0.5, 0.3, 0.0));
+        let body = rigid(&mut world, carrier, 0.1, pose, friction(0.6, 0.5));
+        if shape != carrier {
+            let last = world.add_rigid("cone", world.rigid[body].body.clone());
+            put(&mut world, "cone", (Mover::Rigid(last), Pose::identity()), shape, friction(0.6, 0.5));
+            world.rigid[body].body.pose_w.translation.vector.x += 10.0;
+        }
+        let body = world.rigid.len() - 1;
+        world.rigid[body].body.v = Vec3::z() * -5.0;
+        run(&mut world, 0.5);
+        let z = position(&world, body).z;
+        assert!(z > 0.005 && z < 0.03, "{shape:?} ends at {z} m");
+    }
+}

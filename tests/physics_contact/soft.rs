@@ -136,6 +136,27 @@ fn two_stacked_soft_blocks_fall_asleep_and_a_third_wakes_them() {
     assert!(high.z < asleep_at.z && third.z - high.z > 0.0245, "{high} {third}");
 }
 
+#[test]
+fn soft_cubes_that_meet_at_two_metres_a_second_do_not_enter_each_other() {
+    let mut world = World::new(world().params, Vec3::zeros());
+    let cube = cuboid(0.05, 0.05, 0.05);
+    let rest = soft_rest(&cube, SOFT, 4, 3e-3);
+    soft(&mut world, &cube, &rest, at(-0.06, 0.0, 0.0), bread());
+    soft(&mut world, &cube, &rest, turned(at(0.06, 0.0, 0.0), Vec3::x() * 0.3), bread());
+    for (index, speed) in [(0, 1.0), (1, -1.0)] {
+        world.soft[index].body.v.iter_mut().for_each(|v| *v = Vec3::x() * speed);
+    }
+    let mut nearest = f64::INFINITY;
+    for _ in 0..40 {
+        world.step().expect("a step that converges");
+        // They meet head on, turned about the line between them: all of one stays on one side.
+        let front = world.soft[0].body.x.iter().map(|x| x.x).fold(f64::NEG_INFINITY, f64::max);
+        let back = world.soft[1].body.x.iter().map(|x| x.x).fold(f64::INFINITY, f64::min);
+        nearest = nearest.min(back - front);
+    }
+    assert!(nearest < 1e-3 && nearest > -2e-3, "{nearest} m apart at the nearest");
+}
+
 /// The deepest that any material of a soft body is behind the surface of `shape`, m; sampled four times along an element's edge.
 fn depth(body: &SoftBody, shape: &Shape) -> f64 {
     let mesh = &body.rest.mesh;
