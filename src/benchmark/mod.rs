@@ -1,5 +1,8 @@
 //! What a script returns: suites, tasks, experiments and plans as plain data.
 
+pub mod seed;
+pub mod settings;
+
 use serde::{Deserialize, Serialize};
 
 /// What the objects of a suite are.
@@ -46,6 +49,15 @@ pub enum Goal {
     },
 }
 
+impl Goal {
+    /// Scene name of the object that must get somewhere.
+    pub fn object(&self) -> &str {
+        match self {
+            Self::On { object, .. } | Self::In { object, .. } => object,
+        }
+    }
+}
+
 /// One task of a suite.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Task {
@@ -59,6 +71,23 @@ pub struct Task {
     pub goal: Goal,
     /// Control steps the policy has.
     pub budget_steps: u32,
+    /// Whether a scripted expert comes with it.
+    pub expert: bool,
+}
+
+/// A change of the scene that a run may ask for by name.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Shift {
+    /// Name on the command line.
+    pub name: String,
+    /// Unit of its value, "1" for none.
+    pub unit: String,
+    /// The value that changes nothing.
+    pub default: f64,
+    /// Lowest value.
+    pub min: Option<f64>,
+    /// Highest value.
+    pub max: Option<f64>,
 }
 
 /// A set of tasks that are reported together.
@@ -74,8 +103,10 @@ pub struct Suite {
     pub episodes: u32,
     /// The tasks, in order.
     pub tasks: Vec<Task>,
-    /// Names of the shifts the suite declares.
-    pub shifts: Vec<String>,
+    /// The shifts that the suite declares.
+    pub shifts: Vec<Shift>,
+    /// What the suite changes of the mechanics, the robot and the judge.
+    pub settings: settings::Settings,
 }
 
 /// What `softvt FILE.lua` does.
@@ -95,5 +126,7 @@ pub enum Plan {
         name: String,
         /// Number of points of the grid.
         points: usize,
+        /// Columns of the table of rows, in order; all of them, sorted, if empty.
+        columns: Vec<String>,
     },
 }

@@ -81,11 +81,8 @@ pub fn import(bytes: &[u8], format: MeshFormat, options: &ImportOptions) -> Resu
         MeshFormat::Gltf => read_gltf(bytes)?,
     };
     // Turning y up into z up is a quarter turn about x.
-    let upright = if options.z_up {
-        Mat3::identity()
-    } else {
-        Mat3::new(1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0)
-    };
+    let upright =
+        if options.z_up { Mat3::identity() } else { Mat3::new(1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0) };
     mesh.vertices.iter_mut().for_each(|v| *v = upright * *v * options.scale);
     mesh.check()?;
     Ok(mesh)
@@ -176,7 +173,8 @@ fn read_primitive(
         return Err(ImportError::Unsupported("points, lines or triangle strips"));
     }
     let reader = primitive.reader(|buffer| (buffer.index() == 0).then_some(blob));
-    let positions = reader.read_positions().ok_or(ImportError::Unsupported("positions outside of the file"))?;
+    let positions =
+        reader.read_positions().ok_or(ImportError::Unsupported("positions outside of the file"))?;
     let base = out.vertices.len() as u32;
     let place = |p: [f32; 3]| pose.transform_point(&nalgebra::Point3::from(p.map(f64::from))).coords;
     out.vertices.extend(positions.map(place));

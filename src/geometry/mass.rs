@@ -1,6 +1,11 @@
 //! Mass, centre of mass and inertia of uniform solids.
 
-use super::{Mat3, Pose, Vec3, mesh::Mesh, shape::Shape, skin::skin};
+use super::{
+    Mat3, Pose, Vec3,
+    mesh::Mesh,
+    shape::{Profile, Shape},
+    skin::skin,
+};
 
 /// Mass properties of a solid.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,7 +23,7 @@ const CELLS: f64 = 96.0;
 
 /// Mass properties of `shape` at a uniform `density`, kg/m³.
 ///
-/// In closed form for boxes, spheres, ellipsoids, capsules, cylinders, tori, imported meshes and their placements;
+/// Exact for boxes, spheres, ellipsoids, capsules, cylinders, tori, prisms, lathes, imported meshes and their placements;
 /// otherwise integrated over a fine closed skin.
 pub fn mass_properties(shape: &Shape, density: f64) -> MassProperties {
     unit_density(shape).scaled(density)
@@ -46,9 +51,8 @@ impl MassProperties {
 /// Mass properties at 1 kg/m³.
 fn unit_density(shape: &Shape) -> MassProperties {
     use std::f64::consts::PI;
-    let round = |mass: f64, across: f64, axial: f64| {
-        MassProperties::centred(mass, Vec3::new(across, across, axial))
-    };
+    let round =
+        |mass: f64, across: f64, axial: f64| MassProperties::centred(mass, Vec3::new(across, across, axial));
     match shape {
         Shape::Box { half } => {
             let s = half.component_mul(half) / 3.0;
@@ -72,6 +76,8 @@ fn unit_density(shape: &Shape) -> MassProperties {
             let (big, small) = (major * major, minor * minor);
             round(2.0 * PI * PI * major * small, big / 2.0 + 5.0 / 8.0 * small, big + 0.75 * small)
         }
+        Shape::Prism { section, half_length } => of_mesh(&prism_mesh(section, *half_length)),
+        Shape::Lathe(profile) => revolved(profile),
         Shape::Placed { shape, pose } => unit_density(shape).moved(pose),
         Shape::Paint { shape, .. } => unit_density(shape),
         Shape::Mesh(solid) => of_mesh(solid.mesh()),
@@ -88,6 +94,44 @@ fn capsule(radius: f64, half_length: f64) -> MassProperties {
     let across = tube * (r / 4.0 + h * h / 3.0) + ball * (0.4 * r + h * h + 0.75 * h * radius);
     let mass = tube + ball;
     MassProperties::centred(mass, Vec3::new(across, across, axial) / mass)
+}
+
+/// The hull of a prism. Fans over the end faces may overlap outside of a hollow polygon; signed integrals do not mind.
+fn prism_mesh(section: &Profile, half_length: f64) -> Mesh {
+    let corners = section.points();
+    let n = corners.len() as u32;
+    let end = |y: f64| corners.iter().map(move |p| Vec3::new(p[0], y, p[1]));
+    let mut triangles = Vec::new();
+    for (i, j) in (0..n).map(|i| (i, (i + 1) % n)) {
+        triangles.extend([[0, i, j], [n, n + j, n + i], [i, n + i, n + j], [i, n + j, j]]);
+    }
+    Mesh { vertices: end(-half_length).chain(end(half_length)).collect(), triangles, uvs: Vec::new() }
+}
+
+/// Exact integrals over a revolved polygon, turned into line integrals around it by Green's theorem; along an edge the
+/// integrands are polynomials of degree 4, which three Gauss points integrate exactly.
+fn revolved(profile: &Profile) -> MassProperties {
+    use std::f64::consts::PI;
+    let gauss = [(0.5 - 0.15_f64.sqrt(), 5.0 / 18.0), (0.5, 4.0 / 9.0), (0.5 + 0.15_f64.sqrt(), 5.0 / 18.0)];
+    let (mut volume, mut first, mut axial, mut height) = (0.0, 0.0, 0.0, 0.0);
+    for (a, b) in profile.walls() {
+        let rise = b[1] - a[1];
+        for (t, weight) in gauss {
+            let (r, z) = (a[0] + t * (b[0] - a[0]), a[1] + t * rise);
+            let disc = PI * r * r * weight * rise;
+            volume += disc;
+            first += disc * z;
+            height += disc * z * z;
+            axial += disc * r * r / 2.0;
+        }
+    }
+    let com = first / volume;
+    let across = axial / 2.0 + height - first * com;
+    MassProperties {
+        mass: volume,
+        com: Vec3::new(0.0, 0.0, com),
+        inertia: Mat3::from_diagonal(&Vec3::new(across, across, axial)),
+    }
 }
 
 /// Exact integrals over a closed mesh, summed over the signed tetrahedra between its triangles and a point inside the

@@ -21,3 +21,6 @@ pub type Mat3 = nalgebra::Matrix3<f64>;
 pub type Quat = nalgebra::UnitQuaternion<f64>;
 /// A rigid placement (rotation and translation).
 pub type Pose = nalgebra::Isometry3<f64>;
+
+#[cfg(test)]
+mod tests;

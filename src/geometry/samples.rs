@@ -76,6 +76,7 @@ pub fn surface_samples(shape: &Shape, mesh: &VoxelMesh, spec: &SampleSpec) -> Ve
 fn exact_patches(shape: &Shape, turn: &Quat, spec: &SampleSpec) -> Option<Vec<Patch>> {
     match shape {
         Shape::Box { half } => Some(box_patches(half, turn, spec)),
+        Shape::Prism { section, half_length } => Some(prism_patches(section, *half_length, turn, spec)),
         Shape::Placed { shape, pose } => {
             let patches = exact_patches(shape, &(turn * pose.rotation), spec)?;
             let moved = |Patch { p, n, area }| Patch {
@@ -132,6 +133,32 @@ fn box_patches(half: &Vec3, turn: &Quat, spec: &SampleSpec) -> Vec<Patch> {
             p[j] = at(j, index / rows as usize, columns);
             patches.push(Patch { p, n, area });
         }
+    }
+    patches
+}
+
+/// The walls of a prism by regular grids, its ends by a grid whose cells are clipped to the polygon.
+fn prism_patches(section: &Profile, half_length: f64, turn: &Quat, spec: &SampleSpec) -> Vec<Patch> {
+    let mut patches = Vec::new();
+    for (a, b) in section.walls() {
+        let span = [b[0] - a[0], b[1] - a[1]];
+        let length = span[0].hypot(span[1]);
+        let n = Vec3::new(span[1], 0.0, -span[0]) / length;
+        let spacing = spec.spacing(&(turn * n));
+        let count = |edge: f64| (edge / spacing - 1e-9).ceil().max(1.0);
+        let (rows, columns) = (count(length), count(2.0 * half_length));
+        for index in 0..(rows * columns) as usize {
+            let share = ((index % rows as usize) as f64 + 0.5) / rows;
+            let y = half_length * (((2 * (index / rows as usize)) as f64 + 1.0) / columns - 1.0);
+            let p = Vec3::new(a[0] + share * span[0], y, a[1] + share * span[1]);
+            patches.push(Patch { p, n, area: length * 2.0 * half_length / (rows * columns) });
+        }
+    }
+    for side in [-1.0, 1.0] {
+        let n = Vec3::y() * side;
+        let place =
+            |([x, z], area): ([f64; 2], f64)| Patch { p: Vec3::new(x, side * half_length, z), n, area };
+        patches.extend(section.cells(spec.spacing(&(turn * n))).into_iter().map(place));
     }
     patches
 }

@@ -36,13 +36,17 @@ pub fn skin(shape: &Shape, cell: f64) -> Skin {
         return finish(shape, solid.mesh().clone());
     }
     let grid = Grid::over(&shape.reach(), cell);
-    let values = grid.sample(shape);
+    let mut values = grid.sample(shape);
+    grid.compose_well(&mut values);
     let mut buffer = SurfaceNetsBuffer::default();
     let top = grid.count.map(|n| n as u32 - 1);
     let array = RuntimeShape::<u32, 3>::new(grid.count.map(|n| n as u32));
     surface_nets(&values, &array, [0; 3], top, &mut buffer);
-    let vertices = buffer.surface_points.iter().map(|at| grid.vertex(shape, at.map(|i| i as usize))).collect();
-    let triangles = buffer.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
+    let vertices: Vec<Vec3> =
+        buffer.surface_points.iter().map(|at| grid.vertex(shape, &values, at.map(|i| i as usize))).collect();
+    let normals: Vec<Vec3> = vertices.iter().map(|v| shape.estimate(v).1).collect();
+    let triangles =
+        buffer.indices.chunks_exact(6).flat_map(|quad| split(shape, &vertices, &normals, quad)).collect();
     finish(shape, Mesh { vertices, triangles, uvs: Vec::new() })
 }
 
@@ -65,6 +69,22 @@ fn finish(shape: &Shape, mut mesh: Mesh) -> Skin {
         mesh.uvs = mesh.triangles.iter().map(|t| unwrap(&bounds, &corners(t))).collect();
     }
     Skin { mesh, normals, materials }
+}
+
+/// The two triangles of a quad. Surface nets cut a quad along its shorter diagonal, which may bridge a sharp edge; where
+/// normals differ, the diagonal whose middle lies nearer to the surface is taken.
+fn split(shape: &Shape, vertices: &[Vec3], normals: &[Vec3], quad: &[u32]) -> [[u32; 3]; 2] {
+    let (first, second) = ([quad[0], quad[1], quad[2]], [quad[3], quad[4], quad[5]]);
+    let at = |v: u32| &normals[v as usize];
+    let flat = first.iter().chain(&second).all(|&v| at(v).dot(at(first[0])) >= BEND);
+    let lone = |of: [u32; 3], other: [u32; 3]| (0..3).find(|&i| !other.contains(&of[i]));
+    let (false, Some(i), Some(j)) = (flat, lone(first, second), lone(second, first)) else {
+        return [first, second];
+    };
+    // Counter-clockwise around the quad: p, s, q, r.
+    let (r, p, q, s) = (first[i], first[(i + 1) % 3], first[(i + 2) % 3], second[j]);
+    let off = |a: u32, b: u32| shape.distance(&(0.5 * (vertices[a as usize] + vertices[b as usize]))).abs();
+    if off(r, s) < off(p, q) { [[s, q, r], [s, r, p]] } else { [first, second] }
 }
 
 /// Spherical texture coordinates about the longest axis (z if there is none), after scaling the bounding box to a cube.
@@ -134,59 +154,138 @@ impl Grid {
         values
     }
 
-    /// The vertex of the cell whose lowest corner is `at`: the point that best fits the tangent planes where the
-    /// surface crosses the cell's edges.
-    fn vertex(&self, shape: &Shape, at: [usize; 3]) -> Vec3 {
-        let corner = |c: usize| self.point([at[0] + (c & 1), at[1] + (c >> 1 & 1), at[2] + (c >> 2 & 1)]);
-        let corners: [Vec3; 8] = std::array::from_fn(corner);
-        let values = corners.map(|p| shape.distance(&p));
-        let mut planes: Vec<(Vec3, Vec3)> = Vec::with_capacity(12);
-        for (a, b) in (0..8).flat_map(|a: usize| [1, 2, 4].map(|bit| (a, a | bit))).filter(|(a, b)| a != b) {
-            if (values[a] < 0.0) != (values[b] < 0.0) {
-                let p = crossing(shape, (corners[a], values[a]), (corners[b], values[b]));
-                planes.push((p, shape.estimate(&p).1));
+    /// Removes what is finer than the lattice and would make the surface touch itself: a set of lattice points is *well
+    /// composed* (Latecki 1997) if no face of a cell is a checkerboard and no cell has only two opposite corners on one
+    /// side; only then is the surface between a manifold. The least certain point of each such place changes sides.
+    fn compose_well(&self, values: &mut [f32]) {
+        let [nx, ny, nz] = self.count;
+        let strides = [1, nx, nx * ny];
+        for _ in 0..MOST_PASSES {
+            let mut changed = false;
+            for cell in (0..(nx - 1) * (ny - 1) * (nz - 1))
+                .map(|c| c % (nx - 1) + nx * (c / (nx - 1) % (ny - 1) + ny * (c / (nx - 1) / (ny - 1))))
+            {
+                let corners: [usize; 8] = std::array::from_fn(|c| {
+                    cell + (0..3).map(|axis| (c >> axis & 1) * strides[axis]).sum::<usize>()
+                });
+                let inside = corners.iter().filter(|&&c| values[c] < 0.0).count();
+                if inside > 0 && inside < 8 {
+                    changed |= mend_cell(&corners, inside, values);
+                }
+            }
+            if !changed {
+                return;
             }
         }
-        if planes.is_empty() {
-            return 0.5 * (corners[0] + corners[7]);
-        }
-        let mean = planes.iter().map(|plane| plane.0).sum::<Vec3>() / planes.len() as f64;
-        let sharp = planes.iter().any(|(_, n)| n.dot(&planes[0].1) < SHARP);
-        if sharp {
-            let fit = best_fit(&planes, mean);
-            return fit.sup(&corners[0]).inf(&corners[7]);
-        }
-        shape.project(&mean, self.cell).unwrap_or(mean)
     }
+
+    /// The vertex of the cell whose lowest corner is `at`: where the surface is smooth, the mean of where it crosses the
+    /// cell's edges, projected on it; at an edge, the point that best fits the tangent planes there.
+    fn vertex(&self, shape: &Shape, values: &[f32], at: [usize; 3]) -> Vec3 {
+        let [nx, ny, _] = self.count;
+        let corners: [([usize; 3], f64); 8] = std::array::from_fn(|c| {
+            let [x, y, z] = std::array::from_fn(|axis| at[axis] + (c >> axis & 1));
+            ([x, y, z], f64::from(values[x + nx * (y + ny * z)]))
+        });
+        let crossed: Vec<[(Vec3, f64); 2]> = (0..8)
+            .flat_map(|a: usize| [1, 2, 4].map(|bit| (a, a | bit)))
+            .filter(|&(a, b)| a != b && (corners[a].1 < 0.0) != (corners[b].1 < 0.0))
+            .map(|(a, b)| [a, b].map(|c| (self.point(corners[c].0), corners[c].1)))
+            .collect();
+        let linear = |[a, b]: &[(Vec3, f64); 2]| a.0 + (b.0 - a.0) * (a.1 / (a.1 - b.1));
+        let mean = crossed.iter().map(linear).sum::<Vec3>() / crossed.len() as f64;
+        let smooth = || shape.project(&mean, self.cell).unwrap_or(mean);
+        let guesses = crossed.iter().map(|edge| shape.estimate(&linear(edge)));
+        if alike(guesses, BEND, STRAY * self.cell) {
+            return smooth();
+        }
+        // The field is not linear in this cell, so the crossings must be found for what they are.
+        let planes: Vec<(Vec3, Vec3)> = crossed
+            .iter()
+            .map(|[a, b]| crossing(shape, a.0, b.0))
+            .map(|p| (p, shape.estimate(&p).1))
+            .collect();
+        if alike(planes.iter().map(|plane| (0.0, plane.1)), SHARP, 0.0) {
+            return smooth();
+        }
+        let fit = best_fit(&planes, mean).sup(&self.point(corners[0].0)).inf(&self.point(corners[7].0));
+        // The two sides of a wall thinner than a cell have no edge between them.
+        if shape.distance(&fit).abs() < LOOSE * self.cell { fit } else { smooth() }
+    }
+}
+
+/// Whether all of some fields have distances within `stray` of 0 and normals within an angle of `cosine` of the first.
+fn alike(mut fields: impl Iterator<Item = (f64, Vec3)>, cosine: f64, stray: f64) -> bool {
+    let Some(first) = fields.next() else { return true };
+    first.0.abs() <= stray && fields.all(|field| field.0.abs() <= stray && field.1.dot(&first.1) >= cosine)
+}
+
+/// Where a linear guess is off by less than this, in cells, and normals turn by less than this cosine, a cell is smooth.
+const STRAY: f64 = 0.03;
+/// See [`STRAY`].
+const BEND: f64 = 0.9;
+
+/// A fitted vertex farther from the surface than this, in cells, is no edge.
+const LOOSE: f64 = 0.1;
+
+/// Passes over the lattice; each mends what the one before has spoilt nearby.
+const MOST_PASSES: usize = 16;
+
+/// Mends the first checkerboard face or pair of opposite corners of a cell; whether there was one.
+fn mend_cell(corners: &[usize; 8], inside: usize, values: &mut [f32]) -> bool {
+    let is_in = |c: usize| values[corners[c]] < 0.0;
+    let face = (0..3).flat_map(|axis| [0, 1].map(|side| (axis, side))).find_map(|(axis, side)| {
+        let (i, j) = (1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
+        let base = side << axis;
+        let ring = [base, base | i, base | i | j, base | j];
+        (is_in(ring[0]) == is_in(ring[2])
+            && is_in(ring[1]) == is_in(ring[3])
+            && is_in(ring[0]) != is_in(ring[1]))
+        .then(|| ring.to_vec())
+    });
+    let opposite = || {
+        let few = inside == 2;
+        (inside == 2 || inside == 6)
+            .then(|| (0..4).find(|&c| is_in(c) == few && is_in(7 - c) == few).map(|c| vec![c, 7 - c]))
+            .flatten()
+    };
+    let Some(odd) = face.or_else(opposite) else { return false };
+    let least =
+        odd.into_iter().map(|c| corners[c]).min_by(|a, b| values[*a].abs().total_cmp(&values[*b].abs()));
+    if let Some(point) = least {
+        // The sign bit alone would leave an exact zero where it is.
+        values[point] =
+            if values[point] < 0.0 { -values[point] } else { -values[point].max(f32::MIN_POSITIVE) };
+    }
+    true
 }
 
 /// Normals in a cell that differ by more than this cosine meet at an edge.
 const SHARP: f64 = 0.8;
 
-/// Where the surface crosses an edge between a point inside and one outside (regula falsi, Illinois variant).
-fn crossing(shape: &Shape, mut a: (Vec3, f64), mut b: (Vec3, f64)) -> Vec3 {
-    let mut p = a.0;
-    for _ in 0..8 {
-        p = a.0 + (b.0 - a.0) * (a.1 / (a.1 - b.1));
-        let value = shape.distance(&p);
-        if value.abs() < 1e-9 {
-            break;
-        }
-        if (value < 0.0) == (a.1 < 0.0) {
-            a = (p, value);
-            b.1 *= 0.5;
+/// Where the surface crosses the line between two points, by bisection; at their middle if it does not.
+fn crossing(shape: &Shape, a: Vec3, b: Vec3) -> Vec3 {
+    let inside_a = shape.distance(&a) < 0.0;
+    if inside_a == (shape.distance(&b) < 0.0) {
+        return 0.5 * (a + b);
+    }
+    let (mut low, mut high) = (a, b);
+    for _ in 0..30 {
+        let middle = 0.5 * (low + high);
+        if (shape.distance(&middle) < 0.0) == inside_a {
+            low = middle;
         } else {
-            b = (p, value);
-            a.1 *= 0.5;
+            high = middle;
         }
     }
-    p
+    // The inner end, where the normal is that of a face even next to an edge.
+    if inside_a { low } else { high }
 }
 
 /// Least squares of the distances to planes (point, normal), weakly held at `mean`; repeated so that the hold fades.
 fn best_fit(planes: &[(Vec3, Vec3)], mean: Vec3) -> Vec3 {
-    let hold = 0.05 * planes.len() as f64;
+    let hold = 0.01 * planes.len() as f64;
     let matrix = planes.iter().map(|(_, n)| n * n.transpose()).sum::<Mat3>() + Mat3::identity() * hold;
     let Some(inverse) = matrix.try_inverse() else { return mean };
-    (0..6).fold(mean, |x, _| x + inverse * planes.iter().map(|(p, n)| n * n.dot(&(p - x))).sum::<Vec3>())
+    (0..8).fold(mean, |x, _| x + inverse * planes.iter().map(|(p, n)| n * n.dot(&(p - x))).sum::<Vec3>())
 }

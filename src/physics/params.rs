@@ -47,3 +47,40 @@ impl Default for Params {
         }
     }
 }
+
+impl Params {
+    /// Checks every number.
+    ///
+    /// # Errors
+    /// The first number out of its range; a fragment for people.
+    pub fn check(&self) -> Result<(), String> {
+        let positive = [
+            ("dt", self.dt),
+            ("rigid_modulus", self.rigid_modulus),
+            ("shear_ratio", self.shear_ratio),
+            ("margin", self.margin),
+            ("sleep_after", self.sleep_after),
+        ];
+        let not_negative = [
+            ("alpha", self.alpha),
+            ("beta", self.beta),
+            ("tau", self.tau),
+            ("sleep_speed", self.sleep_speed),
+            ("inverted_after", self.inverted_after),
+        ];
+        for (name, value) in positive {
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(format!("physics.{name}: expected a positive number, got {value}"));
+            }
+        }
+        for (name, value) in not_negative {
+            if !(value >= 0.0 && value.is_finite()) {
+                return Err(format!("physics.{name}: expected 0 or more, got {value}"));
+            }
+        }
+        if self.dt > 0.05 {
+            return Err(format!("physics.dt: expected at most 0.05 s, got {}", self.dt));
+        }
+        Ok(())
+    }
+}

@@ -1,1 +1,18 @@
-//! (room under construction)
+//! One episode: settle → observe → act → step → judge; and the batch of them.
+
+pub mod batch;
+mod build;
+pub mod episode;
+mod evidence;
+mod rig;
+pub mod simulation;
+mod trace;
+
+pub use build::{BuildError, RestCache, soft_rest};
+pub use episode::{ControlError, Controller, Episode, EpisodeError, EpisodeSpec, Finished};
+pub use rig::Rig;
+pub use simulation::{Handle, Kind, SettleError, Simulation};
+pub use trace::{ObjectTrace, StepTrace};
+
+/// Physics steps a control step: 60 Hz physics, 20 Hz control.
+pub const STEPS_PER_CONTROL: u32 = 3;

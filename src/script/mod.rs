@@ -1,1 +1,42 @@
-//! (room under construction)
+//! Lua: the only room that knows it. Sandbox, bindings, options, plans, experts, stubs.
+
+mod catalogue;
+mod catalogue_classes;
+mod catalogue_shapes;
+mod catalogue_world;
+mod classes_world;
+mod controller;
+mod deadline;
+mod envelope_api;
+mod episode;
+mod error;
+mod experiment;
+mod expert;
+mod options;
+mod plan;
+mod pose;
+mod position;
+mod random;
+mod sandbox;
+mod scene_api;
+pub mod schema;
+mod shapes;
+mod sim_api;
+mod sources;
+pub mod stubs;
+mod timing;
+mod world_api;
+
+pub use controller::ExpertController;
+pub use deadline::{Clock, Deadline, OnStuck, Pause, end_process};
+pub use episode::{Episode, EpisodeRequest, check_shift};
+pub use error::ScriptError;
+pub use experiment::{Experiment, Finish, Row};
+pub use expert::{Expert, ExpertCommand, ExpertView, ObjectView};
+pub use options::{OptionSpec, OptionValue};
+pub use plan::{Loaded, declared_options, load, load_with};
+pub use sandbox::{Limits, Print};
+pub use sources::{Bundle, Source, embedded, embedded_scripts};
+
+#[cfg(test)]
+mod tests;

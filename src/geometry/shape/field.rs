@@ -30,12 +30,18 @@ impl Shape {
             }
             Self::Shell { shape, thickness } => shell(shape.distance_and_normal(p_o), *thickness),
             Self::Paint { shape, .. } => shape.distance_and_normal(p_o),
-            Self::Union(parts) => fold(parts, |s| s.distance_and_normal(p_o), combine::unite),
-            Self::Intersect(parts) => fold(parts, |s| s.distance_and_normal(p_o), combine::intersect),
-            Self::Subtract { from, cut } => combine::intersect(
-                from.distance_and_normal(p_o),
-                combine::invert(cut.distance_and_normal(p_o)),
-            ),
+            Self::Union(parts) => {
+                combine::invert(combine::intersect_exactly(parts.len(), p_o, &|part, q| {
+                    combine::invert(parts[part].distance_and_normal(q))
+                }))
+            }
+            Self::Intersect(parts) => {
+                combine::intersect_exactly(parts.len(), p_o, &|part, q| parts[part].distance_and_normal(q))
+            }
+            Self::Subtract { from, cut } => combine::intersect_exactly(2, p_o, &|part, q| match part {
+                0 => from.distance_and_normal(q),
+                _ => combine::invert(cut.distance_and_normal(q)),
+            }),
             Self::Scaled { shape, scale } if scale.max() - scale.min() <= 1e-12 * scale.max() => {
                 let (distance, normal) = shape.distance_and_normal(&(p_o / scale.x));
                 (distance * scale.x, normal)
@@ -110,7 +116,7 @@ impl Shape {
                 combine::to_first_order(value, jacobian.tr_mul(&normal))
             }
             Self::Displace { shape, reliefs } => displace(shape.estimate(p), reliefs, p),
-            _ => (f64::INFINITY, Vec3::z()),
+            _ => combine::NOWHERE,
         }
     }
 
@@ -142,7 +148,7 @@ fn fold(
     field: impl Fn(&Shape) -> combine::Field,
     join: impl Fn(combine::Field, combine::Field) -> combine::Field,
 ) -> combine::Field {
-    parts.iter().map(field).reduce(join).unwrap_or((f64::INFINITY, Vec3::z()))
+    parts.iter().map(field).reduce(join).unwrap_or(combine::NOWHERE)
 }
 
 fn shell((distance, normal): (f64, Vec3), thickness: f64) -> (f64, Vec3) {

@@ -50,7 +50,7 @@ impl Profile {
             return Err(ShapeError::ProfileSize { corners: points.len() });
         }
         let area = twice_area(&points);
-        if !(area.abs() > 1e-14) {
+        if area.abs() <= 1e-14 || !area.is_finite() {
             return Err(ShapeError::ProfileArea);
         }
         if area < 0.0 {
@@ -79,6 +79,28 @@ impl Profile {
             .iter()
             .filter(|edge| !edge.on_axis)
             .map(|e| (e.start, [e.start[0] + e.span[0], e.start[1] + e.span[1]]))
+    }
+
+    /// The polygon cut by a square grid of edge `spacing` (m): centroid and area of what lies in each cell.
+    pub(crate) fn cells(&self, spacing: f64) -> Vec<([f64; 2], f64)> {
+        let extreme = |axis: usize, worst: f64, pick: fn(f64, f64) -> f64| {
+            self.points.iter().map(|p| p[axis]).fold(worst, pick)
+        };
+        let low = [0, 1].map(|axis| extreme(axis, f64::INFINITY, f64::min));
+        let size = [0, 1].map(|axis| extreme(axis, f64::NEG_INFINITY, f64::max) - low[axis]);
+        let count = size.map(|edge| (edge / spacing - 1e-9).ceil().max(1.0));
+        let edge = [size[0] / count[0], size[1] / count[1]];
+        let mut cells = Vec::new();
+        for column in 0..count[0] as usize {
+            let left = low[0] + column as f64 * edge[0];
+            let strip = clip(&clip(&self.points, 0, left, 1.0), 0, left + edge[0], -1.0);
+            for row in 0..count[1] as usize {
+                let bottom = low[1] + row as f64 * edge[1];
+                let cell = clip(&clip(&strip, 1, bottom, 1.0), 1, bottom + edge[1], -1.0);
+                cells.extend(centroid(&cell).filter(|(_, area)| *area > 1e-9 * edge[0] * edge[1]));
+            }
+        }
+        cells
     }
 
     /// Signed distance at `p` and its gradient; exact everywhere.
@@ -135,6 +157,36 @@ fn twice_area(points: &[[f64; 2]]) -> f64 {
             a[0] * b[1] - a[1] * b[0]
         })
         .sum()
+}
+
+/// The part of a polygon with `side · (p[axis] − at) ≥ 0` (Sutherland & Hodgman 1974).
+fn clip(points: &[[f64; 2]], axis: usize, at: f64, side: f64) -> Vec<[f64; 2]> {
+    let mut kept = Vec::with_capacity(points.len() + 2);
+    for (i, a) in points.iter().enumerate() {
+        let b = &points[(i + 1) % points.len()];
+        let (high_a, high_b) = (side * (a[axis] - at), side * (b[axis] - at));
+        if high_a >= 0.0 {
+            kept.push(*a);
+        }
+        if (high_a >= 0.0) != (high_b >= 0.0) {
+            let t = high_a / (high_a - high_b);
+            kept.push([a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])]);
+        }
+    }
+    kept
+}
+
+/// Centroid and area of a polygon; `None` if it has none.
+fn centroid(points: &[[f64; 2]]) -> Option<([f64; 2], f64)> {
+    let origin = points.first()?;
+    let (mut twice, mut moment) = (0.0, [0.0; 2]);
+    for pair in points.windows(2) {
+        let [a, b] = [pair[0], pair[1]].map(|p| [p[0] - origin[0], p[1] - origin[1]]);
+        let cross = a[0] * b[1] - a[1] * b[0];
+        twice += cross;
+        moment = [0, 1].map(|k| moment[k] + cross * (a[k] + b[k]) / 3.0);
+    }
+    (twice > 0.0).then(|| ([origin[0] + moment[0] / twice, origin[1] + moment[1] / twice], 0.5 * twice))
 }
 
 /// Whether two edges that are not neighbours cross properly.

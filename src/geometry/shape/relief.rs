@@ -59,8 +59,9 @@ pub struct Mask {
     pub to: f64,
 }
 
-/// Ridges around an axis fade within this distance of it, where they would run into each other, m.
-const FADE: f64 = 2e-3;
+/// Ridges around an axis fade within this distance of it for each ridge (at least one), where they would run into each
+/// other, m.
+const FADE: f64 = 1e-3;
 
 impl Relief {
     /// Height and its gradient at a point.
@@ -114,8 +115,9 @@ impl Ridges {
         if self.count == 0 && self.radial_pitch.is_infinite() {
             return (value, gradient);
         }
-        let fade = square / (square + FADE * FADE);
-        let d_fade = 2.0 * FADE * FADE / (square + FADE * FADE).powi(2);
+        let inner = (FADE * count.abs().max(1.0)).powi(2);
+        let fade = square / (square + inner);
+        let d_fade = 2.0 * inner / (square + inner).powi(2);
         let mut gradient = gradient * fade;
         gradient[i] += value * d_fade * x;
         gradient[j] += value * d_fade * y;
@@ -125,11 +127,11 @@ impl Ridges {
 
 impl Bumps {
     fn height(&self, p: &Vec3) -> (f64, Vec3) {
-        let base = (p / self.spacing).map(f64::floor);
+        // A bump reaches at most half a cell beyond its own, so two cells an axis can matter.
+        let base = (p / self.spacing).map(|x| (x - 0.5).floor());
         let mut best = (0.0, Vec3::zeros());
-        for cell in 0..27 {
-            let offset = Vec3::new((cell % 3) as f64, (cell / 3 % 3) as f64, (cell / 9) as f64);
-            let corner = base + offset - Vec3::repeat(1.0);
+        for cell in 0..8 {
+            let corner = base + Vec3::new((cell & 1) as f64, (cell >> 1 & 1) as f64, (cell >> 2) as f64);
             let arm = p - (corner + self.jitter(&corner)) * self.spacing;
             let t = arm.norm_squared() / (self.radius * self.radius);
             if t < 1.0 && (1.0 - t).powi(2) > best.0 {

@@ -41,7 +41,7 @@ pub struct Failure {
 }
 
 /// Buffers of the solver.
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub struct Solver {
     offsets: Vec<usize>,
     v: Vec<f64>,

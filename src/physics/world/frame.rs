@@ -136,6 +136,13 @@ impl World {
     }
 }
 
+impl Touch {
+    /// Size of the force along the patch, N (exact where its normals agree).
+    pub fn shear(&self) -> f64 {
+        (self.force_w.norm_squared() - self.normal_force.powi(2)).max(0.0).sqrt()
+    }
+}
+
 impl Soft {
     fn record(&mut self, partner: u32, (row, point): (&RowOf, &Point), force_w: &Vec3, dt: f64) {
         if self.asleep {

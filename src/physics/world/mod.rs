@@ -171,7 +171,7 @@ struct RowOf {
 }
 
 /// All bodies of a scene and how they stand.
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub struct World {
     /// Parameters.
     pub params: Params,
@@ -224,6 +224,11 @@ impl World {
     /// Seconds since the start.
     pub fn time(&self) -> f64 {
         self.step as f64 * self.params.dt
+    }
+
+    /// Name of a partner of a [`Touch`].
+    pub fn partner_name(&self, partner: u32) -> &str {
+        self.colliders.get(partner as usize).map_or("soft body", |c| c.name.as_str())
     }
 
     /// The colliders, by id.

@@ -46,11 +46,12 @@ class Mesh:
         table[tuple(cell.T)] = np.arange(len(cell))
         at = np.clip(((points - local_min) / self.edge).astype(int), 0, size - 1)
         element = table[tuple(at.T)]
+        centre = low + self.edge / 2
         for i in np.where(element < 0)[0]:
-            centre = low + self.edge / 2
-            element[i] = np.argmin(np.maximum(np.abs(centre - points[i]) - self.edge / 2, 0).__pow__(2).sum(1))
+            beyond = np.maximum(np.abs(centre - points[i]) - self.edge / 2, 0.0)
+            element[i] = np.argmin((beyond**2).sum(1))
         local = (points - low[element]) / self.edge
-        return element, weights(local), float(np.abs(local - 0.5).max() - 0.5)
+        return element, weights(local)
 
 
 def from_cells(cells, edge, origin, inside, body=None):

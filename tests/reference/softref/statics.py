@@ -62,7 +62,7 @@ class Scene:
         self.elastic = Elastic(mesh, youngs, poisson, mirrors)
         points, area, cell = body.samples(spacing)
         reps, share = symmetry.orbits(points, mirrors)
-        element, w, self.outside = mesh.embed(points[reps])
+        element, w = mesh.embed(points[reps])
         self.rest, self.area, self.cell, self.share = points[reps], area[reps], cell[reps], share
         rows = np.repeat(np.arange(len(reps)), 8)
         embed = sp.csr_matrix((w.ravel(), (rows, mesh.elements[element].ravel())), (len(reps), len(mesh.nodes)))

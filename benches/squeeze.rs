@@ -1,0 +1,201 @@
+//! CPU time of the squeeze of issue 2: a soft cube on a table is gripped by two flat pads, lifted and held.
+//!
+//! `cargo bench --bench squeeze` prints CPU seconds of this thread per simulated second, by phase, the best of
+//! [`ROUNDS`] runs: other load on the machine lengthens the wall clock, not this.
+
+use std::{sync::Arc, time::Instant};
+
+use softvt::{
+    geometry::{
+        Pose, Vec3,
+        samples::{SampleSpec, surface_samples},
+        shape::Shape,
+        voxelise::{VoxelSpec, voxel_mesh},
+    },
+    physics::{
+        Params, World,
+        contact::{Collider, Friction, Mover},
+        fem::{Material, Rest},
+    },
+};
+
+/// Runs of which the fastest counts.
+const ROUNDS: usize = 5;
+const EDGE: f64 = 0.05;
+const PAD_HALF: Vec3 = Vec3::new(5e-3, 11e-3, 11e-3);
+/// Clearance of each pad before it closes, m, and its closing speed, m/s.
+const CLEARANCE: f64 = 2e-3;
+const CLOSING: f64 = 0.04;
+const SETTLE: f64 = 0.1;
+const GRIP: f64 = 0.25;
+const LIFT: f64 = 1.0;
+const HOLD: f64 = 0.5;
+const RISE: f64 = 0.1;
+
+/// What is squeezed, and how.
+struct Case {
+    name: &'static str,
+    gap: f64,
+    resolution: usize,
+    dt: f64,
+}
+
+/// The scene and the indices that drive it.
+struct Scene {
+    world: World,
+    body: usize,
+    pads: [(usize, usize, f64); 2],
+    gap: f64,
+}
+
+/// CPU seconds of the phases on the table, lifting, holding; forces before and after the lift; what the solver did.
+#[derive(Clone, Copy, Default)]
+struct Outcome {
+    cpu: [f64; 3],
+    simulated: [f64; 3],
+    newton: u32,
+    newton_max: u32,
+    refills: u64,
+    force_grip: f64,
+    force_hold: f64,
+}
+
+impl Scene {
+    fn new(case: &Case, sleeping: bool) -> Self {
+        let shape = Shape::Box { half: Vec3::repeat(0.5 * EDGE) };
+        let mesh = voxel_mesh(&shape, &VoxelSpec { resolution: case.resolution }).expect("a cube has a mesh");
+        let samples = surface_samples(&shape, &mesh, &SampleSpec::default());
+        let material = Material { youngs_pa: 3e4, poisson: 0.4, density: 300.0 };
+        let rest = Rest::new(mesh, material, EDGE.powi(3), samples);
+        let params = Params { beta: 2e-3, sleeping, dt: case.dt, ..Params::default() };
+        let mut world = World::new(params, Vec3::new(0.0, 0.0, -9.81));
+        let none = Friction { static_mu: 0.0, dynamic_mu: 0.0 };
+        let grip = Friction { static_mu: 1.2, dynamic_mu: 1.2 };
+        let body = world.add_soft("cube", rest, &Pose::translation(0.0, 0.0, 0.5 * EDGE), none);
+        let layer = world.rigid_layer();
+        let table = Arc::new(Shape::Box { half: Vec3::new(0.5, 0.5, 0.05) });
+        let below = (Mover::Static, Pose::translation(0.0, 0.0, -0.05));
+        world.add_collider(Collider::new("table", below, table, grip, layer));
+        let pads = [-1.0, 1.0].map(|side| {
+            let frame = world.add_kinematic(pad_pose(side, 0.5 * EDGE + CLEARANCE, 0.0));
+            let surface = Arc::new(Shape::Box { half: PAD_HALF });
+            let on = (Mover::Kinematic(frame), Pose::identity());
+            (frame, world.add_collider(Collider::new("pad", on, surface, grip, layer)), side)
+        });
+        Self { world, body, pads, gap: case.gap }
+    }
+
+    /// Seconds at which the pads have closed and gripped, have lifted, and the run ends.
+    fn ends(&self) -> [f64; 3] {
+        let closed = SETTLE + (0.5 * EDGE + CLEARANCE - 0.5 * self.gap) / CLOSING;
+        [closed + GRIP, closed + GRIP + LIFT, closed + GRIP + LIFT + HOLD]
+    }
+
+    /// One step of the prescribed motion.
+    fn step(&mut self) {
+        let time = self.world.time() + self.world.params.dt;
+        let open = 0.5 * EDGE + CLEARANCE;
+        let x = (open - CLOSING * (time - SETTLE).max(0.0)).max(0.5 * self.gap);
+        let s = ((time - self.ends()[0]) / LIFT).clamp(0.0, 1.0);
+        let z = RISE * s * s * s * (10.0 + s * (6.0 * s - 15.0));
+        for (frame, _, side) in self.pads {
+            self.world.move_kinematic(frame, pad_pose(side, x, z));
+        }
+        self.world.step().expect("the squeeze is well behaved");
+    }
+
+    fn force(&self) -> f64 {
+        self.world.touch(self.body, self.pads[0].1).normal_force
+    }
+
+    fn run(mut self) -> Outcome {
+        let mut out = Outcome::default();
+        let mut begun = 0.0;
+        for (phase, end) in self.ends().into_iter().enumerate() {
+            let start = CpuClock::now();
+            while self.world.time() + 0.5 * self.world.params.dt < end {
+                self.step();
+                out.newton += self.world.stats.newton;
+                out.newton_max = out.newton_max.max(self.world.stats.newton_max);
+            }
+            out.cpu[phase] = start.elapsed();
+            out.simulated[phase] = self.world.time() - begun;
+            begun = self.world.time();
+            if phase == 0 {
+                out.force_grip = self.force();
+            }
+        }
+        out.force_hold = self.force();
+        out.refills = self.world.soft[self.body].refills();
+        out
+    }
+}
+
+fn pad_pose(side: f64, x: f64, z: f64) -> Pose {
+    Pose::translation(side * (x + PAD_HALF.x), 0.0, 0.5 * EDGE + z)
+}
+
+/// CPU time of this thread where the system tells it (Linux), else the wall clock.
+struct CpuClock(Instant, Option<f64>);
+
+impl CpuClock {
+    fn now() -> Self {
+        Self(Instant::now(), Self::thread())
+    }
+
+    fn thread() -> Option<f64> {
+        let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+        Some(text.split_whitespace().next()?.parse::<f64>().ok()? * 1e-9)
+    }
+
+    fn elapsed(&self) -> f64 {
+        match (self.1, Self::thread()) {
+            (Some(start), Some(end)) => end - start,
+            _ => self.0.elapsed().as_secs_f64(),
+        }
+    }
+}
+
+fn report(case: &Case) {
+    let rounds: Vec<Outcome> = (0..ROUNDS).map(|_| Scene::new(case, false).run()).collect();
+    let least = |value: &dyn Fn(&Outcome) -> f64| rounds.iter().map(value).fold(f64::INFINITY, f64::min);
+    let phase = |i: usize| least(&|o: &Outcome| o.cpu[i] / o.simulated[i]);
+    let total = least(&|o: &Outcome| o.cpu.iter().sum::<f64>() / o.simulated.iter().sum::<f64>());
+    let o = &rounds[0];
+    println!(
+        "{:<28} {total:.4}  table {:.4} lift {:.4} hold {:.4}  newton {} (most {}) refills {}  force {:.4} {:.4} N",
+        case.name,
+        phase(0),
+        phase(1),
+        phase(2),
+        o.newton,
+        o.newton_max,
+        o.refills,
+        o.force_grip,
+        o.force_hold,
+    );
+}
+
+/// A body that has gone to sleep on the table, the pads at rest beside it.
+fn report_asleep(case: &Case) {
+    let mut scene = Scene::new(case, true);
+    let seconds = |s: f64| (s / case.dt) as usize;
+    for _ in 0..seconds(3.0) {
+        scene.world.step().expect("a resting cube is well behaved");
+    }
+    assert!(scene.world.soft[scene.body].asleep, "the cube should sleep after 3 s at rest");
+    let start = CpuClock::now();
+    (0..seconds(200.0)).for_each(|_| scene.world.step().expect("a sleeping cube is well behaved"));
+    println!("{:<28} {:.6}", "asleep", start.elapsed() / 200.0);
+}
+
+fn main() {
+    println!("CPU seconds per simulated second");
+    let cube = Case { name: "cube, gap 42", gap: 0.042, resolution: 6, dt: 1.0 / 60.0 };
+    report(&cube);
+    report(&Case { name: "cube, gap 48", gap: 0.048, ..cube });
+    report(&Case { name: "cube, gap 30", gap: 0.030, ..cube });
+    report(&Case { name: "cube, gap 42, 240 Hz", dt: 1.0 / 240.0, ..cube });
+    report(&Case { name: "cube, gap 42, resolution 12", resolution: 12, ..cube });
+    report_asleep(&cube);
+}

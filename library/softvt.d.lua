@@ -1,0 +1,590 @@
+---@meta softvt
+-- Generated from the binding table; do not edit.
+
+---A set of tasks that are reported together.
+---@class softvt.Suite
+---@field name string Name, as in results; part of the seed.
+---@field object_type "deformable"|"rigid" What the objects are.
+---@field variation "object"|"spatial" What varies between tasks.
+---@field episodes? integer Episodes a task by default. Expects a whole number in 1..1000000. Default 5.
+---@field tasks softvt.Task[] The tasks, in order.
+---@field shifts? softvt.Shift[] Changes that a run may ask for.
+
+---One task of a suite.
+---@class softvt.Task
+---@field prompt string What the policy is told.
+---@field layout softvt.Layout Where things stand at the start.
+---@field goal softvt.On|softvt.Inside When it is done.
+---@field expert? fun(arm: softvt.Arm, scene: softvt.View) A coroutine that does the task, with privileged state.
+---@field budget_steps? integer Control steps (20 Hz) that the policy has; 500 where a suite varies layouts, 700 where it varies objects. Expects a whole number in 1..100000.
+
+---The object rests on the target, released, for a time.
+---@class softvt.On
+---@field object string Scene name of the object.
+---@field target string Scene name of what it must reach.
+---@field hold_s? number How long it must stay. Expects seconds in 0..10. Default 0.4.
+
+---The object rests inside the target's walls, released, for a time.
+---@class softvt.Inside
+---@field object string Scene name of the object.
+---@field target string Scene name of what it must reach.
+---@field hold_s? number How long it must stay. Expects seconds in 0..10. Default 0.4.
+
+---A kind of object: its shape at rest with its lowest point at z = 0 and its centre on the z axis.
+---@class softvt.Asset
+---@field name string Name, as in results and calibration files.
+---@field shape softvt.Shape Its shape, in metres.
+---@field body softvt.Soft|softvt.Rigid|softvt.Static How it moves.
+---@field friction? softvt.Friction Friction of its surface.
+---@field visuals? softvt.Visual[] Appearances by material id of the shape; the first is id 0.
+---@field hints? table<string, number> Numbers for experts (grasp height, closure …).
+
+---A finite-element soft body of linear-elastic, isotropic material.
+---@class softvt.Soft
+---@field youngs_pa number Young's modulus. Expects pascals above 0.
+---@field poisson number Poisson's ratio; 0.5 would be incompressible. Expects a number in 0..below 0.5.
+---@field density number Density. Expects a number (kg/m³) above 0.
+---@field resolution? integer Voxels along the longest edge of the bounding box. Expects a whole number in 1..64. Default 6.
+---@field grasp_spacing? number Spacing of contact samples where a gripper can reach. Expects metres in 0.0001..0.02. Default 0.00075.
+
+---A free rigid body of uniform density.
+---@class softvt.Rigid
+---@field density number Density. Expects a number (kg/m³) above 0.
+
+---A part of the world that never moves.
+---@class softvt.Static
+
+---A change of the scene that a run may ask for with --shift name=value. Thresholds stay nominal.
+---@class softvt.Shift
+---@field name string Name on the command line.
+---@field unit? string Unit of the value. Default "1".
+---@field default number The value that changes nothing. Expects a number.
+---@field min? number Lowest value. Expects a number.
+---@field max? number Highest value. Expects a number.
+---@field apply fun(scene: softvt.Scene, value: number): softvt.Scene? Changes the scene.
+
+---A function of a grid of parameters that yields rows. Give grid or points.
+---@class softvt.Experiment
+---@field name string Name, as in results.
+---@field options? any What softvt.options gave; handed to the functions below as opt.
+---@field grid? table<string, any[]> Values of each parameter; every combination is run, names in alphabetical order, the last one fastest.
+---@field points? fun(opt: table): table[] Gives the points instead of a grid.
+---@field run fun(point: table, opt: table): table|table[] Gives a row or a list of rows for one point; points run in any order and on several threads.
+---@field finish? fun(rows: table[], opt: table): softvt.Finish? Sums up all rows.
+---@field columns? string[] Columns of the table, in order; by default all, sorted.
+
+---How a scene is laid out. Tasks with the same layout name share their initial states.
+---@class softvt.Layout
+---@field name string Name; part of the seed.
+---@field build fun(scene: softvt.Scene, rng: softvt.Rng) Puts the objects into the scene.
+
+---Coulomb friction of a surface; a pair of surfaces takes the larger of each coefficient.
+---@class softvt.Friction
+---@field static_mu? number Static coefficient. Expects a number in 0..10. Default 0.6.
+---@field dynamic_mu? number Dynamic coefficient, not above the static one. Expects a number in 0..10. Default 0.5.
+
+---What a surface looks like.
+---@class softvt.Visual
+---@field albedo number[] Base colour. Expects a list of 3 numbers (0..1, linear RGB).
+---@field roughness? number Roughness. Expects a number in 0..1. Default 0.6.
+---@field metalness? number Metalness. Expects a number in 0..1. Default 0.
+
+---What an experiment leaves behind besides its rows.
+---@class softvt.Finish
+---@field text? string Printed after the rows.
+---@field files? table<string, string|table<string, any>|any[]> Files to write, by relative path: text as it is, tables as JSON with sorted keys.
+
+---An option of the script: key gap_mm is --gap-mm on the command line. The default gives the type.
+---@class softvt.Option
+---@field default any A number, string, boolean, or list of numbers or strings.
+---@field integer? boolean Whether only whole numbers are taken. Default false.
+---@field unit? string Unit of a number. Default "".
+---@field min? number Lowest number. Expects a number.
+---@field max? number Highest number. Expects a number.
+---@field choices? string[] The only strings allowed.
+---@field help? string What it does, for --help. Default "".
+
+---An asset put somewhere. Give at or xyz.
+---@class softvt.Place
+---@field name string Name in the scene, unique.
+---@field asset softvt.Asset What it is.
+---@field at? number[] x, y; it stands on the table, or on what `on` names. Expects a list of 2 numbers (m, world).
+---@field xyz? number[] Its origin: lowest point, on the centre line. Expects a list of 3 numbers (m, world).
+---@field yaw? number Turn about the vertical. Expects radians. Default 0.
+---@field on? string Scene name of an object that it stands on (with at).
+
+---A pose in the world frame. Without a quaternion the hand points straight down.
+---@class softvt.PoseSpec
+---@field xyz number[] Position. Expects a list of 3 numbers (m, world).
+---@field yaw? number Turn of the downward hand about the vertical. Expects radians. Default 0.
+---@field quat? number[] Orientation instead of yaw. Expects a list of 4 numbers (w, x, y, z).
+
+---A box centred on the origin.
+---@class softvt.BoxSpec
+---@field size number[] Edge lengths. Expects a list of 3 numbers (m).
+
+---A sphere centred on the origin.
+---@class softvt.SphereSpec
+---@field radius number Radius. Expects metres above 0.
+
+---An ellipsoid centred on the origin.
+---@class softvt.EllipsoidSpec
+---@field size number[] Lengths of the axes (diameters). Expects a list of 3 numbers (m).
+
+---A capsule about the z axis, centred on the origin.
+---@class softvt.CapsuleSpec
+---@field radius number Radius. Expects metres above 0.
+---@field length number Total length, caps included; at least twice the radius. Expects metres above 0.
+
+---A cylinder about the z axis, centred on the origin.
+---@class softvt.CylinderSpec
+---@field radius number Radius. Expects metres above 0.
+---@field height number Height. Expects metres above 0.
+
+---A torus about the z axis, centred on the origin.
+---@class softvt.TorusSpec
+---@field major number Radius of the middle of the tube. Expects metres above 0.
+---@field minor number Radius of the tube, less than major. Expects metres above 0.
+
+---A triangular prism along y in a box centred on the origin.
+---@class softvt.WedgeSpec
+---@field size number[] Edge lengths of the box. Expects a list of 3 numbers (m).
+---@field apex? number Where the top edge lies across the width: -1 and 1 are the sides, 0 the middle. Expects a number in -1..1. Default 0.
+
+---A polygon in (x, z), drawn out along y, centred on y = 0.
+---@class softvt.PrismSpec
+---@field corners number[][] Corners (x, z) in order.
+---@field length number Length along y. Expects metres above 0.
+
+---A profile revolved about the z axis.
+---@class softvt.LatheSpec
+---@field corners number[][] Corners (r, z) in order, r of 0 or more.
+
+---A turn about an axis through the origin.
+---@class softvt.RotateSpec
+---@field axis "x"|"y"|"z" The axis.
+---@field angle number Angle, right-handed. Expects radians.
+
+---A twist about an axis through the origin.
+---@class softvt.TwistSpec
+---@field axis "x"|"y"|"z" The axis.
+---@field rate number Turn along the axis. Expects a number (rad/m).
+
+---A bend into an arc; the origin stays.
+---@class softvt.BendSpec
+---@field along "x"|"y"|"z" The axis that becomes an arc.
+---@field towards "x"|"y"|"z" The axis on which the centre of the arc lies.
+---@field curvature number Curvature of the arc. Expects a number (1/m).
+
+---Regular ridges: rings, flutes, screws or spirals.
+---@class softvt.RidgesSpec
+---@field axis? "x"|"y"|"z" The axis they go around or along. Default "z".
+---@field height number From valley to crest; negative for grooves. Expects metres.
+---@field count? integer Ridges around the axis. Expects a whole number in -1000..1000. Default 0.
+---@field pitch? number Distance of ridges along the axis. Expects metres above 0.
+---@field radial_pitch? number Distance of ridges away from the axis. Expects metres above 0.
+---@field phase? number Phase. Expects radians. Default 0.
+---@field sharpness? number 1 is a sine; larger is narrower. Expects a number in 1..8. Default 1.
+---@field mask? softvt.MaskSpec Where they are.
+
+---Scattered bumps (seeds, raisins).
+---@class softvt.BumpsSpec
+---@field height number Height; negative for pits. Expects metres.
+---@field radius number Radius of a bump, at most half the spacing. Expects metres above 0.
+---@field spacing number Mean distance of bumps. Expects metres above 0.
+---@field seed? integer Selects where they are. Expects a whole number of 0 or more. Default 0.
+---@field mask? softvt.MaskSpec Where they are.
+
+---Another material on all or part of the surface.
+---@class softvt.PaintSpec
+---@field material integer Material id: index into visuals, from 0. Expects a whole number in 0..65535.
+---@field region? softvt.Shape Where; everywhere if left out.
+
+---A weight that rises smoothly from 0 to 1 along an axis.
+---@class softvt.MaskSpec
+---@field axis "x"|"y"|"z" The axis.
+---@field from number Where it is 0. Expects metres.
+---@field to number Where it is 1. Expects metres.
+
+---A closed surface from an OBJ, STL or GLB file.
+---@class softvt.MeshSpec
+---@field file string Path inside of the project.
+---@field scale? number Metres in a unit of the file: 0.001 for millimetres. Expects metres above 0. Default 1.
+---@field z_up? boolean Whether z is up in the file; otherwise y is. Default true.
+
+---A solid. Methods give a new shape and leave this one as it is.
+---@class softvt.Shape
+local Shape = {}
+
+---Moved by an offset, m.
+---@param x number
+---@param y number
+---@param z number
+---@return softvt.Shape
+function Shape:translate(x, y, z) end
+
+---Stretched by factors; one factor counts for all axes.
+---@param x number
+---@param y? number
+---@param z? number
+---@return softvt.Shape
+function Shape:scale(x, y, z) end
+
+---Grown by a radius (m), which rounds convex edges.
+---@param radius number
+---@return softvt.Shape
+function Shape:round(radius) end
+
+---The wall of this thickness (m) under the surface.
+---@param wall number
+---@return softvt.Shape
+function Shape:shell(wall) end
+
+---This or the other.
+---@param other softvt.Shape
+---@return softvt.Shape
+function Shape:union(other) end
+
+---This and the other.
+---@param other softvt.Shape
+---@return softvt.Shape
+function Shape:intersect(other) end
+
+---This without the other; blend (m) rounds the edge.
+---@param cut softvt.Shape
+---@param blend? number
+---@return softvt.Shape
+function Shape:subtract(cut, blend) end
+
+---This or the other, with a fillet of width blend (m).
+---@param other softvt.Shape
+---@param blend number
+---@return softvt.Shape
+function Shape:smooth_union(other, blend) end
+
+---Lowest and highest corner of the bounding box, m.
+---@return number[]
+---@return number[]
+function Shape:bounds() end
+
+---Moved so that its lowest point is at z = 0 and its centre on the z axis.
+---@return softvt.Shape
+function Shape:grounded() end
+
+---A turn about an axis through the origin.
+---@param spec softvt.RotateSpec
+---@return softvt.Shape
+function Shape:rotate(spec) end
+
+---A twist about an axis through the origin.
+---@param spec softvt.TwistSpec
+---@return softvt.Shape
+function Shape:twist(spec) end
+
+---A bend into an arc; the origin stays.
+---@param spec softvt.BendSpec
+---@return softvt.Shape
+function Shape:bend(spec) end
+
+---Regular ridges: rings, flutes, screws or spirals.
+---@param spec softvt.RidgesSpec
+---@return softvt.Shape
+function Shape:ridges(spec) end
+
+---Scattered bumps (seeds, raisins).
+---@param spec softvt.BumpsSpec
+---@return softvt.Shape
+function Shape:bumps(spec) end
+
+---Another material on all or part of the surface.
+---@param spec softvt.PaintSpec
+---@return softvt.Shape
+function Shape:paint(spec) end
+
+---An immutable pose in the world frame.
+---@class softvt.Pose
+---@field x number Position, m.
+---@field y number Position, m.
+---@field z number Position, m.
+---@field xyz number[] Position, m.
+---@field quat number[] Orientation w, x, y, z with w of 0 or more.
+local Pose = {}
+
+---Moved by an offset in the world frame, m.
+---@param by number[]
+---@return softvt.Pose
+function Pose:moved(by) end
+
+---Part of the way to another pose: 0 is here, 1 there.
+---@param other softvt.Pose
+---@param share number
+---@return softvt.Pose
+function Pose:towards(other, share) end
+
+---Metres and radians to another pose.
+---@param other softvt.Pose
+---@return number
+---@return number
+function Pose:distance(other) end
+
+---A named stream of random numbers, a function of suite, layout, episode, seed and split alone.
+---@class softvt.Rng
+local Rng = {}
+
+---Another stream, from its start.
+---@param name "layout"|"arm"|"material"|"light"|"camera"|"sensor"|"expert"|"script"
+---@return softvt.Rng
+function Rng:stream(name) end
+
+---Uniform from a to below b.
+---@param a number
+---@param b number
+---@return number
+function Rng:uniform(a, b) end
+
+---Normally distributed.
+---@param mean number
+---@param sigma number
+---@return number
+function Rng:normal(mean, sigma) end
+
+---Whole number, both ends included.
+---@param low integer
+---@param high integer
+---@return integer
+function Rng:int(low, high) end
+
+---One of a list.
+---@param list any[]
+---@return any
+function Rng:choice(list) end
+
+---A copy in random order.
+---@param list any[]
+---@return any[]
+function Rng:shuffle(list) end
+
+---The scene that a layout or a shift builds.
+---@class softvt.Scene
+---@field objects softvt.Object[] The placed objects, in order.
+---@field base number[] Place of the robot base. Expects a list of 3 numbers (m, world).
+---@field start_q number[] Joint angles of the arm at the start. Expects a list of 7 numbers (rad).
+---@field gravity number[] Gravity. Expects a list of 3 numbers (m/s², world).
+---@field workspace_min number[] Lowest corner of the workspace. Expects a list of 3 numbers (m, world).
+---@field workspace_max number[] Highest corner of the workspace. Expects a list of 3 numbers (m, world).
+local Scene = {}
+
+---Puts an asset somewhere.
+---@param place softvt.Place
+function Scene:add(place) end
+
+---A placed object.
+---@param name string
+---@return softvt.Object
+function Scene:object(name) end
+
+---A placed object; its numbers may be read and written.
+---@class softvt.Object
+---@field name string Name in the scene.
+---@field asset string Name of its asset.
+---@field xyz number[] Its origin: lowest point, on the centre line. Expects a list of 3 numbers (m, world).
+---@field yaw number Turn about the vertical. Expects radians.
+---@field density number Density of a soft or rigid body. Expects a number (kg/m³) above 0.
+---@field youngs_pa number Young's modulus of a soft body. Expects pascals above 0.
+---@field poisson number Poisson's ratio of a soft body. Expects a number in 0..below 0.5.
+---@field static_mu number Static friction coefficient. Expects a number in 0..10.
+---@field dynamic_mu number Dynamic friction coefficient. Expects a number in 0..10.
+local Object = {}
+
+---The true scene at this control step, as an expert sees it.
+---@class softvt.View
+local View = {}
+
+---An object.
+---@param name string
+---@return softvt.Seen
+function View:object(name) end
+
+---All objects, in the order of the scene.
+---@return softvt.Seen[]
+function View:objects() end
+
+---An object as an expert sees it, at one moment.
+---@class softvt.Seen
+---@field name string Name in the scene.
+---@field asset string Name of its asset.
+---@field xyz number[] Middle of its bounding box, world, m.
+---@field size number[] Edge lengths of its bounding box at rest, m.
+---@field yaw number Turn about the vertical, rad.
+---@field hints table<string, number> Numbers that its asset gives to experts.
+local Seen = {}
+
+---What an expert drives. Each motion lasts as many control steps as it needs.
+---@class softvt.Arm
+---@field pose softvt.Pose Measured pose of the tool centre point.
+---@field target softvt.Pose Pose commanded last.
+---@field closure number Closure commanded last, 0 open to 1 shut.
+---@field width number Measured distance of the pads, m.
+---@field force number[] Normal force on the left and right pad, N.
+---@field time number Time since the start, s.
+---@field dt number Length of a control step, s.
+local Arm = {}
+
+---Sends one command and comes back at the next control step.
+---@param pose softvt.Pose
+---@param closure number
+function Arm:command(pose, closure) end
+
+---Moves straight and smoothly, at most at speed (m/s, 0.25) and turn (rad/s, 1.5).
+---@param pose softvt.Pose
+---@param options? {speed: number?, turn: number?, closure: number?}
+function Arm:move_to(pose, options) end
+
+---Moves by an offset in the world frame, m.
+---@param offset number[]
+---@param options? {speed: number?, turn: number?, closure: number?}
+function Arm:move_by(offset, options) end
+
+---Closes or opens at a rate (1/s, 0.5; 1 is the whole stroke in a second).
+---@param closure number
+---@param options? {rate: number?}
+function Arm:close_to(closure, options) end
+
+---Opens the gripper.
+---@param options? {rate: number?}
+function Arm:open(options) end
+
+---Holds still.
+---@param seconds number
+function Arm:wait(seconds) end
+
+---The softvt library.
+softvt = {}
+
+---Version of softvt.
+---@type string
+softvt.version = ""
+
+---A set of tasks that are reported together.
+---@param spec softvt.Suite
+---@return softvt.Suite
+function softvt.suite(spec) end
+
+---One task of a suite.
+---@param spec softvt.Task
+---@return softvt.Task
+function softvt.task(spec) end
+
+---The object rests on the target, released, for a time.
+---@param spec softvt.On
+---@return softvt.On
+function softvt.on(spec) end
+
+---The object rests inside the target's walls, released, for a time.
+---@param spec softvt.Inside
+---@return softvt.Inside
+function softvt.inside(spec) end
+
+---A kind of object: its shape at rest with its lowest point at z = 0 and its centre on the z axis.
+---@param spec softvt.Asset
+---@return softvt.Asset
+function softvt.asset(spec) end
+
+---A finite-element soft body of linear-elastic, isotropic material.
+---@param spec softvt.Soft
+---@return softvt.Soft
+function softvt.soft(spec) end
+
+---A free rigid body of uniform density.
+---@param spec softvt.Rigid
+---@return softvt.Rigid
+function softvt.rigid(spec) end
+
+---A part of the world that never moves.
+---@param spec softvt.Static
+---@return softvt.Static
+function softvt.static(spec) end
+
+---A change of the scene that a run may ask for with --shift name=value. Thresholds stay nominal.
+---@param spec softvt.Shift
+---@return softvt.Shift
+function softvt.shift(spec) end
+
+---A function of a grid of parameters that yields rows. Give grid or points.
+---@param spec softvt.Experiment
+---@return softvt.Experiment
+function softvt.experiment(spec) end
+
+---A layout by name and function, or by a table of name and build.
+---@param name string|softvt.Layout
+---@param build? fun(scene: softvt.Scene, rng: softvt.Rng)
+---@return softvt.Layout
+function softvt.layout(name, build) end
+
+---Declares the script's options; gives their values, from the command line or by default.
+---@param options table<string, softvt.Option>
+---@return table<string, any>
+function softvt.options(options) end
+
+---A pose in the world frame.
+---@param pose softvt.PoseSpec
+---@return softvt.Pose
+function softvt.pose(pose) end
+
+---A shape from a mesh file.
+---@param mesh softvt.MeshSpec
+---@return softvt.Shape
+function softvt.mesh(mesh) end
+
+---Iterates over keys and values in an order that does not depend on hashes: numbers, strings, booleans. In a script, pairs does the same.
+---@param t table
+---@return fun(): any, any
+function softvt.sorted(t) end
+
+---Shapes, in metres.
+softvt.shape = {}
+
+---A box centred on the origin.
+---@param spec softvt.BoxSpec
+---@return softvt.Shape
+function softvt.shape.box(spec) end
+
+---A sphere centred on the origin.
+---@param spec softvt.SphereSpec
+---@return softvt.Shape
+function softvt.shape.sphere(spec) end
+
+---An ellipsoid centred on the origin.
+---@param spec softvt.EllipsoidSpec
+---@return softvt.Shape
+function softvt.shape.ellipsoid(spec) end
+
+---A capsule about the z axis, centred on the origin.
+---@param spec softvt.CapsuleSpec
+---@return softvt.Shape
+function softvt.shape.capsule(spec) end
+
+---A cylinder about the z axis, centred on the origin.
+---@param spec softvt.CylinderSpec
+---@return softvt.Shape
+function softvt.shape.cylinder(spec) end
+
+---A torus about the z axis, centred on the origin.
+---@param spec softvt.TorusSpec
+---@return softvt.Shape
+function softvt.shape.torus(spec) end
+
+---A triangular prism along y in a box centred on the origin.
+---@param spec softvt.WedgeSpec
+---@return softvt.Shape
+function softvt.shape.wedge(spec) end
+
+---A polygon in (x, z), drawn out along y, centred on y = 0.
+---@param spec softvt.PrismSpec
+---@return softvt.Shape
+function softvt.shape.prism(spec) end
+
+---A profile revolved about the z axis.
+---@param spec softvt.LatheSpec
+---@return softvt.Shape
+function softvt.shape.lathe(spec) end

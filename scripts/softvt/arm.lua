@@ -1,0 +1,88 @@
+-- What an expert drives: motions that each last as many control steps as they need, built on one primitive that sends a
+-- command and waits for the next control step. Poses are of the tool centre point, in the world frame.
+local host, check = ...
+local yield, ceil, max = coroutine.yield, math.ceil, math.max
+
+local Arm = {}
+
+-- Largest slope of the quintic below: the mean speed of a motion is the limit divided by it.
+local PEAK = 1.875
+
+-- Minimum-jerk share of the way (Flash and Hogan, 1985).
+local function smooth(u) return u * u * u * (10 + u * (6 * u - 15)) end
+
+-- Sends one command and comes back at the next control step.
+function Arm:command(pose, closure)
+  self.target, self.closure = check.pose(pose), check.number("arm:command: closure", closure, 0, 1)
+  yield(self.target, self.closure, self.gripping)
+end
+
+local function travel(self, pose, options, closure)
+  local from, start = self.target, self.closure
+  local metres, radians = from:distance(pose)
+  local seconds = PEAK * max(metres / options.speed, radians / options.turn)
+  local steps = max(1, ceil(seconds / host.dt))
+  for step = 1, steps do
+    local share = smooth(step / steps)
+    self:command(from:towards(pose, share), start + (closure - start) * share)
+  end
+end
+
+-- Moves straight and smoothly; options: speed (m/s), turn (rad/s), closure to reach on the way.
+function Arm:move_to(pose, options)
+  options = check.options("arm:move_to", options, { speed = 0.25, turn = 1.5, closure = self.closure })
+  check.number("arm:move_to: closure", options.closure, 0, 1)
+  travel(self, check.pose(pose), options, options.closure)
+end
+
+-- Moves by an offset in the world frame, m.
+function Arm:move_by(offset, options) self:move_to(self.target:moved(offset), options) end
+
+-- Closes or opens to a closure at a rate (1/s: 1 is the whole stroke in a second).
+function Arm:close_to(closure, options)
+  options = check.options("arm:close_to", options, { rate = 0.5 })
+  local start = self.closure
+  check.number("arm:close_to: closure", closure, 0, 1)
+  local way = closure - start
+  local steps = max(1, ceil((way < 0 and -way or way) / options.rate / host.dt))
+  for step = 1, steps do self:command(self.target, start + way * step / steps) end
+end
+
+-- Closes on an object. A binary gripper, which knows only open and shut, shuts here and not in close_to.
+function Arm:grasp(closure, options)
+  self.gripping = true
+  self:close_to(closure, options)
+end
+
+-- Lets go of an object, opening to a closure (options.closure) or wide.
+function Arm:release(options)
+  options = check.options("arm:release", options, { rate = 0.5, closure = 0 })
+  self.gripping = false
+  self:close_to(options.closure, { rate = options.rate })
+end
+
+-- Opens the gripper wide.
+function Arm:open(options)
+  self.gripping = false
+  self:close_to(0, options)
+end
+
+-- Holds still for a time, s.
+function Arm:wait(seconds)
+  check.number("arm:wait: seconds", seconds, 0, 600)
+  for _ = 1, ceil(seconds / host.dt - 1e-9) do self:command(self.target, self.closure) end
+end
+
+local measured = { pose = true, width = true, force = true, time = true, dt = true }
+local arm = setmetatable({}, {
+  __index = function(_, key)
+    if measured[key] then return host[key] end
+    local method = Arm[key]
+    if method == nil then check.unknown("arm", key) end
+    return method
+  end,
+  __tostring = function() return "softvt.Arm" end,
+  __metatable = "softvt.Arm",
+})
+arm.target, arm.closure, arm.gripping = host.pose, host.closure, false
+return arm

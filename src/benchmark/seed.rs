@@ -1,0 +1,189 @@
+//! Seeds: every random number of an episode comes from a named stream of its own.
+//!
+//! A stream is ChaCha8 keyed with the SHA-256 of everything that names it, so that one more draw in one stream moves
+//! nothing in another, and an episode does not depend on which others were run.
+
+use rand_chacha::{
+    ChaCha8Rng,
+    rand_core::{RngCore, SeedableRng},
+};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+/// What a stream of random numbers is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stream {
+    /// Where objects stand.
+    Layout,
+    /// Joint angles of the arm at the start.
+    Arm,
+    /// Variation of materials.
+    Material,
+    /// Lights.
+    Light,
+    /// Cameras.
+    Camera,
+    /// Noise of sensors.
+    Sensor,
+    /// Choices of the expert.
+    Expert,
+    /// `math.random` outside of an expert.
+    Script,
+}
+
+impl Stream {
+    /// Every stream, in order.
+    pub const ALL: [Self; 8] = [
+        Self::Layout,
+        Self::Arm,
+        Self::Material,
+        Self::Light,
+        Self::Camera,
+        Self::Sensor,
+        Self::Expert,
+        Self::Script,
+    ];
+
+    /// The name that scripts use.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Layout => "layout",
+            Self::Arm => "arm",
+            Self::Material => "material",
+            Self::Light => "light",
+            Self::Camera => "camera",
+            Self::Sensor => "sensor",
+            Self::Expert => "expert",
+            Self::Script => "script",
+        }
+    }
+}
+
+/// Which endless list of episodes an episode belongs to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Split {
+    /// Episodes that a policy is judged on.
+    #[default]
+    Validation,
+    /// Episodes that demonstrations are recorded on.
+    Demonstration,
+    /// Trials of calibrations and other experiments.
+    Experiment,
+}
+
+impl Split {
+    /// Its name in seeds and results.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Validation => "validation",
+            Self::Demonstration => "demonstration",
+            Self::Experiment => "experiment",
+        }
+    }
+}
+
+/// What the initial state of an episode depends on, and nothing else.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct EpisodeSeed {
+    /// Name of the suite.
+    pub suite: String,
+    /// Name of the layout; the tasks of a mirrored pair share it.
+    pub layout: String,
+    /// Index of the episode in its split.
+    pub episode: u64,
+    /// Seed of the run.
+    pub base: u64,
+    /// Which list of episodes.
+    pub split: Split,
+}
+
+impl EpisodeSeed {
+    /// The generator of one stream, at its start.
+    pub fn stream(&self, stream: Stream) -> ChaCha8Rng {
+        let split = self.split.name();
+        let episode = self.episode.to_string();
+        let base = self.base.to_string();
+        keyed(&["softvt episode", &self.suite, &self.layout, &episode, &base, split, stream.name()])
+    }
+}
+
+/// The generator named by `parts`; their lengths count, so that no two lists of parts run together.
+pub fn keyed(parts: &[&str]) -> ChaCha8Rng {
+    let mut hash = Sha256::new();
+    for part in parts {
+        hash.update((part.len() as u64).to_le_bytes());
+        hash.update(part.as_bytes());
+    }
+    ChaCha8Rng::from_seed(hash.finalize().into())
+}
+
+/// Uniform in [0, 1), 53 bits.
+pub fn unit(rng: &mut ChaCha8Rng) -> f64 {
+    (rng.next_u64() >> 11) as f64 / (1u64 << 53) as f64
+}
+
+/// Standard normal (Box and Muller, 1958).
+pub fn normal(rng: &mut ChaCha8Rng) -> f64 {
+    // 1 − u lies in (0, 1], where the logarithm is finite.
+    let radius = (-2.0 * (1.0 - unit(rng)).ln()).sqrt();
+    radius * (std::f64::consts::TAU * unit(rng)).cos()
+}
+
+/// Uniform over the integers `low..=high`, without bias (rejection). `low` must not exceed `high`.
+pub fn integer(rng: &mut ChaCha8Rng, low: i64, high: i64) -> i64 {
+    let span = (high as u64).wrapping_sub(low as u64);
+    if span == u64::MAX {
+        return rng.next_u64() as i64;
+    }
+    let count = span + 1;
+    let limit = u64::MAX - u64::MAX % count;
+    loop {
+        let draw = rng.next_u64();
+        if draw < limit {
+            return (low as u64).wrapping_add(draw % count) as i64;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn seed() -> EpisodeSeed {
+        EpisodeSeed { suite: "s".into(), layout: "l".into(), episode: 3, base: 7, split: Split::Validation }
+    }
+
+    #[test]
+    fn every_part_of_the_seed_moves_the_stream() {
+        let first = |s: &EpisodeSeed, stream| s.stream(stream).next_u64();
+        let base = first(&seed(), Stream::Layout);
+        let others = [
+            EpisodeSeed { suite: "sl".into(), layout: "".into(), ..seed() },
+            EpisodeSeed { episode: 4, ..seed() },
+            EpisodeSeed { base: 8, ..seed() },
+            EpisodeSeed { split: Split::Demonstration, ..seed() },
+        ];
+        assert!(others.iter().all(|other| first(other, Stream::Layout) != base));
+        assert_ne!(first(&seed(), Stream::Arm), base);
+        assert_eq!(first(&seed(), Stream::Layout), base);
+    }
+
+    #[test]
+    fn normal_draws_have_mean_zero_and_variance_one() {
+        let mut rng = keyed(&["test"]);
+        let draws: Vec<f64> = (0..20_000).map(|_| normal(&mut rng)).collect();
+        let mean = draws.iter().sum::<f64>() / draws.len() as f64;
+        let variance = draws.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / draws.len() as f64;
+        assert!(mean.abs() < 0.03 && (variance - 1.0).abs() < 0.04, "{mean} {variance}");
+    }
+
+    #[test]
+    fn integers_cover_their_range_evenly() {
+        let mut rng = keyed(&["integers"]);
+        let mut counts = [0; 5];
+        (0..50_000).for_each(|_| counts[(integer(&mut rng, -2, 2) + 2) as usize] += 1);
+        assert!(counts.iter().all(|c| (9_600..10_400).contains(c)), "{counts:?}");
+        assert_eq!(integer(&mut rng, i64::MIN, i64::MIN), i64::MIN);
+    }
+}

@@ -1,0 +1,68 @@
+//! The numbers of the mechanics, the robot and the judge that a suite or a run may change.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{evaluation::rules::Rules, physics::Params, robot::RobotSpec};
+
+/// All settings of a run. The default is the benchmark.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Settings {
+    /// The mechanics.
+    pub physics: Params,
+    /// The robot.
+    pub robot: RobotSpec,
+    /// The judge's thresholds.
+    pub rules: Rules,
+}
+
+impl Settings {
+    /// The same with the field at a dotted path set: `robot.pads.static_mu`, `0`.
+    ///
+    /// # Errors
+    /// There is no such field, or the value is not of its type or range; a fragment for people.
+    pub fn with(&self, path: &str, value: &str) -> Result<Self, String> {
+        let mut tree = serde_json::to_value(self).map_err(|e| e.to_string())?;
+        let mut at = &mut tree;
+        for key in path.split('.') {
+            let known: Vec<String> = at.as_object().map_or(Vec::new(), |o| o.keys().cloned().collect());
+            at = at.get_mut(key).ok_or_else(|| {
+                format!("there is no setting {path}; {key} could be one of {}", known.join(", "))
+            })?;
+        }
+        if at.is_object() {
+            return Err(format!("{path} is a group of settings, not one; name one of its fields"));
+        }
+        *at = serde_json::from_str(value)
+            .map_err(|_| format!("{path}: expected a number, true or false, got {value:?}"))?;
+        let changed: Self = serde_json::from_value(tree).map_err(|e| format!("{path}: {e}"))?;
+        changed.check()?;
+        Ok(changed)
+    }
+
+    /// Checks every number.
+    ///
+    /// # Errors
+    /// The first number out of its range; a fragment for people.
+    pub fn check(&self) -> Result<(), String> {
+        self.robot.validate().map_err(|e| e.to_string())?;
+        self.rules.check().map_err(|e| e.to_string())?;
+        self.physics.check()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_setting_changes_and_a_wrong_one_says_what_there_is() {
+        let settings = Settings::default();
+        let changed = settings.with("robot.gripper.effort", "0.2").expect("a setting");
+        assert_eq!(changed.robot.gripper.effort, 0.2);
+        assert!(settings.with("robot.gripper.efort", "0.2").is_err_and(|e| e.contains("effort")));
+        assert!(settings.with("robot.gripper", "1").is_err_and(|e| e.contains("group")));
+        assert!(settings.with("physics.dt", "-1").is_err_and(|e| e.contains("physics.dt")));
+        assert!(settings.with("physics.dt", "fast").is_err_and(|e| e.contains("number")));
+    }
+}

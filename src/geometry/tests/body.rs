@@ -1,0 +1,216 @@
+use std::f64::consts::PI;
+
+use super::{composite_shapes, euler, exact_shapes, lathe, random_unit, rng};
+use crate::geometry::{
+    Mat3, Pose, Quat, Vec3,
+    mass::mass_properties,
+    samples::{SampleSpec, surface_samples},
+    shape::{Axis, Shape},
+    skin::skin,
+    voxel::VoxelMesh,
+    voxelise::{GeometryError, VoxelSpec, voxel_mesh},
+};
+
+fn cut(shape: &Shape, resolution: usize) -> VoxelMesh {
+    voxel_mesh(shape, &VoxelSpec { resolution }).expect("a voxel mesh")
+}
+
+fn filled_volume(mesh: &VoxelMesh) -> f64 {
+    mesh.fill.iter().map(|fill| fill.fraction()).sum::<f64>() * mesh.edge.powi(3)
+}
+
+#[test]
+fn a_cube_at_resolution_six_has_343_nodes_and_full_voxels() {
+    let mesh = cut(&Shape::cuboid(Vec3::repeat(0.056)), 6);
+    assert_eq!((mesh.nodes.len(), mesh.elements.len(), mesh.grid), (343, 216, [6; 3]));
+    assert!(mesh.fill.iter().all(|fill| fill.fraction() == 1.0));
+    assert!((mesh.nodes[0] - Vec3::repeat(-0.028)).norm() < 1e-15);
+    assert!((mesh.nodes[342] - Vec3::repeat(0.028)).norm() < 1e-15);
+    for nodes in &mesh.elements {
+        let corner = mesh.nodes[nodes[0] as usize];
+        for (c, &node) in nodes.iter().enumerate() {
+            let step = Vec3::new((c & 1) as f64, (c >> 1 & 1) as f64, (c >> 2 & 1) as f64);
+            assert!((mesh.nodes[node as usize] - corner - step * mesh.edge).norm() < 1e-15);
+        }
+    }
+}
+
+#[test]
+fn a_lying_box_gets_whole_voxels_on_its_longest_edge_and_is_covered() {
+    let mesh = cut(&Shape::cuboid(Vec3::new(0.120, 0.044, 0.038)), 6);
+    assert_eq!(mesh.grid, [6, 3, 2]);
+    assert!((mesh.edge - 0.02).abs() < 1e-15);
+    // A face that cuts the sub-cells moves by up to half of one.
+    let off = 0.5 * mesh.edge / 6.0;
+    let bound = (1.0 + 2.0 * off / 0.044) * (1.0 + 2.0 * off / 0.038);
+    let ratio = filled_volume(&mesh) / (0.120 * 0.044 * 0.038);
+    assert!(ratio < bound && ratio > 1.0 / bound, "{ratio}");
+}
+
+#[test]
+fn filled_volume_converges_to_the_volume() {
+    let ball = Shape::Sphere { radius: 0.0285 };
+    let exact = 4.0 / 3.0 * PI * 0.0285_f64.powi(3);
+    let error = |resolution| (filled_volume(&cut(&ball, resolution)) / exact - 1.0).abs();
+    assert!(error(6) < 5e-3 && error(18) < 5e-4, "{} {}", error(6), error(18));
+}
+
+#[test]
+fn empty_and_impossible_bodies_are_refused() {
+    let ball = Shape::Sphere { radius: 0.01 };
+    let nothing = ball.clone().subtract(Shape::Sphere { radius: 0.02 });
+    let refused =
+        |shape: &Shape, resolution| voxel_mesh(shape, &VoxelSpec { resolution }).expect_err("refused");
+    assert_eq!(refused(&nothing, 6), GeometryError::Empty);
+    assert_eq!(refused(&ball, 0), GeometryError::Resolution(0));
+    assert!(matches!(refused(&Shape::Sphere { radius: f64::NAN }, 6), GeometryError::Shape(_)));
+}
+
+#[test]
+fn material_points_return_to_their_rest_position() {
+    for (name, shape) in exact_shapes().into_iter().chain(composite_shapes()) {
+        let mesh = cut(&shape, 6);
+        let skin = skin(&shape, 2e-3);
+        for (vertex, at) in skin.mesh.vertices.iter().zip(skin.embed(&mesh).expect("near voxels")) {
+            assert!((mesh.rest_position(&at) - vertex).norm() < 1e-12, "{name}: {vertex:?} {at:?}");
+        }
+    }
+}
+
+#[test]
+fn skins_are_watertight_and_of_the_right_genus() {
+    for (name, shape) in exact_shapes().into_iter().chain(composite_shapes()) {
+        for cell in [1e-3, 1.7e-3] {
+            let skin = skin(&shape, cell);
+            let mesh = &skin.mesh;
+            assert_eq!(mesh.check_closed(), Ok(()), "{name} at {cell}");
+            assert!(mesh.volume() > 0.0, "{name}");
+            let surfaces_less_holes = match name {
+                "torus" | "box less box" => 0,
+                "shell" => 4,
+                _ => 2,
+            };
+            assert_eq!(euler(mesh), surfaces_less_holes, "{name} at {cell}");
+            assert_eq!(
+                (skin.normals.len(), skin.materials.len()),
+                (mesh.vertices.len(), mesh.triangles.len())
+            );
+            let off = mesh.vertices.iter().map(|v| shape.distance(v).abs()).fold(0.0, f64::max);
+            assert!(off < 0.15 * cell, "{name}: a vertex {off} m off the surface");
+            let seamless = mesh.uvs.iter().all(|t| {
+                let u = t.map(|uv| uv[0]);
+                let at_a_pole = t.iter().any(|uv| !(0.05..0.95).contains(&uv[1]));
+                at_a_pole || (0..3).all(|i| (u[i] - u[(i + 1) % 3]).abs() <= 0.5)
+            });
+            assert!(seamless && mesh.uvs.len() == mesh.triangles.len(), "{name}");
+        }
+    }
+}
+
+#[test]
+fn skins_keep_sharp_edges() {
+    let size = Vec3::new(0.05, 0.04, 0.03);
+    let mesh = skin(&Shape::cuboid(size), 1e-3).mesh;
+    assert!((mesh.volume() / size.product() - 1.0).abs() < 1e-5, "{}", mesh.volume());
+    let area = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
+    assert!((mesh.area() / area - 1.0).abs() < 1e-4, "{}", mesh.area() / area);
+}
+
+/// Checks that a surface sampling has the right area, spacing and voxels, and sums to a closed surface.
+fn check_samples(name: &str, shape: &Shape, exact_area: f64, tolerance: f64) {
+    let mesh = cut(shape, 6);
+    let spec = SampleSpec::default();
+    let samples = surface_samples(shape, &mesh, &spec);
+    let area: f64 = samples.iter().map(|s| s.area).sum();
+    assert!((area / exact_area - 1.0).abs() < tolerance, "{name}: area {area} for {exact_area}");
+    let vector: Vec3 = samples.iter().map(|s| s.n_o * s.area).sum();
+    assert!(vector.norm() < 3e-3 * area, "{name}: {vector:?} is not closed");
+    for (steep, spacing) in [(true, spec.grasp_spacing), (false, spec.other_spacing)] {
+        let chosen: Vec<f64> =
+            samples.iter().filter(|s| (s.n_o.z.abs() <= 0.7) == steep).map(|s| s.area).collect();
+        let mean = (chosen.iter().sum::<f64>() / chosen.len().max(1) as f64).sqrt();
+        assert!(mean <= spacing * (1.0 + 1e-9), "{name}: {mean} m apart where {spacing} is wanted");
+    }
+    for sample in &samples {
+        assert!((sample.at.element as usize) < mesh.elements.len());
+        assert!((mesh.rest_position(&sample.at) - sample.p_o).norm() < 1e-12, "{name}");
+        assert!((sample.n_o.norm() - 1.0).abs() < 1e-9 && sample.area > 0.0);
+    }
+    assert!(samples.is_sorted_by_key(|sample| sample.at.element), "{name}");
+}
+
+#[test]
+fn samples_sum_to_the_exact_area() {
+    let (r, h) = (0.022, 0.017);
+    check_samples("box", &Shape::cuboid(Vec3::repeat(0.056)), 6.0 * 0.056 * 0.056, 1e-12);
+    check_samples("sphere", &Shape::Sphere { radius: r }, 4.0 * PI * r * r, 1e-12);
+    let capsule = Shape::Capsule { radius: r, half_length: h };
+    check_samples("capsule", &capsule, 4.0 * PI * r * (r + h), 1e-12);
+    let lying = capsule.rotated(Quat::from_axis_angle(&Vec3::y_axis(), PI / 2.0));
+    check_samples("lying capsule", &lying, 4.0 * PI * r * (r + h), 1e-12);
+    let can = Shape::Cylinder { radius: r, half_height: h };
+    check_samples("cylinder", &can, 2.0 * PI * r * (r + 2.0 * h), 1e-12);
+    check_samples("torus", &Shape::Torus { major: 0.03, minor: 0.01 }, 4.0 * PI * PI * 0.03 * 0.01, 1e-12);
+    // Side 30, 40, 50 mm, 20 mm deep.
+    let prism = Shape::prism(vec![[0.0, 0.0], [0.03, 0.0], [0.0, 0.04]], 0.02).expect("a triangle");
+    check_samples("prism", &prism, 0.03 * 0.04 + 0.12 * 0.02, 1e-9);
+    let cone = lathe(vec![[0.0, 0.0], [0.03, 0.0], [0.0, 0.04]]);
+    check_samples("cone", &cone, PI * 0.03 * (0.03 + 0.05), 1e-12);
+}
+
+#[test]
+fn samples_of_composites_sum_to_the_area_of_a_fine_skin() {
+    for (name, shape) in composite_shapes() {
+        check_samples(name, &shape, skin(&shape, 0.5e-3).mesh.area(), 5e-3);
+    }
+}
+
+#[test]
+fn samples_of_a_box_are_symmetric() {
+    let shape = Shape::cuboid(Vec3::repeat(0.056));
+    let samples = surface_samples(&shape, &cut(&shape, 6), &SampleSpec::default());
+    let moment: Vec3 = samples.iter().map(|s| s.p_o * s.area).sum();
+    assert!(moment.norm() < 1e-15);
+    let side = samples.iter().filter(|s| s.n_o.x == 1.0).count();
+    assert_eq!((side, samples.len()), (75 * 75, 4 * 75 * 75 + 2 * 28 * 28));
+}
+
+#[test]
+fn mass_properties_match_closed_forms_and_integration() {
+    let near = |a: &Mat3, b: &Mat3, tolerance: f64| (a - b).abs().max() <= tolerance * b.abs().max();
+    for (name, shape) in exact_shapes() {
+        let exact = mass_properties(&shape, 300.0);
+        let solid = skin(&shape, 0.8e-3).mesh.into_shape().expect("a solid");
+        let integrated = mass_properties(&solid, 300.0);
+        assert!((exact.mass / integrated.mass - 1.0).abs() < 3e-3, "{name}: {exact:?} {integrated:?}");
+        assert!((exact.com - integrated.com).norm() < 3e-5, "{name}");
+        assert!(near(&exact.inertia, &integrated.inertia, 5e-3), "{name}: {exact:?} {integrated:?}");
+    }
+    let cone = mass_properties(&lathe(vec![[0.0, 0.0], [0.03, 0.0], [0.0, 0.04]]), 1.0);
+    let mass = PI * 0.03 * 0.03 * 0.04 / 3.0;
+    assert!((cone.mass / mass - 1.0).abs() < 2e-3 && (cone.com.z - 0.01).abs() < 2e-5, "{cone:?}");
+    assert!((cone.inertia[(2, 2)] / (0.3 * mass * 0.03 * 0.03) - 1.0).abs() < 3e-3, "{cone:?}");
+}
+
+#[test]
+fn mass_properties_turn_with_the_shape() {
+    let turn = Quat::from_euler_angles(0.3, 0.5, -0.9);
+    let pose = Pose::from_parts(Vec3::new(0.1, -0.2, 0.3).into(), turn);
+    let brick = Shape::cuboid(Vec3::new(0.06, 0.04, 0.02));
+    let (plain, moved) = (mass_properties(&brick, 500.0), mass_properties(&brick.placed(pose), 500.0));
+    let mut rng = rng();
+    for _ in 0..10 {
+        let axis = random_unit(&mut rng);
+        let there = turn * axis;
+        let (a, b) = (axis.dot(&(plain.inertia * axis)), there.dot(&(moved.inertia * there)));
+        assert!((a - b).abs() < 1e-15, "{a} {b}");
+    }
+    assert!((moved.com - Vec3::new(0.1, -0.2, 0.3)).norm() < 1e-15);
+}
+
+#[test]
+fn twisting_keeps_the_volume_of_a_bar() {
+    let bar = Shape::cuboid(Vec3::new(0.08, 0.02, 0.02));
+    let twisted = mass_properties(&bar.clone().twisted(Axis::X, 20.0), 1.0).mass;
+    assert!((twisted / mass_properties(&bar, 1.0).mass - 1.0).abs() < 3e-3);
+}

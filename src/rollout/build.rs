@@ -1,0 +1,139 @@
+//! From a scene to a world: what each object becomes.
+
+use std::sync::{Arc, Mutex};
+
+use super::simulation::{Handle, Kind};
+use crate::{
+    geometry::{
+        mass::mass_properties,
+        samples::{SampleSpec, surface_samples},
+        shape::Shape,
+        voxelise::{GeometryError, VoxelSpec, voxel_mesh},
+    },
+    physics::{
+        World,
+        contact::{Collider, Friction, Mover, Surface},
+        fem::{Material, Rest},
+        rigid::{RigidBody, RigidError},
+    },
+    scene::{Asset, Body, Object, SoftMaterial},
+};
+
+/// An object cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum BuildError {
+    /// Its shape cannot be meshed.
+    #[error("asset {asset}: {source}")]
+    Geometry {
+        /// Asset name.
+        asset: String,
+        /// What is wrong.
+        source: GeometryError,
+    },
+    /// Its mass properties are impossible.
+    #[error("asset {asset}: {source}")]
+    Rigid {
+        /// Asset name.
+        asset: String,
+        /// What is wrong.
+        source: RigidError,
+    },
+    /// A number of its material is out of range.
+    #[error("asset {asset}: {what}")]
+    Material {
+        /// Asset name.
+        asset: String,
+        /// What is wrong and what was expected.
+        what: String,
+    },
+    /// Two objects have one name.
+    #[error("the scene has two objects named {0}; names must be unique")]
+    TwoNames(String),
+}
+
+/// Rest data of soft assets, made once and shared by all episodes.
+#[derive(Clone, Debug, Default)]
+pub struct RestCache {
+    made: Arc<Mutex<Vec<(Arc<Asset>, Arc<Rest>)>>>,
+}
+
+impl RestCache {
+    /// Rest data of a soft asset.
+    fn rest(&self, asset: &Arc<Asset>, material: &SoftMaterial) -> Result<Arc<Rest>, BuildError> {
+        // Held while building, so that two workers never make the same one twice.
+        let mut made = self.made.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        if let Some((_, rest)) =
+            made.iter().find(|(known, _)| known.shape == asset.shape && known.body == asset.body)
+        {
+            return Ok(rest.clone());
+        }
+        let rest = soft_rest(&asset.name, &asset.shape, material)?;
+        made.push((asset.clone(), rest.clone()));
+        Ok(rest)
+    }
+}
+
+/// Rest data of a soft body of `shape`.
+///
+/// # Errors
+/// A shape that cannot be meshed, or a material number out of range; `name` is what messages call it.
+pub fn soft_rest(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<Arc<Rest>, BuildError> {
+    check(name, material)?;
+    let spec = VoxelSpec { resolution: material.resolution };
+    let mesh =
+        voxel_mesh(shape, &spec).map_err(|source| BuildError::Geometry { asset: name.to_owned(), source })?;
+    let spacing = SampleSpec { grasp_spacing: material.grasp_spacing, ..SampleSpec::default() };
+    let samples = surface_samples(shape, &mesh, &spacing);
+    let volume = mass_properties(shape, 1.0).mass;
+    let law =
+        Material { youngs_pa: material.youngs_pa, poisson: material.poisson, density: material.density };
+    Ok(Rest::new(mesh, law, volume, samples))
+}
+
+fn check(name: &str, m: &SoftMaterial) -> Result<(), BuildError> {
+    let wrong = |what: String| Err(BuildError::Material { asset: name.to_owned(), what });
+    if !(m.youngs_pa > 0.0 && m.youngs_pa.is_finite()) {
+        return wrong(format!("Young's modulus is {} Pa, expected a positive number", m.youngs_pa));
+    }
+    if !(0.0..0.5).contains(&m.poisson) {
+        return wrong(format!("Poisson's ratio is {}, expected 0 <= poisson < 0.5", m.poisson));
+    }
+    if !(m.density > 0.0 && m.density.is_finite()) {
+        return wrong(format!("density is {} kg/m³, expected a positive number", m.density));
+    }
+    Ok(())
+}
+
+/// Puts `object` into `world`.
+pub(super) fn add(world: &mut World, object: &Object, cache: &RestCache) -> Result<Handle, BuildError> {
+    let asset = &object.asset;
+    let friction = Friction { static_mu: asset.friction.static_mu, dynamic_mu: asset.friction.dynamic_mu };
+    let collider = |world: &mut World, mover, pose| {
+        let layer = world.rigid_layer();
+        world.add_collider(Collider::new(
+            &object.name,
+            (mover, pose),
+            Arc::new(asset.shape.clone()),
+            friction,
+            layer,
+        ))
+    };
+    let (kind, colliders) = match &asset.body {
+        Body::Soft(material) => {
+            let rest = cache.rest(asset, material)?;
+            let surface: Arc<dyn Surface> = Arc::new(asset.shape.clone());
+            let index = world.add_soft(&object.name, rest, Some(surface), &object.pose_w, friction);
+            (Kind::Soft(index), Vec::new())
+        }
+        Body::Rigid { density } => {
+            let m = mass_properties(&asset.shape, *density);
+            let body = RigidBody::new(&object.pose_w, m.com, m.mass, m.inertia)
+                .map_err(|source| BuildError::Rigid { asset: asset.name.clone(), source })?;
+            let index = world.add_rigid(&object.name, body);
+            let id = collider(world, Mover::Rigid(index), crate::geometry::Pose::identity());
+            (Kind::Rigid(index), vec![id])
+        }
+        Body::Static => (Kind::Static, vec![collider(world, Mover::Static, object.pose_w)]),
+    };
+    Ok(Handle { name: object.name.clone(), asset: asset.clone(), kind, start_w: object.pose_w, colliders })
+}

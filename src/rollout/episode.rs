@@ -1,0 +1,359 @@
+//! One episode from the settled scene to the verdict.
+
+use std::sync::Arc;
+
+use sha2::{Digest, Sha256};
+
+use super::{
+    STEPS_PER_CONTROL,
+    build::{BuildError, RestCache},
+    evidence::{Witness, lowest},
+    simulation::{Kind, SettleError, Simulation},
+    trace::StepTrace,
+};
+use crate::{
+    benchmark::{Goal, Task},
+    evaluation::{
+        goal::Place,
+        judge::{Judge, Setup},
+        record::{EpisodeRecord, Identity, Outcome, RolloutStats},
+        rules::Rules,
+        safety::Limit,
+    },
+    geometry::{Pose, Vec3},
+    physics::{Params, world::StepFailure},
+    policy::{Action, Observation, Policy},
+    robot::{RobotSpec, rotation},
+    scene::{Asset, Region, Scene},
+};
+
+/// What went wrong with whoever drives.
+#[derive(Debug, thiserror::Error)]
+pub enum ControlError {
+    /// A script failed: the user's input.
+    #[error("{0}")]
+    Script(String),
+    /// A policy failed.
+    #[error("{0}")]
+    Policy(String),
+    /// The run was told to stop.
+    #[error("interrupted")]
+    Interrupted,
+}
+
+/// Whoever drives the robot: a policy behind its observation, or a privileged planner.
+pub trait Controller {
+    /// The action of this control step; `None` to keep the last one.
+    ///
+    /// # Errors
+    /// What went wrong.
+    fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, ControlError>;
+}
+
+/// A policy sees the observation and nothing else.
+impl<P: Policy + ?Sized> Controller for Box<P> {
+    fn act(&mut self, _sim: &Simulation, observation: &Observation) -> Result<Option<Action>, ControlError> {
+        Policy::act(self.as_mut(), observation).map(Some).map_err(ControlError::Policy)
+    }
+}
+
+/// Everything about an episode but who drives.
+#[derive(Clone, Debug)]
+pub struct EpisodeSpec {
+    /// Which one it is.
+    pub identity: Identity,
+    /// The task.
+    pub task: Task,
+    /// The scene before settling.
+    pub scene: Arc<Scene>,
+    /// Deformation limit by asset name; `None` if the target was never calibrated.
+    pub limit: Option<Limit>,
+    /// Judging thresholds.
+    pub rules: Rules,
+    /// Parameters of the mechanics.
+    pub params: Params,
+    /// Parameters of the robot.
+    pub robot: RobotSpec,
+    /// Whether to keep a trace, and whether with node positions.
+    pub trace: Option<bool>,
+}
+
+/// A finished episode.
+#[derive(Debug)]
+pub struct Finished {
+    /// The record.
+    pub record: EpisodeRecord,
+    /// One entry a control step, if asked for.
+    pub trace: Vec<StepTrace>,
+}
+
+/// The scene cannot be run; the user's to mend.
+#[derive(Debug, thiserror::Error)]
+pub enum EpisodeError {
+    /// An object cannot be made.
+    #[error(transparent)]
+    Build(#[from] BuildError),
+    /// The scene does not come to rest.
+    #[error("layout {layout}, episode {episode}: {source}")]
+    Settle {
+        /// Layout name.
+        layout: String,
+        /// Episode index.
+        episode: u32,
+        /// What happened.
+        source: SettleError,
+    },
+    /// The goal names an object that is not in the scene.
+    #[error("task {task}: goal.{role} names {name:?}, but layout {layout} places {have}")]
+    NoObject {
+        /// Task index.
+        task: usize,
+        /// "object" or "target".
+        role: &'static str,
+        /// The name.
+        name: String,
+        /// Layout name.
+        layout: String,
+        /// Names in the scene.
+        have: String,
+    },
+    /// Whoever drives failed.
+    #[error("task {task}, episode {episode}: {source}")]
+    Control {
+        /// Task index.
+        task: usize,
+        /// Episode index.
+        episode: u32,
+        /// What happened.
+        source: ControlError,
+    },
+}
+
+/// An episode in progress.
+pub struct Episode {
+    spec: EpisodeSpec,
+    /// The running scene.
+    pub sim: Simulation,
+    witness: Witness,
+    judge: Judge,
+    target: usize,
+    start_hold: Action,
+    steps: u32,
+    physics_steps: u64,
+    newton: (u64, u32),
+    min_det_f: f64,
+    trace: Vec<StepTrace>,
+}
+
+impl Episode {
+    /// Builds and settles the scene; the settled state is the deformation reference.
+    ///
+    /// # Errors
+    /// The scene cannot be built or does not come to rest, or the goal names nothing in it.
+    pub fn start(spec: EpisodeSpec, cache: &RestCache) -> Result<Self, EpisodeError> {
+        let mut sim = Simulation::new(spec.scene.clone(), &spec.params, &spec.robot, cache)?;
+        let (object, place, hold_s) = match &spec.task.goal {
+            Goal::On { object, target, hold_s } | Goal::In { object, target, hold_s } => {
+                (object, target, *hold_s)
+            }
+        };
+        let find = |role, name: &str| {
+            sim.objects.iter().position(|o| o.name == name).ok_or_else(|| EpisodeError::NoObject {
+                task: spec.task.id,
+                role,
+                name: name.to_owned(),
+                layout: spec.task.layout.clone(),
+                have: sim.objects.iter().map(|o| o.name.as_str()).collect::<Vec<_>>().join(", "),
+            })
+        };
+        let (target, place) = (find("object", object)?, find("target", place)?);
+        sim.settle().map_err(|source| EpisodeError::Settle {
+            layout: spec.task.layout.clone(),
+            episode: spec.identity.episode,
+            source,
+        })?;
+        let witness = Witness::new(&sim, target, place);
+        let judge = Judge::new(Setup {
+            rules: spec.rules.clone(),
+            workspace: spec.scene.workspace,
+            place: place_of(&spec.task.goal, &sim.objects[place].asset),
+            hold_s,
+            dt_s: spec.params.dt,
+            steps_per_control: STEPS_PER_CONTROL,
+            target_weight_n: weight(&sim, target),
+            soft: matches!(sim.objects[target].kind, Kind::Soft(_)),
+            limit: spec.limit,
+            target_lowest_z_w: lowest(&sim, &sim.objects[target]),
+            others_lowest_z_w: witness.others_lowest(&sim),
+        });
+        let tool = sim.rig.tool_b(&sim.world);
+        let start_hold = Action {
+            position_b: tool.translation.vector,
+            axis_angle_b: rotation::axis_angle(&tool.rotation),
+            closure: 0.0,
+        };
+        Ok(Self {
+            spec,
+            sim,
+            witness,
+            judge,
+            target,
+            start_hold,
+            steps: 0,
+            physics_steps: 0,
+            newton: (0, 0),
+            min_det_f: f64::INFINITY,
+            trace: Vec::new(),
+        })
+    }
+
+    /// Runs to the goal, the end of the budget, or an invalid state.
+    ///
+    /// # Errors
+    /// Whoever drives failed.
+    pub fn run(mut self, controller: &mut dyn Controller) -> Result<Finished, EpisodeError> {
+        let mut action = self.start_hold;
+        let outcome = loop {
+            if self.judge.goal_reached() {
+                break Outcome::Completed;
+            }
+            if self.steps >= self.spec.task.budget_steps {
+                break Outcome::Timeout;
+            }
+            let observation = self.observation();
+            let wanted =
+                controller.act(&self.sim, &observation).map_err(|source| self.control_error(source))?;
+            if let Some(wanted) = wanted {
+                check_action(&wanted).map_err(|what| self.control_error(ControlError::Policy(what)))?;
+                action = wanted;
+            }
+            if let Err(failure) = self.control_step(&action) {
+                break self.invalid(&failure);
+            }
+        };
+        Ok(self.finish(outcome))
+    }
+
+    fn control_error(&self, source: ControlError) -> EpisodeError {
+        EpisodeError::Control { task: self.spec.task.id, episode: self.spec.identity.episode, source }
+    }
+
+    /// What a policy sees now.
+    pub fn observation(&self) -> Observation {
+        let tool = self.sim.rig.tool_b(&self.sim.world);
+        Observation {
+            time_s: self.time(),
+            ee_position_b: tool.translation.vector,
+            ee_axis_angle_b: rotation::axis_angle(&tool.rotation),
+            joints: self.sim.rig.q(&self.sim.world),
+            gripper_width_m: self.sim.rig.width(&self.sim.world),
+            closure: self.sim.rig.closure(),
+            prompt: self.spec.task.prompt.clone(),
+        }
+    }
+
+    fn time(&self) -> f64 {
+        self.physics_steps as f64 * self.spec.params.dt
+    }
+
+    fn control_step(&mut self, action: &Action) -> Result<(), StepFailure> {
+        let rotation = rotation::from_axis_angle(&action.axis_angle_b);
+        let pose_b = Pose::from_parts(action.position_b.into(), rotation);
+        self.sim.rig.command(&mut self.sim.world, &pose_b, action.closure);
+        self.steps += 1;
+        for _ in 0..STEPS_PER_CONTROL {
+            self.physics_steps += 1;
+            self.sim.step()?;
+            let stats = self.sim.world.stats;
+            self.newton = (self.newton.0 + u64::from(stats.newton), self.newton.1.max(stats.newton_max));
+            if let Kind::Soft(index) = self.sim.objects[self.target].kind {
+                self.min_det_f = self.min_det_f.min(self.sim.world.soft[index].min_det_f.0);
+            }
+            let time = self.time();
+            self.judge.observe(&self.witness.evidence(&self.sim, time));
+        }
+        if let Some(nodes) = self.spec.trace {
+            let at = (self.steps, self.time());
+            let dropped = self.judge.dropped().is_some();
+            self.trace.push(StepTrace::new(&self.sim, &self.witness, self.target, at, dropped, nodes));
+        }
+        Ok(())
+    }
+
+    fn invalid(&self, failure: &StepFailure) -> Outcome {
+        let (reason, node) = match failure {
+            StepFailure::Diverged { .. } => ("not_converged", None),
+            StepFailure::NotFinite { node, .. } => ("not_finite", Some(*node as u32)),
+            StepFailure::Indefinite { .. } => ("indefinite", None),
+            StepFailure::Inverted { body, element, .. } => {
+                let soft = self.sim.world.soft.iter().find(|s| s.name == *body);
+                ("inverted", soft.map(|s| s.body.rest.mesh.elements[*element][0]))
+            }
+        };
+        Outcome::Invalid { reason: reason.to_owned(), step: self.physics_steps, node }
+    }
+
+    fn finish(self, outcome: Outcome) -> Finished {
+        let soft = matches!(self.sim.objects[self.target].kind, Kind::Soft(_));
+        let stats = RolloutStats {
+            steps: self.steps,
+            time_s: self.physics_steps as f64 * self.spec.params.dt,
+            min_det_f: (soft && self.min_det_f.is_finite()).then_some(self.min_det_f),
+            newton_mean: self.newton.0 as f64 / self.physics_steps.max(1) as f64,
+            newton_max: self.newton.1,
+            state_hash: state_hash(&self.sim),
+        };
+        let verdict = self.judge.finish(&outcome);
+        Finished {
+            record: EpisodeRecord { identity: self.spec.identity, outcome, verdict, stats },
+            trace: self.trace,
+        }
+    }
+}
+
+fn check_action(action: &Action) -> Result<(), String> {
+    let numbers = action.position_b.iter().chain(action.axis_angle_b.iter()).chain([&action.closure]);
+    let all: Vec<f64> = numbers.copied().collect();
+    if all.iter().all(|x| x.is_finite()) {
+        return Ok(());
+    }
+    Err(format!("the action {all:?} holds a number that is not finite"))
+}
+
+/// Where the goal is, from the shape of what it names.
+fn place_of(goal: &Goal, asset: &Asset) -> Place {
+    let bounds = asset.shape.bounds();
+    match goal {
+        Goal::On { .. } => Place::On { radius_m: 0.5 * bounds.size().xy().min() },
+        Goal::In { .. } => {
+            let wall = asset.hints.get("wall_m").copied().unwrap_or(0.0);
+            let inset = Vec3::new(wall, wall, 0.0);
+            Place::In { inside: Region { min: bounds.min + inset, max: bounds.max - inset } }
+        }
+    }
+}
+
+fn weight(sim: &Simulation, object: usize) -> f64 {
+    let mass = match sim.objects[object].kind {
+        Kind::Soft(index) => sim.world.soft[index].body.rest.total_mass(),
+        Kind::Rigid(index) => sim.world.rigid[index].body.mass,
+        Kind::Static => 0.0,
+    };
+    mass * sim.scene.gravity.norm()
+}
+
+/// Hash of all positions, bit for bit.
+pub fn state_hash(sim: &Simulation) -> String {
+    let mut hash = Sha256::new();
+    let mut put = |x: f64| hash.update(x.to_bits().to_le_bytes());
+    for soft in &sim.world.soft {
+        soft.body.x.iter().flat_map(|x| x.iter()).for_each(|x| put(*x));
+    }
+    for rigid in &sim.world.rigid {
+        rigid.body.pose_w.to_homogeneous().iter().for_each(|x| put(*x));
+    }
+    for tree in &sim.world.trees {
+        tree.state.q.iter().for_each(|x| put(*x));
+    }
+    hash.finalize().iter().take(8).map(|b| format!("{b:02x}")).collect()
+}

@@ -1,0 +1,116 @@
+//! The hidden state as the judge wants it.
+
+use super::simulation::{Handle, Kind, Simulation};
+use crate::{
+    evaluation::{
+        deformation::{Deformation, Reference},
+        evidence::{BodyEvidence, Evidence, GripperEvidence, PadEvidence, PlaceEvidence},
+    },
+    geometry::Vec3,
+    robot::gripper::target_width,
+};
+
+/// Who is the target, where it must go, who else could move, and their settled shapes.
+#[derive(Debug)]
+pub struct Witness {
+    target: usize,
+    place: usize,
+    others: Vec<usize>,
+    references: Vec<Option<Reference>>,
+    bodies: Vec<BodyEvidence>,
+}
+
+impl Witness {
+    /// Takes the settled state as the deformation reference.
+    pub fn new(sim: &Simulation, target: usize, place: usize) -> Self {
+        let movable = |i: &usize| *i != target && sim.objects[*i].kind != Kind::Static;
+        let references = sim
+            .objects
+            .iter()
+            .map(|object| match object.kind {
+                Kind::Soft(index) => {
+                    let body = &sim.world.soft[index].body;
+                    Reference::new(&body.x, &body.rest.mass).ok()
+                }
+                _ => None,
+            })
+            .collect();
+        let others = (0..sim.objects.len()).filter(movable).filter(|i| *i != place).collect();
+        Self { target, place, others, references, bodies: Vec::new() }
+    }
+
+    /// Lowest points of the other movable bodies, m.
+    pub fn others_lowest(&self, sim: &Simulation) -> Vec<f64> {
+        self.others.iter().map(|&i| lowest(sim, &sim.objects[i])).collect()
+    }
+
+    /// Deformation of an object now; `None` if it is rigid or cannot be measured.
+    pub fn deformation(&self, sim: &Simulation, object: usize) -> Option<Deformation> {
+        let Kind::Soft(index) = sim.objects[object].kind else { return None };
+        self.references[object].as_ref()?.measure(&sim.world.soft[index].body.x).ok()
+    }
+
+    /// The settled shape of an object.
+    pub fn reference(&self, object: usize) -> Option<&Reference> {
+        self.references[object].as_ref()
+    }
+
+    /// The evidence of the step that just ended.
+    pub fn evidence<'a>(&'a mut self, sim: &Simulation, time_s: f64) -> Evidence<'a> {
+        let dt = sim.world.params.dt;
+        self.bodies = self.others.iter().map(|&i| self.body(sim, i)).collect();
+        let target = &sim.objects[self.target];
+        let place = &sim.objects[self.place];
+        let support: f64 = place.colliders.iter().map(|&c| upward(sim, target, c)).sum::<f64>() * dt;
+        Evidence {
+            time_s,
+            hand_w: sim.rig.hand_w(&sim.world),
+            gripper: GripperEvidence {
+                width_m: sim.rig.width(&sim.world),
+                commanded_width_m: target_width(sim.rig.closure()),
+            },
+            pads: sim.rig.pads.map(|pad| match target.kind {
+                Kind::Soft(index) => {
+                    let touch = sim.world.touch(index, pad);
+                    PadEvidence { normal_impulse_ns: touch.normal_force * dt, travel_m: touch.travel }
+                }
+                _ => PadEvidence::default(),
+            }),
+            target: self.body(sim, self.target),
+            place: PlaceEvidence { pose_w: sim.pose(place), support_impulse_ns: support },
+            others: &self.bodies,
+        }
+    }
+
+    fn body(&self, sim: &Simulation, index: usize) -> BodyEvidence {
+        let object = &sim.objects[index];
+        let robot = |c: usize| sim.rig.pads.contains(&c) || sim.rig.body.contains(&c);
+        let support: f64 =
+            (0..sim.world.colliders().len()).filter(|c| !robot(*c)).map(|c| upward(sim, object, c)).sum();
+        BodyEvidence {
+            centre_w: sim.centre(object),
+            lowest_z_w: lowest(sim, object),
+            support_impulse_ns: support * sim.world.params.dt,
+            deformation: self.deformation(sim, index),
+        }
+    }
+}
+
+/// Upward force of a collider on an object, N.
+fn upward(sim: &Simulation, object: &Handle, collider: usize) -> f64 {
+    match object.kind {
+        Kind::Soft(index) => sim.world.touch(index, collider).force_w.z.max(0.0),
+        _ => 0.0,
+    }
+}
+
+/// Height of the lowest point of an object, m.
+pub fn lowest(sim: &Simulation, object: &Handle) -> f64 {
+    match object.kind {
+        Kind::Soft(index) => {
+            let body = &sim.world.soft[index].body;
+            body.x.iter().map(|x: &Vec3| x.z).fold(f64::INFINITY, f64::min)
+        }
+        _ => object.asset.shape.bounds().moved(&sim.pose(object)).min.z,
+    }
+}

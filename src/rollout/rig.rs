@@ -1,0 +1,175 @@
+//! The robot in a world: the Panda as a joint tree, its drives, its pads and its controller.
+
+use std::sync::Arc;
+
+use crate::{
+    geometry::{
+        Pose, Vec3,
+        shape::{Aabb, Contact, Shape},
+    },
+    physics::{
+        World,
+        contact::{Collider, ColliderId, Friction, Layer, Mover, Surface},
+        world::Drive,
+    },
+    robot::{
+        RobotSpec, Side,
+        gripper::{self, Gripper},
+        ik::DiffIk,
+        pads::{self, PadSurface},
+        panda::{self, ARM_DOFS},
+    },
+};
+
+/// A gel pad as contact samples feel it.
+#[derive(Debug)]
+struct Pad(PadSurface);
+
+impl Surface for Pad {
+    fn contact(&self, p: &Vec3, _facing: &Vec3, spacing: f64) -> Contact {
+        let contact = self.0.contact(p, spacing);
+        Contact { phi: contact.phi, normal: contact.normal_p, coverage: contact.coverage }
+    }
+
+    fn bounds(&self) -> Aabb {
+        let half = Vec3::new(self.0.length, self.0.width, 0.0) * 0.5;
+        Aabb { min: Vec3::new(-half.x, -half.y, -self.0.thickness), max: half }
+    }
+}
+
+/// The robot of a simulation.
+#[derive(Debug)]
+pub struct Rig {
+    /// Its numbers.
+    pub spec: RobotSpec,
+    /// Its joint tree in the world.
+    pub tree: usize,
+    /// Colliders of the left and right gel pad.
+    pub pads: [ColliderId; 2],
+    /// All other colliders of the robot.
+    pub body: Vec<ColliderId>,
+    /// Base in the world.
+    pub base_w: Pose,
+    ik: DiffIk,
+    gripper: Gripper,
+}
+
+impl Rig {
+    /// Puts the robot at `base_w` with joint angles `q`, gripper open.
+    pub fn new(
+        world: &mut World,
+        spec: &RobotSpec,
+        base_w: &Pose,
+        q: &[f64; ARM_DOFS],
+        control_dt: f64,
+    ) -> Self {
+        let tree = panda::tree(*base_w, &spec.gripper);
+        let open = gripper::OPENING / 2.0;
+        let all: Vec<f64> = q.iter().copied().chain([open, open]).collect();
+        let drive =
+            |kp, kd, target, effort| Some(Drive { kp, kd, target, target_velocity: 0.0, effort, force: 0.0 });
+        let drives = all
+            .iter()
+            .zip(&tree.links)
+            .enumerate()
+            .map(|(joint, (&q, link))| {
+                if joint < ARM_DOFS {
+                    drive(spec.arm.kp, spec.arm.kd, q, link.effort_limit)
+                } else {
+                    drive(spec.gripper.kp, spec.gripper.kd, q, spec.gripper.effort)
+                }
+            })
+            .collect();
+        let tree = world.add_tree("panda", tree, &all, drives, false);
+        let pads = Side::BOTH.map(|side| add_pad(world, spec, tree, side));
+        let mut body = Vec::new();
+        for side in Side::BOTH {
+            let link = panda::finger_link(side);
+            body.extend(pads::finger_boxes(side).map(|b| add_box(world, tree, link, b.half, b.pose)));
+        }
+        body.extend(pads::hand_boxes().map(|b| add_box(world, tree, panda::HAND_LINK, b.half, b.pose)));
+        Self {
+            tree,
+            pads,
+            body,
+            base_w: *base_w,
+            ik: DiffIk::new(&spec.ik, *q, control_dt),
+            gripper: Gripper::new(&spec.gripper, gripper::OPENING),
+            spec: spec.clone(),
+        }
+    }
+
+    /// Takes a command for the coming control step: the tool's pose in the base frame and the closure.
+    pub fn command(&mut self, world: &mut World, pose_b: &Pose, closure: f64) {
+        let target = self.ik.step(&self.q(world), pose_b);
+        let drives = &mut world.trees[self.tree].drives;
+        drives.iter_mut().flatten().zip(target).for_each(|(drive, q)| drive.target = q);
+        self.gripper.command(closure);
+    }
+
+    /// Before each physics step: moves the finger targets on.
+    pub fn advance(&mut self, world: &mut World) {
+        self.gripper.advance(world.params.dt);
+        let target = self.gripper.finger_target();
+        let drives = &mut world.trees[self.tree].drives;
+        drives[ARM_DOFS..].iter_mut().flatten().for_each(|drive| drive.target = target);
+    }
+
+    /// Arm joint angles, rad.
+    pub fn q(&self, world: &World) -> [f64; ARM_DOFS] {
+        std::array::from_fn(|i| world.trees[self.tree].state.q[i])
+    }
+
+    /// Tool (TCP) pose in the base frame.
+    pub fn tool_b(&self, world: &World) -> Pose {
+        self.ik.tool_pose(&self.q(world))
+    }
+
+    /// Hand frame origin in the world, m.
+    pub fn hand_w(&self, world: &World) -> Vec3 {
+        (world.trees[self.tree].poses()[panda::HAND_LINK] * panda::hand_in_link()).translation.vector
+    }
+
+    /// Measured width, m.
+    pub fn width(&self, world: &World) -> f64 {
+        let q = &world.trees[self.tree].state.q;
+        gripper::width([q[ARM_DOFS], q[ARM_DOFS + 1]])
+    }
+
+    /// Closure last commanded, 0..=1.
+    pub fn closure(&self) -> f64 {
+        self.gripper.closure()
+    }
+
+    /// Arm angles that put the tool at `pose_b`, or by how much the nearest miss.
+    pub fn reach(
+        &self,
+        world: &World,
+        pose_b: &Pose,
+    ) -> Result<[f64; ARM_DOFS], crate::robot::ik::Unreachable> {
+        self.ik.solve(&self.q(world), pose_b)
+    }
+}
+
+fn add_pad(world: &mut World, spec: &RobotSpec, tree: usize, side: Side) -> ColliderId {
+    let mover = Mover::Link { tree, link: panda::finger_link(side) };
+    let friction = Friction { static_mu: spec.pads.static_mu, dynamic_mu: spec.pads.dynamic_mu };
+    let layer = Layer { normal: spec.pads.normal_modulus, shear: spec.pads.tangential_modulus };
+    let name = if side == Side::Left { "left pad" } else { "right pad" };
+    let surface = Arc::new(Pad(PadSurface::default()));
+    world.add_collider(Collider::new(name, (mover, pads::pad_pose_in_finger(side)), surface, friction, layer))
+}
+
+fn add_box(world: &mut World, tree: usize, link: usize, half: Vec3, pose: Pose) -> ColliderId {
+    let layer = world.rigid_layer();
+    // Steel and plastic: the friction of any rigid prop.
+    let friction = Friction { static_mu: 0.6, dynamic_mu: 0.5 };
+    let mover = Mover::Link { tree, link };
+    world.add_collider(Collider::new(
+        "gripper",
+        (mover, pose),
+        Arc::new(Shape::Box { half }),
+        friction,
+        layer,
+    ))
+}

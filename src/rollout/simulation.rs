@@ -1,0 +1,185 @@
+//! A scene that moves: the world, the robot in it, and the objects by name.
+
+use std::sync::Arc;
+
+use super::{
+    STEPS_PER_CONTROL,
+    build::{self, BuildError, RestCache},
+    rig::Rig,
+};
+use crate::{
+    geometry::{Pose, Vec3},
+    physics::{Params, World, contact::ColliderId, world::StepFailure},
+    robot::RobotSpec,
+    scene::{Asset, Scene},
+};
+
+/// What an object is in the world.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// A soft body, by index.
+    Soft(usize),
+    /// A rigid body, by index.
+    Rigid(usize),
+    /// Part of the world.
+    Static,
+}
+
+/// An object of the scene in the world.
+#[derive(Clone, Debug)]
+pub struct Handle {
+    /// Name in the scene.
+    pub name: String,
+    /// What it is.
+    pub asset: Arc<Asset>,
+    /// What it became.
+    pub kind: Kind,
+    /// Where it was put.
+    pub start_w: Pose,
+    /// Its colliders.
+    pub colliders: Vec<ColliderId>,
+}
+
+/// Speed below which a node counts as settled, m/s.
+const SETTLED_SPEED: f64 = 1e-3;
+/// How long all must be that slow, s.
+const SETTLED_FOR: f64 = 0.5;
+/// How long settling may take, s.
+const SETTLE_WITHIN: f64 = 3.0;
+
+/// The scene did not come to rest.
+#[derive(Debug, thiserror::Error)]
+pub enum SettleError {
+    /// Something still moves.
+    #[error(
+        "object {object} still moves at {speed_mm:.1} mm/s after {SETTLE_WITHIN} s of settling; put it nearer to what \
+         it rests on, or make it lie stably"
+    )]
+    Moving {
+        /// The fastest object.
+        object: String,
+        /// Its speed, mm/s.
+        speed_mm: f64,
+    },
+    /// The physics failed.
+    #[error("settling failed: {0}")]
+    Failed(#[from] StepFailure),
+}
+
+/// A running scene.
+#[derive(Debug)]
+pub struct Simulation {
+    /// The scene it was built from.
+    pub scene: Arc<Scene>,
+    /// All bodies.
+    pub world: World,
+    /// The robot.
+    pub rig: Rig,
+    /// The objects, in scene order.
+    pub objects: Vec<Handle>,
+}
+
+impl Simulation {
+    /// Builds the world of `scene`.
+    ///
+    /// # Errors
+    /// An object that cannot be made, or two of one name.
+    pub fn new(
+        scene: Arc<Scene>,
+        params: &Params,
+        robot: &RobotSpec,
+        cache: &RestCache,
+    ) -> Result<Self, BuildError> {
+        let mut world = World::new(params.clone(), scene.gravity);
+        let mut objects: Vec<Handle> = Vec::new();
+        for object in &scene.objects {
+            if objects.iter().any(|o| o.name == object.name) {
+                return Err(BuildError::TwoNames(object.name.clone()));
+            }
+            objects.push(build::add(&mut world, object, cache)?);
+        }
+        let control_dt = params.dt * f64::from(STEPS_PER_CONTROL);
+        let rig = Rig::new(&mut world, robot, &scene.base_w, &scene.start_q, control_dt);
+        Ok(Self { scene, world, rig, objects })
+    }
+
+    /// One physics step.
+    ///
+    /// # Errors
+    /// The step failed; the run is invalid.
+    pub fn step(&mut self) -> Result<(), StepFailure> {
+        self.rig.advance(&mut self.world);
+        self.world.step()
+    }
+
+    /// Lets everything come to rest, the arm holding its pose.
+    ///
+    /// # Errors
+    /// Something does not come to rest in time, or the physics fails.
+    pub fn settle(&mut self) -> Result<(), SettleError> {
+        let dt = self.world.params.dt;
+        let mut quiet = 0.0;
+        let mut waited = 0.0;
+        while quiet < SETTLED_FOR {
+            self.step()?;
+            waited += dt;
+            let (object, speed) = self.fastest();
+            quiet = if speed < SETTLED_SPEED { quiet + dt } else { 0.0 };
+            if waited > SETTLE_WITHIN && quiet == 0.0 {
+                return Err(SettleError::Moving { object, speed_mm: 1e3 * speed });
+            }
+        }
+        Ok(())
+    }
+
+    /// The fastest object and the speed of its fastest point, m/s.
+    fn fastest(&self) -> (String, f64) {
+        let speeds = self.objects.iter().map(|object| (object.name.clone(), self.speed(object)));
+        speeds.fold((String::new(), 0.0), |best, next| if next.1 > best.1 { next } else { best })
+    }
+
+    /// Speed of the fastest point of an object, m/s (of its centre and 0.1 m of lever for a rigid one).
+    pub fn speed(&self, object: &Handle) -> f64 {
+        match object.kind {
+            Kind::Soft(index) => self.world.soft[index].body.max_speed(),
+            Kind::Rigid(index) => {
+                let body = &self.world.rigid[index].body;
+                body.v.norm() + 0.1 * body.w.norm()
+            }
+            Kind::Static => 0.0,
+        }
+    }
+
+    /// Object by name.
+    pub fn object(&self, name: &str) -> Option<&Handle> {
+        self.objects.iter().find(|o| o.name == name)
+    }
+
+    /// Centre of an object, m, world: the mean of a soft body's nodes, the centre of mass of a rigid one.
+    pub fn centre(&self, object: &Handle) -> Vec3 {
+        match object.kind {
+            Kind::Soft(index) => {
+                let x = &self.world.soft[index].body.x;
+                x.iter().sum::<Vec3>() / x.len() as f64
+            }
+            Kind::Rigid(index) => self.world.rigid[index].body.pose_w.translation.vector,
+            Kind::Static => object.start_w.translation.vector,
+        }
+    }
+
+    /// Object frame in the world; of a soft body its mean rotation about its centre.
+    pub fn pose(&self, object: &Handle) -> Pose {
+        match object.kind {
+            Kind::Soft(index) => {
+                let body = &self.world.soft[index].body;
+                let rotation = crate::geometry::Quat::from_matrix(&body.frame);
+                let nodes = &body.rest.mesh.nodes;
+                let rest_centre = nodes.iter().sum::<Vec3>() / nodes.len() as f64;
+                let at = self.centre(object) - rotation * rest_centre;
+                Pose::from_parts(at.into(), rotation)
+            }
+            Kind::Rigid(index) => self.world.rigid[index].body.object_w(),
+            Kind::Static => object.start_w,
+        }
+    }
+}

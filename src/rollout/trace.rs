@@ -1,0 +1,123 @@
+//! What a run can write down about every control step.
+
+use serde::Serialize;
+
+use super::{
+    evidence::Witness,
+    simulation::{Kind, Simulation},
+};
+use crate::robot::rotation;
+
+/// One control step.
+#[derive(Clone, Debug, Serialize)]
+pub struct StepTrace {
+    /// Control step, from 1.
+    pub step: u32,
+    /// Time since the policy took over, s.
+    pub time_s: f64,
+    /// Tool position, base frame, m.
+    pub ee_position_b: [f64; 3],
+    /// Tool orientation, base frame, axis-angle, rad.
+    pub ee_axis_angle_b: [f64; 3],
+    /// Arm joint angles, rad.
+    pub joints: [f64; 7],
+    /// Measured gripper width, m.
+    pub gripper_width_m: f64,
+    /// Commanded closure.
+    pub closure: f64,
+    /// Normal force of the left and right pad on the target, N.
+    pub pad_force_n: [f64; 2],
+    /// Shear force over friction capacity of the two pads, 0..=1.
+    pub friction_utilisation: [f64; 2],
+    /// Slip of the two pads along the target, mm.
+    pub slip_mm: [f64; 2],
+    /// Whether the target was dropped so far.
+    pub dropped: bool,
+    /// Kinetic, elastic and potential energy, J.
+    pub energy_j: [f64; 3],
+    /// Newton iterations of the last physics step.
+    pub newton: u32,
+    /// The objects that can move.
+    pub objects: Vec<ObjectTrace>,
+}
+
+/// One object at a control step.
+#[derive(Clone, Debug, Serialize)]
+pub struct ObjectTrace {
+    /// Scene name.
+    pub name: String,
+    /// Position of its frame, m, world.
+    pub position_w: [f64; 3],
+    /// Orientation of its frame, wxyz, w ≥ 0.
+    pub quaternion_w: [f64; 4],
+    /// D, % of the settled bounding-box diagonal; null for a rigid one.
+    pub d_pct: Option<f64>,
+    /// Least det F; null for a rigid one.
+    pub min_det_f: Option<f64>,
+    /// Whether it sleeps.
+    pub asleep: bool,
+    /// Names of what touches it.
+    pub touches: Vec<String>,
+    /// Node positions, m, world, if asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nodes: Option<Vec<[f64; 3]>>,
+}
+
+impl StepTrace {
+    /// What can be said of the state after control step `step`.
+    pub fn new(
+        sim: &Simulation,
+        witness: &Witness,
+        target: usize,
+        (step, time_s): (u32, f64),
+        dropped: bool,
+        nodes: bool,
+    ) -> Self {
+        let tool = sim.rig.tool_b(&sim.world);
+        let touch = sim.rig.pads.map(|pad| match sim.objects[target].kind {
+            Kind::Soft(index) => sim.world.touch(index, pad),
+            _ => Default::default(),
+        });
+        let energy = sim.world.energy();
+        Self {
+            step,
+            time_s,
+            ee_position_b: tool.translation.vector.into(),
+            ee_axis_angle_b: rotation::axis_angle(&tool.rotation).into(),
+            joints: sim.rig.q(&sim.world),
+            gripper_width_m: sim.rig.width(&sim.world),
+            closure: sim.rig.closure(),
+            pad_force_n: touch.map(|t| t.normal_force),
+            friction_utilisation: touch.map(|t| if t.capacity > 0.0 { t.shear() / t.capacity } else { 0.0 }),
+            slip_mm: touch.map(|t| 1e3 * t.travel),
+            dropped,
+            energy_j: [energy.kinetic, energy.elastic, energy.potential],
+            newton: sim.world.stats.newton,
+            objects: (0..sim.objects.len())
+                .filter(|&i| sim.objects[i].kind != Kind::Static)
+                .map(|i| object(sim, witness, i, nodes))
+                .collect(),
+        }
+    }
+}
+
+fn object(sim: &Simulation, witness: &Witness, index: usize, nodes: bool) -> ObjectTrace {
+    let handle = &sim.objects[index];
+    let pose = sim.pose(handle);
+    let q = rotation::canonical(&pose.rotation);
+    let soft = match handle.kind {
+        Kind::Soft(soft) => Some(&sim.world.soft[soft]),
+        _ => None,
+    };
+    let name = |partner: u32| sim.world.partner_name(partner).to_owned();
+    ObjectTrace {
+        name: handle.name.clone(),
+        position_w: pose.translation.vector.into(),
+        quaternion_w: [q.w, q.i, q.j, q.k],
+        d_pct: witness.deformation(sim, index).map(|d| d.rms_pct),
+        min_det_f: soft.map(|s| s.min_det_f.0),
+        asleep: soft.is_some_and(|s| s.asleep),
+        touches: soft.map_or(Vec::new(), |s| s.touches.iter().map(|(partner, _)| name(*partner)).collect()),
+        nodes: soft.filter(|_| nodes).map(|s| s.body.x.iter().map(|x| (*x).into()).collect()),
+    }
+}

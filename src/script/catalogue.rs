@@ -1,0 +1,376 @@
+//! The binding table: every table that the Lua surface takes, with types, units, ranges, defaults and documentation.
+//!
+//! Checking, stubs and the reference are all made from it.
+
+use super::schema::{Field, Presence, Range, Record, Type};
+
+use Presence::{Empty, Optional, Required};
+
+const fn field(name: &'static str, ty: Type, presence: Presence, doc: &'static str) -> Field {
+    Field { name, ty, presence, doc }
+}
+
+/// Coulomb friction of a surface.
+pub static FRICTION: Record = Record {
+    label: "friction",
+    class: "softvt.Friction",
+    kind: "softvt.Friction",
+    doc: "Coulomb friction of a surface; a pair of surfaces takes the larger of each coefficient.",
+    fields: &[
+        field(
+            "static_mu",
+            Type::Number("", Range::closed(0.0, 10.0)),
+            Presence::Number(0.6),
+            "Static coefficient.",
+        ),
+        field(
+            "dynamic_mu",
+            Type::Number("", Range::closed(0.0, 10.0)),
+            Presence::Number(0.5),
+            "Dynamic coefficient, not above the static one.",
+        ),
+    ],
+};
+
+/// What a surface looks like.
+pub static VISUAL: Record = Record {
+    label: "visual",
+    class: "softvt.Visual",
+    kind: "softvt.Visual",
+    doc: "What a surface looks like.",
+    fields: &[
+        field("albedo", Type::Vector(3, "0..1, linear RGB"), Required, "Base colour."),
+        field("roughness", Type::Number("", Range::closed(0.0, 1.0)), Presence::Number(0.6), "Roughness."),
+        field("metalness", Type::Number("", Range::closed(0.0, 1.0)), Presence::Number(0.0), "Metalness."),
+    ],
+};
+
+/// A finite-element soft body.
+pub static SOFT: Record = Record {
+    label: "asset.body",
+    class: "softvt.Soft",
+    kind: "softvt.soft",
+    doc: "A finite-element soft body of linear-elastic, isotropic material.",
+    fields: &[
+        field("youngs_pa", Type::Number("Pa", Range::POSITIVE), Required, "Young's modulus."),
+        field(
+            "poisson",
+            Type::Number("", Range::below(0.0, 0.5)),
+            Required,
+            "Poisson's ratio; 0.5 would be incompressible.",
+        ),
+        field("density", Type::Number("kg/m³", Range::POSITIVE), Required, "Density."),
+        field(
+            "resolution",
+            Type::Integer(Range::closed(1.0, 64.0)),
+            Presence::Integer(6),
+            "Voxels along the longest edge of the bounding box.",
+        ),
+        field(
+            "grasp_spacing",
+            Type::Number("m", Range::closed(0.0001, 0.02)),
+            Presence::Number(0.00075),
+            "Spacing of contact samples where a gripper can reach.",
+        ),
+    ],
+};
+
+/// A free rigid body.
+pub static RIGID: Record = Record {
+    label: "asset.body",
+    class: "softvt.Rigid",
+    kind: "softvt.rigid",
+    doc: "A free rigid body of uniform density.",
+    fields: &[field("density", Type::Number("kg/m³", Range::POSITIVE), Required, "Density.")],
+};
+
+/// A part of the world.
+pub static STATIC: Record = Record {
+    label: "asset.body",
+    class: "softvt.Static",
+    kind: "softvt.static",
+    doc: "A part of the world that never moves.",
+    fields: &[],
+};
+
+/// A kind of object.
+pub static ASSET: Record = Record {
+    label: "asset",
+    class: "softvt.Asset",
+    kind: "softvt.asset",
+    doc: "A kind of object: its shape at rest with its lowest point at z = 0 and its centre on the z axis.",
+    fields: &[
+        field("name", Type::Text, Required, "Name, as in results and calibration files."),
+        field("shape", Type::Object("softvt.Shape"), Required, "Its shape, in metres."),
+        field("body", Type::Made(&[&SOFT, &RIGID, &STATIC]), Required, "How it moves."),
+        field("friction", Type::Nested(&FRICTION), Empty, "Friction of its surface."),
+        field(
+            "visuals",
+            Type::List(&Type::Nested(&VISUAL)),
+            Optional,
+            "Appearances by material id of the shape; the first is id 0.",
+        ),
+        field(
+            "hints",
+            Type::Map(&Type::Number("", Range::ANY)),
+            Optional,
+            "Numbers for experts (grasp height, closure …).",
+        ),
+    ],
+};
+
+/// Where things stand.
+pub static LAYOUT: Record = Record {
+    label: "layout",
+    class: "softvt.Layout",
+    kind: "softvt.layout",
+    doc: "How a scene is laid out. Tasks with the same layout name share their initial states.",
+    fields: &[
+        field("name", Type::Text, Required, "Name; part of the seed."),
+        field(
+            "build",
+            Type::Function("fun(scene: softvt.Scene, rng: softvt.Rng)"),
+            Required,
+            "Puts the objects into the scene.",
+        ),
+    ],
+};
+
+/// Rest on a target.
+pub static ON: Record = Record {
+    label: "task.goal",
+    class: "softvt.On",
+    kind: "softvt.on",
+    doc: "The object rests on the target, released, for a time.",
+    fields: GOAL_FIELDS,
+};
+
+/// Rest inside a target.
+pub static INSIDE: Record = Record {
+    label: "task.goal",
+    class: "softvt.Inside",
+    kind: "softvt.inside",
+    doc: "The object rests inside the target's walls, released, for a time.",
+    fields: GOAL_FIELDS,
+};
+
+const GOAL_FIELDS: &[Field] = &[
+    field("object", Type::Text, Required, "Scene name of the object."),
+    field("target", Type::Text, Required, "Scene name of what it must reach."),
+    field(
+        "hold_s",
+        Type::Number("s", Range::closed(0.0, 10.0)),
+        Presence::Number(0.4),
+        "How long it must stay.",
+    ),
+];
+
+/// One task.
+pub static TASK: Record = Record {
+    label: "task",
+    class: "softvt.Task",
+    kind: "softvt.task",
+    doc: "One task of a suite.",
+    fields: &[
+        field("prompt", Type::Text, Required, "What the policy is told."),
+        field("layout", Type::Made(&[&LAYOUT]), Required, "Where things stand at the start."),
+        field("goal", Type::Made(&[&ON, &INSIDE]), Required, "When it is done."),
+        field(
+            "expert",
+            Type::Function("fun(arm: softvt.Arm, scene: softvt.View)"),
+            Optional,
+            "A coroutine that does the task, with privileged state.",
+        ),
+        field(
+            "budget_steps",
+            Type::Integer(Range::closed(1.0, 100_000.0)),
+            Optional,
+            "Control steps (20 Hz) that the policy has; 500 where a suite varies layouts, 700 where it varies objects.",
+        ),
+    ],
+};
+
+/// A change of the scene that a run may ask for.
+pub static SHIFT: Record = Record {
+    label: "shift",
+    class: "softvt.Shift",
+    kind: "softvt.shift",
+    doc: "A change of the scene that a run may ask for with --shift name=value. Thresholds stay nominal.",
+    fields: &[
+        field("name", Type::Text, Required, "Name on the command line."),
+        field("unit", Type::Text, Presence::Text("1"), "Unit of the value."),
+        field("default", Type::Number("", Range::ANY), Required, "The value that changes nothing."),
+        field("min", Type::Number("", Range::ANY), Optional, "Lowest value."),
+        field("max", Type::Number("", Range::ANY), Optional, "Highest value."),
+        field(
+            "apply",
+            Type::Function("fun(scene: softvt.Scene, value: number): softvt.Scene?"),
+            Required,
+            "Changes the scene.",
+        ),
+    ],
+};
+
+/// Tasks reported together.
+pub static SUITE: Record = Record {
+    label: "suite",
+    class: "softvt.Suite",
+    kind: "softvt.suite",
+    doc: "A set of tasks that are reported together.",
+    fields: &[
+        field("name", Type::Text, Required, "Name, as in results; part of the seed."),
+        field("object_type", Type::Choice(&["deformable", "rigid"]), Required, "What the objects are."),
+        field("variation", Type::Choice(&["object", "spatial"]), Required, "What varies between tasks."),
+        field(
+            "episodes",
+            Type::Integer(Range::closed(1.0, 1e6)),
+            Presence::Integer(5),
+            "Episodes a task by default.",
+        ),
+        field("tasks", Type::List(&Type::Made(&[&TASK])), Required, "The tasks, in order."),
+        field("shifts", Type::List(&Type::Made(&[&SHIFT])), Optional, "Changes that a run may ask for."),
+        field(
+            "settings",
+            Type::Map(&Type::Map(&Type::Any)),
+            Optional,
+            "What it changes of the mechanics, the robot and the judge: { physics = {…}, robot = {…}, rules = {…} }.",
+        ),
+    ],
+};
+
+/// A scripted run over a grid.
+pub static EXPERIMENT: Record = Record {
+    label: "experiment",
+    class: "softvt.Experiment",
+    kind: "softvt.experiment",
+    doc: "A function of a grid of parameters that yields rows. Give grid or points.",
+    fields: &[
+        field("name", Type::Text, Required, "Name, as in results."),
+        field(
+            "options",
+            Type::Any,
+            Optional,
+            "What softvt.options gave; handed to the functions below as opt.",
+        ),
+        field(
+            "grid",
+            Type::Map(&Type::List(&Type::Any)),
+            Optional,
+            "Values of each parameter; every combination is run, names in alphabetical order, the last one fastest.",
+        ),
+        field(
+            "points",
+            Type::Function("fun(opt: table): table[]"),
+            Optional,
+            "Gives the points instead of a grid.",
+        ),
+        field(
+            "run",
+            Type::Function("fun(point: table, opt: table): table|table[]"),
+            Required,
+            "Gives a row or a list of rows for one point; points run in any order and on several threads.",
+        ),
+        field(
+            "finish",
+            Type::Function("fun(rows: table[], opt: table): softvt.Finish?"),
+            Optional,
+            "Sums up all rows.",
+        ),
+        field(
+            "columns",
+            Type::List(&Type::Text),
+            Optional,
+            "Columns of the table, in order; by default all, sorted.",
+        ),
+    ],
+};
+
+/// What an experiment's `finish` may return.
+pub static FINISH: Record = Record {
+    label: "finish",
+    class: "softvt.Finish",
+    kind: "softvt.Finish",
+    doc: "What an experiment leaves behind besides its rows.",
+    fields: &[
+        field("text", Type::Text, Optional, "Printed after the rows."),
+        field(
+            "files",
+            Type::Map(&Type::OneOf(&[Type::Text, Type::Map(&Type::Any), Type::List(&Type::Any)])),
+            Optional,
+            "Files to write, by relative path: text as it is, tables as JSON with sorted keys.",
+        ),
+    ],
+};
+
+/// An option of a script.
+pub static OPTION: Record = Record {
+    label: "option",
+    class: "softvt.Option",
+    kind: "softvt.Option",
+    doc: "An option of the script: key gap_mm is --gap-mm on the command line. The default gives the type.",
+    fields: &[
+        field("default", Type::Any, Required, "A number, string, boolean, or list of numbers or strings."),
+        field("integer", Type::Boolean, Presence::Boolean(false), "Whether only whole numbers are taken."),
+        field("unit", Type::Text, Presence::Text(""), "Unit of a number."),
+        field("min", Type::Number("", Range::ANY), Optional, "Lowest number."),
+        field("max", Type::Number("", Range::ANY), Optional, "Highest number."),
+        field("choices", Type::List(&Type::Text), Optional, "The only strings allowed."),
+        field("help", Type::Text, Presence::Text(""), "What it does, for --help."),
+    ],
+};
+
+/// What `scene:add` takes.
+pub static PLACE: Record = Record {
+    label: "scene:add",
+    class: "softvt.Place",
+    kind: "softvt.Place",
+    doc: "An asset put somewhere. Give at or xyz.",
+    fields: &[
+        field("name", Type::Text, Required, "Name in the scene, unique."),
+        field("asset", Type::Made(&[&ASSET]), Required, "What it is."),
+        field(
+            "at",
+            Type::Vector(2, "m, world"),
+            Optional,
+            "x, y; it stands on the table, or on what `on` names.",
+        ),
+        field("xyz", Type::Vector(3, "m, world"), Optional, "Its origin: lowest point, on the centre line."),
+        field("yaw", Type::Number("rad", Range::ANY), Presence::Number(0.0), "Turn about the vertical."),
+        field("on", Type::Text, Optional, "Scene name of an object that it stands on (with at)."),
+    ],
+};
+
+/// Where a pose is.
+pub static POSE: Record = Record {
+    label: "pose",
+    class: "softvt.PoseSpec",
+    kind: "softvt.PoseSpec",
+    doc: "A pose in the world frame. Without a quaternion the hand points straight down.",
+    fields: &[
+        field("xyz", Type::Vector(3, "m, world"), Required, "Position."),
+        field(
+            "yaw",
+            Type::Number("rad", Range::ANY),
+            Presence::Number(0.0),
+            "Turn of the downward hand about the vertical.",
+        ),
+        field("quat", Type::Vector(4, "w, x, y, z"), Optional, "Orientation instead of yaw."),
+    ],
+};
+
+/// Constructors of the form `softvt.name{…}` that only check their table, by name.
+pub static CONSTRUCTORS: &[(&str, &Record)] = &[
+    ("suite", &SUITE),
+    ("task", &TASK),
+    ("on", &ON),
+    ("inside", &INSIDE),
+    ("asset", &ASSET),
+    ("soft", &SOFT),
+    ("rigid", &RIGID),
+    ("static", &STATIC),
+    ("shift", &SHIFT),
+    ("experiment", &EXPERIMENT),
+];
+
+/// Tables that functions take but no constructor makes.
+pub static PLAIN: &[&Record] = &[&FRICTION, &VISUAL, &FINISH, &OPTION, &PLACE, &POSE];

@@ -1,0 +1,73 @@
+//! A scripted expert as whoever drives a rollout: the one place where hidden state goes to Lua.
+
+use super::{Expert, ExpertView, ObjectView};
+use crate::{
+    geometry::Vec3,
+    policy::{Action, Observation},
+    robot::rotation,
+    rollout::{ControlError, Controller, Handle, Kind, STEPS_PER_CONTROL, Simulation},
+};
+
+/// Drives by a Lua expert; once it is done, the last command stays.
+pub struct ExpertController {
+    expert: Expert,
+    binary: bool,
+}
+
+impl ExpertController {
+    /// `binary` replaces the expert's closure by fully open or fully shut, as a binary gripper action would.
+    pub fn new(expert: Expert, binary: bool) -> Self {
+        Self { expert, binary }
+    }
+}
+
+impl Controller for ExpertController {
+    fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, ControlError> {
+        let command = self
+            .expert
+            .step(&view(sim, observation.time_s))
+            .map_err(|error| ControlError::Script(error.to_string()))?;
+        Ok(command.map(|command| {
+            let shut = if command.gripping { 1.0 } else { 0.0 };
+            Action {
+                position_b: command.pose_b.translation.vector,
+                axis_angle_b: rotation::axis_angle(&command.pose_b.rotation),
+                closure: if self.binary { shut } else { command.closure },
+            }
+        }))
+    }
+}
+
+/// What an expert may know now.
+pub(super) fn view(sim: &Simulation, time_s: f64) -> ExpertView {
+    ExpertView {
+        time_s,
+        dt_s: sim.world.params.dt * f64::from(STEPS_PER_CONTROL),
+        base_w: sim.rig.base_w,
+        tcp_b: sim.rig.tool_b(&sim.world),
+        width_m: sim.rig.width(&sim.world),
+        closure: sim.rig.closure(),
+        pad_force_n: sim.rig.pads.map(|pad| {
+            sim.world.soft.iter().enumerate().map(|(i, _)| sim.world.touch(i, pad).normal_force).sum()
+        }),
+        objects: sim.objects.iter().map(|object| seen(sim, object)).collect(),
+    }
+}
+
+fn seen(sim: &Simulation, object: &Handle) -> ObjectView {
+    let pose = sim.pose(object);
+    let bounds = object.asset.shape.bounds();
+    let centre_w = match object.kind {
+        Kind::Soft(_) => sim.centre(object),
+        _ => (pose * nalgebra::Point3::from(bounds.centre())).coords,
+    };
+    let x = pose.rotation * Vec3::x();
+    ObjectView {
+        name: object.name.clone(),
+        asset: object.asset.name.clone(),
+        centre_w,
+        yaw: x.y.atan2(x.x),
+        size: bounds.size(),
+        hints: object.asset.hints.clone(),
+    }
+}

@@ -1,0 +1,254 @@
+//! Time limits: a hook that Lua cannot swallow, and a watchdog for C functions that never come back.
+//!
+//! The hook is called every few thousand instructions of Lua. Once the time is up it asks to be called at *every*
+//! instruction and raises an error each time, so that a `pcall` that catches the error only gains one instruction. A C
+//! function (`string.find` with a hostile pattern) never reaches the hook; nothing can stop it but the end of the
+//! process, which the [`Watchdog`] brings about with a message.
+
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError},
+    thread,
+    time::{Duration, Instant},
+};
+
+use mlua::{HookTriggers, Lua, VmState};
+
+use super::error::ScriptError;
+
+/// Instructions between two looks at the clock; about 0.3 ms.
+const STRIDE: u32 = 20_000;
+
+/// What the watchdog does with its message; ends the process unless a test says otherwise.
+pub type OnStuck = Arc<dyn Fn(&str) + Send + Sync>;
+
+/// Prints the message and ends the process with the exit code of bad input; finished episodes are already on disk.
+pub fn end_process() -> OnStuck {
+    Arc::new(|message| {
+        eprintln!("error: {message}");
+        std::process::exit(2);
+    })
+}
+
+type Slot = (Instant, u64);
+
+#[derive(Default)]
+struct Queue {
+    waiting: BTreeMap<Slot, (String, OnStuck)>,
+    next: u64,
+}
+
+/// One thread for the process that knows every running deadline.
+struct Watchdog {
+    queue: Mutex<Queue>,
+    changed: Condvar,
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn watchdog() -> &'static Watchdog {
+    static DOG: OnceLock<&'static Watchdog> = OnceLock::new();
+    DOG.get_or_init(|| {
+        let dog: &'static Watchdog =
+            Box::leak(Box::new(Watchdog { queue: Mutex::default(), changed: Condvar::new() }));
+        // Without this thread a hostile C call would hang the run; everything else still works.
+        let _ = thread::Builder::new().name("script-watchdog".into()).spawn(|| dog.watch());
+        dog
+    })
+}
+
+impl Watchdog {
+    fn watch(&self) {
+        let mut queue = lock(&self.queue);
+        loop {
+            let now = Instant::now();
+            let first = queue.waiting.keys().next().copied();
+            queue = match first {
+                Some(slot) if slot.0 <= now => {
+                    let expired = queue.waiting.remove(&slot);
+                    drop(queue);
+                    if let Some((message, on_stuck)) = expired {
+                        on_stuck(&message);
+                    }
+                    lock(&self.queue)
+                }
+                Some(slot) => {
+                    let wait = self.changed.wait_timeout(queue, slot.0 - now);
+                    wait.unwrap_or_else(PoisonError::into_inner).0
+                }
+                None => self.changed.wait(queue).unwrap_or_else(PoisonError::into_inner),
+            };
+        }
+    }
+
+    fn add(&self, at: Instant, message: String, on_stuck: OnStuck) -> Slot {
+        let mut queue = lock(&self.queue);
+        let slot = (at, queue.next);
+        queue.next += 1;
+        let earliest = queue.waiting.keys().next().is_none_or(|first| at < first.0);
+        queue.waiting.insert(slot, (message, on_stuck));
+        drop(queue);
+        // Every new deadline that is not the first is found when the first comes up: no need to wake anyone.
+        if earliest {
+            self.changed.notify_one();
+        }
+        slot
+    }
+
+    fn remove(&self, slot: Slot) -> Option<(String, OnStuck)> {
+        lock(&self.queue).waiting.remove(&slot)
+    }
+}
+
+#[derive(Default)]
+struct State {
+    /// When the running call must be over; none while nothing runs or the clock is stopped.
+    until: Option<Instant>,
+    limit: Duration,
+    grace: Duration,
+    file: String,
+    slot: Option<Slot>,
+    /// Time left when the clock was stopped, and the watchdog's entry.
+    stopped: Option<(Duration, Option<(String, OnStuck)>)>,
+}
+
+/// The clock of one virtual machine.
+#[derive(Clone, Default)]
+pub struct Clock {
+    state: Arc<Mutex<State>>,
+}
+
+impl Clock {
+    /// Installs the hook in `lua`.
+    pub(super) fn install(&self, lua: &Lua) -> mlua::Result<()> {
+        let clock = self.clone();
+        lua.set_global_hook(HookTriggers::new().every_nth_instruction(STRIDE), move |lua, _| {
+            let Some(error) = clock.expired() else { return Ok(VmState::Continue) };
+            let again = error.clone();
+            lua.set_global_hook(HookTriggers::new().every_nth_instruction(1), move |_, _| {
+                Err(mlua::Error::external(again.clone()))
+            })?;
+            Err(mlua::Error::external(error))
+        })
+    }
+
+    fn expired(&self) -> Option<ScriptError> {
+        let state = lock(&self.state);
+        state.until.is_some_and(|until| Instant::now() > until).then(|| {
+            ScriptError::new(
+                state.file.clone(),
+                format!("the script ran for more than {}", seconds(state.limit)),
+            )
+            .hint("look for an endless loop")
+        })
+    }
+
+    /// Gives the machine `limit` from now on, until the guard is dropped; the watchdog acts `grace` after it. `file` is named in messages. A call inside of
+    /// a call keeps the outer limit.
+    pub fn start(&self, limit: Duration, grace: Duration, file: &str, on_stuck: OnStuck) -> Deadline {
+        let mut state = lock(&self.state);
+        if state.until.is_some() || state.stopped.is_some() {
+            return Deadline { clock: None };
+        }
+        let until = Instant::now() + limit;
+        state.until = Some(until);
+        state.limit = limit;
+        state.grace = grace;
+        state.file = file.into();
+        let message = format!(
+            "{file}: the script called a library function that did not return within {}; \
+             look for a hostile string pattern or a huge repeat count",
+            seconds(limit)
+        );
+        state.slot = Some(watchdog().add(until + grace, message, on_stuck));
+        Deadline { clock: Some(self.clone()) }
+    }
+
+    /// Stops the clock while a binding does honest work in Rust (physics), until the guard is dropped.
+    pub fn pause(&self) -> Pause {
+        let mut state = lock(&self.state);
+        if let Some(until) = state.until.take() {
+            let entry = state.slot.take().and_then(|slot| watchdog().remove(slot));
+            state.stopped = Some((until.saturating_duration_since(Instant::now()), entry));
+            return Pause { clock: Some(self.clone()) };
+        }
+        Pause { clock: None }
+    }
+}
+
+fn seconds(limit: Duration) -> String {
+    format!("{} s", limit.as_secs_f64())
+}
+
+/// A running time limit; see [`Clock::start`].
+#[must_use]
+pub struct Deadline {
+    clock: Option<Clock>,
+}
+
+impl Drop for Deadline {
+    fn drop(&mut self) {
+        let Some(clock) = &self.clock else { return };
+        let mut state = lock(&clock.state);
+        state.until = None;
+        state.stopped = None;
+        if let Some(slot) = state.slot.take() {
+            watchdog().remove(slot);
+        }
+    }
+}
+
+/// A stopped clock; see [`Clock::pause`].
+#[must_use]
+pub struct Pause {
+    clock: Option<Clock>,
+}
+
+impl Drop for Pause {
+    fn drop(&mut self) {
+        let Some(clock) = &self.clock else { return };
+        let mut state = lock(&clock.state);
+        let Some((left, entry)) = state.stopped.take() else { return };
+        let grace = state.grace;
+        let until = Instant::now() + left;
+        state.until = Some(until);
+        state.slot = entry.map(|(message, on_stuck)| watchdog().add(until + grace, message, on_stuck));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIMIT: Duration = Duration::from_millis(60);
+
+    /// Runs a Lua loop after `work`, which takes twice the limit, inside of a deadline.
+    fn outcome(work: impl Fn(&Clock)) -> mlua::Result<()> {
+        let (lua, clock) = (Lua::new(), Clock::default());
+        clock.install(&lua)?;
+        let _deadline = clock.start(LIMIT, LIMIT, "x.lua", Arc::new(|_| {}));
+        work(&clock);
+        lua.load("for i = 1, 2 * 20000 do end").exec()
+    }
+
+    #[test]
+    fn time_that_a_binding_spends_with_the_clock_stopped_does_not_count() {
+        assert!(outcome(|_| thread::sleep(2 * LIMIT)).is_err());
+        let paused = |clock: &Clock| {
+            let _pause = clock.pause();
+            thread::sleep(2 * LIMIT);
+        };
+        assert!(outcome(paused).is_ok());
+    }
+
+    #[test]
+    fn a_deadline_that_was_met_never_wakes_the_watchdog() {
+        let woken = Arc::new(Mutex::new(false));
+        let seen = woken.clone();
+        drop(Clock::default().start(LIMIT, LIMIT, "x.lua", Arc::new(move |_| *lock(&seen) = true)));
+        thread::sleep(3 * LIMIT);
+        assert!(!*lock(&woken));
+    }
+}

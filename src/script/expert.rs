@@ -1,0 +1,284 @@
+//! Experts: Lua coroutines that see the true state and give one command a control step.
+
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, Mutex},
+};
+
+use mlua::{
+    Function, Lua, MetaMethod, MultiValue, Table, Thread, UserData, UserDataFields, UserDataMethods, Value,
+    chunk::ChunkMode,
+};
+
+use super::{
+    ScriptError,
+    plan::Machine,
+    pose::LuaPose,
+    sandbox::{fail, locked},
+    schema::{self, number, unknown},
+    sources::embedded,
+};
+use crate::geometry::{Pose, Vec3};
+
+/// What an expert may know of an object.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ObjectView {
+    /// Name in the scene.
+    pub name: String,
+    /// Name of the asset.
+    pub asset: String,
+    /// Middle of its bounding box, world frame, m.
+    pub centre_w: Vec3,
+    /// Turn about the vertical, rad.
+    pub yaw: f64,
+    /// Edge lengths of its bounding box at rest, in its own frame, m.
+    pub size: Vec3,
+    /// Numbers that its asset gives to experts.
+    pub hints: BTreeMap<String, f64>,
+}
+
+/// What an expert may know at a control step: the true state, copied.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExpertView {
+    /// Time since the start, s.
+    pub time_s: f64,
+    /// Length of a control step, s.
+    pub dt_s: f64,
+    /// Robot base in the world.
+    pub base_w: Pose,
+    /// Tool centre point in the robot base frame.
+    pub tcp_b: Pose,
+    /// Distance of the pads, m.
+    pub width_m: f64,
+    /// Closure commanded last, 0 open to 1 shut.
+    pub closure: f64,
+    /// Normal force on the left and right pad, N.
+    pub pad_force_n: [f64; 2],
+    /// The objects, in the order of the scene.
+    pub objects: Vec<ObjectView>,
+}
+
+/// What an expert wants next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ExpertCommand {
+    /// Tool centre point in the robot base frame.
+    pub pose_b: Pose,
+    /// Closure, 0 open to 1 shut.
+    pub closure: f64,
+    /// Whether the gripper is meant to hold something: what a binary gripper would be told.
+    pub gripping: bool,
+}
+
+/// A running expert in a machine of its own.
+pub struct Expert {
+    machine: Machine,
+    run: Coroutine,
+}
+
+impl Expert {
+    pub(super) fn start(machine: Machine, function: &Function) -> Result<Self, ScriptError> {
+        Ok(Self { machine, run: Coroutine::new(function.clone()) })
+    }
+
+    /// Lets the expert see `view` and gives its next command; none once it is done.
+    ///
+    /// # Errors
+    /// If the expert fails, takes too long, or yields something else than a command.
+    pub fn step(&mut self, view: &ExpertView) -> Result<Option<ExpertCommand>, ScriptError> {
+        let vm = &self.machine.vm;
+        let _deadline = vm.call_deadline();
+        self.run.step(&vm.lua, view).map_err(|e| vm.explain(&e))
+    }
+}
+
+/// An expert as a coroutine of any machine.
+pub(super) struct Coroutine {
+    function: Function,
+    view: Shared,
+    thread: Option<Thread>,
+}
+
+impl Coroutine {
+    pub fn new(function: Function) -> Self {
+        Self { function, view: Arc::default(), thread: None }
+    }
+
+    /// Lets the expert see `view` and gives its next command; none once it is done.
+    pub fn step(&mut self, lua: &Lua, view: &ExpertView) -> mlua::Result<Option<ExpertCommand>> {
+        *locked(&self.view) = Some(view.clone());
+        let values = self.resume(lua)?;
+        if self.thread.as_ref().is_none_or(|thread| !thread.is_resumable()) {
+            return Ok(None);
+        }
+        let mut values = values.into_iter();
+        let pose =
+            values.next().and_then(|value| value.as_userdata()?.borrow::<LuaPose>().ok().map(|pose| pose.0));
+        let closure = values.next().and_then(|value| number(&value));
+        let gripping = values.next().and_then(|value| value.as_boolean());
+        match (pose, closure, gripping) {
+            (Some(pose_w), Some(closure), Some(gripping)) => {
+                Ok(Some(ExpertCommand { pose_b: view.base_w.inv_mul(&pose_w), closure, gripping }))
+            }
+            _ => Err(fail(
+                lua,
+                "the expert yielded something that is not a command; use arm:command, arm:move_to, arm:wait … instead \
+                 of coroutine.yield",
+            )),
+        }
+    }
+
+    fn resume(&mut self, lua: &Lua) -> mlua::Result<MultiValue> {
+        match &self.thread {
+            Some(thread) if thread.is_resumable() => thread.resume(()),
+            Some(_) => Ok(MultiValue::new()),
+            None => {
+                let host = lua.create_userdata(Host(self.view.clone()))?;
+                let arm = arm(lua, &host)?;
+                let thread = lua.create_thread(self.function.clone())?;
+                let scene = lua.create_userdata(View(self.view.clone()))?;
+                self.thread.insert(thread).resume((arm, scene))
+            }
+        }
+    }
+}
+
+/// The arm's Lua side, from the embedded library.
+fn arm(lua: &Lua, host: &mlua::AnyUserData) -> mlua::Result<Table> {
+    let text =
+        embedded("scripts/softvt/arm.lua").ok_or_else(|| fail(lua, "the embedded library has no arm"))?;
+    lua.load(text).set_name("=softvt.arm").set_mode(ChunkMode::Text).call((host, checks(lua)?))
+}
+
+/// Checks for the arm's Lua side; errors stand at the expert's own line.
+fn checks(lua: &Lua) -> mlua::Result<Table> {
+    let checks = lua.create_table()?;
+    checks.set("pose", lua.create_function(|_, pose: LuaPose| Ok(pose))?)?;
+    let in_range = |lua: &Lua, (label, value, low, high): (String, Value, f64, f64)| {
+        let range = schema::Range::closed(low, high);
+        match number(&value).filter(|n| range.holds(*n)) {
+            Some(n) => Ok(n),
+            None => {
+                let got = schema::got(&value);
+                Err(fail(lua, format!("{label}: expected a number{}, got {got}", range.words())))
+            }
+        }
+    };
+    checks.set("number", lua.create_function(in_range)?)?;
+    checks.set("options", lua.create_function(options)?)?;
+    let refuse = |lua: &Lua, (label, key): (String, Value)| -> mlua::Result<()> {
+        Err(fail(lua, format!("{label}: there is no {}", schema::got(&key))))
+    };
+    checks.set("unknown", lua.create_function(refuse)?)?;
+    Ok(checks)
+}
+
+/// Numbers by name over their defaults; closure may be 0, the others are rates and must be above it.
+fn options(lua: &Lua, (label, given, defaults): (String, Value, Table)) -> mlua::Result<Table> {
+    let given = match given {
+        Value::Nil => return Ok(defaults),
+        Value::Table(given) => given,
+        other => {
+            return Err(fail(
+                lua,
+                format!("{label}: expected a table of options, got {}", schema::got(&other)),
+            ));
+        }
+    };
+    let known: Vec<String> =
+        schema::sorted_pairs(&defaults).iter().filter_map(|(key, _)| key.to_string().ok()).collect();
+    for (key, value) in schema::sorted_pairs(&given) {
+        let key = key.to_string()?;
+        if !known.contains(&key) {
+            return Err(fail(
+                lua,
+                format!("{label}: {}", unknown("option", &key, known.iter().map(String::as_str))),
+            ));
+        }
+        let range = if key == "closure" { schema::Range::closed(0.0, 1.0) } else { schema::Range::POSITIVE };
+        match number(&value).filter(|n| range.holds(*n)) {
+            Some(n) => defaults.set(key, n)?,
+            None => {
+                let got = schema::got(&value);
+                return Err(fail(
+                    lua,
+                    format!("{label}: {key}: expected a number{}, got {got}", range.words()),
+                ));
+            }
+        }
+    }
+    Ok(defaults)
+}
+
+type Shared = Arc<Mutex<Option<ExpertView>>>;
+
+fn with<R>(lua: &Lua, view: &Shared, read: impl FnOnce(&ExpertView) -> mlua::Result<R>) -> mlua::Result<R> {
+    match &*locked(view) {
+        Some(view) => read(view),
+        None => Err(fail(lua, "the expert has not been shown anything yet")),
+    }
+}
+
+/// The arm's measurements.
+struct Host(Shared);
+
+impl UserData for Host {
+    fn add_methods<M: UserDataMethods<Self>>(methods: &mut M) {
+        methods.add_meta_method(MetaMethod::Index, |lua, this, key: String| {
+            with(lua, &this.0, |view| {
+                Ok(match key.as_str() {
+                    "pose" => {
+                        let pose = LuaPose(view.base_w * view.tcp_b);
+                        Value::UserData(lua.create_userdata(pose)?)
+                    }
+                    "width" => Value::Number(view.width_m),
+                    "closure" => Value::Number(view.closure),
+                    "time" => Value::Number(view.time_s),
+                    "dt" => Value::Number(view.dt_s),
+                    "force" => Value::Table(lua.create_sequence_from(view.pad_force_n)?),
+                    _ => Value::Nil,
+                })
+            })
+        });
+    }
+}
+
+/// `softvt.View`: the scene as an expert sees it.
+struct View(Shared);
+
+impl UserData for View {
+    fn add_fields<F: UserDataFields<Self>>(fields: &mut F) {
+        fields.add_meta_field(MetaMethod::Type, "softvt.View");
+    }
+
+    fn add_methods<M: UserDataMethods<Self>>(methods: &mut M) {
+        methods.add_meta_method(MetaMethod::ToString, |_, _, ()| Ok("softvt.View"));
+        methods.add_method("object", |lua, this, name: String| {
+            with(lua, &this.0, |view| match view.objects.iter().find(|object| object.name == name) {
+                Some(object) => seen(lua, object),
+                None => {
+                    let names = view.objects.iter().map(|object| object.name.as_str());
+                    Err(fail(lua, format!("scene: {}", unknown("object", &name, names))))
+                }
+            })
+        });
+        methods.add_method("objects", |lua, this, ()| {
+            with(lua, &this.0, |view| {
+                let tables = view.objects.iter().map(|object| seen(lua, object));
+                lua.create_sequence_from(tables.collect::<mlua::Result<Vec<_>>>()?)
+            })
+        });
+    }
+}
+
+fn seen(lua: &Lua, object: &ObjectView) -> mlua::Result<Table> {
+    let table = lua.create_table()?;
+    table.set("name", object.name.as_str())?;
+    table.set("asset", object.asset.as_str())?;
+    table.set("xyz", lua.create_sequence_from(object.centre_w.iter().copied())?)?;
+    table.set("size", lua.create_sequence_from(object.size.iter().copied())?)?;
+    table.set("yaw", object.yaw)?;
+    let hints = object.hints.iter().map(|(name, value)| (name.as_str(), *value));
+    table.set("hints", lua.create_table_from(hints)?)?;
+    let names = ["name", "asset", "xyz", "size", "yaw", "hints"].map(str::to_string).to_vec();
+    super::options::strict(lua, "object", table, names)
+}

@@ -1,0 +1,283 @@
+//! Loading a script: what it returns becomes a [`Plan`] of plain data.
+
+use std::{
+    path::Path,
+    sync::{Arc, Mutex},
+};
+
+use mlua::{Function, Lua, MultiValue, Table, Value};
+
+use super::{
+    Bundle, OptionSpec, ScriptError, catalogue,
+    experiment::points,
+    options::{self, Session},
+    pose,
+    sandbox::{Limits, Vm, fail, locked},
+    schema::{self, unknown},
+    shapes,
+    sources::Library,
+};
+use crate::benchmark::{Goal, ObjectType, Plan, Shift, Suite, Task, Variation};
+
+/// A script that was read and understood.
+#[derive(Clone)]
+pub struct Loaded {
+    /// The main file, as messages name it.
+    pub main: String,
+    /// What it asks for.
+    pub plan: Plan,
+    /// The options that it declares, with their values.
+    pub options: Vec<OptionSpec>,
+    /// Everything that was read; episodes run on this.
+    pub bundle: Arc<Bundle>,
+    pub(super) argv: Vec<String>,
+    pub(super) limits: Limits,
+}
+
+impl std::fmt::Debug for Loaded {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Loaded").field("main", &self.main).field("plan", &self.plan).finish_non_exhaustive()
+    }
+}
+
+/// Reads the script at `path` with the words of the command line that are its own, and makes its plan.
+///
+/// # Errors
+/// Anything that is wrong with the file, what it requires, its options or its plan; the message names file and line.
+pub fn load(path: &Path, argv: &[String]) -> Result<Loaded, ScriptError> {
+    load_with(path, argv, &Limits::default())
+}
+
+/// [`load`] within other limits.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_with(path: &Path, argv: &[String], limits: &Limits) -> Result<Loaded, ScriptError> {
+    let (library, main) = Library::open(path)?;
+    let (machine, values) = open(&main, library, argv, limits)?;
+    let options = locked(&machine.session).options.clone();
+    let plan = machine.plan(&values).map_err(|e| machine.vm.explain(&e))?;
+    let bundle = Arc::new(locked(&machine.vm.shared.library).bundle().clone());
+    Ok(Loaded { main, plan, options, bundle, argv: argv.to_vec(), limits: limits.clone() })
+}
+
+/// The options that the script at `path` declares, for `--help`; those that it declares before an error, if any.
+///
+/// # Errors
+/// If the file cannot be read or is not Lua.
+pub fn declared_options(path: &Path) -> Result<Vec<OptionSpec>, ScriptError> {
+    let (library, main) = Library::open(path)?;
+    let machine = Machine::new(&main, library, &[], &Limits::default())?;
+    let outcome = machine.vm.run_main();
+    let declared = locked(&machine.session).options.clone();
+    if declared.is_empty() { outcome.map(|_| declared) } else { Ok(declared) }
+}
+
+/// A virtual machine with the whole Lua surface.
+pub(super) struct Machine {
+    pub vm: Vm,
+    session: Arc<Mutex<Session>>,
+}
+
+/// A machine that has run the main file, and what the file returned.
+fn open(
+    main: &str,
+    library: Library,
+    argv: &[String],
+    limits: &Limits,
+) -> Result<(Machine, MultiValue), ScriptError> {
+    let machine = Machine::new(main, library, argv, limits)?;
+    let values = machine.vm.run_main()?;
+    locked(&machine.session).leftover(main)?;
+    Ok((machine, values))
+}
+
+/// A fresh machine on the very sources of `loaded`, and what the main file returned in it.
+pub(super) fn reopen(loaded: &Loaded) -> Result<(Machine, MultiValue), ScriptError> {
+    open(&loaded.main, Library::frozen((*loaded.bundle).clone()), &loaded.argv, &loaded.limits)
+}
+
+impl Machine {
+    fn new(main: &str, library: Library, argv: &[String], limits: &Limits) -> Result<Self, ScriptError> {
+        let vm = Vm::new(main, library, limits)?;
+        let session = Session::new(argv);
+        install(&vm, &session).map_err(|e| vm.explain(&e))?;
+        Ok(Self { vm, session })
+    }
+
+    fn plan(&self, values: &MultiValue) -> mlua::Result<Plan> {
+        let lua = &self.vm.lua;
+        let Some(Value::Table(table)) = values.front() else {
+            return Err(no_plan(lua, values));
+        };
+        if schema::is_made(lua, &catalogue::SUITE, table) {
+            return Ok(Plan::Suite(suite(lua, table)?));
+        }
+        if schema::is_made(lua, &catalogue::EXPERIMENT, table) {
+            let _deadline = self.vm.call_deadline();
+            return Ok(Plan::Experiment {
+                name: table.get("name")?,
+                points: points(lua, table)?.len(),
+                columns: table.get::<Option<Vec<String>>>("columns")?.unwrap_or_default(),
+            });
+        }
+        let mut suites = Vec::new();
+        for entry in table.clone().sequence_values::<Value>() {
+            match entry? {
+                Value::Table(table) if schema::is_made(lua, &catalogue::SUITE, &table) => {
+                    suites.push(suite(lua, &table)?);
+                }
+                _ => return Err(no_plan(lua, values)),
+            }
+        }
+        match suites.is_empty() {
+            true => Err(no_plan(lua, values)),
+            false => Ok(Plan::Suites { suites }),
+        }
+    }
+}
+
+fn no_plan(lua: &Lua, values: &MultiValue) -> mlua::Error {
+    let value = values.front().map_or("nothing".to_string(), schema::got);
+    fail(
+        lua,
+        format!(
+            "a script returns a plan (softvt.suite{{…}}, softvt.experiment{{…}} or a list of suites), got {value}"
+        ),
+    )
+}
+
+/// Puts the Lua surface into a new machine. A further binding is one more line here.
+fn install(vm: &Vm, session: &Arc<Mutex<Session>>) -> mlua::Result<()> {
+    let lua = &vm.lua;
+    vm.api.set("version", env!("CARGO_PKG_VERSION"))?;
+    for (name, record) in catalogue::CONSTRUCTORS {
+        let make = lua.create_function(move |lua, value: Value| schema::make(lua, record, &value))?;
+        vm.api.set(*name, make)?;
+    }
+    vm.api.set("asset", lua.create_function(asset)?)?;
+    vm.api.set("layout", lua.create_function(layout)?)?;
+    options::install(lua, &vm.api, session)?;
+    shapes::install(lua, &vm.api)?;
+    pose::install(lua, &vm.api)?;
+    super::world_api::install(lua, &vm.api, &vm.clock)?;
+    super::sim_api::install(lua, &vm.api, &vm.clock)?;
+    super::envelope_api::install(lua, &vm.api)?;
+    let names = schema::sorted_pairs(&vm.api).iter().filter_map(|(key, _)| key.to_string().ok()).collect();
+    options::strict(lua, "softvt", vm.api.clone(), names)?;
+    Ok(())
+}
+
+/// `softvt.asset{…}`, with what no single field can say.
+fn asset(lua: &Lua, value: Value) -> mlua::Result<Table> {
+    let made = schema::make(lua, &catalogue::ASSET, &value)?;
+    let friction: Table = made.get("friction")?;
+    let (most, least): (f64, f64) = (friction.get("static_mu")?, friction.get("dynamic_mu")?);
+    match least <= most {
+        true => Ok(made),
+        false => Err(fail(
+            lua,
+            format!(
+                "asset.friction: dynamic_mu {least} is above static_mu {most}; give the larger one to static_mu"
+            ),
+        )),
+    }
+}
+
+/// `softvt.layout(name, build)` or `softvt.layout{ name = …, build = … }`.
+fn layout(lua: &Lua, (first, build): (Value, Option<Function>)) -> mlua::Result<Table> {
+    match (&first, build) {
+        (Value::String(name), build) => {
+            let table = lua.create_table()?;
+            table.set("name", name)?;
+            table.set("build", build)?;
+            schema::make(lua, &catalogue::LAYOUT, &Value::Table(table))
+        }
+        (_, None) => schema::make(lua, &catalogue::LAYOUT, &first),
+        _ => Err(fail(lua, format!("layout: expected a name and a function, got {}", schema::got(&first)))),
+    }
+}
+
+fn suite(lua: &Lua, table: &Table) -> mlua::Result<Suite> {
+    let variation = match table.get::<String>("variation")?.as_str() {
+        "object" => Variation::Object,
+        _ => Variation::Spatial,
+    };
+    let object_type = match table.get::<String>("object_type")?.as_str() {
+        "rigid" => ObjectType::Rigid,
+        _ => ObjectType::Deformable,
+    };
+    let name: String = table.get("name")?;
+    let tasks: Vec<Table> = table.get("tasks")?;
+    if tasks.is_empty() {
+        return Err(fail(lua, format!("suite.tasks: suite {name:?} has no tasks; give at least one")));
+    }
+    let budget = if variation == Variation::Object { 700 } else { 500 };
+    let tasks =
+        tasks.iter().enumerate().map(|(id, table)| task(id, table, budget)).collect::<Result<_, _>>()?;
+    let shifts: Option<Vec<Table>> = table.get("shifts")?;
+    let shifts = shifts.unwrap_or_default().iter().map(shift).collect::<mlua::Result<_>>()?;
+    let settings = super::sim_api::settings(lua, "suite.settings", table.get("settings")?)?;
+    Ok(Suite { name, object_type, variation, episodes: table.get("episodes")?, tasks, shifts, settings })
+}
+
+fn task(id: usize, table: &Table, budget: u32) -> mlua::Result<Task> {
+    let goal: Table = table.get("goal")?;
+    let (object, target, hold_s) = (goal.get("object")?, goal.get("target")?, goal.get("hold_s")?);
+    let kind: Value = goal.metatable().map_or(Ok(Value::Nil), |meta| meta.get("__name"))?;
+    let inside = kind.as_string().is_some_and(|kind| kind.to_string_lossy() == catalogue::INSIDE.kind);
+    Ok(Task {
+        id,
+        prompt: table.get("prompt")?,
+        layout: table.get::<Table>("layout")?.get("name")?,
+        goal: match inside {
+            true => Goal::In { object, target, hold_s },
+            false => Goal::On { object, target, hold_s },
+        },
+        budget_steps: table.get::<Option<u32>>("budget_steps")?.unwrap_or(budget),
+        expert: table.get::<Option<Function>>("expert")?.is_some(),
+    })
+}
+
+fn shift(table: &Table) -> mlua::Result<Shift> {
+    Ok(Shift {
+        name: table.get("name")?,
+        unit: table.get("unit")?,
+        default: table.get("default")?,
+        min: table.get("min")?,
+        max: table.get("max")?,
+    })
+}
+
+/// The tables of the suite and the task that an episode is of.
+pub(super) fn find_task(
+    machine: &Machine,
+    values: &MultiValue,
+    suite: &str,
+    id: usize,
+) -> Result<(Table, Table), ScriptError> {
+    let main = &machine.vm.shared.main;
+    let explain = |e: mlua::Error| machine.vm.explain(&e);
+    let Some(Value::Table(table)) = values.front() else {
+        return Err(ScriptError::new(main, "the script returned no suite"));
+    };
+    let suites: Vec<Table> = match schema::is_made(&machine.vm.lua, &catalogue::SUITE, table) {
+        true => vec![table.clone()],
+        false => table.clone().sequence_values().collect::<mlua::Result<_>>().map_err(explain)?,
+    };
+    let mut names = Vec::new();
+    for table in suites {
+        let name: String = table.get("name").map_err(explain)?;
+        if name == suite {
+            let tasks: Vec<Table> = table.get("tasks").map_err(explain)?;
+            let count = tasks.len();
+            let task = tasks.into_iter().nth(id);
+            return task.map(|task| (table, task)).ok_or_else(|| {
+                ScriptError::new(main, format!("suite {suite:?} has no task {id}"))
+                    .hint(format!("its tasks are 0 to {}", count.saturating_sub(1)))
+            });
+        }
+        names.push(name);
+    }
+    Err(ScriptError::new(main, unknown("suite", suite, names.iter().map(String::as_str))))
+}

@@ -1,0 +1,118 @@
+-- Replaces what in Lua's base library would leak addresses, depend on hash order, or escape time limits. Runs once in
+-- every new virtual machine, before any script, with the hooks of the host in `host`.
+local host = ...
+local raw_error, raw_tostring, raw_next, raw_format = error, tostring, next, string.format
+local raw_setmetatable, getmetatable, type, rawget, select = setmetatable, getmetatable, type, rawget, select
+local sort, pack, unpack, find, pcall = table.sort, table.pack, table.unpack, string.find, pcall
+
+-- An address differs from run to run, so it never becomes text.
+function tostring(...)
+  if select("#", ...) == 0 then raw_error("bad argument #1 to 'tostring' (value expected)", 2) end
+  local value = ...
+  local kind = type(value)
+  if kind == "table" or kind == "userdata" then
+    local meta = getmetatable(value)
+    if type(meta) == "table" and rawget(meta, "__tostring") == nil or meta == nil then return kind end
+  elseif kind == "function" or kind == "thread" then
+    return kind
+  end
+  return raw_tostring(value)
+end
+local tostring = tostring
+
+function string.format(form, ...)
+  if type(form) == "string" and find(form, "%%[-+ #0]*%d*%.?%d*p") then
+    raw_error("string.format: %p prints an address, which differs from run to run; use %s with a name", 2)
+  end
+  local values = pack(...)
+  for i = 1, values.n do
+    local kind = type(values[i])
+    if kind == "table" or kind == "function" or kind == "thread" or kind == "userdata" then
+      values[i] = tostring(values[i])
+    end
+  end
+  return raw_format(form, unpack(values, 1, values.n))
+end
+
+-- Errors that are objects are described here, since Lua would later show their address alone.
+function error(object, level)
+  level = level or 1
+  if type(object) ~= "string" then host.raised(object) end
+  if level > 0 then level = level + 1 end
+  raw_error(object, level)
+end
+
+-- A handler that runs at the place of the error would run inside the hook that enforces the time limit, where no hook
+-- stops it; this one runs after the stack has unwound.
+function xpcall(f, handler, ...)
+  local results = pack(pcall(f, ...))
+  if results[1] then return unpack(results, 1, results.n) end
+  local _, handled = pcall(handler, results[2])
+  return false, handled
+end
+
+-- A finaliser runs where no time limit holds.
+function setmetatable(object, meta)
+  if type(meta) == "table" and rawget(meta, "__gc") ~= nil then
+    raw_error("setmetatable: finalisers (__gc) are not available in a script", 2)
+  end
+  return raw_setmetatable(object, meta)
+end
+
+local rank = { number = 1, string = 2, boolean = 3 }
+local function before(a, b)
+  local kind_a, kind_b = type(a), type(b)
+  if kind_a ~= kind_b then return rank[kind_a] < rank[kind_b] end
+  if kind_a == "boolean" then return not a and b end
+  return a < b
+end
+
+-- Keys in an order that does not depend on hashes: numbers, strings, booleans, then the rest as Lua has them.
+local function ordered_keys(object)
+  local keys, rest, n, m, in_order = {}, {}, 0, 0, true
+  for key in raw_next, object do
+    if rank[type(key)] then
+      if n > 0 and in_order and not before(keys[n], key) then in_order = false end
+      n = n + 1
+      keys[n] = key
+    else
+      m = m + 1
+      rest[m] = key
+    end
+  end
+  if not in_order then sort(keys, before) end
+  for i = 1, m do keys[n + i] = rest[i] end
+  return keys
+end
+
+local function iterate(object)
+  local keys, i = ordered_keys(object), 0
+  return function()
+    while true do
+      i = i + 1
+      local key = keys[i]
+      if key == nil then return nil end
+      local value = object[key]
+      if value ~= nil then return key, value end
+    end
+  end
+end
+
+function pairs(object)
+  local meta = getmetatable(object)
+  local own = type(meta) == "table" and rawget(meta, "__pairs")
+  if own then return own(object) end
+  if type(object) ~= "table" then
+    raw_error("bad argument #1 to 'pairs' (table expected, got " .. type(object) .. ")", 2)
+  end
+  return iterate(object), object, nil
+end
+
+host.sorted = function(object)
+  if type(object) ~= "table" then raw_error("softvt.sorted: expected a table, got " .. type(object), 2) end
+  return iterate(object)
+end
+
+function math.randomseed()
+  raw_error("math.randomseed: a script is seeded by the run (--seed), so that it can be repeated", 2)
+end

@@ -1,0 +1,455 @@
+//! Strict tables: what a table of the Lua surface may hold, said once and used for checking, stubs and reference.
+
+use mlua::{Lua, Table, Value};
+
+use super::sandbox::{fail, here, locked, shared};
+
+/// Bounds of a number; an end may be excluded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Range {
+    /// Lowest value.
+    pub min: f64,
+    /// Highest value.
+    pub max: f64,
+    /// Whether `min` itself is refused.
+    pub above_min: bool,
+    /// Whether `max` itself is refused.
+    pub below_max: bool,
+}
+
+impl Range {
+    /// Any finite number.
+    pub const ANY: Self =
+        Self { min: f64::NEG_INFINITY, max: f64::INFINITY, above_min: false, below_max: false };
+    /// Greater than zero.
+    pub const POSITIVE: Self = Self { min: 0.0, above_min: true, ..Self::ANY };
+    /// Zero or greater.
+    pub const NOT_NEGATIVE: Self = Self { min: 0.0, ..Self::ANY };
+
+    /// From `min` to `max`, both allowed.
+    pub const fn closed(min: f64, max: f64) -> Self {
+        Self { min, max, above_min: false, below_max: false }
+    }
+
+    /// From `min` (allowed) to `max` (refused).
+    pub const fn below(min: f64, max: f64) -> Self {
+        Self { min, max, above_min: false, below_max: true }
+    }
+
+    /// Whether `value` is allowed; never for NaN or an infinity.
+    pub fn holds(&self, value: f64) -> bool {
+        let low = if self.above_min { value > self.min } else { value >= self.min };
+        let high = if self.below_max { value < self.max } else { value <= self.max };
+        value.is_finite() && low && high
+    }
+
+    /// ` in 0..10`, ` above 0`, …; empty for any number.
+    pub fn words(&self) -> String {
+        match (self.min.is_finite(), self.max.is_finite()) {
+            (false, false) => String::new(),
+            (true, false) if self.above_min => format!(" above {}", self.min),
+            (true, false) => format!(" of {} or more", self.min),
+            (false, true) => format!(" of {} or less", self.max),
+            (true, true) => {
+                let low = if self.above_min { "above " } else { "" };
+                let high = if self.below_max { "below " } else { "" };
+                format!(" in {low}{}..{high}{}", self.min, self.max)
+            }
+        }
+    }
+}
+
+/// What a value may be.
+#[derive(Clone, Copy, Debug)]
+pub enum Type {
+    /// A finite number in a unit ("" for none).
+    Number(&'static str, Range),
+    /// A whole number.
+    Integer(Range),
+    /// A string, not empty.
+    Text,
+    /// `true` or `false`.
+    Boolean,
+    /// A list of so many numbers in a unit.
+    Vector(usize, &'static str),
+    /// One of these strings.
+    Choice(&'static [&'static str]),
+    /// A function, with its signature as LuaCATS writes it.
+    Function(&'static str),
+    /// A list.
+    List(&'static Type),
+    /// A table from strings.
+    Map(&'static Type),
+    /// A plain table, checked in place.
+    Nested(&'static Record),
+    /// A table made by the constructor of one of these records.
+    Made(&'static [&'static Record]),
+    /// An object of the host, by class name.
+    Object(&'static str),
+    /// The first of these that fits.
+    OneOf(&'static [Type]),
+    /// Anything.
+    Any,
+}
+
+/// What holds when a field is left out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Presence {
+    /// It may not be left out.
+    Required,
+    /// Nothing.
+    Optional,
+    /// This number.
+    Number(f64),
+    /// This whole number.
+    Integer(i64),
+    /// This string.
+    Text(&'static str),
+    /// This flag.
+    Boolean(bool),
+    /// A table with its own defaults.
+    Empty,
+}
+
+/// A field of a record.
+#[derive(Clone, Copy, Debug)]
+pub struct Field {
+    /// Its key.
+    pub name: &'static str,
+    /// What it may be.
+    pub ty: Type,
+    /// What holds when it is left out.
+    pub presence: Presence,
+    /// One or two sentences.
+    pub doc: &'static str,
+}
+
+/// A kind of table.
+#[derive(Clone, Copy, Debug)]
+pub struct Record {
+    /// How messages name it: `task.goal`.
+    pub label: &'static str,
+    /// Class name in stubs: `softvt.Goal`.
+    pub class: &'static str,
+    /// Registry key of its metatable, unique.
+    pub kind: &'static str,
+    /// One or two sentences.
+    pub doc: &'static str,
+    /// What it may hold.
+    pub fields: &'static [Field],
+}
+
+/// What is wrong with a value, and where in the table.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Fault {
+    /// Keys from the outermost table inwards.
+    pub path: Vec<String>,
+    /// A lower-case fragment.
+    pub message: String,
+}
+
+impl Fault {
+    fn new(message: String) -> Self {
+        Self { path: Vec::new(), message }
+    }
+
+    fn inside(mut self, key: impl Into<String>) -> Self {
+        self.path.insert(0, key.into());
+        self
+    }
+
+    /// `task.goal.hold_s: expected …`.
+    pub fn words(&self, label: &str) -> String {
+        let mut text = label.to_string();
+        for key in &self.path {
+            if !key.starts_with('[') {
+                text.push('.');
+            }
+            text.push_str(key);
+        }
+        format!("{text}: {}", self.message)
+    }
+}
+
+/// The candidate that the writer of `word` most likely meant, if any is close.
+pub fn closest<'a>(word: &str, candidates: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    let allowed = (word.chars().count() / 3).max(1);
+    let begins =
+        |candidate: &str| word.len() > 2 && (candidate.starts_with(word) || word.starts_with(candidate));
+    candidates
+        .map(|candidate| (strsim::damerau_levenshtein(word, candidate), candidate))
+        .filter(|(distance, candidate)| *distance <= allowed || begins(candidate))
+        .min_by_key(|(distance, candidate)| (*distance, candidate.len()))
+        .map(|(_, candidate)| candidate)
+}
+
+/// `unknown key "promt"; did you mean "prompt"?`
+pub fn unknown<'a>(what: &str, word: &str, known: impl Iterator<Item = &'a str> + Clone) -> String {
+    match closest(word, known.clone()) {
+        Some(close) => format!("unknown {what} {word:?}; did you mean {close:?}?"),
+        None => format!("unknown {what} {word:?}; there are {}", known.collect::<Vec<_>>().join(", ")),
+    }
+}
+
+/// How a message shows an offending value.
+pub(super) fn got(value: &Value) -> String {
+    match value {
+        Value::String(text) => format!("{:?}", text.to_string_lossy()),
+        Value::Integer(number) => number.to_string(),
+        Value::Number(number) => number.to_string(),
+        Value::Boolean(flag) => flag.to_string(),
+        Value::Nil => "nil".into(),
+        other => format!("a {}", other.type_name()),
+    }
+}
+
+impl Type {
+    /// What a message says was expected.
+    pub fn words(&self) -> String {
+        match self {
+            Self::Number(unit, range) => format!("{}{}", unit_words(unit), range.words()),
+            Self::Integer(range) => format!("a whole number{}", range.words()),
+            Self::Text => "a string that is not empty".into(),
+            Self::Boolean => "true or false".into(),
+            Self::Vector(count, "") => format!("a list of {count} numbers"),
+            Self::Vector(count, unit) => format!("a list of {count} numbers ({unit})"),
+            Self::Choice(names) => {
+                let quoted: Vec<_> = names.iter().map(|name| format!("{name:?}")).collect();
+                format!("one of {}", quoted.join(", "))
+            }
+            Self::Function(signature) => format!("a function, {signature}"),
+            Self::List(of) => format!("a list of {}", of.words()),
+            Self::Map(of) => format!("a table from names to {}", of.words()),
+            Self::Nested(record) => format!("a table of {}", names(record)),
+            Self::Made(records) => {
+                let made: Vec<_> = records.iter().map(|r| format!("{}{{…}}", r.kind)).collect();
+                format!("what {} gives", made.join(" or "))
+            }
+            Self::Object(class) => format!("a {class}"),
+            Self::OneOf(types) => types.iter().map(Self::words).collect::<Vec<_>>().join(" or "),
+            Self::Any => "a value".into(),
+        }
+    }
+
+    /// The value as it is stored, or what is wrong with it.
+    pub(super) fn check(&self, lua: &Lua, value: &Value) -> Result<Value, Fault> {
+        let wrong = || Fault::new(format!("expected {}, got {}", self.words(), got(value)));
+        let kept = || Ok(value.clone());
+        match (self, value) {
+            (Self::Number(_, range), _) => match number(value) {
+                Some(n) if range.holds(n) => Ok(Value::Number(n)),
+                _ => Err(wrong()),
+            },
+            (Self::Integer(range), _) => match whole(value) {
+                Some(n) if range.holds(n as f64) => Ok(Value::Integer(n)),
+                _ => Err(wrong()),
+            },
+            (Self::Text, Value::String(text)) if !text.as_bytes().is_empty() => kept(),
+            (Self::Boolean, Value::Boolean(_)) | (Self::Function(_), Value::Function(_)) => kept(),
+            (Self::Any, value) if !value.is_nil() => kept(),
+            (Self::Choice(names), Value::String(text)) => {
+                let text = text.to_string_lossy();
+                match names.iter().any(|name| *name == text) {
+                    true => kept(),
+                    false => Err(wrong()),
+                }
+            }
+            (Self::Vector(count, _), Value::Table(list)) => {
+                let numbers = vector(list, *count).ok_or_else(wrong)?;
+                lua.create_sequence_from(numbers).map(Value::Table).map_err(|e| Fault::new(e.to_string()))
+            }
+            (Self::List(of), Value::Table(list)) => check_list(lua, of, list, &wrong),
+            (Self::Map(of), Value::Table(map)) => check_map(lua, of, map),
+            (Self::Nested(record), Value::Table(table)) => check(lua, record, table).map(Value::Table),
+            (Self::Made(records), Value::Table(table)) => {
+                match records.iter().any(|record| is_made(lua, record, table)) {
+                    true => kept(),
+                    false => Err(wrong()),
+                }
+            }
+            (Self::Object(class), Value::UserData(object)) => match object.type_name() {
+                Ok(name) if name.to_string_lossy() == *class => kept(),
+                _ => Err(wrong()),
+            },
+            (Self::OneOf(types), _) => {
+                types.iter().find_map(|ty| ty.check(lua, value).ok()).ok_or_else(wrong)
+            }
+            _ => Err(wrong()),
+        }
+    }
+}
+
+fn names(record: &Record) -> String {
+    record.fields.iter().map(|field| field.name).collect::<Vec<_>>().join(", ")
+}
+
+fn unit_words(unit: &str) -> String {
+    match unit {
+        "" => "a number".into(),
+        "s" => "seconds".into(),
+        "m" => "metres".into(),
+        "rad" => "radians".into(),
+        "Pa" => "pascals".into(),
+        other => format!("a number ({other})"),
+    }
+}
+
+pub(super) fn number(value: &Value) -> Option<f64> {
+    match value {
+        Value::Integer(n) => Some(*n as f64),
+        Value::Number(n) => Some(*n),
+        _ => None,
+    }
+}
+
+fn whole(value: &Value) -> Option<i64> {
+    match value {
+        Value::Integer(n) => Some(*n),
+        Value::Number(n) if n.fract() == 0.0 && n.abs() < 9e15 => Some(*n as i64),
+        _ => None,
+    }
+}
+
+fn vector(list: &Table, count: usize) -> Option<Vec<f64>> {
+    let values: Vec<Value> = list.clone().sequence_values().collect::<mlua::Result<_>>().ok()?;
+    let numbers: Vec<f64> = values.iter().map(number).collect::<Option<_>>()?;
+    let entries = list.pairs::<Value, Value>().take(count + 1).count();
+    (numbers.len() == count && entries == count && numbers.iter().all(|n| n.is_finite())).then_some(numbers)
+}
+
+fn check_list(lua: &Lua, of: &Type, list: &Table, wrong: &dyn Fn() -> Fault) -> Result<Value, Fault> {
+    let out = lua.create_table().map_err(|e| Fault::new(e.to_string()))?;
+    let count = list.raw_len();
+    if list.pairs::<Value, Value>().count() != count {
+        return Err(wrong());
+    }
+    for index in 1..=count {
+        let value: Value = list.raw_get(index).map_err(|e| Fault::new(e.to_string()))?;
+        let value = of.check(lua, &value).map_err(|fault| fault.inside(format!("[{index}]")))?;
+        out.raw_set(index, value).map_err(|e| Fault::new(e.to_string()))?;
+    }
+    Ok(Value::Table(out))
+}
+
+fn check_map(lua: &Lua, of: &Type, map: &Table) -> Result<Value, Fault> {
+    let out = lua.create_table().map_err(|e| Fault::new(e.to_string()))?;
+    for (key, value) in sorted_pairs(map) {
+        let Value::String(name) = &key else {
+            return Err(Fault::new(format!("expected names as keys, got {}", got(&key))));
+        };
+        let name = name.to_string_lossy().to_string();
+        let value = of.check(lua, &value).map_err(|fault| fault.inside(name.clone()))?;
+        out.raw_set(name, value).map_err(|e| Fault::new(e.to_string()))?;
+    }
+    Ok(Value::Table(out))
+}
+
+/// Entries in an order that does not depend on hashes.
+pub(super) fn sorted_pairs(table: &Table) -> Vec<(Value, Value)> {
+    let mut entries: Vec<_> = table.pairs::<Value, Value>().flatten().collect();
+    entries.sort_by_key(|(key, _)| match key {
+        Value::Integer(n) => (0, *n, String::new()),
+        Value::String(text) => (1, 0, text.to_string_lossy().to_string()),
+        other => (2, 0, got(other)),
+    });
+    entries
+}
+
+/// A copy of `table` with every field checked and every default filled in.
+pub(super) fn check(lua: &Lua, record: &Record, table: &Table) -> Result<Table, Fault> {
+    for (key, _) in sorted_pairs(table) {
+        let known = record.fields.iter().map(|field| field.name);
+        match &key {
+            Value::String(name) if known.clone().any(|field| field == name.to_string_lossy()) => {}
+            Value::String(name) => return Err(Fault::new(unknown("key", &name.to_string_lossy(), known))),
+            other => {
+                return Err(Fault::new(format!(
+                    "unexpected entry [{}]; the keys are {}",
+                    got(other),
+                    names(record)
+                )));
+            }
+        }
+    }
+    let out = lua.create_table().map_err(|e| Fault::new(e.to_string()))?;
+    for field in record.fields {
+        let value: Value = table.raw_get(field.name).map_err(|e| Fault::new(e.to_string()))?;
+        let value = match value {
+            Value::Nil => absent(lua, field)?,
+            value => field.ty.check(lua, &value).map_err(|fault| fault.inside(field.name))?,
+        };
+        out.raw_set(field.name, value).map_err(|e| Fault::new(e.to_string()))?;
+    }
+    Ok(out)
+}
+
+fn absent(lua: &Lua, field: &Field) -> Result<Value, Fault> {
+    Ok(match field.presence {
+        Presence::Required => {
+            return Err(Fault::new(format!("missing; expected {}", field.ty.words())).inside(field.name));
+        }
+        Presence::Optional => Value::Nil,
+        Presence::Number(n) => Value::Number(n),
+        Presence::Integer(n) => Value::Integer(n),
+        Presence::Boolean(flag) => Value::Boolean(flag),
+        Presence::Text(text) => {
+            Value::String(lua.create_string(text).map_err(|e| Fault::new(e.to_string()))?)
+        }
+        Presence::Empty => {
+            let empty = lua.create_table().map_err(|e| Fault::new(e.to_string()))?;
+            field.ty.check(lua, &Value::Table(empty)).map_err(|fault| fault.inside(field.name))?
+        }
+    })
+}
+
+/// What the constructor of `record` gives for `value`: a checked table that also refuses to be read by unknown keys.
+pub(super) fn make(lua: &Lua, record: &'static Record, value: &Value) -> mlua::Result<Table> {
+    let Value::Table(table) = value else {
+        let message = format!("{}: expected a table of {}, got {}", record.label, names(record), got(value));
+        return Err(fail(lua, message));
+    };
+    let made = check(lua, record, table).map_err(|fault| fault_here(lua, record.label, &fault))?;
+    made.set_metatable(Some(metatable(lua, record)?))?;
+    Ok(made)
+}
+
+/// Whether the constructor of `record` made `table`.
+pub(super) fn is_made(lua: &Lua, record: &Record, table: &Table) -> bool {
+    let own = lua.named_registry_value::<Table>(record.kind);
+    own.is_ok_and(|own| table.metatable().is_some_and(|meta| meta.to_pointer() == own.to_pointer()))
+}
+
+fn metatable(lua: &Lua, record: &'static Record) -> mlua::Result<Table> {
+    if let Ok(existing) = lua.named_registry_value::<Table>(record.kind) {
+        return Ok(existing);
+    }
+    let meta = lua.create_table()?;
+    meta.set("__name", record.kind)?;
+    meta.set("__metatable", record.kind)?;
+    meta.set("__tostring", lua.create_function(|_, _: Value| Ok(record.kind))?)?;
+    let read = lua.create_function(|lua, (_, key): (Value, Value)| {
+        let known = record.fields.iter().map(|field| field.name);
+        match &key {
+            Value::String(name) if known.clone().any(|field| field == name.to_string_lossy()) => {
+                Ok(Value::Nil)
+            }
+            Value::String(name) => {
+                let message = unknown("key", &name.to_string_lossy(), known);
+                Err(fail(lua, format!("{}: {message}", record.label)))
+            }
+            _ => Ok(Value::Nil),
+        }
+    })?;
+    meta.set("__index", read)?;
+    lua.set_named_registry_value(record.kind, &meta)?;
+    Ok(meta)
+}
+
+/// A fault as an error at the line of the offending key, as far as the text shows it.
+pub(super) fn fault_here(lua: &Lua, label: &str, fault: &Fault) -> mlua::Error {
+    let message = fault.words(label);
+    let Some((file, line)) = here(lua) else { return fail(lua, message) };
+    let text = shared(lua).ok().and_then(|shared| locked(&shared.library).text(&file).ok());
+    let line = text.map_or(line, |text| super::position::line_of_key(&text, line, &fault.path));
+    mlua::Error::external(super::ScriptError::new(file, message).at(Some(line)))
+}

@@ -1,0 +1,273 @@
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use super::*;
+
+#[test]
+fn a_missing_file_is_named() {
+    let error = load_with(&PathBuf::from("nowhere/x.lua"), &[], &limits()).unwrap_err().to_string();
+    assert_eq!(
+        error,
+        "nowhere/x.lua: no such file; give the path of a Lua file; `softvt list suites` shows the standard ones"
+    );
+    assert!(error_of_folder().starts_with("suites: is a folder"));
+}
+
+fn error_of_folder() -> String {
+    Project::new(&[("suites/x.lua", "")]).error("suites", &[])
+}
+
+#[test]
+fn a_syntax_error_has_its_line() {
+    assert_eq!(
+        error_of("local a = 1\nlocal b = = 2\n"),
+        "suites/x.lua:2: syntax error: unexpected symbol near '='"
+    );
+}
+
+#[test]
+fn a_runtime_error_has_its_line_and_no_traceback() {
+    assert_eq!(
+        error_of("local t = nil\n\nprint(t.x)"),
+        "suites/x.lua:3: attempt to index a nil value (local 't')"
+    );
+    assert_eq!(error_of("error('oh', 0)"), "suites/x.lua:1: oh");
+    assert_eq!(
+        error_of("\nsoftvt.suit {}"),
+        "suites/x.lua:2: softvt: unknown key \"suit\"; did you mean \"suite\"?"
+    );
+}
+
+#[test]
+fn an_error_object_is_described_without_its_address() {
+    assert_eq!(
+        error_of("\nerror({ code = 3, what = 'jam' })"),
+        "suites/x.lua:2: error object {code = 3, what = \"jam\"}"
+    );
+    assert_eq!(error_of("error(nil)"), "suites/x.lua:1: error object nil");
+}
+
+#[test]
+fn endless_loops_are_stopped_wherever_they_hide() {
+    let said = "suites/x.lua: the script ran for more than 0.3 s; look for an endless loop";
+    for text in [
+        "while true do end",
+        "while true do pcall(function() while true do end end) end",
+        "local function f() return f() end f()",
+        "local c = coroutine.wrap(function() while true do end end) c()",
+        "while true do coroutine.resume(coroutine.create(function() while true do end end)) end",
+        "while true do xpcall(function() while true do end end, function() while true do end end) end",
+        "while true do local x <close> = setmetatable({}, { __close = function() while true do end end }) end",
+        "local t = setmetatable({}, { __index = function(t, k) while true do end end }) return t.x",
+        "table.sort({ 3, 2, 1 }, function() while true do end end)",
+        "for _ in pairs(setmetatable({}, { __pairs = function() return function() return 1 end end })) do end",
+        "string.gsub(('x'):rep(10), 'x', function() while true do end end)",
+    ] {
+        assert_eq!(error_of(text), said, "{text}");
+    }
+}
+
+#[test]
+fn a_library_function_that_does_not_return_wakes_the_watchdog() {
+    static BARKS: AtomicUsize = AtomicUsize::new(0);
+    let project = Project::new(&[(
+        "x.lua",
+        "local s = ('a'):rep(1000)\nstring.find(s, ('a-'):rep(2) .. 'b')\nreturn 1",
+    )]);
+    let mut limits = limits();
+    limits.load = Duration::from_millis(1);
+    limits.on_stuck = Arc::new(|message| {
+        assert!(
+            message.contains("x.lua: the script called a library function that did not return"),
+            "{message}"
+        );
+        BARKS.fetch_add(1, Ordering::SeqCst);
+    });
+    let start = std::time::Instant::now();
+    let _ = project.load_with("x.lua", &[], &limits);
+    assert!(start.elapsed() > Duration::from_millis(60), "the pattern is too easy: {:?}", start.elapsed());
+    assert_eq!(BARKS.load(Ordering::SeqCst), 1);
+}
+
+#[test]
+fn a_memory_hog_is_stopped() {
+    let said = "the script used more than its 16 MiB of memory; build smaller tables and strings, or keep fewer of them";
+    for text in [
+        "local t = {} for i = 1, 1e9 do t[i] = { i } end",
+        "local s = 'x' while true do s = s .. s end",
+        "return ('x'):rep(1 << 30)",
+    ] {
+        assert_eq!(error_of(text), format!("suites/x.lua: {said}"), "{text}");
+    }
+}
+
+#[test]
+fn byte_code_is_refused() {
+    let project = Project::new(&[]);
+    project.write("x.lua", b"\x1bLua\x54\x00\x19\x93");
+    assert_eq!(
+        project.error("x.lua", &[]),
+        "x.lua: is compiled byte code; only Lua source text is run; give the .lua file that it was compiled from"
+    );
+    assert_eq!(
+        error_of("local f, message = load('\\27Lua') error(message, 0)"),
+        "suites/x.lua:1: load: compiled byte code is refused; only Lua source text is run"
+    );
+    project.write("y.lua", b"return '\xff'");
+    assert_eq!(project.error("y.lua", &[]), "y.lua:1: is not UTF-8 text; save the file as UTF-8");
+}
+
+#[test]
+fn the_outside_is_out_of_reach() {
+    for name in
+        ["io", "os", "debug", "package", "dofile", "loadfile", "collectgarbage", "string.dump", "warn"]
+    {
+        let text = format!("error({name} == nil and 'gone' or 'here', 0)");
+        assert_eq!(error_of(&text), "suites/x.lua:1: gone", "{name}");
+    }
+    assert!(error_of("setmetatable({}, { __gc = function() end })").contains("__gc"));
+}
+
+#[test]
+fn require_stays_inside_of_the_project() {
+    let paths = "a module is named by words joined with dots, such as \"experts.pick_place\", and lies inside the \
+                 project; paths are refused";
+    for name in ["../secret", "..secret", "/etc/passwd", "a..b", "a/../../b", "C:\\x", ""] {
+        let text = format!("require [[{name}]]");
+        assert_eq!(error_of(&text), format!("suites/x.lua:1: require {name:?}: {paths}"));
+    }
+    let project = Project::new(&[("p/suites/x.lua", "require 'out'"), ("secret.lua", "return 1")]);
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink(project.path("secret.lua"), project.path("p/suites/out.lua")).unwrap();
+        let error = project.error("p/suites/x.lua", &[]);
+        assert_eq!(
+            error,
+            "p/suites/x.lua:1: require \"out\": p/suites/out.lua is a link that leads out of the project"
+        );
+    }
+}
+
+#[test]
+fn modules_are_found_and_circles_are_named() {
+    let project = Project::new(&[
+        ("suites/x.lua", "local a = require 'lib.a'\nassert(a.n == 1 and require 'lib.a' == a)\nrequire 'b'"),
+        ("scripts/lib/a.lua", "return { n = 1 }"),
+        ("suites/b.lua", "return require 'c'"),
+        ("c.lua", "return require 'b'"),
+    ]);
+    assert_eq!(
+        project.error("suites/x.lua", &[]),
+        "c.lua:1: require \"b\": the modules require each other in a circle"
+    );
+    let missing = error_of("\nrequire 'nothing.here'");
+    assert!(
+        missing.starts_with("suites/x.lua:2: require \"nothing.here\": no nothing/here.lua in "),
+        "{missing}"
+    );
+}
+
+#[test]
+fn a_wrong_table_is_named_by_key_and_line() {
+    let on =
+        |rest: &str| error_of(&format!("\nsoftvt.on {{\n  object = 'a',\n  target = 'b',\n  {rest}\n}}"));
+    assert_eq!(
+        on("hold_s = '0.4'"),
+        "suites/x.lua:5: task.goal.hold_s: expected seconds in 0..10, got \"0.4\""
+    );
+    assert_eq!(on("hold_s = 0 / 0"), "suites/x.lua:5: task.goal.hold_s: expected seconds in 0..10, got NaN");
+    assert_eq!(on("hold = 1"), "suites/x.lua:2: task.goal: unknown key \"hold\"; did you mean \"hold_s\"?");
+    assert_eq!(
+        on("[1] = 2"),
+        "suites/x.lua:2: task.goal: unexpected entry [1]; the keys are object, target, hold_s"
+    );
+    assert_eq!(
+        error_of("softvt.on { object = 'a' }"),
+        "suites/x.lua:1: task.goal.target: missing; expected a string that is not empty"
+    );
+    assert_eq!(
+        error_of("softvt.on 'a'"),
+        "suites/x.lua:1: task.goal: expected a table of object, target, hold_s, got \"a\""
+    );
+}
+
+#[test]
+fn a_material_that_cannot_be_is_refused() {
+    let soft = |rest: &str| error_of(&format!("softvt.soft {{ density = 200, {rest} }}"));
+    assert_eq!(
+        soft("youngs_pa = -1, poisson = 0.3"),
+        "suites/x.lua:1: asset.body.youngs_pa: expected pascals above 0, got -1"
+    );
+    assert_eq!(
+        soft("youngs_pa = 1e4, poisson = 0.5"),
+        "suites/x.lua:1: asset.body.poisson: expected a number in 0..below 0.5, got 0.5"
+    );
+    assert!(
+        error_of(
+            "softvt.asset { name = 'a', shape = softvt.shape.sphere { radius = 1 }, body = softvt.static {}, \
+             friction = { static_mu = 0.1 } }"
+        )
+        .contains("asset.friction: dynamic_mu 0.5 is above static_mu 0.1")
+    );
+    assert!(
+        error_of("softvt.shape.sphere { radius = -1 }")
+            .contains("shape.sphere.radius: expected metres above 0, got -1")
+    );
+    assert!(error_of("softvt.shape.box { size = { 1, 0, 1 } }").contains("half extent is 0"));
+}
+
+#[test]
+fn a_mesh_that_is_no_solid_is_refused_with_its_file() {
+    let tetrahedron = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\n";
+    let project = Project::new(&[
+        ("open.obj", tetrahedron),
+        ("empty.obj", "v 0 0 0\n"),
+        ("good.obj", &format!("{tetrahedron}f 2 3 4\n")),
+        ("mesh.doc", ""),
+    ]);
+    let error = |file: &str| {
+        project.write("x.lua", format!("error(tostring(softvt.mesh {{ file = '{file}' }}), 0)").as_bytes());
+        project.error("x.lua", &[])
+    };
+    assert_eq!(
+        error("open.obj"),
+        "x.lua:1: mesh: open.obj: the mesh is open: 3 edges have a triangle on one side only; close its holes"
+    );
+    assert!(
+        error("empty.obj").starts_with("x.lua:1: mesh: empty.obj: the mesh is empty"),
+        "{}",
+        error("empty.obj")
+    );
+    assert!(error("mesh.doc").contains("\"doc\" is no known mesh format"));
+    assert!(error("../a.obj").contains("leads out of the project"));
+    assert!(error("none.obj").starts_with("x.lua:1: mesh.file: no file \"none.obj\" in "));
+    assert_eq!(error("good.obj"), "x.lua:1: softvt.Shape");
+}
+
+#[test]
+fn a_script_must_return_a_plan() {
+    let said = "a script returns a plan (softvt.suite{…}, softvt.experiment{…} or a list of suites), got";
+    assert_eq!(error_of("return 3"), format!("suites/x.lua: {said} 3"));
+    assert_eq!(error_of(""), format!("suites/x.lua: {said} nothing"));
+    assert_eq!(error_of("return {}"), format!("suites/x.lua: {said} a table"));
+}
+
+#[test]
+fn text_never_holds_an_address_and_pairs_has_one_order() {
+    let text = "local t = {} for _, k in ipairs { 'z', 'b', 'q', 'a' } do t[k] = 1 end t[2] = 1 t[1] = 1 t[true] = 1\n\
+                local keys = {} for k in pairs(t) do keys[#keys + 1] = tostring(k) end\n\
+                error(table.concat(keys, ' ') .. tostring({}) .. tostring(print) .. ('%s'):format({}) \
+                .. tostring(softvt.pose { xyz = { 0, 0, 0 } }) .. tostring(softvt.on { object = 'a', target = 'b' }), 0)";
+    assert_eq!(
+        error_of(text),
+        "suites/x.lua:3: 1 2 a b q z truetablefunctiontablepose(0.0000, 0.0000, 0.0000)softvt.on"
+    );
+    assert!(error_of("string.format('%p', {})").contains("%p prints an address"));
+}
+
+#[test]
+fn math_random_is_the_same_in_every_run() {
+    let draw = || error_of("error(math.random() .. ' ' .. math.random(10) .. ' ' .. math.random(-3, 3), 0)");
+    assert_eq!(draw(), draw());
+    assert!(error_of("math.randomseed(1)").contains("--seed"));
+    assert!(error_of("math.random(2, 1)").contains("the range 2..1 is empty"));
+}

@@ -1,0 +1,225 @@
+use super::*;
+use crate::{
+    benchmark::{Plan, seed::Split},
+    geometry::{Pose, Vec3},
+    scene::Body,
+    script::{Episode, EpisodeRequest, Expert, ExpertCommand, ExpertView, ObjectView, check_shift},
+};
+
+fn request(episode: u64, base_seed: u64) -> EpisodeRequest {
+    EpisodeRequest {
+        suite: "test".into(),
+        task: 0,
+        episode,
+        base_seed,
+        split: Split::Validation,
+        shifts: Vec::new(),
+    }
+}
+
+fn project(rest: &str) -> Project {
+    Project::new(&[("x.lua", &format!("{SUITE}{rest}"))])
+}
+
+fn view() -> ExpertView {
+    ExpertView {
+        time_s: 0.0,
+        dt_s: 0.05,
+        base_w: Pose::translation(-0.66, 0.0, 0.012),
+        tcp_b: Pose::translation(0.66, 0.0, 0.288),
+        width_m: 0.08,
+        closure: 0.0,
+        pad_force_n: [0.0; 2],
+        objects: vec![ObjectView {
+            name: "ball".into(),
+            asset: "ball".into(),
+            centre_w: Vec3::new(0.1, 0.0, 0.03),
+            yaw: 0.0,
+            size: Vec3::repeat(0.06),
+            hints: Default::default(),
+        }],
+    }
+}
+
+fn expert(body: &str) -> (Project, Expert) {
+    let project = project(&format!("return suite(function(arm, scene) {body} end)"));
+    let loaded = project.load("x.lua", &[]).unwrap();
+    let expert = Episode::open(&loaded, &request(0, 1)).unwrap().expert().unwrap().unwrap();
+    (project, expert)
+}
+
+fn run(body: &str) -> Result<Vec<ExpertCommand>, String> {
+    let (project, mut expert) = expert(body);
+    let folder = format!("{}/", project.path("").display()).replace("//", "/");
+    let mut commands = Vec::new();
+    while commands.len() < 1000 {
+        match expert.step(&view()).map_err(|e| e.to_string().replace(&folder, ""))? {
+            Some(command) => commands.push(command),
+            None => break,
+        }
+    }
+    Ok(commands)
+}
+
+#[test]
+fn a_suite_becomes_plain_data() {
+    let loaded = project("return suite()").load("x.lua", &[]).unwrap();
+    let Plan::Suite(suite) = &loaded.plan else { panic!("{:?}", loaded.plan) };
+    assert_eq!((suite.name.as_str(), suite.episodes, suite.tasks.len()), ("test", 5, 1));
+    assert_eq!((suite.tasks[0].budget_steps, suite.tasks[0].expert), (500, false));
+    assert_eq!(loaded.bundle.files.len(), 1);
+}
+
+#[test]
+fn a_list_of_suites_is_a_plan_and_tasks_are_found_by_name() {
+    let loaded = project("return { suite() }").load("x.lua", &[]).unwrap();
+    assert!(matches!(&loaded.plan, Plan::Suites { suites } if suites.len() == 1));
+    let open = |suite: &str, task| {
+        let request = EpisodeRequest { suite: suite.into(), task, ..request(0, 1) };
+        Episode::open(&loaded, &request).map(|e| e.scene.objects.len()).map_err(|e| (e.message, e.hint))
+    };
+    assert_eq!(open("test", 0), Ok(1));
+    assert_eq!(open("tst", 0), Err(("unknown suite \"tst\"; did you mean \"test\"?".into(), None)));
+    assert_eq!(
+        open("test", 3),
+        Err(("suite \"test\" has no task 3".into(), Some("its tasks are 0 to 0".into())))
+    );
+}
+
+#[test]
+fn an_episode_depends_on_its_seed_alone() {
+    let loaded = project("return suite()").load("x.lua", &[]).unwrap();
+    let scene = |episode, seed| Episode::open(&loaded, &request(episode, seed)).unwrap().scene;
+    assert_eq!(scene(0, 1), scene(0, 1));
+    assert_ne!(scene(0, 1).objects[0].pose_w, scene(1, 1).objects[0].pose_w);
+    assert_ne!(scene(0, 1).objects[0].pose_w, scene(0, 2).objects[0].pose_w);
+    let xs: Vec<f64> = (0..64).map(|e| scene(e, 1).objects[0].pose_w.translation.x).collect();
+    let (low, high) = xs.iter().fold((1.0, -1.0), |(l, h), x| (x.min(l), x.max(h)));
+    assert!(low < -0.015 && high > 0.015 && xs.iter().all(|x| x.abs() <= 0.02), "{low} {high}");
+}
+
+#[test]
+fn an_episode_runs_on_what_the_plan_was_made_of() {
+    let project = project("return suite()");
+    let loaded = project.load("x.lua", &[]).unwrap();
+    project.write("x.lua", b"error('changed')");
+    assert!(Episode::open(&loaded, &request(0, 1)).is_ok());
+}
+
+#[test]
+fn shifts_change_the_scene_and_are_strict() {
+    let shift = |body: &str| {
+        project(&format!(
+            "return suite(nil, {{ softvt.shift {{ name = 'stiffness', default = 1, min = 0.1, apply = function(scene, value)\n{body}\nend }} }})"
+        ))
+    };
+    let open = |body: &str, name: &str| {
+        let project = shift(body);
+        let loaded = project.load("x.lua", &[]).unwrap();
+        let request = EpisodeRequest { shifts: vec![(name.into(), 0.5)], ..request(0, 1) };
+        Episode::open(&loaded, &request).map(|e| e.scene).map_err(|e| e.message)
+    };
+    let soften = "local o = scene:object 'ball' o.youngs_pa = o.youngs_pa * value return scene";
+    let scene = open(soften, "stiffness").unwrap();
+    let Body::Soft(soft) = &scene.objects[0].asset.body else { panic!("the ball is soft") };
+    assert_eq!(soft.youngs_pa, 20e3);
+    assert_eq!(
+        open(soften, "stifness").unwrap_err(),
+        "unknown shift \"stifness\"; did you mean \"stiffness\"?"
+    );
+    assert_eq!(
+        open("scene:object('ball').youngs = 1", "stiffness").unwrap_err(),
+        "object: unknown key \"youngs\"; did you mean \"youngs_pa\"?"
+    );
+    assert_eq!(
+        open("scene:object('ball').poisson = value", "stiffness").unwrap_err(),
+        "object.poisson: expected a number in 0..below 0.5, got 0.5"
+    );
+    assert_eq!(
+        open("scene.gravty = { 0, 0, 0 }", "stiffness").unwrap_err(),
+        "scene: unknown key \"gravty\"; did you mean \"gravity\"?"
+    );
+}
+
+#[test]
+fn the_library_scales_stiffness_and_mass() {
+    let project =
+        project("local shifts = require 'shifts'\nreturn suite(nil, { shifts.stiffness, shifts.mass })");
+    let loaded = project.load("x.lua", &[]).unwrap();
+    assert!(loaded.bundle.files.contains_key("scripts/shifts.lua"));
+    let shifts = vec![("stiffness".into(), 0.5), ("mass".into(), 2.0)];
+    let scene = Episode::open(&loaded, &EpisodeRequest { shifts, ..request(0, 1) }).unwrap().scene;
+    let Body::Soft(soft) = &scene.objects[0].asset.body else { panic!("the ball is soft") };
+    assert_eq!((soft.youngs_pa, soft.density), (20e3, 400.0));
+    let Plan::Suite(suite) = &loaded.plan else { panic!("{:?}", loaded.plan) };
+    assert!(check_shift(&suite.shifts, "mass", 2.0).is_ok());
+    assert_eq!(
+        check_shift(&suite.shifts, "mass", 0.0),
+        Err("shift mass: expected a number in 0.01..100 (1), got 0".into())
+    );
+}
+
+#[test]
+fn an_object_can_stand_on_another() {
+    let text = "return softvt.suite { name = 'test', object_type = 'rigid', variation = 'object', tasks = { softvt.task {\n\
+        prompt = 'p', goal = softvt.on { object = 'a', target = 'b' }, layout = softvt.layout('two', function(scene)\n\
+        scene:add { name = 'b', asset = ball, at = { 0.1, 0 } }\n\
+        scene:add { name = 'a', asset = ball, at = { 0.1, 0 }, on = 'b' }\nend) } } }";
+    let loaded = project(text).load("x.lua", &[]).unwrap();
+    let scene = Episode::open(&loaded, &request(0, 1)).unwrap().scene;
+    assert!((scene.objects[1].pose_w.translation.z - 0.06).abs() < 1e-6);
+    assert!(std::sync::Arc::ptr_eq(&scene.objects[0].asset, &scene.objects[1].asset));
+}
+
+#[test]
+fn a_motion_is_straight_and_never_faster_than_asked() {
+    let commands = run(
+        "local ball = scene:object 'ball'\n\
+         arm:move_to(softvt.pose { xyz = ball.xyz }, { speed = 0.2, turn = 100 })\narm:close_to(0.5, { rate = 1 })",
+    )
+    .unwrap();
+    let at = |c: &ExpertCommand| c.pose_b.translation.vector;
+    let start = view().tcp_b.translation.vector;
+    let goal = Vec3::new(0.1 + 0.66, 0.0, 0.03 - 0.012);
+    let moves = commands.len() - 10;
+    assert!((at(&commands[moves - 1]) - goal).norm() < 1e-12);
+    let way = (goal - start).normalize();
+    let mut last = start;
+    for command in &commands[..moves] {
+        let off = at(command) - start;
+        assert!((off - way * off.dot(&way)).norm() < 1e-12);
+        assert!((at(command) - last).norm() / 0.05 <= 0.2 + 1e-9);
+        last = at(command);
+    }
+    assert_eq!(commands.last().unwrap().closure, 0.5);
+    assert_eq!(run("arm:wait(0.2)").unwrap().len(), 4);
+}
+
+#[test]
+fn an_expert_that_goes_wrong_is_named_with_its_line() {
+    let line = SUITE.lines().count() + 1;
+    let error = |body: &str| run(body).unwrap_err();
+    assert_eq!(error("local x = nil .. 1"), format!("x.lua:{line}: attempt to concatenate a nil value"));
+    assert_eq!(
+        error("coroutine.yield(3)"),
+        "x.lua: the expert yielded something that is not a command; use arm:command, arm:move_to, arm:wait … instead of \
+         coroutine.yield"
+    );
+    assert_eq!(
+        error("while true do end"),
+        "x.lua: the script ran for more than 0.3 s; look for an endless loop"
+    );
+    assert_eq!(
+        error("scene:object 'bal'"),
+        format!("x.lua:{line}: scene: unknown object \"bal\"; did you mean \"ball\"?")
+    );
+    assert_eq!(
+        error("arm:move_to(arm.pose, { sped = 1 })"),
+        format!("x.lua:{line}: arm:move_to: unknown option \"sped\"; did you mean \"speed\"?")
+    );
+    assert_eq!(
+        error("arm:close_to(2)"),
+        format!("x.lua:{line}: arm:close_to: closure: expected a number in 0..1, got 2")
+    );
+    assert_eq!(error("arm:mov_to(1)"), format!("x.lua:{line}: arm: there is no \"mov_to\""));
+}

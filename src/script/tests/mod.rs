@@ -1,0 +1,82 @@
+//! What a script may and may not do, seen from outside.
+
+mod bad_input;
+mod episodes;
+mod options;
+
+use std::{fs, path::PathBuf, sync::Arc, time::Duration};
+
+use super::{Limits, Loaded, ScriptError, load_with};
+
+/// A project folder that goes away with the test.
+pub(super) struct Project(tempfile::TempDir);
+
+impl Project {
+    pub fn new(files: &[(&str, &str)]) -> Self {
+        let project = Self(tempfile::tempdir().unwrap());
+        files.iter().for_each(|(path, text)| project.write(path, text.as_bytes()));
+        project
+    }
+
+    pub fn write(&self, path: &str, bytes: &[u8]) {
+        let path = self.path(path);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, bytes).unwrap();
+    }
+
+    pub fn path(&self, path: &str) -> PathBuf {
+        self.0.path().join(path)
+    }
+
+    pub fn load(&self, path: &str, argv: &[&str]) -> Result<Loaded, ScriptError> {
+        self.load_with(path, argv, &limits())
+    }
+
+    pub fn load_with(&self, path: &str, argv: &[&str], limits: &Limits) -> Result<Loaded, ScriptError> {
+        let argv: Vec<String> = argv.iter().map(|word| word.to_string()).collect();
+        load_with(&self.path(path), &argv, limits)
+    }
+
+    /// The message, with the folder's name taken off.
+    pub fn error(&self, path: &str, argv: &[&str]) -> String {
+        let folder = format!("{}/", self.0.path().display());
+        self.load(path, argv).expect_err("the script must fail").to_string().replace(&folder, "")
+    }
+}
+
+/// Short limits, and a watchdog that only stays silent.
+pub(super) fn limits() -> Limits {
+    Limits {
+        memory_bytes: 16 << 20,
+        load: Duration::from_millis(300),
+        call: Duration::from_millis(300),
+        grace: Duration::from_millis(50),
+        on_stuck: Arc::new(|_| {}),
+        print: Arc::new(|_| {}),
+    }
+}
+
+/// The message of a script of one file.
+pub(super) fn error_of(text: &str) -> String {
+    Project::new(&[("suites/x.lua", text)]).error("suites/x.lua", &[])
+}
+
+/// The rest of a suite, in which a test puts what it is about.
+pub(super) const SUITE: &str = r#"
+local ball = softvt.asset {
+  name = "ball", shape = softvt.shape.sphere { radius = 0.03 }:grounded(),
+  body = softvt.soft { youngs_pa = 40e3, poisson = 0.4, density = 200 },
+}
+local layout = softvt.layout("one", function(scene, rng)
+  scene:add { name = "ball", asset = ball, at = { rng:uniform(-0.02, 0.02), rng:uniform(-0.02, 0.02) } }
+end)
+local function suite(expert, shifts)
+  return softvt.suite {
+    name = "test", object_type = "deformable", variation = "spatial", shifts = shifts,
+    tasks = { softvt.task {
+      prompt = "lift the ball", layout = layout, expert = expert,
+      goal = softvt.on { object = "ball", target = "ball" },
+    } },
+  }
+end
+"#;
