@@ -58,7 +58,9 @@ pub fn detect(
 ) {
     let bounds = collider.bounds;
     let around = Aabb::around(&body.x).unwrap_or(bounds);
-    if apart(&around, &bounds.moved(&moving.pose), reach) {
+    let lever = (around.centre() - moving.origin).norm() + around.size().norm();
+    let speed = body.max_speed() + moving.linear.norm() + moving.angular.norm() * lever;
+    if apart(&around, &bounds.moved(&moving.pose), reach.max(AHEAD * dt * speed)) {
         return;
     }
     let view = View::new(moving);

@@ -7,6 +7,7 @@ mod frame;
 mod integrate;
 mod rigid_rows;
 mod sleep;
+mod sliding;
 mod soft_rows;
 
 use std::sync::Arc;
