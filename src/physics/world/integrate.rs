@@ -3,7 +3,7 @@
 use super::{StepFailure, Touch, World};
 use crate::{
     geometry::Vec3,
-    physics::{contact::Slot, joints, rigid},
+    physics::{contact::Slot, fem::spin, joints, rigid},
 };
 
 impl World {
@@ -14,7 +14,7 @@ impl World {
             let Some(block) = block else { continue };
             let body = &mut soft.body;
             soft.system.complete(&body.frame, &self.problem.blocks[*block].v, &mut body.v);
-            body.x.iter_mut().zip(&body.v).for_each(|(x, v)| *x += v * dt);
+            spin::advance(body, dt);
             body.update_elastic();
             soft.min_det_f = body.min_det_f();
         }
