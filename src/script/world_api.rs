@@ -109,7 +109,7 @@ impl LuaWorld {
             .map_err(|e| fail(lua, format!("world:soft: {e}")))?;
         let friction = friction(&spec)?;
         let at = pose(spec.get("xyz")?, spec.get("turn")?);
-        let index = inner.world.add_soft(&name, rest, &at, friction);
+        let index = inner.world.add_soft(&name, rest, Some(Arc::new(shape.0)), &at, friction);
         inner.references.push(reference);
         Ok(LuaBody { world: self.0.clone(), index })
     }
