@@ -6,9 +6,9 @@ local TABLE_TOP = softvt.shape.box { size = { 0.2, 0.2, 0.02 } }:translate(0, 0,
 -- A lobe: a slanted ellipsoid that starts at the middle line and leans outwards; x in mm, side ±1, size of the whole.
 local function lobe(x, side, size)
   local function place(shape)
-    return shape:rotate { axis = "z", angle = side * 0.62 }:translate(x * mm, side * 7.5 * mm * size, 17.5 * mm)
+    return shape:rotate { axis = "z", angle = side * 0.62 }:translate(x * mm, side * 7.5 * mm * size, 17 * mm)
   end
-  local dough = place(softvt.shape.ellipsoid { size = { 43 * mm * size, 26 * mm * size, 41 * mm * size } })
+  local dough = place(softvt.shape.ellipsoid { size = { 43 * mm * size, 26 * mm * size, 42 * mm * size } })
   local stripe = place(softvt.shape.box { size = { 40 * mm, 3.6 * mm, 0.1 } })
   return dough:paint { material = 1, region = stripe }
 end
