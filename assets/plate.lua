@@ -11,7 +11,7 @@ local function profile(corners)
 end
 
 local body = profile {
-  { 0, 0 }, { 42, 0 }, { 46, 3 }, { 69, 14.5 }, { 69, 18 }, { 68, 19 }, { 64, 19 }, { 58, 14.2 }, { 56, 13.5 }, { 0, 13.5 },
+  { 0, 0 }, { 42, 0 }, { 46, 3 }, { 69, 15 }, { 69, 18 }, { 68, 19 }, { 65, 19 }, { 60, 15.2 }, { 57, 14.5 }, { 0, 14.5 },
 }
 
 return softvt.asset {
@@ -20,7 +20,8 @@ return softvt.asset {
     material = 1,
     region = softvt.shape.torus { major = 67 * mm, minor = 3 * mm }:translate(0, 0, 18 * mm),
   },
-  body = softvt.static(),
+  body = softvt.static {},
+  hints = { surface_m = 14.5 * mm },
   visuals = {
     { albedo = { 0.82, 0.84, 0.84 }, roughness = 0.25 },
     { albedo = { 0.12, 0.25, 0.45 }, roughness = 0.25 },

@@ -3,28 +3,30 @@
 local mm = 1e-3
 local LENGTH, WIDTH, HEIGHT = 58 * mm, 47 * mm, 40 * mm
 
--- A round drum with a domed top; the ridges below add their height to it.
-local SIDE, TOP = 1.2 * mm, 2.8 * mm
-local radius = LENGTH / 2 - SIDE
-local drum = softvt.shape.lathe {
-  corners = {
-    { 0, 0 }, { radius - 7 * mm, 0 }, { radius - 2 * mm, 3 * mm }, { radius, 9 * mm }, { radius, 20 * mm },
-    { radius - 2.5 * mm, 28 * mm }, { radius - 9 * mm, 34.5 * mm }, { radius - 18 * mm, 37 * mm }, { 0, HEIGHT - TOP },
-  },
+-- The spiral and the pleats stand on the drum and add their height to it; below the table top it is cut off, pleats and
+-- all, so that it lies flat.
+local SPIRAL, PLEAT, EDGE, BELOW = 2 * mm, 1.2 * mm, 11 * mm, 2 * mm
+local radius, height = LENGTH / 2 - PLEAT, HEIGHT - SPIRAL + BELOW
+local drum = softvt.shape.cylinder { radius = radius - EDGE, height = height - 2 * EDGE }
+  :round(EDGE):translate(0, 0, height / 2 - BELOW)
+local oval = drum:scale(1, (WIDTH / 2 - 0.8 * mm) / radius, 1)
+local table_top = softvt.shape.box { size = { 0.1, 0.1, 0.02 } }:translate(0, 0, -0.01)
+
+local spiral = {
+  axis = "z", count = 1, radial_pitch = 8 * mm, height = SPIRAL, mask = { axis = "z", from = 28 * mm, to = 35 * mm },
 }
-local oval = drum:scale(1, (WIDTH / 2 - SIDE) / radius, 1)
+local pleats = { axis = "z", count = 14, height = PLEAT / 0.8, mask = { axis = "z", from = 31 * mm, to = 26 * mm } }
 
-local wound = oval
-  :ridges { axis = "z", count = 1, radial_pitch = 8 * mm, height = TOP, mask = { axis = "z", from = 27 * mm, to = 33 * mm } }
-  :ridges { axis = "z", count = 22, height = SIDE, mask = { axis = "z", from = 31 * mm, to = 25 * mm } }
-
--- Frosting where the spiral stands out of the drum, dough in its groove and below.
-local frosting = softvt.shape.box { size = { 0.1, 0.1, 0.04 } }:translate(0, 0, 0.045)
+-- Frosting where the spiral stands out of the drum; dough in its groove and below.
+local upper = softvt.shape.box { size = { 0.1, 0.1, 0.04 } }:translate(0, 0, 0.049)
+local groove = oval:round(0.7 * mm):intersect(upper)
 
 return softvt.asset {
   name = "spiral_roll",
-  shape = wound:paint { material = 1, region = frosting }:paint { material = 2, region = oval:round(0.9 * mm):intersect(frosting) },
+  shape = oval:ridges(spiral):ridges(pleats):subtract(table_top)
+    :paint { material = 1, region = upper }:paint { material = 2, region = groove },
   body = softvt.soft { youngs_pa = 60e3, poisson = 0.35, density = 240 },
+  hints = { grasp_height_m = 20 * mm },
   visuals = {
     { albedo = { 0.86, 0.80, 0.70 }, roughness = 0.8 },
     { albedo = { 0.93, 0.92, 0.88 }, roughness = 0.4 },

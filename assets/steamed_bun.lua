@@ -3,23 +3,23 @@
 local mm = 1e-3
 local LENGTH, WIDTH, HEIGHT = 66 * mm, 62 * mm, 44 * mm
 
--- The dome is the part of an ellipsoid above its lowest tenth, rounded into the base.
+-- The dome is the part of an ellipsoid above the table, its lower edge rounded.
 local BELOW = 6 * mm
-local dome = softvt.shape.ellipsoid { size = { LENGTH, WIDTH, 2 * (HEIGHT + BELOW) / 2 } }
-  :translate(0, 0, (HEIGHT + BELOW) / 2 - BELOW)
-local base = softvt.shape.box { size = { 0.1, 0.1, 0.02 } }:translate(0, 0, -0.01)
+local dome = softvt.shape.ellipsoid { size = { LENGTH, WIDTH, HEIGHT + BELOW } }
+  :translate(0, 0, (HEIGHT - BELOW) / 2)
+local table_top = softvt.shape.box { size = { 0.1, 0.1, 0.02 } }:translate(0, 0, -0.01)
 
-local function eye(side)
-  return softvt.shape.sphere { radius = 4.5 * mm }:translate(17 * mm, side * 10 * mm, 32.5 * mm)
+local bun = dome:subtract(table_top, 4 * mm)
+for _, side in ipairs { -1, 1 } do
+  local eye = softvt.shape.sphere { radius = 4 * mm }:translate(21 * mm, side * 9 * mm, 36 * mm)
+  bun = bun:paint { material = 1, region = eye }
 end
-
-local bun = dome:smooth_subtract(base, 4 * mm)
-for _, side in ipairs { 1, -1 } do bun = bun:paint { material = 1, region = eye(side) } end
 
 return softvt.asset {
   name = "steamed_bun",
   shape = bun,
   body = softvt.soft { youngs_pa = 25e3, poisson = 0.30, density = 180 },
+  hints = { grasp_height_m = 22 * mm },
   visuals = {
     { albedo = { 0.90, 0.85, 0.72 }, roughness = 0.6 },
     { albedo = { 0.02, 0.02, 0.02 }, roughness = 0.3 },
