@@ -73,7 +73,7 @@ impl Scene {
         let mut world = World::new(params, Vec3::new(0.0, 0.0, -9.81));
         let none = Friction { static_mu: 0.0, dynamic_mu: 0.0 };
         let grip = Friction { static_mu: 1.2, dynamic_mu: 1.2 };
-        let body = world.add_soft("cube", rest, &Pose::translation(0.0, 0.0, 0.5 * EDGE), none);
+        let body = world.add_soft("cube", rest, None, &Pose::translation(0.0, 0.0, 0.5 * EDGE), none);
         let layer = world.rigid_layer();
         let table = Arc::new(Shape::Box { half: Vec3::new(0.5, 0.5, 0.05) });
         let below = (Mover::Static, Pose::translation(0.0, 0.0, -0.05));

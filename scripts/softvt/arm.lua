@@ -14,7 +14,7 @@ local function smooth(u) return u * u * u * (10 + u * (6 * u - 15)) end
 -- Sends one command and comes back at the next control step.
 function Arm:command(pose, closure)
   self.target, self.closure = check.pose(pose), check.number("arm:command: closure", closure, 0, 1)
-  yield(self.target, self.closure)
+  yield(self.target, self.closure, self.gripping)
 end
 
 local function travel(self, pose, options, closure)
@@ -48,8 +48,24 @@ function Arm:close_to(closure, options)
   for step = 1, steps do self:command(self.target, start + way * step / steps) end
 end
 
--- Opens the gripper.
-function Arm:open(options) self:close_to(0, options) end
+-- Closes on an object. A binary gripper, which knows only open and shut, shuts here and not in close_to.
+function Arm:grasp(closure, options)
+  self.gripping = true
+  self:close_to(closure, options)
+end
+
+-- Lets go of an object, opening to a closure (options.closure) or wide.
+function Arm:release(options)
+  options = check.options("arm:release", options, { rate = 0.5, closure = 0 })
+  self.gripping = false
+  self:close_to(options.closure, { rate = options.rate })
+end
+
+-- Opens the gripper wide.
+function Arm:open(options)
+  self.gripping = false
+  self:close_to(0, options)
+end
 
 -- Holds still for a time, s.
 function Arm:wait(seconds)
@@ -68,5 +84,5 @@ local arm = setmetatable({}, {
   __tostring = function() return "softvt.Arm" end,
   __metatable = "softvt.Arm",
 })
-arm.target, arm.closure = host.pose, host.closure
+arm.target, arm.closure, arm.gripping = host.pose, host.closure, false
 return arm

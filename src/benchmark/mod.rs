@@ -49,6 +49,15 @@ pub enum Goal {
     },
 }
 
+impl Goal {
+    /// Scene name of the object that must get somewhere.
+    pub fn object(&self) -> &str {
+        match self {
+            Self::On { object, .. } | Self::In { object, .. } => object,
+        }
+    }
+}
+
 /// One task of a suite.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Task {

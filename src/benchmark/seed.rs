@@ -68,6 +68,19 @@ pub enum Split {
     Validation,
     /// Episodes that demonstrations are recorded on.
     Demonstration,
+    /// Trials of calibrations and other experiments.
+    Experiment,
+}
+
+impl Split {
+    /// Its name in seeds and results.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Validation => "validation",
+            Self::Demonstration => "demonstration",
+            Self::Experiment => "experiment",
+        }
+    }
 }
 
 /// What the initial state of an episode depends on, and nothing else.
@@ -88,10 +101,7 @@ pub struct EpisodeSeed {
 impl EpisodeSeed {
     /// The generator of one stream, at its start.
     pub fn stream(&self, stream: Stream) -> ChaCha8Rng {
-        let split = match self.split {
-            Split::Validation => "validation",
-            Split::Demonstration => "demonstration",
-        };
+        let split = self.split.name();
         let episode = self.episode.to_string();
         let base = self.base.to_string();
         keyed(&["softvt episode", &self.suite, &self.layout, &episode, &base, split, stream.name()])

@@ -26,12 +26,15 @@ impl Settings {
         let mut at = &mut tree;
         for key in path.split('.') {
             let known: Vec<String> = at.as_object().map_or(Vec::new(), |o| o.keys().cloned().collect());
-            at = at.get_mut(key).ok_or_else(|| format!("there is no setting {path}; {key} could be one of {}", known.join(", ")))?;
+            at = at.get_mut(key).ok_or_else(|| {
+                format!("there is no setting {path}; {key} could be one of {}", known.join(", "))
+            })?;
         }
         if at.is_object() {
             return Err(format!("{path} is a group of settings, not one; name one of its fields"));
         }
-        *at = serde_json::from_str(value).map_err(|_| format!("{path}: expected a number, true or false, got {value:?}"))?;
+        *at = serde_json::from_str(value)
+            .map_err(|_| format!("{path}: expected a number, true or false, got {value:?}"))?;
         let changed: Self = serde_json::from_value(tree).map_err(|e| format!("{path}: {e}"))?;
         changed.check()?;
         Ok(changed)

@@ -1,6 +1,112 @@
 //! The command line: flags, exit codes, progress.
 
+mod args;
+mod doctor;
+mod evaluate;
+mod experiment;
+mod files;
+mod init;
+mod list;
+mod progress;
+
+use std::{
+    panic,
+    process::ExitCode,
+    sync::atomic::{AtomicBool, Ordering},
+};
+
+use args::Command;
+
+/// Exit codes, the same for every command.
+pub mod code {
+    /// All went well.
+    pub const OK: u8 = 0;
+    /// Our own fault.
+    pub const INTERNAL: u8 = 1;
+    /// The user's input: usage, script, asset, file.
+    pub const INPUT: u8 = 2;
+    /// Policy or transport.
+    pub const POLICY: u8 = 3;
+    /// Interrupted.
+    pub const INTERRUPTED: u8 = 130;
+}
+
+/// Set by Ctrl-C: running episodes end, finished ones stay.
+static STOP: AtomicBool = AtomicBool::new(false);
+
+/// What ends a command early.
+#[derive(Debug)]
+pub struct Failure {
+    code: u8,
+    message: String,
+}
+
+impl Failure {
+    /// The user's input is wrong.
+    fn input(message: impl ToString) -> Self {
+        Self { code: code::INPUT, message: message.to_string() }
+    }
+
+    /// Interrupted; what is finished has been kept.
+    fn interrupted(message: impl ToString) -> Self {
+        Self { code: code::INTERRUPTED, message: message.to_string() }
+    }
+}
+
 /// Runs the command line of this process and returns its exit code.
-pub fn main() -> std::process::ExitCode {
-    std::process::ExitCode::SUCCESS
+pub fn main() -> ExitCode {
+    panic::set_hook(Box::new(|info| {
+        eprintln!(
+            "softvt: internal error: {info}\nThis is a defect of softvt; please report it with the command that led here."
+        );
+    }));
+    let outcome = panic::catch_unwind(run);
+    let code = match outcome {
+        Ok(Ok(())) => code::OK,
+        Ok(Err(failure)) => {
+            if !failure.message.is_empty() {
+                eprintln!("softvt: {}", failure.message);
+            }
+            failure.code
+        }
+        Err(_) => code::INTERNAL,
+    };
+    ExitCode::from(code)
+}
+
+fn run() -> Result<(), Failure> {
+    let words: Vec<String> = std::env::args_os()
+        .map(|word| {
+            word.into_string().map_err(|w| Failure::input(format!("argument {w:?} is not valid UTF-8")))
+        })
+        .collect::<Result<_, _>>()?;
+    match args::parse(&words)? {
+        Command::Run(run) => {
+            watch_interrupts();
+            evaluate::run(&run)
+        }
+        Command::List { what, json } => list::run(&what, json),
+        Command::Init { dir } => init::run(&dir),
+        Command::Doctor => doctor::run(),
+        Command::Shown => Ok(()),
+    }
+}
+
+/// The first Ctrl-C ends the run in order, the second at once.
+fn watch_interrupts() {
+    let handler = || {
+        if STOP.swap(true, Ordering::Relaxed) {
+            std::process::exit(i32::from(code::INTERRUPTED));
+        }
+        eprintln!("softvt: stopping; finished episodes stay (press again to stop at once)");
+    };
+    // Without a handler Ctrl-C still ends the process; finished episodes are on disk either way.
+    let _ = ctrlc::set_handler(handler);
+}
+
+/// Prints to the standard output; a closed pipe is not an error of ours.
+fn print(text: &str) {
+    use std::io::Write;
+    let mut out = std::io::stdout().lock();
+    let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
 }

@@ -143,7 +143,8 @@ impl VoxelMesh {
         at.weights().iter().zip(nodes).map(|(w, &node)| self.nodes[node as usize] * *w).sum()
     }
 
-    fn element_at(&self, cell: [i64; 3]) -> Option<u32> {
+    /// The element in a cell of the grid, if the cell is in the grid and holds one.
+    pub fn element_at(&self, cell: [i64; 3]) -> Option<u32> {
         let within = (0..3).all(|axis| (0..self.grid[axis] as i64).contains(&cell[axis]));
         let [i, j, k] = cell.map(|x| x as usize);
         within

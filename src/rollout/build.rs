@@ -12,7 +12,7 @@ use crate::{
     },
     physics::{
         World,
-        contact::{Collider, Friction, Mover},
+        contact::{Collider, Friction, Mover, Surface},
         fem::{Material, Rest},
         rigid::{RigidBody, RigidError},
     },
@@ -121,7 +121,9 @@ pub(super) fn add(world: &mut World, object: &Object, cache: &RestCache) -> Resu
     let (kind, colliders) = match &asset.body {
         Body::Soft(material) => {
             let rest = cache.rest(asset, material)?;
-            (Kind::Soft(world.add_soft(&object.name, rest, &object.pose_w, friction)), Vec::new())
+            let surface: Arc<dyn Surface> = Arc::new(asset.shape.clone());
+            let index = world.add_soft(&object.name, rest, Some(surface), &object.pose_w, friction);
+            (Kind::Soft(index), Vec::new())
         }
         Body::Rigid { density } => {
             let m = mass_properties(&asset.shape, *density);

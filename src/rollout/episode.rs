@@ -36,6 +36,9 @@ pub enum ControlError {
     /// A policy failed.
     #[error("{0}")]
     Policy(String),
+    /// The run was told to stop.
+    #[error("interrupted")]
+    Interrupted,
 }
 
 /// Whoever drives the robot: a policy behind its observation, or a privileged planner.

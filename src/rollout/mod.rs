@@ -1,5 +1,6 @@
 //! One episode: settle → observe → act → step → judge; and the batch of them.
 
+pub mod batch;
 mod build;
 pub mod episode;
 mod evidence;
@@ -8,7 +9,7 @@ pub mod simulation;
 mod trace;
 
 pub use build::{BuildError, RestCache, soft_rest};
-pub use episode::{ControlError, Controller, Episode, EpisodeSpec, Finished};
+pub use episode::{ControlError, Controller, Episode, EpisodeError, EpisodeSpec, Finished};
 pub use rig::Rig;
 pub use simulation::{Handle, Kind, SettleError, Simulation};
 pub use trace::{ObjectTrace, StepTrace};

@@ -26,7 +26,7 @@ pub struct Class {
     pub methods: &'static [Signature],
 }
 
-const fn method(
+pub(super) const fn method(
     name: &'static str,
     params: &'static [(&'static str, &'static str)],
     returns: &'static [&'static str],
@@ -48,6 +48,26 @@ pub static FUNCTIONS: &[Signature] = &[
         &[("options", "table<string, softvt.Option>")],
         &["table<string, any>"],
         "Declares the script's options; gives their values, from the command line or by default.",
+    ),
+    method("world", &[("world?", "softvt.WorldSpec")], &["softvt.World"], "An empty world without a robot."),
+    method(
+        "simulate",
+        &[("simulate", "softvt.SimulateSpec")],
+        &["softvt.Simulation"],
+        "A settled scene with the robot.",
+    ),
+    method(
+        "envelope",
+        &[("envelope", "softvt.EnvelopeSpec")],
+        &["table"],
+        "What a calibration found: lower, closure_at_tau, safe_window, tau, d_ref, and as text: text (a plot), sweep \
+         (JSON lines), json (a threshold file).",
+    ),
+    method(
+        "stable",
+        &[("row", "table")],
+        &["boolean"],
+        "Whether a row of a compression sweep is a stable squeeze.",
     ),
     method("pose", &[("pose", "softvt.PoseSpec")], &["softvt.Pose"], "A pose in the world frame."),
     method("mesh", &[("mesh", "softvt.MeshSpec")], &["softvt.Shape"], "A shape from a mesh file."),
@@ -116,6 +136,10 @@ pub static SHAPE: Class = Class {
 
 /// Objects that the host hands to scripts; a shape apart.
 pub static CLASSES: &[Class] = &[
+    super::classes_world::WORLD,
+    super::classes_world::BODY,
+    super::classes_world::SOLID,
+    super::classes_world::SIMULATION,
     Class {
         name: "softvt.Pose",
         doc: "An immutable pose in the world frame.",

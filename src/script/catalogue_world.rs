@@ -1,7 +1,7 @@
 //! The binding table of worlds that experiments build by hand.
 
 use super::{
-    catalogue::FRICTION,
+    catalogue::{FRICTION, LAYOUT},
     schema::{Field, Presence, Range, Record, Type},
 };
 
@@ -18,12 +18,7 @@ pub static WORLD: Record = Record {
     kind: "softvt.WorldSpec",
     doc: "A world of soft bodies and prescribed or fixed solids, without a robot.",
     fields: &[
-        field(
-            "dt",
-            Type::Number("s", Range::closed(1e-5, 0.05)),
-            Presence::Number(1.0 / 60.0),
-            "Time step.",
-        ),
+        field("dt", Type::Number("s", Range::closed(1e-5, 0.05)), Presence::Number(1.0 / 60.0), "Time step."),
         field(
             "alpha",
             Type::Number("1/s", Range::closed(0.0, 1e3)),
@@ -53,7 +48,12 @@ pub static WORLD_SOFT: Record = Record {
         field("youngs_pa", Type::Number("Pa", Range::POSITIVE), Required, "Young's modulus."),
         field("poisson", Type::Number("", Range::below(0.0, 0.5)), Required, "Poisson's ratio."),
         field("density", Type::Number("kg/m³", Range::POSITIVE), Required, "Density."),
-        field("resolution", Type::Integer(Range::closed(1.0, 64.0)), Presence::Integer(6), "Voxels along the longest edge."),
+        field(
+            "resolution",
+            Type::Integer(Range::closed(1.0, 64.0)),
+            Presence::Integer(6),
+            "Voxels along the longest edge.",
+        ),
         field(
             "grasp_spacing",
             Type::Number("m", Range::closed(1e-4, 0.02)),
@@ -80,3 +80,51 @@ pub static WORLD_SOLID: Record = Record {
         field("turn", Type::Vector(3, "rad"), Optional, "Its orientation as axis-angle."),
     ],
 };
+
+/// A settled scene with the robot.
+pub static SIMULATE: Record = Record {
+    label: "simulate",
+    class: "softvt.SimulateSpec",
+    kind: "softvt.SimulateSpec",
+    doc: "A scene with the robot, built and settled. The settled shapes are the reference of deformation.",
+    fields: &[
+        field("layout", Type::Made(&[&LAYOUT]), Required, "Where things stand."),
+        field("suite", Type::Text, Presence::Text("experiment"), "Part of the seed."),
+        field("episode", Type::Integer(Range::closed(0.0, 1e9)), Presence::Integer(0), "Part of the seed."),
+        field("seed", Type::Integer(Range::closed(0.0, 1e9)), Presence::Integer(0), "Part of the seed."),
+        field(
+            "settings",
+            Type::Map(&Type::Map(&Type::Any)),
+            Optional,
+            "Changes of the mechanics, the robot and the judge: { physics = {…}, robot = {…}, rules = {…} }.",
+        ),
+    ],
+};
+
+/// What an envelope is made of.
+pub static ENVELOPE: Record = Record {
+    label: "envelope",
+    class: "softvt.EnvelopeSpec",
+    kind: "softvt.EnvelopeSpec",
+    doc: "The rows of a calibration.",
+    fields: &[
+        field("asset", Type::Text, Required, "Asset name."),
+        field("kappa", Type::Number("", Range::closed(0.0, 1.0)), Presence::Number(0.5), "τ = κ D_ref."),
+        field(
+            "holds",
+            Type::List(&Type::Map(&Type::Any)),
+            Required,
+            "Rows closure, trials, held, slip_mm, d_peak_pct of the lower-bound scan.",
+        ),
+        field(
+            "sweep",
+            Type::List(&Type::Map(&Type::Any)),
+            Required,
+            "Rows closure, gripper_width_mm, d_peak_pct, force_n, min_det_f, node_speed_m_s, both_pads, slip_mm, stable \
+             of the compression sweep.",
+        ),
+    ],
+};
+
+/// All of them.
+pub static RECORDS: &[&Record] = &[&WORLD, &WORLD_SOFT, &WORLD_SOLID, &SIMULATE, &ENVELOPE];

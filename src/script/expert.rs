@@ -65,19 +65,19 @@ pub struct ExpertCommand {
     pub pose_b: Pose,
     /// Closure, 0 open to 1 shut.
     pub closure: f64,
+    /// Whether the gripper is meant to hold something: what a binary gripper would be told.
+    pub gripping: bool,
 }
 
-/// A running expert.
+/// A running expert in a machine of its own.
 pub struct Expert {
     machine: Machine,
-    function: Function,
-    view: Arc<Mutex<Option<ExpertView>>>,
-    thread: Option<Thread>,
+    run: Coroutine,
 }
 
 impl Expert {
     pub(super) fn start(machine: Machine, function: &Function) -> Result<Self, ScriptError> {
-        Ok(Self { machine, function: function.clone(), view: Arc::default(), thread: None })
+        Ok(Self { machine, run: Coroutine::new(function.clone()) })
     }
 
     /// Lets the expert see `view` and gives its next command; none once it is done.
@@ -85,9 +85,28 @@ impl Expert {
     /// # Errors
     /// If the expert fails, takes too long, or yields something else than a command.
     pub fn step(&mut self, view: &ExpertView) -> Result<Option<ExpertCommand>, ScriptError> {
+        let vm = &self.machine.vm;
+        let _deadline = vm.call_deadline();
+        self.run.step(&vm.lua, view).map_err(|e| vm.explain(&e))
+    }
+}
+
+/// An expert as a coroutine of any machine.
+pub(super) struct Coroutine {
+    function: Function,
+    view: Shared,
+    thread: Option<Thread>,
+}
+
+impl Coroutine {
+    pub fn new(function: Function) -> Self {
+        Self { function, view: Arc::default(), thread: None }
+    }
+
+    /// Lets the expert see `view` and gives its next command; none once it is done.
+    pub fn step(&mut self, lua: &Lua, view: &ExpertView) -> mlua::Result<Option<ExpertCommand>> {
         *locked(&self.view) = Some(view.clone());
-        let outcome = self.resume();
-        let values = outcome.map_err(|e| self.machine.vm.explain(&e))?;
+        let values = self.resume(lua)?;
         if self.thread.as_ref().is_none_or(|thread| !thread.is_resumable()) {
             return Ok(None);
         }
@@ -95,25 +114,24 @@ impl Expert {
         let pose =
             values.next().and_then(|value| value.as_userdata()?.borrow::<LuaPose>().ok().map(|pose| pose.0));
         let closure = values.next().and_then(|value| number(&value));
-        match (pose, closure) {
-            (Some(pose_w), Some(closure)) => {
-                Ok(Some(ExpertCommand { pose_b: view.base_w.inv_mul(&pose_w), closure }))
+        let gripping = values.next().and_then(|value| value.as_boolean());
+        match (pose, closure, gripping) {
+            (Some(pose_w), Some(closure), Some(gripping)) => {
+                Ok(Some(ExpertCommand { pose_b: view.base_w.inv_mul(&pose_w), closure, gripping }))
             }
-            _ => Err(ScriptError::new(
-                &self.machine.vm.shared.main,
-                "the expert yielded something that is not a command",
-            )
-            .hint("use arm:command, arm:move_to, arm:wait … instead of coroutine.yield")),
+            _ => Err(fail(
+                lua,
+                "the expert yielded something that is not a command; use arm:command, arm:move_to, arm:wait … instead \
+                 of coroutine.yield",
+            )),
         }
     }
 
-    fn resume(&mut self) -> mlua::Result<MultiValue> {
-        let _deadline = self.machine.vm.call_deadline();
+    fn resume(&mut self, lua: &Lua) -> mlua::Result<MultiValue> {
         match &self.thread {
             Some(thread) if thread.is_resumable() => thread.resume(()),
             Some(_) => Ok(MultiValue::new()),
             None => {
-                let lua = &self.machine.vm.lua;
                 let host = lua.create_userdata(Host(self.view.clone()))?;
                 let arm = arm(lua, &host)?;
                 let thread = lua.create_thread(self.function.clone())?;

@@ -161,6 +161,8 @@ fn install(vm: &Vm, session: &Arc<Mutex<Session>>) -> mlua::Result<()> {
     shapes::install(lua, &vm.api)?;
     pose::install(lua, &vm.api)?;
     super::world_api::install(lua, &vm.api, &vm.clock)?;
+    super::sim_api::install(lua, &vm.api, &vm.clock)?;
+    super::envelope_api::install(lua, &vm.api)?;
     let names = schema::sorted_pairs(&vm.api).iter().filter_map(|(key, _)| key.to_string().ok()).collect();
     options::strict(lua, "softvt", vm.api.clone(), names)?;
     Ok(())
@@ -215,7 +217,8 @@ fn suite(lua: &Lua, table: &Table) -> mlua::Result<Suite> {
         tasks.iter().enumerate().map(|(id, table)| task(id, table, budget)).collect::<Result<_, _>>()?;
     let shifts: Option<Vec<Table>> = table.get("shifts")?;
     let shifts = shifts.unwrap_or_default().iter().map(shift).collect::<mlua::Result<_>>()?;
-    Ok(Suite { name, object_type, variation, episodes: table.get("episodes")?, tasks, shifts })
+    let settings = super::sim_api::settings(lua, "suite.settings", table.get("settings")?)?;
+    Ok(Suite { name, object_type, variation, episodes: table.get("episodes")?, tasks, shifts, settings })
 }
 
 fn task(id: usize, table: &Table, budget: u32) -> mlua::Result<Task> {

@@ -44,6 +44,13 @@ pub struct Bundle {
     pub served: BTreeMap<String, String>,
 }
 
+impl Bundle {
+    /// SHA-256 of every file by its name.
+    pub fn hashes(&self) -> BTreeMap<String, String> {
+        self.files.iter().map(|(name, source)| (name.clone(), source.sha256.clone())).collect()
+    }
+}
+
 /// Looks files up and remembers them.
 #[derive(Debug)]
 pub(super) struct Library {

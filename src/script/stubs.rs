@@ -20,7 +20,11 @@ pub const LUARC: &str = "{\n  \"runtime.version\": \"Lua 5.4\",\n  \"workspace.l
 fn records() -> impl Iterator<Item = &'static Record> {
     let made = CONSTRUCTORS.iter().map(|(_, record)| *record);
     let shapes = SHAPES.iter().chain(METHODS).map(|(_, record)| *record);
-    made.chain([&LAYOUT]).chain(PLAIN.iter().copied()).chain(shapes).chain([&MASK, &MESH])
+    made.chain([&LAYOUT])
+        .chain(PLAIN.iter().copied())
+        .chain(super::catalogue_world::RECORDS.iter().copied())
+        .chain(shapes)
+        .chain([&MASK, &MESH])
 }
 
 /// The type as LuaCATS writes it.

@@ -37,8 +37,11 @@ impl fmt::Display for Timing {
         let cpu = self.phases.iter().map(|p| p.1).sum();
         let simulated = self.phases.iter().map(|p| p.2).sum();
         write!(f, "cpu_s_per_sim_s: {:.3}", rate(cpu, simulated))?;
-        let parts: Vec<String> =
-            self.phases.iter().map(|(name, cpu, simulated)| format!("{name} {:.3}", rate(*cpu, *simulated))).collect();
+        let parts: Vec<String> = self
+            .phases
+            .iter()
+            .map(|(name, cpu, simulated)| format!("{name} {:.3}", rate(*cpu, *simulated)))
+            .collect();
         write!(f, " ({})", parts.join(", "))
     }
 }

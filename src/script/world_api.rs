@@ -2,7 +2,9 @@
 
 use std::sync::{Arc, Mutex};
 
-use mlua::{AnyUserData, Lua, MetaMethod, MultiValue, Table, UserData, UserDataFields, UserDataMethods, Value};
+use mlua::{
+    AnyUserData, Lua, MetaMethod, MultiValue, Table, UserData, UserDataFields, UserDataMethods, Value,
+};
 
 use super::{
     catalogue_world as records,
@@ -107,7 +109,7 @@ impl LuaWorld {
             .map_err(|e| fail(lua, format!("world:soft: {e}")))?;
         let friction = friction(&spec)?;
         let at = pose(spec.get("xyz")?, spec.get("turn")?);
-        let index = inner.world.add_soft(&name, rest, &at, friction);
+        let index = inner.world.add_soft(&name, rest, Some(Arc::new(shape.0)), &at, friction);
         inner.references.push(reference);
         Ok(LuaBody { world: self.0.clone(), index })
     }
@@ -210,7 +212,10 @@ impl LuaBody {
             "rest" => &body.rest.mesh.nodes,
             "now" => &body.x,
             other => {
-                return Err(fail(lua, format!("body:set_reference: expected \"rest\" or \"now\", got {other:?}")));
+                return Err(fail(
+                    lua,
+                    format!("body:set_reference: expected \"rest\" or \"now\", got {other:?}"),
+                ));
             }
         };
         let reference = Reference::new(nodes, &body.rest.mass).map_err(|e| fail(lua, e.to_string()))?;
@@ -245,13 +250,19 @@ impl UserData for LuaBody {
         methods.add_method("asleep", |_, this, ()| Ok(locked(&this.world).world.soft[this.index].asleep));
         methods.add_method("deformation", |lua, this, ()| {
             let d = this.deformation(lua)?;
-            lua.create_table_from([("rms_pct", d.rms_pct), ("weighted_pct", d.weighted_pct), ("max_pct", d.max_pct)])
+            lua.create_table_from([
+                ("rms_pct", d.rms_pct),
+                ("weighted_pct", d.weighted_pct),
+                ("max_pct", d.max_pct),
+            ])
         });
         methods.add_method("extent", move |lua, this, ()| list(lua, &this.deformation(lua)?.bbox_m));
         methods.add_method("set_reference", |lua, this, which: String| this.set_reference(lua, &which));
-        methods.add_method("force", |lua, this, solid: AnyUserData| Ok(this.touch(lua, &solid)?.normal_force));
+        methods
+            .add_method("force", |lua, this, solid: AnyUserData| Ok(this.touch(lua, &solid)?.normal_force));
         methods.add_method("shear", |lua, this, solid: AnyUserData| Ok(this.touch(lua, &solid)?.shear()));
-        methods.add_method("travel", |lua, this, solid: AnyUserData| Ok(1e3 * this.touch(lua, &solid)?.travel));
+        methods
+            .add_method("travel", |lua, this, solid: AnyUserData| Ok(1e3 * this.touch(lua, &solid)?.travel));
         methods.add_method("slipping", |lua, this, solid: AnyUserData| {
             let touch = this.touch(lua, &solid)?;
             Ok(touch.slipping as f64 / touch.samples.max(1) as f64)
@@ -275,7 +286,10 @@ impl UserData for LuaSolid {
         methods.add_meta_method(MetaMethod::ToString, |_, _, ()| Ok("softvt.Solid"));
         methods.add_method("move_to", |lua, this, (xyz, turn): ([f64; 3], Option<[f64; 3]>)| {
             let Some(index) = this.kinematic else {
-                return Err(fail(lua, "solid:move_to: a static solid cannot move; make it with world:kinematic"));
+                return Err(fail(
+                    lua,
+                    "solid:move_to: a static solid cannot move; make it with world:kinematic",
+                ));
             };
             if xyz.iter().chain(turn.iter().flatten()).any(|x| !x.is_finite()) {
                 return Err(fail(lua, "solid:move_to: expected finite numbers"));

@@ -15,6 +15,10 @@ pub struct Contact {
 
 /// A face is felt by samples whose outward normal opposes its own by at least this cosine.
 const FACING: f64 = 0.3;
+/// A face is also felt only down to this depth (m), or to this multiple of the depth under the nearest face: a sample of
+/// an edge that a body drags along a wall faces the wall's far end without being near it.
+const DEEP: f64 = 2e-3;
+const DEEP_RATIO: f64 = 3.0;
 
 /// One flat or round face of a sharp shape, as seen from a point.
 struct Face {
@@ -60,10 +64,12 @@ fn full((phi, normal): (f64, Vec3)) -> Contact {
 
 /// The face that a sample feels: of those that it covers and faces, the one it faces most.
 fn sharp<const N: usize>(faces: [Face; N], facing: &Vec3, spacing: f64) -> Option<Contact> {
+    let nearest = -faces.iter().fold(f64::NEG_INFINITY, |least, face| least.max(face.phi));
+    let deepest = DEEP.max(DEEP_RATIO * nearest);
     let (mut most, mut best) = (FACING, None);
     for face in &faces {
         let alignment = -facing.dot(&face.normal);
-        if alignment <= most || face.phi < -face.depth {
+        if alignment <= most || face.phi < -face.depth.min(deepest) {
             continue;
         }
         let coverage = covered(face.inside[0], spacing) * covered(face.inside[1], spacing);
@@ -124,4 +130,21 @@ fn union(parts: &[Shape], p: &Vec3, facing: &Vec3, spacing: f64) -> Contact {
         }
     }
     best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_edge_dragged_along_a_wall_does_not_feel_the_far_end_of_the_wall() {
+        let wall = Shape::cuboid(Vec3::new(0.01, 0.6, 0.6));
+        // Half a millimetre inside the wall's broad side, looking along it, from either end of the wall.
+        for z in [-0.2, -0.03, -0.001, 0.001, 0.03, 0.2] {
+            for facing in [Vec3::z(), -Vec3::z()] {
+                let felt = wall.contact(&Vec3::new(0.0045, 0.0, z), &facing, 7.5e-4);
+                assert!((felt.phi + 5e-4).abs() < 1e-12 && felt.normal == Vec3::x(), "{felt:?} at {z}");
+            }
+        }
+    }
 }

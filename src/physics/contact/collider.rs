@@ -2,6 +2,7 @@
 
 use std::{fmt::Debug, sync::Arc};
 
+use super::solid::Solid;
 use crate::geometry::{
     Pose, Vec3,
     shape::{Aabb, Contact, Shape},
@@ -13,6 +14,10 @@ pub trait Surface: Debug + Send + Sync {
     fn contact(&self, p: &Vec3, facing: &Vec3, spacing: f64) -> Contact;
     /// A box around the solid.
     fn bounds(&self) -> Aabb;
+    /// The solid as a shape, if it is one: so other rigid colliders meet it. Others are felt by soft bodies only.
+    fn shape(&self) -> Option<&Shape> {
+        None
+    }
 }
 
 impl Surface for Shape {
@@ -22,6 +27,10 @@ impl Surface for Shape {
 
     fn bounds(&self) -> Aabb {
         Self::bounds(self)
+    }
+
+    fn shape(&self) -> Option<&Shape> {
+        Some(self)
     }
 }
 
@@ -99,6 +108,8 @@ pub struct Collider {
     pub layer: Layer,
     /// Its bounds, in its own frame.
     pub bounds: Aabb,
+    /// How other rigid colliders meet it, if they can.
+    pub solid: Option<Arc<Solid>>,
 }
 
 impl Collider {
@@ -111,6 +122,7 @@ impl Collider {
         layer: Layer,
     ) -> Self {
         let bounds = surface.bounds();
-        Self { name: name.to_owned(), mover, pose_in_mover, surface, friction, layer, bounds }
+        let solid = surface.shape().map(|shape| Arc::new(Solid::new(shape)));
+        Self { name: name.to_owned(), mover, pose_in_mover, surface, friction, layer, bounds, solid }
     }
 }

@@ -2,10 +2,37 @@
 
 use crate::geometry::Vec3;
 
+/// Whom a contact sample touches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Partner {
+    /// A collider, by id.
+    Collider(usize),
+    /// A soft body, by index.
+    Soft(usize),
+}
+
+/// Ids from here on are soft bodies, counted from the top; `u32::MAX` is nobody.
+const SOFT: u32 = 1 << 31;
+
+impl Partner {
+    /// The number under which contacts remember it.
+    pub fn id(self) -> u32 {
+        match self {
+            Self::Collider(index) => index as u32,
+            Self::Soft(index) => u32::MAX - 1 - index as u32,
+        }
+    }
+
+    /// Whom a number stands for.
+    pub fn of(id: u32) -> Self {
+        if id < SOFT { Self::Collider(id as usize) } else { Self::Soft((u32::MAX - 1 - id) as usize) }
+    }
+}
+
 /// Memory of one sample about one partner.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slot {
-    /// The partner: a collider, or a soft body counted from the top. `u32::MAX` if the slot is free.
+    /// The partner's [`Partner::id`]; `u32::MAX` if the slot is free.
     pub partner: u32,
     /// Step of the last contact; older than the last step means forgotten.
     pub step: u64,

@@ -4,7 +4,12 @@ mod collider;
 mod detect;
 pub mod manifold;
 mod memory;
+mod soft_field;
+mod solid;
 
 pub use collider::{Collider, ColliderId, Friction, Layer, Mover, Surface};
 pub use detect::{Candidate, Moving, detect};
-pub use memory::{Memory, Slot};
+pub use manifold::ContactPoint;
+pub use memory::{Memory, Partner, Slot};
+pub use soft_field::{Felt, Pressing, SoftField, detect_soft};
+pub use solid::{Part, Solid};

@@ -4,7 +4,7 @@ use super::{RowOf, StepFailure, World};
 use crate::{
     geometry::{Pose, Vec3},
     physics::{
-        contact::{Mover, Moving, Slot, detect},
+        contact::{Mover, Moving, Partner, Slot, detect},
         fem::system::StepCoefficients,
         joints,
         rigid::free_spin,
@@ -13,7 +13,7 @@ use crate::{
 };
 
 /// Distance at which a group's nodes are kept, so that a contact does not change the factor when it begins, m.
-const REACH: f64 = 2.5e-3;
+pub(super) const REACH: f64 = 2.5e-3;
 /// Stiffness and damping of joint stops, relative to the joint's inertia over a step.
 const STOP_RATE: f64 = 0.5;
 
@@ -21,7 +21,7 @@ const STOP_RATE: f64 = 0.5;
 #[derive(Debug, Default)]
 pub(super) struct Layout {
     pub soft: Vec<Option<usize>>,
-    pub rigid: Vec<usize>,
+    pub rigid: Vec<Option<usize>>,
     pub trees: Vec<usize>,
     pub momentum: Vec<Vec3>,
     pub free_w: Vec<crate::physics::rigid::FreeSpin>,
@@ -107,6 +107,8 @@ impl World {
         self.rigid_blocks();
         self.tree_blocks();
         self.soft_patches();
+        self.pressing_patches();
+        self.rigid_patches();
         Ok(())
     }
 
@@ -149,6 +151,11 @@ impl World {
         for rigid in &self.rigid {
             let body = &rigid.body;
             let spin = free_spin(body, dt);
+            self.layout.free_w.push(spin);
+            if rigid.asleep {
+                self.layout.rigid.push(None);
+                continue;
+            }
             let inertia = body.inertia_w();
             let mut matrix = vec![0.0; 36];
             (0..3).for_each(|i| matrix[7 * i] = body.mass);
@@ -158,8 +165,7 @@ impl World {
             let linear = (body.v + self.gravity * dt) * body.mass;
             let angular = inertia * spin.end_w;
             let stack = |a: &Vec3, b: &Vec3| [a.as_slice(), b.as_slice()].concat();
-            self.layout.rigid.push(self.problem.blocks.len());
-            self.layout.free_w.push(spin);
+            self.layout.rigid.push(Some(self.problem.blocks.len()));
             self.problem.blocks.push(Block {
                 dim: 6,
                 matrix,
@@ -220,7 +226,7 @@ impl World {
         self.candidates = candidates;
     }
 
-    fn nodes_of(&self, soft: usize, group: usize, block: usize) -> Endpoint {
+    pub(super) fn nodes_of(&self, soft: usize, group: usize, block: usize) -> Endpoint {
         let soft = &self.soft[soft];
         let group = &soft.body.rest.groups[group];
         let mut at = [0; 8];
@@ -231,7 +237,7 @@ impl World {
     }
 
     /// The endpoint of a mover; its frame is registered on first use.
-    fn endpoint_of(&mut self, mover: Mover) -> Endpoint {
+    pub(super) fn endpoint_of(&mut self, mover: Mover) -> Endpoint {
         let (block, jacobian, origin) = match mover {
             Mover::Static | Mover::Kinematic(_) => return Endpoint::Known,
             _ if self.layout.screws.iter().any(|(m, _)| *m == mover) => {
@@ -239,8 +245,9 @@ impl World {
                 return found.map_or(Endpoint::Known, |(_, screw)| Endpoint::Screw(*screw));
             }
             Mover::Rigid(index) => {
+                let Some(block) = self.layout.rigid[index] else { return Endpoint::Known };
                 let identity = (0..36).map(|e| if e % 7 == 0 { 1.0 } else { 0.0 }).collect();
-                (self.layout.rigid[index], identity, self.rigid[index].body.pose_w.translation.vector)
+                (block, identity, self.rigid[index].body.pose_w.translation.vector)
             }
             Mover::Link { tree, link } => {
                 let t = &self.trees[tree];
@@ -257,11 +264,12 @@ impl World {
         let (body, collider, moving) = (&self.soft[soft], &self.colliders[id], &self.moving[id]);
         let sample = &body.body.rest.samples[candidate.sample];
         let local = moving.pose.inverse_transform_point(&candidate.p.into()).coords;
+        let partner = Partner::Collider(id).id();
         let slot = body
             .memory
-            .get(candidate.sample, id as u32, body.steps)
+            .get(candidate.sample, partner, body.steps)
             .copied()
-            .unwrap_or(Slot::fresh(id as u32, local));
+            .unwrap_or(Slot::fresh(partner, local));
         let anchor_w = (moving.pose * nalgebra::Point3::from(slot.anchor)).coords;
         let offset = candidate.p - anchor_w;
         let friction = collider.friction.with(&body.friction);
@@ -288,9 +296,10 @@ impl World {
         self.rows.push(RowOf {
             soft,
             candidate: *candidate,
-            partner: id as u32,
+            partner,
             anchor: slot.anchor,
             travel: slot.travel,
+            pull: moving.pose.rotation.inverse().to_rotation_matrix().into_inner(),
         });
     }
 }

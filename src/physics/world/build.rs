@@ -6,7 +6,7 @@ use super::{Articulation, Drive, Kinematic, Rigid, Soft, World};
 use crate::{
     geometry::{Pose, Vec3},
     physics::{
-        contact::{Collider, ColliderId, Friction, Layer, Memory},
+        contact::{Collider, ColliderId, Friction, Layer, Memory, Surface},
         fem::{SoftBody, body::Rest, system::System},
         joints::{self, Tree, TreeState},
         params::Params,
@@ -20,8 +20,15 @@ impl World {
         Self { params, gravity, ..Self::default() }
     }
 
-    /// Adds a soft body at rest at `pose`; its index.
-    pub fn add_soft(&mut self, name: &str, rest: Arc<Rest>, pose: &Pose, friction: Friction) -> usize {
+    /// Adds a soft body at rest at `pose`; its index. Other soft bodies feel `surface` (object frame), if it has one.
+    pub fn add_soft(
+        &mut self,
+        name: &str,
+        rest: Arc<Rest>,
+        surface: Option<Arc<dyn Surface>>,
+        pose: &Pose,
+        friction: Friction,
+    ) -> usize {
         let modulus = rest.contact_modulus();
         let mut body = SoftBody::new(rest.clone(), pose);
         body.update_elastic();
@@ -31,6 +38,7 @@ impl World {
             body,
             friction,
             layer: Layer { normal: modulus, shear: self.params.shear_ratio * modulus },
+            surface,
             asleep: false,
             touches: Vec::new(),
             system: System::new(&rest),
@@ -44,7 +52,7 @@ impl World {
 
     /// Adds a free rigid body; its index.
     pub fn add_rigid(&mut self, name: &str, body: RigidBody) -> usize {
-        self.rigid.push(Rigid { name: name.to_owned(), body });
+        self.rigid.push(Rigid { name: name.to_owned(), body, asleep: false, slow_for: 0.0 });
         self.rigid.len() - 1
     }
 

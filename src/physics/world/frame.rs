@@ -1,9 +1,9 @@
 //! What observers see: cheap copies of the state, and who touches whom.
 
-use super::{RowOf, World};
+use super::{RowOf, Soft, World};
 use crate::{
     geometry::{Pose, Vec3},
-    physics::solver::Point,
+    physics::{contact::Partner, solver::Point},
 };
 
 /// An immutable copy of the state after a step.
@@ -57,7 +57,7 @@ pub struct PatchPoint {
     pub slipping: bool,
 }
 
-/// What one collider does to one soft body, summed over the patch.
+/// What one collider or soft body does to one soft body, summed over the patch.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Touch {
     /// Touching samples.
@@ -91,9 +91,10 @@ impl World {
     /// What touched a collider in the last step.
     pub fn patch(&self, collider: usize) -> ContactPatch {
         let dt = self.params.dt;
+        let partner = Partner::Collider(collider).id();
         let rows = self.rows.iter().zip(&self.problem.points);
         let points = rows
-            .filter(|(row, point)| row.partner as usize == collider && point.normal_impulse > 0.0)
+            .filter(|(row, point)| row.partner == partner && point.normal_impulse > 0.0)
             .map(|(row, point)| {
                 let pose = &self.moving[collider].pose;
                 let rest = &self.soft[row.soft].body.rest;
@@ -116,8 +117,22 @@ impl World {
 
     /// What `collider` did to soft body `soft` in the last step in which the body was awake.
     pub fn touch(&self, soft: usize, collider: usize) -> Touch {
+        self.touch_by(soft, Partner::Collider(collider))
+    }
+
+    /// What `partner` did to soft body `soft` in the last step in which the body was awake.
+    pub fn touch_by(&self, soft: usize, partner: Partner) -> Touch {
         let touches = &self.soft[soft].touches;
-        touches.iter().find(|(id, _)| *id as usize == collider).map_or(Touch::default(), |(_, touch)| *touch)
+        touches.iter().find(|(id, _)| *id == partner.id()).map_or(Touch::default(), |(_, touch)| *touch)
+    }
+
+    /// Adds one point to what its two sides are told; a sleeping body keeps what it knew.
+    pub(super) fn record_touch(soft: &mut [Soft], row: &RowOf, point: &Point, dt: f64) {
+        let force = (point.normal * point.normal_impulse + point.shear_impulse) / dt;
+        soft[row.soft].record(row.partner, (row, point), &force, dt);
+        if let Partner::Soft(other) = Partner::of(row.partner) {
+            soft[other].record(Partner::Soft(row.soft).id(), (row, point), &-force, dt);
+        }
     }
 }
 
@@ -126,21 +141,25 @@ impl Touch {
     pub fn shear(&self) -> f64 {
         (self.force_w.norm_squared() - self.normal_force.powi(2)).max(0.0).sqrt()
     }
+}
 
-    /// Adds one point to the touch of its partner.
-    pub(super) fn add(touches: &mut Vec<(u32, Self)>, row: &RowOf, point: &Point, dt: f64) {
-        let at = touches.iter().position(|(id, _)| *id == row.partner).unwrap_or_else(|| {
-            touches.push((row.partner, Self::default()));
-            touches.len() - 1
+impl Soft {
+    fn record(&mut self, partner: u32, (row, point): (&RowOf, &Point), force_w: &Vec3, dt: f64) {
+        if self.asleep {
+            return;
+        }
+        let at = self.touches.iter().position(|(id, _)| *id == partner).unwrap_or_else(|| {
+            self.touches.push((partner, Touch::default()));
+            self.touches.len() - 1
         });
-        let touch = &mut touches[at].1;
+        let touch = &mut self.touches[at].1;
         let force = point.normal_impulse / dt;
         touch.samples += 1;
         touch.slipping += usize::from(point.slipping);
         touch.travel =
             (touch.travel * touch.normal_force + row.travel * force) / (touch.normal_force + force);
         touch.normal_force += force;
-        touch.force_w += (point.normal * point.normal_impulse + point.shear_impulse) / dt;
+        touch.force_w += force_w;
         touch.capacity += point.mu * force;
     }
 }

@@ -1,6 +1,6 @@
 //! From the solution back to the state.
 
-use super::{StepFailure, Touch, World};
+use super::{StepFailure, World};
 use crate::{
     geometry::Vec3,
     physics::{contact::Slot, joints, rigid},
@@ -21,7 +21,8 @@ impl World {
             soft.min_det_f = body.min_det_f();
         }
         for (i, rigid) in self.rigid.iter_mut().enumerate() {
-            let v = &self.problem.blocks[self.layout.rigid[i]].v;
+            let Some(block) = self.layout.rigid[i] else { continue };
+            let v = &self.problem.blocks[block].v;
             let (linear, angular) = (Vec3::new(v[0], v[1], v[2]), Vec3::new(v[3], v[4], v[5]));
             rigid::advance(&mut rigid.body, linear, angular, &self.layout.free_w[i], dt);
         }
@@ -54,7 +55,7 @@ impl World {
             if point.normal_impulse <= 0.0 {
                 continue;
             }
-            Touch::add(&mut self.soft[row.soft].touches, row, point, dt);
+            Self::record_touch(&mut self.soft, row, point, dt);
             let soft = &mut self.soft[row.soft];
             let mut slot = Slot {
                 partner: row.partner,
@@ -70,8 +71,7 @@ impl World {
                 let allowed = point.mu * point.lagged / (dt * point.shear_stiffness).max(f64::MIN_POSITIVE);
                 let excess = (stretched.norm() - allowed).max(0.0);
                 let shift = stretched.try_normalize(0.0).unwrap_or_default() * excess;
-                let pose = &self.moving[row.partner as usize].pose;
-                slot.anchor += pose.rotation.inverse_transform_vector(&shift);
+                slot.anchor += row.pull * shift;
                 slot.travel += excess;
             }
             soft.memory.put(row.candidate.sample, slot);

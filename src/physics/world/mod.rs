@@ -5,12 +5,16 @@ mod build;
 mod energy;
 mod frame;
 mod integrate;
+mod rigid_rows;
 mod sleep;
+mod soft_rows;
+
+use std::sync::Arc;
 
 use crate::{
-    geometry::{Pose, Vec3},
+    geometry::{Mat3, Pose, Vec3},
     physics::{
-        contact::{Candidate, Collider, ColliderId, Friction, Layer, Memory, Moving},
+        contact::{Candidate, Collider, ColliderId, Friction, Layer, Memory, Moving, Surface},
         fem::{SoftBody, system::System},
         joints::{self, Tree, TreeState},
         params::Params,
@@ -32,11 +36,13 @@ pub struct Soft {
     pub friction: Friction,
     /// Compliance of its surface.
     pub layer: Layer,
+    /// Its surface at rest, object frame, as other soft bodies feel it; without one they do not.
+    pub surface: Option<Arc<dyn Surface>>,
     /// Whether it sleeps: it neither moves nor costs anything until something touches it.
     pub asleep: bool,
     /// Least det F of its filled elements after the last step, and where.
     pub min_det_f: (f64, usize),
-    /// What touched it in the last step in which it was awake, by partner (a collider's id).
+    /// What touched it in the last step in which it was awake, by [`Partner::id`](crate::physics::contact::Partner::id).
     pub touches: Vec<(u32, Touch)>,
     system: System,
     memory: Memory,
@@ -53,6 +59,9 @@ pub struct Rigid {
     pub name: String,
     /// The body.
     pub body: RigidBody,
+    /// Whether it sleeps: it stands still, as if it were part of the world, until something stirs near it.
+    pub asleep: bool,
+    slow_for: f64,
 }
 
 /// A PD drive on one joint: force `clamp(kp (target − q) + kd (target_velocity − v), ±effort)`, solved with everything else.
@@ -156,6 +165,8 @@ struct RowOf {
     partner: u32,
     anchor: Vec3,
     travel: f64,
+    /// Takes small vectors of the world to the frame of the anchor.
+    pull: Mat3,
 }
 
 /// All bodies of a scene and how they stand.
@@ -183,6 +194,8 @@ pub struct World {
     solver: Solver,
     rows: Vec<RowOf>,
     candidates: Vec<(usize, ColliderId, Candidate)>,
+    pressing: Vec<soft_rows::Press>,
+    rigid_contacts: rigid_rows::RigidContacts,
     layout: assemble::Layout,
 }
 
@@ -196,11 +209,13 @@ impl World {
         self.place_colliders();
         self.wake();
         self.detect();
+        self.detect_pressing();
         self.assemble()?;
         let solved = self.solver.solve(&mut self.problem);
         self.stats = solved.map_err(|f| StepFailure::Diverged { step: self.step, excess: f.excess })?;
         self.integrate();
         self.remember();
+        self.remember_rigid();
         self.fall_asleep();
         self.check()
     }

@@ -8,12 +8,18 @@ def _key(points):
 
 
 def orbits(points, mirrors):
-    """Representatives of `points` (n, 3) under mirrors {axis: plane}, and the size of each orbit."""
+    """Representatives of `points` (n, 3) under mirrors {axis: plane}, and the size of each orbit.
+
+    A representative lies on the low side of every plane: only the pad on that side is modelled.
+    """
     folded = points.copy()
+    high = np.zeros(len(points), int)
     for axis, plane in mirrors.items():
         folded[:, axis] = plane + np.abs(points[:, axis] - plane)
-    seen, first, size = {}, [], []
-    for i, k in enumerate(_key(folded)):
+        high += points[:, axis] > plane + 1e-9
+    keys, seen, first, size = _key(folded), {}, [], []
+    for i in np.argsort(high, kind="stable"):
+        k = keys[i]
         if k in seen:
             size[seen[k]] += 1
         else:

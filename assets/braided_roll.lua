@@ -1,0 +1,30 @@
+-- An elongated braided roll, 110 × 48 × 38 mm: golden lobes laid left and right in turn as in a plait, each with an
+-- orange stripe of glaze along its crest.
+local mm = 1e-3
+local TABLE_TOP = softvt.shape.box { size = { 0.2, 0.2, 0.02 } }:translate(0, 0, -0.01)
+
+-- A lobe: a slanted ellipsoid that starts at the middle line and leans outwards; x in mm, side ±1, size of the whole.
+local function lobe(x, side, size)
+  local function place(shape)
+    return shape:rotate { axis = "z", angle = side * 0.62 }:translate(x * mm, side * 7.5 * mm * size, 17.5 * mm)
+  end
+  local dough = place(softvt.shape.ellipsoid { size = { 43 * mm * size, 26 * mm * size, 41 * mm * size } })
+  local stripe = place(softvt.shape.box { size = { 40 * mm, 3.6 * mm, 0.1 } })
+  return dough:paint { material = 1, region = stripe }
+end
+
+-- Lobes get smaller towards the ends, as the dough of a plait does.
+local braid = lobe(-40, 1, 0.78)
+for _, next in ipairs { { -26, -1, 0.92 }, { -12, 1, 1 }, { 3, -1, 1 }, { 17, 1, 0.98 }, { 31, -1, 0.88 }, { 41, 1, 0.74 } } do
+  braid = braid:smooth_union(lobe(table.unpack(next)), 3 * mm)
+end
+
+return softvt.asset {
+  name = "braided_roll",
+  shape = braid:subtract(TABLE_TOP, 4 * mm),
+  body = softvt.soft { youngs_pa = 90e3, poisson = 0.37, density = 300 },
+  visuals = {
+    { albedo = { 0.74, 0.48, 0.17 }, roughness = 0.5 },
+    { albedo = { 0.80, 0.27, 0.04 }, roughness = 0.4 },
+  },
+}

@@ -1,0 +1,23 @@
+-- A small ridged bread roll, 62 × 44 × 34 mm: a dark brown oval with rounded ridges across.
+local mm = 1e-3
+local LENGTH, WIDTH, HEIGHT = 62 * mm, 44 * mm, 34 * mm
+
+-- Ridges run around the long axis; they fade towards the flat base.
+local RIDGE = 1.6 * mm
+local BELOW = 4 * mm
+local oval = softvt.shape.ellipsoid { size = { LENGTH, WIDTH - 2 * RIDGE, HEIGHT - RIDGE + BELOW } }
+  :translate(0, 0, (HEIGHT - RIDGE - BELOW) / 2)
+local ridged = oval:ridges {
+  axis = "x", pitch = 9 * mm, height = RIDGE, mask = { axis = "z", from = 2 * mm, to = 9 * mm },
+}
+local table_top = softvt.shape.box { size = { 0.1, 0.1, 0.02 } }:translate(0, 0, -0.01)
+
+return softvt.asset {
+  name = "small_ridged_roll",
+  shape = ridged:subtract(table_top, 3 * mm):paint { material = 1, region = oval:round(0.45 * mm) },
+  body = softvt.soft { youngs_pa = 110e3, poisson = 0.38, density = 320 },
+  visuals = {
+    { albedo = { 0.20, 0.09, 0.04 }, roughness = 0.55 },
+    { albedo = { 0.34, 0.17, 0.07 }, roughness = 0.6 },
+  },
+}

@@ -1,0 +1,26 @@
+-- A steamed bun with a face, 66 × 62 × 44 mm: a smooth cream dome on a flat base, two black eyes that look up and
+-- forward (+x).
+local mm = 1e-3
+local LENGTH, WIDTH, HEIGHT = 66 * mm, 62 * mm, 44 * mm
+
+-- The dome is the part of an ellipsoid above the table, its lower edge rounded.
+local BELOW = 9 * mm
+local dome = softvt.shape.ellipsoid { size = { LENGTH, WIDTH, HEIGHT + BELOW } }
+  :translate(0, 0, (HEIGHT - BELOW) / 2)
+local table_top = softvt.shape.box { size = { 0.1, 0.1, 0.02 } }:translate(0, 0, -0.01)
+
+local bun = dome:subtract(table_top, 4 * mm)
+for _, side in ipairs { -1, 1 } do
+  local eye = softvt.shape.sphere { radius = 4 * mm }:translate(21 * mm, side * 9 * mm, 36 * mm)
+  bun = bun:paint { material = 1, region = eye }
+end
+
+return softvt.asset {
+  name = "steamed_bun",
+  shape = bun,
+  body = softvt.soft { youngs_pa = 25e3, poisson = 0.30, density = 180 },
+  visuals = {
+    { albedo = { 0.90, 0.85, 0.72 }, roughness = 0.6 },
+    { albedo = { 0.02, 0.02, 0.02 }, roughness = 0.3 },
+  },
+}

@@ -1,0 +1,40 @@
+-- Two instances of the same soft object left and right of a plate. Left and right are those of the third-person image:
+-- image right is +y of the world. Both tasks of a mirrored pair use one layout, so that they start from the same state.
+local plate = require "assets.plate"
+local table_top = require "assets.table"
+
+local mm = 1e-3
+-- Spread of the start states: position, turn, arm joints (standard deviation).
+local REACH, TURN, JOINT = 20 * mm, math.rad(30), 0.02
+
+-- Where left, right and plate stand, x and y in mm. An open hand with its sensors needs 70 mm to either side of what it
+-- grasps, the spread takes 20 mm more, and a plate has a radius of 69 mm.
+local PLACES = {
+  { left = { -50, -190 }, right = { -50, 190 }, plate = { 40, 0 } },
+  { left = { 10, -200 }, right = { 10, 200 }, plate = { -60, 0 } },
+  { left = { -100, -185 }, right = { 0, 195 }, plate = { 20, 10 } },
+  { left = { 0, -195 }, right = { -100, 185 }, plate = { 10, -10 } },
+  { left = { -30, -205 }, right = { 40, 190 }, plate = { -20, -10 } },
+}
+
+local layouts = {}
+
+-- Two of `asset` at the k-th arrangement.
+function layouts.pair(asset, k)
+  local places = assert(PLACES[k], "there are five arrangements")
+  local recipe = require("assets." .. asset)
+  return softvt.layout(asset .. "_pair", function(scene, rng)
+    scene:add { name = "table", asset = table_top, xyz = { 0, 0, 0 } }
+    scene:add { name = "plate", asset = plate, at = { places.plate[1] * mm, places.plate[2] * mm } }
+    for _, side in ipairs { "left", "right" } do
+      local x, y = places[side][1] * mm, places[side][2] * mm
+      local at = { x + rng:uniform(-REACH, REACH), y + rng:uniform(-REACH, REACH) }
+      scene:add { name = side, asset = recipe, at = at, yaw = rng:uniform(-TURN, TURN) }
+    end
+    local joints, noise = scene.start_q, rng:stream "arm"
+    for i = 1, #joints do joints[i] = joints[i] + noise:normal(0, JOINT) end
+    scene.start_q = joints
+  end)
+end
+
+return layouts

@@ -1,0 +1,247 @@
+//! What may be typed: the runner's own flags and, beside them, the options that a script declares.
+
+use std::path::{Path, PathBuf};
+
+use clap::{
+    Arg, ArgAction, ArgMatches, builder::PossibleValuesParser, error::ErrorKind, parser::ValueSource,
+    value_parser,
+};
+
+use super::{Failure, code};
+use crate::script::{self, OptionSpec, OptionValue};
+
+/// Policies that need no server and no file.
+pub const POLICIES: [(&str, &str); 4] = [
+    ("expert", "the task's scripted expert (privileged: it sees the true state)"),
+    ("expert-binary", "the same expert with a gripper that is only open or shut (privileged)"),
+    ("noop", "holds still with the gripper open"),
+    ("random", "wanders at random"),
+];
+
+/// A command.
+#[derive(Debug)]
+pub enum Command {
+    /// Do what a script's plan says.
+    Run(Run),
+    /// List what there is.
+    List {
+        /// Suites, tasks, assets or policies.
+        what: String,
+        /// As JSON.
+        json: bool,
+    },
+    /// Set up a folder for scripts.
+    Init {
+        /// The folder.
+        dir: PathBuf,
+    },
+    /// Check the installation.
+    Doctor,
+    /// Help or version was shown.
+    Shown,
+}
+
+/// What to run and how.
+#[derive(Debug)]
+pub struct Run {
+    /// The script.
+    pub file: PathBuf,
+    /// Words for the script's own options.
+    pub script_words: Vec<String>,
+    /// Policy name.
+    pub policy: String,
+    /// Tasks to run: indices or parts of prompts; all if empty.
+    pub tasks: Vec<String>,
+    /// Episodes a task; the suite's own number if none.
+    pub episodes: Option<u32>,
+    /// Base seed.
+    pub seed: u64,
+    /// Threads.
+    pub threads: usize,
+    /// Shifts by name and value.
+    pub shifts: Vec<(String, f64)>,
+    /// Settings by path and value.
+    pub set: Vec<(String, String)>,
+    /// Whether to write a trace, and whether with node positions.
+    pub trace: Option<bool>,
+    /// Where to write.
+    pub out: Option<PathBuf>,
+    /// Print JSON instead of tables.
+    pub json: bool,
+}
+
+/// Reads the command line.
+///
+/// # Errors
+/// Usage errors, with what was meant where it can be guessed.
+pub fn parse(words: &[String]) -> Result<Command, Failure> {
+    let options = match script_file(words) {
+        Some(file) => script::declared_options(Path::new(file)).map_err(Failure::input)?,
+        None => Vec::new(),
+    };
+    let command = command(&options)?;
+    let matches = match command.try_get_matches_from(words) {
+        Ok(matches) => matches,
+        Err(error) if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
+            super::print(&error.to_string());
+            return Ok(Command::Shown);
+        }
+        Err(error) => {
+            let text = error.to_string();
+            let message = text.trim_start_matches("error: ").trim_end().to_owned();
+            return Err(Failure { code: code::INPUT, message });
+        }
+    };
+    match matches.subcommand() {
+        Some(("list", m)) => Ok(Command::List { what: text(m, "what"), json: m.get_flag("json") }),
+        Some(("init", m)) => Ok(Command::Init { dir: PathBuf::from(text(m, "dir")) }),
+        Some(("doctor", _)) => Ok(Command::Doctor),
+        _ => run(&matches, &options).map(Command::Run),
+    }
+}
+
+/// The script among the words: the first that ends in `.lua`, unless it is the value of `--policy`.
+fn script_file(words: &[String]) -> Option<&str> {
+    let mut previous = "";
+    for word in words.iter().skip(1) {
+        if word.ends_with(".lua") && !word.starts_with('-') && previous != "--policy" {
+            return Some(word);
+        }
+        previous = word;
+    }
+    None
+}
+
+fn text(matches: &ArgMatches, name: &str) -> String {
+    matches.get_one::<String>(name).cloned().unwrap_or_default()
+}
+
+/// The whole command with the script's options in a section of their own.
+fn command(options: &[OptionSpec]) -> Result<clap::Command, Failure> {
+    let mut command = runner();
+    let own: Vec<String> = command
+        .get_arguments()
+        .filter_map(|a| a.get_long())
+        .map(str::to_owned)
+        .chain(["help".into(), "version".into()])
+        .collect();
+    for option in options {
+        let long = option.flag().trim_start_matches("--").to_owned();
+        if own.contains(&long) {
+            let message =
+                format!("the script declares the option --{long}, which is the runner's own; rename it");
+            return Err(Failure::input(message));
+        }
+        command = command.arg(script_arg(option, long));
+    }
+    Ok(command)
+}
+
+fn script_arg(option: &OptionSpec, long: String) -> Arg {
+    let about = format!("{} [{}; default {}]", option.help, option.expects(), shown(&option.default));
+    let arg = Arg::new(format!("script:{}", option.name))
+        .long(long)
+        .help(about)
+        .help_heading("Options of the script");
+    match option.default {
+        OptionValue::Flag(_) => {
+            arg.num_args(0..=1).require_equals(true).default_missing_value("on").value_name("on|off")
+        }
+        _ => arg.num_args(1).allow_hyphen_values(true).value_name(if option.unit.is_empty() {
+            "VALUE"
+        } else {
+            "NUMBER"
+        }),
+    }
+}
+
+fn shown(value: &OptionValue) -> String {
+    let joined = |parts: Vec<String>| parts.join(",");
+    match value {
+        OptionValue::Number(n) => n.to_string(),
+        OptionValue::Integer(n) => n.to_string(),
+        OptionValue::Text(text) => format!("{text:?}"),
+        OptionValue::Flag(on) => if *on { "on" } else { "off" }.to_owned(),
+        OptionValue::Numbers(list) => joined(list.iter().map(f64::to_string).collect()),
+        OptionValue::Texts(list) => joined(list.clone()),
+    }
+}
+
+fn runner() -> clap::Command {
+    let policies = POLICIES.map(|(name, _)| name);
+    let flag = |name: &'static str, help: &'static str| Arg::new(name).long(name).help(help);
+    let list = |name, help| flag(name, help).action(ArgAction::Append).value_delimiter(',');
+    let file =
+        Arg::new("file").value_name("FILE.lua").help("The script whose plan to carry out").required(true);
+    let json = flag("json", "Print JSON on the standard output").action(ArgAction::SetTrue);
+    clap::Command::new("softvt")
+        .version(env!("CARGO_PKG_VERSION"))
+        .about("A safety-aware visuo-tactile manipulation benchmark for soft objects, on an ordinary CPU")
+        .after_help("softvt FILE.lua --help shows the options of that script too.\nExit codes: 0 ok, 1 our own fault, 2 your input, 3 policy or transport, 130 interrupted.")
+        .subcommand_negates_reqs(true)
+        .args_conflicts_with_subcommands(true)
+        .arg(file)
+        .arg(flag("policy", "Who drives").value_name("POLICY").default_value("expert").value_parser(PossibleValuesParser::new(policies)))
+        .arg(list("task", "Only these tasks: indices or parts of prompts, joined by commas").value_name("TASK"))
+        .arg(flag("episodes", "Episodes a task").value_name("N").value_parser(value_parser!(u32).range(1..)))
+        .arg(flag("seed", "Base seed").value_name("S").default_value("0").value_parser(value_parser!(u64)))
+        .arg(flag("threads", "Threads; results do not depend on it").value_name("N").value_parser(value_parser!(u16).range(1..=1024)))
+        .arg(list("shift", "Changes of the scene that the suite declares, such as stiffness=0.5").value_name("NAME=VALUE"))
+        .arg(flag("set", "Changes a setting, such as robot.gripper.effort=20").value_name("PATH=VALUE").action(ArgAction::Append))
+        .arg(flag("trace", "Writes a record of every control step; =nodes with node positions").num_args(0..=1).require_equals(true).default_missing_value("state").value_parser(["state", "nodes"]))
+        .arg(flag("out", "Where to write; a folder without a run in it").value_name("DIR"))
+        .arg(json.clone())
+        .subcommand(
+            clap::Command::new("list")
+                .about("Lists suites, tasks, assets or policies")
+                .arg(Arg::new("what").required(true).value_parser(["suites", "tasks", "assets", "policies"]))
+                .arg(json),
+        )
+        .subcommand(
+            clap::Command::new("init")
+                .about("Writes editor stubs for Lua scripts into a folder")
+                .arg(Arg::new("dir").default_value(".")),
+        )
+        .subcommand(clap::Command::new("doctor").about("Checks the installation and runs a golden episode"))
+}
+
+fn run(matches: &ArgMatches, options: &[OptionSpec]) -> Result<Run, Failure> {
+    let mut script_words = Vec::new();
+    for option in options {
+        let id = format!("script:{}", option.name);
+        if matches.value_source(&id) == Some(ValueSource::CommandLine) {
+            script_words.push(format!("{}={}", option.flag(), text(matches, &id)));
+        }
+    }
+    let available = std::thread::available_parallelism().map_or(1, |n| n.get());
+    let many = |name: &str| matches.get_many::<String>(name).unwrap_or_default().cloned().collect::<Vec<_>>();
+    Ok(Run {
+        file: PathBuf::from(text(matches, "file")),
+        script_words,
+        policy: text(matches, "policy"),
+        tasks: many("task"),
+        episodes: matches.get_one("episodes").copied(),
+        seed: matches.get_one("seed").copied().unwrap_or(0),
+        threads: matches.get_one::<u16>("threads").map_or(available, |n| usize::from(*n)),
+        shifts: many("shift").iter().map(|word| shift(word)).collect::<Result<_, _>>()?,
+        set: many("set").iter().map(|word| pair("--set", word)).collect::<Result<_, _>>()?,
+        trace: matches.get_one::<String>("trace").map(|kind| kind == "nodes"),
+        out: matches.get_one::<String>("out").map(PathBuf::from),
+        json: matches.get_flag("json"),
+    })
+}
+
+fn pair(flag: &str, word: &str) -> Result<(String, String), Failure> {
+    let split = word.split_once('=').filter(|(name, value)| !name.is_empty() && !value.is_empty());
+    let (name, value) =
+        split.ok_or_else(|| Failure::input(format!("{flag}: expected NAME=VALUE, got {word:?}")))?;
+    Ok((name.to_owned(), value.to_owned()))
+}
+
+fn shift(word: &str) -> Result<(String, f64), Failure> {
+    let (name, value) = pair("--shift", word)?;
+    let number = value.parse::<f64>().ok().filter(|n| n.is_finite());
+    let number =
+        number.ok_or_else(|| Failure::input(format!("--shift {name}: expected a number, got {value:?}")))?;
+    Ok((name, number))
+}

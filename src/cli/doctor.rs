@@ -1,0 +1,60 @@
+//! `softvt doctor`: versions, the machine, and whether physics gives the published bits here.
+
+use serde::Deserialize;
+
+use super::{Failure, args::Run, evaluate, print};
+use crate::script;
+
+/// The episode whose final state is published, `assets/golden.json`.
+#[derive(Deserialize)]
+struct Golden {
+    script: String,
+    task: usize,
+    state_hash: String,
+}
+
+/// Checks the installation.
+///
+/// # Errors
+/// The golden episode cannot be run.
+pub fn run() -> Result<(), Failure> {
+    let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
+    print(&format!(
+        "softvt     {}\nplatform   {} {}, {threads} threads\nfeatures   {}\nlua        5.4, embedded\n",
+        env!("CARGO_PKG_VERSION"),
+        std::env::consts::ARCH,
+        std::env::consts::OS,
+        if cfg!(target_feature = "avx2") { "avx2" } else { "portable (slower; the same results)" },
+    ));
+    let Some(golden) = script::embedded("assets/golden.json") else {
+        print("golden     none in this build\n");
+        return Ok(());
+    };
+    let golden: Golden = serde_json::from_slice(golden).map_err(Failure::input)?;
+    let record = evaluate::single(&golden_run(&golden), golden.task)?;
+    let hash = &record.stats.state_hash;
+    let verdict = if *hash == golden.state_hash {
+        "matches the published one"
+    } else {
+        "DIFFERS from the published one: results of this machine are not comparable bit for bit"
+    };
+    print(&format!("golden     {} task {}: {hash}, {verdict}\n", golden.script, golden.task));
+    Ok(())
+}
+
+fn golden_run(golden: &Golden) -> Run {
+    Run {
+        file: golden.script.clone().into(),
+        script_words: Vec::new(),
+        policy: "expert".to_owned(),
+        tasks: vec![golden.task.to_string()],
+        episodes: Some(1),
+        seed: 0,
+        threads: 1,
+        shifts: Vec::new(),
+        set: Vec::new(),
+        trace: None,
+        out: None,
+        json: false,
+    }
+}

@@ -1,0 +1,399 @@
+//! Carrying out a plan: a policy on suites, or an experiment.
+
+use std::{
+    collections::BTreeMap,
+    path::PathBuf,
+    sync::{Arc, atomic::Ordering},
+};
+
+use serde::Serialize;
+
+use super::{Failure, STOP, args::Run, code, experiment, files, print, progress::Progress};
+use crate::{
+    benchmark::{Plan, Suite, Task, seed::Split, settings::Settings},
+    evaluation::{
+        record::{EpisodeRecord, Identity},
+        safety::Limit,
+        summary::Summary,
+        thresholds::Thresholds,
+    },
+    policy::{Policy, builtin},
+    report::{
+        interchange,
+        run_folder::{RUN, RunFolder, RunFolderError, SUMMARY, replace},
+        terminal,
+    },
+    rollout::{ControlError, Controller, Episode, EpisodeError, EpisodeSpec, Finished, RestCache, batch},
+    scene::{Body, Scene},
+    script::{self, ExpertController, Loaded},
+};
+
+/// Carries out the plan of a script.
+///
+/// # Errors
+/// Anything that is wrong with the script, the flags, the folder or the policy.
+pub fn run(run: &Run) -> Result<(), Failure> {
+    let loaded = script::load(&run.file, &run.script_words).map_err(Failure::input)?;
+    match &loaded.plan {
+        Plan::Suite(suite) => {
+            let summary = evaluate(run, &loaded, suite, out_dir(run, &suite.name, None))?;
+            show(run, &[summary]);
+            Ok(())
+        }
+        Plan::Suites { suites } => {
+            let mut summaries = Vec::new();
+            for suite in suites {
+                summaries.push(evaluate(run, &loaded, suite, out_dir(run, &suite.name, Some(&suite.name)))?);
+            }
+            show(run, &summaries);
+            Ok(())
+        }
+        Plan::Experiment { name, points, columns } => experiment::run(run, &loaded, name, *points, columns),
+    }
+}
+
+fn show(run: &Run, summaries: &[Summary]) {
+    for summary in summaries {
+        print(&if run.json {
+            format!("{:#}\n", serde_json::json!(summary))
+        } else {
+            terminal::table(summary)
+        });
+    }
+}
+
+/// The folder that was asked for (with one more level for one of several suites), or the next free one under `runs/`.
+fn out_dir(run: &Run, suite: &str, level: Option<&str>) -> PathBuf {
+    match &run.out {
+        Some(dir) => level.map_or(dir.clone(), |level| dir.join(level)),
+        None => (1..)
+            .map(|n| PathBuf::from(format!("runs/{suite}-{}-{n:03}", run.policy)))
+            .find(|dir| !dir.exists())
+            .unwrap_or_default(),
+    }
+}
+
+/// Everything needed to repeat a run.
+#[derive(Serialize)]
+struct RunInfo<'a> {
+    softvt: &'a str,
+    script: String,
+    suite: &'a str,
+    policy: &'a str,
+    privileged: bool,
+    seed: u64,
+    split: &'a str,
+    tasks: Vec<usize>,
+    episodes: u32,
+    shifts: &'a [(String, f64)],
+    options: BTreeMap<String, String>,
+    settings: &'a Settings,
+    sources: BTreeMap<String, String>,
+    thresholds: BTreeMap<String, Option<f64>>,
+}
+
+/// One suite under way.
+struct Batch<'a> {
+    run: &'a Run,
+    loaded: &'a Loaded,
+    suite: &'a Suite,
+    settings: Settings,
+    jobs: Vec<(&'a Task, u32)>,
+    limits: BTreeMap<String, Option<Limit>>,
+    cache: RestCache,
+    out: PathBuf,
+}
+
+/// Runs the first episode of one task of a suite and writes nothing.
+///
+/// # Errors
+/// The script is no suite, or the episode cannot be run.
+pub fn single(run: &Run, task: usize) -> Result<EpisodeRecord, Failure> {
+    let loaded = script::load(&run.file, &run.script_words).map_err(Failure::input)?;
+    let Plan::Suite(suite) = &loaded.plan else {
+        return Err(Failure::input(format!("{} is not a suite", run.file.display())));
+    };
+    let tasks = suite.tasks.iter().filter(|t| t.id == task);
+    let jobs = tasks.map(|task| (task, 0)).collect();
+    let settings = suite.settings.clone();
+    let batch = Batch {
+        run,
+        loaded: &loaded,
+        suite,
+        settings,
+        jobs,
+        limits: BTreeMap::new(),
+        cache: RestCache::default(),
+        out: PathBuf::new(),
+    };
+    batch.episode(0).map(|finished| finished.record)
+}
+
+fn evaluate(run: &Run, loaded: &Loaded, suite: &Suite, out: PathBuf) -> Result<Summary, Failure> {
+    let mut settings = suite.settings.clone();
+    for (path, value) in &run.set {
+        settings = settings.with(path, value).map_err(|e| Failure::input(format!("--set {e}")))?;
+    }
+    for (name, value) in &run.shifts {
+        script::check_shift(&suite.shifts, name, *value)
+            .map_err(|e| Failure::input(format!("{}: --shift: {e}", run.file.display())))?;
+    }
+    let tasks = chosen(run, suite)?;
+    if let Some(task) = tasks.iter().find(|t| !t.expert && run.policy.starts_with("expert")) {
+        let message =
+            format!("{}: task {} has no expert; give one, or another --policy", run.file.display(), task.id);
+        return Err(Failure::input(message));
+    }
+    let episodes = run.episodes.unwrap_or(suite.episodes);
+    let jobs = tasks.iter().flat_map(|task| (0..episodes).map(move |e| (*task, e))).collect();
+    let mut batch = Batch {
+        run,
+        loaded,
+        suite,
+        settings,
+        jobs,
+        limits: BTreeMap::new(),
+        cache: RestCache::default(),
+        out,
+    };
+    batch.find_limits(&tasks)?;
+    let folder = RunFolder::create(&batch.out).map_err(Failure::input)?;
+    batch.write_info(&folder, &tasks, episodes)?;
+    batch.go(folder)
+}
+
+/// The tasks that `--task` names.
+fn chosen<'a>(run: &Run, suite: &'a Suite) -> Result<Vec<&'a Task>, Failure> {
+    let mut found: Vec<&Task> = Vec::new();
+    for word in &run.tasks {
+        let index = word.parse::<usize>().ok();
+        let fits = |task: &&Task| match index {
+            Some(index) => task.id == index,
+            None => task.prompt.contains(word.as_str()),
+        };
+        let before = found.len();
+        found.extend(suite.tasks.iter().filter(fits));
+        if found.len() == before {
+            let message = format!(
+                "--task {word}: suite {} has no such task; it has 0 to {}: see softvt list tasks",
+                suite.name,
+                suite.tasks.len().saturating_sub(1)
+            );
+            return Err(Failure::input(message));
+        }
+    }
+    if run.tasks.is_empty() {
+        found.extend(&suite.tasks);
+    }
+    found.sort_by_key(|task| task.id);
+    found.dedup_by_key(|task| task.id);
+    Ok(found)
+}
+
+impl<'a> Batch<'a> {
+    fn request(&self, task: &Task, episode: u32) -> script::EpisodeRequest {
+        script::EpisodeRequest {
+            suite: self.suite.name.clone(),
+            task: task.id,
+            episode: u64::from(episode),
+            base_seed: self.run.seed,
+            split: Split::Validation,
+            shifts: self.run.shifts.clone(),
+        }
+    }
+
+    /// Thresholds of the targets of all tasks, read before anything runs.
+    fn find_limits(&mut self, tasks: &[&Task]) -> Result<(), Failure> {
+        for task in tasks {
+            let opened =
+                script::Episode::open(self.loaded, &self.request(task, 0)).map_err(Failure::input)?;
+            let Some(asset) = target_asset(&opened.scene, task) else { continue };
+            if !self.limits.contains_key(&asset) {
+                let limit = files::limit(&self.run.file, &asset)?;
+                if limit.is_none() {
+                    eprintln!(
+                        "softvt: {asset} is not calibrated (assets/calibration/{asset}.json): its episodes cannot count as safe"
+                    );
+                }
+                self.limits.insert(asset, limit);
+            }
+        }
+        Ok(())
+    }
+
+    fn write_info(&self, folder: &RunFolder, tasks: &[&Task], episodes: u32) -> Result<(), Failure> {
+        let options =
+            self.loaded.options.iter().map(|o| (o.name.clone(), format!("{:?}", o.value))).collect();
+        let info = RunInfo {
+            softvt: env!("CARGO_PKG_VERSION"),
+            script: self.loaded.main.clone(),
+            suite: &self.suite.name,
+            policy: &self.run.policy,
+            privileged: self.run.policy.starts_with("expert"),
+            seed: self.run.seed,
+            split: Split::Validation.name(),
+            tasks: tasks.iter().map(|t| t.id).collect(),
+            episodes,
+            shifts: &self.run.shifts,
+            options,
+            settings: &self.settings,
+            sources: self.loaded.bundle.hashes(),
+            thresholds: self.limits.iter().map(|(a, l)| (a.clone(), l.map(|l| l.tau_pct()))).collect(),
+        };
+        folder.write_json(RUN, &info).map_err(folder_failure)
+    }
+
+    fn go(&self, mut folder: RunFolder) -> Result<Summary, Failure> {
+        let mut progress = Progress::new(self.jobs.len(), &self.suite.name);
+        let mut records: Vec<EpisodeRecord> = Vec::new();
+        let outcome = batch::run(
+            self.jobs.len(),
+            self.run.threads,
+            &STOP,
+            |job| self.episode(job),
+            |job, finished| {
+                folder.append(job, &finished.record).map_err(folder_failure)?;
+                self.write_trace(&finished)?;
+                progress.tick(&line(&finished.record));
+                records.push(finished.record);
+                Ok(())
+            },
+        );
+        progress.finish();
+        folder.flush().map_err(folder_failure)?;
+        let kept = format!("{} of {} episodes are in {}", records.len(), self.jobs.len(), self.out.display());
+        if STOP.load(Ordering::Relaxed) {
+            return Err(Failure::interrupted(format!("interrupted; {kept}")));
+        }
+        outcome.map_err(|failure| Failure { message: format!("{}\n{kept}", failure.message), ..failure })?;
+        let summary = Summary::of(&self.suite.name, &self.run.policy, &records);
+        folder.write_json(SUMMARY, &summary).map_err(folder_failure)?;
+        records.sort_by_key(|r| (r.identity.task, r.identity.episode));
+        interchange::write_scores(&self.out, &records, &self.released()?).map_err(folder_failure)?;
+        eprintln!("softvt: {}", self.out.display());
+        Ok(summary)
+    }
+
+    /// The thresholds in use as one file of SoftVTBench's form.
+    fn released(&self) -> Result<Thresholds, Failure> {
+        let mut all: Option<Thresholds> = None;
+        for asset in self.limits.keys() {
+            let Some((text, path)) =
+                files::find(&self.run.file, &format!("assets/calibration/{asset}.json"))?
+            else {
+                continue;
+            };
+            let file = Thresholds::parse(&text, &path).map_err(Failure::input)?;
+            match &mut all {
+                None => all = Some(file),
+                Some(all) => all.merge(file),
+            }
+        }
+        Ok(all.unwrap_or_else(|| {
+            Thresholds::new(0.5, Vec::new(), format!("softvt {}", env!("CARGO_PKG_VERSION")))
+        }))
+    }
+
+    fn episode(&self, job: usize) -> Result<Finished, Failure> {
+        let (task, episode) = self.jobs[job];
+        let opened =
+            script::Episode::open(self.loaded, &self.request(task, episode)).map_err(Failure::input)?;
+        let asset = target_asset(&opened.scene, task).unwrap_or_default();
+        let soft = opened
+            .scene
+            .objects
+            .iter()
+            .any(|o| o.asset.name == asset && matches!(o.asset.body, Body::Soft(_)));
+        let spec = EpisodeSpec {
+            identity: Identity {
+                suite: self.suite.name.clone(),
+                task: task.id,
+                prompt: task.prompt.clone(),
+                layout: task.layout.clone(),
+                episode,
+                seed: self.run.seed,
+                split: Split::Validation.name().to_owned(),
+                policy: self.run.policy.clone(),
+                asset: asset.clone(),
+                soft,
+            },
+            task: task.clone(),
+            scene: Arc::new(opened.scene.clone()),
+            limit: self.limits.get(&asset).copied().flatten(),
+            rules: self.settings.rules.clone(),
+            params: self.settings.physics.clone(),
+            robot: self.settings.robot.clone(),
+            trace: self.run.trace,
+        };
+        let driver = self.driver(opened)?;
+        let mut driver = batch::Stoppable { driver, stop: &STOP };
+        let started = Episode::start(spec, &self.cache).map_err(|e| self.episode_failure(&e))?;
+        started.run(&mut driver).map_err(|e| self.episode_failure(&e))
+    }
+
+    fn driver(&self, opened: script::Episode) -> Result<Box<dyn Controller>, Failure> {
+        let boxed = |policy: Box<dyn Policy>| -> Box<dyn Controller> { Box::new(policy) };
+        match self.run.policy.as_str() {
+            "noop" => Ok(boxed(Box::new(builtin::Noop::default()))),
+            "random" => {
+                let mut stream = opened.seed.stream(crate::benchmark::seed::Stream::Script);
+                Ok(boxed(Box::new(builtin::Random::new(rand::RngCore::next_u64(&mut stream)))))
+            }
+            policy => {
+                let expert = opened.expert().map_err(Failure::input)?;
+                let expert = expert.ok_or_else(|| Failure::input("the task has no expert"))?;
+                Ok(Box::new(ExpertController::new(expert, policy == "expert-binary")))
+            }
+        }
+    }
+
+    fn episode_failure(&self, error: &EpisodeError) -> Failure {
+        let code = match error {
+            EpisodeError::Control { source: ControlError::Policy(_), .. } => code::POLICY,
+            EpisodeError::Control { source: ControlError::Interrupted, .. } => code::INTERRUPTED,
+            _ => code::INPUT,
+        };
+        Failure { code, message: format!("{}: {error}", self.run.file.display()) }
+    }
+
+    fn write_trace(&self, finished: &Finished) -> Result<(), Failure> {
+        if self.run.trace.is_none() {
+            return Ok(());
+        }
+        let id = &finished.record.identity;
+        let dir = self.out.join(format!("trace/task_{:03}", id.task));
+        std::fs::create_dir_all(&dir)
+            .map_err(|e| Failure::input(format!("cannot make the folder {}: {e}", dir.display())))?;
+        let mut text = String::new();
+        for step in &finished.trace {
+            text += &serde_json::to_string(step).map_err(Failure::input)?;
+            text.push('\n');
+        }
+        replace(&dir.join(format!("episode_{:05}.jsonl", id.episode)), &text).map_err(folder_failure)
+    }
+}
+
+fn folder_failure(error: RunFolderError) -> Failure {
+    Failure::input(error)
+}
+
+fn target_asset(scene: &Scene, task: &Task) -> Option<String> {
+    let name = task.goal.object();
+    scene.objects.iter().find(|o| o.name == name).map(|o| o.asset.name.clone())
+}
+
+/// One episode in one line.
+fn line(record: &EpisodeRecord) -> String {
+    let v = &record.verdict;
+    let d = v.d_peak.map_or(String::new(), |d| format!(", D {d:.2} %"));
+    let outcome = match (record.outcome.is_valid(), v.safety, v.goal) {
+        (false, _, _) => "invalid",
+        (_, true, _) => "safe",
+        (_, false, true) => "goal, not safe",
+        _ => "failed",
+    };
+    format!(
+        "task {} episode {}: {outcome}{d}, {:.1} s",
+        record.identity.task, record.identity.episode, record.stats.time_s
+    )
+}

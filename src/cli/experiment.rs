@@ -1,0 +1,109 @@
+//! Running an experiment: points on threads, rows in the order of points, files at the end.
+
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+    sync::{Mutex, atomic::Ordering},
+};
+
+use super::{Failure, STOP, args::Run, print, progress::Progress};
+use crate::{
+    report::run_folder::replace,
+    rollout::batch,
+    script::{Experiment, Loaded, Row},
+};
+
+/// Runs all points of an experiment and prints its rows.
+///
+/// # Errors
+/// The script fails, or a file cannot be written.
+pub fn run(run: &Run, loaded: &Loaded, name: &str, points: usize, columns: &[String]) -> Result<(), Failure> {
+    // Machines are not shared between threads but used again: opening one runs the whole script.
+    let idle: Mutex<Vec<Experiment>> = Mutex::default();
+    let take = || idle.lock().unwrap_or_else(|p| p.into_inner()).pop();
+    let mut rows: Vec<Vec<Row>> = vec![Vec::new(); points];
+    let mut progress = Progress::new(points, name);
+    let outcome = batch::run(
+        points,
+        run.threads,
+        &STOP,
+        |point| {
+            let machine = match take() {
+                Some(machine) => machine,
+                None => Experiment::open(loaded).map_err(Failure::input)?,
+            };
+            let rows = machine.run(point).map_err(Failure::input)?;
+            idle.lock().unwrap_or_else(|p| p.into_inner()).push(machine);
+            Ok(rows)
+        },
+        |point, found| {
+            progress.tick(&format!("point {point}: {} rows", found.len()));
+            rows[point] = found;
+            Ok(())
+        },
+    );
+    progress.finish();
+    if STOP.load(Ordering::Relaxed) {
+        return Err(Failure::interrupted("interrupted; nothing was written"));
+    }
+    outcome?;
+    let rows: Vec<Row> = rows.into_iter().flatten().collect();
+    let machine = match take() {
+        Some(machine) => machine,
+        None => Experiment::open(loaded).map_err(Failure::input)?,
+    };
+    let finish = machine.finish(&rows).map_err(Failure::input)?;
+    show(run, &rows, columns);
+    if let Some(text) = finish.text.filter(|_| !run.json) {
+        print(&format!("{text}\n"));
+    }
+    let base = run.out.clone().unwrap_or_default();
+    for (relative, text) in &finish.files {
+        write(&base.join(relative), text)?;
+    }
+    Ok(())
+}
+
+fn write(path: &Path, text: &str) -> Result<(), Failure> {
+    let folder = path.parent().map(PathBuf::from).unwrap_or_default();
+    if !folder.as_os_str().is_empty() {
+        std::fs::create_dir_all(&folder)
+            .map_err(|e| Failure::input(format!("cannot make the folder {}: {e}", folder.display())))?;
+    }
+    replace(path, text).map_err(Failure::input)?;
+    eprintln!("softvt: wrote {}", path.display());
+    Ok(())
+}
+
+/// Rows as JSON lines or as a table.
+fn show(run: &Run, rows: &[Row], columns: &[String]) {
+    if run.json {
+        rows.iter().for_each(|row| print(&format!("{}\n", serde_json::json!(row))));
+        return;
+    }
+    let all: BTreeSet<&String> = rows.iter().flat_map(|row| row.keys()).collect();
+    let columns: Vec<&String> =
+        if columns.is_empty() { all.into_iter().collect() } else { columns.iter().collect() };
+    let cell = |row: &Row, column: &String| match row.get(column) {
+        None | Some(serde_json::Value::Null) => "-".to_owned(),
+        Some(serde_json::Value::String(text)) => text.clone(),
+        Some(serde_json::Value::Number(n)) => n.as_f64().map_or(n.to_string(), |x| {
+            format!("{x:.5}").trim_end_matches('0').trim_end_matches('.').to_owned()
+        }),
+        Some(other) => other.to_string(),
+    };
+    let width = |column: &String| {
+        rows.iter().map(|row| cell(row, column).chars().count()).chain([column.len()]).max().unwrap_or(0)
+    };
+    let line = |cells: Vec<String>| {
+        let padded: Vec<String> =
+            cells.iter().zip(&columns).map(|(text, column)| format!("{text:>0$}", width(column))).collect();
+        format!("{}\n", padded.join("  "))
+    };
+    if !rows.is_empty() {
+        print(&line(columns.iter().map(|c| c.to_string()).collect()));
+    }
+    for row in rows {
+        print(&line(columns.iter().map(|c| cell(row, c)).collect()));
+    }
+}

@@ -1,0 +1,208 @@
+//! Rows between rigid colliders: free bodies, links, prescribed frames and the world.
+//!
+//! A contact point of two solids is seldom a material point of either (a corner of the one below, the crossing of two edges,
+//! the lowest point of a ball), so its tangential spring remembers no anchor but how far the touching *material* has
+//! moved: the stretch, which grows with the relative velocity and turns with the second body. At rest it holds as an
+//! anchor does, and rolling does not stretch it.
+
+use super::World;
+use crate::{
+    geometry::{
+        Vec3,
+        broad_phase::{Candidate, candidate_pairs},
+        shape::Aabb,
+    },
+    physics::{
+        contact::{ContactPoint, Mover, Part},
+        solver::{Endpoint, Patch, Point},
+    },
+};
+
+/// Steps of approach within which a contact point gets a row.
+const AHEAD: f64 = 1.5;
+
+/// Names a contact point of a pair of colliders from step to step.
+type Key = (usize, usize, Part, u32);
+
+/// What a contact point of two rigid colliders remembers.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Grip {
+    key: Key,
+    /// How far the first collider's material is ahead of the second's, in the second's frame, m.
+    stretch: Vec3,
+    /// Normal impulse of the last step, N s.
+    impulse: f64,
+    slipping: bool,
+}
+
+/// Two colliders close enough to touch within the step: the normals point from `b` to `a`.
+#[derive(Clone, Copy, Debug)]
+struct Pair {
+    a: usize,
+    b: usize,
+    margin: f64,
+}
+
+/// What rigid contact needs between steps and within one.
+#[derive(Debug, Default)]
+pub(super) struct RigidContacts {
+    /// By key, ascending.
+    grips: Vec<Grip>,
+    /// Pairs and keys of the rows of this step, in the order of their points.
+    rows: Vec<Key>,
+    pairs: Vec<Pair>,
+    found: Vec<(Part, ContactPoint)>,
+}
+
+impl World {
+    /// Rows of all pairs of rigid colliders that are near each other.
+    pub(super) fn rigid_patches(&mut self) {
+        let mut contacts = std::mem::take(&mut self.rigid_contacts);
+        contacts.rows.clear();
+        self.near_pairs(&mut contacts.pairs);
+        for &pair in &contacts.pairs {
+            let (a, b) = (&self.colliders[pair.a], &self.colliders[pair.b]);
+            let (Some(solid_a), Some(solid_b)) = (&a.solid, &b.solid) else { continue };
+            contacts.found.clear();
+            let (pose_a, pose_b) = (&self.moving[pair.a].pose, &self.moving[pair.b].pose);
+            solid_b.meet(pose_b, solid_a, pose_a, pair.margin, &mut contacts.found);
+            if contacts.found.is_empty() {
+                continue;
+            }
+            let movers = (a.mover, b.mover);
+            let ends = (self.endpoint_of(movers.0), self.endpoint_of(movers.1));
+            let first = self.problem.points.len();
+            for (part, point) in &contacts.found {
+                let key = (pair.a, pair.b, *part, point.feature);
+                let at = contacts.grips.binary_search_by_key(&key, |grip| grip.key);
+                let grip = at.map_or(Grip::fresh(key), |at| contacts.grips[at]);
+                self.push_contact(&pair, point, &grip, &ends);
+                contacts.rows.push(key);
+            }
+            let last = self.problem.points.len();
+            self.problem.patches.push(Patch { a: ends.0, b: ends.1, first, last });
+        }
+        self.rigid_contacts = contacts;
+    }
+
+    /// Pairs of colliders on different movers, of which at least one is free to move, that may touch within the step.
+    fn near_pairs(&self, pairs: &mut Vec<Pair>) {
+        pairs.clear();
+        let ids: Vec<usize> =
+            (0..self.colliders.len()).filter(|&i| self.colliders[i].solid.is_some()).collect();
+        let boxes: Vec<Candidate> = ids.iter().map(|&id| self.box_of(id)).collect();
+        for (i, j) in candidate_pairs(&boxes) {
+            let (i, j) = (ids[i], ids[j]);
+            let (a, b) = if self.is_known(j) { (i, j) } else { (j, i) };
+            if self.is_known(a) {
+                continue;
+            }
+            let (ma, mb) = (&self.moving[a], &self.moving[b]);
+            // The fastest approach of any point of the smaller one.
+            let radius = |id: usize| 0.5 * self.colliders[id].bounds.size().norm();
+            let smaller = if radius(a) < radius(b) { a } else { b };
+            let middle = self.colliders[smaller].bounds.centre();
+            let middle_w = (self.moving[smaller].pose * nalgebra::Point3::from(middle)).coords;
+            let speed = (ma.velocity(&middle_w) - mb.velocity(&middle_w)).norm()
+                + (ma.angular - mb.angular).norm() * radius(smaller);
+            pairs.push(Pair { a, b, margin: self.params.margin.max(AHEAD * self.params.dt * speed) });
+        }
+    }
+
+    /// Where a collider is or may be soon, and with which others it forms one thing.
+    fn box_of(&self, id: usize) -> Candidate {
+        let (collider, moving) = (&self.colliders[id], &self.moving[id]);
+        let bounds = collider.bounds.moved(&moving.pose);
+        let lever = farthest(&bounds, &moving.origin);
+        let speed = moving.linear.norm() + moving.angular.norm() * lever;
+        let rigid = self.rigid.len() as u32;
+        let group = match collider.mover {
+            Mover::Static | Mover::Kinematic(_) => 0,
+            Mover::Rigid(index) => 1 + index as u32,
+            Mover::Link { tree, .. } => 1 + rigid + tree as u32,
+        };
+        Candidate { bounds: bounds.grown(self.params.margin.max(AHEAD * self.params.dt * speed)), group }
+    }
+
+    /// Whether a collider's motion is known before the solve.
+    fn is_known(&self, id: usize) -> bool {
+        match self.colliders[id].mover {
+            Mover::Static | Mover::Kinematic(_) => true,
+            Mover::Rigid(index) => self.rigid[index].asleep,
+            Mover::Link { .. } => false,
+        }
+    }
+
+    fn push_contact(&mut self, pair: &Pair, point: &ContactPoint, grip: &Grip, ends: &(Endpoint, Endpoint)) {
+        let (a, b) = (&self.colliders[pair.a], &self.colliders[pair.b]);
+        let moving = &self.moving[pair.b];
+        let friction = a.friction.with(&b.friction);
+        let layer = a.layer.in_series(&b.layer);
+        let (n, stretch) = (point.n_w, moving.pose.rotation * grip.stretch);
+        let drift = if ends.1 == Endpoint::Known { moving.velocity(&point.p_w) } else { Vec3::zeros() };
+        self.problem.points.push(Point {
+            weights_a: [0.0; 8],
+            weights_b: [0.0; 8],
+            p: point.p_w,
+            normal: n,
+            drift,
+            stiffness: layer.normal * point.area,
+            shear_stiffness: layer.shear * point.area,
+            gap: point.phi,
+            offset: stretch - n * n.dot(&stretch),
+            mu: if grip.slipping { friction.dynamic_mu } else { friction.static_mu },
+            lagged: grip.impulse,
+            normal_impulse: 0.0,
+            shear_impulse: Vec3::zeros(),
+            velocity: Vec3::zeros(),
+            slipping: false,
+        });
+    }
+
+    /// Updates what the points that touched remember. Pairs of which neither side moves keep theirs.
+    pub(super) fn remember_rigid(&mut self) {
+        let mut contacts = std::mem::take(&mut self.rigid_contacts);
+        contacts.grips.retain(|grip| self.is_known(grip.key.0) && self.is_known(grip.key.1));
+        let dt = self.params.dt;
+        for (key, point) in contacts.rows.iter().zip(&self.problem.points[self.rows.len()..]) {
+            if point.normal_impulse <= 0.0 {
+                continue;
+            }
+            let tangential = point.velocity - point.normal * point.normal.dot(&point.velocity);
+            let mut stretch = point.offset + tangential * dt;
+            if point.slipping {
+                let allowed = point.mu * point.lagged / (dt * point.shear_stiffness).max(f64::MIN_POSITIVE);
+                stretch *= (allowed / stretch.norm()).min(1.0);
+            }
+            contacts.grips.push(Grip {
+                key: *key,
+                stretch: self.moving[key.1].pose.rotation.inverse_transform_vector(&stretch),
+                impulse: point.normal_impulse,
+                slipping: point.slipping,
+            });
+        }
+        contacts.grips.sort_unstable_by_key(|grip| grip.key);
+        self.rigid_contacts = contacts;
+    }
+
+    /// What touched the colliders of a rigid body in the last step: the other colliders' ids.
+    pub(super) fn touching(&self, body: usize) -> impl Iterator<Item = usize> + '_ {
+        let of_body = move |id: usize| self.colliders[id].mover == Mover::Rigid(body);
+        self.rigid_contacts.grips.iter().filter_map(move |grip| match grip.key {
+            (a, b, ..) if of_body(a) => Some(b),
+            (a, b, ..) if of_body(b) => Some(a),
+            _ => None,
+        })
+    }
+}
+
+impl Grip {
+    fn fresh(key: Key) -> Self {
+        Self { key, stretch: Vec3::zeros(), impulse: 0.0, slipping: false }
+    }
+}
+
+/// Distance of the farthest corner of a box from a point, m.
+fn farthest(bounds: &Aabb, from: &Vec3) -> f64 {
+    (bounds.min - from).abs().sup(&(bounds.max - from).abs()).norm()
+}

@@ -1,0 +1,240 @@
+//! Simulations in Lua: a settled scene with the robot, for calibrations and other experiments.
+
+use std::sync::{Arc, Mutex};
+
+use mlua::{
+    Function, Lua, LuaSerdeExt, MetaMethod, MultiValue, Table, UserData, UserDataFields, UserDataMethods,
+    Value,
+};
+use serde::de::DeserializeOwned;
+
+use super::{
+    catalogue_world::SIMULATE,
+    controller::view,
+    deadline::Clock,
+    expert::Coroutine,
+    random::Rng,
+    sandbox::{fail, locked},
+    scene_api::{LuaScene, empty_scene},
+    schema,
+};
+use crate::{
+    benchmark::{
+        seed::{EpisodeSeed, Split, Stream},
+        settings::Settings,
+    },
+    evaluation::deformation::Reference,
+    geometry::Pose,
+    robot::rotation,
+    rollout::{Kind, RestCache, STEPS_PER_CONTROL, Simulation},
+};
+
+/// Physics with the robot, and what was seen of it.
+struct Inner {
+    sim: Simulation,
+    /// Settled shape, peak D and height of each object.
+    watched: Vec<Watched>,
+    physics_steps: u64,
+    failed: Option<String>,
+    clock: Clock,
+}
+
+struct Watched {
+    reference: Option<Reference>,
+    d_peak: f64,
+    start_z: f64,
+}
+
+/// Installs `softvt.simulate` and `softvt.settings`.
+pub(super) fn install(lua: &Lua, api: &Table, clock: &Clock) -> mlua::Result<()> {
+    let clock = clock.clone();
+    let cache = RestCache::default();
+    let make = lua.create_function(move |lua, value: Value| simulate(lua, &value, &clock, &cache))?;
+    api.set("simulate", make)
+}
+
+/// A table as settings.
+pub(super) fn settings(lua: &Lua, label: &str, table: Option<Table>) -> mlua::Result<Settings> {
+    let Some(table) = table else { return Ok(Settings::default()) };
+    let settings: Settings = read(lua, label, Value::Table(table))?;
+    settings.check().map_err(|e| fail(lua, format!("{label}: {e}")))?;
+    Ok(settings)
+}
+
+/// Lua data as a Rust type; the message says which field.
+pub(super) fn read<T: DeserializeOwned>(lua: &Lua, label: &str, value: Value) -> mlua::Result<T> {
+    lua.from_value(value).map_err(|e| {
+        let text = e.to_string();
+        let what = text.trim_start_matches("deserialize error: ").lines().next().unwrap_or_default();
+        fail(lua, format!("{label}: {what}"))
+    })
+}
+
+fn simulate(lua: &Lua, value: &Value, clock: &Clock, cache: &RestCache) -> mlua::Result<LuaSimulation> {
+    let Value::Table(table) = value else {
+        return Err(fail(lua, format!("softvt.simulate: expected a table, got {}", schema::got(value))));
+    };
+    let spec = schema::check(lua, &SIMULATE, table)
+        .map_err(|fault| schema::fault_here(lua, "softvt.simulate", &fault))?;
+    let settings = settings(lua, "softvt.simulate: settings", spec.get("settings")?)?;
+    let layout: Table = spec.get("layout")?;
+    let seed = EpisodeSeed {
+        suite: spec.get("suite")?,
+        layout: layout.get("name")?,
+        episode: spec.get("episode")?,
+        base: spec.get("seed")?,
+        split: Split::Experiment,
+    };
+    let scene = LuaScene::new(empty_scene());
+    layout.get::<Function>("build")?.call::<()>((scene.clone(), Rng::new(seed, Stream::Layout)))?;
+    let scene = Arc::new(locked(&scene.scene).clone());
+    let _honest_work = clock.pause();
+    let mut sim = Simulation::new(scene, &settings.physics, &settings.robot, cache)
+        .map_err(|e| fail(lua, format!("softvt.simulate: {e}")))?;
+    sim.settle().map_err(|e| fail(lua, format!("softvt.simulate: {e}")))?;
+    let watched = sim
+        .objects
+        .iter()
+        .map(|object| Watched {
+            reference: match object.kind {
+                Kind::Soft(i) => {
+                    let body = &sim.world.soft[i].body;
+                    Reference::new(&body.x, &body.rest.mass).ok()
+                }
+                _ => None,
+            },
+            d_peak: 0.0,
+            start_z: sim.centre(object).z,
+        })
+        .collect();
+    let inner = Inner { sim, watched, physics_steps: 0, failed: None, clock: clock.clone() };
+    Ok(LuaSimulation(Arc::new(Mutex::new(inner))))
+}
+
+impl Inner {
+    fn time(&self) -> f64 {
+        self.physics_steps as f64 * self.sim.world.params.dt
+    }
+
+    /// One control step; false once the physics has failed.
+    fn control_step(&mut self, command: Option<(&Pose, f64)>) -> bool {
+        if let Some((pose_b, closure)) = command {
+            self.sim.rig.command(&mut self.sim.world, pose_b, closure);
+        }
+        let _honest_work = self.clock.pause();
+        for _ in 0..STEPS_PER_CONTROL {
+            if self.failed.is_some() {
+                return false;
+            }
+            self.physics_steps += 1;
+            if let Err(failure) = self.sim.step() {
+                self.failed = Some(failure.to_string());
+                return false;
+            }
+            self.watch();
+        }
+        true
+    }
+
+    fn watch(&mut self) {
+        for (index, watched) in self.watched.iter_mut().enumerate() {
+            if let Some(d) = deformation(&self.sim, index, &watched.reference) {
+                watched.d_peak = watched.d_peak.max(d);
+            }
+        }
+    }
+
+    fn outcome(&self, lua: &Lua) -> mlua::Result<MultiValue> {
+        let message = match &self.failed {
+            None => Value::Nil,
+            Some(message) => Value::String(lua.create_string(message)?),
+        };
+        Ok(MultiValue::from_vec(vec![Value::Boolean(self.failed.is_none()), message]))
+    }
+}
+
+fn deformation(sim: &Simulation, object: usize, reference: &Option<Reference>) -> Option<f64> {
+    let Kind::Soft(index) = sim.objects[object].kind else { return None };
+    reference.as_ref()?.measure(&sim.world.soft[index].body.x).ok().map(|d| d.rms_pct)
+}
+
+/// `softvt.Simulation`.
+struct LuaSimulation(Arc<Mutex<Inner>>);
+
+impl LuaSimulation {
+    /// Runs an expert to its end.
+    fn drive(&self, lua: &Lua, expert: Function) -> mlua::Result<MultiValue> {
+        let mut expert = Coroutine::new(expert);
+        loop {
+            let seen = {
+                let inner = locked(&self.0);
+                view(&inner.sim, inner.time())
+            };
+            let Some(command) = expert.step(lua, &seen)? else { break };
+            if !locked(&self.0).control_step(Some((&command.pose_b, command.closure))) {
+                break;
+            }
+        }
+        locked(&self.0).outcome(lua)
+    }
+
+    fn wait(&self, lua: &Lua, seconds: f64) -> mlua::Result<MultiValue> {
+        if !(0.0..=600.0).contains(&seconds) {
+            return Err(fail(lua, format!("simulation:wait: expected seconds in 0..600, got {seconds}")));
+        }
+        let mut inner = locked(&self.0);
+        let until = inner.time() + seconds - 1e-9;
+        while inner.time() < until && inner.control_step(None) {}
+        inner.outcome(lua)
+    }
+
+    fn see(&self, lua: &Lua, name: &str) -> mlua::Result<Table> {
+        let inner = locked(&self.0);
+        let sim = &inner.sim;
+        let names = sim.objects.iter().map(|o| o.name.as_str());
+        let index = sim.objects.iter().position(|o| o.name == name);
+        let Some(index) = index else {
+            return Err(fail(lua, format!("simulation:watch: {}", schema::unknown("object", name, names))));
+        };
+        let (object, watched) = (&sim.objects[index], &inner.watched[index]);
+        let table = lua.create_table()?;
+        table.set("width_m", sim.rig.width(&sim.world))?;
+        table.set("height_m", sim.centre(object).z - watched.start_z)?;
+        table.set("speed", sim.speed(object))?;
+        table.set("asset", object.asset.name.as_str())?;
+        if let Kind::Soft(soft) = object.kind {
+            let body = &sim.world.soft[soft];
+            let touch = sim.rig.pads.map(|pad| sim.world.touch(soft, pad));
+            table.set("d_pct", deformation(sim, index, &watched.reference))?;
+            table.set("d_peak_pct", watched.d_peak)?;
+            table.set("min_det_f", body.min_det_f.0)?;
+            table.set("asleep", body.asleep)?;
+            table.set("pad_force", lua.create_sequence_from(touch.map(|t| t.normal_force))?)?;
+            table.set("slip_mm", lua.create_sequence_from(touch.map(|t| 1e3 * t.travel))?)?;
+        }
+        Ok(table)
+    }
+}
+
+impl UserData for LuaSimulation {
+    fn add_fields<F: UserDataFields<Self>>(fields: &mut F) {
+        fields.add_meta_field(MetaMethod::Type, "softvt.Simulation");
+    }
+
+    fn add_methods<M: UserDataMethods<Self>>(methods: &mut M) {
+        methods.add_meta_method(MetaMethod::ToString, |_, _, ()| Ok("softvt.Simulation"));
+        methods.add_method("drive", |lua, this, expert: Function| this.drive(lua, expert));
+        methods.add_method("wait", |lua, this, seconds: f64| this.wait(lua, seconds));
+        methods.add_method("watch", |lua, this, name: String| this.see(lua, &name));
+        methods.add_method("time", |_, this, ()| Ok(locked(&this.0).time()));
+        methods.add_method("tool", |lua, this, ()| {
+            let inner = locked(&this.0);
+            let tool = inner.sim.rig.base_w * inner.sim.rig.tool_b(&inner.sim.world);
+            let turn = rotation::axis_angle(&tool.rotation);
+            Ok((
+                lua.create_sequence_from(tool.translation.vector.iter().copied())?,
+                lua.create_sequence_from(turn.iter().copied())?,
+            ))
+        });
+    }
+}

@@ -1,0 +1,227 @@
+//! Rigid against rigid.
+
+use std::f64::consts::PI;
+
+use softvt::{
+    geometry::{Pose, Vec3, shape::Shape},
+    physics::{World, contact::Mover},
+};
+
+use crate::scene::*;
+
+fn position(world: &World, body: usize) -> Vec3 {
+    world.rigid[body].body.pose_w.translation.vector
+}
+
+/// Acceleration down the slope between 0.2 s and 0.5 s.
+fn acceleration(mut world: World, body: usize) -> f64 {
+    run(&mut world, 0.2);
+    let before = world.rigid[body].body.v.x;
+    run(&mut world, 0.3);
+    (world.rigid[body].body.v.x - before) / 0.3
+}
+
+#[test]
+fn a_box_of_a_kilogram_sinks_less_than_fifty_micrometres() {
+    let mut world = world();
+    floor(&mut world, friction(0.6, 0.5));
+    let body = rigid(&mut world, &cuboid(0.05, 0.05, 0.05), 1.0, at(0.0, 0.0, 0.025), friction(0.6, 0.5));
+    run(&mut world, 1.0);
+    let sunk = 0.025 - position(&world, body).z;
+    assert!(sunk > 0.0 && sunk < 5e-5, "{sunk} m");
+}
+
+#[test]
+fn a_block_sticks_below_the_static_angle_and_slides_above_it_with_dynamic_friction() {
+    let (mu_s, mu_d) = (0.6f64, 0.4f64);
+    let shape = cuboid(0.1, 0.1, 0.02);
+    let scene = |angle: f64| {
+        let mut world = tilted(angle);
+        floor(&mut world, friction(mu_s, mu_d));
+        let body = rigid(&mut world, &shape, 0.3, at(0.0, 0.0, 0.01), friction(0.0, 0.0));
+        (world, body)
+    };
+    let (mut held, body) = scene(mu_s.atan() - 0.02);
+    run(&mut held, 0.5);
+    let before = position(&held, body);
+    run(&mut held, 5.0);
+    let crept = (position(&held, body) - before).norm();
+    assert!(crept < 1e-6, "crept {crept} m in 5 s");
+    for angle in [mu_s.atan() + 0.02, 0.8] {
+        let (world, body) = scene(angle);
+        let expected = GRAVITY * (angle.sin() - mu_d * angle.cos());
+        let found = acceleration(world, body);
+        assert!((found / expected - 1.0).abs() < 0.01, "{found} instead of {expected}");
+    }
+}
+
+#[test]
+fn balls_and_cans_roll_from_rest_on_half_a_degree() {
+    let slope = 0.5f64.to_radians();
+    let can = Shape::Cylinder { radius: 0.033, half_height: 0.05 };
+    let lying = turned(at(0.0, 0.0, 0.033), Vec3::x() * (0.5 * PI));
+    let ball = Shape::Sphere { radius: 0.03 };
+    for (shape, pose, share) in [(ball, at(0.0, 0.0, 0.03), 5.0 / 7.0), (can, lying, 2.0 / 3.0)] {
+        let mut world = tilted(slope);
+        floor(&mut world, friction(0.6, 0.5));
+        let body = rigid(&mut world, &shape, 0.3, pose, friction(0.6, 0.5));
+        let expected = share * GRAVITY * slope.sin();
+        let found = acceleration(world, body);
+        assert!((found / expected - 1.0).abs() < 0.01, "{shape:?}: {found} instead of {expected}");
+    }
+}
+
+/// Whether a body tips over its lower edge when the slope grows from nothing to `angle` in a quarter of a second.
+fn tips(shape: &Shape, pose: Pose, angle: f64) -> bool {
+    let mut world = tilted(0.0);
+    floor(&mut world, friction(5.0, 5.0));
+    let body = rigid(&mut world, shape, 0.3, pose, friction(0.0, 0.0));
+    let start = pose.rotation;
+    for step in 0..90 {
+        world.gravity = gravity(angle * (f64::from(step) / 15.0).min(1.0));
+        world.step().expect("a step that converges");
+    }
+    world.rigid[body].body.pose_w.rotation.angle_to(&start) > 0.05
+}
+
+#[test]
+fn boxes_and_cans_tip_within_three_tenths_of_a_degree_of_their_angle() {
+    let margin = 0.3f64.to_radians();
+    let can = Shape::Cylinder { radius: 0.033, half_height: 0.05 };
+    let headed = |angle: f64| turned(at(0.0, 0.0, 0.05), Vec3::z() * angle);
+    let tall = cuboid(0.06, 0.08, 0.1);
+    for (shape, pose, angle) in [
+        (&tall, headed(0.0), 0.6f64.atan()),
+        (&can, headed(0.0), 0.66f64.atan()),
+        (&can, headed(PI / 24.0), 0.66f64.atan()),
+        (&can, headed(0.05), 0.66f64.atan()),
+    ] {
+        assert!(!tips(shape, pose, angle - margin), "{shape:?} tips too early");
+        assert!(tips(shape, pose, angle + margin), "{shape:?} does not tip");
+    }
+}
+
+#[test]
+fn a_stack_of_five_boxes_stands_still_for_ten_seconds() {
+    let mut world = world();
+    floor(&mut world, friction(0.6, 0.5));
+    let shape = cuboid(0.05, 0.05, 0.05);
+    // A little askew, so that it is no special case.
+    let pose = |i: usize| {
+        let shift = [0.0, 3e-3, -2e-3, 2e-3, -1e-3][i];
+        turned(at(shift, -0.5 * shift, 0.025 + 0.05 * i as f64), Vec3::z() * (20.0 * shift))
+    };
+    let stack: Vec<usize> =
+        (0..5).map(|i| rigid(&mut world, &shape, 0.3, pose(i), friction(0.6, 0.5))).collect();
+    run(&mut world, 1.0);
+    let before: Vec<Pose> = stack.iter().map(|&i| world.rigid[i].body.pose_w).collect();
+    run(&mut world, 10.0);
+    for (&i, before) in stack.iter().zip(&before) {
+        let now = world.rigid[i].body.pose_w;
+        let moved = (now.translation.vector - before.translation.vector).norm();
+        let turned = now.rotation.angle_to(&before.rotation);
+        assert!(moved < 1e-6 && turned < 1e-5, "box {i} moved {moved} m and turned {turned} rad");
+    }
+}
+
+#[test]
+fn a_collision_keeps_momentum_and_makes_no_energy() {
+    let mut world = World::new(world().params, Vec3::zeros());
+    let shape = cuboid(0.05, 0.06, 0.07);
+    let tilt = turned(at(0.12, 0.01, -0.01), Vec3::new(0.3, 0.2, 0.5));
+    let a = rigid(&mut world, &shape, 0.3, Pose::identity(), friction(0.6, 0.5));
+    let b = rigid(&mut world, &shape, 0.5, tilt, friction(0.6, 0.5));
+    (world.rigid[a].body.v, world.rigid[a].body.w) = (Vec3::new(1.0, 0.2, 0.1), Vec3::new(0.0, 1.0, 2.0));
+    world.rigid[b].body.v = Vec3::new(-0.5, 0.0, 0.0);
+    let sums = |world: &World| {
+        let bodies = world.rigid.iter().map(|r| &r.body);
+        (
+            bodies.clone().map(|b| b.momentum()).sum::<Vec3>(),
+            bodies.map(|b| b.angular_momentum()).sum::<Vec3>(),
+        )
+    };
+    let ((linear, angular), energy) = (sums(&world), world.energy().total());
+    run(&mut world, 0.5);
+    let (linear_now, angular_now) = sums(&world);
+    assert!((linear_now - linear).norm() < 1e-6 * linear.norm(), "{linear_now} {linear}");
+    assert!((angular_now - angular).norm() < 0.01 * angular.norm(), "{angular_now} {angular}");
+    let now = world.energy().total();
+    assert!(now < 0.9 * energy, "they met: {now} of {energy} J");
+}
+
+#[test]
+fn a_thousandfold_mass_rests_on_a_light_box() {
+    let mut world = world();
+    floor(&mut world, friction(0.6, 0.5));
+    let shape = cuboid(0.05, 0.05, 0.05);
+    let light = rigid(&mut world, &shape, 0.1, at(0.0, 0.0, 0.025), friction(0.6, 0.5));
+    let heavy = rigid(&mut world, &shape, 100.0, at(0.001, 0.0, 0.0752), friction(0.6, 0.5));
+    run(&mut world, 3.0);
+    let speed = world.rigid.iter().map(|r| r.body.v.norm() + r.body.w.norm()).fold(0.0, f64::max);
+    let sunk = [light, heavy].map(|i| [0.025, 0.075][i] - position(&world, i).z);
+    assert!(speed < 1e-4 && sunk[1] < 2.5e-3 && sunk[0] > 0.0, "{speed} m/s, sunk {sunk:?} m");
+}
+
+#[test]
+fn a_prescribed_pusher_pushes_and_a_box_bigger_than_what_it_rests_on_is_held_by_friction() {
+    let mut world = world();
+    floor(&mut world, friction(0.6, 0.5));
+    let block = cuboid(0.04, 0.04, 0.04);
+    let small = rigid(&mut world, &block, 0.2, at(0.0, 0.0, 0.02), friction(0.6, 0.5));
+    let tray = rigid(&mut world, &cuboid(0.12, 0.12, 0.01), 0.2, at(0.0, 0.0, 0.045), friction(0.6, 0.5));
+    let hand = world.add_kinematic(at(-0.03, 0.0, 0.02));
+    put(
+        &mut world,
+        "hand",
+        (Mover::Kinematic(hand), Pose::identity()),
+        &cuboid(0.02, 0.02, 0.02),
+        friction(0.6, 0.5),
+    );
+    run(&mut world, 0.2);
+    let speed = 0.05;
+    for step in 0..60 {
+        let x = -0.03 + speed * f64::from(step + 1) * world.params.dt;
+        world.move_kinematic(hand, at(x, 0.0, 0.02));
+        world.step().expect("a step that converges");
+    }
+    let (small, tray) = (position(&world, small), position(&world, tray));
+    assert!((small.x - speed).abs() < 1e-3, "pushed to {small}");
+    assert!((tray.x - small.x).abs() < 1e-4, "the tray stays behind: {tray} {small}");
+}
+
+#[test]
+fn a_lathe_bowl_stands_on_its_foot() {
+    let mut world = world();
+    floor(&mut world, friction(0.6, 0.5));
+    let profile = vec![[0.0, 0.0], [0.03, 0.0], [0.05, 0.03], [0.046, 0.03], [0.028, 0.005], [0.0, 0.005]];
+    let bowl = Shape::lathe(profile).expect("a bowl");
+    let inertia = nalgebra::Matrix3::from_diagonal(&Vec3::new(1.5e-4, 1.5e-4, 2e-4));
+    let body = softvt::physics::rigid::RigidBody::new(&at(0.0, 0.0, 0.002), Vec3::z() * 0.012, 0.2, inertia)
+        .expect("a real body");
+    let index = world.add_rigid("bowl", body);
+    put(&mut world, "bowl", (Mover::Rigid(index), Pose::identity()), &bowl, friction(0.6, 0.5));
+    run(&mut world, 1.0);
+    let object = world.rigid[index].body.object_w();
+    let tilt = (object.rotation * Vec3::z()).angle(&Vec3::z());
+    let z = object.translation.vector.z;
+    assert!(z.abs() < 1e-4 && tilt < 1e-3, "z {z} m, tilt {tilt} rad");
+}
+
+#[test]
+fn a_resting_box_falls_asleep_and_a_push_wakes_it() {
+    let mut world = world();
+    world.params.sleeping = true;
+    floor(&mut world, friction(0.6, 0.5));
+    let shape = cuboid(0.05, 0.05, 0.05);
+    let low = rigid(&mut world, &shape, 0.3, at(0.0, 0.0, 0.025), friction(0.6, 0.5));
+    let high = rigid(&mut world, &shape, 0.3, at(0.0, 0.0, 0.076), friction(0.6, 0.5));
+    run(&mut world, 2.0);
+    assert!(world.rigid[low].asleep && world.rigid[high].asleep);
+    let ball =
+        rigid(&mut world, &Shape::Sphere { radius: 0.02 }, 0.3, at(-0.1, 0.0, 0.075), friction(0.6, 0.5));
+    world.rigid[ball].body.v = Vec3::x() * 2.0;
+    run(&mut world, 0.1);
+    let (upper, lower) = (position(&world, high), position(&world, low));
+    assert!(upper.x > 0.02, "pushed: {upper}");
+    assert!(lower.x < 0.01 && !world.rigid[high].asleep, "{lower}");
+}

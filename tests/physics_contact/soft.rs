@@ -1,0 +1,214 @@
+//! Soft against soft, and soft against thin walls and slopes.
+
+use softvt::{
+    geometry::{Pose, Vec3, shape::Shape},
+    physics::{
+        World,
+        contact::{Mover, Partner},
+    },
+};
+
+use crate::scene::*;
+
+const FRICTION: (f64, f64) = (0.6, 0.5);
+
+fn bread() -> softvt::physics::contact::Friction {
+    friction(FRICTION.0, FRICTION.1)
+}
+
+/// Squeezes what is between x = −length/2 and length/2 by `squeeze` (m) between two plates; their force, N.
+fn squeeze(world: &mut World, length: f64, squeeze: f64) -> f64 {
+    let plate = cuboid(0.02, 0.1, 0.1);
+    let plates: Vec<(usize, usize, f64)> = [-1.0, 1.0]
+        .into_iter()
+        .map(|side| {
+            let k = world.add_kinematic(at(side * (0.5 * length + 0.01), 0.0, 0.0));
+            let mover = (Mover::Kinematic(k), Pose::identity());
+            (k, put(world, "plate", mover, &plate, bread()), side)
+        })
+        .collect();
+    for step in 0..60 {
+        let share = (f64::from(step + 1) / 30.0).min(1.0);
+        for &(k, _, side) in &plates {
+            world.move_kinematic(k, at(side * (0.5 * length + 0.01 - 0.5 * squeeze * share), 0.0, 0.0));
+        }
+        world.step().expect("a step that converges");
+    }
+    let last = world.soft.len() - 1;
+    let left = world.touch(0, plates[0].1).force_w.x;
+    let right = world.touch(last, plates[1].1).force_w.x;
+    assert!((left + right).abs() < 1e-3 * left, "unbalanced: {left} {right} N");
+    left
+}
+
+#[test]
+fn two_cubes_face_to_face_are_as_stiff_as_one_of_double_length() {
+    let (cube, bar) = (cuboid(0.05, 0.05, 0.05), cuboid(0.1, 0.05, 0.05));
+    let (rest, long) = (soft_rest(&cube, SOFT, 6, 2e-3), soft_rest(&bar, SOFT, 12, 2e-3));
+    let free = || World::new(world().params, Vec3::zeros());
+    let mut one = free();
+    soft(&mut one, &bar, &long, Pose::identity(), bread());
+    let mut two = free();
+    let left = soft(&mut two, &cube, &rest, at(-0.025, 0.0, 0.0), bread());
+    let right = soft(&mut two, &cube, &rest, at(0.025, 0.0, 0.0), bread());
+    let (alone, pair) = (squeeze(&mut one, 0.1, 0.01), squeeze(&mut two, 0.1, 0.01));
+    assert!((pair / alone - 1.0).abs() < 0.03, "{pair} N for two, {alone} N for one");
+    // What one does to the other is what the other does to it, and what the plates do.
+    let (on_left, on_right) =
+        (two.touch_by(left, Partner::Soft(right)).force_w, two.touch_by(right, Partner::Soft(left)).force_w);
+    assert!(
+        (on_left + on_right).norm() < 1e-9 && (on_right.x / pair - 1.0).abs() < 0.01,
+        "{on_left} {on_right}"
+    );
+}
+
+#[test]
+fn a_soft_collision_keeps_momentum() {
+    let mut world = World::new(world().params, Vec3::zeros());
+    let cube = cuboid(0.05, 0.05, 0.05);
+    let rest = soft_rest(&cube, SOFT, 4, 3e-3);
+    let a = soft(&mut world, &cube, &rest, at(-0.03, 0.0, 0.0), bread());
+    let b =
+        soft(&mut world, &cube, &rest, turned(at(0.035, 0.012, 0.006), Vec3::new(0.2, 0.4, 0.3)), bread());
+    world.soft[a].body.v.iter_mut().for_each(|v| *v = Vec3::new(1.0, 0.1, 0.0));
+    let sums = |world: &World| {
+        let mut sums = (Vec3::zeros(), Vec3::zeros());
+        for body in [a, b].map(|i| &world.soft[i].body) {
+            for ((x, v), m) in body.x.iter().zip(&body.v).zip(&body.rest.mass) {
+                sums = (sums.0 + v * *m, sums.1 + x.cross(v) * *m);
+            }
+        }
+        sums
+    };
+    let ((linear, angular), energy) = (sums(&world), world.energy().total());
+    run(&mut world, 0.4);
+    let (linear_now, angular_now) = sums(&world);
+    let lever = 0.05 * linear.norm();
+    assert!((linear_now - linear).norm() < 1e-5 * linear.norm(), "{linear_now} {linear}");
+    assert!((angular_now - angular).norm() < 0.01 * lever, "{angular_now} {angular}");
+    assert!(world.energy().total() < 0.95 * energy && world.soft[b].body.velocity().x > 0.3, "they met");
+}
+
+#[test]
+fn a_soft_block_sticks_below_the_static_angle_and_slides_above_it_with_dynamic_friction() {
+    let (mu_s, mu_d) = (0.6f64, 0.4f64);
+    let shape = cuboid(0.06, 0.06, 0.02);
+    let rest = soft_rest(&shape, SOFT, 3, 3e-3);
+    let scene = |angle: f64| {
+        let mut world = tilted(angle);
+        floor(&mut world, friction(mu_s, mu_d));
+        soft(&mut world, &shape, &rest, at(0.0, 0.0, 0.01), friction(0.0, 0.0));
+        world
+    };
+    let mut held = scene(mu_s.atan() - 0.03);
+    run(&mut held, 1.0);
+    let before = held.soft[0].body.centre();
+    run(&mut held, 3.0);
+    let crept = (held.soft[0].body.centre() - before).norm();
+    assert!(crept < 1e-5, "crept {crept} m in 3 s");
+    let angle = mu_s.atan() + 0.05;
+    let mut sliding = scene(angle);
+    run(&mut sliding, 0.3);
+    let v0 = sliding.soft[0].body.velocity().x;
+    run(&mut sliding, 0.3);
+    let found = (sliding.soft[0].body.velocity().x - v0) / 0.3;
+    let expected = GRAVITY * (angle.sin() - mu_d * angle.cos());
+    assert!((found / expected - 1.0).abs() < 0.02, "{found} instead of {expected}");
+}
+
+#[test]
+fn two_stacked_soft_blocks_fall_asleep_and_a_third_wakes_them() {
+    let mut world = world();
+    world.params.sleeping = true;
+    floor(&mut world, bread());
+    let shape = cuboid(0.05, 0.05, 0.025);
+    let rest = soft_rest(&shape, SOFT, 4, 4e-3);
+    let low = soft(&mut world, &shape, &rest, at(0.0, 0.0, 0.0125), bread());
+    let high = soft(&mut world, &shape, &rest, at(0.004, 0.0, 0.0376), bread());
+    run(&mut world, 3.0);
+    assert!(world.soft[low].asleep && world.soft[high].asleep);
+    let asleep_at = world.soft[high].body.centre();
+    let third = soft(&mut world, &shape, &rest, at(0.0, 0.0, 0.07), bread());
+    run(&mut world, 0.2);
+    assert!(!world.soft[high].asleep, "a falling block wakes it");
+    run(&mut world, 3.0);
+    let (high, third) = (world.soft[high].body.centre(), world.soft[third].body.centre());
+    assert!(high.z < asleep_at.z && third.z - high.z > 0.0245, "{high} {third}");
+}
+
+/// Drops a soft cube at 2 m/s; how far a sample ever is behind the surface of `shape`, m.
+fn deepest(shape: &Shape, from: Pose, seconds: f64) -> (f64, Vec3) {
+    let mut world = world();
+    floor(&mut world, bread());
+    put(&mut world, "vessel", (Mover::Static, Pose::identity()), shape, bread());
+    let cube = cuboid(0.05, 0.05, 0.05);
+    let rest = soft_rest(&cube, SOFT, 6, 2.5e-3);
+    soft(&mut world, &cube, &rest, from, bread());
+    world.soft[0].body.v.iter_mut().for_each(|v| *v = Vec3::z() * -2.0);
+    let mut deepest = 0.0f64;
+    for _ in 0..(seconds / world.params.dt) as usize {
+        world.step().expect("a step that converges");
+        let body = &world.soft[0].body;
+        deepest = body.x.iter().map(|x| -shape.distance_and_normal(x).0).fold(deepest, f64::max);
+    }
+    (deepest, world.soft[0].body.centre())
+}
+
+#[test]
+fn a_soft_cube_dropped_at_two_metres_a_second_crosses_no_wall() {
+    let bowl = Shape::lathe(vec![
+        [0.0, 0.0],
+        [0.03, 0.0],
+        [0.07, 0.05],
+        [0.066, 0.05],
+        [0.028, 0.004],
+        [0.0, 0.004],
+    ])
+    .expect("a bowl");
+    let plate = Shape::Cylinder { radius: 0.1, half_height: 0.002 }.translated(Vec3::z() * 0.002);
+    let wall = |x: f64, y: f64, along: bool| {
+        let size = if along { Vec3::new(0.124, 0.004, 0.06) } else { Vec3::new(0.004, 0.12, 0.06) };
+        Shape::cuboid(size).translated(Vec3::new(x, y, 0.03))
+    };
+    let base = Shape::cuboid(Vec3::new(0.12, 0.12, 0.004)).translated(Vec3::z() * 0.002);
+    let basket = Shape::Union(vec![
+        base,
+        wall(0.062, 0.0, false),
+        wall(-0.062, 0.0, false),
+        wall(0.0, 0.062, true),
+        wall(0.0, -0.062, true),
+    ]);
+    let askew = turned(at(0.0, 0.0, 0.14), Vec3::new(0.3, 0.5, 0.2));
+    let onto_rim = turned(at(0.045, 0.0, 0.14), Vec3::new(0.3, 0.5, 0.2));
+    for (name, shape) in [("bowl", &bowl), ("plate", &plate), ("basket", &basket)] {
+        for (place, pose) in [("middle", askew), ("rim", onto_rim)] {
+            let (depth, centre) = deepest(shape, pose, 0.8);
+            assert!(depth < 1e-3, "{name}, {place}: {depth} m deep, ends at {centre}");
+        }
+    }
+}
+
+#[test]
+fn no_step_of_a_free_fall_gains_energy() {
+    let mut world = world();
+    let cube = cuboid(0.05, 0.05, 0.05);
+    let rest = soft_rest(&cube, SOFT, 4, 5e-3);
+    soft(&mut world, &cube, &rest, at(0.0, 0.0, 1.0), bread());
+    // Spinning, stretched and falling.
+    let body = &mut world.soft[0].body;
+    for (x, v) in body.x.iter_mut().zip(body.v.iter_mut()) {
+        let r = *x - Vec3::z();
+        *v = Vec3::new(0.0, 5.0, 10.0).cross(&r);
+        x.x += 0.1 * r.x;
+    }
+    body.update_elastic();
+    let start = world.energy();
+    let scale = start.kinetic + start.elastic;
+    let mut before = start.total();
+    for _ in 0..60 {
+        world.step().expect("a step that converges");
+        let now = world.energy().total();
+        assert!(now - before < 1e-3 * scale, "gained {} of {scale} J", now - before);
+        before = now;
+    }
+}

@@ -1,0 +1,58 @@
+//! Light grasps: whether friction carries the weight through the lift.
+
+use crate::{
+    rows::rows,
+    support::{GRAVITY, Outcome, Squeeze, run},
+};
+
+/// Largest acceleration of the lift, m/s².
+const LIFT_ACCELERATION: f64 = 0.577;
+
+/// Gaps, mm: the reference's light ones, and two close on either side of the limit.
+pub const GAPS: [f64; 12] = [49.9, 49.8, 49.775, 49.75, 49.7, 49.6, 49.5, 49.4, 49.3, 49.2, 49.0, 48.0];
+
+/// Static friction capacity off the table over what the lift needs, by the reference (linear between its rows).
+pub fn capacity_ratio(gap_mm: f64) -> f64 {
+    let points: Vec<(f64, f64)> =
+        rows("cube").iter().map(|r| (r.number("gap_mm"), r.number("capacity_over_weight"))).collect();
+    let pair = points.windows(2).find(|p| p[0].0 >= gap_mm && p[1].0 <= gap_mm).expect("a gap of the rows");
+    let share = (pair[0].0 - gap_mm) / (pair[0].0 - pair[1].0);
+    let capacity = pair[0].1 + share * (pair[1].1 - pair[0].1);
+    capacity * GRAVITY / (GRAVITY + LIFT_ACCELERATION)
+}
+
+/// The squeeze at one gap and step.
+pub fn grasp(gap_mm: f64, dt: f64) -> Outcome {
+    run(&Squeeze { dt, ..Squeeze::default() }.gap_mm(gap_mm))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_light_grasp_holds_exactly_when_static_friction_can_at_the_step_and_at_half_of_it() {
+        for gap in GAPS {
+            let ratio = capacity_ratio(gap);
+            for dt in [1.0 / 60.0, 1.0 / 120.0] {
+                let ours = grasp(gap, dt);
+                assert!(ours.failure.is_none(), "gap {gap}: {:?}", ours.failure);
+                if (ratio - 1.0).abs() > 0.03 {
+                    assert_eq!(ours.holds, ratio > 1.0, "gap {gap}, dt {dt}: capacity ratio {ratio:.3}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_light_grasp_that_holds_neither_overshoots_nor_chatters() {
+        for gap in GAPS {
+            let ours = grasp(gap, 1.0 / 60.0);
+            if ours.holds {
+                let peak = ours.d_peak_pct / ours.d_hold_pct;
+                assert!(peak <= 1.1, "gap {gap}: D_peak is {peak:.3} of D_hold");
+                assert!(ours.ripple < 1e-3, "gap {gap}: force ripples by {:.1e}", ours.ripple);
+            }
+        }
+    }
+}

@@ -1,0 +1,15 @@
+//! Validation of the mechanics against closed forms and the independent static reference of `tests/reference`.
+//!
+//! Every module holds experiments and, below them, tests that say what they must show; `examples/validation.rs` prints
+//! the same experiments as tables.
+
+mod element;
+mod extremes;
+mod free;
+mod friction;
+mod light;
+mod rows;
+mod statics;
+mod support;
+mod time_step;
+mod truth;
