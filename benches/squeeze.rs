@@ -2,6 +2,7 @@
 //!
 //! `cargo bench --bench squeeze` prints CPU seconds of this thread per simulated second, by phase, the best of
 //! [`ROUNDS`] runs: other load on the machine lengthens the wall clock, not this.
+//! `cargo bench --bench squeeze -- "gap 42"` runs the cases whose names contain the words.
 
 use std::{sync::Arc, time::Instant};
 
@@ -55,6 +56,7 @@ struct Outcome {
     simulated: [f64; 3],
     newton: u32,
     newton_max: u32,
+    factored: u32,
     refills: u64,
     force_grip: f64,
     force_hold: f64,
@@ -116,6 +118,7 @@ impl Scene {
             while self.world.time() + 0.5 * self.world.params.dt < end {
                 self.step();
                 out.newton += self.world.stats.newton;
+                out.factored += self.world.stats.factored;
                 out.newton_max = out.newton_max.max(self.world.stats.newton_max);
             }
             out.cpu[phase] = start.elapsed();
@@ -163,13 +166,14 @@ fn report(case: &Case) {
     let total = least(&|o: &Outcome| o.cpu.iter().sum::<f64>() / o.simulated.iter().sum::<f64>());
     let o = &rounds[0];
     println!(
-        "{:<28} {total:.4}  table {:.4} lift {:.4} hold {:.4}  newton {} (most {}) refills {}  force {:.4} {:.4} N",
+        "{:<28} {total:.4}  table {:.4} lift {:.4} hold {:.4}  newton {} (most {}) factored {} refills {}  force {:.4} {:.4} N",
         case.name,
         phase(0),
         phase(1),
         phase(2),
         o.newton,
         o.newton_max,
+        o.factored,
         o.refills,
         o.force_grip,
         o.force_hold,
@@ -190,12 +194,20 @@ fn report_asleep(case: &Case) {
 }
 
 fn main() {
+    // Words on the command line choose cases by part of their name.
+    let wanted: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
+    let chosen = |name: &str| wanted.is_empty() || wanted.iter().any(|word| name.contains(word));
     println!("CPU seconds per simulated second");
     let cube = Case { name: "cube, gap 42", gap: 0.042, resolution: 6, dt: 1.0 / 60.0 };
-    report(&cube);
-    report(&Case { name: "cube, gap 48", gap: 0.048, ..cube });
-    report(&Case { name: "cube, gap 30", gap: 0.030, ..cube });
-    report(&Case { name: "cube, gap 42, 240 Hz", dt: 1.0 / 240.0, ..cube });
-    report(&Case { name: "cube, gap 42, resolution 12", resolution: 12, ..cube });
-    report_asleep(&cube);
+    let cases = [
+        Case { ..cube },
+        Case { name: "cube, gap 48", gap: 0.048, ..cube },
+        Case { name: "cube, gap 30", gap: 0.030, ..cube },
+        Case { name: "cube, gap 42, 240 Hz", dt: 1.0 / 240.0, ..cube },
+        Case { name: "cube, gap 42, resolution 12", resolution: 12, ..cube },
+    ];
+    cases.iter().filter(|case| chosen(case.name)).for_each(report);
+    if chosen("asleep") {
+        report_asleep(&cube);
+    }
 }

@@ -7,7 +7,7 @@ use crate::{
     geometry::{
         mass::mass_properties,
         samples::{SampleSpec, surface_samples},
-        shape::Shape,
+        shape::{Aabb, Shape},
         voxelise::{GeometryError, VoxelSpec, voxel_mesh},
     },
     physics::{
@@ -51,13 +51,25 @@ pub enum BuildError {
     TwoNames(String),
 }
 
-/// Rest data of soft assets, made once and shared by all episodes.
+/// Rest data and bounds of assets, made once and shared by all episodes.
 #[derive(Clone, Debug, Default)]
 pub struct RestCache {
     made: Arc<Mutex<Vec<(Arc<Asset>, Arc<Rest>)>>>,
+    bounds: Arc<Mutex<Vec<(Shape, Aabb)>>>,
 }
 
 impl RestCache {
+    /// Bounds of a shape; finding those of a displaced one takes a search.
+    fn bounds(&self, shape: &Shape) -> Aabb {
+        let mut known = self.bounds.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        if let Some((_, bounds)) = known.iter().find(|(known, _)| known == shape) {
+            return *bounds;
+        }
+        let bounds = shape.bounds();
+        known.push((shape.clone(), bounds));
+        bounds
+    }
+
     /// Rest data of a soft asset.
     fn rest(&self, asset: &Arc<Asset>, material: &SoftMaterial) -> Result<Arc<Rest>, BuildError> {
         // Held while building, so that two workers never make the same one twice.
@@ -135,5 +147,6 @@ pub(super) fn add(world: &mut World, object: &Object, cache: &RestCache) -> Resu
         }
         Body::Static => (Kind::Static, vec![collider(world, Mover::Static, object.pose_w)]),
     };
-    Ok(Handle { name: object.name.clone(), asset: asset.clone(), kind, start_w: object.pose_w, colliders })
+    let bounds = cache.bounds(&asset.shape);
+    Ok(Handle { name: object.name.clone(), asset: asset.clone(), kind, start_w: object.pose_w, colliders, bounds })
 }

@@ -8,7 +8,7 @@ use super::{
     STEPS_PER_CONTROL,
     build::{BuildError, RestCache},
     evidence::{Witness, lowest},
-    simulation::{Kind, SettleError, Simulation},
+    simulation::{Handle, Kind, SettleError, Simulation},
     trace::StepTrace,
 };
 use crate::{
@@ -24,7 +24,7 @@ use crate::{
     physics::{Params, world::StepFailure},
     policy::{Action, Observation, Policy},
     robot::{RobotSpec, rotation},
-    scene::{Asset, Region, Scene},
+    scene::{Region, Scene},
 };
 
 /// What went wrong with whoever drives.
@@ -176,7 +176,7 @@ impl Episode {
         let judge = Judge::new(Setup {
             rules: spec.rules.clone(),
             workspace: spec.scene.workspace,
-            place: place_of(&spec.task.goal, &sim.objects[place].asset),
+            place: place_of(&spec.task.goal, &sim.objects[place]),
             hold_s,
             dt_s: spec.params.dt,
             steps_per_control: STEPS_PER_CONTROL,
@@ -321,12 +321,12 @@ fn check_action(action: &Action) -> Result<(), String> {
 }
 
 /// Where the goal is, from the shape of what it names.
-fn place_of(goal: &Goal, asset: &Asset) -> Place {
-    let bounds = asset.shape.bounds();
+fn place_of(goal: &Goal, place: &Handle) -> Place {
+    let bounds = place.bounds;
     match goal {
         Goal::On { .. } => Place::On { radius_m: 0.5 * bounds.size().xy().min() },
         Goal::In { .. } => {
-            let wall = asset.hints.get("wall_m").copied().unwrap_or(0.0);
+            let wall = place.asset.hints.get("wall_m").copied().unwrap_or(0.0);
             let inset = Vec3::new(wall, wall, 0.0);
             Place::In { inside: Region { min: bounds.min + inset, max: bounds.max - inset } }
         }

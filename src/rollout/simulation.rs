@@ -8,7 +8,7 @@ use super::{
     rig::Rig,
 };
 use crate::{
-    geometry::{Pose, Vec3},
+    geometry::{Pose, Vec3, shape::Aabb},
     physics::{Params, World, contact::ColliderId, world::StepFailure},
     robot::RobotSpec,
     scene::{Asset, Scene},
@@ -38,6 +38,8 @@ pub struct Handle {
     pub start_w: Pose,
     /// Its colliders.
     pub colliders: Vec<ColliderId>,
+    /// Bounds of its shape at rest, object frame.
+    pub bounds: Aabb,
 }
 
 /// Speed below which a node counts as settled, m/s.

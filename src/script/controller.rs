@@ -56,7 +56,7 @@ pub(super) fn view(sim: &Simulation, time_s: f64) -> ExpertView {
 
 fn seen(sim: &Simulation, object: &Handle) -> ObjectView {
     let pose = sim.pose(object);
-    let bounds = object.asset.shape.bounds();
+    let bounds = object.bounds;
     let centre_w = match object.kind {
         Kind::Soft(_) => sim.centre(object),
         _ => (pose * nalgebra::Point3::from(bounds.centre())).coords,

@@ -65,7 +65,7 @@ pub fn put(
 
 /// A static floor whose top is z = 0.
 pub fn floor(world: &mut World, mu: Friction) -> usize {
-    put(world, "floor", (Mover::Static, at(0.0, 0.0, -0.05)), &cuboid(2.0, 2.0, 0.1), mu)
+    put(world, "floor", (Mover::Static, at(0.0, 0.0, -0.05)), &cuboid(40.0, 40.0, 0.1), mu)
 }
 
 /// Mass and inertia of the primitives used here, kg and kg m².
@@ -108,6 +108,16 @@ pub fn soft_rest(shape: &Shape, material: Material, resolution: usize, spacing: 
 /// Adds a soft block that other soft blocks feel; its index.
 pub fn soft(world: &mut World, shape: &Shape, rest: &Arc<Rest>, pose: Pose, mu: Friction) -> usize {
     world.add_soft("soft", rest.clone(), Some(Arc::new(shape.clone())), &pose, mu)
+}
+
+/// Lets everything settle on the flat, then leans gravity to `angle` (rad) within `seconds` and waits as long again.
+pub fn lean(world: &mut World, angle: f64, seconds: f64) {
+    run(world, 0.3);
+    let steps = (seconds / world.params.dt).round();
+    for step in 0..2 * steps as usize {
+        world.gravity = gravity(angle * ((step as f64 + 1.0) / steps).min(1.0));
+        world.step().expect("a step that converges");
+    }
 }
 
 /// Steps until `seconds` have passed.

@@ -24,7 +24,8 @@ const DEEP_RATIO: f64 = 3.0;
 struct Face {
     phi: f64,
     normal: Vec3,
-    coverage: f64,
+    /// How far the point lies within the edges of the face, in each direction.
+    inside: [f64; 2],
     /// Half the thickness of the shape under the face: deeper than this, the far side is nearer.
     depth: f64,
 }
@@ -39,10 +40,10 @@ impl Shape {
     /// [`Shape::distance_and_normal`] and full coverage.
     pub fn contact(&self, p_o: &Vec3, facing_o: &Vec3, spacing: f64) -> Contact {
         match self {
-            Self::Box { half } => sharp(box_faces(p_o, half, spacing), facing_o)
+            Self::Box { half } => sharp(box_faces(p_o, half), facing_o, spacing)
                 .unwrap_or_else(|| full(primitive::cuboid(p_o, half))),
             Self::Cylinder { radius, half_height } => {
-                sharp(cylinder_faces(p_o, *radius, *half_height, spacing), facing_o)
+                sharp(cylinder_faces(p_o, *radius, *half_height), facing_o, spacing)
                     .unwrap_or_else(|| full(primitive::cylinder(p_o, *radius, *half_height)))
             }
             Self::Placed { shape, pose } => {
@@ -62,16 +63,22 @@ fn full((phi, normal): (f64, Vec3)) -> Contact {
 }
 
 /// The face that a sample feels: of those that it covers and faces, the one it faces most.
-fn sharp<const N: usize>(faces: [Face; N], facing: &Vec3) -> Option<Contact> {
+fn sharp<const N: usize>(faces: [Face; N], facing: &Vec3, spacing: f64) -> Option<Contact> {
     let nearest = -faces.iter().map(|face| face.phi).fold(f64::NEG_INFINITY, f64::max);
     let deepest = DEEP.max(DEEP_RATIO * nearest);
-    faces
-        .into_iter()
-        .filter(|face| face.coverage > 0.0 && face.phi >= -face.depth.min(deepest))
-        .map(|face| (-facing.dot(&face.normal), face))
-        .filter(|(alignment, _)| *alignment > FACING)
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, face)| Contact { phi: face.phi, normal: face.normal, coverage: face.coverage })
+    let (mut most, mut best) = (FACING, None);
+    for face in &faces {
+        let alignment = -facing.dot(&face.normal);
+        if alignment <= most || face.phi < -face.depth.min(deepest) {
+            continue;
+        }
+        let coverage = covered(face.inside[0], spacing) * covered(face.inside[1], spacing);
+        if coverage > 0.0 {
+            most = alignment;
+            best = Some(Contact { phi: face.phi, normal: face.normal, coverage });
+        }
+    }
+    best
 }
 
 /// The covered share along one direction of a patch whose centre lies `inside` m within the edge.
@@ -79,31 +86,31 @@ fn covered(inside: f64, spacing: f64) -> f64 {
     (inside / spacing + 0.5).clamp(0.0, 1.0)
 }
 
-fn box_faces(p: &Vec3, half: &Vec3, spacing: f64) -> [Face; 3] {
+fn box_faces(p: &Vec3, half: &Vec3) -> [Face; 3] {
     let inside = half - p.abs();
     std::array::from_fn(|axis| {
         let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
         Face {
             phi: -inside[axis],
             normal: Vec3::ith(axis, if p[axis] < 0.0 { -1.0 } else { 1.0 }),
-            coverage: covered(inside[i], spacing) * covered(inside[j], spacing),
+            inside: [inside[i], inside[j]],
             depth: half[axis],
         }
     })
 }
 
-fn cylinder_faces(p: &Vec3, radius: f64, half_height: f64, spacing: f64) -> [Face; 2] {
+fn cylinder_faces(p: &Vec3, radius: f64, half_height: f64) -> [Face; 2] {
     let r = p.x.hypot(p.y);
     let cap = Face {
         phi: p.z.abs() - half_height,
         normal: Vec3::z() * if p.z < 0.0 { -1.0 } else { 1.0 },
-        coverage: covered(radius - r, spacing),
+        inside: [radius - r, f64::INFINITY],
         depth: half_height,
     };
     let side = Face {
         phi: r - radius,
         normal: if r > 1e-12 { Vec3::new(p.x / r, p.y / r, 0.0) } else { Vec3::x() },
-        coverage: covered(half_height - p.z.abs(), spacing),
+        inside: [half_height - p.z.abs(), f64::INFINITY],
         depth: radius,
     };
     [cap, side]

@@ -2,7 +2,7 @@
 
 use super::collider::Collider;
 use crate::{
-    geometry::{Pose, Vec3, shape::Aabb},
+    geometry::{Mat3, Pose, Vec3, shape::Aabb},
     physics::fem::SoftBody,
 };
 
@@ -56,27 +56,32 @@ pub fn detect(
     out: &mut Vec<Candidate>,
     near: &mut dyn FnMut(usize),
 ) {
-    let rest = &body.rest;
     let bounds = collider.bounds;
     let around = Aabb::around(&body.x).unwrap_or(bounds);
-    if apart(&around, &bounds.moved(&moving.pose), reach) {
+    let lever = (around.centre() - moving.origin).norm() + around.size().norm();
+    let speed = body.max_speed() + moving.linear.norm() + moving.angular.norm() * lever;
+    if apart(&around, &bounds.moved(&moving.pose), reach.max(AHEAD * dt * speed)) {
         return;
     }
-    for (index, group) in rest.groups.iter().enumerate() {
-        let nodes = &group.nodes[..group.count];
-        let (low, high, fastest) = span(body, nodes, moving);
-        let ahead = AHEAD * dt * fastest;
-        let centre = moving.pose.inverse_transform_point(&((low + high) * 0.5).into()).coords;
-        let radius = (high - low).norm() * 0.5;
-        if outside(&bounds, &centre) > radius + reach.max(ahead) {
+    let view = View::new(moving);
+    for (index, group) in body.rest.groups.iter().enumerate() {
+        let seen = Seen::new(body, &group.nodes[..group.count], moving, &view);
+        let ahead = AHEAD * dt * seen.fastest;
+        let look = reach.max(ahead);
+        if apart(&seen.bounds, &bounds, look) {
             continue;
         }
         let mut close = false;
         for sample in group.first..group.last {
-            let Some(found) = test(body, collider, moving, (index, sample), dt) else { continue };
-            close |= found.1 < reach;
-            if found.1 < margin.max(found.2) {
-                out.push(found.0);
+            let Some(candidate) = test(body, collider, (&seen, &view), (index, sample), look) else {
+                continue;
+            };
+            close |= candidate.gap < reach;
+            let weights = &body.rest.samples[sample].weights;
+            if candidate.gap < margin
+                || (candidate.gap < ahead && candidate.gap < AHEAD * dt * seen.speed(weights))
+            {
+                out.push(candidate);
             }
         }
         if close {
@@ -85,54 +90,94 @@ pub fn detect(
     }
 }
 
-/// One sample against the surface: the candidate, its gap, and how far it may come in the look-ahead.
+/// A collider's frame in the world.
+struct View {
+    to_world: Mat3,
+    origin: Vec3,
+}
+
+impl View {
+    fn new(moving: &Moving) -> Self {
+        Self {
+            to_world: *moving.pose.rotation.to_rotation_matrix().matrix(),
+            origin: moving.pose.translation.vector,
+        }
+    }
+}
+
+/// The nodes of a group as a collider sees them, in its frame.
+struct Seen {
+    count: usize,
+    x: [Vec3; 8],
+    v: [Vec3; 8],
+    bounds: Aabb,
+    fastest: f64,
+}
+
+impl Seen {
+    fn new(body: &SoftBody, nodes: &[u32], moving: &Moving, view: &View) -> Self {
+        let mut seen = Self {
+            count: nodes.len(),
+            x: [Vec3::zeros(); 8],
+            v: [Vec3::zeros(); 8],
+            bounds: Aabb { min: Vec3::repeat(f64::INFINITY), max: Vec3::repeat(f64::NEG_INFINITY) },
+            fastest: 0.0,
+        };
+        for (i, &node) in nodes.iter().enumerate() {
+            let x = &body.x[node as usize];
+            seen.x[i] = view.to_world.tr_mul(&(x - view.origin));
+            seen.v[i] = body.v[node as usize] - moving.velocity(x);
+            seen.bounds.min = seen.bounds.min.inf(&seen.x[i]);
+            seen.bounds.max = seen.bounds.max.sup(&seen.x[i]);
+            seen.fastest = seen.fastest.max(seen.v[i].norm_squared());
+        }
+        seen.fastest = seen.fastest.sqrt();
+        seen
+    }
+
+    /// Speed of a sample against the mover, m/s.
+    fn speed(&self, weights: &[f64; 8]) -> f64 {
+        mean(self.count, &self.v, weights).norm()
+    }
+}
+
+/// Weighted mean over `count` nodes; with the four of a face known, the sum is unrolled.
+fn mean(count: usize, values: &[Vec3; 8], weights: &[f64; 8]) -> Vec3 {
+    let of = |n: usize| (1..n).fold(values[0] * weights[0], |sum, i| sum + values[i] * weights[i]);
+    if count <= 4 { of(4) } else { of(8) }
+}
+
+/// One sample against the surface, if it is within `look` of its bounds and the two face each other.
 fn test(
     body: &SoftBody,
     collider: &Collider,
-    moving: &Moving,
+    (seen, view): (&Seen, &View),
     (group, sample): (usize, usize),
-    dt: f64,
-) -> Option<(Candidate, f64, f64)> {
-    let rest = &body.rest;
-    let nodes = &rest.groups[group].nodes[..rest.groups[group].count];
-    let data = &rest.samples[sample];
-    let (mut p, mut v) = (Vec3::zeros(), Vec3::zeros());
-    for (&node, w) in nodes.iter().zip(&data.weights) {
-        p += body.x[node as usize] * *w;
-        v += body.v[node as usize] * *w;
-    }
-    let facing = body.rotation[data.surface.at.element as usize] * data.surface.n_o;
-    let local = moving.pose.inverse_transform_point(&p.into()).coords;
-    let local_facing = moving.pose.rotation.inverse_transform_vector(&facing);
-    let contact = collider.surface.contact(&local, &local_facing, data.surface.area.sqrt());
-    let normal = moving.pose.rotation * contact.normal;
-    // A sample that looks the way the surface does has it behind its back: the far side of a thin body.
-    if contact.coverage <= 0.0 || facing.dot(&normal) > 0.3 {
+    look: f64,
+) -> Option<Candidate> {
+    let data = &body.rest.samples[sample];
+    let local = mean(seen.count, &seen.x, &data.weights);
+    let bounds = &collider.bounds;
+    if (0..3).any(|i| local[i] < bounds.min[i] - look || local[i] > bounds.max[i] + look) {
         return None;
     }
-    let approach = AHEAD * dt * (v - moving.velocity(&p)).norm();
-    let candidate = Candidate { group, sample, p, gap: contact.phi, normal, coverage: contact.coverage };
-    Some((candidate, contact.phi, approach))
-}
-
-/// Bounds of some nodes and their largest speed against the mover.
-fn span(body: &SoftBody, nodes: &[u32], moving: &Moving) -> (Vec3, Vec3, f64) {
-    let first = body.x[nodes[0] as usize];
-    let mut result = (first, first, 0.0);
-    for &node in nodes {
-        let x = &body.x[node as usize];
-        result.0 = result.0.inf(x);
-        result.1 = result.1.sup(x);
-        result.2 = f64::max(result.2, (body.v[node as usize] - moving.velocity(x)).norm());
+    let facing = body.rotation[data.surface.at.element as usize] * data.surface.n_o;
+    let local_facing = view.to_world.tr_mul(&facing);
+    let contact = collider.surface.contact(&local, &local_facing, data.surface.area.sqrt());
+    // A sample that looks the way the surface does has it behind its back: the far side of a thin body.
+    if contact.coverage <= 0.0 || local_facing.dot(&contact.normal) > 0.3 {
+        return None;
     }
-    result
+    Some(Candidate {
+        group,
+        sample,
+        p: view.to_world * local + view.origin,
+        gap: contact.phi,
+        normal: view.to_world * contact.normal,
+        coverage: contact.coverage,
+    })
 }
 
 fn apart(a: &Aabb, b: &Aabb, reach: f64) -> bool {
     (0..3).any(|i| a.min[i] > b.max[i] + reach || b.min[i] > a.max[i] + reach)
-}
-
-/// Distance of a point to a box; 0 inside.
-fn outside(bounds: &Aabb, p: &Vec3) -> f64 {
-    (bounds.min - p).sup(&(p - bounds.max)).sup(&Vec3::zeros()).norm()
 }

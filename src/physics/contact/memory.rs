@@ -40,7 +40,7 @@ pub struct Slot {
     pub anchor: Vec3,
     /// Normal impulse of the last step, N s.
     pub impulse: f64,
-    /// Whether the sample slips, so that dynamic friction acts.
+    /// Whether the pair of surfaces slides, so that dynamic friction acts.
     pub slipping: bool,
     /// How far the anchor has been dragged since first contact, m.
     pub travel: f64,

@@ -11,5 +11,5 @@ pub use collider::{Collider, ColliderId, Friction, Layer, Mover, Surface};
 pub use detect::{Candidate, Moving, detect};
 pub use manifold::ContactPoint;
 pub use memory::{Memory, Partner, Slot};
-pub use soft_field::{Felt, Pressing, SoftField, detect_soft};
+pub use soft_field::{Felt, Pressing, SoftField, detect_soft, may_touch};
 pub use solid::{Part, Solid};

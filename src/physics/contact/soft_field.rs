@@ -185,44 +185,77 @@ pub struct Pressing {
 /// Steps of approach within which a sample gets a row.
 const AHEAD: f64 = 1.5;
 
+/// Step (s), margin and reach (m) of a search.
+type Limits = (f64, f64, f64);
+
+/// How far a point of speed up to `speed` is looked for, m.
+fn look(speed: f64, (dt, margin, reach): Limits) -> f64 {
+    reach.max(margin).max(AHEAD * dt * speed)
+}
+
+/// Whether two bodies are close or fast enough for their samples to be worth a look.
+pub fn may_touch(a: &SoftBody, b: &SoftBody, limits: Limits) -> bool {
+    let (Some(box_a), Some(box_b)) = (Aabb::around(&a.x), Aabb::around(&b.x)) else { return false };
+    overlap(&box_a.grown(look(a.max_speed() + b.max_speed(), limits)), &box_b)
+}
+
 /// Collects the samples of `body` that press on `field` or will, and calls `near` with the group and element of every
-/// sample within `reach` of it, so that their nodes can be kept before they are needed.
+/// sample within the reach of it, so that their nodes can be kept before they are needed.
 pub fn detect_soft(
     body: &SoftBody,
     field: &SoftField,
-    (dt, margin, reach): (f64, f64, f64),
+    limits: Limits,
     out: &mut Vec<Pressing>,
     near: &mut dyn FnMut(usize, u32),
 ) {
-    let rest = &body.rest;
     let Some(around) = Aabb::around(&field.body.x) else { return };
     let field_speed = field.body.max_speed();
-    for (index, group) in rest.groups.iter().enumerate() {
+    for (index, group) in body.rest.groups.iter().enumerate() {
         let nodes = &group.nodes[..group.count];
         let speed = nodes.iter().map(|&n| body.v[n as usize].norm()).fold(0.0, f64::max) + field_speed;
-        let wide = around.grown(reach.max(AHEAD * dt * speed));
+        let wide = around.grown(look(speed, limits));
+        let Some(span) = Aabb::around(nodes.iter().map(|&n| &body.x[n as usize])) else { continue };
+        if !overlap(&wide, &span) {
+            continue;
+        }
         for sample in group.first..group.last {
-            let data = &rest.samples[sample];
-            let (mut p, mut v) = (Vec3::zeros(), Vec3::zeros());
-            for (&node, w) in nodes.iter().zip(&data.weights) {
-                p += body.x[node as usize] * *w;
-                v += body.v[node as usize] * *w;
+            let Some((pressing, speed)) = press(body, field, &wide, (index, sample)) else { continue };
+            let (dt, margin, reach) = limits;
+            let ahead = margin.max(AHEAD * dt * speed);
+            if pressing.felt.gap < ahead.max(reach) {
+                near(index, pressing.felt.element);
             }
-            if (0..3).any(|i| p[i] < wide.min[i] || p[i] > wide.max[i]) {
-                continue;
-            }
-            let facing = body.rotation[data.surface.at.element as usize] * data.surface.n_o;
-            let Some(felt) = field.feel(&p, &facing, data.surface.area.sqrt()) else { continue };
-            let carrier = &field.body.rest.mesh.elements[felt.element as usize];
-            let v_field: Vec3 =
-                carrier.iter().zip(&felt.weights).map(|(&n, w)| field.body.v[n as usize] * *w).sum();
-            let ahead = margin.max(AHEAD * dt * (v - v_field).norm());
-            if felt.gap < ahead.max(reach) {
-                near(index, felt.element);
-            }
-            if felt.gap < ahead {
-                out.push(Pressing { group: index, sample, p, felt });
+            if pressing.felt.gap < ahead {
+                out.push(pressing);
             }
         }
     }
+}
+
+/// What one sample feels, and its speed against the place that it feels (m/s).
+fn press(
+    body: &SoftBody,
+    field: &SoftField,
+    wide: &Aabb,
+    (group, sample): (usize, usize),
+) -> Option<(Pressing, f64)> {
+    let nodes = &body.rest.groups[group].nodes[..body.rest.groups[group].count];
+    let data = &body.rest.samples[sample];
+    let p = weighted(&body.x, nodes, &data.weights);
+    if (0..3).any(|i| p[i] < wide.min[i] || p[i] > wide.max[i]) {
+        return None;
+    }
+    let facing = body.rotation[data.surface.at.element as usize] * data.surface.n_o;
+    let felt = field.feel(&p, &facing, data.surface.area.sqrt())?;
+    let carrier = &field.body.rest.mesh.elements[felt.element as usize];
+    let approach = weighted(&body.v, nodes, &data.weights) - weighted(&field.body.v, carrier, &felt.weights);
+    Some((Pressing { group, sample, p, felt }, approach.norm()))
+}
+
+fn weighted(values: &[Vec3], nodes: &[u32], weights: &[f64; 8]) -> Vec3 {
+    nodes.iter().zip(weights).map(|(&node, w)| values[node as usize] * *w).sum()
+}
+
+fn overlap(a: &Aabb, b: &Aabb) -> bool {
+    (0..3).all(|i| a.min[i] <= b.max[i] && b.min[i] <= a.max[i])
 }

@@ -69,7 +69,6 @@ pub struct Rest {
     pub(super) stiffness_of: Vec<u32>,
     pub(super) corners: Corners,
     pub(super) mean: [Vec3; 8],
-    gauss: [[Vec3; 8]; 8],
     watched: Vec<bool>,
 }
 
@@ -106,7 +105,6 @@ impl Rest {
                 Vec3::new((c & 1) as f64, (c >> 1 & 1) as f64, (c >> 2 & 1) as f64) * h
             }),
             mean: element::mean_gradients(h),
-            gauss: element::gauss_points().map(|xi| element::gradients(&xi, h)),
             mesh,
         })
     }
@@ -236,7 +234,7 @@ impl SoftBody {
         let mut least = (f64::INFINITY, 0);
         for (e, nodes) in rest.mesh.elements.iter().enumerate().filter(|(e, _)| rest.watched[*e]) {
             let x: Corners = std::array::from_fn(|c| self.x[nodes[c] as usize]);
-            let det = force::min_det(&x, &rest.gauss);
+            let det = force::min_det(&x, rest.mesh.edge);
             if det < least.0 {
                 least = (det, e);
             }

@@ -2,7 +2,8 @@
 //!
 //! `K = Σ R K₀ Rᵀ` is assembled and factored in the body's own turning frame, so a body that is carried or rotates
 //! without changing shape keeps its factor; it is refilled when an element's rotation has moved by [`STALE_ROTATION`]
-//! against the body, or when a new node comes into contact. A slightly old tangent changes no equilibrium: the force
+//! against the body, or when a new node comes into contact. The turning frame itself follows in steps of [`STALE_TURN`], so
+//! that a body that is merely held needs not even be turned. A slightly old tangent changes no equilibrium: the force
 //! is always evaluated exactly, `A` only says how the step answers it.
 
 use super::body::{Rest, SoftBody};
@@ -12,9 +13,11 @@ use crate::{
 };
 
 /// Change of an element's rotation (Frobenius norm, about √2 × radians) that makes the factor be refilled.
-const STALE_ROTATION: f64 = 0.02;
+const STALE_ROTATION: f64 = 0.04;
+/// Change of the body's rotation (same norm) that makes the reduced matrix be turned again.
+const STALE_TURN: f64 = 2e-3;
 /// Steps for which a node stays kept after its last contact.
-const KEEP_STEPS: u64 = 30;
+const KEEP_STEPS: u64 = 10;
 
 /// Coefficients of the step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,6 +37,9 @@ pub struct System {
     plan: Option<Symbolic>,
     factor: Factor,
     factored: Vec<Mat3>,
+    turn: Mat3,
+    /// The Schur complement in the world, empty while it is lent out or has to be turned again.
+    turned: Vec<f64>,
     coefficients: Option<StepCoefficients>,
     last_used: Vec<u64>,
     kept: Vec<u32>,
@@ -158,6 +164,8 @@ impl System {
             plan: None,
             factor: Factor::default(),
             factored: Vec::new(),
+            turn: Mat3::identity(),
+            turned: Vec::new(),
             coefficients: None,
             last_used: vec![0; nodes],
             kept: Vec::new(),
@@ -194,7 +202,11 @@ impl System {
         if new_plan || self.plan.is_none() {
             self.plan = Some(Symbolic::new(&self.blocks.neighbours, &self.kept));
         }
-        let to_body = body.frame.transpose();
+        if new_plan || (body.frame - self.turn).norm_squared() > STALE_TURN * STALE_TURN {
+            self.turn = body.frame;
+            self.turned.clear();
+        }
+        let to_body = self.turn.transpose();
         let stale =
             |(r, old): (&Mat3, &Mat3)| (to_body * r - old).norm_squared() > STALE_ROTATION * STALE_ROTATION;
         let fresh = !new_plan
@@ -203,6 +215,7 @@ impl System {
         if fresh {
             return true;
         }
+        self.turned.clear();
         self.factored.clear();
         self.factored.extend(body.rotation.iter().map(|r| to_body * r));
         self.blocks.assemble(&body.rest, &self.factored, c);
@@ -231,33 +244,46 @@ impl System {
         true
     }
 
-    /// Reduces momentum `b` (per node, N s, world) and writes the Schur complement (column-major lower, world) and the
-    /// reduced right-hand side of the kept nodes.
-    pub fn reduce(&mut self, frame: &Mat3, b: &[Vec3], matrix: &mut [f64], rhs: &mut [f64]) {
+    /// Lends the reduced matrix of the kept nodes (Schur complement, column-major lower, world); [`System::give_back`]
+    /// spares the next step from making it anew.
+    pub fn lend_matrix(&mut self) -> Vec<f64> {
+        let mut matrix = std::mem::take(&mut self.turned);
+        if let Some(plan) = self.plan.as_ref().filter(|_| matrix.is_empty()) {
+            let side = 3 * plan.kept;
+            matrix.resize(side * side, 0.0);
+            turn_blocks(&self.turn, self.factor.schur(), plan.kept, &mut matrix);
+        }
+        matrix
+    }
+
+    /// Takes the matrix back, unchanged.
+    pub fn give_back(&mut self, matrix: Vec<f64>) {
+        self.turned = matrix;
+    }
+
+    /// Reduces momentum `b` (per node, N s, world) to the right-hand side of the kept nodes.
+    pub fn reduce(&mut self, b: &[Vec3], rhs: &mut [f64]) {
         let Some(plan) = &self.plan else { return };
-        for (at, &node) in plan.order.iter().enumerate() {
-            let turned = frame.tr_mul(&b[node as usize]);
-            self.work[3 * at..3 * at + 3].copy_from_slice(turned.as_slice());
+        for (chunk, &node) in self.work.chunks_exact_mut(3).zip(&plan.order) {
+            chunk.copy_from_slice(self.turn.tr_mul(&b[node as usize]).as_slice());
         }
         self.factor.forward(plan, &mut self.work);
         let inner = 3 * (plan.order.len() - plan.kept);
-        for (i, chunk) in self.work[inner..].chunks_exact(3).enumerate() {
-            rhs[3 * i..3 * i + 3].copy_from_slice((frame * Vec3::from_column_slice(chunk)).as_slice());
+        for (rhs, chunk) in rhs.chunks_exact_mut(3).zip(self.work[inner..].chunks_exact(3)) {
+            rhs.copy_from_slice((self.turn * Vec3::from_column_slice(chunk)).as_slice());
         }
-        turn_blocks(frame, self.factor.schur(), plan.kept, matrix);
     }
 
     /// Completes the velocities of all nodes from those of the kept ones (world, 3 a node).
-    pub fn complete(&mut self, frame: &Mat3, kept: &[f64], v: &mut [Vec3]) {
+    pub fn complete(&mut self, kept: &[f64], v: &mut [Vec3]) {
         let Some(plan) = &self.plan else { return };
         let inner = 3 * (plan.order.len() - plan.kept);
-        for (i, chunk) in kept.chunks_exact(3).enumerate() {
-            let turned = frame.tr_mul(&Vec3::from_column_slice(chunk));
-            self.work[inner + 3 * i..inner + 3 * i + 3].copy_from_slice(turned.as_slice());
+        for (chunk, kept) in self.work[inner..].chunks_exact_mut(3).zip(kept.chunks_exact(3)) {
+            chunk.copy_from_slice(self.turn.tr_mul(&Vec3::from_column_slice(kept)).as_slice());
         }
         self.factor.backward(plan, &mut self.work);
-        for (at, &node) in plan.order.iter().enumerate() {
-            v[node as usize] = frame * Vec3::from_column_slice(&self.work[3 * at..3 * at + 3]);
+        for (chunk, &node) in self.work.chunks_exact(3).zip(&plan.order) {
+            v[node as usize] = self.turn * Vec3::from_column_slice(chunk);
         }
     }
 }

@@ -1,27 +1,23 @@
 //! Velocities of points and the gather and scatter between points and blocks.
 
-use super::{
-    law::Answer,
-    problem::{Endpoint, Point, Problem},
-};
+use super::problem::{Endpoint, Point, Problem};
 use crate::geometry::{Mat3, Vec3};
 
 /// Rows of a patch's local system: up to two endpoints of eight nodes.
 const MAX_LOCAL: usize = 48;
 
-/// Local system of a patch: the endpoints' own coordinates (3 a node, 6 a screw), dense.
+/// Local Hessian of a patch: the endpoints' own coordinates (3 a node, 6 a screw), dense.
 #[derive(Debug)]
 pub struct Local {
     size_a: usize,
     size: usize,
-    gradient: [f64; MAX_LOCAL],
     /// Column-major lower triangle of side `MAX_LOCAL`.
     hessian: Vec<f64>,
 }
 
 impl Default for Local {
     fn default() -> Self {
-        Self { size_a: 0, size: 0, gradient: [0.0; MAX_LOCAL], hessian: vec![0.0; MAX_LOCAL * MAX_LOCAL] }
+        Self { size_a: 0, size: 0, hessian: vec![0.0; MAX_LOCAL * MAX_LOCAL] }
     }
 }
 
@@ -57,11 +53,66 @@ pub fn gather(problem: &Problem, offsets: &[usize], end: &Endpoint, v: &[f64]) -
 }
 
 /// Velocity of a point on an endpoint.
+#[inline]
 pub fn velocity(problem: &Problem, end: &Endpoint, u: &[Vec3; 8], weights: &[f64; 8], p: &Vec3) -> Vec3 {
     match end {
         Endpoint::Known => Vec3::zeros(),
-        Endpoint::Nodes { count, .. } => (0..*count).map(|i| u[i] * weights[i]).sum(),
+        // Faces have four nodes, voxels eight: with the number known, the sums are unrolled.
+        Endpoint::Nodes { count: 4, .. } => mean::<4>(u, weights),
+        Endpoint::Nodes { .. } => mean::<8>(u, weights),
         Endpoint::Screw(screw) => u[0] + u[1].cross(&(p - problem.screws[*screw].origin)),
+    }
+}
+
+#[inline]
+fn mean<const N: usize>(u: &[Vec3; 8], weights: &[f64; 8]) -> Vec3 {
+    (1..N).fold(u[0] * weights[0], |sum, i| sum + u[i] * weights[i])
+}
+
+/// Adds an impulse at a point to the forces on an endpoint's own coordinates (the transpose of [`velocity`]).
+#[inline]
+pub fn pull(
+    problem: &Problem,
+    end: &Endpoint,
+    force: &mut [Vec3; 8],
+    weights: &[f64; 8],
+    (p, impulse): (&Vec3, &Vec3),
+) {
+    match end {
+        Endpoint::Known => {}
+        Endpoint::Nodes { count: 4, .. } => (0..4).for_each(|i| force[i] += impulse * weights[i]),
+        Endpoint::Nodes { .. } => (0..8).for_each(|i| force[i] += impulse * weights[i]),
+        Endpoint::Screw(screw) => {
+            force[0] += impulse;
+            force[1] += (p - problem.screws[*screw].origin).cross(impulse);
+        }
+    }
+}
+
+/// Adds `sign` times the forces on an endpoint's own coordinates to the gradient (the transpose of [`gather`]).
+pub fn spread(
+    problem: &Problem,
+    offsets: &[usize],
+    end: &Endpoint,
+    (sign, force): (f64, &[Vec3; 8]),
+    gradient: &mut [f64],
+) {
+    match end {
+        Endpoint::Known => {}
+        Endpoint::Nodes { block, at, count } => {
+            for (f, at) in force.iter().zip(&at[..*count]) {
+                let start = offsets[*block] + *at as usize;
+                gradient[start..start + 3].iter_mut().zip(f.iter()).for_each(|(g, f)| *g += sign * f);
+            }
+        }
+        Endpoint::Screw(screw) => {
+            let screw = &problem.screws[*screw];
+            let start = offsets[screw.block];
+            for (column, g) in screw.jacobian.chunks_exact(6).zip(&mut gradient[start..]) {
+                let along = Vec3::new(column[0], column[1], column[2]).dot(&force[0]);
+                *g += sign * (along + Vec3::new(column[3], column[4], column[5]).dot(&force[1]));
+            }
+        }
     }
 }
 
@@ -103,14 +154,6 @@ impl Piece {
             Self::Arm(r) => r.cross_matrix() * m,
         }
     }
-
-    /// `Lᵀ · f`.
-    fn transpose_mul(&self, f: &Vec3) -> Vec3 {
-        match self {
-            Self::Scale(w) => f * *w,
-            Self::Arm(r) => r.cross(f),
-        }
-    }
 }
 
 impl Local {
@@ -118,50 +161,28 @@ impl Local {
     pub fn start(&mut self, a: &Endpoint, b: &Endpoint) {
         self.size_a = size_of(a);
         self.size = self.size_a + size_of(b);
-        self.gradient[..self.size].fill(0.0);
         for column in 0..self.size {
             self.hessian[column * MAX_LOCAL..column * MAX_LOCAL + self.size].fill(0.0);
         }
     }
 
-    /// Adds one point's answer.
-    pub fn add(
-        &mut self,
-        problem: &Problem,
-        a: &Endpoint,
-        b: &Endpoint,
-        point: &Point,
-        answer: &Answer,
-        curve: bool,
-    ) {
+    /// Adds one point's curvature.
+    pub fn add(&mut self, problem: &Problem, a: &Endpoint, b: &Endpoint, point: &Point, curvature: &Mat3) {
         let mut left = [Piece::Scale(0.0); 8];
         let mut right = [Piece::Scale(0.0); 8];
         let na = pieces(problem, a, &point.weights_a, &point.p, &mut left);
         let nb = pieces(problem, b, &point.weights_b, &point.p, &mut right);
-        for (i, piece) in left[..na].iter().enumerate() {
-            self.add_gradient(3 * i, &-piece.transpose_mul(&answer.impulse));
-        }
-        for (i, piece) in right[..nb].iter().enumerate() {
-            self.add_gradient(self.size_a + 3 * i, &piece.transpose_mul(&answer.impulse));
-        }
-        if !curve {
-            return;
-        }
         for j in 0..na {
-            let column = left[j].after(&answer.curvature);
+            let column = left[j].after(curvature);
             (j..na).for_each(|i| self.add_block(3 * i, 3 * j, &left[i].before(&column)));
             (0..nb).for_each(|i| self.add_block(self.size_a + 3 * i, 3 * j, &-right[i].before(&column)));
         }
         for j in 0..nb {
-            let column = right[j].after(&answer.curvature);
+            let column = right[j].after(curvature);
             (j..nb).for_each(|i| {
                 self.add_block(self.size_a + 3 * i, self.size_a + 3 * j, &right[i].before(&column))
             });
         }
-    }
-
-    fn add_gradient(&mut self, at: usize, g: &Vec3) {
-        self.gradient[at..at + 3].iter_mut().zip(g.iter()).for_each(|(x, g)| *x += g);
     }
 
     fn add_block(&mut self, row: usize, column: usize, m: &Mat3) {
@@ -171,12 +192,9 @@ impl Local {
         }
     }
 
-    /// Adds the local system to the island's gradient and Hessian (side `n`, lower triangle).
-    pub fn scatter(&self, map: &Map, gradient: &mut [f64], hessian: Option<(&mut [f64], usize)>) {
-        map.scatter_vector(&self.gradient[..self.size], gradient);
-        if let Some((hessian, n)) = hessian {
-            map.scatter_matrix(|r, c| self.hessian[r.min(c) * MAX_LOCAL + r.max(c)], hessian, n);
-        }
+    /// Adds the local system to the island's Hessian (side `n`, lower triangle).
+    pub fn scatter(&self, map: &Map, hessian: &mut [f64], n: usize) {
+        map.scatter_matrix(|r, c| self.hessian[r.min(c) * MAX_LOCAL + r.max(c)], hessian, n);
     }
 }
 
@@ -224,12 +242,6 @@ impl Map {
                     );
                 }
             }
-        }
-    }
-
-    fn scatter_vector(&self, local: &[f64], global: &mut [f64]) {
-        for (row, value) in self.rows[..self.used].iter().zip(local) {
-            row.iter().for_each(|(at, j)| global[*at as usize] += j * value);
         }
     }
 

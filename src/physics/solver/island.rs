@@ -1,6 +1,6 @@
 //! Connected islands of a problem, and the factors that they keep between steps.
 
-use super::problem::Problem;
+use super::{problem::Problem, secant::Secant};
 use crate::physics::sparse::dense;
 
 /// The blocks, patches and scalars of one connected island.
@@ -62,6 +62,7 @@ struct Entry {
     key: Vec<(u64, usize)>,
     factor: Vec<f64>,
     sound: bool,
+    secant: Secant,
 }
 
 /// Factored Hessians by island, the most recently used first.
@@ -89,6 +90,7 @@ impl Cache {
         entry.key.clear();
         entry.key.extend(island.blocks.iter().map(|&b| (problem.blocks[b].identity, problem.blocks[b].dim)));
         entry.sound = false;
+        entry.secant.clear();
         false
     }
 
@@ -103,13 +105,21 @@ impl Cache {
     pub fn give(&mut self, factor: Vec<f64>, sound: bool) {
         self.entries[0].factor = factor;
         self.entries[0].sound = sound;
+        self.entries[0].secant.clear();
     }
 
-    /// Solves with the current factor in place.
+    /// Solves in place with the current factor and what was learnt since it was made.
     pub fn solve(&self, island: &Island, b: &mut [f64]) {
-        let n = island.size;
-        dense::forward(&self.entries[0].factor, n, n, b);
-        dense::backward(&self.entries[0].factor, n, n, b);
+        let (n, entry) = (island.size, &self.entries[0]);
+        entry.secant.solve(b, |b| {
+            dense::forward(&entry.factor, n, n, b);
+            dense::backward(&entry.factor, n, n, b);
+        });
+    }
+
+    /// Corrects the current factor by a step from (`v0`, `g0`) to (`v`, `g`).
+    pub fn learn(&mut self, before: (&[f64], &[f64]), after: (&[f64], &[f64])) {
+        self.entries[0].secant.learn(before, after);
     }
 }
 

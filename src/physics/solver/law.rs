@@ -3,62 +3,99 @@
 use super::problem::Point;
 use crate::geometry::{Mat3, Vec3};
 
-/// What a row answers to a velocity.
+/// What a contact point answers to a velocity.
 #[derive(Clone, Copy, Debug)]
 pub struct Answer {
     /// Impulse on `a`, N s.
     pub impulse: Vec3,
     /// Cost, J.
     pub cost: f64,
-    /// Curvature of the cost, kg.
-    pub curvature: Mat3,
     /// Normal part of the impulse, N s.
     pub normal: f64,
     /// Whether friction is at its bound.
     pub slipping: bool,
+    /// Stretch `z` of the tangential spring, m.
+    stretch: Vec3,
 }
 
-/// Contact law of a point at relative velocity `v`.
-///
-/// Normal: the spring at the end of the step with dissipation, `γ = dt k (−φ − (dt + τ) v_n)₊`. Tangent: with
-/// `z = s + (dt + τ) v_t` the spring `−dt k_t z`, cut off at the lagged bound `μ γ_n` (a Huber cost in `z`).
-pub fn contact(point: &Point, dt: f64, tau: f64, v: &Vec3) -> Answer {
-    let span = dt + tau;
-    let n = &point.normal;
-    let vn = n.dot(v);
-    let c = dt * point.stiffness;
-    let normal = (c * (-point.gap - span * vn)).max(0.0);
-    let mut answer = Answer {
-        impulse: n * normal,
-        cost: 0.5 * normal * normal / (c * span).max(f64::MIN_POSITIVE),
-        curvature: Mat3::zeros(),
-        normal,
-        slipping: false,
-    };
-    if normal > 0.0 {
-        answer.curvature = n * n.transpose() * (c * span);
-    }
-    let bound = point.mu * point.lagged;
-    if bound > 0.0 {
-        let z = point.offset + (v - n * vn) * span;
-        tangent(&mut answer, &z, n, dt * point.shear_stiffness, span, bound);
-    }
-    answer
+/// The law of contact for one step length.
+#[derive(Clone, Copy, Debug)]
+pub struct Law {
+    dt: f64,
+    span: f64,
+    per_span: f64,
 }
 
-fn tangent(answer: &mut Answer, z: &Vec3, n: &Vec3, c: f64, span: f64, bound: f64) {
-    let size = z.norm();
-    let plane = Mat3::identity() - n * n.transpose();
-    if c * size <= bound {
-        answer.impulse -= z * c;
-        answer.cost += 0.5 * c * size * size / span;
-        answer.curvature += plane * (c * span);
-    } else {
-        let direction = z / size;
-        answer.impulse -= direction * bound;
-        answer.cost += bound / span * (size - 0.5 * bound / c);
-        answer.curvature += (plane - direction * direction.transpose()) * (bound * span / size);
-        answer.slipping = true;
+impl Law {
+    /// The law for steps of `dt` and a dissipation time of `tau`, s.
+    pub fn new(dt: f64, tau: f64) -> Self {
+        Self { dt, span: dt + tau, per_span: 1.0 / (dt + tau) }
+    }
+
+    /// Answer of a point at relative velocity `v`; `None` if it is open and nothing of the last pass is left to rub.
+    ///
+    /// Normal: the spring at the end of the step with dissipation, `γ = dt k (−φ − (dt + τ) v_n)₊`. Tangent: with
+    /// `z = s + (dt + τ) v_t` the spring `−dt k_t z`, cut off at the lagged bound `μ γ_n` (a Huber cost in `z`).
+    #[inline]
+    pub fn contact(&self, point: &Point, v: &Vec3) -> Option<Answer> {
+        let n = &point.normal;
+        let vn = n.dot(v);
+        let depth = -point.gap - self.span * vn;
+        let bound = point.mu * point.lagged;
+        if depth <= 0.0 && bound <= 0.0 {
+            return None;
+        }
+        let depth = depth.max(0.0);
+        let normal = self.dt * point.stiffness * depth;
+        let mut answer = Answer {
+            impulse: n * normal,
+            cost: 0.5 * normal * depth * self.per_span,
+            normal,
+            slipping: false,
+            stretch: Vec3::zeros(),
+        };
+        if bound > 0.0 {
+            answer.stretch = point.offset + (v - n * vn) * self.span;
+            self.rub(&mut answer, self.dt * point.shear_stiffness, bound);
+        }
+        Some(answer)
+    }
+
+    #[inline]
+    fn rub(&self, answer: &mut Answer, c: f64, bound: f64) {
+        let z = answer.stretch;
+        let square = z.norm_squared();
+        if c * c * square <= bound * bound {
+            answer.impulse -= z * c;
+            answer.cost += 0.5 * c * square * self.per_span;
+        } else {
+            let size = square.sqrt();
+            answer.impulse -= z * (bound / size);
+            answer.cost += bound * self.per_span * (size - 0.5 * bound / c);
+            answer.slipping = true;
+        }
+    }
+
+    /// Curvature of the cost at an answer of this point, kg.
+    pub fn curvature(&self, point: &Point, answer: &Answer) -> Mat3 {
+        let n = &point.normal;
+        let onto_normal = n * n.transpose();
+        let mut curvature = Mat3::zeros();
+        if answer.normal > 0.0 {
+            curvature = onto_normal * (self.dt * point.stiffness * self.span);
+        }
+        let bound = point.mu * point.lagged;
+        if bound <= 0.0 {
+            return curvature;
+        }
+        let plane = Mat3::identity() - onto_normal;
+        if answer.slipping {
+            let size = answer.stretch.norm();
+            let direction = answer.stretch / size;
+            curvature + (plane - direction * direction.transpose()) * (bound * self.span / size)
+        } else {
+            curvature + plane * (self.dt * point.shear_stiffness * self.span)
+        }
     }
 }
 
@@ -132,16 +169,21 @@ mod tests {
             v in prop::array::uniform3(-0.1f64..0.1), gap in -1e-3f64..1e-3, offset in prop::array::uniform2(-1e-3f64..1e-3),
             lagged in 0.0f64..5e-3,
         ) {
-            let (dt, tau, v, p) = (1.0 / 60.0, 0.01, Vec3::from(v), point(gap, offset, lagged));
-            let at = contact(&p, dt, tau, &v);
+            let (law, v, p) = (Law::new(1.0 / 60.0, 0.01), Vec3::from(v), point(gap, offset, lagged));
+            let open = Answer {
+                impulse: Vec3::zeros(), cost: 0.0, normal: 0.0, slipping: false, stretch: Vec3::zeros(),
+            };
+            let answer = |v: &Vec3| law.contact(&p, v).unwrap_or(open);
+            let at = answer(&v);
+            let curvature = law.curvature(&p, &at);
             let e = 1e-6;
             for i in 0..3 {
-                let moved = |s: f64| contact(&p, dt, tau, &(v + Vec3::ith(i, s)));
+                let moved = |s: f64| answer(&(v + Vec3::ith(i, s)));
                 let (up, down) = (moved(e), moved(-e));
                 prop_assert!(((up.cost - down.cost) / (2.0 * e) + at.impulse[i]).abs() < 1e-6);
                 let kink = (up.normal > 0.0) != (down.normal > 0.0) || up.slipping != down.slipping;
                 let slope = (up.impulse - down.impulse) / (2.0 * e);
-                prop_assert!(kink || (slope + at.curvature.column(i)).norm() < 1e-3, "{slope} {}", at.curvature);
+                prop_assert!(kink || (slope + curvature.column(i)).norm() < 1e-3, "{slope} {curvature}");
             }
         }
 

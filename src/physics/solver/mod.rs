@@ -8,10 +8,12 @@
 //! matrix with a right-hand side, a *patch* is a set of contact samples between two endpoints.
 
 mod assemble;
+mod cost;
 mod island;
 mod law;
 mod newton;
 mod problem;
+mod secant;
 
 pub use law::Scalar;
 pub use newton::{Failure, Solver, Stats};

@@ -1,12 +1,12 @@
 //! Newton's method with an exact line search on each island, and the lagged passes around it.
 
 use super::{
-    assemble::{Local, Map, gather, velocity},
+    assemble::{Local, Map},
     island::{Cache, Island, islands},
-    law::contact,
+    law::Answer,
     problem::Problem,
 };
-use crate::physics::sparse::dense;
+use crate::{geometry::Vec3, physics::sparse::dense};
 
 /// Convergence of the gradient relative to the momenta in play (both scaled by `diag(A)^-1/2`).
 const RELATIVE: f64 = 1e-6;
@@ -19,8 +19,10 @@ const MAX_PASSES: usize = 3;
 /// Change of the normal impulses that ends the passes.
 const PASS_CHANGE: f64 = 0.01;
 
-/// An old factor is kept while a step with it brings the scaled gradient down by this much.
-const KEEP_FACTOR: f64 = 0.3;
+/// A new factor costs about as much as this many steps with the old one.
+const STEPS_PER_FACTOR: f64 = 8.0;
+/// Steps after which an old factor, corrected by what they taught, is judged.
+const TRIAL_STEPS: u32 = 2;
 
 /// What a solve took.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -29,6 +31,8 @@ pub struct Stats {
     pub newton: u32,
     /// Most Newton steps of one island.
     pub newton_max: u32,
+    /// Hessians factored; the other steps used an old factor.
+    pub factored: u32,
 }
 
 /// The solve did not converge: which block, and how far it was.
@@ -43,28 +47,33 @@ pub struct Failure {
 /// Buffers of the solver.
 #[derive(Debug, Default)]
 pub struct Solver {
-    offsets: Vec<usize>,
-    v: Vec<f64>,
+    pub(super) offsets: Vec<usize>,
+    pub(super) v: Vec<f64>,
     trial: Vec<f64>,
     step: Vec<f64>,
     gradient: Vec<f64>,
     trial_gradient: Vec<f64>,
-    product: Vec<f64>,
+    pub(super) product: Vec<f64>,
     scale: Vec<f64>,
     cache: Cache,
-    local: Local,
-    map: Map,
+    pub(super) local: Local,
+    pub(super) map: Map,
+    /// Velocities and answers of one patch.
+    pub(super) solved: Vec<(Vec3, Option<Answer>)>,
+    factored: u32,
 }
 
 impl Solver {
     /// Solves the problem in place: velocities in the blocks, impulses in points and scalars.
     pub fn solve(&mut self, problem: &mut Problem) -> Result<Stats, Failure> {
         let mut stats = Stats::default();
+        self.factored = 0;
         for island in islands(problem) {
             let taken = self.solve_island(problem, &island)?;
             stats.newton += taken;
             stats.newton_max = stats.newton_max.max(taken);
         }
+        stats.factored = self.factored;
         Ok(stats)
     }
 
@@ -114,11 +123,13 @@ impl Solver {
     /// Newton's method for one pass; the number of steps taken.
     ///
     /// The cost is piecewise quadratic and mostly the same from step to step, so an old factor of its Hessian is used
-    /// for as long as it brings the gradient down well; the gradient itself is always exact.
+    /// for as long as that is cheaper than a new one; the gradient itself is always exact.
     fn newton(&mut self, problem: &Problem, island: &Island) -> Result<u32, Failure> {
         let mut cost = self.gradient_at_v(problem, island);
         let mut excess = self.excess(problem, island);
         let mut usable = self.cache.matches(problem, island);
+        // Steps with this factor, and the excess before them.
+        let mut since = (0, excess);
         for taken in 0..MAX_NEWTON as u32 {
             if excess <= 1.0 {
                 return Ok(taken);
@@ -126,6 +137,9 @@ impl Solver {
             let fresh = !usable;
             if fresh && !(excess.is_finite() && self.refactor(problem, island)) {
                 break;
+            }
+            if fresh {
+                since = (0, excess);
             }
             self.step.iter_mut().zip(&self.gradient).for_each(|(s, g)| *s = -g);
             self.cache.solve(island, &mut self.step);
@@ -142,9 +156,10 @@ impl Solver {
                 };
             };
             cost = lower;
-            let before = excess;
+            self.cache.learn((&self.trial, &self.trial_gradient), (&self.v, &self.gradient));
             excess = self.excess(problem, island);
-            usable = excess < KEEP_FACTOR * before;
+            since.0 += 1;
+            usable = since.0 < TRIAL_STEPS || steps_left(since, excess) < STEPS_PER_FACTOR;
         }
         Err(Failure { block: island.blocks[0], excess })
     }
@@ -153,7 +168,7 @@ impl Solver {
     fn gradient_at_v(&mut self, problem: &Problem, island: &Island) -> f64 {
         let v = std::mem::take(&mut self.v);
         let mut gradient = std::mem::take(&mut self.gradient);
-        let cost = self.evaluate(problem, island, &v, &mut gradient, None);
+        let cost = self.evaluate(problem, island, &v, &mut gradient);
         (self.v, self.gradient) = (v, gradient);
         cost
     }
@@ -162,12 +177,12 @@ impl Solver {
     fn refactor(&mut self, problem: &Problem, island: &Island) -> bool {
         let mut hessian = self.cache.take(island);
         let v = std::mem::take(&mut self.v);
-        let mut gradient = std::mem::take(&mut self.trial_gradient);
-        self.evaluate(problem, island, &v, &mut gradient, Some(&mut hessian));
-        (self.v, self.trial_gradient) = (v, gradient);
+        self.assemble_hessian(problem, island, &v, &mut hessian);
+        self.v = v;
         let n = island.size;
         let sound = dense::partial_cholesky(&mut hessian[..n * n], n, n);
         self.cache.give(hessian, sound);
+        self.factored += 1;
         sound
     }
 
@@ -225,123 +240,20 @@ impl Solver {
         self.trial.iter_mut().zip(&self.v).zip(&self.step).for_each(|((t, v), s)| *t = v + at * s);
         let trial = std::mem::take(&mut self.trial);
         let mut gradient = std::mem::take(&mut self.trial_gradient);
-        let value = self.evaluate(problem, island, &trial, &mut gradient, None);
+        let value = self.evaluate(problem, island, &trial, &mut gradient);
         let along = gradient.iter().zip(&self.step).map(|(g, s)| g * s).sum();
         (self.trial, self.trial_gradient) = (trial, gradient);
         (value, along)
     }
+}
 
-    /// Cost, gradient and, if asked, Hessian at `v`.
-    fn evaluate(
-        &mut self,
-        problem: &Problem,
-        island: &Island,
-        v: &[f64],
-        gradient: &mut [f64],
-        mut hessian: Option<&mut Vec<f64>>,
-    ) -> f64 {
-        let n = island.size;
-        let mut cost = self.momentum_terms(problem, island, v, gradient, hessian.as_deref_mut());
-        for &index in &island.patches {
-            let patch = &problem.patches[index];
-            let ua = gather(problem, &self.offsets, &patch.a, v);
-            let ub = gather(problem, &self.offsets, &patch.b, v);
-            self.local.start(&patch.a, &patch.b);
-            let mut touched = false;
-            for point in &problem.points[patch.first..patch.last] {
-                let relative = velocity(problem, &patch.a, &ua, &point.weights_a, &point.p)
-                    - velocity(problem, &patch.b, &ub, &point.weights_b, &point.p)
-                    - point.drift;
-                let answer = contact(point, problem.dt, problem.tau, &relative);
-                if answer.normal == 0.0 && point.lagged == 0.0 {
-                    continue;
-                }
-                touched = true;
-                cost += answer.cost;
-                self.local.add(problem, &patch.a, &patch.b, point, &answer, hessian.is_some());
-            }
-            if touched {
-                self.map.set(problem, &self.offsets, &patch.a, &patch.b);
-                self.local.scatter(
-                    &self.map,
-                    gradient,
-                    hessian.as_deref_mut().map(|h| (h.as_mut_slice(), n)),
-                );
-            }
-        }
-        for &row in &island.scalars {
-            let scalar = &problem.scalars[row];
-            let at = self.offsets[scalar.block] + scalar.index;
-            let (force, slope, value) = scalar.answer(problem.dt, v[at]);
-            cost += value;
-            gradient[at] -= problem.dt * force;
-            if let Some(h) = hessian.as_deref_mut() {
-                h[at * n + at] += slope;
-            }
-        }
-        cost
+/// Steps to convergence if they go on like the ones since then, which began at the excess `before`.
+fn steps_left((steps, before): (u32, f64), after: f64) -> f64 {
+    if after <= 1.0 {
+        return 0.0;
     }
-
-    /// `½ vᵀA v − rᵀv`, its gradient and `A` itself.
-    fn momentum_terms(
-        &mut self,
-        problem: &Problem,
-        island: &Island,
-        v: &[f64],
-        gradient: &mut [f64],
-        mut hessian: Option<&mut Vec<f64>>,
-    ) -> f64 {
-        let n = island.size;
-        if let Some(h) = hessian.as_deref_mut() {
-            h[..n * n].fill(0.0);
-        }
-        let mut cost = 0.0;
-        for &block in &island.blocks {
-            let (b, start) = (&problem.blocks[block], self.offsets[block]);
-            let range = start..start + b.dim;
-            let product = &mut self.product[range.clone()];
-            dense::symmetric_multiply(&b.matrix, b.dim, &v[range.clone()], product);
-            for ((g, p), (r, v)) in
-                gradient[range.clone()].iter_mut().zip(product.iter()).zip(b.rhs.iter().zip(&v[range]))
-            {
-                *g = p - r;
-                cost += v * (0.5 * p - r);
-            }
-            if let Some(h) = hessian.as_deref_mut() {
-                for column in 0..b.dim {
-                    let target = (start + column) * n + start + column;
-                    let source = &b.matrix[column * b.dim + column..(column + 1) * b.dim];
-                    h[target..target + source.len()].copy_from_slice(source);
-                }
-            }
-        }
-        cost
-    }
-
-    /// Writes impulses into the points; returns (change against the lagged ones, total) of the normal impulses.
-    fn record(&mut self, problem: &mut Problem, island: &Island) -> (f64, f64) {
-        let (mut change, mut total) = (0.0, 0.0);
-        for &index in &island.patches {
-            let patch = problem.patches[index];
-            let ua = gather(problem, &self.offsets, &patch.a, &self.v);
-            let ub = gather(problem, &self.offsets, &patch.b, &self.v);
-            for at in patch.first..patch.last {
-                let point = &problem.points[at];
-                let relative = velocity(problem, &patch.a, &ua, &point.weights_a, &point.p)
-                    - velocity(problem, &patch.b, &ub, &point.weights_b, &point.p)
-                    - point.drift;
-                let answer = contact(point, problem.dt, problem.tau, &relative);
-                change += (answer.normal - point.lagged).abs();
-                total += answer.normal;
-                let point = &mut problem.points[at];
-                point.normal_impulse = answer.normal;
-                point.shear_impulse = answer.impulse - point.normal * answer.normal;
-                point.slipping = answer.slipping;
-                point.velocity = relative;
-            }
-        }
-        (change, total)
-    }
+    let gained = (before / after).ln();
+    if gained > 0.0 { f64::from(steps) * after.ln() / gained } else { f64::INFINITY }
 }
 
 fn island_points(problem: &Problem, island: &Island) -> Vec<std::ops::Range<usize>> {

@@ -1,28 +1,35 @@
 //! Dense Cholesky on column-major storage: the kernels under the sparse factor and the contact solve.
 
-/// Columns factored between two updates of the rest.
-const PANEL: usize = 24;
+/// Columns factored between two updates of everything to their right.
+const PANEL: usize = 32;
+/// Columns factored between two updates of the rest of their panel.
+const STRIP: usize = 8;
 /// Rows and columns of the register tile of the update.
 const ROWS: usize = 8;
 const COLUMNS: usize = 4;
+/// Columns that the triangular sweeps and products take at once, so that the vector is read and written less often.
+const WIDE: usize = 4;
 
 /// Factors the first `k` columns of the lower triangle of the `n × n` matrix `a` in place and updates the rest:
 /// afterwards those columns hold `L`, the trailing block its Schur complement. `false` if a pivot is not positive.
 pub fn partial_cholesky(a: &mut [f64], n: usize, k: usize) -> bool {
-    let mut start = 0;
-    while start < k {
+    let mut packed = Vec::with_capacity(PANEL * n.next_multiple_of(ROWS));
+    for start in (0..k).step_by(PANEL) {
         let end = (start + PANEL).min(k);
-        if !factor_panel(a, n, start, end) {
-            return false;
+        for strip in (start..end).step_by(STRIP) {
+            let strip_end = (strip + STRIP).min(end);
+            if !factor_strip(a, n, strip, strip_end) {
+                return false;
+            }
+            update(a, n, (strip, strip_end), end, &mut packed);
         }
-        update_rest(a, n, start, end);
-        start = end;
+        update(a, n, (start, end), n, &mut packed);
     }
     true
 }
 
-/// Factors columns `start..end` over all rows below, left-looking within the panel.
-fn factor_panel(a: &mut [f64], n: usize, start: usize, end: usize) -> bool {
+/// Factors columns `start..end` over all rows below, left-looking.
+fn factor_strip(a: &mut [f64], n: usize, start: usize, end: usize) -> bool {
     for j in start..end {
         for p in start..j {
             let (left, right) = a.split_at_mut(j * n);
@@ -40,63 +47,76 @@ fn factor_panel(a: &mut [f64], n: usize, start: usize, end: usize) -> bool {
     true
 }
 
-/// Subtracts `L Lᵀ` of columns `start..end` from the lower triangle of columns `end..n`.
-fn update_rest(a: &mut [f64], n: usize, start: usize, end: usize) {
+/// Subtracts `L Lᵀ` of columns `start..end` from the lower triangle of columns `end..last`; may write above the diagonal,
+/// which nobody reads.
+fn update(a: &mut [f64], n: usize, (start, end): (usize, usize), last: usize, packed: &mut Vec<f64>) {
+    if end >= last {
+        return;
+    }
+    let depth = end - start;
     let (panel, rest) = a.split_at_mut(end * n);
-    let panel = &panel[start * n..];
-    let mut column = end;
-    while column < n {
-        let columns = COLUMNS.min(n - column);
-        let mut row = column;
-        while row < n {
+    pack(&panel[start * n..], n, end, packed);
+    for column in (end..last).step_by(COLUMNS) {
+        let columns = COLUMNS.min(last - column);
+        let (first, half) = ((column - end) / ROWS, (column - end) % ROWS);
+        let right = &packed[first * ROWS * depth..(first + 1) * ROWS * depth];
+        for (index, left) in packed.chunks_exact(ROWS * depth).enumerate().skip(first) {
+            let row = end + index * ROWS;
+            let sum = if half == 0 { tile::<0>(left, right) } else { tile::<COLUMNS>(left, right) };
             let rows = ROWS.min(n - row);
-            let target = &mut rest[(column - end) * n..];
-            if rows == ROWS && columns == COLUMNS {
-                tile(panel, target, n, row, column);
-            } else {
-                tile_edge(panel, target, n, (row, rows), (column, columns));
+            for (c, sum) in sum.iter().enumerate().take(columns) {
+                let at = (column - end + c) * n + row;
+                rest[at..at + rows].iter_mut().zip(sum).for_each(|(x, s)| *x -= s);
             }
-            row += rows;
         }
-        column += columns;
     }
 }
 
-/// Full register tile: `C[8×4] −= A[8×k] B[4×k]ᵀ`; may write above the diagonal, which nobody reads.
-fn tile(panel: &[f64], target: &mut [f64], n: usize, row: usize, column: usize) {
+/// Copies rows `from..n` of a panel into stripes of [`ROWS`] rows, column after column, filled up with zeros.
+fn pack(panel: &[f64], n: usize, from: usize, packed: &mut Vec<f64>) {
+    packed.clear();
+    for row in (from..n).step_by(ROWS) {
+        let rows = ROWS.min(n - row);
+        for column in panel.chunks_exact(n) {
+            packed.extend_from_slice(&column[row..row + rows]);
+            packed.extend_from_slice(&[0.0; ROWS][rows..]);
+        }
+    }
+}
+
+/// `A[8×k] B[4×k]ᵀ` in registers, where `B` is the rows from `HALF` on of the stripe `right`.
+fn tile<const HALF: usize>(left: &[f64], right: &[f64]) -> [[f64; ROWS]; COLUMNS] {
     let mut sum = [[0.0; ROWS]; COLUMNS];
-    for p in panel.chunks_exact(n) {
-        let a: &[f64; ROWS] = p[row..row + ROWS].try_into().expect("tile height");
-        let b: &[f64; COLUMNS] = p[column..column + COLUMNS].try_into().expect("tile width");
-        for (sum, b) in sum.iter_mut().zip(b) {
+    for (a, b) in left.as_chunks::<ROWS>().0.iter().zip(right.as_chunks::<ROWS>().0) {
+        for (c, sum) in sum.iter_mut().enumerate() {
             for (s, a) in sum.iter_mut().zip(a) {
-                *s += a * b;
+                *s += a * b[HALF + c];
             }
         }
     }
-    for (c, sum) in sum.iter().enumerate() {
-        target[c * n + row..c * n + row + ROWS].iter_mut().zip(sum).for_each(|(x, s)| *x -= s);
-    }
+    sum
 }
 
-fn tile_edge(
-    panel: &[f64],
-    target: &mut [f64],
-    n: usize,
-    (row, rows): (usize, usize),
-    (column, columns): (usize, usize),
-) {
-    for c in 0..columns {
-        for r in 0..rows {
-            let dot: f64 = panel.chunks_exact(n).map(|p| p[row + r] * p[column + c]).sum();
-            target[c * n + row + r] -= dot;
-        }
-    }
+/// [`WIDE`] neighbouring columns of a matrix from row `from` to its end.
+fn wide(a: &[f64], n: usize, column: usize, from: usize) -> [&[f64]; WIDE] {
+    std::array::from_fn(|c| &a[(column + c) * n + from..(column + c + 1) * n])
 }
 
 /// Solves `L y = b` in place for the first `k` columns of `l` (`n` rows), then subtracts their part from `b[k..n]`.
 pub fn forward(l: &[f64], n: usize, k: usize, b: &mut [f64]) {
-    for j in 0..k {
+    let mut j = 0;
+    while j + WIDE <= k {
+        for c in j..j + WIDE {
+            b[c] /= l[c * n + c];
+            (c + 1..j + WIDE).for_each(|r| b[r] -= b[c] * l[c * n + r]);
+        }
+        let [l0, l1, l2, l3] = wide(l, n, j, j + WIDE);
+        let (y0, y1, y2, y3) = (b[j], b[j + 1], b[j + 2], b[j + 3]);
+        let tail = b[j + WIDE..n].iter_mut().zip(l0).zip(l1).zip(l2).zip(l3);
+        tail.for_each(|((((b, l0), l1), l2), l3)| *b -= (y0 * l0 + y1 * l1) + (y2 * l2 + y3 * l3));
+        j += WIDE;
+    }
+    for j in j..k {
         let column = &l[j * n..j * n + n];
         let (head, tail) = b.split_at_mut(j + 1);
         let y = head[j] / column[j];
@@ -107,34 +127,82 @@ pub fn forward(l: &[f64], n: usize, k: usize, b: &mut [f64]) {
 
 /// Solves `Lᵀ x = y` in place for the first `k` columns of `l`, given `x[k..n]`.
 pub fn backward(l: &[f64], n: usize, k: usize, x: &mut [f64]) {
-    for j in (0..k).rev() {
-        let column = &l[j * n..j * n + n];
-        let dot = strided_dot(&column[j + 1..], &x[j + 1..n]);
-        x[j] = (x[j] - dot) / column[j];
+    let whole = k - k % WIDE;
+    for j in (whole..k).rev() {
+        x[j] = (x[j] - dot(&l[j * n + j + 1..(j + 1) * n], &x[j + 1..n])) / l[j * n + j];
+    }
+    for j in (0..whole).step_by(WIDE).rev() {
+        let dot = dots(wide(l, n, j, j + WIDE), &x[j + WIDE..n]);
+        for c in (0..WIDE).rev() {
+            let column = &l[(j + c) * n + j..(j + c) * n + j + WIDE];
+            let mut rest = x[j + c] - dot[c];
+            for r in c + 1..WIDE {
+                rest -= column[r] * x[j + r];
+            }
+            x[j + c] = rest / column[c];
+        }
     }
 }
 
-/// Dot product in four fixed lanes (one order on every machine, and fast).
-pub fn strided_dot(a: &[f64], b: &[f64]) -> f64 {
+/// Dot product in four fixed lanes: one order on every machine, and fast.
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
     let mut lanes = [0.0; 4];
-    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
-    let tail: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(a, b)| a * b).sum();
-    for (a, b) in a4.zip(b4) {
+    for (a, b) in a.iter().zip(b) {
+        (0..4).for_each(|i| lanes[i] += a[i] * b[i]);
+    }
+    let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
+    (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]) + rest
+}
+
+/// Dot products of [`WIDE`] columns with `x`, all at once.
+fn dots([a, b, c, d]: [&[f64]; WIDE], x: &[f64]) -> [f64; WIDE] {
+    let mut lanes = [[0.0; 4]; WIDE];
+    let whole = x.len() - x.len() % 4;
+    let chunks = |values| <[f64]>::as_chunks::<4>(values).0;
+    for ((((x, a), b), c), d) in chunks(x).iter().zip(chunks(a)).zip(chunks(b)).zip(chunks(c)).zip(chunks(d))
+    {
         for i in 0..4 {
-            lanes[i] += a[i] * b[i];
+            lanes[0][i] += a[i] * x[i];
+            lanes[1][i] += b[i] * x[i];
+            lanes[2][i] += c[i] * x[i];
+            lanes[3][i] += d[i] * x[i];
         }
     }
-    (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]) + tail
+    let mut sums = lanes.map(|l| (l[0] + l[1]) + (l[2] + l[3]));
+    for i in whole..x.len() {
+        for (sum, column) in sums.iter_mut().zip([a, b, c, d]) {
+            *sum += column[i] * x[i];
+        }
+    }
+    sums
 }
 
 /// `y = A x` for a symmetric matrix of which only the lower triangle is stored.
 pub fn symmetric_multiply(a: &[f64], n: usize, x: &[f64], y: &mut [f64]) {
     y[..n].fill(0.0);
-    for j in 0..n {
-        let column = &a[j * n + j + 1..j * n + n];
-        let xj = x[j];
-        y[j + 1..n].iter_mut().zip(column).for_each(|(y, a)| *y += a * xj);
-        y[j] += a[j * n + j] * xj + strided_dot(column, &x[j + 1..n]);
+    let whole = n - n % WIDE;
+    for j in (0..whole).step_by(WIDE) {
+        let columns = wide(a, n, j, j + WIDE);
+        let dot = dots(columns, &x[j + WIDE..n]);
+        for c in j..j + WIDE {
+            y[c] += dot[c - j] + a[c * n + c] * x[c];
+            for r in c + 1..j + WIDE {
+                y[c] += a[c * n + r] * x[r];
+                y[r] += a[c * n + r] * x[c];
+            }
+        }
+        let (x0, x1, x2, x3) = (x[j], x[j + 1], x[j + 2], x[j + 3]);
+        let [a0, a1, a2, a3] = columns;
+        let tail = y[j + WIDE..n].iter_mut().zip(a0).zip(a1).zip(a2).zip(a3);
+        tail.for_each(|((((y, a0), a1), a2), a3)| *y += (a0 * x0 + a1 * x1) + (a2 * x2 + a3 * x3));
+    }
+    for j in whole..n {
+        y[j] += a[j * n + j] * x[j];
+        for r in j + 1..n {
+            y[j] += a[j * n + r] * x[r];
+            y[r] += a[j * n + r] * x[j];
+        }
     }
 }
 
@@ -173,6 +241,22 @@ mod tests {
             }
             backward(&l, n, k, &mut b);
             assert!(b.iter().zip(&x).all(|(a, b)| (a - b).abs() < 1e-10), "{n} {k}");
+        }
+    }
+
+    #[test]
+    fn the_product_reads_the_lower_triangle_only() {
+        for n in [1, 3, 4, 10, 41] {
+            let a = spd(n);
+            let mut lower = a.clone();
+            (0..n * n).filter(|at| at % n < at / n).for_each(|at| lower[at] = f64::NAN);
+            let x: Vec<f64> = (0..n).map(|i| (i as f64 * 0.7).sin()).collect();
+            let mut y = vec![f64::NAN; n];
+            symmetric_multiply(&lower, n, &x, &mut y);
+            for (r, y) in y.iter().enumerate() {
+                let plain: f64 = (0..n).map(|c| a[c * n + r] * x[c]).sum();
+                assert!((y - plain).abs() < 1e-11, "{n} {r}");
+            }
         }
     }
 

@@ -132,9 +132,9 @@ impl World {
             );
             let dim = 3 * soft.system.kept().len();
             let identity = (index as u64) << 40 | soft.system.kept_version();
-            let mut block =
-                Block { dim, matrix: vec![0.0; dim * dim], rhs: vec![0.0; dim], v: vec![0.0; dim], identity };
-            soft.system.reduce(&body.frame, momentum, &mut block.matrix, &mut block.rhs);
+            let matrix = soft.system.lend_matrix();
+            let mut block = Block { dim, matrix, rhs: vec![0.0; dim], v: vec![0.0; dim], identity };
+            soft.system.reduce(momentum, &mut block.rhs);
             for (i, &node) in soft.system.kept().iter().enumerate() {
                 block.v[3 * i..3 * i + 3].copy_from_slice(body.v[node as usize].as_slice());
             }

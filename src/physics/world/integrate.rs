@@ -1,6 +1,6 @@
 //! From the solution back to the state.
 
-use super::{StepFailure, World};
+use super::{StepFailure, World, sliding::Sliding};
 use crate::{
     geometry::Vec3,
     physics::{contact::Slot, joints, rigid},
@@ -13,7 +13,9 @@ impl World {
         for (soft, block) in self.soft.iter_mut().zip(&self.layout.soft) {
             let Some(block) = block else { continue };
             let body = &mut soft.body;
-            soft.system.complete(&body.frame, &self.problem.blocks[*block].v, &mut body.v);
+            let block = &mut self.problem.blocks[*block];
+            soft.system.complete(&block.v, &mut body.v);
+            soft.system.give_back(std::mem::take(&mut block.matrix));
             body.x.iter_mut().zip(&body.v).for_each(|(x, v)| *x += v * dt);
             body.update_elastic();
             soft.min_det_f = body.min_det_f();
@@ -49,7 +51,9 @@ impl World {
     pub(super) fn remember(&mut self) {
         let dt = self.params.dt;
         self.soft.iter_mut().filter(|s| !s.asleep).for_each(|s| s.touches.clear());
-        for (row, point) in self.rows.iter().zip(&self.problem.points) {
+        let points = self.rows.iter().zip(&self.problem.points);
+        let sliding = Sliding::of(points.clone().map(|(row, point)| (row.pair(), point)));
+        for (row, point) in points {
             if point.normal_impulse <= 0.0 {
                 continue;
             }
@@ -60,7 +64,7 @@ impl World {
                 step: soft.steps,
                 anchor: row.anchor,
                 impulse: point.normal_impulse,
-                slipping: point.slipping,
+                slipping: sliding.slides(row.pair()),
                 travel: row.travel,
             };
             if point.slipping {

@@ -7,6 +7,7 @@ mod frame;
 mod integrate;
 mod rigid_rows;
 mod sleep;
+mod sliding;
 mod soft_rows;
 
 use std::sync::Arc;
@@ -237,6 +238,11 @@ impl World {
 }
 
 impl Soft {
+    /// How many nodes the contact solve keeps at present.
+    pub fn kept(&self) -> usize {
+        self.system.kept().len()
+    }
+
     /// How often the body's system was factored.
     pub fn refills(&self) -> u64 {
         self.system.refills

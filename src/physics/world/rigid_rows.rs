@@ -5,7 +5,7 @@
 //! moved: the stretch, which grows with the relative velocity and turns with the second body. At rest it holds as an
 //! anchor does, and rolling does not stretch it.
 
-use super::World;
+use super::{World, sliding::Sliding};
 use crate::{
     geometry::{
         Vec3,
@@ -164,7 +164,9 @@ impl World {
         let mut contacts = std::mem::take(&mut self.rigid_contacts);
         contacts.grips.retain(|grip| self.is_known(grip.key.0) && self.is_known(grip.key.1));
         let dt = self.params.dt;
-        for (key, point) in contacts.rows.iter().zip(&self.problem.points[self.rows.len()..]) {
+        let points = contacts.rows.iter().zip(&self.problem.points[self.rows.len()..]);
+        let sliding = Sliding::of(points.clone().map(|(key, point)| ((key.0, key.1), point)));
+        for (key, point) in points {
             if point.normal_impulse <= 0.0 {
                 continue;
             }
@@ -178,7 +180,7 @@ impl World {
                 key: *key,
                 stretch: self.moving[key.1].pose.rotation.inverse_transform_vector(&stretch),
                 impulse: point.normal_impulse,
-                slipping: point.slipping,
+                slipping: sliding.slides((key.0, key.1)),
             });
         }
         contacts.grips.sort_unstable_by_key(|grip| grip.key);

@@ -4,7 +4,7 @@ use super::{RowOf, World, assemble::REACH};
 use crate::{
     geometry::Vec3,
     physics::{
-        contact::{Candidate, Partner, Pressing, Slot, SoftField, detect_soft},
+        contact::{Candidate, Partner, Pressing, Slot, SoftField, detect_soft, may_touch},
         solver::{Endpoint, Patch, Point},
     },
 };
@@ -26,14 +26,16 @@ impl World {
         for on in 0..self.soft.len() {
             let target = &self.soft[on];
             let Some(surface) = &target.surface else { continue };
-            let field = SoftField::new(&target.body, &**surface);
+            let mut field = None;
             for (of, soft) in self.soft.iter().enumerate() {
-                if of == on || (soft.asleep && target.asleep) {
+                let still = soft.asleep && target.asleep;
+                if of == on || still || !may_touch(&soft.body, &target.body, limits) {
                     continue;
                 }
+                let field = field.get_or_insert_with(|| SoftField::new(&target.body, &**surface));
                 found.clear();
                 let nodes_on = &target.body.rest.mesh.elements;
-                detect_soft(&soft.body, &field, limits, &mut found, &mut |group, element| {
+                detect_soft(&soft.body, field, limits, &mut found, &mut |group, element| {
                     let group = &soft.body.rest.groups[group];
                     marked.extend(group.nodes[..group.count].iter().map(|&node| (of, node)));
                     marked.extend(nodes_on[element as usize].iter().map(|&node| (on, node)));

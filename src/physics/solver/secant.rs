@@ -1,0 +1,88 @@
+//! What the last steps say about the difference between a kept factor and the present Hessian.
+//!
+//! Contacts that have begun to slip since the factor was made change the Hessian by a matrix of low rank, which a few
+//! secant pairs capture: limited-memory BFGS (Nocedal 1980) with the factor in the place of the initial matrix.
+
+use crate::physics::sparse::dense::dot;
+
+/// Pairs remembered.
+const PAIRS: usize = 8;
+
+/// A step and the change of the gradient along it.
+#[derive(Clone, Debug)]
+struct Pair {
+    step: Vec<f64>,
+    change: Vec<f64>,
+    curvature: f64,
+}
+
+/// The last pairs, oldest first.
+#[derive(Clone, Debug, Default)]
+pub struct Secant {
+    pairs: Vec<Pair>,
+    used: usize,
+}
+
+impl Secant {
+    /// Forgets all pairs: the factor is new.
+    pub fn clear(&mut self) {
+        self.used = 0;
+    }
+
+    /// Learns from a step from (`v0`, `g0`) to (`v`, `g`).
+    pub fn learn(&mut self, (v0, g0): (&[f64], &[f64]), (v, g): (&[f64], &[f64])) {
+        if self.used == PAIRS {
+            self.pairs.rotate_left(1);
+            self.used -= 1;
+        }
+        if self.used == self.pairs.len() {
+            self.pairs.push(Pair { step: Vec::new(), change: Vec::new(), curvature: 0.0 });
+        }
+        let pair = &mut self.pairs[self.used];
+        pair.step.clear();
+        pair.step.extend(v.iter().zip(v0).map(|(v, v0)| v - v0));
+        pair.change.clear();
+        pair.change.extend(g.iter().zip(g0).map(|(g, g0)| g - g0));
+        pair.curvature = dot(&pair.step, &pair.change);
+        // The cost is convex: anything else is rounding.
+        let floor = 1e-12 * (dot(&pair.step, &pair.step) * dot(&pair.change, &pair.change)).sqrt();
+        if pair.curvature > floor {
+            self.used += 1;
+        }
+    }
+
+    /// Solves with the corrected factor in place; `solve` does so with the factor itself.
+    pub fn solve(&self, b: &mut [f64], solve: impl FnOnce(&mut [f64])) {
+        let mut weights = [0.0; PAIRS];
+        for (pair, weight) in self.pairs[..self.used].iter().zip(&mut weights).rev() {
+            *weight = dot(&pair.step, b) / pair.curvature;
+            b.iter_mut().zip(&pair.change).for_each(|(b, y)| *b -= *weight * y);
+        }
+        solve(b);
+        for (pair, weight) in self.pairs[..self.used].iter().zip(&weights) {
+            let missing = weight - dot(&pair.change, b) / pair.curvature;
+            b.iter_mut().zip(&pair.step).for_each(|(b, s)| *b += missing * s);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn with_exact_pairs_of_every_changed_direction_the_solve_is_exact() {
+        // The Hessian is diagonal, the factor is the identity: as many pairs as entries that differ.
+        let hessian = [1.0, 5.0, 0.25, 1.0, 3.0];
+        let mut secant = Secant::default();
+        for i in [1, 2, 4] {
+            let v: [f64; 5] = std::array::from_fn(|j| if i == j { 0.7 } else { 0.0 });
+            let g: [f64; 5] = std::array::from_fn(|j| hessian[j] * v[j]);
+            secant.learn((&[0.0; 5], &[0.0; 5]), (&v, &g));
+        }
+        let mut b = [1.0, 2.0, 3.0, 4.0, 5.0];
+        let exact: [f64; 5] = std::array::from_fn(|i| b[i] / hessian[i]);
+        secant.solve(&mut b, |_| ());
+        assert!(b.iter().zip(exact).all(|(b, e)| (b - e).abs() < 1e-14), "{b:?}");
+    }
+}
