@@ -1,15 +1,22 @@
 -- Changes of a scene that a suite may declare: factors on the material of every object that has it.
 
-local function factor(name, key)
+local function factor(name, keys, min, max)
   return softvt.shift {
-    name = name, unit = "1", default = 1, min = 0.01, max = 100,
+    name = name, unit = "1", default = 1, min = min, max = max,
     apply = function(scene, value)
       for _, object in ipairs(scene.objects) do
-        if object[key] then object[key] = object[key] * value end
+        for _, key in ipairs(keys) do
+          if object[key] then object[key] = object[key] * value end
+        end
       end
       return scene
     end,
   }
 end
 
-return { stiffness = factor("stiffness", "youngs_pa"), mass = factor("mass", "density") }
+return {
+  stiffness = factor("stiffness", { "youngs_pa" }, 0.01, 100),
+  mass = factor("mass", { "density" }, 0.01, 100),
+  -- Of two surfaces the larger coefficient counts: that of the pads is a setting, robot.pads.
+  friction = factor("friction", { "static_mu", "dynamic_mu" }, 0, 10),
+}

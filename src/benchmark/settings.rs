@@ -22,6 +22,23 @@ impl Settings {
     /// # Errors
     /// There is no such field, or the value is not of its type or range; a fragment for people.
     pub fn with(&self, path: &str, value: &str) -> Result<Self, String> {
+        self.with_all(&[(path.to_owned(), value.to_owned())])
+    }
+
+    /// The same with several fields set; ranges that depend on each other are checked once all of them are.
+    ///
+    /// # Errors
+    /// As [`Settings::with`].
+    pub fn with_all(&self, fields: &[(String, String)]) -> Result<Self, String> {
+        let mut changed = self.clone();
+        for (path, value) in fields {
+            changed = changed.replaced(path, value)?;
+        }
+        changed.check()?;
+        Ok(changed)
+    }
+
+    fn replaced(&self, path: &str, value: &str) -> Result<Self, String> {
         let mut tree = serde_json::to_value(self).map_err(|e| e.to_string())?;
         let mut at = &mut tree;
         for key in path.split('.') {
@@ -35,9 +52,7 @@ impl Settings {
         }
         *at = serde_json::from_str(value)
             .map_err(|_| format!("{path}: expected a number, true or false, got {value:?}"))?;
-        let changed: Self = serde_json::from_value(tree).map_err(|e| format!("{path}: {e}"))?;
-        changed.check()?;
-        Ok(changed)
+        serde_json::from_value(tree).map_err(|e| format!("{path}: {e}"))
     }
 
     /// Checks every number.
@@ -63,6 +78,10 @@ mod tests {
         assert!(settings.with("robot.gripper.efort", "0.2").is_err_and(|e| e.contains("effort")));
         assert!(settings.with("robot.gripper", "1").is_err_and(|e| e.contains("group")));
         assert!(settings.with("physics.dt", "-1").is_err_and(|e| e.contains("physics.dt")));
+        let pads =
+            |mu: &str| ["static_mu", "dynamic_mu"].map(|key| (format!("robot.pads.{key}"), mu.to_owned()));
+        assert!(settings.with("robot.pads.static_mu", "0").is_err(), "the dynamic one would be above it");
+        assert_eq!(settings.with_all(&pads("0")).expect("both at once").robot.pads.dynamic_mu, 0.0);
         assert!(settings.with("physics.dt", "fast").is_err_and(|e| e.contains("number")));
     }
 }

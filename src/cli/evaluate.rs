@@ -130,12 +130,8 @@ pub fn single(run: &Run, task: usize) -> Result<EpisodeRecord, Failure> {
 }
 
 fn evaluate(run: &Run, loaded: &Loaded, suite: &Suite, out: PathBuf) -> Result<Summary, Failure> {
-    let mut settings = suite.settings.clone();
-    for (path, value) in &run.set {
-        settings = settings
-            .with(path, value)
-            .map_err(|e| Failure::input(format!("{}: --set: {e}", run.file.display())))?;
-    }
+    let settings = suite.settings.with_all(&run.set);
+    let settings = settings.map_err(|e| Failure::input(format!("{}: --set: {e}", run.file.display())))?;
     for (name, value) in &run.shifts {
         script::check_shift(&suite.shifts, name, *value)
             .map_err(|e| Failure::input(format!("{}: --shift: {e}", run.file.display())))?;

@@ -1,0 +1,77 @@
+//! Scenes and experts that cannot be run: found while running, told with the file.
+
+use insta::assert_snapshot;
+
+use crate::support::Small;
+
+fn expert(expert: &'static str) -> String {
+    Small { expert, task: "budget_steps = 200", ..Small::default() }.project().refusal("x.lua --out run")
+}
+
+#[test]
+fn an_empty_shape_is_named_with_its_asset() {
+    let shape = "softvt.shape.sphere { radius = 0.02 }:subtract(softvt.shape.sphere { radius = 0.03 })";
+    let project = Small { shape, ..Small::default() }.project();
+    assert_snapshot!(project.refusal("x.lua --out run"), @"x.lua: asset cube: the shape is empty: no point of it lies inside; check what is subtracted or intersected");
+}
+
+#[test]
+fn an_object_that_never_settles_is_named() {
+    let project = Small { at: "xyz = { 0, 0.8, 0.1 }", ..Small::default() }.project();
+    let message = project.refusal("x.lua --out run");
+    assert!(message.starts_with("x.lua: layout one, episode 0: object cube still moves at 29"), "{message}");
+    assert!(
+        message.ends_with(
+            "mm/s after 3 s of settling; put it nearer to what it rests on, or make it lie stably"
+        ),
+        "{message}"
+    );
+}
+
+#[test]
+fn a_run_whose_first_episode_cannot_be_made_leaves_nothing_in_the_way() {
+    let project = Small { at: "xyz = { 0, 0.8, 0.1 }", ..Small::default() }.project();
+    project.refusal("x.lua --out run");
+    assert!(!project.path("run").exists());
+    project.write("x.lua", Small::default().text().as_bytes());
+    project.succeeds("x.lua --out run");
+}
+
+#[test]
+fn an_expert_that_commands_a_pose_out_of_reach_is_told_where_and_by_how_much() {
+    let message = expert("\n  arm:move_to(softvt.pose { xyz = { 2, 0, 0.3 } }, { speed = 1 })");
+    let (place, rest) = message.split_once("no nearer to (").expect("a pose");
+    assert_eq!(place, "x.lua: task 0, episode 0: x.lua:13: unreachable pose: the tool gets ");
+    // The straight way to x = 2 m: the hand was sent farther than the arm's 0.855 m from the shoulder.
+    let (x, rest) = rest.split_once(',').expect("coordinates");
+    let x: f64 = x.parse().expect("a number");
+    let (_, miss) = rest.split_once("than ").expect("a distance");
+    let (miss, _) = miss.split_once(" mm").expect("a unit");
+    let miss: f64 = miss.parse().expect("a number");
+    assert!(x > 0.2 && miss > 20.0 && miss < 1e3 * (x + 0.2), "{message}");
+}
+
+#[test]
+fn a_pose_out_of_reach_is_noticed_after_the_expert_is_done_and_inside_of_pcall() {
+    let sent = expert("arm:command(softvt.pose { xyz = { 2, 0, 0.3 } }, 0)");
+    assert!(sent.starts_with(
+        "x.lua: task 0, episode 0: x.lua: unreachable pose: the tool gets no nearer to (2.000,"
+    ));
+    let caught = expert("pcall(arm.move_to, arm, softvt.pose { xyz = { 2, 0, 0.3 } }) arm:wait(5)");
+    assert!(caught.contains("unreachable pose"), "{caught}");
+}
+
+#[test]
+fn poses_within_reach_are_not_complained_about_however_fast() {
+    let way = "for _, y in ipairs { -0.3, 0.3, -0.3 } do\n\
+               arm:move_to(softvt.pose { xyz = { 0.05, y, 0.2 }, yaw = y }, { speed = 3, turn = 6 })\nend";
+    let project = Small { expert: way, task: "budget_steps = 120", ..Small::default() }.project();
+    project.succeeds("x.lua --out run");
+}
+
+#[test]
+fn an_experts_mistakes_have_their_line() {
+    assert_snapshot!(expert("\n  arm:move_too()"), @r#"x.lua: task 0, episode 0: x.lua:13: arm: there is no "move_too""#);
+    assert_snapshot!(expert("\n  arm:close_to(2)"), @"x.lua: task 0, episode 0: x.lua:13: arm:close_to: closure: expected a number in 0..1, got 2");
+    assert_snapshot!(expert("\n\n  scene:object 'cub'"), @r#"x.lua: task 0, episode 0: x.lua:14: scene: unknown object "cub"; did you mean "cube"?"#);
+}

@@ -1,0 +1,30 @@
+//! Scripts that never end. They are run at once: each waits for the same time limit.
+
+use crate::support::{Project, refusal, said};
+
+const LOOP: &str = "x.lua: the script ran for more than 10 s; look for an endless loop";
+const STUCK: &str = "x.lua: the script called a library function that did not return within 10 s; look for a hostile \
+                     string pattern or a huge repeat count";
+
+const CASES: [(&str, &str, &str); 4] = [
+    ("a loop", "while true do end", LOOP),
+    ("a loop inside of pcall", "while true do pcall(function() while true do end end) end", LOOP),
+    (
+        "a coroutine",
+        "local co = coroutine.wrap(function() while true do coroutine.yield() end end)\nwhile true do co() end",
+        LOOP,
+    ),
+    ("a pattern", "return (('a'):rep(100000)):find(('.-'):rep(20) .. 'b')", STUCK),
+];
+
+#[test]
+fn scripts_that_never_end_are_stopped_with_a_message() {
+    std::thread::scope(|scope| {
+        for (what, text, expected) in CASES {
+            scope.spawn(move || {
+                let project = Project::new(&[("x.lua", text)]);
+                assert_eq!(refusal(said(project.command("x.lua")), what), expected, "{what}");
+            });
+        }
+    });
+}

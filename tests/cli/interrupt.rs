@@ -1,0 +1,57 @@
+//! Ctrl-C in the middle of a run.
+#![cfg(unix)]
+
+use std::{
+    process::{Command, Stdio},
+    thread::sleep,
+    time::{Duration, Instant},
+};
+
+use assert_cmd::cargo::cargo_bin;
+
+use crate::support::{Project, Small};
+
+#[test]
+fn finished_episodes_survive_an_interrupt() {
+    let project = Small { task: "budget_steps = 100", ..Default::default() }.project();
+    let mut child = Command::new(cargo_bin!("softvt"))
+        .current_dir(project.path(""))
+        .args(["x.lua", "--policy", "random", "--threads", "2", "--episodes", "100000", "--out", "run"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("started");
+    await_lines(&project, 3);
+    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill runs");
+    assert!(killed.success());
+    let start = Instant::now();
+    while child.try_wait().expect("a child").is_none() {
+        if start.elapsed() > Duration::from_secs(60) {
+            child.kill().expect("ended");
+            panic!("the run goes on after an interrupt");
+        }
+        sleep(Duration::from_millis(20));
+    }
+    let output = child.wait_with_output().expect("output");
+    let err = String::from_utf8(output.stderr).expect("text");
+    assert_eq!(output.status.code(), Some(130), "{err}");
+    assert!(output.stdout.is_empty(), "no table of a run that was cut off");
+    let episodes = project.lines("run/episodes.jsonl");
+    let indices: Vec<_> = episodes.iter().map(|e| e["episode"].as_u64().expect("an index")).collect();
+    assert!(indices.len() >= 3 && indices.len() < 100_000);
+    assert!(indices.is_sorted());
+    let kept = format!("interrupted; {} of 100000 episodes are in run", episodes.len());
+    assert!(err.trim_end().ends_with(&kept), "{err}");
+    assert!(!err.contains("panicked"), "{err}");
+    assert!(project.json("run/run.json").is_object());
+    assert!(!project.path("run/summary.json").exists());
+}
+
+fn await_lines(project: &Project, count: usize) {
+    let start = Instant::now();
+    let path = project.path("run/episodes.jsonl");
+    while std::fs::read_to_string(&path).unwrap_or_default().lines().count() < count {
+        assert!(start.elapsed() < Duration::from_secs(60), "no episode in a minute");
+        sleep(Duration::from_millis(20));
+    }
+}

@@ -1,0 +1,13 @@
+//! The binary as people use it: what it says of bad input, what it writes, that results repeat, and that the benchmark
+//! measures what it says.
+
+mod bad_runs;
+mod bad_scripts;
+mod determinism;
+mod endless;
+mod files;
+mod interrupt;
+mod measures;
+mod spread;
+mod support;
+mod usage;

@@ -1,0 +1,137 @@
+//! A project folder, small scripts in it, and the binary run there.
+
+use std::{fs, path::PathBuf, time::Duration};
+
+use assert_cmd::{Command, cargo::cargo_bin_cmd};
+use serde_json::Value;
+
+/// What a run said.
+pub struct Said {
+    pub code: i32,
+    pub out: String,
+    pub err: String,
+}
+
+/// A folder that goes away with the test.
+pub struct Project(tempfile::TempDir);
+
+impl Project {
+    pub fn new(files: &[(&str, &str)]) -> Self {
+        let project = Self(tempfile::tempdir().expect("a folder"));
+        files.iter().for_each(|(path, text)| project.write(path, text.as_bytes()));
+        project
+    }
+
+    pub fn write(&self, path: &str, bytes: &[u8]) {
+        let path = self.path(path);
+        fs::create_dir_all(path.parent().expect("a folder above")).expect("made");
+        fs::write(path, bytes).expect("written");
+    }
+
+    pub fn path(&self, path: &str) -> PathBuf {
+        self.0.path().join(path)
+    }
+
+    pub fn text(&self, path: &str) -> String {
+        fs::read_to_string(self.path(path)).unwrap_or_else(|e| panic!("{path}: {e}"))
+    }
+
+    pub fn json(&self, path: &str) -> Value {
+        serde_json::from_str(&self.text(path)).unwrap_or_else(|e| panic!("{path}: {e}"))
+    }
+
+    /// Every line must be whole.
+    pub fn lines(&self, path: &str) -> Vec<Value> {
+        let text = self.text(path);
+        assert!(text.is_empty() || text.ends_with('\n'), "{path} ends in a torn line");
+        text.lines().map(|line| serde_json::from_str(line).expect("a line of JSON")).collect()
+    }
+
+    pub fn softvt(&self, words: &str) -> Said {
+        said(self.command(words))
+    }
+
+    pub fn command(&self, words: &str) -> Command {
+        let mut command: Command = cargo_bin_cmd!("softvt");
+        command.current_dir(self.0.path()).args(words.split_whitespace()).timeout(Duration::from_secs(110));
+        command
+    }
+
+    /// Runs what must succeed.
+    pub fn succeeds(&self, words: &str) -> Said {
+        let said = self.softvt(words);
+        assert_eq!(said.code, 0, "softvt {words}\n{}", said.err);
+        said
+    }
+
+    /// The message of bad input, without the program's name; nothing may be on the standard output.
+    pub fn refusal(&self, words: &str) -> String {
+        refusal(self.softvt(words), words)
+    }
+}
+
+pub fn said(mut command: Command) -> Said {
+    let output = command.output().expect("started");
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("text");
+    Said { code: output.status.code().unwrap_or(-1), out: text(output.stdout), err: text(output.stderr) }
+}
+
+/// Of a run that must fail for its input: what comes after the last `softvt: `.
+pub fn refusal(said: Said, words: &str) -> String {
+    let Said { code, out, err } = said;
+    assert_eq!((code, out.as_str()), (2, ""), "softvt {words}\n{err}");
+    assert!(!err.contains("panicked") && !err.contains("internal error"), "{err}");
+    let (_, message) = err.rsplit_once("softvt: ").unwrap_or_else(|| panic!("no message: {err:?}"));
+    message.trim_end().to_owned()
+}
+
+/// A suite of one soft cube on a floor: its parts can be replaced by others.
+pub struct Small {
+    pub shape: &'static str,
+    pub material: &'static str,
+    pub at: &'static str,
+    pub task: &'static str,
+    pub expert: &'static str,
+}
+
+impl Default for Small {
+    fn default() -> Self {
+        Self {
+            shape: "softvt.shape.box { size = { 0.04, 0.04, 0.04 } }:grounded()",
+            material: "youngs_pa = 2e4, poisson = 0.3, density = 300",
+            at: "at = { 0, 0.1 }",
+            task: "budget_steps = 40",
+            expert: "arm:wait(1)",
+        }
+    }
+}
+
+impl Small {
+    /// Line 2 is the shape, 3 the material, 6 the place, 11 the task, 12 the expert.
+    pub fn text(&self) -> String {
+        let Self { shape, material, at, task, expert } = self;
+        format!(
+            r#"local floor = softvt.asset {{ name = "floor", shape = softvt.shape.box {{ size = {{ 1, 1, 0.05 }} }}:translate(0, 0, -0.025), body = softvt.static {{}} }}
+local shape = {shape}
+local cube = softvt.asset {{ name = "cube", shape = shape, body = softvt.soft {{ {material} }} }}
+local layout = softvt.layout("one", function(scene)
+  scene:add {{ name = "floor", asset = floor, xyz = {{ 0, 0, 0 }} }}
+  scene:add {{ name = "cube", asset = cube, {at} }}
+  scene:add {{ name = "post", asset = floor, xyz = {{ 0, 2, 0 }} }}
+end)
+return softvt.suite {{ name = "one", object_type = "deformable", variation = "spatial", episodes = 1, tasks = {{
+  softvt.task {{ prompt = "wait", layout = layout, goal = softvt.on {{ object = "cube", target = "post" }},
+    {task},
+    expert = function(arm, scene) {expert} end }},
+}} }}
+"#
+        )
+    }
+
+    pub fn project(&self) -> Project {
+        Project::new(&[("x.lua", &self.text())])
+    }
+}
+
+/// The suite that comes with the binary.
+pub const SPATIAL_SOFT: &str = "suites/spatial_soft.lua";
