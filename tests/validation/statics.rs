@@ -16,17 +16,18 @@ impl Compared {
     /// pads stick.
     pub fn new(row: Row) -> Self {
         let mut options = row.squeeze();
-        if row.text("hold_branch") == "stick" {
+        if !row.flag("holds") {
             options.friction = 1e3;
         }
         Self { ours: run(&options), row }
     }
 
-    /// Relative errors of grip force, hold force and hold D.
-    pub fn errors(&self) -> [f64; 3] {
+    /// Relative errors of force and D in the grip and of force and D in the hold.
+    pub fn errors(&self) -> [f64; 4] {
         let against = |value: f64, key: &str| value / self.row.number(key) - 1.0;
         [
             against(self.ours.force_grip_n, "force_grip_n"),
+            against(self.ours.d_grip_pct, "d_grip_pct"),
             against(self.ours.force_hold_n, "force_hold_n"),
             against(self.ours.d_hold_pct, "d_hold_pct"),
         ]
@@ -51,7 +52,7 @@ mod tests {
     fn assert_within(compared: &[Compared], bound: f64) {
         assert!(!compared.is_empty());
         for c in compared {
-            let [_, force, d] = c.errors();
+            let [.., force, d] = c.errors();
             assert!(c.ours.failure.is_none(), "{:?}: {:?}", c.row, c.ours.failure);
             assert!(force.abs() < bound && d.abs() < bound, "force {force:.4}, D {d:.4} at {:?}", c.row);
         }

@@ -165,7 +165,6 @@ pub struct Seen {
     pub force: f64,
     pub capacity: f64,
     pub min_det_f: f64,
-    pub newton: u32,
     /// Whether all samples of a pad are at their friction bound.
     pub sliding: bool,
 }
@@ -232,7 +231,6 @@ impl Scene {
             force: 0.5 * (touches[0].normal_force + touches[1].normal_force),
             capacity: touches[0].capacity + touches[1].capacity,
             min_det_f: soft.min_det_f.0,
-            newton: self.world.stats.newton,
             sliding: touches.iter().any(|t| t.slipping == t.samples),
         }
     }
@@ -261,7 +259,6 @@ fn pad_pose(options: &Squeeze, side: f64, t: f64, hand: &Pose) -> Pose {
 #[derive(Clone, Debug, Default)]
 pub struct Outcome {
     pub holds: bool,
-    pub slip_mm: f64,
     pub creep_mm_per_s: f64,
     pub d_grip_pct: f64,
     pub d_hold_pct: f64,
@@ -271,10 +268,6 @@ pub struct Outcome {
     pub force_grip_n: f64,
     pub force_hold_n: f64,
     pub min_det_f: f64,
-    pub steps: usize,
-    pub newton_mean: f64,
-    pub newton_max: u32,
-    pub weight_n: f64,
     pub failure: Option<StepFailure>,
 }
 
@@ -296,7 +289,7 @@ pub fn run(options: &Squeeze) -> Outcome {
             }
         }
     }
-    Outcome { failure, weight_n: scene.weight(), ..summarise(options, &seen) }
+    Outcome { failure, ..summarise(options, &seen) }
 }
 
 fn summarise(options: &Squeeze, seen: &[Seen]) -> Outcome {
@@ -312,7 +305,6 @@ fn summarise(options: &Squeeze, seen: &[Seen]) -> Outcome {
     let force = mean(&hold, |s| s.force);
     Outcome {
         holds: rise > 0.8 * options.lift,
-        slip_mm: 1e3 * (options.lift - rise),
         creep_mm_per_s: creep,
         d_grip_pct: mean(&grip, |s| s.d_pct),
         d_hold_pct: mean(&hold, |s| s.d_pct),
@@ -321,9 +313,6 @@ fn summarise(options: &Squeeze, seen: &[Seen]) -> Outcome {
         force_grip_n: mean(&grip, |s| s.force),
         force_hold_n: force,
         min_det_f: seen.iter().map(|s| s.min_det_f).fold(f64::INFINITY, f64::min),
-        steps: seen.len(),
-        newton_mean: seen.iter().map(|s| f64::from(s.newton)).sum::<f64>() / seen.len().max(1) as f64,
-        newton_max: seen.iter().map(|s| s.newton).max().unwrap_or(0),
         ..Outcome::default()
     }
 }

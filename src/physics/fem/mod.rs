@@ -9,6 +9,7 @@ pub mod body;
 pub mod element;
 pub mod force;
 pub mod rotation;
+pub mod spin;
 pub mod system;
 
 pub use body::{Material, Rest, SoftBody};

@@ -3,7 +3,7 @@
 use super::{StepFailure, World, sliding::Sliding};
 use crate::{
     geometry::Vec3,
-    physics::{contact::Slot, joints, rigid},
+    physics::{contact::Slot, fem::spin, joints, rigid},
 };
 
 impl World {
@@ -16,7 +16,7 @@ impl World {
             let block = &mut self.problem.blocks[*block];
             soft.system.complete(&block.v, &mut body.v);
             soft.system.give_back(std::mem::take(&mut block.matrix));
-            body.x.iter_mut().zip(&body.v).for_each(|(x, v)| *x += v * dt);
+            spin::advance(body, dt);
             body.update_elastic();
             soft.min_det_f = body.min_det_f();
         }
