@@ -17,7 +17,7 @@ pub struct Contact {
 const FACING: f64 = 0.3;
 /// A face is also felt only down to this depth (m), or to this multiple of the depth under the nearest face: a sample of
 /// an edge that a body drags along a wall faces the wall's far end without being near it.
-const DEEP: f64 = 2e-3;
+const DEEP: f64 = 4e-3;
 const DEEP_RATIO: f64 = 3.0;
 
 /// One flat or round face of a sharp shape, as seen from a point.
@@ -64,7 +64,7 @@ fn full((phi, normal): (f64, Vec3)) -> Contact {
 
 /// The face that a sample feels: of those that it covers and faces, the one it faces most.
 fn sharp<const N: usize>(faces: [Face; N], facing: &Vec3, spacing: f64) -> Option<Contact> {
-    let nearest = -faces.iter().map(|face| face.phi).fold(f64::NEG_INFINITY, f64::max);
+    let nearest = -faces.iter().fold(f64::NEG_INFINITY, |least, face| least.max(face.phi));
     let deepest = DEEP.max(DEEP_RATIO * nearest);
     let (mut most, mut best) = (FACING, None);
     for face in &faces {
