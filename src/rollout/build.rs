@@ -148,5 +148,12 @@ pub(super) fn add(world: &mut World, object: &Object, cache: &RestCache) -> Resu
         Body::Static => (Kind::Static, vec![collider(world, Mover::Static, object.pose_w)]),
     };
     let bounds = cache.bounds(&asset.shape);
-    Ok(Handle { name: object.name.clone(), asset: asset.clone(), kind, start_w: object.pose_w, colliders, bounds })
+    Ok(Handle {
+        name: object.name.clone(),
+        asset: asset.clone(),
+        kind,
+        start_w: object.pose_w,
+        colliders,
+        bounds,
+    })
 }
