@@ -11,10 +11,11 @@ local PEAK = 1.875
 -- Minimum-jerk share of the way (Flash and Hogan, 1985).
 local function smooth(u) return u * u * u * (10 + u * (6 * u - 15)) end
 
--- Sends one command and comes back at the next control step.
+-- Sends one command and comes back at the next control step, or with what is wrong with it.
 function Arm:command(pose, closure)
   self.target, self.closure = check.pose(pose), check.number("arm:command: closure", closure, 0, 1)
-  yield(self.target, self.closure, self.gripping)
+  local refusal = yield(self.target, self.closure, self.gripping)
+  if refusal then check.refuse(refusal) end
 end
 
 local function travel(self, pose, options, closure)

@@ -79,25 +79,41 @@ pub fn parse(words: &[String]) -> Result<Command, Failure> {
         Some(file) => script::declared_options(Path::new(file)).map_err(Failure::input)?,
         None => Vec::new(),
     };
-    let command = command(&options)?;
+    let named = |failure: Failure| match script_file(words) {
+        Some(file) => Failure { message: format!("{file}: {}", failure.message), ..failure },
+        None => failure,
+    };
+    let command = command(&options).map_err(named)?;
     let matches = match command.try_get_matches_from(words) {
         Ok(matches) => matches,
         Err(error) if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
             super::print(&error.to_string());
             return Ok(Command::Shown);
         }
-        Err(error) => {
-            let text = error.to_string();
-            let message = text.trim_start_matches("error: ").trim_end().to_owned();
-            return Err(Failure { code: code::INPUT, message });
-        }
+        Err(error) => return Err(usage(script_file(words), &error.to_string())),
     };
     match matches.subcommand() {
         Some(("list", m)) => Ok(Command::List { what: text(m, "what"), json: m.get_flag("json") }),
         Some(("init", m)) => Ok(Command::Init { dir: PathBuf::from(text(m, "dir")) }),
         Some(("doctor", _)) => Ok(Command::Doctor),
-        _ => run(&matches, &options).map(Command::Run),
+        _ => run(&matches, &options).map(Command::Run).map_err(named),
     }
+}
+
+/// A usage error as it is told: the file first, since a script brings options of its own.
+fn usage(file: Option<&str>, text: &str) -> Failure {
+    // A value that looks like a flag is never meant here: scripts take no positional words.
+    let told = text.lines().filter(|line| !line.contains("tip: to pass '"));
+    let mut message = file.map_or(String::new(), |file| format!("{file}: "));
+    let mut blank = false;
+    for line in told.map(|line| line.strip_prefix("error: ").unwrap_or(line)) {
+        if !(blank && line.is_empty()) {
+            message += line;
+            message.push('\n');
+        }
+        blank = line.is_empty();
+    }
+    Failure { code: code::INPUT, message: message.trim_end().to_owned() }
 }
 
 /// The script among the words: the first that ends in `.lua`, unless it is the value of `--policy`.

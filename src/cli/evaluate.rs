@@ -132,7 +132,9 @@ pub fn single(run: &Run, task: usize) -> Result<EpisodeRecord, Failure> {
 fn evaluate(run: &Run, loaded: &Loaded, suite: &Suite, out: PathBuf) -> Result<Summary, Failure> {
     let mut settings = suite.settings.clone();
     for (path, value) in &run.set {
-        settings = settings.with(path, value).map_err(|e| Failure::input(format!("--set {e}")))?;
+        settings = settings
+            .with(path, value)
+            .map_err(|e| Failure::input(format!("{}: --set: {e}", run.file.display())))?;
     }
     for (name, value) in &run.shifts {
         script::check_shift(&suite.shifts, name, *value)
@@ -175,7 +177,8 @@ fn chosen<'a>(run: &Run, suite: &'a Suite) -> Result<Vec<&'a Task>, Failure> {
         found.extend(suite.tasks.iter().filter(fits));
         if found.len() == before {
             let message = format!(
-                "--task {word}: suite {} has no such task; it has 0 to {}: see softvt list tasks",
+                "{}: --task {word}: suite {} has no such task; it has 0 to {}: see softvt list tasks",
+                run.file.display(),
                 suite.name,
                 suite.tasks.len().saturating_sub(1)
             );
@@ -265,7 +268,14 @@ impl<'a> Batch<'a> {
         if STOP.load(Ordering::Relaxed) {
             return Err(Failure::interrupted(format!("interrupted; {kept}")));
         }
-        outcome.map_err(|failure| Failure { message: format!("{}\n{kept}", failure.message), ..failure })?;
+        if let Err(failure) = outcome {
+            if records.is_empty() {
+                // Nothing would be lost, and the same command must work once the mistake is mended.
+                folder.discard().map_err(folder_failure)?;
+                return Err(failure);
+            }
+            return Err(Failure { message: format!("{}\n{kept}", failure.message), ..failure });
+        }
         let summary = Summary::of(&self.suite.name, &self.run.policy, &records);
         folder.write_json(SUMMARY, &summary).map_err(folder_failure)?;
         records.sort_by_key(|r| (r.identity.task, r.identity.episode));

@@ -129,6 +129,25 @@ impl RunFolder {
         Ok(())
     }
 
+    /// Takes back what was written of a run that has no episode; the folder itself goes too if nothing else is in it.
+    ///
+    /// # Errors
+    /// A file cannot be removed.
+    pub fn discard(self) -> Result<(), RunFolderError> {
+        for name in [RUN, EPISODES] {
+            let path = self.dir.join(name);
+            match fs::remove_file(&path) {
+                Err(source) if source.kind() != io::ErrorKind::NotFound => {
+                    return Err(io_error("remove", &path)(source));
+                }
+                _ => {}
+            }
+        }
+        // It may hold the user's own files; then it stays.
+        let _ = fs::remove_dir(&self.dir);
+        Ok(())
+    }
+
     /// Writes `value` as indented JSON to the file `name` of the folder, aside and then renamed: a reader sees the old
     /// file or the new one, never a part.
     ///

@@ -1,6 +1,6 @@
 //! A scripted expert as whoever drives a rollout: the one place where hidden state goes to Lua.
 
-use super::{Expert, ExpertView, ObjectView};
+use super::{Expert, ExpertView, ObjectView, ScriptError, reach::Lag};
 use crate::{
     geometry::Vec3,
     policy::{Action, Observation},
@@ -12,21 +12,26 @@ use crate::{
 pub struct ExpertController {
     expert: Expert,
     binary: bool,
+    lag: Lag,
 }
 
 impl ExpertController {
     /// `binary` replaces the expert's closure by fully open or fully shut, as a binary gripper action would.
     pub fn new(expert: Expert, binary: bool) -> Self {
-        Self { expert, binary }
+        Self { expert, binary, lag: Lag::default() }
     }
 }
 
 impl Controller for ExpertController {
     fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, ControlError> {
-        let command = self
-            .expert
-            .step(&view(sim, observation.time_s))
-            .map_err(|error| ControlError::Script(error.to_string()))?;
+        let script = |error: ScriptError| ControlError::Script(error.to_string());
+        if let Some(complaint) = self.lag.complaint(sim) {
+            return Err(script(self.expert.refuse(&complaint)));
+        }
+        let command = self.expert.step(&view(sim, observation.time_s)).map_err(script)?;
+        if let Some(command) = &command {
+            self.lag.sent(&command.pose_b);
+        }
         Ok(command.map(|command| {
             let shut = if command.gripping { 1.0 } else { 0.0 };
             Action {

@@ -25,7 +25,7 @@ pub type OnStuck = Arc<dyn Fn(&str) + Send + Sync>;
 /// Prints the message and ends the process with the exit code of bad input; finished episodes are already on disk.
 pub fn end_process() -> OnStuck {
     Arc::new(|message| {
-        eprintln!("error: {message}");
+        eprintln!("softvt: {message}");
         std::process::exit(2);
     })
 }

@@ -89,6 +89,13 @@ impl Expert {
         let _deadline = vm.call_deadline();
         self.run.step(&vm.lua, view).map_err(|e| vm.explain(&e))
     }
+
+    /// Ends the expert with an error that says `complaint` at the line of the command that it gave last.
+    pub fn refuse(&mut self, complaint: &str) -> ScriptError {
+        let vm = &self.machine.vm;
+        let _deadline = vm.call_deadline();
+        vm.explain(&self.run.refuse(&vm.lua, complaint))
+    }
 }
 
 /// An expert as a coroutine of any machine.
@@ -125,6 +132,14 @@ impl Coroutine {
                  of coroutine.yield",
             )),
         }
+    }
+
+    /// The error that `complaint` raises in the script where it waits for the next control step.
+    pub fn refuse(&mut self, lua: &Lua, complaint: &str) -> mlua::Error {
+        let waiting = self.thread.as_ref().filter(|thread| thread.is_resumable());
+        let raised = waiting.and_then(|thread| thread.resume::<MultiValue>(complaint).err());
+        // A script that is over, or that catches errors, has no line to show.
+        raised.unwrap_or_else(|| fail(lua, complaint))
     }
 
     fn resume(&mut self, lua: &Lua) -> mlua::Result<MultiValue> {
@@ -169,6 +184,8 @@ fn checks(lua: &Lua) -> mlua::Result<Table> {
         Err(fail(lua, format!("{label}: there is no {}", schema::got(&key))))
     };
     checks.set("unknown", lua.create_function(refuse)?)?;
+    let complain = |lua: &Lua, complaint: String| -> mlua::Result<()> { Err(fail(lua, complaint)) };
+    checks.set("refuse", lua.create_function(complain)?)?;
     Ok(checks)
 }
 

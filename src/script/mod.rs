@@ -17,6 +17,7 @@ mod plan;
 mod pose;
 mod position;
 mod random;
+mod reach;
 mod sandbox;
 mod scene_api;
 pub mod schema;

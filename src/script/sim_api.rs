@@ -14,6 +14,7 @@ use super::{
     deadline::Clock,
     expert::Coroutine,
     random::Rng,
+    reach::Lag,
     sandbox::{fail, locked},
     scene_api::{LuaScene, empty_scene},
     schema,
@@ -164,14 +165,18 @@ struct LuaSimulation(Arc<Mutex<Inner>>);
 impl LuaSimulation {
     /// Runs an expert to its end.
     fn drive(&self, lua: &Lua, expert: Function) -> mlua::Result<MultiValue> {
-        let mut expert = Coroutine::new(expert);
+        let (mut expert, mut lag) = (Coroutine::new(expert), Lag::default());
         loop {
-            let seen = {
+            let (seen, complaint) = {
                 let inner = locked(&self.0);
                 let _honest_work = inner.clock.pause();
-                view(&inner.sim, inner.time())
+                (view(&inner.sim, inner.time()), lag.complaint(&inner.sim))
             };
+            if let Some(complaint) = complaint {
+                return Err(expert.refuse(lua, &complaint));
+            }
             let Some(command) = expert.step(lua, &seen)? else { break };
+            lag.sent(&command.pose_b);
             if !locked(&self.0).control_step(Some((&command.pose_b, command.closure))) {
                 break;
             }
