@@ -168,6 +168,7 @@ impl LuaSimulation {
         loop {
             let seen = {
                 let inner = locked(&self.0);
+                let _honest_work = inner.clock.pause();
                 view(&inner.sim, inner.time())
             };
             let Some(command) = expert.step(lua, &seen)? else { break };
@@ -190,6 +191,7 @@ impl LuaSimulation {
 
     fn see(&self, lua: &Lua, name: &str) -> mlua::Result<Table> {
         let inner = locked(&self.0);
+        let _honest_work = inner.clock.pause();
         let sim = &inner.sim;
         let names = sim.objects.iter().map(|o| o.name.as_str());
         let index = sim.objects.iter().position(|o| o.name == name);
