@@ -23,7 +23,9 @@ use crate::{
         run_folder::{RUN, RunFolder, RunFolderError, SUMMARY, replace},
         terminal,
     },
-    rollout::{ControlError, Controller, Episode, EpisodeError, EpisodeSpec, Finished, RestCache, ScoreFrame, batch},
+    rollout::{
+        ControlError, Controller, Episode, EpisodeError, EpisodeSpec, Finished, RestCache, ScoreFrame, batch,
+    },
     scene::{Body, Scene},
     script::{self, ExpertController, Loaded},
 };

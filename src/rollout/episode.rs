@@ -329,7 +329,6 @@ impl Episode {
         let record = EpisodeRecord { identity: self.spec.identity, outcome, verdict, stats };
         Finished { record, trace: self.trace, frames: self.frames, reference }
     }
-    }
 }
 
 fn check_action(action: &Action) -> Result<(), String> {
