@@ -9,6 +9,7 @@
 ---@field episodes? integer Episodes a task by default. Expects a whole number in 1..1000000. Default 5.
 ---@field tasks softvt.Task[] The tasks, in order.
 ---@field shifts? softvt.Shift[] Changes that a run may ask for.
+---@field settings? table<string, table<string, any>> What it changes of the mechanics, the robot and the judge: { physics = {…}, robot = {…}, rules = {…} }.
 
 ---One task of a suite.
 ---@class softvt.Task
@@ -118,6 +119,50 @@
 ---@field xyz number[] Position. Expects a list of 3 numbers (m, world).
 ---@field yaw? number Turn of the downward hand about the vertical. Expects radians. Default 0.
 ---@field quat? number[] Orientation instead of yaw. Expects a list of 4 numbers (w, x, y, z).
+
+---A world of soft bodies and prescribed or fixed solids, without a robot.
+---@class softvt.WorldSpec
+---@field dt? number Time step. Expects seconds in 0.00001..0.05. Default 0.016666666666666666.
+---@field alpha? number Mass-proportional damping. Expects a number (1/s) in 0..1000. Default 0.
+---@field beta_s? number Stiffness-proportional damping. Expects seconds in 0..1. Default 0.005.
+---@field gravity? number[] Gravity; {0, 0, -9.81} by default. Expects a list of 3 numbers (m/s²).
+---@field sleeping? boolean Whether bodies at rest fall asleep. Default true.
+
+---A finite-element soft body in a world.
+---@class softvt.WorldSoft
+---@field name? string Name, for messages. Default "body".
+---@field shape softvt.Shape Its shape.
+---@field youngs_pa number Young's modulus. Expects pascals above 0.
+---@field poisson number Poisson's ratio. Expects a number in 0..below 0.5.
+---@field density number Density. Expects a number (kg/m³) above 0.
+---@field resolution? integer Voxels along the longest edge. Expects a whole number in 1..64. Default 6.
+---@field grasp_spacing? number Spacing of contact samples on steep surfaces. Expects metres in 0.0001..0.02. Default 0.00075.
+---@field friction? softvt.Friction Friction of its surface.
+---@field xyz number[] Where its frame is. Expects a list of 3 numbers (m).
+---@field turn? number[] Its orientation as axis-angle. Expects a list of 3 numbers (rad).
+
+---A solid whose motion is prescribed (kinematic) or that never moves (static).
+---@class softvt.WorldSolid
+---@field name? string Name, for messages. Default "solid".
+---@field shape softvt.Shape Its shape.
+---@field friction? softvt.Friction Friction of its surface.
+---@field xyz number[] Where its frame is. Expects a list of 3 numbers (m).
+---@field turn? number[] Its orientation as axis-angle. Expects a list of 3 numbers (rad).
+
+---A scene with the robot, built and settled. The settled shapes are the reference of deformation.
+---@class softvt.SimulateSpec
+---@field layout softvt.Layout Where things stand.
+---@field suite? string Part of the seed. Default "experiment".
+---@field episode? integer Part of the seed. Expects a whole number in 0..1000000000. Default 0.
+---@field seed? integer Part of the seed. Expects a whole number in 0..1000000000. Default 0.
+---@field settings? table<string, table<string, any>> Changes of the mechanics, the robot and the judge: { physics = {…}, robot = {…}, rules = {…} }.
+
+---The rows of a calibration.
+---@class softvt.EnvelopeSpec
+---@field asset string Asset name.
+---@field kappa? number τ = κ D_ref. Expects a number in 0..1. Default 0.5.
+---@field holds table<string, any>[] Rows closure, trials, held, slip_mm, d_peak_pct of the lower-bound scan.
+---@field sweep table<string, any>[] Rows closure, gripper_width_mm, d_peak_pct, force_n, min_det_f, node_speed_m_s, both_pads, slip_mm, stable of the compression sweep.
 
 ---A box centred on the origin.
 ---@class softvt.BoxSpec
@@ -300,6 +345,149 @@ function Shape:bumps(spec) end
 ---@param spec softvt.PaintSpec
 ---@return softvt.Shape
 function Shape:paint(spec) end
+
+---The mechanics alone: soft bodies among solids that stand still or move as prescribed.
+---@class softvt.World
+local World = {}
+
+---Adds a soft body.
+---@param spec softvt.WorldSoft
+---@return softvt.Body
+function World:soft(spec) end
+
+---Adds a solid that move_to moves.
+---@param spec softvt.WorldSolid
+---@return softvt.Solid
+function World:kinematic(spec) end
+
+---Adds a solid that never moves.
+---@param spec softvt.WorldSolid
+---@return softvt.Solid
+function World:static(spec) end
+
+---One time step; false and why once the state is void.
+---@return boolean
+---@return string?
+function World:step() end
+
+---Time, s.
+---@return number
+function World:time() end
+
+---Mean and largest number of Newton iterations a step.
+---@return number
+---@return integer
+function World:newton() end
+
+---Kinetic, elastic and potential energy, J.
+---@return number
+function World:energy() end
+
+---From now on, CPU time goes to this phase.
+---@param name string
+function World:phase(name) end
+
+---Prints CPU time per simulated time, by phase, to the standard error.
+function World:report_timing() end
+
+---A soft body of a world.
+---@class softvt.Body
+local Body = {}
+
+---Centre of mass, m.
+---@return number[]
+function Body:centre() end
+
+---Velocity of the centre of mass, m/s.
+---@return number[]
+function Body:velocity() end
+
+---Speed of the fastest node, m/s.
+---@return number
+function Body:speed() end
+
+---Mass, kg.
+---@return number
+function Body:mass() end
+
+---Least det F of a filled element; 0 or less is inverted.
+---@return number
+function Body:min_det_f() end
+
+---Whether it sleeps.
+---@return boolean
+function Body:asleep() end
+
+---rms_pct, weighted_pct and max_pct against the reference shape.
+---@return table
+function Body:deformation() end
+
+---Size of the bounding box of the nodes, m.
+---@return number[]
+function Body:extent() end
+
+---Measures deformation from the rest shape (default) or from now.
+---@param which "rest"|"now"
+function Body:set_reference(which) end
+
+---Normal force of a solid on the body, N.
+---@param solid softvt.Solid
+---@return number
+function Body:force(solid) end
+
+---Tangential force of a solid on the body, N.
+---@param solid softvt.Solid
+---@return number
+function Body:shear(solid) end
+
+---How far the patch has slid on the solid, mm.
+---@param solid softvt.Solid
+---@return number
+function Body:travel(solid) end
+
+---Share of the patch's samples that slip, 0..1.
+---@param solid softvt.Solid
+---@return number
+function Body:slipping(solid) end
+
+---A solid of a world.
+---@class softvt.Solid
+local Solid = {}
+
+---Where it will be after the next step: position, m, and axis-angle, rad.
+---@param xyz number[]
+---@param turn? number[]
+function Solid:move_to(xyz, turn) end
+
+---A settled scene with the robot.
+---@class softvt.Simulation
+local Simulation = {}
+
+---Runs an expert to its end; false and why once the physics has failed.
+---@param expert fun(arm: softvt.Arm, scene: softvt.View)
+---@return boolean
+---@return string?
+function Simulation:drive(expert) end
+
+---Holds the last command for a time.
+---@param seconds number
+---@return boolean
+---@return string?
+function Simulation:wait(seconds) end
+
+---width_m, height_m (rise of the centre), speed, asset; of a soft object also d_pct, d_peak_pct, min_det_f, asleep, and pad_force (N) and slip_mm of the left and right pad.
+---@param object string
+---@return table
+function Simulation:watch(object) end
+
+---Time since settling, s.
+---@return number
+function Simulation:time() end
+
+---Tool position, m, and axis-angle, rad, world.
+---@return number[]
+---@return number[]
+function Simulation:tool() end
 
 ---An immutable pose in the world frame.
 ---@class softvt.Pose
@@ -525,6 +713,26 @@ function softvt.layout(name, build) end
 ---@param options table<string, softvt.Option>
 ---@return table<string, any>
 function softvt.options(options) end
+
+---An empty world without a robot.
+---@param world? softvt.WorldSpec
+---@return softvt.World
+function softvt.world(world) end
+
+---A settled scene with the robot.
+---@param simulate softvt.SimulateSpec
+---@return softvt.Simulation
+function softvt.simulate(simulate) end
+
+---What a calibration found: lower, closure_at_tau, safe_window, tau, d_ref, and as text: text (a plot), sweep (JSON lines), json (a threshold file).
+---@param envelope softvt.EnvelopeSpec
+---@return table
+function softvt.envelope(envelope) end
+
+---Whether a row of a compression sweep is a stable squeeze.
+---@param row table
+---@return boolean
+function softvt.stable(row) end
 
 ---A pose in the world frame.
 ---@param pose softvt.PoseSpec

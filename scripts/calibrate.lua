@@ -28,14 +28,22 @@ for _, name in ipairs(opt.asset) do assets[name] = require("assets." .. name) en
 
 local OFFSET, TURN = 0.005, math.rad(10)  -- how far trials miss the middle
 local LIFT, SLIP_MM = 0.10, 2             -- m; mm of slip that fails a trial
-local QUIET_S, FINE = 0.5, 8              -- s at rest that judge a squeeze; fine steps in one step
+local QUIET_S, QUIET_SPEED = 0.5, 0.005   -- s and m/s of a squeeze at rest
+local PATIENCE_S = 3                      -- s that a squeeze may take to come to rest
+local FINE = 8                            -- fine steps in one step
 local BEYOND = 3                          -- closures tried beyond the first that holds, for the plot
 local TOUCH_N = 1e-3
 
-local function alone(name)
-  return softvt.layout("calibrate_" .. name, function(scene)
+-- The object alone on the table. A trial's `miss` is drawn with the scene, so that it depends on the asset and the number
+-- of the trial alone: closures differ by nothing else.
+local function alone(name, miss)
+  return softvt.layout("calibrate_" .. name, function(scene, rng)
     scene:add { name = "table", asset = table_top, xyz = { 0, 0, 0 } }
     scene:add { name = "object", asset = assets[name], at = { -0.05, 0 } }
+    if miss then
+      miss.offset = { rng:uniform(-OFFSET, OFFSET), rng:uniform(-OFFSET, OFFSET) }
+      miss.turn = rng:uniform(-TURN, TURN)
+    end
   end)
 end
 
@@ -73,9 +81,10 @@ end
 
 local function mark(sim) return { tool = (sim:tool())[3], height = sim:watch "object".height_m } end
 
--- One grasp–lift–hold trial: whether it held, how far the object slipped (mm) and its peak D (%).
-local function trial(name, closure, miss, hold_s)
-  local sim = softvt.simulate { layout = alone(name) }
+-- Grasp–lift–hold trial number `k`: whether it held, how far the object slipped (mm) and its peak D (%).
+local function trial(name, closure, k, hold_s)
+  local miss = {}
+  local sim = softvt.simulate { layout = alone(name, miss), episode = k }
   local ok = sim:drive(take(closure, miss))
   local before = mark(sim)
   ok = ok and sim:drive(lift)
@@ -86,23 +95,13 @@ local function trial(name, closure, miss, hold_s)
   return { held = ok and slip <= SLIP_MM, slip_mm = slip, d_peak_pct = seen.d_peak_pct }
 end
 
--- The same misses at every closure, so that closures differ by nothing else.
-local function draw_misses(count)
-  local misses = {}
-  for i = 1, count do
-    local function spread(most) return (2 * math.random() - 1) * most end
-    misses[i] = { offset = { spread(OFFSET), spread(OFFSET) }, turn = spread(TURN) }
-  end
-  return misses
-end
-
 local function scan_holds(name, first, o)
-  local misses, rows, beyond = draw_misses(o.trials), {}, 0
+  local rows, beyond = {}, 0
   local closure = first
   while closure <= 1 and beyond <= BEYOND do
     local row = { asset = name, kind = "hold", closure = closure, trials = o.trials, held = 0, slip_mm = 0, d_peak_pct = 0 }
-    for _, miss in ipairs(misses) do
-      local result = trial(name, closure, miss, o.hold_s)
+    for k = 1, o.trials do
+      local result = trial(name, closure, k, o.hold_s)
       if result.held then row.held = row.held + 1 end
       row.slip_mm = math.max(row.slip_mm, result.slip_mm)
       row.d_peak_pct = math.max(row.d_peak_pct, result.d_peak_pct)
@@ -114,19 +113,22 @@ local function scan_holds(name, first, o)
   return rows
 end
 
--- One closure of a squeeze: closes on, then watches for as long as it must be quiet.
+-- One closure of a squeeze: closes on and waits until it has been quiet for long enough, or for as long as it may take.
+-- What a row says of speed, det F and contact is of the last QUIET_S seconds.
 local function squeeze(sim, name, closure)
+  local row = { asset = name, kind = "sweep", closure = closure, stable = false }
   local ok, problem = sim:drive(function(arm) arm:close_to(closure, { rate = 0.2 }) end)
-  ok = ok and sim:wait(0.2)
-  local row = { asset = name, kind = "sweep", closure = closure, min_det_f = math.huge, node_speed_m_s = 0, both_pads = true, stable = false }
-  local waited = 0
-  while ok and waited < QUIET_S do
+  local waited, quiet = 0, 0
+  while ok and quiet < QUIET_S and waited < PATIENCE_S do
     ok, problem = sim:wait(0.05)
     waited = waited + 0.05
     local seen = sim:watch "object"
+    local touching = math.min(table.unpack(seen.pad_force)) > TOUCH_N
+    if quiet == 0 then row.min_det_f, row.node_speed_m_s, row.both_pads = math.huge, 0, true end
     row.min_det_f = math.min(row.min_det_f, seen.min_det_f)
     row.node_speed_m_s = math.max(row.node_speed_m_s, seen.speed)
-    row.both_pads = row.both_pads and math.min(table.unpack(seen.pad_force)) > TOUCH_N
+    row.both_pads = row.both_pads and touching
+    quiet = seen.speed < QUIET_SPEED and quiet + 0.05 or 0
   end
   if not ok then return nil, problem end
   local seen = sim:watch "object"
@@ -159,10 +161,12 @@ local function sweep(name, first, step, rows)
   return last, false
 end
 
+-- A point is one half of an asset's calibration, so that halves and assets run side by side.
 local function run(point, o)
   local name = point.asset
   local first = loose(name, o.step)
-  local rows = scan_holds(name, first, o)
+  if point.part == "hold" then return scan_holds(name, first, o) end
+  local rows = {}
   local last, more = sweep(name, first, o.step, rows)
   if last and more then sweep(name, last + o.step / FINE, o.step / FINE, rows) end
   return rows
@@ -217,7 +221,9 @@ return softvt.experiment {
   options = opt,
   points = function(o)
     local points = {}
-    for i, name in ipairs(o.asset) do points[i] = { asset = name } end
+    for _, name in ipairs(o.asset) do
+      for _, part in ipairs { "hold", "sweep" } do points[#points + 1] = { asset = name, part = part } end
+    end
     return points
   end,
   run = run,

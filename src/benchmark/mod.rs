@@ -114,7 +114,7 @@ pub struct Suite {
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum Plan {
     /// Evaluate a policy on one suite.
-    Suite(Suite),
+    Suite(Box<Suite>),
     /// Evaluate a policy on several suites.
     Suites {
         /// In order.

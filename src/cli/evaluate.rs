@@ -19,11 +19,13 @@ use crate::{
     },
     policy::{Policy, builtin},
     report::{
-        interchange,
+        interchange::{self, DebugFrame, DebugShape},
         run_folder::{RUN, RunFolder, RunFolderError, SUMMARY, replace},
         terminal,
     },
-    rollout::{ControlError, Controller, Episode, EpisodeError, EpisodeSpec, Finished, RestCache, batch},
+    rollout::{
+        ControlError, Controller, Episode, EpisodeError, EpisodeSpec, Finished, RestCache, ScoreFrame, batch,
+    },
     scene::{Body, Scene},
     script::{self, ExpertController, Loaded},
 };
@@ -253,6 +255,7 @@ impl<'a> Batch<'a> {
             |job, finished| {
                 folder.append(job, &finished.record).map_err(folder_failure)?;
                 self.write_trace(&finished)?;
+                self.write_debug_log(&finished)?;
                 progress.tick(&line(&finished.record));
                 records.push(finished.record);
                 Ok(())
@@ -340,7 +343,7 @@ impl<'a> Batch<'a> {
     fn driver(&self, opened: script::Episode) -> Result<Box<dyn Controller>, Failure> {
         let boxed = |policy: Box<dyn Policy>| -> Box<dyn Controller> { Box::new(policy) };
         match self.run.policy.as_str() {
-            "noop" => Ok(boxed(Box::new(builtin::Noop::default()))),
+            "noop" => Ok(boxed(Box::<builtin::Noop>::default())),
             "random" => {
                 let mut stream = opened.seed.stream(crate::benchmark::seed::Stream::Script);
                 Ok(boxed(Box::new(builtin::Random::new(rand::RngCore::next_u64(&mut stream)))))
@@ -360,6 +363,18 @@ impl<'a> Batch<'a> {
             _ => code::INPUT,
         };
         Failure { code, message: format!("{}: {error}", self.run.file.display()) }
+    }
+
+    /// SoftVTBench's log of every control step, which its own scorer reads.
+    fn write_debug_log(&self, finished: &Finished) -> Result<(), Failure> {
+        let identity = &finished.record.identity;
+        let frame = |(step, frame): (usize, &ScoreFrame)| {
+            let measured = finished.reference.as_ref().zip(frame.deformation.as_ref());
+            let shape = DebugShape::new(&identity.asset, measured);
+            DebugFrame::new(identity, step as u32, frame.success_now, shape)
+        };
+        let frames: Vec<DebugFrame> = finished.frames.iter().enumerate().map(frame).collect();
+        interchange::write_debug_log(&self.out, identity, &frames).map(|_| ()).map_err(folder_failure)
     }
 
     fn write_trace(&self, finished: &Finished) -> Result<(), Failure> {

@@ -68,7 +68,7 @@ fn suites() -> Result<Vec<(String, Suite)>, Failure> {
     for path in scripts("suites") {
         let loaded = script::load(Path::new(&path), &[]).map_err(Failure::input)?;
         match loaded.plan {
-            Plan::Suite(suite) => all.push((path, suite)),
+            Plan::Suite(suite) => all.push((path, *suite)),
             Plan::Suites { .. } | Plan::Experiment { .. } => {}
         }
     }

@@ -219,7 +219,7 @@ fn summary(records: &[EpisodeRecord]) -> Value {
     let safe = |r: &&EpisodeRecord| safe_success(r) == Some(true);
     let (all, n) = (in_order(records), records.len());
     let goal_rate = rate(all.iter().filter(|r| r.verdict.goal).count(), n);
-    let safe_rate = rate(all.iter().copied().filter(|r| safe(&r)).count(), n);
+    let safe_rate = rate(all.iter().copied().filter(|r| safe(r)).count(), n);
     let mut assets: Vec<&str> = Vec::new();
     for record in &all {
         if !assets.contains(&record.identity.asset.as_str()) {

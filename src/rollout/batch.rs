@@ -74,7 +74,7 @@ mod tests {
     #[test]
     fn every_job_is_done_once_and_the_first_failure_is_told() {
         let stop = AtomicBool::new(false);
-        let mut seen = vec![0; 20];
+        let mut seen = [0; 20];
         let all = run(
             20,
             3,

@@ -51,11 +51,14 @@ pub enum BuildError {
     TwoNames(String),
 }
 
+/// Something made once for each of a few keys, shared between threads.
+type Made<K, V> = Arc<Mutex<Vec<(K, V)>>>;
+
 /// Rest data and bounds of assets, made once and shared by all episodes.
 #[derive(Clone, Debug, Default)]
 pub struct RestCache {
-    made: Arc<Mutex<Vec<(Arc<Asset>, Arc<Rest>)>>>,
-    bounds: Arc<Mutex<Vec<(Shape, Aabb)>>>,
+    made: Made<Arc<Asset>, Arc<Rest>>,
+    bounds: Made<Shape, Aabb>,
 }
 
 impl RestCache {

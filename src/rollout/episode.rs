@@ -14,6 +14,7 @@ use super::{
 use crate::{
     benchmark::{Goal, Task},
     evaluation::{
+        deformation::{Deformation, Reference},
         goal::Place,
         judge::{Judge, Setup},
         record::{EpisodeRecord, Identity, Outcome, RolloutStats},
@@ -85,6 +86,19 @@ pub struct Finished {
     pub record: EpisodeRecord,
     /// One entry a control step, if asked for.
     pub trace: Vec<StepTrace>,
+    /// One entry a control step: what another scorer needs.
+    pub frames: Vec<ScoreFrame>,
+    /// Settled shape of a soft target.
+    pub reference: Option<Reference>,
+}
+
+/// What another scorer needs to know of a control step.
+#[derive(Clone, Debug)]
+pub struct ScoreFrame {
+    /// Whether the goal had been reached: held for long enough.
+    pub success_now: bool,
+    /// The target's worst deformation over the physics steps of the control step; `None` if it is not known.
+    pub deformation: Option<Deformation>,
 }
 
 /// The scene cannot be run; the user's to mend.
@@ -143,6 +157,7 @@ pub struct Episode {
     newton: (u64, u32),
     min_det_f: f64,
     trace: Vec<StepTrace>,
+    frames: Vec<ScoreFrame>,
 }
 
 impl Episode {
@@ -204,6 +219,7 @@ impl Episode {
             newton: (0, 0),
             min_det_f: f64::INFINITY,
             trace: Vec::new(),
+            frames: Vec::new(),
         })
     }
 
@@ -261,6 +277,7 @@ impl Episode {
         let pose_b = Pose::from_parts(action.position_b.into(), rotation);
         self.sim.rig.command(&mut self.sim.world, &pose_b, action.closure);
         self.steps += 1;
+        let mut worst: Option<Deformation> = None;
         for _ in 0..STEPS_PER_CONTROL {
             self.physics_steps += 1;
             self.sim.step()?;
@@ -270,8 +287,12 @@ impl Episode {
                 self.min_det_f = self.min_det_f.min(self.sim.world.soft[index].min_det_f.0);
             }
             let time = self.time();
-            self.judge.observe(&self.witness.evidence(&self.sim, time));
+            let evidence = self.witness.evidence(&self.sim, time);
+            let now = evidence.target.deformation;
+            self.judge.observe(&evidence);
+            worst = worst.into_iter().chain(now).max_by(|a, b| a.rms_pct.total_cmp(&b.rms_pct));
         }
+        self.frames.push(ScoreFrame { success_now: self.judge.goal_reached(), deformation: worst });
         if let Some(nodes) = self.spec.trace {
             let at = (self.steps, self.time());
             let dropped = self.judge.dropped().is_some();
@@ -303,11 +324,10 @@ impl Episode {
             newton_max: self.newton.1,
             state_hash: state_hash(&self.sim),
         };
+        let reference = self.witness.reference(self.target).cloned();
         let verdict = self.judge.finish(&outcome);
-        Finished {
-            record: EpisodeRecord { identity: self.spec.identity, outcome, verdict, stats },
-            trace: self.trace,
-        }
+        let record = EpisodeRecord { identity: self.spec.identity, outcome, verdict, stats };
+        Finished { record, trace: self.trace, frames: self.frames, reference }
     }
 }
 

@@ -9,7 +9,7 @@ pub mod simulation;
 mod trace;
 
 pub use build::{BuildError, RestCache, soft_rest};
-pub use episode::{ControlError, Controller, Episode, EpisodeError, EpisodeSpec, Finished};
+pub use episode::{ControlError, Controller, Episode, EpisodeError, EpisodeSpec, Finished, ScoreFrame};
 pub use rig::Rig;
 pub use simulation::{Handle, Kind, SettleError, Simulation};
 pub use trace::{ObjectTrace, StepTrace};

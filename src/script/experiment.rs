@@ -81,7 +81,7 @@ impl Experiment {
         };
         let (run, options) = fetch().map_err(|e| vm.explain(&e))?;
         let point = self.points.get(index).cloned().unwrap_or(Value::Nil);
-        let result: Value = vm.call(&run, (point, options))?;
+        let result: Value = vm.call_point(&run, (point, options))?;
         rows(&vm.lua, &result).map_err(|e| vm.explain(&e))
     }
 

@@ -111,7 +111,7 @@ impl Machine {
             return Err(no_plan(lua, values));
         };
         if schema::is_made(lua, &catalogue::SUITE, table) {
-            return Ok(Plan::Suite(suite(lua, table)?));
+            return Ok(Plan::Suite(Box::new(suite(lua, table)?)));
         }
         if schema::is_made(lua, &catalogue::EXPERIMENT, table) {
             let _deadline = self.vm.call_deadline();

@@ -27,9 +27,10 @@ pub struct Limits {
     pub memory_bytes: usize,
     /// Time to load a script and make its plan.
     pub load: Duration,
-    /// Lua time of one call: a layout, a shift, a control step of an expert, a point of an experiment (physics that a
-    /// binding runs is not counted).
+    /// Lua time of one call: a layout, a shift, a control step of an expert (physics that a binding runs is not counted).
     pub call: Duration,
+    /// Lua time of one point of an experiment, likewise.
+    pub point: Duration,
     /// How long after a limit the script may still stop by itself before it counts as stuck.
     pub grace: Duration,
     /// What happens when a library function does not return.
@@ -39,12 +40,13 @@ pub struct Limits {
 }
 
 impl Default for Limits {
-    /// 256 MiB, 10 s to load, 5 s a call; a stuck function ends the process with code 2; `print` to standard error.
+    /// 256 MiB, 10 s to load, 5 s a call, 60 s a point; a stuck function ends the process with code 2; `print` to standard error.
     fn default() -> Self {
         Self {
             memory_bytes: 256 << 20,
             load: Duration::from_secs(10),
             call: Duration::from_secs(5),
+            point: Duration::from_secs(60),
             grace: Duration::from_millis(1500),
             on_stuck: end_process(),
             print: Arc::new(|text| eprintln!("{text}")),
@@ -129,6 +131,16 @@ impl Vm {
         args: impl IntoLuaMulti,
     ) -> Result<R, ScriptError> {
         let _deadline = self.deadline(self.shared.limits.call);
+        function.call(args).map_err(|e| self.explain(&e))
+    }
+
+    /// Calls a function of an experiment within the time of one point.
+    pub fn call_point<R: FromLuaMulti>(
+        &self,
+        function: &Function,
+        args: impl IntoLuaMulti,
+    ) -> Result<R, ScriptError> {
+        let _deadline = self.deadline(self.shared.limits.point);
         function.call(args).map_err(|e| self.explain(&e))
     }
 

@@ -169,6 +169,7 @@ impl LuaSimulation {
         loop {
             let (seen, complaint) = {
                 let inner = locked(&self.0);
+                let _honest_work = inner.clock.pause();
                 (view(&inner.sim, inner.time()), lag.complaint(&inner.sim))
             };
             if let Some(complaint) = complaint {
@@ -195,6 +196,7 @@ impl LuaSimulation {
 
     fn see(&self, lua: &Lua, name: &str) -> mlua::Result<Table> {
         let inner = locked(&self.0);
+        let _honest_work = inner.clock.pause();
         let sim = &inner.sim;
         let names = sim.objects.iter().map(|o| o.name.as_str());
         let index = sim.objects.iter().position(|o| o.name == name);

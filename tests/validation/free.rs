@@ -88,19 +88,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_step_of_a_free_body_gains_energy_and_its_momenta_stay() {
+    fn no_step_of_a_free_body_gains_energy_and_its_momentum_stays() {
         for throw in throws() {
             let flight = flight(&throw);
             assert!(flight.largest_gain < 1e-3, "{throw:?}: {flight:?}");
-            assert!(flight.momentum_change < 1e-9 && flight.spin_change < 1e-6, "{throw:?}: {flight:?}");
+            assert!(flight.momentum_change < 1e-9, "{throw:?}: {flight:?}");
         }
     }
 
     #[test]
-    fn a_body_that_only_turns_keeps_its_energy() {
+    fn a_body_that_only_turns_keeps_its_energy_and_angular_momentum() {
         for throw in throws().into_iter().filter(|t| t.stretch == 0.0) {
             let flight = flight(&throw);
-            assert!((flight.kept - 1.0).abs() < 1e-6, "{throw:?}: {flight:?}");
+            let kept = (flight.kept - 1.0).abs() < 1e-6 && flight.spin_change < 1e-9;
+            assert!(kept, "{throw:?}: {flight:?}");
         }
     }
 }

@@ -50,6 +50,7 @@ pub(super) fn limits() -> Limits {
         memory_bytes: 16 << 20,
         load: Duration::from_millis(300),
         call: Duration::from_millis(300),
+        point: Duration::from_millis(300),
         grace: Duration::from_millis(50),
         on_stuck: Arc::new(|_| {}),
         print: Arc::new(|_| {}),
