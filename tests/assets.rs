@@ -1,0 +1,171 @@
+//! Every shipped recipe is what it says: size, mass, mesh, samples, rest on the table; and the suite on them.
+
+use std::{collections::BTreeMap, path::Path, sync::Arc};
+
+use softvt::{
+    benchmark::{Plan, seed::Split},
+    geometry::{
+        Pose, Vec3,
+        samples::{SampleSpec, surface_samples},
+        voxelise::{VoxelSpec, voxel_mesh},
+    },
+    rollout::{RestCache, Simulation},
+    scene::{Asset, Body, Scene},
+    script::{self, Episode, EpisodeRequest, Loaded},
+};
+
+/// Length, width, height as it lies, mm; Young's modulus, kPa; Poisson's ratio; density, kg/m³.
+const PASTRIES: [(&str, [f64; 3], f64, f64, f64); 5] = [
+    ("spiral_roll", [58.0, 47.0, 40.0], 60.0, 0.35, 240.0),
+    ("steamed_bun", [66.0, 62.0, 44.0], 25.0, 0.30, 180.0),
+    ("small_ridged_roll", [62.0, 44.0, 34.0], 110.0, 0.38, 320.0),
+    ("sesame_bun", [64.0, 62.0, 42.0], 45.0, 0.34, 220.0),
+    ("braided_roll", [110.0, 48.0, 38.0], 90.0, 0.37, 300.0),
+];
+/// A recipe may differ from its table by this, m.
+const NEAR: f64 = 0.5e-3;
+
+fn suite() -> Loaded {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("suites/spatial_soft.lua");
+    script::load(&path, &[]).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn scene(loaded: &Loaded, task: usize, episode: u64) -> Scene {
+    let request = EpisodeRequest {
+        suite: "spatial_soft".into(),
+        task,
+        episode,
+        base_seed: 0,
+        split: Split::Validation,
+        shifts: Vec::new(),
+    };
+    Episode::open(loaded, &request).unwrap_or_else(|e| panic!("{e}")).scene
+}
+
+/// All assets of the suite by name.
+fn assets() -> BTreeMap<String, Arc<Asset>> {
+    let loaded = suite();
+    let objects = (0..5).flat_map(|pair| scene(&loaded, 2 * pair, 0).objects);
+    objects.map(|object| (object.asset.name.clone(), object.asset)).collect()
+}
+
+#[test]
+fn every_recipe_has_the_size_and_material_of_the_table_and_stands_on_zero() {
+    let assets = assets();
+    for (name, size_mm, youngs_kpa, poisson, density) in PASTRIES {
+        let asset = &assets[name];
+        let bounds = asset.shape.bounds();
+        let off = bounds.size() - Vec3::from(size_mm) * 1e-3;
+        assert!(off.amax() < NEAR, "{name}: {:?} mm", bounds.size() * 1e3);
+        assert!(bounds.min.z.abs() < NEAR, "{name}: lowest at {} m", bounds.min.z);
+        assert!(bounds.centre().xy().amax() < NEAR, "{name}: centre at {:?}", bounds.centre());
+        let Body::Soft(soft) = &asset.body else { panic!("{name} is not soft") };
+        assert_eq!(
+            (soft.youngs_pa, soft.poisson, soft.density),
+            (youngs_kpa * 1e3, poisson, density),
+            "{name}"
+        );
+        assert_eq!((asset.friction.static_mu, asset.friction.dynamic_mu), (0.6, 0.5), "{name}");
+    }
+    let plate = assets["plate"].shape.bounds();
+    assert!((plate.size() - Vec3::new(0.138, 0.138, 0.019)).amax() < NEAR, "{:?}", plate.size());
+    assert!(assets["table"].shape.bounds().max.z.abs() < 1e-12);
+}
+
+#[test]
+fn a_plate_is_as_high_as_its_hint_where_objects_rest() {
+    let plate = &assets()["plate"];
+    let hint = plate.hints["surface_m"];
+    for r in [0.0, 0.02, 0.04, 0.055] {
+        let down = plate.shape.ray(&Vec3::new(r, 0.0, 0.1), &-Vec3::z(), 0.2).expect("a plate has no hole");
+        assert!((0.1 - down - hint).abs() < 1e-4, "at {r} m: {}", 0.1 - down);
+    }
+}
+
+#[test]
+fn every_recipe_has_a_voxel_mesh_and_samples_all_around() {
+    let assets = assets();
+    for (name, ..) in PASTRIES {
+        let asset = &assets[name];
+        let Body::Soft(soft) = &asset.body else { panic!("{name} is not soft") };
+        let mesh = voxel_mesh(&asset.shape, &VoxelSpec { resolution: soft.resolution }).expect(name);
+        let samples = surface_samples(&asset.shape, &mesh, &SampleSpec::default());
+        // The surface of a body closes: its oriented area vanishes.
+        let area: f64 = samples.iter().map(|s| s.area).sum();
+        let sum: Vec3 = samples.iter().map(|s| s.n_o * s.area).sum();
+        assert!(sum.norm() < 0.01 * area, "{name}: {sum:?} of {area}");
+        let off = samples.iter().map(|s| asset.shape.distance(&s.p_o).abs()).fold(0.0, f64::max);
+        assert!(off < 0.3e-3, "{name}: a sample lies {off} m off the surface");
+        assert!(asset.visuals.len() >= 2, "{name} has one colour");
+    }
+}
+
+#[test]
+fn every_layout_settles_and_both_tasks_of_a_pair_start_from_one_state() {
+    let loaded = suite();
+    let cache = RestCache::default();
+    let settled = |task: usize| {
+        let scene = scene(&loaded, task, 1);
+        let mut sim = Simulation::new(Arc::new(scene), &Default::default(), &Default::default(), &cache)
+            .expect("builds");
+        sim.settle().unwrap_or_else(|e| panic!("task {task}: {e}"));
+        let bits = |x: &Vec3| x.map(f64::to_bits);
+        sim.world
+            .soft
+            .iter()
+            .flat_map(|soft| soft.body.x.iter().map(bits).collect::<Vec<_>>())
+            .collect::<Vec<_>>()
+    };
+    for pair in 0..5 {
+        assert!(settled(2 * pair) == settled(2 * pair + 1), "pair {pair}");
+    }
+}
+
+#[test]
+fn start_states_spread_as_far_as_the_benchmark_asks() {
+    let loaded = suite();
+    let count = 60;
+    for task in [0, 2, 4, 6, 8] {
+        let scenes: Vec<Scene> = (0..count).map(|episode| scene(&loaded, task, episode)).collect();
+        for side in ["left", "right"] {
+            let poses: Vec<Pose> = scenes.iter().map(|s| pose(s, side)).collect();
+            for (what, value, spread) in [
+                ("x", poses.iter().map(|p| p.translation.x).collect::<Vec<_>>(), 0.020),
+                ("y", poses.iter().map(|p| p.translation.y).collect(), 0.020),
+                ("yaw", poses.iter().map(|p| p.rotation.euler_angles().2).collect(), 30_f64.to_radians()),
+            ] {
+                let low = value.iter().copied().fold(f64::INFINITY, f64::min);
+                let high = value.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+                // 60 uniform draws miss a tenth of the range with a chance of about 1 %.
+                let range = (high - low) / (2.0 * spread);
+                assert!((0.9..=1.0).contains(&range), "task {task} {side} {what}: {range} of the range");
+            }
+        }
+        let joint: Vec<f64> = scenes.iter().flat_map(|s| (0..7).map(|i| s.start_q[i] - START_Q[i])).collect();
+        let sigma = (joint.iter().map(|x| x * x).sum::<f64>() / joint.len() as f64).sqrt();
+        assert!((sigma - 0.02).abs() < 0.003, "task {task}: σ {sigma} rad");
+    }
+}
+
+/// The nominal start pose.
+const START_Q: [f64; 7] = [-0.01988, -0.18734, 0.00767, -2.40340, 0.00496, 2.24534, 0.79485];
+
+fn pose(scene: &Scene, name: &str) -> Pose {
+    scene.objects.iter().find(|o| o.name == name).expect("is in the scene").pose_w
+}
+
+#[test]
+fn left_and_right_are_those_of_the_image_and_prompts_name_the_goal() {
+    let loaded = suite();
+    let Plan::Suite(suite) = &loaded.plan else { panic!("{:?}", loaded.plan) };
+    assert_eq!(suite.tasks.len(), 10);
+    for task in &suite.tasks {
+        let scene = scene(&loaded, task.id, 0);
+        assert!(pose(&scene, "left").translation.y < pose(&scene, "right").translation.y, "task {}", task.id);
+        let softvt::benchmark::Goal::On { object, target, .. } = &task.goal else {
+            panic!("task {}", task.id)
+        };
+        assert!(task.prompt.starts_with(&format!("pick up the {object} ")), "{}", task.prompt);
+        assert_eq!(target, "plate");
+    }
+}
