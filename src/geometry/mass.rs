@@ -4,7 +4,7 @@ use super::{
     Mat3, Pose, Vec3,
     mesh::Mesh,
     shape::{Profile, Shape},
-    skin::skin,
+    skin::bare_skin,
 };
 
 /// Mass properties of a solid.
@@ -81,7 +81,7 @@ fn unit_density(shape: &Shape) -> MassProperties {
         Shape::Placed { shape, pose } => unit_density(shape).moved(pose),
         Shape::Paint { shape, .. } => unit_density(shape),
         Shape::Mesh(solid) => of_mesh(solid.mesh()),
-        _ => of_mesh(&skin(shape, shape.reach().size().max() / CELLS).mesh),
+        _ => of_mesh(&bare_skin(shape, shape.reach().size().max() / CELLS).0),
     }
 }
 

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use super::{
     Quat, Vec3,
     shape::{Profile, Shape},
-    skin::skin,
+    skin::bare_skin,
     voxel::{SurfaceSample, VoxelMesh},
 };
 
@@ -94,10 +94,10 @@ fn exact_patches(shape: &Shape, turn: &Quat, spec: &SampleSpec) -> Option<Vec<Pa
 /// Gathers the triangles of a skin by cells of the wanted spacing and by the side that they face, so that the two sides
 /// of an edge are not mixed; the area of the skin is kept exactly.
 fn skin_patches(shape: &Shape, spec: &SampleSpec) -> Vec<Patch> {
-    let skin = skin(shape, spec.grasp_spacing.min(spec.other_spacing));
+    let (mesh, _) = bare_skin(shape, spec.grasp_spacing.min(spec.other_spacing));
     let mut cells: BTreeMap<(usize, [i64; 3]), Gathered> = BTreeMap::new();
-    for triangle in &skin.mesh.triangles {
-        let [a, b, c] = triangle.map(|v| skin.mesh.vertices[v as usize]);
+    for triangle in &mesh.triangles {
+        let [a, b, c] = triangle.map(|v| mesh.vertices[v as usize]);
         let normal_area = 0.5 * (b - a).cross(&(c - a));
         let area = normal_area.norm();
         if area <= 0.0 {

@@ -32,8 +32,16 @@ const BLOCK: usize = 4;
 ///
 /// The skin is empty only if the shape is, or if it is all thinner than a cell.
 pub fn skin(shape: &Shape, cell: f64) -> Skin {
+    let (mesh, normals) = bare_skin(shape, cell);
+    finish(shape, mesh, normals)
+}
+
+/// What [`skin`] is made of, without materials and texture coordinates: the triangles and the normals at the vertices.
+pub(super) fn bare_skin(shape: &Shape, cell: f64) -> (Mesh, Vec<Vec3>) {
     if let Shape::Mesh(solid) = shape {
-        return finish(shape, solid.mesh().clone());
+        let mesh = solid.mesh().clone();
+        let normals = mesh.vertices.iter().map(|v| shape.estimate(v).1).collect();
+        return (mesh, normals);
     }
     let grid = Grid::over(&shape.reach(), cell);
     let mut values = grid.sample(shape);
@@ -47,7 +55,7 @@ pub fn skin(shape: &Shape, cell: f64) -> Skin {
     let normals: Vec<Vec3> = vertices.iter().map(|v| shape.estimate(v).1).collect();
     let triangles =
         buffer.indices.chunks_exact(6).flat_map(|quad| split(shape, &vertices, &normals, quad)).collect();
-    finish(shape, Mesh { vertices, triangles, uvs: Vec::new() })
+    (Mesh { vertices, triangles, uvs: Vec::new() }, normals)
 }
 
 impl Skin {
@@ -57,9 +65,8 @@ impl Skin {
     }
 }
 
-/// Adds normals, texture coordinates and materials.
-fn finish(shape: &Shape, mut mesh: Mesh) -> Skin {
-    let normals = mesh.vertices.iter().map(|v| shape.estimate(v).1).collect();
+/// Adds texture coordinates and materials.
+fn finish(shape: &Shape, mut mesh: Mesh, normals: Vec<Vec3>) -> Skin {
     let corners = |t: &[u32; 3]| t.map(|v| mesh.vertices[v as usize]);
     let materials =
         mesh.triangles.iter().map(|t| shape.material(&(corners(t).iter().sum::<Vec3>() / 3.0))).collect();

@@ -43,13 +43,38 @@ impl Moving {
     }
 }
 
+/// Where a body and its sample groups are at the start of a step, which is the same for all colliders.
+#[derive(Clone, Debug, Default)]
+pub struct Whereabouts {
+    body: Option<Aabb>,
+    groups: Vec<Aabb>,
+    fastest: f64,
+}
+
+impl Whereabouts {
+    /// Looks where `body` is.
+    pub fn look(&mut self, body: &SoftBody) {
+        self.body = Aabb::around(&body.x);
+        self.fastest = body.max_speed();
+        self.groups.clear();
+        self.groups.extend(body.rest.groups.iter().map(|group| {
+            let first = body.x[group.nodes[0] as usize];
+            let nodes = group.nodes[1..group.count].iter().map(|&node| &body.x[node as usize]);
+            nodes.fold(Aabb { min: first, max: first }, |Aabb { min, max }, x| Aabb {
+                min: min.inf(x),
+                max: max.sup(x),
+            })
+        }));
+    }
+}
+
 /// Steps of approach within which a sample gets a row.
 const AHEAD: f64 = 1.5;
 
 /// Collects the candidates of `body` against `collider` into `out`, in sample order, and calls `near` with every group
 /// that is within `reach` of it, so that its nodes can be kept before they are needed.
 pub fn detect(
-    body: &SoftBody,
+    (body, whereabouts): (&SoftBody, &Whereabouts),
     collider: &Collider,
     moving: &Moving,
     (dt, margin, reach): (f64, f64, f64),
@@ -57,14 +82,18 @@ pub fn detect(
     near: &mut dyn FnMut(usize),
 ) {
     let bounds = collider.bounds;
-    let around = Aabb::around(&body.x).unwrap_or(bounds);
+    let around = whereabouts.body.unwrap_or(bounds);
     let lever = (around.centre() - moving.origin).norm() + around.size().norm();
-    let speed = body.max_speed() + moving.linear.norm() + moving.angular.norm() * lever;
-    if apart(&around, &bounds.moved(&moving.pose), reach.max(AHEAD * dt * speed)) {
+    let speed = whereabouts.fastest + moving.linear.norm() + moving.angular.norm() * lever;
+    let (there, far) = (bounds.moved(&moving.pose), reach.max(AHEAD * dt * speed));
+    if apart(&around, &there, far) {
         return;
     }
     let view = View::new(moving);
-    for (index, group) in body.rest.groups.iter().enumerate() {
+    for (index, (group, around)) in body.rest.groups.iter().zip(&whereabouts.groups).enumerate() {
+        if apart(around, &there, far) {
+            continue;
+        }
         let seen = Seen::new(body, &group.nodes[..group.count], moving, &view);
         let ahead = AHEAD * dt * seen.fastest;
         let look = reach.max(ahead);

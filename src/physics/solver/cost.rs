@@ -55,7 +55,7 @@ impl Solver {
         }
         for scalar in island.scalars.iter().map(|&row| &problem.scalars[row]) {
             let at = self.offsets[scalar.block] + scalar.index;
-            let (force, _, value) = scalar.answer(problem.dt, v[at]);
+            let (force, value) = scalar.answer(problem.dt, v[at]);
             cost += value;
             gradient[at] -= problem.dt * force;
         }
@@ -79,7 +79,7 @@ impl Solver {
         cost
     }
 
-    /// Hessian at `v`: column-major lower triangle of side `island.size`.
+    /// Hessian at `v` but for the scalar rows: column-major lower triangle of side `island.size`.
     pub(super) fn assemble_hessian(
         &mut self,
         problem: &Problem,
@@ -110,10 +110,6 @@ impl Solver {
                 self.map.set(problem, &self.offsets, &patch.a, &patch.b);
                 self.local.scatter(&self.map, hessian, n);
             }
-        }
-        for scalar in island.scalars.iter().map(|&row| &problem.scalars[row]) {
-            let at = self.offsets[scalar.block] + scalar.index;
-            hessian[at * n + at] += scalar.answer(problem.dt, v[at]).1;
         }
     }
 

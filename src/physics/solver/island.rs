@@ -69,6 +69,8 @@ struct Entry {
 #[derive(Debug, Default)]
 pub struct Cache {
     entries: Vec<Entry>,
+    /// Factor of the last velocities' complement.
+    tail: Vec<f64>,
 }
 
 /// Islands whose factors are remembered.
@@ -108,18 +110,37 @@ impl Cache {
         self.entries[0].secant.clear();
     }
 
-    /// Solves in place with the current factor and what was learnt since it was made.
-    pub fn solve(&self, island: &Island, b: &mut [f64]) {
-        let (n, entry) = (island.size, &self.entries[0]);
-        entry.secant.solve(b, |b| {
-            dense::forward(&entry.factor, n, n, b);
-            dense::backward(&entry.factor, n, n, b);
+    /// Solves in place with the current factor, what was learnt since it was made, and `stiffness` added to the diagonal
+    /// of the last velocities, for which the factor was left open.
+    pub fn solve(&mut self, island: &Island, stiffness: &[f64], b: &mut [f64]) {
+        let (n, t) = (island.size, stiffness.len());
+        let (head, tail) = (n - t, &mut self.tail);
+        let entry = &self.entries[0];
+        tail.clear();
+        for (c, stiffness) in stiffness.iter().enumerate() {
+            let start = (head + c) * n + head;
+            tail.extend_from_slice(&entry.factor[start..start + t]);
+            tail[c * t + c] += stiffness;
+        }
+        // The complement of a positive definite matrix, made stiffer: it has a factor.
+        dense::partial_cholesky(tail, t, t);
+        entry.secant.solve(stiffness, b, |b| {
+            dense::forward(&entry.factor, n, head, b);
+            dense::forward(tail, t, t, &mut b[head..]);
+            dense::backward(tail, t, t, &mut b[head..]);
+            dense::backward(&entry.factor, n, head, b);
         });
     }
 
-    /// Corrects the current factor by a step from (`v0`, `g0`) to (`v`, `g`).
-    pub fn learn(&mut self, before: (&[f64], &[f64]), after: (&[f64], &[f64])) {
-        self.entries[0].secant.learn(before, after);
+    /// Corrects the current factor by a step from (`v0`, `g0`) to (`v`, `g`), of which the changes `others` (index,
+    /// amount) are no matter of the factor's.
+    pub fn learn(
+        &mut self,
+        before: (&[f64], &[f64]),
+        after: (&[f64], &[f64]),
+        others: impl Iterator<Item = (usize, f64)>,
+    ) {
+        self.entries[0].secant.learn(before, after, others);
     }
 }
 

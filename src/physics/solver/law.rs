@@ -120,21 +120,54 @@ pub struct Scalar {
     pub force: f64,
 }
 
+/// The pieces of a scalar row's law: at its least force, on its line, at its greatest force.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Piece {
+    /// At the least force.
+    Least,
+    /// Between the two.
+    Inside,
+    /// At the greatest force.
+    Greatest,
+}
+
 impl Scalar {
-    /// Force at velocity `v`: `clamp(k (e − dt v) + d (v_t − v), range)`, and the slope of its impulse, and its cost.
-    pub fn answer(&self, dt: f64, v: f64) -> (f64, f64, f64) {
+    /// Force without the range.
+    fn free(&self, dt: f64, v: f64) -> f64 {
+        self.stiffness * self.error + self.damping * self.target_velocity
+            - (self.stiffness * dt + self.damping) * v
+    }
+
+    /// The piece that acts at velocity `v`.
+    pub fn piece(&self, dt: f64, v: f64) -> Piece {
+        match self.free(dt, v) {
+            free if free <= self.range.0 => Piece::Least,
+            free if free >= self.range.1 => Piece::Greatest,
+            _ => Piece::Inside,
+        }
+    }
+
+    /// Slope and curvature of the cost at `v` if it went on there as on `piece`.
+    pub fn on(&self, piece: Piece, dt: f64, v: f64) -> (f64, f64) {
+        match piece {
+            Piece::Least => (-dt * self.range.0, 0.0),
+            Piece::Greatest => (-dt * self.range.1, 0.0),
+            Piece::Inside => (-dt * self.free(dt, v), dt * (self.stiffness * dt + self.damping)),
+        }
+    }
+
+    /// Force at velocity `v`: `clamp(k (e − dt v) + d (v_t − v), range)`, and its cost.
+    pub fn answer(&self, dt: f64, v: f64) -> (f64, f64) {
         let gain = self.stiffness * dt + self.damping;
-        let base = self.stiffness * self.error + self.damping * self.target_velocity;
-        let free = base - gain * v;
+        let free = self.free(dt, v);
         let force = free.clamp(self.range.0, self.range.1);
-        let inside = free > self.range.0 && free < self.range.1;
         // d(cost)/dv = −dt force; outside of the range the cost goes on linearly.
         let cost = if gain > 0.0 {
             dt / gain * (0.5 * force * force + force * (free - force))
         } else {
             -dt * force * v
         };
-        (force, if inside { dt * gain } else { 0.0 }, cost)
+        (force, cost)
     }
 }
 
@@ -193,8 +226,10 @@ mod tests {
                 block: 0, index: 0, stiffness: 2000.0, damping: 100.0, error, target_velocity: 0.1, range: (-70.0, 70.0), force: 0.0,
             };
             let (dt, e) = (1.0 / 60.0, 1e-6);
-            let slope = (row.answer(dt, v + e).2 - row.answer(dt, v - e).2) / (2.0 * e);
+            let slope = (row.answer(dt, v + e).1 - row.answer(dt, v - e).1) / (2.0 * e);
             prop_assert!((slope + dt * row.answer(dt, v).0).abs() < 1e-5);
+            let (on_piece, _) = row.on(row.piece(dt, v), dt, v);
+            prop_assert!((on_piece + dt * row.answer(dt, v).0).abs() < 1e-12);
         }
     }
 }

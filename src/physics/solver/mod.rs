@@ -9,6 +9,7 @@
 
 mod assemble;
 mod cost;
+mod direction;
 mod island;
 mod law;
 mod newton;

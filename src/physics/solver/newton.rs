@@ -2,8 +2,9 @@
 
 use super::{
     assemble::{Local, Map},
+    direction::tail,
     island::{Cache, Island, islands},
-    law::Answer,
+    law::{Answer, Piece},
     problem::Problem,
 };
 use crate::{geometry::Vec3, physics::sparse::dense};
@@ -49,13 +50,17 @@ pub struct Failure {
 pub struct Solver {
     pub(super) offsets: Vec<usize>,
     pub(super) v: Vec<f64>,
-    trial: Vec<f64>,
-    step: Vec<f64>,
-    gradient: Vec<f64>,
-    trial_gradient: Vec<f64>,
+    pub(super) trial: Vec<f64>,
+    pub(super) step: Vec<f64>,
+    pub(super) gradient: Vec<f64>,
+    pub(super) trial_gradient: Vec<f64>,
     pub(super) product: Vec<f64>,
     scale: Vec<f64>,
-    cache: Cache,
+    pub(super) cache: Cache,
+    /// The piece on which each scalar row of the island is taken to end.
+    pub(super) pieces: Vec<Piece>,
+    /// Curvature of the scalar rows at the island's last velocities.
+    pub(super) stiffness: Vec<f64>,
     pub(super) local: Local,
     pub(super) map: Map,
     /// Velocities and answers of one patch.
@@ -141,8 +146,7 @@ impl Solver {
             if fresh {
                 since = (0, excess);
             }
-            self.step.iter_mut().zip(&self.gradient).for_each(|(s, g)| *s = -g);
-            self.cache.solve(island, &mut self.step);
+            self.find_step(problem, island);
             let Some(lower) = self.line_search(problem, island, cost) else {
                 if !fresh {
                     usable = false;
@@ -156,7 +160,7 @@ impl Solver {
                 };
             };
             cost = lower;
-            self.cache.learn((&self.trial, &self.trial_gradient), (&self.v, &self.gradient));
+            self.learn(problem, island);
             excess = self.excess(problem, island);
             since.0 += 1;
             usable = since.0 < TRIAL_STEPS || steps_left(since, excess) < STEPS_PER_FACTOR;
@@ -173,14 +177,15 @@ impl Solver {
         cost
     }
 
-    /// Assembles and factors the Hessian at the present velocities.
+    /// Assembles the Hessian at the present velocities and factors it down to the velocities with scalar rows.
     fn refactor(&mut self, problem: &Problem, island: &Island) -> bool {
         let mut hessian = self.cache.take(island);
         let v = std::mem::take(&mut self.v);
         self.assemble_hessian(problem, island, &v, &mut hessian);
         self.v = v;
         let n = island.size;
-        let sound = dense::partial_cholesky(&mut hessian[..n * n], n, n);
+        let tail = tail(problem, &self.offsets, island);
+        let sound = dense::partial_cholesky(&mut hessian[..n * n], n, n - tail);
         self.cache.give(hessian, sound);
         self.factored += 1;
         sound

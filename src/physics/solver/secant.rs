@@ -29,8 +29,14 @@ impl Secant {
         self.used = 0;
     }
 
-    /// Learns from a step from (`v0`, `g0`) to (`v`, `g`).
-    pub fn learn(&mut self, (v0, g0): (&[f64], &[f64]), (v, g): (&[f64], &[f64])) {
+    /// Learns from a step from (`v0`, `g0`) to (`v`, `g`), of which the changes `others` (index, amount) of the gradient
+    /// are not to be learnt.
+    pub fn learn(
+        &mut self,
+        (v0, g0): (&[f64], &[f64]),
+        (v, g): (&[f64], &[f64]),
+        others: impl Iterator<Item = (usize, f64)>,
+    ) {
         if self.used == PAIRS {
             self.pairs.rotate_left(1);
             self.used -= 1;
@@ -43,6 +49,7 @@ impl Secant {
         pair.step.extend(v.iter().zip(v0).map(|(v, v0)| v - v0));
         pair.change.clear();
         pair.change.extend(g.iter().zip(g0).map(|(g, g0)| g - g0));
+        others.for_each(|(at, amount)| pair.change[at] -= amount);
         pair.curvature = dot(&pair.step, &pair.change);
         // The cost is convex: anything else is rounding.
         let floor = 1e-12 * (dot(&pair.step, &pair.step) * dot(&pair.change, &pair.change)).sqrt();
@@ -51,16 +58,24 @@ impl Secant {
         }
     }
 
-    /// Solves with the corrected factor in place; `solve` does so with the factor itself.
-    pub fn solve(&self, b: &mut [f64], solve: impl FnOnce(&mut [f64])) {
-        let mut weights = [0.0; PAIRS];
-        for (pair, weight) in self.pairs[..self.used].iter().zip(&mut weights).rev() {
-            *weight = dot(&pair.step, b) / pair.curvature;
+    /// Solves with the corrected factor in place; `solve` does so with the factor itself. The factor holds `stiffness`
+    /// on the diagonal of the last velocities, which the pairs do not know of.
+    pub fn solve(&self, stiffness: &[f64], b: &mut [f64], solve: impl FnOnce(&mut [f64])) {
+        let head = b.len() - stiffness.len();
+        let (mut weights, mut curvatures) = ([0.0; PAIRS], [0.0; PAIRS]);
+        let pairs = self.pairs[..self.used].iter();
+        for ((pair, weight), curvature) in pairs.clone().zip(&mut weights).zip(&mut curvatures).rev() {
+            let tail = || pair.step[head..].iter().zip(stiffness);
+            *curvature = pair.curvature + tail().map(|(s, k)| k * s * s).sum::<f64>();
+            *weight = dot(&pair.step, b) / *curvature;
             b.iter_mut().zip(&pair.change).for_each(|(b, y)| *b -= *weight * y);
+            b[head..].iter_mut().zip(tail()).for_each(|(b, (s, k))| *b -= *weight * k * s);
         }
         solve(b);
-        for (pair, weight) in self.pairs[..self.used].iter().zip(&weights) {
-            let missing = weight - dot(&pair.change, b) / pair.curvature;
+        for ((pair, weight), curvature) in pairs.zip(&weights).zip(&curvatures) {
+            let tail = pair.step[head..].iter().zip(stiffness).zip(&b[head..]);
+            let along = dot(&pair.change, b) + tail.map(|((s, k), b)| k * s * b).sum::<f64>();
+            let missing = weight - along / curvature;
             b.iter_mut().zip(&pair.step).for_each(|(b, s)| *b += missing * s);
         }
     }
@@ -78,11 +93,14 @@ mod tests {
         for i in [1, 2, 4] {
             let v: [f64; 5] = std::array::from_fn(|j| if i == j { 0.7 } else { 0.0 });
             let g: [f64; 5] = std::array::from_fn(|j| hessian[j] * v[j]);
-            secant.learn((&[0.0; 5], &[0.0; 5]), (&v, &g));
+            // What a stiffness of 7 on the last entry adds is not to be learnt.
+            let all: [f64; 5] = std::array::from_fn(|j| g[j] + if j == 4 { 7.0 * v[j] } else { 0.0 });
+            secant.learn((&[0.0; 5], &[0.0; 5]), (&v, &all), [(4, 7.0 * v[4])].into_iter());
         }
         let mut b = [1.0, 2.0, 3.0, 4.0, 5.0];
-        let exact: [f64; 5] = std::array::from_fn(|i| b[i] / hessian[i]);
-        secant.solve(&mut b, |_| ());
+        let full = [1.0, 5.0, 0.25, 1.0, 3.0 + 2.0];
+        let exact: [f64; 5] = std::array::from_fn(|i| b[i] / full[i]);
+        secant.solve(&[2.0], &mut b, |b| b[4] /= 1.0 + 2.0);
         assert!(b.iter().zip(exact).all(|(b, e)| (b - e).abs() < 1e-14), "{b:?}");
     }
 }

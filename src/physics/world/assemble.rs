@@ -4,7 +4,7 @@ use super::{RowOf, StepFailure, World};
 use crate::{
     geometry::{Pose, Vec3},
     physics::{
-        contact::{Mover, Moving, Partner, Slot, detect},
+        contact::{Mover, Moving, Partner, Slot, Whereabouts, detect},
         fem::system::StepCoefficients,
         joints,
         rigid::free_spin,
@@ -78,14 +78,15 @@ impl World {
     /// Fills the candidate list and marks the nodes that must stay in the reduced systems.
     pub(super) fn detect(&mut self) {
         self.candidates.clear();
-        let mut found = Vec::new();
+        let (mut found, mut whereabouts) = (Vec::new(), Whereabouts::default());
         for (index, soft) in self.soft.iter_mut().enumerate().filter(|(_, s)| !s.asleep) {
             soft.steps += 1;
             let (system, body, step) = (&mut soft.system, &soft.body, soft.steps);
+            whereabouts.look(body);
             for (id, collider) in self.colliders.iter().enumerate() {
                 found.clear();
                 let limits = (self.params.dt, self.params.margin, REACH);
-                detect(body, collider, &self.moving[id], limits, &mut found, &mut |group| {
+                detect((body, &whereabouts), collider, &self.moving[id], limits, &mut found, &mut |group| {
                     let group = &body.rest.groups[group];
                     group.nodes[..group.count].iter().for_each(|&node| system.mark(node, step));
                 });
