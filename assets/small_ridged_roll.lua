@@ -15,7 +15,8 @@ local table_top = softvt.shape.box { size = { 0.1, 0.1, 0.02 } }:translate(0, 0,
 return softvt.asset {
   name = "small_ridged_roll",
   shape = ridged:subtract(table_top, 3 * mm):paint { material = 1, region = oval:round(0.45 * mm) },
-  body = softvt.soft { youngs_pa = 110e3, poisson = 0.38, density = 320 },
+  -- At six voxels its deformation comes out half again too large; at eight it is within 10 % of a refined mesh.
+  body = softvt.soft { youngs_pa = 110e3, poisson = 0.38, density = 320, resolution = 8 },
   hints = { grasp_height_m = 18.5 * mm },
   visuals = {
     { albedo = { 0.20, 0.09, 0.04 }, roughness = 0.55 },
