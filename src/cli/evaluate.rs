@@ -66,6 +66,10 @@ fn show(run: &Run, summaries: &[Summary]) {
 
 /// The folder that was asked for (with one more level for one of several suites), or the next free one under `runs/`.
 fn out_dir(run: &Run, suite: &str, level: Option<&str>) -> PathBuf {
+    // A name is the script's; it must not lead out of the folder.
+    let plain = |name: &str| name.replace(|c: char| !(c.is_alphanumeric() || c == '_' || c == '-'), "_");
+    let suite = plain(suite);
+    let level = level.map(plain);
     match &run.out {
         Some(dir) => level.map_or(dir.clone(), |level| dir.join(level)),
         None => (1..)
