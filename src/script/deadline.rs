@@ -15,6 +15,7 @@ use std::{
 use mlua::{HookTriggers, Lua, VmState};
 
 use super::error::ScriptError;
+use crate::rollout::stop;
 
 /// Instructions between two looks at the clock; about 0.3 ms.
 const STRIDE: u32 = 20_000;
@@ -136,6 +137,9 @@ impl Clock {
 
     fn expired(&self) -> Option<ScriptError> {
         let state = lock(&self.state);
+        if stop::requested() {
+            return Some(ScriptError::new(state.file.clone(), "interrupted"));
+        }
         state.until.is_some_and(|until| Instant::now() > until).then(|| {
             ScriptError::new(
                 state.file.clone(),

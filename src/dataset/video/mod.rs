@@ -73,7 +73,11 @@ impl VideoWriter {
         config.preset = Preset::Fast;
         config.level_idc = level(width, height);
         let encoder = Encoder::new(config).map_err(VideoError::Encoder)?;
-        Ok(Self { encoder, track: mp4::Track::new(width, height, rate), frame: YuvFrame::black(width, height) })
+        Ok(Self {
+            encoder,
+            track: mp4::Track::new(width, height, rate),
+            frame: YuvFrame::black(width, height),
+        })
     }
 
     /// Adds one picture: rows from the top, three bytes a pixel, sRGB.
@@ -121,7 +125,8 @@ impl VideoWriter {
 /// Smallest level whose frame size admits this picture (ITU-T H.264, Table A-1, MaxFS in macroblocks).
 fn level(width: usize, height: usize) -> u8 {
     let blocks = width.div_ceil(16) * height.div_ceil(16);
-    const LEVELS: [(usize, u8); 6] = [(1620, 30), (3600, 31), (5120, 32), (8192, 40), (22080, 50), (36864, 51)];
+    const LEVELS: [(usize, u8); 6] =
+        [(1620, 30), (3600, 31), (5120, 32), (8192, 40), (22080, 50), (36864, 51)];
     LEVELS.iter().find(|(most, _)| blocks <= *most).map_or(52, |(_, level)| *level)
 }
 

@@ -62,7 +62,8 @@ impl Track {
     fn moov(&self, first: u32) -> Vec<u8> {
         let scale = self.rate * TICKS;
         let duration = self.samples.len() as u32 * TICKS;
-        let mvhd = Fields::full(0).u32s(&[0, 0, scale, duration, 0x0001_0000]).u16s(&[0x0100, 0]).u32s(&[0, 0]);
+        let mvhd =
+            Fields::full(0).u32s(&[0, 0, scale, duration, 0x0001_0000]).u16s(&[0x0100, 0]).u32s(&[0, 0]);
         let mvhd = mvhd.u32s(&MATRIX).u32s(&[0; 6]).u32s(&[2]);
         // Flags 3: the track is enabled and part of the presentation.
         let tkhd = Fields::full(3).u32s(&[0, 0, 1, 0, duration, 0, 0]).u16s(&[0, 0, 0, 0]).u32s(&MATRIX);
@@ -111,7 +112,8 @@ impl Track {
         let avcc = Fields(profile.to_vec()).u16s(&[sps.len() as u16]).bytes(sps).bytes(&[1]);
         let avcc = avcc.u16s(&[pps.len() as u16]).bytes(pps);
         let colr = Fields(b"nclx".to_vec()).u16s(&[6, 6, 6]).bytes(&[0]);
-        let entry = Fields(vec![0; 6]).u16s(&[1]).u16s(&[0; 8]).u16s(&[self.width as u16, self.height as u16]);
+        let entry =
+            Fields(vec![0; 6]).u16s(&[1]).u16s(&[0; 8]).u16s(&[self.width as u16, self.height as u16]);
         // 72 dpi, one frame a sample, no name, 24 bits a pixel, no colour table.
         let entry = entry.u32s(&[0x0048_0000, 0x0048_0000, 0]).u16s(&[1]).bytes(&[0; 32]).u16s(&[24, 0xffff]);
         boxed(b"avc1", &entry.bytes(&boxed(b"avcC", &avcc.0)).bytes(&boxed(b"colr", &colr.0)).0)
@@ -152,7 +154,8 @@ impl Fields {
 
 /// Splits an Annex B stream (ITU-T H.264, B.1) at its start codes; the units come without them and are never empty.
 fn nal_units(stream: &[u8]) -> impl Iterator<Item = &[u8]> {
-    let starts: Vec<usize> = (0..stream.len().saturating_sub(2)).filter(|&i| stream[i..i + 3] == [0, 0, 1]).collect();
+    let starts: Vec<usize> =
+        (0..stream.len().saturating_sub(2)).filter(|&i| stream[i..i + 3] == [0, 0, 1]).collect();
     let ends = starts.iter().skip(1).copied().chain([stream.len()]).collect::<Vec<_>>();
     let units = starts.into_iter().zip(ends).map(|(start, end)| {
         let unit = &stream[start + 3..end];
