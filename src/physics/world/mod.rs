@@ -5,6 +5,7 @@ mod build;
 mod energy;
 mod frame;
 mod integrate;
+mod points;
 mod rigid_rows;
 mod sleep;
 mod sliding;
@@ -24,7 +25,7 @@ use crate::{
     },
 };
 
-pub use frame::{ContactPatch, Frame, PatchPoint, Touch};
+pub use frame::{ContactPatch, Frame, Movable, PatchPoint, Touch};
 
 /// A soft body in the world.
 #[derive(Debug)]
@@ -62,6 +63,8 @@ pub struct Rigid {
     pub body: RigidBody,
     /// Whether it sleeps: it stands still, as if it were part of the world, until something stirs near it.
     pub asleep: bool,
+    /// What touched it in the last step in which it was awake, by [`Partner::id`](crate::physics::contact::Partner::id).
+    pub touches: Vec<(u32, Touch)>,
     slow_for: f64,
 }
 
