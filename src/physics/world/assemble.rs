@@ -282,7 +282,8 @@ impl World {
             sliding: slot.slipping,
         };
         let known = *b == Endpoint::Known;
-        let point = meeting.point(&collider.friction.with(&body.friction), &collider.layer.in_series(&body.layer));
+        let point =
+            meeting.point(&collider.friction.with(&body.friction), &collider.layer.in_series(&body.layer));
         self.problem.points.push(Point {
             weights_a: sample.weights,
             drift: if known { moving.velocity(&candidate.p) } else { Vec3::zeros() },

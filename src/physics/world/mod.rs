@@ -16,7 +16,7 @@ use std::sync::Arc;
 use crate::{
     geometry::{Mat3, Pose, Vec3},
     physics::{
-        contact::{Candidate, Collider, ColliderId, Friction, Layer, Memory, Moving, Surface},
+        contact::{Candidate, Collider, ColliderId, Friction, Layer, Memory, Moving, Partner, Surface},
         fem::{SoftBody, system::System},
         joints::{self, Tree, TreeState},
         params::Params,
@@ -231,7 +231,10 @@ impl World {
 
     /// Name of a partner of a [`Touch`].
     pub fn partner_name(&self, partner: u32) -> &str {
-        self.colliders.get(partner as usize).map_or("soft body", |c| c.name.as_str())
+        match Partner::of(partner) {
+            Partner::Collider(id) => &self.colliders[id].name,
+            Partner::Soft(index) => &self.soft[index].name,
+        }
     }
 
     /// The colliders, by id.
