@@ -476,7 +476,7 @@ function Simulation:drive(expert) end
 ---@return string?
 function Simulation:wait(seconds) end
 
----width_m, height_m (rise of the centre), speed, asset; of a soft object also d_pct, d_peak_pct, min_det_f, asleep, and pad_force (N) and slip_mm of the left and right pad.
+---width_m, height_m (rise of the centre), speed, asset; of a movable object also pad_force (N) and slip_mm of the left and right pad, and of a soft one d_pct, d_peak_pct, min_det_f, asleep.
 ---@param object string
 ---@return table
 function Simulation:watch(object) end

@@ -81,6 +81,8 @@ pub struct Motion {
     pub lifted: bool,
     /// At least one pad presses on it.
     pub touched: bool,
+    /// Another part of the robot presses on it: the hand, a finger, a sensor's case.
+    pub handled: bool,
     /// Something other than the robot presses on it from below.
     pub supported: bool,
     /// The hand has been told to release.
@@ -131,7 +133,7 @@ impl DropWatch {
     }
 
     fn fell_freely(&mut self, rules: &Rules, motion: &Motion) -> bool {
-        if motion.touched || motion.supported {
+        if motion.touched || motion.handled || motion.supported {
             // The fall starts at the height of the last touch, not one step below it.
             self.airborne_from = Some(motion.centre_z);
             return false;

@@ -10,6 +10,7 @@ fn held() -> Motion {
         hand_z: 0.4,
         lifted: true,
         touched: true,
+        handled: false,
         supported: false,
         released: false,
         in_workspace: true,
@@ -53,6 +54,22 @@ fn what_was_not_lifted_cannot_be_lost() {
     let mut motions = lost(30, 0.1);
     motions[0].lifted = false;
     assert_eq!(drop_of(motions), None);
+}
+
+#[test]
+fn what_lies_on_a_finger_does_not_fall_freely() {
+    let lowered = |handled| {
+        let at = |i: u32| 0.3 - 0.001 * f64::from(i);
+        drop_of((0..100).map(|i| Motion {
+            touched: false,
+            handled,
+            released: true,
+            centre_z: at(i),
+            ..held()
+        }))
+    };
+    assert_eq!(lowered(false), Some(DropReason::FreeFall));
+    assert_eq!(lowered(true), None);
 }
 
 #[test]

@@ -56,6 +56,8 @@ pub struct Evidence<'a> {
     pub gripper: GripperEvidence,
     /// Left and right pad against the target.
     pub pads: [PadEvidence; 2],
+    /// Normal impulse in this step between the target and the rest of the robot (hand, fingers, sensor cases), N s.
+    pub robot_impulse_ns: f64,
     /// The target.
     pub target: BodyEvidence,
     /// The other movable bodies, always in the same order.
@@ -81,6 +83,7 @@ impl Evidence<'_> {
             && self.gripper.width_m.is_finite()
             && self.gripper.commanded_width_m.is_finite()
             && self.pads.iter().all(|pad| pad.normal_impulse_ns.is_finite() && pad.travel_m.is_finite())
+            && self.robot_impulse_ns.is_finite()
             && self.target.is_finite()
             && self.others.iter().all(BodyEvidence::is_finite)
             && self.place.support_impulse_ns.is_finite()

@@ -60,7 +60,7 @@ pub struct Placement {
     pub inside_with_margin: bool,
     /// The place carries its share of the weight, mean over the control step.
     pub supported: bool,
-    /// A pad pressed on the target at any time in the control step.
+    /// A pad or another part of the robot pressed on the target at any time in the control step.
     pub touched: bool,
     /// The released code's predicate.
     pub v1: bool,

@@ -180,12 +180,13 @@ impl Judge {
             hand_z: evidence.hand_w.z,
             lifted,
             touched: touch[0] || touch[1],
+            handled: evidence.robot_impulse_ns / self.setup.dt_s > self.setup.rules.touch_force_n,
             supported: self.supported(&evidence.target),
             released,
             in_workspace: contains(&self.setup.workspace, &evidence.target),
         };
         self.drops.observe(&self.setup.rules, self.setup.dt_s, &motion);
-        self.observe_goal(evidence, motion.touched);
+        self.observe_goal(evidence, motion.touched || motion.handled);
     }
 
     /// Whether the goal has held for long enough: the episode may end.

@@ -66,6 +66,7 @@ impl Play {
                 hand_w: Vec3::new(-0.2, 0.0, 0.1),
                 gripper: GripperEvidence { width_m: 0.08, commanded_width_m: 0.08 },
                 pads: [PadEvidence::default(); 2],
+                robot_impulse_ns: 0.0,
                 target: lying(-0.2, 0.2),
                 others: &others,
                 place: PlaceEvidence { pose_w: Pose::identity(), support_impulse_ns: 0.0 },
@@ -132,16 +133,17 @@ fn one_step_of_too_much_deformation_is_enough() {
 }
 
 #[test]
-fn a_plate_that_carries_less_than_half_or_a_pad_that_touches_is_no_rest() {
-    for (share, pad) in [(0.49, 0.0), (0.6, 0.01)] {
+fn a_plate_that_carries_less_than_half_or_a_hand_that_touches_is_no_rest() {
+    for (share, pad, case) in [(0.49, 0.0, 0.0), (0.6, 0.01, 0.0), (0.6, 0.0, 0.01)] {
         let mut play = Play::new(setup());
         play.steps(60, |e| {
             e.target = lying(0.0, 0.2);
             e.place.support_impulse_ns = share * WEIGHT_N * DT;
             e.pads[0].normal_impulse_ns = pad;
+            e.robot_impulse_ns = case;
         });
         let v = play.verdict(Outcome::Timeout);
-        assert!(!v.goal && v.goal_v1 && v.no_drop && !v.safety, "{share} {pad}");
+        assert!(!v.goal && v.goal_v1 && v.no_drop && !v.safety, "{share} {pad} {case}");
     }
 }
 

@@ -97,6 +97,24 @@ impl PadSurface {
             coverage,
         }
     }
+
+    /// The dome in square patches about `spacing` (m) wide: centre and normal (pad frame) and the part of the patch's
+    /// area (m²) that lies on the footprint.
+    pub fn patches(&self, spacing: f64) -> Vec<(Vec3, Vec3, f64)> {
+        let count = |extent: f64| (extent / spacing).ceil().max(1.0) as usize;
+        let (nx, ny) = (count(self.length), count(self.width));
+        let (dx, dy) = (self.length / nx as f64, self.width / ny as f64);
+        let at = |i: usize, n: usize, d: f64| (i as f64 + 0.5 - 0.5 * n as f64) * d;
+        let cells = (0..nx * ny).map(|cell| (at(cell % nx, nx, dx), at(cell / nx, ny, dy)));
+        cells
+            .map(|(x, y)| {
+                let p_p = Vec3::new(x, y, self.height(x, y));
+                let contact = self.contact(&p_p, dx.max(dy));
+                (p_p, contact.normal_p, dx * dy * contact.coverage)
+            })
+            .filter(|(_, _, area)| *area > 0.0)
+            .collect()
+    }
 }
 
 /// Pad frame in the frame of its finger's link.
@@ -241,6 +259,21 @@ mod tests {
                 * spacing
                 * spacing;
             assert!((area / footprint - 1.0).abs() < 2e-3, "{area} {footprint}");
+        }
+    }
+
+    #[test]
+    fn patches_tile_the_footprint_and_lie_on_the_dome() {
+        let pad = PadSurface::default();
+        let footprint = pad.length * pad.width - (4.0 - std::f64::consts::PI) * pad.corner.powi(2);
+        let patches = pad.patches(0.75e-3);
+        let area: f64 = patches.iter().map(|(_, _, area)| area).sum();
+        assert!((area / footprint - 1.0).abs() < 2e-3, "{area} {footprint}");
+        let mean = patches.iter().map(|(p, _, area)| p * *area).sum::<Vec3>() / area;
+        assert!(mean.xy().norm() < 1e-12, "{mean}");
+        for (p, normal, _) in patches {
+            let contact = pad.contact(&p, 1e-3);
+            assert!(contact.phi.abs() < 1e-15 && (contact.normal_p - normal).norm() < 1e-15);
         }
     }
 

@@ -7,6 +7,7 @@ use crate::{
         evidence::{BodyEvidence, Evidence, GripperEvidence, PadEvidence, PlaceEvidence},
     },
     geometry::Vec3,
+    physics::{contact::Partner, world::Touch},
     robot::gripper::target_width,
 };
 
@@ -61,7 +62,9 @@ impl Witness {
         self.bodies = self.others.iter().map(|&i| self.body(sim, i)).collect();
         let target = &sim.objects[self.target];
         let place = &sim.objects[self.place];
-        let support: f64 = place.colliders.iter().map(|&c| upward(sim, target, c)).sum::<f64>() * dt;
+        let from_place = partners(place).map(|partner| upward(&sim.touch(target, partner))).sum::<f64>();
+        let from_robot =
+            sim.rig.body.iter().map(|&c| sim.touch(target, Partner::Collider(c)).normal_force).sum::<f64>();
         Evidence {
             time_s,
             hand_w: sim.rig.hand_w(&sim.world),
@@ -69,24 +72,23 @@ impl Witness {
                 width_m: sim.rig.width(&sim.world),
                 commanded_width_m: target_width(sim.rig.closure()),
             },
-            pads: sim.rig.pads.map(|pad| match target.kind {
-                Kind::Soft(index) => {
-                    let touch = sim.world.touch(index, pad);
-                    PadEvidence { normal_impulse_ns: touch.normal_force * dt, travel_m: touch.travel }
-                }
-                _ => PadEvidence::default(),
+            pads: sim.pad_touches(target).map(|touch| PadEvidence {
+                normal_impulse_ns: touch.normal_force * dt,
+                travel_m: touch.travel,
             }),
+            robot_impulse_ns: from_robot * dt,
             target: self.body(sim, self.target),
-            place: PlaceEvidence { pose_w: sim.pose(place), support_impulse_ns: support },
+            place: PlaceEvidence { pose_w: sim.pose(place), support_impulse_ns: from_place * dt },
             others: &self.bodies,
         }
     }
 
     fn body(&self, sim: &Simulation, index: usize) -> BodyEvidence {
         let object = &sim.objects[index];
-        let robot = |c: usize| sim.rig.pads.contains(&c) || sim.rig.body.contains(&c);
-        let support: f64 =
-            (0..sim.world.colliders().len()).filter(|c| !robot(*c)).map(|c| upward(sim, object, c)).sum();
+        let robot = |partner| matches!(partner, Partner::Collider(c) if sim.rig.pads.contains(&c) || sim.rig.body.contains(&c));
+        let touches = object.kind.movable().map_or(&[][..], |body| sim.world.touches_on(body));
+        let others = touches.iter().filter(|(partner, _)| !robot(Partner::of(*partner)));
+        let support: f64 = others.map(|(_, touch)| upward(touch)).sum();
         BodyEvidence {
             centre_w: sim.centre(object),
             lowest_z_w: lowest(sim, object),
@@ -96,12 +98,18 @@ impl Witness {
     }
 }
 
-/// Upward force of a collider on an object, N.
-fn upward(sim: &Simulation, object: &Handle, collider: usize) -> f64 {
-    match object.kind {
-        Kind::Soft(index) => sim.world.touch(index, collider).force_w.z.max(0.0),
-        _ => 0.0,
-    }
+/// What an object is to those that it touches: its colliders, or a soft body.
+fn partners(object: &Handle) -> impl Iterator<Item = Partner> + '_ {
+    let soft = match object.kind {
+        Kind::Soft(index) => Some(Partner::Soft(index)),
+        _ => None,
+    };
+    object.colliders.iter().map(|&c| Partner::Collider(c)).chain(soft)
+}
+
+/// Upward part of a force, N.
+fn upward(touch: &Touch) -> f64 {
+    touch.force_w.z.max(0.0)
 }
 
 /// Height of the lowest point of an object, m.

@@ -9,7 +9,7 @@ use crate::{
     },
     physics::{
         World,
-        contact::{Collider, ColliderId, Friction, Layer, Mover, Surface},
+        contact::{Collider, ColliderId, Friction, GelSample, Layer, Mover, Solid, Surface},
         world::Drive,
     },
     robot::{
@@ -21,7 +21,10 @@ use crate::{
     },
 };
 
-/// A gel pad as contact samples feel it.
+/// Distance of the gel's samples that hard shapes press on, m: that of a soft body's samples where it is grasped.
+const GEL_SPACING: f64 = 0.75e-3;
+
+/// A gel pad as contact samples and hard shapes feel it.
 #[derive(Debug)]
 struct Pad(PadSurface);
 
@@ -34,6 +37,11 @@ impl Surface for Pad {
     fn bounds(&self) -> Aabb {
         let half = Vec3::new(self.0.length, self.0.width, 0.0) * 0.5;
         Aabb { min: Vec3::new(-half.x, -half.y, -self.0.thickness), max: half }
+    }
+
+    fn solid(&self) -> Option<Solid> {
+        let patches = self.0.patches(GEL_SPACING).into_iter();
+        Some(Solid::Gel(patches.map(|(p, normal, area)| GelSample { p, normal, area }).collect()))
     }
 }
 

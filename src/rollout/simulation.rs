@@ -10,7 +10,11 @@ use super::{
 use crate::{
     benchmark::control::CONTROL_DT,
     geometry::{Pose, Vec3, shape::Aabb},
-    physics::{Params, World, contact::ColliderId, world::StepFailure},
+    physics::{
+        Params, World,
+        contact::{ColliderId, Partner},
+        world::{Movable, StepFailure, Touch},
+    },
     robot::RobotSpec,
     scene::{Asset, Scene},
 };
@@ -24,6 +28,17 @@ pub enum Kind {
     Rigid(usize),
     /// Part of the world.
     Static,
+}
+
+impl Kind {
+    /// It as a free body of the world, if it is one.
+    pub fn movable(self) -> Option<Movable> {
+        match self {
+            Self::Soft(index) => Some(Movable::Soft(index)),
+            Self::Rigid(index) => Some(Movable::Rigid(index)),
+            Self::Static => None,
+        }
+    }
 }
 
 /// An object of the scene in the world.
@@ -156,6 +171,17 @@ impl Simulation {
             }
             Kind::Static => 0.0,
         }
+    }
+
+    /// What a collider or soft body did to an object in the last step in which the object was awake; nothing to what
+    /// never moves.
+    pub fn touch(&self, object: &Handle, partner: Partner) -> Touch {
+        object.kind.movable().map_or(Touch::default(), |body| self.world.touch_on(body, partner))
+    }
+
+    /// What the left and right pad did to an object.
+    pub fn pad_touches(&self, object: &Handle) -> [Touch; 2] {
+        self.rig.pads.map(|pad| self.touch(object, Partner::Collider(pad)))
     }
 
     /// Object by name.

@@ -74,10 +74,7 @@ impl StepTrace {
         nodes: bool,
     ) -> Self {
         let tool = sim.rig.tool_b(&sim.world);
-        let touch = sim.rig.pads.map(|pad| match sim.objects[target].kind {
-            Kind::Soft(index) => sim.world.touch(index, pad),
-            _ => Default::default(),
-        });
+        let touch = sim.pad_touches(&sim.objects[target]);
         let energy = sim.world.energy();
         Self {
             step,
@@ -105,10 +102,12 @@ fn object(sim: &Simulation, witness: &Witness, index: usize, nodes: bool) -> Obj
     let handle = &sim.objects[index];
     let pose = sim.pose(handle);
     let q = rotation::canonical(&pose.rotation);
-    let soft = match handle.kind {
-        Kind::Soft(soft) => Some(&sim.world.soft[soft]),
-        _ => None,
+    let (soft, asleep) = match handle.kind {
+        Kind::Soft(index) => (Some(&sim.world.soft[index]), sim.world.soft[index].asleep),
+        Kind::Rigid(index) => (None, sim.world.rigid[index].asleep),
+        Kind::Static => (None, false),
     };
+    let touches = handle.kind.movable().map_or(&[][..], |body| sim.world.touches_on(body));
     let name = |partner: u32| sim.world.partner_name(partner).to_owned();
     ObjectTrace {
         name: handle.name.clone(),
@@ -116,8 +115,8 @@ fn object(sim: &Simulation, witness: &Witness, index: usize, nodes: bool) -> Obj
         quaternion_w: [q.w, q.i, q.j, q.k],
         d_pct: witness.deformation(sim, index).map(|d| d.rms_pct),
         min_det_f: soft.map(|s| s.min_det_f.0),
-        asleep: soft.is_some_and(|s| s.asleep),
-        touches: soft.map_or(Vec::new(), |s| s.touches.iter().map(|(partner, _)| name(*partner)).collect()),
+        asleep,
+        touches: touches.iter().map(|(partner, _)| name(*partner)).collect(),
         nodes: soft.filter(|_| nodes).map(|s| s.body.x.iter().map(|x| (*x).into()).collect()),
     }
 }

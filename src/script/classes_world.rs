@@ -117,8 +117,8 @@ pub const SIMULATION: Class = Class {
             "watch",
             &[("object", "string")],
             &["table"],
-            "width_m, height_m (rise of the centre), speed, asset; of a soft object also d_pct, d_peak_pct, min_det_f, \
-             asleep, and pad_force (N) and slip_mm of the left and right pad.",
+            "width_m, height_m (rise of the centre), speed, asset; of a movable object also pad_force (N) and slip_mm of \
+             the left and right pad, and of a soft one d_pct, d_peak_pct, min_det_f, asleep.",
         ),
         method("time", &[], &["number"], "Time since settling, s."),
         method("tool", &[], &["number[]", "number[]"], "Tool position, m, and axis-angle, rad, world."),

@@ -53,9 +53,11 @@ pub(super) fn view(sim: &Simulation, time_s: f64) -> ExpertView {
         tcp_b: sim.rig.tool_b(&sim.world),
         width_m: sim.rig.width(&sim.world),
         closure: sim.rig.closure(),
-        pad_force_n: sim.rig.pads.map(|pad| {
-            sim.world.soft.iter().enumerate().map(|(i, _)| sim.world.touch(i, pad).normal_force).sum()
-        }),
+        pad_force_n: sim
+            .objects
+            .iter()
+            .map(|object| sim.pad_touches(object))
+            .fold([0.0; 2], |sum, touch| [sum[0] + touch[0].normal_force, sum[1] + touch[1].normal_force]),
         objects: sim.objects.iter().map(|object| seen(sim, object)).collect(),
     }
 }

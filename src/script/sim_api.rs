@@ -214,15 +214,17 @@ impl LuaSimulation {
         table.set("speed", sim.speed(object))?;
         table.set("asset", object.asset.name.as_str())?;
         table.set("fingerprint", object.asset.fingerprint())?;
+        if object.kind != Kind::Static {
+            let touch = sim.pad_touches(object);
+            table.set("pad_force", lua.create_sequence_from(touch.map(|t| t.normal_force))?)?;
+            table.set("slip_mm", lua.create_sequence_from(touch.map(|t| 1e3 * t.travel))?)?;
+        }
         if let Kind::Soft(soft) = object.kind {
             let body = &sim.world.soft[soft];
-            let touch = sim.rig.pads.map(|pad| sim.world.touch(soft, pad));
             table.set("d_pct", deformation(sim, index, &watched.reference))?;
             table.set("d_peak_pct", watched.d_peak)?;
             table.set("min_det_f", body.min_det_f.0)?;
             table.set("asleep", body.asleep)?;
-            table.set("pad_force", lua.create_sequence_from(touch.map(|t| t.normal_force))?)?;
-            table.set("slip_mm", lua.create_sequence_from(touch.map(|t| 1e3 * t.travel))?)?;
         }
         Ok(table)
     }

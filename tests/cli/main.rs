@@ -1,6 +1,7 @@
 //! The binary as people use it: what it says of bad input, what it writes, that results repeat, and that the benchmark
 //! measures what it says.
 
+mod alike;
 mod bad_runs;
 mod bad_scripts;
 mod determinism;

@@ -1,5 +1,6 @@
 //! Contact in the real world: soft on soft, rigid on rigid, and all kinds of body in one solve, against closed forms.
 
+mod gel;
 mod mixed;
 mod rigid;
 mod scene;

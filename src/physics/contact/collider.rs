@@ -14,8 +14,8 @@ pub trait Surface: Debug + Send + Sync {
     fn contact(&self, p: &Vec3, facing: &Vec3, spacing: f64) -> Contact;
     /// A box around the solid.
     fn bounds(&self) -> Aabb;
-    /// The solid as a shape, if it is one: so other rigid colliders meet it. Others are felt by soft bodies only.
-    fn shape(&self) -> Option<&Shape> {
+    /// How other rigid colliders meet it; without a solid, only soft bodies feel it.
+    fn solid(&self) -> Option<Solid> {
         None
     }
 }
@@ -29,8 +29,8 @@ impl Surface for Shape {
         Self::bounds(self)
     }
 
-    fn shape(&self) -> Option<&Shape> {
-        Some(self)
+    fn solid(&self) -> Option<Solid> {
+        Some(Solid::new(self))
     }
 }
 
@@ -122,7 +122,7 @@ impl Collider {
         layer: Layer,
     ) -> Self {
         let bounds = surface.bounds();
-        let solid = surface.shape().map(|shape| Arc::new(Solid::new(shape)));
+        let solid = surface.solid().map(Arc::new);
         Self { name: name.to_owned(), mover, pose_in_mover, surface, friction, layer, bounds, solid }
     }
 }

@@ -12,4 +12,4 @@ pub use detect::{Candidate, Moving, Whereabouts, detect};
 pub use manifold::ContactPoint;
 pub use memory::{Memory, Partner, Slot};
 pub use soft_field::{Felt, Pressing, SoftField, detect_soft, may_touch};
-pub use solid::{Part, Solid};
+pub use solid::{GelSample, Part, Solid};

@@ -1,20 +1,46 @@
-//! A collider's shape as other rigid colliders meet it: convex pieces where it is made of them, samples of its skin and its
-//! distance field otherwise.
+//! A collider as other rigid colliders meet it: convex pieces where its shape is made of them, samples of its skin and its
+//! distance field otherwise; or a compliant skin, which is felt where it is sampled.
 
 use std::sync::OnceLock;
 
 use super::manifold::{
-    ContactPoint, Piece, SkinSamples, field::samples_vs_field, manifold, pieces, skin_samples,
+    ContactPoint, Piece, SkinSamples, field::samples_vs_field, gel::gel_vs_shape, manifold, pieces,
+    skin_samples,
 };
-use crate::geometry::{Pose, shape::Shape};
+use crate::geometry::{
+    Pose, Vec3,
+    shape::{Aabb, Shape},
+};
 
 /// What rigid solids need to find their contact points.
 #[derive(Debug)]
-pub struct Solid {
+pub enum Solid {
+    /// A hard shape.
+    Hard(Box<Hard>),
+    /// A compliant skin: it meets hard shapes at its samples, and other skins not at all.
+    Gel(Vec<GelSample>),
+}
+
+/// A hard shape with what is derived from it.
+#[derive(Debug)]
+pub struct Hard {
     shape: Shape,
     pieces: Option<Vec<(Piece, Pose)>>,
     /// Chosen when first needed: it takes some milliseconds, and most colliders never meet a general shape.
     samples: OnceLock<SkinSamples>,
+    /// The same: that of a displaced shape takes a search.
+    bounds: OnceLock<Aabb>,
+}
+
+/// A material point of a compliant skin, in the collider's frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GelSample {
+    /// Where it is, m.
+    pub p: Vec3,
+    /// Outward unit normal.
+    pub normal: Vec3,
+    /// Area that it stands for, m².
+    pub area: f64,
 }
 
 /// Says which pieces (or whose samples) a contact point belongs to, within a pair of solids.
@@ -23,15 +49,49 @@ pub type Part = u32;
 impl Solid {
     /// The solid of a shape.
     pub fn new(shape: &Shape) -> Self {
-        Self { shape: shape.clone(), pieces: pieces(shape), samples: OnceLock::new() }
+        Self::Hard(Box::new(Hard {
+            shape: shape.clone(),
+            pieces: pieces(shape),
+            samples: OnceLock::new(),
+            bounds: OnceLock::new(),
+        }))
+    }
+
+    /// Appends the contact points with `other` whose gap is below `margin` (m); normals point from this to the other.
+    pub fn meet(
+        &self,
+        pose: &Pose,
+        other: &Self,
+        other_pose: &Pose,
+        margin: f64,
+        out: &mut Vec<(Part, ContactPoint)>,
+    ) {
+        let mut found = Vec::new();
+        match (self, other) {
+            (Self::Hard(mine), Self::Hard(theirs)) => mine.meet(pose, theirs, other_pose, margin, out),
+            (Self::Gel(gel), Self::Hard(hard)) => {
+                gel_vs_shape(gel, pose, hard.field(), other_pose, margin, &mut found);
+                out.extend(found.drain(..).map(|point| (0, point)));
+            }
+            (Self::Hard(hard), Self::Gel(gel)) => {
+                gel_vs_shape(gel, other_pose, hard.field(), pose, margin, &mut found);
+                out.extend(found.drain(..).map(|point| (0, ContactPoint { n_w: -point.n_w, ..point })));
+            }
+            (Self::Gel(_), Self::Gel(_)) => {}
+        }
+    }
+}
+
+impl Hard {
+    fn field(&self) -> (&Shape, &Aabb) {
+        (&self.shape, self.bounds.get_or_init(|| self.shape.bounds()))
     }
 
     fn samples(&self) -> &SkinSamples {
         self.samples.get_or_init(|| skin_samples(&self.shape))
     }
 
-    /// Appends the contact points with `other` whose gap is below `margin` (m); normals point from this to the other.
-    pub fn meet(
+    fn meet(
         &self,
         pose: &Pose,
         other: &Self,

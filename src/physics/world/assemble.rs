@@ -1,6 +1,6 @@
 //! From the state of the world to one convex problem: blocks, frames, patches, rows.
 
-use super::{RowOf, StepFailure, World};
+use super::{RowOf, StepFailure, World, points::Meeting};
 use crate::{
     geometry::{Pose, Vec3},
     physics::{
@@ -272,27 +272,22 @@ impl World {
             .copied()
             .unwrap_or(Slot::fresh(partner, local));
         let anchor_w = (moving.pose * nalgebra::Point3::from(slot.anchor)).coords;
-        let offset = candidate.p - anchor_w;
-        let friction = collider.friction.with(&body.friction);
-        let layer = collider.layer.in_series(&body.layer);
-        let area = sample.surface.area * candidate.coverage;
-        let known = *b == Endpoint::Known;
-        self.problem.points.push(Point {
-            weights_a: sample.weights,
-            weights_b: [0.0; 8],
+        let meeting = Meeting {
             p: candidate.p,
             normal: candidate.normal,
-            drift: if known { moving.velocity(&candidate.p) } else { Vec3::zeros() },
-            stiffness: layer.normal * area,
-            shear_stiffness: layer.shear * area,
             gap: candidate.gap,
-            offset: offset - candidate.normal * candidate.normal.dot(&offset),
-            mu: if slot.slipping { friction.dynamic_mu } else { friction.static_mu },
-            lagged: slot.impulse,
-            normal_impulse: 0.0,
-            shear_impulse: Vec3::zeros(),
-            velocity: Vec3::zeros(),
-            slipping: false,
+            area: sample.surface.area * candidate.coverage,
+            stretch: candidate.p - anchor_w,
+            impulse: slot.impulse,
+            sliding: slot.slipping,
+        };
+        let known = *b == Endpoint::Known;
+        let point =
+            meeting.point(&collider.friction.with(&body.friction), &collider.layer.in_series(&body.layer));
+        self.problem.points.push(Point {
+            weights_a: sample.weights,
+            drift: if known { moving.velocity(&candidate.p) } else { Vec3::zeros() },
+            ..point
         });
         self.rows.push(RowOf {
             soft,

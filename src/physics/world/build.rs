@@ -52,7 +52,13 @@ impl World {
 
     /// Adds a free rigid body; its index.
     pub fn add_rigid(&mut self, name: &str, body: RigidBody) -> usize {
-        self.rigid.push(Rigid { name: name.to_owned(), body, asleep: false, slow_for: 0.0 });
+        self.rigid.push(Rigid {
+            name: name.to_owned(),
+            body,
+            asleep: false,
+            touches: Vec::new(),
+            slow_for: 0.0,
+        });
         self.rigid.len() - 1
     }
 

@@ -1,9 +1,12 @@
 //! What observers see: cheap copies of the state, and who touches whom.
 
-use super::{RowOf, Soft, World};
+use super::{Rigid, Soft, World, points::add_touch};
 use crate::{
     geometry::{Pose, Vec3},
-    physics::{contact::Partner, solver::Point},
+    physics::{
+        contact::{Mover, Partner},
+        solver::Point,
+    },
 };
 
 /// An immutable copy of the state after a step.
@@ -57,7 +60,16 @@ pub struct PatchPoint {
     pub slipping: bool,
 }
 
-/// What one collider or soft body does to one soft body, summed over the patch.
+/// A free body of the world.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Movable {
+    /// A soft body, by index.
+    Soft(usize),
+    /// A free rigid body, by index.
+    Rigid(usize),
+}
+
+/// What one collider or soft body does to one free body, summed over the patch.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Touch {
     /// Touching samples.
@@ -122,16 +134,48 @@ impl World {
 
     /// What `partner` did to soft body `soft` in the last step in which the body was awake.
     pub fn touch_by(&self, soft: usize, partner: Partner) -> Touch {
-        let touches = &self.soft[soft].touches;
-        touches.iter().find(|(id, _)| *id == partner.id()).map_or(Touch::default(), |(_, touch)| *touch)
+        self.touch_on(Movable::Soft(soft), partner)
     }
 
-    /// Adds one point to what its two sides are told; a sleeping body keeps what it knew.
-    pub(super) fn record_touch(soft: &mut [Soft], row: &RowOf, point: &Point, dt: f64) {
-        let force = (point.normal * point.normal_impulse + point.shear_impulse) / dt;
-        soft[row.soft].record(row.partner, (row, point), &force, dt);
-        if let Partner::Soft(other) = Partner::of(row.partner) {
-            soft[other].record(Partner::Soft(row.soft).id(), (row, point), &-force, dt);
+    /// What `partner` did to a body in the last step in which the body was awake.
+    pub fn touch_on(&self, body: Movable, partner: Partner) -> Touch {
+        let found = self.touches_on(body).iter().find(|(id, _)| *id == partner.id());
+        found.map_or(Touch::default(), |(_, touch)| *touch)
+    }
+
+    /// All that touched a body in the last step in which it was awake, by [`Partner::id`].
+    pub fn touches_on(&self, body: Movable) -> &[(u32, Touch)] {
+        match body {
+            Movable::Soft(index) => &self.soft[index].touches,
+            Movable::Rigid(index) => &self.rigid[index].touches,
+        }
+    }
+
+    /// Tells all bodies that are awake what touched them; a sleeping one keeps what it knew.
+    pub(super) fn record_touches(&mut self) {
+        self.soft.iter_mut().filter(|s| !s.asleep).for_each(|s| s.touches.clear());
+        self.rigid.iter_mut().filter(|r| !r.asleep).for_each(|r| r.touches.clear());
+        let dt = self.params.dt;
+        let Self { soft, rigid, rows, problem, colliders, rigid_contacts, .. } = self;
+        for (row, point) in rows.iter().zip(&problem.points).filter(|(_, point)| point.normal_impulse > 0.0) {
+            let (partner, told) = (Partner::of(row.partner), (point, row.travel));
+            let own = Partner::Soft(row.soft).id();
+            soft[row.soft].told(row.partner, told, (1.0, dt));
+            match partner {
+                Partner::Soft(other) => soft[other].told(own, told, (-1.0, dt)),
+                Partner::Collider(id) => {
+                    if let Mover::Rigid(index) = colliders[id].mover {
+                        rigid[index].told(own, told, (-1.0, dt));
+                    }
+                }
+            }
+        }
+        for (pair, travel, point) in rigid_contacts.points(&problem.points[rows.len()..]) {
+            for (side, other, sign) in [(pair.0, pair.1, 1.0), (pair.1, pair.0, -1.0)] {
+                if let Mover::Rigid(index) = colliders[side].mover {
+                    rigid[index].told(Partner::Collider(other).id(), (point, travel), (sign, dt));
+                }
+            }
         }
     }
 }
@@ -144,22 +188,17 @@ impl Touch {
 }
 
 impl Soft {
-    fn record(&mut self, partner: u32, (row, point): (&RowOf, &Point), force_w: &Vec3, dt: f64) {
-        if self.asleep {
-            return;
+    fn told(&mut self, partner: u32, point: (&Point, f64), side: (f64, f64)) {
+        if !self.asleep {
+            add_touch(&mut self.touches, partner, point, side);
         }
-        let at = self.touches.iter().position(|(id, _)| *id == partner).unwrap_or_else(|| {
-            self.touches.push((partner, Touch::default()));
-            self.touches.len() - 1
-        });
-        let touch = &mut self.touches[at].1;
-        let force = point.normal_impulse / dt;
-        touch.samples += 1;
-        touch.slipping += usize::from(point.slipping);
-        touch.travel =
-            (touch.travel * touch.normal_force + row.travel * force) / (touch.normal_force + force);
-        touch.normal_force += force;
-        touch.force_w += force_w;
-        touch.capacity += point.mu * force;
+    }
+}
+
+impl Rigid {
+    fn told(&mut self, partner: u32, point: (&Point, f64), side: (f64, f64)) {
+        if !self.asleep {
+            add_touch(&mut self.touches, partner, point, side);
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! From the solution back to the state.
 
-use super::{StepFailure, World, sliding::Sliding};
+use super::{StepFailure, World, points::slid, sliding::Sliding};
 use crate::{
     geometry::Vec3,
     physics::{contact::Slot, fem::spin, joints, rigid},
@@ -50,14 +50,13 @@ impl World {
     /// Updates anchors and impulses of the samples that had a row.
     pub(super) fn remember(&mut self) {
         let dt = self.params.dt;
-        self.soft.iter_mut().filter(|s| !s.asleep).for_each(|s| s.touches.clear());
+        self.record_touches();
         let points = self.rows.iter().zip(&self.problem.points);
         let sliding = Sliding::of(points.clone().map(|(row, point)| (row.pair(), point)));
         for (row, point) in points {
             if point.normal_impulse <= 0.0 {
                 continue;
             }
-            Self::record_touch(&mut self.soft, row, point, dt);
             let soft = &mut self.soft[row.soft];
             let mut slot = Slot {
                 partner: row.partner,
@@ -67,13 +66,9 @@ impl World {
                 slipping: sliding.slides(row.pair()),
                 travel: row.travel,
             };
-            if point.slipping {
-                let tangential = point.velocity - point.normal * point.normal.dot(&point.velocity);
-                let stretched = point.offset + tangential * dt;
-                let allowed = point.mu * point.lagged / (dt * point.shear_stiffness).max(f64::MIN_POSITIVE);
-                let excess = (stretched.norm() - allowed).max(0.0);
-                let shift = stretched.try_normalize(0.0).unwrap_or_default() * excess;
-                slot.anchor += row.pull * shift;
+            let (stretch, excess) = slid(point, dt);
+            if excess > 0.0 {
+                slot.anchor += row.pull * (stretch.try_normalize(0.0).unwrap_or_default() * excess);
                 slot.travel += excess;
             }
             soft.memory.put(row.candidate.sample, slot);

@@ -5,6 +5,7 @@ mod build;
 mod energy;
 mod frame;
 mod integrate;
+mod points;
 mod rigid_rows;
 mod sleep;
 mod sliding;
@@ -15,7 +16,7 @@ use std::sync::Arc;
 use crate::{
     geometry::{Mat3, Pose, Vec3},
     physics::{
-        contact::{Candidate, Collider, ColliderId, Friction, Layer, Memory, Moving, Surface},
+        contact::{Candidate, Collider, ColliderId, Friction, Layer, Memory, Moving, Partner, Surface},
         fem::{SoftBody, system::System},
         joints::{self, Tree, TreeState},
         params::Params,
@@ -24,7 +25,7 @@ use crate::{
     },
 };
 
-pub use frame::{ContactPatch, Frame, PatchPoint, Touch};
+pub use frame::{ContactPatch, Frame, Movable, PatchPoint, Touch};
 
 /// A soft body in the world.
 #[derive(Debug)]
@@ -62,6 +63,8 @@ pub struct Rigid {
     pub body: RigidBody,
     /// Whether it sleeps: it stands still, as if it were part of the world, until something stirs near it.
     pub asleep: bool,
+    /// What touched it in the last step in which it was awake, by [`Partner::id`](crate::physics::contact::Partner::id).
+    pub touches: Vec<(u32, Touch)>,
     slow_for: f64,
 }
 
@@ -228,7 +231,10 @@ impl World {
 
     /// Name of a partner of a [`Touch`].
     pub fn partner_name(&self, partner: u32) -> &str {
-        self.colliders.get(partner as usize).map_or("soft body", |c| c.name.as_str())
+        match Partner::of(partner) {
+            Partner::Collider(id) => &self.colliders[id].name,
+            Partner::Soft(index) => &self.soft[index].name,
+        }
     }
 
     /// The colliders, by id.

@@ -5,7 +5,11 @@
 //! moved: the stretch, which grows with the relative velocity and turns with the second body. At rest it holds as an
 //! anchor does, and rolling does not stretch it.
 
-use super::{World, sliding::Sliding};
+use super::{
+    World,
+    points::{Meeting, slid},
+    sliding::Sliding,
+};
 use crate::{
     geometry::{
         Vec3,
@@ -33,6 +37,8 @@ pub(super) struct Grip {
     /// Normal impulse of the last step, N s.
     impulse: f64,
     slipping: bool,
+    /// How far the two have slid on each other here since they met, m.
+    travel: f64,
 }
 
 /// Two colliders close enough to touch within the step: the normals point from `b` to `a`.
@@ -48,8 +54,8 @@ struct Pair {
 pub(super) struct RigidContacts {
     /// By key, ascending.
     grips: Vec<Grip>,
-    /// Pairs and keys of the rows of this step, in the order of their points.
-    rows: Vec<Key>,
+    /// Keys of the rows of this step and how far they have slid before it (m), in the order of their points.
+    rows: Vec<(Key, f64)>,
     pairs: Vec<Pair>,
     found: Vec<(Part, ContactPoint)>,
 }
@@ -77,7 +83,7 @@ impl World {
                 let at = contacts.grips.binary_search_by_key(&key, |grip| grip.key);
                 let grip = at.map_or(Grip::fresh(key), |at| contacts.grips[at]);
                 self.push_contact(&pair, point, &grip, &ends);
-                contacts.rows.push(key);
+                contacts.rows.push((key, grip.travel));
             }
             let last = self.problem.points.len();
             self.problem.patches.push(Patch { a: ends.0, b: ends.1, first, last });
@@ -136,27 +142,18 @@ impl World {
     fn push_contact(&mut self, pair: &Pair, point: &ContactPoint, grip: &Grip, ends: &(Endpoint, Endpoint)) {
         let (a, b) = (&self.colliders[pair.a], &self.colliders[pair.b]);
         let moving = &self.moving[pair.b];
-        let friction = a.friction.with(&b.friction);
-        let layer = a.layer.in_series(&b.layer);
-        let (n, stretch) = (point.n_w, moving.pose.rotation * grip.stretch);
-        let drift = if ends.1 == Endpoint::Known { moving.velocity(&point.p_w) } else { Vec3::zeros() };
-        self.problem.points.push(Point {
-            weights_a: [0.0; 8],
-            weights_b: [0.0; 8],
+        let meeting = Meeting {
             p: point.p_w,
-            normal: n,
-            drift,
-            stiffness: layer.normal * point.area,
-            shear_stiffness: layer.shear * point.area,
+            normal: point.n_w,
             gap: point.phi,
-            offset: stretch - n * n.dot(&stretch),
-            mu: if grip.slipping { friction.dynamic_mu } else { friction.static_mu },
-            lagged: grip.impulse,
-            normal_impulse: 0.0,
-            shear_impulse: Vec3::zeros(),
-            velocity: Vec3::zeros(),
-            slipping: false,
-        });
+            area: point.area,
+            stretch: moving.pose.rotation * grip.stretch,
+            impulse: grip.impulse,
+            sliding: grip.slipping,
+        };
+        let drift = if ends.1 == Endpoint::Known { moving.velocity(&point.p_w) } else { Vec3::zeros() };
+        let point = meeting.point(&a.friction.with(&b.friction), &a.layer.in_series(&b.layer));
+        self.problem.points.push(Point { drift, ..point });
     }
 
     /// Updates what the points that touched remember. Pairs of which neither side moves keep theirs.
@@ -165,22 +162,19 @@ impl World {
         contacts.grips.retain(|grip| self.is_known(grip.key.0) && self.is_known(grip.key.1));
         let dt = self.params.dt;
         let points = contacts.rows.iter().zip(&self.problem.points[self.rows.len()..]);
-        let sliding = Sliding::of(points.clone().map(|(key, point)| ((key.0, key.1), point)));
-        for (key, point) in points {
+        let sliding = Sliding::of(points.clone().map(|((key, _), point)| ((key.0, key.1), point)));
+        for ((key, travel), point) in points {
             if point.normal_impulse <= 0.0 {
                 continue;
             }
-            let tangential = point.velocity - point.normal * point.normal.dot(&point.velocity);
-            let mut stretch = point.offset + tangential * dt;
-            if point.slipping {
-                let allowed = point.mu * point.lagged / (dt * point.shear_stiffness).max(f64::MIN_POSITIVE);
-                stretch *= (allowed / stretch.norm()).min(1.0);
-            }
+            let (stretch, excess) = slid(point, dt);
+            let kept = if excess > 0.0 { stretch * (1.0 - excess / stretch.norm()) } else { stretch };
             contacts.grips.push(Grip {
                 key: *key,
-                stretch: self.moving[key.1].pose.rotation.inverse_transform_vector(&stretch),
+                stretch: self.moving[key.1].pose.rotation.inverse_transform_vector(&kept),
                 impulse: point.normal_impulse,
                 slipping: sliding.slides((key.0, key.1)),
+                travel: travel + excess,
             });
         }
         contacts.grips.sort_unstable_by_key(|grip| grip.key);
@@ -198,9 +192,20 @@ impl World {
     }
 }
 
+impl RigidContacts {
+    /// The pairs of colliders (first, second), how far they had slid (m) and the solved points, of those that press.
+    pub fn points<'a>(
+        &'a self,
+        solved: &'a [Point],
+    ) -> impl Iterator<Item = ((usize, usize), f64, &'a Point)> {
+        let pressing = self.rows.iter().zip(solved).filter(|(_, point)| point.normal_impulse > 0.0);
+        pressing.map(|((key, travel), point)| ((key.0, key.1), *travel, point))
+    }
+}
+
 impl Grip {
     fn fresh(key: Key) -> Self {
-        Self { key, stretch: Vec3::zeros(), impulse: 0.0, slipping: false }
+        Self { key, stretch: Vec3::zeros(), impulse: 0.0, slipping: false, travel: 0.0 }
     }
 }
 

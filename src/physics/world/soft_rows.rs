@@ -1,6 +1,6 @@
 //! Rows between two soft bodies: the samples of each in the other's deformed rest field.
 
-use super::{RowOf, World, assemble::REACH};
+use super::{RowOf, World, assemble::REACH, points::Meeting};
 use crate::{
     geometry::Vec3,
     physics::{
@@ -88,29 +88,20 @@ impl World {
         let slot = a.memory.get(sample, partner, now).copied();
         let held = slot.and_then(|slot| Some((slot, p - b.place_of(&slot.anchor)?)));
         let (slot, offset) = held.unwrap_or((Slot::fresh(partner, felt.surface_o), Vec3::zeros()));
-        let friction = a.friction.with(&b.friction);
-        let layer = a.layer.in_series(&b.layer);
         // Each surface is sampled, so each carries half, unless one has no field to press on.
         let share = if a.surface.is_some() { 0.5 } else { 1.0 };
         let data = &a.body.rest.samples[sample];
-        let area = data.surface.area * felt.coverage * share;
-        self.problem.points.push(Point {
-            weights_a: data.weights,
-            weights_b: felt.weights,
+        let meeting = Meeting {
             p,
             normal: felt.normal,
-            drift: Vec3::zeros(),
-            stiffness: layer.normal * area,
-            shear_stiffness: layer.shear * area,
             gap: felt.gap,
-            offset: offset - felt.normal * felt.normal.dot(&offset),
-            mu: if slot.slipping { friction.dynamic_mu } else { friction.static_mu },
-            lagged: slot.impulse,
-            normal_impulse: 0.0,
-            shear_impulse: Vec3::zeros(),
-            velocity: Vec3::zeros(),
-            slipping: false,
-        });
+            area: data.surface.area * felt.coverage * share,
+            stretch: offset,
+            impulse: slot.impulse,
+            sliding: slot.slipping,
+        };
+        let point = meeting.point(&a.friction.with(&b.friction), &a.layer.in_series(&b.layer));
+        self.problem.points.push(Point { weights_a: data.weights, weights_b: felt.weights, ..point });
         let candidate =
             Candidate { group, sample, p, gap: felt.gap, normal: felt.normal, coverage: felt.coverage };
         let (soft, anchor, travel, pull) = (press.of, slot.anchor, slot.travel, felt.pull);

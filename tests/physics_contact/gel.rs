@@ -1,0 +1,190 @@
+//! Gel pads against rigid bodies.
+
+use std::sync::Arc;
+
+use softvt::{
+    geometry::{
+        Pose, Vec3,
+        shape::{Aabb, Contact, Shape},
+    },
+    physics::{
+        World,
+        contact::{Collider, GelSample, Layer, Mover, Partner, Solid, Surface},
+        world::Movable,
+    },
+    robot::{Side, pads::PadSurface},
+};
+
+use crate::scene::*;
+
+/// The gel of a finger, as the rig puts it into a world.
+#[derive(Debug)]
+struct Gel(PadSurface);
+
+impl Surface for Gel {
+    fn contact(&self, p: &Vec3, _facing: &Vec3, spacing: f64) -> Contact {
+        let contact = self.0.contact(p, spacing);
+        Contact { phi: contact.phi, normal: contact.normal_p, coverage: contact.coverage }
+    }
+
+    fn bounds(&self) -> Aabb {
+        let half = Vec3::new(self.0.length, self.0.width, 0.0) * 0.5;
+        Aabb { min: Vec3::new(-half.x, -half.y, -self.0.thickness), max: half }
+    }
+
+    fn solid(&self) -> Option<Solid> {
+        let patches = self.0.patches(0.75e-3).into_iter();
+        Some(Solid::Gel(patches.map(|(p, normal, area)| GelSample { p, normal, area }).collect()))
+    }
+}
+
+const GEL: Layer = Layer { normal: 3e8, shear: 4e7 };
+
+/// Two prescribed pads whose apexes are `apart` (m) from each other along y, at height z.
+struct Hand {
+    frames: [usize; 2],
+    pads: [usize; 2],
+}
+
+fn pad_pose(side: Side, apart: f64, lift: f64) -> Pose {
+    let sign = if side == Side::Left { 1.0 } else { -1.0 };
+    // Pad z looks along −y (left) or y (right); pad x points up.
+    let turn = softvt::robot::pads::pad_pose_in_finger(side).rotation;
+    Pose::from_parts(Vec3::new(0.0, sign * 0.5 * apart, lift).into(), turn)
+}
+
+impl Hand {
+    fn new(world: &mut World, apart: f64, lift: f64) -> Self {
+        let frames = Side::BOTH.map(|side| world.add_kinematic(pad_pose(side, apart, lift)));
+        let pads = frames.map(|frame| {
+            world.add_collider(Collider::new(
+                "pad",
+                (Mover::Kinematic(frame), Pose::identity()),
+                Arc::new(Gel(PadSurface::default())),
+                friction(1.5, 1.2),
+                GEL,
+            ))
+        });
+        Self { frames, pads }
+    }
+
+    /// Moves both pads straight to a width and height within `seconds`, starting and ending gently.
+    fn go(&self, world: &mut World, from: (f64, f64), to: (f64, f64), seconds: f64) {
+        let steps = (seconds / world.params.dt).round() as usize;
+        for step in 1..=steps {
+            let share = step as f64 / steps as f64;
+            let u = share * share * (3.0 - 2.0 * share);
+            for (side, frame) in Side::BOTH.into_iter().zip(self.frames) {
+                let at = |a: f64, b: f64| a + (b - a) * u;
+                world.move_kinematic(frame, pad_pose(side, at(from.0, to.0), at(from.1, to.1)));
+            }
+            world.step().expect("a step that converges");
+        }
+    }
+
+    fn force(&self, world: &World, body: usize) -> [f64; 2] {
+        self.pads.map(|pad| world.touch_on(Movable::Rigid(body), Partner::Collider(pad)).normal_force)
+    }
+}
+
+/// A body of 0.2 kg on a floor, squeezed `depth` m by each pad at its middle height.
+fn grasped(shape: &Shape, pose: Pose, width: f64, depth: f64) -> (World, usize, Hand, f64) {
+    let mut world = world();
+    floor(&mut world, friction(0.6, 0.5));
+    let body = rigid(&mut world, shape, 0.2, pose, friction(0.6, 0.5));
+    let lift = pose.translation.vector.z;
+    let hand = Hand::new(&mut world, width + 0.004, lift);
+    run(&mut world, 0.2);
+    let shut = width - 2.0 * depth;
+    hand.go(&mut world, (width + 0.004, lift), (shut, lift), 0.2);
+    // Until the springs' damping has died away.
+    run(&mut world, 0.3);
+    (world, body, hand, shut)
+}
+
+#[test]
+fn a_flat_face_feels_the_dome_as_a_bed_of_springs() {
+    // F = k π sqrt(Rx Ry) d² for a paraboloid pressed d deep, while the patch is inside of the footprint.
+    let (pad, hard) = (PadSurface::default(), 1e9);
+    let k = 1.0 / (1.0 / GEL.normal + 1.0 / hard);
+    for depth in [5e-5, 1e-4, 2e-4] {
+        let (world, body, hand, _) = grasped(&cuboid(0.04, 0.05, 0.04), at(0.0, 0.0, 0.02), 0.05, depth);
+        let expected = k * std::f64::consts::PI * (pad.radius_x * pad.radius_y).sqrt() * depth * depth;
+        for force in hand.force(&world, body) {
+            assert!((force / expected - 1.0).abs() < 0.05, "{force} instead of {expected} N at {depth} m");
+        }
+    }
+}
+
+#[test]
+fn a_rigid_box_is_grasped_lifted_and_held_without_creep() {
+    let can = Shape::Cylinder { radius: 0.025, half_height: 0.03 };
+    for (name, shape, height) in [("box", cuboid(0.04, 0.05, 0.04), 0.02), ("can", can, 0.03)] {
+        let (mut world, body, hand, shut) = grasped(&shape, at(0.0, 0.0, height), 0.05, 1.5e-4);
+        hand.go(&mut world, (shut, height), (shut, height + 0.2), 1.0);
+        run(&mut world, 0.3);
+        let place = |world: &World| world.rigid[body].body.pose_w;
+        let before = place(&world);
+        assert!((before.translation.vector.z - height - 0.2).abs() < 1e-3, "{name} at {before}");
+        run(&mut world, 5.0);
+        let now = place(&world);
+        let crept = (now.translation.vector - before.translation.vector).norm();
+        let turned = now.rotation.angle_to(&before.rotation);
+        eprintln!("{name}: crept {crept:.2e} m, turned {turned:.2e} rad, {:?} N", hand.force(&world, body));
+        assert!(crept < 1e-6 && turned < 1e-5, "{name} crept {crept} m, turned {turned} rad");
+    }
+}
+
+#[test]
+fn what_the_pads_cannot_hold_slides_out_of_them() {
+    // 0.2 kg need 0.66 N a pad at μ 1.5; 20 µm give 0.6 N on the dome of a flat box.
+    let (mut world, body, hand, shut) = grasped(&cuboid(0.04, 0.05, 0.04), at(0.0, 0.0, 0.02), 0.05, 1.5e-5);
+    let force: f64 = hand.force(&world, body).iter().sum();
+    assert!(force > 0.0 && 1.5 * force < 0.2 * GRAVITY, "{force} N");
+    hand.go(&mut world, (shut, 0.02), (shut, 0.12), 0.5);
+    run(&mut world, 0.3);
+    let z = world.rigid[body].body.pose_w.translation.vector.z;
+    assert!(z < 0.021, "carried to {z} m");
+}
+
+#[test]
+fn a_box_that_covers_part_of_a_pad_is_felt_without_jumps_as_it_moves() {
+    let shape = cuboid(0.04, 0.05, 0.04);
+    let force = |shift: f64| {
+        let (world, body, hand, _) = grasped(&shape, at(0.02 + shift, 0.0, 0.02), 0.05, 2e-4);
+        hand.force(&world, body).iter().sum::<f64>()
+    };
+    let forces: Vec<f64> = (0..8).map(|i| force(1e-4 * f64::from(i))).collect();
+    eprintln!("{forces:?}");
+    for pair in forces.windows(2) {
+        assert!((pair[1] / pair[0] - 1.0).abs() < 0.03, "{forces:?}");
+    }
+}
+
+#[test]
+fn bodies_are_told_alike_what_touches_them() {
+    let mut world = world();
+    let ground = floor(&mut world, friction(0.6, 0.5));
+    let shape = cuboid(0.05, 0.05, 0.05);
+    let low = rigid(&mut world, &shape, 0.3, at(0.0, 0.0, 0.025), friction(0.6, 0.5));
+    let high = rigid(&mut world, &shape, 0.2, at(0.0, 0.0, 0.075), friction(0.6, 0.5));
+    let bun = soft_rest(&cuboid(0.04, 0.04, 0.04), SOFT, 4, 0.002);
+    let bun = soft(&mut world, &cuboid(0.04, 0.04, 0.04), &bun, at(0.0, 0.0, 0.12), friction(0.6, 0.5));
+    run(&mut world, 1.5);
+    let up = |on, partner| world.touch_on(on, partner).force_w.z;
+    let bun_weight = world.soft[bun].body.rest.total_mass() * GRAVITY;
+    let collider = |body| ground + 1 + body;
+    for (on, partner, expected) in [
+        (Movable::Rigid(low), Partner::Collider(ground), 0.5 * GRAVITY + bun_weight),
+        (Movable::Rigid(low), Partner::Collider(collider(high)), -0.2 * GRAVITY - bun_weight),
+        (Movable::Rigid(high), Partner::Collider(collider(low)), 0.2 * GRAVITY + bun_weight),
+        (Movable::Rigid(high), Partner::Soft(bun), -bun_weight),
+        (Movable::Soft(bun), Partner::Collider(collider(high)), bun_weight),
+    ] {
+        let found = up(on, partner);
+        assert!(
+            (found / expected - 1.0).abs() < 2e-3,
+            "{on:?} from {partner:?}: {found} N, not {expected} N"
+        );
+    }
+}
