@@ -39,7 +39,7 @@ pub(super) struct Front {
 }
 
 /// Widest share of zeros accepted when two fronts are merged.
-const MERGE_ZEROS: f64 = 0.2;
+const MERGE_ZEROS: f64 = 0.1;
 /// Fronts with at most this many pivots are merged whatever the zeros.
 const MERGE_SMALL: usize = 3;
 
