@@ -161,6 +161,7 @@
 ---@class softvt.EnvelopeSpec
 ---@field asset string Asset name.
 ---@field kappa? number τ = κ D_ref. Expects a number in 0..1. Default 0.5.
+---@field fingerprint? string What was calibrated, as simulation:watch tells it; another object of that name is then not taken for it.
 ---@field holds table<string, any>[] Rows closure, trials, held, slip_mm, d_peak_pct of the lower-bound scan.
 ---@field sweep table<string, any>[] Rows closure, gripper_width_mm, d_peak_pct, force_n, min_det_f, node_speed_m_s, both_pads, slip_mm, stable of the compression sweep.
 

@@ -133,6 +133,7 @@ local function squeeze(sim, name, closure)
   if not ok then return nil, problem end
   local seen = sim:watch "object"
   row.gripper_width_mm = 1e3 * seen.width_m
+  row.fingerprint = seen.fingerprint
   row.d_peak_pct = seen.d_peak_pct
   row.force_n = 0.5 * (seen.pad_force[1] + seen.pad_force[2])
   row.slip_mm = math.max(table.unpack(seen.slip_mm))
@@ -179,7 +180,7 @@ local function pick(rows, name, kind)
     if row.asset == name and row.kind == kind then
       local copy = {}
       for key, value in pairs(row) do copy[key] = value end
-      copy.asset, copy.kind = nil, nil
+      copy.asset, copy.kind, copy.fingerprint = nil, nil, nil
       picked[#picked + 1] = copy
     end
   end
@@ -202,7 +203,14 @@ local function finish(rows, o)
   local files, text, closures = {}, {}, {}
   for name, closure in pairs(known) do closures[name] = closure end
   for _, name in ipairs(o.asset) do
-    local found = softvt.envelope { asset = name, kappa = o.kappa, holds = pick(rows, name, "hold"), sweep = pick(rows, name, "sweep") }
+    local fingerprint
+    for _, row in ipairs(rows) do
+      if row.asset == name then fingerprint = row.fingerprint or fingerprint end
+    end
+    local found = softvt.envelope {
+      asset = name, kappa = o.kappa, fingerprint = fingerprint,
+      holds = pick(rows, name, "hold"), sweep = pick(rows, name, "sweep"),
+    }
     files[("assets/calibration/%s.json"):format(name)] = found.json
     files[("assets/calibration/%s.sweep.jsonl"):format(name)] = found.sweep
     text[#text + 1] = found.text

@@ -10,6 +10,7 @@
 
 pub mod benchmark;
 pub mod cli;
+pub mod dataset;
 pub mod evaluation;
 pub mod geometry;
 pub mod physics;

@@ -1,5 +1,6 @@
 //! What a script returns: suites, tasks, experiments and plans as plain data.
 
+pub mod control;
 pub mod seed;
 pub mod settings;
 

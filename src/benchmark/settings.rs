@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::control::check_dt;
 use crate::{evaluation::rules::Rules, physics::Params, robot::RobotSpec};
 
 /// All settings of a run. The default is the benchmark.
@@ -62,7 +63,8 @@ impl Settings {
     pub fn check(&self) -> Result<(), String> {
         self.robot.validate().map_err(|e| e.to_string())?;
         self.rules.check().map_err(|e| e.to_string())?;
-        self.physics.check()
+        self.physics.check()?;
+        check_dt(self.physics.dt)
     }
 }
 

@@ -200,7 +200,7 @@ fn runner() -> clap::Command {
         .arg(flag("policy", "Who drives").value_name("POLICY").default_value("expert").value_parser(PossibleValuesParser::new(policies)))
         .arg(list("task", "Only these tasks: indices or parts of prompts, joined by commas").value_name("TASK"))
         .arg(flag("episodes", "Episodes a task").value_name("N").value_parser(value_parser!(u32).range(1..)))
-        .arg(flag("seed", "Base seed").value_name("S").default_value("0").value_parser(value_parser!(u64)))
+        .arg(flag("seed", "Base seed").value_name("S").default_value("0").allow_hyphen_values(true).value_parser(seed))
         .arg(flag("threads", "Threads; results do not depend on it").value_name("N").value_parser(value_parser!(u16).range(1..=1024)))
         .arg(list("shift", "Changes of the scene that the suite declares, such as stiffness=0.5").value_name("NAME=VALUE"))
         .arg(flag("set", "Changes a setting, such as robot.gripper.effort=20").value_name("PATH=VALUE").action(ArgAction::Append))
@@ -245,6 +245,10 @@ fn run(matches: &ArgMatches, options: &[OptionSpec]) -> Result<Run, Failure> {
         out: matches.get_one::<String>("out").map(PathBuf::from),
         json: matches.get_flag("json"),
     })
+}
+
+fn seed(word: &str) -> Result<u64, String> {
+    word.parse().map_err(|_| format!("expected a whole number in 0..{}", u64::MAX))
 }
 
 fn pair(flag: &str, word: &str) -> Result<(String, String), Failure> {

@@ -1,14 +1,14 @@
 //! Carrying out a plan: a policy on suites, or an experiment.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     path::PathBuf,
-    sync::{Arc, atomic::Ordering},
+    sync::Arc,
 };
 
 use serde::Serialize;
 
-use super::{Failure, STOP, args::Run, code, experiment, files, print, progress::Progress};
+use super::{Failure, args::Run, code, experiment, files, files::Calibrated, print, progress::Progress};
 use crate::{
     benchmark::{Plan, Suite, Task, seed::Split, settings::Settings},
     evaluation::{
@@ -24,9 +24,10 @@ use crate::{
         terminal,
     },
     rollout::{
-        ControlError, Controller, Episode, EpisodeError, EpisodeSpec, Finished, RestCache, ScoreFrame, batch,
+        ControlError, Controller, Episode, EpisodeError, EpisodeSpec, Finished, RestCache, ScoreFrame,
+        SettleError, batch, stop,
     },
-    scene::{Body, Scene},
+    scene::{Asset, Body, Scene},
     script::{self, ExpertController, Loaded},
 };
 
@@ -39,35 +40,46 @@ pub fn run(run: &Run) -> Result<(), Failure> {
     match &loaded.plan {
         Plan::Suite(suite) => {
             let summary = evaluate(run, &loaded, suite, out_dir(run, &suite.name, None))?;
-            show(run, &[summary]);
+            show(run, &[summary], false);
             Ok(())
         }
         Plan::Suites { suites } => {
+            let mut names = BTreeSet::new();
+            if let Some(twice) = suites.iter().find(|suite| !names.insert(plain(&suite.name))) {
+                let message = format!(
+                    "{}: two suites are named {:?}, and would share one folder; rename one",
+                    run.file.display(),
+                    twice.name
+                );
+                return Err(Failure::input(message));
+            }
             let mut summaries = Vec::new();
             for suite in suites {
                 summaries.push(evaluate(run, &loaded, suite, out_dir(run, &suite.name, Some(&suite.name)))?);
             }
-            show(run, &summaries);
+            show(run, &summaries, true);
             Ok(())
         }
         Plan::Experiment { name, points, columns } => experiment::run(run, &loaded, name, *points, columns),
     }
 }
 
-fn show(run: &Run, summaries: &[Summary]) {
-    for summary in summaries {
-        print(&if run.json {
-            format!("{:#}\n", serde_json::json!(summary))
-        } else {
-            terminal::table(summary)
-        });
+/// Tables, or one JSON document: an object for a suite, an array for a list of suites.
+fn show(run: &Run, summaries: &[Summary], list: bool) {
+    match summaries {
+        _ if !run.json => summaries.iter().for_each(|summary| print(&terminal::table(summary))),
+        [summary] if !list => print(&format!("{:#}\n", serde_json::json!(summary))),
+        _ => print(&format!("{:#}\n", serde_json::json!(summaries))),
     }
+}
+
+/// A name as part of a path: it is the script's, and must not lead out of the folder.
+fn plain(name: &str) -> String {
+    name.replace(|c: char| !(c.is_alphanumeric() || c == '_' || c == '-'), "_")
 }
 
 /// The folder that was asked for (with one more level for one of several suites), or the next free one under `runs/`.
 fn out_dir(run: &Run, suite: &str, level: Option<&str>) -> PathBuf {
-    // A name is the script's; it must not lead out of the folder.
-    let plain = |name: &str| name.replace(|c: char| !(c.is_alphanumeric() || c == '_' || c == '-'), "_");
     let suite = plain(suite);
     let level = level.map(plain);
     match &run.out {
@@ -106,6 +118,10 @@ struct Batch<'a> {
     settings: Settings,
     jobs: Vec<(&'a Task, u32)>,
     limits: BTreeMap<String, Option<Limit>>,
+    /// The thresholds in use as one file of SoftVTBench's form.
+    released: Thresholds,
+    /// SHA-256 of every file that the results depend on.
+    sources: BTreeMap<String, String>,
     cache: RestCache,
     out: PathBuf,
 }
@@ -122,16 +138,7 @@ pub fn single(run: &Run, task: usize) -> Result<EpisodeRecord, Failure> {
     let tasks = suite.tasks.iter().filter(|t| t.id == task);
     let jobs = tasks.map(|task| (task, 0)).collect();
     let settings = suite.settings.clone();
-    let batch = Batch {
-        run,
-        loaded: &loaded,
-        suite,
-        settings,
-        jobs,
-        limits: BTreeMap::new(),
-        cache: RestCache::default(),
-        out: PathBuf::new(),
-    };
+    let batch = Batch::new(run, &loaded, suite, settings, (jobs, PathBuf::new()));
     batch.episode(0).map(|finished| finished.record)
 }
 
@@ -150,18 +157,10 @@ fn evaluate(run: &Run, loaded: &Loaded, suite: &Suite, out: PathBuf) -> Result<S
     }
     let episodes = run.episodes.unwrap_or(suite.episodes);
     let jobs = tasks.iter().flat_map(|task| (0..episodes).map(move |e| (*task, e))).collect();
-    let mut batch = Batch {
-        run,
-        loaded,
-        suite,
-        settings,
-        jobs,
-        limits: BTreeMap::new(),
-        cache: RestCache::default(),
-        out,
-    };
+    let mut batch = Batch::new(run, loaded, suite, settings, (jobs, out));
     batch.find_limits(&tasks)?;
-    let folder = RunFolder::create(&batch.out).map_err(Failure::input)?;
+    let folder =
+        RunFolder::create(&batch.out).map_err(|e| Failure::input(format!("{}: {e}", run.file.display())))?;
     batch.write_info(&folder, &tasks, episodes)?;
     batch.go(folder)
 }
@@ -170,6 +169,13 @@ fn evaluate(run: &Run, loaded: &Loaded, suite: &Suite, out: PathBuf) -> Result<S
 fn chosen<'a>(run: &Run, suite: &'a Suite) -> Result<Vec<&'a Task>, Failure> {
     let mut found: Vec<&Task> = Vec::new();
     for word in &run.tasks {
+        if word.trim().is_empty() {
+            let message = format!(
+                "{}: --task: expected an index or part of a prompt, got {word:?}",
+                run.file.display()
+            );
+            return Err(Failure::input(message));
+        }
         let index = word.parse::<usize>().ok();
         let fits = |task: &&Task| match index {
             Some(index) => task.id == index,
@@ -196,6 +202,28 @@ fn chosen<'a>(run: &Run, suite: &'a Suite) -> Result<Vec<&'a Task>, Failure> {
 }
 
 impl<'a> Batch<'a> {
+    fn new(
+        run: &'a Run,
+        loaded: &'a Loaded,
+        suite: &'a Suite,
+        settings: Settings,
+        (jobs, out): (Vec<(&'a Task, u32)>, PathBuf),
+    ) -> Self {
+        let made_by = format!("softvt {}", env!("CARGO_PKG_VERSION"));
+        Self {
+            run,
+            loaded,
+            suite,
+            settings,
+            jobs,
+            limits: BTreeMap::new(),
+            released: Thresholds::new(0.5, Vec::new(), made_by),
+            sources: loaded.bundle.hashes(),
+            cache: RestCache::default(),
+            out,
+        }
+    }
+
     fn request(&self, task: &Task, episode: u32) -> script::EpisodeRequest {
         script::EpisodeRequest {
             suite: self.suite.name.clone(),
@@ -210,20 +238,37 @@ impl<'a> Batch<'a> {
     /// Thresholds of the targets of all tasks, read before anything runs.
     fn find_limits(&mut self, tasks: &[&Task]) -> Result<(), Failure> {
         for task in tasks {
-            let opened =
-                script::Episode::open(self.loaded, &self.request(task, 0)).map_err(Failure::input)?;
+            // Limits are those of the object as calibrated, whatever a shift makes of it.
+            let nominal = script::EpisodeRequest { shifts: Vec::new(), ..self.request(task, 0) };
+            let opened = script::Episode::open(self.loaded, &nominal).map_err(Failure::input)?;
             let Some(asset) = target_asset(&opened.scene, task) else { continue };
-            if !self.limits.contains_key(&asset) {
-                let limit = files::limit(&self.run.file, &asset)?;
-                if limit.is_none() {
-                    eprintln!(
-                        "softvt: {asset} is not calibrated (assets/calibration/{asset}.json): its episodes cannot count as safe"
-                    );
-                }
-                self.limits.insert(asset, limit);
+            if matches!(asset.body, Body::Soft(_)) && !self.limits.contains_key(&asset.name) {
+                let limit = self.find_limit(&asset)?;
+                self.limits.insert(asset.name.clone(), limit);
             }
         }
         Ok(())
+    }
+
+    fn find_limit(&mut self, asset: &Asset) -> Result<Option<Limit>, Failure> {
+        let name = &asset.name;
+        let cure = format!("its episodes cannot count as safe; softvt scripts/calibrate.lua --asset {name}");
+        match files::calibrated(&self.run.file, asset)? {
+            Calibrated::Never => {
+                eprintln!("softvt: {name} is not calibrated (assets/calibration/{name}.json): {cure}")
+            }
+            Calibrated::Another(path) => {
+                eprintln!(
+                    "softvt: {path} is about another {name} (its shape, material or friction differ): {cure}"
+                );
+            }
+            Calibrated::Yes { limit, file, path, text } => {
+                self.sources.insert(path, script::sha256(text.as_bytes()));
+                self.released.merge(file);
+                return Ok(limit);
+            }
+        }
+        Ok(None)
     }
 
     fn write_info(&self, folder: &RunFolder, tasks: &[&Task], episodes: u32) -> Result<(), Failure> {
@@ -242,7 +287,7 @@ impl<'a> Batch<'a> {
             shifts: &self.run.shifts,
             options,
             settings: &self.settings,
-            sources: self.loaded.bundle.hashes(),
+            sources: self.sources.clone(),
             thresholds: self.limits.iter().map(|(a, l)| (a.clone(), l.map(|l| l.tau_pct()))).collect(),
         };
         folder.write_json(RUN, &info).map_err(folder_failure)
@@ -254,7 +299,7 @@ impl<'a> Batch<'a> {
         let outcome = batch::run(
             self.jobs.len(),
             self.run.threads,
-            &STOP,
+            &stop::FLAG,
             |job| self.episode(job),
             |job, finished| {
                 folder.append(job, &finished.record).map_err(folder_failure)?;
@@ -268,7 +313,7 @@ impl<'a> Batch<'a> {
         progress.finish();
         folder.flush().map_err(folder_failure)?;
         let kept = format!("{} of {} episodes are in {}", records.len(), self.jobs.len(), self.out.display());
-        if STOP.load(Ordering::Relaxed) {
+        if stop::requested() {
             return Err(Failure::interrupted(format!("interrupted; {kept}")));
         }
         if let Err(failure) = outcome {
@@ -282,41 +327,18 @@ impl<'a> Batch<'a> {
         let summary = Summary::of(&self.suite.name, &self.run.policy, &records);
         folder.write_json(SUMMARY, &summary).map_err(folder_failure)?;
         records.sort_by_key(|r| (r.identity.task, r.identity.episode));
-        interchange::write_scores(&self.out, &records, &self.released()?).map_err(folder_failure)?;
+        interchange::write_scores(&self.out, &records, &self.released).map_err(folder_failure)?;
         eprintln!("softvt: {}", self.out.display());
         Ok(summary)
-    }
-
-    /// The thresholds in use as one file of SoftVTBench's form.
-    fn released(&self) -> Result<Thresholds, Failure> {
-        let mut all: Option<Thresholds> = None;
-        for asset in self.limits.keys() {
-            let Some((text, path)) =
-                files::find(&self.run.file, &format!("assets/calibration/{asset}.json"))?
-            else {
-                continue;
-            };
-            let file = Thresholds::parse(&text, &path).map_err(Failure::input)?;
-            match &mut all {
-                None => all = Some(file),
-                Some(all) => all.merge(file),
-            }
-        }
-        Ok(all.unwrap_or_else(|| {
-            Thresholds::new(0.5, Vec::new(), format!("softvt {}", env!("CARGO_PKG_VERSION")))
-        }))
     }
 
     fn episode(&self, job: usize) -> Result<Finished, Failure> {
         let (task, episode) = self.jobs[job];
         let opened =
             script::Episode::open(self.loaded, &self.request(task, episode)).map_err(Failure::input)?;
-        let asset = target_asset(&opened.scene, task).unwrap_or_default();
-        let soft = opened
-            .scene
-            .objects
-            .iter()
-            .any(|o| o.asset.name == asset && matches!(o.asset.body, Body::Soft(_)));
+        let target = target_asset(&opened.scene, task);
+        let soft = target.as_ref().is_some_and(|asset| matches!(asset.body, Body::Soft(_)));
+        let asset = target.map_or(String::new(), |asset| asset.name.clone());
         let spec = EpisodeSpec {
             identity: Identity {
                 suite: self.suite.name.clone(),
@@ -339,7 +361,7 @@ impl<'a> Batch<'a> {
             trace: self.run.trace,
         };
         let driver = self.driver(opened)?;
-        let mut driver = batch::Stoppable { driver, stop: &STOP };
+        let mut driver = batch::Stoppable { driver, stop: &stop::FLAG };
         let started = Episode::start(spec, &self.cache).map_err(|e| self.episode_failure(&e))?;
         started.run(&mut driver).map_err(|e| self.episode_failure(&e))
     }
@@ -363,7 +385,8 @@ impl<'a> Batch<'a> {
     fn episode_failure(&self, error: &EpisodeError) -> Failure {
         let code = match error {
             EpisodeError::Control { source: ControlError::Policy(_), .. } => code::POLICY,
-            EpisodeError::Control { source: ControlError::Interrupted, .. } => code::INTERRUPTED,
+            EpisodeError::Control { source: ControlError::Interrupted, .. }
+            | EpisodeError::Settle { source: SettleError::Interrupted, .. } => code::INTERRUPTED,
             _ => code::INPUT,
         };
         Failure { code, message: format!("{}: {error}", self.run.file.display()) }
@@ -402,9 +425,9 @@ fn folder_failure(error: RunFolderError) -> Failure {
     Failure::input(error)
 }
 
-fn target_asset(scene: &Scene, task: &Task) -> Option<String> {
+fn target_asset(scene: &Scene, task: &Task) -> Option<Arc<Asset>> {
     let name = task.goal.object();
-    scene.objects.iter().find(|o| o.name == name).map(|o| o.asset.name.clone())
+    scene.objects.iter().find(|o| o.name == name).map(|o| o.asset.clone())
 }
 
 /// One episode in one line.

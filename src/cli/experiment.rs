@@ -3,13 +3,13 @@
 use std::{
     collections::BTreeSet,
     path::{Path, PathBuf},
-    sync::{Mutex, atomic::Ordering},
+    sync::Mutex,
 };
 
-use super::{Failure, STOP, args::Run, print, progress::Progress};
+use super::{Failure, args::Run, print, progress::Progress};
 use crate::{
     report::run_folder::replace,
-    rollout::batch,
+    rollout::{batch, stop},
     script::{Experiment, Loaded, Row},
 };
 
@@ -26,7 +26,7 @@ pub fn run(run: &Run, loaded: &Loaded, name: &str, points: usize, columns: &[Str
     let outcome = batch::run(
         points,
         run.threads,
-        &STOP,
+        &stop::FLAG,
         |point| {
             let machine = match take() {
                 Some(machine) => machine,
@@ -43,11 +43,15 @@ pub fn run(run: &Run, loaded: &Loaded, name: &str, points: usize, columns: &[Str
         },
     );
     progress.finish();
-    if STOP.load(Ordering::Relaxed) {
-        return Err(Failure::interrupted("interrupted; nothing was written"));
+    let done = rows.iter().filter(|rows| !rows.is_empty()).count();
+    let rows: Vec<Row> = rows.into_iter().flatten().collect();
+    if stop::requested() {
+        show(run, &rows, columns);
+        let message =
+            format!("interrupted; the rows of {done} of {points} points are above, no file was written");
+        return Err(Failure::interrupted(message));
     }
     outcome?;
-    let rows: Vec<Row> = rows.into_iter().flatten().collect();
     let machine = match take() {
         Some(machine) => machine,
         None => Experiment::open(loaded).map_err(Failure::input)?,
@@ -58,13 +62,21 @@ pub fn run(run: &Run, loaded: &Loaded, name: &str, points: usize, columns: &[Str
         print(&format!("{text}\n"));
     }
     let base = run.out.clone().unwrap_or_default();
-    for (relative, text) in &finish.files {
-        write(&base.join(relative), text)?;
-    }
-    Ok(())
+    finish.files.iter().try_for_each(|(relative, text)| write(&base, relative, text))
 }
 
-fn write(path: &Path, text: &str) -> Result<(), Failure> {
+/// Writes a file of the script under `base`; a link on its way could lead anywhere, so none is followed.
+fn write(base: &Path, relative: &str, text: &str) -> Result<(), Failure> {
+    let path = &base.join(relative);
+    let between = path.ancestors().skip(1).take_while(|folder| *folder != base);
+    if let Some(link) = between.into_iter().find(|folder| folder.is_symlink()) {
+        let message = format!(
+            "{}: {} is a link; files are written into real folders only",
+            path.display(),
+            link.display()
+        );
+        return Err(Failure::input(message));
+    }
     let folder = path.parent().map(PathBuf::from).unwrap_or_default();
     if !folder.as_os_str().is_empty() {
         std::fs::create_dir_all(&folder)

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::Failure;
 use crate::{
     evaluation::{safety::Limit, thresholds::Thresholds},
+    scene::Asset,
     script,
 };
 
@@ -29,14 +30,39 @@ pub fn find(script: &Path, relative: &str) -> Result<Option<(String, String)>, F
     Ok(embedded.map(|text| (text.to_owned(), format!("{relative} (embedded)"))))
 }
 
-/// The calibrated limit of an asset; `None` if it was never calibrated.
+/// What is known of an asset's limit.
+pub enum Calibrated {
+    /// Nothing.
+    Never,
+    /// The file (as messages name it) is about another object of that name.
+    Another(String),
+    /// The limit, its file, and the file's text.
+    Yes {
+        /// The limit; none if no squeeze of the sweep was stable.
+        limit: Option<Limit>,
+        /// All that the file says.
+        file: Thresholds,
+        /// Path from the project's root.
+        path: String,
+        /// The file's text.
+        text: String,
+    },
+}
+
+/// The calibrated limit of an asset, if it was calibrated as it is now.
 ///
 /// # Errors
 /// Its file cannot be read or is not a threshold file.
-pub fn limit(script: &Path, asset: &str) -> Result<Option<Limit>, Failure> {
-    let Some((text, path)) = find(script, &format!("assets/calibration/{asset}.json"))? else {
-        return Ok(None);
+pub fn calibrated(script: &Path, asset: &Asset) -> Result<Calibrated, Failure> {
+    let name = &asset.name;
+    let relative = format!("assets/calibration/{name}.json");
+    let Some((text, path)) = find(script, &relative)? else {
+        return Ok(Calibrated::Never);
     };
     let file = Thresholds::parse(&text, &path).map_err(Failure::input)?;
-    Ok(file.limit(asset))
+    // Released files carry no fingerprint and are taken at their word.
+    if file.fingerprints.get(name).is_some_and(|known| *known != asset.fingerprint()) {
+        return Ok(Calibrated::Another(path));
+    }
+    Ok(Calibrated::Yes { limit: file.limit(name), file, path: relative, text })
 }

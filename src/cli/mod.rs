@@ -9,13 +9,11 @@ mod init;
 mod list;
 mod progress;
 
-use std::{
-    panic,
-    process::ExitCode,
-    sync::atomic::{AtomicBool, Ordering},
-};
+use std::{panic, process::ExitCode};
 
 use args::Command;
+
+use crate::rollout::stop;
 
 /// Exit codes, the same for every command.
 pub mod code {
@@ -30,9 +28,6 @@ pub mod code {
     /// Interrupted.
     pub const INTERRUPTED: u8 = 130;
 }
-
-/// Set by Ctrl-C: running episodes end, finished ones stay.
-static STOP: AtomicBool = AtomicBool::new(false);
 
 /// What ends a command early.
 #[derive(Debug)]
@@ -50,6 +45,11 @@ impl Failure {
     /// Interrupted; what is finished has been kept.
     fn interrupted(message: impl ToString) -> Self {
         Self { code: code::INTERRUPTED, message: message.to_string() }
+    }
+
+    /// Once the end was asked for, whatever failed did so because of it.
+    fn or_interrupted(self) -> Self {
+        if stop::requested() { Self { code: code::INTERRUPTED, ..self } } else { self }
     }
 }
 
@@ -83,7 +83,7 @@ fn run() -> Result<(), Failure> {
     match args::parse(&words)? {
         Command::Run(run) => {
             watch_interrupts();
-            evaluate::run(&run)
+            evaluate::run(&run).map_err(Failure::or_interrupted)
         }
         Command::List { what, json } => list::run(&what, json),
         Command::Init { dir } => init::run(&dir),
@@ -95,7 +95,7 @@ fn run() -> Result<(), Failure> {
 /// The first Ctrl-C ends the run in order, the second at once.
 fn watch_interrupts() {
     let handler = || {
-        if STOP.swap(true, Ordering::Relaxed) {
+        if stop::request() {
             std::process::exit(i32::from(code::INTERRUPTED));
         }
         eprintln!("softvt: stopping; finished episodes stay (press again to stop at once)");

@@ -108,6 +108,9 @@ pub struct Thresholds {
     /// Ours: the envelope of each asset with its rows; absent in released files.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub envelopes: BTreeMap<String, Envelope>,
+    /// Ours: what was calibrated, by asset ([`crate::scene::Asset::fingerprint`]); absent in released files.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub fingerprints: BTreeMap<String, String>,
 }
 
 impl Thresholds {
@@ -126,6 +129,7 @@ impl Thresholds {
             },
             thresholds: BTreeMap::new(),
             envelopes: BTreeMap::new(),
+            fingerprints: BTreeMap::new(),
         }
     }
 
@@ -150,6 +154,7 @@ impl Thresholds {
     pub fn merge(&mut self, other: Self) {
         self.thresholds.extend(other.thresholds);
         self.envelopes.extend(other.envelopes);
+        self.fingerprints.extend(other.fingerprints);
         self.calibration.sources.extend(other.calibration.sources);
     }
 

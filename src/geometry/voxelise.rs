@@ -23,8 +23,18 @@ pub enum GeometryError {
     #[error("resolution is {0}; give 1 to {MAX_RESOLUTION} voxels along the longest edge")]
     Resolution(usize),
     /// Nothing is inside.
-    #[error("the shape is empty: no point of it lies inside; check what is subtracted or intersected")]
+    #[error("the shape is empty: nothing of it is left; check what is subtracted or intersected")]
     Empty,
+    /// Nothing is inside, or nothing that a voxel could see.
+    #[error(
+        "no point of a grid of {:.3} mm lies inside: the shape is empty (check what is subtracted or intersected) or \
+         thinner than that (raise the resolution)",
+        1e3 * .step
+    )]
+    Nothing {
+        /// Spacing of the points that were tried, m.
+        step: f64,
+    },
 }
 
 /// Largest resolution: a million voxels for a cube.
@@ -68,7 +78,7 @@ pub fn voxel_mesh(shape: &Shape, spec: &VoxelSpec) -> Result<VoxelMesh, Geometry
         }
     }
     if mesh.fill.is_empty() {
-        return Err(GeometryError::Empty);
+        return Err(GeometryError::Nothing { step: edge / SUB as f64 });
     }
     number_nodes(&mut mesh);
     Ok(mesh)

@@ -94,6 +94,7 @@ impl RestCache {
 /// A shape that cannot be meshed, or a material number out of range; `name` is what messages call it.
 pub fn soft_rest(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<Arc<Rest>, BuildError> {
     check(name, material)?;
+    check_size(name, shape, material)?;
     let spec = VoxelSpec { resolution: material.resolution };
     let mesh =
         voxel_mesh(shape, &spec).map_err(|source| BuildError::Geometry { asset: name.to_owned(), source })?;
@@ -117,6 +118,27 @@ fn check(name: &str, m: &SoftMaterial) -> Result<(), BuildError> {
         return wrong(format!("density is {} kg/m³, expected a positive number", m.density));
     }
     Ok(())
+}
+
+/// Contact samples of one body: more would take minutes to find, and is nearly always a size in millimetres.
+const MOST_SAMPLES: f64 = 1e6;
+
+fn check_size(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<(), BuildError> {
+    let size = shape.bounds().size();
+    let samples =
+        2.0 * (size.x * size.y + size.y * size.z + size.z * size.x) / material.grasp_spacing.powi(2);
+    if samples <= MOST_SAMPLES {
+        return Ok(());
+    }
+    let what = format!(
+        "it is {:.3} × {:.3} × {:.3} m, about {samples:.0e} contact samples {} mm apart, expected at most {MOST_SAMPLES:.0e}; \
+         sizes are in metres; a truly large body needs a larger grasp_spacing",
+        size.x,
+        size.y,
+        size.z,
+        1e3 * material.grasp_spacing
+    );
+    Err(BuildError::Material { asset: name.to_owned(), what })
 }
 
 /// Puts `object` into `world`.

@@ -5,14 +5,13 @@ use std::sync::Arc;
 use sha2::{Digest, Sha256};
 
 use super::{
-    STEPS_PER_CONTROL,
     build::{BuildError, RestCache},
     evidence::{Witness, lowest},
     simulation::{Handle, Kind, SettleError, Simulation},
     trace::StepTrace,
 };
 use crate::{
-    benchmark::{Goal, Task},
+    benchmark::{Goal, Task, control::steps_per_control},
     evaluation::{
         deformation::{Deformation, Reference},
         goal::Place,
@@ -194,7 +193,7 @@ impl Episode {
             place: place_of(&spec.task.goal, &sim.objects[place]),
             hold_s,
             dt_s: spec.params.dt,
-            steps_per_control: STEPS_PER_CONTROL,
+            steps_per_control: steps_per_control(spec.params.dt),
             target_weight_n: weight(&sim, target),
             soft: matches!(sim.objects[target].kind, Kind::Soft(_)),
             limit: spec.limit,
@@ -278,7 +277,7 @@ impl Episode {
         self.sim.rig.command(&mut self.sim.world, &pose_b, action.closure);
         self.steps += 1;
         let mut worst: Option<Deformation> = None;
-        for _ in 0..STEPS_PER_CONTROL {
+        for _ in 0..steps_per_control(self.spec.params.dt) {
             self.physics_steps += 1;
             self.sim.step()?;
             let stats = self.sim.world.stats;

@@ -6,6 +6,7 @@ pub mod episode;
 mod evidence;
 mod rig;
 pub mod simulation;
+pub mod stop;
 mod trace;
 
 pub use build::{BuildError, RestCache, soft_rest};
@@ -13,6 +14,3 @@ pub use episode::{ControlError, Controller, Episode, EpisodeError, EpisodeSpec, 
 pub use rig::Rig;
 pub use simulation::{Handle, Kind, SettleError, Simulation};
 pub use trace::{ObjectTrace, StepTrace};
-
-/// Physics steps a control step: 60 Hz physics, 20 Hz control.
-pub const STEPS_PER_CONTROL: u32 = 3;

@@ -3,11 +3,12 @@
 use std::sync::Arc;
 
 use super::{
-    STEPS_PER_CONTROL,
     build::{self, BuildError, RestCache},
     rig::Rig,
+    stop,
 };
 use crate::{
+    benchmark::control::CONTROL_DT,
     geometry::{Pose, Vec3, shape::Aabb},
     physics::{
         Params, World,
@@ -78,6 +79,9 @@ pub enum SettleError {
         /// Its speed, mm/s.
         speed_mm: f64,
     },
+    /// The run is to end.
+    #[error("interrupted")]
+    Interrupted,
     /// The physics failed.
     #[error("settling failed: {0}")]
     Failed(#[from] StepFailure),
@@ -115,8 +119,7 @@ impl Simulation {
             }
             objects.push(build::add(&mut world, object, cache)?);
         }
-        let control_dt = params.dt * f64::from(STEPS_PER_CONTROL);
-        let rig = Rig::new(&mut world, robot, &scene.base_w, &scene.start_q, control_dt);
+        let rig = Rig::new(&mut world, robot, &scene.base_w, &scene.start_q, CONTROL_DT);
         Ok(Self { scene, world, rig, objects })
     }
 
@@ -138,6 +141,9 @@ impl Simulation {
         let mut quiet = 0.0;
         let mut waited = 0.0;
         while quiet < SETTLED_FOR {
+            if stop::requested() {
+                return Err(SettleError::Interrupted);
+            }
             self.step()?;
             waited += dt;
             let (object, speed) = self.fastest();

@@ -100,7 +100,7 @@ pub static ASSET: Record = Record {
     kind: "softvt.asset",
     doc: "A kind of object: its shape at rest with its lowest point at z = 0 and its centre on the z axis.",
     fields: &[
-        field("name", Type::Text, Required, "Name, as in results and calibration files."),
+        field("name", Type::Name, Required, "Name, as in results and calibration files."),
         field("shape", Type::Object("softvt.Shape"), Required, "Its shape, in metres."),
         field("body", Type::Made(&[&SOFT, &RIGID, &STATIC]), Required, "How it moves."),
         field("friction", Type::Nested(&FRICTION), Empty, "Friction of its surface."),
@@ -218,7 +218,7 @@ pub static SUITE: Record = Record {
     kind: "softvt.suite",
     doc: "A set of tasks that are reported together.",
     fields: &[
-        field("name", Type::Text, Required, "Name, as in results; part of the seed."),
+        field("name", Type::Name, Required, "Name, as in results; part of the seed."),
         field("object_type", Type::Choice(&["deformable", "rigid"]), Required, "What the objects are."),
         field("variation", Type::Choice(&["object", "spatial"]), Required, "What varies between tasks."),
         field(
@@ -245,7 +245,7 @@ pub static EXPERIMENT: Record = Record {
     kind: "softvt.experiment",
     doc: "A function of a grid of parameters that yields rows. Give grid or points.",
     fields: &[
-        field("name", Type::Text, Required, "Name, as in results."),
+        field("name", Type::Name, Required, "Name, as in results."),
         field(
             "options",
             Type::Any,
@@ -326,7 +326,7 @@ pub static PLACE: Record = Record {
     kind: "softvt.Place",
     doc: "An asset put somewhere. Give at or xyz.",
     fields: &[
-        field("name", Type::Text, Required, "Name in the scene, unique."),
+        field("name", Type::Name, Required, "Name in the scene, unique."),
         field("asset", Type::Made(&[&ASSET]), Required, "What it is."),
         field(
             "at",

@@ -108,8 +108,14 @@ pub static ENVELOPE: Record = Record {
     kind: "softvt.EnvelopeSpec",
     doc: "The rows of a calibration.",
     fields: &[
-        field("asset", Type::Text, Required, "Asset name."),
+        field("asset", Type::Name, Required, "Asset name."),
         field("kappa", Type::Number("", Range::closed(0.0, 1.0)), Presence::Number(0.5), "τ = κ D_ref."),
+        field(
+            "fingerprint",
+            Type::Text,
+            Optional,
+            "What was calibrated, as simulation:watch tells it; another object of that name is then not taken for it.",
+        ),
         field(
             "holds",
             Type::List(&Type::Map(&Type::Any)),

@@ -2,10 +2,11 @@
 
 use super::{Expert, ExpertView, ObjectView, ScriptError, reach::Lag};
 use crate::{
+    benchmark::control::CONTROL_DT,
     geometry::Vec3,
     policy::{Action, Observation},
     robot::rotation,
-    rollout::{ControlError, Controller, Handle, Kind, STEPS_PER_CONTROL, Simulation},
+    rollout::{ControlError, Controller, Handle, Kind, Simulation},
 };
 
 /// Drives by a Lua expert; once it is done, the last command stays.
@@ -47,7 +48,7 @@ impl Controller for ExpertController {
 pub(super) fn view(sim: &Simulation, time_s: f64) -> ExpertView {
     ExpertView {
         time_s,
-        dt_s: sim.world.params.dt * f64::from(STEPS_PER_CONTROL),
+        dt_s: CONTROL_DT,
         base_w: sim.rig.base_w,
         tcp_b: sim.rig.tool_b(&sim.world),
         width_m: sim.rig.width(&sim.world),

@@ -18,6 +18,7 @@ use cpu_time::ThreadTime;
 use mlua::{HookTriggers, Lua, VmState};
 
 use super::error::ScriptError;
+use crate::rollout::stop;
 
 /// Instructions between two looks at the clock; about 0.3 ms.
 const STRIDE: u32 = 20_000;
@@ -175,6 +176,9 @@ impl Clock {
     fn expired(&self) -> Option<ScriptError> {
         let mut state = lock(&self.state);
         state.beat += 1;
+        if stop::requested() {
+            return Some(ScriptError::new(state.file.clone(), "interrupted"));
+        }
         state.until.is_some_and(|until| used() > until).then(|| {
             ScriptError::new(
                 state.file.clone(),

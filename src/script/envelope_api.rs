@@ -44,6 +44,9 @@ fn envelope(lua: &Lua, value: &Value) -> mlua::Result<Table> {
     result.set("text", plot(&asset, &envelope, limit))?;
     result.set("sweep", sweep_jsonl(&asset, &envelope))?;
     file.insert(&asset, envelope);
+    if let Some(fingerprint) = spec.get::<Option<String>>("fingerprint")? {
+        file.fingerprints.insert(asset, fingerprint);
+    }
     result.set("json", file.to_text())?;
     result.set("table", lua.to_value(&file)?)?;
     Ok(result)

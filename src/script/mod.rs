@@ -37,7 +37,7 @@ pub use expert::{Expert, ExpertCommand, ExpertView, ObjectView};
 pub use options::{OptionSpec, OptionValue};
 pub use plan::{Loaded, declared_options, load, load_with};
 pub use sandbox::{Limits, Print};
-pub use sources::{Bundle, Source, embedded, embedded_scripts};
+pub use sources::{Bundle, Source, embedded, embedded_scripts, sha256};
 
 #[cfg(test)]
 mod tests;

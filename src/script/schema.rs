@@ -68,6 +68,8 @@ pub enum Type {
     Integer(Range),
     /// A string, not empty.
     Text,
+    /// A string that may name a file.
+    Name,
     /// `true` or `false`.
     Boolean,
     /// A list of so many numbers in a unit.
@@ -191,11 +193,24 @@ pub fn unknown<'a>(what: &str, word: &str, known: impl Iterator<Item = &'a str> 
     }
 }
 
+/// A text in quotes, control characters escaped, its middle left out where it is long.
+fn quoted(text: &str) -> String {
+    const SHOWN: usize = 60;
+    if text.chars().count() <= SHOWN {
+        return format!("{text:?}");
+    }
+    let start: String = text.chars().take(SHOWN).collect();
+    format!("{start:?}… ({} bytes)", text.len())
+}
+
 /// How a message shows an offending value.
 pub(super) fn got(value: &Value) -> String {
     match value {
-        Value::String(text) => format!("{:?}", text.to_string_lossy()),
+        Value::String(text) => quoted(&text.to_string_lossy()),
         Value::Integer(number) => number.to_string(),
+        Value::Number(number) if *number != 0.0 && !(1e-6..1e9).contains(&number.abs()) => {
+            format!("{number:e}")
+        }
         Value::Number(number) => number.to_string(),
         Value::Boolean(flag) => flag.to_string(),
         Value::Nil => "nil".into(),
@@ -210,6 +225,7 @@ impl Type {
             Self::Number(unit, range) => format!("{}{}", unit_words(unit), range.words()),
             Self::Integer(range) => format!("a whole number{}", range.words()),
             Self::Text => "a string that is not empty".into(),
+            Self::Name => "a name of letters, digits, _ and -".into(),
             Self::Boolean => "true or false".into(),
             Self::Vector(count, "") => format!("a list of {count} numbers"),
             Self::Vector(count, unit) => format!("a list of {count} numbers ({unit})"),
@@ -245,6 +261,7 @@ impl Type {
                 _ => Err(wrong()),
             },
             (Self::Text, Value::String(text)) if !text.as_bytes().is_empty() => kept(),
+            (Self::Name, Value::String(text)) if is_name(&text.to_string_lossy()) => kept(),
             (Self::Boolean, Value::Boolean(_)) | (Self::Function(_), Value::Function(_)) => kept(),
             (Self::Any, value) if !value.is_nil() => kept(),
             (Self::Choice(names), Value::String(text)) => {
@@ -277,6 +294,12 @@ impl Type {
             _ => Err(wrong()),
         }
     }
+}
+
+/// Whether a text can be part of a path and of a line without harm.
+fn is_name(text: &str) -> bool {
+    let fits = |c: char| c.is_alphanumeric() || c == '_' || c == '-';
+    (1..=100).contains(&text.len()) && text.chars().all(fits)
 }
 
 fn names(record: &Record) -> String {

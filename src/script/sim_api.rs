@@ -21,13 +21,14 @@ use super::{
 };
 use crate::{
     benchmark::{
+        control::steps_per_control,
         seed::{EpisodeSeed, Split, Stream},
         settings::Settings,
     },
     evaluation::deformation::Reference,
     geometry::Pose,
     robot::rotation,
-    rollout::{Kind, RestCache, STEPS_PER_CONTROL, Simulation},
+    rollout::{Kind, RestCache, Simulation, stop},
 };
 
 /// Physics with the robot, and what was seen of it.
@@ -119,11 +120,14 @@ impl Inner {
 
     /// One control step; false once the physics has failed.
     fn control_step(&mut self, command: Option<(&Pose, f64)>) -> bool {
+        if stop::requested() {
+            self.failed = Some("interrupted".into());
+        }
         if let Some((pose_b, closure)) = command {
             self.sim.rig.command(&mut self.sim.world, pose_b, closure);
         }
         let _honest_work = self.clock.pause();
-        for _ in 0..STEPS_PER_CONTROL {
+        for _ in 0..steps_per_control(self.sim.world.params.dt) {
             if self.failed.is_some() {
                 return false;
             }
@@ -209,6 +213,7 @@ impl LuaSimulation {
         table.set("height_m", sim.centre(object).z - watched.start_z)?;
         table.set("speed", sim.speed(object))?;
         table.set("asset", object.asset.name.as_str())?;
+        table.set("fingerprint", object.asset.fingerprint())?;
         if object.kind != Kind::Static {
             let touch = sim.pad_touches(object);
             table.set("pad_force", lua.create_sequence_from(touch.map(|t| t.normal_force))?)?;

@@ -30,7 +30,7 @@ pub struct Source {
 
 impl Source {
     fn new(bytes: Vec<u8>) -> Self {
-        let sha256 = Sha256::digest(&bytes).iter().map(|b| format!("{b:02x}")).collect();
+        let sha256 = sha256(&bytes);
         Self { bytes: bytes.into(), sha256 }
     }
 }
@@ -42,6 +42,11 @@ pub struct Bundle {
     pub files: BTreeMap<String, Source>,
     /// For each module or data file asked for, the file that served it.
     pub served: BTreeMap<String, String>,
+}
+
+/// SHA-256 of some bytes, in hexadecimal.
+pub fn sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect()
 }
 
 impl Bundle {

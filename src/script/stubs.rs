@@ -32,7 +32,7 @@ fn lua_type(ty: &Type) -> String {
     match ty {
         Type::Number(..) => "number".into(),
         Type::Integer(_) => "integer".into(),
-        Type::Text => "string".into(),
+        Type::Text | Type::Name => "string".into(),
         Type::Boolean => "boolean".into(),
         Type::Vector(..) => "number[]".into(),
         Type::Choice(names) => names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join("|"),

@@ -23,7 +23,7 @@ use crate::{
         fem::Rest,
         world::{StepFailure, Touch},
     },
-    rollout::soft_rest,
+    rollout::{soft_rest, stop},
     scene::SoftMaterial,
 };
 
@@ -166,6 +166,9 @@ impl UserData for LuaWorld {
 
 /// One step; true, or false and why the world is void from now on.
 fn step(lua: &Lua, inner: &mut Inner) -> mlua::Result<MultiValue> {
+    if stop::requested() {
+        return Err(fail(lua, "interrupted"));
+    }
     if inner.failed.is_none() {
         let _honest_work = inner.clock.pause();
         let dt = inner.world.params.dt;

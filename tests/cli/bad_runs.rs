@@ -12,7 +12,23 @@ fn expert(expert: &'static str) -> String {
 fn an_empty_shape_is_named_with_its_asset() {
     let shape = "softvt.shape.sphere { radius = 0.02 }:subtract(softvt.shape.sphere { radius = 0.03 })";
     let project = Small { shape, ..Small::default() }.project();
-    assert_snapshot!(project.refusal("x.lua --out run"), @"x.lua: asset cube: the shape is empty: no point of it lies inside; check what is subtracted or intersected");
+    assert_snapshot!(project.refusal("x.lua --out run"), @"x.lua: asset cube: the shape is empty: nothing of it is left; check what is subtracted or intersected");
+}
+
+#[test]
+fn a_shape_too_thin_for_its_voxels_says_so() {
+    // The thin sheet hangs between two points of the grid that looks for it.
+    let shape = "softvt.shape.box { size = { 0.04, 0.04, 0.0001 } }:grounded()";
+    let message = Small { shape, ..Small::default() }.project().refusal("x.lua --out run");
+    assert!(message.contains("thinner than that (raise the resolution)"), "{message}");
+}
+
+#[test]
+fn a_size_in_millimetres_is_taken_for_what_it_is() {
+    let shape = "softvt.shape.box { size = { 40, 40, 40 } }:grounded()";
+    let message = Small { shape, ..Small::default() }.project().refusal("x.lua --out run");
+    assert!(message.starts_with("x.lua: asset cube: it is 40.000 × 40.000 × 40.000 m, about"), "{message}");
+    assert!(message.contains("sizes are in metres"), "{message}");
 }
 
 #[test]

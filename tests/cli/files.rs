@@ -118,14 +118,14 @@ fn a_trace_has_a_line_for_every_control_step_and_nodes_if_asked_for() {
 fn a_folder_that_cannot_be_written_or_holds_a_run_is_refused_and_left_alone() {
     let project = Small::default().project();
     project.write("file", b"mine");
-    assert!(project.refusal("x.lua --out file").starts_with("cannot make the folder file: "));
-    assert!(project.refusal("x.lua --out file/run").starts_with("cannot make the folder file/run: "));
+    assert!(project.refusal("x.lua --out file").starts_with("x.lua: cannot make the folder file: "));
+    assert!(project.refusal("x.lua --out file/run").starts_with("x.lua: cannot make the folder file/run: "));
     assert_eq!(project.text("file"), "mine");
     project.succeeds("x.lua --out run");
     let before = (project.text("run/run.json"), project.text("run/episodes.jsonl"));
     assert_eq!(
         project.refusal("x.lua --out run --policy noop"),
-        "run already holds a run (run.json): give another folder with --out, or remove it"
+        "x.lua: run already holds a run (run.json): give another folder with --out, or remove it"
     );
     assert_eq!((project.text("run/run.json"), project.text("run/episodes.jsonl")), before);
 }
@@ -146,7 +146,82 @@ fn the_standard_suite_says_which_sources_and_thresholds_it_ran_with() {
     let run = project.json("run/run.json");
     has(
         &run["sources"],
-        &["suites/spatial_soft.lua", "scripts/experts/pick_place.lua", "assets/sesame_bun.lua"],
+        &[
+            "suites/spatial_soft.lua",
+            "scripts/experts/pick_place.lua",
+            "assets/sesame_bun.lua",
+            "assets/calibration/sesame_bun.json",
+        ],
     );
     assert!(run["thresholds"]["sesame_bun"].as_f64().is_some_and(|tau| tau > 0.0));
+}
+
+/// A suite whose cube is soft and has the name of a calibrated object, and that object's calibration.
+fn impostor(fingerprint: &str) -> Project {
+    let project = Small::default().project();
+    let file = format!(
+        r#"{{"schema_version":1,"protocol_id":"softvtbench-v1","metric_id":"fem_rms_rigid_aligned_bbox_pct_v1",
+        "calibration":{{"method":"compression_sweep","definition":"d","kappa":0.5,"sources":[],"generated_at":"x"}},
+        "thresholds":{{"cube":{{"tau":1.0,"d_ref":2.0,"kappa":0.5,"n_stable_trials":3}}}},
+        "fingerprints":{{"cube":"{fingerprint}"}}}}"#
+    );
+    project.write("assets/calibration/cube.json", file.as_bytes());
+    project
+}
+
+#[test]
+fn the_limit_of_another_object_of_the_same_name_does_not_count() {
+    let said = impostor("0123456789abcdef").succeeds("x.lua --policy noop --out run");
+    assert!(said.err.contains("assets/calibration/cube.json is about another cube"), "{}", said.err);
+    let script = r#"return softvt.experiment { name = "who", grid = { x = { 1 } }, run = function()
+  local cube = softvt.asset { name = "cube", shape = softvt.shape.box { size = { 0.04, 0.04, 0.04 } }:grounded(),
+    body = softvt.soft { youngs_pa = 2e4, poisson = 0.3, density = 300 } }
+  local floor = softvt.asset { name = "floor", shape = softvt.shape.box { size = { 1, 1, 0.05 } }:translate(0, 0, -0.025), body = softvt.static {} }
+  local sim = softvt.simulate { layout = softvt.layout("one", function(scene)
+    scene:add { name = "floor", asset = floor, xyz = { 0, 0, 0 } }
+    scene:add { name = "cube", asset = cube, at = { 0, 0.1 } } end) }
+  return { fingerprint = sim:watch "cube".fingerprint }
+end }
+"#;
+    let project = Project::new(&[("who.lua", script)]);
+    let row: Value = serde_json::from_str(&project.succeeds("who.lua --json").out).expect("a row");
+    let project = impostor(row["fingerprint"].as_str().expect("a text"));
+    let said = project.succeeds("x.lua --policy noop --out run");
+    assert!(!said.err.contains("another"), "{}", said.err);
+    assert_eq!(project.json("run/run.json")["thresholds"]["cube"], 1.0);
+}
+
+#[test]
+fn several_suites_are_one_document_and_must_differ_in_name() {
+    let one = Small { task: "budget_steps = 1", ..Small::default() }.text();
+    let two = |name: &str| {
+        let other = one.replace("name = \"one\", object_type", &format!("name = \"{name}\", object_type"));
+        let body = |text: &str| format!("(function()\n{text}\nend)()");
+        Project::new(&[("x.lua", &format!("return {{ {}, {} }}\n", body(&one), body(&other)))])
+    };
+    let project = two("other");
+    let said = project.succeeds("x.lua --policy noop --json --out run");
+    let document: Value = serde_json::from_str(&said.out).expect("one document");
+    assert_eq!((&document[0]["suite"], &document[1]["suite"]), (&"one".into(), &"other".into()));
+    let message = two("one").refusal("x.lua --policy noop --out run");
+    assert_eq!(message, "x.lua: two suites are named \"one\", and would share one folder; rename one");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_scripts_files_do_not_follow_links_out_of_the_folder() {
+    let script = r#"return softvt.experiment { name = "e", grid = { x = { 1 } }, run = function() return { x = 1 } end,
+      finish = function() return { files = { ["deep/stolen.txt"] = "mine" } } end }"#;
+    let project = Project::new(&[("x.lua", script), ("elsewhere/kept.txt", ""), ("run/kept.txt", "")]);
+    std::os::unix::fs::symlink(project.path("elsewhere"), project.path("run/deep")).expect("a link");
+    let said = project.softvt("x.lua --out run");
+    assert_eq!(said.code, 2, "{}", said.err);
+    assert!(said.err.contains("run/deep is a link"), "{}", said.err);
+    assert!(!project.path("elsewhere/stolen.txt").exists());
+}
+
+#[test]
+fn the_golden_episode_is_the_published_one() {
+    let said = Project::new(&[]).succeeds("doctor");
+    assert!(said.out.contains("matches"), "{}", said.out);
 }

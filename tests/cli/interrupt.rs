@@ -47,6 +47,40 @@ fn finished_episodes_survive_an_interrupt() {
     assert!(!project.path("run/summary.json").exists());
 }
 
+/// An experiment of 100 points: the first ends at once, the others squeeze for an hour.
+const SLOW: &str = r#"local points = {}
+for i = 1, 100 do points[i] = { i = i } end
+return softvt.experiment { name = "e", options = {}, points = function() return points end, run = function(point)
+  if point.i == 1 then return { i = 1 } end
+  local world = softvt.world { sleeping = false }
+  world:soft { name = "cube", shape = softvt.shape.box { size = { 0.05, 0.05, 0.05 } }, youngs_pa = 3e4, poisson = 0.4, density = 300, xyz = { 0, 0, 1 } }
+  for _ = 1, 60 * 3600 do pcall(world.step, world) end
+  return { i = point.i }
+end }
+"#;
+
+#[test]
+fn an_experiment_ends_soon_and_shows_the_rows_that_it_has() {
+    let project = Project::new(&[("x.lua", SLOW)]);
+    let child = Command::new(cargo_bin!("softvt"))
+        .current_dir(project.path(""))
+        .args(["x.lua", "--threads", "2", "--json"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("started");
+    sleep(Duration::from_secs(2));
+    let start = Instant::now();
+    let killed = Command::new("kill").args(["-TERM", &child.id().to_string()]).status().expect("kill runs");
+    assert!(killed.success());
+    let output = child.wait_with_output().expect("output");
+    assert!(start.elapsed() < Duration::from_secs(10), "it took {:?}", start.elapsed());
+    let err = String::from_utf8(output.stderr).expect("text");
+    assert_eq!(output.status.code(), Some(130), "{err}");
+    assert_eq!(String::from_utf8(output.stdout).expect("text"), "{\"i\":1}\n");
+    assert!(err.contains("interrupted; the rows of 1 of 100 points"), "{err}");
+}
+
 fn await_lines(project: &Project, count: usize) {
     let start = Instant::now();
     let path = project.path("run/episodes.jsonl");

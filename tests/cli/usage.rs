@@ -51,6 +51,16 @@ fn an_unknown_flag_is_told_with_the_one_that_was_meant() {
 #[test]
 fn an_unknown_task_shift_or_setting_is_told_with_those_there_are() {
     assert_snapshot!(small("--task 7"), @"x.lua: --task 7: suite one has no such task; it has 0 to 0: see softvt list tasks");
+    let words = ["x.lua", "--out", "run", "--task", ""];
+    let project = Small::default().project();
+    let mut command = project.command("");
+    command.args(words);
+    assert!(
+        crate::support::refusal(crate::support::said(command), "")
+            .starts_with("x.lua: --task: expected an index")
+    );
+    assert!(small("--seed -1").contains("expected a whole number in 0..18446744073709551615"));
+    assert!(small("--set physics.dt=0.02").contains("dt must divide 0.05 s"));
     assert_snapshot!(small("--shift stiffness=2"), @r#"x.lua: --shift: unknown shift "stiffness"; the suite declares none"#);
     assert_snapshot!(small("--shift stiffness"), @r#"x.lua: --shift: expected NAME=VALUE, got "stiffness""#);
     assert_snapshot!(small("--set robot.pad=1"), @"x.lua: --set: there is no setting robot.pad; pad could be one of arm, gripper, pads, ik");

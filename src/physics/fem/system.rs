@@ -53,6 +53,8 @@ pub struct System {
 /// The matrix: diagonal blocks and, per node, blocks to its higher neighbours.
 #[derive(Debug)]
 struct Blocks {
+    /// Places of the nodes in the voxel lattice.
+    places: Vec<[i32; 3]>,
     neighbours: Vec<Vec<u32>>,
     slot: Vec<Vec<u32>>,
     diagonal: Vec<[f64; 9]>,
@@ -119,7 +121,11 @@ impl Blocks {
             })
             .collect();
         let off = vec![[0.0; 9]; count as usize];
-        Self { neighbours, slot, diagonal: vec![[0.0; 9]; nodes], off, pairs }
+        let place =
+            |p: &Vec3| [0, 1, 2].map(|i| ((p[i] - rest.mesh.nodes[0][i]) / rest.mesh.edge).round() as i32);
+        let places = rest.mesh.nodes.iter().map(place);
+        let diagonal = vec![[0.0; 9]; nodes];
+        Self { places: places.collect(), neighbours, slot, diagonal, off, pairs }
     }
 
     fn assemble(&mut self, rest: &Rest, rotations: &[Mat3], c: &StepCoefficients) {
@@ -200,7 +206,7 @@ impl System {
     pub fn prepare(&mut self, body: &SoftBody, c: &StepCoefficients, step: u64) -> bool {
         let new_plan = self.choose_kept(step);
         if new_plan || self.plan.is_none() {
-            self.plan = Some(Symbolic::new(&self.blocks.neighbours, &self.kept));
+            self.plan = Some(Symbolic::new(&self.blocks.neighbours, &self.blocks.places, &self.kept));
         }
         if new_plan || (body.frame - self.turn).norm_squared() > STALE_TURN * STALE_TURN {
             self.turn = body.frame;

@@ -1,6 +1,6 @@
 //! Connected islands of a problem, and the factors that they keep between steps.
 
-use super::{problem::Problem, secant::Secant};
+use super::{newton::STEPS_PER_FACTOR, problem::Problem, secant::Secant};
 use crate::physics::sparse::dense;
 
 /// The blocks, patches and scalars of one connected island.
@@ -63,6 +63,10 @@ struct Entry {
     factor: Vec<f64>,
     sound: bool,
     secant: Secant,
+    /// Steps of the first pass that ended with this factor.
+    first: Option<u32>,
+    /// Steps beyond that many, or beyond [`GOOD_STEPS`], in later passes.
+    wasted: u32,
 }
 
 /// Factored Hessians by island, the most recently used first.
@@ -73,16 +77,22 @@ pub struct Cache {
     tail: Vec<f64>,
 }
 
+/// Steps of a pass that no new factor would spare.
+const GOOD_STEPS: u32 = 4;
 /// Islands whose factors are remembered.
 const REMEMBERED: usize = 6;
 
 impl Cache {
-    /// Whether there is a factor for the island; it becomes the current one.
+    /// Whether there is a factor for the island that is worth its steps; it becomes the current one.
+    ///
+    /// A factor that has wasted as many steps as a new one costs is given up, so that altogether never more than twice
+    /// the least is spent, however long each single pass would rather go on with it.
     pub fn matches(&mut self, problem: &Problem, island: &Island) -> bool {
         let found = self.entries.iter().position(|entry| same(entry, problem, island));
         if let Some(found) = found {
             self.entries[..=found].rotate_right(1);
-            return self.entries[0].sound;
+            let entry = &self.entries[0];
+            return entry.sound && f64::from(entry.wasted) < STEPS_PER_FACTOR;
         }
         if self.entries.len() < REMEMBERED {
             self.entries.push(Entry::default());
@@ -105,9 +115,17 @@ impl Cache {
 
     /// Puts the factored buffer back.
     pub fn give(&mut self, factor: Vec<f64>, sound: bool) {
-        self.entries[0].factor = factor;
-        self.entries[0].sound = sound;
-        self.entries[0].secant.clear();
+        let entry = &mut self.entries[0];
+        (entry.factor, entry.sound) = (factor, sound);
+        (entry.first, entry.wasted) = (None, 0);
+        entry.secant.clear();
+    }
+
+    /// Tells that a pass ended after `steps` with the current factor.
+    pub fn took(&mut self, steps: u32) {
+        let entry = &mut self.entries[0];
+        let first = *entry.first.get_or_insert(steps);
+        entry.wasted += steps.saturating_sub(first.min(GOOD_STEPS));
     }
 
     /// Solves in place with the current factor, what was learnt since it was made, and `stiffness` added to the diagonal

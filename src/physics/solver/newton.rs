@@ -10,7 +10,7 @@ use super::{
 use crate::{geometry::Vec3, physics::sparse::dense};
 
 /// Convergence of the gradient relative to the momenta in play (both scaled by `diag(A)^-1/2`).
-const RELATIVE: f64 = 1e-6;
+const RELATIVE: f64 = 1e-5;
 /// Convergence in absolute terms, √J.
 const ABSOLUTE: f64 = 1e-10;
 /// Most Newton steps a pass.
@@ -21,7 +21,7 @@ const MAX_PASSES: usize = 3;
 const PASS_CHANGE: f64 = 0.01;
 
 /// A new factor costs about as much as this many steps with the old one.
-const STEPS_PER_FACTOR: f64 = 8.0;
+pub(super) const STEPS_PER_FACTOR: f64 = 8.0;
 /// Steps after which an old factor, corrected by what they taught, is judged.
 const TRIAL_STEPS: u32 = 2;
 
@@ -137,6 +137,7 @@ impl Solver {
         let mut since = (0, excess);
         for taken in 0..MAX_NEWTON as u32 {
             if excess <= 1.0 {
+                self.cache.took(since.0);
                 return Ok(taken);
             }
             let fresh = !usable;

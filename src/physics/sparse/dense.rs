@@ -1,11 +1,13 @@
 //! Dense Cholesky on column-major storage: the kernels under the sparse factor and the contact solve.
+//!
+//! Products are added by `mul_add`, which is exactly rounded on every machine, so the bytes are the same everywhere.
 
 /// Columns factored between two updates of everything to their right.
 const PANEL: usize = 32;
 /// Columns factored between two updates of the rest of their panel.
 const STRIP: usize = 8;
 /// Rows and columns of the register tile of the update.
-const ROWS: usize = 8;
+const ROWS: usize = 12;
 const COLUMNS: usize = 4;
 /// Columns that the triangular sweeps and products take at once, so that the vector is read and written less often.
 const WIDE: usize = 4;
@@ -35,7 +37,7 @@ fn factor_strip(a: &mut [f64], n: usize, start: usize, end: usize) -> bool {
             let (left, right) = a.split_at_mut(j * n);
             let source = &left[p * n + j..p * n + n];
             let scale = source[0];
-            right[j..n].iter_mut().zip(source).for_each(|(x, s)| *x -= scale * s);
+            right[j..n].iter_mut().zip(source).for_each(|(x, s)| *x = s.mul_add(-scale, *x));
         }
         let pivot = a[j * n + j];
         if pivot.is_nan() || pivot <= 0.0 {
@@ -58,11 +60,15 @@ fn update(a: &mut [f64], n: usize, (start, end): (usize, usize), last: usize, pa
     pack(&panel[start * n..], n, end, packed);
     for column in (end..last).step_by(COLUMNS) {
         let columns = COLUMNS.min(last - column);
-        let (first, half) = ((column - end) / ROWS, (column - end) % ROWS);
+        let (first, offset) = ((column - end) / ROWS, (column - end) % ROWS);
         let right = &packed[first * ROWS * depth..(first + 1) * ROWS * depth];
         for (index, left) in packed.chunks_exact(ROWS * depth).enumerate().skip(first) {
             let row = end + index * ROWS;
-            let sum = if half == 0 { tile::<0>(left, right) } else { tile::<COLUMNS>(left, right) };
+            let sum = match offset {
+                0 => tile::<0>(left, right),
+                COLUMNS => tile::<COLUMNS>(left, right),
+                _ => tile::<{ 2 * COLUMNS }>(left, right),
+            };
             let rows = ROWS.min(n - row);
             for (c, sum) in sum.iter().enumerate().take(columns) {
                 let at = (column - end + c) * n + row;
@@ -84,13 +90,13 @@ fn pack(panel: &[f64], n: usize, from: usize, packed: &mut Vec<f64>) {
     }
 }
 
-/// `A[8×k] B[4×k]ᵀ` in registers, where `B` is the rows from `HALF` on of the stripe `right`.
-fn tile<const HALF: usize>(left: &[f64], right: &[f64]) -> [[f64; ROWS]; COLUMNS] {
+/// `A[12×k] B[4×k]ᵀ` in registers, where `B` is the rows from `OFFSET` on of the stripe `right`.
+fn tile<const OFFSET: usize>(left: &[f64], right: &[f64]) -> [[f64; ROWS]; COLUMNS] {
     let mut sum = [[0.0; ROWS]; COLUMNS];
     for (a, b) in left.as_chunks::<ROWS>().0.iter().zip(right.as_chunks::<ROWS>().0) {
         for (c, sum) in sum.iter_mut().enumerate() {
             for (s, a) in sum.iter_mut().zip(a) {
-                *s += a * b[HALF + c];
+                *s = a.mul_add(b[OFFSET + c], *s);
             }
         }
     }
@@ -113,7 +119,9 @@ pub fn forward(l: &[f64], n: usize, k: usize, b: &mut [f64]) {
         let [l0, l1, l2, l3] = wide(l, n, j, j + WIDE);
         let (y0, y1, y2, y3) = (b[j], b[j + 1], b[j + 2], b[j + 3]);
         let tail = b[j + WIDE..n].iter_mut().zip(l0).zip(l1).zip(l2).zip(l3);
-        tail.for_each(|((((b, l0), l1), l2), l3)| *b -= (y0 * l0 + y1 * l1) + (y2 * l2 + y3 * l3));
+        tail.for_each(|((((b, l0), l1), l2), l3)| {
+            *b -= y0.mul_add(*l0, y1 * l1) + y2.mul_add(*l2, y3 * l3);
+        });
         j += WIDE;
     }
     for j in j..k {
@@ -121,7 +129,7 @@ pub fn forward(l: &[f64], n: usize, k: usize, b: &mut [f64]) {
         let (head, tail) = b.split_at_mut(j + 1);
         let y = head[j] / column[j];
         head[j] = y;
-        tail[..n - j - 1].iter_mut().zip(&column[j + 1..]).for_each(|(b, l)| *b -= y * l);
+        tail[..n - j - 1].iter_mut().zip(&column[j + 1..]).for_each(|(b, l)| *b = l.mul_add(-y, *b));
     }
 }
 
@@ -149,7 +157,7 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
     let mut lanes = [0.0; 4];
     for (a, b) in a.iter().zip(b) {
-        (0..4).for_each(|i| lanes[i] += a[i] * b[i]);
+        (0..4).for_each(|i| lanes[i] = a[i].mul_add(b[i], lanes[i]));
     }
     let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
     (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]) + rest
@@ -163,10 +171,10 @@ fn dots([a, b, c, d]: [&[f64]; WIDE], x: &[f64]) -> [f64; WIDE] {
     for ((((x, a), b), c), d) in chunks(x).iter().zip(chunks(a)).zip(chunks(b)).zip(chunks(c)).zip(chunks(d))
     {
         for i in 0..4 {
-            lanes[0][i] += a[i] * x[i];
-            lanes[1][i] += b[i] * x[i];
-            lanes[2][i] += c[i] * x[i];
-            lanes[3][i] += d[i] * x[i];
+            lanes[0][i] = a[i].mul_add(x[i], lanes[0][i]);
+            lanes[1][i] = b[i].mul_add(x[i], lanes[1][i]);
+            lanes[2][i] = c[i].mul_add(x[i], lanes[2][i]);
+            lanes[3][i] = d[i].mul_add(x[i], lanes[3][i]);
         }
     }
     let mut sums = lanes.map(|l| (l[0] + l[1]) + (l[2] + l[3]));
@@ -195,7 +203,9 @@ pub fn symmetric_multiply(a: &[f64], n: usize, x: &[f64], y: &mut [f64]) {
         let (x0, x1, x2, x3) = (x[j], x[j + 1], x[j + 2], x[j + 3]);
         let [a0, a1, a2, a3] = columns;
         let tail = y[j + WIDE..n].iter_mut().zip(a0).zip(a1).zip(a2).zip(a3);
-        tail.for_each(|((((y, a0), a1), a2), a3)| *y += (a0 * x0 + a1 * x1) + (a2 * x2 + a3 * x3));
+        tail.for_each(|((((y, a0), a1), a2), a3)| {
+            *y += a0.mul_add(x0, a1 * x1) + a2.mul_add(x2, a3 * x3);
+        });
     }
     for j in whole..n {
         y[j] += a[j * n + j] * x[j];

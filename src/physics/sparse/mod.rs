@@ -5,6 +5,7 @@
 //! [`Symbolic`] depends on the pattern and the kept set only; [`Factor`] is refilled without allocating.
 
 pub mod dense;
+mod dissection;
 mod numeric;
 mod symbolic;
 

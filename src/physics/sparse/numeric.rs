@@ -204,7 +204,8 @@ mod tests {
             });
         }
         for keep in [vec![], vec![3, 4, 77], (0..25).collect::<Vec<u32>>(), (0..125).collect()] {
-            let plan = Symbolic::new(&grid.neighbours, &keep);
+            let places: Vec<[i32; 3]> = (0..125).map(|c| [c % 5, c / 5 % 5, c / 25]).collect();
+            let plan = Symbolic::new(&grid.neighbours, &places, &keep);
             let mut factor = Factor::default();
             assert!(factor.refill(&plan, &grid));
             let mut y = vec![0.0; 3 * nodes];

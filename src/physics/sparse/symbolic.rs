@@ -1,4 +1,6 @@
-//! Ordering and structure of a factor: which nodes go when, and where their fronts live.
+//! Structure of a factor: which nodes go when, and where their fronts live.
+
+use super::dissection;
 
 /// The plan of a factorisation for one pattern and one kept set.
 #[derive(Debug)]
@@ -37,14 +39,15 @@ pub(super) struct Front {
 }
 
 /// Widest share of zeros accepted when two fronts are merged.
-const MERGE_ZEROS: f64 = 0.2;
+const MERGE_ZEROS: f64 = 0.1;
 /// Fronts with at most this many pivots are merged whatever the zeros.
 const MERGE_SMALL: usize = 3;
 
 impl Symbolic {
     /// Analyses the graph `neighbours` (symmetric, without self loops, ascending lists), keeping `keep` (ascending).
-    pub fn new(neighbours: &[Vec<u32>], keep: &[u32]) -> Self {
-        let order = elimination_order(neighbours, keep);
+    /// `places` are the nodes' places in a lattice in which neighbours are at most one apart along each axis.
+    pub fn new(neighbours: &[Vec<u32>], places: &[[i32; 3]], keep: &[u32]) -> Self {
+        let order = elimination_order(places, keep);
         let inner = order.len() - keep.len();
         let structure = column_structure(neighbours, &order, inner);
         let order = postorder(&order, &structure, inner);
@@ -59,26 +62,14 @@ impl Symbolic {
     }
 }
 
-/// Approximate minimum degree on the nodes that are not kept, then the kept ones.
-fn elimination_order(neighbours: &[Vec<u32>], keep: &[u32]) -> Vec<u32> {
-    let mut kept = vec![false; neighbours.len()];
+/// The nodes that are not kept by nested dissection, then the kept ones.
+fn elimination_order(places: &[[i32; 3]], keep: &[u32]) -> Vec<u32> {
+    let mut kept = vec![false; places.len()];
     keep.iter().for_each(|&node| kept[node as usize] = true);
-    let inner: Vec<u32> = (0..neighbours.len() as u32).filter(|&n| !kept[n as usize]).collect();
-    let mut local = vec![usize::MAX; neighbours.len()];
-    inner.iter().enumerate().for_each(|(i, &n)| local[n as usize] = i);
-    let (mut starts, mut rows) = (vec![0usize], Vec::new());
-    for &node in &inner {
-        rows.extend(
-            neighbours[node as usize].iter().map(|&n| local[n as usize]).filter(|&n| n != usize::MAX),
-        );
-        starts.push(rows.len());
-    }
-    let permutation = match amd::order(inner.len(), &starts, &rows, &amd::Control::default()) {
-        Ok((permutation, _, _)) => permutation,
-        // The natural order is always valid, only slower.
-        Err(_) => (0..inner.len()).collect(),
-    };
-    permutation.into_iter().map(|i| inner[i]).chain(keep.iter().copied()).collect()
+    let mut order: Vec<u32> = (0..places.len() as u32).filter(|&n| !kept[n as usize]).collect();
+    dissection::order(&mut order, places);
+    order.extend_from_slice(keep);
+    order
 }
 
 /// Rows below the diagonal of each eliminated column, as ascending positions.
@@ -136,18 +127,18 @@ fn postorder(order: &[u32], structure: &[Vec<u32>], inner: usize) -> Vec<u32> {
 
 /// Groups columns into fronts, links them, and adds the root over the kept positions.
 fn build_fronts(structure: &[Vec<u32>], inner: usize, total: usize) -> Vec<Front> {
-    let mut groups: Vec<(usize, usize, Vec<u32>)> = Vec::new();
+    let mut groups: Vec<Group> = Vec::new();
     for (at, rows) in structure.iter().enumerate() {
-        groups.push((at, 1, rows.clone()));
+        groups.push(Group { first: at, pivots: 1, below: rows.clone(), zeros: 0 });
         while try_merge(&mut groups) {}
     }
     let mut front_of = vec![groups.len(); total];
-    for (index, (first, pivots, _)) in groups.iter().enumerate() {
-        front_of[*first..first + pivots].fill(index);
+    for (index, group) in groups.iter().enumerate() {
+        front_of[group.first..group.first + group.pivots].fill(index);
     }
     let mut fronts = Vec::with_capacity(groups.len() + 1);
     let mut offset = 0;
-    for (first, pivots, below) in groups {
+    for Group { first, pivots, below, .. } in groups {
         let rows: Vec<u32> = (first as u32..(first + pivots) as u32).chain(below).collect();
         let size = 9 * rows.len() * pivots;
         fronts.push(Front { first, pivots, rows, children: Vec::new(), into_parent: Vec::new(), offset });
@@ -166,22 +157,35 @@ fn build_fronts(structure: &[Vec<u32>], inner: usize, total: usize) -> Vec<Front
     fronts
 }
 
-/// Merges the last two groups if the former is a child of the latter and few zeros are added.
-fn try_merge(groups: &mut Vec<(usize, usize, Vec<u32>)>) -> bool {
+/// Neighbouring columns that are eliminated in one front.
+struct Group {
+    /// First position.
+    first: usize,
+    /// How many positions.
+    pivots: usize,
+    /// Rows below them, ascending.
+    below: Vec<u32>,
+    /// Blocks stored although they are zero, because of merges.
+    zeros: usize,
+}
+
+/// Merges the last two groups if the former is a child of the latter and few zeros are stored in all.
+fn try_merge(groups: &mut Vec<Group>) -> bool {
     let [.., child, parent] = groups.as_slice() else { return false };
-    if child.2.first() != Some(&(parent.0 as u32)) {
+    if child.below.first() != Some(&(parent.first as u32)) {
         return false;
     }
-    let full = parent.1 + parent.2.len();
-    let zeros = child.1 * (full - child.2.len());
-    let area = child.1 * (child.1 + full) + parent.1 * full;
-    let small = child.1 <= MERGE_SMALL && parent.1 <= MERGE_SMALL;
+    let full = parent.pivots + parent.below.len();
+    let zeros = child.zeros + parent.zeros + child.pivots * (full - child.below.len());
+    let area = child.pivots * (child.pivots + full) + parent.pivots * full;
+    let small = child.pivots <= MERGE_SMALL && parent.pivots <= MERGE_SMALL;
     if zeros as f64 > MERGE_ZEROS * area as f64 && !small {
         return false;
     }
-    let merged = (child.0, child.1 + parent.1, parent.2.clone());
+    let (first, pivots) = (child.first, child.pivots + parent.pivots);
+    let below = parent.below.clone();
     groups.truncate(groups.len() - 2);
-    groups.push(merged);
+    groups.push(Group { first, pivots, below, zeros });
     true
 }
 

@@ -1,0 +1,39 @@
+//! The rate of control.
+
+/// Time between two commands, s: policies act, and records are written, at 20 Hz.
+pub const CONTROL_DT: f64 = 0.05;
+
+/// Physics steps of `dt` seconds a control step, 3 at 60 Hz; settings let only a `dt` pass that divides [`CONTROL_DT`].
+pub fn steps_per_control(dt: f64) -> u32 {
+    (CONTROL_DT / dt).round().max(1.0) as u32
+}
+
+/// Whether `dt` divides [`CONTROL_DT`].
+///
+/// # Errors
+/// A fragment for people.
+pub fn check_dt(dt: f64) -> Result<(), String> {
+    let steps = f64::from(steps_per_control(dt));
+    if (steps * dt - CONTROL_DT).abs() <= 1e-9 {
+        return Ok(());
+    }
+    let (below, above) =
+        (CONTROL_DT / (CONTROL_DT / dt).ceil(), CONTROL_DT / (CONTROL_DT / dt).floor().max(1.0));
+    Err(format!(
+        "physics.dt: control runs at 20 Hz, so dt must divide {CONTROL_DT} s; got {dt}, near are {below:.6} and {above:.6}"
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_control_rate_does_not_depend_on_the_physics_step() {
+        for (dt, steps) in [(1.0 / 60.0, 3), (1.0 / 120.0, 6), (1.0 / 240.0, 12), (0.05, 1), (1e-4, 500)] {
+            assert_eq!(steps_per_control(dt), steps);
+            assert!(check_dt(dt).is_ok());
+        }
+        assert!(check_dt(1.0 / 50.0).is_err_and(|e| e.contains("0.016667") && e.contains("0.025")));
+    }
+}

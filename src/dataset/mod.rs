@@ -1,0 +1,3 @@
+//! What is kept of rollouts for people and for training: videos.
+
+pub mod video;

@@ -1,0 +1,195 @@
+//! The container (ISO/IEC 14496-12, 14496-15): one H.264 track, the index before the pictures so that a browser can start at once.
+
+/// Clock ticks of one picture.
+const TICKS: u32 = 1000;
+
+/// One picture as the container keeps it.
+struct Sample {
+    bytes: Vec<u8>,
+    key: bool,
+}
+
+/// A video track in memory.
+pub struct Track {
+    width: usize,
+    height: usize,
+    rate: u32,
+    /// Sequence and picture parameter sets, without start codes.
+    sps: Vec<u8>,
+    pps: Vec<u8>,
+    samples: Vec<Sample>,
+}
+
+impl Track {
+    pub fn new(width: usize, height: usize, rate: u32) -> Self {
+        Self { width, height, rate, sps: Vec::new(), pps: Vec::new(), samples: Vec::new() }
+    }
+
+    /// Pictures so far.
+    pub fn len(&self) -> usize {
+        self.samples.len()
+    }
+
+    /// Adds one access unit in Annex B form: parameter sets go to the index, slices get their lengths before them.
+    pub fn push(&mut self, unit: &[u8]) {
+        let mut sample = Sample { bytes: Vec::with_capacity(unit.len()), key: false };
+        for nal in nal_units(unit) {
+            match nal[0] & 31 {
+                7 => self.sps = nal.to_vec(),
+                8 => self.pps = nal.to_vec(),
+                kind => {
+                    sample.key |= kind == 5;
+                    sample.bytes.extend((nal.len() as u32).to_be_bytes());
+                    sample.bytes.extend(nal);
+                }
+            }
+        }
+        self.samples.push(sample);
+    }
+
+    /// The whole file.
+    pub fn file(&self) -> Vec<u8> {
+        let brands = b"isomiso2avc1mp41";
+        let mut file = boxed(b"ftyp", &[b"isom".as_slice(), &512_u32.to_be_bytes(), brands].concat());
+        // The index holds the place of the first picture, which comes after the index: its length does not depend on it.
+        let before = file.len() + self.moov(0).len() + 8;
+        file.extend(self.moov(before as u32));
+        let pictures: Vec<u8> = self.samples.iter().flat_map(|s| s.bytes.iter().copied()).collect();
+        file.extend(boxed(b"mdat", &pictures));
+        file
+    }
+
+    fn moov(&self, first: u32) -> Vec<u8> {
+        let scale = self.rate * TICKS;
+        let duration = self.samples.len() as u32 * TICKS;
+        let mvhd =
+            Fields::full(0).u32s(&[0, 0, scale, duration, 0x0001_0000]).u16s(&[0x0100, 0]).u32s(&[0, 0]);
+        let mvhd = mvhd.u32s(&MATRIX).u32s(&[0; 6]).u32s(&[2]);
+        // Flags 3: the track is enabled and part of the presentation.
+        let tkhd = Fields::full(3).u32s(&[0, 0, 1, 0, duration, 0, 0]).u16s(&[0, 0, 0, 0]).u32s(&MATRIX);
+        let tkhd = tkhd.u32s(&[(self.width as u32) << 16, (self.height as u32) << 16]);
+        // 0x55c4: language undetermined.
+        let mdhd = Fields::full(0).u32s(&[0, 0, scale, duration]).u16s(&[0x55c4, 0]);
+        let hdlr = Fields::full(0).u32s(&[0]).bytes(b"vide").u32s(&[0; 3]).bytes(b"softvt\0");
+        let vmhd = Fields::full(1).u16s(&[0; 4]);
+        let dref = Fields::full(0).u32s(&[1]).bytes(&boxed(b"url ", &Fields::full(1).0));
+        let minf = [
+            boxed(b"vmhd", &vmhd.0),
+            boxed(b"dinf", &boxed(b"dref", &dref.0)),
+            boxed(b"stbl", &self.sample_table(first)),
+        ];
+        let mdia = [boxed(b"mdhd", &mdhd.0), boxed(b"hdlr", &hdlr.0), boxed(b"minf", &minf.concat())];
+        let trak = [boxed(b"tkhd", &tkhd.0), boxed(b"mdia", &mdia.concat())];
+        boxed(b"moov", &[boxed(b"mvhd", &mvhd.0), boxed(b"trak", &trak.concat())].concat())
+    }
+
+    fn sample_table(&self, first: u32) -> Vec<u8> {
+        let count = self.samples.len() as u32;
+        let stsd = Fields::full(0).u32s(&[1]).bytes(&self.sample_entry());
+        let stts = Fields::full(0).u32s(&[1, count, TICKS]);
+        let keys = self.samples.iter().zip(1_u32..).filter(|(s, _)| s.key).map(|(_, number)| number);
+        let keys: Vec<u32> = keys.collect();
+        let stss = Fields::full(0).u32s(&[keys.len() as u32]).u32s(&keys);
+        let stsc = Fields::full(0).u32s(&[1, 1, count, 1]);
+        let sizes: Vec<u32> = self.samples.iter().map(|s| s.bytes.len() as u32).collect();
+        let stsz = Fields::full(0).u32s(&[0, count]).u32s(&sizes);
+        let stco = Fields::full(0).u32s(&[1, first]);
+        let boxes = [
+            (b"stsd", stsd),
+            (b"stts", stts),
+            (b"stss", stss),
+            (b"stsc", stsc),
+            (b"stsz", stsz),
+            (b"stco", stco),
+        ];
+        boxes.iter().flat_map(|(name, fields)| boxed(name, &fields.0)).collect()
+    }
+
+    /// The `avc1` entry: size, the decoder's configuration and the colour space (BT.601 primaries, transfer, matrix; studio range).
+    fn sample_entry(&self) -> Vec<u8> {
+        let (sps, pps) = (&self.sps, &self.pps);
+        let profile = [1, sps[1], sps[2], sps[3], 0xff, 0xe1];
+        let avcc = Fields(profile.to_vec()).u16s(&[sps.len() as u16]).bytes(sps).bytes(&[1]);
+        let avcc = avcc.u16s(&[pps.len() as u16]).bytes(pps);
+        let colr = Fields(b"nclx".to_vec()).u16s(&[6, 6, 6]).bytes(&[0]);
+        let entry =
+            Fields(vec![0; 6]).u16s(&[1]).u16s(&[0; 8]).u16s(&[self.width as u16, self.height as u16]);
+        // 72 dpi, one frame a sample, no name, 24 bits a pixel, no colour table.
+        let entry = entry.u32s(&[0x0048_0000, 0x0048_0000, 0]).u16s(&[1]).bytes(&[0; 32]).u16s(&[24, 0xffff]);
+        boxed(b"avc1", &entry.bytes(&boxed(b"avcC", &avcc.0)).bytes(&boxed(b"colr", &colr.0)).0)
+    }
+}
+
+/// No rotation, as the container writes it (16.16 and 2.30 fixed point).
+const MATRIX: [u32; 9] = [0x0001_0000, 0, 0, 0, 0x0001_0000, 0, 0, 0, 0x4000_0000];
+
+fn boxed(name: &[u8; 4], payload: &[u8]) -> Vec<u8> {
+    [&(payload.len() as u32 + 8).to_be_bytes(), name.as_slice(), payload].concat()
+}
+
+/// Big-endian fields, one after the other.
+struct Fields(Vec<u8>);
+
+impl Fields {
+    /// Version 0 and flags.
+    fn full(flags: u32) -> Self {
+        Self(flags.to_be_bytes().to_vec())
+    }
+
+    fn u32s(mut self, values: &[u32]) -> Self {
+        values.iter().for_each(|v| self.0.extend(v.to_be_bytes()));
+        self
+    }
+
+    fn u16s(mut self, values: &[u16]) -> Self {
+        values.iter().for_each(|v| self.0.extend(v.to_be_bytes()));
+        self
+    }
+
+    fn bytes(mut self, values: &[u8]) -> Self {
+        self.0.extend(values);
+        self
+    }
+}
+
+/// Splits an Annex B stream (ITU-T H.264, B.1) at its start codes; the units come without them and are never empty.
+fn nal_units(stream: &[u8]) -> impl Iterator<Item = &[u8]> {
+    let starts: Vec<usize> =
+        (0..stream.len().saturating_sub(2)).filter(|&i| stream[i..i + 3] == [0, 0, 1]).collect();
+    let ends = starts.iter().skip(1).copied().chain([stream.len()]).collect::<Vec<_>>();
+    let units = starts.into_iter().zip(ends).map(|(start, end)| {
+        let unit = &stream[start + 3..end];
+        // A four-byte start code leaves its first zero at the end of the unit before it; units never end in zero.
+        &unit[..unit.iter().rposition(|b| *b != 0).map_or(0, |last| last + 1)]
+    });
+    units.filter(|unit| !unit.is_empty())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_are_split_at_three_and_four_byte_start_codes() {
+        let stream = [0, 0, 0, 1, 0x67, 5, 0, 0, 1, 0x68, 6, 0, 0, 0, 1, 0x65, 7, 8];
+        let units: Vec<_> = nal_units(&stream).collect();
+        assert_eq!(units, [&[0x67, 5][..], &[0x68, 6], &[0x65, 7, 8]]);
+    }
+
+    #[test]
+    fn the_index_points_at_the_pictures() {
+        let mut track = Track::new(32, 32, 20);
+        track.push(&[0, 0, 0, 1, 0x67, 66, 192, 30, 0, 0, 0, 1, 0x68, 1, 0, 0, 0, 1, 0x65, 7, 8]);
+        track.push(&[0, 0, 0, 1, 0x41, 9]);
+        let file = track.file();
+        let find = |name: &[u8]| file.windows(4).position(|w| w == name).unwrap() + 4;
+        let number = |at: usize| u32::from_be_bytes(file[at..at + 4].try_into().unwrap()) as usize;
+        let first = number(find(b"stco") + 8);
+        assert_eq!(first, find(b"mdat"));
+        let sizes = find(b"stsz");
+        assert_eq!((number(sizes + 8), number(sizes + 12), number(sizes + 16)), (2, 7, 6));
+        assert_eq!(file[first..], [0, 0, 0, 3, 0x65, 7, 8, 0, 0, 0, 2, 0x41, 9]);
+        let keys = find(b"stss");
+        assert_eq!((number(keys + 4), number(keys + 8)), (1, 1));
+    }
+}
