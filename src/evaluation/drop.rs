@@ -43,8 +43,10 @@ pub struct Grip {
 /// Knows whether the hand was told to let go.
 ///
 /// A gripper that holds something is commanded narrower than it is. It is told to release when it is commanded wider
-/// than it is by [`Rules::release_margin_m`], or as wide as it was when both pads first touched, so that opening in
-/// many small steps is a release as well.
+/// than it is by [`Rules::release_margin_m`], or as wide as it has been at most with both pads on the object, so that
+/// opening in many small steps is a release as well, and a hold that was loosened until it barely holds is none. (The
+/// width at the *first* touch would not do: it is noticed when a fast gripper is some millimetres in already, and an
+/// object that turns in the hand may become wider.)
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ReleaseWatch {
     released: bool,
@@ -59,6 +61,8 @@ impl ReleaseWatch {
             if squeezing {
                 *self = Self { released: false, touch_width_m: Some(grip.width_m) };
             }
+        } else if grip.both_touch {
+            self.touch_width_m = self.touch_width_m.map(|touch| touch.max(grip.width_m));
         }
         if let Some(touch) = self.touch_width_m {
             let limit = (grip.width_m + rules.release_margin_m).min(touch);

@@ -151,3 +151,43 @@ fn loosening_the_grip_is_not_a_release_but_opening_in_small_steps_is() {
     let opened = [(true, 0.050, 0.040), (true, 0.048, 0.047), (true, 0.049, 0.0495), (false, 0.0505, 0.051)];
     assert_eq!(released(&opened), [false, false, false, true]);
 }
+
+/// The gripper opens by `step` a physics step from 40 mm around an object that is 50 mm wide and lies on something: its
+/// pads stay on the object as long as they are pressed, a little wider than commanded.
+fn opened_by(step: f64, noticed_at: f64) -> Vec<(bool, f64, f64)> {
+    let mut grips = vec![(false, 0.08, 0.08), (true, noticed_at, 0.04), (true, 0.0425, 0.04)];
+    let mut commanded: f64 = 0.04;
+    while commanded < 0.06 {
+        commanded += step;
+        // Half of the way that the spring of the drive would still go is taken up by the object.
+        let width = if commanded < 0.05 { commanded + 0.25 * (0.05 - commanded) } else { commanded };
+        grips.push((commanded < 0.05, width, commanded));
+    }
+    grips
+}
+
+#[test]
+fn opening_by_steps_of_any_size_is_a_release_once_the_object_is_no_more_squeezed() {
+    for (step, noticed_at) in [(1e-4, 0.050), (5e-4, 0.050), (2e-3, 0.050), (1e-4, 0.046), (5e-4, 0.044)] {
+        let grips = opened_by(step, noticed_at);
+        let at = released(&grips).iter().position(|released| *released).expect("released in the end");
+        let (_, width, commanded) = grips[at];
+        assert!((0.0499..0.0521).contains(&commanded), "{step} m steps: at {commanded} m, {width} m wide");
+    }
+}
+
+#[test]
+fn a_hold_loosened_until_the_object_slips_out_is_a_lost_grasp_and_no_release() {
+    // Touch is noticed at 46 mm; the hold is loosened to 48 mm, wider than that, where 0.5 N still hold the object.
+    let loosened =
+        [(true, 0.046, 0.040), (true, 0.0425, 0.040), (true, 0.0485, 0.048), (true, 0.0485, 0.048)];
+    // Then it slips out, and the pads close to what is commanded.
+    let slipped = [(false, 0.0482, 0.048), (false, 0.048, 0.048)];
+    assert_eq!(released(&[&loosened[..], &slipped[..]].concat()), [false; 6]);
+}
+
+#[test]
+fn an_object_that_turned_wide_in_the_hand_is_not_released_while_it_is_squeezed() {
+    let turned = [(true, 0.050, 0.045), (true, 0.056, 0.052), (true, 0.056, 0.0525), (false, 0.06, 0.0601)];
+    assert_eq!(released(&turned), [false, false, false, true]);
+}

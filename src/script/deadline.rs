@@ -1,17 +1,20 @@
 //! Time limits: a hook that Lua cannot swallow, and a watchdog for C functions that never come back.
 //!
-//! The hook is called every few thousand instructions of Lua. Once the time is up it asks to be called at *every*
+//! Limits are of the processor time of the script's own thread, so that a busy machine makes no honest script late. The
+//! hook is called every few thousand instructions of Lua. Once the time is up it asks to be called at *every*
 //! instruction and raises an error each time, so that a `pcall` that catches the error only gains one instruction. A C
 //! function (`string.find` with a hostile pattern) never reaches the hook; nothing can stop it but the end of the
-//! process, which the [`Watchdog`] brings about with a message.
+//! process, which the [`Watchdog`] brings about with a message: it goes by the clock on the wall, and spares a script
+//! whose hook has been called since it last looked.
 
 use std::{
     collections::BTreeMap,
-    sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError},
+    sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError, Weak},
     thread,
     time::{Duration, Instant},
 };
 
+use cpu_time::ThreadTime;
 use mlua::{HookTriggers, Lua, VmState};
 
 use super::error::ScriptError;
@@ -33,9 +36,36 @@ pub fn end_process() -> OnStuck {
 
 type Slot = (Instant, u64);
 
+/// What the watchdog does when a time has come.
+#[derive(Clone)]
+struct Alarm {
+    clock: Weak<Mutex<State>>,
+    /// The clock's beat when the alarm was set.
+    beat: u64,
+    message: String,
+    on_stuck: OnStuck,
+}
+
+impl Alarm {
+    /// Sounds, unless the script has shown life since; then it is set anew.
+    fn ring(mut self) {
+        let Some(clock) = self.clock.upgrade() else { return };
+        let mut state = lock(&clock);
+        if state.until.is_none() {
+            return;
+        }
+        if state.beat == self.beat {
+            drop(state);
+            return (self.on_stuck)(&self.message);
+        }
+        self.beat = state.beat;
+        state.slot = Some(watchdog().add(Instant::now() + state.grace, self));
+    }
+}
+
 #[derive(Default)]
 struct Queue {
-    waiting: BTreeMap<Slot, (String, OnStuck)>,
+    waiting: BTreeMap<Slot, Alarm>,
     next: u64,
 }
 
@@ -70,8 +100,8 @@ impl Watchdog {
                 Some(slot) if slot.0 <= now => {
                     let expired = queue.waiting.remove(&slot);
                     drop(queue);
-                    if let Some((message, on_stuck)) = expired {
-                        on_stuck(&message);
+                    if let Some(alarm) = expired {
+                        alarm.ring();
                     }
                     lock(&self.queue)
                 }
@@ -84,12 +114,12 @@ impl Watchdog {
         }
     }
 
-    fn add(&self, at: Instant, message: String, on_stuck: OnStuck) -> Slot {
+    fn add(&self, at: Instant, alarm: Alarm) -> Slot {
         let mut queue = lock(&self.queue);
         let slot = (at, queue.next);
         queue.next += 1;
         let earliest = queue.waiting.keys().next().is_none_or(|first| at < first.0);
-        queue.waiting.insert(slot, (message, on_stuck));
+        queue.waiting.insert(slot, alarm);
         drop(queue);
         // Every new deadline that is not the first is found when the first comes up: no need to wake anyone.
         if earliest {
@@ -98,21 +128,29 @@ impl Watchdog {
         slot
     }
 
-    fn remove(&self, slot: Slot) -> Option<(String, OnStuck)> {
+    fn remove(&self, slot: Slot) -> Option<Alarm> {
         lock(&self.queue).waiting.remove(&slot)
     }
 }
 
 #[derive(Default)]
 struct State {
-    /// When the running call must be over; none while nothing runs or the clock is stopped.
-    until: Option<Instant>,
+    /// Processor time of the thread at which the running call must be over; none while nothing runs or the clock is
+    /// stopped.
+    until: Option<Duration>,
     limit: Duration,
     grace: Duration,
     file: String,
     slot: Option<Slot>,
+    /// How often the hook has looked.
+    beat: u64,
     /// Time left when the clock was stopped, and the watchdog's entry.
-    stopped: Option<(Duration, Option<(String, OnStuck)>)>,
+    stopped: Option<(Duration, Option<Alarm>)>,
+}
+
+/// Processor time that this thread has used.
+fn used() -> Duration {
+    ThreadTime::now().as_duration()
 }
 
 /// The clock of one virtual machine.
@@ -136,11 +174,12 @@ impl Clock {
     }
 
     fn expired(&self) -> Option<ScriptError> {
-        let state = lock(&self.state);
+        let mut state = lock(&self.state);
+        state.beat += 1;
         if stop::requested() {
             return Some(ScriptError::new(state.file.clone(), "interrupted"));
         }
-        state.until.is_some_and(|until| Instant::now() > until).then(|| {
+        state.until.is_some_and(|until| used() > until).then(|| {
             ScriptError::new(
                 state.file.clone(),
                 format!("the script ran for more than {}", seconds(state.limit)),
@@ -149,15 +188,15 @@ impl Clock {
         })
     }
 
-    /// Gives the machine `limit` from now on, until the guard is dropped; the watchdog acts `grace` after it. `file` is named in messages. A call inside of
+    /// Gives the machine `limit` of this thread's processor time from now on, until the guard is dropped; the watchdog
+    /// acts when `grace` more has passed on the wall without a sign of life. `file` is named in messages. A call inside of
     /// a call keeps the outer limit.
     pub fn start(&self, limit: Duration, grace: Duration, file: &str, on_stuck: OnStuck) -> Deadline {
         let mut state = lock(&self.state);
         if state.until.is_some() || state.stopped.is_some() {
             return Deadline { clock: None };
         }
-        let until = Instant::now() + limit;
-        state.until = Some(until);
+        state.until = Some(used() + limit);
         state.limit = limit;
         state.grace = grace;
         state.file = file.into();
@@ -166,7 +205,8 @@ impl Clock {
              look for a hostile string pattern or a huge repeat count",
             seconds(limit)
         );
-        state.slot = Some(watchdog().add(until + grace, message, on_stuck));
+        let alarm = Alarm { clock: Arc::downgrade(&self.state), beat: state.beat, message, on_stuck };
+        state.slot = Some(watchdog().add(Instant::now() + limit + grace, alarm));
         Deadline { clock: Some(self.clone()) }
     }
 
@@ -175,7 +215,7 @@ impl Clock {
         let mut state = lock(&self.state);
         if let Some(until) = state.until.take() {
             let entry = state.slot.take().and_then(|slot| watchdog().remove(slot));
-            state.stopped = Some((until.saturating_duration_since(Instant::now()), entry));
+            state.stopped = Some((until.saturating_sub(used()), entry));
             return Pause { clock: Some(self.clone()) };
         }
         Pause { clock: None }
@@ -215,10 +255,10 @@ impl Drop for Pause {
         let Some(clock) = &self.clock else { return };
         let mut state = lock(&clock.state);
         let Some((left, entry)) = state.stopped.take() else { return };
-        let grace = state.grace;
-        let until = Instant::now() + left;
-        state.until = Some(until);
-        state.slot = entry.map(|(message, on_stuck)| watchdog().add(until + grace, message, on_stuck));
+        let at = Instant::now() + left + state.grace;
+        state.until = Some(used() + left);
+        let beat = state.beat;
+        state.slot = entry.map(|alarm| watchdog().add(at, Alarm { beat, ..alarm }));
     }
 }
 
@@ -228,7 +268,15 @@ mod tests {
 
     const LIMIT: Duration = Duration::from_millis(60);
 
-    /// Runs a Lua loop after `work`, which takes twice the limit, inside of a deadline.
+    /// Keeps this thread's processor busy for twice the limit.
+    fn toil() {
+        let start = used();
+        while used() - start < 2 * LIMIT {
+            std::hint::spin_loop();
+        }
+    }
+
+    /// Runs a Lua loop after `work`, inside of a deadline.
     fn outcome(work: impl Fn(&Clock)) -> mlua::Result<()> {
         let (lua, clock) = (Lua::new(), Clock::default());
         clock.install(&lua)?;
@@ -238,13 +286,29 @@ mod tests {
     }
 
     #[test]
-    fn time_that_a_binding_spends_with_the_clock_stopped_does_not_count() {
-        assert!(outcome(|_| thread::sleep(2 * LIMIT)).is_err());
+    fn only_the_scripts_own_processor_time_counts() {
+        assert!(outcome(|_| toil()).is_err());
         let paused = |clock: &Clock| {
             let _pause = clock.pause();
-            thread::sleep(2 * LIMIT);
+            toil();
         };
-        assert!(outcome(paused).is_ok());
+        assert!(outcome(paused).is_ok(), "a binding's work with the clock stopped");
+        assert!(outcome(|_| thread::sleep(2 * LIMIT)).is_ok(), "others had the processor");
+    }
+
+    #[test]
+    fn the_watchdog_spares_who_shows_life_and_barks_at_who_does_not() {
+        let stuck = Arc::new(Mutex::new(false));
+        let (clock, seen) = (Clock::default(), stuck.clone());
+        let _deadline = clock.start(LIMIT, LIMIT, "x.lua", Arc::new(move |_| *lock(&seen) = true));
+        // What the hook of a slow script does on a busy machine, for five times as long as the watchdog waits.
+        for _ in 0..100 {
+            let _ = clock.expired();
+            thread::sleep(LIMIT / 10);
+        }
+        assert!(!*lock(&stuck));
+        thread::sleep(4 * LIMIT);
+        assert!(*lock(&stuck));
     }
 
     #[test]
