@@ -4,6 +4,8 @@
 //! [`geometry`] → [`physics`] → [`scene`], [`robot`] → [`evaluation`] → [`benchmark`] → [`policy`] → [`rollout`]
 //! → [`report`] → [`script`] → [`cli`]. `docs/architecture.md` draws them and follows one episode through.
 //!
+//! Beside them stands [`message`]: how numbers and text look in what they say.
+//!
 //! Units are SI throughout; a name carries its unit where it is not SI or not obvious. Frames are suffixes:
 //! `_w` world, `_b` robot base, `_h` hand, `_p` pad, `_o` object.
 #![warn(missing_docs)]
@@ -13,6 +15,7 @@ pub mod cli;
 pub mod dataset;
 pub mod evaluation;
 pub mod geometry;
+pub mod message;
 pub mod physics;
 pub mod policy;
 pub mod report;

@@ -1,5 +1,7 @@
 //! The rate of control.
 
+use crate::message::number;
+
 /// Time between two commands, s: policies act, and records are written, at 20 Hz.
 pub const CONTROL_DT: f64 = 0.05;
 
@@ -20,7 +22,8 @@ pub fn check_dt(dt: f64) -> Result<(), String> {
     let (below, above) =
         (CONTROL_DT / (CONTROL_DT / dt).ceil(), CONTROL_DT / (CONTROL_DT / dt).floor().max(1.0));
     Err(format!(
-        "physics.dt: control runs at 20 Hz, so dt must divide {CONTROL_DT} s; got {dt}, near are {below:.6} and {above:.6}"
+        "physics.dt: control runs at 20 Hz, so dt must divide {CONTROL_DT} s; got {}, near are {below:.6} and {above:.6}",
+        number(dt)
     ))
 }
 

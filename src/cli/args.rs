@@ -189,7 +189,7 @@ fn runner() -> clap::Command {
     let list = |name, help| flag(name, help).action(ArgAction::Append).value_delimiter(',');
     let file =
         Arg::new("file").value_name("FILE.lua").help("The script whose plan to carry out").required(true);
-    let json = flag("json", "Print JSON on the standard output").action(ArgAction::SetTrue);
+    let json = flag("json", "Print JSON on the standard output: one object for a suite, an array for a list of suites, a line a row for an experiment").action(ArgAction::SetTrue);
     clap::Command::new("softvt")
         .version(env!("CARGO_PKG_VERSION"))
         .about("A safety-aware visuo-tactile manipulation benchmark for soft objects, on an ordinary CPU")

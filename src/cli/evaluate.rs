@@ -238,10 +238,9 @@ impl<'a> Batch<'a> {
     /// Thresholds of the targets of all tasks, read before anything runs.
     fn find_limits(&mut self, tasks: &[&Task]) -> Result<(), Failure> {
         for task in tasks {
-            // Limits are those of the object as calibrated, whatever a shift makes of it.
-            let nominal = script::EpisodeRequest { shifts: Vec::new(), ..self.request(task, 0) };
-            let opened = script::Episode::open(self.loaded, &nominal).map_err(Failure::input)?;
-            let Some(asset) = target_asset(&opened.scene, task) else { continue };
+            let opened =
+                script::Episode::open(self.loaded, &self.request(task, 0)).map_err(Failure::input)?;
+            let Some(asset) = target_asset(&opened.nominal, task) else { continue };
             if matches!(asset.body, Body::Soft(_)) && !self.limits.contains_key(&asset.name) {
                 let limit = self.find_limit(&asset)?;
                 self.limits.insert(asset.name.clone(), limit);
@@ -269,6 +268,13 @@ impl<'a> Batch<'a> {
             }
         }
         Ok(None)
+    }
+
+    /// The limit of an object as its layout made it in this episode, whatever a shift makes of it then.
+    fn limit_of(&self, asset: &Asset) -> Option<Limit> {
+        let limit = self.limits.get(&asset.name).copied().flatten()?;
+        let known = self.released.fingerprints.get(&asset.name);
+        known.is_none_or(|known| *known == asset.fingerprint()).then_some(limit)
     }
 
     fn write_info(&self, folder: &RunFolder, tasks: &[&Task], episodes: u32) -> Result<(), Failure> {
@@ -336,7 +342,8 @@ impl<'a> Batch<'a> {
         let (task, episode) = self.jobs[job];
         let opened =
             script::Episode::open(self.loaded, &self.request(task, episode)).map_err(Failure::input)?;
-        let target = target_asset(&opened.scene, task);
+        let target = target_asset(&opened.nominal, task);
+        let limit = target.as_ref().and_then(|asset| self.limit_of(asset));
         let soft = target.as_ref().is_some_and(|asset| matches!(asset.body, Body::Soft(_)));
         let asset = target.map_or(String::new(), |asset| asset.name.clone());
         let spec = EpisodeSpec {
@@ -349,12 +356,12 @@ impl<'a> Batch<'a> {
                 seed: self.run.seed,
                 split: Split::Validation.name().to_owned(),
                 policy: self.run.policy.clone(),
-                asset: asset.clone(),
+                asset,
                 soft,
             },
             task: task.clone(),
             scene: Arc::new(opened.scene.clone()),
-            limit: self.limits.get(&asset).copied().flatten(),
+            limit,
             rules: self.settings.rules.clone(),
             params: self.settings.physics.clone(),
             robot: self.settings.robot.clone(),

@@ -9,11 +9,11 @@ mod init;
 mod list;
 mod progress;
 
-use std::{panic, process::ExitCode};
+use std::{panic, process::ExitCode, thread, time::Duration};
 
 use args::Command;
 
-use crate::rollout::stop;
+use crate::{message, rollout::stop};
 
 /// Exit codes, the same for every command.
 pub mod code {
@@ -65,7 +65,7 @@ pub fn main() -> ExitCode {
         Ok(Ok(())) => code::OK,
         Ok(Err(failure)) => {
             if !failure.message.is_empty() {
-                eprintln!("softvt: {}", failure.message);
+                eprintln!("softvt: {}", message::plain(&failure.message));
             }
             failure.code
         }
@@ -75,16 +75,18 @@ pub fn main() -> ExitCode {
 }
 
 fn run() -> Result<(), Failure> {
+    watch_interrupts();
     let words: Vec<String> = std::env::args_os()
         .map(|word| {
             word.into_string().map_err(|w| Failure::input(format!("argument {w:?} is not valid UTF-8")))
         })
         .collect::<Result<_, _>>()?;
-    match args::parse(&words)? {
-        Command::Run(run) => {
-            watch_interrupts();
-            evaluate::run(&run).map_err(Failure::or_interrupted)
-        }
+    carry_out(&words).map_err(Failure::or_interrupted)
+}
+
+fn carry_out(words: &[String]) -> Result<(), Failure> {
+    match args::parse(words)? {
+        Command::Run(run) => evaluate::run(&run),
         Command::List { what, json } => list::run(&what, json),
         Command::Init { dir } => init::run(&dir),
         Command::Doctor => doctor::run(),
@@ -92,21 +94,30 @@ fn run() -> Result<(), Failure> {
     }
 }
 
+/// How long what runs may take to end in order; a library function of Lua that never returns would take for ever.
+const PATIENCE: Duration = Duration::from_secs(3);
+
 /// The first Ctrl-C ends the run in order, the second at once.
 fn watch_interrupts() {
-    let handler = || {
+    let end = || std::process::exit(i32::from(code::INTERRUPTED));
+    let handler = move || {
         if stop::request() {
-            std::process::exit(i32::from(code::INTERRUPTED));
+            end();
         }
         eprintln!("softvt: stopping; finished episodes stay (press again to stop at once)");
+        thread::spawn(move || {
+            thread::sleep(PATIENCE);
+            eprintln!("softvt: interrupted; something did not end within {} s", PATIENCE.as_secs());
+            end();
+        });
     };
     // Without a handler Ctrl-C still ends the process; finished episodes are on disk either way.
     let _ = ctrlc::set_handler(handler);
 }
 
-/// Prints to the standard output; a closed pipe is not an error of ours.
+/// Prints to the standard output, control characters shown; a closed pipe is not an error of ours.
 fn print(text: &str) {
     use std::io::Write;
     let mut out = std::io::stdout().lock();
-    let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+    let _ = out.write_all(message::plain(text).as_bytes()).and_then(|()| out.flush());
 }

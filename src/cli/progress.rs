@@ -4,6 +4,8 @@ use std::io::IsTerminal;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::message;
+
 /// Progress of a batch of jobs.
 pub struct Progress {
     bar: Option<ProgressBar>,
@@ -31,10 +33,10 @@ impl Progress {
         self.done += 1;
         match &self.bar {
             Some(bar) => {
-                bar.set_message(message.to_owned());
+                bar.set_message(message::plain(message).into_owned());
                 bar.inc(1);
             }
-            None => eprintln!("[{}/{}] {message}", self.done, self.total),
+            None => eprintln!("[{}/{}] {}", self.done, self.total, message::plain(message)),
         }
     }
 

@@ -8,6 +8,8 @@ use parry3d_f64::{
     shape::{TriMesh, TriMeshFlags},
 };
 
+use sha2::{Digest, Sha256};
+
 use super::{Vec3, shape::Shape};
 
 /// A triangle mesh in the object frame, m.
@@ -175,8 +177,24 @@ impl PartialEq for MeshSolid {
 
 impl std::fmt::Debug for MeshSolid {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "MeshSolid({} vertices, {} triangles)", self.mesh.vertices.len(), self.mesh.triangles.len())
+        let Mesh { vertices, triangles, .. } = &self.mesh;
+        write!(
+            f,
+            "MeshSolid({} vertices, {} triangles, {})",
+            vertices.len(),
+            triangles.len(),
+            digest(&self.mesh)
+        )
     }
+}
+
+/// SHA-256 of a mesh's corners, to a nanometre, and triangles.
+fn digest(mesh: &Mesh) -> String {
+    let mut hash = Sha256::new();
+    let coordinates = mesh.vertices.iter().flat_map(|v| v.iter());
+    coordinates.for_each(|x| hash.update(((x * 1e9).round() as i64).to_le_bytes()));
+    mesh.triangles.iter().flatten().for_each(|corner| hash.update(corner.to_le_bytes()));
+    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 impl MeshSolid {

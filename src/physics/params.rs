@@ -2,11 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::message::number;
+
 /// Parameters of the mechanics. The defaults are what the benchmark runs with.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Params {
-    /// Time step, s. Control runs at a third of its rate.
+    /// Time step, s. Control runs at 20 Hz whatever it is.
     pub dt: f64,
     /// Mass-proportional damping of soft bodies (air drag), 1/s. 0; the paper's engine uses 2.5.
     pub alpha: f64,
@@ -70,17 +72,17 @@ impl Params {
         ];
         for (name, value) in positive {
             if !(value > 0.0 && value.is_finite()) {
-                return Err(format!("physics.{name}: expected a positive number, got {value}"));
+                return Err(format!("physics.{name}: expected a positive number, got {}", number(value)));
             }
         }
         for (name, value) in not_negative {
             if !(value >= 0.0 && value.is_finite()) {
-                return Err(format!("physics.{name}: expected 0 or more, got {value}"));
+                return Err(format!("physics.{name}: expected 0 or more, got {}", number(value)));
             }
         }
         // Below, settling alone would take minutes.
         if !(1e-4..=0.05).contains(&self.dt) {
-            return Err(format!("physics.dt: expected seconds in 0.0001..0.05, got {}", self.dt));
+            return Err(format!("physics.dt: expected seconds in 0.0001..0.05, got {}", number(self.dt)));
         }
         Ok(())
     }

@@ -176,7 +176,15 @@ pub fn replace(path: &Path, text: &str) -> Result<(), RunFolderError> {
     let mut name = path.file_name().unwrap_or_default().to_os_string();
     name.push(".part");
     let aside = path.with_file_name(name);
-    let mut file = File::create(&aside).map_err(io_error("make", &aside))?;
+    // Made anew: what a link of that name leads to must not be written to.
+    match fs::remove_file(&aside) {
+        Err(source) if source.kind() != io::ErrorKind::NotFound => {
+            return Err(io_error("replace", &aside)(source));
+        }
+        _ => {}
+    }
+    let mut file =
+        OpenOptions::new().write(true).create_new(true).open(&aside).map_err(io_error("make", &aside))?;
     file.write_all(text.as_bytes()).map_err(io_error("write to", &aside))?;
     file.sync_all().map_err(io_error("sync", &aside))?;
     fs::rename(&aside, path).map_err(io_error("replace", path))

@@ -10,6 +10,7 @@ use crate::{
         shape::{Aabb, Shape},
         voxelise::{GeometryError, VoxelSpec, voxel_mesh},
     },
+    message::number,
     physics::{
         World,
         contact::{Collider, Friction, Mover, Surface},
@@ -109,13 +110,13 @@ pub fn soft_rest(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<A
 fn check(name: &str, m: &SoftMaterial) -> Result<(), BuildError> {
     let wrong = |what: String| Err(BuildError::Material { asset: name.to_owned(), what });
     if !(m.youngs_pa > 0.0 && m.youngs_pa.is_finite()) {
-        return wrong(format!("Young's modulus is {} Pa, expected a positive number", m.youngs_pa));
+        return wrong(format!("Young's modulus is {} Pa, expected a positive number", number(m.youngs_pa)));
     }
     if !(0.0..0.5).contains(&m.poisson) {
-        return wrong(format!("Poisson's ratio is {}, expected 0 <= poisson < 0.5", m.poisson));
+        return wrong(format!("Poisson's ratio is {}, expected 0 <= poisson < 0.5", number(m.poisson)));
     }
     if !(m.density > 0.0 && m.density.is_finite()) {
-        return wrong(format!("density is {} kg/m³, expected a positive number", m.density));
+        return wrong(format!("density is {} kg/m³, expected a positive number", number(m.density)));
     }
     Ok(())
 }
@@ -131,11 +132,11 @@ fn check_size(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<(), 
         return Ok(());
     }
     let what = format!(
-        "it is {:.3} × {:.3} × {:.3} m, about {samples:.0e} contact samples {} mm apart, expected at most {MOST_SAMPLES:.0e}; \
+        "it is {} × {} × {} m, about {samples:.0e} contact samples {} mm apart, expected at most {MOST_SAMPLES:.0e}; \
          sizes are in metres; a truly large body needs a larger grasp_spacing",
-        size.x,
-        size.y,
-        size.z,
+        number(size.x),
+        number(size.y),
+        number(size.z),
         1e3 * material.grasp_spacing
     );
     Err(BuildError::Material { asset: name.to_owned(), what })

@@ -1,9 +1,10 @@
 //! A scene as plain data: assets, placed objects, the robot's place, regions. Knows no physics.
 
+mod fingerprint;
+
 use std::{collections::BTreeMap, sync::Arc};
 
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 
 use crate::geometry::{Pose, Vec3, shape::Shape};
 
@@ -85,19 +86,6 @@ pub struct Asset {
     pub visuals: Vec<Visual>,
     /// Free-form hints for experts (grasp axis, height …), numbers only, read by scripts.
     pub hints: BTreeMap<String, f64>,
-}
-
-impl Asset {
-    /// A short hash of what a calibration depends on: shape, body and friction. Looks and hints may change.
-    pub fn fingerprint(&self) -> String {
-        use std::fmt::Write;
-        let mut hash = Sha256::new();
-        hash.update(format!("{:?} {:?} {:?}", self.shape, self.body, self.friction));
-        hash.finalize().iter().take(8).fold(String::new(), |mut text, byte| {
-            let _ = write!(text, "{byte:02x}");
-            text
-        })
-    }
 }
 
 /// An asset put somewhere.

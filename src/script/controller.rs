@@ -1,6 +1,6 @@
 //! A scripted expert as whoever drives a rollout: the one place where hidden state goes to Lua.
 
-use super::{Expert, ExpertView, ObjectView, ScriptError, reach::Lag};
+use super::{Expert, ExpertCommand, ExpertView, ObjectView, ScriptError, reach::Lag};
 use crate::{
     benchmark::control::CONTROL_DT,
     geometry::Vec3,
@@ -25,14 +25,9 @@ impl ExpertController {
 
 impl Controller for ExpertController {
     fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, ControlError> {
-        let script = |error: ScriptError| ControlError::Script(error.to_string());
-        if let Some(complaint) = self.lag.complaint(sim) {
-            return Err(script(self.expert.refuse(&complaint)));
-        }
-        let command = self.expert.step(&view(sim, observation.time_s)).map_err(script)?;
-        if let Some(command) = &command {
-            self.lag.sent(&command.pose_b);
-        }
+        let glance = Glance::new(sim, observation.time_s, &mut self.lag);
+        let command = next(&mut self.expert, glance, &mut self.lag);
+        let command = command.map_err(|error| ControlError::Script(error.to_string()))?;
         Ok(command.map(|command| {
             let shut = if command.gripping { 1.0 } else { 0.0 };
             Action {
@@ -44,8 +39,59 @@ impl Controller for ExpertController {
     }
 }
 
+/// A planner that gives one command a control step.
+pub(super) trait Planner {
+    /// What goes wrong with it.
+    type Error;
+    /// Its next command, or none once it is done.
+    fn step(&mut self, view: &ExpertView) -> Result<Option<ExpertCommand>, Self::Error>;
+    /// Ends it with an error that says `complaint`.
+    fn refuse(&mut self, complaint: &str) -> Self::Error;
+}
+
+impl Planner for Expert {
+    type Error = ScriptError;
+
+    fn step(&mut self, view: &ExpertView) -> Result<Option<ExpertCommand>, ScriptError> {
+        Self::step(self, view)
+    }
+
+    fn refuse(&mut self, complaint: &str) -> ScriptError {
+        Self::refuse(self, complaint)
+    }
+}
+
+/// What a planner is shown at a control step, and what there is to say of its last command.
+pub(super) struct Glance {
+    view: ExpertView,
+    complaint: Option<String>,
+}
+
+impl Glance {
+    /// Looks at the true state.
+    pub fn new(sim: &Simulation, time_s: f64, lag: &mut Lag) -> Self {
+        Self { view: view(sim, time_s), complaint: lag.complaint(sim) }
+    }
+}
+
+/// The next command of a planner; an error if the arm could not follow the last one.
+pub(super) fn next<P: Planner>(
+    planner: &mut P,
+    glance: Glance,
+    lag: &mut Lag,
+) -> Result<Option<ExpertCommand>, P::Error> {
+    if let Some(complaint) = glance.complaint {
+        return Err(planner.refuse(&complaint));
+    }
+    let command = planner.step(&glance.view)?;
+    if let Some(command) = &command {
+        lag.sent(&command.pose_b);
+    }
+    Ok(command)
+}
+
 /// What an expert may know now.
-pub(super) fn view(sim: &Simulation, time_s: f64) -> ExpertView {
+fn view(sim: &Simulation, time_s: f64) -> ExpertView {
     ExpertView {
         time_s,
         dt_s: CONTROL_DT,

@@ -15,6 +15,7 @@ use crate::{
         Shift,
         seed::{EpisodeSeed, Split, Stream},
     },
+    message::number,
     scene::Scene,
 };
 
@@ -39,6 +40,8 @@ pub struct EpisodeRequest {
 pub struct Episode {
     /// What it starts from.
     pub scene: Scene,
+    /// The same before the shifts: limits are those of its objects.
+    pub nominal: Scene,
     /// What its random streams come from.
     pub seed: EpisodeSeed,
     machine: Machine,
@@ -65,6 +68,7 @@ impl Episode {
         let scene = LuaScene::new(empty_scene());
         let userdata = machine.vm.lua.create_userdata(scene.clone()).map_err(|e| machine.vm.explain(&e))?;
         machine.vm.call::<()>(&parts.build, (&userdata, Rng::new(seed.clone(), Stream::Layout)))?;
+        let nominal = locked(&scene.scene).clone();
         let mut current = scene;
         for (name, value) in &request.shifts {
             let (apply, value) = find_shift(&machine, &suite, name, *value)?;
@@ -72,7 +76,7 @@ impl Episode {
         }
         let scene = locked(&current.scene).clone();
         check_goal(&loaded.main, &task, &scene).map_err(|e| machine.vm.explain(&e))?;
-        Ok(Self { scene, seed, machine, expert: parts.expert })
+        Ok(Self { scene, nominal, seed, machine, expert: parts.expert })
     }
 
     /// The expert of the task, ready to start; none if the task has none.
@@ -138,9 +142,12 @@ pub fn check_shift(shifts: &[Shift], name: &str, value: f64) -> Result<(), Strin
     };
     match range.holds(value) {
         true => Ok(()),
-        false => {
-            Err(format!("shift {name}: expected a number{} ({}), got {value}", range.words(), shift.unit))
-        }
+        false => Err(format!(
+            "shift {name}: expected a number{} ({}), got {}",
+            range.words(),
+            shift.unit,
+            number(value)
+        )),
     }
 }
 

@@ -3,6 +3,7 @@
 use mlua::{Lua, Table, Value};
 
 use super::sandbox::{fail, here, locked, shared};
+use crate::message;
 
 /// Bounds of a number; an end may be excluded.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -208,10 +209,7 @@ pub(super) fn got(value: &Value) -> String {
     match value {
         Value::String(text) => quoted(&text.to_string_lossy()),
         Value::Integer(number) => number.to_string(),
-        Value::Number(number) if *number != 0.0 && !(1e-6..1e9).contains(&number.abs()) => {
-            format!("{number:e}")
-        }
-        Value::Number(number) => number.to_string(),
+        Value::Number(number) => message::number(*number),
         Value::Boolean(flag) => flag.to_string(),
         Value::Nil => "nil".into(),
         other => format!("a {}", other.type_name()),

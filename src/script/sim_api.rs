@@ -10,9 +10,9 @@ use serde::de::DeserializeOwned;
 
 use super::{
     catalogue_world::SIMULATE,
-    controller::view,
+    controller::{Glance, Planner, next},
     deadline::Clock,
-    expert::Coroutine,
+    expert::{Coroutine, ExpertCommand, ExpertView},
     random::Rng,
     reach::Lag,
     sandbox::{fail, locked},
@@ -163,24 +163,39 @@ fn deformation(sim: &Simulation, object: usize, reference: &Option<Reference>) -
     reference.as_ref()?.measure(&sim.world.soft[index].body.x).ok().map(|d| d.rms_pct)
 }
 
+/// An expert that runs in the machine that drives it.
+struct Bound<'a> {
+    run: Coroutine,
+    lua: &'a Lua,
+}
+
+impl Planner for Bound<'_> {
+    type Error = mlua::Error;
+
+    fn step(&mut self, view: &ExpertView) -> mlua::Result<Option<ExpertCommand>> {
+        self.run.step(self.lua, view)
+    }
+
+    fn refuse(&mut self, complaint: &str) -> mlua::Error {
+        self.run.refuse(self.lua, complaint)
+    }
+}
+
 /// `softvt.Simulation`.
 struct LuaSimulation(Arc<Mutex<Inner>>);
 
 impl LuaSimulation {
     /// Runs an expert to its end.
     fn drive(&self, lua: &Lua, expert: Function) -> mlua::Result<MultiValue> {
-        let (mut expert, mut lag) = (Coroutine::new(expert), Lag::default());
+        let (mut expert, mut lag) = (Bound { run: Coroutine::new(expert), lua }, Lag::default());
         loop {
-            let (seen, complaint) = {
+            // The expert itself may look at the simulation, so it is not held while the expert runs.
+            let glance = {
                 let inner = locked(&self.0);
                 let _honest_work = inner.clock.pause();
-                (view(&inner.sim, inner.time()), lag.complaint(&inner.sim))
+                Glance::new(&inner.sim, inner.time(), &mut lag)
             };
-            if let Some(complaint) = complaint {
-                return Err(expert.refuse(lua, &complaint));
-            }
-            let Some(command) = expert.step(lua, &seen)? else { break };
-            lag.sent(&command.pose_b);
+            let Some(command) = next(&mut expert, glance, &mut lag)? else { break };
             if !locked(&self.0).control_step(Some((&command.pose_b, command.closure))) {
                 break;
             }

@@ -89,3 +89,62 @@ fn whatever_lies_on_whatever_is_carried_by_it_and_by_nothing_else() {
         assert!(episodes.iter().all(|e| e["no_drop"] == true), "{upper} on {lower}: {episodes:#?}");
     }
 }
+
+/// The calibration of a cube with a fingerprint.
+fn calibration(fingerprint: &str) -> String {
+    format!(
+        r#"{{"schema_version":1,"protocol_id":"softvtbench-v1","metric_id":"fem_rms_rigid_aligned_bbox_pct_v1",
+        "calibration":{{"method":"compression_sweep","definition":"d","kappa":0.5,"sources":[],"generated_at":"x"}},
+        "thresholds":{{"cube":{{"tau":1.0,"d_ref":2.0,"kappa":0.5,"n_stable_trials":3}}}},
+        "fingerprints":{{"cube":"{fingerprint}"}}}}"#
+    )
+}
+
+/// A suite whose cube is `stiffness` Pa stiff, with a shift of it and an experiment that tells its fingerprint.
+fn cubes(stiffness: &str) -> [(&'static str, String); 2] {
+    let layout = format!(
+        r#"
+local floor = softvt.asset {{ name = "floor", shape = softvt.shape.box {{ size = {{ 1, 1, 0.05 }} }}:translate(0, 0, -0.025), body = softvt.static {{}} }}
+local layout = softvt.layout("one", function(scene, rng)
+  local episode = rng:uniform(0, 1)
+  local cube = softvt.asset {{ name = "cube", shape = softvt.shape.box {{ size = {{ 0.04, 0.04, 0.04 }} }}:grounded(),
+    body = softvt.soft {{ youngs_pa = {stiffness}, poisson = 0.3, density = 300 }} }}
+  scene:add {{ name = "floor", asset = floor, xyz = {{ 0, 0, 0 }} }}
+  scene:add {{ name = "cube", asset = cube, at = {{ 0, 0.1 }} }}
+end)
+"#
+    );
+    let who = r#"return softvt.experiment { name = "who", grid = { x = { 1 } }, run = function()
+  return { fingerprint = softvt.simulate { layout = layout }:watch "cube".fingerprint }
+end }"#;
+    let suite = r#"return softvt.suite { name = "one", object_type = "deformable", variation = "spatial", episodes = 2, tasks = {
+  softvt.task { prompt = "lie", layout = layout, goal = softvt.on { object = "cube", target = "floor" }, budget_steps = 12 },
+}, shifts = { softvt.shift { name = "soft", default = 1, apply = function(scene, x)
+  scene:object "cube".youngs_pa = x * scene:object "cube".youngs_pa
+end } } }"#;
+    [("who.lua", format!("{layout}{who}")), ("x.lua", format!("{layout}{suite}"))]
+}
+
+fn safe(project: &Project, words: &str) -> Vec<bool> {
+    project.succeeds(&format!("x.lua --policy noop --out run {words}"));
+    let safe = project.lines("run/episodes.jsonl").iter().map(|e| e["safety"] == true).collect();
+    std::fs::remove_dir_all(project.path("run")).expect("removed");
+    safe
+}
+
+#[test]
+fn a_limit_counts_for_the_calibrated_object_alone_in_every_episode_and_under_every_shift() {
+    let project = Project::new(&cubes("2e4").each_ref().map(|(path, text)| (*path, text.as_str())));
+    let row: Value = serde_json::from_str(&project.succeeds("who.lua --json").out).expect("a row");
+    let fingerprint = row["fingerprint"].as_str().expect("a text");
+    project.write("assets/calibration/cube.json", calibration(fingerprint).as_bytes());
+    assert_eq!(safe(&project, ""), [true, true]);
+    assert_eq!(safe(&project, "--shift soft=0.5"), [true, true], "limits stay nominal");
+    // One stiffness in the first episode and others later, all by one name.
+    let vary = cubes("rng:uniform(0, 1) < 2 and 2e4 * (1 + episode)");
+    project.write("x.lua", vary[1].1.as_bytes());
+    assert_eq!(safe(&project, ""), [false, false]);
+    let other = cubes("3e4");
+    project.write("x.lua", other[1].1.as_bytes());
+    assert_eq!(safe(&project, ""), [false, false]);
+}

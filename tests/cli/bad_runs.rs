@@ -91,3 +91,26 @@ fn an_experts_mistakes_have_their_line() {
     assert_snapshot!(expert("\n  arm:close_to(2)"), @"x.lua: task 0, episode 0: x.lua:13: arm:close_to: closure: expected a number in 0..1, got 2");
     assert_snapshot!(expert("\n\n  scene:object 'cub'"), @r#"x.lua: task 0, episode 0: x.lua:14: scene: unknown object "cub"; did you mean "cube"?"#);
 }
+
+#[test]
+fn what_a_script_says_cannot_command_the_terminal() {
+    let text = Small::default().text().replace("prompt = \"wait\"", "prompt = \"wait\\27[2Jfor it\"");
+    let project = crate::support::Project::new(&[("x.lua", &format!("print('\\27]0;mine\\7')\n{text}"))]);
+    let said = project.succeeds("x.lua --policy noop --out run");
+    assert!(!said.out.contains('\u{1b}') && !said.err.contains('\u{1b}'), "{} {}", said.out, said.err);
+    assert!(
+        said.out.contains("wait\\u{1b}[2Jfor it") && said.err.contains("\\u{1b}]0;mine\\u{7}"),
+        "{}",
+        said.err
+    );
+    project.write("x.lua", b"error('\\27[31mred')");
+    assert!(project.refusal("x.lua").contains("\\u{1b}[31mred"));
+}
+
+#[test]
+fn huge_numbers_are_told_in_short() {
+    let message = Small { material: "youngs_pa = -1e300, poisson = 0.3, density = 300", ..Small::default() };
+    assert!(message.project().refusal("x.lua --out run").ends_with("got -1e300"));
+    let setting = Small::default().project().refusal("x.lua --out run --set physics.dt=1e300");
+    assert!(setting.ends_with("got 1e300"), "{setting}");
+}

@@ -89,3 +89,38 @@ fn await_lines(project: &Project, count: usize) {
         sleep(Duration::from_millis(20));
     }
 }
+
+/// Starts softvt, waits until it is at work, sends a signal, and gives its exit code, how long it took, and what it said.
+fn interrupted(project: &Project, words: &[&str], work_s: f64) -> (Option<i32>, Duration, String) {
+    let child = Command::new(cargo_bin!("softvt"))
+        .current_dir(project.path(""))
+        .args(words)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("started");
+    sleep(Duration::from_secs_f64(work_s));
+    let start = Instant::now();
+    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill runs");
+    assert!(killed.success());
+    let output = child.wait_with_output().expect("output");
+    (output.status.code(), start.elapsed(), String::from_utf8(output.stderr).expect("text"))
+}
+
+#[test]
+fn whatever_a_script_is_at_ends_soon() {
+    // Loading for ever, a calibration, and a library function that never comes back.
+    let stuck = "return string.find(('a'):rep(40), ('.-'):rep(40) .. 'b')";
+    for (name, text, words, work_s) in [
+        ("loading", "while true do end", vec!["x.lua"], 0.5),
+        ("calibrating", "return 1", vec!["scripts/calibrate.lua", "--asset", "sesame_bun"], 3.0),
+        ("stuck", stuck, vec!["x.lua"], 0.5),
+    ] {
+        let project = Project::new(&[("x.lua", text)]);
+        let (code, took, err) = interrupted(&project, &words, work_s);
+        assert_eq!(code, Some(130), "{name}: {err}");
+        // The library function ends only with the process, three seconds after the wish; a busy machine takes longer.
+        assert!(took < Duration::from_secs(8), "{name}: {took:?}");
+        assert!(!err.contains("panicked"), "{name}: {err}");
+    }
+}

@@ -1,0 +1,136 @@
+//! What an object is made of, as a short text that two objects share only if they are alike.
+
+use std::fmt::Write;
+
+use sha2::{Digest, Sha256};
+
+use super::Asset;
+
+impl Asset {
+    /// A short hash (16 hexadecimal digits of a SHA-256) of the shape, the body with its material and resolution, and the friction: all that a
+    /// calibration depends on. Looks, hints and the name do not count. Numbers count with seven digits, so that the last
+    /// bits of another platform's sines make no other object.
+    pub fn fingerprint(&self) -> String {
+        let text = format!("{:?}", (&self.shape, &self.body, &self.friction));
+        let digest = Sha256::digest(rounded(&text).as_bytes());
+        digest.iter().take(8).map(|byte| format!("{byte:02x}")).collect()
+    }
+}
+
+/// The text with every number that has a fraction or an exponent written with seven digits.
+fn rounded(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    let mut rest = text;
+    let mut in_word = false;
+    while let Some(first) = rest.chars().next() {
+        let length = if in_word { 0 } else { number_length(rest) };
+        if length == 0 {
+            out.push(first);
+            in_word = first.is_alphanumeric() || first == '_';
+            rest = &rest[first.len_utf8()..];
+            continue;
+        }
+        let (token, after) = rest.split_at(length);
+        match token.parse::<f64>() {
+            // Adding zero makes the negative zero a positive one.
+            Ok(x) if token.contains(['.', 'e']) => {
+                let _ = write!(out, "{:.6e}", if x.abs() < 1e-12 { 0.0 } else { x + 0.0 });
+            }
+            _ => out.push_str(token),
+        }
+        rest = after;
+    }
+    out
+}
+
+/// Length of the number at the beginning of `text`, 0 if there is none.
+fn number_length(text: &str) -> usize {
+    let digits = text.strip_prefix('-').unwrap_or(text);
+    if !digits.starts_with(|c: char| c.is_ascii_digit()) {
+        return 0;
+    }
+    let mut previous = '-';
+    let end = text.find(|c: char| {
+        let sign = c == '-' && (previous == 'e' || previous == '-');
+        let belongs = c.is_ascii_digit() || c == '.' || c == 'e' || sign;
+        previous = c;
+        !belongs
+    });
+    end.unwrap_or(text.len())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::{
+        geometry::{Pose, Vec3, mesh::Mesh, shape::Shape},
+        scene::{Body, Friction, SoftMaterial, Visual},
+    };
+
+    fn bun() -> Asset {
+        Asset {
+            name: "bun".into(),
+            shape: Shape::Placed {
+                shape: Arc::new(Shape::Sphere { radius: 0.03 }),
+                pose: Pose::translation(0.0, 0.0, 0.03),
+            },
+            body: Body::Soft(SoftMaterial {
+                youngs_pa: 2e4,
+                poisson: 0.4,
+                density: 300.0,
+                resolution: 6,
+                grasp_spacing: 7.5e-4,
+            }),
+            friction: Friction::default(),
+            visuals: vec![Visual::default()],
+            hints: Default::default(),
+        }
+    }
+
+    #[test]
+    fn shape_material_resolution_and_friction_count_and_looks_and_names_do_not() {
+        let known = bun().fingerprint();
+        assert_eq!(known.len(), 16);
+        let changed = |change: &dyn Fn(&mut Asset)| {
+            let mut asset = bun();
+            change(&mut asset);
+            asset.fingerprint() != known
+        };
+        let soft = |change: &dyn Fn(&mut SoftMaterial)| {
+            changed(&|asset| {
+                let Body::Soft(material) = &mut asset.body else { unreachable!() };
+                change(material);
+            })
+        };
+        assert!(changed(&|a| a.shape = Shape::Sphere { radius: 0.030_001 }));
+        assert!(changed(&|a| a.shape = Shape::Box { half: Vec3::repeat(0.03) }));
+        assert!(changed(&|a| a.friction.static_mu = 0.7));
+        assert!(soft(&|m| m.youngs_pa = 2.1e4) && soft(&|m| m.poisson = 0.3) && soft(&|m| m.density = 301.0));
+        assert!(soft(&|m| m.resolution = 7));
+        assert!(!changed(&|a| a.name = "roll".into()));
+        assert!(!changed(&|a| a.visuals.clear()));
+        assert!(!soft(&|m| m.youngs_pa = 2e4 * (1.0 + f64::EPSILON)), "the last bit is no other object");
+    }
+
+    #[test]
+    fn meshes_of_as_many_corners_are_told_apart() {
+        let tetrahedron = |height: f64| {
+            let vertices = [Vec3::zeros(), Vec3::x(), Vec3::y(), Vec3::z() * height].to_vec();
+            let triangles = vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
+            let shape = Mesh { vertices, triangles, uvs: Vec::new() }.into_shape().expect("a solid");
+            Asset { shape, ..bun() }.fingerprint()
+        };
+        assert_eq!(tetrahedron(1.0), tetrahedron(1.0));
+        assert_ne!(tetrahedron(1.0), tetrahedron(1.1));
+    }
+
+    #[test]
+    fn numbers_are_rounded_and_words_and_counts_are_kept() {
+        assert_eq!(
+            rounded("a1.5 { x: -0.0, n: 12, y: 1.25e-7 }"),
+            "a1.5 { x: 0.000000e0, n: 12, y: 1.250000e-7 }"
+        );
+    }
+}
