@@ -1,0 +1,1 @@
+//! Pictures against closed forms.
