@@ -103,7 +103,7 @@ impl Facet {
             .map(|i| {
                 let p =
                     origin + u * ((i % width) as f32 + 0.5) * texel + v * ((i / width) as f32 + 0.5) * texel;
-                let look = pattern::look(visual, &p, texel).0;
+                let look = pattern::look(visual, &p, n, texel).0;
                 [look.albedo.x, look.albedo.y, look.albedo.z, look.roughness]
             })
             .collect();

@@ -222,7 +222,7 @@ fn bake(mesh: &Mesh, materials: &[u16], visuals: &[Visual], spacing: f32, shape:
     for (i, p) in positions.iter().enumerate() {
         let normal = normals[i];
         let (look, height) = *known.entry(of[i]).or_insert_with(|| {
-            let (mut look, height) = blend(&around[i], visuals, p, spacing);
+            let (mut look, height) = blend(&around[i], visuals, (p, &normal), spacing);
             look.open = shape.map_or(1.0, |shape| openness(shape, p, &normal, reach));
             (look, height)
         });
@@ -236,13 +236,13 @@ fn bake(mesh: &Mesh, materials: &[u16], visuals: &[Visual], spacing: f32, shape:
     Level { positions, normals, looks, triangles, facets: Vec::new(), embedding: Vec::new(), spacing }
 }
 
-fn blend(materials: &[u16], visuals: &[Visual], p: &V3, spacing: f32) -> (Look, f32) {
+fn blend(materials: &[u16], visuals: &[Visual], (p, n): (&V3, &V3), spacing: f32) -> (Look, f32) {
     let mut sum: Option<(Look, f32)> = None;
     let share = 1.0 / materials.len().max(1) as f32;
     let mut sorted = materials.to_vec();
     sorted.sort_unstable();
     for run in sorted.chunk_by(|a, b| a == b) {
-        let (look, height) = pattern::look(&visuals[run[0] as usize], p, spacing);
+        let (look, height) = pattern::look(&visuals[run[0] as usize], p, n, spacing);
         let part = share * run.len() as f32;
         let scaled = Look {
             albedo: look.albedo * part,
@@ -263,7 +263,7 @@ fn blend(materials: &[u16], visuals: &[Visual], p: &V3, spacing: f32) -> (Look, 
             ),
         });
     }
-    sum.unwrap_or_else(|| pattern::look(&Visual::default(), p, spacing))
+    sum.unwrap_or_else(|| pattern::look(&Visual::default(), p, n, spacing))
 }
 
 /// Share of the sky that the object itself leaves open, from its distance field along the normal (Evans, Fast

@@ -14,9 +14,11 @@ pub(super) struct Look {
     pub open: f32,
 }
 
-/// A visual, its numbers in single precision, at `p` (object frame, m); what is finer than `spacing` (m) is averaged out.
-/// The second number is the height of the drawn relief, m.
-pub(super) fn look(visual: &Visual, p: &V3, spacing: f32) -> (Look, f32) {
+/// A visual, its numbers in single precision, at `p` (object frame, m) of a surface of unit normal `n`; what is finer than
+/// `spacing` (m) along the surface is averaged out. The second number is the height of the drawn relief, m.
+pub(super) fn look(visual: &Visual, p: &V3, n: &V3, spacing: f32) -> (Look, f32) {
+    // A little inside, so that a face that lies on a border of a pattern shows what is behind it.
+    let p = &(p - n * INSIDE);
     let colour = |c: [f64; 3]| V3::from(c.map(|x| x as f32));
     let mut look = Look {
         albedo: colour(visual.albedo),
@@ -26,7 +28,7 @@ pub(super) fn look(visual: &Visual, p: &V3, spacing: f32) -> (Look, f32) {
     };
     let mut height = 0.0;
     for layer in &visual.layers {
-        let mask = mask(&layer.mask, p, spacing);
+        let mask = mask(&layer.mask, p, n, spacing);
         let share = mask * layer.opacity as f32;
         look.albedo += (colour(layer.albedo) - look.albedo) * share;
         look.roughness += (layer.roughness as f32 - look.roughness) * share;
@@ -35,19 +37,24 @@ pub(super) fn look(visual: &Visual, p: &V3, spacing: f32) -> (Look, f32) {
     (look, height)
 }
 
-/// The value of a mask at `p`, averaged over about `spacing`.
-fn mask(mask: &Mask, p: &V3, spacing: f32) -> f32 {
+/// How far under the surface patterns are looked up, m.
+const INSIDE: f32 = 2e-5;
+
+/// The value of a mask at `p`, averaged over about `spacing` along the surface.
+fn mask(mask: &Mask, p: &V3, n: &V3, spacing: f32) -> f32 {
+    // What a step along the surface can change along a direction.
+    let across = |cosine: f32| spacing * (1.0 - cosine * cosine).max(0.0).sqrt();
     match mask {
         Mask::Whole => 1.0,
         Mask::Checker { size_m } => {
             let size = *size_m as f32;
             // The product of three square waves of values ±1, each averaged over the spacing.
-            let wave = |x: f32| 2.0 * pulse(x / (2.0 * size), 0.5, spacing / (2.0 * size)) - 1.0;
-            0.5 + 0.5 * p.iter().map(|&x| wave(x + 1e-6 * size)).product::<f32>()
+            let wave = |i: usize| 2.0 * pulse(p[i] / (2.0 * size), 0.5, across(n[i]) / (2.0 * size)) - 1.0;
+            0.5 + 0.5 * wave(0) * wave(1) * wave(2)
         }
         Mask::Stripes { axis, pitch_m, share } => {
             let pitch = *pitch_m as f32;
-            pulse(along(axis, p) / pitch, *share as f32, spacing / pitch)
+            pulse(along(axis, p) / pitch, *share as f32, across(along(axis, n)) / pitch)
         }
         Mask::Gradient { axis, from_m, to_m } => {
             smooth((along(axis, p) - *from_m as f32) / (*to_m - *from_m) as f32)
@@ -71,7 +78,7 @@ fn mask(mask: &Mask, p: &V3, spacing: f32) -> f32 {
             specks(p, *spacing_m as f32, *radius_m as f32, spacing, *seed)
         }
         Mask::Weave { pitch_m } => weave(p, *pitch_m as f32, spacing),
-        Mask::Both { masks } => masks.iter().map(|m| self::mask(m, p, spacing)).product(),
+        Mask::Both { masks } => masks.iter().map(|m| self::mask(m, p, n, spacing)).product(),
     }
 }
 

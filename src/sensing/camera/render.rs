@@ -304,24 +304,20 @@ impl Pass<'_> {
         let scale = 1.0 / face.norm_squared().max(1e-30);
         let s = (q.cross(&e2).dot(&face) * scale).clamp(0.0, 1.0);
         let t = (e1.cross(&q).dot(&face) * scale).clamp(0.0, 1.0 - s);
-        let weights = [1.0 - s - t, s, t];
-        let mix = |of: &dyn Fn(usize) -> V3| {
-            of(corners[0] as usize) * weights[0]
-                + of(corners[1] as usize) * weights[1]
-                + of(corners[2] as usize) * weights[2]
-        };
-        let n = mix(&|v| posed.normals[v]);
+        let [w0, w1, w2] = [1.0 - s - t, s, t];
+        let mix = |a: &V3, b: &V3, c: &V3| a * w0 + b * w1 + c * w2;
+        let [i, j, k] = corners.map(|v| v as usize);
+        let n = mix(&posed.normals[i], &posed.normals[j], &posed.normals[k]);
         let looks = corners.map(|v| &level.looks[v as usize]);
-        let number_of = |of: &dyn Fn(&Look) -> f32| (0..3).map(|i| of(looks[i]) * weights[i]).sum::<f32>();
         let mut look = Look {
-            albedo: mix(&|v| level.looks[v].albedo),
-            roughness: number_of(&|l| l.roughness),
+            albedo: mix(&looks[0].albedo, &looks[1].albedo, &looks[2].albedo),
+            roughness: looks[0].roughness * w0 + looks[1].roughness * w1 + looks[2].roughness * w2,
             metalness: looks[0].metalness,
-            open: number_of(&|l| l.open),
+            open: looks[0].open * w0 + looks[1].open * w1 + looks[2].open * w2,
         };
         let p = a + e1 * s + e2 * t;
         if let Some(facet) = level.facets.get(number) {
-            let p_o = mix(&|v| level.positions[v]);
+            let p_o = mix(&level.positions[i], &level.positions[j], &level.positions[k]);
             // A pixel's width on the surface: geometric mean of both directions.
             let cosine = (facing.abs() / (face.norm() * ray.norm())).max(0.05);
             let footprint = p.norm() / (self.lens.focal * cosine.sqrt());
@@ -376,15 +372,17 @@ impl Pass<'_> {
     }
 
     /// Depth and object of a pixel: those of the thing with most samples in it.
-    fn geometry(&self, samples: &Samples, x: usize, y: usize) -> (f32, u16) {
-        let first = SUB * y * samples.width + SUB * x;
-        let at = [first, first + 1, first + samples.width, first + samples.width + 1];
+    fn geometry(&self, samples: &Samples, (x, y): (usize, usize), parity: usize) -> (f32, u16) {
+        let corner = SUB * y * samples.width + SUB * x;
+        let at = [corner, corner + 1, corner + samples.width, corner + samples.width + 1];
         let thing = |i: usize| {
             if samples.id[i] == NONE { NO_THING } else { (samples.id[i] >> TRIANGLE_BITS) as usize }
         };
         let things = at.map(thing);
         let votes = things.map(|t| things.iter().filter(|o| **o == t).count());
-        let best = (0..4).fold(0, |b, i| if votes[i] > votes[b] { i } else { b });
+        // Two against two: one side on every other pixel, so that outlines do not lean.
+        let first = if parity & 1 == 0 { 0 } else { 3 };
+        let best = (0..4).fold(first, |b, i| if votes[i] > votes[b] { i } else { b });
         if things[best] == NO_THING {
             return (f32::INFINITY, 0);
         }
@@ -415,7 +413,7 @@ impl Pass<'_> {
                     display += self.display(id, px, py) * share;
                 });
                 picture.rgb.extend(display.iter().map(|&d| tone::byte(d)));
-                let (depth, object) = self.geometry(samples, x, y);
+                let (depth, object) = self.geometry(samples, (x, y), x + y);
                 picture.depth.push(depth);
                 picture.segmentation.push(object);
             }
@@ -443,7 +441,7 @@ impl Pass<'_> {
                 let spot = self.spot(&samples, x, y);
                 picture.rgb.extend(spot.display.iter().map(|&d| tone::byte(d)));
                 spots.push(spot);
-                let (depth, object) = self.geometry(&samples, x, y);
+                let (depth, object) = self.geometry(&samples, (x, y), x + y);
                 picture.depth.push(depth);
                 picture.segmentation.push(object);
             }
@@ -522,7 +520,7 @@ impl Pass<'_> {
                     let from = if moving { samples } else { &background.samples };
                     (merged.id[k], merged.w[k]) = (from.id[i], from.w[i]);
                 }
-                (picture.depth[pixel], picture.segmentation[pixel]) = self.geometry(&merged, 0, 0);
+                (picture.depth[pixel], picture.segmentation[pixel]) = self.geometry(&merged, (0, 0), x + y);
             }
         }
         picture

@@ -12,7 +12,7 @@ const TILES: usize = EDGE / TILE;
 /// A surface is in the shadow of what is higher by more than this, m.
 const BIAS: f32 = 2.5e-3;
 /// Step of the search for what casts the shadow, texels.
-const SEARCH: f32 = 4.0;
+const SEARCH: f32 = 6.0;
 /// Widest filter, texels to each side.
 const WIDEST: f32 = 12.0;
 /// Heights below all.
@@ -114,8 +114,8 @@ impl ShadowMap {
         let slope = [-n.dot(&self.axes[0]) / steep, -n.dot(&self.axes[1]) / steep];
         let limit = |dx: f32, dy: f32| place[2] + BIAS + (slope[0] * dx + slope[1] * dy).max(0.0);
         let (mut above, mut count) = (0.0, 0);
-        for j in -2..=2 {
-            for i in -2..=2 {
+        for j in -1..=1 {
+            for i in -1..=1 {
                 let (dx, dy) = (i as f32 * SEARCH, j as f32 * SEARCH);
                 let height = self.height(place[0] + dx, place[1] + dy);
                 if height > limit(dx, dy) {
@@ -127,15 +127,19 @@ impl ShadowMap {
         if count == 0 {
             return 1.0;
         }
+        // Dark all around: well inside of the shadow.
+        if count == 9 {
+            return 0.0;
+        }
         let radius = (above / count as f32 * self.tangent * self.texels_per_metre).clamp(1.2, WIDEST);
         let mut open = 0.0;
-        for j in -3..=3 {
-            for i in -3..=3 {
-                let (dx, dy) = (i as f32 * radius / 3.0, j as f32 * radius / 3.0);
+        for j in -2..=2 {
+            for i in -2..=2 {
+                let (dx, dy) = (i as f32 * radius * 0.5, j as f32 * radius * 0.5);
                 open += self.open(place[0] + dx, place[1] + dy, limit(dx, dy));
             }
         }
-        open / 49.0
+        open / 25.0
     }
 
     fn height(&self, x: f32, y: f32) -> f32 {
