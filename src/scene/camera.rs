@@ -1,5 +1,7 @@
 //! Cameras as plain data, and the two that the paper uses.
 
+use std::f64::consts::FRAC_1_SQRT_2;
+
 use nalgebra::Quaternion;
 use serde::{Deserialize, Serialize};
 
@@ -61,7 +63,7 @@ impl Camera {
         Self {
             name: "wrist".to_owned(),
             mount: CameraMount::Hand,
-            pose: placed(Vec3::new(0.05, 0.0, 0.0), [0.0, 0.7071, 0.7071, 0.0]),
+            pose: placed(Vec3::new(0.05, 0.0, 0.0), [0.0, FRAC_1_SQRT_2, FRAC_1_SQRT_2, 0.0]),
             fovy_rad: fovy_of_lens(9.77, 15.0),
             near_m: 0.01,
             far_m: 20.0,

@@ -10,9 +10,11 @@
 mod background;
 mod error;
 mod facet;
+mod frame;
 mod lens;
 mod model;
 mod noise;
+mod pass;
 mod pattern;
 mod picture;
 mod pose;

@@ -47,7 +47,7 @@ impl Samples {
     ) {
         let [a, b, c] = at;
         let area = turn * ((b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]));
-        if !(area > 0.0) {
+        if area.is_nan() || area <= 0.0 {
             return;
         }
         if turn < 0.0 {
