@@ -1,0 +1,3 @@
+//! What the robot senses: pure functions of a state and a scene; made only when someone looks.
+
+pub mod tactile;
