@@ -1,7 +1,7 @@
 //! softvt: a safety-aware visuo-tactile manipulation benchmark for soft objects, on an ordinary CPU.
 //!
 //! The rooms, from the ground up; each may use those before it and none after it:
-//! [`geometry`] → [`physics`] → [`scene`], [`robot`] → [`evaluation`] → [`benchmark`] → [`policy`] → [`rollout`]
+//! [`geometry`] → [`physics`] → [`scene`], [`robot`] → [`sensing`], [`evaluation`] → [`benchmark`] → [`policy`] → [`rollout`]
 //! → [`report`] → [`script`] → [`cli`]. `docs/architecture.md` draws them and follows one episode through.
 //!
 //! Beside them stands [`message`]: how numbers and text look in what they say.
@@ -23,3 +23,4 @@ pub mod robot;
 pub mod rollout;
 pub mod scene;
 pub mod script;
+pub mod sensing;

@@ -1,4 +1,9 @@
-//! A scene as plain data: assets, placed objects, the robot's place, regions. Knows no physics.
+//! A scene as plain data: assets, placed objects, their looks, the robot's place, light, cameras, regions. Knows no
+//! physics.
+
+mod camera;
+mod light;
+mod visual;
 
 mod fingerprint;
 
@@ -7,6 +12,10 @@ use std::{collections::BTreeMap, sync::Arc};
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::{Pose, Vec3, shape::Shape};
+
+pub use camera::{Camera, CameraMount, POLICY_EDGE, fovy_of_lens};
+pub use light::{KeyLight, Lighting, Sky};
+pub use visual::{Layer, Mask, Visual};
 
 /// How an object moves.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -51,23 +60,6 @@ impl Default for Friction {
     /// 0.6 / 0.5, that of every object and surface but the pads.
     fn default() -> Self {
         Self { static_mu: 0.6, dynamic_mu: 0.5 }
-    }
-}
-
-/// What a surface looks like; rendered later, carried now.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Visual {
-    /// Base colour, linear RGB, 0..=1.
-    pub albedo: [f64; 3],
-    /// Roughness, 0..=1.
-    pub roughness: f64,
-    /// Metalness, 0..=1.
-    pub metalness: f64,
-}
-
-impl Default for Visual {
-    fn default() -> Self {
-        Self { albedo: [0.7, 0.7, 0.7], roughness: 0.6, metalness: 0.0 }
     }
 }
 

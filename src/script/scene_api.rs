@@ -151,6 +151,7 @@ fn read_asset(table: &Table) -> mlua::Result<Asset> {
             albedo: table.get("albedo")?,
             roughness: table.get("roughness")?,
             metalness: table.get("metalness")?,
+            layers: Vec::new(),
         })
     };
     let visuals = visuals.unwrap_or_default().iter().map(visual).collect::<mlua::Result<Vec<_>>>()?;

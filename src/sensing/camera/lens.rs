@@ -1,0 +1,140 @@
+//! A camera in its place: checks, and the way from the world to the image.
+
+use super::{CameraError, FrameView, V3, pose::Rigid};
+use crate::{
+    geometry::Pose,
+    scene::{Camera, CameraMount},
+};
+
+/// Largest edge of an image, pixels.
+const MOST_EDGE: usize = 4096;
+
+/// Samples a pixel along each axis.
+pub(super) const SUB: usize = 2;
+
+/// A camera in the world.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lens {
+    pub width: usize,
+    pub height: usize,
+    pub near: f32,
+    pub far: f32,
+    /// Pixels a unit of slope.
+    pub focal: f32,
+    pub eye: V3,
+    to_view: Rigid,
+    to_world: Rigid,
+}
+
+/// A point in the image: samples from the top left, and the reciprocal of its depth; in front of the near plane if not
+/// `behind`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Seen {
+    pub x: f32,
+    pub y: f32,
+    pub w: f32,
+    pub view: V3,
+}
+
+/// Checks the numbers of a camera.
+fn check(camera: &Camera) -> Result<(), CameraError> {
+    let wrong = |field, expected: &str, got: String| {
+        Err(CameraError::Field { camera: camera.name.clone(), field, expected: expected.to_owned(), got })
+    };
+    for (field, edge) in [("width", camera.width), ("height", camera.height)] {
+        if !(1..=MOST_EDGE).contains(&edge) {
+            return wrong(field, &format!("1 to {MOST_EDGE} pixels"), edge.to_string());
+        }
+    }
+    if !(camera.fovy_rad >= 0.01 && camera.fovy_rad <= 2.8) {
+        return wrong("fovy_rad", "0.01 to 2.8 rad", camera.fovy_rad.to_string());
+    }
+    if !(camera.near_m >= 1e-4 && camera.near_m.is_finite()) {
+        return wrong("near_m", "at least 0.0001 m", camera.near_m.to_string());
+    }
+    if !(camera.far_m > camera.near_m && camera.far_m.is_finite()) {
+        return wrong("far_m", "a length above near_m", camera.far_m.to_string());
+    }
+    let pose = &camera.pose;
+    if !pose.translation.vector.iter().chain(pose.rotation.coords.iter()).all(|x| x.is_finite()) {
+        return wrong("pose", "finite numbers", format!("{:?}", pose.to_homogeneous().as_slice()));
+    }
+    if (pose.rotation.coords.norm() - 1.0).abs() > 1e-3 {
+        return wrong(
+            "pose",
+            "a rotation by a unit quaternion",
+            format!("norm {}", pose.rotation.coords.norm()),
+        );
+    }
+    Ok(())
+}
+
+impl Lens {
+    /// `camera` where `view` has it.
+    pub fn new(camera: &Camera, view: &FrameView) -> Result<Self, CameraError> {
+        check(camera)?;
+        let pose: Pose = match camera.mount {
+            CameraMount::World => camera.pose,
+            CameraMount::Hand => {
+                let hand = view.hand_w.ok_or_else(|| CameraError::Field {
+                    camera: camera.name.clone(),
+                    field: "mount",
+                    expected: "a hand in the state".to_owned(),
+                    got: "a state without a robot".to_owned(),
+                })?;
+                hand * camera.pose
+            }
+        };
+        if !pose.translation.vector.iter().chain(pose.rotation.coords.iter()).all(|x| x.is_finite()) {
+            return Err(CameraError::Field {
+                camera: camera.name.clone(),
+                field: "mount",
+                expected: "a finite hand pose".to_owned(),
+                got: "one that is not a number".to_owned(),
+            });
+        }
+        Ok(Self {
+            width: camera.width,
+            height: camera.height,
+            near: camera.near_m as f32,
+            far: camera.far_m as f32,
+            focal: (0.5 * camera.height as f64 / (0.5 * camera.fovy_rad).tan()) as f32,
+            eye: pose.translation.vector.cast(),
+            to_view: Rigid::of(&pose.inverse()),
+            to_world: Rigid::of(&pose),
+        })
+    }
+
+    pub fn see(&self, p_w: &V3) -> Seen {
+        self.project(self.to_view.turn(&(p_w - self.eye)))
+    }
+
+    /// The image of a point of the camera frame.
+    pub fn project(&self, view: V3) -> Seen {
+        let w = -1.0 / view.z;
+        let scale = SUB as f32 * self.focal * w;
+        let middle = |edge: usize| 0.5 * (SUB * edge) as f32;
+        Seen { x: middle(self.width) + scale * view.x, y: middle(self.height) - scale * view.y, w, view }
+    }
+
+    /// The ray through a point of the image (pixels from the top left), world; as long as a unit along the axis.
+    pub fn ray(&self, x: f32, y: f32) -> V3 {
+        let slope = |at: f32, edge: usize| (at - 0.5 * edge as f32) / self.focal;
+        self.to_world.turn(&V3::new(slope(x, self.width), -slope(y, self.height), -1.0))
+    }
+
+    /// Depth along the axis of a point of the world, m.
+    pub fn depth(&self, p_w: &V3) -> f32 {
+        -self.to_view.turn(&(p_w - self.eye)).z
+    }
+
+    /// Whether a ball can be in the image.
+    pub fn may_see(&self, centre: &V3, radius: f32) -> bool {
+        let c = self.to_view.turn(&(centre - self.eye));
+        let inside = |along: f32, edge: usize| {
+            let half = 0.5 * edge as f32 / self.focal;
+            (along.abs() + c.z * half) < radius * (1.0 + half * half).sqrt()
+        };
+        -c.z + radius > self.near && inside(c.x, self.width) && inside(c.y, self.height)
+    }
+}

@@ -1,0 +1,38 @@
+//! Pictures: a deterministic renderer for the processor, in single precision.
+//!
+//! Triangles are rasterised at four samples a pixel into a buffer of triangle numbers and reciprocal depths; then every
+//! triangle that a pixel shows is shaded once: Lambert and GGX (Walter et al. 2007) under one key light with soft shadows
+//! and a sky. Looks are baked into vertices, or into textures on large flat faces, when a [`Model`] is built, filtered to
+//! the spacing of its vertices; so that nothing is evaluated twice and small images do not alias.
+//!
+//! What does not move is drawn once for a camera that does not move either; see [`Scratch`].
+
+mod background;
+mod error;
+mod facet;
+mod frame;
+mod lens;
+mod model;
+mod noise;
+mod pass;
+mod pattern;
+mod picture;
+mod pose;
+mod raster;
+mod render;
+mod shade;
+mod shadow;
+mod stage;
+mod tone;
+
+#[cfg(test)]
+mod tests;
+
+pub use error::CameraError;
+pub use model::{Model, box_mesh};
+pub use picture::Picture;
+pub use render::{Scratch, render};
+pub use stage::{FrameView, Mount, Stage, Thing};
+
+/// A point, direction or colour of a picture.
+type V3 = nalgebra::Vector3<f32>;

@@ -1,0 +1,160 @@
+//! What can be seen: things, how they move, and the light on them.
+
+use std::sync::{
+    Arc,
+    atomic::{AtomicU64, Ordering},
+};
+
+use super::{CameraError, Model, pose::Posed, shadow::ShadowMap};
+use crate::{
+    geometry::{Pose, Vec3},
+    physics::world::Frame,
+    scene::Lighting,
+};
+
+/// What moves a thing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Mount {
+    /// Nothing: it stands here in the world.
+    Fixed(Pose),
+    /// A rigid body, by its index in the state.
+    Rigid(usize),
+    /// A link of a tree of joints.
+    Link {
+        /// Index of the tree.
+        tree: usize,
+        /// Index of the link in it.
+        link: usize,
+        /// Frame of the thing in the link's.
+        offset: Pose,
+    },
+    /// The nodes of a soft body, by its index; the model must be [`Model::embedded`].
+    Soft(usize),
+}
+
+/// One thing to be drawn.
+#[derive(Clone, Debug)]
+pub struct Thing {
+    /// Name, for messages.
+    pub name: String,
+    /// Its number in segmentations; 0 is where nothing is.
+    pub object: u16,
+    /// Its drawn form.
+    pub model: Arc<Model>,
+    /// What moves it.
+    pub mount: Mount,
+    /// Whether it casts shadows. Grounds on which all stands need not, and are cheaper so.
+    pub casts_shadow: bool,
+}
+
+/// All things and the light: immutable, shared by all frames of an episode.
+#[derive(Debug)]
+pub struct Stage {
+    pub(super) things: Vec<Thing>,
+    pub(super) lighting: Lighting,
+    /// World forms of the levels of fixed things (empty for others).
+    pub(super) fixed: Vec<Vec<Posed>>,
+    pub(super) fixed_shadow: ShadowMap,
+    /// Tells caches of one stage from those of another.
+    pub(super) key: u64,
+}
+
+/// The part of a state that pictures depend on.
+#[derive(Clone, Copy, Debug)]
+pub struct FrameView<'a> {
+    /// Node positions of each soft body, m, world.
+    pub nodes: &'a [Vec<Vec3>],
+    /// Frames of the rigid bodies, world.
+    pub rigid: &'a [Pose],
+    /// Link frames of each tree, world.
+    pub links: &'a [Vec<Pose>],
+    /// The hand frame, world, for cameras mounted there.
+    pub hand_w: Option<Pose>,
+}
+
+impl<'a> FrameView<'a> {
+    /// What pictures need of `frame`, and the hand frame.
+    pub fn of(frame: &'a Frame, hand_w: Option<Pose>) -> Self {
+        Self { nodes: &frame.nodes, rigid: &frame.rigid, links: &frame.links, hand_w }
+    }
+
+    /// Nothing that moves.
+    pub fn still() -> Self {
+        Self { nodes: &[], rigid: &[], links: &[], hand_w: None }
+    }
+}
+
+static NEXT_KEY: AtomicU64 = AtomicU64::new(0);
+
+impl Stage {
+    /// Gathers things and light, and works out what never changes.
+    ///
+    /// # Errors
+    /// If a number of the light is out of range, a fixed thing's pose is not finite, or there are more than 1000 things.
+    pub fn new(things: Vec<Thing>, lighting: Lighting) -> Result<Self, CameraError> {
+        check_light(&lighting)?;
+        if things.len() > 1000 {
+            return Err(CameraError::Model {
+                name: "the stage".to_owned(),
+                reason: format!("{} things; at most 1000 can be drawn, join some", things.len()),
+            });
+        }
+        let mut fixed = Vec::new();
+        for thing in &things {
+            let levels = match &thing.mount {
+                Mount::Fixed(pose) => {
+                    let world = |level| Posed::rigid(level, pose, &thing.name);
+                    thing.model.levels.iter().map(world).collect::<Result<Vec<_>, _>>()?
+                }
+                _ => Vec::new(),
+            };
+            fixed.push(levels);
+        }
+        let mut fixed_shadow = ShadowMap::new(&lighting);
+        for (thing, posed) in things.iter().zip(&fixed).filter(|(thing, _)| thing.casts_shadow) {
+            if let (Some(level), Some(posed)) = (thing.model.levels.first(), posed.first()) {
+                fixed_shadow.draw(&posed.positions, &level.triangles);
+            }
+        }
+        fixed_shadow.finish();
+        Ok(Self { things, lighting, fixed, fixed_shadow, key: NEXT_KEY.fetch_add(1, Ordering::Relaxed) })
+    }
+
+    /// The things, in the order of their drawing.
+    pub fn things(&self) -> &[Thing] {
+        &self.things
+    }
+}
+
+fn check_light(light: &Lighting) -> Result<(), CameraError> {
+    let wrong = |field, expected, got: String| Err(CameraError::Light { field, expected, got });
+    let direction = light.key.direction_w;
+    if !(direction.norm() > 1e-9 && direction.norm().is_finite()) {
+        return wrong("key.direction_w", "a direction", format!("{:?}", direction.as_slice()));
+    }
+    if !(0.0..=0.5).contains(&light.key.softness_rad) {
+        return wrong("key.softness_rad", "0 to 0.5 rad", light.key.softness_rad.to_string());
+    }
+    let positive = |x: f64| x >= 0.0 && x.is_finite();
+    for (field, values) in [
+        ("key.colour", light.key.colour),
+        ("sky.zenith", light.sky.zenith),
+        ("sky.horizon", light.sky.horizon),
+        ("sky.ground", light.sky.ground),
+        ("strength", [light.key.strength, light.sky.strength, 0.0]),
+    ] {
+        if !values.into_iter().all(positive) {
+            return wrong(field, "numbers from 0", format!("{values:?}"));
+        }
+    }
+    if !(light.exposure > 0.0 && light.exposure.is_finite()) {
+        return wrong("exposure", "a number above 0", light.exposure.to_string());
+    }
+    if !(light.shadow_radius_m > 0.0 && light.shadow_radius_m.is_finite()) {
+        return wrong("shadow_radius_m", "a length above 0 m", light.shadow_radius_m.to_string());
+    }
+    if !light.shadow_centre_w.iter().all(|x| x.is_finite()) {
+        return wrong("shadow_centre_w", "a point", format!("{:?}", light.shadow_centre_w.as_slice()));
+    }
+    Ok(())
+}

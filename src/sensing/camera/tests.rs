@@ -1,0 +1,287 @@
+//! Pictures against closed forms.
+
+use std::sync::Arc;
+
+use super::*;
+use crate::{
+    geometry::{Pose, Quat, Vec3, mesh::Mesh, shape::Shape},
+    scene::{Camera, CameraMount, Layer, Lighting, Mask, Visual},
+};
+
+fn thing(object: u16, model: Model, mount: Mount) -> Thing {
+    Thing { name: format!("thing {object}"), object, model: Arc::new(model), mount, casts_shadow: true }
+}
+
+fn ball(object: u16, radius: f64, mount: Mount) -> Thing {
+    let model = Model::of_shape("ball", &Shape::Sphere { radius }, &[Visual::default()]).expect("a ball");
+    thing(object, model, mount)
+}
+
+fn checker(size_m: f64) -> Visual {
+    let mask = Mask::Checker { size_m };
+    Visual::plain([0.1; 3], 1.0, 0.0).with(Layer {
+        mask,
+        albedo: [0.5; 3],
+        roughness: 1.0,
+        opacity: 1.0,
+        relief_m: 0.0,
+    })
+}
+
+/// A ground whose top is z = 0.
+fn ground(visual: Visual) -> Thing {
+    let half = Vec3::new(1.0, 1.0, 0.1);
+    let model = Model::of_shape("ground", &Shape::Box { half }, &[visual]).expect("a box");
+    let mut ground = thing(1, model, Mount::Fixed(Pose::translation(0.0, 0.0, -0.1)));
+    ground.casts_shadow = false;
+    ground
+}
+
+/// A camera at `eye` that looks at `target`; image up is as near to `up` as can be.
+fn camera(eye: Vec3, target: Vec3, up: Vec3) -> Camera {
+    let turn = Quat::face_towards(&(eye - target), &up);
+    Camera { pose: Pose::from_parts(eye.into(), turn), ..Camera::third_person_table() }
+}
+
+fn above(height: f64) -> Camera {
+    camera(Vec3::new(0.0, 0.0, height), Vec3::zeros(), Vec3::y())
+}
+
+fn stage(things: Vec<Thing>) -> Stage {
+    Stage::new(things, Lighting::default()).expect("the default light is good")
+}
+
+fn draw(stage: &Stage, camera: &Camera) -> Picture {
+    render(stage, &FrameView::still(), camera, &mut Scratch::default()).expect("a picture")
+}
+
+fn focal(camera: &Camera) -> f64 {
+    0.5 * camera.height as f64 / (0.5 * camera.fovy_rad).tan()
+}
+
+#[test]
+fn a_ball_has_the_silhouette_of_the_pinhole_to_a_tenth_of_a_pixel() {
+    let camera = above(1.0);
+    let radius = 0.2;
+    let picture = draw(&stage(vec![ball(7, radius, Mount::Fixed(Pose::identity()))]), &camera);
+    let inside: Vec<usize> = (0..224 * 224).filter(|&i| picture.segmentation[i] == 7).collect();
+    let area = inside.len() as f64;
+    let mean = |of: &dyn Fn(usize) -> usize| inside.iter().map(|&i| of(i) as f64 + 0.5).sum::<f64>() / area;
+    let expected = focal(&camera) * radius / (1.0 - radius * radius).sqrt();
+    let found = (area / std::f64::consts::PI).sqrt();
+    assert!((found - expected).abs() < 0.1, "radius {found} px, expected {expected}");
+    let centre = [mean(&|i| i % 224), mean(&|i| i / 224)];
+    assert!(centre.iter().all(|c| (c - 112.0).abs() < 0.1), "{centre:?}");
+}
+
+fn linear(byte: u8) -> f64 {
+    let x = f64::from(byte) / 255.0;
+    if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
+}
+
+/// Where a line of values passes from its first to its last, pixels: the place of an ideal step of the same sum.
+fn step(values: &[f64]) -> f64 {
+    let (first, last) = (values[0], values[values.len() - 1]);
+    values.iter().map(|v| (v - last) / (first - last)).sum()
+}
+
+#[test]
+fn checkerboard_corners_lie_where_the_pinhole_puts_them_to_a_tenth_of_a_pixel() {
+    let camera = above(1.0);
+    let picture = draw(&stage(vec![ground(checker(0.1))]), &camera);
+    let value = |x: usize, y: usize| linear(picture.rgb[3 * (y * 224 + x)]);
+    let square = 0.1 * focal(&camera);
+    for corner in [[-2, -1], [0, 0], [1, 2], [2, -2]] {
+        let [ex, ey] = corner.map(|c| 112.0 + square * f64::from(c));
+        let reach = (0.4 * square) as usize;
+        let (cx, cy, off) = (ex as usize, ey as usize, (0.5 * square) as usize);
+        let row: Vec<f64> = (cx - reach..cx + reach).map(|x| value(x, cy - off)).collect();
+        let column: Vec<f64> = (cy - reach..cy + reach).map(|y| value(cx - off, y)).collect();
+        let found = [(cx - reach) as f64 + step(&row), (cy - reach) as f64 + step(&column)];
+        let error = (found[0] - ex).abs().max((found[1] - ey).abs());
+        assert!(error < 0.1, "{corner:?}: found {found:?}, expected {:?}", [ex, ey]);
+    }
+}
+
+#[test]
+fn depth_is_that_of_the_plane_to_a_tenth_of_a_millimetre_also_where_it_passes_behind_the_camera() {
+    let eye = Vec3::new(0.0, -0.3, 0.25);
+    let camera = Camera { fovy_rad: 1.8, ..camera(eye, Vec3::new(0.0, 0.1, 0.0), Vec3::z()) };
+    let picture = draw(&stage(vec![ground(Visual::default())]), &camera);
+    let (mut checked, mut worst) = (0, 0.0_f64);
+    for i in 0..224 * 224 {
+        let slope = |at: usize| (at as f64 + 0.5 - 112.0) / focal(&camera);
+        let ray = camera.pose.rotation * Vec3::new(slope(i % 224), -slope(i / 224), -1.0);
+        let depth = -eye.z / ray.z;
+        let hit = eye + ray * depth;
+        if depth > 0.0 && depth < 1.0 && hit.x.abs().max(hit.y.abs()) < 0.98 {
+            assert_eq!(picture.segmentation[i], 1, "pixel {i} shows no ground");
+            worst = worst.max((f64::from(picture.depth[i]) - depth).abs());
+            checked += 1;
+        }
+    }
+    assert!(checked > 20_000 && worst < 1e-4, "{checked} pixels, worst {worst} m");
+}
+
+/// A still scene with something of everything, and its camera.
+fn still_life() -> (Vec<Thing>, Camera) {
+    let cube = Model::of_mesh("cube", &box_mesh(&Vec3::repeat(0.05)), &[], &[checker(0.02)]).expect("a cube");
+    let things = vec![
+        ground(checker(0.13)),
+        ball(2, 0.06, Mount::Fixed(Pose::translation(0.15, 0.05, 0.06))),
+        thing(3, cube, Mount::Rigid(0)),
+    ];
+    (things, camera(Vec3::new(0.7, 0.0, 0.6), Vec3::zeros(), Vec3::z()))
+}
+
+fn cube_view(rigid: &[Pose]) -> FrameView<'_> {
+    FrameView { rigid, ..FrameView::still() }
+}
+
+/// Mean difference of two rows of bytes.
+fn difference(a: &[f64], b: &[u8]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - f64::from(*b)).abs()).sum::<f64>() / b.len() as f64
+}
+
+#[test]
+fn a_kept_background_gives_the_picture_that_is_drawn_from_nothing() {
+    let (things, camera) = still_life();
+    let stage = stage(things);
+    let (mut kept, mut fresh) = (Scratch::default(), Scratch::uncached());
+    for height in [0.05, 0.2] {
+        let rigid = [Pose::translation(-0.1, -0.1, height)];
+        let view = cube_view(&rigid);
+        let a = render(&stage, &view, &camera, &mut kept).expect("a picture");
+        let b = render(&stage, &view, &camera, &mut fresh).expect("a picture");
+        assert_eq!(a.segmentation, b.segmentation);
+        assert_eq!(a.depth, b.depth);
+        let mean = difference(&a.rgb.iter().map(|v| f64::from(*v)).collect::<Vec<_>>(), &b.rgb);
+        assert!(mean < 0.05, "mean difference {mean} of 255");
+    }
+}
+
+/// Mean over the area of each pixel of a smaller square image.
+fn box_resized(rgb: &[u8], from: usize, to: usize) -> Vec<f64> {
+    let scale = from as f64 / to as f64;
+    let cover = |i: usize| {
+        let (low, high) = (i as f64 * scale, (i + 1) as f64 * scale);
+        (low as usize..(high.ceil() as usize).min(from))
+            .map(move |k| (k, (high.min(k as f64 + 1.0) - low.max(k as f64)) / scale))
+    };
+    let mut out = Vec::with_capacity(3 * to * to);
+    for y in 0..to {
+        for x in 0..to {
+            for c in 0..3 {
+                let pixel = |(j, b): (usize, f64)| {
+                    cover(x).map(|(i, a)| a * b * f64::from(rgb[3 * (j * from + i) + c])).sum::<f64>()
+                };
+                out.push(cover(y).map(pixel).sum());
+            }
+        }
+    }
+    out
+}
+
+#[test]
+fn the_small_picture_is_the_large_one_made_small() {
+    let (things, camera) = still_life();
+    let stage = stage(things);
+    let rigid = [Pose::translation(-0.1, -0.1, 0.05)];
+    let mut scratch = Scratch::uncached();
+    let small = render(&stage, &cube_view(&rigid), &camera, &mut scratch).expect("a picture");
+    for edge in [512, 1024] {
+        let camera = camera.clone().with_edge(edge);
+        let large = render(&stage, &cube_view(&rigid), &camera, &mut scratch).expect("a picture");
+        let mean = difference(&box_resized(&large.rgb, edge, 224), &small.rgb);
+        assert!(mean < 2.0, "{edge}: mean difference {mean} of 255");
+    }
+}
+
+#[test]
+fn pictures_are_the_same_bytes_on_any_thread() {
+    let (things, camera) = still_life();
+    let stage = stage(things);
+    let rigid = [Pose::translation(-0.1, -0.1, 0.05)];
+    let shoot = || render(&stage, &cube_view(&rigid), &camera, &mut Scratch::default()).expect("a picture");
+    let here = shoot();
+    std::thread::scope(|scope| {
+        let there: Vec<_> = (0..3).map(|_| scope.spawn(shoot)).collect();
+        there.into_iter().for_each(|t| assert_eq!(t.join().expect("no panic"), here));
+    });
+}
+
+#[test]
+fn a_shadow_falls_where_the_light_throws_it() {
+    let lighting = Lighting { shadow_centre_w: Vec3::zeros(), ..Lighting::default() };
+    let camera = above(1.2);
+    let with_ball = |height: Option<f64>| {
+        let mut things = vec![ground(Visual::default())];
+        things.extend(height.map(|h| ball(2, 0.04, Mount::Fixed(Pose::translation(0.0, 0.0, h)))));
+        let stage = Stage::new(things, lighting.clone()).expect("a stage");
+        draw(&stage, &camera)
+    };
+    let (bare, shaded) = (with_ball(None), with_ball(Some(0.25)));
+    let direction = lighting.key.direction_w;
+    let foot = -direction * (0.25 / direction.z);
+    let (mut weight, mut centre) = (0.0, [0.0; 2]);
+    // The ball itself covers 12 pixels around the middle.
+    let beside = |i: &usize| (i % 224).abs_diff(112).max((i / 224).abs_diff(112)) > 16;
+    for i in (0..224 * 224).filter(beside) {
+        let dark = f64::from(bare.rgb[3 * i]) - f64::from(shaded.rgb[3 * i]);
+        let scale = 1.2 / focal(&camera);
+        weight += dark;
+        centre[0] += dark * ((i % 224) as f64 + 0.5 - 112.0) * scale;
+        centre[1] -= dark * ((i / 224) as f64 + 0.5 - 112.0) * scale;
+    }
+    assert!(weight > 1000.0, "no shadow");
+    let error = (centre[0] / weight - foot.x).hypot(centre[1] / weight - foot.y);
+    assert!(error < 5e-3, "the shadow lies {error} m beside its place");
+}
+
+#[test]
+fn the_right_of_the_third_person_image_is_the_worlds_positive_y() {
+    for camera in [Camera::third_person_table(), Camera::third_person_floor()] {
+        let at = |object, y| ball(object, 0.03, Mount::Fixed(Pose::translation(0.0, y, 0.03)));
+        let picture = draw(&stage(vec![at(1, -0.2), at(2, 0.2)]), &camera);
+        let column = |object| picture.segmentation.iter().position(|&s| s == object).expect("in sight") % 224;
+        assert!(column(1) < 112 && column(2) > 112);
+    }
+}
+
+#[test]
+fn bad_cameras_are_refused_with_the_name_of_the_field() {
+    let stage = stage(vec![ball(1, 0.1, Mount::Fixed(Pose::identity()))]);
+    let good = above(1.0);
+    let nowhere = Pose::translation(f64::NAN, 0.0, 0.0);
+    for (camera, words) in [
+        (Camera { width: 0, ..good.clone() }, "width: expected 1 to 4096 pixels, got 0"),
+        (Camera { height: 100_000, ..good.clone() }, "height: expected 1 to 4096 pixels, got 100000"),
+        (Camera { fovy_rad: 3.2, ..good.clone() }, "fovy_rad: expected 0.01 to 2.8 rad, got 3.2"),
+        (Camera { fovy_rad: f64::NAN, ..good.clone() }, "fovy_rad: expected 0.01 to 2.8 rad, got NaN"),
+        (Camera { near_m: 0.0, ..good.clone() }, "near_m: expected at least 0.0001 m, got 0"),
+        (Camera { far_m: 0.01, ..good.clone() }, "far_m: expected a length above near_m, got 0.01"),
+        (Camera { pose: nowhere, ..good.clone() }, "pose: expected finite numbers"),
+        (Camera { mount: CameraMount::Hand, ..good.clone() }, "mount: expected a hand in the state"),
+        (above(0.05), "pose: it stands inside of thing 1; move it out"),
+    ] {
+        let error = render(&stage, &FrameView::still(), &camera, &mut Scratch::default()).expect_err(words);
+        assert!(error.to_string().contains(words), "{error}");
+    }
+}
+
+#[test]
+fn bad_meshes_states_and_lights_are_refused() {
+    let visuals = [Visual::default()];
+    let empty = Model::of_mesh("egg", &Mesh::default(), &[], &visuals).expect_err("empty");
+    assert!(empty.to_string().starts_with("egg cannot be drawn: the mesh is empty"), "{empty}");
+    let cube = box_mesh(&Vec3::repeat(0.1));
+    let unknown = Model::of_mesh("egg", &cube, &[3; 12], &visuals).expect_err("no such visual");
+    assert!(unknown.to_string().contains("material 3 has no visual; there are 1"), "{unknown}");
+    let lost = stage(vec![ball(1, 0.1, Mount::Rigid(4))]);
+    let error = render(&lost, &FrameView::still(), &above(1.0), &mut Scratch::default()).expect_err("lost");
+    assert!(error.to_string().contains("the state has no rigid body 4"), "{error}");
+    let mut light = Lighting::default();
+    light.key.direction_w = Vec3::zeros();
+    let dark = Stage::new(Vec::new(), light).expect_err("no direction");
+    assert!(dark.to_string().starts_with("lighting: key.direction_w: expected a direction"), "{dark}");
+}

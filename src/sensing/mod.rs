@@ -1,0 +1,3 @@
+//! What sensors see: pure functions of a state and a scene.
+
+pub mod camera;
