@@ -263,7 +263,7 @@ impl<'a> Batch<'a> {
             }
             Calibrated::Yes { limit, file, path, text } => {
                 self.sources.insert(path, script::sha256(text.as_bytes()));
-                self.released.merge(file);
+                self.released.merge(*file);
                 return Ok(limit);
             }
         }

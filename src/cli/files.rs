@@ -41,7 +41,7 @@ pub enum Calibrated {
         /// The limit; none if no squeeze of the sweep was stable.
         limit: Option<Limit>,
         /// All that the file says.
-        file: Thresholds,
+        file: Box<Thresholds>,
         /// Path from the project's root.
         path: String,
         /// The file's text.
@@ -64,5 +64,5 @@ pub fn calibrated(script: &Path, asset: &Asset) -> Result<Calibrated, Failure> {
     if file.fingerprints.get(name).is_some_and(|known| *known != asset.fingerprint()) {
         return Ok(Calibrated::Another(path));
     }
-    Ok(Calibrated::Yes { limit: file.limit(name), file, path: relative, text })
+    Ok(Calibrated::Yes { limit: file.limit(name), file: Box::new(file), path: relative, text })
 }
