@@ -43,6 +43,8 @@ struct Data {
     untouched: Vec<f64>,
     size: [usize; 2],
     steepest: f64,
+    /// Least and greatest place of a sample.
+    range: [[f64; 2]; 2],
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -65,6 +67,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         ball_radius_mm: radius,
         held_out_l1: round(held_out_l1),
         steepest: round(data.steepest),
+        place_range: data.range.map(|at| at.map(round)),
         background: [0, 1, 2]
             .map(|channel| series(&data, channel).map(|row| row.map(round).to_vec()).to_vec()),
         colour: [0, 1, 2].map(|channel| {
@@ -83,7 +86,13 @@ fn load(path: &Path, radius_mm: f64) -> Result<Data, Box<dyn Error>> {
         return Err(format!("imgs: expected pictures × rows × columns × 3, got {:?}", pictures.shape).into());
     };
     let untouched = untouched.values();
-    let mut data = Data { presses: Vec::new(), untouched, size: [wide, high], steepest: 0.0 };
+    let mut data = Data {
+        presses: Vec::new(),
+        untouched,
+        size: [wide, high],
+        steepest: 0.0,
+        range: [[1.0; 2], [-1.0; 2]],
+    };
     for i in 0..count {
         let picture = &pictures.bytes[i * high * wide * 3..(i + 1) * high * wide * 3];
         let (cx, cy, r) = (centres[2 * i], centres[2 * i + 1], radii[i]);
@@ -97,9 +106,14 @@ fn load(path: &Path, radius_mm: f64) -> Result<Data, Box<dyn Error>> {
                 // The sine of the slope of a sphere is the distance from its axis over its radius.
                 let (a, b) = (dx * PITCH_MM / radius_mm, dy * PITCH_MM / radius_mm);
                 data.steepest = data.steepest.max(a.hypot(b));
+                let place = [unit(x, wide), unit(y, high)];
+                for (axis, &p) in place.iter().enumerate() {
+                    data.range[0][axis] = data.range[0][axis].min(p);
+                    data.range[1][axis] = data.range[1][axis].max(p);
+                }
                 let at = 3 * (y * wide + x);
                 press.push(Sample {
-                    features: features(a, b, unit(x, wide), unit(y, high)),
+                    features: features(a, b, place[0], place[1]),
                     pressed: std::array::from_fn(|c| f64::from(picture[at + STORED[c]])),
                     untouched: std::array::from_fn(|c| data.untouched[at + STORED[c]]),
                 });

@@ -16,6 +16,7 @@ mod relief;
 mod shear;
 mod spec;
 mod surface;
+mod taxim;
 mod view;
 
 #[cfg(test)]
@@ -30,3 +31,4 @@ pub use markers::{ARROW_GAIN, MARKERS, MarkerStyle, Markers, Places, draw_marker
 pub use optics::{Optics, OpticsError};
 pub use relief::Surface;
 pub use spec::{FotsSpec, GelSpec, MarkerModel, OpticsModel, PICTURE, TactileSpec, TactileSpecError, View};
+pub use taxim::Taxim;

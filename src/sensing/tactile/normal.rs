@@ -25,18 +25,19 @@ pub(super) fn press(gel: &Gel, gap: &[f32], force: f64, scratch: &mut Scratch) -
     let mut p = foundation(gap, total, 1.0 / long_wave(gel, scratch))?;
     let n = gap.len();
     let (mut residual, mut direction, mut moved) = (vec![0.0_f32; n], vec![0.0_f32; n], vec![0.0_f32; n]);
+    let mut sunk = vec![0.0_f32; n];
+    convolve(gel, &p, &mut sunk, scratch);
     let (mut before, mut keep, mut push) = (1.0_f64, 0.0_f32, 0.0);
     for _ in 0..MOST {
-        convolve(gel, &p, &mut residual, scratch);
-        let depth = mean(&p, residual.iter().zip(gap).map(|(u, g)| u + g));
+        let depth = mean(&p, sunk.iter().zip(gap).map(|(u, g)| u + g));
         push = f64::from(depth);
         let mut now = 0.0_f64;
         let mut touching = 0_u32;
         let mut deepest = 0.0_f32;
         for c in 0..n {
-            deepest = if p[c] > 0.0 { deepest.max(residual[c]) } else { deepest };
-            residual[c] = residual[c] + gap[c] - depth;
+            residual[c] = sunk[c] + gap[c] - depth;
             if p[c] > 0.0 {
+                deepest = deepest.max(sunk[c]);
                 now += f64::from(residual[c] * residual[c]);
                 touching += 1;
             }
@@ -59,14 +60,21 @@ pub(super) fn press(gel: &Gel, gap: &[f32], force: f64, scratch: &mut Scratch) -
         if !(curvature > 0.0) {
             break;
         }
-        keep = advance(&mut p, &direction, &residual, (down / curvature) as f32, total);
+        let step = (down / curvature) as f32;
+        let scale;
+        (keep, scale) = advance(&mut p, &direction, &residual, step, total);
+        if keep > 0.0 {
+            sunk.iter_mut().zip(&moved).for_each(|(u, m)| *u = scale * (*u + step * m));
+        } else {
+            convolve(gel, &p, &mut sunk, scratch);
+        }
     }
     Some(Pressed { pressure: p, push })
 }
 
 /// A step along `direction`; cells that would pull let go, cells that overlap join. 1 if the touching cells stay the same
-/// and the next direction may be conjugate to this one, else 0.
-fn advance(p: &mut [f32], direction: &[f32], residual: &[f32], step: f32, total: f32) -> f32 {
+/// and the next direction may be conjugate to this one, else 0; and the factor that restored the sum.
+fn advance(p: &mut [f32], direction: &[f32], residual: &[f32], step: f32, total: f32) -> (f32, f32) {
     let (mut keep, mut sum) = (1.0, 0.0_f64);
     for c in 0..p.len() {
         if p[c] > 0.0 {
@@ -81,7 +89,7 @@ fn advance(p: &mut [f32], direction: &[f32], residual: &[f32], step: f32, total:
     }
     let scale = total / sum as f32;
     p.iter_mut().for_each(|p| *p *= scale);
-    keep
+    (keep, scale)
 }
 
 /// Mean over the touching cells.

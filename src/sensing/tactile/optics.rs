@@ -1,8 +1,15 @@
 //! The tactile picture: our model, a smooth polynomial of slope and place fitted to a real GelSight Mini.
 
+use std::ops::Range;
+
 use serde::{Deserialize, Serialize};
 
-use super::{field::GelField, gel::Gel, spec::PICTURE, surface::Window};
+use super::{
+    field::GelField,
+    gel::Gel,
+    spec::PICTURE,
+    surface::{FLAT, Window},
+};
 
 /// The coefficients that are shipped, made by `examples/fit_gelsight.rs`.
 const MINI: &str = include_str!("../../../assets/gelsight/mini.json");
@@ -26,6 +33,8 @@ pub struct OpticsFile {
     pub held_out_l1: f64,
     /// Greatest sine of slope in the fit; steeper surfaces are coloured like this.
     pub steepest: f64,
+    /// Least and greatest place (x, y) at which there was a press; beyond them colours change as at their edge.
+    pub place_range: [[f64; 2]; 2],
     /// Cosine series of the untouched picture, by channel: `background[c][j][i]` times cos(π i u) cos(π j v) with
     /// (u, v) in 0..1 across the picture.
     pub background: [Vec<Vec<f64>>; 3],
@@ -39,6 +48,7 @@ pub struct Optics {
     background: Vec<u8>,
     smooth: Vec<f32>,
     steepest: f32,
+    range: [[f32; 2]; 2],
     colour: [Vec<[f32; PLACES]>; 3],
 }
 
@@ -97,6 +107,7 @@ impl Optics {
             background: smooth.iter().map(|&value| level(value)).collect(),
             smooth,
             steepest: file.steepest as f32,
+            range: file.place_range.map(|at| at.map(|v| v as f32)),
             colour: file.colour.map(|c| c.into_iter().map(|p| p.map(|v| v as f32)).collect()),
         })
     }
@@ -118,25 +129,34 @@ impl Optics {
         let window = Window::of(gel, field);
         let [wide, high] = window.size;
         let mut line = Line::new(wide);
+        let column = |i: usize| ((window.from[0] + i) as f32 + 0.5) * 2.0 / PICTURE[0] as f32 - 1.0;
+        let columns: Vec<f32> =
+            (0..wide).map(|i| column(i).clamp(self.range[0][0], self.range[1][0])).collect();
         for row in 0..high {
             window.slopes(row, gel.view.pitch as f32, &mut line.a, &mut line.b);
-            line.limit(self.steepest);
-            let at = 3 * ((window.from[1] + row) * PICTURE[0] + window.from[0]);
+            let Some((first, end)) = line.limit(self.steepest) else { continue };
             let y = ((window.from[1] + row) as f32 + 0.5) * 2.0 / PICTURE[1] as f32 - 1.0;
+            let y = y.clamp(self.range[0][1], self.range[1][1]);
             for (channel, colour) in self.colour.iter().enumerate() {
-                line.change(colour, window.from[0], y);
-                let base = &self.smooth[at..at + 3 * wide];
-                let out = &mut rgb[at..at + 3 * wide];
-                for (i, change) in line.change.iter().enumerate() {
-                    out[3 * i + channel] = level(base[3 * i + channel] + change);
-                }
+                line.change(channel, colour, &columns, y, first..end);
+            }
+            let at = 3 * ((window.from[1] + row) * PICTURE[0] + window.from[0]);
+            let (from, to) = (at + 3 * first, at + 3 * end);
+            let [red, green, blue] = &line.change;
+            let changes = red[first..end].iter().zip(&green[first..end]).zip(&blue[first..end]);
+            let pixels = rgb[from..to].chunks_exact_mut(3).zip(self.smooth[from..to].chunks_exact(3));
+            for ((out, base), ((r, g), b)) in pixels.zip(changes) {
+                out[0] = level(base[0] + r);
+                out[1] = level(base[1] + g);
+                out[2] = level(base[2] + b);
             }
         }
     }
 
     /// Change of the colour (R, G, B, of 255) at picture place (x, y), −1..1, by a surface with sines of slope (a, b).
     pub fn change(&self, a: f64, b: f64, x: f64, y: f64) -> [f64; 3] {
-        let (slopes, places) = (monomials(a, b), places(x, y));
+        let at = |axis: usize, v: f64| v.clamp(self.range[0][axis].into(), self.range[1][axis].into());
+        let (slopes, places) = (monomials(a, b), places(at(0, x), at(1, y)));
         [0, 1, 2].map(|channel| {
             let rows = self.colour[channel].iter().zip(&slopes);
             rows.map(|(row, s)| s * row.iter().zip(&places).map(|(c, p)| f64::from(*c) * p).sum::<f64>())
@@ -150,35 +170,45 @@ struct Line {
     /// Sines of the slope along x and y.
     a: Vec<f32>,
     b: Vec<f32>,
-    change: Vec<f32>,
+    /// By channel.
+    change: [Vec<f32>; 3],
 }
 
 impl Line {
     fn new(wide: usize) -> Self {
-        Self { a: vec![0.0; wide], b: vec![0.0; wide], change: vec![0.0; wide] }
+        Self { a: vec![0.0; wide], b: vec![0.0; wide], change: std::array::from_fn(|_| vec![0.0; wide]) }
     }
 
-    /// Turns slopes into sines, none above `steepest`.
-    fn limit(&mut self, steepest: f32) {
+    /// Turns slopes into sines, none above `steepest`; from where to where there is any to speak of.
+    fn limit(&mut self, steepest: f32) -> Option<(usize, usize)> {
         for (a, b) in self.a.iter_mut().zip(&mut self.b) {
             let square = *a * *a + *b * *b;
-            let sine = (square / (1.0 + square)).sqrt();
-            let scale = sine.min(steepest) / square.sqrt().max(1e-12);
+            let scale = (1.0 / (1.0 + square)).sqrt().min(steepest / square.max(1e-20).sqrt());
             (*a, *b) = (*a * scale, *b * scale);
         }
+        let steep = |(a, b): (&f32, &f32)| a.abs().max(b.abs()) > FLAT;
+        let first = self.a.iter().zip(&self.b).position(steep)?;
+        let end = self.a.iter().zip(&self.b).rposition(steep)? + 1;
+        Some((first, end))
     }
 
-    /// Change of one channel along the row, from pixel column `from`, at height `y`.
-    fn change(&mut self, colour: &[[f32; PLACES]], from: usize, y: f32) {
+    /// Change of one channel along the row, whose pixels are at `columns` and height `y`.
+    fn change(
+        &mut self,
+        channel: usize,
+        colour: &[[f32; PLACES]],
+        columns: &[f32],
+        y: f32,
+        range: Range<usize>,
+    ) {
         // In a row each coefficient is a parabola of x.
         let mut parabolas = [[0.0_f32; 3]; SLOPES];
         for (parabola, c) in parabolas.iter_mut().zip(colour) {
             *parabola = [c[0] + y * (c[2] + y * c[5]), c[1] + y * c[4], c[3]];
         }
-        let step = 2.0 / PICTURE[0] as f32;
-        let places = self.a.iter().zip(&self.b).zip(&mut self.change).enumerate();
-        for (i, ((&a, &b), change)) in places {
-            let x = ((from + i) as f32 + 0.5) * step - 1.0;
+        let out = &mut self.change[channel][range.clone()];
+        let slopes = self.a[range.clone()].iter().zip(&self.b[range.clone()]);
+        for (((&a, &b), &x), change) in slopes.zip(&columns[range]).zip(out) {
             let c = |m: usize| parabolas[m][0] + x * (parabolas[m][1] + x * parabolas[m][2]);
             // By powers of a, Horner's rule in b within each.
             let a0 = b * (c(0) + b * (c(2) + b * (c(5) + b * c(9))));
@@ -191,7 +221,8 @@ impl Line {
 }
 
 fn level(value: f32) -> u8 {
-    (value + 0.5).clamp(0.0, 255.0) as u8
+    // By way of an integer, which the compiler turns into vector instructions.
+    (value + 0.5).clamp(0.0, 255.0) as i32 as u8
 }
 
 /// The untouched picture of its cosine series, 320 × 240 RGB.

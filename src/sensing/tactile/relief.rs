@@ -67,19 +67,31 @@ impl Relief {
             ((b[2] - a[2]) * (c[1] - a[1]) - (c[2] - a[2]) * (b[1] - a[1])) / area,
             ((c[2] - a[2]) * (b[0] - a[0]) - (b[2] - a[2]) * (c[0] - a[0])) / area,
         ];
-        let edge = |p: [f64; 3], q: [f64; 3], x: f64, y: f64| {
-            (q[0] - p[0]) * (y - p[1]) - (x - p[0]) * (q[1] - p[1])
-        };
+        // Where an edge is at y = 0, how far it goes along x a row, and which side of it is inside.
+        let edges = [(a, b), (b, c), (c, a)].map(|(p, q)| {
+            let lean = (q[0] - p[0]) / (q[1] - p[1]);
+            (p[0] - lean * p[1], lean, q[1] - p[1])
+        });
         for j in low_y..=high_y {
             let y = j as f64;
-            for i in low_x..=high_x {
-                let x = i as f64;
-                // A little beyond the edges, so that no point falls between two neighbours.
-                if edge(a, b, x, y) <= 1e-9 && edge(b, c, x, y) <= 1e-9 && edge(c, a, x, y) <= 1e-9 {
-                    let z = (a[2] + slope[0] * (x - a[0]) + slope[1] * (y - a[1])) as f32;
-                    let height = &mut self.height[j * self.columns + i];
-                    *height = height.min(z);
+            // A little beyond the edges, so that no point falls between two neighbours.
+            let (mut from, mut to) = (low_x as f64 - 1e-6, high_x as f64 + 1e-6);
+            for (at, lean, rise) in edges {
+                let x = at + lean * y;
+                if rise > 0.0 {
+                    from = from.max(x - 1e-6);
+                } else if rise < 0.0 {
+                    to = to.min(x + 1e-6);
                 }
+            }
+            if from > to {
+                continue;
+            }
+            let (first, last) = (from.ceil() as usize, to.floor() as usize);
+            let start = a[2] + slope[0] * -a[0] + slope[1] * (y - a[1]);
+            let line = &mut self.height[j * self.columns..(j + 1) * self.columns];
+            for (i, height) in line.iter_mut().enumerate().take(last + 1).skip(first) {
+                *height = height.min((start + slope[0] * i as f64) as f32);
             }
         }
     }

@@ -10,9 +10,9 @@ use super::gel::{Gel, Scratch};
 use crate::geometry::{Mat3, Vec3};
 
 /// Iterations end when the sticking cells move as one up to this share of their motion (energy norm).
-const TOLERANCE: f64 = 3e-3;
+const TOLERANCE: f64 = 1.5e-2;
 /// Most iterations.
-const MOST: usize = 24;
+const MOST: usize = 10;
 /// Factor by which the bound grows when no sticking cell is left to carry the load.
 const RELAX: f64 = 1.1;
 /// Rounds of giving what slipping cells could not carry to the others.

@@ -1,7 +1,7 @@
 //! The touched surface at the picture's resolution.
 //!
-//! Where the gel is free its surface is the grid's, by a cubic; where it touches it has the very shape of the skin, which
-//! is known finer than the grid, and nowhere is it inside the skin.
+//! Where the gel is free its surface is the grid's, by a cubic; where it touches it lies on the skin, which is known finer
+//! than the grid: nowhere is it inside.
 
 use super::{
     field::{GelField, taps},
@@ -21,7 +21,7 @@ pub(super) struct Window {
 }
 
 /// Steeper than this a cell belongs to the window: a slope that changes no colour by half a grey level.
-const FLAT: f32 = 1.5e-3;
+pub(super) const FLAT: f32 = 3e-3;
 
 /// How pixel centres along one axis read a grid: first of the taps and their weights.
 struct Reading {
@@ -46,16 +46,15 @@ impl Window {
             Reading { first, weights }
         };
         let (x, y) = (reading(0), reading(1));
-        let touched: Vec<f32> = field.pressure.iter().map(|&p| if p > 0.0 { 1.0 } else { 0.0 }).collect();
         let free = resample(&field.displacement[2], count, &x, &y);
-        let cover = resample(&touched, count, &x, &y);
         let mut window = Self { from, size, u: free };
-        window.touch(gel, field, &cover, centre);
+        window.touch(gel, field, centre);
+        window.soften();
         window
     }
 
     /// Lays the surface on the skin where they touch.
-    fn touch(&mut self, gel: &Gel, field: &GelField, cover: &[f32], centre: impl Fn(usize, usize) -> f64) {
+    fn touch(&mut self, gel: &Gel, field: &GelField, centre: impl Fn(usize, usize) -> f64) {
         let relief = &field.relief;
         let half = [relief.columns, relief.rows].map(|n| 0.5 * (n - 1) as f64);
         let places = |axis: usize| -> Vec<(usize, f32, f64)> {
@@ -64,27 +63,50 @@ impl Window {
                 .map(|p| {
                     let metres = centre(axis, p);
                     let at = (metres / relief.cell + half[axis]).clamp(0.0, last as f64);
-                    (at.floor() as usize, at.fract() as f32, metres)
+                    (at as usize, at.fract() as f32, metres)
                 })
                 .collect()
         };
         let (xs, ys) = (places(0), places(1));
         let (curve_x, curve_y) = (0.5 / gel.pad.radius_x, 0.5 / gel.pad.radius_y);
+        let bend: Vec<f32> = xs.iter().map(|&(_, _, x)| (curve_x * x * x) as f32).collect();
+        let mut mixed = vec![0.0; relief.columns];
         for (row, &(j, ty, y)) in ys.iter().enumerate() {
-            let dome_y = curve_y * y * y;
+            let dome = (curve_y * y * y) as f32;
             let line = row * self.size[0]..(row + 1) * self.size[0];
             let upper = &relief.height[j * relief.columns..];
             let lower = &relief.height[(j + 1) * relief.columns..];
-            for ((u, &cover), &(i, tx, x)) in self.u[line.clone()].iter_mut().zip(&cover[line]).zip(&xs) {
-                let skin = (1.0 - ty) * ((1.0 - tx) * upper[i] + tx * upper[i + 1])
-                    + ty * ((1.0 - tx) * lower[i] + tx * lower[i + 1]);
-                let skin = skin + (dome_y + curve_x * x * x) as f32;
-                // Infinite or, at the skin's rim, not a number where no skin is.
-                if skin < 1.0 {
-                    let touch = cover.clamp(0.0, 1.0);
-                    *u = touch * skin + (1.0 - touch) * u.min(skin);
-                }
+            for (mix, (a, b)) in mixed.iter_mut().zip(upper.iter().zip(lower)) {
+                *mix = (1.0 - ty) * a + ty * b + dome;
             }
+            for ((u, &(i, tx, _)), bend) in self.u[line].iter_mut().zip(&xs).zip(&bend) {
+                let skin = (1.0 - tx) * mixed[i] + tx * mixed[i + 1] + bend;
+                // Not a number at the skin's rim, where a product of zero and infinity is added: `min` leaves it out.
+                *u = u.min(skin);
+            }
+        }
+    }
+
+    /// Blurs like the sensor's coating and lens: twice a binomial of five pixels along each axis (σ = 1.4 px).
+    fn soften(&mut self) {
+        let n = self.size[0];
+        if n < 5 {
+            return;
+        }
+        let mut line = vec![0.0; n];
+        for row in self.u.chunks_exact_mut(n) {
+            for _ in 0..2 {
+                line.copy_from_slice(row);
+                blur([0, 1, 2, 3, 4].map(|k| &line[k..n - 4 + k]), &mut row[2..n - 2]);
+            }
+        }
+        let mut from = self.u.clone();
+        for _ in 0..2 {
+            for j in 2..self.size[1].saturating_sub(2) {
+                let rows = [0, 1, 2, 3, 4].map(|k| &from[(j + k - 2) * n..(j + k - 1) * n]);
+                blur(rows, &mut self.u[j * n..(j + 1) * n]);
+            }
+            from.copy_from_slice(&self.u);
         }
     }
 
@@ -100,10 +122,19 @@ impl Window {
         let here = &self.u[row * n..(row + 1) * n];
         let above = &self.u[(row - 1) * n..row * n];
         let below = &self.u[(row + 1) * n..(row + 2) * n];
-        for i in 1..n - 1 {
-            along[i] = half * (here[i + 1] - here[i - 1]);
-            across[i] = half * (below[i] - above[i]);
+        for (slope, (left, right)) in along[1..n - 1].iter_mut().zip(here.iter().zip(&here[2..])) {
+            *slope = half * (right - left);
         }
+        let columns = across.iter_mut().zip(above.iter().zip(below));
+        columns.take(n - 1).skip(1).for_each(|(slope, (up, down))| *slope = half * (down - up));
+    }
+}
+
+/// Binomial mean of five lines.
+fn blur([a, b, c, d, e]: [&[f32]; 5], out: &mut [f32]) {
+    let inner = b.iter().zip(c).zip(d);
+    for (((out, a), ((b, c), d)), e) in out.iter_mut().zip(a).zip(inner).zip(e) {
+        *out = 0.0625 * (a + e + 4.0 * (b + d) + 6.0 * c);
     }
 }
 
