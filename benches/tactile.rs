@@ -59,7 +59,9 @@ fn report(case: &Case, gel: &Gel, optics: &Optics) {
     let mut rgb = vec![0; 320 * 240 * 3];
     let sensing = least(|| drop(black_box(sense(gel, &input, &mut scratch))));
     let picture = least(|| optics.picture(gel, Some(&field), &mut rgb));
-    let moving = least(|| { black_box(markers(gel, &MarkerModel::Elastic, Some(&field))); });
+    let moving = least(|| {
+        black_box(markers(gel, &MarkerModel::Elastic, Some(&field)));
+    });
     println!("{:<28} {sensing:>9.3} {picture:>9.3} {moving:>11.4}", case.name);
 }
 
