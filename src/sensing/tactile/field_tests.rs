@@ -153,7 +153,7 @@ fn fine() -> Gel {
 fn a_sheared_disc_moves_its_surroundings_as_in_the_reference() {
     let gel = fine();
     let (dragged, u) = disc(&gel, Vec3::new(1.3513814, 0.0, 0.0));
-    assert!((dragged.motion.x / 1e-3 - 1.0).abs() < 0.05, "stiffness: moved {:e}", dragged.motion.x);
+    assert!((dragged.motion.x / 1e-3 - 1.0).abs() < 0.02, "stiffness: moved {:e}", dragged.motion.x);
     for (r, along, across) in
         [(2e-3, 0.585012, 0.34868), (4e-3, 0.225487, 0.059259), (6e-3, 0.123558, 0.013237)]
     {
@@ -166,7 +166,7 @@ fn a_sheared_disc_moves_its_surroundings_as_in_the_reference() {
 fn a_twisted_disc_moves_its_surroundings_as_in_the_reference_and_antisymmetrically() {
     let gel = fine();
     let (dragged, u) = disc(&gel, Vec3::new(0.0, 0.0, 2.6354775e-3));
-    assert!((dragged.motion.z - 1.0).abs() < 0.07, "stiffness: turned {}", dragged.motion.z);
+    assert!((dragged.motion.z - 1.0).abs() < 0.02, "stiffness: turned {}", dragged.motion.z);
     for (r, turn) in [(2e-3, 0.444175), (3e-3, 0.16291), (4e-3, 0.080892), (6e-3, 0.026719)] {
         let found = u(r, 0.0)[1] / 1e-3;
         assert!((found - turn).abs() < 0.05 * 1.5, "r {r}: {found}, reference {turn}");

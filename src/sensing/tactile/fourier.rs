@@ -28,10 +28,10 @@ pub(super) struct Buffers {
     scratch: Vec<Complex32>,
 }
 
-/// The least even length of at least `n` without prime factors above 3: the fast ones.
+/// The least multiple of 4 of at least `n` without prime factors above 5: the fast ones.
 fn fast_length(n: usize) -> usize {
     let smooth = |mut n: usize| {
-        for factor in [2, 3] {
+        for factor in [2, 3, 5] {
             while n.is_multiple_of(factor) {
                 n /= factor;
             }

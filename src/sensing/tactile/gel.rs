@@ -64,8 +64,9 @@ impl Gel {
         let cell = spec.gel.cell;
         let count = |length: f64| 2 * (0.5 * length / cell).ceil() as usize;
         let (columns, rows) = (count(pad.length), count(pad.width));
-        // Two thicknesses away a load moves the surface by less than 1 % of what it does beneath itself.
-        let plane = Plane::new(columns, rows, (2.0 * pad.thickness / cell).ceil() as usize);
+        // Images of a contact disturb each other only across the pad's whole width: there, one and a half thicknesses
+        // away, a load moves the surface by less than 2 % of what it does beneath itself.
+        let plane = Plane::new(columns, rows, (1.5 * pad.thickness / cell).ceil() as usize);
         let layer = Layer {
             shear_modulus: spec.gel.shear_modulus,
             poisson: spec.gel.poisson,

@@ -108,3 +108,51 @@ impl Taxels {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::physics::world::PatchPoint;
+
+    /// Two samples on a flat pad: 20 kPa on 1 mm² at x = 2 mm, 40 kPa on 1 mm² at y = −3 mm; friction drags the body
+    /// along +x with 5 kPa at the first.
+    fn patch() -> (ContactPatch, PadSurface) {
+        let point = |x: f64, y: f64, pressure: f64, shear: f64| PatchPoint {
+            body: 0,
+            face: 0,
+            weights: [0.125; 8],
+            p_p: Vec3::new(x, y, 0.0),
+            area: 1e-6,
+            gap: 0.0,
+            pressure,
+            shear_p: Vec3::new(shear, 0.0, 0.0),
+            slipping: false,
+        };
+        let points = vec![point(2e-3, 0.0, 2e4, 5e3), point(0.0, -3e-3, 4e4, 0.0)];
+        let flat = PadSurface { radius_x: 1e9, radius_y: 1e9, ..PadSurface::default() };
+        (ContactPatch { collider: 0, points }, flat)
+    }
+
+    #[test]
+    fn a_patch_loads_the_gel_against_what_it_does_to_the_body() {
+        let (patch, pad) = patch();
+        let load = PadLoad::of_patch(&patch, &pad);
+        assert!((load.force - Vec3::new(-5e-3, 0.0, -0.06)).norm() < 1e-9, "{load:?}");
+        // r × f: (2 mm, 0) × (−5 mN, 0, −20 mN) and (0, −3 mm) × (0, 0, −40 mN).
+        assert!((load.moment - Vec3::new(1.2e-4, 4e-5, 0.0)).norm() < 1e-11, "{load:?}");
+        assert!((load.normal() - 0.06).abs() < 1e-9);
+    }
+
+    #[test]
+    fn taxels_keep_the_sum_and_the_place_of_a_patch() {
+        let (patch, pad) = patch();
+        let taxels = Taxels::of_patch(&patch, &pad, [25, 20]);
+        assert!((taxels.normal_force() - 0.06).abs() < 1e-12);
+        let area = taxels.size[0] * taxels.size[1];
+        let x = |t: usize| (t as f64 - 12.0) * taxels.size[0];
+        let moment: f64 = taxels.pressure.iter().enumerate().map(|(t, p)| p * area * x(t % 25)).sum();
+        assert!((moment - 2e-3 * 0.02).abs() < 1e-9, "{moment}");
+        let shear: f64 = taxels.shear.iter().map(|s| s[0] * area).sum();
+        assert!((shear + 5e-3).abs() < 1e-12, "{shear}");
+    }
+}

@@ -57,7 +57,7 @@ pub(super) fn press(gel: &Gel, gap: &[f32], force: f64, scratch: &mut Scratch) -
             down -= f64::from(residual[c] * direction[c]);
             curvature += f64::from((moved[c] - level) * direction[c]);
         }
-        if !(curvature > 0.0) {
+        if curvature <= 0.0 || curvature.is_nan() {
             break;
         }
         let step = (down / curvature) as f32;

@@ -58,7 +58,7 @@ impl Relief {
         let half = [0.5 * (self.columns - 1) as f64, 0.5 * (self.rows - 1) as f64];
         let [a, b, c] = corners.map(|p| [p.x / self.cell + half[0], p.y / self.cell + half[1], p.z]);
         let area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
-        if !(area < 0.0) || !area.is_finite() {
+        if area >= 0.0 || !area.is_finite() {
             return;
         }
         let Some((low_x, high_x)) = span(self.columns, [a[0], b[0], c[0]]) else { return };
