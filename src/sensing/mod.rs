@@ -1,3 +1,4 @@
-//! What sensors see: pure functions of a state and a scene.
+//! What the robot senses: pure functions of a state and a scene; made only when someone looks.
 
 pub mod camera;
+pub mod tactile;

@@ -1,0 +1,247 @@
+//! The gel field against an independent axisymmetric finite-element solution of the same layer (sphere of 4 mm on a flat
+//! 4 mm layer, ν 0.475, μ 0.145 MPa; shear and twist of a stuck disc of 1.5 mm), and against the rules it must keep.
+
+use super::{
+    FieldError, Gel, GelField, PadInput, PadLoad, Scratch, Surface, TactileSpec, Taxels,
+    gel::Kernels,
+    sense,
+    shear::{self, Dragged},
+};
+use crate::{geometry::Vec3, robot::PadSurface};
+
+/// Radius of the sphere, m.
+const SPHERE: f64 = 4e-3;
+
+fn flat() -> PadSurface {
+    PadSurface { radius_x: 1e6, radius_y: 1e6, ..PadSurface::default() }
+}
+
+fn gel(pad: PadSurface) -> Gel {
+    Gel::new(&TactileSpec::default(), pad).expect("default numbers")
+}
+
+/// The graph z = f(x, y), looking down at the pad, as triangles of edge `step` over a square of half width `half`.
+pub(super) fn graph(half: f64, step: f64, f: impl Fn(f64, f64) -> f64) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    let n = (2.0 * half / step).ceil() as u32;
+    let at = |i: u32| -half + 2.0 * half * f64::from(i) / f64::from(n);
+    let vertices = (0..=n).flat_map(|j| (0..=n).map(move |i| (at(i), at(j))));
+    let vertices = vertices.map(|(x, y)| Vec3::new(x, y, f(x, y))).collect();
+    let corner = |i: u32, j: u32| j * (n + 1) + i;
+    let cells = (0..n).flat_map(|j| (0..n).map(move |i| (i, j)));
+    let triangles = cells
+        .flat_map(|(i, j)| {
+            let [a, b, c, d] = [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
+            [[a, c, b], [a, d, c]]
+        })
+        .collect();
+    (vertices, triangles)
+}
+
+fn sphere(at: [f64; 2]) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    graph(12e-3, 1e-4, |x, y| {
+        let r2 = (x - at[0]).powi(2) + (y - at[1]).powi(2);
+        r2 / (2.0 * SPHERE)
+    })
+}
+
+pub(super) fn touch(gel: &Gel, skin: &(Vec<Vec3>, Vec<[u32; 3]>), load: PadLoad) -> GelField {
+    let surfaces = [Surface { vertices: &skin.0, triangles: &skin.1 }];
+    let input = PadInput { load, surfaces: &surfaces, friction: 1.5, give: None };
+    sense(gel, &input, &mut Scratch::default()).expect("a good touch").expect("a force")
+}
+
+/// (force N, depth m, radius m of the outward peak, its size m) of the reference.
+const PRESSES: [(f64, f64, f64); 4] =
+    [(0.056109, 1e-4, 1.827e-6), (0.250, 2.5e-4, 7.9e-6), (0.81625, 5e-4, 2.5267e-5), (2.82, 1e-3, 8.1e-5)];
+
+#[test]
+fn a_pressed_sphere_goes_as_deep_as_the_reference_wherever_it_lies_on_the_grid() {
+    let gel = gel(flat());
+    for at in [[0.0, 0.0], [2e-4, 2e-4], [1e-4, 0.5e-4], [2e-4, 0.0]] {
+        let skin = sphere(at);
+        for (force, depth, _) in PRESSES {
+            let field = touch(&gel, &skin, PadLoad::new(force, [0.0; 2], 0.0, [0.0; 2]));
+            let limit = if depth < 2e-4 { 0.05 } else { 0.10 };
+            let error = field.push / depth - 1.0;
+            assert!(
+                error.abs() < limit,
+                "{force} N at {at:?}: {} mm, {:+.1} %",
+                1e3 * field.push,
+                100.0 * error
+            );
+        }
+    }
+}
+
+#[test]
+fn the_surface_moves_outwards_around_a_press_as_in_the_reference() {
+    let gel = gel(flat());
+    let skin = sphere([0.0; 2]);
+    for (force, _, peak) in PRESSES {
+        let field = touch(&gel, &skin, PadLoad::new(force, [0.0; 2], 0.0, [0.0; 2]));
+        let ring = |r: f64| {
+            let directions = 16;
+            let mean = |i: i32| {
+                let phi = std::f64::consts::TAU * f64::from(i) / f64::from(directions);
+                let u = field.at(&gel, r * phi.cos(), r * phi.sin());
+                u[0] * phi.cos() + u[1] * phi.sin()
+            };
+            (0..directions).map(mean).sum::<f64>() / f64::from(directions)
+        };
+        let most = (8..40).map(|i| ring(f64::from(i) * 2e-4)).fold(f64::MIN, f64::max);
+        assert!((most / peak - 1.0).abs() < 0.10, "{force} N: {most:e}, reference {peak:e}");
+        if (force - 0.81625).abs() < 1e-9 {
+            for (r, u) in [
+                (2e-3, 1.1979e-5),
+                (3e-3, 2.1946e-5),
+                (4e-3, 2.5176e-5),
+                (6e-3, 2.1524e-5),
+                (8e-3, 1.4997e-5),
+            ] {
+                assert!((ring(r) - u).abs() < 0.10 * peak, "r {r}: {:e}, reference {u:e}", ring(r));
+            }
+        }
+    }
+}
+
+#[test]
+fn the_surface_bulges_around_a_press_as_in_the_reference() {
+    let gel = gel(flat());
+    let field = touch(&gel, &sphere([0.0; 2]), PadLoad::new(0.81625, [0.0; 2], 0.0, [0.0; 2]));
+    for (r, u) in
+        [(0.0, -0.5e-3), (1e-3, -0.373e-3), (2e-3, -0.084e-3), (3e-3, -0.01244e-3), (5e-3, 0.01029e-3)]
+    {
+        let found = field.at(&gel, r, 0.0)[2];
+        assert!((found - u).abs() < 0.05 * 0.5e-3, "r {r}: {found:e}, reference {u:e}");
+    }
+}
+
+/// A disc of radius 1.5 mm, stuck, moved by `load` (N, N, N m).
+fn disc(gel: &Gel, load: Vec3) -> (Dragged, impl Fn(f64, f64) -> [f64; 2]) {
+    let inside = |c: usize| {
+        let [x, y] = gel.centre(c);
+        x.hypot(y) < 1.5e-3
+    };
+    let pressure: Vec<f32> = (0..gel.columns * gel.rows).map(|c| if inside(c) { 1e5 } else { 0.0 }).collect();
+    let mut scratch = Scratch::default();
+    scratch.fit(gel);
+    let dragged = shear::drag(gel, &pressure, &load, 1e6, &mut scratch);
+    let none = vec![0.0; pressure.len()];
+    let u = super::field::displace(gel, &none, &dragged.traction, &mut scratch);
+    let (columns, rows, cell) = (gel.columns, gel.rows, gel.cell);
+    let at = move |x: f64, y: f64| {
+        let (i, wx) = super::field::taps(x / cell + 0.5 * (columns - 1) as f64);
+        let (j, wy) = super::field::taps(y / cell + 0.5 * (rows - 1) as f64);
+        [0, 1].map(|d| {
+            let row = |b: usize| {
+                let from = (j + b as isize) as usize * columns + i as usize;
+                (0..4).map(|a| wx[a] * f64::from(u[d][from + a])).sum::<f64>()
+            };
+            (0..4).map(|b| wy[b] * row(b)).sum()
+        })
+    };
+    (dragged, at)
+}
+
+fn fine() -> Gel {
+    let mut spec = TactileSpec::default();
+    spec.gel.cell = 1e-4;
+    Gel::new(&spec, flat()).expect("good numbers")
+}
+
+#[test]
+fn a_sheared_disc_moves_its_surroundings_as_in_the_reference() {
+    let gel = fine();
+    let (dragged, u) = disc(&gel, Vec3::new(1.3513814, 0.0, 0.0));
+    assert!((dragged.motion.x / 1e-3 - 1.0).abs() < 0.05, "stiffness: moved {:e}", dragged.motion.x);
+    for (r, along, across) in
+        [(2e-3, 0.585012, 0.34868), (4e-3, 0.225487, 0.059259), (6e-3, 0.123558, 0.013237)]
+    {
+        assert!((u(r, 0.0)[0] / 1e-3 - along).abs() < 0.03, "along, r {r}: {:e}", u(r, 0.0)[0]);
+        assert!((u(0.0, r)[0] / 1e-3 - across).abs() < 0.03, "across, r {r}: {:e}", u(0.0, r)[0]);
+    }
+}
+
+#[test]
+fn a_twisted_disc_moves_its_surroundings_as_in_the_reference_and_antisymmetrically() {
+    let gel = fine();
+    let (dragged, u) = disc(&gel, Vec3::new(0.0, 0.0, 2.6354775e-3));
+    assert!((dragged.motion.z - 1.0).abs() < 0.07, "stiffness: turned {}", dragged.motion.z);
+    for (r, turn) in [(2e-3, 0.444175), (3e-3, 0.16291), (4e-3, 0.080892), (6e-3, 0.026719)] {
+        let found = u(r, 0.0)[1] / 1e-3;
+        assert!((found - turn).abs() < 0.05 * 1.5, "r {r}: {found}, reference {turn}");
+        let opposite = u(-r, 0.0)[1] / 1e-3;
+        assert!((found + opposite).abs() < 1e-4, "r {r}: {found} and {opposite}");
+    }
+}
+
+#[test]
+fn the_tractions_sum_up_to_the_solvers_load_within_friction() {
+    let gel = gel(PadSurface::default());
+    let ridges = graph(12e-3, 2e-4, |x, y| 3e-4 * (1.0 - (x * 2000.0).cos()) + 0.01 * x + y * y / 0.2);
+    for (normal, shear, twist) in
+        [(2.0, [0.0, 0.0], 0.0), (0.3, [0.3, -0.2], 4e-4), (12.0, [-3.0, 8.0], -2e-2)]
+    {
+        let load = PadLoad::new(normal, shear, twist, [0.0; 2]);
+        let field = touch(&gel, &ridges, load);
+        let found = PadLoad::of_field(&gel, &field);
+        assert!((found.force - load.force).norm() < 1e-9 * normal, "{found:?} {load:?}");
+        assert!((found.moment.z - load.moment.z).abs() < 1e-12, "{found:?} {load:?}");
+        for c in 0..field.pressure.len() {
+            let size = field.shear[0][c].hypot(field.shear[1][c]);
+            let bound = 1.5 * field.friction_excess * field.pressure[c];
+            assert!(field.pressure[c] >= 0.0 && size <= 1.06 * bound + 1.0, "cell {c}: {size} {bound}");
+        }
+        let taxels = Taxels::of_field(&gel, &field, [12, 10]);
+        assert!((taxels.normal_force() - normal).abs() < 1e-9 * normal);
+    }
+}
+
+#[test]
+fn ridges_stand_out_in_the_touched_surface() {
+    let gel = gel(PadSurface::default());
+    let ridges = graph(12e-3, 1e-4, |x, _| 2e-4 * (1.0 - (x * std::f64::consts::TAU / 3e-3).cos()));
+    let field = touch(&gel, &ridges, PadLoad::new(3.0, [0.0; 2], 0.0, [0.0; 2]));
+    let (crest, valley) = (field.at(&gel, 0.0, 0.0)[2], field.at(&gel, 1.5e-3, 0.0)[2]);
+    assert!(valley - crest > 5e-5, "crest {crest:e}, valley {valley:e}");
+}
+
+#[test]
+fn the_field_is_the_same_bytes_whatever_the_scratch_was_used_for() {
+    let gel = gel(PadSurface::default());
+    let skin = sphere([1e-3, -5e-4]);
+    let surfaces = [Surface { vertices: &skin.0, triangles: &skin.1 }];
+    let input = |f| PadInput {
+        load: PadLoad::new(f, [0.1 * f, 0.0], 0.0, [0.0; 2]),
+        surfaces: &surfaces,
+        friction: 1.5,
+        give: None,
+    };
+    let mut used = Scratch::default();
+    sense(&gel, &input(3.0), &mut used).expect("good");
+    let again = sense(&gel, &input(1.0), &mut used).expect("good").expect("touch");
+    let fresh = sense(&gel, &input(1.0), &mut Scratch::default()).expect("good").expect("touch");
+    assert_eq!((again.pressure, again.displacement), (fresh.pressure, fresh.displacement));
+}
+
+#[test]
+fn bad_touches_are_named_and_no_force_is_no_touch() {
+    let gel = gel(PadSurface::default());
+    let run = |load, friction| {
+        sense(&gel, &PadInput { load, surfaces: &[], friction, give: None }, &mut Scratch::default())
+    };
+    assert!(run(PadLoad::default(), 1.5).expect("no force").is_none());
+    let pressed = PadLoad::new(1.0, [0.0; 2], 0.0, [0.0; 2]);
+    let error = run(pressed, 1.5).expect_err("no skin");
+    assert_eq!(error, FieldError::NothingThere { force: 1.0, surfaces: 0 });
+    assert!(run(PadLoad::new(f64::NAN, [0.0; 2], 0.0, [0.0; 2]), 1.5).is_err());
+    let message = run(pressed, 0.0).expect_err("no friction").to_string();
+    assert_eq!(message, "the pad's friction is 0; expected a finite number above 0");
+}
+
+#[test]
+fn kernels_are_finite() {
+    let Kernels { normal, inline, coupling, .. } = &gel(PadSurface::default()).kernels;
+    let all = [normal].into_iter().chain(inline).chain(coupling);
+    assert!(all.flatten().all(|value| value.is_finite()) && normal.iter().all(|&n| n > 0.0));
+}

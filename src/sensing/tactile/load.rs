@@ -1,0 +1,110 @@
+//! Force and pressure as the solver knows them: the truth behind the pictures, for evaluators.
+
+use super::{field::GelField, gel::Gel};
+use crate::{geometry::Vec3, physics::world::ContactPatch, robot::PadSurface};
+
+/// Force and moment on a gel about the apex, pad frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct PadLoad {
+    /// Force on the gel, N; a pressing body makes z negative.
+    pub force: Vec3,
+    /// Moment on the gel about the apex, N m.
+    pub moment: Vec3,
+}
+
+impl PadLoad {
+    /// A load of a normal force and a shear force (N) at (x, y) (m), and a twist about the normal there (N m).
+    pub fn new(normal: f64, shear: [f64; 2], twist: f64, at: [f64; 2]) -> Self {
+        let force = Vec3::new(shear[0], shear[1], -normal);
+        let arm = Vec3::new(at[0], at[1], 0.0);
+        Self { force, moment: arm.cross(&force) + Vec3::new(0.0, 0.0, twist) }
+    }
+
+    /// What the samples of a patch in the pad's frame do to the gel.
+    pub fn of_patch(patch: &ContactPatch, pad: &PadSurface) -> Self {
+        patch.points.iter().fold(Self::default(), |sum, point| {
+            let normal_p = pad.contact(&point.p_p, 1.0).normal_p;
+            let force = -(normal_p * point.pressure + point.shear_p) * point.area;
+            Self { force: sum.force + force, moment: sum.moment + point.p_p.cross(&force) }
+        })
+    }
+
+    /// The sum of the tractions of a field, taken at the apex plane.
+    pub fn of_field(gel: &Gel, field: &GelField) -> Self {
+        let area = gel.cell * gel.cell;
+        field.pressure.iter().enumerate().filter(|(_, p)| **p > 0.0).fold(Self::default(), |sum, (c, &p)| {
+            let [x, y] = gel.centre(c);
+            let force = Vec3::new(field.shear[0][c], field.shear[1][c], -p) * area;
+            let moment = Vec3::new(x, y, 0.0).cross(&force);
+            Self { force: sum.force + force, moment: sum.moment + moment }
+        })
+    }
+
+    /// The pressing force, N; positive when pressed.
+    pub fn normal(&self) -> f64 {
+        -self.force.z
+    }
+}
+
+/// Pressure and shear on a grid of taxels over the pad, rows from −y, each from −x.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Taxels {
+    /// Taxels along x and y.
+    pub shape: [usize; 2],
+    /// Edges of a taxel along x and y, m.
+    pub size: [f64; 2],
+    /// Pressure on the gel, Pa.
+    pub pressure: Vec<f64>,
+    /// Shear on the gel along x and y, Pa.
+    pub shear: Vec<[f64; 2]>,
+}
+
+impl Taxels {
+    /// `shape` taxels over `pad`, untouched; at least one along each axis.
+    fn over(pad: &PadSurface, shape: [usize; 2]) -> Self {
+        let shape = shape.map(|n| n.max(1));
+        let size = [pad.length / shape[0] as f64, pad.width / shape[1] as f64];
+        let count = shape[0] * shape[1];
+        Self { shape, size, pressure: vec![0.0; count], shear: vec![[0.0; 2]; count] }
+    }
+
+    /// The solver's samples, each shared among the four taxels around it.
+    pub fn of_patch(patch: &ContactPatch, pad: &PadSurface, shape: [usize; 2]) -> Self {
+        let mut taxels = Self::over(pad, shape);
+        for point in &patch.points {
+            let shear = [-point.shear_p.x, -point.shear_p.y];
+            taxels.add([point.p_p.x, point.p_p.y], point.area, point.pressure, shear);
+        }
+        taxels
+    }
+
+    /// The field's cells, each shared among the four taxels around it.
+    pub fn of_field(gel: &Gel, field: &GelField, shape: [usize; 2]) -> Self {
+        let mut taxels = Self::over(&gel.pad, shape);
+        for (c, &p) in field.pressure.iter().enumerate().filter(|(_, p)| **p > 0.0) {
+            taxels.add(gel.centre(c), gel.cell * gel.cell, p, [field.shear[0][c], field.shear[1][c]]);
+        }
+        taxels
+    }
+
+    /// Sum of the pressure, N.
+    pub fn normal_force(&self) -> f64 {
+        self.pressure.iter().sum::<f64>() * self.size[0] * self.size[1]
+    }
+
+    fn add(&mut self, at: [f64; 2], area: f64, pressure: f64, shear: [f64; 2]) {
+        let share = area / (self.size[0] * self.size[1]);
+        let [x, y] = [0, 1].map(|a| {
+            let last = (self.shape[a] - 1) as f64;
+            (at[a] / self.size[a] + 0.5 * last).clamp(0.0, last)
+        });
+        for (i, wx) in [(x.floor(), 1.0 - x.fract()), (x.ceil(), x.fract())] {
+            for (j, wy) in [(y.floor(), 1.0 - y.fract()), (y.ceil(), y.fract())] {
+                let taxel = j as usize * self.shape[0] + i as usize;
+                let weight = share * wx * wy;
+                self.pressure[taxel] += weight * pressure;
+                self.shear[taxel] = [0, 1].map(|a| self.shear[taxel][a] + weight * shear[a]);
+            }
+        }
+    }
+}

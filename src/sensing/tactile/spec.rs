@@ -1,0 +1,170 @@
+//! The numbers of a tactile sensor, in one place.
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+/// Width and height of a tactile picture, px.
+pub const PICTURE: [usize; 2] = [320, 240];
+
+/// A tactile sensor.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TactileSpec {
+    /// The gel's material and the grid on which it is solved.
+    pub gel: GelSpec,
+    /// Which part of the pad the camera sees.
+    pub view: View,
+    /// How the picture is made.
+    pub optics: OpticsModel,
+    /// How the markers move.
+    pub markers: MarkerModel,
+}
+
+/// The gel's material and grid. Its shape is [`crate::robot::PadSurface`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct GelSpec {
+    /// Shear modulus, Pa. 0.145 MPa: twice the C10 identified on a GelSight Mini (Helmut et al., arXiv 2411.03315).
+    pub shear_modulus: f64,
+    /// Poisson's ratio.
+    pub poisson: f64,
+    /// Edge of a grid cell, m.
+    pub cell: f64,
+}
+
+impl Default for GelSpec {
+    fn default() -> Self {
+        Self { shear_modulus: 1.45e5, poisson: 0.475, cell: 4e-4 }
+    }
+}
+
+/// The sensor's camera: a pinhole behind the gel's apex that looks out along the pad's +z; image x is the pad's x,
+/// image y (down) the pad's y. See `docs/tactile.md`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct View {
+    /// Edge of a pixel on the plane of the apex, m. 0.0634 mm at 320×240 (GelSight's own figure).
+    pub pitch: f64,
+    /// Distance of the pinhole behind the apex, m.
+    pub lens: f64,
+}
+
+impl Default for View {
+    fn default() -> Self {
+        Self { pitch: 6.34e-5, lens: 2.6e-2 }
+    }
+}
+
+/// How the tactile picture is made.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "model", rename_all = "snake_case", deny_unknown_fields)]
+pub enum OpticsModel {
+    /// A smooth polynomial of the surface's slope and place, fitted to a real GelSight Mini.
+    #[default]
+    Polynomial,
+    /// The pipeline of Taxim (Si & Yuan, RA-L 2022) with the tables of a folder.
+    Taxim {
+        /// Folder with `polycalib.npz`, `gelmap.npy` and `dataPack.npz`.
+        tables: PathBuf,
+    },
+}
+
+/// How the markers move.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "model", rename_all = "snake_case", deny_unknown_fields)]
+pub enum MarkerModel {
+    /// With the gel's surface, seen through the sensor's pinhole.
+    #[default]
+    Elastic,
+    /// By the law of FOTS (Zhao et al., arXiv 2404.19217).
+    Fots(FotsSpec),
+}
+
+/// The constants of FOTS's marker law.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FotsSpec {
+    /// Decay of the dilation, 1/px².
+    pub dilate: f64,
+    /// Decay of the shear, 1/px².
+    pub shear: f64,
+    /// Decay of the twist, 1/px².
+    pub twist: f64,
+    /// Pixels a millimetre.
+    pub scale: f64,
+    /// Factor on the heights, mm: 1 in FOTS, 0.1 in the port that SoftVTBench uses.
+    pub height_factor: f64,
+}
+
+impl Default for FotsSpec {
+    fn default() -> Self {
+        Self { dilate: 0.00125, shear: 0.00021, twist: 0.00038, scale: 19.58, height_factor: 0.1 }
+    }
+}
+
+/// A number of a tactile sensor out of its range.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("tactile.{field}: expected {expected}, got {value}")]
+pub struct TactileSpecError {
+    /// Path of the field.
+    pub field: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// What it may be.
+    pub expected: &'static str,
+}
+
+impl TactileSpec {
+    /// Checks that every number is in its range.
+    ///
+    /// # Errors
+    /// Names the first field that is not, its value and the range.
+    pub fn validate(&self) -> Result<(), TactileSpecError> {
+        let (gel, view) = (&self.gel, &self.view);
+        let between = |field, value: f64, low: f64, high: f64, expected| {
+            if (low..=high).contains(&value) {
+                Ok(())
+            } else {
+                Err(TactileSpecError { field, value, expected })
+            }
+        };
+        between("gel.shear_modulus", gel.shear_modulus, 1e2, 1e9, "Pa in 1e2..1e9")?;
+        between("gel.poisson", gel.poisson, 0.0, 0.499, "0..0.499")?;
+        between("gel.cell", gel.cell, 1e-4, 5e-4, "m in 0.0001..0.0005")?;
+        between("view.pitch", view.pitch, 1e-5, 2e-4, "m in 1e-5..2e-4")?;
+        between("view.lens", view.lens, 5e-3, 1.0, "m in 0.005..1")?;
+        if let MarkerModel::Fots(fots) = &self.markers {
+            between("markers.dilate", fots.dilate, 0.0, 1.0, "1/px² in 0..1")?;
+            between("markers.shear", fots.shear, 0.0, 1.0, "1/px² in 0..1")?;
+            between("markers.twist", fots.twist, 0.0, 1.0, "1/px² in 0..1")?;
+            between("markers.scale", fots.scale, 1.0, 1000.0, "px/mm in 1..1000")?;
+            between("markers.height_factor", fots.height_factor, 0.0, 100.0, "0..100")?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn defaults_are_valid_and_bad_numbers_are_named() {
+        TactileSpec::default().validate().expect("defaults");
+        let mut spec = TactileSpec::default();
+        spec.view.pitch = f64::NAN;
+        let message = spec.validate().expect_err("NaN").to_string();
+        assert_eq!(message, "tactile.view.pitch: expected m in 1e-5..2e-4, got NaN");
+    }
+
+    #[test]
+    fn models_are_chosen_by_name() {
+        let text = r#"{ "optics": { "model": "taxim", "tables": "x" }, "markers": { "model": "fots", "scale": 15.77 } }"#;
+        let spec: TactileSpec = serde_json::from_str(text).expect("valid");
+        assert_eq!(spec.optics, OpticsModel::Taxim { tables: "x".into() });
+        assert_eq!(spec.markers, MarkerModel::Fots(FotsSpec { scale: 15.77, ..FotsSpec::default() }));
+        let unknown = serde_json::from_str::<TactileSpec>(r#"{ "optics": { "model": "photon" } }"#);
+        assert!(unknown.expect_err("unknown model").to_string().contains("photon"));
+    }
+}
