@@ -11,7 +11,8 @@ const TILE: usize = 16;
 const TILES: usize = EDGE / TILE;
 /// A surface is in the shadow of what is higher by more than this, m.
 const BIAS: f32 = 2.5e-3;
-/// Step of the search for what casts the shadow, texels.
+/// Step of the search for what casts the shadow, texels; two of them reach as far as the widest filter, so that there is
+/// no seam where the search finds all dark or nothing.
 const SEARCH: f32 = 6.0;
 /// Widest filter, texels to each side.
 const WIDEST: f32 = 12.0;
@@ -114,8 +115,8 @@ impl ShadowMap {
         let slope = [-n.dot(&self.axes[0]) / steep, -n.dot(&self.axes[1]) / steep];
         let limit = |dx: f32, dy: f32| place[2] + BIAS + (slope[0] * dx + slope[1] * dy).max(0.0);
         let (mut above, mut count) = (0.0, 0);
-        for j in -1..=1 {
-            for i in -1..=1 {
+        for j in -2..=2 {
+            for i in -2..=2 {
                 let (dx, dy) = (i as f32 * SEARCH, j as f32 * SEARCH);
                 let height = self.height(place[0] + dx, place[1] + dy);
                 if height > limit(dx, dy) {
@@ -128,7 +129,7 @@ impl ShadowMap {
             return 1.0;
         }
         // Dark all around: well inside of the shadow.
-        if count == 9 {
+        if count == 25 {
             return 0.0;
         }
         let radius = (above / count as f32 * self.tangent * self.texels_per_metre).clamp(1.2, WIDEST);
