@@ -37,24 +37,41 @@ pub struct ContactPatch {
     pub points: Vec<PatchPoint>,
 }
 
-/// One touching sample.
+/// What presses on a collider at one point.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Presser {
+    /// A sample of a soft body.
+    Soft {
+        /// Index of the body.
+        body: usize,
+        /// Sample group (face or element) of that body.
+        face: usize,
+        /// Weights of the group's nodes.
+        weights: [f64; 8],
+    },
+    /// Another collider: of a rigid body, a link or the world.
+    Solid {
+        /// Its index.
+        collider: usize,
+    },
+}
+
+/// One touching point: a sample of a soft body, or of the gel that a hard one presses on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PatchPoint {
-    /// Soft body it belongs to.
-    pub body: usize,
-    /// Sample group (face or element) of that body.
-    pub face: usize,
-    /// Weights of the group's nodes.
-    pub weights: [f64; 8],
+    /// What presses there.
+    pub by: Presser,
     /// Position in the collider's frame, m.
     pub p_p: Vec3,
     /// Area it stands for, m², as far as the collider covers it.
     pub area: f64,
     /// Gap, m; negative is overlap.
     pub gap: f64,
+    /// Unit normal out of the collider, in its frame.
+    pub normal_p: Vec3,
     /// Normal traction, Pa.
     pub pressure: f64,
-    /// Shear traction on the body in the collider's frame, Pa.
+    /// Shear traction on what presses, in the collider's frame, Pa.
     pub shear_p: Vec3,
     /// Whether friction is at its bound.
     pub slipping: bool,
@@ -102,29 +119,51 @@ impl World {
 
     /// What touched a collider in the last step.
     pub fn patch(&self, collider: usize) -> ContactPatch {
-        let dt = self.params.dt;
         let partner = Partner::Collider(collider).id();
-        let rows = self.rows.iter().zip(&self.problem.points);
-        let points = rows
+        let (soft, solid) = self.problem.points.split_at(self.rows.len().min(self.problem.points.len()));
+        let rows = self.rows.iter().zip(soft);
+        let mut points: Vec<PatchPoint> = rows
             .filter(|(row, point)| row.partner == partner && point.normal_impulse > 0.0)
             .map(|(row, point)| {
-                let pose = &self.moving[collider].pose;
                 let rest = &self.soft[row.soft].body.rest;
                 let area = rest.samples[row.candidate.sample].surface.area * row.candidate.coverage;
-                PatchPoint {
-                    body: row.soft,
-                    face: row.candidate.group,
-                    weights: point.weights_a,
-                    p_p: pose.inverse_transform_point(&row.candidate.p.into()).coords,
-                    area,
-                    gap: point.gap,
-                    pressure: point.normal_impulse / dt / area,
-                    shear_p: pose.rotation.inverse_transform_vector(&point.shear_impulse) / dt / area,
-                    slipping: point.slipping,
-                }
+                let (body, face, weights) = (row.soft, row.candidate.group, point.weights_a);
+                self.patch_point(collider, Presser::Soft { body, face, weights }, (point, 1.0), area)
             })
             .collect();
+        for ((a, b), _, point) in self.rigid_contacts.points(solid) {
+            let (other, sign) = match collider {
+                own if own == a => (b, -1.0),
+                own if own == b => (a, 1.0),
+                _ => continue,
+            };
+            let layer = self.colliders[a].layer.in_series(&self.colliders[b].layer);
+            let by = Presser::Solid { collider: other };
+            points.push(self.patch_point(collider, by, (point, sign), point.stiffness / layer.normal));
+        }
         ContactPatch { collider, points }
+    }
+
+    /// A solved point as the collider's patch tells it; `sign` is 1 if its impulse is that on what presses.
+    fn patch_point(
+        &self,
+        collider: usize,
+        by: Presser,
+        (point, sign): (&Point, f64),
+        area: f64,
+    ) -> PatchPoint {
+        let pose = &self.moving[collider].pose;
+        let share = self.params.dt * area;
+        PatchPoint {
+            by,
+            p_p: pose.inverse_transform_point(&point.p.into()).coords,
+            area,
+            gap: point.gap,
+            normal_p: pose.rotation.inverse_transform_vector(&point.normal) * sign,
+            pressure: point.normal_impulse / share,
+            shear_p: pose.rotation.inverse_transform_vector(&point.shear_impulse) * (sign / share),
+            slipping: point.slipping,
+        }
     }
 
     /// What `collider` did to soft body `soft` in the last step in which the body was awake.

@@ -25,7 +25,7 @@ use crate::{
     },
 };
 
-pub use frame::{ContactPatch, Frame, Movable, PatchPoint, Touch};
+pub use frame::{ContactPatch, Frame, Movable, PatchPoint, Presser, Touch};
 
 /// A soft body in the world.
 #[derive(Debug)]

@@ -68,6 +68,12 @@ impl World {
         moving.linear.norm() + moving.angular.norm() > least
     }
 
+    /// Whether a body that touches a collider must stay awake. What a driven link holds does so even if it is still: the
+    /// link needs its force at every step, and so does the sensor on it.
+    fn keeps_awake(&self, id: usize) -> bool {
+        matches!(self.colliders[id].mover, Mover::Link { .. }) || self.stirs(id)
+    }
+
     /// Whether a soft body moves fast enough to wake others.
     fn is_lively(&self, soft: usize) -> bool {
         let soft = &self.soft[soft];
@@ -119,7 +125,7 @@ impl World {
             };
             company.0 = true;
             company.1 |= match partner {
-                Partner::Collider(id) => self.stirs(id),
+                Partner::Collider(id) => self.keeps_awake(id),
                 Partner::Soft(other) => self.is_lively(other),
             };
         }
@@ -130,7 +136,7 @@ impl World {
     fn company_of_rigid(&self, index: usize) -> (bool, bool) {
         let mut company = (false, false);
         for id in self.touching(index) {
-            company = (true, company.1 || self.stirs(id));
+            company = (true, company.1 || self.keeps_awake(id));
         }
         for row in &self.rows {
             let Partner::Collider(id) = Partner::of(row.partner) else { continue };

@@ -20,11 +20,10 @@ impl PadLoad {
         Self { force, moment: arm.cross(&force) + Vec3::new(0.0, 0.0, twist) }
     }
 
-    /// What the samples of a patch in the pad's frame do to the gel.
-    pub fn of_patch(patch: &ContactPatch, pad: &PadSurface) -> Self {
+    /// What the points of a pad's patch do to its gel.
+    pub fn of_patch(patch: &ContactPatch) -> Self {
         patch.points.iter().fold(Self::default(), |sum, point| {
-            let normal_p = pad.contact(&point.p_p, 1.0).normal_p;
-            let force = -(normal_p * point.pressure + point.shear_p) * point.area;
+            let force = -(point.normal_p * point.pressure + point.shear_p) * point.area;
             Self { force: sum.force + force, moment: sum.moment + point.p_p.cross(&force) }
         })
     }
@@ -112,18 +111,17 @@ impl Taxels {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::world::PatchPoint;
+    use crate::physics::world::{PatchPoint, Presser};
 
     /// Two samples on a flat pad: 20 kPa on 1 mm² at x = 2 mm, 40 kPa on 1 mm² at y = −3 mm; friction drags the body
     /// along +x with 5 kPa at the first.
     fn patch() -> (ContactPatch, PadSurface) {
         let point = |x: f64, y: f64, pressure: f64, shear: f64| PatchPoint {
-            body: 0,
-            face: 0,
-            weights: [0.125; 8],
+            by: Presser::Soft { body: 0, face: 0, weights: [0.125; 8] },
             p_p: Vec3::new(x, y, 0.0),
             area: 1e-6,
             gap: 0.0,
+            normal_p: Vec3::z(),
             pressure,
             shear_p: Vec3::new(shear, 0.0, 0.0),
             slipping: false,
@@ -135,8 +133,8 @@ mod tests {
 
     #[test]
     fn a_patch_loads_the_gel_against_what_it_does_to_the_body() {
-        let (patch, pad) = patch();
-        let load = PadLoad::of_patch(&patch, &pad);
+        let (patch, _) = patch();
+        let load = PadLoad::of_patch(&patch);
         assert!((load.force - Vec3::new(-5e-3, 0.0, -0.06)).norm() < 1e-9, "{load:?}");
         // r × f: (2 mm, 0) × (−5 mN, 0, −20 mN) and (0, −3 mm) × (0, 0, −40 mN).
         assert!((load.moment - Vec3::new(1.2e-4, 4e-5, 0.0)).norm() < 1e-11, "{load:?}");
