@@ -1,9 +1,9 @@
-//! The numbers of the mechanics, the robot and the judge that a suite or a run may change.
+//! The numbers of the mechanics, the robot, the judge and the sensors that a suite or a run may change.
 
 use serde::{Deserialize, Serialize};
 
 use super::control::check_dt;
-use crate::{evaluation::rules::Rules, physics::Params, robot::RobotSpec};
+use crate::{evaluation::rules::Rules, physics::Params, robot::RobotSpec, sensing::tactile::TactileSpec};
 
 /// All settings of a run. The default is the benchmark.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -15,6 +15,8 @@ pub struct Settings {
     pub robot: RobotSpec,
     /// The judge's thresholds.
     pub rules: Rules,
+    /// The tactile sensors.
+    pub tactile: TactileSpec,
 }
 
 impl Settings {
@@ -63,6 +65,7 @@ impl Settings {
     pub fn check(&self) -> Result<(), String> {
         self.robot.validate().map_err(|e| e.to_string())?;
         self.rules.check().map_err(|e| e.to_string())?;
+        self.tactile.validate().map_err(|e| e.to_string())?;
         self.physics.check()?;
         check_dt(self.physics.dt)
     }

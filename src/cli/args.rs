@@ -35,6 +35,8 @@ pub enum Command {
         /// The folder.
         dir: PathBuf,
     },
+    /// Draw one episode.
+    View(View),
     /// Check the installation.
     Doctor,
     /// Help or version was shown.
@@ -64,10 +66,34 @@ pub struct Run {
     pub set: Vec<(String, String)>,
     /// Whether to write a trace, and whether with node positions.
     pub trace: Option<bool>,
+    /// Which rollouts to draw.
+    pub video: Option<Video>,
     /// Where to write.
     pub out: Option<PathBuf>,
     /// Print JSON instead of tables.
     pub json: bool,
+}
+
+/// Which rollouts of a run become videos.
+#[derive(Debug, PartialEq, Eq)]
+pub enum Video {
+    /// Those that are not safe.
+    Failed,
+    /// All.
+    All,
+    /// These episodes of each task.
+    Episodes(Vec<u32>),
+}
+
+/// Which episode to draw, and how.
+#[derive(Debug)]
+pub struct View {
+    /// Suite, policy, seed, shifts, settings and folder as for a run; its `tasks` name one.
+    pub run: Run,
+    /// Episode of the task.
+    pub episode: u32,
+    /// Whether stills are in the cameras' own size.
+    pub native: bool,
 }
 
 /// Reads the command line.
@@ -96,6 +122,7 @@ pub fn parse(words: &[String]) -> Result<Command, Failure> {
         Some(("list", m)) => Ok(Command::List { what: text(m, "what"), json: m.get_flag("json") }),
         Some(("init", m)) => Ok(Command::Init { dir: PathBuf::from(text(m, "dir")) }),
         Some(("doctor", _)) => Ok(Command::Doctor),
+        Some(("view", m)) => view(m, &options).map(Command::View).map_err(named),
         _ => run(&matches, &options).map(Command::Run).map_err(named),
     }
 }
@@ -148,7 +175,9 @@ fn command(options: &[OptionSpec]) -> Result<clap::Command, Failure> {
                 format!("the script declares the option --{long}, which is the runner's own; rename it");
             return Err(Failure::input(message));
         }
-        command = command.arg(script_arg(option, long));
+        command = command
+            .arg(script_arg(option, long.clone()))
+            .mut_subcommand("view", |view| view.arg(script_arg(option, long)));
     }
     Ok(command)
 }
@@ -183,28 +212,37 @@ fn shown(value: &OptionValue) -> String {
     }
 }
 
-fn runner() -> clap::Command {
+fn flag(name: &'static str, help: &'static str) -> Arg {
+    Arg::new(name).long(name).help(help)
+}
+
+fn list(name: &'static str, help: &'static str) -> Arg {
+    flag(name, help).action(ArgAction::Append).value_delimiter(',')
+}
+
+/// A command on a script with what decides how an episode goes.
+fn on_script(command: clap::Command) -> clap::Command {
     let policies = POLICIES.map(|(name, _)| name);
-    let flag = |name: &'static str, help: &'static str| Arg::new(name).long(name).help(help);
-    let list = |name, help| flag(name, help).action(ArgAction::Append).value_delimiter(',');
-    let file =
-        Arg::new("file").value_name("FILE.lua").help("The script whose plan to carry out").required(true);
+    command
+        .arg(Arg::new("file").value_name("FILE.lua").help("The script whose plan to carry out").required(true))
+        .arg(flag("policy", "Who drives").value_name("POLICY").default_value("expert").value_parser(PossibleValuesParser::new(policies)))
+        .arg(flag("seed", "Base seed").value_name("S").default_value("0").allow_hyphen_values(true).value_parser(seed))
+        .arg(list("shift", "Changes of the scene that the suite declares, such as stiffness=0.5").value_name("NAME=VALUE"))
+        .arg(flag("set", "Changes a setting, such as robot.gripper.effort=20").value_name("PATH=VALUE").action(ArgAction::Append))
+}
+
+fn runner() -> clap::Command {
     let json = flag("json", "Print JSON on the standard output: one object for a suite, an array for a list of suites, a line a row for an experiment").action(ArgAction::SetTrue);
-    clap::Command::new("softvt")
-        .version(env!("CARGO_PKG_VERSION"))
-        .about("A safety-aware visuo-tactile manipulation benchmark for soft objects, on an ordinary CPU")
+    let about = "A safety-aware visuo-tactile manipulation benchmark for soft objects, on an ordinary CPU";
+    on_script(clap::Command::new("softvt").version(env!("CARGO_PKG_VERSION")).about(about))
         .after_help("softvt FILE.lua --help shows the options of that script too.\nExit codes: 0 ok, 1 our own fault, 2 your input, 3 policy or transport, 130 interrupted.")
         .subcommand_negates_reqs(true)
         .args_conflicts_with_subcommands(true)
-        .arg(file)
-        .arg(flag("policy", "Who drives").value_name("POLICY").default_value("expert").value_parser(PossibleValuesParser::new(policies)))
         .arg(list("task", "Only these tasks: indices or parts of prompts, joined by commas").value_name("TASK"))
         .arg(flag("episodes", "Episodes a task").value_name("N").value_parser(value_parser!(u32).range(1..)))
-        .arg(flag("seed", "Base seed").value_name("S").default_value("0").allow_hyphen_values(true).value_parser(seed))
         .arg(flag("threads", "Threads; results do not depend on it").value_name("N").value_parser(value_parser!(u16).range(1..=1024)))
-        .arg(list("shift", "Changes of the scene that the suite declares, such as stiffness=0.5").value_name("NAME=VALUE"))
-        .arg(flag("set", "Changes a setting, such as robot.gripper.effort=20").value_name("PATH=VALUE").action(ArgAction::Append))
         .arg(flag("trace", "Writes a record of every control step; =nodes with node positions").num_args(0..=1).require_equals(true).default_missing_value("state").value_parser(["state", "nodes"]))
+        .arg(flag("video", "Draws rollouts: those that are not safe, =all, or episodes such as =0,3").value_name("WHICH").num_args(0..=1).require_equals(true).default_missing_value("failed").value_parser(video))
         .arg(flag("out", "Where to write; a folder without a run in it").value_name("DIR"))
         .arg(json.clone())
         .subcommand(
@@ -218,10 +256,34 @@ fn runner() -> clap::Command {
                 .about("Writes editor stubs for Lua scripts into a folder")
                 .arg(Arg::new("dir").default_value(".")),
         )
+        .subcommand(
+            on_script(clap::Command::new("view").about("Draws one episode: a video and stills of every stream"))
+                .arg(flag("task", "The task: its index or part of its prompt").value_name("TASK").default_value("0"))
+                .arg(flag("episode", "The episode of the task").value_name("N").default_value("0").value_parser(value_parser!(u32)))
+                .arg(flag("native", "Stills in the cameras' own size: 1024 and 512 pixels instead of 224").action(ArgAction::SetTrue))
+                .arg(flag("out", "Where to write").value_name("DIR").required(true)),
+        )
         .subcommand(clap::Command::new("doctor").about("Checks the installation and runs a golden episode"))
 }
 
-fn run(matches: &ArgMatches, options: &[OptionSpec]) -> Result<Run, Failure> {
+fn video(word: &str) -> Result<String, String> {
+    let episodes = || word.split(',').all(|part| part.parse::<u32>().is_ok());
+    if matches!(word, "failed" | "all") || episodes() {
+        Ok(word.to_owned())
+    } else {
+        Err("expected failed, all, or episodes such as 0,3".to_owned())
+    }
+}
+
+fn view(matches: &ArgMatches, options: &[OptionSpec]) -> Result<View, Failure> {
+    let episode = matches.get_one("episode").copied().unwrap_or(0);
+    let run = common(matches, options)?;
+    let tasks = vec![text(matches, "task")];
+    Ok(View { run: Run { tasks, ..run }, episode, native: matches.get_flag("native") })
+}
+
+/// What commands on scripts share.
+fn common(matches: &ArgMatches, options: &[OptionSpec]) -> Result<Run, Failure> {
     let mut script_words = Vec::new();
     for option in options {
         let id = format!("script:{}", option.name);
@@ -229,21 +291,42 @@ fn run(matches: &ArgMatches, options: &[OptionSpec]) -> Result<Run, Failure> {
             script_words.push(format!("{}={}", option.flag(), text(matches, &id)));
         }
     }
-    let available = std::thread::available_parallelism().map_or(1, |n| n.get());
-    let many = |name: &str| matches.get_many::<String>(name).unwrap_or_default().cloned().collect::<Vec<_>>();
     Ok(Run {
         file: PathBuf::from(text(matches, "file")),
         script_words,
         policy: text(matches, "policy"),
-        tasks: many("task"),
-        episodes: matches.get_one("episodes").copied(),
+        tasks: Vec::new(),
+        episodes: None,
         seed: matches.get_one("seed").copied().unwrap_or(0),
-        threads: matches.get_one::<u16>("threads").map_or(available, |n| usize::from(*n)),
-        shifts: many("shift").iter().map(|word| shift(word)).collect::<Result<_, _>>()?,
-        set: many("set").iter().map(|word| pair("--set", word)).collect::<Result<_, _>>()?,
-        trace: matches.get_one::<String>("trace").map(|kind| kind == "nodes"),
+        threads: 1,
+        shifts: many(matches, "shift").iter().map(|word| shift(word)).collect::<Result<_, _>>()?,
+        set: many(matches, "set").iter().map(|word| pair("--set", word)).collect::<Result<_, _>>()?,
+        trace: None,
+        video: None,
         out: matches.get_one::<String>("out").map(PathBuf::from),
+        json: false,
+    })
+}
+
+fn many(matches: &ArgMatches, name: &str) -> Vec<String> {
+    matches.get_many::<String>(name).unwrap_or_default().cloned().collect()
+}
+
+fn run(matches: &ArgMatches, options: &[OptionSpec]) -> Result<Run, Failure> {
+    let available = std::thread::available_parallelism().map_or(1, |n| n.get());
+    let video = matches.get_one::<String>("video").map(|word| match word.as_str() {
+        "failed" => Video::Failed,
+        "all" => Video::All,
+        list => Video::Episodes(list.split(',').filter_map(|part| part.parse().ok()).collect()),
+    });
+    Ok(Run {
+        tasks: many(matches, "task"),
+        episodes: matches.get_one("episodes").copied(),
+        threads: matches.get_one::<u16>("threads").map_or(available, |n| usize::from(*n)),
+        trace: matches.get_one::<String>("trace").map(|kind| kind == "nodes"),
+        video,
         json: matches.get_flag("json"),
+        ..common(matches, options)?
     })
 }
 

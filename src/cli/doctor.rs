@@ -54,6 +54,7 @@ fn golden_run(golden: &Golden) -> Run {
         shifts: Vec::new(),
         set: Vec::new(),
         trace: None,
+        video: None,
         out: None,
         json: false,
     }

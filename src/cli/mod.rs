@@ -1,6 +1,7 @@
 //! The command line: flags, exit codes, progress.
 
 mod args;
+mod batch;
 mod doctor;
 mod evaluate;
 mod experiment;
@@ -8,6 +9,7 @@ mod files;
 mod init;
 mod list;
 mod progress;
+mod view;
 
 use std::{panic, process::ExitCode, thread, time::Duration};
 
@@ -89,6 +91,7 @@ fn carry_out(words: &[String]) -> Result<(), Failure> {
         Command::Run(run) => evaluate::run(&run),
         Command::List { what, json } => list::run(&what, json),
         Command::Init { dir } => init::run(&dir),
+        Command::View(view) => view::run(&view),
         Command::Doctor => doctor::run(),
         Command::Shown => Ok(()),
     }

@@ -1,27 +1,11 @@
 //! What judges and drives a rollout from outside: the policy's view and its answer.
 
 pub mod builtin;
+mod observation;
 
 use crate::geometry::Vec3;
 
-/// What a policy is allowed to see at a control step. Hidden state is not in this type.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Observation {
-    /// Time since the policy took over, s.
-    pub time_s: f64,
-    /// Tool position in the robot base frame, m.
-    pub ee_position_b: Vec3,
-    /// Tool orientation in the base frame as axis-angle, rad.
-    pub ee_axis_angle_b: Vec3,
-    /// Arm joint angles, rad.
-    pub joints: [f64; 7],
-    /// Measured gripper width, m.
-    pub gripper_width_m: f64,
-    /// Closure last commanded, 0..=1.
-    pub closure: f64,
-    /// The instruction.
-    pub prompt: String,
-}
+pub use observation::{CameraPicture, Observation, PadForce, Streams, TouchFrame, TouchHistory};
 
 /// What a policy commands for one control step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,6 +22,10 @@ pub struct Action {
 pub trait Policy: Send {
     /// Its name in results.
     fn name(&self) -> &str;
+    /// What it looks at now; nothing else is computed.
+    fn streams(&self) -> Streams {
+        Streams::default()
+    }
     /// The action for this control step.
     ///
     /// # Errors

@@ -1,6 +1,7 @@
-//! What a run leaves behind: its folder, the results table, envelope plots, and SoftVTBench's files.
+//! What a run leaves behind: its folder, the results table, envelope plots, films, and SoftVTBench's files.
 
 pub mod envelope;
+pub mod film;
 pub mod interchange;
 pub mod run_folder;
 pub mod terminal;

@@ -1,8 +1,11 @@
 //! From a scene to a world: what each object becomes.
 
-use std::sync::{Arc, Mutex};
+use std::{convert::Infallible, sync::Arc};
 
-use super::simulation::{Handle, Kind};
+use super::{
+    made::Made,
+    simulation::{Handle, Kind},
+};
 use crate::{
     geometry::{
         mass::mass_properties,
@@ -52,40 +55,27 @@ pub enum BuildError {
     TwoNames(String),
 }
 
-/// Something made once for each of a few keys, shared between threads.
-type Made<K, V> = Arc<Mutex<Vec<(K, V)>>>;
-
 /// Rest data and bounds of assets, made once and shared by all episodes.
 #[derive(Clone, Debug, Default)]
 pub struct RestCache {
-    made: Made<Arc<Asset>, Arc<Rest>>,
+    rests: Made<Arc<Asset>, Arc<Rest>>,
     bounds: Made<Shape, Aabb>,
 }
 
 impl RestCache {
     /// Bounds of a shape; finding those of a displaced one takes a search.
     fn bounds(&self, shape: &Shape) -> Aabb {
-        let mut known = self.bounds.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-        if let Some((_, bounds)) = known.iter().find(|(known, _)| known == shape) {
-            return *bounds;
-        }
-        let bounds = shape.bounds();
-        known.push((shape.clone(), bounds));
-        bounds
+        let made: Result<_, Infallible> =
+            self.bounds.get(|known| known == shape, || Ok((shape.clone(), shape.bounds())));
+        made.unwrap_or_else(|never| match never {})
     }
 
     /// Rest data of a soft asset.
     fn rest(&self, asset: &Arc<Asset>, material: &SoftMaterial) -> Result<Arc<Rest>, BuildError> {
-        // Held while building, so that two workers never make the same one twice.
-        let mut made = self.made.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-        if let Some((_, rest)) =
-            made.iter().find(|(known, _)| known.shape == asset.shape && known.body == asset.body)
-        {
-            return Ok(rest.clone());
-        }
-        let rest = soft_rest(&asset.name, &asset.shape, material)?;
-        made.push((asset.clone(), rest.clone()));
-        Ok(rest)
+        self.rests.get(
+            |known| known.shape == asset.shape && known.body == asset.body,
+            || Ok((asset.clone(), soft_rest(&asset.name, &asset.shape, material)?)),
+        )
     }
 }
 

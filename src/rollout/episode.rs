@@ -7,6 +7,9 @@ use sha2::{Digest, Sha256};
 use super::{
     build::{BuildError, RestCache},
     evidence::{Witness, lowest},
+    looks::Looks,
+    recent::Recent,
+    senses::{Film, SenseError, Senses},
     simulation::{Handle, Kind, SettleError, Simulation},
     trace::StepTrace,
 };
@@ -22,9 +25,10 @@ use crate::{
     },
     geometry::{Pose, Vec3},
     physics::{Params, world::StepFailure},
-    policy::{Action, Observation, Policy},
+    policy::{Action, Observation, Policy, Streams},
     robot::{RobotSpec, rotation},
     scene::{Region, Scene},
+    sensing::tactile::TactileSpec,
 };
 
 /// What went wrong with whoever drives.
@@ -43,6 +47,10 @@ pub enum ControlError {
 
 /// Whoever drives the robot: a policy behind its observation, or a privileged planner.
 pub trait Controller {
+    /// What it looks at, the same for the whole episode.
+    fn streams(&self) -> Streams {
+        Streams::default()
+    }
     /// The action of this control step; `None` to keep the last one.
     ///
     /// # Errors
@@ -52,6 +60,10 @@ pub trait Controller {
 
 /// A policy sees the observation and nothing else.
 impl<P: Policy + ?Sized> Controller for Box<P> {
+    fn streams(&self) -> Streams {
+        Policy::streams(self.as_ref())
+    }
+
     fn act(&mut self, _sim: &Simulation, observation: &Observation) -> Result<Option<Action>, ControlError> {
         Policy::act(self.as_mut(), observation).map(Some).map_err(ControlError::Policy)
     }
@@ -74,6 +86,10 @@ pub struct EpisodeSpec {
     pub params: Params,
     /// Parameters of the robot.
     pub robot: RobotSpec,
+    /// Parameters of the tactile sensors.
+    pub tactile: TactileSpec,
+    /// Whether to keep what is needed to draw the rollout later.
+    pub film: bool,
     /// Whether to keep a trace, and whether with node positions.
     pub trace: Option<bool>,
 }
@@ -89,6 +105,8 @@ pub struct Finished {
     pub frames: Vec<ScoreFrame>,
     /// Settled shape of a soft target.
     pub reference: Option<Reference>,
+    /// What is needed to draw the rollout, if asked for.
+    pub film: Option<Film>,
 }
 
 /// What another scorer needs to know of a control step.
@@ -130,6 +148,16 @@ pub enum EpisodeError {
         /// Names in the scene.
         have: String,
     },
+    /// Something cannot be sensed.
+    #[error("task {task}, episode {episode}: {source}")]
+    Sense {
+        /// Task index.
+        task: usize,
+        /// Episode index.
+        episode: u32,
+        /// What happened.
+        source: SenseError,
+    },
     /// Whoever drives failed.
     #[error("task {task}, episode {episode}: {source}")]
     Control {
@@ -157,6 +185,8 @@ pub struct Episode {
     min_det_f: f64,
     trace: Vec<StepTrace>,
     frames: Vec<ScoreFrame>,
+    recent: Recent,
+    film: Option<Film>,
 }
 
 impl Episode {
@@ -164,7 +194,7 @@ impl Episode {
     ///
     /// # Errors
     /// The scene cannot be built or does not come to rest, or the goal names nothing in it.
-    pub fn start(spec: EpisodeSpec, cache: &RestCache) -> Result<Self, EpisodeError> {
+    pub fn start(spec: EpisodeSpec, cache: &RestCache, looks: &Looks) -> Result<Self, EpisodeError> {
         let mut sim = Simulation::new(spec.scene.clone(), &spec.params, &spec.robot, cache)?;
         let (object, place, hold_s) = match &spec.task.goal {
             Goal::On { object, target, hold_s } | Goal::In { object, target, hold_s } => {
@@ -206,6 +236,9 @@ impl Episode {
             axis_angle_b: rotation::axis_angle(&tool.rotation),
             closure: 0.0,
         };
+        let senses = || Senses::new(&sim, &spec.tactile, looks);
+        let film = spec.film.then(|| Film { senses: senses(), frames: Vec::new(), d_pct: Vec::new() });
+        let recent = Recent::new(senses());
         Ok(Self {
             spec,
             sim,
@@ -219,6 +252,8 @@ impl Episode {
             min_det_f: f64::INFINITY,
             trace: Vec::new(),
             frames: Vec::new(),
+            recent,
+            film,
         })
     }
 
@@ -228,6 +263,8 @@ impl Episode {
     /// Whoever drives failed.
     pub fn run(mut self, controller: &mut dyn Controller) -> Result<Finished, EpisodeError> {
         let mut action = self.start_hold;
+        let streams = controller.streams();
+        self.remember(&streams, self.witness.reference(self.target).map(|_| 0.0));
         let outcome = loop {
             if self.judge.goal_reached() {
                 break Outcome::Completed;
@@ -235,7 +272,7 @@ impl Episode {
             if self.steps >= self.spec.task.budget_steps {
                 break Outcome::Timeout;
             }
-            let observation = self.observation();
+            let observation = self.observation(&streams)?;
             let wanted =
                 controller.act(&self.sim, &observation).map_err(|source| self.control_error(source))?;
             if let Some(wanted) = wanted {
@@ -245,6 +282,7 @@ impl Episode {
             if let Err(failure) = self.control_step(&action) {
                 break self.invalid(&failure);
             }
+            self.remember(&streams, self.frames.last().and_then(|frame| frame.deformation.as_ref()).map(|d| d.rms_pct));
         };
         Ok(self.finish(outcome))
     }
@@ -254,9 +292,12 @@ impl Episode {
     }
 
     /// What a policy sees now.
-    pub fn observation(&self) -> Observation {
+    ///
+    /// # Errors
+    /// A stream cannot be made.
+    fn observation(&mut self, streams: &Streams) -> Result<Observation, EpisodeError> {
         let tool = self.sim.rig.tool_b(&self.sim.world);
-        Observation {
+        let blind = Observation {
             time_s: self.time(),
             ee_position_b: tool.translation.vector,
             ee_axis_angle_b: rotation::axis_angle(&tool.rotation),
@@ -264,7 +305,28 @@ impl Episode {
             gripper_width_m: self.sim.rig.width(&self.sim.world),
             closure: self.sim.rig.closure(),
             prompt: self.spec.task.prompt.clone(),
+            cameras: Vec::new(),
+            touch: None,
+            forces: None,
+        };
+        self.recent.observe(blind, streams).map_err(|source| EpisodeError::Sense {
+            task: self.spec.task.id,
+            episode: self.spec.identity.episode,
+            source,
+        })
+    }
+
+    /// Keeps what may be looked at later: for the sensors and for the film.
+    fn remember(&mut self, streams: &Streams, d_pct: Option<f64>) {
+        if streams == &Streams::default() && self.film.is_none() {
+            return;
         }
+        let frame = Senses::frame(&self.sim);
+        if let Some(film) = &mut self.film {
+            film.frames.push(frame.clone());
+            film.d_pct.push(d_pct);
+        }
+        self.recent.push(frame);
     }
 
     fn time(&self) -> f64 {
@@ -326,7 +388,7 @@ impl Episode {
         let reference = self.witness.reference(self.target).cloned();
         let verdict = self.judge.finish(&outcome);
         let record = EpisodeRecord { identity: self.spec.identity, outcome, verdict, stats };
-        Finished { record, trace: self.trace, frames: self.frames, reference }
+        Finished { record, trace: self.trace, frames: self.frames, reference, film: self.film }
     }
 }
 

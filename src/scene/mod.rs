@@ -113,4 +113,15 @@ pub struct Scene {
     pub gravity: Vec3,
     /// An object outside of this box has left the workspace.
     pub workspace: Region,
+    /// The light.
+    pub lighting: Lighting,
+    /// The cameras; names are unique. A policy asks for pictures by name.
+    pub cameras: Vec<Camera>,
+}
+
+impl Scene {
+    /// A camera by name.
+    pub fn camera(&self, name: &str) -> Option<&Camera> {
+        self.cameras.iter().find(|camera| camera.name == name)
+    }
 }

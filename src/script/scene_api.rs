@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     geometry::{Pose, Quat, Vec3},
-    scene::{Asset, Body, Friction, Object, Region, Scene, SoftMaterial, Visual},
+    scene::{Asset, Body, Camera, Friction, Lighting, Object, Region, Scene, SoftMaterial, Visual},
 };
 
 const fn field(name: &'static str, ty: Type, doc: &'static str) -> Field {
@@ -50,6 +50,8 @@ pub(super) fn empty_scene() -> Scene {
         start_q: START_Q,
         gravity: Vec3::new(0.0, 0.0, -9.81),
         workspace: Region { min: Vec3::new(-0.5, -0.6, -0.05), max: Vec3::new(0.5, 0.6, 1.0) },
+        lighting: Lighting::default(),
+        cameras: vec![Camera::third_person_table(), Camera::wrist()],
     }
 }
 

@@ -29,7 +29,7 @@ mod tone;
 mod tests;
 
 pub use error::CameraError;
-pub use model::{Model, box_mesh};
+pub use model::{Model, box_mesh, flat_faces};
 pub use picture::Picture;
 pub use render::{Scratch, render};
 pub use stage::{FrameView, Mount, Stage, Thing};

@@ -55,7 +55,7 @@ impl Model {
     /// # Errors
     /// If the shape has no surface or a material id has no visual.
     pub fn of_shape(name: &str, shape: &Shape, visuals: &[Visual]) -> Result<Self, CameraError> {
-        if let Some(mesh) = exact(shape) {
+        if let Some(mesh) = flat_faces(shape) {
             return Self::of_mesh(name, &mesh, &[], visuals);
         }
         let longest = shape.bounds().size().max();
@@ -148,12 +148,12 @@ fn extent(points: &[Vec3]) -> Vec3 {
     points.iter().fold(Vec3::repeat(f64::MIN), |b, p| b.sup(p)) - low
 }
 
-/// The triangles of a box, wherever it is placed; other shapes have curved surfaces.
-fn exact(shape: &Shape) -> Option<Mesh> {
+/// The triangles of a box, wherever it is placed; `None` for other shapes, whose surfaces are curved.
+pub fn flat_faces(shape: &Shape) -> Option<Mesh> {
     match shape {
         Shape::Box { half } => Some(box_mesh(half)),
         Shape::Placed { shape, pose } => {
-            let mut mesh = exact(shape)?;
+            let mut mesh = flat_faces(shape)?;
             mesh.vertices
                 .iter_mut()
                 .for_each(|v| *v = pose * nalgebra::Point3::from(*v) - nalgebra::Point3::origin());

@@ -60,7 +60,7 @@ pub struct Taxels {
 
 impl Taxels {
     /// `shape` taxels over `pad`, untouched; at least one along each axis.
-    fn over(pad: &PadSurface, shape: [usize; 2]) -> Self {
+    pub fn over(pad: &PadSurface, shape: [usize; 2]) -> Self {
         let shape = shape.map(|n| n.max(1));
         let size = [pad.length / shape[0] as f64, pad.width / shape[1] as f64];
         let count = shape[0] * shape[1];

@@ -1,0 +1,393 @@
+//! The episodes of one suite: their limits, their runs, their files.
+
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use serde::Serialize;
+
+use super::{Failure, args::Run, args::Video, code, files, files::Calibrated, progress::Progress};
+use crate::{
+    benchmark::{Suite, Task, seed::Split, settings::Settings},
+    evaluation::{
+        record::{EpisodeRecord, Identity},
+        safety::Limit,
+        summary::Summary,
+        thresholds::Thresholds,
+    },
+    policy::{Policy, builtin},
+    report::{
+        film::{self, Caption, FilmError},
+        interchange::{self, DebugFrame, DebugShape},
+        run_folder::{RUN, RunFolder, RunFolderError, SUMMARY, replace},
+    },
+    rollout::{
+        ControlError, Controller, Episode, EpisodeError, EpisodeSpec, Finished, Looks, RestCache, ScoreFrame,
+        SettleError, batch, stop,
+    },
+    scene::{Asset, Body, Scene},
+    script::{self, ExpertController, Loaded},
+};
+
+/// Everything needed to repeat a run.
+#[derive(Serialize)]
+struct RunInfo<'a> {
+    softvt: &'a str,
+    script: String,
+    suite: &'a str,
+    policy: &'a str,
+    privileged: bool,
+    seed: u64,
+    split: &'a str,
+    tasks: Vec<usize>,
+    episodes: u32,
+    shifts: &'a [(String, f64)],
+    options: BTreeMap<String, String>,
+    settings: &'a Settings,
+    sources: BTreeMap<String, String>,
+    thresholds: BTreeMap<String, Option<f64>>,
+}
+
+/// One suite under way.
+pub(super) struct Batch<'a> {
+    run: &'a Run,
+    loaded: &'a Loaded,
+    suite: &'a Suite,
+    settings: Settings,
+    jobs: Vec<(&'a Task, u32)>,
+    limits: BTreeMap<String, Option<Limit>>,
+    /// The thresholds in use as one file of SoftVTBench's form.
+    released: Thresholds,
+    /// SHA-256 of every file that the results depend on.
+    sources: BTreeMap<String, String>,
+    cache: RestCache,
+    looks: Looks,
+    pub out: PathBuf,
+}
+
+impl<'a> Batch<'a> {
+    /// `jobs` of a suite, to be kept in `out`.
+    ///
+    /// # Errors
+    /// A setting or shift that the suite does not have, or a value out of its range.
+    pub fn new(
+        run: &'a Run,
+        loaded: &'a Loaded,
+        suite: &'a Suite,
+        (jobs, out): (Vec<(&'a Task, u32)>, PathBuf),
+    ) -> Result<Self, Failure> {
+        let wrong = |flag: &str, e: String| Failure::input(format!("{}: {flag}: {e}", run.file.display()));
+        let settings = suite.settings.with_all(&run.set).map_err(|e| wrong("--set", e))?;
+        for (name, value) in &run.shifts {
+            script::check_shift(&suite.shifts, name, *value).map_err(|e| wrong("--shift", e.to_string()))?;
+        }
+        let made_by = format!("softvt {}", env!("CARGO_PKG_VERSION"));
+        Ok(Self {
+            run,
+            loaded,
+            suite,
+            settings,
+            jobs,
+            limits: BTreeMap::new(),
+            released: Thresholds::new(0.5, Vec::new(), made_by),
+            sources: loaded.bundle.hashes(),
+            cache: RestCache::default(),
+            looks: Looks::default(),
+            out,
+        })
+    }
+
+    fn request(&self, task: &Task, episode: u32) -> script::EpisodeRequest {
+        script::EpisodeRequest {
+            suite: self.suite.name.clone(),
+            task: task.id,
+            episode: u64::from(episode),
+            base_seed: self.run.seed,
+            split: Split::Validation,
+            shifts: self.run.shifts.clone(),
+        }
+    }
+
+    /// Thresholds of the targets of all tasks, read before anything runs.
+    ///
+    /// # Errors
+    /// A layout or a threshold file that is wrong.
+    pub fn find_limits(&mut self, tasks: &[&Task]) -> Result<(), Failure> {
+        for task in tasks {
+            let opened =
+                script::Episode::open(self.loaded, &self.request(task, 0)).map_err(Failure::input)?;
+            let Some(asset) = target_asset(&opened.nominal, task) else { continue };
+            if matches!(asset.body, Body::Soft(_)) && !self.limits.contains_key(&asset.name) {
+                let limit = self.find_limit(&asset)?;
+                self.limits.insert(asset.name.clone(), limit);
+            }
+        }
+        Ok(())
+    }
+
+    fn find_limit(&mut self, asset: &Asset) -> Result<Option<Limit>, Failure> {
+        let name = &asset.name;
+        let cure = format!("its episodes cannot count as safe; softvt scripts/calibrate.lua --asset {name}");
+        match files::calibrated(&self.run.file, asset)? {
+            Calibrated::Never => {
+                eprintln!("softvt: {name} is not calibrated (assets/calibration/{name}.json): {cure}")
+            }
+            Calibrated::Another(path) => {
+                eprintln!(
+                    "softvt: {path} is about another {name} (its shape, material or friction differ): {cure}"
+                );
+            }
+            Calibrated::Yes { limit, file, path, text } => {
+                self.sources.insert(path, script::sha256(text.as_bytes()));
+                self.released.merge(*file);
+                return Ok(limit);
+            }
+        }
+        Ok(None)
+    }
+
+    /// The limit of an object as its layout made it in this episode, whatever a shift makes of it then.
+    fn limit_of(&self, asset: &Asset) -> Option<Limit> {
+        let limit = self.limits.get(&asset.name).copied().flatten()?;
+        let known = self.released.fingerprints.get(&asset.name);
+        known.is_none_or(|known| *known == asset.fingerprint()).then_some(limit)
+    }
+
+    /// Writes down what is needed to repeat the run.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write_info(&self, folder: &RunFolder, tasks: &[&Task], episodes: u32) -> Result<(), Failure> {
+        let options =
+            self.loaded.options.iter().map(|o| (o.name.clone(), format!("{:?}", o.value))).collect();
+        let info = RunInfo {
+            softvt: env!("CARGO_PKG_VERSION"),
+            script: self.loaded.main.clone(),
+            suite: &self.suite.name,
+            policy: &self.run.policy,
+            privileged: self.run.policy.starts_with("expert"),
+            seed: self.run.seed,
+            split: Split::Validation.name(),
+            tasks: tasks.iter().map(|t| t.id).collect(),
+            episodes,
+            shifts: &self.run.shifts,
+            options,
+            settings: &self.settings,
+            sources: self.sources.clone(),
+            thresholds: self.limits.iter().map(|(a, l)| (a.clone(), l.map(|l| l.tau_pct()))).collect(),
+        };
+        folder.write_json(RUN, &info).map_err(folder_failure)
+    }
+
+    /// Runs all episodes and sums them up.
+    ///
+    /// # Errors
+    /// A script, policy or file that fails, or an interrupt; finished episodes are kept.
+    pub fn go(&self, mut folder: RunFolder) -> Result<Summary, Failure> {
+        let mut progress = Progress::new(self.jobs.len(), &self.suite.name);
+        let mut records: Vec<EpisodeRecord> = Vec::new();
+        let outcome = batch::run(
+            self.jobs.len(),
+            self.run.threads,
+            &stop::FLAG,
+            |job| {
+                let mut finished = self.episode(job, self.may_show(job))?;
+                self.write_video(&mut finished)?;
+                Ok(finished)
+            },
+            |job, finished| {
+                folder.append(job, &finished.record).map_err(folder_failure)?;
+                self.write_trace(&finished)?;
+                self.write_debug_log(&finished)?;
+                progress.tick(&line(&finished.record));
+                records.push(finished.record);
+                Ok(())
+            },
+        );
+        progress.finish();
+        folder.flush().map_err(folder_failure)?;
+        let kept = format!("{} of {} episodes are in {}", records.len(), self.jobs.len(), self.out.display());
+        if stop::requested() {
+            return Err(Failure::interrupted(format!("interrupted; {kept}")));
+        }
+        if let Err(failure) = outcome {
+            if records.is_empty() {
+                // Nothing would be lost, and the same command must work once the mistake is mended.
+                folder.discard().map_err(folder_failure)?;
+                return Err(failure);
+            }
+            return Err(Failure { message: format!("{}\n{kept}", failure.message), ..failure });
+        }
+        let summary = Summary::of(&self.suite.name, &self.run.policy, &records);
+        folder.write_json(SUMMARY, &summary).map_err(folder_failure)?;
+        records.sort_by_key(|r| (r.identity.task, r.identity.episode));
+        interchange::write_scores(&self.out, &records, &self.released).map_err(folder_failure)?;
+        eprintln!("softvt: {}", self.out.display());
+        Ok(summary)
+    }
+
+    /// Whether a job's rollout may have to be drawn.
+    fn may_show(&self, job: usize) -> bool {
+        match &self.run.video {
+            None => false,
+            Some(Video::Episodes(chosen)) => chosen.contains(&self.jobs[job].1),
+            Some(Video::All | Video::Failed) => true,
+        }
+    }
+
+    /// The video of an episode, if it was asked for.
+    fn write_video(&self, finished: &mut Finished) -> Result<(), Failure> {
+        let (record, Some(mut film)) = (&finished.record, finished.film.take()) else { return Ok(()) };
+        if self.run.video == Some(Video::Failed) && record.verdict.safety {
+            return Ok(());
+        }
+        let id = &record.identity;
+        let path = self.out.join(format!("video/task_{:03}/episode_{:05}.mp4", id.task, id.episode));
+        make_folder(path.parent().unwrap_or(&self.out))?;
+        film::write_video(&mut film, &self.caption(record), &path, stop::requested).map_err(film_failure)
+    }
+
+    /// What is said of an episode beneath its film.
+    pub fn caption(&self, record: &EpisodeRecord) -> Caption {
+        let limit = self.limits.get(&record.identity.asset).copied().flatten();
+        Caption::of(record, limit.map(|limit| limit.tau_pct()))
+    }
+
+    /// Runs one job; with `film` what is needed to draw it is kept.
+    ///
+    /// # Errors
+    /// A script, the scene or whoever drives fails.
+    pub fn episode(&self, job: usize, film: bool) -> Result<Finished, Failure> {
+        let (task, episode) = self.jobs[job];
+        let opened =
+            script::Episode::open(self.loaded, &self.request(task, episode)).map_err(Failure::input)?;
+        let target = target_asset(&opened.nominal, task);
+        let limit = target.as_ref().and_then(|asset| self.limit_of(asset));
+        let soft = target.as_ref().is_some_and(|asset| matches!(asset.body, Body::Soft(_)));
+        let asset = target.map_or(String::new(), |asset| asset.name.clone());
+        let spec = EpisodeSpec {
+            identity: Identity {
+                suite: self.suite.name.clone(),
+                task: task.id,
+                prompt: task.prompt.clone(),
+                layout: task.layout.clone(),
+                episode,
+                seed: self.run.seed,
+                split: Split::Validation.name().to_owned(),
+                policy: self.run.policy.clone(),
+                asset,
+                soft,
+            },
+            task: task.clone(),
+            scene: Arc::new(opened.scene.clone()),
+            limit,
+            rules: self.settings.rules.clone(),
+            params: self.settings.physics.clone(),
+            robot: self.settings.robot.clone(),
+            tactile: self.settings.tactile.clone(),
+            film,
+            trace: self.run.trace,
+        };
+        let driver = self.driver(opened)?;
+        let mut driver = batch::Stoppable { driver, stop: &stop::FLAG };
+        let started = Episode::start(spec, &self.cache, &self.looks).map_err(|e| self.episode_failure(&e))?;
+        started.run(&mut driver).map_err(|e| self.episode_failure(&e))
+    }
+
+    fn driver(&self, opened: script::Episode) -> Result<Box<dyn Controller>, Failure> {
+        let boxed = |policy: Box<dyn Policy>| -> Box<dyn Controller> { Box::new(policy) };
+        match self.run.policy.as_str() {
+            "noop" => Ok(boxed(Box::<builtin::Noop>::default())),
+            "random" => {
+                let mut stream = opened.seed.stream(crate::benchmark::seed::Stream::Script);
+                Ok(boxed(Box::new(builtin::Random::new(rand::RngCore::next_u64(&mut stream)))))
+            }
+            policy => {
+                let expert = opened.expert().map_err(Failure::input)?;
+                let expert = expert.ok_or_else(|| Failure::input("the task has no expert"))?;
+                Ok(Box::new(ExpertController::new(expert, policy == "expert-binary")))
+            }
+        }
+    }
+
+    fn episode_failure(&self, error: &EpisodeError) -> Failure {
+        let code = match error {
+            EpisodeError::Control { source: ControlError::Policy(_), .. } => code::POLICY,
+            EpisodeError::Control { source: ControlError::Interrupted, .. }
+            | EpisodeError::Settle { source: SettleError::Interrupted, .. } => code::INTERRUPTED,
+            _ => code::INPUT,
+        };
+        Failure { code, message: format!("{}: {error}", self.run.file.display()) }
+    }
+
+    /// SoftVTBench's log of every control step, which its own scorer reads.
+    fn write_debug_log(&self, finished: &Finished) -> Result<(), Failure> {
+        let identity = &finished.record.identity;
+        let frame = |(step, frame): (usize, &ScoreFrame)| {
+            let measured = finished.reference.as_ref().zip(frame.deformation.as_ref());
+            let shape = DebugShape::new(&identity.asset, measured);
+            DebugFrame::new(identity, step as u32, frame.success_now, shape)
+        };
+        let frames: Vec<DebugFrame> = finished.frames.iter().enumerate().map(frame).collect();
+        interchange::write_debug_log(&self.out, identity, &frames).map(|_| ()).map_err(folder_failure)
+    }
+
+    fn write_trace(&self, finished: &Finished) -> Result<(), Failure> {
+        if self.run.trace.is_none() {
+            return Ok(());
+        }
+        let id = &finished.record.identity;
+        let dir = self.out.join(format!("trace/task_{:03}", id.task));
+        make_folder(&dir)?;
+        let mut text = String::new();
+        for step in &finished.trace {
+            text += &serde_json::to_string(step).map_err(Failure::input)?;
+            text.push('\n');
+        }
+        replace(&dir.join(format!("episode_{:05}.jsonl", id.episode)), &text).map_err(folder_failure)
+    }
+}
+
+/// Makes a folder and those above it.
+///
+/// # Errors
+/// The system refuses.
+pub(super) fn make_folder(dir: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(dir)
+        .map_err(|e| Failure::input(format!("cannot make the folder {}: {e}", dir.display())))
+}
+
+/// A film that could not be made.
+pub(super) fn film_failure(error: FilmError) -> Failure {
+    match error {
+        FilmError::Interrupted => Failure::interrupted("interrupted"),
+        other => Failure::input(other),
+    }
+}
+
+fn folder_failure(error: RunFolderError) -> Failure {
+    Failure::input(error)
+}
+
+fn target_asset(scene: &Scene, task: &Task) -> Option<Arc<Asset>> {
+    let name = task.goal.object();
+    scene.objects.iter().find(|o| o.name == name).map(|o| o.asset.clone())
+}
+
+/// One episode in one line.
+fn line(record: &EpisodeRecord) -> String {
+    let v = &record.verdict;
+    let d = v.d_peak.map_or(String::new(), |d| format!(", D {d:.2} %"));
+    let outcome = match (record.outcome.is_valid(), v.safety, v.goal) {
+        (false, _, _) => "invalid",
+        (_, true, _) => "safe",
+        (_, false, true) => "goal, not safe",
+        _ => "failed",
+    };
+    format!(
+        "task {} episode {}: {outcome}{d}, {:.1} s",
+        record.identity.task, record.identity.episode, record.stats.time_s
+    )
+}

@@ -1,0 +1,59 @@
+//! `softvt view`: one episode as a video and stills.
+
+use super::{
+    Failure,
+    args::View,
+    batch::{Batch, film_failure, make_folder},
+    evaluate::chosen,
+    print,
+};
+use crate::{
+    benchmark::Plan,
+    report::film::{write_stills, write_video},
+    rollout::stop,
+    script,
+};
+
+/// Runs one episode and writes `episode.mp4` and the stills of its first, worst and last states into the folder; files of
+/// the same name are replaced.
+///
+/// # Errors
+/// The script is no suite, the task or episode fails, a stream cannot be made or a file not written.
+pub fn run(view: &View) -> Result<(), Failure> {
+    let run = &view.run;
+    let loaded = script::load(&run.file, &run.script_words).map_err(Failure::input)?;
+    let Plan::Suite(suite) = &loaded.plan else {
+        let message = format!(
+            "{}: softvt view draws an episode of a suite, and this is none; name a file that returns softvt.suite",
+            run.file.display()
+        );
+        return Err(Failure::input(message));
+    };
+    let tasks = chosen(run, suite)?;
+    let [task] = tasks[..] else {
+        let fits: Vec<String> = tasks.iter().map(|task| task.id.to_string()).collect();
+        let message = format!(
+            "{}: --task {:?} fits the tasks {}; name one by its index",
+            run.file.display(),
+            run.tasks[0],
+            fits.join(", ")
+        );
+        return Err(Failure::input(message));
+    };
+    let dir = run.out.clone().unwrap_or_default();
+    make_folder(&dir)?;
+    let mut batch = Batch::new(run, &loaded, suite, (vec![(task, view.episode)], dir.clone()))?;
+    batch.find_limits(&[task])?;
+    let finished = batch.episode(0, true)?;
+    let caption = batch.caption(&finished.record);
+    let Some(mut film) = finished.film else { return Ok(()) };
+    let worst = (0..film.frames.len())
+        .max_by(|&a, &b| film.d_pct[a].unwrap_or(0.0).total_cmp(&film.d_pct[b].unwrap_or(0.0)).then(b.cmp(&a)));
+    let moments = [("start", 0), ("worst", worst.unwrap_or(0)), ("end", film.frames.len().saturating_sub(1))];
+    let mut written = write_stills(&mut film, &moments, view.native, &dir).map_err(film_failure)?;
+    let video = dir.join("episode.mp4");
+    write_video(&mut film, &caption, &video, stop::requested).map_err(film_failure)?;
+    written.push(video);
+    written.iter().for_each(|path| print(&format!("{}\n", path.display())));
+    Ok(())
+}

@@ -1,0 +1,116 @@
+//! What a policy may see: the only type that reaches it. Hidden state (poses and shapes of objects, deformation, drops,
+//! thresholds) has no field here.
+
+use std::sync::Arc;
+
+use image::RgbImage;
+
+use crate::{
+    geometry::Vec3,
+    sensing::tactile::{HISTORY, MARKERS, Markers, MosaicLayout, PadLoad, Taxels, mosaic},
+};
+
+/// The streams that somebody looks at; others are never computed.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Streams {
+    /// Cameras of the scene, by name.
+    pub cameras: Vec<String>,
+    /// The tactile sensors.
+    pub touch: bool,
+    /// True forces at the pads. No real sensor gives them: results of whoever asks are marked `force_observed`.
+    pub force: bool,
+}
+
+/// What a policy sees at a control step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Observation {
+    /// Time since the policy took over, s.
+    pub time_s: f64,
+    /// Tool position in the robot base frame, m.
+    pub ee_position_b: Vec3,
+    /// Tool orientation in the base frame as axis-angle, rad.
+    pub ee_axis_angle_b: Vec3,
+    /// Arm joint angles, rad.
+    pub joints: [f64; 7],
+    /// Measured gripper width, m: 0 to 0.08 between the apexes of the gels.
+    pub gripper_width_m: f64,
+    /// Closure last commanded, 0 (open) ..= 1 (shut).
+    pub closure: f64,
+    /// The instruction.
+    pub prompt: String,
+    /// Pictures of the cameras asked for, in the order of [`Streams::cameras`].
+    pub cameras: Vec<CameraPicture>,
+    /// What the fingers felt, if asked for.
+    pub touch: Option<TouchHistory>,
+    /// True forces at the left and right pad, if asked for.
+    pub forces: Option<[PadForce; 2]>,
+}
+
+/// A camera's picture: rows from the top, RGB, 8 bits a channel, sRGB.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CameraPicture {
+    /// Name of the camera.
+    pub name: String,
+    /// The picture; its size is the camera's, 224 × 224 unless the scene says otherwise.
+    pub picture: RgbImage,
+}
+
+/// One finger's sensor at one control step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TouchFrame {
+    /// The colour picture, 320 × 240; `docs/tactile.md` draws its frame.
+    pub picture: RgbImage,
+    /// Initial and present places of the 11 × 9 markers, row by row, (x, y) px: the shape (2, 99, 2).
+    pub markers: Markers,
+}
+
+/// The last control steps of both fingers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TouchHistory {
+    /// Left and right finger, oldest first; 1 to 8 frames.
+    pub frames: Vec<Arc<[TouchFrame; 2]>>,
+}
+
+/// True force on one gel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PadForce {
+    /// Force (N) and moment about the apex (N m) on the gel, pad frame.
+    pub load: PadLoad,
+    /// Pressure and shear maps, Pa.
+    pub taxels: Taxels,
+}
+
+impl Observation {
+    /// A camera's picture by name.
+    pub fn camera(&self, name: &str) -> Option<&RgbImage> {
+        self.cameras.iter().find(|camera| camera.name == name).map(|camera| &camera.picture)
+    }
+}
+
+impl TouchHistory {
+    /// Left and right finger now.
+    pub fn now(&self) -> Option<&[TouchFrame; 2]> {
+        self.frames.last().map(AsRef::as_ref)
+    }
+
+    /// The 4 × 4 mosaic of both fingers' pictures, 224 × 224.
+    pub fn mosaic(&self, layout: MosaicLayout) -> RgbImage {
+        let [left, right] =
+            [0, 1].map(|side| self.frames.iter().map(|frame| &frame[side].picture).collect::<Vec<_>>());
+        mosaic([&left, &right], layout)
+    }
+
+    /// The shape (1 + 8, 198, 2) of SoftVTBench's policies: initial places of the left and right markers, then the
+    /// present ones of the last 8 control steps, oldest first; a short history starts with its oldest frame.
+    pub fn marker_motion(&self) -> Vec<[[f32; 2]; 2 * MARKERS]> {
+        let row = |frame: &[TouchFrame; 2], when: usize| -> [[f32; 2]; 2 * MARKERS] {
+            std::array::from_fn(|m| frame[m / MARKERS].markers[when][m % MARKERS])
+        };
+        let Some(first) = self.frames.first() else { return Vec::new() };
+        let last = (0..HISTORY).filter_map(|place| {
+            let frame = self.frames.get((place + self.frames.len()).saturating_sub(HISTORY))?;
+            Some(row(frame, 1))
+        });
+        std::iter::once(row(first, 0)).chain(last).collect()
+    }
+}

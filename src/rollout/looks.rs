@@ -1,0 +1,71 @@
+//! How things look and feel to the sensors: drawn models, fine skins, the tactile sensor. Made when somebody first looks.
+
+use std::sync::Arc;
+
+use super::{made::Made, senses::SenseError};
+use crate::{
+    geometry::voxel::VoxelMesh,
+    scene::Asset,
+    sensing::{
+        camera::{CameraError, Model},
+        tactile::{Sensor, Skin, TactileSpec},
+    },
+};
+
+/// Shared by all episodes of a run.
+#[derive(Clone, Debug, Default)]
+pub struct Looks {
+    models: Made<Arc<Asset>, Arc<Model>>,
+    skins: Made<Arc<Asset>, Arc<Skin>>,
+    sensors: Made<TactileSpec, Arc<Sensor>>,
+}
+
+impl Looks {
+    /// The drawn form of an asset; `mesh` is that of its soft body.
+    pub(super) fn model(
+        &self,
+        name: &str,
+        asset: &Arc<Asset>,
+        mesh: Option<&VoxelMesh>,
+    ) -> Result<Arc<Model>, CameraError> {
+        let same = |known: &Arc<Asset>| alike(known, asset) && known.visuals == asset.visuals;
+        self.models.get(same, || {
+            let model = Model::of_shape(name, &asset.shape, &asset.visuals)?;
+            let model = match mesh {
+                Some(mesh) => model.embedded(name, mesh)?,
+                None => model,
+            };
+            Ok((asset.clone(), Arc::new(model)))
+        })
+    }
+
+    /// The skin of an asset that presses on gels.
+    pub(super) fn skin(
+        &self,
+        name: &str,
+        asset: &Arc<Asset>,
+        mesh: Option<&VoxelMesh>,
+    ) -> Result<Arc<Skin>, SenseError> {
+        self.skins.get(
+            |known| alike(known, asset),
+            || {
+                let skin = Skin::of_shape(&asset.shape);
+                let skin = match mesh {
+                    Some(mesh) => skin.embedded(mesh).ok_or_else(|| SenseError::Skin(name.to_owned()))?,
+                    None => skin,
+                };
+                Ok((asset.clone(), Arc::new(skin)))
+            },
+        )
+    }
+
+    /// The tactile sensor of these numbers.
+    pub(super) fn sensor(&self, spec: &TactileSpec) -> Result<Arc<Sensor>, SenseError> {
+        self.sensors.get(|known| known == spec, || Ok((spec.clone(), Arc::new(Sensor::new(spec)?))))
+    }
+}
+
+/// Whether two assets have one surface, at rest and moved.
+fn alike(a: &Asset, b: &Asset) -> bool {
+    a.shape == b.shape && a.body == b.body
+}

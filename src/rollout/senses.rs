@@ -1,0 +1,277 @@
+//! What the robot senses in a simulation: pictures, touch and forces, each a pure function of a [`Frame`], computed when
+//! somebody looks, then or later.
+
+use std::sync::Arc;
+
+use image::RgbImage;
+
+use super::{
+    looks::Looks,
+    simulation::{Kind, Simulation},
+};
+use crate::{
+    geometry::{Pose, Vec3},
+    physics::{
+        contact::ColliderId,
+        fem::Rest,
+        world::{ContactPatch, Frame, Presser},
+    },
+    policy::{CameraPicture, PadForce, TouchFrame},
+    robot::{RobotSpec, Side, pads, panda},
+    scene::{Asset, Body, Camera, Scene},
+    sensing::{
+        camera::{self, CameraError, FrameView, Mount, Picture, Stage, Thing, render},
+        tactile::{
+            self, FieldError, Give, PadInput, PadLoad, Sensor, SensorError, Skin, Surface, TactileSpec,
+            Taxels, Touched,
+        },
+    },
+};
+
+/// Why something cannot be sensed.
+#[derive(Debug, thiserror::Error)]
+pub enum SenseError {
+    /// A picture cannot be drawn.
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+    /// The tactile sensor cannot be made.
+    #[error(transparent)]
+    Sensor(#[from] SensorError),
+    /// A touch cannot be worked out.
+    #[error(transparent)]
+    Field(#[from] FieldError),
+    /// There is no such camera.
+    #[error("there is no camera {name:?}; the scene has {have}")]
+    NoCamera {
+        /// The name.
+        name: String,
+        /// Names of those there are.
+        have: String,
+    },
+    /// A soft body and its skin do not belong together.
+    #[error("{0}: its surface lies outside of its voxel mesh; build both from one shape")]
+    Skin(String),
+}
+
+/// An object of the scene as the sensors know it.
+#[derive(Debug)]
+struct Part {
+    name: String,
+    asset: Arc<Asset>,
+    kind: Kind,
+    start_w: Pose,
+    colliders: Vec<ColliderId>,
+    rest: Option<Arc<Rest>>,
+}
+
+/// The sensors of one simulation.
+#[derive(Debug)]
+pub struct Senses {
+    scene: Arc<Scene>,
+    spec: TactileSpec,
+    robot: RobotSpec,
+    tree: usize,
+    parts: Vec<Part>,
+    looks: Looks,
+    stage: Option<Stage>,
+    eye: camera::Scratch,
+    touch: tactile::Scratch,
+}
+
+/// Taxels along x and y of the force maps: squares of a millimetre.
+const TAXELS: [usize; 2] = [25, 21];
+/// Number of the robot in segmentations; objects count from 1 in the order of the scene.
+pub const ROBOT: u16 = 1000;
+/// Static things longer than this are grounds, whose own shadow nobody sees, m.
+const GROUND: f64 = 1.0;
+
+impl Senses {
+    /// The sensors of `sim`; nothing is computed yet.
+    pub fn new(sim: &Simulation, spec: &TactileSpec, looks: &Looks) -> Self {
+        let part = |object: &super::Handle| Part {
+            name: object.name.clone(),
+            asset: object.asset.clone(),
+            kind: object.kind,
+            start_w: object.start_w,
+            colliders: object.colliders.clone(),
+            rest: match object.kind {
+                Kind::Soft(body) => Some(sim.world.soft[body].body.rest.clone()),
+                _ => None,
+            },
+        };
+        Self {
+            scene: sim.scene.clone(),
+            spec: spec.clone(),
+            robot: sim.rig.spec.clone(),
+            tree: sim.rig.tree,
+            parts: sim.objects.iter().map(part).collect(),
+            looks: looks.clone(),
+            stage: None,
+            eye: camera::Scratch::default(),
+            touch: tactile::Scratch::default(),
+        }
+    }
+
+    /// All that the sensors need of the present state.
+    pub fn frame(sim: &Simulation) -> Frame {
+        sim.world.snapshot(&sim.rig.pads)
+    }
+
+    /// The scene's camera of a name.
+    ///
+    /// # Errors
+    /// There is none.
+    pub fn camera(&self, name: &str) -> Result<&Camera, SenseError> {
+        self.scene.camera(name).ok_or_else(|| SenseError::NoCamera {
+            name: name.to_owned(),
+            have: self.scene.cameras.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(", "),
+        })
+    }
+
+    /// The scene's cameras.
+    pub fn cameras(&self) -> &[Camera] {
+        &self.scene.cameras
+    }
+
+    /// What `camera` sees.
+    ///
+    /// # Errors
+    /// A number of the camera or light out of range, a camera inside of a thing, a thing that cannot be drawn.
+    pub fn see(&mut self, frame: &Frame, camera: &Camera) -> Result<Picture, SenseError> {
+        let stage = match self.stage.take() {
+            Some(stage) => stage,
+            None => Stage::new(self.things()?, self.scene.lighting.clone())?,
+        };
+        let hand_w = frame.links[self.tree][panda::HAND_LINK] * panda::hand_in_link();
+        let picture = render(&stage, &FrameView::of(frame, Some(hand_w)), camera, &mut self.eye);
+        self.stage = Some(stage);
+        Ok(picture?)
+    }
+
+    /// The picture of the scene's camera of a name, for a policy.
+    ///
+    /// # Errors
+    /// As [`Senses::see`], or there is no such camera.
+    pub fn picture(&mut self, frame: &Frame, name: &str) -> Result<CameraPicture, SenseError> {
+        let camera = self.camera(name)?.clone();
+        let Picture { width, height, rgb, .. } = self.see(frame, &camera)?;
+        let picture = RgbImage::from_raw(width as u32, height as u32, rgb).unwrap_or_default();
+        Ok(CameraPicture { name: camera.name, picture })
+    }
+
+    /// What the left and right finger feel.
+    ///
+    /// # Errors
+    /// The sensor cannot be made, or a number of the state is none.
+    pub fn touch(&mut self, frame: &Frame) -> Result<[Touched; 2], SenseError> {
+        let sensor = self.looks.sensor(&self.spec)?;
+        let left = self.finger(frame, Side::Left, &sensor)?;
+        Ok([left, self.finger(frame, Side::Right, &sensor)?])
+    }
+
+    /// The same as a policy gets it.
+    ///
+    /// # Errors
+    /// As [`Senses::touch`].
+    pub fn touch_frame(&mut self, frame: &Frame) -> Result<[TouchFrame; 2], SenseError> {
+        let both = self.touch(frame)?;
+        Ok(both.map(|touched| TouchFrame { picture: touched.picture, markers: touched.markers }))
+    }
+
+    /// True forces on the left and right gel.
+    pub fn forces(frame: &Frame) -> [PadForce; 2] {
+        let pad = pads::PadSurface::default();
+        [0, 1].map(|side| match frame.patches.get(side) {
+            Some(patch) => {
+                PadForce { load: PadLoad::of_patch(patch), taxels: Taxels::of_patch(patch, &pad, TAXELS) }
+            }
+            None => PadForce { load: PadLoad::default(), taxels: Taxels::over(&pad, TAXELS) },
+        })
+    }
+
+    fn finger(&mut self, frame: &Frame, side: Side, sensor: &Sensor) -> Result<Touched, SenseError> {
+        let index = usize::from(side == Side::Right);
+        let none = ContactPatch { collider: 0, points: Vec::new() };
+        let patch = frame.patches.get(index).unwrap_or(&none);
+        let pad_w = frame.links[self.tree][panda::finger_link(side)] * pads::pad_pose_in_finger(side);
+        let mut placed: Vec<(Arc<Skin>, Vec<Vec3>)> = Vec::new();
+        let mut give = None;
+        for part in self.parts.iter().filter(|part| part.presses(patch)) {
+            let mesh = part.rest.as_ref().map(|rest| &rest.mesh);
+            let skin = self.looks.skin(&part.name, &part.asset, mesh)?;
+            let mut vertices = Vec::new();
+            let w_p = pad_w.inverse();
+            match part.kind {
+                Kind::Soft(body) => skin.soft(&frame.nodes[body], &w_p, &mut vertices),
+                Kind::Rigid(body) => skin.rigid(&(w_p * frame.rigid[body]), &mut vertices),
+                Kind::Static => skin.rigid(&(w_p * part.start_w), &mut vertices),
+            }
+            placed.push((skin, vertices));
+            give = part.give();
+        }
+        let surfaces: Vec<Surface> = placed
+            .iter()
+            .map(|(skin, vertices)| Surface { vertices, triangles: skin.triangles() })
+            .collect();
+        let input = PadInput {
+            load: PadLoad::of_patch(patch),
+            surfaces: &surfaces,
+            friction: self.robot.pads.static_mu,
+            give: if placed.len() == 1 { give } else { None },
+        };
+        Ok(sensor.see(&input, &mut self.touch)?)
+    }
+
+    /// Everything that is drawn.
+    fn things(&self) -> Result<Vec<Thing>, CameraError> {
+        let draw = |(index, part): (usize, &Part)| {
+            let mesh = part.rest.as_ref().map(|rest| &rest.mesh);
+            let mount = match part.kind {
+                Kind::Soft(body) => Mount::Soft(body),
+                Kind::Rigid(body) => Mount::Rigid(body),
+                Kind::Static => Mount::Fixed(part.start_w),
+            };
+            Ok(Thing {
+                name: part.name.clone(),
+                object: index as u16 + 1,
+                model: self.looks.model(&part.name, &part.asset, mesh)?,
+                mount,
+                casts_shadow: !part.is_ground(),
+            })
+        };
+        self.parts.iter().enumerate().map(draw).collect()
+    }
+}
+
+impl Part {
+    /// Whether any point of a patch is its own.
+    fn presses(&self, patch: &ContactPatch) -> bool {
+        patch.points.iter().any(|point| match (&point.by, self.kind) {
+            (Presser::Soft { body, .. }, Kind::Soft(own)) => *body == own,
+            (Presser::Solid { collider }, _) => self.colliders.contains(collider),
+            _ => false,
+        })
+    }
+
+    /// How its surface gives way to a gel in ridges too fine for its elements.
+    fn give(&self) -> Option<Give> {
+        let (Body::Soft(material), Some(rest)) = (&self.asset.body, &self.rest) else { return None };
+        let modulus = material.youngs_pa / (1.0 - material.poisson * material.poisson);
+        Some(Give { modulus, resolved: 2.0 * rest.mesh.edge })
+    }
+
+    fn is_ground(&self) -> bool {
+        matches!(self.kind, Kind::Static) && self.asset.shape.bounds().size().max() > GROUND
+    }
+}
+
+/// All that was to be seen of a rollout, to be drawn later.
+#[derive(Debug)]
+pub struct Film {
+    /// The sensors.
+    pub senses: Senses,
+    /// The settled state and the state after each control step.
+    pub frames: Vec<Frame>,
+    /// The target's deformation in each frame, % of the diagonal; `None` for a rigid one.
+    pub d_pct: Vec<Option<f64>>,
+}

@@ -1,0 +1,79 @@
+//! The tactile history of both fingers in one picture, as SoftVTBench's policies take it.
+
+use std::borrow::Borrow;
+
+use image::{
+    RgbImage,
+    imageops::{self, FilterType},
+};
+use serde::{Deserialize, Serialize};
+
+/// Frames of history a finger.
+pub const CELLS: usize = 8;
+/// Cells along an edge, and pixels along the edge of a cell.
+const EDGE: usize = 4;
+const CELL: u32 = 56;
+
+/// Where the fingers' frames go, oldest first.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MosaicLayout {
+    /// Left finger in the upper two rows, right finger in the lower two (the soft suites).
+    #[default]
+    Rows,
+    /// Left finger in the left two columns, right finger in the right two (the rigid suites).
+    Columns,
+}
+
+/// 4 × 4 cells of 56 × 56: the last 8 frames of the left and of the right finger. `history` is oldest first, left and
+/// right; a shorter one is filled up in front with its oldest frame; an empty one leaves the picture black.
+pub fn mosaic<T: Borrow<RgbImage>>(history: [&[T]; 2], layout: MosaicLayout) -> RgbImage {
+    let mut picture = RgbImage::new(EDGE as u32 * CELL, EDGE as u32 * CELL);
+    for (finger, frames) in history.into_iter().enumerate() {
+        for place in 0..CELLS {
+            let Some(frame) = frames.get((place + frames.len()).saturating_sub(CELLS)) else { continue };
+            let (column, row) = match layout {
+                MosaicLayout::Rows => (place % EDGE, 2 * finger + place / EDGE),
+                MosaicLayout::Columns => (2 * finger + place % 2, place / 2),
+            };
+            let small = imageops::resize(frame.borrow(), CELL, CELL, FilterType::Triangle);
+            imageops::replace(&mut picture, &small, i64::from(CELL) * column as i64, i64::from(CELL) * row as i64);
+        }
+    }
+    picture
+}
+
+#[cfg(test)]
+mod tests {
+    use image::Rgb;
+
+    use super::*;
+
+    fn frames(from: u8, count: u8) -> Vec<RgbImage> {
+        (0..count).map(|i| RgbImage::from_pixel(320, 240, Rgb([from + i, 0, 0]))).collect()
+    }
+
+    fn cell(picture: &RgbImage, column: u32, row: u32) -> u8 {
+        picture.get_pixel(56 * column + 20, 56 * row + 30)[0]
+    }
+
+    #[test]
+    fn the_left_finger_is_above_and_time_runs_to_the_right() {
+        let (left, right) = (frames(10, 8), frames(50, 8));
+        let picture = mosaic([&left, &right], MosaicLayout::Rows);
+        assert_eq!(picture.dimensions(), (224, 224));
+        assert_eq!([cell(&picture, 0, 0), cell(&picture, 3, 0), cell(&picture, 0, 1)], [10, 13, 14]);
+        assert_eq!([cell(&picture, 0, 2), cell(&picture, 3, 3)], [50, 57]);
+        let picture = mosaic([&left, &right], MosaicLayout::Columns);
+        assert_eq!([cell(&picture, 1, 0), cell(&picture, 0, 1), cell(&picture, 2, 0)], [11, 12, 50]);
+    }
+
+    #[test]
+    fn a_short_history_starts_with_its_oldest_frame_and_a_long_one_keeps_its_last() {
+        let (short, long) = (frames(10, 3), frames(50, 20));
+        let picture = mosaic([&short, &long], MosaicLayout::Rows);
+        let upper: Vec<u8> = (0..8).map(|i| cell(&picture, i % 4, i / 4)).collect();
+        assert_eq!(upper, [10, 10, 10, 10, 10, 10, 11, 12]);
+        assert_eq!([cell(&picture, 0, 2), cell(&picture, 3, 3)], [62, 69]);
+    }
+}
