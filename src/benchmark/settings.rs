@@ -1,6 +1,7 @@
 //! The numbers of the mechanics, the robot, the judge and the sensors that a suite or a run may change.
 
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use super::control::check_dt;
 use crate::{evaluation::rules::Rules, physics::Params, robot::RobotSpec, sensing::tactile::TactileSpec};
@@ -50,11 +51,16 @@ impl Settings {
                 format!("there is no setting {path}; {key} could be one of {}", known.join(", "))
             })?;
         }
-        if at.is_object() {
-            return Err(format!("{path} is a group of settings, not one; name one of its fields"));
-        }
-        *at = serde_json::from_str(value)
-            .map_err(|_| format!("{path}: expected a number, true or false, got {value:?}"))?;
+        let parsed = serde_json::from_str::<Value>(value);
+        *at = match (&at, parsed) {
+            (Value::Object(_), Ok(group @ Value::Object(_))) => group,
+            (Value::Object(_), _) => {
+                return Err(format!("{path} is a group of settings, not one; name one of its fields"));
+            }
+            (_, Ok(value)) => value,
+            (Value::String(_), Err(_)) => Value::String(value.to_owned()),
+            _ => return Err(format!("{path}: expected a number, true or false, got {value:?}")),
+        };
         serde_json::from_value(tree).map_err(|e| format!("{path}: {e}"))
     }
 

@@ -224,11 +224,31 @@ fn list(name: &'static str, help: &'static str) -> Arg {
 fn on_script(command: clap::Command) -> clap::Command {
     let policies = POLICIES.map(|(name, _)| name);
     command
-        .arg(Arg::new("file").value_name("FILE.lua").help("The script whose plan to carry out").required(true))
-        .arg(flag("policy", "Who drives").value_name("POLICY").default_value("expert").value_parser(PossibleValuesParser::new(policies)))
-        .arg(flag("seed", "Base seed").value_name("S").default_value("0").allow_hyphen_values(true).value_parser(seed))
-        .arg(list("shift", "Changes of the scene that the suite declares, such as stiffness=0.5").value_name("NAME=VALUE"))
-        .arg(flag("set", "Changes a setting, such as robot.gripper.effort=20").value_name("PATH=VALUE").action(ArgAction::Append))
+        .arg(
+            Arg::new("file").value_name("FILE.lua").help("The script whose plan to carry out").required(true),
+        )
+        .arg(
+            flag("policy", "Who drives")
+                .value_name("POLICY")
+                .default_value("expert")
+                .value_parser(PossibleValuesParser::new(policies)),
+        )
+        .arg(
+            flag("seed", "Base seed")
+                .value_name("S")
+                .default_value("0")
+                .allow_hyphen_values(true)
+                .value_parser(seed),
+        )
+        .arg(
+            list("shift", "Changes of the scene that the suite declares, such as stiffness=0.5")
+                .value_name("NAME=VALUE"),
+        )
+        .arg(
+            flag("set", "Changes a setting, such as robot.gripper.effort=20")
+                .value_name("PATH=VALUE")
+                .action(ArgAction::Append),
+        )
 }
 
 fn runner() -> clap::Command {

@@ -62,11 +62,11 @@ pub fn run(run: &Run, loaded: &Loaded, name: &str, points: usize, columns: &[Str
         print(&format!("{text}\n"));
     }
     let base = run.out.clone().unwrap_or_default();
-    finish.files.iter().try_for_each(|(relative, text)| write(&base, relative, text))
+    finish.files.iter().try_for_each(|(relative, bytes)| write(&base, relative, bytes))
 }
 
 /// Writes a file of the script under `base`; a link on its way could lead anywhere, so none is followed.
-fn write(base: &Path, relative: &str, text: &str) -> Result<(), Failure> {
+fn write(base: &Path, relative: &str, bytes: &[u8]) -> Result<(), Failure> {
     let path = &base.join(relative);
     let between = path.ancestors().skip(1).take_while(|folder| *folder != base);
     if let Some(link) = between.into_iter().find(|folder| folder.is_symlink()) {
@@ -82,7 +82,7 @@ fn write(base: &Path, relative: &str, text: &str) -> Result<(), Failure> {
         std::fs::create_dir_all(&folder)
             .map_err(|e| Failure::input(format!("cannot make the folder {}: {e}", folder.display())))?;
     }
-    replace(path, text).map_err(Failure::input)?;
+    replace(path, bytes).map_err(Failure::input)?;
     eprintln!("softvt: wrote {}", path.display());
     Ok(())
 }

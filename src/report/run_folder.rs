@@ -168,11 +168,11 @@ impl RunFolder {
     }
 }
 
-/// Replaces `path` by `text`: written aside, synced, renamed.
+/// Replaces `path` by `content`: written aside, synced, renamed.
 ///
 /// # Errors
 /// The file cannot be written.
-pub fn replace(path: &Path, text: &str) -> Result<(), RunFolderError> {
+pub fn replace(path: &Path, content: impl AsRef<[u8]>) -> Result<(), RunFolderError> {
     let mut name = path.file_name().unwrap_or_default().to_os_string();
     name.push(".part");
     let aside = path.with_file_name(name);
@@ -185,7 +185,7 @@ pub fn replace(path: &Path, text: &str) -> Result<(), RunFolderError> {
     }
     let mut file =
         OpenOptions::new().write(true).create_new(true).open(&aside).map_err(io_error("make", &aside))?;
-    file.write_all(text.as_bytes()).map_err(io_error("write to", &aside))?;
+    file.write_all(content.as_ref()).map_err(io_error("write to", &aside))?;
     file.sync_all().map_err(io_error("sync", &aside))?;
     fs::rename(&aside, path).map_err(io_error("replace", path))
 }

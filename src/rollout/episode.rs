@@ -282,7 +282,10 @@ impl Episode {
             if let Err(failure) = self.control_step(&action) {
                 break self.invalid(&failure);
             }
-            self.remember(&streams, self.frames.last().and_then(|frame| frame.deformation.as_ref()).map(|d| d.rms_pct));
+            self.remember(
+                &streams,
+                self.frames.last().and_then(|frame| frame.deformation.as_ref()).map(|d| d.rms_pct),
+            );
         };
         Ok(self.finish(outcome))
     }

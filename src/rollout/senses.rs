@@ -209,10 +209,8 @@ impl Senses {
             placed.push((skin, vertices));
             give = part.give();
         }
-        let surfaces: Vec<Surface> = placed
-            .iter()
-            .map(|(skin, vertices)| Surface { vertices, triangles: skin.triangles() })
-            .collect();
+        let surfaces: Vec<Surface> =
+            placed.iter().map(|(skin, vertices)| Surface { vertices, triangles: skin.triangles() }).collect();
         let input = PadInput {
             load: PadLoad::of_patch(patch),
             surfaces: &surfaces,

@@ -69,6 +69,7 @@ pub static FUNCTIONS: &[Signature] = &[
         &["boolean"],
         "Whether a row of a compression sweep is a stable squeeze.",
     ),
+    method("image", &[("image", "softvt.NewImage")], &["softvt.Image"], "An empty picture."),
     method("pose", &[("pose", "softvt.PoseSpec")], &["softvt.Pose"], "A pose in the world frame."),
     method("mesh", &[("mesh", "softvt.MeshSpec")], &["softvt.Shape"], "A shape from a mesh file."),
     method(
@@ -140,6 +141,8 @@ pub static CLASSES: &[Class] = &[
     super::classes_world::BODY,
     super::classes_world::SOLID,
     super::classes_world::SIMULATION,
+    super::classes_world::FELT,
+    super::classes_world::IMAGE,
     Class {
         name: "softvt.Pose",
         doc: "An immutable pose in the world frame.",
@@ -205,16 +208,53 @@ pub static CLASSES: &[Class] = &[
     Class {
         name: "softvt.Scene",
         doc: "The scene that a layout or a shift builds.",
-        fields: &[("objects", "softvt.Object[]", "The placed objects, in order.")],
+        fields: &[
+            ("objects", "softvt.Object[]", "The placed objects, in order."),
+            ("light", "softvt.Light", "The light on them."),
+        ],
         methods: &[
             method("add", &[("place", "softvt.Place")], &[], "Puts an asset somewhere."),
             method("object", &[("name", "string")], &["softvt.Object"], "A placed object."),
+            method(
+                "camera",
+                &[("name", "string")],
+                &["softvt.Camera"],
+                "A camera; every scene has third_person and wrist.",
+            ),
+            method("add_camera", &[("camera", "softvt.NewCamera")], &["softvt.Camera"], "One more camera."),
         ],
+    },
+    Class {
+        name: "softvt.Light",
+        doc: "The light of a scene: one key light and a sky. Its numbers may be read and written.",
+        fields: &[],
+        methods: &[],
+    },
+    Class {
+        name: "softvt.Camera",
+        doc: "A pinhole camera; its numbers may be read and written.",
+        fields: &[("name", "string", "Its name."), ("mount", "\"world\"|\"hand\"", "What it is fixed to.")],
+        methods: &[method(
+            "look_at",
+            &[("point", "number[]"), ("up?", "number[]")],
+            &[],
+            "Turns it to a point (m, frame of the mount); up, z if left out, is upwards in the picture.",
+        )],
+    },
+    Class {
+        name: "softvt.Look",
+        doc: "A material of a placed object; its numbers may be read and written, the layers over it stay.",
+        fields: &[],
+        methods: &[],
     },
     Class {
         name: "softvt.Object",
         doc: "A placed object; its numbers may be read and written.",
-        fields: &[("name", "string", "Name in the scene."), ("asset", "string", "Name of its asset.")],
+        fields: &[
+            ("name", "string", "Name in the scene."),
+            ("asset", "string", "Name of its asset."),
+            ("looks", "softvt.Look[]", "Its materials, in the order of the asset's visuals."),
+        ],
         methods: &[],
     },
     Class {

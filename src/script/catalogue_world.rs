@@ -132,5 +132,121 @@ pub static ENVELOPE: Record = Record {
     ],
 };
 
+/// What `softvt.image` takes.
+pub static NEW_IMAGE: Record = Record {
+    label: "image",
+    class: "softvt.NewImage",
+    kind: "softvt.NewImage",
+    doc: "An empty picture.",
+    fields: &[
+        field("width", Type::Integer(Range::closed(1.0, 8192.0)), Required, "Width, pixels."),
+        field("height", Type::Integer(Range::closed(1.0, 8192.0)), Required, "Height, pixels."),
+        field("colour", Type::Vector(3, "sRGB of 0 to 255"), Required, "Colour all over."),
+    ],
+};
+
+/// What `image:text` takes.
+pub static TEXT: Record = Record {
+    label: "image:text",
+    class: "softvt.Text",
+    kind: "softvt.Text",
+    doc: "Where and how a line of text is written.",
+    fields: &[
+        field("at", Type::Vector(2, "pixels"), Required, "Left end of its baseline, from the top left."),
+        field("size", Type::Number("pixels", Range::closed(4.0, 200.0)), Presence::Number(18.0), "Height."),
+        field("colour", Type::Vector(3, "sRGB of 0 to 255"), Required, "Colour."),
+    ],
+};
+
+/// What `simulation:see` takes.
+pub static SEE: Record = Record {
+    label: "simulation:see",
+    class: "softvt.See",
+    kind: "softvt.See",
+    doc: "What is drawn.",
+    fields: &[
+        field("camera", Type::Name, Presence::Text("third_person"), "A camera of the scene."),
+        field(
+            "width",
+            Type::Integer(Range::closed(1.0, 4096.0)),
+            Optional,
+            "Width, pixels; the camera's own.",
+        ),
+        field(
+            "height",
+            Type::Integer(Range::closed(1.0, 4096.0)),
+            Optional,
+            "Height, pixels; the camera's own.",
+        ),
+    ],
+};
+
+/// What `scene:add_camera` takes.
+pub static NEW_CAMERA: Record = Record {
+    label: "scene:add_camera",
+    class: "softvt.NewCamera",
+    kind: "softvt.NewCamera",
+    doc: "A camera. Give look_at or quat.",
+    fields: &[
+        field("name", Type::Name, Required, "Its name, unique; the stream's."),
+        field(
+            "mount",
+            Type::Choice(&["world", "hand"]),
+            Presence::Text("world"),
+            "What it is fixed to; hand is panda_hand.",
+        ),
+        field("position", Type::Vector(3, "m, frame of the mount"), Required, "Where it is."),
+        field(
+            "look_at",
+            Type::Vector(3, "m, frame of the mount"),
+            Optional,
+            "A point in the middle of the picture.",
+        ),
+        field(
+            "up",
+            Type::Vector(3, "frame of the mount"),
+            Optional,
+            "Upwards in the picture (with look_at); z if left out.",
+        ),
+        field(
+            "quat",
+            Type::Vector(4, "w, x, y, z, frame of the mount"),
+            Optional,
+            "How it is turned: it looks along its −z, +y is up.",
+        ),
+        field(
+            "fovy",
+            Type::Number("rad", Range::closed(0.01, 2.8)),
+            Presence::Number(0.8),
+            "Vertical field of view.",
+        ),
+        field(
+            "near",
+            Type::Number("m", Range::closed(1e-4, 100.0)),
+            Presence::Number(0.01),
+            "Nothing nearer is seen.",
+        ),
+        field(
+            "far",
+            Type::Number("m", Range::closed(1e-3, 1e4)),
+            Presence::Number(20.0),
+            "Nothing farther is seen.",
+        ),
+        field(
+            "width",
+            Type::Integer(Range::closed(1.0, 4096.0)),
+            Presence::Integer(224),
+            "Width of the picture, pixels.",
+        ),
+        field(
+            "height",
+            Type::Integer(Range::closed(1.0, 4096.0)),
+            Presence::Integer(224),
+            "Height of the picture, pixels.",
+        ),
+    ],
+};
+
 /// All of them.
-pub static RECORDS: &[&Record] = &[&WORLD, &WORLD_SOFT, &WORLD_SOLID, &SIMULATE, &ENVELOPE];
+pub static RECORDS: &[&Record] =
+    &[&NEW_CAMERA, &NEW_IMAGE, &TEXT, &SEE, &WORLD, &WORLD_SOFT, &WORLD_SOLID, &SIMULATE, &ENVELOPE];

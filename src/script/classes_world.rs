@@ -120,7 +120,59 @@ pub const SIMULATION: Class = Class {
             "width_m, height_m (rise of the centre), speed, asset; of a movable object also pad_force (N) and slip_mm of \
              the left and right pad, and of a soft one d_pct, d_peak_pct, min_det_f, asleep.",
         ),
+        method(
+            "see",
+            &[("see?", "softvt.See")],
+            &["softvt.Image"],
+            "What a camera sees now; third_person if nothing else is said.",
+        ),
+        method(
+            "feel",
+            &[("side", "\"left\"|\"right\"")],
+            &["softvt.Felt"],
+            "What a finger's tactile sensor sees now, and the true force on its gel.",
+        ),
         method("time", &[], &["number"], "Time since settling, s."),
         method("tool", &[], &["number[]", "number[]"], "Tool position, m, and axis-angle, rad, world."),
+    ],
+};
+
+/// `softvt.Felt`.
+pub const FELT: Class = Class {
+    name: "softvt.Felt",
+    doc: "A finger's tactile sensor at one moment; docs/tactile.md draws its frames.",
+    fields: &[
+        ("picture", "softvt.Image", "The colour picture, 320 × 240."),
+        ("dots", "softvt.Image", "The same with its markers as dots."),
+        ("arrows", "softvt.Image", "The same with the motion of its markers as arrows, lengthened."),
+        ("initial", "number[][]", "Places of the 99 markers without a touch, px, row by row."),
+        ("present", "number[][]", "Their places now, px."),
+        ("force", "number[]", "True force on the gel, N, pad frame; a pressing body makes z negative."),
+        ("depth_mm", "number", "Greatest depth of the dent, mm."),
+    ],
+    methods: &[],
+};
+
+/// `softvt.Image`.
+pub const IMAGE: Class = Class {
+    name: "softvt.Image",
+    doc: "A picture of 8-bit sRGB pixels. Regions are x, y, width, height in pixels from the top left.",
+    fields: &[("width", "integer", "Width, pixels."), ("height", "integer", "Height, pixels.")],
+    methods: &[
+        method("mean", &[("region?", "number[]")], &["number[]"], "Mean red, green and blue, 0..255."),
+        method("crop", &[("region", "number[]")], &["softvt.Image"], "A part as a picture of its own."),
+        method(
+            "resize",
+            &[("width", "integer"), ("height", "integer")],
+            &["softvt.Image"],
+            "The same in another size.",
+        ),
+        method(
+            "paste",
+            &[("other", "softvt.Image"), ("x", "integer"), ("y", "integer")],
+            &[],
+            "Puts another picture on this one.",
+        ),
+        method("text", &[("text", "string"), ("how", "softvt.Text")], &[], "Writes a line of text on it."),
     ],
 };

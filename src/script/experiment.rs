@@ -5,6 +5,7 @@ use serde_json::{Map, Number, Value as Json};
 
 use super::{
     Loaded, ScriptError, catalogue,
+    image_api::{picture, png},
     plan::{Machine, reopen},
     sandbox::fail,
     schema::{self, sorted_pairs},
@@ -18,8 +19,8 @@ pub type Row = Map<String, Json>;
 pub struct Finish {
     /// Printed after the rows.
     pub text: Option<String>,
-    /// Files to write: relative path without `..`, and text.
-    pub files: Vec<(String, String)>,
+    /// Files to write: relative path without `..`, and bytes.
+    pub files: Vec<(String, Vec<u8>)>,
 }
 
 /// A machine that runs points of an experiment; open one a thread.
@@ -137,17 +138,23 @@ fn read_finish(lua: &Lua, value: &Value) -> mlua::Result<Finish> {
                     format!("finish.files: {path:?} leads out of the folder; give a path without \"..\""),
                 ));
             }
-            let text = match &content {
-                Value::String(text) => text.to_string_lossy().to_string(),
-                content => {
-                    let json = json(lua, content, "finish.files", 0)?;
-                    serde_json::to_string_pretty(&json).map_err(mlua::Error::external)? + "\n"
-                }
-            };
-            files.push((path, text));
+            files.push((path, bytes(lua, &content)?));
         }
     }
     Ok(Finish { text: checked.get("text")?, files })
+}
+
+/// A file's content: text as it is, a picture as PNG, other data as JSON.
+fn bytes(lua: &Lua, content: &Value) -> mlua::Result<Vec<u8>> {
+    if let Value::String(text) = content {
+        return Ok(text.to_string_lossy().into_bytes());
+    }
+    if let Some(picture) = picture(content) {
+        return png(&picture).map_err(mlua::Error::external);
+    }
+    let json = json(lua, content, "finish.files", 0)?;
+    let text = serde_json::to_string_pretty(&json).map_err(mlua::Error::external)?;
+    Ok((text + "\n").into_bytes())
 }
 
 /// The points of an experiment: those it gives, or every combination of its grid.

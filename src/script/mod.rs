@@ -12,6 +12,7 @@ mod episode;
 mod error;
 mod experiment;
 mod expert;
+mod image_api;
 mod options;
 mod plan;
 mod pose;
@@ -26,6 +27,7 @@ mod sim_api;
 mod sources;
 pub mod stubs;
 mod timing;
+mod view_api;
 mod world_api;
 
 pub use controller::ExpertController;

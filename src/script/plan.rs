@@ -163,6 +163,7 @@ fn install(vm: &Vm, session: &Arc<Mutex<Session>>) -> mlua::Result<()> {
     super::world_api::install(lua, &vm.api, &vm.clock)?;
     super::sim_api::install(lua, &vm.api, &vm.clock)?;
     super::envelope_api::install(lua, &vm.api)?;
+    super::image_api::install(lua, &vm.api)?;
     let names = schema::sorted_pairs(&vm.api).iter().filter_map(|(key, _)| key.to_string().ok()).collect();
     options::strict(lua, "softvt", vm.api.clone(), names)?;
     Ok(())

@@ -9,13 +9,14 @@ use super::{
     sandbox::{fail, locked},
     schema::{self, Fault, Field, Presence, Range, Type, unknown},
     shapes::LuaShape,
+    view_api::{LuaCamera, LuaLight, LuaLook},
 };
 use crate::{
     geometry::{Pose, Quat, Vec3},
     scene::{Asset, Body, Camera, Friction, Lighting, Object, Region, Scene, SoftMaterial, Visual},
 };
 
-const fn field(name: &'static str, ty: Type, doc: &'static str) -> Field {
+pub(super) const fn field(name: &'static str, ty: Type, doc: &'static str) -> Field {
     Field { name, ty, presence: Presence::Required, doc }
 }
 
@@ -168,12 +169,18 @@ fn read_asset(table: &Table) -> mlua::Result<Asset> {
     })
 }
 
-fn numbers(lua: &Lua, values: &[f64]) -> mlua::Result<Value> {
+pub(super) fn numbers(lua: &Lua, values: &[f64]) -> mlua::Result<Value> {
     lua.create_sequence_from(values.iter().copied()).map(Value::Table)
 }
 
 /// The value to store, or an error that names the key.
-fn checked(lua: &Lua, label: &str, fields: &[Field], key: &str, value: &Value) -> mlua::Result<Value> {
+pub(super) fn checked(
+    lua: &Lua,
+    label: &str,
+    fields: &[Field],
+    key: &str,
+    value: &Value,
+) -> mlua::Result<Value> {
     let Some(field) = fields.iter().find(|field| field.name == key) else {
         let known = fields.iter().map(|field| field.name);
         return Err(fail(lua, format!("{label}: {}", unknown("key", key, known))));
@@ -192,8 +199,13 @@ impl UserData for LuaScene {
             let index = find(lua, &locked(&this.scene), &name)?;
             Ok(LuaObject { scene: this.scene.clone(), index })
         });
+        methods.add_method("camera", |lua, this, name: String| LuaCamera::named(lua, &this.scene, &name));
+        methods.add_method("add_camera", |lua, this, value: Value| LuaCamera::add(lua, &this.scene, &value));
         methods.add_meta_method(MetaMethod::ToString, |_, _, ()| Ok("softvt.Scene"));
         methods.add_meta_method(MetaMethod::Index, |lua, this, key: String| {
+            if key == "light" {
+                return lua.create_userdata(LuaLight(this.scene.clone())).map(Value::UserData);
+            }
             let scene = locked(&this.scene);
             match key.as_str() {
                 "base" => numbers(lua, scene.base_w.translation.vector.as_slice()),
@@ -207,7 +219,14 @@ impl UserData for LuaScene {
                     lua.create_sequence_from(handles).map(Value::Table)
                 }
                 _ => {
-                    let known = SCENE.iter().map(|field| field.name).chain(["objects", "add", "object"]);
+                    let known = SCENE.iter().map(|field| field.name).chain([
+                        "objects",
+                        "light",
+                        "add",
+                        "object",
+                        "camera",
+                        "add_camera",
+                    ]);
                     Err(fail(lua, format!("scene: {}", unknown("key", &key, known))))
                 }
             }
@@ -241,6 +260,10 @@ struct LuaObject {
 
 impl LuaObject {
     fn read(&self, lua: &Lua, key: &str) -> mlua::Result<Value> {
+        if key == "looks" {
+            let looks = LuaLook::all(&self.scene, self.index);
+            return lua.create_sequence_from(looks).map(Value::Table);
+        }
         let scene = locked(&self.scene);
         let object = &scene.objects[self.index];
         let asset = &object.asset;
@@ -264,7 +287,7 @@ impl LuaObject {
             "static_mu" => Ok(Value::Number(asset.friction.static_mu)),
             "dynamic_mu" => Ok(Value::Number(asset.friction.dynamic_mu)),
             _ => {
-                let known = OBJECT.iter().map(|field| field.name).chain(["name", "asset"]);
+                let known = OBJECT.iter().map(|field| field.name).chain(["name", "asset", "looks"]);
                 Err(fail(lua, format!("object: {}", unknown("key", key, known))))
             }
         }

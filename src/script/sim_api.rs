@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, Mutex};
 
+use image::RgbImage;
 use mlua::{
     Function, Lua, LuaSerdeExt, MetaMethod, MultiValue, Table, UserData, UserDataFields, UserDataMethods,
     Value,
@@ -9,10 +10,11 @@ use mlua::{
 use serde::de::DeserializeOwned;
 
 use super::{
-    catalogue_world::SIMULATE,
+    catalogue_world::{SEE, SIMULATE},
     controller::{Glance, Planner, next},
     deadline::Clock,
     expert::{Coroutine, ExpertCommand, ExpertView},
+    image_api::LuaImage,
     random::Rng,
     reach::Lag,
     sandbox::{fail, locked},
@@ -28,7 +30,8 @@ use crate::{
     evaluation::deformation::Reference,
     geometry::Pose,
     robot::rotation,
-    rollout::{Kind, RestCache, Simulation, stop},
+    rollout::{Kind, Looks, RestCache, SenseError, Senses, Simulation, stop},
+    sensing::tactile::{MarkerStyle, PadLoad, Places},
 };
 
 /// Physics with the robot, and what was seen of it.
@@ -39,6 +42,7 @@ struct Inner {
     physics_steps: u64,
     failed: Option<String>,
     clock: Clock,
+    senses: Senses,
 }
 
 struct Watched {
@@ -50,8 +54,9 @@ struct Watched {
 /// Installs `softvt.simulate` and `softvt.settings`.
 pub(super) fn install(lua: &Lua, api: &Table, clock: &Clock) -> mlua::Result<()> {
     let clock = clock.clone();
-    let cache = RestCache::default();
-    let make = lua.create_function(move |lua, value: Value| simulate(lua, &value, &clock, &cache))?;
+    let (cache, looks) = (RestCache::default(), Looks::default());
+    let make =
+        lua.create_function(move |lua, value: Value| simulate(lua, &value, &clock, (&cache, &looks)))?;
     api.set("simulate", make)
 }
 
@@ -72,7 +77,12 @@ pub(super) fn read<T: DeserializeOwned>(lua: &Lua, label: &str, value: Value) ->
     })
 }
 
-fn simulate(lua: &Lua, value: &Value, clock: &Clock, cache: &RestCache) -> mlua::Result<LuaSimulation> {
+fn simulate(
+    lua: &Lua,
+    value: &Value,
+    clock: &Clock,
+    (cache, looks): (&RestCache, &Looks),
+) -> mlua::Result<LuaSimulation> {
     let Value::Table(table) = value else {
         return Err(fail(lua, format!("softvt.simulate: expected a table, got {}", schema::got(value))));
     };
@@ -109,7 +119,8 @@ fn simulate(lua: &Lua, value: &Value, clock: &Clock, cache: &RestCache) -> mlua:
             start_z: sim.centre(object).z,
         })
         .collect();
-    let inner = Inner { sim, watched, physics_steps: 0, failed: None, clock: clock.clone() };
+    let senses = Senses::new(&sim, &settings.tactile, looks);
+    let inner = Inner { sim, watched, physics_steps: 0, failed: None, clock: clock.clone(), senses };
     Ok(LuaSimulation(Arc::new(Mutex::new(inner))))
 }
 
@@ -213,7 +224,60 @@ impl LuaSimulation {
         inner.outcome(lua)
     }
 
-    fn see(&self, lua: &Lua, name: &str) -> mlua::Result<Table> {
+    /// What a camera sees.
+    fn see(&self, lua: &Lua, value: &Value) -> mlua::Result<LuaImage> {
+        const LABEL: &str = "simulation:see";
+        let table = match value {
+            Value::Nil => lua.create_table()?,
+            Value::Table(table) => table.clone(),
+            other => {
+                return Err(fail(lua, format!("{LABEL}: expected a table, got {}", schema::got(other))));
+            }
+        };
+        let spec =
+            schema::check(lua, &SEE, &table).map_err(|fault| schema::fault_here(lua, LABEL, &fault))?;
+        let wrong = |e: SenseError| fail(lua, format!("{LABEL}: {e}"));
+        let mut inner = locked(&self.0);
+        let Inner { sim, senses, clock, .. } = &mut *inner;
+        let _honest_work = clock.pause();
+        let mut camera = senses.camera(&spec.get::<String>("camera")?).map_err(wrong)?.clone();
+        camera.width = spec.get::<Option<usize>>("width")?.unwrap_or(camera.width);
+        camera.height = spec.get::<Option<usize>>("height")?.unwrap_or(camera.height);
+        let seen = senses.see(&Senses::frame(sim), &camera).map_err(wrong)?;
+        let picture = RgbImage::from_raw(seen.width as u32, seen.height as u32, seen.rgb);
+        LuaImage::new(lua, picture.unwrap_or_default())
+    }
+
+    /// What a finger feels.
+    fn feel(&self, lua: &Lua, side: &str) -> mlua::Result<Table> {
+        let index = match side {
+            "left" => 0,
+            "right" => 1,
+            other => {
+                let message = format!("simulation:feel: expected \"left\" or \"right\", got {other:?}");
+                return Err(fail(lua, message));
+            }
+        };
+        let mut inner = locked(&self.0);
+        let Inner { sim, senses, clock, .. } = &mut *inner;
+        let _honest_work = clock.pause();
+        let frame = Senses::frame(sim);
+        let felt = senses.touch(&frame).map_err(|e| fail(lua, format!("simulation:feel: {e}")))?;
+        let felt = &felt[index];
+        let places = |places: &Places| lua.create_sequence_from(places.iter().map(|p| p.to_vec()));
+        let table = lua.create_table()?;
+        table.set("picture", LuaImage::new(lua, felt.picture.clone())?)?;
+        table.set("dots", LuaImage::new(lua, felt.with_markers(MarkerStyle::Dots))?)?;
+        table.set("arrows", LuaImage::new(lua, felt.with_markers(MarkerStyle::Arrows))?)?;
+        table.set("initial", places(&felt.markers[0])?)?;
+        table.set("present", places(&felt.markers[1])?)?;
+        let load = frame.patches.get(index).map_or(PadLoad::default(), PadLoad::of_patch);
+        table.set("force", lua.create_sequence_from(load.force.iter().copied())?)?;
+        table.set("depth_mm", felt.field.as_ref().map_or(0.0, |field| 1e3 * field.depth()))?;
+        Ok(table)
+    }
+
+    fn watch(&self, lua: &Lua, name: &str) -> mlua::Result<Table> {
         let inner = locked(&self.0);
         let _honest_work = inner.clock.pause();
         let sim = &inner.sim;
@@ -254,7 +318,9 @@ impl UserData for LuaSimulation {
         methods.add_meta_method(MetaMethod::ToString, |_, _, ()| Ok("softvt.Simulation"));
         methods.add_method("drive", |lua, this, expert: Function| this.drive(lua, expert));
         methods.add_method("wait", |lua, this, seconds: f64| this.wait(lua, seconds));
-        methods.add_method("watch", |lua, this, name: String| this.see(lua, &name));
+        methods.add_method("watch", |lua, this, name: String| this.watch(lua, &name));
+        methods.add_method("see", |lua, this, value: Value| this.see(lua, &value));
+        methods.add_method("feel", |lua, this, side: String| this.feel(lua, &side));
         methods.add_method("time", |_, this, ()| Ok(locked(&this.0).time()));
         methods.add_method("tool", |lua, this, ()| {
             let inner = locked(&this.0);

@@ -8,6 +8,7 @@ use super::{
     catalogue_shapes::{MASK, MESH, METHODS, SHAPES},
     scene_api::{OBJECT, SCENE},
     schema::{Field, Presence, Record, Type},
+    view_api::{CAMERA, LIGHT, LOOK},
 };
 
 /// Name of the stub file that `softvt init` writes.
@@ -111,6 +112,9 @@ fn writable(class: &Class) -> &'static [Field] {
     match class.name {
         "softvt.Scene" => SCENE,
         "softvt.Object" => OBJECT,
+        "softvt.Light" => LIGHT,
+        "softvt.Camera" => CAMERA,
+        "softvt.Look" => LOOK,
         _ => &[],
     }
 }

@@ -23,6 +23,13 @@ impl Canvas {
         Self { pixels, font: FontRef::try_from_slice(epaint_default_fonts::UBUNTU_LIGHT).ok() }
     }
 
+    /// A canvas with a picture on it.
+    pub fn of(picture: &RgbImage) -> Self {
+        let mut canvas = Self::new(picture.width(), picture.height(), [0; 3]);
+        canvas.place(picture, 0, 0);
+        canvas
+    }
+
     /// Puts a picture at (x, y).
     pub fn place(&mut self, picture: &RgbImage, x: u32, y: u32) {
         let width = self.pixels.width() as usize;
@@ -83,7 +90,12 @@ impl Canvas {
             if let Some(outline) = font.outline_glyph(glyph) {
                 let bounds = outline.px_bounds();
                 outline.draw(|dx, dy, cover| {
-                    self.blend(bounds.min.x as i64 + i64::from(dx), bounds.min.y as i64 + i64::from(dy), cover, ink);
+                    self.blend(
+                        bounds.min.x as i64 + i64::from(dx),
+                        bounds.min.y as i64 + i64::from(dy),
+                        cover,
+                        ink,
+                    );
                 });
             }
             at += scaled.h_advance(id);
@@ -114,7 +126,8 @@ impl Canvas {
     /// The picture.
     pub fn picture(&self) -> RgbImage {
         let (width, height) = (self.pixels.width(), self.pixels.height());
-        let data = self.pixels.data().chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
+        let data =
+            self.pixels.data().chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
         RgbImage::from_raw(width, height, data).unwrap_or_default()
     }
 }

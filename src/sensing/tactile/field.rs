@@ -49,6 +49,8 @@ pub struct GelField {
     pub motion: Vec3,
     /// 1, or by how much more than friction the shear needs to be held.
     pub friction_excess: f64,
+    /// Whether the skins keep their shape, finer than the grid too.
+    pub(super) firm: bool,
     /// The skins where they were pushed to.
     pub(super) relief: Relief,
 }
@@ -104,6 +106,7 @@ pub fn sense(gel: &Gel, input: &PadInput, scratch: &mut Scratch) -> Result<Optio
         push: pressed.push,
         motion: dragged.motion,
         friction_excess: dragged.relaxed,
+        firm: input.give.is_none(),
         relief,
     }))
 }

@@ -37,7 +37,12 @@ pub fn mosaic<T: Borrow<RgbImage>>(history: [&[T]; 2], layout: MosaicLayout) -> 
                 MosaicLayout::Columns => (2 * finger + place % 2, place / 2),
             };
             let small = imageops::resize(frame.borrow(), CELL, CELL, FilterType::Triangle);
-            imageops::replace(&mut picture, &small, i64::from(CELL) * column as i64, i64::from(CELL) * row as i64);
+            imageops::replace(
+                &mut picture,
+                &small,
+                i64::from(CELL) * column as i64,
+                i64::from(CELL) * row as i64,
+            );
         }
     }
     picture

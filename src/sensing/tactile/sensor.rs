@@ -4,7 +4,7 @@ use image::RgbImage;
 
 use super::{
     FieldError, Gel, GelField, MarkerModel, MarkerStyle, Markers, Optics, OpticsError, OpticsModel, PICTURE,
-    PadInput, Scratch, Taxim, TactileSpec, TactileSpecError, draw_markers, markers, npz::NpzError, sense,
+    PadInput, Scratch, TactileSpec, TactileSpecError, Taxim, draw_markers, markers, npz::NpzError, sense,
 };
 use crate::robot::PadSurface;
 

@@ -1,7 +1,7 @@
 //! The touched surface at the picture's resolution.
 //!
-//! Where the gel is free its surface is the grid's, by a cubic; where it touches it lies on the skin, which is known finer
-//! than the grid: nowhere is it inside.
+//! Where the gel is free its surface is the grid's, by a cubic; where it touches something firm it lies on the skin, which is
+//! known finer than the grid: nowhere is it inside. Soft skins give way to the gel in all that is finer than the grid.
 
 use super::{
     field::{GelField, taps},
@@ -48,7 +48,9 @@ impl Window {
         let (x, y) = (reading(0), reading(1));
         let free = resample(&field.displacement[2], count, &x, &y);
         let mut window = Self { from, size, u: free };
-        window.touch(gel, field, centre);
+        if field.firm {
+            window.touch(gel, field, centre);
+        }
         window.soften();
         window
     }
