@@ -3,6 +3,7 @@
 mod catalogue;
 mod catalogue_classes;
 mod catalogue_shapes;
+mod catalogue_visuals;
 mod catalogue_world;
 mod classes_world;
 mod controller;
@@ -26,6 +27,7 @@ mod sim_api;
 mod sources;
 pub mod stubs;
 mod timing;
+mod visuals;
 mod world_api;
 
 pub use controller::ExpertController;
