@@ -35,7 +35,7 @@
 ---@class softvt.Asset
 ---@field name string Name, as in results and calibration files.
 ---@field shape softvt.Shape Its shape, in metres.
----@field body softvt.Soft|softvt.Rigid|softvt.Static How it moves.
+---@field body softvt.Soft|softvt.Rigid|softvt.Static|softvt.Scenery How it moves.
 ---@field friction? softvt.Friction Friction of its surface.
 ---@field visuals? softvt.Visual[] Appearances by material id of the shape; the first is id 0.
 ---@field hints? table<string, number> Numbers for experts (grasp height, closure …).
@@ -54,6 +54,9 @@
 
 ---A part of the world that never moves.
 ---@class softvt.Static
+
+---Part of the picture only: it is drawn, casts shadows, and nothing touches it.
+---@class softvt.Scenery
 
 ---A change of the scene that a run may ask for with --shift name=value. Thresholds stay nominal.
 ---@class softvt.Shift
@@ -84,11 +87,20 @@
 ---@field static_mu? number Static coefficient. Expects a number in 0..10. Default 0.6.
 ---@field dynamic_mu? number Dynamic coefficient, not above the static one. Expects a number in 0..10. Default 0.5.
 
----What a surface looks like.
+---What a surface looks like: a base, and layers painted over it one after the other.
 ---@class softvt.Visual
----@field albedo number[] Base colour. Expects a list of 3 numbers (0..1, linear RGB).
+---@field albedo number[] Base colour. Expects a list of 3 numbers in 0..1 (linear RGB).
+---@field roughness? number Roughness: 0 is a mirror, 1 is chalk. Expects a number in 0..1. Default 0.6.
+---@field metalness? number Metalness: 1 is bare metal. Expects a number in 0..1. Default 0.
+---@field layers? softvt.Layer[] Painted over the base, in this order.
+
+---A colour laid over what is below where a mask says so.
+---@class softvt.Layer
+---@field mask? softvt.Mask Where; everywhere if left out.
+---@field albedo number[] Colour. Expects a list of 3 numbers in 0..1 (linear RGB).
 ---@field roughness? number Roughness. Expects a number in 0..1. Default 0.6.
----@field metalness? number Metalness. Expects a number in 0..1. Default 0.
+---@field opacity? number Share of this layer where the mask is 1; 0 leaves the relief alone. Expects a number in 0..1. Default 1.
+---@field relief_m? number Height of the drawn surface where the mask is 1; it is drawn only, nothing touches it. Expects metres in -0.005..0.005. Default 0.
 
 ---What an experiment leaves behind besides its rows.
 ---@class softvt.Finish
@@ -258,6 +270,70 @@
 ---@field scale? number Metres in a unit of the file: 0.001 for millimetres. Expects metres above 0. Default 1.
 ---@field z_up? boolean Whether z is up in the file; otherwise y is. Default true.
 
+---Cubes, every other one 1; a corner lies at the origin.
+---@class softvt.CheckerMask
+---@field size_m number Edge of a cube. Expects metres above 0.
+
+---Slabs across an axis.
+---@class softvt.StripesMask
+---@field axis "x"|"y"|"z"|number[] Direction in which they follow each other.
+---@field pitch_m number Distance from one to the next. Expects metres above 0.
+---@field share? number Share of it that is 1. Expects a number in 0..1. Default 0.5.
+
+---Rises smoothly from 0 to 1 along an axis.
+---@class softvt.GradientMask
+---@field axis? "x"|"y"|"z"|number[] Direction. Default "z".
+---@field from_m number Where it is 0. Expects metres.
+---@field to_m number Where it is 1; may lie below from_m. Expects metres.
+
+---Cloudy noise; its values lie about 0.5, few below 0.2 or above 0.8.
+---@class softvt.NoiseMask
+---@field size_m number|number[] Size of the coarsest features, one for all or one for each of x, y and z.
+---@field octaves? integer Octaves, each half the size and half the weight of the one before. Expects a whole number in 1..8. Default 3.
+---@field from? number Value of the noise that becomes 0. Expects a number in -1..2. Default 0.35.
+---@field to? number Value that becomes 1; may lie below from. Expects a number in -1..2. Default 0.65.
+---@field seed? integer Selects the pattern. Expects a whole number in 0..4294967295. Default 0.
+
+---Year rings of a trunk: cylinders about a line along z, bent by noise.
+---@class softvt.RingsMask
+---@field centre_m number[] A point of the line. Expects a list of 3 numbers (m).
+---@field pitch_m number Distance from one ring to the next. Expects metres above 0.
+---@field wobble_m? number How far noise bends them. Expects metres above 0. Default 0.01.
+---@field seed? integer Selects the pattern. Expects a whole number in 0..4294967295. Default 0.
+
+---Boards that lie along x, side by side in y: one value a board.
+---@class softvt.BoardsMask
+---@field length_m number Length of a board. Expects metres above 0.
+---@field width_m number Width of a board. Expects metres above 0.
+---@field seed? integer Selects the pattern. Expects a whole number in 0..4294967295. Default 0.
+
+---The gaps between boards of these sizes.
+---@class softvt.SeamsMask
+---@field length_m number Length of a board. Expects metres above 0.
+---@field width_m number Width of a board. Expects metres above 0.
+---@field gap_m number Width of a gap. Expects metres above 0.
+
+---Round specks, strewn about.
+---@class softvt.SpecksMask
+---@field spacing_m number Mean distance. Expects metres above 0.
+---@field radius_m number Radius, at most half the spacing. Expects metres above 0.
+---@field seed? integer Selects the pattern. Expects a whole number in 0..4294967295. Default 0.
+
+---A plain weave in x and y: high in the middle of a thread.
+---@class softvt.WeaveMask
+---@field pitch_m number Width of a thread. Expects metres above 0.
+
+---Where the surface faces a direction, by the cosine between its normal and that.
+---@class softvt.FacingMask
+---@field axis? "x"|"y"|"z"|number[] Direction. Default "z".
+---@field from? number Cosine at which it is 0. Expects a number in -1..1. Default 0.
+---@field to? number Cosine at which it is 1; may lie below from. Expects a number in -1..1. Default 1.
+
+---Where a shape is: a painted rim, the grooves between ridges.
+---@class softvt.InsideMask
+---@field shape softvt.Shape The shape.
+---@field soft_m? number Width of the border, half of it on either side of the shape's surface. Expects metres of 0 or more. Default 0.
+
 ---A solid. Methods give a new shape and leave this one as it is.
 ---@class softvt.Shape
 local Shape = {}
@@ -346,6 +422,19 @@ function Shape:bumps(spec) end
 ---@param spec softvt.PaintSpec
 ---@return softvt.Shape
 function Shape:paint(spec) end
+
+---A number between 0 and 1 at every point of a surface: where a layer is. It never changes; methods give new masks.
+---@class softvt.Mask
+local Mask = {}
+
+---Where this and the other are: their product.
+---@param other softvt.Mask
+---@return softvt.Mask
+function Mask:both(other) end
+
+---Where this is not.
+---@return softvt.Mask
+function Mask:inverted() end
 
 ---The mechanics alone: soft bodies among solids that stand still or move as prescribed.
 ---@class softvt.World
@@ -694,6 +783,11 @@ function softvt.rigid(spec) end
 ---@return softvt.Static
 function softvt.static(spec) end
 
+---Part of the picture only: it is drawn, casts shadows, and nothing touches it.
+---@param spec softvt.Scenery
+---@return softvt.Scenery
+function softvt.scenery(spec) end
+
 ---A change of the scene that a run may ask for with --shift name=value. Thresholds stay nominal.
 ---@param spec softvt.Shift
 ---@return softvt.Shift
@@ -797,3 +891,61 @@ function softvt.shape.prism(spec) end
 ---@param spec softvt.LatheSpec
 ---@return softvt.Shape
 function softvt.shape.lathe(spec) end
+
+---Masks: where a layer of a visual is.
+softvt.mask = {}
+
+---Cubes, every other one 1; a corner lies at the origin.
+---@param spec softvt.CheckerMask
+---@return softvt.Mask
+function softvt.mask.checker(spec) end
+
+---Slabs across an axis.
+---@param spec softvt.StripesMask
+---@return softvt.Mask
+function softvt.mask.stripes(spec) end
+
+---Rises smoothly from 0 to 1 along an axis.
+---@param spec softvt.GradientMask
+---@return softvt.Mask
+function softvt.mask.gradient(spec) end
+
+---Cloudy noise; its values lie about 0.5, few below 0.2 or above 0.8.
+---@param spec softvt.NoiseMask
+---@return softvt.Mask
+function softvt.mask.noise(spec) end
+
+---Year rings of a trunk: cylinders about a line along z, bent by noise.
+---@param spec softvt.RingsMask
+---@return softvt.Mask
+function softvt.mask.rings(spec) end
+
+---Boards that lie along x, side by side in y: one value a board.
+---@param spec softvt.BoardsMask
+---@return softvt.Mask
+function softvt.mask.boards(spec) end
+
+---The gaps between boards of these sizes.
+---@param spec softvt.SeamsMask
+---@return softvt.Mask
+function softvt.mask.seams(spec) end
+
+---Round specks, strewn about.
+---@param spec softvt.SpecksMask
+---@return softvt.Mask
+function softvt.mask.specks(spec) end
+
+---A plain weave in x and y: high in the middle of a thread.
+---@param spec softvt.WeaveMask
+---@return softvt.Mask
+function softvt.mask.weave(spec) end
+
+---Where the surface faces a direction, by the cosine between its normal and that.
+---@param spec softvt.FacingMask
+---@return softvt.Mask
+function softvt.mask.facing(spec) end
+
+---Where a shape is: a painted rim, the grooves between ridges.
+---@param spec softvt.InsideMask
+---@return softvt.Mask
+function softvt.mask.inside(spec) end

@@ -14,6 +14,7 @@ mod check;
 mod combine;
 mod contact;
 mod field;
+mod plain;
 mod primitive;
 mod profile;
 mod ray;

@@ -162,6 +162,7 @@ pub(super) fn add(world: &mut World, object: &Object, cache: &RestCache) -> Resu
             (Kind::Rigid(index), vec![id])
         }
         Body::Static => (Kind::Static, vec![collider(world, Mover::Static, object.pose_w)]),
+        Body::Scenery => (Kind::Static, Vec::new()),
     };
     let bounds = cache.bounds(&asset.shape);
     Ok(Handle {

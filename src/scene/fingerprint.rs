@@ -8,10 +8,10 @@ use super::Asset;
 
 impl Asset {
     /// A short hash (16 hexadecimal digits of a SHA-256) of the shape, the body with its material and resolution, and the friction: all that a
-    /// calibration depends on. Looks, hints and the name do not count. Numbers count with seven digits, so that the last
+    /// calibration depends on. Looks (paint too), hints and the name do not count. Numbers count with seven digits, so that the last
     /// bits of another platform's sines make no other object.
     pub fn fingerprint(&self) -> String {
-        let text = format!("{:?}", (&self.shape, &self.body, &self.friction));
+        let text = format!("{:?}", (self.shape.unpainted(), &self.body, &self.friction));
         let digest = Sha256::digest(rounded(&text).as_bytes());
         digest.iter().take(8).map(|byte| format!("{byte:02x}")).collect()
     }
@@ -111,6 +111,15 @@ mod tests {
         assert!(soft(&|m| m.resolution = 7));
         assert!(!changed(&|a| a.name = "roll".into()));
         assert!(!changed(&|a| a.visuals.clear()));
+        let brush = || Shape::Sphere { radius: 0.02 };
+        assert!(!changed(&|a| a.shape = a.shape.clone().painted(1, Some(brush()))));
+        assert!(
+            !changed(&|a| {
+                let inner = Shape::Sphere { radius: 0.03 }.painted(2, None).translated(Vec3::z() * 0.01);
+                a.shape = inner.painted(1, Some(brush())).translated(Vec3::z() * 0.02);
+            }),
+            "paint between two moves"
+        );
         assert!(!soft(&|m| m.youngs_pa = 2e4 * (1.0 + f64::EPSILON)), "the last bit is no other object");
     }
 

@@ -30,6 +30,8 @@ pub enum Body {
     },
     /// Part of the world; never moves.
     Static,
+    /// Part of the picture only: it never moves and nothing touches it.
+    Scenery,
 }
 
 /// Linear-elastic isotropic material and discretisation of a soft body.

@@ -1,9 +1,11 @@
 //! What surfaces look like: a base and layers of procedural patterns over it, all in the object frame at rest.
 
-use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+use crate::geometry::shape::Shape;
 
 /// The look of a surface (metal/rough model). Colours are linear RGB.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Visual {
     /// Base colour, 0..=1.
     pub albedo: [f64; 3],
@@ -12,7 +14,6 @@ pub struct Visual {
     /// Metalness, 0..=1.
     pub metalness: f64,
     /// Painted over the base one after the other.
-    #[serde(default)]
     pub layers: Vec<Layer>,
 }
 
@@ -37,7 +38,7 @@ impl Visual {
 }
 
 /// A colour laid over what is below where a mask says so.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Layer {
     /// Where.
     pub mask: Mask,
@@ -48,13 +49,11 @@ pub struct Layer {
     /// Share of this layer where the mask is 1, 0..=1; 0 leaves the relief alone.
     pub opacity: f64,
     /// Height of the drawn surface where the mask is 1, m (it is drawn only: nothing touches it).
-    #[serde(default)]
     pub relief_m: f64,
 }
 
 /// A number between 0 and 1 at every point of an object. Lengths are metres, points those of the object frame at rest.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", tag = "kind")]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Mask {
     /// 1 everywhere.
     Whole,
@@ -136,6 +135,27 @@ pub enum Mask {
     Weave {
         /// Width of a thread, m.
         pitch_m: f64,
+    },
+    /// Where the surface faces `axis`: by the cosine between its normal and that, 0 at `from`, 1 at `to`.
+    Facing {
+        /// Direction, any length.
+        axis: [f64; 3],
+        /// Cosine that becomes 0.
+        from: f64,
+        /// Cosine that becomes 1; below `from` for the inverse.
+        to: f64,
+    },
+    /// Inside of a shape.
+    Inside {
+        /// The shape.
+        shape: Arc<Shape>,
+        /// Width of the border, half of it on either side of the shape's surface, m.
+        soft_m: f64,
+    },
+    /// One minus a mask.
+    Inverse {
+        /// The mask.
+        mask: Box<Mask>,
     },
     /// The product of masks: where all of them are.
     Both {

@@ -2,7 +2,10 @@
 //!
 //! Checking, stubs and the reference are all made from it.
 
-use super::schema::{Field, Presence, Range, Record, Type};
+use super::{
+    catalogue_visuals::{LAYER, VISUAL},
+    schema::{Field, Presence, Range, Record, Type},
+};
 
 use Presence::{Empty, Optional, Required};
 
@@ -29,19 +32,6 @@ pub static FRICTION: Record = Record {
             Presence::Number(0.5),
             "Dynamic coefficient, not above the static one.",
         ),
-    ],
-};
-
-/// What a surface looks like.
-pub static VISUAL: Record = Record {
-    label: "visual",
-    class: "softvt.Visual",
-    kind: "softvt.Visual",
-    doc: "What a surface looks like.",
-    fields: &[
-        field("albedo", Type::Vector(3, "0..1, linear RGB"), Required, "Base colour."),
-        field("roughness", Type::Number("", Range::closed(0.0, 1.0)), Presence::Number(0.6), "Roughness."),
-        field("metalness", Type::Number("", Range::closed(0.0, 1.0)), Presence::Number(0.0), "Metalness."),
     ],
 };
 
@@ -93,6 +83,15 @@ pub static STATIC: Record = Record {
     fields: &[],
 };
 
+/// What is only seen.
+pub static SCENERY: Record = Record {
+    label: "asset.body",
+    class: "softvt.Scenery",
+    kind: "softvt.scenery",
+    doc: "Part of the picture only: it is drawn, casts shadows, and nothing touches it.",
+    fields: &[],
+};
+
 /// A kind of object.
 pub static ASSET: Record = Record {
     label: "asset",
@@ -102,7 +101,7 @@ pub static ASSET: Record = Record {
     fields: &[
         field("name", Type::Name, Required, "Name, as in results and calibration files."),
         field("shape", Type::Object("softvt.Shape"), Required, "Its shape, in metres."),
-        field("body", Type::Made(&[&SOFT, &RIGID, &STATIC]), Required, "How it moves."),
+        field("body", Type::Made(&[&SOFT, &RIGID, &STATIC, &SCENERY]), Required, "How it moves."),
         field("friction", Type::Nested(&FRICTION), Empty, "Friction of its surface."),
         field(
             "visuals",
@@ -368,9 +367,10 @@ pub static CONSTRUCTORS: &[(&str, &Record)] = &[
     ("soft", &SOFT),
     ("rigid", &RIGID),
     ("static", &STATIC),
+    ("scenery", &SCENERY),
     ("shift", &SHIFT),
     ("experiment", &EXPERIMENT),
 ];
 
 /// Tables that functions take but no constructor makes.
-pub static PLAIN: &[&Record] = &[&FRICTION, &VISUAL, &FINISH, &OPTION, &PLACE, &POSE];
+pub static PLAIN: &[&Record] = &[&FRICTION, &VISUAL, &LAYER, &FINISH, &OPTION, &PLACE, &POSE];

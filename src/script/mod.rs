@@ -3,6 +3,7 @@
 mod catalogue;
 mod catalogue_classes;
 mod catalogue_shapes;
+mod catalogue_visuals;
 mod catalogue_world;
 mod classes_world;
 mod controller;
@@ -28,6 +29,7 @@ mod sources;
 pub mod stubs;
 mod timing;
 mod view_api;
+mod visuals;
 mod world_api;
 
 pub use controller::ExpertController;

@@ -159,6 +159,7 @@ fn install(vm: &Vm, session: &Arc<Mutex<Session>>) -> mlua::Result<()> {
     vm.api.set("layout", lua.create_function(layout)?)?;
     options::install(lua, &vm.api, session)?;
     shapes::install(lua, &vm.api)?;
+    super::visuals::install(lua, &vm.api)?;
     pose::install(lua, &vm.api)?;
     super::world_api::install(lua, &vm.api, &vm.clock)?;
     super::sim_api::install(lua, &vm.api, &vm.clock)?;

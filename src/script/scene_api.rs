@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     geometry::{Pose, Quat, Vec3},
-    scene::{Asset, Body, Camera, Friction, Lighting, Object, Region, Scene, SoftMaterial, Visual},
+    scene::{Asset, Body, Camera, Friction, Lighting, Object, Region, Scene, SoftMaterial},
 };
 
 pub(super) const fn field(name: &'static str, ty: Type, doc: &'static str) -> Field {
@@ -145,26 +145,17 @@ fn read_asset(table: &Table) -> mlua::Result<Asset> {
             grasp_spacing: body.get("grasp_spacing")?,
         }),
         kind if kind == catalogue::RIGID.kind => Body::Rigid { density: body.get("density")? },
+        kind if kind == catalogue::SCENERY.kind => Body::Scenery,
         _ => Body::Static,
     };
     let friction: Table = table.get("friction")?;
-    let visuals: Option<Vec<Table>> = table.get("visuals")?;
-    let visual = |table: &Table| -> mlua::Result<Visual> {
-        Ok(Visual {
-            albedo: table.get("albedo")?,
-            roughness: table.get("roughness")?,
-            metalness: table.get("metalness")?,
-            layers: Vec::new(),
-        })
-    };
-    let visuals = visuals.unwrap_or_default().iter().map(visual).collect::<mlua::Result<Vec<_>>>()?;
     let shape: mlua::AnyUserData = table.get("shape")?;
     Ok(Asset {
         name: table.get("name")?,
         shape: shape.borrow::<LuaShape>()?.0.clone(),
         body,
         friction: Friction { static_mu: friction.get("static_mu")?, dynamic_mu: friction.get("dynamic_mu")? },
-        visuals: if visuals.is_empty() { vec![Visual::default()] } else { visuals },
+        visuals: super::visuals::read(table)?,
         hints: table.get::<Option<_>>("hints")?.unwrap_or_default(),
     })
 }
@@ -280,7 +271,7 @@ impl LuaObject {
             "density" => optional(match &asset.body {
                 Body::Soft(soft) => Some(soft.density),
                 Body::Rigid { density } => Some(*density),
-                Body::Static => None,
+                Body::Static | Body::Scenery => None,
             }),
             "youngs_pa" => optional(soft.map(|soft| soft.youngs_pa)),
             "poisson" => optional(soft.map(|soft| soft.poisson)),

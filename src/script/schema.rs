@@ -75,6 +75,8 @@ pub enum Type {
     Boolean,
     /// A list of so many numbers in a unit.
     Vector(usize, &'static str),
+    /// A list of three numbers in 0..1, linear RGB.
+    Colour,
     /// One of these strings.
     Choice(&'static [&'static str]),
     /// A function, with its signature as LuaCATS writes it.
@@ -227,6 +229,7 @@ impl Type {
             Self::Boolean => "true or false".into(),
             Self::Vector(count, "") => format!("a list of {count} numbers"),
             Self::Vector(count, unit) => format!("a list of {count} numbers ({unit})"),
+            Self::Colour => "a list of 3 numbers in 0..1 (linear RGB)".into(),
             Self::Choice(names) => {
                 let quoted: Vec<_> = names.iter().map(|name| format!("{name:?}")).collect();
                 format!("one of {}", quoted.join(", "))
@@ -268,6 +271,11 @@ impl Type {
                     true => kept(),
                     false => Err(wrong()),
                 }
+            }
+            (Self::Colour, Value::Table(list)) => {
+                let numbers = vector(list, 3).filter(|rgb| rgb.iter().all(|c| (0.0..=1.0).contains(c)));
+                let numbers = numbers.ok_or_else(wrong)?;
+                lua.create_sequence_from(numbers).map(Value::Table).map_err(|e| Fault::new(e.to_string()))
             }
             (Self::Vector(count, _), Value::Table(list)) => {
                 let numbers = vector(list, *count).ok_or_else(wrong)?;

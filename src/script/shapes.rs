@@ -60,7 +60,7 @@ fn mesh(lua: &Lua, value: &Value) -> mlua::Result<LuaShape> {
     shape.map(LuaShape).map_err(|error| fail(lua, format!("mesh: {path}: {error}")))
 }
 
-fn checked(lua: &Lua, record: &'static Record, value: &Value) -> mlua::Result<Table> {
+pub(super) fn checked(lua: &Lua, record: &'static Record, value: &Value) -> mlua::Result<Table> {
     let Value::Table(spec) = value else {
         let fields: Vec<_> = record.fields.iter().map(|field| field.name).collect();
         let message = format!(

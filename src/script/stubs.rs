@@ -6,6 +6,7 @@ use super::{
     catalogue::{CONSTRUCTORS, LAYOUT, PLAIN},
     catalogue_classes::{CLASSES, Class, FUNCTIONS, SHAPE, Signature},
     catalogue_shapes::{MASK, MESH, METHODS, SHAPES},
+    catalogue_visuals::{MASK_CLASS, MASKS},
     scene_api::{OBJECT, SCENE},
     schema::{Field, Presence, Record, Type},
     view_api::{CAMERA, LIGHT, LOOK},
@@ -26,6 +27,7 @@ fn records() -> impl Iterator<Item = &'static Record> {
         .chain(super::catalogue_world::RECORDS.iter().copied())
         .chain(shapes)
         .chain([&MASK, &MESH])
+        .chain(MASKS.iter().map(|(_, record)| *record))
 }
 
 /// The type as LuaCATS writes it.
@@ -35,7 +37,7 @@ fn lua_type(ty: &Type) -> String {
         Type::Integer(_) => "integer".into(),
         Type::Text | Type::Name => "string".into(),
         Type::Boolean => "boolean".into(),
-        Type::Vector(..) => "number[]".into(),
+        Type::Vector(..) | Type::Colour => "number[]".into(),
         Type::Choice(names) => names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join("|"),
         Type::Function(signature) => (*signature).into(),
         Type::List(of) => match of {
@@ -54,7 +56,9 @@ fn lua_type(ty: &Type) -> String {
 /// What is taken and what holds by default, for people.
 fn details(field: &Field) -> String {
     let taken = match field.ty {
-        Type::Number(..) | Type::Integer(_) | Type::Vector(..) => format!(" Expects {}.", field.ty.words()),
+        Type::Number(..) | Type::Integer(_) | Type::Vector(..) | Type::Colour => {
+            format!(" Expects {}.", field.ty.words())
+        }
         _ => String::new(),
     };
     let default = match field.presence {
@@ -85,7 +89,7 @@ pub fn stubs() -> String {
         let _ = writeln!(out, "---{}\n---@param spec {}\n---@return softvt.Shape", record.doc, record.class);
         let _ = writeln!(out, "function Shape:{name}(spec) end\n");
     }
-    for class in CLASSES {
+    for class in [&MASK_CLASS].into_iter().chain(CLASSES) {
         stub_class(&mut out, class, writable(class));
     }
     out.push_str("---The softvt library.\nsoftvt = {}\n\n---Version of softvt.\n---@type string\nsoftvt.version = \"\"\n\n");
@@ -101,6 +105,11 @@ pub fn stubs() -> String {
     for (name, record) in SHAPES {
         let _ = writeln!(out, "---{}\n---@param spec {}\n---@return softvt.Shape", record.doc, record.class);
         let _ = writeln!(out, "function softvt.shape.{name}(spec) end\n");
+    }
+    out.push_str("---Masks: where a layer of a visual is.\nsoftvt.mask = {}\n\n");
+    for (name, record) in MASKS {
+        let _ = writeln!(out, "---{}\n---@param spec {}\n---@return softvt.Mask", record.doc, record.class);
+        let _ = writeln!(out, "function softvt.mask.{name}(spec) end\n");
     }
     out.truncate(out.trim_end().len());
     out.push('\n');
@@ -157,8 +166,11 @@ pub fn reference() -> String {
     for (name, record) in SHAPES {
         let _ = writeln!(out, "- `softvt.shape.{name}{{…}}`: {} See `{}`.", record.doc, record.class);
     }
+    for (name, record) in MASKS {
+        let _ = writeln!(out, "- `softvt.mask.{name}{{…}}`: {} See `{}`.", record.doc, record.class);
+    }
     out.push_str("- `softvt.version`: version of softvt, a string.\n\n## Objects\n");
-    for class in [&SHAPE].into_iter().chain(CLASSES) {
+    for class in [&SHAPE, &MASK_CLASS].into_iter().chain(CLASSES) {
         let _ = writeln!(out, "\n### {}\n\n{}\n", class.name, class.doc);
         for (name, ty, doc) in class.fields {
             let _ = writeln!(out, "- `{name}` ({}): {doc}", cell(ty));
@@ -260,22 +272,24 @@ mod tests {
         lua.load(stubs()).exec().unwrap();
         let has = "local names = {} for name in pairs(softvt) do names[#names + 1] = name end return #names";
         let count: usize = lua.load(has).eval().unwrap();
-        assert_eq!(count, CONSTRUCTORS.len() + FUNCTIONS.len() + 2);
+        assert_eq!(count, CONSTRUCTORS.len() + FUNCTIONS.len() + 3);
     }
 
     #[test]
     fn the_machine_offers_just_what_the_table_says() {
         let text = "local names = {} for name in pairs(softvt) do names[#names + 1] = name end\n\
+                    for name in pairs(softvt.mask) do names[#names + 1] = 'mask.' .. name end\n\
                     for name in pairs(softvt.shape) do names[#names + 1] = 'shape.' .. name end\n\
                     error(table.concat(names, ' '), 0)";
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("x.lua"), text).unwrap();
         let error = crate::script::load(&folder.path().join("x.lua"), &[]).unwrap_err();
         let mut names: Vec<String> = error.message.split(' ').map(str::to_string).collect();
-        let mut table: Vec<String> = ["version".to_string(), "shape".into()].into();
+        let mut table: Vec<String> = ["version".to_string(), "shape".into(), "mask".into()].into();
         table.extend(CONSTRUCTORS.iter().map(|(name, _)| name.to_string()));
         table.extend(FUNCTIONS.iter().map(|function| function.name.to_string()));
         table.extend(SHAPES.iter().map(|(name, _)| format!("shape.{name}")));
+        table.extend(MASKS.iter().map(|(name, _)| format!("mask.{name}")));
         names.sort();
         table.sort();
         assert_eq!(names, table);

@@ -78,6 +78,12 @@ fn mask(mask: &Mask, p: &V3, n: &V3, spacing: f32) -> f32 {
             specks(p, *spacing_m as f32, *radius_m as f32, spacing, *seed)
         }
         Mask::Weave { pitch_m } => weave(p, *pitch_m as f32, spacing),
+        Mask::Facing { axis, from, to } => smooth((along(axis, n) - *from as f32) / (*to - *from) as f32),
+        Mask::Inside { shape, soft_m } => {
+            let width = (*soft_m as f32).max(spacing).max(1e-6);
+            smooth(0.5 - shape.distance(&p.cast()) as f32 / width)
+        }
+        Mask::Inverse { mask } => 1.0 - self::mask(mask, p, n, spacing),
         Mask::Both { masks } => masks.iter().map(|m| self::mask(m, p, n, spacing)).product(),
     }
 }
@@ -155,4 +161,41 @@ fn weave(p: &V3, pitch: f32, spacing: f32) -> f32 {
     let thread = 4.0 * across * (1.0 - across);
     let kept = (2.0 - 2.0 * spacing / pitch).clamp(0.0, 1.0);
     2.0 / 3.0 + (thread - 2.0 / 3.0) * kept
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::{geometry::shape::Shape, scene::Mask};
+
+    fn value(of: &Mask, p: [f32; 3], n: [f32; 3], spacing: f32) -> f32 {
+        mask(of, &p.into(), &n.into(), spacing)
+    }
+
+    #[test]
+    fn a_surface_faces_up_by_the_cosine_of_its_normal() {
+        let up = Mask::Facing { axis: [0.0, 0.0, 3.0], from: 0.0, to: 1.0 };
+        for (n, expected) in [([0.0, 0.0, 1.0], 1.0), ([1.0, 0.0, 0.0], 0.0), ([0.0, 0.0, -1.0], 0.0)] {
+            assert_eq!(value(&up, [0.0; 3], n, 1e-3), expected);
+        }
+        assert!((value(&up, [0.0; 3], [0.75_f32.sqrt(), 0.0, 0.5], 1e-3) - 0.5).abs() < 1e-6);
+        let inverse = Mask::Inverse { mask: Box::new(up) };
+        assert_eq!(value(&inverse, [0.0; 3], [0.0, 0.0, 1.0], 1e-3), 0.0);
+    }
+
+    #[test]
+    fn the_border_of_a_shape_is_as_wide_as_asked_or_as_the_spacing() {
+        let ball = |soft_m| Mask::Inside { shape: Arc::new(Shape::Sphere { radius: 0.01 }), soft_m };
+        let at = |mask: &Mask, r: f32, spacing| value(mask, [r, 0.0, 0.0], [1.0, 0.0, 0.0], spacing);
+        for (soft, spacing, half) in [(0.004, 1e-3, 0.002), (0.0, 1e-3, 0.0005)] {
+            let mask = ball(soft);
+            assert!((at(&mask, 0.01, spacing) - 0.5).abs() < 1e-5);
+            assert_eq!(at(&mask, 0.01 - 1.01 * half, spacing), 1.0);
+            assert_eq!(at(&mask, 0.01 + 1.01 * half, spacing), 0.0);
+            // Smoothstep at a quarter of the width: 3/4 of the way.
+            assert!((at(&mask, 0.01 - 0.5 * half, spacing) - 0.84375).abs() < 1e-4);
+        }
+    }
 }

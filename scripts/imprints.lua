@@ -1,0 +1,88 @@
+-- What the fingers see of each soft asset in the expert's grasp: the tactile picture, its markers, and their motion, in one
+-- panel; and the numbers behind it.
+--
+--   softvt scripts/imprints.lua
+--   softvt scripts/imprints.lua --asset my_pastry --write my_imprint.png
+local grasp = require "experts.grasp"
+local table_top = require "assets.table"
+
+local STANDARD = { "spiral_roll", "steamed_bun", "small_ridged_roll", "braided_roll", "sesame_bun" }
+
+local opt = softvt.options {
+  asset = { default = STANDARD, help = "soft assets to grasp" },
+  lift_mm = { default = 60, unit = "mm", min = 0, max = 200, help = "height of the lift" },
+  write = { default = "docs/pictures/imprints.png", help = "the picture to write" },
+}
+
+local assets = {}
+for _, name in ipairs(opt.asset) do assets[name] = require("assets." .. name) end
+
+local WORDS, GROUND = { 40, 44, 50 }, { 244, 243, 240 }
+local LABEL, GAP = 34, 6  -- pixels
+local WIDTH, HEIGHT = 320, 240
+
+local function alone(name)
+  return softvt.layout("imprint_" .. name, function(scene)
+    scene:add { name = "table", asset = table_top, xyz = { 0, 0, 0 } }
+    scene:add { name = "object", asset = assets[name], at = { -0.05, 0 } }
+  end)
+end
+
+local function hold(arm, scene)
+  local object = scene:object "object"
+  local at = grasp.pose(object, grasp.height(object))
+  arm:move_to(at:moved { 0, 0, 0.08 }, { speed = 0.6, turn = 3 })
+  arm:move_to(at, { speed = 0.25 })
+  arm:grasp(grasp.closure(object), { rate = 0.6 })
+  arm:wait(0.3)
+  arm:move_by({ 0, 0, opt.lift_mm * 1e-3 }, { speed = 0.2 })
+  arm:wait(0.3)
+end
+
+local function held(name)
+  local sim = softvt.simulate { layout = alone(name) }
+  local ok, why = sim:drive(hold)
+  if not ok then error(name .. ": " .. why) end
+  return sim
+end
+
+-- Mean motion of the markers, px.
+local function drift(felt)
+  local x, y = 0, 0
+  for i, from in ipairs(felt.initial) do
+    x, y = x + felt.present[i][1] - from[1], y + felt.present[i][2] - from[2]
+  end
+  return x / #felt.initial, y / #felt.initial
+end
+
+return softvt.experiment {
+  name = "imprints",
+  columns = { "asset", "side", "force_n", "shear_n", "depth_mm", "markers_x_px", "markers_y_px" },
+  points = function() return opt.asset end,
+  run = function(name)
+    local sim, rows = held(name), {}
+    for _, side in ipairs { "left", "right" } do
+      local felt = sim:feel(side)
+      local x, y = drift(felt)
+      rows[#rows + 1] = {
+        asset = name, side = side, force_n = -felt.force[3], shear_n = math.sqrt(felt.force[1] ^ 2 + felt.force[2] ^ 2),
+        depth_mm = felt.depth_mm, markers_x_px = x, markers_y_px = y,
+      }
+    end
+    return rows
+  end,
+  finish = function()
+    local row = HEIGHT + LABEL
+    local panel = softvt.image { width = 4 * WIDTH + 3 * GAP, height = #opt.asset * row, colour = GROUND }
+    for index, name in ipairs(opt.asset) do
+      local sim, y = held(name), (index - 1) * row
+      local left, right = sim:feel "left", sim:feel "right"
+      for column, picture in ipairs { left.picture, left.dots, left.arrows, right.arrows } do
+        panel:paste(picture, (column - 1) * (WIDTH + GAP), y)
+      end
+      local words = ("%s: left, its markers, their motion; right, its motion. %.2f N"):format(name:gsub("_", " "), -left.force[3])
+      panel:text(words, { at = { 10, y + HEIGHT + 23 }, size = 19, colour = WORDS })
+    end
+    return { files = { [opt.write] = panel } }
+  end,
+}

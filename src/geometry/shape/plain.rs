@@ -1,0 +1,44 @@
+//! A shape without its paint.
+
+use std::sync::Arc;
+
+use super::Shape;
+
+impl Shape {
+    /// The same solid, unpainted: two shapes that differ in colours alone give equal ones.
+    pub fn unpainted(&self) -> Self {
+        let arc = |shape: &Arc<Self>| Arc::new(shape.unpainted());
+        let all = |parts: &[Self]| parts.iter().map(Self::unpainted).collect();
+        match self {
+            Self::Paint { shape, .. } => shape.unpainted(),
+            // Moves in a row are one, also with paint between them.
+            Self::Placed { shape, pose } => shape.unpainted().placed(*pose),
+            Self::Scaled { shape, scale } => Self::Scaled { shape: arc(shape), scale: *scale },
+            Self::Rounded { shape, radius } => Self::Rounded { shape: arc(shape), radius: *radius },
+            Self::Shell { shape, thickness } => Self::Shell { shape: arc(shape), thickness: *thickness },
+            Self::Union(parts) => Self::Union(all(parts)),
+            Self::Intersect(parts) => Self::Intersect(all(parts)),
+            Self::Subtract { from, cut } => Self::Subtract { from: arc(from), cut: arc(cut) },
+            Self::SmoothUnion { parts, blend } => Self::SmoothUnion { parts: all(parts), blend: *blend },
+            Self::SmoothSubtract { from, cut, blend } => {
+                Self::SmoothSubtract { from: arc(from), cut: arc(cut), blend: *blend }
+            }
+            Self::Twist { shape, axis, rate } => Self::Twist { shape: arc(shape), axis: *axis, rate: *rate },
+            Self::Bend { shape, along, towards, curvature } => {
+                Self::Bend { shape: arc(shape), along: *along, towards: *towards, curvature: *curvature }
+            }
+            Self::Displace { shape, reliefs } => {
+                Self::Displace { shape: arc(shape), reliefs: reliefs.clone() }
+            }
+            Self::Box { .. }
+            | Self::Sphere { .. }
+            | Self::Ellipsoid { .. }
+            | Self::Capsule { .. }
+            | Self::Cylinder { .. }
+            | Self::Torus { .. }
+            | Self::Prism { .. }
+            | Self::Lathe(_)
+            | Self::Mesh(_) => self.clone(),
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! Looks in Lua: what reaches the scene, and what is said where a table is wrong.
+
+use super::{Project, SUITE, error_of};
+use crate::{
+    benchmark::seed::Split,
+    scene::{Body, Mask, Visual},
+    script::{Episode, EpisodeRequest},
+};
+
+fn with_visuals(visuals: &str) -> String {
+    format!(
+        "local mask = softvt.mask\nlocal asset = softvt.asset {{\n  name = \"bun\",\n  shape = softvt.shape.sphere {{ \
+         radius = 0.03 }}:grounded(),\n  body = softvt.scenery {{}},\n  visuals = {visuals},\n}}\n"
+    )
+}
+
+fn read(visuals: &str) -> Vec<Visual> {
+    let text = SUITE.replace(
+        "  scene:add { name = \"ball\", asset = ball,",
+        "  scene:add { name = \"bun\", asset = asset, xyz = { 0, 0, 0 } }\n  scene:add { name = \"ball\", asset = ball,",
+    );
+    let project = Project::new(&[("suites/x.lua", &(with_visuals(visuals) + &text + "\nreturn suite()"))]);
+    let loaded = project.load("suites/x.lua", &[]).unwrap();
+    let request = EpisodeRequest {
+        suite: "test".into(),
+        task: 0,
+        episode: 0,
+        base_seed: 0,
+        split: Split::Validation,
+        shifts: Vec::new(),
+    };
+    let scene = Episode::open(&loaded, &request).unwrap().scene;
+    assert_eq!(scene.objects[0].asset.body, Body::Scenery);
+    scene.objects[0].asset.visuals.clone()
+}
+
+#[test]
+fn layers_reach_the_scene_as_they_are_written() {
+    let visuals = read(
+        "{ { albedo = { 0.5, 0.4, 0.3 }, roughness = 0.2, layers = {
+          { mask = mask.noise { size_m = 0.01, from = 0.6, to = 0.4, seed = 7 }, albedo = { 1, 1, 1 }, opacity = 0.5, relief_m = 1e-4 },
+          { albedo = { 0, 0, 0 }, roughness = 0.9,
+            mask = mask.facing { axis = 'x' }:both(mask.gradient { from_m = 0, to_m = 0.02 }):both(mask.weave { pitch_m = 1e-3 }:inverted()) },
+          { albedo = { 0, 0, 0 } },
+        } } }",
+    );
+    let [visual] = visuals.as_slice() else { panic!("one visual") };
+    assert_eq!((visual.albedo, visual.roughness, visual.metalness), ([0.5, 0.4, 0.3], 0.2, 0.0));
+    let [noise, both, whole] = visual.layers.as_slice() else { panic!("three layers") };
+    assert_eq!(noise.mask, Mask::Noise { size_m: [0.01; 3], octaves: 3, from: 0.6, to: 0.4, seed: 7 });
+    assert_eq!((noise.opacity, noise.relief_m, noise.roughness), (0.5, 1e-4, 0.6));
+    let weave = Mask::Inverse { mask: Box::new(Mask::Weave { pitch_m: 1e-3 }) };
+    let masks = vec![
+        Mask::Facing { axis: [1.0, 0.0, 0.0], from: 0.0, to: 1.0 },
+        Mask::Gradient { axis: [0.0, 0.0, 1.0], from_m: 0.0, to_m: 0.02 },
+        weave,
+    ];
+    assert_eq!(both.mask, Mask::Both { masks });
+    assert_eq!((&whole.mask, whole.opacity), (&Mask::Whole, 1.0));
+}
+
+#[test]
+fn every_mask_can_be_made_from_lua() {
+    let masks = [
+        "checker { size_m = 0.01 }",
+        "stripes { axis = { 1, 1, 0 }, pitch_m = 0.01 }",
+        "gradient { axis = 'y', from_m = 0.02, to_m = 0.01 }",
+        "noise { size_m = { 0.01, 0.02, 0.03 } }",
+        "rings { centre_m = { 0, 0, 0 }, pitch_m = 0.01 }",
+        "boards { length_m = 0.5, width_m = 0.1 }",
+        "seams { length_m = 0.5, width_m = 0.1, gap_m = 1e-3 }",
+        "specks { spacing_m = 0.01, radius_m = 1e-3 }",
+        "weave { pitch_m = 1e-3 }",
+        "facing { from = 0.2, to = 0.8 }",
+        "inside { shape = softvt.shape.sphere { radius = 0.01 }, soft_m = 1e-3 }",
+    ];
+    assert_eq!(masks.len(), crate::script::catalogue_visuals::MASKS.len());
+    let layers: Vec<_> =
+        masks.iter().map(|m| format!("{{ albedo = {{ 0, 0, 0 }}, mask = mask.{m} }}")).collect();
+    let visuals = read(&format!("{{ {{ albedo = {{ 1, 1, 1 }}, layers = {{ {} }} }} }}", layers.join(", ")));
+    assert_eq!(visuals[0].layers.len(), masks.len());
+}
+
+#[test]
+fn a_wrong_look_is_named_with_its_line_and_the_mend() {
+    let layer = |inner: &str| {
+        error_of(&with_visuals(&format!(
+            "{{ {{ albedo = {{ 1, 1, 1 }},\n    layers = {{ {{\n      {inner}\n    }} }} }} }}"
+        )))
+    };
+    let at = |line: usize, what: &str| format!("suites/x.lua:{line}: {what}");
+    let in_layer = "asset.visuals[1].layers[1]";
+    for (inner, expected) in [
+        (
+            "albedo = { 2, 0, 0 },",
+            at(
+                8,
+                &format!("{in_layer}.albedo: expected a list of 3 numbers in 0..1 (linear RGB), got a table"),
+            ),
+        ),
+        (
+            "albedo = { 1, 0, 0 }, rougness = 1,",
+            at(7, &format!("{in_layer}: unknown key \"rougness\"; did you mean \"roughness\"?")),
+        ),
+        (
+            "albedo = { 1, 0, 0 }, opacity = 1.5,",
+            at(8, &format!("{in_layer}.opacity: expected a number in 0..1, got 1.5")),
+        ),
+        (
+            "albedo = { 1, 0, 0 }, relief_m = 1,",
+            at(8, &format!("{in_layer}.relief_m: expected metres in -0.005..0.005, got 1")),
+        ),
+        (
+            "albedo = { 1, 0, 0 }, mask = { kind = \"noise\" },",
+            at(8, &format!("{in_layer}.mask: expected a softvt.Mask, got a table")),
+        ),
+        (
+            "mask = mask.noise { size_m = 0 },",
+            at(
+                8,
+                "mask.noise.size_m: expected metres above 0 or a list of 3 numbers (m, each above 0), got 0",
+            ),
+        ),
+        (
+            "mask = mask.noise { size_m = { 1, 0, 1 } },",
+            at(8, "mask.noise.size_m: expected metres above 0 for each of x, y and z"),
+        ),
+        (
+            "mask = mask.noise { size_m = 1, from = 0.5, to = 0.5 },",
+            at(8, "mask.noise.to: expected a number other than from, got the same"),
+        ),
+        (
+            "mask = mask.gradient { axis = { 0, 0, 0 }, from_m = 0, to_m = 1 },",
+            at(8, "mask.gradient.axis: expected a direction, got one of length 0"),
+        ),
+        (
+            "mask = mask.specks { spacing_m = 1, radius_m = 0.6 },",
+            at(8, "mask.specks.radius_m: expected at most half of spacing_m"),
+        ),
+        (
+            "mask = mask.specks { spacing = 1 },",
+            at(8, "mask.specks: unknown key \"spacing\"; did you mean \"spacing_m\"?"),
+        ),
+    ] {
+        assert_eq!(layer(inner), expected, "{inner}");
+    }
+}

@@ -1,0 +1,174 @@
+//! Looks in Lua: masks are immutable values with chained methods; layers and visuals are checked tables.
+
+use std::sync::Arc;
+
+use mlua::{FromLua, Lua, MetaMethod, Table, UserData, UserDataFields, UserDataMethods, Value};
+
+use super::{
+    catalogue_visuals::MASKS,
+    sandbox::fail,
+    schema::{self, Fault, Record},
+    shapes::{LuaShape, checked},
+};
+use crate::scene::{Layer, Mask, Visual};
+
+/// `softvt.Mask`.
+#[derive(Clone, Debug)]
+struct LuaMask(Mask);
+
+impl FromLua for LuaMask {
+    fn from_lua(value: Value, lua: &Lua) -> mlua::Result<Self> {
+        match value.as_userdata().and_then(|data| data.borrow::<Self>().ok()) {
+            Some(mask) => Ok(mask.clone()),
+            None => {
+                Err(fail(lua, format!("expected a mask (softvt.mask.…{{…}}), got {}", schema::got(&value))))
+            }
+        }
+    }
+}
+
+impl UserData for LuaMask {
+    fn add_fields<F: UserDataFields<Self>>(fields: &mut F) {
+        fields.add_meta_field(MetaMethod::Type, "softvt.Mask");
+    }
+
+    fn add_methods<M: UserDataMethods<Self>>(methods: &mut M) {
+        methods.add_meta_method(MetaMethod::ToString, |_, _, ()| Ok("softvt.Mask"));
+        methods.add_method("both", |_, this, other: Self| {
+            let mut masks = match &this.0 {
+                Mask::Both { masks } => masks.clone(),
+                mask => vec![mask.clone()],
+            };
+            masks.push(other.0);
+            Ok(Self(Mask::Both { masks }))
+        });
+        methods
+            .add_method("inverted", |_, this, ()| Ok(Self(Mask::Inverse { mask: Box::new(this.0.clone()) })));
+    }
+}
+
+/// Installs `softvt.mask`.
+pub(super) fn install(lua: &Lua, api: &Table) -> mlua::Result<()> {
+    let masks = lua.create_table()?;
+    for (name, record) in MASKS {
+        let make = lua.create_function(move |lua, value: Value| {
+            let spec = checked(lua, record, &value)?;
+            let wrong = |key: &str, message: &str| {
+                let fault = Fault { path: vec![key.to_owned()], message: message.to_owned() };
+                schema::fault_here(lua, record.label, &fault)
+            };
+            sound(record, &spec, &wrong)?;
+            Ok(LuaMask(mask(name, &spec)?))
+        })?;
+        masks.set(*name, make)?;
+    }
+    api.set("mask", masks)
+}
+
+/// What the types of single fields do not say.
+fn sound(record: &Record, spec: &Table, wrong: &dyn Fn(&str, &str) -> mlua::Error) -> mlua::Result<()> {
+    let has = |key: &str| record.fields.iter().any(|field| field.name == key);
+    if has("axis") && direction(spec)?.iter().all(|&x| x == 0.0) {
+        return Err(wrong("axis", "expected a direction, got one of length 0"));
+    }
+    for (from, to) in [("from", "to"), ("from_m", "to_m")] {
+        if has(from) && spec.get::<f64>(from)? == spec.get::<f64>(to)? {
+            return Err(wrong(to, &format!("expected a number other than {from}, got the same")));
+        }
+    }
+    if has("size_m")
+        && let Value::Table(_) = spec.get("size_m")?
+        && spec.get::<[f64; 3]>("size_m")?.iter().any(|&size| size <= 0.0)
+    {
+        return Err(wrong("size_m", "expected metres above 0 for each of x, y and z"));
+    }
+    if has("radius_m") && spec.get::<f64>("radius_m")? > 0.5 * spec.get::<f64>("spacing_m")? {
+        return Err(wrong("radius_m", "expected at most half of spacing_m"));
+    }
+    Ok(())
+}
+
+fn direction(spec: &Table) -> mlua::Result<[f64; 3]> {
+    Ok(match spec.get::<Value>("axis")? {
+        Value::String(name) => match name.as_bytes().first() {
+            Some(b'x') => [1.0, 0.0, 0.0],
+            Some(b'y') => [0.0, 1.0, 0.0],
+            _ => [0.0, 0.0, 1.0],
+        },
+        _ => spec.get("axis")?,
+    })
+}
+
+/// One size for all axes or one for each.
+fn sizes(spec: &Table) -> mlua::Result<[f64; 3]> {
+    Ok(match spec.get::<Value>("size_m")? {
+        Value::Table(_) => spec.get("size_m")?,
+        _ => [spec.get("size_m")?; 3],
+    })
+}
+
+fn mask(name: &str, s: &Table) -> mlua::Result<Mask> {
+    Ok(match name {
+        "checker" => Mask::Checker { size_m: s.get("size_m")? },
+        "stripes" => {
+            Mask::Stripes { axis: direction(s)?, pitch_m: s.get("pitch_m")?, share: s.get("share")? }
+        }
+        "gradient" => Mask::Gradient { axis: direction(s)?, from_m: s.get("from_m")?, to_m: s.get("to_m")? },
+        "noise" => Mask::Noise {
+            size_m: sizes(s)?,
+            octaves: s.get("octaves")?,
+            from: s.get("from")?,
+            to: s.get("to")?,
+            seed: s.get("seed")?,
+        },
+        "rings" => Mask::Rings {
+            centre_m: s.get("centre_m")?,
+            pitch_m: s.get("pitch_m")?,
+            wobble_m: s.get("wobble_m")?,
+            seed: s.get("seed")?,
+        },
+        "boards" => {
+            Mask::Boards { length_m: s.get("length_m")?, width_m: s.get("width_m")?, seed: s.get("seed")? }
+        }
+        "seams" => {
+            Mask::Seams { length_m: s.get("length_m")?, width_m: s.get("width_m")?, gap_m: s.get("gap_m")? }
+        }
+        "specks" => Mask::Specks {
+            spacing_m: s.get("spacing_m")?,
+            radius_m: s.get("radius_m")?,
+            seed: s.get("seed")?,
+        },
+        "weave" => Mask::Weave { pitch_m: s.get("pitch_m")? },
+        "facing" => Mask::Facing { axis: direction(s)?, from: s.get("from")?, to: s.get("to")? },
+        _ => Mask::Inside { shape: Arc::new(s.get::<LuaShape>("shape")?.0), soft_m: s.get("soft_m")? },
+    })
+}
+
+/// The looks of a checked asset table; one plain grey if it names none.
+pub(super) fn read(asset: &Table) -> mlua::Result<Vec<Visual>> {
+    let visuals: Option<Vec<Table>> = asset.get("visuals")?;
+    match visuals.unwrap_or_default().iter().map(visual).collect::<mlua::Result<Vec<_>>>()? {
+        none if none.is_empty() => Ok(vec![Visual::default()]),
+        visuals => Ok(visuals),
+    }
+}
+
+fn visual(table: &Table) -> mlua::Result<Visual> {
+    let layers: Option<Vec<Table>> = table.get("layers")?;
+    Ok(Visual {
+        albedo: table.get("albedo")?,
+        roughness: table.get("roughness")?,
+        metalness: table.get("metalness")?,
+        layers: layers.unwrap_or_default().iter().map(layer).collect::<mlua::Result<_>>()?,
+    })
+}
+
+fn layer(table: &Table) -> mlua::Result<Layer> {
+    Ok(Layer {
+        mask: table.get::<Option<LuaMask>>("mask")?.map_or(Mask::Whole, |mask| mask.0),
+        albedo: table.get("albedo")?,
+        roughness: table.get("roughness")?,
+        opacity: table.get("opacity")?,
+        relief_m: table.get("relief_m")?,
+    })
+}
