@@ -41,8 +41,9 @@ end
 return softvt.experiment {
   name = "contact_sheet",
   columns = { "asset", "x_mm", "y_mm", "z_mm" },
-  points = function() return opt.asset end,
-  run = function(name)
+  grid = { asset = opt.asset },
+  run = function(point)
+    local name = point.asset
     local _, size = size_of(name)
     return { asset = name, x_mm = 1e3 * size[1], y_mm = 1e3 * size[2], z_mm = 1e3 * size[3] }
   end,

@@ -58,8 +58,9 @@ end
 return softvt.experiment {
   name = "imprints",
   columns = { "asset", "side", "force_n", "shear_n", "depth_mm", "markers_x_px", "markers_y_px" },
-  points = function() return opt.asset end,
-  run = function(name)
+  grid = { asset = opt.asset },
+  run = function(point)
+    local name = point.asset
     local sim, rows = held(name), {}
     for _, side in ipairs { "left", "right" } do
       local felt = sim:feel(side)

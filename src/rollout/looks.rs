@@ -30,10 +30,9 @@ impl Looks {
     ) -> Result<Arc<Model>, CameraError> {
         let same = |known: &Arc<Asset>| alike(known, asset) && known.visuals == asset.visuals;
         self.models.get(same, || {
-            let model = Model::of_shape(name, &asset.shape, &asset.visuals)?;
             let model = match mesh {
-                Some(mesh) => model.embedded(name, mesh)?,
-                None => model,
+                None => Model::of_shape(name, &asset.shape, &asset.visuals)?,
+                Some(mesh) => Model::of_skin(name, &asset.shape, &asset.visuals)?.embedded(name, mesh)?,
             };
             Ok((asset.clone(), Arc::new(model)))
         })
@@ -49,10 +48,11 @@ impl Looks {
         self.skins.get(
             |known| alike(known, asset),
             || {
-                let skin = Skin::of_shape(&asset.shape);
                 let skin = match mesh {
-                    Some(mesh) => skin.embedded(mesh).ok_or_else(|| SenseError::Skin(name.to_owned()))?,
-                    None => skin,
+                    None => Skin::of_shape(&asset.shape),
+                    Some(mesh) => {
+                        Skin::of_soft(&asset.shape, mesh).ok_or_else(|| SenseError::Skin(name.to_owned()))?
+                    }
                 };
                 Ok((asset.clone(), Arc::new(skin)))
             },

@@ -192,7 +192,10 @@ impl Senses {
     fn finger(&mut self, frame: &Frame, side: Side, sensor: &Sensor) -> Result<Touched, SenseError> {
         let index = usize::from(side == Side::Right);
         let none = ContactPatch { collider: 0, points: Vec::new() };
-        let patch = frame.patches.get(index).unwrap_or(&none);
+        // What touches the very rim alone, where no cell of the grid has its centre, cannot be seen.
+        let inside = |p: &Vec3| sensor.gel.pad.edge_distance(p.x, p.y) < -sensor.gel.cell;
+        let patch = frame.patches.get(index).filter(|patch| patch.points.iter().any(|p| inside(&p.p_p)));
+        let patch = patch.unwrap_or(&none);
         let pad_w = frame.links[self.tree][panda::finger_link(side)] * pads::pad_pose_in_finger(side);
         let mut placed: Vec<(Arc<Skin>, Vec<Vec3>)> = Vec::new();
         let mut give = None;

@@ -294,9 +294,14 @@ pub static FINISH: Record = Record {
         field("text", Type::Text, Optional, "Printed after the rows."),
         field(
             "files",
-            Type::Map(&Type::OneOf(&[Type::Text, Type::Map(&Type::Any), Type::List(&Type::Any)])),
+            Type::Map(&Type::OneOf(&[
+                Type::Text,
+                Type::Object("softvt.Image"),
+                Type::Map(&Type::Any),
+                Type::List(&Type::Any),
+            ])),
             Optional,
-            "Files to write, by relative path: text as it is, tables as JSON with sorted keys.",
+            "Files to write, by relative path: text as it is, pictures as PNG, tables as JSON with sorted keys.",
         ),
     ],
 };

@@ -58,6 +58,14 @@ impl Model {
         if let Some(mesh) = flat_faces(shape) {
             return Self::of_mesh(name, &mesh, &[], visuals);
         }
+        Self::of_skin(name, shape, visuals)
+    }
+
+    /// The same with flat faces in small triangles too, for bodies that bend.
+    ///
+    /// # Errors
+    /// As [`Model::of_shape`].
+    pub fn of_skin(name: &str, shape: &Shape, visuals: &[Visual]) -> Result<Self, CameraError> {
         let longest = shape.bounds().size().max();
         let mut levels = Vec::new();
         for cells in CELLS {

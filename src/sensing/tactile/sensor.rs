@@ -66,13 +66,9 @@ impl Sensor {
     /// What the sensor sees of a touch.
     ///
     /// # Errors
-    /// A load or friction that is no number.
+    /// A load or friction that is no number, or a load without a skin over the pad.
     pub fn see(&self, input: &PadInput, scratch: &mut Scratch) -> Result<Touched, FieldError> {
-        let field = match sense(&self.gel, input, scratch) {
-            // Pressed at the very rim only, where no cell of the grid has its centre: nothing can be seen of it.
-            Err(FieldError::NothingThere { .. }) => None,
-            found => found?,
-        };
+        let field = sense(&self.gel, input, scratch)?;
         let [wide, high] = PICTURE;
         let mut picture = RgbImage::new(wide as u32, high as u32);
         match &self.eye {

@@ -44,17 +44,25 @@ const AWAY: Vec3 = Vec3::new(0.0, 0.0, 1.0);
 const NEAR: Vec3 = Vec3::new(0.018, 0.016, 0.010);
 
 impl Skin {
-    /// The skin of a shape.
+    /// The skin of a hard shape.
     pub fn of_shape(shape: &Shape) -> Self {
-        let cell = CELL.max(shape.bounds().size().max() / MOST_CELLS);
-        let mesh = camera::flat_faces(shape).unwrap_or_else(|| skin::skin(shape, cell).mesh);
-        Self { vertices: mesh.vertices, triangles: mesh.triangles, embedding: None }
+        match camera::flat_faces(shape) {
+            Some(mesh) => Self { vertices: mesh.vertices, triangles: mesh.triangles, embedding: None },
+            None => Self::fine(shape),
+        }
     }
 
-    /// The same, moved by the nodes of a soft body; `None` if part of it lies more than two voxels outside of `mesh`.
-    pub fn embedded(mut self, mesh: &VoxelMesh) -> Option<Self> {
-        self.embedding = Some(Embedding::of(&self.vertices, mesh)?);
-        Some(self)
+    /// The skin of a soft body, its flat faces in small triangles too; `None` if part of it lies more than two voxels
+    /// outside of `mesh`.
+    pub fn of_soft(shape: &Shape, mesh: &VoxelMesh) -> Option<Self> {
+        let mut skin = Self::fine(shape);
+        skin.embedding = Some(Embedding::of(&skin.vertices, mesh)?);
+        Some(skin)
+    }
+
+    fn fine(shape: &Shape) -> Self {
+        let mesh = skin::skin(shape, CELL.max(shape.bounds().size().max() / MOST_CELLS)).mesh;
+        Self { vertices: mesh.vertices, triangles: mesh.triangles, embedding: None }
     }
 
     /// Triangles, counter-clockwise seen from outside.
@@ -188,7 +196,7 @@ mod tests {
     fn ball() -> (Skin, VoxelMesh) {
         let shape = Shape::Sphere { radius: 0.02 };
         let mesh = voxel_mesh(&shape, &VoxelSpec { resolution: 6 }).expect("a ball");
-        (Skin::of_shape(&shape).embedded(&mesh).expect("inside"), mesh)
+        (Skin::of_soft(&shape, &mesh).expect("inside"), mesh)
     }
 
     #[test]

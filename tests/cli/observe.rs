@@ -1,0 +1,178 @@
+//! What a policy is given when it asks, and that left and right of a prompt are left and right of the picture. Seen through
+//! the library, as the observation itself is the claim.
+
+use std::{path::Path, sync::Arc};
+
+use softvt::{
+    benchmark::{Plan, seed::Split, settings::Settings},
+    evaluation::record::Identity,
+    policy::{Action, Observation, Policy, Streams},
+    rollout::{Controller, Episode, EpisodeSpec, Looks, RestCache, Senses, Simulation},
+    script::{self, EpisodeRequest, Loaded},
+    sensing::tactile::MosaicLayout,
+};
+
+use crate::support::{SPATIAL_SOFT, Small};
+
+fn request(suite: &str, task: usize) -> EpisodeRequest {
+    EpisodeRequest {
+        suite: suite.to_owned(),
+        task,
+        episode: 0,
+        base_seed: 0,
+        split: Split::Validation,
+        shifts: Vec::new(),
+    }
+}
+
+/// Keeps what it was shown.
+struct Witness {
+    streams: Streams,
+    seen: Vec<Observation>,
+}
+
+impl Policy for &mut Witness {
+    fn name(&self) -> &str {
+        "witness"
+    }
+
+    fn streams(&self) -> Streams {
+        self.streams.clone()
+    }
+
+    fn act(&mut self, observation: &Observation) -> Result<Action, String> {
+        self.seen.push(observation.clone());
+        let (position_b, axis_angle_b) = (observation.ee_position_b, observation.ee_axis_angle_b);
+        Ok(Action { position_b, axis_angle_b, closure: 0.0 })
+    }
+}
+
+/// What a policy that asks for `streams` sees in a short episode, or why not.
+fn shown(streams: Streams) -> Result<Vec<Observation>, String> {
+    let project = Small { task: "budget_steps = 10", ..Small::default() }.project();
+    let loaded = script::load(&project.path("x.lua"), &[]).expect("it loads");
+    let Plan::Suite(suite) = &loaded.plan else { panic!("a suite") };
+    let scene = script::Episode::open(&loaded, &request("one", 0)).expect("it opens").scene;
+    let (task, settings) = (suite.tasks[0].clone(), Settings::default());
+    let identity = Identity {
+        suite: suite.name.clone(),
+        task: 0,
+        prompt: task.prompt.clone(),
+        layout: task.layout.clone(),
+        episode: 0,
+        seed: 0,
+        split: Split::Validation.name().to_owned(),
+        policy: "witness".to_owned(),
+        asset: "cube".to_owned(),
+        soft: true,
+    };
+    let spec = EpisodeSpec {
+        identity,
+        task,
+        scene: Arc::new(scene),
+        limit: None,
+        rules: settings.rules,
+        params: settings.physics,
+        robot: settings.robot,
+        tactile: settings.tactile,
+        film: false,
+        trace: None,
+    };
+    let episode = Episode::start(spec, &RestCache::default(), &Looks::default()).expect("it starts");
+    let mut witness = Witness { streams, seen: Vec::new() };
+    let mut driver: Box<dyn Policy + '_> = Box::new(&mut witness);
+    let outcome = episode.run(&mut driver as &mut dyn Controller).map(|_| ()).map_err(|e| e.to_string());
+    drop(driver);
+    outcome.map(|()| witness.seen)
+}
+
+#[test]
+fn a_policy_gets_the_streams_it_asks_for_and_no_others() {
+    let all = Streams { cameras: vec!["wrist".into(), "third_person".into()], touch: true, force: true };
+    let seen = shown(all.clone()).expect("shown");
+    assert_eq!(seen.len(), 10);
+    for (step, observation) in seen.iter().enumerate() {
+        let names: Vec<&str> = observation.cameras.iter().map(|c| c.name.as_str()).collect();
+        assert_eq!(names, ["wrist", "third_person"]);
+        assert!(observation.cameras.iter().all(|c| c.picture.dimensions() == (224, 224)));
+        let touch = observation.touch.as_ref().expect("asked for");
+        assert_eq!(touch.frames.len(), (step + 1).min(8));
+        assert_eq!(touch.now().expect("a frame")[0].picture.dimensions(), (320, 240));
+        assert_eq!(touch.mosaic(MosaicLayout::Rows).dimensions(), (224, 224));
+        assert_eq!(touch.marker_motion().len(), 9);
+        assert_eq!(
+            touch.marker_motion()[0][99..],
+            touch.marker_motion()[0][..99],
+            "both fingers start alike"
+        );
+        let forces = observation.forces.as_ref().expect("asked for");
+        assert_eq!((forces[0].load.normal(), forces[1].taxels.shape), (0.0, [25, 21]));
+        assert!((0.0..=0.0805).contains(&observation.gripper_width_m));
+        assert_eq!(observation.prompt, "wait");
+    }
+    assert_eq!(seen, shown(all).expect("shown"), "the same bytes again");
+    let blind = shown(Streams::default()).expect("shown");
+    assert!(blind.iter().all(|o| o.cameras.is_empty() && o.touch.is_none() && o.forces.is_none()));
+    assert_eq!(blind[9].joints, seen[9].joints, "looking changes nothing");
+}
+
+#[test]
+fn an_unknown_stream_is_named() {
+    let streams = Streams { cameras: vec!["agentview".into()], ..Streams::default() };
+    let message = shown(streams).expect_err("no such camera");
+    assert!(
+        message.contains("there is no camera \"agentview\"; the scene has third_person, wrist"),
+        "{message}"
+    );
+}
+
+fn loaded() -> Loaded {
+    script::load(Path::new(SPATIAL_SOFT), &[]).expect("the suite loads")
+}
+
+#[test]
+fn left_and_right_of_all_ten_prompts_are_those_of_the_picture() {
+    let loaded = loaded();
+    let Plan::Suite(suite) = &loaded.plan else { panic!("a suite") };
+    let (settings, rests, looks) = (Settings::default(), RestCache::default(), Looks::default());
+    for task in &suite.tasks {
+        let scene =
+            script::Episode::open(&loaded, &request("spatial_soft", task.id)).expect("it opens").scene;
+        let sim =
+            Simulation::new(Arc::new(scene), &settings.physics, &settings.robot, &rests).expect("it builds");
+        let mut senses = Senses::new(&sim, &settings.tactile, &looks);
+        let camera = senses.camera("third_person").expect("there").clone();
+        let picture = senses.see(&Senses::frame(&sim), &camera).expect("drawn");
+        let column = |name: &str| {
+            let id = sim.objects.iter().position(|o| o.name == name).expect("placed") as u16 + 1;
+            let of = picture.segmentation.iter().enumerate().filter(|(_, s)| **s == id);
+            let (sum, count) = of.fold((0, 0), |(sum, n), (at, _)| (sum + at % picture.width, n + 1));
+            assert!(count > 50, "task {}: {name} fills {count} pixels", task.id);
+            sum as f64 / f64::from(count)
+        };
+        let side = if task.prompt.contains(" right ") { "right" } else { "left" };
+        assert!(task.prompt.contains(&format!("pick up the {side} ")));
+        assert_eq!(task.goal.object(), side);
+        assert!(column("left") < 100.0 && column("right") > 124.0, "task {}", task.id);
+        assert!(column("left") < column("plate") && column("plate") < column("right"));
+    }
+}
+
+#[test]
+fn an_observation_has_no_field_for_hidden_state() {
+    let observation = shown(Streams::default()).expect("shown").swap_remove(0);
+    // Every field by name: a new one must be added here, and be no secret.
+    let Observation {
+        time_s: _,
+        ee_position_b: _,
+        ee_axis_angle_b: _,
+        joints: _,
+        gripper_width_m: _,
+        closure: _,
+        prompt: _,
+        cameras: _,
+        touch: _,
+        forces,
+    } = observation;
+    assert!(forces.is_none(), "true forces only for those who ask, and their results say so");
+}

@@ -1,0 +1,160 @@
+//! Pictures and videos that a user asks for.
+
+use std::fs;
+
+use crate::support::{Project, Small};
+
+fn png_size(bytes: &[u8]) -> [u32; 2] {
+    assert_eq!(&bytes[..8], b"\x89PNG\r\n\x1a\n");
+    [16, 20].map(|at| u32::from_be_bytes(bytes[at..at + 4].try_into().expect("four bytes")))
+}
+
+/// Whether a picture is neither black nor one colour: it does not shrink to nothing.
+fn shows_something(bytes: &[u8], [width, height]: [u32; 2]) -> bool {
+    bytes.len() as f64 > 0.02 * f64::from(width * height)
+}
+
+fn short() -> Project {
+    Small { task: "budget_steps = 4", ..Small::default() }.project()
+}
+
+#[test]
+fn view_writes_stills_of_every_stream_and_a_video_and_the_same_ones_again() {
+    let project = short();
+    let said = project.succeeds("view x.lua --out seen");
+    assert_eq!(said.out.lines().last(), Some("seen/episode.mp4"));
+    assert_eq!(said.out.lines().count(), 3 * (2 + 2 * 3) + 1, "{}", said.out);
+    for moment in ["start", "worst", "end"] {
+        for (stream, size) in [
+            ("third_person", [224, 224]),
+            ("wrist", [224, 224]),
+            ("tactile_left", [320, 240]),
+            ("tactile_right_markers", [320, 240]),
+            ("tactile_right_arrows", [320, 240]),
+        ] {
+            let bytes = fs::read(project.path(&format!("seen/{moment}_{stream}.png"))).expect("written");
+            assert_eq!(png_size(&bytes), size, "{moment}_{stream}");
+            assert!(shows_something(&bytes, size), "{moment}_{stream}: {} bytes", bytes.len());
+        }
+    }
+    let video = fs::read(project.path("seen/episode.mp4")).expect("written");
+    assert_eq!(&video[4..8], b"ftyp");
+    project.succeeds("view x.lua --out again");
+    for line in said.out.lines() {
+        let again = line.replace("seen/", "again/");
+        assert!(
+            fs::read(project.path(line)).expect("a file") == fs::read(project.path(&again)).expect("a file"),
+            "{line}"
+        );
+    }
+}
+
+#[test]
+fn native_stills_are_large() {
+    let project = short();
+    project.succeeds("view x.lua --native --policy noop --out seen");
+    let size = |name: &str| png_size(&fs::read(project.path(name)).expect("written"));
+    assert_eq!((size("seen/end_third_person.png"), size("seen/end_wrist.png")), ([1024, 1024], [512, 512]));
+}
+
+#[test]
+fn a_run_draws_the_episodes_that_were_asked_for() {
+    let project = short();
+    let drawn = |flag: &str, out: &str| {
+        project.succeeds(&format!("x.lua --episodes 2 {flag} --out {out}"));
+        [0, 1].map(|e| project.path(&format!("{out}/video/task_000/episode_0000{e}.mp4")).exists())
+    };
+    assert_eq!(drawn("", "none"), [false, false]);
+    assert_eq!(drawn("--video=1", "chosen"), [false, true]);
+    assert_eq!(drawn("--video", "failed"), [true, true], "waiting is not safe");
+    assert_eq!(drawn("--video=all", "all"), [true, true]);
+    assert_eq!(
+        project.text("none/episodes.jsonl"),
+        project.text("all/episodes.jsonl"),
+        "looking changes nothing"
+    );
+    let message = project.refusal("x.lua --video=some");
+    assert!(message.contains("expected failed, all, or episodes such as 0,3"), "{message}");
+}
+
+#[test]
+fn what_cannot_be_drawn_is_told() {
+    let project = short();
+    project.write("e.lua", b"return softvt.experiment { name = \"e\", grid = { a = { 1 } }, run = function() return { b = 1 } end }");
+    let message = project.refusal("view e.lua --out seen");
+    assert!(message.contains("e.lua: softvt view draws an episode of a suite"), "{message}");
+    let message = project.refusal("view x.lua --task 3 --out seen");
+    assert!(message.contains("--task 3: suite one has no such task"), "{message}");
+    let message = project.refusal("view x.lua");
+    assert!(message.contains("--out <DIR>"), "{message}");
+    project.write("file", b"");
+    let message = project.refusal("view x.lua --out file");
+    assert!(message.contains("cannot make the folder file"), "{message}");
+}
+
+/// The layout with a line added to its function.
+fn with(line: &str) -> Project {
+    let text = Small { task: "budget_steps = 4", ..Small::default() }.text();
+    let text =
+        text.replace("  scene:add { name = \"post\"", &format!("  {line}\n  scene:add {{ name = \"post\""));
+    Project::new(&[("x.lua", &text)])
+}
+
+#[test]
+fn light_cameras_and_looks_are_checked_where_they_are_written() {
+    for (line, message) in [
+        ("scene.light.strength = -1", "x.lua:7: scene.light.strength: expected a number in 0..1000, got -1"),
+        ("scene.light.brightness = 1", "x.lua:7: scene.light: unknown key \"brightness\""),
+        ("scene.light.direction = { 0, 0, 0 }", "scene.light.direction: expected a direction"),
+        (
+            "scene.light.direction = { 0, 0/0, 1 }",
+            "x.lua:7: scene.light.direction: expected a list of 3 numbers",
+        ),
+        ("scene:camera(\"wirst\").width = 64", "unknown camera \"wirst\"; did you mean \"wrist\"?"),
+        ("scene:camera(\"wrist\").width = 0", "camera.width: expected a whole number in 1..4096, got 0"),
+        ("scene:camera(\"wrist\").height = 100000", "camera.height: expected a whole number in 1..4096"),
+        ("scene:camera(\"wrist\").position = { 0/0, 0, 0 }", "camera.position: expected a list of 3 numbers"),
+        ("scene:camera(\"wrist\").quat = { 0, 0, 0, 0 }", "camera.quat: expected a quaternion other than 0"),
+        (
+            "scene:add_camera { name = \"top\", position = { 0, 0, 1 }, look_at = { 0, 0, 0 } }",
+            "give another up",
+        ),
+        (
+            "scene:add_camera { name = \"wrist\", position = { 0, 0, 1 }, look_at = { 1, 0, 0 } }",
+            "there is a camera \"wrist\" already",
+        ),
+        ("scene:object(\"cube\").looks[1].albedo = { 2, 0, 0 }", "look.albedo: expected linear RGB in 0..1"),
+        ("scene:object(\"cube\").looks[1].shine = 2", "look: unknown key \"shine\""),
+    ] {
+        let said = with(line).refusal("view x.lua --out seen");
+        assert!(said.contains(message), "{line}\n{said}");
+    }
+}
+
+#[test]
+fn a_camera_inside_of_something_is_told_and_leaves_no_picture() {
+    let project =
+        with("scene:add_camera { name = \"mole\", position = { 0, 0, -0.02 }, look_at = { 1, 0, -0.02 } }");
+    let message = project.refusal("view x.lua --out seen");
+    assert!(message.contains("camera mole: pose: it stands inside of floor; move it out"), "{message}");
+    assert!(!project.path("seen/start_mole.png").exists() && !project.path("seen/episode.mp4").exists());
+}
+
+#[test]
+fn light_camera_and_looks_change_the_picture() {
+    let still = |line: &str| {
+        let project = with(line);
+        project.succeeds("view x.lua --out seen");
+        fs::read(project.path("seen/end_third_person.png")).expect("written")
+    };
+    let plain = still("");
+    assert!(plain == still("local _ = scene.light.strength"), "reading changes nothing");
+    for line in [
+        "scene.light.strength = 0.1 * scene.light.strength",
+        "scene:camera(\"third_person\").fovy = 0.4",
+        "scene:camera(\"third_person\"):look_at({ 0.1, 0.1, 0 })",
+        "scene:object(\"cube\").looks[1].albedo = { 0.9, 0.1, 0.1 }",
+    ] {
+        assert!(plain != still(line), "{line}");
+    }
+}
