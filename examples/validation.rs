@@ -8,6 +8,8 @@ mod extremes;
 mod free;
 #[path = "../tests/validation/friction.rs"]
 mod friction;
+#[path = "../tests/validation/gel.rs"]
+mod gel;
 #[path = "../tests/validation/light.rs"]
 mod light;
 #[path = "../tests/validation/rows.rs"]
@@ -461,6 +463,43 @@ fn extremes(report: &mut Report) {
     }
 }
 
+fn gel_under_a_ball(report: &mut Report) {
+    heading(
+        "Gel",
+        "A rigid ball of 4 mm pressed on the gel's flat layer (4 mm, μ 0.145 MPa, ν 0.475) on the default grid of 0.4 mm, at four \
+         offsets from it, against an independent axisymmetric finite-element solution: depth for the force, and the largest \
+         outward motion of the surface.",
+    );
+    header(&["force N", "depth mm, reference", "found", "", "outward µm, reference", "found", ""]);
+    let gel = gel::flat_gel();
+    let (mut shallow, mut deep, mut outwards) = (Vec::new(), Vec::new(), Vec::new());
+    for of in gel::PRESSES {
+        let depths = gel::OFFSETS.map(|at| gel::press(&gel, at, of.force).push);
+        let (least, most) = depths.iter().fold((f64::MAX, f64::MIN), |(a, b), &d| (a.min(d), b.max(d)));
+        let errors = [least, most].map(|d| d / of.depth - 1.0);
+        let worst = if errors[0].abs() > errors[1].abs() { errors[0] } else { errors[1] };
+        let peak = gel::outward_peak(&gel, &gel::press(&gel, [0.0; 2], of.force));
+        if of.depth < 2e-4 {
+            shallow.push(worst)
+        } else {
+            deep.push(worst)
+        }
+        outwards.push(peak / of.outward - 1.0);
+        row(&[
+            of.force.to_string(),
+            format!("{}", 1e3 * of.depth),
+            format!("{:.4} to {:.4}", 1e3 * least, 1e3 * most),
+            percent(worst),
+            format!("{:.2}", 1e6 * of.outward),
+            format!("{:.2}", 1e6 * peak),
+            percent(peak / of.outward - 1.0),
+        ]);
+    }
+    report.claim("gel: depth for the force at 0.1 mm", shallow, 0.05);
+    report.claim("gel: depth for the force beyond", deep, 0.10);
+    report.claim("gel: outward motion", outwards, 0.10);
+}
+
 fn main() {
     print!("{HEAD}");
     let mut report = Report::default();
@@ -472,6 +511,7 @@ fn main() {
     friction(&mut report);
     time_step(&mut report);
     extremes(&mut report);
+    gel_under_a_ball(&mut report);
     report.print();
     print!("{MISSES}");
 }

@@ -7,6 +7,7 @@ mod element;
 mod extremes;
 mod free;
 mod friction;
+mod gel;
 mod light;
 mod rows;
 mod statics;

@@ -1,5 +1,6 @@
 //! The gel field against an independent axisymmetric finite-element solution of the same layer (sphere of 4 mm on a flat
-//! 4 mm layer, ν 0.475, μ 0.145 MPa; shear and twist of a stuck disc of 1.5 mm), and against the rules it must keep.
+//! 4 mm layer, ν 0.475, μ 0.145 MPa; shear and twist of a stuck disc of 1.5 mm), and against the rules it must keep. How deep
+//! the sphere goes and how far it moves the surface outwards is in `tests/validation/gel.rs`.
 
 use super::{
     FieldError, Gel, GelField, PadInput, PadLoad, Scratch, Surface, TactileSpec, Taxels,
@@ -48,60 +49,6 @@ pub(super) fn touch(gel: &Gel, skin: &(Vec<Vec3>, Vec<[u32; 3]>), load: PadLoad)
     let surfaces = [Surface { vertices: &skin.0, triangles: &skin.1 }];
     let input = PadInput { load, surfaces: &surfaces, friction: 1.5, give: None };
     sense(gel, &input, &mut Scratch::default()).expect("a good touch").expect("a force")
-}
-
-/// (force N, depth m, radius m of the outward peak, its size m) of the reference.
-const PRESSES: [(f64, f64, f64); 4] =
-    [(0.056109, 1e-4, 1.827e-6), (0.250, 2.5e-4, 7.9e-6), (0.81625, 5e-4, 2.5267e-5), (2.82, 1e-3, 8.1e-5)];
-
-#[test]
-fn a_pressed_sphere_goes_as_deep_as_the_reference_wherever_it_lies_on_the_grid() {
-    let gel = gel(flat());
-    for at in [[0.0, 0.0], [2e-4, 2e-4], [1e-4, 0.5e-4], [2e-4, 0.0]] {
-        let skin = sphere(at);
-        for (force, depth, _) in PRESSES {
-            let field = touch(&gel, &skin, PadLoad::new(force, [0.0; 2], 0.0, [0.0; 2]));
-            let limit = if depth < 2e-4 { 0.05 } else { 0.10 };
-            let error = field.push / depth - 1.0;
-            assert!(
-                error.abs() < limit,
-                "{force} N at {at:?}: {} mm, {:+.1} %",
-                1e3 * field.push,
-                100.0 * error
-            );
-        }
-    }
-}
-
-#[test]
-fn the_surface_moves_outwards_around_a_press_as_in_the_reference() {
-    let gel = gel(flat());
-    let skin = sphere([0.0; 2]);
-    for (force, _, peak) in PRESSES {
-        let field = touch(&gel, &skin, PadLoad::new(force, [0.0; 2], 0.0, [0.0; 2]));
-        let ring = |r: f64| {
-            let directions = 16;
-            let mean = |i: i32| {
-                let phi = std::f64::consts::TAU * f64::from(i) / f64::from(directions);
-                let u = field.at(&gel, r * phi.cos(), r * phi.sin());
-                u[0] * phi.cos() + u[1] * phi.sin()
-            };
-            (0..directions).map(mean).sum::<f64>() / f64::from(directions)
-        };
-        let most = (8..40).map(|i| ring(f64::from(i) * 2e-4)).fold(f64::MIN, f64::max);
-        assert!((most / peak - 1.0).abs() < 0.10, "{force} N: {most:e}, reference {peak:e}");
-        if (force - 0.81625).abs() < 1e-9 {
-            for (r, u) in [
-                (2e-3, 1.1979e-5),
-                (3e-3, 2.1946e-5),
-                (4e-3, 2.5176e-5),
-                (6e-3, 2.1524e-5),
-                (8e-3, 1.4997e-5),
-            ] {
-                assert!((ring(r) - u).abs() < 0.10 * peak, "r {r}: {:e}, reference {u:e}", ring(r));
-            }
-        }
-    }
 }
 
 #[test]
