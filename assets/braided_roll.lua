@@ -1,5 +1,7 @@
 -- An elongated braided roll, 110 × 48 × 38 mm: golden lobes laid left and right in turn as in a plait, each with an
 -- orange stripe of glaze along its crest.
+local material = require "materials"
+
 local mm = 1e-3
 local TABLE_TOP = softvt.shape.box { size = { 0.2, 0.2, 0.02 } }:translate(0, 0, -0.01)
 
@@ -26,7 +28,7 @@ return softvt.asset {
   body = softvt.soft { youngs_pa = 90e3, poisson = 0.37, density = 300, resolution = 12 },
   hints = { grasp_height_m = 19 * mm },
   visuals = {
-    { albedo = { 0.74, 0.48, 0.17 }, roughness = 0.5 },
-    { albedo = { 0.80, 0.27, 0.04 }, roughness = 0.4 },
+    material.crust { base = { 0.72, 0.43, 0.13 }, top = { 0.50, 0.21, 0.035 }, browning = 0.8, foot = { 0.82, 0.62, 0.32 }, sheen = 0.30, seed = 41 },
+    material.crust { base = { 0.76, 0.24, 0.03 }, top = { 0.62, 0.16, 0.02 }, foot = { 0.78, 0.34, 0.08 }, sheen = 0.20, seed = 42 },
   },
 }

@@ -3,6 +3,8 @@
 -- The well is wide and lies high in the plate, so that the sensors' cases, which reach 16 mm below the finger tips and
 -- 29 mm behind the gels, clear the rim when an object is set down. The rim is 4 mm thick at its edge: thinner walls could
 -- be crossed by a fast soft body.
+local material = require "materials"
+
 local mm = 1e-3
 
 local function profile(corners)
@@ -14,6 +16,13 @@ local body = profile {
   { 0, 0 }, { 42, 0 }, { 46, 3 }, { 69, 15 }, { 69, 18 }, { 68, 19 }, { 65, 19 }, { 60, 15.2 }, { 57, 14.5 }, { 0, 14.5 },
 }
 
+-- A thin second line in the well, as potters draw it on the wheel.
+local glazed = material.ceramic { seed = 4 }
+table.insert(glazed.layers, {
+  mask = softvt.mask.inside { shape = softvt.shape.torus { major = 55 * mm, minor = 0.9 * mm }:translate(0, 0, 14.5 * mm), soft_m = 0.8 * mm },
+  albedo = { 0.14, 0.22, 0.34 }, roughness = 0.14, opacity = 0.85,
+})
+
 return softvt.asset {
   name = "plate",
   shape = body:paint {
@@ -23,7 +32,7 @@ return softvt.asset {
   body = softvt.static {},
   hints = { surface_m = 14.5 * mm },
   visuals = {
-    { albedo = { 0.82, 0.84, 0.84 }, roughness = 0.25 },
-    { albedo = { 0.12, 0.25, 0.45 }, roughness = 0.25 },
+    glazed,
+    material.ceramic { base = { 0.075, 0.15, 0.27 }, seed = 5 },
   },
 }

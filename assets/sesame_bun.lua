@@ -1,4 +1,6 @@
 -- A round sesame bun, 64 × 62 × 42 mm: an orange glazed dome with cream seeds strewn over its top.
+local material = require "materials"
+
 local mm = 1e-3
 local LENGTH, WIDTH, HEIGHT = 64 * mm, 62 * mm, 42 * mm
 
@@ -19,7 +21,7 @@ return softvt.asset {
   body = softvt.soft { youngs_pa = 45e3, poisson = 0.34, density = 220 },
   hints = { grasp_height_m = 22 * mm },
   visuals = {
-    { albedo = { 0.78, 0.30, 0.05 }, roughness = 0.35 },
-    { albedo = { 0.90, 0.80, 0.58 }, roughness = 0.6 },
+    material.crust { base = { 0.70, 0.27, 0.045 }, top = { 0.50, 0.155, 0.022 }, foot = { 0.80, 0.50, 0.20 }, sheen = 0.26, seed = 51 },
+    material.seeds { seed = 52 },
   },
 }

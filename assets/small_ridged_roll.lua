@@ -1,4 +1,6 @@
 -- A small ridged bread roll, 62 × 44 × 34 mm: a dark brown oval with rounded ridges across.
+local material = require "materials"
+
 local mm = 1e-3
 local LENGTH, WIDTH, HEIGHT = 62 * mm, 44 * mm, 34 * mm
 
@@ -19,7 +21,10 @@ return softvt.asset {
   body = softvt.soft { youngs_pa = 110e3, poisson = 0.38, density = 320, resolution = 8 },
   hints = { grasp_height_m = 18.5 * mm },
   visuals = {
-    { albedo = { 0.20, 0.09, 0.04 }, roughness = 0.55 },
-    { albedo = { 0.34, 0.17, 0.07 }, roughness = 0.6 },
+    material.floured(
+      material.crust { base = { 0.075, 0.029, 0.012 }, top = { 0.048, 0.018, 0.008 }, foot = { 0.13, 0.058, 0.024 }, sheen = 0.40, rise_m = 9 * mm, seed = 61 },
+      { seed = 65, opacity = 0.40 }
+    ),
+    material.crust { base = { 0.17, 0.075, 0.030 }, top = { 0.13, 0.055, 0.021 }, foot = { 0.21, 0.10, 0.042 }, sheen = 0.62, rise_m = 9 * mm, seed = 62 },
   },
 }

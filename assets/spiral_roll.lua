@@ -1,5 +1,7 @@
 -- A spiral pastry with ridged frosting, 58 × 47 × 40 mm: a low drum wound up like a snail, its side pleated by the paper
 -- case, white frosting piped on top along the spiral.
+local material = require "materials"
+
 local mm = 1e-3
 local LENGTH, WIDTH, HEIGHT = 58 * mm, 47 * mm, 40 * mm
 
@@ -21,6 +23,15 @@ local pleats = { axis = "z", count = 14, height = PLEAT / 0.8, mask = { axis = "
 local upper = softvt.shape.box { size = { 0.1, 0.1, 0.04 } }:translate(0, 0, 0.049)
 local groove = oval:round(0.7 * mm):intersect(upper)
 
+-- The paper case: greaseproof, browned a little where it met the tin.
+local case = {
+  albedo = { 0.78, 0.71, 0.58 }, roughness = 0.72,
+  layers = {
+    { mask = softvt.mask.gradient { from_m = 12 * mm, to_m = 1 * mm }, albedo = { 0.60, 0.42, 0.22 }, roughness = 0.6, opacity = 0.7 },
+    { mask = softvt.mask.noise { size_m = { 8 * mm, 8 * mm, 20 * mm }, from = 0.45, to = 0.8, seed = 73 }, albedo = { 0.66, 0.52, 0.33 }, roughness = 0.6, opacity = 0.4 },
+  },
+}
+
 return softvt.asset {
   name = "spiral_roll",
   shape = oval:ridges(spiral):ridges(pleats):subtract(table_top)
@@ -28,8 +39,8 @@ return softvt.asset {
   body = softvt.soft { youngs_pa = 60e3, poisson = 0.35, density = 240 },
   hints = { grasp_height_m = 20 * mm },
   visuals = {
-    { albedo = { 0.86, 0.80, 0.70 }, roughness = 0.8 },
-    { albedo = { 0.93, 0.92, 0.88 }, roughness = 0.4 },
-    { albedo = { 0.62, 0.44, 0.26 }, roughness = 0.7 },
+    case,
+    material.frosting { seed = 71 },
+    material.crust { base = { 0.56, 0.33, 0.135 }, top = { 0.42, 0.20, 0.06 }, foot = { 0.60, 0.38, 0.17 }, sheen = 0.4, seed = 72 },
   },
 }

@@ -1,5 +1,7 @@
 -- A steamed bun with a face, 66 × 62 × 44 mm: a smooth cream dome on a flat base, two black eyes that look up and
 -- forward (+x).
+local material = require "materials"
+
 local mm = 1e-3
 local LENGTH, WIDTH, HEIGHT = 66 * mm, 62 * mm, 44 * mm
 
@@ -21,7 +23,7 @@ return softvt.asset {
   body = softvt.soft { youngs_pa = 25e3, poisson = 0.30, density = 180 },
   hints = { grasp_height_m = 22 * mm },
   visuals = {
-    { albedo = { 0.90, 0.85, 0.72 }, roughness = 0.6 },
-    { albedo = { 0.02, 0.02, 0.02 }, roughness = 0.3 },
+    material.dough { seed = 81 },
+    { albedo = { 0.012, 0.011, 0.010 }, roughness = 0.16 },
   },
 }

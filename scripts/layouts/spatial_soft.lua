@@ -1,6 +1,7 @@
 -- Two instances of the same soft object left and right of a plate. Left and right are those of the third-person image:
 -- image right is +y of the world. Both tasks of a mirrored pair use one layout, so that they start from the same state.
 local plate = require "assets.plate"
+local scenery = require "scenery"
 local table_top = require "assets.table"
 
 local mm = 1e-3
@@ -31,6 +32,7 @@ function layouts.pair(asset, k)
       local at = { x + rng:uniform(-REACH, REACH), y + rng:uniform(-REACH, REACH) }
       scene:add { name = side, asset = recipe, at = at, yaw = rng:uniform(-TURN, TURN) }
     end
+    scenery.table_room(scene)
     local joints, noise = scene.start_q, rng:stream "arm"
     for i = 1, #joints do joints[i] = joints[i] + noise:normal(0, JOINT) end
     scene.start_q = joints

@@ -9,7 +9,7 @@ use super::{
 use crate::{geometry::mesh::Mesh, scene::Visual};
 
 /// Meshes of more triangles than this are not treated as a few facets.
-const MOST_TRIANGLES: usize = 64;
+const MOST_TRIANGLES: usize = 160;
 /// Facets smaller than this across need no texture, m.
 const LEAST_SIZE: f64 = 0.1;
 /// Most texels along an edge, and the finest they get, m.

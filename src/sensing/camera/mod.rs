@@ -22,8 +22,10 @@ mod raster;
 mod render;
 mod shade;
 mod shadow;
+mod solids;
 mod stage;
 mod tone;
+mod turned;
 
 #[cfg(test)]
 mod tests;
@@ -32,6 +34,7 @@ pub use error::CameraError;
 pub use model::{Model, box_mesh, flat_faces};
 pub use picture::Picture;
 pub use render::{Scratch, render};
+pub use solids::{Form, Solid};
 pub use stage::{FrameView, Mount, Stage, Thing};
 
 /// A point, direction or colour of a picture.

@@ -6,12 +6,13 @@ use super::{
     CameraError, V3,
     facet::{self, Facet},
     pattern::{self, Look},
+    turned::turned,
 };
 use crate::{
     geometry::{
         Vec3,
         mesh::Mesh,
-        shape::Shape,
+        shape::{Profile, Shape},
         skin,
         voxel::{Embedding, VoxelMesh},
     },
@@ -69,10 +70,10 @@ impl Model {
         let longest = shape.bounds().size().max();
         let mut levels = Vec::new();
         for cells in CELLS {
-            let skin = skin::skin(shape, longest / cells);
-            check(name, &skin.mesh, &skin.materials, visuals)?;
-            let spacing = (longest / cells) as f32;
-            levels.push(bake(&skin.mesh, &skin.materials, visuals, spacing, Some(shape)));
+            let cell = longest / cells;
+            let (mesh, materials) = triangles(shape, cell);
+            check(name, &mesh, &materials, visuals)?;
+            levels.push(bake(&mesh, &materials, visuals, cell as f32, Some(shape)));
             if matches!(shape, Shape::Mesh(_)) {
                 break;
             }
@@ -133,7 +134,12 @@ impl Model {
     }
 }
 
-fn check(name: &str, mesh: &Mesh, materials: &[u16], visuals: &[Visual]) -> Result<(), CameraError> {
+pub(super) fn check(
+    name: &str,
+    mesh: &Mesh,
+    materials: &[u16],
+    visuals: &[Visual],
+) -> Result<(), CameraError> {
     let wrong = |reason: String| Err(CameraError::Model { name: name.to_owned(), reason });
     if let Err(error) = mesh.check() {
         return wrong(error.to_string());
@@ -156,7 +162,7 @@ fn extent(points: &[Vec3]) -> Vec3 {
     points.iter().fold(Vec3::repeat(f64::MIN), |b, p| b.sup(p)) - low
 }
 
-/// The triangles of a box, wherever it is placed; `None` for other shapes, whose surfaces are curved.
+/// The triangles of a box, wherever it is placed, or of several; `None` for other shapes, whose surfaces are curved.
 pub fn flat_faces(shape: &Shape) -> Option<Mesh> {
     match shape {
         Shape::Box { half } => Some(box_mesh(half)),
@@ -167,6 +173,42 @@ pub fn flat_faces(shape: &Shape) -> Option<Mesh> {
                 .for_each(|v| *v = pose * nalgebra::Point3::from(*v) - nalgebra::Point3::origin());
             Some(mesh)
         }
+        Shape::Union(parts) => {
+            let mut whole = Mesh { vertices: Vec::new(), triangles: Vec::new(), uvs: Vec::new() };
+            for part in parts {
+                let mesh = flat_faces(part)?;
+                let first = whole.vertices.len() as u32;
+                whole.vertices.extend(mesh.vertices);
+                whole.triangles.extend(mesh.triangles.iter().map(|t| t.map(|v| v + first)));
+            }
+            Some(whole)
+        }
+        _ => None,
+    }
+}
+
+/// Triangles about `cell` (m) wide on a shape, and their materials.
+fn triangles(shape: &Shape, cell: f64) -> (Mesh, Vec<u16>) {
+    let Some(profile) = revolved(shape) else {
+        let skin = skin::skin(shape, cell);
+        return (skin.mesh, skin.materials);
+    };
+    let widest = profile.points().iter().map(|p| p[0]).fold(0.0, f64::max);
+    let turns = (std::f64::consts::TAU * widest / (TURNED[1] * cell)).ceil() as usize;
+    let mesh = turned(profile, TURNED[0] * cell, turns.clamp(24, 400));
+    let middle = |t: &[u32; 3]| t.map(|v| mesh.vertices[v as usize]).iter().sum::<Vec3>() / 3.0;
+    let materials = mesh.triangles.iter().map(|t| shape.material(&middle(t))).collect();
+    (mesh, materials)
+}
+
+/// Steps along and around a revolved profile, in cells: what is painted on it follows the rings.
+const TURNED: [f64; 2] = [0.75, 2.2];
+
+/// The profile of a shape that is one of revolution where it stands, painted or not.
+fn revolved(shape: &Shape) -> Option<&Profile> {
+    match shape {
+        Shape::Lathe(profile) => Some(profile),
+        Shape::Paint { shape, .. } => revolved(shape),
         _ => None,
     }
 }
@@ -212,7 +254,13 @@ fn cut(mut mesh: Mesh, mut materials: Vec<u16>, edge: f64) -> (Mesh, Vec<u16>, f
 }
 
 /// Splits vertices at creases, evaluates looks at them and raises their drawn relief.
-fn bake(mesh: &Mesh, materials: &[u16], visuals: &[Visual], spacing: f32, shape: Option<&Shape>) -> Level {
+pub(super) fn bake(
+    mesh: &Mesh,
+    materials: &[u16],
+    visuals: &[Visual],
+    spacing: f32,
+    shape: Option<&Shape>,
+) -> Level {
     let points: Vec<V3> = mesh.vertices.iter().map(|v| v.cast()).collect();
     let (of, triangles) = split(&points, &mesh.triangles);
     let mut positions: Vec<V3> = of.iter().map(|&v| points[v as usize]).collect();
@@ -230,7 +278,12 @@ fn bake(mesh: &Mesh, materials: &[u16], visuals: &[Visual], spacing: f32, shape:
     for (i, p) in positions.iter().enumerate() {
         let normal = normals[i];
         let (look, height) = *known.entry(of[i]).or_insert_with(|| {
-            let (mut look, height) = blend(&around[i], visuals, (p, &normal), spacing);
+            let border = around[i].iter().any(|&m| m != around[i][0]);
+            let materials = match shape {
+                Some(shape) if border => materials_near(shape, p, &normal, spacing),
+                _ => around[i].clone(),
+            };
+            let (mut look, height) = blend(&materials, visuals, (p, &normal), spacing);
             look.open = shape.map_or(1.0, |shape| openness(shape, p, &normal, reach));
             (look, height)
         });
@@ -242,6 +295,21 @@ fn bake(mesh: &Mesh, materials: &[u16], visuals: &[Visual], spacing: f32, shape:
         accumulate(&positions, &triangles, &mut normals);
     }
     Level { positions, normals, looks, triangles, facets: Vec::new(), embedding: Vec::new(), spacing }
+}
+
+/// Material ids at points spread evenly over the surface around `p`, a little farther than half the way to the next
+/// vertices: their shares change smoothly across a border, whatever the triangles there look like.
+fn materials_near(shape: &Shape, p: &V3, n: &V3, spacing: f32) -> Vec<u16> {
+    const STEPS: i32 = 2;
+    let side = if n.z.abs() < 0.9 { V3::z() } else { V3::x() };
+    let u = side.cross(n).normalize();
+    let v = n.cross(&u);
+    let step = 0.7 * spacing / STEPS as f32;
+    let at = |i: i32, j: i32| p + u * (i as f32 * step) + v * (j as f32 * step);
+    (-STEPS..=STEPS)
+        .flat_map(|i| (-STEPS..=STEPS).map(move |j| at(i, j)))
+        .map(|q| shape.material(&q.cast()))
+        .collect()
 }
 
 fn blend(materials: &[u16], visuals: &[Visual], (p, n): (&V3, &V3), spacing: f32) -> (Look, f32) {

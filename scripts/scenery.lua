@@ -1,0 +1,71 @@
+-- What stands around a scene. It is drawn and never touched: physics does not know it.
+local material = require "materials"
+local mask = softvt.mask
+local mm = 1e-3
+
+local scenery = {}
+
+local box = softvt.shape.box
+
+local function seen(name, shape, look)
+  return softvt.asset { name = name, shape = shape, body = softvt.scenery {}, visuals = { look } }
+end
+
+-- A board floor whose top is its origin, and a panelled wall that stands on it.
+local floor = seen(
+  "floor", box { size = { 5, 5, 0.02 } }:translate(0, 0, -10 * mm),
+  material.wood {
+    base = { 0.150, 0.120, 0.095 }, dark = { 0.075, 0.058, 0.046 }, light = { 0.20, 0.165, 0.13 }, length_m = 1.6, width_m = 0.19, seed = 21,
+  }
+)
+
+local groove = { mask = mask.stripes { axis = "y", pitch_m = 0.16, share = 0.05 }, albedo = { 0.075, 0.095, 0.095 }, roughness = 0.8, opacity = 0.9 }
+local wall = seen(
+  "wall", box { size = { 0.04, 5, 3 } }:translate(-20 * mm, 0, 1.5),
+  material.paint { base = { 0.235, 0.285, 0.275 }, layers = { groove }, seed = 31 }
+)
+local skirting = seen(
+  "skirting", box { size = { 0.02, 5, 0.11 } }:translate(10 * mm, 0, 55 * mm),
+  material.paint { base = { 0.62, 0.60, 0.55 }, seed = 33 }
+)
+
+-- Legs and apron of the table; its top is an asset of its own, since things stand on it.
+local LEG, HIGH = 0.07, 0.85
+local legs
+for _, x in ipairs { -0.53, 0.53 } do
+  for _, y in ipairs { -0.73, 0.73 } do
+    local leg = box { size = { LEG, LEG, HIGH } }:translate(x, y, HIGH / 2)
+    legs = legs and legs:union(leg) or leg
+  end
+end
+for _, side in ipairs { -1, 1 } do
+  legs = legs:union(box { size = { 1.0, 0.025, 0.09 } }:translate(0, side * 0.73, HIGH - 0.045))
+    :union(box { size = { 0.025, 1.4, 0.09 } }:translate(side * 0.53, 0, HIGH - 0.045))
+end
+local frame = seen("table_frame", legs, { albedo = { 0.21, 0.115, 0.055 }, roughness = 0.55 })
+
+-- The robot's stand: a column between two plates; its top is 10 mm under the table's, as high as the robot's base there.
+local function stand(height)
+  local shape = box { size = { 0.23, 0.26, 0.02 } }:translate(-0.056, 0, height - 10 * mm)
+    :union(box { size = { 0.16, 0.16, height - 40 * mm } }:translate(-0.056, 0, height / 2))
+    :union(box { size = { 0.36, 0.36, 0.02 } }:translate(-0.056, 0, 10 * mm))
+  return seen("robot_stand", shape, { albedo = { 0.10, 0.105, 0.11 }, roughness = 0.42, metalness = 0.4 })
+end
+
+-- A room around a scene whose floor is at `floor_z`.
+function scenery.room(scene, floor_z)
+  scene:add { name = "floor", asset = floor, xyz = { -0.2, 0, floor_z } }
+  scene:add { name = "wall", asset = wall, xyz = { -1.75, 0, floor_z } }
+  scene:add { name = "skirting", asset = skirting, xyz = { -1.75, 0, floor_z } }
+end
+
+-- A room around a scene whose support is a table with its top at z = 0, the robot beside it on a stand.
+function scenery.table_room(scene)
+  local floor_z = -HIGH - 0.05
+  scenery.room(scene, floor_z)
+  scene:add { name = "table_frame", asset = frame, xyz = { 0, 0, floor_z } }
+  local base = scene.base
+  scene:add { name = "robot_stand", asset = stand(base[3] - floor_z), xyz = { base[1], base[2], floor_z } }
+end
+
+return scenery

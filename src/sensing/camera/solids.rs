@@ -1,0 +1,120 @@
+//! Models put together of plainly coloured solids, each with its own mesh, so that colours meet in clean lines.
+
+use super::{
+    CameraError, Model,
+    model::{Level, bake, check},
+};
+use crate::{
+    geometry::{Pose, mesh::Mesh, shape::Shape, skin},
+    scene::Visual,
+};
+
+/// How a solid becomes triangles.
+#[derive(Clone, Debug)]
+pub enum Form {
+    /// As the skin of its shape.
+    Skin {
+        /// Edge of the cells of the finest, m.
+        cell_m: f64,
+    },
+    /// As these, in the object frame; the shape only says where it is.
+    Mesh(Mesh),
+}
+
+/// A solid of one look.
+#[derive(Clone, Debug)]
+pub struct Solid {
+    /// Its shape, in the object frame.
+    pub shape: Shape,
+    /// How it becomes triangles.
+    pub form: Form,
+    /// Number of its look.
+    pub visual: usize,
+}
+
+impl Solid {
+    /// A solid of look number `visual`, meshed with cells of edge `cell_m`, m.
+    pub fn new(shape: Shape, cell_m: f64, visual: usize) -> Self {
+        Self { shape, form: Form::Skin { cell_m }, visual }
+    }
+
+    /// A solid of look number `visual` with a mesh of its own.
+    pub fn of_mesh(shape: Shape, mesh: Mesh, visual: usize) -> Self {
+        Self { shape, form: Form::Mesh(mesh), visual }
+    }
+
+    /// The solid moved.
+    #[must_use]
+    pub fn placed(mut self, pose: &Pose) -> Self {
+        self.shape = self.shape.placed(*pose);
+        if let Form::Mesh(mesh) = &mut self.form {
+            mesh.vertices.iter_mut().for_each(|v| *v = pose.transform_point(&(*v).into()).coords);
+        }
+        self
+    }
+
+    /// Its triangles with cells `times` as large as the finest.
+    fn triangles(&self, times: f64) -> Mesh {
+        match &self.form {
+            Form::Mesh(mesh) => mesh.clone(),
+            Form::Skin { cell_m } => skin::skin(&self.shape, cell_m * times).mesh,
+        }
+    }
+}
+
+/// Cells of the levels, in the finest's.
+const COARSER: [f64; 2] = [1.0, 1.9];
+/// Smooth one-coloured surfaces look right with edges of so many times what patterns need: this share of a cell counts
+/// as the level's spacing.
+const PLAIN: f64 = 0.36;
+/// What lies deeper than this inside of another solid is never seen, m.
+const HIDDEN: f64 = 1.5e-3;
+
+impl Model {
+    /// The drawn form of solids that may reach into each other; `visuals` by their numbers.
+    ///
+    /// # Errors
+    /// If a solid has no surface or its look is not there.
+    pub fn of_solids(name: &str, solids: &[Solid], visuals: &[Visual]) -> Result<Self, CameraError> {
+        let whole = Shape::Union(solids.iter().map(|solid| solid.shape.clone()).collect());
+        let mut levels = Vec::new();
+        for times in COARSER {
+            levels.push(level(name, solids, visuals, times, &whole)?);
+        }
+        Ok(Self { levels, facets: Vec::new() })
+    }
+}
+
+fn level(
+    name: &str,
+    solids: &[Solid],
+    visuals: &[Visual],
+    times: f64,
+    whole: &Shape,
+) -> Result<Level, CameraError> {
+    let mut all = Mesh { vertices: Vec::new(), triangles: Vec::new(), uvs: Vec::new() };
+    let mut materials = Vec::new();
+    // Of solids with meshes of their own alone: fine enough for any view.
+    let mut largest = 2e-3_f64;
+    for (i, solid) in solids.iter().enumerate() {
+        if let Form::Skin { cell_m } = solid.form {
+            largest = largest.max(cell_m * times);
+        }
+        let mesh = solid.triangles(times);
+        check(name, &mesh, &vec![solid.visual as u16; mesh.triangles.len()], visuals)?;
+        let first = all.vertices.len() as u32;
+        let hidden: Vec<bool> = mesh
+            .vertices
+            .iter()
+            .map(|v| {
+                let others = solids.iter().enumerate().filter(|(j, _)| *j != i);
+                others.into_iter().any(|(_, other)| other.shape.distance(v) < -HIDDEN)
+            })
+            .collect();
+        let seen = mesh.triangles.iter().filter(|t| !t.iter().all(|&v| hidden[v as usize]));
+        all.triangles.extend(seen.map(|t| t.map(|v| v + first)));
+        materials.resize(all.triangles.len(), solid.visual as u16);
+        all.vertices.extend(mesh.vertices);
+    }
+    Ok(bake(&all, &materials, visuals, (PLAIN * largest) as f32, Some(whole)))
+}

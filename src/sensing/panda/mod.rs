@@ -1,0 +1,96 @@
+//! The Franka Emika Panda with its hand and two GelSight Minis, to be drawn: shapes of our own making from public
+//! dimensions, moved by the links of the joint tree that physics moves.
+
+mod arm;
+mod hand;
+mod pillow;
+mod solid;
+
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+
+use super::camera::{CameraError, Model, Mount, Solid, Thing};
+use crate::{geometry::Pose, robot::Side, scene::Visual};
+
+/// Numbers of the looks in [`visuals`].
+const SHELL: usize = 0;
+const DARK: usize = 1;
+const GREY: usize = 2;
+const METAL: usize = 3;
+const CASE: usize = 4;
+const GEL: usize = 5;
+
+/// What moves as one.
+#[derive(Clone, Debug)]
+struct Part {
+    /// Index of its link in the tree; the base has none.
+    link: Option<usize>,
+    name: &'static str,
+    /// Its solids, in the frame of the link.
+    solids: Vec<Solid>,
+}
+
+/// Painted shells, black plastic, grey rings, bare metal, the sensors' anodised cases, and their gels' silvered skins.
+fn visuals() -> Vec<Visual> {
+    vec![
+        Visual::plain([0.74, 0.75, 0.765], 0.33, 0.0),
+        Visual::plain([0.035, 0.036, 0.040], 0.38, 0.0),
+        Visual::plain([0.20, 0.205, 0.215], 0.42, 0.0),
+        Visual::plain([0.62, 0.62, 0.63], 0.32, 1.0),
+        Visual::plain([0.022, 0.022, 0.025], 0.46, 0.0),
+        Visual::plain([0.44, 0.44, 0.45], 0.42, 0.35),
+    ]
+}
+
+/// The robot's drawn form, made once and shared by all episodes.
+#[derive(Clone, Debug)]
+pub struct RobotModel {
+    parts: Vec<(Option<usize>, &'static str, Arc<Model>)>,
+}
+
+impl RobotModel {
+    /// Makes all meshes, in a few tenths of a second.
+    ///
+    /// # Errors
+    /// If a part has no surface, which would be a fault of this room.
+    pub fn new() -> Result<Self, CameraError> {
+        let visuals = visuals();
+        let mut parts = vec![arm::base()];
+        parts.extend(arm::links());
+        parts.push(hand::hand());
+        parts.extend(Side::BOTH.map(hand::finger));
+        let mut made = Vec::new();
+        for part in parts {
+            let model = Model::of_solids(part.name, &part.solids, &visuals)?;
+            made.push((part.link, part.name, Arc::new(model)));
+        }
+        for (side, name) in Side::BOTH.into_iter().zip(["left gel", "right gel"]) {
+            let mesh = hand::gel(side);
+            let model = Model::of_mesh(name, &mesh, &vec![GEL as u16; mesh.triangles.len()], &visuals)?;
+            made.push((Some(crate::robot::panda::finger_link(side)), name, Arc::new(model)));
+        }
+        Ok(Self { parts: made })
+    }
+
+    /// The robot of joint tree number `tree`, its base at `base_w` (world), as object number `object` of segmentations.
+    pub fn things(&self, tree: usize, base_w: Pose, object: u16) -> Vec<Thing> {
+        let thing = |(link, name, model): &(Option<usize>, &'static str, Arc<Model>)| Thing {
+            name: format!("panda {name}"),
+            object,
+            model: model.clone(),
+            mount: match *link {
+                None => Mount::Fixed(base_w),
+                Some(link) => Mount::Link { tree, link, offset: Pose::identity() },
+            },
+            casts_shadow: true,
+        };
+        self.parts.iter().map(thing).collect()
+    }
+
+    /// How many triangles it has at the finest.
+    pub fn triangles(&self) -> usize {
+        self.parts.iter().map(|(_, _, model)| model.triangles()).sum()
+    }
+}

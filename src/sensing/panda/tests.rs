@@ -1,0 +1,119 @@
+//! The drawn robot against the one that moves and touches.
+
+use std::sync::OnceLock;
+
+use super::*;
+use crate::{
+    geometry::Vec3,
+    physics::joints::forward,
+    robot::{GripperSpec, pads, panda},
+    scene::{Camera, Lighting},
+    sensing::camera::{FrameView, Scratch, Stage, render},
+};
+
+fn model() -> &'static RobotModel {
+    static MODEL: OnceLock<RobotModel> = OnceLock::new();
+    MODEL.get_or_init(|| RobotModel::new().expect("every part has a surface"))
+}
+
+/// A pose in which no joint stands at zero: joints 1 to 7, then the fingers half open.
+const POSE: [f64; panda::DOFS] = [0.3, -0.5, 0.2, -2.0, 0.4, 1.9, 0.7, 0.02, 0.02];
+
+#[test]
+fn it_is_modest_in_triangles() {
+    let triangles = model().triangles();
+    assert!((5_000..=26_000).contains(&triangles), "{triangles}");
+}
+
+#[test]
+fn every_link_is_drawn_and_none_twice() {
+    let things = model().things(3, Pose::identity(), 9);
+    assert!(things.iter().all(|thing| thing.object == 9 && thing.casts_shadow));
+    let drawn = |link: usize| {
+        let own = |t: &&Thing| matches!(t.mount, Mount::Link { tree: 3, link: l, .. } if l == link);
+        things.iter().filter(own).count()
+    };
+    let mut expected = vec![1; panda::DOFS];
+    // The hand moves with the last link; a gel is drawn beside each finger.
+    expected[panda::HAND_LINK] = 2;
+    Side::BOTH.iter().for_each(|&side| expected[panda::finger_link(side)] = 2);
+    assert_eq!((0..panda::DOFS).map(drawn).collect::<Vec<_>>(), expected);
+    assert_eq!(things.iter().filter(|t| matches!(t.mount, Mount::Fixed(_))).count(), 1);
+}
+
+/// The shapes of the parts, posed: link (0 for the base, then one more each), solids.
+fn posed(q: &[f64; panda::DOFS]) -> Vec<(usize, Vec<Solid>)> {
+    let poses = forward(&panda::tree(Pose::identity(), &GripperSpec::default()), q);
+    let mut parts = vec![arm::base()];
+    parts.extend(arm::links());
+    parts.push(hand::hand());
+    let place = |part: Part| {
+        let (index, pose) = part.link.map_or((0, Pose::identity()), |link| (link + 1, poses[link]));
+        (index, part.solids.into_iter().map(|solid| solid.placed(&pose)).collect())
+    };
+    parts.into_iter().map(place).collect()
+}
+
+#[test]
+fn the_links_hang_together_in_any_pose() {
+    for q in [POSE, [0.0; panda::DOFS], POSE.map(|q| -0.5 * q)] {
+        let parts = posed(&q);
+        let poses = forward(&panda::tree(Pose::identity(), &GripperSpec::default()), &q);
+        for (link, pose) in poses.iter().enumerate().take(panda::ARM_DOFS) {
+            // Along its axis a joint has a point that belongs to both of its links.
+            let shared = (-100..=100).any(|step| {
+                let p = pose.transform_point(&Vec3::new(0.0, 0.0, f64::from(step) * 4e-3).into()).coords;
+                let inside = |index: usize| {
+                    let own = parts.iter().filter(|part| part.0 == index);
+                    own.flat_map(|part| &part.1).any(|solid| solid.shape.distance(&p) < 2e-3)
+                };
+                inside(link) && inside(link + 1)
+            });
+            assert!(shared, "joint {}", link + 1);
+        }
+    }
+}
+
+#[test]
+fn the_gels_that_are_seen_are_those_that_touch() {
+    let pad = pads::PadSurface::default();
+    for side in Side::BOTH {
+        let to_pad = pads::pad_pose_in_finger(side).inverse();
+        let mesh = hand::gel(side);
+        let points: Vec<Vec3> =
+            mesh.vertices.iter().map(|v| to_pad.transform_point(&(*v).into()).coords).collect();
+        let dome: Vec<&Vec3> = points.iter().filter(|p| (p.z - pad.height(p.x, p.y)).abs() < 1e-12).collect();
+        assert_eq!(dome.len(), 15 * 13);
+        assert!(points.iter().all(|p| pad.edge_distance(p.x, p.y) < 1e-9 && p.z <= 1e-12));
+        let reach = |axis: usize| points.iter().map(|p| p[axis]).fold(0.0, f64::max);
+        assert!((reach(0) - 0.5 * pad.length).abs() < 1e-9 && (reach(1) - 0.5 * pad.width).abs() < 1e-9);
+        // The dome faces out of the pad.
+        for t in &mesh.triangles[..2 * 14 * 12] {
+            let [a, b, c] = t.map(|v| points[v as usize]);
+            assert!((b - a).cross(&(c - a)).z > 0.0);
+        }
+        let part = hand::finger(side);
+        let in_front = part.solids.iter().filter(|solid| {
+            solid.shape.distance(&pads::pad_pose_in_finger(side).translation.vector) < pad.thickness * 0.5
+        });
+        assert_eq!(in_front.count(), 0, "nothing stands before the apex");
+    }
+}
+
+#[test]
+fn a_camera_sees_a_pale_arm_and_dark_sensors() {
+    let things = model().things(0, Pose::translation(-0.66, 0.0, 0.0), 200);
+    let stage = Stage::new(things, Lighting::default()).expect("good light");
+    let tree = panda::tree(Pose::translation(-0.66, 0.0, 0.0), &GripperSpec::default());
+    let links = [forward(&tree, &[0.0, -0.19, 0.0, -2.4, 0.0, 2.245, 0.79, 0.04, 0.04])];
+    let view = FrameView { nodes: &[], rigid: &[], links: &links, hand_w: None };
+    let picture =
+        render(&stage, &view, &Camera::third_person_table(), &mut Scratch::default()).expect("a picture");
+    let mut tones: Vec<u32> = (0..224 * 224)
+        .filter(|&i| picture.segmentation[i] == 200)
+        .map(|i| picture.rgb[3 * i..3 * i + 3].iter().map(|&c| u32::from(c)).sum::<u32>() / 3)
+        .collect();
+    tones.sort_unstable();
+    assert!(tones.len() > 2000, "{} pixels", tones.len());
+    assert!(tones[tones.len() / 2] > 140 && tones[tones.len() / 20] < 60, "{:?}", tones[tones.len() / 2]);
+}
