@@ -1,8 +1,13 @@
 //! Large flat faces with patterns: a few triangles each and a texture with a chain of halved copies (Williams, Pyramidal
 //! Parametrics, 1983), baked from the pattern on the face itself.
 
+use std::sync::OnceLock;
+
+use wide::{bytemuck::cast, i32x8, u32x8};
+
 use super::{
     V3,
+    lanes::{F8, LANES, V8, rough_log2},
     model::{Level, accumulate, split},
     pattern::{self, Look},
 };
@@ -13,7 +18,7 @@ const MOST_TRIANGLES: usize = 160;
 /// Facets smaller than this across need no texture, m.
 const LEAST_SIZE: f64 = 0.1;
 /// Most texels along an edge, and the finest they get, m.
-const MOST_TEXELS: f32 = 1024.0;
+const MOST_TEXELS: f32 = 2048.0;
 const FINEST: f32 = 0.8e-3;
 
 /// A flat face: axes of its texture in the object frame and the texture.
@@ -23,17 +28,21 @@ pub(super) struct Facet {
     /// Unit axes.
     u: V3,
     v: V3,
-    /// Texels a metre.
-    density: f32,
-    mips: Vec<Image>,
+    n: V3,
+    /// Edge of a texel, m.
+    texel: f32,
+    size: [usize; 2],
+    visual: Visual,
+    /// Painted when it is first looked at: undersides never are.
+    mips: OnceLock<Vec<Image>>,
 }
 
+/// Texels as bytes: square roots of the albedo (so that dark colours have steps as fine as bright ones) and roughness.
+/// The last row and column are there twice, so that every texel has neighbours.
 #[derive(Clone, Debug)]
 struct Image {
-    width: usize,
-    height: usize,
-    /// Albedo and roughness.
-    texels: Vec<[f32; 4]>,
+    size: [usize; 2],
+    texels: Vec<u32>,
 }
 
 /// Whether a mesh is a few big flat faces.
@@ -68,10 +77,16 @@ pub(super) fn bake(mesh: &Mesh, materials: &[u16], visuals: &[Visual]) -> (Level
         facets_of.push(index as u32);
     }
     let facets: Vec<Facet> =
-        planes.iter().map(|(n, _, m, corners)| Facet::paint(n, corners, &visuals[*m as usize])).collect();
+        planes.iter().map(|(n, _, m, corners)| Facet::of(n, corners, &visuals[*m as usize])).collect();
     let looks =
         vec![Look { albedo: V3::zeros(), roughness: 1.0, metalness: 0.0, open: 1.0 }; positions.len()];
+    let places = triangles.iter().zip(&facets_of).map(|(t, &facet)| {
+        let facet: &Facet = &facets[facet as usize];
+        t.map(|v| facet.place(&positions[v as usize]))
+    });
     let mut level = Level {
+        places: places.collect(),
+        patches: facets_of.clone(),
         positions,
         normals,
         looks,
@@ -88,7 +103,7 @@ pub(super) fn bake(mesh: &Mesh, materials: &[u16], visuals: &[Visual]) -> (Level
 }
 
 impl Facet {
-    fn paint(n: &V3, corners: &[V3], visual: &Visual) -> Self {
+    fn of(n: &V3, corners: &[V3], visual: &Visual) -> Self {
         let u = if n.x.abs() < 0.9 { V3::x() } else { V3::y() };
         let u = (u - n * u.dot(n)).normalize();
         let v = n.cross(&u);
@@ -98,63 +113,117 @@ impl Facet {
         let ([u0, u1], [v0, v1]) = (span(&u), span(&v));
         let texel = FINEST.max((u1 - u0).max(v1 - v0) / MOST_TEXELS);
         let origin = u * u0 + v * v0 + n * corners[0].dot(n);
-        let [width, height] = [u1 - u0, v1 - v0].map(|x| (x / texel).ceil().max(1.0) as usize);
-        let texels = (0..width * height)
-            .map(|i| {
-                let p =
-                    origin + u * ((i % width) as f32 + 0.5) * texel + v * ((i / width) as f32 + 0.5) * texel;
-                let look = pattern::look(visual, &p, n, texel).0;
-                [look.albedo.x, look.albedo.y, look.albedo.z, look.roughness]
-            })
-            .collect();
-        let mut mips = vec![Image { width, height, texels }];
-        while let Some(last) = mips.last().filter(|image| image.width.max(image.height) > 1) {
-            let next = last.halved();
-            mips.push(next);
-        }
-        Self { origin, u, v, density: 1.0 / texel, mips }
+        let size = [u1 - u0, v1 - v0].map(|x| (x / texel).ceil().max(1.0) as usize);
+        Self { origin, u, v, n: *n, texel, size, visual: visual.clone(), mips: OnceLock::new() }
     }
 
-    /// Albedo and roughness at `p` (object frame), averaged over about `footprint`, m.
-    pub fn sample(&self, p: &V3, footprint: f32) -> (V3, f32) {
+    /// Place of a point of the object frame, texels of the finest copy.
+    pub fn place(&self, p: &V3) -> [f32; 2] {
         let d = p - self.origin;
-        let level = (footprint * self.density).max(1.0).log2();
-        let low = (level as usize).min(self.mips.len() - 1);
-        let high = (low + 1).min(self.mips.len() - 1);
-        let [u, v] = [d.dot(&self.u) * self.density, d.dot(&self.v) * self.density];
-        let a = self.mips[low].at(u / (1 << low) as f32, v / (1 << low) as f32);
-        let t = (level - low as f32).clamp(0.0, 1.0);
-        let b = if t > 0.05 { self.mips[high].at(u / (1 << high) as f32, v / (1 << high) as f32) } else { a };
-        let mixed: [f32; 4] = std::array::from_fn(|i| a[i] + (b[i] - a[i]) * t);
-        (V3::new(mixed[0], mixed[1], mixed[2]), mixed[3])
+        [d.dot(&self.u) / self.texel, d.dot(&self.v) / self.texel]
+    }
+
+    fn paint(&self) -> Vec<Image> {
+        let [width, height] = self.size;
+        let look = |i: usize| {
+            let [x, y] = [(i % width) as f32 + 0.5, (i / width) as f32 + 0.5];
+            let p = self.origin + (self.u * x + self.v * y) * self.texel;
+            let look = pattern::look(&self.visual, &p, &self.n, self.texel).0;
+            [look.albedo.x, look.albedo.y, look.albedo.z, look.roughness]
+        };
+        let mut fine: Vec<[f32; 4]> = (0..width * height).map(look).collect();
+        let mut size = self.size;
+        let mut mips = vec![Image::of(&fine, size)];
+        while size[0].max(size[1]) > 1 {
+            (fine, size) = halved(&fine, size);
+            mips.push(Image::of(&fine, size));
+        }
+        mips
+    }
+
+    /// Albedo and roughness at places (texels), averaged over about `footprint`, m.
+    pub fn sample(&self, [u, v]: [F8; 2], footprint: F8) -> (V8, F8) {
+        let mips = self.mips.get_or_init(|| self.paint());
+        let last = F8::splat((mips.len() - 1) as f32);
+        let texels = footprint * F8::splat(1.0 / self.texel);
+        let level = rough_log2(texels.fast_max(F8::ONE)).fast_max(F8::ZERO).fast_min(last);
+        let levels = level.to_array();
+        let low = levels.into_iter().fold(f32::MAX, f32::min) as usize;
+        let high = levels.into_iter().fold(0.0, f32::max).ceil() as usize;
+        let mut sum = [F8::ZERO; 4];
+        for (k, image) in mips.iter().enumerate().take(high + 1).skip(low) {
+            let weight = (F8::ONE - (level - F8::splat(k as f32)).abs()).fast_max(F8::ZERO);
+            let scale = F8::splat(1.0 / (1_u32 << k) as f32);
+            let values = image.at(u * scale, v * scale);
+            (0..4).for_each(|c| sum[c] += weight * values[c]);
+        }
+        let [x, y, z, roughness] = sum;
+        (V8 { x: x * x, y: y * y, z: z * z }, roughness)
     }
 }
 
+/// Half the size, each texel the mean of up to four.
+fn halved(texels: &[[f32; 4]], from: [usize; 2]) -> (Vec<[f32; 4]>, [usize; 2]) {
+    let [width, height] = from.map(|n| n.div_ceil(2));
+    let texel = |i: usize| {
+        let (x, y) = (2 * (i % width), 2 * (i / width));
+        let (x1, y1) = ((x + 1).min(from[0] - 1), (y + 1).min(from[1] - 1));
+        let four = [(x, y), (x1, y), (x, y1), (x1, y1)].map(|(x, y)| texels[x + from[0] * y]);
+        std::array::from_fn(|c| 0.25 * four.iter().map(|t| t[c]).sum::<f32>())
+    };
+    ((0..width * height).map(texel).collect(), [width, height])
+}
+
 impl Image {
-    /// Half the size, each texel the mean of up to four.
-    fn halved(&self) -> Self {
-        let [width, height] = [self.width, self.height].map(|n| n.div_ceil(2));
-        let texel = |i: usize| {
-            let (x, y) = (2 * (i % width), 2 * (i / width));
-            let (x1, y1) = ((x + 1).min(self.width - 1), (y + 1).min(self.height - 1));
-            let four = [(x, y), (x1, y), (x, y1), (x1, y1)].map(|(x, y)| self.texels[x + self.width * y]);
-            std::array::from_fn(|c| 0.25 * four.iter().map(|t| t[c]).sum::<f32>())
-        };
-        Self { width, height, texels: (0..width * height).map(texel).collect() }
+    fn of(texels: &[[f32; 4]], size: [usize; 2]) -> Self {
+        let byte = |x: f32| (x.clamp(0.0, 1.0) * 255.0 + 0.5) as u32;
+        let stride = size[0] + 1;
+        let packed = (0..stride * (size[1] + 1)).map(|i| {
+            let (x, y) = ((i % stride).min(size[0] - 1), (i / stride).min(size[1] - 1));
+            let [r, g, b, roughness] = texels[x + size[0] * y];
+            byte(r.sqrt()) | byte(g.sqrt()) << 8 | byte(b.sqrt()) << 16 | byte(roughness) << 24
+        });
+        Self { size, texels: packed.collect() }
     }
 
-    /// Bilinear, clamped at the edges; (u, v) in texels.
-    fn at(&self, u: f32, v: f32) -> [f32; 4] {
-        let x = (u - 0.5).clamp(0.0, (self.width - 1) as f32);
-        let y = (v - 0.5).clamp(0.0, (self.height - 1) as f32);
-        let (i, j) = (x as usize, y as usize);
-        let (s, t) = (x - i as f32, y - j as f32);
-        let row = |j: usize| {
-            let a = self.texels[i + self.width * j];
-            let b = self.texels[(i + 1).min(self.width - 1) + self.width * j];
-            std::array::from_fn::<f32, 4, _>(|c| a[c] + (b[c] - a[c]) * s)
+    /// Bilinear, clamped at the edges; (u, v) in texels. Values 0..=1 of the four bytes.
+    #[inline(always)]
+    fn at(&self, u: F8, v: F8) -> [F8; 4] {
+        let clamped = |x: F8, most: usize| {
+            (x - F8::splat(0.5)).fast_max(F8::ZERO).fast_min(F8::splat((most - 1) as f32))
         };
-        let (a, b) = (row(j), row((j + 1).min(self.height - 1)));
-        std::array::from_fn(|c| a[c] + (b[c] - a[c]) * t)
+        let (x, y) = (clamped(u, self.size[0]), clamped(v, self.size[1]));
+        let (i, j) = (x.fast_trunc_int(), y.fast_trunc_int());
+        let stride = self.size[0] + 1;
+        let first: [u32; LANES] = cast(j * i32x8::splat(stride as i32) + i);
+        let mut corners = [[0_u32; LANES]; 4];
+        for (lane, &first) in first.iter().enumerate() {
+            let rows = self.texels.get(first as usize..first as usize + stride + 2);
+            let rows = rows.unwrap_or_default();
+            if let (Some(top), Some(bottom)) = (rows.first_chunk::<2>(), rows.last_chunk::<2>()) {
+                (corners[0][lane], corners[1][lane]) = (top[0], top[1]);
+                (corners[2][lane], corners[3][lane]) = (bottom[0], bottom[1]);
+            }
+        }
+        let fraction = |x: F8, i: i32x8| -> u32x8 {
+            cast(((x - F8::from_i32x8(i)) * F8::splat(256.0)).fast_trunc_int())
+        };
+        blend(corners.map(u32x8::new), fraction(x, i), fraction(y, j))
     }
+}
+
+/// Mixes four texels by fractions in 256ths, two bytes at a time.
+#[inline(always)]
+fn blend(corners: [u32x8; 4], x: u32x8, y: u32x8) -> [F8; 4] {
+    let both = (x * y) >> 8;
+    let weights = [u32x8::splat(256) - x - y + both, x - both, y - both, both];
+    let mask = u32x8::splat(0x00FF_00FF);
+    let (mut even, mut odd) = (u32x8::ZERO, u32x8::ZERO);
+    for (texel, weight) in corners.into_iter().zip(weights) {
+        even += (texel & mask) * weight;
+        odd += ((texel >> 8) & mask) * weight;
+    }
+    let value = |x: u32x8| F8::from_i32x8(cast(x)) * F8::splat(1.0 / 65_280.0);
+    let low = u32x8::splat(0xFFFF);
+    [value(even & low), value(odd & low), value(even >> 16), value(odd >> 16)]
 }

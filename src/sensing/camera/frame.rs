@@ -2,6 +2,7 @@
 
 use super::{
     CameraError, FrameView, Mount, Stage, V3, lens::Lens, pose::Posed, shade::Blob, shadow::ShadowMap,
+    surface::Drawn,
 };
 use crate::scene::Camera;
 
@@ -64,8 +65,26 @@ pub(super) fn choose_levels(
 }
 
 /// A thing's vertices in the world.
-pub(super) fn posed<'a>(stage: &'a Stage, poses: &'a [Vec<Posed>], thing: usize, level: usize) -> &'a Posed {
+fn posed<'a>(stage: &'a Stage, poses: &'a [Vec<Posed>], thing: usize, level: usize) -> &'a Posed {
     stage.fixed[thing].get(level).unwrap_or_else(|| &poses[thing][level])
+}
+
+/// What of each thing is drawn.
+pub(super) fn drawn<'a>(
+    stage: &'a Stage,
+    poses: &'a [Vec<Posed>],
+    levels: &[Option<usize>],
+) -> Vec<Option<Drawn<'a>>> {
+    let one = |(i, level): (usize, &Option<usize>)| {
+        let model = &stage.things[i].model;
+        let level = (*level)?;
+        Some(Drawn {
+            level: &model.levels[level],
+            posed: posed(stage, poses, i, level),
+            facets: &model.facets,
+        })
+    };
+    levels.iter().enumerate().map(one).collect()
 }
 
 /// The camera must not be inside of anything: where the solid angles of the triangles around it (Van Oosterom &

@@ -1,6 +1,6 @@
 //! A camera in its place: checks, and the way from the world to the image.
 
-use super::{CameraError, FrameView, V3, pose::Rigid};
+use super::{CameraError, FrameView, V3, pose::Rigid, screen::Seen};
 use crate::{
     geometry::Pose,
     scene::{Camera, CameraMount},
@@ -8,9 +8,6 @@ use crate::{
 
 /// Largest edge of an image, pixels.
 const MOST_EDGE: usize = 4096;
-
-/// Samples a pixel along each axis.
-pub(super) const SUB: usize = 2;
 
 /// A camera in the world.
 #[derive(Clone, Copy, Debug)]
@@ -24,16 +21,6 @@ pub(super) struct Lens {
     pub eye: V3,
     to_view: Rigid,
     to_world: Rigid,
-}
-
-/// A point in the image: samples from the top left, and the reciprocal of its depth; in front of the near plane if not
-/// `behind`.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Seen {
-    pub x: f32,
-    pub y: f32,
-    pub w: f32,
-    pub view: V3,
 }
 
 /// Checks the numbers of a camera.
@@ -112,15 +99,22 @@ impl Lens {
     /// The image of a point of the camera frame.
     pub fn project(&self, view: V3) -> Seen {
         let w = -1.0 / view.z;
-        let scale = SUB as f32 * self.focal * w;
-        let middle = |edge: usize| 0.5 * (SUB * edge) as f32;
+        let scale = self.focal * w;
+        let middle = |edge: usize| 0.5 * edge as f32;
         Seen { x: middle(self.width) + scale * view.x, y: middle(self.height) - scale * view.y, w, view }
     }
 
-    /// The ray through a point of the image (pixels from the top left), world; as long as a unit along the axis.
-    pub fn ray(&self, x: f32, y: f32) -> V3 {
-        let slope = |at: f32, edge: usize| (at - 0.5 * edge as f32) / self.focal;
-        self.to_world.turn(&V3::new(slope(x, self.width), -slope(y, self.height), -1.0))
+    /// The ray through the top left of the image, world, as long as a unit along the axis; and what it changes by a pixel
+    /// to the right, and a pixel down.
+    pub fn rays(&self) -> [V3; 3] {
+        let slope = |edge: usize| 0.5 * edge as f32 / self.focal;
+        let pixel = 1.0 / self.focal;
+        [
+            V3::new(-slope(self.width), slope(self.height), -1.0),
+            V3::new(pixel, 0.0, 0.0),
+            V3::new(0.0, -pixel, 0.0),
+        ]
+        .map(|v| self.to_world.turn(&v))
     }
 
     /// Depth along the axis of a point of the world, m.

@@ -1,8 +1,8 @@
 //! Pictures: a deterministic renderer for the processor, in single precision.
 //!
-//! Triangles are rasterised at four samples a pixel into a buffer of triangle numbers and reciprocal depths; then every
-//! triangle that a pixel shows is shaded once: Lambert and GGX (Walter et al. 2007) under one key light with soft shadows
-//! and a sky. Looks are baked into vertices, or into textures on large flat faces, when a [`Model`] is built, filtered to
+//! An image is made tile by tile. Triangles are rasterised at four samples a pixel into triangle numbers and reciprocal
+//! depths; then every surface that a pixel shows is lit once, eight points at a time: Lambert and GGX (Walter et al. 2007)
+//! under one key light with soft shadows and a sky. Looks are baked into vertices, or into textures on large flat faces, when a [`Model`] is built, filtered to
 //! the spacing of its vertices; so that nothing is evaluated twice and small images do not alias.
 //!
 //! What does not move is drawn once for a camera that does not move either; see [`Scratch`].
@@ -11,6 +11,7 @@ mod background;
 mod error;
 mod facet;
 mod frame;
+mod lanes;
 mod lens;
 mod model;
 mod noise;
@@ -20,10 +21,13 @@ mod picture;
 mod pose;
 mod raster;
 mod render;
+mod screen;
 mod shade;
 mod shadow;
 mod solids;
 mod stage;
+mod surface;
+mod tile;
 mod tone;
 mod turned;
 

@@ -37,6 +37,10 @@ pub(super) struct Level {
     pub triangles: Vec<[u32; 3]>,
     /// Facet of each triangle, or empty if there are none.
     pub facets: Vec<u32>,
+    /// Places of each triangle's corners in its facet.
+    pub places: Vec<[[f32; 2]; 3]>,
+    /// Number of the smooth patch that each triangle belongs to.
+    pub patches: Vec<u32>,
     /// Nodes and weights of each vertex of a soft thing.
     pub embedding: Vec<([u32; 8], [f32; 8])>,
     /// Mean length of the edges, m.
@@ -294,7 +298,17 @@ pub(super) fn bake(
         positions.iter_mut().zip(&normals).zip(&raised).for_each(|((p, n), h)| *p += n * *h);
         accumulate(&positions, &triangles, &mut normals);
     }
-    Level { positions, normals, looks, triangles, facets: Vec::new(), embedding: Vec::new(), spacing }
+    Level {
+        patches: patches(&triangles, positions.len()),
+        positions,
+        normals,
+        looks,
+        triangles,
+        facets: Vec::new(),
+        places: Vec::new(),
+        embedding: Vec::new(),
+        spacing,
+    }
 }
 
 /// Material ids at points spread evenly over the surface around `p`, a little farther than half the way to the next
@@ -390,6 +404,24 @@ pub(super) fn split(points: &[V3], triangles: &[[u32; 3]]) -> (Vec<u32>, Vec<[u3
         }
     }
     (of, out)
+}
+
+/// Numbers the sets of triangles that hang together by vertices.
+fn patches(triangles: &[[u32; 3]], vertices: usize) -> Vec<u32> {
+    let mut above: Vec<u32> = (0..vertices as u32).collect();
+    let root = |above: &mut Vec<u32>, mut v: u32| {
+        while above[v as usize] != v {
+            above[v as usize] = above[above[v as usize] as usize];
+            v = above[v as usize];
+        }
+        v
+    };
+    for t in triangles {
+        let roots = t.map(|v| root(&mut above, v));
+        let least = roots[0].min(roots[1]).min(roots[2]);
+        roots.iter().for_each(|&r| above[r as usize] = least);
+    }
+    triangles.iter().map(|t| root(&mut above, t[0])).collect()
 }
 
 /// Unit normals of vertices: the sum of the area normals of the triangles around.

@@ -1,152 +1,206 @@
-//! Triangles into samples. Edge functions are evaluated alike for both triangles of an edge, so that there are neither
-//! gaps nor double hits between them (Pineda, A Parallel Algorithm for Polygon Rasterization, 1988).
+//! Triangles into samples, eight samples at once. Edge functions are evaluated alike for both triangles of an edge, so that
+//! there are neither gaps nor double hits between them (Pineda, A Parallel Algorithm for Polygon Rasterization, 1988).
+
+use wide::{bytemuck::cast, u32x8};
+
+use super::lanes::{F8, LANES, STEPS};
 
 /// No triangle.
-pub(super) const NONE: u32 = u32::MAX;
+pub(super) const NONE: u32 = 0x7FFF_FFFF;
 
-/// A rectangle of samples: the greatest `w` at each, and whose it is.
+/// Samples a pixel of a camera.
+pub(super) const SAMPLES: usize = 4;
+/// Where the sample of each row of a pixel lies, pixels: no two are above one another or side by side, so that edges of
+/// every slope get all shades between in and out.
+const OFFSETS: [f32; SAMPLES] = [0.375, 0.875, 0.125, 0.625];
+
+/// A rectangle of samples in `ROWS` rows a unit, each row with a sample a unit: the greatest `w` at each, and whose it is.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Samples {
-    pub width: usize,
-    pub height: usize,
+pub(super) struct Samples<const ROWS: usize> {
+    /// Units across; rows are [`LANES`] longer, since eight are always written.
+    pub columns: usize,
+    /// Rows of samples.
+    pub rows: usize,
     /// Reciprocal depth, or height towards the light.
     pub w: Vec<f32>,
     /// Number of the triangle, or [`NONE`]; empty if nobody asks.
     pub id: Vec<u32>,
     /// Rows that something was drawn to, from and to.
-    pub rows: [usize; 2],
+    pub touched: [usize; 2],
 }
 
-impl Samples {
-    /// Empty samples of this size at `w`.
-    pub fn reset(&mut self, width: usize, height: usize, w: f32, with_ids: bool) {
-        if (self.width, self.height) != (width, height) || self.id.is_empty() == with_ids {
-            *self = Self { width, height, ..Self::default() };
-            self.w.resize(width * height, w);
-            self.id.resize(if with_ids { width * height } else { 0 }, NONE);
-        } else {
-            let [from, to] = self.rows;
-            if from < to {
-                self.w[from * width..to * width].fill(w);
-                if with_ids {
-                    self.id[from * width..to * width].fill(NONE);
+/// A place within a pixel, from its top left.
+pub(super) fn place<const ROWS: usize>(row: usize) -> [f32; 2] {
+    let x = if ROWS == 1 { 0.5 } else { OFFSETS[row % SAMPLES] };
+    [x, ((row % ROWS) as f32 + 0.5) / ROWS as f32]
+}
+
+impl<const ROWS: usize> Samples<ROWS> {
+    /// Empty samples at `w`; `units` high.
+    pub fn new(columns: usize, units: usize, w: f32, with_ids: bool) -> Self {
+        let rows = units * ROWS;
+        let all = rows * (columns + LANES);
+        let id = vec![NONE; if with_ids { all } else { 0 }];
+        Self { columns, rows, w: vec![w; all], id, touched: [rows, 0] }
+    }
+
+    /// Length of a row in memory.
+    pub fn stride(&self) -> usize {
+        self.columns + LANES
+    }
+
+    /// Empties what was drawn to.
+    pub fn clear(&mut self, w: f32) {
+        let [from, to] = self.touched.map(|row| row * self.stride());
+        if from < to {
+            self.w[from..to].fill(w);
+            if !self.id.is_empty() {
+                self.id[from..to].fill(NONE);
+            }
+        }
+        self.touched = [self.rows, 0];
+    }
+
+    /// Draws a triangle (x, y in units from the top left, w) where nothing is nearer. Its corners run clockwise as seen
+    /// in an image with y down; others face away. `origin` is the place of the first unit.
+    pub fn draw<const IDS: bool>(&mut self, at: &[[f32; 3]; 3], origin: [f32; 2], id: u32) {
+        let Some(span) = Span::of::<ROWS>(at, origin, [self.columns, self.rows]) else { return };
+        let Some(setup) = Setup::of(at, origin) else { return };
+        let size = [self.columns as f32, (self.rows / ROWS) as f32];
+        let Some(whole) = setup.covers(size) else { return };
+        self.touched = [self.touched[0].min(span.rows[0]), self.touched[1].max(span.rows[1])];
+        let stride = self.stride();
+        let edges = setup.edges.map(|e| (F8::splat(e.a), F8::splat(e.least)));
+        let (gx, least, most) = (F8::splat(setup.gx), F8::splat(setup.least), F8::splat(setup.most));
+        for row in span.rows[0]..span.rows[1] {
+            let [x, _] = place::<ROWS>(row);
+            let y = (row as f32 + 0.5) / ROWS as f32;
+            let starts = setup.edges.map(|e| F8::splat(e.c + (e.b * y + e.a * x)));
+            let w_row = F8::splat(setup.w + (setup.gy * y + setup.gx * x));
+            let mut column = span.columns[0];
+            while column < span.columns[1] {
+                let step = F8::splat(column as f32) + STEPS;
+                let at = row * stride + column;
+                column += LANES;
+                let Some(old) = self.w.get_mut(at..).and_then(|w| w.first_chunk_mut::<LANES>()) else {
+                    break;
+                };
+                let w = (w_row + gx * step).fast_max(least).fast_min(most);
+                let mut take = w.simd_gt(F8::new(*old));
+                if !whole {
+                    let inside = |i: usize| (starts[i] + edges[i].0 * step).simd_gt(edges[i].1);
+                    take &= inside(0) & inside(1) & inside(2);
+                }
+                if !take.any() {
+                    continue;
+                }
+                *old = take.select(w, F8::new(*old)).to_array();
+                if let (true, Some(ids)) =
+                    (IDS, self.id.get_mut(at..).and_then(|id| id.first_chunk_mut::<LANES>()))
+                {
+                    let mask: u32x8 = cast(take);
+                    *ids = mask.select(u32x8::splat(id), u32x8::new(*ids)).to_array();
                 }
             }
         }
-        self.rows = [height, 0];
     }
+}
 
-    /// Draws a triangle (x, y in samples from the top left, w) where nothing is nearer, also not in `before`. Its
-    /// corners run clockwise as seen in an image with y down if `turn` is 1, and the other way if −1; others face away.
-    pub fn draw<const IDS: bool>(
-        &mut self,
-        mut at: [[f32; 3]; 3],
-        turn: f32,
-        id: u32,
-        before: Option<&[f32]>,
-    ) {
-        let [a, b, c] = at;
-        let area = turn * ((b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]));
-        if area.is_nan() || area <= 0.0 {
-            return;
-        }
-        if turn < 0.0 {
-            at.swap(1, 2);
-        }
-        let span = |axis: usize, most: usize| {
-            let low = at[0][axis].min(at[1][axis]).min(at[2][axis]);
-            let high = at[0][axis].max(at[1][axis]).max(at[2][axis]);
-            // The samples are at halves; conversions saturate.
-            let from = (low - 0.5).ceil().max(0.0) as usize;
-            let to = ((high - 0.5).floor() + 1.0).max(0.0) as usize;
-            (from, to.min(most))
+/// The rows and columns of samples that a triangle can touch.
+struct Span {
+    rows: [usize; 2],
+    columns: [usize; 2],
+}
+
+impl Span {
+    fn of<const ROWS: usize>(at: &[[f32; 3]; 3], origin: [f32; 2], size: [usize; 2]) -> Option<Self> {
+        let range = |axis: usize| {
+            let low = at[0][axis].min(at[1][axis]).min(at[2][axis]) - origin[axis];
+            let high = at[0][axis].max(at[1][axis]).max(at[2][axis]) - origin[axis];
+            (low, high)
         };
-        let (y0, y1) = span(1, self.height);
-        let (x0, x1) = span(0, self.width);
-        if y0 >= y1 || x0 >= x1 {
-            return;
-        }
-        let edges = [edge(&at[0], &at[1]), edge(&at[1], &at[2]), edge(&at[2], &at[0])];
-        let plane = plane(&at);
-        self.rows = [self.rows[0].min(y0), self.rows[1].max(y1)];
-        for y in y0..y1 {
-            let e = edges.each_ref().map(|edge| edge.row(y as f64 + 0.5));
-            let (from, to) = narrowed(&edges, &e, x0, x1);
-            let w_row = (plane[2] + plane[1] * (y as f64 + 0.5)) as f32;
-            let line = y * self.width;
-            for x in from..to {
-                let s = x as f32 + 0.5;
-                if edges[0].inside(e[0], s) & edges[1].inside(e[1], s) & edges[2].inside(e[2], s) {
-                    let w = w_row + plane[0] as f32 * s;
-                    let i = line + x;
-                    if w > self.w[i] && before.is_none_or(|before| w > before[i]) {
-                        self.w[i] = w;
-                        if IDS {
-                            self.id[i] = id;
-                        }
-                    }
-                }
-            }
-        }
+        // Conversions saturate.
+        let between = |low: f32, high: f32, most: usize| {
+            let (from, to) = (low.ceil().max(0.0) as usize, (high.floor() + 1.0).max(0.0) as usize);
+            [from, to.min(most)]
+        };
+        let scale = ROWS as f32;
+        let (low, high) = range(1);
+        let rows = between(low * scale - 0.5, high * scale - 0.5, size[1]);
+        let (low, high) = range(0);
+        let [first, last] = if ROWS == 1 { [0.5, 0.5] } else { [0.125, 0.875] };
+        let columns = between(low - last, high - first, size[0]);
+        (rows[0] < rows[1] && columns[0] < columns[1]).then_some(Self { rows, columns })
     }
 }
 
-/// The line through two corners: positive inside.
+/// The line through two corners, a x + b y + c; inside where it is above `least`.
+#[derive(Clone, Copy)]
 struct Edge {
     a: f32,
-    b: f64,
-    c: f64,
-    /// Whether points exactly on it belong to this side.
-    owns: bool,
+    b: f32,
+    c: f32,
+    /// 0 or just below: whether points exactly on the line belong to this side.
+    least: f32,
 }
 
-fn edge(from: &[f32; 3], to: &[f32; 3]) -> Edge {
+/// A triangle's edges and its w = w + gx x + gy y, clamped to what its corners have.
+struct Setup {
+    edges: [Edge; 3],
+    w: f32,
+    gx: f32,
+    gy: f32,
+    least: f32,
+    most: f32,
+}
+
+impl Setup {
+    /// None if it faces away or has no area.
+    fn of(at: &[[f32; 3]; 3], origin: [f32; 2]) -> Option<Self> {
+        let [a, b, c] = at.map(|v| v.map(f64::from));
+        let (bx, by, bw) = (b[0] - a[0], b[1] - a[1], b[2] - a[2]);
+        let (cx, cy, cw) = (c[0] - a[0], c[1] - a[1], c[2] - a[2]);
+        let area = bx * cy - cx * by;
+        if area.is_nan() || area <= 0.0 {
+            return None;
+        }
+        let (gx, gy) = ((bw * cy - cw * by) / area, (bx * cw - cx * bw) / area);
+        let origin = origin.map(f64::from);
+        let w = a[2] + gx * (origin[0] - a[0]) + gy * (origin[1] - a[1]);
+        let edge = |i: usize| edge(&at[i], &at[(i + 1) % 3], origin);
+        Some(Self {
+            edges: [edge(0), edge(1), edge(2)],
+            w: w as f32,
+            gx: gx as f32,
+            gy: gy as f32,
+            least: at[0][2].min(at[1][2]).min(at[2][2]),
+            most: at[0][2].max(at[1][2]).max(at[2][2]),
+        })
+    }
+
+    /// Whether a rectangle from the origin lies wholly inside; none if wholly outside.
+    fn covers(&self, size: [f32; 2]) -> Option<bool> {
+        let mut whole = true;
+        for e in &self.edges {
+            let (x, y) = (e.a * size[0], e.b * size[1]);
+            if e.c + x.max(0.0) + y.max(0.0) < 0.0 {
+                return None;
+            }
+            whole &= e.c + x.min(0.0) + y.min(0.0) > 0.0;
+        }
+        Some(whole)
+    }
+}
+
+fn edge(from: &[f32; 3], to: &[f32; 3], origin: [f64; 2]) -> Edge {
     // One order for both triangles of an edge, and the sign after.
     let flipped = (from[0], from[1]) > (to[0], to[1]);
     let (p, q) = if flipped { (to, from) } else { (from, to) };
     let sign = if flipped { -1.0 } else { 1.0 };
-    let (a, b) = (f64::from(p[1]) - f64::from(q[1]), f64::from(q[0]) - f64::from(p[0]));
-    let c = -(a * f64::from(p[0]) + b * f64::from(p[1]));
+    let (px, py) = (f64::from(p[0]), f64::from(p[1]));
+    let (a, b) = (py - f64::from(q[1]), f64::from(q[0]) - px);
+    let c = a * (origin[0] - px) + b * (origin[1] - py);
     let (a, b, c) = (sign * a, sign * b, sign * c);
-    Edge { a: a as f32, b, c, owns: a > 0.0 || (a == 0.0 && b > 0.0) }
-}
-
-impl Edge {
-    fn row(&self, y: f64) -> f32 {
-        (self.b * y + self.c) as f32
-    }
-
-    #[inline(always)]
-    fn inside(&self, row: f32, x: f32) -> bool {
-        let e = row + self.a * x;
-        e > 0.0 || (e == 0.0 && self.owns)
-    }
-}
-
-/// The part of x0..x1 in which a row can be inside all edges, a sample wider than needed.
-fn narrowed(edges: &[Edge; 3], rows: &[f32; 3], x0: usize, x1: usize) -> (usize, usize) {
-    if x1 - x0 < 6 {
-        return (x0, x1);
-    }
-    let (mut from, mut to) = (x0 as f32, x1 as f32);
-    for (edge, row) in edges.iter().zip(rows) {
-        let cross = -row / edge.a - 0.5;
-        if edge.a > 0.0 {
-            from = from.max(cross - 1.5);
-        } else if edge.a < 0.0 {
-            to = to.min(cross + 2.5);
-        }
-    }
-    (from.max(x0 as f32) as usize, to.max(0.0).min(x1 as f32) as usize)
-}
-
-/// w = p0 x + p1 y + p2 through three corners.
-fn plane(at: &[[f32; 3]; 3]) -> [f64; 3] {
-    let [a, b, c] = at.map(|v| v.map(f64::from));
-    let (bx, by, bw) = (b[0] - a[0], b[1] - a[1], b[2] - a[2]);
-    let (cx, cy, cw) = (c[0] - a[0], c[1] - a[1], c[2] - a[2]);
-    let det = bx * cy - cx * by;
-    let gx = (bw * cy - cw * by) / det;
-    let gy = (bx * cw - cx * bw) / det;
-    [gx, gy, a[2] - gx * a[0] - gy * a[1]]
+    let owns = a > 0.0 || (a == 0.0 && b > 0.0);
+    Edge { a: a as f32, b: b as f32, c: c as f32, least: if owns { -f32::MIN_POSITIVE } else { 0.0 } }
 }

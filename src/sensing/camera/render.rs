@@ -2,15 +2,16 @@
 
 use super::{
     CameraError, FrameView, Picture, Stage,
-    background::Background,
-    frame::{blobs, check_outside, choose_levels, draw_shadows, pose_all},
-    lens::{Lens, Seen},
-    pass::{Pass, Which},
+    background::{Background, Spots},
+    frame::{blobs, check_outside, choose_levels, draw_shadows, drawn, pose_all},
+    lens::Lens,
+    pass::Pass,
     pose::Posed,
-    raster::Samples,
-    shade::Light,
+    raster::{SAMPLES, Samples},
+    screen::{Screen, TILE},
     shadow::ShadowMap,
-    tone::Tone,
+    surface::Rays,
+    tile::{Display, PIXELS, Resolver, Window},
 };
 use crate::scene::{Camera, CameraMount};
 
@@ -19,8 +20,7 @@ use crate::scene::{Camera, CameraMount};
 pub struct Scratch {
     /// World forms of the levels of moving things.
     poses: Vec<Vec<Posed>>,
-    projected: Vec<Seen>,
-    samples: Samples,
+    screen: Screen,
     shadow: Option<(u64, ShadowMap)>,
     backgrounds: Vec<Background>,
     /// Whether backgrounds are not kept.
@@ -53,34 +53,123 @@ pub fn render(
         _ => ShadowMap::new(&stage.lighting),
     };
     draw_shadows(stage, &scratch.poses, &mut shadow);
-    let (light, tone) = (Light::new(&stage.lighting), Tone::new(stage.lighting.exposure));
     let [fixed_blobs, moving_blobs] = blobs(stage, &bounds);
     let pass = Pass {
         stage,
         lens: &lens,
-        levels: &levels,
-        poses: &scratch.poses,
-        light: &light,
-        tone: &tone,
+        rays: Rays::new(&lens),
+        drawn: &drawn(stage, &scratch.poses, &levels),
         fixed_blobs: &fixed_blobs,
         moving_blobs: &moving_blobs,
         moving_shadow: &shadow,
     };
-    let (samples, projected) = (&mut scratch.samples, &mut scratch.projected);
     let picture = if scratch.uncached || camera.mount != CameraMount::World {
-        pass.draw(Which::All, samples, projected, None);
-        pass.shade_all(samples)
+        all(&pass, &mut scratch.screen)
     } else {
         let known = scratch.backgrounds.iter().position(|b| b.stage == stage.key && b.camera == *camera);
         let index = known.unwrap_or_else(|| {
             scratch.backgrounds.retain(|b| b.stage == stage.key);
-            scratch.backgrounds.push(pass.background(camera, projected));
+            scratch.backgrounds.push(background(&pass, camera));
             scratch.backgrounds.len() - 1
         });
-        let background = &scratch.backgrounds[index];
-        pass.draw(Which::Moving, samples, projected, Some(&background.samples.w));
-        pass.shade_over(background, samples)
+        over(&pass, &scratch.backgrounds[index], &mut scratch.screen)
     };
     scratch.shadow = Some((stage.key, shadow));
     Ok(picture)
+}
+
+fn empty_picture(lens: &Lens) -> Picture {
+    let (width, height) = (lens.width, lens.height);
+    let pixels = width * height;
+    Picture {
+        width,
+        height,
+        rgb: vec![0; 3 * pixels],
+        depth: vec![0.0; pixels],
+        segmentation: vec![0; pixels],
+    }
+}
+
+fn empty_display() -> Display {
+    Display(Box::new([[0.0; PIXELS]; 3]))
+}
+
+fn empty_samples(lens: &Lens) -> Samples<SAMPLES> {
+    Samples::new(TILE, TILE, 1.0 / lens.far, true)
+}
+
+/// Everything, drawn from nothing.
+fn all(pass: &Pass, screen: &mut Screen) -> Picture {
+    screen.clear(pass.lens);
+    pass.show(false, screen);
+    pass.show(true, screen);
+    screen.sort();
+    let (mut picture, mut display) = (empty_picture(pass.lens), empty_display());
+    let mut samples = empty_samples(pass.lens);
+    for tile in 0..screen.tiles().iter().product() {
+        let window = Window::of(tile, screen, pass);
+        samples.clear(1.0 / pass.lens.far);
+        window.draw(screen, &mut samples);
+        Resolver::new(pass, window, &samples, &[screen]).run(false, &mut display, &mut picture);
+        window.write(&display, &mut picture);
+    }
+    picture
+}
+
+/// What is fixed.
+fn background(pass: &Pass, camera: &Camera) -> Background {
+    let screen = &mut Screen::default();
+    screen.clear(pass.lens);
+    pass.show(false, screen);
+    screen.sort();
+    let (mut picture, mut display) = (empty_picture(pass.lens), empty_display());
+    let mut samples = empty_samples(pass.lens);
+    let mut tiles = Vec::new();
+    for tile in 0..screen.tiles().iter().product() {
+        let window = Window::of(tile, screen, pass);
+        samples.clear(1.0 / pass.lens.far);
+        window.draw(screen, &mut samples);
+        let mut spots = Spots::new();
+        Resolver::new(pass, window, &samples, &[screen]).run(false, &mut spots, &mut picture);
+        spots.finish(pass, &samples);
+        spots.relight(pass, &(false, Vec::new()), &mut display);
+        window.write(&display, &mut picture);
+        tiles.push(spots);
+    }
+    Background {
+        stage: pass.stage.key,
+        camera: camera.clone(),
+        tiles,
+        picture,
+        screen: std::mem::take(screen),
+    }
+}
+
+/// What moves, over a background.
+fn over(pass: &Pass, background: &Background, screen: &mut Screen) -> Picture {
+    screen.clear(pass.lens);
+    pass.show(true, screen);
+    screen.sort();
+    let (mut picture, mut display) = (background.picture.clone(), empty_display());
+    let mut samples = empty_samples(pass.lens);
+    for (tile, spots) in background.tiles.iter().enumerate() {
+        let hidden = spots.hidden_by(pass);
+        let covered = screen.of_tile(tile).len() > 0;
+        if !covered && !hidden.0 && hidden.1.is_empty() {
+            continue;
+        }
+        let window = Window::of(tile, screen, pass);
+        spots.relight(pass, &hidden, &mut display);
+        if covered {
+            samples.clone_from(&spots.samples);
+            window.draw(screen, &mut samples);
+            Resolver::new(pass, window, &samples, &[&background.screen, screen]).run(
+                true,
+                &mut display,
+                &mut picture,
+            );
+        }
+        window.write(&display, &mut picture);
+    }
+    picture
 }

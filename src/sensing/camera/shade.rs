@@ -1,32 +1,40 @@
-//! Light on a point of a surface.
+//! Light on points of surfaces, eight at once.
 
-use std::f32::consts::PI;
-
-use super::{V3, pattern::Look, shadow::ShadowMap};
+use super::{
+    V3,
+    lanes::{F8, V8, exp2},
+    shadow::ShadowMap,
+};
 use crate::scene::Lighting;
 
-/// A point of a surface that is looked at.
+/// Points of surfaces that are looked at.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Fragment {
+pub(super) struct Points {
     /// World, m.
-    pub p: V3,
-    /// Unit normal, world.
-    pub n: V3,
-    pub look: Look,
+    pub p: V8,
+    /// Unit normals, world.
+    pub n: V8,
+    /// Linear RGB.
+    pub albedo: V8,
+    pub roughness: F8,
+    pub metalness: F8,
+    /// Share of the sky that is not hidden by the object itself.
+    pub open: F8,
+    /// Numbers of the things.
+    pub thing: F8,
 }
 
-/// The light that reaches the eye from a point, linear RGB: from the key light, and from everywhere else.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// The light that reaches the eye from points, linear RGB: from the key light, and from everywhere else.
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Split {
-    pub direct: V3,
-    pub ambient: V3,
+    pub direct: V8,
+    pub ambient: V8,
 }
 
 impl Split {
-    pub const BLACK: Self = Self { direct: V3::new(0.0, 0.0, 0.0), ambient: V3::new(0.0, 0.0, 0.0) };
-
-    /// With shares of both reaching the point.
-    pub fn dimmed(&self, (direct, ambient): (f32, f32)) -> V3 {
+    /// With shares of both reaching the points.
+    #[inline(always)]
+    pub fn dimmed(&self, direct: F8, ambient: F8) -> V8 {
         self.direct * direct + self.ambient * ambient
     }
 }
@@ -59,66 +67,87 @@ impl Light {
         }
     }
 
-    /// The sky in a direction (unit z component `up`).
-    pub fn sky(&self, up: f32) -> V3 {
-        let end = if up > 0.0 { self.zenith } else { self.ground };
-        self.horizon + (end - self.horizon) * up.abs().min(1.0).sqrt()
+    /// From the horizon to the zenith or the ground.
+    #[inline(always)]
+    fn towards(&self, up: F8, share: F8) -> V8 {
+        let horizon = V8::splat(&self.horizon);
+        let above = up.simd_gt(F8::ZERO);
+        let end = V8::splat(&self.zenith).or(above, V8::splat(&self.ground));
+        horizon + (end - horizon) * share
     }
 
-    /// Irradiance from the sky over π on a surface whose normal's z component is `up`.
-    fn fill(&self, up: f32) -> V3 {
-        let end = if up > 0.0 { self.zenith } else { self.ground };
-        self.horizon + (end - self.horizon) * up.abs()
+    /// The sky in directions (unit z components `up`).
+    #[inline(always)]
+    pub fn sky(&self, up: F8) -> V8 {
+        self.towards(up, up.abs().fast_min(F8::ONE).sqrt())
     }
 
-    /// Light from a fragment towards `to_eye` (unit), before anything else shades it.
+    /// Irradiance from the sky over π on surfaces whose normals' z components are `up`.
+    #[inline(always)]
+    fn fill(&self, up: F8) -> V8 {
+        self.towards(up, up.abs())
+    }
+
+    /// Light from points towards `to_eye` (unit), before anything else shades it.
     ///
     /// Lambert and GGX with Smith's height-correlated masking (Walter et al., Microfacet Models for Refraction, 2007;
     /// Heitz, Understanding the Masking-Shadowing Function, JCGT 2014) and Schlick's Fresnel term; the sky's reflection
     /// by Karis's fit (Physically Based Shading on Mobile, 2014).
-    pub fn split(&self, f: &Fragment, to_eye: &V3) -> Split {
-        let look = &f.look;
-        let n_v = f.n.dot(to_eye).max(0.02);
-        let n_l = f.n.dot(&self.to_key).max(0.0);
-        let diffuse = look.albedo * (1.0 - look.metalness);
-        let f0 = V3::repeat(0.04 * (1.0 - look.metalness)) + look.albedo * look.metalness;
-        let mut direct = V3::zeros();
-        if n_l > 0.0 {
-            let half = (to_eye + self.to_key).normalize();
-            let (n_h, l_h) = (f.n.dot(&half).clamp(0.0, 1.0), half.dot(&self.to_key).clamp(0.0, 1.0));
-            let alpha = (look.roughness * look.roughness + self.widening).clamp(0.02, 1.0);
-            let a2 = alpha * alpha;
-            let d = n_h * n_h * (a2 - 1.0) + 1.0;
-            let masked =
-                n_l * (n_v * n_v * (1.0 - a2) + a2).sqrt() + n_v * (n_l * n_l * (1.0 - a2) + a2).sqrt();
-            let grazing = (1.0 - l_h) * (1.0 - l_h);
-            let fresnel = f0 + (V3::repeat(1.0) - f0) * (grazing * grazing * (1.0 - l_h));
-            // D V F with the light's irradiance π times its strength.
-            let specular = fresnel * (a2 / (PI * d * d) * 0.5 / masked * PI);
-            direct = (diffuse + specular).component_mul(&self.key) * n_l;
-        }
-        let mirror = f.n * (2.0 * f.n.dot(to_eye)) - to_eye;
-        let fill = self.fill(f.n.z);
-        let seen = self.sky(mirror.z) * (1.0 - look.roughness) + self.fill(mirror.z) * look.roughness;
-        let ambient = (diffuse.component_mul(&fill)
-            + reflected(&f0, look.roughness, n_v).component_mul(&seen))
-            * look.open;
-        Split { direct, ambient }
+    #[inline(always)]
+    pub fn split(&self, s: &Points, to_eye: V8) -> Split {
+        let one = F8::ONE;
+        let n_v = s.n.dot(to_eye).fast_max(F8::splat(0.02));
+        let diffuse = s.albedo * (one - s.metalness);
+        let f0 = (s.albedo * s.metalness).map(|c| c + F8::splat(0.04) * (one - s.metalness));
+        let mirror = s.n.z * (F8::splat(2.0) * s.n.dot(to_eye)) - to_eye.z;
+        let seen = self.sky(mirror) * (one - s.roughness) + self.fill(mirror) * s.roughness;
+        let (scale, bias) = reflected(s.roughness, n_v);
+        let ambient = diffuse.times(self.fill(s.n.z)) + f0.map(|c| c * scale + bias).times(seen);
+        Split { direct: self.direct(s, to_eye, diffuse, f0), ambient: ambient * s.open }
     }
 
-    /// What of the key light casters leave at a fragment.
-    pub fn unshadowed(&self, f: &Fragment, map: &ShadowMap) -> f32 {
-        if f.n.dot(&self.to_key) <= 0.0 { 1.0 } else { map.light(&map.place(&f.p), &f.n) }
+    /// The key light's part.
+    #[inline(always)]
+    fn direct(&self, s: &Points, to_eye: V8, diffuse: V8, f0: V8) -> V8 {
+        let (one, half_one) = (F8::ONE, F8::splat(0.5));
+        let to_key = V8::splat(&self.to_key);
+        let n_v = s.n.dot(to_eye).fast_max(F8::splat(0.02));
+        let n_l = s.n.dot(to_key).fast_max(F8::ZERO);
+        let half = (to_eye + to_key).unit();
+        let n_h = s.n.dot(half).fast_max(F8::ZERO).fast_min(one);
+        let l_h = half.dot(to_key).fast_max(F8::ZERO).fast_min(one);
+        let alpha = (s.roughness * s.roughness + F8::splat(self.widening)).fast_max(F8::splat(0.02));
+        let alpha = alpha.fast_min(one);
+        let a2 = alpha * alpha;
+        let d = n_h * n_h * (a2 - one) + one;
+        let masked = n_l * (n_v * n_v * (one - a2) + a2).sqrt() + n_v * (n_l * n_l * (one - a2) + a2).sqrt();
+        let grazing = (one - l_h) * (one - l_h);
+        let grazing = grazing * grazing * (one - l_h);
+        // D V F with the light's irradiance π times its strength.
+        let strength = a2 * half_one / (d * d * masked);
+        let specular = f0.map(|c| (c + (one - c) * grazing) * strength);
+        (diffuse + specular).times(V8::splat(&self.key)) * n_l
+    }
+
+    /// What of the key light casters leave at points.
+    #[inline(always)]
+    pub fn unshadowed(&self, p: V8, n: &V8, map: &ShadowMap) -> F8 {
+        let faces = n.dot(V8::splat(&self.to_key)).simd_gt(F8::ZERO);
+        map.light(&map.places(p), n, faces)
     }
 }
 
-fn reflected(f0: &V3, roughness: f32, n_v: f32) -> V3 {
-    let r =
-        [1.0 - roughness, 0.0425 - 0.0275 * roughness, 1.04 - 0.572 * roughness, 0.022 * roughness - 0.04];
-    let fall = (0.001_f32).powf(n_v * 0.93).min(r[0] * r[0]);
-    let a004 = fall * r[0] + r[1];
-    let (scale, bias) = (-1.04 * a004 + r[2], 1.04 * a004 + r[3]);
-    f0 * scale + V3::repeat(bias.max(0.0))
+/// Factor of the reflectance at normal incidence, and what is added to it.
+#[inline(always)]
+fn reflected(roughness: F8, n_v: F8) -> (F8, F8) {
+    let linear = |a: f32, b: f32| F8::splat(a) + F8::splat(b) * roughness;
+    let r = linear(1.0, -1.0);
+    // 0.001 to the power of 0.93 n_v.
+    let fall = exp2(n_v * F8::splat(-9.268_2)).fast_min(r * r);
+    let a004 = fall * r + linear(0.0425, -0.0275);
+    let scale = linear(1.04, -0.572) - F8::splat(1.04) * a004;
+    let bias = linear(-0.04, 0.022) + F8::splat(1.04) * a004;
+    (scale, bias.fast_max(F8::ZERO))
 }
 
 /// Something that hides part of the sky from what is near: an ellipsoid.
@@ -139,25 +168,33 @@ impl Blob {
         let reach = 2.6 * radii.max();
         Self { thing, centre: (low + high) * 0.5, radii, reach2: reach * reach }
     }
+
+    /// Whether it hides sky from anything in a box.
+    pub fn reaches(&self, [low, high]: &[V3; 2]) -> bool {
+        let nearest = self.centre.sup(low).inf(high);
+        (nearest - self.centre).norm_squared() < self.reach2
+    }
 }
 
-/// Share of the sky that blobs leave open at `p` on a surface of normal `n` (Quilez, Sphere Ambient Occlusion, 2006, in
-/// the space in which the ellipsoid is a ball).
-#[inline]
-pub(super) fn open_sky(blobs: &[Blob], p: &V3, n: &V3, own: usize) -> f32 {
-    let mut open = 1.0;
+/// Share of the sky that blobs leave open at `p` on surfaces of normals `n` (Quilez, Sphere Ambient Occlusion, 2006, in
+/// the space in which the ellipsoid is a ball). `own` is the thing each point belongs to.
+#[inline(always)]
+pub(super) fn open_sky(blobs: &[Blob], p: V8, n: V8, own: F8) -> F8 {
+    let mut open = F8::ONE;
     for blob in blobs {
-        let d = blob.centre - p;
-        let d2 = d.norm_squared();
-        if d2 > blob.reach2 || blob.thing == own {
+        let d = V8::splat(&blob.centre) - p;
+        let d2 = d.dot(d);
+        let near = d2.simd_lt(F8::splat(blob.reach2)) & own.simd_ne(F8::splat(blob.thing as f32));
+        if !near.any() {
             continue;
         }
-        let q = d.component_div(&blob.radii);
-        let normal = n.component_mul(&blob.radii);
-        let distance2 = q.norm_squared().max(1.0);
-        let cosine = (normal.dot(&q) / (normal.norm() * q.norm()).max(1e-9)).max(0.0);
-        let fade = 1.0 - d2 / blob.reach2;
-        open *= 1.0 - 0.75 * cosine / distance2 * fade;
+        let q = d.times(V8::splat(&blob.radii.map(|r| 1.0 / r)));
+        let normal = n.times(V8::splat(&blob.radii));
+        let (q2, n2) = (q.dot(q), normal.dot(normal));
+        let cosine = (normal.dot(q) / (q2 * n2).fast_max(F8::splat(1e-18)).sqrt()).fast_max(F8::ZERO);
+        let fade = F8::ONE - d2 * F8::splat(1.0 / blob.reach2);
+        let hidden = F8::splat(0.75) * cosine * fade / q2.fast_max(F8::ONE);
+        open *= F8::ONE - (near & hidden);
     }
     open
 }

@@ -1,21 +1,31 @@
 //! Soft shadows of the key light: a map of the heights nearest to it, and a filter as wide as the penumbra (Fernando,
-//! Percentage-Closer Soft Shadows, SIGGRAPH sketches 2005).
+//! Percentage-Closer Soft Shadows, SIGGRAPH sketches 2005). Most points are known to be lit or dark from the greatest and
+//! least heights around them, and are not filtered at all.
 
-use super::{V3, raster::Samples};
+use super::{
+    V3,
+    lanes::{F8, LANES, STEPS, V8},
+    raster::Samples,
+};
 use crate::scene::Lighting;
 
+/// Texels along an edge of the part of the map in which shadows fall.
+const INNER: usize = 1024;
+/// Texels around it that the filter reaches into.
+const MARGIN: usize = 16;
 /// Texels along an edge of the map.
-const EDGE: usize = 1024;
-/// Texels along an edge of the tiles that know whether a shadow can be near.
-const TILE: usize = 16;
+const EDGE: usize = INNER + 2 * MARGIN;
+/// Texels along an edge of the tiles that know the range of heights around them.
+const TILE: usize = 8;
 const TILES: usize = EDGE / TILE;
+/// Tiles to each side that the range covers: as far as the filter reaches.
+const AROUND: usize = 2;
 /// A surface is in the shadow of what is higher by more than this, m.
 const BIAS: f32 = 2.5e-3;
-/// Step of the search for what casts the shadow, texels; two of them reach as far as the widest filter, so that there is
-/// no seam where the search finds all dark or nothing.
-const SEARCH: f32 = 6.0;
-/// Widest filter, texels to each side.
-const WIDEST: f32 = 12.0;
+/// Widest filter and reach of the search for what casts the shadow, texels to each side: three vectors across.
+const WIDEST: f32 = 11.4;
+/// Narrowest filter, texels to each side.
+const NARROWEST: f32 = 1.6;
 /// Heights below all.
 const EMPTY: f32 = -1e9;
 
@@ -26,9 +36,20 @@ pub(super) struct ShadowMap {
     centre: V3,
     texels_per_metre: f32,
     tangent: f32,
-    heights: Samples,
-    /// Greatest height in and around each tile.
-    tiles: Vec<f32>,
+    heights: Samples<1>,
+    /// Least and greatest height in and around each tile.
+    ranges: Vec<[f32; 2]>,
+    /// Working memory.
+    own: Vec<[f32; 2]>,
+    places: Vec<[f32; 3]>,
+}
+
+/// Places of eight points: texels, and height towards the light, m.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Places {
+    pub u: F8,
+    pub v: F8,
+    pub height: F8,
 }
 
 impl ShadowMap {
@@ -37,126 +58,196 @@ impl ShadowMap {
         let up: V3 = lighting.key.direction_w.normalize().cast();
         let side = if up.z.abs() < 0.99 { V3::z() } else { V3::x() };
         let u = side.cross(&up).normalize();
-        let mut map = Self {
+        Self {
             axes: [u, up.cross(&u), up],
             centre: lighting.shadow_centre_w.cast(),
-            texels_per_metre: EDGE as f32 / (2.0 * lighting.shadow_radius_m as f32),
+            texels_per_metre: INNER as f32 / (2.0 * lighting.shadow_radius_m as f32),
             tangent: lighting.key.softness_rad.tan() as f32,
-            heights: Samples::default(),
-            tiles: vec![EMPTY; TILES * TILES],
-        };
-        map.clear();
-        map
+            heights: Samples::new(EDGE, EDGE, EMPTY, false),
+            ranges: vec![[EMPTY; 2]; TILES * TILES],
+            own: vec![[EMPTY; 2]; TILES * TILES],
+            places: Vec::new(),
+        }
     }
 
+    /// Takes all casters away.
     pub fn clear(&mut self) {
-        self.heights.reset(EDGE, EDGE, EMPTY, false);
+        self.heights.clear(EMPTY);
     }
 
-    /// Place of a point in the map: texels, and height towards the light, m.
-    pub fn place(&self, p_w: &V3) -> [f32; 3] {
+    fn place(&self, p_w: &V3) -> [f32; 3] {
         let d = p_w - self.centre;
         let at = |axis: usize| d.dot(&self.axes[axis]) * self.texels_per_metre + 0.5 * EDGE as f32;
         [at(0), at(1), d.dot(&self.axes[2])]
     }
 
+    /// Places of points, world.
+    #[inline(always)]
+    pub fn places(&self, p_w: V8) -> Places {
+        let d = p_w - V8::splat(&self.centre);
+        let [scale, middle] = [self.texels_per_metre, 0.5 * EDGE as f32].map(F8::splat);
+        Places {
+            u: d.dot(V8::splat(&self.axes[0])) * scale + middle,
+            v: d.dot(V8::splat(&self.axes[1])) * scale + middle,
+            height: d.dot(V8::splat(&self.axes[2])),
+        }
+    }
+
     /// Adds casters.
     pub fn draw(&mut self, positions: &[V3], triangles: &[[u32; 3]]) {
-        let places: Vec<[f32; 3]> = positions.iter().map(|p| self.place(p)).collect();
+        let mut places = std::mem::take(&mut self.places);
+        places.clear();
+        places.extend(positions.iter().map(|p| self.place(p)));
         for t in triangles {
             // Faces towards the light only: u × v points to it, so that they run the positive way.
-            self.heights.draw::<false>(t.map(|v| places[v as usize]), 1.0, 0, None);
+            self.heights.draw::<false>(&t.map(|v| places[v as usize]), [0.0; 2], 0);
         }
+        self.places = places;
     }
 
     /// To be called when all casters are drawn.
     pub fn finish(&mut self) {
-        self.tiles.fill(EMPTY);
-        let [from, to] = self.heights.rows;
-        let mut own = vec![EMPTY; TILES * TILES];
-        for y in from..to {
-            let row = &self.heights.w[y * EDGE..(y + 1) * EDGE];
-            for (x, chunk) in row.chunks_exact(TILE).enumerate() {
-                let highest = chunk.iter().copied().fold(EMPTY, f32::max);
-                let tile = &mut own[y / TILE * TILES + x];
-                *tile = tile.max(highest);
-            }
-        }
+        self.own.fill([EMPTY; 2]);
+        self.ranges.fill([EMPTY; 2]);
+        let [from, to] = self.heights.touched;
         if from >= to {
             return;
         }
-        for y in (from / TILE).saturating_sub(1)..(to.div_ceil(TILE) + 1).min(TILES) {
-            for x in 0..TILES {
-                let (ys, xs) =
-                    (y.saturating_sub(1)..(y + 2).min(TILES), x.saturating_sub(1)..(x + 2).min(TILES));
-                let around = ys.flat_map(|y| xs.clone().map(move |x| y * TILES + x));
-                self.tiles[y * TILES + x] = around.map(|i| own[i]).fold(EMPTY, f32::max);
-            }
-        }
-    }
-
-    /// Whether a shadow can fall on `place`.
-    #[inline]
-    pub fn may_shade(&self, place: &[f32; 3]) -> bool {
-        let inside = |x: f32| x >= 0.0 && x < EDGE as f32;
-        if !(inside(place[0]) && inside(place[1])) {
-            return false;
-        }
-        self.tiles[place[1] as usize / TILE * TILES + place[0] as usize / TILE] > place[2] + BIAS
-    }
-
-    /// Share of the light that reaches `place` on a surface of normal `n`, 0..=1.
-    pub fn light(&self, place: &[f32; 3], n: &V3) -> f32 {
-        if !self.may_shade(place) {
-            return 1.0;
-        }
-        // Where the surface itself would be, a texel away along each axis.
-        let steep = (n.dot(&self.axes[2]) * self.texels_per_metre).max(0.3 * self.texels_per_metre);
-        let slope = [-n.dot(&self.axes[0]) / steep, -n.dot(&self.axes[1]) / steep];
-        let limit = |dx: f32, dy: f32| place[2] + BIAS + (slope[0] * dx + slope[1] * dy).max(0.0);
-        let (mut above, mut count) = (0.0, 0);
-        for j in -2..=2 {
-            for i in -2..=2 {
-                let (dx, dy) = (i as f32 * SEARCH, j as f32 * SEARCH);
-                let height = self.height(place[0] + dx, place[1] + dy);
-                if height > limit(dx, dy) {
-                    above += height - place[2];
-                    count += 1;
+        let stride = self.heights.stride();
+        for row in from / TILE..to.div_ceil(TILE) {
+            for column in 0..TILES {
+                let (mut low, mut high) = (F8::splat(f32::MAX), F8::splat(EMPTY));
+                for y in row * TILE..(row + 1) * TILE {
+                    let at = y * stride + column * TILE;
+                    let Some(texels) = self.heights.w[at..].first_chunk::<TILE>() else { continue };
+                    (low, high) = (low.fast_min(F8::new(*texels)), high.fast_max(F8::new(*texels)));
                 }
+                let least = low.to_array().into_iter().fold(f32::MAX, f32::min);
+                let most = high.to_array().into_iter().fold(EMPTY, f32::max);
+                self.own[row * TILES + column] = [least, most];
             }
         }
-        if count == 0 {
-            return 1.0;
+        let span = |i: usize| i.saturating_sub(AROUND)..(i + AROUND + 1).min(TILES);
+        let join = |a: [f32; 2], b: &[f32; 2]| [a[0].min(b[0]), a[1].max(b[1])];
+        let rows = (from / TILE).saturating_sub(AROUND)..(to.div_ceil(TILE) + AROUND).min(TILES);
+        for y in rows {
+            let mut column_ranges = [[f32::MAX, EMPTY]; TILES];
+            for row in span(y) {
+                let line = &self.own[row * TILES..(row + 1) * TILES];
+                column_ranges.iter_mut().zip(line).for_each(|(all, own)| *all = join(*all, own));
+            }
+            for x in 0..TILES {
+                self.ranges[y * TILES + x] = column_ranges[span(x)].iter().fold([f32::MAX, EMPTY], join);
+            }
         }
-        // Dark all around: well inside of the shadow.
-        if count == 25 {
+    }
+
+    /// Whether a shadow can fall on anything at least as high as `least` between two corners, texels.
+    pub fn may_shade(&self, from: [f32; 2], to: [f32; 2], least: f32) -> bool {
+        let tile = |x: f32| (x.max(0.0) as usize / TILE).min(TILES - 1);
+        let columns = tile(from[0])..tile(to[0]) + 1;
+        (tile(from[1])..tile(to[1]) + 1)
+            .any(|y| self.ranges[y * TILES..][columns.clone()].iter().any(|range| range[1] > least + BIAS))
+    }
+
+    /// Shares of the light that reach eight points of normals `n`, of those in `wanted`; 1 for others.
+    pub fn light(&self, at: &Places, n: &V8, wanted: F8) -> F8 {
+        let (low, high) = (F8::splat(MARGIN as f32), F8::splat((MARGIN + INNER) as f32));
+        let inside = at.u.simd_ge(low) & at.v.simd_ge(low) & at.u.simd_lt(high) & at.v.simd_lt(high) & wanted;
+        let bits = inside.to_bitmask();
+        if bits == 0 {
+            return F8::ONE;
+        }
+        let [u, v, height] = [at.u, at.v, at.height].map(F8::to_array);
+        let normals = n.to_arrays();
+        let mut open = [1.0; LANES];
+        for i in (0..LANES).filter(|i| bits >> i & 1 == 1) {
+            let [least, most] = self.ranges[v[i] as usize / TILE * TILES + u[i] as usize / TILE];
+            if most <= height[i] + BIAS {
+                continue;
+            }
+            let place = [u[i], v[i], height[i]];
+            let normal = V3::from(normals.map(|axis| axis[i]));
+            open[i] = Filter::new(self, place, &normal).share(least);
+        }
+        F8::new(open)
+    }
+}
+
+/// What is around one point.
+struct Filter<'a> {
+    map: &'a ShadowMap,
+    place: [f32; 3],
+    /// Rise of the surface itself a texel along each axis, m.
+    slope: [f32; 2],
+}
+
+impl<'a> Filter<'a> {
+    fn new(map: &'a ShadowMap, place: [f32; 3], n: &V3) -> Self {
+        let steep = (n.dot(&map.axes[2]) * map.texels_per_metre).max(0.3 * map.texels_per_metre);
+        let slope = [-n.dot(&map.axes[0]) / steep, -n.dot(&map.axes[1]) / steep];
+        Self { map, place, slope }
+    }
+
+    /// Share of the light, 0..=1; `least` is the least height around.
+    fn share(&self, least: f32) -> f32 {
+        let rise = (self.slope[0].abs() + self.slope[1].abs()) * WIDEST;
+        if least > self.place[2] + BIAS + rise {
             return 0.0;
         }
-        let radius = (above / count as f32 * self.tangent * self.texels_per_metre).clamp(1.2, WIDEST);
-        let mut open = 0.0;
-        for j in -2..=2 {
-            for i in -2..=2 {
-                let (dx, dy) = (i as f32 * radius * 0.5, j as f32 * radius * 0.5);
-                open += self.open(place[0] + dx, place[1] + dy, limit(dx, dy));
+        let [open, hidden, above] = self.sums::<3, 3>(WIDEST);
+        if hidden <= 0.0 {
+            return 1.0;
+        }
+        if open <= 0.0 {
+            return 0.0;
+        }
+        let width = above / hidden * self.map.tangent * self.map.texels_per_metre;
+        let [open, hidden, _] = match width {
+            ..=3.4 => self.sums::<1, 1>(width.max(NARROWEST)),
+            ..=7.4 => self.sums::<2, 1>(width),
+            _ => self.sums::<3, 2>(width.min(WIDEST)),
+        };
+        open / (open + hidden)
+    }
+
+    /// Weights of what lets light through and of what hides it within `radius` texels, and the latter's weighted height
+    /// above the point; of every `STEP`th row, and as wide as `CHUNKS` vectors.
+    #[inline(always)]
+    fn sums<const CHUNKS: usize, const STEP: usize>(&self, radius: f32) -> [f32; 3] {
+        let [u, v, height] = self.place;
+        let first = (u - radius) as usize;
+        let (from, to) = ((v - radius) as usize, (v + radius) as usize + 1);
+        let inverse2 = 1.0 / (radius * radius);
+        let across: [F8; CHUNKS] =
+            std::array::from_fn(|c| STEPS + F8::splat((first + c * LANES) as f32 + 0.5 - u));
+        // A paraboloid's worth of weight: softer than a box, and still separable.
+        let weights = across.map(|d| (F8::ONE - d * d * F8::splat(inverse2)).fast_max(F8::ZERO));
+        let rise = across.map(|d| d * F8::splat(self.slope[0]));
+        let [base, limit] = [height, height + BIAS].map(F8::splat);
+        let (mut all, mut hidden, mut above) = (F8::ZERO, F8::ZERO, F8::ZERO);
+        let stride = self.map.heights.stride();
+        for row in (from.div_ceil(STEP) * STEP..to).step_by(STEP) {
+            let d = row as f32 + 0.5 - v;
+            let share = F8::splat((1.0 - d * d * inverse2).max(0.0));
+            let row_rise = F8::splat(self.slope[1] * d);
+            let texels = self.map.heights.w.get(row * stride + first..).unwrap_or_default();
+            for (c, texels) in texels.as_chunks::<LANES>().0.iter().take(CHUNKS).enumerate() {
+                let heights = F8::new(*texels);
+                let weight = weights[c] * share;
+                let covered = heights.simd_gt(limit + (rise[c] + row_rise).fast_max(F8::ZERO)) & weight;
+                all += weight;
+                hidden += covered;
+                above += covered * (heights - base);
             }
         }
-        open / 25.0
+        let (all, hidden) = (sum(all), sum(hidden));
+        [all - hidden, hidden, sum(above)]
     }
+}
 
-    fn height(&self, x: f32, y: f32) -> f32 {
-        let index = |t: f32| (t.max(0.0) as usize).min(EDGE - 1);
-        self.heights.w[index(y) * EDGE + index(x)]
-    }
-
-    /// Bilinear share of the four texels around (x, y) that are not above `limit`.
-    fn open(&self, x: f32, y: f32, limit: f32) -> f32 {
-        let (x, y) = ((x - 0.5).clamp(0.0, (EDGE - 2) as f32), (y - 0.5).clamp(0.0, (EDGE - 2) as f32));
-        let (i, j) = (x as usize, y as usize);
-        let (s, t) = (x - i as f32, y - j as f32);
-        let free = |k: usize| if self.heights.w[k] > limit { 0.0 } else { 1.0 };
-        let k = j * EDGE + i;
-        let low = free(k) * (1.0 - s) + free(k + 1) * s;
-        let high = free(k + EDGE) * (1.0 - s) + free(k + EDGE + 1) * s;
-        low * (1.0 - t) + high * t
-    }
+/// In one order on every machine.
+fn sum(x: F8) -> f32 {
+    let [a, b, c, d, e, f, g, h] = x.to_array();
+    ((a + e) + (c + g)) + ((b + f) + (d + h))
 }

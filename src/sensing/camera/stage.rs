@@ -5,7 +5,7 @@ use std::sync::{
     atomic::{AtomicU64, Ordering},
 };
 
-use super::{CameraError, Model, pose::Posed, shadow::ShadowMap};
+use super::{CameraError, Model, pose::Posed, shade::Light, shadow::ShadowMap, tone::Tone};
 use crate::{
     geometry::{Pose, Vec3},
     physics::world::Frame,
@@ -55,6 +55,8 @@ pub struct Stage {
     /// World forms of the levels of fixed things (empty for others).
     pub(super) fixed: Vec<Vec<Posed>>,
     pub(super) fixed_shadow: ShadowMap,
+    pub(super) light: Light,
+    pub(super) tone: Tone,
     /// Tells caches of one stage from those of another.
     pub(super) key: u64,
 }
@@ -117,7 +119,9 @@ impl Stage {
             }
         }
         fixed_shadow.finish();
-        Ok(Self { things, lighting, fixed, fixed_shadow, key: NEXT_KEY.fetch_add(1, Ordering::Relaxed) })
+        let (light, tone) = (Light::new(&lighting), Tone::new(lighting.exposure));
+        let key = NEXT_KEY.fetch_add(1, Ordering::Relaxed);
+        Ok(Self { things, lighting, fixed, fixed_shadow, light, tone, key })
     }
 
     /// The things, in the order of their drawing.
