@@ -495,8 +495,8 @@ fn gel_under_a_ball(report: &mut Report) {
             percent(peak / of.outward - 1.0),
         ]);
     }
-    report.claim("gel: depth for the force at 0.1 mm", shallow, 0.05);
-    report.claim("gel: depth for the force beyond", deep, 0.10);
+    report.claim("gel: depth for the force at 0.1 mm", shallow, gel::depth_bound(1e-4));
+    report.claim("gel: depth for the force beyond", deep, gel::depth_bound(1e-3));
     report.claim("gel: outward motion", outwards, 0.10);
 }
 

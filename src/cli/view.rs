@@ -9,13 +9,13 @@ use super::{
 };
 use crate::{
     benchmark::Plan,
-    report::film::{write_stills, write_video},
+    report::film::{write_panels, write_stills, write_video},
     rollout::stop,
     script,
 };
 
-/// Runs one episode and writes `episode.mp4` and the stills of its first, worst and last states into the folder; files of
-/// the same name are replaced.
+/// Runs one episode and writes into the folder: `episode.mp4`, one of its pictures as `episode.png`, and stills of its
+/// first, worst and last states. Files of the same name are replaced.
 ///
 /// # Errors
 /// The script is no suite, the task or episode fails, a stream cannot be made or a file not written.
@@ -52,6 +52,8 @@ pub fn run(view: &View) -> Result<(), Failure> {
     });
     let moments = [("start", 0), ("worst", worst.unwrap_or(0)), ("end", film.frames.len().saturating_sub(1))];
     let mut written = write_stills(&mut film, &moments, view.native, &dir).map_err(film_failure)?;
+    written.push(dir.join("episode.png"));
+    write_panels(&mut film, &caption, worst, &dir.join("episode.png")).map_err(film_failure)?;
     let video = dir.join("episode.mp4");
     write_video(&mut film, &caption, &video, stop::requested).map_err(film_failure)?;
     written.push(video);

@@ -8,6 +8,7 @@ use crate::{
     scene::Asset,
     sensing::{
         camera::{CameraError, Model},
+        panda::RobotModel,
         tactile::{Sensor, Skin, TactileSpec},
     },
 };
@@ -18,6 +19,7 @@ pub struct Looks {
     models: Made<Arc<Asset>, Arc<Model>>,
     skins: Made<Arc<Asset>, Arc<Skin>>,
     sensors: Made<TactileSpec, Arc<Sensor>>,
+    robot: Made<(), Arc<RobotModel>>,
 }
 
 impl Looks {
@@ -57,6 +59,11 @@ impl Looks {
                 Ok((asset.clone(), Arc::new(skin)))
             },
         )
+    }
+
+    /// The drawn form of the robot.
+    pub(super) fn robot(&self) -> Result<Arc<RobotModel>, CameraError> {
+        self.robot.get(|()| true, || Ok(((), Arc::new(RobotModel::new()?))))
     }
 
     /// The tactile sensor of these numbers.

@@ -240,7 +240,9 @@ impl Senses {
                 casts_shadow: !part.is_ground(),
             })
         };
-        self.parts.iter().enumerate().map(draw).collect()
+        let mut things: Vec<Thing> = self.parts.iter().enumerate().map(draw).collect::<Result<_, _>>()?;
+        things.extend(self.looks.robot()?.things(self.tree, self.scene.base_w, ROBOT));
+        Ok(things)
     }
 }
 

@@ -23,7 +23,7 @@ fn view_writes_stills_of_every_stream_and_a_video_and_the_same_ones_again() {
     let project = short();
     let said = project.succeeds("view x.lua --out seen");
     assert_eq!(said.out.lines().last(), Some("seen/episode.mp4"));
-    assert_eq!(said.out.lines().count(), 3 * (2 + 2 * 3) + 1, "{}", said.out);
+    assert_eq!(said.out.lines().count(), 3 * (2 + 2 * 3) + 2, "{}", said.out);
     for moment in ["start", "worst", "end"] {
         for (stream, size) in [
             ("third_person", [224, 224]),

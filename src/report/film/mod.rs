@@ -111,10 +111,7 @@ fn rate() -> u32 {
 }
 
 /// One picture of the video.
-///
-/// # Errors
-/// A stream cannot be made, or there is no such state.
-pub fn panels(film: &mut Film, caption: &Caption, index: usize) -> Result<RgbImage, FilmError> {
+fn panels(film: &mut Film, caption: &Caption, index: usize) -> Result<RgbImage, FilmError> {
     let mut canvas = Canvas::new(2 * PANEL, PANEL + FINGER + STRIP, GROUND);
     let frame = film.frames.get(index).ok_or(FilmError::Empty)?;
     for (side, name) in CAMERAS.into_iter().enumerate() {
@@ -183,6 +180,14 @@ fn chart(canvas: &mut Canvas, film: &Film, caption: &Caption, index: usize, [x, 
 
 fn round(x: f64) -> f64 {
     (100.0 * x).round() / 100.0
+}
+
+/// Writes one picture of the video as a PNG file.
+///
+/// # Errors
+/// A stream cannot be made, or the file not written.
+pub fn write_panels(film: &mut Film, caption: &Caption, index: usize, path: &Path) -> Result<(), FilmError> {
+    save(&panels(film, caption, index)?, path)
 }
 
 /// Edges of the cameras' own pictures, pixels.
