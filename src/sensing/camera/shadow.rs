@@ -111,7 +111,7 @@ impl ShadowMap {
             return 1.0;
         }
         // Where the surface itself would be, a texel away along each axis.
-        let steep = (n.dot(&self.axes[2]) * self.texels_per_metre).max(0.3 * self.texels_per_metre);
+        let steep = (n.dot(&self.axes[2]) * self.texels_per_metre).max(0.1 * self.texels_per_metre);
         let slope = [-n.dot(&self.axes[0]) / steep, -n.dot(&self.axes[1]) / steep];
         let limit = |dx: f32, dy: f32| place[2] + BIAS + (slope[0] * dx + slope[1] * dy).max(0.0);
         let (mut above, mut count) = (0.0, 0);
