@@ -28,7 +28,7 @@ return softvt.asset {
   body = softvt.soft { youngs_pa = 90e3, poisson = 0.37, density = 300, resolution = 12 },
   hints = { grasp_height_m = 19 * mm },
   visuals = {
-    material.crust { base = { 0.72, 0.43, 0.13 }, top = { 0.50, 0.21, 0.035 }, browning = 0.8, foot = { 0.82, 0.62, 0.32 }, sheen = 0.30, seed = 41 },
+    material.crust { base = { 0.74, 0.405, 0.115 }, top = { 0.50, 0.21, 0.035 }, browning = 0.8, foot = { 0.80, 0.555, 0.27 }, sheen = 0.30, seed = 41 },
     material.crust { base = { 0.76, 0.24, 0.03 }, top = { 0.62, 0.16, 0.02 }, foot = { 0.78, 0.34, 0.08 }, sheen = 0.20, seed = 42 },
   },
 }

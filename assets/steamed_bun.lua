@@ -12,9 +12,14 @@ local dome = softvt.shape.ellipsoid { size = { LENGTH, WIDTH, HEIGHT + BELOW } }
 local table_top = softvt.shape.box { size = { 0.1, 0.1, 0.02 } }:translate(0, 0, -0.01)
 
 local bun = dome:subtract(table_top, 4 * mm)
+
+local skin = material.dough { seed = 81 }
 for _, side in ipairs { -1, 1 } do
   local eye = softvt.shape.sphere { radius = 4 * mm }:translate(21 * mm, side * 9 * mm, 36 * mm)
-  bun = bun:paint { material = 1, region = eye }
+  -- Not too glossy: a lamp mirrored in an eye would make it white.
+  table.insert(skin.layers, {
+    mask = softvt.mask.inside { shape = eye, soft_m = 1.5 * mm }, albedo = { 0.012, 0.011, 0.010 }, roughness = 0.6,
+  })
 end
 
 return softvt.asset {
@@ -22,8 +27,5 @@ return softvt.asset {
   shape = bun,
   body = softvt.soft { youngs_pa = 25e3, poisson = 0.30, density = 180 },
   hints = { grasp_height_m = 22 * mm },
-  visuals = {
-    material.dough { seed = 81 },
-    { albedo = { 0.012, 0.011, 0.010 }, roughness = 0.16 },
-  },
+  visuals = { skin },
 }

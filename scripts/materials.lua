@@ -30,7 +30,7 @@ function material.crust(o)
       layer(mask.noise { size_m = 14 * mm, octaves = 4, from = 0.42, to = 0.85, seed = seed }, top, sheen + 0.06, 0.5),
       layer(mask.noise { size_m = 9 * mm, octaves = 3, from = 0.50, to = 0.20, seed = seed + 7 }, foot, sheen + 0.1, 0.22),
       layer(mask.gradient { from_m = rise, to_m = 0.15 * rise }, foot, 0.62, 0.75),
-      pores(2.6 * mm, 0.22 * mm, seed + 3, base),
+      pores(2.6 * mm, 0.15 * mm, seed + 3, base),
     },
   }
 end

@@ -52,11 +52,13 @@ local function stand(height)
   return seen("robot_stand", shape, { albedo = { 0.10, 0.105, 0.11 }, roughness = 0.42, metalness = 0.4 })
 end
 
--- A room around a scene whose floor is at `floor_z`.
+-- A room around a scene whose floor is at `floor_z`: walls behind the robot and on the side away from the light.
 function scenery.room(scene, floor_z)
-  scene:add { name = "floor", asset = floor, xyz = { -0.2, 0, floor_z } }
+  scene:add { name = "floor", asset = floor, xyz = { 0.75, 0, floor_z } }
   scene:add { name = "wall", asset = wall, xyz = { -1.75, 0, floor_z } }
   scene:add { name = "skirting", asset = skirting, xyz = { -1.75, 0, floor_z } }
+  scene:add { name = "side_wall", asset = wall, xyz = { 0.75, 2.5, floor_z }, yaw = -math.pi / 2 }
+  scene:add { name = "side_skirting", asset = skirting, xyz = { 0.75, 2.5, floor_z }, yaw = -math.pi / 2 }
 end
 
 -- A room around a scene whose support is a table with its top at z = 0, the robot beside it on a stand.

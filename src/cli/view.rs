@@ -47,10 +47,10 @@ pub fn run(view: &View) -> Result<(), Failure> {
     let finished = batch.episode(0, true)?;
     let caption = batch.caption(&finished.record);
     let Some(mut film) = finished.film else { return Ok(()) };
-    let worst = (0..film.frames.len()).max_by(|&a, &b| {
-        film.d_pct[a].unwrap_or(0.0).total_cmp(&film.d_pct[b].unwrap_or(0.0)).then(b.cmp(&a))
-    });
-    let moments = [("start", 0), ("worst", worst.unwrap_or(0)), ("end", film.frames.len().saturating_sub(1))];
+    let d_pct = |at: usize| film.d_pct[at].unwrap_or(0.0);
+    let last = film.frames.len().saturating_sub(1);
+    let worst = (0..=last).max_by(|&a, &b| d_pct(a).total_cmp(&d_pct(b)).then(b.cmp(&a))).unwrap_or(0);
+    let moments = [("start", 0), ("worst", worst), ("end", last)];
     let mut written = write_stills(&mut film, &moments, view.native, &dir).map_err(film_failure)?;
     written.push(dir.join("episode.png"));
     write_panels(&mut film, &caption, worst, &dir.join("episode.png")).map_err(film_failure)?;

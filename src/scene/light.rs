@@ -51,15 +51,15 @@ impl Default for Lighting {
         Self {
             key: KeyLight {
                 direction_w: Vec3::new(0.45, -0.55, 1.0),
-                colour: [1.0, 0.96, 0.9],
-                strength: 0.75,
+                colour: [1.0, 0.95, 0.87],
+                strength: 0.92,
                 softness_rad: 0.06,
             },
             sky: Sky {
-                zenith: [0.95, 0.98, 1.05],
-                horizon: [0.62, 0.66, 0.72],
-                ground: [0.30, 0.27, 0.24],
-                strength: 0.62,
+                zenith: [0.97, 0.98, 1.02],
+                horizon: [0.66, 0.67, 0.70],
+                ground: [0.36, 0.30, 0.25],
+                strength: 0.52,
             },
             exposure: 1.0,
             shadow_centre_w: Vec3::new(-0.15, 0.0, 0.15),

@@ -113,6 +113,7 @@ impl ShadowMap {
         if from >= to {
             return;
         }
+<<<<<<< HEAD
         let stride = self.heights.stride();
         for row in from / TILE..to.div_ceil(TILE) {
             for column in 0..TILES {
@@ -121,6 +122,45 @@ impl ShadowMap {
                     let at = y * stride + column * TILE;
                     let Some(texels) = self.heights.w[at..].first_chunk::<TILE>() else { continue };
                     (low, high) = (low.fast_min(F8::new(*texels)), high.fast_max(F8::new(*texels)));
+=======
+        for y in (from / TILE).saturating_sub(1)..(to.div_ceil(TILE) + 1).min(TILES) {
+            for x in 0..TILES {
+                let (ys, xs) =
+                    (y.saturating_sub(1)..(y + 2).min(TILES), x.saturating_sub(1)..(x + 2).min(TILES));
+                let around = ys.flat_map(|y| xs.clone().map(move |x| y * TILES + x));
+                self.tiles[y * TILES + x] = around.map(|i| own[i]).fold(EMPTY, f32::max);
+            }
+        }
+    }
+
+    /// Whether a shadow can fall on `place`.
+    #[inline]
+    pub fn may_shade(&self, place: &[f32; 3]) -> bool {
+        let inside = |x: f32| x >= 0.0 && x < EDGE as f32;
+        if !(inside(place[0]) && inside(place[1])) {
+            return false;
+        }
+        self.tiles[place[1] as usize / TILE * TILES + place[0] as usize / TILE] > place[2] + BIAS
+    }
+
+    /// Share of the light that reaches `place` on a surface of normal `n`, 0..=1.
+    pub fn light(&self, place: &[f32; 3], n: &V3) -> f32 {
+        if !self.may_shade(place) {
+            return 1.0;
+        }
+        // Where the surface itself would be, a texel away along each axis.
+        let steep = (n.dot(&self.axes[2]) * self.texels_per_metre).max(0.1 * self.texels_per_metre);
+        let slope = [-n.dot(&self.axes[0]) / steep, -n.dot(&self.axes[1]) / steep];
+        let limit = |dx: f32, dy: f32| place[2] + BIAS + (slope[0] * dx + slope[1] * dy).max(0.0);
+        let (mut above, mut count) = (0.0, 0);
+        for j in -2..=2 {
+            for i in -2..=2 {
+                let (dx, dy) = (i as f32 * SEARCH, j as f32 * SEARCH);
+                let height = self.height(place[0] + dx, place[1] + dy);
+                if height > limit(dx, dy) {
+                    above += height - place[2];
+                    count += 1;
+>>>>>>> looks
                 }
                 let least = low.to_array().into_iter().fold(f32::MAX, f32::min);
                 let most = high.to_array().into_iter().fold(EMPTY, f32::max);
