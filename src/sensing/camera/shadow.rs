@@ -26,6 +26,11 @@ const BIAS: f32 = 2.5e-3;
 const WIDEST: f32 = 11.4;
 /// Narrowest filter, texels to each side.
 const NARROWEST: f32 = 1.6;
+/// Eight points within so many texels, of which three tell what the others see: less than the widest filter's reach lies
+/// between them.
+const NEIGHBOURS: f32 = 12.0;
+/// Eight points within so many texels, of which four tell what the others see even in a penumbra.
+const NEAREST: f32 = 5.0;
 /// Heights below all.
 const EMPTY: f32 = -1e9;
 
@@ -113,7 +118,6 @@ impl ShadowMap {
         if from >= to {
             return;
         }
-<<<<<<< HEAD
         let stride = self.heights.stride();
         for row in from / TILE..to.div_ceil(TILE) {
             for column in 0..TILES {
@@ -122,45 +126,6 @@ impl ShadowMap {
                     let at = y * stride + column * TILE;
                     let Some(texels) = self.heights.w[at..].first_chunk::<TILE>() else { continue };
                     (low, high) = (low.fast_min(F8::new(*texels)), high.fast_max(F8::new(*texels)));
-=======
-        for y in (from / TILE).saturating_sub(1)..(to.div_ceil(TILE) + 1).min(TILES) {
-            for x in 0..TILES {
-                let (ys, xs) =
-                    (y.saturating_sub(1)..(y + 2).min(TILES), x.saturating_sub(1)..(x + 2).min(TILES));
-                let around = ys.flat_map(|y| xs.clone().map(move |x| y * TILES + x));
-                self.tiles[y * TILES + x] = around.map(|i| own[i]).fold(EMPTY, f32::max);
-            }
-        }
-    }
-
-    /// Whether a shadow can fall on `place`.
-    #[inline]
-    pub fn may_shade(&self, place: &[f32; 3]) -> bool {
-        let inside = |x: f32| x >= 0.0 && x < EDGE as f32;
-        if !(inside(place[0]) && inside(place[1])) {
-            return false;
-        }
-        self.tiles[place[1] as usize / TILE * TILES + place[0] as usize / TILE] > place[2] + BIAS
-    }
-
-    /// Share of the light that reaches `place` on a surface of normal `n`, 0..=1.
-    pub fn light(&self, place: &[f32; 3], n: &V3) -> f32 {
-        if !self.may_shade(place) {
-            return 1.0;
-        }
-        // Where the surface itself would be, a texel away along each axis.
-        let steep = (n.dot(&self.axes[2]) * self.texels_per_metre).max(0.1 * self.texels_per_metre);
-        let slope = [-n.dot(&self.axes[0]) / steep, -n.dot(&self.axes[1]) / steep];
-        let limit = |dx: f32, dy: f32| place[2] + BIAS + (slope[0] * dx + slope[1] * dy).max(0.0);
-        let (mut above, mut count) = (0.0, 0);
-        for j in -2..=2 {
-            for i in -2..=2 {
-                let (dx, dy) = (i as f32 * SEARCH, j as f32 * SEARCH);
-                let height = self.height(place[0] + dx, place[1] + dy);
-                if height > limit(dx, dy) {
-                    above += height - place[2];
-                    count += 1;
->>>>>>> looks
                 }
                 let least = low.to_array().into_iter().fold(f32::MAX, f32::min);
                 let most = high.to_array().into_iter().fold(EMPTY, f32::max);
@@ -200,17 +165,36 @@ impl ShadowMap {
         }
         let [u, v, height] = [at.u, at.v, at.height].map(F8::to_array);
         let normals = n.to_arrays();
-        let mut open = [1.0; LANES];
-        for i in (0..LANES).filter(|i| bits >> i & 1 == 1) {
+        let one = |i: usize| {
             let [least, most] = self.ranges[v[i] as usize / TILE * TILES + u[i] as usize / TILE];
             if most <= height[i] + BIAS {
-                continue;
+                return 1.0;
             }
-            let place = [u[i], v[i], height[i]];
             let normal = V3::from(normals.map(|axis| axis[i]));
-            open[i] = Filter::new(self, place, &normal).share(least);
+            Filter::new(self, [u[i], v[i], height[i]], &normal).share(least)
+        };
+        let spread = |of: &[f32; LANES]| {
+            let [low, high] = of.iter().fold([f32::MAX, f32::MIN], |[l, h], &x| [l.min(x), h.max(x)]);
+            high - low
+        };
+        let apart = spread(&u).max(spread(&v)).max(spread(&height) * self.texels_per_metre);
+        let mut open = [1.0; LANES];
+        if bits != 0xFF || apart > NEIGHBOURS {
+            (0..LANES).filter(|i| bits >> i & 1 == 1).for_each(|i| open[i] = one(i));
+            return F8::new(open);
         }
-        F8::new(open)
+        // Where both ends and the middle see all or nothing of the light, so do those between.
+        let [a, d, h] = [one(0), one(3), one(7)];
+        if [a, d, h] == [0.0; 3] || [a, d, h] == [1.0; 3] {
+            return F8::splat(a);
+        }
+        if apart > NEAREST {
+            return F8::new([a, one(1), one(2), d, one(4), one(5), one(6), h]);
+        }
+        // Penumbras are wider than the gaps.
+        let f = one(5);
+        let third = (d - a) / 3.0;
+        F8::new([a, a + third, d - third, d, 0.5 * (d + f), f, 0.5 * (f + h), h])
     }
 }
 
@@ -224,7 +208,7 @@ struct Filter<'a> {
 
 impl<'a> Filter<'a> {
     fn new(map: &'a ShadowMap, place: [f32; 3], n: &V3) -> Self {
-        let steep = (n.dot(&map.axes[2]) * map.texels_per_metre).max(0.3 * map.texels_per_metre);
+        let steep = (n.dot(&map.axes[2]) * map.texels_per_metre).max(0.1 * map.texels_per_metre);
         let slope = [-n.dot(&map.axes[0]) / steep, -n.dot(&map.axes[1]) / steep];
         Self { map, place, slope }
     }
