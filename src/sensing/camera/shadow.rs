@@ -26,6 +26,11 @@ const BIAS: f32 = 2.5e-3;
 const WIDEST: f32 = 11.4;
 /// Narrowest filter, texels to each side.
 const NARROWEST: f32 = 1.6;
+/// Eight points within so many texels, of which three tell what the others see: less than the widest filter's reach lies
+/// between them.
+const NEIGHBOURS: f32 = 12.0;
+/// Eight points within so many texels, of which four tell what the others see even in a penumbra.
+const NEAREST: f32 = 5.0;
 /// Heights below all.
 const EMPTY: f32 = -1e9;
 
@@ -160,17 +165,36 @@ impl ShadowMap {
         }
         let [u, v, height] = [at.u, at.v, at.height].map(F8::to_array);
         let normals = n.to_arrays();
-        let mut open = [1.0; LANES];
-        for i in (0..LANES).filter(|i| bits >> i & 1 == 1) {
+        let one = |i: usize| {
             let [least, most] = self.ranges[v[i] as usize / TILE * TILES + u[i] as usize / TILE];
             if most <= height[i] + BIAS {
-                continue;
+                return 1.0;
             }
-            let place = [u[i], v[i], height[i]];
             let normal = V3::from(normals.map(|axis| axis[i]));
-            open[i] = Filter::new(self, place, &normal).share(least);
+            Filter::new(self, [u[i], v[i], height[i]], &normal).share(least)
+        };
+        let spread = |of: &[f32; LANES]| {
+            let [low, high] = of.iter().fold([f32::MAX, f32::MIN], |[l, h], &x| [l.min(x), h.max(x)]);
+            high - low
+        };
+        let apart = spread(&u).max(spread(&v)).max(spread(&height) * self.texels_per_metre);
+        let mut open = [1.0; LANES];
+        if bits != 0xFF || apart > NEIGHBOURS {
+            (0..LANES).filter(|i| bits >> i & 1 == 1).for_each(|i| open[i] = one(i));
+            return F8::new(open);
         }
-        F8::new(open)
+        // Where both ends and the middle see all or nothing of the light, so do those between.
+        let [a, d, h] = [one(0), one(3), one(7)];
+        if [a, d, h] == [0.0; 3] || [a, d, h] == [1.0; 3] {
+            return F8::splat(a);
+        }
+        if apart > NEAREST {
+            return F8::new([a, one(1), one(2), d, one(4), one(5), one(6), h]);
+        }
+        // Penumbras are wider than the gaps.
+        let f = one(5);
+        let third = (d - a) / 3.0;
+        F8::new([a, a + third, d - third, d, 0.5 * (d + f), f, 0.5 * (f + h), h])
     }
 }
 
