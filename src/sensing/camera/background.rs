@@ -5,8 +5,7 @@ use super::{
     Picture, V3,
     lanes::{F8, LANES, V8},
     pass::Pass,
-    raster::{SAMPLES, Samples},
-    screen::Screen,
+    raster::{ROWS, Samples},
     shade::{Blob, Points, open_sky},
     tile::{Display, Goal, PIXELS, Sink},
 };
@@ -18,8 +17,6 @@ pub(super) struct Background {
     pub stage: u64,
     pub camera: Camera,
     pub tiles: Vec<Spots>,
-    /// The triangles that it shows.
-    pub screen: Screen,
     pub picture: Picture,
 }
 
@@ -42,7 +39,7 @@ pub(super) struct Spots {
     texels: [[f32; 2]; 2],
     least: f32,
     /// Reciprocal depths and numbers of triangles.
-    pub samples: Samples<SAMPLES>,
+    pub samples: Samples<ROWS>,
 }
 
 fn channels() -> [Vec<f32>; 3] {
@@ -71,7 +68,7 @@ impl Spots {
     }
 
     /// To be called when all is drawn; keeps the samples.
-    pub fn finish(&mut self, pass: &Pass, samples: &Samples<SAMPLES>) {
+    pub fn finish(&mut self, pass: &Pass, samples: &Samples<ROWS>) {
         self.samples = samples.clone();
         self.most = Vec::new();
         for i in (0..PIXELS).filter(|&i| (0..3).any(|c| self.n[c][i] != 0.0)) {
@@ -109,11 +106,7 @@ impl Spots {
                 let change = tone.display(direct * key + ambient * open) - tone.display(direct + ambient);
                 shown = (shown + change).map(|c| c.fast_max(F8::ZERO).fast_min(F8::splat(255.0)));
             }
-            for (all, own) in display.0.iter_mut().zip(shown.to_arrays()) {
-                if let Some(all) = all[first..].first_chunk_mut::<LANES>() {
-                    *all = own;
-                }
-            }
+            display.set(first, shown);
         }
     }
 }

@@ -18,8 +18,10 @@ const MOST_TRIANGLES: usize = 160;
 /// Facets smaller than this across need no texture, m.
 const LEAST_SIZE: f64 = 0.1;
 /// Most texels along an edge, and the finest they get, m.
-const MOST_TEXELS: f32 = 2048.0;
+const MOST_TEXELS: f32 = 1536.0;
 const FINEST: f32 = 0.8e-3;
+/// Texels across the finest feature of a pattern: no more are needed.
+const TEXELS_A_FEATURE: f32 = 8.0;
 
 /// A flat face: axes of its texture in the object frame and the texture.
 #[derive(Clone, Debug)]
@@ -94,6 +96,8 @@ pub(super) fn bake(mesh: &Mesh, materials: &[u16], visuals: &[Visual]) -> (Level
         facets: facets_of,
         embedding: Vec::new(),
         spacing: FINEST,
+        plain: false,
+        flaw: 0.0,
     };
     // Metalness does not vary over a facet.
     for (t, &m) in level.triangles.iter().zip(materials) {
@@ -111,7 +115,8 @@ impl Facet {
             corners.iter().map(|c| c.dot(axis)).fold([f32::MAX, f32::MIN], |b, x| [b[0].min(x), b[1].max(x)])
         };
         let ([u0, u1], [v0, v1]) = (span(&u), span(&v));
-        let texel = FINEST.max((u1 - u0).max(v1 - v0) / MOST_TEXELS);
+        let feature = pattern::finest(visual).min((u1 - u0).max(v1 - v0));
+        let texel = FINEST.max(feature / TEXELS_A_FEATURE).max((u1 - u0).max(v1 - v0) / MOST_TEXELS);
         let origin = u * u0 + v * v0 + n * corners[0].dot(n);
         let size = [u1 - u0, v1 - v0].map(|x| (x / texel).ceil().max(1.0) as usize);
         Self { origin, u, v, n: *n, texel, size, visual: visual.clone(), mips: OnceLock::new() }

@@ -1,13 +1,15 @@
 //! Before a picture is drawn: everything in its place, at the level of detail that it is seen at.
 
 use super::{
-    CameraError, FrameView, Mount, Stage, V3, lens::Lens, pose::Posed, shade::Blob, shadow::ShadowMap,
-    surface::Drawn,
+    CameraError, FrameView, Mount, Stage, V3, lens::Lens, model::Level, pose::Posed, shade::Blob,
+    shadow::ShadowMap, surface::Drawn,
 };
 use crate::scene::Camera;
 
-/// A coarser level is used if its edges are at most this many pixels long.
-const COARSE_PIXELS: f32 = 1.0;
+/// A coarser level is used if its edges are at most this many pixels long, or if it is of one colour and at most this many
+/// pixels from the shape that it stands for.
+const COARSE_PIXELS: f32 = 1.4;
+const FLAW_PIXELS: f32 = 0.1;
 /// Things wider than this hide no sky from others, m: they are grounds and walls.
 const WIDEST_BLOB: f32 = 0.35;
 
@@ -55,7 +57,8 @@ pub(super) fn choose_levels(
         let nearest = (lens.depth(&centre) - radius).max(lens.near);
         let pixel = nearest / lens.focal;
         let levels = &thing.model.levels;
-        let level = levels.iter().rposition(|l| l.spacing <= COARSE_PIXELS * pixel).unwrap_or(0);
+        let fine = |l: &Level| l.spacing <= COARSE_PIXELS * pixel || l.plain && l.flaw <= FLAW_PIXELS * pixel;
+        let level = levels.iter().rposition(fine).unwrap_or(0);
         if stage.fixed[i].is_empty() && level + 1 < levels.len() {
             poses[i][level].update(thing, &levels[level], view)?;
         }

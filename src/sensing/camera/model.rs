@@ -21,8 +21,8 @@ use crate::{
 
 /// Faces that meet at more than this angle (cosine) meet at an edge; others are one smooth surface.
 const CREASE: f32 = 0.8;
-/// Cells of a skin along the longest edge, for near and far views.
-const CELLS: [f64; 2] = [64.0, 26.0];
+/// Cells of a skin along the longest edge, from near views to far ones; the last also throws shadows.
+const CELLS: [f64; 4] = [64.0, 34.0, 20.0, 12.0];
 /// Triangles with patterns are cut until their edges are shorter than this share of the longest extent.
 const FINEST_CUT: f64 = 1.0 / 48.0;
 /// Most triangles that cutting may make.
@@ -45,6 +45,10 @@ pub(super) struct Level {
     pub embedding: Vec<([u32; 8], [f32; 8])>,
     /// Mean length of the edges, m.
     pub spacing: f32,
+    /// Whether all of it looks alike but for its shape.
+    pub plain: bool,
+    /// How far it is from the shape that it stands for, m.
+    pub flaw: f32,
 }
 
 /// The drawn form of one kind of thing, to be shared by all its instances.
@@ -77,7 +81,11 @@ impl Model {
             let cell = longest / cells;
             let (mesh, materials) = triangles(shape, cell);
             check(name, &mesh, &materials, visuals)?;
-            levels.push(bake(&mesh, &materials, visuals, cell as f32, Some(shape)));
+            let mut level = bake(&mesh, &materials, visuals, cell as f32, Some(shape));
+            if !levels.is_empty() && level.plain {
+                level.flaw = flaw(&mesh, shape);
+            }
+            levels.push(level);
             if matches!(shape, Shape::Mesh(_)) {
                 break;
             }
@@ -257,6 +265,15 @@ fn cut(mut mesh: Mesh, mut materials: Vec<u16>, edge: f64) -> (Mesh, Vec<u16>, f
     }
 }
 
+/// How far the middles of triangles are from the surface that they stand for, m: all but the farthest fiftieth, which lie
+/// across sharp edges.
+fn flaw(mesh: &Mesh, shape: &Shape) -> f32 {
+    let middle = |t: &[u32; 3]| t.iter().map(|&v| mesh.vertices[v as usize]).sum::<Vec3>() / 3.0;
+    let mut away: Vec<f64> = mesh.triangles.iter().map(|t| shape.distance(&middle(t)).abs()).collect();
+    away.sort_by(f64::total_cmp);
+    away.get(away.len() * 49 / 50).map_or(0.0, |&d| d as f32)
+}
+
 /// Splits vertices at creases, evaluates looks at them and raises their drawn relief.
 pub(super) fn bake(
     mesh: &Mesh,
@@ -298,7 +315,11 @@ pub(super) fn bake(
         positions.iter_mut().zip(&normals).zip(&raised).for_each(|((p, n), h)| *p += n * *h);
         accumulate(&positions, &triangles, &mut normals);
     }
+    let same =
+        |a: &Look, b: &Look| a.albedo == b.albedo && a.roughness == b.roughness && a.metalness == b.metalness;
     Level {
+        plain: looks.iter().all(|look| same(look, &looks[0])),
+        flaw: 0.0,
         patches: patches(&triangles, positions.len()),
         positions,
         normals,

@@ -37,6 +37,31 @@ pub(super) fn look(visual: &Visual, p: &V3, n: &V3, spacing: f32) -> (Look, f32)
     (look, height)
 }
 
+/// Size of the smallest features of a visual, m; infinite if it has none.
+pub(super) fn finest(visual: &Visual) -> f32 {
+    fn of(mask: &Mask) -> f64 {
+        match mask {
+            Mask::Whole => f64::INFINITY,
+            Mask::Gradient { from_m, to_m, .. } => (to_m - from_m).abs(),
+            Mask::Noise { size_m, octaves, from, to, .. } => {
+                let least = size_m.iter().copied().fold(f64::INFINITY, f64::min);
+                // Narrow ranges cut the noise to sharp edges.
+                least * 0.5_f64.powi(*octaves as i32 - 1) * (to - from).abs().min(1.0)
+            }
+            Mask::Both { masks } => masks.iter().map(of).fold(f64::INFINITY, f64::min),
+            // Sharp edges.
+            Mask::Checker { .. }
+            | Mask::Stripes { .. }
+            | Mask::Rings { .. }
+            | Mask::Boards { .. }
+            | Mask::Seams { .. }
+            | Mask::Specks { .. }
+            | Mask::Weave { .. } => 0.0,
+        }
+    }
+    visual.layers.iter().map(|layer| of(&layer.mask)).fold(f64::INFINITY, f64::min) as f32
+}
+
 /// How far under the surface patterns are looked up, m.
 const INSIDE: f32 = 2e-5;
 

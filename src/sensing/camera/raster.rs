@@ -8,15 +8,18 @@ use super::lanes::{F8, LANES, STEPS};
 /// No triangle.
 pub(super) const NONE: u32 = 0x7FFF_FFFF;
 
-/// Samples a pixel of a camera.
-pub(super) const SAMPLES: usize = 4;
-/// Where the sample of each row of a pixel lies, pixels: no two are above one another or side by side, so that edges of
-/// every slope get all shades between in and out.
-const OFFSETS: [f32; SAMPLES] = [0.375, 0.875, 0.125, 0.625];
+/// Rows of samples a pixel of a camera: four that share its colour, and its middle, which has its depth and object.
+pub(super) const ROWS: usize = 5;
+/// The row of the middle.
+pub(super) const MIDDLE: usize = 2;
+/// Where the sample of each row of a pixel lies: no two are above one another or side by side, so that edges of every
+/// slope get all shades between in and out.
+pub(super) const PLACES: [[f32; 2]; ROWS] =
+    [[0.375, 0.125], [0.875, 0.375], [0.5, 0.5], [0.125, 0.625], [0.625, 0.875]];
 
-/// A rectangle of samples in `ROWS` rows a unit, each row with a sample a unit: the greatest `w` at each, and whose it is.
+/// A rectangle of samples in `PER_UNIT` rows a unit, each row with a sample a unit: the greatest `w` at each, and whose it is.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Samples<const ROWS: usize> {
+pub(super) struct Samples<const PER_UNIT: usize> {
     /// Units across; rows are [`LANES`] longer, since eight are always written.
     pub columns: usize,
     /// Rows of samples.
@@ -29,16 +32,20 @@ pub(super) struct Samples<const ROWS: usize> {
     pub touched: [usize; 2],
 }
 
-/// A place within a pixel, from its top left.
-pub(super) fn place<const ROWS: usize>(row: usize) -> [f32; 2] {
-    let x = if ROWS == 1 { 0.5 } else { OFFSETS[row % SAMPLES] };
-    [x, ((row % ROWS) as f32 + 0.5) / ROWS as f32]
+/// Place of a row's first sample, units.
+#[inline(always)]
+fn place<const PER_UNIT: usize>(row: usize) -> [f32; 2] {
+    if PER_UNIT == 1 {
+        return [0.5, row as f32 + 0.5];
+    }
+    let [x, y] = PLACES[row % ROWS];
+    [x, (row / ROWS) as f32 + y]
 }
 
-impl<const ROWS: usize> Samples<ROWS> {
+impl<const PER_UNIT: usize> Samples<PER_UNIT> {
     /// Empty samples at `w`; `units` high.
     pub fn new(columns: usize, units: usize, w: f32, with_ids: bool) -> Self {
-        let rows = units * ROWS;
+        let rows = units * PER_UNIT;
         let all = rows * (columns + LANES);
         let id = vec![NONE; if with_ids { all } else { 0 }];
         Self { columns, rows, w: vec![w; all], id, touched: [rows, 0] }
@@ -63,18 +70,30 @@ impl<const ROWS: usize> Samples<ROWS> {
 
     /// Draws a triangle (x, y in units from the top left, w) where nothing is nearer. Its corners run clockwise as seen
     /// in an image with y down; others face away. `origin` is the place of the first unit.
+    #[inline(always)]
     pub fn draw<const IDS: bool>(&mut self, at: &[[f32; 3]; 3], origin: [f32; 2], id: u32) {
-        let Some(span) = Span::of::<ROWS>(at, origin, [self.columns, self.rows]) else { return };
+        self.draw_rows::<IDS>(at, origin, id, [0, 1]);
+    }
+
+    /// The same for every so manieth row, from a first one on.
+    pub fn draw_rows<const IDS: bool>(
+        &mut self,
+        at: &[[f32; 3]; 3],
+        origin: [f32; 2],
+        id: u32,
+        [first, step]: [usize; 2],
+    ) {
+        let Some(span) = Span::of::<PER_UNIT>(at, origin, [self.columns, self.rows]) else { return };
         let Some(setup) = Setup::of(at, origin) else { return };
-        let size = [self.columns as f32, (self.rows / ROWS) as f32];
+        let size = [self.columns as f32, (self.rows / PER_UNIT) as f32];
         let Some(whole) = setup.covers(size) else { return };
         self.touched = [self.touched[0].min(span.rows[0]), self.touched[1].max(span.rows[1])];
         let stride = self.stride();
         let edges = setup.edges.map(|e| (F8::splat(e.a), F8::splat(e.least)));
         let (gx, least, most) = (F8::splat(setup.gx), F8::splat(setup.least), F8::splat(setup.most));
-        for row in span.rows[0]..span.rows[1] {
-            let [x, _] = place::<ROWS>(row);
-            let y = (row as f32 + 0.5) / ROWS as f32;
+        let start = span.rows[0].next_multiple_of(step) + first;
+        for row in (start..span.rows[1]).step_by(step) {
+            let [x, y] = place::<PER_UNIT>(row);
             let starts = setup.edges.map(|e| F8::splat(e.c + (e.b * y + e.a * x)));
             let w_row = F8::splat(setup.w + (setup.gy * y + setup.gx * x));
             let mut column = span.columns[0];
@@ -106,6 +125,15 @@ impl<const ROWS: usize> Samples<ROWS> {
     }
 }
 
+/// Whether a triangle covers a whole square of an edge `size`, and the least and greatest w that it has there.
+pub(super) fn cover(at: &[[f32; 3]; 3], origin: [f32; 2], size: f32) -> Option<(bool, [f32; 2])> {
+    let setup = Setup::of(at, origin)?;
+    let whole = setup.covers([size; 2])?;
+    let corners = [[0.0; 2], [size, 0.0], [0.0, size], [size; 2]]
+        .map(|[x, y]| (setup.w + (setup.gy * y + setup.gx * x)).clamp(setup.least, setup.most));
+    Some((whole, [corners.into_iter().fold(f32::MAX, f32::min), corners.into_iter().fold(0.0, f32::max)]))
+}
+
 /// The rows and columns of samples that a triangle can touch.
 struct Span {
     rows: [usize; 2],
@@ -113,23 +141,31 @@ struct Span {
 }
 
 impl Span {
-    fn of<const ROWS: usize>(at: &[[f32; 3]; 3], origin: [f32; 2], size: [usize; 2]) -> Option<Self> {
+    #[inline(always)]
+    fn of<const PER_UNIT: usize>(at: &[[f32; 3]; 3], origin: [f32; 2], size: [usize; 2]) -> Option<Self> {
         let range = |axis: usize| {
             let low = at[0][axis].min(at[1][axis]).min(at[2][axis]) - origin[axis];
             let high = at[0][axis].max(at[1][axis]).max(at[2][axis]) - origin[axis];
             (low, high)
         };
-        // Conversions saturate.
+        let [[left, top], [right, bottom]] =
+            if PER_UNIT == 1 { [[0.5; 2]; 2] } else { [[0.125; 2], [0.875; 2]] };
+        // Whole units that have samples between; conversions saturate.
         let between = |low: f32, high: f32, most: usize| {
             let (from, to) = (low.ceil().max(0.0) as usize, (high.floor() + 1.0).max(0.0) as usize);
             [from, to.min(most)]
         };
-        let scale = ROWS as f32;
-        let (low, high) = range(1);
-        let rows = between(low * scale - 0.5, high * scale - 0.5, size[1]);
         let (low, high) = range(0);
-        let [first, last] = if ROWS == 1 { [0.5, 0.5] } else { [0.125, 0.875] };
-        let columns = between(low - last, high - first, size[0]);
+        let columns = between(low - right, high - left, size[0]);
+        let (low, high) = range(1);
+        let [from, to] = between(low - bottom, high - top, size[1] / PER_UNIT);
+        let mut rows = [from * PER_UNIT, to * PER_UNIT];
+        while rows[0] < rows[1] && place::<PER_UNIT>(rows[0])[1] < low {
+            rows[0] += 1;
+        }
+        while rows[0] < rows[1] && place::<PER_UNIT>(rows[1] - 1)[1] > high {
+            rows[1] -= 1;
+        }
         (rows[0] < rows[1] && columns[0] < columns[1]).then_some(Self { rows, columns })
     }
 }

@@ -7,7 +7,7 @@ use super::{
     lens::Lens,
     pass::Pass,
     pose::Posed,
-    raster::{SAMPLES, Samples},
+    raster::{ROWS, Samples},
     screen::{Screen, TILE},
     shadow::ShadowMap,
     surface::Rays,
@@ -69,7 +69,7 @@ pub fn render(
         let known = scratch.backgrounds.iter().position(|b| b.stage == stage.key && b.camera == *camera);
         let index = known.unwrap_or_else(|| {
             scratch.backgrounds.retain(|b| b.stage == stage.key);
-            scratch.backgrounds.push(background(&pass, camera));
+            scratch.backgrounds.push(background(&pass, camera, &mut scratch.screen));
             scratch.backgrounds.len() - 1
         });
         over(&pass, &scratch.backgrounds[index], &mut scratch.screen)
@@ -94,7 +94,7 @@ fn empty_display() -> Display {
     Display(Box::new([[0.0; PIXELS]; 3]))
 }
 
-fn empty_samples(lens: &Lens) -> Samples<SAMPLES> {
+fn empty_samples(lens: &Lens) -> Samples<ROWS> {
     Samples::new(TILE, TILE, 1.0 / lens.far, true)
 }
 
@@ -109,16 +109,19 @@ fn all(pass: &Pass, screen: &mut Screen) -> Picture {
     for tile in 0..screen.tiles().iter().product() {
         let window = Window::of(tile, screen, pass);
         samples.clear(1.0 / pass.lens.far);
-        window.draw(screen, &mut samples);
-        Resolver::new(pass, window, &samples, &[screen]).run(false, &mut display, &mut picture);
+        if let Some(sole) = screen.sole(tile, window.origin()) {
+            window.draw_sole(sole, pass, &mut samples, (&mut display, &mut picture));
+        } else {
+            window.draw(screen, &mut samples);
+            Resolver::new(pass, window, &samples).run(false, &mut display, &mut picture);
+        }
         window.write(&display, &mut picture);
     }
     picture
 }
 
 /// What is fixed.
-fn background(pass: &Pass, camera: &Camera) -> Background {
-    let screen = &mut Screen::default();
+fn background(pass: &Pass, camera: &Camera, screen: &mut Screen) -> Background {
     screen.clear(pass.lens);
     pass.show(false, screen);
     screen.sort();
@@ -130,19 +133,13 @@ fn background(pass: &Pass, camera: &Camera) -> Background {
         samples.clear(1.0 / pass.lens.far);
         window.draw(screen, &mut samples);
         let mut spots = Spots::new();
-        Resolver::new(pass, window, &samples, &[screen]).run(false, &mut spots, &mut picture);
+        Resolver::new(pass, window, &samples).run(false, &mut spots, &mut picture);
         spots.finish(pass, &samples);
         spots.relight(pass, &(false, Vec::new()), &mut display);
         window.write(&display, &mut picture);
         tiles.push(spots);
     }
-    Background {
-        stage: pass.stage.key,
-        camera: camera.clone(),
-        tiles,
-        picture,
-        screen: std::mem::take(screen),
-    }
+    Background { stage: pass.stage.key, camera: camera.clone(), tiles, picture }
 }
 
 /// What moves, over a background.
@@ -163,11 +160,7 @@ fn over(pass: &Pass, background: &Background, screen: &mut Screen) -> Picture {
         if covered {
             samples.clone_from(&spots.samples);
             window.draw(screen, &mut samples);
-            Resolver::new(pass, window, &samples, &[&background.screen, screen]).run(
-                true,
-                &mut display,
-                &mut picture,
-            );
+            Resolver::new(pass, window, &samples).run(true, &mut display, &mut picture);
         }
         window.write(&display, &mut picture);
     }

@@ -1,9 +1,12 @@
 //! The triangles that a camera sees, sorted into the tiles of its image.
 
-use super::{V3, lens::Lens};
+use super::{V3, lens::Lens, raster::cover};
 
 /// Pixels along an edge of a tile: its samples stay in the processor's nearest cache.
 pub(super) const TILE: usize = 32;
+
+/// Tiles of more triangles are not looked at for one that hides the others.
+const FEW: usize = 8;
 
 /// A triangle in the image.
 #[derive(Clone, Copy, Debug)]
@@ -11,6 +14,8 @@ struct Shown {
     /// Corners, clockwise: pixels from the top left, and reciprocal depth.
     at: [[f32; 3]; 3],
     id: u32,
+    /// First and last tile along each axis.
+    tiles: [[u16; 2]; 2],
 }
 
 /// A point of the image; in front of the near plane if not behind it.
@@ -91,23 +96,23 @@ impl Screen {
             || low(1) > lens.height as f32
             || high(2) < 1.0 / lens.far;
         if area > 0.0 && !outside {
-            self.shown.push(Shown { at: [a, c, b], id });
+            // Conversions saturate.
+            let tile =
+                |x: f32, axis: usize| ((x * (1.0 / TILE as f32)) as u16).min(self.tiles[axis] as u16 - 1);
+            let tiles = [0, 1].map(|axis| [tile(low(axis), axis), tile(high(axis), axis)]);
+            self.shown.push(Shown { at: [a, c, b], id, tiles });
         }
     }
 
     /// Sorts the triangles into tiles, each in the order in which they were added.
     pub fn sort(&mut self) {
         let [columns, rows] = self.tiles;
-        let range = |shown: &Shown, axis: usize, most: usize| {
-            let [a, b, c] = shown.at.map(|corner| corner[axis] * (1.0 / TILE as f32));
-            let (from, to) = (a.min(b).min(c).max(0.0) as usize, a.max(b).max(c).max(0.0) as usize);
-            from.min(most - 1)..to.min(most - 1) + 1
-        };
+        let range = |[from, to]: [u16; 2]| usize::from(from)..usize::from(to) + 1;
         self.starts.clear();
         self.starts.resize(columns * rows + 2, 0);
         for shown in &self.shown {
-            for y in range(shown, 1, rows) {
-                range(shown, 0, columns).for_each(|x| self.starts[y * columns + x + 2] += 1);
+            for y in range(shown.tiles[1]) {
+                range(shown.tiles[0]).for_each(|x| self.starts[y * columns + x + 2] += 1);
             }
         }
         for i in 1..self.starts.len() {
@@ -117,8 +122,8 @@ impl Screen {
         self.sorted.clear();
         self.sorted.resize(all, 0);
         for (number, shown) in (0_u32..).zip(&self.shown) {
-            for y in range(shown, 1, rows) {
-                for x in range(shown, 0, columns) {
+            for y in range(shown.tiles[1]) {
+                for x in range(shown.tiles[0]) {
                     let next = &mut self.starts[y * columns + x + 1];
                     self.sorted[*next as usize] = number;
                     *next += 1;
@@ -141,13 +146,23 @@ impl Screen {
         })
     }
 
-    /// Whether a triangle of a tile whose number `is` accepts covers a point.
-    pub fn covers(&self, tile: usize, [x, y]: [f32; 2], is: impl Fn(u32) -> bool) -> bool {
-        self.of_tile(tile).filter(|(_, id)| is(*id)).any(|(at, _)| {
-            (0..3).all(|i| {
-                let (a, b) = (at[i], at[(i + 1) % 3]);
-                (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0]) >= 0.0
-            })
-        })
+    /// The one triangle of a tile that lies over all of it and before all others, if there is one and others are few.
+    pub fn sole(&self, tile: usize, origin: [f32; 2]) -> Option<(&[[f32; 3]; 3], u32)> {
+        let triangles = self.of_tile(tile);
+        if triangles.len() > FEW {
+            return None;
+        }
+        let mut front: Option<(usize, f32)> = None;
+        let mut covers = [[0.0; 2]; FEW];
+        for (i, (at, _)) in self.of_tile(tile).enumerate() {
+            let Some((whole, [least, most])) = cover(at, origin, TILE as f32) else { continue };
+            covers[i] = [least, most];
+            if whole && front.is_none_or(|(_, nearest)| least > nearest) {
+                front = Some((i, least));
+            }
+        }
+        let (index, nearest) = front?;
+        let before = |(i, [_, most]): (usize, &[f32; 2])| i == index || *most < nearest;
+        if covers.iter().enumerate().all(before) { self.of_tile(tile).nth(index) } else { None }
     }
 }

@@ -6,10 +6,10 @@ use super::{
     Picture,
     lanes::{F8, LANES, STEPS, V8},
     pass::Pass,
-    raster::{NONE, SAMPLES, Samples, place},
+    raster::{MIDDLE, NONE, PLACES, ROWS, Samples},
     screen::{Screen, TILE},
     shade::Points,
-    surface::{Batch, Drawn, MOVING, Patch, thing_of},
+    surface::{Batch, MOVING, Patch, thing_of},
 };
 
 /// Pixels of a tile.
@@ -21,16 +21,19 @@ pub(super) struct Goal {
     pub pixel: [u32; LANES],
     pub share: [f32; LANES],
     pub count: usize,
+    /// Whether these are whole pixels in a row.
+    row: bool,
 }
 
 impl Goal {
+    #[inline(always)]
     fn row(first: usize) -> Self {
         let pixel = std::array::from_fn(|lane| (first + lane) as u32);
-        Self { pixel, share: [1.0; LANES], count: LANES }
+        Self { pixel, share: [1.0; LANES], count: LANES, row: true }
     }
 
     fn one(pixel: usize, share: f32) -> Self {
-        Self { pixel: [pixel as u32; LANES], share: [share; LANES], count: 1 }
+        Self { pixel: [pixel as u32; LANES], share: [share; LANES], count: 1, row: false }
     }
 
     /// Pixels and shares.
@@ -45,7 +48,7 @@ pub(super) trait Sink {
     fn points(&mut self, pass: &Pass, points: &Points, goal: &Goal);
     /// Nothing: radiance of the sky.
     fn nothing(&mut self, pass: &Pass, radiance: V8, goal: &Goal);
-    /// A pixel begins anew.
+    /// A pixel that gets shares begins anew.
     fn begin(&mut self, pixel: usize);
 }
 
@@ -53,9 +56,26 @@ pub(super) trait Sink {
 pub(super) struct Display(pub Box<[[f32; PIXELS]; 3]>);
 
 impl Display {
-    pub fn add(&mut self, display: V8, goal: &Goal) {
+    #[inline(always)]
+    fn add(&mut self, display: V8, goal: &Goal) {
+        if goal.row {
+            self.set(goal.pixel[0] as usize, display);
+            return;
+        }
         for (all, own) in self.0.iter_mut().zip(display.to_arrays()) {
             goal.each().for_each(|(lane, pixel, share)| all[pixel] += share * own[lane]);
+        }
+    }
+}
+
+impl Display {
+    /// Eight pixels from `first` on.
+    #[inline(always)]
+    pub fn set(&mut self, first: usize, display: V8) {
+        for (all, own) in self.0.iter_mut().zip(display.to_arrays()) {
+            if let Some(all) = all.get_mut(first..).and_then(|all| all.first_chunk_mut::<LANES>()) {
+                *all = own;
+            }
         }
     }
 }
@@ -94,9 +114,31 @@ impl Window {
     }
 
     /// Draws the triangles of the tile.
-    pub fn draw(&self, screen: &Screen, samples: &mut Samples<SAMPLES>) {
-        let origin = [self.x as f32, self.y as f32];
-        screen.of_tile(self.tile).for_each(|(at, id)| samples.draw::<true>(at, origin, id));
+    pub fn draw(&self, screen: &Screen, samples: &mut Samples<ROWS>) {
+        screen.of_tile(self.tile).for_each(|(at, id)| samples.draw::<true>(at, self.origin(), id));
+    }
+
+    /// Lights a tile that shows one triangle only.
+    pub fn draw_sole<'a>(
+        &self,
+        (at, id): (&[[f32; 3]; 3], u32),
+        pass: &Pass<'a>,
+        samples: &mut Samples<ROWS>,
+        (sink, picture): (&mut impl Sink, &mut Picture),
+    ) {
+        samples.draw_rows::<true>(at, self.origin(), id, [MIDDLE, ROWS]);
+        let mut resolver = Resolver::new(pass, *self, samples);
+        for y in 0..self.height {
+            for x in (0..self.width).step_by(LANES) {
+                resolver.middles((x, y), &[id; LANES], picture);
+                resolver.row(id, (x, y), sink);
+            }
+        }
+    }
+
+    /// Place of its top left in the picture, pixels.
+    pub fn origin(&self) -> [f32; 2] {
+        [self.x as f32, self.y as f32]
     }
 
     /// Writes display values into the picture.
@@ -137,22 +179,15 @@ fn pack(w: [u64; LANES]) -> [u8; 3 * LANES] {
 pub(super) struct Resolver<'a, 'p> {
     pass: &'p Pass<'a>,
     window: Window,
-    samples: &'p Samples<SAMPLES>,
-    /// All triangles that the samples may show.
-    screens: &'p [&'p Screen],
+    samples: &'p Samples<ROWS>,
     /// The triangle that was met last.
     patch: Option<Patch<'a>>,
     batch: Batch<'a>,
 }
 
 impl<'a, 'p> Resolver<'a, 'p> {
-    pub fn new(
-        pass: &'p Pass<'a>,
-        window: Window,
-        samples: &'p Samples<SAMPLES>,
-        screens: &'p [&'p Screen],
-    ) -> Self {
-        Self { pass, window, samples, screens, patch: None, batch: Batch::default() }
+    pub fn new(pass: &'p Pass<'a>, window: Window, samples: &'p Samples<ROWS>) -> Self {
+        Self { pass, window, samples, patch: None, batch: Batch::default() }
     }
 
     /// Every pixel, or only those that show something that moves, also into the picture's depths and objects.
@@ -160,129 +195,103 @@ impl<'a, 'p> Resolver<'a, 'p> {
         for y in 0..self.window.height {
             for x in (0..self.window.width).step_by(LANES) {
                 let rows = self.ids(x, y);
-                let [a, b, c, d] = rows.map(u32x8::new);
+                let ids = rows.map(u32x8::new);
                 let all = (1 << (self.window.width - x).min(LANES)) - 1;
-                let wanted = if only_moving {
-                    ((a | b | c | d) & u32x8::splat(MOVING)).to_bitmask() & all
-                } else {
-                    all
-                };
+                let any = ids.iter().fold(u32x8::ZERO, |any, row| any | *row);
+                let moving = (any & u32x8::splat(MOVING)).to_bitmask();
+                let wanted = if only_moving { moving & all } else { all };
                 if wanted == 0 {
                     continue;
                 }
-                let one = a.simd_eq(b) & a.simd_eq(c) & a.simd_eq(d) & a.simd_eq(u32x8::splat(rows[0][0]));
-                self.depths((x, y), wanted, picture);
+                self.middles((x, y), &rows[MIDDLE], picture);
+                let first = u32x8::splat(rows[0][0]);
+                let one = ids.iter().fold(u32x8::MAX, |one, row| one & row.simd_eq(first));
                 if one.all() && wanted == all {
                     self.row(rows[0][0], (x, y), sink);
-                    let at = (self.window.y + y) * picture.width + self.window.x + x;
-                    let end = at + (self.window.width - x).min(LANES);
-                    picture.segmentation[at..end].fill(self.pass.object(rows[0][0]));
                     continue;
                 }
                 for lane in (0..LANES).filter(|lane| wanted >> lane & 1 == 1) {
-                    self.pixel(rows.map(|row| row[lane]), (x + lane, y), sink, picture);
+                    self.pixel(rows.map(|row| row[lane]), (x + lane, y), sink);
                 }
             }
         }
         self.flush(sink);
     }
 
-    fn ids(&self, x: usize, y: usize) -> [[u32; LANES]; SAMPLES] {
+    fn ids(&self, x: usize, y: usize) -> [[u32; LANES]; ROWS] {
         let stride = self.samples.stride();
         std::array::from_fn(|row| {
-            let at = (SAMPLES * y + row) * stride + x;
+            let at = (ROWS * y + row) * stride + x;
             self.samples.id[at..].first_chunk::<LANES>().copied().unwrap_or([NONE; LANES])
         })
     }
 
-    /// Depths of pixels that show one thing: the mean of the reciprocals is that in the middle.
-    fn depths(&self, (x, y): (usize, usize), wanted: u32, picture: &mut Picture) {
-        let stride = self.samples.stride();
-        let row = |row: usize| {
-            let at = (SAMPLES * y + row) * stride + x;
-            F8::new(self.samples.w[at..].first_chunk::<LANES>().copied().unwrap_or_default())
-        };
-        let depths = (F8::splat(SAMPLES as f32) / ((row(0) + row(1)) + (row(2) + row(3)))).to_array();
+    /// Depths and objects of eight pixels: what their middles show.
+    fn middles(&self, (x, y): (usize, usize), ids: &[u32; LANES], picture: &mut Picture) {
+        let from = (ROWS * y + MIDDLE) * self.samples.stride() + x;
+        let w = F8::new(self.samples.w[from..].first_chunk::<LANES>().copied().unwrap_or_default());
+        let depths = (F8::ONE / w).to_array();
         let at = (self.window.y + y) * picture.width + self.window.x + x;
         let end = at + (self.window.width - x).min(LANES);
-        for (lane, depth) in picture.depth[at..end].iter_mut().enumerate() {
-            if wanted >> lane & 1 == 1 {
-                *depth = depths[lane];
-            }
+        let pixels = picture.depth[at..end].iter_mut().zip(&mut picture.segmentation[at..end]);
+        for ((depth, object), (id, own)) in pixels.zip(ids.iter().zip(depths)) {
+            (*depth, *object) = if *id == NONE { (f32::INFINITY, 0) } else { (own, self.pass.object(*id)) };
         }
-    }
-
-    fn patch(&mut self, id: u32) -> Option<&Patch<'a>> {
-        if self.patch.as_ref().is_none_or(|patch| patch.id != id) {
-            let drawn: &Drawn<'a> = self.pass.drawn.get(thing_of(id))?.as_ref()?;
-            self.patch = Some(Patch::new(drawn, &self.pass.rays, id));
-        }
-        self.patch.as_ref()
     }
 
     /// Eight pixels wholly covered by one triangle.
     fn row(&mut self, id: u32, (x, y): (usize, usize), sink: &mut impl Sink) {
         let goal = Goal::row(y * TILE + x);
-        goal.each().for_each(|(_, pixel, _)| sink.begin(pixel));
         let (px, py) = ((self.window.x + x) as f32 + 0.5, (self.window.y + y) as f32 + 0.5);
         let (pass, rays) = (self.pass, self.pass.rays);
         if id == NONE {
             sink.nothing(pass, pass.nothing(F8::splat(px) + STEPS, F8::splat(py)), &goal);
-        } else if let Some(patch) = self.patch(id) {
+        } else if let Some(patch) = known(&mut self.patch, pass, id) {
             sink.points(pass, &patch.row(&rays, px, py), &goal);
         }
     }
 
     /// One pixel: its surfaces and their shares.
-    fn pixel(
-        &mut self,
-        ids: [u32; SAMPLES],
-        (x, y): (usize, usize),
-        sink: &mut impl Sink,
-        picture: &mut Picture,
-    ) {
+    fn pixel(&mut self, ids: [u32; ROWS], (x, y): (usize, usize), sink: &mut impl Sink) {
+        const SHARING: [usize; 4] = [0, 1, 3, 4];
         let pixel = y * TILE + x;
         sink.begin(pixel);
-        let at = (self.window.y + y) * picture.width + self.window.x + x;
-        if ids[0] == ids[1] && ids[0] == ids[2] && ids[0] == ids[3] {
-            picture.segmentation[at] = self.pass.object(ids[0]);
-            self.part(ids[0], (x as f32 + 0.5, y as f32 + 0.5), (pixel, 1.0), sink);
+        let place = |row: usize| [0, 1].map(|axis| [x, y][axis] as f32 + PLACES[row][axis]);
+        if SHARING.iter().all(|&row| ids[row] == ids[0]) {
+            self.part(ids[0], place(MIDDLE), (pixel, 1.0), sink);
             return;
         }
         let surfaces = ids.map(|id| self.pass.surface(id));
-        for i in 0..SAMPLES {
-            if surfaces[..i].contains(&surfaces[i]) {
+        for (i, first) in SHARING.into_iter().enumerate() {
+            let own = || SHARING.into_iter().filter(|&row| surfaces[row] == surfaces[first]);
+            if own().next() != Some(SHARING[i]) {
                 continue;
             }
-            let own = || (0..SAMPLES).filter(|&j| surfaces[j] == surfaces[i]);
-            let share = 1.0 / own().count() as f32;
-            let middle = [0, 1].map(|axis| own().map(|j| place::<SAMPLES>(j)[axis]).sum::<f32>() * share);
-            let away = |j: usize| {
-                let [u, v] = place::<SAMPLES>(j);
+            let count = own().count() as f32;
+            let middle = [0, 1].map(|axis| own().map(|row| place(row)[axis]).sum::<f32>() / count);
+            let away = |row: usize| {
+                let [u, v] = place(row);
                 (u - middle[0]) * (u - middle[0]) + (v - middle[1]) * (v - middle[1])
             };
-            let nearest = own().fold(i, |best, j| if away(j) < away(best) { j } else { best });
-            let at = (x as f32 + middle[0], y as f32 + middle[1]);
-            self.part(ids[nearest], at, (pixel, own().count() as f32 / SAMPLES as f32), sink);
+            let nearest = own().fold(first, |best, row| if away(row) < away(best) { row } else { best });
+            self.part(ids[nearest], middle, (pixel, 0.25 * count), sink);
         }
-        (picture.depth[at], picture.segmentation[at]) = self.front(ids, surfaces.map(|s| s.0), (x, y));
     }
 
-    /// A share of a pixel that shows triangle `id` at (x, y).
-    fn part(&mut self, id: u32, (x, y): (f32, f32), (pixel, share): (usize, f32), sink: &mut impl Sink) {
+    /// A share of a pixel that shows triangle `id` at a place of the tile.
+    fn part(&mut self, id: u32, [x, y]: [f32; 2], (pixel, share): (usize, f32), sink: &mut impl Sink) {
         let (x, y) = (self.window.x as f32 + x, self.window.y as f32 + y);
         if id == NONE {
             let radiance = self.pass.nothing(F8::splat(x), F8::splat(y));
             sink.nothing(self.pass, radiance, &Goal::one(pixel, share));
             return;
         }
-        let mut batch = std::mem::take(&mut self.batch);
-        if let Some(patch) = self.patch(id) {
-            patch.put(&mut batch, x, y);
+        if let Some(patch) = known(&mut self.patch, self.pass, id) {
+            let batch = &mut self.batch;
+            patch.put(batch, x, y);
             (batch.pixel[batch.count], batch.share[batch.count]) = (pixel as u32, share);
             batch.count += 1;
         }
-        self.batch = batch;
         if self.batch.count == LANES {
             self.flush(sink);
         }
@@ -291,34 +300,20 @@ impl<'a, 'p> Resolver<'a, 'p> {
     fn flush(&mut self, sink: &mut impl Sink) {
         let Batch { count, pixel, share, .. } = self.batch;
         if count > 0 {
-            sink.points(self.pass, &self.batch.points(&self.pass.rays), &Goal { pixel, share, count });
+            sink.points(
+                self.pass,
+                &self.batch.points(&self.pass.rays),
+                &Goal { pixel, share, count, row: false },
+            );
             self.batch.count = 0;
         }
     }
+}
 
-    /// Depth and object of a pixel of several surfaces: those of the thing with most samples in it; of two with two
-    /// samples each, the one in its middle.
-    fn front(&self, ids: [u32; SAMPLES], things: [usize; SAMPLES], (x, y): (usize, usize)) -> (f32, u16) {
-        let stride = self.samples.stride();
-        let w: [f32; SAMPLES] = std::array::from_fn(|row| self.samples.w[(SAMPLES * y + row) * stride + x]);
-        let votes = |i: usize| things.iter().filter(|t| **t == things[i]).count();
-        let most = (0..SAMPLES).map(votes).max().unwrap_or(0);
-        let leading = |i: &usize| votes(*i) == most;
-        let near = (0..SAMPLES).filter(leading).fold(None, |best: Option<usize>, i| {
-            if best.is_some_and(|b| w[b] >= w[i]) { best } else { Some(i) }
-        });
-        let mut best = near.unwrap_or(0);
-        if let Some(other) = (0..SAMPLES).filter(leading).find(|&i| things[i] != things[best]) {
-            let middle = [(self.window.x + x) as f32 + 0.5, (self.window.y + y) as f32 + 0.5];
-            let own = |id| thing_of(id) == things[best];
-            if !self.screens.iter().any(|screen| screen.covers(self.window.tile, middle, own)) {
-                best = other;
-            }
-        }
-        if ids[best] == NONE {
-            return (f32::INFINITY, 0);
-        }
-        let own = (0..SAMPLES).filter(|&i| things[i] == things[best]);
-        (votes(best) as f32 / own.map(|i| w[i]).sum::<f32>(), self.pass.object(ids[best]))
+/// Triangle `id`, which may be the one that was met last.
+fn known<'m, 'a>(last: &'m mut Option<Patch<'a>>, pass: &Pass<'a>, id: u32) -> Option<&'m Patch<'a>> {
+    if last.as_ref().is_none_or(|patch| patch.id != id) {
+        *last = Some(Patch::new(pass.drawn.get(thing_of(id))?.as_ref()?, &pass.rays, id));
     }
+    last.as_ref()
 }
