@@ -49,6 +49,10 @@ pub(super) fn finest(visual: &Visual) -> f32 {
                 least * 0.5_f64.powi(*octaves as i32 - 1) * (to - from).abs().min(1.0)
             }
             Mask::Both { masks } => masks.iter().map(of).fold(f64::INFINITY, f64::min),
+            Mask::Inverse { mask } => of(mask),
+            Mask::Inside { soft_m, .. } => *soft_m,
+            // As fine as the surface itself, whose own detail is told elsewhere.
+            Mask::Facing { .. } => f64::INFINITY,
             // Sharp edges.
             Mask::Checker { .. }
             | Mask::Stripes { .. }
