@@ -1,5 +1,7 @@
 //! Prints docs/validation.md: `cargo run --release --example validation > docs/validation.md`.
 
+#[path = "../tests/validation/camera.rs"]
+mod camera;
 #[path = "../tests/validation/element.rs"]
 mod element;
 #[path = "../tests/validation/extremes.rs"]
@@ -28,7 +30,7 @@ use softvt::geometry::Vec3;
 use statics::Compared;
 use support::{Outcome, Squeeze, run};
 
-const HEAD: &str = "# Validation of the mechanics
+const HEAD: &str = "# Validation
 
 Made by `cargo run --release --example validation > docs/validation.md`; the same experiments are asserted by
 `cargo test --release --test validation`. *Squeeze*: a soft cube of 50 mm (E 30 kPa, ν 0.4, 300 kg/m³, β 2 ms) on a table
@@ -500,6 +502,18 @@ fn gel_under_a_ball(report: &mut Report) {
     report.claim("gel: outward motion", outwards, 0.10);
 }
 
+fn cameras(report: &mut Report) {
+    heading("Camera", "Pictures of 224 × 224 pixels against the pinhole in closed form.");
+    let ([radius, centre], corners, depth) = (camera::silhouette(), camera::corners(), camera::depth());
+    println!("Ball of 0.2 m at 1 m: radius of its silhouette off by {radius:.3} px, its centre by {centre:.3} px.");
+    let worst = corners.iter().copied().fold(0.0, f64::max);
+    println!("Checkerboard of 0.1 m at 1 m: corners off by {worst:.3} px at most.");
+    println!("A plane that passes behind the camera: depth up to 1 m off by {:.4} mm at most.", 1e3 * depth);
+    report.claim("camera: silhouette, px", [radius, centre], 0.1);
+    report.claim("camera: corners of a checkerboard, px", corners, 0.1);
+    report.claim("camera: depth, m", [depth], 1e-4);
+}
+
 fn main() {
     print!("{HEAD}");
     let mut report = Report::default();
@@ -512,6 +526,7 @@ fn main() {
     time_step(&mut report);
     extremes(&mut report);
     gel_under_a_ball(&mut report);
+    cameras(&mut report);
     report.print();
     print!("{MISSES}");
 }

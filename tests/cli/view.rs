@@ -23,7 +23,7 @@ fn view_writes_stills_of_every_stream_and_a_video_and_the_same_ones_again() {
     let project = short();
     let said = project.succeeds("view x.lua --out seen");
     assert_eq!(said.out.lines().last(), Some("seen/episode.mp4"));
-    assert_eq!(said.out.lines().count(), 3 * (2 + 2 * 3) + 2, "{}", said.out);
+    assert_eq!(said.out.lines().count(), 3 * (2 * 3 + 2 * 3) + 2, "{}", said.out);
     for moment in ["start", "worst", "end"] {
         for (stream, size) in [
             ("third_person", [224, 224]),
@@ -37,6 +37,12 @@ fn view_writes_stills_of_every_stream_and_a_video_and_the_same_ones_again() {
             assert!(shows_something(&bytes, size), "{moment}_{stream}: {} bytes", bytes.len());
         }
     }
+    // The floor is 0.71 m below the camera and farther along most of its axes; the cube is object 2.
+    let numbers = |name: &str| image::open(project.path(name)).expect("a picture").into_luma16().into_raw();
+    let depth = numbers("seen/start_third_person_depth.png");
+    assert!(depth.iter().all(|d| *d > 5000) && depth.iter().any(|d| *d < 12000), "tenths of a millimetre");
+    let objects = numbers("seen/start_third_person_segmentation.png");
+    assert!(objects.contains(&1) && objects.contains(&2) && objects.contains(&1000));
     let video = fs::read(project.path("seen/episode.mp4")).expect("written");
     assert_eq!(&video[4..8], b"ftyp");
     project.succeeds("view x.lua --out again");

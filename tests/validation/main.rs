@@ -3,6 +3,7 @@
 //! Every module holds experiments and, below them, tests that say what they must show; `examples/validation.rs` prints
 //! the same experiments as tables.
 
+mod camera;
 mod element;
 mod extremes;
 mod free;

@@ -5,7 +5,7 @@ mod canvas;
 use std::path::{Path, PathBuf};
 
 pub use canvas::{Canvas, Ink};
-use image::{ImageError, RgbImage};
+use image::{ImageBuffer, ImageError, Luma, RgbImage};
 
 use crate::{
     benchmark::control::CONTROL_DT,
@@ -195,7 +195,9 @@ fn native(camera: &Camera) -> usize {
     if camera.name == CAMERAS[0] { 1024 } else { 512 }
 }
 
-/// Stills of a film: `moments` are indices of states by name. Writes each stream of each moment into `dir`.
+/// Stills of a film: `moments` are indices of states by name. Writes each stream of each moment into `dir`; of cameras also
+/// depth (16 bits, 0.1 mm along the optical axis, 65535 where it is farther or nothing is) and segmentation (16 bits, objects
+/// from 1 in the order of the scene, [`crate::rollout::senses::ROBOT`], 0 where nothing is).
 ///
 /// # Errors
 /// A stream cannot be made, or a file not written.
@@ -211,10 +213,13 @@ pub fn write_stills(
         for camera in film.senses.cameras().to_vec() {
             let camera = if full_size { camera.clone().with_edge(native(&camera)) } else { camera };
             let seen = film.senses.see(frame, &camera)?;
-            let picture = RgbImage::from_raw(seen.width as u32, seen.height as u32, seen.rgb);
-            let path = dir.join(format!("{moment}_{}.png", camera.name));
-            save(&picture.unwrap_or_default(), &path)?;
-            written.push(path);
+            let path = |kind: &str| dir.join(format!("{moment}_{}{kind}.png", camera.name));
+            let size = (seen.width as u32, seen.height as u32);
+            let tenths = |depth: &f32| (1e4 * depth).min(f32::from(u16::MAX)).round() as u16;
+            save_numbers(size, seen.depth.iter().map(tenths).collect(), &path("_depth"))?;
+            save_numbers(size, seen.segmentation, &path("_segmentation"))?;
+            save(&RgbImage::from_raw(size.0, size.1, seen.rgb).unwrap_or_default(), &path(""))?;
+            written.extend(["", "_depth", "_segmentation"].map(path));
         }
         for (side, touched) in ["left", "right"].into_iter().zip(&film.senses.touch(frame)?) {
             for (kind, picture) in tactile(touched) {
@@ -236,5 +241,10 @@ fn tactile(touched: &Touched) -> [(&'static str, RgbImage); 3] {
 }
 
 fn save(picture: &RgbImage, path: &Path) -> Result<(), FilmError> {
+    picture.save(path).map_err(|source| FilmError::Picture { path: path.to_owned(), source })
+}
+
+fn save_numbers((width, height): (u32, u32), numbers: Vec<u16>, path: &Path) -> Result<(), FilmError> {
+    let picture = ImageBuffer::<Luma<u16>, _>::from_raw(width, height, numbers).unwrap_or_default();
     picture.save(path).map_err(|source| FilmError::Picture { path: path.to_owned(), source })
 }

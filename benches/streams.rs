@@ -1,0 +1,102 @@
+//! The closed loop with every stream at every control step: both cameras, both fingers' pictures and markers.
+//!
+//! `cargo bench --bench streams` runs the expert on the first task of a suite and prints CPU seconds a simulated second,
+//! blind and looking, and how many times real time that is. One thread; settling and the making of models are apart.
+
+use std::sync::Arc;
+
+use cpu_time::ThreadTime;
+use softvt::{
+    benchmark::{Plan, seed::Split},
+    evaluation::record::Identity,
+    policy::{Action, Observation, Streams},
+    rollout::{ControlError, Controller, Episode, EpisodeSpec, Looks, RestCache, Simulation},
+    script::{self, EpisodeRequest, ExpertController, Loaded},
+};
+
+/// The suite, and the goal: times real time with all streams.
+const SUITE: &str = "suites/spatial_soft.lua";
+const GOAL: f64 = 4.0;
+
+/// An expert that also looks; time runs from its first action on.
+struct Looking {
+    expert: ExpertController,
+    streams: Streams,
+    since: Option<ThreadTime>,
+}
+
+impl Controller for Looking {
+    fn streams(&self) -> Streams {
+        self.streams.clone()
+    }
+
+    fn act(&mut self, sim: &Simulation, seen: &Observation) -> Result<Option<Action>, ControlError> {
+        self.since.get_or_insert_with(ThreadTime::now);
+        self.expert.act(sim, seen)
+    }
+}
+
+/// Simulated seconds and CPU seconds of an episode.
+fn episode(loaded: &Loaded, streams: &Streams, shared: &(RestCache, Looks)) -> (f64, f64) {
+    let Plan::Suite(suite) = &loaded.plan else { panic!("{SUITE} is a suite") };
+    let request = EpisodeRequest {
+        suite: suite.name.clone(),
+        task: 0,
+        episode: 0,
+        base_seed: 0,
+        split: Split::Validation,
+        shifts: Vec::new(),
+    };
+    let opened = script::Episode::open(loaded, &request).expect("it opens");
+    let (task, settings) = (suite.tasks[0].clone(), suite.settings.clone());
+    let spec = EpisodeSpec {
+        identity: Identity {
+            suite: suite.name.clone(),
+            task: task.id,
+            prompt: task.prompt.clone(),
+            layout: task.layout.clone(),
+            episode: 0,
+            seed: 0,
+            split: Split::Validation.name().to_owned(),
+            policy: "expert".to_owned(),
+            asset: String::new(),
+            soft: true,
+        },
+        task,
+        scene: Arc::new(opened.scene.clone()),
+        limit: None,
+        rules: settings.rules,
+        params: settings.physics,
+        robot: settings.robot,
+        tactile: settings.tactile,
+        film: false,
+        trace: None,
+    };
+    let expert = opened.expert().expect("a script").expect("an expert");
+    let expert = ExpertController::new(expert, false);
+    let mut driver = Looking { expert, streams: streams.clone(), since: None };
+    let started = Episode::start(spec, &shared.0, &shared.1).expect("it starts");
+    let record = started.run(&mut driver).expect("it runs").record;
+    let since = driver.since.expect("it acted");
+    (record.stats.time_s, since.elapsed().as_secs_f64())
+}
+
+fn main() {
+    let loaded = script::load(SUITE.as_ref(), &[]).expect("the suite loads");
+    let shared = (RestCache::default(), Looks::default());
+    let cameras: Vec<String> = ["third_person", "wrist"].map(str::to_owned).into();
+    let cases = [
+        ("blind", Streams::default()),
+        ("cameras", Streams { cameras: cameras.clone(), ..Streams::default() }),
+        ("touch", Streams { touch: true, ..Streams::default() }),
+        ("all streams", Streams { cameras, touch: true, force: true }),
+    ];
+    println!("{:<12} {:>10} {:>12} {:>12}", "case", "simulated", "CPU s / s", "× real time");
+    for (name, streams) in cases {
+        // The first one makes the models.
+        episode(&loaded, &streams, &shared);
+        let (simulated, spent) = episode(&loaded, &streams, &shared);
+        println!("{name:<12} {simulated:>8.2} s {:>12.4} {:>12.1}", spent / simulated, simulated / spent);
+    }
+    println!("goal: all streams at {GOAL} × real time");
+}

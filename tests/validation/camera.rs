@@ -1,0 +1,140 @@
+//! Pictures against the pinhole in closed form.
+
+use std::sync::Arc;
+
+use softvt::{
+    geometry::{Pose, Quat, Vec3, shape::Shape},
+    scene::{Camera, Layer, Lighting, Mask, Visual},
+    sensing::camera::{FrameView, Model, Mount, Picture, Scratch, Stage, Thing, render},
+};
+
+/// Edge of the pictures, pixels.
+const EDGE: usize = 224;
+
+fn thing(object: u16, shape: &Shape, visual: Visual, pose: Pose) -> Thing {
+    let model = Model::of_shape("thing", shape, &[visual]).expect("a surface");
+    Thing {
+        name: format!("thing {object}"),
+        object,
+        model: Arc::new(model),
+        mount: Mount::Fixed(pose),
+        casts_shadow: false,
+    }
+}
+
+/// A ground whose top is z = 0, object 1.
+fn ground(visual: Visual) -> Thing {
+    let half = Vec3::new(1.0, 1.0, 0.1);
+    thing(1, &Shape::Box { half }, visual, Pose::translation(0.0, 0.0, -0.1))
+}
+
+/// A camera at `eye` that looks at `target`; image up is as near to `up` as can be.
+fn camera(eye: Vec3, target: Vec3, up: Vec3) -> Camera {
+    let turn = Quat::face_towards(&(eye - target), &up);
+    Camera { pose: Pose::from_parts(eye.into(), turn), ..Camera::third_person_table() }
+}
+
+fn above() -> Camera {
+    camera(Vec3::z(), Vec3::zeros(), Vec3::y())
+}
+
+fn draw(things: Vec<Thing>, camera: &Camera) -> Picture {
+    let stage = Stage::new(things, Lighting::default()).expect("the default light is good");
+    render(&stage, &FrameView::still(), camera, &mut Scratch::default()).expect("a picture")
+}
+
+/// Pixels a unit of slope.
+fn focal(camera: &Camera) -> f64 {
+    0.5 * camera.height as f64 / (0.5 * camera.fovy_rad).tan()
+}
+
+/// A ball of 0.2 m seen from 1 m: errors of the radius and of the centre of its silhouette, pixels.
+pub fn silhouette() -> [f64; 2] {
+    let (camera, radius) = (above(), 0.2);
+    let ball = thing(7, &Shape::Sphere { radius }, Visual::default(), Pose::identity());
+    let picture = draw(vec![ball], &camera);
+    let inside: Vec<usize> = (0..EDGE * EDGE).filter(|&i| picture.segmentation[i] == 7).collect();
+    let area = inside.len() as f64;
+    let mean = |of: &dyn Fn(usize) -> usize| inside.iter().map(|&i| of(i) as f64 + 0.5).sum::<f64>() / area;
+    let expected = focal(&camera) * radius / (1.0 - radius * radius).sqrt();
+    let middle = 0.5 * EDGE as f64;
+    let centre = (mean(&|i| i % EDGE) - middle).abs().max((mean(&|i| i / EDGE) - middle).abs());
+    [((area / std::f64::consts::PI).sqrt() - expected).abs(), centre]
+}
+
+fn linear(byte: u8) -> f64 {
+    let x = f64::from(byte) / 255.0;
+    if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
+}
+
+/// Where a line of values passes from its first to its last, pixels: the place of an ideal step of the same sum.
+fn step(values: &[f64]) -> f64 {
+    let (first, last) = (values[0], values[values.len() - 1]);
+    values.iter().map(|v| (v - last) / (first - last)).sum()
+}
+
+/// Corners of a checkerboard of 0.1 m seen from 1 m: their errors, pixels.
+pub fn corners() -> Vec<f64> {
+    let layer = Layer {
+        mask: Mask::Checker { size_m: 0.1 },
+        albedo: [0.5; 3],
+        roughness: 1.0,
+        opacity: 1.0,
+        relief_m: 0.0,
+    };
+    let camera = above();
+    let picture = draw(vec![ground(Visual::plain([0.1; 3], 1.0, 0.0).with(layer))], &camera);
+    let value = |x: usize, y: usize| linear(picture.rgb[3 * (y * EDGE + x)]);
+    let square = 0.1 * focal(&camera);
+    let error = |corner: [i32; 2]| {
+        let [ex, ey] = corner.map(|c| 0.5 * EDGE as f64 + square * f64::from(c));
+        let reach = (0.4 * square) as usize;
+        let (cx, cy, off) = (ex as usize, ey as usize, (0.5 * square) as usize);
+        let row: Vec<f64> = (cx - reach..cx + reach).map(|x| value(x, cy - off)).collect();
+        let column: Vec<f64> = (cy - reach..cy + reach).map(|y| value(cx - off, y)).collect();
+        let found = [(cx - reach) as f64 + step(&row), (cy - reach) as f64 + step(&column)];
+        (found[0] - ex).abs().max((found[1] - ey).abs())
+    };
+    [[-2, -1], [0, 0], [1, 2], [2, -2]].map(error).into()
+}
+
+/// A plane that passes behind the camera: the largest error of its depth up to 1 m, m.
+pub fn depth() -> f64 {
+    let eye = Vec3::new(0.0, -0.3, 0.25);
+    let camera = Camera { fovy_rad: 1.8, ..camera(eye, Vec3::new(0.0, 0.1, 0.0), Vec3::z()) };
+    let picture = draw(vec![ground(Visual::default())], &camera);
+    let (mut checked, mut worst) = (0, 0.0_f64);
+    for i in 0..EDGE * EDGE {
+        let slope = |at: usize| (at as f64 + 0.5 - 0.5 * EDGE as f64) / focal(&camera);
+        let ray = camera.pose.rotation * Vec3::new(slope(i % EDGE), -slope(i / EDGE), -1.0);
+        let depth = -eye.z / ray.z;
+        let hit = eye + ray * depth;
+        if depth > 0.0 && depth < 1.0 && hit.x.abs().max(hit.y.abs()) < 0.98 {
+            assert_eq!(picture.segmentation[i], 1, "pixel {i} shows no ground");
+            worst = worst.max((f64::from(picture.depth[i]) - depth).abs());
+            checked += 1;
+        }
+    }
+    assert!(checked > 10_000, "{checked} pixels of ground");
+    worst
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ball_has_the_silhouette_of_the_pinhole_to_a_tenth_of_a_pixel() {
+        assert!(silhouette().iter().all(|error| *error < 0.1), "{:?}", silhouette());
+    }
+
+    #[test]
+    fn checkerboard_corners_lie_where_the_pinhole_puts_them_to_a_tenth_of_a_pixel() {
+        assert!(corners().iter().all(|error| *error < 0.1), "{:?}", corners());
+    }
+
+    #[test]
+    fn depth_is_that_of_the_plane_to_a_tenth_of_a_millimetre_also_where_it_passes_behind_the_camera() {
+        assert!(depth() < 1e-4, "{:e}", depth());
+    }
+}
