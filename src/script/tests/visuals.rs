@@ -171,3 +171,25 @@ fn a_painted_shape_needs_a_look_for_each_material_or_none_at_all() {
                     material 0";
     assert!(message.ends_with(expected) && message.contains("x.lua:"), "{message}");
 }
+
+#[test]
+fn every_material_of_the_library_gives_a_look() {
+    let names =
+        ["crust", "dough", "frosting", "seeds", "ceramic", "wood", "steel", "fabric", "paint", "floured"];
+    let looks: Vec<_> = names
+        .iter()
+        .map(|name| match *name {
+            "floured" => "material.floured(material.crust {}, {})".to_owned(),
+            name => format!("material.{name} {{}}"),
+        })
+        .collect();
+    let visuals = read(&format!(
+        "(function() local material = require 'materials'\n\
+         local count = 0 for name in pairs(material) do count = count + 1 end assert(count == {})\n\
+         return {{ {} }} end)()",
+        names.len(),
+        looks.join(", ")
+    ));
+    assert!(visuals.iter().all(|visual| !visual.layers.is_empty()));
+    assert_eq!(visuals.len(), names.len());
+}
