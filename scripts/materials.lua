@@ -108,23 +108,23 @@ end
 
 -- Brushed steel; `along` is the direction of the brush.
 function material.steel(o)
-  local fine, long = 0.8 * mm, 60 * mm
+  local fine, long = 2 * mm, 80 * mm
   local size = ({ x = { long, fine, fine }, y = { fine, long, fine }, z = { fine, fine, long } })[o.along or "x"]
   return {
-    albedo = o.base or { 0.56, 0.57, 0.58 }, roughness = o.roughness or 0.30, metalness = 1,
+    albedo = o.base or { 0.72, 0.73, 0.74 }, roughness = o.roughness or 0.30, metalness = 1,
     layers = {
-      layer(mask.noise { size_m = size, octaves = 2, from = 0.3, to = 0.7, seed = o.seed or 1 }, { 0.44, 0.45, 0.46 }, 0.38, 0.6),
+      layer(mask.noise { size_m = size, octaves = 2, from = 0.3, to = 0.7, seed = o.seed or 1 }, { 0.50, 0.51, 0.52 }, 0.42, 0.7),
     },
   }
 end
 
 -- Woven cloth; the threads lie along x and y.
 function material.fabric(o)
-  local base, thread = o.base or { 0.60, 0.56, 0.48 }, o.thread or { 0.74, 0.71, 0.64 }
+  local base, thread = o.base or { 0.34, 0.31, 0.26 }, o.thread or { 0.70, 0.66, 0.58 }
   return {
     albedo = base, roughness = 0.92,
     layers = {
-      layer(mask.weave { pitch_m = o.pitch_m or 1.2 * mm }, thread, 0.95, 0.9, 0.1 * mm),
+      layer(mask.weave { pitch_m = o.pitch_m or 2.4 * mm }, thread, 0.95, 0.9, 0.1 * mm),
       layer(mask.noise { size_m = 30 * mm, octaves = 3, from = 0.4, to = 0.8, seed = o.seed or 1 }, base, 0.95, 0.4),
     },
   }

@@ -96,26 +96,36 @@ fn every_recipe_has_a_voxel_mesh_and_samples_all_around() {
         assert!(sum.norm() < 0.01 * area, "{name}: {sum:?} of {area}");
         let off = samples.iter().map(|s| asset.shape.distance(&s.p_o).abs()).fold(0.0, f64::max);
         assert!(off < 0.3e-3, "{name}: a sample lies {off} m off the surface");
-        assert!(asset.visuals.len() >= 2, "{name} has one colour");
+        let layers = asset.visuals.iter().flat_map(|visual| &visual.layers);
+        let colours = asset.visuals.len() + layers.filter(|layer| layer.opacity > 0.0).count();
+        assert!(colours >= 3, "{name} has {colours} colours");
     }
+}
+
+/// The nodes of all soft bodies at rest, bit by bit.
+fn at_rest(scene: Scene, cache: &RestCache) -> Vec<[u64; 3]> {
+    let mut sim =
+        Simulation::new(Arc::new(scene), &Default::default(), &Default::default(), cache).expect("builds");
+    sim.settle().unwrap_or_else(|e| panic!("{e}"));
+    let bodies = sim.world.soft.iter();
+    bodies.flat_map(|soft| soft.body.x.iter().map(|x| x.map(f64::to_bits).into())).collect()
+}
+
+#[test]
+fn what_is_only_seen_changes_no_bit_of_what_moves() {
+    let cache = RestCache::default();
+    let seen = scene(&suite(), 0, 0);
+    let mut bare = seen.clone();
+    bare.objects.retain(|object| object.asset.body != Body::Scenery);
+    assert!(bare.objects.len() + 5 < seen.objects.len(), "a room stands around the table");
+    assert!(at_rest(seen, &cache) == at_rest(bare, &cache));
 }
 
 #[test]
 fn every_layout_settles_and_both_tasks_of_a_pair_start_from_one_state() {
     let loaded = suite();
     let cache = RestCache::default();
-    let settled = |task: usize| {
-        let scene = scene(&loaded, task, 1);
-        let mut sim = Simulation::new(Arc::new(scene), &Default::default(), &Default::default(), &cache)
-            .expect("builds");
-        sim.settle().unwrap_or_else(|e| panic!("task {task}: {e}"));
-        let bits = |x: &Vec3| x.map(f64::to_bits);
-        sim.world
-            .soft
-            .iter()
-            .flat_map(|soft| soft.body.x.iter().map(bits).collect::<Vec<_>>())
-            .collect::<Vec<_>>()
-    };
+    let settled = |task: usize| at_rest(scene(&loaded, task, 1), &cache);
     for pair in 0..5 {
         assert!(settled(2 * pair) == settled(2 * pair + 1), "pair {pair}");
     }

@@ -72,12 +72,12 @@ impl LuaScene {
         Self { scene: Arc::new(Mutex::new(scene)), assets: Arc::default() }
     }
 
-    fn asset(&self, table: &Table) -> mlua::Result<Arc<Asset>> {
+    fn asset(&self, lua: &Lua, table: &Table) -> mlua::Result<Arc<Asset>> {
         let mut assets = locked(&self.assets);
         if let Some((_, asset)) = assets.iter().find(|(known, _)| known.to_pointer() == table.to_pointer()) {
             return Ok(asset.clone());
         }
-        let asset = Arc::new(read_asset(table)?);
+        let asset = Arc::new(read_asset(lua, table)?);
         assets.push((table.clone(), asset.clone()));
         Ok(asset)
     }
@@ -89,7 +89,7 @@ impl LuaScene {
         let place = schema::check(lua, &catalogue::PLACE, table)
             .map_err(|fault| schema::fault_here(lua, "scene:add", &fault))?;
         let name: String = place.get("name")?;
-        let asset = self.asset(&place.get("asset")?)?;
+        let asset = self.asset(lua, &place.get("asset")?)?;
         let mut scene = locked(&self.scene);
         if scene.objects.iter().any(|object| object.name == name) {
             return Err(fail(
@@ -133,7 +133,7 @@ fn find(lua: &Lua, scene: &Scene, name: &str) -> mlua::Result<usize> {
     index.ok_or_else(|| fail(lua, format!("scene: {}", unknown("object", name, names))))
 }
 
-fn read_asset(table: &Table) -> mlua::Result<Asset> {
+fn read_asset(lua: &Lua, table: &Table) -> mlua::Result<Asset> {
     let body: Table = table.get("body")?;
     let kind: String = body.metatable().map_or(Ok(String::new()), |meta| meta.get("__name"))?;
     let body = match kind.as_str() {
@@ -149,13 +149,13 @@ fn read_asset(table: &Table) -> mlua::Result<Asset> {
         _ => Body::Static,
     };
     let friction: Table = table.get("friction")?;
-    let shape: mlua::AnyUserData = table.get("shape")?;
+    let LuaShape(shape) = table.get("shape")?;
     Ok(Asset {
         name: table.get("name")?,
-        shape: shape.borrow::<LuaShape>()?.0.clone(),
+        visuals: super::visuals::read(lua, table, &shape)?,
+        shape,
         body,
         friction: Friction { static_mu: friction.get("static_mu")?, dynamic_mu: friction.get("dynamic_mu")? },
-        visuals: super::visuals::read(table)?,
         hints: table.get::<Option<_>>("hints")?.unwrap_or_default(),
     })
 }

@@ -10,7 +10,10 @@ use super::{
     schema::{self, Fault, Record},
     shapes::{LuaShape, checked},
 };
-use crate::scene::{Layer, Mask, Visual};
+use crate::{
+    geometry::shape::Shape,
+    scene::{Layer, Mask, Visual},
+};
 
 /// `softvt.Mask`.
 #[derive(Clone, Debug)]
@@ -144,11 +147,21 @@ fn mask(name: &str, s: &Table) -> mlua::Result<Mask> {
     })
 }
 
-/// The looks of a checked asset table; one plain grey if it names none.
-pub(super) fn read(asset: &Table) -> mlua::Result<Vec<Visual>> {
+/// The looks of a checked asset table, whose shape is `shape`; plain grey all over if it names none.
+pub(super) fn read(lua: &Lua, asset: &Table, shape: &Shape) -> mlua::Result<Vec<Visual>> {
+    let needed = usize::from(shape.highest_material()) + 1;
     let visuals: Option<Vec<Table>> = asset.get("visuals")?;
     match visuals.unwrap_or_default().iter().map(visual).collect::<mlua::Result<Vec<_>>>()? {
-        none if none.is_empty() => Ok(vec![Visual::default()]),
+        none if none.is_empty() => Ok(vec![Visual::default(); needed]),
+        visuals if visuals.len() < needed => {
+            let (name, count): (String, usize) = (asset.get("name")?, visuals.len());
+            let what = format!(
+                "asset {name}: visuals: the shape is painted with material {}, expected {needed} looks, got {count}; \
+                 the first is that of material 0",
+                needed - 1
+            );
+            Err(fail(lua, what))
+        }
         visuals => Ok(visuals),
     }
 }

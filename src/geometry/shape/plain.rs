@@ -1,4 +1,4 @@
-//! A shape without its paint.
+//! A shape without its paint, and what paint there is.
 
 use std::sync::Arc;
 
@@ -39,6 +39,24 @@ impl Shape {
             | Self::Prism { .. }
             | Self::Lathe(_)
             | Self::Mesh(_) => self.clone(),
+        }
+    }
+
+    /// The highest material id that [`Shape::material`] may give.
+    pub fn highest_material(&self) -> u16 {
+        let most = |parts: &[Self]| parts.iter().map(Self::highest_material).max().unwrap_or(0);
+        match self {
+            Self::Paint { shape, material, .. } => shape.highest_material().max(*material),
+            Self::Placed { shape, .. }
+            | Self::Scaled { shape, .. }
+            | Self::Rounded { shape, .. }
+            | Self::Shell { shape, .. }
+            | Self::Twist { shape, .. }
+            | Self::Bend { shape, .. }
+            | Self::Displace { shape, .. } => shape.highest_material(),
+            Self::Union(parts) | Self::Intersect(parts) | Self::SmoothUnion { parts, .. } => most(parts),
+            Self::Subtract { from, .. } | Self::SmoothSubtract { from, .. } => from.highest_material(),
+            _ => 0,
         }
     }
 }

@@ -14,6 +14,17 @@ fn with_visuals(visuals: &str) -> String {
     )
 }
 
+fn first() -> EpisodeRequest {
+    EpisodeRequest {
+        suite: "test".into(),
+        task: 0,
+        episode: 0,
+        base_seed: 0,
+        split: Split::Validation,
+        shifts: Vec::new(),
+    }
+}
+
 fn read(visuals: &str) -> Vec<Visual> {
     let text = SUITE.replace(
         "  scene:add { name = \"ball\", asset = ball,",
@@ -21,15 +32,7 @@ fn read(visuals: &str) -> Vec<Visual> {
     );
     let project = Project::new(&[("suites/x.lua", &(with_visuals(visuals) + &text + "\nreturn suite()"))]);
     let loaded = project.load("suites/x.lua", &[]).unwrap();
-    let request = EpisodeRequest {
-        suite: "test".into(),
-        task: 0,
-        episode: 0,
-        base_seed: 0,
-        split: Split::Validation,
-        shifts: Vec::new(),
-    };
-    let scene = Episode::open(&loaded, &request).unwrap().scene;
+    let scene = Episode::open(&loaded, &first()).unwrap().scene;
     assert_eq!(scene.objects[0].asset.body, Body::Scenery);
     scene.objects[0].asset.visuals.clone()
 }
@@ -144,4 +147,49 @@ fn a_wrong_look_is_named_with_its_line_and_the_mend() {
     ] {
         assert_eq!(layer(inner), expected, "{inner}");
     }
+}
+
+#[test]
+fn a_painted_shape_needs_a_look_for_each_material_or_none_at_all() {
+    let painted = |visuals: &str| {
+        let asset = format!(
+            "local asset = softvt.asset {{ name = \"bun\", body = softvt.scenery {{}}, {visuals}\n  shape = softvt.shape.sphere \
+             {{ radius = 0.03 }}:paint {{ material = 2, region = softvt.shape.sphere {{ radius = 0.01 }} }}:grounded() }}\n"
+        );
+        let add =
+            "scene:add { name = \"bun\", asset = asset, xyz = { 0, 0, 0 } }\n  scene:add { name = \"ball\",";
+        let text = asset + &SUITE.replace("scene:add { name = \"ball\",", add) + "\nreturn suite()";
+        let project = Project::new(&[("suites/x.lua", &text)]);
+        let loaded = project.load("suites/x.lua", &[]).unwrap();
+        Episode::open(&loaded, &first()).map(|episode| episode.scene.objects[0].asset.visuals.len())
+    };
+    assert_eq!(painted("").unwrap(), 3);
+    let looks = |count: usize| format!("visuals = {{ {} }},", "{ albedo = { 1, 1, 1 } },".repeat(count));
+    assert_eq!(painted(&looks(3)).unwrap(), 3);
+    let message = painted(&looks(2)).unwrap_err().to_string();
+    let expected = "asset bun: visuals: the shape is painted with material 2, expected 3 looks, got 2; the first is that of \
+                    material 0";
+    assert!(message.ends_with(expected) && message.contains("x.lua:"), "{message}");
+}
+
+#[test]
+fn every_material_of_the_library_gives_a_look() {
+    let names =
+        ["crust", "dough", "frosting", "seeds", "ceramic", "wood", "steel", "fabric", "paint", "floured"];
+    let looks: Vec<_> = names
+        .iter()
+        .map(|name| match *name {
+            "floured" => "material.floured(material.crust {}, {})".to_owned(),
+            name => format!("material.{name} {{}}"),
+        })
+        .collect();
+    let visuals = read(&format!(
+        "(function() local material = require 'materials'\n\
+         local count = 0 for name in pairs(material) do count = count + 1 end assert(count == {})\n\
+         return {{ {} }} end)()",
+        names.len(),
+        looks.join(", ")
+    ));
+    assert!(visuals.iter().all(|visual| !visual.layers.is_empty()));
+    assert_eq!(visuals.len(), names.len());
 }

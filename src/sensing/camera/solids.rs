@@ -63,10 +63,10 @@ impl Solid {
 }
 
 /// Cells of the levels, in the finest's.
-const COARSER: [f64; 2] = [1.0, 1.9];
+const COARSER: [f64; 2] = [1.0, 1.6];
 /// Smooth one-coloured surfaces look right with edges of so many times what patterns need: this share of a cell counts
 /// as the level's spacing.
-const PLAIN: f64 = 0.36;
+const PLAIN: f64 = 0.16;
 /// What lies deeper than this inside of another solid is never seen, m.
 const HIDDEN: f64 = 1.5e-3;
 

@@ -11,7 +11,7 @@ use crate::{geometry::Pose, sensing::camera::Solid};
 /// Edge of the cells of the shells, m.
 const CELL: f64 = 12.5e-3;
 /// The same for the more winding ones from the forearm on, m.
-const FINE: f64 = 10e-3;
+const FINE: f64 = 10.8e-3;
 /// Radius of the tubes, m.
 const TUBE: f64 = 0.057;
 /// Rounding of the shells' ends, which collars cover, m.
@@ -33,7 +33,7 @@ pub(super) fn base() -> Part {
         link: None,
         name: "base",
         solids: vec![
-            Solid::new(flat_below(body), CELL, SHELL),
+            Solid::new(flat_below(body), FINE, SHELL),
             case(&plugs, [0.024, 0.046, 0.036], 4e-3, 4e-3, DARK),
             collar([0.0, 0.0, 0.122], [0.0, 0.0, 0.139], 0.0585),
             ring([0.0, 0.0, 0.120], [0.0, 0.0, 0.160], NECK, 2e-3, GREY),
@@ -43,7 +43,7 @@ pub(super) fn base() -> Part {
 
 /// The clean rim of a shell at a seam, from inside of the shell to the seam.
 fn collar(from: [f64; 3], to: [f64; 3], radius: f64) -> Solid {
-    ring(from, to, radius + 0.5e-3, 2.5e-3, SHELL)
+    ring(from, to, radius + 1e-3, 2.5e-3, SHELL)
 }
 
 /// Links 1 to 7.
@@ -58,7 +58,7 @@ fn part(link: usize, name: &'static str, solids: Vec<Solid>) -> Part {
 /// Link 1: the column that bulges into the shoulder's drum.
 fn shoulder() -> Part {
     let column = drum([0.0, 0.0, -0.185], [0.0, 0.0, -0.03], TUBE, RIM);
-    let bulge = drum([0.0, -0.063, 0.0], [0.0, 0.063, 0.0], DRUM, 22e-3);
+    let bulge = drum([0.0, -0.063, 0.0], [0.0, 0.063, 0.0], DRUM - 1.5e-3, 20e-3);
     let cap = |side: f64| ring([0.0, side * 0.050, 0.0], [0.0, side * 0.0715, 0.0], 0.0385, 3e-3, GREY);
     let shell = blended(vec![column, bulge], 0.032);
     let rim = collar([0.0, 0.0, -0.175], [0.0, 0.0, -0.191], TUBE);
@@ -68,7 +68,7 @@ fn shoulder() -> Part {
 /// Link 2: the upper arm, along −y of its frame.
 fn upper_arm() -> Part {
     let tube = drum([0.0, -0.03, 0.0], [0.0, -0.185, 0.0], TUBE, RIM);
-    let core = drum([0.0, 0.0, -0.045], [0.0, 0.0, 0.045], DRUM + 1.2e-3, 5e-3);
+    let core = drum([0.0, 0.0, -0.045], [0.0, 0.0, 0.045], DRUM + 2.5e-3, 5e-3);
     let shell = blended(vec![tube, core], 0.032);
     let rim = collar([0.0, -0.175, 0.0], [0.0, -0.191, 0.0], TUBE);
     let seam = ring([0.0, -0.175, 0.0], [0.0, -0.212, 0.0], NECK, 2e-3, GREY);
@@ -99,11 +99,12 @@ fn elbow_below() -> Part {
 
 /// Link 5: the slanted forearm, which leaves its axis for y = 80 mm and holds the wrist from there.
 fn forearm() -> Part {
-    let tube = drum([0.0, 0.0, -0.2555], [0.0, 0.0, -0.185], TUBE, RIM);
+    let tube = drum([0.0, 0.0, -0.2555], [0.0, 0.0, -0.212], TUBE, RIM);
+    let dome = limb([0.0, 0.0, -0.232], [0.0, 0.008, -0.204], 0.0510);
     let slant = limb([0.0, 0.012, -0.19], [0.0, 0.066, -0.055], 0.042);
     let back = limb([0.0, 0.055, -0.16], [0.0, 0.088, -0.02], 0.027);
     let hub = drum([0.0, 0.058, 0.0], [0.0, 0.112, 0.0], 0.051, 14e-3);
-    let shell = blended(vec![tube, slant, back, hub], 0.040);
+    let shell = blended(vec![tube, dome, slant, back, hub], 0.040);
     let cap = ring([0.0, 0.095, 0.0], [0.0, 0.1175, 0.0], 0.036, 4e-3, DARK);
     let rim = collar([0.0, 0.0, -0.245], [0.0, 0.0, -0.2615], TUBE);
     part(4, "forearm", vec![Solid::new(shell, FINE, SHELL), rim, cap])

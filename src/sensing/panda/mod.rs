@@ -35,7 +35,7 @@ struct Part {
 /// Painted shells, black plastic, grey rings, bare metal, the sensors' anodised cases, and their gels' silvered skins.
 fn visuals() -> Vec<Visual> {
     vec![
-        Visual::plain([0.74, 0.75, 0.765], 0.33, 0.0),
+        Visual::plain([0.68, 0.69, 0.705], 0.34, 0.0),
         Visual::plain([0.035, 0.036, 0.040], 0.38, 0.0),
         Visual::plain([0.20, 0.205, 0.215], 0.42, 0.0),
         Visual::plain([0.62, 0.62, 0.63], 0.32, 1.0),

@@ -11,7 +11,7 @@ use crate::{
 };
 
 /// Pieces of a turn around large drums and around small ones.
-const TURNS: [usize; 2] = [40, 24];
+const TURNS: [usize; 2] = [36, 20];
 /// Drums of a smaller radius are small, m.
 const SMALL: f64 = 0.025;
 /// Pieces of a turn around the corners of blocks and slabs.
