@@ -10,7 +10,7 @@ use super::{
 use crate::scene::Lighting;
 
 /// Texels along an edge of the part of the map in which shadows fall.
-const INNER: usize = 1024;
+const INNER: usize = 768;
 /// Texels around it that the filter reaches into.
 const MARGIN: usize = 16;
 /// Texels along an edge of the map.
@@ -25,7 +25,7 @@ const BIAS: f32 = 2.5e-3;
 /// Widest filter and reach of the search for what casts the shadow, texels to each side: three vectors across.
 const WIDEST: f32 = 11.4;
 /// Narrowest filter, texels to each side.
-const NARROWEST: f32 = 1.6;
+const NARROWEST: f32 = 1.5;
 /// Eight points within so many texels, of which three tell what the others see: less than the widest filter's reach lies
 /// between them.
 const NEIGHBOURS: f32 = 12.0;
