@@ -104,6 +104,10 @@ impl Spots {
         let tone = &pass.stage.tone;
         for first in (0..PIXELS).step_by(LANES).filter(|first| !skipped(*first)) {
             let mut shown = eight(&self.display, first);
+            if !shaded && blobs.is_empty() {
+                display.set(first, shown);
+                continue;
+            }
             let (p, n) = (eight(&self.p, first), eight(&self.n, first));
             let key = if *shaded { pass.stage.light.unshadowed(p, &n, pass.moving_shadow) } else { F8::ONE };
             let open = open_sky(blobs, p, n, F8::splat(-1.0));
