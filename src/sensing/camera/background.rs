@@ -93,11 +93,21 @@ impl Spots {
         (pass.moving_shadow.may_shade(self.texels[0], self.texels[1], self.least), blobs.collect())
     }
 
-    /// Display values under what moves.
-    pub fn relight(&self, pass: &Pass, (shaded, blobs): &(bool, Vec<Blob>), display: &mut Display) {
+    /// Display values under what moves, but for eights of pixels of which `skipped` says that they are covered by it.
+    pub fn relight(
+        &self,
+        pass: &Pass,
+        (shaded, blobs): &(bool, Vec<Blob>),
+        skipped: impl Fn(usize) -> bool,
+        display: &mut Display,
+    ) {
         let tone = &pass.stage.tone;
-        for first in (0..PIXELS).step_by(LANES) {
+        for first in (0..PIXELS).step_by(LANES).filter(|first| !skipped(*first)) {
             let mut shown = eight(&self.display, first);
+            if !shaded && blobs.is_empty() {
+                display.set(first, shown);
+                continue;
+            }
             let (p, n) = (eight(&self.p, first), eight(&self.n, first));
             let key = if *shaded { pass.stage.light.unshadowed(p, &n, pass.moving_shadow) } else { F8::ONE };
             let open = open_sky(blobs, p, n, F8::splat(-1.0));

@@ -22,7 +22,7 @@ use crate::{
 /// Faces that meet at more than this angle (cosine) meet at an edge; others are one smooth surface.
 const CREASE: f32 = 0.8;
 /// Cells of a skin along the longest edge, from near views to far ones; the last also throws shadows.
-const CELLS: [f64; 4] = [64.0, 34.0, 20.0, 12.0];
+const CELLS: [f64; 5] = [64.0, 40.0, 26.0, 18.0, 12.0];
 /// Triangles with patterns are cut until their edges are shorter than this share of the longest extent.
 const FINEST_CUT: f64 = 1.0 / 48.0;
 /// Most triangles that cutting may make.

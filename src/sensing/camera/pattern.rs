@@ -14,6 +14,15 @@ pub(super) struct Look {
     pub open: f32,
 }
 
+impl Look {
+    /// Albedo, roughness, metalness, openness.
+    #[inline(always)]
+    pub fn numbers(&self) -> [f32; 6] {
+        let a = &self.albedo;
+        [a.x, a.y, a.z, self.roughness, self.metalness, self.open]
+    }
+}
+
 /// A visual, its numbers in single precision, at `p` (object frame, m) of a surface of unit normal `n`; what is finer than
 /// `spacing` (m) along the surface is averaged out. The second number is the height of the drawn relief, m.
 pub(super) fn look(visual: &Visual, p: &V3, n: &V3, spacing: f32) -> (Look, f32) {

@@ -72,16 +72,15 @@ impl<const PER_UNIT: usize> Samples<PER_UNIT> {
     /// in an image with y down; others face away. `origin` is the place of the first unit.
     #[inline(always)]
     pub fn draw<const IDS: bool>(&mut self, at: &[[f32; 3]; 3], origin: [f32; 2], id: u32) {
-        self.draw_rows::<IDS>(at, origin, id, [0, 1]);
+        self.draw_rows::<IDS, 0, 1>(at, origin, id);
     }
 
-    /// The same for every so manieth row, from a first one on.
-    pub fn draw_rows<const IDS: bool>(
+    /// The same for every `STEP`th row, from `FIRST` on.
+    pub fn draw_rows<const IDS: bool, const FIRST: usize, const STEP: usize>(
         &mut self,
         at: &[[f32; 3]; 3],
         origin: [f32; 2],
         id: u32,
-        [first, step]: [usize; 2],
     ) {
         let Some(span) = Span::of::<PER_UNIT>(at, origin, [self.columns, self.rows]) else { return };
         let Some(setup) = Setup::of(at, origin) else { return };
@@ -91,12 +90,13 @@ impl<const PER_UNIT: usize> Samples<PER_UNIT> {
         let stride = self.stride();
         let edges = setup.edges.map(|e| (F8::splat(e.a), F8::splat(e.least)));
         let (gx, least, most) = (F8::splat(setup.gx), F8::splat(setup.least), F8::splat(setup.most));
-        let start = span.rows[0].next_multiple_of(step) + first;
-        for row in (start..span.rows[1]).step_by(step) {
+        let start = span.rows[0].next_multiple_of(STEP) + FIRST;
+        for row in (start..span.rows[1]).step_by(STEP) {
             let [x, y] = place::<PER_UNIT>(row);
             let starts = setup.edges.map(|e| F8::splat(e.c + (e.b * y + e.a * x)));
             let w_row = F8::splat(setup.w + (setup.gy * y + setup.gx * x));
-            let mut column = span.columns[0];
+            // At multiples of eight, so that what was just written is read whole.
+            let mut column = span.columns[0] / LANES * LANES;
             while column < span.columns[1] {
                 let step = F8::splat(column as f32) + STEPS;
                 let at = row * stride + column;

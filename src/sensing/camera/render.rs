@@ -135,7 +135,7 @@ fn background(pass: &Pass, camera: &Camera, screen: &mut Screen) -> Background {
         let mut spots = Spots::new();
         Resolver::new(pass, window, &samples).run(false, &mut spots, &mut picture);
         spots.finish(pass, &samples);
-        spots.relight(pass, &(false, Vec::new()), &mut display);
+        spots.relight(pass, &(false, Vec::new()), |_| false, &mut display);
         window.write(&display, &mut picture);
         tiles.push(spots);
     }
@@ -156,11 +156,14 @@ fn over(pass: &Pass, background: &Background, screen: &mut Screen) -> Picture {
             continue;
         }
         let window = Window::of(tile, screen, pass);
-        spots.relight(pass, &hidden, &mut display);
         if covered {
             samples.clone_from(&spots.samples);
             window.draw(screen, &mut samples);
-            Resolver::new(pass, window, &samples).run(true, &mut display, &mut picture);
+            let mut resolver = Resolver::new(pass, window, &samples);
+            spots.relight(pass, &hidden, |first| resolver.moves(first), &mut display);
+            resolver.run(true, &mut display, &mut picture);
+        } else {
+            spots.relight(pass, &hidden, |_| false, &mut display);
         }
         window.write(&display, &mut picture);
     }

@@ -113,18 +113,19 @@ impl Light {
         let to_key = V8::splat(&self.to_key);
         let n_v = s.n.dot(to_eye).fast_max(F8::splat(0.02));
         let n_l = s.n.dot(to_key).fast_max(F8::ZERO);
-        let half = (to_eye + to_key).unit();
-        let n_h = s.n.dot(half).fast_max(F8::ZERO).fast_min(one);
-        let l_h = half.dot(to_key).fast_max(F8::ZERO).fast_min(one);
+        // Both angles with the half vector h = eye + key from its square, 2 + 2 eye · key, without making it of unit length.
+        let half2 = (F8::splat(2.0) + F8::splat(2.0) * to_eye.dot(to_key)).fast_max(F8::splat(1e-6));
+        let n_h = (s.n.dot(to_eye) + s.n.dot(to_key)).fast_max(F8::ZERO);
+        let l_h = (half2 * F8::splat(0.25)).fast_min(one).sqrt();
         let alpha = (s.roughness * s.roughness + F8::splat(self.widening)).fast_max(F8::splat(0.02));
         let alpha = alpha.fast_min(one);
         let a2 = alpha * alpha;
-        let d = n_h * n_h * (a2 - one) + one;
+        let d = (n_h * n_h).fast_min(half2) * (a2 - one) + half2;
         let masked = n_l * (n_v * n_v * (one - a2) + a2).sqrt() + n_v * (n_l * n_l * (one - a2) + a2).sqrt();
         let grazing = (one - l_h) * (one - l_h);
         let grazing = grazing * grazing * (one - l_h);
-        // D V F with the light's irradiance π times its strength.
-        let strength = a2 * half_one / (d * d * masked);
+        // D V F with the light's irradiance π times its strength; D over the fourth power of the half vector's length.
+        let strength = a2 * half_one * half2 * half2 / (d * d * masked);
         let specular = f0.map(|c| (c + (one - c) * grazing) * strength);
         (diffuse + specular).times(V8::splat(&self.key)) * n_l
     }

@@ -10,7 +10,7 @@ use super::{
 use crate::scene::Lighting;
 
 /// Texels along an edge of the part of the map in which shadows fall.
-const INNER: usize = 1024;
+const INNER: usize = 768;
 /// Texels around it that the filter reaches into.
 const MARGIN: usize = 16;
 /// Texels along an edge of the map.
@@ -19,13 +19,13 @@ const EDGE: usize = INNER + 2 * MARGIN;
 const TILE: usize = 8;
 const TILES: usize = EDGE / TILE;
 /// Tiles to each side that the range covers: as far as the filter reaches.
-const AROUND: usize = 2;
+const AROUND: usize = 1;
 /// A surface is in the shadow of what is higher by more than this, m.
 const BIAS: f32 = 2.5e-3;
-/// Widest filter and reach of the search for what casts the shadow, texels to each side: three vectors across.
-const WIDEST: f32 = 11.4;
+/// Widest filter and reach of the search for what casts the shadow, texels to each side: two vectors across.
+const WIDEST: f32 = 7.4;
 /// Narrowest filter, texels to each side.
-const NARROWEST: f32 = 1.6;
+const NARROWEST: f32 = 1.5;
 /// Eight points within so many texels, of which three tell what the others see: less than the widest filter's reach lies
 /// between them.
 const NEIGHBOURS: f32 = 12.0;
@@ -219,7 +219,7 @@ impl<'a> Filter<'a> {
         if least > self.place[2] + BIAS + rise {
             return 0.0;
         }
-        let [open, hidden, above] = self.sums::<3, 3>(WIDEST);
+        let [open, hidden, above] = self.sums::<2, 3>(WIDEST);
         if hidden <= 0.0 {
             return 1.0;
         }
@@ -229,8 +229,7 @@ impl<'a> Filter<'a> {
         let width = above / hidden * self.map.tangent * self.map.texels_per_metre;
         let [open, hidden, _] = match width {
             ..=3.4 => self.sums::<1, 1>(width.max(NARROWEST)),
-            ..=7.4 => self.sums::<2, 1>(width),
-            _ => self.sums::<3, 2>(width.min(WIDEST)),
+            _ => self.sums::<2, 2>(width.min(WIDEST)),
         };
         open / (open + hidden)
     }

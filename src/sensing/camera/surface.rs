@@ -9,6 +9,7 @@ use super::{
     pose::Posed,
     shade::Points,
 };
+use crate::geometry::Vec3;
 
 /// Bits of a triangle's number that count triangles; those above count things.
 pub(super) const TRIANGLE_BITS: u32 = 21;
@@ -48,6 +49,13 @@ impl Rays {
         Self { eye: lens.eye, rays: lens.rays(), pixel: 1.0 / lens.focal }
     }
 
+    /// The ray through (x, y).
+    #[inline(always)]
+    fn through(&self, x: f32, y: f32) -> Vec3 {
+        let [base, right, down] = self.rays.map(|ray| ray.cast::<f64>());
+        base + right * f64::from(x) + down * f64::from(y)
+    }
+
     /// z components of unit vectors along the rays through eight pixels from (x, y) on.
     pub fn up(&self, x: F8, y: F8) -> F8 {
         let [base, right, down] = self.rays.each_ref().map(V8::splat);
@@ -60,11 +68,10 @@ impl Rays {
 pub(super) struct Patch<'a> {
     pub id: u32,
     thing: f32,
-    /// For each corner how much a ray leans to it (to be divided by their sum): its value at the image's top left and its
-    /// changes a pixel to the right and down. These are the volumes that rays span with the opposite edges, which also
-    /// hold for triangles that reach behind the camera (Olano & Greer, Triangle Scan Conversion using 2D Homogeneous
-    /// Coordinates, 1997).
-    lean: [[f64; 3]; 3],
+    /// For each corner the vector whose product with a ray tells how much that leans to the corner (to be divided by the
+    /// sum of all): the volumes that rays span with the opposite edges, which also hold for triangles that reach behind the
+    /// camera (Olano & Greer, Triangle Scan Conversion using 2D Homogeneous Coordinates, 1997).
+    lean: [Vec3; 3],
     /// Corners from the eye, and their normals.
     p: [V3; 3],
     n: [V3; 3],
@@ -80,12 +87,8 @@ impl<'a> Patch<'a> {
         let p = corners.map(|v| drawn.posed.positions[v] - rays.eye);
         let wide = p.map(|p| p.cast::<f64>());
         let across = [wide[1].cross(&wide[2]), wide[2].cross(&wide[0]), wide[0].cross(&wide[1])];
-        let rays = rays.rays.map(|ray| ray.cast::<f64>());
-        let looks = corners.map(|v| {
-            let look = &drawn.level.looks[v];
-            let [r, g, b] = look.albedo.into();
-            [r, g, b, look.roughness, look.metalness, look.open]
-        });
+        let [i, j, k] = corners;
+        let (looks, normals) = (&drawn.level.looks, &drawn.posed.normals);
         let facet = drawn.level.facets.get(number).map(|&facet| {
             let place = drawn.level.places[number];
             (&drawn.facets[facet as usize], place)
@@ -93,20 +96,19 @@ impl<'a> Patch<'a> {
         Self {
             id,
             thing: thing_of(id) as f32,
-            lean: across.map(|n| [n.dot(&rays[0]), n.dot(&rays[1]), n.dot(&rays[2])]),
+            lean: across,
             p,
-            n: corners.map(|v| drawn.posed.normals[v]),
-            looks,
+            n: [normals[i], normals[j], normals[k]],
+            looks: [looks[i].numbers(), looks[j].numbers(), looks[k].numbers()],
             facet,
         }
     }
 
     /// Eight pixels from (x, y) (their middles) to the right, all of which this triangle covers.
     pub fn row(&self, rays: &Rays, x: f32, y: f32) -> Points {
-        let lean = self.lean.map(|[at, right, down]| {
-            let first = at + right * f64::from(x) + down * f64::from(y);
-            F8::splat(first as f32) + F8::splat(right as f32) * STEPS
-        });
+        let [first, right] = [rays.through(x, y), rays.rays[1].cast()];
+        let lean =
+            self.lean.map(|n| F8::splat(n.dot(&first) as f32) + F8::splat(n.dot(&right) as f32) * STEPS);
         let scale = F8::ONE / (lean[0] + lean[1] + lean[2]);
         let w = lean.map(|l| l * scale);
         let mix3 =
@@ -134,8 +136,9 @@ impl<'a> Patch<'a> {
     }
 
     /// Adds the point that the ray through (x, y) meets, or the nearest of the triangle.
-    pub fn put(&self, batch: &mut Batch<'a>, x: f32, y: f32) {
-        let lean = self.lean.map(|[at, right, down]| at + right * f64::from(x) + down * f64::from(y));
+    pub fn put(&self, batch: &mut Batch<'a>, rays: &Rays, x: f32, y: f32) {
+        let ray = rays.through(x, y);
+        let lean = self.lean.map(|n| n.dot(&ray));
         let sum = lean[0] + lean[1] + lean[2];
         let w = if sum == 0.0 { [1.0 / 3.0; 3] } else { lean.map(|l| (l / sum).max(0.0) as f32) };
         let scale = 1.0 / (w[0] + w[1] + w[2]);

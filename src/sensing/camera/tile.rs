@@ -126,7 +126,7 @@ impl Window {
         samples: &mut Samples<ROWS>,
         (sink, picture): (&mut impl Sink, &mut Picture),
     ) {
-        samples.draw_rows::<true>(at, self.origin(), id, [MIDDLE, ROWS]);
+        samples.draw_rows::<true, MIDDLE, ROWS>(at, self.origin(), id);
         let mut resolver = Resolver::new(pass, *self, samples);
         for y in 0..self.height {
             for x in (0..self.width).step_by(LANES) {
@@ -226,6 +226,13 @@ impl<'a, 'p> Resolver<'a, 'p> {
         })
     }
 
+    /// Whether all that eight pixels of the tile from one on show moves.
+    pub fn moves(&self, first: usize) -> bool {
+        let rows = self.ids(first % TILE, first / TILE);
+        let all = rows.iter().fold(u32x8::MAX, |all, row| all & u32x8::new(*row));
+        (all & u32x8::splat(MOVING)).to_bitmask() == 0xFF
+    }
+
     /// Depths and objects of eight pixels: what their middles show.
     fn middles(&self, (x, y): (usize, usize), ids: &[u32; LANES], picture: &mut Picture) {
         let from = (ROWS * y + MIDDLE) * self.samples.stride() + x;
@@ -288,7 +295,7 @@ impl<'a, 'p> Resolver<'a, 'p> {
         }
         if let Some(patch) = known(&mut self.patch, self.pass, id) {
             let batch = &mut self.batch;
-            patch.put(batch, x, y);
+            patch.put(batch, &self.pass.rays, x, y);
             (batch.pixel[batch.count], batch.share[batch.count]) = (pixel as u32, share);
             batch.count += 1;
         }
