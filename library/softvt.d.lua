@@ -105,7 +105,7 @@
 ---What an experiment leaves behind besides its rows.
 ---@class softvt.Finish
 ---@field text? string Printed after the rows.
----@field files? table<string, string|table<string, any>|any[]> Files to write, by relative path: text as it is, tables as JSON with sorted keys.
+---@field files? table<string, string|softvt.Image|table<string, any>|any[]> Files to write, by relative path: text as it is, pictures as PNG, tables as JSON with sorted keys.
 
 ---An option of the script: key gap_mm is --gap-mm on the command line. The default gives the type.
 ---@class softvt.Option
@@ -131,6 +131,38 @@
 ---@field xyz number[] Position. Expects a list of 3 numbers (m, world).
 ---@field yaw? number Turn of the downward hand about the vertical. Expects radians. Default 0.
 ---@field quat? number[] Orientation instead of yaw. Expects a list of 4 numbers (w, x, y, z).
+
+---A camera. Give look_at or quat.
+---@class softvt.NewCamera
+---@field name string Its name, unique; the stream's.
+---@field mount? "world"|"hand" What it is fixed to; hand is panda_hand. Default "world".
+---@field position number[] Where it is. Expects a list of 3 numbers (m, frame of the mount).
+---@field look_at? number[] A point in the middle of the picture. Expects a list of 3 numbers (m, frame of the mount).
+---@field up? number[] Upwards in the picture (with look_at); z if left out. Expects a list of 3 numbers (frame of the mount).
+---@field quat? number[] How it is turned: it looks along its −z, +y is up. Expects a list of 4 numbers (w, x, y, z, frame of the mount).
+---@field fovy? number Vertical field of view. Expects radians in 0.01..2.8. Default 0.8.
+---@field near? number Nothing nearer is seen. Expects metres in 0.0001..100. Default 0.01.
+---@field far? number Nothing farther is seen. Expects metres in 0.001..10000. Default 20.
+---@field width? integer Width of the picture, pixels. Expects a whole number in 1..4096. Default 224.
+---@field height? integer Height of the picture, pixels. Expects a whole number in 1..4096. Default 224.
+
+---An empty picture.
+---@class softvt.NewImage
+---@field width integer Width, pixels. Expects a whole number in 1..8192.
+---@field height integer Height, pixels. Expects a whole number in 1..8192.
+---@field colour number[] Colour all over. Expects a list of 3 numbers (sRGB of 0 to 255).
+
+---Where and how a line of text is written.
+---@class softvt.Text
+---@field at number[] Left end of its baseline, from the top left. Expects a list of 2 numbers (pixels).
+---@field size? number Height. Expects a number (pixels) in 4..200. Default 18.
+---@field colour number[] Colour. Expects a list of 3 numbers (sRGB of 0 to 255).
+
+---What is drawn.
+---@class softvt.See
+---@field camera? string A camera of the scene. Default "third_person".
+---@field width? integer Width, pixels; the camera's own. Expects a whole number in 1..4096.
+---@field height? integer Height, pixels; the camera's own. Expects a whole number in 1..4096.
 
 ---A world of soft bodies and prescribed or fixed solids, without a robot.
 ---@class softvt.WorldSpec
@@ -570,6 +602,16 @@ function Simulation:wait(seconds) end
 ---@return table
 function Simulation:watch(object) end
 
+---What a camera sees now; third_person if nothing else is said.
+---@param see? softvt.See
+---@return softvt.Image
+function Simulation:see(see) end
+
+---What a finger's tactile sensor sees now, and the true force on its gel.
+---@param side "left"|"right"
+---@return softvt.Felt
+function Simulation:feel(side) end
+
 ---Time since settling, s.
 ---@return number
 function Simulation:time() end
@@ -578,6 +620,50 @@ function Simulation:time() end
 ---@return number[]
 ---@return number[]
 function Simulation:tool() end
+
+---A finger's tactile sensor at one moment; docs/tactile.md draws its frames.
+---@class softvt.Felt
+---@field picture softvt.Image The colour picture, 320 × 240.
+---@field dots softvt.Image The same with its markers as dots.
+---@field arrows softvt.Image The same with the motion of its markers as arrows, lengthened.
+---@field initial number[][] Places of the 99 markers without a touch, px, row by row.
+---@field present number[][] Their places now, px.
+---@field force number[] True force on the gel, N, pad frame; a pressing body makes z negative.
+---@field depth_mm number Greatest depth of the dent, mm.
+local Felt = {}
+
+---A picture of 8-bit sRGB pixels. Regions are x, y, width, height in pixels from the top left.
+---@class softvt.Image
+---@field width integer Width, pixels.
+---@field height integer Height, pixels.
+local Image = {}
+
+---Mean red, green and blue, 0..255.
+---@param region? number[]
+---@return number[]
+function Image:mean(region) end
+
+---A part as a picture of its own.
+---@param region number[]
+---@return softvt.Image
+function Image:crop(region) end
+
+---The same in another size.
+---@param width integer
+---@param height integer
+---@return softvt.Image
+function Image:resize(width, height) end
+
+---Puts another picture on this one.
+---@param other softvt.Image
+---@param x integer
+---@param y integer
+function Image:paste(other, x, y) end
+
+---Writes a line of text on it.
+---@param text string
+---@param how softvt.Text
+function Image:text(text, how) end
 
 ---An immutable pose in the world frame.
 ---@class softvt.Pose
@@ -645,6 +731,7 @@ function Rng:shuffle(list) end
 ---The scene that a layout or a shift builds.
 ---@class softvt.Scene
 ---@field objects softvt.Object[] The placed objects, in order.
+---@field light softvt.Light The light on them.
 ---@field base number[] Place of the robot base. Expects a list of 3 numbers (m, world).
 ---@field start_q number[] Joint angles of the arm at the start. Expects a list of 7 numbers (rad).
 ---@field gravity number[] Gravity. Expects a list of 3 numbers (m/s², world).
@@ -661,10 +748,59 @@ function Scene:add(place) end
 ---@return softvt.Object
 function Scene:object(name) end
 
+---A camera; every scene has third_person and wrist.
+---@param name string
+---@return softvt.Camera
+function Scene:camera(name) end
+
+---One more camera.
+---@param camera softvt.NewCamera
+---@return softvt.Camera
+function Scene:add_camera(camera) end
+
+---The light of a scene: one key light and a sky. Its numbers may be read and written.
+---@class softvt.Light
+---@field direction number[] Direction to the key light. Expects a list of 3 numbers (world, any length).
+---@field colour number[] Colour of the key light. Expects a list of 3 numbers (linear RGB).
+---@field strength number Strength of the key light; 1 shows white at full value. Expects a number in 0..1000.
+---@field softness number Half the angle under which it is seen. Expects radians in 0..0.5.
+---@field sky_zenith number[] Light from straight above. Expects a list of 3 numbers (linear RGB).
+---@field sky_horizon number[] Light from the horizon, and the backdrop. Expects a list of 3 numbers (linear RGB).
+---@field sky_ground number[] Light from straight below. Expects a list of 3 numbers (linear RGB).
+---@field sky_strength number Factor on the sky. Expects a number in 0..1000.
+---@field exposure number Factor on the picture. Expects a number in above 0..1000.
+local Light = {}
+
+---A pinhole camera; its numbers may be read and written.
+---@class softvt.Camera
+---@field name string Its name.
+---@field mount "world"|"hand" What it is fixed to.
+---@field position number[] Where it is. Expects a list of 3 numbers (m, frame of the mount).
+---@field quat number[] How it is turned: it looks along its −z, +y is up. Expects a list of 4 numbers (w, x, y, z, frame of the mount).
+---@field fovy number Vertical field of view. Expects radians in 0.01..2.8.
+---@field near number Nothing nearer is seen. Expects metres in 0.0001..100.
+---@field far number Nothing farther is seen. Expects metres in 0.001..10000.
+---@field width integer Width of the picture, pixels. Expects a whole number in 1..4096.
+---@field height integer Height of the picture, pixels. Expects a whole number in 1..4096.
+local Camera = {}
+
+---Turns it to a point (m, frame of the mount); up, z if left out, is upwards in the picture.
+---@param point number[]
+---@param up? number[]
+function Camera:look_at(point, up) end
+
+---A material of a placed object; its numbers may be read and written, the layers over it stay.
+---@class softvt.Look
+---@field albedo number[] Base colour. Expects a list of 3 numbers (linear RGB in 0..1).
+---@field roughness number Roughness, 0 a mirror. Expects a number in 0..1.
+---@field metalness number Metalness. Expects a number in 0..1.
+local Look = {}
+
 ---A placed object; its numbers may be read and written.
 ---@class softvt.Object
 ---@field name string Name in the scene.
 ---@field asset string Name of its asset.
+---@field looks softvt.Look[] Its materials, in the order of the asset's visuals.
 ---@field xyz number[] Its origin: lowest point, on the centre line. Expects a list of 3 numbers (m, world).
 ---@field yaw number Turn about the vertical. Expects radians.
 ---@field density number Density of a soft or rigid body. Expects a number (kg/m³) above 0.
@@ -828,6 +964,11 @@ function softvt.envelope(envelope) end
 ---@param row table
 ---@return boolean
 function softvt.stable(row) end
+
+---An empty picture.
+---@param image softvt.NewImage
+---@return softvt.Image
+function softvt.image(image) end
 
 ---A pose in the world frame.
 ---@param pose softvt.PoseSpec
