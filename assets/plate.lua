@@ -20,7 +20,7 @@ local body = profile {
 local glazed = material.ceramic { seed = 4 }
 table.insert(glazed.layers, {
   mask = softvt.mask.inside { shape = softvt.shape.torus { major = 55 * mm, minor = 0.9 * mm }:translate(0, 0, 14.5 * mm), soft_m = 0.8 * mm },
-  albedo = { 0.14, 0.22, 0.34 }, roughness = 0.14, opacity = 0.85,
+  albedo = { 0.14, 0.22, 0.34 }, roughness = 0.24, opacity = 0.85,
 })
 
 return softvt.asset {

@@ -84,9 +84,9 @@ end
 function material.ceramic(o)
   local base, seed = o.base or { 0.78, 0.77, 0.73 }, o.seed or 1
   return {
-    albedo = base, roughness = o.roughness or 0.14,
+    albedo = base, roughness = o.roughness or 0.24,
     layers = {
-      layer(mask.noise { size_m = 40 * mm, octaves = 4, from = 0.4, to = 0.8, seed = seed }, { 0.70, 0.67, 0.60 }, 0.18, 0.4),
+      layer(mask.noise { size_m = 40 * mm, octaves = 4, from = 0.4, to = 0.8, seed = seed }, { 0.70, 0.67, 0.60 }, 0.28, 0.4),
     },
   }
 end
