@@ -505,7 +505,9 @@ fn gel_under_a_ball(report: &mut Report) {
 fn cameras(report: &mut Report) {
     heading("Camera", "Pictures of 224 × 224 pixels against the pinhole in closed form.");
     let ([radius, centre], corners, depth) = (camera::silhouette(), camera::corners(), camera::depth());
-    println!("Ball of 0.2 m at 1 m: radius of its silhouette off by {radius:.3} px, its centre by {centre:.3} px.");
+    println!(
+        "Ball of 0.2 m at 1 m: radius of its silhouette off by {radius:.3} px, its centre by {centre:.3} px."
+    );
     let worst = corners.iter().copied().fold(0.0, f64::max);
     println!("Checkerboard of 0.1 m at 1 m: corners off by {worst:.3} px at most.");
     println!("A plane that passes behind the camera: depth up to 1 m off by {:.4} mm at most.", 1e3 * depth);
