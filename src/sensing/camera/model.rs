@@ -215,13 +215,11 @@ fn cut(mut mesh: Mesh, mut materials: Vec<u16>, edge: f64) -> (Mesh, Vec<u16>, f
     }
 }
 
-/// How far the middles of triangles are from the surface that they stand for, m: all but the farthest fiftieth, which lie
-/// across sharp edges.
+/// How far the middles of triangles are from the surface that they stand for, m: root of the mean square.
 fn flaw(mesh: &Mesh, shape: &Shape) -> f32 {
     let middle = |t: &[u32; 3]| t.iter().map(|&v| mesh.vertices[v as usize]).sum::<Vec3>() / 3.0;
-    let mut away: Vec<f64> = mesh.triangles.iter().map(|t| shape.distance(&middle(t)).abs()).collect();
-    away.sort_by(f64::total_cmp);
-    away.get(away.len() * 49 / 50).map_or(0.0, |&d| d as f32)
+    let squares: f64 = mesh.triangles.iter().map(|t| shape.distance(&middle(t)).powi(2)).sum();
+    (squares / mesh.triangles.len().max(1) as f64).sqrt() as f32
 }
 
 /// Splits vertices at creases, evaluates looks at them and raises their drawn relief.

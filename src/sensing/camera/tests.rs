@@ -74,6 +74,25 @@ fn a_ball_has_the_silhouette_of_the_pinhole_to_a_tenth_of_a_pixel() {
     assert!(centre.iter().all(|c| (c - 112.0).abs() < 0.1), "{centre:?}");
 }
 
+#[test]
+fn a_straight_outline_is_straight_in_the_objects() {
+    // A box whose right side is seen from straight above: one column, wherever it lies within a pixel.
+    for shift in [0.0, 0.3, 0.5, 0.8] {
+        let camera = above(1.0);
+        let half = Vec3::new(0.1, 0.1, 0.01);
+        let model = Model::of_shape("box", &Shape::Box { half }, &[Visual::default()]).expect("a box");
+        let x = shift / focal(&camera);
+        let stage = stage(vec![
+            ground(Visual::default()),
+            thing(2, model, Mount::Fixed(Pose::translation(x, 0.0, 0.0))),
+        ]);
+        let picture = draw(&stage, &camera);
+        let rows = picture.segmentation.chunks(224).filter(|row| row.contains(&2));
+        let ends: Vec<_> = rows.map(|row| row.iter().rposition(|&s| s == 2)).collect();
+        assert!(ends.len() > 50 && ends.iter().all(|end| *end == ends[0]), "{shift}: {ends:?}");
+    }
+}
+
 fn linear(byte: u8) -> f64 {
     let x = f64::from(byte) / 255.0;
     if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
