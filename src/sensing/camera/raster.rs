@@ -125,13 +125,12 @@ impl<const PER_UNIT: usize> Samples<PER_UNIT> {
     }
 }
 
-/// Whether a triangle covers a whole square of an edge `size`, and the least and greatest w that it has there.
-pub(super) fn cover(at: &[[f32; 3]; 3], origin: [f32; 2], size: f32) -> Option<(bool, [f32; 2])> {
+/// The least w of a triangle in a square of an edge `size`, if it covers all of it.
+pub(super) fn cover(at: &[[f32; 3]; 3], origin: [f32; 2], size: f32) -> Option<f32> {
     let setup = Setup::of(at, origin)?;
-    let whole = setup.covers([size; 2])?;
     let corners = [[0.0; 2], [size, 0.0], [0.0, size], [size; 2]]
         .map(|[x, y]| (setup.w + (setup.gy * y + setup.gx * x)).clamp(setup.least, setup.most));
-    Some((whole, [corners.into_iter().fold(f32::MAX, f32::min), corners.into_iter().fold(0.0, f32::max)]))
+    setup.covers([size; 2])?.then(|| corners.into_iter().fold(f32::MAX, f32::min))
 }
 
 /// The rows and columns of samples that a triangle can touch.
