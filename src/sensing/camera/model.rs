@@ -6,6 +6,7 @@ use super::{
     CameraError, V3,
     facet::{self, Facet},
     pattern::{self, Look},
+    surface::TRIANGLE_BITS,
 };
 use crate::{
     geometry::{
@@ -21,7 +22,7 @@ use crate::{
 /// Faces that meet at more than this angle (cosine) meet at an edge; others are one smooth surface.
 const CREASE: f32 = 0.8;
 /// Cells of a skin along the longest edge, from near views to far ones; the last also throws shadows.
-const CELLS: [f64; 5] = [64.0, 40.0, 26.0, 18.0, 12.0];
+const CELLS: [f64; 4] = [64.0, 40.0, 26.0, 16.0];
 /// Triangles with patterns are cut until their edges are shorter than this share of the longest extent.
 const FINEST_CUT: f64 = 1.0 / 48.0;
 /// Most triangles that cutting may make.
@@ -141,6 +142,13 @@ fn check(name: &str, mesh: &Mesh, materials: &[u16], visuals: &[Visual]) -> Resu
     let wrong = |reason: String| Err(CameraError::Model { name: name.to_owned(), reason });
     if let Err(error) = mesh.check() {
         return wrong(error.to_string());
+    }
+    if mesh.triangles.len() >= 1 << TRIANGLE_BITS {
+        let most = (1 << TRIANGLE_BITS) - 1;
+        return wrong(format!(
+            "{} triangles; at most {most} can be drawn, simplify it",
+            mesh.triangles.len()
+        ));
     }
     if materials.len() != mesh.triangles.len() {
         return wrong(format!(
