@@ -6,6 +6,7 @@ use super::{
     CameraError, V3,
     facet::{self, Facet},
     pattern::{self, Look},
+    surface::TRIANGLE_BITS,
     turned::turned,
 };
 use crate::{
@@ -22,7 +23,7 @@ use crate::{
 /// Faces that meet at more than this angle (cosine) meet at an edge; others are one smooth surface.
 const CREASE: f32 = 0.8;
 /// Cells of a skin along the longest edge, from near views to far ones; the last also throws shadows.
-const CELLS: [f64; 5] = [64.0, 40.0, 26.0, 18.0, 12.0];
+const CELLS: [f64; 4] = [64.0, 40.0, 26.0, 16.0];
 /// Triangles with patterns are cut until their edges are shorter than this share of the longest extent.
 const FINEST_CUT: f64 = 1.0 / 48.0;
 /// Most triangles that cutting may make.
@@ -156,6 +157,13 @@ pub(super) fn check(
     if let Err(error) = mesh.check() {
         return wrong(error.to_string());
     }
+    if mesh.triangles.len() >= 1 << TRIANGLE_BITS {
+        let most = (1 << TRIANGLE_BITS) - 1;
+        return wrong(format!(
+            "{} triangles; at most {most} can be drawn, simplify it",
+            mesh.triangles.len()
+        ));
+    }
     if materials.len() != mesh.triangles.len() {
         return wrong(format!(
             "{} material ids for {} triangles; give one a triangle",
@@ -265,13 +273,11 @@ fn cut(mut mesh: Mesh, mut materials: Vec<u16>, edge: f64) -> (Mesh, Vec<u16>, f
     }
 }
 
-/// How far the middles of triangles are from the surface that they stand for, m: all but the farthest fiftieth, which lie
-/// across sharp edges.
+/// How far the middles of triangles are from the surface that they stand for, m: root of the mean square.
 fn flaw(mesh: &Mesh, shape: &Shape) -> f32 {
     let middle = |t: &[u32; 3]| t.iter().map(|&v| mesh.vertices[v as usize]).sum::<Vec3>() / 3.0;
-    let mut away: Vec<f64> = mesh.triangles.iter().map(|t| shape.distance(&middle(t)).abs()).collect();
-    away.sort_by(f64::total_cmp);
-    away.get(away.len() * 49 / 50).map_or(0.0, |&d| d as f32)
+    let squares: f64 = mesh.triangles.iter().map(|t| shape.distance(&middle(t)).powi(2)).sum();
+    (squares / mesh.triangles.len().max(1) as f64).sqrt() as f32
 }
 
 /// Splits vertices at creases, evaluates looks at them and raises their drawn relief.

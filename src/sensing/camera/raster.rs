@@ -125,13 +125,12 @@ impl<const PER_UNIT: usize> Samples<PER_UNIT> {
     }
 }
 
-/// Whether a triangle covers a whole square of an edge `size`, and the least and greatest w that it has there.
-pub(super) fn cover(at: &[[f32; 3]; 3], origin: [f32; 2], size: f32) -> Option<(bool, [f32; 2])> {
+/// The least w of a triangle in a square of an edge `size`, if it covers all of it.
+pub(super) fn cover(at: &[[f32; 3]; 3], origin: [f32; 2], size: f32) -> Option<f32> {
     let setup = Setup::of(at, origin)?;
-    let whole = setup.covers([size; 2])?;
     let corners = [[0.0; 2], [size, 0.0], [0.0, size], [size; 2]]
         .map(|[x, y]| (setup.w + (setup.gy * y + setup.gx * x)).clamp(setup.least, setup.most));
-    Some((whole, [corners.into_iter().fold(f32::MAX, f32::min), corners.into_iter().fold(0.0, f32::max)]))
+    setup.covers([size; 2])?.then(|| corners.into_iter().fold(f32::MAX, f32::min))
 }
 
 /// The rows and columns of samples that a triangle can touch.
@@ -239,4 +238,36 @@ fn edge(from: &[f32; 3], to: &[f32; 3], origin: [f64; 2]) -> Edge {
     let (a, b, c) = (sign * a, sign * b, sign * c);
     let owns = a > 0.0 || (a == 0.0 && b > 0.0);
     Edge { a: a as f32, b: b as f32, c: c as f32, least: if owns { -f32::MIN_POSITIVE } else { 0.0 } }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn triangles_of_one_edge_neither_overlap_nor_leave_a_gap() {
+        // A fan around a point, over all of the square; odd numbers, so that edges pass through samples too.
+        for middle in [[13.0, 17.5], [7.3, 21.9], [16.375, 16.125]] {
+            let rim = [[-3.0, -3.0], [16.0, -3.0], [40.0, -3.0], [40.0, 16.0], [40.0, 40.0], [-3.0, 40.0]];
+            let mut hits = vec![0; 32 * ROWS * (32 + LANES)];
+            for i in 0..rim.len() {
+                let mut samples = Samples::<ROWS>::new(32, 32, 0.0, true);
+                let [a, b] = [rim[i], rim[(i + 1) % rim.len()]].map(|[x, y]| [x, y, 1.0]);
+                samples.draw::<true>(&[[middle[0], middle[1], 1.0], a, b], [0.0; 2], 7);
+                hits.iter_mut().zip(&samples.id).for_each(|(hits, id)| *hits += i32::from(*id == 7));
+            }
+            for row in hits.chunks(32 + LANES) {
+                assert!(row[..32].iter().all(|h| *h == 1), "{middle:?}: {row:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_triangle_covers_as_many_samples_as_its_area_has() {
+        let mut samples = Samples::<ROWS>::new(32, 32, 0.0, true);
+        samples.draw::<true>(&[[2.2, 3.1, 1.0], [29.7, 8.4, 1.0], [11.5, 30.3, 1.0]], [0.0; 2], 1);
+        let area = 0.5 * (27.5 * 27.2 - 9.3 * 5.3);
+        let count = samples.id.iter().filter(|id| **id == 1).count() as f32 / ROWS as f32;
+        assert!((count - area).abs() < 2.0, "{count} pixels, {area} expected");
+    }
 }

@@ -11,7 +11,7 @@ use super::{
     screen::{Screen, TILE},
     shadow::ShadowMap,
     surface::Rays,
-    tile::{Display, PIXELS, Resolver, Window},
+    tile::{Display, PIXELS, Resolver, Triangles, Window},
 };
 use crate::scene::{Camera, CameraMount};
 
@@ -105,14 +105,14 @@ fn all(pass: &Pass, screen: &mut Screen) -> Picture {
     pass.show(true, screen);
     screen.sort();
     let (mut picture, mut display) = (empty_picture(pass.lens), empty_display());
-    let mut samples = empty_samples(pass.lens);
+    let (mut samples, mut triangles) = (empty_samples(pass.lens), Triangles::new());
     for tile in 0..screen.tiles().iter().product() {
         let window = Window::of(tile, screen, pass);
         samples.clear(1.0 / pass.lens.far);
-        if let Some(sole) = screen.sole(tile, window.origin()) {
-            window.draw_sole(sole, pass, &mut samples, (&mut display, &mut picture));
+        if window.visible(screen, &mut triangles) {
+            window.draw_sole(&triangles[0], pass, &mut samples, (&mut display, &mut picture));
         } else {
-            window.draw(screen, &mut samples);
+            window.draw(&triangles, &mut samples);
             Resolver::new(pass, window, &samples).run(false, &mut display, &mut picture);
         }
         window.write(&display, &mut picture);
@@ -126,12 +126,13 @@ fn background(pass: &Pass, camera: &Camera, screen: &mut Screen) -> Background {
     pass.show(false, screen);
     screen.sort();
     let (mut picture, mut display) = (empty_picture(pass.lens), empty_display());
-    let mut samples = empty_samples(pass.lens);
+    let (mut samples, mut triangles) = (empty_samples(pass.lens), Triangles::new());
     let mut tiles = Vec::new();
     for tile in 0..screen.tiles().iter().product() {
         let window = Window::of(tile, screen, pass);
         samples.clear(1.0 / pass.lens.far);
-        window.draw(screen, &mut samples);
+        window.visible(screen, &mut triangles);
+        window.draw(&triangles, &mut samples);
         let mut spots = Spots::new();
         Resolver::new(pass, window, &samples).run(false, &mut spots, &mut picture);
         spots.finish(pass, &samples);
@@ -148,17 +149,18 @@ fn over(pass: &Pass, background: &Background, screen: &mut Screen) -> Picture {
     pass.show(true, screen);
     screen.sort();
     let (mut picture, mut display) = (background.picture.clone(), empty_display());
-    let mut samples = empty_samples(pass.lens);
+    let (mut samples, mut triangles) = (empty_samples(pass.lens), Triangles::new());
     for (tile, spots) in background.tiles.iter().enumerate() {
         let hidden = spots.hidden_by(pass);
-        let covered = screen.of_tile(tile).len() > 0;
+        let covered = screen.touches(tile);
         if !covered && !hidden.0 && hidden.1.is_empty() {
             continue;
         }
         let window = Window::of(tile, screen, pass);
         if covered {
             samples.clone_from(&spots.samples);
-            window.draw(screen, &mut samples);
+            window.visible(screen, &mut triangles);
+            window.draw(&triangles, &mut samples);
             let mut resolver = Resolver::new(pass, window, &samples);
             spots.relight(pass, &hidden, |first| resolver.moves(first), &mut display);
             resolver.run(true, &mut display, &mut picture);

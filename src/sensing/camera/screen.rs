@@ -1,12 +1,14 @@
 //! The triangles that a camera sees, sorted into the tiles of its image.
 
-use super::{V3, lens::Lens, raster::cover};
+use super::{
+    V3,
+    lens::Lens,
+    raster::{NONE, cover},
+    tile::Triangles,
+};
 
 /// Pixels along an edge of a tile: its samples stay in the processor's nearest cache.
 pub(super) const TILE: usize = 32;
-
-/// Tiles of more triangles are not looked at for one that hides the others.
-const FEW: usize = 8;
 
 /// A triangle in the image.
 #[derive(Clone, Copy, Debug)]
@@ -132,13 +134,18 @@ impl Screen {
         }
     }
 
+    /// Whether any triangle can touch a tile.
+    pub fn touches(&self, tile: usize) -> bool {
+        self.starts[tile] < self.starts[tile + 1]
+    }
+
     /// Tiles across and down.
     pub fn tiles(&self) -> [usize; 2] {
         self.tiles
     }
 
     /// Corners and numbers of the triangles of a tile.
-    pub fn of_tile(&self, tile: usize) -> impl ExactSizeIterator<Item = (&[[f32; 3]; 3], u32)> {
+    fn of_tile(&self, tile: usize) -> impl ExactSizeIterator<Item = (&[[f32; 3]; 3], u32)> {
         let part = self.starts[tile] as usize..self.starts[tile + 1] as usize;
         self.sorted[part].iter().map(|&number| {
             let shown = &self.shown[number as usize];
@@ -146,23 +153,28 @@ impl Screen {
         })
     }
 
-    /// The one triangle of a tile that lies over all of it and before all others, if there is one and others are few.
-    pub fn sole(&self, tile: usize, origin: [f32; 2]) -> Option<(&[[f32; 3]; 3], u32)> {
-        let triangles = self.of_tile(tile);
-        if triangles.len() > FEW {
-            return None;
-        }
-        let mut front: Option<(usize, f32)> = None;
-        let mut covers = [[0.0; 2]; FEW];
-        for (i, (at, _)) in self.of_tile(tile).enumerate() {
-            let Some((whole, [least, most])) = cover(at, origin, TILE as f32) else { continue };
-            covers[i] = [least, most];
-            if whole && front.is_none_or(|(_, nearest)| least > nearest) {
-                front = Some((i, least));
+    /// What is left of a tile's triangles, in their order, without those behind one that covers all of it; and whether it
+    /// is that one alone.
+    pub fn visible(&self, tile: usize, origin: [f32; 2], left: &mut Triangles) -> bool {
+        let size = TILE as f32;
+        let around = |at: &[[f32; 3]; 3]| {
+            [0, 1].into_iter().all(|axis| {
+                let [a, b, c] = at.map(|corner| corner[axis] - origin[axis]);
+                a.min(b).min(c) <= 0.0 && a.max(b).max(c) >= size
+            })
+        };
+        let mut front: Option<(u32, f32)> = None;
+        for (at, id) in self.of_tile(tile).filter(|(at, _)| around(at)) {
+            let least = cover(at, origin, size);
+            if let Some(least) = least.filter(|least| front.is_none_or(|(_, nearest)| *least > nearest)) {
+                front = Some((id, least));
             }
         }
-        let (index, nearest) = front?;
-        let before = |(i, [_, most]): (usize, &[f32; 2])| i == index || *most < nearest;
-        if covers.iter().enumerate().all(before) { self.of_tile(tile).nth(index) } else { None }
+        let (first, nearest) = front.unwrap_or((NONE, 0.0));
+        left.clear();
+        let before = |at: &[[f32; 3]; 3]| at[0][2].max(at[1][2]).max(at[2][2]) >= nearest;
+        let kept = self.of_tile(tile).filter(|(at, id)| *id == first || before(at));
+        left.extend(kept.map(|(at, id)| (id, *at)));
+        front.is_some() && left.len() == 1
     }
 }

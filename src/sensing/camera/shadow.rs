@@ -2,6 +2,8 @@
 //! Percentage-Closer Soft Shadows, SIGGRAPH sketches 2005). Most points are known to be lit or dark from the greatest and
 //! least heights around them, and are not filtered at all.
 
+use wide::i32x8;
+
 use super::{
     V3,
     lanes::{F8, LANES, STEPS, V8},
@@ -16,7 +18,8 @@ const MARGIN: usize = 16;
 /// Texels along an edge of the map.
 const EDGE: usize = INNER + 2 * MARGIN;
 /// Texels along an edge of the tiles that know the range of heights around them.
-const TILE: usize = 8;
+const TILE: usize = 1 << TILE_BITS;
+const TILE_BITS: i32 = 3;
 const TILES: usize = EDGE / TILE;
 /// Tiles to each side that the range covers: as far as the filter reaches.
 const AROUND: usize = 1;
@@ -156,32 +159,41 @@ impl ShadowMap {
     }
 
     /// Shares of the light that reach eight points of normals `n`, of those in `wanted`; 1 for others.
+    #[inline(always)]
     pub fn light(&self, at: &Places, n: &V8, wanted: F8) -> F8 {
         let (low, high) = (F8::splat(MARGIN as f32), F8::splat((MARGIN + INNER) as f32));
         let inside = at.u.simd_ge(low) & at.v.simd_ge(low) & at.u.simd_lt(high) & at.v.simd_lt(high) & wanted;
-        let bits = inside.to_bitmask();
-        if bits == 0 {
+        let inside = inside.to_bitmask();
+        let [first, last] = self.heights.touched;
+        if inside == 0 || first >= last {
             return F8::ONE;
         }
+        let tile = |x: F8| {
+            (x.fast_max(F8::ZERO).fast_min(F8::splat((EDGE - 1) as f32))).fast_trunc_int() >> TILE_BITS
+        };
+        let tiles = (tile(at.v) * i32x8::splat(TILES as i32) + tile(at.u)).to_array();
+        let ranges = tiles.map(|i| self.ranges[i as usize % (TILES * TILES)]);
+        let most = F8::new(ranges.map(|[_, most]| most));
+        let near = most.simd_gt(at.height + F8::splat(BIAS)).to_bitmask() & inside;
+        if near == 0 { F8::ONE } else { self.filtered(at, n, near, &ranges) }
+    }
+
+    /// The shares of the points `near` something higher, by the ranges of heights around them.
+    #[inline(never)]
+    fn filtered(&self, at: &Places, n: &V8, near: u32, ranges: &[[f32; 2]; LANES]) -> F8 {
         let [u, v, height] = [at.u, at.v, at.height].map(F8::to_array);
         let normals = n.to_arrays();
         let one = |i: usize| {
-            let [least, most] = self.ranges[v[i] as usize / TILE * TILES + u[i] as usize / TILE];
-            if most <= height[i] + BIAS {
-                return 1.0;
-            }
             let normal = V3::from(normals.map(|axis| axis[i]));
-            Filter::new(self, [u[i], v[i], height[i]], &normal).share(least)
+            Filter::new(self, [u[i], v[i], height[i]], &normal).share(ranges[i][0])
         };
         let spread = |of: &[f32; LANES]| {
             let [low, high] = of.iter().fold([f32::MAX, f32::MIN], |[l, h], &x| [l.min(x), h.max(x)]);
             high - low
         };
         let apart = spread(&u).max(spread(&v)).max(spread(&height) * self.texels_per_metre);
-        let mut open = [1.0; LANES];
-        if bits != 0xFF || apart > NEIGHBOURS {
-            (0..LANES).filter(|i| bits >> i & 1 == 1).for_each(|i| open[i] = one(i));
-            return F8::new(open);
+        if near != 0xFF || apart > NEIGHBOURS {
+            return F8::new(std::array::from_fn(|i| if near >> i & 1 == 1 { one(i) } else { 1.0 }));
         }
         // Where both ends and the middle see all or nothing of the light, so do those between.
         let [a, d, h] = [one(0), one(3), one(7)];

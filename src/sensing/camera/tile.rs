@@ -95,6 +95,9 @@ impl Sink for Display {
     }
 }
 
+/// Numbers and corners of the triangles of a tile.
+pub(super) type Triangles = Vec<(u32, [[f32; 3]; 3])>;
+
 /// A tile's place in the picture.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Window {
@@ -114,14 +117,19 @@ impl Window {
     }
 
     /// Draws the triangles of the tile.
-    pub fn draw(&self, screen: &Screen, samples: &mut Samples<ROWS>) {
-        screen.of_tile(self.tile).for_each(|(at, id)| samples.draw::<true>(at, self.origin(), id));
+    pub fn draw(&self, triangles: &Triangles, samples: &mut Samples<ROWS>) {
+        triangles.iter().for_each(|(id, at)| samples.draw::<true>(at, self.origin(), *id));
+    }
+
+    /// The triangles of the tile that nothing hides wholly; true if one alone covers it.
+    pub fn visible(&self, screen: &Screen, triangles: &mut Triangles) -> bool {
+        screen.visible(self.tile, self.origin(), triangles)
     }
 
     /// Lights a tile that shows one triangle only.
     pub fn draw_sole<'a>(
         &self,
-        (at, id): (&[[f32; 3]; 3], u32),
+        &(id, ref at): &(u32, [[f32; 3]; 3]),
         pass: &Pass<'a>,
         samples: &mut Samples<ROWS>,
         (sink, picture): (&mut impl Sink, &mut Picture),
@@ -137,7 +145,7 @@ impl Window {
     }
 
     /// Place of its top left in the picture, pixels.
-    pub fn origin(&self) -> [f32; 2] {
+    fn origin(&self) -> [f32; 2] {
         [self.x as f32, self.y as f32]
     }
 
