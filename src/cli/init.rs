@@ -17,7 +17,7 @@ pub fn run(dir: &Path) -> Result<(), Failure> {
     let folder = stub.parent().unwrap_or(dir);
     std::fs::create_dir_all(folder)
         .map_err(|e| Failure::input(format!("cannot make the folder {}: {e}", folder.display())))?;
-    replace(&stub, &stubs()).map_err(Failure::input)?;
+    replace(&stub, stubs()).map_err(Failure::input)?;
     print(&format!("wrote {}\n", stub.display()));
     let settings = dir.join(".luarc.json");
     if settings.exists() {

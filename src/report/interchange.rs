@@ -137,9 +137,9 @@ pub fn write_scores(
     let folder = dir.join(FOLDER);
     fs::create_dir_all(&folder).map_err(io_error("make the folder", &folder))?;
     let released = Thresholds { envelopes: BTreeMap::new(), ..thresholds.clone() };
-    replace(&folder.join("episodes.csv"), &episodes_csv(records))?;
-    replace(&folder.join("summary.json"), &format!("{:#}\n", summary(records)))?;
-    replace(&folder.join("thresholds.json"), &released.to_text())
+    replace(&folder.join("episodes.csv"), episodes_csv(records))?;
+    replace(&folder.join("summary.json"), format!("{:#}\n", summary(records)))?;
+    replace(&folder.join("thresholds.json"), released.to_text())
 }
 
 /// `compression_sweep.jsonl`: the sweep rows of an asset. Their closure is the *opening*, 1 open … 0 shut.

@@ -34,9 +34,12 @@ struct Embedding {
     rest: Vec<Vec3>,
     /// Grid points next to nodes that are none themselves: rest position, and the nodes whose surroundings reach there.
     ghosts: Vec<(Vec3, Vec<u32>)>,
-    /// The vertices in each voxel, with the 27 points (nodes, then ghosts) and weights that move them.
-    held: Vec<Vec<(u32, [u32; 27], [f64; 27])>>,
+    /// The vertices in each voxel.
+    held: Vec<Vec<Held>>,
 }
+
+/// A vertex, and the 27 points (nodes, then ghosts) and weights that move it.
+type Held = (u32, [u32; 27], [f64; 27]);
 
 /// Where a skin's vertices are put that are too far from the pad to matter, m, pad frame: above it.
 const AWAY: Vec3 = Vec3::new(0.0, 0.0, 1.0);
