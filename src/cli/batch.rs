@@ -194,14 +194,18 @@ impl<'a> Batch<'a> {
             &stop::FLAG,
             |job| {
                 let mut finished = self.episode(job, self.may_show(job))?;
-                self.write_video(&mut finished)?;
-                Ok(finished)
+                let drawn = self.write_video(&mut finished);
+                Ok((finished, drawn))
             },
-            |job, finished| {
+            |job, (finished, drawn)| {
                 folder.append(job, &finished.record).map_err(folder_failure)?;
                 self.write_trace(&finished)?;
                 self.write_debug_log(&finished)?;
                 progress.tick(&line(&finished.record));
+                // The episode counts whether or not it can be drawn.
+                if let Err(failure) = drawn {
+                    eprintln!("softvt: no video of {}: {}", line(&finished.record), failure.message);
+                }
                 records.push(finished.record);
                 Ok(())
             },
@@ -251,8 +255,7 @@ impl<'a> Batch<'a> {
 
     /// What is said of an episode beneath its film.
     pub fn caption(&self, record: &EpisodeRecord) -> Caption {
-        let limit = self.limits.get(&record.identity.asset).copied().flatten();
-        Caption::of(record, limit.map(|limit| limit.tau_pct()))
+        Caption::of(record, record.verdict.tau)
     }
 
     /// Runs one job; with `film` what is needed to draw it is kept.

@@ -135,8 +135,14 @@ fn turn(lua: &Lua, label: &str, [w, x, y, z]: [f64; 4]) -> mlua::Result<Quat> {
 
 /// The turn of a camera at `from` that looks at `to`, with `up` upwards in the picture.
 fn look_at(lua: &Lua, label: &str, from: &Vec3, to: &Vec3, up: &Vec3) -> mlua::Result<Quat> {
+    if !from.iter().chain(to).chain(up).all(|x| x.abs() < 1e6) {
+        return Err(fail(
+            lua,
+            format!("{label}.look_at: expected numbers within ±1e6, got {to:?} with up {up:?}"),
+        ));
+    }
     let ahead = to - from;
-    if ahead.norm() < 1e-6 || ahead.cross(up).norm() < 1e-6 * ahead.norm() * up.norm() {
+    if up.norm() < 1e-9 || ahead.norm() < 1e-6 || ahead.cross(up).norm() < 1e-6 * ahead.norm() * up.norm() {
         let message = "expected a point away from the camera, not straight along up; give another up";
         return Err(fail(lua, format!("{label}.look_at: {message}")));
     }

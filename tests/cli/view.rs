@@ -129,6 +129,8 @@ fn light_cameras_and_looks_are_checked_where_they_are_written() {
             "scene:add_camera { name = \"wrist\", position = { 0, 0, 1 }, look_at = { 1, 0, 0 } }",
             "there is a camera \"wrist\" already",
         ),
+        ("scene:camera(\"wrist\"):look_at { 0, 0/0, 1 }", "camera.look_at: expected numbers within"),
+        ("scene:camera(\"wrist\"):look_at({ 0, 0, 1 }, { 0, 0, 0 })", "give another up"),
         ("scene:object(\"cube\").looks[1].albedo = { 2, 0, 0 }", "look.albedo: expected linear RGB in 0..1"),
         ("scene:object(\"cube\").looks[1].shine = 2", "look: unknown key \"shine\""),
     ] {
@@ -144,6 +146,18 @@ fn a_camera_inside_of_something_is_told_and_leaves_no_picture() {
     let message = project.refusal("view x.lua --out seen");
     assert!(message.contains("camera mole: pose: it stands inside of floor; move it out"), "{message}");
     assert!(!project.path("seen/start_mole.png").exists() && !project.path("seen/episode.mp4").exists());
+    let project = with("scene:camera(\"third_person\").position = { 0, 0, -0.02 }");
+    let said = project.succeeds("x.lua --episodes 2 --video=all --out run");
+    assert_eq!(
+        project.lines("run/episodes.jsonl").len(),
+        2,
+        "an episode counts whether or not it can be drawn"
+    );
+    assert!(
+        said.err.contains("no video of task 0 episode 1") && said.err.contains("third_person"),
+        "{}",
+        said.err
+    );
 }
 
 #[test]
