@@ -211,7 +211,7 @@ fn main() {
             let picture =
                 render(&set.stage, &set.view(0), &camera, &mut Scratch::default()).expect("a picture");
             let path = folder.join(format!("{task}_{}_{edge}.png", camera.name));
-            picture.write_png(&path).expect("the folder can be written");
+            picture.into_image().save(&path).expect("the folder can be written");
         }
     }
 }

@@ -1,14 +1,16 @@
 //! The episodes of one suite: their limits, their runs, their files.
 
-use std::{
-    collections::BTreeMap,
-    path::{Path, PathBuf},
-    sync::Arc,
-};
+use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
 
 use serde::Serialize;
 
-use super::{Failure, args::Run, args::Video, code, files, files::Calibrated, progress::Progress};
+use super::{
+    Failure,
+    args::{Run, Video},
+    code,
+    files::{self, Calibrated, make_folder},
+    progress::Progress,
+};
 use crate::{
     benchmark::{Suite, Task, seed::Split, settings::Settings},
     evaluation::{
@@ -250,12 +252,7 @@ impl<'a> Batch<'a> {
         let id = &record.identity;
         let path = self.out.join(format!("video/task_{:03}/episode_{:05}.mp4", id.task, id.episode));
         make_folder(path.parent().unwrap_or(&self.out))?;
-        film::write_video(&mut film, &self.caption(record), &path, stop::requested).map_err(film_failure)
-    }
-
-    /// What is said of an episode beneath its film.
-    pub fn caption(&self, record: &EpisodeRecord) -> Caption {
-        Caption::of(record, record.verdict.tau)
+        film::write_video(&mut film, &Caption::of(record), &path, stop::requested).map_err(film_failure)
     }
 
     /// Runs one job; with `film` what is needed to draw it is kept.
@@ -351,15 +348,6 @@ impl<'a> Batch<'a> {
         }
         replace(&dir.join(format!("episode_{:05}.jsonl", id.episode)), &text).map_err(folder_failure)
     }
-}
-
-/// Makes a folder and those above it.
-///
-/// # Errors
-/// The system refuses.
-pub(super) fn make_folder(dir: &Path) -> Result<(), Failure> {
-    std::fs::create_dir_all(dir)
-        .map_err(|e| Failure::input(format!("cannot make the folder {}: {e}", dir.display())))
 }
 
 /// A film that could not be made.

@@ -6,7 +6,7 @@ use std::{
     sync::Mutex,
 };
 
-use super::{Failure, args::Run, print, progress::Progress};
+use super::{Failure, args::Run, files::make_folder, print, progress::Progress};
 use crate::{
     report::run_folder::replace,
     rollout::{batch, stop},
@@ -79,8 +79,7 @@ fn write(base: &Path, relative: &str, bytes: &[u8]) -> Result<(), Failure> {
     }
     let folder = path.parent().map(PathBuf::from).unwrap_or_default();
     if !folder.as_os_str().is_empty() {
-        std::fs::create_dir_all(&folder)
-            .map_err(|e| Failure::input(format!("cannot make the folder {}: {e}", folder.display())))?;
+        make_folder(&folder)?;
     }
     replace(path, bytes).map_err(Failure::input)?;
     eprintln!("softvt: wrote {}", path.display());

@@ -1,4 +1,4 @@
-//! Files that belong to a script: beside it, in the working folder, or embedded in the binary.
+//! Files that belong to a script: beside it, in the working folder, or embedded in the binary; and folders to write to.
 
 use std::path::{Path, PathBuf};
 
@@ -8,6 +8,15 @@ use crate::{
     scene::Asset,
     script,
 };
+
+/// Makes a folder and those above it.
+///
+/// # Errors
+/// The system refuses.
+pub fn make_folder(dir: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(dir)
+        .map_err(|e| Failure::input(format!("cannot make the folder {}: {e}", dir.display())))
+}
 
 /// The text of `relative` (such as `assets/calibration/x.json`) and how messages name it: from the folders above the
 /// script, the working folder, or the embedded library, in this order.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Failure, print};
+use super::{Failure, files::make_folder, print};
 use crate::{
     report::run_folder::replace,
     script::stubs::{LUARC, STUB_FILE, stubs},
@@ -15,8 +15,7 @@ use crate::{
 pub fn run(dir: &Path) -> Result<(), Failure> {
     let stub = dir.join(STUB_FILE);
     let folder = stub.parent().unwrap_or(dir);
-    std::fs::create_dir_all(folder)
-        .map_err(|e| Failure::input(format!("cannot make the folder {}: {e}", folder.display())))?;
+    make_folder(folder)?;
     replace(&stub, stubs()).map_err(Failure::input)?;
     print(&format!("wrote {}\n", stub.display()));
     let settings = dir.join(".luarc.json");

@@ -3,13 +3,14 @@
 use super::{
     Failure,
     args::View,
-    batch::{Batch, film_failure, make_folder},
+    batch::{Batch, film_failure},
     evaluate::chosen,
+    files::make_folder,
     print,
 };
 use crate::{
     benchmark::Plan,
-    report::film::{write_panels, write_stills, write_video},
+    report::film::{Caption, write_panels, write_stills, write_video},
     rollout::stop,
     script,
 };
@@ -45,7 +46,7 @@ pub fn run(view: &View) -> Result<(), Failure> {
     let mut batch = Batch::new(run, &loaded, suite, (vec![(task, view.episode)], dir.clone()))?;
     batch.find_limits(&[task])?;
     let finished = batch.episode(0, true)?;
-    let caption = batch.caption(&finished.record);
+    let caption = Caption::of(&finished.record);
     let Some(mut film) = finished.film else { return Ok(()) };
     let d_pct = |at: usize| film.d_pct[at].unwrap_or(0.0);
     let last = film.frames.len().saturating_sub(1);

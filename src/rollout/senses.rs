@@ -3,8 +3,6 @@
 
 use std::sync::Arc;
 
-use image::RgbImage;
-
 use super::{
     looks::Looks,
     simulation::{Kind, Simulation},
@@ -22,8 +20,8 @@ use crate::{
     sensing::{
         camera::{self, CameraError, FrameView, Mount, Picture, Stage, Thing, render},
         tactile::{
-            self, FieldError, Give, PadInput, PadLoad, Sensor, SensorError, Skin, Surface, TactileSpec,
-            Taxels, Touched,
+            self, FieldError, Give, PadInput, PadLoad, SensorError, Skin, Surface, TactileSpec, Taxels,
+            Touched,
         },
     },
 };
@@ -154,8 +152,7 @@ impl Senses {
     /// As [`Senses::see`], or there is no such camera.
     pub fn picture(&mut self, frame: &Frame, name: &str) -> Result<CameraPicture, SenseError> {
         let camera = self.camera(name)?.clone();
-        let Picture { width, height, rgb, .. } = self.see(frame, &camera)?;
-        let picture = RgbImage::from_raw(width as u32, height as u32, rgb).unwrap_or_default();
+        let picture = self.see(frame, &camera)?.into_image();
         Ok(CameraPicture { name: camera.name, picture })
     }
 
@@ -164,9 +161,8 @@ impl Senses {
     /// # Errors
     /// The sensor cannot be made, or a number of the state is none.
     pub fn touch(&mut self, frame: &Frame) -> Result<[Touched; 2], SenseError> {
-        let sensor = self.looks.sensor(&self.spec)?;
-        let left = self.finger(frame, Side::Left, &sensor)?;
-        Ok([left, self.finger(frame, Side::Right, &sensor)?])
+        let left = self.finger(frame, Side::Left)?;
+        Ok([left, self.finger(frame, Side::Right)?])
     }
 
     /// The same as a policy gets it.
@@ -189,7 +185,12 @@ impl Senses {
         })
     }
 
-    fn finger(&mut self, frame: &Frame, side: Side, sensor: &Sensor) -> Result<Touched, SenseError> {
+    /// What one finger feels.
+    ///
+    /// # Errors
+    /// As [`Senses::touch`].
+    pub fn finger(&mut self, frame: &Frame, side: Side) -> Result<Touched, SenseError> {
+        let sensor = self.looks.sensor(&self.spec)?;
         let index = usize::from(side == Side::Right);
         let none = ContactPatch { collider: 0, points: Vec::new() };
         // What touches the very rim alone, where no cell of the grid has its centre, cannot be seen.

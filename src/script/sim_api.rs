@@ -2,7 +2,6 @@
 
 use std::sync::{Arc, Mutex};
 
-use image::RgbImage;
 use mlua::{
     Function, Lua, LuaSerdeExt, MetaMethod, MultiValue, Table, UserData, UserDataFields, UserDataMethods,
     Value,
@@ -29,7 +28,7 @@ use crate::{
     },
     evaluation::deformation::Reference,
     geometry::Pose,
-    robot::rotation,
+    robot::{Side, rotation},
     rollout::{Kind, Looks, RestCache, SenseError, Senses, Simulation, stop},
     sensing::tactile::{MarkerStyle, PadLoad, Places},
 };
@@ -243,16 +242,15 @@ impl LuaSimulation {
         let mut camera = senses.camera(&spec.get::<String>("camera")?).map_err(wrong)?.clone();
         camera.width = spec.get::<Option<usize>>("width")?.unwrap_or(camera.width);
         camera.height = spec.get::<Option<usize>>("height")?.unwrap_or(camera.height);
-        let seen = senses.see(&Senses::frame(sim), &camera).map_err(wrong)?;
-        let picture = RgbImage::from_raw(seen.width as u32, seen.height as u32, seen.rgb);
-        LuaImage::new(lua, picture.unwrap_or_default())
+        let picture = senses.see(&Senses::frame(sim), &camera).map_err(wrong)?.into_image();
+        LuaImage::new(lua, picture)
     }
 
     /// What a finger feels.
     fn feel(&self, lua: &Lua, side: &str) -> mlua::Result<Table> {
-        let index = match side {
-            "left" => 0,
-            "right" => 1,
+        let (index, side) = match side {
+            "left" => (0, Side::Left),
+            "right" => (1, Side::Right),
             other => {
                 let message = format!("simulation:feel: expected \"left\" or \"right\", got {other:?}");
                 return Err(fail(lua, message));
@@ -262,8 +260,7 @@ impl LuaSimulation {
         let Inner { sim, senses, clock, .. } = &mut *inner;
         let _honest_work = clock.pause();
         let frame = Senses::frame(sim);
-        let felt = senses.touch(&frame).map_err(|e| fail(lua, format!("simulation:feel: {e}")))?;
-        let felt = &felt[index];
+        let felt = senses.finger(&frame, side).map_err(|e| fail(lua, format!("simulation:feel: {e}")))?;
         let places = |places: &Places| lua.create_sequence_from(places.iter().map(|p| p.to_vec()));
         let table = lua.create_table()?;
         table.set("picture", LuaImage::new(lua, felt.picture.clone())?)?;

@@ -67,8 +67,8 @@ pub struct Caption {
 }
 
 impl Caption {
-    /// That of a finished episode and its limit.
-    pub fn of(record: &EpisodeRecord, tau_pct: Option<f64>) -> Self {
+    /// That of a finished episode.
+    pub fn of(record: &EpisodeRecord) -> Self {
         let (id, verdict) = (&record.identity, &record.verdict);
         let word = match (verdict.safety, verdict.goal) {
             (true, _) => "safe",
@@ -79,7 +79,7 @@ impl Caption {
             prompt: id.prompt.clone(),
             who: format!("{} · task {} · episode {} · {}", id.suite, id.task, id.episode, id.policy),
             verdict: word.to_owned(),
-            tau_pct,
+            tau_pct: verdict.tau,
             good: verdict.safety,
         }
     }
@@ -116,8 +116,7 @@ fn panels(film: &mut Film, caption: &Caption, index: usize) -> Result<RgbImage, 
     let frame = film.frames.get(index).ok_or(FilmError::Empty)?;
     for (side, name) in CAMERAS.into_iter().enumerate() {
         let camera = film.senses.camera(name)?.clone().with_edge(PANEL as usize);
-        let picture = film.senses.see(frame, &camera)?;
-        let picture = RgbImage::from_raw(PANEL, PANEL, picture.rgb).unwrap_or_default();
+        let picture = film.senses.see(frame, &camera)?.into_image();
         canvas.place(&picture, PANEL * side as u32, 0);
         label(&mut canvas, ["third person", "wrist"][side], PANEL * side as u32, 0);
     }
@@ -212,13 +211,13 @@ pub fn write_stills(
         let frame = film.frames.get(index).ok_or(FilmError::Empty)?;
         for camera in film.senses.cameras().to_vec() {
             let camera = if full_size { camera.clone().with_edge(native(&camera)) } else { camera };
-            let seen = film.senses.see(frame, &camera)?;
+            let mut seen = film.senses.see(frame, &camera)?;
             let path = |kind: &str| dir.join(format!("{moment}_{}{kind}.png", camera.name));
             let size = (seen.width as u32, seen.height as u32);
             let tenths = |depth: &f32| (1e4 * depth).min(f32::from(u16::MAX)).round() as u16;
             save_numbers(size, seen.depth.iter().map(tenths).collect(), &path("_depth"))?;
-            save_numbers(size, seen.segmentation, &path("_segmentation"))?;
-            save(&RgbImage::from_raw(size.0, size.1, seen.rgb).unwrap_or_default(), &path(""))?;
+            save_numbers(size, std::mem::take(&mut seen.segmentation), &path("_segmentation"))?;
+            save(&seen.into_image(), &path(""))?;
             written.extend(["", "_depth", "_segmentation"].map(path));
         }
         for (side, touched) in ["left", "right"].into_iter().zip(&film.senses.touch(frame)?) {

@@ -49,12 +49,4 @@ pub enum CameraError {
         /// What is missing.
         reason: String,
     },
-    /// A file cannot be written.
-    #[error("{path}: cannot write the picture: {reason}")]
-    Write {
-        /// The file.
-        path: String,
-        /// What the system says.
-        reason: String,
-    },
 }

@@ -1,8 +1,6 @@
-//! The picture and its file.
+//! The picture.
 
-use std::path::Path;
-
-use super::CameraError;
+use image::RgbImage;
 
 /// What a camera sees. Rows run from the top, pixels from the left.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -20,14 +18,9 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Writes the colours as a PNG file.
-    ///
-    /// # Errors
-    /// If the file cannot be written.
-    pub fn write_png(&self, path: &Path) -> Result<(), CameraError> {
-        let colour = image::ExtendedColorType::Rgb8;
-        image::save_buffer(path, &self.rgb, self.width as u32, self.height as u32, colour).map_err(|error| {
-            CameraError::Write { path: path.display().to_string(), reason: error.to_string() }
-        })
+    /// The colours as an image that can be resized, put together and saved.
+    pub fn into_image(self) -> RgbImage {
+        // As many bytes as the size asks for, as every picture has.
+        RgbImage::from_raw(self.width as u32, self.height as u32, self.rgb).unwrap_or_default()
     }
 }
