@@ -3,6 +3,7 @@
 use std::{convert::Infallible, sync::Arc};
 
 use super::{
+    furniture,
     made::Made,
     simulation::{Handle, Kind},
 };
@@ -18,9 +19,10 @@ use crate::{
         World,
         contact::{Collider, Friction, Mover, Surface},
         fem::{Material, Rest},
+        joints::TreeError,
         rigid::{RigidBody, RigidError},
     },
-    scene::{Asset, Body, Object, SoftMaterial},
+    scene::{Asset, Body, Object, Scene, SoftMaterial},
 };
 
 /// An object cannot be made.
@@ -50,9 +52,55 @@ pub enum BuildError {
         /// What is wrong and what was expected.
         what: String,
     },
+    /// Its joints carry what no joint could.
+    #[error("object {object}: {source}")]
+    Joints {
+        /// Object name.
+        object: String,
+        /// What is wrong.
+        source: TreeError,
+    },
+    /// Two objects are in each other.
+    #[error(
+        "objects {first} and {second}{} overlap by {} mm at the start; move them apart",
+        placed(.second_at),
+        number((1e4 * .depth).round() / 10.0)
+    )]
+    Overlap {
+        /// Name of one.
+        first: String,
+        /// Name of the other.
+        second: String,
+        /// Where the other was placed, `file:line`; empty if no script did.
+        second_at: String,
+        /// How far the deepest point of one is under the surface of the other, m.
+        depth: f64,
+    },
+    /// What is wrong with an object that a script placed.
+    #[error("{place}: {source}")]
+    At {
+        /// `file:line`.
+        place: String,
+        /// What is wrong.
+        source: Box<BuildError>,
+    },
     /// Two objects have one name.
     #[error("the scene has two objects named {0}; names must be unique")]
     TwoNames(String),
+}
+
+fn placed(at: &str) -> String {
+    if at.is_empty() { String::new() } else { format!(" (placed at {at})") }
+}
+
+impl BuildError {
+    /// The same with the place of the script that put `object` into the scene.
+    fn of(self, object: &Object) -> Self {
+        match object.placed_at.as_str() {
+            "" => self,
+            place => Self::At { place: place.to_owned(), source: Box::new(self) },
+        }
+    }
 }
 
 /// Rest data and bounds of assets, made once and shared by all episodes.
@@ -60,13 +108,21 @@ pub enum BuildError {
 pub struct RestCache {
     rests: Made<Arc<Asset>, Arc<Rest>>,
     bounds: Made<Shape, Aabb>,
+    walls: Made<Shape, Option<f64>>,
 }
 
 impl RestCache {
     /// Bounds of a shape; finding those of a displaced one takes a search.
-    fn bounds(&self, shape: &Shape) -> Aabb {
+    pub(super) fn bounds(&self, shape: &Shape) -> Aabb {
         let made: Result<_, Infallible> =
             self.bounds.get(|known| known == shape, || Ok((shape.clone(), shape.bounds())));
+        made.unwrap_or_else(|never| match never {})
+    }
+
+    /// Thickness of walls that are too thin to move, m, if there are such.
+    pub(super) fn wall(&self, shape: &Shape) -> Option<f64> {
+        let make = || Ok((shape.clone(), furniture::thin_wall(shape)));
+        let made: Result<_, Infallible> = self.walls.get(|known| known == shape, make);
         made.unwrap_or_else(|never| match never {})
     }
 
@@ -132,20 +188,67 @@ fn check_size(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<(), 
     Err(BuildError::Material { asset: name.to_owned(), what })
 }
 
-/// Puts `object` into `world`.
-pub(super) fn add(world: &mut World, object: &Object, cache: &RestCache) -> Result<Handle, BuildError> {
+/// Objects may overlap by this much where they are put, m: contact takes it up while they settle.
+const OVERLAP: f64 = 1e-3;
+
+/// Puts all objects of `scene` into `world`; their handles in the order of the scene, those of an object's parts after
+/// it.
+pub(super) fn add_all(
+    world: &mut World,
+    scene: &Scene,
+    cache: &RestCache,
+) -> Result<Vec<Handle>, BuildError> {
+    let mut handles: Vec<Handle> = Vec::new();
+    for object in &scene.objects {
+        if handles.iter().any(|known| known.name == object.name) {
+            return Err(BuildError::TwoNames(object.name.clone()).of(object));
+        }
+        add(world, object, cache, &mut handles).map_err(|error| error.of(object))?;
+    }
+    check_overlap(world, scene)?;
+    Ok(handles)
+}
+
+fn check_overlap(world: &mut World, scene: &Scene) -> Result<(), BuildError> {
+    let found = world.overlaps(OVERLAP);
+    let Some(deepest) = found.iter().max_by(|a, b| a.depth.total_cmp(&b.depth)) else { return Ok(()) };
+    // A part is named after its object and a dot, which no object's name holds.
+    let index = |name: &str| {
+        let whole = name.split('.').next().unwrap_or(name);
+        scene.objects.iter().position(|object| object.name == whole)
+    };
+    let [mut first, mut second] = [0, 1].map(|i| (index(&deepest.names[i]), deepest.names[i].clone()));
+    if first.0 < second.0 {
+        // The one that was placed last is the one to be moved.
+        std::mem::swap(&mut first, &mut second);
+    }
+    let place = |index: Option<usize>| index.map_or(String::new(), |i| scene.objects[i].placed_at.clone());
+    let error = BuildError::Overlap {
+        first: first.1,
+        second: second.1,
+        second_at: place(second.0),
+        depth: deepest.depth,
+    };
+    Err(match first.0 {
+        Some(index) => error.of(&scene.objects[index]),
+        None => error,
+    })
+}
+
+/// Puts `object` into `world` and its handles behind the others.
+fn add(
+    world: &mut World,
+    object: &Object,
+    cache: &RestCache,
+    handles: &mut Vec<Handle>,
+) -> Result<(), BuildError> {
     let asset = &object.asset;
     let friction = Friction { static_mu: asset.friction.static_mu, dynamic_mu: asset.friction.dynamic_mu };
-    let collider = |world: &mut World, mover, pose| {
-        let layer = world.rigid_layer();
-        world.add_collider(Collider::new(
-            &object.name,
-            (mover, pose),
-            Arc::new(asset.shape.clone()),
-            friction,
-            layer,
-        ))
+    let collider = |world: &World, mover, pose| {
+        let shape = Arc::new(asset.shape.clone());
+        Collider::new(&object.name, (mover, pose), shape, friction, world.rigid_layer())
     };
+    let mut parts = Vec::new();
     let (kind, colliders) = match &asset.body {
         Body::Soft(material) => {
             let rest = cache.rest(asset, material)?;
@@ -158,19 +261,30 @@ pub(super) fn add(world: &mut World, object: &Object, cache: &RestCache) -> Resu
             let body = RigidBody::new(&object.pose_w, m.com, m.mass, m.inertia)
                 .map_err(|source| BuildError::Rigid { asset: asset.name.clone(), source })?;
             let index = world.add_rigid(&object.name, body);
-            let id = collider(world, Mover::Rigid(index), crate::geometry::Pose::identity());
-            (Kind::Rigid(index), vec![id])
+            let collider = collider(world, Mover::Rigid(index), crate::geometry::Pose::identity());
+            (Kind::Rigid(index), vec![world.add_collider(collider)])
         }
-        Body::Static => (Kind::Static, vec![collider(world, Mover::Static, object.pose_w)]),
+        Body::Articulated(carried) => {
+            let (tree, made) = furniture::add(world, object, carried, handles.len(), cache)?;
+            parts = made;
+            let base = collider(world, Mover::Static, object.pose_w).as_base_of(tree);
+            (Kind::Static, vec![world.add_collider(base)])
+        }
+        Body::Static => {
+            let collider = collider(world, Mover::Static, object.pose_w);
+            (Kind::Static, vec![world.add_collider(collider)])
+        }
         Body::Scenery => (Kind::Static, Vec::new()),
     };
-    let bounds = cache.bounds(&asset.shape);
-    Ok(Handle {
+    handles.push(Handle {
         name: object.name.clone(),
         asset: asset.clone(),
         kind,
         start_w: object.pose_w,
         colliders,
-        bounds,
-    })
+        bounds: cache.bounds(&asset.shape),
+        part: None,
+    });
+    handles.extend(parts);
+    Ok(())
 }

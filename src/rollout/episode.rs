@@ -412,7 +412,8 @@ fn place_of(goal: &Goal, place: &Handle) -> Place {
         Goal::In { .. } => {
             let wall = place.asset.hints.get("wall_m").copied().unwrap_or(0.0);
             let inset = Vec3::new(wall, wall, 0.0);
-            Place::In { inside: Region { min: bounds.min + inset, max: bounds.max - inset } }
+            let foot = place.foot_o();
+            Place::In { inside: Region { min: bounds.min + inset - foot, max: bounds.max - inset - foot } }
         }
     }
 }
@@ -421,7 +422,7 @@ fn weight(sim: &Simulation, object: usize) -> f64 {
     let mass = match sim.objects[object].kind {
         Kind::Soft(index) => sim.world.soft[index].body.rest.total_mass(),
         Kind::Rigid(index) => sim.world.rigid[index].body.mass,
-        Kind::Static => 0.0,
+        Kind::Link { .. } | Kind::Static => 0.0,
     };
     mass * sim.scene.gravity.norm()
 }

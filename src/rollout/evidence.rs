@@ -6,7 +6,7 @@ use crate::{
         deformation::{Deformation, Reference},
         evidence::{BodyEvidence, Evidence, GripperEvidence, PadEvidence, PlaceEvidence},
     },
-    geometry::Vec3,
+    geometry::{Pose, Vec3},
     physics::{contact::Partner, world::Touch},
     robot::gripper::target_width,
 };
@@ -24,7 +24,7 @@ pub struct Witness {
 impl Witness {
     /// Takes the settled state as the deformation reference.
     pub fn new(sim: &Simulation, target: usize, place: usize) -> Self {
-        let movable = |i: &usize| *i != target && sim.objects[*i].kind != Kind::Static;
+        let movable = |i: &usize| *i != target && sim.objects[*i].kind.movable().is_some();
         let references = sim
             .objects
             .iter()
@@ -78,7 +78,9 @@ impl Witness {
             }),
             robot_impulse_ns: from_robot * dt,
             target: self.body(sim, self.target),
-            place: PlaceEvidence { pose_w: sim.pose(place), support_impulse_ns: from_place * dt },
+            place: PlaceEvidence {
+                pose_w: sim.pose(place) * Pose::from(place.foot_o()),
+                support_impulse_ns: from_place * dt },
             others: &self.bodies,
         }
     }

@@ -4,6 +4,7 @@ pub mod batch;
 mod build;
 pub mod episode;
 mod evidence;
+mod furniture;
 mod looks;
 mod made;
 mod recent;
@@ -18,5 +19,5 @@ pub use episode::{ControlError, Controller, Episode, EpisodeError, EpisodeSpec, 
 pub use looks::Looks;
 pub use rig::Rig;
 pub use senses::{Film, SenseError, Senses};
-pub use simulation::{Handle, Kind, SettleError, Simulation};
+pub use simulation::{Handle, Kind, PartOf, SettleError, Simulation};
 pub use trace::{ObjectTrace, StepTrace};

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::{
     looks::Looks,
-    simulation::{Kind, Simulation},
+    simulation::{Kind, Simulation, joint_frame},
 };
 use crate::{
     geometry::{Pose, Vec3},
@@ -58,6 +58,8 @@ struct Part {
     asset: Arc<Asset>,
     kind: Kind,
     start_w: Pose,
+    /// Its frame in that of its link, if it has one.
+    offset: Pose,
     colliders: Vec<ColliderId>,
     rest: Option<Arc<Rest>>,
 }
@@ -78,7 +80,8 @@ pub struct Senses {
 
 /// Taxels along x and y of the force maps: squares of a millimetre.
 const TAXELS: [usize; 2] = [25, 21];
-/// Number of the robot in segmentations; objects count from 1 in the order of the scene.
+/// Number of the robot in segmentations; objects count from 1 in the order of the scene, the parts of each after
+/// it.
 pub const ROBOT: u16 = 1000;
 /// Static things longer than this are grounds, whose own shadow nobody sees, m.
 const GROUND: f64 = 1.0;
@@ -91,6 +94,7 @@ impl Senses {
             asset: object.asset.clone(),
             kind: object.kind,
             start_w: object.start_w,
+            offset: joint_frame(object).inverse(),
             colliders: object.colliders.clone(),
             rest: match object.kind {
                 Kind::Soft(body) => Some(sim.world.soft[body].body.rest.clone()),
@@ -208,6 +212,9 @@ impl Senses {
             match part.kind {
                 Kind::Soft(body) => skin.soft(&frame.nodes[body], &w_p, &mut vertices),
                 Kind::Rigid(body) => skin.rigid(&(w_p * frame.rigid[body]), &mut vertices),
+                Kind::Link { tree, link } => {
+                    skin.rigid(&(w_p * frame.links[tree][link] * part.offset), &mut vertices)
+                }
                 Kind::Static => skin.rigid(&(w_p * part.start_w), &mut vertices),
             }
             placed.push((skin, vertices));
@@ -231,6 +238,7 @@ impl Senses {
             let mount = match part.kind {
                 Kind::Soft(body) => Mount::Soft(body),
                 Kind::Rigid(body) => Mount::Rigid(body),
+                Kind::Link { tree, link } => Mount::Link { tree, link, offset: part.offset },
                 Kind::Static => Mount::Fixed(part.start_w),
             };
             Ok(Thing {

@@ -13,10 +13,11 @@ use crate::{
     physics::{
         Params, World,
         contact::{ColliderId, Partner},
+        joints,
         world::{Movable, StepFailure, Touch},
     },
     robot::RobotSpec,
-    scene::{Asset, Scene},
+    scene::{Asset, Joint, Scene},
 };
 
 /// What an object is in the world.
@@ -26,6 +27,13 @@ pub enum Kind {
     Soft(usize),
     /// A rigid body, by index.
     Rigid(usize),
+    /// A part on a joint.
+    Link {
+        /// Index of the joint tree.
+        tree: usize,
+        /// Index of the link, which is also that of the joint.
+        link: usize,
+    },
     /// Part of the world.
     Static,
 }
@@ -36,9 +44,20 @@ impl Kind {
         match self {
             Self::Soft(index) => Some(Movable::Soft(index)),
             Self::Rigid(index) => Some(Movable::Rigid(index)),
-            Self::Static => None,
+            Self::Link { .. } | Self::Static => None,
         }
     }
+}
+
+/// What a part belongs to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PartOf {
+    /// Index of the handle of the whole object.
+    pub object: usize,
+    /// Name within the object.
+    pub name: String,
+    /// What carries it.
+    pub joint: Joint,
 }
 
 /// An object of the scene in the world.
@@ -54,8 +73,21 @@ pub struct Handle {
     pub start_w: Pose,
     /// Its colliders.
     pub colliders: Vec<ColliderId>,
-    /// Bounds of its shape at rest, object frame.
+    /// Bounds of its shape at rest, object frame (of a part: the whole object's with all joints at 0).
     pub bounds: Aabb,
+    /// What it is a part of.
+    pub part: Option<PartOf>,
+}
+
+impl Handle {
+    /// Where things are put on it or in it: its lowest point on its centre line, object frame, m. An asset stands there by
+    /// itself; a part is where it is in its object.
+    pub fn foot_o(&self) -> Vec3 {
+        match self.part {
+            Some(_) => Vec3::new(self.bounds.centre().x, self.bounds.centre().y, self.bounds.min.z),
+            None => Vec3::zeros(),
+        }
+    }
 }
 
 /// Speed below which a node counts as settled, m/s.
@@ -96,7 +128,7 @@ pub struct Simulation {
     pub world: World,
     /// The robot.
     pub rig: Rig,
-    /// The objects, in scene order.
+    /// The objects, in scene order, each followed by its parts.
     pub objects: Vec<Handle>,
 }
 
@@ -104,7 +136,7 @@ impl Simulation {
     /// Builds the world of `scene`.
     ///
     /// # Errors
-    /// An object that cannot be made, or two of one name.
+    /// An object that cannot be made, two of one name, or two in each other.
     pub fn new(
         scene: Arc<Scene>,
         params: &Params,
@@ -112,13 +144,7 @@ impl Simulation {
         cache: &RestCache,
     ) -> Result<Self, BuildError> {
         let mut world = World::new(params.clone(), scene.gravity);
-        let mut objects: Vec<Handle> = Vec::new();
-        for object in &scene.objects {
-            if objects.iter().any(|o| o.name == object.name) {
-                return Err(BuildError::TwoNames(object.name.clone()));
-            }
-            objects.push(build::add(&mut world, object, cache)?);
-        }
+        let objects = build::add_all(&mut world, &scene, cache)?;
         let rig = Rig::new(&mut world, robot, &scene.base_w, &scene.start_q, CONTROL_DT);
         Ok(Self { scene, world, rig, objects })
     }
@@ -169,6 +195,12 @@ impl Simulation {
                 let body = &self.world.rigid[index].body;
                 body.v.norm() + 0.1 * body.w.norm()
             }
+            Kind::Link { tree, link } => {
+                let tree = &self.world.trees[tree];
+                let velocity = joints::velocities(&tree.tree, tree.poses(), tree.state.v.as_slice())[link];
+                let centre = self.centre(object);
+                velocity.at(&tree.poses()[link], &centre).norm() + 0.1 * velocity.angular.norm()
+            }
             Kind::Static => 0.0,
         }
     }
@@ -189,7 +221,8 @@ impl Simulation {
         self.objects.iter().find(|o| o.name == name)
     }
 
-    /// Centre of an object, m, world: the mean of a soft body's nodes, the centre of mass of a rigid one.
+    /// Centre of an object, m, world: the mean of a soft body's nodes, the centre of mass of a rigid one, the middle of a
+    /// part's bounds.
     pub fn centre(&self, object: &Handle) -> Vec3 {
         match object.kind {
             Kind::Soft(index) => {
@@ -197,7 +230,22 @@ impl Simulation {
                 x.iter().sum::<Vec3>() / x.len() as f64
             }
             Kind::Rigid(index) => self.world.rigid[index].body.pose_w.translation.vector,
+            Kind::Link { .. } => (self.pose(object) * nalgebra::Point3::from(object.bounds.centre())).coords,
             Kind::Static => object.start_w.translation.vector,
+        }
+    }
+
+    /// The parts of the object with handle `index`.
+    pub fn parts(&self, index: usize) -> impl Iterator<Item = (&Handle, &PartOf)> {
+        let parts = self.objects.iter().filter_map(|handle| Some((handle, handle.part.as_ref()?)));
+        parts.filter(move |(_, part)| part.object == index)
+    }
+
+    /// Joint value of a part, m or rad.
+    pub fn joint(&self, object: &Handle) -> Option<f64> {
+        match object.kind {
+            Kind::Link { tree, link } => Some(self.world.trees[tree].state.q[link]),
+            _ => None,
         }
     }
 
@@ -213,7 +261,13 @@ impl Simulation {
                 Pose::from_parts(at.into(), rotation)
             }
             Kind::Rigid(index) => self.world.rigid[index].body.object_w(),
+            Kind::Link { tree, link } => self.world.trees[tree].poses()[link] * joint_frame(object).inverse(),
             Kind::Static => object.start_w,
         }
     }
+}
+
+/// Frame of a part's joint in its object frame; the link frame of the mechanics coincides with it.
+pub(super) fn joint_frame(object: &Handle) -> Pose {
+    object.part.as_ref().map_or(Pose::identity(), |part| Pose::from(part.joint.origin_o))
 }

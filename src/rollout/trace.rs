@@ -105,6 +105,7 @@ fn object(sim: &Simulation, witness: &Witness, index: usize, nodes: bool) -> Obj
     let (soft, asleep) = match handle.kind {
         Kind::Soft(index) => (Some(&sim.world.soft[index]), sim.world.soft[index].asleep),
         Kind::Rigid(index) => (None, sim.world.rigid[index].asleep),
+        Kind::Link { tree, .. } => (None, sim.world.trees[tree].asleep),
         Kind::Static => (None, false),
     };
     let touches = handle.kind.movable().map_or(&[][..], |body| sim.world.touches_on(body));

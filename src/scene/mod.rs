@@ -1,6 +1,7 @@
 //! A scene as plain data: assets, placed objects, their looks, the robot's place, light, cameras, regions. Knows no
 //! physics.
 
+mod articulated;
 mod camera;
 mod light;
 mod visual;
@@ -13,13 +14,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::geometry::{Pose, Vec3, shape::Shape};
 
+pub use articulated::{Joint, Motion, Part, part_poses};
 pub use camera::{Camera, CameraMount, POLICY_EDGE, fovy_of_lens};
 pub use light::{KeyLight, Lighting, Sky};
 pub use visual::{Layer, Mask, Visual};
 
 /// How an object moves.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", tag = "kind")]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Body {
     /// A finite-element soft body.
     Soft(SoftMaterial),
@@ -28,6 +29,8 @@ pub enum Body {
         /// Density, kg/m³.
         density: f64,
     },
+    /// Parts on joints; the asset's own shape is their base, which is part of the world.
+    Articulated(Vec<Part>),
     /// Part of the world; never moves.
     Static,
     /// Part of the picture only: it never moves and nothing touches it.
@@ -82,6 +85,16 @@ pub struct Asset {
     pub hints: BTreeMap<String, f64>,
 }
 
+impl Asset {
+    /// Its parts on joints, if it is articulated; a carrier comes before what it carries.
+    pub fn parts(&self) -> &[Part] {
+        match &self.body {
+            Body::Articulated(parts) => parts,
+            _ => &[],
+        }
+    }
+}
+
 /// An asset put somewhere.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Object {
@@ -91,6 +104,10 @@ pub struct Object {
     pub asset: Arc<Asset>,
     /// Object frame in the world.
     pub pose_w: Pose,
+    /// Start values of the joints of an articulated object, in the order of its parts, m or rad.
+    pub joints: Vec<f64>,
+    /// Where it was placed, `file:line`, for messages; empty if no script did.
+    pub placed_at: String,
 }
 
 /// An axis-aligned box, world frame.

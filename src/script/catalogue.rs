@@ -3,6 +3,7 @@
 //! Checking, stubs and the reference are all made from it.
 
 use super::{
+    catalogue_joints::{ARTICULATED, HINGE, PART, SLIDER},
     catalogue_visuals::{LAYER, VISUAL},
     schema::{Field, Presence, Range, Record, Type},
 };
@@ -101,7 +102,7 @@ pub static ASSET: Record = Record {
     fields: &[
         field("name", Type::Name, Required, "Name, as in results and calibration files."),
         field("shape", Type::Object("softvt.Shape"), Required, "Its shape, in metres."),
-        field("body", Type::Made(&[&SOFT, &RIGID, &STATIC, &SCENERY]), Required, "How it moves."),
+        field("body", Type::Made(&[&SOFT, &RIGID, &ARTICULATED, &STATIC, &SCENERY]), Required, "How it moves."),
         field("friction", Type::Nested(&FRICTION), Empty, "Friction of its surface."),
         field(
             "visuals",
@@ -155,7 +156,7 @@ pub static INSIDE: Record = Record {
 
 const GOAL_FIELDS: &[Field] = &[
     field("object", Type::Text, Required, "Scene name of the object."),
-    field("target", Type::Text, Required, "Scene name of what it must reach."),
+    field("target", Type::Text, Required, "Scene name of what it must reach, or of a part of it (cabinet.top_drawer)."),
     field(
         "hold_s",
         Type::Number("s", Range::closed(0.0, 10.0)),
@@ -340,7 +341,18 @@ pub static PLACE: Record = Record {
         ),
         field("xyz", Type::Vector(3, "m, world"), Optional, "Its origin: lowest point, on the centre line."),
         field("yaw", Type::Number("rad", Range::ANY), Presence::Number(0.0), "Turn about the vertical."),
-        field("on", Type::Text, Optional, "Scene name of an object that it stands on (with at)."),
+        field(
+            "on",
+            Type::Text,
+            Optional,
+            "Scene name of an object or part (cabinet.top_drawer) that it stands on (with at).",
+        ),
+        field(
+            "joints",
+            Type::Map(&Type::Number("m or rad", Range::ANY)),
+            Optional,
+            "Start values of an articulated object's joints by part; 0, or the nearest limit, by default.",
+        ),
     ],
 };
 
@@ -371,6 +383,9 @@ pub static CONSTRUCTORS: &[(&str, &Record)] = &[
     ("asset", &ASSET),
     ("soft", &SOFT),
     ("rigid", &RIGID),
+    ("articulated", &ARTICULATED),
+    ("slider", &SLIDER),
+    ("hinge", &HINGE),
     ("static", &STATIC),
     ("scenery", &SCENERY),
     ("shift", &SHIFT),
@@ -378,4 +393,4 @@ pub static CONSTRUCTORS: &[(&str, &Record)] = &[
 ];
 
 /// Tables that functions take but no constructor makes.
-pub static PLAIN: &[&Record] = &[&FRICTION, &VISUAL, &LAYER, &FINISH, &OPTION, &PLACE, &POSE];
+pub static PLAIN: &[&Record] = &[&FRICTION, &PART, &VISUAL, &LAYER, &FINISH, &OPTION, &PLACE, &POSE];

@@ -117,7 +117,8 @@ pub const SIMULATION: Class = Class {
             "watch",
             &[("object", "string")],
             &["table"],
-            "width_m, height_m (rise of the centre), speed, asset; of a movable object also pad_force (N) and slip_mm of \
+            "width_m, height_m (rise of the centre), speed, asset; of a part joint, of what has parts joints by name; of a \
+             movable object also pad_force (N) and slip_mm of \
              the left and right pad, and of a soft one d_pct, d_peak_pct, min_det_f, asleep.",
         ),
         method(

@@ -104,11 +104,17 @@ fn view(sim: &Simulation, time_s: f64) -> ExpertView {
             .iter()
             .map(|object| sim.pad_touches(object))
             .fold([0.0; 2], |sum, touch| [sum[0] + touch[0].normal_force, sum[1] + touch[1].normal_force]),
-        objects: sim.objects.iter().map(|object| seen(sim, object)).collect(),
+        objects: (0..sim.objects.len())
+            .filter(|&index| sim.objects[index].part.is_none())
+            .map(|index| ObjectView {
+                parts: sim.parts(index).map(|(handle, part)| seen(sim, handle, &part.name)).collect(),
+                ..seen(sim, &sim.objects[index], &sim.objects[index].name)
+            })
+            .collect(),
     }
 }
 
-fn seen(sim: &Simulation, object: &Handle) -> ObjectView {
+fn seen(sim: &Simulation, object: &Handle, name: &str) -> ObjectView {
     let pose = sim.pose(object);
     let bounds = object.bounds;
     let centre_w = match object.kind {
@@ -117,11 +123,13 @@ fn seen(sim: &Simulation, object: &Handle) -> ObjectView {
     };
     let x = pose.rotation * Vec3::x();
     ObjectView {
-        name: object.name.clone(),
+        name: name.to_owned(),
         asset: object.asset.name.clone(),
         centre_w,
         yaw: x.y.atan2(x.x),
         size: bounds.size(),
         hints: object.asset.hints.clone(),
+        joint: sim.joint(object),
+        parts: Vec::new(),
     }
 }

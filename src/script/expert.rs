@@ -35,6 +35,10 @@ pub struct ObjectView {
     pub size: Vec3,
     /// Numbers that its asset gives to experts.
     pub hints: BTreeMap<String, f64>,
+    /// Joint value of a part, m or rad.
+    pub joint: Option<f64>,
+    /// Its parts by name.
+    pub parts: Vec<ObjectView>,
 }
 
 /// What an expert may know at a control step: the true state, copied.
@@ -270,12 +274,12 @@ impl UserData for View {
     fn add_methods<M: UserDataMethods<Self>>(methods: &mut M) {
         methods.add_meta_method(MetaMethod::ToString, |_, _, ()| Ok("softvt.View"));
         methods.add_method("object", |lua, this, name: String| {
-            with(lua, &this.0, |view| match view.objects.iter().find(|object| object.name == name) {
-                Some(object) => seen(lua, object),
-                None => {
-                    let names = view.objects.iter().map(|object| object.name.as_str());
-                    Err(fail(lua, format!("scene: {}", unknown("object", &name, names))))
-                }
+            with(lua, &this.0, |view| seen(lua, find(lua, "object", &view.objects, &name)?))
+        });
+        methods.add_method("part", |lua, this, (object, part): (String, String)| {
+            with(lua, &this.0, |view| {
+                let whole = find(lua, "object", &view.objects, &object)?;
+                seen(lua, find(lua, "part", &whole.parts, &part)?)
             })
         });
         methods.add_method("objects", |lua, this, ()| {
@@ -287,6 +291,12 @@ impl UserData for View {
     }
 }
 
+fn find<'a>(lua: &Lua, what: &str, all: &'a [ObjectView], name: &str) -> mlua::Result<&'a ObjectView> {
+    let names = all.iter().map(|object| object.name.as_str());
+    let found = all.iter().find(|object| object.name == name);
+    found.ok_or_else(|| fail(lua, format!("scene: {}", unknown(what, name, names))))
+}
+
 fn seen(lua: &Lua, object: &ObjectView) -> mlua::Result<Table> {
     let table = lua.create_table()?;
     table.set("name", object.name.as_str())?;
@@ -296,6 +306,12 @@ fn seen(lua: &Lua, object: &ObjectView) -> mlua::Result<Table> {
     table.set("yaw", object.yaw)?;
     let hints = object.hints.iter().map(|(name, value)| (name.as_str(), *value));
     table.set("hints", lua.create_table_from(hints)?)?;
-    let names = ["name", "asset", "xyz", "size", "yaw", "hints"].map(str::to_string).to_vec();
+    table.set("joint", object.joint)?;
+    let values = object.parts.iter().map(|part| (part.name.as_str(), part.joint));
+    table.set("joints", lua.create_table_from(values)?)?;
+    let parts = object.parts.iter().map(|part| Ok((part.name.as_str(), seen(lua, part)?)));
+    table.set("parts", lua.create_table_from(parts.collect::<mlua::Result<Vec<_>>>()?)?)?;
+    let names = ["name", "asset", "xyz", "size", "yaw", "hints", "joint", "joints", "parts"];
+    let names = names.map(str::to_string).to_vec();
     super::options::strict(lua, "object", table, names)
 }

@@ -1,7 +1,9 @@
 //! Lua: the only room that knows it. Sandbox, bindings, options, plans, experts, stubs.
 
+mod articulated;
 mod catalogue;
 mod catalogue_classes;
+mod catalogue_joints;
 mod catalogue_shapes;
 mod catalogue_visuals;
 mod catalogue_world;

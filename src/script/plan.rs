@@ -157,6 +157,7 @@ fn install(vm: &Vm, session: &Arc<Mutex<Session>>) -> mlua::Result<()> {
     }
     vm.api.set("asset", lua.create_function(asset)?)?;
     vm.api.set("layout", lua.create_function(layout)?)?;
+    super::articulated::install(lua, &vm.api)?;
     options::install(lua, &vm.api, session)?;
     shapes::install(lua, &vm.api)?;
     super::visuals::install(lua, &vm.api)?;

@@ -5,8 +5,9 @@ use std::sync::{Arc, Mutex};
 use mlua::{Lua, MetaMethod, Table, UserData, UserDataFields, UserDataMethods, Value};
 
 use super::{
-    catalogue,
-    sandbox::{fail, locked},
+    articulated, catalogue,
+    catalogue_joints::ARTICULATED,
+    sandbox::{fail, here, locked},
     schema::{self, Fault, Field, Presence, Range, Type, unknown},
     shapes::LuaShape,
     view_api::{LuaCamera, LuaLight, LuaLook},
@@ -99,7 +100,10 @@ impl LuaScene {
         }
         let at = position(lua, &scene, &place)?;
         let turn = Quat::from_axis_angle(&Vec3::z_axis(), place.get("yaw")?);
-        scene.objects.push(Object { name, asset, pose_w: Pose::from_parts(at.into(), turn) });
+        let joints = articulated::start(lua, &asset, place.get("joints")?)?;
+        let placed_at = here(lua).map_or(String::new(), |(file, line)| format!("{file}:{line}"));
+        let pose_w = Pose::from_parts(at.into(), turn);
+        scene.objects.push(Object { name, asset, pose_w, joints, placed_at });
         Ok(())
     }
 }
@@ -112,19 +116,29 @@ fn position(lua: &Lua, scene: &Scene, place: &Table) -> mlua::Result<Vec3> {
         (None, Some(xyz), None) => Ok(Vec3::from(xyz)),
         (Some([x, y]), None, None) => Ok(Vec3::new(x, y, 0.0)),
         (Some([x, y]), None, Some(on)) => {
-            let under = find(lua, scene, &on)?;
-            Ok(Vec3::new(x, y, top(&scene.objects[under], x, y).unwrap_or(0.0)))
+            let (object, part) = on.split_once('.').map_or((on.as_str(), None), |(o, p)| (o, Some(p)));
+            let under = &scene.objects[find(lua, scene, object)?];
+            let parts = under.asset.parts().iter().map(|part| part.name.as_str());
+            if let Some(part) = part.filter(|part| !parts.clone().any(|known| known == *part)) {
+                let message = format!("scene:add: on: object {object:?}: {}", unknown("part", part, parts));
+                return Err(fail(lua, message));
+            }
+            Ok(Vec3::new(x, y, top(under, part, x, y).unwrap_or(0.0)))
         }
         _ => Err(fail(lua, "scene:add: give either at = { x, y } (with or without on) or xyz = { x, y, z }")),
     }
 }
 
-/// Height of an object's surface over the table at (x, y), m.
-fn top(object: &Object, x: f64, y: f64) -> Option<f64> {
+/// Height of the surface of an object, or of one of its parts, over the table at (x, y), m.
+fn top(object: &Object, part: Option<&str>, x: f64, y: f64) -> Option<f64> {
     const ABOVE: f64 = 2.0;
-    let start = object.pose_w.inverse_transform_point(&nalgebra::Point3::new(x, y, ABOVE)).coords;
-    let down = object.pose_w.rotation.inverse_transform_vector(&-Vec3::z());
-    object.asset.shape.ray(&start, &down, 2.0 * ABOVE).map(|length| ABOVE - length)
+    let length = articulated::first_hit(&object.asset, &object.joints, part, |asset, pose| {
+        let pose_w = object.pose_w * pose;
+        let start = pose_w.inverse_transform_point(&nalgebra::Point3::new(x, y, ABOVE)).coords;
+        let down = pose_w.rotation.inverse_transform_vector(&-Vec3::z());
+        asset.shape.ray(&start, &down, 2.0 * ABOVE)
+    });
+    length.map(|length| ABOVE - length)
 }
 
 fn find(lua: &Lua, scene: &Scene, name: &str) -> mlua::Result<usize> {
@@ -134,6 +148,9 @@ fn find(lua: &Lua, scene: &Scene, name: &str) -> mlua::Result<usize> {
 }
 
 fn read_asset(lua: &Lua, table: &Table) -> mlua::Result<Asset> {
+    let friction: Table = table.get("friction")?;
+    let friction =
+        Friction { static_mu: friction.get("static_mu")?, dynamic_mu: friction.get("dynamic_mu")? };
     let body: Table = table.get("body")?;
     let kind: String = body.metatable().map_or(Ok(String::new()), |meta| meta.get("__name"))?;
     let body = match kind.as_str() {
@@ -145,17 +162,19 @@ fn read_asset(lua: &Lua, table: &Table) -> mlua::Result<Asset> {
             grasp_spacing: body.get("grasp_spacing")?,
         }),
         kind if kind == catalogue::RIGID.kind => Body::Rigid { density: body.get("density")? },
+        kind if kind == ARTICULATED.kind => {
+            Body::Articulated(articulated::read(lua, table, &body, friction)?)
+        }
         kind if kind == catalogue::SCENERY.kind => Body::Scenery,
         _ => Body::Static,
     };
-    let friction: Table = table.get("friction")?;
     let LuaShape(shape) = table.get("shape")?;
     Ok(Asset {
         name: table.get("name")?,
         visuals: super::visuals::read(lua, table, &shape)?,
         shape,
         body,
-        friction: Friction { static_mu: friction.get("static_mu")?, dynamic_mu: friction.get("dynamic_mu")? },
+        friction,
         hints: table.get::<Option<_>>("hints")?.unwrap_or_default(),
     })
 }
@@ -271,14 +290,18 @@ impl LuaObject {
             "density" => optional(match &asset.body {
                 Body::Soft(soft) => Some(soft.density),
                 Body::Rigid { density } => Some(*density),
-                Body::Static | Body::Scenery => None,
+                Body::Articulated(_) | Body::Static | Body::Scenery => None,
             }),
             "youngs_pa" => optional(soft.map(|soft| soft.youngs_pa)),
             "poisson" => optional(soft.map(|soft| soft.poisson)),
+            "joints" => {
+                let names = asset.parts().iter().map(|part| part.name.as_str());
+                lua.create_table_from(names.zip(object.joints.iter().copied())).map(Value::Table)
+            }
             "static_mu" => Ok(Value::Number(asset.friction.static_mu)),
             "dynamic_mu" => Ok(Value::Number(asset.friction.dynamic_mu)),
             _ => {
-                let known = OBJECT.iter().map(|field| field.name).chain(["name", "asset", "looks"]);
+                let known = OBJECT.iter().map(|field| field.name).chain(["name", "asset", "looks", "joints"]);
                 Err(fail(lua, format!("object: {}", unknown("key", key, known))))
             }
         }
@@ -307,6 +330,10 @@ impl LuaObject {
             ("youngs_pa", Body::Soft(soft)) => soft.youngs_pa = number,
             ("poisson", Body::Soft(soft)) => soft.poisson = number,
             _ => return Err(fail(lua, format!("object.{key}: object {name:?} is a body without it"))),
+        }
+        // The parts of an object have the friction of the whole.
+        if let Body::Articulated(parts) = &mut asset.body {
+            parts.iter_mut().for_each(|part| Arc::make_mut(&mut part.asset).friction = asset.friction);
         }
         Ok(())
     }

@@ -290,7 +290,10 @@ impl LuaSimulation {
         table.set("speed", sim.speed(object))?;
         table.set("asset", object.asset.name.as_str())?;
         table.set("fingerprint", object.asset.fingerprint())?;
-        if object.kind != Kind::Static {
+        table.set("joint", sim.joint(object))?;
+        let joints = sim.parts(index).map(|(handle, part)| (part.name.as_str(), sim.joint(handle)));
+        table.set("joints", lua.create_table_from(joints)?)?;
+        if object.kind.movable().is_some() {
             let touch = sim.pad_touches(object);
             table.set("pad_force", lua.create_sequence_from(touch.map(|t| t.normal_force))?)?;
             table.set("slip_mm", lua.create_sequence_from(touch.map(|t| 1e3 * t.travel))?)?;

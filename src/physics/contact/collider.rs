@@ -108,6 +108,9 @@ pub struct Collider {
     pub layer: Layer,
     /// Its bounds, in its own frame.
     pub bounds: Aabb,
+    /// The joint tree that it is part of without moving with one of its links: the fixed base of a piece of furniture. It
+    /// never touches the links of that tree.
+    pub base_of: Option<usize>,
     /// How other rigid colliders meet it, if they can.
     pub solid: Option<Arc<Solid>>,
 }
@@ -123,6 +126,13 @@ impl Collider {
     ) -> Self {
         let bounds = surface.bounds();
         let solid = surface.solid().map(Arc::new);
-        Self { name: name.to_owned(), mover, pose_in_mover, surface, friction, layer, bounds, solid }
+        Self { name: name.to_owned(), mover, pose_in_mover, surface, friction, layer, bounds, base_of: None, solid }
+    }
+
+    /// The same as the fixed base of joint tree `tree`.
+    #[must_use]
+    pub fn as_base_of(mut self, tree: usize) -> Self {
+        self.base_of = Some(tree);
+        self
     }
 }

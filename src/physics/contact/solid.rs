@@ -82,7 +82,31 @@ impl Solid {
     }
 }
 
+impl Solid {
+    /// How far the deepest point of two hard solids is under the other's surface, m; 0 if they do not overlap. Compliant
+    /// skins are not looked at.
+    pub fn depth(&self, pose: &Pose, other: &Self, other_pose: &Pose) -> f64 {
+        let (Self::Hard(mine), Self::Hard(theirs)) = (self, other) else { return 0.0 };
+        let mut found = Vec::new();
+        mine.meet(pose, theirs, other_pose, 0.0, &mut found);
+        found.iter().map(|(_, point)| -point.phi).fold(mine.seed_depth(pose, theirs, other_pose), f64::max)
+    }
+}
+
 impl Hard {
+    /// Depth of the deepest place of either skin in the other's field, m. Pieces need none: their manifold is exact.
+    fn seed_depth(&self, pose: &Pose, other: &Self, other_pose: &Pose) -> f64 {
+        if self.pieces.is_some() && other.pieces.is_some() {
+            return 0.0;
+        }
+        let deepest = |skin: &Self, from: &Pose, into: &Self, frame: &Pose| {
+            let to = frame.inv_mul(from);
+            let depth = |p: &Vec3| -into.shape.distance(&(to * nalgebra::Point3::from(*p)).coords);
+            skin.samples().seeds.iter().map(depth).fold(0.0, f64::max)
+        };
+        deepest(self, pose, other, other_pose).max(deepest(other, other_pose, self, pose))
+    }
+
     fn field(&self) -> (&Shape, &Aabb) {
         (&self.shape, self.bounds.get_or_init(|| self.shape.bounds()))
     }

@@ -16,13 +16,15 @@ use crate::{
 pub(super) const REACH: f64 = 2.5e-3;
 /// Stiffness and damping of joint stops, relative to the joint's inertia over a step.
 const STOP_RATE: f64 = 0.5;
+/// The same of the stops and the dry friction of joints without a drive, which nothing but these holds.
+const FIRM_RATE: f64 = 50.0;
 
 /// Which block belongs to what.
 #[derive(Debug, Default)]
 pub(super) struct Layout {
     pub soft: Vec<Option<usize>>,
     pub rigid: Vec<Option<usize>>,
-    pub trees: Vec<usize>,
+    pub trees: Vec<Option<usize>>,
     pub momentum: Vec<Vec3>,
     pub free_w: Vec<crate::physics::rigid::FreeSpin>,
     screws: Vec<(Mover, usize)>,
@@ -181,6 +183,10 @@ impl World {
         self.layout.trees.clear();
         let dt = self.params.dt;
         for tree in &mut self.trees {
+            if tree.asleep {
+                self.layout.trees.push(None);
+                continue;
+            }
             let n = tree.tree.dofs();
             let mut mass = nalgebra::DMatrix::zeros(n, n);
             joints::mass_matrix_into(&tree.tree, &tree.poses, &mut tree.scratch, &mut mass);
@@ -190,9 +196,10 @@ impl World {
             let block = self.problem.blocks.len();
             for (i, link) in tree.tree.links.iter().enumerate() {
                 mass[(i, i)] += dt * link.damping;
+                tree.bristles[i].stiffness = FIRM_RATE * mass[(i, i)] / (dt * dt);
                 self.problem.scalars.extend(joint_rows(tree, i, block, mass[(i, i)], dt));
             }
-            self.layout.trees.push(block);
+            self.layout.trees.push(Some(block));
             self.problem.blocks.push(Block {
                 dim: n,
                 matrix: mass.as_slice().to_vec(),
@@ -251,9 +258,10 @@ impl World {
                 (block, identity, self.rigid[index].body.pose_w.translation.vector)
             }
             Mover::Link { tree, link } => {
+                let Some(block) = self.layout.trees[tree] else { return Endpoint::Known };
                 let t = &self.trees[tree];
                 let jacobian = joints::jacobian(&t.tree, &t.poses, link).as_slice().to_vec();
-                (self.layout.trees[tree], jacobian, t.poses[link].translation.vector)
+                (block, jacobian, t.poses[link].translation.vector)
             }
         };
         self.layout.screws.push((mover, self.problem.screws.len()));
@@ -323,14 +331,20 @@ fn joint_rows(
     let drive =
         tree.drives[joint].map(|d| row(d.kp, d.kd, d.target - q, d.target_velocity, (-d.effort, d.effort)));
     // A stop answers within about two steps whatever the inertia: k dt² and c dt are of the order of it.
-    let (k, c) = (STOP_RATE * inertia / (dt * dt), STOP_RATE * inertia / dt);
-    let near = |distance: f64| distance < 2.0 * v.abs() * dt + 0.02 * (link.upper - link.lower).min(1.0);
+    let rate = if drive.is_some() { STOP_RATE } else { FIRM_RATE };
+    let (k, c) = (rate * inertia / (dt * dt), STOP_RATE * inertia / dt);
+    // What has no drive may be struck within the step.
+    let near = |distance: f64| {
+        drive.is_none() || distance < 2.0 * v.abs() * dt + 0.02 * (link.upper - link.lower).min(1.0)
+    };
     let low = near(q - link.lower).then(|| row(k, 0.0, link.lower - q, 0.0, (0.0, f64::INFINITY)));
     let high = near(link.upper - q).then(|| row(k, 0.0, link.upper - q, 0.0, (f64::NEG_INFINITY, 0.0)));
     let fast = v.abs() > 0.5 * link.velocity_limit && link.velocity_limit.is_finite();
     let limit = link.velocity_limit;
     let brake_up = fast.then(|| row(0.0, 10.0 * c, 0.0, limit, (f64::NEG_INFINITY, 0.0)));
     let brake_down = fast.then(|| row(0.0, 10.0 * c, 0.0, -limit, (0.0, f64::INFINITY)));
-    let dry = (link.friction > 0.0).then(|| row(0.0, 100.0 * c, 0.0, 0.0, (-link.friction, link.friction)));
+    let bristle = &tree.bristles[joint];
+    let dry = (link.friction > 0.0)
+        .then(|| row(bristle.stiffness, 0.0, bristle.from - q, 0.0, (-link.friction, link.friction)));
     [drive, low, high, brake_up, brake_down, dry].into_iter().flatten()
 }

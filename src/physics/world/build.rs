@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Articulation, Drive, Kinematic, Rigid, Soft, World};
+use super::{Articulation, Bristle, Drive, Kinematic, Rigid, Soft, World};
 use crate::{
     geometry::{Pose, Vec3},
     physics::{
@@ -78,6 +78,9 @@ impl World {
             tree,
             drives,
             gravity,
+            asleep: false,
+            slow_for: 0.0,
+            bristles: q.iter().map(|&from| Bristle { from, stiffness: 0.0 }).collect(),
             poses,
             scratch: joints::Scratch::default(),
         });

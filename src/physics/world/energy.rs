@@ -1,6 +1,7 @@
 //! Energies and momenta of everything in the world.
 
 use super::World;
+use crate::physics::joints::{kinetic_energy, potential_energy};
 
 /// Energies of a world, J.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,7 +22,7 @@ impl Energy {
 }
 
 impl World {
-    /// Energies of soft and rigid bodies now.
+    /// Energies now of soft and rigid bodies and of the joint trees on which gravity acts.
     pub fn energy(&self) -> Energy {
         let mut energy = Energy { kinetic: 0.0, elastic: 0.0, potential: 0.0 };
         for soft in &self.soft {
@@ -32,6 +33,10 @@ impl World {
         for rigid in &self.rigid {
             energy.kinetic += rigid.body.kinetic_energy();
             energy.potential += rigid.body.potential_energy(&self.gravity);
+        }
+        for tree in self.trees.iter().filter(|tree| tree.gravity) {
+            energy.kinetic += kinetic_energy(&tree.tree, &tree.poses, tree.state.v.as_slice());
+            energy.potential += potential_energy(&tree.tree, &tree.poses, &self.gravity);
         }
         energy
     }

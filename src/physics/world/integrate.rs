@@ -27,17 +27,23 @@ impl World {
             rigid::advance(&mut rigid.body, linear, angular, &self.layout.free_w[i], dt);
         }
         for (tree, block) in self.trees.iter_mut().zip(&self.layout.trees) {
+            let Some(block) = block else { continue };
             tree.state.v.copy_from_slice(&self.problem.blocks[*block].v);
             tree.state.q.axpy(dt, &tree.state.v, 1.0);
             joints::forward_into(&tree.tree, tree.state.q.as_slice(), &mut tree.poses);
         }
-        self.record_drives();
+        self.record_joints();
         self.kinematic.iter_mut().for_each(|k| k.pose = k.next);
     }
 
-    /// Drive forces: the first row of a driven joint is its drive.
-    fn record_drives(&mut self) {
+    /// Where dry friction holds the joints now, and drive forces: the first row of a driven joint is its drive.
+    fn record_joints(&mut self) {
         for (tree, block) in self.trees.iter_mut().zip(&self.layout.trees) {
+            let Some(block) = block else { continue };
+            for ((bristle, link), q) in tree.bristles.iter_mut().zip(&tree.tree.links).zip(tree.state.q.iter()) {
+                let bend = link.friction / bristle.stiffness;
+                bristle.from = bristle.from.clamp(q - bend, q + bend);
+            }
             for (joint, drive) in tree.drives.iter_mut().enumerate() {
                 let row = self.problem.scalars.iter().find(|r| r.block == *block && r.index == joint);
                 if let (Some(drive), Some(row)) = (drive, row) {

@@ -5,6 +5,7 @@ mod build;
 mod energy;
 mod frame;
 mod integrate;
+mod overlap;
 mod points;
 mod rigid_rows;
 mod sleep;
@@ -26,6 +27,7 @@ use crate::{
 };
 
 pub use frame::{ContactPatch, Frame, Movable, PatchPoint, Presser, Touch};
+pub use overlap::Overlap;
 
 /// A soft body in the world.
 #[derive(Debug)]
@@ -85,6 +87,15 @@ pub struct Drive {
     pub force: f64,
 }
 
+/// Dry friction of a joint as a stiff spring that gives way at the friction: a joint that sticks does not creep.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Bristle {
+    /// Where the spring is free, rad or m.
+    from: f64,
+    /// Its stiffness in the last step, N m/rad or N/m.
+    stiffness: f64,
+}
+
 /// A joint tree in the world.
 #[derive(Debug)]
 pub struct Articulation {
@@ -98,6 +109,12 @@ pub struct Articulation {
     pub drives: Vec<Option<Drive>>,
     /// Whether gravity acts on its links (off for an arm whose controller compensates it).
     pub gravity: bool,
+    /// Whether it sleeps: its links stand still, as if they were part of the world, until something stirs near them. One
+    /// with a drive never does.
+    pub asleep: bool,
+    slow_for: f64,
+    /// Dry friction of each joint.
+    bristles: Vec<Bristle>,
     poses: Vec<Pose>,
     scratch: joints::Scratch,
 }
@@ -106,6 +123,11 @@ impl Articulation {
     /// Link frames in the world.
     pub fn poses(&self) -> &[Pose] {
         &self.poses
+    }
+
+    /// Whether any joint has a drive.
+    pub fn is_driven(&self) -> bool {
+        self.drives.iter().any(Option::is_some)
     }
 }
 

@@ -43,9 +43,9 @@ pub(super) struct Grip {
 
 /// Two colliders close enough to touch within the step: the normals point from `b` to `a`.
 #[derive(Clone, Copy, Debug)]
-struct Pair {
-    a: usize,
-    b: usize,
+pub(super) struct Pair {
+    pub a: usize,
+    pub b: usize,
     margin: f64,
 }
 
@@ -92,7 +92,7 @@ impl World {
     }
 
     /// Pairs of colliders on different movers, of which at least one is free to move, that may touch within the step.
-    fn near_pairs(&self, pairs: &mut Vec<Pair>) {
+    pub(super) fn near_pairs(&self, pairs: &mut Vec<Pair>) {
         pairs.clear();
         let ids: Vec<usize> =
             (0..self.colliders.len()).filter(|&i| self.colliders[i].solid.is_some()).collect();
@@ -122,10 +122,10 @@ impl World {
         let lever = farthest(&bounds, &moving.origin);
         let speed = moving.linear.norm() + moving.angular.norm() * lever;
         let rigid = self.rigid.len() as u32;
-        let group = match collider.mover {
-            Mover::Static | Mover::Kinematic(_) => 0,
-            Mover::Rigid(index) => 1 + index as u32,
-            Mover::Link { tree, .. } => 1 + rigid + tree as u32,
+        let group = match (collider.mover, collider.base_of) {
+            (Mover::Link { tree, .. }, _) | (_, Some(tree)) => 1 + rigid + tree as u32,
+            (Mover::Static | Mover::Kinematic(_), None) => 0,
+            (Mover::Rigid(index), None) => 1 + index as u32,
         };
         Candidate { bounds: bounds.grown(self.params.margin.max(AHEAD * self.params.dt * speed)), group }
     }
@@ -135,7 +135,7 @@ impl World {
         match self.colliders[id].mover {
             Mover::Static | Mover::Kinematic(_) => true,
             Mover::Rigid(index) => self.rigid[index].asleep,
-            Mover::Link { .. } => false,
+            Mover::Link { tree, .. } => self.trees[tree].asleep,
         }
     }
 
@@ -181,9 +181,12 @@ impl World {
         self.rigid_contacts = contacts;
     }
 
-    /// What touched the colliders of a rigid body in the last step: the other colliders' ids.
-    pub(super) fn touching(&self, body: usize) -> impl Iterator<Item = usize> + '_ {
-        let of_body = move |id: usize| self.colliders[id].mover == Mover::Rigid(body);
+    /// What touched the colliders of a body in the last step: the other colliders' ids.
+    pub(super) fn touching<'a>(
+        &'a self,
+        is_own: impl Fn(Mover) -> bool + 'a,
+    ) -> impl Iterator<Item = usize> + 'a {
+        let of_body = move |id: usize| is_own(self.colliders[id].mover);
         self.rigid_contacts.grips.iter().filter_map(move |grip| match grip.key {
             (a, b, ..) if of_body(a) => Some(b),
             (a, b, ..) if of_body(b) => Some(a),

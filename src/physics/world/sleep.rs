@@ -14,7 +14,8 @@ const NEAR: f64 = 3e-3;
 impl World {
     /// Wakes bodies near others that move.
     pub(super) fn wake(&mut self) {
-        if !self.soft.iter().any(|s| s.asleep) && !self.rigid.iter().any(|r| r.asleep) {
+        let (soft, rigid) = (self.soft.iter().any(|s| s.asleep), self.rigid.iter().any(|r| r.asleep));
+        if !soft && !rigid && !self.trees.iter().any(|t| t.asleep) {
             return;
         }
         let stirring = self.stirring();
@@ -30,12 +31,7 @@ impl World {
             if !self.rigid[index].asleep {
                 continue;
             }
-            let mover = Mover::Rigid(index);
-            let mut own = self.colliders.iter().zip(&self.moving).filter(|(c, _)| c.mover == mover);
-            let near = own.any(|(collider, moving)| {
-                let around = collider.bounds.moved(&moving.pose).grown(NEAR);
-                stirring.iter().any(|(by, bounds)| *by != Some(mover) && overlap(&around, bounds))
-            });
+            let near = self.is_near(&stirring, |mover| mover == Mover::Rigid(index));
             let body = &self.rigid[index].body;
             // Somebody may have given it a push.
             if near || body.v != Vec3::zeros() || body.w != Vec3::zeros() {
@@ -43,6 +39,25 @@ impl World {
                 (rigid.asleep, rigid.slow_for) = (false, 0.0);
             }
         }
+        for index in 0..self.trees.len() {
+            if !self.trees[index].asleep {
+                continue;
+            }
+            let near = self.is_near(&stirring, is_link_of(index));
+            let tree = &mut self.trees[index];
+            if near || tree.is_driven() || tree.state.v.iter().any(|&v| v != 0.0) {
+                (tree.asleep, tree.slow_for) = (false, 0.0);
+            }
+        }
+    }
+
+    /// Whether any collider on movers that are `own` is near something else that stirs.
+    fn is_near(&self, stirring: &[(Option<Mover>, Aabb)], own: impl Fn(Mover) -> bool) -> bool {
+        let mut mine = self.colliders.iter().zip(&self.moving).filter(|(c, _)| own(c.mover));
+        mine.any(|(collider, moving)| {
+            let around = collider.bounds.moved(&moving.pose).grown(NEAR);
+            stirring.iter().any(|(by, bounds)| !by.is_some_and(&own) && overlap(&around, bounds))
+        })
     }
 
     /// Everything that moves: its mover, if it is a collider, and its bounds.
@@ -62,8 +77,9 @@ impl World {
         let moving = &self.moving[id];
         let least = match self.colliders[id].mover {
             Mover::Static => f64::INFINITY,
-            Mover::Kinematic(_) | Mover::Link { .. } => STIRRING,
-            Mover::Rigid(_) => self.params.sleep_speed,
+            Mover::Kinematic(_) => STIRRING,
+            Mover::Link { tree, .. } if self.trees[tree].is_driven() => STIRRING,
+            Mover::Rigid(_) | Mover::Link { .. } => self.params.sleep_speed,
         };
         moving.linear.norm() + moving.angular.norm() > least
     }
@@ -71,7 +87,11 @@ impl World {
     /// Whether a body that touches a collider must stay awake. What a driven link holds does so even if it is still: the
     /// link needs its force at every step, and so does the sensor on it.
     fn keeps_awake(&self, id: usize) -> bool {
-        matches!(self.colliders[id].mover, Mover::Link { .. }) || self.stirs(id)
+        let driven = match self.colliders[id].mover {
+            Mover::Link { tree, .. } => self.trees[tree].is_driven(),
+            _ => false,
+        };
+        driven || self.stirs(id)
     }
 
     /// Whether a soft body moves fast enough to wake others.
@@ -103,13 +123,26 @@ impl World {
             if self.rigid[index].asleep {
                 continue;
             }
-            let (touches, stirred) = self.company_of_rigid(index);
+            let (touches, stirred) = self.company_of(|mover| mover == Mover::Rigid(index));
             let rigid = &mut self.rigid[index];
             let moved = stirred || rigid.body.v.norm() + rigid.body.w.norm() > self.params.sleep_speed;
             rigid.slow_for = if moved { 0.0 } else { rigid.slow_for + dt };
             if rigid.slow_for >= after && touches {
                 rigid.asleep = true;
                 (rigid.body.v, rigid.body.w) = (Vec3::zeros(), Vec3::zeros());
+            }
+        }
+        for index in 0..self.trees.len() {
+            if self.trees[index].asleep || self.trees[index].is_driven() {
+                continue;
+            }
+            let stirred = self.company_of(is_link_of(index)).1;
+            let tree = &mut self.trees[index];
+            let moved = stirred || tree.state.v.amax() > self.params.sleep_speed;
+            tree.slow_for = if moved { 0.0 } else { tree.slow_for + dt };
+            if tree.slow_for >= after {
+                tree.asleep = true;
+                tree.state.v.fill(0.0);
             }
         }
     }
@@ -132,20 +165,25 @@ impl World {
         company
     }
 
-    /// The same for a rigid body.
-    fn company_of_rigid(&self, index: usize) -> (bool, bool) {
+    /// The same for a rigid body or a joint tree, by its movers.
+    fn company_of(&self, own: impl Fn(Mover) -> bool) -> (bool, bool) {
         let mut company = (false, false);
-        for id in self.touching(index) {
+        for id in self.touching(&own) {
             company = (true, company.1 || self.keeps_awake(id));
         }
         for row in &self.rows {
             let Partner::Collider(id) = Partner::of(row.partner) else { continue };
-            if self.colliders[id].mover == Mover::Rigid(index) {
+            if own(self.colliders[id].mover) {
                 company = (true, company.1 || self.is_lively(row.soft));
             }
         }
         company
     }
+}
+
+/// Whether a mover is a link of a tree.
+fn is_link_of(index: usize) -> impl Fn(Mover) -> bool {
+    move |mover| matches!(mover, Mover::Link { tree, .. } if tree == index)
 }
 
 fn overlap(a: &Aabb, b: &Aabb) -> bool {

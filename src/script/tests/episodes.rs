@@ -37,6 +37,8 @@ fn view() -> ExpertView {
             yaw: 0.0,
             size: Vec3::repeat(0.06),
             hints: Default::default(),
+            joint: None,
+            parts: Vec::new(),
         }],
     }
 }

@@ -1,0 +1,121 @@
+//! Articulated objects in the world: a fixed base and a joint tree, one handle for the whole and one for each part.
+
+use std::sync::Arc;
+
+use super::{
+    build::{BuildError, RestCache},
+    simulation::{Handle, Kind, PartOf},
+};
+use crate::{
+    geometry::{Pose, Vec3, mass::mass_properties, shape::Shape},
+    message::number,
+    physics::{
+        World,
+        contact::{Collider, Friction, Mover, manifold::skin_samples},
+        joints::{JointKind, Link, Tree},
+    },
+    scene::{Motion, Object, Part},
+};
+
+/// Walls of moving parts are at least this thick, m: a thinner one could be crossed between two steps.
+const LEAST_WALL: f64 = 4e-3;
+/// Step of the search for the far side of a wall, m; what is this much thinner still passes.
+const WALL_STEP: f64 = 2e-4;
+/// Share of a part's surface that may have a thin wall under it: rims and edges do.
+const THIN_SHARE: f64 = 0.1;
+
+/// Puts the parts of an articulated object into `world`; their handles come after that of the whole, which is `base`.
+pub(super) fn add(
+    world: &mut World,
+    object: &Object,
+    parts: &[Part],
+    base: usize,
+    cache: &RestCache,
+) -> Result<(usize, Vec<Handle>), BuildError> {
+    for part in parts {
+        check_walls(object, part, cache)?;
+    }
+    let links = parts.iter().map(|part| link(part, parts)).collect();
+    let tree = Tree { links, base_w: object.pose_w };
+    tree.validate().map_err(|source| BuildError::Joints { object: object.name.clone(), source })?;
+    let drives = vec![None; parts.len()];
+    let tree = world.add_tree(&object.name, tree, &object.joints, drives, true);
+    let handles = parts.iter().enumerate().map(|(link, part)| {
+        let name = format!("{}.{}", object.name, part.name);
+        let mover = Mover::Link { tree, link };
+        let placed = (mover, Pose::from(-part.joint.origin_o));
+        let friction = part.asset.friction;
+        let friction = Friction { static_mu: friction.static_mu, dynamic_mu: friction.dynamic_mu };
+        let surface = Arc::new(part.asset.shape.clone());
+        let collider = Collider::new(&name, placed, surface, friction, world.rigid_layer());
+        Handle {
+            name,
+            asset: part.asset.clone(),
+            kind: Kind::Link { tree, link },
+            start_w: world.trees[tree].poses()[link] * placed.1,
+            colliders: vec![world.add_collider(collider)],
+            bounds: cache.bounds(&part.asset.shape),
+            part: Some(PartOf { object: base, name: part.name.clone(), joint: part.joint.clone() }),
+        }
+    });
+    Ok((tree, handles.collect()))
+}
+
+/// A part as a link whose frame is the object's, moved to the origin of its joint.
+fn link(part: &Part, parts: &[Part]) -> Link {
+    let m = mass_properties(&part.asset.shape, part.density);
+    let joint = &part.joint;
+    let axis = nalgebra::Unit::new_normalize(joint.axis_o);
+    let carrier = part.parent.map_or(Vec3::zeros(), |parent| parts[parent].joint.origin_o);
+    Link {
+        name: part.name.clone(),
+        parent: part.parent,
+        placement: Pose::from(joint.origin_o - carrier),
+        kind: match joint.motion {
+            Motion::Slide => JointKind::Prismatic(axis),
+            Motion::Turn => JointKind::Revolute(axis),
+        },
+        mass: m.mass,
+        com: m.com - joint.origin_o,
+        inertia: (m.inertia + m.inertia.transpose()) * 0.5,
+        lower: joint.lower,
+        upper: joint.upper,
+        velocity_limit: f64::INFINITY,
+        effort_limit: f64::INFINITY,
+        friction: joint.friction,
+        damping: joint.damping,
+    }
+}
+
+fn check_walls(object: &Object, part: &Part, cache: &RestCache) -> Result<(), BuildError> {
+    match cache.wall(&part.asset.shape) {
+        None => Ok(()),
+        Some(wall) => Err(BuildError::Material {
+            asset: object.asset.name.clone(),
+            what: format!(
+                "part {}: its walls are about {} mm thick, expected at least {} mm: what meets a thinner one may pass \
+                 through it",
+                part.name,
+                number((1e4 * wall).round() / 10.0),
+                number(1e3 * LEAST_WALL)
+            ),
+        }),
+    }
+}
+
+/// Typical thickness of the walls of a shape that are too thin, m; `None` if too little of its surface has such.
+pub(super) fn thin_wall(shape: &Shape) -> Option<f64> {
+    let seeds = skin_samples(shape).seeds;
+    let steps = (LEAST_WALL / WALL_STEP).round() as usize;
+    let under = |p: &Vec3| {
+        let normal = shape.distance_and_normal(p).1;
+        let depths = (1..steps).map(|step| WALL_STEP * step as f64);
+        depths.into_iter().find(|depth| shape.distance(&(p - normal * *depth)) > 0.0)
+    };
+    let mut thin: Vec<f64> = seeds.iter().filter_map(under).collect();
+    if thin.len() as f64 <= THIN_SHARE * seeds.len() as f64 {
+        return None;
+    }
+    thin.sort_by(f64::total_cmp);
+    Some(thin[thin.len() / 2])
+}
