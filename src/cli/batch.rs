@@ -26,7 +26,7 @@ use crate::{
         run_folder::{RUN, RunFolder, RunFolderError, SUMMARY, replace},
     },
     rollout::{
-        ControlError, Controller, Episode, EpisodeError, EpisodeSpec, Finished, Looks, RestCache, ScoreFrame,
+        BuildError, ControlError, Controller, Episode, EpisodeError, EpisodeSpec, Finished, Looks, RestCache, ScoreFrame,
         SettleError, batch, stop,
     },
     scene::{Asset, Body, Scene},
@@ -319,7 +319,12 @@ impl<'a> Batch<'a> {
             | EpisodeError::Settle { source: SettleError::Interrupted, .. } => code::INTERRUPTED,
             _ => code::INPUT,
         };
-        Failure { code, message: format!("{}: {error}", self.run.file.display()) }
+        let message = match error {
+            // It says which file and line itself.
+            EpisodeError::Build(BuildError::At { .. }) => error.to_string(),
+            _ => format!("{}: {error}", self.run.file.display()),
+        };
+        Failure { code, message }
     }
 
     /// SoftVTBench's log of every control step, which its own scorer reads.

@@ -142,6 +142,7 @@ impl RestCache {
 pub fn soft_rest(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<Arc<Rest>, BuildError> {
     check(name, material)?;
     check_size(name, shape, material)?;
+    check_thickness(name, shape, material)?;
     let spec = VoxelSpec { resolution: material.resolution };
     let mesh =
         voxel_mesh(shape, &spec).map_err(|source| BuildError::Geometry { asset: name.to_owned(), source })?;
@@ -184,6 +185,32 @@ fn check_size(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<(), 
         number(size.y),
         number(size.z),
         1e3 * material.grasp_spacing
+    );
+    Err(BuildError::Material { asset: name.to_owned(), what })
+}
+
+/// A body thinner than a voxel has no element of its own across it, and what is far thinner none at all.
+fn check_thickness(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<(), BuildError> {
+    let size = shape.bounds().size();
+    let (thin, long) = (size.min(), size.max());
+    let edge = long / material.resolution.max(1) as f64;
+    // The slack is for a size that is a whole number of voxels.
+    if !(thin > 0.0 && thin < edge * (1.0 - 1e-6)) {
+        return Ok(());
+    }
+    let mm = |metres: f64| number((1e5 * metres).round() / 100.0);
+    let needed = (long / thin * (1.0 - 1e-6)).ceil();
+    let cure = if needed <= SoftMaterial::FINEST as f64 {
+        format!("resolution = {needed} would serve")
+    } else {
+        let least = mm(long / SoftMaterial::FINEST as f64);
+        format!("no resolution up to {} would serve; make it at least {least} mm thick", SoftMaterial::FINEST)
+    };
+    let what = format!(
+        "it is {} mm thick, thinner than a voxel: at resolution {} they are {} mm; {cure}",
+        mm(thin),
+        material.resolution,
+        mm(edge)
     );
     Err(BuildError::Material { asset: name.to_owned(), what })
 }

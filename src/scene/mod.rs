@@ -46,10 +46,15 @@ pub struct SoftMaterial {
     pub poisson: f64,
     /// Density, kg/m³.
     pub density: f64,
-    /// Voxels along the longest edge of the bounding box.
+    /// Voxels along the longest edge of the bounding box, at most [`Self::FINEST`].
     pub resolution: usize,
     /// Spacing of the contact samples on surfaces that a gripper can reach, m.
     pub grasp_spacing: f64,
+}
+
+impl SoftMaterial {
+    /// Largest resolution.
+    pub const FINEST: usize = 64;
 }
 
 /// Coulomb friction coefficients of a surface; a pair of surfaces takes the larger of each.

@@ -8,6 +8,8 @@ use super::{
     schema::{Field, Presence, Range, Record, Type},
 };
 
+use crate::scene::SoftMaterial;
+
 use Presence::{Empty, Optional, Required};
 
 const fn field(name: &'static str, ty: Type, presence: Presence, doc: &'static str) -> Field {
@@ -53,7 +55,7 @@ pub static SOFT: Record = Record {
         field("density", Type::Number("kg/m³", Range::POSITIVE), Required, "Density."),
         field(
             "resolution",
-            Type::Integer(Range::closed(1.0, 64.0)),
+            Type::Integer(Range::closed(1.0, SoftMaterial::FINEST as f64)),
             Presence::Integer(6),
             "Voxels along the longest edge of the bounding box.",
         ),

@@ -12,22 +12,64 @@ fn expert(expert: &'static str) -> String {
 fn an_empty_shape_is_named_with_its_asset() {
     let shape = "softvt.shape.sphere { radius = 0.02 }:subtract(softvt.shape.sphere { radius = 0.03 })";
     let project = Small { shape, ..Small::default() }.project();
-    assert_snapshot!(project.refusal("x.lua --out run"), @"x.lua: asset cube: the shape is empty: nothing of it is left; check what is subtracted or intersected");
+    assert_snapshot!(project.refusal("x.lua --out run"), @"x.lua:6: asset cube: the shape is empty: nothing of it is left; check what is subtracted or intersected");
 }
 
 #[test]
 fn a_shape_too_thin_for_its_voxels_says_so() {
-    // The thin sheet hangs between two points of the grid that looks for it.
-    let shape = "softvt.shape.box { size = { 0.04, 0.04, 0.0001 } }:grounded()";
-    let message = Small { shape, ..Small::default() }.project().refusal("x.lua --out run");
-    assert!(message.contains("thinner than that (raise the resolution)"), "{message}");
+    let refusal = |shape| Small { shape, ..Small::default() }.project().refusal("x.lua --out run");
+    assert_snapshot!(refusal("softvt.shape.box { size = { 0.04, 0.04, 0.0001 } }:grounded()"), @"x.lua:6: asset cube: it is 0.1 mm thick, thinner than a voxel: at resolution 6 they are 6.67 mm; no resolution up to 64 would serve; make it at least 0.63 mm thick");
+    assert_snapshot!(refusal("softvt.shape.box { size = { 0.04, 0.04, 0.003 } }:grounded()"), @"x.lua:6: asset cube: it is 3 mm thick, thinner than a voxel: at resolution 6 they are 6.67 mm; resolution = 14 would serve");
+    let project = Small {
+        shape: "softvt.mesh { file = 'm.obj' }:grounded()",
+        material: "youngs_pa = 2e4, poisson = 0.3, density = 300, resolution = 5",
+        ..Small::default()
+    }
+    .project();
+    project.write("m.obj", b"v 0 0 0\nv .05 0 0\nv 0 .05 0\nv 0 0 .004\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
+    assert_snapshot!(project.refusal("x.lua --out run"), @"x.lua:6: asset cube: it is 4 mm thick, thinner than a voxel: at resolution 5 they are 10 mm; resolution = 13 would serve");
+}
+
+/// A small world of a floor and whatever `add` puts on it, from line 4 on.
+fn placed(body: &str, add: &str) -> String {
+    let text = format!(
+        "local floor = softvt.asset {{ name = 'floor', shape = softvt.shape.box {{ size = {{ 1, 1, 0.05 }} }}:translate(0, 0, -0.025), body = softvt.static {{}} }}\n\
+         local block = softvt.asset {{ name = 'block', shape = softvt.shape.box {{ size = {{ 0.04, 0.04, 0.04 }} }}:grounded(), body = {body} }}\n\
+         local layout = softvt.layout('one', function(scene)\n{add}\nend)\n\
+         return softvt.suite {{ name = 'one', object_type = 'rigid', variation = 'spatial', episodes = 1, tasks = {{\n\
+         softvt.task {{ prompt = 'wait', layout = layout, budget_steps = 1, goal = softvt.on {{ object = 'a', target = 'floor' }}, expert = function(arm) arm:wait(0.1) end }} }} }}"
+    );
+    crate::support::Project::new(&[("x.lua", &text)]).refusal("x.lua --out run")
+}
+
+#[test]
+fn objects_that_overlap_at_the_start_are_named_with_depth_and_place() {
+    let (rigid, soft) = ("softvt.rigid { density = 500 }", "softvt.soft { youngs_pa = 2e4, poisson = 0.3, density = 300 }");
+    let floor = "scene:add { name = 'floor', asset = floor, xyz = { 0, 0, 0 } }\n";
+    let add = |a: &str, b: &str| {
+        format!("{floor}scene:add {{ name = 'a', asset = block, {a} }}\nscene:add {{ name = 'b', asset = block, {b} }}")
+    };
+    let beside = add("at = { 0, 0.1 }", "at = { 0.03, 0.1 }");
+    assert_snapshot!(placed(rigid, &beside), @"x.lua:6: objects b and a (placed at x.lua:5) overlap by 10 mm at the start; move them apart");
+    assert_snapshot!(placed(soft, &beside), @"x.lua:6: objects b and a (placed at x.lua:5) overlap by 10 mm at the start; move them apart");
+    for body in [rigid, soft] {
+        let sunk = add("xyz = { 0, 0.1, -0.012 }", "at = { 0.2, 0.1 }");
+        assert_eq!(
+            placed(body, &sunk),
+            "x.lua:5: objects a and floor (placed at x.lua:4) overlap by 12 mm at the start; move them apart"
+        );
+    }
+    let ball = "scene:add { name = 'c', at = { 0.02, 0.1 }, asset = softvt.asset { name = 'ball', body = softvt.soft { youngs_pa = 2e4, poisson = 0.3, density = 300 },\n\
+                shape = softvt.shape.sphere { radius = 0.02 }:grounded() } }";
+    let mixed = placed(rigid, &format!("{}\n{ball}", add("at = { 0, 0.1 }", "at = { 0.2, 0.1 }")));
+    assert!(mixed.starts_with("x.lua:7: objects c and a (placed at x.lua:5) overlap by "), "{mixed}");
 }
 
 #[test]
 fn a_size_in_millimetres_is_taken_for_what_it_is() {
     let shape = "softvt.shape.box { size = { 40, 40, 40 } }:grounded()";
     let message = Small { shape, ..Small::default() }.project().refusal("x.lua --out run");
-    assert!(message.starts_with("x.lua: asset cube: it is 40 × 40 × 40 m, about"), "{message}");
+    assert!(message.starts_with("x.lua:6: asset cube: it is 40 × 40 × 40 m, about"), "{message}");
     assert!(message.contains("sizes are in metres"), "{message}");
 }
 

@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod episodes;
+mod joints;
 mod options;
 mod visuals;
 

@@ -1,0 +1,176 @@
+use super::*;
+use crate::{
+    benchmark::seed::Split,
+    geometry::{Pose, Vec3},
+    physics::joints,
+    rollout::{RestCache, Simulation},
+    scene::{Motion, Scene},
+    script::{Episode, EpisodeRequest},
+};
+
+/// A chest of one drawer; what carries it and what more it has are put in.
+fn chest(joint: &str, more: &str) -> String {
+    format!(
+        "local box = softvt.shape.box {{ size = {{ 0.1, 0.1, 0.03 }} }}\n\
+         local chest = softvt.asset {{ name = 'chest', shape = box:grounded(), body = softvt.articulated {{ parts = {{\n\
+         {{ name = 'drawer', shape = box:translate(0, 0, 0.05), density = 500,\n\
+         joint = {joint} }},\n{more}\n}} }} }}\n"
+    )
+}
+
+const SLIDER: &str = "softvt.slider { axis = { 0, -2, 0 }, lower = 0, upper = 0.1, friction = 1 }";
+
+/// A suite of a chest placed with `place`.
+fn suite(chest: &str, place: &str) -> String {
+    format!(
+        "{chest}local ball = softvt.asset {{ name = 'ball', shape = softvt.shape.sphere {{ radius = 0.02 }}:grounded(), body = softvt.rigid {{ density = 300 }} }}\n\
+         local layout = softvt.layout('one', function(scene)\n\
+         {place}\nend)\n\
+         return softvt.suite {{ name = 'test', object_type = 'rigid', variation = 'spatial', tasks = {{ softvt.task {{\n\
+         prompt = 'p', layout = layout, goal = softvt.on {{ object = 'ball', target = 'chest.drawer' }} }} }} }}"
+    )
+}
+
+fn open(text: &str) -> Result<Scene, String> {
+    let project = Project::new(&[("x.lua", text)]);
+    let loaded = project.load("x.lua", &[]).map_err(|e| e.message)?;
+    let request = EpisodeRequest {
+        suite: "test".into(),
+        task: 0,
+        episode: 0,
+        base_seed: 1,
+        split: Split::Validation,
+        shifts: Vec::new(),
+    };
+    let folder = format!("{}/", project.path("").display()).replace("//", "/");
+    Episode::open(&loaded, &request).map(|e| e.scene).map_err(|e| e.to_string().replace(&folder, ""))
+}
+
+#[test]
+fn a_joint_without_limits_or_with_wrong_ones_is_refused_at_its_line() {
+    let joint = |text: &str| error_of(&chest(text, ""));
+    let missing = "missing; every joint needs limits: give lower and upper";
+    assert_eq!(joint("softvt.slider { axis = { 0, -1, 0 } }"), format!("suites/x.lua:4: slider.lower: {missing}"));
+    assert_eq!(
+        joint("softvt.hinge { axis = { 0, 0, 1 }, origin = { 0, 0, 0 },\nlower = -1 }"),
+        format!("suites/x.lua:4: hinge.upper: {missing}")
+    );
+    assert_eq!(
+        joint("softvt.slider { axis = { 0, -1, 0 }, lower = 0,\nupper = -0.1 }"),
+        "suites/x.lua:5: slider.upper: expected more than lower, 0, got -0.1"
+    );
+    assert_eq!(
+        joint("softvt.slider { lower = 0, upper = 1,\naxis = { 0, 0, 0 } }"),
+        "suites/x.lua:5: slider.axis: expected a direction, got one of length 0"
+    );
+    assert_eq!(
+        joint("softvt.slider { axis = { 0, 1, 0 }, lower = 0, upper = math.huge }"),
+        "suites/x.lua:4: slider.upper: expected metres, got inf"
+    );
+    assert_eq!(
+        joint("softvt.slider { axis = { 0, 1, 0 }, lower = 0, upper = 1, damping = -1 }"),
+        "suites/x.lua:4: slider.damping: expected a number (N s/m) of 0 or more, got -1"
+    );
+    assert!(joint("{ axis = { 0, 1, 0 } }").contains("expected what softvt.slider{…} or softvt.hinge{…} gives"));
+}
+
+#[test]
+fn parts_of_one_name_of_no_parent_and_in_a_circle_are_refused() {
+    let more = |name: &str, parent: &str| {
+        let rest = format!("shape = box, density = 500, joint = {SLIDER}");
+        error_of(&chest(SLIDER, &format!("{{ name = '{name}', {parent} {rest} }},\n{{ name = 'lid', parent = 'flap', {rest} }}")))
+    };
+    assert_eq!(
+        more("drawer", ""),
+        "suites/x.lua:2: articulated.parts: there are two parts named \"drawer\"; names must be unique"
+    );
+    assert_eq!(
+        more("flp", ""),
+        "suites/x.lua:2: articulated.parts: part \"lid\": parent: unknown part \"flap\"; did you mean \"flp\"?"
+    );
+    assert_eq!(
+        more("flap", "parent = 'lid',"),
+        "suites/x.lua:2: articulated.parts: parts flap, lid carry each other in a circle; one must hang on the base"
+    );
+    assert_eq!(
+        error_of("softvt.articulated { parts = {} }"),
+        "suites/x.lua:1: articulated.parts: expected at least one part; without any it is softvt.static {}"
+    );
+}
+
+#[test]
+fn start_values_are_those_given_and_must_lie_within_the_limits() {
+    let add = |rest: &str| {
+        let place = format!("scene:add {{ name = 'chest', asset = chest, at = {{ 0.1, 0 }}, {rest} }}");
+        open(&suite(&chest(SLIDER, ""), &place)).map(|scene| scene.objects[0].joints.clone())
+    };
+    assert_eq!(add("joints = { drawer = 0.04 }"), Ok(vec![0.04]));
+    assert_eq!(add(""), Ok(vec![0.0]));
+    assert_eq!(
+        add("joints = { drawer = 0.2 }").unwrap_err(),
+        "x.lua:9: scene:add.joints.drawer: expected a value in 0..0.1 (m), got 0.2"
+    );
+    assert_eq!(
+        add("joints = { draw = 0 }").unwrap_err(),
+        "x.lua:9: scene:add.joints: unknown part \"draw\"; did you mean \"drawer\"?"
+    );
+    let ball = "scene:add { name = 'ball', asset = ball, at = { 0, 0 }, joints = { drawer = 0 } }";
+    assert_eq!(
+        open(&suite(&chest(SLIDER, ""), ball)).unwrap_err(),
+        "x.lua:9: scene:add.joints: asset ball has no joints"
+    );
+}
+
+#[test]
+fn a_thing_can_stand_on_a_part_where_that_is() {
+    let place = "scene:add { name = 'chest', asset = chest, at = { 0.1, 0 }, yaw = math.pi, joints = { drawer = 0.08 } }\n\
+                 scene:add { name = 'ball', asset = ball, at = { 0.1, 0.1 }, on = 'chest.drawer' }\n\
+                 scene:add { name = 'low', asset = ball, at = { 0.1, -0.03 }, on = 'chest' }";
+    let scene = open(&suite(&chest(SLIDER, ""), place)).unwrap();
+    let height = |index: usize| scene.objects[index].pose_w.translation.z;
+    assert!((height(1) - 0.065).abs() < 1e-6, "on the drawer: {}", height(1));
+    assert!((height(2) - 0.03).abs() < 1e-6, "beside it, on the base: {}", height(2));
+    let wrong = place.replace("chest.drawer", "chest.drawr");
+    assert_eq!(
+        open(&suite(&chest(SLIDER, ""), &wrong)).unwrap_err(),
+        "x.lua:10: scene:add: on: object \"chest\": unknown part \"drawr\"; did you mean \"drawer\"?"
+    );
+}
+
+#[test]
+fn walls_that_others_could_pass_through_are_refused_where_the_object_is_placed() {
+    let thin = chest(SLIDER, "").replace("shape = box:translate(0, 0, 0.05)", "shape = box:shell(0.0015):translate(0, 0, 0.05)");
+    let scene = open(&suite(&thin, "scene:add { name = 'chest', asset = chest, at = { 0, 0 } }")).unwrap();
+    let built = Simulation::new(Arc::new(scene), &Default::default(), &Default::default(), &RestCache::default());
+    let message = built.expect_err("too thin").to_string();
+    let expected = "9: asset chest: part drawer: its walls are about 1.6 mm thick, expected at least 4 mm";
+    assert!(message.contains(expected), "{message}");
+}
+
+#[test]
+fn where_the_parts_of_a_scene_are_is_where_the_mechanics_has_them() {
+    let more = "{ name = 'door', parent = 'drawer', shape = box:translate(0, 0, 0.1), density = 300,\n\
+                joint = softvt.hinge { axis = { 1, 0, 2 }, origin = { 0.05, 0.02, 0.1 }, lower = -1, upper = 1 } },\n\
+                { name = 'knob', parent = 'door', shape = box:translate(0, 0, 0.15), density = 300,\n\
+                joint = softvt.hinge { axis = { 0, 1, 0 }, origin = { 0, -0.02, 0.15 }, lower = 0.2, upper = 1 } }";
+    let place = "scene:add { name = 'chest', asset = chest, at = { 0.1, 0.2 }, yaw = 0.7, joints = { drawer = 0.05, door = 0.6 } }";
+    let scene = open(&suite(&chest(SLIDER, more), place)).unwrap();
+    let object = scene.objects[0].clone();
+    assert_eq!(object.joints, [0.05, 0.6, 0.2], "the knob starts at its nearest limit");
+    assert_eq!(object.asset.parts()[1].joint.motion, Motion::Turn);
+    let placed = crate::scene::part_poses(object.asset.parts(), &object.joints);
+    let sim = Simulation::new(Arc::new(scene), &Default::default(), &Default::default(), &RestCache::default());
+    let sim = sim.expect("builds");
+    let names: Vec<&str> = sim.objects.iter().map(|o| o.name.as_str()).collect();
+    assert_eq!(names, ["chest", "chest.drawer", "chest.door", "chest.knob"]);
+    for ((part, _), pose) in sim.parts(0).zip(placed) {
+        let (ours, theirs): (Pose, Pose) = (sim.pose(part), object.pose_w * pose);
+        let gap = (ours.to_homogeneous() - theirs.to_homogeneous()).amax();
+        assert!(gap < 1e-12, "{}: {gap}", part.name);
+    }
+    let tree = &sim.world.trees[0];
+    let weight = joints::potential_energy(&tree.tree, tree.poses(), &-Vec3::z());
+    let parts = sim.parts(0).map(|(part, _)| sim.centre(part).z);
+    let expected: f64 = parts.zip([500.0, 300.0, 300.0]).map(|(z, density)| z * density * 3e-4).sum();
+    assert!((weight - expected).abs() < 1e-9, "{weight} {expected}");
+}
