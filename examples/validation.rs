@@ -12,10 +12,18 @@ mod free;
 mod friction;
 #[path = "../tests/validation/gel.rs"]
 mod gel;
+#[path = "../tests/validation/jointed.rs"]
+mod jointed;
 #[path = "../tests/validation/light.rs"]
 mod light;
+#[path = "../tests/validation/rigid.rs"]
+mod rigid;
+#[path = "validation/rigid_tables.rs"]
+mod rigid_tables;
 #[path = "../tests/validation/rows.rs"]
 mod rows;
+#[path = "../tests/physics_contact/solids.rs"]
+mod solids;
 #[path = "../tests/validation/statics.rs"]
 mod statics;
 #[path = "../tests/validation/support.rs"]
@@ -533,6 +541,8 @@ fn main() {
     friction(&mut report);
     time_step(&mut report);
     extremes(&mut report);
+    rigid_tables::rigid(&mut report);
+    rigid_tables::jointed(&mut report);
     gel_under_a_ball(&mut report);
     cameras(&mut report);
     report.print();

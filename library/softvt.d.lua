@@ -22,20 +22,20 @@
 ---The object rests on the target, released, for a time.
 ---@class softvt.On
 ---@field object string Scene name of the object.
----@field target string Scene name of what it must reach.
+---@field target string Scene name of what it must reach, or of a part of it (cabinet.top_drawer).
 ---@field hold_s? number How long it must stay. Expects seconds in 0..10. Default 0.4.
 
 ---The object rests inside the target's walls, released, for a time.
 ---@class softvt.Inside
 ---@field object string Scene name of the object.
----@field target string Scene name of what it must reach.
+---@field target string Scene name of what it must reach, or of a part of it (cabinet.top_drawer).
 ---@field hold_s? number How long it must stay. Expects seconds in 0..10. Default 0.4.
 
 ---A kind of object: its shape at rest with its lowest point at z = 0 and its centre on the z axis.
 ---@class softvt.Asset
 ---@field name string Name, as in results and calibration files.
 ---@field shape softvt.Shape Its shape, in metres.
----@field body softvt.Soft|softvt.Rigid|softvt.Static|softvt.Scenery How it moves.
+---@field body softvt.Soft|softvt.Rigid|softvt.Articulated|softvt.Static|softvt.Scenery How it moves.
 ---@field friction? softvt.Friction Friction of its surface.
 ---@field visuals? softvt.Visual[] Appearances by material id of the shape; the first is id 0.
 ---@field hints? table<string, number> Numbers for experts (grasp height, closure …).
@@ -51,6 +51,27 @@
 ---A free rigid body of uniform density.
 ---@class softvt.Rigid
 ---@field density number Density. Expects a number (kg/m³) above 0.
+
+---Parts on joints; the asset's own shape is their base, which never moves.
+---@class softvt.Articulated
+---@field parts softvt.Part[] The parts, in any order.
+
+---A joint along which a part slides, as a drawer does.
+---@class softvt.Slider
+---@field axis number[] Direction in which its value grows. Expects a list of 3 numbers (object frame).
+---@field lower number Lowest value. Expects metres.
+---@field upper number Highest value, above the lowest. Expects metres.
+---@field damping? number Viscous damping. Expects a number (N s/m) of 0 or more. Default 0.
+---@field friction? number Dry friction. Expects a number (N) of 0 or more. Default 0.
+
+---A joint about which a part turns, as a door or a knob does.
+---@class softvt.Hinge
+---@field axis number[] Axis about which its value grows, by the right hand. Expects a list of 3 numbers (object frame).
+---@field origin number[] A point of the axis, with all joints at 0. Expects a list of 3 numbers (m, object frame).
+---@field lower number Lowest value. Expects radians.
+---@field upper number Highest value, above the lowest. Expects radians.
+---@field damping? number Viscous damping. Expects a number (N m s/rad) of 0 or more. Default 0.
+---@field friction? number Dry friction. Expects a number (N m) of 0 or more. Default 0.
 
 ---A part of the world that never moves.
 ---@class softvt.Static
@@ -86,6 +107,16 @@
 ---@class softvt.Friction
 ---@field static_mu? number Static coefficient. Expects a number in 0..10. Default 0.6.
 ---@field dynamic_mu? number Dynamic coefficient, not above the static one. Expects a number in 0..10. Default 0.5.
+
+---A part of an articulated object. Parts of one object never touch each other or its base.
+---@class softvt.Part
+---@field name string Name, unique in the object: cabinet.top_drawer in a scene.
+---@field shape softvt.Shape Its shape where it is with all joints at 0, in the frame of the whole object; walls of 4 mm or more.
+---@field density number Density. Expects a number (kg/m³) above 0.
+---@field joint softvt.Slider|softvt.Hinge What carries it; axes and origins are in the frame of the whole object.
+---@field parent? string The part that carries it; the fixed base by default.
+---@field visuals? softvt.Visual[] Appearances by material id of its shape; the first is id 0. Those of the asset by default.
+---@field hints? table<string, number> Numbers for experts (handle height …).
 
 ---What a surface looks like: a base, and layers painted over it one after the other.
 ---@class softvt.Visual
@@ -124,7 +155,8 @@
 ---@field at? number[] x, y; it stands on the table, or on what `on` names. Expects a list of 2 numbers (m, world).
 ---@field xyz? number[] Its origin: lowest point, on the centre line. Expects a list of 3 numbers (m, world).
 ---@field yaw? number Turn about the vertical. Expects radians. Default 0.
----@field on? string Scene name of an object that it stands on (with at).
+---@field on? string Scene name of an object or part (cabinet.top_drawer) that it stands on (with at).
+---@field joints? table<string, number> Start values of an articulated object's joints by part; 0, or the nearest limit, by default.
 
 ---A pose in the world frame. Without a quaternion the hand points straight down.
 ---@class softvt.PoseSpec
@@ -597,7 +629,7 @@ function Simulation:drive(expert) end
 ---@return string?
 function Simulation:wait(seconds) end
 
----width_m, height_m (rise of the centre), speed, asset; of a movable object also pad_force (N) and slip_mm of the left and right pad, and of a soft one d_pct, d_peak_pct, min_det_f, asleep.
+---width_m, height_m (rise of the centre), speed, asset; of a part joint, of what has parts joints by name; of a movable object also pad_force (N) and slip_mm of the left and right pad, and of a soft one d_pct, d_peak_pct, min_det_f, asleep.
 ---@param object string
 ---@return table
 function Simulation:watch(object) end
@@ -801,6 +833,7 @@ local Look = {}
 ---@field name string Name in the scene.
 ---@field asset string Name of its asset.
 ---@field looks softvt.Look[] Its materials, in the order of the asset's visuals.
+---@field joints table<string, number> Start values of its joints by part, m or rad.
 ---@field xyz number[] Its origin: lowest point, on the centre line. Expects a list of 3 numbers (m, world).
 ---@field yaw number Turn about the vertical. Expects radians.
 ---@field density number Density of a soft or rigid body. Expects a number (kg/m³) above 0.
@@ -819,6 +852,12 @@ local View = {}
 ---@return softvt.Seen
 function View:object(name) end
 
+---A part of an articulated object.
+---@param object string
+---@param part string
+---@return softvt.Seen
+function View:part(object, part) end
+
 ---All objects, in the order of the scene.
 ---@return softvt.Seen[]
 function View:objects() end
@@ -831,6 +870,9 @@ function View:objects() end
 ---@field size number[] Edge lengths of its bounding box at rest, m.
 ---@field yaw number Turn about the vertical, rad.
 ---@field hints table<string, number> Numbers that its asset gives to experts.
+---@field joint number? Joint value of a part, m or rad.
+---@field joints table<string, number> Joint values of an articulated object by part, m or rad.
+---@field parts table<string, softvt.Seen> The parts of an articulated object by name.
 local Seen = {}
 
 ---What an expert drives. Each motion lasts as many control steps as it needs.
@@ -913,6 +955,21 @@ function softvt.soft(spec) end
 ---@param spec softvt.Rigid
 ---@return softvt.Rigid
 function softvt.rigid(spec) end
+
+---Parts on joints; the asset's own shape is their base, which never moves.
+---@param spec softvt.Articulated
+---@return softvt.Articulated
+function softvt.articulated(spec) end
+
+---A joint along which a part slides, as a drawer does.
+---@param spec softvt.Slider
+---@return softvt.Slider
+function softvt.slider(spec) end
+
+---A joint about which a part turns, as a door or a knob does.
+---@param spec softvt.Hinge
+---@return softvt.Hinge
+function softvt.hinge(spec) end
 
 ---A part of the world that never moves.
 ---@param spec softvt.Static

@@ -26,8 +26,8 @@ use crate::{
         run_folder::{RUN, RunFolder, RunFolderError, SUMMARY, replace},
     },
     rollout::{
-        BuildError, ControlError, Controller, Episode, EpisodeError, EpisodeSpec, Finished, Looks, RestCache, ScoreFrame,
-        SettleError, batch, stop,
+        BuildError, ControlError, Controller, Episode, EpisodeError, EpisodeSpec, Finished, Looks, RestCache,
+        ScoreFrame, SettleError, batch, stop,
     },
     scene::{Asset, Body, Scene},
     script::{self, ExpertController, Loaded},

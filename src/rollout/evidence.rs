@@ -80,7 +80,8 @@ impl Witness {
             target: self.body(sim, self.target),
             place: PlaceEvidence {
                 pose_w: sim.pose(place) * Pose::from(place.foot_o()),
-                support_impulse_ns: from_place * dt },
+                support_impulse_ns: from_place * dt,
+            },
             others: &self.bodies,
         }
     }

@@ -4,14 +4,23 @@ use std::fmt::Write;
 
 use sha2::{Digest, Sha256};
 
-use super::Asset;
+use super::{Asset, Body, Part};
 
 impl Asset {
     /// A short hash (16 hexadecimal digits of a SHA-256) of the shape, the body with its material and resolution, and the friction: all that a
     /// calibration depends on. Looks (paint too), hints and the name do not count. Numbers count with seven digits, so that the last
     /// bits of another platform's sines make no other object.
     pub fn fingerprint(&self) -> String {
-        let text = format!("{:?}", (self.shape.unpainted(), &self.body, &self.friction));
+        let body = match &self.body {
+            Body::Articulated(parts) => {
+                let bare = |part: &Part| {
+                    (part.asset.shape.unpainted(), part.density, part.parent, part.joint.clone())
+                };
+                format!("{:?}", parts.iter().map(bare).collect::<Vec<_>>())
+            }
+            body => format!("{body:?}"),
+        };
+        let text = format!("({:?}, {body}, {:?})", self.shape.unpainted(), self.friction);
         let digest = Sha256::digest(rounded(&text).as_bytes());
         digest.iter().take(8).map(|byte| format!("{byte:02x}")).collect()
     }
@@ -66,7 +75,7 @@ mod tests {
     use super::*;
     use crate::{
         geometry::{Pose, Vec3, mesh::Mesh, shape::Shape},
-        scene::{Body, Friction, SoftMaterial, Visual},
+        scene::{Friction, SoftMaterial, Visual},
     };
 
     fn bun() -> Asset {

@@ -144,6 +144,15 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// Names of the objects, each followed by those of its parts: cabinet, cabinet.top_drawer.
+    pub fn names(&self) -> Vec<String> {
+        let of = |object: &Object| {
+            let parts = object.asset.parts().iter().map(|part| format!("{}.{}", object.name, part.name));
+            std::iter::once(object.name.clone()).chain(parts).collect::<Vec<_>>()
+        };
+        self.objects.iter().flat_map(of).collect()
+    }
+
     /// A camera by name.
     pub fn camera(&self, name: &str) -> Option<&Camera> {
         self.cameras.iter().find(|camera| camera.name == name)

@@ -90,7 +90,9 @@ fn order(parts: &[Table]) -> mlua::Result<Result<Vec<usize>, String>> {
                 let stuck: Vec<_> =
                     (0..parts.len()).filter(|i| !sorted.contains(i)).map(|i| names[i].as_str()).collect();
                 let who = stuck.join(", ");
-                return Ok(Err(format!("parts {who} carry each other in a circle; one must hang on the base")));
+                return Ok(Err(format!(
+                    "parts {who} carry each other in a circle; one must hang on the base"
+                )));
             }
         }
     }

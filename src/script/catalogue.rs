@@ -104,7 +104,12 @@ pub static ASSET: Record = Record {
     fields: &[
         field("name", Type::Name, Required, "Name, as in results and calibration files."),
         field("shape", Type::Object("softvt.Shape"), Required, "Its shape, in metres."),
-        field("body", Type::Made(&[&SOFT, &RIGID, &ARTICULATED, &STATIC, &SCENERY]), Required, "How it moves."),
+        field(
+            "body",
+            Type::Made(&[&SOFT, &RIGID, &ARTICULATED, &STATIC, &SCENERY]),
+            Required,
+            "How it moves.",
+        ),
         field("friction", Type::Nested(&FRICTION), Empty, "Friction of its surface."),
         field(
             "visuals",
@@ -158,7 +163,12 @@ pub static INSIDE: Record = Record {
 
 const GOAL_FIELDS: &[Field] = &[
     field("object", Type::Text, Required, "Scene name of the object."),
-    field("target", Type::Text, Required, "Scene name of what it must reach, or of a part of it (cabinet.top_drawer)."),
+    field(
+        "target",
+        Type::Text,
+        Required,
+        "Scene name of what it must reach, or of a part of it (cabinet.top_drawer).",
+    ),
     field(
         "hold_s",
         Type::Number("s", Range::closed(0.0, 10.0)),

@@ -174,8 +174,13 @@ fn check_goal(main: &str, task: &Table, scene: &Scene) -> mlua::Result<()> {
     let goal: Table = task.get("goal")?;
     for key in ["object", "target"] {
         let name: String = goal.get(key)?;
-        if !scene.objects.iter().any(|object| object.name == name) {
-            let known = scene.objects.iter().map(|object| object.name.as_str());
+        let mut known = scene.names();
+        if key == "object" {
+            // What is to be carried is no part of anything.
+            known.retain(|name| !name.contains('.'));
+        }
+        if !known.contains(&name) {
+            let known = known.iter().map(String::as_str);
             let message = format!("task.goal.{key}: {}", unknown("object", &name, known));
             return Err(mlua::Error::external(ScriptError::new(main, message)));
         }

@@ -26,7 +26,8 @@ fn a_shape_too_thin_for_its_voxels_says_so() {
         ..Small::default()
     }
     .project();
-    project.write("m.obj", b"v 0 0 0\nv .05 0 0\nv 0 .05 0\nv 0 0 .004\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
+    project
+        .write("m.obj", b"v 0 0 0\nv .05 0 0\nv 0 .05 0\nv 0 0 .004\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
     assert_snapshot!(project.refusal("x.lua --out run"), @"x.lua:6: asset cube: it is 4 mm thick, thinner than a voxel: at resolution 5 they are 10 mm; resolution = 13 would serve");
 }
 
@@ -44,10 +45,13 @@ fn placed(body: &str, add: &str) -> String {
 
 #[test]
 fn objects_that_overlap_at_the_start_are_named_with_depth_and_place() {
-    let (rigid, soft) = ("softvt.rigid { density = 500 }", "softvt.soft { youngs_pa = 2e4, poisson = 0.3, density = 300 }");
+    let (rigid, soft) =
+        ("softvt.rigid { density = 500 }", "softvt.soft { youngs_pa = 2e4, poisson = 0.3, density = 300 }");
     let floor = "scene:add { name = 'floor', asset = floor, xyz = { 0, 0, 0 } }\n";
     let add = |a: &str, b: &str| {
-        format!("{floor}scene:add {{ name = 'a', asset = block, {a} }}\nscene:add {{ name = 'b', asset = block, {b} }}")
+        format!(
+            "{floor}scene:add {{ name = 'a', asset = block, {a} }}\nscene:add {{ name = 'b', asset = block, {b} }}"
+        )
     };
     let beside = add("at = { 0, 0.1 }", "at = { 0.03, 0.1 }");
     assert_snapshot!(placed(rigid, &beside), @"x.lua:6: objects b and a (placed at x.lua:5) overlap by 10 mm at the start; move them apart");

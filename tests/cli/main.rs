@@ -8,6 +8,7 @@ mod determinism;
 mod endless;
 mod files;
 mod interrupt;
+mod joints;
 mod measures;
 mod observe;
 mod spread;

@@ -5,3 +5,4 @@ mod mixed;
 mod rigid;
 mod scene;
 mod soft;
+mod solids;

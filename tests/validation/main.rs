@@ -9,8 +9,12 @@ mod extremes;
 mod free;
 mod friction;
 mod gel;
+mod jointed;
 mod light;
+mod rigid;
 mod rows;
+#[path = "../physics_contact/solids.rs"]
+mod solids;
 mod statics;
 mod support;
 mod time_step;

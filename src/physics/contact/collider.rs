@@ -126,7 +126,17 @@ impl Collider {
     ) -> Self {
         let bounds = surface.bounds();
         let solid = surface.solid().map(Arc::new);
-        Self { name: name.to_owned(), mover, pose_in_mover, surface, friction, layer, bounds, base_of: None, solid }
+        Self {
+            name: name.to_owned(),
+            mover,
+            pose_in_mover,
+            surface,
+            friction,
+            layer,
+            bounds,
+            base_of: None,
+            solid,
+        }
     }
 
     /// The same as the fixed base of joint tree `tree`.

@@ -40,7 +40,9 @@ impl World {
     fn record_joints(&mut self) {
         for (tree, block) in self.trees.iter_mut().zip(&self.layout.trees) {
             let Some(block) = block else { continue };
-            for ((bristle, link), q) in tree.bristles.iter_mut().zip(&tree.tree.links).zip(tree.state.q.iter()) {
+            for ((bristle, link), q) in
+                tree.bristles.iter_mut().zip(&tree.tree.links).zip(tree.state.q.iter())
+            {
                 let bend = link.friction / bristle.stiffness;
                 bristle.from = bristle.from.clamp(q - bend, q + bend);
             }

@@ -3,10 +3,7 @@
 use super::{World, rigid_rows::Pair};
 use crate::{
     geometry::{Pose, Quat, Vec3, shape::Aabb},
-    physics::{
-        contact::Collider,
-        fem::SoftBody,
-    },
+    physics::{contact::Collider, fem::SoftBody},
 };
 
 /// Two things that overlap.
@@ -25,7 +22,8 @@ impl World {
         let mut found = self.solid_overlaps();
         for (index, soft) in self.soft.iter().enumerate() {
             for (id, collider) in self.colliders.iter().enumerate() {
-                let depth = sunk(&soft.body, &self.moving[id].pose, &collider.bounds, &|p| field(collider, p));
+                let depth =
+                    sunk(&soft.body, &self.moving[id].pose, &collider.bounds, &|p| field(collider, p));
                 found.push(Overlap { names: [soft.name.clone(), collider.name.clone()], depth });
             }
             for other in &self.soft[index + 1..] {

@@ -27,7 +27,7 @@ fn suite(chest: &str, place: &str) -> String {
          local layout = softvt.layout('one', function(scene)\n\
          {place}\nend)\n\
          return softvt.suite {{ name = 'test', object_type = 'rigid', variation = 'spatial', tasks = {{ softvt.task {{\n\
-         prompt = 'p', layout = layout, goal = softvt.on {{ object = 'ball', target = 'chest.drawer' }} }} }} }}"
+         prompt = 'p', layout = layout, goal = softvt.on {{ object = 'chest', target = 'chest.drawer' }} }} }} }}"
     )
 }
 
@@ -50,7 +50,10 @@ fn open(text: &str) -> Result<Scene, String> {
 fn a_joint_without_limits_or_with_wrong_ones_is_refused_at_its_line() {
     let joint = |text: &str| error_of(&chest(text, ""));
     let missing = "missing; every joint needs limits: give lower and upper";
-    assert_eq!(joint("softvt.slider { axis = { 0, -1, 0 } }"), format!("suites/x.lua:4: slider.lower: {missing}"));
+    assert_eq!(
+        joint("softvt.slider { axis = { 0, -1, 0 } }"),
+        format!("suites/x.lua:4: slider.lower: {missing}")
+    );
     assert_eq!(
         joint("softvt.hinge { axis = { 0, 0, 1 }, origin = { 0, 0, 0 },\nlower = -1 }"),
         format!("suites/x.lua:4: hinge.upper: {missing}")
@@ -71,14 +74,19 @@ fn a_joint_without_limits_or_with_wrong_ones_is_refused_at_its_line() {
         joint("softvt.slider { axis = { 0, 1, 0 }, lower = 0, upper = 1, damping = -1 }"),
         "suites/x.lua:4: slider.damping: expected a number (N s/m) of 0 or more, got -1"
     );
-    assert!(joint("{ axis = { 0, 1, 0 } }").contains("expected what softvt.slider{…} or softvt.hinge{…} gives"));
+    assert!(
+        joint("{ axis = { 0, 1, 0 } }").contains("expected what softvt.slider{…} or softvt.hinge{…} gives")
+    );
 }
 
 #[test]
 fn parts_of_one_name_of_no_parent_and_in_a_circle_are_refused() {
     let more = |name: &str, parent: &str| {
         let rest = format!("shape = box, density = 500, joint = {SLIDER}");
-        error_of(&chest(SLIDER, &format!("{{ name = '{name}', {parent} {rest} }},\n{{ name = 'lid', parent = 'flap', {rest} }}")))
+        error_of(&chest(
+            SLIDER,
+            &format!("{{ name = '{name}', {parent} {rest} }},\n{{ name = 'lid', parent = 'flap', {rest} }}"),
+        ))
     };
     assert_eq!(
         more("drawer", ""),
@@ -114,7 +122,7 @@ fn start_values_are_those_given_and_must_lie_within_the_limits() {
         add("joints = { draw = 0 }").unwrap_err(),
         "x.lua:9: scene:add.joints: unknown part \"draw\"; did you mean \"drawer\"?"
     );
-    let ball = "scene:add { name = 'ball', asset = ball, at = { 0, 0 }, joints = { drawer = 0 } }";
+    let ball = "scene:add { name = 'chest', asset = ball, at = { 0, 0 }, joints = { drawer = 0 } }";
     assert_eq!(
         open(&suite(&chest(SLIDER, ""), ball)).unwrap_err(),
         "x.lua:9: scene:add.joints: asset ball has no joints"
@@ -139,9 +147,11 @@ fn a_thing_can_stand_on_a_part_where_that_is() {
 
 #[test]
 fn walls_that_others_could_pass_through_are_refused_where_the_object_is_placed() {
-    let thin = chest(SLIDER, "").replace("shape = box:translate(0, 0, 0.05)", "shape = box:shell(0.0015):translate(0, 0, 0.05)");
+    let thin = chest(SLIDER, "")
+        .replace("shape = box:translate(0, 0, 0.05)", "shape = box:shell(0.0015):translate(0, 0, 0.05)");
     let scene = open(&suite(&thin, "scene:add { name = 'chest', asset = chest, at = { 0, 0 } }")).unwrap();
-    let built = Simulation::new(Arc::new(scene), &Default::default(), &Default::default(), &RestCache::default());
+    let built =
+        Simulation::new(Arc::new(scene), &Default::default(), &Default::default(), &RestCache::default());
     let message = built.expect_err("too thin").to_string();
     let expected = "9: asset chest: part drawer: its walls are about 1.6 mm thick, expected at least 4 mm";
     assert!(message.contains(expected), "{message}");
@@ -159,7 +169,8 @@ fn where_the_parts_of_a_scene_are_is_where_the_mechanics_has_them() {
     assert_eq!(object.joints, [0.05, 0.6, 0.2], "the knob starts at its nearest limit");
     assert_eq!(object.asset.parts()[1].joint.motion, Motion::Turn);
     let placed = crate::scene::part_poses(object.asset.parts(), &object.joints);
-    let sim = Simulation::new(Arc::new(scene), &Default::default(), &Default::default(), &RestCache::default());
+    let sim =
+        Simulation::new(Arc::new(scene), &Default::default(), &Default::default(), &RestCache::default());
     let sim = sim.expect("builds");
     let names: Vec<&str> = sim.objects.iter().map(|o| o.name.as_str()).collect();
     assert_eq!(names, ["chest", "chest.drawer", "chest.door", "chest.knob"]);

@@ -1,0 +1,68 @@
+//! Furniture in a suite: goals that name a part, experts that see joints, and what is refused.
+
+use insta::assert_snapshot;
+
+use crate::support::Project;
+
+/// A chest of one tray, open by 50 mm, with a block in it. Line 5 is the joint, 14 the expert.
+fn suite(joint: &str, target: &str, expert: &str) -> Project {
+    let text = format!(
+        r#"local floor = softvt.asset {{ name = "floor", shape = softvt.shape.box {{ size = {{ 1, 1, 0.05 }} }}:translate(0, 0, -0.025), body = softvt.static {{}} }}
+local block = softvt.asset {{ name = "block", shape = softvt.shape.box {{ size = {{ 0.03, 0.03, 0.03 }} }}:grounded(), body = softvt.rigid {{ density = 500 }} }}
+local slab = softvt.shape.box {{ size = {{ 0.1, 0.1, 0.01 }} }}
+local chest = softvt.asset {{ name = "chest", shape = slab:grounded(), body = softvt.articulated {{ parts = {{ {{ name = "tray", shape = slab:translate(0, 0, 0.02), density = 500,
+  joint = {joint} }} }} }} }}
+local layout = softvt.layout("one", function(scene)
+  scene:add {{ name = "floor", asset = floor, xyz = {{ 0, 0, 0 }} }}
+  scene:add {{ name = "chest", asset = chest, at = {{ 0, 0.1 }}, joints = {{ tray = 0.05 }} }}
+  scene:add {{ name = "block", asset = block, at = {{ 0, 0.03 }}, on = "chest.tray" }}
+  assert(scene:object("chest").joints.tray == 0.05)
+end)
+return softvt.suite {{ name = "one", object_type = "rigid", variation = "spatial", episodes = 1, tasks = {{
+  softvt.task {{ prompt = "wait", layout = layout, budget_steps = 40, goal = softvt.on {{ object = "block", target = "{target}" }},
+    expert = function(arm, scene) {expert} end }},
+}} }}
+"#
+    );
+    Project::new(&[("x.lua", &text)])
+}
+
+const TRAY: &str =
+    "softvt.slider { axis = { 0, -1, 0 }, lower = 0, upper = 0.08, damping = 2, friction = 1 }";
+
+#[test]
+fn a_block_that_rests_on_a_part_is_at_the_goal_that_names_the_part_and_at_no_other() {
+    let goal = |target: &str| {
+        let project = suite(TRAY, target, "arm:wait(1)");
+        project.succeeds("x.lua --policy noop --out run");
+        let lines = project.lines("run/episodes.jsonl");
+        assert_eq!(lines.len(), 1);
+        lines[0]["goal"].as_bool().expect("a verdict")
+    };
+    assert!(goal("chest.tray"));
+    assert!(!goal("chest"), "the base does not carry it");
+}
+
+#[test]
+fn an_expert_sees_parts_and_joints() {
+    let expert = r#"
+      local chest = scene:object "chest"
+      assert(math.abs(chest.joints.tray - 0.05) < 1e-5 and chest.joint == nil)
+      local tray = scene:part("chest", "tray")
+      assert(tray.name == "tray" and tray.joint == chest.joints.tray and chest.parts.tray.joint == tray.joint)
+      assert(math.abs(tray.xyz[2] - 0.05) < 1e-5 and math.abs(tray.size[1] - 0.1) < 1e-9)
+      assert(#scene:objects() == 3, "parts are no objects of their own")
+      error "all seen""#;
+    let project = suite(TRAY, "chest.tray", expert);
+    let said = project.refusal("x.lua --out run");
+    assert!(said.ends_with("x.lua:21: all seen"), "{said}");
+    let project = suite(TRAY, "chest.tray", "scene:part('chest', 'tra')");
+    assert_snapshot!(project.refusal("x.lua --out run"), @r#"x.lua: task 0, episode 0: x.lua:14: scene: unknown part "tra"; did you mean "tray"?"#);
+}
+
+#[test]
+fn a_drawer_without_limits_and_a_goal_on_no_part_are_refused() {
+    let refusal = |joint, target| suite(joint, target, "arm:wait(1)").refusal("x.lua --out run");
+    assert_snapshot!(refusal("softvt.slider { axis = { 0, -1, 0 }, lower = 0 }", "chest"), @"x.lua:5: slider.upper: missing; every joint needs limits: give lower and upper");
+    assert_snapshot!(refusal(TRAY, "chest.drawer"), @r#"x.lua: task.goal.target: unknown object "chest.drawer"; did you mean "chest.tray"?"#);
+}

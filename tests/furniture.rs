@@ -1,0 +1,162 @@
+//! The cabinet and the stove as the benchmark uses them.
+
+use std::sync::Arc;
+
+use softvt::{
+    benchmark::seed::Split,
+    geometry::Vec3,
+    physics::contact::Partner,
+    rollout::{Handle, Kind, Looks, RestCache, Senses, Simulation, episode::state_hash},
+    scene::{Asset, Camera, Scene},
+    script::{self, Episode, EpisodeRequest},
+    sensing::tactile::TactileSpec,
+};
+
+/// A cabinet with its top drawer open, a bowl of 107 mm in it, and a stove; its front looks to −y.
+const SUITE: &str = r#"
+local bowl = softvt.asset {
+  name = "bowl", body = softvt.rigid { density = 1500 },
+  shape = softvt.shape.lathe { corners = {
+    { 0, 0 }, { 0.027, 0 }, { 0.0535, 0.048 }, { 0.049, 0.048 }, { 0.025, 0.005 }, { 0, 0.005 },
+  } },
+}
+local layout = softvt.layout("kitchen", function(scene)
+  scene:add { name = "table", asset = require "assets.table", xyz = { 0, 0, 0 } }
+  scene:add { name = "cabinet", asset = require "assets.wooden_cabinet", at = { 0, 0.2 }, joints = { top_drawer = 0.12 } }
+  scene:add { name = "stove", asset = require "assets.flat_stove", at = { 0, -0.3 }, joints = { knob = 1 } }
+  scene:add { name = "bowl", asset = bowl, at = { 0, 0.2 - 0.0805 - 0.06 }, on = "cabinet.top_drawer" }
+end)
+return softvt.suite { name = "kitchen", object_type = "rigid", variation = "spatial", tasks = { softvt.task {
+  prompt = "wait", layout = layout, goal = softvt.on { object = "bowl", target = "stove" },
+} } }
+"#;
+
+fn scene() -> Scene {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("kitchen.lua");
+    std::fs::write(&path, SUITE).expect("written");
+    let loaded = script::load(&path, &[]).unwrap_or_else(|e| panic!("{e}"));
+    let request = EpisodeRequest {
+        suite: "kitchen".into(),
+        task: 0,
+        episode: 0,
+        base_seed: 0,
+        split: Split::Validation,
+        shifts: Vec::new(),
+    };
+    Episode::open(&loaded, &request).unwrap_or_else(|e| panic!("{e}")).scene
+}
+
+/// The scene at rest.
+fn settled() -> Simulation {
+    let sim =
+        Simulation::new(Arc::new(scene()), &Default::default(), &Default::default(), &RestCache::default());
+    let mut sim = sim.unwrap_or_else(|e| panic!("{e}"));
+    sim.settle().unwrap_or_else(|e| panic!("{e}"));
+    sim
+}
+
+fn run(sim: &mut Simulation, seconds: f64) {
+    (0..(60.0 * seconds) as usize).for_each(|_| sim.step().expect("a step that converges"));
+}
+
+fn object<'a>(sim: &'a Simulation, name: &str) -> &'a Handle {
+    sim.object(name).unwrap_or_else(|| panic!("no {name}"))
+}
+
+/// Joint tree and link of a part.
+fn link(sim: &Simulation, name: &str) -> (usize, usize) {
+    let Kind::Link { tree, link } = object(sim, name).kind else { panic!("{name} is no part") };
+    (tree, link)
+}
+
+/// Size of an asset with all joints at 0, m.
+fn size(asset: &Asset) -> Vec3 {
+    let parts = asset.parts().iter().map(|part| part.asset.shape.bounds());
+    let all = parts.fold(asset.shape.bounds(), |mut all, next| {
+        (all.min, all.max) = (all.min.inf(&next.min), all.max.sup(&next.max));
+        all
+    });
+    assert!(all.centre().xy().norm() < 1e-6 && all.min.z.abs() < 1e-6, "{all:?}");
+    all.size()
+}
+
+#[test]
+fn furniture_has_the_size_of_liberos() {
+    let scene = scene();
+    for (index, expected) in [(1, Vec3::new(0.255, 0.221, 0.218)), (2, Vec3::new(0.19, 0.19, 0.07))] {
+        let asset = &scene.objects[index].asset;
+        assert!((size(asset) - expected).amax() < 5e-4, "{}: {:?}", asset.name, size(asset));
+    }
+}
+
+#[test]
+fn a_bowl_rests_on_the_floor_of_an_open_drawer_and_all_of_it_falls_asleep() {
+    let mut sim = settled();
+    run(&mut sim, 1.0);
+    let drawer = object(&sim, "cabinet.top_drawer");
+    assert!((sim.joint(drawer).expect("a joint") - 0.12).abs() < 1e-5);
+    let bowl = object(&sim, "bowl");
+    let weight = 9.81 * sim.world.rigid[0].body.mass;
+    let carried = sim.touch(bowl, Partner::Collider(drawer.colliders[0])).force_w.z;
+    assert!((carried / weight - 1.0).abs() < 0.01, "the drawer carries {carried} of {weight} N");
+    let (cabinet, stove) = (link(&sim, "cabinet.top_drawer").0, link(&sim, "stove.knob").0);
+    assert!(sim.world.rigid[0].asleep, "the bowl");
+    assert!(sim.world.trees[cabinet].asleep && sim.world.trees[stove].asleep, "cabinet and stove");
+    assert!(!sim.world.trees[sim.rig.tree].asleep, "the robot");
+}
+
+#[test]
+fn a_drawer_that_is_pushed_takes_its_bowl_along_and_pictures_show_it() {
+    let mut sim = settled();
+    let (tree, link) = link(&sim, "cabinet.top_drawer");
+    let mut senses = Senses::new(&sim, &TactileSpec::default(), &Looks::default());
+    let camera = Camera { width: 160, height: 160, ..Camera::third_person_table() };
+    let drawer = 1 + sim.objects.iter().position(|o| o.name == "cabinet.top_drawer").expect("a part") as u16;
+    let mut column = |sim: &Simulation| {
+        let seen = senses.see(&Senses::frame(sim), &camera).expect("a picture").segmentation;
+        let columns = seen.iter().enumerate().filter(|(_, id)| **id == drawer).map(|(i, _)| (i % 160) as f64);
+        let count = columns.clone().count();
+        assert!(count > 50, "{count} pixels of the drawer");
+        columns.sum::<f64>() / count as f64
+    };
+    let (before, seen) = (sim.centre(object(&sim, "bowl")), column(&sim));
+    // A push shut that the bowl's friction can follow: 0.5 × 9.81 m/s² would be its limit.
+    let mut speed = 0.0;
+    for _ in 0..15 {
+        speed -= 2.5 / 60.0;
+        sim.world.trees[tree].state.v[link] = speed;
+        sim.step().expect("a step that converges");
+    }
+    run(&mut sim, 1.0);
+    let moved = 0.12 - sim.world.trees[tree].state.q[link];
+    let along = sim.centre(object(&sim, "bowl")) - before;
+    assert!(moved > 0.04, "pushed by {moved} m");
+    assert!((along.y - moved).abs() < 2e-3 && along.x.abs() < 1e-3, "{moved} m, the bowl by {along:?}");
+    // Image right is +y.
+    assert!(column(&sim) > seen + 3.0, "{} after {seen}", column(&sim));
+}
+
+#[test]
+fn a_knob_turns_within_its_limits_and_stops() {
+    let mut sim = settled();
+    let (tree, link) = link(&sim, "stove.knob");
+    assert_eq!(sim.world.trees[tree].state.q[link], 1.0, "friction holds it where it was set");
+    sim.world.trees[tree].state.v[link] = 40.0;
+    run(&mut sim, 1.0);
+    let q = sim.world.trees[tree].state.q[link];
+    assert!((1.5..=1.5 * std::f64::consts::PI + 1e-3).contains(&q), "{q} rad");
+    assert!(sim.world.trees[tree].asleep);
+}
+
+#[test]
+fn the_same_scene_goes_the_same_way_to_the_bit() {
+    let end = || {
+        let mut sim = settled();
+        let (tree, link) = link(&sim, "cabinet.top_drawer");
+        sim.world.trees[tree].state.v[link] = -0.3;
+        run(&mut sim, 0.5);
+        state_hash(&sim)
+    };
+    assert_eq!(end(), end());
+}

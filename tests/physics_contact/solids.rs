@@ -1,0 +1,105 @@
+//! Short ways to put hard things into a world.
+
+use std::sync::Arc;
+
+use softvt::{
+    geometry::{Mat3, Pose, Quat, Vec3, shape::Shape},
+    physics::{
+        Params, World,
+        contact::{Collider, Friction, Mover},
+        rigid::RigidBody,
+    },
+};
+
+pub const GRAVITY: f64 = 9.81;
+
+/// Surfaces with both coefficients.
+pub fn friction(static_mu: f64, dynamic_mu: f64) -> Friction {
+    Friction { static_mu, dynamic_mu }
+}
+
+/// A world that never sleeps, with gravity along −z.
+pub fn world() -> World {
+    tilted(0.0)
+}
+
+/// A world whose gravity leans by `angle` (rad) towards +x: a slope that stays flat.
+pub fn tilted(angle: f64) -> World {
+    World::new(Params { sleeping: false, ..Params::default() }, gravity(angle))
+}
+
+/// Gravity on a slope of `angle` (rad) down +x, in the slope's frame.
+pub fn gravity(angle: f64) -> Vec3 {
+    Vec3::new(angle.sin(), 0.0, -angle.cos()) * GRAVITY
+}
+
+pub fn cuboid(x: f64, y: f64, z: f64) -> Shape {
+    Shape::cuboid(Vec3::new(x, y, z))
+}
+
+pub fn at(x: f64, y: f64, z: f64) -> Pose {
+    Pose::translation(x, y, z)
+}
+
+pub fn turned(pose: Pose, turn: Vec3) -> Pose {
+    pose * Quat::from_scaled_axis(turn)
+}
+
+/// A collider of a hard shape.
+pub fn put(
+    world: &mut World,
+    name: &str,
+    (mover, pose): (Mover, Pose),
+    shape: &Shape,
+    mu: Friction,
+) -> usize {
+    let layer = world.rigid_layer();
+    world.add_collider(Collider::new(name, (mover, pose), Arc::new(shape.clone()), mu, layer))
+}
+
+/// A static floor whose top is z = 0.
+pub fn floor(world: &mut World, mu: Friction) -> usize {
+    put(world, "floor", (Mover::Static, at(0.0, 0.0, -0.05)), &cuboid(40.0, 40.0, 0.1), mu)
+}
+
+/// Mass and inertia of the primitives used here, kg and kg m².
+fn inertia(shape: &Shape, mass: f64) -> Mat3 {
+    let diagonal = match *shape {
+        Shape::Box { half } => {
+            let square = half.component_mul(&half);
+            Vec3::new(square.y + square.z, square.x + square.z, square.x + square.y) / 3.0
+        }
+        Shape::Sphere { radius } => Vec3::repeat(0.4 * radius * radius),
+        Shape::Cylinder { radius, half_height } => {
+            let side = 0.25 * radius * radius + half_height * half_height / 3.0;
+            Vec3::new(side, side, 0.5 * radius * radius)
+        }
+        _ => panic!("no closed form for {shape:?}"),
+    };
+    Mat3::from_diagonal(&(diagonal * mass))
+}
+
+/// A free rigid body with one collider; its index.
+pub fn rigid(world: &mut World, shape: &Shape, mass: f64, pose: Pose, mu: Friction) -> usize {
+    let body = RigidBody::new(&pose, Vec3::zeros(), mass, inertia(shape, mass)).expect("a real body");
+    let index = world.add_rigid("body", body);
+    put(world, "body", (Mover::Rigid(index), Pose::identity()), shape, mu);
+    index
+}
+
+/// Lets everything settle on the flat, then leans gravity to `angle` (rad) within `seconds` and waits as long again.
+pub fn lean(world: &mut World, angle: f64, seconds: f64) {
+    run(world, 0.3);
+    let steps = (seconds / world.params.dt).round();
+    for step in 0..2 * steps as usize {
+        world.gravity = gravity(angle * ((step as f64 + 1.0) / steps).min(1.0));
+        world.step().expect("a step that converges");
+    }
+}
+
+/// Steps until `seconds` have passed.
+pub fn run(world: &mut World, seconds: f64) {
+    for _ in 0..(seconds / world.params.dt).round() as usize {
+        world.step().expect("a step that converges");
+    }
+}

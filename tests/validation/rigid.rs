@@ -1,0 +1,288 @@
+//! Free rigid bodies against closed forms: fall, slopes, tipping, rolling, stacks, collisions.
+
+use std::f64::consts::PI;
+
+use softvt::{
+    geometry::{Pose, Vec3, shape::Shape},
+    physics::World,
+};
+
+use crate::solids::{GRAVITY, at, cuboid, floor, friction, gravity, lean, rigid, run, tilted, turned, world};
+
+/// Friction of what stands or rolls on a floor.
+pub const MU: (f64, f64) = (0.6, 0.5);
+/// Friction of the sliding block, whose two coefficients differ more.
+pub const SLIDING: (f64, f64) = (0.6, 0.4);
+
+fn can() -> Shape {
+    Shape::Cylinder { radius: 0.033, half_height: 0.05 }
+}
+
+fn on_floor(shape: &Shape, pose: Pose) -> (World, usize) {
+    let mut world = world();
+    floor(&mut world, friction(MU.0, MU.1));
+    let body = rigid(&mut world, shape, 0.3, pose, friction(MU.0, MU.1));
+    (world, body)
+}
+
+fn position(world: &World, body: usize) -> Vec3 {
+    world.rigid[body].body.pose_w.translation.vector
+}
+
+/// Relative errors of speed and way after a free fall of one second.
+pub fn fall() -> [f64; 2] {
+    let mut world = world();
+    let body = rigid(&mut world, &cuboid(0.05, 0.06, 0.07), 0.3, Pose::identity(), friction(MU.0, MU.1));
+    world.rigid[body].body.w = Vec3::new(1.0, 2.0, 3.0);
+    run(&mut world, 1.0);
+    let way = -position(&world, body).z;
+    [-world.rigid[body].body.v.z / GRAVITY - 1.0, way / (0.5 * GRAVITY) - 1.0]
+}
+
+/// Acceleration along x between 0.2 s and 0.5 s.
+fn acceleration(mut world: World, body: usize) -> f64 {
+    run(&mut world, 0.2);
+    let before = world.rigid[body].body.v.x;
+    run(&mut world, 0.3);
+    (world.rigid[body].body.v.x - before) / 0.3
+}
+
+/// A block on a slope that has grown to `angle` (rad), and its acceleration over that of dynamic friction; and how far
+/// it creeps in 5 s, m.
+pub struct Slide {
+    pub acceleration: f64,
+    pub crept: f64,
+}
+
+/// A block on a slope of `angle`, rad.
+pub fn slide(angle: f64) -> Slide {
+    let slope = || {
+        let mut world = world();
+        floor(&mut world, friction(SLIDING.0, SLIDING.1));
+        let shape = cuboid(0.1, 0.1, 0.02);
+        let body = rigid(&mut world, &shape, 0.3, at(0.0, 0.0, 0.01), friction(0.0, 0.0));
+        lean(&mut world, angle, 0.5);
+        (world, body)
+    };
+    let (mut held, body) = slope();
+    let before = position(&held, body);
+    run(&mut held, 5.0);
+    let crept = (position(&held, body) - before).norm();
+    let (world, body) = slope();
+    let expected = GRAVITY * (angle.sin() - SLIDING.1 * angle.cos());
+    Slide { acceleration: acceleration(world, body) / expected, crept }
+}
+
+/// Acceleration of a ball and of a lying can from rest on half a degree, over the closed forms.
+pub fn rolls() -> [f64; 2] {
+    let slope = 0.5f64.to_radians();
+    let lying = turned(at(0.0, 0.0, 0.033), Vec3::x() * (0.5 * PI));
+    let bodies = [(Shape::Sphere { radius: 0.03 }, at(0.0, 0.0, 0.03), 5.0 / 7.0), (can(), lying, 2.0 / 3.0)];
+    bodies.map(|(shape, pose, share)| {
+        let mut world = tilted(slope);
+        floor(&mut world, friction(MU.0, MU.1));
+        let body = rigid(&mut world, &shape, 0.3, pose, friction(MU.0, MU.1));
+        acceleration(world, body) / (share * GRAVITY * slope.sin())
+    })
+}
+
+/// A body that stands on a rough slope.
+pub struct Standing {
+    pub name: &'static str,
+    shape: Shape,
+    pose: Pose,
+    /// Angle at which it tips, rad.
+    pub tips_at: f64,
+}
+
+/// A box and a can, which is turned so that different samples of its rim carry it.
+pub fn standing() -> Vec<Standing> {
+    let headed = |angle: f64| turned(at(0.0, 0.0, 0.05), Vec3::z() * angle);
+    let tall = cuboid(0.06, 0.08, 0.1);
+    let can_at = |name, turn| Standing { name, shape: can(), pose: headed(turn), tips_at: 0.66f64.atan() };
+    vec![
+        Standing { name: "box 60 × 80 × 100 mm", shape: tall, pose: headed(0.0), tips_at: 0.6f64.atan() },
+        can_at("can ⌀66 × 100 mm", 0.0),
+        can_at("the same, turned by 7.5°", PI / 24.0),
+        can_at("the same, turned by 2.9°", 0.05),
+    ]
+}
+
+impl Standing {
+    /// Whether it tips over its lower edge when the slope grows slowly from nothing to `angle`, rad.
+    fn tips(&self, angle: f64) -> bool {
+        let mut world = world();
+        floor(&mut world, friction(5.0, 5.0));
+        let body = rigid(&mut world, &self.shape, 0.3, self.pose, friction(0.0, 0.0));
+        lean(&mut world, angle, 1.5);
+        world.rigid[body].body.pose_w.rotation.angle_to(&self.pose.rotation) > 0.05
+    }
+
+    /// The angle at which it tips, rad, to a fiftieth of a degree; within two degrees of the closed form.
+    pub fn found(&self) -> f64 {
+        let (mut low, mut high) = (self.tips_at - 2f64.to_radians(), self.tips_at + 2f64.to_radians());
+        while high - low > 0.02f64.to_radians() {
+            let middle = 0.5 * (low + high);
+            if self.tips(middle) { high = middle } else { low = middle }
+        }
+        0.5 * (low + high)
+    }
+}
+
+/// How far any body moves (m) and turns (rad) within `seconds`.
+pub fn drift(world: &mut World, seconds: f64) -> [f64; 2] {
+    let before: Vec<Pose> = world.rigid.iter().map(|r| r.body.pose_w).collect();
+    run(world, seconds);
+    let moved = world.rigid.iter().zip(&before).map(|(rigid, before)| {
+        let now = rigid.body.pose_w;
+        let way = (now.translation.vector - before.translation.vector).norm();
+        [way, now.rotation.angle_to(&before.rotation)]
+    });
+    moved.fold([0.0; 2], |most, next| [most[0].max(next[0]), most[1].max(next[1])])
+}
+
+/// Drift of five boxes on each other over 10 s. A little askew, so that they are no special case.
+pub fn stack() -> [f64; 2] {
+    let shape = cuboid(0.05, 0.05, 0.05);
+    let pose = |i: usize| {
+        let shift = [0.0, 3e-3, -2e-3, 2e-3, -1e-3][i];
+        turned(at(shift, -0.5 * shift, 0.025 + 0.05 * i as f64), Vec3::z() * (20.0 * shift))
+    };
+    let (mut world, _) = on_floor(&shape, pose(0));
+    (1..5).for_each(|i| {
+        rigid(&mut world, &shape, 0.3, pose(i), friction(MU.0, MU.1));
+    });
+    run(&mut world, 1.0);
+    drift(&mut world, 10.0)
+}
+
+/// What a collision of two free boxes changes.
+#[derive(Debug)]
+pub struct Collision {
+    /// Momentum and angular momentum, relative.
+    pub momentum: f64,
+    pub spin: f64,
+    /// Energy after over before.
+    pub energy: f64,
+}
+
+/// Two boxes that meet off their centres, with friction.
+fn colliding() -> World {
+    let mut world = World::new(world().params, Vec3::zeros());
+    let shape = cuboid(0.05, 0.06, 0.07);
+    let tilt = turned(at(0.12, 0.01, -0.01), Vec3::new(0.3, 0.2, 0.5));
+    let a = rigid(&mut world, &shape, 0.3, Pose::identity(), friction(MU.0, MU.1));
+    let b = rigid(&mut world, &shape, 0.5, tilt, friction(MU.0, MU.1));
+    (world.rigid[a].body.v, world.rigid[a].body.w) = (Vec3::new(1.0, 0.2, 0.1), Vec3::new(0.0, 1.0, 2.0));
+    world.rigid[b].body.v = Vec3::new(-0.5, 0.0, 0.0);
+    world
+}
+
+pub fn collision() -> Collision {
+    let mut world = colliding();
+    let sums = |world: &World| {
+        let bodies = world.rigid.iter().map(|r| &r.body);
+        let linear = bodies.clone().map(|b| b.momentum()).sum::<Vec3>();
+        (linear, bodies.map(|b| b.angular_momentum()).sum::<Vec3>())
+    };
+    let ((linear, angular), energy) = (sums(&world), world.energy().total());
+    run(&mut world, 0.5);
+    let (linear_now, angular_now) = sums(&world);
+    Collision {
+        momentum: (linear_now - linear).norm() / linear.norm(),
+        spin: (angular_now - angular).norm() / angular.norm(),
+        energy: world.energy().total() / energy,
+    }
+}
+
+/// Largest gain of energy in one step, of the energy at the start (potential: over the floor), by scene.
+pub fn largest_gains() -> Vec<(&'static str, f64)> {
+    let block = cuboid(0.05, 0.06, 0.07);
+    let tumbling = || {
+        let (mut world, body) = on_floor(&block, turned(at(0.0, 0.0, 0.3), Vec3::new(0.4, 0.3, 0.2)));
+        world.rigid[body].body.w = Vec3::new(4.0, 3.0, 1.0);
+        world.rigid[body].body.v = Vec3::x() * 0.5;
+        world
+    };
+    let rolling = || {
+        let (mut world, _) = on_floor(&Shape::Sphere { radius: 0.03 }, at(0.0, 0.0, 0.03));
+        world.gravity = gravity(0.05);
+        world.rigid[0].body.v = -Vec3::x();
+        world.rigid[0].body.w = -Vec3::y() / 0.03;
+        world
+    };
+    let tipping = || on_floor(&cuboid(0.03, 0.03, 0.2), turned(at(0.0, 0.0, 0.105), Vec3::y() * 0.2)).0;
+    let scenes: [(&str, &dyn Fn() -> World); 4] = [
+        ("two boxes collide", &colliding),
+        ("a turning box falls and tumbles", &tumbling),
+        ("a ball rolls up a slope and back", &rolling),
+        ("a tall box falls over", &tipping),
+    ];
+    scenes.into_iter().map(|(name, make)| (name, largest_gain(make()))).collect()
+}
+
+fn largest_gain(mut world: World) -> f64 {
+    let start = world.energy().total();
+    let (mut last, mut most) = (start, f64::NEG_INFINITY);
+    for _ in 0..180 {
+        world.step().expect("a step that converges");
+        let now = world.energy().total();
+        most = most.max((now - last) / start);
+        last = now;
+    }
+    most
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_falling_body_has_the_speed_of_the_closed_form_and_its_way_to_first_order() {
+        let [speed, way] = fall();
+        assert!(speed.abs() < 1e-9 && (way - 1.0 / 60.0).abs() < 1e-9, "{speed} {way}");
+    }
+
+    #[test]
+    fn a_block_sticks_below_the_static_angle_and_slides_above_it_with_dynamic_friction() {
+        let held = slide(SLIDING.0.atan() - 0.02);
+        assert!(held.crept < 1e-6, "crept {} m in 5 s", held.crept);
+        for angle in [SLIDING.0.atan() + 0.02, 0.8] {
+            let ratio = slide(angle).acceleration;
+            assert!((ratio - 1.0).abs() < 0.01, "{angle}: {ratio}");
+        }
+    }
+
+    #[test]
+    fn balls_and_cans_roll_from_rest_on_half_a_degree() {
+        assert!(rolls().iter().all(|ratio| (ratio - 1.0).abs() < 0.01), "{:?}", rolls());
+    }
+
+    #[test]
+    fn boxes_and_cans_tip_within_three_tenths_of_a_degree_of_their_angle() {
+        for body in standing() {
+            let off = (body.found() - body.tips_at).to_degrees();
+            assert!(off.abs() < 0.3, "{}: {off}°", body.name);
+        }
+    }
+
+    #[test]
+    fn a_stack_of_five_boxes_stands_still_for_ten_seconds() {
+        let [moved, turned] = stack();
+        assert!(moved < 1e-6 && turned < 1e-5, "moved {moved} m, turned {turned} rad");
+    }
+
+    #[test]
+    fn a_collision_keeps_momentum_and_makes_no_energy() {
+        let collision = collision();
+        assert!(collision.momentum < 1e-6 && collision.spin < 0.01, "{collision:?}");
+        assert!(collision.energy < 0.9, "they met: {collision:?}");
+    }
+
+    #[test]
+    fn no_step_gains_energy() {
+        for (name, gain) in largest_gains() {
+            assert!(gain < 1e-3, "{name}: {gain}");
+        }
+    }
+}
