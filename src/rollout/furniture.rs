@@ -11,7 +11,7 @@ use crate::{
     message::number,
     physics::{
         World,
-        contact::{Collider, Friction, Mover, manifold::skin_samples},
+        contact::{Collider, Friction, Mover},
         joints::{JointKind, Link, Tree},
     },
     scene::{Motion, Object, Part},
@@ -23,6 +23,8 @@ const LEAST_WALL: f64 = 4e-3;
 const WALL_STEP: f64 = 2e-4;
 /// Share of a part's surface that may have a thin wall under it: rims and edges do.
 const THIN_SHARE: f64 = 0.1;
+/// Rays along each edge of a side from which walls are looked for.
+const RAYS: usize = 12;
 
 /// Puts the parts of an articulated object into `world`; their handles come after that of the whole, which is `base`.
 pub(super) fn add(
@@ -105,17 +107,40 @@ fn check_walls(object: &Object, part: &Part, cache: &RestCache) -> Result<(), Bu
 
 /// Typical thickness of the walls of a shape that are too thin, m; `None` if too little of its surface has such.
 pub(super) fn thin_wall(shape: &Shape) -> Option<f64> {
-    let seeds = skin_samples(shape).seeds;
+    let hits = seen_from_outside(shape);
     let steps = (LEAST_WALL / WALL_STEP).round() as usize;
     let under = |p: &Vec3| {
         let normal = shape.distance_and_normal(p).1;
-        let depths = (1..steps).map(|step| WALL_STEP * step as f64);
-        depths.into_iter().find(|depth| shape.distance(&(p - normal * *depth)) > 0.0)
+        let mut depths = (1..steps).map(|step| WALL_STEP * step as f64);
+        depths.find(|depth| shape.distance(&(p - normal * *depth)) > 0.0)
     };
-    let mut thin: Vec<f64> = seeds.iter().filter_map(under).collect();
-    if thin.len() as f64 <= THIN_SHARE * seeds.len() as f64 {
+    let mut thin: Vec<f64> = hits.iter().filter_map(under).collect();
+    if thin.len() as f64 <= THIN_SHARE * hits.len() as f64 {
         return None;
     }
     thin.sort_by(f64::total_cmp);
     Some(thin[thin.len() / 2])
+}
+
+/// Points of the surface that parallel rays along the six directions of the axes meet first. Rays find walls however
+/// thin, which a grid would miss.
+fn seen_from_outside(shape: &Shape) -> Vec<Vec3> {
+    let bounds = shape.bounds();
+    let size = bounds.size();
+    let mut hits = Vec::new();
+    for (axis, far) in (0..3).flat_map(|axis| [(axis, false), (axis, true)]) {
+        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+        let mut ahead = Vec3::zeros();
+        ahead[axis] = if far { -1.0 } else { 1.0 };
+        for cell in 0..RAYS * RAYS {
+            let share = |index: usize| (index as f64 + 0.5) / RAYS as f64;
+            let mut start = if far { bounds.max } else { bounds.min };
+            start[u] = bounds.min[u] + size[u] * share(cell % RAYS);
+            start[v] = bounds.min[v] + size[v] * share(cell / RAYS);
+            start -= ahead * LEAST_WALL;
+            let hit = shape.ray(&start, &ahead, size[axis] + 2.0 * LEAST_WALL);
+            hits.extend(hit.map(|length| start + ahead * length));
+        }
+    }
+    hits
 }
