@@ -144,6 +144,17 @@ pub fn finger_boxes(side: Side) -> [BodyBox; 2] {
     [at(CASE_HALF, APEX_Z), at(Vec3::new(0.0105, 0.010, bracket_z), bracket_z)]
 }
 
+/// Half extents of the box around a gel, finger axes, m.
+pub(super) fn gel_half() -> Vec3 {
+    let pad = PadSurface::default();
+    Vec3::new(pad.width, pad.thickness, pad.length) / 2.0
+}
+
+/// Middle of the box around a gel, in the finger's link frame.
+pub(super) fn gel_centre_in_finger(side: Side) -> Pose {
+    Pose::translation(0.0, outward(side) * gel_half().y, APEX_Z)
+}
+
 /// The hand's body, in the frame of the link that carries it.
 pub fn hand_boxes() -> [BodyBox; 1] {
     let pose = super::panda::hand_in_link() * Pose::translation(0.0, 0.0, HAND_HALF.z);

@@ -264,6 +264,13 @@ pub static CLASSES: &[Class] = &[
         methods: &[
             method("object", &[("name", "string")], &["softvt.Seen"], "An object."),
             method("objects", &[], &["softvt.Seen[]"], "All objects, in the order of the scene."),
+            method(
+                "clearance",
+                &[("pose", "softvt.Pose"), ("options?", "{width: number?, ignore: string[]?}")],
+                &["number", "string?"],
+                "Metres (at most 0.2) between a hand at pose, its fingers width (m, 0.08) apart, and the nearest object that \
+                 is not to be ignored, and the name of that; negative inside.",
+            ),
         ],
     },
     Class {

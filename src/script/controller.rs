@@ -118,10 +118,10 @@ fn seen(sim: &Simulation, object: &Handle) -> ObjectView {
     let x = pose.rotation * Vec3::x();
     ObjectView {
         name: object.name.clone(),
-        asset: object.asset.name.clone(),
+        asset: object.asset.clone(),
+        pose_w: pose,
+        bounds,
         centre_w,
         yaw: x.y.atan2(x.x),
-        size: bounds.size(),
-        hints: object.asset.hints.clone(),
     }
 }

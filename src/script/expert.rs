@@ -1,13 +1,10 @@
 //! Experts: Lua coroutines that see the true state and give one command a control step.
 
-use std::{
-    collections::BTreeMap,
-    sync::{Arc, Mutex},
-};
+use std::sync::{Arc, Mutex};
 
 use mlua::{
-    Function, Lua, MetaMethod, MultiValue, Table, Thread, UserData, UserDataFields, UserDataMethods, Value,
-    chunk::ChunkMode,
+    FromLua, Function, Lua, MetaMethod, MultiValue, Table, Thread, UserData, UserDataFields, UserDataMethods,
+    Value, chunk::ChunkMode,
 };
 
 use super::{
@@ -18,23 +15,27 @@ use super::{
     schema::{self, number, unknown},
     sources::embedded,
 };
-use crate::geometry::{Pose, Vec3};
+use crate::{
+    geometry::{Pose, Vec3, shape::Aabb},
+    robot::{Obstacle, clearance, gripper::OPENING},
+    scene::{Asset, Body},
+};
 
 /// What an expert may know of an object.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObjectView {
     /// Name in the scene.
     pub name: String,
-    /// Name of the asset.
-    pub asset: String,
+    /// Its asset.
+    pub asset: Arc<Asset>,
+    /// Object frame in the world.
+    pub pose_w: Pose,
+    /// Bounds of its shape at rest, object frame.
+    pub bounds: Aabb,
     /// Middle of its bounding box, world frame, m.
     pub centre_w: Vec3,
     /// Turn about the vertical, rad.
     pub yaw: f64,
-    /// Edge lengths of its bounding box at rest, in its own frame, m.
-    pub size: Vec3,
-    /// Numbers that its asset gives to experts.
-    pub hints: BTreeMap<String, f64>,
 }
 
 /// What an expert may know at a control step: the true state, copied.
@@ -278,6 +279,7 @@ impl UserData for View {
                 }
             })
         });
+        methods.add_method("clearance", room);
         methods.add_method("objects", |lua, this, ()| {
             with(lua, &this.0, |view| {
                 let tables = view.objects.iter().map(|object| seen(lua, object));
@@ -287,14 +289,59 @@ impl UserData for View {
     }
 }
 
+/// Distances of the hand from things are told apart up to this, m.
+const FAR: f64 = 0.2;
+
+/// Metres between a hand at `pose` and the nearest thing that is not to be ignored, and its name.
+fn room(
+    lua: &Lua,
+    this: &View,
+    (pose, options): (LuaPose, Option<Table>),
+) -> mlua::Result<(f64, Option<String>)> {
+    let (mut width, mut ignored) = (OPENING, Vec::new());
+    for (key, value) in options.iter().flat_map(schema::sorted_pairs) {
+        match key.to_string()?.as_str() {
+            "width" => {
+                width = number(&value).filter(|w| (0.0..=OPENING).contains(w)).ok_or_else(|| {
+                    let got = schema::got(&value);
+                    fail(lua, format!("scene:clearance: width: expected metres in 0..{OPENING}, got {got}"))
+                })?;
+            }
+            "ignore" => {
+                ignored = Vec::<String>::from_lua(value, lua)
+                    .map_err(|_| fail(lua, "scene:clearance: ignore: expected a list of names of objects"))?;
+            }
+            other => {
+                let message = unknown("option", other, ["width", "ignore"].into_iter());
+                return Err(fail(lua, format!("scene:clearance: {message}")));
+            }
+        }
+    }
+    with(lua, &this.0, |view| {
+        let known = || view.objects.iter().map(|object| object.name.as_str());
+        if let Some(name) = ignored.iter().find(|name| !known().any(|other| other == name.as_str())) {
+            return Err(fail(lua, format!("scene:clearance: ignore: {}", unknown("object", name, known()))));
+        }
+        let solid =
+            |object: &&ObjectView| object.asset.body != Body::Scenery && !ignored.contains(&object.name);
+        let objects: Vec<&ObjectView> = view.objects.iter().filter(solid).collect();
+        let obstacles: Vec<Obstacle<'_>> = objects
+            .iter()
+            .map(|o| Obstacle { pose_w: o.pose_w, shape: &o.asset.shape, bounds: o.bounds })
+            .collect();
+        let (metres, nearest) = clearance(&pose.0, width, &obstacles, FAR);
+        Ok((metres, nearest.map(|index| objects[index].name.clone())))
+    })
+}
+
 fn seen(lua: &Lua, object: &ObjectView) -> mlua::Result<Table> {
     let table = lua.create_table()?;
     table.set("name", object.name.as_str())?;
-    table.set("asset", object.asset.as_str())?;
+    table.set("asset", object.asset.name.as_str())?;
     table.set("xyz", lua.create_sequence_from(object.centre_w.iter().copied())?)?;
-    table.set("size", lua.create_sequence_from(object.size.iter().copied())?)?;
+    table.set("size", lua.create_sequence_from(object.bounds.size().iter().copied())?)?;
     table.set("yaw", object.yaw)?;
-    let hints = object.hints.iter().map(|(name, value)| (name.as_str(), *value));
+    let hints = object.asset.hints.iter().map(|(name, value)| (name.as_str(), *value));
     table.set("hints", lua.create_table_from(hints)?)?;
     let names = ["name", "asset", "xyz", "size", "yaw", "hints"].map(str::to_string).to_vec();
     super::options::strict(lua, "object", table, names)
