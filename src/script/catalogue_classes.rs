@@ -161,6 +161,18 @@ pub static CLASSES: &[Class] = &[
                 "Moved by an offset in the world frame, m.",
             ),
             method(
+                "at",
+                &[("xyz", "number[]")],
+                &["softvt.Pose"],
+                "The same orientation at another place, m.",
+            ),
+            method(
+                "turned",
+                &[("angle", "number")],
+                &["softvt.Pose"],
+                "Turned where it is about the world's vertical, rad.",
+            ),
+            method(
                 "towards",
                 &[("other", "softvt.Pose"), ("share", "number")],
                 &["softvt.Pose"],

@@ -64,6 +64,13 @@ impl UserData for LuaPose {
             pose.translation.vector += Vec3::from(by);
             Ok(Self(pose))
         });
+        methods.add_method("at", |_, this, xyz: [f64; 3]| {
+            Ok(Self(Pose::from_parts(Vec3::from(xyz).into(), this.0.rotation)))
+        });
+        methods.add_method("turned", |_, this, angle: f64| {
+            let turn = Quat::from_axis_angle(&Vec3::z_axis(), angle);
+            Ok(Self(Pose::from_parts(this.0.translation, turn * this.0.rotation)))
+        });
         methods.add_method("towards", |_, this, (other, share): (Self, f64)| {
             let at = this.0.translation.vector.lerp(&other.0.translation.vector, share);
             // The spherical mean of opposite orientations is not defined; any shortest way will do.
@@ -90,7 +97,8 @@ impl UserData for LuaPose {
                 "xyz" => list(&[at.x, at.y, at.z]),
                 "quat" => list(&[sign * q.w, sign * q.i, sign * q.j, sign * q.k]),
                 _ => {
-                    let known = ["x", "y", "z", "xyz", "quat", "moved", "towards", "distance"];
+                    let known =
+                        ["x", "y", "z", "xyz", "quat", "moved", "at", "turned", "towards", "distance"];
                     Err(fail(lua, format!("pose: {}", unknown("key", &key, known.into_iter()))))
                 }
             }
