@@ -16,7 +16,7 @@ end
 
 -- Segments: place along the arc, length, width, height over the table (mm). Each overlaps the next, which is smaller.
 local SEGMENTS = {
-  { 0, 34, 39.6, 36 }, { 14.5, 28, 35, 32.5 }, { 27, 24, 28, 26.5 }, { 37.8, 20, 20, 20 }, { 46.4, 15, 12, 13.5 },
+  { 0, 34, 39.6, 36 }, { 14.5, 28, 35, 32.5 }, { 27, 24, 28, 26.5 }, { 37.8, 20, 20, 20 }, { 46.7, 15.2, 12, 13.5 },
 }
 local BELOW = 4
 

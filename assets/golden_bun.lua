@@ -12,9 +12,9 @@ end
 local table_top = softvt.shape.box { size = { 0.1, 0.1, 0.02 } }:translate(0, 0, -0.01)
 
 -- Cuts: narrow grooves that turn outwards in arcs and end above the fingers.
-local CUT = 3 * mm
+local CUT = 2.8 * mm
 local cut = {
-  axis = "z", count = 5, radial_pitch = 50 * mm, height = -CUT, sharpness = 3, mask = { axis = "z", from = 19 * mm, to = 30 * mm },
+  axis = "z", count = 5, radial_pitch = 50 * mm, height = -CUT, sharpness = 2.6, mask = { axis = "z", from = 19 * mm, to = 30 * mm },
 }
 local pinwheel = dome(0):ridges(cut)
 

@@ -13,5 +13,5 @@ return softvt.asset {
   shape = ball:subtract(table_top, 2 * mm),
   body = softvt.soft { youngs_pa = 60e3, poisson = 0.40, density = 200 },
   hints = { grasp_height_m = SIZE / 2 },
-  visuals = { material.silicone { base = { 0.82, 0.46, 0.035 }, seed = 171 } },
+  visuals = { material.silicone { base = { 0.86, 0.60, 0.05 }, seed = 171 } },
 }

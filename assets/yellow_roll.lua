@@ -38,7 +38,7 @@ return softvt.asset {
   body = softvt.soft { youngs_pa = 55e3, poisson = 0.34, density = 230, resolution = 8 },
   hints = { grasp_height_m = 22.5 * mm },
   visuals = {
-    material.floured(skin, { seed = 125, opacity = 0.55 }),
+    material.floured(skin, { seed = 125, opacity = 0.6, size_m = 6 * mm }),
     material.frosting { base = { 0.90, 0.86, 0.74 }, seed = 126 },
   },
 }

@@ -32,7 +32,7 @@ end
 local function alone(name)
   local size = size_of(name)
   local across = math.sqrt(size[1] ^ 2 + size[2] ^ 2 + size[3] ^ 2)
-  local reach = 0.92 * across / 2 / math.sin(FOVY / 2)
+  local reach = 0.99 * across / 2 / math.sin(FOVY / 2)
   return softvt.layout("portrait_" .. name, function(scene)
     scene:add { name = "table", asset = table_top, xyz = { 0, 0, 0 } }
     scene:add { name = "object", asset = assets[name], at = { 0.1, 0 }, yaw = math.rad(25) }

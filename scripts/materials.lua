@@ -106,7 +106,7 @@ function material.silicone(o)
     layers = {
       layer(mask.noise { size_m = 22 * mm, octaves = 3, from = 0.45, to = 0.8, seed = seed }, pale, 0.46, 0.4),
       layer(mask.noise { size_m = 9 * mm, octaves = 3, from = 0.5, to = 0.85, seed = seed + 1 }, deep, 0.34, 0.4),
-      pores(1.8 * mm, 0.10 * mm, seed + 3, base),
+      pores(1.6 * mm, 0.06 * mm, seed + 3, base),
     },
   }
 end
