@@ -16,6 +16,6 @@ return {
   spiral_roll = { lower = 0.4200, at_tau = 0.7468 },
   steamed_bun = { lower = 0.2600, at_tau = 0.6202 },
   twisted_stick = { lower = 0.6400, at_tau = 0.8418 },
-  wedge = { lower = 0.3800, at_tau = 0.6989 },
+  wedge = { lower = 0.3800, at_tau = 0.7165 },
   yellow_roll = { lower = 0.4000, at_tau = 0.7248 },
 }
