@@ -10,12 +10,11 @@
 -- Writes assets/calibration/<asset>.json, the sweep rows in SoftVTBench's fields beside it, and scripts/calibrated.lua.
 local grasp = require "experts.grasp"
 local known = require "calibrated"
+local soft_assets = require "soft_assets"
 local table_top = require "assets.table"
 
-local STANDARD = { "spiral_roll", "steamed_bun", "small_ridged_roll", "braided_roll", "sesame_bun" }
-
 local opt = softvt.options {
-  asset = { default = STANDARD, help = "assets to calibrate" },
+  asset = { default = soft_assets, help = "assets to calibrate" },
   step = { default = 0.02, min = 0.002, max = 0.2, help = "step of the closure" },
   trials = { default = 5, integer = true, min = 1, max = 100, help = "hold trials at each closure" },
   hold_s = { default = 2, unit = "s", min = 0.1, max = 60, help = "how long a trial holds" },
