@@ -1,10 +1,11 @@
 //! What is drawn of a thing: triangles with normals and baked looks, in the object frame at rest.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::Arc};
 
 use super::{
     CameraError, V3,
-    facet::{self, Facet},
+    charts::{self, Cloth},
+    facet::{self, Facet, PRINT},
     pattern::{self, Look},
     surface::TRIANGLE_BITS,
     turned::turned,
@@ -77,12 +78,19 @@ impl Model {
     /// As [`Model::of_shape`].
     pub fn of_skin(name: &str, shape: &Shape, visuals: &[Visual]) -> Result<Self, CameraError> {
         let longest = shape.bounds().size().max();
-        let mut levels = Vec::new();
+        let (mut levels, mut facets) = (Vec::new(), Vec::new());
+        let cloth = visuals
+            .iter()
+            .any(pattern::printed)
+            .then(|| Arc::new(Cloth { shape: shape.clone(), visuals: visuals.to_vec() }));
         for cells in CELLS {
             let cell = longest / cells;
             let (mesh, materials) = triangles(shape, cell);
             check(name, &mesh, &materials, visuals)?;
             let mut level = bake(&mesh, &materials, visuals, cell as f32, Some(shape));
+            if let Some(cloth) = &cloth {
+                charts::wrap(&mut level, &mut facets, cloth, PRINT * (CELLS[0] / cells) as f32);
+            }
             if !levels.is_empty() && level.plain {
                 level.flaw = flaw(&mesh, shape);
             }
@@ -91,7 +99,7 @@ impl Model {
                 break;
             }
         }
-        Ok(Self { levels, facets: Vec::new() })
+        Ok(Self { levels, facets })
     }
 
     /// The drawn form of triangles, closed or not, seen from their counter-clockwise side. `materials` is the visual of
@@ -112,7 +120,7 @@ impl Model {
             Mesh { vertices: mesh.vertices.clone(), triangles: mesh.triangles.clone(), uvs: Vec::new() };
         let patterned = materials.iter().any(|&m| !visuals[m as usize].layers.is_empty());
         let longest = extent(&mesh.vertices).max();
-        if patterned && facet::worth_it(&mesh) {
+        if patterned && facet::worth_it(&mesh, visuals.iter().any(pattern::printed)) {
             let (level, facets) = facet::bake(&mesh, &materials, visuals);
             return Ok(Self { levels: vec![level], facets });
         }
