@@ -17,8 +17,8 @@ for _, at in ipairs { { -24, -11 }, { 24, -11 }, { 0, -13 } } do
 end
 top.bar(0, 15, 83, 19, CREAM)
 top.bar(0, 6.4, 83, 0.8, DOUGH)
-top.text("COOKIES", 0, 16, 9.6, RED, { weight = 0.22 })
-top.text("with dark chocolate chips", 0, 8.6, 2.5, CHIP, { weight = 0.1 })
+top.text("COOKIES", 0, 17.2, 9.4, RED, { weight = 0.22 })
+top.text("with dark chocolate chips", 0, 9, 2.3, CHIP, { weight = 0.1 })
 top.text("CRUMBLE & CO", 0, 27.3, 3.2, CREAM, { weight = 0.16 })
 
 local layers = top.layers

@@ -12,9 +12,9 @@ top.polygon(-21, 1.5, { { -20, 0 }, { 20, 0 }, { 3, 15 }, { -2, 15.5 } }, SKY)
 top.polygon(18, 1.5, { { -24, 0 }, { 22, 0 }, { 4, 17 }, { -1, 17.5 } }, SKY)
 top.polygon(-20.5, 10.5, { { -8.6, 0 }, { -4, -1.8 }, { 0, 0.4 }, { 4, -2 }, { 9, 0 }, { 3, 6.4 }, { -2, 6.9 } }, WHITE)
 top.polygon(18.5, 11.5, { { -9.4, 0 }, { -4, -2 }, { 0, 0.4 }, { 5, -2 }, { 10.6, 0 }, { 4, 7.2 }, { -1.5, 7.7 } }, WHITE)
-top.text("CREAM CHEESE", 0, -5.2, 6.4, BLUE, { weight = 0.2 })
+top.text("CREAM CHEESE", 0, -5.2, 6.0, BLUE, { weight = 0.2 })
 top.text("SNOWFIELD", 0, -14.4, 3.4, SKY, { weight = 0.16 })
-top.text("soft & mild", 28, -14.4, 2.6, BLUE)
+top.text("soft & mild", 29, -14.4, 2.6, BLUE)
 top.text("200 g", -31, -14.4, 2.6, BLUE)
 
 local sides = packages.label { on = { "+y", "-y" }, out = 21.5 }

@@ -18,7 +18,7 @@ label.ink(patches:both(softvt.mask.inside { shape = packages.band(-1, 40) }), BL
 label.belt(86, 94, BLUE)
 label.belt(94, 140, DEEP)
 label.belt(84, 84.8, BLUE)
-label.text("MILK", 0, 62, 14, BLUE, { weight = 0.2 })
+label.text("MILK", 0, 62, 12.4, BLUE, { weight = 0.2 })
 label.text("whole & fresh", 0, 48.5, 4.2, DEEP, { weight = 0.12 })
 label.text("MEADOWBELL", 0, 90, 4.4, WHITE, { weight = 0.16 })
 label.text("1 L", 17, 76.5, 4.2, DEEP)

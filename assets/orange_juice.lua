@@ -23,9 +23,9 @@ label.oval(0, 34, 35, 35, { 0.90, 0.36, 0.03 })
 for i = 0, 3 do label.bar(0, 34, 37, 1.3, CREAM, { lean = i * math.pi / 4 + 0.2 }) end
 label.oval(0, 34, 5, 5, CREAM)
 label.leaf(17, 55, 15, 0.6, GREEN)
-label.text("ORANGE", 0, 81, 7.6, CREAM, { weight = 0.2 })
-label.text("JUICE", 0, 69, 7.6, CREAM, { weight = 0.2 })
-label.text("SUNNY GROVE", 0, 93, 4.0, CREAM, { weight = 0.14 })
+label.text("ORANGE", 0, 80.5, 6.7, CREAM, { weight = 0.2 })
+label.text("JUICE", 0, 69, 6.7, CREAM, { weight = 0.2 })
+label.text("SUNNY GROVE", 0, 92, 3.8, CREAM, { weight = 0.14 })
 
 return softvt.asset {
   name = "orange_juice",

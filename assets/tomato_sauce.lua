@@ -6,7 +6,7 @@ local packages = require "packages"
 
 local RED, CREAM, GREEN, DARK = { 0.56, 0.022, 0.014 }, { 0.89, 0.80, 0.58 }, { 0.025, 0.19, 0.03 }, { 0.30, 0.010, 0.008 }
 
-local label = packages.label { on = { "+x", "-x" }, out = 30.2, wrap = 30.2 }
+local label = packages.label { on = { "+x", "-x" }, out = 30.2, wrap = 30.2, round = 8 }
 label.belt(40, 72.4, DARK)
 label.belt(38, 39, DARK)
 label.belt(4, 7, GREEN)

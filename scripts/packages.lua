@@ -64,10 +64,12 @@ end
 
 -- A label: the same print on each of the faces `on`, which are named by the direction in which they look ("+z" is the top).
 -- Places are mm to the reader's right and up from the object's origin; `out` is how far the faces are from it, `turn` turns
--- what is on top. With `wrap`, a radius in mm, text runs round the z axis. Motifs reach through everything from `out` / 4 on.
+-- what is on top. On round things `round` is how near to the middle motifs reach; with `wrap`, a radius in mm, text runs round
+-- the z axis.
 function packages.label(spec)
   local label = { layers = {} }
   local out, turn = spec.out, spec.turn or 0
+  local inner = spec.round or out - 0.5
 
   -- Another layer on top of the others.
   function label.ink(where, albedo, more)
@@ -79,7 +81,7 @@ function packages.label(spec)
   function label.motif(shape, x, y, albedo, more)
     local all
     for _, face in ipairs(spec.on) do
-      local here = shape:translate(x * mm, y * mm, (out / 4 + 100) * mm):rotate { axis = "z", angle = turn }
+      local here = shape:translate(x * mm, y * mm, (inner + 100) * mm):rotate { axis = "z", angle = turn }
       here = onto(here, face)
       all = all and all:union(here) or here
     end

@@ -13,10 +13,7 @@ end
 
 -- A board floor whose top is its origin; darker where something stands close above it (`under`, a shape).
 local function floor(under)
-  local look = material.wood {
-    base = { 0.150, 0.120, 0.095 }, dark = { 0.075, 0.058, 0.046 }, light = { 0.20, 0.165, 0.13 },
-    length_m = 1.6, width_m = 0.19, seed = 21,
-  }
+  local look = material.floorboards()
   if under then
     table.insert(look.layers, {
       mask = mask.inside { shape = under, soft_m = 0.9 }, albedo = { 0.035, 0.028, 0.022 }, roughness = 0.7, opacity = 0.8,
@@ -68,7 +65,7 @@ local function room(scene, floor_z, ground)
 end
 
 -- A room around a scene whose support is its floor, z = 0: walls behind the robot and on the side away from the light. What
--- things stand on there must be the scene's own; this floor lies just beneath.
+-- things stand on there must be the scene's own; this floor lies just beneath. assets/floor.lua has the same boards.
 function scenery.floor_room(scene)
   room(scene, -1 * mm, plain_floor)
 end

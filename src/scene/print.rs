@@ -256,7 +256,10 @@ mod tests {
         for width in [1e-3, 4e-3, 1.6e-2] {
             assert!((ink(width) / fine - 1.0).abs() < 1e-6, "{width}: {} of {fine}", ink(width));
         }
-        assert!(fine > 1.2 * letters("softvt", 0.0).letters().share(0.0, 0.0, 0.08) * 0.0064, "thicker strokes");
+        assert!(
+            fine > 1.2 * letters("softvt", 0.0).letters().share(0.0, 0.0, 0.08) * 0.0064,
+            "thicker strokes"
+        );
     }
 
     #[test]

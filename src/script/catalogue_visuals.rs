@@ -223,8 +223,18 @@ mask!(
     "The letters of a line of text, printed on what faces who reads it. Surfaces with text are drawn with finer detail than others.",
     &[
         field("text", Type::Text, Required, "What it says: at most 64 letters."),
-        field("height_m", Type::Number("m", Range::closed(0.0005, 1.0)), Required, "Height of a capital letter."),
-        field("at", Type::Vector(3, "m"), Required, "Where the middle of the line is; of a line that is wrapped, only its height counts."),
+        field(
+            "height_m",
+            Type::Number("m", Range::closed(0.0005, 1.0)),
+            Required,
+            "Height of a capital letter."
+        ),
+        field(
+            "at",
+            Type::Vector(3, "m"),
+            Required,
+            "Where the middle of the line is; of a line that is wrapped, only its height counts."
+        ),
         field(
             "facing",
             Type::OneOf(&[

@@ -125,10 +125,12 @@ fn line(spec: &Table, wrong: &dyn Fn(&str, &str) -> mlua::Error) -> mlua::Result
         return Err(wrong("facing", "expected a direction, its length between 1e-6 and 1e6"));
     }
     if wrap_m.is_some() && facing[0].hypot(facing[1]) < 1e-3 * length {
-        return Err(wrong("facing", "expected a direction to a side, since the line is laid round the z axis"));
+        return Err(wrong(
+            "facing",
+            "expected a direction to a side, since the line is laid round the z axis",
+        ));
     }
-    let typeface =
-        if spec.get::<String>("font")? == "mono" { Typeface::Mono } else { Typeface::Sans };
+    let typeface = if spec.get::<String>("font")? == "mono" { Typeface::Mono } else { Typeface::Sans };
     let line = Line {
         text,
         typeface,
@@ -141,7 +143,8 @@ fn line(spec: &Table, wrong: &dyn Fn(&str, &str) -> mlua::Error) -> mlua::Result
     };
     match line.missing() {
         Some(letter) => {
-            let what = format!("the typeface has no letter {letter:?}; expected Latin, Greek or Cyrillic ones");
+            let what =
+                format!("the typeface has no letter {letter:?}; expected Latin, Greek or Cyrillic ones");
             Err(wrong("text", &what))
         }
         None => Ok(line),

@@ -158,7 +158,10 @@ fn a_wrong_look_is_named_with_its_line_and_the_mend() {
         ),
         (
             "mask = mask.text { text = 'x', height_m = 0.01, at = { 0, 0, 0 }, facing = '+z', wrap_m = 0.1 },",
-            at(8, "mask.text.facing: expected a direction to a side, since the line is laid round the z axis"),
+            at(
+                8,
+                "mask.text.facing: expected a direction to a side, since the line is laid round the z axis",
+            ),
         ),
         (
             "mask = mask.specks { spacing_m = 1, radius_m = 0.6 },",

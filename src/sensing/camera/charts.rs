@@ -37,7 +37,9 @@ pub(super) fn wrap(level: &mut Level, facets: &mut Vec<Facet>, cloth: &Arc<Cloth
         let curved = Curved { cloth: cloth.clone(), triangles: own };
         facets.push(Facet::curved(&direction(axis), &corners, texel, curved));
     }
-    let place = |(t, &facet): (&[u32; 3], &u32)| t.map(|v| facets[facet as usize].place(&level.positions[v as usize]));
+    let place = |(t, &facet): (&[u32; 3], &u32)| {
+        t.map(|v| facets[facet as usize].place(&level.positions[v as usize]))
+    };
     level.places = level.triangles.iter().zip(&chart_of).map(place).collect();
     level.facets = chart_of;
     level.plain = true;
@@ -113,7 +115,8 @@ fn spread(
     size: [usize; 2],
     points: &mut [Option<(f32, V3, V3)>],
 ) {
-    let cross = |a: [f32; 2], b: [f32; 2], p: [f32; 2]| (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
+    let cross =
+        |a: [f32; 2], b: [f32; 2], p: [f32; 2]| (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
     let area = cross(at[0], at[1], at[2]);
     if area <= 0.0 {
         return;
@@ -154,8 +157,10 @@ fn filled(texels: Vec<Option<[f32; 4]>>, size: [usize; 2]) -> Vec<[f32; 4]> {
     let mean = |i: usize| {
         let (x, y) = (2 * (i % half[0]), 2 * (i / half[0]));
         let four = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)].into_iter();
-        let own: Vec<[f32; 4]> =
-            four.filter(|&(x, y)| x < size[0] && y < size[1]).filter_map(|(x, y)| texels[y * size[0] + x]).collect();
+        let own: Vec<[f32; 4]> = four
+            .filter(|&(x, y)| x < size[0] && y < size[1])
+            .filter_map(|(x, y)| texels[y * size[0] + x])
+            .collect();
         let share = 1.0 / own.len().max(1) as f32;
         (!own.is_empty()).then(|| std::array::from_fn(|c| own.iter().map(|t| t[c]).sum::<f32>() * share))
     };

@@ -16,6 +16,7 @@ mod lanes;
 mod lens;
 mod model;
 mod noise;
+mod parts;
 mod pass;
 mod pattern;
 mod picture;

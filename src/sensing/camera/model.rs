@@ -6,6 +6,7 @@ use super::{
     CameraError, V3,
     charts::{self, Cloth},
     facet::{self, Facet, PRINT},
+    parts,
     pattern::{self, Look},
     surface::TRIANGLE_BITS,
     turned::turned,
@@ -69,7 +70,7 @@ impl Model {
         if let Some(mesh) = flat_faces(shape) {
             return Self::of_mesh(name, &mesh, &[], visuals);
         }
-        Self::of_skin(name, shape, visuals)
+        Self::of_levels(name, shape, visuals, parts::triangles)
     }
 
     /// The same with flat faces in small triangles too, for bodies that bend.
@@ -77,6 +78,16 @@ impl Model {
     /// # Errors
     /// As [`Model::of_shape`].
     pub fn of_skin(name: &str, shape: &Shape, visuals: &[Visual]) -> Result<Self, CameraError> {
+        Self::of_levels(name, shape, visuals, |_, _| None)
+    }
+
+    /// `known` gives the triangles of printed shapes, which need no small ones, if it can.
+    fn of_levels(
+        name: &str,
+        shape: &Shape,
+        visuals: &[Visual],
+        known: impl Fn(&Shape, f64) -> Option<Mesh>,
+    ) -> Result<Self, CameraError> {
         let longest = shape.bounds().size().max();
         let (mut levels, mut facets) = (Vec::new(), Vec::new());
         let cloth = visuals
@@ -85,7 +96,9 @@ impl Model {
             .then(|| Arc::new(Cloth { shape: shape.clone(), visuals: visuals.to_vec() }));
         for cells in CELLS {
             let cell = longest / cells;
-            let (mesh, materials) = triangles(shape, cell);
+            let exact = cloth.as_ref().and_then(|_| known(shape, cell));
+            let (mesh, materials) =
+                exact.map_or_else(|| triangles(shape, cell), |mesh| materials_of(mesh, shape));
             check(name, &mesh, &materials, visuals)?;
             let mut level = bake(&mesh, &materials, visuals, cell as f32, Some(shape));
             if let Some(cloth) = &cloth {
@@ -221,9 +234,18 @@ fn triangles(shape: &Shape, cell: f64) -> (Mesh, Vec<u16>) {
         let skin = skin::skin(shape, cell);
         return (skin.mesh, skin.materials);
     };
+    materials_of(lathed(profile, cell), shape)
+}
+
+/// The rings of a revolved profile.
+pub(super) fn lathed(profile: &Profile, cell: f64) -> Mesh {
     let widest = profile.points().iter().map(|p| p[0]).fold(0.0, f64::max);
     let turns = (std::f64::consts::TAU * widest / (TURNED[1] * cell)).ceil() as usize;
-    let mesh = turned(profile, TURNED[0] * cell, turns.clamp(24, 400));
+    turned(profile, TURNED[0] * cell, turns.clamp(24, 400))
+}
+
+/// A mesh with the materials that a shape has there.
+fn materials_of(mesh: Mesh, shape: &Shape) -> (Mesh, Vec<u16>) {
     let middle = |t: &[u32; 3]| t.map(|v| mesh.vertices[v as usize]).iter().sum::<Vec3>() / 3.0;
     let materials = mesh.triangles.iter().map(|t| shape.material(&middle(t))).collect();
     (mesh, materials)

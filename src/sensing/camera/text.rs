@@ -103,7 +103,8 @@ mod tests {
             let at = |j: i32| value(&line, place(r, f64::from(j) * 4e-4), n(r / 0.01));
             (-14..=14).map(at).sum::<f32>()
         };
-        let [left, right] = [-1.0, 1.0].map(|side| (1..=12).map(|i| ink(side * f64::from(i) * 5e-4)).sum::<f32>());
+        let [left, right] =
+            [-1.0, 1.0].map(|side| (1..=12).map(|i| ink(side * f64::from(i) * 5e-4)).sum::<f32>());
         assert!(left > 1.5 * right && right > 0.5, "{left} {right}");
         assert_eq!(value(&line, [0.0, 0.01, 0.05], [0.0, 1.0, 0.0]), 0.0, "not behind");
         let upright = Line { wrap_m: None, facing: [0.0, 0.0, 1.0], at: [0.0; 3], ..line };
