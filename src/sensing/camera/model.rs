@@ -6,10 +6,11 @@ use super::{
     CameraError, V3,
     charts::{self, Cloth},
     facet::{self, Facet, PRINT},
+    frame::FLAW_PIXELS,
     parts,
     pattern::{self, Look},
     surface::TRIANGLE_BITS,
-    turned::turned,
+    turned::lathed,
 };
 use crate::{
     geometry::{
@@ -101,11 +102,14 @@ impl Model {
                 exact.map_or_else(|| triangles(shape, cell), |mesh| materials_of(mesh, shape));
             check(name, &mesh, &materials, visuals)?;
             let mut level = bake(&mesh, &materials, visuals, cell as f32, Some(shape));
+            let texel = PRINT * (CELLS[0] / cells) as f32;
             if let Some(cloth) = &cloth {
-                charts::wrap(&mut level, &mut facets, cloth, PRINT * (CELLS[0] / cells) as f32);
+                charts::wrap(&mut level, &mut facets, cloth, texel);
             }
             if !levels.is_empty() && level.plain {
-                level.flaw = flaw(&mesh, shape);
+                // Print needs a texel a pixel.
+                let least = if cloth.is_some() { FLAW_PIXELS * texel } else { 0.0 };
+                level.flaw = flaw(&mesh, shape, cell).max(least);
             }
             levels.push(level);
             if matches!(shape, Shape::Mesh(_)) {
@@ -237,22 +241,12 @@ fn triangles(shape: &Shape, cell: f64) -> (Mesh, Vec<u16>) {
     materials_of(lathed(profile, cell), shape)
 }
 
-/// The rings of a revolved profile.
-pub(super) fn lathed(profile: &Profile, cell: f64) -> Mesh {
-    let widest = profile.points().iter().map(|p| p[0]).fold(0.0, f64::max);
-    let turns = (std::f64::consts::TAU * widest / (TURNED[1] * cell)).ceil() as usize;
-    turned(profile, TURNED[0] * cell, turns.clamp(24, 400))
-}
-
 /// A mesh with the materials that a shape has there.
 fn materials_of(mesh: Mesh, shape: &Shape) -> (Mesh, Vec<u16>) {
     let middle = |t: &[u32; 3]| t.map(|v| mesh.vertices[v as usize]).iter().sum::<Vec3>() / 3.0;
     let materials = mesh.triangles.iter().map(|t| shape.material(&middle(t))).collect();
     (mesh, materials)
 }
-
-/// Steps along and around a revolved profile, in cells: what is painted on it follows the rings.
-const TURNED: [f64; 2] = [0.75, 2.2];
 
 /// The profile of a shape that is one of revolution where it stands, painted or not.
 fn revolved(shape: &Shape) -> Option<&Profile> {
@@ -303,10 +297,12 @@ fn cut(mut mesh: Mesh, mut materials: Vec<u16>, edge: f64) -> (Mesh, Vec<u16>, f
     }
 }
 
-/// How far the middles of triangles are from the surface that they stand for, m: root of the mean square.
-fn flaw(mesh: &Mesh, shape: &Shape) -> f32 {
+/// How far the middles of triangles are from the surface that they stand for, m: root of the mean square. What lies deeper
+/// than a cell is hidden by another part.
+fn flaw(mesh: &Mesh, shape: &Shape, cell: f64) -> f32 {
     let middle = |t: &[u32; 3]| t.iter().map(|&v| mesh.vertices[v as usize]).sum::<Vec3>() / 3.0;
-    let squares: f64 = mesh.triangles.iter().map(|t| shape.distance(&middle(t)).powi(2)).sum();
+    let gaps = mesh.triangles.iter().map(|t| shape.distance(&middle(t))).filter(|gap| gap.abs() < cell);
+    let squares: f64 = gaps.map(|gap| gap * gap).sum();
     (squares / mesh.triangles.len().max(1) as f64).sqrt() as f32
 }
 

@@ -1,7 +1,7 @@
 //! Triangles of shapes that are put together of boxes, prisms, cylinders and revolved profiles: each as it is, where the cells
 //! of a skin would be ragged along their seams.
 
-use super::model::{box_mesh, lathed};
+use super::{model::box_mesh, turned::lathed};
 use crate::geometry::{
     Vec3,
     mesh::Mesh,
