@@ -117,7 +117,7 @@ function material.ceramic(o)
   return {
     albedo = base, roughness = o.roughness or 0.24,
     layers = {
-      layer(mask.noise { size_m = 40 * mm, octaves = 4, from = 0.4, to = 0.8, seed = seed }, { 0.70, 0.67, 0.60 }, 0.28, 0.4),
+      layer(mask.noise { size_m = 40 * mm, octaves = 4, from = 0.4, to = 0.8, seed = seed }, o.shade or { 0.70, 0.67, 0.60 }, 0.28, 0.4),
     },
   }
 end
@@ -134,6 +134,14 @@ function material.wood(o)
       layer(mask.noise { size_m = { 0.07, 3 * mm, 3 * mm }, octaves = 2, from = 0.5, to = 0.95, seed = seed + 2 }, dark, 0.60, 0.4),
       layer(mask.seams { length_m = length, width_m = width, gap_m = 1.4 * mm }, { 0.05, 0.027, 0.014 }, 0.8, 0.85),
     },
+  }
+end
+
+-- The boards of the room's floor: dark, wide and long.
+function material.floorboards()
+  return material.wood {
+    base = { 0.150, 0.120, 0.095 }, dark = { 0.075, 0.058, 0.046 }, light = { 0.20, 0.165, 0.13 },
+    length_m = 1.6, width_m = 0.19, seed = 21,
   }
 end
 

@@ -13,10 +13,7 @@ end
 
 -- A board floor whose top is its origin; darker where something stands close above it (`under`, a shape).
 local function floor(under)
-  local look = material.wood {
-    base = { 0.150, 0.120, 0.095 }, dark = { 0.075, 0.058, 0.046 }, light = { 0.20, 0.165, 0.13 },
-    length_m = 1.6, width_m = 0.19, seed = 21,
-  }
+  local look = material.floorboards()
   if under then
     table.insert(look.layers, {
       mask = mask.inside { shape = under, soft_m = 0.9 }, albedo = { 0.035, 0.028, 0.022 }, roughness = 0.7, opacity = 0.8,
@@ -67,7 +64,7 @@ local function walls(scene, floor_z)
 end
 
 -- A room around a scene whose support is its floor, z = 0: walls behind the robot and on the side away from the light. The
--- floor is the scene's own, assets/floor.lua.
+-- floor is the scene's own: assets/floor.lua.
 function scenery.floor_room(scene)
   walls(scene, 0)
 end

@@ -6,11 +6,12 @@ use softvt::{
     benchmark::{Plan, seed::Split},
     geometry::{
         Pose, Vec3,
+        mass::mass_properties,
         samples::{SampleSpec, surface_samples},
         voxelise::{VoxelSpec, voxel_mesh},
     },
     rollout::{RestCache, Simulation},
-    scene::{Asset, Body, Scene},
+    scene::{Asset, Body, Mask, Scene},
     script::{self, Episode, EpisodeRequest, Loaded},
 };
 
@@ -178,4 +179,160 @@ fn left_and_right_are_those_of_the_image_and_prompts_name_the_goal() {
         assert!(task.prompt.starts_with(&format!("pick up the {object} ")), "{}", task.prompt);
         assert_eq!(target, "plate");
     }
+}
+
+/// Size as it stands, mm, and mass, g (100 kg/m³ of the box around it, as LIBERO has it).
+const RIGID: [(&str, [f64; 3], f64); 15] = [
+    ("alphabet_soup", [62.0, 62.0, 76.0], 29.2),
+    ("basket", [170.0, 157.0, 142.0], 379.0),
+    ("bbq_sauce", [47.0, 29.0, 107.0], 14.6),
+    ("black_bowl", [107.0, 107.0, 51.0], 58.4),
+    ("butter", [76.0, 40.0, 17.0], 5.2),
+    ("chocolate_pudding", [80.0, 46.0, 27.0], 9.9),
+    ("cookies", [62.0, 83.0, 19.0], 9.8),
+    ("cream_cheese", [81.0, 43.0, 18.0], 6.3),
+    ("ketchup", [56.0, 37.0, 146.0], 30.3),
+    ("milk", [53.0, 53.0, 131.0], 36.8),
+    ("orange_juice", [53.0, 53.0, 131.0], 36.8),
+    ("plate", [138.0, 138.0, 19.0], 36.2),
+    ("ramekin", [89.0, 89.0, 42.0], 33.3),
+    ("salad_dressing", [53.0, 36.0, 146.0], 27.9),
+    ("tomato_sauce", [62.0, 62.0, 76.0], 29.2),
+];
+/// What is printed on packages.
+const PACKAGES: [&str; 11] = [
+    "alphabet_soup",
+    "bbq_sauce",
+    "butter",
+    "chocolate_pudding",
+    "cookies",
+    "cream_cheese",
+    "ketchup",
+    "milk",
+    "orange_juice",
+    "salad_dressing",
+    "tomato_sauce",
+];
+
+/// A task for each stack of assets: on the table one on the other, or on the floor if it is the lowest.
+fn stacks(stacks: &[&[&str]]) -> Vec<Scene> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let list: Vec<String> =
+        stacks.iter().map(|names| format!("{{ \"{}\" }}", names.join("\", \""))).collect();
+    let text = format!(
+        "local tasks = {{}}
+        for _, names in ipairs {{ {} }} do
+          local layout = softvt.layout(table.concat(names, \"_\"), function(scene)
+            scene:add {{ name = \"table\", asset = require \"assets.table\", xyz = {{ 0, 0, 0 }} }}
+            for i, name in ipairs(names) do
+              local on = i > 1 and names[i - 1] or nil
+              scene:add {{ name = name, asset = require(\"assets.\" .. name), at = {{ 0.05, 0.02 }}, yaw = 0.3 * i, on = on }}
+            end
+          end)
+          local goal = softvt.on {{ object = names[1], target = \"table\" }}
+          tasks[#tasks + 1] = softvt.task {{ prompt = table.concat(names, \" under \"), layout = layout, goal = goal }}
+        end
+        return softvt.suite {{ name = \"stacks\", object_type = \"rigid\", variation = \"object\", tasks = tasks }}",
+        list.join(", ")
+    );
+    let path = folder.path().join("stacks.lua");
+    std::fs::write(&path, text).expect("is written");
+    let loaded = script::load(&path, &[]).unwrap_or_else(|e| panic!("{e}"));
+    (0..stacks.len()).map(|task| scene(&loaded, task, 0)).collect()
+}
+
+fn rigid_assets() -> Vec<Arc<Asset>> {
+    let scenes = stacks(&RIGID.each_ref().map(|(name, ..)| std::slice::from_ref(name)));
+    scenes.into_iter().map(|scene| scene.objects[1].asset.clone()).collect()
+}
+
+#[test]
+fn every_rigid_recipe_has_its_size_and_mass_and_stands_on_zero() {
+    for (asset, (name, size_mm, grams)) in rigid_assets().iter().zip(RIGID) {
+        let bounds = asset.shape.bounds();
+        assert!((bounds.size() - Vec3::from(size_mm) * 1e-3).amax() < NEAR, "{name}: {:?}", bounds.size());
+        assert!(bounds.min.z.abs() < NEAR, "{name}: lowest at {} m", bounds.min.z);
+        assert!(bounds.centre().xy().amax() < NEAR, "{name}: centre at {:?}", bounds.centre());
+        let Body::Rigid { density } = asset.body else { panic!("{name} is not rigid") };
+        let mass = 1e3 * mass_properties(&asset.shape, density).mass;
+        assert!((mass / grams - 1.0).abs() < 0.03, "{name}: {mass} g for {grams} g");
+        assert_eq!((asset.friction.static_mu, asset.friction.dynamic_mu), (0.6, 0.5), "{name}");
+    }
+}
+
+#[test]
+fn packages_say_what_they_are() {
+    fn read(mask: &Mask, words: &mut Vec<String>) {
+        match mask {
+            Mask::Text { print } => words.push(print.line.text.to_lowercase()),
+            Mask::Both { masks } => masks.iter().for_each(|mask| read(mask, words)),
+            Mask::Inverse { mask } => read(mask, words),
+            _ => {}
+        }
+    }
+    for asset in rigid_assets().iter().filter(|asset| PACKAGES.contains(&asset.name.as_str())) {
+        let mut words = Vec::new();
+        let layers = asset.visuals.iter().flat_map(|visual| &visual.layers);
+        layers.for_each(|layer| read(&layer.mask, &mut words));
+        // A part of the name in large letters, or all of it on several lines.
+        let said = asset.name.split('_').filter(|part| words.iter().any(|word| word.contains(part))).count();
+        assert!(said > 0, "{}: {words:?}", asset.name);
+    }
+}
+
+#[test]
+fn bowl_basket_and_ramekin_are_hollow_and_their_walls_thick_enough() {
+    let assets = rigid_assets();
+    let of = |name: &str| assets.iter().find(|asset| asset.name == name).expect("is there");
+    for (name, at, inside) in [("black_bowl", 0.04, 0.04), ("basket", 0.1, 0.06), ("ramekin", 0.03, 0.036)] {
+        let shape = &of(name).shape;
+        assert!(shape.distance(&Vec3::new(0.0, 0.0, at)) > 0.03, "{name} is hollow");
+        for turn in [0.0_f64, 0.4, 0.8, 1.3, 2.0, 4.0] {
+            let way = Vec3::new(turn.cos(), turn.sin(), 0.0);
+            let from = Vec3::z() * at;
+            let inner = shape.ray(&from, &way, 0.2).expect("a wall");
+            assert!(inner > inside, "{name}: {inner} m from the middle");
+            let outer = shape.ray(&(from + way * 0.2), &-way, 0.2).expect("a wall");
+            assert!(0.2 - outer - inner > 4e-3 * 0.95, "{name}: a wall of {} m", 0.2 - outer - inner);
+        }
+    }
+}
+
+#[test]
+fn rigid_things_stand_still_alone_and_stacked() {
+    let alone = RIGID.each_ref().map(|(name, ..)| std::slice::from_ref(name));
+    let mut all: Vec<&[&str]> = alone.to_vec();
+    all.extend([["ramekin", "black_bowl"].as_slice(), &["cookies", "black_bowl"], &["plate", "black_bowl"]]);
+    for (scene, names) in stacks(&all).into_iter().zip(all) {
+        let upright: Vec<f64> = scene.objects.iter().map(|object| object.pose_w.translation.z).collect();
+        let mut sim =
+            Simulation::new(Arc::new(scene), &Default::default(), &Default::default(), &RestCache::default())
+                .expect("builds");
+        sim.settle().unwrap_or_else(|e| panic!("{names:?}: {e}"));
+        let settled: Vec<Pose> = sim.objects.iter().map(|object| sim.pose(object)).collect();
+        for _ in 0..120 {
+            sim.step().unwrap_or_else(|e| panic!("{names:?}: {e}"));
+        }
+        for ((object, before), start) in sim.objects.iter().zip(&settled).zip(upright) {
+            let after = sim.pose(object);
+            let moved = (after.translation.vector - before.translation.vector).norm();
+            let turned = after.rotation.angle_to(&before.rotation);
+            assert!(
+                moved < 5e-5 && turned < 1e-3,
+                "{names:?}: {} moved {moved} m, {turned} rad",
+                object.name
+            );
+            // A bowl sinks into a ramekin; nothing else changes its height.
+            let sunk = start - after.translation.z;
+            let limit = if names[0] == "ramekin" { 0.014 } else { 5e-4 };
+            assert!((-1e-4..limit).contains(&sunk), "{names:?}: {} sank by {sunk} m", object.name);
+            assert!((after.rotation * Vec3::z()).z > 0.9999, "{names:?}: {} leans", object.name);
+        }
+    }
+}
+
+#[test]
+fn the_floor_never_moves_and_its_top_is_zero() {
+    let floor = stacks(&[&["floor"]]).remove(0).objects.remove(1).asset;
+    assert!(floor.shape.bounds().max.z.abs() < 1e-12 && floor.body == Body::Static);
 }

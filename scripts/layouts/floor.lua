@@ -50,7 +50,7 @@ local function layout(name, asset, k, spread)
     scene.base = { -0.6, 0, 0 }
     local camera = scene:camera "third_person"
     camera.position, camera.quat = { 0.8966, 0, 0.65 }, { 0.6182, 0.3432, 0.3432, 0.6182 }
-    scene:add { name = "floor", asset = floor, xyz = { 0, 0, 0 } }
+    scene:add { name = "floor", asset = floor, xyz = { 0.75, 0, 0 } }
     arrange.add(scene, rng, things, ROOM)
     scenery.floor_room(scene)
     arrange.arm(scene, rng)

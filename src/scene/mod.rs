@@ -3,6 +3,7 @@
 
 mod camera;
 mod light;
+mod print;
 mod visual;
 
 mod fingerprint;
@@ -15,6 +16,7 @@ use crate::geometry::{Pose, Vec3, shape::Shape};
 
 pub use camera::{Camera, CameraMount, POLICY_EDGE, fovy_of_lens};
 pub use light::{KeyLight, Lighting, Sky};
+pub use print::{Letters, Line, MOST_LETTERS, Print, Typeface};
 pub use visual::{Layer, Mask, Visual};
 
 /// How an object moves.

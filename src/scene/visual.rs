@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::Print;
 use crate::geometry::shape::Shape;
 
 /// The look of a surface (metal/rough model). Colours are linear RGB.
@@ -151,6 +152,11 @@ pub enum Mask {
         shape: Arc<Shape>,
         /// Width of the border, half of it on either side of the shape's surface, m.
         soft_m: f64,
+    },
+    /// The letters of a line of text, where the surface faces who reads it.
+    Text {
+        /// The line.
+        print: Arc<Print>,
     },
     /// One minus a mask.
     Inverse {

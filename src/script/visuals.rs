@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     geometry::shape::Shape,
-    scene::{Layer, Mask, Visual},
+    scene::{Layer, Line, MOST_LETTERS, Mask, Print, Typeface, Visual},
 };
 
 /// `softvt.Mask`.
@@ -61,6 +61,10 @@ pub(super) fn install(lua: &Lua, api: &Table) -> mlua::Result<()> {
                 schema::fault_here(lua, record.label, &fault)
             };
             sound(record, &spec, &wrong)?;
+            if *name == "text" {
+                let line = line(&spec, &wrong)?;
+                return Ok(LuaMask(Mask::Text { print: Arc::new(Print::new(line)) }));
+            }
             Ok(LuaMask(mask(name, &spec)?))
         })?;
         masks.set(*name, make)?;
@@ -100,6 +104,57 @@ fn direction(spec: &Table) -> mlua::Result<[f64; 3]> {
         },
         _ => spec.get("axis")?,
     })
+}
+
+/// A line of text that can be printed.
+fn line(spec: &Table, wrong: &dyn Fn(&str, &str) -> mlua::Error) -> mlua::Result<Line> {
+    let Ok(text) = spec.get::<String>("text") else {
+        return Err(wrong("text", "expected letters in UTF-8"));
+    };
+    let count = text.chars().count();
+    if count > MOST_LETTERS {
+        return Err(wrong("text", &format!("expected at most {MOST_LETTERS} letters, got {count}")));
+    }
+    let facing = match spec.get::<Value>("facing")? {
+        Value::String(name) => facing_of(&name.to_string_lossy()),
+        _ => spec.get("facing")?,
+    };
+    let wrap_m: Option<f64> = spec.get("wrap_m")?;
+    let length = facing.iter().map(|x| x * x).sum::<f64>().sqrt();
+    if !(length > 1e-6 && length < 1e6) {
+        return Err(wrong("facing", "expected a direction, its length between 1e-6 and 1e6"));
+    }
+    if wrap_m.is_some() && facing[0].hypot(facing[1]) < 1e-3 * length {
+        return Err(wrong(
+            "facing",
+            "expected a direction to a side, since the line is laid round the z axis",
+        ));
+    }
+    let typeface = if spec.get::<String>("font")? == "mono" { Typeface::Mono } else { Typeface::Sans };
+    let line = Line {
+        text,
+        typeface,
+        height_m: spec.get("height_m")?,
+        weight: spec.get("weight")?,
+        at: spec.get("at")?,
+        facing,
+        turn: spec.get("turn")?,
+        wrap_m,
+    };
+    match line.missing() {
+        Some(letter) => {
+            let what =
+                format!("the typeface has no letter {letter:?}; expected Latin, Greek or Cyrillic ones");
+            Err(wrong("text", &what))
+        }
+        None => Ok(line),
+    }
+}
+
+/// The direction of "+x" and its like.
+fn facing_of(name: &str) -> [f64; 3] {
+    let sign = if name.starts_with('-') { -1.0 } else { 1.0 };
+    ["x", "y", "z"].map(|axis| if name.ends_with(axis) { sign } else { 0.0 })
 }
 
 /// One size for all axes or one for each.

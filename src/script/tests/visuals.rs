@@ -76,6 +76,7 @@ fn every_mask_can_be_made_from_lua() {
         "weave { pitch_m = 1e-3 }",
         "facing { from = 0.2, to = 0.8 }",
         "inside { shape = softvt.shape.sphere { radius = 0.01 }, soft_m = 1e-3 }",
+        "text { text = 'Ünder', height_m = 5e-3, at = { 0, 0, 0.03 }, facing = '-y', wrap_m = 0.03, weight = 0.1, font = 'mono' }",
     ];
     assert_eq!(masks.len(), crate::script::catalogue_visuals::MASKS.len());
     let layers: Vec<_> =
@@ -135,6 +136,32 @@ fn a_wrong_look_is_named_with_its_line_and_the_mend() {
         (
             "mask = mask.gradient { axis = { 0, 0, 0 }, from_m = 0, to_m = 1 },",
             at(8, "mask.gradient.axis: expected a direction, got one of length 0"),
+        ),
+        (
+            "mask = mask.text { text = 'a\\u{6f22}', height_m = 0.01, at = { 0, 0, 0 }, facing = '+z' },",
+            at(
+                8,
+                "mask.text.text: the typeface has no letter '\u{6f22}'; expected Latin, Greek or Cyrillic ones",
+            ),
+        ),
+        (
+            "mask = mask.text { text = ('x'):rep(65), height_m = 0.01, at = { 0, 0, 0 }, facing = '+z' },",
+            at(8, "mask.text.text: expected at most 64 letters, got 65"),
+        ),
+        (
+            "mask = mask.text { text = '\\xff', height_m = 0.01, at = { 0, 0, 0 }, facing = '+z' },",
+            at(8, "mask.text.text: expected letters in UTF-8"),
+        ),
+        (
+            "mask = mask.text { text = 'x', height_m = 0.01, at = { 0, 0, 0 }, facing = { 0, 0, 0 } },",
+            at(8, "mask.text.facing: expected a direction, its length between 1e-6 and 1e6"),
+        ),
+        (
+            "mask = mask.text { text = 'x', height_m = 0.01, at = { 0, 0, 0 }, facing = '+z', wrap_m = 0.1 },",
+            at(
+                8,
+                "mask.text.facing: expected a direction to a side, since the line is laid round the z axis",
+            ),
         ),
         (
             "mask = mask.specks { spacing_m = 1, radius_m = 0.6 },",

@@ -9,7 +9,7 @@ use crate::scene::Camera;
 /// A coarser level is used if its edges are at most this many pixels long, or if it is of one colour and at most this many
 /// pixels from the shape that it stands for.
 const COARSE_PIXELS: f32 = 1.7;
-const FLAW_PIXELS: f32 = 0.12;
+pub(super) const FLAW_PIXELS: f32 = 0.12;
 /// Things wider than this hide no sky from others, m: they are grounds and walls.
 const WIDEST_BLOB: f32 = 0.35;
 

@@ -2,12 +2,13 @@
 //!
 //! An image is made tile by tile. Triangles are rasterised at four samples a pixel into triangle numbers and reciprocal
 //! depths; then every surface that a pixel shows is lit once, eight points at a time: Lambert and GGX (Walter et al. 2007)
-//! under one key light with soft shadows and a sky. Looks are baked into vertices, or into textures on large flat faces, when a [`Model`] is built, filtered to
-//! the spacing of its vertices; so that nothing is evaluated twice and small images do not alias.
+//! under one key light with soft shadows and a sky. Looks are baked into vertices, or into textures on large flat faces and on all that is printed, when a [`Model`] is
+//! built, filtered to the spacing of its vertices; so that nothing is evaluated twice and small images do not alias.
 //!
 //! What does not move is drawn once for a camera that does not move either; see [`Scratch`].
 
 mod background;
+mod charts;
 mod error;
 mod facet;
 mod frame;
@@ -15,6 +16,7 @@ mod lanes;
 mod lens;
 mod model;
 mod noise;
+mod parts;
 mod pass;
 mod pattern;
 mod picture;
@@ -27,6 +29,7 @@ mod shadow;
 mod solids;
 mod stage;
 mod surface;
+mod text;
 mod tile;
 mod tone;
 mod turned;

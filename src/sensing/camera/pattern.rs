@@ -1,6 +1,6 @@
 //! The look of a surface at a point: masks and layers evaluated, filtered to the spacing at which they are sampled.
 
-use super::{V3, noise};
+use super::{V3, noise, text};
 use crate::scene::{Mask, Visual};
 
 /// What shading needs to know of a point of a surface.
@@ -15,6 +15,11 @@ pub(super) struct Look {
 }
 
 impl Look {
+    /// What textures hold: albedo and roughness.
+    pub fn painted(&self) -> [f32; 4] {
+        [self.albedo.x, self.albedo.y, self.albedo.z, self.roughness]
+    }
+
     /// Albedo, roughness, metalness, openness.
     #[inline(always)]
     pub fn numbers(&self) -> [f32; 6] {
@@ -63,7 +68,8 @@ pub(super) fn finest(visual: &Visual) -> f32 {
             // As fine as the surface itself, whose own detail is told elsewhere.
             Mask::Facing { .. } => f64::INFINITY,
             // Sharp edges.
-            Mask::Checker { .. }
+            Mask::Text { .. }
+            | Mask::Checker { .. }
             | Mask::Stripes { .. }
             | Mask::Rings { .. }
             | Mask::Boards { .. }
@@ -73,6 +79,19 @@ pub(super) fn finest(visual: &Visual) -> f32 {
         }
     }
     visual.layers.iter().map(|layer| of(&layer.mask)).fold(f64::INFINITY, f64::min) as f32
+}
+
+/// Whether text is printed on a visual.
+pub(super) fn printed(visual: &Visual) -> bool {
+    fn of(mask: &Mask) -> bool {
+        match mask {
+            Mask::Text { .. } => true,
+            Mask::Both { masks } => masks.iter().any(of),
+            Mask::Inverse { mask } => of(mask),
+            _ => false,
+        }
+    }
+    visual.layers.iter().any(|layer| of(&layer.mask))
 }
 
 /// How far under the surface patterns are looked up, m.
@@ -121,6 +140,7 @@ fn mask(mask: &Mask, p: &V3, n: &V3, spacing: f32) -> f32 {
             let width = (*soft_m as f32).max(spacing).max(1e-6);
             smooth(0.5 - shape.distance(&p.cast()) as f32 / width)
         }
+        Mask::Text { print } => text::share(print, p, n, spacing),
         Mask::Inverse { mask } => 1.0 - self::mask(mask, p, n, spacing),
         Mask::Both { masks } => masks.iter().map(|m| self::mask(m, p, n, spacing)).product(),
     }

@@ -8,11 +8,21 @@ use crate::geometry::{Vec3, mesh::Mesh, shape::Profile};
 const ROUNDED: f64 = 1e-3;
 /// Points that round a corner.
 const POINTS: usize = 3;
+/// Steps along and around a revolved profile, in cells: what is painted on it follows the rings.
+const TURNED: [f64; 2] = [0.75, 2.2];
+
 /// Nearer to the axis than this is on it, m.
 const ON_AXIS: f64 = 1e-9;
 
+/// The rings of a revolved profile, about `cell` (m) wide.
+pub(super) fn lathed(profile: &Profile, cell: f64) -> Mesh {
+    let widest = profile.points().iter().map(|p| p[0]).fold(0.0, f64::max);
+    let turns = (TAU * widest / (TURNED[1] * cell)).ceil() as usize;
+    turned(profile, TURNED[0] * cell, turns.clamp(24, 400))
+}
+
 /// The profile revolved about z in `turns` pieces, its edges cut to at most `step`, m.
-pub(super) fn turned(profile: &Profile, step: f64, turns: usize) -> Mesh {
+fn turned(profile: &Profile, step: f64, turns: usize) -> Mesh {
     let ring = cut(&rounded(profile.points()), step);
     let mut vertices = Vec::new();
     // First vertex of each ring of vertices; one on the axis is a single vertex.
