@@ -242,3 +242,45 @@ fn background(series: &[Vec<Vec<f64>>; 3]) -> Vec<f32> {
     }
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_row_of_pixels_follows_the_same_law_as_a_single_slope() {
+        let optics = Optics::mini().expect("shipped");
+        let slopes: Vec<[f32; 2]> = (0..200)
+            .map(|i| {
+                let turn = 0.37 * i as f32;
+                [turn.cos(), turn.sin()].map(|v| v * 0.005 * i as f32)
+            })
+            .collect();
+        let mut line = Line::new(slopes.len());
+        // As tangents, which the row turns into sines.
+        let tangent = |v: f32, s: &[f32; 2]| v / (1.0 - (s[0] * s[0] + s[1] * s[1])).max(1e-3).sqrt();
+        line.a = slopes.iter().map(|s| tangent(s[0], s)).collect();
+        line.b = slopes.iter().map(|s| tangent(s[1], s)).collect();
+        let (first, end) = line.limit(optics.steepest).expect("slopes");
+        assert_eq!((first, end), (1, 200));
+        for (channel, colour) in optics.colour.iter().enumerate() {
+            line.light(channel, colour, 0..200);
+            for (i, s) in slopes.iter().enumerate() {
+                let pixel = [i, 100];
+                let single = optics.change(f64::from(s[0]), f64::from(s[1]), pixel)[channel];
+                let base = optics.smooth[3 * (100 * PICTURE[0] + i) + channel];
+                let found = f64::from(base * line.light[channel][i] - base);
+                assert!((found - single).abs() < 0.05, "channel {channel}, {s:?}: {found} and {single}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_file_with_too_few_numbers_is_refused_by_name() {
+        let mut file: OpticsFile = serde_json::from_str(MINI).expect("shipped");
+        file.colour[1].pop();
+        let text = serde_json::to_string(&file).expect("plain data");
+        let message = Optics::parse(&text).expect_err("19 numbers").to_string();
+        assert_eq!(message, "optics: colour has 19 entries a channel, expected 20");
+    }
+}
