@@ -218,7 +218,7 @@ impl Senses {
         let input = PadInput {
             load: PadLoad::of_patch(patch),
             surfaces: &surfaces,
-            friction: self.robot.pads.static_mu,
+            friction: PadLoad::friction_of(patch).unwrap_or(self.robot.pads.static_mu),
             give: if placed.len() == 1 { give } else { None },
         };
         Ok(sensor.see(&input, &mut self.touch)?)
