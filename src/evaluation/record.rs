@@ -14,7 +14,7 @@ pub enum Outcome {
     Timeout,
     /// The physics could not be trusted any more.
     Invalid {
-        /// Why: "inverted", "not_finite", "not_converged" …
+        /// Why: "inverted", "not_finite", "not_converged", "too_fast", "too_hard" …
         reason: String,
         /// Physics step since the policy took over.
         step: u64,

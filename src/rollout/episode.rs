@@ -358,6 +358,8 @@ impl Episode {
             StepFailure::Diverged { .. } => ("not_converged", None),
             StepFailure::NotFinite { node, .. } => ("not_finite", Some(*node as u32)),
             StepFailure::Indefinite { .. } => ("indefinite", None),
+            StepFailure::TooFast { node, .. } => ("too_fast", node.map(|node| node as u32)),
+            StepFailure::TooHard { .. } => ("too_hard", None),
             StepFailure::Inverted { body, element, .. } => {
                 let soft = self.sim.world.soft.iter().find(|s| s.name == *body);
                 ("inverted", soft.map(|s| s.body.rest.mesh.elements[*element][0]))
