@@ -77,6 +77,7 @@ pub(super) struct Batch<'a> {
     pub films: bool,
     /// Whether whoever drives sees the true forces at the pads.
     force_observed: bool,
+    drive: Drive,
 }
 
 impl<'a> Batch<'a> {
@@ -110,6 +111,7 @@ impl<'a> Batch<'a> {
             out,
             films: run.video.is_some(),
             force_observed: false,
+            drive: driver,
         })
     }
 
@@ -143,7 +145,7 @@ impl<'a> Batch<'a> {
                 self.limits.insert(asset.name.clone(), limit);
             }
             let scene = Arc::new(opened.scene.clone());
-            let streams = self.driver(opened)?.streams();
+            let streams = (self.drive)(self.run, opened)?.streams();
             self.force_observed |= streams.force;
             self.try_out(scene, streams).map_err(|error| {
                 self.episode_failure(&match error {
@@ -325,26 +327,10 @@ impl<'a> Batch<'a> {
             trace: self.run.trace,
             ..EpisodeSpec::new(&which, task, scenes, &self.settings)
         };
-        let driver = self.driver(opened)?;
+        let driver = (self.drive)(self.run, opened)?;
         let mut driver = batch::Stoppable { driver, stop: &stop::FLAG };
         let started = Episode::start(spec, &self.cache, &self.looks).map_err(|e| self.episode_failure(&e))?;
         started.run(&mut driver).map_err(|e| self.episode_failure(&e))
-    }
-
-    fn driver(&self, opened: script::Episode) -> Result<Box<dyn Controller>, Failure> {
-        let boxed = |policy: Box<dyn Policy>| -> Box<dyn Controller> { Box::new(policy) };
-        match self.run.policy.as_str() {
-            "noop" => Ok(boxed(Box::<builtin::Noop>::default())),
-            "random" => {
-                let mut stream = opened.seed.stream(crate::benchmark::seed::Stream::Script);
-                Ok(boxed(Box::new(builtin::Random::new(rand::RngCore::next_u64(&mut stream)))))
-            }
-            policy => {
-                let expert = opened.expert().map_err(Failure::input)?;
-                let expert = expert.ok_or_else(|| Failure::input("the task has no expert"))?;
-                Ok(Box::new(ExpertController::new(expert, policy == "expert-binary")))
-            }
-        }
     }
 
     fn episode_failure(&self, error: &EpisodeError) -> Failure {
@@ -385,6 +371,26 @@ impl<'a> Batch<'a> {
     }
 }
 
+/// Makes whoever drives an episode.
+type Drive = fn(&Run, script::Episode) -> Result<Box<dyn Controller>, Failure>;
+
+/// The policy of the command line.
+fn driver(run: &Run, opened: script::Episode) -> Result<Box<dyn Controller>, Failure> {
+    let boxed = |policy: Box<dyn Policy>| -> Box<dyn Controller> { Box::new(policy) };
+    match run.policy.as_str() {
+        "noop" => Ok(boxed(Box::<builtin::Noop>::default())),
+        "random" => {
+            let mut stream = opened.seed.stream(crate::benchmark::seed::Stream::Script);
+            Ok(boxed(Box::new(builtin::Random::new(rand::RngCore::next_u64(&mut stream)))))
+        }
+        policy => {
+            let expert = opened.expert().map_err(Failure::input)?;
+            let expert = expert.ok_or_else(|| Failure::input("the task has no expert"))?;
+            Ok(Box::new(ExpertController::new(expert, policy == "expert-binary")))
+        }
+    }
+}
+
 /// A film that could not be made.
 pub(super) fn film_failure(error: FilmError) -> Failure {
     match error {
@@ -412,3 +418,7 @@ fn line(record: &EpisodeRecord) -> String {
         record.identity.task, record.identity.episode, record.stats.time_s
     )
 }
+
+#[cfg(test)]
+#[path = "batch_tests.rs"]
+mod tests;

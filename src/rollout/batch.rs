@@ -6,7 +6,7 @@ use std::sync::{
 };
 
 use super::{ControlError, Controller, Simulation};
-use crate::policy::{Action, Observation};
+use crate::policy::{Action, Observation, Streams};
 
 /// Runs `jobs` jobs on `threads` threads; `done` gets each result as it comes, on this thread.
 ///
@@ -65,6 +65,10 @@ pub struct Stoppable<'a> {
 }
 
 impl Controller for Stoppable<'_> {
+    fn streams(&self) -> Streams {
+        self.driver.streams()
+    }
+
     fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, ControlError> {
         if self.stop.load(Ordering::Relaxed) {
             return Err(ControlError::Interrupted);

@@ -160,6 +160,18 @@ fn a_camera_inside_of_something_is_told_before_anything_runs_and_leaves_no_pictu
 }
 
 #[test]
+fn a_simulation_of_a_script_tells_of_a_camera_inside_of_something_where_it_was_put() {
+    let mole = "scene:add_camera { name = \"mole\", position = { 0, 0, -0.02 }, look_at = { 1, 0, -0.02 } }";
+    let text = with(mole).text("x.lua");
+    let (layout, _) = text.split_once("return softvt.suite").expect("a suite");
+    let run = "return softvt.experiment { name = \"e\", grid = { a = { 1 } }, run = function()\n\
+               local sim = softvt.simulate { layout = layout }\nsim:see { camera = \"mole\" }\nreturn { b = 1 } end }";
+    let message = Project::new(&[("x.lua", &format!("{layout}{run}"))]).refusal("x.lua");
+    let told = "simulation:see: x.lua:7: camera mole: position: it stands inside of floor; move it out";
+    assert!(message.contains(told), "{message}");
+}
+
+#[test]
 fn what_gets_around_a_camera_in_an_episode_does_not_end_its_film() {
     // A block falls over it while the scene settles.
     let block = "local block = softvt.asset { name = \"block\", shape = softvt.shape.box { size = { 0.1, 0.1, 0.05 } }:grounded(), body = softvt.rigid { density = 300 } }";
