@@ -3,14 +3,11 @@
 //! `cargo bench --bench streams` runs the expert on the first task of a suite and prints CPU seconds a simulated second,
 //! blind and looking, and how many times real time that is. One thread; settling and the making of models are apart.
 
-use std::sync::Arc;
-
 use cpu_time::ThreadTime;
 use softvt::{
     benchmark::{Plan, seed::Split},
-    evaluation::record::Identity,
     policy::{Action, Observation, Streams},
-    rollout::{ControlError, Controller, Episode, EpisodeSpec, Looks, RestCache, Simulation},
+    rollout::{ControlError, Controller, Episode, EpisodeSpec, Looks, RestCache, Simulation, Which},
     script::{self, EpisodeRequest, ExpertController, Loaded},
 };
 
@@ -48,30 +45,9 @@ fn episode(loaded: &Loaded, streams: &Streams, shared: &(RestCache, Looks)) -> (
         shifts: Vec::new(),
     };
     let opened = script::Episode::open(loaded, &request).expect("it opens");
-    let (task, settings) = (suite.tasks[0].clone(), suite.settings.clone());
-    let spec = EpisodeSpec {
-        identity: Identity {
-            suite: suite.name.clone(),
-            task: task.id,
-            prompt: task.prompt.clone(),
-            layout: task.layout.clone(),
-            episode: 0,
-            seed: 0,
-            split: Split::Validation.name().to_owned(),
-            policy: "expert".to_owned(),
-            asset: String::new(),
-            soft: true,
-        },
-        task,
-        scene: Arc::new(opened.scene.clone()),
-        limit: None,
-        rules: settings.rules,
-        params: settings.physics,
-        robot: settings.robot,
-        tactile: settings.tactile,
-        film: false,
-        trace: None,
-    };
+    let which = Which { suite: &suite.name, episode: 0, seed: 0, split: Split::Validation, policy: "expert" };
+    let scenes = (&opened.nominal, opened.scene.clone());
+    let spec = EpisodeSpec::new(&which, &suite.tasks[0], scenes, &suite.settings);
     let expert = opened.expert().expect("a script").expect("an expert");
     let expert = ExpertController::new(expert, false);
     let mut driver = Looking { expert, streams: streams.clone(), since: None };

@@ -311,6 +311,10 @@ fn common(matches: &ArgMatches, options: &[OptionSpec]) -> Result<Run, Failure> 
             script_words.push(format!("{}={}", option.flag(), text(matches, &id)));
         }
     }
+    let out = matches.get_one::<String>("out");
+    if out.is_some_and(|dir| dir.trim().is_empty()) {
+        return Err(Failure::input("--out: expected a folder, got \"\"; \".\" is the one you are in"));
+    }
     Ok(Run {
         file: PathBuf::from(text(matches, "file")),
         script_words,
@@ -323,7 +327,7 @@ fn common(matches: &ArgMatches, options: &[OptionSpec]) -> Result<Run, Failure> 
         set: many(matches, "set").iter().map(|word| pair("--set", word)).collect::<Result<_, _>>()?,
         trace: None,
         video: None,
-        out: matches.get_one::<String>("out").map(PathBuf::from),
+        out: out.map(PathBuf::from),
         json: false,
     })
 }

@@ -39,19 +39,15 @@ pub struct Failure {
 }
 
 impl Failure {
-    /// The user's input is wrong.
+    /// The user's input is wrong; unless the end was asked for before: what fails from then on may fail because of that.
     fn input(message: impl ToString) -> Self {
-        Self { code: code::INPUT, message: message.to_string() }
+        let code = if stop::requested() { code::INTERRUPTED } else { code::INPUT };
+        Self { code, message: message.to_string() }
     }
 
     /// Interrupted; what is finished has been kept.
     fn interrupted(message: impl ToString) -> Self {
         Self { code: code::INTERRUPTED, message: message.to_string() }
-    }
-
-    /// Once the end was asked for, whatever failed did so because of it.
-    fn or_interrupted(self) -> Self {
-        if stop::requested() { Self { code: code::INTERRUPTED, ..self } } else { self }
     }
 }
 
@@ -83,7 +79,7 @@ fn run() -> Result<(), Failure> {
             word.into_string().map_err(|w| Failure::input(format!("argument {w:?} is not valid UTF-8")))
         })
         .collect::<Result<_, _>>()?;
-    carry_out(&words).map_err(Failure::or_interrupted)
+    carry_out(&words)
 }
 
 fn carry_out(words: &[String]) -> Result<(), Failure> {

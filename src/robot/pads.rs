@@ -12,7 +12,13 @@
 use nalgebra::Quaternion;
 
 use super::Side;
-use crate::geometry::{Mat3, Pose, Quat, Vec3};
+use crate::{
+    geometry::{
+        Mat3, Pose, Quat, Vec3,
+        shape::{Aabb, Contact},
+    },
+    physics::contact::{GelSample, Solid, Surface},
+};
 
 /// Height of the gel's apex above the finger frame, m: that of Franka's own finger tips.
 pub(super) const APEX_Z: f64 = 0.045;
@@ -114,6 +120,27 @@ impl PadSurface {
             })
             .filter(|(_, _, area)| *area > 0.0)
             .collect()
+    }
+}
+
+/// Distance of the gel's samples that hard shapes press on, m: that of a soft body's samples where it is grasped.
+const GEL_SPACING: f64 = 0.75e-3;
+
+/// The gel as contact samples and hard shapes feel it, in the pad frame.
+impl Surface for PadSurface {
+    fn contact(&self, p: &Vec3, _facing: &Vec3, spacing: f64) -> Contact {
+        let contact = self.contact(p, spacing);
+        Contact { phi: contact.phi, normal: contact.normal_p, coverage: contact.coverage }
+    }
+
+    fn bounds(&self) -> Aabb {
+        let half = Vec3::new(self.length, self.width, 0.0) * 0.5;
+        Aabb { min: Vec3::new(-half.x, -half.y, -self.thickness), max: half }
+    }
+
+    fn solid(&self) -> Option<Solid> {
+        let patches = self.patches(GEL_SPACING).into_iter();
+        Some(Solid::Gel(patches.map(|(p, normal, area)| GelSample { p, normal, area }).collect()))
     }
 }
 

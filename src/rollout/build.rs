@@ -66,15 +66,16 @@ impl RestCache {
     /// Bounds of a shape; finding those of a displaced one takes a search.
     fn bounds(&self, shape: &Shape) -> Aabb {
         let made: Result<_, Infallible> =
-            self.bounds.get(|known| known == shape, || Ok((shape.clone(), shape.bounds())));
+            self.bounds.get(shape, |known| known == shape, || Ok(shape.bounds()));
         made.unwrap_or_else(|never| match never {})
     }
 
     /// Rest data of a soft asset.
     fn rest(&self, asset: &Arc<Asset>, material: &SoftMaterial) -> Result<Arc<Rest>, BuildError> {
         self.rests.get(
+            asset,
             |known| known.shape == asset.shape && known.body == asset.body,
-            || Ok((asset.clone(), soft_rest(&asset.name, &asset.shape, material)?)),
+            || soft_rest(&asset.name, &asset.shape, material),
         )
     }
 }

@@ -237,13 +237,19 @@ impl LuaSimulation {
             schema::check(lua, &SEE, &table).map_err(|fault| schema::fault_here(lua, LABEL, &fault))?;
         let wrong = |e: SenseError| fail(lua, format!("{LABEL}: {e}"));
         let mut inner = locked(&self.0);
-        let Inner { sim, senses, clock, .. } = &mut *inner;
+        let Inner { sim, senses, clock, physics_steps, .. } = &mut *inner;
         let _honest_work = clock.pause();
         let mut camera = senses.camera(&spec.get::<String>("camera")?).map_err(wrong)?.clone();
         camera.width = spec.get::<Option<usize>>("width")?.unwrap_or(camera.width);
         camera.height = spec.get::<Option<usize>>("height")?.unwrap_or(camera.height);
-        let picture = senses.see(&Senses::frame(sim), &camera).map_err(wrong)?.into_image();
-        LuaImage::new(lua, picture)
+        let frame = Senses::frame(sim);
+        // Before anything has moved, only whoever wrote the layout can have put the camera inside of something.
+        let seen = if *physics_steps == 0 {
+            senses.see_from_outside(&frame, &camera)
+        } else {
+            senses.see(&frame, &camera)
+        };
+        LuaImage::new(lua, seen.map_err(wrong)?.into_image())
     }
 
     /// What a finger feels.

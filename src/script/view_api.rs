@@ -7,7 +7,7 @@ use nalgebra::Quaternion;
 
 use super::{
     catalogue_world::NEW_CAMERA,
-    sandbox::{fail, locked},
+    sandbox::{fail, here, locked},
     scene_api::{checked, field, numbers},
     schema::{self, Field, Range, Type, unknown},
 };
@@ -127,6 +127,11 @@ impl LuaLight {
     }
 }
 
+/// File and line of the script that is at work, as messages name them.
+fn place(lua: &Lua) -> Option<String> {
+    here(lua).map(|(file, line)| format!("{file}:{line}"))
+}
+
 /// A turn from four numbers.
 fn turn(lua: &Lua, label: &str, [w, x, y, z]: [f64; 4]) -> mlua::Result<Quat> {
     let turn = Quat::try_new(Quaternion::new(w, x, y, z), 1e-6);
@@ -186,6 +191,7 @@ impl LuaCamera {
             far_m: spec.get("far")?,
             width: spec.get("width")?,
             height: spec.get("height")?,
+            set_at: place(lua),
         };
         let mut inner = locked(scene);
         if inner.camera(&name).is_some() {
@@ -224,6 +230,7 @@ impl LuaCamera {
         let value = checked(lua, "camera", CAMERA, key, value)?;
         let mut scene = locked(&self.0);
         let camera = &mut scene.cameras[self.1];
+        camera.set_at = place(lua);
         match key {
             "position" => camera.pose.translation.vector = Vec3::from(lua.unpack::<[f64; 3]>(value)?),
             "quat" => camera.pose.rotation = turn(lua, "camera", lua.unpack(value)?)?,
@@ -238,7 +245,9 @@ impl LuaCamera {
 
     fn turn_to(&self, lua: &Lua, to: [f64; 3], up: Option<[f64; 3]>) -> mlua::Result<()> {
         let mut scene = locked(&self.0);
-        let pose = &mut scene.cameras[self.1].pose;
+        let camera = &mut scene.cameras[self.1];
+        camera.set_at = place(lua);
+        let pose = &mut camera.pose;
         let up = Vec3::from(up.unwrap_or([0.0, 0.0, 1.0]));
         pose.rotation = look_at(lua, "camera", &pose.translation.vector, &Vec3::from(to), &up)?;
         Ok(())

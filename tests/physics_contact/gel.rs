@@ -3,13 +3,10 @@
 use std::sync::Arc;
 
 use softvt::{
-    geometry::{
-        Pose, Vec3,
-        shape::{Aabb, Contact, Shape},
-    },
+    geometry::{Pose, Vec3, shape::Shape},
     physics::{
         World,
-        contact::{Collider, Friction, GelSample, Layer, Mover, Partner, Solid, Surface},
+contact::{Collider, Friction, Layer, Mover, Partner},
         world::Movable,
     },
     robot::{Side, pads::PadSurface},
@@ -17,27 +14,6 @@ use softvt::{
 };
 
 use crate::scene::*;
-
-/// The gel of a finger, as the rig puts it into a world.
-#[derive(Debug)]
-struct Gel(PadSurface);
-
-impl Surface for Gel {
-    fn contact(&self, p: &Vec3, _facing: &Vec3, spacing: f64) -> Contact {
-        let contact = self.0.contact(p, spacing);
-        Contact { phi: contact.phi, normal: contact.normal_p, coverage: contact.coverage }
-    }
-
-    fn bounds(&self) -> Aabb {
-        let half = Vec3::new(self.0.length, self.0.width, 0.0) * 0.5;
-        Aabb { min: Vec3::new(-half.x, -half.y, -self.0.thickness), max: half }
-    }
-
-    fn solid(&self) -> Option<Solid> {
-        let patches = self.0.patches(0.75e-3).into_iter();
-        Some(Solid::Gel(patches.map(|(p, normal, area)| GelSample { p, normal, area }).collect()))
-    }
-}
 
 const GEL: Layer = Layer { normal: 3e8, shear: 4e7 };
 
@@ -61,7 +37,7 @@ impl Hand {
             world.add_collider(Collider::new(
                 "pad",
                 (Mover::Kinematic(frame), Pose::identity()),
-                Arc::new(Gel(PadSurface::default())),
+                Arc::new(PadSurface::default()),
                 friction(1.5, 1.2),
                 GEL,
             ))

@@ -3,21 +3,17 @@
 use std::sync::Arc;
 
 use softvt::{
-    geometry::{
-        Mat3, Pose, Quat, Vec3,
-        samples::{SampleSpec, surface_samples},
-        shape::Shape,
-        voxelise::{VoxelSpec, voxel_mesh},
-    },
+    geometry::{Mat3, Pose, Quat, Vec3, samples::SampleSpec, shape::Shape},
     physics::{
         Params, World,
-        contact::{Collider, Friction, Mover},
+        contact::{Friction, Mover},
         fem::{Material, Rest},
         rigid::RigidBody,
     },
 };
 
-pub const GRAVITY: f64 = 9.81;
+use crate::bodies;
+pub use crate::bodies::{GRAVITY, put};
 
 /// Surfaces with both coefficients.
 pub fn friction(static_mu: f64, dynamic_mu: f64) -> Friction {
@@ -49,18 +45,6 @@ pub fn at(x: f64, y: f64, z: f64) -> Pose {
 
 pub fn turned(pose: Pose, turn: Vec3) -> Pose {
     pose * Quat::from_scaled_axis(turn)
-}
-
-/// A collider of a hard shape.
-pub fn put(
-    world: &mut World,
-    name: &str,
-    (mover, pose): (Mover, Pose),
-    shape: &Shape,
-    mu: Friction,
-) -> usize {
-    let layer = world.rigid_layer();
-    world.add_collider(Collider::new(name, (mover, pose), Arc::new(shape.clone()), mu, layer))
 }
 
 /// A static floor whose top is z = 0.
@@ -98,11 +82,8 @@ pub const SOFT: Material = Material { youngs_pa: 3e4, poisson: 0.4, density: 300
 
 /// The rest data of a soft block with samples every `spacing` m.
 pub fn soft_rest(shape: &Shape, material: Material, resolution: usize, spacing: f64) -> Arc<Rest> {
-    let mesh = voxel_mesh(shape, &VoxelSpec { resolution }).expect("a mesh");
     let spec = SampleSpec { grasp_spacing: spacing, other_spacing: spacing };
-    let samples = surface_samples(shape, &mesh, &spec);
-    let size = shape.bounds().size();
-    Rest::new(mesh, material, size.x * size.y * size.z, samples)
+    bodies::soft_rest(shape, material, resolution, &spec)
 }
 
 /// Adds a soft block that other soft blocks feel; its index.

@@ -94,6 +94,6 @@ impl World {
                 });
             }
         }
-        Ok(())
+        self.check_bounds()
     }
 }

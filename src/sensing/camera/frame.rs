@@ -4,7 +4,6 @@ use super::{
     CameraError, FrameView, Mount, Stage, V3, lens::Lens, model::Level, pose::Posed, shade::Blob,
     shadow::ShadowMap, surface::Drawn,
 };
-use crate::scene::Camera;
 
 /// A coarser level is used if its edges are at most this many pixels long, or if it is of one colour and at most this many
 /// pixels from the shape that it stands for.
@@ -90,15 +89,14 @@ pub(super) fn drawn<'a>(
     levels.iter().enumerate().map(one).collect()
 }
 
-/// The camera must not be inside of anything: where the solid angles of the triangles around it (Van Oosterom &
-/// Strackee, 1983) add up to a whole turn.
-pub(super) fn check_outside(
+/// The first thing that the camera is inside of: there the solid angles of the triangles around it (Van Oosterom & Strackee,
+/// 1983) add up to a whole turn.
+pub(super) fn inside_of(
     stage: &Stage,
-    camera: &Camera,
     lens: &Lens,
     bounds: &[[V3; 2]],
     poses: &[Vec<Posed>],
-) -> Result<(), CameraError> {
+) -> Option<String> {
     for (i, thing) in stage.things.iter().enumerate() {
         let [low, high] = bounds[i];
         if (0..3).any(|axis| lens.eye[axis] < low[axis] || lens.eye[axis] > high[axis]) {
@@ -114,10 +112,10 @@ pub(super) fn check_outside(
             angle += 2.0 * a.dot(&b.cross(&c)).atan2(below);
         }
         if angle.abs() > std::f64::consts::TAU {
-            return Err(CameraError::Inside { camera: camera.name.clone(), object: thing.name.clone() });
+            return Some(thing.name.clone());
         }
     }
-    Ok(())
+    None
 }
 
 /// The shadow map of what moves.

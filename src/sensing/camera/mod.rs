@@ -38,11 +38,12 @@ mod turned;
 mod tests;
 
 pub use error::CameraError;
+pub use lens::check_cameras;
 pub use model::{Model, box_mesh, flat_faces};
 pub use picture::Picture;
 pub use render::{Scratch, render};
 pub use solids::{Form, Solid};
-pub use stage::{FrameView, Mount, Stage, Thing};
+pub use stage::{FrameView, Mount, Stage, Thing, check_light};
 
 /// A point, direction or colour of a picture.
 type V3 = nalgebra::Vector3<f32>;

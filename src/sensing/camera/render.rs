@@ -3,7 +3,7 @@
 use super::{
     CameraError, FrameView, Picture, Stage,
     background::{Background, Spots},
-    frame::{blobs, check_outside, choose_levels, draw_shadows, drawn, pose_all},
+    frame::{blobs, choose_levels, draw_shadows, drawn, inside_of, pose_all},
     lens::Lens,
     pass::Pass,
     pose::Posed,
@@ -37,7 +37,8 @@ impl Scratch {
 /// Draws what `camera` sees of `stage` in the state `view`.
 ///
 /// # Errors
-/// A number of the camera out of range, a camera inside a thing, a state without a body that is drawn.
+/// A number of the camera out of range, a state without a body that is drawn. A camera inside of a thing is none: see
+/// [`Picture::inside`].
 pub fn render(
     stage: &Stage,
     view: &FrameView,
@@ -47,7 +48,7 @@ pub fn render(
     let lens = Lens::new(camera, view)?;
     let bounds = pose_all(stage, view, &mut scratch.poses)?;
     let levels = choose_levels(stage, view, &lens, &bounds, &mut scratch.poses)?;
-    check_outside(stage, camera, &lens, &bounds, &scratch.poses)?;
+    let inside = inside_of(stage, &lens, &bounds, &scratch.poses);
     let mut shadow = match scratch.shadow.take() {
         Some((key, map)) if key == stage.key => map,
         _ => ShadowMap::new(&stage.lighting),
@@ -63,7 +64,7 @@ pub fn render(
         moving_blobs: &moving_blobs,
         moving_shadow: &shadow,
     };
-    let picture = if scratch.uncached || camera.mount != CameraMount::World {
+    let mut picture = if scratch.uncached || camera.mount != CameraMount::World {
         all(&pass, &mut scratch.screen)
     } else {
         let known = scratch.backgrounds.iter().position(|b| b.stage == stage.key && b.camera == *camera);
@@ -75,6 +76,7 @@ pub fn render(
         over(&pass, &scratch.backgrounds[index], &mut scratch.screen)
     };
     scratch.shadow = Some((stage.key, shadow));
+    picture.inside = inside;
     Ok(picture)
 }
 
@@ -87,6 +89,7 @@ fn empty_picture(lens: &Lens) -> Picture {
         rgb: vec![0; 3 * pixels],
         depth: vec![0.0; pixels],
         segmentation: vec![0; pixels],
+        inside: None,
     }
 }
 

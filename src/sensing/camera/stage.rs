@@ -130,22 +130,27 @@ impl Stage {
     }
 }
 
-fn check_light(light: &Lighting) -> Result<(), CameraError> {
+/// Checks the numbers of the light.
+///
+/// # Errors
+/// The first that is out of its range.
+pub fn check_light(light: &Lighting) -> Result<(), CameraError> {
     let wrong = |field, expected, got: String| Err(CameraError::Light { field, expected, got });
     let direction = light.key.direction_w;
     if !(direction.norm() > 1e-9 && direction.norm().is_finite()) {
-        return wrong("key.direction_w", "a direction", format!("{:?}", direction.as_slice()));
+        return wrong("direction", "a direction", format!("{:?}", direction.as_slice()));
     }
     if !(0.0..=0.5).contains(&light.key.softness_rad) {
-        return wrong("key.softness_rad", "0 to 0.5 rad", light.key.softness_rad.to_string());
+        return wrong("softness", "0 to 0.5 rad", light.key.softness_rad.to_string());
     }
     let positive = |x: f64| x >= 0.0 && x.is_finite();
     for (field, values) in [
-        ("key.colour", light.key.colour),
-        ("sky.zenith", light.sky.zenith),
-        ("sky.horizon", light.sky.horizon),
-        ("sky.ground", light.sky.ground),
-        ("strength", [light.key.strength, light.sky.strength, 0.0]),
+        ("colour", light.key.colour),
+        ("sky_zenith", light.sky.zenith),
+        ("sky_horizon", light.sky.horizon),
+        ("sky_ground", light.sky.ground),
+        ("strength", [light.key.strength; 3]),
+        ("sky_strength", [light.sky.strength; 3]),
     ] {
         if !values.into_iter().all(positive) {
             return wrong(field, "numbers from 0", format!("{values:?}"));
