@@ -203,19 +203,7 @@ impl Episode {
             source,
         })?;
         let witness = Witness::new(&sim, target, place);
-        let judge = Judge::new(Setup {
-            rules: spec.rules.clone(),
-            workspace: spec.scene.workspace,
-            place: place_of(&spec.task.goal, &sim.objects[place]),
-            hold_s,
-            dt_s: spec.params.dt,
-            steps_per_control: steps_per_control(spec.params.dt),
-            target_weight_n: weight(&sim, target),
-            soft: matches!(sim.objects[target].kind, Kind::Soft(_)),
-            limit: spec.limit,
-            target_lowest_z_w: lowest(&sim, &sim.objects[target]),
-            others_lowest_z_w: witness.others_lowest(&sim),
-        });
+        let judge = judge(&spec, &sim, &witness, (target, place), hold_s);
         let tool = sim.rig.tool_b(&sim.world);
         let start_hold = Action {
             position_b: tool.translation.vector,
@@ -395,6 +383,29 @@ fn check_action(action: &Action) -> Result<(), String> {
         return Ok(());
     }
     Err(format!("the action {all:?} holds a number that is not finite"))
+}
+
+/// The judge of an episode in its settled state.
+fn judge(
+    spec: &EpisodeSpec,
+    sim: &Simulation,
+    witness: &Witness,
+    (target, place): (usize, usize),
+    hold_s: f64,
+) -> Judge {
+    Judge::new(Setup {
+        rules: spec.rules.clone(),
+        workspace: spec.scene.workspace,
+        place: place_of(&spec.task.goal, &sim.objects[place]),
+        hold_s,
+        dt_s: spec.params.dt,
+        steps_per_control: steps_per_control(spec.params.dt),
+        target_weight_n: weight(sim, target),
+        soft: matches!(sim.objects[target].kind, Kind::Soft(_)),
+        limit: spec.limit,
+        target_lowest_z_w: lowest(sim, &sim.objects[target]),
+        others_lowest_z_w: witness.others_lowest(sim),
+    })
 }
 
 /// Where the goal is, from the shape of what it names.
