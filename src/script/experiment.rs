@@ -6,6 +6,7 @@ use serde_json::{Map, Number, Value as Json};
 use super::{
     Loaded, ScriptError, catalogue,
     image_api::{picture, png},
+    lists,
     plan::{Machine, reopen},
     sandbox::fail,
     schema::{self, sorted_pairs},
@@ -225,6 +226,7 @@ fn rows(lua: &Lua, result: &Value) -> mlua::Result<Vec<Row>> {
 
 /// A Lua value as JSON, keys sorted; numbers must be finite.
 fn json(lua: &Lua, value: &Value, place: &str, depth: usize) -> mlua::Result<Json> {
+    let value = &lists::plain(lua, value)?;
     Ok(match value {
         Value::Nil => Json::Null,
         Value::Boolean(flag) => Json::Bool(*flag),

@@ -1,5 +1,6 @@
 //! Lua: the only room that knows it. Sandbox, bindings, options, plans, experts, stubs.
 
+mod budget;
 mod catalogue;
 mod catalogue_classes;
 mod catalogue_shapes;
@@ -13,7 +14,9 @@ mod episode;
 mod error;
 mod experiment;
 mod expert;
+mod host;
 mod image_api;
+mod lists;
 mod options;
 mod plan;
 mod pose;
@@ -28,6 +31,7 @@ mod sim_api;
 mod sources;
 pub mod stubs;
 mod timing;
+mod turn;
 mod view_api;
 mod visuals;
 mod world_api;

@@ -187,7 +187,7 @@ fn asset(lua: &Lua, value: Value) -> mlua::Result<Table> {
 }
 
 /// `softvt.layout(name, build)` or `softvt.layout{ name = …, build = … }`.
-fn layout(lua: &Lua, (first, build): (Value, Option<Function>)) -> mlua::Result<Table> {
+fn layout(lua: &Lua, (first, build): (Value, Value)) -> mlua::Result<Table> {
     match (&first, build) {
         (Value::String(name), build) => {
             let table = lua.create_table()?;
@@ -195,7 +195,7 @@ fn layout(lua: &Lua, (first, build): (Value, Option<Function>)) -> mlua::Result<
             table.set("build", build)?;
             schema::make(lua, &catalogue::LAYOUT, &Value::Table(table))
         }
-        (_, None) => schema::make(lua, &catalogue::LAYOUT, &first),
+        (_, Value::Nil) => schema::make(lua, &catalogue::LAYOUT, &first),
         _ => Err(fail(lua, format!("layout: expected a name and a function, got {}", schema::got(&first)))),
     }
 }

@@ -3,7 +3,8 @@
 local host = ...
 local raw_error, raw_tostring, raw_next, raw_format = error, tostring, next, string.format
 local raw_setmetatable, getmetatable, type, rawget, select = setmetatable, getmetatable, type, rawget, select
-local sort, pack, unpack, find, pcall = table.sort, table.pack, table.unpack, string.find, pcall
+local sort, pack, unpack, find, raw_pcall = table.sort, table.pack, table.unpack, string.find, pcall
+local raw_resume, raw_close = coroutine.resume, coroutine.close
 
 -- An address differs from run to run, so it never becomes text.
 function tostring(...)
@@ -41,6 +42,17 @@ function error(object, level)
   if level > 0 then level = level + 1 end
   raw_error(object, level)
 end
+
+-- Errors of the host are objects; scripts get their text, as of any other error.
+local function answer(ok, ...)
+  if ok then return true, ... end
+  return false, host.words((...))
+end
+
+function pcall(...) return answer(raw_pcall(...)) end
+function coroutine.resume(...) return answer(raw_resume(...)) end
+function coroutine.close(...) return answer(raw_close(...)) end
+local pcall = pcall
 
 -- A handler that runs at the place of the error would run inside the hook that enforces the time limit, where no hook
 -- stops it; this one runs after the stack has unwound.
@@ -102,6 +114,7 @@ function pairs(object)
   local meta = getmetatable(object)
   local own = type(meta) == "table" and rawget(meta, "__pairs")
   if own then return own(object) end
+  object = host.plain(object)
   if type(object) ~= "table" then
     raw_error("bad argument #1 to 'pairs' (table expected, got " .. type(object) .. ")", 2)
   end
@@ -109,6 +122,7 @@ function pairs(object)
 end
 
 host.sorted = function(object)
+  object = host.plain(object)
   if type(object) ~= "table" then raw_error("softvt.sorted: expected a table, got " .. type(object), 2) end
   return iterate(object)
 end

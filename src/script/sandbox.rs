@@ -11,9 +11,12 @@ use mlua::{
 };
 
 use super::{
+    budget::Budget,
     deadline::{Clock, Deadline, OnStuck, end_process},
     error::{Context, RaisedObject, ScriptError},
+    lists,
     random::MathRandom,
+    schema,
     sources::Library,
 };
 
@@ -58,6 +61,7 @@ impl Default for Limits {
 pub(super) struct Shared {
     pub main: String,
     pub library: Mutex<Library>,
+    pub budget: Budget,
     raised: Mutex<Option<RaisedObject>>,
     limits: Limits,
 }
@@ -82,6 +86,7 @@ impl Vm {
         let shared = Arc::new(Shared {
             main: main.into(),
             library: Mutex::new(library),
+            budget: Budget::default(),
             raised: Mutex::new(None),
             limits: limits.clone(),
         });
@@ -96,6 +101,8 @@ impl Vm {
         let api = lua.create_table()?;
         let host = lua.create_table()?;
         host.set("raised", lua.create_function(note_raised)?)?;
+        host.set("words", lua.create_function(words)?)?;
+        host.set("plain", lua.create_function(|lua, value: Value| lists::plain(lua, &value))?)?;
         lua.load(include_str!("prelude.lua"))
             .set_name("=softvt")
             .set_mode(ChunkMode::Text)
@@ -223,8 +230,18 @@ fn print(lua: &Lua, values: MultiValue) -> mlua::Result<()> {
 /// `load(chunk [, name [, mode [, env]]])` for text alone; as in Lua, a bad chunk gives nil and the message.
 fn load(
     lua: &Lua,
-    (chunk, name, _mode, env): (Value, Option<String>, Option<String>, Option<Table>),
+    (chunk, name, _mode, env): (Value, Value, Value, Value),
 ) -> mlua::Result<(Value, Value)> {
+    let name = match name {
+        Value::Nil => "=(load)".to_owned(),
+        Value::String(name) => name.to_string_lossy(),
+        other => return Err(fail(lua, format!("load: expected a string as name, got {}", schema::got(&other)))),
+    };
+    let env = match env {
+        Value::Nil => None,
+        Value::Table(env) => Some(env),
+        other => return Err(fail(lua, format!("load: expected a table as env, got {}", schema::got(&other)))),
+    };
     let mut bytes = Vec::new();
     match chunk {
         Value::String(text) => bytes.extend_from_slice(&text.as_bytes()),
@@ -237,14 +254,13 @@ fn load(
             }
         },
         other => {
-            return Err(fail(lua, format!("load: expected a string or function, got {}", other.type_name())));
+            return Err(fail(lua, format!("load: expected a string or function, got {}", schema::got(&other))));
         }
     }
     let refusal = |text: String| Ok((Value::Nil, Value::String(lua.create_string(text)?)));
     if bytes.first() == Some(&0x1b) {
         return refusal("load: compiled byte code is refused; only Lua source text is run".into());
     }
-    let name = name.unwrap_or_else(|| "=(load)".into());
     let mut built = lua.load(bytes).set_name(name).set_mode(ChunkMode::Text);
     if let Some(env) = env {
         built = built.set_environment(env);
@@ -290,6 +306,13 @@ fn require(lua: &Lua, loaded: &Table, name: &Value) -> mlua::Result<Value> {
     Ok(value)
 }
 
+/// An error of the host as the text that people would read; any other value as it is.
+fn words(lua: &Lua, value: Value) -> mlua::Result<Value> {
+    let Value::Error(error) = &value else { return Ok(value) };
+    let text = explain(&*shared(lua)?, error).to_string();
+    lua.create_string(text).map(Value::String)
+}
+
 /// Keeps a description of an error object, since its address is all that would be left of it later.
 fn note_raised(lua: &Lua, object: Value) -> mlua::Result<()> {
     let description = describe(&object, 0);
@@ -325,6 +348,6 @@ pub(super) fn describe(value: &Value, depth: usize) -> String {
             format!("{{{}}}", parts.collect::<Vec<_>>().join(", "))
         }
         Value::Nil => "nil".into(),
-        other => format!("a {}", other.type_name()),
+        other => schema::kind(other),
     }
 }

@@ -3,6 +3,7 @@
 mod bad_input;
 mod episodes;
 mod options;
+mod surface;
 mod visuals;
 
 use std::{fs, path::PathBuf, sync::Arc, time::Duration};
