@@ -13,7 +13,7 @@ use super::{
     host::{self, Hosted, Read, hosted, method},
     plan::Machine,
     pose::LuaPose,
-    sandbox::{fail, locked},
+    sandbox::{base, fail, locked},
     schema::{self, number, unknown},
     sources::embedded,
 };
@@ -160,7 +160,8 @@ impl Coroutine {
 fn arm(lua: &Lua, host: &mlua::AnyUserData) -> mlua::Result<Table> {
     let text =
         embedded("scripts/softvt/arm.lua").ok_or_else(|| fail(lua, "the embedded library has no arm"))?;
-    lua.load(text).set_name("=softvt.arm").set_mode(ChunkMode::Text).call((host, checks(lua)?))
+    let chunk = lua.load(text).set_name("=softvt.arm").set_mode(ChunkMode::Text).set_environment(base(lua)?);
+    chunk.call((host, checks(lua)?))
 }
 
 /// Checks for the arm's Lua side; errors stand at the expert's own line.

@@ -3,7 +3,7 @@
 local host = ...
 local raw_error, raw_tostring, raw_next, raw_format = error, tostring, next, string.format
 local raw_setmetatable, getmetatable, type, rawget, select = setmetatable, getmetatable, type, rawget, select
-local sort, pack, unpack, find, raw_pcall = table.sort, table.pack, table.unpack, string.find, pcall
+local sort, pack, unpack, find, gsub, raw_pcall = table.sort, table.pack, table.unpack, string.find, string.gsub, pcall
 local raw_resume, raw_close = coroutine.resume, coroutine.close
 
 -- An address differs from run to run, so it never becomes text.
@@ -32,7 +32,9 @@ function string.format(form, ...)
       values[i] = tostring(values[i])
     end
   end
-  return raw_format(form, unpack(values, 1, values.n))
+  local ok, text = raw_pcall(raw_format, form, unpack(values, 1, values.n))
+  if ok then return text end
+  raw_error("string.format: " .. gsub(text, "^bad argument (#%d+) to '[^']*'", "argument %1"), 2)
 end
 
 -- Errors that are objects are described here, since Lua would later show their address alone.

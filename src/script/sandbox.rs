@@ -2,7 +2,10 @@
 
 use std::{
     collections::BTreeSet,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicUsize, Ordering},
+    },
     time::Duration,
 };
 
@@ -19,6 +22,12 @@ use super::{
     schema,
     sources::Library,
 };
+
+/// Bytes that a machine may print; the rest of a flood is left out.
+const MOST_PRINTED: usize = 1 << 20;
+
+/// Registry key of the base library as it was before a script could change it.
+const BASE: &str = "softvt base library";
 
 /// Where `print` goes; not the standard output, which belongs to results.
 pub type Print = Arc<dyn Fn(&str) + Send + Sync>;
@@ -63,6 +72,8 @@ pub(super) struct Shared {
     pub library: Mutex<Library>,
     pub budget: Budget,
     raised: Mutex<Option<RaisedObject>>,
+    /// Bytes that `print` may still write.
+    printable: AtomicUsize,
     limits: Limits,
 }
 
@@ -88,6 +99,7 @@ impl Vm {
             library: Mutex::new(library),
             budget: Budget::default(),
             raised: Mutex::new(None),
+            printable: AtomicUsize::new(MOST_PRINTED),
             limits: limits.clone(),
         });
         Self::build(&shared).map_err(|e| explain(&shared, &e))
@@ -109,7 +121,10 @@ impl Vm {
             .call::<()>(&host)?;
         api.set("sorted", host.get::<Function>("sorted")?)?;
         withhold(&lua)?;
-        lua.globals().set("print", lua.create_function(print)?)?;
+        let tostring: Function = lua.globals().get("tostring")?;
+        let print = lua.create_function(move |lua, values: MultiValue| print(lua, &tostring, values))?;
+        lua.globals().set("print", print)?;
+        keep_base(&lua)?;
         lua.globals().set("load", lua.create_function(load)?)?;
         let loaded = lua.create_table()?;
         let require = lua.create_function(move |lua, name: Value| require(lua, &loaded, &name))?;
@@ -217,13 +232,43 @@ pub(super) fn fail(lua: &Lua, message: impl Into<String>) -> mlua::Error {
     mlua::Error::external(error)
 }
 
-fn print(lua: &Lua, values: MultiValue) -> mlua::Result<()> {
-    let tostring: Function = lua.globals().get("tostring")?;
-    let mut words = Vec::new();
-    for value in values {
-        words.push(tostring.call::<mlua::LuaString>(value)?.to_string_lossy().to_string());
+/// Puts a copy of the base library where scripts do not reach it: the library's own Lua runs on that.
+fn keep_base(lua: &Lua) -> mlua::Result<()> {
+    let base = lua.create_table()?;
+    for entry in lua.globals().pairs::<Value, Value>() {
+        let (name, value) = entry?;
+        let value = match &value {
+            Value::Table(library) if name.as_string().is_some_and(|name| name != "_G") => {
+                Value::Table(lua.create_table_from(library.pairs::<Value, Value>().flatten())?)
+            }
+            _ => value,
+        };
+        base.set(name, value)?;
     }
-    (shared(lua)?.limits.print)(&words.join("\t"));
+    lua.set_named_registry_value(BASE, base)
+}
+
+/// The base library as it was before a script could change it.
+pub(super) fn base(lua: &Lua) -> mlua::Result<Table> {
+    lua.named_registry_value(BASE)
+}
+
+fn print(lua: &Lua, tostring: &Function, values: MultiValue) -> mlua::Result<()> {
+    let shared = shared(lua)?;
+    let mut line = String::new();
+    for (index, value) in values.into_iter().enumerate() {
+        if index > 0 {
+            line.push('\t');
+        }
+        line.push_str(&tostring.call::<mlua::LuaString>(value)?.to_string_lossy());
+    }
+    let left = shared.printable.load(Ordering::Relaxed);
+    if line.len() < left {
+        shared.printable.store(left - line.len() - 1, Ordering::Relaxed);
+        (shared.limits.print)(&line);
+    } else if shared.printable.swap(0, Ordering::Relaxed) > 0 {
+        (shared.limits.print)(&format!("… the script prints more than {} MiB; the rest is left out", MOST_PRINTED >> 20));
+    }
     Ok(())
 }
 

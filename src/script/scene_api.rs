@@ -9,7 +9,7 @@ use super::{
     catalogue_classes::{self as classes, Class},
     host::{Hosted, Read, hosted, method},
     sandbox::{fail, locked},
-    schema::{Field, Presence, Range, Type, unknown},
+    schema::{self, Field, Presence, Range, Type, unknown},
     shapes::LuaShape,
     view_api::{LuaCamera, LuaLight, LuaLook},
 };
@@ -151,7 +151,12 @@ fn find(lua: &Lua, scene: &Scene, name: &str) -> mlua::Result<usize> {
 }
 
 fn read_asset(lua: &Lua, table: &Table) -> mlua::Result<Asset> {
+    schema::still_sound(lua, &catalogue::ASSET, table)?;
     let body: Table = table.get("body")?;
+    let kinds = [&catalogue::SOFT, &catalogue::RIGID, &catalogue::STATIC, &catalogue::SCENERY];
+    if let Some(record) = kinds.into_iter().find(|record| schema::is_made(lua, record, &body)) {
+        schema::still_sound(lua, record, &body)?;
+    }
     let kind: String = body.metatable().map_or(Ok(String::new()), |meta| meta.get("__name"))?;
     let body = match kind.as_str() {
         kind if kind == catalogue::SOFT.kind => Body::Soft(SoftMaterial {

@@ -6,62 +6,8 @@ use super::{
     lists,
     sandbox::{fail, here, locked, shared},
 };
+pub use super::range::Range;
 use crate::message;
-
-/// Bounds of a number; an end may be excluded.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Range {
-    /// Lowest value.
-    pub min: f64,
-    /// Highest value.
-    pub max: f64,
-    /// Whether `min` itself is refused.
-    pub above_min: bool,
-    /// Whether `max` itself is refused.
-    pub below_max: bool,
-}
-
-impl Range {
-    /// Any finite number.
-    pub const ANY: Self =
-        Self { min: f64::NEG_INFINITY, max: f64::INFINITY, above_min: false, below_max: false };
-    /// Greater than zero.
-    pub const POSITIVE: Self = Self { min: 0.0, above_min: true, ..Self::ANY };
-    /// Zero or greater.
-    pub const NOT_NEGATIVE: Self = Self { min: 0.0, ..Self::ANY };
-
-    /// From `min` to `max`, both allowed.
-    pub const fn closed(min: f64, max: f64) -> Self {
-        Self { min, max, above_min: false, below_max: false }
-    }
-
-    /// From `min` (allowed) to `max` (refused).
-    pub const fn below(min: f64, max: f64) -> Self {
-        Self { min, max, above_min: false, below_max: true }
-    }
-
-    /// Whether `value` is allowed; never for NaN or an infinity.
-    pub fn holds(&self, value: f64) -> bool {
-        let low = if self.above_min { value > self.min } else { value >= self.min };
-        let high = if self.below_max { value < self.max } else { value <= self.max };
-        value.is_finite() && low && high
-    }
-
-    /// ` in 0..10`, ` above 0`, …; empty for any number.
-    pub fn words(&self) -> String {
-        match (self.min.is_finite(), self.max.is_finite()) {
-            (false, false) => String::new(),
-            (true, false) if self.above_min => format!(" above {}", self.min),
-            (true, false) => format!(" of {} or more", self.min),
-            (false, true) => format!(" of {} or less", self.max),
-            (true, true) => {
-                let low = if self.above_min { "above " } else { "" };
-                let high = if self.below_max { "below " } else { "" };
-                format!(" in {low}{}..{high}{}", self.min, self.max)
-            }
-        }
-    }
-}
 
 /// What a value may be.
 #[derive(Clone, Copy, Debug)]
@@ -273,6 +219,11 @@ impl Type {
     pub(super) fn check(&self, lua: &Lua, value: &Value) -> Result<Value, Fault> {
         let value = &lists::plain(lua, value).map_err(|e| Fault::new(e.to_string()))?;
         let wrong = || Fault::new(format!("expected {}, got {}", self.words(), got(value)));
+        if let Value::String(text) = value
+            && text.to_str().is_err()
+        {
+            return Err(Fault::new(format!("expected UTF-8 text, got {}", got(value))));
+        }
         let kept = || Ok(value.clone());
         match (self, value) {
             (Self::Number(_, range), _) => match number(value) {
@@ -474,6 +425,14 @@ pub(super) fn checked(lua: &Lua, record: &Record, value: &Value) -> mlua::Result
             let message = format!("{}: expected a table of {}, got {}", record.label, names(record), got(&other));
             Err(fail(lua, message))
         }
+    }
+}
+
+/// Checks a made table once more: a script may have written to it since.
+pub(super) fn still_sound(lua: &Lua, record: &Record, table: &Table) -> mlua::Result<()> {
+    match check(lua, record, table) {
+        Ok(_) => Ok(()),
+        Err(fault) => Err(fail(lua, format!("{} (changed after it was made)", fault.words(record.label)))),
     }
 }
 

@@ -19,7 +19,7 @@ use crate::geometry::{
 };
 
 /// Largest tree of a shape: every question about a point goes through all of it.
-const MOST: TreeSize = TreeSize { nodes: 2000, depth: 100 };
+const MOST: TreeSize = TreeSize { nodes: 2000, depth: 100, work: 1e5 };
 
 /// `softvt.Shape`.
 #[derive(Clone, Debug)]
@@ -46,7 +46,12 @@ impl LuaShape {
 
     /// Takes a shape into the machine that keeps `more` bytes besides its own tree, if it can be and is not too large.
     fn new(lua: &Lua, shape: Shape, more: usize) -> mlua::Result<Self> {
-        let TreeSize { nodes, depth } = shape.tree_size();
+        let TreeSize { nodes, depth, work } = shape.tree_size();
+        if work > MOST.work {
+            let message = "shape: too many cuts or unions stand in one another to be computed with; join the parts by union \
+                           first (a:union(b):union(c)), and cut or join them at once";
+            return Err(fail(lua, message));
+        }
         if nodes > MOST.nodes || depth > MOST.depth {
             return Err(fail(
                 lua,

@@ -2,11 +2,13 @@
 
 use std::sync::{Arc, Mutex};
 
-use mlua::{Function, Lua, LuaSerdeExt, MultiValue, Table, UserDataMethods, Value};
+use mlua::{Function, Lua, MultiValue, Table, UserDataMethods, Value};
 use serde::de::DeserializeOwned;
 
 use super::{
+    catalogue::LAYOUT,
     catalogue_classes::Class,
+    data::json,
     catalogue_world::SIMULATE,
     classes_world::SIMULATION,
     controller::{Glance, Planner, next},
@@ -62,17 +64,29 @@ pub(super) fn install(lua: &Lua, api: &Table, clock: &Clock) -> mlua::Result<()>
 /// A table as settings.
 pub(super) fn settings(lua: &Lua, label: &str, table: Option<Table>) -> mlua::Result<Settings> {
     let Some(table) = table else { return Ok(Settings::default()) };
-    let settings: Settings = read(lua, label, Value::Table(table))?;
+    let settings: Settings = read(lua, label, &Value::Table(table))?;
     settings.check().map_err(|e| fail(lua, format!("{label}: {e}")))?;
     Ok(settings)
 }
 
-/// Lua data as a Rust type; the message says which field.
-pub(super) fn read<T: DeserializeOwned>(lua: &Lua, label: &str, value: Value) -> mlua::Result<T> {
-    lua.from_value(value).map_err(|e| {
-        let text = e.to_string();
-        let what = text.trim_start_matches("deserialize error: ").lines().next().unwrap_or_default();
-        fail(lua, format!("{label}: {what}"))
+/// Lua data as a Rust type, in words for people.
+pub(super) fn read<T: DeserializeOwned>(lua: &Lua, label: &str, value: &Value) -> mlua::Result<T> {
+    serde_json::from_value(json(lua, value, label)?).map_err(|error| {
+        let text = error.to_string();
+        let kinds = [
+            ("floating point ", ""),
+            ("expected f64", "expected a number"),
+            ("expected u32", "expected a whole number"),
+            ("expected u64", "expected a whole number"),
+            ("expected usize", "expected a whole number"),
+            ("expected a sequence", "expected a list"),
+            ("expected a map", "expected a table"),
+            ("invalid type: map", "invalid type: a table"),
+            ("invalid type: sequence", "invalid type: a list"),
+        ];
+        let text = kinds.iter().fold(text, |text, (rust, people)| text.replace(rust, people));
+        let text = text.split_once("expected struct ").map_or(text.clone(), |(before, _)| format!("{before}expected a table"));
+        fail(lua, format!("{label}: {text}"))
     })
 }
 
@@ -85,6 +99,7 @@ fn simulate(
     let spec = schema::checked(lua, &SIMULATE, value)?;
     let settings = settings(lua, "softvt.simulate: settings", spec.get("settings")?)?;
     let layout: Table = spec.get("layout")?;
+    schema::still_sound(lua, &LAYOUT, &layout)?;
     let seed = EpisodeSeed {
         suite: spec.get("suite")?,
         layout: layout.get("name")?,

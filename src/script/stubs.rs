@@ -222,7 +222,13 @@ Scripts are Lua 5.4 in a sandbox: `coroutine`, `math`, `string`, `table` and `ut
 `package` and byte code. `require \"a.b\"` looks for `scripts/a/b.lua`, `suites/a/b.lua` and `a/b.lua` in the script's
 folder, the folder above and the current one, then in the library inside the binary. `math.random` is seeded by the run.
 `pairs` goes through numbers, strings and booleans in order; other keys, and `next`, have no promised order. `tostring`
-gives the kind of a table or function, never an address. `print` writes to standard error. Memory and time are limited.
+gives the kind of a table or function, never an address. `print` writes to standard error, up to 1 MiB. Memory and time
+are limited: 256 MiB of Lua values, 512 MiB of pictures, shapes and masks, shapes of at most 2000 parts, masks of 200.
+
+A list that belongs to an object (`scene.base`, `look.albedo`, `scene.objects`) is the object's own and no copy: what is
+written to it is checked and holds at once, and a list that cannot be written says what to do instead. What a method
+gives, and a table that a script made, are the script's. Unknown fields are errors everywhere. `pcall` gives messages as
+strings.
 ";
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod episodes;
+mod hostile;
 mod options;
 mod surface;
 mod visuals;

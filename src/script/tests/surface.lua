@@ -4,7 +4,7 @@ local function note(what, ok, message)
   if not ok then said[#said + 1] = { what = what, said = tostring(message), kind = type(message) } end
 end
 local wrong = {
-  "abc", "", {}, { 1, 2 }, { "a", "b", "c" }, { 0/0, 0, 0 }, { 1e308, 1e308, 1e308 }, { x = 1 }, { [1.5] = {} }, true, 1e308, -1e308,
+  "abc", "", "\255", {}, { 1, 2 }, { "a", "b", "c" }, { 0/0, 0, 0 }, { 1e308, 1e308, 1e308 }, { x = 1 }, { [1.5] = {} }, true, 1e308, -1e308,
   -1, 0.5, 0/0, 1/0, 2^53, math.mininteger, function() end, coroutine.create(print), softvt.pose { xyz = { 0, 0, 0 } },
   softvt.image { width = 1, height = 1, colour = { 0, 0, 0 } },
   setmetatable({}, { __index = function() error("trap") end, __len = function() return 1e9 end }),
