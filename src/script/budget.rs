@@ -43,7 +43,9 @@ pub(super) fn hold(lua: &Lua, bytes: usize) -> mlua::Result<Held> {
         let most = MOST_BYTES >> 20;
         return Err(fail(
             lua,
-            format!("the script holds more than {most} MiB of pictures, shapes and masks; keep fewer or smaller ones"),
+            format!(
+                "the script holds more than {most} MiB of pictures, shapes and masks; keep fewer or smaller ones"
+            ),
         ));
     }
     budget.0.fetch_add(bytes, Ordering::Relaxed);

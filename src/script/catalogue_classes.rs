@@ -56,7 +56,10 @@ const POSE_VALUE: Type = Type::Object("softvt.Pose");
 pub static FUNCTIONS: &[Signature] = &[
     method(
         "layout",
-        &[("name", Type::OneOf(&[Type::Text, Type::Nested(&tables::LAYOUT)])), ("build?", Type::Function("fun(scene: softvt.Scene, rng: softvt.Rng)"))],
+        &[
+            ("name", Type::OneOf(&[Type::Text, Type::Nested(&tables::LAYOUT)])),
+            ("build?", Type::Function("fun(scene: softvt.Scene, rng: softvt.Rng)")),
+        ],
         &["softvt.Layout"],
         "A layout by name and function, or by a table of name and build.",
     ),
@@ -66,7 +69,12 @@ pub static FUNCTIONS: &[Signature] = &[
         &["table<string, any>"],
         "Declares the script's options; gives their values, from the command line or by default.",
     ),
-    method("world", &[("world?", Type::Nested(&WORLD))], &["softvt.World"], "An empty world without a robot."),
+    method(
+        "world",
+        &[("world?", Type::Nested(&WORLD))],
+        &["softvt.World"],
+        "An empty world without a robot.",
+    ),
     method(
         "simulate",
         &[("simulate", Type::Nested(&SIMULATE))],
@@ -197,19 +205,14 @@ pub static RNG: Class = Class {
         method(
             "stream",
             &[(
-            "name",
-            Type::Choice(&["layout", "arm", "material", "light", "camera", "sensor", "expert", "script"]),
-        )],
+                "name",
+                Type::Choice(&["layout", "arm", "material", "light", "camera", "sensor", "expert", "script"]),
+            )],
             &["softvt.Rng"],
             "Another stream, from its start.",
         ),
         method("uniform", &[("a", NUMBER), ("b", NUMBER)], &["number"], "Uniform from a to below b."),
-        method(
-            "normal",
-            &[("mean", NUMBER), ("sigma", NUMBER)],
-            &["number"],
-            "Normally distributed.",
-        ),
+        method("normal", &[("mean", NUMBER), ("sigma", NUMBER)], &["number"], "Normally distributed."),
         method(
             "int",
             &[("low", Type::Integer(Range::ANY)), ("high", Type::Integer(Range::ANY))],
@@ -239,7 +242,12 @@ pub static SCENE: Class = Class {
             &["softvt.Camera"],
             "A camera; every scene has third_person and wrist.",
         ),
-        method("add_camera", &[("camera", Type::Nested(&NEW_CAMERA))], &["softvt.Camera"], "One more camera."),
+        method(
+            "add_camera",
+            &[("camera", Type::Nested(&NEW_CAMERA))],
+            &["softvt.Camera"],
+            "One more camera.",
+        ),
     ],
 };
 

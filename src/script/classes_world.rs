@@ -59,7 +59,12 @@ pub static BODY: Class = Class {
         method("velocity", &[], &["number[]"], "Velocity of the centre of mass, m/s."),
         method("speed", &[], &["number"], "Speed of the fastest node, m/s."),
         method("mass", &[], &["number"], "Mass, kg."),
-        method("min_det_f", &[], &["number?"], "Least det F of a filled element; 0 or less is inverted, nil where no element is filled."),
+        method(
+            "min_det_f",
+            &[],
+            &["number?"],
+            "Least det F of a filled element; 0 or less is inverted, nil where no element is filled.",
+        ),
         method("asleep", &[], &["boolean"], "Whether it sleeps."),
         method(
             "deformation",
@@ -191,6 +196,11 @@ pub static IMAGE: Class = Class {
             &[],
             "Puts another picture on this one.",
         ),
-        method("text", &[("text", Type::Line), ("how", Type::Nested(&TEXT))], &[], "Writes a line of text on it."),
+        method(
+            "text",
+            &[("text", Type::Line), ("how", Type::Nested(&TEXT))],
+            &[],
+            "Writes a line of text on it.",
+        ),
     ],
 };

@@ -167,11 +167,13 @@ fn arm(lua: &Lua, host: &mlua::AnyUserData) -> mlua::Result<Table> {
 /// Checks for the arm's Lua side; errors stand at the expert's own line.
 fn checks(lua: &Lua) -> mlua::Result<Table> {
     let checks = lua.create_table()?;
-    let arguments = |lua: &Lua, (name, values): (String, MultiValue)| {
-        match classes::ARM.methods.iter().find(|signature| signature.name == name) {
-            Some(signature) => host::arguments(lua, &format!("arm:{name}"), signature, values),
-            None => Err(fail(lua, format!("arm: there is no {name:?}"))),
-        }
+    let arguments = |lua: &Lua, (name, values): (String, MultiValue)| match classes::ARM
+        .methods
+        .iter()
+        .find(|signature| signature.name == name)
+    {
+        Some(signature) => host::arguments(lua, &format!("arm:{name}"), signature, values),
+        None => Err(fail(lua, format!("arm: there is no {name:?}"))),
     };
     checks.set("arguments", lua.create_function(arguments)?)?;
     let no_self = |lua: &Lua, (name, first): (String, Value)| -> mlua::Result<()> {

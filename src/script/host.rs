@@ -3,7 +3,8 @@
 //! Both go by the binding table, so that every wrong argument and every unknown field ends in the same kind of message.
 
 use mlua::{
-    FromLuaMulti, IntoLuaMulti, Lua, MetaMethod, MultiValue, Table, UserData, UserDataFields, UserDataMethods, Value,
+    FromLuaMulti, IntoLuaMulti, Lua, MetaMethod, MultiValue, Table, UserData, UserDataFields,
+    UserDataMethods, Value,
 };
 
 use super::{
@@ -156,7 +157,11 @@ pub(super) fn no_self(lua: &Lua, class: &Class, name: &str, first: &Value) -> ml
     let short = short(class);
     fail(
         lua,
-        format!("{short}:{name}: expected a {} before the colon, got {}; call it as {short}:{name}(…)", class.name, got(first)),
+        format!(
+            "{short}:{name}: expected a {} before the colon, got {}; call it as {short}:{name}(…)",
+            class.name,
+            got(first)
+        ),
     )
 }
 
@@ -245,7 +250,10 @@ fn set_index<T: Hosted>(lua: &Lua, this: &T, key: &Value, value: &Value) -> mlua
         return set_field(lua, this, &name, value);
     }
     if class.methods.iter().any(|method| method.name == name) {
-        return Err(fail(lua, format!("{label}.{name}: is a method and cannot be written; call it as {label}:{name}(…)")));
+        return Err(fail(
+            lua,
+            format!("{label}.{name}: is a method and cannot be written; call it as {label}:{name}(…)"),
+        ));
     }
     let Some((_, ty, _)) = class.fields.iter().find(|(field, ..)| *field == name) else {
         let names = class.written.iter().map(|field| field.name);
@@ -254,11 +262,16 @@ fn set_index<T: Hosted>(lua: &Lua, this: &T, key: &Value, value: &Value) -> mlua
             false => fail(lua, format!("{label}: {}", unknown("key", &name, names))),
         });
     };
-    let inner = CLASSES.iter().find(|class| class.name == *ty).and_then(|class| class.written.iter().find(|f| is_number(f)));
+    let inner = CLASSES
+        .iter()
+        .find(|class| class.name == *ty)
+        .and_then(|class| class.written.iter().find(|f| is_number(f)));
     Err(match inner {
         Some(Field { name: number, .. }) => fail(
             lua,
-            format!("{label}.{name}: cannot be replaced; its numbers are written one by one, as in {label}.{name}.{number} = …"),
+            format!(
+                "{label}.{name}: cannot be replaced; its numbers are written one by one, as in {label}.{name}.{number} = …"
+            ),
         ),
         None => fail(lua, format!("{label}.{name}: is only read")),
     })

@@ -93,7 +93,8 @@ fn part(lua: &Lua, method: &str, picture: &RgbImage, region: Option<[f64; 4]>) -
         return Ok([x, y, w, h]);
     }
     let [x, y, w, h] = region.map(crate::message::number);
-    let message = format!("expected x, y, width, height within {width} × {height} pixels, got {{{x}, {y}, {w}, {h}}}");
+    let message =
+        format!("expected x, y, width, height within {width} × {height} pixels, got {{{x}, {y}, {w}, {h}}}");
     Err(fail(lua, format!("image:{method}: region: {message}")))
 }
 
@@ -121,7 +122,9 @@ impl LuaImage {
         let picture = &locked(&self.0).picture;
         // The picture on the way, as tall as the new one and as wide as the old one, has four floats a pixel.
         let between = 16 * picture.width() as usize * height as usize;
-        Self::made(lua, (width, height), between, || imageops::resize(picture, width, height, FilterType::Triangle))
+        Self::made(lua, (width, height), between, || {
+            imageops::resize(picture, width, height, FilterType::Triangle)
+        })
     }
 
     fn paste(&self, other: &Self, x: f64, y: f64) {
@@ -179,7 +182,9 @@ impl Hosted for LuaImage {
             lua.create_sequence_from(this.mean(lua, region)?)
         });
         method(methods, "crop", |lua, this: &Self, region: [f64; 4]| this.crop(lua, region));
-        method(methods, "resize", |lua, this: &Self, (width, height): (u32, u32)| this.resized(lua, width, height));
+        method(methods, "resize", |lua, this: &Self, (width, height): (u32, u32)| {
+            this.resized(lua, width, height)
+        });
         method(methods, "paste", |_, this: &Self, (other, x, y): (mlua::UserDataRef<Self>, f64, f64)| {
             this.paste(&other, x, y);
             Ok(())

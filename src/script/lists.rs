@@ -40,14 +40,23 @@ impl LuaList {
     fn entries(&self, lua: &Lua) -> mlua::Result<Table> {
         match &self.content {
             Content::Live { get, .. } => lua.create_sequence_from(get(lua)?),
-            Content::Fixed { entries, .. } => lua.create_sequence_from(entries.sequence_values::<Value>().flatten()),
+            Content::Fixed { entries, .. } => {
+                lua.create_sequence_from(entries.sequence_values::<Value>().flatten())
+            }
         }
     }
 
     fn read(&self, lua: &Lua, key: &Value) -> mlua::Result<Value> {
         match key {
             Value::Integer(_) | Value::Number(_) => self.entries(lua)?.raw_get(key),
-            other => Err(fail(lua, format!("{}: expected a place in the list, 1 or more, got {}", self.label, schema::got(other)))),
+            other => Err(fail(
+                lua,
+                format!(
+                    "{}: expected a place in the list, 1 or more, got {}",
+                    self.label,
+                    schema::got(other)
+                ),
+            )),
         }
     }
 
@@ -55,7 +64,9 @@ impl LuaList {
         let label = &self.label;
         let (get, set) = match &self.content {
             Content::Live { get, set } => (get, set),
-            Content::Fixed { mend, .. } => return Err(fail(lua, format!("{label}: cannot be written; {mend}"))),
+            Content::Fixed { mend, .. } => {
+                return Err(fail(lua, format!("{label}: cannot be written; {mend}")));
+            }
         };
         let mut numbers = get(lua)?;
         let count = numbers.len();
@@ -64,7 +75,10 @@ impl LuaList {
             return Err(fail(lua, format!("{label}: has places 1 to {count}, got {}", schema::got(key))));
         };
         let Some(entry) = number(value).filter(|n| n.is_finite()) else {
-            return Err(fail(lua, format!("{label}[{place}]: expected a number, got {}", schema::got(value))));
+            return Err(fail(
+                lua,
+                format!("{label}[{place}]: expected a number, got {}", schema::got(value)),
+            ));
         };
         numbers[place as usize - 1] = entry;
         set(lua, &Value::Table(lua.create_sequence_from(numbers)?))

@@ -217,8 +217,10 @@ fn read_spec(lua: &Lua, key: &Value, value: &Value) -> mlua::Result<OptionSpec> 
     };
     let fits = |b: u8| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_';
     if !name.starts_with(|c: char| c.is_ascii_lowercase()) || !name.bytes().all(fits) {
-        let message =
-            format!("options: {}: a name begins with a letter and has lower-case letters, digits and underscores", schema::got(key));
+        let message = format!(
+            "options: {}: a name begins with a letter and has lower-case letters, digits and underscores",
+            schema::got(key)
+        );
         return Err(fail(lua, message));
     }
     let fault = |fault: schema::Fault| {

@@ -220,7 +220,8 @@ fn suite(lua: &Lua, table: &Table) -> mlua::Result<Suite> {
     let tasks =
         tasks.iter().enumerate().map(|(id, table)| task(lua, id, table, budget)).collect::<Result<_, _>>()?;
     let shifts: Option<Vec<Table>> = table.get("shifts")?;
-    let shifts = shifts.unwrap_or_default().iter().map(|table| shift(lua, table)).collect::<mlua::Result<_>>()?;
+    let shifts =
+        shifts.unwrap_or_default().iter().map(|table| shift(lua, table)).collect::<mlua::Result<_>>()?;
     let settings = super::sim_api::settings(lua, "suite.settings", table.get("settings")?)?;
     Ok(Suite { name, object_type, variation, episodes: table.get("episodes")?, tasks, shifts, settings })
 }

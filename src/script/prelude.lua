@@ -116,16 +116,12 @@ function pairs(object)
   local meta = getmetatable(object)
   local own = type(meta) == "table" and rawget(meta, "__pairs")
   if own then return own(object) end
-  object = host.plain(object)
-  if type(object) ~= "table" then
-    raw_error("bad argument #1 to 'pairs' (table expected, got " .. type(object) .. ")", 2)
-  end
+  object = host.list("pairs", object)
   return iterate(object), object, nil
 end
 
 host.sorted = function(object)
-  object = host.plain(object)
-  if type(object) ~= "table" then raw_error("softvt.sorted: expected a table, got " .. type(object), 2) end
+  object = host.list("softvt.sorted", object)
   return iterate(object)
 end
 

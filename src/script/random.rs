@@ -72,7 +72,9 @@ impl Rng {
 fn finite(lua: &Lua, method: &str, value: f64) -> mlua::Result<f64> {
     match value.is_finite() {
         true => Ok(value),
-        false => Err(fail(lua, format!("rng:{method}: the range is too wide for a number; give smaller bounds"))),
+        false => {
+            Err(fail(lua, format!("rng:{method}: the range is too wide for a number; give smaller bounds")))
+        }
     }
 }
 

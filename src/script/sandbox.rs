@@ -114,7 +114,7 @@ impl Vm {
         let host = lua.create_table()?;
         host.set("raised", lua.create_function(note_raised)?)?;
         host.set("words", lua.create_function(words)?)?;
-        host.set("plain", lua.create_function(|lua, value: Value| lists::plain(lua, &value))?)?;
+        host.set("list", lua.create_function(to_go_through)?)?;
         lua.load(include_str!("prelude.lua"))
             .set_name("=softvt")
             .set_mode(ChunkMode::Text)
@@ -267,25 +267,29 @@ fn print(lua: &Lua, tostring: &Function, values: MultiValue) -> mlua::Result<()>
         shared.printable.store(left - line.len() - 1, Ordering::Relaxed);
         (shared.limits.print)(&line);
     } else if shared.printable.swap(0, Ordering::Relaxed) > 0 {
-        (shared.limits.print)(&format!("… the script prints more than {} MiB; the rest is left out", MOST_PRINTED >> 20));
+        (shared.limits.print)(&format!(
+            "… the script prints more than {} MiB; the rest is left out",
+            MOST_PRINTED >> 20
+        ));
     }
     Ok(())
 }
 
 /// `load(chunk [, name [, mode [, env]]])` for text alone; as in Lua, a bad chunk gives nil and the message.
-fn load(
-    lua: &Lua,
-    (chunk, name, _mode, env): (Value, Value, Value, Value),
-) -> mlua::Result<(Value, Value)> {
+fn load(lua: &Lua, (chunk, name, _mode, env): (Value, Value, Value, Value)) -> mlua::Result<(Value, Value)> {
     let name = match name {
         Value::Nil => "=(load)".to_owned(),
         Value::String(name) => name.to_string_lossy(),
-        other => return Err(fail(lua, format!("load: expected a string as name, got {}", schema::got(&other)))),
+        other => {
+            return Err(fail(lua, format!("load: expected a string as name, got {}", schema::got(&other))));
+        }
     };
     let env = match env {
         Value::Nil => None,
         Value::Table(env) => Some(env),
-        other => return Err(fail(lua, format!("load: expected a table as env, got {}", schema::got(&other)))),
+        other => {
+            return Err(fail(lua, format!("load: expected a table as env, got {}", schema::got(&other))));
+        }
     };
     let mut bytes = Vec::new();
     match chunk {
@@ -299,7 +303,10 @@ fn load(
             }
         },
         other => {
-            return Err(fail(lua, format!("load: expected a string or function, got {}", schema::got(&other))));
+            return Err(fail(
+                lua,
+                format!("load: expected a string or function, got {}", schema::got(&other)),
+            ));
         }
     }
     let refusal = |text: String| Ok((Value::Nil, Value::String(lua.create_string(text)?)));
@@ -351,10 +358,19 @@ fn require(lua: &Lua, loaded: &Table, name: &Value) -> mlua::Result<Value> {
     Ok(value)
 }
 
+/// What `pairs` and its like go through: a table, or the entries of a list of the host.
+fn to_go_through(lua: &Lua, (place, value): (String, Value)) -> mlua::Result<Value> {
+    match lists::plain(lua, &value)? {
+        Value::Table(table) => Ok(Value::Table(table)),
+        other => Err(fail(lua, format!("{place}: expected a table, got {}", schema::got(&other)))),
+    }
+}
+
 /// An error of the host as the text that people would read; any other value as it is.
 fn words(lua: &Lua, value: Value) -> mlua::Result<Value> {
     let Value::Error(error) = &value else { return Ok(value) };
-    let text = explain(&*shared(lua)?, error).to_string();
+    let shared = shared(lua)?;
+    let text = explain(&shared, error).to_string();
     lua.create_string(text).map(Value::String)
 }
 

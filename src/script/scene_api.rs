@@ -71,7 +71,10 @@ fn place_at(lua: &Lua, label: &str, xyz: Vec3) -> mlua::Result<Vec3> {
         return Ok(xyz);
     }
     let [x, y, z] = [xyz.x, xyz.y, xyz.z].map(number);
-    Err(fail(lua, format!("{label}: expected a place within {FARTHEST} m of the origin, got {{{x}, {y}, {z}}}")))
+    Err(fail(
+        lua,
+        format!("{label}: expected a place within {FARTHEST} m of the origin, got {{{x}, {y}, {z}}}"),
+    ))
 }
 
 /// An asset's Lua table and what was read from it.
@@ -193,7 +196,9 @@ impl Hosted for LuaScene {
 
     fn read(&self, lua: &Lua, key: &str) -> mlua::Result<Read> {
         if key == "light" {
-            return lua.create_userdata(LuaLight(self.scene.clone())).map(|light| Read::Value(Value::UserData(light)));
+            return lua
+                .create_userdata(LuaLight(self.scene.clone()))
+                .map(|light| Read::Value(Value::UserData(light)));
         }
         let scene = locked(&self.scene);
         let numbers = |v: &[f64]| Ok(Read::Numbers(v.to_vec()));
@@ -204,7 +209,8 @@ impl Hosted for LuaScene {
             "workspace_min" => numbers(scene.workspace.min.as_slice()),
             "workspace_max" => numbers(scene.workspace.max.as_slice()),
             _ => {
-                let handles = (0..scene.objects.len()).map(|index| LuaObject { scene: self.scene.clone(), index });
+                let handles =
+                    (0..scene.objects.len()).map(|index| LuaObject { scene: self.scene.clone(), index });
                 let list = lua.create_sequence_from(handles)?;
                 Ok(Read::Fixed(list, "scene:add{…} puts one more there".into()))
             }
@@ -235,7 +241,9 @@ impl Hosted for LuaScene {
             Ok(LuaObject { scene: this.scene.clone(), index })
         });
         method(methods, "camera", |lua, this: &Self, name: String| LuaCamera::named(lua, &this.scene, &name));
-        method(methods, "add_camera", |lua, this: &Self, camera: Table| LuaCamera::add(lua, &this.scene, &camera));
+        method(methods, "add_camera", |lua, this: &Self, camera: Table| {
+            LuaCamera::add(lua, &this.scene, &camera)
+        });
     }
 }
 
@@ -258,7 +266,10 @@ impl Hosted for LuaObject {
     fn read(&self, lua: &Lua, key: &str) -> mlua::Result<Read> {
         if key == "looks" {
             let looks = lua.create_sequence_from(LuaLook::all(&self.scene, self.index))?;
-            return Ok(Read::Fixed(looks, "write the numbers of a look, as in looks[1].roughness = 0.5".into()));
+            return Ok(Read::Fixed(
+                looks,
+                "write the numbers of a look, as in looks[1].roughness = 0.5".into(),
+            ));
         }
         let scene = locked(&self.scene);
         let object = &scene.objects[self.index];

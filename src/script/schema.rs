@@ -2,11 +2,11 @@
 
 use mlua::{Lua, Table, Value};
 
+pub use super::range::Range;
 use super::{
     lists,
     sandbox::{fail, here, locked, shared},
 };
-pub use super::range::Range;
 use crate::message;
 
 /// What a value may be.
@@ -420,9 +420,12 @@ pub(super) fn make(lua: &Lua, record: &'static Record, value: &Value) -> mlua::R
 /// A table that `record` describes, checked.
 pub(super) fn checked(lua: &Lua, record: &Record, value: &Value) -> mlua::Result<Table> {
     match lists::plain(lua, value)? {
-        Value::Table(table) => check(lua, record, &table).map_err(|fault| fault_here(lua, record.label, &fault)),
+        Value::Table(table) => {
+            check(lua, record, &table).map_err(|fault| fault_here(lua, record.label, &fault))
+        }
         other => {
-            let message = format!("{}: expected a table of {}, got {}", record.label, names(record), got(&other));
+            let message =
+                format!("{}: expected a table of {}, got {}", record.label, names(record), got(&other));
             Err(fail(lua, message))
         }
     }

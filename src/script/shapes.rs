@@ -97,7 +97,8 @@ pub(super) fn install(lua: &Lua, api: &Table) -> mlua::Result<()> {
         let make = lua.create_function(move |lua, value: Value| {
             let spec = checked(lua, record, &value)?;
             let shape = build(name, &spec)?.map_err(|error| fail(lua, format!("shape.{error}")))?;
-            let corners = spec.get::<Option<Table>>("corners").ok().flatten().map_or(0, |list| list.raw_len());
+            let corners =
+                spec.get::<Option<Table>>("corners").ok().flatten().map_or(0, |list| list.raw_len());
             LuaShape::new(lua, shape, corners * BYTES_A_CORNER)
         })?;
         shapes.set(*name, make)?;

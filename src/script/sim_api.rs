@@ -8,10 +8,10 @@ use serde::de::DeserializeOwned;
 use super::{
     catalogue::LAYOUT,
     catalogue_classes::Class,
-    data::json,
     catalogue_world::SIMULATE,
     classes_world::SIMULATION,
     controller::{Glance, Planner, next},
+    data::json,
     deadline::Clock,
     expert::{Coroutine, ExpertCommand, ExpertView},
     host::{Hosted, hosted, method},
@@ -85,7 +85,9 @@ pub(super) fn read<T: DeserializeOwned>(lua: &Lua, label: &str, value: &Value) -
             ("invalid type: sequence", "invalid type: a list"),
         ];
         let text = kinds.iter().fold(text, |text, (rust, people)| text.replace(rust, people));
-        let text = text.split_once("expected struct ").map_or(text.clone(), |(before, _)| format!("{before}expected a table"));
+        let text = text
+            .split_once("expected struct ")
+            .map_or(text.clone(), |(before, _)| format!("{before}expected a table"));
         fail(lua, format!("{label}: {text}"))
     })
 }

@@ -9,7 +9,8 @@ const LEAST: f64 = 1e-9;
 
 /// Numbers divided by the largest of them, so that no square over- or underflows; none where that is too small or no number.
 fn scaled<const N: usize>(numbers: [f64; N]) -> Option<[f64; N]> {
-    let largest = numbers.iter().fold(0.0, |most: f64, x| if x.is_nan() { f64::NAN } else { most.max(x.abs()) });
+    let largest =
+        numbers.iter().fold(0.0, |most: f64, x| if x.is_nan() { f64::NAN } else { most.max(x.abs()) });
     (largest.is_finite() && largest >= LEAST).then(|| numbers.map(|x| x / largest))
 }
 

@@ -144,8 +144,9 @@ fn braced(numbers: &[f64]) -> String {
 
 /// A turn from four numbers.
 fn quat(lua: &Lua, label: &str, numbers: [f64; 4]) -> mlua::Result<Quat> {
-    turn::turn(numbers)
-        .ok_or_else(|| fail(lua, format!("{label}.quat: expected a quaternion other than 0, got {}", braced(&numbers))))
+    turn::turn(numbers).ok_or_else(|| {
+        fail(lua, format!("{label}.quat: expected a quaternion other than 0, got {}", braced(&numbers)))
+    })
 }
 
 /// The turn of a camera at `from` that looks at `to`, with `up` upwards in the picture.
@@ -155,7 +156,8 @@ fn look_at(lua: &Lua, label: &str, from: &Vec3, to: &Vec3, up: [f64; 3]) -> mlua
         return Err(fail(lua, format!("{label}: expected numbers within ±1e6, got {to} from {from}")));
     }
     let ahead = to - from;
-    match turn::direction(up).filter(|up| ahead.norm() > 1e-6 && ahead.cross(up).norm() > 1e-6 * ahead.norm()) {
+    match turn::direction(up).filter(|up| ahead.norm() > 1e-6 && ahead.cross(up).norm() > 1e-6 * ahead.norm())
+    {
         Some(up) => Ok(Quat::face_towards(&-ahead, &up)),
         None => {
             let message = "expected a point away from the camera, not straight along up; give another up";
@@ -231,7 +233,11 @@ impl Hosted for LuaCamera {
             "position" => Read::Numbers(camera.pose.translation.vector.as_slice().to_vec()),
             "quat" => {
                 let q = crate::robot::rotation::canonical(&camera.pose.rotation);
-                Read::together(lua, &[q.w, q.i, q.j, q.k], "its numbers belong together: write camera.quat = { w, x, y, z }")?
+                Read::together(
+                    lua,
+                    &[q.w, q.i, q.j, q.k],
+                    "its numbers belong together: write camera.quat = { w, x, y, z }",
+                )?
             }
             "fovy" => Read::number(camera.fovy_rad),
             "near" => Read::number(camera.near_m),

@@ -39,8 +39,9 @@ struct Node {
 impl LuaMask {
     fn new(lua: &Lua, mask: Mask, parts: usize, bytes: usize) -> mlua::Result<Self> {
         if parts > MOST_PARTS {
-            let message =
-                format!("mask: is made of {parts} masks; at most {MOST_PARTS} can be drawn; use fewer, or more layers");
+            let message = format!(
+                "mask: is made of {parts} masks; at most {MOST_PARTS} can be drawn; use fewer, or more layers"
+            );
             return Err(fail(lua, message));
         }
         Ok(Self(Arc::new(Node { mask: Arc::new(mask), parts, bytes, _held: hold(lua, bytes)? })))
@@ -191,7 +192,10 @@ fn mask(name: &str, s: &Table) -> mlua::Result<Mask> {
         },
         "weave" => Mask::Weave { pitch_m: s.get("pitch_m")? },
         "facing" => Mask::Facing { axis: direction(s)?, from: s.get("from")?, to: s.get("to")? },
-        _ => Mask::Inside { shape: Arc::new(s.get::<LuaShape>("shape")?.shape().clone()), soft_m: s.get("soft_m")? },
+        _ => Mask::Inside {
+            shape: Arc::new(s.get::<LuaShape>("shape")?.shape().clone()),
+            soft_m: s.get("soft_m")?,
+        },
     })
 }
 

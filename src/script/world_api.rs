@@ -118,7 +118,13 @@ impl LuaWorld {
         } else {
             (None, (Mover::Static, at))
         };
-        let collider = world.add_collider(Collider::new(&name, placed, Arc::new(shape.shape().clone()), friction, layer));
+        let collider = world.add_collider(Collider::new(
+            &name,
+            placed,
+            Arc::new(shape.shape().clone()),
+            friction,
+            layer,
+        ));
         Ok(LuaSolid { world: self.0.clone(), kinematic, collider })
     }
 }
@@ -251,9 +257,13 @@ impl Hosted for LuaBody {
 /// Methods of a body that say how a solid touches it.
 fn touches<M: UserDataMethods<LuaBody>>(methods: &mut M) {
     type Of = UserDataRef<LuaSolid>;
-    method(methods, "force", |lua, this: &LuaBody, solid: Of| Ok(this.touch(lua, "force", &solid)?.normal_force));
+    method(methods, "force", |lua, this: &LuaBody, solid: Of| {
+        Ok(this.touch(lua, "force", &solid)?.normal_force)
+    });
     method(methods, "shear", |lua, this: &LuaBody, solid: Of| Ok(this.touch(lua, "shear", &solid)?.shear()));
-    method(methods, "travel", |lua, this: &LuaBody, solid: Of| Ok(1e3 * this.touch(lua, "travel", &solid)?.travel));
+    method(methods, "travel", |lua, this: &LuaBody, solid: Of| {
+        Ok(1e3 * this.touch(lua, "travel", &solid)?.travel)
+    });
     method(methods, "slipping", |lua, this: &LuaBody, solid: Of| {
         let touch = this.touch(lua, "slipping", &solid)?;
         Ok(touch.slipping as f64 / touch.samples.max(1) as f64)

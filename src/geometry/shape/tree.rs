@@ -32,7 +32,9 @@ impl Shape {
                 [Some(shape), region.as_ref()].into_iter().flatten().map(AsRef::as_ref).collect()
             }
             Self::Subtract { from, cut } | Self::SmoothSubtract { from, cut, .. } => vec![from, cut],
-            Self::Union(parts) | Self::Intersect(parts) | Self::SmoothUnion { parts, .. } => parts.iter().collect(),
+            Self::Union(parts) | Self::Intersect(parts) | Self::SmoothUnion { parts, .. } => {
+                parts.iter().collect()
+            }
             Self::Box { .. }
             | Self::Sphere { .. }
             | Self::Ellipsoid { .. }

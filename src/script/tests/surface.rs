@@ -25,7 +25,11 @@ fn script() -> String {
         let methods = quoted(class.methods.iter().map(|method| method.name).chain(more));
         let fields = class.fields.iter().map(|(name, ..)| *name);
         let fields = quoted(fields.chain(class.written.iter().map(|field| field.name)));
-        let _ = writeln!(text, "  [{:?}] = {{ methods = {{ {methods} }}, fields = {{ {fields} }} }},", class.name);
+        let _ = writeln!(
+            text,
+            "  [{:?}] = {{ methods = {{ {methods} }}, fields = {{ {fields} }} }},",
+            class.name
+        );
     }
     let functions = FUNCTIONS.iter().map(|f| f.name).chain(CONSTRUCTORS.iter().map(|(name, _)| *name));
     let _ = writeln!(text, "}}\nFUNCTIONS = {{ {} }}", quoted(functions));
@@ -37,10 +41,33 @@ fn script() -> String {
 /// What only an implementer would want to read.
 fn leak(message: &str) -> Option<&'static str> {
     let words = [
-        "::", "[f64", "[u8", "Option<", "Vec<", "userdata", "error converting", "stack traceback", "runtime error",
-        "bad self", "mlua", "conversion", "Lua table", "panicked",
+        "::",
+        "[f64",
+        "[u8",
+        "Option<",
+        "Vec<",
+        "userdata",
+        "error converting",
+        "stack traceback",
+        "runtime error",
+        "bad self",
+        "mlua",
+        "conversion",
+        "Lua table",
+        "panicked",
     ];
-    let ours = ["LuaCamera", "LuaShape", "LuaMask", "LuaImage", "LuaPose", "LuaScene", "LuaObject", "LuaLight", "LuaLook", "LuaList"];
+    let ours = [
+        "LuaCamera",
+        "LuaShape",
+        "LuaMask",
+        "LuaImage",
+        "LuaPose",
+        "LuaScene",
+        "LuaObject",
+        "LuaLight",
+        "LuaLook",
+        "LuaList",
+    ];
     words.into_iter().chain(ours).find(|word| message.contains(word))
 }
 
@@ -48,7 +75,13 @@ fn leak(message: &str) -> Option<&'static str> {
 fn whatever_is_called_wrongly_is_answered_in_the_words_of_the_surface() {
     let project = Project::new(&[("x.lua", &script())]);
     let minute = Duration::from_secs(60);
-    let limits = crate::script::Limits { load: minute, call: minute, point: minute, memory_bytes: 128 << 20, ..limits() };
+    let limits = crate::script::Limits {
+        load: minute,
+        call: minute,
+        point: minute,
+        memory_bytes: 128 << 20,
+        ..limits()
+    };
     let loaded = project.load_with("x.lua", &[], &limits).unwrap();
     let rows = Experiment::open(&loaded).unwrap().run(0).unwrap();
     let folder = format!("{}/", project.path("").display()).replace("//", "/");
@@ -70,7 +103,11 @@ fn whatever_is_called_wrongly_is_answered_in_the_words_of_the_surface() {
     let seen: BTreeSet<&str> = rows.last().unwrap()["said"].as_str().unwrap().split(' ').collect();
     let listed = CLASSES.iter().map(|class| class.name).chain([SHAPE.name, MASK_CLASS.name]);
     let missing: Vec<&str> = listed.filter(|name| !seen.contains(name)).collect();
-    assert_eq!(missing, ["softvt.Felt", "softvt.List"], "one is a plain table, the other has a test of its own");
+    assert_eq!(
+        missing,
+        ["softvt.Felt", "softvt.List"],
+        "one is a plain table, the other has a test of its own"
+    );
 }
 
 /// Runs a layout over a scene with one ball and gives what it fails with.
@@ -124,19 +161,49 @@ fn a_list_that_cannot_be_written_says_how_its_object_is_changed() {
         ("scene.base.x = 1", "scene.base: has places 1 to 3, got \"x\""),
         ("local _ = scene.base.x", "scene.base: expected a place in the list, 1 or more, got \"x\""),
         ("table.insert(scene.base, 1)", "scene.base: has places 1 to 3, got 4"),
-        ("scene.light.colour = { 1, 0.5, 0.25 } scene.light.colour[1] = -1", "scene.light.colour: expected linear RGB in 0..1000, got {-1, 0.5, 0.25}"),
+        (
+            "scene.light.colour = { 1, 0.5, 0.25 } scene.light.colour[1] = -1",
+            "scene.light.colour: expected linear RGB in 0..1000, got {-1, 0.5, 0.25}",
+        ),
         ("scene.objects[1] = 3", "scene.objects: cannot be written; scene:add{…} puts one more there"),
-        ("scene:camera('wrist').quat[1] = 0", "scene:camera(\"wrist\").quat: cannot be written; its numbers belong together: write camera.quat = { w, x, y, z }"),
-        ("softvt.pose { xyz = { 0, 0, 0 } }.xyz[1] = 1", "pose.xyz: cannot be written; a pose never changes: make another with softvt.pose{…}, or with moved"),
-        ("scene.light = 'x'", "scene.light: cannot be replaced; its numbers are written one by one, as in scene.light.strength = …"),
+        (
+            "scene:camera('wrist').quat[1] = 0",
+            "scene:camera(\"wrist\").quat: cannot be written; its numbers belong together: write camera.quat = { w, x, y, z }",
+        ),
+        (
+            "softvt.pose { xyz = { 0, 0, 0 } }.xyz[1] = 1",
+            "pose.xyz: cannot be written; a pose never changes: make another with softvt.pose{…}, or with moved",
+        ),
+        (
+            "scene.light = 'x'",
+            "scene.light: cannot be replaced; its numbers are written one by one, as in scene.light.strength = …",
+        ),
         ("scene.objects = {}", "scene.objects: is only read"),
         ("scene.add = 1", "scene.add: is a method and cannot be written; call it as scene:add(…)"),
-        ("scene.add {}", "scene:add: expected a softvt.Scene before the colon, got a table; call it as scene:add(…)"),
-        ("scene:camera('wrist'):look_at('abc')", "scene:camera(\"wrist\"):look_at: point: expected a list of 3 numbers (m, frame of the mount), got \"abc\""),
-        ("scene:camera('wrist').quat = { 0, 0, 0, 0 }", "scene:camera(\"wrist\").quat: expected a quaternion other than 0, got {0, 0, 0, 0}"),
-        ("softvt.pose { xyz = { 0, 0, 0 }, quat = { 1e-300, 0, 0, 0 } }", "pose.quat: expected a quaternion other than 0"),
-        ("local _ = softvt.image { width = 1, height = 1, colour = { 0, 0, 0 } }.widht", "image: unknown key \"widht\"; did you mean \"width\"?"),
-        ("scene.base = { 1e300, 0, 0 }", "scene.base: expected a place within 1000 m of the origin, got {1e300, 0, 0}"),
+        (
+            "scene.add {}",
+            "scene:add: expected a softvt.Scene before the colon, got a table; call it as scene:add(…)",
+        ),
+        (
+            "scene:camera('wrist'):look_at('abc')",
+            "scene:camera(\"wrist\"):look_at: point: expected a list of 3 numbers (m, frame of the mount), got \"abc\"",
+        ),
+        (
+            "scene:camera('wrist').quat = { 0, 0, 0, 0 }",
+            "scene:camera(\"wrist\").quat: expected a quaternion other than 0, got {0, 0, 0, 0}",
+        ),
+        (
+            "softvt.pose { xyz = { 0, 0, 0 }, quat = { 1e-300, 0, 0, 0 } }",
+            "pose.quat: expected a quaternion other than 0",
+        ),
+        (
+            "local _ = softvt.image { width = 1, height = 1, colour = { 0, 0, 0 } }.widht",
+            "image: unknown key \"widht\"; did you mean \"width\"?",
+        ),
+        (
+            "scene.base = { 1e300, 0, 0 }",
+            "scene.base: expected a place within 1000 m of the origin, got {1e300, 0, 0}",
+        ),
     ] {
         assert_eq!(in_layout(text), format!("x.lua:{line}: {said}"), "{text}");
     }
