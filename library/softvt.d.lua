@@ -532,8 +532,8 @@ function Body:speed() end
 ---@return number
 function Body:mass() end
 
----Least det F of a filled element; 0 or less is inverted.
----@return number
+---Least det F of a filled element; 0 or less is inverted, nil where no element is filled.
+---@return number?
 function Body:min_det_f() end
 
 ---Whether it sleeps.
@@ -656,8 +656,8 @@ function Image:resize(width, height) end
 
 ---Puts another picture on this one.
 ---@param other softvt.Image
----@param x integer
----@param y integer
+---@param x number
+---@param y number
 function Image:paste(other, x, y) end
 
 ---Writes a line of text on it.
@@ -838,6 +838,7 @@ local Seen = {}
 ---@field pose softvt.Pose Measured pose of the tool centre point.
 ---@field target softvt.Pose Pose commanded last.
 ---@field closure number Closure commanded last, 0 open to 1 shut.
+---@field gripping boolean Whether grasp was called last, not release or open.
 ---@field width number Measured distance of the pads, m.
 ---@field force number[] Normal force on the left and right pad, N.
 ---@field time number Time since the start, s.
@@ -864,6 +865,15 @@ function Arm:move_by(offset, options) end
 ---@param options? {rate: number?}
 function Arm:close_to(closure, options) end
 
+---Closes on an object; a binary gripper, which knows only open and shut, shuts here and not in close_to.
+---@param closure number
+---@param options? {rate: number?}
+function Arm:grasp(closure, options) end
+
+---Lets go of an object, opening to a closure or wide.
+---@param options? {rate: number?, closure: number?}
+function Arm:release(options) end
+
 ---Opens the gripper.
 ---@param options? {rate: number?}
 function Arm:open(options) end
@@ -871,6 +881,10 @@ function Arm:open(options) end
 ---Holds still.
 ---@param seconds number
 function Arm:wait(seconds) end
+
+---A list that belongs to an object: scene.base, look.albedo, scene.objects. #, [i], ipairs, pairs, table.unpack and table.concat work on it, and it may be given wherever a list is expected. Numbers that may be written one by one go to the object at once: scene.base[1] = 0.1 is as good as scene.base = { 0.1, 0, 0 }. Any other list refuses to be written.
+---@class softvt.List
+local List = {}
 
 ---The softvt library.
 softvt = {}

@@ -124,7 +124,7 @@ local function squeeze(sim, name, closure)
     local seen = sim:watch "object"
     local touching = math.min(table.unpack(seen.pad_force)) > TOUCH_N
     if quiet == 0 then row.min_det_f, row.node_speed_m_s, row.both_pads = math.huge, 0, true end
-    row.min_det_f = math.min(row.min_det_f, seen.min_det_f)
+    row.min_det_f = math.min(row.min_det_f, seen.min_det_f or 1)
     row.node_speed_m_s = math.max(row.node_speed_m_s, seen.speed)
     row.both_pads = row.both_pads and touching
     quiet = seen.speed < QUIET_SPEED and quiet + 0.05 or 0

@@ -63,6 +63,13 @@ impl Print {
         Self { line, letters: OnceLock::new() }
     }
 
+    /// Memory that its letters take at most, bytes.
+    pub fn bytes(&self) -> usize {
+        // A letter is at most two capitals wide and high.
+        let texels = (2.0 * CAPITAL).powi(2) as usize;
+        size_of::<f64>() * texels * (self.line.text.chars().count() + 1)
+    }
+
     /// Its letters.
     pub fn letters(&self) -> &Letters {
         self.letters.get_or_init(|| Letters::of(&self.line))

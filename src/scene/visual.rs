@@ -161,11 +161,11 @@ pub enum Mask {
     /// One minus a mask.
     Inverse {
         /// The mask.
-        mask: Box<Mask>,
+        mask: Arc<Mask>,
     },
     /// The product of masks: where all of them are.
     Both {
         /// The masks.
-        masks: Vec<Mask>,
+        masks: Vec<Arc<Mask>>,
     },
 }

@@ -287,10 +287,11 @@ pub static MASK_CLASS: Class = Class {
     name: "softvt.Mask",
     doc: "A number between 0 and 1 at every point of a surface: where a layer is. It never changes; methods give new masks.",
     fields: &[],
+    written: &[],
     methods: &[
         method(
             "both",
-            &[("other", "softvt.Mask")],
+            &[("other", Type::Object("softvt.Mask"))],
             &["softvt.Mask"],
             "Where this and the other are: their product.",
         ),

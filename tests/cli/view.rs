@@ -117,10 +117,19 @@ fn light_cameras_and_looks_are_checked_where_they_are_written() {
             "x.lua:7: scene.light.direction: expected a list of 3 numbers",
         ),
         ("scene:camera(\"wirst\").width = 64", "unknown camera \"wirst\"; did you mean \"wrist\"?"),
-        ("scene:camera(\"wrist\").width = 0", "camera.width: expected a whole number in 1..4096, got 0"),
-        ("scene:camera(\"wrist\").height = 100000", "camera.height: expected a whole number in 1..4096"),
-        ("scene:camera(\"wrist\").position = { 0/0, 0, 0 }", "camera.position: expected a list of 3 numbers"),
-        ("scene:camera(\"wrist\").quat = { 0, 0, 0, 0 }", "camera.quat: expected a quaternion other than 0"),
+        (
+            "scene:camera(\"wrist\").width = 0",
+            "x.lua:7: scene:camera(\"wrist\").width: expected a whole number in 1..4096, got 0",
+        ),
+        (
+            "scene:camera(\"wrist\").height = 100000",
+            ".height: expected a whole number in 1..4096, got 100000",
+        ),
+        ("scene:camera(\"wrist\").position = { 0/0, 0, 0 }", ".position: expected a list of 3 numbers"),
+        (
+            "scene:camera(\"wrist\").quat = { 0, 0, 0, 0 }",
+            ".quat: expected a quaternion other than 0, got {0, 0, 0, 0}",
+        ),
         (
             "scene:add_camera { name = \"top\", position = { 0, 0, 1 }, look_at = { 0, 0, 0 } }",
             "give another up",
@@ -129,7 +138,15 @@ fn light_cameras_and_looks_are_checked_where_they_are_written() {
             "scene:add_camera { name = \"wrist\", position = { 0, 0, 1 }, look_at = { 1, 0, 0 } }",
             "there is a camera \"wrist\" already",
         ),
-        ("scene:camera(\"wrist\"):look_at { 0, 0/0, 1 }", "camera.look_at: expected numbers within"),
+        (
+            "scene:camera(\"wrist\"):look_at { 0, 0/0, 1 }",
+            "x.lua:7: scene:camera(\"wrist\"):look_at: point: expected a list of 3 numbers",
+        ),
+        (
+            "scene:camera(\"wrist\"):look_at { 0, 1e7, 1 }",
+            ":look_at: expected numbers within ±1e6, got {0, 10000000, 1}",
+        ),
+        ("scene.light = 3", "x.lua:7: scene.light: cannot be replaced; its numbers are written one by one"),
         ("scene:camera(\"wrist\"):look_at({ 0, 0, 1 }, { 0, 0, 0 })", "give another up"),
         ("scene:object(\"cube\").looks[1].albedo = { 2, 0, 0 }", "look.albedo: expected linear RGB in 0..1"),
         ("scene:object(\"cube\").looks[1].shine = 2", "look: unknown key \"shine\""),

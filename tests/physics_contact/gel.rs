@@ -6,7 +6,7 @@ use softvt::{
     geometry::{Pose, Vec3, shape::Shape},
     physics::{
         World,
-contact::{Collider, Friction, Layer, Mover, Partner},
+        contact::{Collider, Friction, Layer, Mover, Partner},
         world::Movable,
     },
     robot::{Side, pads::PadSurface},

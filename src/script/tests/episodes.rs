@@ -235,7 +235,10 @@ fn an_expert_that_goes_wrong_is_named_with_its_line() {
         error("arm:close_to(2)"),
         format!("x.lua:{line}: arm:close_to: closure: expected a number in 0..1, got 2")
     );
-    assert_eq!(error("arm:mov_to(1)"), format!("x.lua:{line}: arm: there is no \"mov_to\""));
+    assert_eq!(
+        error("arm:mov_to(1)"),
+        format!("x.lua:{line}: arm: unknown key \"mov_to\"; did you mean \"move_to\"?")
+    );
 }
 
 #[test]

@@ -2,7 +2,9 @@
 
 mod bad_input;
 mod episodes;
+mod hostile;
 mod options;
+mod surface;
 mod visuals;
 
 use std::{fs, path::PathBuf, sync::Arc, time::Duration};

@@ -1,5 +1,7 @@
 //! Looks in Lua: what reaches the scene, and what is said where a table is wrong.
 
+use std::sync::Arc;
+
 use super::{Project, SUITE, error_of};
 use crate::{
     benchmark::seed::Split,
@@ -52,12 +54,13 @@ fn layers_reach_the_scene_as_they_are_written() {
     let [noise, both, whole] = visual.layers.as_slice() else { panic!("three layers") };
     assert_eq!(noise.mask, Mask::Noise { size_m: [0.01; 3], octaves: 3, from: 0.6, to: 0.4, seed: 7 });
     assert_eq!((noise.opacity, noise.relief_m, noise.roughness), (0.5, 1e-4, 0.6));
-    let weave = Mask::Inverse { mask: Box::new(Mask::Weave { pitch_m: 1e-3 }) };
+    let weave = Mask::Inverse { mask: Arc::new(Mask::Weave { pitch_m: 1e-3 }) };
     let masks = vec![
         Mask::Facing { axis: [1.0, 0.0, 0.0], from: 0.0, to: 1.0 },
         Mask::Gradient { axis: [0.0, 0.0, 1.0], from_m: 0.0, to_m: 0.02 },
         weave,
     ];
+    let masks = masks.into_iter().map(Arc::new).collect();
     assert_eq!(both.mask, Mask::Both { masks });
     assert_eq!((&whole.mask, whole.opacity), (&Mask::Whole, 1.0));
 }

@@ -62,7 +62,7 @@ pub(super) fn finest(visual: &Visual) -> f32 {
                 // Narrow ranges cut the noise to sharp edges.
                 least * 0.5_f64.powi(*octaves as i32 - 1) * (to - from).abs().min(1.0)
             }
-            Mask::Both { masks } => masks.iter().map(of).fold(f64::INFINITY, f64::min),
+            Mask::Both { masks } => masks.iter().map(|mask| of(mask)).fold(f64::INFINITY, f64::min),
             Mask::Inverse { mask } => of(mask),
             Mask::Inside { soft_m, .. } => *soft_m,
             // As fine as the surface itself, whose own detail is told elsewhere.
@@ -86,7 +86,7 @@ pub(super) fn printed(visual: &Visual) -> bool {
     fn of(mask: &Mask) -> bool {
         match mask {
             Mask::Text { .. } => true,
-            Mask::Both { masks } => masks.iter().any(of),
+            Mask::Both { masks } => masks.iter().any(|mask| of(mask)),
             Mask::Inverse { mask } => of(mask),
             _ => false,
         }
@@ -239,7 +239,7 @@ mod tests {
             assert_eq!(value(&up, [0.0; 3], n, 1e-3), expected);
         }
         assert!((value(&up, [0.0; 3], [0.75_f32.sqrt(), 0.0, 0.5], 1e-3) - 0.5).abs() < 1e-6);
-        let inverse = Mask::Inverse { mask: Box::new(up) };
+        let inverse = Mask::Inverse { mask: Arc::new(up) };
         assert_eq!(value(&inverse, [0.0; 3], [0.0, 0.0, 1.0], 1e-3), 0.0);
     }
 
