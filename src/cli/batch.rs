@@ -34,6 +34,8 @@ struct RunInfo<'a> {
     softvt: &'a str,
     script: String,
     suite: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    twin: Option<&'a str>,
     policy: &'a str,
     privileged: bool,
     seed: u64,
@@ -63,6 +65,8 @@ pub(super) struct Batch<'a> {
     run: &'a Run,
     loaded: &'a Loaded,
     suite: &'a Suite,
+    /// Name in results.
+    name: String,
     settings: Settings,
     jobs: Vec<(&'a Task, u32)>,
     limits: BTreeMap<String, Option<Limit>>,
@@ -101,6 +105,7 @@ impl<'a> Batch<'a> {
             run,
             loaded,
             suite,
+            name: run.name_of(suite),
             settings,
             jobs,
             limits: BTreeMap::new(),
@@ -113,6 +118,16 @@ impl<'a> Batch<'a> {
             force_observed: false,
             drive: driver,
         })
+    }
+
+    /// An episode as its layout, the shifts and the run make it.
+    fn open(&self, task: &Task, episode: u32) -> Result<script::Episode, Failure> {
+        let mut opened =
+            script::Episode::open(self.loaded, &self.request(task, episode)).map_err(Failure::input)?;
+        if self.run.twin {
+            (opened.scene, opened.nominal) = (opened.scene.rigid_twin(), opened.nominal.rigid_twin());
+        }
+        Ok(opened)
     }
 
     fn request(&self, task: &Task, episode: u32) -> script::EpisodeRequest {
@@ -134,8 +149,7 @@ impl<'a> Batch<'a> {
     pub fn prepare(&mut self, tasks: &[&Task]) -> Result<(), Failure> {
         for task in tasks {
             let first = self.jobs.iter().find(|(of, _)| of.id == task.id).map_or(0, |(_, episode)| *episode);
-            let opened =
-                script::Episode::open(self.loaded, &self.request(task, first)).map_err(Failure::input)?;
+            let opened = self.open(task, first)?;
             let target = target_asset(&opened.nominal, task).cloned();
             if let Some(asset) = target
                 && matches!(asset.body, Body::Soft(_))
@@ -212,6 +226,7 @@ impl<'a> Batch<'a> {
             softvt: env!("CARGO_PKG_VERSION"),
             script: self.loaded.main.clone(),
             suite: &self.suite.name,
+            twin: self.run.twin.then_some("rigid"),
             policy: &self.run.policy,
             privileged: self.run.policy.starts_with("expert"),
             seed: self.run.seed,
@@ -233,7 +248,7 @@ impl<'a> Batch<'a> {
     /// # Errors
     /// A script, policy or file that fails, or an interrupt; finished episodes are kept.
     pub fn go(&self, mut folder: RunFolder) -> Result<Summary, Failure> {
-        let mut progress = Progress::new(self.jobs.len(), &self.suite.name);
+        let mut progress = Progress::new(self.jobs.len(), &self.name);
         let mut records: Vec<EpisodeRecord> = Vec::new();
         let outcome: Result<(), Failure> = batch::run(
             self.jobs.len(),
@@ -275,7 +290,7 @@ impl<'a> Batch<'a> {
             Ok(()) if stop::requested() => return Err(interrupted()),
             Ok(()) => {}
         }
-        let summary = Summary::of(&self.suite.name, &self.run.policy, &records);
+        let summary = Summary::of(&self.name, &self.run.policy, &records);
         folder.write_json(SUMMARY, &summary).map_err(folder_failure)?;
         records.sort_by_key(|r| (r.identity.task, r.identity.episode));
         interchange::write_scores(&self.out, &records, &self.released).map_err(folder_failure)?;
@@ -310,11 +325,10 @@ impl<'a> Batch<'a> {
     /// A script, the scene or whoever drives fails.
     pub fn episode(&self, job: usize, film: bool) -> Result<Finished, Failure> {
         let (task, episode) = self.jobs[job];
-        let opened =
-            script::Episode::open(self.loaded, &self.request(task, episode)).map_err(Failure::input)?;
+        let opened = self.open(task, episode)?;
         let limit = target_asset(&opened.nominal, task).and_then(|asset| self.limit_of(asset));
         let which = Which {
-            suite: &self.suite.name,
+            suite: &self.name,
             episode,
             seed: self.run.seed,
             split: Split::Validation,

@@ -24,7 +24,7 @@ pub fn run(run: &Run) -> Result<(), Failure> {
     check_video(run, &loaded.plan)?;
     match &loaded.plan {
         Plan::Suite(suite) => {
-            let summary = evaluate(run, &loaded, suite, out_dir(run, &suite.name, None))?;
+            let summary = evaluate(run, &loaded, suite, out_dir(run, &run.name_of(suite), None))?;
             show(run, &[summary], false);
             Ok(())
         }
@@ -40,7 +40,8 @@ pub fn run(run: &Run) -> Result<(), Failure> {
             }
             let mut summaries = Vec::new();
             for suite in suites {
-                summaries.push(evaluate(run, &loaded, suite, out_dir(run, &suite.name, Some(&suite.name)))?);
+                let name = run.name_of(suite);
+                summaries.push(evaluate(run, &loaded, suite, out_dir(run, &name, Some(&name)))?);
             }
             show(run, &summaries, true);
             Ok(())

@@ -2,6 +2,7 @@
 
 mod args;
 mod batch;
+mod check;
 mod doctor;
 mod evaluate;
 mod experiment;
@@ -86,7 +87,9 @@ fn carry_out(words: &[String]) -> Result<(), Failure> {
     match args::parse(words)? {
         Command::Run(run) => evaluate::run(&run),
         Command::List { what, json } => list::run(&what, json),
-        Command::Init { dir } => init::run(&dir),
+        Command::Init { dir, task: false } => init::run(&dir),
+        Command::Init { dir, task: true } => init::task(&dir),
+        Command::Check(run) => check::run(&run),
         Command::View(view) => view::run(&view),
         Command::Doctor => doctor::run(),
         Command::Shown => Ok(()),

@@ -124,6 +124,17 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// The same scene with every soft body made rigid: same shapes, places, densities, friction and looks.
+    pub fn rigid_twin(mut self) -> Self {
+        for object in &mut self.objects {
+            if let Body::Soft(material) = &object.asset.body {
+                let density = material.density;
+                Arc::make_mut(&mut object.asset).body = Body::Rigid { density };
+            }
+        }
+        self
+    }
+
     /// A camera by name.
     pub fn camera(&self, name: &str) -> Option<&Camera> {
         self.cameras.iter().find(|camera| camera.name == name)
