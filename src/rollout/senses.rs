@@ -138,12 +138,33 @@ impl Senses {
     pub fn see(&mut self, frame: &Frame, camera: &Camera) -> Result<Picture, SenseError> {
         let stage = match self.stage.take() {
             Some(stage) => stage,
-            None => Stage::new(self.things()?, self.scene.lighting.clone())?,
+            None => self.build()?,
         };
-        let hand_w = frame.links[self.tree][panda::HAND_LINK] * panda::hand_in_link();
-        let picture = render(&stage, &FrameView::of(frame, Some(hand_w)), camera, &mut self.eye);
+        let picture = render(&stage, &self.view(frame), camera, &mut self.eye);
         self.stage = Some(stage);
         Ok(picture?)
+    }
+
+    /// Everything that is drawn, for [`render`]; made when somebody first looks.
+    ///
+    /// # Errors
+    /// A thing that cannot be drawn, a number of the light out of range.
+    pub fn stage(&mut self) -> Result<&Stage, SenseError> {
+        let stage = match self.stage.take() {
+            Some(stage) => stage,
+            None => self.build()?,
+        };
+        Ok(self.stage.insert(stage))
+    }
+
+    fn build(&self) -> Result<Stage, CameraError> {
+        Stage::new(self.things()?, self.scene.lighting.clone())
+    }
+
+    /// What pictures need of a state.
+    pub fn view<'a>(&self, frame: &'a Frame) -> FrameView<'a> {
+        let hand_w = frame.links[self.tree][panda::HAND_LINK] * panda::hand_in_link();
+        FrameView::of(frame, Some(hand_w))
     }
 
     /// The picture of the scene's camera of a name, for a policy.
