@@ -80,8 +80,6 @@ pub struct Senses {
 const TAXELS: [usize; 2] = [25, 21];
 /// Number of the robot in segmentations; objects count from 1 in the order of the scene.
 pub const ROBOT: u16 = 1000;
-/// Static things longer than this are grounds, whose own shadow nobody sees, m.
-const GROUND: f64 = 1.0;
 
 impl Senses {
     /// The sensors of `sim`; nothing is computed yet.
@@ -259,7 +257,7 @@ impl Senses {
                 object: index as u16 + 1,
                 model: self.looks.model(&part.name, &part.asset, mesh)?,
                 mount,
-                casts_shadow: !part.is_ground(),
+                casts_shadow: true,
             })
         };
         let mut things: Vec<Thing> = self.parts.iter().enumerate().map(draw).collect::<Result<_, _>>()?;
@@ -283,10 +281,6 @@ impl Part {
         let (Body::Soft(material), Some(rest)) = (&self.asset.body, &self.rest) else { return None };
         let modulus = material.youngs_pa / (1.0 - material.poisson * material.poisson);
         Some(Give { modulus, resolved: 2.0 * rest.mesh.edge })
-    }
-
-    fn is_ground(&self) -> bool {
-        matches!(self.kind, Kind::Static) && self.asset.shape.bounds().size().max() > GROUND
     }
 }
 

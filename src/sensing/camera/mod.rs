@@ -8,6 +8,7 @@
 //! What does not move is drawn once for a camera that does not move either; see [`Scratch`].
 
 mod background;
+mod decimate;
 mod error;
 mod facet;
 mod frame;
