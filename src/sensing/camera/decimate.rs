@@ -10,8 +10,12 @@ use super::{V3, model::Level};
 /// Place, normal, albedo, roughness, metalness and openness.
 const DIMENSIONS: usize = 12;
 /// A normal that is off by this much (rad), or a look by this much, counts as a place that is off by the tolerance.
-const NORMAL: f64 = 0.04;
-const LOOK: f64 = 0.012;
+const NORMAL: f64 = 0.15;
+const LOOK: f64 = 0.005;
+/// A quadric adds up the squares of the distances from the planes of all triangles that it stands for, and those of a
+/// vertex that leaves are farther than the middles of its edges: so many squares of the tolerance are what a surface as far
+/// off as that has.
+const SQUARES: f64 = 64.0;
 /// No triangle turns by more than this (cosine) in one collapse.
 const TURN: f32 = 0.5;
 /// Nor becomes narrower than this: twice its area in squares of its longest edge.
@@ -90,7 +94,7 @@ struct Work<'a> {
 /// A level with as few triangles as look the same but for `tolerance`, m.
 pub(super) fn decimated(level: &Level, tolerance: f32) -> Level {
     let mut work = Work::new(level, f64::from(tolerance));
-    let most = f64::from(tolerance).powi(2);
+    let most = SQUARES * f64::from(tolerance).powi(2);
     for v in 0..level.positions.len() as u32 {
         work.offer(v);
     }
@@ -287,7 +291,8 @@ mod tests {
             let ring = |p: &&V3| p.z > 0.009 && (from..to).contains(&p.xy().norm());
             of.positions.iter().filter(ring).count()
         };
-        let [edge, plain] = [[0.025, 0.033], [0.04, 0.07]].map(|[a, b]| (near(&coarse, a, b), near(&fine, a, b)));
+        let [edge, plain] =
+            [[0.025, 0.033], [0.04, 0.07]].map(|[a, b]| (near(&coarse, a, b), near(&fine, a, b)));
         assert!(2 * edge.0 > edge.1, "{edge:?} at the border of the pattern");
         assert!(10 * plain.0 < plain.1, "{plain:?} where nothing is");
     }

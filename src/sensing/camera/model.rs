@@ -26,7 +26,7 @@ const CREASE: f32 = 0.8;
 /// Cells of a skin along the longest edge, from near views to far ones; the last also throws shadows.
 const CELLS: [f64; 4] = [64.0, 40.0, 26.0, 16.0];
 /// How far fewer triangles of a rigid thing may be from all of them, in the spacing of their vertices.
-const STRAIGHT: f32 = 0.04;
+const STRAIGHT: f32 = 0.025;
 /// Triangles with patterns are cut until their edges are shorter than this share of the longest extent.
 const FINEST_CUT: f64 = 1.0 / 48.0;
 /// Most triangles that cutting may make.

@@ -125,7 +125,10 @@ impl ShadowMap {
         places.extend(positions.iter().map(|p| self.place(p)));
         for t in triangles {
             // Faces towards the light only: u × v points to it, so that they run the positive way.
-            self.heights.draw::<false>(&t.map(|v| places[v as usize]), [0.0; 2], 0);
+            let at @ [a, b, c] = t.map(|v| places[v as usize]);
+            if (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]) > 0.0 {
+                self.heights.draw::<false>(&at, [0.0; 2], 0);
+            }
         }
         self.places = places;
     }
@@ -174,8 +177,9 @@ impl ShadowMap {
     pub fn may_shade(&self, from: [f32; 2], to: [f32; 2], least: f32) -> bool {
         let tile = |x: f32| (x.max(0.0) as usize / TILE).min(TILES - 1);
         let columns = tile(from[0])..tile(to[0]) + 1;
-        (tile(from[1])..tile(to[1]) + 1)
-            .any(|y| self.ranges[y * TILES..][columns.clone()].iter().any(|range| range[1] > least + self.bias))
+        (tile(from[1])..tile(to[1]) + 1).any(|y| {
+            self.ranges[y * TILES..][columns.clone()].iter().any(|range| range[1] > least + self.bias)
+        })
     }
 
     /// Which points the map knows something about.

@@ -63,7 +63,7 @@ impl Solid {
 }
 
 /// How far the levels may be from what is meshed, m: for large pictures, for small ones, and for shadows and far views.
-const FLAWS: [f32; 3] = [8e-5, 3e-4, 1e-3];
+const FLAWS: [f32; 3] = [1e-4, 4e-4, 1.5e-3];
 /// Smooth one-coloured surfaces look right with edges of so many times what patterns need: this share of a cell counts
 /// as the level's spacing.
 const PLAIN: f64 = 0.16;
@@ -77,17 +77,16 @@ impl Model {
     /// If a solid has no surface or its look is not there.
     pub fn of_solids(name: &str, solids: &[Solid], visuals: &[Visual]) -> Result<Self, CameraError> {
         let whole = Shape::Union(solids.iter().map(|solid| solid.shape.clone()).collect());
-        let fine = level(name, solids, visuals, &whole)?;
-        Ok(Self { levels: FLAWS.map(|flaw| decimated(&fine, flaw)).into(), facets: Vec::new() })
+        let mut finer = level(name, solids, visuals, &whole)?;
+        let levels = FLAWS.map(|flaw| {
+            finer = Level { flaw, ..decimated(&finer, flaw) };
+            finer.clone()
+        });
+        Ok(Self { levels: levels.into(), facets: Vec::new() })
     }
 }
 
-fn level(
-    name: &str,
-    solids: &[Solid],
-    visuals: &[Visual],
-    whole: &Shape,
-) -> Result<Level, CameraError> {
+fn level(name: &str, solids: &[Solid], visuals: &[Visual], whole: &Shape) -> Result<Level, CameraError> {
     let mut all = Mesh { vertices: Vec::new(), triangles: Vec::new(), uvs: Vec::new() };
     let mut materials = Vec::new();
     // Of solids with meshes of their own alone: fine enough for any view.

@@ -219,7 +219,10 @@ fn a_roof_and_a_wall_darken_what_lies_behind_them_also_far_from_where_shadows_ar
     let picture = draw(&stage, &camera);
     let at = |x: f64| red(&picture, &camera, Vec3::new(x, 0.0, 0.0));
     let (open, behind_wall, under_roof) = (at(0.0), [at(2.9), at(2.3)], [at(-1.2), at(-2.0), at(-2.8)]);
-    assert!(behind_wall.iter().chain(&under_roof).all(|dark| open - dark > 40), "{open} {behind_wall:?} {under_roof:?}");
+    assert!(
+        behind_wall.iter().chain(&under_roof).all(|dark| open - dark > 40),
+        "{open} {behind_wall:?} {under_roof:?}"
+    );
     for x in [1.5, -0.8, -3.3] {
         assert!((at(x) - open).abs() < 12, "the floor at x = {x} shows {}, not {open}", at(x));
     }
