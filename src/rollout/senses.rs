@@ -110,8 +110,6 @@ pub struct Senses {
 const TAXELS: [usize; 2] = [25, 21];
 /// Number of the robot in segmentations; objects count from 1 in the order of the scene.
 pub const ROBOT: u16 = 1000;
-/// Static things longer than this are grounds, whose own shadow nobody sees, m.
-const GROUND: f64 = 1.0;
 
 impl Senses {
     /// The sensors of `sim`; nothing is computed yet.
@@ -169,12 +167,33 @@ impl Senses {
     pub fn see(&mut self, frame: &Frame, camera: &Camera) -> Result<Picture, SenseError> {
         let stage = match self.stage.take() {
             Some(stage) => stage,
-            None => Stage::new(self.things()?, self.scene.lighting.clone())?,
+            None => self.build()?,
         };
-        let hand_w = frame.links[self.tree][panda::HAND_LINK] * panda::hand_in_link();
-        let picture = render(&stage, &FrameView::of(frame, Some(hand_w)), camera, &mut self.eye);
+        let picture = render(&stage, &self.view(frame), camera, &mut self.eye);
         self.stage = Some(stage);
         picture.map_err(|error| SenseError::from(error).set_by(camera))
+    }
+
+    /// Everything that is drawn, for [`render`]; made when somebody first looks.
+    ///
+    /// # Errors
+    /// A thing that cannot be drawn, a number of the light out of range.
+    pub fn stage(&mut self) -> Result<&Stage, SenseError> {
+        let stage = match self.stage.take() {
+            Some(stage) => stage,
+            None => self.build()?,
+        };
+        Ok(self.stage.insert(stage))
+    }
+
+    fn build(&self) -> Result<Stage, CameraError> {
+        Stage::new(self.things()?, self.scene.lighting.clone())
+    }
+
+    /// What pictures need of a state.
+    pub fn view<'a>(&self, frame: &'a Frame) -> FrameView<'a> {
+        let hand_w = frame.links[self.tree][panda::HAND_LINK] * panda::hand_in_link();
+        FrameView::of(frame, Some(hand_w))
     }
 
     /// The same for a camera where somebody put it, before anything has moved.
@@ -274,7 +293,7 @@ impl Senses {
                 object: index as u16 + 1,
                 model: self.looks.model(&part.name, &part.asset, mesh)?,
                 mount,
-                casts_shadow: !part.is_ground(),
+                casts_shadow: true,
             })
         };
         let mut things: Vec<Thing> = self.parts.iter().enumerate().map(draw).collect::<Result<_, _>>()?;
@@ -298,10 +317,6 @@ impl Part {
         let (Body::Soft(material), Some(rest)) = (&self.asset.body, &self.rest) else { return None };
         let modulus = material.youngs_pa / (1.0 - material.poisson * material.poisson);
         Some(Give { modulus, resolved: 2.0 * rest.mesh.edge })
-    }
-
-    fn is_ground(&self) -> bool {
-        matches!(self.kind, Kind::Static) && self.asset.shape.bounds().size().max() > GROUND
     }
 }
 

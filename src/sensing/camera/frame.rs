@@ -16,10 +16,11 @@ fn bounds_of(points: &[V3]) -> [V3; 2] {
     points.iter().fold([V3::repeat(f32::MAX), V3::repeat(f32::MIN)], |b, p| [b[0].inf(p), b[1].sup(p)])
 }
 
-/// Puts the coarsest level of every moving thing in its place; bounds of all things, world.
+/// Puts the coarsest level of every moving thing in its place, if it is not `placed` there; bounds of all things, world.
 pub(super) fn pose_all(
     stage: &Stage,
     view: &FrameView,
+    placed: bool,
     poses: &mut Vec<Vec<Posed>>,
 ) -> Result<Vec<[V3; 2]>, CameraError> {
     poses.resize_with(stage.things.len(), Vec::new);
@@ -31,7 +32,9 @@ pub(super) fn pose_all(
             continue;
         }
         own.resize_with(thing.model.levels.len(), Posed::default);
-        own[last].update(thing, &thing.model.levels[last], view)?;
+        if !placed {
+            own[last].update(thing, &thing.model.levels[last], view)?;
+        }
         bounds.push(bounds_of(&own[last].positions));
     }
     Ok(bounds)

@@ -2,13 +2,15 @@
 //!
 //! An image is made tile by tile. Triangles are rasterised at four samples a pixel into triangle numbers and reciprocal
 //! depths; then every surface that a pixel shows is lit once, eight points at a time: Lambert and GGX (Walter et al. 2007)
-//! under one key light with soft shadows and a sky. Looks are baked into vertices, or into textures on large flat faces and on all that is printed, when a [`Model`] is
-//! built, filtered to the spacing of its vertices; so that nothing is evaluated twice and small images do not alias.
+//! under one key light with soft shadows and a sky. Looks are baked into vertices, or into textures on large flat faces and on
+//! all that is printed, when a [`Model`] is built, filtered to the spacing of its vertices; so that nothing is evaluated
+//! twice and small images do not alias. Triangles that the look of a rigid thing does not need are taken out of it once.
 //!
 //! What does not move is drawn once for a camera that does not move either; see [`Scratch`].
 
 mod background;
 mod charts;
+mod decimate;
 mod error;
 mod facet;
 mod frame;

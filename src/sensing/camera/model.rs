@@ -5,6 +5,7 @@ use std::{collections::BTreeMap, sync::Arc};
 use super::{
     CameraError, V3,
     charts::{self, Cloth},
+    decimate::decimated,
     facet::{self, Facet, PRINT},
     frame::FLAW_PIXELS,
     parts,
@@ -27,6 +28,8 @@ use crate::{
 const CREASE: f32 = 0.8;
 /// Cells of a skin along the longest edge, from near views to far ones; the last also throws shadows.
 const CELLS: [f64; 4] = [64.0, 40.0, 26.0, 16.0];
+/// How far fewer triangles of a rigid thing may be from all of them, in the spacing of their vertices.
+const STRAIGHT: f32 = 0.025;
 /// Triangles with patterns are cut until their edges are shorter than this share of the longest extent.
 const FINEST_CUT: f64 = 1.0 / 48.0;
 /// Most triangles that cutting may make.
@@ -71,7 +74,12 @@ impl Model {
         if let Some(mesh) = flat_faces(shape) {
             return Self::of_mesh(name, &mesh, &[], visuals);
         }
-        Self::of_levels(name, shape, visuals, parts::triangles)
+        let mut model = Self::of_levels(name, shape, visuals, parts::triangles)?;
+        // What is printed lies on its triangles as they are.
+        if model.facets.is_empty() {
+            model.levels.iter_mut().for_each(|level| *level = decimated(level, STRAIGHT * level.spacing));
+        }
+        Ok(model)
     }
 
     /// The same with flat faces in small triangles too, for bodies that bend.

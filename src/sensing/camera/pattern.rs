@@ -168,7 +168,7 @@ fn pulse(x: f32, share: f32, width: f32) -> f32 {
 fn rings(p: &V3, pitch: f32, wobble: f32, spacing: f32, seed: u32) -> f32 {
     let bend =
         noise::fractal([p.x / (8.0 * wobble), p.y / (8.0 * wobble), p.z / (40.0 * wobble)], 2, 0.0, seed);
-    let phase = (p.x.hypot(p.y) + 2.0 * wobble * (bend - 0.5)) / pitch;
+    let phase = ((p.x * p.x + p.y * p.y).sqrt() + 2.0 * wobble * (bend - 0.5)) / pitch;
     let t = phase - phase.floor();
     // Slow growth from light to dark, then a sharp edge.
     let ring = if t < 0.85 { (t / 0.85).powi(3) } else { 1.0 - (t - 0.85) / 0.15 };

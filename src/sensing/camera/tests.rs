@@ -193,6 +193,41 @@ fn a_shadow_falls_where_the_light_throws_it() {
     assert!(error < 5e-3, "the shadow lies {error} m beside its place");
 }
 
+/// Bytes of the red channel at a point of the world.
+fn red(picture: &Picture, camera: &Camera, p: Vec3) -> i32 {
+    let view = camera.pose.inverse_transform_point(&p.into()).coords;
+    let pixel = |along: f64| (112.0 + focal(camera) * along / -view.z) as usize;
+    i32::from(picture.rgb[3 * (224 * pixel(-view.y) + pixel(view.x))])
+}
+
+#[test]
+fn a_roof_and_a_wall_darken_what_lies_behind_them_also_far_from_where_shadows_are_fine() {
+    // Light along −x and down by as much; a wall of 1 m at x = 3 and a roof of 2 m a side over the origin.
+    let mut lighting = Lighting { shadow_centre_w: Vec3::zeros(), ..Lighting::default() };
+    (lighting.key.direction_w, lighting.key.softness_rad) = (Vec3::new(1.0, 0.0, 1.0), 0.01);
+    let slab = |half: Vec3, at: Vec3| {
+        let model = Model::of_shape("slab", &Shape::Box { half }, &[Visual::default()]).expect("a box");
+        thing(1, model, Mount::Fixed(Pose::from_parts(at.into(), Quat::identity())))
+    };
+    let floor = slab(Vec3::new(6.0, 3.0, 0.05), Vec3::new(0.0, 0.0, -0.05));
+    let wall = slab(Vec3::new(0.02, 1.5, 0.5), Vec3::new(3.02, 0.0, 0.5));
+    let roof = slab(Vec3::new(1.0, 1.0, 0.02), Vec3::new(0.0, 0.0, 2.0));
+    let stage = Stage::new(vec![floor, wall, roof], lighting).expect("a stage");
+    // From the side, under the roof: its shadow lies 2 m towards −x.
+    let camera = camera(Vec3::new(0.0, -6.0, 1.5), Vec3::new(0.0, 0.0, 0.5), Vec3::z());
+    let camera = Camera { fovy_rad: 1.2, ..camera };
+    let picture = draw(&stage, &camera);
+    let at = |x: f64| red(&picture, &camera, Vec3::new(x, 0.0, 0.0));
+    let (open, behind_wall, under_roof) = (at(0.0), [at(2.9), at(2.3)], [at(-1.2), at(-2.0), at(-2.8)]);
+    assert!(
+        behind_wall.iter().chain(&under_roof).all(|dark| open - dark > 40),
+        "{open} {behind_wall:?} {under_roof:?}"
+    );
+    for x in [1.5, -0.8, -3.3] {
+        assert!((at(x) - open).abs() < 12, "the floor at x = {x} shows {}, not {open}", at(x));
+    }
+}
+
 #[test]
 fn the_right_of_the_third_person_image_is_the_worlds_positive_y() {
     for camera in [Camera::third_person_table(), Camera::third_person_floor()] {
