@@ -80,7 +80,7 @@ table.move(tag.layers, 1, #tag.layers, #layers + 1, layers)
 return softvt.asset {
   name = "basket",
   shape = shape:union(rods),
-  body = softvt.rigid { density = 487.5 },
+  body = softvt.rigid { density = 523.3 },
   hints = { surface_m = 6 * mm, wall_m = 24 * mm },
   visuals = { { albedo = WILLOW, roughness = 0.6, layers = layers } },
 }
