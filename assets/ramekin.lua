@@ -24,7 +24,7 @@ table.insert(glaze.layers, {
 return softvt.asset {
   name = "ramekin",
   shape = solid:subtract(hollow),
-  body = softvt.rigid { density = 436.5 },
+  body = softvt.rigid { density = 392.0 },
   hints = { grasp_rim_m = 42 * mm, grasp_height_m = 33 * mm, surface_m = 6 * mm },
   visuals = { glaze },
 }

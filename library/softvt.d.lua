@@ -366,6 +366,17 @@
 ---@field shape softvt.Shape The shape.
 ---@field soft_m? number Width of the border, half of it on either side of the shape's surface. Expects metres of 0 or more. Default 0.
 
+---The letters of a line of text, printed on what faces who reads it. Surfaces with text are drawn with finer detail than others.
+---@class softvt.TextMask
+---@field text string What it says: at most 64 letters.
+---@field height_m number Height of a capital letter. Expects metres in 0.0005..1.
+---@field at number[] Where the middle of the line is; of a line that is wrapped, only its height counts. Expects a list of 3 numbers (m).
+---@field facing "+x"|"-x"|"+y"|"-y"|"+z"|"-z"|number[] Where the printed surface looks. Lines on top have their head towards +y, others towards +z.
+---@field turn? number Turn of the line on its surface, counter-clockwise to who reads it. Expects radians. Default 0.
+---@field wrap_m? number Radius of the upright cylinder about the z axis that the line is laid round; flat if left out. Expects metres above 0.
+---@field weight? number How much strokes are thickened, in heights of a capital letter. Expects a number in 0..0.25. Default 0.08.
+---@field font? "sans"|"mono" Typeface. Default "sans".
+
 ---A solid. Methods give a new shape and leave this one as it is.
 ---@class softvt.Shape
 local Shape = {}
@@ -1104,3 +1115,8 @@ function softvt.mask.facing(spec) end
 ---@param spec softvt.InsideMask
 ---@return softvt.Mask
 function softvt.mask.inside(spec) end
+
+---The letters of a line of text, printed on what faces who reads it. Surfaces with text are drawn with finer detail than others.
+---@param spec softvt.TextMask
+---@return softvt.Mask
+function softvt.mask.text(spec) end

@@ -32,8 +32,9 @@ fn suite() -> Loaded {
 }
 
 fn scene(loaded: &Loaded, task: usize, episode: u64) -> Scene {
+    let Plan::Suite(suite) = &loaded.plan else { panic!("{:?}", loaded.plan) };
     let request = EpisodeRequest {
-        suite: "spatial_soft".into(),
+        suite: suite.name.clone(),
         task,
         episode,
         base_seed: 0,
@@ -286,7 +287,7 @@ fn bowl_basket_and_ramekin_are_hollow_and_their_walls_thick_enough() {
     let of = |name: &str| assets.iter().find(|asset| asset.name == name).expect("is there");
     for (name, at, inside) in [("black_bowl", 0.04, 0.04), ("basket", 0.1, 0.06), ("ramekin", 0.03, 0.036)] {
         let shape = &of(name).shape;
-        assert!(shape.distance(&Vec3::new(0.0, 0.0, at)) > 0.03, "{name} is hollow");
+        assert!(shape.distance(&Vec3::new(0.0, 0.0, at)) > 0.02, "{name} is hollow");
         for turn in [0.0_f64, 0.4, 0.8, 1.3, 2.0, 4.0] {
             let way = Vec3::new(turn.cos(), turn.sin(), 0.0);
             let from = Vec3::z() * at;
@@ -322,9 +323,9 @@ fn rigid_things_stand_still_alone_and_stacked() {
                 "{names:?}: {} moved {moved} m, {turned} rad",
                 object.name
             );
-            // A bowl sinks into a ramekin; nothing else changes its height.
+            // A bowl sinks into a ramekin and a plate's well; nothing else changes its height.
             let sunk = start - after.translation.z;
-            let limit = if names[0] == "ramekin" { 0.014 } else { 5e-4 };
+            let limit = if ["ramekin", "plate"].contains(&names[0]) { 0.014 } else { 5e-4 };
             assert!((-1e-4..limit).contains(&sunk), "{names:?}: {} sank by {sunk} m", object.name);
             assert!((after.rotation * Vec3::z()).z > 0.9999, "{names:?}: {} leans", object.name);
         }

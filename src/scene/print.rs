@@ -194,7 +194,9 @@ fn thickened(cover: &[f32], [width, height]: [usize; 2], thick: f32) -> Vec<f32>
     let mut out = vec![0.0_f32; cover.len()];
     for dy in -reach..=reach {
         for dx in -reach..=reach {
-            let share = (radius + 0.5 - (dx as f32).hypot(dy as f32)).clamp(0.0, 1.0);
+            // The middle counts wholly, however thin the growth is.
+            let away = (dx as f32).hypot(dy as f32);
+            let share = if away == 0.0 { 1.0 } else { (radius + 0.5 - away).clamp(0.0, 1.0) };
             if share == 0.0 {
                 continue;
             }

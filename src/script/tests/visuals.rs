@@ -204,8 +204,19 @@ fn a_painted_shape_needs_a_look_for_each_material_or_none_at_all() {
 
 #[test]
 fn every_material_of_the_library_gives_a_look() {
-    let names =
-        ["crust", "dough", "frosting", "seeds", "ceramic", "wood", "steel", "fabric", "paint", "floured"];
+    let names = [
+        "crust",
+        "dough",
+        "frosting",
+        "seeds",
+        "ceramic",
+        "wood",
+        "floorboards",
+        "steel",
+        "fabric",
+        "paint",
+        "floured",
+    ];
     let looks: Vec<_> = names
         .iter()
         .map(|name| match *name {

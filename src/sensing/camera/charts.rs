@@ -47,7 +47,7 @@ pub(super) fn wrap(level: &mut Level, facets: &mut Vec<Facet>, cloth: &Arc<Cloth
 
 /// Twice the number of an axis, and one more for its negative direction.
 fn direction(axis: usize) -> V3 {
-    let sign = if axis % 2 == 0 { 1.0 } else { -1.0 };
+    let sign = if axis.is_multiple_of(2) { 1.0 } else { -1.0 };
     V3::ith(axis / 2, sign)
 }
 
