@@ -26,6 +26,6 @@ return softvt.asset {
   shape = body,
   body = softvt.rigid { density = 673.4 },
   -- It is taken by its rim from above, the wall between the fingers: where the wall is, and how high the tool centre then is.
-  hints = { grasp_rim_m = 51 * mm, grasp_height_m = 42 * mm, surface_m = 6.6 * mm },
+  hints = { grasp_rim_m = 51 * mm, grasp_width_m = 5 * mm, grasp_height_m = 43 * mm, surface_m = 6.6 * mm },
   visuals = { glaze },
 }

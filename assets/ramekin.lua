@@ -25,6 +25,6 @@ return softvt.asset {
   name = "ramekin",
   shape = solid:subtract(hollow),
   body = softvt.rigid { density = 392.0 },
-  hints = { grasp_rim_m = 42 * mm, grasp_height_m = 33 * mm, surface_m = 6 * mm },
+  hints = { grasp_rim_m = 42 * mm, grasp_width_m = 5 * mm, grasp_height_m = 33 * mm, surface_m = 6 * mm },
   visuals = { glaze },
 }

@@ -38,9 +38,9 @@ function grasp.height(object)
   return object.hints.grasp_height_m or math.max(CASE + UNDER, object.size[3] / 2)
 end
 
--- The width across which the fingers close, m: of a wall where it is taken by the rim.
+-- The width across which the fingers close, m, where they take it.
 function grasp.width(object)
-  return object.hints.grasp_wall_m or math.min(object.size[1], object.size[2])
+  return object.hints.grasp_width_m or math.min(object.size[1], object.size[2])
 end
 
 -- How far to close: between what just holds and what deforms too much; without a calibration, a squeeze of what is rigid.
