@@ -2,7 +2,7 @@
 --
 -- The well is wide and lies high in the plate, so that the sensors' cases, which reach 16 mm below the finger tips and
 -- 29 mm behind the gels, clear the rim when an object is set down. The rim is 4 mm thick at its edge: thinner walls could
--- be crossed by a fast soft body.
+-- be crossed by a fast soft body. 36 g, as in LIBERO (100 kg/m³ of the box around it).
 local material = require "materials"
 
 local mm = 1e-3
@@ -29,7 +29,7 @@ return softvt.asset {
     material = 1,
     region = softvt.shape.torus { major = 67 * mm, minor = 3 * mm }:translate(0, 0, 18 * mm),
   },
-  body = softvt.static {},
+  body = softvt.rigid { density = 241.2 },
   hints = { surface_m = 14.5 * mm },
   visuals = {
     glazed,

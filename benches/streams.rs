@@ -3,19 +3,16 @@
 //! `cargo bench --bench streams` runs the expert on the first task of a suite and prints CPU seconds a simulated second,
 //! blind and looking, and how many times real time that is. One thread; settling and the making of models are apart.
 
-use std::sync::Arc;
+mod episode;
 
 use cpu_time::ThreadTime;
 use softvt::{
-    benchmark::{Plan, seed::Split},
-    evaluation::record::Identity,
     policy::{Action, Observation, Streams},
-    rollout::{ControlError, Controller, Episode, EpisodeSpec, Looks, RestCache, Simulation},
-    script::{self, EpisodeRequest, ExpertController, Loaded},
+    rollout::{ControlError, Controller, Episode, Looks, RestCache, Simulation},
+    script::{ExpertController, Loaded},
 };
 
-/// The suite, and the goal: times real time with all streams.
-const SUITE: &str = "suites/spatial_soft.lua";
+/// Times real time with all streams.
 const GOAL: f64 = 4.0;
 
 /// An expert that also looks; time runs from its first action on.
@@ -38,42 +35,7 @@ impl Controller for Looking {
 
 /// Simulated seconds and CPU seconds of an episode.
 fn episode(loaded: &Loaded, streams: &Streams, shared: &(RestCache, Looks)) -> (f64, f64) {
-    let Plan::Suite(suite) = &loaded.plan else { panic!("{SUITE} is a suite") };
-    let request = EpisodeRequest {
-        suite: suite.name.clone(),
-        task: 0,
-        episode: 0,
-        base_seed: 0,
-        split: Split::Validation,
-        shifts: Vec::new(),
-    };
-    let opened = script::Episode::open(loaded, &request).expect("it opens");
-    let (task, settings) = (suite.tasks[0].clone(), suite.settings.clone());
-    let spec = EpisodeSpec {
-        identity: Identity {
-            suite: suite.name.clone(),
-            task: task.id,
-            prompt: task.prompt.clone(),
-            layout: task.layout.clone(),
-            episode: 0,
-            seed: 0,
-            split: Split::Validation.name().to_owned(),
-            policy: "expert".to_owned(),
-            asset: String::new(),
-            soft: true,
-        },
-        task,
-        scene: Arc::new(opened.scene.clone()),
-        limit: None,
-        rules: settings.rules,
-        params: settings.physics,
-        robot: settings.robot,
-        tactile: settings.tactile,
-        film: false,
-        trace: None,
-    };
-    let expert = opened.expert().expect("a script").expect("an expert");
-    let expert = ExpertController::new(expert, false);
+    let (spec, expert) = episode::open(loaded, 0, false);
     let mut driver = Looking { expert, streams: streams.clone(), since: None };
     let started = Episode::start(spec, &shared.0, &shared.1).expect("it starts");
     let record = started.run(&mut driver).expect("it runs").record;
@@ -82,7 +44,7 @@ fn episode(loaded: &Loaded, streams: &Streams, shared: &(RestCache, Looks)) -> (
 }
 
 fn main() {
-    let loaded = script::load(SUITE.as_ref(), &[]).expect("the suite loads");
+    let loaded = episode::load();
     let shared = (RestCache::default(), Looks::default());
     let cameras: Vec<String> = ["third_person", "wrist"].map(str::to_owned).into();
     let cases = [

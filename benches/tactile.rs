@@ -44,7 +44,10 @@ fn main() {
     ];
     let gel = Gel::new(&TactileSpec::default(), PadSurface::default()).expect("default numbers");
     let optics = Optics::mini().expect("shipped optics");
-    println!("{:<28} {:>9} {:>9} {:>11}   ms a finger", "case", "field", "picture", "99 markers");
+    println!(
+        "{:<28} {:>9} {:>9} {:>12} {:>11}   ms a finger",
+        "case", "field", "picture", "with shadows", "99 markers"
+    );
     for case in cases {
         report(&case, &gel, &optics);
     }
@@ -58,11 +61,12 @@ fn report(case: &Case, gel: &Gel, optics: &Optics) {
     let field = sense(gel, &input, &mut scratch).expect("a good touch").expect("a force");
     let mut rgb = vec![0; 320 * 240 * 3];
     let sensing = least(|| drop(black_box(sense(gel, &input, &mut scratch))));
-    let picture = least(|| optics.picture(gel, Some(&field), &mut rgb));
+    let picture = least(|| optics.picture(gel, Some(&field), false, &mut rgb));
+    let shaded = least(|| optics.picture(gel, Some(&field), true, &mut rgb));
     let moving = least(|| {
         black_box(markers(gel, &MarkerModel::Elastic, Some(&field)));
     });
-    println!("{:<28} {sensing:>9.3} {picture:>9.3} {moving:>11.4}", case.name);
+    println!("{:<28} {sensing:>9.3} {picture:>9.3} {shaded:>12.3} {moving:>11.4}", case.name);
 }
 
 /// Least time of the rounds, ms.

@@ -6,55 +6,88 @@
 //! ```
 //!
 //! The package (T. Schneider, MIT) holds 24 pictures, 640 × 480, of a ball pressed into a GelSight Mini, the circle of
-//! contact of each, and the untouched picture. Within a circle the ball's shape gives the slope at every pixel; ridge
-//! regression then finds, for each channel, 14 monomials of the slope × 6 of the place. The error printed (stderr) is
-//! that of pictures left out of the fit, four folds. The ball's radius is not documented: 2 mm is what the package's own
-//! parameters use; another may be given as the second argument (mm).
+//! contact of each, drawn by hand, and the untouched picture. The circles are up to 26 px beside the dents that one sees,
+//! so each is moved first to where the colour of its picture turns fastest, which is at the ball's lowest point; its
+//! radius is kept. Within a circle the ball's shape gives the slope at every pixel; ridge regression then finds, for each
+//! channel, 20 monomials of the slope by which it multiplies the untouched picture. The errors printed (stderr) are those
+//! of pictures left out of the fit, four folds: every fourth picture, and a quarter of the pictures in the order they
+//! were taken (other places of the gel); and the same where the circles are not moved. The ball's radius is not
+//! documented: 2 mm is what the package's own parameters use; another may be given as the second argument (mm).
 
-use std::{error::Error, f64::consts::PI, path::Path};
+use std::{error::Error, f64::consts::PI, ops::Range, path::Path};
 
 use nalgebra::{DMatrix, DVector};
 use softvt::sensing::tactile::{
     npz::read_npz,
-    optics::{OpticsFile, PLACES, SLOPES, monomials, places},
+    optics::{OpticsFile, SLOPES, monomials},
 };
 
 /// Edge of a pixel of a 640 × 480 picture, mm: half of 0.0634, GelSight's own figure at 320 × 240.
 const PITCH_MM: f64 = 0.0317;
-/// Weight of the ridge, a pixel.
-const RIDGE: f64 = 1e-7;
+/// Weight of the ridge, grey levels squared a pixel.
+const RIDGE: f64 = 1e-3;
 const FOLDS: usize = 4;
 /// Waves of the untouched picture along each axis.
 const WAVES: usize = 10;
 /// Where red, green and blue are in a stored pixel.
 const STORED: [usize; 3] = [2, 1, 0];
-const TERMS: usize = SLOPES * PLACES;
+/// How far from a circle's centre the dent's is looked for, px.
+const REACH: usize = 60;
+/// σ of the blur before that, px.
+const BLUR: f64 = 4.0;
+/// Share of the greatest change of colour from which on places count for the centre.
+const NEAR: f64 = 0.7;
 
 /// One pixel in a contact circle: its features, and the colours of the press and of the untouched picture.
 struct Sample {
-    features: [f64; TERMS],
+    slopes: [f64; SLOPES],
     pressed: [f64; 3],
     untouched: [f64; 3],
 }
 
+/// A picture of a press.
+struct Press {
+    /// 640 × 480, three bytes a pixel, as stored.
+    picture: Vec<u8>,
+    /// The circle drawn by hand, px.
+    drawn: [f64; 2],
+    /// Centre of the dent, px.
+    centre: [f64; 2],
+    radius: f64,
+}
+
 struct Data {
-    /// By picture.
-    presses: Vec<Vec<Sample>>,
+    presses: Vec<Press>,
     untouched: Vec<f64>,
     size: [usize; 2],
+}
+
+/// Slope over distance from the centre (1/px), and the greatest slope that is told apart.
+#[derive(Clone, Copy)]
+struct Ball {
+    per_px: f64,
     steepest: f64,
-    /// Least and greatest place of a sample.
-    range: [[f64; 2]; 2],
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut words = std::env::args().skip(1);
     let path = words.next().ok_or("expected the path of dataPack.npz")?;
     let radius: f64 = words.next().map_or(Ok(2.0), |word| word.parse())?;
-    let data = load(Path::new(&path), radius)?;
-    let held_out_l1 = (0..FOLDS).map(|fold| error(&data, fold)).sum::<f64>() / FOLDS as f64;
+    let data = load(Path::new(&path))?;
+    let ball = Ball::of(&data, radius)?;
+    let moved: Vec<Vec<Sample>> = data.presses.iter().map(|p| samples(&data, p, p.centre, ball)).collect();
+    let drawn: Vec<Vec<Sample>> = data.presses.iter().map(|p| samples(&data, p, p.drawn, ball)).collect();
+    let count = data.presses.len();
+    let [every_fourth, quarters]: [fn(usize, usize) -> usize; 2] = [|i, _| i % FOLDS, |i, n| i * FOLDS / n];
+    let held_out_l1 = left_out(&moved, |i| every_fourth(i, count));
     eprintln!("held-out L1 in the contact circles: {held_out_l1:.2} of 255");
-    let all: Vec<&Sample> = data.presses.iter().flatten().collect();
+    eprintln!("  a quarter left out in the order taken: {:.2}", left_out(&moved, |i| quarters(i, count)));
+    eprintln!("  circles as drawn in the package: {:.2}", left_out(&drawn, |i| every_fourth(i, count)));
+    for press in &data.presses {
+        let [dx, dy] = [0, 1].map(|axis| press.centre[axis] - press.drawn[axis]);
+        eprintln!("  circle at {:?} px, dent {dx:+.1}, {dy:+.1} px from it", press.drawn);
+    }
+    let all: Vec<&Sample> = moved.iter().flatten().collect();
     let weights = fit(&all).ok_or("the normal equations are singular")?;
     let round = |value: f64| (value * 1e3).round() / 1e3;
     let file = OpticsFile {
@@ -62,113 +95,166 @@ fn main() -> Result<(), Box<dyn Error>> {
                  https://github.com/TimSchneider42/taxim, MIT licence, Copyright (c) 2021 CMURoboTouch"
             .into(),
         note: format!(
-            "made by examples/fit_gelsight.rs; ball radius assumed, pixel pitch {PITCH_MM} mm at 640 x 480"
+            "made by examples/fit_gelsight.rs; ball radius assumed, pixel pitch {PITCH_MM} mm at 640 x 480, \
+             circles moved onto their dents"
         ),
         ball_radius_mm: radius,
         held_out_l1: round(held_out_l1),
-        steepest: round(data.steepest),
-        place_range: data.range.map(|at| at.map(round)),
+        steepest: round(ball.steepest),
         background: [0, 1, 2]
             .map(|channel| series(&data, channel).map(|row| row.map(round).to_vec()).to_vec()),
-        colour: [0, 1, 2].map(|channel| {
-            weights[channel].as_slice().chunks(PLACES).map(|c| std::array::from_fn(|p| round(c[p]))).collect()
-        }),
+        colour: weights.map(|w| w.iter().copied().map(round).collect()),
     };
     println!("{}", serde_json::to_string(&file)?);
     Ok(())
 }
 
-fn load(path: &Path, radius_mm: f64) -> Result<Data, Box<dyn Error>> {
-    let (pictures, untouched) = (read_npz(path, "imgs")?, read_npz(path, "f0")?);
+fn load(path: &Path) -> Result<Data, Box<dyn Error>> {
+    let (pictures, untouched) = (read_npz(path, "imgs")?, read_npz(path, "f0")?.values());
     let (centres, radii) =
         (read_npz(path, "touch_center")?.values(), read_npz(path, "touch_radius")?.values());
     let &[count, high, wide, 3] = pictures.shape.as_slice() else {
         return Err(format!("imgs: expected pictures × rows × columns × 3, got {:?}", pictures.shape).into());
     };
-    let untouched = untouched.values();
-    let mut data = Data {
-        presses: Vec::new(),
-        untouched,
-        size: [wide, high],
-        steepest: 0.0,
-        range: [[1.0; 2], [-1.0; 2]],
-    };
-    for i in 0..count {
-        let picture = &pictures.bytes[i * high * wide * 3..(i + 1) * high * wide * 3];
-        let (cx, cy, r) = (centres[2 * i], centres[2 * i + 1], radii[i]);
-        let mut press = Vec::new();
-        for y in 0..high {
-            for x in 0..wide {
-                let (dx, dy) = (x as f64 - cx, y as f64 - cy);
-                if dx.hypot(dy) >= r {
-                    continue;
-                }
-                // The sine of the slope of a sphere is the distance from its axis over its radius.
-                let (a, b) = (dx * PITCH_MM / radius_mm, dy * PITCH_MM / radius_mm);
-                data.steepest = data.steepest.max(a.hypot(b));
-                let place = [unit(x, wide), unit(y, high)];
-                for (axis, &p) in place.iter().enumerate() {
-                    data.range[0][axis] = data.range[0][axis].min(p);
-                    data.range[1][axis] = data.range[1][axis].max(p);
-                }
-                let at = 3 * (y * wide + x);
-                press.push(Sample {
-                    features: features(a, b, place[0], place[1]),
-                    pressed: std::array::from_fn(|c| f64::from(picture[at + STORED[c]])),
-                    untouched: std::array::from_fn(|c| data.untouched[at + STORED[c]]),
-                });
-            }
-        }
-        data.presses.push(press);
+    if centres.len() != 2 * count || radii.len() != count || untouched.len() != 3 * high * wide {
+        return Err("touch_center, touch_radius and f0 do not belong to imgs".into());
     }
-    if data.steepest >= 1.0 {
-        return Err(format!("a ball of {radius_mm} mm has no circles that wide; give a larger radius").into());
+    let mut data = Data { presses: Vec::new(), untouched, size: [wide, high] };
+    for (i, &radius) in radii.iter().enumerate() {
+        let picture = pictures.bytes[i * high * wide * 3..(i + 1) * high * wide * 3].to_vec();
+        let drawn = [centres[2 * i], centres[2 * i + 1]];
+        let centre = dent(&data, &picture, drawn);
+        data.presses.push(Press { picture, drawn, centre, radius });
     }
     Ok(data)
 }
 
-/// −1..1 across the picture.
-fn unit(p: usize, of: usize) -> f64 {
-    (p as f64 + 0.5) * 2.0 / of as f64 - 1.0
+impl Ball {
+    /// Of a radius in mm.
+    fn of(data: &Data, radius_mm: f64) -> Result<Self, Box<dyn Error>> {
+        // The sine of the slope of a sphere is the distance from its axis over its radius.
+        let per_px = PITCH_MM / radius_mm;
+        let mut edges: Vec<f64> = data.presses.iter().map(|press| press.radius * per_px).collect();
+        edges.sort_by(f64::total_cmp);
+        if edges.last().is_none_or(|&edge| edge >= 1.0) {
+            return Err(
+                format!("a ball of {radius_mm} mm has no circles that wide; give a larger radius").into()
+            );
+        }
+        // Steeper than that less than half of the presses have something to say.
+        Ok(Self { per_px, steepest: edges[edges.len() / 2] })
+    }
 }
 
-fn features(a: f64, b: f64, x: f64, y: f64) -> [f64; TERMS] {
-    let (slopes, places) = (monomials(a, b), places(x, y));
-    std::array::from_fn(|i| slopes[i / PLACES] * places[i % PLACES])
-}
-
-/// Weights of each channel.
-fn fit(samples: &[&Sample]) -> Option<[DVector<f64>; 3]> {
-    let mut normal = DMatrix::identity(TERMS, TERMS) * (RIDGE * samples.len() as f64);
-    let mut right = [0, 1, 2].map(|_| DVector::zeros(TERMS));
-    for sample in samples {
-        let f = DVector::from_row_slice(&sample.features);
-        normal.syger(1.0, &f, &f, 1.0);
-        for (channel, right) in right.iter_mut().enumerate() {
-            right.axpy(sample.pressed[channel] - sample.untouched[channel], &f, 1.0);
+/// Where the colour of a press turns fastest, near `drawn`: the centre of its dent, px.
+fn dent(data: &Data, picture: &[u8], drawn: [f64; 2]) -> [f64; 2] {
+    let margin = REACH + (3.0 * BLUR) as usize;
+    let [columns, rows]: [Range<usize>; 2] = [0, 1].map(|axis| {
+        let at = drawn[axis].max(0.0) as usize;
+        at.saturating_sub(margin)..(at + margin).min(data.size[axis])
+    });
+    let (wide, high) = (columns.len(), rows.len());
+    let mut turning = vec![0.0; wide * high];
+    for channel in STORED {
+        let mut change = vec![0.0; wide * high];
+        for (c, value) in change.iter_mut().enumerate() {
+            let at = 3 * ((rows.start + c / wide) * data.size[0] + columns.start + c % wide) + channel;
+            *value = f64::from(picture[at]) - data.untouched[at];
+        }
+        let smooth = blur(&change, wide);
+        for y in 1..high - 1 {
+            for x in 1..wide - 1 {
+                let c = y * wide + x;
+                let (dx, dy) = (smooth[c + 1] - smooth[c - 1], smooth[c + wide] - smooth[c - wide]);
+                turning[c] += dx * dx + dy * dy;
+            }
         }
     }
-    let factor = normal.cholesky()?;
-    Some(right.map(|right| factor.solve(&right)))
+    let greatest = turning.iter().copied().fold(0.0, f64::max);
+    let near = turning.iter().enumerate().filter(|(_, t)| **t > NEAR * greatest);
+    let [x, y, sum] = near.fold([0.0; 3], |[x, y, sum], (c, t)| {
+        [x + t * (c % wide) as f64, y + t * (c / wide) as f64, sum + t]
+    });
+    [columns.start as f64 + x / sum, rows.start as f64 + y / sum]
 }
 
-/// Mean error of the pictures of a fold by what the others say.
-fn error(data: &Data, fold: usize) -> f64 {
-    let of = |left_out: bool| {
-        let chosen = data.presses.iter().enumerate().filter(move |(i, _)| (i % FOLDS == fold) == left_out);
-        chosen.flat_map(|(_, press)| press).collect::<Vec<&Sample>>()
+/// Gaussian blur of rows of `wide` numbers; what is beyond them counts for nothing.
+fn blur(image: &[f64], wide: usize) -> Vec<f64> {
+    let reach = (3.0 * BLUR) as isize;
+    let weight = |k: isize| (-0.5 * (k as f64 / BLUR).powi(2)).exp();
+    let total: f64 = (-reach..=reach).map(weight).sum();
+    let pass = |image: &[f64], step: isize| -> Vec<f64> {
+        let line = |c: usize| if step == 1 { c / wide } else { c % wide };
+        (0..image.len())
+            .map(|c| {
+                let taps = (-reach..=reach).filter_map(|k| {
+                    let at = usize::try_from(c as isize + k * step).ok()?;
+                    (at < image.len() && line(at) == line(c)).then(|| weight(k) * image[at])
+                });
+                taps.sum::<f64>() / total
+            })
+            .collect()
     };
-    let (train, test) = (of(false), of(true));
-    let Some(weights) = fit(&train) else { return f64::NAN };
-    let mut sum = 0.0;
-    for sample in &test {
-        for (channel, weights) in weights.iter().enumerate() {
-            let change: f64 = sample.features.iter().zip(weights.iter()).map(|(f, w)| f * w).sum();
-            let found = (sample.untouched[channel] + change).clamp(0.0, 255.0);
-            sum += (found - sample.pressed[channel]).abs();
+    pass(&pass(image, 1), wide as isize)
+}
+
+/// The pixels of a press in its circle, moved to `centre`.
+fn samples(data: &Data, press: &Press, centre: [f64; 2], ball: Ball) -> Vec<Sample> {
+    let [wide, high] = data.size;
+    let mut samples = Vec::new();
+    for (x, y) in (0..high).flat_map(|y| (0..wide).map(move |x| (x, y))) {
+        let (dx, dy) = (x as f64 - centre[0], y as f64 - centre[1]);
+        let far = dx.hypot(dy);
+        if far >= press.radius {
+            continue;
         }
+        let per_px = ball.per_px.min(ball.steepest / far.max(1e-9));
+        let at = 3 * (y * wide + x);
+        samples.push(Sample {
+            slopes: monomials(dx * per_px, dy * per_px),
+            pressed: STORED.map(|c| f64::from(press.picture[at + c])),
+            untouched: STORED.map(|c| data.untouched[at + c]),
+        });
     }
-    sum / (3 * test.len()) as f64
+    samples
+}
+
+/// Weights of each channel: the sum over monomials times the untouched picture is its change.
+fn fit(samples: &[&Sample]) -> Option<[DVector<f64>; 3]> {
+    let channel = |channel: usize| {
+        let mut normal = DMatrix::identity(SLOPES, SLOPES) * (RIDGE * samples.len() as f64);
+        let mut right = DVector::zeros(SLOPES);
+        for sample in samples {
+            let light = sample.untouched[channel];
+            let f = DVector::from_row_slice(&sample.slopes) * light;
+            normal.syger(1.0, &f, &f, 1.0);
+            right.axpy(sample.pressed[channel] - light, &f, 1.0);
+        }
+        Some(normal.cholesky()?.solve(&right))
+    };
+    Some([channel(0)?, channel(1)?, channel(2)?])
+}
+
+/// Mean error over the folds of pictures by what the other folds say, of 255; `fold` tells a picture's.
+fn left_out(presses: &[Vec<Sample>], fold: impl Fn(usize) -> usize) -> f64 {
+    let error = |out: usize| {
+        let of = |left_out: bool| {
+            let chosen = presses.iter().enumerate().filter(|(i, _)| (fold(*i) == out) == left_out);
+            chosen.flat_map(|(_, press)| press).collect::<Vec<&Sample>>()
+        };
+        let (train, test) = (of(false), of(true));
+        let Some(weights) = fit(&train) else { return f64::NAN };
+        let mut sum = 0.0;
+        for sample in &test {
+            for (channel, weights) in weights.iter().enumerate() {
+                let share: f64 = sample.slopes.iter().zip(weights.iter()).map(|(f, w)| f * w).sum();
+                let found = (sample.untouched[channel] * (1.0 + share)).clamp(0.0, 255.0);
+                sum += (found - sample.pressed[channel]).abs();
+            }
+        }
+        sum / (3 * test.len()) as f64
+    };
+    (0..FOLDS).map(error).sum::<f64>() / FOLDS as f64
 }
 
 /// The cosine series of a channel of the untouched picture.

@@ -398,6 +398,17 @@
 ---@field shape softvt.Shape The shape.
 ---@field soft_m? number Width of the border, half of it on either side of the shape's surface. Expects metres of 0 or more. Default 0.
 
+---The letters of a line of text, printed on what faces who reads it. Surfaces with text are drawn with finer detail than others.
+---@class softvt.TextMask
+---@field text string What it says: at most 64 letters.
+---@field height_m number Height of a capital letter. Expects metres in 0.0005..1.
+---@field at number[] Where the middle of the line is; of a line that is wrapped, only its height counts. Expects a list of 3 numbers (m).
+---@field facing "+x"|"-x"|"+y"|"-y"|"+z"|"-z"|number[] Where the printed surface looks. Lines on top have their head towards +y, others towards +z.
+---@field turn? number Turn of the line on its surface, counter-clockwise to who reads it. Expects radians. Default 0.
+---@field wrap_m? number Radius of the upright cylinder about the z axis that the line is laid round; flat if left out. Expects metres above 0.
+---@field weight? number How much strokes are thickened, in heights of a capital letter. Expects a number in 0..0.25. Default 0.08.
+---@field font? "sans"|"mono" Typeface. Default "sans".
+
 ---A solid. Methods give a new shape and leave this one as it is.
 ---@class softvt.Shape
 local Shape = {}
@@ -564,8 +575,8 @@ function Body:speed() end
 ---@return number
 function Body:mass() end
 
----Least det F of a filled element; 0 or less is inverted.
----@return number
+---Least det F of a filled element; 0 or less is inverted, nil where no element is filled.
+---@return number?
 function Body:min_det_f() end
 
 ---Whether it sleeps.
@@ -688,8 +699,8 @@ function Image:resize(width, height) end
 
 ---Puts another picture on this one.
 ---@param other softvt.Image
----@param x integer
----@param y integer
+---@param x number
+---@param y number
 function Image:paste(other, x, y) end
 
 ---Writes a line of text on it.
@@ -880,6 +891,7 @@ local Seen = {}
 ---@field pose softvt.Pose Measured pose of the tool centre point.
 ---@field target softvt.Pose Pose commanded last.
 ---@field closure number Closure commanded last, 0 open to 1 shut.
+---@field gripping boolean Whether grasp was called last, not release or open.
 ---@field width number Measured distance of the pads, m.
 ---@field force number[] Normal force on the left and right pad, N.
 ---@field time number Time since the start, s.
@@ -906,6 +918,15 @@ function Arm:move_by(offset, options) end
 ---@param options? {rate: number?}
 function Arm:close_to(closure, options) end
 
+---Closes on an object; a binary gripper, which knows only open and shut, shuts here and not in close_to.
+---@param closure number
+---@param options? {rate: number?}
+function Arm:grasp(closure, options) end
+
+---Lets go of an object, opening to a closure or wide.
+---@param options? {rate: number?, closure: number?}
+function Arm:release(options) end
+
 ---Opens the gripper.
 ---@param options? {rate: number?}
 function Arm:open(options) end
@@ -913,6 +934,10 @@ function Arm:open(options) end
 ---Holds still.
 ---@param seconds number
 function Arm:wait(seconds) end
+
+---A list that belongs to an object: scene.base, look.albedo, scene.objects. #, [i], ipairs, pairs, table.unpack and table.concat work on it, and it may be given wherever a list is expected. Numbers that may be written one by one go to the object at once: scene.base[1] = 0.1 is as good as scene.base = { 0.1, 0, 0 }. Any other list refuses to be written.
+---@class softvt.List
+local List = {}
 
 ---The softvt library.
 softvt = {}
@@ -1147,3 +1172,8 @@ function softvt.mask.facing(spec) end
 ---@param spec softvt.InsideMask
 ---@return softvt.Mask
 function softvt.mask.inside(spec) end
+
+---The letters of a line of text, printed on what faces who reads it. Surfaces with text are drawn with finer detail than others.
+---@param spec softvt.TextMask
+---@return softvt.Mask
+function softvt.mask.text(spec) end

@@ -10,12 +10,11 @@
 -- Writes assets/calibration/<asset>.json, the sweep rows in SoftVTBench's fields beside it, and scripts/calibrated.lua.
 local grasp = require "experts.grasp"
 local known = require "calibrated"
+local soft_assets = require "soft_assets"
 local table_top = require "assets.table"
 
-local STANDARD = { "spiral_roll", "steamed_bun", "small_ridged_roll", "braided_roll", "sesame_bun" }
-
 local opt = softvt.options {
-  asset = { default = STANDARD, help = "assets to calibrate" },
+  asset = { default = soft_assets, help = "assets to calibrate" },
   step = { default = 0.02, min = 0.002, max = 0.2, help = "step of the closure" },
   trials = { default = 5, integer = true, min = 1, max = 100, help = "hold trials at each closure" },
   hold_s = { default = 2, unit = "s", min = 0.1, max = 60, help = "how long a trial holds" },
@@ -125,7 +124,7 @@ local function squeeze(sim, name, closure)
     local seen = sim:watch "object"
     local touching = math.min(table.unpack(seen.pad_force)) > TOUCH_N
     if quiet == 0 then row.min_det_f, row.node_speed_m_s, row.both_pads = math.huge, 0, true end
-    row.min_det_f = math.min(row.min_det_f, seen.min_det_f)
+    row.min_det_f = math.min(row.min_det_f, seen.min_det_f or 1)
     row.node_speed_m_s = math.max(row.node_speed_m_s, seen.speed)
     row.both_pads = row.both_pads and touching
     quiet = seen.speed < QUIET_SPEED and quiet + 0.05 or 0

@@ -4,22 +4,22 @@
 --   softvt scripts/imprints.lua
 --   softvt scripts/imprints.lua --asset my_pastry --write my_imprint.png
 local grasp = require "experts.grasp"
+local soft_assets = require "soft_assets"
 local table_top = require "assets.table"
 
-local STANDARD = { "spiral_roll", "steamed_bun", "small_ridged_roll", "braided_roll", "sesame_bun" }
-
 local opt = softvt.options {
-  asset = { default = STANDARD, help = "soft assets to grasp" },
+  asset = { default = soft_assets, help = "soft assets to grasp" },
   lift_mm = { default = 60, unit = "mm", min = 0, max = 200, help = "height of the lift" },
   write = { default = "docs/pictures/imprints.png", help = "the picture to write" },
+  columns = { default = 2, integer = true, min = 1, max = 6, help = "assets side by side" },
 }
 
 local assets = {}
 for _, name in ipairs(opt.asset) do assets[name] = require("assets." .. name) end
 
 local WORDS, GROUND = { 40, 44, 50 }, { 244, 243, 240 }
-local LABEL, GAP = 34, 6  -- pixels
-local WIDTH, HEIGHT = 320, 240
+local LABEL, GAP = 28, 6  -- pixels
+local WIDTH, HEIGHT = 240, 180
 
 local function alone(name)
   return softvt.layout("imprint_" .. name, function(scene)
@@ -73,16 +73,19 @@ return softvt.experiment {
     return rows
   end,
   finish = function()
-    local row = HEIGHT + LABEL
-    local panel = softvt.image { width = 4 * WIDTH + 3 * GAP, height = #opt.asset * row, colour = GROUND }
+    local columns = math.min(opt.columns, #opt.asset)
+    local group, row = 4 * (WIDTH + GAP) + 3 * GAP, HEIGHT + LABEL
+    local rows = (#opt.asset + columns - 1) // columns
+    local panel = softvt.image { width = columns * group - 4 * GAP, height = rows * row, colour = GROUND }
     for index, name in ipairs(opt.asset) do
-      local sim, y = held(name), (index - 1) * row
+      local sim = held(name)
+      local x, y = (index - 1) % columns * group, (index - 1) // columns * row
       local left, right = sim:feel "left", sim:feel "right"
       for column, picture in ipairs { left.picture, left.dots, left.arrows, right.arrows } do
-        panel:paste(picture, (column - 1) * (WIDTH + GAP), y)
+        panel:paste(picture:resize(WIDTH, HEIGHT), x + (column - 1) * (WIDTH + GAP), y)
       end
       local words = ("%s: left, its markers, their motion; right, its motion. %.2f N"):format(name:gsub("_", " "), -left.force[3])
-      panel:text(words, { at = { 10, y + HEIGHT + 23 }, size = 19, colour = WORDS })
+      panel:text(words, { at = { x + 8, y + HEIGHT + 19 }, size = 16, colour = WORDS })
     end
     return { files = { [opt.write] = panel } }
   end,

@@ -80,13 +80,44 @@ function material.floured(look, o)
   return look
 end
 
+-- Foam rubber: one colour, matt, full of fine cells.
+function material.foam(o)
+  local base, seed = o.base or { 0.10, 0.33, 0.60 }, o.seed or 1
+  local deep = { base[1] * 0.62, base[2] * 0.62, base[3] * 0.62 }
+  local worn = { 0.75 * base[1] + 0.2, 0.75 * base[2] + 0.2, 0.75 * base[3] + 0.2 }
+  return {
+    albedo = base, roughness = 0.85,
+    layers = {
+      layer(mask.noise { size_m = 16 * mm, octaves = 3, from = 0.4, to = 0.8, seed = seed }, worn, 0.88, 0.12),
+      layer(mask.specks { spacing_m = 2.2 * mm, radius_m = 0.55 * mm, seed = seed + 1 }, deep, 0.95, 0.75, -0.18 * mm),
+      layer(mask.specks { spacing_m = 3.7 * mm, radius_m = 0.8 * mm, seed = seed + 2 }, deep, 0.95, 0.6, -0.22 * mm),
+      pores(1.6 * mm, 0.10 * mm, seed + 3, base),
+    },
+  }
+end
+
+-- Cast silicone: one colour, satin, with a faint orange peel and finger marks.
+function material.silicone(o)
+  local base, seed = o.base or { 0.78, 0.45, 0.05 }, o.seed or 1
+  local pale = { 0.9 * base[1] + 0.09, 0.9 * base[2] + 0.09, 0.9 * base[3] + 0.09 }
+  local deep = { base[1] * 0.85, base[2] * 0.85, base[3] * 0.85 }
+  return {
+    albedo = base, roughness = 0.38,
+    layers = {
+      layer(mask.noise { size_m = 22 * mm, octaves = 3, from = 0.45, to = 0.8, seed = seed }, pale, 0.46, 0.4),
+      layer(mask.noise { size_m = 9 * mm, octaves = 3, from = 0.5, to = 0.85, seed = seed + 1 }, deep, 0.34, 0.4),
+      pores(1.6 * mm, 0.06 * mm, seed + 3, base),
+    },
+  }
+end
+
 -- Glazed stoneware.
 function material.ceramic(o)
   local base, seed = o.base or { 0.78, 0.77, 0.73 }, o.seed or 1
   return {
     albedo = base, roughness = o.roughness or 0.24,
     layers = {
-      layer(mask.noise { size_m = 40 * mm, octaves = 4, from = 0.4, to = 0.8, seed = seed }, { 0.70, 0.67, 0.60 }, 0.28, 0.4),
+      layer(mask.noise { size_m = 40 * mm, octaves = 4, from = 0.4, to = 0.8, seed = seed }, o.shade or { 0.70, 0.67, 0.60 }, 0.28, 0.4),
     },
   }
 end
@@ -103,6 +134,14 @@ function material.wood(o)
       layer(mask.noise { size_m = { 0.07, 3 * mm, 3 * mm }, octaves = 2, from = 0.5, to = 0.95, seed = seed + 2 }, dark, 0.60, 0.4),
       layer(mask.seams { length_m = length, width_m = width, gap_m = 1.4 * mm }, { 0.05, 0.027, 0.014 }, 0.8, 0.85),
     },
+  }
+end
+
+-- The boards of the room's floor: dark, wide and long.
+function material.floorboards()
+  return material.wood {
+    base = { 0.150, 0.120, 0.095 }, dark = { 0.075, 0.058, 0.046 }, light = { 0.20, 0.165, 0.13 },
+    length_m = 1.6, width_m = 0.19, seed = 21,
   }
 end
 

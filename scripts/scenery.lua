@@ -13,10 +13,7 @@ end
 
 -- A board floor whose top is its origin; darker where something stands close above it (`under`, a shape).
 local function floor(under)
-  local look = material.wood {
-    base = { 0.150, 0.120, 0.095 }, dark = { 0.075, 0.058, 0.046 }, light = { 0.20, 0.165, 0.13 },
-    length_m = 1.6, width_m = 0.19, seed = 21,
-  }
+  local look = material.floorboards()
   if under then
     table.insert(look.layers, {
       mask = mask.inside { shape = under, soft_m = 0.9 }, albedo = { 0.035, 0.028, 0.022 }, roughness = 0.7, opacity = 0.8,
@@ -24,7 +21,7 @@ local function floor(under)
   end
   return seen("floor", box { size = { 5, 5, 0.02 } }:translate(0, 0, -10 * mm), look)
 end
-local plain_floor, shaded_floor = floor(), floor(box { size = { 1.5, 1.5, 1 } }:translate(-0.85, 0, 0))
+local shaded_floor = floor(box { size = { 1.5, 1.5, 1 } }:translate(-0.85, 0, 0))
 
 local groove = { mask = mask.stripes { axis = "y", pitch_m = 0.16, share = 0.05 }, albedo = { 0.075, 0.095, 0.095 }, roughness = 0.8, opacity = 0.9 }
 local wall = seen(
@@ -59,24 +56,24 @@ local function stand(height)
   return seen("robot_stand", shape, { albedo = { 0.10, 0.105, 0.11 }, roughness = 0.42, metalness = 0.4 })
 end
 
-local function room(scene, floor_z, ground)
-  scene:add { name = "floor", asset = ground, xyz = { 0.75, 0, floor_z } }
+local function walls(scene, floor_z)
   scene:add { name = "wall", asset = wall, xyz = { -1.75, 0, floor_z } }
   scene:add { name = "skirting", asset = skirting, xyz = { -1.75, 0, floor_z } }
   scene:add { name = "side_wall", asset = wall, xyz = { 0.75, 2.5, floor_z }, yaw = -math.pi / 2 }
   scene:add { name = "side_skirting", asset = skirting, xyz = { 0.75, 2.5, floor_z }, yaw = -math.pi / 2 }
 end
 
--- A room around a scene whose support is its floor, z = 0: walls behind the robot and on the side away from the light. What
--- things stand on there must be the scene's own; this floor lies just beneath.
+-- A room around a scene whose support is its floor, z = 0: walls behind the robot and on the side away from the light. The
+-- floor is the scene's own: assets/floor.lua.
 function scenery.floor_room(scene)
-  room(scene, -1 * mm, plain_floor)
+  walls(scene, 0)
 end
 
 -- A room around a scene whose support is a table with its top at z = 0, the robot beside it on a stand.
 function scenery.table_room(scene)
   local floor_z = -HIGH - 0.05
-  room(scene, floor_z, shaded_floor)
+  scene:add { name = "floor", asset = shaded_floor, xyz = { 0.75, 0, floor_z } }
+  walls(scene, floor_z)
   scene:add { name = "table_frame", asset = frame, xyz = { 0, 0, floor_z } }
   local base = scene.base
   scene:add { name = "robot_stand", asset = stand(base[3] - floor_z), xyz = { base[1], base[2], floor_z } }

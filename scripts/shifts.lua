@@ -1,4 +1,4 @@
--- Changes of a scene that a suite may declare: factors on the material of every object that has it.
+-- Changes of a scene that a suite may declare: factors on the material of every object that has it, and on the light.
 
 local function factor(name, keys, min, max)
   return softvt.shift {
@@ -14,9 +14,23 @@ local function factor(name, keys, min, max)
   }
 end
 
-return {
+local shifts = {
   stiffness = factor("stiffness", { "youngs_pa" }, 0.01, 100),
   mass = factor("mass", { "density" }, 0.01, 100),
   -- Of two surfaces the larger coefficient counts: that of the pads is a setting, robot.pads.
   friction = factor("friction", { "static_mu", "dynamic_mu" }, 0, 10),
+  light = softvt.shift {
+    name = "light", unit = "1", default = 1, min = 0.01, max = 20,
+    apply = function(scene, value)
+      scene.light.strength = scene.light.strength * value
+      scene.light.sky_strength = scene.light.sky_strength * value
+      return scene
+    end,
+  },
 }
+
+-- What suites of soft and of rigid objects declare.
+shifts.soft = { shifts.mass, shifts.stiffness, shifts.light, shifts.friction }
+shifts.rigid = { shifts.mass, shifts.light, shifts.friction }
+
+return shifts

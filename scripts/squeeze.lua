@@ -119,7 +119,7 @@ local function run(point, o)
     if not ok then break end
     local d = body:deformation().rms_pct
     local force = 0.5 * (body:force(scene.pads[1].solid) + body:force(scene.pads[2].solid))
-    peak, least = math.max(peak, d), math.min(least, body:min_det_f())
+    peak, least = math.max(peak, d), math.min(least, body:min_det_f() or 1)
     local height = body:centre()[3]
     if time <= lift_at and time > lift_at - GRIP_WINDOW_S then look(grip, time, d, force, height) end
     if time > finish - HOLD_WINDOW_S then look(hold, time, d, force, height) end

@@ -30,5 +30,5 @@ return softvt.suite {
   variation = "spatial",
   episodes = 5,
   tasks = tasks,
-  shifts = { shifts.mass, shifts.stiffness, shifts.friction },
+  shifts = shifts.soft,
 }

@@ -6,21 +6,34 @@ use softvt::{
     benchmark::{Plan, seed::Split},
     geometry::{
         Pose, Vec3,
+        mass::mass_properties,
         samples::{SampleSpec, surface_samples},
         voxelise::{VoxelSpec, voxel_mesh},
     },
     rollout::{RestCache, Simulation},
-    scene::{Asset, Body, Scene},
+    scene::{Asset, Body, Mask, Scene},
     script::{self, Episode, EpisodeRequest, Loaded},
 };
 
 /// Length, width, height as it lies, mm; Young's modulus, kPa; Poisson's ratio; density, kg/m³.
-const PASTRIES: [(&str, [f64; 3], f64, f64, f64); 5] = [
+const SOFT: [(&str, [f64; 3], f64, f64, f64); 17] = [
     ("spiral_roll", [58.0, 47.0, 40.0], 60.0, 0.35, 240.0),
     ("steamed_bun", [66.0, 62.0, 44.0], 25.0, 0.30, 180.0),
+    ("twisted_stick", [120.0, 31.0, 28.0], 75.0, 0.36, 280.0),
+    ("long_roll", [120.0, 44.0, 38.0], 35.0, 0.32, 200.0),
     ("small_ridged_roll", [62.0, 44.0, 34.0], 110.0, 0.38, 320.0),
     ("sesame_bun", [64.0, 62.0, 42.0], 45.0, 0.34, 220.0),
+    ("croissant", [95.0, 46.0, 36.0], 160.0, 0.36, 260.0),
+    ("curved_layered", [88.0, 60.0, 36.0], 130.0, 0.38, 340.0),
     ("braided_roll", [110.0, 48.0, 38.0], 90.0, 0.37, 300.0),
+    ("golden_bun", [60.0, 60.0, 42.0], 220.0, 0.36, 380.0),
+    ("oval_loaf", [84.0, 59.0, 44.0], 180.0, 0.37, 350.0),
+    ("yellow_roll", [70.0, 50.0, 46.0], 55.0, 0.34, 230.0),
+    ("cube", [56.0, 56.0, 56.0], 40.0, 0.40, 200.0),
+    ("cylinder", [53.0, 53.0, 60.0], 50.0, 0.40, 200.0),
+    ("wedge", [64.0, 50.0, 40.0], 50.0, 0.40, 220.0),
+    ("capsule", [78.0, 44.0, 44.0], 30.0, 0.40, 200.0),
+    ("sphere", [57.0, 57.0, 57.0], 60.0, 0.40, 200.0),
 ];
 /// A recipe may differ from its table by this, m.
 const NEAR: f64 = 0.5e-3;
@@ -31,8 +44,9 @@ fn suite() -> Loaded {
 }
 
 fn scene(loaded: &Loaded, task: usize, episode: u64) -> Scene {
+    let Plan::Suite(suite) = &loaded.plan else { panic!("{:?}", loaded.plan) };
     let request = EpisodeRequest {
-        suite: "spatial_soft".into(),
+        suite: suite.name.clone(),
         task,
         episode,
         base_seed: 0,
@@ -42,17 +56,21 @@ fn scene(loaded: &Loaded, task: usize, episode: u64) -> Scene {
     Episode::open(loaded, &request).unwrap_or_else(|e| panic!("{e}")).scene
 }
 
-/// All assets of the suite by name.
-fn assets() -> BTreeMap<String, Arc<Asset>> {
-    let loaded = suite();
-    let objects = (0..5).flat_map(|pair| scene(&loaded, 2 * pair, 0).objects);
+/// Assets by name, and the table that each stands on.
+fn assets(names: &[&str]) -> BTreeMap<String, Arc<Asset>> {
+    let alone: Vec<&[&str]> = names.iter().map(std::slice::from_ref).collect();
+    let objects = stacks(&alone).into_iter().flat_map(|scene| scene.objects);
     objects.map(|object| (object.asset.name.clone(), object.asset)).collect()
+}
+
+fn soft_assets() -> BTreeMap<String, Arc<Asset>> {
+    assets(&SOFT.each_ref().map(|(name, ..)| *name))
 }
 
 #[test]
 fn every_recipe_has_the_size_and_material_of_the_table_and_stands_on_zero() {
-    let assets = assets();
-    for (name, size_mm, youngs_kpa, poisson, density) in PASTRIES {
+    let assets = soft_assets();
+    for (name, size_mm, youngs_kpa, poisson, density) in SOFT {
         let asset = &assets[name];
         let bounds = asset.shape.bounds();
         let off = bounds.size() - Vec3::from(size_mm) * 1e-3;
@@ -67,14 +85,12 @@ fn every_recipe_has_the_size_and_material_of_the_table_and_stands_on_zero() {
         );
         assert_eq!((asset.friction.static_mu, asset.friction.dynamic_mu), (0.6, 0.5), "{name}");
     }
-    let plate = assets["plate"].shape.bounds();
-    assert!((plate.size() - Vec3::new(0.138, 0.138, 0.019)).amax() < NEAR, "{:?}", plate.size());
     assert!(assets["table"].shape.bounds().max.z.abs() < 1e-12);
 }
 
 #[test]
 fn a_plate_is_as_high_as_its_hint_where_objects_rest() {
-    let plate = &assets()["plate"];
+    let plate = &assets(&["plate"])["plate"];
     let hint = plate.hints["surface_m"];
     for r in [0.0, 0.02, 0.04, 0.055] {
         let down = plate.shape.ray(&Vec3::new(r, 0.0, 0.1), &-Vec3::z(), 0.2).expect("a plate has no hole");
@@ -84,8 +100,8 @@ fn a_plate_is_as_high_as_its_hint_where_objects_rest() {
 
 #[test]
 fn every_recipe_has_a_voxel_mesh_and_samples_all_around() {
-    let assets = assets();
-    for (name, ..) in PASTRIES {
+    let assets = soft_assets();
+    for (name, ..) in SOFT {
         let asset = &assets[name];
         let Body::Soft(soft) = &asset.body else { panic!("{name} is not soft") };
         let mesh = voxel_mesh(&asset.shape, &VoxelSpec { resolution: soft.resolution }).expect(name);
@@ -178,4 +194,160 @@ fn left_and_right_are_those_of_the_image_and_prompts_name_the_goal() {
         assert!(task.prompt.starts_with(&format!("pick up the {object} ")), "{}", task.prompt);
         assert_eq!(target, "plate");
     }
+}
+
+/// Size as it stands, mm, and mass, g (100 kg/m³ of the box around it, as LIBERO has it).
+const RIGID: [(&str, [f64; 3], f64); 15] = [
+    ("alphabet_soup", [62.0, 62.0, 76.0], 29.2),
+    ("basket", [170.0, 157.0, 142.0], 379.0),
+    ("bbq_sauce", [47.0, 29.0, 107.0], 14.6),
+    ("black_bowl", [107.0, 107.0, 51.0], 58.4),
+    ("butter", [76.0, 40.0, 17.0], 5.2),
+    ("chocolate_pudding", [80.0, 46.0, 27.0], 9.9),
+    ("cookies", [62.0, 83.0, 19.0], 9.8),
+    ("cream_cheese", [81.0, 43.0, 18.0], 6.3),
+    ("ketchup", [56.0, 37.0, 146.0], 30.3),
+    ("milk", [53.0, 53.0, 131.0], 36.8),
+    ("orange_juice", [53.0, 53.0, 131.0], 36.8),
+    ("plate", [138.0, 138.0, 19.0], 36.2),
+    ("ramekin", [89.0, 89.0, 42.0], 33.3),
+    ("salad_dressing", [53.0, 36.0, 146.0], 27.9),
+    ("tomato_sauce", [62.0, 62.0, 76.0], 29.2),
+];
+/// What is printed on packages.
+const PACKAGES: [&str; 11] = [
+    "alphabet_soup",
+    "bbq_sauce",
+    "butter",
+    "chocolate_pudding",
+    "cookies",
+    "cream_cheese",
+    "ketchup",
+    "milk",
+    "orange_juice",
+    "salad_dressing",
+    "tomato_sauce",
+];
+
+/// A task for each stack of assets: on the table one on the other, or on the floor if it is the lowest.
+fn stacks(stacks: &[&[&str]]) -> Vec<Scene> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let list: Vec<String> =
+        stacks.iter().map(|names| format!("{{ \"{}\" }}", names.join("\", \""))).collect();
+    let text = format!(
+        "local tasks = {{}}
+        for _, names in ipairs {{ {} }} do
+          local layout = softvt.layout(table.concat(names, \"_\"), function(scene)
+            scene:add {{ name = \"table\", asset = require \"assets.table\", xyz = {{ 0, 0, 0 }} }}
+            for i, name in ipairs(names) do
+              local on = i > 1 and names[i - 1] or nil
+              scene:add {{ name = name, asset = require(\"assets.\" .. name), at = {{ 0.05, 0.02 }}, yaw = 0.3 * i, on = on }}
+            end
+          end)
+          local goal = softvt.on {{ object = names[1], target = \"table\" }}
+          tasks[#tasks + 1] = softvt.task {{ prompt = table.concat(names, \" under \"), layout = layout, goal = goal }}
+        end
+        return softvt.suite {{ name = \"stacks\", object_type = \"rigid\", variation = \"object\", tasks = tasks }}",
+        list.join(", ")
+    );
+    let path = folder.path().join("stacks.lua");
+    std::fs::write(&path, text).expect("is written");
+    let loaded = script::load(&path, &[]).unwrap_or_else(|e| panic!("{e}"));
+    (0..stacks.len()).map(|task| scene(&loaded, task, 0)).collect()
+}
+
+fn rigid_assets() -> Vec<Arc<Asset>> {
+    let scenes = stacks(&RIGID.each_ref().map(|(name, ..)| std::slice::from_ref(name)));
+    scenes.into_iter().map(|scene| scene.objects[1].asset.clone()).collect()
+}
+
+#[test]
+fn every_rigid_recipe_has_its_size_and_mass_and_stands_on_zero() {
+    for (asset, (name, size_mm, grams)) in rigid_assets().iter().zip(RIGID) {
+        let bounds = asset.shape.bounds();
+        assert!((bounds.size() - Vec3::from(size_mm) * 1e-3).amax() < NEAR, "{name}: {:?}", bounds.size());
+        assert!(bounds.min.z.abs() < NEAR, "{name}: lowest at {} m", bounds.min.z);
+        assert!(bounds.centre().xy().amax() < NEAR, "{name}: centre at {:?}", bounds.centre());
+        let Body::Rigid { density } = asset.body else { panic!("{name} is not rigid") };
+        let mass = 1e3 * mass_properties(&asset.shape, density).mass;
+        assert!((mass / grams - 1.0).abs() < 0.03, "{name}: {mass} g for {grams} g");
+        assert_eq!((asset.friction.static_mu, asset.friction.dynamic_mu), (0.6, 0.5), "{name}");
+    }
+}
+
+#[test]
+fn packages_say_what_they_are() {
+    fn read(mask: &Mask, words: &mut Vec<String>) {
+        match mask {
+            Mask::Text { print } => words.push(print.line.text.to_lowercase()),
+            Mask::Both { masks } => masks.iter().for_each(|mask| read(mask, words)),
+            Mask::Inverse { mask } => read(mask, words),
+            _ => {}
+        }
+    }
+    for asset in rigid_assets().iter().filter(|asset| PACKAGES.contains(&asset.name.as_str())) {
+        let mut words = Vec::new();
+        let layers = asset.visuals.iter().flat_map(|visual| &visual.layers);
+        layers.for_each(|layer| read(&layer.mask, &mut words));
+        // A part of the name in large letters, or all of it on several lines.
+        let said = asset.name.split('_').filter(|part| words.iter().any(|word| word.contains(part))).count();
+        assert!(said > 0, "{}: {words:?}", asset.name);
+    }
+}
+
+#[test]
+fn bowl_basket_and_ramekin_are_hollow_and_their_walls_thick_enough() {
+    let assets = rigid_assets();
+    let of = |name: &str| assets.iter().find(|asset| asset.name == name).expect("is there");
+    for (name, at, inside) in [("black_bowl", 0.04, 0.04), ("basket", 0.05, 0.06), ("ramekin", 0.03, 0.036)] {
+        let shape = &of(name).shape;
+        assert!(shape.distance(&Vec3::new(0.0, 0.0, at)) > 0.02, "{name} is hollow");
+        for turn in [0.0_f64, 0.4, 0.8, 1.3, 2.0, 4.0] {
+            let way = Vec3::new(turn.cos(), turn.sin(), 0.0);
+            let from = Vec3::z() * at;
+            let inner = shape.ray(&from, &way, 0.2).expect("a wall");
+            assert!(inner > inside, "{name}: {inner} m from the middle");
+            let outer = shape.ray(&(from + way * 0.2), &-way, 0.2).expect("a wall");
+            assert!(0.2 - outer - inner > 4e-3 * 0.95, "{name}: a wall of {} m", 0.2 - outer - inner);
+        }
+    }
+}
+
+#[test]
+fn rigid_things_stand_still_alone_and_stacked() {
+    let alone = RIGID.each_ref().map(|(name, ..)| std::slice::from_ref(name));
+    let mut all: Vec<&[&str]> = alone.to_vec();
+    all.extend([["ramekin", "black_bowl"].as_slice(), &["cookies", "black_bowl"], &["plate", "black_bowl"]]);
+    for (scene, names) in stacks(&all).into_iter().zip(all) {
+        let upright: Vec<f64> = scene.objects.iter().map(|object| object.pose_w.translation.z).collect();
+        let mut sim =
+            Simulation::new(Arc::new(scene), &Default::default(), &Default::default(), &RestCache::default())
+                .expect("builds");
+        sim.settle().unwrap_or_else(|e| panic!("{names:?}: {e}"));
+        let settled: Vec<Pose> = sim.objects.iter().map(|object| sim.pose(object)).collect();
+        for _ in 0..120 {
+            sim.step().unwrap_or_else(|e| panic!("{names:?}: {e}"));
+        }
+        for ((object, before), start) in sim.objects.iter().zip(&settled).zip(upright) {
+            let after = sim.pose(object);
+            let moved = (after.translation.vector - before.translation.vector).norm();
+            let turned = after.rotation.angle_to(&before.rotation);
+            assert!(
+                moved < 5e-5 && turned < 1e-3,
+                "{names:?}: {} moved {moved} m, {turned} rad",
+                object.name
+            );
+            // A bowl sinks into a ramekin and a plate's well; nothing else changes its height.
+            let sunk = start - after.translation.z;
+            let limit = if ["ramekin", "plate"].contains(&names[0]) { 0.014 } else { 5e-4 };
+            assert!((-1e-4..limit).contains(&sunk), "{names:?}: {} sank by {sunk} m", object.name);
+            assert!((after.rotation * Vec3::z()).z > 0.9999, "{names:?}: {} leans", object.name);
+        }
+    }
+}
+
+#[test]
+fn the_floor_never_moves_and_its_top_is_zero() {
+    let floor = stacks(&[&["floor"]]).remove(0).objects.remove(1).asset;
+    assert!(floor.shape.bounds().max.z.abs() < 1e-12 && floor.body == Body::Static);
 }

@@ -1,6 +1,10 @@
 //! The section on rigid and articulated bodies.
 
-use super::{Report, header, heading, jointed, percent, rigid, row, short};
+use crate::{
+    jointed,
+    page::{Report, header, heading, percent, row, short},
+    rigid,
+};
 
 /// Free rigid bodies.
 pub fn rigid(report: &mut Report) {

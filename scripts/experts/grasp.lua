@@ -1,12 +1,19 @@
--- How to take hold of an object that lies on something: across its narrow side, from above, with a known closure.
+-- How to take hold of an object from above, with a known closure: across its narrow side, or by its rim, wherever the hand
+-- has room among its neighbours.
 local calibrated = require "calibrated"
 
 local grasp = {}
 
--- The sensors' cases reach 16 mm below the tool centre point; this leaves room over the table and over a plate's rim.
-local LOWEST = 0.0225
 -- Full stroke of the gripper, m.
 local STROKE = 0.08
+-- The sensors' cases reach this far below the tool centre point, m.
+local CASE = 0.016
+-- Room to leave under the cases and beside the fingers, m.
+local UNDER, BESIDE = 0.0015, 0.004
+-- Turns away from the best line that are tried for room: 15° steps.
+local STEP = math.rad(15)
+-- How much a gripper squeezes what is rigid, m of width that its fingers would still close.
+local SQUEEZE = 0.012
 
 -- The nearest of the two turns of a two-fingered hand that close along the same line.
 local function nearest(yaw)
@@ -25,24 +32,78 @@ function grasp.pose(object, height, offset, turn)
   return softvt.pose { xyz = { x, y, bottom + height }, yaw = nearest(yaw) }
 end
 
--- Height of the tool centre point over an object's lowest point when it grasps: half way up, or as low as cases allow.
+-- Height of the tool centre point over an object's lowest point when it grasps: half way up, or as low as cases allow on
+-- what the object stands on.
 function grasp.height(object)
-  return object.hints.grasp_height_m or math.max(LOWEST, object.size[3] / 2)
+  return object.hints.grasp_height_m or math.max(CASE + UNDER, object.size[3] / 2)
 end
 
--- The width across which the fingers close, m.
-function grasp.width(object) return math.min(object.size[1], object.size[2]) end
+-- The width across which the fingers close, m, where they take it.
+function grasp.width(object)
+  return object.hints.grasp_width_m or math.min(object.size[1], object.size[2])
+end
 
--- How far to close: between what just holds and what deforms too much; without a calibration, a tenth of the width.
+-- How far to close: between what just holds and what deforms too much; without a calibration, a squeeze of what is rigid.
 function grasp.closure(object)
   local known = calibrated[object.asset]
   if known then return known.lower + 0.5 * (known.at_tau - known.lower) end
-  return 1 - 0.9 * grasp.width(object) / STROKE
+  return math.min(1, 1 - (grasp.width(object) - SQUEEZE) / STROKE)
 end
 
--- The closure at which the gels are 4 mm away from the object on either side, to approach and to let go.
-function grasp.clear(object)
-  return math.max(0, 1 - (grasp.width(object) + 0.008) / STROKE)
+-- The closure at which the gels are `room` (m, 4 mm) away from the object on either side, to approach and to let go.
+function grasp.clear(object, room)
+  return math.max(0, 1 - (grasp.width(object) + 2 * (room or 0.004)) / STROKE)
+end
+
+-- Turns of the hand to try, the best first: about the narrow side, or all around what is round.
+local function turns(object)
+  local list = { 0 }
+  local long, short = math.max(object.size[1], object.size[2]), math.min(object.size[1], object.size[2])
+  -- Turned by more than this, a box would be wider than the fingers open.
+  local most = long < 1.1 * short and math.pi / 2 or math.rad(15)
+  for k = 1, math.floor(most / STEP + 1e-9) do
+    list[#list + 1], list[#list + 2] = k * STEP, -k * STEP
+  end
+  return list
+end
+
+-- Poses in which the object could be taken, the best first: { pose, cost }.
+local function candidates(object, height, offset)
+  local list, hints = {}, object.hints
+  if hints.grasp_rim_m then
+    local bottom = object.xyz[3] - object.size[3] / 2
+    for k = 0, 23 do
+      local angle = k * STEP
+      local x = object.xyz[1] + hints.grasp_rim_m * math.cos(angle)
+      local y = object.xyz[2] + hints.grasp_rim_m * math.sin(angle)
+      local yaw = nearest(angle - math.pi / 2)
+      for _, up in ipairs { 0, 0.003, 0.006 } do
+        list[#list + 1] = { softvt.pose { xyz = { x, y, bottom + height + up }, yaw = yaw }, math.abs(yaw) + 300 * up }
+      end
+    end
+  else
+    for _, turn in ipairs(turns(object)) do
+      list[#list + 1] = { grasp.pose(object, height, offset, turn), 2 * math.abs(turn) }
+    end
+  end
+  return list
+end
+
+-- The pose to take an object in and the closure to come down with: where the fingers have room, as wide open as it goes.
+-- The third result is the room that they have, m; negative if the hand would touch something.
+function grasp.choose(scene, object, height, offset)
+  local best
+  for _, opening in ipairs { 0, grasp.clear(object, 0.010), grasp.clear(object, 0.005) } do
+    for _, candidate in ipairs(candidates(object, height, offset)) do
+      local pose, cost = candidate[1], candidate[2]
+      local ignore = object.hints.grasp_rim_m and {} or { object.name }
+      local room = scene:clearance(pose, { width = STROKE * (1 - opening), ignore = ignore })
+      -- Room beyond what is needed is worth nothing.
+      local worth = math.min(room, BESIDE) * 1e3 - 0.1 * cost - opening
+      if not best or worth > best.worth then best = { pose = pose, closure = opening, room = room, worth = worth } end
+    end
+  end
+  return best.pose, best.closure, best.room
 end
 
 return grasp

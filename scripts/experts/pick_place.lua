@@ -2,14 +2,21 @@
 --
 --   expert = pick_place { object = "left", target = "plate" }
 local grasp = require "experts.grasp"
+local route = require "experts.route"
 
--- Clearance over everything while carrying, and over the target when letting go, m.
-local CARRY, DROP = 0.12, 0.001
-local DEFAULTS = { object = false, target = false, closure = false, speed = 0.4 }
+local FIELDS = { object = true, target = true, closure = true, speed = true }
+-- Clearance over everything while carrying, over the target when letting go, and beside the fingers there, m.
+local OVER, DROP, BESIDE = 0.025, 0.001, 0.002
+-- An object that has not come along by this much of a lift is not held.
+local HELD = 0.5
+-- Attempts at taking hold.
+local TRIES = 3
+-- Spread of speeds, and of the grasp along the fingers' line and across it, so that no two demonstrations are alike.
+local PACE, MISS = 0.12, 0.0015
 
 local function checked(spec)
   for key in pairs(spec) do
-    if DEFAULTS[key] == nil then error("pick_place: unknown field " .. tostring(key), 3) end
+    if not FIELDS[key] then error("pick_place: unknown field " .. tostring(key), 3) end
   end
   if type(spec.object) ~= "string" or type(spec.target) ~= "string" then
     error("pick_place: object and target must name objects of the scene", 3)
@@ -17,40 +24,88 @@ local function checked(spec)
   return spec
 end
 
+local function spread(most) return (2 * math.random() - 1) * most end
+
+local function bottom(object) return object.xyz[3] - object.size[3] / 2 end
+
+-- Takes the object and lifts it off what it stands on; whether it came along.
+local function take(arm, scene, spec, pace)
+  local object = scene:object(spec.object)
+  local height = grasp.height(object)
+  local at, opening, room = grasp.choose(scene, object, height, { spread(MISS), spread(MISS) })
+  if room < 0 then return false end
+  local over = math.max(at.z + 0.06, route.height(scene, arm.pose.xyz, at.xyz, nil, OVER))
+  arm:move_to(arm.target:at { arm.target.x, arm.target.y, math.max(over, arm.target.z) }, { speed = 0.4 * pace })
+  arm:move_to(at:at { at.x, at.y, over }, { speed = 0.4 * pace, closure = opening })
+  arm:move_to(at, { speed = 0.25 * pace, closure = opening })
+  arm:wait(0.1)
+  local before = scene:object(spec.object).xyz[3]
+  arm:grasp(spec.closure or grasp.closure(object), { rate = 0.6 })
+  arm:wait(0.3)
+  -- Straight up before going anywhere.
+  arm:move_by({ 0, 0, 0.05 }, { speed = 0.2 * pace })
+  return scene:object(spec.object).xyz[3] - before > HELD * 0.05, height
+end
+
+-- Turns of the hand for putting down, the nearest first.
+local function turns(object, target)
+  local list = { 0 }
+  for k = 1, 6 do list[#list + 1], list[#list + 2] = k * math.rad(15), -k * math.rad(15) end
+  -- What is long goes along the longer side of what it is put into.
+  local function lie(o) return o.yaw + (o.size[1] < o.size[2] and math.pi / 2 or 0) end
+  if target.hints.wall_m and math.max(object.size[1], object.size[2]) > 1.3 * math.min(object.size[1], object.size[2]) then
+    local turn = (lie(target) - lie(object)) % math.pi
+    table.insert(list, 1, turn > math.pi / 2 and turn - math.pi or turn)
+  end
+  return list
+end
+
+-- Where to let go: as low as the hand has room for, the object over the middle of the target.
+local function resting_pose(arm, scene, spec, height)
+  local object, target = scene:object(spec.object), scene:object(spec.target)
+  local surface = bottom(target) + (target.hints.surface_m or target.size[3]) + height + DROP
+  local width = 0.08 * (1 - grasp.clear(object))
+  -- The object may hang off the tool's axis; that offset turns with the hand.
+  local dx, dy = object.xyz[1] - arm.pose.x, object.xyz[2] - arm.pose.y
+  local best
+  for up = 0, 20 do
+    for _, turn in ipairs(turns(object, target)) do
+      local c, s = math.cos(turn), math.sin(turn)
+      local x, y = target.xyz[1] - (c * dx - s * dy), target.xyz[2] - (s * dx + c * dy)
+      local pose = arm.target:turned(turn):at { x, y, surface + 0.005 * up }
+      local room = scene:clearance(pose, { width = width, ignore = { spec.object } })
+      if not best or room > best.room then best = { pose = pose, room = room } end
+      if room >= BESIDE then return pose end
+    end
+  end
+  return best.pose
+end
+
+local function put(arm, scene, spec, height, pace)
+  local object = scene:object(spec.object)
+  local place = resting_pose(arm, scene, spec, height)
+  local carried = { object = object, below = height }
+  local over = math.max(place.z + 0.03, route.height(scene, arm.pose.xyz, place.xyz, carried, OVER))
+  arm:move_to(arm.target:at { arm.target.x, arm.target.y, math.max(over, arm.target.z) }, { speed = 0.25 * pace })
+  arm:move_to(place:at { place.x, place.y, over }, { speed = 0.4 * pace })
+  arm:move_to(place, { speed = 0.2 * pace })
+  arm:wait(0.2)
+  -- Only as wide as needed: a rim or a wall may be near.
+  arm:release { closure = grasp.clear(object), rate = 0.4 }
+  arm:wait(0.1)
+  arm:move_by({ 0, 0, math.max(0.08, over - place.z) }, { speed = 0.25 * pace })
+end
+
 return function(spec)
   checked(spec)
-  local speed = spec.speed or DEFAULTS.speed
-
   return function(arm, scene)
-    local object, target = scene:object(spec.object), scene:object(spec.target)
-    local height = grasp.height(object)
-    local closure = spec.closure or grasp.closure(object)
-    local at = grasp.pose(object, height)
-    local over = grasp.pose(object, CARRY)
-
-    -- Open as far as the neighbours allow and come straight down.
-    arm:move_to(over, { speed = speed })
-    arm:move_to(at, { speed = 0.25 })
-    arm:wait(0.1)
-    arm:grasp(closure, { rate = 0.6 })
-    arm:wait(0.3)
-
-    -- Straight up before going anywhere.
-    arm:move_to(over, { speed = 0.25 })
-    local held = scene:object(spec.object)
-    local surface = target.hints.surface_m or target.size[3]
-    local bottom = target.xyz[3] - target.size[3] / 2
-    local down = bottom + surface + height + DROP
-    -- The object may hang a little off the tool's axis; that offset goes with it.
-    local dx, dy = held.xyz[1] - arm.pose.x, held.xyz[2] - arm.pose.y
-    local place = softvt.pose { xyz = { target.xyz[1] - dx, target.xyz[2] - dy, down }, quat = arm.target.quat }
-    arm:move_to(place:moved { 0, 0, CARRY - height }, { speed = speed })
-    arm:move_to(place, { speed = 0.2 })
-    arm:wait(0.2)
-
-    -- Only as wide as needed: a plate's rim may be near.
-    arm:release { closure = grasp.clear(object), rate = 0.4 }
-    arm:wait(0.1)
-    arm:move_by({ 0, 0, 0.08 }, { speed = 0.25 })
+    local pace = (spec.speed or 1) * (1 + spread(PACE))
+    for _ = 1, TRIES do
+      local held, height = take(arm, scene, spec, pace)
+      if held then return put(arm, scene, spec, height, pace) end
+      -- Not forced: let go, rise, look again.
+      arm:open()
+      arm:move_by({ 0, 0, 0.08 }, { speed = 0.25 })
+    end
   end
 end

@@ -1,12 +1,13 @@
 -- Two instances of the same soft object left and right of a plate. Left and right are those of the third-person image:
 -- image right is +y of the world. Both tasks of a mirrored pair use one layout, so that they start from the same state.
+local arrange = require "layouts.arrange"
 local plate = require "assets.plate"
 local scenery = require "scenery"
 local table_top = require "assets.table"
 
 local mm = 1e-3
--- Spread of the start states: position, turn, arm joints (standard deviation).
-local REACH, TURN, JOINT = 20 * mm, math.rad(30), 0.02
+-- Spread of the start states: position, turn.
+local REACH, TURN = 20 * mm, math.rad(30)
 
 -- Where left, right and plate stand, x and y in mm. An open hand with its sensors needs 70 mm to either side of what it
 -- grasps, the spread takes 20 mm more, and a plate has a radius of 69 mm.
@@ -33,9 +34,7 @@ function layouts.pair(asset, k)
       scene:add { name = side, asset = recipe, at = at, yaw = rng:uniform(-TURN, TURN) }
     end
     scenery.table_room(scene)
-    local joints, noise = scene.start_q, rng:stream "arm"
-    for i = 1, #joints do joints[i] = joints[i] + noise:normal(0, JOINT) end
-    scene.start_q = joints
+    arrange.arm(scene, rng)
   end)
 end
 

@@ -13,7 +13,7 @@ local function smooth(u) return u * u * u * (10 + u * (6 * u - 15)) end
 
 -- Sends one command and comes back at the next control step, or with what is wrong with it.
 function Arm:command(pose, closure)
-  self.target, self.closure = check.pose(pose), check.number("arm:command: closure", closure, 0, 1)
+  self.target, self.closure = pose, closure
   local refusal = yield(self.target, self.closure, self.gripping)
   if refusal then check.refuse(refusal) end
 end
@@ -32,8 +32,7 @@ end
 -- Moves straight and smoothly; options: speed (m/s), turn (rad/s), closure to reach on the way.
 function Arm:move_to(pose, options)
   options = check.options("arm:move_to", options, { speed = 0.25, turn = 1.5, closure = self.closure })
-  check.number("arm:move_to: closure", options.closure, 0, 1)
-  travel(self, check.pose(pose), options, options.closure)
+  travel(self, pose, options, options.closure)
 end
 
 -- Moves by an offset in the world frame, m.
@@ -43,7 +42,6 @@ function Arm:move_by(offset, options) self:move_to(self.target:moved(offset), op
 function Arm:close_to(closure, options)
   options = check.options("arm:close_to", options, { rate = 0.5 })
   local start = self.closure
-  check.number("arm:close_to: closure", closure, 0, 1)
   local way = closure - start
   local steps = max(1, ceil((way < 0 and -way or way) / options.rate / host.dt))
   for step = 1, steps do self:command(self.target, start + way * step / steps) end
@@ -70,20 +68,35 @@ end
 
 -- Holds still for a time, s.
 function Arm:wait(seconds)
-  check.number("arm:wait: seconds", seconds, 0, 600)
   for _ = 1, ceil(seconds / host.dt - 1e-9) do self:command(self.target, self.closure) end
 end
 
 local measured = { pose = true, width = true, force = true, time = true, dt = true }
-local arm = setmetatable({}, {
+local own = { target = true, closure = true, gripping = true }
+local state, methods, arm = { target = host.pose, closure = host.closure, gripping = false }, {}, nil
+
+-- Methods see the state of the arm; scripts see the methods, which check what they are given.
+for name, method in pairs(Arm) do
+  methods[name] = function(self, ...)
+    if self ~= arm then check.no_self(name, self) end
+    return method(state, check.arguments(name, ...))
+  end
+end
+setmetatable(state, { __index = Arm })
+
+arm = setmetatable({}, {
   __index = function(_, key)
     if measured[key] then return host[key] end
-    local method = Arm[key]
-    if method == nil then check.unknown("arm", key) end
+    if own[key] then return state[key] end
+    local method = methods[key]
+    if method == nil then check.unknown(key) end
     return method
+  end,
+  __newindex = function(_, key)
+    if not (measured[key] or own[key] or methods[key]) then check.unknown(key) end
+    check.refuse("arm." .. key .. ": is only read; the methods of the arm change what it does")
   end,
   __tostring = function() return "softvt.Arm" end,
   __metatable = "softvt.Arm",
 })
-arm.target, arm.closure, arm.gripping = host.pose, host.closure, false
 return arm

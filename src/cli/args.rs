@@ -8,7 +8,10 @@ use clap::{
 };
 
 use super::{Failure, code};
-use crate::script::{self, OptionSpec, OptionValue};
+use crate::{
+    benchmark::Suite,
+    script::{self, OptionSpec, OptionValue},
+};
 
 /// Policies that need no server and no file.
 pub const POLICIES: [(&str, &str); 4] = [
@@ -34,7 +37,11 @@ pub enum Command {
     Init {
         /// The folder.
         dir: PathBuf,
+        /// With a suite to start from.
+        task: bool,
     },
+    /// Say what is wrong with a script, without running it.
+    Check(Run),
     /// Draw one episode.
     View(View),
     /// Check the installation.
@@ -62,6 +69,8 @@ pub struct Run {
     pub threads: usize,
     /// Shifts by name and value.
     pub shifts: Vec<(String, f64)>,
+    /// Whether soft objects are made rigid.
+    pub twin: bool,
     /// Settings by path and value.
     pub set: Vec<(String, String)>,
     /// Whether to write a trace, and whether with node positions.
@@ -72,6 +81,14 @@ pub struct Run {
     pub out: Option<PathBuf>,
     /// Print JSON instead of tables.
     pub json: bool,
+}
+
+impl Run {
+    /// A suite's name in results: that of a twin is its own, though its episodes start as the suite's do.
+    pub fn name_of(&self, suite: &Suite) -> String {
+        let twin = if self.twin { "_rigid_twin" } else { "" };
+        format!("{}{twin}", suite.name)
+    }
 }
 
 /// Which rollouts of a run become videos.
@@ -120,7 +137,11 @@ pub fn parse(words: &[String]) -> Result<Command, Failure> {
     };
     match matches.subcommand() {
         Some(("list", m)) => Ok(Command::List { what: text(m, "what"), json: m.get_flag("json") }),
-        Some(("init", m)) => Ok(Command::Init { dir: PathBuf::from(text(m, "dir")) }),
+        Some(("init", m)) => {
+            let task = m.subcommand_matches("task");
+            Ok(Command::Init { dir: PathBuf::from(text(task.unwrap_or(m), "dir")), task: task.is_some() })
+        }
+        Some(("check", m)) => common(m, &options).map(Command::Check).map_err(named),
         Some(("doctor", _)) => Ok(Command::Doctor),
         Some(("view", m)) => view(m, &options).map(Command::View).map_err(named),
         _ => run(&matches, &options).map(Command::Run).map_err(named),
@@ -177,6 +198,7 @@ fn command(options: &[OptionSpec]) -> Result<clap::Command, Failure> {
         }
         command = command
             .arg(script_arg(option, long.clone()))
+            .mut_subcommand("check", |check| check.arg(script_arg(option, long.clone())))
             .mut_subcommand("view", |view| view.arg(script_arg(option, long)));
     }
     Ok(command)
@@ -245,6 +267,11 @@ fn on_script(command: clap::Command) -> clap::Command {
                 .value_name("NAME=VALUE"),
         )
         .arg(
+            flag("twin", "Makes every soft object rigid: same shapes, masses and looks")
+                .value_name("KIND")
+                .value_parser(["rigid"]),
+        )
+        .arg(
             flag("set", "Changes a setting, such as robot.gripper.effort=20")
                 .value_name("PATH=VALUE")
                 .action(ArgAction::Append),
@@ -274,8 +301,17 @@ fn runner() -> clap::Command {
         .subcommand(
             clap::Command::new("init")
                 .about("Writes editor stubs for Lua scripts into a folder")
-                .arg(Arg::new("dir").default_value(".")),
+                .args_conflicts_with_subcommands(true)
+                .arg(Arg::new("dir").default_value("."))
+                .subcommand(
+                    clap::Command::new("task")
+                        .about("Writes a commented suite and its object to start from, too")
+                        .arg(Arg::new("dir").default_value(".")),
+                ),
         )
+        .subcommand(on_script(
+            clap::Command::new("check").about("Says what is wrong with a script, without running it"),
+        ))
         .subcommand(
             on_script(clap::Command::new("view").about("Draws one episode: a video and stills of every stream"))
                 .arg(flag("task", "The task: its index or part of its prompt").value_name("TASK").default_value("0"))
@@ -311,6 +347,10 @@ fn common(matches: &ArgMatches, options: &[OptionSpec]) -> Result<Run, Failure> 
             script_words.push(format!("{}={}", option.flag(), text(matches, &id)));
         }
     }
+    let out = matches.get_one::<String>("out");
+    if out.is_some_and(|dir| dir.trim().is_empty()) {
+        return Err(Failure::input("--out: expected a folder, got \"\"; \".\" is the one you are in"));
+    }
     Ok(Run {
         file: PathBuf::from(text(matches, "file")),
         script_words,
@@ -320,10 +360,11 @@ fn common(matches: &ArgMatches, options: &[OptionSpec]) -> Result<Run, Failure> 
         seed: matches.get_one("seed").copied().unwrap_or(0),
         threads: 1,
         shifts: many(matches, "shift").iter().map(|word| shift(word)).collect::<Result<_, _>>()?,
+        twin: matches.contains_id("twin"),
         set: many(matches, "set").iter().map(|word| pair("--set", word)).collect::<Result<_, _>>()?,
         trace: None,
         video: None,
-        out: matches.get_one::<String>("out").map(PathBuf::from),
+        out: out.map(PathBuf::from),
         json: false,
     })
 }

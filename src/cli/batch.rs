@@ -13,13 +13,8 @@ use super::{
 };
 use crate::{
     benchmark::{Suite, Task, seed::Split, settings::Settings},
-    evaluation::{
-        record::{EpisodeRecord, Identity},
-        safety::Limit,
-        summary::Summary,
-        thresholds::Thresholds,
-    },
-    policy::{Policy, builtin},
+    evaluation::{record::EpisodeRecord, safety::Limit, summary::Summary, thresholds::Thresholds},
+    policy::{Policy, Streams, builtin},
     report::{
         film::{self, Caption, FilmError},
         interchange::{self, DebugFrame, DebugShape},
@@ -27,7 +22,7 @@ use crate::{
     },
     rollout::{
         BuildError, ControlError, Controller, Episode, EpisodeError, EpisodeSpec, Finished, Looks, RestCache,
-        ScoreFrame, SettleError, batch, stop,
+        ScoreFrame, SenseError, Senses, Simulation, Which, batch, check_senses, stop, target_asset,
     },
     scene::{Asset, Body, Scene},
     script::{self, ExpertController, Loaded},
@@ -39,6 +34,8 @@ struct RunInfo<'a> {
     softvt: &'a str,
     script: String,
     suite: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    twin: Option<&'a str>,
     policy: &'a str,
     privileged: bool,
     seed: u64,
@@ -50,6 +47,17 @@ struct RunInfo<'a> {
     settings: &'a Settings,
     sources: BTreeMap<String, String>,
     thresholds: BTreeMap<String, Option<f64>>,
+    /// Whether the policy sees the true forces at the pads.
+    force_observed: bool,
+}
+
+/// Why a first look at a scene fails.
+#[derive(Debug, thiserror::Error)]
+enum Trial {
+    #[error(transparent)]
+    Build(#[from] BuildError),
+    #[error(transparent)]
+    Sense(#[from] SenseError),
 }
 
 /// One suite under way.
@@ -57,6 +65,8 @@ pub(super) struct Batch<'a> {
     run: &'a Run,
     loaded: &'a Loaded,
     suite: &'a Suite,
+    /// Name in results.
+    name: String,
     settings: Settings,
     jobs: Vec<(&'a Task, u32)>,
     limits: BTreeMap<String, Option<Limit>>,
@@ -67,6 +77,11 @@ pub(super) struct Batch<'a> {
     cache: RestCache,
     looks: Looks,
     pub out: PathBuf,
+    /// Whether rollouts are drawn.
+    pub films: bool,
+    /// Whether whoever drives sees the true forces at the pads.
+    force_observed: bool,
+    drive: Drive,
 }
 
 impl<'a> Batch<'a> {
@@ -90,6 +105,7 @@ impl<'a> Batch<'a> {
             run,
             loaded,
             suite,
+            name: run.name_of(suite),
             settings,
             jobs,
             limits: BTreeMap::new(),
@@ -98,7 +114,20 @@ impl<'a> Batch<'a> {
             cache: RestCache::default(),
             looks: Looks::default(),
             out,
+            films: run.video.is_some(),
+            force_observed: false,
+            drive: driver,
         })
+    }
+
+    /// An episode as its layout, the shifts and the run make it.
+    fn open(&self, task: &Task, episode: u32) -> Result<script::Episode, Failure> {
+        let mut opened =
+            script::Episode::open(self.loaded, &self.request(task, episode)).map_err(Failure::input)?;
+        if self.run.twin {
+            (opened.scene, opened.nominal) = (opened.scene.rigid_twin(), opened.nominal.rigid_twin());
+        }
+        Ok(opened)
     }
 
     fn request(&self, task: &Task, episode: u32) -> script::EpisodeRequest {
@@ -112,21 +141,50 @@ impl<'a> Batch<'a> {
         }
     }
 
-    /// Thresholds of the targets of all tasks, read before anything runs.
+    /// Reads the thresholds of the targets of all tasks, and looks once at whatever will be looked at in the first episode of
+    /// each: what is wrong with a scene's senses is told before anything runs.
     ///
     /// # Errors
-    /// A layout or a threshold file that is wrong.
-    pub fn find_limits(&mut self, tasks: &[&Task]) -> Result<(), Failure> {
+    /// A layout, a threshold file, a camera, the light or a tactile sensor that is wrong.
+    pub fn prepare(&mut self, tasks: &[&Task]) -> Result<(), Failure> {
         for task in tasks {
-            let opened =
-                script::Episode::open(self.loaded, &self.request(task, 0)).map_err(Failure::input)?;
-            let Some(asset) = target_asset(&opened.nominal, task) else { continue };
-            if matches!(asset.body, Body::Soft(_)) && !self.limits.contains_key(&asset.name) {
+            let first = self.jobs.iter().find(|(of, _)| of.id == task.id).map_or(0, |(_, episode)| *episode);
+            let opened = self.open(task, first)?;
+            let target = target_asset(&opened.nominal, task).cloned();
+            if let Some(asset) = target
+                && matches!(asset.body, Body::Soft(_))
+                && !self.limits.contains_key(&asset.name)
+            {
                 let limit = self.find_limit(&asset)?;
                 self.limits.insert(asset.name.clone(), limit);
             }
+            let scene = Arc::new(opened.scene.clone());
+            let streams = (self.drive)(self.run, opened)?.streams();
+            self.force_observed |= streams.force;
+            self.try_out(scene, streams).map_err(|error| {
+                self.episode_failure(&match error {
+                    Trial::Build(error) => EpisodeError::Build(error),
+                    Trial::Sense(source) => EpisodeError::Sense { task: task.id, episode: first, source },
+                })
+            })?;
         }
         Ok(())
+    }
+
+    /// Looks once at what a policy asks for, and a film shows, of a scene in which nothing has moved yet.
+    fn try_out(&self, scene: Arc<Scene>, mut streams: Streams) -> Result<(), Trial> {
+        let settings = &self.settings;
+        check_senses(&scene, &settings.tactile, &self.looks)?;
+        if self.films {
+            streams.touch = true;
+            streams.cameras.extend(scene.cameras.iter().map(|camera| camera.name.clone()));
+        }
+        if streams.cameras.is_empty() && !streams.touch {
+            return Ok(());
+        }
+        let sim = Simulation::new(scene, &settings.physics, &settings.robot, &self.cache)?;
+        let mut senses = Senses::new(&sim, &settings.tactile, &self.looks);
+        Ok(senses.try_out(&Senses::frame(&sim), &streams)?)
     }
 
     fn find_limit(&mut self, asset: &Asset) -> Result<Option<Limit>, Failure> {
@@ -168,6 +226,7 @@ impl<'a> Batch<'a> {
             softvt: env!("CARGO_PKG_VERSION"),
             script: self.loaded.main.clone(),
             suite: &self.suite.name,
+            twin: self.run.twin.then_some("rigid"),
             policy: &self.run.policy,
             privileged: self.run.policy.starts_with("expert"),
             seed: self.run.seed,
@@ -179,6 +238,7 @@ impl<'a> Batch<'a> {
             settings: &self.settings,
             sources: self.sources.clone(),
             thresholds: self.limits.iter().map(|(a, l)| (a.clone(), l.map(|l| l.tau_pct()))).collect(),
+            force_observed: self.force_observed,
         };
         folder.write_json(RUN, &info).map_err(folder_failure)
     }
@@ -188,9 +248,9 @@ impl<'a> Batch<'a> {
     /// # Errors
     /// A script, policy or file that fails, or an interrupt; finished episodes are kept.
     pub fn go(&self, mut folder: RunFolder) -> Result<Summary, Failure> {
-        let mut progress = Progress::new(self.jobs.len(), &self.suite.name);
+        let mut progress = Progress::new(self.jobs.len(), &self.name);
         let mut records: Vec<EpisodeRecord> = Vec::new();
-        let outcome = batch::run(
+        let outcome: Result<(), Failure> = batch::run(
             self.jobs.len(),
             self.run.threads,
             &stop::FLAG,
@@ -215,18 +275,22 @@ impl<'a> Batch<'a> {
         progress.finish();
         folder.flush().map_err(folder_failure)?;
         let kept = format!("{} of {} episodes are in {}", records.len(), self.jobs.len(), self.out.display());
-        if stop::requested() {
-            return Err(Failure::interrupted(format!("interrupted; {kept}")));
-        }
-        if let Err(failure) = outcome {
-            if records.is_empty() {
+        let interrupted = || Failure::interrupted(format!("interrupted; {kept}"));
+        match outcome {
+            // What failed before the end was asked for is what went wrong, however long others took to end.
+            Err(failure) if failure.code == code::INTERRUPTED => return Err(interrupted()),
+            Err(failure) if records.is_empty() => {
                 // Nothing would be lost, and the same command must work once the mistake is mended.
                 folder.discard().map_err(folder_failure)?;
                 return Err(failure);
             }
-            return Err(Failure { message: format!("{}\n{kept}", failure.message), ..failure });
+            Err(failure) => {
+                return Err(Failure { message: format!("{}\n{kept}", failure.message), ..failure });
+            }
+            Ok(()) if stop::requested() => return Err(interrupted()),
+            Ok(()) => {}
         }
-        let summary = Summary::of(&self.suite.name, &self.run.policy, &records);
+        let summary = Summary::of(&self.name, &self.run.policy, &records);
         folder.write_json(SUMMARY, &summary).map_err(folder_failure)?;
         records.sort_by_key(|r| (r.identity.task, r.identity.episode));
         interchange::write_scores(&self.out, &records, &self.released).map_err(folder_failure)?;
@@ -261,62 +325,33 @@ impl<'a> Batch<'a> {
     /// A script, the scene or whoever drives fails.
     pub fn episode(&self, job: usize, film: bool) -> Result<Finished, Failure> {
         let (task, episode) = self.jobs[job];
-        let opened =
-            script::Episode::open(self.loaded, &self.request(task, episode)).map_err(Failure::input)?;
-        let target = target_asset(&opened.nominal, task);
-        let limit = target.as_ref().and_then(|asset| self.limit_of(asset));
-        let soft = target.as_ref().is_some_and(|asset| matches!(asset.body, Body::Soft(_)));
-        let asset = target.map_or(String::new(), |asset| asset.name.clone());
+        let opened = self.open(task, episode)?;
+        let limit = target_asset(&opened.nominal, task).and_then(|asset| self.limit_of(asset));
+        let which = Which {
+            suite: &self.name,
+            episode,
+            seed: self.run.seed,
+            split: Split::Validation,
+            policy: &self.run.policy,
+        };
+        let scenes = (&opened.nominal, opened.scene.clone());
         let spec = EpisodeSpec {
-            identity: Identity {
-                suite: self.suite.name.clone(),
-                task: task.id,
-                prompt: task.prompt.clone(),
-                layout: task.layout.clone(),
-                episode,
-                seed: self.run.seed,
-                split: Split::Validation.name().to_owned(),
-                policy: self.run.policy.clone(),
-                asset,
-                soft,
-            },
-            task: task.clone(),
-            scene: Arc::new(opened.scene.clone()),
             limit,
-            rules: self.settings.rules.clone(),
-            params: self.settings.physics.clone(),
-            robot: self.settings.robot.clone(),
-            tactile: self.settings.tactile.clone(),
             film,
             trace: self.run.trace,
+            ..EpisodeSpec::new(&which, task, scenes, &self.settings)
         };
-        let driver = self.driver(opened)?;
+        let driver = (self.drive)(self.run, opened)?;
         let mut driver = batch::Stoppable { driver, stop: &stop::FLAG };
         let started = Episode::start(spec, &self.cache, &self.looks).map_err(|e| self.episode_failure(&e))?;
         started.run(&mut driver).map_err(|e| self.episode_failure(&e))
     }
 
-    fn driver(&self, opened: script::Episode) -> Result<Box<dyn Controller>, Failure> {
-        let boxed = |policy: Box<dyn Policy>| -> Box<dyn Controller> { Box::new(policy) };
-        match self.run.policy.as_str() {
-            "noop" => Ok(boxed(Box::<builtin::Noop>::default())),
-            "random" => {
-                let mut stream = opened.seed.stream(crate::benchmark::seed::Stream::Script);
-                Ok(boxed(Box::new(builtin::Random::new(rand::RngCore::next_u64(&mut stream)))))
-            }
-            policy => {
-                let expert = opened.expert().map_err(Failure::input)?;
-                let expert = expert.ok_or_else(|| Failure::input("the task has no expert"))?;
-                Ok(Box::new(ExpertController::new(expert, policy == "expert-binary")))
-            }
-        }
-    }
-
     fn episode_failure(&self, error: &EpisodeError) -> Failure {
         let code = match error {
+            // What fails after the end was asked for may fail because of that.
+            _ if stop::requested() => code::INTERRUPTED,
             EpisodeError::Control { source: ControlError::Policy(_), .. } => code::POLICY,
-            EpisodeError::Control { source: ControlError::Interrupted, .. }
-            | EpisodeError::Settle { source: SettleError::Interrupted, .. } => code::INTERRUPTED,
             _ => code::INPUT,
         };
         let message = match error {
@@ -355,6 +390,26 @@ impl<'a> Batch<'a> {
     }
 }
 
+/// Makes whoever drives an episode.
+type Drive = fn(&Run, script::Episode) -> Result<Box<dyn Controller>, Failure>;
+
+/// The policy of the command line.
+fn driver(run: &Run, opened: script::Episode) -> Result<Box<dyn Controller>, Failure> {
+    let boxed = |policy: Box<dyn Policy>| -> Box<dyn Controller> { Box::new(policy) };
+    match run.policy.as_str() {
+        "noop" => Ok(boxed(Box::<builtin::Noop>::default())),
+        "random" => {
+            let mut stream = opened.seed.stream(crate::benchmark::seed::Stream::Script);
+            Ok(boxed(Box::new(builtin::Random::new(rand::RngCore::next_u64(&mut stream)))))
+        }
+        policy => {
+            let expert = opened.expert().map_err(Failure::input)?;
+            let expert = expert.ok_or_else(|| Failure::input("the task has no expert"))?;
+            Ok(Box::new(ExpertController::new(expert, policy == "expert-binary")))
+        }
+    }
+}
+
 /// A film that could not be made.
 pub(super) fn film_failure(error: FilmError) -> Failure {
     match error {
@@ -365,11 +420,6 @@ pub(super) fn film_failure(error: FilmError) -> Failure {
 
 fn folder_failure(error: RunFolderError) -> Failure {
     Failure::input(error)
-}
-
-fn target_asset(scene: &Scene, task: &Task) -> Option<Arc<Asset>> {
-    let name = task.goal.object();
-    scene.objects.iter().find(|o| o.name == name).map(|o| o.asset.clone())
 }
 
 /// One episode in one line.
@@ -387,3 +437,7 @@ fn line(record: &EpisodeRecord) -> String {
         record.identity.task, record.identity.episode, record.stats.time_s
     )
 }
+
+#[cfg(test)]
+#[path = "batch_tests.rs"]
+mod tests;

@@ -52,6 +52,7 @@ fn golden_run(golden: &Golden) -> Run {
         seed: 0,
         threads: 1,
         shifts: Vec::new(),
+        twin: false,
         set: Vec::new(),
         trace: None,
         video: None,

@@ -2,7 +2,12 @@
 
 use std::{collections::BTreeSet, path::PathBuf};
 
-use super::{Failure, args::Run, batch::Batch, experiment, print};
+use super::{
+    Failure,
+    args::{Run, Video},
+    batch::Batch,
+    experiment, print,
+};
 use crate::{
     benchmark::{Plan, Suite, Task},
     evaluation::{record::EpisodeRecord, summary::Summary},
@@ -16,9 +21,10 @@ use crate::{
 /// Anything that is wrong with the script, the flags, the folder or the policy.
 pub fn run(run: &Run) -> Result<(), Failure> {
     let loaded = script::load(&run.file, &run.script_words).map_err(Failure::input)?;
+    check_video(run, &loaded.plan)?;
     match &loaded.plan {
         Plan::Suite(suite) => {
-            let summary = evaluate(run, &loaded, suite, out_dir(run, &suite.name, None))?;
+            let summary = evaluate(run, &loaded, suite, out_dir(run, &run.name_of(suite), None))?;
             show(run, &[summary], false);
             Ok(())
         }
@@ -34,13 +40,37 @@ pub fn run(run: &Run) -> Result<(), Failure> {
             }
             let mut summaries = Vec::new();
             for suite in suites {
-                summaries.push(evaluate(run, &loaded, suite, out_dir(run, &suite.name, Some(&suite.name)))?);
+                let name = run.name_of(suite);
+                summaries.push(evaluate(run, &loaded, suite, out_dir(run, &name, Some(&name)))?);
             }
             show(run, &summaries, true);
             Ok(())
         }
         Plan::Experiment { name, points, columns } => experiment::run(run, &loaded, name, *points, columns),
     }
+}
+
+/// Every episode that `--video` names must be one of every suite's: before any of them runs.
+fn check_video(run: &Run, plan: &Plan) -> Result<(), Failure> {
+    let suites: Vec<&Suite> = match plan {
+        Plan::Suite(suite) => vec![suite],
+        Plan::Suites { suites } => suites.iter().collect(),
+        Plan::Experiment { .. } => Vec::new(),
+    };
+    let Some(Video::Episodes(chosen)) = &run.video else { return Ok(()) };
+    for suite in suites {
+        let episodes = run.episodes.unwrap_or(suite.episodes);
+        if let Some(beyond) = chosen.iter().find(|episode| **episode >= episodes) {
+            let last = episodes.saturating_sub(1);
+            let message = format!(
+                "{}: --video={beyond}: suite {} runs the episodes 0 to {last} of each task; name one of them, or raise --episodes",
+                run.file.display(),
+                suite.name
+            );
+            return Err(Failure::input(message));
+        }
+    }
+    Ok(())
 }
 
 /// Tables, or one JSON document: an object for a suite, an array for a list of suites.
@@ -90,7 +120,7 @@ fn evaluate(run: &Run, loaded: &Loaded, suite: &Suite, out: PathBuf) -> Result<S
     let episodes = run.episodes.unwrap_or(suite.episodes);
     let jobs = tasks.iter().flat_map(|task| (0..episodes).map(move |e| (*task, e))).collect();
     let mut batch = Batch::new(run, loaded, suite, (jobs, out))?;
-    batch.find_limits(&tasks)?;
+    batch.prepare(&tasks)?;
     let folder =
         RunFolder::create(&batch.out).map_err(|e| Failure::input(format!("{}: {e}", run.file.display())))?;
     batch.write_info(&folder, &tasks, episodes)?;

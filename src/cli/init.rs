@@ -1,12 +1,21 @@
-//! `softvt init`: editor stubs for a folder of scripts.
+//! `softvt init`: editor stubs for a folder of scripts, and a suite to start from.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::{Failure, files::make_folder, print};
 use crate::{
     report::run_folder::replace,
-    script::stubs::{LUARC, STUB_FILE, stubs},
+    script::{
+        embedded,
+        stubs::{LUARC, STUB_FILE, stubs},
+    },
 };
+
+/// A suite and its object to start from: where they go, and where they are in the library.
+const TEMPLATE: [(&str, &str); 2] = [
+    ("suites/my_suite.lua", "scripts/templates/my_suite.lua"),
+    ("assets/my_object.lua", "scripts/templates/my_object.lua"),
+];
 
 /// Writes the stubs and the language server's settings into `dir`; an own `.luarc.json` is left alone.
 ///
@@ -14,16 +23,36 @@ use crate::{
 /// A file cannot be written.
 pub fn run(dir: &Path) -> Result<(), Failure> {
     let stub = dir.join(STUB_FILE);
-    let folder = stub.parent().unwrap_or(dir);
-    make_folder(folder)?;
-    replace(&stub, stubs()).map_err(Failure::input)?;
-    print(&format!("wrote {}\n", stub.display()));
+    write(&stub, stubs().as_bytes())?;
     let settings = dir.join(".luarc.json");
     if settings.exists() {
         print(&format!("left {} as it is\n", settings.display()));
-    } else {
-        replace(&settings, LUARC).map_err(Failure::input)?;
-        print(&format!("wrote {}\n", settings.display()));
+        return Ok(());
     }
+    write(&settings, LUARC.as_bytes())
+}
+
+/// Writes a commented suite of one task and its object into `dir`, with what [`run`] writes.
+///
+/// # Errors
+/// One of them is there already, or cannot be written; nothing is written then.
+pub fn task(dir: &Path) -> Result<(), Failure> {
+    let files: Vec<(PathBuf, &[u8])> =
+        TEMPLATE.iter().filter_map(|(path, from)| Some((dir.join(path), embedded(from)?))).collect();
+    if let Some((there, _)) = files.iter().find(|(path, _)| path.exists()) {
+        let message = format!("{} is there already; rename it, or give another folder", there.display());
+        return Err(Failure::input(message));
+    }
+    files.iter().try_for_each(|(path, text)| write(path, text))?;
+    run(dir)?;
+    let (suite, _) = TEMPLATE[0];
+    print(&format!("now: softvt check {suite}, softvt {suite}; docs/write-a-task.md goes on from there\n"));
+    Ok(())
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    make_folder(path.parent().unwrap_or(Path::new(".")))?;
+    replace(path, bytes).map_err(Failure::input)?;
+    print(&format!("wrote {}\n", path.display()));
     Ok(())
 }

@@ -2,6 +2,7 @@
 
 mod args;
 mod batch;
+mod check;
 mod doctor;
 mod evaluate;
 mod experiment;
@@ -39,19 +40,15 @@ pub struct Failure {
 }
 
 impl Failure {
-    /// The user's input is wrong.
+    /// The user's input is wrong; unless the end was asked for before: what fails from then on may fail because of that.
     fn input(message: impl ToString) -> Self {
-        Self { code: code::INPUT, message: message.to_string() }
+        let code = if stop::requested() { code::INTERRUPTED } else { code::INPUT };
+        Self { code, message: message.to_string() }
     }
 
     /// Interrupted; what is finished has been kept.
     fn interrupted(message: impl ToString) -> Self {
         Self { code: code::INTERRUPTED, message: message.to_string() }
-    }
-
-    /// Once the end was asked for, whatever failed did so because of it.
-    fn or_interrupted(self) -> Self {
-        if stop::requested() { Self { code: code::INTERRUPTED, ..self } } else { self }
     }
 }
 
@@ -83,14 +80,16 @@ fn run() -> Result<(), Failure> {
             word.into_string().map_err(|w| Failure::input(format!("argument {w:?} is not valid UTF-8")))
         })
         .collect::<Result<_, _>>()?;
-    carry_out(&words).map_err(Failure::or_interrupted)
+    carry_out(&words)
 }
 
 fn carry_out(words: &[String]) -> Result<(), Failure> {
     match args::parse(words)? {
         Command::Run(run) => evaluate::run(&run),
         Command::List { what, json } => list::run(&what, json),
-        Command::Init { dir } => init::run(&dir),
+        Command::Init { dir, task: false } => init::run(&dir),
+        Command::Init { dir, task: true } => init::task(&dir),
+        Command::Check(run) => check::run(&run),
         Command::View(view) => view::run(&view),
         Command::Doctor => doctor::run(),
         Command::Shown => Ok(()),

@@ -42,9 +42,10 @@ pub fn run(view: &View) -> Result<(), Failure> {
         return Err(Failure::input(message));
     };
     let dir = run.out.clone().unwrap_or_default();
-    make_folder(&dir)?;
     let mut batch = Batch::new(run, &loaded, suite, (vec![(task, view.episode)], dir.clone()))?;
-    batch.find_limits(&[task])?;
+    batch.films = true;
+    batch.prepare(&[task])?;
+    make_folder(&dir)?;
     let finished = batch.episode(0, true)?;
     let caption = Caption::of(&finished.record);
     let Some(mut film) = finished.film else { return Ok(()) };
@@ -52,7 +53,8 @@ pub fn run(view: &View) -> Result<(), Failure> {
     let last = film.frames.len().saturating_sub(1);
     let worst = (0..=last).max_by(|&a, &b| d_pct(a).total_cmp(&d_pct(b)).then(b.cmp(&a))).unwrap_or(0);
     let moments = [("start", 0), ("worst", worst), ("end", last)];
-    let mut written = write_stills(&mut film, &moments, view.native, &dir).map_err(film_failure)?;
+    let mut written =
+        write_stills(&mut film, &moments, view.native, &dir, stop::requested).map_err(film_failure)?;
     written.push(dir.join("episode.png"));
     write_panels(&mut film, &caption, worst, &dir.join("episode.png")).map_err(film_failure)?;
     let video = dir.join("episode.mp4");

@@ -14,7 +14,7 @@ pub enum Outcome {
     Timeout,
     /// The physics could not be trusted any more.
     Invalid {
-        /// Why: "inverted", "not_finite", "not_converged" …
+        /// Why: "inverted", "not_finite", "not_converged", "too_fast", "too_hard" …
         reason: String,
         /// Physics step since the policy took over.
         step: u64,
@@ -73,6 +73,12 @@ pub struct RolloutStats {
     pub newton_mean: f64,
     /// Most Newton iterations in one physics step.
     pub newton_max: u32,
+    /// Whether the policy saw the true forces at the pads, which no real sensor gives.
+    #[serde(default)]
+    pub force_observed: bool,
+    /// Observations with a picture of a camera that stood inside of something: it shows what is beyond that thing.
+    #[serde(default)]
+    pub camera_inside: u32,
     /// Hash of the final state, hexadecimal.
     pub state_hash: String,
 }
@@ -142,6 +148,8 @@ pub(crate) mod tests {
             min_det_f: Some(0.7),
             newton_mean: 2.1,
             newton_max: 5,
+            force_observed: false,
+            camera_inside: 0,
             state_hash: "00ff".into(),
         };
         EpisodeRecord { identity, outcome: Outcome::Completed, verdict, stats }

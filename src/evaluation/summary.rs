@@ -89,6 +89,9 @@ pub struct Summary {
     pub suite: String,
     /// Policy name.
     pub policy: String,
+    /// Whether the policy saw the true forces at the pads in any episode; no real sensor gives them.
+    #[serde(default)]
+    pub force_observed: bool,
     /// All episodes together.
     #[serde(flatten)]
     pub scores: Scores,
@@ -141,6 +144,7 @@ impl Summary {
         Self {
             suite: suite.into(),
             policy: policy.into(),
+            force_observed: records.iter().any(|r| r.stats.force_observed),
             scores: Scores::of(&records),
             kappa: kappa_curve(&records),
             by_task: tasks.into_iter().map(|(task, group)| task_scores(task, &group)).collect(),

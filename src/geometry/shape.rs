@@ -19,6 +19,7 @@ mod primitive;
 mod profile;
 mod ray;
 mod relief;
+mod tree;
 mod warp;
 
 pub use bounds::Aabb;
@@ -26,6 +27,7 @@ pub use check::ShapeError;
 pub use contact::Contact;
 pub use profile::Profile;
 pub use relief::{Bumps, Mask, Relief, Ridges};
+pub use tree::TreeSize;
 
 /// A coordinate axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

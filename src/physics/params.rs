@@ -30,6 +30,9 @@ pub struct Params {
     pub sleeping: bool,
     /// Time for which an element may be inverted before the run is invalid, s.
     pub inverted_after: f64,
+    /// Speed beyond which the run is invalid, m/s: nothing that a gripper of 0.2 m/s, an arm or a fall onto a table moves is
+    /// near it.
+    pub most_speed: f64,
 }
 
 impl Default for Params {
@@ -46,6 +49,7 @@ impl Default for Params {
             sleep_after: 0.5,
             sleeping: true,
             inverted_after: 0.1,
+            most_speed: 100.0,
         }
     }
 }
@@ -62,6 +66,7 @@ impl Params {
             ("shear_ratio", self.shear_ratio),
             ("margin", self.margin),
             ("sleep_after", self.sleep_after),
+            ("most_speed", self.most_speed),
         ];
         let not_negative = [
             ("alpha", self.alpha),

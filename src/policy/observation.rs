@@ -46,7 +46,8 @@ pub struct Observation {
     pub forces: Option<[PadForce; 2]>,
 }
 
-/// A camera's picture: rows from the top, RGB, 8 bits a channel, sRGB.
+/// A camera's picture: rows from the top, RGB, 8 bits a channel, sRGB. A camera that gets inside of something during an
+/// episode, on the hand or in the world, sees what is beyond that thing; results count such steps as `camera_inside`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraPicture {
     /// Name of the camera.

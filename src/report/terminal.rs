@@ -90,6 +90,9 @@ fn footer(out: &mut String, summary: &Summary) {
             ),
         );
     }
+    if summary.force_observed {
+        line(out, "the policy saw true forces at the pads (force_observed): no real sensor gives them");
+    }
     if scores.safety_unknown > 0 {
         line(
             out,

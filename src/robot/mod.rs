@@ -4,6 +4,7 @@
 //! tips, y from the right finger to the left one), the `tool` frame (TCP) with the hand's axes at the nominal
 //! midpoint of the two gel apexes, and a pad frame on each finger (see [`pads`]).
 
+pub mod clearance;
 pub mod gripper;
 pub mod ik;
 pub mod pads;
@@ -11,6 +12,7 @@ pub mod panda;
 pub mod rotation;
 pub mod spec;
 
+pub use clearance::{Obstacle, clearance};
 pub use gripper::{Encoding, Gripper, GripperError};
 pub use ik::{DiffIk, Unreachable};
 pub use pads::{BodyBox, PadContact, PadSurface};

@@ -12,7 +12,13 @@
 use nalgebra::Quaternion;
 
 use super::Side;
-use crate::geometry::{Mat3, Pose, Quat, Vec3};
+use crate::{
+    geometry::{
+        Mat3, Pose, Quat, Vec3,
+        shape::{Aabb, Contact},
+    },
+    physics::contact::{GelSample, Solid, Surface},
+};
 
 /// Height of the gel's apex above the finger frame, m: that of Franka's own finger tips.
 pub(super) const APEX_Z: f64 = 0.045;
@@ -117,6 +123,27 @@ impl PadSurface {
     }
 }
 
+/// Distance of the gel's samples that hard shapes press on, m: that of a soft body's samples where it is grasped.
+const GEL_SPACING: f64 = 0.75e-3;
+
+/// The gel as contact samples and hard shapes feel it, in the pad frame.
+impl Surface for PadSurface {
+    fn contact(&self, p: &Vec3, _facing: &Vec3, spacing: f64) -> Contact {
+        let contact = self.contact(p, spacing);
+        Contact { phi: contact.phi, normal: contact.normal_p, coverage: contact.coverage }
+    }
+
+    fn bounds(&self) -> Aabb {
+        let half = Vec3::new(self.length, self.width, 0.0) * 0.5;
+        Aabb { min: Vec3::new(-half.x, -half.y, -self.thickness), max: half }
+    }
+
+    fn solid(&self) -> Option<Solid> {
+        let patches = self.patches(GEL_SPACING).into_iter();
+        Some(Solid::Gel(patches.map(|(p, normal, area)| GelSample { p, normal, area }).collect()))
+    }
+}
+
 /// Pad frame in the frame of its finger's link.
 pub fn pad_pose_in_finger(side: Side) -> Pose {
     let turn = match side {
@@ -142,6 +169,17 @@ pub fn finger_boxes(side: Side) -> [BodyBox; 2] {
     let bracket_z = (APEX_Z - CASE_HALF.z) / 2.0;
     let at = |half, z| BodyBox { half, pose: Pose::translation(0.0, out * depth, z) };
     [at(CASE_HALF, APEX_Z), at(Vec3::new(0.0105, 0.010, bracket_z), bracket_z)]
+}
+
+/// Half extents of the box around a gel, finger axes, m.
+pub(super) fn gel_half() -> Vec3 {
+    let pad = PadSurface::default();
+    Vec3::new(pad.width, pad.thickness, pad.length) / 2.0
+}
+
+/// Middle of the box around a gel, in the finger's link frame.
+pub(super) fn gel_centre_in_finger(side: Side) -> Pose {
+    Pose::translation(0.0, outward(side) * gel_half().y, APEX_Z)
 }
 
 /// The hand's body, in the frame of the link that carries it.

@@ -132,6 +132,15 @@ pub fn tool_in_hand() -> Pose {
     Pose::translation(0.0, 0.0, FINGER_Z + pads::APEX_Z)
 }
 
+/// A finger's link in the hand frame, its gel's apex `q` (m) from the hand's middle plane.
+pub fn finger_in_hand(side: Side, q: f64) -> Pose {
+    let out = match side {
+        Side::Left => q,
+        Side::Right => -q,
+    };
+    Pose::translation(0.0, out, FINGER_Z)
+}
+
 /// Tool frame in the frame of [`HAND_LINK`].
 pub fn tool_in_link() -> Pose {
     hand_in_link() * tool_in_hand()

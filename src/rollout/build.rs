@@ -115,22 +115,23 @@ impl RestCache {
     /// Bounds of a shape; finding those of a displaced one takes a search.
     pub(super) fn bounds(&self, shape: &Shape) -> Aabb {
         let made: Result<_, Infallible> =
-            self.bounds.get(|known| known == shape, || Ok((shape.clone(), shape.bounds())));
+            self.bounds.get(shape, |known| known == shape, || Ok(shape.bounds()));
         made.unwrap_or_else(|never| match never {})
     }
 
     /// Thickness of walls that are too thin to move, m, if there are such.
     pub(super) fn wall(&self, shape: &Shape) -> Option<f64> {
-        let make = || Ok((shape.clone(), furniture::thin_wall(shape)));
-        let made: Result<_, Infallible> = self.walls.get(|known| known == shape, make);
+        let made: Result<_, Infallible> =
+            self.walls.get(shape, |known| known == shape, || Ok(furniture::thin_wall(shape)));
         made.unwrap_or_else(|never| match never {})
     }
 
     /// Rest data of a soft asset.
     fn rest(&self, asset: &Arc<Asset>, material: &SoftMaterial) -> Result<Arc<Rest>, BuildError> {
         self.rests.get(
+            asset,
             |known| known.shape == asset.shape && known.body == asset.body,
-            || Ok((asset.clone(), soft_rest(&asset.name, &asset.shape, material)?)),
+            || soft_rest(&asset.name, &asset.shape, material),
         )
     }
 }

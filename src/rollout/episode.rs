@@ -1,7 +1,5 @@
 //! One episode from the settled scene to the verdict.
 
-use std::sync::Arc;
-
 use sha2::{Digest, Sha256};
 
 use super::{
@@ -11,24 +9,23 @@ use super::{
     recent::Recent,
     senses::{Film, SenseError, Senses},
     simulation::{Handle, Kind, SettleError, Simulation},
+    spec::EpisodeSpec,
+    streams::check_senses,
     trace::StepTrace,
 };
 use crate::{
-    benchmark::{Goal, Task, control::steps_per_control},
+    benchmark::{Goal, control::steps_per_control},
     evaluation::{
         deformation::{Deformation, Reference},
         goal::Place,
         judge::{Judge, Setup},
-        record::{EpisodeRecord, Identity, Outcome, RolloutStats},
-        rules::Rules,
-        safety::Limit,
+        record::{EpisodeRecord, Outcome, RolloutStats},
     },
     geometry::{Pose, Vec3},
-    physics::{Params, world::StepFailure},
+    physics::world::{Frame, StepFailure},
     policy::{Action, Observation, Policy, Streams},
-    robot::{RobotSpec, rotation},
-    scene::{Region, Scene},
-    sensing::tactile::TactileSpec,
+    robot::rotation,
+    scene::Region,
 };
 
 /// What went wrong with whoever drives.
@@ -67,31 +64,6 @@ impl<P: Policy + ?Sized> Controller for Box<P> {
     fn act(&mut self, _sim: &Simulation, observation: &Observation) -> Result<Option<Action>, ControlError> {
         Policy::act(self.as_mut(), observation).map(Some).map_err(ControlError::Policy)
     }
-}
-
-/// Everything about an episode but who drives.
-#[derive(Clone, Debug)]
-pub struct EpisodeSpec {
-    /// Which one it is.
-    pub identity: Identity,
-    /// The task.
-    pub task: Task,
-    /// The scene before settling.
-    pub scene: Arc<Scene>,
-    /// Deformation limit by asset name; `None` if the target was never calibrated.
-    pub limit: Option<Limit>,
-    /// Judging thresholds.
-    pub rules: Rules,
-    /// Parameters of the mechanics.
-    pub params: Params,
-    /// Parameters of the robot.
-    pub robot: RobotSpec,
-    /// Parameters of the tactile sensors.
-    pub tactile: TactileSpec,
-    /// Whether to keep what is needed to draw the rollout later.
-    pub film: bool,
-    /// Whether to keep a trace, and whether with node positions.
-    pub trace: Option<bool>,
 }
 
 /// A finished episode.
@@ -185,16 +157,30 @@ pub struct Episode {
     min_det_f: f64,
     trace: Vec<StepTrace>,
     frames: Vec<ScoreFrame>,
+    senses: Senses,
     recent: Recent,
-    film: Option<Film>,
+    reel: Option<Reel>,
+    force_observed: bool,
+}
+
+/// What a film keeps while it is being taken.
+#[derive(Default)]
+struct Reel {
+    frames: Vec<Frame>,
+    d_pct: Vec<Option<f64>>,
 }
 
 impl Episode {
     /// Builds and settles the scene; the settled state is the deformation reference.
     ///
     /// # Errors
-    /// The scene cannot be built or does not come to rest, or the goal names nothing in it.
+    /// The scene cannot be sensed or built or does not come to rest, or the goal names nothing in it.
     pub fn start(spec: EpisodeSpec, cache: &RestCache, looks: &Looks) -> Result<Self, EpisodeError> {
+        check_senses(&spec.scene, &spec.tactile, looks).map_err(|source| EpisodeError::Sense {
+            task: spec.task.id,
+            episode: spec.identity.episode,
+            source,
+        })?;
         let mut sim = Simulation::new(spec.scene.clone(), &spec.params, &spec.robot, cache)?;
         let (object, place, hold_s) = match &spec.task.goal {
             Goal::On { object, target, hold_s } | Goal::In { object, target, hold_s } => {
@@ -217,28 +203,15 @@ impl Episode {
             source,
         })?;
         let witness = Witness::new(&sim, target, place);
-        let judge = Judge::new(Setup {
-            rules: spec.rules.clone(),
-            workspace: spec.scene.workspace,
-            place: place_of(&spec.task.goal, &sim.objects[place]),
-            hold_s,
-            dt_s: spec.params.dt,
-            steps_per_control: steps_per_control(spec.params.dt),
-            target_weight_n: weight(&sim, target),
-            soft: matches!(sim.objects[target].kind, Kind::Soft(_)),
-            limit: spec.limit,
-            target_lowest_z_w: lowest(&sim, &sim.objects[target]),
-            others_lowest_z_w: witness.others_lowest(&sim),
-        });
+        let judge = judge(&spec, &sim, &witness, (target, place), hold_s);
         let tool = sim.rig.tool_b(&sim.world);
         let start_hold = Action {
             position_b: tool.translation.vector,
             axis_angle_b: rotation::axis_angle(&tool.rotation),
             closure: 0.0,
         };
-        let senses = || Senses::new(&sim, &spec.tactile, looks);
-        let film = spec.film.then(|| Film { senses: senses(), frames: Vec::new(), d_pct: Vec::new() });
-        let recent = Recent::new(senses());
+        let senses = Senses::new(&sim, &spec.tactile, looks);
+        let reel = spec.film.then(Reel::default);
         Ok(Self {
             spec,
             sim,
@@ -252,8 +225,10 @@ impl Episode {
             min_det_f: f64::INFINITY,
             trace: Vec::new(),
             frames: Vec::new(),
-            recent,
-            film,
+            senses,
+            recent: Recent::default(),
+            reel,
+            force_observed: false,
         })
     }
 
@@ -264,6 +239,7 @@ impl Episode {
     pub fn run(mut self, controller: &mut dyn Controller) -> Result<Finished, EpisodeError> {
         let mut action = self.start_hold;
         let streams = controller.streams();
+        self.force_observed = streams.force;
         self.remember(&streams, self.witness.reference(self.target).map(|_| 0.0));
         let outcome = loop {
             if self.judge.goal_reached() {
@@ -312,7 +288,7 @@ impl Episode {
             touch: None,
             forces: None,
         };
-        self.recent.observe(blind, streams).map_err(|source| EpisodeError::Sense {
+        self.recent.observe(&mut self.senses, blind, streams).map_err(|source| EpisodeError::Sense {
             task: self.spec.task.id,
             episode: self.spec.identity.episode,
             source,
@@ -321,13 +297,13 @@ impl Episode {
 
     /// Keeps what may be looked at later: for the sensors and for the film.
     fn remember(&mut self, streams: &Streams, d_pct: Option<f64>) {
-        if streams == &Streams::default() && self.film.is_none() {
+        if streams == &Streams::default() && self.reel.is_none() {
             return;
         }
         let frame = Senses::frame(&self.sim);
-        if let Some(film) = &mut self.film {
-            film.frames.push(frame.clone());
-            film.d_pct.push(d_pct);
+        if let Some(reel) = &mut self.reel {
+            reel.frames.push(frame.clone());
+            reel.d_pct.push(d_pct);
         }
         self.recent.push(frame);
     }
@@ -370,6 +346,8 @@ impl Episode {
             StepFailure::Diverged { .. } => ("not_converged", None),
             StepFailure::NotFinite { node, .. } => ("not_finite", Some(*node as u32)),
             StepFailure::Indefinite { .. } => ("indefinite", None),
+            StepFailure::TooFast { node, .. } => ("too_fast", node.map(|node| node as u32)),
+            StepFailure::TooHard { .. } => ("too_hard", None),
             StepFailure::Inverted { body, element, .. } => {
                 let soft = self.sim.world.soft.iter().find(|s| s.name == *body);
                 ("inverted", soft.map(|s| s.body.rest.mesh.elements[*element][0]))
@@ -386,12 +364,15 @@ impl Episode {
             min_det_f: (soft && self.min_det_f.is_finite()).then_some(self.min_det_f),
             newton_mean: self.newton.0 as f64 / self.physics_steps.max(1) as f64,
             newton_max: self.newton.1,
+            force_observed: self.force_observed,
+            camera_inside: self.recent.inside,
             state_hash: state_hash(&self.sim),
         };
+        let film = self.reel.map(|Reel { frames, d_pct }| Film { senses: self.senses, frames, d_pct });
         let reference = self.witness.reference(self.target).cloned();
         let verdict = self.judge.finish(&outcome);
         let record = EpisodeRecord { identity: self.spec.identity, outcome, verdict, stats };
-        Finished { record, trace: self.trace, frames: self.frames, reference, film: self.film }
+        Finished { record, trace: self.trace, frames: self.frames, reference, film }
     }
 }
 
@@ -402,6 +383,29 @@ fn check_action(action: &Action) -> Result<(), String> {
         return Ok(());
     }
     Err(format!("the action {all:?} holds a number that is not finite"))
+}
+
+/// The judge of an episode in its settled state.
+fn judge(
+    spec: &EpisodeSpec,
+    sim: &Simulation,
+    witness: &Witness,
+    (target, place): (usize, usize),
+    hold_s: f64,
+) -> Judge {
+    Judge::new(Setup {
+        rules: spec.rules.clone(),
+        workspace: spec.scene.workspace,
+        place: place_of(&spec.task.goal, &sim.objects[place]),
+        hold_s,
+        dt_s: spec.params.dt,
+        steps_per_control: steps_per_control(spec.params.dt),
+        target_weight_n: weight(sim, target),
+        soft: matches!(sim.objects[target].kind, Kind::Soft(_)),
+        limit: spec.limit,
+        target_lowest_z_w: lowest(sim, &sim.objects[target]),
+        others_lowest_z_w: witness.others_lowest(sim),
+    })
 }
 
 /// Where the goal is, from the shape of what it names.

@@ -13,7 +13,7 @@ use crate::{
     },
 };
 
-/// Shared by all episodes of a run.
+/// Shared by all episodes of a run; what was not used for long is forgotten and made again when it is asked for.
 #[derive(Clone, Debug, Default)]
 pub struct Looks {
     models: Made<Arc<Asset>, Arc<Model>>,
@@ -31,12 +31,12 @@ impl Looks {
         mesh: Option<&VoxelMesh>,
     ) -> Result<Arc<Model>, CameraError> {
         let same = |known: &Arc<Asset>| alike(known, asset) && known.visuals == asset.visuals;
-        self.models.get(same, || {
+        self.models.get(asset, same, || {
             let model = match mesh {
                 None => Model::of_shape(name, &asset.shape, &asset.visuals)?,
                 Some(mesh) => Model::of_skin(name, &asset.shape, &asset.visuals)?.embedded(name, mesh)?,
             };
-            Ok((asset.clone(), Arc::new(model)))
+            Ok(Arc::new(model))
         })
     }
 
@@ -48,6 +48,7 @@ impl Looks {
         mesh: Option<&VoxelMesh>,
     ) -> Result<Arc<Skin>, SenseError> {
         self.skins.get(
+            asset,
             |known| alike(known, asset),
             || {
                 let skin = match mesh {
@@ -56,19 +57,19 @@ impl Looks {
                         Skin::of_soft(&asset.shape, mesh).ok_or_else(|| SenseError::Skin(name.to_owned()))?
                     }
                 };
-                Ok((asset.clone(), Arc::new(skin)))
+                Ok(Arc::new(skin))
             },
         )
     }
 
     /// The drawn form of the robot.
     pub(super) fn robot(&self) -> Result<Arc<RobotModel>, CameraError> {
-        self.robot.get(|()| true, || Ok(((), Arc::new(RobotModel::new()?))))
+        self.robot.get(&(), |()| true, || Ok(Arc::new(RobotModel::new()?)))
     }
 
     /// The tactile sensor of these numbers.
     pub(super) fn sensor(&self, spec: &TactileSpec) -> Result<Arc<Sensor>, SenseError> {
-        self.sensors.get(|known| known == spec, || Ok((spec.clone(), Arc::new(Sensor::new(spec)?))))
+        self.sensors.get(spec, |known| known == spec, || Ok(Arc::new(Sensor::new(spec)?)))
     }
 }
 

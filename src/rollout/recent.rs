@@ -5,22 +5,19 @@ use std::{collections::VecDeque, sync::Arc};
 use super::senses::{SenseError, Senses};
 use crate::{
     physics::world::Frame,
-    policy::{Observation, Streams, TouchFrame, TouchHistory},
+    policy::{CameraPicture, Observation, Streams, TouchFrame, TouchHistory},
     sensing::tactile::HISTORY,
 };
 
 /// States and, where somebody has looked, what was felt in them; oldest first.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Recent {
-    senses: Senses,
     frames: VecDeque<(Frame, Option<Arc<[TouchFrame; 2]>>)>,
+    /// Observations with a picture taken from inside of something.
+    pub inside: u32,
 }
 
 impl Recent {
-    pub fn new(senses: Senses) -> Self {
-        Self { senses, frames: VecDeque::with_capacity(HISTORY) }
-    }
-
     /// Takes the state after a control step.
     pub fn push(&mut self, frame: Frame) {
         if self.frames.len() == HISTORY {
@@ -30,22 +27,34 @@ impl Recent {
     }
 
     /// Adds to an observation what is looked at.
-    pub fn observe(&mut self, blind: Observation, streams: &Streams) -> Result<Observation, SenseError> {
+    pub fn observe(
+        &mut self,
+        senses: &mut Senses,
+        blind: Observation,
+        streams: &Streams,
+    ) -> Result<Observation, SenseError> {
         let Some((frame, _)) = self.frames.back() else { return Ok(blind) };
-        let cameras = streams.cameras.iter().map(|name| self.senses.picture(frame, name));
-        let cameras = cameras.collect::<Result<_, _>>()?;
+        let mut cameras = Vec::with_capacity(streams.cameras.len());
+        let mut inside = false;
+        for name in &streams.cameras {
+            let camera = senses.camera(name)?.clone();
+            let picture = senses.see(frame, &camera)?;
+            inside |= picture.inside.is_some();
+            cameras.push(CameraPicture { name: camera.name, picture: picture.into_image() });
+        }
+        self.inside += u32::from(inside);
         let forces = streams.force.then(|| Senses::forces(frame));
-        let touch = if streams.touch { Some(self.touch()?) } else { None };
+        let touch = if streams.touch { Some(self.touch(senses)?) } else { None };
         Ok(Observation { cameras, touch, forces, ..blind })
     }
 
     /// What was felt in the last states; each is worked out once.
-    fn touch(&mut self) -> Result<TouchHistory, SenseError> {
+    fn touch(&mut self, senses: &mut Senses) -> Result<TouchHistory, SenseError> {
         let mut frames = Vec::with_capacity(HISTORY);
         for (frame, felt) in &mut self.frames {
             let both = match felt.take() {
                 Some(both) => both,
-                None => Arc::new(self.senses.touch_frame(frame)?),
+                None => Arc::new(senses.touch_frame(frame)?),
             };
             frames.push(both.clone());
             *felt = Some(both);

@@ -3,13 +3,10 @@
 use std::sync::Arc;
 
 use crate::{
-    geometry::{
-        Pose, Vec3,
-        shape::{Aabb, Contact, Shape},
-    },
+    geometry::{Pose, Vec3, shape::Shape},
     physics::{
         World,
-        contact::{Collider, ColliderId, Friction, GelSample, Layer, Mover, Solid, Surface},
+        contact::{Collider, ColliderId, Friction, Layer, Mover},
         world::Drive,
     },
     robot::{
@@ -20,30 +17,6 @@ use crate::{
         panda::{self, ARM_DOFS},
     },
 };
-
-/// Distance of the gel's samples that hard shapes press on, m: that of a soft body's samples where it is grasped.
-const GEL_SPACING: f64 = 0.75e-3;
-
-/// A gel pad as contact samples and hard shapes feel it.
-#[derive(Debug)]
-struct Pad(PadSurface);
-
-impl Surface for Pad {
-    fn contact(&self, p: &Vec3, _facing: &Vec3, spacing: f64) -> Contact {
-        let contact = self.0.contact(p, spacing);
-        Contact { phi: contact.phi, normal: contact.normal_p, coverage: contact.coverage }
-    }
-
-    fn bounds(&self) -> Aabb {
-        let half = Vec3::new(self.0.length, self.0.width, 0.0) * 0.5;
-        Aabb { min: Vec3::new(-half.x, -half.y, -self.0.thickness), max: half }
-    }
-
-    fn solid(&self) -> Option<Solid> {
-        let patches = self.0.patches(GEL_SPACING).into_iter();
-        Some(Solid::Gel(patches.map(|(p, normal, area)| GelSample { p, normal, area }).collect()))
-    }
-}
 
 /// The robot of a simulation.
 #[derive(Debug)]
@@ -164,7 +137,7 @@ fn add_pad(world: &mut World, spec: &RobotSpec, tree: usize, side: Side) -> Coll
     let friction = Friction { static_mu: spec.pads.static_mu, dynamic_mu: spec.pads.dynamic_mu };
     let layer = Layer { normal: spec.pads.normal_modulus, shear: spec.pads.tangential_modulus };
     let name = if side == Side::Left { "left pad" } else { "right pad" };
-    let surface = Arc::new(Pad(PadSurface::default()));
+    let surface = Arc::new(PadSurface::default());
     world.add_collider(Collider::new(name, (mover, pads::pad_pose_in_finger(side)), surface, friction, layer))
 }
 

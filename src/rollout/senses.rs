@@ -14,7 +14,7 @@ use crate::{
         fem::Rest,
         world::{ContactPatch, Frame, Presser},
     },
-    policy::{CameraPicture, PadForce, TouchFrame},
+    policy::{PadForce, TouchFrame},
     robot::{RobotSpec, Side, pads, panda},
     scene::{Asset, Body, Camera, Scene},
     sensing::{
@@ -38,6 +38,26 @@ pub enum SenseError {
     /// A touch cannot be worked out.
     #[error(transparent)]
     Field(#[from] FieldError),
+    /// What a script set is wrong.
+    #[error("{at}: {source}")]
+    Set {
+        /// File and line.
+        at: String,
+        /// What is wrong.
+        source: Box<SenseError>,
+    },
+    /// Two pictures have one name.
+    #[error(
+        "camera {camera}: name: {picture:?} is a picture of {owner} already; give the camera another name"
+    )]
+    Name {
+        /// The camera.
+        camera: String,
+        /// The name of the picture.
+        picture: String,
+        /// Whose picture it is.
+        owner: String,
+    },
     /// There is no such camera.
     #[error("there is no camera {name:?}; the scene has {have}")]
     NoCamera {
@@ -49,6 +69,16 @@ pub enum SenseError {
     /// A soft body and its skin do not belong together.
     #[error("{0}: its surface lies outside of its voxel mesh; build both from one shape")]
     Skin(String),
+}
+
+impl SenseError {
+    /// The same error with the place in the script that set the camera.
+    pub(super) fn set_by(self, camera: &Camera) -> Self {
+        match &camera.set_at {
+            Some(at) => Self::Set { at: at.clone(), source: Box::new(self) },
+            None => self,
+        }
+    }
 }
 
 /// An object of the scene as the sensors know it.
@@ -83,8 +113,6 @@ const TAXELS: [usize; 2] = [25, 21];
 /// Number of the robot in segmentations; objects count from 1 in the order of the scene, the parts of each after
 /// it.
 pub const ROBOT: u16 = 1000;
-/// Static things longer than this are grounds, whose own shadow nobody sees, m.
-const GROUND: f64 = 1.0;
 
 impl Senses {
     /// The sensors of `sim`; nothing is computed yet.
@@ -135,29 +163,56 @@ impl Senses {
         &self.scene.cameras
     }
 
-    /// What `camera` sees.
+    /// What `camera` sees. One that stands inside of something sees what is beyond it, and the picture says so: things may
+    /// get around a camera in the course of an episode, and that must not end it.
     ///
     /// # Errors
-    /// A number of the camera or light out of range, a camera inside of a thing, a thing that cannot be drawn.
+    /// A number of the camera or light out of range, a thing that cannot be drawn.
     pub fn see(&mut self, frame: &Frame, camera: &Camera) -> Result<Picture, SenseError> {
         let stage = match self.stage.take() {
             Some(stage) => stage,
-            None => Stage::new(self.things()?, self.scene.lighting.clone())?,
+            None => self.build()?,
         };
-        let hand_w = frame.links[self.tree][panda::HAND_LINK] * panda::hand_in_link();
-        let picture = render(&stage, &FrameView::of(frame, Some(hand_w)), camera, &mut self.eye);
+        let picture = render(&stage, &self.view(frame), camera, &mut self.eye);
         self.stage = Some(stage);
-        Ok(picture?)
+        picture.map_err(|error| SenseError::from(error).set_by(camera))
     }
 
-    /// The picture of the scene's camera of a name, for a policy.
+    /// Everything that is drawn, for [`render`]; made when somebody first looks.
     ///
     /// # Errors
-    /// As [`Senses::see`], or there is no such camera.
-    pub fn picture(&mut self, frame: &Frame, name: &str) -> Result<CameraPicture, SenseError> {
-        let camera = self.camera(name)?.clone();
-        let picture = self.see(frame, &camera)?.into_image();
-        Ok(CameraPicture { name: camera.name, picture })
+    /// A thing that cannot be drawn, a number of the light out of range.
+    pub fn stage(&mut self) -> Result<&Stage, SenseError> {
+        let stage = match self.stage.take() {
+            Some(stage) => stage,
+            None => self.build()?,
+        };
+        Ok(self.stage.insert(stage))
+    }
+
+    fn build(&self) -> Result<Stage, CameraError> {
+        Stage::new(self.things()?, self.scene.lighting.clone())
+    }
+
+    /// What pictures need of a state.
+    pub fn view<'a>(&self, frame: &'a Frame) -> FrameView<'a> {
+        let hand_w = frame.links[self.tree][panda::HAND_LINK] * panda::hand_in_link();
+        FrameView::of(frame, Some(hand_w))
+    }
+
+    /// The same for a camera where somebody put it, before anything has moved.
+    ///
+    /// # Errors
+    /// As [`Senses::see`]; also if the camera stands inside of something.
+    pub fn see_from_outside(&mut self, frame: &Frame, camera: &Camera) -> Result<Picture, SenseError> {
+        let picture = self.see(frame, camera)?;
+        match &picture.inside {
+            None => Ok(picture),
+            Some(object) => {
+                let inside = CameraError::Inside { camera: camera.name.clone(), object: object.clone() };
+                Err(SenseError::from(inside).set_by(camera))
+            }
+        }
     }
 
     /// What the left and right finger feel.
@@ -225,7 +280,7 @@ impl Senses {
         let input = PadInput {
             load: PadLoad::of_patch(patch),
             surfaces: &surfaces,
-            friction: self.robot.pads.static_mu,
+            friction: PadLoad::friction_of(patch).unwrap_or(self.robot.pads.static_mu),
             give: if placed.len() == 1 { give } else { None },
         };
         Ok(sensor.see(&input, &mut self.touch)?)
@@ -246,7 +301,7 @@ impl Senses {
                 object: index as u16 + 1,
                 model: self.looks.model(&part.name, &part.asset, mesh)?,
                 mount,
-                casts_shadow: !part.is_ground(),
+                casts_shadow: true,
             })
         };
         let mut things: Vec<Thing> = self.parts.iter().enumerate().map(draw).collect::<Result<_, _>>()?;
@@ -270,10 +325,6 @@ impl Part {
         let (Body::Soft(material), Some(rest)) = (&self.asset.body, &self.rest) else { return None };
         let modulus = material.youngs_pa / (1.0 - material.poisson * material.poisson);
         Some(Give { modulus, resolved: 2.0 * rest.mesh.edge })
-    }
-
-    fn is_ground(&self) -> bool {
-        matches!(self.kind, Kind::Static) && self.asset.shape.bounds().size().max() > GROUND
     }
 }
 

@@ -36,6 +36,9 @@ pub struct Camera {
     pub width: usize,
     /// Height of the image, pixels.
     pub height: usize,
+    /// Where a script last set it, as messages name a place (`file:line`); `None` for one that no script touched.
+    #[serde(skip)]
+    pub set_at: Option<String>,
 }
 
 /// Vertical field of view, rad, of a lens of some focal length behind an aperture of some height (one unit for both).
@@ -69,6 +72,7 @@ impl Camera {
             far_m: 20.0,
             width: POLICY_EDGE,
             height: POLICY_EDGE,
+            set_at: None,
         }
     }
 
@@ -82,6 +86,7 @@ impl Camera {
             far_m: 20.0,
             width: POLICY_EDGE,
             height: POLICY_EDGE,
+            set_at: None,
         }
     }
 

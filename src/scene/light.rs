@@ -39,7 +39,7 @@ pub struct Lighting {
     pub sky: Sky,
     /// Factor on what reaches the camera, before tone mapping.
     pub exposure: f64,
-    /// Middle of the ball in which things cast shadows, world, m.
+    /// Middle of the ball in which what moves casts shadows, and in which those of fixed things are fine, world, m.
     pub shadow_centre_w: Vec3,
     /// Radius of that ball, m.
     pub shadow_radius_m: f64,

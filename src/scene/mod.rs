@@ -4,6 +4,7 @@
 mod articulated;
 mod camera;
 mod light;
+mod print;
 mod visual;
 
 mod fingerprint;
@@ -17,6 +18,7 @@ use crate::geometry::{Pose, Vec3, shape::Shape};
 pub use articulated::{Joint, Motion, Part, part_poses};
 pub use camera::{Camera, CameraMount, POLICY_EDGE, fovy_of_lens};
 pub use light::{KeyLight, Lighting, Sky};
+pub use print::{Letters, Line, MOST_LETTERS, Print, Typeface};
 pub use visual::{Layer, Mask, Visual};
 
 /// How an object moves.
@@ -151,6 +153,17 @@ impl Scene {
             std::iter::once(object.name.clone()).chain(parts).collect::<Vec<_>>()
         };
         self.objects.iter().flat_map(of).collect()
+    }
+
+    /// The same scene with every soft body made rigid: same shapes, places, densities, friction and looks.
+    pub fn rigid_twin(mut self) -> Self {
+        for object in &mut self.objects {
+            if let Body::Soft(material) = &object.asset.body {
+                let density = material.density;
+                Arc::make_mut(&mut object.asset).body = Body::Rigid { density };
+            }
+        }
+        self
     }
 
     /// A camera by name.

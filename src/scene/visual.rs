@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::Print;
 use crate::geometry::shape::Shape;
 
 /// The look of a surface (metal/rough model). Colours are linear RGB.
@@ -152,14 +153,19 @@ pub enum Mask {
         /// Width of the border, half of it on either side of the shape's surface, m.
         soft_m: f64,
     },
+    /// The letters of a line of text, where the surface faces who reads it.
+    Text {
+        /// The line.
+        print: Arc<Print>,
+    },
     /// One minus a mask.
     Inverse {
         /// The mask.
-        mask: Box<Mask>,
+        mask: Arc<Mask>,
     },
     /// The product of masks: where all of them are.
     Both {
         /// The masks.
-        masks: Vec<Mask>,
+        masks: Vec<Arc<Mask>>,
     },
 }

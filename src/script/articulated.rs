@@ -106,7 +106,7 @@ pub(super) fn read(lua: &Lua, asset: &Table, body: &Table, friction: Friction) -
     let mut parts: Vec<Part> = Vec::new();
     for index in sorted {
         let table = &tables[index];
-        let LuaShape(shape) = table.get("shape")?;
+        let shape = table.get::<LuaShape>("shape")?.shape().clone();
         let (name, density): (String, f64) = (table.get("name")?, table.get("density")?);
         let own = !table.get::<Value>("visuals")?.is_nil();
         let parent: Option<String> = table.get("parent")?;

@@ -336,6 +336,23 @@ pub static OPTION: Record = Record {
     ],
 };
 
+/// How far a hand would be from things.
+pub static CLEARANCE: Record = Record {
+    label: "scene:clearance",
+    class: "softvt.Clearance",
+    kind: "softvt.Clearance",
+    doc: "How a hand would be held, and what it may touch.",
+    fields: &[
+        field(
+            "width",
+            Type::Number("m", Range::closed(0.0, 0.08)),
+            Presence::Number(0.08),
+            "Distance of the pads.",
+        ),
+        field("ignore", Type::List(&Type::Text), Optional, "Scene names of what it may touch."),
+    ],
+};
+
 /// What `scene:add` takes.
 pub static PLACE: Record = Record {
     label: "scene:add",
@@ -405,4 +422,5 @@ pub static CONSTRUCTORS: &[(&str, &Record)] = &[
 ];
 
 /// Tables that functions take but no constructor makes.
-pub static PLAIN: &[&Record] = &[&FRICTION, &PART, &VISUAL, &LAYER, &FINISH, &OPTION, &PLACE, &POSE];
+pub static PLAIN: &[&Record] =
+    &[&FRICTION, &PART, &VISUAL, &LAYER, &FINISH, &OPTION, &PLACE, &POSE, &CLEARANCE];

@@ -216,6 +216,56 @@ mask!(
     ]
 );
 
+mask!(
+    TEXT,
+    "mask.text",
+    "softvt.TextMask",
+    "The letters of a line of text, printed on what faces who reads it. Surfaces with text are drawn with finer detail than others.",
+    &[
+        field("text", Type::Text, Required, "What it says: at most 64 letters."),
+        field(
+            "height_m",
+            Type::Number("m", Range::closed(0.0005, 1.0)),
+            Required,
+            "Height of a capital letter."
+        ),
+        field(
+            "at",
+            Type::Vector(3, "m"),
+            Required,
+            "Where the middle of the line is; of a line that is wrapped, only its height counts."
+        ),
+        field(
+            "facing",
+            Type::OneOf(&[
+                Type::Choice(&["+x", "-x", "+y", "-y", "+z", "-z"]),
+                Type::Vector(3, "any length")
+            ]),
+            Required,
+            "Where the printed surface looks. Lines on top have their head towards +y, others towards +z."
+        ),
+        field(
+            "turn",
+            Type::Number("rad", Range::ANY),
+            Presence::Number(0.0),
+            "Turn of the line on its surface, counter-clockwise to who reads it."
+        ),
+        field(
+            "wrap_m",
+            LENGTH,
+            Optional,
+            "Radius of the upright cylinder about the z axis that the line is laid round; flat if left out."
+        ),
+        field(
+            "weight",
+            Type::Number("", Range::closed(0.0, 0.25)),
+            Presence::Number(0.08),
+            "How much strokes are thickened, in heights of a capital letter."
+        ),
+        field("font", Type::Choice(&["sans", "mono"]), Presence::Text("sans"), "Typeface."),
+    ]
+);
+
 /// Constructors `softvt.mask.name{…}`.
 pub static MASKS: &[(&str, &Record)] = &[
     ("checker", &CHECKER),
@@ -229,6 +279,7 @@ pub static MASKS: &[(&str, &Record)] = &[
     ("weave", &WEAVE),
     ("facing", &FACING),
     ("inside", &INSIDE),
+    ("text", &TEXT),
 ];
 
 /// `softvt.Mask`.
@@ -236,10 +287,11 @@ pub static MASK_CLASS: Class = Class {
     name: "softvt.Mask",
     doc: "A number between 0 and 1 at every point of a surface: where a layer is. It never changes; methods give new masks.",
     fields: &[],
+    written: &[],
     methods: &[
         method(
             "both",
-            &[("other", "softvt.Mask")],
+            &[("other", Type::Object("softvt.Mask"))],
             &["softvt.Mask"],
             "Where this and the other are: their product.",
         ),

@@ -13,7 +13,7 @@ const fn field(name: &'static str, ty: Type, presence: Presence, doc: &'static s
 
 /// A world.
 pub static WORLD: Record = Record {
-    label: "world",
+    label: "softvt.world",
     class: "softvt.WorldSpec",
     kind: "softvt.WorldSpec",
     doc: "A world of soft bodies and prescribed or fixed solids, without a robot.",
@@ -83,7 +83,7 @@ pub static WORLD_SOLID: Record = Record {
 
 /// A settled scene with the robot.
 pub static SIMULATE: Record = Record {
-    label: "simulate",
+    label: "softvt.simulate",
     class: "softvt.SimulateSpec",
     kind: "softvt.SimulateSpec",
     doc: "A scene with the robot, built and settled. The settled shapes are the reference of deformation.",
@@ -103,7 +103,7 @@ pub static SIMULATE: Record = Record {
 
 /// What an envelope is made of.
 pub static ENVELOPE: Record = Record {
-    label: "envelope",
+    label: "softvt.envelope",
     class: "softvt.EnvelopeSpec",
     kind: "softvt.EnvelopeSpec",
     doc: "The rows of a calibration.",
@@ -134,7 +134,7 @@ pub static ENVELOPE: Record = Record {
 
 /// What `softvt.image` takes.
 pub static NEW_IMAGE: Record = Record {
-    label: "image",
+    label: "softvt.image",
     class: "softvt.NewImage",
     kind: "softvt.NewImage",
     doc: "An empty picture.",

@@ -1,23 +1,36 @@
 //! The binding table of worlds and simulations: their methods.
 
-use super::catalogue_classes::{Class, method};
+use super::{
+    catalogue_classes::{Class, method},
+    catalogue_world::{SEE, TEXT, WORLD_SOFT, WORLD_SOLID},
+    schema::{Range, Type},
+};
+
+/// Largest edge of a picture that a script may make, pixels.
+pub(super) const MOST_EDGE: f64 = 8192.0;
+const EDGE: Type = Type::Integer(Range::closed(1.0, MOST_EDGE));
+const REGION: Type = Type::Vector(4, "x, y, width, height in pixels");
+/// Where a picture may be put on another, pixels.
+const PLACE: Type = Type::Number("pixels", Range::closed(-1e5, 1e5));
+const SOLID_VALUE: Type = Type::Object("softvt.Solid");
 
 /// `softvt.World`.
-pub const WORLD: Class = Class {
+pub static WORLD: Class = Class {
     name: "softvt.World",
     doc: "The mechanics alone: soft bodies among solids that stand still or move as prescribed.",
     fields: &[],
+    written: &[],
     methods: &[
-        method("soft", &[("spec", "softvt.WorldSoft")], &["softvt.Body"], "Adds a soft body."),
+        method("soft", &[("spec", Type::Nested(&WORLD_SOFT))], &["softvt.Body"], "Adds a soft body."),
         method(
             "kinematic",
-            &[("spec", "softvt.WorldSolid")],
+            &[("spec", Type::Nested(&WORLD_SOLID))],
             &["softvt.Solid"],
             "Adds a solid that move_to moves.",
         ),
         method(
             "static",
-            &[("spec", "softvt.WorldSolid")],
+            &[("spec", Type::Nested(&WORLD_SOLID))],
             &["softvt.Solid"],
             "Adds a solid that never moves.",
         ),
@@ -25,7 +38,7 @@ pub const WORLD: Class = Class {
         method("time", &[], &["number"], "Time, s."),
         method("newton", &[], &["number", "integer"], "Mean and largest number of Newton iterations a step."),
         method("energy", &[], &["number"], "Kinetic, elastic and potential energy, J."),
-        method("phase", &[("name", "string")], &[], "From now on, CPU time goes to this phase."),
+        method("phase", &[("name", Type::Text)], &[], "From now on, CPU time goes to this phase."),
         method(
             "report_timing",
             &[],
@@ -36,16 +49,22 @@ pub const WORLD: Class = Class {
 };
 
 /// `softvt.Body`.
-pub const BODY: Class = Class {
+pub static BODY: Class = Class {
     name: "softvt.Body",
     doc: "A soft body of a world.",
     fields: &[],
+    written: &[],
     methods: &[
         method("centre", &[], &["number[]"], "Centre of mass, m."),
         method("velocity", &[], &["number[]"], "Velocity of the centre of mass, m/s."),
         method("speed", &[], &["number"], "Speed of the fastest node, m/s."),
         method("mass", &[], &["number"], "Mass, kg."),
-        method("min_det_f", &[], &["number"], "Least det F of a filled element; 0 or less is inverted."),
+        method(
+            "min_det_f",
+            &[],
+            &["number?"],
+            "Least det F of a filled element; 0 or less is inverted, nil where no element is filled.",
+        ),
         method("asleep", &[], &["boolean"], "Whether it sleeps."),
         method(
             "deformation",
@@ -56,26 +75,26 @@ pub const BODY: Class = Class {
         method("extent", &[], &["number[]"], "Size of the bounding box of the nodes, m."),
         method(
             "set_reference",
-            &[("which", "\"rest\"|\"now\"")],
+            &[("which", Type::Choice(&["rest", "now"]))],
             &[],
             "Measures deformation from the rest shape (default) or from now.",
         ),
-        method("force", &[("solid", "softvt.Solid")], &["number"], "Normal force of a solid on the body, N."),
+        method("force", &[("solid", SOLID_VALUE)], &["number"], "Normal force of a solid on the body, N."),
         method(
             "shear",
-            &[("solid", "softvt.Solid")],
+            &[("solid", SOLID_VALUE)],
             &["number"],
             "Tangential force of a solid on the body, N.",
         ),
         method(
             "travel",
-            &[("solid", "softvt.Solid")],
+            &[("solid", SOLID_VALUE)],
             &["number"],
             "How far the patch has slid on the solid, mm.",
         ),
         method(
             "slipping",
-            &[("solid", "softvt.Solid")],
+            &[("solid", SOLID_VALUE)],
             &["number"],
             "Share of the patch's samples that slip, 0..1.",
         ),
@@ -83,39 +102,41 @@ pub const BODY: Class = Class {
 };
 
 /// `softvt.Solid`.
-pub const SOLID: Class = Class {
+pub static SOLID: Class = Class {
     name: "softvt.Solid",
     doc: "A solid of a world.",
     fields: &[],
+    written: &[],
     methods: &[method(
         "move_to",
-        &[("xyz", "number[]"), ("turn?", "number[]")],
+        &[("xyz", Type::Vector(3, "m")), ("turn?", Type::Vector(3, "rad"))],
         &[],
         "Where it will be after the next step: position, m, and axis-angle, rad.",
     )],
 };
 
 /// `softvt.Simulation`.
-pub const SIMULATION: Class = Class {
+pub static SIMULATION: Class = Class {
     name: "softvt.Simulation",
     doc: "A settled scene with the robot.",
     fields: &[],
+    written: &[],
     methods: &[
         method(
             "drive",
-            &[("expert", "fun(arm: softvt.Arm, scene: softvt.View)")],
+            &[("expert", Type::Function("fun(arm: softvt.Arm, scene: softvt.View)"))],
             &["boolean", "string?"],
             "Runs an expert to its end; false and why once the physics has failed.",
         ),
         method(
             "wait",
-            &[("seconds", "number")],
+            &[("seconds", Type::Number("s", Range::closed(0.0, 600.0)))],
             &["boolean", "string?"],
             "Holds the last command for a time.",
         ),
         method(
             "watch",
-            &[("object", "string")],
+            &[("object", Type::Text)],
             &["table"],
             "width_m, height_m (rise of the centre), speed, asset; of a part joint, of what has parts joints by name; of a \
              movable object also pad_force (N) and slip_mm of \
@@ -123,13 +144,13 @@ pub const SIMULATION: Class = Class {
         ),
         method(
             "see",
-            &[("see?", "softvt.See")],
+            &[("see?", Type::Nested(&SEE))],
             &["softvt.Image"],
             "What a camera sees now; third_person if nothing else is said.",
         ),
         method(
             "feel",
-            &[("side", "\"left\"|\"right\"")],
+            &[("side", Type::Choice(&["left", "right"]))],
             &["softvt.Felt"],
             "What a finger's tactile sensor sees now, and the true force on its gel.",
         ),
@@ -139,7 +160,7 @@ pub const SIMULATION: Class = Class {
 };
 
 /// `softvt.Felt`.
-pub const FELT: Class = Class {
+pub static FELT: Class = Class {
     name: "softvt.Felt",
     doc: "A finger's tactile sensor at one moment; docs/tactile.md draws its frames.",
     fields: &[
@@ -151,29 +172,36 @@ pub const FELT: Class = Class {
         ("force", "number[]", "True force on the gel, N, pad frame; a pressing body makes z negative."),
         ("depth_mm", "number", "Greatest depth of the dent, mm."),
     ],
+    written: &[],
     methods: &[],
 };
 
 /// `softvt.Image`.
-pub const IMAGE: Class = Class {
+pub static IMAGE: Class = Class {
     name: "softvt.Image",
     doc: "A picture of 8-bit sRGB pixels. Regions are x, y, width, height in pixels from the top left.",
     fields: &[("width", "integer", "Width, pixels."), ("height", "integer", "Height, pixels.")],
+    written: &[],
     methods: &[
-        method("mean", &[("region?", "number[]")], &["number[]"], "Mean red, green and blue, 0..255."),
-        method("crop", &[("region", "number[]")], &["softvt.Image"], "A part as a picture of its own."),
+        method("mean", &[("region?", REGION)], &["number[]"], "Mean red, green and blue, 0..255."),
+        method("crop", &[("region", REGION)], &["softvt.Image"], "A part as a picture of its own."),
         method(
             "resize",
-            &[("width", "integer"), ("height", "integer")],
+            &[("width", EDGE), ("height", EDGE)],
             &["softvt.Image"],
             "The same in another size.",
         ),
         method(
             "paste",
-            &[("other", "softvt.Image"), ("x", "integer"), ("y", "integer")],
+            &[("other", Type::Object("softvt.Image")), ("x", PLACE), ("y", PLACE)],
             &[],
             "Puts another picture on this one.",
         ),
-        method("text", &[("text", "string"), ("how", "softvt.Text")], &[], "Writes a line of text on it."),
+        method(
+            "text",
+            &[("text", Type::Line), ("how", Type::Nested(&TEXT))],
+            &[],
+            "Writes a line of text on it.",
+        ),
     ],
 };

@@ -6,7 +6,7 @@ use crate::{
     geometry::Vec3,
     policy::{Action, Observation},
     robot::rotation,
-    rollout::{ControlError, Controller, Handle, Kind, Simulation},
+    rollout::{ControlError, Controller, Handle, Simulation},
 };
 
 /// Drives by a Lua expert; once it is done, the last command stays.
@@ -117,18 +117,15 @@ fn view(sim: &Simulation, time_s: f64) -> ExpertView {
 fn seen(sim: &Simulation, object: &Handle, name: &str) -> ObjectView {
     let pose = sim.pose(object);
     let bounds = object.bounds;
-    let centre_w = match object.kind {
-        Kind::Soft(_) => sim.centre(object),
-        _ => (pose * nalgebra::Point3::from(bounds.centre())).coords,
-    };
+    let centre_w = (pose * nalgebra::Point3::from(bounds.centre())).coords;
     let x = pose.rotation * Vec3::x();
     ObjectView {
         name: name.to_owned(),
-        asset: object.asset.name.clone(),
+        asset: object.asset.clone(),
+        pose_w: pose,
+        bounds,
         centre_w,
         yaw: x.y.atan2(x.x),
-        size: bounds.size(),
-        hints: object.asset.hints.clone(),
         joint: sim.joint(object),
         parts: Vec::new(),
     }

@@ -2,7 +2,7 @@
 
 use mlua::{Lua, LuaSerdeExt, Table, Value};
 
-use super::{catalogue_world::ENVELOPE, sandbox::fail, schema, sim_api::read};
+use super::{catalogue_world::ENVELOPE, schema, sim_api::read};
 use crate::{
     evaluation::{
         calibration::{self, Envelope, HoldRow, StableRule, SweepRow},
@@ -15,22 +15,18 @@ use crate::{
 pub(super) fn install(lua: &Lua, api: &Table) -> mlua::Result<()> {
     api.set("envelope", lua.create_function(|lua, value: Value| envelope(lua, &value))?)?;
     let stable = |lua: &Lua, row: Value| {
-        let row: SweepRow = read(lua, "softvt.stable", row)?;
+        let row: SweepRow = read(lua, "softvt.stable", &row)?;
         Ok(StableRule::default().accepts(&row))
     };
     api.set("stable", lua.create_function(stable)?)
 }
 
 fn envelope(lua: &Lua, value: &Value) -> mlua::Result<Table> {
-    let Value::Table(table) = value else {
-        return Err(fail(lua, format!("softvt.envelope: expected a table, got {}", schema::got(value))));
-    };
-    let spec = schema::check(lua, &ENVELOPE, table)
-        .map_err(|fault| schema::fault_here(lua, "softvt.envelope", &fault))?;
+    let spec = schema::checked(lua, &ENVELOPE, value)?;
     let asset: String = spec.get("asset")?;
     let kappa: f64 = spec.get("kappa")?;
-    let holds: Vec<HoldRow> = read(lua, "softvt.envelope: holds", spec.get("holds")?)?;
-    let sweep: Vec<SweepRow> = read(lua, "softvt.envelope: sweep", spec.get("sweep")?)?;
+    let holds: Vec<HoldRow> = read(lua, "softvt.envelope: holds", &spec.get("holds")?)?;
+    let sweep: Vec<SweepRow> = read(lua, "softvt.envelope: sweep", &spec.get("sweep")?)?;
     let envelope = Envelope::new(holds, sweep, kappa);
     let limit = calibration::limit(&envelope.sweep, kappa);
     let made_by = format!("softvt {}", env!("CARGO_PKG_VERSION"));

@@ -4,7 +4,7 @@ use mlua::{Function, Table, Value};
 
 use super::{
     Loaded, ScriptError, expert,
-    plan::{Machine, find_task, reopen},
+    plan::{Machine, find_task, reopen, sound_task},
     random::Rng,
     sandbox::{fail, locked},
     scene_api::{LuaScene, empty_scene},
@@ -56,7 +56,7 @@ impl Episode {
     pub fn open(loaded: &Loaded, request: &EpisodeRequest) -> Result<Self, ScriptError> {
         let (machine, values) = reopen(loaded)?;
         let (suite, task) = find_task(&machine, &values, &request.suite, request.task)?;
-        let parts = read(&task).map_err(|e| machine.vm.explain(&e))?;
+        let parts = read(&machine, &task).map_err(|e| machine.vm.explain(&e))?;
         let seed = EpisodeSeed {
             suite: request.suite.clone(),
             layout: parts.layout,
@@ -96,7 +96,8 @@ struct Parts {
     expert: Option<Function>,
 }
 
-fn read(task: &Table) -> mlua::Result<Parts> {
+fn read(machine: &Machine, task: &Table) -> mlua::Result<Parts> {
+    sound_task(&machine.vm.lua, task)?;
     let layout: Table = task.get("layout")?;
     Ok(Parts { layout: layout.get("name")?, build: layout.get("build")?, expert: task.get("expert")? })
 }

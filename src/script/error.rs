@@ -108,6 +108,7 @@ impl Context<'_> {
             Some(rest) => ("syntax error: ", rest),
             None => ("", text),
         };
+        let rest = without_own_position(rest);
         let (message, inner_trace) = rest.split_once("\nstack traceback:").unwrap_or((rest, ""));
         match self.position(message) {
             Some((file, line, said)) => {
@@ -144,6 +145,13 @@ impl Context<'_> {
         });
         known.cloned()
     }
+}
+
+/// The message without the line of this room's own Lua, where that failed for what a script gave it.
+fn without_own_position(message: &str) -> &str {
+    let inner = ["softvt:", "softvt.arm:"].iter().find_map(|name| message.strip_prefix(name));
+    let said = inner.and_then(|rest| rest.split_once(": ")).filter(|(line, _)| line.parse::<usize>().is_ok());
+    said.map_or(message, |(_, said)| said)
 }
 
 /// Whether Lua could only print an address for the error value.

@@ -1,10 +1,11 @@
 //! Running an experiment: points in, rows out.
 
 use mlua::{Function, Lua, LuaSerdeExt, Table, Value};
-use serde_json::{Map, Number, Value as Json};
+use serde_json::{Map, Value as Json};
 
 use super::{
     Loaded, ScriptError, catalogue,
+    data::json,
     image_api::{picture, png},
     plan::{Machine, reopen},
     sandbox::fail,
@@ -67,7 +68,7 @@ impl Experiment {
     pub fn point(&self, index: usize) -> Result<Json, ScriptError> {
         let lua = &self.machine.vm.lua;
         let point = self.points.get(index).cloned().unwrap_or(Value::Nil);
-        json(lua, &point, "point", 0).map_err(|e| self.machine.vm.explain(&e))
+        json(lua, &point, "point").map_err(|e| self.machine.vm.explain(&e))
     }
 
     /// The rows of point `index`. `math.random` starts afresh for each point, so that the order does not matter.
@@ -78,6 +79,7 @@ impl Experiment {
         let vm = &self.machine.vm;
         vm.random.reseed(crate::benchmark::seed::keyed(&["softvt point", &index.to_string()]));
         let fetch = || -> mlua::Result<_> {
+            schema::still_sound(&vm.lua, &catalogue::EXPERIMENT, &self.table)?;
             Ok((self.table.get::<Function>("run")?, self.table.get::<Value>("options")?))
         };
         let (run, options) = fetch().map_err(|e| vm.explain(&e))?;
@@ -97,6 +99,7 @@ impl Experiment {
 
     fn call_finish(&self, rows: &[Row]) -> mlua::Result<Result<Finish, ScriptError>> {
         let vm = &self.machine.vm;
+        schema::still_sound(&vm.lua, &catalogue::EXPERIMENT, &self.table)?;
         let Some(finish) = self.table.get::<Option<Function>>("finish")? else {
             return Ok(Ok(Finish::default()));
         };
@@ -152,7 +155,7 @@ fn bytes(lua: &Lua, content: &Value) -> mlua::Result<Vec<u8>> {
     if let Some(picture) = picture(content) {
         return png(&picture).map_err(mlua::Error::external);
     }
-    let json = json(lua, content, "finish.files", 0)?;
+    let json = json(lua, content, "finish.files")?;
     let text = serde_json::to_string_pretty(&json).map_err(mlua::Error::external)?;
     Ok((text + "\n").into_bytes())
 }
@@ -207,7 +210,7 @@ fn product(lua: &Lua, grid: &Table) -> mlua::Result<Vec<Value>> {
 }
 
 fn rows(lua: &Lua, result: &Value) -> mlua::Result<Vec<Row>> {
-    let row = |value: &Value| match json(lua, value, "experiment.run: row", 0)? {
+    let row = |value: &Value| match json(lua, value, "experiment.run: row")? {
         Json::Object(map) => Ok(map),
         _ => Err(fail(
             lua,
@@ -221,41 +224,4 @@ fn rows(lua: &Lua, result: &Value) -> mlua::Result<Vec<Row>> {
         Value::Table(table) if table.is_empty() => Ok(Vec::new()),
         other => Ok(vec![row(other)?]),
     }
-}
-
-/// A Lua value as JSON, keys sorted; numbers must be finite.
-fn json(lua: &Lua, value: &Value, place: &str, depth: usize) -> mlua::Result<Json> {
-    Ok(match value {
-        Value::Nil => Json::Null,
-        Value::Boolean(flag) => Json::Bool(*flag),
-        Value::Integer(n) => Json::Number((*n).into()),
-        Value::Number(n) => match Number::from_f64(*n) {
-            Some(number) => Json::Number(number),
-            None => return Err(fail(lua, format!("{place}: expected a finite number, got {n}"))),
-        },
-        Value::String(text) => Json::String(text.to_string_lossy().to_string()),
-        Value::Table(table) if depth < 32 => {
-            let count = table.raw_len();
-            if count > 0 && table.pairs::<Value, Value>().count() == count {
-                let items = (1..=count)
-                    .map(|index| json(lua, &table.raw_get(index)?, &format!("{place}[{index}]"), depth + 1));
-                return items.collect::<mlua::Result<_>>().map(Json::Array);
-            }
-            let mut map = Map::new();
-            for (key, value) in sorted_pairs(table) {
-                let Value::String(name) = &key else {
-                    return Err(fail(
-                        lua,
-                        format!("{place}: expected names as keys, got {}", schema::got(&key)),
-                    ));
-                };
-                let name = name.to_string_lossy().to_string();
-                let inner = json(lua, &value, &format!("{place}.{name}"), depth + 1)?;
-                map.insert(name, inner);
-            }
-            Json::Object(map)
-        }
-        Value::Table(_) => return Err(fail(lua, format!("{place}: tables are nested too deeply"))),
-        other => return Err(fail(lua, format!("{place}: expected data, got {}", schema::got(other)))),
-    })
 }

@@ -1,40 +1,40 @@
 //! Experts: Lua coroutines that see the true state and give one command a control step.
 
-use std::{
-    collections::BTreeMap,
-    sync::{Arc, Mutex},
-};
+use std::sync::{Arc, Mutex};
 
-use mlua::{
-    Function, Lua, MetaMethod, MultiValue, Table, Thread, UserData, UserDataFields, UserDataMethods, Value,
-    chunk::ChunkMode,
-};
+use mlua::{Function, Lua, MultiValue, Table, Thread, UserDataMethods, Value, chunk::ChunkMode};
 
 use super::{
     ScriptError,
+    catalogue_classes::{self as classes, Class},
+    host::{self, Hosted, Read, hosted, method},
     plan::Machine,
     pose::LuaPose,
-    sandbox::{fail, locked},
+    sandbox::{base, fail, locked},
     schema::{self, number, unknown},
     sources::embedded,
 };
-use crate::geometry::{Pose, Vec3};
+use crate::{
+    geometry::{Pose, Vec3, shape::Aabb},
+    robot::{Obstacle, clearance, gripper::OPENING},
+    scene::{Asset, Body},
+};
 
 /// What an expert may know of an object.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObjectView {
     /// Name in the scene.
     pub name: String,
-    /// Name of the asset.
-    pub asset: String,
+    /// Its asset.
+    pub asset: Arc<Asset>,
+    /// Object frame in the world.
+    pub pose_w: Pose,
+    /// Bounds of its shape at rest, object frame.
+    pub bounds: Aabb,
     /// Middle of its bounding box, world frame, m.
     pub centre_w: Vec3,
     /// Turn about the vertical, rad.
     pub yaw: f64,
-    /// Edge lengths of its bounding box at rest, in its own frame, m.
-    pub size: Vec3,
-    /// Numbers that its asset gives to experts.
-    pub hints: BTreeMap<String, f64>,
     /// Joint value of a part, m or rad.
     pub joint: Option<f64>,
     /// Its parts by name.
@@ -126,7 +126,7 @@ impl Coroutine {
             values.next().and_then(|value| value.as_userdata()?.borrow::<LuaPose>().ok().map(|pose| pose.0));
         let closure = values.next().and_then(|value| number(&value));
         let gripping = values.next().and_then(|value| value.as_boolean());
-        match (pose, closure, gripping) {
+        match (pose, closure.filter(|closure| (0.0..=1.0).contains(closure)), gripping) {
             (Some(pose_w), Some(closure), Some(gripping)) => {
                 Ok(Some(ExpertCommand { pose_b: view.base_w.inv_mul(&pose_w), closure, gripping }))
             }
@@ -165,29 +165,37 @@ impl Coroutine {
 fn arm(lua: &Lua, host: &mlua::AnyUserData) -> mlua::Result<Table> {
     let text =
         embedded("scripts/softvt/arm.lua").ok_or_else(|| fail(lua, "the embedded library has no arm"))?;
-    lua.load(text).set_name("=softvt.arm").set_mode(ChunkMode::Text).call((host, checks(lua)?))
+    let chunk = lua.load(text).set_name("=softvt.arm").set_mode(ChunkMode::Text).set_environment(base(lua)?);
+    chunk.call((host, checks(lua)?))
 }
 
 /// Checks for the arm's Lua side; errors stand at the expert's own line.
 fn checks(lua: &Lua) -> mlua::Result<Table> {
     let checks = lua.create_table()?;
-    checks.set("pose", lua.create_function(|_, pose: LuaPose| Ok(pose))?)?;
-    let in_range = |lua: &Lua, (label, value, low, high): (String, Value, f64, f64)| {
-        let range = schema::Range::closed(low, high);
-        match number(&value).filter(|n| range.holds(*n)) {
-            Some(n) => Ok(n),
-            None => {
-                let got = schema::got(&value);
-                Err(fail(lua, format!("{label}: expected a number{}, got {got}", range.words())))
-            }
-        }
+    let arguments = |lua: &Lua, (name, values): (String, MultiValue)| match classes::ARM
+        .methods
+        .iter()
+        .find(|signature| signature.name == name)
+    {
+        Some(signature) => host::arguments(lua, &format!("arm:{name}"), signature, values),
+        None => Err(fail(lua, format!("arm: there is no {name:?}"))),
     };
-    checks.set("number", lua.create_function(in_range)?)?;
+    checks.set("arguments", lua.create_function(arguments)?)?;
+    let no_self = |lua: &Lua, (name, first): (String, Value)| -> mlua::Result<()> {
+        Err(host::no_self(lua, &classes::ARM, &name, &first))
+    };
+    checks.set("no_self", lua.create_function(no_self)?)?;
     checks.set("options", lua.create_function(options)?)?;
-    let refuse = |lua: &Lua, (label, key): (String, Value)| -> mlua::Result<()> {
-        Err(fail(lua, format!("{label}: there is no {}", schema::got(&key))))
+    let unknown_key = |lua: &Lua, key: Value| -> mlua::Result<()> {
+        let Value::String(key) = &key else {
+            let what = format!("arm: expected the name of a field or method, got {}", schema::got(&key));
+            return Err(fail(lua, what));
+        };
+        let fields = classes::ARM.fields.iter().map(|(name, ..)| *name);
+        let known = fields.chain(classes::ARM.methods.iter().map(|method| method.name));
+        Err(fail(lua, format!("arm: {}", unknown("key", &key.to_string_lossy(), known))))
     };
-    checks.set("unknown", lua.create_function(refuse)?)?;
+    checks.set("unknown", lua.create_function(unknown_key)?)?;
     let complain = |lua: &Lua, complaint: String| -> mlua::Result<()> { Err(fail(lua, complaint)) };
     checks.set("refuse", lua.create_function(complain)?)?;
     Ok(checks)
@@ -208,7 +216,10 @@ fn options(lua: &Lua, (label, given, defaults): (String, Value, Table)) -> mlua:
     let known: Vec<String> =
         schema::sorted_pairs(&defaults).iter().filter_map(|(key, _)| key.to_string().ok()).collect();
     for (key, value) in schema::sorted_pairs(&given) {
-        let key = key.to_string()?;
+        let Value::String(key) = &key else {
+            return Err(fail(lua, format!("{label}: expected names of options, got {}", schema::got(&key))));
+        };
+        let key = key.to_string_lossy().to_string();
         if !known.contains(&key) {
             return Err(fail(
                 lua,
@@ -239,56 +250,106 @@ fn with<R>(lua: &Lua, view: &Shared, read: impl FnOnce(&ExpertView) -> mlua::Res
     }
 }
 
-/// The arm's measurements.
+/// The arm's measurements: the fields of `softvt.Arm` that are not its own.
+#[derive(Clone)]
 struct Host(Shared);
 
-impl UserData for Host {
-    fn add_methods<M: UserDataMethods<Self>>(methods: &mut M) {
-        methods.add_meta_method(MetaMethod::Index, |lua, this, key: String| {
-            with(lua, &this.0, |view| {
-                Ok(match key.as_str() {
-                    "pose" => {
-                        let pose = LuaPose(view.base_w * view.tcp_b);
-                        Value::UserData(lua.create_userdata(pose)?)
-                    }
-                    "width" => Value::Number(view.width_m),
-                    "closure" => Value::Number(view.closure),
-                    "time" => Value::Number(view.time_s),
-                    "dt" => Value::Number(view.dt_s),
-                    "force" => Value::Table(lua.create_sequence_from(view.pad_force_n)?),
-                    _ => Value::Nil,
-                })
-            })
-        });
+impl Hosted for Host {
+    fn class() -> &'static Class {
+        &classes::ARM
     }
+
+    fn label(&self) -> String {
+        "arm".into()
+    }
+
+    fn read(&self, lua: &Lua, key: &str) -> mlua::Result<Read> {
+        with(lua, &self.0, |view| {
+            Ok(match key {
+                "pose" => {
+                    let pose = LuaPose(view.base_w * view.tcp_b);
+                    Read::Value(Value::UserData(lua.create_userdata(pose)?))
+                }
+                "width" => Read::number(view.width_m),
+                "closure" => Read::number(view.closure),
+                "time" => Read::number(view.time_s),
+                "dt" => Read::number(view.dt_s),
+                _ => Read::together(lua, &view.pad_force_n, "it is measured")?,
+            })
+        })
+    }
+
+    fn methods<M: UserDataMethods<Self>>(_: &mut M) {}
 }
 
 /// `softvt.View`: the scene as an expert sees it.
+#[derive(Clone)]
 struct View(Shared);
 
-impl UserData for View {
-    fn add_fields<F: UserDataFields<Self>>(fields: &mut F) {
-        fields.add_meta_field(MetaMethod::Type, "softvt.View");
+impl Hosted for View {
+    fn class() -> &'static Class {
+        &classes::VIEW
     }
 
-    fn add_methods<M: UserDataMethods<Self>>(methods: &mut M) {
-        methods.add_meta_method(MetaMethod::ToString, |_, _, ()| Ok("softvt.View"));
-        methods.add_method("object", |lua, this, name: String| {
+    fn label(&self) -> String {
+        "scene".into()
+    }
+
+    fn methods<M: UserDataMethods<Self>>(methods: &mut M) {
+        method(methods, "object", |lua, this: &Self, name: String| {
             with(lua, &this.0, |view| seen(lua, find(lua, "object", &view.objects, &name)?))
         });
-        methods.add_method("part", |lua, this, (object, part): (String, String)| {
+        method(methods, "part", |lua, this: &Self, (object, part): (String, String)| {
             with(lua, &this.0, |view| {
                 let whole = find(lua, "object", &view.objects, &object)?;
                 seen(lua, find(lua, "part", &whole.parts, &part)?)
             })
         });
-        methods.add_method("objects", |lua, this, ()| {
+        method(methods, "clearance", room);
+        method(methods, "objects", |lua, this: &Self, ()| {
             with(lua, &this.0, |view| {
                 let tables = view.objects.iter().map(|object| seen(lua, object));
                 lua.create_sequence_from(tables.collect::<mlua::Result<Vec<_>>>()?)
             })
         });
     }
+}
+
+hosted!(Host, View);
+
+/// Distances of the hand from things are told apart up to this, m.
+const FAR: f64 = 0.2;
+
+/// Metres between a hand at `pose` and the nearest thing that is not to be ignored, and its name.
+fn room(
+    lua: &Lua,
+    this: &View,
+    (pose, options): (LuaPose, Option<Table>),
+) -> mlua::Result<(f64, Option<String>)> {
+    let (width, ignored): (f64, Vec<String>) = match options {
+        Some(options) => (options.get("width")?, options.get::<Option<_>>("ignore")?.unwrap_or_default()),
+        None => (OPENING, Vec::new()),
+    };
+    with(lua, &this.0, |view| {
+        let known = || view.objects.iter().map(|object| object.name.as_str());
+        if let Some(name) = ignored.iter().find(|name| !known().any(|other| other == name.as_str())) {
+            return Err(fail(lua, format!("scene:clearance: ignore: {}", unknown("object", name, known()))));
+        }
+        let solid =
+            |object: &&ObjectView| object.asset.body != Body::Scenery && !ignored.contains(&object.name);
+        let objects: Vec<&ObjectView> = view
+            .objects
+            .iter()
+            .filter(solid)
+            .flat_map(|object| std::iter::once(object).chain(&object.parts))
+            .collect();
+        let obstacles: Vec<Obstacle<'_>> = objects
+            .iter()
+            .map(|o| Obstacle { pose_w: o.pose_w, shape: &o.asset.shape, bounds: o.bounds })
+            .collect();
+        let (metres, nearest) = clearance(&pose.0, width, &obstacles, FAR);
+        Ok((metres, nearest.map(|index| objects[index].name.clone())))
+    })
 }
 
 fn find<'a>(lua: &Lua, what: &str, all: &'a [ObjectView], name: &str) -> mlua::Result<&'a ObjectView> {
@@ -300,11 +361,11 @@ fn find<'a>(lua: &Lua, what: &str, all: &'a [ObjectView], name: &str) -> mlua::R
 fn seen(lua: &Lua, object: &ObjectView) -> mlua::Result<Table> {
     let table = lua.create_table()?;
     table.set("name", object.name.as_str())?;
-    table.set("asset", object.asset.as_str())?;
+    table.set("asset", object.asset.name.as_str())?;
     table.set("xyz", lua.create_sequence_from(object.centre_w.iter().copied())?)?;
-    table.set("size", lua.create_sequence_from(object.size.iter().copied())?)?;
+    table.set("size", lua.create_sequence_from(object.bounds.size().iter().copied())?)?;
     table.set("yaw", object.yaw)?;
-    let hints = object.hints.iter().map(|(name, value)| (name.as_str(), *value));
+    let hints = object.asset.hints.iter().map(|(name, value)| (name.as_str(), *value));
     table.set("hints", lua.create_table_from(hints)?)?;
     table.set("joint", object.joint)?;
     let values = object.parts.iter().map(|part| (part.name.as_str(), part.joint));

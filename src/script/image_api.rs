@@ -2,66 +2,66 @@
 
 use std::{
     io::Cursor,
-    sync::atomic::{AtomicUsize, Ordering},
+    sync::{Arc, Mutex},
 };
 
 use image::{
     ImageFormat, Rgb, RgbImage,
     imageops::{self, FilterType},
 };
-use mlua::{Lua, MetaMethod, Table, UserData, UserDataFields, UserDataMethods, Value};
+use mlua::{Lua, Table, UserDataMethods, Value};
 
 use super::{
-    catalogue_world::{NEW_IMAGE, TEXT},
-    sandbox::fail,
+    budget::{Held, hold},
+    catalogue_classes::Class,
+    catalogue_world::NEW_IMAGE,
+    classes_world::{IMAGE, MOST_EDGE},
+    host::{Hosted, Read, hosted, method},
+    sandbox::{fail, locked},
     schema,
 };
 use crate::report::film::Canvas;
 
-/// Largest edge of a picture that a script may make, pixels.
-const MOST_EDGE: f64 = 8192.0;
-/// Bytes that all pictures of scripts may take together; the machine's own limit does not see them.
-const MOST_BYTES: usize = 1 << 29;
-/// Bytes that they take.
-static HELD: AtomicUsize = AtomicUsize::new(0);
+/// Longest text that is written on a picture, bytes.
+const MOST_TEXT: usize = 1000;
 
 /// `softvt.Image`.
+#[derive(Clone, Debug)]
+pub(super) struct LuaImage(Arc<Mutex<Kept>>);
+
+/// A picture and its share of the machine's memory.
 #[derive(Debug)]
-pub(super) struct LuaImage(RgbImage);
+struct Kept {
+    picture: RgbImage,
+    _held: Held,
+}
 
 impl LuaImage {
     /// Takes a picture into the machine.
     pub fn new(lua: &Lua, picture: RgbImage) -> mlua::Result<Self> {
-        let bytes = picture.as_raw().len();
-        if HELD.load(Ordering::Relaxed) + bytes > MOST_BYTES {
-            lua.gc_collect()?;
-        }
-        if HELD.fetch_add(bytes, Ordering::Relaxed) + bytes > MOST_BYTES {
-            HELD.fetch_sub(bytes, Ordering::Relaxed);
-            let message =
-                format!("the script holds more than {} MB of pictures; keep fewer", MOST_BYTES >> 20);
-            return Err(fail(lua, message));
-        }
-        Ok(Self(picture))
+        let held = hold(lua, picture.as_raw().len())?;
+        Ok(Self(Arc::new(Mutex::new(Kept { picture, _held: held }))))
     }
-}
 
-impl Drop for LuaImage {
-    fn drop(&mut self) {
-        HELD.fetch_sub(self.0.as_raw().len(), Ordering::Relaxed);
+    /// Makes a picture of this size where there is room for it, and for `more` bytes while it is made.
+    fn made(
+        lua: &Lua,
+        (width, height): (u32, u32),
+        more: usize,
+        make: impl FnOnce() -> RgbImage,
+    ) -> mlua::Result<Self> {
+        let held = hold(lua, 3 * width as usize * height as usize)?;
+        let _while_made = hold(lua, more)?;
+        Ok(Self(Arc::new(Mutex::new(Kept { picture: make(), _held: held }))))
     }
 }
 
 /// Installs `softvt.image`.
 pub(super) fn install(lua: &Lua, api: &Table) -> mlua::Result<()> {
     let make = lua.create_function(|lua, value: Value| {
-        let Value::Table(table) = &value else {
-            return Err(fail(lua, format!("softvt.image: expected a table, got {}", schema::got(&value))));
-        };
-        let spec = schema::check(lua, &NEW_IMAGE, table)
-            .map_err(|fault| schema::fault_here(lua, "softvt.image", &fault))?;
-        let ground = ink(spec.get("colour")?);
-        LuaImage::new(lua, RgbImage::from_pixel(spec.get("width")?, spec.get("height")?, Rgb(ground)))
+        let spec = schema::checked(lua, &NEW_IMAGE, &value)?;
+        let (ground, size) = (ink(spec.get("colour")?), (spec.get("width")?, spec.get("height")?));
+        LuaImage::made(lua, size, 0, || RgbImage::from_pixel(size.0, size.1, Rgb(ground)))
     })?;
     api.set("image", make)
 }
@@ -73,7 +73,7 @@ fn ink(colour: [f64; 3]) -> [u8; 3] {
 
 /// The picture that a value is, if it is one.
 pub(super) fn picture(value: &Value) -> Option<RgbImage> {
-    value.as_userdata()?.borrow::<LuaImage>().ok().map(|image| image.0.clone())
+    value.as_userdata()?.borrow::<LuaImage>().ok().map(|image| locked(&image.0).picture.clone())
 }
 
 /// A picture as a PNG file.
@@ -83,80 +83,116 @@ pub(super) fn png(picture: &RgbImage) -> Result<Vec<u8>, image::ImageError> {
     Ok(bytes.into_inner())
 }
 
-impl LuaImage {
-    /// A part of the picture: x, y, width, height; all of it if left out.
-    fn region(&self, lua: &Lua, region: Option<[f64; 4]>) -> mlua::Result<[u32; 4]> {
-        let (width, height) = self.0.dimensions();
-        let Some(region) = region else { return Ok([0, 0, width, height]) };
-        let [x, y, w, h] = region.map(|n| n as u32);
-        let whole = region.iter().all(|n| n.fract() == 0.0 && (0.0..=MOST_EDGE).contains(n));
-        if whole && w > 0 && h > 0 && x + w <= width && y + h <= height {
-            return Ok([x, y, w, h]);
-        }
-        let message =
-            format!("expected x, y, width, height within {width} × {height} pixels, got {region:?}");
-        Err(fail(lua, format!("image: {message}")))
+/// A part of a picture: x, y, width, height; all of it if left out.
+fn part(lua: &Lua, method: &str, picture: &RgbImage, region: Option<[f64; 4]>) -> mlua::Result<[u32; 4]> {
+    let (width, height) = picture.dimensions();
+    let Some(region) = region else { return Ok([0, 0, width, height]) };
+    let [x, y, w, h] = region.map(|n| n as u32);
+    let whole = region.iter().all(|n| n.fract() == 0.0 && (0.0..=MOST_EDGE).contains(n));
+    if whole && w > 0 && h > 0 && x + w <= width && y + h <= height {
+        return Ok([x, y, w, h]);
     }
+    let [x, y, w, h] = region.map(crate::message::number);
+    let message =
+        format!("expected x, y, width, height within {width} × {height} pixels, got {{{x}, {y}, {w}, {h}}}");
+    Err(fail(lua, format!("image:{method}: region: {message}")))
+}
 
+impl LuaImage {
     fn mean(&self, lua: &Lua, region: Option<[f64; 4]>) -> mlua::Result<[f64; 3]> {
-        let [x, y, w, h] = self.region(lua, region)?;
+        let picture = &locked(&self.0).picture;
+        let [x, y, w, h] = part(lua, "mean", picture, region)?;
         let mut sum = [0_u64; 3];
         for row in y..y + h {
             for column in x..x + w {
-                let pixel = self.0.get_pixel(column, row);
+                let pixel = picture.get_pixel(column, row);
                 (0..3).for_each(|c| sum[c] += u64::from(pixel[c]));
             }
         }
-        Ok(sum.map(|s| s as f64 / f64::from(w * h)))
+        Ok(sum.map(|s| s as f64 / (f64::from(w) * f64::from(h))))
     }
 
-    fn resized(&self, lua: &Lua, width: f64, height: f64) -> mlua::Result<Self> {
-        let fits = |n: f64| n.fract() == 0.0 && (1.0..=MOST_EDGE).contains(&n);
-        if !fits(width) || !fits(height) {
-            let message =
-                format!("expected whole numbers of pixels in 1..{MOST_EDGE}, got {width} × {height}");
-            return Err(fail(lua, format!("image:resize: {message}")));
+    fn crop(&self, lua: &Lua, region: [f64; 4]) -> mlua::Result<Self> {
+        let picture = &locked(&self.0).picture;
+        let [x, y, w, h] = part(lua, "crop", picture, Some(region))?;
+        Self::made(lua, (w, h), 0, || imageops::crop_imm(picture, x, y, w, h).to_image())
+    }
+
+    fn resized(&self, lua: &Lua, width: u32, height: u32) -> mlua::Result<Self> {
+        let picture = &locked(&self.0).picture;
+        // The picture on the way, as tall as the new one and as wide as the old one, has four floats a pixel.
+        let between = 16 * picture.width() as usize * height as usize;
+        Self::made(lua, (width, height), between, || {
+            imageops::resize(picture, width, height, FilterType::Triangle)
+        })
+    }
+
+    fn paste(&self, other: &Self, x: f64, y: f64) {
+        // Of itself a picture takes a copy first: it cannot be read while it is written.
+        let (other, itself) = match Arc::ptr_eq(&self.0, &other.0) {
+            true => (None, Some(locked(&self.0).picture.clone())),
+            false => (Some(locked(&other.0)), None),
+        };
+        let source = other.as_ref().map(|kept| &kept.picture).or(itself.as_ref());
+        if let Some(source) = source {
+            imageops::replace(&mut locked(&self.0).picture, source, x.round() as i64, y.round() as i64);
         }
-        Self::new(lua, imageops::resize(&self.0, width as u32, height as u32, FilterType::Triangle))
     }
 
-    fn text(&mut self, lua: &Lua, text: &str, options: &Table) -> mlua::Result<()> {
-        let spec = schema::check(lua, &TEXT, options)
-            .map_err(|fault| schema::fault_here(lua, "image:text", &fault))?;
-        let [x, y]: [f64; 2] = spec.get("at")?;
-        let mut canvas = Canvas::of(&self.0);
-        canvas.write(text, (x as f32, y as f32), spec.get("size")?, ink(spec.get("colour")?));
-        self.0 = canvas.picture();
+    fn write_text(&self, lua: &Lua, text: &str, how: &Table) -> mlua::Result<()> {
+        let [x, y]: [f64; 2] = how.get("at")?;
+        if x.abs().max(y.abs()) > 1e5 {
+            return Err(fail(lua, "image:text.at: expected pixels within ±100000".to_owned()));
+        }
+        if text.len() > MOST_TEXT {
+            let message = format!("image:text: text: expected at most {MOST_TEXT} bytes, got {}", text.len());
+            return Err(fail(lua, message));
+        }
+        let picture = &mut locked(&self.0).picture;
+        // The canvas has four bytes a pixel, and gives a picture of three.
+        let _while_written = hold(lua, 7 * picture.width() as usize * picture.height() as usize)?;
+        let mut canvas = Canvas::of(picture);
+        canvas.write(text, (x as f32, y as f32), how.get("size")?, ink(how.get("colour")?));
+        *picture = canvas.picture();
         Ok(())
     }
 }
 
-impl UserData for LuaImage {
-    fn add_fields<F: UserDataFields<Self>>(fields: &mut F) {
-        fields.add_meta_field(MetaMethod::Type, "softvt.Image");
-        fields.add_field_method_get("width", |_, this| Ok(this.0.width()));
-        fields.add_field_method_get("height", |_, this| Ok(this.0.height()));
+impl Hosted for LuaImage {
+    fn class() -> &'static Class {
+        &IMAGE
     }
 
-    fn add_methods<M: UserDataMethods<Self>>(methods: &mut M) {
-        methods.add_meta_method(MetaMethod::ToString, |_, this, ()| {
-            Ok(format!("softvt.Image({} × {})", this.0.width(), this.0.height()))
-        });
-        methods.add_method("mean", |lua, this, region: Option<[f64; 4]>| {
+    fn label(&self) -> String {
+        "image".into()
+    }
+
+    fn text(&self) -> String {
+        let (width, height) = locked(&self.0).picture.dimensions();
+        format!("softvt.Image({width} × {height})")
+    }
+
+    fn read(&self, _: &Lua, key: &str) -> mlua::Result<Read> {
+        let (width, height) = locked(&self.0).picture.dimensions();
+        Ok(Read::Value(Value::Integer(i64::from(if key == "width" { width } else { height }))))
+    }
+
+    fn methods<M: UserDataMethods<Self>>(methods: &mut M) {
+        method(methods, "mean", |lua, this: &Self, region: Option<[f64; 4]>| {
             lua.create_sequence_from(this.mean(lua, region)?)
         });
-        methods.add_method("crop", |lua, this, region: [f64; 4]| {
-            let [x, y, w, h] = this.region(lua, Some(region))?;
-            Self::new(lua, imageops::crop_imm(&this.0, x, y, w, h).to_image())
+        method(methods, "crop", |lua, this: &Self, region: [f64; 4]| this.crop(lua, region));
+        method(methods, "resize", |lua, this: &Self, (width, height): (u32, u32)| {
+            this.resized(lua, width, height)
         });
-        methods
-            .add_method("resize", |lua, this, (width, height): (f64, f64)| this.resized(lua, width, height));
-        methods.add_method_mut("paste", |_, this, (other, x, y): (mlua::UserDataRef<Self>, f64, f64)| {
-            imageops::replace(&mut this.0, &other.0, x.round() as i64, y.round() as i64);
+        method(methods, "paste", |_, this: &Self, (other, x, y): (mlua::UserDataRef<Self>, f64, f64)| {
+            this.paste(&other, x, y);
             Ok(())
         });
-        methods.add_method_mut("text", |lua, this, (text, options): (String, Table)| {
-            this.text(lua, &text, &options)
+        method(methods, "text", |lua, this: &Self, (text, how): (mlua::LuaString, Table)| {
+            this.write_text(lua, &text.to_string_lossy(), &how)
         });
     }
 }
+
+hosted!(LuaImage);

@@ -1,6 +1,7 @@
 //! Lua: the only room that knows it. Sandbox, bindings, options, plans, experts, stubs.
 
 mod articulated;
+mod budget;
 mod catalogue;
 mod catalogue_classes;
 mod catalogue_joints;
@@ -9,18 +10,22 @@ mod catalogue_visuals;
 mod catalogue_world;
 mod classes_world;
 mod controller;
+mod data;
 mod deadline;
 mod envelope_api;
 mod episode;
 mod error;
 mod experiment;
 mod expert;
+mod host;
 mod image_api;
+mod lists;
 mod options;
 mod plan;
 mod pose;
 mod position;
 mod random;
+mod range;
 mod reach;
 mod sandbox;
 mod scene_api;
@@ -30,6 +35,7 @@ mod sim_api;
 mod sources;
 pub mod stubs;
 mod timing;
+mod turn;
 mod view_api;
 mod visuals;
 mod world_api;

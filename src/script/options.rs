@@ -215,8 +215,12 @@ fn read_spec(lua: &Lua, key: &Value, value: &Value) -> mlua::Result<OptionSpec> 
             return Err(fail(lua, format!("options: expected names as keys, got {}", schema::got(other))));
         }
     };
-    if !name.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_') {
-        let message = format!("options.{name}: a name has lower-case letters, digits and underscores");
+    let fits = |b: u8| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_';
+    if !name.starts_with(|c: char| c.is_ascii_lowercase()) || !name.bytes().all(fits) {
+        let message = format!(
+            "options: {}: a name begins with a letter and has lower-case letters, digits and underscores",
+            schema::got(key)
+        );
         return Err(fail(lua, message));
     }
     let fault = |fault: schema::Fault| {
@@ -309,21 +313,21 @@ fn to_lua(lua: &Lua, value: &OptionValue) -> mlua::Result<Value> {
 /// `table`, made to refuse reading and writing of keys other than `names`.
 pub(super) fn strict(lua: &Lua, label: &str, table: Table, names: Vec<String>) -> mlua::Result<Table> {
     let meta = lua.create_table()?;
-    let refuse = move |lua: &Lua, label: &str, names: &[String], key: &Value| match key {
-        Value::String(key) if names.iter().any(|name| *name == key.to_string_lossy()) => Ok(Value::Nil),
+    let name = label.to_owned();
+    let refuse = lua.create_function(move |lua, (table, key, value): (Table, Value, Value)| match &key {
+        Value::String(key) if names.iter().any(|name| *name == key.to_string_lossy()) => {
+            table.raw_set(key, value)?;
+            Ok(Value::Nil)
+        }
         Value::String(key) => {
             let known = names.iter().map(String::as_str);
-            Err(fail(lua, format!("{label}: {}", schema::unknown("key", &key.to_string_lossy(), known))))
+            Err(fail(lua, format!("{name}: {}", schema::unknown("key", &key.to_string_lossy(), known))))
         }
-        _ => Ok(Value::Nil),
-    };
-    let (read_label, read_names) = (label.to_string(), names.clone());
-    meta.set(
-        "__index",
-        lua.create_function(move |lua, (_, key): (Value, Value)| {
-            refuse(lua, &read_label, &read_names, &key)
-        })?,
-    )?;
+        key => Err(fail(lua, format!("{name}: expected a name as key, got {}", schema::got(key)))),
+    })?;
+    // Only keys without a value come here; reading one that is known gives nil, and stores that.
+    meta.set("__index", &refuse)?;
+    meta.set("__newindex", refuse)?;
     meta.set("__metatable", label)?;
     table.set_metatable(Some(meta))?;
     Ok(table)

@@ -114,6 +114,7 @@ impl Machine {
             return Ok(Plan::Suite(Box::new(suite(lua, table)?)));
         }
         if schema::is_made(lua, &catalogue::EXPERIMENT, table) {
+            schema::still_sound(lua, &catalogue::EXPERIMENT, table)?;
             let _deadline = self.vm.call_deadline();
             return Ok(Plan::Experiment {
                 name: table.get("name")?,
@@ -188,7 +189,7 @@ fn asset(lua: &Lua, value: Value) -> mlua::Result<Table> {
 }
 
 /// `softvt.layout(name, build)` or `softvt.layout{ name = …, build = … }`.
-fn layout(lua: &Lua, (first, build): (Value, Option<Function>)) -> mlua::Result<Table> {
+fn layout(lua: &Lua, (first, build): (Value, Value)) -> mlua::Result<Table> {
     match (&first, build) {
         (Value::String(name), build) => {
             let table = lua.create_table()?;
@@ -196,12 +197,13 @@ fn layout(lua: &Lua, (first, build): (Value, Option<Function>)) -> mlua::Result<
             table.set("build", build)?;
             schema::make(lua, &catalogue::LAYOUT, &Value::Table(table))
         }
-        (_, None) => schema::make(lua, &catalogue::LAYOUT, &first),
+        (_, Value::Nil) => schema::make(lua, &catalogue::LAYOUT, &first),
         _ => Err(fail(lua, format!("layout: expected a name and a function, got {}", schema::got(&first)))),
     }
 }
 
 fn suite(lua: &Lua, table: &Table) -> mlua::Result<Suite> {
+    schema::still_sound(lua, &catalogue::SUITE, table)?;
     let variation = match table.get::<String>("variation")?.as_str() {
         "object" => Variation::Object,
         _ => Variation::Spatial,
@@ -217,14 +219,16 @@ fn suite(lua: &Lua, table: &Table) -> mlua::Result<Suite> {
     }
     let budget = if variation == Variation::Object { 700 } else { 500 };
     let tasks =
-        tasks.iter().enumerate().map(|(id, table)| task(id, table, budget)).collect::<Result<_, _>>()?;
+        tasks.iter().enumerate().map(|(id, table)| task(lua, id, table, budget)).collect::<Result<_, _>>()?;
     let shifts: Option<Vec<Table>> = table.get("shifts")?;
-    let shifts = shifts.unwrap_or_default().iter().map(shift).collect::<mlua::Result<_>>()?;
+    let shifts =
+        shifts.unwrap_or_default().iter().map(|table| shift(lua, table)).collect::<mlua::Result<_>>()?;
     let settings = super::sim_api::settings(lua, "suite.settings", table.get("settings")?)?;
     Ok(Suite { name, object_type, variation, episodes: table.get("episodes")?, tasks, shifts, settings })
 }
 
-fn task(id: usize, table: &Table, budget: u32) -> mlua::Result<Task> {
+fn task(lua: &Lua, id: usize, table: &Table, budget: u32) -> mlua::Result<Task> {
+    sound_task(lua, table)?;
     let goal: Table = table.get("goal")?;
     let (object, target, hold_s) = (goal.get("object")?, goal.get("target")?, goal.get("hold_s")?);
     let kind: Value = goal.metatable().map_or(Ok(Value::Nil), |meta| meta.get("__name"))?;
@@ -242,7 +246,15 @@ fn task(id: usize, table: &Table, budget: u32) -> mlua::Result<Task> {
     })
 }
 
-fn shift(table: &Table) -> mlua::Result<Shift> {
+/// A task and what it is made of are still what their constructors made.
+pub(super) fn sound_task(lua: &Lua, task: &Table) -> mlua::Result<()> {
+    schema::still_sound(lua, &catalogue::TASK, task)?;
+    schema::still_sound(lua, &catalogue::LAYOUT, &task.get("layout")?)?;
+    schema::still_sound(lua, &catalogue::ON, &task.get("goal")?)
+}
+
+fn shift(lua: &Lua, table: &Table) -> mlua::Result<Shift> {
+    schema::still_sound(lua, &catalogue::SHIFT, table)?;
     Ok(Shift {
         name: table.get("name")?,
         unit: table.get("unit")?,

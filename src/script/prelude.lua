@@ -3,7 +3,8 @@
 local host = ...
 local raw_error, raw_tostring, raw_next, raw_format = error, tostring, next, string.format
 local raw_setmetatable, getmetatable, type, rawget, select = setmetatable, getmetatable, type, rawget, select
-local sort, pack, unpack, find, pcall = table.sort, table.pack, table.unpack, string.find, pcall
+local sort, pack, unpack, find, gsub, raw_pcall = table.sort, table.pack, table.unpack, string.find, string.gsub, pcall
+local raw_resume, raw_close = coroutine.resume, coroutine.close
 
 -- An address differs from run to run, so it never becomes text.
 function tostring(...)
@@ -31,7 +32,9 @@ function string.format(form, ...)
       values[i] = tostring(values[i])
     end
   end
-  return raw_format(form, unpack(values, 1, values.n))
+  local ok, text = raw_pcall(raw_format, form, unpack(values, 1, values.n))
+  if ok then return text end
+  raw_error("string.format: " .. gsub(text, "^bad argument (#%d+) to '[^']*'", "argument %1"), 2)
 end
 
 -- Errors that are objects are described here, since Lua would later show their address alone.
@@ -41,6 +44,17 @@ function error(object, level)
   if level > 0 then level = level + 1 end
   raw_error(object, level)
 end
+
+-- Errors of the host are objects; scripts get their text, as of any other error.
+local function answer(ok, ...)
+  if ok then return true, ... end
+  return false, host.words((...))
+end
+
+function pcall(...) return answer(raw_pcall(...)) end
+function coroutine.resume(...) return answer(raw_resume(...)) end
+function coroutine.close(...) return answer(raw_close(...)) end
+local pcall = pcall
 
 -- A handler that runs at the place of the error would run inside the hook that enforces the time limit, where no hook
 -- stops it; this one runs after the stack has unwound.
@@ -102,14 +116,12 @@ function pairs(object)
   local meta = getmetatable(object)
   local own = type(meta) == "table" and rawget(meta, "__pairs")
   if own then return own(object) end
-  if type(object) ~= "table" then
-    raw_error("bad argument #1 to 'pairs' (table expected, got " .. type(object) .. ")", 2)
-  end
+  object = host.list("pairs", object)
   return iterate(object), object, nil
 end
 
 host.sorted = function(object)
-  if type(object) ~= "table" then raw_error("softvt.sorted: expected a table, got " .. type(object), 2) end
+  object = host.list("softvt.sorted", object)
   return iterate(object)
 end
 

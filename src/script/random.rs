@@ -2,10 +2,14 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use mlua::{Lua, MultiValue, UserData, UserDataMethods, Value};
+use mlua::{Lua, MultiValue, Table, UserDataMethods, Value};
 use rand_chacha::{ChaCha8Rng, rand_core::RngCore};
 
-use super::sandbox::fail;
+use super::{
+    catalogue_classes::{self as classes, Class},
+    host::{Hosted, hosted, method},
+    sandbox::{fail, locked},
+};
 use crate::benchmark::seed::{self, EpisodeSeed, Stream};
 
 /// The generator behind `math.random`, which the host reseeds between phases.
@@ -52,58 +56,64 @@ fn draw(lua: &Lua, rng: &mut ChaCha8Rng, args: &MultiValue) -> mlua::Result<Valu
 }
 
 /// A named stream of random numbers, `rng` in scripts.
+#[derive(Clone)]
 pub(super) struct Rng {
     seed: EpisodeSeed,
-    draws: ChaCha8Rng,
+    draws: Arc<Mutex<ChaCha8Rng>>,
 }
 
 impl Rng {
     pub fn new(seed: EpisodeSeed, stream: Stream) -> Self {
-        Self { draws: seed.stream(stream), seed }
+        Self { draws: Arc::new(Mutex::new(seed.stream(stream))), seed }
     }
 }
 
-fn finite(lua: &Lua, method: &str, name: &str, value: f64) -> mlua::Result<f64> {
+/// A draw that did not overflow.
+fn finite(lua: &Lua, method: &str, value: f64) -> mlua::Result<f64> {
     match value.is_finite() {
         true => Ok(value),
-        false => Err(fail(lua, format!("rng:{method}: {name} must be finite, got {value}"))),
+        false => {
+            Err(fail(lua, format!("rng:{method}: the range is too wide for a number; give smaller bounds")))
+        }
     }
 }
 
-impl UserData for Rng {
-    fn add_methods<M: UserDataMethods<Self>>(methods: &mut M) {
-        methods.add_method("stream", |lua, this, name: String| {
-            match Stream::ALL.into_iter().find(|stream| stream.name() == name) {
-                Some(stream) => Ok(Self::new(this.seed.clone(), stream)),
-                None => {
-                    let names = Stream::ALL.map(Stream::name).join(", ");
-                    Err(fail(lua, format!("rng:stream: no stream {name:?}; there are {names}")))
-                }
-            }
+impl Hosted for Rng {
+    fn class() -> &'static Class {
+        &classes::RNG
+    }
+
+    fn label(&self) -> String {
+        "rng".into()
+    }
+
+    fn methods<M: UserDataMethods<Self>>(methods: &mut M) {
+        method(methods, "stream", |_, this: &Self, name: String| {
+            let stream = Stream::ALL.into_iter().find(|stream| stream.name() == name);
+            Ok(stream.map(|stream| Self::new(this.seed.clone(), stream)))
         });
-        methods.add_method_mut("uniform", |lua, this, (low, high): (f64, f64)| {
-            let (low, high) = (finite(lua, "uniform", "a", low)?, finite(lua, "uniform", "b", high)?);
-            Ok(low + (high - low) * seed::unit(&mut this.draws))
+        method(methods, "uniform", |lua, this: &Self, (low, high): (f64, f64)| {
+            finite(lua, "uniform", low + (high - low) * seed::unit(&mut locked(&this.draws)))
         });
-        methods.add_method_mut("normal", |lua, this, (mean, deviation): (f64, f64)| {
-            let (mean, deviation) =
-                (finite(lua, "normal", "mean", mean)?, finite(lua, "normal", "sigma", deviation)?);
-            Ok(mean + deviation * seed::normal(&mut this.draws))
+        method(methods, "normal", |lua, this: &Self, (mean, deviation): (f64, f64)| {
+            finite(lua, "normal", mean + deviation * seed::normal(&mut locked(&this.draws)))
         });
-        methods.add_method_mut("int", |lua, this, (low, high): (i64, i64)| match low <= high {
-            true => Ok(seed::integer(&mut this.draws, low, high)),
+        method(methods, "int", |lua, this: &Self, (low, high): (i64, i64)| match low <= high {
+            true => Ok(seed::integer(&mut locked(&this.draws), low, high)),
             false => Err(fail(lua, format!("rng:int: the range {low}..{high} is empty"))),
         });
-        methods.add_method_mut("choice", |lua, this, list: mlua::Table| match list.raw_len() {
+        method(methods, "choice", |lua, this: &Self, list: Table| match list.raw_len() {
             0 => Err(fail(lua, "rng:choice: the list is empty".to_string())),
-            count => list.get::<Value>(seed::integer(&mut this.draws, 1, count as i64)),
+            count => list.raw_get::<Value>(seed::integer(&mut locked(&this.draws), 1, count as i64)),
         });
-        methods.add_method_mut("shuffle", |lua, this, list: mlua::Table| {
+        method(methods, "shuffle", |lua, this: &Self, list: Table| {
             let mut values: Vec<Value> = list.sequence_values().collect::<mlua::Result<_>>()?;
             for last in (1..values.len()).rev() {
-                values.swap(last, seed::integer(&mut this.draws, 0, last as i64) as usize);
+                values.swap(last, seed::integer(&mut locked(&this.draws), 0, last as i64) as usize);
             }
             lua.create_sequence_from(values)
         });
     }
 }
+
+hosted!(Rng);

@@ -2,7 +2,10 @@
 
 use std::{
     collections::BTreeSet,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicUsize, Ordering},
+    },
     time::Duration,
 };
 
@@ -11,11 +14,20 @@ use mlua::{
 };
 
 use super::{
+    budget::Budget,
     deadline::{Clock, Deadline, OnStuck, end_process},
     error::{Context, RaisedObject, ScriptError},
+    lists,
     random::MathRandom,
+    schema,
     sources::Library,
 };
+
+/// Bytes that a machine may print; the rest of a flood is left out.
+const MOST_PRINTED: usize = 1 << 20;
+
+/// Registry key of the base library as it was before a script could change it.
+const BASE: &str = "softvt base library";
 
 /// Where `print` goes; not the standard output, which belongs to results.
 pub type Print = Arc<dyn Fn(&str) + Send + Sync>;
@@ -58,7 +70,10 @@ impl Default for Limits {
 pub(super) struct Shared {
     pub main: String,
     pub library: Mutex<Library>,
+    pub budget: Budget,
     raised: Mutex<Option<RaisedObject>>,
+    /// Bytes that `print` may still write.
+    printable: AtomicUsize,
     limits: Limits,
 }
 
@@ -82,7 +97,9 @@ impl Vm {
         let shared = Arc::new(Shared {
             main: main.into(),
             library: Mutex::new(library),
+            budget: Budget::default(),
             raised: Mutex::new(None),
+            printable: AtomicUsize::new(MOST_PRINTED),
             limits: limits.clone(),
         });
         Self::build(&shared).map_err(|e| explain(&shared, &e))
@@ -96,13 +113,18 @@ impl Vm {
         let api = lua.create_table()?;
         let host = lua.create_table()?;
         host.set("raised", lua.create_function(note_raised)?)?;
+        host.set("words", lua.create_function(words)?)?;
+        host.set("list", lua.create_function(to_go_through)?)?;
         lua.load(include_str!("prelude.lua"))
             .set_name("=softvt")
             .set_mode(ChunkMode::Text)
             .call::<()>(&host)?;
         api.set("sorted", host.get::<Function>("sorted")?)?;
         withhold(&lua)?;
-        lua.globals().set("print", lua.create_function(print)?)?;
+        let tostring: Function = lua.globals().get("tostring")?;
+        let print = lua.create_function(move |lua, values: MultiValue| print(lua, &tostring, values))?;
+        lua.globals().set("print", print)?;
+        keep_base(&lua)?;
         lua.globals().set("load", lua.create_function(load)?)?;
         let loaded = lua.create_table()?;
         let require = lua.create_function(move |lua, name: Value| require(lua, &loaded, &name))?;
@@ -210,21 +232,65 @@ pub(super) fn fail(lua: &Lua, message: impl Into<String>) -> mlua::Error {
     mlua::Error::external(error)
 }
 
-fn print(lua: &Lua, values: MultiValue) -> mlua::Result<()> {
-    let tostring: Function = lua.globals().get("tostring")?;
-    let mut words = Vec::new();
-    for value in values {
-        words.push(tostring.call::<mlua::LuaString>(value)?.to_string_lossy().to_string());
+/// Puts a copy of the base library where scripts do not reach it: the library's own Lua runs on that.
+fn keep_base(lua: &Lua) -> mlua::Result<()> {
+    let base = lua.create_table()?;
+    for entry in lua.globals().pairs::<Value, Value>() {
+        let (name, value) = entry?;
+        let value = match &value {
+            Value::Table(library) if name.as_string().is_some_and(|name| name != "_G") => {
+                Value::Table(lua.create_table_from(library.pairs::<Value, Value>().flatten())?)
+            }
+            _ => value,
+        };
+        base.set(name, value)?;
     }
-    (shared(lua)?.limits.print)(&words.join("\t"));
+    lua.set_named_registry_value(BASE, base)
+}
+
+/// The base library as it was before a script could change it.
+pub(super) fn base(lua: &Lua) -> mlua::Result<Table> {
+    lua.named_registry_value(BASE)
+}
+
+fn print(lua: &Lua, tostring: &Function, values: MultiValue) -> mlua::Result<()> {
+    let shared = shared(lua)?;
+    let mut line = String::new();
+    for (index, value) in values.into_iter().enumerate() {
+        if index > 0 {
+            line.push('\t');
+        }
+        line.push_str(&tostring.call::<mlua::LuaString>(value)?.to_string_lossy());
+    }
+    let left = shared.printable.load(Ordering::Relaxed);
+    if line.len() < left {
+        shared.printable.store(left - line.len() - 1, Ordering::Relaxed);
+        (shared.limits.print)(&line);
+    } else if shared.printable.swap(0, Ordering::Relaxed) > 0 {
+        (shared.limits.print)(&format!(
+            "… the script prints more than {} MiB; the rest is left out",
+            MOST_PRINTED >> 20
+        ));
+    }
     Ok(())
 }
 
 /// `load(chunk [, name [, mode [, env]]])` for text alone; as in Lua, a bad chunk gives nil and the message.
-fn load(
-    lua: &Lua,
-    (chunk, name, _mode, env): (Value, Option<String>, Option<String>, Option<Table>),
-) -> mlua::Result<(Value, Value)> {
+fn load(lua: &Lua, (chunk, name, _mode, env): (Value, Value, Value, Value)) -> mlua::Result<(Value, Value)> {
+    let name = match name {
+        Value::Nil => "=(load)".to_owned(),
+        Value::String(name) => name.to_string_lossy(),
+        other => {
+            return Err(fail(lua, format!("load: expected a string as name, got {}", schema::got(&other))));
+        }
+    };
+    let env = match env {
+        Value::Nil => None,
+        Value::Table(env) => Some(env),
+        other => {
+            return Err(fail(lua, format!("load: expected a table as env, got {}", schema::got(&other))));
+        }
+    };
     let mut bytes = Vec::new();
     match chunk {
         Value::String(text) => bytes.extend_from_slice(&text.as_bytes()),
@@ -237,14 +303,16 @@ fn load(
             }
         },
         other => {
-            return Err(fail(lua, format!("load: expected a string or function, got {}", other.type_name())));
+            return Err(fail(
+                lua,
+                format!("load: expected a string or function, got {}", schema::got(&other)),
+            ));
         }
     }
     let refusal = |text: String| Ok((Value::Nil, Value::String(lua.create_string(text)?)));
     if bytes.first() == Some(&0x1b) {
         return refusal("load: compiled byte code is refused; only Lua source text is run".into());
     }
-    let name = name.unwrap_or_else(|| "=(load)".into());
     let mut built = lua.load(bytes).set_name(name).set_mode(ChunkMode::Text);
     if let Some(env) = env {
         built = built.set_environment(env);
@@ -290,6 +358,22 @@ fn require(lua: &Lua, loaded: &Table, name: &Value) -> mlua::Result<Value> {
     Ok(value)
 }
 
+/// What `pairs` and its like go through: a table, or the entries of a list of the host.
+fn to_go_through(lua: &Lua, (place, value): (String, Value)) -> mlua::Result<Value> {
+    match lists::plain(lua, &value)? {
+        Value::Table(table) => Ok(Value::Table(table)),
+        other => Err(fail(lua, format!("{place}: expected a table, got {}", schema::got(&other)))),
+    }
+}
+
+/// An error of the host as the text that people would read; any other value as it is.
+fn words(lua: &Lua, value: Value) -> mlua::Result<Value> {
+    let Value::Error(error) = &value else { return Ok(value) };
+    let shared = shared(lua)?;
+    let text = explain(&shared, error).to_string();
+    lua.create_string(text).map(Value::String)
+}
+
 /// Keeps a description of an error object, since its address is all that would be left of it later.
 fn note_raised(lua: &Lua, object: Value) -> mlua::Result<()> {
     let description = describe(&object, 0);
@@ -325,6 +409,6 @@ pub(super) fn describe(value: &Value, depth: usize) -> String {
             format!("{{{}}}", parts.collect::<Vec<_>>().join(", "))
         }
         Value::Nil => "nil".into(),
-        other => format!("a {}", other.type_name()),
+        other => schema::kind(other),
     }
 }

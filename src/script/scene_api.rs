@@ -2,18 +2,21 @@
 
 use std::sync::{Arc, Mutex};
 
-use mlua::{Lua, MetaMethod, Table, UserData, UserDataFields, UserDataMethods, Value};
+use mlua::{Lua, Table, UserDataMethods, Value};
 
 use super::{
     articulated, catalogue,
+    catalogue_classes::{self as classes, Class},
     catalogue_joints::ARTICULATED,
+    host::{Hosted, Read, hosted, method},
     sandbox::{fail, here, locked},
-    schema::{self, Fault, Field, Presence, Range, Type, unknown},
+    schema::{self, Field, Presence, Range, Type, unknown},
     shapes::LuaShape,
     view_api::{LuaCamera, LuaLight, LuaLook},
 };
 use crate::{
     geometry::{Pose, Quat, Vec3},
+    message::number,
     scene::{Asset, Body, Camera, Friction, Lighting, Object, Region, Scene, SoftMaterial},
 };
 
@@ -57,6 +60,24 @@ pub(super) fn empty_scene() -> Scene {
     }
 }
 
+/// Objects in a scene; a layout that adds more has run away.
+const MOST_OBJECTS: usize = 1000;
+
+/// Farther from the origin than this nothing can be computed with the exactness of a grasp, m.
+const FARTHEST: f64 = 1e3;
+
+/// A place in the world that can be.
+fn place_at(lua: &Lua, label: &str, xyz: Vec3) -> mlua::Result<Vec3> {
+    if xyz.amax() <= FARTHEST {
+        return Ok(xyz);
+    }
+    let [x, y, z] = [xyz.x, xyz.y, xyz.z].map(number);
+    Err(fail(
+        lua,
+        format!("{label}: expected a place within {FARTHEST} m of the origin, got {{{x}, {y}, {z}}}"),
+    ))
+}
+
 /// An asset's Lua table and what was read from it.
 type Known = (Table, Arc<Asset>);
 
@@ -83,12 +104,7 @@ impl LuaScene {
         Ok(asset)
     }
 
-    fn add(&self, lua: &Lua, value: &Value) -> mlua::Result<()> {
-        let Value::Table(table) = value else {
-            return Err(fail(lua, format!("scene:add: expected a table, got {}", schema::got(value))));
-        };
-        let place = schema::check(lua, &catalogue::PLACE, table)
-            .map_err(|fault| schema::fault_here(lua, "scene:add", &fault))?;
+    fn add(&self, lua: &Lua, place: &Table) -> mlua::Result<()> {
         let name: String = place.get("name")?;
         let asset = self.asset(lua, &place.get("asset")?)?;
         let mut scene = locked(&self.scene);
@@ -98,7 +114,10 @@ impl LuaScene {
                 format!("scene:add: there is an object {name:?} already; give another name"),
             ));
         }
-        let at = position(lua, &scene, &place)?;
+        if scene.objects.len() >= MOST_OBJECTS {
+            return Err(fail(lua, format!("scene:add: a scene holds at most {MOST_OBJECTS} objects")));
+        }
+        let at = position(lua, &scene, place)?;
         let turn = Quat::from_axis_angle(&Vec3::z_axis(), place.get("yaw")?);
         let joints = articulated::start(lua, &asset, place.get("joints")?)?;
         let placed_at = here(lua).map_or(String::new(), |(file, line)| format!("{file}:{line}"));
@@ -113,9 +132,10 @@ fn position(lua: &Lua, scene: &Scene, place: &Table) -> mlua::Result<Vec3> {
     let xyz: Option<[f64; 3]> = place.get("xyz")?;
     let on: Option<String> = place.get("on")?;
     match (at, xyz, on) {
-        (None, Some(xyz), None) => Ok(Vec3::from(xyz)),
-        (Some([x, y]), None, None) => Ok(Vec3::new(x, y, 0.0)),
-        (Some([x, y]), None, Some(on)) => {
+        (None, Some(xyz), None) => place_at(lua, "scene:add.xyz", Vec3::from(xyz)),
+        (Some([x, y]), None, on) => {
+            let at = place_at(lua, "scene:add.at", Vec3::new(x, y, 0.0))?;
+            let Some(on) = on else { return Ok(at) };
             let (object, part) = on.split_once('.').map_or((on.as_str(), None), |(o, p)| (o, Some(p)));
             let under = &scene.objects[find(lua, scene, object)?];
             let parts = under.asset.parts().iter().map(|part| part.name.as_str());
@@ -148,10 +168,15 @@ fn find(lua: &Lua, scene: &Scene, name: &str) -> mlua::Result<usize> {
 }
 
 fn read_asset(lua: &Lua, table: &Table) -> mlua::Result<Asset> {
+    schema::still_sound(lua, &catalogue::ASSET, table)?;
+    let body: Table = table.get("body")?;
+    let kinds = [&catalogue::SOFT, &catalogue::RIGID, &ARTICULATED, &catalogue::STATIC, &catalogue::SCENERY];
+    if let Some(record) = kinds.into_iter().find(|record| schema::is_made(lua, record, &body)) {
+        schema::still_sound(lua, record, &body)?;
+    }
     let friction: Table = table.get("friction")?;
     let friction =
         Friction { static_mu: friction.get("static_mu")?, dynamic_mu: friction.get("dynamic_mu")? };
-    let body: Table = table.get("body")?;
     let kind: String = body.metatable().map_or(Ok(String::new()), |meta| meta.get("__name"))?;
     let body = match kind.as_str() {
         kind if kind == catalogue::SOFT.kind => Body::Soft(SoftMaterial {
@@ -168,7 +193,7 @@ fn read_asset(lua: &Lua, table: &Table) -> mlua::Result<Asset> {
         kind if kind == catalogue::SCENERY.kind => Body::Scenery,
         _ => Body::Static,
     };
-    let LuaShape(shape) = table.get("shape")?;
+    let shape = table.get::<LuaShape>("shape")?.shape().clone();
     Ok(Asset {
         name: table.get("name")?,
         visuals: super::visuals::read(lua, table, &shape)?,
@@ -179,84 +204,64 @@ fn read_asset(lua: &Lua, table: &Table) -> mlua::Result<Asset> {
     })
 }
 
-pub(super) fn numbers(lua: &Lua, values: &[f64]) -> mlua::Result<Value> {
-    lua.create_sequence_from(values.iter().copied()).map(Value::Table)
-}
-
-/// The value to store, or an error that names the key.
-pub(super) fn checked(
-    lua: &Lua,
-    label: &str,
-    fields: &[Field],
-    key: &str,
-    value: &Value,
-) -> mlua::Result<Value> {
-    let Some(field) = fields.iter().find(|field| field.name == key) else {
-        let known = fields.iter().map(|field| field.name);
-        return Err(fail(lua, format!("{label}: {}", unknown("key", key, known))));
-    };
-    field.ty.check(lua, value).map_err(|fault: Fault| fail(lua, fault.words(&format!("{label}.{key}"))))
-}
-
-impl UserData for LuaScene {
-    fn add_fields<F: UserDataFields<Self>>(fields: &mut F) {
-        fields.add_meta_field(MetaMethod::Type, "softvt.Scene");
+impl Hosted for LuaScene {
+    fn class() -> &'static Class {
+        &classes::SCENE
     }
 
-    fn add_methods<M: UserDataMethods<Self>>(methods: &mut M) {
-        methods.add_method("add", |lua, this, value: Value| this.add(lua, &value));
-        methods.add_method("object", |lua, this, name: String| {
+    fn label(&self) -> String {
+        "scene".into()
+    }
+
+    fn read(&self, lua: &Lua, key: &str) -> mlua::Result<Read> {
+        if key == "light" {
+            return lua
+                .create_userdata(LuaLight(self.scene.clone()))
+                .map(|light| Read::Value(Value::UserData(light)));
+        }
+        let scene = locked(&self.scene);
+        let numbers = |v: &[f64]| Ok(Read::Numbers(v.to_vec()));
+        match key {
+            "base" => numbers(scene.base_w.translation.vector.as_slice()),
+            "start_q" => numbers(&scene.start_q),
+            "gravity" => numbers(scene.gravity.as_slice()),
+            "workspace_min" => numbers(scene.workspace.min.as_slice()),
+            "workspace_max" => numbers(scene.workspace.max.as_slice()),
+            _ => {
+                let handles =
+                    (0..scene.objects.len()).map(|index| LuaObject { scene: self.scene.clone(), index });
+                let list = lua.create_sequence_from(handles)?;
+                Ok(Read::Fixed(list, "scene:add{…} puts one more there".into()))
+            }
+        }
+    }
+
+    fn write(&self, lua: &Lua, key: &str, value: Value) -> mlua::Result<()> {
+        let list: Vec<f64> = lua.unpack(value)?;
+        let mut scene = locked(&self.scene);
+        if let Ok(q) = <[f64; 7]>::try_from(list.as_slice()) {
+            scene.start_q = q;
+            return Ok(());
+        }
+        let v = Vec3::from_column_slice(&list[..3]);
+        match key {
+            "base" => scene.base_w.translation.vector = place_at(lua, "scene.base", v)?,
+            "gravity" => scene.gravity = v,
+            "workspace_min" => scene.workspace.min = v,
+            _ => scene.workspace.max = v,
+        }
+        Ok(())
+    }
+
+    fn methods<M: UserDataMethods<Self>>(methods: &mut M) {
+        method(methods, "add", |lua, this: &Self, place: Table| this.add(lua, &place));
+        method(methods, "object", |lua, this: &Self, name: String| {
             let index = find(lua, &locked(&this.scene), &name)?;
             Ok(LuaObject { scene: this.scene.clone(), index })
         });
-        methods.add_method("camera", |lua, this, name: String| LuaCamera::named(lua, &this.scene, &name));
-        methods.add_method("add_camera", |lua, this, value: Value| LuaCamera::add(lua, &this.scene, &value));
-        methods.add_meta_method(MetaMethod::ToString, |_, _, ()| Ok("softvt.Scene"));
-        methods.add_meta_method(MetaMethod::Index, |lua, this, key: String| {
-            if key == "light" {
-                return lua.create_userdata(LuaLight(this.scene.clone())).map(Value::UserData);
-            }
-            let scene = locked(&this.scene);
-            match key.as_str() {
-                "base" => numbers(lua, scene.base_w.translation.vector.as_slice()),
-                "start_q" => numbers(lua, &scene.start_q),
-                "gravity" => numbers(lua, scene.gravity.as_slice()),
-                "workspace_min" => numbers(lua, scene.workspace.min.as_slice()),
-                "workspace_max" => numbers(lua, scene.workspace.max.as_slice()),
-                "objects" => {
-                    let handles =
-                        (0..scene.objects.len()).map(|index| LuaObject { scene: this.scene.clone(), index });
-                    lua.create_sequence_from(handles).map(Value::Table)
-                }
-                _ => {
-                    let known = SCENE.iter().map(|field| field.name).chain([
-                        "objects",
-                        "light",
-                        "add",
-                        "object",
-                        "camera",
-                        "add_camera",
-                    ]);
-                    Err(fail(lua, format!("scene: {}", unknown("key", &key, known))))
-                }
-            }
-        });
-        methods.add_meta_method(MetaMethod::NewIndex, |lua, this, (key, value): (String, Value)| {
-            let value = checked(lua, "scene", SCENE, &key, &value)?;
-            let list: Vec<f64> = lua.unpack(value)?;
-            let mut scene = locked(&this.scene);
-            if let Ok(q) = <[f64; 7]>::try_from(list.as_slice()) {
-                scene.start_q = q;
-                return Ok(());
-            }
-            let v = Vec3::from_column_slice(&list[..3]);
-            match key.as_str() {
-                "base" => scene.base_w.translation.vector = v,
-                "gravity" => scene.gravity = v,
-                "workspace_min" => scene.workspace.min = v,
-                _ => scene.workspace.max = v,
-            }
-            Ok(())
+        method(methods, "camera", |lua, this: &Self, name: String| LuaCamera::named(lua, &this.scene, &name));
+        method(methods, "add_camera", |lua, this: &Self, camera: Table| {
+            LuaCamera::add(lua, &this.scene, &camera)
         });
     }
 }
@@ -268,11 +273,22 @@ struct LuaObject {
     index: usize,
 }
 
-impl LuaObject {
-    fn read(&self, lua: &Lua, key: &str) -> mlua::Result<Value> {
+impl Hosted for LuaObject {
+    fn class() -> &'static Class {
+        &classes::OBJECT
+    }
+
+    fn label(&self) -> String {
+        "object".into()
+    }
+
+    fn read(&self, lua: &Lua, key: &str) -> mlua::Result<Read> {
         if key == "looks" {
-            let looks = LuaLook::all(&self.scene, self.index);
-            return lua.create_sequence_from(looks).map(Value::Table);
+            let looks = lua.create_sequence_from(LuaLook::all(&self.scene, self.index))?;
+            return Ok(Read::Fixed(
+                looks,
+                "write the numbers of a look, as in looks[1].roughness = 0.5".into(),
+            ));
         }
         let scene = locked(&self.scene);
         let object = &scene.objects[self.index];
@@ -281,38 +297,34 @@ impl LuaObject {
             Body::Soft(soft) => Some(soft),
             _ => None,
         };
-        let optional = |value: Option<f64>| Ok(value.map_or(Value::Nil, Value::Number));
-        match key {
-            "name" => lua.create_string(&object.name).map(Value::String),
-            "asset" => lua.create_string(&asset.name).map(Value::String),
-            "xyz" => numbers(lua, object.pose_w.translation.vector.as_slice()),
-            "yaw" => Ok(Value::Number(object.pose_w.rotation.euler_angles().2)),
-            "density" => optional(match &asset.body {
+        Ok(match key {
+            "name" => Read::text(lua, &object.name)?,
+            "asset" => Read::text(lua, &asset.name)?,
+            "xyz" => Read::Numbers(object.pose_w.translation.vector.as_slice().to_vec()),
+            "yaw" => Read::number(object.pose_w.rotation.euler_angles().2),
+            "density" => Read::optional(match &asset.body {
                 Body::Soft(soft) => Some(soft.density),
                 Body::Rigid { density } => Some(*density),
                 Body::Articulated(_) | Body::Static | Body::Scenery => None,
             }),
-            "youngs_pa" => optional(soft.map(|soft| soft.youngs_pa)),
-            "poisson" => optional(soft.map(|soft| soft.poisson)),
+            "youngs_pa" => Read::optional(soft.map(|soft| soft.youngs_pa)),
+            "poisson" => Read::optional(soft.map(|soft| soft.poisson)),
             "joints" => {
                 let names = asset.parts().iter().map(|part| part.name.as_str());
-                lua.create_table_from(names.zip(object.joints.iter().copied())).map(Value::Table)
+                let values = lua.create_table_from(names.zip(object.joints.iter().copied()))?;
+                Read::Fixed(values, "scene:add{ joints = … } gives start values".into())
             }
-            "static_mu" => Ok(Value::Number(asset.friction.static_mu)),
-            "dynamic_mu" => Ok(Value::Number(asset.friction.dynamic_mu)),
-            _ => {
-                let known = OBJECT.iter().map(|field| field.name).chain(["name", "asset", "looks", "joints"]);
-                Err(fail(lua, format!("object: {}", unknown("key", key, known))))
-            }
-        }
+            "static_mu" => Read::number(asset.friction.static_mu),
+            _ => Read::number(asset.friction.dynamic_mu),
+        })
     }
 
-    fn write(&self, lua: &Lua, key: &str, value: &Value) -> mlua::Result<()> {
-        let value = checked(lua, "object", OBJECT, key, value)?;
+    fn write(&self, lua: &Lua, key: &str, value: Value) -> mlua::Result<()> {
         let mut scene = locked(&self.scene);
         let object = &mut scene.objects[self.index];
         if key == "xyz" {
-            object.pose_w.translation.vector = Vec3::from(lua.unpack::<[f64; 3]>(value)?);
+            let xyz = Vec3::from(lua.unpack::<[f64; 3]>(value)?);
+            object.pose_w.translation.vector = place_at(lua, "object.xyz", xyz)?;
             return Ok(());
         }
         let number: f64 = lua.unpack(value)?;
@@ -337,18 +349,8 @@ impl LuaObject {
         }
         Ok(())
     }
+
+    fn methods<M: UserDataMethods<Self>>(_: &mut M) {}
 }
 
-impl UserData for LuaObject {
-    fn add_fields<F: UserDataFields<Self>>(fields: &mut F) {
-        fields.add_meta_field(MetaMethod::Type, "softvt.Object");
-    }
-
-    fn add_methods<M: UserDataMethods<Self>>(methods: &mut M) {
-        methods.add_meta_method(MetaMethod::ToString, |_, _, ()| Ok("softvt.Object"));
-        methods.add_meta_method(MetaMethod::Index, |lua, this, key: String| this.read(lua, &key));
-        methods.add_meta_method(MetaMethod::NewIndex, |lua, this, (key, value): (String, Value)| {
-            this.write(lua, &key, &value)
-        });
-    }
-}
+hosted!(LuaScene, LuaObject);

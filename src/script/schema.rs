@@ -2,63 +2,12 @@
 
 use mlua::{Lua, Table, Value};
 
-use super::sandbox::{fail, here, locked, shared};
+pub use super::range::Range;
+use super::{
+    lists,
+    sandbox::{fail, here, locked, shared},
+};
 use crate::message;
-
-/// Bounds of a number; an end may be excluded.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Range {
-    /// Lowest value.
-    pub min: f64,
-    /// Highest value.
-    pub max: f64,
-    /// Whether `min` itself is refused.
-    pub above_min: bool,
-    /// Whether `max` itself is refused.
-    pub below_max: bool,
-}
-
-impl Range {
-    /// Any finite number.
-    pub const ANY: Self =
-        Self { min: f64::NEG_INFINITY, max: f64::INFINITY, above_min: false, below_max: false };
-    /// Greater than zero.
-    pub const POSITIVE: Self = Self { min: 0.0, above_min: true, ..Self::ANY };
-    /// Zero or greater.
-    pub const NOT_NEGATIVE: Self = Self { min: 0.0, ..Self::ANY };
-
-    /// From `min` to `max`, both allowed.
-    pub const fn closed(min: f64, max: f64) -> Self {
-        Self { min, max, above_min: false, below_max: false }
-    }
-
-    /// From `min` (allowed) to `max` (refused).
-    pub const fn below(min: f64, max: f64) -> Self {
-        Self { min, max, above_min: false, below_max: true }
-    }
-
-    /// Whether `value` is allowed; never for NaN or an infinity.
-    pub fn holds(&self, value: f64) -> bool {
-        let low = if self.above_min { value > self.min } else { value >= self.min };
-        let high = if self.below_max { value < self.max } else { value <= self.max };
-        value.is_finite() && low && high
-    }
-
-    /// ` in 0..10`, ` above 0`, …; empty for any number.
-    pub fn words(&self) -> String {
-        match (self.min.is_finite(), self.max.is_finite()) {
-            (false, false) => String::new(),
-            (true, false) if self.above_min => format!(" above {}", self.min),
-            (true, false) => format!(" of {} or more", self.min),
-            (false, true) => format!(" of {} or less", self.max),
-            (true, true) => {
-                let low = if self.above_min { "above " } else { "" };
-                let high = if self.below_max { "below " } else { "" };
-                format!(" in {low}{}..{high}{}", self.min, self.max)
-            }
-        }
-    }
-}
 
 /// What a value may be.
 #[derive(Clone, Copy, Debug)]
@@ -69,6 +18,8 @@ pub enum Type {
     Integer(Range),
     /// A string, not empty.
     Text,
+    /// Any string.
+    Line,
     /// A string that may name a file.
     Name,
     /// `true` or `false`.
@@ -89,6 +40,8 @@ pub enum Type {
     Nested(&'static Record),
     /// A table made by the constructor of one of these records.
     Made(&'static [&'static Record]),
+    /// A table that is checked elsewhere, as LuaCATS writes it.
+    Table(&'static str),
     /// An object of the host, by class name.
     Object(&'static str),
     /// The first of these that fits.
@@ -214,6 +167,17 @@ pub(super) fn got(value: &Value) -> String {
         Value::Number(number) => message::number(*number),
         Value::Boolean(flag) => flag.to_string(),
         Value::Nil => "nil".into(),
+        other => kind(other),
+    }
+}
+
+/// `a table`, or of an object of the host its class: `a softvt.Pose`.
+pub(super) fn kind(value: &Value) -> String {
+    match value {
+        Value::UserData(object) => match object.type_name() {
+            Ok(name) => format!("a {}", name.to_string_lossy()),
+            Err(_) => "an object".into(),
+        },
         other => format!("a {}", other.type_name()),
     }
 }
@@ -225,6 +189,8 @@ impl Type {
             Self::Number(unit, range) => format!("{}{}", unit_words(unit), range.words()),
             Self::Integer(range) => format!("a whole number{}", range.words()),
             Self::Text => "a string that is not empty".into(),
+            Self::Line => "a string".into(),
+            Self::Table(_) => "a table".into(),
             Self::Name => "a name of letters, digits, _ and -".into(),
             Self::Boolean => "true or false".into(),
             Self::Vector(count, "") => format!("a list of {count} numbers"),
@@ -235,6 +201,7 @@ impl Type {
                 format!("one of {}", quoted.join(", "))
             }
             Self::Function(signature) => format!("a function, {signature}"),
+            Self::List(Self::Any) => "a list".into(),
             Self::List(of) => format!("a list of {}", of.words()),
             Self::Map(of) => format!("a table from names to {}", of.words()),
             Self::Nested(record) => format!("a table of {}", names(record)),
@@ -250,7 +217,13 @@ impl Type {
 
     /// The value as it is stored, or what is wrong with it.
     pub(super) fn check(&self, lua: &Lua, value: &Value) -> Result<Value, Fault> {
+        let value = &lists::plain(lua, value).map_err(|e| Fault::new(e.to_string()))?;
         let wrong = || Fault::new(format!("expected {}, got {}", self.words(), got(value)));
+        if let Value::String(text) = value
+            && text.to_str().is_err()
+        {
+            return Err(Fault::new(format!("expected UTF-8 text, got {}", got(value))));
+        }
         let kept = || Ok(value.clone());
         match (self, value) {
             (Self::Number(_, range), _) => match number(value) {
@@ -263,6 +236,7 @@ impl Type {
             },
             (Self::Text, Value::String(text)) if !text.as_bytes().is_empty() => kept(),
             (Self::Name, Value::String(text)) if is_name(&text.to_string_lossy()) => kept(),
+            (Self::Line, Value::String(_)) | (Self::Table(_), Value::Table(_)) => kept(),
             (Self::Boolean, Value::Boolean(_)) | (Self::Function(_), Value::Function(_)) => kept(),
             (Self::Any, value) if !value.is_nil() => kept(),
             (Self::Choice(names), Value::String(text)) => {
@@ -329,6 +303,11 @@ pub(super) fn number(value: &Value) -> Option<f64> {
         Value::Number(n) => Some(*n),
         _ => None,
     }
+}
+
+/// A measured number for scripts: none, which is nil, where there is nothing to measure.
+pub(super) fn finite(number: f64) -> Option<f64> {
+    number.is_finite().then_some(number)
 }
 
 fn whole(value: &Value) -> Option<i64> {
@@ -433,13 +412,31 @@ fn absent(lua: &Lua, field: &Field) -> Result<Value, Fault> {
 
 /// What the constructor of `record` gives for `value`: a checked table that also refuses to be read by unknown keys.
 pub(super) fn make(lua: &Lua, record: &'static Record, value: &Value) -> mlua::Result<Table> {
-    let Value::Table(table) = value else {
-        let message = format!("{}: expected a table of {}, got {}", record.label, names(record), got(value));
-        return Err(fail(lua, message));
-    };
-    let made = check(lua, record, table).map_err(|fault| fault_here(lua, record.label, &fault))?;
+    let made = checked(lua, record, value)?;
     made.set_metatable(Some(metatable(lua, record)?))?;
     Ok(made)
+}
+
+/// A table that `record` describes, checked.
+pub(super) fn checked(lua: &Lua, record: &Record, value: &Value) -> mlua::Result<Table> {
+    match lists::plain(lua, value)? {
+        Value::Table(table) => {
+            check(lua, record, &table).map_err(|fault| fault_here(lua, record.label, &fault))
+        }
+        other => {
+            let message =
+                format!("{}: expected a table of {}, got {}", record.label, names(record), got(&other));
+            Err(fail(lua, message))
+        }
+    }
+}
+
+/// Checks a made table once more: a script may have written to it since.
+pub(super) fn still_sound(lua: &Lua, record: &Record, table: &Table) -> mlua::Result<()> {
+    match check(lua, record, table) {
+        Ok(_) => Ok(()),
+        Err(fault) => Err(fail(lua, format!("{} (changed after it was made)", fault.words(record.label)))),
+    }
 }
 
 /// Whether the constructor of `record` made `table`.

@@ -1,21 +1,78 @@
 //! Shapes in Lua: immutable values with chained methods.
 
-use mlua::{FromLua, Lua, MetaMethod, Table, UserData, UserDataFields, UserDataMethods, Value};
+use std::sync::Arc;
+
+use mlua::{FromLua, Lua, Table, UserDataMethods, Value};
 
 use super::{
+    budget::{Held, hold},
+    catalogue_classes::{Class, SHAPE},
     catalogue_shapes as table,
+    host::{self, Hosted, hosted, method},
     sandbox::{fail, locked, shared},
-    schema::{self, Record},
+    schema::{self, checked},
 };
 use crate::geometry::{
     Quat, Vec3,
     import::{ImportOptions, MeshFormat, import},
-    shape::{Axis, Bumps, Mask, Relief, Ridges, Shape, ShapeError},
+    shape::{Axis, Bumps, Mask, Relief, Ridges, Shape, ShapeError, TreeSize},
 };
+
+/// Largest tree of a shape: every question about a point goes through all of it.
+const MOST: TreeSize = TreeSize { nodes: 2000, depth: 100, work: 1e5 };
 
 /// `softvt.Shape`.
 #[derive(Clone, Debug)]
-pub(super) struct LuaShape(pub Shape);
+pub(super) struct LuaShape(Arc<Node>);
+
+#[derive(Debug)]
+struct Node {
+    shape: Shape,
+    /// What it keeps in memory, bytes; what it shares with others counts for each of them.
+    bytes: usize,
+    _held: Held,
+}
+
+impl LuaShape {
+    /// The shape.
+    pub fn shape(&self) -> &Shape {
+        &self.0.shape
+    }
+
+    /// What it keeps in memory, bytes.
+    pub fn bytes(&self) -> usize {
+        self.0.bytes
+    }
+
+    /// Takes a shape into the machine that keeps `more` bytes besides its own tree, if it can be and is not too large.
+    fn new(lua: &Lua, shape: Shape, more: usize) -> mlua::Result<Self> {
+        let TreeSize { nodes, depth, work } = shape.tree_size();
+        if work > MOST.work {
+            let message = "shape: too many cuts or unions stand in one another to be computed with; join the parts by union \
+                           first (a:union(b):union(c)), and cut or join them at once";
+            return Err(fail(lua, message));
+        }
+        if nodes > MOST.nodes || depth > MOST.depth {
+            return Err(fail(
+                lua,
+                format!(
+                    "shape: is made of {nodes} shapes, {depth} deep; at most {} and {} can be computed with; use fewer, or a mesh",
+                    MOST.nodes, MOST.depth
+                ),
+            ));
+        }
+        shape.check().map_err(|error| fail(lua, format!("shape.{error}")))?;
+        let bytes = nodes * size_of::<Shape>() + more;
+        Ok(Self(Arc::new(Node { shape, bytes, _held: hold(lua, bytes)? })))
+    }
+
+    /// A shape made of this one and `others`.
+    fn derived(&self, lua: &Lua, shape: Shape, others: &[&Self]) -> mlua::Result<Self> {
+        let own = |shape: &Self| shape.0.bytes - shape.0.shape.tree_size().nodes * size_of::<Shape>();
+        let more = others.iter().map(|other| own(other)).sum::<usize>() + own(self);
+        Self::new(lua, shape, more)
+    }
+}
 
 impl FromLua for LuaShape {
     fn from_lua(value: Value, lua: &Lua) -> mlua::Result<Self> {
@@ -28,13 +85,21 @@ impl FromLua for LuaShape {
     }
 }
 
+/// A corner of a profile with its edge, bytes.
+const BYTES_A_CORNER: usize = 128;
+/// A solid takes about so many times the bytes of its file.
+const MESH_TO_FILE: usize = 8;
+
 /// Installs `softvt.shape`.
 pub(super) fn install(lua: &Lua, api: &Table) -> mlua::Result<()> {
     let shapes = lua.create_table()?;
     for (name, record) in table::SHAPES {
         let make = lua.create_function(move |lua, value: Value| {
             let spec = checked(lua, record, &value)?;
-            finished(lua, build(name, &spec)?)
+            let shape = build(name, &spec)?.map_err(|error| fail(lua, format!("shape.{error}")))?;
+            let corners =
+                spec.get::<Option<Table>>("corners").ok().flatten().map_or(0, |list| list.raw_len());
+            LuaShape::new(lua, shape, corners * BYTES_A_CORNER)
         })?;
         shapes.set(*name, make)?;
     }
@@ -52,34 +117,14 @@ fn mesh(lua: &Lua, value: &Value) -> mlua::Result<LuaShape> {
         let file = library.data(&path).map_err(|message| fail(lua, format!("mesh.file: {message}")))?;
         library.bytes(&file).unwrap_or_default()
     };
+    drop(hold(lua, MESH_TO_FILE * bytes.len())?);
     let extension = path.rsplit_once('.').map_or("", |(_, extension)| extension);
     let options = ImportOptions { scale: spec.get("scale")?, z_up: spec.get("z_up")? };
     let shape = MeshFormat::of_extension(extension)
         .and_then(|format| import(&bytes, format, &options))
         .and_then(|mesh| Ok(mesh.into_shape()?));
-    shape.map(LuaShape).map_err(|error| fail(lua, format!("mesh: {path}: {error}")))
-}
-
-pub(super) fn checked(lua: &Lua, record: &'static Record, value: &Value) -> mlua::Result<Table> {
-    let Value::Table(spec) = value else {
-        let fields: Vec<_> = record.fields.iter().map(|field| field.name).collect();
-        let message = format!(
-            "{}: expected a table of {}, got {}",
-            record.label,
-            fields.join(", "),
-            schema::got(value)
-        );
-        return Err(fail(lua, message));
-    };
-    schema::check(lua, record, spec).map_err(|fault| schema::fault_here(lua, record.label, &fault))
-}
-
-/// What can be, at the script's line.
-fn finished(lua: &Lua, shape: Result<Shape, ShapeError>) -> mlua::Result<LuaShape> {
-    match shape.and_then(|shape| shape.check().map(|()| shape)) {
-        Ok(shape) => Ok(LuaShape(shape)),
-        Err(error) => Err(fail(lua, format!("shape.{error}"))),
-    }
+    let shape = shape.map_err(|error| fail(lua, format!("mesh: {path}: {error}")))?;
+    LuaShape::new(lua, shape, MESH_TO_FILE * bytes.len())
 }
 
 fn vec3(spec: &Table, key: &str) -> mlua::Result<Vec3> {
@@ -158,69 +203,77 @@ fn change(shape: Shape, name: &str, spec: &Table) -> mlua::Result<Shape> {
         "ridges" => shape.displaced(ridges(spec)?),
         "bumps" => shape.displaced(bumps(spec)?),
         _ => {
-            let region: Option<LuaShape> = match spec.get::<Value>("region")? {
-                Value::Nil => None,
-                value => Some(value.as_userdata().map_or_else(
-                    || Err(mlua::Error::runtime("shape:paint: region is no shape")),
-                    |data| Ok(data.borrow::<LuaShape>()?.clone()),
-                )?),
-            };
-            shape.painted(spec.get("material")?, region.map(|region| region.0))
+            let region: Option<LuaShape> = spec.get("region")?;
+            shape.painted(spec.get("material")?, region.map(|region| region.shape().clone()))
         }
     })
 }
 
-impl UserData for LuaShape {
-    fn add_fields<F: UserDataFields<Self>>(fields: &mut F) {
-        fields.add_meta_field(MetaMethod::Type, "softvt.Shape");
+impl Hosted for LuaShape {
+    fn class() -> &'static Class {
+        &SHAPE
     }
 
-    fn add_methods<M: UserDataMethods<Self>>(methods: &mut M) {
-        methods.add_meta_method(MetaMethod::ToString, |_, _, ()| Ok("softvt.Shape"));
+    fn label(&self) -> String {
+        "shape".into()
+    }
+
+    fn methods<M: UserDataMethods<Self>>(methods: &mut M) {
         for (name, record) in table::METHODS {
-            methods.add_method(*name, move |lua, this, value: Value| {
-                let spec = checked(lua, record, &value)?;
-                finished(lua, Ok(change(this.0.clone(), name, &spec)?))
+            host::changing(methods, name, record, move |lua, this: &Self, spec: Table| {
+                let region: Option<Self> = if *name == "paint" { spec.get("region")? } else { None };
+                let others: Vec<&Self> = region.iter().collect();
+                this.derived(lua, change(this.shape().clone(), name, &spec)?, &others)
             });
         }
-        methods.add_method("translate", |lua, this, (x, y, z): (f64, f64, f64)| {
-            finished(lua, Ok(this.0.clone().translated(Vec3::new(x, y, z))))
+        method(methods, "translate", |lua, this: &Self, (x, y, z): (f64, f64, f64)| {
+            this.derived(lua, this.shape().clone().translated(Vec3::new(x, y, z)), &[])
         });
-        methods.add_method("scale", |lua, this, (x, y, z): (f64, Option<f64>, Option<f64>)| {
+        method(methods, "scale", |lua, this: &Self, (x, y, z): (f64, Option<f64>, Option<f64>)| {
             let (y, z) = (y.unwrap_or(x), z.unwrap_or(x));
-            finished(lua, Ok(this.0.clone().scaled(Vec3::new(x, y, z))))
+            this.derived(lua, this.shape().clone().scaled(Vec3::new(x, y, z)), &[])
         });
-        methods
-            .add_method("round", |lua, this, radius: f64| finished(lua, Ok(this.0.clone().rounded(radius))));
-        methods.add_method("shell", |lua, this, wall: f64| finished(lua, Ok(this.0.clone().shell(wall))));
-        methods
-            .add_method("union", |lua, this, other: Self| finished(lua, Ok(this.0.clone().union(other.0))));
-        methods.add_method("intersect", |lua, this, other: Self| {
-            finished(lua, Ok(this.0.clone().intersect(other.0)))
+        method(methods, "round", |lua, this: &Self, radius: f64| {
+            this.derived(lua, this.shape().clone().rounded(radius), &[])
         });
-        methods.add_method("subtract", |lua, this, (cut, blend): (Self, Option<f64>)| {
-            let shape = this.0.clone();
-            finished(
-                lua,
-                Ok(match blend {
-                    None => shape.subtract(cut.0),
-                    Some(blend) => shape.smooth_subtract(cut.0, blend),
-                }),
-            )
+        method(methods, "shell", |lua, this: &Self, wall: f64| {
+            this.derived(lua, this.shape().clone().shell(wall), &[])
         });
-        methods.add_method("smooth_union", |lua, this, (other, blend): (Self, f64)| {
-            finished(lua, Ok(this.0.clone().smooth_union(other.0, blend)))
-        });
-        methods.add_method("bounds", |lua, this, ()| {
-            let bounds = this.0.bounds();
+        combinations(methods);
+        method(methods, "bounds", |lua, this: &Self, ()| {
+            let bounds = this.shape().bounds();
             let list = |v: Vec3| lua.create_sequence_from([v.x, v.y, v.z]);
             Ok((list(bounds.min)?, list(bounds.max)?))
         });
         // A recipe ends with it: whatever the shape, its lowest point comes to z = 0 and its centre on the z axis.
-        methods.add_method("grounded", |_, this, ()| {
-            let bounds = this.0.bounds();
+        method(methods, "grounded", |lua, this: &Self, ()| {
+            let bounds = this.shape().bounds();
             let centre = bounds.centre();
-            Ok(Self(this.0.clone().translated(Vec3::new(-centre.x, -centre.y, -bounds.min.z))))
+            let shape = this.shape().clone().translated(Vec3::new(-centre.x, -centre.y, -bounds.min.z));
+            this.derived(lua, shape, &[])
         });
     }
 }
+
+/// Methods that join two shapes.
+fn combinations<M: UserDataMethods<LuaShape>>(methods: &mut M) {
+    let of = |shape: &LuaShape| shape.shape().clone();
+    method(methods, "union", move |lua, this: &LuaShape, other: LuaShape| {
+        this.derived(lua, of(this).union(of(&other)), &[&other])
+    });
+    method(methods, "intersect", move |lua, this: &LuaShape, other: LuaShape| {
+        this.derived(lua, of(this).intersect(of(&other)), &[&other])
+    });
+    method(methods, "subtract", move |lua, this: &LuaShape, (cut, blend): (LuaShape, Option<f64>)| {
+        let shape = match blend {
+            None => of(this).subtract(of(&cut)),
+            Some(blend) => of(this).smooth_subtract(of(&cut), blend),
+        };
+        this.derived(lua, shape, &[&cut])
+    });
+    method(methods, "smooth_union", move |lua, this: &LuaShape, (other, blend): (LuaShape, f64)| {
+        this.derived(lua, of(this).smooth_union(of(&other), blend), &[&other])
+    });
+}
+
+hosted!(LuaShape);

@@ -2,23 +2,25 @@
 
 use std::sync::{Arc, Mutex};
 
-use mlua::{
-    Function, Lua, LuaSerdeExt, MetaMethod, MultiValue, Table, UserData, UserDataFields, UserDataMethods,
-    Value,
-};
+use mlua::{Function, Lua, MultiValue, Table, UserDataMethods, Value};
 use serde::de::DeserializeOwned;
 
 use super::{
-    catalogue_world::{SEE, SIMULATE},
+    catalogue::LAYOUT,
+    catalogue_classes::Class,
+    catalogue_world::SIMULATE,
+    classes_world::SIMULATION,
     controller::{Glance, Planner, next},
+    data::json,
     deadline::Clock,
     expert::{Coroutine, ExpertCommand, ExpertView},
+    host::{Hosted, hosted, method},
     image_api::LuaImage,
     random::Rng,
     reach::Lag,
     sandbox::{fail, locked},
     scene_api::{LuaScene, empty_scene},
-    schema,
+    schema::{self, finite},
 };
 use crate::{
     benchmark::{
@@ -62,17 +64,31 @@ pub(super) fn install(lua: &Lua, api: &Table, clock: &Clock) -> mlua::Result<()>
 /// A table as settings.
 pub(super) fn settings(lua: &Lua, label: &str, table: Option<Table>) -> mlua::Result<Settings> {
     let Some(table) = table else { return Ok(Settings::default()) };
-    let settings: Settings = read(lua, label, Value::Table(table))?;
+    let settings: Settings = read(lua, label, &Value::Table(table))?;
     settings.check().map_err(|e| fail(lua, format!("{label}: {e}")))?;
     Ok(settings)
 }
 
-/// Lua data as a Rust type; the message says which field.
-pub(super) fn read<T: DeserializeOwned>(lua: &Lua, label: &str, value: Value) -> mlua::Result<T> {
-    lua.from_value(value).map_err(|e| {
-        let text = e.to_string();
-        let what = text.trim_start_matches("deserialize error: ").lines().next().unwrap_or_default();
-        fail(lua, format!("{label}: {what}"))
+/// Lua data as a Rust type, in words for people.
+pub(super) fn read<T: DeserializeOwned>(lua: &Lua, label: &str, value: &Value) -> mlua::Result<T> {
+    serde_json::from_value(json(lua, value, label)?).map_err(|error| {
+        let text = error.to_string();
+        let kinds = [
+            ("floating point ", ""),
+            ("expected f64", "expected a number"),
+            ("expected u32", "expected a whole number"),
+            ("expected u64", "expected a whole number"),
+            ("expected usize", "expected a whole number"),
+            ("expected a sequence", "expected a list"),
+            ("expected a map", "expected a table"),
+            ("invalid type: map", "invalid type: a table"),
+            ("invalid type: sequence", "invalid type: a list"),
+        ];
+        let text = kinds.iter().fold(text, |text, (rust, people)| text.replace(rust, people));
+        let text = text
+            .split_once("expected struct ")
+            .map_or(text.clone(), |(before, _)| format!("{before}expected a table"));
+        fail(lua, format!("{label}: {text}"))
     })
 }
 
@@ -82,13 +98,10 @@ fn simulate(
     clock: &Clock,
     (cache, looks): (&RestCache, &Looks),
 ) -> mlua::Result<LuaSimulation> {
-    let Value::Table(table) = value else {
-        return Err(fail(lua, format!("softvt.simulate: expected a table, got {}", schema::got(value))));
-    };
-    let spec = schema::check(lua, &SIMULATE, table)
-        .map_err(|fault| schema::fault_here(lua, "softvt.simulate", &fault))?;
+    let spec = schema::checked(lua, &SIMULATE, value)?;
     let settings = settings(lua, "softvt.simulate: settings", spec.get("settings")?)?;
     let layout: Table = spec.get("layout")?;
+    schema::still_sound(lua, &LAYOUT, &layout)?;
     let seed = EpisodeSeed {
         suite: spec.get("suite")?,
         layout: layout.get("name")?,
@@ -192,6 +205,7 @@ impl Planner for Bound<'_> {
 }
 
 /// `softvt.Simulation`.
+#[derive(Clone)]
 struct LuaSimulation(Arc<Mutex<Inner>>);
 
 impl LuaSimulation {
@@ -214,9 +228,6 @@ impl LuaSimulation {
     }
 
     fn wait(&self, lua: &Lua, seconds: f64) -> mlua::Result<MultiValue> {
-        if !(0.0..=600.0).contains(&seconds) {
-            return Err(fail(lua, format!("simulation:wait: expected seconds in 0..600, got {seconds}")));
-        }
         let mut inner = locked(&self.0);
         let until = inner.time() + seconds - 1e-9;
         while inner.time() < until && inner.control_step(None) {}
@@ -224,38 +235,27 @@ impl LuaSimulation {
     }
 
     /// What a camera sees.
-    fn see(&self, lua: &Lua, value: &Value) -> mlua::Result<LuaImage> {
-        const LABEL: &str = "simulation:see";
-        let table = match value {
-            Value::Nil => lua.create_table()?,
-            Value::Table(table) => table.clone(),
-            other => {
-                return Err(fail(lua, format!("{LABEL}: expected a table, got {}", schema::got(other))));
-            }
-        };
-        let spec =
-            schema::check(lua, &SEE, &table).map_err(|fault| schema::fault_here(lua, LABEL, &fault))?;
-        let wrong = |e: SenseError| fail(lua, format!("{LABEL}: {e}"));
+    fn see(&self, lua: &Lua, spec: &Table) -> mlua::Result<LuaImage> {
+        let wrong = |e: SenseError| fail(lua, format!("simulation:see: {e}"));
         let mut inner = locked(&self.0);
-        let Inner { sim, senses, clock, .. } = &mut *inner;
+        let Inner { sim, senses, clock, physics_steps, .. } = &mut *inner;
         let _honest_work = clock.pause();
         let mut camera = senses.camera(&spec.get::<String>("camera")?).map_err(wrong)?.clone();
         camera.width = spec.get::<Option<usize>>("width")?.unwrap_or(camera.width);
         camera.height = spec.get::<Option<usize>>("height")?.unwrap_or(camera.height);
-        let picture = senses.see(&Senses::frame(sim), &camera).map_err(wrong)?.into_image();
-        LuaImage::new(lua, picture)
+        let frame = Senses::frame(sim);
+        // Before anything has moved, only whoever wrote the layout can have put the camera inside of something.
+        let seen = if *physics_steps == 0 {
+            senses.see_from_outside(&frame, &camera)
+        } else {
+            senses.see(&frame, &camera)
+        };
+        LuaImage::new(lua, seen.map_err(wrong)?.into_image())
     }
 
     /// What a finger feels.
     fn feel(&self, lua: &Lua, side: &str) -> mlua::Result<Table> {
-        let (index, side) = match side {
-            "left" => (0, Side::Left),
-            "right" => (1, Side::Right),
-            other => {
-                let message = format!("simulation:feel: expected \"left\" or \"right\", got {other:?}");
-                return Err(fail(lua, message));
-            }
-        };
+        let (index, side) = if side == "left" { (0, Side::Left) } else { (1, Side::Right) };
         let mut inner = locked(&self.0);
         let Inner { sim, senses, clock, .. } = &mut *inner;
         let _honest_work = clock.pause();
@@ -285,9 +285,9 @@ impl LuaSimulation {
         };
         let (object, watched) = (&sim.objects[index], &inner.watched[index]);
         let table = lua.create_table()?;
-        table.set("width_m", sim.rig.width(&sim.world))?;
-        table.set("height_m", sim.centre(object).z - watched.start_z)?;
-        table.set("speed", sim.speed(object))?;
+        table.set("width_m", finite(sim.rig.width(&sim.world)))?;
+        table.set("height_m", finite(sim.centre(object).z - watched.start_z))?;
+        table.set("speed", finite(sim.speed(object)))?;
         table.set("asset", object.asset.name.as_str())?;
         table.set("fingerprint", object.asset.fingerprint())?;
         table.set("joint", sim.joint(object))?;
@@ -302,27 +302,30 @@ impl LuaSimulation {
             let body = &sim.world.soft[soft];
             table.set("d_pct", deformation(sim, index, &watched.reference))?;
             table.set("d_peak_pct", watched.d_peak)?;
-            table.set("min_det_f", body.min_det_f.0)?;
+            table.set("min_det_f", finite(body.min_det_f.0))?;
             table.set("asleep", body.asleep)?;
         }
         Ok(table)
     }
 }
 
-impl UserData for LuaSimulation {
-    fn add_fields<F: UserDataFields<Self>>(fields: &mut F) {
-        fields.add_meta_field(MetaMethod::Type, "softvt.Simulation");
+impl Hosted for LuaSimulation {
+    fn class() -> &'static Class {
+        &SIMULATION
     }
 
-    fn add_methods<M: UserDataMethods<Self>>(methods: &mut M) {
-        methods.add_meta_method(MetaMethod::ToString, |_, _, ()| Ok("softvt.Simulation"));
-        methods.add_method("drive", |lua, this, expert: Function| this.drive(lua, expert));
-        methods.add_method("wait", |lua, this, seconds: f64| this.wait(lua, seconds));
-        methods.add_method("watch", |lua, this, name: String| this.watch(lua, &name));
-        methods.add_method("see", |lua, this, value: Value| this.see(lua, &value));
-        methods.add_method("feel", |lua, this, side: String| this.feel(lua, &side));
-        methods.add_method("time", |_, this, ()| Ok(locked(&this.0).time()));
-        methods.add_method("tool", |lua, this, ()| {
+    fn label(&self) -> String {
+        "simulation".into()
+    }
+
+    fn methods<M: UserDataMethods<Self>>(methods: &mut M) {
+        method(methods, "drive", |lua, this: &Self, expert: Function| this.drive(lua, expert));
+        method(methods, "wait", |lua, this: &Self, seconds: f64| this.wait(lua, seconds));
+        method(methods, "watch", |lua, this: &Self, name: String| this.watch(lua, &name));
+        method(methods, "see", |lua, this: &Self, spec: Table| this.see(lua, &spec));
+        method(methods, "feel", |lua, this: &Self, side: String| this.feel(lua, &side));
+        method(methods, "time", |_, this: &Self, ()| Ok(locked(&this.0).time()));
+        method(methods, "tool", |lua, this: &Self, ()| {
             let inner = locked(&this.0);
             let tool = inner.sim.rig.base_w * inner.sim.rig.tool_b(&inner.sim.world);
             let turn = rotation::axis_angle(&tool.rotation);
@@ -333,3 +336,5 @@ impl UserData for LuaSimulation {
         });
     }
 }
+
+hosted!(LuaSimulation);

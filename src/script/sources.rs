@@ -3,6 +3,7 @@
 use std::{
     collections::BTreeMap,
     fs,
+    io::Read,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -257,10 +258,13 @@ pub fn embedded_scripts(tree: &str) -> Vec<String> {
 }
 
 fn read(path: &Path) -> std::io::Result<Vec<u8>> {
-    if fs::metadata(path)?.len() > MAX_BYTES {
-        return Err(std::io::Error::other(format!("is larger than {} MiB", MAX_BYTES >> 20)));
+    let mut bytes = Vec::new();
+    // What a pipe or a device holds is only known once it is read.
+    fs::File::open(path)?.take(MAX_BYTES + 1).read_to_end(&mut bytes)?;
+    match bytes.len() as u64 > MAX_BYTES {
+        true => Err(std::io::Error::other(format!("is larger than {} MiB", MAX_BYTES >> 20))),
+        false => Ok(bytes),
     }
-    fs::read(path)
 }
 
 fn read_main(main: &Path, name: &str) -> Result<Vec<u8>, ScriptError> {

@@ -7,9 +7,7 @@ use super::{
     catalogue_classes::{CLASSES, Class, FUNCTIONS, SHAPE, Signature},
     catalogue_shapes::{MASK, MESH, METHODS, SHAPES},
     catalogue_visuals::{MASK_CLASS, MASKS},
-    scene_api::{OBJECT, SCENE},
     schema::{Field, Presence, Record, Type},
-    view_api::{CAMERA, LIGHT, LOOK},
 };
 
 /// Name of the stub file that `softvt init` writes.
@@ -35,11 +33,11 @@ fn lua_type(ty: &Type) -> String {
     match ty {
         Type::Number(..) => "number".into(),
         Type::Integer(_) => "integer".into(),
-        Type::Text | Type::Name => "string".into(),
+        Type::Text | Type::Line | Type::Name => "string".into(),
         Type::Boolean => "boolean".into(),
         Type::Vector(..) | Type::Colour => "number[]".into(),
         Type::Choice(names) => names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join("|"),
-        Type::Function(signature) => (*signature).into(),
+        Type::Function(signature) | Type::Table(signature) => (*signature).into(),
         Type::List(of) => match of {
             Type::OneOf(_) | Type::Choice(_) | Type::Function(_) => format!("({})[]", lua_type(of)),
             of => format!("{}[]", lua_type(of)),
@@ -84,13 +82,13 @@ pub fn stubs() -> String {
         }
         out.push('\n');
     }
-    stub_class(&mut out, &SHAPE, &[]);
+    stub_class(&mut out, &SHAPE);
     for (name, record) in METHODS {
         let _ = writeln!(out, "---{}\n---@param spec {}\n---@return softvt.Shape", record.doc, record.class);
         let _ = writeln!(out, "function Shape:{name}(spec) end\n");
     }
-    for class in [&MASK_CLASS].into_iter().chain(CLASSES) {
-        stub_class(&mut out, class, writable(class));
+    for class in [&MASK_CLASS].into_iter().chain(CLASSES.iter().copied()) {
+        stub_class(&mut out, class);
     }
     out.push_str("---The softvt library.\nsoftvt = {}\n\n---Version of softvt.\n---@type string\nsoftvt.version = \"\"\n\n");
     for (name, record) in CONSTRUCTORS {
@@ -116,24 +114,12 @@ pub fn stubs() -> String {
     out
 }
 
-/// Fields of a class that scripts may write.
-fn writable(class: &Class) -> &'static [Field] {
-    match class.name {
-        "softvt.Scene" => SCENE,
-        "softvt.Object" => OBJECT,
-        "softvt.Light" => LIGHT,
-        "softvt.Camera" => CAMERA,
-        "softvt.Look" => LOOK,
-        _ => &[],
-    }
-}
-
-fn stub_class(out: &mut String, class: &Class, fields: &[Field]) {
+fn stub_class(out: &mut String, class: &Class) {
     let _ = writeln!(out, "---{}\n---@class {}", class.doc, class.name);
     for (name, ty, doc) in class.fields {
         let _ = writeln!(out, "---@field {name} {ty} {doc}");
     }
-    for field in fields {
+    for field in class.written {
         let _ = writeln!(out, "---@field {} {} {}", field.name, lua_type(&field.ty), details(field));
     }
     let short = class.name.rsplit('.').next().unwrap_or(class.name);
@@ -146,7 +132,7 @@ fn stub_class(out: &mut String, class: &Class, fields: &[Field]) {
 fn stub_function(out: &mut String, prefix: &str, function: &Signature) {
     let _ = writeln!(out, "---{}", function.doc);
     for (name, ty) in function.params {
-        let _ = writeln!(out, "---@param {name} {ty}");
+        let _ = writeln!(out, "---@param {name} {}", lua_type(ty));
     }
     for ty in function.returns {
         let _ = writeln!(out, "---@return {ty}");
@@ -170,12 +156,12 @@ pub fn reference() -> String {
         let _ = writeln!(out, "- `softvt.mask.{name}{{…}}`: {} See `{}`.", record.doc, record.class);
     }
     out.push_str("- `softvt.version`: version of softvt, a string.\n\n## Objects\n");
-    for class in [&SHAPE, &MASK_CLASS].into_iter().chain(CLASSES) {
+    for class in [&SHAPE, &MASK_CLASS].into_iter().chain(CLASSES.iter().copied()) {
         let _ = writeln!(out, "\n### {}\n\n{}\n", class.name, class.doc);
         for (name, ty, doc) in class.fields {
             let _ = writeln!(out, "- `{name}` ({}): {doc}", cell(ty));
         }
-        for field in writable(class) {
+        for field in class.written {
             let _ = writeln!(
                 out,
                 "- `{}` ({}, writable): {}",
@@ -236,7 +222,13 @@ Scripts are Lua 5.4 in a sandbox: `coroutine`, `math`, `string`, `table` and `ut
 `package` and byte code. `require \"a.b\"` looks for `scripts/a/b.lua`, `suites/a/b.lua` and `a/b.lua` in the script's
 folder, the folder above and the current one, then in the library inside the binary. `math.random` is seeded by the run.
 `pairs` goes through numbers, strings and booleans in order; other keys, and `next`, have no promised order. `tostring`
-gives the kind of a table or function, never an address. `print` writes to standard error. Memory and time are limited.
+gives the kind of a table or function, never an address. `print` writes to standard error, up to 1 MiB. Memory and time
+are limited: 256 MiB of Lua values, 512 MiB of pictures, shapes and masks, shapes of at most 2000 parts, masks of 200.
+
+A list that belongs to an object (`scene.base`, `look.albedo`, `scene.objects`) is the object's own and no copy: what is
+written to it is checked and holds at once, and a list that cannot be written says what to do instead. What a method
+gives, and a table that a script made, are the script's. Unknown fields are errors everywhere. `pcall` gives messages as
+strings.
 ";
 
 #[cfg(test)]

@@ -2,20 +2,24 @@
 
 use std::sync::{Arc, Mutex};
 
-use mlua::{Lua, MetaMethod, UserData, UserDataFields, UserDataMethods, Value};
-use nalgebra::Quaternion;
+use mlua::{Lua, Table, UserDataMethods, Value};
 
 use super::{
-    catalogue_world::NEW_CAMERA,
-    sandbox::{fail, locked},
-    scene_api::{checked, field, numbers},
-    schema::{self, Field, Range, Type, unknown},
+    catalogue_classes::{self as classes, Class},
+    host::{Hosted, Read, hosted, method},
+    sandbox::{fail, here, locked},
+    scene_api::field,
+    schema::{Field, Range, Type, unknown},
+    turn,
 };
 use crate::{
     geometry::{Pose, Quat, Vec3},
+    message,
     scene::{Camera, CameraMount, Scene, Visual},
 };
 
+/// Cameras of a scene; each draws its own pictures.
+const MOST_CAMERAS: usize = 64;
 const SHARE: Range = Range::closed(0.0, 1.0);
 /// Colours of lights may be brighter than white.
 const BRIGHT: Range = Range::closed(0.0, 1000.0);
@@ -69,51 +73,46 @@ pub(super) struct LuaCamera(Shared, usize);
 #[derive(Clone)]
 pub(super) struct LuaLook(Shared, usize, usize);
 
-/// A key that is not there.
-fn missing(lua: &Lua, label: &str, fields: &[Field], key: &str) -> mlua::Error {
-    fail(lua, format!("{label}: {}", unknown("key", key, fields.iter().map(|field| field.name))))
-}
-
 /// Three numbers of a checked list, none below 0.
 fn colour(lua: &Lua, label: &str, value: Value, most: f64) -> mlua::Result<[f64; 3]> {
     let colour: [f64; 3] = lua.unpack(value)?;
     if colour.iter().all(|c| (0.0..=most).contains(c)) {
         return Ok(colour);
     }
-    Err(fail(lua, format!("{label}: expected linear RGB in 0..{most}, got {colour:?}")))
+    Err(fail(lua, format!("{label}: expected linear RGB in 0..{most}, got {}", braced(&colour))))
 }
 
-impl LuaLight {
-    fn read(&self, lua: &Lua, key: &str) -> mlua::Result<Value> {
-        let scene = locked(&self.0);
-        let (light, key_light, sky) = (&scene.lighting, &scene.lighting.key, &scene.lighting.sky);
-        match key {
-            "direction" => numbers(lua, key_light.direction_w.as_slice()),
-            "colour" => numbers(lua, &key_light.colour),
-            "strength" => Ok(Value::Number(key_light.strength)),
-            "softness" => Ok(Value::Number(key_light.softness_rad)),
-            "sky_zenith" => numbers(lua, &sky.zenith),
-            "sky_horizon" => numbers(lua, &sky.horizon),
-            "sky_ground" => numbers(lua, &sky.ground),
-            "sky_strength" => Ok(Value::Number(sky.strength)),
-            "exposure" => Ok(Value::Number(light.exposure)),
-            _ => Err(missing(lua, "scene.light", LIGHT, key)),
-        }
+impl Hosted for LuaLight {
+    fn class() -> &'static Class {
+        &classes::LIGHT
     }
 
-    fn write(&self, lua: &Lua, key: &str, value: &Value) -> mlua::Result<()> {
-        let value = checked(lua, "scene.light", LIGHT, key, value)?;
+    fn label(&self) -> String {
+        "scene.light".into()
+    }
+
+    fn read(&self, _: &Lua, key: &str) -> mlua::Result<Read> {
+        let scene = locked(&self.0);
+        let (light, key_light, sky) = (&scene.lighting, &scene.lighting.key, &scene.lighting.sky);
+        Ok(match key {
+            "direction" => Read::Numbers(key_light.direction_w.as_slice().to_vec()),
+            "colour" => Read::Numbers(key_light.colour.to_vec()),
+            "strength" => Read::number(key_light.strength),
+            "softness" => Read::number(key_light.softness_rad),
+            "sky_zenith" => Read::Numbers(sky.zenith.to_vec()),
+            "sky_horizon" => Read::Numbers(sky.horizon.to_vec()),
+            "sky_ground" => Read::Numbers(sky.ground.to_vec()),
+            "sky_strength" => Read::number(sky.strength),
+            _ => Read::number(light.exposure),
+        })
+    }
+
+    fn write(&self, lua: &Lua, key: &str, value: Value) -> mlua::Result<()> {
         let label = format!("scene.light.{key}");
         let mut scene = locked(&self.0);
         let light = &mut scene.lighting;
         match key {
-            "direction" => {
-                let direction = Vec3::from(lua.unpack::<[f64; 3]>(value)?);
-                if direction.norm() < 1e-9 {
-                    return Err(fail(lua, format!("{label}: expected a direction, got {{0, 0, 0}}")));
-                }
-                light.key.direction_w = direction;
-            }
+            "direction" => light.key.direction_w = direction(lua, &label, lua.unpack(value)?)?,
             "colour" => light.key.colour = colour(lua, &label, value, BRIGHT.max)?,
             "strength" => light.key.strength = lua.unpack(value)?,
             "softness" => light.key.softness_rad = lua.unpack(value)?,
@@ -125,29 +124,54 @@ impl LuaLight {
         }
         Ok(())
     }
+
+    fn methods<M: UserDataMethods<Self>>(_: &mut M) {}
+}
+
+/// A direction of any length, which is kept: its numbers may be written one by one.
+fn direction(lua: &Lua, label: &str, numbers: [f64; 3]) -> mlua::Result<Vec3> {
+    let Some(unit) = turn::direction(numbers) else {
+        return Err(fail(lua, format!("{label}: expected a direction, got {}", braced(&numbers))));
+    };
+    let most = numbers.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    Ok(if (1e-6..1e6).contains(&most) { Vec3::from(numbers) } else { unit })
+}
+
+/// `{0, 1e300, 0}`.
+fn braced(numbers: &[f64]) -> String {
+    format!("{{{}}}", numbers.iter().map(|x| message::number(*x)).collect::<Vec<_>>().join(", "))
+}
+
+/// File and line of the script that is at work, as messages name them.
+fn place(lua: &Lua) -> Option<String> {
+    here(lua).map(|(file, line)| format!("{file}:{line}"))
 }
 
 /// A turn from four numbers.
-fn turn(lua: &Lua, label: &str, [w, x, y, z]: [f64; 4]) -> mlua::Result<Quat> {
-    let turn = Quat::try_new(Quaternion::new(w, x, y, z), 1e-6);
-    turn.ok_or_else(|| fail(lua, format!("{label}.quat: expected a quaternion other than 0")))
+fn quat(lua: &Lua, label: &str, numbers: [f64; 4]) -> mlua::Result<Quat> {
+    turn::turn(numbers).ok_or_else(|| {
+        fail(lua, format!("{label}.quat: expected a quaternion other than 0, got {}", braced(&numbers)))
+    })
 }
 
 /// The turn of a camera at `from` that looks at `to`, with `up` upwards in the picture.
-fn look_at(lua: &Lua, label: &str, from: &Vec3, to: &Vec3, up: &Vec3) -> mlua::Result<Quat> {
-    if !from.iter().chain(to).chain(up).all(|x| x.abs() < 1e6) {
-        return Err(fail(
-            lua,
-            format!("{label}.look_at: expected numbers within ±1e6, got {to:?} with up {up:?}"),
-        ));
+fn look_at(lua: &Lua, label: &str, from: &Vec3, to: &Vec3, up: [f64; 3]) -> mlua::Result<Quat> {
+    if from.amax().max(to.amax()) > 1e6 {
+        let (from, to) = (braced(from.as_slice()), braced(to.as_slice()));
+        return Err(fail(lua, format!("{label}: expected numbers within ±1e6, got {to} from {from}")));
     }
     let ahead = to - from;
-    if up.norm() < 1e-9 || ahead.norm() < 1e-6 || ahead.cross(up).norm() < 1e-6 * ahead.norm() * up.norm() {
-        let message = "expected a point away from the camera, not straight along up; give another up";
-        return Err(fail(lua, format!("{label}.look_at: {message}")));
+    match turn::direction(up).filter(|up| ahead.norm() > 1e-6 && ahead.cross(up).norm() > 1e-6 * ahead.norm())
+    {
+        Some(up) => Ok(Quat::face_towards(&-ahead, &up)),
+        None => {
+            let message = "expected a point away from the camera, not straight along up; give another up";
+            Err(fail(lua, format!("{label}: {message}")))
+        }
     }
-    Ok(Quat::face_towards(&-ahead, up))
 }
+
+const UP: [f64; 3] = [0.0, 0.0, 1.0];
 
 impl LuaCamera {
     /// The scene's camera of a name.
@@ -160,20 +184,15 @@ impl LuaCamera {
         }
     }
 
-    /// A new one from its table.
-    pub fn add(lua: &Lua, scene: &Shared, value: &Value) -> mlua::Result<Self> {
+    /// A new one from its checked table.
+    pub fn add(lua: &Lua, scene: &Shared, spec: &Table) -> mlua::Result<Self> {
         const LABEL: &str = "scene:add_camera";
-        let Value::Table(table) = value else {
-            return Err(fail(lua, format!("{LABEL}: expected a table, got {}", schema::got(value))));
-        };
-        let spec =
-            schema::check(lua, &NEW_CAMERA, table).map_err(|fault| schema::fault_here(lua, LABEL, &fault))?;
         let name: String = spec.get("name")?;
         let at = Vec3::from(spec.get::<[f64; 3]>("position")?);
-        let up = Vec3::from(spec.get::<Option<[f64; 3]>>("up")?.unwrap_or([0.0, 0.0, 1.0]));
+        let up = spec.get::<Option<[f64; 3]>>("up")?.unwrap_or(UP);
         let turn = match (spec.get::<Option<[f64; 3]>>("look_at")?, spec.get::<Option<[f64; 4]>>("quat")?) {
-            (Some(to), None) => look_at(lua, LABEL, &at, &Vec3::from(to), &up)?,
-            (None, Some(quat)) => turn(lua, LABEL, quat)?,
+            (Some(to), None) => look_at(lua, &format!("{LABEL}.look_at"), &at, &Vec3::from(to), up)?,
+            (None, Some(numbers)) => quat(lua, LABEL, numbers)?,
             _ => return Err(fail(lua, format!("{LABEL}: give either look_at or quat"))),
         };
         let hand = spec.get::<String>("mount")? == "hand";
@@ -186,6 +205,7 @@ impl LuaCamera {
             far_m: spec.get("far")?,
             width: spec.get("width")?,
             height: spec.get("height")?,
+            set_at: place(lua),
         };
         let mut inner = locked(scene);
         if inner.camera(&name).is_some() {
@@ -193,40 +213,54 @@ impl LuaCamera {
                 format!("{LABEL}: there is a camera {name:?} already; change it by scene:camera({name:?})");
             return Err(fail(lua, message));
         }
+        if inner.cameras.len() >= MOST_CAMERAS {
+            return Err(fail(lua, format!("{LABEL}: a scene has at most {MOST_CAMERAS} cameras")));
+        }
         inner.cameras.push(camera);
         Ok(Self(scene.clone(), inner.cameras.len() - 1))
     }
+}
 
-    fn read(&self, lua: &Lua, key: &str) -> mlua::Result<Value> {
-        let scene = locked(&self.0);
-        let camera = &scene.cameras[self.1];
-        match key {
-            "name" => lua.create_string(&camera.name).map(Value::String),
-            "mount" => {
-                let mount = if camera.mount == CameraMount::Hand { "hand" } else { "world" };
-                lua.create_string(mount).map(Value::String)
-            }
-            "position" => numbers(lua, camera.pose.translation.vector.as_slice()),
-            "quat" => {
-                let q = crate::robot::rotation::canonical(&camera.pose.rotation);
-                numbers(lua, &[q.w, q.i, q.j, q.k])
-            }
-            "fovy" => Ok(Value::Number(camera.fovy_rad)),
-            "near" => Ok(Value::Number(camera.near_m)),
-            "far" => Ok(Value::Number(camera.far_m)),
-            "width" => Ok(Value::Integer(camera.width as i64)),
-            "height" => Ok(Value::Integer(camera.height as i64)),
-            _ => Err(missing(lua, "camera", CAMERA, key)),
-        }
+impl Hosted for LuaCamera {
+    fn class() -> &'static Class {
+        &classes::CAMERA
     }
 
-    fn write(&self, lua: &Lua, key: &str, value: &Value) -> mlua::Result<()> {
-        let value = checked(lua, "camera", CAMERA, key, value)?;
+    fn label(&self) -> String {
+        format!("scene:camera({:?})", locked(&self.0).cameras[self.1].name)
+    }
+
+    fn read(&self, lua: &Lua, key: &str) -> mlua::Result<Read> {
+        let scene = locked(&self.0);
+        let camera = &scene.cameras[self.1];
+        Ok(match key {
+            "name" => Read::text(lua, &camera.name)?,
+            "mount" => Read::text(lua, if camera.mount == CameraMount::Hand { "hand" } else { "world" })?,
+            "position" => Read::Numbers(camera.pose.translation.vector.as_slice().to_vec()),
+            "quat" => {
+                let q = crate::robot::rotation::canonical(&camera.pose.rotation);
+                Read::together(
+                    lua,
+                    &[q.w, q.i, q.j, q.k],
+                    "its numbers belong together: write camera.quat = { w, x, y, z }",
+                )?
+            }
+            "fovy" => Read::number(camera.fovy_rad),
+            "near" => Read::number(camera.near_m),
+            "far" => Read::number(camera.far_m),
+            "width" => Read::Value(Value::Integer(camera.width as i64)),
+            _ => Read::Value(Value::Integer(camera.height as i64)),
+        })
+    }
+
+    fn write(&self, lua: &Lua, key: &str, value: Value) -> mlua::Result<()> {
+        let label = self.label();
         let mut scene = locked(&self.0);
         let camera = &mut scene.cameras[self.1];
+        camera.set_at = place(lua);
         match key {
             "position" => camera.pose.translation.vector = Vec3::from(lua.unpack::<[f64; 3]>(value)?),
-            "quat" => camera.pose.rotation = turn(lua, "camera", lua.unpack(value)?)?,
+            "quat" => camera.pose.rotation = quat(lua, &label, lua.unpack(value)?)?,
             "fovy" => camera.fovy_rad = lua.unpack(value)?,
             "near" => camera.near_m = lua.unpack(value)?,
             "far" => camera.far_m = lua.unpack(value)?,
@@ -236,12 +270,17 @@ impl LuaCamera {
         Ok(())
     }
 
-    fn turn_to(&self, lua: &Lua, to: [f64; 3], up: Option<[f64; 3]>) -> mlua::Result<()> {
-        let mut scene = locked(&self.0);
-        let pose = &mut scene.cameras[self.1].pose;
-        let up = Vec3::from(up.unwrap_or([0.0, 0.0, 1.0]));
-        pose.rotation = look_at(lua, "camera", &pose.translation.vector, &Vec3::from(to), &up)?;
-        Ok(())
+    fn methods<M: UserDataMethods<Self>>(methods: &mut M) {
+        method(methods, "look_at", |lua, this: &Self, (to, up): ([f64; 3], Option<[f64; 3]>)| {
+            let label = format!("{}:look_at", this.label());
+            let mut scene = locked(&this.0);
+            let camera = &mut scene.cameras[this.1];
+            camera.set_at = place(lua);
+            let pose = &mut camera.pose;
+            pose.rotation =
+                look_at(lua, &label, &pose.translation.vector, &Vec3::from(to), up.unwrap_or(UP))?;
+            Ok(())
+        });
     }
 }
 
@@ -256,20 +295,28 @@ impl LuaLook {
         let mut scene = locked(&self.0);
         with(&mut Arc::make_mut(&mut scene.objects[self.1].asset).visuals[self.2])
     }
+}
 
-    fn read(&self, lua: &Lua, key: &str) -> mlua::Result<Value> {
-        let scene = locked(&self.0);
-        let look = &scene.objects[self.1].asset.visuals[self.2];
-        match key {
-            "albedo" => numbers(lua, &look.albedo),
-            "roughness" => Ok(Value::Number(look.roughness)),
-            "metalness" => Ok(Value::Number(look.metalness)),
-            _ => Err(missing(lua, "look", LOOK, key)),
-        }
+impl Hosted for LuaLook {
+    fn class() -> &'static Class {
+        &classes::LOOK
     }
 
-    fn write(&self, lua: &Lua, key: &str, value: &Value) -> mlua::Result<()> {
-        let value = checked(lua, "look", LOOK, key, value)?;
+    fn label(&self) -> String {
+        "look".into()
+    }
+
+    fn read(&self, _: &Lua, key: &str) -> mlua::Result<Read> {
+        let scene = locked(&self.0);
+        let look = &scene.objects[self.1].asset.visuals[self.2];
+        Ok(match key {
+            "albedo" => Read::Numbers(look.albedo.to_vec()),
+            "roughness" => Read::number(look.roughness),
+            _ => Read::number(look.metalness),
+        })
+    }
+
+    fn write(&self, lua: &Lua, key: &str, value: Value) -> mlua::Result<()> {
         if key == "albedo" {
             let albedo = colour(lua, "look.albedo", value, 1.0)?;
             self.change(|look| look.albedo = albedo);
@@ -282,31 +329,8 @@ impl LuaLook {
         });
         Ok(())
     }
+
+    fn methods<M: UserDataMethods<Self>>(_: &mut M) {}
 }
 
-/// The same few lines for each of the three: fields that are read and written by name.
-macro_rules! fields_by_name {
-    ($type:ty, $name:literal, |$methods:ident| $more:expr) => {
-        impl UserData for $type {
-            fn add_fields<F: UserDataFields<Self>>(fields: &mut F) {
-                fields.add_meta_field(MetaMethod::Type, $name);
-            }
-
-            fn add_methods<M: UserDataMethods<Self>>($methods: &mut M) {
-                $methods.add_meta_method(MetaMethod::ToString, |_, _, ()| Ok($name));
-                $methods.add_meta_method(MetaMethod::Index, |lua, this, key: String| this.read(lua, &key));
-                $methods.add_meta_method(MetaMethod::NewIndex, |lua, this, (key, value): (String, Value)| {
-                    this.write(lua, &key, &value)
-                });
-                $more
-            }
-        }
-    };
-}
-
-fields_by_name!(LuaLight, "softvt.Light", |methods| ());
-fields_by_name!(LuaLook, "softvt.Look", |methods| ());
-fields_by_name!(LuaCamera, "softvt.Camera", |methods| {
-    methods
-        .add_method("look_at", |lua, this, (to, up): ([f64; 3], Option<[f64; 3]>)| this.turn_to(lua, to, up));
-});
+hosted!(LuaLight, LuaCamera, LuaLook);

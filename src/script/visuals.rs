@@ -2,22 +2,61 @@
 
 use std::sync::Arc;
 
-use mlua::{FromLua, Lua, MetaMethod, Table, UserData, UserDataFields, UserDataMethods, Value};
+use mlua::{FromLua, Lua, Table, UserDataMethods, Value};
 
 use super::{
-    catalogue_visuals::MASKS,
+    budget::{Held, hold},
+    catalogue_classes::Class,
+    catalogue_visuals::{MASK_CLASS, MASKS},
+    host::{Hosted, hosted, method},
     sandbox::fail,
-    schema::{self, Fault, Record},
-    shapes::{LuaShape, checked},
+    schema::{self, Fault, Record, checked},
+    shapes::LuaShape,
+    turn,
 };
 use crate::{
     geometry::shape::Shape,
-    scene::{Layer, Mask, Visual},
+    scene::{Layer, Line, MOST_LETTERS, Mask, Print, Typeface, Visual},
 };
+
+/// Masks that one may be made of: each is computed at every point that is drawn.
+const MOST_PARTS: usize = 200;
 
 /// `softvt.Mask`.
 #[derive(Clone, Debug)]
-struct LuaMask(Mask);
+struct LuaMask(Arc<Node>);
+
+#[derive(Debug)]
+struct Node {
+    mask: Arc<Mask>,
+    /// Masks that it is made of, each as often as it occurs.
+    parts: usize,
+    /// What it keeps in memory, bytes; what it shares with others counts for each of them.
+    bytes: usize,
+    _held: Held,
+}
+
+impl LuaMask {
+    fn new(lua: &Lua, mask: Mask, parts: usize, bytes: usize) -> mlua::Result<Self> {
+        if parts > MOST_PARTS {
+            let message = format!(
+                "mask: is made of {parts} masks; at most {MOST_PARTS} can be drawn; use fewer, or more layers"
+            );
+            return Err(fail(lua, message));
+        }
+        Ok(Self(Arc::new(Node { mask: Arc::new(mask), parts, bytes, _held: hold(lua, bytes)? })))
+    }
+
+    fn both(&self, lua: &Lua, other: &Self) -> mlua::Result<Self> {
+        let (mut masks, own) = match &*self.0.mask {
+            Mask::Both { masks } => (masks.clone(), 0),
+            _ => (vec![self.0.mask.clone()], 1),
+        };
+        masks.push(other.0.mask.clone());
+        let bytes = self.0.bytes + other.0.bytes + size_of::<Mask>();
+        Self::new(lua, Mask::Both { masks }, self.0.parts + other.0.parts + own, bytes)
+    }
+}
 
 impl FromLua for LuaMask {
     fn from_lua(value: Value, lua: &Lua) -> mlua::Result<Self> {
@@ -30,25 +69,25 @@ impl FromLua for LuaMask {
     }
 }
 
-impl UserData for LuaMask {
-    fn add_fields<F: UserDataFields<Self>>(fields: &mut F) {
-        fields.add_meta_field(MetaMethod::Type, "softvt.Mask");
+impl Hosted for LuaMask {
+    fn class() -> &'static Class {
+        &MASK_CLASS
     }
 
-    fn add_methods<M: UserDataMethods<Self>>(methods: &mut M) {
-        methods.add_meta_method(MetaMethod::ToString, |_, _, ()| Ok("softvt.Mask"));
-        methods.add_method("both", |_, this, other: Self| {
-            let mut masks = match &this.0 {
-                Mask::Both { masks } => masks.clone(),
-                mask => vec![mask.clone()],
-            };
-            masks.push(other.0);
-            Ok(Self(Mask::Both { masks }))
+    fn label(&self) -> String {
+        "mask".into()
+    }
+
+    fn methods<M: UserDataMethods<Self>>(methods: &mut M) {
+        method(methods, "both", |lua, this: &Self, other: Self| this.both(lua, &other));
+        method(methods, "inverted", |lua, this: &Self, ()| {
+            let Node { mask, parts, bytes, .. } = &*this.0;
+            Self::new(lua, Mask::Inverse { mask: mask.clone() }, parts + 1, bytes + size_of::<Mask>())
         });
-        methods
-            .add_method("inverted", |_, this, ()| Ok(Self(Mask::Inverse { mask: Box::new(this.0.clone()) })));
     }
 }
+
+hosted!(LuaMask);
 
 /// Installs `softvt.mask`.
 pub(super) fn install(lua: &Lua, api: &Table) -> mlua::Result<()> {
@@ -61,7 +100,13 @@ pub(super) fn install(lua: &Lua, api: &Table) -> mlua::Result<()> {
                 schema::fault_here(lua, record.label, &fault)
             };
             sound(record, &spec, &wrong)?;
-            Ok(LuaMask(mask(name, &spec)?))
+            if *name == "text" {
+                let print = Print::new(line(&spec, &wrong)?);
+                let bytes = print.bytes();
+                return LuaMask::new(lua, Mask::Text { print: Arc::new(print) }, 1, bytes);
+            }
+            let shape = if *name == "inside" { spec.get::<LuaShape>("shape")?.bytes() } else { 0 };
+            LuaMask::new(lua, mask(name, &spec)?, 1, size_of::<Mask>() + shape)
         })?;
         masks.set(*name, make)?;
     }
@@ -71,7 +116,7 @@ pub(super) fn install(lua: &Lua, api: &Table) -> mlua::Result<()> {
 /// What the types of single fields do not say.
 fn sound(record: &Record, spec: &Table, wrong: &dyn Fn(&str, &str) -> mlua::Error) -> mlua::Result<()> {
     let has = |key: &str| record.fields.iter().any(|field| field.name == key);
-    if has("axis") && direction(spec)?.iter().all(|&x| x == 0.0) {
+    if has("axis") && turn::direction(axis(spec)?).is_none() {
         return Err(wrong("axis", "expected a direction, got one of length 0"));
     }
     for (from, to) in [("from", "to"), ("from_m", "to_m")] {
@@ -91,7 +136,8 @@ fn sound(record: &Record, spec: &Table, wrong: &dyn Fn(&str, &str) -> mlua::Erro
     Ok(())
 }
 
-fn direction(spec: &Table) -> mlua::Result<[f64; 3]> {
+/// A direction as it is written.
+fn axis(spec: &Table) -> mlua::Result<[f64; 3]> {
     Ok(match spec.get::<Value>("axis")? {
         Value::String(name) => match name.as_bytes().first() {
             Some(b'x') => [1.0, 0.0, 0.0],
@@ -100,6 +146,65 @@ fn direction(spec: &Table) -> mlua::Result<[f64; 3]> {
         },
         _ => spec.get("axis")?,
     })
+}
+
+/// The same of a length that can be computed with.
+fn direction(spec: &Table) -> mlua::Result<[f64; 3]> {
+    let axis = axis(spec)?;
+    let plain = axis.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    let unit = turn::direction(axis).filter(|_| !(1e-6..1e6).contains(&plain));
+    Ok(unit.map_or(axis, Into::into))
+}
+
+/// A line of text that can be printed.
+fn line(spec: &Table, wrong: &dyn Fn(&str, &str) -> mlua::Error) -> mlua::Result<Line> {
+    let Ok(text) = spec.get::<String>("text") else {
+        return Err(wrong("text", "expected letters in UTF-8"));
+    };
+    let count = text.chars().count();
+    if count > MOST_LETTERS {
+        return Err(wrong("text", &format!("expected at most {MOST_LETTERS} letters, got {count}")));
+    }
+    let facing = match spec.get::<Value>("facing")? {
+        Value::String(name) => facing_of(&name.to_string_lossy()),
+        _ => spec.get("facing")?,
+    };
+    let wrap_m: Option<f64> = spec.get("wrap_m")?;
+    let length = facing.iter().map(|x| x * x).sum::<f64>().sqrt();
+    if !(length > 1e-6 && length < 1e6) {
+        return Err(wrong("facing", "expected a direction, its length between 1e-6 and 1e6"));
+    }
+    if wrap_m.is_some() && facing[0].hypot(facing[1]) < 1e-3 * length {
+        return Err(wrong(
+            "facing",
+            "expected a direction to a side, since the line is laid round the z axis",
+        ));
+    }
+    let typeface = if spec.get::<String>("font")? == "mono" { Typeface::Mono } else { Typeface::Sans };
+    let line = Line {
+        text,
+        typeface,
+        height_m: spec.get("height_m")?,
+        weight: spec.get("weight")?,
+        at: spec.get("at")?,
+        facing,
+        turn: spec.get("turn")?,
+        wrap_m,
+    };
+    match line.missing() {
+        Some(letter) => {
+            let what =
+                format!("the typeface has no letter {letter:?}; expected Latin, Greek or Cyrillic ones");
+            Err(wrong("text", &what))
+        }
+        None => Ok(line),
+    }
+}
+
+/// The direction of "+x" and its like.
+fn facing_of(name: &str) -> [f64; 3] {
+    let sign = if name.starts_with('-') { -1.0 } else { 1.0 };
+    ["x", "y", "z"].map(|axis| if name.ends_with(axis) { sign } else { 0.0 })
 }
 
 /// One size for all axes or one for each.
@@ -143,7 +248,10 @@ fn mask(name: &str, s: &Table) -> mlua::Result<Mask> {
         },
         "weave" => Mask::Weave { pitch_m: s.get("pitch_m")? },
         "facing" => Mask::Facing { axis: direction(s)?, from: s.get("from")?, to: s.get("to")? },
-        _ => Mask::Inside { shape: Arc::new(s.get::<LuaShape>("shape")?.0), soft_m: s.get("soft_m")? },
+        _ => Mask::Inside {
+            shape: Arc::new(s.get::<LuaShape>("shape")?.shape().clone()),
+            soft_m: s.get("soft_m")?,
+        },
     })
 }
 
@@ -178,7 +286,7 @@ fn visual(table: &Table) -> mlua::Result<Visual> {
 
 fn layer(table: &Table) -> mlua::Result<Layer> {
     Ok(Layer {
-        mask: table.get::<Option<LuaMask>>("mask")?.map_or(Mask::Whole, |mask| mask.0),
+        mask: table.get::<Option<LuaMask>>("mask")?.map_or(Mask::Whole, |mask| (*mask.0.mask).clone()),
         albedo: table.get("albedo")?,
         roughness: table.get("roughness")?,
         opacity: table.get("opacity")?,

@@ -2,15 +2,15 @@
 
 use std::sync::{Arc, Mutex};
 
-use mlua::{
-    AnyUserData, Lua, MetaMethod, MultiValue, Table, UserData, UserDataFields, UserDataMethods, Value,
-};
+use mlua::{Lua, MultiValue, Table, UserDataMethods, UserDataRef, Value};
 
 use super::{
-    catalogue_world as records,
+    catalogue_classes::Class,
+    catalogue_world as records, classes_world as classes,
     deadline::Clock,
+    host::{Hosted, hosted, method},
     sandbox::{fail, locked},
-    schema::{self, Record},
+    schema::{self, finite},
     shapes::LuaShape,
     timing::Timing,
 };
@@ -43,7 +43,8 @@ type Shared = Arc<Mutex<Inner>>;
 pub(super) fn install(lua: &Lua, api: &Table, clock: &Clock) -> mlua::Result<()> {
     let clock = clock.clone();
     let make = lua.create_function(move |lua, value: Value| {
-        let spec = checked(lua, &records::WORLD, "softvt.world", &value)?;
+        let given = if value.is_nil() { Value::Table(lua.create_table()?) } else { value };
+        let spec = schema::checked(lua, &records::WORLD, &given)?;
         let gravity: Option<[f64; 3]> = spec.get("gravity")?;
         let params = Params {
             dt: spec.get("dt")?,
@@ -65,16 +66,6 @@ pub(super) fn install(lua: &Lua, api: &Table, clock: &Clock) -> mlua::Result<()>
     api.set("world", make)
 }
 
-fn checked(lua: &Lua, record: &'static Record, label: &str, value: &Value) -> mlua::Result<Table> {
-    let empty = lua.create_table()?;
-    let table = match value {
-        Value::Table(table) => table,
-        Value::Nil => &empty,
-        other => return Err(fail(lua, format!("{label}: expected a table, got {}", schema::got(other)))),
-    };
-    schema::check(lua, record, table).map_err(|fault| schema::fault_here(lua, label, &fault))
-}
-
 fn friction(spec: &Table) -> mlua::Result<Friction> {
     let table: Table = spec.get("friction")?;
     Ok(Friction { static_mu: table.get("static_mu")?, dynamic_mu: table.get("dynamic_mu")? })
@@ -86,11 +77,11 @@ fn pose(xyz: [f64; 3], turn: Option<[f64; 3]>) -> Pose {
 }
 
 /// `softvt.World`.
+#[derive(Clone)]
 struct LuaWorld(Shared);
 
 impl LuaWorld {
-    fn soft(&self, lua: &Lua, value: &Value) -> mlua::Result<LuaBody> {
-        let spec = checked(lua, &records::WORLD_SOFT, "world:soft", value)?;
+    fn soft(&self, lua: &Lua, spec: &Table) -> mlua::Result<LuaBody> {
         let shape: LuaShape = spec.get("shape")?;
         let material = SoftMaterial {
             youngs_pa: spec.get("youngs_pa")?,
@@ -103,22 +94,21 @@ impl LuaWorld {
         let mut inner = locked(&self.0);
         let rest: Arc<Rest> = {
             let _honest_work = inner.clock.pause();
-            soft_rest(&name, &shape.0, &material).map_err(|e| fail(lua, format!("world:soft: {e}")))?
+            soft_rest(&name, shape.shape(), &material).map_err(|e| fail(lua, format!("world:soft: {e}")))?
         };
         let reference = Reference::new(&rest.mesh.nodes, &rest.mass)
             .map_err(|e| fail(lua, format!("world:soft: {e}")))?;
-        let friction = friction(&spec)?;
+        let friction = friction(spec)?;
         let at = pose(spec.get("xyz")?, spec.get("turn")?);
-        let index = inner.world.add_soft(&name, rest, Some(Arc::new(shape.0)), &at, friction);
+        let index = inner.world.add_soft(&name, rest, Some(Arc::new(shape.shape().clone())), &at, friction);
         inner.references.push(reference);
         Ok(LuaBody { world: self.0.clone(), index })
     }
 
-    fn solid(&self, lua: &Lua, label: &str, value: &Value, moves: bool) -> mlua::Result<LuaSolid> {
-        let spec = checked(lua, &records::WORLD_SOLID, label, value)?;
+    fn solid(&self, spec: &Table, moves: bool) -> mlua::Result<LuaSolid> {
         let shape: LuaShape = spec.get("shape")?;
         let at = pose(spec.get("xyz")?, spec.get("turn")?);
-        let friction = friction(&spec)?;
+        let friction = friction(spec)?;
         let name: String = spec.get("name")?;
         let world = &mut locked(&self.0).world;
         let layer = world.rigid_layer();
@@ -128,36 +118,42 @@ impl LuaWorld {
         } else {
             (None, (Mover::Static, at))
         };
-        let collider = world.add_collider(Collider::new(&name, placed, Arc::new(shape.0), friction, layer));
+        let collider = world.add_collider(Collider::new(
+            &name,
+            placed,
+            Arc::new(shape.shape().clone()),
+            friction,
+            layer,
+        ));
         Ok(LuaSolid { world: self.0.clone(), kinematic, collider })
     }
 }
 
-impl UserData for LuaWorld {
-    fn add_fields<F: UserDataFields<Self>>(fields: &mut F) {
-        fields.add_meta_field(MetaMethod::Type, "softvt.World");
+impl Hosted for LuaWorld {
+    fn class() -> &'static Class {
+        &classes::WORLD
     }
 
-    fn add_methods<M: UserDataMethods<Self>>(methods: &mut M) {
-        methods.add_meta_method(MetaMethod::ToString, |_, _, ()| Ok("softvt.World"));
-        methods.add_method("soft", |lua, this, value: Value| this.soft(lua, &value));
-        methods.add_method("kinematic", |lua, this, value: Value| {
-            this.solid(lua, "world:kinematic", &value, true)
-        });
-        methods
-            .add_method("static", |lua, this, value: Value| this.solid(lua, "world:static", &value, false));
-        methods.add_method("step", |lua, this, ()| step(lua, &mut locked(&this.0)));
-        methods.add_method("time", |_, this, ()| Ok(locked(&this.0).world.time()));
-        methods.add_method("newton", |_, this, ()| {
+    fn label(&self) -> String {
+        "world".into()
+    }
+
+    fn methods<M: UserDataMethods<Self>>(methods: &mut M) {
+        method(methods, "soft", |lua, this: &Self, spec: Table| this.soft(lua, &spec));
+        method(methods, "kinematic", |_, this: &Self, spec: Table| this.solid(&spec, true));
+        method(methods, "static", |_, this: &Self, spec: Table| this.solid(&spec, false));
+        method(methods, "step", |lua, this: &Self, ()| step(lua, &mut locked(&this.0)));
+        method(methods, "time", |_, this: &Self, ()| Ok(locked(&this.0).world.time()));
+        method(methods, "newton", |_, this: &Self, ()| {
             let inner = locked(&this.0);
             Ok((inner.newton.0 as f64 / inner.world.step.max(1) as f64, inner.newton.1))
         });
-        methods.add_method("energy", |_, this, ()| Ok(locked(&this.0).world.energy().total()));
-        methods.add_method("phase", |_, this, name: String| {
+        method(methods, "energy", |_, this: &Self, ()| Ok(locked(&this.0).world.energy().total()));
+        method(methods, "phase", |_, this: &Self, name: String| {
             locked(&this.0).timing.phase(&name);
             Ok(())
         });
-        methods.add_method("report_timing", |_, this, ()| {
+        method(methods, "report_timing", |_, this: &Self, ()| {
             eprintln!("{}", locked(&this.0).timing);
             Ok(())
         });
@@ -187,17 +183,16 @@ fn step(lua: &Lua, inner: &mut Inner) -> mlua::Result<MultiValue> {
 }
 
 /// `softvt.Body`.
+#[derive(Clone)]
 struct LuaBody {
     world: Shared,
     index: usize,
 }
 
 impl LuaBody {
-    fn touch(&self, lua: &Lua, solid: &AnyUserData) -> mlua::Result<Touch> {
-        let wrong = || fail(lua, "expected a solid of this world (world:kinematic or world:static)");
-        let solid = solid.borrow::<LuaSolid>().map_err(|_| wrong())?;
+    fn touch(&self, lua: &Lua, method: &str, solid: &LuaSolid) -> mlua::Result<Touch> {
         if !Arc::ptr_eq(&solid.world, &self.world) {
-            return Err(wrong());
+            return Err(fail(lua, format!("body:{method}: solid: expected a solid of the body's own world")));
         }
         Ok(locked(&self.world).world.touch(self.index, solid.collider))
     }
@@ -211,47 +206,41 @@ impl LuaBody {
     fn set_reference(&self, lua: &Lua, which: &str) -> mlua::Result<()> {
         let mut inner = locked(&self.world);
         let body = &inner.world.soft[self.index].body;
-        let nodes = match which {
-            "rest" => &body.rest.mesh.nodes,
-            "now" => &body.x,
-            other => {
-                return Err(fail(
-                    lua,
-                    format!("body:set_reference: expected \"rest\" or \"now\", got {other:?}"),
-                ));
-            }
-        };
+        let nodes = if which == "rest" { &body.rest.mesh.nodes } else { &body.x };
         let reference = Reference::new(nodes, &body.rest.mass).map_err(|e| fail(lua, e.to_string()))?;
         inner.references[self.index] = reference;
         Ok(())
     }
 }
 
-impl UserData for LuaBody {
-    fn add_fields<F: UserDataFields<Self>>(fields: &mut F) {
-        fields.add_meta_field(MetaMethod::Type, "softvt.Body");
+impl Hosted for LuaBody {
+    fn class() -> &'static Class {
+        &classes::BODY
     }
 
-    fn add_methods<M: UserDataMethods<Self>>(methods: &mut M) {
+    fn label(&self) -> String {
+        "body".into()
+    }
+
+    fn methods<M: UserDataMethods<Self>>(methods: &mut M) {
         let list = |lua: &Lua, v: &Vec3| lua.create_sequence_from(v.iter().copied());
-        methods.add_meta_method(MetaMethod::ToString, |_, _, ()| Ok("softvt.Body"));
-        methods.add_method("centre", move |lua, this, ()| {
+        method(methods, "centre", move |lua, this: &Self, ()| {
             list(lua, &locked(&this.world).world.soft[this.index].body.centre())
         });
-        methods.add_method("velocity", move |lua, this, ()| {
+        method(methods, "velocity", move |lua, this: &Self, ()| {
             list(lua, &locked(&this.world).world.soft[this.index].body.velocity())
         });
-        methods.add_method("speed", |_, this, ()| {
+        method(methods, "speed", |_, this: &Self, ()| {
             Ok(locked(&this.world).world.soft[this.index].body.max_speed())
         });
-        methods.add_method("mass", |_, this, ()| {
+        method(methods, "mass", |_, this: &Self, ()| {
             Ok(locked(&this.world).world.soft[this.index].body.rest.total_mass())
         });
-        methods.add_method("min_det_f", |_, this, ()| {
-            Ok(locked(&this.world).world.soft[this.index].min_det_f.0)
+        method(methods, "min_det_f", |_, this: &Self, ()| {
+            Ok(finite(locked(&this.world).world.soft[this.index].min_det_f.0))
         });
-        methods.add_method("asleep", |_, this, ()| Ok(locked(&this.world).world.soft[this.index].asleep));
-        methods.add_method("deformation", |lua, this, ()| {
+        method(methods, "asleep", |_, this: &Self, ()| Ok(locked(&this.world).world.soft[this.index].asleep));
+        method(methods, "deformation", |lua, this: &Self, ()| {
             let d = this.deformation(lua)?;
             lua.create_table_from([
                 ("rms_pct", d.rms_pct),
@@ -259,46 +248,57 @@ impl UserData for LuaBody {
                 ("max_pct", d.max_pct),
             ])
         });
-        methods.add_method("extent", move |lua, this, ()| list(lua, &this.deformation(lua)?.bbox_m));
-        methods.add_method("set_reference", |lua, this, which: String| this.set_reference(lua, &which));
-        methods
-            .add_method("force", |lua, this, solid: AnyUserData| Ok(this.touch(lua, &solid)?.normal_force));
-        methods.add_method("shear", |lua, this, solid: AnyUserData| Ok(this.touch(lua, &solid)?.shear()));
-        methods
-            .add_method("travel", |lua, this, solid: AnyUserData| Ok(1e3 * this.touch(lua, &solid)?.travel));
-        methods.add_method("slipping", |lua, this, solid: AnyUserData| {
-            let touch = this.touch(lua, &solid)?;
-            Ok(touch.slipping as f64 / touch.samples.max(1) as f64)
-        });
+        method(methods, "extent", move |lua, this: &Self, ()| list(lua, &this.deformation(lua)?.bbox_m));
+        method(methods, "set_reference", |lua, this: &Self, which: String| this.set_reference(lua, &which));
+        touches(methods);
     }
 }
 
+/// Methods of a body that say how a solid touches it.
+fn touches<M: UserDataMethods<LuaBody>>(methods: &mut M) {
+    type Of = UserDataRef<LuaSolid>;
+    method(methods, "force", |lua, this: &LuaBody, solid: Of| {
+        Ok(this.touch(lua, "force", &solid)?.normal_force)
+    });
+    method(methods, "shear", |lua, this: &LuaBody, solid: Of| Ok(this.touch(lua, "shear", &solid)?.shear()));
+    method(methods, "travel", |lua, this: &LuaBody, solid: Of| {
+        Ok(1e3 * this.touch(lua, "travel", &solid)?.travel)
+    });
+    method(methods, "slipping", |lua, this: &LuaBody, solid: Of| {
+        let touch = this.touch(lua, "slipping", &solid)?;
+        Ok(touch.slipping as f64 / touch.samples.max(1) as f64)
+    });
+}
+
 /// `softvt.Solid`.
+#[derive(Clone)]
 struct LuaSolid {
     world: Shared,
     kinematic: Option<usize>,
     collider: usize,
 }
 
-impl UserData for LuaSolid {
-    fn add_fields<F: UserDataFields<Self>>(fields: &mut F) {
-        fields.add_meta_field(MetaMethod::Type, "softvt.Solid");
+impl Hosted for LuaSolid {
+    fn class() -> &'static Class {
+        &classes::SOLID
     }
 
-    fn add_methods<M: UserDataMethods<Self>>(methods: &mut M) {
-        methods.add_meta_method(MetaMethod::ToString, |_, _, ()| Ok("softvt.Solid"));
-        methods.add_method("move_to", |lua, this, (xyz, turn): ([f64; 3], Option<[f64; 3]>)| {
+    fn label(&self) -> String {
+        "solid".into()
+    }
+
+    fn methods<M: UserDataMethods<Self>>(methods: &mut M) {
+        method(methods, "move_to", |lua, this: &Self, (xyz, turn): ([f64; 3], Option<[f64; 3]>)| {
             let Some(index) = this.kinematic else {
                 return Err(fail(
                     lua,
                     "solid:move_to: a static solid cannot move; make it with world:kinematic",
                 ));
             };
-            if xyz.iter().chain(turn.iter().flatten()).any(|x| !x.is_finite()) {
-                return Err(fail(lua, "solid:move_to: expected finite numbers"));
-            }
             locked(&this.world).world.move_kinematic(index, pose(xyz, turn));
             Ok(())
         });
     }
 }
+
+hosted!(LuaWorld, LuaBody, LuaSolid);

@@ -81,6 +81,19 @@ fn an_experiment_ends_soon_and_shows_the_rows_that_it_has() {
     assert!(err.contains("interrupted; the rows of 1 of 100 points"), "{err}");
 }
 
+#[test]
+fn what_was_wrong_before_an_interrupt_is_what_the_exit_code_tells() {
+    // The second task fails at once, the first goes on for long.
+    let text = Small { task: "budget_steps = 100000", ..Small::default() }.text();
+    let (suite, task) = text.trim_end().trim_end_matches("} }").split_once("  softvt.task").expect("a task");
+    let failing = task.replace("arm:wait(1)", "arm:wait_for_ever()");
+    let both = format!("{suite}  softvt.task{task}  softvt.task{failing}}} }}");
+    let project = Project::new(&[("x.lua", &both)]);
+    let (code, _, err) = interrupted(&project, &["x.lua", "--threads", "2", "--out", "run"], 6.0);
+    assert_eq!(code, Some(2), "{err}");
+    assert!(err.contains("there is no \"wait_for_ever\""), "{err}");
+}
+
 fn await_lines(project: &Project, count: usize) {
     let start = Instant::now();
     let path = project.path("run/episodes.jsonl");

@@ -5,14 +5,15 @@ use std::{path::Path, sync::Arc};
 
 use softvt::{
     benchmark::{Plan, seed::Split, settings::Settings},
-    evaluation::record::Identity,
+    evaluation::{record::EpisodeRecord, summary::Summary},
     policy::{Action, Observation, Policy, Streams},
-    rollout::{Controller, Episode, EpisodeSpec, Looks, RestCache, Senses, Simulation},
+    report::terminal,
+    rollout::{Controller, Episode, EpisodeSpec, Looks, RestCache, Senses, Simulation, Which},
     script::{self, EpisodeRequest, Loaded},
     sensing::tactile::MosaicLayout,
 };
 
-use crate::support::{SPATIAL_SOFT, Small};
+use crate::support::{Project, SPATIAL_SOFT, Small};
 
 fn request(suite: &str, task: usize) -> EpisodeRequest {
     EpisodeRequest {
@@ -47,43 +48,32 @@ impl Policy for &mut Witness {
     }
 }
 
-/// What a policy that asks for `streams` sees in a short episode, or why not.
-fn shown(streams: Streams) -> Result<Vec<Observation>, String> {
-    let project = Small { task: "budget_steps = 10", ..Small::default() }.project();
+/// What a policy that asks for `streams` sees in a short episode of a project, and the record; or why not.
+fn played(project: &Project, streams: Streams) -> Result<(Vec<Observation>, EpisodeRecord), String> {
     let loaded = script::load(&project.path("x.lua"), &[]).expect("it loads");
     let Plan::Suite(suite) = &loaded.plan else { panic!("a suite") };
-    let scene = script::Episode::open(&loaded, &request("one", 0)).expect("it opens").scene;
-    let (task, settings) = (suite.tasks[0].clone(), Settings::default());
-    let identity = Identity {
-        suite: suite.name.clone(),
-        task: 0,
-        prompt: task.prompt.clone(),
-        layout: task.layout.clone(),
-        episode: 0,
-        seed: 0,
-        split: Split::Validation.name().to_owned(),
-        policy: "witness".to_owned(),
-        asset: "cube".to_owned(),
-        soft: true,
-    };
-    let spec = EpisodeSpec {
-        identity,
-        task,
-        scene: Arc::new(scene),
-        limit: None,
-        rules: settings.rules,
-        params: settings.physics,
-        robot: settings.robot,
-        tactile: settings.tactile,
-        film: false,
-        trace: None,
-    };
-    let episode = Episode::start(spec, &RestCache::default(), &Looks::default()).expect("it starts");
+    let opened = script::Episode::open(&loaded, &request("one", 0)).expect("it opens");
+    let which =
+        Which { suite: &suite.name, episode: 0, seed: 0, split: Split::Validation, policy: "witness" };
+    let scenes = (&opened.nominal, opened.scene.clone());
+    let spec = EpisodeSpec::new(&which, &suite.tasks[0], scenes, &suite.settings);
+    assert_eq!((spec.identity.asset.as_str(), spec.identity.soft), ("cube", true));
+    let episode =
+        Episode::start(spec, &RestCache::default(), &Looks::default()).map_err(|e| e.to_string())?;
     let mut witness = Witness { streams, seen: Vec::new() };
     let mut driver: Box<dyn Policy + '_> = Box::new(&mut witness);
-    let outcome = episode.run(&mut driver as &mut dyn Controller).map(|_| ()).map_err(|e| e.to_string());
+    let outcome = episode.run(&mut driver as &mut dyn Controller).map_err(|e| e.to_string());
     drop(driver);
-    outcome.map(|()| witness.seen)
+    outcome.map(|finished| (witness.seen, finished.record))
+}
+
+fn short() -> Small {
+    Small { task: "budget_steps = 10", ..Small::default() }
+}
+
+/// What a policy that asks for `streams` sees, or why not.
+fn shown(streams: Streams) -> Result<Vec<Observation>, String> {
+    played(&short().project(), streams).map(|(seen, _)| seen)
 }
 
 #[test]
@@ -114,6 +104,72 @@ fn a_policy_gets_the_streams_it_asks_for_and_no_others() {
     let blind = shown(Streams::default()).expect("shown");
     assert!(blind.iter().all(|o| o.cameras.is_empty() && o.touch.is_none() && o.forces.is_none()));
     assert_eq!(blind[9].joints, seen[9].joints, "looking changes nothing");
+}
+
+#[test]
+fn results_say_whether_the_policy_saw_true_forces() {
+    for force in [false, true] {
+        let streams = Streams { force, ..Streams::default() };
+        let (seen, record) = played(&short().project(), streams).expect("played");
+        assert_eq!(seen[0].forces.is_some(), force);
+        assert_eq!(record.stats.force_observed, force);
+        let line = serde_json::to_string(&record).expect("JSON");
+        assert!(line.contains(&format!("\"force_observed\":{force},")), "{line}");
+        let summary = Summary::of("one", "witness", &[record]);
+        assert_eq!(summary.force_observed, force);
+        assert_eq!(terminal::table(&summary).contains("the policy saw true forces"), force);
+    }
+}
+
+/// The small suite with lines in its layout.
+fn with(lines: &str) -> Project {
+    let text = short().text();
+    let text =
+        text.replace("  scene:add { name = \"post\"", &format!("  {lines}\n  scene:add {{ name = \"post\""));
+    Project::new(&[("x.lua", &text)])
+}
+
+#[test]
+fn a_camera_that_something_is_around_shows_what_is_beyond_and_is_counted() {
+    // In the cube, on its way to the floor below and the robot behind; the batch would have refused it.
+    let camera =
+        "scene:add_camera { name = \"mole\", position = { 0, 0.1, 0.02 }, look_at = { -1, 0.1, 0.2 } }";
+    let streams = Streams { cameras: vec!["mole".into(), "wrist".into()], ..Streams::default() };
+    let (seen, record) = played(&with(camera), streams.clone()).expect("an episode is never ended by that");
+    assert_eq!((seen.len(), record.stats.camera_inside), (10, 10));
+    let picture = seen[9].camera("mole").expect("asked for");
+    let bright = picture.pixels().filter(|p| p.0.iter().any(|c| *c > 40)).count();
+    assert!(2 * bright > 224 * 224, "{bright} pixels show something");
+    let outside = camera.replace("0.02 }, look", "0.2 }, look");
+    let (_, record) = played(&with(&outside), streams).expect("played");
+    assert_eq!(record.stats.camera_inside, 0);
+}
+
+#[test]
+fn senses_that_cannot_be_are_told_before_the_episode_with_the_line_that_set_them() {
+    for (lines, words) in [
+        (
+            "scene:camera(\"wrist\").near = 30",
+            "x.lua:7: camera wrist: far: expected more than near (30 m), got 20 m",
+        ),
+        (
+            "for i = 1, 2 do scene:add_camera { name = \"c\" .. i, position = { 1, 0, 1 }, look_at = { 0, 0, 0 }, width = 4096, height = 4096 } end",
+            "x.lua:7: camera c1: width and height: expected at most 16777216 pixels",
+        ),
+        (
+            "scene:add_camera { name = \"wrist_depth\", position = { 1, 0, 1 }, look_at = { 0, 0, 0 } }",
+            "x.lua:7: camera wrist_depth: name: \"wrist_depth\" is a picture of camera wrist",
+        ),
+    ] {
+        let project = with(lines);
+        // Nobody looks, and still it is wrong; the library tells it as the program does, which has run nothing then.
+        let message = played(&project, Streams::default()).expect_err(words);
+        assert!(message.contains(words), "{message}");
+        let message = project.refusal("x.lua --episodes 3 --out run");
+        let path = project.path("x.lua").display().to_string();
+        assert!(message.replace(&path, "x.lua").contains(words), "{message}");
+        assert!(!project.path("run").exists());
+    }
 }
 
 #[test]

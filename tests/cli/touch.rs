@@ -117,4 +117,7 @@ fn the_sensors_model_pitch_and_gel_are_settings() {
     assert!(pitch.contains("tactile.view.pitch: expected m in"), "{pitch}");
     let tables = refusal("{ tactile = { optics = { model = \"taxim\", tables = \"nowhere\" } } }");
     assert!(tables.contains("nowhere"), "{tables}");
+    let shadows = "{ tactile = { shadows = true, optics = { model = \"taxim\", tables = \"nowhere\" } } }";
+    let shadows = refusal(shadows);
+    assert!(shadows.contains("tactile.shadows: expected false with the model \"taxim\""), "{shadows}");
 }

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::support::{Project, Small};
+use crate::support::{Project, Small, refusal, said};
 
 fn png_size(bytes: &[u8]) -> [u32; 2] {
     assert_eq!(&bytes[..8], b"\x89PNG\r\n\x1a\n");
@@ -117,10 +117,19 @@ fn light_cameras_and_looks_are_checked_where_they_are_written() {
             "x.lua:7: scene.light.direction: expected a list of 3 numbers",
         ),
         ("scene:camera(\"wirst\").width = 64", "unknown camera \"wirst\"; did you mean \"wrist\"?"),
-        ("scene:camera(\"wrist\").width = 0", "camera.width: expected a whole number in 1..4096, got 0"),
-        ("scene:camera(\"wrist\").height = 100000", "camera.height: expected a whole number in 1..4096"),
-        ("scene:camera(\"wrist\").position = { 0/0, 0, 0 }", "camera.position: expected a list of 3 numbers"),
-        ("scene:camera(\"wrist\").quat = { 0, 0, 0, 0 }", "camera.quat: expected a quaternion other than 0"),
+        (
+            "scene:camera(\"wrist\").width = 0",
+            "x.lua:7: scene:camera(\"wrist\").width: expected a whole number in 1..4096, got 0",
+        ),
+        (
+            "scene:camera(\"wrist\").height = 100000",
+            ".height: expected a whole number in 1..4096, got 100000",
+        ),
+        ("scene:camera(\"wrist\").position = { 0/0, 0, 0 }", ".position: expected a list of 3 numbers"),
+        (
+            "scene:camera(\"wrist\").quat = { 0, 0, 0, 0 }",
+            ".quat: expected a quaternion other than 0, got {0, 0, 0, 0}",
+        ),
         (
             "scene:add_camera { name = \"top\", position = { 0, 0, 1 }, look_at = { 0, 0, 0 } }",
             "give another up",
@@ -129,7 +138,15 @@ fn light_cameras_and_looks_are_checked_where_they_are_written() {
             "scene:add_camera { name = \"wrist\", position = { 0, 0, 1 }, look_at = { 1, 0, 0 } }",
             "there is a camera \"wrist\" already",
         ),
-        ("scene:camera(\"wrist\"):look_at { 0, 0/0, 1 }", "camera.look_at: expected numbers within"),
+        (
+            "scene:camera(\"wrist\"):look_at { 0, 0/0, 1 }",
+            "x.lua:7: scene:camera(\"wrist\"):look_at: point: expected a list of 3 numbers",
+        ),
+        (
+            "scene:camera(\"wrist\"):look_at { 0, 1e7, 1 }",
+            ":look_at: expected numbers within ±1e6, got {0, 10000000, 1}",
+        ),
+        ("scene.light = 3", "x.lua:7: scene.light: cannot be replaced; its numbers are written one by one"),
         ("scene:camera(\"wrist\"):look_at({ 0, 0, 1 }, { 0, 0, 0 })", "give another up"),
         ("scene:object(\"cube\").looks[1].albedo = { 2, 0, 0 }", "look.albedo: expected linear RGB in 0..1"),
         ("scene:object(\"cube\").looks[1].shine = 2", "look: unknown key \"shine\""),
@@ -140,24 +157,85 @@ fn light_cameras_and_looks_are_checked_where_they_are_written() {
 }
 
 #[test]
-fn a_camera_inside_of_something_is_told_and_leaves_no_picture() {
-    let project =
-        with("scene:add_camera { name = \"mole\", position = { 0, 0, -0.02 }, look_at = { 1, 0, -0.02 } }");
+fn a_camera_inside_of_something_is_told_before_anything_runs_and_leaves_no_picture() {
+    let told = "x.lua:7: camera mole: position: it stands inside of floor; move it out";
+    let mole = "scene:add_camera { name = \"mole\", position = { 0, 0, -0.02 }, look_at = { 1, 0, -0.02 } }";
+    let project = with(mole);
+    for words in ["view x.lua --out seen", "x.lua --episodes 2 --video=all --out seen"] {
+        let message = project.refusal(words);
+        assert!(message.contains(told), "{message}");
+        assert!(!project.path("seen").exists());
+    }
+    project.succeeds("x.lua --episodes 2 --out blind");
+    let project = with("scene:camera(\"third_person\").position = { 0, 0.1, 0.02 }");
+    let message = project.refusal("x.lua --video --out run");
+    let told = "x.lua:7: camera third_person: position: it stands inside of cube; move it out";
+    assert!(message.contains(told), "{message}");
+    let project = with("scene:camera(\"wrist\").position = { 0, 0, 0 }");
     let message = project.refusal("view x.lua --out seen");
-    assert!(message.contains("camera mole: pose: it stands inside of floor; move it out"), "{message}");
-    assert!(!project.path("seen/start_mole.png").exists() && !project.path("seen/episode.mp4").exists());
-    let project = with("scene:camera(\"third_person\").position = { 0, 0, -0.02 }");
-    let said = project.succeeds("x.lua --episodes 2 --video=all --out run");
-    assert_eq!(
-        project.lines("run/episodes.jsonl").len(),
-        2,
-        "an episode counts whether or not it can be drawn"
-    );
+    assert!(message.contains("x.lua:7: camera wrist: position: it stands inside of"), "{message}");
+}
+
+#[test]
+fn a_simulation_of_a_script_tells_of_a_camera_inside_of_something_where_it_was_put() {
+    let mole = "scene:add_camera { name = \"mole\", position = { 0, 0, -0.02 }, look_at = { 1, 0, -0.02 } }";
+    let text = with(mole).text("x.lua");
+    let (layout, _) = text.split_once("return softvt.suite").expect("a suite");
+    let run = "return softvt.experiment { name = \"e\", grid = { a = { 1 } }, run = function()\n\
+               local sim = softvt.simulate { layout = layout }\nsim:see { camera = \"mole\" }\nreturn { b = 1 } end }";
+    let message = Project::new(&[("x.lua", &format!("{layout}{run}"))]).refusal("x.lua");
+    let told = "simulation:see: x.lua:7: camera mole: position: it stands inside of floor; move it out";
+    assert!(message.contains(told), "{message}");
+}
+
+#[test]
+fn what_gets_around_a_camera_in_an_episode_does_not_end_its_film() {
+    // A block falls over it while the scene settles.
+    let block = "local block = softvt.asset { name = \"block\", shape = softvt.shape.box { size = { 0.1, 0.1, 0.05 } }:grounded(), body = softvt.rigid { density = 300 } }";
+    let lines = "scene:add { name = \"block\", asset = block, xyz = { 0.3, 0.1, 0.03 } } \
+                 scene:add_camera { name = \"mole\", position = { 0.3, 0.1, 0.01 }, look_at = { -0.5, 0.1, 0.1 } }";
+    let project = with(lines);
+    project.write("x.lua", format!("{block}\n{}", project.text("x.lua")).as_bytes());
+    project.succeeds("view x.lua --out seen");
+    let bytes = fs::read(project.path("seen/end_mole.png")).expect("written");
+    assert!(shows_something(&bytes, [224, 224]), "{} bytes", bytes.len());
+}
+
+#[test]
+fn tables_of_a_tactile_model_that_are_missing_are_told_before_anything_runs() {
+    let text = Small { task: "budget_steps = 4", ..Small::default() }.text();
+    let settings = "settings = { tactile = { optics = { model = \"taxim\", tables = \"nowhere\" } } },";
+    let text = text.replace("episodes = 1,", &format!("episodes = 1, {settings}"));
+    let project = Project::new(&[("x.lua", &text)]);
+    let message = project.refusal("x.lua --episodes 2 --out run");
+    assert!(message.contains("x.lua: task 0, episode 0: tactile.optics.tables:"), "{message}");
+    assert!(message.contains("nowhere"), "{message}");
+    assert!(!project.path("run").exists());
+}
+
+#[test]
+fn a_video_of_an_episode_that_is_not_run_is_an_error() {
+    let project = short();
+    let message = project.refusal("x.lua --episodes 2 --video=1,7 --out run");
     assert!(
-        said.err.contains("no video of task 0 episode 1") && said.err.contains("third_person"),
-        "{}",
-        said.err
+        message.contains("x.lua: --video=7: suite one runs the episodes 0 to 1 of each task"),
+        "{message}"
     );
+    assert!(!project.path("run").exists());
+}
+
+#[test]
+fn a_folder_without_a_name_is_an_error() {
+    let project = short();
+    for words in
+        [["view", "x.lua", "--out", ""].as_slice(), &["x.lua", "--out", ""], &["x.lua", "--out", " "]]
+    {
+        let mut command = project.command("");
+        command.args(words);
+        let message = refusal(said(command), "--out");
+        assert!(message.contains("--out: expected a folder"), "{message}");
+    }
+    assert_eq!(fs::read_dir(project.path("")).expect("a folder").count(), 1, "x.lua alone");
 }
 
 #[test]

@@ -3,40 +3,17 @@
 use std::sync::Arc;
 
 use softvt::{
-    geometry::{
-        Pose, Vec3,
-        shape::{Aabb, Contact, Shape},
-    },
+    geometry::{Pose, Vec3, shape::Shape},
     physics::{
         World,
-        contact::{Collider, GelSample, Layer, Mover, Partner, Solid, Surface},
+        contact::{Collider, Friction, Layer, Mover, Partner},
         world::Movable,
     },
     robot::{Side, pads::PadSurface},
+    sensing::tactile::PadLoad,
 };
 
 use crate::scene::*;
-
-/// The gel of a finger, as the rig puts it into a world.
-#[derive(Debug)]
-struct Gel(PadSurface);
-
-impl Surface for Gel {
-    fn contact(&self, p: &Vec3, _facing: &Vec3, spacing: f64) -> Contact {
-        let contact = self.0.contact(p, spacing);
-        Contact { phi: contact.phi, normal: contact.normal_p, coverage: contact.coverage }
-    }
-
-    fn bounds(&self) -> Aabb {
-        let half = Vec3::new(self.0.length, self.0.width, 0.0) * 0.5;
-        Aabb { min: Vec3::new(-half.x, -half.y, -self.0.thickness), max: half }
-    }
-
-    fn solid(&self) -> Option<Solid> {
-        let patches = self.0.patches(0.75e-3).into_iter();
-        Some(Solid::Gel(patches.map(|(p, normal, area)| GelSample { p, normal, area }).collect()))
-    }
-}
 
 const GEL: Layer = Layer { normal: 3e8, shear: 4e7 };
 
@@ -60,7 +37,7 @@ impl Hand {
             world.add_collider(Collider::new(
                 "pad",
                 (Mover::Kinematic(frame), Pose::identity()),
-                Arc::new(Gel(PadSurface::default())),
+                Arc::new(PadSurface::default()),
                 friction(1.5, 1.2),
                 GEL,
             ))
@@ -89,9 +66,20 @@ impl Hand {
 
 /// A body of 0.2 kg on a floor, squeezed `depth` m by each pad at its middle height.
 fn grasped(shape: &Shape, pose: Pose, width: f64, depth: f64) -> (World, usize, Hand, f64) {
+    grasped_of(shape, pose, width, depth, friction(0.6, 0.5))
+}
+
+/// The same of a surface of any friction.
+fn grasped_of(
+    shape: &Shape,
+    pose: Pose,
+    width: f64,
+    depth: f64,
+    surface: Friction,
+) -> (World, usize, Hand, f64) {
     let mut world = world();
     floor(&mut world, friction(0.6, 0.5));
-    let body = rigid(&mut world, shape, 0.2, pose, friction(0.6, 0.5));
+    let body = rigid(&mut world, shape, 0.2, pose, surface);
     let lift = pose.translation.vector.z;
     let hand = Hand::new(&mut world, width + 0.004, lift);
     run(&mut world, 0.2);
@@ -145,6 +133,27 @@ fn what_the_pads_cannot_hold_slides_out_of_them() {
     run(&mut world, 0.3);
     let z = world.rigid[body].body.pose_w.translation.vector.z;
     assert!(z < 0.021, "carried to {z} m");
+}
+
+#[test]
+fn a_pads_patch_tells_the_friction_of_the_pair_held_and_sliding() {
+    let shape = cuboid(0.04, 0.05, 0.04);
+    // Pads have 1.5 and 1.2; each of the two is the larger one's.
+    for (surface, held, sliding) in [((0.1, 0.05), 1.5, 1.2), ((2.0, 1.7), 2.0, 1.7), ((1.6, 1.1), 1.6, 1.2)]
+    {
+        let of = friction(surface.0, surface.1);
+        let (mut world, _, hand, shut) = grasped_of(&shape, at(0.0, 0.0, 0.02), 0.05, 1.5e-5, of);
+        let mu = |world: &World| PadLoad::friction_of(&world.patch(hand.pads[0])).expect("a force");
+        assert!((mu(&world) - held).abs() < 1e-12, "{surface:?}: held with {}", mu(&world));
+        // Too weak a grip to lift the body: the pads slide up on it, at 60 mm/s.
+        for step in 1..=10 {
+            for (side, frame) in Side::BOTH.into_iter().zip(hand.frames) {
+                world.move_kinematic(frame, pad_pose(side, shut, 0.02 + 1e-3 * f64::from(step)));
+            }
+            world.step().expect("a step that converges");
+        }
+        assert!((mu(&world) - sliding).abs() < 1e-12, "{surface:?}: slides with {}", mu(&world));
+    }
 }
 
 #[test]

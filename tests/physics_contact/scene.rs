@@ -3,12 +3,7 @@
 use std::sync::Arc;
 
 use softvt::{
-    geometry::{
-        Pose,
-        samples::{SampleSpec, surface_samples},
-        shape::Shape,
-        voxelise::{VoxelSpec, voxel_mesh},
-    },
+    geometry::{Pose, samples::SampleSpec, shape::Shape},
     physics::{
         World,
         contact::Friction,
@@ -16,6 +11,7 @@ use softvt::{
     },
 };
 
+use crate::bodies;
 pub use crate::solids::*;
 
 /// A soft material like bread.
@@ -23,11 +19,8 @@ pub const SOFT: Material = Material { youngs_pa: 3e4, poisson: 0.4, density: 300
 
 /// The rest data of a soft block with samples every `spacing` m.
 pub fn soft_rest(shape: &Shape, material: Material, resolution: usize, spacing: f64) -> Arc<Rest> {
-    let mesh = voxel_mesh(shape, &VoxelSpec { resolution }).expect("a mesh");
     let spec = SampleSpec { grasp_spacing: spacing, other_spacing: spacing };
-    let samples = surface_samples(shape, &mesh, &spec);
-    let size = shape.bounds().size();
-    Rest::new(mesh, material, size.x * size.y * size.z, samples)
+    bodies::soft_rest(shape, material, resolution, &spec)
 }
 
 /// Adds a soft block that other soft blocks feel; its index.

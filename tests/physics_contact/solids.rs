@@ -1,17 +1,15 @@
 //! Short ways to put hard things into a world.
 
-use std::sync::Arc;
-
 use softvt::{
     geometry::{Mat3, Pose, Quat, Vec3, shape::Shape},
     physics::{
         Params, World,
-        contact::{Collider, Friction, Mover},
+        contact::{Friction, Mover},
         rigid::RigidBody,
     },
 };
 
-pub const GRAVITY: f64 = 9.81;
+pub use crate::bodies::{GRAVITY, put};
 
 /// Surfaces with both coefficients.
 pub fn friction(static_mu: f64, dynamic_mu: f64) -> Friction {
@@ -43,18 +41,6 @@ pub fn at(x: f64, y: f64, z: f64) -> Pose {
 
 pub fn turned(pose: Pose, turn: Vec3) -> Pose {
     pose * Quat::from_scaled_axis(turn)
-}
-
-/// A collider of a hard shape.
-pub fn put(
-    world: &mut World,
-    name: &str,
-    (mover, pose): (Mover, Pose),
-    shape: &Shape,
-    mu: Friction,
-) -> usize {
-    let layer = world.rigid_layer();
-    world.add_collider(Collider::new(name, (mover, pose), Arc::new(shape.clone()), mu, layer))
 }
 
 /// A static floor whose top is z = 0.

@@ -1,8 +1,10 @@
 //! Validation of the mechanics against closed forms and the independent static reference of `tests/reference`.
 //!
-//! Every module holds experiments and, below them, tests that say what they must show; `examples/validation.rs` prints
+//! Every module holds experiments and, below them, tests that say what they must show; `examples/validation/` prints
 //! the same experiments as tables.
 
+#[path = "../bodies/mod.rs"]
+mod bodies;
 mod camera;
 mod element;
 mod extremes;

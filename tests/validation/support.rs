@@ -4,27 +4,20 @@
 //! peers: 0.10 s of rest, closing at 40 mm/s a pad from 2 mm of clearance, 0.25 s of waiting, a lift of 1 s along a
 //! quintic, and the hold.
 
-use std::sync::Arc;
-
 use softvt::{
     evaluation::deformation::Reference,
-    geometry::{
-        Pose, Quat, Vec3,
-        mass::mass_properties,
-        samples::{SampleSpec, surface_samples},
-        shape::Shape,
-        voxelise::{VoxelSpec, voxel_mesh},
-    },
+    geometry::{Pose, Quat, Vec3, samples::SampleSpec, shape::Shape},
     physics::{
         Params, World,
-        contact::{Collider, Friction, Mover},
-        fem::{Material, Rest},
+        contact::{Friction, Mover},
+        fem::Material,
         world::StepFailure,
     },
 };
 
-/// Gravity, m/s².
-pub const GRAVITY: f64 = 9.81;
+pub use crate::bodies::GRAVITY;
+use crate::bodies::{put, soft_rest};
+
 /// Rest before the pads close, s.
 const REST_S: f64 = 0.10;
 /// Closing speed of each pad, m/s, and its clearance before, m.
@@ -181,26 +174,25 @@ pub struct Scene {
 impl Scene {
     pub fn new(options: &Squeeze) -> Self {
         let shape = options.body.shape();
-        let mesh = voxel_mesh(&shape, &VoxelSpec { resolution: options.resolution }).expect("a body");
-        let samples = surface_samples(&shape, &mesh, &SampleSpec::default());
         let material =
             Material { youngs_pa: options.youngs_pa, poisson: options.poisson, density: options.density };
-        let rest = Rest::new(mesh, material, mass_properties(&shape, 1.0).mass, samples);
+        let rest = soft_rest(&shape, material, options.resolution, &SampleSpec::default());
         let params = Params { beta: options.beta, dt: options.dt, sleeping: false, ..Params::default() };
         let mut world = World::new(params, Vec3::zeros());
-        let smooth = Friction { static_mu: 0.0, dynamic_mu: 0.0 };
+        let friction = |mu: f64| Friction { static_mu: mu, dynamic_mu: mu };
+        let (smooth, rough) = (friction(0.0), friction(options.friction));
         let height = 0.5 * options.body.width();
         world.add_soft("body", rest.clone(), None, &Pose::translation(0.0, 0.0, height), smooth);
         if options.grounded {
             world.gravity = -GRAVITY * Vec3::z();
             let table = Shape::cuboid(Vec3::new(1.0, 1.0, 0.1));
-            add(&mut world, "table", Mover::Static, Pose::translation(0.0, 0.0, -0.05), table, options);
+            put(&mut world, "table", (Mover::Static, Pose::translation(0.0, 0.0, -0.05)), &table, rough);
         }
         let size = Vec3::new(2.0 * PAD_DEPTH, options.pad, options.pad);
         let pads = [-1.0, 1.0].map(|side| {
             let frame = world.add_kinematic(pad_pose(options, side, 0.0, &Pose::identity()));
-            let mover = Mover::Kinematic(frame);
-            (frame, add(&mut world, "pad", mover, Pose::identity(), Shape::cuboid(size), options), side)
+            let mover = (Mover::Kinematic(frame), Pose::identity());
+            (frame, put(&mut world, "pad", mover, &Shape::cuboid(size), rough), side)
         });
         let reference = Reference::new(&rest.mesh.nodes, &rest.mass).expect("a body with size");
         let start = world.soft[0].body.centre();
@@ -239,12 +231,6 @@ impl Scene {
     pub fn weight(&self) -> f64 {
         self.world.soft[0].body.rest.total_mass() * GRAVITY
     }
-}
-
-fn add(world: &mut World, name: &str, mover: Mover, pose: Pose, shape: Shape, options: &Squeeze) -> usize {
-    let friction = Friction { static_mu: options.friction, dynamic_mu: options.friction };
-    let layer = world.rigid_layer();
-    world.add_collider(Collider::new(name, (mover, pose), Arc::new(shape), friction, layer))
 }
 
 /// The hand turns about the middle between the pads.

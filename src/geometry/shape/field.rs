@@ -30,18 +30,7 @@ impl Shape {
             }
             Self::Shell { shape, thickness } => shell(shape.distance_and_normal(p_o), *thickness),
             Self::Paint { shape, .. } => shape.distance_and_normal(p_o),
-            Self::Union(parts) => {
-                combine::invert(combine::intersect_exactly(parts.len(), p_o, &|part, q| {
-                    combine::invert(parts[part].distance_and_normal(q))
-                }))
-            }
-            Self::Intersect(parts) => {
-                combine::intersect_exactly(parts.len(), p_o, &|part, q| parts[part].distance_and_normal(q))
-            }
-            Self::Subtract { from, cut } => combine::intersect_exactly(2, p_o, &|part, q| match part {
-                0 => from.distance_and_normal(q),
-                _ => combine::invert(cut.distance_and_normal(q)),
-            }),
+            Self::Union(_) | Self::Intersect(_) | Self::Subtract { .. } => self.combined(p_o),
             Self::Scaled { shape, scale } if scale.max() - scale.min() <= 1e-12 * scale.max() => {
                 let (distance, normal) = shape.distance_and_normal(&(p_o / scale.x));
                 (distance * scale.x, normal)
@@ -54,6 +43,42 @@ impl Shape {
             | Self::Bend { .. }
             | Self::Displace { .. } => self.refine(p_o),
             _ => self.estimate(p_o),
+        }
+    }
+
+    /// [`Shape::distance_and_normal`] of what combines others.
+    fn combined(&self, p: &Vec3) -> (f64, Vec3) {
+        let (first, normal) = self.estimate(p);
+        if first.abs() > BAND {
+            return (first, normal);
+        }
+        match self {
+            // Exactness asks every part dozens of times: nested, that would multiply with every level.
+            Self::Union(parts) | Self::Intersect(parts) if parts.iter().any(Self::combines) => self.refine(p),
+            Self::Subtract { from, cut } if from.combines() || cut.combines() => self.refine(p),
+            Self::Union(parts) => combine::invert(combine::intersect_exactly(parts.len(), p, &|part, q| {
+                combine::invert(parts[part].distance_and_normal(q))
+            })),
+            Self::Intersect(parts) => {
+                combine::intersect_exactly(parts.len(), p, &|part, q| parts[part].distance_and_normal(q))
+            }
+            Self::Subtract { from, cut } => combine::intersect_exactly(2, p, &|part, q| match part {
+                0 => from.distance_and_normal(q),
+                _ => combine::invert(cut.distance_and_normal(q)),
+            }),
+            _ => (first, normal),
+        }
+    }
+
+    /// Whether it combines others, wherever it is placed and however painted or rounded.
+    fn combines(&self) -> bool {
+        match self {
+            Self::Union(_) | Self::Intersect(_) | Self::Subtract { .. } => true,
+            Self::Placed { shape, .. }
+            | Self::Paint { shape, .. }
+            | Self::Rounded { shape, .. }
+            | Self::Shell { shape, .. } => shape.combines(),
+            _ => false,
         }
     }
 

@@ -93,6 +93,18 @@ fn composite_shapes() -> Vec<(&'static str, Shape)> {
     ]
 }
 
+/// Combinations of combinations: a crate with rounded corners, its long sides cut low, and a hole in either end.
+fn crate_with_low_sides() -> Shape {
+    let upright = |x, y, z| {
+        let sides = Shape::cuboid(Vec3::new(x - 0.02, y - 0.02, 0.2)).rounded(0.01);
+        sides.intersect(Shape::cuboid(Vec3::new(0.3, 0.3, z)))
+    };
+    let inside = upright(0.108, 0.088, 0.08).translated(Vec3::z() * 0.008);
+    let dip = Shape::cuboid(Vec3::new(0.06, 0.2, 0.06)).translated(Vec3::z() * 0.045);
+    let holes = Shape::cuboid(Vec3::new(0.2, 0.02, 0.004)).rounded(0.006).translated(Vec3::z() * 0.02);
+    upright(0.12, 0.1, 0.08).subtract(inside).subtract(dip).subtract(holes)
+}
+
 fn wedge() -> Shape {
     Shape::wedge(Vec3::new(0.064, 0.05, 0.04), -0.4).expect("a triangle")
 }

@@ -73,6 +73,8 @@ pub struct PatchPoint {
     pub pressure: f64,
     /// Shear traction on what presses, in the collider's frame, Pa.
     pub shear_p: Vec3,
+    /// Coefficient of friction of the pair in this step: its dynamic one if the two slide on each other, else its static.
+    pub mu: f64,
     /// Whether friction is at its bound.
     pub slipping: bool,
 }
@@ -162,6 +164,7 @@ impl World {
             normal_p: pose.rotation.inverse_transform_vector(&point.normal) * sign,
             pressure: point.normal_impulse / share,
             shear_p: pose.rotation.inverse_transform_vector(&point.shear_impulse) * (sign / share),
+            mu: point.mu,
             slipping: point.slipping,
         }
     }

@@ -102,6 +102,6 @@ impl World {
                 });
             }
         }
-        Ok(())
+        self.check_bounds()
     }
 }

@@ -1,6 +1,7 @@
 //! The world: all bodies, and the step that moves them.
 
 mod assemble;
+mod bounds;
 mod build;
 mod energy;
 mod frame;
@@ -168,6 +169,34 @@ pub enum StepFailure {
         step: u64,
         /// Body name.
         body: String,
+    },
+    /// Something is faster than anything in a scene can be.
+    #[error("{body} moves at {speed:.1} m/s at step {step}, beyond the {most} m/s of a valid state")]
+    TooFast {
+        /// Step, counted from 1.
+        step: u64,
+        /// Body name.
+        body: String,
+        /// The node, of a soft body.
+        node: Option<usize>,
+        /// Its speed, m/s.
+        speed: f64,
+        /// [`Params::most_speed`].
+        most: f64,
+    },
+    /// A soft body is touched with a force that neither its momentum nor its stress explains.
+    #[error(
+        "{body} is touched with {force:.1e} N at step {step}, beyond the {most:.1e} N that its mass and stress explain"
+    )]
+    TooHard {
+        /// Step, counted from 1.
+        step: u64,
+        /// Body name.
+        body: String,
+        /// Sum of the normal forces on it, N.
+        force: f64,
+        /// What is the most, N.
+        most: f64,
     },
     /// An element stayed inverted.
     #[error("inverted: element {element} of {body} has been inside out for over {seconds} s at step {step}")]

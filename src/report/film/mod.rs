@@ -2,20 +2,28 @@
 
 mod canvas;
 
-use std::path::{Path, PathBuf};
+use std::{
+    io::Cursor,
+    path::{Path, PathBuf},
+};
 
 pub use canvas::{Canvas, Ink};
-use image::{ImageBuffer, ImageError, Luma, RgbImage};
+use image::{EncodableLayout, ImageBuffer, ImageError, ImageFormat, Luma, PixelWithColorType, RgbImage};
 
 use crate::{
     benchmark::control::CONTROL_DT,
     dataset::video::{VideoError, VideoWriter},
     evaluation::record::EpisodeRecord,
     message::number,
-    rollout::{Film, SenseError},
+    rollout::{CAMERA_PICTURES, FINGER_PICTURES, FINGERS, Film, SenseError},
     scene::Camera,
-    sensing::tactile::{MarkerStyle, Touched},
+    sensing::{
+        camera::Picture,
+        tactile::{MarkerStyle, Touched},
+    },
 };
+
+use super::run_folder::{RunFolderError, replace};
 
 /// Edge of a camera's panel, height of a finger's and of the strip below, pixels.
 const PANEL: u32 = 512;
@@ -39,14 +47,12 @@ pub enum FilmError {
     /// The video cannot be encoded or written.
     #[error(transparent)]
     Video(#[from] VideoError),
-    /// A picture cannot be written.
-    #[error("{path}: cannot write the picture: {source}")]
-    Picture {
-        /// Where.
-        path: PathBuf,
-        /// Why.
-        source: ImageError,
-    },
+    /// A picture cannot be encoded.
+    #[error("cannot encode the picture: {0}")]
+    Picture(#[from] ImageError),
+    /// A file cannot be written.
+    #[error(transparent)]
+    File(#[from] RunFolderError),
     /// There is nothing to be drawn.
     #[error("the rollout has no states to be drawn")]
     Empty,
@@ -186,7 +192,7 @@ fn round(x: f64) -> f64 {
 /// # Errors
 /// A stream cannot be made, or the file not written.
 pub fn write_panels(film: &mut Film, caption: &Caption, index: usize, path: &Path) -> Result<(), FilmError> {
-    save(&panels(film, caption, index)?, path)
+    Ok(replace(path, png(&panels(film, caption, index)?)?)?)
 }
 
 /// Edges of the cameras' own pictures, pixels.
@@ -196,7 +202,8 @@ fn native(camera: &Camera) -> usize {
 
 /// Stills of a film: `moments` are indices of states by name. Writes each stream of each moment into `dir`; of cameras also
 /// depth (16 bits, 0.1 mm along the optical axis, 65535 where it is farther or nothing is) and segmentation (16 bits, objects
-/// from 1 in the order of the scene, [`crate::rollout::senses::ROBOT`], 0 where nothing is).
+/// from 1 in the order of the scene, [`crate::rollout::senses::ROBOT`], 0 where nothing is). Each file is whole or not there;
+/// `stop` ends the work between two of them.
 ///
 /// # Errors
 /// A stream cannot be made, or a file not written.
@@ -205,45 +212,60 @@ pub fn write_stills(
     moments: &[(&str, usize)],
     full_size: bool,
     dir: &Path,
+    stop: impl Fn() -> bool,
 ) -> Result<Vec<PathBuf>, FilmError> {
     let mut written = Vec::new();
     for &(moment, index) in moments {
         let frame = film.frames.get(index).ok_or(FilmError::Empty)?;
+        let mut put = |of: &str, kind: &str, bytes: Vec<u8>| {
+            if stop() {
+                return Err(FilmError::Interrupted);
+            }
+            let path = dir.join(format!("{moment}_{of}{kind}.png"));
+            replace(&path, bytes)?;
+            written.push(path);
+            Ok(())
+        };
         for camera in film.senses.cameras().to_vec() {
             let camera = if full_size { camera.clone().with_edge(native(&camera)) } else { camera };
-            let mut seen = film.senses.see(frame, &camera)?;
-            let path = |kind: &str| dir.join(format!("{moment}_{}{kind}.png", camera.name));
-            let size = (seen.width as u32, seen.height as u32);
-            let tenths = |depth: &f32| (1e4 * depth).min(f32::from(u16::MAX)).round() as u16;
-            save_numbers(size, seen.depth.iter().map(tenths).collect(), &path("_depth"))?;
-            save_numbers(size, std::mem::take(&mut seen.segmentation), &path("_segmentation"))?;
-            save(&seen.into_image(), &path(""))?;
-            written.extend(["", "_depth", "_segmentation"].map(path));
+            let seen = film.senses.see(frame, &camera)?;
+            for (kind, bytes) in CAMERA_PICTURES.into_iter().zip(camera_pictures(seen)?) {
+                put(&camera.name, kind, bytes)?;
+            }
         }
-        for (side, touched) in ["left", "right"].into_iter().zip(&film.senses.touch(frame)?) {
-            for (kind, picture) in tactile(touched) {
-                let path = dir.join(format!("{moment}_tactile_{side}{kind}.png"));
-                save(&picture, &path)?;
-                written.push(path);
+        for (name, touched) in FINGERS.into_iter().zip(&film.senses.touch(frame)?) {
+            for (kind, picture) in FINGER_PICTURES.into_iter().zip(tactile(touched)) {
+                put(name, kind, png(&picture)?)?;
             }
         }
     }
     Ok(written)
 }
 
-fn tactile(touched: &Touched) -> [(&'static str, RgbImage); 3] {
-    [
-        ("", touched.picture.clone()),
-        ("_markers", touched.with_markers(MarkerStyle::Dots)),
-        ("_arrows", touched.with_markers(MarkerStyle::Arrows)),
-    ]
+/// Colour, depth and segmentation of what a camera sees, as files.
+fn camera_pictures(mut seen: Picture) -> Result<[Vec<u8>; 3], FilmError> {
+    let numbers = |values: Vec<u16>| {
+        ImageBuffer::<Luma<u16>, _>::from_raw(seen.width as u32, seen.height as u32, values)
+            .unwrap_or_default()
+    };
+    let tenths = |depth: &f32| (1e4 * depth).min(f32::from(u16::MAX)).round() as u16;
+    let depth = png(&numbers(seen.depth.iter().map(tenths).collect()))?;
+    let segmentation = png(&numbers(std::mem::take(&mut seen.segmentation)))?;
+    Ok([png(&seen.into_image())?, depth, segmentation])
 }
 
-fn save(picture: &RgbImage, path: &Path) -> Result<(), FilmError> {
-    picture.save(path).map_err(|source| FilmError::Picture { path: path.to_owned(), source })
+/// A finger's picture, plain, with dots and with arrows.
+fn tactile(touched: &Touched) -> [RgbImage; 3] {
+    let drawn = |style| touched.with_markers(style);
+    [touched.picture.clone(), drawn(MarkerStyle::Dots), drawn(MarkerStyle::Arrows)]
 }
 
-fn save_numbers((width, height): (u32, u32), numbers: Vec<u16>, path: &Path) -> Result<(), FilmError> {
-    let picture = ImageBuffer::<Luma<u16>, _>::from_raw(width, height, numbers).unwrap_or_default();
-    picture.save(path).map_err(|source| FilmError::Picture { path: path.to_owned(), source })
+/// A picture as a PNG file.
+fn png<P: PixelWithColorType>(picture: &ImageBuffer<P, Vec<P::Subpixel>>) -> Result<Vec<u8>, FilmError>
+where
+    [P::Subpixel]: EncodableLayout,
+{
+    let mut bytes = Cursor::new(Vec::new());
+    picture.write_to(&mut bytes, ImageFormat::Png)?;
+    Ok(bytes.into_inner())
 }

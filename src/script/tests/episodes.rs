@@ -1,8 +1,10 @@
+use std::sync::Arc;
+
 use super::*;
 use crate::{
     benchmark::{Plan, seed::Split},
-    geometry::{Pose, Vec3},
-    scene::Body,
+    geometry::{Pose, Vec3, shape::Shape},
+    scene::{Asset, Body},
     script::{Episode, EpisodeRequest, Expert, ExpertCommand, ExpertView, ObjectView, check_shift},
 };
 
@@ -21,6 +23,27 @@ fn project(rest: &str) -> Project {
     Project::new(&[("x.lua", &format!("{SUITE}{rest}"))])
 }
 
+fn ball() -> ObjectView {
+    let shape = Shape::Sphere { radius: 0.03 }.translated(Vec3::z() * 0.03);
+    ObjectView {
+        name: "ball".into(),
+        bounds: shape.bounds(),
+        asset: Arc::new(Asset {
+            name: "ball".into(),
+            shape,
+            body: Body::Static,
+            friction: Default::default(),
+            visuals: Vec::new(),
+            hints: Default::default(),
+        }),
+        pose_w: Pose::translation(0.1, 0.0, 0.0),
+        centre_w: Vec3::new(0.1, 0.0, 0.03),
+        yaw: 0.0,
+        joint: None,
+        parts: Vec::new(),
+    }
+}
+
 fn view() -> ExpertView {
     ExpertView {
         time_s: 0.0,
@@ -30,16 +53,7 @@ fn view() -> ExpertView {
         width_m: 0.08,
         closure: 0.0,
         pad_force_n: [0.0; 2],
-        objects: vec![ObjectView {
-            name: "ball".into(),
-            asset: "ball".into(),
-            centre_w: Vec3::new(0.1, 0.0, 0.03),
-            yaw: 0.0,
-            size: Vec3::repeat(0.06),
-            hints: Default::default(),
-            joint: None,
-            parts: Vec::new(),
-        }],
+        objects: vec![ball()],
     }
 }
 
@@ -223,5 +237,25 @@ fn an_expert_that_goes_wrong_is_named_with_its_line() {
         error("arm:close_to(2)"),
         format!("x.lua:{line}: arm:close_to: closure: expected a number in 0..1, got 2")
     );
-    assert_eq!(error("arm:mov_to(1)"), format!("x.lua:{line}: arm: there is no \"mov_to\""));
+    assert_eq!(
+        error("arm:mov_to(1)"),
+        format!("x.lua:{line}: arm: unknown key \"mov_to\"; did you mean \"move_to\"?")
+    );
+}
+
+#[test]
+fn an_expert_can_ask_how_far_a_hand_would_be_from_things() {
+    let found = run("local over = softvt.pose { xyz = { 0.1, 0, 0.5 }, yaw = 0 }
+         local on = softvt.pose { xyz = { 0.1, 0, 0.06 }, yaw = 0 }
+         local far, none = scene:clearance(over)
+         local near, ball = scene:clearance(on, { width = 0.02 })
+         assert(far == 0.2 and none == nil, tostring(far))
+         assert(near < 0 and ball == 'ball', tostring(near))
+         assert(scene:clearance(on, { ignore = { 'ball' } }) == 0.2)
+         scene:clearance(on, { ignore = { 'bal' } })");
+    let message = found.unwrap_err();
+    assert!(
+        message.contains("scene:clearance: ignore: unknown object \"bal\"; did you mean \"ball\"?"),
+        "{message}"
+    );
 }

@@ -2,8 +2,10 @@
 
 mod bad_input;
 mod episodes;
+mod hostile;
 mod joints;
 mod options;
+mod surface;
 mod visuals;
 
 use std::{fs, path::PathBuf, sync::Arc, time::Duration};

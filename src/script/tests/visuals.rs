@@ -1,5 +1,7 @@
 //! Looks in Lua: what reaches the scene, and what is said where a table is wrong.
 
+use std::sync::Arc;
+
 use super::{Project, SUITE, error_of};
 use crate::{
     benchmark::seed::Split,
@@ -52,12 +54,13 @@ fn layers_reach_the_scene_as_they_are_written() {
     let [noise, both, whole] = visual.layers.as_slice() else { panic!("three layers") };
     assert_eq!(noise.mask, Mask::Noise { size_m: [0.01; 3], octaves: 3, from: 0.6, to: 0.4, seed: 7 });
     assert_eq!((noise.opacity, noise.relief_m, noise.roughness), (0.5, 1e-4, 0.6));
-    let weave = Mask::Inverse { mask: Box::new(Mask::Weave { pitch_m: 1e-3 }) };
+    let weave = Mask::Inverse { mask: Arc::new(Mask::Weave { pitch_m: 1e-3 }) };
     let masks = vec![
         Mask::Facing { axis: [1.0, 0.0, 0.0], from: 0.0, to: 1.0 },
         Mask::Gradient { axis: [0.0, 0.0, 1.0], from_m: 0.0, to_m: 0.02 },
         weave,
     ];
+    let masks = masks.into_iter().map(Arc::new).collect();
     assert_eq!(both.mask, Mask::Both { masks });
     assert_eq!((&whole.mask, whole.opacity), (&Mask::Whole, 1.0));
 }
@@ -76,6 +79,7 @@ fn every_mask_can_be_made_from_lua() {
         "weave { pitch_m = 1e-3 }",
         "facing { from = 0.2, to = 0.8 }",
         "inside { shape = softvt.shape.sphere { radius = 0.01 }, soft_m = 1e-3 }",
+        "text { text = 'Ünder', height_m = 5e-3, at = { 0, 0, 0.03 }, facing = '-y', wrap_m = 0.03, weight = 0.1, font = 'mono' }",
     ];
     assert_eq!(masks.len(), crate::script::catalogue_visuals::MASKS.len());
     let layers: Vec<_> =
@@ -137,6 +141,32 @@ fn a_wrong_look_is_named_with_its_line_and_the_mend() {
             at(8, "mask.gradient.axis: expected a direction, got one of length 0"),
         ),
         (
+            "mask = mask.text { text = 'a\\u{6f22}', height_m = 0.01, at = { 0, 0, 0 }, facing = '+z' },",
+            at(
+                8,
+                "mask.text.text: the typeface has no letter '\u{6f22}'; expected Latin, Greek or Cyrillic ones",
+            ),
+        ),
+        (
+            "mask = mask.text { text = ('x'):rep(65), height_m = 0.01, at = { 0, 0, 0 }, facing = '+z' },",
+            at(8, "mask.text.text: expected at most 64 letters, got 65"),
+        ),
+        (
+            "mask = mask.text { text = '\\xff', height_m = 0.01, at = { 0, 0, 0 }, facing = '+z' },",
+            at(8, "mask.text.text: expected letters in UTF-8"),
+        ),
+        (
+            "mask = mask.text { text = 'x', height_m = 0.01, at = { 0, 0, 0 }, facing = { 0, 0, 0 } },",
+            at(8, "mask.text.facing: expected a direction, its length between 1e-6 and 1e6"),
+        ),
+        (
+            "mask = mask.text { text = 'x', height_m = 0.01, at = { 0, 0, 0 }, facing = '+z', wrap_m = 0.1 },",
+            at(
+                8,
+                "mask.text.facing: expected a direction to a side, since the line is laid round the z axis",
+            ),
+        ),
+        (
             "mask = mask.specks { spacing_m = 1, radius_m = 0.6 },",
             at(8, "mask.specks.radius_m: expected at most half of spacing_m"),
         ),
@@ -174,8 +204,19 @@ fn a_painted_shape_needs_a_look_for_each_material_or_none_at_all() {
 
 #[test]
 fn every_material_of_the_library_gives_a_look() {
-    let names =
-        ["crust", "dough", "frosting", "seeds", "ceramic", "wood", "steel", "fabric", "paint", "floured"];
+    let names = [
+        "crust",
+        "dough",
+        "frosting",
+        "seeds",
+        "ceramic",
+        "wood",
+        "floorboards",
+        "steel",
+        "fabric",
+        "paint",
+        "floured",
+    ];
     let looks: Vec<_> = names
         .iter()
         .map(|name| match *name {

@@ -80,7 +80,7 @@ impl Spots {
                 [self.texels[0][0].min(u), self.texels[0][1].min(v)],
                 [self.texels[1][0].max(u), self.texels[1][1].max(v)],
             ];
-            self.least = self.least.min(at.height.to_array()[0]);
+            self.least = self.least.min(at.level.to_array()[0]);
         }
     }
 

@@ -3,7 +3,7 @@
 /// A picture cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CameraError {
-    /// A number of the camera is out of range.
+    /// A number of the camera is out of range; fields are named as scripts name them.
     #[error("camera {camera}: {field}: expected {expected}, got {got}")]
     Field {
         /// Name of the camera.
@@ -15,16 +15,16 @@ pub enum CameraError {
         /// What it is.
         got: String,
     },
-    /// The camera would see the inside of something.
-    #[error("camera {camera}: pose: it stands inside of {object}; move it out")]
+    /// The camera stands inside of something, where none can be put.
+    #[error("camera {camera}: position: it stands inside of {object}; move it out")]
     Inside {
         /// Name of the camera.
         camera: String,
         /// What it is inside of.
         object: String,
     },
-    /// A number of the light is out of range.
-    #[error("lighting: {field}: expected {expected}, got {got}")]
+    /// A number of the light is out of range; fields are named as scripts name them, where they have one.
+    #[error("light: {field}: expected {expected}, got {got}")]
     Light {
         /// The field.
         field: &'static str,

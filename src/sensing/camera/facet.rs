@@ -1,4 +1,4 @@
-//! Large flat faces with patterns: a few triangles each and a texture with a chain of halved copies (Williams, Pyramidal
+//! Large flat faces with patterns, and parts of curved ones with fine print: a few triangles each and a texture with a chain of halved copies (Williams, Pyramidal
 //! Parametrics, 1983), baked from the pattern on the face itself.
 
 use std::sync::OnceLock;
@@ -7,6 +7,7 @@ use wide::{bytemuck::cast, i32x8, u32x8};
 
 use super::{
     V3,
+    charts::{self, Curved},
     lanes::{F8, LANES, V8, rough_log2},
     model::{Level, accumulate, split},
     pattern::{self, Look},
@@ -20,10 +21,12 @@ const LEAST_SIZE: f64 = 0.1;
 /// Most texels along an edge, and the finest they get, m.
 const MOST_TEXELS: f32 = 1536.0;
 const FINEST: f32 = 0.8e-3;
+/// Texels of surfaces with text, m.
+pub(super) const PRINT: f32 = 0.3e-3;
 /// Texels across the finest feature of a pattern: no more are needed.
 const TEXELS_A_FEATURE: f32 = 8.0;
 
-/// A flat face: axes of its texture in the object frame and the texture.
+/// A face: axes of its texture in the object frame and the texture.
 #[derive(Clone, Debug)]
 pub(super) struct Facet {
     origin: V3,
@@ -34,9 +37,18 @@ pub(super) struct Facet {
     /// Edge of a texel, m.
     texel: f32,
     size: [usize; 2],
-    visual: Visual,
+    ground: Ground,
     /// Painted when it is first looked at: undersides never are.
     mips: OnceLock<Vec<Image>>,
+}
+
+/// What a texture is painted from.
+#[derive(Clone, Debug)]
+enum Ground {
+    /// A flat face of one look.
+    Flat(Visual),
+    /// A part of a curved surface.
+    Curved(Curved),
 }
 
 /// Texels as bytes: square roots of the albedo (so that dark colours have steps as fine as bright ones) and roughness.
@@ -47,9 +59,9 @@ struct Image {
     texels: Vec<u32>,
 }
 
-/// Whether a mesh is a few big flat faces.
-pub(super) fn worth_it(mesh: &Mesh) -> bool {
-    mesh.triangles.len() <= MOST_TRIANGLES && mesh.area().sqrt() > LEAST_SIZE
+/// Whether a mesh is a few flat faces that are big, or printed.
+pub(super) fn worth_it(mesh: &Mesh, printed: bool) -> bool {
+    mesh.triangles.len() <= MOST_TRIANGLES && (printed || mesh.area().sqrt() > LEAST_SIZE)
 }
 
 /// Each triangle pair or triangle of one plane and material becomes a facet.
@@ -108,6 +120,18 @@ pub(super) fn bake(mesh: &Mesh, materials: &[u16], visuals: &[Visual]) -> (Level
 
 impl Facet {
     fn of(n: &V3, corners: &[V3], visual: &Visual) -> Self {
+        let least = if pattern::printed(visual) { PRINT } else { FINEST };
+        let texel = |size: f32| least.max(pattern::finest(visual).min(size) / TEXELS_A_FEATURE);
+        Self::over(n, corners, texel, Ground::Flat(visual.clone()))
+    }
+
+    /// Part of a curved surface that faces mostly along the unit vector `n`, seen along that, with texels of edge `texel`, m.
+    pub fn curved(n: &V3, corners: &[V3], texel: f32, curved: Curved) -> Self {
+        Self::over(n, corners, |_| texel, Ground::Curved(curved))
+    }
+
+    /// `texel` gives the edge of a texel on a face of a size, m.
+    fn over(n: &V3, corners: &[V3], texel: impl Fn(f32) -> f32, ground: Ground) -> Self {
         let u = if n.x.abs() < 0.9 { V3::x() } else { V3::y() };
         let u = (u - n * u.dot(n)).normalize();
         let v = n.cross(&u);
@@ -115,11 +139,11 @@ impl Facet {
             corners.iter().map(|c| c.dot(axis)).fold([f32::MAX, f32::MIN], |b, x| [b[0].min(x), b[1].max(x)])
         };
         let ([u0, u1], [v0, v1]) = (span(&u), span(&v));
-        let feature = pattern::finest(visual).min((u1 - u0).max(v1 - v0));
-        let texel = FINEST.max(feature / TEXELS_A_FEATURE).max((u1 - u0).max(v1 - v0) / MOST_TEXELS);
+        let longest = (u1 - u0).max(v1 - v0);
+        let texel = texel(longest).max(longest / MOST_TEXELS);
         let origin = u * u0 + v * v0 + n * corners[0].dot(n);
         let size = [u1 - u0, v1 - v0].map(|x| (x / texel).ceil().max(1.0) as usize);
-        Self { origin, u, v, n: *n, texel, size, visual: visual.clone(), mips: OnceLock::new() }
+        Self { origin, u, v, n: *n, texel, size, ground, mips: OnceLock::new() }
     }
 
     /// Place of a point of the object frame, texels of the finest copy.
@@ -130,13 +154,15 @@ impl Facet {
 
     fn paint(&self) -> Vec<Image> {
         let [width, height] = self.size;
-        let look = |i: usize| {
+        let look = |visual: &Visual, i: usize| {
             let [x, y] = [(i % width) as f32 + 0.5, (i / width) as f32 + 0.5];
             let p = self.origin + (self.u * x + self.v * y) * self.texel;
-            let look = pattern::look(&self.visual, &p, &self.n, self.texel).0;
-            [look.albedo.x, look.albedo.y, look.albedo.z, look.roughness]
+            pattern::look(visual, &p, &self.n, self.texel).0.painted()
         };
-        let mut fine: Vec<[f32; 4]> = (0..width * height).map(look).collect();
+        let mut fine: Vec<[f32; 4]> = match &self.ground {
+            Ground::Flat(visual) => (0..width * height).map(|i| look(visual, i)).collect(),
+            Ground::Curved(curved) => charts::paint(curved, self.size, self.texel, |p| self.place(p)),
+        };
         let mut size = self.size;
         let mut mips = vec![Image::of(&fine, size)];
         while size[0].max(size[1]) > 1 {

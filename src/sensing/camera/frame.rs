@@ -4,12 +4,11 @@ use super::{
     CameraError, FrameView, Mount, Stage, V3, lens::Lens, model::Level, pose::Posed, shade::Blob,
     shadow::ShadowMap, surface::Drawn,
 };
-use crate::scene::Camera;
 
 /// A coarser level is used if its edges are at most this many pixels long, or if it is of one colour and at most this many
 /// pixels from the shape that it stands for.
 const COARSE_PIXELS: f32 = 1.7;
-const FLAW_PIXELS: f32 = 0.12;
+pub(super) const FLAW_PIXELS: f32 = 0.12;
 /// Things wider than this hide no sky from others, m: they are grounds and walls.
 const WIDEST_BLOB: f32 = 0.35;
 
@@ -17,10 +16,11 @@ fn bounds_of(points: &[V3]) -> [V3; 2] {
     points.iter().fold([V3::repeat(f32::MAX), V3::repeat(f32::MIN)], |b, p| [b[0].inf(p), b[1].sup(p)])
 }
 
-/// Puts the coarsest level of every moving thing in its place; bounds of all things, world.
+/// Puts the coarsest level of every moving thing in its place, if it is not `placed` there; bounds of all things, world.
 pub(super) fn pose_all(
     stage: &Stage,
     view: &FrameView,
+    placed: bool,
     poses: &mut Vec<Vec<Posed>>,
 ) -> Result<Vec<[V3; 2]>, CameraError> {
     poses.resize_with(stage.things.len(), Vec::new);
@@ -32,7 +32,9 @@ pub(super) fn pose_all(
             continue;
         }
         own.resize_with(thing.model.levels.len(), Posed::default);
-        own[last].update(thing, &thing.model.levels[last], view)?;
+        if !placed {
+            own[last].update(thing, &thing.model.levels[last], view)?;
+        }
         bounds.push(bounds_of(&own[last].positions));
     }
     Ok(bounds)
@@ -90,15 +92,14 @@ pub(super) fn drawn<'a>(
     levels.iter().enumerate().map(one).collect()
 }
 
-/// The camera must not be inside of anything: where the solid angles of the triangles around it (Van Oosterom &
-/// Strackee, 1983) add up to a whole turn.
-pub(super) fn check_outside(
+/// The first thing that the camera is inside of: there the solid angles of the triangles around it (Van Oosterom & Strackee,
+/// 1983) add up to a whole turn.
+pub(super) fn inside_of(
     stage: &Stage,
-    camera: &Camera,
     lens: &Lens,
     bounds: &[[V3; 2]],
     poses: &[Vec<Posed>],
-) -> Result<(), CameraError> {
+) -> Option<String> {
     for (i, thing) in stage.things.iter().enumerate() {
         let [low, high] = bounds[i];
         if (0..3).any(|axis| lens.eye[axis] < low[axis] || lens.eye[axis] > high[axis]) {
@@ -114,10 +115,10 @@ pub(super) fn check_outside(
             angle += 2.0 * a.dot(&b.cross(&c)).atan2(below);
         }
         if angle.abs() > std::f64::consts::TAU {
-            return Err(CameraError::Inside { camera: camera.name.clone(), object: thing.name.clone() });
+            return Some(thing.name.clone());
         }
     }
-    Ok(())
+    None
 }
 
 /// The shadow map of what moves.

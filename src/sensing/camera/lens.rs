@@ -8,6 +8,10 @@ use crate::{
 
 /// Largest edge of an image, pixels.
 const MOST_EDGE: usize = 4096;
+/// Most pixels of all cameras of a scene together: their kept backgrounds take a hundred bytes a pixel.
+const MOST_PIXELS: usize = MOST_EDGE * MOST_EDGE;
+/// Most cameras of a scene.
+const MOST_CAMERAS: usize = 64;
 
 /// A camera in the world.
 #[derive(Clone, Copy, Debug)]
@@ -23,35 +27,65 @@ pub(super) struct Lens {
     to_world: Rigid,
 }
 
+/// That `camera` has something else in `field` than it may.
+fn wrong(camera: &Camera, field: &'static str, expected: &str, got: String) -> CameraError {
+    CameraError::Field { camera: camera.name.clone(), field, expected: expected.to_owned(), got }
+}
+
+/// Checks the numbers of a scene's cameras, each by itself and all together; no state is needed.
+///
+/// # Errors
+/// The first camera with a number out of its range, or that is one too many or too large beside those before it.
+pub fn check_cameras(cameras: &[Camera]) -> Result<(), (usize, CameraError)> {
+    let mut pixels = 0_usize;
+    for (index, camera) in cameras.iter().enumerate() {
+        let fault = |e| (index, e);
+        check(camera).map_err(fault)?;
+        if index == MOST_CAMERAS {
+            let expected = format!("at most {MOST_CAMERAS} cameras in a scene");
+            return Err(fault(wrong(camera, "name", &expected, format!("{} of them", cameras.len()))));
+        }
+        pixels += camera.width * camera.height;
+        if pixels > MOST_PIXELS {
+            let expected = format!("at most {MOST_PIXELS} pixels in all cameras of a scene together");
+            return Err(fault(wrong(
+                camera,
+                "width and height",
+                &expected,
+                format!("{pixels} up to this one"),
+            )));
+        }
+    }
+    Ok(())
+}
+
 /// Checks the numbers of a camera.
 fn check(camera: &Camera) -> Result<(), CameraError> {
-    let wrong = |field, expected: &str, got: String| {
-        Err(CameraError::Field { camera: camera.name.clone(), field, expected: expected.to_owned(), got })
-    };
+    let wrong = |field, expected: &str, got: String| Err(wrong(camera, field, expected, got));
     for (field, edge) in [("width", camera.width), ("height", camera.height)] {
         if !(1..=MOST_EDGE).contains(&edge) {
             return wrong(field, &format!("1 to {MOST_EDGE} pixels"), edge.to_string());
         }
     }
     if !(camera.fovy_rad >= 0.01 && camera.fovy_rad <= 2.8) {
-        return wrong("fovy_rad", "0.01 to 2.8 rad", camera.fovy_rad.to_string());
+        let expected = "0.01 to 2.8 rad (0.6° to 160°)";
+        return wrong("fovy", expected, format!("{} rad", camera.fovy_rad));
     }
     if !(camera.near_m >= 1e-4 && camera.near_m.is_finite()) {
-        return wrong("near_m", "at least 0.0001 m", camera.near_m.to_string());
+        return wrong("near", "at least 0.0001 m", format!("{} m", camera.near_m));
     }
     if !(camera.far_m > camera.near_m && camera.far_m.is_finite()) {
-        return wrong("far_m", "a length above near_m", camera.far_m.to_string());
+        let expected = format!("more than near ({} m)", camera.near_m);
+        return wrong("far", &expected, format!("{} m", camera.far_m));
     }
-    let pose = &camera.pose;
-    if !pose.translation.vector.iter().chain(pose.rotation.coords.iter()).all(|x| x.is_finite()) {
-        return wrong("pose", "finite numbers", format!("{:?}", pose.to_homogeneous().as_slice()));
+    let (place, turn) = (&camera.pose.translation.vector, &camera.pose.rotation.coords);
+    // Beyond, single precision cannot tell a pixel from the next.
+    if !place.iter().all(|x| x.abs() <= 1e6) {
+        return wrong("position", "metres within ±1e6", format!("{:?}", place.as_slice()));
     }
-    if (pose.rotation.coords.norm() - 1.0).abs() > 1e-3 {
-        return wrong(
-            "pose",
-            "a rotation by a unit quaternion",
-            format!("norm {}", pose.rotation.coords.norm()),
-        );
+    // A turn that is no number has no norm either.
+    if !((turn.norm() - 1.0).abs() <= 1e-3) {
+        return wrong("quat", "a unit quaternion", format!("{:?} (x, y, z, w)", turn.as_slice()));
     }
     Ok(())
 }

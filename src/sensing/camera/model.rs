@@ -1,13 +1,17 @@
 //! What is drawn of a thing: triangles with normals and baked looks, in the object frame at rest.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::Arc};
 
 use super::{
     CameraError, V3,
-    facet::{self, Facet},
+    charts::{self, Cloth},
+    decimate::decimated,
+    facet::{self, Facet, PRINT},
+    frame::FLAW_PIXELS,
+    parts,
     pattern::{self, Look},
     surface::TRIANGLE_BITS,
-    turned::turned,
+    turned::lathed,
 };
 use crate::{
     geometry::{
@@ -24,6 +28,8 @@ use crate::{
 const CREASE: f32 = 0.8;
 /// Cells of a skin along the longest edge, from near views to far ones; the last also throws shadows.
 const CELLS: [f64; 4] = [64.0, 40.0, 26.0, 16.0];
+/// How far fewer triangles of a rigid thing may be from all of them, in the spacing of their vertices.
+const STRAIGHT: f32 = 0.025;
 /// Triangles with patterns are cut until their edges are shorter than this share of the longest extent.
 const FINEST_CUT: f64 = 1.0 / 48.0;
 /// Most triangles that cutting may make.
@@ -68,7 +74,12 @@ impl Model {
         if let Some(mesh) = flat_faces(shape) {
             return Self::of_mesh(name, &mesh, &[], visuals);
         }
-        Self::of_skin(name, shape, visuals)
+        let mut model = Self::of_levels(name, shape, visuals, parts::triangles)?;
+        // What is printed lies on its triangles as they are.
+        if model.facets.is_empty() {
+            model.levels.iter_mut().for_each(|level| *level = decimated(level, STRAIGHT * level.spacing));
+        }
+        Ok(model)
     }
 
     /// The same with flat faces in small triangles too, for bodies that bend.
@@ -76,22 +87,44 @@ impl Model {
     /// # Errors
     /// As [`Model::of_shape`].
     pub fn of_skin(name: &str, shape: &Shape, visuals: &[Visual]) -> Result<Self, CameraError> {
+        Self::of_levels(name, shape, visuals, |_, _| None)
+    }
+
+    /// `known` gives the triangles of printed shapes, which need no small ones, if it can.
+    fn of_levels(
+        name: &str,
+        shape: &Shape,
+        visuals: &[Visual],
+        known: impl Fn(&Shape, f64) -> Option<Mesh>,
+    ) -> Result<Self, CameraError> {
         let longest = shape.bounds().size().max();
-        let mut levels = Vec::new();
+        let (mut levels, mut facets) = (Vec::new(), Vec::new());
+        let cloth = visuals
+            .iter()
+            .any(pattern::printed)
+            .then(|| Arc::new(Cloth { shape: shape.clone(), visuals: visuals.to_vec() }));
         for cells in CELLS {
             let cell = longest / cells;
-            let (mesh, materials) = triangles(shape, cell);
+            let exact = cloth.as_ref().and_then(|_| known(shape, cell));
+            let (mesh, materials) =
+                exact.map_or_else(|| triangles(shape, cell), |mesh| materials_of(mesh, shape));
             check(name, &mesh, &materials, visuals)?;
             let mut level = bake(&mesh, &materials, visuals, cell as f32, Some(shape));
+            let texel = PRINT * (CELLS[0] / cells) as f32;
+            if let Some(cloth) = &cloth {
+                charts::wrap(&mut level, &mut facets, cloth, texel);
+            }
             if !levels.is_empty() && level.plain {
-                level.flaw = flaw(&mesh, shape);
+                // Print needs a texel a pixel.
+                let least = if cloth.is_some() { FLAW_PIXELS * texel } else { 0.0 };
+                level.flaw = flaw(&mesh, shape, cell).max(least);
             }
             levels.push(level);
             if matches!(shape, Shape::Mesh(_)) {
                 break;
             }
         }
-        Ok(Self { levels, facets: Vec::new() })
+        Ok(Self { levels, facets })
     }
 
     /// The drawn form of triangles, closed or not, seen from their counter-clockwise side. `materials` is the visual of
@@ -112,7 +145,7 @@ impl Model {
             Mesh { vertices: mesh.vertices.clone(), triangles: mesh.triangles.clone(), uvs: Vec::new() };
         let patterned = materials.iter().any(|&m| !visuals[m as usize].layers.is_empty());
         let longest = extent(&mesh.vertices).max();
-        if patterned && facet::worth_it(&mesh) {
+        if patterned && facet::worth_it(&mesh, visuals.iter().any(pattern::printed)) {
             let (level, facets) = facet::bake(&mesh, &materials, visuals);
             return Ok(Self { levels: vec![level], facets });
         }
@@ -213,16 +246,15 @@ fn triangles(shape: &Shape, cell: f64) -> (Mesh, Vec<u16>) {
         let skin = skin::skin(shape, cell);
         return (skin.mesh, skin.materials);
     };
-    let widest = profile.points().iter().map(|p| p[0]).fold(0.0, f64::max);
-    let turns = (std::f64::consts::TAU * widest / (TURNED[1] * cell)).ceil() as usize;
-    let mesh = turned(profile, TURNED[0] * cell, turns.clamp(24, 400));
+    materials_of(lathed(profile, cell), shape)
+}
+
+/// A mesh with the materials that a shape has there.
+fn materials_of(mesh: Mesh, shape: &Shape) -> (Mesh, Vec<u16>) {
     let middle = |t: &[u32; 3]| t.map(|v| mesh.vertices[v as usize]).iter().sum::<Vec3>() / 3.0;
     let materials = mesh.triangles.iter().map(|t| shape.material(&middle(t))).collect();
     (mesh, materials)
 }
-
-/// Steps along and around a revolved profile, in cells: what is painted on it follows the rings.
-const TURNED: [f64; 2] = [0.75, 2.2];
 
 /// The profile of a shape that is one of revolution where it stands, painted or not.
 fn revolved(shape: &Shape) -> Option<&Profile> {
@@ -273,10 +305,12 @@ fn cut(mut mesh: Mesh, mut materials: Vec<u16>, edge: f64) -> (Mesh, Vec<u16>, f
     }
 }
 
-/// How far the middles of triangles are from the surface that they stand for, m: root of the mean square.
-fn flaw(mesh: &Mesh, shape: &Shape) -> f32 {
+/// How far the middles of triangles are from the surface that they stand for, m: root of the mean square. What lies deeper
+/// than a cell is hidden by another part.
+fn flaw(mesh: &Mesh, shape: &Shape, cell: f64) -> f32 {
     let middle = |t: &[u32; 3]| t.iter().map(|&v| mesh.vertices[v as usize]).sum::<Vec3>() / 3.0;
-    let squares: f64 = mesh.triangles.iter().map(|t| shape.distance(&middle(t)).powi(2)).sum();
+    let gaps = mesh.triangles.iter().map(|t| shape.distance(&middle(t))).filter(|gap| gap.abs() < cell);
+    let squares: f64 = gaps.map(|gap| gap * gap).sum();
     (squares / mesh.triangles.len().max(1) as f64).sqrt() as f32
 }
 

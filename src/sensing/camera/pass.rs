@@ -56,7 +56,8 @@ impl Pass<'_> {
         let to_eye = (V8::splat(&self.rays.eye) - points.p).unit();
         let light = &self.stage.light;
         let mut split = light.split(points, to_eye);
-        split.direct = split.direct * light.unshadowed(points.p, &points.n, &self.stage.fixed_shadow);
+        let (fine, wide) = (&self.stage.fixed_shadow, self.stage.wide_shadow.as_ref());
+        split.direct = split.direct * light.unshadowed_afar(points.p, &points.n, fine, wide);
         split.ambient = split.ambient * open_sky(self.fixed_blobs, points.p, points.n, points.thing);
         split
     }

@@ -1,6 +1,6 @@
 //! The look of a surface at a point: masks and layers evaluated, filtered to the spacing at which they are sampled.
 
-use super::{V3, noise};
+use super::{V3, noise, text};
 use crate::scene::{Mask, Visual};
 
 /// What shading needs to know of a point of a surface.
@@ -15,6 +15,11 @@ pub(super) struct Look {
 }
 
 impl Look {
+    /// What textures hold: albedo and roughness.
+    pub fn painted(&self) -> [f32; 4] {
+        [self.albedo.x, self.albedo.y, self.albedo.z, self.roughness]
+    }
+
     /// Albedo, roughness, metalness, openness.
     #[inline(always)]
     pub fn numbers(&self) -> [f32; 6] {
@@ -57,13 +62,14 @@ pub(super) fn finest(visual: &Visual) -> f32 {
                 // Narrow ranges cut the noise to sharp edges.
                 least * 0.5_f64.powi(*octaves as i32 - 1) * (to - from).abs().min(1.0)
             }
-            Mask::Both { masks } => masks.iter().map(of).fold(f64::INFINITY, f64::min),
+            Mask::Both { masks } => masks.iter().map(|mask| of(mask)).fold(f64::INFINITY, f64::min),
             Mask::Inverse { mask } => of(mask),
             Mask::Inside { soft_m, .. } => *soft_m,
             // As fine as the surface itself, whose own detail is told elsewhere.
             Mask::Facing { .. } => f64::INFINITY,
             // Sharp edges.
-            Mask::Checker { .. }
+            Mask::Text { .. }
+            | Mask::Checker { .. }
             | Mask::Stripes { .. }
             | Mask::Rings { .. }
             | Mask::Boards { .. }
@@ -73,6 +79,19 @@ pub(super) fn finest(visual: &Visual) -> f32 {
         }
     }
     visual.layers.iter().map(|layer| of(&layer.mask)).fold(f64::INFINITY, f64::min) as f32
+}
+
+/// Whether text is printed on a visual.
+pub(super) fn printed(visual: &Visual) -> bool {
+    fn of(mask: &Mask) -> bool {
+        match mask {
+            Mask::Text { .. } => true,
+            Mask::Both { masks } => masks.iter().any(|mask| of(mask)),
+            Mask::Inverse { mask } => of(mask),
+            _ => false,
+        }
+    }
+    visual.layers.iter().any(|layer| of(&layer.mask))
 }
 
 /// How far under the surface patterns are looked up, m.
@@ -121,6 +140,7 @@ fn mask(mask: &Mask, p: &V3, n: &V3, spacing: f32) -> f32 {
             let width = (*soft_m as f32).max(spacing).max(1e-6);
             smooth(0.5 - shape.distance(&p.cast()) as f32 / width)
         }
+        Mask::Text { print } => text::share(print, p, n, spacing),
         Mask::Inverse { mask } => 1.0 - self::mask(mask, p, n, spacing),
         Mask::Both { masks } => masks.iter().map(|m| self::mask(m, p, n, spacing)).product(),
     }
@@ -148,7 +168,7 @@ fn pulse(x: f32, share: f32, width: f32) -> f32 {
 fn rings(p: &V3, pitch: f32, wobble: f32, spacing: f32, seed: u32) -> f32 {
     let bend =
         noise::fractal([p.x / (8.0 * wobble), p.y / (8.0 * wobble), p.z / (40.0 * wobble)], 2, 0.0, seed);
-    let phase = (p.x.hypot(p.y) + 2.0 * wobble * (bend - 0.5)) / pitch;
+    let phase = ((p.x * p.x + p.y * p.y).sqrt() + 2.0 * wobble * (bend - 0.5)) / pitch;
     let t = phase - phase.floor();
     // Slow growth from light to dark, then a sharp edge.
     let ring = if t < 0.85 { (t / 0.85).powi(3) } else { 1.0 - (t - 0.85) / 0.15 };
@@ -219,7 +239,7 @@ mod tests {
             assert_eq!(value(&up, [0.0; 3], n, 1e-3), expected);
         }
         assert!((value(&up, [0.0; 3], [0.75_f32.sqrt(), 0.0, 0.5], 1e-3) - 0.5).abs() < 1e-6);
-        let inverse = Mask::Inverse { mask: Box::new(up) };
+        let inverse = Mask::Inverse { mask: Arc::new(up) };
         assert_eq!(value(&inverse, [0.0; 3], [0.0, 0.0, 1.0], 1e-3), 0.0);
     }
 

@@ -15,6 +15,9 @@ pub struct Picture {
     pub depth: Vec<f32>,
     /// Object number, height × width; 0 where nothing is.
     pub segmentation: Vec<u16>,
+    /// The thing that the camera stands inside of, if it does. Surfaces are seen from outside alone, so the picture shows
+    /// what is beyond that thing.
+    pub inside: Option<String>,
 }
 
 impl Picture {

@@ -3,7 +3,7 @@
 use super::{
     CameraError, FrameView, Picture, Stage,
     background::{Background, Spots},
-    frame::{blobs, check_outside, choose_levels, draw_shadows, drawn, pose_all},
+    frame::{blobs, choose_levels, draw_shadows, drawn, inside_of, pose_all},
     lens::Lens,
     pass::Pass,
     pose::Posed,
@@ -13,7 +13,10 @@ use super::{
     surface::Rays,
     tile::{Display, PIXELS, Resolver, Triangles, Window},
 };
-use crate::scene::{Camera, CameraMount};
+use crate::{
+    geometry::{Pose, Vec3},
+    scene::{Camera, CameraMount},
+};
 
 /// Working memory of a renderer, kept from picture to picture; also the backgrounds of cameras that do not move.
 #[derive(Debug, Default)]
@@ -21,7 +24,8 @@ pub struct Scratch {
     /// World forms of the levels of moving things.
     poses: Vec<Vec<Posed>>,
     screen: Screen,
-    shadow: Option<(u64, ShadowMap)>,
+    /// What throws the shadows of the state that was drawn last.
+    shadow: Option<(Shown, ShadowMap)>,
     backgrounds: Vec<Background>,
     /// Whether backgrounds are not kept.
     uncached: bool,
@@ -34,10 +38,33 @@ impl Scratch {
     }
 }
 
+/// What a state was: all that moves.
+#[derive(Clone, Debug, Default)]
+struct Shown {
+    stage: u64,
+    nodes: Vec<Vec<Vec3>>,
+    rigid: Vec<Pose>,
+    links: Vec<Vec<Pose>>,
+}
+
+impl Shown {
+    fn is(&self, view: &FrameView) -> bool {
+        self.nodes == view.nodes && self.rigid == view.rigid && self.links == view.links
+    }
+
+    fn keep(&mut self, stage: u64, view: &FrameView) {
+        self.stage = stage;
+        view.nodes.clone_into(&mut self.nodes);
+        view.rigid.clone_into(&mut self.rigid);
+        view.links.clone_into(&mut self.links);
+    }
+}
+
 /// Draws what `camera` sees of `stage` in the state `view`.
 ///
 /// # Errors
-/// A number of the camera out of range, a camera inside a thing, a state without a body that is drawn.
+/// A number of the camera out of range, a state without a body that is drawn. A camera inside of a thing is none: see
+/// [`Picture::inside`].
 pub fn render(
     stage: &Stage,
     view: &FrameView,
@@ -45,14 +72,18 @@ pub fn render(
     scratch: &mut Scratch,
 ) -> Result<Picture, CameraError> {
     let lens = Lens::new(camera, view)?;
-    let bounds = pose_all(stage, view, &mut scratch.poses)?;
+    // Cameras that look at one state share its shadows.
+    let known = scratch.shadow.take().filter(|(shown, _)| shown.stage == stage.key);
+    let same = known.as_ref().is_some_and(|(shown, _)| shown.is(view));
+    let bounds = pose_all(stage, view, same, &mut scratch.poses)?;
     let levels = choose_levels(stage, view, &lens, &bounds, &mut scratch.poses)?;
-    check_outside(stage, camera, &lens, &bounds, &scratch.poses)?;
-    let mut shadow = match scratch.shadow.take() {
-        Some((key, map)) if key == stage.key => map,
-        _ => ShadowMap::new(&stage.lighting),
-    };
-    draw_shadows(stage, &scratch.poses, &mut shadow);
+    let inside = inside_of(stage, &lens, &bounds, &scratch.poses);
+    let (mut shown, mut shadow) =
+        known.unwrap_or_else(|| (Shown::default(), ShadowMap::new(&stage.lighting)));
+    if !same {
+        shown.keep(stage.key, view);
+        draw_shadows(stage, &scratch.poses, &mut shadow);
+    }
     let [fixed_blobs, moving_blobs] = blobs(stage, &bounds);
     let pass = Pass {
         stage,
@@ -63,7 +94,7 @@ pub fn render(
         moving_blobs: &moving_blobs,
         moving_shadow: &shadow,
     };
-    let picture = if scratch.uncached || camera.mount != CameraMount::World {
+    let mut picture = if scratch.uncached || camera.mount != CameraMount::World {
         all(&pass, &mut scratch.screen)
     } else {
         let known = scratch.backgrounds.iter().position(|b| b.stage == stage.key && b.camera == *camera);
@@ -74,7 +105,8 @@ pub fn render(
         });
         over(&pass, &scratch.backgrounds[index], &mut scratch.screen)
     };
-    scratch.shadow = Some((stage.key, shadow));
+    scratch.shadow = Some((shown, shadow));
+    picture.inside = inside;
     Ok(picture)
 }
 
@@ -87,6 +119,7 @@ fn empty_picture(lens: &Lens) -> Picture {
         rgb: vec![0; 3 * pixels],
         depth: vec![0.0; pixels],
         segmentation: vec![0; pixels],
+        inside: None,
     }
 }
 

@@ -133,8 +133,25 @@ impl Light {
     /// What of the key light casters leave at points.
     #[inline(always)]
     pub fn unshadowed(&self, p: V8, n: &V8, map: &ShadowMap) -> F8 {
-        let faces = n.dot(V8::splat(&self.to_key)).simd_gt(F8::ZERO);
-        map.light(&map.places(p), n, faces)
+        map.light(&map.places(p), n, self.lit(n))
+    }
+
+    /// The same by two maps: a fine one where it reaches, and a wide one, if there is any, elsewhere.
+    #[inline(always)]
+    pub fn unshadowed_afar(&self, p: V8, n: &V8, fine: &ShadowMap, wide: Option<&ShadowMap>) -> F8 {
+        let (at, lit) = (fine.places(p), self.lit(n));
+        let near = fine.light(&at, n, lit);
+        let beyond = lit & !fine.inside(&at);
+        match wide {
+            Some(wide) if beyond.any() => near * wide.light(&wide.places(p), n, beyond),
+            _ => near,
+        }
+    }
+
+    /// Which surfaces face the key light.
+    #[inline(always)]
+    fn lit(&self, n: &V8) -> F8 {
+        n.dot(V8::splat(&self.to_key)).simd_gt(F8::ZERO)
     }
 }
 

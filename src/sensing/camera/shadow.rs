@@ -23,8 +23,8 @@ const TILE_BITS: i32 = 3;
 const TILES: usize = EDGE / TILE;
 /// Tiles to each side that the range covers: as far as the filter reaches.
 const AROUND: usize = 1;
-/// A surface is in the shadow of what is higher by more than this, m.
-const BIAS: f32 = 2.5e-3;
+/// A surface is in the shadow of what is higher by more than this, m, and texels.
+const BIAS: [f32; 2] = [2.5e-3, 1.1];
 /// Widest filter and reach of the search for what casts the shadow, texels to each side: two vectors across.
 const WIDEST: f32 = 7.4;
 /// Narrowest filter, texels to each side.
@@ -34,6 +34,8 @@ const NARROWEST: f32 = 1.5;
 const NEIGHBOURS: f32 = 12.0;
 /// Eight points within so many texels, of which four tell what the others see even in a penumbra.
 const NEAREST: f32 = 5.0;
+/// Light that comes in flatter than this (sine) is treated as if it did not.
+const LEVELLEST: f32 = 0.15;
 /// Heights below all.
 const EMPTY: f32 = -1e9;
 
@@ -44,32 +46,47 @@ pub(super) struct ShadowMap {
     centre: V3,
     texels_per_metre: f32,
     tangent: f32,
+    bias: f32,
+    /// Rise of level ground a texel along each axis, m. Heights above it tell what can darken something: what is farther
+    /// along the light is always higher above it too, and level ground never stands above itself.
+    lean: [f32; 2],
     heights: Samples<1>,
-    /// Least and greatest height in and around each tile.
+    /// Least and greatest height above level ground in and around each tile.
     ranges: Vec<[f32; 2]>,
     /// Working memory.
     own: Vec<[f32; 2]>,
     places: Vec<[f32; 3]>,
 }
 
-/// Places of eight points: texels, and height towards the light, m.
+/// Places of eight points: texels, height towards the light, and that above level ground, m.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Places {
     pub u: F8,
     pub v: F8,
     pub height: F8,
+    pub level: F8,
 }
 
 impl ShadowMap {
-    /// An empty map for a light.
+    /// An empty map for a light, of the ball in which shadows are fine.
     pub fn new(lighting: &Lighting) -> Self {
+        Self::around(lighting, lighting.shadow_radius_m as f32)
+    }
+
+    /// An empty map of all around the middle of that ball up to `radius`, m.
+    pub fn around(lighting: &Lighting, radius: f32) -> Self {
         let up: V3 = lighting.key.direction_w.normalize().cast();
         let side = if up.z.abs() < 0.99 { V3::z() } else { V3::x() };
         let u = side.cross(&up).normalize();
+        let axes = [u, up.cross(&u), up];
+        let texels_per_metre = INNER as f32 / (2.0 * radius);
+        let steep = up.z.signum() * up.z.abs().max(LEVELLEST) * texels_per_metre;
         Self {
-            axes: [u, up.cross(&u), up],
+            axes,
+            lean: [-axes[0].z / steep, -axes[1].z / steep],
+            bias: BIAS[0].max(BIAS[1] / texels_per_metre),
             centre: lighting.shadow_centre_w.cast(),
-            texels_per_metre: INNER as f32 / (2.0 * lighting.shadow_radius_m as f32),
+            texels_per_metre,
             tangent: lighting.key.softness_rad.tan() as f32,
             heights: Samples::new(EDGE, EDGE, EMPTY, false),
             ranges: vec![[EMPTY; 2]; TILES * TILES],
@@ -94,11 +111,11 @@ impl ShadowMap {
     pub fn places(&self, p_w: V8) -> Places {
         let d = p_w - V8::splat(&self.centre);
         let [scale, middle] = [self.texels_per_metre, 0.5 * EDGE as f32].map(F8::splat);
-        Places {
-            u: d.dot(V8::splat(&self.axes[0])) * scale + middle,
-            v: d.dot(V8::splat(&self.axes[1])) * scale + middle,
-            height: d.dot(V8::splat(&self.axes[2])),
-        }
+        let u = d.dot(V8::splat(&self.axes[0])) * scale + middle;
+        let v = d.dot(V8::splat(&self.axes[1])) * scale + middle;
+        let height = d.dot(V8::splat(&self.axes[2]));
+        let level = height - (u * F8::splat(self.lean[0]) + v * F8::splat(self.lean[1]));
+        Places { u, v, height, level }
     }
 
     /// Adds casters.
@@ -108,7 +125,10 @@ impl ShadowMap {
         places.extend(positions.iter().map(|p| self.place(p)));
         for t in triangles {
             // Faces towards the light only: u × v points to it, so that they run the positive way.
-            self.heights.draw::<false>(&t.map(|v| places[v as usize]), [0.0; 2], 0);
+            let at @ [a, b, c] = t.map(|v| places[v as usize]);
+            if (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]) > 0.0 {
+                self.heights.draw::<false>(&at, [0.0; 2], 0);
+            }
         }
         self.places = places;
     }
@@ -128,7 +148,10 @@ impl ShadowMap {
                 for y in row * TILE..(row + 1) * TILE {
                     let at = y * stride + column * TILE;
                     let Some(texels) = self.heights.w[at..].first_chunk::<TILE>() else { continue };
-                    (low, high) = (low.fast_min(F8::new(*texels)), high.fast_max(F8::new(*texels)));
+                    let u = STEPS + F8::splat((column * TILE) as f32 + 0.5);
+                    let ground = u * F8::splat(self.lean[0]) + F8::splat(self.lean[1] * (y as f32 + 0.5));
+                    let level = F8::new(*texels) - ground;
+                    (low, high) = (low.fast_min(level), high.fast_max(level));
                 }
                 let least = low.to_array().into_iter().fold(f32::MAX, f32::min);
                 let most = high.to_array().into_iter().fold(EMPTY, f32::max);
@@ -150,20 +173,26 @@ impl ShadowMap {
         }
     }
 
-    /// Whether a shadow can fall on anything at least as high as `least` between two corners, texels.
+    /// Whether a shadow can fall on anything at least as high as `least` above level ground between two corners, texels.
     pub fn may_shade(&self, from: [f32; 2], to: [f32; 2], least: f32) -> bool {
         let tile = |x: f32| (x.max(0.0) as usize / TILE).min(TILES - 1);
         let columns = tile(from[0])..tile(to[0]) + 1;
-        (tile(from[1])..tile(to[1]) + 1)
-            .any(|y| self.ranges[y * TILES..][columns.clone()].iter().any(|range| range[1] > least + BIAS))
+        (tile(from[1])..tile(to[1]) + 1).any(|y| {
+            self.ranges[y * TILES..][columns.clone()].iter().any(|range| range[1] > least + self.bias)
+        })
+    }
+
+    /// Which points the map knows something about.
+    #[inline(always)]
+    pub fn inside(&self, at: &Places) -> F8 {
+        let (low, high) = (F8::splat(MARGIN as f32), F8::splat((MARGIN + INNER) as f32));
+        at.u.simd_ge(low) & at.v.simd_ge(low) & at.u.simd_lt(high) & at.v.simd_lt(high)
     }
 
     /// Shares of the light that reach eight points of normals `n`, of those in `wanted`; 1 for others.
     #[inline(always)]
     pub fn light(&self, at: &Places, n: &V8, wanted: F8) -> F8 {
-        let (low, high) = (F8::splat(MARGIN as f32), F8::splat((MARGIN + INNER) as f32));
-        let inside = at.u.simd_ge(low) & at.v.simd_ge(low) & at.u.simd_lt(high) & at.v.simd_lt(high) & wanted;
-        let inside = inside.to_bitmask();
+        let inside = (self.inside(at) & wanted).to_bitmask();
         let [first, last] = self.heights.touched;
         if inside == 0 || first >= last {
             return F8::ONE;
@@ -174,18 +203,18 @@ impl ShadowMap {
         let tiles = (tile(at.v) * i32x8::splat(TILES as i32) + tile(at.u)).to_array();
         let ranges = tiles.map(|i| self.ranges[i as usize % (TILES * TILES)]);
         let most = F8::new(ranges.map(|[_, most]| most));
-        let near = most.simd_gt(at.height + F8::splat(BIAS)).to_bitmask() & inside;
+        let near = most.simd_gt(at.level + F8::splat(self.bias)).to_bitmask() & inside;
         if near == 0 { F8::ONE } else { self.filtered(at, n, near, &ranges) }
     }
 
     /// The shares of the points `near` something higher, by the ranges of heights around them.
     #[inline(never)]
     fn filtered(&self, at: &Places, n: &V8, near: u32, ranges: &[[f32; 2]; LANES]) -> F8 {
-        let [u, v, height] = [at.u, at.v, at.height].map(F8::to_array);
+        let [u, v, height, level] = [at.u, at.v, at.height, at.level].map(F8::to_array);
         let normals = n.to_arrays();
         let one = |i: usize| {
             let normal = V3::from(normals.map(|axis| axis[i]));
-            Filter::new(self, [u[i], v[i], height[i]], &normal).share(ranges[i][0])
+            Filter::new(self, [u[i], v[i], height[i]], &normal).share(ranges[i][0] - level[i])
         };
         let spread = |of: &[f32; LANES]| {
             let [low, high] = of.iter().fold([f32::MAX, f32::MIN], |[l, h], &x| [l.min(x), h.max(x)]);
@@ -225,10 +254,10 @@ impl<'a> Filter<'a> {
         Self { map, place, slope }
     }
 
-    /// Share of the light, 0..=1; `least` is the least height around.
+    /// Share of the light, 0..=1; all around is higher than the point by `least` above level ground.
     fn share(&self, least: f32) -> f32 {
-        let rise = (self.slope[0].abs() + self.slope[1].abs()) * WIDEST;
-        if least > self.place[2] + BIAS + rise {
+        let steepest = |axis: usize| self.slope[axis].abs() + self.map.lean[axis].abs();
+        if least > self.map.bias + (steepest(0) + steepest(1)) * WIDEST {
             return 0.0;
         }
         let [open, hidden, above] = self.sums::<2, 3>(WIDEST);
@@ -259,7 +288,7 @@ impl<'a> Filter<'a> {
         // A paraboloid's worth of weight: softer than a box, and still separable.
         let weights = across.map(|d| (F8::ONE - d * d * F8::splat(inverse2)).fast_max(F8::ZERO));
         let rise = across.map(|d| d * F8::splat(self.slope[0]));
-        let [base, limit] = [height, height + BIAS].map(F8::splat);
+        let [base, limit] = [height, height + self.map.bias].map(F8::splat);
         let (mut all, mut hidden, mut above) = (F8::ZERO, F8::ZERO, F8::ZERO);
         let stride = self.map.heights.stride();
         for row in (from.div_ceil(STEP) * STEP..to).step_by(STEP) {

@@ -2,6 +2,7 @@
 
 use super::{
     CameraError, Model,
+    decimate::decimated,
     model::{Level, bake, check},
 };
 use crate::{
@@ -14,7 +15,7 @@ use crate::{
 pub enum Form {
     /// As the skin of its shape.
     Skin {
-        /// Edge of the cells of the finest, m.
+        /// Edge of the cells, m.
         cell_m: f64,
     },
     /// As these, in the object frame; the shape only says where it is.
@@ -53,17 +54,16 @@ impl Solid {
         self
     }
 
-    /// Its triangles with cells `times` as large as the finest.
-    fn triangles(&self, times: f64) -> Mesh {
+    fn triangles(&self) -> Mesh {
         match &self.form {
             Form::Mesh(mesh) => mesh.clone(),
-            Form::Skin { cell_m } => skin::skin(&self.shape, cell_m * times).mesh,
+            Form::Skin { cell_m } => skin::skin(&self.shape, *cell_m).mesh,
         }
     }
 }
 
-/// Cells of the levels, in the finest's.
-const COARSER: [f64; 2] = [1.0, 1.6];
+/// How far the levels may be from what is meshed, m: for large pictures, for small ones, and for shadows and far views.
+const FLAWS: [f32; 3] = [1e-4, 4e-4, 1.5e-3];
 /// Smooth one-coloured surfaces look right with edges of so many times what patterns need: this share of a cell counts
 /// as the level's spacing.
 const PLAIN: f64 = 0.16;
@@ -77,30 +77,25 @@ impl Model {
     /// If a solid has no surface or its look is not there.
     pub fn of_solids(name: &str, solids: &[Solid], visuals: &[Visual]) -> Result<Self, CameraError> {
         let whole = Shape::Union(solids.iter().map(|solid| solid.shape.clone()).collect());
-        let mut levels = Vec::new();
-        for times in COARSER {
-            levels.push(level(name, solids, visuals, times, &whole)?);
-        }
-        Ok(Self { levels, facets: Vec::new() })
+        let mut finer = level(name, solids, visuals, &whole)?;
+        let levels = FLAWS.map(|flaw| {
+            finer = Level { flaw, ..decimated(&finer, flaw) };
+            finer.clone()
+        });
+        Ok(Self { levels: levels.into(), facets: Vec::new() })
     }
 }
 
-fn level(
-    name: &str,
-    solids: &[Solid],
-    visuals: &[Visual],
-    times: f64,
-    whole: &Shape,
-) -> Result<Level, CameraError> {
+fn level(name: &str, solids: &[Solid], visuals: &[Visual], whole: &Shape) -> Result<Level, CameraError> {
     let mut all = Mesh { vertices: Vec::new(), triangles: Vec::new(), uvs: Vec::new() };
     let mut materials = Vec::new();
     // Of solids with meshes of their own alone: fine enough for any view.
     let mut largest = 2e-3_f64;
     for (i, solid) in solids.iter().enumerate() {
         if let Form::Skin { cell_m } = solid.form {
-            largest = largest.max(cell_m * times);
+            largest = largest.max(cell_m);
         }
-        let mesh = solid.triangles(times);
+        let mesh = solid.triangles();
         check(name, &mesh, &vec![solid.visual as u16; mesh.triangles.len()], visuals)?;
         let first = all.vertices.len() as u32;
         let hidden: Vec<bool> = mesh
@@ -116,5 +111,6 @@ fn level(
         materials.resize(all.triangles.len(), solid.visual as u16);
         all.vertices.extend(mesh.vertices);
     }
-    Ok(bake(&all, &materials, visuals, (PLAIN * largest) as f32, Some(whole)))
+    // Each solid is of one look, and shares no vertex with another.
+    Ok(Level { plain: true, ..bake(&all, &materials, visuals, (PLAIN * largest) as f32, Some(whole)) })
 }

@@ -43,7 +43,7 @@ pub struct Thing {
     pub model: Arc<Model>,
     /// What moves it.
     pub mount: Mount,
-    /// Whether it casts shadows. Grounds on which all stands need not, and are cheaper so.
+    /// Whether it casts shadows.
     pub casts_shadow: bool,
 }
 
@@ -55,6 +55,8 @@ pub struct Stage {
     /// World forms of the levels of fixed things (empty for others).
     pub(super) fixed: Vec<Vec<Posed>>,
     pub(super) fixed_shadow: ShadowMap,
+    /// Coarser, for what lies beyond.
+    pub(super) wide_shadow: Option<ShadowMap>,
     pub(super) light: Light,
     pub(super) tone: Tone,
     /// Tells caches of one stage from those of another.
@@ -112,16 +114,12 @@ impl Stage {
             };
             fixed.push(levels);
         }
-        let mut fixed_shadow = ShadowMap::new(&lighting);
-        for (thing, posed) in things.iter().zip(&fixed).filter(|(thing, _)| thing.casts_shadow) {
-            if let (Some(level), Some(posed)) = (thing.model.levels.first(), posed.first()) {
-                fixed_shadow.draw(&posed.positions, &level.triangles);
-            }
-        }
-        fixed_shadow.finish();
+        let shadow = |map| fixed_shadow(&things, &fixed, map);
+        let fine = shadow(ShadowMap::new(&lighting));
+        let wide = wide_radius(&fixed, &lighting).map(|radius| shadow(ShadowMap::around(&lighting, radius)));
         let (light, tone) = (Light::new(&lighting), Tone::new(lighting.exposure));
         let key = NEXT_KEY.fetch_add(1, Ordering::Relaxed);
-        Ok(Self { things, lighting, fixed, fixed_shadow, light, tone, key })
+        Ok(Self { things, lighting, fixed, fixed_shadow: fine, wide_shadow: wide, light, tone, key })
     }
 
     /// The things, in the order of their drawing.
@@ -130,22 +128,49 @@ impl Stage {
     }
 }
 
-fn check_light(light: &Lighting) -> Result<(), CameraError> {
+/// The shadows of fixed things.
+fn fixed_shadow(things: &[Thing], fixed: &[Vec<Posed>], mut map: ShadowMap) -> ShadowMap {
+    for (thing, posed) in things.iter().zip(fixed).filter(|(thing, _)| thing.casts_shadow) {
+        if let (Some(level), Some(posed)) = (thing.model.levels.first(), posed.first()) {
+            map.draw(&posed.positions, &level.triangles);
+        }
+    }
+    map.finish();
+    map
+}
+
+/// The wide shadow map reaches no farther than this, in radii of the fine one: it would get too coarse.
+const WIDEST: f32 = 8.0;
+
+/// How far fixed things lie about the middle of the shadows, m, if that is farther than the fine map goes.
+fn wide_radius(fixed: &[Vec<Posed>], lighting: &Lighting) -> Option<f32> {
+    let (middle, fine) = (lighting.shadow_centre_w.cast::<f32>(), lighting.shadow_radius_m as f32);
+    let all = fixed.iter().filter_map(|levels| levels.last()).flat_map(|posed| &posed.positions);
+    let farthest = all.map(|p| (p - middle).norm()).fold(0.0, f32::max);
+    (farthest > fine).then(|| farthest.min(WIDEST * fine))
+}
+
+/// Checks the numbers of the light.
+///
+/// # Errors
+/// The first that is out of its range.
+pub fn check_light(light: &Lighting) -> Result<(), CameraError> {
     let wrong = |field, expected, got: String| Err(CameraError::Light { field, expected, got });
     let direction = light.key.direction_w;
     if !(direction.norm() > 1e-9 && direction.norm().is_finite()) {
-        return wrong("key.direction_w", "a direction", format!("{:?}", direction.as_slice()));
+        return wrong("direction", "a direction", format!("{:?}", direction.as_slice()));
     }
     if !(0.0..=0.5).contains(&light.key.softness_rad) {
-        return wrong("key.softness_rad", "0 to 0.5 rad", light.key.softness_rad.to_string());
+        return wrong("softness", "0 to 0.5 rad", light.key.softness_rad.to_string());
     }
     let positive = |x: f64| x >= 0.0 && x.is_finite();
     for (field, values) in [
-        ("key.colour", light.key.colour),
-        ("sky.zenith", light.sky.zenith),
-        ("sky.horizon", light.sky.horizon),
-        ("sky.ground", light.sky.ground),
-        ("strength", [light.key.strength, light.sky.strength, 0.0]),
+        ("colour", light.key.colour),
+        ("sky_zenith", light.sky.zenith),
+        ("sky_horizon", light.sky.horizon),
+        ("sky_ground", light.sky.ground),
+        ("strength", [light.key.strength; 3]),
+        ("sky_strength", [light.sky.strength; 3]),
     ] {
         if !values.into_iter().all(positive) {
             return wrong(field, "numbers from 0", format!("{values:?}"));

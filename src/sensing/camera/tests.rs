@@ -193,6 +193,41 @@ fn a_shadow_falls_where_the_light_throws_it() {
     assert!(error < 5e-3, "the shadow lies {error} m beside its place");
 }
 
+/// Bytes of the red channel at a point of the world.
+fn red(picture: &Picture, camera: &Camera, p: Vec3) -> i32 {
+    let view = camera.pose.inverse_transform_point(&p.into()).coords;
+    let pixel = |along: f64| (112.0 + focal(camera) * along / -view.z) as usize;
+    i32::from(picture.rgb[3 * (224 * pixel(-view.y) + pixel(view.x))])
+}
+
+#[test]
+fn a_roof_and_a_wall_darken_what_lies_behind_them_also_far_from_where_shadows_are_fine() {
+    // Light along −x and down by as much; a wall of 1 m at x = 3 and a roof of 2 m a side over the origin.
+    let mut lighting = Lighting { shadow_centre_w: Vec3::zeros(), ..Lighting::default() };
+    (lighting.key.direction_w, lighting.key.softness_rad) = (Vec3::new(1.0, 0.0, 1.0), 0.01);
+    let slab = |half: Vec3, at: Vec3| {
+        let model = Model::of_shape("slab", &Shape::Box { half }, &[Visual::default()]).expect("a box");
+        thing(1, model, Mount::Fixed(Pose::from_parts(at.into(), Quat::identity())))
+    };
+    let floor = slab(Vec3::new(6.0, 3.0, 0.05), Vec3::new(0.0, 0.0, -0.05));
+    let wall = slab(Vec3::new(0.02, 1.5, 0.5), Vec3::new(3.02, 0.0, 0.5));
+    let roof = slab(Vec3::new(1.0, 1.0, 0.02), Vec3::new(0.0, 0.0, 2.0));
+    let stage = Stage::new(vec![floor, wall, roof], lighting).expect("a stage");
+    // From the side, under the roof: its shadow lies 2 m towards −x.
+    let camera = camera(Vec3::new(0.0, -6.0, 1.5), Vec3::new(0.0, 0.0, 0.5), Vec3::z());
+    let camera = Camera { fovy_rad: 1.2, ..camera };
+    let picture = draw(&stage, &camera);
+    let at = |x: f64| red(&picture, &camera, Vec3::new(x, 0.0, 0.0));
+    let (open, behind_wall, under_roof) = (at(0.0), [at(2.9), at(2.3)], [at(-1.2), at(-2.0), at(-2.8)]);
+    assert!(
+        behind_wall.iter().chain(&under_roof).all(|dark| open - dark > 40),
+        "{open} {behind_wall:?} {under_roof:?}"
+    );
+    for x in [1.5, -0.8, -3.3] {
+        assert!((at(x) - open).abs() < 12, "the floor at x = {x} shows {}, not {open}", at(x));
+    }
+}
+
 #[test]
 fn the_right_of_the_third_person_image_is_the_worlds_positive_y() {
     for camera in [Camera::third_person_table(), Camera::third_person_floor()] {
@@ -211,17 +246,53 @@ fn bad_cameras_are_refused_with_the_name_of_the_field() {
     for (camera, words) in [
         (Camera { width: 0, ..good.clone() }, "width: expected 1 to 4096 pixels, got 0"),
         (Camera { height: 100_000, ..good.clone() }, "height: expected 1 to 4096 pixels, got 100000"),
-        (Camera { fovy_rad: 3.2, ..good.clone() }, "fovy_rad: expected 0.01 to 2.8 rad, got 3.2"),
-        (Camera { fovy_rad: f64::NAN, ..good.clone() }, "fovy_rad: expected 0.01 to 2.8 rad, got NaN"),
-        (Camera { near_m: 0.0, ..good.clone() }, "near_m: expected at least 0.0001 m, got 0"),
-        (Camera { far_m: 0.01, ..good.clone() }, "far_m: expected a length above near_m, got 0.01"),
-        (Camera { pose: nowhere, ..good.clone() }, "pose: expected finite numbers"),
+        (
+            Camera { fovy_rad: 3.2, ..good.clone() },
+            "fovy: expected 0.01 to 2.8 rad (0.6° to 160°), got 3.2 rad",
+        ),
+        (
+            Camera { fovy_rad: f64::NAN, ..good.clone() },
+            "fovy: expected 0.01 to 2.8 rad (0.6° to 160°), got NaN rad",
+        ),
+        (Camera { near_m: 0.0, ..good.clone() }, "near: expected at least 0.0001 m, got 0 m"),
+        (Camera { far_m: 0.01, ..good.clone() }, "far: expected more than near (0.05 m), got 0.01 m"),
+        (Camera { pose: nowhere, ..good.clone() }, "position: expected metres within ±1e6"),
         (Camera { mount: CameraMount::Hand, ..good.clone() }, "mount: expected a hand in the state"),
-        (above(0.05), "pose: it stands inside of thing 1; move it out"),
     ] {
         let error = render(&stage, &FrameView::still(), &camera, &mut Scratch::default()).expect_err(words);
         assert!(error.to_string().contains(words), "{error}");
     }
+}
+
+#[test]
+fn a_camera_inside_of_a_thing_says_so_and_sees_what_is_beyond_it() {
+    let marked = |ball: Thing| vec![ground(checker(0.1)), ball];
+    let (here, away) =
+        (Mount::Fixed(Pose::translation(0.0, 0.0, 1.0)), Mount::Fixed(Pose::translation(9.0, 0.0, 1.0)));
+    let within = draw(&stage(marked(ball(2, 0.1, here))), &above(1.0));
+    assert_eq!(within.inside.as_deref(), Some("thing 2"));
+    let without = draw(&stage(marked(ball(2, 0.1, away))), &above(1.0));
+    assert_eq!(without.inside, None);
+    assert_eq!((&within.depth, &within.segmentation), (&without.depth, &without.segmentation));
+    assert!(within.rgb.iter().any(|c| *c > 60), "no black picture");
+}
+
+#[test]
+fn cameras_are_checked_without_a_picture_one_by_one_and_together() {
+    let named = |name: &str, edge: usize| Camera { name: name.to_owned(), ..above(1.0).with_edge(edge) };
+    assert!(check_cameras(&[named("a", 4096)]).is_ok());
+    let (index, error) = check_cameras(&[named("a", 4096), named("b", 1)]).expect_err("too many pixels");
+    assert_eq!(index, 1);
+    assert!(
+        error.to_string().starts_with("camera b: width and height: expected at most 16777216 pixels"),
+        "{error}"
+    );
+    let many: Vec<Camera> = (0..65).map(|i| named(&i.to_string(), 1)).collect();
+    let (_, error) = check_cameras(&many).expect_err("too many");
+    assert!(error.to_string().contains("at most 64 cameras"), "{error}");
+    let turned = Camera { near_m: 2.0, far_m: 1.0, ..above(1.0) };
+    let (_, error) = check_cameras(&[turned]).expect_err("nothing between");
+    assert_eq!(error.to_string(), "camera third_person: far: expected more than near (2 m), got 1 m");
 }
 
 #[test]
@@ -238,5 +309,5 @@ fn bad_meshes_states_and_lights_are_refused() {
     let mut light = Lighting::default();
     light.key.direction_w = Vec3::zeros();
     let dark = Stage::new(Vec::new(), light).expect_err("no direction");
-    assert!(dark.to_string().starts_with("lighting: key.direction_w: expected a direction"), "{dark}");
+    assert!(dark.to_string().starts_with("light: direction: expected a direction"), "{dark}");
 }

@@ -8,11 +8,21 @@ use crate::geometry::{Vec3, mesh::Mesh, shape::Profile};
 const ROUNDED: f64 = 1e-3;
 /// Points that round a corner.
 const POINTS: usize = 3;
+/// Steps along and around a revolved profile, in cells: what is painted on it follows the rings.
+const TURNED: [f64; 2] = [0.75, 2.2];
+
 /// Nearer to the axis than this is on it, m.
 const ON_AXIS: f64 = 1e-9;
 
+/// The rings of a revolved profile, about `cell` (m) wide.
+pub(super) fn lathed(profile: &Profile, cell: f64) -> Mesh {
+    let widest = profile.points().iter().map(|p| p[0]).fold(0.0, f64::max);
+    let turns = (TAU * widest / (TURNED[1] * cell)).ceil() as usize;
+    turned(profile, TURNED[0] * cell, turns.clamp(24, 400))
+}
+
 /// The profile revolved about z in `turns` pieces, its edges cut to at most `step`, m.
-pub(super) fn turned(profile: &Profile, step: f64, turns: usize) -> Mesh {
+fn turned(profile: &Profile, step: f64, turns: usize) -> Mesh {
     let ring = cut(&rounded(profile.points()), step);
     let mut vertices = Vec::new();
     // First vertex of each ring of vertices; one on the axis is a single vertex.
@@ -48,11 +58,17 @@ pub(super) fn turned(profile: &Profile, step: f64, turns: usize) -> Mesh {
     Mesh { vertices, triangles, uvs: Vec::new() }
 }
 
+/// By a root alone, which every machine rounds alike.
+fn distance(p: [f64; 2], q: [f64; 2]) -> f64 {
+    let [x, y] = [q[0] - p[0], q[1] - p[1]];
+    (x * x + y * y).sqrt()
+}
+
 /// The polygon with its corners rounded (quadratic Bézier arcs), but for those on the axis.
 fn rounded(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let n = points.len();
     let towards = |p: [f64; 2], q: [f64; 2]| {
-        let length = (q[0] - p[0]).hypot(q[1] - p[1]);
+        let length = distance(p, q);
         let share = ROUNDED.min(0.4 * length) / length;
         [p[0] + (q[0] - p[0]) * share, p[1] + (q[1] - p[1]) * share]
     };
@@ -79,7 +95,7 @@ fn cut(points: &[[f64; 2]], step: f64) -> Vec<[f64; 2]> {
     for (i, &a) in points.iter().enumerate() {
         let b = points[(i + 1) % points.len()];
         let on_axis = a[0] < ON_AXIS && b[0] < ON_AXIS;
-        let length = (b[0] - a[0]).hypot(b[1] - a[1]);
+        let length = distance(a, b);
         let pieces = if on_axis { 1 } else { (length / step).ceil().max(1.0) as usize };
         out.extend((0..pieces).map(|k| {
             let t = k as f64 / pieces as f64;

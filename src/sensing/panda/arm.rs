@@ -9,9 +9,9 @@ use super::{
 use crate::{geometry::Pose, sensing::camera::Solid};
 
 /// Edge of the cells of the shells, m.
-const CELL: f64 = 12.5e-3;
+const CELL: f64 = 8.5e-3;
 /// The same for the more winding ones from the forearm on, m.
-const FINE: f64 = 10.8e-3;
+const FINE: f64 = 7.5e-3;
 /// Radius of the tubes, m.
 const TUBE: f64 = 0.057;
 /// Rounding of the shells' ends, which collars cover, m.

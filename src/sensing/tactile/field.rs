@@ -18,7 +18,7 @@ pub struct PadInput<'a> {
     pub load: PadLoad,
     /// Skins of the touching bodies.
     pub surfaces: &'a [Surface<'a>],
-    /// Friction coefficient between gel and bodies: the bound of shear over pressure.
+    /// Friction coefficient of the pair of gel and bodies: the bound of shear over pressure; see [`PadLoad::friction_of`].
     pub friction: f64,
     /// Give of the touching body's surface in series with the gel; `None` presses the skin as it is.
     pub give: Option<Give>,
@@ -179,9 +179,11 @@ fn check(input: &PadInput) -> Result<(), FieldError> {
             return Err(FieldError::Number { field, value, and: "" });
         }
     }
-    let mut positive = vec![("friction", input.friction)];
-    positive
-        .extend(input.give.iter().flat_map(|g| [("give.modulus", g.modulus), ("give.resolved", g.resolved)]));
+    if !(input.friction >= 0.0 && input.friction.is_finite()) {
+        return Err(FieldError::Number { field: "friction", value: input.friction, and: " of at least 0" });
+    }
+    let positive =
+        input.give.iter().flat_map(|g| [("give.modulus", g.modulus), ("give.resolved", g.resolved)]);
     for (field, value) in positive {
         if !(value > 0.0 && value.is_finite()) {
             return Err(FieldError::Number { field, value, and: " above 0" });

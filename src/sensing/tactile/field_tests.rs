@@ -145,6 +145,37 @@ fn the_tractions_sum_up_to_the_solvers_load_within_friction() {
 }
 
 #[test]
+fn what_the_pair_holds_is_held_and_what_it_does_not_hold_slips() {
+    let gel = gel(PadSurface::default());
+    let skin = graph(3e-3, 2e-4, |_, _| 0.0);
+    let surfaces = [Surface { vertices: &skin.0, triangles: &skin.1 }];
+    let field = |shear: f64, friction: f64| {
+        let load = PadLoad::new(2.0, [-shear, 0.0], 0.0, [0.0; 2]);
+        let input = PadInput { load, surfaces: &surfaces, friction, give: None };
+        sense(&gel, &input, &mut Scratch::default()).expect("a good touch").expect("a force")
+    };
+    let slips = |field: &GelField, mu: f64| {
+        let cells = (0..field.pressure.len()).filter(|&c| field.pressure[c] > 0.0);
+        let (all, at_bound) = cells.fold((0, 0), |(all, at_bound), c| {
+            let size = field.shear[0][c].hypot(field.shear[1][c]);
+            (all + 1, at_bound + i32::from(size > 0.99 * mu * field.pressure[c]))
+        });
+        f64::from(at_bound) / f64::from(all)
+    };
+    // 3.5 N of shear under 2 N: a rough body (μ 2) holds it, the pad's own 1.5 would not.
+    let (rough, pad) = (field(3.5, 2.0), field(3.5, 1.5));
+    assert!(rough.friction_excess == 1.0 && pad.friction_excess > 1.1, "{}", pad.friction_excess);
+    // 2.3 N: both hold, but on the smoother one more of the rim slips, and the body moves farther.
+    let (rough, pad) = (field(2.3, 2.0), field(2.3, 1.5));
+    assert_eq!([rough.friction_excess, pad.friction_excess], [1.0, 1.0]);
+    let (few, many) = (slips(&rough, 2.0), slips(&pad, 1.5));
+    assert!(many > few + 0.05 && pad.motion.x < rough.motion.x, "{few} {many}");
+    // Without friction there is no shear to hold.
+    let smooth = field(0.0, 0.0);
+    assert!(smooth.friction_excess == 1.0 && smooth.shear[0].iter().all(|&t| t.abs() < 1e-6));
+}
+
+#[test]
 fn ridges_stand_out_in_the_touched_surface() {
     let gel = gel(PadSurface::default());
     let ridges = graph(12e-3, 1e-4, |x, _| 2e-4 * (1.0 - (x * std::f64::consts::TAU / 3e-3).cos()));
@@ -182,8 +213,8 @@ fn bad_touches_are_named_and_no_force_is_no_touch() {
     let error = run(pressed, 1.5).expect_err("no skin");
     assert_eq!(error, FieldError::NothingThere { force: 1.0, surfaces: 0 });
     assert!(run(PadLoad::new(f64::NAN, [0.0; 2], 0.0, [0.0; 2]), 1.5).is_err());
-    let message = run(pressed, 0.0).expect_err("no friction").to_string();
-    assert_eq!(message, "the pad's friction is 0; expected a finite number above 0");
+    let message = run(pressed, -0.1).expect_err("no friction").to_string();
+    assert_eq!(message, "the pad's friction is -0.1; expected a finite number of at least 0");
 }
 
 #[test]

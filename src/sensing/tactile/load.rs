@@ -28,6 +28,16 @@ impl PadLoad {
         })
     }
 
+    /// Coefficient of friction that holds a patch: the mean over its points by their force; `None` without a force. It is
+    /// that of the pair of pad and body (the larger of both), static or, while they slide, dynamic.
+    pub fn friction_of(patch: &ContactPatch) -> Option<f64> {
+        let sum = patch.points.iter().fold([0.0; 2], |[bound, force], point| {
+            let normal = point.pressure * point.area;
+            [bound + point.mu * normal, force + normal]
+        });
+        (sum[1] > 0.0).then(|| sum[0] / sum[1])
+    }
+
     /// The sum of the tractions of a field, taken at the apex plane.
     pub fn of_field(gel: &Gel, field: &GelField) -> Self {
         let area = gel.cell * gel.cell;
@@ -124,6 +134,7 @@ mod tests {
             normal_p: Vec3::z(),
             pressure,
             shear_p: Vec3::new(shear, 0.0, 0.0),
+            mu: 1.5,
             slipping: false,
         };
         let points = vec![point(2e-3, 0.0, 2e4, 5e3), point(0.0, -3e-3, 4e4, 0.0)];
@@ -139,6 +150,17 @@ mod tests {
         // r × f: (2 mm, 0) × (−5 mN, 0, −20 mN) and (0, −3 mm) × (0, 0, −40 mN).
         assert!((load.moment - Vec3::new(1.2e-4, 4e-5, 0.0)).norm() < 1e-11, "{load:?}");
         assert!((load.normal() - 0.06).abs() < 1e-9);
+    }
+
+    #[test]
+    fn bodies_of_different_friction_hold_a_patch_by_their_forces() {
+        let (mut patch, _) = patch();
+        patch.points[0].mu = 0.3;
+        // 20 mN at 0.3 and 40 mN at 1.5.
+        let mean = PadLoad::friction_of(&patch).expect("a force");
+        assert!((mean - 1.1).abs() < 1e-12, "{mean}");
+        patch.points.clear();
+        assert_eq!(PadLoad::friction_of(&patch), None);
     }
 
     #[test]

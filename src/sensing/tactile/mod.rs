@@ -15,6 +15,7 @@ pub mod npz;
 pub mod optics;
 mod relief;
 mod sensor;
+mod shadow;
 mod shear;
 mod skin;
 mod spec;
@@ -25,7 +26,11 @@ mod view;
 #[cfg(test)]
 mod field_tests;
 #[cfg(test)]
+mod golden_tests;
+#[cfg(test)]
 mod picture_tests;
+#[cfg(test)]
+mod taxim_tests;
 
 pub use field::{FieldError, GelField, Give, PadInput, sense};
 pub use gel::{Gel, Scratch};
@@ -35,6 +40,7 @@ pub use mosaic::{CELLS as HISTORY, MosaicLayout, mosaic};
 pub use optics::{Optics, OpticsError};
 pub use relief::Surface;
 pub use sensor::{Sensor, SensorError, Touched};
+pub use shadow::Lamp;
 pub use skin::Skin;
 pub use spec::{FotsSpec, GelSpec, MarkerModel, OpticsModel, PICTURE, TactileSpec, TactileSpecError, View};
 pub use taxim::Taxim;

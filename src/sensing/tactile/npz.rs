@@ -6,6 +6,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use zip::result::ZipError;
+
 /// An array.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Array {
@@ -43,13 +45,36 @@ pub enum NpzError {
 /// # Errors
 /// Names the file and, where the file can be opened, the key.
 pub fn read_npz(path: &Path, key: &str) -> Result<Array, NpzError> {
-    let mut archive = open(path)?;
+    let mut archive = open(path, key)?;
     let keys: Vec<String> =
         archive.file_names().map(|name| name.trim_end_matches(".npy").to_owned()).collect();
-    let mut entry = archive
-        .by_name(&format!("{key}.npy"))
-        .map_err(|_| content(path, format!("no array \"{key}\"; the file has: {}", keys.join(", "))))?;
+    let mut entry = archive.by_name(&format!("{key}.npy")).map_err(|error| match error {
+        ZipError::FileNotFound => {
+            content(path, format!("no array \"{key}\"; the file has: {}", keys.join(", ")))
+        }
+        error => content(path, format!("array \"{key}\": {error}")),
+    })?;
     read_array(path, key, &mut entry)
+}
+
+/// Reads the array `key` of the archive `path`, of one of the types `kinds` and, for one of floating point, all of it
+/// finite.
+///
+/// # Errors
+/// As [`read_npz`], or names the type, or the first entry that is no number.
+pub fn read_npz_of(path: &Path, key: &str, kinds: &[&str]) -> Result<Array, NpzError> {
+    let array = read_npz(path, key)?;
+    if !kinds.contains(&array.kind.as_str()) {
+        let expected = kinds.join(" or ");
+        return Err(content(path, format!("array \"{key}\": expected type {expected}, got {}", array.kind)));
+    }
+    if let Some((at, value)) = array.values().iter().enumerate().find(|(_, value)| !value.is_finite()) {
+        return Err(content(
+            path,
+            format!("array \"{key}\": entry {at} is {value}; expected a finite number"),
+        ));
+    }
+    Ok(array)
 }
 
 /// Reads the array of a `.npy` file.
@@ -61,9 +86,10 @@ pub fn read_npy(path: &Path) -> Result<Array, NpzError> {
     read_array(path, "array", &mut BufReader::new(file))
 }
 
-fn open(path: &Path) -> Result<zip::ZipArchive<impl Read + Seek>, NpzError> {
+fn open(path: &Path, key: &str) -> Result<zip::ZipArchive<impl Read + Seek>, NpzError> {
     let file = File::open(path).map_err(|source| NpzError::Io { path: path.into(), source })?;
-    zip::ZipArchive::new(BufReader::new(file)).map_err(|e| content(path, format!("not an .npz file: {e}")))
+    zip::ZipArchive::new(BufReader::new(file))
+        .map_err(|e| content(path, format!("not an .npz file, so there is no array \"{key}\": {e}")))
 }
 
 fn content(path: &Path, what: String) -> NpzError {
@@ -73,7 +99,7 @@ fn content(path: &Path, what: String) -> NpzError {
 fn read_array(path: &Path, key: &str, from: &mut impl Read) -> Result<Array, NpzError> {
     let broken = |what: &str| content(path, format!("array \"{key}\": {what}"));
     let mut bytes = Vec::new();
-    from.read_to_end(&mut bytes).map_err(|source| NpzError::Io { path: path.into(), source })?;
+    from.read_to_end(&mut bytes).map_err(|e| broken(&format!("cannot be read to its end: {e}")))?;
     if bytes.len() < 12 || &bytes[..6] != b"\x93NUMPY" {
         return Err(broken("not an .npy array"));
     }

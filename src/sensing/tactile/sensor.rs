@@ -25,7 +25,7 @@ pub enum SensorError {
 /// How a picture comes from a field.
 #[derive(Debug)]
 enum Eye {
-    Polynomial(Optics),
+    Polynomial { optics: Optics, shadows: bool },
     Taxim(Box<Taxim>),
 }
 
@@ -57,7 +57,7 @@ impl Sensor {
     pub fn new(spec: &TactileSpec) -> Result<Self, SensorError> {
         let gel = Gel::new(spec, PadSurface::default())?;
         let eye = match &spec.optics {
-            OpticsModel::Polynomial => Eye::Polynomial(Optics::mini()?),
+            OpticsModel::Polynomial => Eye::Polynomial { optics: Optics::mini()?, shadows: spec.shadows },
             OpticsModel::Taxim { tables } => Eye::Taxim(Box::new(Taxim::load(tables)?)),
         };
         Ok(Self { gel, eye, markers: spec.markers })
@@ -72,7 +72,9 @@ impl Sensor {
         let [wide, high] = PICTURE;
         let mut picture = RgbImage::new(wide as u32, high as u32);
         match &self.eye {
-            Eye::Polynomial(optics) => optics.picture(&self.gel, field.as_ref(), &mut picture),
+            Eye::Polynomial { optics, shadows } => {
+                optics.picture(&self.gel, field.as_ref(), *shadows, &mut picture);
+            }
             Eye::Taxim(taxim) => taxim.picture(&self.gel, field.as_ref(), &mut picture),
         }
         let markers = markers(&self.gel, &self.markers, field.as_ref());

@@ -35,7 +35,11 @@ pub(super) type Drag = Vec3;
 /// Drags the cells under `pressure` (Pa) with `drag`, on friction `mu`.
 pub(super) fn drag(gel: &Gel, pressure: &[f32], drag: &Drag, mu: f64, scratch: &mut Scratch) -> Dragged {
     let cells: Vec<usize> = (0..pressure.len()).filter(|&c| pressure[c] > 0.0).collect();
+    let none = || vec![0.0; pressure.len()];
     let mut relaxed = 1.0;
+    if mu <= 0.0 {
+        return Dragged { traction: [none(), none()], motion: Vec3::zeros(), relaxed };
+    }
     loop {
         let problem = Problem::new(gel, pressure, &cells, drag, mu * relaxed);
         if let Some((traction, motion)) = problem.solve(scratch) {
@@ -43,8 +47,7 @@ pub(super) fn drag(gel: &Gel, pressure: &[f32], drag: &Drag, mu: f64, scratch: &
         }
         relaxed *= RELAX;
         if relaxed > 1e6 {
-            let none = vec![0.0; pressure.len()];
-            return Dragged { traction: [none.clone(), none], motion: Vec3::zeros(), relaxed };
+            return Dragged { traction: [none(), none()], motion: Vec3::zeros(), relaxed };
         }
     }
 }

@@ -17,6 +17,8 @@ pub struct TactileSpec {
     pub view: View,
     /// How the picture is made.
     pub optics: OpticsModel,
+    /// Whether what is pressed into the gel casts shadows in the picture; with the `polynomial` optics alone.
+    pub shadows: bool,
     /// How the markers move.
     pub markers: MarkerModel,
 }
@@ -65,7 +67,7 @@ pub enum OpticsModel {
     Polynomial,
     /// The pipeline of Taxim (Si & Yuan, RA-L 2022) with the tables of a folder.
     Taxim {
-        /// Folder with `polycalib.npz`, `gelmap.npy` and `dataPack.npz`.
+        /// Folder with `polycalib.npz` and `dataPack.npz`.
         tables: PathBuf,
     },
 }
@@ -110,7 +112,7 @@ pub struct TactileSpecError {
     /// Path of the field.
     pub field: &'static str,
     /// Its value.
-    pub value: f64,
+    pub value: String,
     /// What it may be.
     pub expected: &'static str,
 }
@@ -126,7 +128,7 @@ impl TactileSpec {
             if (low..=high).contains(&value) {
                 Ok(())
             } else {
-                Err(TactileSpecError { field, value, expected })
+                Err(TactileSpecError { field, value: value.to_string(), expected })
             }
         };
         between("gel.shear_modulus", gel.shear_modulus, 1e2, 1e9, "Pa in 1e2..1e9")?;
@@ -134,6 +136,10 @@ impl TactileSpec {
         between("gel.cell", gel.cell, 1e-4, 5e-4, "m in 0.0001..0.0005")?;
         between("view.pitch", view.pitch, 1e-5, 2e-4, "m in 1e-5..2e-4")?;
         between("view.lens", view.lens, 5e-3, 1.0, "m in 0.005..1")?;
+        if self.shadows && self.optics != OpticsModel::Polynomial {
+            let expected = "false with the model \"taxim\", whose pictures have no shadows";
+            return Err(TactileSpecError { field: "shadows", value: "true".into(), expected });
+        }
         if let MarkerModel::Fots(fots) = &self.markers {
             between("markers.dilate", fots.dilate, 0.0, 1.0, "1/px² in 0..1")?;
             between("markers.shear", fots.shear, 0.0, 1.0, "1/px² in 0..1")?;
@@ -156,6 +162,10 @@ mod tests {
         spec.view.pitch = f64::NAN;
         let message = spec.validate().expect_err("NaN").to_string();
         assert_eq!(message, "tactile.view.pitch: expected m in 1e-5..2e-4, got NaN");
+        let optics = OpticsModel::Taxim { tables: "x".into() };
+        let spec = TactileSpec { shadows: true, optics, ..TactileSpec::default() };
+        let message = spec.validate().expect_err("shadows of Taxim").to_string();
+        assert!(message.starts_with("tactile.shadows: expected false with the model \"taxim\""), "{message}");
     }
 
     #[test]

@@ -21,7 +21,7 @@ pub(super) struct Window {
 }
 
 /// Steeper than this a cell belongs to the window: a slope that changes no colour by half a grey level.
-pub(super) const FLAT: f32 = 3e-3;
+pub(super) const FLAT: f32 = 1e-3;
 
 /// How pixel centres along one axis read a grid: first of the taps and their weights.
 struct Reading {

@@ -10,7 +10,7 @@ use std::{f64::consts::PI, path::Path};
 use super::{
     field::GelField,
     gel::Gel,
-    npz::{NpzError, read_npz},
+    npz::{NpzError, read_npz_of},
     spec::PICTURE,
 };
 
@@ -22,6 +22,8 @@ const FIXED: f32 = 0.4;
 /// σ and share of the smoothed untouched picture in the background.
 const SMOOTH: f32 = 25.0;
 const MIXED: f32 = 0.15;
+/// More bins than that are no table of this kind.
+const MOST_BINS: f64 = 4096.0;
 
 /// Taxim's tables of a sensor.
 #[derive(Clone, Debug)]
@@ -36,24 +38,32 @@ impl Taxim {
     /// Reads `polycalib.npz` (`bins`, `grad_r`, `grad_g`, `grad_b`) and `dataPack.npz` (`f0`) in `folder`.
     ///
     /// # Errors
-    /// Names the file and the key that is missing or of a wrong shape.
+    /// Names the file and the key that is missing, of a wrong shape or type, or has an entry that is no number.
     pub fn load(folder: &Path) -> Result<Self, NpzError> {
         let path = folder.join("polycalib.npz");
-        let bins = read_npz(&path, "bins")?.values().first().map_or(0, |&b| b as usize);
         let wrong = |path: &Path, key: &str, expected: String, found: &[usize]| NpzError::Content {
             path: path.into(),
             what: format!("array \"{key}\": expected the shape {expected}, got {found:?}"),
         };
+        let one = read_npz_of(&path, "bins", &["i4", "i8"])?;
+        let bins = match one.values()[..] {
+            [bins] if (2.0..=MOST_BINS).contains(&bins) => bins as usize,
+            [bins] => {
+                let what = format!("array \"bins\": expected 2..{MOST_BINS}, got {bins}");
+                return Err(NpzError::Content { path, what });
+            }
+            _ => return Err(wrong(&path, "bins", "[] of one number".into(), &one.shape)),
+        };
         let channel = |key: &str| {
-            let array = read_npz(&path, key)?;
-            if bins < 2 || array.shape != [bins, bins, 6] {
+            let array = read_npz_of(&path, key, &["f4", "f8"])?;
+            if array.shape != [bins, bins, 6] {
                 return Err(wrong(&path, key, format!("[{bins}, {bins}, 6] of \"bins\""), &array.shape));
             }
             Ok(array.values().into_iter().map(|v| v as f32).collect::<Vec<f32>>())
         };
         let table = [channel("grad_b")?, channel("grad_g")?, channel("grad_r")?];
         let path = folder.join("dataPack.npz");
-        let f0 = read_npz(&path, "f0")?;
+        let f0 = read_npz_of(&path, "f0", &["u1"])?;
         let [wide, high] = PICTURE;
         if f0.shape != [2 * high, 2 * wide, 3] {
             return Err(wrong(&path, "f0", format!("[{}, {}, 3]", 2 * high, 2 * wide), &f0.shape));

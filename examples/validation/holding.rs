@@ -1,0 +1,75 @@
+//! Held bodies: friction, creep and the time step.
+
+use softvt::geometry::Vec3;
+
+use crate::{
+    friction,
+    page::{Report, header, heading, percent, row, short, yes},
+    time_step,
+};
+
+pub fn friction(report: &mut Report) {
+    heading(
+        "Friction",
+        "A cube held at gap 48 mm with the weight at a share of the friction capacity: creep over 5 s.",
+    );
+    header(&["weight / capacity", "creep mm"]);
+    for share in [0.16, 0.4, 0.6, 0.8, 0.9] {
+        let creep = friction::creep(share);
+        row(&[format!("{:.4}", creep.share), short(creep.creep_mm)]);
+        report.claim(&format!("creep at {share} of capacity, mm"), [creep.creep_mm], 0.01);
+    }
+    println!(
+        "\nBetween pads so large that the contact stays the same, capacity in closed form: acceleration between 0.2 and 0.3 s.\n"
+    );
+    header(&["weight / capacity", "m/s²", "g (1 − capacity/load)", ""]);
+    for load in [1.05, 1.5] {
+        let fall = friction::fall(load);
+        let error = fall.acceleration / fall.expected - 1.0;
+        row(&[
+            load.to_string(),
+            format!("{:.4}", fall.acceleration),
+            format!("{:.4}", fall.expected),
+            percent(error),
+        ]);
+        report.claim(&format!("fall at {load} of capacity"), [error], 0.05);
+    }
+    println!(
+        "\nAt 60 % of capacity: the hand turns by 90° in 1 s and back, or shakes with 2 m/s² at 2 Hz.\n"
+    );
+    header(&["motion", "axis", "weight / capacity", "shift in the hand mm", "pad slid"]);
+    for (name, axis) in [("x", Vec3::x()), ("y", Vec3::y()), ("z", Vec3::z())] {
+        let mut print = |motion: &str, c: friction::Carried| {
+            row(&[motion.to_owned(), name.to_owned(), short(c.share), short(c.shift_mm), yes(c.slid)]);
+            report.claim(
+                &format!("{motion} {name}: shift, mm"),
+                [if c.slid { f64::INFINITY } else { c.shift_mm }],
+                0.1,
+            );
+        };
+        if name != "z" {
+            print("turn about", friction::turned(axis));
+        }
+        print("shake along", friction::shaken(axis));
+    }
+}
+
+pub fn time_step(report: &mut Report) {
+    heading("Time step", "Equilibria at 60, 120 and 240 Hz.");
+    header(&["squeeze", "F grip", "F hold", "D hold %"]);
+    for (name, options, bound) in time_step::cases() {
+        let runs = time_step::refined(&options);
+        let columns = [
+            runs.each_ref().map(|o| o.force_grip_n),
+            runs.each_ref().map(|o| o.force_hold_n),
+            runs.each_ref().map(|o| o.d_hold_pct),
+        ];
+        let cells = columns.map(|c| c.map(|v| format!("{v:.5}")).join(", "));
+        row(&[&[name.to_owned()], cells.as_slice()].concat());
+        report.claim(
+            &format!("{name}: 60 to 240 Hz"),
+            columns.iter().flat_map(|c| c.map(|v| v / c[2] - 1.0)),
+            bound,
+        );
+    }
+}

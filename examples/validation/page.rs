@@ -1,0 +1,62 @@
+//! The page: headings, tables, and what was claimed.
+
+/// What was to be reached, and what was.
+struct Claim {
+    what: String,
+    worst: f64,
+    bound: f64,
+}
+
+#[derive(Default)]
+pub struct Report {
+    claims: Vec<Claim>,
+}
+
+impl Report {
+    /// Notes the worst of `values` (by size) against a bound.
+    pub fn claim(&mut self, what: &str, values: impl IntoIterator<Item = f64>, bound: f64) {
+        let worst = values.into_iter().map(f64::abs).fold(0.0, f64::max);
+        self.claims.push(Claim { what: what.to_owned(), worst, bound });
+    }
+
+    pub fn print(&self) {
+        heading("Summary", "What each section reached against what it had to; \"missed\" is a defect.");
+        header(&["claim", "worst", "bound", ""]);
+        for c in &self.claims {
+            let verdict = if c.worst <= c.bound { "reached" } else { "**missed**" };
+            row(&[c.what.clone(), short(c.worst), short(c.bound), verdict.to_owned()]);
+        }
+    }
+}
+
+pub fn heading(title: &str, text: &str) {
+    println!("\n## {title}\n\n{text}\n");
+}
+
+pub fn header(names: &[&str]) {
+    println!("| {} |\n|{}", names.join(" | "), "---|".repeat(names.len()));
+}
+
+pub fn row(cells: &[String]) {
+    println!("| {} |", cells.join(" | "));
+}
+
+/// Three significant digits.
+pub fn short(value: f64) -> String {
+    let size = value.abs();
+    if value == 0.0 {
+        "0".to_owned()
+    } else if size < 1e-3 {
+        format!("{value:.1e}")
+    } else {
+        format!("{value:.*}", (2 - size.log10().floor() as i32).max(0) as usize)
+    }
+}
+
+pub fn percent(share: f64) -> String {
+    format!("{:+.2} %", 100.0 * share)
+}
+
+pub fn yes(value: bool) -> String {
+    if value { "yes" } else { "no" }.to_owned()
+}

@@ -1,0 +1,57 @@
+use super::*;
+use crate::{
+    benchmark::Plan,
+    cli::args::{self, Command},
+    policy::{Action, Observation},
+    report::run_folder::EPISODES,
+};
+
+/// Asks for the true forces, holds still, and complains if it does not get them.
+struct Feeler;
+
+impl Policy for Feeler {
+    fn name(&self) -> &str {
+        "feeler"
+    }
+
+    fn streams(&self) -> Streams {
+        Streams { force: true, ..Streams::default() }
+    }
+
+    fn act(&mut self, seen: &Observation) -> Result<Action, String> {
+        seen.forces.as_ref().ok_or("no forces")?;
+        Ok(Action { position_b: seen.ee_position_b, axis_angle_b: seen.ee_axis_angle_b, closure: 0.0 })
+    }
+}
+
+fn feeler(_: &Run, _: script::Episode) -> Result<Box<dyn Controller>, Failure> {
+    let policy: Box<dyn Policy> = Box::new(Feeler);
+    Ok(Box::new(policy))
+}
+
+#[test]
+fn every_file_of_a_run_says_whether_the_policy_saw_true_forces() {
+    let words = ["softvt", "suites/spatial_soft.lua", "--threads", "1"].map(str::to_owned);
+    let Ok(Command::Run(run)) = args::parse(&words) else { panic!("a run") };
+    let loaded = script::load(&run.file, &[]).expect("it loads");
+    let Plan::Suite(suite) = &loaded.plan else { panic!("a suite") };
+    let mut suite = suite.clone();
+    suite.tasks.truncate(1);
+    suite.tasks[0].budget_steps = 3;
+    let tasks: Vec<&Task> = suite.tasks.iter().collect();
+    let root = tempfile::tempdir().expect("a folder");
+    for (out, drive, felt) in [("blind", driver as Drive, false), ("felt", feeler as Drive, true)] {
+        let dir = root.path().join(out);
+        let mut batch = Batch::new(&run, &loaded, &suite, (vec![(tasks[0], 0)], dir.clone())).expect("made");
+        batch.drive = drive;
+        batch.prepare(&tasks).expect("nothing is wrong");
+        let folder = RunFolder::create(&dir).expect("a folder");
+        batch.write_info(&folder, &tasks, 1).expect("written");
+        batch.go(folder).expect("it runs");
+        for file in [RUN, EPISODES, SUMMARY] {
+            let text = std::fs::read_to_string(dir.join(file)).expect("written");
+            let value: serde_json::Value = serde_json::from_str(&text).expect("one document");
+            assert_eq!(value["force_observed"], felt, "{out}/{file}");
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! What of the sensors can be told to be wrong before anything runs, and how their pictures are called.
+
+use super::{
+    looks::Looks,
+    senses::{SenseError, Senses},
+};
+use crate::{
+    physics::world::Frame,
+    policy::Streams,
+    scene::{Camera, Scene},
+    sensing::{
+        camera::{check_cameras, check_light},
+        tactile::{OpticsModel, TactileSpec},
+    },
+};
+
+/// What is added to a camera's name for its picture, its depth and its segmentation.
+pub const CAMERA_PICTURES: [&str; 3] = ["", "_depth", "_segmentation"];
+/// What is added to a finger's name for its picture, and for the picture with its markers as dots and as arrows.
+pub const FINGER_PICTURES: [&str; 3] = ["", "_markers", "_arrows"];
+/// Names of the left and right finger's pictures.
+pub const FINGERS: [&str; 2] = ["tactile_left", "tactile_right"];
+
+/// Edge of the pictures that only try out whether there can be one, pixels.
+const TRIAL_EDGE: usize = 16;
+
+/// Checks the senses of a scene as far as no state is needed: the cameras' numbers, names and sizes, the light, and that a
+/// tactile sensor with tables of its own has them.
+///
+/// # Errors
+/// What is wrong, with the place in the script that set it.
+pub fn check_senses(scene: &Scene, spec: &TactileSpec, looks: &Looks) -> Result<(), SenseError> {
+    check_cameras(&scene.cameras)
+        .map_err(|(index, error)| SenseError::from(error).set_by(&scene.cameras[index]))?;
+    check_names(&scene.cameras)?;
+    check_light(&scene.lighting)?;
+    // The others have no file that could be missing.
+    if let OpticsModel::Taxim { .. } = spec.optics {
+        looks.sensor(spec)?;
+    }
+    Ok(())
+}
+
+/// No camera may be called as a picture of another or of a finger is: one file would replace the other.
+fn check_names(cameras: &[Camera]) -> Result<(), SenseError> {
+    let called = |owner: &str, kinds: [&str; 3]| kinds.map(|kind| format!("{owner}{kind}"));
+    let mut taken: Vec<(String, String)> = Vec::new();
+    for finger in FINGERS {
+        taken.extend(called(finger, FINGER_PICTURES).map(|name| (name, "a finger".to_owned())));
+    }
+    for camera in cameras {
+        for name in called(&camera.name, CAMERA_PICTURES) {
+            if let Some((_, owner)) = taken.iter().find(|(known, _)| *known == name) {
+                let (camera_name, owner) = (camera.name.clone(), owner.clone());
+                return Err(SenseError::Name { camera: camera_name, picture: name, owner }.set_by(camera));
+            }
+        }
+        let owner = format!("camera {}", camera.name);
+        taken.extend(called(&camera.name, CAMERA_PICTURES).map(|name| (name, owner.clone())));
+    }
+    Ok(())
+}
+
+impl Senses {
+    /// Looks once at `streams` in the state in which an episode starts: whatever would go wrong in its first control step
+    /// goes wrong here.
+    ///
+    /// # Errors
+    /// As [`Senses::see_from_outside`] and [`Senses::touch`].
+    pub fn try_out(&mut self, frame: &Frame, streams: &Streams) -> Result<(), SenseError> {
+        for name in &streams.cameras {
+            let camera = self.camera(name)?.clone().with_edge(TRIAL_EDGE);
+            self.see_from_outside(frame, &camera)?;
+        }
+        if streams.touch {
+            self.touch(frame)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn named(names: &[&str]) -> Vec<Camera> {
+        let camera = |name: &&str| Camera { name: (*name).to_owned(), ..Camera::wrist() };
+        names.iter().map(camera).collect()
+    }
+
+    #[test]
+    fn no_two_pictures_have_one_name() {
+        assert!(check_names(&named(&["third_person", "wrist", "wrist_2", "depth"])).is_ok());
+        for (names, words) in [
+            (
+                ["wrist", "wrist_depth"],
+                "camera wrist_depth: name: \"wrist_depth\" is a picture of camera wrist",
+            ),
+            (
+                ["wrist_depth", "wrist"],
+                "camera wrist: name: \"wrist_depth\" is a picture of camera wrist_depth",
+            ),
+            (["wrist", "tactile_left"], "\"tactile_left\" is a picture of a finger"),
+            (["wrist", "tactile_right_arrows"], "\"tactile_right_arrows\" is a picture of a finger"),
+            (["wrist", "wrist"], "camera wrist: name: \"wrist\" is a picture of camera wrist"),
+        ] {
+            let error = check_names(&named(&names)).expect_err(words);
+            assert!(error.to_string().contains(words), "{error}");
+        }
+    }
+}

@@ -1,0 +1,281 @@
+//! Lines of text to be printed on surfaces.
+
+use std::sync::OnceLock;
+
+use ab_glyph::{Font, FontRef, PxScale, ScaleFont, point};
+
+/// A typeface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Typeface {
+    /// Ubuntu Light, without serifs.
+    #[default]
+    Sans,
+    /// Hack, all letters of one width.
+    Mono,
+}
+
+/// A line of text and where it stands, in the object frame at rest.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Line {
+    /// What it says, at most [`MOST_LETTERS`] letters.
+    pub text: String,
+    /// Its typeface.
+    pub typeface: Typeface,
+    /// Height of a capital letter, m.
+    pub height_m: f64,
+    /// How much strokes are thickened, in heights of a capital letter, 0..=0.25.
+    pub weight: f64,
+    /// Where the middle of the line is, m.
+    pub at: [f64; 3],
+    /// From where it is read: the direction, of any length, in which the printed surface looks. A line that looks up or down
+    /// has its head towards +y, any other towards +z.
+    pub facing: [f64; 3],
+    /// Turn of the line on its surface, rad, counter-clockwise to who reads it.
+    pub turn: f64,
+    /// Radius of the cylinder about the z axis that the line is laid round, m; flat if there is none.
+    pub wrap_m: Option<f64>,
+}
+
+/// Most letters of a line.
+pub const MOST_LETTERS: usize = 64;
+/// Height of a capital letter in the field, texels.
+const CAPITAL: f32 = 44.0;
+/// Texels left free around the line.
+const MARGIN: usize = 2;
+
+/// A line with the field of its letters, which is made when it is first looked at.
+#[derive(Debug, Default)]
+pub struct Print {
+    /// The line.
+    pub line: Line,
+    letters: OnceLock<Letters>,
+}
+
+impl PartialEq for Print {
+    fn eq(&self, other: &Self) -> bool {
+        self.line == other.line
+    }
+}
+
+impl Print {
+    /// A print of a line.
+    pub fn new(line: Line) -> Self {
+        Self { line, letters: OnceLock::new() }
+    }
+
+    /// Memory that its letters take at most, bytes.
+    pub fn bytes(&self) -> usize {
+        // A letter is at most two capitals wide and high.
+        let texels = (2.0 * CAPITAL).powi(2) as usize;
+        size_of::<f64>() * texels * (self.line.text.chars().count() + 1)
+    }
+
+    /// Its letters.
+    pub fn letters(&self) -> &Letters {
+        self.letters.get_or_init(|| Letters::of(&self.line))
+    }
+}
+
+impl Line {
+    /// The first letter that the typeface does not have.
+    pub fn missing(&self) -> Option<char> {
+        let font = font(self.typeface)?;
+        self.text.chars().find(|&letter| letter.is_control() || font.glyph_id(letter).0 == 0)
+    }
+}
+
+fn font(typeface: Typeface) -> Option<FontRef<'static>> {
+    let bytes = match typeface {
+        Typeface::Sans => epaint_default_fonts::UBUNTU_LIGHT,
+        Typeface::Mono => epaint_default_fonts::HACK_REGULAR,
+    };
+    FontRef::try_from_slice(bytes).ok()
+}
+
+/// How much of each place letters cover, as sums over all texels above and to the left (Crow, Summed-Area Tables for Texture
+/// Mapping, 1984): the mean over any rectangle takes four looks.
+#[derive(Debug, Default)]
+pub struct Letters {
+    size: [usize; 2],
+    /// One row and one column more than texels.
+    sums: Vec<f64>,
+    /// Texels in a metre.
+    scale: f64,
+    /// Row at half the height of capital letters.
+    middle: f64,
+}
+
+impl Letters {
+    fn of(line: &Line) -> Self {
+        let Some(font) = font(line.typeface) else { return Self::default() };
+        let em = CAPITAL / capital(&font);
+        let thick = line.weight as f32 * CAPITAL;
+        let scaled = font.as_scaled(PxScale::from(em));
+        let mut across = MARGIN as f32 + thick;
+        let mut glyphs = Vec::new();
+        let mut previous = None;
+        let baseline = MARGIN as f32 + thick + scaled.ascent();
+        for letter in line.text.chars() {
+            let id = font.glyph_id(letter);
+            across += previous.map_or(0.0, |previous| scaled.kern(previous, id) + thick);
+            glyphs.push(id.with_scale_and_position(PxScale::from(em), point(across, baseline)));
+            across += scaled.h_advance(id);
+            previous = Some(id);
+        }
+        let width = (across + thick).ceil() as usize + MARGIN;
+        let height = (baseline + thick - scaled.descent()).ceil() as usize + MARGIN;
+        let mut cover = vec![0.0_f32; width * height];
+        for outline in glyphs.into_iter().filter_map(|glyph| font.outline_glyph(glyph)) {
+            let low = outline.px_bounds().min;
+            outline.draw(|x, y, share| {
+                let [x, y] = [low.x + x as f32, low.y + y as f32];
+                let inside = x >= 0.0 && y >= 0.0 && (x as usize) < width && (y as usize) < height;
+                if inside {
+                    let texel = &mut cover[y as usize * width + x as usize];
+                    *texel = texel.max(share);
+                }
+            });
+        }
+        let cover = thickened(&cover, [width, height], thick);
+        Self {
+            sums: sums(&cover, [width, height]),
+            size: [width, height],
+            scale: f64::from(CAPITAL) / line.height_m,
+            middle: f64::from(baseline - 0.5 * CAPITAL),
+        }
+    }
+
+    /// Share that letters cover of a square of edge `width` (m) about the place `right` and `up` (m) of the line's middle.
+    pub fn share(&self, right: f64, up: f64, width: f64) -> f64 {
+        if self.sums.is_empty() {
+            return 0.0;
+        }
+        let [columns, rows] = self.size.map(|n| n as f64);
+        let x = 0.5 * columns + right * self.scale;
+        let y = self.middle - up * self.scale;
+        let half = (0.5 * width * self.scale).max(0.5);
+        if x + half <= 0.0 || y + half <= 0.0 || x - half >= columns || y - half >= rows {
+            return 0.0;
+        }
+        let sum = self.sum(x + half, y + half) + self.sum(x - half, y - half)
+            - self.sum(x + half, y - half)
+            - self.sum(x - half, y + half);
+        (sum / (4.0 * half * half)).clamp(0.0, 1.0)
+    }
+
+    /// Length of the line with its margins, m.
+    pub fn length_m(&self) -> f64 {
+        self.size[0] as f64 / self.scale.max(1e-9)
+    }
+
+    /// The sum over all above and left of (x, y), bilinear between texels.
+    fn sum(&self, x: f64, y: f64) -> f64 {
+        let [columns, rows] = self.size;
+        let (x, y) = (x.clamp(0.0, columns as f64), y.clamp(0.0, rows as f64));
+        let (i, j) = ((x as usize).min(columns.saturating_sub(1)), (y as usize).min(rows.saturating_sub(1)));
+        let (u, v) = (x - i as f64, y - j as f64);
+        let at = |i: usize, j: usize| self.sums[j * (columns + 1) + i];
+        let top = at(i, j) * (1.0 - u) + at(i + 1, j) * u;
+        let bottom = at(i, j + 1) * (1.0 - u) + at(i + 1, j + 1) * u;
+        top * (1.0 - v) + bottom * v
+    }
+}
+
+/// Height of a capital letter in ems of pixels.
+fn capital(font: &FontRef) -> f32 {
+    let outline = font.outline_glyph(font.glyph_id('H').with_scale(PxScale::from(100.0)));
+    outline.map_or(0.7, |outline| outline.px_bounds().height() / 100.0)
+}
+
+/// Strokes grown by half of `thick` texels on either side.
+fn thickened(cover: &[f32], [width, height]: [usize; 2], thick: f32) -> Vec<f32> {
+    let radius = 0.5 * thick;
+    let reach = radius.ceil() as isize;
+    let mut out = vec![0.0_f32; cover.len()];
+    for dy in -reach..=reach {
+        for dx in -reach..=reach {
+            // The middle counts wholly, however thin the growth is.
+            let away = (dx as f32).hypot(dy as f32);
+            let share = if away == 0.0 { 1.0 } else { (radius + 0.5 - away).clamp(0.0, 1.0) };
+            if share == 0.0 {
+                continue;
+            }
+            let span = |n: usize, d: isize| (-d).max(0) as usize..(n as isize - d.max(0)).max(0) as usize;
+            for y in span(height, dy) {
+                for x in span(width, dx) {
+                    let from = (y as isize + dy) as usize * width + (x as isize + dx) as usize;
+                    let texel = &mut out[y * width + x];
+                    *texel = texel.max(share * cover[from]);
+                }
+            }
+        }
+    }
+    out
+}
+
+/// Sums over all texels above and to the left of each corner of a texel.
+fn sums(cover: &[f32], [width, height]: [usize; 2]) -> Vec<f64> {
+    let stride = width + 1;
+    let mut sums = vec![0.0; stride * (height + 1)];
+    for y in 0..height {
+        let mut row = 0.0;
+        for x in 0..width {
+            row += f64::from(cover[y * width + x]);
+            sums[(y + 1) * stride + x + 1] = sums[y * stride + x + 1] + row;
+        }
+    }
+    sums
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn letters(text: &str, weight: f64) -> Print {
+        Print::new(Line { text: text.into(), height_m: 0.01, weight, ..Line::default() })
+    }
+
+    #[test]
+    fn a_capital_letter_is_as_high_as_asked_and_stands_in_the_middle() {
+        let print = letters("H", 0.0);
+        let lit = |up: f64| (-20..=20).any(|i| print.letters().share(f64::from(i) * 2e-4, up, 1e-4) > 0.5);
+        assert!(lit(0.0) && lit(0.0047) && lit(-0.0047));
+        assert!(!lit(0.0053) && !lit(-0.0053));
+    }
+
+    #[test]
+    fn letters_run_to_the_right_and_the_middle_of_a_line_is_its_place() {
+        let print = letters("l.", 0.1);
+        let left = print.letters().share(-1.5e-3, 0.002, 2e-3);
+        let right = print.letters().share(1.5e-3, 0.002, 2e-3);
+        assert!(left > 3.0 * right, "l stands left of its stop: {left} {right}");
+    }
+
+    #[test]
+    fn the_mean_over_squares_keeps_the_ink_however_wide_they_are() {
+        let print = letters("softvt", 0.08);
+        let ink = |width: f64| {
+            let steps = (0.08 / width) as i32;
+            let at = |i: i32| (f64::from(i) + 0.5) * width - 0.04;
+            let all = (0..steps).flat_map(|i| (0..steps).map(move |j| (i, j)));
+            all.map(|(i, j)| print.letters().share(at(i), at(j), width)).sum::<f64>() * width * width
+        };
+        let fine = ink(2.5e-4);
+        assert!(fine > 1e-5, "{fine} m²");
+        for width in [1e-3, 4e-3, 1.6e-2] {
+            assert!((ink(width) / fine - 1.0).abs() < 1e-6, "{width}: {} of {fine}", ink(width));
+        }
+        assert!(
+            fine > 1.2 * letters("softvt", 0.0).letters().share(0.0, 0.0, 0.08) * 0.0064,
+            "thicker strokes"
+        );
+    }
+
+    #[test]
+    fn a_letter_that_the_typeface_lacks_is_found() {
+        let line = |text: &str| Line { text: text.into(), ..Line::default() };
+        assert_eq!(line("Käse & Öl").missing(), None);
+        assert_eq!(line("ab漢").missing(), Some('漢'));
+        assert_eq!(line("a\nb").missing(), Some('\n'));
+    }
+}

@@ -1,0 +1,222 @@
+//! The whole Lua surface, called wrongly: every method, field and function of the binding table, by every kind of value.
+
+use std::{collections::BTreeSet, fmt::Write, time::Duration};
+
+use super::{Project, limits};
+use crate::script::{
+    Experiment,
+    catalogue::CONSTRUCTORS,
+    catalogue_classes::{CLASSES, FUNCTIONS, SHAPE},
+    catalogue_shapes::{METHODS, SHAPES},
+    catalogue_visuals::{MASK_CLASS, MASKS},
+};
+
+/// Makes one of each class, calls everything with everything, and gives what was said.
+const SCRIPT: &str = include_str!("surface.lua");
+
+fn quoted<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    names.map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", ")
+}
+
+fn script() -> String {
+    let mut text = String::from("NAMES = {\n");
+    for class in CLASSES.iter().copied().chain([&SHAPE, &MASK_CLASS]) {
+        let more = METHODS.iter().map(|(name, _)| *name).filter(|_| class.name == SHAPE.name);
+        let methods = quoted(class.methods.iter().map(|method| method.name).chain(more));
+        let fields = class.fields.iter().map(|(name, ..)| *name);
+        let fields = quoted(fields.chain(class.written.iter().map(|field| field.name)));
+        let _ = writeln!(
+            text,
+            "  [{:?}] = {{ methods = {{ {methods} }}, fields = {{ {fields} }} }},",
+            class.name
+        );
+    }
+    let functions = FUNCTIONS.iter().map(|f| f.name).chain(CONSTRUCTORS.iter().map(|(name, _)| *name));
+    let _ = writeln!(text, "}}\nFUNCTIONS = {{ {} }}", quoted(functions));
+    let _ = writeln!(text, "SHAPES = {{ {} }}", quoted(SHAPES.iter().map(|(name, _)| *name)));
+    let _ = writeln!(text, "MASKS = {{ {} }}", quoted(MASKS.iter().map(|(name, _)| *name)));
+    text + SCRIPT
+}
+
+/// What only an implementer would want to read.
+fn leak(message: &str) -> Option<&'static str> {
+    let words = [
+        "::",
+        "[f64",
+        "[u8",
+        "Option<",
+        "Vec<",
+        "userdata",
+        "error converting",
+        "stack traceback",
+        "runtime error",
+        "bad self",
+        "mlua",
+        "conversion",
+        "Lua table",
+        "panicked",
+    ];
+    let ours = [
+        "LuaCamera",
+        "LuaShape",
+        "LuaMask",
+        "LuaImage",
+        "LuaPose",
+        "LuaScene",
+        "LuaObject",
+        "LuaLight",
+        "LuaLook",
+        "LuaList",
+    ];
+    words.into_iter().chain(ours).find(|word| message.contains(word))
+}
+
+#[test]
+fn whatever_is_called_wrongly_is_answered_in_the_words_of_the_surface() {
+    let project = Project::new(&[("x.lua", &script())]);
+    let minute = Duration::from_secs(60);
+    let limits = crate::script::Limits {
+        load: minute,
+        call: minute,
+        point: minute,
+        memory_bytes: 128 << 20,
+        ..limits()
+    };
+    let loaded = project.load_with("x.lua", &[], &limits).unwrap();
+    let rows = Experiment::open(&loaded).unwrap().run(0).unwrap();
+    let folder = format!("{}/", project.path("").display()).replace("//", "/");
+    let mut wrong = Vec::new();
+    for row in &rows {
+        let text = |key: &str| row[key].as_str().unwrap_or_default();
+        let (what, said) = (text("what"), text("said").replace(&folder, ""));
+        if ["seen", "enough"].contains(&what) {
+            continue;
+        }
+        let placed = said.strip_prefix("x.lua:").and_then(|rest| rest.split_once(": "));
+        let placed = placed.is_some_and(|(line, _)| line.parse::<usize>().is_ok());
+        if !placed || leak(&said).is_some() || text("kind") != "string" {
+            wrong.push(format!("{what} → {said}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{} of {} are wrong:\n{}", wrong.len(), rows.len(), wrong.join("\n"));
+    assert!(rows.len() > 2000, "{}", rows.len());
+    let seen: BTreeSet<&str> = rows.last().unwrap()["said"].as_str().unwrap().split(' ').collect();
+    let listed = CLASSES.iter().map(|class| class.name).chain([SHAPE.name, MASK_CLASS.name]);
+    let missing: Vec<&str> = listed.filter(|name| !seen.contains(name)).collect();
+    assert_eq!(
+        missing,
+        ["softvt.Felt", "softvt.List"],
+        "one is a plain table, the other has a test of its own"
+    );
+}
+
+/// Runs a layout over a scene with one ball and gives what it fails with.
+fn in_layout(text: &str) -> String {
+    let whole = super::SUITE.replace("scene:add { name", &format!("{text} scene:add {{ name"));
+    let project = Project::new(&[("x.lua", &(whole + "return suite()"))]);
+    let loaded = project.load("x.lua", &[]).unwrap();
+    let request = crate::script::EpisodeRequest {
+        suite: "test".into(),
+        task: 0,
+        episode: 0,
+        base_seed: 0,
+        split: crate::benchmark::seed::Split::Validation,
+        shifts: Vec::new(),
+    };
+    let folder = format!("{}/", project.path("").display()).replace("//", "/");
+    match crate::script::Episode::open(&loaded, &request) {
+        Ok(_) => String::new(),
+        Err(error) => error.to_string().replace(&folder, ""),
+    }
+}
+
+#[test]
+fn a_list_of_an_object_is_the_objects_own() {
+    for text in [
+        "scene.base[1] = 0.25 assert(scene.base[1] == 0.25)",
+        "local b = scene.base b[1] = 0.5 scene.base = b assert(scene.base[1] == 0.5)",
+        "local q = scene.start_q for i = 1, #q do q[i] = q[i] + 0.5 end scene.start_q = q assert(#q == 7 and scene.start_q[7] == q[7])",
+        "scene.light.colour[2] = 0.5 assert(scene.light.colour[2] == 0.5)",
+        "local n = 0 for i, x in ipairs(scene.gravity) do n = n + i * x end assert(n == 3 * -9.81)",
+        "local n = 0 for i, x in pairs(scene.gravity) do n = n + i * x end assert(n == 3 * -9.81)",
+        "local n = 0 for i, x in softvt.sorted(scene.gravity) do n = n + i * x end assert(n == 3 * -9.81)",
+        "scene.gravity = { 0, 0, -1 } local x, y, z, more = table.unpack(scene.gravity) assert(z == -1 and more == nil)",
+        "scene.gravity = { 1, 2, 3 } assert(table.concat(scene.gravity, ' ') == '1.0 2.0 3.0' and scene.gravity[4] == nil)",
+        "assert(tostring(scene.gravity) == '{0, 0, -9.81}' and ('%s'):format(scene.gravity) == '{0, 0, -9.81}')",
+        "scene.workspace_min = scene.base assert(scene.workspace_min[1] == scene.base[1])",
+        "assert(softvt.pose { xyz = scene.base }.x == scene.base[1] and rng:choice(scene.base))",
+        "assert(#scene.objects == 0 and #rng:shuffle(scene.objects) == 0)",
+    ] {
+        assert_eq!(in_layout(text), "", "{text}");
+    }
+}
+
+#[test]
+fn a_list_that_cannot_be_written_says_how_its_object_is_changed() {
+    let line = super::SUITE.lines().position(|line| line.contains("scene:add")).unwrap() + 1;
+    for (text, said) in [
+        ("scene.base[1] = 'a'", "scene.base[1]: expected a number, got \"a\""),
+        ("scene.base[1] = 0/0", "scene.base[1]: expected a number, got NaN"),
+        ("scene.base[4] = 1", "scene.base: has places 1 to 3, got 4"),
+        ("scene.base.x = 1", "scene.base: has places 1 to 3, got \"x\""),
+        ("local _ = scene.base.x", "scene.base: expected a place in the list, 1 or more, got \"x\""),
+        ("table.insert(scene.base, 1)", "scene.base: has places 1 to 3, got 4"),
+        (
+            "scene.light.colour = { 1, 0.5, 0.25 } scene.light.colour[1] = -1",
+            "scene.light.colour: expected linear RGB in 0..1000, got {-1, 0.5, 0.25}",
+        ),
+        ("scene.objects[1] = 3", "scene.objects: cannot be written; scene:add{…} puts one more there"),
+        (
+            "scene:camera('wrist').quat[1] = 0",
+            "scene:camera(\"wrist\").quat: cannot be written; its numbers belong together: write camera.quat = { w, x, y, z }",
+        ),
+        (
+            "softvt.pose { xyz = { 0, 0, 0 } }.xyz[1] = 1",
+            "pose.xyz: cannot be written; a pose never changes: make another with softvt.pose{…}, or with moved",
+        ),
+        (
+            "scene.light = 'x'",
+            "scene.light: cannot be replaced; its numbers are written one by one, as in scene.light.strength = …",
+        ),
+        ("scene.objects = {}", "scene.objects: is only read"),
+        ("scene.add = 1", "scene.add: is a method and cannot be written; call it as scene:add(…)"),
+        (
+            "scene.add {}",
+            "scene:add: expected a softvt.Scene before the colon, got a table; call it as scene:add(…)",
+        ),
+        (
+            "scene:camera('wrist'):look_at('abc')",
+            "scene:camera(\"wrist\"):look_at: point: expected a list of 3 numbers (m, frame of the mount), got \"abc\"",
+        ),
+        (
+            "scene:camera('wrist').quat = { 0, 0, 0, 0 }",
+            "scene:camera(\"wrist\").quat: expected a quaternion other than 0, got {0, 0, 0, 0}",
+        ),
+        (
+            "softvt.pose { xyz = { 0, 0, 0 }, quat = { 1e-300, 0, 0, 0 } }",
+            "pose.quat: expected a quaternion other than 0",
+        ),
+        (
+            "local _ = softvt.image { width = 1, height = 1, colour = { 0, 0, 0 } }.widht",
+            "image: unknown key \"widht\"; did you mean \"width\"?",
+        ),
+        (
+            "scene.base = { 1e300, 0, 0 }",
+            "scene.base: expected a place within 1000 m of the origin, got {1e300, 0, 0}",
+        ),
+    ] {
+        assert_eq!(in_layout(text), format!("x.lua:{line}: {said}"), "{text}");
+    }
+}
+
+#[test]
+fn a_turn_and_a_light_of_any_length_are_taken() {
+    for text in [
+        "local c = scene:camera 'wrist' c.quat = { 1e200, 0, 0, 1e200 } assert(math.abs(c.quat[1] - 0.5 ^ 0.5) < 1e-12)",
+        "assert(math.abs(softvt.pose { xyz = { 0, 0, 0 }, quat = { 0, 1e308, -1e308, 0 } }.quat[2]) > 0.7)",
+        "local l = scene.light l.direction = { 1e308, 1e308, 0 } assert(math.abs(l.direction[1] - 0.5 ^ 0.5) < 1e-12)",
+        "local l = scene.light l.direction = { 0, 3, 4 } assert(l.direction[2] == 3)",
+    ] {
+        assert_eq!(in_layout(text), "", "{text}");
+    }
+}

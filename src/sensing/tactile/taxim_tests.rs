@@ -1,0 +1,187 @@
+//! Taxim's tables as files of the package's layout, whole and broken.
+
+use std::{fs, io::Write, path::Path};
+
+use super::{Gel, PICTURE, TactileSpec, Taxim};
+use crate::robot::PadSurface;
+
+const BINS: usize = 125;
+
+/// An array as NumPy saves it: version 1.0, the header filled up to a multiple of 64 bytes.
+fn npy(kind: &str, shape: &str, data: &[u8]) -> Vec<u8> {
+    let mut header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}");
+    while !(10 + header.len() + 1).is_multiple_of(64) {
+        header.push(' ');
+    }
+    header.push('\n');
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((header.len() as u16).to_le_bytes());
+    bytes.extend(header.as_bytes());
+    bytes.extend(data);
+    bytes
+}
+
+/// An array's name and bytes.
+type Entry = (&'static str, Vec<u8>);
+
+fn write(path: &Path, entries: &[Entry]) {
+    let mut zip = zip::ZipWriter::new(fs::File::create(path).expect("a file"));
+    let stored = zip::write::SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
+    for (name, bytes) in entries {
+        zip.start_file(format!("{name}.npy"), stored).expect("an entry");
+        zip.write_all(bytes).expect("written");
+    }
+    zip.finish().expect("finished");
+}
+
+/// A table whose entries are all the quadratic [0, 0, 0, 0, 0, `constant`].
+fn grad(constant: f64) -> Vec<u8> {
+    let entry: Vec<u8> =
+        [0.0, 0.0, 0.0, 0.0, 0.0, constant].iter().flat_map(|v: &f64| v.to_le_bytes()).collect();
+    npy("<f8", "(125, 125, 6)", &entry.repeat(BINS * BINS))
+}
+
+/// `polycalib.npz` as in the package: changes of 1, 2 and 3 grey levels.
+fn polycalib() -> Vec<Entry> {
+    let bins = npy("<i4", "()", &(BINS as i32).to_le_bytes());
+    vec![("bins", bins), ("grad_r", grad(1.0)), ("grad_g", grad(2.0)), ("grad_b", grad(3.0))]
+}
+
+/// `dataPack.npz` as in the package, with one press: blue 10, green 20, red 30.
+fn data_pack() -> Vec<Entry> {
+    let pixels = [10, 20, 30].repeat(480 * 640);
+    vec![
+        ("f0", npy("|u1", "(480, 640, 3)", &pixels)),
+        ("imgs", npy("|u1", "(1, 480, 640, 3)", &pixels)),
+        ("touch_center", npy("<u2", "(1, 2)", &[64, 1, 240, 0])),
+        ("touch_radius", npy("<u2", "(1,)", &[45, 0])),
+        ("names", npy("<U2", "(1,)", &[0; 8])),
+        ("img_size", npy("<i4", "(3,)", &[224, 1, 0, 0, 128, 2, 0, 0, 3, 0, 0, 0])),
+    ]
+}
+
+/// What loading a folder says, with the file `name` replaced.
+fn loaded(name: &str, entries: &[Entry]) -> Result<Taxim, String> {
+    let folder = tempfile::tempdir().expect("a folder");
+    write(&folder.path().join("polycalib.npz"), &polycalib());
+    write(&folder.path().join("dataPack.npz"), &data_pack());
+    write(&folder.path().join(name), entries);
+    Taxim::load(folder.path()).map_err(|error| error.to_string())
+}
+
+/// The same with one array replaced, or left out.
+fn refused(name: &str, key: &str, by: Option<Vec<u8>>) -> String {
+    let mut entries = if name == "polycalib.npz" { polycalib() } else { data_pack() };
+    entries.retain(|(known, _)| *known != key);
+    let key: &'static str = entries_key(key);
+    entries.extend(by.map(|bytes| (key, bytes)));
+    loaded(name, &entries).expect_err("a broken file")
+}
+
+fn entries_key(key: &str) -> &'static str {
+    ["bins", "grad_r", "grad_g", "grad_b", "f0"].into_iter().find(|known| *known == key).expect("a known key")
+}
+
+#[test]
+fn files_of_the_packages_layout_are_read_with_red_and_blue_as_it_has_them() {
+    let taxim = loaded("dataPack.npz", &data_pack()).expect("whole files");
+    let gel = Gel::new(&TactileSpec::default(), PadSurface::default()).expect("default numbers");
+    let mut rgb = vec![0; 3 * PICTURE[0] * PICTURE[1]];
+    taxim.picture(&gel, None, &mut rgb);
+    // The picture is stored blue first; its tables are named the other way round.
+    assert!(rgb.chunks_exact(3).all(|pixel| pixel == [30 + 3, 20 + 2, 10 + 1]), "{:?}", &rgb[..3]);
+}
+
+#[test]
+fn every_broken_array_is_named_with_its_file() {
+    let number = |value: f64| {
+        let mut bytes = grad(1.0);
+        let at = bytes.len() - 8;
+        bytes[at..].copy_from_slice(&value.to_le_bytes());
+        bytes
+    };
+    let (poly, pack) = ("polycalib.npz", "dataPack.npz");
+    let mut short = grad(1.0);
+    short.truncate(2000);
+    for (file, key, by, what) in [
+        (poly, "bins", None, "no array \"bins\"; the file has: grad_r, grad_g, grad_b"),
+        (poly, "grad_g", None, "no array \"grad_g\"; the file has: bins, grad_r, grad_b"),
+        (pack, "f0", None, "no array \"f0\"; the file has: imgs, touch_center"),
+        (
+            poly,
+            "bins",
+            Some(npy("<i4", "(2,)", &[125, 0, 0, 0, 125, 0, 0, 0])),
+            "array \"bins\": expected the shape []",
+        ),
+        (poly, "bins", Some(npy("<i4", "()", &[255; 4])), "array \"bins\": expected 2..4096, got -1"),
+        (
+            poly,
+            "bins",
+            Some(npy("<i4", "()", &[9, 0, 0, 0])),
+            "array \"grad_b\": expected the shape [9, 9, 6]",
+        ),
+        (
+            poly,
+            "bins",
+            Some(npy("<f8", "()", &125.0_f64.to_le_bytes())),
+            "array \"bins\": expected type i4 or i8, got f8",
+        ),
+        (
+            poly,
+            "grad_r",
+            Some(npy("<f8", "(125, 6)", &[0; 6000])),
+            "array \"grad_r\": expected the shape [125, 125, 6]",
+        ),
+        (poly, "grad_r", Some(npy("|O", "(1,)", &[0])), "array \"grad_r\": of type 'O'"),
+        (poly, "grad_r", Some(npy(">f8", "(1,)", &[0; 8])), "array \"grad_r\": of type '>f8'"),
+        (
+            poly,
+            "grad_r",
+            Some(npy("<i8", "(1,)", &[0; 8])),
+            "array \"grad_r\": expected type f4 or f8, got i8",
+        ),
+        (poly, "grad_b", Some(number(f64::NAN)), "array \"grad_b\": entry 93749 is NaN"),
+        (poly, "grad_b", Some(number(f64::INFINITY)), "array \"grad_b\": entry 93749 is inf"),
+        (poly, "grad_r", Some(short), "array \"grad_r\": 1872 bytes do not fill the shape [125, 125, 6]"),
+        (poly, "grad_r", Some(b"not an array".to_vec()), "array \"grad_r\": not an .npy array"),
+        (pack, "f0", Some(npy("<f8", "(1,)", &[0; 8])), "array \"f0\": expected type u1, got f8"),
+        (
+            pack,
+            "f0",
+            Some(npy("|u1", "(2, 2, 3)", &[0; 12])),
+            "array \"f0\": expected the shape [480, 640, 3]",
+        ),
+    ] {
+        let said = refused(file, key, by);
+        assert!(
+            said.contains(file) && said.contains(what),
+            "{file}, {key}: expected \"{what}\", got \"{said}\""
+        );
+    }
+}
+
+#[test]
+fn a_file_that_is_cut_off_or_damaged_is_named_with_the_array_that_was_wanted() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (poly, pack) = (folder.path().join("polycalib.npz"), folder.path().join("dataPack.npz"));
+    write(&poly, &polycalib());
+    write(&pack, &data_pack());
+    let said = || Taxim::load(folder.path()).expect_err("a broken file").to_string();
+    let whole = fs::read(&poly).expect("written");
+    for length in [0, 1, 1000, whole.len() / 2, whole.len() - 1] {
+        fs::write(&poly, &whole[..length]).expect("written");
+        let said = said();
+        assert!(said.contains("polycalib.npz") && said.contains("\"bins\""), "{length} bytes: {said}");
+    }
+    // One bit within grad_g: its check sum does not fit.
+    let mut damaged = whole.clone();
+    let at = whole.windows(6).position(|w| w == b"grad_g").expect("an entry") + 10_000;
+    damaged[at] ^= 1;
+    fs::write(&poly, &damaged).expect("written");
+    let message = said();
+    assert!(message.contains("polycalib.npz: array \"grad_g\": cannot be read to its end"), "{message}");
+    fs::write(&poly, &whole).expect("written");
+    fs::write(&pack, b"PK").expect("written");
+    let message = said();
+    assert!(message.contains("dataPack.npz") && message.contains("\"f0\""), "{message}");
+}

@@ -1,0 +1,37 @@
+-- Object-Soft: ten soft things, one basket; each stands among the distractors of the same task of Object-Rigid.
+local layouts = require "layouts.floor"
+local pick_place = require "experts.pick_place"
+local shifts = require "shifts"
+
+local things = {
+  { "steamed_bun", "pale cream round steamed-bun pastry" },
+  { "croissant", "soft pastry" },
+  { "yellow_roll", "soft pastry" },
+  { "oval_loaf", "soft pastry" },
+  { "sesame_bun", "orange round bun pastry with sesame speckles" },
+  { "long_roll", "soft pastry" },
+  { "cube", "soft cube" },
+  { "cylinder", "soft cylinder" },
+  { "wedge", "soft wedge" },
+  { "capsule", "soft capsule" },
+}
+
+local tasks = {}
+for k, thing in ipairs(things) do
+  local asset, says = thing[1], thing[2]
+  tasks[k] = softvt.task {
+    prompt = ("pick up the %s and place it in the basket"):format(says),
+    layout = layouts.soft(asset, k),
+    goal = softvt.inside { object = asset, target = "basket", hold_s = 0.4 },
+    expert = pick_place { object = asset, target = "basket" },
+  }
+end
+
+return softvt.suite {
+  name = "object_soft",
+  object_type = "deformable",
+  variation = "object",
+  episodes = 5,
+  tasks = tasks,
+  shifts = shifts.soft,
+}
