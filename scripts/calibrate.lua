@@ -10,7 +10,7 @@
 -- Writes assets/calibration/<asset>.json, the sweep rows in SoftVTBench's fields beside it, and scripts/calibrated.lua.
 local grasp = require "experts.grasp"
 local known = require "calibrated"
-local soft_assets = require "soft_assets"
+local soft_assets = require("asset_names").soft
 local table_top = require "assets.table"
 
 local opt = softvt.options {

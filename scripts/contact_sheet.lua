@@ -2,11 +2,14 @@
 --
 --   softvt scripts/contact_sheet.lua
 --   softvt scripts/contact_sheet.lua --asset my_pastry --write my_pastry.png
-local soft_assets = require "soft_assets"
+local names = require "asset_names"
 local table_top = require "assets.table"
 
--- Soft things first, then what they meet.
-local STANDARD = table.move({ "plate" }, 1, 1, #soft_assets + 1, table.move(soft_assets, 1, #soft_assets, 1, {}))
+-- Soft things first, then what they meet, then what stands around; the table and the floor are under all of them.
+local STANDARD = {}
+for _, group in ipairs { names.soft, names.rigid, names.furniture } do
+  table.move(group, 1, #group, #STANDARD + 1, STANDARD)
+end
 
 local opt = softvt.options {
   asset = { default = STANDARD, help = "assets to draw" },

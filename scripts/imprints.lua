@@ -4,7 +4,7 @@
 --   softvt scripts/imprints.lua
 --   softvt scripts/imprints.lua --asset my_pastry --write my_imprint.png
 local grasp = require "experts.grasp"
-local soft_assets = require "soft_assets"
+local soft_assets = require("asset_names").soft
 local table_top = require "assets.table"
 
 local opt = softvt.options {

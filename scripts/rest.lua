@@ -2,7 +2,7 @@
 -- away needs a flatter foot; scripts/contact_sheet.lua draws how it lies.
 --
 --   softvt scripts/rest.lua --asset my_pastry
-local soft_assets = require "soft_assets"
+local soft_assets = require("asset_names").soft
 local table_top = require "assets.table"
 
 local opt = softvt.options {

@@ -28,7 +28,8 @@ local PLACES = {
   next_to_cookies = { at = { 130 * mm, -70 * mm } },
   next_to_plate = { at = { 0, 340 * mm } },
   table_center = { at = { -75 * mm, 0 } },
-  on_cookies = { on = "cookies" }, on_ramekin = { on = "ramekin" },
+  -- Its foot sinks into the ramekin, in which it rests 29.7 mm up.
+  on_cookies = { on = "cookies" }, on_ramekin = { on = "ramekin", rests = 30.5 * mm },
   on_cabinet = { on = "cabinet" }, on_stove = { on = "stove" },
   in_drawer = { drawer = { 0, -168 * mm, 148 * mm } },
 }
@@ -81,7 +82,11 @@ function layouts.relation(k)
       local how, dx, dy = bowls[name], rng:uniform(-ON_TOP, ON_TOP), rng:uniform(-ON_TOP, ON_TOP)
       if how.on then
         local under = placed[how.on]
-        scene:add { name = name, asset = bowl, at = { under.x + dx, under.y + dy }, on = how.on }
+        if how.rests then
+          scene:add { name = name, asset = bowl, xyz = { under.x, under.y, how.rests } }
+        else
+          scene:add { name = name, asset = bowl, at = { under.x + dx, under.y + dy }, on = how.on }
+        end
       elseif how.drawer then
         local xyz = seen_from(placed.cabinet, how.drawer)
         scene:add { name = name, asset = bowl, xyz = { xyz[1] + dx, xyz[2] + dy, xyz[3] } }

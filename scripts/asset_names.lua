@@ -1,0 +1,12 @@
+-- The names of all assets, in the order in which pages and tables show them.
+return {
+  soft = {
+    "spiral_roll", "steamed_bun", "twisted_stick", "long_roll", "small_ridged_roll", "sesame_bun", "croissant", "curved_layered",
+    "braided_roll", "golden_bun", "oval_loaf", "yellow_roll", "cube", "cylinder", "wedge", "capsule", "sphere",
+  },
+  rigid = {
+    "black_bowl", "plate", "ramekin", "basket", "alphabet_soup", "tomato_sauce", "bbq_sauce", "ketchup", "salad_dressing", "milk",
+    "orange_juice", "butter", "cream_cheese", "cookies", "chocolate_pudding",
+  },
+  furniture = { "wooden_cabinet", "flat_stove" },
+}
