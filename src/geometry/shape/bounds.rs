@@ -69,6 +69,22 @@ impl Shape {
         }
     }
 
+    /// Whether it is surely more than `reach` (m) away from `p`, where that is quickly known.
+    pub(super) fn is_farther(&self, p: &Vec3, reach: f64) -> bool {
+        let reach = reach.max(0.0);
+        let beyond = |across2: f64, radius: f64| across2 > (radius + reach).powi(2);
+        match self {
+            Self::Box { half } => (p.abs() - half).max() > reach,
+            Self::Sphere { radius } => beyond(p.norm_squared(), *radius),
+            Self::Cylinder { radius, half_height } => {
+                p.z.abs() - half_height > reach || beyond(p.xy().norm_squared(), *radius)
+            }
+            Self::Placed { shape, pose } => shape.is_farther(&super::to_local(pose, p), reach),
+            Self::Paint { shape, .. } => shape.is_farther(p, reach),
+            _ => false,
+        }
+    }
+
     /// Largest value of `p · direction` over the shape, where a closed form is known.
     fn support(&self, direction: &Vec3) -> Option<f64> {
         let across = direction.x.hypot(direction.y);

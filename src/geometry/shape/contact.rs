@@ -100,7 +100,7 @@ fn box_faces(p: &Vec3, half: &Vec3) -> [Face; 3] {
 }
 
 fn cylinder_faces(p: &Vec3, radius: f64, half_height: f64) -> [Face; 2] {
-    let r = p.x.hypot(p.y);
+    let r = primitive::length(p.x, p.y);
     let cap = Face {
         phi: p.z.abs() - half_height,
         normal: Vec3::z() * if p.z < 0.0 { -1.0 } else { 1.0 },
@@ -120,6 +120,10 @@ fn cylinder_faces(p: &Vec3, radius: f64, half_height: f64) -> [Face; 2] {
 fn union(parts: &[Shape], p: &Vec3, facing: &Vec3, spacing: f64) -> Contact {
     let mut best = Contact { phi: f64::INFINITY, normal: Vec3::z(), coverage: 1.0 };
     for part in parts {
+        // A face may be felt half a spacing beyond its edge.
+        if part.is_farther(p, best.phi + spacing) {
+            continue;
+        }
         let contact = part.contact(p, facing, spacing);
         let flush =
             (contact.phi - best.phi).abs() < 1e-3 * spacing && contact.normal.dot(&best.normal) > 0.999;

@@ -117,7 +117,7 @@ impl Shape {
                 (distance - radius, normal)
             }
             Self::Shell { shape, thickness } => shell(shape.estimate(p), *thickness),
-            Self::Union(parts) => fold(parts, |part| part.estimate(p), combine::unite),
+            Self::Union(parts) => unite_near(parts, p),
             Self::Intersect(parts) => fold(parts, |part| part.estimate(p), combine::intersect),
             Self::Subtract { from, cut } => {
                 combine::intersect(from.estimate(p), combine::invert(cut.estimate(p)))
@@ -165,6 +165,18 @@ impl Shape {
         }
         (best.0.copysign(first), best.1)
     }
+}
+
+/// The first-order field of a union. A part that is farther than the others are near or deep has no say in it.
+fn unite_near(parts: &[Shape], p: &Vec3) -> combine::Field {
+    let mut best = combine::NOWHERE;
+    for part in parts {
+        if !part.is_farther(p, best.0.abs()) {
+            let field = part.estimate(p);
+            best = if best.0.is_infinite() { field } else { combine::unite(best, field) };
+        }
+    }
+    best
 }
 
 /// Folds the fields of parts; nothing is infinitely far away.

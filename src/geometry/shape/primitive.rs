@@ -36,24 +36,29 @@ pub(super) fn ellipsoid(p: &Vec3, radii: &Vec3) -> (f64, Vec3) {
     ((length - 1.0) / slope, gradient / slope)
 }
 
+/// Length of a vector in the plane. Square roots are exact on every machine, which a library's hypot need not be.
+pub(super) fn length(x: f64, y: f64) -> f64 {
+    (x * x + y * y).sqrt()
+}
+
 pub(super) fn capsule(p: &Vec3, radius: f64, half_length: f64) -> (f64, Vec3) {
     sphere(&Vec3::new(p.x, p.y, p.z - p.z.clamp(-half_length, half_length)), radius)
 }
 
 pub(super) fn cylinder(p: &Vec3, radius: f64, half_height: f64) -> (f64, Vec3) {
-    let r = p.x.hypot(p.y);
+    let r = length(p.x, p.y);
     let (side, cap) = (r - radius, p.z.abs() - half_height);
     let radial = unit_or_x(Vec3::new(p.x, p.y, 0.0), r);
     let up = Vec3::z() * if p.z < 0.0 { -1.0 } else { 1.0 };
     if side > 0.0 && cap > 0.0 {
-        let length = side.hypot(cap);
-        return (length, (radial * side + up * cap) / length);
+        let edge = length(side, cap);
+        return (edge, (radial * side + up * cap) / edge);
     }
     if side > cap { (side, radial) } else { (cap, up) }
 }
 
 pub(super) fn torus(p: &Vec3, major: f64, minor: f64) -> (f64, Vec3) {
-    let r = p.x.hypot(p.y);
+    let r = length(p.x, p.y);
     let radial = unit_or_x(Vec3::new(p.x, p.y, 0.0), r);
     let arm = radial * (r - major) + Vec3::z() * p.z;
     let length = arm.norm();
@@ -66,14 +71,14 @@ pub(super) fn prism(p: &Vec3, section: &Profile, half_length: f64) -> (f64, Vec3
     let across = Vec3::new(gradient[0], 0.0, gradient[1]);
     let along = Vec3::y() * if p.y < 0.0 { -1.0 } else { 1.0 };
     if flat > 0.0 && side > 0.0 {
-        let length = flat.hypot(side);
-        return (length, (across * flat + along * side) / length);
+        let edge = length(flat, side);
+        return (edge, (across * flat + along * side) / edge);
     }
     if flat > side { (flat, across) } else { (side, along) }
 }
 
 pub(super) fn lathe(p: &Vec3, profile: &Profile) -> (f64, Vec3) {
-    let r = p.x.hypot(p.y);
+    let r = length(p.x, p.y);
     let (distance, gradient) = profile.distance([r, p.z]);
     (distance, unit_or_x(Vec3::new(p.x, p.y, 0.0), r) * gradient[0] + Vec3::z() * gradient[1])
 }
