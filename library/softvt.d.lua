@@ -164,6 +164,11 @@
 ---@field yaw? number Turn of the downward hand about the vertical. Expects radians. Default 0.
 ---@field quat? number[] Orientation instead of yaw. Expects a list of 4 numbers (w, x, y, z).
 
+---How a hand would be held, and what it may touch.
+---@class softvt.Clearance
+---@field width? number Distance of the pads. Expects metres in 0..0.08. Default 0.08.
+---@field ignore? string[] Scene names of what it may touch.
+
 ---A camera. Give look_at or quat.
 ---@class softvt.NewCamera
 ---@field name string Its name, unique; the stream's.
@@ -722,6 +727,16 @@ local Pose = {}
 ---@return softvt.Pose
 function Pose:moved(by) end
 
+---The same orientation at another place, m.
+---@param xyz number[]
+---@return softvt.Pose
+function Pose:at(xyz) end
+
+---Turned where it is about the world's vertical, rad.
+---@param angle number
+---@return softvt.Pose
+function Pose:turned(angle) end
+
 ---Part of the way to another pose: 0 is here, 1 there.
 ---@param other softvt.Pose
 ---@param share number
@@ -872,6 +887,13 @@ function View:part(object, part) end
 ---All objects, in the order of the scene.
 ---@return softvt.Seen[]
 function View:objects() end
+
+---Metres (at most 0.2) between a hand at pose and the nearest object, and the name of that; negative inside.
+---@param pose softvt.Pose
+---@param options? softvt.Clearance
+---@return number
+---@return string?
+function View:clearance(pose, options) end
 
 ---An object as an expert sees it, at one moment.
 ---@class softvt.Seen

@@ -235,13 +235,16 @@ fn stacks(stacks: &[&[&str]]) -> Vec<Scene> {
     let list: Vec<String> =
         stacks.iter().map(|names| format!("{{ \"{}\" }}", names.join("\", \""))).collect();
     let text = format!(
-        "local tasks = {{}}
-        for _, names in ipairs {{ {} }} do
+        "local tasks, all, assets = {{}}, {{ {} }}, {{ table = require \"assets.table\" }}
+        for _, names in ipairs(all) do
+          for _, name in ipairs(names) do assets[name] = require(\"assets.\" .. name) end
+        end
+        for _, names in ipairs(all) do
           local layout = softvt.layout(table.concat(names, \"_\"), function(scene)
-            scene:add {{ name = \"table\", asset = require \"assets.table\", xyz = {{ 0, 0, 0 }} }}
+            scene:add {{ name = \"table\", asset = assets.table, xyz = {{ 0, 0, 0 }} }}
             for i, name in ipairs(names) do
               local on = i > 1 and names[i - 1] or nil
-              scene:add {{ name = name, asset = require(\"assets.\" .. name), at = {{ 0.05, 0.02 }}, yaw = 0.3 * i, on = on }}
+              scene:add {{ name = name, asset = assets[name], at = {{ 0.05, 0.02 }}, yaw = 0.3 * i, on = on }}
             end
           end)
           local goal = softvt.on {{ object = names[1], target = \"table\" }}

@@ -124,6 +124,7 @@ fn a_drawer_that_is_pushed_takes_its_bowl_along_and_pictures_show_it() {
     let (before, seen) = (sim.centre(object(&sim, "bowl")), column(&sim));
     // A push shut that the bowl's friction can follow: 0.5 × 9.81 m/s² would be its limit.
     let mut speed = 0.0;
+    sim.world.trees[tree].asleep = false;
     for _ in 0..16 {
         speed = f64::max(speed - 2.5 / 60.0, -0.2);
         sim.world.trees[tree].state.v[link] = speed;
@@ -144,6 +145,7 @@ fn a_knob_turns_within_its_limits_and_stops() {
     let (tree, link) = link(&sim, "stove.knob");
     let set = sim.world.trees[tree].state.q[link];
     assert!((set - 1.0).abs() < 1e-6, "friction holds it where it was set: {set}");
+    sim.world.trees[tree].asleep = false;
     sim.world.trees[tree].state.v[link] = 40.0;
     run(&mut sim, 1.0);
     let q = sim.world.trees[tree].state.q[link];

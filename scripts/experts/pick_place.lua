@@ -9,8 +9,8 @@ local FIELDS = { object = true, target = true, closure = true, speed = true }
 local OVER, DROP, BESIDE = 0.025, 0.001, 0.002
 -- An object that has not come along by this much of a lift is not held.
 local HELD = 0.5
--- Attempts at taking hold.
-local TRIES = 3
+-- Attempts at taking hold, and how far the object may have moved before one, m.
+local TRIES, AWAY = 3, 0.08
 -- Spread of speeds, and of the grasp along the fingers' line and across it, so that no two demonstrations are alike.
 local PACE, MISS = 0.12, 0.0015
 
@@ -100,7 +100,11 @@ return function(spec)
   checked(spec)
   return function(arm, scene)
     local pace = (spec.speed or 1) * (1 + spread(PACE))
+    local first = scene:object(spec.object).xyz
     for _ = 1, TRIES do
+      -- What has slid or rolled away is not chased.
+      local now = scene:object(spec.object).xyz
+      if math.sqrt((now[1] - first[1]) ^ 2 + (now[2] - first[2]) ^ 2) > AWAY then return end
       local held, height = take(arm, scene, spec, pace)
       if held then return put(arm, scene, spec, height, pace) end
       -- Not forced: let go, rise, look again.

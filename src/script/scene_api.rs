@@ -311,8 +311,7 @@ impl Hosted for LuaObject {
             "poisson" => Read::optional(soft.map(|soft| soft.poisson)),
             "joints" => {
                 let names = asset.parts().iter().map(|part| part.name.as_str());
-                let values = lua.create_table_from(names.zip(object.joints.iter().copied()))?;
-                Read::Fixed(values, "scene:add{ joints = … } gives start values".into())
+                Read::Value(Value::Table(lua.create_table_from(names.zip(object.joints.iter().copied()))?))
             }
             "static_mu" => Read::number(asset.friction.static_mu),
             _ => Read::number(asset.friction.dynamic_mu),

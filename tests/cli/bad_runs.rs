@@ -133,7 +133,7 @@ fn poses_within_reach_are_not_complained_about_however_fast() {
 
 #[test]
 fn an_experts_mistakes_have_their_line() {
-    assert_snapshot!(expert("\n  arm:move_too()"), @r#"x.lua: task 0, episode 0: x.lua:13: arm: there is no "move_too""#);
+    assert_snapshot!(expert("\n  arm:move_too()"), @r#"x.lua: task 0, episode 0: x.lua:13: arm: unknown key "move_too"; did you mean "move_to"?"#);
     assert_snapshot!(expert("\n  arm:close_to(2)"), @"x.lua: task 0, episode 0: x.lua:13: arm:close_to: closure: expected a number in 0..1, got 2");
     assert_snapshot!(expert("\n\n  scene:object 'cub'"), @r#"x.lua: task 0, episode 0: x.lua:14: scene: unknown object "cub"; did you mean "cube"?"#);
 }

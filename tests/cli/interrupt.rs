@@ -91,7 +91,7 @@ fn what_was_wrong_before_an_interrupt_is_what_the_exit_code_tells() {
     let project = Project::new(&[("x.lua", &both)]);
     let (code, _, err) = interrupted(&project, &["x.lua", "--threads", "2", "--out", "run"], 6.0);
     assert_eq!(code, Some(2), "{err}");
-    assert!(err.contains("there is no \"wait_for_ever\""), "{err}");
+    assert!(err.contains("unknown key \"wait_for_ever\""), "{err}");
 }
 
 fn await_lines(project: &Project, count: usize) {

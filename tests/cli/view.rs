@@ -171,7 +171,7 @@ fn a_camera_inside_of_something_is_told_before_anything_runs_and_leaves_no_pictu
     let message = project.refusal("x.lua --video --out run");
     let told = "x.lua:7: camera third_person: position: it stands inside of cube; move it out";
     assert!(message.contains(told), "{message}");
-    let project = with("scene:camera(\"wrist\").position = { 0, 0, 0 }");
+    let project = with("scene:camera(\"wrist\").position = { 0, 0, 0.03 }");
     let message = project.refusal("view x.lua --out seen");
     assert!(message.contains("x.lua:7: camera wrist: position: it stands inside of"), "{message}");
 }

@@ -195,7 +195,7 @@ fn errors_of_every_kind_end_in_a_line_of_text() {
         ("return load(('('):rep(1e5))", "x.lua:2: C stack overflow"),
         (
             "local t = setmetatable({}, {}) getmetatable(t).__index = t return { a = t.x }",
-            "x.lua:2: '__index' chain too long; possibly a loop",
+            "x.lua:2: '__index' chain too long; possible loop",
         ),
         (
             "local _, m = pcall(softvt.pose, 3) error(m, 0)",

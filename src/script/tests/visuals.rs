@@ -153,7 +153,7 @@ fn a_wrong_look_is_named_with_its_line_and_the_mend() {
         ),
         (
             "mask = mask.text { text = '\\xff', height_m = 0.01, at = { 0, 0, 0 }, facing = '+z' },",
-            at(8, "mask.text.text: expected letters in UTF-8"),
+            at(8, "mask.text.text: expected UTF-8 text, got \"\u{fffd}\""),
         ),
         (
             "mask = mask.text { text = 'x', height_m = 0.01, at = { 0, 0, 0 }, facing = { 0, 0, 0 } },",
@@ -208,6 +208,8 @@ fn every_material_of_the_library_gives_a_look() {
         "crust",
         "dough",
         "frosting",
+        "foam",
+        "silicone",
         "seeds",
         "ceramic",
         "wood",
