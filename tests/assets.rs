@@ -304,7 +304,7 @@ fn bowl_basket_and_ramekin_are_hollow_and_their_walls_thick_enough() {
     let of = |name: &str| assets.iter().find(|asset| asset.name == name).expect("is there");
     for (name, at, inside) in [("black_bowl", 0.04, 0.04), ("basket", 0.05, 0.06), ("ramekin", 0.03, 0.036)] {
         let shape = &of(name).shape;
-        assert!(shape.distance(&Vec3::new(0.0, 0.0, at)) > 0.02, "{name} is hollow");
+        assert!(shape.distance(&Vec3::new(0.0, 0.0, at)) > 0.01, "{name} is hollow");
         for turn in [0.0_f64, 0.4, 0.8, 1.3, 2.0, 4.0] {
             let way = Vec3::new(turn.cos(), turn.sin(), 0.0);
             let from = Vec3::z() * at;

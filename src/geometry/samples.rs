@@ -51,12 +51,19 @@ struct Gathered {
     moment: Vec3,
     normals: Vec3,
     area: f64,
+    /// Area and middle of the largest of them.
+    largest: (f64, Vec3),
 }
+
+/// Samples lie on the surface to this, m.
+const OFF: f64 = 1e-4;
 
 impl Gathered {
     fn patch(&self, shape: &Shape) -> Patch {
         let middle = self.moment / self.area;
-        let p = shape.project(&middle, self.area.sqrt()).unwrap_or(middle);
+        let on_surface = |p: &Vec3| shape.distance(p).abs() < OFF;
+        // In a crease the middle may have no surface nearby; the largest triangle lies on it.
+        let p = shape.project(&middle, self.area.sqrt()).filter(on_surface).unwrap_or(self.largest.1);
         Patch { p, n: self.normals.normalize(), area: self.area }
     }
 }
@@ -109,6 +116,9 @@ fn skin_patches(shape: &Shape, spec: &SampleSpec) -> Vec<Patch> {
         let cell = centre / spec.spacing(&normal);
         let key = (side, [cell.x, cell.y, cell.z].map(|x| x.floor() as i64));
         let gathered = cells.entry(key).or_default();
+        if area > gathered.largest.0 {
+            gathered.largest = (area, centre);
+        }
         gathered.moment += centre * area;
         gathered.normals += normal_area;
         gathered.area += area;
