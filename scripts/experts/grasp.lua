@@ -10,8 +10,8 @@ local STROKE = 0.08
 local CASE = 0.016
 -- Room to leave under the cases and beside the fingers, m.
 local UNDER, BESIDE = 0.0015, 0.004
--- Turns away from the best line that are tried for room: 15° steps.
-local STEP = math.rad(15)
+-- Turns away from the best line that are tried for room: steps of 7.5°.
+local STEP = math.rad(7.5)
 -- How much a gripper squeezes what is rigid, m of width that its fingers would still close.
 local SQUEEZE = 0.012
 
@@ -72,7 +72,7 @@ local function candidates(object, height, offset)
   local list, hints = {}, object.hints
   if hints.grasp_rim_m then
     local bottom = object.xyz[3] - object.size[3] / 2
-    for k = 0, 23 do
+    for k = 0, 47 do
       local angle = k * STEP
       local x = object.xyz[1] + hints.grasp_rim_m * math.cos(angle)
       local y = object.xyz[2] + hints.grasp_rim_m * math.sin(angle)
@@ -82,8 +82,15 @@ local function candidates(object, height, offset)
       end
     end
   else
-    for _, turn in ipairs(turns(object)) do
-      list[#list + 1] = { grasp.pose(object, height, offset, turn), 2 * math.abs(turn) }
+    -- Turned, or beside the middle of what is long.
+    local long, short = math.max(object.size[1], object.size[2]), math.min(object.size[1], object.size[2])
+    local yaw, slack = object.yaw + (object.size[1] < object.size[2] and math.pi / 2 or 0), (long - short) / 4
+    for _, along in ipairs { 0, slack, -slack } do
+      for _, turn in ipairs(turns(object)) do
+        local at = { (offset and offset[1] or 0) + along * math.cos(yaw), (offset and offset[2] or 0) + along * math.sin(yaw) }
+        list[#list + 1] = { grasp.pose(object, height, at, turn), 2 * math.abs(turn) + 100 * math.abs(along) }
+      end
+      if slack < 0.005 then break end
     end
   end
   return list

@@ -3,6 +3,8 @@ local arrange = {}
 
 -- Standard deviation of the arm's joints at the start, rad.
 local JOINT = 0.02
+-- Half of the hand along its fingers' line and across, with some room, and what it passes over when it grasps low, m.
+local PALM, LOW = { 0.108, 0.036 }, 0.05
 -- Tries before an arrangement is given up.
 local TRIES = 1000
 
@@ -19,6 +21,13 @@ local function footprint(asset, x, y, yaw)
     x = x, y = y, cos = math.cos(yaw), sin = math.sin(yaw),
     half = { (high[1] - low[1]) / 2, (high[2] - low[2]) / 2 },
   }
+end
+
+-- What the palm covers over an asset that is taken across its narrow side.
+local function palm(asset, x, y, yaw)
+  local own = footprint(asset, x, y, yaw)
+  local across = own.half[1] < own.half[2] and yaw or yaw + math.pi / 2
+  return { x = x, y = y, cos = math.cos(across), sin = math.sin(across), half = { PALM[1], PALM[2] } }
 end
 
 -- How far apart two footprints are at least: the largest gap along the sides of either (separating axes).
@@ -50,19 +59,28 @@ local function draw(rng, things)
   return placed
 end
 
+-- Whether all keep their room, and the palm fits between those that stand higher than it would.
 local function apart(things, placed, room)
   local prints = {}
   for k, thing in ipairs(things) do
     prints[k] = footprint(thing.asset, placed[k].x, placed[k].y, placed[k].yaw)
     for other = 1, k - 1 do
-      if gap(prints[k], prints[other]) < room then return false end
+      if gap(prints[k], prints[other]) < math.max(room, things[k].room or 0, things[other].room or 0) then return false end
+    end
+  end
+  for k, thing in ipairs(things) do
+    local over = thing.reachable and palm(thing.asset, placed[k].x, placed[k].y, placed[k].yaw)
+    for other = 1, over and #things or 0 do
+      local _, high = things[other].asset.shape:bounds()
+      if other ~= k and high[3] > LOW and gap(over, prints[other]) < 0 then return false end
     end
   end
   return true
 end
 
--- Places for `things` ({ name =, asset =, at = { x, y }, yaw =, reach = (m, either way in x and y), turn = (rad) }), drawn
--- anew until all are `room` (m) apart: a list of { x, y, yaw } in the same order.
+-- Places for `things` ({ name =, asset =, at = { x, y }, yaw =, reach = (m, either way in x and y), turn = (rad), room = (m), reachable = true }),
+-- drawn anew until all are `room` (m) apart, and those with a room of their own that far from all, and a hand can come
+-- down on what must be reachable: a list of { x, y, yaw } in the same order.
 function arrange.scatter(rng, things, room)
   for _ = 1, TRIES do
     local placed = draw(rng, things)

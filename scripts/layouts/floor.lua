@@ -13,8 +13,8 @@ local OTHERS = { { -150 * mm, 60 * mm }, { 100 * mm, -200 * mm }, { 150 * mm, 30
 local SOFT = { reach = 20 * mm, turn = math.rad(30) }
 local RIGID = { reach = 25 * mm, turn = 0 }
 local REGION = 10 * mm
--- Room between things, for a finger.
-local ROOM = 12 * mm
+-- Room between things, and around the target: for a finger with its sensor.
+local ROOM, AROUND = 12 * mm, 20 * mm
 
 -- Targets and distractors by task, in LIBERO's order.
 local TASKS = {
@@ -43,6 +43,7 @@ local function layout(name, asset, k, spread)
     things[#things + 1] = { name = other, asset = require("assets." .. other), at = at, reach = how.reach, turn = how.turn }
   end
   add(asset, task.far and FAR or NEAR, spread)
+  things[1].room, things[1].reachable = AROUND, true
   add(task[2], task.far and NEAR or FAR, RIGID)
   for i, at in ipairs(OTHERS) do add(task[i + 2], at, RIGID) end
   things[#things + 1] = { name = "basket", asset = basket, at = BASKET, reach = REGION }
