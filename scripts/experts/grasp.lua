@@ -47,7 +47,11 @@ end
 function grasp.closure(object)
   local known = calibrated[object.asset]
   if known then return known.lower + 0.5 * (known.at_tau - known.lower) end
-  return math.min(1, 1 - (grasp.width(object) - SQUEEZE) / STROKE)
+  local width = grasp.width(object)
+  if width >= STROKE then
+    error(("pick_place: %s is %.0f mm wide where the fingers take it; the hand opens 80 mm"):format(object.name, 1e3 * width), 0)
+  end
+  return math.min(1, 1 - (width - SQUEEZE) / STROKE)
 end
 
 -- The closure at which the gels are `room` (m, 4 mm) away from the object on either side, to approach and to let go.

@@ -25,7 +25,7 @@ local function travel(self, pose, options, closure)
   local steps = max(1, ceil(seconds / host.dt))
   for step = 1, steps do
     local share = smooth(step / steps)
-    self:command(from:towards(pose, share), start + (closure - start) * share)
+    self:command(from:towards(pose, share), start * (1 - share) + closure * share)
   end
 end
 
@@ -44,7 +44,7 @@ function Arm:close_to(closure, options)
   local start = self.closure
   local way = closure - start
   local steps = max(1, ceil((way < 0 and -way or way) / options.rate / host.dt))
-  for step = 1, steps do self:command(self.target, start + way * step / steps) end
+  for step = 1, steps do self:command(self.target, start * (1 - step / steps) + closure * (step / steps)) end
 end
 
 -- Closes on an object. A binary gripper, which knows only open and shut, shuts here and not in close_to.

@@ -191,13 +191,13 @@ impl<'a> Batch<'a> {
         let name = &asset.name;
         let cure = format!("its episodes cannot count as safe; softvt scripts/calibrate.lua --asset {name}");
         match files::calibrated(&self.run.file, asset)? {
-            Calibrated::Never => {
-                eprintln!("softvt: {name} is not calibrated (assets/calibration/{name}.json): {cure}")
-            }
+            Calibrated::Never => crate::message::tell(&format!(
+                "softvt: {name} is not calibrated (assets/calibration/{name}.json): {cure}"
+            )),
             Calibrated::Another(path) => {
-                eprintln!(
+                crate::message::tell(&format!(
                     "softvt: {path} is about another {name} (its shape, material or friction differ): {cure}"
-                );
+                ));
             }
             Calibrated::Yes { limit, file, path, text } => {
                 self.sources.insert(path, script::sha256(text.as_bytes()));
@@ -266,7 +266,11 @@ impl<'a> Batch<'a> {
                 progress.tick(&line(&finished.record));
                 // The episode counts whether or not it can be drawn.
                 if let Err(failure) = drawn {
-                    eprintln!("softvt: no video of {}: {}", line(&finished.record), failure.message);
+                    crate::message::tell(&format!(
+                        "softvt: no video of {}: {}",
+                        line(&finished.record),
+                        failure.message
+                    ));
                 }
                 records.push(finished.record);
                 Ok(())
@@ -294,7 +298,7 @@ impl<'a> Batch<'a> {
         folder.write_json(SUMMARY, &summary).map_err(folder_failure)?;
         records.sort_by_key(|r| (r.identity.task, r.identity.episode));
         interchange::write_scores(&self.out, &records, &self.released).map_err(folder_failure)?;
-        eprintln!("softvt: {}", self.out.display());
+        crate::message::tell(&format!("softvt: {}", self.out.display()));
         Ok(summary)
     }
 

@@ -82,7 +82,7 @@ fn write(base: &Path, relative: &str, bytes: &[u8]) -> Result<(), Failure> {
         make_folder(&folder)?;
     }
     replace(path, bytes).map_err(Failure::input)?;
-    eprintln!("softvt: wrote {}", path.display());
+    crate::message::tell(&format!("softvt: wrote {}", path.display()));
     Ok(())
 }
 

@@ -55,16 +55,16 @@ impl Failure {
 /// Runs the command line of this process and returns its exit code.
 pub fn main() -> ExitCode {
     panic::set_hook(Box::new(|info| {
-        eprintln!(
+        crate::message::tell(&format!(
             "softvt: internal error: {info}\nThis is a defect of softvt; please report it with the command that led here."
-        );
+        ));
     }));
     let outcome = panic::catch_unwind(run);
     let code = match outcome {
         Ok(Ok(())) => code::OK,
         Ok(Err(failure)) => {
             if !failure.message.is_empty() {
-                eprintln!("softvt: {}", message::plain(&failure.message));
+                crate::message::tell(&format!("softvt: {}", message::plain(&failure.message)));
             }
             failure.code
         }
@@ -106,10 +106,15 @@ fn watch_interrupts() {
         if stop::request() {
             end();
         }
-        eprintln!("softvt: stopping; finished episodes stay (press again to stop at once)");
+        crate::message::tell(&format!(
+            "softvt: stopping; finished episodes stay (press again to stop at once)"
+        ));
         thread::spawn(move || {
             thread::sleep(PATIENCE);
-            eprintln!("softvt: interrupted; something did not end within {} s", PATIENCE.as_secs());
+            crate::message::tell(&format!(
+                "softvt: interrupted; something did not end within {} s",
+                PATIENCE.as_secs()
+            ));
             end();
         });
     };

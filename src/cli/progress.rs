@@ -36,7 +36,9 @@ impl Progress {
                 bar.set_message(message::plain(message).into_owned());
                 bar.inc(1);
             }
-            None => eprintln!("[{}/{}] {}", self.done, self.total, message::plain(message)),
+            None => {
+                crate::message::tell(&format!("[{}/{}] {}", self.done, self.total, message::plain(message)))
+            }
         }
     }
 

@@ -10,10 +10,16 @@ use super::{
 };
 use crate::{
     benchmark::Plan,
+    physics::world::Frame,
     report::film::{Caption, write_panels, write_stills, write_video},
     rollout::stop,
     script,
 };
+
+/// How hard the pads are pressed on, N: what is worst for something that does not deform.
+fn press(frame: &Frame) -> f64 {
+    frame.patches.iter().flat_map(|patch| &patch.points).map(|point| point.pressure * point.area).sum()
+}
 
 /// Runs one episode and writes into the folder: `episode.mp4`, one of its pictures as `episode.png`, and stills of its
 /// first, worst and last states. Files of the same name are replaced.
@@ -49,9 +55,9 @@ pub fn run(view: &View) -> Result<(), Failure> {
     let finished = batch.episode(0, true)?;
     let caption = Caption::of(&finished.record);
     let Some(mut film) = finished.film else { return Ok(()) };
-    let d_pct = |at: usize| film.d_pct[at].unwrap_or(0.0);
     let last = film.frames.len().saturating_sub(1);
-    let worst = (0..=last).max_by(|&a, &b| d_pct(a).total_cmp(&d_pct(b)).then(b.cmp(&a))).unwrap_or(0);
+    let hard = |at: usize| film.d_pct[at].unwrap_or_else(|| press(&film.frames[at]));
+    let worst = (0..=last).max_by(|&a, &b| hard(a).total_cmp(&hard(b)).then(b.cmp(&a))).unwrap_or(0);
     let moments = [("start", 0), ("worst", worst), ("end", last)];
     let mut written =
         write_stills(&mut film, &moments, view.native, &dir, stop::requested).map_err(film_failure)?;

@@ -29,7 +29,7 @@ pub type OnStuck = Arc<dyn Fn(&str) + Send + Sync>;
 /// Prints the message and ends the process with the exit code of bad input; finished episodes are already on disk.
 pub fn end_process() -> OnStuck {
     Arc::new(|message| {
-        eprintln!("softvt: {message}");
+        crate::message::tell(&format!("softvt: {message}"));
         std::process::exit(2);
     })
 }

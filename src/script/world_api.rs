@@ -154,7 +154,7 @@ impl Hosted for LuaWorld {
             Ok(())
         });
         method(methods, "report_timing", |_, this: &Self, ()| {
-            eprintln!("{}", locked(&this.0).timing);
+            crate::message::tell(&format!("{}", locked(&this.0).timing));
             Ok(())
         });
     }

@@ -153,7 +153,6 @@ mod tests {
         for (lamp, degrees) in lamps.iter().zip([-97.0_f32, 10.0, 84.0]) {
             let found = lamp.towards[1].atan2(lamp.towards[0]).to_degrees();
             let elevation = lamp.rise.atan().to_degrees();
-            eprintln!("lamp at {found:.1}°, {elevation:.1}° high");
             assert!((found - degrees).abs() < 5.0, "{found}° instead of {degrees}°");
             assert!((10.0..35.0).contains(&elevation), "{elevation}° high");
         }
