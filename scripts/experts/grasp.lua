@@ -81,8 +81,10 @@ local function candidates(object, height, offset)
       local x = object.xyz[1] + hints.grasp_rim_m * math.cos(angle)
       local y = object.xyz[2] + hints.grasp_rim_m * math.sin(angle)
       local yaw = nearest(angle - math.pi / 2)
+      -- The side of the rim that is nearer to the robot is reached with the arm less stretched.
+      local stretch = 8 * (x - object.xyz[1])
       for _, up in ipairs { 0, 0.003, 0.006 } do
-        list[#list + 1] = { softvt.pose { xyz = { x, y, bottom + height + up }, yaw = yaw }, math.abs(yaw) + 300 * up }
+        list[#list + 1] = { softvt.pose { xyz = { x, y, bottom + height + up }, yaw = yaw }, math.abs(yaw) + stretch + 300 * up }
       end
     end
   else

@@ -34,7 +34,7 @@ local function take(arm, scene, spec, pace)
   local height = grasp.height(object)
   local at, opening, room = grasp.choose(scene, object, height, { spread(MISS), spread(MISS) })
   if room < 0 then return false end
-  local over = math.max(at.z + 0.06, route.height(scene, arm.pose.xyz, at.xyz, nil, OVER))
+  local over = route.over(scene, arm.pose.xyz, at, 0.05, BESIDE)
   arm:move_to(arm.target:at { arm.target.x, arm.target.y, math.max(over, arm.target.z) }, { speed = 0.4 * pace })
   arm:move_to(at:at { at.x, at.y, over }, { speed = 0.4 * pace, closure = opening })
   arm:move_to(at, { speed = 0.25 * pace, closure = opening })
@@ -109,7 +109,7 @@ return function(spec)
       if held then return put(arm, scene, spec, height, pace) end
       -- Not forced: let go, rise, look again.
       arm:open()
-      arm:move_by({ 0, 0, 0.08 }, { speed = 0.25 })
+      arm:move_by({ 0, 0, 0.03 }, { speed = 0.25 })
     end
   end
 end

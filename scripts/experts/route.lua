@@ -13,25 +13,37 @@ local function from_line(p, a, b)
   return math.sqrt((p[1] - a[1] - share * dx) ^ 2 + (p[2] - a[2] - share * dy) ^ 2)
 end
 
--- Height of the tool centre point at which the hand, and what it holds `below` (m) beneath it and `reach` (m) to its
--- sides, passes over everything between two points by `margin` (m).
+-- Height of the tool centre point at which the hand, and what it holds ({ object =, below = m under it }), passes over
+-- everything between two points by `margin` (m).
 function route.height(scene, from, to, carried, margin)
-  local reach, below = HAND, CASE
-  local held
-  if carried then
-    held = carried.object.name
-    reach = math.max(HAND, math.sqrt(carried.object.size[1] ^ 2 + carried.object.size[2] ^ 2) / 2)
-    below = math.max(CASE, carried.below)
-  end
+  local size, name = carried.object.size, carried.object.name
+  local reach = math.max(HAND, math.sqrt(size[1] ^ 2 + size[2] ^ 2) / 2)
   local top = 0
   for _, object in ipairs(scene:objects()) do
     local radius = math.sqrt(object.size[1] ^ 2 + object.size[2] ^ 2) / 2
     -- What reaches under the whole way is the support, or scenery.
-    if object.name ~= held and radius < 0.5 and from_line(object.xyz, from, to) < reach + radius then
+    if object.name ~= name and radius < 0.5 and from_line(object.xyz, from, to) < reach + radius then
       top = math.max(top, object.xyz[3] + object.size[3] / 2)
     end
   end
-  return top + below + margin
+  return top + math.max(CASE, carried.below) + margin
+end
+
+-- The least height of the tool centre point, from that of `pose` and `rise` (m) on, at which the empty hand comes to over
+-- `pose` from `from` with `margin` (m) to everything; where there is none, the one with the most room.
+function route.over(scene, from, pose, rise, margin)
+  local best
+  for step = 0, 8 do
+    local z, room = pose.z + rise + 0.015 * step, math.huge
+    for k = 1, 8 do
+      local share = k / 8
+      local x, y = from[1] + share * (pose.x - from[1]), from[2] + share * (pose.y - from[2])
+      room = math.min(room, (scene:clearance(pose:at { x, y, z })))
+    end
+    if room >= margin then return z end
+    if not best or room > best.room then best = { z = z, room = room } end
+  end
+  return best.z
 end
 
 return route
