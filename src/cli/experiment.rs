@@ -33,6 +33,10 @@ pub fn run(run: &Run, loaded: &Loaded, name: &str, points: usize, columns: &[Str
                 None => Experiment::open(loaded).map_err(Failure::input)?,
             };
             let rows = machine.run(point).map_err(Failure::input)?;
+            // What was cut short may have caught its errors and gone on to a row that is not one.
+            if stop::requested() {
+                return Err(Failure::interrupted("interrupted"));
+            }
             idle.lock().unwrap_or_else(|p| p.into_inner()).push(machine);
             Ok(rows)
         },

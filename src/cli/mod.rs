@@ -55,7 +55,7 @@ impl Failure {
 /// Runs the command line of this process and returns its exit code.
 pub fn main() -> ExitCode {
     panic::set_hook(Box::new(|info| {
-        crate::message::tell(&format!(
+        message::tell(&format!(
             "softvt: internal error: {info}\nThis is a defect of softvt; please report it with the command that led here."
         ));
     }));
@@ -64,7 +64,7 @@ pub fn main() -> ExitCode {
         Ok(Ok(())) => code::OK,
         Ok(Err(failure)) => {
             if !failure.message.is_empty() {
-                crate::message::tell(&format!("softvt: {}", message::plain(&failure.message)));
+                message::tell(&format!("softvt: {}", message::plain(&failure.message)));
             }
             failure.code
         }
@@ -106,12 +106,10 @@ fn watch_interrupts() {
         if stop::request() {
             end();
         }
-        crate::message::tell(&format!(
-            "softvt: stopping; finished episodes stay (press again to stop at once)"
-        ));
+        message::tell("softvt: stopping; finished episodes stay (press again to stop at once)");
         thread::spawn(move || {
             thread::sleep(PATIENCE);
-            crate::message::tell(&format!(
+            message::tell(&format!(
                 "softvt: interrupted; something did not end within {} s",
                 PATIENCE.as_secs()
             ));

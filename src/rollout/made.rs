@@ -9,9 +9,12 @@ const MOST: usize = 64;
 /// The place of one value: empty until it is made.
 type Cell<V> = Arc<Mutex<Option<V>>>;
 
+/// Places by key, the ones used last at the end.
+type Kept<K, V> = Vec<(K, Cell<V>)>;
+
 /// Values by key: the ones used last.
 #[derive(Debug)]
-pub(super) struct Made<K, V>(Arc<Mutex<Vec<(K, Cell<V>)>>>);
+pub(super) struct Made<K, V>(Arc<Mutex<Kept<K, V>>>);
 
 impl<K, V> Clone for Made<K, V> {
     fn clone(&self) -> Self {

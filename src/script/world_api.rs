@@ -154,7 +154,7 @@ impl Hosted for LuaWorld {
             Ok(())
         });
         method(methods, "report_timing", |_, this: &Self, ()| {
-            crate::message::tell(&format!("{}", locked(&this.0).timing));
+            crate::message::tell(&locked(&this.0).timing.to_string());
             Ok(())
         });
     }

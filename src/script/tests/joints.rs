@@ -152,7 +152,7 @@ fn walls_that_others_could_pass_through_are_refused_where_the_object_is_placed()
     let scene = open(&suite(&thin, "scene:add { name = 'chest', asset = chest, at = { 0, 0 } }")).unwrap();
     let built =
         Simulation::new(Arc::new(scene), &Default::default(), &Default::default(), &RestCache::default());
-    let message = built.err().expect("too thin").to_string();
+    let message = built.expect_err("too thin").to_string();
     let expected = "9: asset chest: part drawer: its walls are about 1.6 mm thick, expected at least 4 mm";
     assert!(message.contains(expected), "{message}");
 }

@@ -84,7 +84,7 @@ fn check(camera: &Camera) -> Result<(), CameraError> {
         return wrong("position", "metres within ±1e6", format!("{:?}", place.as_slice()));
     }
     // A turn that is no number has no norm either.
-    if !((turn.norm() - 1.0).abs() <= 1e-3) {
+    if !(0.999..=1.001).contains(&turn.norm()) {
         return wrong("quat", "a unit quaternion", format!("{:?} (x, y, z, w)", turn.as_slice()));
     }
     Ok(())

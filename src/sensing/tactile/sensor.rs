@@ -25,7 +25,7 @@ pub enum SensorError {
 /// How a picture comes from a field.
 #[derive(Debug)]
 enum Eye {
-    Polynomial { optics: Optics, shadows: bool },
+    Polynomial { optics: Box<Optics>, shadows: bool },
     Taxim(Box<Taxim>),
 }
 
@@ -57,7 +57,9 @@ impl Sensor {
     pub fn new(spec: &TactileSpec) -> Result<Self, SensorError> {
         let gel = Gel::new(spec, PadSurface::default())?;
         let eye = match &spec.optics {
-            OpticsModel::Polynomial => Eye::Polynomial { optics: Optics::mini()?, shadows: spec.shadows },
+            OpticsModel::Polynomial => {
+                Eye::Polynomial { optics: Box::new(Optics::mini()?), shadows: spec.shadows }
+            }
             OpticsModel::Taxim { tables } => Eye::Taxim(Box::new(Taxim::load(tables)?)),
         };
         Ok(Self { gel, eye, markers: spec.markers })
