@@ -47,14 +47,14 @@ fn finished_episodes_survive_an_interrupt() {
     assert!(!project.path("run/summary.json").exists());
 }
 
-/// An experiment of 100 points: the first ends at once, the others squeeze for an hour.
+/// An experiment of 100 points: the first ends at once, the others go on for days.
 const SLOW: &str = r#"local points = {}
 for i = 1, 100 do points[i] = { i = i } end
 return softvt.experiment { name = "e", options = {}, points = function() return points end, run = function(point)
   if point.i == 1 then return { i = 1 } end
-  local world = softvt.world { sleeping = false }
+  local world = softvt.world { sleeping = false, gravity = { 0, 0, 0 } }
   world:soft { name = "cube", shape = softvt.shape.box { size = { 0.05, 0.05, 0.05 } }, youngs_pa = 3e4, poisson = 0.4, density = 300, xyz = { 0, 0, 1 } }
-  for _ = 1, 60 * 3600 do pcall(world.step, world) end
+  for _ = 1, 1e9 do pcall(world.step, world) end
   return { i = point.i }
 end }
 "#;
