@@ -22,14 +22,24 @@ local function nearest(yaw)
   return yaw
 end
 
+-- The direction of an object's longer horizontal side, rad: the fingers close across it.
+function grasp.lie(object) return object.yaw + (object.size[1] < object.size[2] and math.pi / 2 or 0) end
+
+-- Height of an object's lowest point, m.
+function grasp.bottom(object) return object.xyz[3] - object.size[3] / 2 end
+
+-- An object's longer and shorter horizontal side, m.
+function grasp.sides(object)
+  return math.max(object.size[1], object.size[2]), math.min(object.size[1], object.size[2])
+end
+
 -- A pose over an object: fingers across its shorter horizontal side. `height` is that of the tool centre point over the
 -- object's lowest point; `offset` (m) and `turn` (rad) displace the grasp on purpose, for trials.
 function grasp.pose(object, height, offset, turn)
-  local yaw = object.yaw + (object.size[1] < object.size[2] and math.pi / 2 or 0) + (turn or 0)
+  local yaw = grasp.lie(object) + (turn or 0)
   local x, y = object.xyz[1], object.xyz[2]
   if offset then x, y = x + offset[1], y + offset[2] end
-  local bottom = object.xyz[3] - object.size[3] / 2
-  return softvt.pose { xyz = { x, y, bottom + height }, yaw = nearest(yaw) }
+  return softvt.pose { xyz = { x, y, grasp.bottom(object) + height }, yaw = nearest(yaw) }
 end
 
 -- Height of the tool centre point over an object's lowest point when it grasps: half way up, or as low as cases allow on
@@ -62,7 +72,7 @@ end
 -- Turns of the hand to try, the best first: about the narrow side, or all around what is round.
 local function turns(object)
   local list = { 0 }
-  local long, short = math.max(object.size[1], object.size[2]), math.min(object.size[1], object.size[2])
+  local long, short = grasp.sides(object)
   -- Turned by more than this, a box would be wider than the fingers open.
   local most = long < 1.1 * short and math.pi / 2 or math.rad(15)
   for k = 1, math.floor(most / STEP + 1e-9) do
@@ -75,7 +85,7 @@ end
 local function candidates(object, height, offset)
   local list, hints = {}, object.hints
   if hints.grasp_rim_m then
-    local bottom = object.xyz[3] - object.size[3] / 2
+    local bottom = grasp.bottom(object)
     for k = 0, 47 do
       local angle = k * STEP
       local x = object.xyz[1] + hints.grasp_rim_m * math.cos(angle)
@@ -89,8 +99,8 @@ local function candidates(object, height, offset)
     end
   else
     -- Turned, or beside the middle of what is long.
-    local long, short = math.max(object.size[1], object.size[2]), math.min(object.size[1], object.size[2])
-    local yaw, slack = object.yaw + (object.size[1] < object.size[2] and math.pi / 2 or 0), (long - short) / 4
+    local long, short = grasp.sides(object)
+    local yaw, slack = grasp.lie(object), (long - short) / 4
     for _, along in ipairs { 0, slack, -slack } do
       for _, turn in ipairs(turns(object)) do
         local at = { (offset and offset[1] or 0) + along * math.cos(yaw), (offset and offset[2] or 0) + along * math.sin(yaw) }
@@ -106,10 +116,10 @@ end
 -- The third result is the room that they have, m; negative if the hand would touch something.
 function grasp.choose(scene, object, height, offset)
   local best
+  local all, ignore = candidates(object, height, offset), object.hints.grasp_rim_m and {} or { object.name }
   for _, opening in ipairs { 0, grasp.clear(object, 0.010), grasp.clear(object, 0.005) } do
-    for _, candidate in ipairs(candidates(object, height, offset)) do
+    for _, candidate in ipairs(all) do
       local pose, cost = candidate[1], candidate[2]
-      local ignore = object.hints.grasp_rim_m and {} or { object.name }
       local room = scene:clearance(pose, { width = STROKE * (1 - opening), ignore = ignore })
       -- Room beyond what is needed is worth nothing.
       local worth = math.min(room, BESIDE) * 1e3 - 0.1 * cost - opening

@@ -26,8 +26,6 @@ end
 
 local function spread(most) return (2 * math.random() - 1) * most end
 
-local function bottom(object) return object.xyz[3] - object.size[3] / 2 end
-
 -- Takes the object and lifts it off what it stands on; whether it came along.
 local function take(arm, scene, spec, pace)
   local object = scene:object(spec.object)
@@ -52,9 +50,9 @@ local function turns(object, target)
   local list = { 0 }
   for k = 1, 6 do list[#list + 1], list[#list + 2] = k * math.rad(15), -k * math.rad(15) end
   -- What is long goes along the longer side of what it is put into.
-  local function lie(o) return o.yaw + (o.size[1] < o.size[2] and math.pi / 2 or 0) end
-  if target.hints.wall_m and math.max(object.size[1], object.size[2]) > 1.3 * math.min(object.size[1], object.size[2]) then
-    local turn = (lie(target) - lie(object)) % math.pi
+  local long, short = grasp.sides(object)
+  if target.hints.wall_m and long > 1.3 * short then
+    local turn = (grasp.lie(target) - grasp.lie(object)) % math.pi
     table.insert(list, 1, turn > math.pi / 2 and turn - math.pi or turn)
   end
   return list
@@ -63,13 +61,13 @@ end
 -- Where to let go: as low as the hand has room for, the object over the middle of the target.
 local function resting_pose(arm, scene, spec, height)
   local object, target = scene:object(spec.object), scene:object(spec.target)
-  local surface = bottom(target) + (target.hints.surface_m or target.size[3]) + height + DROP
+  local surface = grasp.bottom(target) + (target.hints.surface_m or target.size[3]) + height + DROP
   local width = 0.08 * (1 - grasp.clear(object))
   -- The object may hang off the tool's axis; that offset turns with the hand.
   local dx, dy = object.xyz[1] - arm.pose.x, object.xyz[2] - arm.pose.y
-  local best
+  local best, ways = nil, turns(object, target)
   for up = 0, 20 do
-    for _, turn in ipairs(turns(object, target)) do
+    for _, turn in ipairs(ways) do
       local c, s = math.cos(turn), math.sin(turn)
       local x, y = target.xyz[1] - (c * dx - s * dy), target.xyz[2] - (s * dx + c * dy)
       local pose = arm.target:turned(turn):at { x, y, surface + 0.005 * up }

@@ -198,7 +198,7 @@ pub(super) fn finger_mass(side: Side, mass: f64) -> (Vec3, Mat3) {
 }
 
 /// Direction along the hand's y in which a finger opens.
-fn outward(side: Side) -> f64 {
+pub(super) fn outward(side: Side) -> f64 {
     match side {
         Side::Left => 1.0,
         Side::Right => -1.0,

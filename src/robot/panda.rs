@@ -134,11 +134,7 @@ pub fn tool_in_hand() -> Pose {
 
 /// A finger's link in the hand frame, its gel's apex `q` (m) from the hand's middle plane.
 pub fn finger_in_hand(side: Side, q: f64) -> Pose {
-    let out = match side {
-        Side::Left => q,
-        Side::Right => -q,
-    };
-    Pose::translation(0.0, out, FINGER_Z)
+    Pose::translation(0.0, pads::outward(side) * q, FINGER_Z)
 }
 
 /// Tool frame in the frame of [`HAND_LINK`].
