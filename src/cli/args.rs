@@ -1,25 +1,21 @@
 //! What may be typed: the runner's own flags and, beside them, the options that a script declares.
 
-use std::path::{Path, PathBuf};
-
-use clap::{
-    Arg, ArgAction, ArgMatches, builder::PossibleValuesParser, error::ErrorKind, parser::ValueSource,
-    value_parser,
+use std::{
+    path::{Path, PathBuf},
+    time::Duration,
 };
 
-use super::{Failure, code};
+use clap::{Arg, ArgAction, ArgMatches, error::ErrorKind, parser::ValueSource, value_parser};
+
+use super::{
+    Failure, code,
+    drivers::{Choice, policy_word},
+};
 use crate::{
     benchmark::Suite,
+    policy::remote::Protocol,
     script::{self, OptionSpec, OptionValue},
 };
-
-/// Policies that need no server and no file.
-pub const POLICIES: [(&str, &str); 4] = [
-    ("expert", "the task's scripted expert (privileged: it sees the true state)"),
-    ("expert-binary", "the same expert with a gripper that is only open or shut (privileged)"),
-    ("noop", "holds still with the gripper open"),
-    ("random", "wanders at random"),
-];
 
 /// A command.
 #[derive(Debug)]
@@ -57,8 +53,8 @@ pub struct Run {
     pub file: PathBuf,
     /// Words for the script's own options.
     pub script_words: Vec<String>,
-    /// Policy name.
-    pub policy: String,
+    /// Who drives.
+    pub policy: Choice,
     /// Tasks to run: indices or parts of prompts; all if empty.
     pub tasks: Vec<String>,
     /// Episodes a task; the suite's own number if none.
@@ -244,7 +240,6 @@ fn list(name: &'static str, help: &'static str) -> Arg {
 
 /// A command on a script with what decides how an episode goes.
 fn on_script(command: clap::Command) -> clap::Command {
-    let policies = POLICIES.map(|(name, _)| name);
     command
         .arg(
             Arg::new("file").value_name("FILE.lua").help("The script whose plan to carry out").required(true),
@@ -253,8 +248,37 @@ fn on_script(command: clap::Command) -> clap::Command {
             flag("policy", "Who drives")
                 .value_name("POLICY")
                 .default_value("expert")
-                .value_parser(PossibleValuesParser::new(policies)),
+                .value_parser(policy_word),
         )
+        .arg(
+            flag("profile", "What a policy gets and what its numbers mean")
+                .value_name("PROFILE")
+                .default_value("visuo_tactile"),
+        )
+        .arg(
+            flag("protocol", "How a policy's server talks")
+                .value_name("PROTOCOL")
+                .default_value("openpi")
+                .value_parser(["openpi", "vla-eval"]),
+        )
+        .arg(
+            flag("gripper", "Whether a policy's gripper is only open or shut, if its profile says otherwise")
+                .value_name("CODE")
+                .value_parser(["binary", "continuous"]),
+        )
+        .arg(
+            flag("replan", "Actions of each of a policy's answers that are carried out")
+                .value_name("N")
+                .default_value("10")
+                .value_parser(value_parser!(u16).range(1..)),
+        )
+        .arg(
+            flag("policy-timeout", "Longest wait for a policy's server and for each of its answers, s")
+                .value_name("SECONDS")
+                .default_value("60")
+                .value_parser(patience),
+        )
+        .arg(flag("name", "How results call the policy").value_name("NAME").value_parser(policy_name))
         .arg(
             flag("seed", "Base seed")
                 .value_name("S")
@@ -354,7 +378,7 @@ fn common(matches: &ArgMatches, options: &[OptionSpec]) -> Result<Run, Failure> 
     Ok(Run {
         file: PathBuf::from(text(matches, "file")),
         script_words,
-        policy: text(matches, "policy"),
+        policy: choice(matches),
         tasks: Vec::new(),
         episodes: None,
         seed: matches.get_one("seed").copied().unwrap_or(0),
@@ -367,6 +391,31 @@ fn common(matches: &ArgMatches, options: &[OptionSpec]) -> Result<Run, Failure> 
         out: out.map(PathBuf::from),
         json: false,
     })
+}
+
+fn choice(matches: &ArgMatches) -> Choice {
+    Choice {
+        word: text(matches, "policy"),
+        name: matches.get_one("name").cloned(),
+        profile: text(matches, "profile"),
+        protocol: match text(matches, "protocol").as_str() {
+            "vla-eval" => Protocol::VlaEval,
+            _ => Protocol::Openpi,
+        },
+        replan: matches.get_one::<u16>("replan").map_or(10, |n| usize::from(*n)),
+        binary: matches.get_one::<String>("gripper").map(|code| code == "binary"),
+        patience: matches.get_one("policy-timeout").copied().unwrap_or_default(),
+    }
+}
+
+fn patience(word: &str) -> Result<Duration, String> {
+    let seconds = word.parse().ok().filter(|seconds| (0.01..=86_400.0).contains(seconds));
+    seconds.map(Duration::from_secs_f64).ok_or_else(|| "expected seconds in 0.01..86400".to_owned())
+}
+
+fn policy_name(word: &str) -> Result<String, String> {
+    let fits = !word.trim().is_empty() && word.len() <= 80 && !word.chars().any(char::is_control);
+    if fits { Ok(word.to_owned()) } else { Err("expected a name of 1 to 80 letters".to_owned()) }
 }
 
 fn many(matches: &ArgMatches, name: &str) -> Vec<String> {

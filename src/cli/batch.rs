@@ -8,13 +8,14 @@ use super::{
     Failure,
     args::{Run, Video},
     code,
+    drivers::Drivers,
     files::{self, Calibrated, make_folder},
     progress::Progress,
 };
 use crate::{
     benchmark::{Suite, Task, seed::Split, settings::Settings},
     evaluation::{record::EpisodeRecord, safety::Limit, summary::Summary, thresholds::Thresholds},
-    policy::{Policy, Streams, builtin},
+    policy::{Streams, TaskBrief, profile::Profile},
     report::{
         film::{self, Caption, FilmError},
         interchange::{self, DebugFrame, DebugShape},
@@ -25,7 +26,7 @@ use crate::{
         ScoreFrame, SenseError, Senses, Simulation, Which, batch, check_senses, stop, target_asset,
     },
     scene::{Asset, Body, Scene},
-    script::{self, ExpertController, Loaded},
+    script::{self, Loaded},
 };
 
 /// Everything needed to repeat a run.
@@ -37,6 +38,12 @@ struct RunInfo<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     twin: Option<&'a str>,
     policy: &'a str,
+    /// What a policy behind a network gets, and what its numbers mean.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    profile: Option<Profile>,
+    /// Actions of a chunk that are carried out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    replan: Option<usize>,
     privileged: bool,
     seed: u64,
     split: &'a str,
@@ -100,6 +107,7 @@ impl<'a> Batch<'a> {
         for (name, value) in &run.shifts {
             script::check_shift(&suite.shifts, name, *value).map_err(|e| wrong("--shift", e.to_string()))?;
         }
+        let drivers = Drivers::new(&run.policy)?;
         let made_by = format!("softvt {}", env!("CARGO_PKG_VERSION"));
         Ok(Self {
             run,
@@ -116,7 +124,7 @@ impl<'a> Batch<'a> {
             out,
             films: run.video.is_some(),
             force_observed: false,
-            drive: driver,
+            drive: Box::new(move |opened, brief| drivers.drive(opened, brief)),
         })
     }
 
@@ -128,6 +136,10 @@ impl<'a> Batch<'a> {
             (opened.scene, opened.nominal) = (opened.scene.rigid_twin(), opened.nominal.rigid_twin());
         }
         Ok(opened)
+    }
+
+    fn brief(&self, task: &Task, episode: u32) -> TaskBrief {
+        TaskBrief { suite: self.name.clone(), task: task.id, prompt: task.prompt.clone(), episode }
     }
 
     fn request(&self, task: &Task, episode: u32) -> script::EpisodeRequest {
@@ -159,7 +171,7 @@ impl<'a> Batch<'a> {
                 self.limits.insert(asset.name.clone(), limit);
             }
             let scene = Arc::new(opened.scene.clone());
-            let streams = (self.drive)(self.run, opened)?.streams();
+            let streams = (self.drive)(opened, self.brief(task, first))?.streams();
             self.force_observed |= streams.force;
             self.try_out(scene, streams).map_err(|error| {
                 self.episode_failure(&match error {
@@ -227,8 +239,10 @@ impl<'a> Batch<'a> {
             script: self.loaded.main.clone(),
             suite: &self.suite.name,
             twin: self.run.twin.then_some("rigid"),
-            policy: &self.run.policy,
-            privileged: self.run.policy.starts_with("expert"),
+            policy: self.run.policy.name(),
+            profile: self.run.policy.profile()?,
+            replan: self.run.policy.is_remote().then_some(self.run.policy.replan),
+            privileged: self.run.policy.is_privileged(),
             seed: self.run.seed,
             split: Split::Validation.name(),
             tasks: tasks.iter().map(|t| t.id).collect(),
@@ -294,7 +308,7 @@ impl<'a> Batch<'a> {
             Ok(()) if stop::requested() => return Err(interrupted()),
             Ok(()) => {}
         }
-        let summary = Summary::of(&self.name, &self.run.policy, &records);
+        let summary = Summary::of(&self.name, self.run.policy.name(), &records);
         folder.write_json(SUMMARY, &summary).map_err(folder_failure)?;
         records.sort_by_key(|r| (r.identity.task, r.identity.episode));
         interchange::write_scores(&self.out, &records, &self.released).map_err(folder_failure)?;
@@ -336,7 +350,7 @@ impl<'a> Batch<'a> {
             episode,
             seed: self.run.seed,
             split: Split::Validation,
-            policy: &self.run.policy,
+            policy: self.run.policy.name(),
         };
         let scenes = (&opened.nominal, opened.scene.clone());
         let spec = EpisodeSpec {
@@ -345,7 +359,7 @@ impl<'a> Batch<'a> {
             trace: self.run.trace,
             ..EpisodeSpec::new(&which, task, scenes, &self.settings)
         };
-        let driver = (self.drive)(self.run, opened)?;
+        let driver = (self.drive)(opened, self.brief(task, episode))?;
         let mut driver = batch::Stoppable { driver, stop: &stop::FLAG };
         let started = Episode::start(spec, &self.cache, &self.looks).map_err(|e| self.episode_failure(&e))?;
         started.run(&mut driver).map_err(|e| self.episode_failure(&e))
@@ -395,24 +409,7 @@ impl<'a> Batch<'a> {
 }
 
 /// Makes whoever drives an episode.
-type Drive = fn(&Run, script::Episode) -> Result<Box<dyn Controller>, Failure>;
-
-/// The policy of the command line.
-fn driver(run: &Run, opened: script::Episode) -> Result<Box<dyn Controller>, Failure> {
-    let boxed = |policy: Box<dyn Policy>| -> Box<dyn Controller> { Box::new(policy) };
-    match run.policy.as_str() {
-        "noop" => Ok(boxed(Box::<builtin::Noop>::default())),
-        "random" => {
-            let mut stream = opened.seed.stream(crate::benchmark::seed::Stream::Script);
-            Ok(boxed(Box::new(builtin::Random::new(rand::RngCore::next_u64(&mut stream)))))
-        }
-        policy => {
-            let expert = opened.expert().map_err(Failure::input)?;
-            let expert = expert.ok_or_else(|| Failure::input("the task has no expert"))?;
-            Ok(Box::new(ExpertController::new(expert, policy == "expert-binary")))
-        }
-    }
-}
+type Drive = Box<dyn Fn(script::Episode, TaskBrief) -> Result<Box<dyn Controller>, Failure> + Sync>;
 
 /// A film that could not be made.
 pub(super) fn film_failure(error: FilmError) -> Failure {

@@ -2,7 +2,7 @@ use super::*;
 use crate::{
     benchmark::Plan,
     cli::args::{self, Command},
-    policy::{Action, Observation},
+    policy::{Action, ActionChunk, Chunked, Observation, Policy, PolicyError},
     report::run_folder::EPISODES,
 };
 
@@ -18,15 +18,14 @@ impl Policy for Feeler {
         Streams { force: true, ..Streams::default() }
     }
 
-    fn act(&mut self, seen: &Observation) -> Result<Action, String> {
-        seen.forces.as_ref().ok_or("no forces")?;
-        Ok(Action { position_b: seen.ee_position_b, axis_angle_b: seen.ee_axis_angle_b, closure: 0.0 })
+    fn act(&mut self, seen: &Observation) -> Result<ActionChunk, PolicyError> {
+        seen.forces.as_ref().ok_or(PolicyError::Action("no forces".to_owned()))?;
+        Ok(Action { position_b: seen.ee_position_b, axis_angle_b: seen.ee_axis_angle_b, closure: 0.0 }.into())
     }
 }
 
-fn feeler(_: &Run, _: script::Episode) -> Result<Box<dyn Controller>, Failure> {
-    let policy: Box<dyn Policy> = Box::new(Feeler);
-    Ok(Box::new(policy))
+fn feeler(_: script::Episode, brief: TaskBrief) -> Result<Box<dyn Controller>, Failure> {
+    Ok(Box::new(Chunked::new(Box::new(Feeler), brief, 1)))
 }
 
 #[test]
@@ -40,10 +39,12 @@ fn every_file_of_a_run_says_whether_the_policy_saw_true_forces() {
     suite.tasks[0].budget_steps = 3;
     let tasks: Vec<&Task> = suite.tasks.iter().collect();
     let root = tempfile::tempdir().expect("a folder");
-    for (out, drive, felt) in [("blind", driver as Drive, false), ("felt", feeler as Drive, true)] {
+    for (out, felt) in [("blind", false), ("felt", true)] {
         let dir = root.path().join(out);
         let mut batch = Batch::new(&run, &loaded, &suite, (vec![(tasks[0], 0)], dir.clone())).expect("made");
-        batch.drive = drive;
+        if felt {
+            batch.drive = Box::new(feeler);
+        }
         batch.prepare(&tasks).expect("nothing is wrong");
         let folder = RunFolder::create(&dir).expect("a folder");
         batch.write_info(&folder, &tasks, 1).expect("written");

@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use super::{Failure, args::Run, evaluate, print};
+use super::{Failure, args::Run, drivers::Choice, evaluate, print};
 use crate::script;
 
 /// The episode whose final state is published, `assets/golden.json`.
@@ -46,7 +46,7 @@ fn golden_run(golden: &Golden) -> Run {
     Run {
         file: golden.script.clone().into(),
         script_words: Vec::new(),
-        policy: "expert".to_owned(),
+        policy: Choice::expert(),
         tasks: vec![golden.task.to_string()],
         episodes: Some(1),
         seed: 0,

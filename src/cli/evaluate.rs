@@ -94,7 +94,7 @@ fn out_dir(run: &Run, suite: &str, level: Option<&str>) -> PathBuf {
     match &run.out {
         Some(dir) => level.map_or(dir.clone(), |level| dir.join(level)),
         None => (1..)
-            .map(|n| PathBuf::from(format!("runs/{suite}-{}-{n:03}", run.policy)))
+            .map(|n| PathBuf::from(format!("runs/{suite}-{}-{n:03}", plain(run.policy.name()))))
             .find(|dir| !dir.exists())
             .unwrap_or_default(),
     }
@@ -163,7 +163,7 @@ pub(super) fn chosen<'a>(run: &Run, suite: &'a Suite) -> Result<Vec<&'a Task>, F
     }
     found.sort_by_key(|task| task.id);
     found.dedup_by_key(|task| task.id);
-    if let Some(task) = found.iter().find(|t| !t.expert && run.policy.starts_with("expert")) {
+    if let Some(task) = found.iter().find(|t| !t.expert && run.policy.is_privileged()) {
         let message =
             format!("{}: task {} has no expert; give one, or another --policy", run.file.display(), task.id);
         return Err(Failure::input(message));

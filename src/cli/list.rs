@@ -4,7 +4,7 @@ use std::{collections::BTreeSet, path::Path};
 
 use serde_json::{Value, json};
 
-use super::{Failure, args::POLICIES, print};
+use super::{Failure, drivers::POLICIES, print};
 use crate::{
     benchmark::{Plan, Suite},
     script,

@@ -4,6 +4,7 @@ mod args;
 mod batch;
 mod check;
 mod doctor;
+mod drivers;
 mod evaluate;
 mod experiment;
 mod files;

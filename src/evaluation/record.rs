@@ -79,6 +79,10 @@ pub struct RolloutStats {
     /// Observations with a picture of a camera that stood inside of something: it shows what is beyond that thing.
     #[serde(default)]
     pub camera_inside: u32,
+    /// Control steps whose command was farther from the tool than a step of the inverse kinematics looks (0.2 m, 0.6 rad):
+    /// out of reach, or in the wrong frame or unit.
+    #[serde(default)]
+    pub far_commands: u32,
     /// Hash of the final state, hexadecimal.
     pub state_hash: String,
 }

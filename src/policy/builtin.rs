@@ -3,7 +3,7 @@
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::{Action, Observation, Policy};
+use super::{Action, ActionChunk, Observation, Policy, PolicyError};
 use crate::geometry::Vec3;
 
 /// Stays where it is with the gripper open.
@@ -17,10 +17,10 @@ impl Policy for Noop {
         "noop"
     }
 
-    fn act(&mut self, observation: &Observation) -> Result<Action, String> {
+    fn act(&mut self, observation: &Observation) -> Result<ActionChunk, PolicyError> {
         let (position_b, axis_angle_b) =
             *self.hold.get_or_insert((observation.ee_position_b, observation.ee_axis_angle_b));
-        Ok(Action { position_b, axis_angle_b, closure: 0.0 })
+        Ok(Action { position_b, axis_angle_b, closure: 0.0 }.into())
     }
 }
 
@@ -52,7 +52,7 @@ impl Policy for Random {
         "random"
     }
 
-    fn act(&mut self, observation: &Observation) -> Result<Action, String> {
+    fn act(&mut self, observation: &Observation) -> Result<ActionChunk, PolicyError> {
         let axis_angle_b = *self.hold.get_or_insert(observation.ee_axis_angle_b);
         let stride = Vec3::from_fn(|_, _| STRIDE * (2.0 * self.uniform() - 1.0));
         let mut position_b = observation.ee_position_b + stride;
@@ -61,6 +61,6 @@ impl Policy for Random {
         if self.uniform() < 0.05 {
             self.closure = self.uniform();
         }
-        Ok(Action { position_b, axis_angle_b, closure: self.closure })
+        Ok(Action { position_b, axis_angle_b, closure: self.closure }.into())
     }
 }

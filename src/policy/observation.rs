@@ -44,6 +44,9 @@ pub struct Observation {
     pub touch: Option<TouchHistory>,
     /// True forces at the left and right pad, if asked for.
     pub forces: Option<[PadForce; 2]>,
+    /// Resultants of the last control steps, oldest first, 1 to 8, if asked for: force on the left and the right gel, N, in the
+    /// frame of the pad.
+    pub force_history: Vec<[f64; 6]>,
 }
 
 /// A camera's picture: rows from the top, RGB, 8 bits a channel, sRGB. A camera that gets inside of something during an

@@ -21,7 +21,7 @@ type Joints = SVector<f64, ARM_DOFS>;
 type Jacobian = SMatrix<f64, 6, ARM_DOFS>;
 
 /// A single step looks no farther than this: a linearisation holds only nearby, m and rad.
-const REACH: (f64, f64) = (0.2, 0.6);
+pub const REACH: (f64, f64) = (0.2, 0.6);
 
 /// Closer than this a pose counts as reached, m and rad.
 const REACHED: (f64, f64) = (1e-4, 1e-3);

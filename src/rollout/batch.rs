@@ -75,6 +75,14 @@ impl Controller for Stoppable<'_> {
         }
         self.driver.act(sim, observation)
     }
+
+    fn looks(&self) -> bool {
+        self.driver.looks()
+    }
+
+    fn finish(&mut self) {
+        self.driver.finish();
+    }
 }
 
 #[cfg(test)]

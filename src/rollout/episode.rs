@@ -23,8 +23,8 @@ use crate::{
     },
     geometry::{Pose, Vec3},
     physics::world::{Frame, StepFailure},
-    policy::{Action, Observation, Policy, Streams},
-    robot::rotation,
+    policy::{Action, Chunked, Observation, PolicyError, Streams},
+    robot::{ik::REACH, rotation},
     scene::Region,
 };
 
@@ -34,9 +34,12 @@ pub enum ControlError {
     /// A script failed: the user's input.
     #[error("{0}")]
     Script(String),
-    /// A policy failed.
+    /// A policy failed: the server or its answers.
     #[error("{0}")]
     Policy(String),
+    /// A policy's answer cannot be carried out; this episode has failed and others may go on.
+    #[error("{0}")]
+    Action(String),
     /// The run was told to stop.
     #[error("interrupted")]
     Interrupted,
@@ -44,25 +47,50 @@ pub enum ControlError {
 
 /// Whoever drives the robot: a policy behind its observation, or a privileged planner.
 pub trait Controller {
-    /// What it looks at, the same for the whole episode.
+    /// What it looks at, when it looks; the same for the whole episode.
     fn streams(&self) -> Streams {
         Streams::default()
+    }
+    /// Whether it looks in this control step; if not, nothing is sensed for it.
+    fn looks(&self) -> bool {
+        true
     }
     /// The action of this control step; `None` to keep the last one.
     ///
     /// # Errors
     /// What went wrong.
     fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, ControlError>;
+    /// The episode is over.
+    fn finish(&mut self) {}
 }
 
 /// A policy sees the observation and nothing else.
-impl<P: Policy + ?Sized> Controller for Box<P> {
+impl Controller for Chunked {
     fn streams(&self) -> Streams {
-        Policy::streams(self.as_ref())
+        Chunked::streams(self)
+    }
+
+    fn looks(&self) -> bool {
+        Chunked::looks(self)
     }
 
     fn act(&mut self, _sim: &Simulation, observation: &Observation) -> Result<Option<Action>, ControlError> {
-        Policy::act(self.as_mut(), observation).map(Some).map_err(ControlError::Policy)
+        Chunked::act(self, observation).map(Some).map_err(ControlError::from)
+    }
+
+    fn finish(&mut self) {
+        Chunked::finish(self);
+    }
+}
+
+impl From<PolicyError> for ControlError {
+    fn from(error: PolicyError) -> Self {
+        match error {
+            PolicyError::Transport(message) | PolicyError::Reply(message) => Self::Policy(message),
+            PolicyError::Action(message) => Self::Action(message),
+            PolicyError::Script(message) => Self::Script(message),
+            PolicyError::Interrupted => Self::Interrupted,
+        }
     }
 }
 
@@ -161,6 +189,7 @@ pub struct Episode {
     recent: Recent,
     reel: Option<Reel>,
     force_observed: bool,
+    far_commands: u32,
 }
 
 /// What a film keeps while it is being taken.
@@ -229,6 +258,7 @@ impl Episode {
             recent: Recent::default(),
             reel,
             force_observed: false,
+            far_commands: 0,
         })
     }
 
@@ -248,13 +278,18 @@ impl Episode {
             if self.steps >= self.spec.task.budget_steps {
                 break Outcome::Timeout;
             }
-            let observation = self.observation(&streams)?;
-            let wanted =
-                controller.act(&self.sim, &observation).map_err(|source| self.control_error(source))?;
-            if let Some(wanted) = wanted {
-                check_action(&wanted).map_err(|what| self.control_error(ControlError::Policy(what)))?;
-                action = wanted;
+            let looked_at = if controller.looks() { &streams } else { &Streams::default() };
+            let observation = self.observation(looked_at)?;
+            match controller.act(&self.sim, &observation) {
+                Ok(Some(wanted)) => action = wanted,
+                Ok(None) => {}
+                Err(ControlError::Action(message)) => break Outcome::Error { message },
+                Err(source) => return Err(self.control_error(source)),
             }
+            if let Err(message) = check_action(&action) {
+                break Outcome::Error { message };
+            }
+            self.far_commands += u32::from(is_far(&observation, &action));
             if let Err(failure) = self.control_step(&action) {
                 break self.invalid(&failure);
             }
@@ -263,6 +298,7 @@ impl Episode {
                 self.frames.last().and_then(|frame| frame.deformation.as_ref()).map(|d| d.rms_pct),
             );
         };
+        controller.finish();
         Ok(self.finish(outcome))
     }
 
@@ -287,6 +323,7 @@ impl Episode {
             cameras: Vec::new(),
             touch: None,
             forces: None,
+            force_history: Vec::new(),
         };
         self.recent.observe(&mut self.senses, blind, streams).map_err(|source| EpisodeError::Sense {
             task: self.spec.task.id,
@@ -366,6 +403,7 @@ impl Episode {
             newton_max: self.newton.1,
             force_observed: self.force_observed,
             camera_inside: self.recent.inside,
+            far_commands: self.far_commands,
             state_hash: state_hash(&self.sim),
         };
         let film = self.reel.map(|Reel { frames, d_pct }| Film { senses: self.senses, frames, d_pct });
@@ -374,6 +412,13 @@ impl Episode {
         let record = EpisodeRecord { identity: self.spec.identity, outcome, verdict, stats };
         Finished { record, trace: self.trace, frames: self.frames, reference, film }
     }
+}
+
+/// Whether a command is farther from the tool than a step of the inverse kinematics looks.
+fn is_far(now: &Observation, action: &Action) -> bool {
+    let (from, to) = (&now.ee_axis_angle_b, &action.axis_angle_b);
+    let turn = rotation::error(&rotation::from_axis_angle(from), &rotation::from_axis_angle(to));
+    (action.position_b - now.ee_position_b).norm() > REACH.0 || turn.norm() > REACH.1
 }
 
 fn check_action(action: &Action) -> Result<(), String> {

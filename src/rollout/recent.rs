@@ -44,8 +44,18 @@ impl Recent {
         }
         self.inside += u32::from(inside);
         let forces = streams.force.then(|| Senses::forces(frame));
+        let force_history = if streams.force { self.forces() } else { Vec::new() };
         let touch = if streams.touch { Some(self.touch(senses)?) } else { None };
-        Ok(Observation { cameras, touch, forces, ..blind })
+        Ok(Observation { cameras, touch, forces, force_history, ..blind })
+    }
+
+    /// Resultants in the last states.
+    fn forces(&self) -> Vec<[f64; 6]> {
+        let both = |(frame, _): &(Frame, _)| {
+            let [left, right] = Senses::forces(frame).map(|pad| pad.load.force);
+            [left.x, left.y, left.z, right.x, right.y, right.z]
+        };
+        self.frames.iter().map(both).collect()
     }
 
     /// What was felt in the last states; each is worked out once.

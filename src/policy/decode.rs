@@ -1,0 +1,142 @@
+//! Replies as profiles code them.
+
+use rmpv::Value;
+
+use super::{
+    Action, ActionChunk, Command, PolicyError,
+    profile::{ACTION_LEN, ActionCode, PoseCode},
+    wire::{entry, kind, names, numbers},
+};
+use crate::geometry::Vec3;
+
+/// The most actions of one reply; a longer one is a mistake.
+const LONGEST: usize = 10_000;
+
+/// The chunk of a reply with the entry `actions` (or `action`): rows of at least seven numbers, or one row.
+///
+/// # Errors
+/// The reply is no such thing: [`PolicyError::Reply`]; it holds a number that is not finite: [`PolicyError::Action`].
+pub fn chunk(reply: &Value, code: &ActionCode) -> Result<ActionChunk, PolicyError> {
+    let wrong = |what: String| PolicyError::Reply(format!("the policy's reply {what}"));
+    if reply.as_map().is_none() {
+        return Err(wrong(format!("is {}; expected a map with the entry actions", kind(reply))));
+    }
+    let actions = entry(reply, "actions")
+        .or_else(|| entry(reply, "action"))
+        .ok_or_else(|| wrong(format!("has no entry actions; it has {}", names(reply))))?;
+    let (shape, found) =
+        numbers(actions).map_err(|what| wrong(format!("has {what} as actions; expected numbers")))?;
+    rows(&shape, &found, code)
+}
+
+/// The chunk of an array of numbers.
+///
+/// # Errors
+/// As [`chunk`].
+pub fn rows(shape: &[usize], found: &[f64], code: &ActionCode) -> Result<ActionChunk, PolicyError> {
+    let wrong = |what: &str| {
+        PolicyError::Reply(format!(
+            "the policy's reply has actions of shape {shape:?}: {what}; expected (horizon, {ACTION_LEN} or more)"
+        ))
+    };
+    let (horizon, width) = match *shape {
+        [width] => (1, width),
+        [horizon, width] | [1, horizon, width] => (horizon, width),
+        _ => return Err(wrong("not rows of actions")),
+    };
+    match (horizon, width) {
+        (0, _) => return Err(wrong("no action at all")),
+        (LONGEST.., _) => return Err(wrong("too many")),
+        (_, ..ACTION_LEN) => return Err(wrong("too few numbers an action")),
+        _ => {}
+    }
+    let commands: Result<Vec<Command>, PolicyError> =
+        found.chunks_exact(width).map(|row| command(&row[..ACTION_LEN], code)).collect();
+    Ok(ActionChunk { commands: commands? })
+}
+
+/// What seven numbers command.
+///
+/// # Errors
+/// One of them is not finite.
+pub fn command(row: &[f64], code: &ActionCode) -> Result<Command, PolicyError> {
+    let &[x, y, z, rx, ry, rz, gripper] = row else {
+        return Err(PolicyError::Reply(format!(
+            "an action has {} numbers; expected {ACTION_LEN}",
+            row.len()
+        )));
+    };
+    if row.iter().any(|number| !number.is_finite()) {
+        return Err(PolicyError::Action(format!("the action {row:?} holds a number that is not finite")));
+    }
+    let (first, second) = (Vec3::new(x, y, z), Vec3::new(rx, ry, rz));
+    let closure = code.gripper.closure(gripper);
+    Ok(match code.pose {
+        PoseCode::Absolute => Command::Pose(Action { position_b: first, axis_angle_b: second, closure }),
+        PoseCode::DeltaOsc { translation_m, rotation_rad } => Command::Step {
+            // The controller cuts what is beyond −1..=1 off too.
+            translation_b: first.map(|x| x.clamp(-1.0, 1.0)) * translation_m,
+            rotation_b: second.map(|x| x.clamp(-1.0, 1.0)) * rotation_rad,
+            closure,
+        },
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::policy::{profile::Profile, wire::Array};
+
+    fn read(value: Value) -> Result<ActionChunk, PolicyError> {
+        chunk(&value, &Profile::named("visuo_tactile").unwrap().actions)
+    }
+
+    fn reply(shape: Vec<usize>, fill: f32) -> Value {
+        let count = shape.iter().product();
+        let actions = Array::floats(shape, vec![fill; count]).into_value(true);
+        Value::Map(vec![("actions".into(), actions)])
+    }
+
+    #[test]
+    fn padded_replies_are_cut_to_seven_numbers_an_action() {
+        let chunk = read(reply(vec![50, 32], 0.25)).unwrap();
+        assert_eq!(chunk.commands.len(), 50);
+        let quarter = Vec3::repeat(0.25);
+        let expected = Action { position_b: quarter, axis_angle_b: quarter, closure: 0.25 };
+        assert_eq!(chunk.commands[49], Command::Pose(expected));
+        assert_eq!(read(reply(vec![7], 0.1)).unwrap().commands.len(), 1);
+        assert_eq!(read(reply(vec![1, 4, 7], 0.1)).unwrap().commands.len(), 4);
+    }
+
+    #[test]
+    fn what_is_no_chunk_is_told() {
+        for (value, words) in [
+            (reply(vec![0, 7], 0.0), "no action at all"),
+            (reply(vec![10, 6], 0.0), "[10, 6]: too few numbers"),
+            (reply(vec![2, 3, 7], 0.0), "not rows"),
+            (Value::from("hi"), "is text"),
+            (Value::Map(vec![("state".into(), 1.into())]), "no entry actions; it has state"),
+            (Value::Map(vec![("actions".into(), "x".into())]), "has text as actions"),
+        ] {
+            match read(value) {
+                Err(PolicyError::Reply(message)) => assert!(message.contains(words), "{message}"),
+                other => panic!("{words}: {other:?}"),
+            }
+        }
+        for bad in [f32::NAN, f32::INFINITY] {
+            assert!(matches!(read(reply(vec![2, 7], bad)), Err(PolicyError::Action(_))));
+        }
+    }
+
+    #[test]
+    fn liberos_steps_are_scaled_and_cut_off() {
+        let code = Profile::named("libero").unwrap().actions;
+        let step = command(&[1.0, -9.0, 0.5, 0.0, 0.0, 2.0, 1.0], &code).unwrap();
+        let expected = Command::Step {
+            translation_b: Vec3::new(0.05, -0.05, 0.025),
+            rotation_b: Vec3::new(0.0, 0.0, 0.5),
+            closure: 1.0,
+        };
+        assert_eq!(step, expected);
+    }
+}

@@ -1,0 +1,104 @@
+//! Observations as profiles lay them out.
+
+use image::{RgbImage, imageops};
+use rmpv::Value;
+
+use super::{
+    Observation,
+    profile::{Finger, Profile, Source, StatePart},
+    wire::Array,
+};
+use crate::{
+    robot::rotation,
+    sensing::tactile::{HISTORY, MARKERS},
+};
+
+/// An entry of an observation before it is packed.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Content {
+    /// Numbers or pictures.
+    Array(Array),
+    /// Text.
+    Text(String),
+}
+
+impl Content {
+    /// As msgpack; see [`Array::into_value`].
+    pub fn into_value(self, bin_keys: bool) -> Value {
+        match self {
+            Self::Array(array) => array.into_value(bin_keys),
+            Self::Text(text) => Value::from(text),
+        }
+    }
+}
+
+/// What an entry holds; `None` if the observation lacks what it is made of.
+pub fn content(observation: &Observation, source: &Source) -> Option<Content> {
+    let array = match source {
+        Source::Prompt => return Some(Content::Text(observation.prompt.clone())),
+        Source::Camera { camera, half_turn } => {
+            let picture = observation.camera(camera)?;
+            if *half_turn { bytes(imageops::rotate180(picture)) } else { bytes(picture.clone()) }
+        }
+        Source::State { parts } => {
+            let numbers: Vec<f32> = parts.iter().flat_map(|part| state(observation, *part)).collect();
+            Array::floats(vec![numbers.len()], numbers)
+        }
+        Source::TactileImage { layout } => bytes(observation.touch.as_ref()?.mosaic((*layout).into())),
+        Source::Tactile { finger } => {
+            bytes(observation.touch.as_ref()?.now()?[usize::from(*finger == Finger::Right)].picture.clone())
+        }
+        Source::MarkerMotion => {
+            let rows = observation.touch.as_ref()?.marker_motion();
+            Array::floats(vec![rows.len(), 2 * MARKERS, 2], rows.into_iter().flatten().flatten())
+        }
+        Source::Force => {
+            let rows = (0..HISTORY).map(|place| {
+                let past = &observation.force_history;
+                past.get((place + past.len()).saturating_sub(HISTORY))
+            });
+            let rows: Option<Vec<&[f64; 6]>> = rows.collect();
+            Array::floats(vec![HISTORY, 6], rows?.into_iter().flatten().map(|x| *x as f32))
+        }
+    };
+    Some(Content::Array(array))
+}
+
+/// The whole observation as openpi's clients send it.
+pub fn openpi(observation: &Observation, profile: &Profile) -> Value {
+    let mut entries = Vec::new();
+    for input in &profile.inputs {
+        let Some(content) = content(observation, &input.source) else { continue };
+        let value = content.into_value(true);
+        entries.extend(input.keys.iter().map(|key| (Value::from(key.as_str()), value.clone())));
+    }
+    Value::Map(entries)
+}
+
+fn bytes(picture: RgbImage) -> Array {
+    let shape = vec![picture.height() as usize, picture.width() as usize, 3];
+    Array::bytes(shape, picture.into_raw())
+}
+
+fn state(o: &Observation, part: StatePart) -> Vec<f32> {
+    let quaternion = || rotation::from_axis_angle(&o.ee_axis_angle_b).into_inner();
+    let numbers: Vec<f64> = match part {
+        StatePart::Position => o.ee_position_b.iter().copied().collect(),
+        StatePart::AxisAngle => o.ee_axis_angle_b.iter().copied().collect(),
+        StatePart::QuaternionWxyz => {
+            let q = quaternion();
+            vec![q.w, q.i, q.j, q.k]
+        }
+        StatePart::QuaternionXyzw => {
+            let q = quaternion();
+            vec![q.i, q.j, q.k, q.w]
+        }
+        StatePart::Joints => o.joints.to_vec(),
+        StatePart::GripperWidth => vec![o.gripper_width_m],
+        StatePart::FingerPosition => vec![0.5 * o.gripper_width_m],
+        StatePart::FingerPair => vec![0.5 * o.gripper_width_m, -0.5 * o.gripper_width_m],
+        StatePart::Closure => vec![o.closure],
+    };
+    debug_assert_eq!(numbers.len(), part.len());
+    numbers.into_iter().map(|x| x as f32).collect()
+}

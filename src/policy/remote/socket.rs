@@ -1,0 +1,254 @@
+//! A websocket with time limits: every wait ends at a deadline or when the run does.
+
+use std::{
+    io::{self, ErrorKind},
+    net::{TcpStream, ToSocketAddrs},
+    sync::atomic::{AtomicBool, Ordering},
+    thread,
+    time::{Duration, Instant},
+};
+
+use rmpv::Value;
+use tungstenite::{
+    ClientRequestBuilder, Error, HandshakeError, Message, WebSocket, client, http::Uri,
+    protocol::WebSocketConfig,
+};
+
+use super::{PolicyError, Server};
+
+/// The longest message that is taken: a chunk of actions is some ten kilobytes.
+const LARGEST: usize = 64 << 20;
+/// Between two looks at the clock and at the wish to end.
+const SLICE: Duration = Duration::from_millis(50);
+/// Between two attempts to connect: doubled each time up to the longest.
+const PAUSES: [Duration; 2] = [Duration::from_millis(100), Duration::from_secs(2)];
+/// Characters of a server's own text that are told.
+const TOLD: usize = 2000;
+/// Deepest nesting of a message.
+const DEEPEST: usize = 64;
+
+/// An open connection.
+#[derive(Debug)]
+pub struct Socket {
+    url: String,
+    socket: WebSocket<TcpStream>,
+    patience: Duration,
+    stop: &'static AtomicBool,
+}
+
+impl Socket {
+    /// Connects; a server that is not there yet is waited for.
+    ///
+    /// # Errors
+    /// A wrong address; nobody answers in time.
+    pub fn connect(server: &Server) -> Result<Self, PolicyError> {
+        let request = request(server)?;
+        let deadline = Instant::now() + server.patience;
+        let mut pause = PAUSES[0];
+        loop {
+            let refused = match attempt(&request, server, deadline) {
+                Ok(socket) => {
+                    let url = server.url.clone();
+                    return Ok(Self { url, socket, patience: server.patience, stop: server.stop });
+                }
+                Err(Attempt::Final(error)) => return Err(error),
+                Err(Attempt::Again(what)) => what,
+            };
+            if Instant::now() + pause > deadline {
+                return Err(PolicyError::Transport(format!(
+                    "no policy server at {}: {refused}; tried for {} s: start it, or raise --policy-timeout",
+                    server.url,
+                    server.patience.as_secs_f64()
+                )));
+            }
+            rest(pause, server.stop)?;
+            pause = (2 * pause).min(PAUSES[1]);
+        }
+    }
+
+    /// Sends a message.
+    ///
+    /// # Errors
+    /// The connection is gone, or the server does not take it in time.
+    pub fn send(&mut self, value: &Value) -> Result<(), PolicyError> {
+        let mut bytes = Vec::new();
+        rmpv::encode::write_value(&mut bytes, value)
+            .map_err(|e| PolicyError::Transport(format!("cannot pack an observation: {e}")))?;
+        let deadline = Instant::now() + self.patience;
+        let mut sent = self.socket.send(Message::binary(bytes));
+        while let Err(Error::Io(error)) = &sent
+            && is_wait(error)
+        {
+            self.wait(deadline, "did not take an observation")?;
+            sent = self.socket.flush();
+        }
+        sent.map_err(|error| self.lost(&error))
+    }
+
+    /// The next message of the server.
+    ///
+    /// # Errors
+    /// The connection is gone, the server answers with text or bytes that are no msgpack, too much, or not in time.
+    pub fn receive(&mut self) -> Result<Value, PolicyError> {
+        let deadline = Instant::now() + self.patience;
+        loop {
+            match self.socket.read() {
+                Ok(Message::Binary(bytes)) => return self.unpack(&bytes),
+                Ok(Message::Text(text)) => {
+                    return Err(PolicyError::Transport(format!(
+                        "the policy server {} failed; it says:\n{}",
+                        self.url,
+                        end_of(&text)
+                    )));
+                }
+                Ok(Message::Close(_)) => return Err(self.lost(&Error::ConnectionClosed)),
+                Ok(Message::Ping(_) | Message::Pong(_) | Message::Frame(_)) => {}
+                Err(Error::Io(error)) if is_wait(&error) => self.wait(deadline, "did not answer")?,
+                Err(error) => return Err(self.lost(&error)),
+            }
+        }
+    }
+
+    /// Tells what is wrong with what the server sent.
+    pub fn wrong(&self, what: &str) -> PolicyError {
+        PolicyError::Transport(format!("the policy server {} {what}", self.url))
+    }
+
+    fn unpack(&self, mut bytes: &[u8]) -> Result<Value, PolicyError> {
+        let value = rmpv::decode::read_value_with_max_depth(&mut bytes, DEEPEST)
+            .map_err(|error| self.wrong(&format!("sent bytes that are no msgpack: {error}")))?;
+        if !bytes.is_empty() {
+            return Err(self.wrong(&format!("sent {} bytes behind its msgpack value", bytes.len())));
+        }
+        Ok(value)
+    }
+
+    fn wait(&self, deadline: Instant, what: &str) -> Result<(), PolicyError> {
+        if self.stop.load(Ordering::Relaxed) {
+            return Err(PolicyError::Interrupted);
+        }
+        if Instant::now() < deadline {
+            return Ok(());
+        }
+        let seconds = self.patience.as_secs_f64();
+        Err(self.wrong(&format!("{what} within {seconds} s; raise --policy-timeout if it needs longer")))
+    }
+
+    fn lost(&self, error: &Error) -> PolicyError {
+        match error {
+            Error::ConnectionClosed | Error::AlreadyClosed => self.wrong("closed the connection"),
+            Error::Capacity(_) => self.wrong(&format!(
+                "sent more than {} MiB in one message: no chunk of actions is as long",
+                LARGEST >> 20
+            )),
+            Error::Io(error) => self.wrong(&format!("is gone: {error}")),
+            Error::Protocol(_) => self.wrong(&format!("is gone: {error}")),
+            other => self.wrong(&format!("does not speak websocket: {other}")),
+        }
+    }
+}
+
+/// What became of an attempt to connect.
+enum Attempt {
+    Again(String),
+    Final(PolicyError),
+}
+
+fn attempt(
+    request: &ClientRequestBuilder,
+    server: &Server,
+    deadline: Instant,
+) -> Result<WebSocket<TcpStream>, Attempt> {
+    let again = |error: io::Error| Attempt::Again(error.to_string());
+    let stream = open(&server.url, deadline).map_err(again)?;
+    stream.set_nodelay(true).map_err(again)?;
+    stream.set_read_timeout(Some(SLICE)).map_err(again)?;
+    stream.set_write_timeout(Some(SLICE)).map_err(again)?;
+    let config = WebSocketConfig::default().max_message_size(Some(LARGEST)).max_frame_size(Some(LARGEST));
+    let mut shake = client::client_with_config(request.clone(), stream, Some(config));
+    loop {
+        match shake {
+            Ok((socket, _)) => return Ok(socket),
+            Err(HandshakeError::Interrupted(middle)) => {
+                if server.stop.load(Ordering::Relaxed) {
+                    return Err(Attempt::Final(PolicyError::Interrupted));
+                }
+                if Instant::now() > deadline {
+                    return Err(Attempt::Again("it accepts connections but says nothing".to_owned()));
+                }
+                shake = middle.handshake();
+            }
+            // A server that is being started may close connections at first.
+            Err(HandshakeError::Failure(Error::Io(error))) => return Err(again(error)),
+            Err(HandshakeError::Failure(Error::Http(response))) if response.status().as_u16() == 503 => {
+                return Err(Attempt::Again("HTTP status 503".to_owned()));
+            }
+            Err(HandshakeError::Failure(error)) => {
+                let message = format!("{} is no websocket server: {error}", server.url);
+                return Err(Attempt::Final(PolicyError::Transport(message)));
+            }
+        }
+    }
+}
+
+/// Opens a connection to the first address of a server that takes one.
+fn open(url: &str, deadline: Instant) -> io::Result<TcpStream> {
+    let uri: Uri = url.parse().map_err(io::Error::other)?;
+    let host = uri.host().unwrap_or_default().trim_start_matches('[').trim_end_matches(']');
+    let mut refused = io::Error::new(ErrorKind::NotFound, "its name has no address");
+    for address in (host, uri.port_u16().unwrap_or(DEFAULT_PORT)).to_socket_addrs()? {
+        let left = deadline.saturating_duration_since(Instant::now()).max(SLICE);
+        match TcpStream::connect_timeout(&address, left) {
+            Ok(stream) => return Ok(stream),
+            Err(error) => refused = error,
+        }
+    }
+    Err(refused)
+}
+
+/// openpi's, if the address names none.
+const DEFAULT_PORT: u16 = 8000;
+
+fn request(server: &Server) -> Result<ClientRequestBuilder, PolicyError> {
+    let wrong = |what: &str| {
+        PolicyError::Transport(format!("--policy {}: {what}; expected ws://HOST:PORT", server.url))
+    };
+    let uri: Uri = server.url.parse().map_err(|_| wrong("not an address"))?;
+    match uri.scheme_str() {
+        Some("ws") => {}
+        Some("wss") => {
+            return Err(wrong("encrypted connections are not spoken: use a tunnel, such as ssh -L"));
+        }
+        _ => return Err(wrong("not a websocket address")),
+    }
+    if uri.host().is_none_or(str::is_empty) {
+        return Err(wrong("no host"));
+    }
+    let request = ClientRequestBuilder::new(uri);
+    Ok(match &server.api_key {
+        Some(key) => request.with_header("Authorization", format!("Api-Key {key}")),
+        None => request,
+    })
+}
+
+fn rest(pause: Duration, stop: &AtomicBool) -> Result<(), PolicyError> {
+    let end = Instant::now() + pause;
+    while Instant::now() < end {
+        if stop.load(Ordering::Relaxed) {
+            return Err(PolicyError::Interrupted);
+        }
+        thread::sleep(SLICE.min(end.saturating_duration_since(Instant::now())));
+    }
+    Ok(())
+}
+
+fn is_wait(error: &io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted)
+}
+
+/// The end of a text, which of a traceback says most.
+fn end_of(text: &str) -> &str {
+    let text = text.trim_end();
+    let from = text.char_indices().rev().nth(TOLD).map_or(0, |(at, _)| at);
+    &text[from..]
+}
