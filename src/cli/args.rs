@@ -75,6 +75,8 @@ pub struct Run {
     pub video: Option<Video>,
     /// Where to write.
     pub out: Option<PathBuf>,
+    /// Whether to go on with a run that was broken off.
+    pub resume: bool,
     /// Print JSON instead of tables.
     pub json: bool,
 }
@@ -315,6 +317,7 @@ fn runner() -> clap::Command {
         .arg(flag("trace", "Writes a record of every control step; =nodes with node positions").num_args(0..=1).require_equals(true).default_missing_value("state").value_parser(["state", "nodes"]))
         .arg(flag("video", "Draws rollouts: those that are not safe, =all, or episodes such as =0,3").value_name("WHICH").num_args(0..=1).require_equals(true).default_missing_value("failed").value_parser(video))
         .arg(flag("out", "Where to write; a folder without a run in it").value_name("DIR"))
+        .arg(flag("resume", "Goes on with the run in --out, if one was broken off there").action(ArgAction::SetTrue).requires("out"))
         .arg(json.clone())
         .subcommand(
             clap::Command::new("list")
@@ -389,6 +392,7 @@ fn common(matches: &ArgMatches, options: &[OptionSpec]) -> Result<Run, Failure> 
         trace: None,
         video: None,
         out: out.map(PathBuf::from),
+        resume: false,
         json: false,
     })
 }
@@ -435,6 +439,7 @@ fn run(matches: &ArgMatches, options: &[OptionSpec]) -> Result<Run, Failure> {
         threads: matches.get_one::<u16>("threads").map_or(available, |n| usize::from(*n)),
         trace: matches.get_one::<String>("trace").map(|kind| kind == "nodes"),
         video,
+        resume: matches.get_flag("resume"),
         json: matches.get_flag("json"),
         ..common(matches, options)?
     })

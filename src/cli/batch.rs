@@ -1,8 +1,10 @@
 //! The episodes of one suite: their limits, their runs, their files.
 
-use std::{collections::BTreeMap, path::PathBuf, sync::Arc};
-
-use serde::Serialize;
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::PathBuf,
+    sync::Arc,
+};
 
 use super::{
     Failure,
@@ -10,16 +12,18 @@ use super::{
     code,
     drivers::Drivers,
     files::{self, Calibrated, make_folder},
+    info::{self, RunInfo},
     progress::Progress,
 };
 use crate::{
     benchmark::{Suite, Task, seed::Split, settings::Settings},
     evaluation::{record::EpisodeRecord, safety::Limit, summary::Summary, thresholds::Thresholds},
-    policy::{Streams, TaskBrief, profile::Profile},
+    policy::{Streams, TaskBrief},
     report::{
+        actions,
         film::{self, Caption, FilmError},
         interchange::{self, DebugFrame, DebugShape},
-        run_folder::{RUN, RunFolder, RunFolderError, SUMMARY, replace},
+        run_folder::{RunFolder, RunFolderError, SUMMARY, replace},
     },
     rollout::{
         BuildError, ControlError, Controller, Episode, EpisodeError, EpisodeSpec, Finished, Looks, RestCache,
@@ -28,35 +32,6 @@ use crate::{
     scene::{Asset, Body, Scene},
     script::{self, Loaded},
 };
-
-/// Everything needed to repeat a run.
-#[derive(Serialize)]
-struct RunInfo<'a> {
-    softvt: &'a str,
-    script: String,
-    suite: &'a str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    twin: Option<&'a str>,
-    policy: &'a str,
-    /// What a policy behind a network gets, and what its numbers mean.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    profile: Option<Profile>,
-    /// Actions of a chunk that are carried out.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    replan: Option<usize>,
-    privileged: bool,
-    seed: u64,
-    split: &'a str,
-    tasks: Vec<usize>,
-    episodes: u32,
-    shifts: &'a [(String, f64)],
-    options: BTreeMap<String, String>,
-    settings: &'a Settings,
-    sources: BTreeMap<String, String>,
-    thresholds: BTreeMap<String, Option<f64>>,
-    /// Whether the policy sees the true forces at the pads.
-    force_observed: bool,
-}
 
 /// Why a first look at a scene fails.
 #[derive(Debug, thiserror::Error)]
@@ -227,11 +202,16 @@ impl<'a> Batch<'a> {
         known.is_none_or(|known| *known == asset.fingerprint()).then_some(limit)
     }
 
-    /// Writes down what is needed to repeat the run.
+    /// Writes down what is needed to repeat the run; if it stands there already, it must be the same.
     ///
     /// # Errors
-    /// The file cannot be written.
+    /// The file cannot be written, or is that of another run.
     pub fn write_info(&self, folder: &RunFolder, tasks: &[&Task], episodes: u32) -> Result<(), Failure> {
+        let info = self.info(tasks, episodes)?;
+        info::write(folder, &info)
+    }
+
+    fn info(&self, tasks: &[&Task], episodes: u32) -> Result<RunInfo<'_>, Failure> {
         let options =
             self.loaded.options.iter().map(|o| (o.name.clone(), format!("{:?}", o.value))).collect();
         let info = RunInfo {
@@ -254,46 +234,24 @@ impl<'a> Batch<'a> {
             thresholds: self.limits.iter().map(|(a, l)| (a.clone(), l.map(|l| l.tau_pct()))).collect(),
             force_observed: self.force_observed,
         };
-        folder.write_json(RUN, &info).map_err(folder_failure)
+        Ok(info)
     }
 
-    /// Runs all episodes and sums them up.
+    /// Runs the episodes that are not `done` and sums all up.
     ///
     /// # Errors
     /// A script, policy or file that fails, or an interrupt; finished episodes are kept.
-    pub fn go(&self, mut folder: RunFolder) -> Result<Summary, Failure> {
-        let mut progress = Progress::new(self.jobs.len(), &self.name);
-        let mut records: Vec<EpisodeRecord> = Vec::new();
-        let outcome: Result<(), Failure> = batch::run(
-            self.jobs.len(),
-            self.run.threads,
-            &stop::FLAG,
-            |job| {
-                let mut finished = self.episode(job, self.may_show(job))?;
-                let drawn = self.write_video(&mut finished);
-                Ok((finished, drawn))
-            },
-            |job, (finished, drawn)| {
-                folder.append(job, &finished.record).map_err(folder_failure)?;
-                self.write_trace(&finished)?;
-                self.write_debug_log(&finished)?;
-                progress.tick(&line(&finished.record));
-                // The episode counts whether or not it can be drawn.
-                if let Err(failure) = drawn {
-                    crate::message::tell(&format!(
-                        "softvt: no video of {}: {}",
-                        line(&finished.record),
-                        failure.message
-                    ));
-                }
-                records.push(finished.record);
-                Ok(())
-            },
-        );
-        progress.finish();
-        folder.flush().map_err(folder_failure)?;
+    pub fn go(&self, mut folder: RunFolder, done: Vec<EpisodeRecord>) -> Result<Summary, Failure> {
+        let mut records = done;
+        let left = self.left(&records);
+        let outcome = self.run_episodes(&left, &mut folder, &mut records);
         let kept = format!("{} of {} episodes are in {}", records.len(), self.jobs.len(), self.out.display());
-        let interrupted = || Failure::interrupted(format!("interrupted; {kept}"));
+        let interrupted = || {
+            Failure::interrupted(format!(
+                "interrupted; {kept}; go on with --resume --out {}",
+                self.out.display()
+            ))
+        };
         match outcome {
             // What failed before the end was asked for is what went wrong, however long others took to end.
             Err(failure) if failure.code == code::INTERRUPTED => return Err(interrupted()),
@@ -308,12 +266,62 @@ impl<'a> Batch<'a> {
             Ok(()) if stop::requested() => return Err(interrupted()),
             Ok(()) => {}
         }
-        let summary = Summary::of(&self.name, self.run.policy.name(), &records);
-        folder.write_json(SUMMARY, &summary).map_err(folder_failure)?;
         records.sort_by_key(|r| (r.identity.task, r.identity.episode));
+        folder.put_in_order(&records).map_err(folder_failure)?;
+        let summary = Summary::of(&self.name, self.run.policy.name(), &records);
         interchange::write_scores(&self.out, &records, &self.released).map_err(folder_failure)?;
+        // The last of all: a folder with a summary is finished.
+        folder.write_json(SUMMARY, &summary).map_err(folder_failure)?;
         crate::message::tell(&format!("softvt: {}", self.out.display()));
         Ok(summary)
+    }
+
+    /// The jobs that are not done.
+    fn left(&self, done: &[EpisodeRecord]) -> Vec<usize> {
+        let done: BTreeSet<_> = done.iter().map(|r| (r.identity.task, r.identity.episode)).collect();
+        (0..self.jobs.len()).filter(|&job| !done.contains(&(self.jobs[job].0.id, self.jobs[job].1))).collect()
+    }
+
+    /// Runs jobs; an episode's line is written after all its other files, so that whoever is listed is whole.
+    fn run_episodes(
+        &self,
+        left: &[usize],
+        folder: &mut RunFolder,
+        records: &mut Vec<EpisodeRecord>,
+    ) -> Result<(), Failure> {
+        let mut progress = Progress::new(left.len(), &self.name);
+        let outcome = batch::run(
+            left.len(),
+            self.run.threads,
+            &stop::FLAG,
+            |index| {
+                let job = left[index];
+                let mut finished = self.episode(job, self.may_show(job))?;
+                let drawn = self.write_video(&mut finished);
+                Ok((finished, drawn))
+            },
+            |_, (finished, drawn)| {
+                self.write_trace(&finished)?;
+                self.write_debug_log(&finished)?;
+                let id = &finished.record.identity;
+                let actions_path = actions::path(&self.out, id.task, id.episode);
+                actions::write(&actions_path, &finished.actions).map_err(folder_failure)?;
+                folder.append(&finished.record).map_err(folder_failure)?;
+                progress.tick(&line(&finished.record));
+                // The episode counts whether or not it can be drawn.
+                if let Err(failure) = drawn {
+                    crate::message::tell(&format!(
+                        "softvt: no video of {}: {}",
+                        line(&finished.record),
+                        failure.message
+                    ));
+                }
+                records.push(finished.record);
+                Ok(())
+            },
+        );
+        progress.finish();
+        outcome
     }
 
     /// Whether a job's rollout may have to be drawn.
@@ -419,7 +427,7 @@ pub(super) fn film_failure(error: FilmError) -> Failure {
     }
 }
 
-fn folder_failure(error: RunFolderError) -> Failure {
+pub(super) fn folder_failure(error: RunFolderError) -> Failure {
     Failure::input(error)
 }
 

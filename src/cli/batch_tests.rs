@@ -3,7 +3,7 @@ use crate::{
     benchmark::Plan,
     cli::args::{self, Command},
     policy::{Action, ActionChunk, Chunked, Observation, Policy, PolicyError},
-    report::run_folder::EPISODES,
+    report::run_folder::{EPISODES, RUN},
 };
 
 /// Asks for the true forces, holds still, and complains if it does not get them.
@@ -48,7 +48,7 @@ fn every_file_of_a_run_says_whether_the_policy_saw_true_forces() {
         batch.prepare(&tasks).expect("nothing is wrong");
         let folder = RunFolder::create(&dir).expect("a folder");
         batch.write_info(&folder, &tasks, 1).expect("written");
-        batch.go(folder).expect("it runs");
+        batch.go(folder, Vec::new()).expect("it runs");
         for file in [RUN, EPISODES, SUMMARY] {
             let text = std::fs::read_to_string(dir.join(file)).expect("written");
             let value: serde_json::Value = serde_json::from_str(&text).expect("one document");

@@ -57,6 +57,7 @@ fn golden_run(golden: &Golden) -> Run {
         trace: None,
         video: None,
         out: None,
+        resume: false,
         json: false,
     }
 }

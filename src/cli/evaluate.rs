@@ -121,10 +121,13 @@ fn evaluate(run: &Run, loaded: &Loaded, suite: &Suite, out: PathBuf) -> Result<S
     let jobs = tasks.iter().flat_map(|task| (0..episodes).map(move |e| (*task, e))).collect();
     let mut batch = Batch::new(run, loaded, suite, (jobs, out))?;
     batch.prepare(&tasks)?;
-    let folder =
-        RunFolder::create(&batch.out).map_err(|e| Failure::input(format!("{}: {e}", run.file.display())))?;
+    let opened = match run.resume {
+        true => RunFolder::resume(&batch.out),
+        false => RunFolder::create(&batch.out).map(|folder| (folder, Vec::new())),
+    };
+    let (folder, done) = opened.map_err(|e| Failure::input(format!("{}: {e}", run.file.display())))?;
     batch.write_info(&folder, &tasks, episodes)?;
-    batch.go(folder)
+    batch.go(folder, done)
 }
 
 /// The tasks that `--task` names.

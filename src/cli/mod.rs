@@ -8,6 +8,7 @@ mod drivers;
 mod evaluate;
 mod experiment;
 mod files;
+mod info;
 mod init;
 mod list;
 mod progress;

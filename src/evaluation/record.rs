@@ -154,6 +154,7 @@ pub(crate) mod tests {
             newton_max: 5,
             force_observed: false,
             camera_inside: 0,
+            far_commands: 0,
             state_hash: "00ff".into(),
         };
         EpisodeRecord { identity, outcome: Outcome::Completed, verdict, stats }

@@ -5,8 +5,8 @@ use std::collections::VecDeque;
 use super::{Action, ActionChunk, Command, Observation, Policy, PolicyError, Streams, TaskBrief, osc::Osc};
 
 /// A policy whose chunks are carried out.
-pub struct Chunked {
-    policy: Box<dyn Policy>,
+pub struct Chunked<'a> {
+    policy: Box<dyn Policy + 'a>,
     /// Actions of a chunk that are carried out.
     replan: usize,
     brief: Option<TaskBrief>,
@@ -14,10 +14,10 @@ pub struct Chunked {
     osc: Osc,
 }
 
-impl Chunked {
+impl<'a> Chunked<'a> {
     /// `policy` in the episode `brief`; the first `replan` actions of each of its chunks are carried out, or all if they are
     /// fewer.
-    pub fn new(policy: Box<dyn Policy>, brief: TaskBrief, replan: usize) -> Self {
+    pub fn new(policy: Box<dyn Policy + 'a>, brief: TaskBrief, replan: usize) -> Self {
         Self { policy, replan: replan.max(1), brief: Some(brief), rest: VecDeque::new(), osc: Osc::default() }
     }
 

@@ -1,5 +1,6 @@
 //! What a run leaves behind: its folder, the results table, envelope plots, films, and SoftVTBench's files.
 
+pub mod actions;
 pub mod envelope;
 pub mod film;
 pub mod interchange;

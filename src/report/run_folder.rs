@@ -1,12 +1,12 @@
 //! The folder of a run: `run.json`, `episodes.jsonl`, `summary.json` and what else belongs to it.
 //!
-//! An episode's line is written and synced as soon as its turn has come: lines keep the order of the episodes, whatever
-//! thread finished first, so that the file's bytes do not depend on the number of threads.
+//! An episode's line is written and synced as soon as it is over, after its other files: whoever has a line has all. At the
+//! end of a run the lines are put into the order of the episodes, so that the file's bytes depend neither on the number of
+//! threads nor on how often the run was broken off.
 
 use std::{
-    collections::BTreeMap,
-    fs::{self, File, OpenOptions},
-    io::{self, Write},
+    fs::{self, File, OpenOptions, TryLockError},
+    io::{self, Read, Write},
     path::{Path, PathBuf},
 };
 
@@ -25,12 +25,20 @@ pub const SUMMARY: &str = "summary.json";
 #[derive(Debug, thiserror::Error)]
 pub enum RunFolderError {
     /// It holds another run.
-    #[error("{dir} already holds a run ({found}): give another folder with --out, or remove it")]
+    #[error(
+        "{dir} already holds a run ({found}): go on with it by --resume, or give another folder with --out"
+    )]
     Occupied {
         /// The folder.
         dir: String,
         /// What was found in it.
         found: &'static str,
+    },
+    /// Another process writes to it.
+    #[error("another softvt is at work in {dir}; wait for it, or stop it")]
+    Busy {
+        /// The folder.
+        dir: String,
     },
     /// The system refused.
     #[error("cannot {action} {path}: {source}")]
@@ -62,13 +70,11 @@ pub enum RunFolderError {
     },
 }
 
-/// The folder of a run in progress.
+/// The folder of a run in progress: no other process gets it meanwhile.
 #[derive(Debug)]
 pub struct RunFolder {
     dir: PathBuf,
     episodes: File,
-    next: usize,
-    held: BTreeMap<usize, String>,
 }
 
 impl RunFolder {
@@ -90,7 +96,30 @@ impl RunFolder {
                 _ => io_error("make", &path)(source),
             }
         })?;
-        Ok(Self { dir: dir.into(), episodes, next: 0, held: BTreeMap::new() })
+        lock(&episodes, dir)?;
+        Ok(Self { dir: dir.into(), episodes })
+    }
+
+    /// Goes on in `dir`, which may be empty or absent; the episodes that are finished. A last line that was torn by a crash is
+    /// taken off.
+    ///
+    /// # Errors
+    /// Another process is at work there, a line is not an episode, the system refuses.
+    pub fn resume(dir: &Path) -> Result<(Self, Vec<EpisodeRecord>), RunFolderError> {
+        fs::create_dir_all(dir).map_err(io_error("make the folder", dir))?;
+        let path = dir.join(EPISODES);
+        let mut options = OpenOptions::new();
+        let mut episodes =
+            options.read(true).append(true).create(true).open(&path).map_err(io_error("open", &path))?;
+        lock(&episodes, dir)?;
+        let mut bytes = Vec::new();
+        episodes.read_to_end(&mut bytes).map_err(io_error("read", &path))?;
+        let records = parse(&bytes, &path)?;
+        let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1);
+        if whole < bytes.len() {
+            episodes.set_len(whole as u64).map_err(io_error("shorten", &path))?;
+        }
+        Ok((Self { dir: dir.into(), episodes }, records))
     }
 
     /// Where it is.
@@ -98,33 +127,42 @@ impl RunFolder {
         &self.dir
     }
 
-    /// Takes the record of the `index`-th episode of the run (from 0). It is on disk when this returns, unless an
-    /// earlier episode is still running; then it is written with that one, or by [`RunFolder::flush`].
+    /// The text of a file of the folder, if it is there.
+    ///
+    /// # Errors
+    /// It cannot be read.
+    pub fn read(&self, name: &str) -> Result<Option<String>, RunFolderError> {
+        let path = self.dir.join(name);
+        match fs::read_to_string(&path) {
+            Ok(text) => Ok(Some(text)),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+            Err(source) => Err(io_error("read", &path)(source)),
+        }
+    }
+
+    /// Takes the record of an episode whose other files are written. It is on disk when this returns: after a crash the file
+    /// ends in at most one torn line.
     ///
     /// # Errors
     /// The line cannot be written.
-    pub fn append(&mut self, index: usize, record: &EpisodeRecord) -> Result<(), RunFolderError> {
-        let mut line = serde_json::to_string(record).map_err(|source| RunFolderError::Json {
-            path: self.dir.join(EPISODES).display().to_string(),
-            source,
-        })?;
-        line.push('\n');
-        self.held.insert(index, line);
-        while let Some(line) = self.held.remove(&self.next) {
-            self.write_line(&line)?;
-            self.next += 1;
-        }
-        Ok(())
+    pub fn append(&mut self, record: &EpisodeRecord) -> Result<(), RunFolderError> {
+        let path = self.dir.join(EPISODES);
+        let line = line(record, &path)?;
+        self.episodes.write_all(line.as_bytes()).map_err(io_error("write to", &path))?;
+        self.episodes.sync_data().map_err(io_error("sync", &path))
     }
 
-    /// Writes finished episodes that still wait for an earlier one: the run was interrupted and that one will not come.
+    /// Puts the lines into the order of `records`, which are all there are.
     ///
     /// # Errors
-    /// A line cannot be written.
-    pub fn flush(&mut self) -> Result<(), RunFolderError> {
-        while let Some((index, line)) = self.held.pop_first() {
-            self.write_line(&line)?;
-            self.next = index + 1;
+    /// The file cannot be written.
+    pub fn put_in_order(&mut self, records: &[EpisodeRecord]) -> Result<(), RunFolderError> {
+        let path = self.dir.join(EPISODES);
+        let lines: Result<String, RunFolderError> =
+            records.iter().map(|record| line(record, &path)).collect();
+        let lines = lines?;
+        if fs::read(&path).map_err(io_error("read", &path))? != lines.as_bytes() {
+            replace(&path, &lines)?;
         }
         Ok(())
     }
@@ -159,13 +197,21 @@ impl RunFolder {
             .map_err(|source| RunFolderError::Json { path: path.display().to_string(), source })?;
         replace(&path, &(text + "\n"))
     }
+}
 
-    /// One write and one sync a line: after a crash the file ends in at most one torn line.
-    fn write_line(&mut self, line: &str) -> Result<(), RunFolderError> {
-        let path = self.dir.join(EPISODES);
-        self.episodes.write_all(line.as_bytes()).map_err(io_error("write to", &path))?;
-        self.episodes.sync_data().map_err(io_error("sync", &path))
+/// Keeps other processes out until the file is closed, which the system does for a process that dies.
+fn lock(episodes: &File, dir: &Path) -> Result<(), RunFolderError> {
+    match episodes.try_lock() {
+        Err(TryLockError::WouldBlock) => Err(RunFolderError::Busy { dir: dir.display().to_string() }),
+        // A file system without locks: as good as it gets.
+        Ok(()) | Err(TryLockError::Error(_)) => Ok(()),
     }
+}
+
+fn line(record: &EpisodeRecord, path: &Path) -> Result<String, RunFolderError> {
+    let line = serde_json::to_string(record)
+        .map_err(|source| RunFolderError::Json { path: path.display().to_string(), source })?;
+    Ok(line + "\n")
 }
 
 /// Replaces `path` by `content`: written aside, synced, renamed.
@@ -187,7 +233,10 @@ pub fn replace(path: &Path, content: impl AsRef<[u8]>) -> Result<(), RunFolderEr
         OpenOptions::new().write(true).create_new(true).open(&aside).map_err(io_error("make", &aside))?;
     file.write_all(content.as_ref()).map_err(io_error("write to", &aside))?;
     file.sync_all().map_err(io_error("sync", &aside))?;
-    fs::rename(&aside, path).map_err(io_error("replace", path))
+    fs::rename(&aside, path).map_err(io_error("replace", path))?;
+    // The new name itself must outlast a power cut; a system that cannot sync folders keeps it in order some other way.
+    let _ = path.parent().map(File::open).transpose().map(|folder| folder.map(|folder| folder.sync_all()));
+    Ok(())
 }
 
 /// Reads the episodes of a run folder. A last line that was torn by a crash is left out.
@@ -196,22 +245,20 @@ pub fn replace(path: &Path, content: impl AsRef<[u8]>) -> Result<(), RunFolderEr
 /// The file cannot be read, or another line is not an episode.
 pub fn read_episodes(dir: &Path) -> Result<Vec<EpisodeRecord>, RunFolderError> {
     let path = dir.join(EPISODES);
-    let bytes = fs::read(&path).map_err(io_error("read", &path))?;
-    let torn = !bytes.ends_with(b"\n");
+    parse(&fs::read(&path).map_err(io_error("read", &path))?, &path)
+}
+
+fn parse(bytes: &[u8], path: &Path) -> Result<Vec<EpisodeRecord>, RunFolderError> {
+    // What follows the last line break was torn.
     let lines: Vec<&[u8]> = bytes.split(|byte| *byte == b'\n').collect();
-    let last = lines.len() - 1;
-    let mut records = Vec::with_capacity(last);
-    for (i, line) in lines.iter().enumerate().filter(|(_, line)| !line.is_empty()) {
-        match serde_json::from_slice(line) {
-            Ok(record) => records.push(record),
-            Err(_) if torn && i == last => {}
-            Err(source) => {
-                let path = path.display().to_string();
-                return Err(RunFolderError::BadLine { path, line: i + 1, source });
-            }
-        }
-    }
-    Ok(records)
+    let whole = lines[..lines.len() - 1].iter().enumerate().filter(|(_, line)| !line.is_empty());
+    let read = whole.map(|(i, line)| {
+        serde_json::from_slice(line).map_err(|source| {
+            let path = path.display().to_string();
+            RunFolderError::BadLine { path, line: i + 1, source }
+        })
+    });
+    read.collect()
 }
 
 pub(super) fn io_error(
@@ -238,25 +285,40 @@ mod tests {
     }
 
     #[test]
-    fn lines_keep_the_order_of_the_episodes_whatever_finished_first() {
+    fn lines_are_put_in_order_at_the_end_whatever_finished_first() {
         let root = tempfile::tempdir().unwrap();
         let dir = root.path().join("deep/run");
         let mut folder = RunFolder::create(&dir).unwrap();
-        folder.append(1, &episode(1)).unwrap();
-        assert!(indices(&dir).is_empty());
-        folder.append(0, &episode(0)).unwrap();
-        assert_eq!(indices(&dir), [0, 1]);
-        folder.append(3, &episode(3)).unwrap();
-        folder.flush().unwrap();
-        assert_eq!(indices(&dir), [0, 1, 3]);
-        assert_eq!(read_episodes(&dir).unwrap()[0], episode(0));
+        [2, 0, 1].into_iter().for_each(|i| folder.append(&episode(i)).unwrap());
+        assert_eq!(indices(&dir), [2, 0, 1]);
+        folder.put_in_order(&[episode(0), episode(1), episode(2)]).unwrap();
+        assert_eq!(indices(&dir), [0, 1, 2]);
+        assert_eq!(read_episodes(&dir).unwrap()[1], episode(1));
+    }
+
+    #[test]
+    fn a_run_goes_on_behind_its_last_whole_line() {
+        let root = tempfile::tempdir().unwrap();
+        let mut folder = RunFolder::create(root.path()).unwrap();
+        (0..2).for_each(|i| folder.append(&episode(i)).unwrap());
+        assert!(RunFolder::resume(root.path()).is_err_and(|e| e.to_string().contains("at work")));
+        drop(folder);
+        let path = root.path().join(EPISODES);
+        let whole = fs::read_to_string(&path).unwrap();
+        fs::write(&path, format!("{whole}{}", &whole[..40])).unwrap();
+        let (mut folder, done) = RunFolder::resume(root.path()).unwrap();
+        assert_eq!(done, [episode(0), episode(1)]);
+        folder.append(&episode(2)).unwrap();
+        assert_eq!(indices(root.path()), [0, 1, 2]);
+        let (_, none) = RunFolder::resume(&root.path().join("new")).unwrap();
+        assert!(none.is_empty());
     }
 
     #[test]
     fn a_folder_with_a_run_is_refused_and_left_alone() {
         let root = tempfile::tempdir().unwrap();
         let mut folder = RunFolder::create(root.path()).unwrap();
-        folder.append(0, &episode(0)).unwrap();
+        folder.append(&episode(0)).unwrap();
         let error = RunFolder::create(root.path()).unwrap_err().to_string();
         assert!(error.contains("already holds a run (episodes.jsonl)") && error.contains("--out"), "{error}");
         assert_eq!(indices(root.path()), [0]);
@@ -278,13 +340,12 @@ mod tests {
     fn a_torn_last_line_is_left_out_and_a_bad_line_before_it_is_not() {
         let root = tempfile::tempdir().unwrap();
         let mut folder = RunFolder::create(root.path()).unwrap();
-        (0..2).for_each(|i| folder.append(i, &episode(i as u32)).unwrap());
+        (0..2).for_each(|i| folder.append(&episode(i)).unwrap());
         let path = root.path().join(EPISODES);
         let whole = fs::read_to_string(&path).unwrap();
         for cut in [1, 2, whole.len() / 4] {
             fs::write(&path, &whole[..whole.len() - cut]).unwrap();
-            let expected: &[u32] = if cut == 1 { &[0, 1] } else { &[0] };
-            assert_eq!(indices(root.path()), expected, "{cut} bytes lost");
+            assert_eq!(indices(root.path()), [0], "{cut} bytes lost");
         }
         fs::write(&path, format!("{{\"suite\":\n{whole}")).unwrap();
         let error = read_episodes(root.path()).unwrap_err().to_string();

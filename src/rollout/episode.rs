@@ -65,7 +65,7 @@ pub trait Controller {
 }
 
 /// A policy sees the observation and nothing else.
-impl Controller for Chunked {
+impl Controller for Chunked<'_> {
     fn streams(&self) -> Streams {
         Chunked::streams(self)
     }
@@ -103,6 +103,8 @@ pub struct Finished {
     pub trace: Vec<StepTrace>,
     /// One entry a control step: what another scorer needs.
     pub frames: Vec<ScoreFrame>,
+    /// What was commanded in each control step.
+    pub actions: Vec<Action>,
     /// Settled shape of a soft target.
     pub reference: Option<Reference>,
     /// What is needed to draw the rollout, if asked for.
@@ -185,6 +187,7 @@ pub struct Episode {
     min_det_f: f64,
     trace: Vec<StepTrace>,
     frames: Vec<ScoreFrame>,
+    actions: Vec<Action>,
     senses: Senses,
     recent: Recent,
     reel: Option<Reel>,
@@ -254,6 +257,7 @@ impl Episode {
             min_det_f: f64::INFINITY,
             trace: Vec::new(),
             frames: Vec::new(),
+            actions: Vec::new(),
             senses,
             recent: Recent::default(),
             reel,
@@ -289,6 +293,7 @@ impl Episode {
             if let Err(message) = check_action(&action) {
                 break Outcome::Error { message };
             }
+            self.actions.push(action);
             self.far_commands += u32::from(is_far(&observation, &action));
             if let Err(failure) = self.control_step(&action) {
                 break self.invalid(&failure);
@@ -410,7 +415,7 @@ impl Episode {
         let reference = self.witness.reference(self.target).cloned();
         let verdict = self.judge.finish(&outcome);
         let record = EpisodeRecord { identity: self.spec.identity, outcome, verdict, stats };
-        Finished { record, trace: self.trace, frames: self.frames, reference, film }
+        Finished { record, trace: self.trace, frames: self.frames, actions: self.actions, reference, film }
     }
 }
 

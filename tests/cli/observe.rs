@@ -6,9 +6,9 @@ use std::{path::Path, sync::Arc};
 use softvt::{
     benchmark::{Plan, seed::Split, settings::Settings},
     evaluation::{record::EpisodeRecord, summary::Summary},
-    policy::{Action, Observation, Policy, Streams},
+    policy::{Action, ActionChunk, Chunked, Observation, Policy, PolicyError, Streams, TaskBrief},
     report::terminal,
-    rollout::{Controller, Episode, EpisodeSpec, Looks, RestCache, Senses, Simulation, Which},
+    rollout::{Episode, EpisodeSpec, Looks, RestCache, Senses, Simulation, Which},
     script::{self, EpisodeRequest, Loaded},
     sensing::tactile::MosaicLayout,
 };
@@ -41,10 +41,10 @@ impl Policy for &mut Witness {
         self.streams.clone()
     }
 
-    fn act(&mut self, observation: &Observation) -> Result<Action, String> {
+    fn act(&mut self, observation: &Observation) -> Result<ActionChunk, PolicyError> {
         self.seen.push(observation.clone());
         let (position_b, axis_angle_b) = (observation.ee_position_b, observation.ee_axis_angle_b);
-        Ok(Action { position_b, axis_angle_b, closure: 0.0 })
+        Ok(Action { position_b, axis_angle_b, closure: 0.0 }.into())
     }
 }
 
@@ -61,8 +61,9 @@ fn played(project: &Project, streams: Streams) -> Result<(Vec<Observation>, Epis
     let episode =
         Episode::start(spec, &RestCache::default(), &Looks::default()).map_err(|e| e.to_string())?;
     let mut witness = Witness { streams, seen: Vec::new() };
-    let mut driver: Box<dyn Policy + '_> = Box::new(&mut witness);
-    let outcome = episode.run(&mut driver as &mut dyn Controller).map_err(|e| e.to_string());
+    let brief = TaskBrief { suite: "one".into(), task: 0, prompt: "wait".into(), episode: 0 };
+    let mut driver = Chunked::new(Box::new(&mut witness), brief, 1);
+    let outcome = episode.run(&mut driver).map_err(|e| e.to_string());
     drop(driver);
     outcome.map(|finished| (witness.seen, finished.record))
 }
@@ -229,6 +230,10 @@ fn an_observation_has_no_field_for_hidden_state() {
         cameras: _,
         touch: _,
         forces,
+        force_history,
     } = observation;
-    assert!(forces.is_none(), "true forces only for those who ask, and their results say so");
+    assert!(
+        forces.is_none() && force_history.is_empty(),
+        "true forces only for those who ask, and their results say so"
+    );
 }

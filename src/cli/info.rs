@@ -1,0 +1,95 @@
+//! `run.json`: everything needed to repeat a run.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde::Serialize;
+use serde_json::{Map, Value, json};
+
+use super::{Failure, batch::folder_failure};
+use crate::{
+    benchmark::settings::Settings,
+    policy::profile::Profile,
+    report::run_folder::{RUN, RunFolder},
+};
+
+/// Everything needed to repeat a run.
+#[derive(Serialize)]
+pub struct RunInfo<'a> {
+    pub softvt: &'a str,
+    pub script: String,
+    pub suite: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub twin: Option<&'a str>,
+    pub policy: &'a str,
+    /// What a policy behind a network gets, and what its numbers mean.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub profile: Option<Profile>,
+    /// Actions of a chunk that are carried out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub replan: Option<usize>,
+    pub privileged: bool,
+    pub seed: u64,
+    pub split: &'a str,
+    pub tasks: Vec<usize>,
+    pub episodes: u32,
+    pub shifts: &'a [(String, f64)],
+    pub options: BTreeMap<String, String>,
+    pub settings: &'a Settings,
+    pub sources: BTreeMap<String, String>,
+    pub thresholds: BTreeMap<String, Option<f64>>,
+    /// Whether the policy sees the true forces at the pads.
+    pub force_observed: bool,
+}
+
+/// Writes it down; if it stands there already, it must be the same.
+///
+/// # Errors
+/// The file cannot be written, or is that of another run.
+pub fn write(folder: &RunFolder, info: &RunInfo) -> Result<(), Failure> {
+    let Some(known) = folder.read(RUN).map_err(folder_failure)? else {
+        return folder.write_json(RUN, info).map_err(folder_failure);
+    };
+    let path = folder.path().join(RUN).display().to_string();
+    let known: Value = serde_json::from_str(&known)
+        .map_err(|e| Failure::input(format!("{path}: not that of a run: {e}")))?;
+    match difference(&known, &json!(info)) {
+        None => Ok(()),
+        Some(what) => Err(Failure::input(format!(
+            "{path} is of another run: {what}; resume it with what it was started with, or give another folder with --out"
+        ))),
+    }
+}
+
+/// Longest value that is told.
+const TOLD: usize = 60;
+
+/// Where two documents differ first, with both values.
+fn difference(known: &Value, now: &Value) -> Option<String> {
+    let (Value::Object(a), Value::Object(b)) = (known, now) else {
+        let short = |value: &Value| value.to_string().chars().take(TOLD).collect::<String>();
+        return (known != now).then(|| format!("{} then, {} now", short(known), short(now)));
+    };
+    let names: BTreeSet<&String> = a.keys().chain(b.keys()).collect();
+    names.into_iter().find_map(|name| {
+        let of = |map: &Map<String, Value>| map.get(name).cloned().unwrap_or(Value::Null);
+        let inner = difference(&of(a), &of(b))?;
+        // Below the first level the names make a path.
+        let is_path = of(a).is_object() && of(b).is_object();
+        Some(if is_path { format!("{name}.{inner}") } else { format!("{name}: {inner}") })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_difference_is_named_by_its_path() {
+        let a = json!({ "seed": 0, "settings": { "physics": { "dt": 0.0166 } }, "shifts": [] });
+        assert_eq!(difference(&a, &a.clone()), None);
+        let b = json!({ "seed": 0, "settings": { "physics": { "dt": 0.01 } }, "shifts": [] });
+        assert_eq!(difference(&a, &b).unwrap(), "settings.physics.dt: 0.0166 then, 0.01 now");
+        let c = json!({ "seed": 0, "settings": { "physics": { "dt": 0.0166 } } });
+        assert_eq!(difference(&a, &c).unwrap(), "shifts: [] then, null now");
+    }
+}
