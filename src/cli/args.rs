@@ -10,6 +10,8 @@ use clap::{Arg, ArgAction, ArgMatches, error::ErrorKind, parser::ValueSource, va
 use super::{
     Failure, code,
     drivers::{Choice, policy_word},
+    require::{self, Requirement},
+    shard::{self, Shard},
 };
 use crate::{
     benchmark::Suite,
@@ -38,6 +40,22 @@ pub enum Command {
     },
     /// Say what is wrong with a script, without running it.
     Check(Run),
+    /// Compare two runs.
+    Compare {
+        /// Folder of the first.
+        first: PathBuf,
+        /// Folder of the second.
+        second: PathBuf,
+        /// As JSON.
+        json: bool,
+    },
+    /// Put the shards of a run together.
+    Merge {
+        /// New folder.
+        out: PathBuf,
+        /// Their folders.
+        shards: Vec<PathBuf>,
+    },
     /// Draw one episode.
     View(View),
     /// Check the installation.
@@ -77,6 +95,10 @@ pub struct Run {
     pub out: Option<PathBuf>,
     /// Whether to go on with a run that was broken off.
     pub resume: bool,
+    /// The part of the run to do.
+    pub shard: Option<Shard>,
+    /// What the results must reach.
+    pub require: Vec<Requirement>,
     /// Print JSON instead of tables.
     pub json: bool,
 }
@@ -138,6 +160,14 @@ pub fn parse(words: &[String]) -> Result<Command, Failure> {
         Some(("init", m)) => {
             let task = m.subcommand_matches("task");
             Ok(Command::Init { dir: PathBuf::from(text(task.unwrap_or(m), "dir")), task: task.is_some() })
+        }
+        Some(("compare", m)) => {
+            let [first, second] = ["first", "second"].map(|name| PathBuf::from(text(m, name)));
+            Ok(Command::Compare { first, second, json: m.get_flag("json") })
+        }
+        Some(("merge", m)) => {
+            let shards = many(m, "shards").into_iter().map(PathBuf::from).collect();
+            Ok(Command::Merge { out: PathBuf::from(text(m, "out")), shards })
         }
         Some(("check", m)) => common(m, &options).map(Command::Check).map_err(named),
         Some(("doctor", _)) => Ok(Command::Doctor),
@@ -308,7 +338,7 @@ fn runner() -> clap::Command {
     let json = flag("json", "Print JSON on the standard output: one object for a suite, an array for a list of suites, a line a row for an experiment").action(ArgAction::SetTrue);
     let about = "A safety-aware visuo-tactile manipulation benchmark for soft objects, on an ordinary CPU";
     on_script(clap::Command::new("softvt").version(env!("CARGO_PKG_VERSION")).about(about))
-        .after_help("softvt FILE.lua --help shows the options of that script too.\nExit codes: 0 ok, 1 our own fault, 2 your input, 3 policy or transport, 130 interrupted.")
+        .after_help("softvt FILE.lua --help shows the options of that script too.\nExit codes: 0 ok, 1 our own fault, 2 your input, 3 policy or transport, 99 --require not met, 130 interrupted.")
         .subcommand_negates_reqs(true)
         .args_conflicts_with_subcommands(true)
         .arg(list("task", "Only these tasks: indices or parts of prompts, joined by commas").value_name("TASK"))
@@ -318,11 +348,26 @@ fn runner() -> clap::Command {
         .arg(flag("video", "Draws rollouts: those that are not safe, =all, or episodes such as =0,3").value_name("WHICH").num_args(0..=1).require_equals(true).default_missing_value("failed").value_parser(video))
         .arg(flag("out", "Where to write; a folder without a run in it").value_name("DIR"))
         .arg(flag("resume", "Goes on with the run in --out, if one was broken off there").action(ArgAction::SetTrue).requires("out"))
+        .arg(flag("shard", "Does the I-th of N parts of the run; softvt merge puts them together").value_name("I/N").value_parser(shard::parse))
+        .arg(flag("require", "What each suite's results must reach, such as \"safety>=0.9\"; exit code 99 if not").value_name("RULE").action(ArgAction::Append).value_parser(require::parse))
         .arg(json.clone())
         .subcommand(
             clap::Command::new("list")
                 .about("Lists suites, tasks, assets or policies")
                 .arg(Arg::new("what").required(true).value_parser(["suites", "tasks", "assets", "policies"]))
+                .arg(json.clone()),
+        )
+        .subcommand(
+            clap::Command::new("merge")
+                .about("Puts the shards of a run together: the folder that one run would have left")
+                .arg(Arg::new("out").value_name("OUT").required(true).help("A new folder"))
+                .arg(Arg::new("shards").value_name("SHARD").required(true).num_args(1..).help("The folders of all shards")),
+        )
+        .subcommand(
+            clap::Command::new("compare")
+                .about("Compares two runs of the same episodes, episode by episode")
+                .arg(Arg::new("first").value_name("A").required(true).help("A run's folder, or one with runs in it"))
+                .arg(Arg::new("second").value_name("B").required(true).help("Another"))
                 .arg(json),
         )
         .subcommand(
@@ -393,6 +438,8 @@ fn common(matches: &ArgMatches, options: &[OptionSpec]) -> Result<Run, Failure> 
         video: None,
         out: out.map(PathBuf::from),
         resume: false,
+        shard: None,
+        require: Vec::new(),
         json: false,
     })
 }
@@ -440,6 +487,8 @@ fn run(matches: &ArgMatches, options: &[OptionSpec]) -> Result<Run, Failure> {
         trace: matches.get_one::<String>("trace").map(|kind| kind == "nodes"),
         video,
         resume: matches.get_flag("resume"),
+        shard: matches.get_one("shard").copied(),
+        require: matches.get_many("require").unwrap_or_default().cloned().collect(),
         json: matches.get_flag("json"),
         ..common(matches, options)?
     })

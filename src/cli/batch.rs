@@ -227,6 +227,7 @@ impl<'a> Batch<'a> {
             split: Split::Validation.name(),
             tasks: tasks.iter().map(|t| t.id).collect(),
             episodes,
+            shard: self.run.shard.map(|shard| shard.to_string()),
             shifts: &self.run.shifts,
             options,
             settings: &self.settings,

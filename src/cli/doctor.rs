@@ -58,6 +58,8 @@ fn golden_run(golden: &Golden) -> Run {
         video: None,
         out: None,
         resume: false,
+        shard: None,
+        require: Vec::new(),
         json: false,
     }
 }

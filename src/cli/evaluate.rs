@@ -6,7 +6,7 @@ use super::{
     Failure,
     args::{Run, Video},
     batch::Batch,
-    experiment, print,
+    experiment, print, require,
 };
 use crate::{
     benchmark::{Plan, Suite, Task},
@@ -25,8 +25,9 @@ pub fn run(run: &Run) -> Result<(), Failure> {
     match &loaded.plan {
         Plan::Suite(suite) => {
             let summary = evaluate(run, &loaded, suite, out_dir(run, &run.name_of(suite), None))?;
-            show(run, &[summary], false);
-            Ok(())
+            let summaries = [summary];
+            show(run, &summaries, false);
+            require::check(&run.require, &summaries)
         }
         Plan::Suites { suites } => {
             let mut names = BTreeSet::new();
@@ -44,7 +45,7 @@ pub fn run(run: &Run) -> Result<(), Failure> {
                 summaries.push(evaluate(run, &loaded, suite, out_dir(run, &name, Some(&name)))?);
             }
             show(run, &summaries, true);
-            Ok(())
+            require::check(&run.require, &summaries)
         }
         Plan::Experiment { name, points, columns } => experiment::run(run, &loaded, name, *points, columns),
     }
@@ -118,7 +119,9 @@ pub fn single(run: &Run, task: usize) -> Result<EpisodeRecord, Failure> {
 fn evaluate(run: &Run, loaded: &Loaded, suite: &Suite, out: PathBuf) -> Result<Summary, Failure> {
     let tasks = chosen(run, suite)?;
     let episodes = run.episodes.unwrap_or(suite.episodes);
-    let jobs = tasks.iter().flat_map(|task| (0..episodes).map(move |e| (*task, e))).collect();
+    let all = tasks.iter().flat_map(|task| (0..episodes).map(move |e| (*task, e)));
+    let chosen = all.enumerate().filter(|(job, _)| run.shard.is_none_or(|shard| shard.has(*job)));
+    let jobs = chosen.map(|(_, job)| job).collect();
     let mut batch = Batch::new(run, loaded, suite, (jobs, out))?;
     batch.prepare(&tasks)?;
     let opened = match run.resume {

@@ -32,6 +32,9 @@ pub struct RunInfo<'a> {
     pub split: &'a str,
     pub tasks: Vec<usize>,
     pub episodes: u32,
+    /// The part of the run that this is, such as 2/8.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shard: Option<String>,
     pub shifts: &'a [(String, f64)],
     pub options: BTreeMap<String, String>,
     pub settings: &'a Settings,

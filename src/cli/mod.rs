@@ -3,6 +3,7 @@
 mod args;
 mod batch;
 mod check;
+mod compare;
 mod doctor;
 mod drivers;
 mod evaluate;
@@ -12,6 +13,8 @@ mod info;
 mod init;
 mod list;
 mod progress;
+mod require;
+mod shard;
 mod view;
 
 use std::{panic, process::ExitCode, thread, time::Duration};
@@ -30,6 +33,8 @@ pub mod code {
     pub const INPUT: u8 = 2;
     /// Policy or transport.
     pub const POLICY: u8 = 3;
+    /// `--require` is not met.
+    pub const UNMET: u8 = 99;
     /// Interrupted.
     pub const INTERRUPTED: u8 = 130;
 }
@@ -46,6 +51,11 @@ impl Failure {
     fn input(message: impl ToString) -> Self {
         let code = if stop::requested() { code::INTERRUPTED } else { code::INPUT };
         Self { code, message: message.to_string() }
+    }
+
+    /// The run went well and its results do not suffice.
+    fn unmet(message: String) -> Self {
+        Self { code: code::UNMET, message }
     }
 
     /// Interrupted; what is finished has been kept.
@@ -92,6 +102,8 @@ fn carry_out(words: &[String]) -> Result<(), Failure> {
         Command::Init { dir, task: false } => init::run(&dir),
         Command::Init { dir, task: true } => init::task(&dir),
         Command::Check(run) => check::run(&run),
+        Command::Compare { first, second, json } => compare::run(&first, &second, json),
+        Command::Merge { out, shards } => shard::merge(&out, &shards),
         Command::View(view) => view::run(&view),
         Command::Doctor => doctor::run(),
         Command::Shown => Ok(()),

@@ -1,8 +1,11 @@
 //! What a run leaves behind: its folder, the results table, envelope plots, films, and SoftVTBench's files.
 
 pub mod actions;
+pub mod comparison;
 pub mod envelope;
 pub mod film;
 pub mod interchange;
+pub mod merge;
 pub mod run_folder;
+pub mod runs;
 pub mod terminal;

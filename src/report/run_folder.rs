@@ -208,7 +208,7 @@ fn lock(episodes: &File, dir: &Path) -> Result<(), RunFolderError> {
     }
 }
 
-fn line(record: &EpisodeRecord, path: &Path) -> Result<String, RunFolderError> {
+pub(super) fn line(record: &EpisodeRecord, path: &Path) -> Result<String, RunFolderError> {
     let line = serde_json::to_string(record)
         .map_err(|source| RunFolderError::Json { path: path.display().to_string(), source })?;
     Ok(line + "\n")

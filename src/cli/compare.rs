@@ -1,0 +1,27 @@
+//! `softvt compare A B`: what two runs of the same episodes differ in.
+
+use std::path::Path;
+
+use super::{Failure, print};
+use crate::report::{comparison, runs};
+
+/// Prints the paired differences of the run or runs in `second` from those in `first`.
+///
+/// # Errors
+/// A folder holds no run, or they share no episode.
+pub fn run(first: &Path, second: &Path, json: bool) -> Result<(), Failure> {
+    let [a, b] = [first, second].map(runs::load);
+    let (a, b) = (a.map_err(Failure::input)?, b.map_err(Failure::input)?);
+    let compared = comparison::compare(&a, &b).ok_or_else(|| {
+        Failure::input(format!(
+            "{} and {} share no episode: they differ in suite, tasks, seed or split",
+            first.display(),
+            second.display()
+        ))
+    })?;
+    print(&match json {
+        true => format!("{:#}\n", serde_json::json!(compared)),
+        false => comparison::table(&compared),
+    });
+    Ok(())
+}
