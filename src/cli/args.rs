@@ -10,6 +10,7 @@ use clap::{Arg, ArgAction, ArgMatches, error::ErrorKind, parser::ValueSource, va
 use super::{
     Failure, code,
     drivers::{Choice, policy_word},
+    replay,
     require::{self, Requirement},
     shard::{self, Shard},
 };
@@ -55,6 +56,13 @@ pub enum Command {
         out: PathBuf,
         /// Their folders.
         shards: Vec<PathBuf>,
+    },
+    /// Simulate a recorded episode again.
+    Replay {
+        /// Folder of the run.
+        dir: PathBuf,
+        /// Which of its episodes.
+        which: replay::Which,
     },
     /// Draw one episode.
     View(View),
@@ -104,6 +112,29 @@ pub struct Run {
 }
 
 impl Run {
+    /// A script under a policy, one thread, all else as it is by default.
+    pub fn of(file: PathBuf, policy: Choice) -> Self {
+        Self {
+            file,
+            policy,
+            script_words: Vec::new(),
+            tasks: Vec::new(),
+            episodes: None,
+            seed: 0,
+            threads: 1,
+            shifts: Vec::new(),
+            twin: false,
+            set: Vec::new(),
+            trace: None,
+            video: None,
+            out: None,
+            resume: false,
+            shard: None,
+            require: Vec::new(),
+            json: false,
+        }
+    }
+
     /// A suite's name in results: that of a twin is its own, though its episodes start as the suite's do.
     pub fn name_of(&self, suite: &Suite) -> String {
         let twin = if self.twin { "_rigid_twin" } else { "" };
@@ -168,6 +199,10 @@ pub fn parse(words: &[String]) -> Result<Command, Failure> {
         Some(("merge", m)) => {
             let shards = many(m, "shards").into_iter().map(PathBuf::from).collect();
             Ok(Command::Merge { out: PathBuf::from(text(m, "out")), shards })
+        }
+        Some(("replay", m)) => {
+            let which = m.get_one("episode").copied().unwrap_or(replay::Which::Line(0));
+            Ok(Command::Replay { dir: PathBuf::from(text(m, "run")), which })
         }
         Some(("check", m)) => common(m, &options).map(Command::Check).map_err(named),
         Some(("doctor", _)) => Ok(Command::Doctor),
@@ -358,6 +393,12 @@ fn runner() -> clap::Command {
                 .arg(json.clone()),
         )
         .subcommand(
+            clap::Command::new("replay")
+                .about("Simulates a recorded episode again: exit code 0 if every byte comes out the same")
+                .arg(Arg::new("run").value_name("RUN").required(true).help("The folder of a run"))
+                .arg(Arg::new("episode").value_name("EPISODE").required(true).help("TASK/EPISODE, or the number of its line from 0").value_parser(replay::which)),
+        )
+        .subcommand(
             clap::Command::new("merge")
                 .about("Puts the shards of a run together: the folder that one run would have left")
                 .arg(Arg::new("out").value_name("OUT").required(true).help("A new folder"))
@@ -424,23 +465,13 @@ fn common(matches: &ArgMatches, options: &[OptionSpec]) -> Result<Run, Failure> 
         return Err(Failure::input("--out: expected a folder, got \"\"; \".\" is the one you are in"));
     }
     Ok(Run {
-        file: PathBuf::from(text(matches, "file")),
         script_words,
-        policy: choice(matches),
-        tasks: Vec::new(),
-        episodes: None,
         seed: matches.get_one("seed").copied().unwrap_or(0),
-        threads: 1,
         shifts: many(matches, "shift").iter().map(|word| shift(word)).collect::<Result<_, _>>()?,
         twin: matches.contains_id("twin"),
         set: many(matches, "set").iter().map(|word| pair("--set", word)).collect::<Result<_, _>>()?,
-        trace: None,
-        video: None,
         out: out.map(PathBuf::from),
-        resume: false,
-        shard: None,
-        require: Vec::new(),
-        json: false,
+        ..Run::of(PathBuf::from(text(matches, "file")), choice(matches))
     })
 }
 

@@ -55,7 +55,7 @@ pub(super) struct Batch<'a> {
     /// The thresholds in use as one file of SoftVTBench's form.
     released: Thresholds,
     /// SHA-256 of every file that the results depend on.
-    sources: BTreeMap<String, String>,
+    pub sources: BTreeMap<String, String>,
     cache: RestCache,
     looks: Looks,
     pub out: PathBuf,
@@ -63,7 +63,7 @@ pub(super) struct Batch<'a> {
     pub films: bool,
     /// Whether whoever drives sees the true forces at the pads.
     force_observed: bool,
-    drive: Drive,
+    pub drive: Drive,
 }
 
 impl<'a> Batch<'a> {
@@ -230,6 +230,8 @@ impl<'a> Batch<'a> {
             shard: self.run.shard.map(|shard| shard.to_string()),
             shifts: &self.run.shifts,
             options,
+            arguments: &self.run.script_words,
+            set: &self.run.set,
             settings: &self.settings,
             sources: self.sources.clone(),
             thresholds: self.limits.iter().map(|(a, l)| (a.clone(), l.map(|l| l.tau_pct()))).collect(),
@@ -278,7 +280,7 @@ impl<'a> Batch<'a> {
     }
 
     /// The jobs that are not done.
-    fn left(&self, done: &[EpisodeRecord]) -> Vec<usize> {
+    pub fn left(&self, done: &[EpisodeRecord]) -> Vec<usize> {
         let done: BTreeSet<_> = done.iter().map(|r| (r.identity.task, r.identity.episode)).collect();
         (0..self.jobs.len()).filter(|&job| !done.contains(&(self.jobs[job].0.id, self.jobs[job].1))).collect()
     }
@@ -418,7 +420,7 @@ impl<'a> Batch<'a> {
 }
 
 /// Makes whoever drives an episode.
-type Drive = Box<dyn Fn(script::Episode, TaskBrief) -> Result<Box<dyn Controller>, Failure> + Sync>;
+pub type Drive = Box<dyn Fn(script::Episode, TaskBrief) -> Result<Box<dyn Controller>, Failure> + Sync>;
 
 /// A film that could not be made.
 pub(super) fn film_failure(error: FilmError) -> Failure {

@@ -44,22 +44,8 @@ pub fn run() -> Result<(), Failure> {
 
 fn golden_run(golden: &Golden) -> Run {
     Run {
-        file: golden.script.clone().into(),
-        script_words: Vec::new(),
-        policy: Choice::expert(),
         tasks: vec![golden.task.to_string()],
         episodes: Some(1),
-        seed: 0,
-        threads: 1,
-        shifts: Vec::new(),
-        twin: false,
-        set: Vec::new(),
-        trace: None,
-        video: None,
-        out: None,
-        resume: false,
-        shard: None,
-        require: Vec::new(),
-        json: false,
+        ..Run::of(golden.script.clone().into(), Choice::expert())
     }
 }

@@ -1,14 +1,23 @@
 //! Who drives: what `--policy` names, made ready for many episodes.
 
-use std::{sync::Arc, time::Duration};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::Duration,
+};
 
 use super::{Failure, code};
 use crate::{
     benchmark::seed::Stream,
     policy::{
-        Chunked, Policy, PolicyError, TaskBrief, builtin,
+        Action, Chunked, Policy, PolicyError, TaskBrief, builtin,
         profile::{PROFILES, Profile},
+        recorded::Recorded,
         remote::{Connections, Protocol, Remote, Server},
+    },
+    report::{
+        actions,
+        runs::{self, StoredRun},
     },
     rollout::{Controller, stop},
     script::{self, ExpertController},
@@ -55,11 +64,22 @@ impl Choice {
         }
     }
 
+    /// Recorded actions that somebody else hands over.
+    pub fn replay() -> Self {
+        Self { word: "noop".to_owned(), name: Some("replay".to_owned()), ..Self::expert() }
+    }
+
+    /// Whether it carries out what a run recorded.
+    pub fn is_recorded(&self) -> bool {
+        is_run(&self.word)
+    }
+
     /// How results call it.
     pub fn name(&self) -> &str {
         match &self.name {
             Some(name) => name,
             None if self.is_remote() => &self.profile,
+            None if self.is_recorded() => "replay",
             None => &self.word,
         }
     }
@@ -97,6 +117,7 @@ impl Choice {
 pub struct Drivers {
     choice: Choice,
     connections: Option<Arc<Connections>>,
+    recorded: Vec<StoredRun>,
 }
 
 impl Drivers {
@@ -120,7 +141,11 @@ impl Drivers {
                 Some(Arc::new(connections))
             }
         };
-        Ok(Self { choice: choice.clone(), connections })
+        let recorded = match choice.is_recorded() {
+            true => runs::load(Path::new(&choice.word)).map_err(Failure::input)?,
+            false => Vec::new(),
+        };
+        Ok(Self { choice: choice.clone(), connections, recorded })
     }
 
     /// Whoever drives the episode `brief`.
@@ -133,6 +158,10 @@ impl Drivers {
         };
         if let Some(connections) = &self.connections {
             return Ok(chunked(Box::new(Remote::new(connections.clone())), brief));
+        }
+        if self.choice.is_recorded() {
+            let actions = self.actions_of(&brief)?;
+            return Ok(Box::new(Chunked::new(Box::new(Recorded::new(actions, None)), brief, 1)));
         }
         match self.choice.word.as_str() {
             "noop" => Ok(chunked(Box::<builtin::Noop>::default(), brief)),
@@ -147,6 +176,20 @@ impl Drivers {
             }
         }
     }
+}
+
+impl Drivers {
+    /// What was recorded of an episode.
+    fn actions_of(&self, brief: &TaskBrief) -> Result<Vec<Action>, Failure> {
+        let run = self.recorded.iter().find(|run| run.text("suite") == brief.suite).or(self.recorded.first());
+        let dir = run.map_or_else(|| PathBuf::from(&self.choice.word), |run| run.dir.clone());
+        actions::read(&actions::path(&dir, brief.task, brief.episode)).map_err(Failure::input)
+    }
+}
+
+/// Whether a folder holds a run, or runs.
+fn is_run(word: &str) -> bool {
+    Path::new(word).is_dir()
 }
 
 /// Where a server's key comes from: not from the command line, which others can read.
@@ -164,12 +207,12 @@ fn policy_failure(error: PolicyError) -> Failure {
 /// # Errors
 /// A fragment for people.
 pub fn policy_word(word: &str) -> Result<String, String> {
-    if POLICIES.iter().any(|(name, _)| *name == word) || word.contains("://") {
+    if POLICIES.iter().any(|(name, _)| *name == word) || word.contains("://") || is_run(word) {
         return Ok(word.to_owned());
     }
     let known = POLICIES.map(|(name, _)| name).join(", ");
     let near = POLICIES.iter().map(|(name, _)| (strsim::jaro_winkler(name, word), *name));
     let meant = near.filter(|(alike, _)| *alike > 0.8).max_by(|a, b| a.0.total_cmp(&b.0));
     let hint = meant.map_or(String::new(), |(_, name)| format!("; did you mean {name}?"));
-    Err(format!("expected {known}, or a server such as ws://host:8000{hint}"))
+    Err(format!("expected {known}, a server such as ws://host:8000, or the folder of a run{hint}"))
 }

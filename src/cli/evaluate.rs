@@ -11,7 +11,10 @@ use super::{
 use crate::{
     benchmark::{Plan, Suite, Task},
     evaluation::{record::EpisodeRecord, summary::Summary},
-    report::{run_folder::RunFolder, terminal},
+    report::{
+        run_folder::{RunFolder, SUMMARY},
+        terminal,
+    },
     script::{self, Loaded},
 };
 
@@ -124,12 +127,18 @@ fn evaluate(run: &Run, loaded: &Loaded, suite: &Suite, out: PathBuf) -> Result<S
     let jobs = chosen.map(|(_, job)| job).collect();
     let mut batch = Batch::new(run, loaded, suite, (jobs, out))?;
     batch.prepare(&tasks)?;
-    let opened = match run.resume {
+    // The same command again on a finished folder changes nothing.
+    let finished = batch.out.join(SUMMARY).is_file();
+    let opened = match run.resume || finished {
         true => RunFolder::resume(&batch.out),
         false => RunFolder::create(&batch.out).map(|folder| (folder, Vec::new())),
     };
     let (folder, done) = opened.map_err(|e| Failure::input(format!("{}: {e}", run.file.display())))?;
     batch.write_info(&folder, &tasks, episodes)?;
+    if finished && batch.left(&done).is_empty() {
+        crate::message::tell(&format!("softvt: {} is finished already", batch.out.display()));
+        return Ok(Summary::of(&run.name_of(suite), run.policy.name(), &done));
+    }
     batch.go(folder, done)
 }
 

@@ -37,6 +37,10 @@ pub struct RunInfo<'a> {
     pub shard: Option<String>,
     pub shifts: &'a [(String, f64)],
     pub options: BTreeMap<String, String>,
+    /// What was typed of the script's own options.
+    pub arguments: &'a [String],
+    /// What was typed behind --set.
+    pub set: &'a [(String, String)],
     pub settings: &'a Settings,
     pub sources: BTreeMap<String, String>,
     pub thresholds: BTreeMap<String, Option<f64>>,
@@ -67,7 +71,7 @@ pub fn write(folder: &RunFolder, info: &RunInfo) -> Result<(), Failure> {
 const TOLD: usize = 60;
 
 /// Where two documents differ first, with both values.
-fn difference(known: &Value, now: &Value) -> Option<String> {
+pub fn difference(known: &Value, now: &Value) -> Option<String> {
     let (Value::Object(a), Value::Object(b)) = (known, now) else {
         let short = |value: &Value| value.to_string().chars().take(TOLD).collect::<String>();
         return (known != now).then(|| format!("{} then, {} now", short(known), short(now)));

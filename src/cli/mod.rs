@@ -13,6 +13,7 @@ mod info;
 mod init;
 mod list;
 mod progress;
+mod replay;
 mod require;
 mod shard;
 mod view;
@@ -104,6 +105,7 @@ fn carry_out(words: &[String]) -> Result<(), Failure> {
         Command::Check(run) => check::run(&run),
         Command::Compare { first, second, json } => compare::run(&first, &second, json),
         Command::Merge { out, shards } => shard::merge(&out, &shards),
+        Command::Replay { dir, which } => replay::run(&dir, which),
         Command::View(view) => view::run(&view),
         Command::Doctor => doctor::run(),
         Command::Shown => Ok(()),

@@ -7,6 +7,7 @@ pub mod encode;
 mod observation;
 mod osc;
 pub mod profile;
+pub mod recorded;
 pub mod remote;
 pub mod wire;
 

@@ -1,0 +1,170 @@
+//! `softvt replay RUN EPISODE`: simulates a recorded episode again and asks whether every byte comes out the same.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+
+use super::{
+    Failure, args::Run, batch::Batch, code, drivers::Choice, evaluate::chosen, info::difference, print,
+};
+use crate::{
+    benchmark::{Plan, Suite},
+    evaluation::record::{EpisodeRecord, Outcome},
+    policy::{Chunked, recorded::Recorded},
+    report::{
+        actions,
+        runs::{self, StoredRun},
+    },
+    script,
+};
+
+/// Which episode of a run: `TASK/EPISODE`, or the number of its line from 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Which {
+    /// A line.
+    Line(usize),
+    /// A task's episode.
+    Of(usize, u32),
+}
+
+/// Reads which episode is meant.
+///
+/// # Errors
+/// A fragment for people.
+pub fn which(word: &str) -> Result<Which, String> {
+    let pair =
+        word.split_once('/').and_then(|(task, e)| Some(Which::Of(task.parse().ok()?, e.parse().ok()?)));
+    let found = pair.or_else(|| word.parse().ok().map(Which::Line));
+    found.ok_or_else(|| {
+        "expected TASK/EPISODE such as 3/0, or the number of a line of episodes.jsonl from 0".to_owned()
+    })
+}
+
+/// Simulates the episode again by its recorded actions.
+///
+/// # Errors
+/// The run cannot be read, its scripts have changed since, or (exit code 1) something comes out different.
+pub fn run(dir: &Path, which: Which) -> Result<(), Failure> {
+    let stored = runs::load(dir).map_err(Failure::input)?;
+    let [stored] = &stored[..] else {
+        let names: Vec<String> = stored.iter().map(|run| run.dir.display().to_string()).collect();
+        return Err(Failure::input(format!(
+            "{} holds several runs; name one of {}",
+            dir.display(),
+            names.join(", ")
+        )));
+    };
+    let record = find(stored, which)?;
+    let run = run_of(stored)?;
+    let loaded = script::load(&run.file, &run.script_words).map_err(Failure::input)?;
+    let suite = suite_of(&loaded.plan, &run, stored)?;
+    let (task, episode) = (record.identity.task, record.identity.episode);
+    let run = Run { tasks: vec![task.to_string()], ..run };
+    let tasks = chosen(&run, suite)?;
+    let mut batch = Batch::new(&run, &loaded, suite, (vec![(tasks[0], episode)], PathBuf::new()))?;
+    let path = actions::path(&stored.dir, task, episode);
+    let recorded = actions::read(&path).map_err(Failure::input)?;
+    let ending = match &record.outcome {
+        Outcome::Error { message } => Some(message.clone()),
+        _ => None,
+    };
+    batch.drive = Box::new(move |_, brief| {
+        Ok(Box::new(Chunked::new(Box::new(Recorded::new(recorded.clone(), ending.clone())), brief, 1)))
+    });
+    batch.prepare(&tasks)?;
+    same_sources(stored, &batch)?;
+    let mut again = batch.episode(0, false)?.record;
+    // Who drove, and what was looked at, is not simulated again.
+    again.identity.policy.clone_from(&record.identity.policy);
+    again.stats.force_observed = record.stats.force_observed;
+    again.stats.camera_inside = record.stats.camera_inside;
+    let bytes = |record: &EpisodeRecord| serde_json::to_string(record).map_err(Failure::input);
+    if bytes(&again)? == bytes(record)? {
+        print(&format!(
+            "task {task} episode {episode}: the same to the byte, final state {}\n",
+            again.stats.state_hash
+        ));
+        return Ok(());
+    }
+    let what = difference(&json!(record), &json!(again)).unwrap_or_default();
+    Err(Failure {
+        code: code::INTERNAL,
+        message: format!(
+            "task {task} episode {episode} does not come out the same: {what}; softvt doctor says whether this machine computes as published"
+        ),
+    })
+}
+
+fn find(stored: &StoredRun, which: Which) -> Result<&EpisodeRecord, Failure> {
+    let found = match which {
+        Which::Line(line) => stored.records.get(line),
+        Which::Of(task, episode) => {
+            stored.records.iter().find(|r| (r.identity.task, r.identity.episode) == (task, episode))
+        }
+    };
+    found.ok_or_else(|| {
+        Failure::input(format!(
+            "{} has no such episode; it has {}",
+            stored.dir.display(),
+            stored.records.len()
+        ))
+    })
+}
+
+/// The command that made a run.
+fn run_of(stored: &StoredRun) -> Result<Run, Failure> {
+    let info = &stored.info;
+    let wrong = |field: &str| {
+        Failure::input(format!(
+            "{}/run.json: it has no {field}, as runs of this version have",
+            stored.dir.display()
+        ))
+    };
+    let texts = |value: &Value| -> Option<Vec<String>> {
+        value.as_array()?.iter().map(|text| text.as_str().map(str::to_owned)).collect()
+    };
+    let set = info["set"].as_array().and_then(|all| {
+        all.iter().map(|pair| texts(pair)?.try_into().ok().map(|[a, b]: [String; 2]| (a, b))).collect()
+    });
+    let shifts = info["shifts"].as_array().and_then(|all| {
+        all.iter().map(|pair| Some((pair[0].as_str()?.to_owned(), pair[1].as_f64()?))).collect()
+    });
+    Ok(Run {
+        script_words: texts(&info["arguments"]).ok_or_else(|| wrong("arguments"))?,
+        seed: info["seed"].as_u64().ok_or_else(|| wrong("seed"))?,
+        twin: info["twin"].is_string(),
+        set: set.ok_or_else(|| wrong("set"))?,
+        shifts: shifts.ok_or_else(|| wrong("shifts"))?,
+        ..Run::of(PathBuf::from(stored.text("script")), Choice::replay())
+    })
+}
+
+fn suite_of<'a>(plan: &'a Plan, run: &Run, stored: &StoredRun) -> Result<&'a Suite, Failure> {
+    let suites: Vec<&Suite> = match plan {
+        Plan::Suite(suite) => vec![suite],
+        Plan::Suites { suites } => suites.iter().collect(),
+        _ => Vec::new(),
+    };
+    let found = suites.into_iter().find(|suite| suite.name == stored.text("suite"));
+    found.ok_or_else(|| {
+        Failure::input(format!("{} has no suite {:?} any more", run.file.display(), stored.text("suite")))
+    })
+}
+
+/// Refuses scripts and thresholds that are not what the run was made with.
+fn same_sources(stored: &StoredRun, batch: &Batch) -> Result<(), Failure> {
+    let now = json!(batch.sources);
+    let known = stored.info["sources"].as_object().into_iter().flatten();
+    let changed: Vec<&str> = known
+        .filter(|(name, hash)| now.get(name.as_str()).is_some_and(|own| own != *hash))
+        .map(|(n, _)| n.as_str())
+        .collect();
+    if changed.is_empty() {
+        return Ok(());
+    }
+    Err(Failure::input(format!(
+        "{}: {} changed since the run was made; go back to what it was, or run anew",
+        stored.dir.display(),
+        changed.join(", ")
+    )))
+}
