@@ -64,6 +64,13 @@ pub enum Command {
         /// Which of its episodes.
         which: replay::Which,
     },
+    /// Write a page about runs.
+    Report {
+        /// Their folders.
+        runs: Vec<PathBuf>,
+        /// Where to write.
+        out: PathBuf,
+    },
     /// Draw one episode.
     View(View),
     /// Check the installation.
@@ -203,6 +210,10 @@ pub fn parse(words: &[String]) -> Result<Command, Failure> {
         Some(("replay", m)) => {
             let which = m.get_one("episode").copied().unwrap_or(replay::Which::Line(0));
             Ok(Command::Replay { dir: PathBuf::from(text(m, "run")), which })
+        }
+        Some(("report", m)) => {
+            let runs = many(m, "runs").into_iter().map(PathBuf::from).collect();
+            Ok(Command::Report { runs, out: PathBuf::from(text(m, "out")) })
         }
         Some(("check", m)) => common(m, &options).map(Command::Check).map_err(named),
         Some(("doctor", _)) => Ok(Command::Doctor),
@@ -397,6 +408,12 @@ fn runner() -> clap::Command {
                 .about("Simulates a recorded episode again: exit code 0 if every byte comes out the same")
                 .arg(Arg::new("run").value_name("RUN").required(true).help("The folder of a run"))
                 .arg(Arg::new("episode").value_name("EPISODE").required(true).help("TASK/EPISODE, or the number of its line from 0").value_parser(replay::which)),
+        )
+        .subcommand(
+            clap::Command::new("report")
+                .about("Writes one page about runs (report.html), and its tables as markdown and LaTeX")
+                .arg(Arg::new("runs").value_name("RUN").required(true).num_args(1..).help("Folders of runs, or folders with runs in them"))
+                .arg(flag("out", "Where to write").value_name("DIR").default_value("report")),
         )
         .subcommand(
             clap::Command::new("merge")

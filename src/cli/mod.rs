@@ -14,6 +14,7 @@ mod init;
 mod list;
 mod progress;
 mod replay;
+mod report;
 mod require;
 mod shard;
 mod view;
@@ -106,6 +107,7 @@ fn carry_out(words: &[String]) -> Result<(), Failure> {
         Command::Compare { first, second, json } => compare::run(&first, &second, json),
         Command::Merge { out, shards } => shard::merge(&out, &shards),
         Command::Replay { dir, which } => replay::run(&dir, which),
+        Command::Report { runs, out } => report::run(&runs, &out),
         Command::View(view) => view::run(&view),
         Command::Doctor => doctor::run(),
         Command::Shown => Ok(()),

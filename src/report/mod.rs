@@ -6,6 +6,8 @@ pub mod envelope;
 pub mod film;
 pub mod interchange;
 pub mod merge;
+pub mod page;
 pub mod run_folder;
 pub mod runs;
+pub mod tables;
 pub mod terminal;
