@@ -198,6 +198,7 @@ const API_KEY: &str = "SOFTVT_API_KEY";
 fn policy_failure(error: PolicyError) -> Failure {
     match error {
         PolicyError::Interrupted => Failure::interrupted("interrupted"),
+        PolicyError::Address(message) => Failure::input(message),
         other => Failure { code: code::POLICY, message: other.to_string() },
     }
 }

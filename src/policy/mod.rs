@@ -75,6 +75,9 @@ pub enum PolicyError {
     /// The server cannot be reached, or does not answer: the run ends.
     #[error("{0}")]
     Transport(String),
+    /// The address is none: the user's input.
+    #[error("{0}")]
+    Address(String),
     /// The answer is not of the form that the profile says: the run ends.
     #[error("{0}")]
     Reply(String),

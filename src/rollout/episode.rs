@@ -88,7 +88,7 @@ impl From<PolicyError> for ControlError {
         match error {
             PolicyError::Transport(message) | PolicyError::Reply(message) => Self::Policy(message),
             PolicyError::Action(message) => Self::Action(message),
-            PolicyError::Script(message) => Self::Script(message),
+            PolicyError::Script(message) | PolicyError::Address(message) => Self::Script(message),
             PolicyError::Interrupted => Self::Interrupted,
         }
     }

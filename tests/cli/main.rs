@@ -11,6 +11,7 @@ mod interrupt;
 mod joints;
 mod measures;
 mod observe;
+mod servers;
 mod spread;
 mod support;
 mod touch;

@@ -211,7 +211,7 @@ const DEFAULT_PORT: u16 = 8000;
 
 fn request(server: &Server) -> Result<ClientRequestBuilder, PolicyError> {
     let wrong = |what: &str| {
-        PolicyError::Transport(format!("--policy {}: {what}; expected ws://HOST:PORT", server.url))
+        PolicyError::Address(format!("--policy {}: {what}; expected ws://HOST:PORT", server.url))
     };
     let uri: Uri = server.url.parse().map_err(|_| wrong("not an address"))?;
     match uri.scheme_str() {

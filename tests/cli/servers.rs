@@ -1,0 +1,334 @@
+//! Policy servers of every temper: what a run does about them, and that nothing finished is lost.
+
+use std::{
+    io::Write,
+    net::{TcpListener, TcpStream},
+    thread,
+};
+
+use rmpv::Value;
+use tungstenite::{Message, WebSocket, accept};
+
+use crate::support::{Project, Said, Small};
+
+type Socket = WebSocket<TcpStream>;
+
+/// A server that serves each of `visits` connections by `serve`, which gets their number; its address.
+fn server(visits: usize, serve: impl Fn(usize, Socket) + Send + 'static) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = format!("ws://{}", listener.local_addr().expect("an address"));
+    thread::spawn(move || {
+        for (number, stream) in listener.incoming().take(visits).enumerate() {
+            if let Ok(socket) = accept(stream.expect("a connection")) {
+                serve(number, socket);
+            }
+        }
+    });
+    address
+}
+
+fn packed(value: &Value) -> Message {
+    let mut bytes = Vec::new();
+    rmpv::encode::write_value(&mut bytes, value).expect("packed");
+    Message::binary(bytes)
+}
+
+fn text(name: &str) -> Value {
+    Value::from(name)
+}
+
+/// An array with keys of type bin, as openpi writes it.
+fn array(dtype: &str, shape: &[usize], data: Vec<u8>) -> Value {
+    let key = |name: &str| Value::Binary(name.as_bytes().to_vec());
+    Value::Map(vec![
+        (key("__ndarray__"), Value::Boolean(true)),
+        (key("data"), Value::Binary(data)),
+        (key("dtype"), text(dtype)),
+        (key("shape"), Value::Array(shape.iter().map(|n| Value::from(*n)).collect())),
+    ])
+}
+
+fn actions(rows: usize, row: [f32; 7]) -> Value {
+    let numbers = (0..rows).flat_map(|_| row).flat_map(f32::to_le_bytes).collect();
+    Value::Map(vec![(text("actions"), array("<f4", &[rows, 7], numbers))])
+}
+
+/// The state that an observation shows.
+fn state(observation: &Value) -> Vec<f32> {
+    let of = |map: &Value, key: &[u8]| -> Value {
+        let found = map.as_map().expect("a map").iter().find(|(k, _)| match k {
+            Value::String(text) => text.as_bytes() == key,
+            Value::Binary(bytes) => bytes == key,
+            _ => false,
+        });
+        found.expect("an entry").1.clone()
+    };
+    let data = of(&of(observation, b"observation/state"), b"data");
+    data.as_slice().expect("bytes").as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect()
+}
+
+fn observation(socket: &mut Socket) -> Option<Value> {
+    match socket.read() {
+        Ok(Message::Binary(bytes)) => rmpv::decode::read_value(&mut &bytes[..]).ok(),
+        _ => None,
+    }
+}
+
+/// Greets as openpi does and answers each observation by what `reply` makes of its number and it.
+fn answering(mut socket: Socket, reply: impl Fn(usize, &Value) -> Option<Message>) {
+    let _ = socket.send(packed(&Value::Map(Vec::new())));
+    let mut count = 0;
+    while let Some(seen) = observation(&mut socket) {
+        let Some(message) = reply(count, &seen) else { return };
+        if socket.send(message).is_err() {
+            return;
+        }
+        count += 1;
+    }
+}
+
+fn hold(seen: &Value, rows: usize) -> Message {
+    let state = state(seen);
+    let row = std::array::from_fn(|i| if i < 6 { state[i] } else { 0.0 });
+    packed(&actions(rows, row))
+}
+
+fn project() -> Project {
+    Small { task: "budget_steps = 12", ..Small::default() }.project()
+}
+
+fn run(project: &Project, address: &str, words: &str) -> Said {
+    project.softvt(&format!(
+        "x.lua --policy {address} --profile vision --policy-timeout 5 --threads 1 --out run {words}"
+    ))
+}
+
+/// A run that must fail for its server: what it says.
+fn fails(address: &str, words: &str) -> String {
+    let project = project();
+    let said = run(&project, address, words);
+    assert_eq!((said.code, said.out.as_str()), (3, ""), "{}", said.err);
+    assert!(!said.err.contains("panicked") && !said.err.contains("internal error"), "{}", said.err);
+    assert!(!project.path("run").exists(), "nothing was finished, so nothing is left");
+    said.err
+}
+
+#[test]
+fn a_server_is_asked_once_a_chunk_and_its_actions_are_carried_out() {
+    let asked = std::sync::Arc::new(std::sync::atomic::AtomicUsize::new(0));
+    let count = asked.clone();
+    let address = server(9, move |_, socket| {
+        answering(socket, |_, seen| {
+            count.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+            Some(hold(seen, 50))
+        });
+    });
+    let project = project();
+    let said = run(&project, &address, "--episodes 2 --replan 5");
+    assert_eq!(said.code, 0, "{}", said.err);
+    // Twelve steps in chunks of five are three questions; two episodes on one connection.
+    assert_eq!(asked.load(std::sync::atomic::Ordering::Relaxed), 6);
+    let info = project.json("run/run.json");
+    assert_eq!((info["policy"].as_str(), info["replan"].as_u64()), (Some("vision"), Some(5)));
+    assert_eq!(info["profile"]["actions"]["gripper"]["binary"], true);
+    let replayed = project.succeeds("replay run 0/1");
+    assert!(replayed.out.contains("task 0 episode 1: the same to the byte"), "{}", replayed.out);
+}
+
+#[test]
+fn a_server_that_is_not_there_is_told() {
+    let free = TcpListener::bind("127.0.0.1:0").expect("a port").local_addr().expect("an address");
+    let said = fails(&format!("ws://{free}"), "--policy-timeout 0.3");
+    assert!(
+        said.contains("no policy server at ws://127.0.0.1") && said.contains("--policy-timeout"),
+        "{said}"
+    );
+}
+
+#[test]
+fn addresses_that_are_none_are_the_users_input() {
+    let project = project();
+    for (address, words) in [
+        ("wss://host:1", "use a tunnel"),
+        ("http://host:1", "expected ws://HOST:PORT"),
+        ("ws://", "not an address"),
+    ] {
+        let message = project.refusal(&format!("x.lua --out run --policy {address}"));
+        assert!(message.contains(words), "{message}");
+    }
+    let message = project.refusal("x.lua --out run --policy exprt");
+    assert!(message.contains("did you mean expert"), "{message}");
+    let message = project.refusal("x.lua --out run --policy ws://127.0.0.1:9 --profile pi");
+    assert!(message.contains("--profile pi: expected one of vision, visuo_tactile"), "{message}");
+}
+
+#[test]
+fn a_server_that_hangs_is_not_waited_for_for_ever() {
+    let address = server(9, |_, mut socket| {
+        let _ = socket.send(packed(&Value::Map(Vec::new())));
+        let _ = observation(&mut socket);
+        thread::sleep(std::time::Duration::from_secs(60));
+    });
+    let said = fails(&address, "--policy-timeout 0.5");
+    assert!(said.contains("did not answer within 0.5 s"), "{said}");
+    // One that takes the connection and never says anything.
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let silent = format!("ws://{}", listener.local_addr().expect("an address"));
+    let said = fails(&silent, "--policy-timeout 0.5");
+    assert!(said.contains("says nothing"), "{said}");
+}
+
+#[test]
+fn what_a_server_says_of_its_own_failure_is_shown() {
+    let address = server(9, |_, socket| {
+        answering(socket, |_, _| {
+            Some(Message::text("Traceback (most recent call last):\nValueError: bad key"))
+        });
+    });
+    let said = fails(&address, "");
+    assert!(said.contains("failed; it says:") && said.contains("ValueError: bad key"), "{said}");
+}
+
+#[test]
+fn replies_that_are_no_chunks_are_told() {
+    let of = |value: Value| Value::Map(vec![(text("actions"), value)]);
+    let floats = |n: usize| vec![0; 4 * n];
+    for (reply, words) in [
+        (packed(&of(array("<f4", &[10, 6], floats(60)))), "[10, 6]: too few numbers"),
+        (packed(&of(array("<f4", &[0, 7], floats(0)))), "no action at all"),
+        (packed(&of(array("<f4", &[10, 7], floats(3)))), "with 12 bytes"),
+        (packed(&of(array("<U7", &[10, 7], floats(70)))), "dtype \"<U7\""),
+        (packed(&of(text("left"))), "has text as actions"),
+        (packed(&Value::Map(vec![(text("act"), Value::Nil)])), "no entry actions; it has act"),
+        (packed(&Value::Nil), "is nil"),
+        (Message::binary(vec![0xC1; 40]), "no msgpack"),
+        (Message::binary(vec![0xDD, 0xFF, 0xFF, 0xFF, 0xFF]), "no msgpack"),
+        (Message::binary(vec![0x91; 5000]), "no msgpack"),
+        (Message::binary(Vec::new()), "no msgpack"),
+    ] {
+        let address = server(9, move |_, socket| answering(socket, |_, _| Some(reply.clone())));
+        let said = fails(&address, "");
+        assert!(said.contains(words), "{words}: {said}");
+    }
+}
+
+#[test]
+fn a_reply_of_a_gigabyte_is_refused_before_it_is_read() {
+    let address = server(9, |_, mut socket| {
+        let _ = socket.send(packed(&Value::Map(Vec::new())));
+        let _ = observation(&mut socket);
+        let mut frame = vec![0x82, 127];
+        frame.extend((1_u64 << 30).to_be_bytes());
+        let _ = socket.get_mut().write_all(&frame);
+        let megabyte = vec![0; 1 << 20];
+        while socket.get_mut().write_all(&megabyte).is_ok() {}
+    });
+    let said = fails(&address, "");
+    assert!(said.contains("more than 64 MiB"), "{said}");
+}
+
+#[test]
+fn a_server_that_speaks_otherwise_is_told() {
+    let address = server(9, |_, mut socket| {
+        let _ = socket.send(packed(&Value::from(7)));
+    });
+    assert!(fails(&address, "").contains("sent a number first"), "a greeting that is none");
+    let address = server(9, |_, socket| answering(socket, |_, seen| Some(packed(seen))));
+    let said = fails(&address, "--protocol vla-eval --policy-timeout 1");
+    assert!(said.contains("vla-eval"), "{said}");
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = format!("ws://{}", listener.local_addr().expect("an address"));
+    thread::spawn(move || {
+        for stream in listener.incoming().flatten().take(2) {
+            let mut stream = stream;
+            let _ = stream.write_all(b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\n\r\n");
+            thread::sleep(std::time::Duration::from_millis(300));
+        }
+    });
+    assert!(fails(&address, "").contains("no websocket server"), "a web server");
+}
+
+#[test]
+fn numbers_that_are_none_fail_their_episode_and_no_other() {
+    let address = server(9, |_, socket| {
+        answering(socket, |count, seen| match count {
+            1 => Some(packed(&actions(5, [f32::NAN; 7]))),
+            _ => Some(hold(seen, 5)),
+        });
+    });
+    let project = project();
+    let said = run(&project, &address, "--episodes 2 --replan 5");
+    assert_eq!(said.code, 0, "{}", said.err);
+    let lines = project.lines("run/episodes.jsonl");
+    assert_eq!(lines[0]["outcome"]["kind"], "error");
+    assert!(
+        lines[0]["outcome"]["message"].as_str().is_some_and(|m| m.contains("not finite")),
+        "{}",
+        lines[0]
+    );
+    assert_eq!((lines[0]["steps"].as_u64(), lines[0]["safety"].as_bool()), (Some(5), Some(false)));
+    assert_eq!(lines[1]["outcome"]["kind"], "timeout");
+    assert!(project.succeeds("replay run 0/0").out.contains("the same to the byte"));
+}
+
+#[test]
+fn poses_out_of_reach_are_counted() {
+    let address = server(9, |_, socket| {
+        answering(socket, |_, _| Some(packed(&actions(9, [50.0, 0.0, -3.0, 0.0, 9.0, 0.0, 7.0]))))
+    });
+    let project = project();
+    let said = run(&project, &address, "");
+    assert_eq!(said.code, 0, "{}", said.err);
+    assert_eq!(project.lines("run/episodes.jsonl")[0]["far_commands"], 12);
+}
+
+#[test]
+fn a_server_that_dies_loses_no_finished_episode_and_the_run_goes_on_to_the_same_bytes() {
+    let whole = project();
+    let address = server(9, |_, socket| answering(socket, |_, seen| Some(hold(seen, 50))));
+    assert_eq!(run(&whole, &address, "--episodes 3").code, 0);
+    let broken = project();
+    let dying = server(1, |_, socket| answering(socket, |count, seen| (count < 3).then(|| hold(seen, 50))));
+    let said = run(&broken, &dying, "--episodes 3 --policy-timeout 1");
+    assert_eq!(said.code, 3, "{}", said.err);
+    assert!(said.err.contains("1 of 3 episodes are in run"), "{}", said.err);
+    let said = run(&broken, &address, "--episodes 3 --resume");
+    assert_eq!(said.code, 0, "{}", said.err);
+    for file in ["run.json", "episodes.jsonl", "summary.json", "softvtbench/episodes.csv"] {
+        assert_eq!(broken.text(&format!("run/{file}")), whole.text(&format!("run/{file}")), "{file}");
+    }
+    let again = run(&broken, &address, "--episodes 3");
+    assert!(again.code == 0 && again.err.contains("finished already"), "{}", again.err);
+}
+
+#[test]
+fn profiles_show_what_they_say() {
+    let entries = |profile: &str, words: &str| {
+        let names = std::sync::Arc::new(std::sync::Mutex::new(Vec::new()));
+        let kept = names.clone();
+        let address = server(9, move |_, socket| {
+            answering(socket, |_, seen| {
+                let map = seen.as_map().expect("a map");
+                *kept.lock().unwrap() =
+                    map.iter().map(|(k, _)| k.as_str().unwrap_or("").to_owned()).collect();
+                Some(hold(seen, 50))
+            });
+        });
+        let project = project();
+        let words = format!("x.lua --policy {address} --profile {profile} --threads 1 --out run {words}");
+        let said = project.softvt(&words);
+        assert_eq!(said.code, 0, "{}", said.err);
+        let names = names.lock().unwrap().clone();
+        (names, project.json("run/summary.json"), project.json("run/run.json"))
+    };
+    let (vision, summary, _) = entries("vision", "");
+    assert!(vision.iter().any(|k| k == "image") && vision.iter().any(|k| k == "observation/wrist_image"));
+    assert!(!vision.iter().any(|k| k.contains("tactile")));
+    assert_eq!(summary["force_observed"], false);
+    let (touch, _, info) = entries("visuo_tactile", "--gripper binary");
+    assert!(touch.iter().any(|k| k == "observation/tactile_marker_motion"));
+    assert_eq!(info["profile"]["actions"]["gripper"]["binary"], true, "modality and gripper cross");
+    let (released, summary, _) = entries("softvtbench", "");
+    assert!(released.iter().any(|k| k == "tactile_gripper_force"));
+    assert_eq!(summary["force_observed"], true);
+}
