@@ -3,12 +3,14 @@
 use sha2::{Digest, Sha256};
 
 use super::{
-    build::{BuildError, RestCache},
+    build::BuildError,
     evidence::{Witness, lowest},
     looks::Looks,
     recent::Recent,
+    rest_cache::RestCache,
     senses::{Film, SenseError, Senses},
-    simulation::{Handle, Kind, SettleError, Simulation},
+    settle::SettleError,
+    simulation::{Handle, Kind, Simulation},
     spec::EpisodeSpec,
     streams::check_senses,
     trace::StepTrace,
@@ -47,6 +49,10 @@ pub trait Controller {
     /// What it looks at, the same for the whole episode.
     fn streams(&self) -> Streams {
         Streams::default()
+    }
+    /// Why it has given up, if it has: the last action stays then.
+    fn gave_up(&self) -> Option<&str> {
+        None
     }
     /// The action of this control step; `None` to keep the last one.
     ///
@@ -140,6 +146,16 @@ pub enum EpisodeError {
         /// What happened.
         source: ControlError,
     },
+}
+
+impl EpisodeError {
+    /// `file:line` of what is wrong, where that is known and the message does not name it itself.
+    pub fn place(&self) -> Option<&str> {
+        match self {
+            Self::Settle { source, .. } => source.place(),
+            _ => None,
+        }
+    }
 }
 
 /// An episode in progress.
@@ -263,7 +279,7 @@ impl Episode {
                 self.frames.last().and_then(|frame| frame.deformation.as_ref()).map(|d| d.rms_pct),
             );
         };
-        Ok(self.finish(outcome))
+        Ok(self.finish(outcome, controller.gave_up().map(str::to_owned)))
     }
 
     fn control_error(&self, source: ControlError) -> EpisodeError {
@@ -356,7 +372,7 @@ impl Episode {
         Outcome::Invalid { reason: reason.to_owned(), step: self.physics_steps, node }
     }
 
-    fn finish(self, outcome: Outcome) -> Finished {
+    fn finish(self, outcome: Outcome, gave_up: Option<String>) -> Finished {
         let soft = matches!(self.sim.objects[self.target].kind, Kind::Soft(_));
         let stats = RolloutStats {
             steps: self.steps,
@@ -366,6 +382,7 @@ impl Episode {
             newton_max: self.newton.1,
             force_observed: self.force_observed,
             camera_inside: self.recent.inside,
+            gave_up,
             state_hash: state_hash(&self.sim),
         };
         let film = self.reel.map(|Reel { frames, d_pct }| Film { senses: self.senses, frames, d_pct });
