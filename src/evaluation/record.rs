@@ -79,6 +79,9 @@ pub struct RolloutStats {
     /// Observations with a picture of a camera that stood inside of something: it shows what is beyond that thing.
     #[serde(default)]
     pub camera_inside: u32,
+    /// Why whoever drove gave up, if it said so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gave_up: Option<String>,
     /// Hash of the final state, hexadecimal.
     pub state_hash: String,
 }
@@ -150,6 +153,7 @@ pub(crate) mod tests {
             newton_max: 5,
             force_observed: false,
             camera_inside: 0,
+            gave_up: None,
             state_hash: "00ff".into(),
         };
         EpisodeRecord { identity, outcome: Outcome::Completed, verdict, stats }
