@@ -43,6 +43,14 @@ impl ScriptError {
         self
     }
 
+    /// The same error in the file and on the line where it was found, if they are known.
+    pub(super) fn found_at(mut self, place: Option<(String, usize)>) -> Self {
+        if let Some((file, line)) = place {
+            (self.file, self.line) = (file, Some(line));
+        }
+        self
+    }
+
     /// The same error at `line` (from 1).
     pub fn at(mut self, line: Option<usize>) -> Self {
         self.line = line;

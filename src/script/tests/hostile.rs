@@ -84,6 +84,25 @@ fn what_the_host_keeps_for_a_script_is_counted_for_each_machine() {
 }
 
 #[test]
+fn worlds_are_counted_as_what_they_take_once_they_are_stepped() {
+    let full = "x.lua:3: the script holds more than 4096 MiB of worlds and simulations; keep fewer, or give bodies a lower resolution";
+    let body = |resolution: u32| {
+        format!(
+            "softvt.world {{}}:soft {{ name = 'b', shape = softvt.shape.sphere {{ radius = 0.01 }}, youngs_pa = 1e4, poisson = 0.3, density = 300, xyz = {{ 0, 0, 0 }}, grasp_spacing = 0.005, resolution = {resolution} }}"
+        )
+    };
+    refused(&format!("local kept = {{}}\nfor i = 1, 1e9 do kept[i] = {} end", body(20)), full);
+    let solids = "softvt.world {}:static { name = 's', shape = ball, xyz = { 0, 0, 0 } }";
+    let hoard = format!(
+        "local ball, world, kept = softvt.shape.sphere {{ radius = 1 }}, nil, {{}}\nfor i = 1, 20 do kept[i] = {solids} end return {{ a = 1 }}"
+    );
+    assert_eq!(run(&hoard), Ok("[{\"a\":1}]".into()));
+    // What is dropped makes room.
+    let churn = format!("for i = 1, 60 do local body = {} end return {{ a = 1 }}", body(20));
+    assert_eq!(run(&churn), Ok("[{\"a\":1}]".into()));
+}
+
+#[test]
 fn data_without_end_is_refused() {
     refused("local t = {} t.t = t return { a = t }", "tables are nested too deeply");
     refused(
