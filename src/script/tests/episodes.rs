@@ -318,7 +318,7 @@ fn an_expert_that_goes_wrong_is_named_with_its_line() {
     );
     assert_eq!(
         error("while true do end"),
-        "x.lua: the script ran for more than 0.3 s; look for an endless loop"
+        format!("x.lua:{line}: the script ran for more than 0.3 s; look for an endless loop")
     );
     assert_eq!(
         error("scene:object 'bal'"),

@@ -173,7 +173,7 @@ fn where_the_parts_of_a_scene_are_is_where_the_mechanics_has_them() {
         Simulation::new(Arc::new(scene), &Default::default(), &Default::default(), &RestCache::default());
     let sim = sim.expect("builds");
     let names: Vec<&str> = sim.objects.iter().map(|o| o.name.as_str()).collect();
-    assert_eq!(names, ["chest", "chest.drawer", "chest.door", "chest.knob"]);
+    assert_eq!(names, ["chest", "chest.drawer", "chest.door", "chest.knob", "marble"]);
     for ((part, _), pose) in sim.parts(0).zip(placed) {
         let (ours, theirs): (Pose, Pose) = (sim.pose(part), object.pose_w * pose);
         let gap = (ours.to_homogeneous() - theirs.to_homogeneous()).amax();
