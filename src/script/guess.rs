@@ -5,7 +5,7 @@
 type Rank = (u8, usize, usize);
 
 /// The candidate that the writer of `word` most likely meant, if any is close. A name with a dot is that of a part
-/// (`cabinet.top_drawer`): both sides of it may be wrong.
+/// (`chest.top_drawer`): both sides of it may be wrong.
 pub fn closest<'a>(word: &str, candidates: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     let ranked = candidates.filter_map(|candidate| Some((rank(word, candidate)?, candidate)));
     ranked.min_by_key(|(rank, _)| *rank).map(|(_, candidate)| candidate)
@@ -43,14 +43,14 @@ mod tests {
 
     #[test]
     fn a_part_is_found_by_the_start_of_its_name_its_own_name_or_a_misspelt_one() {
-        let known = ["c", "plate", "c.top_drawer", "c.middle_drawer", "cabinet.top_drawer"];
+        let known = ["c", "lid", "c.top_drawer", "c.middle_drawer", "chest.top_drawer"];
         for (word, meant) in [
             ("c.top", Some("c.top_drawer")),
             ("c.topdrawer", Some("c.top_drawer")),
-            ("cabnet.top", Some("cabinet.top_drawer")),
+            ("chset.top", Some("chest.top_drawer")),
             ("middle_drawer", Some("c.middle_drawer")),
-            ("plat", Some("plate")),
-            ("plates", Some("plate")),
+            ("lidd", Some("lid")),
+            ("lids", Some("lid")),
             ("c.handle", None),
             ("xyz", None),
         ] {

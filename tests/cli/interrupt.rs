@@ -136,18 +136,16 @@ fn whatever_a_script_is_at_ends_soon() {
     let laying_out =
         Small::default().text().replace("function(scene)\n", "function(scene)\nstep_for_ever()\n");
     let laying_out = format!("{STEPS}{laying_out}");
-    let simulating = format!(
-        "return softvt.experiment {{ name = 'e', grid = {{ a = {{ 1 }} }}, run = function()\n\
-         local sim = softvt.simulate {{ layout = softvt.layout('l', function() end) }}\n\
-         while true do pcall(sim.wait, sim, 600) end\nend }}"
-    );
+    let simulating = "return softvt.experiment { name = 'e', grid = { a = { 1 } }, run = function()\n\
+         local sim = softvt.simulate { layout = softvt.layout('l', function() end) }\n\
+         while true do pcall(sim.wait, sim, 600) end\nend }";
     for (name, text, words, work_s) in [
         ("loading", "while true do end", vec!["x.lua"], 0.5),
         ("calibrating", "return 1", vec!["scripts/calibrate.lua", "--asset", "sesame_bun"], 3.0),
         ("stuck", stuck, vec!["x.lua"], 0.5),
         ("loading physics", &physics, vec!["x.lua"], 1.0),
         ("laying out with physics", &laying_out, vec!["x.lua", "--out", "run"], 1.0),
-        ("simulating", &simulating, vec!["x.lua"], 2.0),
+        ("simulating", simulating, vec!["x.lua"], 2.0),
     ] {
         let project = Project::new(&[("x.lua", text)]);
         let (code, took, err) = interrupted(&project, &words, work_s);
