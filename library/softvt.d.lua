@@ -633,7 +633,7 @@ function Solid:move_to(xyz, turn) end
 ---@class softvt.Simulation
 local Simulation = {}
 
----Runs an expert to its end; false and why once the physics has failed.
+---Runs an expert to its end; false and why once it has given up or the physics has failed.
 ---@param expert fun(arm: softvt.Arm, scene: softvt.View)
 ---@return boolean
 ---@return string?
@@ -956,6 +956,10 @@ function Arm:open(options) end
 ---Holds still.
 ---@param seconds number
 function Arm:wait(seconds) end
+
+---Ends the expert: the last command stays, and the episode's record and the results say why.
+---@param reason string
+function Arm:give_up(reason) end
 
 ---A list that belongs to an object: scene.base, look.albedo, scene.objects. #, [i], ipairs, pairs, table.unpack and table.concat work on it, and it may be given wherever a list is expected. Numbers that may be written one by one go to the object at once: scene.base[1] = 0.1 is as good as scene.base = { 0.1, 0, 0 }. Any other list refuses to be written.
 ---@class softvt.List

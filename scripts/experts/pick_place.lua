@@ -26,12 +26,12 @@ end
 
 local function spread(most) return (2 * math.random() - 1) * most end
 
--- Takes the object and lifts it off what it stands on; whether it came along.
+-- Takes the object and lifts it off what it stands on; whether it came along, and how high it was held or why not.
 local function take(arm, scene, spec, pace)
   local object = scene:object(spec.object)
   local height = grasp.height(object)
   local at, opening, room = grasp.choose(scene, object, height, { spread(MISS), spread(MISS) })
-  if room < 0 then return false end
+  if room < 0 then return false, "has no room beside it for the hand" end
   local over = route.over(scene, arm.pose.xyz, at, 0.05, BESIDE)
   arm:move_to(arm.target:at { arm.target.x, arm.target.y, math.max(over, arm.target.z) }, { speed = 0.4 * pace })
   arm:move_to(at:at { at.x, at.y, over }, { speed = 0.4 * pace, closure = opening })
@@ -42,7 +42,8 @@ local function take(arm, scene, spec, pace)
   arm:wait(0.3)
   -- Straight up before going anywhere.
   arm:move_by({ 0, 0, 0.05 }, { speed = 0.2 * pace })
-  return scene:object(spec.object).xyz[3] - before > HELD * 0.05, height
+  if scene:object(spec.object).xyz[3] - before > HELD * 0.05 then return true, height end
+  return false, "did not come along when it was lifted"
 end
 
 -- Turns of the hand for putting down, the nearest first.
@@ -98,16 +99,19 @@ return function(spec)
   checked(spec)
   return function(arm, scene)
     local pace = (spec.speed or 1) * (1 + spread(PACE))
-    local first = scene:object(spec.object).xyz
+    local first, reason = scene:object(spec.object).xyz, nil
     for _ = 1, TRIES do
       -- What has slid or rolled away is not chased.
       local now = scene:object(spec.object).xyz
-      if math.sqrt((now[1] - first[1]) ^ 2 + (now[2] - first[2]) ^ 2) > AWAY then return end
-      local held, height = take(arm, scene, spec, pace)
-      if held then return put(arm, scene, spec, height, pace) end
+      local moved = math.sqrt((now[1] - first[1]) ^ 2 + (now[2] - first[2]) ^ 2)
+      if moved > AWAY then arm:give_up(("%s is %.0f mm from where it was; it is not chased"):format(spec.object, 1e3 * moved)) end
+      local held, result = take(arm, scene, spec, pace)
+      if held then return put(arm, scene, spec, result, pace) end
+      reason = result
       -- Not forced: let go, rise, look again.
       arm:open()
       arm:move_by({ 0, 0, 0.03 }, { speed = 0.25 })
     end
+    arm:give_up(("%s %s, %d times"):format(spec.object, reason, TRIES))
   end
 end

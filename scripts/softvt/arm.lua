@@ -71,6 +71,9 @@ function Arm:wait(seconds)
   for _ = 1, ceil(seconds / host.dt - 1e-9) do self:command(self.target, self.closure) end
 end
 
+-- Ends the expert with a reason; the last command stays, and the host never comes back here.
+function Arm:give_up(reason) yield(self.target, self.closure, self.gripping, reason) end
+
 local measured = { pose = true, width = true, force = true, time = true, dt = true }
 local own = { target = true, closure = true, gripping = true }
 local state, methods, arm = { target = host.pose, closure = host.closure, gripping = false }, {}, nil

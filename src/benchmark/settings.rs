@@ -1,7 +1,7 @@
 //! The numbers of the mechanics, the robot, the judge and the sensors that a suite or a run may change.
 
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::control::check_dt;
 use crate::{evaluation::rules::Rules, physics::Params, robot::RobotSpec, sensing::tactile::TactileSpec};
@@ -46,22 +46,30 @@ impl Settings {
         let mut tree = serde_json::to_value(self).map_err(|e| e.to_string())?;
         let mut at = &mut tree;
         for key in path.split('.') {
-            let known: Vec<String> = at.as_object().map_or(Vec::new(), |o| o.keys().cloned().collect());
-            at = at.get_mut(key).ok_or_else(|| {
-                format!("there is no setting {path}; {key} could be one of {}", known.join(", "))
+            let known = fields(at);
+            at = at.get_mut(key).ok_or_else(|| match known.is_empty() {
+                true => format!("there is no setting {path}; what stands before {key} is no group"),
+                false => format!("there is no setting {path}; {key} could be one of {}", known.join(", ")),
             })?;
         }
         let parsed = serde_json::from_str::<Value>(value);
         *at = match (&at, parsed) {
             (Value::Object(_), Ok(group @ Value::Object(_))) => group,
+            // What can be of several models is chosen by the name of one.
+            (Value::Object(known), Err(_)) if known.contains_key(MODEL) => json!({ MODEL: value }),
             (Value::Object(_), _) => {
-                return Err(format!("{path} is a group of settings, not one; name one of its fields"));
+                let known = fields(at);
+                return Err(format!(
+                    "{path} is a group of settings, not one; its fields are {}, as in {path}.{}=…",
+                    known.join(", "),
+                    known[0]
+                ));
             }
             (_, Ok(value)) => value,
             (Value::String(_), Err(_)) => Value::String(value.to_owned()),
             _ => return Err(format!("{path}: expected a number, true or false, got {value:?}")),
         };
-        serde_json::from_value(tree).map_err(|e| format!("{path}: {e}"))
+        serde_json::from_value(tree).map_err(|e| refusal(path, value, &e.to_string()))
     }
 
     /// Checks every number.
@@ -77,9 +85,30 @@ impl Settings {
     }
 }
 
+/// Names the kind of a setting that can be of several: `tactile.optics.model`.
+const MODEL: &str = "model";
+
+/// Names of the fields of a group.
+fn fields(group: &Value) -> Vec<String> {
+    group.as_object().map_or(Vec::new(), |o| o.keys().cloned().collect())
+}
+
+/// Why a setting cannot have a value; a model that cannot be without a field of its own is told how to be given with it.
+fn refusal(path: &str, value: &str, error: &str) -> String {
+    let missing = error.strip_prefix("missing field `").and_then(|rest| rest.split('`').next());
+    let group = path.strip_suffix(".model").unwrap_or(path);
+    match missing {
+        Some(field) if !value.contains('{') => format!(
+            "{path}: {value} cannot be without {field}; give both: '{group}={{\"{MODEL}\":\"{value}\",\"{field}\":…}}'"
+        ),
+        _ => format!("{path}: {error}"),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sensing::tactile::{FotsSpec, MarkerModel, OpticsModel};
 
     #[test]
     fn one_setting_changes_and_a_wrong_one_says_what_there_is() {
@@ -87,12 +116,43 @@ mod tests {
         let changed = settings.with("robot.gripper.effort", "0.2").expect("a setting");
         assert_eq!(changed.robot.gripper.effort, 0.2);
         assert!(settings.with("robot.gripper.efort", "0.2").is_err_and(|e| e.contains("effort")));
-        assert!(settings.with("robot.gripper", "1").is_err_and(|e| e.contains("group")));
+        assert_eq!(
+            settings.with("tactile", "1").expect_err("a group"),
+            "tactile is a group of settings, not one; its fields are gel, view, optics, shadows, markers, as in \
+             tactile.gel=…"
+        );
+        assert_eq!(
+            settings.with("physics.dt.x", "1").expect_err("no group"),
+            "there is no setting physics.dt.x; what stands before x is no group"
+        );
         assert!(settings.with("physics.dt", "-1").is_err_and(|e| e.contains("physics.dt")));
         let pads =
             |mu: &str| ["static_mu", "dynamic_mu"].map(|key| (format!("robot.pads.{key}"), mu.to_owned()));
         assert!(settings.with("robot.pads.static_mu", "0").is_err(), "the dynamic one would be above it");
         assert_eq!(settings.with_all(&pads("0")).expect("both at once").robot.pads.dynamic_mu, 0.0);
         assert!(settings.with("physics.dt", "fast").is_err_and(|e| e.contains("number")));
+    }
+
+    #[test]
+    fn a_model_is_chosen_by_its_name_and_told_what_it_needs() {
+        let settings = Settings::default();
+        for path in ["tactile.markers", "tactile.markers.model"] {
+            let changed = settings.with(path, "fots").expect("a model");
+            assert_eq!(changed.tactile.markers, MarkerModel::Fots(FotsSpec::default()), "{path}");
+        }
+        let both = r#"{"model":"taxim","tables":"calib"}"#;
+        let taxim = settings.with("tactile.optics", both).expect("a model with its tables");
+        assert_eq!(taxim.tactile.optics, OpticsModel::Taxim { tables: "calib".into() });
+        for path in ["tactile.optics", "tactile.optics.model"] {
+            assert_eq!(
+                settings.with(path, "taxim").expect_err("no tables"),
+                format!(
+                    "{path}: taxim cannot be without tables; give both: \
+                     'tactile.optics={{\"model\":\"taxim\",\"tables\":…}}'"
+                )
+            );
+        }
+        let unknown = settings.with("tactile.optics", "tracim").expect_err("no such model");
+        assert_eq!(unknown, "tactile.optics: unknown variant `tracim`, expected `polynomial` or `taxim`");
     }
 }

@@ -103,6 +103,12 @@ impl<'a> Batch<'a> {
         })
     }
 
+    /// The same with what was made of assets for other suites.
+    pub fn sharing(mut self, cache: &RestCache, looks: &Looks) -> Self {
+        (self.cache, self.looks) = (cache.clone(), looks.clone());
+        self
+    }
+
     /// An episode as its layout, the shifts and the run make it.
     fn open(&self, task: &Task, episode: u32) -> Result<script::Episode, Failure> {
         let mut opened =
@@ -117,7 +123,8 @@ impl<'a> Batch<'a> {
         TaskBrief { suite: self.name.clone(), task: task.id, prompt: task.prompt.clone(), episode }
     }
 
-    fn request(&self, task: &Task, episode: u32) -> script::EpisodeRequest {
+    /// Which episode of a task it is.
+    pub fn request(&self, task: &Task, episode: u32) -> script::EpisodeRequest {
         script::EpisodeRequest {
             suite: self.suite.name.clone(),
             task: task.id,
@@ -137,25 +144,48 @@ impl<'a> Batch<'a> {
         for task in tasks {
             let first = self.jobs.iter().find(|(of, _)| of.id == task.id).map_or(0, |(_, episode)| *episode);
             let opened = self.open(task, first)?;
-            let target = target_asset(&opened.nominal, task).cloned();
-            if let Some(asset) = target
-                && matches!(asset.body, Body::Soft(_))
-                && !self.limits.contains_key(&asset.name)
-            {
-                let limit = self.find_limit(&asset)?;
-                self.limits.insert(asset.name.clone(), limit);
-            }
+            self.learn_limit(target_asset(&opened.nominal, task).cloned())?;
             let scene = Arc::new(opened.scene.clone());
             let streams = (self.drive)(opened, self.brief(task, first))?.streams();
             self.force_observed |= streams.force;
-            self.try_out(scene, streams).map_err(|error| {
-                self.episode_failure(&match error {
-                    Trial::Build(error) => EpisodeError::Build(error),
-                    Trial::Sense(source) => EpisodeError::Sense { task: task.id, episode: first, source },
-                })
-            })?;
+            self.try_out(scene, streams).map_err(|error| self.trial_failure(error, task, first))?;
         }
         Ok(())
+    }
+
+    /// Reads the threshold of a task's target, if it is a soft one whose threshold is not known yet.
+    ///
+    /// # Errors
+    /// A threshold file that is wrong.
+    pub fn learn_limit(&mut self, target: Option<Arc<Asset>>) -> Result<(), Failure> {
+        let soft = target.filter(|asset| matches!(asset.body, Body::Soft(_)));
+        if let Some(asset) = soft.filter(|asset| !self.limits.contains_key(&asset.name)) {
+            let limit = self.find_limit(&asset)?;
+            self.limits.insert(asset.name.clone(), limit);
+        }
+        Ok(())
+    }
+
+    /// Builds the first scene of a task, and looks for all that can be wrong with it before anything moves.
+    ///
+    /// # Errors
+    /// What is wrong.
+    pub fn examine(&self, task: &Task, scene: Scene) -> Result<(), Failure> {
+        let scene = Arc::new(if self.run.twin { scene.rigid_twin() } else { scene });
+        let settings = &self.settings;
+        let look = || -> Result<(), Trial> {
+            check_senses(&scene, &settings.tactile, &self.looks)?;
+            let sim = Simulation::new(scene.clone(), &settings.physics, &settings.robot, &self.cache)?;
+            Ok(Senses::new(&sim, &settings.tactile, &self.looks).stand_outside(&Senses::frame(&sim))?)
+        };
+        look().map_err(|error| self.trial_failure(error, task, 0))
+    }
+
+    fn trial_failure(&self, error: Trial, task: &Task, episode: u32) -> Failure {
+        self.episode_failure(&match error {
+            Trial::Build(error) => EpisodeError::Build(error),
+            Trial::Sense(source) => EpisodeError::Sense { task: task.id, episode, source },
+        })
     }
 
     /// Looks once at what a policy asks for, and a film shows, of a scene in which nothing has moved yet.
@@ -383,10 +413,11 @@ impl<'a> Batch<'a> {
             EpisodeError::Control { source: ControlError::Policy(_), .. } => code::POLICY,
             _ => code::INPUT,
         };
-        let message = match error {
+        let message = match (error, error.place()) {
             // It says which file and line itself.
-            EpisodeError::Build(BuildError::At { .. }) => error.to_string(),
-            _ => format!("{}: {error}", self.run.file.display()),
+            (EpisodeError::Build(BuildError::At { .. }), _) => error.to_string(),
+            (_, Some(place)) => format!("{place}: {error}"),
+            (_, None) => format!("{}: {error}", self.run.file.display()),
         };
         Failure { code, message }
     }
@@ -444,8 +475,9 @@ fn line(record: &EpisodeRecord) -> String {
         (_, false, true) => "goal, not safe",
         _ => "failed",
     };
+    let reason = record.stats.gave_up.as_ref().map_or(String::new(), |reason| format!("; gave up: {reason}"));
     format!(
-        "task {} episode {}: {outcome}{d}, {:.1} s",
+        "task {} episode {}: {outcome}{d}, {:.1} s{reason}",
         record.identity.task, record.identity.episode, record.stats.time_s
     )
 }

@@ -1,24 +1,34 @@
 //! `softvt check`: whether a script is right, without running what it plans.
 
-use std::path::PathBuf;
-
-use super::{Failure, args::Run, batch::Batch, print};
-use crate::{
-    benchmark::{Goal, Plan, Suite},
-    message,
-    script::{self, Loaded},
+use std::{
+    path::PathBuf,
+    sync::{Arc, Mutex},
 };
 
-/// Reads a script, makes its plan, and builds and looks at the first scene of every task.
+use super::{Failure, args::Run, batch::Batch, evaluate::own_folders, print};
+use crate::{
+    benchmark::{Goal, Plan, Suite, Task},
+    message,
+    rollout::{Looks, RestCache, batch as parallel, stop, target_asset},
+    scene::Asset,
+    script::{self, Loaded, Scenes},
+};
+
+/// Reads a script, makes its plan, and builds the first scene of every task; nothing is settled, run or drawn.
 ///
 /// # Errors
 /// The first thing that is wrong.
 pub fn run(run: &Run) -> Result<(), Failure> {
     let loaded = script::load(&run.file, &run.script_words).map_err(Failure::input)?;
     let file = run.file.display();
+    // Suites have assets in common.
+    let made = (RestCache::rough(), Looks::default());
     match &loaded.plan {
-        Plan::Suite(suite) => suite_is_right(run, &loaded, suite)?,
-        Plan::Suites { suites } => suites.iter().try_for_each(|suite| suite_is_right(run, &loaded, suite))?,
+        Plan::Suite(suite) => suite_is_right(run, &loaded, suite, &made)?,
+        Plan::Suites { suites } => {
+            own_folders(run, suites)?;
+            suites.iter().try_for_each(|suite| suite_is_right(run, &loaded, suite, &made))?;
+        }
         Plan::Experiment { name, points, .. } => {
             print(&format!("experiment {name}: {points} points; they are not run here\n"));
         }
@@ -27,13 +37,16 @@ pub fn run(run: &Run) -> Result<(), Failure> {
     Ok(())
 }
 
-fn suite_is_right(run: &Run, loaded: &Loaded, suite: &Suite) -> Result<(), Failure> {
+fn suite_is_right(
+    run: &Run,
+    loaded: &Loaded,
+    suite: &Suite,
+    (cache, looks): &(RestCache, Looks),
+) -> Result<(), Failure> {
     let tasks: Vec<_> = suite.tasks.iter().collect();
-    let jobs = tasks.iter().map(|task| (*task, 0)).collect();
-    let mut batch = Batch::new(run, loaded, suite, (jobs, PathBuf::new()))?;
-    // As if all were to be drawn: whatever can be wrong with a camera is found too.
-    batch.films = true;
-    batch.prepare(&tasks)?;
+    let mut batch = Batch::new(run, loaded, suite, (Vec::new(), PathBuf::new()))?.sharing(cache, looks);
+    let targets = first_targets(loaded, &batch, &tasks)?;
+    targets.into_iter().try_for_each(|target| batch.learn_limit(target))?;
     let episodes = suite.episodes;
     print(&format!("suite {}: {} tasks, {episodes} episodes each\n", suite.name, tasks.len()));
     for task in tasks {
@@ -46,4 +59,31 @@ fn suite_is_right(run: &Run, loaded: &Loaded, suite: &Suite) -> Result<(), Failu
         print(&format!("{id:>4} {}: {object} {way} {target}{expert}\n", message::plain(&task.prompt)));
     }
     Ok(())
+}
+
+/// Builds and examines the first scene of every task, on all processors; the assets of their targets.
+fn first_targets(
+    loaded: &Loaded,
+    batch: &Batch,
+    tasks: &[&Task],
+) -> Result<Vec<Option<Arc<Asset>>>, Failure> {
+    // Opening a machine runs the whole script, so it is used for more than one task.
+    let idle: Mutex<Vec<Scenes>> = Mutex::default();
+    let idle = || idle.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
+    let mut targets = vec![None; tasks.len()];
+    let examine = |job: usize| {
+        let task = tasks[job];
+        let free = idle().pop();
+        let scenes = free.map_or_else(|| Scenes::open(loaded), Ok).map_err(Failure::input)?;
+        let (nominal, scene) = scenes.of(&batch.request(task, 0)).map_err(Failure::input)?;
+        idle().push(scenes);
+        batch.examine(task, scene)?;
+        Ok(target_asset(&nominal, task).cloned())
+    };
+    parallel::run(tasks.len(), threads, &stop::FLAG, examine, |job, target| {
+        targets[job] = target;
+        Ok(())
+    })?;
+    if stop::requested() { Err(Failure::interrupted("interrupted")) } else { Ok(targets) }
 }

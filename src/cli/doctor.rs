@@ -1,5 +1,7 @@
 //! `softvt doctor`: versions, the machine, and whether physics gives the published bits here.
 
+use std::path::Path;
+
 use serde::Deserialize;
 
 use super::{Failure, args::Run, drivers::Choice, evaluate, print};
@@ -16,7 +18,7 @@ struct Golden {
 /// Checks the installation.
 ///
 /// # Errors
-/// The golden episode cannot be run.
+/// The golden episode cannot be run, or ends otherwise than the published one.
 pub fn run() -> Result<(), Failure> {
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
     print(&format!(
@@ -33,13 +35,29 @@ pub fn run() -> Result<(), Failure> {
     let golden: Golden = serde_json::from_slice(golden).map_err(Failure::input)?;
     let record = evaluate::single(&golden_run(&golden), golden.task)?;
     let hash = &record.stats.state_hash;
-    let verdict = if *hash == golden.state_hash {
-        "matches the published one"
-    } else {
-        "DIFFERS from the published one: results of this machine are not comparable bit for bit"
-    };
+    let same = *hash == golden.state_hash;
+    let verdict = if same { "matches the published one" } else { "DIFFERS from the published one" };
     print(&format!("golden     {} task {}: {hash}, {verdict}\n", golden.script, golden.task));
-    Ok(())
+    if same { Ok(()) } else { Err(Failure::wrong_here(mismatch(&golden))) }
+}
+
+/// What a state other than the published one can come from.
+fn mismatch(golden: &Golden) -> String {
+    let own = ["suites", "scripts", "assets"].iter().filter(|tree| Path::new(tree).is_dir());
+    let own: Vec<&str> = own.copied().collect();
+    let cause = match own.is_empty() {
+        true => "this machine or this build computes otherwise".to_owned(),
+        false => format!(
+            "files of this folder ({}) come before those of the release; run softvt doctor in an empty folder to test \
+             the machine alone",
+            own.join(", ")
+        ),
+    };
+    format!(
+        "the golden episode does not end in the published state {}: {cause}; results are not comparable bit for bit \
+         with published ones",
+        golden.state_hash
+    )
 }
 
 fn golden_run(golden: &Golden) -> Run {

@@ -33,15 +33,7 @@ pub fn run(run: &Run) -> Result<(), Failure> {
             require::check(&run.require, &summaries)
         }
         Plan::Suites { suites } => {
-            let mut names = BTreeSet::new();
-            if let Some(twice) = suites.iter().find(|suite| !names.insert(plain(&suite.name))) {
-                let message = format!(
-                    "{}: two suites are named {:?}, and would share one folder; rename one",
-                    run.file.display(),
-                    twice.name
-                );
-                return Err(Failure::input(message));
-            }
+            own_folders(run, suites)?;
             let mut summaries = Vec::new();
             for suite in suites {
                 let name = run.name_of(suite);
@@ -52,6 +44,22 @@ pub fn run(run: &Run) -> Result<(), Failure> {
         }
         Plan::Experiment { name, points, columns } => experiment::run(run, &loaded, name, *points, columns),
     }
+}
+
+/// Every suite must have a folder of its own.
+///
+/// # Errors
+/// Two names that become one as part of a path.
+pub(super) fn own_folders(run: &Run, suites: &[Suite]) -> Result<(), Failure> {
+    let mut names = BTreeSet::new();
+    let Some(twice) = suites.iter().find(|suite| !names.insert(plain(&suite.name))) else { return Ok(()) };
+    let message = format!(
+        "{}: suite {:?} would share its folder {:?} with another; rename one",
+        run.file.display(),
+        twice.name,
+        plain(&twice.name)
+    );
+    Err(Failure::input(message))
 }
 
 /// Every episode that `--video` names must be one of every suite's: before any of them runs.

@@ -45,7 +45,8 @@ pub fn task(dir: &Path) -> Result<(), Failure> {
     }
     files.iter().try_for_each(|(path, text)| write(path, text))?;
     run(dir)?;
-    let (suite, _) = TEMPLATE[0];
+    let suite = dir.join(TEMPLATE[0].0);
+    let suite = suite.strip_prefix(".").unwrap_or(&suite).display();
     print(&format!("now: softvt check {suite}, softvt {suite}; docs/write-a-task.md goes on from there\n"));
     Ok(())
 }

@@ -29,7 +29,7 @@ use crate::{message, rollout::stop};
 pub mod code {
     /// All went well.
     pub const OK: u8 = 0;
-    /// Our own fault.
+    /// Our own fault, or the machine's: `softvt doctor` found other results than the published ones.
     pub const INTERNAL: u8 = 1;
     /// The user's input: usage, script, asset, file.
     pub const INPUT: u8 = 2;
@@ -58,6 +58,11 @@ impl Failure {
     /// The run went well and its results do not suffice.
     fn unmet(message: String) -> Self {
         Self { code: code::UNMET, message }
+    }
+
+    /// What was tested is not as it should be, and no input of the user's is to blame.
+    fn wrong_here(message: impl ToString) -> Self {
+        Self { code: code::INTERNAL, message: message.to_string() }
     }
 
     /// Interrupted; what is finished has been kept.

@@ -83,6 +83,9 @@ pub struct RolloutStats {
     /// out of reach, or in the wrong frame or unit.
     #[serde(default)]
     pub far_commands: u32,
+    /// Why whoever drove gave up, if it said so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gave_up: Option<String>,
     /// Hash of the final state, hexadecimal.
     pub state_hash: String,
 }
@@ -155,6 +158,7 @@ pub(crate) mod tests {
             force_observed: false,
             camera_inside: 0,
             far_commands: 0,
+            gave_up: None,
             state_hash: "00ff".into(),
         };
         EpisodeRecord { identity, outcome: Outcome::Completed, verdict, stats }

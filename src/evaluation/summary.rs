@@ -82,6 +82,17 @@ pub struct AssetScores {
     pub scores: Scores,
 }
 
+/// An episode in which whoever drove gave up.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GivenUp {
+    /// Index of the task.
+    pub task: usize,
+    /// Index of the episode in the task.
+    pub episode: u32,
+    /// Why.
+    pub reason: String,
+}
+
 /// `summary.json`: one suite, one policy.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
@@ -101,6 +112,9 @@ pub struct Summary {
     pub by_task: Vec<TaskScores>,
     /// By asset of the target.
     pub by_asset: BTreeMap<String, AssetScores>,
+    /// The episodes in which whoever drove gave up, in order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub gave_up: Vec<GivenUp>,
 }
 
 impl Scores {
@@ -149,6 +163,7 @@ impl Summary {
             kappa: kappa_curve(&records),
             by_task: tasks.into_iter().map(|(task, group)| task_scores(task, &group)).collect(),
             by_asset: assets.into_iter().map(|(asset, group)| (asset, asset_scores(&group))).collect(),
+            gave_up: records.iter().filter_map(|record| given_up(record)).collect(),
         }
     }
 }
@@ -160,6 +175,11 @@ fn grouped<'a, K: Ord>(
     let mut groups: BTreeMap<K, Vec<&EpisodeRecord>> = BTreeMap::new();
     records.iter().for_each(|record| groups.entry(key(record)).or_default().push(record));
     groups
+}
+
+fn given_up(record: &EpisodeRecord) -> Option<GivenUp> {
+    let reason = record.stats.gave_up.clone()?;
+    Some(GivenUp { task: record.identity.task, episode: record.identity.episode, reason })
 }
 
 fn task_scores(task: usize, group: &[&EpisodeRecord]) -> TaskScores {

@@ -20,13 +20,20 @@ pub struct MassProperties {
 
 /// Cells along the longest edge of the skin that shapes without a closed form are integrated over.
 const CELLS: f64 = 96.0;
+/// The same where only the order of magnitude matters.
+const ROUGH_CELLS: f64 = 24.0;
 
 /// Mass properties of `shape` at a uniform `density`, kg/m³.
 ///
 /// Exact for boxes, spheres, ellipsoids, capsules, cylinders, tori, prisms, lathes, imported meshes and their placements;
 /// otherwise integrated over a fine closed skin.
 pub fn mass_properties(shape: &Shape, density: f64) -> MassProperties {
-    unit_density(shape).scaled(density)
+    unit_density(shape, CELLS).scaled(density)
+}
+
+/// [`mass_properties`] to about a hundredth, in a sixtieth of the time.
+pub fn rough_mass_properties(shape: &Shape, density: f64) -> MassProperties {
+    unit_density(shape, ROUGH_CELLS).scaled(density)
 }
 
 impl MassProperties {
@@ -49,7 +56,7 @@ impl MassProperties {
 }
 
 /// Mass properties at 1 kg/m³.
-fn unit_density(shape: &Shape) -> MassProperties {
+fn unit_density(shape: &Shape, cells: f64) -> MassProperties {
     use std::f64::consts::PI;
     let round =
         |mass: f64, across: f64, axial: f64| MassProperties::centred(mass, Vec3::new(across, across, axial));
@@ -78,10 +85,10 @@ fn unit_density(shape: &Shape) -> MassProperties {
         }
         Shape::Prism { section, half_length } => of_mesh(&prism_mesh(section, *half_length)),
         Shape::Lathe(profile) => revolved(profile),
-        Shape::Placed { shape, pose } => unit_density(shape).moved(pose),
-        Shape::Paint { shape, .. } => unit_density(shape),
+        Shape::Placed { shape, pose } => unit_density(shape, cells).moved(pose),
+        Shape::Paint { shape, .. } => unit_density(shape, cells),
         Shape::Mesh(solid) => of_mesh(solid.mesh()),
-        _ => of_mesh(&bare_skin(shape, shape.reach().size().max() / CELLS).0),
+        _ => of_mesh(&bare_skin(shape, shape.reach().size().max() / cells).0),
     }
 }
 

@@ -5,13 +5,16 @@ use std::fmt::Write;
 use crate::evaluation::{
     safety::KAPPAS,
     statistics::{Distribution, Rate},
-    summary::{Scores, Summary},
+    summary::{GivenUp, Scores, Summary},
 };
 
 /// Columns of the task's name.
 const NAME: usize = 30;
 /// Columns of the whole table.
 const WIDTH: usize = 98;
+
+/// Episodes that were given up of which the table says why.
+const MOST_REASONS: usize = 10;
 
 /// The results of one suite: a row a task, all together, and the rates with their intervals.
 pub fn table(summary: &Summary) -> String {
@@ -104,6 +107,25 @@ fn footer(out: &mut String, summary: &Summary) {
     }
     if scores.invalid > 0 {
         line(out, &format!("{} invalid episodes count as failures in every rate", scores.invalid));
+    }
+    gave_up(out, summary);
+}
+
+/// Why whoever drove gave up, an episode a line.
+fn gave_up(out: &mut String, summary: &Summary) {
+    let all = &summary.gave_up;
+    if all.is_empty() {
+        return;
+    }
+    line(out, &format!("{} gave up in {} episodes:", summary.policy, all.len()));
+    for GivenUp { task, episode, reason } in all.iter().take(MOST_REASONS) {
+        line(
+            out,
+            &shortened(&format!("  task {task} episode {episode}: {}", reason.replace('\n', " ")), WIDTH),
+        );
+    }
+    if all.len() > MOST_REASONS {
+        line(out, &format!("  … and {} more, in summary.json", all.len() - MOST_REASONS));
     }
 }
 

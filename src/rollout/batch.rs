@@ -69,6 +69,10 @@ impl Controller for Stoppable<'_> {
         self.driver.streams()
     }
 
+    fn gave_up(&self) -> Option<&str> {
+        self.driver.gave_up()
+    }
+
     fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, ControlError> {
         if self.stop.load(Ordering::Relaxed) {
             return Err(ControlError::Interrupted);

@@ -1,28 +1,28 @@
 //! From a scene to a world: what each object becomes.
 
-use std::{convert::Infallible, sync::Arc};
+use std::sync::Arc;
 
 use super::{
     furniture,
-    made::Made,
+    rest_cache::RestCache,
     simulation::{Handle, Kind},
 };
 use crate::{
     geometry::{
         mass::mass_properties,
         samples::{SampleSpec, surface_samples},
-        shape::{Aabb, Shape},
+        shape::Shape,
         voxelise::{GeometryError, VoxelSpec, voxel_mesh},
     },
     message::number,
     physics::{
         World,
-        contact::{Collider, Friction, Mover, Surface},
+        contact::{Friction, Mover, Surface},
         fem::{Material, Rest},
         joints::TreeError,
         rigid::{RigidBody, RigidError},
     },
-    scene::{Asset, Body, Object, Scene, SoftMaterial},
+    scene::{Body, Object, Scene, SoftMaterial},
 };
 
 /// An object cannot be made.
@@ -76,6 +76,19 @@ pub enum BuildError {
         /// How far the deepest point of one is under the surface of the other, m.
         depth: f64,
     },
+    /// An object is in the robot.
+    #[error(
+        "object {object} starts inside of the robot's hand ({part}), {} mm deep; move it away, or the arm (scene.start_q)",
+        number((1e4 * .depth).round() / 10.0)
+    )]
+    InRobot {
+        /// Object name.
+        object: String,
+        /// The part of the hand.
+        part: String,
+        /// How far the deepest point of one is under the surface of the other, m.
+        depth: f64,
+    },
     /// What is wrong with an object that a script placed.
     #[error("{place}: {source}")]
     At {
@@ -103,53 +116,34 @@ impl BuildError {
     }
 }
 
-/// Rest data and bounds of assets, made once and shared by all episodes.
-#[derive(Clone, Debug, Default)]
-pub struct RestCache {
-    rests: Made<Arc<Asset>, Arc<Rest>>,
-    bounds: Made<Shape, Aabb>,
-    walls: Made<Shape, Option<f64>>,
-}
-
-impl RestCache {
-    /// Bounds of a shape; finding those of a displaced one takes a search.
-    pub(super) fn bounds(&self, shape: &Shape) -> Aabb {
-        let made: Result<_, Infallible> =
-            self.bounds.get(shape, |known| known == shape, || Ok(shape.bounds()));
-        made.unwrap_or_else(|never| match never {})
-    }
-
-    /// Thickness of walls that are too thin to move, m, if there are such.
-    pub(super) fn wall(&self, shape: &Shape) -> Option<f64> {
-        let made: Result<_, Infallible> =
-            self.walls.get(shape, |known| known == shape, || Ok(furniture::thin_wall(shape)));
-        made.unwrap_or_else(|never| match never {})
-    }
-
-    /// Rest data of a soft asset.
-    fn rest(&self, asset: &Arc<Asset>, material: &SoftMaterial) -> Result<Arc<Rest>, BuildError> {
-        self.rests.get(
-            asset,
-            |known| known.shape == asset.shape && known.body == asset.body,
-            || soft_rest(&asset.name, &asset.shape, material),
-        )
-    }
-}
-
 /// Rest data of a soft body of `shape`.
 ///
 /// # Errors
 /// A shape that cannot be meshed, or a material number out of range; `name` is what messages call it.
 pub fn soft_rest(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<Arc<Rest>, BuildError> {
+    check_soft(name, shape, material)?;
+    meshed(name, shape, material, mass_properties(shape, 1.0).mass)
+}
+
+/// Whether a soft body of `shape` and `material` can be.
+pub(super) fn check_soft(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<(), BuildError> {
     check(name, material)?;
     check_size(name, shape, material)?;
-    check_thickness(name, shape, material)?;
+    check_thickness(name, shape, material)
+}
+
+/// Rest data of a soft body of some volume, m³, that can be.
+pub(super) fn meshed(
+    name: &str,
+    shape: &Shape,
+    material: &SoftMaterial,
+    volume: f64,
+) -> Result<Arc<Rest>, BuildError> {
     let spec = VoxelSpec { resolution: material.resolution };
     let mesh =
         voxel_mesh(shape, &spec).map_err(|source| BuildError::Geometry { asset: name.to_owned(), source })?;
     let spacing = SampleSpec { grasp_spacing: material.grasp_spacing, ..SampleSpec::default() };
     let samples = surface_samples(shape, &mesh, &spacing);
-    let volume = mass_properties(shape, 1.0).mass;
     let law =
         Material { youngs_pa: material.youngs_pa, poisson: material.poisson, density: material.density };
     Ok(Rest::new(mesh, law, volume, samples))
@@ -233,11 +227,11 @@ pub(super) fn add_all(
         }
         add(world, object, cache, &mut handles).map_err(|error| error.of(object))?;
     }
-    check_overlap(world, scene)?;
     Ok(handles)
 }
 
-fn check_overlap(world: &mut World, scene: &Scene) -> Result<(), BuildError> {
+/// Nothing may start inside of anything else, nor of the robot, which is in `world` already.
+pub(super) fn check_overlap(world: &mut World, scene: &Scene) -> Result<(), BuildError> {
     let found = world.overlaps(OVERLAP);
     let Some(deepest) = found.iter().max_by(|a, b| a.depth.total_cmp(&b.depth)) else { return Ok(()) };
     // A part is named after its object and a dot, which no object's name holds.
@@ -249,6 +243,11 @@ fn check_overlap(world: &mut World, scene: &Scene) -> Result<(), BuildError> {
     if first.0 < second.0 {
         // The one that was placed last is the one to be moved.
         std::mem::swap(&mut first, &mut second);
+    }
+    if let (Some(index), None) = (first.0, second.0) {
+        // What is of no object is of the robot.
+        let (object, part) = (first.1, second.1);
+        return Err(BuildError::InRobot { object, part, depth: deepest.depth }.of(&scene.objects[index]));
     }
     let place = |index: Option<usize>| index.map_or(String::new(), |i| scene.objects[i].placed_at.clone());
     let error = BuildError::Overlap {
@@ -273,8 +272,8 @@ fn add(
     let asset = &object.asset;
     let friction = Friction { static_mu: asset.friction.static_mu, dynamic_mu: asset.friction.dynamic_mu };
     let collider = |world: &World, mover, pose| {
-        let shape = Arc::new(asset.shape.clone());
-        Collider::new(&object.name, (mover, pose), shape, friction, world.rigid_layer())
+        let (name, shape) = (&object.name, &asset.shape);
+        cache.collider(world, name, (mover, pose), shape, friction)
     };
     let mut parts = Vec::new();
     let (kind, colliders) = match &asset.body {
@@ -285,7 +284,7 @@ fn add(
             (Kind::Soft(index), Vec::new())
         }
         Body::Rigid { density } => {
-            let m = mass_properties(&asset.shape, *density);
+            let m = cache.mass(&asset.shape, *density);
             let body = RigidBody::new(&object.pose_w, m.com, m.mass, m.inertia)
                 .map_err(|source| BuildError::Rigid { asset: asset.name.clone(), source })?;
             let index = world.add_rigid(&object.name, body);

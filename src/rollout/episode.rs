@@ -3,12 +3,14 @@
 use sha2::{Digest, Sha256};
 
 use super::{
-    build::{BuildError, RestCache},
+    build::BuildError,
     evidence::{Witness, lowest},
     looks::Looks,
     recent::Recent,
+    rest_cache::RestCache,
     senses::{Film, SenseError, Senses},
-    simulation::{Handle, Kind, SettleError, Simulation},
+    settle::SettleError,
+    simulation::{Handle, Kind, Simulation},
     spec::EpisodeSpec,
     streams::check_senses,
     trace::StepTrace,
@@ -54,6 +56,10 @@ pub trait Controller {
     /// Whether it looks in this control step; if not, nothing is sensed for it.
     fn looks(&self) -> bool {
         true
+    }
+    /// Why it has given up, if it has: the last action stays then.
+    fn gave_up(&self) -> Option<&str> {
+        None
     }
     /// The action of this control step; `None` to keep the last one.
     ///
@@ -170,6 +176,16 @@ pub enum EpisodeError {
         /// What happened.
         source: ControlError,
     },
+}
+
+impl EpisodeError {
+    /// `file:line` of what is wrong, where that is known and the message does not name it itself.
+    pub fn place(&self) -> Option<&str> {
+        match self {
+            Self::Settle { source, .. } => source.place(),
+            _ => None,
+        }
+    }
 }
 
 /// An episode in progress.
@@ -304,7 +320,7 @@ impl Episode {
             );
         };
         controller.finish();
-        Ok(self.finish(outcome))
+        Ok(self.finish(outcome, controller.gave_up().map(str::to_owned)))
     }
 
     fn control_error(&self, source: ControlError) -> EpisodeError {
@@ -398,7 +414,7 @@ impl Episode {
         Outcome::Invalid { reason: reason.to_owned(), step: self.physics_steps, node }
     }
 
-    fn finish(self, outcome: Outcome) -> Finished {
+    fn finish(self, outcome: Outcome, gave_up: Option<String>) -> Finished {
         let soft = matches!(self.sim.objects[self.target].kind, Kind::Soft(_));
         let stats = RolloutStats {
             steps: self.steps,
@@ -409,6 +425,7 @@ impl Episode {
             force_observed: self.force_observed,
             camera_inside: self.recent.inside,
             far_commands: self.far_commands,
+            gave_up,
             state_hash: state_hash(&self.sim),
         };
         let film = self.reel.map(|Reel { frames, d_pct }| Film { senses: self.senses, frames, d_pct });

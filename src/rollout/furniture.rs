@@ -1,17 +1,16 @@
 //! Articulated objects in the world: a fixed base and a joint tree, one handle for the whole and one for each part.
 
-use std::sync::Arc;
-
 use super::{
-    build::{BuildError, RestCache},
+    build::BuildError,
+    rest_cache::RestCache,
     simulation::{Handle, Kind, PartOf},
 };
 use crate::{
-    geometry::{Pose, Vec3, mass::mass_properties, shape::Shape},
+    geometry::{Pose, Vec3, shape::Shape},
     message::number,
     physics::{
         World,
-        contact::{Collider, Friction, Mover},
+        contact::{Friction, Mover},
         joints::{JointKind, Link, Tree},
     },
     scene::{Motion, Object, Part},
@@ -37,7 +36,7 @@ pub(super) fn add(
     for part in parts {
         check_walls(object, part, cache)?;
     }
-    let links = parts.iter().map(|part| link(part, parts)).collect();
+    let links = parts.iter().map(|part| link(part, parts, cache)).collect();
     let tree = Tree { links, base_w: object.pose_w };
     tree.validate().map_err(|source| BuildError::Joints { object: object.name.clone(), source })?;
     let drives = vec![None; parts.len()];
@@ -48,8 +47,7 @@ pub(super) fn add(
         let placed = (mover, Pose::from(-part.joint.origin_o));
         let friction = part.asset.friction;
         let friction = Friction { static_mu: friction.static_mu, dynamic_mu: friction.dynamic_mu };
-        let surface = Arc::new(part.asset.shape.clone());
-        let collider = Collider::new(&name, placed, surface, friction, world.rigid_layer());
+        let collider = cache.collider(world, &name, placed, &part.asset.shape, friction);
         Handle {
             name,
             asset: part.asset.clone(),
@@ -64,8 +62,8 @@ pub(super) fn add(
 }
 
 /// A part as a link whose frame is the object's, moved to the origin of its joint.
-fn link(part: &Part, parts: &[Part]) -> Link {
-    let m = mass_properties(&part.asset.shape, part.density);
+fn link(part: &Part, parts: &[Part], cache: &RestCache) -> Link {
+    let m = cache.mass(&part.asset.shape, part.density);
     let joint = &part.joint;
     let axis = nalgebra::Unit::new_normalize(joint.axis_o);
     let carrier = part.parent.map_or(Vec3::zeros(), |parent| parts[parent].joint.origin_o);

@@ -194,6 +194,20 @@ impl Senses {
         Stage::new(self.things()?, self.scene.lighting.clone())
     }
 
+    /// The robot with nothing around it.
+    pub(super) fn robot_alone(&self) -> Result<Stage, CameraError> {
+        let things = self.looks.robot()?.things(self.tree, self.scene.base_w, ROBOT);
+        Stage::new(things.into_iter().collect(), self.scene.lighting.clone())
+    }
+
+    /// The object that a point of the world is inside of where the objects start.
+    pub(super) fn around(&self, point_w: &nalgebra::Point3<f64>) -> Option<&str> {
+        let inside = |part: &&Part| {
+            part.asset.shape.distance(&part.start_w.inverse_transform_point(point_w).coords) < 0.0
+        };
+        self.parts.iter().find(inside).map(|part| part.name.as_str())
+    }
+
     /// What pictures need of a state.
     pub fn view<'a>(&self, frame: &'a Frame) -> FrameView<'a> {
         let hand_w = frame.links[self.tree][panda::HAND_LINK] * panda::hand_in_link();

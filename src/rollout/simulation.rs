@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use super::{
-    build::{self, BuildError, RestCache},
+    build::{self, BuildError},
+    rest_cache::RestCache,
     rig::Rig,
-    stop,
 };
 use crate::{
     benchmark::control::CONTROL_DT,
@@ -90,35 +90,6 @@ impl Handle {
     }
 }
 
-/// Speed below which a node counts as settled, m/s.
-const SETTLED_SPEED: f64 = 1e-3;
-/// How long all must be that slow, s.
-const SETTLED_FOR: f64 = 0.5;
-/// How long settling may take, s.
-const SETTLE_WITHIN: f64 = 3.0;
-
-/// The scene did not come to rest.
-#[derive(Debug, thiserror::Error)]
-pub enum SettleError {
-    /// Something still moves.
-    #[error(
-        "object {object} still moves at {speed_mm:.1} mm/s after {SETTLE_WITHIN} s of settling; put it nearer to what \
-         it rests on, or make it lie stably"
-    )]
-    Moving {
-        /// The fastest object.
-        object: String,
-        /// Its speed, mm/s.
-        speed_mm: f64,
-    },
-    /// The run is to end.
-    #[error("interrupted")]
-    Interrupted,
-    /// The physics failed.
-    #[error("settling failed: {0}")]
-    Failed(#[from] StepFailure),
-}
-
 /// A running scene.
 #[derive(Debug)]
 pub struct Simulation {
@@ -136,7 +107,7 @@ impl Simulation {
     /// Builds the world of `scene`.
     ///
     /// # Errors
-    /// An object that cannot be made, two of one name, or two in each other.
+    /// An object that cannot be made, two of one name, or one that starts inside of another or of the robot.
     pub fn new(
         scene: Arc<Scene>,
         params: &Params,
@@ -146,6 +117,7 @@ impl Simulation {
         let mut world = World::new(params.clone(), scene.gravity);
         let objects = build::add_all(&mut world, &scene, cache)?;
         let rig = Rig::new(&mut world, robot, &scene.base_w, &scene.start_q, CONTROL_DT);
+        build::check_overlap(&mut world, &scene)?;
         Ok(Self { scene, world, rig, objects })
     }
 
@@ -156,35 +128,6 @@ impl Simulation {
     pub fn step(&mut self) -> Result<(), StepFailure> {
         self.rig.advance(&mut self.world);
         self.world.step()
-    }
-
-    /// Lets everything come to rest, the arm holding its pose.
-    ///
-    /// # Errors
-    /// Something does not come to rest in time, or the physics fails.
-    pub fn settle(&mut self) -> Result<(), SettleError> {
-        let dt = self.world.params.dt;
-        let mut quiet = 0.0;
-        let mut waited = 0.0;
-        while quiet < SETTLED_FOR {
-            if stop::requested() {
-                return Err(SettleError::Interrupted);
-            }
-            self.step()?;
-            waited += dt;
-            let (object, speed) = self.fastest();
-            quiet = if speed < SETTLED_SPEED { quiet + dt } else { 0.0 };
-            if waited > SETTLE_WITHIN && quiet == 0.0 {
-                return Err(SettleError::Moving { object, speed_mm: 1e3 * speed });
-            }
-        }
-        Ok(())
-    }
-
-    /// The fastest object and the speed of its fastest point, m/s.
-    fn fastest(&self) -> (String, f64) {
-        let speeds = self.objects.iter().map(|object| (object.name.clone(), self.speed(object)));
-        speeds.fold((String::new(), 0.0), |best, next| if next.1 > best.1 { next } else { best })
     }
 
     /// Speed of the fastest point of an object, m/s (of its centre and 0.1 m of lever for a rigid one).

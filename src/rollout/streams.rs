@@ -5,11 +5,12 @@ use super::{
     senses::{SenseError, Senses},
 };
 use crate::{
+    geometry::Pose,
     physics::world::Frame,
     policy::Streams,
-    scene::{Camera, Scene},
+    scene::{Camera, CameraMount, Scene},
     sensing::{
-        camera::{check_cameras, check_light},
+        camera::{CameraError, Scratch, check_cameras, check_light, render},
         tactile::{OpticsModel, TactileSpec},
     },
 };
@@ -74,6 +75,36 @@ impl Senses {
         }
         if streams.touch {
             self.touch(frame)?;
+        }
+        Ok(())
+    }
+
+    /// Whether a camera of the scene stands inside of something in the state in which an episode starts, by the shapes of
+    /// the objects: nothing of them is drawn, which would take a hundred times as long.
+    ///
+    /// # Errors
+    /// A camera inside of something, or a picture of the robot alone that cannot be drawn.
+    pub fn stand_outside(&mut self, frame: &Frame) -> Result<(), SenseError> {
+        let robot = self.robot_alone()?;
+        let view = self.view(frame);
+        for camera in self.cameras() {
+            let mount_w = match (camera.mount, view.hand_w) {
+                (CameraMount::Hand, Some(hand_w)) => hand_w,
+                _ => Pose::identity(),
+            };
+            let eye_w = mount_w * nalgebra::Point3::from(camera.pose.translation.vector);
+            let object = match self.around(&eye_w) {
+                Some(name) => Some(name.to_owned()),
+                None => {
+                    let picture =
+                        render(&robot, &view, &camera.clone().with_edge(TRIAL_EDGE), &mut Scratch::default());
+                    picture.map_err(|error| SenseError::from(error).set_by(camera))?.inside
+                }
+            };
+            if let Some(object) = object {
+                let inside = CameraError::Inside { camera: camera.name.clone(), object };
+                return Err(SenseError::from(inside).set_by(camera));
+            }
         }
         Ok(())
     }

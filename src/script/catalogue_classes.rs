@@ -406,6 +406,12 @@ pub static ARM: Class = Class {
         ),
         method("open", &[("options?", RATE)], &[], "Opens the gripper."),
         method("wait", &[("seconds", Type::Number("s", Range::closed(0.0, 600.0)))], &[], "Holds still."),
+        method(
+            "give_up",
+            &[("reason", Type::Text)],
+            &[],
+            "Ends the expert: the last command stays, and the episode's record and the results say why.",
+        ),
     ],
 };
 

@@ -126,7 +126,7 @@ pub static SIMULATION: Class = Class {
             "drive",
             &[("expert", Type::Function("fun(arm: softvt.Arm, scene: softvt.View)"))],
             &["boolean", "string?"],
-            "Runs an expert to its end; false and why once the physics has failed.",
+            "Runs an expert to its end; false and why once it has given up or the physics has failed.",
         ),
         method(
             "wait",

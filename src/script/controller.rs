@@ -24,6 +24,10 @@ impl ExpertController {
 }
 
 impl Controller for ExpertController {
+    fn gave_up(&self) -> Option<&str> {
+        self.expert.gave_up()
+    }
+
     fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, ControlError> {
         let glance = Glance::new(sim, observation.time_s, &mut self.lag);
         let command = next(&mut self.expert, glance, &mut self.lag);

@@ -15,9 +15,9 @@ use std::{
 };
 
 use cpu_time::ThreadTime;
-use mlua::{HookTriggers, Lua, VmState};
+use mlua::{HookTriggers, Lua, VmState, debug::Debug};
 
-use super::error::ScriptError;
+use super::{error::ScriptError, sandbox::here};
 use crate::rollout::stop;
 
 /// Instructions between two looks at the clock; about 0.3 ms.
@@ -148,6 +148,12 @@ struct State {
     stopped: Option<(Duration, Option<Alarm>)>,
 }
 
+/// File and line of what is running, if it is a script's.
+fn place(running: &Debug<'_>) -> Option<(String, usize)> {
+    let file = running.source().source?.strip_prefix('@')?.to_owned();
+    Some((file, running.current_line()?))
+}
+
 /// Processor time that this thread has used.
 fn used() -> Duration {
     ThreadTime::now().as_duration()
@@ -163,8 +169,9 @@ impl Clock {
     /// Installs the hook in `lua`.
     pub(super) fn install(&self, lua: &Lua) -> mlua::Result<()> {
         let clock = self.clone();
-        lua.set_global_hook(HookTriggers::new().every_nth_instruction(STRIDE), move |lua, _| {
+        lua.set_global_hook(HookTriggers::new().every_nth_instruction(STRIDE), move |lua, running| {
             let Some(error) = clock.expired() else { return Ok(VmState::Continue) };
+            let error = error.found_at(place(running).or_else(|| here(lua)));
             let again = error.clone();
             lua.set_global_hook(HookTriggers::new().every_nth_instruction(1), move |_, _| {
                 Err(mlua::Error::external(again.clone()))
@@ -173,6 +180,7 @@ impl Clock {
         })
     }
 
+    /// What is wrong once the time is up or the run is to end.
     fn expired(&self) -> Option<ScriptError> {
         let mut state = lock(&self.state);
         state.beat += 1;

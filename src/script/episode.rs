@@ -1,9 +1,10 @@
 //! One episode's own machine: the scene that its layout builds, and its expert.
 
-use mlua::{Function, Table, Value};
+use mlua::{Function, Lua, MultiValue, Table, Value};
 
 use super::{
     Loaded, ScriptError, expert,
+    origin::fail_at,
     plan::{Machine, find_task, reopen, sound_task},
     random::Rng,
     sandbox::{fail, locked},
@@ -16,7 +17,7 @@ use crate::{
         seed::{EpisodeSeed, Split, Stream},
     },
     message::number,
-    scene::Scene,
+    scene::{Body, Scene},
 };
 
 /// Which episode.
@@ -55,28 +56,8 @@ impl Episode {
     /// If the suite, task or a shift is unknown, or the script fails.
     pub fn open(loaded: &Loaded, request: &EpisodeRequest) -> Result<Self, ScriptError> {
         let (machine, values) = reopen(loaded)?;
-        let (suite, task) = find_task(&machine, &values, &request.suite, request.task)?;
-        let parts = read(&machine, &task).map_err(|e| machine.vm.explain(&e))?;
-        let seed = EpisodeSeed {
-            suite: request.suite.clone(),
-            layout: parts.layout,
-            episode: request.episode,
-            base: request.base_seed,
-            split: request.split,
-        };
-        machine.vm.random.reseed(seed.stream(Stream::Script));
-        let scene = LuaScene::new(empty_scene());
-        let userdata = machine.vm.lua.create_userdata(scene.clone()).map_err(|e| machine.vm.explain(&e))?;
-        machine.vm.call::<()>(&parts.build, (&userdata, Rng::new(seed.clone(), Stream::Layout)))?;
-        let nominal = locked(&scene.scene).clone();
-        let mut current = scene;
-        for (name, value) in &request.shifts {
-            let (apply, value) = find_shift(&machine, &suite, name, *value)?;
-            current = shifted(&machine, &apply, current, value)?;
-        }
-        let scene = locked(&current.scene).clone();
-        check_goal(&loaded.main, &task, &scene).map_err(|e| machine.vm.explain(&e))?;
-        Ok(Self { scene, nominal, seed, machine, expert: parts.expert })
+        let Start { scene, nominal, seed, expert } = start(&machine, &values, request)?;
+        Ok(Self { scene, nominal, seed, machine, expert })
     }
 
     /// The expert of the task, ready to start; none if the task has none.
@@ -88,6 +69,66 @@ impl Episode {
         self.machine.vm.random.reseed(self.seed.stream(Stream::Expert));
         expert::Expert::start(self.machine, &function).map(Some)
     }
+}
+
+/// A machine that lays out one scene after another, of which none will be run: what a layout leaves behind in the machine
+/// is seen by the next.
+pub struct Scenes {
+    machine: Machine,
+    values: MultiValue,
+}
+
+impl Scenes {
+    /// Runs the sources of `loaded` in a fresh machine.
+    ///
+    /// # Errors
+    /// If the script fails.
+    pub fn open(loaded: &Loaded) -> Result<Self, ScriptError> {
+        let (machine, values) = reopen(loaded)?;
+        Ok(Self { machine, values })
+    }
+
+    /// The scene that an episode starts from, before and after the shifts.
+    ///
+    /// # Errors
+    /// As [`Episode::open`].
+    pub fn of(&self, request: &EpisodeRequest) -> Result<(Scene, Scene), ScriptError> {
+        let Start { scene, nominal, .. } = start(&self.machine, &self.values, request)?;
+        Ok((nominal, scene))
+    }
+}
+
+/// What an episode starts from.
+struct Start {
+    scene: Scene,
+    nominal: Scene,
+    seed: EpisodeSeed,
+    expert: Option<Function>,
+}
+
+fn start(machine: &Machine, values: &MultiValue, request: &EpisodeRequest) -> Result<Start, ScriptError> {
+    let (suite, task) = find_task(machine, values, &request.suite, request.task)?;
+    let parts = read(machine, &task).map_err(|e| machine.vm.explain(&e))?;
+    let seed = EpisodeSeed {
+        suite: request.suite.clone(),
+        layout: parts.layout,
+        episode: request.episode,
+        base: request.base_seed,
+        split: request.split,
+    };
+    machine.vm.random.reseed(seed.stream(Stream::Script));
+    let scene = LuaScene::new(empty_scene());
+    let userdata = machine.vm.lua.create_userdata(scene.clone()).map_err(|e| machine.vm.explain(&e))?;
+    machine.vm.call::<()>(&parts.build, (&userdata, Rng::new(seed.clone(), Stream::Layout)))?;
+    let nominal = locked(&scene.scene).clone();
+    let mut current = scene;
+    for (name, value) in &request.shifts {
+        let (apply, value) = find_shift(machine, &suite, name, *value)?;
+        current = shifted(machine, &apply, current, value)?;
+    }
+    let scene = locked(&current.scene).clone();
+    check_goal(&machine.vm.lua, &task, &scene).map_err(|e| machine.vm.explain(&e))?;
+    Ok(Start { scene, nominal, seed, expert: parts.expert })
 }
 
 struct Parts {
@@ -170,20 +211,33 @@ fn shifted(
     }
 }
 
-/// A goal that names what is not there would never be reached.
-fn check_goal(main: &str, task: &Table, scene: &Scene) -> mlua::Result<()> {
+/// A goal that names what is not there, or what cannot get anywhere, would never be reached.
+fn check_goal(lua: &Lua, task: &Table, scene: &Scene) -> mlua::Result<()> {
     let goal: Table = task.get("goal")?;
     for key in ["object", "target"] {
         let name: String = goal.get(key)?;
+        let wrong = |what: String| Err(fail_at(lua, &goal, key, format!("task.goal.{key}: {what}")));
         let mut known = scene.names();
         if key == "object" {
             // What is to be carried is no part of anything.
             known.retain(|name| !name.contains('.'));
         }
         if !known.contains(&name) {
-            let known = known.iter().map(String::as_str);
-            let message = format!("task.goal.{key}: {}", unknown("object", &name, known));
-            return Err(mlua::Error::external(ScriptError::new(main, message)));
+            return wrong(unknown("object", &name, known.iter().map(String::as_str)));
+        }
+        let object = scene.objects.iter().find(|object| object.name == name);
+        match (key, object.map(|object| &object.asset.body)) {
+            ("object", Some(Body::Static | Body::Articulated(_) | Body::Scenery)) => {
+                return wrong(format!(
+                    "{name:?} never moves; name an object whose body is softvt.soft or softvt.rigid"
+                ));
+            }
+            ("target", Some(Body::Scenery)) => {
+                return wrong(format!(
+                    "{name:?} is softvt.scenery, which nothing touches; name what can be reached"
+                ));
+            }
+            _ => {}
         }
     }
     Ok(())

@@ -43,6 +43,14 @@ impl ScriptError {
         self
     }
 
+    /// The same error in the file and on the line where it was found, if they are known.
+    pub(super) fn found_at(mut self, place: Option<(String, usize)>) -> Self {
+        if let Some((file, line)) = place {
+            (self.file, self.line) = (file, Some(line));
+        }
+        self
+    }
+
     /// The same error at `line` (from 1).
     pub fn at(mut self, line: Option<usize>) -> Self {
         self.line = line;
@@ -111,7 +119,13 @@ impl Context<'_> {
         let rest = without_own_position(rest);
         let (message, inner_trace) = rest.split_once("\nstack traceback:").unwrap_or((rest, ""));
         match self.position(message) {
-            Some((file, line, said)) => {
+            Some((file, line, mut said)) => {
+                // A coroutine in a coroutine puts its place before that of the inner one.
+                while let Some((_, _, inner)) =
+                    self.position(said.trim()).filter(|(f, l, _)| *f == file && *l == line)
+                {
+                    said = inner;
+                }
                 ScriptError::new(file, format!("{prefix}{}", said.trim())).at(Some(line))
             }
             None => self.traced(format!("{prefix}{}", message.trim()), &format!("{inner_trace}\n{trace}")),
@@ -211,6 +225,14 @@ mod tests {
     fn a_shortened_name_is_restored() {
         let raw = "...way/down/lib.lua:7: oh";
         assert_eq!(explain(mlua::Error::RuntimeError(raw.into())), "/a/very/long/way/down/lib.lua:7: oh");
+    }
+
+    #[test]
+    fn a_place_that_is_said_again_is_said_once() {
+        let raw = "suites/x.lua:3: suites/x.lua:3: suites/x.lua:3: oh";
+        assert_eq!(explain(mlua::Error::RuntimeError(raw.into())), "suites/x.lua:3: oh");
+        let raw = "suites/x.lua:3: suites/x.lua:5: oh";
+        assert_eq!(explain(mlua::Error::RuntimeError(raw.into())), raw);
     }
 
     #[test]

@@ -94,6 +94,11 @@ impl Expert {
         self.run.step(&vm.lua, view).map_err(|e| vm.explain(&e))
     }
 
+    /// Why the expert gave up, if it did.
+    pub fn gave_up(&self) -> Option<&str> {
+        self.run.gave_up.as_deref()
+    }
+
     /// Ends the expert with an error that says `complaint` at the line of the command that it gave last.
     pub fn refuse(&mut self, complaint: &str) -> ScriptError {
         let vm = &self.machine.vm;
@@ -107,15 +112,23 @@ pub(super) struct Coroutine {
     function: Function,
     view: Shared,
     thread: Option<Thread>,
+    /// The reason that it gave to `arm:give_up`, after which it is not resumed.
+    pub gave_up: Option<String>,
 }
+
+/// Characters that are kept of the reason for giving up.
+const LONGEST_REASON: usize = 300;
 
 impl Coroutine {
     pub fn new(function: Function) -> Self {
-        Self { function, view: Arc::default(), thread: None }
+        Self { function, view: Arc::default(), thread: None, gave_up: None }
     }
 
     /// Lets the expert see `view` and gives its next command; none once it is done.
     pub fn step(&mut self, lua: &Lua, view: &ExpertView) -> mlua::Result<Option<ExpertCommand>> {
+        if self.gave_up.is_some() {
+            return Ok(None);
+        }
         *locked(&self.view) = Some(view.clone());
         let values = self.resume(lua)?;
         if self.thread.as_ref().is_none_or(|thread| !thread.is_resumable()) {
@@ -126,6 +139,10 @@ impl Coroutine {
             values.next().and_then(|value| value.as_userdata()?.borrow::<LuaPose>().ok().map(|pose| pose.0));
         let closure = values.next().and_then(|value| number(&value));
         let gripping = values.next().and_then(|value| value.as_boolean());
+        if let Some(reason) = values.next().and_then(|value| value.as_string().map(|s| s.to_string_lossy())) {
+            self.gave_up = Some(reason.chars().take(LONGEST_REASON).collect());
+            return Ok(None);
+        }
         match (pose, closure.filter(|closure| (0.0..=1.0).contains(closure)), gripping) {
             (Some(pose_w), Some(closure), Some(gripping)) => {
                 Ok(Some(ExpertCommand { pose_b: view.base_w.inv_mul(&pose_w), closure, gripping }))
@@ -140,7 +157,8 @@ impl Coroutine {
 
     /// The error that `complaint` raises in the script where it waits for the next control step.
     pub fn refuse(&mut self, lua: &Lua, complaint: &str) -> mlua::Error {
-        let waiting = self.thread.as_ref().filter(|thread| thread.is_resumable());
+        let over = self.gave_up.is_some();
+        let waiting = self.thread.as_ref().filter(|thread| !over && thread.is_resumable());
         let raised = waiting.and_then(|thread| thread.resume::<MultiValue>(complaint).err());
         // A script that is over, or that catches errors, has no line to show.
         raised.unwrap_or_else(|| fail(lua, complaint))

@@ -4,6 +4,7 @@ use mlua::{Lua, MetaMethod, MultiValue, Table, UserData, UserDataFields, UserDat
 
 use super::{
     catalogue_classes::LIST,
+    numbers,
     sandbox::{describe, fail},
     schema::{self, number},
 };
@@ -74,12 +75,8 @@ impl LuaList {
         let Some(place) = place else {
             return Err(fail(lua, format!("{label}: has places 1 to {count}, got {}", schema::got(key))));
         };
-        let Some(entry) = number(value).filter(|n| n.is_finite()) else {
-            return Err(fail(
-                lua,
-                format!("{label}[{place}]: expected a number, got {}", schema::got(value)),
-            ));
-        };
+        let entry = numbers::entry(value, schema::Range::ANY);
+        let entry = entry.map_err(|message| fail(lua, format!("{label}[{place}]: {message}")))?;
         numbers[place as usize - 1] = entry;
         set(lua, &Value::Table(lua.create_sequence_from(numbers)?))
     }

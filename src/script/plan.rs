@@ -11,6 +11,7 @@ use super::{
     Bundle, OptionSpec, ScriptError, catalogue,
     experiment::points,
     options::{self, Session},
+    origin::fail_at,
     pose,
     sandbox::{Limits, Vm, fail, locked},
     schema::{self, unknown},
@@ -126,7 +127,12 @@ impl Machine {
         for entry in table.clone().sequence_values::<Value>() {
             match entry? {
                 Value::Table(table) if schema::is_made(lua, &catalogue::SUITE, &table) => {
-                    suites.push(suite(lua, &table)?);
+                    let suite = suite(lua, &table)?;
+                    if suites.iter().any(|known: &Suite| known.name == suite.name) {
+                        let message = format!("two suites are named {:?}; rename one", suite.name);
+                        return Err(fail_at(lua, &table, "name", message));
+                    }
+                    suites.push(suite);
                 }
                 _ => return Err(no_plan(lua, values)),
             }
@@ -213,13 +219,26 @@ fn suite(lua: &Lua, table: &Table) -> mlua::Result<Suite> {
         _ => ObjectType::Deformable,
     };
     let name: String = table.get("name")?;
-    let tasks: Vec<Table> = table.get("tasks")?;
-    if tasks.is_empty() {
-        return Err(fail(lua, format!("suite.tasks: suite {name:?} has no tasks; give at least one")));
+    let tables: Vec<Table> = table.get("tasks")?;
+    if tables.is_empty() {
+        let message = format!("suite.tasks: suite {name:?} has no tasks; give at least one");
+        return Err(fail_at(lua, table, "tasks", message));
     }
     let budget = if variation == Variation::Object { 700 } else { 500 };
-    let tasks =
-        tasks.iter().enumerate().map(|(id, table)| task(lua, id, table, budget)).collect::<Result<_, _>>()?;
+    let mut tasks: Vec<Task> = Vec::new();
+    for (id, table) in tables.iter().enumerate() {
+        let task = task(lua, id, table, budget)?;
+        let same = |known: &&Task| (&known.prompt, &known.layout) == (&task.prompt, &task.layout);
+        if let Some(twin) = tasks.iter().find(same) {
+            let message = format!(
+                "task.prompt: tasks {} and {id} of suite {name:?} are both {:?} in the layout {:?}; nobody could tell them \
+                 apart",
+                twin.id, task.prompt, task.layout
+            );
+            return Err(fail_at(lua, table, "prompt", message));
+        }
+        tasks.push(task);
+    }
     let shifts: Option<Vec<Table>> = table.get("shifts")?;
     let shifts =
         shifts.unwrap_or_default().iter().map(|table| shift(lua, table)).collect::<mlua::Result<_>>()?;
@@ -230,7 +249,13 @@ fn suite(lua: &Lua, table: &Table) -> mlua::Result<Suite> {
 fn task(lua: &Lua, id: usize, table: &Table, budget: u32) -> mlua::Result<Task> {
     sound_task(lua, table)?;
     let goal: Table = table.get("goal")?;
-    let (object, target, hold_s) = (goal.get("object")?, goal.get("target")?, goal.get("hold_s")?);
+    let (object, target): (String, String) = (goal.get("object")?, goal.get("target")?);
+    let hold_s = goal.get("hold_s")?;
+    if object == target {
+        let message =
+            format!("task.goal.target: is {target:?}, which is the object itself; name what it must reach");
+        return Err(fail_at(lua, &goal, "target", message));
+    }
     let kind: Value = goal.metatable().map_or(Ok(Value::Nil), |meta| meta.get("__name"))?;
     let inside = kind.as_string().is_some_and(|kind| kind.to_string_lossy() == catalogue::INSIDE.kind);
     Ok(Task {

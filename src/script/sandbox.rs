@@ -14,7 +14,7 @@ use mlua::{
 };
 
 use super::{
-    budget::Budget,
+    budget::Budgets,
     deadline::{Clock, Deadline, OnStuck, end_process},
     error::{Context, RaisedObject, ScriptError},
     lists,
@@ -70,7 +70,7 @@ impl Default for Limits {
 pub(super) struct Shared {
     pub main: String,
     pub library: Mutex<Library>,
-    pub budget: Budget,
+    pub budgets: Budgets,
     raised: Mutex<Option<RaisedObject>>,
     /// Bytes that `print` may still write.
     printable: AtomicUsize,
@@ -97,7 +97,7 @@ impl Vm {
         let shared = Arc::new(Shared {
             main: main.into(),
             library: Mutex::new(library),
-            budget: Budget::default(),
+            budgets: Budgets::default(),
             raised: Mutex::new(None),
             printable: AtomicUsize::new(MOST_PRINTED),
             limits: limits.clone(),

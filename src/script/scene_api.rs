@@ -17,6 +17,7 @@ use super::{
 use crate::{
     geometry::{Pose, Quat, Vec3},
     message::number,
+    robot::panda::{self, ARM_DOFS},
     scene::{Asset, Body, Camera, Friction, Lighting, Object, Region, Scene, SoftMaterial},
 };
 
@@ -45,7 +46,7 @@ pub(super) static OBJECT: &[Field] = &[
 ];
 
 /// Start pose of the arm as in SoftVTBench (facts of the released code): the hand over the table, pointing down.
-const START_Q: [f64; 7] = [-0.01988, -0.18734, 0.00767, -2.40340, 0.00496, 2.24534, 0.79485];
+const START_Q: [f64; ARM_DOFS] = [-0.01988, -0.18734, 0.00767, -2.40340, 0.00496, 2.24534, 0.79485];
 
 /// A scene with nothing in it: robot base of the table scenes, workspace of the table.
 pub(super) fn empty_scene() -> Scene {
@@ -76,6 +77,23 @@ fn place_at(lua: &Lua, label: &str, xyz: Vec3) -> mlua::Result<Vec3> {
         lua,
         format!("{label}: expected a place within {FARTHEST} m of the origin, got {{{x}, {y}, {z}}}"),
     ))
+}
+
+/// Joint angles that the arm can have, rad.
+fn within_limits(lua: &Lua, q: [f64; ARM_DOFS]) -> mlua::Result<[f64; ARM_DOFS]> {
+    for (index, (link, q)) in panda::arm_chain().links.iter().zip(q).enumerate() {
+        if !(link.lower..=link.upper).contains(&q) {
+            let (lower, upper) = (link.lower, link.upper);
+            let message = format!(
+                "scene.start_q[{}]: expected radians in {lower}..{upper}, the limits of {}, got {}",
+                index + 1,
+                link.name,
+                number(q)
+            );
+            return Err(fail(lua, message));
+        }
+    }
+    Ok(q)
 }
 
 /// An asset's Lua table and what was read from it.
@@ -239,8 +257,8 @@ impl Hosted for LuaScene {
     fn write(&self, lua: &Lua, key: &str, value: Value) -> mlua::Result<()> {
         let list: Vec<f64> = lua.unpack(value)?;
         let mut scene = locked(&self.scene);
-        if let Ok(q) = <[f64; 7]>::try_from(list.as_slice()) {
-            scene.start_q = q;
+        if let Ok(q) = <[f64; ARM_DOFS]>::try_from(list.as_slice()) {
+            scene.start_q = within_limits(lua, q)?;
             return Ok(());
         }
         let v = Vec3::from_column_slice(&list[..3]);

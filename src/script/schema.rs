@@ -2,10 +2,10 @@
 
 use mlua::{Lua, Table, Value};
 
-pub use super::range::Range;
+pub use super::{guess::closest, range::Range};
 use super::{
-    lists,
-    sandbox::{fail, here, locked, shared},
+    lists, numbers, origin,
+    sandbox::{fail, here},
 };
 use crate::message;
 
@@ -107,11 +107,11 @@ pub struct Fault {
 }
 
 impl Fault {
-    fn new(message: String) -> Self {
+    pub(super) fn new(message: String) -> Self {
         Self { path: Vec::new(), message }
     }
 
-    fn inside(mut self, key: impl Into<String>) -> Self {
+    pub(super) fn inside(mut self, key: impl Into<String>) -> Self {
         self.path.insert(0, key.into());
         self
     }
@@ -127,18 +127,6 @@ impl Fault {
         }
         format!("{text}: {}", self.message)
     }
-}
-
-/// The candidate that the writer of `word` most likely meant, if any is close.
-pub fn closest<'a>(word: &str, candidates: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    let allowed = (word.chars().count() / 3).max(1);
-    let begins =
-        |candidate: &str| word.len() > 2 && (candidate.starts_with(word) || word.starts_with(candidate));
-    candidates
-        .map(|candidate| (strsim::damerau_levenshtein(word, candidate), candidate))
-        .filter(|(distance, candidate)| *distance <= allowed || begins(candidate))
-        .min_by_key(|(distance, candidate)| (*distance, candidate.len()))
-        .map(|(_, candidate)| candidate)
 }
 
 /// `unknown key "promt"; did you mean "prompt"?`
@@ -164,6 +152,9 @@ pub(super) fn got(value: &Value) -> String {
     match value {
         Value::String(text) => quoted(&text.to_string_lossy()),
         Value::Integer(number) => number.to_string(),
+        Value::Number(number) if !number.is_finite() => {
+            format!("{}, which is not a finite number", message::number(*number))
+        }
         Value::Number(number) => message::number(*number),
         Value::Boolean(flag) => flag.to_string(),
         Value::Nil => "nil".into(),
@@ -247,13 +238,10 @@ impl Type {
                 }
             }
             (Self::Colour, Value::Table(list)) => {
-                let numbers = vector(list, 3).filter(|rgb| rgb.iter().all(|c| (0.0..=1.0).contains(c)));
-                let numbers = numbers.ok_or_else(wrong)?;
-                lua.create_sequence_from(numbers).map(Value::Table).map_err(|e| Fault::new(e.to_string()))
+                numbers::check(lua, list, (3, Range::closed(0.0, 1.0)), &wrong)
             }
             (Self::Vector(count, _), Value::Table(list)) => {
-                let numbers = vector(list, *count).ok_or_else(wrong)?;
-                lua.create_sequence_from(numbers).map(Value::Table).map_err(|e| Fault::new(e.to_string()))
+                numbers::check(lua, list, (*count, Range::ANY), &wrong)
             }
             (Self::List(of), Value::Table(list)) => check_list(lua, of, list, &wrong),
             (Self::Map(of), Value::Table(map)) => check_map(lua, of, map),
@@ -268,9 +256,7 @@ impl Type {
                 Ok(name) if name.to_string_lossy() == *class => kept(),
                 _ => Err(wrong()),
             },
-            (Self::OneOf(types), _) => {
-                types.iter().find_map(|ty| ty.check(lua, value).ok()).ok_or_else(wrong)
-            }
+            (Self::OneOf(types), _) => one_of(lua, types, value, &wrong),
             _ => Err(wrong()),
         }
     }
@@ -318,11 +304,17 @@ fn whole(value: &Value) -> Option<i64> {
     }
 }
 
-fn vector(list: &Table, count: usize) -> Option<Vec<f64>> {
-    let values: Vec<Value> = list.clone().sequence_values().collect::<mlua::Result<_>>().ok()?;
-    let numbers: Vec<f64> = values.iter().map(number).collect::<Option<_>>()?;
-    let entries = list.pairs::<Value, Value>().take(count + 1).count();
-    (numbers.len() == count && entries == count && numbers.iter().all(|n| n.is_finite())).then_some(numbers)
+/// The first type that fits; a fault inside of the value says more than that none does.
+fn one_of(lua: &Lua, types: &[Type], value: &Value, wrong: &dyn Fn() -> Fault) -> Result<Value, Fault> {
+    let mut inner = None;
+    for ty in types {
+        match ty.check(lua, value) {
+            Ok(value) => return Ok(value),
+            Err(fault) if !fault.path.is_empty() => inner = inner.or(Some(fault)),
+            Err(_) => {}
+        }
+    }
+    Err(inner.unwrap_or_else(wrong))
 }
 
 fn check_list(lua: &Lua, of: &Type, list: &Table, wrong: &dyn Fn() -> Fault) -> Result<Value, Fault> {
@@ -414,6 +406,7 @@ fn absent(lua: &Lua, field: &Field) -> Result<Value, Fault> {
 pub(super) fn make(lua: &Lua, record: &'static Record, value: &Value) -> mlua::Result<Table> {
     let made = checked(lua, record, value)?;
     made.set_metatable(Some(metatable(lua, record)?))?;
+    origin::note(lua, &made)?;
     Ok(made)
 }
 
@@ -475,7 +468,6 @@ fn metatable(lua: &Lua, record: &'static Record) -> mlua::Result<Table> {
 pub(super) fn fault_here(lua: &Lua, label: &str, fault: &Fault) -> mlua::Error {
     let message = fault.words(label);
     let Some((file, line)) = here(lua) else { return fail(lua, message) };
-    let text = shared(lua).ok().and_then(|shared| locked(&shared.library).text(&file).ok());
-    let line = text.map_or(line, |text| super::position::line_of_key(&text, line, &fault.path));
+    let line = origin::line_of(lua, &file, line, &fault.path);
     mlua::Error::external(super::ScriptError::new(file, message).at(Some(line)))
 }

@@ -9,7 +9,7 @@ use super::{
     catalogue_classes::{Class, SHAPE},
     catalogue_shapes as table,
     host::{self, Hosted, hosted, method},
-    sandbox::{fail, locked, shared},
+    sandbox::{fail, here, locked, shared},
     schema::{self, checked},
 };
 use crate::geometry::{
@@ -114,7 +114,9 @@ fn mesh(lua: &Lua, value: &Value) -> mlua::Result<LuaShape> {
     let shared = shared(lua)?;
     let bytes = {
         let mut library = locked(&shared.library);
-        let file = library.data(&path).map_err(|message| fail(lua, format!("mesh.file: {message}")))?;
+        let asker = here(lua).map(|(file, _)| file);
+        let file = library.data(&path, asker.as_deref());
+        let file = file.map_err(|message| fail(lua, format!("mesh.file: {message}")))?;
         library.bytes(&file).unwrap_or_default()
     };
     drop(hold(lua, MESH_TO_FILE * bytes.len())?);

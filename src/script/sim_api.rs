@@ -2,10 +2,11 @@
 
 use std::sync::{Arc, Mutex};
 
-use mlua::{Function, Lua, MultiValue, Table, UserDataMethods, Value};
+use mlua::{Function, IntoLuaMulti, Lua, MultiValue, Table, UserDataMethods, Value};
 use serde::de::DeserializeOwned;
 
 use super::{
+    budget::{Held, hold_in_world},
     catalogue::LAYOUT,
     catalogue_classes::Class,
     catalogue_world::SIMULATE,
@@ -44,7 +45,11 @@ struct Inner {
     failed: Option<String>,
     clock: Clock,
     senses: Senses,
+    _held: Held,
 }
+
+/// About what a simulation takes besides its soft bodies: the robot, its sensors, fixed things, bytes.
+const BYTES_A_SIMULATION: usize = 4 << 20;
 
 struct Watched {
     reference: Option<Reference>,
@@ -115,7 +120,12 @@ fn simulate(
     let _honest_work = clock.pause();
     let mut sim = Simulation::new(scene, &settings.physics, &settings.robot, cache)
         .map_err(|e| fail(lua, format!("softvt.simulate: {e}")))?;
-    sim.settle().map_err(|e| fail(lua, format!("softvt.simulate: {e}")))?;
+    let soft: usize = sim.world.soft.iter().map(|soft| soft.body.rest.bytes()).sum();
+    let held = hold_in_world(lua, BYTES_A_SIMULATION + soft)?;
+    sim.settle().map_err(|e| {
+        let place = e.place().map_or(String::new(), |place| format!("{place}: "));
+        fail(lua, format!("softvt.simulate: {place}{e}"))
+    })?;
     let watched = sim
         .objects
         .iter()
@@ -132,7 +142,8 @@ fn simulate(
         })
         .collect();
     let senses = Senses::new(&sim, &settings.tactile, looks);
-    let inner = Inner { sim, watched, physics_steps: 0, failed: None, clock: clock.clone(), senses };
+    let inner =
+        Inner { sim, watched, physics_steps: 0, failed: None, clock: clock.clone(), senses, _held: held };
     Ok(LuaSimulation(Arc::new(Mutex::new(inner))))
 }
 
@@ -223,6 +234,9 @@ impl LuaSimulation {
             if !locked(&self.0).control_step(Some((&command.pose_b, command.closure))) {
                 break;
             }
+        }
+        if let Some(reason) = &expert.run.gave_up {
+            return (false, format!("the expert gave up: {reason}")).into_lua_multi(lua);
         }
         locked(&self.0).outcome(lua)
     }

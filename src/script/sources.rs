@@ -133,7 +133,7 @@ impl Library {
             ));
         }
         let path = format!("{}.lua", module.replace('.', "/"));
-        self.find(module, &[format!("scripts/{path}"), format!("suites/{path}"), path.clone()]).map_err(
+        self.find(module, None, &[format!("scripts/{path}"), format!("suites/{path}"), path.clone()]).map_err(
             |problem| match problem {
                 Problem::Frozen => format!(
                     "require {module:?}: the module was not loaded when the plan was made; \
@@ -149,8 +149,8 @@ impl Library {
         )
     }
 
-    /// A data file (a mesh) inside of the roots, by relative path.
-    pub fn data(&mut self, path: &str) -> Result<String, String> {
+    /// A data file (a mesh) inside of the roots, by relative path: beside the Lua file that asks for it first.
+    pub fn data(&mut self, path: &str, asker: Option<&str>) -> Result<String, String> {
         let inside =
             |part: &str| !part.is_empty() && part != "." && part != ".." && !part.contains(['\\', '\0', ':']);
         if !path.split('/').all(inside) {
@@ -158,27 +158,37 @@ impl Library {
                 "{path:?} leads out of the project; give a path inside of it without \"..\""
             ));
         }
-        self.find(path, &[path.to_string()]).map_err(|problem| match problem {
+        let folder = asker.map(|file| file.rsplit_once('/').map_or("", |(folder, _)| folder));
+        let beside =
+            folder.map(|folder| if folder.is_empty() { path.to_owned() } else { format!("{folder}/{path}") });
+        // No path holds a colon, so one folder's file is never taken for another's.
+        let key = format!("{}:{path}", folder.unwrap_or_default());
+        self.find(&key, beside, &[path.to_string()]).map_err(|problem| match problem {
             Problem::Frozen => {
                 format!("{path:?} was not read when the plan was made; build the shape in the file itself")
             }
-            Problem::Missing => format!("no file {path:?} in {}", self.places()),
+            Problem::Missing => match asker {
+                Some(asker) => format!("no file {path:?} beside {asker}, nor in {}", self.places()),
+                None => format!("no file {path:?} in {}", self.places()),
+            },
             Problem::Other(text) => text,
         })
     }
 
-    fn find(&mut self, key: &str, candidates: &[String]) -> Result<String, Problem> {
+    /// The file of `key`: at the path `first`, else at the first of `candidates` below the roots, on disk or embedded.
+    fn find(&mut self, key: &str, first: Option<String>, candidates: &[String]) -> Result<String, Problem> {
         if let Some(file) = self.bundle.served.get(key) {
             return Ok(file.clone());
         }
         if self.frozen {
             return Err(Problem::Frozen);
         }
-        let on_disk = self.roots.iter().flat_map(|root| candidates.iter().map(move |c| root.join(c)));
-        let found = match on_disk.into_iter().find(|path| path.is_file()) {
+        let below = self.roots.iter().flat_map(|root| candidates.iter().map(move |c| root.join(c)));
+        let found = match first.iter().map(PathBuf::from).chain(below).find(|path| path.is_file()) {
             Some(path) => (display(&path), self.read_inside(&path)?),
             None => {
-                let embedded = candidates.iter().find_map(|c| Some((c.clone(), embedded(c)?.to_vec())));
+                let all = first.iter().chain(candidates);
+                let embedded = all.into_iter().find_map(|c| Some((c.clone(), embedded(c)?.to_vec())));
                 embedded.ok_or(Problem::Missing)?
             }
         };

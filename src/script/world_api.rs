@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex};
 use mlua::{Lua, MultiValue, Table, UserDataMethods, UserDataRef, Value};
 
 use super::{
+    budget::{Held, hold_in_world},
     catalogue_classes::Class,
     catalogue_world as records, classes_world as classes,
     deadline::Clock,
@@ -35,7 +36,13 @@ struct Inner {
     newton: (u64, u32),
     timing: Timing,
     clock: Clock,
+    /// What it takes of the machine's budget.
+    held: Vec<Held>,
 }
+
+/// About what a world and one of its solids take themselves, bytes.
+const BYTES_A_WORLD: usize = 16 << 10;
+const BYTES_A_SOLID: usize = 4 << 10;
 
 type Shared = Arc<Mutex<Inner>>;
 
@@ -61,6 +68,7 @@ pub(super) fn install(lua: &Lua, api: &Table, clock: &Clock) -> mlua::Result<()>
             newton: (0, 0),
             timing: Timing::default(),
             clock: clock.clone(),
+            held: vec![hold_in_world(lua, BYTES_A_WORLD)?],
         }))))
     })?;
     api.set("world", make)
@@ -96,21 +104,26 @@ impl LuaWorld {
             let _honest_work = inner.clock.pause();
             soft_rest(&name, shape.shape(), &material).map_err(|e| fail(lua, format!("world:soft: {e}")))?
         };
+        let held = hold_in_world(lua, rest.bytes())?;
         let reference = Reference::new(&rest.mesh.nodes, &rest.mass)
             .map_err(|e| fail(lua, format!("world:soft: {e}")))?;
         let friction = friction(spec)?;
         let at = pose(spec.get("xyz")?, spec.get("turn")?);
         let index = inner.world.add_soft(&name, rest, Some(Arc::new(shape.shape().clone())), &at, friction);
         inner.references.push(reference);
+        inner.held.push(held);
         Ok(LuaBody { world: self.0.clone(), index })
     }
 
-    fn solid(&self, spec: &Table, moves: bool) -> mlua::Result<LuaSolid> {
+    fn solid(&self, lua: &Lua, spec: &Table, moves: bool) -> mlua::Result<LuaSolid> {
         let shape: LuaShape = spec.get("shape")?;
         let at = pose(spec.get("xyz")?, spec.get("turn")?);
         let friction = friction(spec)?;
         let name: String = spec.get("name")?;
-        let world = &mut locked(&self.0).world;
+        let held = hold_in_world(lua, BYTES_A_SOLID + shape.bytes())?;
+        let mut inner = locked(&self.0);
+        inner.held.push(held);
+        let world = &mut inner.world;
         let layer = world.rigid_layer();
         let (kinematic, placed) = if moves {
             let index = world.add_kinematic(at);
@@ -140,8 +153,8 @@ impl Hosted for LuaWorld {
 
     fn methods<M: UserDataMethods<Self>>(methods: &mut M) {
         method(methods, "soft", |lua, this: &Self, spec: Table| this.soft(lua, &spec));
-        method(methods, "kinematic", |_, this: &Self, spec: Table| this.solid(&spec, true));
-        method(methods, "static", |_, this: &Self, spec: Table| this.solid(&spec, false));
+        method(methods, "kinematic", |lua, this: &Self, spec: Table| this.solid(lua, &spec, true));
+        method(methods, "static", |lua, this: &Self, spec: Table| this.solid(lua, &spec, false));
         method(methods, "step", |lua, this: &Self, ()| step(lua, &mut locked(&this.0)));
         method(methods, "time", |_, this: &Self, ()| Ok(locked(&this.0).world.time()));
         method(methods, "newton", |_, this: &Self, ()| {

@@ -79,15 +79,34 @@ fn a_size_in_millimetres_is_taken_for_what_it_is() {
 
 #[test]
 fn an_object_that_never_settles_is_named() {
-    let project = Small { at: "xyz = { 0, 0.8, 0.1 }", ..Small::default() }.project();
-    let message = project.refusal("x.lua --out run");
-    assert!(message.starts_with("x.lua: layout one, episode 0: object cube still moves at 29"), "{message}");
+    let slope = "softvt.rigid { density = 500 }";
+    let add = "local ramp = softvt.asset { name = 'ramp', shape = softvt.shape.box { size = { 9, 1, 0.05 } }:rotate { axis = 'y', angle = 0.1 }, body = softvt.static {} }\n\
+               scene:add { name = 'floor', asset = ramp, xyz = { 0, 0, 0 } }\n\
+               local ball = softvt.asset { name = 'ball', shape = softvt.shape.sphere { radius = 0.02 }:grounded(), body = softvt.rigid { density = 500 } }\n\
+               scene:add { name = 'a', asset = ball, at = { 0, 0.1 }, on = 'floor' }";
+    let message = placed(slope, add);
+    assert!(message.starts_with("x.lua:7: layout one, episode 0: object a still moves at "), "{message}");
     assert!(
         message.ends_with(
             "mm/s after 3 s of settling; put it nearer to what it rests on, or make it lie stably"
         ),
         "{message}"
     );
+}
+
+#[test]
+fn an_object_that_falls_out_of_the_world_is_told_so() {
+    let project = Small { at: "xyz = { 0, 0.8, 0.1 }", ..Small::default() }.project();
+    let message = project.refusal("x.lua --out run");
+    assert_snapshot!(message, @"x.lua:6: layout one, episode 0: object cube fell out of the world: there was nothing below it, and after 3 s of settling it is 44.9 m lower; put it above what it is to rest on");
+}
+
+#[test]
+fn an_object_that_starts_inside_of_the_hand_is_told_so() {
+    let message =
+        Small { at: "xyz = { -0.187, 0.03, 0.29 }", ..Small::default() }.project().refusal("x.lua --out run");
+    assert!(message.starts_with("x.lua:6: object cube starts inside of the robot's hand ("), "{message}");
+    assert!(message.ends_with(" mm deep; move it away, or the arm (scene.start_q)"), "{message}");
 }
 
 #[test]

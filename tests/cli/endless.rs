@@ -2,7 +2,7 @@
 
 use crate::support::{Project, refusal, said};
 
-const LOOP: &str = "x.lua: the script ran for more than 10 s; look for an endless loop";
+const LOOP: &str = "x.lua:1: the script ran for more than 10 s; look for an endless loop";
 const STUCK: &str = "x.lua: the script called a library function that did not return within 10 s; look for a hostile \
                      string pattern or a huge repeat count";
 
@@ -11,7 +11,7 @@ const CASES: [(&str, &str, &str); 4] = [
     ("a loop inside of pcall", "while true do pcall(function() while true do end end) end", LOOP),
     (
         "a coroutine",
-        "local co = coroutine.wrap(function() while true do coroutine.yield() end end)\nwhile true do co() end",
+        "local co = coroutine.wrap(function() while true do coroutine.yield() end end) while true do co() end",
         LOOP,
     ),
     ("a pattern", "return (('a'):rep(100000)):find(('.-'):rep(20) .. 'b')", STUCK),

@@ -18,7 +18,9 @@ fn what_there_is_is_listed_as_text_and_as_json_in_any_folder() {
     };
     let suites = json("suites");
     assert!(suites.iter().any(|s| s["name"] == "spatial_soft" && s["tasks"] == 10 && s["episodes"] == 5));
+    assert!(suites.iter().any(|s| s["name"] == "all" && s["tasks"] == 40 && s["file"] == "suites/all.lua"));
     let tasks = json("tasks");
+    assert_eq!(tasks.len(), 40, "no task is listed twice");
     let of_suite: Vec<_> = tasks.iter().filter(|t| t["suite"] == "spatial_soft").collect();
     assert_eq!(of_suite.len(), 10);
     assert!(of_suite[1]["prompt"].as_str().is_some_and(|p| p.starts_with("pick up the left white spiral")));
@@ -204,7 +206,7 @@ fn several_suites_are_one_document_and_must_differ_in_name() {
     let document: Value = serde_json::from_str(&said.out).expect("one document");
     assert_eq!((&document[0]["suite"], &document[1]["suite"]), (&"one".into(), &"other".into()));
     let message = two("one").refusal("x.lua --policy noop --out run");
-    assert_eq!(message, "x.lua: two suites are named \"one\", and would share one folder; rename one");
+    assert_eq!(message, "x.lua:25: two suites are named \"one\"; rename one");
 }
 
 #[cfg(unix)]
@@ -218,6 +220,31 @@ fn a_scripts_files_do_not_follow_links_out_of_the_folder() {
     assert_eq!(said.code, 2, "{}", said.err);
     assert!(said.err.contains("run/deep is a link"), "{}", said.err);
     assert!(!project.path("elsewhere/stolen.txt").exists());
+}
+
+#[test]
+fn init_task_says_what_to_run_from_where_it_was_called() {
+    let project = Project::new(&[]);
+    for (words, suite) in
+        [("init task", "suites/my_suite.lua"), ("init task deep/mine", "deep/mine/suites/my_suite.lua")]
+    {
+        let out = project.succeeds(words).out;
+        assert!(out.contains(&format!("now: softvt check {suite}, softvt {suite};")), "{out}");
+        project.succeeds(&format!("check {suite}"));
+    }
+}
+
+#[test]
+fn a_golden_episode_that_ends_otherwise_is_a_failure() {
+    let project = Project::new(&[("suites/spatial_soft.lua", &Small::default().text())]);
+    let said = project.softvt("doctor");
+    assert_eq!(said.code, 1, "{}", said.err);
+    assert!(said.out.contains("DIFFERS from the published one"), "{}", said.out);
+    assert!(
+        said.err.contains("files of this folder (suites) come before those of the release"),
+        "{}",
+        said.err
+    );
 }
 
 #[test]

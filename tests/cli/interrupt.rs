@@ -86,7 +86,7 @@ fn what_was_wrong_before_an_interrupt_is_what_the_exit_code_tells() {
     // The second task fails at once, the first goes on for long.
     let text = Small { task: "budget_steps = 100000", ..Small::default() }.text();
     let (suite, task) = text.trim_end().trim_end_matches("} }").split_once("  softvt.task").expect("a task");
-    let failing = task.replace("arm:wait(1)", "arm:wait_for_ever()");
+    let failing = task.replace("arm:wait(1)", "arm:wait_for_ever()").replace("\"wait\"", "\"fail\"");
     let both = format!("{suite}  softvt.task{task}  softvt.task{failing}}} }}");
     let project = Project::new(&[("x.lua", &both)]);
     let (code, _, err) = interrupted(&project, &["x.lua", "--threads", "2", "--out", "run"], 6.0);
@@ -120,14 +120,32 @@ fn interrupted(project: &Project, words: &[&str], work_s: f64) -> (Option<i32>, 
     (output.status.code(), start.elapsed(), String::from_utf8(output.stderr).expect("text"))
 }
 
+/// Defines `step_for_ever()`, which hardly ever leaves the physics.
+const STEPS: &str = r#"local function step_for_ever()
+  local world = softvt.world { sleeping = false, gravity = { 0, 0, 0 } }
+  world:soft { name = "cube", shape = softvt.shape.box { size = { 0.05, 0.05, 0.05 } }, youngs_pa = 3e4, poisson = 0.4, density = 300, xyz = { 0, 0, 1 } }
+  while true do pcall(world.step, world) end
+end
+"#;
+
 #[test]
 fn whatever_a_script_is_at_ends_soon() {
     // Loading for ever, a calibration, and a library function that never comes back.
     let stuck = "return string.find(('a'):rep(40), ('.-'):rep(40) .. 'b')";
+    let physics = format!("{STEPS}step_for_ever()");
+    let laying_out =
+        Small::default().text().replace("function(scene)\n", "function(scene)\nstep_for_ever()\n");
+    let laying_out = format!("{STEPS}{laying_out}");
+    let simulating = "return softvt.experiment { name = 'e', grid = { a = { 1 } }, run = function()\n\
+         local sim = softvt.simulate { layout = softvt.layout('l', function() end) }\n\
+         while true do pcall(sim.wait, sim, 600) end\nend }";
     for (name, text, words, work_s) in [
         ("loading", "while true do end", vec!["x.lua"], 0.5),
         ("calibrating", "return 1", vec!["scripts/calibrate.lua", "--asset", "sesame_bun"], 3.0),
         ("stuck", stuck, vec!["x.lua"], 0.5),
+        ("loading physics", &physics, vec!["x.lua"], 1.0),
+        ("laying out with physics", &laying_out, vec!["x.lua", "--out", "run"], 1.0),
+        ("simulating", simulating, vec!["x.lua"], 2.0),
     ] {
         let project = Project::new(&[("x.lua", text)]);
         let (code, took, err) = interrupted(&project, &words, work_s);

@@ -4,9 +4,11 @@
 mod alike;
 mod bad_runs;
 mod bad_scripts;
+mod check;
 mod determinism;
 mod endless;
 mod files;
+mod given_up;
 mod interrupt;
 mod joints;
 mod measures;

@@ -114,7 +114,7 @@ fn light_cameras_and_looks_are_checked_where_they_are_written() {
         ("scene.light.direction = { 0, 0, 0 }", "scene.light.direction: expected a direction"),
         (
             "scene.light.direction = { 0, 0/0, 1 }",
-            "x.lua:7: scene.light.direction: expected a list of 3 numbers",
+            "x.lua:7: scene.light.direction[2]: expected a number, got NaN, which is not a finite number",
         ),
         ("scene:camera(\"wirst\").width = 64", "unknown camera \"wirst\"; did you mean \"wrist\"?"),
         (
@@ -125,7 +125,7 @@ fn light_cameras_and_looks_are_checked_where_they_are_written() {
             "scene:camera(\"wrist\").height = 100000",
             ".height: expected a whole number in 1..4096, got 100000",
         ),
-        ("scene:camera(\"wrist\").position = { 0/0, 0, 0 }", ".position: expected a list of 3 numbers"),
+        ("scene:camera(\"wrist\").position = { 0/0, 0, 0 }", ".position[1]: expected a number, got NaN"),
         (
             "scene:camera(\"wrist\").quat = { 0, 0, 0, 0 }",
             ".quat: expected a quaternion other than 0, got {0, 0, 0, 0}",
@@ -140,7 +140,7 @@ fn light_cameras_and_looks_are_checked_where_they_are_written() {
         ),
         (
             "scene:camera(\"wrist\"):look_at { 0, 0/0, 1 }",
-            "x.lua:7: scene:camera(\"wrist\"):look_at: point: expected a list of 3 numbers",
+            "x.lua:7: scene:camera(\"wrist\"):look_at: point[2]: expected a number, got NaN",
         ),
         (
             "scene:camera(\"wrist\"):look_at { 0, 1e7, 1 }",

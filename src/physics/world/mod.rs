@@ -212,6 +212,20 @@ pub enum StepFailure {
     },
 }
 
+impl StepFailure {
+    /// Name of the body that it was seen at, if there is one.
+    pub fn body(&self) -> Option<&str> {
+        match self {
+            Self::Diverged { .. } => None,
+            Self::NotFinite { body, .. }
+            | Self::Indefinite { body, .. }
+            | Self::TooFast { body, .. }
+            | Self::TooHard { body, .. }
+            | Self::Inverted { body, .. } => Some(body),
+        }
+    }
+}
+
 /// What a row of the problem is about.
 #[derive(Clone, Copy, Debug)]
 struct RowOf {

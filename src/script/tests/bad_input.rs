@@ -48,7 +48,11 @@ fn an_error_object_is_described_without_its_address() {
 
 #[test]
 fn endless_loops_are_stopped_wherever_they_hide() {
-    let said = "suites/x.lua: the script ran for more than 0.3 s; look for an endless loop";
+    let said = "suites/x.lua:1: the script ran for more than 0.3 s; look for an endless loop";
+    assert_eq!(
+        error_of("local i = 0\n\nwhile true do\n  i = i + 1\nend").replace(":4:", ":3:"),
+        said.replace(":1:", ":3:")
+    );
     for text in [
         "while true do end",
         "while true do pcall(function() while true do end end) end",
@@ -174,7 +178,10 @@ fn a_wrong_table_is_named_by_key_and_line() {
         on("hold_s = '0.4'"),
         "suites/x.lua:5: task.goal.hold_s: expected seconds in 0..10, got \"0.4\""
     );
-    assert_eq!(on("hold_s = 0 / 0"), "suites/x.lua:5: task.goal.hold_s: expected seconds in 0..10, got NaN");
+    assert_eq!(
+        on("hold_s = 0 / 0"),
+        "suites/x.lua:5: task.goal.hold_s: expected seconds in 0..10, got NaN, which is not a finite number"
+    );
     assert_eq!(on("hold = 1"), "suites/x.lua:2: task.goal: unknown key \"hold\"; did you mean \"hold_s\"?");
     assert_eq!(
         on("[1] = 2"),
@@ -239,8 +246,73 @@ fn a_mesh_that_is_no_solid_is_refused_with_its_file() {
     );
     assert!(error("mesh.doc").contains("\"doc\" is no known mesh format"));
     assert!(error("../a.obj").contains("leads out of the project"));
-    assert!(error("none.obj").starts_with("x.lua:1: mesh.file: no file \"none.obj\" in "));
+    assert!(error("none.obj").starts_with("x.lua:1: mesh.file: no file \"none.obj\" beside x.lua, nor in "));
     assert_eq!(error("good.obj"), "x.lua:1: softvt.Shape");
+}
+
+#[test]
+fn a_mesh_is_looked_for_beside_the_file_that_names_it() {
+    let closed = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+    let own = "return { shape = softvt.mesh { file = 'm.obj' } }";
+    let project = Project::new(&[
+        ("assets/a.lua", own),
+        ("assets/m.obj", closed),
+        ("assets/far/b.lua", own),
+        ("assets/far/m.obj", &closed.replace("v 0 0 1", "v 0 0 2")),
+        ("assets/lonely/c.lua", own),
+        ("m.obj", &closed.replace("v 0 0 1", "v 0 0 3")),
+        (
+            "suites/x.lua",
+            "local heights = {}\nfor _, name in ipairs { 'a', 'far.b', 'lonely.c' } do\n\
+             local _, high = require('assets.' .. name).shape:bounds() heights[#heights + 1] = high[3] end\n\
+             error(table.concat(heights, ' '), 0)",
+        ),
+    ]);
+    assert_eq!(project.error("suites/x.lua", &[]), "suites/x.lua:4: 1.0 2.0 3.0");
+}
+
+#[test]
+fn a_list_of_numbers_is_told_which_of_them_is_wrong() {
+    let message = |list: &str| error_of(&format!("softvt.shape.box {{\n  size = {list}\n}}"));
+    let at = "suites/x.lua:2: shape.box.size";
+    for (list, said) in [
+        ("{ 1, 0 / 0, 1 }", "[2]: expected a number, got NaN, which is not a finite number"),
+        ("{ 1, 1, 1 / 0 }", "[3]: expected a number, got inf, which is not a finite number"),
+        ("{ 'a', 1, 1 }", "[1]: expected a number, got \"a\""),
+        ("{ 1, 1 }", ": expected a list of 3 numbers (m), got a table"),
+        ("{ 1, 1, 1, 1 }", ": expected a list of 3 numbers (m), got a table"),
+        ("{ 1, 1, x = 1 }", ": expected a list of 3 numbers (m), got a table"),
+        ("0 / 0", ": expected a list of 3 numbers (m), got NaN, which is not a finite number"),
+    ] {
+        assert_eq!(message(list), format!("{at}{said}"), "{list}");
+    }
+}
+
+#[test]
+fn a_plan_that_makes_no_sense_is_told_at_the_line_that_made_it() {
+    let suite = |tasks: &str| {
+        let project = Project::new(&[(
+            "x.lua",
+            &format!(
+                "local layout = softvt.layout('l', function() end)\nlocal function task(prompt, goal)\n\
+                 return softvt.task {{ prompt = prompt, layout = layout,\n  goal = goal }}\nend\n\
+                 return softvt.suite {{ name = 's', object_type = 'rigid', variation = 'spatial',\n  tasks = {tasks} }}"
+            ),
+        )]);
+        project.error("x.lua", &[])
+    };
+    let to = "softvt.on { object = 'a', target = 'b' }";
+    assert_eq!(suite("{}"), "x.lua:7: suite.tasks: suite \"s\" has no tasks; give at least one");
+    assert_eq!(
+        suite(&format!("{{ task('p', {to}), task('q', {to}),\n task('p', {to}) }}")),
+        "x.lua:3: task.prompt: tasks 0 and 2 of suite \"s\" are both \"p\" in the layout \"l\"; nobody could tell them apart"
+    );
+    assert_eq!(
+        suite(&format!(
+            "{{ task('p', {to}), task('q',\n softvt.inside {{ object = 'a',\n\n target = 'a' }}) }}"
+        )),
+        "x.lua:10: task.goal.target: is \"a\", which is the object itself; name what it must reach"
+    );
 }
 
 #[test]

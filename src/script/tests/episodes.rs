@@ -94,7 +94,7 @@ fn a_list_of_suites_is_a_plan_and_tasks_are_found_by_name() {
         let request = EpisodeRequest { suite: suite.into(), task, ..request(0, 1) };
         Episode::open(&loaded, &request).map(|e| e.scene.objects.len()).map_err(|e| (e.message, e.hint))
     };
-    assert_eq!(open("test", 0), Ok(1));
+    assert_eq!(open("test", 0), Ok(2));
     assert_eq!(open("tst", 0), Err(("unknown suite \"tst\"; did you mean \"test\"?".into(), None)));
     assert_eq!(
         open("test", 3),
@@ -176,6 +176,101 @@ fn the_library_scales_stiffness_and_mass() {
 }
 
 #[test]
+fn a_goal_that_cannot_be_reached_is_told_at_its_line() {
+    let open = |object: &str, target: &str| {
+        let text = format!(
+            "local chest = softvt.asset {{ name = 'chest', shape = mat.shape, body = softvt.articulated {{ parts = {{ {{ name = 'top_drawer',\n\
+             shape = mat.shape:translate(0, 0, 0.05), density = 500, joint = softvt.slider {{ axis = {{ 0, 1, 0 }}, lower = 0, upper = 0.1 }} }} }} }} }}\n\
+             local sky = softvt.asset {{ name = 'sky', shape = mat.shape, body = softvt.scenery {{}} }}\n\
+             local all = softvt.layout('all', function(scene) for i, asset in ipairs {{ ball, mat, chest, sky }} do\n\
+             scene:add {{ name = asset.name, asset = asset, at = {{ i, 0 }} }} end end)\n\
+             return softvt.suite {{ name = 'test', object_type = 'rigid', variation = 'object', tasks = {{ softvt.task {{\n\
+             prompt = 'p', layout = all, goal = softvt.on {{ -- a comment\n object = '{object}',\n target = '{target}' }} }} }} }}"
+        );
+        let project = project(&text);
+        let loaded = project.load("x.lua", &[]).unwrap();
+        let folder = format!("{}/", project.path("").display()).replace("//", "/");
+        let opened = Episode::open(&loaded, &request(0, 1)).map(|_| ());
+        opened.map_err(|e| e.to_string().replace(&folder, ""))
+    };
+    let line = SUITE.lines().count() + 8;
+    let wrong = |object: &str, target: &str| open(object, target).unwrap_err();
+    assert_eq!(open("ball", "chest.top_drawer"), Ok(()));
+    assert_eq!(
+        wrong("bal", "mat"),
+        format!("x.lua:{line}: task.goal.object: unknown object \"bal\"; did you mean \"ball\"?")
+    );
+    assert_eq!(
+        wrong("ball", "chest.top"),
+        format!(
+            "x.lua:{}: task.goal.target: unknown object \"chest.top\"; did you mean \"chest.top_drawer\"?",
+            line + 1
+        )
+    );
+    for fixed in ["mat", "chest", "sky"] {
+        assert_eq!(
+            wrong(fixed, "ball"),
+            format!(
+                "x.lua:{line}: task.goal.object: \"{fixed}\" never moves; name an object whose body is softvt.soft or \
+                 softvt.rigid"
+            )
+        );
+    }
+    assert_eq!(
+        wrong("ball", "sky"),
+        format!(
+            "x.lua:{}: task.goal.target: \"sky\" is softvt.scenery, which nothing touches; name what can be reached",
+            line + 1
+        )
+    );
+}
+
+#[test]
+fn the_arm_starts_within_its_joint_limits() {
+    let open = |set: &str| {
+        let project = Project::new(&[(
+            "x.lua",
+            &(SUITE.replace("scene:add {", &format!("{set} scene:add {{")) + "return suite()"),
+        )]);
+        let loaded = project.load("x.lua", &[]).unwrap();
+        let folder = format!("{}/", project.path("").display()).replace("//", "/");
+        Episode::open(&loaded, &request(0, 1))
+            .map(|e| e.scene.start_q)
+            .map_err(|e| e.to_string().replace(&folder, ""))
+    };
+    let line = SUITE.lines().position(|line| line.contains("scene:add")).unwrap() + 1;
+    assert_eq!(
+        open("scene.start_q = { 0, 0, 0, 0.5, 0, 2, 0 }"),
+        Err(format!(
+            "x.lua:{line}: scene.start_q[4]: expected radians in -3.0718..-0.0698, the limits of panda_link4, got 0.5"
+        ))
+    );
+    assert!(
+        open("scene.start_q[2] = 1.8")
+            .is_err_and(|e| e.contains("scene.start_q[2]: expected radians in -1.7628..1.7628"))
+    );
+    assert_eq!(open("scene.start_q = { 0, 0, 0, -2, 0, 2, 0 }"), Ok([0.0, 0.0, 0.0, -2.0, 0.0, 2.0, 0.0]));
+}
+
+#[test]
+fn an_expert_that_gives_up_is_done_and_its_reason_is_kept() {
+    let (_project, mut expert) = expert("arm:wait(0.1) pcall(arm.give_up, arm, 'too slippery') arm:wait(1)");
+    let mut commands = 0;
+    while expert.step(&view()).unwrap().is_some() {
+        assert_eq!(expert.gave_up(), None);
+        commands += 1;
+    }
+    assert_eq!((commands, expert.gave_up()), (2, Some("too slippery")));
+    assert_eq!(expert.step(&view()).unwrap(), None, "it is not resumed");
+    assert_eq!(expert.refuse("unreachable").message, "unreachable");
+    let message = run("arm:give_up()").unwrap_err();
+    assert!(
+        message.ends_with("arm:give_up: reason: expected a string that is not empty, got nil"),
+        "{message}"
+    );
+}
+
+#[test]
 fn an_object_can_stand_on_another() {
     let text = "return softvt.suite { name = 'test', object_type = 'rigid', variation = 'object', tasks = { softvt.task {\n\
         prompt = 'p', goal = softvt.on { object = 'a', target = 'b' }, layout = softvt.layout('two', function(scene)\n\
@@ -223,7 +318,7 @@ fn an_expert_that_goes_wrong_is_named_with_its_line() {
     );
     assert_eq!(
         error("while true do end"),
-        "x.lua: the script ran for more than 0.3 s; look for an endless loop"
+        format!("x.lua:{line}: the script ran for more than 0.3 s; look for an endless loop")
     );
     assert_eq!(
         error("scene:object 'bal'"),

@@ -84,6 +84,25 @@ fn what_the_host_keeps_for_a_script_is_counted_for_each_machine() {
 }
 
 #[test]
+fn worlds_are_counted_as_what_they_take_once_they_are_stepped() {
+    let full = "x.lua:3: the script holds more than 4096 MiB of worlds and simulations; keep fewer, or give bodies a lower resolution";
+    let body = |resolution: u32| {
+        format!(
+            "softvt.world {{}}:soft {{ name = 'b', shape = softvt.shape.sphere {{ radius = 0.01 }}, youngs_pa = 1e4, poisson = 0.3, density = 300, xyz = {{ 0, 0, 0 }}, grasp_spacing = 0.005, resolution = {resolution} }}"
+        )
+    };
+    refused(&format!("local kept = {{}}\nfor i = 1, 1e9 do kept[i] = {} end", body(28)), full);
+    let solids = "softvt.world {}:static { name = 's', shape = ball, xyz = { 0, 0, 0 } }";
+    let hoard = format!(
+        "local ball, world, kept = softvt.shape.sphere {{ radius = 1 }}, nil, {{}}\nfor i = 1, 20 do kept[i] = {solids} end return {{ a = 1 }}"
+    );
+    assert_eq!(run(&hoard), Ok("[{\"a\":1}]".into()));
+    // What is dropped makes room.
+    let churn = format!("for i = 1, 12 do local body = {} end return {{ a = 1 }}", body(28));
+    assert_eq!(run(&churn), Ok("[{\"a\":1}]".into()));
+}
+
+#[test]
 fn data_without_end_is_refused() {
     refused("local t = {} t.t = t return { a = t }", "tables are nested too deeply");
     refused(
@@ -179,19 +198,25 @@ fn errors_of_every_kind_end_in_a_line_of_text() {
             "x.lua:2: string.format: invalid conversion specification: '%99999d'",
         ),
         ("string.format('%d', 'x')", "x.lua:2: string.format: argument #2 (number expected, got string)"),
-        ("error(setmetatable({}, { __tostring = function() while true do end end }))", "x.lua"),
-        ("error(setmetatable({}, { __tostring = function() error('again') end }))", "x.lua"),
+        (
+            "error(setmetatable({}, { __tostring = function() while true do end end }))",
+            "x.lua:2: the script ran for more than 0.3 s",
+        ),
+        ("error(setmetatable({}, { __tostring = function() error('again') end }))", "x.lua:2: again"),
         ("error(function() end)", "x.lua:2: error object a function"),
-        ("error(softvt.pose { xyz = { 0, 0, 0 } })", "x.lua"),
+        ("error(softvt.pose { xyz = { 0, 0, 0 } })", "x.lua:2: pose(0.0000, 0.0000, 0.0000)"),
         ("coroutine.yield(1)", "x.lua:2: attempt to yield from outside a coroutine"),
-        ("local function deep() return 1 + deep() end return deep()", "x.lua"),
-        ("local f f = function() return pcall(f) end local ok, m = f() error(m, 0)", "x.lua"),
+        (
+            "local function deep() return 1 + deep() end return deep()",
+            "stack overflow|more than its 16 MiB of memory",
+        ),
+        ("local f f = function() return pcall(f) end local ok, m = f() error(m, 0)", "x.lua:2: true"),
         ("local s = ('x'):rep(100, ('y'):rep(1e9))", "the script used more than its 16 MiB of memory"),
         (
             "local function w(n) return coroutine.wrap(function() return w(n + 1) end)() end return w(0)",
-            "x.lua",
+            "x.lua:2: C stack overflow",
         ),
-        ("local f f = function(s) return s:gsub('.', f) end f('x')", "x.lua"),
+        ("local f f = function(s) return s:gsub('.', f) end f('x')", "x.lua:2: C stack overflow"),
         ("return load(('('):rep(1e5))", "x.lua:2: C stack overflow"),
         (
             "local t = setmetatable({}, {}) getmetatable(t).__index = t return { a = t.x }",
@@ -212,7 +237,9 @@ fn errors_of_every_kind_end_in_a_line_of_text() {
         };
         let plain =
             !["::", "userdata", "traceback", "softvt:", "0x", "\n"].iter().any(|word| message.contains(word));
-        assert!(message.starts_with("x.lua") && message.contains(said) && plain, "{text}\n{message}");
+        // Which of two limits is met first is the machine's affair.
+        let told = said.split('|').any(|said| message.contains(said));
+        assert!(message.starts_with("x.lua") && told && plain, "{text}\n{message}");
     }
 }
 

@@ -156,7 +156,7 @@ fn a_list_that_cannot_be_written_says_how_its_object_is_changed() {
     let line = super::SUITE.lines().position(|line| line.contains("scene:add")).unwrap() + 1;
     for (text, said) in [
         ("scene.base[1] = 'a'", "scene.base[1]: expected a number, got \"a\""),
-        ("scene.base[1] = 0/0", "scene.base[1]: expected a number, got NaN"),
+        ("scene.base[1] = 0/0", "scene.base[1]: expected a number, got NaN, which is not a finite number"),
         ("scene.base[4] = 1", "scene.base: has places 1 to 3, got 4"),
         ("scene.base.x = 1", "scene.base: has places 1 to 3, got \"x\""),
         ("local _ = scene.base.x", "scene.base: expected a place in the list, 1 or more, got \"x\""),

@@ -98,13 +98,7 @@ fn a_wrong_look_is_named_with_its_line_and_the_mend() {
     let at = |line: usize, what: &str| format!("suites/x.lua:{line}: {what}");
     let in_layer = "asset.visuals[1].layers[1]";
     for (inner, expected) in [
-        (
-            "albedo = { 2, 0, 0 },",
-            at(
-                8,
-                &format!("{in_layer}.albedo: expected a list of 3 numbers in 0..1 (linear RGB), got a table"),
-            ),
-        ),
+        ("albedo = { 2, 0, 0 },", at(8, &format!("{in_layer}.albedo[1]: expected a number in 0..1, got 2"))),
         (
             "albedo = { 1, 0, 0 }, rougness = 1,",
             at(7, &format!("{in_layer}: unknown key \"rougness\"; did you mean \"roughness\"?")),

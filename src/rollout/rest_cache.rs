@@ -1,0 +1,107 @@
+//! What follows from assets alone, made once and shared by all episodes.
+
+use std::{convert::Infallible, sync::Arc};
+
+use super::{
+    build::{BuildError, check_soft, meshed, soft_rest},
+    furniture,
+    made::Made,
+};
+use crate::{
+    geometry::{
+        Pose,
+        mass::{MassProperties, mass_properties, rough_mass_properties},
+        shape::{Aabb, Shape},
+    },
+    physics::{
+        World,
+        contact::{Collider, Friction, Mover, Solid},
+        fem::Rest,
+    },
+    scene::{Asset, SoftMaterial},
+};
+
+/// Rest data of assets, and what takes a search over their shapes: bounds, masses, walls, where their skin can touch.
+#[derive(Clone, Debug, Default)]
+pub struct RestCache {
+    rests: Made<Arc<Asset>, Arc<Rest>>,
+    bounds: Made<Shape, Aabb>,
+    masses: Made<Shape, MassProperties>,
+    solids: Made<Shape, Arc<Solid>>,
+    walls: Made<Shape, Option<f64>>,
+    /// Whether masses and contact samples need only be about right.
+    rough: bool,
+}
+
+/// Contact samples of a rough body are this many times farther apart.
+const ROUGH_SPACING: f64 = 4.0;
+
+/// The value of a shape; making it cannot fail.
+fn of_shape<V: Clone>(made: &Made<Shape, V>, shape: &Shape, make: impl FnOnce() -> V) -> V {
+    let value: Result<_, Infallible> = made.get(shape, |known| known == shape, || Ok(make()));
+    value.unwrap_or_else(|never| match never {})
+}
+
+fn rough_rest(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<Arc<Rest>, BuildError> {
+    check_soft(name, shape, material)?;
+    let rough = SoftMaterial { grasp_spacing: ROUGH_SPACING * material.grasp_spacing, ..material.clone() };
+    meshed(name, shape, &rough, rough_mass_properties(shape, 1.0).mass)
+}
+
+impl RestCache {
+    /// For scenes that are looked at before anything moves, and never run: what takes long is made roughly.
+    pub fn rough() -> Self {
+        Self { rough: true, ..Self::default() }
+    }
+
+    /// Bounds of a shape; finding those of a displaced one takes a search.
+    pub(super) fn bounds(&self, shape: &Shape) -> Aabb {
+        of_shape(&self.bounds, shape, || shape.bounds())
+    }
+
+    /// Mass properties of a shape at a uniform density, kg/m³.
+    pub(super) fn mass(&self, shape: &Shape, density: f64) -> MassProperties {
+        let make = if self.rough { rough_mass_properties } else { mass_properties };
+        let unit = of_shape(&self.masses, shape, || make(shape, 1.0));
+        MassProperties { mass: unit.mass * density, com: unit.com, inertia: unit.inertia * density }
+    }
+
+    /// Thickness of walls that are too thin to move, m, if there are such.
+    pub(super) fn wall(&self, shape: &Shape) -> Option<f64> {
+        of_shape(&self.walls, shape, || furniture::thin_wall(shape))
+    }
+
+    /// A collider of a hard shape in a frame of its mover.
+    pub(super) fn collider(
+        &self,
+        world: &World,
+        name: &str,
+        (mover, pose_in_mover): (Mover, Pose),
+        shape: &Shape,
+        friction: Friction,
+    ) -> Collider {
+        Collider {
+            name: name.to_owned(),
+            mover,
+            pose_in_mover,
+            surface: Arc::new(shape.clone()),
+            friction,
+            layer: world.rigid_layer(),
+            bounds: self.bounds(shape),
+            base_of: None,
+            solid: Some(of_shape(&self.solids, shape, || Arc::new(Solid::new(shape)))),
+        }
+    }
+
+    /// Rest data of a soft asset.
+    pub(super) fn rest(&self, asset: &Arc<Asset>, material: &SoftMaterial) -> Result<Arc<Rest>, BuildError> {
+        self.rests.get(
+            asset,
+            |known| known.shape == asset.shape && known.body == asset.body,
+            || match self.rough {
+                true => rough_rest(&asset.name, &asset.shape, material),
+                false => soft_rest(&asset.name, &asset.shape, material),
+            },
+        )
+    }
+}

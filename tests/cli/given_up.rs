@@ -1,0 +1,31 @@
+//! Experts that give up say why, in the record and in the results.
+
+use crate::support::Small;
+
+#[test]
+fn the_reason_for_giving_up_is_in_the_record_and_in_the_results() {
+    let project = Small { expert: "arm:wait(0.1) arm:give_up('too slippery')", ..Small::default() }.project();
+    let said = project.succeeds("x.lua --episodes 2 --out run");
+    assert!(
+        said.err.contains("task 0 episode 0: failed, D 0.00 %, 2.0 s; gave up: too slippery"),
+        "{}",
+        said.err
+    );
+    let list =
+        "expert gave up in 2 episodes:\n  task 0 episode 0: too slippery\n  task 0 episode 1: too slippery\n";
+    assert!(said.out.contains(list), "{}", said.out);
+    for (episode, record) in project.lines("run/episodes.jsonl").iter().enumerate() {
+        assert_eq!((&record["episode"], &record["gave_up"]), (&episode.into(), &"too slippery".into()));
+        assert_eq!(record["outcome"]["kind"], "timeout", "the last command stayed to the end");
+    }
+    assert_eq!(project.json("run/summary.json")["gave_up"][1]["reason"], "too slippery");
+}
+
+#[test]
+fn who_does_not_give_up_has_no_reason() {
+    let project = Small::default().project();
+    let said = project.succeeds("x.lua --out run");
+    assert!(!said.out.contains("gave up") && !said.err.contains("gave up"), "{}", said.out);
+    assert!(project.lines("run/episodes.jsonl")[0].get("gave_up").is_none());
+    assert!(project.json("run/summary.json").get("gave_up").is_none());
+}
