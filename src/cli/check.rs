@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::{Failure, args::Run, batch::Batch, print};
+use super::{Failure, args::Run, batch::Batch, conditions, print};
 use crate::{
     benchmark::{Goal, Plan, Suite},
     message,
@@ -19,6 +19,10 @@ pub fn run(run: &Run) -> Result<(), Failure> {
     match &loaded.plan {
         Plan::Suite(suite) => suite_is_right(run, &loaded, suite)?,
         Plan::Suites { suites } => suites.iter().try_for_each(|suite| suite_is_right(run, &loaded, suite))?,
+        Plan::Conditions { suites, conditions: list, .. } => {
+            suites.iter().try_for_each(|suite| suite_is_right(run, &loaded, suite))?;
+            conditions::check(run, &loaded, (suites, list))?;
+        }
         Plan::Experiment { name, points, .. } => {
             print(&format!("experiment {name}: {points} points; they are not run here\n"));
         }

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::{Failure, args::POLICIES, print};
 use crate::{
-    benchmark::{Plan, Suite},
+    benchmark::Plan,
     script,
 };
 
@@ -20,8 +20,8 @@ pub fn run(what: &str, as_json: bool) -> Result<(), Failure> {
         "assets" => {
             scripts("assets").iter().map(|path| json!({ "name": stem(path), "file": path })).collect()
         }
-        "suites" => suites()?.iter().map(|(path, suite)| suite_row(path, suite)).collect(),
-        _ => suites()?.iter().flat_map(|(path, suite)| tasks(path, suite)).collect::<Vec<_>>(),
+        "suites" => plans()?.iter().filter_map(|(path, plan)| row(path, plan)).collect(),
+        _ => plans()?.iter().flat_map(|(path, plan)| tasks(path, plan)).collect::<Vec<_>>(),
     };
     if as_json {
         print(&format!("{:#}\n", Value::Array(rows)));
@@ -38,11 +38,30 @@ fn text(value: &Value) -> String {
     value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }
 
-fn suite_row(path: &str, suite: &Suite) -> Value {
-    json!({ "name": suite.name, "file": path, "tasks": suite.tasks.len(), "episodes": suite.episodes })
+/// A suite, or a file of several; `suites` names those.
+fn row(path: &str, plan: &Plan) -> Option<Value> {
+    let suites = plan.suites();
+    let tasks: usize = suites.iter().map(|suite| suite.tasks.len()).sum();
+    let names: Vec<&str> = suites.iter().map(|suite| suite.name.as_str()).collect();
+    let episodes = suites.first()?.episodes;
+    let name = match plan {
+        Plan::Suite(suite) => suite.name.clone(),
+        Plan::Conditions { name, .. } => name.clone(),
+        Plan::Suites { .. } | Plan::Experiment { .. } => stem(path),
+    };
+    let mut row = json!({ "name": name, "file": path, "tasks": tasks, "episodes": episodes });
+    if !matches!(plan, Plan::Suite(_)) {
+        row["suites"] = json!(names);
+    }
+    if let Plan::Conditions { conditions, .. } = plan {
+        row["conditions"] = json!(conditions.len() + 1);
+    }
+    Some(row)
 }
 
-fn tasks(path: &str, suite: &Suite) -> Vec<Value> {
+/// The tasks of a suite; those of a file of several are its suites'.
+fn tasks(path: &str, plan: &Plan) -> Vec<Value> {
+    let Plan::Suite(suite) = plan else { return Vec::new() };
     let row = |task: &crate::benchmark::Task| json!({ "suite": suite.name, "task": task.id, "file": path, "layout": task.layout, "prompt": task.prompt });
     suite.tasks.iter().map(row).collect()
 }
@@ -63,14 +82,10 @@ fn scripts(tree: &str) -> BTreeSet<String> {
     found
 }
 
-fn suites() -> Result<Vec<(String, Suite)>, Failure> {
-    let mut all = Vec::new();
-    for path in scripts("suites") {
+fn plans() -> Result<Vec<(String, Plan)>, Failure> {
+    let load = |path: String| {
         let loaded = script::load(Path::new(&path), &[]).map_err(Failure::input)?;
-        match loaded.plan {
-            Plan::Suite(suite) => all.push((path, *suite)),
-            Plan::Suites { .. } | Plan::Experiment { .. } => {}
-        }
-    }
-    Ok(all)
+        Ok((path, loaded.plan))
+    };
+    scripts("suites").into_iter().map(load).collect()
 }

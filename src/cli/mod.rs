@@ -3,6 +3,7 @@
 mod args;
 mod batch;
 mod check;
+mod conditions;
 mod doctor;
 mod evaluate;
 mod experiment;
@@ -44,6 +45,11 @@ impl Failure {
     fn input(message: impl ToString) -> Self {
         let code = if stop::requested() { code::INTERRUPTED } else { code::INPUT };
         Self { code, message: message.to_string() }
+    }
+
+    /// The same, said of a part of what was asked for.
+    fn within(self, part: &str) -> Self {
+        Self { message: format!("{} ({part})", self.message), ..self }
     }
 
     /// Interrupted; what is finished has been kept.

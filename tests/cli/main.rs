@@ -4,7 +4,9 @@
 mod alike;
 mod bad_runs;
 mod bad_scripts;
+mod conditions;
 mod determinism;
+mod documents;
 mod endless;
 mod files;
 mod interrupt;
