@@ -107,11 +107,11 @@ local function row(name)
   return "| " .. table.concat(cells, " | ") .. " |\n"
 end
 
-local function page()
+local function page(made)
   local sections = { ["softvt.soft"] = { SOFT }, ["softvt.rigid"] = { RIGID }, ["softvt.articulated"] = { JOINTED } }
   for _, name in ipairs(opt.asset) do
     local rows = sections[kind(assets[name])]
-    if rows then rows[#rows + 1] = row(name) end
+    if rows then rows[#rows + 1] = made[name] end
   end
   local text = HEAD
   for _, key in ipairs { "softvt.soft", "softvt.rigid", "softvt.articulated" } do
@@ -126,10 +126,14 @@ return softvt.experiment {
   grid = { asset = opt.asset },
   run = function(point)
     local size = studio.size(assets[point.asset])
-    return { asset = point.asset, x_mm = 1e3 * size[1], y_mm = 1e3 * size[2], z_mm = 1e3 * size[3] }
+    return {
+      asset = point.asset, x_mm = 1e3 * size[1], y_mm = 1e3 * size[2], z_mm = 1e3 * size[3], text = row(point.asset),
+    }
   end,
-  finish = function()
-    local files = { [opt.folder .. "/assets.md"] = page() }
+  finish = function(rows)
+    local made = {}
+    for _, row in ipairs(rows) do made[row.asset] = row.text end
+    local files = { [opt.folder .. "/assets.md"] = page(made) }
     for _, name in ipairs(opt.pictures and opt.asset or {}) do
       local at = ("%s/pictures/assets/%s"):format(opt.folder, name)
       files[at .. ".png"] = studio.portrait(assets[name], opt.edge)

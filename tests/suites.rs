@@ -17,7 +17,7 @@ const START_Q: [f64; 7] = [-0.01988, -0.18734, 0.00767, -2.40340, 0.00496, 2.245
 
 /// What the paper prints for Object-Soft; it calls four of its pastries just that.
 const SOFT_OBJECTS: [&str; 10] = [
-    "pale cream round steamed-bun pastry with black eyes",
+    "pale cream round steamed-bun pastry",
     "soft pastry",
     "soft pastry",
     "soft pastry",
@@ -117,9 +117,8 @@ fn forty_tasks_have_the_prompts_of_the_paper_and_ask_for_what_they_say() {
         }
         tasks.iter().map(|task| task.prompt.clone()).collect::<Vec<_>>()
     };
-    let mut all = prompts("object_soft", |k| {
-        format!("pick up the {} and place it in the basket", SOFT_OBJECTS[k])
-    });
+    let mut all =
+        prompts("object_soft", |k| format!("pick up the {} and place it in the basket", SOFT_OBJECTS[k]));
     all.extend(prompts("spatial_soft", |k| {
         format!("pick up the {} and place it on the plate", SOFT_PLACES[k])
     }));
@@ -133,7 +132,11 @@ fn forty_tasks_have_the_prompts_of_the_paper_and_ask_for_what_they_say() {
     let paper = "pick up the soft pastry and place it in the basket";
     let different: BTreeSet<&String> = all.iter().collect();
     let repeated = all.iter().filter(|prompt| *prompt == paper).count();
-    assert_eq!((different.len(), repeated), (37, 4), "no prompt stands twice but the one that the paper repeats");
+    assert_eq!(
+        (different.len(), repeated),
+        (37, 4),
+        "no prompt stands twice but the one that the paper repeats"
+    );
 }
 
 #[test]
@@ -293,7 +296,9 @@ fn the_bowl_that_is_meant_stands_where_the_prompt_says() {
                 "on the wooden cabinet" => on("cabinet") && bowl.z > 0.2,
                 _ => {
                     let cabinet = object(&scene, "cabinet");
-                    cabinet.joints.iter().any(|joint| *joint > 0.1) && bowl.z > 0.1 && across(bowl, other) > 0.1
+                    cabinet.joints.iter().any(|joint| *joint > 0.1)
+                        && bowl.z > 0.1
+                        && across(bowl, other) > 0.1
                 }
             };
             assert!(right, "{place}, episode {episode}: {bowl:?}");
@@ -330,8 +335,8 @@ fn solids(object: &Object) -> Vec<(&Shape, Pose)> {
 
 /// How deep a point of `a` on a grid lies in `b`, m; 0 if none does.
 fn depth(a: &(&Shape, Pose), b: &(&Shape, Pose)) -> f64 {
-    const CELLS: usize = 24;
-    let (bounds, to_b) = (a.0.bounds(), b.1.inverse() * a.1);
+    const CELLS: usize = 20;
+    let (bounds, within, to_b) = (a.0.bounds(), b.0.bounds(), b.1.inverse() * a.1);
     let reach = |solid: &(&Shape, Pose)| {
         let bounds = solid.0.bounds();
         (solid.1 * nalgebra::Point3::from(bounds.centre()), 0.5 * bounds.size().norm())
@@ -345,9 +350,10 @@ fn depth(a: &(&Shape, Pose), b: &(&Shape, Pose)) -> f64 {
     for cell in 0..CELLS.pow(3) {
         let share = Vec3::new(at(cell % CELLS), at(cell / CELLS % CELLS), at(cell / CELLS / CELLS));
         let point = bounds.min + bounds.size().component_mul(&share);
-        let inside = -b.0.distance(&(to_b * nalgebra::Point3::from(point)).coords);
-        if inside > deepest {
-            deepest = deepest.max(inside.min(-a.0.distance(&point)));
+        let seen = (to_b * nalgebra::Point3::from(point)).coords;
+        if (0..3).all(|axis| (within.min[axis]..within.max[axis]).contains(&seen[axis])) {
+            let inside = -b.0.distance(&seen);
+            deepest = deepest.max(if inside > deepest { inside.min(-a.0.distance(&point)) } else { 0.0 });
         }
     }
     deepest
@@ -358,12 +364,13 @@ fn nothing_stands_in_anything_else_at_the_start() {
     for name in ["object_soft", "spatial_soft", "object_rigid", "spatial_rigid"] {
         let loaded = load(name);
         for task in 0..10 {
-            for episode in 0..3 {
+            for episode in 0..2 {
                 let scene = open(&loaded, task, episode, Split::Validation);
                 let all: Vec<&Object> = things(&scene).collect();
                 for (i, a) in all.iter().enumerate() {
                     for b in &all[i + 1..] {
-                        let pairs = solids(a).into_iter().flat_map(|a| solids(b).into_iter().map(move |b| (a, b)));
+                        let pairs =
+                            solids(a).into_iter().flat_map(|a| solids(b).into_iter().map(move |b| (a, b)));
                         let most = pairs.map(|(a, b)| depth(&a, &b).max(depth(&b, &a))).fold(0.0, f64::max);
                         // What is put on something touches it.
                         assert!(most < 2e-4, "{name} {task} {episode}: {} is {most} m in {}", a.name, b.name);

@@ -5,10 +5,7 @@ use std::{collections::BTreeSet, path::Path};
 use serde_json::{Value, json};
 
 use super::{Failure, args::POLICIES, print};
-use crate::{
-    benchmark::Plan,
-    script,
-};
+use crate::{benchmark::Plan, script};
 
 /// Lists suites, tasks, assets or policies.
 ///

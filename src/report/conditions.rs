@@ -95,14 +95,15 @@ pub fn table(suite: &Rows) -> String {
         ),
     );
     rule(&mut out);
-    let heading = ["Goal", "NoDrop", "Safety", "D/τ", "inval.", "Goal +/-", "NoDrop +/-", "Safety +/-", "Δ D/τ +/-"];
+    let heading =
+        ["Goal", "NoDrop", "Safety", "D/τ", "inval.", "Goal +/-", "NoDrop +/-", "Safety +/-", "Δ D/τ +/-"];
     line(&mut out, &cells("condition", heading.map(str::to_owned)));
     rule(&mut out);
     for row in &suite.rows {
         line(&mut out, &row_text(row, suite.deformable));
     }
     rule(&mut out);
-    line(&mut out, "+/-: episodes that went better / worse than the same episode of the reference; of D/τ, less is better");
+    line(&mut out, "+/-: episodes better / worse than the same one of the reference; of D/τ, less is better");
     for row in &suite.rows {
         if let Some(why) = &row.not_applicable {
             line(&mut out, &format!("{}: N/A, {why}", row.condition));
@@ -200,9 +201,8 @@ mod tests {
             text.lines().find(|line| line.starts_with(start)).unwrap().split_whitespace().collect()
         };
         assert_eq!(words("reference"), ["reference", "100.0", "100.0", "100.0", "0.333", "0"]);
-        let heavy =
-            ["heavy", "100.0", "100.0", "0.0", "1.500", "0", "0/0", "0/0", "0/1", "+1.167", "0/1"];
+        let heavy = ["heavy", "100.0", "100.0", "0.0", "1.500", "0", "0/0", "0/0", "0/1", "+1.167", "0/1"];
         assert_eq!(words("heavy"), heavy);
-        assert!(text.contains("a condition with a…    N/A") && text.contains("N/A, nothing in it deforms"));
+        assert!(text.contains("a condition with a …   N/A") && text.contains("N/A, nothing in it deforms"));
     }
 }

@@ -9,7 +9,10 @@ fn project(conditions: &str, object_type: &str) -> Project {
     let small = Small { expert: "arm:close_to(1, { rate = 2 })", ..Small::default() };
     let shifts = "local shifts = require \"shifts\"\n";
     let declared = "shifts = shifts.soft, episodes = 2,";
-    let text = small.text().replacen("episodes = 1,", declared, 1).replace("\"deformable\"", &format!("\"{object_type}\""));
+    let text = small
+        .text()
+        .replacen("episodes = 1,", declared, 1)
+        .replace("\"deformable\"", &format!("\"{object_type}\""));
     let plan = format!(
         "return softvt.conditions {{ name = \"trial\", suites = {{ require \"suites.one\" }}, conditions = {{\n{conditions}\n}} }}\n"
     );
@@ -116,6 +119,9 @@ fn conditions_are_checked_and_listed_as_suites_are() {
         assert!(row(name).is_some(), "{name}");
     }
     let shifts = row("shifts").expect("the standard conditions");
-    assert_eq!((&shifts["conditions"], &shifts["file"]), (&Value::from(10), &Value::from("suites/shifts.lua")));
+    assert_eq!(
+        (&shifts["conditions"], &shifts["file"]),
+        (&Value::from(10), &Value::from("suites/shifts.lua"))
+    );
     assert!(project.succeeds("check suites/shifts.lua --suite spatial_rigid").out.contains("mass x1.75"));
 }

@@ -3,11 +3,7 @@
 
 use std::{path::Path, time::Duration};
 
-use softvt::{
-    evaluation::thresholds::Thresholds,
-    report::envelope::plot,
-    script,
-};
+use softvt::{evaluation::thresholds::Thresholds, report::envelope::plot, script};
 
 use crate::support::{Project, Said, said};
 
@@ -99,7 +95,9 @@ fn a_newcomer_gets_from_nothing_to_a_safe_suite_by_the_page() {
     }
     assert!(files >= 5 && commands >= 6, "{files} files, {commands} commands");
     assert_eq!(rates, [0.0, 100.0], "nothing is safe before the calibration, everything after it");
-    assert!(project.path("assets/calibration/brick.json").exists() && project.path("seen/episode.mp4").exists());
+    assert!(
+        project.path("assets/calibration/brick.json").exists() && project.path("seen/episode.mp4").exists()
+    );
 }
 
 #[test]
@@ -124,7 +122,14 @@ fn the_readmes_suite_and_object_work() {
 /// The commands of the README that run a suite or a script that is there.
 #[test]
 fn every_script_that_a_page_names_is_there_and_takes_the_flags_that_it_shows() {
-    let pages = ["README.md", "CONTRIBUTING.md", "docs/write-a-task.md", "docs/assets.md", "docs/calibration.md", "docs/tactile.md"];
+    let pages = [
+        "README.md",
+        "CONTRIBUTING.md",
+        "docs/write-a-task.md",
+        "docs/assets.md",
+        "docs/calibration.md",
+        "docs/tactile.md",
+    ];
     let mut tried = 0;
     for page in pages {
         for line in read(page).lines().filter_map(|line| line.trim().strip_prefix("softvt ")) {
