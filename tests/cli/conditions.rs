@@ -123,5 +123,5 @@ fn conditions_are_checked_and_listed_as_suites_are() {
         (&shifts["conditions"], &shifts["file"]),
         (&Value::from(10), &Value::from("suites/shifts.lua"))
     );
-    assert!(project.succeeds("check suites/shifts.lua --suite spatial_rigid").out.contains("mass x1.75"));
+    assert!(project.succeeds("check suites/shifts.lua --suite one").out.contains("mass x1.75"));
 }
