@@ -6,7 +6,7 @@ use super::{
     Failure,
     args::{Run, Video},
     batch::Batch,
-    experiment, print,
+    conditions, experiment, print,
 };
 use crate::{
     benchmark::{Plan, Suite, Task},
@@ -38,6 +38,10 @@ pub fn run(run: &Run) -> Result<(), Failure> {
             show(run, &summaries, true);
             Ok(())
         }
+        Plan::Conditions { name, suites, conditions } => {
+            own_folders(run, suites)?;
+            conditions::run(run, &loaded, (suites, conditions), &out_dir(run, name, None))
+        }
         Plan::Experiment { name, points, columns } => experiment::run(run, &loaded, name, *points, columns),
     }
 }
@@ -60,13 +64,8 @@ pub(super) fn own_folders(run: &Run, suites: &[Suite]) -> Result<(), Failure> {
 
 /// Every episode that `--video` names must be one of every suite's: before any of them runs.
 fn check_video(run: &Run, plan: &Plan) -> Result<(), Failure> {
-    let suites: Vec<&Suite> = match plan {
-        Plan::Suite(suite) => vec![suite],
-        Plan::Suites { suites } => suites.iter().collect(),
-        Plan::Experiment { .. } => Vec::new(),
-    };
     let Some(Video::Episodes(chosen)) = &run.video else { return Ok(()) };
-    for suite in suites {
+    for suite in plan.suites() {
         let episodes = run.episodes.unwrap_or(suite.episodes);
         if let Some(beyond) = chosen.iter().find(|episode| **episode >= episodes) {
             let last = episodes.saturating_sub(1);
@@ -91,7 +90,7 @@ fn show(run: &Run, summaries: &[Summary], list: bool) {
 }
 
 /// A name as part of a path: it is the script's, and must not lead out of the folder.
-fn plain(name: &str) -> String {
+pub(super) fn plain(name: &str) -> String {
     name.replace(|c: char| !(c.is_alphanumeric() || c == '_' || c == '-'), "_")
 }
 
@@ -123,15 +122,28 @@ pub fn single(run: &Run, task: usize) -> Result<EpisodeRecord, Failure> {
     batch.episode(0, false).map(|finished| finished.record)
 }
 
+/// All episodes of the tasks that `--task` names.
+pub(super) fn jobs<'a>(run: &Run, suite: &Suite, tasks: &[&'a Task]) -> Vec<(&'a Task, u32)> {
+    let episodes = run.episodes.unwrap_or(suite.episodes);
+    tasks.iter().flat_map(|task| (0..episodes).map(move |e| (*task, e))).collect()
+}
+
 fn evaluate(run: &Run, loaded: &Loaded, suite: &Suite, out: PathBuf) -> Result<Summary, Failure> {
     let tasks = chosen(run, suite)?;
-    let episodes = run.episodes.unwrap_or(suite.episodes);
-    let jobs = tasks.iter().flat_map(|task| (0..episodes).map(move |e| (*task, e))).collect();
-    let mut batch = Batch::new(run, loaded, suite, (jobs, out))?;
+    let mut batch = Batch::new(run, loaded, suite, (jobs(run, suite, &tasks), out))?;
     batch.prepare(&tasks)?;
+    carry_out(&batch, &tasks)
+}
+
+/// Runs all jobs of a batch that is prepared, into its folder.
+///
+/// # Errors
+/// The folder holds a run, or an episode fails.
+pub(super) fn carry_out(batch: &Batch, tasks: &[&Task]) -> Result<Summary, Failure> {
+    let run = batch.run;
     let folder =
         RunFolder::create(&batch.out).map_err(|e| Failure::input(format!("{}: {e}", run.file.display())))?;
-    batch.write_info(&folder, &tasks, episodes)?;
+    batch.write_info(&folder, tasks, run.episodes.unwrap_or(batch.suite.episodes))?;
     batch.go(folder)
 }
 

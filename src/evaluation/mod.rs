@@ -9,6 +9,7 @@ pub mod drop;
 pub mod evidence;
 pub mod goal;
 pub mod judge;
+pub mod paired;
 pub mod record;
 pub mod rules;
 pub mod safety;
