@@ -134,9 +134,9 @@ impl Hard {
             }
             return;
         }
-        samples_vs_field(self.samples(), &self.shape, pose, &other.shape, other_pose, margin, &mut found);
+        samples_vs_field(self.samples(), &self.shape, pose, other.field(), other_pose, margin, &mut found);
         out.extend(found.drain(..).map(|point| (0, point)));
-        samples_vs_field(other.samples(), &other.shape, other_pose, &self.shape, pose, margin, &mut found);
+        samples_vs_field(other.samples(), &other.shape, other_pose, self.field(), pose, margin, &mut found);
         out.extend(found.drain(..).map(|point| (1, ContactPoint { n_w: -point.n_w, ..point })));
     }
 }

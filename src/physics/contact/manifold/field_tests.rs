@@ -6,7 +6,7 @@ use crate::geometry::{Quat, shape::Shape};
 
 fn touch(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64) -> Vec<ContactPoint> {
     let mut out = Vec::new();
-    samples_vs_field(&skin_samples(a), a, pose_a, b, pose_b, margin, &mut out);
+    samples_vs_field(&skin_samples(a), a, pose_a, (b, &b.bounds()), pose_b, margin, &mut out);
     out
 }
 

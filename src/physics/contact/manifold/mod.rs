@@ -12,7 +12,9 @@ mod axis;
 mod clip;
 mod feature;
 pub mod field;
+mod flat;
 pub mod gel;
+mod lowest;
 mod plane;
 mod round;
 mod skin;
@@ -25,6 +27,7 @@ mod field_tests;
 #[cfg(test)]
 mod tests;
 
+pub use flat::Spot;
 pub use skin::{Ring, SkinSamples, pieces, skin_samples};
 
 /// A convex primitive in its own frame, m.
