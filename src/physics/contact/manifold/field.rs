@@ -60,32 +60,52 @@ impl Probe<'_> {
     }
 }
 
-/// Appends the contact points of body a's samples with the field of shape b whose gap is below `margin` (m): corners
-/// and edges, flat faces, rims with their moving lowest point, and the lowest points and lines of smooth parts.
-///
-/// The normals point from a to b. For two general bodies call it both ways (and flip the normals of one).
-pub fn samples_vs_field(
-    samples: &SkinSamples,
-    shape_a: &Shape,
-    pose_a: &Pose,
-    (shape_b, bounds_b): (&Shape, &Aabb),
-    pose_b: &Pose,
-    margin: f64,
-    out: &mut Vec<ContactPoint>,
-) {
-    let probe = Probe { shape_b, bounds_b, a_in_b: pose_b.inv_mul(pose_a), pose_b };
-    let fixed = samples.fixed.iter().map(|p| (p, SAMPLE_AREA)).zip(0..);
-    let spots = samples.spots.iter().map(|spot| (&spot.p, spot.area)).zip(SPOTS..);
-    for ((p_a, area), name) in fixed.chain(spots).filter(|((p, _), _)| !probe.is_beyond(p, margin)) {
-        let point = probe.contact(p_a, area, name);
-        if point.phi < margin {
-            out.push(point);
+/// Body a's skin over the field of body b.
+pub struct Skin<'a> {
+    samples: &'a SkinSamples,
+    shape: &'a Shape,
+    probe: Probe<'a>,
+}
+
+impl<'a> Skin<'a> {
+    /// The skin of `shape_a`, whose samples are given, and shape b with its bounds.
+    ///
+    /// The normals of its points are from a to b. Two general bodies meet both ways (flip the normals of one): first
+    /// [`Skin::fixed`] of both, then [`Skin::lowest`].
+    pub fn new(
+        (samples, shape): (&'a SkinSamples, &'a Shape),
+        pose_a: &Pose,
+        (shape_b, bounds_b): (&'a Shape, &'a Aabb),
+        pose_b: &'a Pose,
+    ) -> Self {
+        let probe = Probe { shape_b, bounds_b, a_in_b: pose_b.inv_mul(pose_a), pose_b };
+        Self { samples, shape, probe }
+    }
+
+    /// Appends the points whose gap is below `margin` (m) of corners and edges, flat faces, and rims with their moving lowest
+    /// point.
+    pub fn fixed(&self, margin: f64, out: &mut Vec<ContactPoint>) {
+        let fixed = self.samples.fixed.iter().map(|p| (p, SAMPLE_AREA)).zip(0..);
+        let spots = self.samples.spots.iter().map(|spot| (&spot.p, spot.area)).zip(SPOTS..);
+        for ((p_a, area), name) in fixed.chain(spots) {
+            if self.probe.is_beyond(p_a, margin) {
+                continue;
+            }
+            let point = self.probe.contact(p_a, area, name);
+            if point.phi < margin {
+                out.push(point);
+            }
+        }
+        for (index, ring) in self.samples.rings.iter().enumerate() {
+            ring_points(&self.probe, ring, RINGS + 64 * index as u32, margin, out);
         }
     }
-    for (index, ring) in samples.rings.iter().enumerate() {
-        ring_points(&probe, ring, RINGS + 64 * index as u32, margin, out);
+
+    /// Appends the lowest points and lines of smooth parts whose gap is below `margin` (m), as far as the points that are in
+    /// `out` already do not carry there.
+    pub fn lowest(&self, margin: f64, out: &mut Vec<ContactPoint>) {
+        lowest_points(&self.probe, self.samples, self.shape, margin, out);
     }
-    lowest_points(&probe, samples, shape_a, margin, out);
 }
 
 /// The fixed points of a nearly flat ring and its moving lowest point.

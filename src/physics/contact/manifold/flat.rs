@@ -56,15 +56,15 @@ struct Face<'a> {
 pub(super) fn spots(shape: &Shape, starts: &[Vec3], step: f64, sharp: &[Vec3], area: f64) -> Vec<Spot> {
     let seeds: Vec<Seed> = starts.iter().filter_map(|p| Seed::at(shape, p, PROBE * step)).collect();
     let mut spots = Vec::new();
-    let is_free = |p: &Vec3, taken: &[Spot], apart: f64| {
-        taken.iter().all(|q| (q.p - p).norm() > apart) && sharp.iter().all(|q| (q - p).norm() > step)
-    };
+    let is_free = |p: &Vec3, taken: &[Spot], apart: f64| taken.iter().all(|q| (q.p - p).norm() > apart);
     let mut inner: Vec<(Vec3, f64)> =
         seeds.iter().filter(|seed| seed.bend >= PLANE).map(|seed| (seed.p, seed.bend)).collect();
     for face in faces(shape, &seeds) {
         let first = spots.len();
+        // A fine rounding that counts as an edge lies off the face and does not carry it.
+        let edges: Vec<&Vec3> = sharp.iter().filter(|q| face.height(q).abs() < SAME_HEIGHT).collect();
         for p in face.outline(step) {
-            if is_free(&p, &spots[first..], 0.25 * step) {
+            if is_free(&p, &spots[first..], 0.25 * step) && edges.iter().all(|q| (*q - p).norm() > step) {
                 spots.push(Spot { p, area });
             }
         }
@@ -105,8 +105,7 @@ fn faces<'a>(shape: &'a Shape, seeds: &[Seed]) -> Vec<Face<'a>> {
     let mut faces: Vec<Face> = Vec::new();
     for seed in seeds.iter().filter(|seed| seed.bend < PLANE) {
         let same = faces.iter_mut().find(|face| {
-            (face.normal - seed.normal).norm() < SAME_TURN
-                && face.normal.dot(&(seed.p - face.origin)).abs() < SAME_HEIGHT
+            (face.normal - seed.normal).norm() < SAME_TURN && face.height(&seed.p).abs() < SAME_HEIGHT
         });
         match same {
             Some(face) => face.seeds.push(seed.p),
@@ -129,6 +128,11 @@ impl Face<'_> {
                 Some(self.extreme(*start, &way, step))
             })
             .collect()
+    }
+
+    /// Height of a point over its plane, m.
+    fn height(&self, p: &Vec3) -> f64 {
+        self.normal.dot(&(p - self.origin))
     }
 
     fn holds(&self, p: &Vec3) -> bool {

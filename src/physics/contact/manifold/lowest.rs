@@ -1,7 +1,9 @@
 //! The lowest points of the smooth parts of a body in the field of another, and the lines in which such parts touch.
 //!
 //! Where a part bends in one direction alone (the side of a can, the rounded edge of a box) it touches along a line, whose
-//! lowest point has no place: the ends of the line carry instead.
+//! lowest point has no place: the ends of the line carry instead. Where corners, rims or spots of a flat touch as deep as a
+//! lowest point, they carry alone: a second support beside them, on the side to which a body happens to lean, would make it
+//! rock for ever.
 
 use std::f64::consts::{FRAC_PI_4, TAU};
 
@@ -9,7 +11,7 @@ use super::{
     ContactPoint, MOVING, POINT_AREA,
     field::{Probe, golden_minimum},
     flat::{CURVED, across},
-    skin::{Ring, SkinSamples, onto},
+    skin::{Ring, SAMPLE_AREA, SkinSamples, onto},
 };
 use crate::geometry::{Vec3, shape::Shape};
 
@@ -18,9 +20,14 @@ const ASIDE: f64 = 1e-3;
 /// See [`ASIDE`].
 const ASIDE_SHARE: f64 = 1.0 / 6.0;
 /// Lowest points looked for on one body.
-const WITNESSES: usize = 4;
+const WITNESSES: usize = 6;
 /// First of the names of lowest points, four for each: the point, two ends of its line.
 const LOWEST: u32 = 1 << 24;
+/// Other points that lie higher than a lowest point by up to the first of these, m, carry instead of it, from the second on
+/// they do not.
+const AS_DEEP_M: [f64; 2] = [2e-6, 1e-5];
+/// They do so if their normals agree (cosine) by at least this.
+const SAME_SIDE: f64 = 0.9;
 /// A line ends where the normal has turned by this much, rad, …
 const LINE_TURN: f64 = 5e-3;
 /// … or the gap or the skin has risen by this much over its lowest point, m.
@@ -33,12 +40,11 @@ struct Smooth<'a> {
     shape: &'a Shape,
     /// How far aside of a point its surroundings are looked at, m.
     aside: f64,
-    /// A lowest point counts in full if the gap rises by this much aside of it, m: that of a curvature of [`CURVED`]. On a
-    /// flat it has no place, and spots, corners and rims carry.
+    /// A lowest point has a place if the gap rises by this much aside of it, m: that of a curvature of [`CURVED`].
     rise: f64,
 }
 
-/// Appends the lowest points of the smooth parts of body a in the field of b.
+/// Appends the lowest points of the smooth parts of body a in the field of b; `out` holds what touches already.
 pub(super) fn lowest_points(
     probe: &Probe,
     samples: &SkinSamples,
@@ -53,15 +59,14 @@ pub(super) fn lowest_points(
     let mut starts: Vec<(f64, Vec3)> = near.map(|p| (probe.gap(p), *p)).collect();
     starts.retain(|(gap, _)| *gap < reach);
     starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let others = out.clone();
     let (mut used, mut found): (Vec<Vec3>, Vec<[Vec3; 2]>) = (Vec::new(), Vec::new());
     for (_, start) in starts {
         if used.len() == WITNESSES {
             break;
         }
         let is_known = |p: &Vec3, apart: f64| found.iter().any(|line| from_segment(p, line) < apart);
-        if used.iter().any(|p| (p - start).norm() < 2.0 * samples.spacing)
-            || is_known(&start, 2.0 * samples.spacing)
-        {
+        if used.iter().any(|p| (p - start).norm() < samples.spacing) || is_known(&start, samples.spacing) {
             continue;
         }
         used.push(start);
@@ -70,23 +75,33 @@ pub(super) fn lowest_points(
             continue;
         }
         let name = MOVING | (LOWEST + 4 * used.len() as u32);
-        found.push(smooth.points(&lowest, name, margin, out));
+        found.push(smooth.points(&lowest, name, (&others, margin), out));
     }
 }
 
 impl Smooth<'_> {
-    /// Appends the point `p` as far as it has a place, and the ends of its line as far as it has none; the line.
-    fn points(&self, p: &Vec3, name: u32, margin: f64, out: &mut Vec<ContactPoint>) -> [Vec3; 2] {
-        let rises = self.rises(p);
-        let opposite = |k: usize| rises[k].min(rises[k + 4]);
-        let bent = ((0..4).map(opposite).fold(0.0, f64::max) / self.rise).clamp(0.0, 1.0);
+    /// Appends the point `p` as far as it has a place, and the ends of its line as far as it has none on that; the line.
+    fn points(
+        &self,
+        p: &Vec3,
+        name: u32,
+        (others, margin): (&[ContactPoint], f64),
+        out: &mut Vec<ContactPoint>,
+    ) -> [Vec3; 2] {
+        let lacking = lacking(&self.probe.contact(p, 0.0, name), others);
         let mut push = |p: &Vec3, share: f64, name: u32| {
-            let area = POINT_AREA * bent.min(self.off_edges(p)) * share;
+            let area = POINT_AREA * lacking.min(self.off_edges(p)) * share;
             let point = self.probe.contact(p, area, name);
             if point.phi < margin && area > 0.0 {
                 out.push(point);
             }
         };
+        if lacking == 0.0 {
+            return [*p; 2];
+        }
+        let rises = self.rises(p);
+        let opposite = |k: usize| rises[k].min(rises[k + 4]);
+        let bent = ((0..4).map(opposite).fold(0.0, f64::max) / self.rise).clamp(0.0, 1.0);
         let least = (0..8).fold(0, |least, k| if rises[k] < rises[least] { k } else { least });
         if bent == 0.0 || rises[least] >= self.rise {
             push(p, 1.0, name);
@@ -94,11 +109,10 @@ impl Smooth<'_> {
         }
         let (way, along) = self.line_way(p, least);
         let ends = [self.line_end(p, way), self.line_end(p, -way)];
-        push(p, along, name);
-        if along < 1.0 {
-            push(&ends[0], 1.0 - along, name + 1);
-            push(&ends[1], 1.0 - along, name + 2);
-        }
+        let line = bent * (1.0 - along);
+        push(p, 1.0 - line, name);
+        push(&ends[0], line, name + 1);
+        push(&ends[1], line, name + 2);
         ends
     }
 
@@ -157,6 +171,16 @@ impl Smooth<'_> {
         let to_rings = self.samples.rings.iter().filter(|ring| ring.sharp).map(to_ring);
         (to_fixed.chain(to_rings).fold(f64::INFINITY, f64::min) / self.aside).min(1.0)
     }
+}
+
+/// The share of a point contact that `lowest` must carry, for want of others as deep as it on its side.
+fn lacking(lowest: &ContactPoint, others: &[ContactPoint]) -> f64 {
+    let same_side = others.iter().filter(|point| point.n_w.dot(&lowest.n_w) > SAME_SIDE);
+    let carried = same_side.map(|point| {
+        let higher = (point.phi - lowest.phi - AS_DEEP_M[0]) / (AS_DEEP_M[1] - AS_DEEP_M[0]);
+        (1.0 - higher).clamp(0.0, 1.0) * (point.area / SAMPLE_AREA).min(1.0)
+    });
+    (1.0 - carried.sum::<f64>()).max(0.0)
 }
 
 /// Distance of a point from a segment, m.

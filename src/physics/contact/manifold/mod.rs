@@ -3,7 +3,7 @@
 //! Two *primitives* ([`Piece`]) meet in [`manifold`]: a contact normal is found, the feature of each piece that faces
 //! the other (a face, a side line) is projected along it, and the overlap's corners become the points. Every point's
 //! gap is exact at its place, so corners and rims carry a tipping body where its real edge is, and round bodies touch
-//! at the moving lowest point and roll. General shapes meet through [`field::samples_vs_field`],
+//! at the moving lowest point and roll. General shapes meet through [`field::Skin`],
 //! and compliant skins meet hard shapes through [`gel::gel_vs_shape`].
 
 use crate::geometry::{Pose, Vec3};
