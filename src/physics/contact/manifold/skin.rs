@@ -56,8 +56,8 @@ pub struct SkinSamples {
     pub spacing: f64,
 }
 
-/// Chooses the samples of a shape. Boxes, cylinders and lathes are known exactly; of anything else the sharp edges are
-/// found on a grid of 1/24 of its longest side.
+/// Chooses the samples of a shape. Boxes, cylinders and lathes are known exactly; of anything else the sharp edges and flat
+/// faces are found on a grid of 1/24 of its longest side.
 pub fn skin_samples(shape: &Shape) -> SkinSamples {
     let mut samples = SkinSamples::default();
     edges(shape, &Pose::identity(), &mut samples);
