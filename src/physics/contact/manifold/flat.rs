@@ -21,6 +21,9 @@ const LEAVES: f64 = 2e-3;
 const LEAST: usize = 3;
 /// Directions in which the outline is looked for: that of a disc is off by at most 0.9 %.
 const DIRECTIONS: u32 = 24;
+/// Points of an outline nearer to each other than this share of the distance of seeds are one: more, and a corner would be cut
+/// by as much.
+const SAME_POINT: f64 = 0.02;
 /// Share of the distance of seeds at which the skin's bend is looked at.
 const PROBE: f64 = 0.1;
 /// Points spread over a face are this many distances of seeds apart.
@@ -64,7 +67,8 @@ pub(super) fn spots(shape: &Shape, starts: &[Vec3], step: f64, sharp: &[Vec3], a
         // A fine rounding that counts as an edge lies off the face and does not carry it.
         let edges: Vec<&Vec3> = sharp.iter().filter(|q| face.height(q).abs() < SAME_HEIGHT).collect();
         for p in face.outline(step) {
-            if is_free(&p, &spots[first..], 0.25 * step) && edges.iter().all(|q| (*q - p).norm() > step) {
+            if is_free(&p, &spots[first..], SAME_POINT * step) && edges.iter().all(|q| (*q - p).norm() > step)
+            {
                 spots.push(Spot { p, area });
             }
         }
