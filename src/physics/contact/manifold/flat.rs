@@ -4,7 +4,7 @@
 //! A flat face carries at its outline, where it goes over into a rounding. What is nearly flat has a lowest point that
 //! moves, which counts the less the flatter it is (see [`super::field`]); points spread over it count for the rest.
 
-use super::skin::onto;
+use super::{POINT_AREA, skin::onto};
 use crate::geometry::{Vec3, shape::Shape};
 
 /// Curvature from which the moving lowest point carries alone, 1/m: 1/250 mm.
@@ -19,8 +19,8 @@ const SAME_HEIGHT: f64 = 5e-6;
 const LEAVES: f64 = 2e-3;
 /// Seeds that a face has at least: smaller ones are facets of something curved.
 const LEAST: usize = 3;
-/// Directions in which the outline is looked for: that of a disc is off by at most 0.9 %.
-const DIRECTIONS: u32 = 24;
+/// Directions in which the outline is looked for: that of a disc is off by at most 0.2 %.
+const DIRECTIONS: u32 = 48;
 /// Points of an outline nearer to each other than this share of the distance of seeds are one: more, and a corner would be cut
 /// by as much.
 const SAME_POINT: f64 = 0.02;
@@ -54,8 +54,9 @@ struct Face<'a> {
     seeds: Vec<Vec3>,
 }
 
-/// The spots of a shape from places `starts` on its skin that lie about `step` (m) apart, of at most `area` (m²) each. A
-/// face that ends at the `sharp` edges needs none.
+/// The spots of a shape from places `starts` on its skin that lie about `step` (m) apart. Those of an outline are whole point
+/// contacts: a softer edge would let a body tip too early. The others have at most `area` (m²). A face that ends at the
+/// `sharp` edges needs none.
 pub(super) fn spots(shape: &Shape, starts: &[Vec3], step: f64, sharp: &[Vec3], area: f64) -> Vec<Spot> {
     let seeds: Vec<Seed> = starts.iter().filter_map(|p| Seed::at(shape, p, PROBE * step)).collect();
     let mut spots = Vec::new();
@@ -69,7 +70,7 @@ pub(super) fn spots(shape: &Shape, starts: &[Vec3], step: f64, sharp: &[Vec3], a
         for p in face.outline(step) {
             if is_free(&p, &spots[first..], SAME_POINT * step) && edges.iter().all(|q| (*q - p).norm() > step)
             {
-                spots.push(Spot { p, area });
+                spots.push(Spot { p, area: POINT_AREA });
             }
         }
         if spots.len() > first {
