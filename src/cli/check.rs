@@ -28,6 +28,7 @@ pub fn run(run: &Run) -> Result<(), Failure> {
         Plan::Suites { suites } => {
             own_folders(run, suites)?;
             suites.iter().try_for_each(|suite| suite_is_right(run, &loaded, suite, &made))?;
+        }
         Plan::Conditions { suites, conditions: list, .. } => {
             own_folders(run, suites)?;
             suites.iter().try_for_each(|suite| suite_is_right(run, &loaded, suite, &made))?;
