@@ -88,6 +88,12 @@
 ---@field max? number Highest value. Expects a number.
 ---@field apply fun(scene: softvt.Scene, value: number): softvt.Scene? Changes the scene.
 
+---Runs suites as they are, then under each condition, and compares episode by episode.
+---@class softvt.Conditions
+---@field name string Name, as in results.
+---@field suites softvt.Suite[] The suites, in order.
+---@field conditions softvt.Condition[] The conditions, in order.
+
 ---A function of a grid of parameters that yields rows. Give grid or points.
 ---@class softvt.Experiment
 ---@field name string Name, as in results.
@@ -132,6 +138,13 @@
 ---@field roughness? number Roughness. Expects a number in 0..1. Default 0.6.
 ---@field opacity? number Share of this layer where the mask is 1; 0 leaves the relief alone. Expects a number in 0..1. Default 1.
 ---@field relief_m? number Height of the drawn surface where the mask is 1; it is drawn only, nothing touches it. Expects metres in -0.005..0.005. Default 0.
+
+---One way in which a run differs from its reference: same tasks, initial states and seeds, other shifts or settings.
+---@class softvt.Condition
+---@field name string Name, as in the table; its run is in a folder of that name.
+---@field shift? table<string, number> Shifts by name, as --shift takes them: { mass = 1.25 }.
+---@field set? table<string, number|boolean|string> Settings by path, as --set takes them: { ["robot.gripper.effort"] = 20 }.
+---@field only? "deformable"|"rigid" The object_type of the suites of which it can change anything; in others it is not run, and its row says N/A.
 
 ---What an experiment leaves behind besides its rows.
 ---@class softvt.Finish
@@ -468,6 +481,10 @@ function Shape:smooth_union(other, blend) end
 ---@return number[]
 ---@return number[]
 function Shape:bounds() end
+
+---Its volume, m³.
+---@return number
+function Shape:volume() end
 
 ---Moved so that its lowest point is at z = 0 and its centre on the z axis.
 ---@return softvt.Shape
@@ -869,6 +886,15 @@ local Look = {}
 ---@field dynamic_mu number Dynamic friction coefficient. Expects a number in 0..10.
 local Object = {}
 
+---Mass of a soft or rigid body, of one moving part of an articulated object, or of all of them, kg; nil for what never moves.
+---@param part? string
+---@return number?
+function Object:mass(part) end
+
+---Multiplies the density of a soft or rigid body, or of every moving part; what never moves stays as it is.
+---@param factor number
+function Object:scale_mass(factor) end
+
 ---The true scene at this control step, as an expert sees it.
 ---@class softvt.View
 local View = {}
@@ -1037,6 +1063,11 @@ function softvt.scenery(spec) end
 ---@return softvt.Shift
 function softvt.shift(spec) end
 
+---Runs suites as they are, then under each condition, and compares episode by episode.
+---@param spec softvt.Conditions
+---@return softvt.Conditions
+function softvt.conditions(spec) end
+
 ---A function of a grid of parameters that yields rows. Give grid or points.
 ---@param spec softvt.Experiment
 ---@return softvt.Experiment
@@ -1067,6 +1098,11 @@ function softvt.simulate(simulate) end
 ---@param envelope softvt.EnvelopeSpec
 ---@return table
 function softvt.envelope(envelope) end
+
+---What assets/calibration/<asset>.json says, as softvt.envelope gives it; nil if there is no such file.
+---@param asset string
+---@return table?
+function softvt.calibration(asset) end
 
 ---Whether a row of a compression sweep is a stable squeeze.
 ---@param row table

@@ -7,7 +7,9 @@
 --
 --   softvt scripts/calibrate.lua --asset spiral_roll,sesame_bun
 --
--- Writes assets/calibration/<asset>.json, the sweep rows in SoftVTBench's fields beside it, and scripts/calibrated.lua.
+-- Writes assets/calibration/<asset>.json, the sweep rows in SoftVTBench's fields and the envelope's plot beside it, and
+-- scripts/calibrated.lua; where all standard assets are calibrated, docs/calibration.md too, which shows all plots.
+local envelopes = require "envelopes"
 local grasp = require "experts.grasp"
 local known = require "calibrated"
 local soft_assets = require("asset_names").soft
@@ -198,8 +200,16 @@ local function library_of(closures)
   return table.concat(lines, "\n")
 end
 
+-- Whether all standard assets are among `found`.
+local function complete(found)
+  for _, name in ipairs(soft_assets) do
+    if not found[name] then return false end
+  end
+  return true
+end
+
 local function finish(rows, o)
-  local files, text, closures = {}, {}, {}
+  local files, text, closures, envelope_of = {}, {}, {}, {}
   for name, closure in pairs(known) do closures[name] = closure end
   for _, name in ipairs(o.asset) do
     local fingerprint
@@ -212,6 +222,8 @@ local function finish(rows, o)
     }
     files[("assets/calibration/%s.json"):format(name)] = found.json
     files[("assets/calibration/%s.sweep.jsonl"):format(name)] = found.sweep
+    files[("assets/calibration/%s.txt"):format(name)] = found.text
+    envelope_of[name] = found
     text[#text + 1] = found.text
     if found.d_ref then
       text[#text + 1] = ("τ at κ 0.3, 0.5, 0.7: %.3f, %.3f, %.3f %%\n"):format(
@@ -220,6 +232,7 @@ local function finish(rows, o)
     closures[name] = found.safe_window and { lower = found.lower, at_tau = found.closure_at_tau } or nil
   end
   files["scripts/calibrated.lua"] = library_of(closures)
+  if complete(envelope_of) then files["docs/calibration.md"] = envelopes(soft_assets, envelope_of) end
   return { text = table.concat(text, "\n"), files = files }
 end
 

@@ -3,7 +3,7 @@
 --   softvt scripts/contact_sheet.lua
 --   softvt scripts/contact_sheet.lua --asset my_pastry --write my_pastry.png
 local names = require "asset_names"
-local table_top = require "assets.table"
+local studio = require "studio"
 
 -- Soft things first, then what they meet, then what stands around; the table and the floor are under all of them.
 local STANDARD = {}
@@ -24,28 +24,8 @@ for _, name in ipairs(opt.asset) do assets[name] = require("assets." .. name) en
 
 local WORDS, GROUND = { 40, 44, 50 }, { 244, 243, 240 }
 local LABEL = 34  -- pixels under each picture
-local FOVY = math.rad(28)
 
-local function size_of(name)
-  local low, high = assets[name].shape:bounds()
-  return { high[1] - low[1], high[2] - low[2], high[3] - low[3] }
-end
-
--- The asset alone, with a camera that it fills: its bounding sphere just fits the picture.
-local function alone(name)
-  local size = size_of(name)
-  local across = math.sqrt(size[1] ^ 2 + size[2] ^ 2 + size[3] ^ 2)
-  local reach = 0.99 * across / 2 / math.sin(FOVY / 2)
-  return softvt.layout("portrait_" .. name, function(scene)
-    scene:add { name = "table", asset = table_top, xyz = { 0, 0, 0 } }
-    scene:add { name = "object", asset = assets[name], at = { 0.1, 0 }, yaw = math.rad(25) }
-    local middle = { 0.1, 0, size[3] / 2 }
-    scene:add_camera {
-      name = "portrait", position = { 0.1 + reach * 0.71, -reach * 0.335, middle[3] + reach * 0.62 }, look_at = middle,
-      fovy = FOVY, width = opt.edge, height = opt.edge,
-    }
-  end)
-end
+local function size_of(name) return studio.size(assets[name]) end
 
 return softvt.experiment {
   name = "contact_sheet",
@@ -62,9 +42,8 @@ return softvt.experiment {
     local cell = opt.edge + LABEL
     local sheet = softvt.image { width = columns * opt.edge, height = rows * cell, colour = GROUND }
     for index, name in ipairs(opt.asset) do
-      local sim = softvt.simulate { layout = alone(name) }
       local x, y = (index - 1) % columns * opt.edge, (index - 1) // columns * cell
-      sheet:paste(sim:see { camera = "portrait" }, x, y)
+      sheet:paste(studio.portrait(assets[name], opt.edge), x, y)
       local words = ("%s, %.0f mm"):format(name:gsub("_", " "), 1e3 * math.max(table.unpack(size_of(name))))
       sheet:text(words, { at = { x + 12, y + opt.edge + 23 }, size = 19, colour = WORDS })
     end

@@ -3,9 +3,8 @@
 --
 --   softvt scripts/imprints.lua
 --   softvt scripts/imprints.lua --asset my_pastry --write my_imprint.png
-local grasp = require "experts.grasp"
 local soft_assets = require("asset_names").soft
-local table_top = require "assets.table"
+local studio = require "studio"
 
 local opt = softvt.options {
   asset = { default = soft_assets, help = "soft assets to grasp" },
@@ -21,30 +20,7 @@ local WORDS, GROUND = { 40, 44, 50 }, { 244, 243, 240 }
 local LABEL, GAP = 28, 6  -- pixels
 local WIDTH, HEIGHT = 240, 180
 
-local function alone(name)
-  return softvt.layout("imprint_" .. name, function(scene)
-    scene:add { name = "table", asset = table_top, xyz = { 0, 0, 0 } }
-    scene:add { name = "object", asset = assets[name], at = { -0.05, 0 } }
-  end)
-end
-
-local function hold(arm, scene)
-  local object = scene:object "object"
-  local at = grasp.pose(object, grasp.height(object))
-  arm:move_to(at:moved { 0, 0, 0.08 }, { speed = 0.6, turn = 3 })
-  arm:move_to(at, { speed = 0.25 })
-  arm:grasp(grasp.closure(object), { rate = 0.6 })
-  arm:wait(0.3)
-  arm:move_by({ 0, 0, opt.lift_mm * 1e-3 }, { speed = 0.2 })
-  arm:wait(0.3)
-end
-
-local function held(name)
-  local sim = softvt.simulate { layout = alone(name) }
-  local ok, why = sim:drive(hold)
-  if not ok then error(name .. ": " .. why) end
-  return sim
-end
+local function held(name) return studio.held(assets[name], opt.lift_mm * 1e-3) end
 
 -- Mean motion of the markers, px.
 local function drift(felt)

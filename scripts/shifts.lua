@@ -1,4 +1,5 @@
--- Changes of a scene that a suite may declare: factors on the material of every object that has it, and on the light.
+-- Changes of a scene that a suite may declare: factors on the material of every object that has it, on the mass of all that
+-- moves, and on the light; and the standard conditions, which change one of them at a time.
 
 local function factor(name, keys, min, max)
   return softvt.shift {
@@ -16,7 +17,14 @@ end
 
 local shifts = {
   stiffness = factor("stiffness", { "youngs_pa" }, 0.01, 100),
-  mass = factor("mass", { "density" }, 0.01, 100),
+  -- Of soft and rigid bodies, and of the moving parts of furniture; sizes stay.
+  mass = softvt.shift {
+    name = "mass", unit = "1", default = 1, min = 0.01, max = 100,
+    apply = function(scene, value)
+      for _, object in ipairs(scene.objects) do object:scale_mass(value) end
+      return scene
+    end,
+  },
   -- Of two surfaces the larger coefficient counts: that of the pads is a setting, robot.pads.
   friction = factor("friction", { "static_mu", "dynamic_mu" }, 0, 10),
   light = softvt.shift {
@@ -32,5 +40,20 @@ local shifts = {
 -- What suites of soft and of rigid objects declare.
 shifts.soft = { shifts.mass, shifts.stiffness, shifts.light, shifts.friction }
 shifts.rigid = { shifts.mass, shifts.light, shifts.friction }
+
+-- Three levels of light, as factors on lamp and sky.
+shifts.lights = { { "dim", 0.3 }, { "low", 0.6 }, { "bright", 2 } }
+
+-- The nine standard conditions. Stiffness can change nothing of what does not deform.
+shifts.conditions = {}
+for _, factor in ipairs { 1.25, 1.75, 2.5 } do
+  table.insert(shifts.conditions, { name = "mass x" .. factor, shift = { mass = factor } })
+end
+for _, factor in ipairs { 0.5, 0.8, 2.0 } do
+  table.insert(shifts.conditions, { name = "stiffness x" .. factor, shift = { stiffness = factor }, only = "deformable" })
+end
+for _, level in ipairs(shifts.lights) do
+  table.insert(shifts.conditions, { name = "light " .. level[1], shift = { light = level[2] } })
+end
 
 return shifts

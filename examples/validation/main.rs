@@ -62,8 +62,6 @@ const MISSES: &str = "
 - Resolutions 18 and 24 are compared by their small-strain stiffness only; their squeezes take minutes.
 - Speed (`softvt scripts/squeeze.lua --gap-mm 42`): 0.12 to 0.14 CPU s per simulated second where 0.05 was to be reached;
   a whole suite runs about 11 times faster than real time on one core where 25 was to be reached.
-- A rigid body with flat faces and *rounded* edges has no contact points on its flats: it sinks and does not settle. Sharp
-  edges, lathes, balls and capsules rest; rigid twins of most soft objects (`--twin rigid`) do not.
 - Pictures show stripes and specks along some borders of shadows, and on surfaces that the key light grazes.
 - Speed of pictures (`cargo bench --bench render`), ms, one thread, measured and to be reached: third-person 224² 3.6 and 3, wrist
   224² 9.9 and 4, third-person 1024² 31 and 25, without its kept background 85 and 60. Measured before robot and rigid things

@@ -23,6 +23,11 @@ pub fn rigid(report: &mut Report) {
     let [moved, turned] = rigid::stack();
     println!("Stack of five boxes, 10 s: moved by {moved:.1e} m, turned by {turned:.1e} rad at most.");
     report.claim("stack of five boxes over 10 s: moved, m", [moved], 1e-6);
+    let [moved, turned] = rigid::rounded_stack();
+    println!(
+        "The same with edges rounded by 5 mm: moved by {moved:.1e} m, turned by {turned:.1e} rad at most."
+    );
+    report.claim("stack of five boxes with rounded edges over 10 s: moved, m", [moved], 1e-6);
     let hit = rigid::collision();
     println!(
         "Two boxes collide off their centres: momentum off by {:.1e}, angular momentum by {}, energy kept {:.0} %.\n",

@@ -113,14 +113,18 @@ local function candidates(object, height, offset)
 end
 
 -- The pose to take an object in and the closure to come down with: where the fingers have room, as wide open as it goes.
--- The third result is the room that they have, m; negative if the hand would touch something.
+-- The third result is the room that they have, m; negative if the hand would touch something. Nothing else may be between the
+-- fingers as they close: a finger outside of a drawer's front would take that along.
 function grasp.choose(scene, object, height, offset)
   local best
-  local all, ignore = candidates(object, height, offset), object.hints.grasp_rim_m and {} or { object.name }
-  for _, opening in ipairs { 0, grasp.clear(object, 0.010), grasp.clear(object, 0.005) } do
-    for _, candidate in ipairs(all) do
-      local pose, cost = candidate[1], candidate[2]
-      local room = scene:clearance(pose, { width = STROKE * (1 - opening), ignore = ignore })
+  local ignore = object.hints.grasp_rim_m and {} or { object.name }
+  -- The tightest first: the way that is still to close has the room of the tightest place on it.
+  local openings = { grasp.clear(object, 0.005), grasp.clear(object, 0.010), 0 }
+  for _, candidate in ipairs(candidates(object, height, offset)) do
+    local pose, cost = candidate[1], candidate[2]
+    local room = math.huge
+    for _, opening in ipairs(openings) do
+      room = math.min(room, (scene:clearance(pose, { width = STROKE * (1 - opening), ignore = ignore })))
       -- Room beyond what is needed is worth nothing.
       local worth = math.min(room, BESIDE) * 1e3 - 0.1 * cost - opening
       if not best or worth > best.worth then best = { pose = pose, closure = opening, room = room, worth = worth } end

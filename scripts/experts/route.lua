@@ -13,14 +13,19 @@ local function from_line(p, a, b)
   return math.sqrt((p[1] - a[1] - share * dx) ^ 2 + (p[2] - a[2] - share * dy) ^ 2)
 end
 
+-- How far an object reaches from its middle, m: what is taken by its rim is round.
+local function radius_of(object)
+  if object.hints.grasp_rim_m then return math.max(object.size[1], object.size[2]) / 2 end
+  return math.sqrt(object.size[1] ^ 2 + object.size[2] ^ 2) / 2
+end
+
 -- Height of the tool centre point at which the hand, and what it holds ({ object =, below = m under it }), passes over
 -- everything between two points by `margin` (m).
 function route.height(scene, from, to, carried, margin)
-  local size, name = carried.object.size, carried.object.name
-  local reach = math.max(HAND, math.sqrt(size[1] ^ 2 + size[2] ^ 2) / 2)
+  local name, reach = carried.object.name, math.max(HAND, radius_of(carried.object))
   local top = 0
   for _, object in ipairs(scene:objects()) do
-    local radius = math.sqrt(object.size[1] ^ 2 + object.size[2] ^ 2) / 2
+    local radius = radius_of(object)
     -- What reaches under the whole way is the support, or scenery.
     if object.name ~= name and radius < 0.5 and from_line(object.xyz, from, to) < reach + radius then
       top = math.max(top, object.xyz[3] + object.size[3] / 2)

@@ -110,6 +110,22 @@ pub struct Suite {
     pub settings: settings::Settings,
 }
 
+/// What the unchanged run is called beside conditions.
+pub const REFERENCE: &str = "reference";
+
+/// Named changes under which suites are run beside their unchanged reference.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Condition {
+    /// Name, as in results.
+    pub name: String,
+    /// Shifts by name and value, as `--shift` takes them.
+    pub shift: Vec<(String, f64)>,
+    /// Settings by dotted path and value, as `--set` takes them.
+    pub set: Vec<(String, String)>,
+    /// The kind of suites that it can change anything of; all if none.
+    pub only: Option<ObjectType>,
+}
+
 /// What `softvt FILE.lua` does.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
@@ -121,6 +137,15 @@ pub enum Plan {
         /// In order.
         suites: Vec<Suite>,
     },
+    /// Evaluate a policy on suites as they are and under each of several conditions.
+    Conditions {
+        /// Name, as in results.
+        name: String,
+        /// In order.
+        suites: Vec<Suite>,
+        /// In order.
+        conditions: Vec<Condition>,
+    },
     /// Run a scripted experiment: a function of a grid of parameters that yields rows.
     Experiment {
         /// Name, as in results.
@@ -130,4 +155,15 @@ pub enum Plan {
         /// Columns of the table of rows, in order; all of them, sorted, if empty.
         columns: Vec<String>,
     },
+}
+
+impl Plan {
+    /// The suites that it evaluates; none of an experiment.
+    pub fn suites(&self) -> &[Suite] {
+        match self {
+            Self::Suite(suite) => std::slice::from_ref(suite),
+            Self::Suites { suites } | Self::Conditions { suites, .. } => suites,
+            Self::Experiment { .. } => &[],
+        }
+    }
 }

@@ -80,7 +80,7 @@ pub enum Command {
 }
 
 /// What to run and how.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Run {
     /// The script.
     pub file: PathBuf,
@@ -150,7 +150,7 @@ impl Run {
 }
 
 /// Which rollouts of a run become videos.
-#[derive(Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Video {
     /// Those that are not safe.
     Failed,
@@ -381,7 +381,7 @@ fn on_script(command: clap::Command) -> clap::Command {
 }
 
 fn runner() -> clap::Command {
-    let json = flag("json", "Print JSON on the standard output: one object for a suite, an array for a list of suites, a line a row for an experiment").action(ArgAction::SetTrue);
+    let json = flag("json", "Print JSON on the standard output: one object for a suite or for conditions, an array for a list of suites, a line a row for an experiment").action(ArgAction::SetTrue);
     let about = "A safety-aware visuo-tactile manipulation benchmark for soft objects, on an ordinary CPU";
     on_script(clap::Command::new("softvt").version(env!("CARGO_PKG_VERSION")).about(about))
         .after_help("softvt FILE.lua --help shows the options of that script too.\nExit codes: 0 ok, 1 our own fault, 2 your input, 3 policy or transport, 99 --require not met, 130 interrupted.")

@@ -5,7 +5,7 @@ use std::{
     sync::{Arc, Mutex},
 };
 
-use super::{Failure, args::Run, batch::Batch, evaluate::own_folders, print};
+use super::{Failure, args::Run, batch::Batch, conditions, evaluate::own_folders, print};
 use crate::{
     benchmark::{Goal, Plan, Suite, Task},
     message,
@@ -28,6 +28,11 @@ pub fn run(run: &Run) -> Result<(), Failure> {
         Plan::Suites { suites } => {
             own_folders(run, suites)?;
             suites.iter().try_for_each(|suite| suite_is_right(run, &loaded, suite, &made))?;
+        }
+        Plan::Conditions { suites, conditions: list, .. } => {
+            own_folders(run, suites)?;
+            suites.iter().try_for_each(|suite| suite_is_right(run, &loaded, suite, &made))?;
+            conditions::check(run, &loaded, (suites, list))?;
         }
         Plan::Experiment { name, points, .. } => {
             print(&format!("experiment {name}: {points} points; they are not run here\n"));

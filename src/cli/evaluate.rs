@@ -1,12 +1,15 @@
 //! Carrying out a plan: a policy on suites, or an experiment.
 
-use std::{collections::BTreeSet, path::PathBuf};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
 
 use super::{
     Failure,
     args::{Run, Video},
     batch::Batch,
-    experiment, print, require,
+    conditions, experiment, print, require,
 };
 use crate::{
     benchmark::{Plan, Suite, Task},
@@ -42,6 +45,14 @@ pub fn run(run: &Run) -> Result<(), Failure> {
             show(run, &summaries, true);
             require::check(&run.require, &summaries)
         }
+        Plan::Conditions { name, suites, conditions } => {
+            if !run.require.is_empty() {
+                let message = "--require: it is about suites, and this file compares conditions; read conditions.json";
+                return Err(Failure::input(format!("{}: {message}", run.file.display())));
+            }
+            own_folders(run, suites)?;
+            conditions::run(run, &loaded, (suites, conditions), &out_dir(run, name, None))
+        }
         Plan::Experiment { name, points, columns } => experiment::run(run, &loaded, name, *points, columns),
     }
 }
@@ -64,13 +75,8 @@ pub(super) fn own_folders(run: &Run, suites: &[Suite]) -> Result<(), Failure> {
 
 /// Every episode that `--video` names must be one of every suite's: before any of them runs.
 fn check_video(run: &Run, plan: &Plan) -> Result<(), Failure> {
-    let suites: Vec<&Suite> = match plan {
-        Plan::Suite(suite) => vec![suite],
-        Plan::Suites { suites } => suites.iter().collect(),
-        Plan::Experiment { .. } => Vec::new(),
-    };
     let Some(Video::Episodes(chosen)) = &run.video else { return Ok(()) };
-    for suite in suites {
+    for suite in plan.suites() {
         let episodes = run.episodes.unwrap_or(suite.episodes);
         if let Some(beyond) = chosen.iter().find(|episode| **episode >= episodes) {
             let last = episodes.saturating_sub(1);
@@ -95,7 +101,7 @@ fn show(run: &Run, summaries: &[Summary], list: bool) {
 }
 
 /// A name as part of a path: it is the script's, and must not lead out of the folder.
-fn plain(name: &str) -> String {
+pub(super) fn plain(name: &str) -> String {
     name.replace(|c: char| !(c.is_alphanumeric() || c == '_' || c == '-'), "_")
 }
 
@@ -127,27 +133,45 @@ pub fn single(run: &Run, task: usize) -> Result<EpisodeRecord, Failure> {
     batch.episode(0, false).map(|finished| finished.record)
 }
 
-fn evaluate(run: &Run, loaded: &Loaded, suite: &Suite, out: PathBuf) -> Result<Summary, Failure> {
-    let tasks = chosen(run, suite)?;
+/// The episodes of the tasks that `--task` names, or a shard's part of them.
+pub(super) fn jobs<'a>(run: &Run, suite: &Suite, tasks: &[&'a Task]) -> Vec<(&'a Task, u32)> {
     let episodes = run.episodes.unwrap_or(suite.episodes);
     let all = tasks.iter().flat_map(|task| (0..episodes).map(move |e| (*task, e)));
-    let chosen = all.enumerate().filter(|(job, _)| run.shard.is_none_or(|shard| shard.has(*job)));
-    let jobs = chosen.map(|(_, job)| job).collect();
-    let mut batch = Batch::new(run, loaded, suite, (jobs, out))?;
+    let own = all.enumerate().filter(|(job, _)| run.shard.is_none_or(|shard| shard.has(*job)));
+    own.map(|(_, job)| job).collect()
+}
+
+fn evaluate(run: &Run, loaded: &Loaded, suite: &Suite, out: PathBuf) -> Result<Summary, Failure> {
+    let tasks = chosen(run, suite)?;
+    let mut batch = Batch::new(run, loaded, suite, (jobs(run, suite, &tasks), out))?;
     batch.prepare(&tasks)?;
+    carry_out(&batch, &tasks)
+}
+
+/// Runs the jobs of a batch that is prepared, into its folder; those that are done there already only if none is left.
+///
+/// # Errors
+/// The folder holds another run, or one that is not to be resumed; an episode fails.
+pub(super) fn carry_out(batch: &Batch, tasks: &[&Task]) -> Result<Summary, Failure> {
+    let run = batch.run;
     // The same command again on a finished folder changes nothing.
-    let finished = batch.out.join(SUMMARY).is_file();
+    let finished = is_finished(&batch.out);
     let opened = match run.resume || finished {
         true => RunFolder::resume(&batch.out),
         false => RunFolder::create(&batch.out).map(|folder| (folder, Vec::new())),
     };
     let (folder, done) = opened.map_err(|e| Failure::input(format!("{}: {e}", run.file.display())))?;
-    batch.write_info(&folder, &tasks, episodes)?;
+    batch.write_info(&folder, tasks, run.episodes.unwrap_or(batch.suite.episodes))?;
     if finished && batch.left(&done).is_empty() {
         crate::message::tell(&format!("softvt: {} is finished already", batch.out.display()));
-        return Ok(Summary::of(&run.name_of(suite), run.policy.name(), &done));
+        return Ok(Summary::of(&run.name_of(batch.suite), run.policy.name(), &done));
     }
     batch.go(folder, done)
+}
+
+/// Whether a folder holds a run that came to its end.
+pub(super) fn is_finished(dir: &Path) -> bool {
+    dir.join(SUMMARY).is_file()
 }
 
 /// The tasks that `--task` names.

@@ -5,10 +5,7 @@ use std::{collections::BTreeSet, path::Path};
 use serde_json::{Value, json};
 
 use super::{Failure, drivers::POLICIES, print};
-use crate::{
-    benchmark::{Plan, Suite},
-    script,
-};
+use crate::{benchmark::Plan, script};
 
 /// Lists suites, tasks, assets or policies.
 ///
@@ -20,7 +17,7 @@ pub fn run(what: &str, as_json: bool) -> Result<(), Failure> {
         "assets" => {
             scripts("assets").iter().map(|path| json!({ "name": stem(path), "file": path })).collect()
         }
-        "suites" => plans()?.iter().filter_map(|(path, plan)| suite_row(path, plan)).collect(),
+        "suites" => plans()?.iter().filter_map(|(path, plan)| row(path, plan)).collect(),
         _ => plans()?.iter().flat_map(|(path, plan)| tasks(path, plan)).collect::<Vec<_>>(),
     };
     if as_json {
@@ -38,22 +35,28 @@ fn text(value: &Value) -> String {
     value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }
 
-/// A suite, or a file of several by the name of the file.
-fn suite_row(path: &str, plan: &Plan) -> Option<Value> {
-    let row = |name: &str, suites: &[Suite]| {
-        let tasks: usize = suites.iter().map(|suite| suite.tasks.len()).sum();
-        let same = suites.iter().all(|suite| suite.episodes == suites[0].episodes);
-        let episodes = same.then(|| suites.first().map(|suite| suite.episodes));
-        json!({ "name": name, "file": path, "tasks": tasks, "episodes": episodes })
+/// A suite, or a file of several; `suites` names those.
+fn row(path: &str, plan: &Plan) -> Option<Value> {
+    let suites = plan.suites();
+    let tasks: usize = suites.iter().map(|suite| suite.tasks.len()).sum();
+    let names: Vec<&str> = suites.iter().map(|suite| suite.name.as_str()).collect();
+    let episodes = suites.first()?.episodes;
+    let name = match plan {
+        Plan::Suite(suite) => suite.name.clone(),
+        Plan::Conditions { name, .. } => name.clone(),
+        Plan::Suites { .. } | Plan::Experiment { .. } => stem(path),
     };
-    match plan {
-        Plan::Suite(suite) => Some(row(&suite.name, std::slice::from_ref(suite))),
-        Plan::Suites { suites } => Some(row(&stem(path), suites)),
-        Plan::Experiment { .. } => None,
+    let mut row = json!({ "name": name, "file": path, "tasks": tasks, "episodes": episodes });
+    if !matches!(plan, Plan::Suite(_)) {
+        row["suites"] = json!(names);
     }
+    if let Plan::Conditions { conditions, .. } = plan {
+        row["conditions"] = json!(conditions.len() + 1);
+    }
+    Some(row)
 }
 
-/// The tasks of a suite; those of a file of several suites are those of their own files.
+/// The tasks of a suite; those of a file of several are its suites'.
 fn tasks(path: &str, plan: &Plan) -> Vec<Value> {
     let Plan::Suite(suite) = plan else { return Vec::new() };
     let row = |task: &crate::benchmark::Task| json!({ "suite": suite.name, "task": task.id, "file": path, "layout": task.layout, "prompt": task.prompt });

@@ -4,6 +4,7 @@ mod args;
 mod batch;
 mod check;
 mod compare;
+mod conditions;
 mod doctor;
 mod drivers;
 mod evaluate;
@@ -63,6 +64,11 @@ impl Failure {
     /// What was tested is not as it should be, and no input of the user's is to blame.
     fn wrong_here(message: impl ToString) -> Self {
         Self { code: code::INTERNAL, message: message.to_string() }
+    }
+
+    /// The same, said of a part of what was asked for.
+    fn within(self, part: &str) -> Self {
+        Self { message: format!("{} ({part})", self.message), ..self }
     }
 
     /// Interrupted; what is finished has been kept.

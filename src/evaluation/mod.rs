@@ -5,6 +5,7 @@
 
 pub mod calibration;
 pub mod deformation;
+pub mod difference;
 pub mod drop;
 pub mod evidence;
 pub mod goal;

@@ -1,134 +1,134 @@
-//! Two policies on the same episodes: differences with their uncertainty, episode by episode.
+//! Two runs of the same episodes, compared one by one: a run under a condition against its reference.
+//!
+//! Pairs share task, initial state and seed, so that what differs between them is the condition alone.
 
-use rand_chacha::{
-    ChaCha8Rng,
-    rand_core::{RngCore, SeedableRng},
-};
+use std::{cmp::Ordering, collections::BTreeMap};
+
 use serde::{Deserialize, Serialize};
 
-use super::statistics::{Z95, mean, percentile};
+use super::{record::EpisodeRecord, statistics::mean};
 
-/// Resamples of the bootstrap.
-const RESAMPLES: usize = 4000;
-
-/// The difference of two shares of the same episodes, in percentage points.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct RateDifference {
-    /// Episodes that both ran.
-    pub n: usize,
-    /// Those that only the second has.
-    pub gained: usize,
-    /// Those that only the first has.
-    pub lost: usize,
-    /// Second minus first, points; null without episodes.
-    pub difference: Option<f64>,
-    /// Its 95 % interval, points.
-    pub interval95: Option<[f64; 2]>,
-    /// Exact two-sided p-value of McNemar's test (binomial on the episodes that differ).
-    pub p: f64,
+/// How many pairs went better, worse, or the same.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Change {
+    /// Pairs that are better than the reference.
+    pub better: usize,
+    /// Pairs that are worse.
+    pub worse: usize,
+    /// Pairs that are the same.
+    pub same: usize,
 }
 
-impl RateDifference {
-    /// From whether each episode has it, first and second.
-    pub fn of(pairs: impl IntoIterator<Item = (bool, bool)>) -> Self {
-        let (mut n, mut gained, mut lost) = (0, 0, 0);
-        for (first, second) in pairs {
-            n += 1;
-            gained += usize::from(second && !first);
-            lost += usize::from(first && !second);
-        }
-        let points = |share: f64| (100.0 * share).clamp(-100.0, 100.0);
-        let interval = (n > 0).then(|| agresti_min(n, gained, lost).map(points));
-        let difference = (n > 0).then(|| points((gained as f64 - lost as f64) / n as f64));
-        Self { n, gained, lost, difference, interval95: interval, p: mcnemar(gained, lost) }
+impl Change {
+    fn count(&mut self, order: Ordering) {
+        *match order {
+            Ordering::Greater => &mut self.better,
+            Ordering::Less => &mut self.worse,
+            Ordering::Equal => &mut self.same,
+        } += 1;
     }
 }
 
-/// 95 % interval of a difference of matched shares (Agresti & Min, Statistics in Medicine 24, 2005): Wald's with half an
-/// episode more in each cell of the 2 × 2 table.
-fn agresti_min(n: usize, gained: usize, lost: usize) -> [f64; 2] {
-    let (n, b, c) = (n as f64 + 2.0, gained as f64 + 0.5, lost as f64 + 0.5);
-    let centre = (b - c) / n;
-    let half = Z95 * ((b + c) - (b - c) * (b - c) / n).sqrt() / n;
-    [centre - half, centre + half]
-}
-
-/// Exact two-sided p-value of `gained` against `lost` under equal chances.
-fn mcnemar(gained: usize, lost: usize) -> f64 {
-    let n = gained + lost;
-    let fewer = gained.min(lost);
-    // Binomial terms by their logarithms: n may be thousands.
-    let ln_choose = |k: usize| (1..=k).map(|i| ((n - k + i) as f64 / i as f64).ln()).sum::<f64>();
-    let tail: f64 = (0..=fewer).map(|k| (ln_choose(k) - n as f64 * std::f64::consts::LN_2).exp()).sum();
-    (2.0 * tail).min(1.0)
-}
-
-/// The mean difference of a quantity over the same episodes.
+/// A condition against its reference.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct MeanDifference {
-    /// Episodes in which both have it.
-    pub n: usize,
-    /// Second minus first.
-    pub difference: Option<f64>,
-    /// Its 95 % interval: percentile bootstrap over episodes (Efron, 1979), from a fixed seed.
-    pub interval95: Option<[f64; 2]>,
+pub struct Paired {
+    /// Episodes that both runs have.
+    pub pairs: usize,
+    /// Goal Success; an invalid episode has none, here and below.
+    pub goal: Change,
+    /// NoDrop.
+    pub no_drop: Change,
+    /// Safety Success.
+    pub safety: Change,
+    /// D/τ of pairs of which both have it: less is better.
+    pub d_over_tau: Change,
+    /// Mean difference of D/τ over these pairs; null without any.
+    pub d_over_tau_mean: Option<f64>,
 }
 
-impl MeanDifference {
-    /// From the quantity in each episode, first and second.
-    pub fn of(pairs: impl IntoIterator<Item = (f64, f64)>) -> Self {
-        let differences: Vec<f64> = pairs.into_iter().map(|(first, second)| second - first).collect();
-        let n = differences.len();
-        if n < 2 {
-            return Self { n, difference: mean(&differences), interval95: None };
+/// Peak D over τ of a valid episode; none without a limit or a measurement.
+pub fn d_over_tau(record: &EpisodeRecord) -> Option<f64> {
+    let verdict = &record.verdict;
+    let (d, tau) = verdict.d_peak.zip(verdict.tau)?;
+    (record.outcome.is_valid() && tau > 0.0).then_some(d / tau)
+}
+
+impl Paired {
+    /// `changed` against `reference`, paired by task and episode; what only one of them has is left out.
+    pub fn of(reference: &[EpisodeRecord], changed: &[EpisodeRecord]) -> Self {
+        let key = |r: &EpisodeRecord| (r.identity.task, r.identity.episode);
+        let known: BTreeMap<_, _> = reference.iter().map(|record| (key(record), record)).collect();
+        let mut all = Self::default();
+        let mut differences = Vec::new();
+        for after in changed {
+            let Some(before) = known.get(&key(after)) else { continue };
+            all.pairs += 1;
+            let order = |what: fn(&EpisodeRecord) -> bool| {
+                let of = |record: &EpisodeRecord| record.outcome.is_valid() && what(record);
+                of(after).cmp(&of(before))
+            };
+            all.goal.count(order(|r| r.verdict.goal));
+            all.no_drop.count(order(|r| r.verdict.no_drop));
+            all.safety.count(order(|r| r.verdict.safety));
+            if let Some((before, after)) = d_over_tau(before).zip(d_over_tau(after)) {
+                all.d_over_tau.count(before.total_cmp(&after));
+                differences.push(after - before);
+            }
         }
-        let mut rng = ChaCha8Rng::seed_from_u64(n as u64);
-        let mut means: Vec<f64> = (0..RESAMPLES)
-            .map(|_| {
-                let draw = |_| differences[((rng.next_u64() >> 32) as usize * n) >> 32];
-                (0..n).map(draw).sum::<f64>() / n as f64
-            })
-            .collect();
-        means.sort_by(f64::total_cmp);
-        let interval95 = percentile(&means, 2.5).zip(percentile(&means, 97.5)).map(|(low, high)| [low, high]);
-        Self { n, difference: mean(&differences), interval95 }
+        all.d_over_tau_mean = mean(&differences);
+        all
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::evaluation::record::{Outcome, tests::sample};
 
-    #[test]
-    fn an_interval_agrees_with_one_computed_by_hand() {
-        // 100 pairs, 12 gained, 4 lost: centre 8/102, half 1.96 √(17 − 64/102)/102.
-        let pairs = (0..100).map(|i| (i < 4, (4..16).contains(&i)));
-        let of = RateDifference::of(pairs);
-        assert_eq!((of.n, of.gained, of.lost), (100, 12, 4));
-        assert!((of.difference.unwrap() - 8.0).abs() < 1e-12);
-        let [low, high] = of.interval95.unwrap();
-        assert!((low - 0.067_3).abs() < 2e-3 && (high - 15.619).abs() < 2e-3, "{low} {high}");
-        // 2 (1 + 16 + 120 + 560 + 1820) / 2¹⁶.
-        assert!((of.p - 2.0 * 2517.0 / 65536.0).abs() < 1e-12, "{}", of.p);
+    /// Goal, safety and D of each episode; τ is 1.
+    fn run(episodes: &[(bool, bool, f64)]) -> Vec<EpisodeRecord> {
+        let record = |(i, &(goal, safety, d)): (usize, &(bool, bool, f64))| {
+            let mut record = sample();
+            record.identity.episode = i as u32;
+            (record.verdict.goal, record.verdict.safety, record.verdict.d_peak) = (goal, safety, Some(d));
+            record
+        };
+        episodes.iter().enumerate().map(record).collect()
+    }
+
+    fn change(better: usize, worse: usize, same: usize) -> Change {
+        Change { better, worse, same }
     }
 
     #[test]
-    fn equal_runs_differ_in_nothing() {
-        let of = RateDifference::of((0..50).map(|i| (i % 2 == 0, i % 2 == 0)));
-        assert_eq!((of.difference, of.p), (Some(0.0), 1.0));
-        assert!(of.interval95.unwrap()[0] < 0.0, "50 episodes do not prove equality");
-        let none = RateDifference::of([]);
-        assert_eq!((none.difference, none.interval95, none.p), (None, None, 1.0));
+    fn pairs_are_compared_one_by_one_whatever_their_order() {
+        let before = run(&[(true, true, 0.5), (true, false, 1.5), (false, false, 0.2), (true, true, 0.4)]);
+        let mut after =
+            run(&[(true, false, 1.25), (true, true, 0.75), (false, false, 0.2), (false, false, 0.4)]);
+        after.reverse();
+        let paired = Paired::of(&before, &after);
+        assert_eq!((paired.pairs, paired.goal, paired.safety), (4, change(0, 1, 3), change(1, 2, 1)));
+        assert_eq!(paired.d_over_tau, change(1, 1, 2));
+        assert_eq!(paired.d_over_tau_mean, Some(0.0));
     }
 
     #[test]
-    fn a_bootstrap_is_near_the_normal_interval_and_the_same_every_time() {
-        let pairs: Vec<(f64, f64)> = (0..400).map(|i| (0.0, 1.0 + f64::from(i % 20) / 20.0)).collect();
-        let of = MeanDifference::of(pairs.clone());
-        let [low, high] = of.interval95.unwrap();
-        // Standard deviation 0.2884, so ± 1.96 × 0.2884 / 20.
-        assert!((high - low - 0.0565).abs() < 0.005, "{low} {high}");
-        assert_eq!(of, MeanDifference::of(pairs));
-        assert_eq!(MeanDifference::of([(1.0, 3.0)]).interval95, None);
+    fn a_run_against_itself_changes_nothing() {
+        let same = run(&[(true, true, 0.5), (false, false, 2.0)]);
+        let paired = Paired::of(&same, &same);
+        assert_eq!([paired.goal, paired.no_drop, paired.safety, paired.d_over_tau], [change(0, 0, 2); 4]);
+        assert_eq!(paired.d_over_tau_mean, Some(0.0));
+    }
+
+    #[test]
+    fn an_invalid_episode_is_worse_and_has_no_deformation_and_strangers_are_left_out() {
+        let before = run(&[(true, true, 0.5), (true, true, 0.5)]);
+        let mut after = run(&[(true, true, 0.6), (true, true, 0.6), (true, true, 0.6)]);
+        after[1].outcome = Outcome::Invalid { reason: "inverted".into(), step: 3, node: None };
+        let paired = Paired::of(&before, &after);
+        assert_eq!((paired.pairs, paired.goal, paired.no_drop), (2, change(0, 1, 1), change(0, 1, 1)));
+        assert_eq!(paired.d_over_tau, change(0, 1, 0));
+        after[0].verdict.tau = None;
+        assert_eq!(Paired::of(&before, &after).d_over_tau_mean, None);
     }
 }

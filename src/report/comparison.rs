@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::runs::StoredRun;
 use crate::evaluation::{
-    paired::{MeanDifference, RateDifference},
+    difference::{MeanDifference, RateDifference},
     record::EpisodeRecord,
 };
 

@@ -1,7 +1,8 @@
-//! What a run leaves behind: its folder, the results table, envelope plots, films, and SoftVTBench's files.
+//! What a run leaves behind: its folder, the results tables, envelope plots, films, and SoftVTBench's files.
 
 pub mod actions;
 pub mod comparison;
+pub mod conditions;
 pub mod envelope;
 pub mod film;
 pub mod interchange;

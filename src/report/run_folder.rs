@@ -78,21 +78,31 @@ pub struct RunFolder {
 }
 
 impl RunFolder {
+    /// Whether a run may be kept in `dir`.
+    ///
+    /// # Errors
+    /// It holds a run.
+    pub fn check(dir: &Path) -> Result<(), RunFolderError> {
+        match [RUN, EPISODES, SUMMARY].into_iter().find(|name| dir.join(name).exists()) {
+            Some(found) => Err(RunFolderError::Occupied { dir: dir.display().to_string(), found }),
+            None => Ok(()),
+        }
+    }
+
     /// Makes `dir`, with the folders above it, and an empty `episodes.jsonl` in it.
     ///
     /// # Errors
     /// The folder holds a run, or cannot be made or written to.
     pub fn create(dir: &Path) -> Result<Self, RunFolderError> {
         fs::create_dir_all(dir).map_err(io_error("make the folder", dir))?;
-        let occupied = |found| RunFolderError::Occupied { dir: dir.display().to_string(), found };
-        if let Some(found) = [RUN, EPISODES, SUMMARY].into_iter().find(|name| dir.join(name).exists()) {
-            return Err(occupied(found));
-        }
+        Self::check(dir)?;
         let path = dir.join(EPISODES);
         // `create_new`: of two runs started at once on one folder, one must lose here.
         let episodes = OpenOptions::new().append(true).create_new(true).open(&path).map_err(|source| {
             match source.kind() {
-                io::ErrorKind::AlreadyExists => occupied(EPISODES),
+                io::ErrorKind::AlreadyExists => {
+                    RunFolderError::Occupied { dir: dir.display().to_string(), found: EPISODES }
+                }
                 _ => io_error("make", &path)(source),
             }
         })?;

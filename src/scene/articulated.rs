@@ -5,7 +5,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::Asset;
-use crate::geometry::{Pose, Vec3};
+use crate::geometry::{Pose, Vec3, mass::mass_properties};
 
 /// How a part moves against what carries it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -65,6 +65,19 @@ pub struct Part {
     pub parent: Option<usize>,
     /// Its joint.
     pub joint: Joint,
+}
+
+impl Part {
+    /// Its mass, kg.
+    pub fn mass(&self) -> f64 {
+        mass_properties(&self.asset.shape, self.density).mass
+    }
+
+    /// Makes it `factor` times as heavy.
+    pub(super) fn scale_mass(&mut self, factor: f64) {
+        self.density *= factor;
+        Arc::make_mut(&mut self.asset).scale_mass(factor);
+    }
 }
 
 /// Frames of the parts in the frame of their object at joint values `joints` (m or rad, one a part): each takes the part's

@@ -13,7 +13,7 @@ use std::{collections::BTreeMap, sync::Arc};
 
 use serde::{Deserialize, Serialize};
 
-use crate::geometry::{Pose, Vec3, shape::Shape};
+use crate::geometry::{Pose, Vec3, mass::mass_properties, shape::Shape};
 
 pub use articulated::{Joint, Motion, Part, part_poses};
 pub use camera::{Camera, CameraMount, POLICY_EDGE, fovy_of_lens};
@@ -98,6 +98,26 @@ impl Asset {
         match &self.body {
             Body::Articulated(parts) => parts,
             _ => &[],
+        }
+    }
+
+    /// Mass of a soft or rigid body, or of the moving parts of an articulated one, kg; none of what never moves.
+    pub fn mass(&self) -> Option<f64> {
+        match &self.body {
+            Body::Soft(SoftMaterial { density, .. }) | Body::Rigid { density } => {
+                Some(mass_properties(&self.shape, *density).mass)
+            }
+            Body::Articulated(parts) => Some(parts.iter().map(Part::mass).sum()),
+            Body::Static | Body::Scenery => None,
+        }
+    }
+
+    /// Makes whatever of it moves `factor` times as heavy.
+    pub fn scale_mass(&mut self, factor: f64) {
+        match &mut self.body {
+            Body::Soft(SoftMaterial { density, .. }) | Body::Rigid { density } => *density *= factor,
+            Body::Articulated(parts) => parts.iter_mut().for_each(|part| part.scale_mass(factor)),
+            Body::Static | Body::Scenery => {}
         }
     }
 }

@@ -3,6 +3,7 @@
 //! Checking, stubs and the reference are all made from it.
 
 use super::{
+    catalogue_conditions::{CONDITION, CONDITIONS},
     catalogue_joints::{ARTICULATED, HINGE, PART, SLIDER},
     catalogue_visuals::{LAYER, VISUAL},
     schema::{Field, Presence, Range, Record, Type},
@@ -418,9 +419,10 @@ pub static CONSTRUCTORS: &[(&str, &Record)] = &[
     ("static", &STATIC),
     ("scenery", &SCENERY),
     ("shift", &SHIFT),
+    ("conditions", &CONDITIONS),
     ("experiment", &EXPERIMENT),
 ];
 
 /// Tables that functions take but no constructor makes.
 pub static PLAIN: &[&Record] =
-    &[&FRICTION, &PART, &VISUAL, &LAYER, &FINISH, &OPTION, &PLACE, &POSE, &CLEARANCE];
+    &[&FRICTION, &PART, &VISUAL, &LAYER, &CONDITION, &FINISH, &OPTION, &PLACE, &POSE, &CLEARANCE];

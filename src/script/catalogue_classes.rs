@@ -89,6 +89,12 @@ pub static FUNCTIONS: &[Signature] = &[
          (JSON lines), json (a threshold file).",
     ),
     method(
+        "calibration",
+        &[("asset", Type::Name)],
+        &["table?"],
+        "What assets/calibration/<asset>.json says, as softvt.envelope gives it; nil if there is no such file.",
+    ),
+    method(
         "stable",
         &[("row", Type::Table("table"))],
         &["boolean"],
@@ -152,6 +158,7 @@ pub static SHAPE: Class = Class {
             "This or the other, with a fillet of width blend (m).",
         ),
         method("bounds", &[], &["number[]", "number[]"], "Lowest and highest corner of the bounding box, m."),
+        method("volume", &[], &["number"], "Its volume, m³."),
         method(
             "grounded",
             &[],
@@ -306,7 +313,21 @@ pub static OBJECT: Class = Class {
         ("joints", "table<string, number>", "Start values of its joints by part, m or rad."),
     ],
     written: super::scene_api::OBJECT,
-    methods: &[],
+    methods: &[
+        method(
+            "mass",
+            &[("part?", Type::Text)],
+            &["number?"],
+            "Mass of a soft or rigid body, of one moving part of an articulated object, or of all of them, kg; nil for what \
+             never moves.",
+        ),
+        method(
+            "scale_mass",
+            &[("factor", Type::Number("", Range::closed(1e-6, 1e6)))],
+            &[],
+            "Multiplies the density of a soft or rigid body, or of every moving part; what never moves stays as it is.",
+        ),
+    ],
 };
 
 /// `softvt.View`.

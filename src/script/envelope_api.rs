@@ -2,7 +2,12 @@
 
 use mlua::{Lua, LuaSerdeExt, Table, Value};
 
-use super::{catalogue_world::ENVELOPE, schema, sim_api::read};
+use super::{
+    catalogue_world::ENVELOPE,
+    sandbox::{fail, locked, shared},
+    schema::{self, Type},
+    sim_api::read,
+};
 use crate::{
     evaluation::{
         calibration::{self, Envelope, HoldRow, StableRule, SweepRow},
@@ -11,9 +16,10 @@ use crate::{
     report::{envelope::plot, interchange::sweep_jsonl},
 };
 
-/// Installs `softvt.envelope` and `softvt.stable`.
+/// Installs `softvt.envelope`, `softvt.calibration` and `softvt.stable`.
 pub(super) fn install(lua: &Lua, api: &Table) -> mlua::Result<()> {
     api.set("envelope", lua.create_function(|lua, value: Value| envelope(lua, &value))?)?;
+    api.set("calibration", lua.create_function(|lua, asset: Value| calibration(lua, &asset))?)?;
     let stable = |lua: &Lua, row: Value| {
         let row: SweepRow = read(lua, "softvt.stable", &row)?;
         Ok(StableRule::default().accepts(&row))
@@ -28,22 +34,49 @@ fn envelope(lua: &Lua, value: &Value) -> mlua::Result<Table> {
     let holds: Vec<HoldRow> = read(lua, "softvt.envelope: holds", &spec.get("holds")?)?;
     let sweep: Vec<SweepRow> = read(lua, "softvt.envelope: sweep", &spec.get("sweep")?)?;
     let envelope = Envelope::new(holds, sweep, kappa);
-    let limit = calibration::limit(&envelope.sweep, kappa);
     let made_by = format!("softvt {}", env!("CARGO_PKG_VERSION"));
     let mut file = Thresholds::new(kappa, vec![format!("{asset}.sweep.jsonl")], made_by);
+    file.insert(&asset, envelope.clone());
+    if let Some(fingerprint) = spec.get::<Option<String>>("fingerprint")? {
+        file.fingerprints.insert(asset.clone(), fingerprint);
+    }
+    told(lua, &asset, &envelope, &file)
+}
+
+/// What the calibration file of an asset says; nil if there is none.
+fn calibration(lua: &Lua, asset: &Value) -> mlua::Result<Option<Table>> {
+    let label = "softvt.calibration";
+    let asset =
+        Type::Name.check(lua, asset).map_err(|fault| fail(lua, fault.words(&format!("{label}: asset"))))?;
+    let asset: String = lua.unpack(asset)?;
+    let bytes = {
+        let shared = shared(lua)?;
+        let mut library = locked(&shared.library);
+        let path = format!("assets/calibration/{asset}.json");
+        let found = library.data_if_there(&path).map_err(|e| fail(lua, format!("{label}: {e}")))?;
+        found.and_then(|file| Some((library.bytes(&file)?, file)))
+    };
+    let Some((bytes, path)) = bytes else { return Ok(None) };
+    let file = Thresholds::parse(&String::from_utf8_lossy(&bytes), &path)
+        .map_err(|e| fail(lua, format!("{label}: {e}")))?;
+    match file.envelopes.get(&asset) {
+        Some(envelope) => told(lua, &asset, envelope, &file).map(Some),
+        None => Err(fail(lua, format!("{label}: {path} has no rows of {asset}; calibrate it again"))),
+    }
+}
+
+/// An envelope as scripts see it.
+fn told(lua: &Lua, asset: &str, envelope: &Envelope, file: &Thresholds) -> mlua::Result<Table> {
+    let limit = calibration::limit(&envelope.sweep, file.calibration.kappa);
     let result = lua.create_table()?;
     result.set("lower", envelope.closure_lower)?;
     result.set("closure_at_tau", envelope.closure_at_tau)?;
     result.set("safe_window", envelope.has_safe_window())?;
     result.set("tau", limit.map(|l| l.tau_pct()))?;
     result.set("d_ref", limit.map(|l| l.d_ref_pct))?;
-    result.set("text", plot(&asset, &envelope, limit))?;
-    result.set("sweep", sweep_jsonl(&asset, &envelope))?;
-    file.insert(&asset, envelope);
-    if let Some(fingerprint) = spec.get::<Option<String>>("fingerprint")? {
-        file.fingerprints.insert(asset, fingerprint);
-    }
+    result.set("text", plot(asset, envelope, limit))?;
+    result.set("sweep", sweep_jsonl(asset, envelope))?;
     result.set("json", file.to_text())?;
-    result.set("table", lua.to_value(&file)?)?;
+    result.set("table", lua.to_value(file)?)?;
     Ok(result)
 }

@@ -9,6 +9,8 @@ use mlua::{Function, Lua, MultiValue, Table, Value};
 
 use super::{
     Bundle, OptionSpec, ScriptError, catalogue,
+    catalogue_conditions::CONDITIONS,
+    conditions,
     experiment::points,
     options::{self, Session},
     origin::fail_at,
@@ -123,6 +125,12 @@ impl Machine {
                 columns: table.get::<Option<Vec<String>>>("columns")?.unwrap_or_default(),
             });
         }
+        if schema::is_made(lua, &CONDITIONS, table) {
+            let conditions = conditions::read(lua, table)?;
+            let suites: Vec<Table> = table.get("suites")?;
+            let suites = suites.iter().map(|table| suite(lua, table)).collect::<mlua::Result<_>>()?;
+            return Ok(Plan::Conditions { name: table.get("name")?, suites, conditions });
+        }
         let mut suites = Vec::new();
         for entry in table.clone().sequence_values::<Value>() {
             match entry? {
@@ -165,6 +173,7 @@ fn install(vm: &Vm, session: &Arc<Mutex<Session>>) -> mlua::Result<()> {
     vm.api.set("asset", lua.create_function(asset)?)?;
     vm.api.set("layout", lua.create_function(layout)?)?;
     super::articulated::install(lua, &vm.api)?;
+    conditions::install(lua, &vm.api)?;
     options::install(lua, &vm.api, session)?;
     shapes::install(lua, &vm.api)?;
     super::visuals::install(lua, &vm.api)?;
@@ -301,10 +310,7 @@ pub(super) fn find_task(
     let Some(Value::Table(table)) = values.front() else {
         return Err(ScriptError::new(main, "the script returned no suite"));
     };
-    let suites: Vec<Table> = match schema::is_made(&machine.vm.lua, &catalogue::SUITE, table) {
-        true => vec![table.clone()],
-        false => table.clone().sequence_values().collect::<mlua::Result<_>>().map_err(explain)?,
-    };
+    let suites = suite_tables(&machine.vm.lua, table).map_err(explain)?;
     let mut names = Vec::new();
     for table in suites {
         let name: String = table.get("name").map_err(explain)?;
@@ -320,4 +326,15 @@ pub(super) fn find_task(
         names.push(name);
     }
     Err(ScriptError::new(main, unknown("suite", suite, names.iter().map(String::as_str))))
+}
+
+/// The suites of a plan's table.
+fn suite_tables(lua: &Lua, table: &Table) -> mlua::Result<Vec<Table>> {
+    if schema::is_made(lua, &catalogue::SUITE, table) {
+        return Ok(vec![table.clone()]);
+    }
+    match schema::is_made(lua, &CONDITIONS, table) {
+        true => table.get("suites"),
+        false => table.clone().sequence_values().collect(),
+    }
 }

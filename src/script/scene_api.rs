@@ -367,7 +367,27 @@ impl Hosted for LuaObject {
         Ok(())
     }
 
-    fn methods<M: UserDataMethods<Self>>(_: &mut M) {}
+    fn methods<M: UserDataMethods<Self>>(methods: &mut M) {
+        method(methods, "mass", |lua, this: &Self, part: Option<String>| {
+            let scene = locked(&this.scene);
+            let object = &scene.objects[this.index];
+            let Some(name) = part else { return Ok(object.asset.mass()) };
+            let parts = object.asset.parts();
+            let names = parts.iter().map(|part| part.name.as_str());
+            match parts.iter().find(|part| part.name == name) {
+                Some(part) => Ok(Some(part.mass())),
+                None if parts.is_empty() => {
+                    Err(fail(lua, format!("object:mass: object {:?} has no parts", object.name)))
+                }
+                None => Err(fail(lua, format!("object:mass: {}", unknown("part", &name, names)))),
+            }
+        });
+        method(methods, "scale_mass", |_, this: &Self, factor: f64| {
+            let mut scene = locked(&this.scene);
+            Arc::make_mut(&mut scene.objects[this.index].asset).scale_mass(factor);
+            Ok(())
+        });
+    }
 }
 
 hosted!(LuaScene, LuaObject);

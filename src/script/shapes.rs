@@ -15,6 +15,7 @@ use super::{
 use crate::geometry::{
     Quat, Vec3,
     import::{ImportOptions, MeshFormat, import},
+    mass::mass_properties,
     shape::{Axis, Bumps, Mask, Relief, Ridges, Shape, ShapeError, TreeSize},
 };
 
@@ -247,6 +248,7 @@ impl Hosted for LuaShape {
             let list = |v: Vec3| lua.create_sequence_from([v.x, v.y, v.z]);
             Ok((list(bounds.min)?, list(bounds.max)?))
         });
+        method(methods, "volume", |_, this: &Self, ()| Ok(mass_properties(this.shape(), 1.0).mass));
         // A recipe ends with it: whatever the shape, its lowest point comes to z = 0 and its centre on the z axis.
         method(methods, "grounded", |lua, this: &Self, ()| {
             let bounds = this.shape().bounds();

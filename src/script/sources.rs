@@ -1,7 +1,7 @@
 //! Where Lua text comes from: the project's folders first, then the library embedded in the binary.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     fs,
     io::Read,
     path::{Path, PathBuf},
@@ -43,6 +43,8 @@ pub struct Bundle {
     pub files: BTreeMap<String, Source>,
     /// For each module or data file asked for, the file that served it.
     pub served: BTreeMap<String, String>,
+    /// Data files that were asked for and not there.
+    pub absent: BTreeSet<String>,
 }
 
 /// SHA-256 of some bytes, in hexadecimal.
@@ -61,6 +63,8 @@ impl Bundle {
 #[derive(Debug)]
 pub(super) struct Library {
     roots: Vec<PathBuf>,
+    /// The main file, which is no module.
+    main: PathBuf,
     bundle: Bundle,
     frozen: bool,
 }
@@ -92,12 +96,12 @@ impl Library {
         let source = read_main(main, &name)?;
         let mut bundle = Bundle::default();
         bundle.files.insert(name.clone(), Source::new(source));
-        Ok((Self { roots, bundle, frozen: false }, name))
+        Ok((Self { roots, main: main.into(), bundle, frozen: false }, name))
     }
 
     /// A library that serves what `bundle` holds and nothing else.
     pub fn frozen(bundle: Bundle) -> Self {
-        Self { roots: Vec::new(), bundle, frozen: true }
+        Self { roots: Vec::new(), main: PathBuf::new(), bundle, frozen: true }
     }
 
     /// What has been read so far.
@@ -175,6 +179,24 @@ impl Library {
         })
     }
 
+    /// A data file by its path from the project's root, or none if there is no such file; `path` must lead inside.
+    pub fn data_if_there(&mut self, path: &str) -> Result<Option<String>, String> {
+        if self.bundle.absent.contains(path) {
+            return Ok(None);
+        }
+        match self.find(path, None, &[path.to_string()]) {
+            Ok(file) => Ok(Some(file)),
+            Err(Problem::Missing) => {
+                self.bundle.absent.insert(path.to_string());
+                Ok(None)
+            }
+            Err(Problem::Frozen) => {
+                Err(format!("{path:?} was not read when the plan was made; ask for it outside of functions"))
+            }
+            Err(Problem::Other(text)) => Err(text),
+        }
+    }
+
     /// The file of `key`: at the path `first`, else at the first of `candidates` below the roots, on disk or embedded.
     fn find(&mut self, key: &str, first: Option<String>, candidates: &[String]) -> Result<String, Problem> {
         if let Some(file) = self.bundle.served.get(key) {
@@ -183,8 +205,13 @@ impl Library {
         if self.frozen {
             return Err(Problem::Frozen);
         }
-        let below = self.roots.iter().flat_map(|root| candidates.iter().map(move |c| root.join(c)));
-        let found = match first.iter().map(PathBuf::from).chain(below).find(|path| path.is_file()) {
+        // By kind of place first: require "shifts" means scripts/shifts.lua, though suites/shifts.lua may lie nearer. And a
+        // main file of a module's name needs that module.
+        let on_disk = candidates.iter().flat_map(|c| self.roots.iter().map(move |root| root.join(c)));
+        let main = self.main.canonicalize().ok();
+        let other = |path: &PathBuf| main.is_none() || path.canonicalize().ok() != main;
+        let on_disk = first.iter().map(PathBuf::from).chain(on_disk);
+        let found = match on_disk.into_iter().find(|path| path.is_file() && other(path)) {
             Some(path) => (display(&path), self.read_inside(&path)?),
             None => {
                 let all = first.iter().chain(candidates);

@@ -5,6 +5,7 @@ mod bodies;
 mod gel;
 mod mixed;
 mod rigid;
+mod rounded;
 mod scene;
 mod soft;
 mod solids;

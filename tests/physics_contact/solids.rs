@@ -1,7 +1,7 @@
 //! Short ways to put hard things into a world.
 
 use softvt::{
-    geometry::{Mat3, Pose, Quat, Vec3, shape::Shape},
+    geometry::{Mat3, Pose, Quat, Vec3, mass::mass_properties, shape::Shape},
     physics::{
         Params, World,
         contact::{Friction, Mover},
@@ -71,6 +71,26 @@ pub fn rigid(world: &mut World, shape: &Shape, mass: f64, pose: Pose, mu: Fricti
     let index = world.add_rigid("body", body);
     put(world, "body", (Mover::Rigid(index), Pose::identity()), shape, mu);
     index
+}
+
+/// A free uniform body of any shape; its index.
+pub fn uniform(world: &mut World, shape: &Shape, mass: f64, object_w: Pose, mu: Friction) -> usize {
+    let one = mass_properties(shape, 1.0);
+    let density = mass / one.mass;
+    let body = RigidBody::new(&object_w, one.com, mass, one.inertia * density).expect("a real body");
+    let index = world.add_rigid("body", body);
+    put(world, "body", (Mover::Rigid(index), Pose::identity()), shape, mu);
+    index
+}
+
+/// A box of these edges (m) whose edges are rounded.
+pub fn rounded_box(size: Vec3, radius: f64) -> Shape {
+    Shape::cuboid(size.add_scalar(-2.0 * radius)).rounded(radius)
+}
+
+/// A cylinder along z whose edges are rounded; full height, m.
+pub fn rounded_can(radius: f64, height: f64, rounding: f64) -> Shape {
+    Shape::Cylinder { radius: radius - rounding, half_height: 0.5 * height - rounding }.rounded(rounding)
 }
 
 /// Lets everything settle on the flat, then leans gravity to `angle` (rad) within `seconds` and waits as long again.

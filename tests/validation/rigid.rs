@@ -7,7 +7,10 @@ use softvt::{
     physics::World,
 };
 
-use crate::solids::{GRAVITY, at, cuboid, floor, friction, gravity, lean, rigid, run, tilted, turned, world};
+use crate::solids::{
+    GRAVITY, at, cuboid, floor, friction, gravity, lean, rigid, rounded_box, rounded_can, run, tilted,
+    turned, uniform, world,
+};
 
 /// Friction of what stands or rolls on a floor.
 pub const MU: (f64, f64) = (0.6, 0.5);
@@ -96,16 +99,39 @@ pub struct Standing {
     pub tips_at: f64,
 }
 
-/// A box and a can, which is turned so that different samples of its rim carry it.
+/// Edge of the rounded boxes, m.
+const EDGE: f64 = 0.048;
+
+/// A box and a can, which is turned so that different samples of its rim carry it, and both with rounded edges, which tip over
+/// the outline of the flat that they stand on.
 pub fn standing() -> Vec<Standing> {
     let headed = |angle: f64| turned(at(0.0, 0.0, 0.05), Vec3::z() * angle);
     let tall = cuboid(0.06, 0.08, 0.1);
+    let rounded = |name, shape, height: f64, slope: f64| Standing {
+        name,
+        shape,
+        pose: at(0.0, 0.0, 0.5 * height),
+        tips_at: slope.atan(),
+    };
     let can_at = |name, turn| Standing { name, shape: can(), pose: headed(turn), tips_at: 0.66f64.atan() };
     vec![
         Standing { name: "box 60 × 80 × 100 mm", shape: tall, pose: headed(0.0), tips_at: 0.6f64.atan() },
         can_at("can ⌀66 × 100 mm", 0.0),
         can_at("the same, turned by 7.5°", PI / 24.0),
         can_at("the same, turned by 2.9°", 0.05),
+        rounded(
+            "box of 48 mm, edges rounded by 4.8 mm",
+            rounded_box(Vec3::repeat(EDGE), 0.1 * EDGE),
+            EDGE,
+            0.8,
+        ),
+        rounded(
+            "box of 48 mm, edges rounded by 21.6 mm",
+            rounded_box(Vec3::repeat(EDGE), 0.45 * EDGE),
+            EDGE,
+            0.1,
+        ),
+        rounded("can ⌀66 × 100 mm, edges rounded by 6 mm", rounded_can(0.033, 0.1, 0.006), 0.1, 0.54),
     ]
 }
 
@@ -114,7 +140,7 @@ impl Standing {
     fn tips(&self, angle: f64) -> bool {
         let mut world = world();
         floor(&mut world, friction(5.0, 5.0));
-        let body = rigid(&mut world, &self.shape, 0.3, self.pose, friction(0.0, 0.0));
+        let body = uniform(&mut world, &self.shape, 0.3, self.pose, friction(0.0, 0.0));
         lean(&mut world, angle, 1.5);
         world.rigid[body].body.pose_w.rotation.angle_to(&self.pose.rotation) > 0.05
     }
@@ -144,14 +170,23 @@ pub fn drift(world: &mut World, seconds: f64) -> [f64; 2] {
 
 /// Drift of five boxes on each other over 10 s. A little askew, so that they are no special case.
 pub fn stack() -> [f64; 2] {
-    let shape = cuboid(0.05, 0.05, 0.05);
+    stack_of(&cuboid(0.05, 0.05, 0.05))
+}
+
+/// The same for boxes whose edges are rounded by 5 mm.
+pub fn rounded_stack() -> [f64; 2] {
+    stack_of(&rounded_box(Vec3::repeat(0.05), 0.005))
+}
+
+fn stack_of(shape: &Shape) -> [f64; 2] {
     let pose = |i: usize| {
         let shift = [0.0, 3e-3, -2e-3, 2e-3, -1e-3][i];
         turned(at(shift, -0.5 * shift, 0.025 + 0.05 * i as f64), Vec3::z() * (20.0 * shift))
     };
-    let (mut world, _) = on_floor(&shape, pose(0));
-    (1..5).for_each(|i| {
-        rigid(&mut world, &shape, 0.3, pose(i), friction(MU.0, MU.1));
+    let mut world = world();
+    floor(&mut world, friction(MU.0, MU.1));
+    (0..5).for_each(|i| {
+        uniform(&mut world, shape, 0.3, pose(i), friction(MU.0, MU.1));
     });
     run(&mut world, 1.0);
     drift(&mut world, 10.0)
@@ -213,11 +248,21 @@ pub fn largest_gains() -> Vec<(&'static str, f64)> {
         world
     };
     let tipping = || on_floor(&cuboid(0.03, 0.03, 0.2), turned(at(0.0, 0.0, 0.105), Vec3::y() * 0.2)).0;
-    let scenes: [(&str, &dyn Fn() -> World); 4] = [
+    let rounded = || {
+        let mut world = world();
+        floor(&mut world, friction(MU.0, MU.1));
+        let shape = rounded_box(Vec3::new(0.05, 0.06, 0.07), 0.012);
+        let pose = turned(at(0.0, 0.0, 0.3), Vec3::new(0.4, 0.3, 0.2));
+        let body = uniform(&mut world, &shape, 0.3, pose, friction(MU.0, MU.1));
+        (world.rigid[body].body.w, world.rigid[body].body.v) = (Vec3::new(4.0, 3.0, 1.0), Vec3::x() * 0.5);
+        world
+    };
+    let scenes: [(&str, &dyn Fn() -> World); 5] = [
         ("two boxes collide", &colliding),
         ("a turning box falls and tumbles", &tumbling),
         ("a ball rolls up a slope and back", &rolling),
         ("a tall box falls over", &tipping),
+        ("a box with rounded edges falls and tumbles", &rounded),
     ];
     scenes.into_iter().map(|(name, make)| (name, largest_gain(make()))).collect()
 }
@@ -269,8 +314,9 @@ mod tests {
 
     #[test]
     fn a_stack_of_five_boxes_stands_still_for_ten_seconds() {
-        let [moved, turned] = stack();
-        assert!(moved < 1e-6 && turned < 1e-5, "moved {moved} m, turned {turned} rad");
+        for [moved, turned] in [stack(), rounded_stack()] {
+            assert!(moved < 1e-6 && turned < 1e-5, "moved {moved} m, turned {turned} rad");
+        }
     }
 
     #[test]

@@ -4,8 +4,7 @@
 use std::sync::OnceLock;
 
 use super::manifold::{
-    ContactPoint, Piece, SkinSamples, field::samples_vs_field, gel::gel_vs_shape, manifold, pieces,
-    skin_samples,
+    ContactPoint, Piece, SkinSamples, field::Skin, gel::gel_vs_shape, manifold, pieces, skin_samples,
 };
 use crate::geometry::{
     Pose, Vec3,
@@ -134,9 +133,26 @@ impl Hard {
             }
             return;
         }
-        samples_vs_field(self.samples(), &self.shape, pose, &other.shape, other_pose, margin, &mut found);
-        out.extend(found.drain(..).map(|point| (0, point)));
-        samples_vs_field(other.samples(), &other.shape, other_pose, &self.shape, pose, margin, &mut found);
-        out.extend(found.drain(..).map(|point| (1, ContactPoint { n_w: -point.n_w, ..point })));
+        let mine = Skin::new((self.samples(), &self.shape), pose, other.field(), other_pose);
+        let theirs = Skin::new((other.samples(), &other.shape), other_pose, self.field(), pose);
+        // What is smooth on one body carries only where neither has points that do.
+        mine.fixed(margin, &mut found);
+        let first = found.len();
+        flip(&mut found);
+        theirs.fixed(margin, &mut found);
+        let second = found.len();
+        flip(&mut found);
+        mine.lowest(margin, &mut found);
+        let third = found.len();
+        flip(&mut found);
+        theirs.lowest(margin, &mut found);
+        flip(&mut found);
+        let is_theirs = |i: usize| (first..second).contains(&i) || i >= third;
+        out.extend(found.drain(..).enumerate().map(|(i, point)| (Part::from(is_theirs(i)), point)));
     }
+}
+
+/// Turns the normals around.
+fn flip(points: &mut [ContactPoint]) {
+    points.iter_mut().for_each(|point| point.n_w = -point.n_w);
 }

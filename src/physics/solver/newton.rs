@@ -14,7 +14,10 @@ const RELATIVE: f64 = 1e-5;
 /// Convergence in absolute terms, √J.
 const ABSOLUTE: f64 = 1e-10;
 /// Most Newton steps a pass.
-const MAX_NEWTON: usize = 60;
+const MAX_NEWTON: u32 = 240;
+/// Newton steps after which every one gets a factor of its own: with many stiff points that open and close, what old factors
+/// were taught may lead nowhere.
+const PATIENT: u32 = 60;
 /// Most lagged passes.
 const MAX_PASSES: usize = 3;
 /// Change of the normal impulses that ends the passes.
@@ -135,7 +138,7 @@ impl Solver {
         let mut usable = self.cache.matches(problem, island);
         // Steps with this factor, and the excess before them.
         let mut since = (0, excess);
-        for taken in 0..MAX_NEWTON as u32 {
+        for taken in 0..MAX_NEWTON {
             if excess <= 1.0 {
                 self.cache.took(since.0);
                 return Ok(taken);
@@ -164,7 +167,8 @@ impl Solver {
             self.learn(problem, island);
             excess = self.excess(problem, island);
             since.0 += 1;
-            usable = since.0 < TRIAL_STEPS || steps_left(since, excess) < STEPS_PER_FACTOR;
+            usable = taken + 1 < PATIENT
+                && (since.0 < TRIAL_STEPS || steps_left(since, excess) < STEPS_PER_FACTOR);
         }
         Err(Failure { block: island.blocks[0], excess })
     }

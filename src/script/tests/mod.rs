@@ -7,6 +7,7 @@ mod joints;
 mod options;
 mod surface;
 mod visuals;
+mod weigh;
 
 use std::{fs, path::PathBuf, sync::Arc, time::Duration};
 

@@ -1,12 +1,15 @@
 use std::f64::consts::FRAC_PI_2;
 
-use super::field::samples_vs_field;
+use super::field::Skin;
 use super::*;
 use crate::geometry::{Quat, shape::Shape};
 
 fn touch(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64) -> Vec<ContactPoint> {
     let mut out = Vec::new();
-    samples_vs_field(&skin_samples(a), a, pose_a, b, pose_b, margin, &mut out);
+    let (samples, bounds) = (skin_samples(a), b.bounds());
+    let skin = Skin::new((&samples, a), pose_a, (b, &bounds), pose_b);
+    skin.fixed(margin, &mut out);
+    skin.lowest(margin, &mut out);
     out
 }
 

@@ -3,7 +3,7 @@
 //! Two *primitives* ([`Piece`]) meet in [`manifold`]: a contact normal is found, the feature of each piece that faces
 //! the other (a face, a side line) is projected along it, and the overlap's corners become the points. Every point's
 //! gap is exact at its place, so corners and rims carry a tipping body where its real edge is, and round bodies touch
-//! at the moving lowest point and roll. General shapes meet through [`field::samples_vs_field`],
+//! at the moving lowest point and roll. General shapes meet through [`field::Skin`],
 //! and compliant skins meet hard shapes through [`gel::gel_vs_shape`].
 
 use crate::geometry::{Pose, Vec3};
@@ -12,7 +12,9 @@ mod axis;
 mod clip;
 mod feature;
 pub mod field;
+mod flat;
 pub mod gel;
+mod lowest;
 mod plane;
 mod round;
 mod skin;
@@ -25,6 +27,7 @@ mod field_tests;
 #[cfg(test)]
 mod tests;
 
+pub use flat::Spot;
 pub use skin::{Ring, SkinSamples, pieces, skin_samples};
 
 /// A convex primitive in its own frame, m.

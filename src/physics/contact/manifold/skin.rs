@@ -2,7 +2,10 @@
 
 use nalgebra::SymmetricEigen;
 
-use super::Piece;
+use super::{
+    POINT_AREA, Piece,
+    flat::{Spot, across, spots},
+};
 use crate::geometry::{
     Mat3, Pose, Vec3,
     shape::{Profile, Shape},
@@ -17,14 +20,25 @@ const SEED_CELLS: f64 = 8.0;
 const SHARP: f64 = 0.07;
 /// The convex turn (sine) at a profile's corner from which its ring is a rim: 20°.
 const RIM_TURN: f64 = 0.34;
+/// The same for a corner on which the solid stands, though it is part of a rounding.
+const FOOT_TURN: f64 = 5e-3;
+/// An edge is truly sharp if the normals differ by more than `SHARP_TURN` (chord of the unit circle, 20°) this far aside of
+/// it, m: a rounding of less than 0.5 mm is an edge.
+const SHARP_ASIDE: f64 = 1e-4;
+/// See [`SHARP_ASIDE`].
+const SHARP_TURN: f64 = 0.35;
+/// Area of a sample on a sharp edge, m²: several of them carry together what one point contact does.
+pub(super) const SAMPLE_AREA: f64 = 0.25 * POINT_AREA;
 
-/// A sharp convex circle about the z axis of `frame_o`, in its plane z = 0.
+/// A convex circle about the z axis of `frame_o`, in its plane z = 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ring {
     /// Frame of the circle in the object frame.
     pub frame_o: Pose,
     /// Radius, m.
     pub radius: f64,
+    /// Whether it is an edge, and not the lowest circle of a rounding.
+    pub sharp: bool,
 }
 
 /// The places of a shape's skin that are watched for contact, object frame, m.
@@ -32,16 +46,18 @@ pub struct Ring {
 pub struct SkinSamples {
     /// On sharp convex corners and edges.
     pub fixed: Vec<Vec3>,
-    /// Sharp convex circles.
+    /// Convex circles.
     pub rings: Vec<Ring>,
+    /// On flat and nearly flat faces, and on edges that are finely rounded.
+    pub spots: Vec<Spot>,
     /// Spread over the whole surface: where the search for the lowest point of a smooth part starts.
     pub seeds: Vec<Vec3>,
     /// Distance between neighbouring seeds, m.
     pub spacing: f64,
 }
 
-/// Chooses the samples of a shape. Boxes, cylinders and lathes are known exactly; of anything else the sharp edges are
-/// found on a grid of 1/24 of its longest side.
+/// Chooses the samples of a shape. Boxes, cylinders and lathes are known exactly; of anything else the sharp edges and flat
+/// faces are found on a grid of 1/24 of its longest side.
 pub fn skin_samples(shape: &Shape) -> SkinSamples {
     let mut samples = SkinSamples::default();
     edges(shape, &Pose::identity(), &mut samples);
@@ -78,39 +94,64 @@ pub fn pieces(shape: &Shape) -> Option<Vec<(Piece, Pose)>> {
 
 /// Adds the sharp features of `shape`, which sits at `frame_o`.
 fn edges(shape: &Shape, frame_o: &Pose, samples: &mut SkinSamples) {
-    let ring =
-        |z: f64, radius: f64| Ring { frame_o: frame_o * nalgebra::Translation3::new(0.0, 0.0, z), radius };
+    let ring = |z: f64, radius: f64, sharp: bool| Ring {
+        frame_o: frame_o * nalgebra::Translation3::new(0.0, 0.0, z),
+        radius,
+        sharp,
+    };
     match shape {
         Shape::Box { half } => samples.fixed.extend((0..8).map(|corner| {
             let sign = Vec3::from_fn(|axis, _| if corner >> axis & 1 == 1 { 1.0 } else { -1.0 });
             (frame_o * nalgebra::Point3::from(half.component_mul(&sign))).coords
         })),
         Shape::Cylinder { radius, half_height } => {
-            samples.rings.extend([ring(-half_height, *radius), ring(*half_height, *radius)]);
+            samples.rings.extend([ring(-half_height, *radius, true), ring(*half_height, *radius, true)]);
         }
         Shape::Lathe(profile) => {
-            for [r, z] in rims(profile) {
+            for ([r, z], sharp) in rims(profile) {
                 if r > 1e-6 {
-                    samples.rings.push(ring(z, r));
-                } else {
+                    samples.rings.push(ring(z, r, sharp));
+                } else if sharp {
                     samples.fixed.push((frame_o * nalgebra::Point3::new(0.0, 0.0, z)).coords);
                 }
             }
         }
         Shape::Placed { shape, pose } => edges(shape, &(frame_o * pose), samples),
         Shape::Paint { shape, .. } => edges(shape, frame_o, samples),
-        Shape::Sphere { .. } | Shape::Capsule { .. } | Shape::Ellipsoid { .. } | Shape::Torus { .. } => {}
-        _ => {
-            let step = shape.bounds().size().max() / EDGE_CELLS;
-            let sharp = Grid::over(shape, step);
-            let found = sharp.crossed().filter_map(|cell| cell.sharp_point(shape, step));
-            samples.fixed.extend(found.map(|p| (frame_o * nalgebra::Point3::from(p)).coords));
+        Shape::Torus { major, minor } => {
+            samples.rings.extend([ring(-minor, *major, false), ring(*minor, *major, false)]);
         }
+        Shape::Sphere { .. } | Shape::Capsule { .. } | Shape::Ellipsoid { .. } => {}
+        _ => general(shape, frame_o, samples),
     }
 }
 
-/// The convex corners of a revolved profile, (r, z); those on the axis only if they are tips.
-fn rims(profile: &Profile) -> impl Iterator<Item = [f64; 2]> + '_ {
+/// Adds what a grid finds on a shape of any kind.
+fn general(shape: &Shape, frame_o: &Pose, samples: &mut SkinSamples) {
+    let step = shape.bounds().size().max() / EDGE_CELLS;
+    let cells: Vec<Cell> = Grid::over(shape, step).crossed().collect();
+    let edges = cells.iter().filter_map(|cell| cell.sharp_point(shape, step));
+    let (sharp, blunt): (Vec<Vec3>, Vec<Vec3>) = edges.partition(|p| is_sharp(shape, p));
+    let starts: Vec<Vec3> = cells.iter().map(Cell::mean).collect();
+    let to_object = |p: &Vec3| (frame_o * nalgebra::Point3::from(*p)).coords;
+    let blunt = blunt.into_iter().map(|p| Spot { p, area: SAMPLE_AREA });
+    let all = spots(shape, &starts, step, &sharp, SAMPLE_AREA).into_iter().chain(blunt);
+    samples.spots.extend(all.map(|spot| Spot { p: to_object(&spot.p), ..spot }));
+    samples.fixed.extend(sharp.iter().map(to_object));
+}
+
+/// Whether the skin has an edge at `p`, and not a rounding.
+fn is_sharp(shape: &Shape, p: &Vec3) -> bool {
+    let (u, v) = across(&shape.distance_and_normal(p).1);
+    let ways =
+        [u, -u, v, -v, (u + v).normalize(), -(u + v).normalize(), (u - v).normalize(), (v - u).normalize()];
+    let normals = ways.map(|way| shape.distance_and_normal(&onto(shape, p + way * SHARP_ASIDE)).1);
+    (0..ways.len()).any(|i| normals[i + 1..].iter().any(|n| (n - normals[i]).norm() > SHARP_TURN))
+}
+
+/// The convex corners of a revolved profile, (r, z), and whether they are sharp; those on the axis only if they are tips,
+/// blunt ones only if the solid can stand on them.
+fn rims(profile: &Profile) -> impl Iterator<Item = ([f64; 2], bool)> + '_ {
     let points = profile.points();
     let count = points.len();
     (0..count).filter_map(move |i| {
@@ -121,7 +162,9 @@ fn rims(profile: &Profile) -> impl Iterator<Item = [f64; 2]> + '_ {
         // A flat end's middle is a corner of the polygon with its axis, but no corner of the solid.
         let tip =
             here[0] > 1e-6 || az.abs().max(bz.abs()) > RIM_TURN * ar.abs().max(br.abs()) && ar * br < 0.0;
-        (sine > RIM_TURN && tip).then_some(here)
+        let sharp = sine > RIM_TURN;
+        let foot = sine > FOOT_TURN && here[0] > 1e-6 && az * bz <= 1e-9 * ar.hypot(az) * br.hypot(bz);
+        (sharp && tip || foot).then_some((here, sharp))
     })
 }
 

@@ -1,0 +1,55 @@
+-- Pictures of one asset alone on the table: what it looks like, and what the fingers feel of it in the expert's grasp.
+local grasp = require "experts.grasp"
+local table_top = require "assets.table"
+
+local studio = {}
+
+-- Vertical field of view of portraits, rad.
+local FOVY = math.rad(28)
+
+-- Edge lengths of an asset's bounding box, m.
+function studio.size(asset)
+  local low, high = asset.shape:bounds()
+  return { high[1] - low[1], high[2] - low[2], high[3] - low[3] }
+end
+
+-- A picture of the asset, `edge` pixels wide and high: its bounding sphere just fits.
+function studio.portrait(asset, edge)
+  local size = studio.size(asset)
+  local across = math.sqrt(size[1] ^ 2 + size[2] ^ 2 + size[3] ^ 2)
+  local reach = 0.99 * across / 2 / math.sin(FOVY / 2)
+  local layout = softvt.layout("portrait_" .. asset.name, function(scene)
+    scene:add { name = "table", asset = table_top, xyz = { 0, 0, 0 } }
+    scene:add { name = "object", asset = asset, at = { 0.1, 0 }, yaw = math.rad(25) }
+    local middle = { 0.1, 0, size[3] / 2 }
+    scene:add_camera {
+      name = "portrait", position = { 0.1 + reach * 0.71, -reach * 0.335, middle[3] + reach * 0.62 }, look_at = middle,
+      fovy = FOVY, width = edge, height = edge,
+    }
+  end)
+  return softvt.simulate { layout = layout }:see { camera = "portrait" }
+end
+
+-- The asset in the expert's grasp, lifted by `lift` (m): a simulation to feel.
+function studio.held(asset, lift)
+  local layout = softvt.layout("imprint_" .. asset.name, function(scene)
+    scene:add { name = "table", asset = table_top, xyz = { 0, 0, 0 } }
+    scene:add { name = "object", asset = asset, at = { -0.05, 0 } }
+  end)
+  local sim = softvt.simulate { layout = layout }
+  local ok, why = sim:drive(function(arm, scene)
+    local object = scene:object "object"
+    local at = grasp.pose(object, grasp.height(object))
+    if object.hints.grasp_rim_m then at = grasp.choose(scene, object, grasp.height(object)) end
+    arm:move_to(at:moved { 0, 0, 0.08 }, { speed = 0.6, turn = 3 })
+    arm:move_to(at, { speed = 0.25 })
+    arm:grasp(grasp.closure(object), { rate = 0.6 })
+    arm:wait(0.3)
+    arm:move_by({ 0, 0, lift }, { speed = 0.2 })
+    arm:wait(0.3)
+  end)
+  if not ok then error(asset.name .. ": " .. why) end
+  return sim
+end
+
+return studio

@@ -1,0 +1,227 @@
+//! `softvt.conditions`: suites as they are, then under each condition, each in a run folder of its own; and the table.
+
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::{
+    Failure,
+    args::Run,
+    batch::Batch,
+    evaluate::{carry_out, chosen, is_finished, jobs, plain},
+    files::make_folder,
+    print,
+};
+use crate::{
+    benchmark::{Condition, ObjectType, REFERENCE, Suite, Task},
+    message,
+    report::{
+        conditions::{Outcome, Row, Rows, table},
+        run_folder::{RunFolder, read_episodes, replace},
+    },
+    script::Loaded,
+};
+
+/// The comparison of all suites, in the folder of all runs.
+const FILE: &str = "conditions.json";
+
+/// `conditions.json`.
+#[derive(Serialize)]
+struct Document<'a> {
+    softvt: &'a str,
+    script: &'a str,
+    policy: &'a str,
+    seed: u64,
+    suites: &'a [Rows],
+}
+
+/// A suite under one condition, or as it is.
+struct Case {
+    name: String,
+    shift: Vec<(String, f64)>,
+    set: Vec<(String, String)>,
+    /// Its folder, from that of all.
+    folder: String,
+    /// The command line with the condition's shifts and settings after its own.
+    run: Run,
+    not_applicable: Option<String>,
+}
+
+/// Runs every suite as it is and under every condition, and prints a table a suite. All that can be wrong without running
+/// is found before anything runs.
+///
+/// # Errors
+/// A condition that a suite does not know, a folder that holds a run, or an episode that fails; finished runs are kept.
+pub fn run(
+    run: &Run,
+    loaded: &Loaded,
+    (suites, conditions): (&[Suite], &[Condition]),
+    out: &Path,
+) -> Result<(), Failure> {
+    let cases: Vec<Vec<Case>> = suites
+        .iter()
+        .map(|suite| cases(run, suite, conditions, suites.len() > 1))
+        .collect::<Result<_, _>>()?;
+    let mut ready = Vec::new();
+    for (suite, cases) in suites.iter().zip(&cases) {
+        let tasks = chosen(run, suite)?;
+        ready.push((prepared(loaded, suite, (cases, &tasks), out)?, tasks));
+    }
+    let mut compared = Vec::new();
+    for ((suite, cases), (batches, tasks)) in suites.iter().zip(&cases).zip(ready) {
+        let rows = compare(run, suite, (cases, batches), &tasks)?;
+        if !run.json {
+            print(&table(&rows));
+        }
+        compared.push(rows);
+    }
+    write(run, loaded, &compared, out)
+}
+
+/// Whether every condition can be applied to every suite; the first task of each is built.
+///
+/// # Errors
+/// The first thing that is wrong.
+pub fn check(
+    run: &Run,
+    loaded: &Loaded,
+    (suites, conditions): (&[Suite], &[Condition]),
+) -> Result<(), Failure> {
+    for suite in suites {
+        let first: Vec<&Task> = suite.tasks.iter().take(1).collect();
+        let cases = cases(run, suite, conditions, false)?;
+        prepared(loaded, suite, (&cases, &first), Path::new(""))?;
+    }
+    let names: Vec<&str> = conditions.iter().map(|condition| condition.name.as_str()).collect();
+    print(&format!("conditions: {REFERENCE}, {}\n", message::plain(&names.join(", "))));
+    Ok(())
+}
+
+fn cases(run: &Run, suite: &Suite, conditions: &[Condition], level: bool) -> Result<Vec<Case>, Failure> {
+    let kind = if run.twin { ObjectType::Rigid } else { suite.object_type };
+    let above = if level { format!("{}/", plain(&run.name_of(suite))) } else { String::new() };
+    let mut found = vec![Case {
+        name: REFERENCE.to_owned(),
+        shift: Vec::new(),
+        set: Vec::new(),
+        folder: format!("{above}{REFERENCE}"),
+        run: run.clone(),
+        not_applicable: None,
+    }];
+    for condition in conditions {
+        let folder = format!("{above}{}", plain(&condition.name));
+        if let Some(same) = found.iter().find(|case| case.folder == folder) {
+            let message = format!(
+                "{}: the conditions {:?} and {:?} would share the folder {folder}; rename one",
+                run.file.display(),
+                same.name,
+                condition.name
+            );
+            return Err(Failure::input(message));
+        }
+        let mut changed = run.clone();
+        changed.shifts.extend(condition.shift.iter().cloned());
+        changed.set.extend(condition.set.iter().cloned());
+        found.push(Case {
+            name: condition.name.clone(),
+            shift: condition.shift.clone(),
+            set: condition.set.clone(),
+            folder,
+            run: changed,
+            not_applicable: not_applicable(condition.only, kind),
+        });
+    }
+    Ok(found)
+}
+
+fn not_applicable(only: Option<ObjectType>, kind: ObjectType) -> Option<String> {
+    match only? {
+        only if only == kind => None,
+        ObjectType::Deformable => Some("nothing that is judged deforms".to_owned()),
+        ObjectType::Rigid => Some("it is for rigid objects".to_owned()),
+    }
+}
+
+/// A batch for every case that applies; nothing has run yet.
+fn prepared<'a>(
+    loaded: &'a Loaded,
+    suite: &'a Suite,
+    (cases, tasks): (&'a [Case], &[&'a Task]),
+    out: &Path,
+) -> Result<Vec<Option<Batch<'a>>>, Failure> {
+    let mut batches: Vec<Option<Batch>> = Vec::new();
+    for case in cases {
+        if case.not_applicable.is_some() {
+            batches.push(None);
+            continue;
+        }
+        let named = |failure: Failure| match case.name == REFERENCE {
+            true => failure,
+            false => failure.within(&format!("suite {}, condition {:?}", suite.name, case.name)),
+        };
+        let dir: PathBuf = out.join(&case.folder);
+        // One that is finished is left alone, one that was broken off goes on if that is asked for.
+        let fresh = !case.run.resume && !is_finished(&dir);
+        fresh
+            .then(|| RunFolder::check(&dir))
+            .unwrap_or(Ok(()))
+            .map_err(|e| Failure::input(format!("{}: {e}", case.run.file.display())))?;
+        let jobs = jobs(&case.run, suite, tasks);
+        let mut batch = Batch::new(&case.run, loaded, suite, (jobs, dir)).map_err(named)?;
+        if let Some(Some(reference)) = batches.first() {
+            batch.share_limits(reference);
+        }
+        batch.prepare(tasks).map_err(named)?;
+        batches.push(Some(batch));
+    }
+    Ok(batches)
+}
+
+fn compare(
+    run: &Run,
+    suite: &Suite,
+    (cases, batches): (&[Case], Vec<Option<Batch>>),
+    tasks: &[&Task],
+) -> Result<Rows, Failure> {
+    let mut reference = None;
+    let mut rows = Vec::new();
+    for (case, batch) in cases.iter().zip(batches) {
+        let mut outcome = None;
+        if let Some(batch) = batch {
+            let name = message::plain(&case.name);
+            message::tell(&format!("softvt: {}, {name} ({} of {})", suite.name, rows.len() + 1, cases.len()));
+            carry_out(&batch, tasks)?;
+            let records = read_episodes(&batch.out).map_err(Failure::input)?;
+            outcome = Some(Outcome::new(case.folder.clone(), &records, reference.as_deref()));
+            reference.get_or_insert(records);
+        }
+        rows.push(Row {
+            condition: case.name.clone(),
+            shift: case.shift.clone(),
+            set: case.set.clone(),
+            outcome,
+            not_applicable: case.not_applicable.clone(),
+        });
+    }
+    let deformable = suite.object_type == ObjectType::Deformable && !run.twin;
+    Ok(Rows { suite: run.name_of(suite), policy: run.policy.name().to_owned(), deformable, rows })
+}
+
+fn write(run: &Run, loaded: &Loaded, compared: &[Rows], out: &Path) -> Result<(), Failure> {
+    let document = Document {
+        softvt: env!("CARGO_PKG_VERSION"),
+        script: &loaded.main,
+        policy: run.policy.name(),
+        seed: run.seed,
+        suites: compared,
+    };
+    let text = format!("{:#}\n", serde_json::json!(document));
+    make_folder(out)?;
+    let path = out.join(FILE);
+    replace(&path, &text).map_err(Failure::input)?;
+    if run.json {
+        print(&text);
+    }
+    message::tell(&format!("softvt: {}", path.display()));
+    Ok(())
+}

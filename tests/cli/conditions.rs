@@ -1,0 +1,127 @@
+//! Conditions: each suite as it is and under each of them, compared episode by episode.
+
+use serde_json::Value;
+
+use crate::support::{Project, Small};
+
+/// The small suite with shifts, under conditions of its own.
+fn project(conditions: &str, object_type: &str) -> Project {
+    let small = Small { expert: "arm:close_to(1, { rate = 2 })", ..Small::default() };
+    let shifts = "local shifts = require \"shifts\"\n";
+    let declared = "shifts = shifts.soft, episodes = 2,";
+    let text = small
+        .text()
+        .replacen("episodes = 1,", declared, 1)
+        .replace("\"deformable\"", &format!("\"{object_type}\""));
+    let plan = format!(
+        "return softvt.conditions {{ name = \"trial\", suites = {{ require \"suites.one\" }}, conditions = {{\n{conditions}\n}} }}\n"
+    );
+    Project::new(&[("suites/one.lua", &format!("{shifts}{text}")), ("suites/trial.lua", &plan)])
+}
+
+const THREE: &str = "{ name = \"heavy x2\", shift = { mass = 2 } },
+  { name = \"same\", shift = { mass = 1, light = 0.5 } },
+  { name = \"hard\", shift = { stiffness = 2 }, only = \"deformable\" },
+  { name = \"weak\", set = { [\"robot.gripper.effort\"] = 3 } },";
+
+#[test]
+fn each_condition_is_an_ordinary_run_of_the_same_episodes() {
+    let project = project(THREE, "deformable");
+    let said = project.succeeds("suites/trial.lua --policy noop --out run");
+    let rows: Vec<&str> = said.out.lines().filter(|line| !line.starts_with('─')).collect();
+    let starts: Vec<&str> = rows.iter().map(|row| row.split("  ").next().unwrap_or_default()).collect();
+    assert_eq!(starts[1..7], ["condition", "reference", "heavy x2", "same", "hard", "weak"], "{}", said.out);
+    assert!(said.out.lines().all(|line| line.chars().count() <= 100), "{}", said.out);
+    let alone = project.succeeds("suites/one.lua --policy noop --shift mass=2 --out alone");
+    assert!(!alone.out.is_empty());
+    assert_eq!(project.text("run/heavy_x2/episodes.jsonl"), project.text("alone/episodes.jsonl"));
+    let settings = |path: &str| project.json(path)["settings"]["robot"]["gripper"]["effort"].clone();
+    assert_eq!(settings("run/weak/run.json"), 3.0);
+    assert_ne!(settings("run/reference/run.json"), 3.0);
+}
+
+#[test]
+fn the_comparison_is_written_and_light_alone_changes_no_result() {
+    let project = project(THREE, "deformable");
+    let said = project.succeeds("suites/trial.lua --policy noop --out run --json");
+    let document = project.json("run/conditions.json");
+    assert_eq!(document, serde_json::from_str::<Value>(&said.out).expect("JSON"));
+    let suite = &document["suites"][0];
+    assert_eq!((&suite["suite"], &document["policy"]), (&Value::from("one"), &Value::from("noop")));
+    let rows = suite["rows"].as_array().expect("rows");
+    let names: Vec<&str> = rows.iter().filter_map(|row| row["condition"].as_str()).collect();
+    assert_eq!(names, ["reference", "heavy x2", "same", "hard", "weak"]);
+    assert!(rows[0]["outcome"]["paired"].is_null());
+    let same = &rows[2]["outcome"];
+    assert_eq!(same["paired"]["goal"], serde_json::json!({ "better": 0, "worse": 0, "same": 2 }));
+    assert_eq!(project.text("run/same/episodes.jsonl"), project.text("run/reference/episodes.jsonl"));
+    assert_ne!(project.text("run/heavy_x2/episodes.jsonl"), project.text("run/reference/episodes.jsonl"));
+}
+
+#[test]
+fn what_can_change_nothing_is_told_and_not_run() {
+    let project = project(THREE, "rigid");
+    let said = project.succeeds("suites/trial.lua --policy noop --out run");
+    let row = said.out.lines().find(|line| line.starts_with("hard  ")).expect("a row");
+    assert!(row.split_whitespace().skip(1).all(|cell| cell == "N/A"), "{row}");
+    assert!(said.out.contains("hard: N/A, nothing that is judged deforms"), "{}", said.out);
+    assert!(!project.path("run/hard").exists() && project.path("run/weak/summary.json").exists());
+    let twin = self::project(THREE, "deformable");
+    twin.succeeds("suites/trial.lua --policy noop --twin rigid --out run");
+    assert!(!twin.path("run/hard").exists());
+}
+
+#[test]
+fn wrong_conditions_are_told_before_anything_runs() {
+    let refused = |conditions: &str| {
+        let project = project(conditions, "deformable");
+        let message = project.refusal("suites/trial.lua --policy noop --out run");
+        assert!(!project.path("run").exists(), "{message}");
+        message
+    };
+    for (conditions, expected) in [
+        ("", "suites/trial.lua:1: conditions.conditions: expected at least one, got an empty list"),
+        (
+            "{ name = \"a\", shift = { mas = 2 } }",
+            "suites/trial.lua: --shift: unknown shift \"mas\"; did you mean \"mass\"? (suite one, condition \"a\")",
+        ),
+        (
+            "{ name = \"a\", set = { [\"robot.gripper.efort\"] = 2 } }",
+            "suites/trial.lua: --set: there is no setting robot.gripper.efort",
+        ),
+        ("{ name = \"a\", shift = { mass = -1 } }", "shift mass: expected a number in 0.01..100"),
+        ("{ name = \"a\" },\n{ name = \"a\" }", "is the name of another condition; give another"),
+        ("{ name = \"reference\" }", "\"reference\" is the name of the unchanged run; give another"),
+        ("{ name = \"a b\" },\n{ name = \"a_b\" }", "would share the folder a_b; rename one"),
+        ("{ name = \"a\", mass = 2 }", "unknown key \"mass\""),
+    ] {
+        let message = refused(conditions);
+        assert!(message.contains(expected), "{message}");
+    }
+    let project = project(THREE, "deformable");
+    project.write("run/weak/summary.json", b"{}");
+    let message = project.refusal("suites/trial.lua --policy noop --out run");
+    assert!(message.contains("run/weak already holds a run"), "{message}");
+    assert!(!project.path("run/reference").exists());
+}
+
+#[test]
+fn conditions_are_checked_and_listed_as_suites_are() {
+    let project = project(THREE, "deformable");
+    let said = project.succeeds("check suites/trial.lua");
+    assert!(said.out.contains("conditions: reference, heavy x2, same, hard, weak\n"), "{}", said.out);
+    let said = project.succeeds("list suites --json");
+    let rows: Value = serde_json::from_str(&said.out).expect("JSON");
+    let row = |name: &str| rows.as_array().into_iter().flatten().find(|row| row["name"] == name).cloned();
+    assert_eq!(row("all").map(|row| row["tasks"].clone()), Some(Value::from(40)));
+    assert_eq!(row("trial").map(|row| row["conditions"].clone()), Some(Value::from(5)));
+    for name in ["object_soft", "spatial_soft", "object_rigid", "spatial_rigid", "one"] {
+        assert!(row(name).is_some(), "{name}");
+    }
+    let shifts = row("shifts").expect("the standard conditions");
+    assert_eq!(
+        (&shifts["conditions"], &shifts["file"]),
+        (&Value::from(10), &Value::from("suites/shifts.lua"))
+    );
+    assert!(project.succeeds("check suites/shifts.lua --suite one").out.contains("mass x1.75"));
+}

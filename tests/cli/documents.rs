@@ -1,0 +1,182 @@
+//! What the documents promise: their files are written into an empty folder and their commands run there, in the order in
+//! which they stand on the page; and pages that are made are what the binary makes.
+
+use std::{path::Path, time::Duration};
+
+use softvt::{evaluation::thresholds::Thresholds, report::envelope::plot, script};
+
+use crate::support::{Project, Said, said};
+
+/// A fenced block: the words after its backticks, and what is in it.
+struct Fence {
+    info: String,
+    text: String,
+}
+
+fn read(path: &str) -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
+    std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}
+
+fn fences(page: &str) -> Vec<Fence> {
+    let mut found = Vec::new();
+    let mut open: Option<Fence> = None;
+    for line in read(page).lines() {
+        match (line.strip_prefix("```"), &mut open) {
+            (Some(info), None) => open = Some(Fence { info: info.to_owned(), text: String::new() }),
+            (Some(_), Some(_)) => found.extend(open.take()),
+            (None, Some(fence)) => fence.text += &format!("{line}\n"),
+            (None, None) => {}
+        }
+    }
+    assert!(open.is_none(), "{page} ends inside of a fence");
+    found
+}
+
+impl Fence {
+    /// Where a complete file goes.
+    fn file(&self) -> Option<&str> {
+        self.info.strip_prefix("lua file=")
+    }
+
+    /// The softvt commands of a shell block, without comments.
+    fn commands(&self) -> Vec<&str> {
+        let lines = self.text.lines().filter(|_| self.info == "sh");
+        lines.filter_map(|line| line.split(" #").next()?.trim().strip_prefix("softvt ")).collect()
+    }
+}
+
+/// Fewer episodes and trials than a person would run.
+fn shortened(command: &str) -> String {
+    let (script, _) = command.split_once(' ').unwrap_or((command, ""));
+    match script {
+        "scripts/calibrate.lua" => format!("{command} --trials 1 --step 0.04 --hold-s 0.5"),
+        script if script.ends_with(".lua") => format!("{command} --episodes 1 --json --out run"),
+        _ => command.to_owned(),
+    }
+}
+
+/// Runs what must succeed; drawing a video may take long where others work too.
+fn runs(project: &Project, words: &str) -> Said {
+    let mut command = project.command(words);
+    command.timeout(Duration::from_secs(600));
+    let said = said(command);
+    assert_eq!(said.code, 0, "softvt {words}\n{}", said.err);
+    said
+}
+
+/// Safety Success of a run that printed JSON, %.
+fn safety(said: &str) -> f64 {
+    let summary: serde_json::Value = serde_json::from_str(said).expect("JSON");
+    assert_eq!(summary["goal_success_rate"]["rate"], 100.0, "the goal is reached");
+    summary["safety_success_rate"]["rate"].as_f64().expect("a rate")
+}
+
+#[test]
+fn a_newcomer_gets_from_nothing_to_a_safe_suite_by_the_page() {
+    let project = Project::new(&[]);
+    let (mut files, mut rates, mut commands) = (0, Vec::new(), 0);
+    for fence in fences("docs/write-a-task.md") {
+        if let Some(file) = fence.file() {
+            project.write(file, fence.text.as_bytes());
+            files += 1;
+            continue;
+        }
+        assert!(fence.info == "sh", "a fence of {:?}: say which file it is", fence.info);
+        for command in fence.commands() {
+            commands += 1;
+            let said = runs(&project, &shortened(command));
+            if command.starts_with("suites/bricks.lua") {
+                rates.push(safety(&said.out));
+            }
+            // The next command writes one of that name.
+            let _ = std::fs::remove_dir_all(project.path("run"));
+        }
+    }
+    assert!(files >= 5 && commands >= 6, "{files} files, {commands} commands");
+    assert_eq!(rates, [0.0, 100.0], "nothing is safe before the calibration, everything after it");
+    assert!(
+        project.path("assets/calibration/brick.json").exists() && project.path("seen/episode.mp4").exists()
+    );
+}
+
+#[test]
+fn the_readmes_suite_and_object_work() {
+    let project = Project::new(&[]);
+    let files: Vec<Fence> = fences("README.md").into_iter().filter(|fence| fence.file().is_some()).collect();
+    let paths: Vec<&str> = files.iter().filter_map(Fence::file).collect();
+    assert_eq!(paths, ["my_suite.lua", "assets/jelly.lua"]);
+    files.iter().for_each(|f| project.write(f.file().unwrap_or_default(), f.text.as_bytes()));
+    project.succeeds("check my_suite.lua");
+    let said = project.succeeds("my_suite.lua --episodes 1 --json --out run");
+    assert_eq!(safety(&said.out), 0.0);
+    assert!(said.err.contains("jelly is not calibrated"), "{}", said.err);
+    // The message that the page shows.
+    let text = files[0].text.replace("hold_s", "holds");
+    project.write("my_suite.lua", text.as_bytes());
+    let shown = read("README.md");
+    let message = format!("softvt: {}", project.refusal("my_suite.lua"));
+    assert!(shown.contains(&format!("\n{message}\n")), "{message}");
+}
+
+/// The commands of the README that run a suite or a script that is there.
+#[test]
+fn every_script_that_a_page_names_is_there_and_takes_the_flags_that_it_shows() {
+    let pages = [
+        "README.md",
+        "CONTRIBUTING.md",
+        "docs/write-a-task.md",
+        "docs/assets.md",
+        "docs/calibration.md",
+        "docs/tactile.md",
+    ];
+    let mut tried = 0;
+    for page in pages {
+        for line in read(page).lines().filter_map(|line| line.trim().strip_prefix("softvt ")) {
+            let words = line.split(" #").next().unwrap_or(line).trim();
+            let file = words.split(' ').find(|word| word.ends_with(".lua"));
+            let Some(file) = file.filter(|file| script::embedded(file).is_some()) else { continue };
+            // With --help last nothing runs, but every flag before it must be known.
+            let project = Project::new(&[]);
+            let said = project.succeeds(&format!("{words} --help"));
+            assert!(said.out.contains("Usage:"), "{page}: {file}");
+            tried += 1;
+        }
+    }
+    assert!(tried >= 10, "{tried} commands");
+}
+
+#[test]
+fn the_asset_page_says_what_the_binary_says() {
+    let project = Project::new(&[]);
+    project.succeeds("scripts/asset_page.lua --pictures=off --out made");
+    let (kept, made) = (read("docs/assets.md"), project.text("made/docs/assets.md"));
+    assert!(kept == made, "docs/assets.md is old: softvt scripts/asset_page.lua makes it anew");
+    let mut bytes = 0;
+    for part in kept.split("](pictures/").skip(1) {
+        let path = part.split(')').next().unwrap_or_default();
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/pictures").join(path);
+        bytes += std::fs::metadata(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display())).len();
+    }
+    assert!(bytes < 1_500_000, "the pictures of the page take {bytes} bytes");
+    let rows = kept.lines().filter(|line| line.starts_with("| <a id=")).count();
+    let assets = script::embedded_scripts("assets").len();
+    assert_eq!(rows, assets - 2, "every asset but table and floor");
+}
+
+#[test]
+fn the_calibration_page_shows_the_envelope_of_every_soft_asset() {
+    let page = read("docs/calibration.md");
+    let soft = fences("docs/calibration.md");
+    assert_eq!(soft.len(), 17);
+    for fence in soft {
+        let asset = fence.text.split(' ').next().expect("a name").to_owned();
+        let path = format!("assets/calibration/{asset}.json");
+        let file = Thresholds::parse(&read(&path), &path).expect("a threshold file");
+        let text = plot(&asset, &file.envelopes[&asset], file.limit(&asset));
+        assert_eq!(fence.text, text, "{asset}: softvt scripts/calibrate.lua makes it anew");
+        assert_eq!(read(&format!("assets/calibration/{asset}.txt")), text, "{asset}");
+        assert!(page.contains(&format!("| [{asset}](#{asset}) | ")), "{asset}");
+        assert!(text.contains("█ safe window ≤"), "{asset} has a safe window");
+    }
+}
