@@ -64,10 +64,11 @@ const MISSES: &str = "
   a whole suite runs about 11 times faster than real time on one core where 25 was to be reached.
 - A rigid body with flat faces and *rounded* edges has no contact points on its flats: it sinks and does not settle. Sharp
   edges, lathes, balls and capsules rest; rigid twins of most soft objects (`--twin rigid`) do not.
-- Pictures show stripes and specks along some borders of shadows, and on surfaces that the key light grazes.
-- Speed of pictures (`cargo bench --bench render`), ms, one thread, measured and to be reached: third-person 224² 3.6 and 3, wrist
-  224² 9.9 and 4, third-person 1024² 31 and 25, without its kept background 85 and 60. Measured before robot and rigid things
-  were given fewer triangles and everything a shadow, which has to be measured anew.
+- Surfaces that the key light grazes take no shadow from what is nearer than a few millimetres to them, and moving things throw
+  none outside of the ball in which shadows are fine (0.85 m).
+- Speed of pictures (`cargo bench --bench render`), ms, one thread, measured on a machine busy with other work and to be reached:
+  third-person 224² 7.5 and 3, wrist 224² 12 and 4, third-person 1024² 67 and 25, without its kept background 137 and 60, wrist
+  512² 38 and 20. Shadows without specks cost up to a fifth of that; drawing triangles costs most.
 - Speed of touch (`cargo bench --bench tactile`): a gel field of many slipping ridges takes 1.2 ms where 1 was to be reached.
 - The whole loop with every stream at every control step (`cargo bench --bench streams`): 1.8 times real time where 4 was to be
   reached; blind it is 14, with touch alone 6. Triangles of the robot, rasterised for picture and shadow, are most of it.

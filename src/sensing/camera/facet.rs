@@ -38,9 +38,8 @@ pub(super) struct Facet {
     texel: f32,
     size: [usize; 2],
     ground: Ground,
-    /// Copies, each half the size of the one before, painted when they are first looked at: undersides and what is only
-    /// seen from afar never are.
-    mips: Vec<OnceLock<Image>>,
+    /// Painted when it is first looked at: undersides never are.
+    mips: OnceLock<Vec<Image>>,
 }
 
 /// What a texture is painted from.
@@ -144,9 +143,7 @@ impl Facet {
         let texel = texel(longest).max(longest / MOST_TEXELS);
         let origin = u * u0 + v * v0 + n * corners[0].dot(n);
         let size = [u1 - u0, v1 - v0].map(|x| (x / texel).ceil().max(1.0) as usize);
-        let copies = usize::BITS - (size[0].max(size[1]) - 1).leading_zeros() + 1;
-        let mips = (0..copies).map(|_| OnceLock::new()).collect();
-        Self { origin, u, v, n: *n, texel, size, ground, mips }
+        Self { origin, u, v, n: *n, texel, size, ground, mips: OnceLock::new() }
     }
 
     /// Place of a point of the object frame, texels of the finest copy.
@@ -155,49 +152,37 @@ impl Facet {
         [d.dot(&self.u) / self.texel, d.dot(&self.v) / self.texel]
     }
 
-    /// The copy number `k`.
-    fn image(&self, k: usize) -> &Image {
-        self.mips[k].get_or_init(|| match &self.ground {
-            Ground::Flat(visual) if k == 0 || !pattern::printed(visual) => self.painted(visual, k),
-            Ground::Flat(_) => self.image(k - 1).half(),
-            Ground::Curved(curved) if k == 0 => {
-                Image::of(&charts::paint(curved, self.size, self.texel, |p| self.place(p)), self.size)
-            }
-            Ground::Curved(_) => self.image(k - 1).half(),
-        })
-    }
-
-    /// The pattern itself, for copies as the mean of four points a texel.
-    fn painted(&self, visual: &Visual, k: usize) -> Image {
-        let size = self.size.map(|n| n.div_ceil(1 << k));
-        let texel = self.texel * (1_u32 << k) as f32;
-        let each = if k == 0 { 1 } else { 2 };
-        let step = texel / each as f32;
-        let look = |x: usize, y: usize| {
-            let at = self.u * ((x as f32 + 0.5) * step) + self.v * ((y as f32 + 0.5) * step);
-            pattern::look(visual, &(self.origin + at), &self.n, step).0.painted()
+    fn paint(&self) -> Vec<Image> {
+        let [width, height] = self.size;
+        let look = |visual: &Visual, i: usize| {
+            let [x, y] = [(i % width) as f32 + 0.5, (i / width) as f32 + 0.5];
+            let p = self.origin + (self.u * x + self.v * y) * self.texel;
+            pattern::look(visual, &p, &self.n, self.texel).0.painted()
         };
-        let points: Vec<[f32; 4]> = (0..each * size[1])
-            .flat_map(|y| (0..each * size[0]).map(move |x| (x, y)))
-            .map(|(x, y)| look(x, y))
-            .collect();
-        match each {
-            1 => Image::of(&points, size),
-            _ => Image::of(&halved(&points, size.map(|n| each * n)).0, size),
+        let mut fine: Vec<[f32; 4]> = match &self.ground {
+            Ground::Flat(visual) => (0..width * height).map(|i| look(visual, i)).collect(),
+            Ground::Curved(curved) => charts::paint(curved, self.size, self.texel, |p| self.place(p)),
+        };
+        let mut size = self.size;
+        let mut mips = vec![Image::of(&fine, size)];
+        while size[0].max(size[1]) > 1 {
+            (fine, size) = halved(&fine, size);
+            mips.push(Image::of(&fine, size));
         }
+        mips
     }
 
     /// Albedo and roughness at places (texels), averaged over about `footprint`, m.
     pub fn sample(&self, [u, v]: [F8; 2], footprint: F8) -> (V8, F8) {
-        let last = F8::splat((self.mips.len() - 1) as f32);
+        let mips = self.mips.get_or_init(|| self.paint());
+        let last = F8::splat((mips.len() - 1) as f32);
         let texels = footprint * F8::splat(1.0 / self.texel);
         let level = rough_log2(texels.fast_max(F8::ONE)).fast_max(F8::ZERO).fast_min(last);
         let levels = level.to_array();
         let low = levels.into_iter().fold(f32::MAX, f32::min) as usize;
         let high = levels.into_iter().fold(0.0, f32::max).ceil() as usize;
         let mut sum = [F8::ZERO; 4];
-        for k in low..high + 1 {
-            let image = self.image(k);
+        for (k, image) in mips.iter().enumerate().take(high + 1).skip(low) {
             let weight = (F8::ONE - (level - F8::splat(k as f32)).abs()).fast_max(F8::ZERO);
             let scale = F8::splat(1.0 / (1_u32 << k) as f32);
             let values = image.at(u * scale, v * scale);
@@ -221,21 +206,6 @@ fn halved(texels: &[[f32; 4]], from: [usize; 2]) -> (Vec<[f32; 4]>, [usize; 2]) 
 }
 
 impl Image {
-    /// Half the size.
-    fn half(&self) -> Self {
-        let stride = self.size[0] + 1;
-        let value = |texel: u32, c: usize| (texel >> (8 * c) & 0xFF) as f32 / 255.0;
-        let rows = self.texels.chunks(stride).take(self.size[1]).flat_map(|row| &row[..self.size[0]]);
-        let texels: Vec<[f32; 4]> = rows
-            .map(|&texel| {
-                let [r, g, b, roughness] = std::array::from_fn(|c| value(texel, c));
-                [r * r, g * g, b * b, roughness]
-            })
-            .collect();
-        let (texels, size) = halved(&texels, self.size);
-        Self::of(&texels, size)
-    }
-
     fn of(texels: &[[f32; 4]], size: [usize; 2]) -> Self {
         let byte = |x: f32| (x.clamp(0.0, 1.0) * 255.0 + 0.5) as u32;
         let stride = size[0] + 1;

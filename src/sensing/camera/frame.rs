@@ -8,7 +8,7 @@ use super::{
 /// A coarser level is used if its edges are at most this many pixels long, or if it is of one colour and at most this many
 /// pixels from the shape that it stands for.
 const COARSE_PIXELS: f32 = 1.7;
-pub(super) const FLAW_PIXELS: f32 = 0.2;
+pub(super) const FLAW_PIXELS: f32 = 0.12;
 /// Things wider than this hide no sky from others, m: they are grounds and walls.
 const WIDEST_BLOB: f32 = 0.35;
 
@@ -56,14 +56,10 @@ pub(super) fn choose_levels(
             chosen.push(None);
             continue;
         }
-        // Corners of the box stand out of what it holds: that comes nearer by half an edge.
-        let nearest = (lens.depth(&centre) - 0.5 * (high - low).max()).max(lens.near);
+        let nearest = (lens.depth(&centre) - radius).max(lens.near);
         let pixel = nearest / lens.focal;
         let levels = &thing.model.levels;
-        let fine = |l: &Level| {
-            let (looks, form) = (l.spacing <= COARSE_PIXELS * pixel, l.flaw <= FLAW_PIXELS * pixel);
-            if l.plain { form && (looks || l.flaw > 0.0) } else { looks }
-        };
+        let fine = |l: &Level| l.spacing <= COARSE_PIXELS * pixel || l.plain && l.flaw <= FLAW_PIXELS * pixel;
         let level = levels.iter().rposition(fine).unwrap_or(0);
         if stage.fixed[i].is_empty() && level + 1 < levels.len() {
             poses[i][level].update(thing, &levels[level], view)?;

@@ -29,7 +29,7 @@ const OFFSET: f32 = 2e-3;
 /// Normals are off by as much as this, rad: what rises above the surface no more than that explains is the surface itself.
 const BENT: f32 = 0.1;
 /// Light that falls in flatter than this (cosine) is treated as if it did not.
-const LEAST_COSINE: f32 = 0.08;
+const LEAST_COSINE: f32 = 0.02;
 /// Rise of a surface beyond which its tilt says nothing about what is above it.
 const STEEPEST: f32 = 1.5;
 /// Widest filter and reach of the search for what casts the shadow, texels to each side: two vectors across.
@@ -370,7 +370,8 @@ impl Filter<'_> {
         let rise = across.map(|d| d * F8::splat(self.slope[0]));
         let tilt = across.map(|d| d * F8::splat(self.tilt[0]) + F8::splat(height));
         let limit = F8::splat(height + self.bias);
-        let (cone, narrowest, widest) = (F8::splat(self.cone), F8::splat(NARROWEST), F8::splat(radius));
+        let [cone, narrowest] = [self.cone, NARROWEST].map(F8::splat);
+        let widest = F8::splat(if SEARCH { radius } else { f32::MAX });
         let (mut open, mut hidden, mut above) = (F8::ZERO, F8::ZERO, F8::ZERO);
         let stride = self.map.heights.stride();
         for row in (from.div_ceil(STEP) * STEP..to).step_by(STEP) {
@@ -384,17 +385,15 @@ impl Filter<'_> {
                 let higher = heights.simd_gt(limit + (rise[c] + row_rise).fast_max(F8::ZERO));
                 open += weight & !higher;
                 let rise = heights - tilt[c] - row_tilt;
-                let reach = rise * cone + narrowest;
-                let away2 = across2[c] + d2;
+                let reach = (rise * cone + narrowest).fast_min(widest);
+                // Whole for all that is as high as what it was sought by, and fading to the cone's border.
+                let within = (reach * reach - across2[c] - d2) * F8::splat(1.0 / (NARROWEST * NARROWEST));
+                let within = higher & within.fast_max(F8::ZERO).fast_min(F8::ONE);
                 if SEARCH {
-                    let reach = reach.fast_min(widest);
-                    let covered = higher & (F8::ONE - away2 / (reach * reach)).fast_max(F8::ZERO);
-                    hidden += covered;
-                    above += covered * rise;
+                    hidden += within;
+                    above += within * rise;
                 } else {
-                    // Whole for all that is as high as what it was sought by, and fading to the cone's border.
-                    let within = (reach * reach - away2) * F8::splat(1.0 / (NARROWEST * NARROWEST));
-                    hidden += higher & (weight * within.fast_max(F8::ZERO).fast_min(F8::ONE));
+                    hidden += weight * within;
                 }
             }
         }

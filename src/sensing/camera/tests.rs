@@ -252,7 +252,7 @@ fn the_border_of_a_shadow_gets_darker_all_the_way_and_lies_where_the_edge_throws
     let edge = Vec3::new(edge.x, edge.y, 0.0);
     for along in [-0.02, -0.004, 0.01] {
         for step in [2e-4, 9e-4, 2e-3] {
-            let count = (0.03 / step) as usize / 8 * 8;
+            let count = (0.05 / step) as usize / 8 * 8;
             let from = -0.5 * step * count as f64;
             let place = |i: usize| edge + across * (from + step * i as f64) + turn * Vec3::x() * along;
             let shares: Vec<f32> = (0..count)
