@@ -67,8 +67,8 @@ const MISSES: &str = "
 - Surfaces that the key light grazes take no shadow from what is nearer than a few millimetres to them, and moving things throw
   none outside of the ball in which shadows are fine (0.85 m).
 - Speed of pictures (`cargo bench --bench render`), ms, one thread, measured on a machine busy with other work and to be reached:
-  third-person 224² 7.5 and 3, wrist 224² 12 and 4, third-person 1024² 67 and 25, without its kept background 137 and 60, wrist
-  512² 38 and 20. Shadows without specks cost up to a fifth of that; drawing triangles costs most.
+  third-person 224² 9.3 and 3, wrist 224² 13.5 and 4, third-person 1024² 79 and 25, without its kept background 140 and 60, wrist
+  512² 36 and 20. Before shadows lost their specks: 6.6, 10.9, 53, 117 and 37, measured right after, when the machine was less busy.
 - Speed of touch (`cargo bench --bench tactile`): a gel field of many slipping ridges takes 1.2 ms where 1 was to be reached.
 - The whole loop with every stream at every control step (`cargo bench --bench streams`): 1.8 times real time where 4 was to be
   reached; blind it is 14, with touch alone 6. Triangles of the robot, rasterised for picture and shadow, are most of it.
