@@ -62,10 +62,11 @@ const MISSES: &str = "
 - Resolutions 18 and 24 are compared by their small-strain stiffness only; their squeezes take minutes.
 - Speed (`softvt scripts/squeeze.lua --gap-mm 42`): 0.12 to 0.14 CPU s per simulated second where 0.05 was to be reached;
   a whole suite runs about 11 times faster than real time on one core where 25 was to be reached.
-- Pictures show stripes and specks along some borders of shadows, and on surfaces that the key light grazes.
-- Speed of pictures (`cargo bench --bench render`), ms, one thread, measured and to be reached: third-person 224² 3.6 and 3, wrist
-  224² 9.9 and 4, third-person 1024² 31 and 25, without its kept background 85 and 60. Measured before robot and rigid things
-  were given fewer triangles and everything a shadow, which has to be measured anew.
+- Surfaces that the key light grazes take no shadow from what is nearer than a few millimetres to them, and moving things throw
+  none outside of the ball in which shadows are fine (0.85 m).
+- Speed of pictures (`cargo bench --bench render`), ms, one thread, measured on a machine busy with other work and to be reached:
+  third-person 224² 9.3 and 3, wrist 224² 13.5 and 4, third-person 1024² 79 and 25, without its kept background 140 and 60, wrist
+  512² 36 and 20. Before shadows lost their specks: 6.6, 10.9, 53, 117 and 37, measured right after, when the machine was less busy.
 - Speed of touch (`cargo bench --bench tactile`): a gel field of many slipping ridges takes 1.2 ms where 1 was to be reached.
 - The whole loop with every stream at every control step (`cargo bench --bench streams`): 1.8 times real time where 4 was to be
   reached; blind it is 14, with touch alone 6. Triangles of the robot, rasterised for picture and shadow, are most of it.

@@ -23,17 +23,29 @@ const TILE_BITS: i32 = 3;
 const TILES: usize = EDGE / TILE;
 /// Tiles to each side that the range covers: as far as the filter reaches.
 const AROUND: usize = 1;
-/// A surface is in the shadow of what is higher by more than this, m, and texels.
-const BIAS: [f32; 2] = [2.5e-3, 1.1];
+/// A surface is in the shadow of what is farther off it than this, m: casters are drawn with fewer triangles than what they
+/// throw shadows on.
+const OFFSET: f32 = 2e-3;
+/// Normals are off by as much as this, rad: what rises above the surface no more than that explains is the surface itself.
+const BENT: f32 = 0.1;
+/// Light that falls in flatter than this (cosine) is treated as if it did not.
+const LEAST_COSINE: f32 = 0.02;
+/// Rise of a surface beyond which its tilt says nothing about what is above it.
+const STEEPEST: f32 = 1.5;
 /// Widest filter and reach of the search for what casts the shadow, texels to each side: two vectors across.
 const WIDEST: f32 = 7.4;
 /// Narrowest filter, texels to each side.
 const NARROWEST: f32 = 1.5;
-/// Eight points within so many texels, of which three tell what the others see: less than the widest filter's reach lies
-/// between them.
-const NEIGHBOURS: f32 = 12.0;
-/// Eight points within so many texels, of which four tell what the others see even in a penumbra.
-const NEAREST: f32 = 5.0;
+/// Widest filter of one vector across, texels to each side.
+const ONE_VECTOR: f32 = 3.4;
+/// Eight points on a line of so many texels are filtered at these places only: the filter is smooth between them.
+const RUN: f32 = 4.0;
+/// On a line of so many, these places tell whether all see the whole light, or none of it.
+const LONG_RUN: f32 = 7.0;
+const NODES: [usize; 4] = [0, 2, 5, 7];
+/// How far points of a run are beside their even places, texels, and how much their normals differ (cosine).
+const UNEVEN: f32 = 0.3;
+const FLAT: f32 = 0.998;
 /// Light that comes in flatter than this (sine) is treated as if it did not.
 const LEVELLEST: f32 = 0.15;
 /// Heights below all.
@@ -46,7 +58,6 @@ pub(super) struct ShadowMap {
     centre: V3,
     texels_per_metre: f32,
     tangent: f32,
-    bias: f32,
     /// Rise of level ground a texel along each axis, m. Heights above it tell what can darken something: what is farther
     /// along the light is always higher above it too, and level ground never stands above itself.
     lean: [f32; 2],
@@ -84,7 +95,6 @@ impl ShadowMap {
         Self {
             axes,
             lean: [-axes[0].z / steep, -axes[1].z / steep],
-            bias: BIAS[0].max(BIAS[1] / texels_per_metre),
             centre: lighting.shadow_centre_w.cast(),
             texels_per_metre,
             tangent: lighting.key.softness_rad.tan() as f32,
@@ -177,9 +187,8 @@ impl ShadowMap {
     pub fn may_shade(&self, from: [f32; 2], to: [f32; 2], least: f32) -> bool {
         let tile = |x: f32| (x.max(0.0) as usize / TILE).min(TILES - 1);
         let columns = tile(from[0])..tile(to[0]) + 1;
-        (tile(from[1])..tile(to[1]) + 1).any(|y| {
-            self.ranges[y * TILES..][columns.clone()].iter().any(|range| range[1] > least + self.bias)
-        })
+        (tile(from[1])..tile(to[1]) + 1)
+            .any(|y| self.ranges[y * TILES..][columns.clone()].iter().any(|range| range[1] > least + OFFSET))
     }
 
     /// Which points the map knows something about.
@@ -203,110 +212,192 @@ impl ShadowMap {
         let tiles = (tile(at.v) * i32x8::splat(TILES as i32) + tile(at.u)).to_array();
         let ranges = tiles.map(|i| self.ranges[i as usize % (TILES * TILES)]);
         let most = F8::new(ranges.map(|[_, most]| most));
-        let near = most.simd_gt(at.level + F8::splat(self.bias)).to_bitmask() & inside;
+        let near = most.simd_gt(at.level + F8::splat(OFFSET)).to_bitmask() & inside;
         if near == 0 { F8::ONE } else { self.filtered(at, n, near, &ranges) }
     }
 
     /// The shares of the points `near` something higher, by the ranges of heights around them.
     #[inline(never)]
     fn filtered(&self, at: &Places, n: &V8, near: u32, ranges: &[[f32; 2]; LANES]) -> F8 {
-        let [u, v, height, level] = [at.u, at.v, at.height, at.level].map(F8::to_array);
-        let normals = n.to_arrays();
-        let one = |i: usize| {
-            let normal = V3::from(normals.map(|axis| axis[i]));
-            Filter::new(self, [u[i], v[i], height[i]], &normal).share(ranges[i][0] - level[i])
-        };
-        let spread = |of: &[f32; LANES]| {
-            let [low, high] = of.iter().fold([f32::MAX, f32::MIN], |[l, h], &x| [l.min(x), h.max(x)]);
-            high - low
-        };
-        let apart = spread(&u).max(spread(&v)).max(spread(&height) * self.texels_per_metre);
-        if near != 0xFF || apart > NEIGHBOURS {
+        let surfaces = Surfaces::new(self, at, n);
+        let level = at.level.to_array();
+        let one = |i: usize| surfaces.filter(self, i).share(ranges[i].map(|end| end - level[i]));
+        let length = if near == 0xFF { surfaces.run() } else { f32::MAX };
+        if length > LONG_RUN {
             return F8::new(std::array::from_fn(|i| if near >> i & 1 == 1 { one(i) } else { 1.0 }));
         }
-        // Where both ends and the middle see all or nothing of the light, so do those between.
-        let [a, d, h] = [one(0), one(3), one(7)];
-        if [a, d, h] == [0.0; 3] || [a, d, h] == [1.0; 3] {
+        let known @ [a, b, c, d] = NODES.map(one);
+        // What is narrower than the gaps is still seen from beside it: no filter is narrower than they are.
+        if known == [0.0; 4] || known == [1.0; 4] {
             return F8::splat(a);
         }
-        if apart > NEAREST {
-            return F8::new([a, one(1), one(2), d, one(4), one(5), one(6), h]);
-        }
-        // Penumbras are wider than the gaps.
-        let f = one(5);
-        let third = (d - a) / 3.0;
-        F8::new([a, a + third, d - third, d, 0.5 * (d + f), f, 0.5 * (f + h), h])
+        if length > RUN { F8::new([a, one(1), b, one(3), one(4), c, one(6), d]) } else { run_of(known) }
     }
 }
 
+/// Values of a run of eight from those at [`NODES`]: the cubic through them.
+fn run_of(known: [f32; 4]) -> F8 {
+    let nodes = NODES.map(|node| F8::splat(node as f32));
+    let mut sum = F8::ZERO;
+    for (i, value) in known.into_iter().enumerate() {
+        let mut term = F8::splat(value);
+        for j in (0..NODES.len()).filter(|&j| j != i) {
+            term *= (STEPS - nodes[j]) * F8::splat(1.0 / (NODES[i] as f32 - NODES[j] as f32));
+        }
+        sum += term;
+    }
+    sum.fast_max(F8::ZERO).fast_min(F8::ONE)
+}
+
 /// What is around one point.
+///
+/// A thing hides light that comes to a point from within the lamp's cone only: what is farther away to the side than its
+/// height times the lamp's width does not count, so that a surface that rises beside the point does not darken it.
 struct Filter<'a> {
     map: &'a ShadowMap,
     place: [f32; 3],
     /// Rise of the surface itself a texel along each axis, m.
     slope: [f32; 2],
+    /// The same, but not steeper than heights can be told from.
+    tilt: [f32; 2],
+    /// What is not higher than this above the surface is the surface, m.
+    bias: f32,
+    /// Half the width of the lamp's cone a metre, texels.
+    cone: f32,
 }
 
-impl<'a> Filter<'a> {
-    fn new(map: &'a ShadowMap, place: [f32; 3], n: &V3) -> Self {
-        let steep = (n.dot(&map.axes[2]) * map.texels_per_metre).max(0.1 * map.texels_per_metre);
-        let slope = [-n.dot(&map.axes[0]) / steep, -n.dot(&map.axes[1]) / steep];
-        Self { map, place, slope }
+/// Eight points and what the surfaces around them are, as in [`Filter`].
+struct Surfaces {
+    place: [F8; 3],
+    normal: V8,
+    slope: [[f32; LANES]; 2],
+    tilt: [[f32; LANES]; 2],
+    bias: [f32; LANES],
+}
+
+impl Surfaces {
+    fn new(map: &ShadowMap, at: &Places, n: &V8) -> Self {
+        let along = |axis: usize| n.dot(V8::splat(&map.axes[axis]));
+        let inverse = F8::ONE / along(2).fast_max(F8::splat(LEAST_COSINE));
+        let texel = F8::splat(1.0 / map.texels_per_metre);
+        let slope = [0, 1].map(|axis| -along(axis) * inverse * texel);
+        let most = F8::splat(STEEPEST) * texel;
+        let bent = F8::splat(NARROWEST * BENT) * texel * inverse * inverse;
+        Self {
+            place: [at.u, at.v, at.height],
+            normal: *n,
+            slope: slope.map(F8::to_array),
+            tilt: slope.map(|rise| rise.fast_max(-most).fast_min(most).to_array()),
+            bias: (F8::splat(OFFSET) * inverse + bent).to_array(),
+        }
     }
 
-    /// Share of the light, 0..=1; all around is higher than the point by `least` above level ground.
-    fn share(&self, least: f32) -> f32 {
-        let steepest = |axis: usize| self.slope[axis].abs() + self.map.lean[axis].abs();
-        if least > self.map.bias + (steepest(0) + steepest(1)) * WIDEST {
+    fn filter<'a>(&self, map: &'a ShadowMap, i: usize) -> Filter<'a> {
+        Filter {
+            map,
+            place: self.place.map(|x| x.to_array()[i]),
+            slope: self.slope.map(|rise| rise[i]),
+            tilt: self.tilt.map(|rise| rise[i]),
+            bias: self.bias[i],
+            cone: map.tangent * map.texels_per_metre,
+        }
+    }
+
+    /// Length of the line along which the points lie evenly on a flat surface, texels; endless if they do not.
+    fn run(&self) -> f32 {
+        let [u, v, _] = self.place;
+        let spans = [u, v].map(|x| {
+            let [first, .., last] = x.to_array();
+            let line = F8::splat(first) + STEPS * F8::splat((last - first) / (LANES - 1) as f32);
+            let even = (x - line).abs().simd_lt(F8::splat(UNEVEN)).all();
+            if even { (last - first).abs() } else { f32::MAX }
+        });
+        let first = V3::from(self.normal.to_arrays().map(|axis| axis[0]));
+        // Heights follow the plane through the first point.
+        let rise = |axis: usize| {
+            let from = F8::splat(self.place[axis].to_array()[0]);
+            (self.place[axis] - from) * F8::splat(self.slope[axis][0])
+        };
+        let plane = F8::splat(self.place[2].to_array()[0]) + rise(0) + rise(1);
+        let on_plane = (self.place[2] - plane).abs().simd_lt(F8::splat(OFFSET)).all();
+        let flat = self.normal.dot(V8::splat(&first)).simd_gt(F8::splat(FLAT)).all();
+        if flat && on_plane { spans[0].max(spans[1]) } else { f32::MAX }
+    }
+}
+
+impl Filter<'_> {
+    /// Share of the light, 0..=1; what is around is higher above level ground than the point by numbers of a range, m.
+    fn share(&self, [least, most]: [f32; 2]) -> f32 {
+        let both = |of: fn(&Self, usize) -> f32| of(self, 0) + of(self, 1);
+        let steepest = both(|f, axis| f.slope[axis].abs() + f.map.lean[axis].abs());
+        if least > self.bias + steepest * WIDEST {
             return 0.0;
         }
-        let [open, hidden, above] = self.sums::<2, 3>(WIDEST);
+        let uneven = both(|f, axis| (f.map.lean[axis] - f.tilt[axis]).abs());
+        let reach = (NARROWEST + (most + uneven * WIDEST) * self.cone).clamp(NARROWEST, WIDEST);
+        let [open, hidden, above] = match reach {
+            ..=ONE_VECTOR => self.sums::<1, 1, true>(reach),
+            _ => self.sums::<2, 2, true>(reach),
+        };
         if hidden <= 0.0 {
             return 1.0;
         }
         if open <= 0.0 {
             return 0.0;
         }
-        let width = above / hidden * self.map.tangent * self.map.texels_per_metre;
+        let width = (above / hidden * self.cone).clamp(NARROWEST, reach);
         let [open, hidden, _] = match width {
-            ..=3.4 => self.sums::<1, 1>(width.max(NARROWEST)),
-            _ => self.sums::<2, 2>(width.min(WIDEST)),
+            ..=ONE_VECTOR => self.sums::<1, 1, false>(width),
+            _ => self.sums::<2, 2, false>(width),
         };
-        open / (open + hidden)
+        if hidden <= 0.0 { 1.0 } else { open / (open + hidden) }
     }
 
     /// Weights of what lets light through and of what hides it within `radius` texels, and the latter's weighted height
-    /// above the point; of every `STEP`th row, and as wide as `CHUNKS` vectors.
+    /// above the surface; of every `STEP`th row, and as wide as `CHUNKS` vectors. A `SEARCH` weighs what hides light by the
+    /// cone alone, so that it does not matter how far it reaches.
     #[inline(always)]
-    fn sums<const CHUNKS: usize, const STEP: usize>(&self, radius: f32) -> [f32; 3] {
+    fn sums<const CHUNKS: usize, const STEP: usize, const SEARCH: bool>(&self, radius: f32) -> [f32; 3] {
         let [u, v, height] = self.place;
         let first = (u - radius) as usize;
         let (from, to) = ((v - radius) as usize, (v + radius) as usize + 1);
         let inverse2 = 1.0 / (radius * radius);
         let across: [F8; CHUNKS] =
             std::array::from_fn(|c| STEPS + F8::splat((first + c * LANES) as f32 + 0.5 - u));
+        let across2 = across.map(|d| d * d);
         // A paraboloid's worth of weight: softer than a box, and still separable.
-        let weights = across.map(|d| (F8::ONE - d * d * F8::splat(inverse2)).fast_max(F8::ZERO));
+        let weights = across2.map(|d2| (F8::ONE - d2 * F8::splat(inverse2)).fast_max(F8::ZERO));
         let rise = across.map(|d| d * F8::splat(self.slope[0]));
-        let [base, limit] = [height, height + self.map.bias].map(F8::splat);
-        let (mut all, mut hidden, mut above) = (F8::ZERO, F8::ZERO, F8::ZERO);
+        let tilt = across.map(|d| d * F8::splat(self.tilt[0]) + F8::splat(height));
+        let limit = F8::splat(height + self.bias);
+        let [cone, narrowest] = [self.cone, NARROWEST].map(F8::splat);
+        let widest = F8::splat(if SEARCH { radius } else { f32::MAX });
+        let (mut open, mut hidden, mut above) = (F8::ZERO, F8::ZERO, F8::ZERO);
         let stride = self.map.heights.stride();
         for row in (from.div_ceil(STEP) * STEP..to).step_by(STEP) {
             let d = row as f32 + 0.5 - v;
             let share = F8::splat((1.0 - d * d * inverse2).max(0.0));
-            let row_rise = F8::splat(self.slope[1] * d);
+            let [row_rise, row_tilt, d2] = [self.slope[1] * d, self.tilt[1] * d, d * d].map(F8::splat);
             let texels = self.map.heights.w.get(row * stride + first..).unwrap_or_default();
             for (c, texels) in texels.as_chunks::<LANES>().0.iter().take(CHUNKS).enumerate() {
                 let heights = F8::new(*texels);
                 let weight = weights[c] * share;
-                let covered = heights.simd_gt(limit + (rise[c] + row_rise).fast_max(F8::ZERO)) & weight;
-                all += weight;
-                hidden += covered;
-                above += covered * (heights - base);
+                let higher = heights.simd_gt(limit + (rise[c] + row_rise).fast_max(F8::ZERO));
+                open += weight & !higher;
+                let rise = heights - tilt[c] - row_tilt;
+                let reach = (rise * cone + narrowest).fast_min(widest);
+                // Whole for all that is as high as what it was sought by, and fading to the cone's border.
+                let within = (reach * reach - across2[c] - d2) * F8::splat(1.0 / (NARROWEST * NARROWEST));
+                let within = higher & within.fast_max(F8::ZERO).fast_min(F8::ONE);
+                if SEARCH {
+                    hidden += within;
+                    above += within * rise;
+                } else {
+                    hidden += weight * within;
+                }
             }
         }
-        let (all, hidden) = (sum(all), sum(hidden));
-        [all - hidden, hidden, sum(above)]
+        [open, hidden, above].map(sum)
     }
 }
 

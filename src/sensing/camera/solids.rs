@@ -62,8 +62,9 @@ impl Solid {
     }
 }
 
-/// How far the levels may be from what is meshed, m: for large pictures, for small ones, and for shadows and far views.
-const FLAWS: [f32; 3] = [1e-4, 4e-4, 1.5e-3];
+/// How far the levels may be from what is meshed, m: for large pictures, for small ones, and for shadows and far views. What
+/// throws shadows must not stand out of what they fall on by as much as shadow maps leave between them.
+const FLAWS: [f32; 3] = [1e-4, 2.5e-4, 5e-4];
 /// Smooth one-coloured surfaces look right with edges of so many times what patterns need: this share of a cell counts
 /// as the level's spacing.
 const PLAIN: f64 = 0.16;

@@ -2,7 +2,11 @@
 
 use std::sync::Arc;
 
-use super::*;
+use super::{
+    lanes::{F8, V8},
+    shadow::ShadowMap,
+    *,
+};
 use crate::{
     geometry::{Pose, Quat, Vec3, mesh::Mesh, shape::Shape},
     scene::{Camera, CameraMount, Layer, Lighting, Mask, Visual},
@@ -191,6 +195,78 @@ fn a_shadow_falls_where_the_light_throws_it() {
     assert!(weight > 1000.0, "no shadow");
     let error = (centre[0] / weight - foot.x).hypot(centre[1] / weight - foot.y);
     assert!(error < 5e-3, "the shadow lies {error} m beside its place");
+}
+
+/// A thing as rigid body 0 whose shadows are thrown by its coarsest form.
+fn lone(model: Model, casts_shadow: bool) -> Vec<Thing> {
+    vec![Thing { casts_shadow, ..thing(1, model, Mount::Rigid(0)) }]
+}
+
+#[test]
+fn smooth_surfaces_throw_no_shadow_on_what_of_themselves_faces_the_light() {
+    let visuals = [Visual::plain([0.8; 3], 0.6, 0.0)];
+    let solid =
+        |shape: Shape| Model::of_solids("solid", &[Solid::new(shape, 3e-3, 0)], &visuals).expect("a solid");
+    let shape = |shape: &Shape| Model::of_shape("shape", shape, &visuals).expect("a shape");
+    let tube = Shape::Cylinder { radius: 0.06, half_height: 0.15 };
+    let ball = Shape::Sphere { radius: 0.1 };
+    let slab = Shape::Box { half: Vec3::new(0.2, 0.2, 0.02) };
+    let models = [solid(tube.clone()), solid(ball.clone()), shape(&tube), shape(&ball), shape(&slab)];
+    let camera = camera(Vec3::new(0.8, 0.1, 0.5), Vec3::zeros(), Vec3::z());
+    for direction in [[0.45, -0.55, 1.0], [0.1, -1.0, 0.06], [1.0, 0.02, 0.03], [0.0, 0.05, 1.0]] {
+        let mut lighting = Lighting { shadow_centre_w: Vec3::zeros(), ..Lighting::default() };
+        lighting.key.direction_w = direction.into();
+        for (i, model) in models.iter().enumerate() {
+            let draw = |casts_shadow: bool| {
+                let stage = Stage::new(lone(model.clone(), casts_shadow), lighting.clone()).expect("a stage");
+                let view = [Pose::identity()];
+                render(&stage, &cube_view(&view), &camera, &mut Scratch::uncached()).expect("a picture")
+            };
+            let (with, without) = (draw(true), draw(false));
+            let apart = with.rgb.iter().zip(&without.rgb).map(|(a, b)| a.abs_diff(*b));
+            let worst = apart.max().expect("pixels");
+            assert!(worst <= 2, "model {i}, light {direction:?}: darker by {worst} of 255");
+        }
+    }
+}
+
+#[test]
+fn the_border_of_a_shadow_gets_darker_all_the_way_and_lies_where_the_edge_throws_it() {
+    let mut lighting = Lighting { shadow_centre_w: Vec3::zeros(), ..Lighting::default() };
+    lighting.key.direction_w = Vec3::new(0.3, 0.4, 1.0);
+    let mut map = ShadowMap::new(&lighting);
+    let half = Vec3::new(0.05, 0.08, 0.06);
+    let cube = box_mesh(&half);
+    let turn = Quat::from_axis_angle(&Vec3::z_axis(), 0.3);
+    let corners: Vec<V3> = cube.vertices.iter().map(|v| (turn * v + Vec3::z() * half.z).cast()).collect();
+    map.draw(&corners, &cube.triangles);
+    map.finish();
+    let light = |p: [Vec3; 8]| {
+        let at = std::array::from_fn(|axis| p.map(|p| p[axis] as f32));
+        let n = V8::splat(&V3::z());
+        map.light(&map.places(V8::from_arrays(&at)), &n, F8::ONE.simd_gt(F8::ZERO)).to_array()
+    };
+    // Across the edge that the far side of the top throws, from its middle on: the ray through it falls by the light's slope.
+    let across = turn * -Vec3::y();
+    let edge = turn * Vec3::new(0.0, -half.y, 0.0) - lighting.key.direction_w * (2.0 * half.z);
+    let edge = Vec3::new(edge.x, edge.y, 0.0);
+    for along in [-0.02, -0.004, 0.01] {
+        for step in [2e-4, 9e-4, 2e-3] {
+            let count = (0.05 / step) as usize / 8 * 8;
+            let from = -0.5 * step * count as f64;
+            let place = |i: usize| edge + across * (from + step * i as f64) + turn * Vec3::x() * along;
+            let shares: Vec<f32> = (0..count)
+                .step_by(8)
+                .flat_map(|first| light(std::array::from_fn(|lane| place(first + lane))))
+                .collect();
+            let [dark, .., bright] = shares[..] else { panic!("many points") };
+            assert!(dark == 0.0 && bright == 1.0, "{along} {step}: from {dark} to {bright}");
+            let worst = shares.windows(2).map(|w| w[0] - w[1]).fold(0.0, f32::max);
+            assert!(worst < 0.02, "{along} {step}: gets darker by {worst} on the way out: {shares:?}");
+            let middle = from + step * shares.iter().filter(|share| **share < 0.5).count() as f64;
+            assert!(middle.abs() < 2.5e-3, "{along} {step}: the border lies {middle} m beside the edge");
+        }
+    }
 }
 
 /// Bytes of the red channel at a point of the world.
