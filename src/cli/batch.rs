@@ -248,6 +248,14 @@ impl<'a> Batch<'a> {
         info::write(folder, &info)
     }
 
+    /// Whether the run in the folder is this one.
+    ///
+    /// # Errors
+    /// Its `run.json` cannot be read.
+    pub fn is_of(&self, tasks: &[&Task], episodes: u32) -> Result<bool, Failure> {
+        info::is_of(&self.out, &self.info(tasks, episodes)?)
+    }
+
     fn info(&self, tasks: &[&Task], episodes: u32) -> Result<RunInfo<'_>, Failure> {
         let options =
             self.loaded.options.iter().map(|o| (o.name.clone(), format!("{:?}", o.value))).collect();

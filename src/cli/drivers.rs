@@ -71,7 +71,7 @@ impl Choice {
 
     /// Whether it carries out what a run recorded.
     pub fn is_recorded(&self) -> bool {
-        is_run(&self.word)
+        !is_built_in(&self.word) && is_run(&self.word)
     }
 
     /// How results call it.
@@ -187,6 +187,10 @@ impl Drivers {
     }
 }
 
+fn is_built_in(word: &str) -> bool {
+    POLICIES.iter().any(|(name, _)| *name == word)
+}
+
 /// Whether a folder holds a run, or runs.
 fn is_run(word: &str) -> bool {
     Path::new(word).is_dir()
@@ -208,7 +212,7 @@ fn policy_failure(error: PolicyError) -> Failure {
 /// # Errors
 /// A fragment for people.
 pub fn policy_word(word: &str) -> Result<String, String> {
-    if POLICIES.iter().any(|(name, _)| *name == word) || word.contains("://") || is_run(word) {
+    if is_built_in(word) || word.contains("://") || is_run(word) {
         return Ok(word.to_owned());
     }
     let known = POLICIES.map(|(name, _)| name).join(", ");

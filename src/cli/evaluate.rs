@@ -15,7 +15,7 @@ use crate::{
     benchmark::{Plan, Suite, Task},
     evaluation::{record::EpisodeRecord, summary::Summary},
     report::{
-        run_folder::{RunFolder, SUMMARY},
+        run_folder::{RUN, RunFolder, SUMMARY},
         terminal,
     },
     script::{self, Loaded},
@@ -47,7 +47,8 @@ pub fn run(run: &Run) -> Result<(), Failure> {
         }
         Plan::Conditions { name, suites, conditions } => {
             if !run.require.is_empty() {
-                let message = "--require: it is about suites, and this file compares conditions; read conditions.json";
+                let message =
+                    "--require: it is about suites, and this file compares conditions; read conditions.json";
                 return Err(Failure::input(format!("{}: {message}", run.file.display())));
             }
             own_folders(run, suites)?;
@@ -155,13 +156,14 @@ fn evaluate(run: &Run, loaded: &Loaded, suite: &Suite, out: PathBuf) -> Result<S
 pub(super) fn carry_out(batch: &Batch, tasks: &[&Task]) -> Result<Summary, Failure> {
     let run = batch.run;
     // The same command again on a finished folder changes nothing.
-    let finished = is_finished(&batch.out);
+    let episodes = run.episodes.unwrap_or(batch.suite.episodes);
+    let finished = is_finished(&batch.out) && batch.is_of(tasks, episodes)?;
     let opened = match run.resume || finished {
         true => RunFolder::resume(&batch.out),
         false => RunFolder::create(&batch.out).map(|folder| (folder, Vec::new())),
     };
     let (folder, done) = opened.map_err(|e| Failure::input(format!("{}: {e}", run.file.display())))?;
-    batch.write_info(&folder, tasks, run.episodes.unwrap_or(batch.suite.episodes))?;
+    batch.write_info(&folder, tasks, episodes)?;
     if finished && batch.left(&done).is_empty() {
         crate::message::tell(&format!("softvt: {} is finished already", batch.out.display()));
         return Ok(Summary::of(&run.name_of(batch.suite), run.policy.name(), &done));
@@ -171,7 +173,7 @@ pub(super) fn carry_out(batch: &Batch, tasks: &[&Task]) -> Result<Summary, Failu
 
 /// Whether a folder holds a run that came to its end.
 pub(super) fn is_finished(dir: &Path) -> bool {
-    dir.join(SUMMARY).is_file()
+    dir.join(SUMMARY).is_file() && dir.join(RUN).is_file()
 }
 
 /// The tasks that `--task` names.

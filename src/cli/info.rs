@@ -1,6 +1,9 @@
 //! `run.json`: everything needed to repeat a run.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::Path,
+};
 
 use serde::Serialize;
 use serde_json::{Map, Value, json};
@@ -65,6 +68,17 @@ pub fn write(folder: &RunFolder, info: &RunInfo) -> Result<(), Failure> {
             "{path} is of another run: {what}; resume it with what it was started with, or give another folder with --out"
         ))),
     }
+}
+
+/// Whether it stands in a folder.
+///
+/// # Errors
+/// The file is there and cannot be read.
+pub fn is_of(dir: &Path, info: &RunInfo) -> Result<bool, Failure> {
+    let path = dir.join(RUN);
+    let text = std::fs::read_to_string(&path)
+        .map_err(|e| Failure::input(format!("cannot read {}: {e}", path.display())))?;
+    Ok(serde_json::from_str::<Value>(&text).is_ok_and(|known| known == json!(info)))
 }
 
 /// Longest value that is told.

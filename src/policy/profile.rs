@@ -171,7 +171,8 @@ pub struct GripperCode {
 impl GripperCode {
     /// The closure that a number means.
     pub fn closure(&self, number: f64) -> f64 {
-        let share = ((number - self.open) / (self.shut - self.open)).clamp(0.0, 1.0);
+        // Never −0.
+        let share = ((number - self.open) / (self.shut - self.open)).clamp(0.0, 1.0) + 0.0;
         if self.binary { f64::from(u8::from(share > 0.5)) } else { share }
     }
 
@@ -281,7 +282,8 @@ mod tests {
     #[test]
     fn grippers_open_and_shut_at_the_ends_of_their_codes() {
         let fingers = Profile::named("softvtbench").unwrap().actions.gripper;
-        assert_eq!((fingers.closure(0.04), fingers.closure(0.0), fingers.closure(0.03)), (0.0, 1.0, 0.25));
+        assert_eq!((fingers.closure(0.04), fingers.closure(0.0), fingers.closure(0.02)), (0.0, 1.0, 0.5));
+        assert!(fingers.closure(0.04).is_sign_positive());
         assert_eq!((fingers.closure(0.3), fingers.closure(-1.0)), (0.0, 1.0));
         let libero = Profile::named("libero").unwrap().actions.gripper;
         assert_eq!((libero.closure(-0.2), libero.closure(0.2)), (0.0, 1.0));

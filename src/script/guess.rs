@@ -14,8 +14,10 @@ pub fn closest<'a>(word: &str, candidates: impl Iterator<Item = &'a str>) -> Opt
 fn rank(word: &str, candidate: &str) -> Option<Rank> {
     match (word.split_once('.'), candidate.split_once('.')) {
         (Some((object, part)), Some((known_object, known_part))) => {
-            let (a, b) = (rank_of_word(object, known_object)?, rank_of_word(part, known_part)?);
-            Some((a.0.max(b.0), a.1 + b.1, candidate.len()))
+            let sides = rank_of_word(object, known_object).zip(rank_of_word(part, known_part));
+            let of_sides = sides.map(|(a, b)| (a.0.max(b.0), a.1 + b.1, candidate.len()));
+            // An object that is right makes up for a part that is not.
+            of_sides.or_else(|| rank_of_word(word, candidate))
         }
         // The part alone, its object forgotten.
         (None, Some((_, known_part))) => {

@@ -142,9 +142,11 @@ fn general(shape: &Shape, frame_o: &Pose, samples: &mut SkinSamples) {
 
 /// Whether the skin has an edge at `p`, and not a rounding.
 fn is_sharp(shape: &Shape, p: &Vec3) -> bool {
-    let (u, v) = across(&shape.distance_and_normal(p).1);
-    let ways =
-        [u, -u, v, -v, (u + v).normalize(), -(u + v).normalize(), (u - v).normalize(), (v - u).normalize()];
+    let normal = shape.distance_and_normal(p).1;
+    let (u, v) = across(&normal);
+    let (s, d) = ((u + v).normalize(), (u - v).normalize());
+    // Inwards too: on an edge itself the normal is one face's, and what lies off the other leads back to the edge.
+    let ways = [u, -u, v, -v, s, -s, d, -d, -normal];
     let normals = ways.map(|way| shape.distance_and_normal(&onto(shape, p + way * SHARP_ASIDE)).1);
     (0..ways.len()).any(|i| normals[i + 1..].iter().any(|n| (n - normals[i]).norm() > SHARP_TURN))
 }
