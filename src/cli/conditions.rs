@@ -161,11 +161,10 @@ fn prepared<'a>(
         };
         let dir: PathBuf = out.join(&case.folder);
         // One that is finished is left alone, one that was broken off goes on if that is asked for.
-        let fresh = !case.run.resume && !is_finished(&dir);
-        fresh
-            .then(|| RunFolder::check(&dir))
-            .unwrap_or(Ok(()))
-            .map_err(|e| Failure::input(format!("{}: {e}", case.run.file.display())))?;
+        if !(case.run.resume || is_finished(&dir)) {
+            RunFolder::check(&dir)
+                .map_err(|e| Failure::input(format!("{}: {e}", case.run.file.display())))?;
+        }
         let jobs = jobs(&case.run, suite, tasks);
         let mut batch = Batch::new(&case.run, loaded, suite, (jobs, dir)).map_err(named)?;
         if let Some(Some(reference)) = batches.first() {

@@ -10,6 +10,7 @@ mod drivers;
 mod evaluate;
 mod experiment;
 mod files;
+mod flags;
 mod info;
 mod init;
 mod list;

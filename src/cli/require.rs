@@ -3,8 +3,11 @@
 use super::Failure;
 use crate::evaluation::{statistics::Rate, summary::Summary};
 
+/// Takes a number from a suite's results, if it is defined there.
+type Measure = fn(&Summary) -> Option<f64>;
+
 /// Names of what may be required, with what each is.
-const MEASURES: [(&str, fn(&Summary) -> Option<f64>); 8] = [
+const MEASURES: [(&str, Measure); 8] = [
     ("goal", |s| share(&s.scores.goal_success_rate)),
     ("no_drop", |s| share(&s.scores.no_drop_rate)),
     ("deformation_ok", |s| share(s.scores.deformation_ok_rate.as_ref()?)),

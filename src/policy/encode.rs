@@ -99,6 +99,6 @@ fn state(o: &Observation, part: StatePart) -> Vec<f32> {
         StatePart::FingerPair => vec![0.5 * o.gripper_width_m, -0.5 * o.gripper_width_m],
         StatePart::Closure => vec![o.closure],
     };
-    debug_assert_eq!(numbers.len(), part.len());
+    debug_assert_eq!(numbers.len(), part.count());
     numbers.into_iter().map(|x| x as f32).collect()
 }

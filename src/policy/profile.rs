@@ -119,7 +119,7 @@ pub enum StatePart {
 
 impl StatePart {
     /// How many numbers it is.
-    pub fn len(self) -> usize {
+    pub fn count(self) -> usize {
         match self {
             Self::Position | Self::AxisAngle => 3,
             Self::QuaternionWxyz | Self::QuaternionXyzw => 4,

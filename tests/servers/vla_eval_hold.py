@@ -1,6 +1,6 @@
 """A third-party vla-eval model server (PyPI: vla-eval) that holds still and checks what it is shown.
 
-usage: python vla_eval_hold.py PORT
+usage: python vla_eval_hold.py PORT PROFILE (visuo_tactile)
 """
 
 import sys
