@@ -64,13 +64,14 @@ const MISSES: &str = "
   a whole suite runs about 11 times faster than real time on one core where 25 was to be reached.
 - Surfaces that the key light grazes take no shadow from what is nearer than a few millimetres to them, and moving things throw
   none outside of the ball in which shadows are fine (0.85 m).
-- Speed of pictures (`cargo bench --bench render`), ms, one thread, measured on a machine busy with other work and to be reached:
-  third-person 224² 9.3 and 3, wrist 224² 13.5 and 4, third-person 1024² 79 and 25, without its kept background 140 and 60, wrist
-  512² 36 and 20. Before shadows lost their specks: 6.6, 10.9, 53, 117 and 37, measured right after, when the machine was less busy.
-- Speed of touch (`cargo bench --bench tactile`): a gel field of many slipping ridges takes 1.2 ms where 1 was to be reached.
+- Speed of pictures (`cargo bench --bench render`), ms, one thread, measured and to be reached: third-person 224² 7.5 and 3, wrist
+  224² 11.7 and 4, third-person 1024² 65 and 25, without its kept background 130 and 60, wrist 512² 36 and 20. Filtering
+  shadows and drawing triangles take a tenth to a fifth each, the rest is spread thin.
+- Speed of touch (`cargo bench --bench tactile`): a gel field of many slipping ridges takes 1.2 ms where 1 was to be reached, a
+  picture 1.40 to 1.47 where 1.4 was.
 - The whole loop with every stream at every control step (`cargo bench --bench streams`): 1.8 times real time where 4 was to be
-  reached; blind it is 14, with touch alone 6. Triangles of the robot, rasterised for picture and shadow, are most of it.
-- No cast shadows in tactile pictures. No images were compared across machines; on one, threads do not change a byte.
+  reached; blind it is 11, with touch alone 5.5. A policy that is asked every ten steps has its pictures made only then.
+- Tactile pictures have cast shadows only where asked for (14 to 46 ms a picture). No images were compared across machines; on one, threads do not change a byte.
 - Deep squeezes of some pastries chatter at a few cm/s with every element upright, which ends their calibration sweep.
 ";
 
