@@ -5,8 +5,8 @@ local arrange = {}
 local JOINT = 0.02
 -- Half of the hand along its fingers' line and across, with some room, and what it passes over when it grasps low, m.
 local PALM, LOW = { 0.108, 0.036 }, 0.05
--- Tries before an arrangement is given up.
-local TRIES = 1000
+-- Places that are tried for a thing, arrangements around what is reached for, and places of that before all is given up.
+local TRIES, AROUND, PLACES = 60, 40, 20
 
 function arrange.arm(scene, rng)
   local joints, noise = scene.start_q, rng:stream "arm"
@@ -48,51 +48,71 @@ local function gap(a, b)
   return most
 end
 
-local function draw(rng, things)
-  local placed = {}
-  for k, thing in ipairs(things) do
-    local reach, turn = thing.reach or 0, thing.turn or 0
-    local x = thing.at[1] + rng:uniform(-reach, reach)
-    local y = thing.at[2] + rng:uniform(-reach, reach)
-    placed[k] = { x = x, y = y, yaw = (thing.yaw or 0) + rng:uniform(-turn, turn) }
-  end
-  return placed
+local function draw(rng, thing)
+  local reach, turn = thing.reach or 0, thing.turn or 0
+  local x = thing.at[1] + rng:uniform(-reach, reach)
+  local y = thing.at[2] + rng:uniform(-reach, reach)
+  return { x = x, y = y, yaw = (thing.yaw or 0) + rng:uniform(-turn, turn) }
 end
 
--- Whether all keep their room, and the palm fits between those that stand higher than it would.
-local function apart(things, placed, room)
-  local prints = {}
-  for k, thing in ipairs(things) do
-    prints[k] = footprint(thing.asset, placed[k].x, placed[k].y, placed[k].yaw)
-    for other = 1, k - 1 do
-      if gap(prints[k], prints[other]) < math.max(room, things[k].room or 0, things[other].room or 0) then return false end
+-- Whether two things at their places keep their room, and the palm that comes down on either fits past the other.
+local function apart(a, b, room)
+  if gap(a.print, b.print) < math.max(room, a.thing.room or 0, b.thing.room or 0) then return false end
+  return not (a.palm and b.high > LOW and gap(a.palm, b.print) < 0 or b.palm and a.high > LOW and gap(b.palm, a.print) < 0)
+end
+
+-- A place of a thing that is apart from all of `others`, or none after some tries.
+local function place(rng, thing, others, room)
+  for _ = 1, TRIES do
+    local at = draw(rng, thing)
+    local _, high = thing.asset.shape:bounds()
+    local one = {
+      thing = thing, at = at, high = high[3], print = footprint(thing.asset, at.x, at.y, at.yaw),
+      palm = thing.reachable and palm(thing.asset, at.x, at.y, at.yaw),
+    }
+    local free = true
+    for _, other in ipairs(others) do free = free and apart(one, other, room) end
+    if free then return one end
+  end
+end
+
+-- `others` and behind them those of `things` that are reached for or are not, each apart from all before; none if one finds no place.
+local function around(rng, things, others, reachable, room)
+  local all = { table.unpack(others) }
+  for _, thing in ipairs(things) do
+    if (thing.reachable or false) == reachable then
+      local one = place(rng, thing, all, room)
+      if not one then return nil end
+      all[#all + 1] = one
     end
   end
-  for k, thing in ipairs(things) do
-    local over = thing.reachable and palm(thing.asset, placed[k].x, placed[k].y, placed[k].yaw)
-    for other = 1, over and #things or 0 do
-      local _, high = things[other].asset.shape:bounds()
-      if other ~= k and high[3] > LOW and gap(over, prints[other]) < 0 then return false end
-    end
-  end
-  return true
+  return all
 end
 
 -- Places for `things` ({ name =, asset =, at = { x, y }, yaw =, reach = (m, either way in x and y), turn = (rad), room = (m), reachable = true }),
--- drawn anew until all are `room` (m) apart, and those with a room of their own that far from all, and a hand can come
--- down on what must be reachable: a list of { x, y, yaw } in the same order.
+-- such that all are `room` (m) apart, those with a room of their own that far from all, and a hand can come down on what
+-- must be reachable: a list of { x, y, yaw } in the same order. What must be reachable is drawn first and keeps its place while
+-- the others are drawn anew: it has all the places that it is given, and not only those that suit the others.
 function arrange.scatter(rng, things, room)
-  for _ = 1, TRIES do
-    local placed = draw(rng, things)
-    if apart(things, placed, room) then return placed end
+  for _ = 1, PLACES do
+    local first = around(rng, things, {}, true, room)
+    for _ = 1, first and AROUND or 0 do
+      local all = around(rng, things, first, false, room)
+      if all then
+        local places = {}
+        for _, one in ipairs(all) do places[one.thing] = one.at end
+        for k, thing in ipairs(things) do places[k] = places[thing] end
+        return places
+      end
+    end
   end
-  error(("arrange.scatter: no arrangement found in %d tries; give the things more room"):format(TRIES), 2)
+  error("arrange.scatter: no arrangement found; give the things more room", 2)
 end
 
 -- The same, put into the scene.
 function arrange.add(scene, rng, things, room)
-  for k, place in ipairs(arrange.scatter(rng, things, room)) do
-    scene:add { name = things[k].name, asset = things[k].asset, at = { place.x, place.y }, yaw = place.yaw }
+  for k, at in ipairs(arrange.scatter(rng, things, room)) do
+    scene:add { name = things[k].name, asset = things[k].asset, at = { at.x, at.y }, yaw = at.yaw }
   end
 end
 

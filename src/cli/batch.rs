@@ -23,7 +23,7 @@ use crate::{
         actions,
         film::{self, Caption, FilmError},
         interchange::{self, DebugFrame, DebugShape},
-        run_folder::{RunFolder, RunFolderError, SUMMARY, replace},
+        run_folder::{EPISODES, RUN, RunFolder, RunFolderError, SUMMARY, replace},
     },
     rollout::{
         BuildError, ControlError, Controller, Episode, EpisodeError, EpisodeSpec, Finished, Looks, RestCache,
@@ -322,6 +322,38 @@ impl<'a> Batch<'a> {
         folder.write_json(SUMMARY, &summary).map_err(folder_failure)?;
         crate::message::tell(&format!("softvt: {}", self.out.display()));
         Ok(summary)
+    }
+
+    /// Refuses episodes of another run, or one that is there twice.
+    ///
+    /// # Errors
+    /// The first such line of the folder's `episodes.jsonl`.
+    pub fn check_done(&self, folder: &RunFolder, done: &[EpisodeRecord]) -> Result<(), Failure> {
+        let path = folder.path().join(EPISODES).display().to_string();
+        if !done.is_empty() && folder.read(RUN).map_err(folder_failure)?.is_none() {
+            return Err(Failure::input(format!(
+                "{path}: there is no {RUN} beside it, so that nobody knows what it is of"
+            )));
+        }
+        let wanted: BTreeSet<_> = self.jobs.iter().map(|(task, episode)| (task.id, *episode)).collect();
+        let mut seen = BTreeSet::new();
+        for (i, record) in done.iter().enumerate() {
+            let id = &record.identity;
+            let own =
+                id.suite == self.name && id.seed == self.run.seed && id.policy == self.run.policy.name();
+            let place = (id.task, id.episode);
+            let wrong = match () {
+                () if !own || !wanted.contains(&place) => "is of another run",
+                () if !seen.insert(place) => "is there twice",
+                () => continue,
+            };
+            let line = i + 1;
+            return Err(Failure::input(format!(
+                "{path}:{line}: task {} episode {} {wrong}",
+                id.task, id.episode
+            )));
+        }
+        Ok(())
     }
 
     /// The jobs that are not done.

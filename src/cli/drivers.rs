@@ -11,7 +11,7 @@ use crate::{
     benchmark::seed::Stream,
     policy::{
         Action, Chunked, Policy, PolicyError, TaskBrief, builtin,
-        profile::{PROFILES, Profile},
+        profile::Profile,
         recorded::Recorded,
         remote::{Connections, Protocol, Remote, Server},
     },
@@ -102,10 +102,8 @@ impl Choice {
         if !self.is_remote() {
             return Ok(None);
         }
-        let mut profile = Profile::named(&self.profile).ok_or_else(|| {
-            let known = PROFILES.map(|(name, _)| name).join(", ");
-            Failure::input(format!("--profile {}: expected one of {known}", self.profile))
-        })?;
+        let mut profile = Profile::named(&self.profile)
+            .ok_or_else(|| Failure::input(format!("--profile {}: there is none", self.profile)))?;
         if let Some(binary) = self.binary {
             profile.actions.gripper.binary = binary;
         }

@@ -54,7 +54,19 @@ pub fn run(run: &Run) -> Result<(), Failure> {
             own_folders(run, suites)?;
             conditions::run(run, &loaded, (suites, conditions), &out_dir(run, name, None))
         }
-        Plan::Experiment { name, points, columns } => experiment::run(run, &loaded, name, *points, columns),
+        Plan::Experiment { name, points, columns } => {
+            let about_suites = [
+                ("--require", !run.require.is_empty()),
+                ("--shard", run.shard.is_some()),
+                ("--resume", run.resume),
+            ];
+            if let Some((flag, _)) = about_suites.iter().find(|(_, given)| *given) {
+                let message =
+                    format!("{}: {flag}: it is about suites, and this is an experiment", run.file.display());
+                return Err(Failure::input(message));
+            }
+            experiment::run(run, &loaded, name, *points, columns)
+        }
     }
 }
 
@@ -163,6 +175,7 @@ pub(super) fn carry_out(batch: &Batch, tasks: &[&Task]) -> Result<Summary, Failu
         false => RunFolder::create(&batch.out).map(|folder| (folder, Vec::new())),
     };
     let (folder, done) = opened.map_err(|e| Failure::input(format!("{}: {e}", run.file.display())))?;
+    batch.check_done(&folder, &done)?;
     batch.write_info(&folder, tasks, episodes)?;
     if finished && batch.left(&done).is_empty() {
         crate::message::tell(&format!("softvt: {} is finished already", batch.out.display()));

@@ -5,7 +5,10 @@ use std::time::Duration;
 use clap::{Arg, ArgAction, value_parser};
 
 use super::{Failure, drivers::policy_word, replay, require, shard};
-use crate::script::{OptionSpec, OptionValue};
+use crate::{
+    policy::profile::PROFILES,
+    script::{OptionSpec, OptionValue},
+};
 
 /// The whole command with the script's options in a section of their own.
 pub fn command(options: &[OptionSpec]) -> Result<clap::Command, Failure> {
@@ -84,7 +87,8 @@ fn on_script(command: clap::Command) -> clap::Command {
         .arg(
             flag("profile", "What a policy gets and what its numbers mean")
                 .value_name("PROFILE")
-                .default_value("visuo_tactile"),
+                .default_value("visuo_tactile")
+                .value_parser(PROFILES.map(|(name, _)| name)),
         )
         .arg(
             flag("protocol", "How a policy's server talks")

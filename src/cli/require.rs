@@ -57,8 +57,13 @@ pub fn parse(word: &str) -> Result<Requirement, String> {
     let measure = measure.ok_or_else(|| format!("no measure is called {name:?}; there are {}", names()))?;
     let bound = bound.trim();
     let (number, unit) = bound.strip_suffix('%').map_or((bound, 1.0), |number| (number, 0.01));
-    let bound: Option<f64> = number.trim().parse().ok().filter(|bound: &f64| bound.is_finite());
-    let bound = unit * bound.ok_or_else(|| format!("expected a number behind the sign, got {bound:?}"))?;
+    let value: Option<f64> = number.trim().parse().ok().filter(|value: &f64| value.is_finite());
+    let value = value.ok_or_else(|| format!("expected a number behind the sign, got {bound:?}"))?;
+    let is_rate = !matches!(name, "d_median" | "d_p95" | "invalid");
+    if is_rate && !(-1.0..=1.0).contains(&(unit * value)) {
+        return Err(format!("{name} is a share of 1, got {bound}; write 0.9 or 90%"));
+    }
+    let bound = unit * value;
     Ok(Requirement { text: word.to_owned(), measure, order, bound })
 }
 
@@ -126,7 +131,9 @@ mod tests {
             ("saftey>=1", "no measure is called \"saftey\""),
             ("safety", "expected a comparison"),
             ("safety>=high", "expected a number"),
-            ("safety>=NaN", "expected a number"),
+            ("safety>=NaN", "got \"NaN\""),
+            ("safety>=", "got \"\""),
+            ("no_drop>=90", "a share of 1, got 90"),
         ] {
             let error = parse(word).expect_err(words);
             assert!(error.contains(words), "{error}");

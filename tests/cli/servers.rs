@@ -160,7 +160,7 @@ fn addresses_that_are_none_are_the_users_input() {
     let message = project.refusal("x.lua --out run --policy exprt");
     assert!(message.contains("did you mean expert"), "{message}");
     let message = project.refusal("x.lua --out run --policy ws://127.0.0.1:9 --profile pi");
-    assert!(message.contains("--profile pi: expected one of vision, visuo_tactile"), "{message}");
+    assert!(message.contains("possible values: vision, visuo_tactile"), "{message}");
 }
 
 #[test]
@@ -332,4 +332,29 @@ fn profiles_show_what_they_say() {
     let (released, summary, _) = entries("softvtbench", "");
     assert!(released.iter().any(|k| k == "tactile_gripper_force"));
     assert_eq!(summary["force_observed"], true);
+}
+
+#[test]
+fn a_folder_with_lines_of_another_run_is_not_gone_on_with() {
+    let project = project();
+    let line = "x.lua --policy noop --episodes 2 --threads 1 --out run";
+    project.succeeds(line);
+    let (lines, info) = (project.text("run/episodes.jsonl"), project.text("run/run.json"));
+    let refused = |text: &str, words: &str| {
+        project.write("run/episodes.jsonl", text.as_bytes());
+        let message = project.refusal(&format!("{line} --resume"));
+        assert!(message.contains(words), "{message}");
+    };
+    refused(&format!("{lines}{lines}"), "run/episodes.jsonl:3: task 0 episode 0 is there twice");
+    refused(
+        &lines.replace("\"noop\"", "\"other\""),
+        "run/episodes.jsonl:1: task 0 episode 0 is of another run",
+    );
+    project.write("run/episodes.jsonl", lines.as_bytes());
+    std::fs::remove_file(project.path("run/run.json")).expect("removed");
+    assert!(project.refusal(&format!("{line} --resume")).contains("there is no run.json beside it"));
+    project.write("run/run.json", info.as_bytes());
+    assert!(project.succeeds(&format!("{line} --resume")).err.contains("finished already"));
+    let message = project.refusal("x.lua --policy noop --require safety>=90");
+    assert!(message.contains("a share of 1"), "{message}");
 }
