@@ -16,7 +16,7 @@ use super::{
     progress::Progress,
 };
 use crate::{
-    benchmark::{Suite, Task, seed::Split, settings::Settings},
+    benchmark::{Goal, ObjectType, Suite, Task, seed::Split, settings::Settings},
     evaluation::{record::EpisodeRecord, safety::Limit, summary::Summary, thresholds::Thresholds},
     policy::{Streams, TaskBrief},
     report::{
@@ -27,7 +27,8 @@ use crate::{
     },
     rollout::{
         BuildError, ControlError, Controller, Episode, EpisodeError, EpisodeSpec, Finished, Looks, RestCache,
-        ScoreFrame, SenseError, Senses, Simulation, Which, batch, check_senses, stop, target_asset,
+        ScoreFrame, SenseError, Senses, Simulation, Which, batch, check_senses, check_support, stop,
+        target_asset,
     },
     scene::{Asset, Body, Scene},
     script::{self, Loaded},
@@ -144,6 +145,7 @@ impl<'a> Batch<'a> {
         for task in tasks {
             let first = self.jobs.iter().find(|(of, _)| of.id == task.id).map_or(0, |(_, episode)| *episode);
             let opened = self.open(task, first)?;
+            self.right_kind(task, &opened.nominal)?;
             self.learn_limit(target_asset(&opened.nominal, task).cloned())?;
             let scene = Arc::new(opened.scene.clone());
             let streams = (self.drive)(opened, self.brief(task, first))?.streams();
@@ -171,14 +173,31 @@ impl<'a> Batch<'a> {
     /// # Errors
     /// What is wrong.
     pub fn examine(&self, task: &Task, scene: Scene) -> Result<(), Failure> {
+        self.right_kind(task, &scene)?;
         let scene = Arc::new(if self.run.twin { scene.rigid_twin() } else { scene });
         let settings = &self.settings;
         let look = || -> Result<(), Trial> {
             check_senses(&scene, &settings.tactile, &self.looks)?;
             let sim = Simulation::new(scene.clone(), &settings.physics, &settings.robot, &self.cache)?;
+            check_support(&sim)?;
             Ok(Senses::new(&sim, &settings.tactile, &self.looks).stand_outside(&Senses::frame(&sim))?)
         };
         look().map_err(|error| self.trial_failure(error, task, 0))
+    }
+
+    /// What can be deformed is not the target of a suite whose tables say N/A to deformation.
+    fn right_kind(&self, task: &Task, scene: &Scene) -> Result<(), Failure> {
+        let (Goal::On { object, .. } | Goal::In { object, .. }) = &task.goal;
+        let target = scene.objects.iter().find(|known| known.name == *object);
+        let soft = target.filter(|object| matches!(object.asset.body, Body::Soft(_)));
+        match soft.filter(|_| self.suite.object_type == ObjectType::Rigid && !self.run.twin) {
+            None => Ok(()),
+            Some(target) => Err(Failure::input(format!(
+                "{}: the target of task {}, {object}, is soft, and suite {} has object_type = \"rigid\"; say \
+                 \"deformable\"",
+                target.placed_at, task.id, self.suite.name
+            ))),
+        }
     }
 
     fn trial_failure(&self, error: Trial, task: &Task, episode: u32) -> Failure {

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use super::{
     furniture,
     rest_cache::RestCache,
-    simulation::{Handle, Kind},
+    simulation::{Handle, Kind, Simulation},
 };
 use crate::{
     geometry::{
         mass::mass_properties,
         samples::{SampleSpec, surface_samples},
-        shape::Shape,
+        shape::{Aabb, Shape},
         voxelise::{GeometryError, VoxelSpec, voxel_mesh},
     },
     message::number,
@@ -76,6 +76,9 @@ pub enum BuildError {
         /// How far the deepest point of one is under the surface of the other, m.
         depth: f64,
     },
+    /// An object is in the robot's foot.
+    #[error("object {0} starts inside of the robot's base; move it away")]
+    InBase(String),
     /// An object is in the robot.
     #[error(
         "object {object} starts inside of the robot's hand ({part}), {} mm deep; move it away, or the arm (scene.start_q)",
@@ -89,6 +92,9 @@ pub enum BuildError {
         /// How far the deepest point of one is under the surface of the other, m.
         depth: f64,
     },
+    /// Nothing could hold an object.
+    #[error("object {0} has nothing below it; put it above what it is to rest on")]
+    NothingBelow(String),
     /// What is wrong with an object that a script placed.
     #[error("{place}: {source}")]
     At {
@@ -210,6 +216,38 @@ fn check_thickness(name: &str, shape: &Shape, material: &SoftMaterial) -> Result
     Err(BuildError::Material { asset: name.to_owned(), what })
 }
 
+/// Walls of hard bodies are at least this thick, m: what meets a thinner sheet is through it before contact can hold it.
+const LEAST_SHEET: f64 = 2e-3;
+/// The longest side of an object is at least this long, m: less is nearly always a wrong scale.
+const LEAST_SIZE: f64 = 1e-3;
+
+fn check_scale(object: &Object, cache: &RestCache) -> Result<(), BuildError> {
+    let longest = cache.bounds(&object.asset.shape).size().max();
+    if longest >= LEAST_SIZE {
+        return Ok(());
+    }
+    let what = format!(
+        "it is {longest:.1e} m long, expected at least {} m; sizes are in metres (a mesh has a scale)",
+        number(LEAST_SIZE)
+    );
+    Err(BuildError::Material { asset: object.asset.name.clone(), what })
+}
+
+fn check_sheet(object: &Object, cache: &RestCache) -> Result<(), BuildError> {
+    match cache.wall(&object.asset.shape).filter(|wall| *wall < LEAST_SHEET) {
+        None => Ok(()),
+        Some(wall) => Err(BuildError::Material {
+            asset: object.asset.name.clone(),
+            what: format!(
+                "it is about {} mm thick, or its walls are, expected at least {} mm: what meets a thinner one may pass \
+                 through it",
+                number((1e4 * wall).round() / 10.0),
+                number(1e3 * LEAST_SHEET)
+            ),
+        }),
+    }
+}
+
 /// Objects may overlap by this much where they are put, m: contact takes it up while they settle.
 const OVERLAP: f64 = 1e-3;
 
@@ -262,6 +300,54 @@ pub(super) fn check_overlap(world: &mut World, scene: &Scene) -> Result<(), Buil
     })
 }
 
+/// The column of the robot's first two links, which nothing collides with: radius, and from where to where on its axis, m
+/// (the collision meshes of the public `franka_description`, rounded inwards).
+const COLUMN: (f64, [f64; 2]) = (0.05, [0.03, 0.33]);
+
+/// Nothing that may move starts inside of the robot's base.
+pub(super) fn check_base(scene: &Scene) -> Result<(), BuildError> {
+    let (radius, [low, high]) = COLUMN;
+    let movable = |object: &&Object| matches!(object.asset.body, Body::Soft(_) | Body::Rigid { .. });
+    for object in scene.objects.iter().filter(movable) {
+        let column_o = object.pose_w.inverse() * scene.base_w;
+        let steps = ((high - low) / radius).ceil() as usize;
+        let inside = (0..=steps).any(|step| {
+            let z = low + (high - low) * step as f64 / steps as f64;
+            object.asset.shape.distance(&(column_o * nalgebra::Point3::new(0.0, 0.0, z)).coords) < radius
+        });
+        if inside {
+            return Err(BuildError::InBase(object.name.clone()).of(object));
+        }
+    }
+    Ok(())
+}
+
+/// Every body that is free to fall starts above something.
+///
+/// # Errors
+/// The first one that does not.
+pub fn check_support(sim: &Simulation) -> Result<(), BuildError> {
+    let boxes: Vec<Aabb> = sim.objects.iter().map(|h| h.bounds.moved(&h.start_w)).collect();
+    for (handle, own) in sim.objects.iter().zip(&boxes) {
+        let holds = |(other, below): (&Handle, &Aabb)| {
+            let beneath = (0..2).all(|i| below.min[i] < own.max[i] && own.min[i] < below.max[i]);
+            other.name != handle.name
+                && !matches!(other.asset.body, Body::Scenery)
+                && beneath
+                && below.min.z < own.min.z
+        };
+        if handle.kind.movable().is_some() && !sim.objects.iter().zip(&boxes).any(holds) {
+            let object = sim.scene.objects.iter().find(|object| object.name == handle.name);
+            let error = BuildError::NothingBelow(handle.name.clone());
+            return Err(match object {
+                Some(object) => error.of(object),
+                None => error,
+            });
+        }
+    }
+    Ok(())
+}
+
 /// Puts `object` into `world` and its handles behind the others.
 fn add(
     world: &mut World,
@@ -270,6 +356,10 @@ fn add(
     handles: &mut Vec<Handle>,
 ) -> Result<(), BuildError> {
     let asset = &object.asset;
+    check_scale(object, cache)?;
+    if matches!(asset.body, Body::Rigid { .. }) {
+        check_sheet(object, cache)?;
+    }
     let friction = Friction { static_mu: asset.friction.static_mu, dynamic_mu: asset.friction.dynamic_mu };
     let collider = |world: &World, mover, pose| {
         let (name, shape) = (&object.name, &asset.shape);

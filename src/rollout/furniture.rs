@@ -103,7 +103,8 @@ fn check_walls(object: &Object, part: &Part, cache: &RestCache) -> Result<(), Bu
     }
 }
 
-/// Typical thickness of the walls of a shape that are too thin, m; `None` if too little of its surface has such.
+/// Typical thickness of those walls of a shape that are thinner than a moving part's may be, m; `None` if too little of its
+/// surface has such.
 pub(super) fn thin_wall(shape: &Shape) -> Option<f64> {
     let hits = seen_from_outside(shape);
     let steps = (LEAST_WALL / WALL_STEP).round() as usize;

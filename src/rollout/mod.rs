@@ -18,7 +18,7 @@ pub mod stop;
 mod streams;
 mod trace;
 
-pub use build::{BuildError, soft_rest};
+pub use build::{BuildError, check_support, soft_rest};
 pub use episode::{ControlError, Controller, Episode, EpisodeError, Finished, ScoreFrame};
 pub use looks::Looks;
 pub use rest_cache::RestCache;

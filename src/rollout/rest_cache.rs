@@ -66,7 +66,7 @@ impl RestCache {
         MassProperties { mass: unit.mass * density, com: unit.com, inertia: unit.inertia * density }
     }
 
-    /// Thickness of walls that are too thin to move, m, if there are such.
+    /// Thickness of walls that are thinner than a moving part's may be, m, if there are such.
     pub(super) fn wall(&self, shape: &Shape) -> Option<f64> {
         of_shape(&self.walls, shape, || furniture::thin_wall(shape))
     }

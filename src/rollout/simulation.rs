@@ -118,6 +118,7 @@ impl Simulation {
         let objects = build::add_all(&mut world, &scene, cache)?;
         let rig = Rig::new(&mut world, robot, &scene.base_w, &scene.start_q, CONTROL_DT);
         build::check_overlap(&mut world, &scene)?;
+        build::check_base(&scene)?;
         Ok(Self { scene, world, rig, objects })
     }
 

@@ -237,7 +237,8 @@ fn suite(lua: &Lua, table: &Table) -> mlua::Result<Suite> {
     let mut tasks: Vec<Task> = Vec::new();
     for (id, table) in tables.iter().enumerate() {
         let task = task(lua, id, table, budget)?;
-        let same = |known: &&Task| (&known.prompt, &known.layout) == (&task.prompt, &task.layout);
+        let words = |task: &Task| task.prompt.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+        let same = |known: &&Task| words(known) == words(&task) && known.layout == task.layout;
         if let Some(twin) = tasks.iter().find(same) {
             let message = format!(
                 "task.prompt: tasks {} and {id} of suite {name:?} are both {:?} in the layout {:?}; nobody could tell them \

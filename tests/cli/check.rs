@@ -35,8 +35,44 @@ fn scenes_that_cannot_be_are_found_without_settling() {
         ..Small::default()
     });
     assert_snapshot!(inside, @"x.lua: task 0, episode 0: x.lua:6: camera in: position: it stands inside of cube; move it out");
+    let beside = of(Small { at: "xyz = { 0, -1, 0 }", ..Small::default() });
+    assert_snapshot!(beside, @"x.lua:6: object cube has nothing below it; put it above what it is to rest on");
+    let below = of(Small { at: "xyz = { 0, 0.1, -0.3 }", ..Small::default() });
+    assert_snapshot!(below, @"x.lua:6: object cube has nothing below it; put it above what it is to rest on");
+    let base = of(Small { at: "xyz = { -0.6, 0, 0.05 }", ..Small::default() });
+    assert_snapshot!(base, @"x.lua:6: object cube starts inside of the robot's base; move it away");
+    let dust = of(Small {
+        shape: "softvt.shape.box { size = { 4e-5, 4e-5, 4e-5 } }:grounded()",
+        ..Small::default()
+    });
+    assert_snapshot!(dust, @"x.lua:6: asset cube: it is 4.0e-5 m long, expected at least 0.001 m; sizes are in metres (a mesh has a scale)");
     let hand = of(Small { at: "xyz = { -0.187, 0.03, 0.29 }", ..Small::default() });
     assert!(hand.starts_with("x.lua:6: object cube starts inside of the robot's hand ("), "{hand}");
+}
+
+#[test]
+fn hard_things_have_walls_that_nothing_passes() {
+    let text = |size: &str| {
+        let text = Small::default().text().replace(
+            "body = softvt.soft { youngs_pa = 2e4, poisson = 0.3, density",
+            "body = softvt.rigid { density",
+        );
+        text.replace("{ 0.04, 0.04, 0.04 } }", size)
+    };
+    let refused = |size: &str| Project::new(&[("x.lua", &text(size))]).refusal("check x.lua");
+    assert_snapshot!(refused("{ 0.04, 0.04, 0.0005 } }"), @"x.lua:6: asset cube: it is about 0.6 mm thick, or its walls are, expected at least 2 mm: what meets a thinner one may pass through it");
+    assert!(refused("{ 0.06, 0.06, 0.04 } }:shell(0.001)").contains("its walls are, expected at least 2 mm"));
+    Project::new(&[("x.lua", &text("{ 0.04, 0.04, 0.003 } }"))]).succeeds("check x.lua");
+}
+
+#[test]
+fn a_suite_without_deformation_has_no_soft_targets() {
+    let text = Small::default().text().replace("\"deformable\"", "\"rigid\"");
+    let project = Project::new(&[("x.lua", &text)]);
+    let expected = "x.lua:6: the target of task 0, cube, is soft, and suite one has object_type = \"rigid\"; say \"deformable\"";
+    assert_eq!(project.refusal("check x.lua"), expected);
+    assert_eq!(project.refusal("x.lua"), expected);
+    project.succeeds("check x.lua --twin rigid");
 }
 
 #[test]

@@ -13,6 +13,7 @@ mod files;
 mod given_up;
 mod interrupt;
 mod joints;
+mod killed;
 mod measures;
 mod observe;
 mod servers;

@@ -1,0 +1,185 @@
+//! The way to a policy server and back, on the loopback interface.
+//!
+//! `cargo bench --bench policy` prints, for each profile, how long an answer takes beyond the server's own time: encoding,
+//! sending, receiving, decoding and cutting into commands, over the replans of an episode in which the server holds the robot
+//! still. Then it judges a slow server (200 ms an answer, one at a time) with two workers, and prints which share of the time
+//! that server was busy.
+
+mod episode;
+
+use std::{
+    net::{TcpListener, TcpStream},
+    process::{Command, Stdio},
+    sync::{Arc, Mutex, atomic::AtomicBool},
+    thread,
+    time::{Duration, Instant},
+};
+
+use rmpv::Value;
+use softvt::{
+    policy::{
+        ActionChunk, Chunked, Observation, Policy, PolicyError, Streams, TaskBrief,
+        profile::Profile,
+        remote::{Connections, Protocol, Remote, Server},
+    },
+    rollout::{Episode, Looks, RestCache},
+};
+use tungstenite::{Message, accept};
+
+/// Longest time of an answer beyond the server's own, ms.
+const GOAL_MS: f64 = 2.0;
+/// Least share of the time that a slow server is busy.
+const GOAL_BUSY: f64 = 0.9;
+const SLOW: Duration = Duration::from_millis(200);
+
+/// When each answer was begun and sent.
+type Answers = Arc<Mutex<Vec<(Instant, Instant)>>>;
+
+/// A server that thinks for so long, about one observation at a time; its address.
+fn serve(thinks: Duration) -> (String, Answers) {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let url = format!("ws://{}", listener.local_addr().expect("an address"));
+    let (answers, model) = (Answers::default(), Arc::new(Mutex::new(())));
+    let kept = answers.clone();
+    thread::spawn(move || {
+        for stream in listener.incoming().flatten() {
+            let (answers, model) = (answers.clone(), model.clone());
+            thread::spawn(move || answer(stream, thinks, &answers, &model));
+        }
+    });
+    (url, kept)
+}
+
+fn answer(stream: TcpStream, thinks: Duration, answers: &Answers, model: &Mutex<()>) {
+    stream.set_nodelay(true).expect("a socket");
+    let Ok(mut socket) = accept(stream) else { return };
+    let _ = socket.send(packed(&Value::Map(Vec::new())));
+    while let Ok(Message::Binary(bytes)) = socket.read() {
+        let turn = model.lock().expect("the model");
+        let begun = Instant::now();
+        let seen = rmpv::decode::read_value(&mut &bytes[..]).expect("msgpack");
+        thread::sleep(thinks);
+        let message = packed(&hold(&seen));
+        answers.lock().expect("answers").push((begun, Instant::now()));
+        drop(turn);
+        if socket.send(message).is_err() {
+            return;
+        }
+    }
+}
+
+fn packed(value: &Value) -> Message {
+    let mut bytes = Vec::new();
+    rmpv::encode::write_value(&mut bytes, value).expect("packed");
+    Message::binary(bytes)
+}
+
+fn entry<'a>(map: &'a Value, wanted: &str) -> &'a Value {
+    let is = |key: &Value| key.as_str() == Some(wanted) || key.as_slice() == Some(wanted.as_bytes());
+    &map.as_map().expect("a map").iter().find(|(key, _)| is(key)).expect("an entry").1
+}
+
+/// Fifty actions that leave the tool where it is.
+fn hold(seen: &Value) -> Value {
+    let state = entry(entry(seen, "observation/state"), "data").as_slice().expect("bytes");
+    let row: Vec<u8> = state[..24].iter().copied().chain([0; 4]).collect();
+    let key = |name: &str| Value::Binary(name.as_bytes().to_vec());
+    let actions = Value::Map(vec![
+        (key("__ndarray__"), Value::Boolean(true)),
+        (key("data"), Value::Binary(row.repeat(50))),
+        (key("dtype"), Value::from("<f4")),
+        (key("shape"), Value::Array(vec![Value::from(50), Value::from(7)])),
+    ]);
+    Value::Map(vec![(Value::from("actions"), actions)])
+}
+
+/// A policy, and how long each of its answers took.
+struct Timed<'a> {
+    inner: Remote,
+    took: &'a mut Vec<Duration>,
+}
+
+impl Policy for Timed<'_> {
+    fn name(&self) -> &str {
+        self.inner.name()
+    }
+
+    fn streams(&self) -> Streams {
+        self.inner.streams()
+    }
+
+    fn reset(&mut self, brief: &TaskBrief) -> Result<(), PolicyError> {
+        self.inner.reset(brief)
+    }
+
+    fn act(&mut self, observation: &Observation) -> Result<ActionChunk, PolicyError> {
+        let start = Instant::now();
+        let chunk = self.inner.act(observation);
+        self.took.push(start.elapsed());
+        chunk
+    }
+}
+
+/// Times of the answers of an episode beyond the server's own, sorted, ms.
+fn overheads(profile: &str) -> Vec<f64> {
+    static STOP: AtomicBool = AtomicBool::new(false);
+    let (url, answers) = serve(Duration::ZERO);
+    let remote = Remote::new(Arc::new(Connections::new(Server {
+        url,
+        protocol: Protocol::Openpi,
+        profile: Profile::named(profile).expect("a profile"),
+        patience: Duration::from_secs(60),
+        api_key: None,
+        stop: &STOP,
+    })));
+    let (spec, _) = episode::open(&episode::load(), 0, false);
+    let (suite, prompt) = (spec.identity.suite.clone(), spec.task.prompt.clone());
+    let mut took = Vec::new();
+    let policy = Timed { inner: remote, took: &mut took };
+    let mut driver = Chunked::new(Box::new(policy), TaskBrief { suite, task: 0, prompt, episode: 0 }, 10);
+    let started = Episode::start(spec, &RestCache::default(), &Looks::default()).expect("it starts");
+    started.run(&mut driver).expect("it runs");
+    drop(driver);
+    let answers = answers.lock().expect("answers");
+    let own = answers.iter().map(|(begun, sent)| *sent - *begun);
+    let mut beyond: Vec<f64> =
+        took.iter().zip(own).map(|(all, own)| 1e3 * (all.saturating_sub(own)).as_secs_f64()).collect();
+    beyond.sort_by(f64::total_cmp);
+    beyond
+}
+
+/// The share of the time between its first and its last answer that a slow server thought, with two workers.
+fn busy() -> f64 {
+    let (url, answers) = serve(SLOW);
+    let out = std::env::temp_dir().join(format!("softvt-bench-{}", std::process::id()));
+    let status = Command::new(env!("CARGO_BIN_EXE_softvt"))
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .args([episode::SUITE, "--task", "0", "--episodes", "4", "--threads", "2", "--policy", &url, "--out"])
+        .arg(&out)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .status()
+        .expect("softvt runs");
+    assert!(status.success(), "{status}");
+    std::fs::remove_dir_all(out).expect("the run's folder");
+    let answers = answers.lock().expect("answers");
+    let thought: Duration = answers.iter().map(|(begun, sent)| *sent - *begun).sum();
+    let (first, last) = (answers.first().expect("answers").0, answers.last().expect("answers").1);
+    thought.as_secs_f64() / (last - first).as_secs_f64()
+}
+
+fn main() {
+    println!("{:<16} {:>8} {:>10} {:>10} {:>10}", "profile", "replans", "median ms", "95 % ms", "most ms");
+    for profile in ["vision", "visuo_tactile", "softvtbench", "libero"] {
+        let ms = overheads(profile);
+        let at = |share: f64| ms[((ms.len() - 1) as f64 * share).round() as usize];
+        println!("{profile:<16} {:>8} {:>10.2} {:>10.2} {:>10.2}", ms.len(), at(0.5), at(0.95), at(1.0));
+    }
+    println!("goal: {GOAL_MS} ms");
+    println!(
+        "a server of {} ms an answer, two workers: busy {:.1} % of the time (goal {:.0} %)",
+        SLOW.as_millis(),
+        1e2 * busy(),
+        1e2 * GOAL_BUSY
+    );
+}
