@@ -2,7 +2,7 @@
 //!
 //! The rooms, from the ground up; each may use those before it and none after it:
 //! [`geometry`] → [`physics`] → [`scene`], [`robot`] → [`sensing`], [`evaluation`] → [`benchmark`] → [`policy`] → [`rollout`]
-//! → [`dataset`] → [`report`] → [`script`] → [`cli`]. `docs/architecture.md` draws them and follows one episode through.
+//! → [`dataset`] → [`report`] → [`script`] → [`serve`] → [`cli`]. `docs/architecture.md` draws them and follows one episode through.
 //!
 //! Beside them stands [`message`]: how numbers and text look in what they say.
 //!
@@ -24,3 +24,4 @@ pub mod rollout;
 pub mod scene;
 pub mod script;
 pub mod sensing;
+pub mod serve;

@@ -6,7 +6,7 @@ use softvt::{
     benchmark::seed::Split,
     geometry::Vec3,
     physics::{contact::Partner, world::Drive},
-    rollout::{Handle, Kind, Looks, RestCache, Senses, Simulation, episode::state_hash},
+    rollout::{Handle, Kind, Looks, RestCache, Senses, Simulation, state_hash},
     scene::{Asset, Camera, Scene},
     script::{self, Episode, EpisodeRequest},
     sensing::tactile::TactileSpec,

@@ -6,7 +6,7 @@ use clap::{ArgMatches, error::ErrorKind, parser::ValueSource};
 
 use super::{Failure, code, drivers::Choice, flags, replay, require::Requirement, shard::Shard};
 use crate::{
-    benchmark::Suite,
+    benchmark::{Suite, seed::Split},
     policy::remote::Protocol,
     script::{self, OptionSpec},
 };
@@ -64,6 +64,8 @@ pub enum Command {
     },
     /// Draw one episode.
     View(View),
+    /// Serve episodes to clients.
+    Serve(Serve),
     /// Check the installation.
     Doctor,
     /// Help or version was shown.
@@ -162,6 +164,23 @@ pub struct View {
     pub native: bool,
 }
 
+/// What to serve, where and to how many.
+#[derive(Debug)]
+pub struct Serve {
+    /// Suite, profile, seed, shifts and settings as for a run.
+    pub run: Run,
+    /// Address to listen at.
+    pub host: String,
+    /// Port to listen at; 0 is any that is free.
+    pub port: u16,
+    /// Most clients at once.
+    pub seats: usize,
+    /// Which list of episodes, where a client names none.
+    pub split: Split,
+    /// Whether clients are told the true state.
+    pub privileged: bool,
+}
+
 /// Reads the command line.
 ///
 /// # Errors
@@ -207,6 +226,7 @@ pub fn parse(words: &[String]) -> Result<Command, Failure> {
             Ok(Command::Report { runs, out: PathBuf::from(text(m, "out")) })
         }
         Some(("check", m)) => common(m, &options).map(Command::Check).map_err(named),
+        Some(("serve", m)) => serve(m, &options).map(Command::Serve).map_err(named),
         Some(("doctor", _)) => Ok(Command::Doctor),
         Some(("view", m)) => view(m, &options).map(Command::View).map_err(named),
         _ => run(&matches, &options).map(Command::Run).map_err(named),
@@ -250,6 +270,21 @@ fn view(matches: &ArgMatches, options: &[OptionSpec]) -> Result<View, Failure> {
     let run = common(matches, options)?;
     let tasks = vec![text(matches, "task")];
     Ok(View { run: Run { tasks, ..run }, episode, native: matches.get_flag("native") })
+}
+
+fn serve(matches: &ArgMatches, options: &[OptionSpec]) -> Result<Serve, Failure> {
+    let typed = |name: &&&str| matches.value_source(name) == Some(ValueSource::CommandLine);
+    if let Some(flag) = flags::DRIVERS.iter().find(typed) {
+        return Err(Failure::input(format!("--{flag}: with softvt serve the client drives; leave it out")));
+    }
+    Ok(Serve {
+        run: common(matches, options)?,
+        host: text(matches, "host"),
+        port: matches.get_one("port").copied().unwrap_or_default(),
+        seats: matches.get_one::<u16>("threads").map_or(1, |n| usize::from(*n)),
+        split: matches.get_one("split").copied().unwrap_or_default(),
+        privileged: matches.get_flag("privileged"),
+    })
 }
 
 /// What commands on scripts share.

@@ -111,9 +111,8 @@ impl<'a> Batch<'a> {
     }
 
     /// An episode as its layout, the shifts and the run make it.
-    fn open(&self, task: &Task, episode: u32) -> Result<script::Episode, Failure> {
-        let mut opened =
-            script::Episode::open(self.loaded, &self.request(task, episode)).map_err(Failure::input)?;
+    fn open(&self, request: &script::EpisodeRequest) -> Result<script::Episode, Failure> {
+        let mut opened = script::Episode::open(self.loaded, request).map_err(Failure::input)?;
         if self.run.twin {
             (opened.scene, opened.nominal) = (opened.scene.rigid_twin(), opened.nominal.rigid_twin());
         }
@@ -144,7 +143,7 @@ impl<'a> Batch<'a> {
     pub fn prepare(&mut self, tasks: &[&Task]) -> Result<(), Failure> {
         for task in tasks {
             let first = self.jobs.iter().find(|(of, _)| of.id == task.id).map_or(0, |(_, episode)| *episode);
-            let opened = self.open(task, first)?;
+            let opened = self.open(&self.request(task, first))?;
             self.right_kind(task, &opened.nominal)?;
             self.learn_limit(target_asset(&opened.nominal, task).cloned())?;
             let scene = Arc::new(opened.scene.clone());
@@ -153,6 +152,17 @@ impl<'a> Batch<'a> {
             self.try_out(scene, streams).map_err(|error| self.trial_failure(error, task, first))?;
         }
         Ok(())
+    }
+
+    /// Reads the thresholds of the targets of tasks, and does nothing else to prepare them.
+    ///
+    /// # Errors
+    /// A layout or a threshold file that is wrong.
+    pub fn learn_limits(&mut self, tasks: &[Task]) -> Result<(), Failure> {
+        tasks.iter().try_for_each(|task| {
+            let opened = self.open(&self.request(task, 0))?;
+            self.learn_limit(target_asset(&opened.nominal, task).cloned())
+        })
     }
 
     /// Reads the threshold of a task's target, if it is a soft one whose threshold is not known yet.
@@ -450,26 +460,43 @@ impl<'a> Batch<'a> {
     /// A script, the scene or whoever drives fails.
     pub fn episode(&self, job: usize, film: bool) -> Result<Finished, Failure> {
         let (task, episode) = self.jobs[job];
-        let opened = self.open(task, episode)?;
+        let (spec, opened) = self.spec(task, &self.request(task, episode))?;
+        let driver = (self.drive)(opened, self.brief(task, episode))?;
+        let mut driver = batch::Stoppable { driver, stop: &stop::FLAG };
+        let started = self.start(EpisodeSpec { film, ..spec })?;
+        started.run(&mut driver).map_err(|e| self.episode_failure(&e))
+    }
+
+    /// The settled start of an episode, for somebody else to drive.
+    ///
+    /// # Errors
+    /// A script or the scene fails.
+    pub fn begin(&self, task: &Task, request: &script::EpisodeRequest) -> Result<Episode, Failure> {
+        self.start(self.spec(task, request)?.0)
+    }
+
+    fn start(&self, spec: EpisodeSpec) -> Result<Episode, Failure> {
+        Episode::start(spec, &self.cache, &self.looks).map_err(|e| self.episode_failure(&e))
+    }
+
+    /// All of an episode but who drives, and what its script made.
+    fn spec(
+        &self,
+        task: &Task,
+        request: &script::EpisodeRequest,
+    ) -> Result<(EpisodeSpec, script::Episode), Failure> {
+        let opened = self.open(request)?;
         let limit = target_asset(&opened.nominal, task).and_then(|asset| self.limit_of(asset));
         let which = Which {
             suite: &self.name,
-            episode,
-            seed: self.run.seed,
-            split: Split::Validation,
+            episode: request.episode as u32,
+            seed: request.base_seed,
+            split: request.split,
             policy: self.run.policy.name(),
         };
         let scenes = (&opened.nominal, opened.scene.clone());
-        let spec = EpisodeSpec {
-            limit,
-            film,
-            trace: self.run.trace,
-            ..EpisodeSpec::new(&which, task, scenes, &self.settings)
-        };
-        let driver = (self.drive)(opened, self.brief(task, episode))?;
-        let mut driver = batch::Stoppable { driver, stop: &stop::FLAG };
-        let started = Episode::start(spec, &self.cache, &self.looks).map_err(|e| self.episode_failure(&e))?;
-        started.run(&mut driver).map_err(|e| self.episode_failure(&e))
+        let spec = EpisodeSpec::new(&which, task, scenes, &self.settings);
+        Ok((EpisodeSpec { limit, trace: self.run.trace, ..spec }, opened))
     }
 
     fn episode_failure(&self, error: &EpisodeError) -> Failure {

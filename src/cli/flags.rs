@@ -8,6 +8,7 @@ use super::{Failure, drivers::policy_word, replay, require, shard};
 use crate::{
     policy::profile::PROFILES,
     script::{OptionSpec, OptionValue},
+    serve::split_named,
 };
 
 /// The whole command with the script's options in a section of their own.
@@ -29,6 +30,7 @@ pub fn command(options: &[OptionSpec]) -> Result<clap::Command, Failure> {
         command = command
             .arg(script_arg(option, long.clone()))
             .mut_subcommand("check", |check| check.arg(script_arg(option, long.clone())))
+            .mut_subcommand("serve", |serve| serve.arg(script_arg(option, long.clone())))
             .mut_subcommand("view", |view| view.arg(script_arg(option, long)));
     }
     Ok(command)
@@ -137,6 +139,49 @@ fn on_script(command: clap::Command) -> clap::Command {
         )
 }
 
+/// What says who drives: with `softvt serve` that is the client.
+pub const DRIVERS: [&str; 5] = ["policy", "protocol", "replan", "policy-timeout", "name"];
+
+fn server() -> clap::Command {
+    let command = clap::Command::new("serve")
+        .about("Serves episodes over a websocket, for somebody else to drive: docs/serve.md")
+        .arg(
+            flag("host", "Address of this machine to listen at")
+                .value_name("HOST")
+                .default_value("127.0.0.1"),
+        )
+        .arg(
+            flag(
+                "port",
+                "Port to listen at; 0 is any that is free, and the first line of the output says which",
+            )
+            .value_name("PORT")
+            .default_value("8765")
+            .value_parser(value_parser!(u16)),
+        )
+        .arg(
+            flag("threads", "Most clients at once; each has a thread and an episode of its own")
+                .value_name("N")
+                .default_value("8")
+                .value_parser(value_parser!(u16).range(1..=1024)),
+        )
+        .arg(
+            flag("split", "Which list of episodes, where a client names none")
+                .value_name("SPLIT")
+                .default_value("validation")
+                .value_parser(|word: &str| split_named(word)),
+        )
+        .arg(
+            flag(
+                "privileged",
+                "Tells clients the true state: poses, deformation, contact forces, limits, verdict",
+            )
+            .action(ArgAction::SetTrue),
+        );
+    let hidden = |command: clap::Command, name: &&'static str| command.mut_arg(*name, |arg| arg.hide(true));
+    DRIVERS.iter().fold(on_script(command), hidden)
+}
+
 fn runner() -> clap::Command {
     let json = flag("json", "Print JSON on the standard output: one object for a suite or for conditions, an array for a list of suites, a line a row for an experiment").action(ArgAction::SetTrue);
     let about = "A safety-aware visuo-tactile manipulation benchmark for soft objects, on an ordinary CPU";
@@ -206,6 +251,7 @@ fn runner() -> clap::Command {
                 .arg(flag("native", "Stills in the cameras' own size: 1024 and 512 pixels instead of 224").action(ArgAction::SetTrue))
                 .arg(flag("out", "Where to write").value_name("DIR").required(true)),
         )
+        .subcommand(server())
         .subcommand(clap::Command::new("doctor").about("Checks the installation and runs a golden episode"))
 }
 

@@ -18,6 +18,7 @@ mod progress;
 mod replay;
 mod report;
 mod require;
+mod serve;
 mod shard;
 mod view;
 
@@ -121,6 +122,7 @@ fn carry_out(words: &[String]) -> Result<(), Failure> {
         Command::Replay { dir, which } => replay::run(&dir, which),
         Command::Report { runs, out } => report::run(&runs, &out),
         Command::View(view) => view::run(&view),
+        Command::Serve(serve) => serve::run(&serve),
         Command::Doctor => doctor::run(),
         Command::Shown => Ok(()),
     }

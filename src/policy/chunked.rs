@@ -11,14 +11,41 @@ pub struct Chunked<'a> {
     replan: usize,
     brief: Option<TaskBrief>,
     rest: VecDeque<Command>,
+    follower: Follower,
+}
+
+/// Commands become poses one after another: a step away from where the tool is remembers how fast the last one left it.
+#[derive(Clone, Debug, Default)]
+pub struct Follower {
     osc: Osc,
+}
+
+impl Follower {
+    /// The pose that a command means when its turn comes.
+    pub fn action(&mut self, now: &Observation, command: Command) -> Action {
+        match command {
+            Command::Pose(action) => {
+                self.osc = Osc::default();
+                action
+            }
+            Command::Step { translation_b, rotation_b, closure } => {
+                self.osc.step(now, translation_b, rotation_b, closure)
+            }
+        }
+    }
 }
 
 impl<'a> Chunked<'a> {
     /// `policy` in the episode `brief`; the first `replan` actions of each of its chunks are carried out, or all if they are
     /// fewer.
     pub fn new(policy: Box<dyn Policy + 'a>, brief: TaskBrief, replan: usize) -> Self {
-        Self { policy, replan: replan.max(1), brief: Some(brief), rest: VecDeque::new(), osc: Osc::default() }
+        Self {
+            policy,
+            replan: replan.max(1),
+            brief: Some(brief),
+            rest: VecDeque::new(),
+            follower: Follower::default(),
+        }
     }
 
     /// What the policy looks at, when it looks.
@@ -44,16 +71,10 @@ impl<'a> Chunked<'a> {
             commands.truncate(self.replan);
             self.rest = commands.into();
         }
-        match self.rest.pop_front() {
-            Some(Command::Pose(action)) => {
-                self.osc = Osc::default();
-                Ok(action)
-            }
-            Some(Command::Step { translation_b, rotation_b, closure }) => {
-                Ok(self.osc.step(observation, translation_b, rotation_b, closure))
-            }
-            None => Err(PolicyError::Reply("the policy's reply has no action at all".to_owned())),
-        }
+        let command = self.rest.pop_front();
+        let command = command
+            .ok_or_else(|| PolicyError::Reply("the policy's reply has no action at all".to_owned()))?;
+        Ok(self.follower.action(observation, command))
     }
 
     /// The episode is over.

@@ -13,7 +13,7 @@ pub mod wire;
 
 use crate::geometry::Vec3;
 
-pub use chunked::Chunked;
+pub use chunked::{Chunked, Follower};
 pub use observation::{CameraPicture, Observation, PadForce, Streams, TouchFrame, TouchHistory};
 
 /// What a policy commands for one control step.

@@ -1,17 +1,21 @@
 //! One episode from the settled scene to the verdict.
 
-use sha2::{Digest, Sha256};
+use image::RgbImage;
 
 use super::{
     build::BuildError,
-    evidence::{Witness, lowest},
+    command::{check_action, is_far},
+    control::{ControlError, Controller},
+    evidence::Witness,
+    judging::judge,
     looks::Looks,
     recent::Recent,
     rest_cache::RestCache,
     senses::{Film, SenseError, Senses},
     settle::SettleError,
-    simulation::{Handle, Kind, Simulation},
+    simulation::{Kind, Simulation},
     spec::EpisodeSpec,
+    state_hash::state_hash,
     streams::check_senses,
     trace::StepTrace,
 };
@@ -19,86 +23,14 @@ use crate::{
     benchmark::{Goal, control::steps_per_control},
     evaluation::{
         deformation::{Deformation, Reference},
-        goal::Place,
-        judge::{Judge, Setup},
+        judge::{Judge, Verdict},
         record::{EpisodeRecord, Outcome, RolloutStats},
     },
-    geometry::{Pose, Vec3},
+    geometry::Pose,
     physics::world::{Frame, StepFailure},
-    policy::{Action, Chunked, Observation, PolicyError, Streams},
-    robot::{ik::REACH, rotation},
-    scene::Region,
+    policy::{Action, Observation, Streams},
+    robot::{Side, rotation},
 };
-
-/// What went wrong with whoever drives.
-#[derive(Debug, thiserror::Error)]
-pub enum ControlError {
-    /// A script failed: the user's input.
-    #[error("{0}")]
-    Script(String),
-    /// A policy failed: the server or its answers.
-    #[error("{0}")]
-    Policy(String),
-    /// A policy's answer cannot be carried out; this episode has failed and others may go on.
-    #[error("{0}")]
-    Action(String),
-    /// The run was told to stop.
-    #[error("interrupted")]
-    Interrupted,
-}
-
-/// Whoever drives the robot: a policy behind its observation, or a privileged planner.
-pub trait Controller {
-    /// What it looks at, when it looks; the same for the whole episode.
-    fn streams(&self) -> Streams {
-        Streams::default()
-    }
-    /// Whether it looks in this control step; if not, nothing is sensed for it.
-    fn looks(&self) -> bool {
-        true
-    }
-    /// Why it has given up, if it has: the last action stays then.
-    fn gave_up(&self) -> Option<&str> {
-        None
-    }
-    /// The action of this control step; `None` to keep the last one.
-    ///
-    /// # Errors
-    /// What went wrong.
-    fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, ControlError>;
-    /// The episode is over.
-    fn finish(&mut self) {}
-}
-
-/// A policy sees the observation and nothing else.
-impl Controller for Chunked<'_> {
-    fn streams(&self) -> Streams {
-        Chunked::streams(self)
-    }
-
-    fn looks(&self) -> bool {
-        Chunked::looks(self)
-    }
-
-    fn act(&mut self, _sim: &Simulation, observation: &Observation) -> Result<Option<Action>, ControlError> {
-        Chunked::act(self, observation).map(Some).map_err(ControlError::from)
-    }
-
-    fn finish(&mut self) {
-        Chunked::finish(self);
-    }
-}
-
-impl From<PolicyError> for ControlError {
-    fn from(error: PolicyError) -> Self {
-        match error {
-            PolicyError::Transport(message) | PolicyError::Reply(message) => Self::Policy(message),
-            PolicyError::Action(message) => Self::Action(message),
-            PolicyError::Script(message) | PolicyError::Address(message) => Self::Script(message),
-            PolicyError::Interrupted => Self::Interrupted,
-        }
-    }
-}
 
 /// A finished episode.
 #[derive(Debug)]
@@ -178,6 +110,12 @@ pub enum EpisodeError {
     },
 }
 
+impl EpisodeSpec {
+    fn sense_error(&self, source: SenseError) -> EpisodeError {
+        EpisodeError::Sense { task: self.task.id, episode: self.identity.episode, source }
+    }
+}
+
 impl EpisodeError {
     /// `file:line` of what is wrong, where that is known and the message does not name it itself.
     pub fn place(&self) -> Option<&str> {
@@ -188,9 +126,12 @@ impl EpisodeError {
     }
 }
 
-/// An episode in progress.
+/// An episode in progress. A copy of it goes on as it would itself, to the same bytes.
+#[derive(Clone)]
 pub struct Episode {
     spec: EpisodeSpec,
+    /// How it ended, if it has.
+    outcome: Option<Outcome>,
     /// The running scene.
     pub sim: Simulation,
     witness: Witness,
@@ -207,12 +148,13 @@ pub struct Episode {
     senses: Senses,
     recent: Recent,
     reel: Option<Reel>,
-    force_observed: bool,
+    /// What is looked at.
+    streams: Streams,
     far_commands: u32,
 }
 
 /// What a film keeps while it is being taken.
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Reel {
     frames: Vec<Frame>,
     d_pct: Vec<Option<f64>>,
@@ -224,11 +166,7 @@ impl Episode {
     /// # Errors
     /// The scene cannot be sensed or built or does not come to rest, or the goal names nothing in it.
     pub fn start(spec: EpisodeSpec, cache: &RestCache, looks: &Looks) -> Result<Self, EpisodeError> {
-        check_senses(&spec.scene, &spec.tactile, looks).map_err(|source| EpisodeError::Sense {
-            task: spec.task.id,
-            episode: spec.identity.episode,
-            source,
-        })?;
+        check_senses(&spec.scene, &spec.tactile, looks).map_err(|source| spec.sense_error(source))?;
         let mut sim = Simulation::new(spec.scene.clone(), &spec.params, &spec.robot, cache)?;
         let (object, place, hold_s) = match &spec.task.goal {
             Goal::On { object, target, hold_s } | Goal::In { object, target, hold_s } => {
@@ -277,8 +215,9 @@ impl Episode {
             senses,
             recent: Recent::default(),
             reel,
-            force_observed: false,
+            streams: Streams::default(),
             far_commands: 0,
+            outcome: None,
         })
     }
 
@@ -289,49 +228,75 @@ impl Episode {
     pub fn run(mut self, controller: &mut dyn Controller) -> Result<Finished, EpisodeError> {
         let mut action = self.start_hold;
         let streams = controller.streams();
-        self.force_observed = streams.force;
-        self.remember(&streams, self.witness.reference(self.target).map(|_| 0.0));
-        let outcome = loop {
-            if self.judge.goal_reached() {
-                break Outcome::Completed;
-            }
-            if self.steps >= self.spec.task.budget_steps {
-                break Outcome::Timeout;
-            }
+        self.watch(streams.clone());
+        while self.outcome.is_none() {
             let looked_at = if controller.looks() { &streams } else { &Streams::default() };
-            let observation = self.observation(looked_at)?;
+            let observation = self.observe(looked_at)?;
             match controller.act(&self.sim, &observation) {
                 Ok(Some(wanted)) => action = wanted,
                 Ok(None) => {}
-                Err(ControlError::Action(message)) => break Outcome::Error { message },
+                Err(ControlError::Action(message)) => {
+                    self.outcome = Some(Outcome::Error { message });
+                    break;
+                }
                 Err(source) => return Err(self.control_error(source)),
             }
-            if let Err(message) = check_action(&action) {
-                break Outcome::Error { message };
-            }
-            self.actions.push(action);
-            self.far_commands += u32::from(is_far(&observation, &action));
-            if let Err(failure) = self.control_step(&action) {
-                break self.invalid(&failure);
-            }
-            self.remember(
-                &streams,
-                self.frames.last().and_then(|frame| frame.deformation.as_ref()).map(|d| d.rms_pct),
-            );
-        };
+            self.step(&action);
+        }
         controller.finish();
-        Ok(self.finish(outcome, controller.gave_up().map(str::to_owned)))
+        Ok(self.finish(controller.gave_up().map(str::to_owned)))
+    }
+
+    /// Says once, before the first step, what will be looked at: that much of the past is kept.
+    pub fn watch(&mut self, streams: Streams) {
+        self.streams = streams;
+        self.remember(self.witness.reference(self.target).map(|_| 0.0));
+        self.outcome = self.ending();
+    }
+
+    /// Carries out one control step and says how the episode has ended, if it has. One that has ended moves no more.
+    pub fn step(&mut self, action: &Action) -> Option<&Outcome> {
+        if self.outcome.is_none() {
+            self.outcome = self.advance(action);
+        }
+        self.outcome.as_ref()
+    }
+
+    /// How it ended, if it has.
+    pub fn outcome(&self) -> Option<&Outcome> {
+        self.outcome.as_ref()
+    }
+
+    fn advance(&mut self, action: &Action) -> Option<Outcome> {
+        if let Err(message) = check_action(action) {
+            return Some(Outcome::Error { message });
+        }
+        self.actions.push(*action);
+        self.far_commands += u32::from(is_far(&self.sim.rig.tool_b(&self.sim.world), action));
+        if let Err(failure) = self.control_step(action) {
+            return Some(self.invalid(&failure));
+        }
+        self.remember(self.frames.last().and_then(|frame| frame.deformation.as_ref()).map(|d| d.rms_pct));
+        self.ending()
+    }
+
+    /// How a state that can be trusted ends the episode, if it does.
+    fn ending(&self) -> Option<Outcome> {
+        if self.judge.goal_reached() {
+            return Some(Outcome::Completed);
+        }
+        (self.steps >= self.spec.task.budget_steps).then_some(Outcome::Timeout)
     }
 
     fn control_error(&self, source: ControlError) -> EpisodeError {
         EpisodeError::Control { task: self.spec.task.id, episode: self.spec.identity.episode, source }
     }
 
-    /// What a policy sees now.
+    /// What a policy sees now, through those `streams` that are watched.
     ///
     /// # Errors
     /// A stream cannot be made.
-    fn observation(&mut self, streams: &Streams) -> Result<Observation, EpisodeError> {
+    pub fn observe(&mut self, streams: &Streams) -> Result<Observation, EpisodeError> {
         let tool = self.sim.rig.tool_b(&self.sim.world);
         let blind = Observation {
             time_s: self.time(),
@@ -346,16 +311,33 @@ impl Episode {
             forces: None,
             force_history: Vec::new(),
         };
-        self.recent.observe(&mut self.senses, blind, streams).map_err(|source| EpisodeError::Sense {
-            task: self.spec.task.id,
-            episode: self.spec.identity.episode,
-            source,
-        })
+        let seen = self.recent.observe(&mut self.senses, blind, streams);
+        seen.map_err(|source| self.spec.sense_error(source))
+    }
+
+    /// What a camera of the scene sees now, in its own size or another (width and height, pixels). It is for onlookers: the
+    /// record does not count it as a look of the policy's.
+    ///
+    /// # Errors
+    /// There is no such camera, or it has no picture of that size.
+    pub fn picture(&mut self, camera: &str, size: [Option<usize>; 2]) -> Result<RgbImage, SenseError> {
+        let mut camera = self.senses.camera(camera)?.clone();
+        camera.width = size[0].unwrap_or(camera.width);
+        camera.height = size[1].unwrap_or(camera.height);
+        Ok(self.senses.see(&Senses::frame(&self.sim), &camera)?.into_image())
+    }
+
+    /// What a finger's sensor sees now, for onlookers too.
+    ///
+    /// # Errors
+    /// As [`Senses::finger`].
+    pub fn finger_picture(&mut self, side: Side) -> Result<RgbImage, SenseError> {
+        Ok(self.senses.finger(&Senses::frame(&self.sim), side)?.picture)
     }
 
     /// Keeps what may be looked at later: for the sensors and for the film.
-    fn remember(&mut self, streams: &Streams, d_pct: Option<f64>) {
-        if streams == &Streams::default() && self.reel.is_none() {
+    fn remember(&mut self, d_pct: Option<f64>) {
+        if self.streams == Streams::default() && self.reel.is_none() {
             return;
         }
         let frame = Senses::frame(&self.sim);
@@ -391,10 +373,8 @@ impl Episode {
             worst = worst.into_iter().chain(now).max_by(|a, b| a.rms_pct.total_cmp(&b.rms_pct));
         }
         self.frames.push(ScoreFrame { success_now: self.judge.goal_reached(), deformation: worst });
-        if let Some(nodes) = self.spec.trace {
-            let at = (self.steps, self.time());
-            let dropped = self.judge.dropped().is_some();
-            self.trace.push(StepTrace::new(&self.sim, &self.witness, self.target, at, dropped, nodes));
+        if self.spec.trace.is_some() {
+            self.trace.push(self.trace());
         }
         Ok(())
     }
@@ -414,102 +394,41 @@ impl Episode {
         Outcome::Invalid { reason: reason.to_owned(), step: self.physics_steps, node }
     }
 
-    fn finish(self, outcome: Outcome, gave_up: Option<String>) -> Finished {
+    /// What is said of it up to now; one that has not ended is judged as if its time were up.
+    pub fn verdict(&self) -> Verdict {
+        self.judge.clone().finish(self.outcome.as_ref().unwrap_or(&Outcome::Timeout))
+    }
+
+    /// The present state, as a run would write it down.
+    pub fn trace(&self) -> StepTrace {
+        let at = (self.steps, self.time());
+        let dropped = self.judge.dropped().is_some();
+        StepTrace::new(&self.sim, &self.witness, self.target, at, dropped, self.spec.trace == Some(true))
+    }
+
+    /// Its record, as far as it has come.
+    pub fn record(&self, gave_up: Option<String>) -> EpisodeRecord {
         let soft = matches!(self.sim.objects[self.target].kind, Kind::Soft(_));
         let stats = RolloutStats {
             steps: self.steps,
-            time_s: self.physics_steps as f64 * self.spec.params.dt,
+            time_s: self.time(),
             min_det_f: (soft && self.min_det_f.is_finite()).then_some(self.min_det_f),
             newton_mean: self.newton.0 as f64 / self.physics_steps.max(1) as f64,
             newton_max: self.newton.1,
-            force_observed: self.force_observed,
+            force_observed: self.streams.force,
             camera_inside: self.recent.inside,
             far_commands: self.far_commands,
             gave_up,
             state_hash: state_hash(&self.sim),
         };
+        let outcome = self.outcome.clone().unwrap_or(Outcome::Timeout);
+        EpisodeRecord { identity: self.spec.identity.clone(), outcome, verdict: self.verdict(), stats }
+    }
+
+    fn finish(self, gave_up: Option<String>) -> Finished {
+        let record = self.record(gave_up);
         let film = self.reel.map(|Reel { frames, d_pct }| Film { senses: self.senses, frames, d_pct });
         let reference = self.witness.reference(self.target).cloned();
-        let verdict = self.judge.finish(&outcome);
-        let record = EpisodeRecord { identity: self.spec.identity, outcome, verdict, stats };
         Finished { record, trace: self.trace, frames: self.frames, actions: self.actions, reference, film }
     }
-}
-
-/// Whether a command is farther from the tool than a step of the inverse kinematics looks.
-fn is_far(now: &Observation, action: &Action) -> bool {
-    let (from, to) = (&now.ee_axis_angle_b, &action.axis_angle_b);
-    let turn = rotation::error(&rotation::from_axis_angle(from), &rotation::from_axis_angle(to));
-    (action.position_b - now.ee_position_b).norm() > REACH.0 || turn.norm() > REACH.1
-}
-
-fn check_action(action: &Action) -> Result<(), String> {
-    let numbers = action.position_b.iter().chain(action.axis_angle_b.iter()).chain([&action.closure]);
-    let all: Vec<f64> = numbers.copied().collect();
-    if all.iter().all(|x| x.is_finite()) {
-        return Ok(());
-    }
-    Err(format!("the action {all:?} holds a number that is not finite"))
-}
-
-/// The judge of an episode in its settled state.
-fn judge(
-    spec: &EpisodeSpec,
-    sim: &Simulation,
-    witness: &Witness,
-    (target, place): (usize, usize),
-    hold_s: f64,
-) -> Judge {
-    Judge::new(Setup {
-        rules: spec.rules.clone(),
-        workspace: spec.scene.workspace,
-        place: place_of(&spec.task.goal, &sim.objects[place]),
-        hold_s,
-        dt_s: spec.params.dt,
-        steps_per_control: steps_per_control(spec.params.dt),
-        target_weight_n: weight(sim, target),
-        soft: matches!(sim.objects[target].kind, Kind::Soft(_)),
-        limit: spec.limit,
-        target_lowest_z_w: lowest(sim, &sim.objects[target]),
-        others_lowest_z_w: witness.others_lowest(sim),
-    })
-}
-
-/// Where the goal is, from the shape of what it names.
-fn place_of(goal: &Goal, place: &Handle) -> Place {
-    let bounds = place.bounds;
-    match goal {
-        Goal::On { .. } => Place::On { radius_m: 0.5 * bounds.size().xy().min() },
-        Goal::In { .. } => {
-            let wall = place.asset.hints.get("wall_m").copied().unwrap_or(0.0);
-            let inset = Vec3::new(wall, wall, 0.0);
-            let foot = place.foot_o();
-            Place::In { inside: Region { min: bounds.min + inset - foot, max: bounds.max - inset - foot } }
-        }
-    }
-}
-
-fn weight(sim: &Simulation, object: usize) -> f64 {
-    let mass = match sim.objects[object].kind {
-        Kind::Soft(index) => sim.world.soft[index].body.rest.total_mass(),
-        Kind::Rigid(index) => sim.world.rigid[index].body.mass,
-        Kind::Link { .. } | Kind::Static => 0.0,
-    };
-    mass * sim.scene.gravity.norm()
-}
-
-/// Hash of all positions, bit for bit.
-pub fn state_hash(sim: &Simulation) -> String {
-    let mut hash = Sha256::new();
-    let mut put = |x: f64| hash.update(x.to_bits().to_le_bytes());
-    for soft in &sim.world.soft {
-        soft.body.x.iter().flat_map(|x| x.iter()).for_each(|x| put(*x));
-    }
-    for rigid in &sim.world.rigid {
-        rigid.body.pose_w.to_homogeneous().iter().for_each(|x| put(*x));
-    }
-    for tree in &sim.world.trees {
-        tree.state.q.iter().for_each(|x| put(*x));
-    }
-    hash.finalize().iter().take(8).map(|b| format!("{b:02x}")).collect()
 }

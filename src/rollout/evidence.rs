@@ -12,7 +12,7 @@ use crate::{
 };
 
 /// Who is the target, where it must go, who else could move, and their settled shapes.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Witness {
     target: usize,
     place: usize,

@@ -2,9 +2,12 @@
 
 pub mod batch;
 mod build;
+mod command;
+mod control;
 pub mod episode;
 mod evidence;
 mod furniture;
+mod judging;
 mod looks;
 mod made;
 mod recent;
@@ -14,12 +17,14 @@ pub mod senses;
 mod settle;
 pub mod simulation;
 mod spec;
+mod state_hash;
 pub mod stop;
 mod streams;
 mod trace;
 
 pub use build::{BuildError, check_support, soft_rest};
-pub use episode::{ControlError, Controller, Episode, EpisodeError, Finished, ScoreFrame};
+pub use control::{ControlError, Controller};
+pub use episode::{Episode, EpisodeError, Finished, ScoreFrame};
 pub use looks::Looks;
 pub use rest_cache::RestCache;
 pub use rig::Rig;
@@ -27,5 +32,6 @@ pub use senses::{Film, SenseError, Senses};
 pub use settle::SettleError;
 pub use simulation::{Handle, Kind, PartOf, Simulation};
 pub use spec::{EpisodeSpec, Which, target_asset};
+pub use state_hash::state_hash;
 pub use streams::{CAMERA_PICTURES, FINGER_PICTURES, FINGERS, check_senses};
 pub use trace::{ObjectTrace, StepTrace};

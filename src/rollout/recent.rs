@@ -10,7 +10,7 @@ use crate::{
 };
 
 /// States and, where somebody has looked, what was felt in them; oldest first.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Recent {
     frames: VecDeque<(Frame, Option<Arc<[TouchFrame; 2]>>)>,
     /// Observations with a picture taken from inside of something.

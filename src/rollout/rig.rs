@@ -19,7 +19,7 @@ use crate::{
 };
 
 /// The robot of a simulation.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Rig {
     /// Its numbers.
     pub spec: RobotSpec,

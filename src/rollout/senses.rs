@@ -82,7 +82,7 @@ impl SenseError {
 }
 
 /// An object of the scene as the sensors know it.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Part {
     name: String,
     asset: Arc<Asset>,
@@ -103,9 +103,26 @@ pub struct Senses {
     tree: usize,
     parts: Vec<Part>,
     looks: Looks,
-    stage: Option<Stage>,
+    stage: Option<Arc<Stage>>,
     eye: camera::Scratch,
     touch: tactile::Scratch,
+}
+
+/// A copy draws the same scene with a working memory of its own, which it fills when it first looks.
+impl Clone for Senses {
+    fn clone(&self) -> Self {
+        Self {
+            scene: self.scene.clone(),
+            spec: self.spec.clone(),
+            robot: self.robot.clone(),
+            tree: self.tree,
+            parts: self.parts.clone(),
+            looks: self.looks.clone(),
+            stage: self.stage.clone(),
+            eye: camera::Scratch::default(),
+            touch: tactile::Scratch::default(),
+        }
+    }
 }
 
 /// Taxels along x and y of the force maps: squares of a millimetre.
@@ -171,7 +188,7 @@ impl Senses {
     pub fn see(&mut self, frame: &Frame, camera: &Camera) -> Result<Picture, SenseError> {
         let stage = match self.stage.take() {
             Some(stage) => stage,
-            None => self.build()?,
+            None => Arc::new(self.build()?),
         };
         let picture = render(&stage, &self.view(frame), camera, &mut self.eye);
         self.stage = Some(stage);
@@ -185,7 +202,7 @@ impl Senses {
     pub fn stage(&mut self) -> Result<&Stage, SenseError> {
         let stage = match self.stage.take() {
             Some(stage) => stage,
-            None => self.build()?,
+            None => Arc::new(self.build()?),
         };
         Ok(self.stage.insert(stage))
     }

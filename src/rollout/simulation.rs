@@ -91,7 +91,7 @@ impl Handle {
 }
 
 /// A running scene.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Simulation {
     /// The scene it was built from.
     pub scene: Arc<Scene>,

@@ -16,6 +16,7 @@ mod joints;
 mod killed;
 mod measures;
 mod observe;
+mod serve;
 mod servers;
 mod spread;
 mod support;

@@ -5,7 +5,7 @@ use std::{path::Path, sync::Arc};
 
 use softvt::{
     benchmark::{Plan, seed::Split, settings::Settings},
-    rollout::{RestCache, Simulation, episode::state_hash},
+    rollout::{RestCache, Simulation, state_hash},
     scene::Scene,
     script::{self, Episode, EpisodeRequest, Loaded},
 };

@@ -31,7 +31,7 @@ pub struct StepCoefficients {
 }
 
 /// The factored system of one body.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct System {
     blocks: Blocks,
     plan: Option<Symbolic>,
@@ -51,7 +51,7 @@ pub struct System {
 }
 
 /// The matrix: diagonal blocks and, per node, blocks to its higher neighbours.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Blocks {
     /// Places of the nodes in the voxel lattice.
     places: Vec<[i32; 3]>,

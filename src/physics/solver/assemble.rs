@@ -7,7 +7,7 @@ use crate::geometry::{Mat3, Vec3};
 const MAX_LOCAL: usize = 48;
 
 /// Local Hessian of a patch: the endpoints' own coordinates (3 a node, 6 a screw), dense.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Local {
     size_a: usize,
     size: usize,
@@ -199,7 +199,7 @@ impl Local {
 }
 
 /// How a patch's local coordinates read the island's velocities: each coordinate is a sparse row.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Map {
     /// Per local coordinate: (island index, coefficient).
     rows: Vec<Vec<(u32, f64)>>,

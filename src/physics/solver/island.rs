@@ -56,7 +56,7 @@ fn find(root: &mut [usize], mut at: usize) -> usize {
 }
 
 /// A factored Hessian and what it belongs to.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 struct Entry {
     /// Identity and size of each block.
     key: Vec<(u64, usize)>,
@@ -70,7 +70,7 @@ struct Entry {
 }
 
 /// Factored Hessians by island, the most recently used first.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Cache {
     entries: Vec<Entry>,
     /// Factor of the last velocities' complement.

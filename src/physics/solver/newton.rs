@@ -49,7 +49,7 @@ pub struct Failure {
 }
 
 /// Buffers of the solver.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Solver {
     pub(super) offsets: Vec<usize>,
     pub(super) v: Vec<f64>,

@@ -3,7 +3,7 @@
 use super::{Symbolic, dense};
 
 /// A refillable factor of one [`Symbolic`] plan.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Factor {
     panels: Vec<f64>,
     stack: Vec<f64>,

@@ -3,7 +3,7 @@
 use super::dissection;
 
 /// The plan of a factorisation for one pattern and one kept set.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Symbolic {
     /// Node at each position of the elimination order; the kept nodes are last, in ascending order.
     pub order: Vec<u32>,
@@ -22,7 +22,7 @@ pub struct Symbolic {
 }
 
 /// One dense piece of the elimination.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Front {
     /// First position eliminated here.
     pub first: usize,

@@ -20,7 +20,7 @@ const STOP_RATE: f64 = 0.5;
 const FIRM_RATE: f64 = 50.0;
 
 /// Which block belongs to what.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Layout {
     pub soft: Vec<Option<usize>>,
     pub rigid: Vec<Option<usize>>,

@@ -31,7 +31,7 @@ pub use frame::{ContactPatch, Frame, Movable, PatchPoint, Presser, Touch};
 pub use overlap::Overlap;
 
 /// A soft body in the world.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Soft {
     /// Name, for messages and logs.
     pub name: String,
@@ -58,7 +58,7 @@ pub struct Soft {
 }
 
 /// A free rigid body in the world.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Rigid {
     /// Name, for messages and logs.
     pub name: String,
@@ -98,7 +98,7 @@ struct Bristle {
 }
 
 /// A joint tree in the world.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Articulation {
     /// Name, for messages and logs.
     pub name: String,
@@ -239,7 +239,7 @@ struct RowOf {
 }
 
 /// All bodies of a scene and how they stand.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct World {
     /// Parameters.
     pub params: Params,

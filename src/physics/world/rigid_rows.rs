@@ -50,7 +50,7 @@ pub(super) struct Pair {
 }
 
 /// What rigid contact needs between steps and within one.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct RigidContacts {
     /// By key, ascending.
     grips: Vec<Grip>,

@@ -1,0 +1,62 @@
+//! The judge of an episode: what it must know of the settled scene.
+
+use super::{
+    evidence::{Witness, lowest},
+    simulation::{Handle, Kind, Simulation},
+    spec::EpisodeSpec,
+};
+use crate::{
+    benchmark::{Goal, control::steps_per_control},
+    evaluation::{
+        goal::Place,
+        judge::{Judge, Setup},
+    },
+    geometry::Vec3,
+    scene::Region,
+};
+
+/// The judge of an episode in its settled state.
+pub(super) fn judge(
+    spec: &EpisodeSpec,
+    sim: &Simulation,
+    witness: &Witness,
+    (target, place): (usize, usize),
+    hold_s: f64,
+) -> Judge {
+    Judge::new(Setup {
+        rules: spec.rules.clone(),
+        workspace: spec.scene.workspace,
+        place: place_of(&spec.task.goal, &sim.objects[place]),
+        hold_s,
+        dt_s: spec.params.dt,
+        steps_per_control: steps_per_control(spec.params.dt),
+        target_weight_n: weight(sim, target),
+        soft: matches!(sim.objects[target].kind, Kind::Soft(_)),
+        limit: spec.limit,
+        target_lowest_z_w: lowest(sim, &sim.objects[target]),
+        others_lowest_z_w: witness.others_lowest(sim),
+    })
+}
+
+/// Where the goal is, from the shape of what it names.
+fn place_of(goal: &Goal, place: &Handle) -> Place {
+    let bounds = place.bounds;
+    match goal {
+        Goal::On { .. } => Place::On { radius_m: 0.5 * bounds.size().xy().min() },
+        Goal::In { .. } => {
+            let wall = place.asset.hints.get("wall_m").copied().unwrap_or(0.0);
+            let inset = Vec3::new(wall, wall, 0.0);
+            let foot = place.foot_o();
+            Place::In { inside: Region { min: bounds.min + inset - foot, max: bounds.max - inset - foot } }
+        }
+    }
+}
+
+fn weight(sim: &Simulation, object: usize) -> f64 {
+    let mass = match sim.objects[object].kind {
+        Kind::Soft(index) => sim.world.soft[index].body.rest.total_mass(),
+        Kind::Rigid(index) => sim.world.rigid[index].body.mass,
+        Kind::Link { .. } | Kind::Static => 0.0,
+    };
+    mass * sim.scene.gravity.norm()
+}

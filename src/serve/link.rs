@@ -1,0 +1,166 @@
+//! The server's side of a websocket: waits that end when the run does, and clients that vanish.
+
+use std::{
+    io::{self, ErrorKind},
+    net::TcpStream,
+    sync::atomic::{AtomicBool, Ordering},
+    time::{Duration, Instant},
+};
+
+use rmpv::Value;
+use tungstenite::{
+    Error, HandshakeError, Message, WebSocket, accept_hdr_with_config,
+    handshake::server::{ErrorResponse, Request, Response},
+    protocol::{CloseFrame, WebSocketConfig, frame::coding::CloseCode},
+};
+
+/// The longest message that is taken: a state of a long episode is half a megabyte.
+pub const LARGEST: usize = 8 << 20;
+/// Between two looks at the clock and at the wish to end.
+pub const SLICE: Duration = Duration::from_millis(50);
+/// How long a client may take to say what it wants when it comes.
+pub const GREETING: Duration = Duration::from_secs(10);
+/// How long it may take to take an answer: somebody may have stopped it for a while.
+const PATIENCE: Duration = Duration::from_secs(60);
+/// Silence after which a client is asked whether it is there: to a machine that is gone that fails in the end.
+const QUIET: Duration = Duration::from_secs(60);
+/// Deepest nesting of a message.
+const DEEPEST: usize = 64;
+
+/// What came from a client.
+#[derive(Debug)]
+pub enum Heard {
+    /// A message.
+    Message(Value),
+    /// Something that is none; a message for people.
+    Nonsense(String),
+    /// Something after which nothing can be understood any more; a message for people.
+    Lost(String),
+    /// The end.
+    Closed,
+}
+
+/// A connection to a client.
+#[derive(Debug)]
+pub struct Link<'a> {
+    socket: WebSocket<TcpStream>,
+    stop: &'a AtomicBool,
+}
+
+impl<'a> Link<'a> {
+    /// Shakes hands, unless `full` says why there is no room.
+    ///
+    /// # Errors
+    /// The client speaks no websocket, is too slow, or there is no room for it.
+    pub fn accept(
+        stream: TcpStream,
+        stop: &'a AtomicBool,
+        full: impl FnOnce() -> Option<String>,
+    ) -> Result<Self, Error> {
+        let config = WebSocketConfig::default().max_message_size(Some(LARGEST)).max_frame_size(Some(LARGEST));
+        // The type of the refusal is tungstenite's.
+        #[allow(clippy::result_large_err)]
+        let callback = |_: &Request, response: Response| match full() {
+            None => Ok(response),
+            Some(why) => {
+                let mut refusal = ErrorResponse::new(Some(why));
+                *refusal.status_mut() = tungstenite::http::StatusCode::SERVICE_UNAVAILABLE;
+                Err(refusal)
+            }
+        };
+        let deadline = Instant::now() + GREETING;
+        let mut shake = accept_hdr_with_config(stream, callback, Some(config));
+        loop {
+            match shake {
+                Ok(socket) => return Ok(Self { socket, stop }),
+                Err(HandshakeError::Failure(error)) => return Err(error),
+                Err(HandshakeError::Interrupted(_)) if Instant::now() > deadline || is_set(stop) => {
+                    return Err(Error::ConnectionClosed);
+                }
+                Err(HandshakeError::Interrupted(middle)) => shake = middle.handshake(),
+            }
+        }
+    }
+
+    /// The next message. An end of the run counts as the end of the connection.
+    pub fn hear(&mut self) -> Heard {
+        let mut quiet_since = Instant::now();
+        loop {
+            match self.socket.read() {
+                Ok(Message::Binary(bytes)) => return unpack(&bytes),
+                Ok(Message::Text(_)) => {
+                    return Heard::Nonsense("the message is a text frame; expected msgpack".to_owned());
+                }
+                Ok(Message::Close(_)) => {
+                    let _ = self.socket.flush();
+                    return Heard::Closed;
+                }
+                Ok(_) => quiet_since = Instant::now(),
+                Err(Error::Io(error)) if is_wait(&error) => {
+                    if is_set(self.stop) {
+                        return Heard::Closed;
+                    }
+                    if quiet_since.elapsed() > QUIET {
+                        quiet_since = Instant::now();
+                        let _ = self.socket.send(Message::Ping(Vec::new().into()));
+                    }
+                }
+                Err(Error::Capacity(_)) => {
+                    return Heard::Lost(format!("the message is longer than {} MiB", LARGEST >> 20));
+                }
+                Err(_) => return Heard::Closed,
+            }
+        }
+    }
+
+    /// Sends a message.
+    ///
+    /// # Errors
+    /// The client is gone or does not take it.
+    pub fn say(&mut self, value: &Value) -> Result<(), Error> {
+        let mut bytes = Vec::new();
+        rmpv::encode::write_value(&mut bytes, value).map_err(io::Error::from)?;
+        let deadline = Instant::now() + PATIENCE;
+        let mut sent = self.socket.send(Message::binary(bytes));
+        while let Err(Error::Io(error)) = &sent
+            && is_wait(error)
+            && Instant::now() < deadline
+            && !is_set(self.stop)
+        {
+            sent = self.socket.flush();
+        }
+        sent
+    }
+
+    /// Ends the connection in order, as far as the client lets it.
+    pub fn close(mut self) {
+        let code = if is_set(self.stop) { CloseCode::Away } else { CloseCode::Normal };
+        let _ = self.socket.close(Some(CloseFrame { code, reason: "".into() }));
+        let deadline = Instant::now() + Duration::from_secs(1);
+        // What has not been read yet would make the system throw away what was said last.
+        while Instant::now() < deadline && !is_set(self.stop) {
+            match self.socket.read() {
+                Ok(_) => {}
+                Err(Error::Io(error)) if is_wait(&error) => {}
+                Err(_) => return,
+            }
+        }
+    }
+}
+
+fn unpack(mut bytes: &[u8]) -> Heard {
+    match rmpv::decode::read_value_with_max_depth(&mut bytes, DEEPEST) {
+        Ok(value) if bytes.is_empty() => Heard::Message(value),
+        Ok(_) => Heard::Nonsense(format!("the message has {} bytes behind its msgpack value", bytes.len())),
+        Err(error) => Heard::Nonsense(format!("the message is no msgpack: {error}")),
+    }
+}
+
+fn is_set(stop: &AtomicBool) -> bool {
+    stop.load(Ordering::Relaxed)
+}
+
+/// Whether a wait ended without anything having happened.
+pub fn is_wait(error: &io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted)
+}

@@ -1,0 +1,60 @@
+//! An episode that a client drives.
+
+use super::{offer::Offer, request::Row, state::State};
+use crate::{
+    evaluation::record::Outcome,
+    policy::{Follower, Observation, Streams, decode},
+    rollout::{Episode, EpisodeError},
+};
+
+/// An episode that a client drives. A copy of it goes on as it would itself.
+#[derive(Clone)]
+pub struct Running {
+    /// Where it stands.
+    pub state: State,
+    /// The episode.
+    pub episode: Episode,
+    follower: Follower,
+}
+
+impl Running {
+    /// The settled start of an episode.
+    ///
+    /// # Errors
+    /// It cannot be made; a message for people.
+    pub fn start(offer: &Offer, state: State) -> Result<Self, String> {
+        let mut episode = (offer.open)(&state.wanted)?;
+        episode.watch(offer.profile.streams());
+        Ok(Self { state, episode, follower: Follower::default() })
+    }
+
+    /// What the client sees now.
+    ///
+    /// # Errors
+    /// It cannot be sensed.
+    pub fn observe(&mut self, offer: &Offer) -> Result<Observation, EpisodeError> {
+        self.episode.observe(&offer.profile.streams())
+    }
+
+    /// Carries out one action of finite numbers; nothing once the episode has ended.
+    ///
+    /// # Errors
+    /// The action is none; a message for people.
+    pub fn advance(&mut self, offer: &Offer, row: &Row) -> Result<(), String> {
+        if self.episode.outcome().is_some() {
+            return Ok(());
+        }
+        let command = decode::command(row, &offer.profile.actions).map_err(|e| e.to_string())?;
+        // A step away from where the tool is needs to know where that is, and no picture.
+        let now = self.episode.observe(&Streams::default()).map_err(|e| e.to_string())?;
+        let action = self.follower.action(&now, command);
+        self.episode.step(&action);
+        self.state.actions.push(*row);
+        Ok(())
+    }
+
+    /// Whether the goal was reached.
+    pub fn succeeded(&self) -> bool {
+        self.episode.outcome() == Some(&Outcome::Completed)
+    }
+}

@@ -1,0 +1,54 @@
+//! Where an episode stands, as something that can be kept, copied and sent: which episode it is and all that was done in it.
+
+use rmpv::Value;
+
+use super::{
+    offer::{Offer, Wanted},
+    request::Row,
+};
+use crate::policy::{profile::ACTION_LEN, wire::Array};
+
+/// Where an episode stands.
+#[derive(Clone, Debug, PartialEq)]
+pub struct State {
+    /// Which episode.
+    pub wanted: Wanted,
+    /// What was done in it, in the code of the profile.
+    pub actions: Vec<Row>,
+}
+
+impl State {
+    /// Whether one state lies on the way to another: how many actions are then left to do.
+    pub fn left_to(&self, other: &Self) -> Option<usize> {
+        let same = |(a, b): (&Row, &Row)| a.map(f64::to_bits) == b.map(f64::to_bits);
+        let on_the_way = self.wanted == other.wanted
+            && self.actions.len() <= other.actions.len()
+            && self.actions.iter().zip(&other.actions).all(same);
+        on_the_way.then(|| other.actions.len() - self.actions.len())
+    }
+
+    /// As msgpack.
+    pub fn to_value(&self, offer: &Offer) -> Value {
+        let Wanted { suite, task, episode, seed, split } = &self.wanted;
+        let data = self.actions.iter().flatten().flat_map(|number| number.to_le_bytes()).collect();
+        let actions = Array { dtype: "<f8", shape: vec![self.actions.len(), ACTION_LEN], data };
+        let pair = |name: &str, value: Value| (Value::from(name), value);
+        Value::Map(vec![
+            pair("suite", suite.as_str().into()),
+            pair("task", (*task).into()),
+            pair("episode", (*episode).into()),
+            pair("seed", (*seed).into()),
+            pair("split", split.name().into()),
+            pair("actions", actions.into_value(true)),
+            pair("code", offer.code().into()),
+            pair("made_by", offer.made_by.as_str().into()),
+        ])
+    }
+}
+
+impl Offer<'_> {
+    /// What an action means, as text that tells it from others.
+    pub fn code(&self) -> String {
+        serde_json::to_string(&self.profile.actions).unwrap_or_default()
+    }
+}

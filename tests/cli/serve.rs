@@ -1,0 +1,401 @@
+//! `softvt serve` and clients of every temper: whatever one of them does, it is told, and the others are served.
+
+use std::{
+    io::{BufRead, BufReader, Read, Write},
+    net::{Shutdown, TcpListener, TcpStream},
+    process::{Child, Command, Stdio},
+    time::Duration,
+};
+
+use assert_cmd::cargo::cargo_bin;
+use rmpv::Value;
+use tungstenite::{Error, Message, WebSocket};
+
+use crate::support::{Project, Small};
+
+/// A server that ends with the test.
+struct Server {
+    child: Child,
+    address: String,
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+impl Server {
+    fn start(project: &Project, words: &str) -> Self {
+        let mut child = Command::new(cargo_bin!("softvt"))
+            .current_dir(project.path(""))
+            .args(["serve", "x.lua", "--port", "0"])
+            .args(words.split_whitespace())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("started");
+        let mut line = String::new();
+        BufReader::new(child.stdout.take().expect("an output")).read_line(&mut line).expect("a line");
+        let address = line.trim().strip_prefix("ws://").unwrap_or_else(|| panic!("no address: {line:?}"));
+        Self { address: address.to_owned(), child }
+    }
+
+    fn stream(&self) -> TcpStream {
+        let stream = TcpStream::connect(&self.address).expect("connected");
+        stream.set_read_timeout(Some(Duration::from_secs(60))).expect("set");
+        stream
+    }
+
+    /// A client that has been greeted, and the greeting.
+    fn client(&self) -> (Client, Value) {
+        let (socket, _) =
+            tungstenite::client(format!("ws://{}", self.address), self.stream()).expect("shaken hands");
+        let mut client = Client(socket);
+        let hello = client.hear();
+        assert_eq!(text(&hello, "type"), "hello");
+        (client, hello)
+    }
+
+    fn healthy(&self) -> bool {
+        let mut stream = self.stream();
+        stream.write_all(b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n").expect("asked");
+        let mut said = String::new();
+        stream.read_to_string(&mut said).expect("answered");
+        said.starts_with("HTTP/1.1 200 OK\r\n") && said.ends_with("\r\n\r\nOK\n")
+    }
+}
+
+struct Client(WebSocket<TcpStream>);
+
+impl Client {
+    fn hear(&mut self) -> Value {
+        match self.0.read().expect("an answer") {
+            Message::Binary(bytes) => rmpv::decode::read_value(&mut &bytes[..]).expect("msgpack"),
+            other => panic!("not a message: {other:?}"),
+        }
+    }
+
+    fn send(&mut self, value: &Value) {
+        let mut bytes = Vec::new();
+        rmpv::encode::write_value(&mut bytes, value).expect("packed");
+        self.0.send(Message::binary(bytes)).expect("sent");
+    }
+
+    fn ask(&mut self, value: &Value) -> Value {
+        self.send(value);
+        self.hear()
+    }
+
+    /// What is said instead of an answer.
+    fn refused(&mut self, value: &Value) -> String {
+        let answer = self.ask(value);
+        assert_eq!(text(&answer, "type"), "error", "{value} is answered");
+        text(&answer, "error").to_owned()
+    }
+
+    fn reset(&mut self) -> Value {
+        let answer = self.ask(&reset(0));
+        assert_eq!(text(&answer, "type"), "reset", "{answer}");
+        answer
+    }
+}
+
+fn map(entries: &[(&str, Value)]) -> Value {
+    Value::Map(entries.iter().map(|(key, value)| (Value::from(*key), value.clone())).collect())
+}
+
+fn of(kind: &str) -> Value {
+    map(&[("type", kind.into())])
+}
+
+fn reset(episode: u64) -> Value {
+    map(&[("type", "reset".into()), ("task", 0.into()), ("episode", episode.into())])
+}
+
+/// An array as Python's clients pack it.
+fn array(shape: &[usize], numbers: &[f64]) -> Value {
+    let key = |name: &str| Value::Binary(name.as_bytes().to_vec());
+    Value::Map(vec![
+        (key("__ndarray__"), true.into()),
+        (key("data"), Value::Binary(numbers.iter().flat_map(|x| x.to_le_bytes()).collect())),
+        (key("dtype"), "<f8".into()),
+        (key("shape"), Value::Array(shape.iter().map(|n| Value::from(*n)).collect())),
+    ])
+}
+
+const ACTION: [f64; 7] = [0.45, 0.05, 0.3, 3.1, 0.0, 0.0, 0.3];
+
+fn step(times: usize) -> Value {
+    map(&[("type", "step".into()), ("actions", array(&[times, 7], &ACTION.repeat(times)))])
+}
+
+fn get<'a>(value: &'a Value, name: &str) -> &'a Value {
+    let entries = value.as_map().unwrap_or_else(|| panic!("no map: {value}"));
+    let found = entries.iter().find(|(key, _)| key.as_str() == Some(name));
+    &found.unwrap_or_else(|| panic!("no {name} in {value}")).1
+}
+
+fn text<'a>(value: &'a Value, name: &str) -> &'a str {
+    get(value, name).as_str().expect("text")
+}
+
+fn keys(value: &Value) -> Vec<&str> {
+    value.as_map().expect("a map").iter().filter_map(|(key, _)| key.as_str()).collect()
+}
+
+fn project() -> Project {
+    Small { task: "budget_steps = 12", ..Small::default() }.project()
+}
+
+#[test]
+fn an_episode_is_driven_from_its_start_to_its_end() {
+    let project = project();
+    let server = Server::start(&project, "--profile vision");
+    let (mut client, hello) = server.client();
+    let task = &get(&get(&hello, "suites").as_array().expect("a list")[0], "tasks")[0];
+    assert_eq!((text(task, "prompt"), get(task, "budget_steps").as_u64()), ("wait", Some(12)));
+    assert_eq!(keys(get(&hello, "observation_space")), ["image", "wrist_image", "state", "prompt"]);
+    assert_eq!(get(&hello, "privileged").as_bool(), Some(false));
+    let start = client.reset();
+    assert_eq!(keys(get(&start, "observation")), ["image", "wrist_image", "state", "prompt"]);
+    let mut info = keys(get(&start, "info"));
+    info.sort_unstable();
+    assert_eq!(info, ["episode", "step", "success", "task", "time_s"]);
+    let middle = client.ask(&step(11));
+    assert_eq!(get(&middle, "truncated").as_bool(), Some(false));
+    assert_eq!(get(get(&middle, "info"), "carried_out").as_u64(), Some(11));
+    let end = client.ask(&step(5));
+    assert_eq!(get(get(&end, "info"), "carried_out").as_u64(), Some(1), "the budget ends it");
+    assert_eq!((get(&end, "truncated").as_bool(), get(&end, "terminated").as_bool()), (Some(true), Some(false)));
+    assert_eq!(get(&end, "reward").as_f64(), Some(0.0));
+    let record = get(get(&end, "info"), "record");
+    assert_eq!(keys(record), ["goal", "outcome", "steps"], "nothing hidden is told");
+    assert!(client.refused(&step(1)).contains("the episode is over"));
+    assert_eq!(client.reset(), start, "the same start again");
+    assert_eq!(text(&client.ask(&of("close")), "type"), "close");
+    assert!(client.0.read().is_ok_and(|m| m.is_close()));
+}
+
+#[test]
+fn privileged_clients_are_told_the_true_state() {
+    let project = project();
+    let server = Server::start(&project, "--profile vision --privileged --seed 3 --split demonstration");
+    let (mut client, hello) = server.client();
+    assert_eq!((get(&hello, "seed").as_u64(), text(&hello, "split")), (Some(3), "demonstration"));
+    client.reset();
+    let info = get(&client.ask(&step(12)), "info").clone();
+    let objects = get(get(&info, "state"), "objects").as_array().expect("a list").clone();
+    assert_eq!(text(&objects[0], "name"), "cube");
+    assert!(get(get(&info, "state"), "pad_force_n").is_array());
+    assert!(get(get(&info, "verdict"), "d_peak").is_f64());
+    let record = get(&info, "record");
+    assert_eq!((text(record, "split"), text(get(record, "outcome"), "kind")), ("demonstration", "timeout"));
+    assert_eq!(get(record, "seed").as_u64(), Some(3));
+}
+
+#[test]
+fn bad_requests_are_told_once_and_the_connection_goes_on() {
+    let project = project();
+    let server = Server::start(&project, "--profile vision");
+    let (mut client, _) = server.client();
+    for kind in ["get_state", "render"] {
+        assert!(client.refused(&of(kind)).contains("reset first"), "{kind}");
+    }
+    assert!(client.refused(&step(1)).contains("reset first"));
+    let start = client.reset();
+    let stepping = |value: Value| map(&[("type", "step".into()), ("action", value)]);
+    let resetting = |name: &str, value: Value| {
+        let all = [("type", "reset".into()), ("task", 0.into()), ("episode", 0.into())];
+        let mut all: Vec<(&str, Value)> = all.into_iter().filter(|(key, _)| *key != name).collect();
+        all.push((name, value));
+        map(&all)
+    };
+    let mut nan = ACTION;
+    nan[2] = f64::NAN;
+    let long = "x".repeat(100_000);
+    for (request, words) in [
+        (Value::from(7), "is a number; expected a map"),
+        (map(&[]), "has no type"),
+        (map(&[("type", 5.into())]), "the type is a number"),
+        (of("fly"), "type \"fly\": there is none"),
+        (of(&long), "there is none"),
+        (stepping(array(&[6], &ACTION[..6])), "shape [6]"),
+        (stepping(array(&[2, 3, 7], &ACTION.repeat(6))), "shape [2, 3, 7]"),
+        (stepping(array(&[0, 7], &[])), "empty"),
+        (stepping(array(&[1001, 7], &ACTION.repeat(1001))), "up to 1000"),
+        (stepping(array(&[7], &nan)), "not finite"),
+        (stepping(array(&[7], &[f64::INFINITY; 7])), "not finite"),
+        (stepping(array(&[9], &ACTION)), "with 56 bytes"),
+        (stepping("left".into()), "are text"),
+        (of("step"), "neither action nor actions"),
+        (resetting("task", 5.into()), "has the tasks 0 to 0"),
+        (resetting("task", "x".into()), "task is \"x\"; expected a whole number"),
+        (resetting("task", Value::Nil), "no field task"),
+        (resetting("episode", (-1).into()), "episode is -1"),
+        (resetting("episode", 1.5.into()), "episode is 1.5"),
+        (resetting("suite", "two".into()), "suite \"two\": there is none; served are one"),
+        (resetting("split", "test".into()), "expected validation, demonstration, experiment"),
+        (resetting("epsiode", 1.into()), "no field \"epsiode\""),
+        (map(&[("type", "render".into()), ("camera", "nose".into())]), "there is no camera \"nose\""),
+        (map(&[("type", "render".into()), ("width", 60_000.into())]), "width"),
+        (map(&[("type", "render".into()), ("camera", "left".into()), ("width", 5.into())]), "one size"),
+        (map(&[("type", "set_state".into()), ("state", Value::Nil)]), "no field state"),
+        (map(&[("type", "set_state".into()), ("state", map(&[("task", 0.into())]))]), "no field actions"),
+    ] {
+        let said = client.refused(&request);
+        assert!(said.contains(words) && said.len() < 500, "{words}: {said}");
+    }
+    let after = client.ask(&step(1));
+    assert_eq!(get(get(&after, "info"), "step").as_u64(), Some(1), "nothing was carried out before");
+    assert_eq!(client.reset(), start);
+}
+
+#[test]
+fn bytes_that_are_no_message_are_told() {
+    let project = project();
+    let server = Server::start(&project, "--profile vision");
+    let (mut client, _) = server.client();
+    let mut behind = Vec::new();
+    rmpv::encode::write_value(&mut behind, &of("get_state")).expect("packed");
+    behind.push(0);
+    for (message, words) in [
+        (Message::text("{\"type\": \"reset\"}"), "text frame"),
+        (Message::binary(vec![0xC1; 40]), "no msgpack"),
+        (Message::binary(vec![0xDD, 0xFF, 0xFF, 0xFF, 0xFF]), "no msgpack"),
+        (Message::binary(vec![0x91; 5000]), "no msgpack"),
+        (Message::binary(Vec::new()), "no msgpack"),
+        (Message::binary(behind), "1 bytes behind"),
+    ] {
+        client.0.send(message).expect("sent");
+        let answer = client.hear();
+        assert!(text(&answer, "error").contains(words), "{words}: {answer}");
+    }
+    client.reset();
+    // Ten megabytes: told before they are read, then the connection ends.
+    let _ = client.0.send(Message::binary(vec![0; 10 << 20]));
+    let last = client.0.read();
+    match &last {
+        Ok(Message::Binary(bytes)) => {
+            let answer = rmpv::decode::read_value(&mut &bytes[..]).expect("msgpack");
+            assert!(text(&answer, "error").contains("longer than 8 MiB"), "{answer}");
+        }
+        Ok(other) => panic!("{other:?}"),
+        Err(error) => assert!(matches!(error, Error::Io(_) | Error::Protocol(_)), "{error}"),
+    }
+    server.client().0.reset();
+}
+
+#[test]
+fn clients_that_vanish_or_never_speak_hold_nobody_up() {
+    let project = project();
+    let server = Server::start(&project, "--profile vision --threads 2");
+    let mut silent: Vec<TcpStream> = (0..3).map(|_| server.stream()).collect();
+    silent[1].write_all(b"GET / HTTP/1.1\r\nUpgrade: webs").expect("half a greeting");
+    silent[2].write_all(&[0x16, 0x03, 0x01, 0x00, 0xFF]).expect("another protocol's");
+    assert!(server.healthy(), "while others are silent");
+    for _ in 0..4 {
+        let (mut client, _) = server.client();
+        client.send(&reset(1));
+        client.0.get_ref().shutdown(Shutdown::Both).expect("gone");
+        // Seats of the dead come free when their last request has been carried out.
+        std::thread::sleep(Duration::from_millis(1500));
+    }
+    let (mut first, _) = server.client();
+    first.reset();
+    let (second, _) = server.client();
+    assert!(server.healthy(), "with all seats taken");
+    let full = tungstenite::client(format!("ws://{}", server.address), server.stream());
+    match full {
+        Err(tungstenite::HandshakeError::Failure(Error::Http(response))) => {
+            assert_eq!(response.status().as_u16(), 503);
+        }
+        other => panic!("{other:?}"),
+    }
+    drop(second);
+    std::thread::sleep(Duration::from_millis(500));
+    server.client().0.reset();
+    assert_eq!(get(get(&first.ask(&step(2)), "info"), "step").as_u64(), Some(2), "the first did not notice");
+}
+
+#[test]
+fn a_state_is_restored_to_the_byte_by_a_copy_and_by_simulating_again() {
+    let project = project();
+    let server = Server::start(&project, "--profile visuo_tactile --privileged");
+    let (mut client, _) = server.client();
+    client.reset();
+    client.ask(&step(3));
+    let state = get(&client.ask(&of("get_state")), "state").clone();
+    assert_eq!(get(&state, "episode").as_u64(), Some(0));
+    let straight = client.ask(&step(4));
+    let back = map(&[("type", "set_state".into()), ("state", state)]);
+    let copied = client.ask(&back);
+    assert_eq!(get(get(&copied, "info"), "step").as_u64(), Some(3));
+    assert_eq!(client.ask(&step(4)), straight, "by a copy");
+    let (mut other, _) = server.client();
+    assert_eq!(other.ask(&back), copied, "by simulating again");
+    assert_eq!(other.ask(&step(4)), straight, "what follows");
+    let changed = Server::start(&project, "--profile visuo_tactile --set robot.gripper.effort=20");
+    let said = changed.client().0.refused(&back);
+    assert!(said.contains("settings or version differ"), "{said}");
+    let changed = Server::start(&project, "--profile libero");
+    let said = changed.client().0.refused(&back);
+    assert!(said.contains("another profile or gripper"), "{said}");
+}
+
+#[test]
+fn pictures_are_drawn_in_the_size_that_is_asked_for() {
+    let project = project();
+    let server = Server::start(&project, "--profile vision");
+    let (mut client, _) = server.client();
+    client.reset();
+    let mut shape = |entries: &[(&str, Value)]| {
+        let all: Vec<_> = [("type", Value::from("render"))].into_iter().chain(entries.to_vec()).collect();
+        let answer = client.ask(&map(&all));
+        let image = get(&answer, "image").as_map().expect("an array").to_vec();
+        let found = image.iter().find(|(key, _)| key.as_slice() == Some(b"shape")).expect("a shape");
+        found.1.as_array().expect("a list").iter().filter_map(Value::as_u64).collect::<Vec<_>>()
+    };
+    assert_eq!(shape(&[]), [224, 224, 3]);
+    assert_eq!(shape(&[("camera", "wrist".into()), ("width", 64.into()), ("height", 48.into())]), [48, 64, 3]);
+    assert_eq!(shape(&[("camera", "right".into())]), [240, 320, 3]);
+}
+
+#[test]
+fn what_cannot_be_served_is_refused() {
+    let project = project();
+    project.write("e.lua", b"return softvt.experiment { name = \"e\", points = function() return {} end, run = function() end }");
+    let taken = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let port = taken.local_addr().expect("an address").port();
+    for (words, told) in [
+        (format!("serve x.lua --port {port}"), "somebody listens at 127.0.0.1 there already"),
+        ("serve e.lua".to_owned(), "serves suites, and this is none"),
+        ("serve x.lua --policy noop".to_owned(), "--policy: with softvt serve the client drives"),
+        ("serve x.lua --port 70000".to_owned(), "70000"),
+        ("serve x.lua --host 192.0.2.7 --port 0".to_owned(), "cannot listen there"),
+        ("serve x.lua --split test".to_owned(), "expected validation"),
+        ("serve x.lua --shift warp=1 --port 0".to_owned(), "unknown shift \"warp\""),
+        ("serve x.lua --profile pi".to_owned(), "visuo_tactile"),
+    ] {
+        let message = project.refusal(&words);
+        assert!(message.contains(told), "{words}: {message}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_ends_the_server_in_order() {
+    let project = project();
+    let mut server = Server::start(&project, "--profile vision");
+    let (mut client, _) = server.client();
+    client.reset();
+    let id = server.child.id().to_string();
+    assert!(Command::new("kill").args(["-INT", &id]).status().expect("kill runs").success());
+    assert!(client.0.read().is_ok_and(|m| m.is_close()), "clients are told");
+    let code = server.child.wait().expect("ended").code();
+    let mut err = String::new();
+    server.child.stderr.take().expect("messages").read_to_string(&mut err).expect("text");
+    assert_eq!(code, Some(130), "{err}");
+    assert!(!err.contains("panicked") && !err.contains("did not end"), "{err}");
+}

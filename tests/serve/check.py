@@ -1,0 +1,113 @@
+"""What must hold of scripts/python/softvt_gym.py and the server behind it. Arguments: the binary, the folder of an expert's run."""
+
+import json
+import sys
+import warnings
+
+import gymnasium
+import numpy as np
+from gymnasium.utils.env_checker import check_env
+from softvt_gym import SoftVTEnv
+
+BINARY, RUN = sys.argv[1:]
+SUITE = "suites/object_soft.lua"
+# Poses in metres and radians are what policies of this field answer; scaled ones would be another code.
+KNOWN = "we recommend using a symmetric and normalized space"
+
+
+def same(a, b):
+    """Whether two observations are the same to the bit."""
+    assert a.keys() == b.keys()
+    return all(np.array_equal(a[key], b[key]) for key in a)
+
+
+def gymnasiums_own_checker_finds_nothing(env):
+    spec = gymnasium.make("softvt/Suite-v0", url=env.url, render_mode="rgb_array")
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        check_env(spec.unwrapped)
+    told = [str(one.message) for one in caught if KNOWN not in str(one.message)]
+    assert not told, told
+
+
+def the_same_seed_and_actions_give_the_same_observations(env):
+    actions = np.load(f"{RUN}/actions/task_000/episode_00000.npy")[:5]
+
+    def drive():
+        first, _ = env.reset(seed=3, options={"task": 2})
+        return [first] + [env.step(action)[0] for action in actions]
+
+    once, again = drive(), drive()
+    assert all(same(a, b) for a, b in zip(once, again, strict=True))
+    assert not same(once[0], env.reset(seed=4, options={"task": 2})[0]), "a seed changes nothing"
+    assert not same(once[0], once[-1]), "actions change nothing"
+
+
+def a_state_is_restored_to_the_bit_by_a_copy_and_by_simulating_again(env):
+    actions = np.load(f"{RUN}/actions/task_000/episode_00000.npy")
+    env.reset(seed=0, options={"task": 0, "episode": 0})
+    env.step(actions[:8])
+    state = env.get_state()
+    assert np.array_equal(state["actions"], actions[:8])
+    straight, _, _, _, told = env.step(actions[8:12])
+    copied, _ = env.set_state(state)
+    assert same(env.step(actions[8:12])[0], straight), "by a copy"
+    other = SoftVTEnv(env.url)
+    again, _ = other.set_state(state)
+    assert same(again, copied), "by simulating again"
+    seen, _, _, _, info = other.step(actions[8:12])
+    other.close()
+    assert same(seen, straight) and info == told, "what follows"
+
+
+def an_experts_actions_reach_the_goal_with_the_record_of_its_run(env):
+    actions = np.load(f"{RUN}/actions/task_000/episode_00000.npy")
+    with open(f"{RUN}/episodes.jsonl", encoding="utf-8") as lines:
+        expected = json.loads(lines.readline())
+    env.reset(seed=0, options={"task": 0, "episode": 0})
+    rewards = []
+    for action in actions:
+        assert action in env.action_space
+        observation, reward, terminated, truncated, info = env.step(action)
+        assert observation in env.observation_space
+        rewards.append(reward)
+    assert rewards == [0.0] * (len(actions) - 1) + [1.0], "the reward comes with the goal"
+    assert terminated and not truncated and info["success"]
+    for key in ("policy", "camera_inside", "gave_up"):
+        expected.pop(key, None)
+        info["record"].pop(key, None)
+    assert info["record"] == expected, (info["record"], expected)
+    assert info["verdict"]["goal"] and info["state"]["objects"]
+    print(f"    state {expected['state_hash']} after {len(actions)} steps, D_peak {expected['d_peak']:.2f} %")
+
+
+def nothing_hidden_is_told_without_the_right_to_it(env):
+    _, info = env.reset(seed=0)
+    told = set(info)
+    _, _, _, _, info = env.step(env.action_space.sample())
+    told |= set(info)
+    assert told == {"task", "episode", "step", "time_s", "success", "carried_out"}, told
+
+
+def main():
+    env = SoftVTEnv.launch(SUITE, "--privileged", softvt=BINARY)
+    try:
+        for check in (
+            gymnasiums_own_checker_finds_nothing,
+            the_same_seed_and_actions_give_the_same_observations,
+            a_state_is_restored_to_the_bit_by_a_copy_and_by_simulating_again,
+            an_experts_actions_reach_the_goal_with_the_record_of_its_run,
+        ):
+            print(check.__name__.replace("_", " "), flush=True)
+            check(env)
+    finally:
+        env.close()
+    env = SoftVTEnv.launch(SUITE, "--profile", "libero", softvt=BINARY)
+    try:
+        print("nothing hidden is told without the right to it", flush=True)
+        nothing_hidden_is_told_without_the_right_to_it(env)
+    finally:
+        env.close()
+
+
+main()
