@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::{Action, ActionChunk, Command, Observation, Policy, PolicyError, Streams, TaskBrief, osc::Osc};
+use super::{Action, ActionChunk, Command, Observation, Policy, PolicyError, Streams, TaskBrief, osc, osc::Osc};
 
 /// A policy whose chunks are carried out.
 pub struct Chunked<'a> {
@@ -49,7 +49,11 @@ impl<'a> Chunked<'a> {
                 self.osc = Osc::default();
                 Ok(action)
             }
-            Some(Command::Step { translation_b, rotation_b, closure }) => {
+            Some(Command::Step { whole: true, translation_b, rotation_b, closure }) => {
+                self.osc = Osc::default();
+                Ok(osc::whole(observation, translation_b, rotation_b, closure))
+            }
+            Some(Command::Step { whole: false, translation_b, rotation_b, closure }) => {
                 Ok(self.osc.step(observation, translation_b, rotation_b, closure))
             }
             None => Err(PolicyError::Reply("the policy's reply has no action at all".to_owned())),
