@@ -27,13 +27,15 @@ pub enum Stream {
     Sensor,
     /// Choices of the expert.
     Expert,
-    /// `math.random` outside of an expert.
+    /// `math.random` outside of an expert and a policy.
     Script,
+    /// Choices of a policy in Lua.
+    Policy,
 }
 
 impl Stream {
     /// Every stream, in order.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Layout,
         Self::Arm,
         Self::Material,
@@ -42,6 +44,7 @@ impl Stream {
         Self::Sensor,
         Self::Expert,
         Self::Script,
+        Self::Policy,
     ];
 
     /// The name that scripts use.
@@ -55,6 +58,7 @@ impl Stream {
             Self::Sensor => "sensor",
             Self::Expert => "expert",
             Self::Script => "script",
+            Self::Policy => "policy",
         }
     }
 }

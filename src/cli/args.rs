@@ -4,10 +4,17 @@ use std::path::{Path, PathBuf};
 
 use clap::{ArgMatches, error::ErrorKind, parser::ValueSource};
 
-use super::{Failure, code, drivers::Choice, flags, replay, require::Requirement, shard::Shard};
+use super::{
+    Failure, code,
+    drivers::Choice,
+    flags, replay,
+    require::Requirement,
+    shard::Shard,
+    who::{self, Typed, Word},
+};
 use crate::{
     benchmark::{Suite, seed::Split},
-    policy::remote::Protocol,
+    policy::{profile::Profile, remote::Protocol},
     script::{self, OptionSpec},
 };
 
@@ -167,8 +174,10 @@ pub struct View {
 /// What to serve, where and to how many.
 #[derive(Debug)]
 pub struct Serve {
-    /// Suite, profile, seed, shifts and settings as for a run.
+    /// Suite, seed, shifts and settings as for a run.
     pub run: Run,
+    /// What clients are shown and what their numbers mean.
+    pub profile: Profile,
     /// Address to listen at.
     pub host: String,
     /// Port to listen at; 0 is any that is free.
@@ -225,11 +234,14 @@ pub fn parse(words: &[String]) -> Result<Command, Failure> {
             let runs = many(m, "runs").into_iter().map(PathBuf::from).collect();
             Ok(Command::Report { runs, out: PathBuf::from(text(m, "out")) })
         }
-        Some(("check", m)) => common(m, &options).map(Command::Check).map_err(named),
-        Some(("serve", m)) => serve(m, &options).map(Command::Serve).map_err(named),
+        Some(("check", m)) => driven(common(m, &options).map_err(named)?, m).map(Command::Check),
+        Some(("serve", m)) => serve(common(m, &options).map_err(named)?, m).map(Command::Serve),
         Some(("doctor", _)) => Ok(Command::Doctor),
-        Some(("view", m)) => view(m, &options).map(Command::View).map_err(named),
-        _ => run(&matches, &options).map(Command::Run).map_err(named),
+        Some(("view", m)) => {
+            let view = view(m, &options).map_err(named)?;
+            Ok(Command::View(View { run: driven(view.run, m)?, ..view }))
+        }
+        _ => driven(run(&matches, &options).map_err(named)?, &matches).map(Command::Run),
     }
 }
 
@@ -249,11 +261,12 @@ fn usage(file: Option<&str>, text: &str) -> Failure {
     Failure { code: code::INPUT, message: message.trim_end().to_owned() }
 }
 
-/// The script among the words: the first that ends in `.lua`, unless it is the value of `--policy`.
+/// The script among the words: the first that ends in `.lua`, unless it is the value of a flag that takes such a file.
 fn script_file(words: &[String]) -> Option<&str> {
     let mut previous = "";
     for word in words.iter().skip(1) {
-        if word.ends_with(".lua") && !word.starts_with('-') && previous != "--policy" {
+        if word.ends_with(".lua") && !word.starts_with('-') && !["--policy", "--profile"].contains(&previous)
+        {
             return Some(word);
         }
         previous = word;
@@ -272,13 +285,14 @@ fn view(matches: &ArgMatches, options: &[OptionSpec]) -> Result<View, Failure> {
     Ok(View { run: Run { tasks, ..run }, episode, native: matches.get_flag("native") })
 }
 
-fn serve(matches: &ArgMatches, options: &[OptionSpec]) -> Result<Serve, Failure> {
-    let typed = |name: &&&str| matches.value_source(name) == Some(ValueSource::CommandLine);
-    if let Some(flag) = flags::DRIVERS.iter().find(typed) {
+fn serve(run: Run, matches: &ArgMatches) -> Result<Serve, Failure> {
+    let given = |name: &&&str| matches.value_source(name) == Some(ValueSource::CommandLine);
+    if let Some(flag) = flags::DRIVERS.iter().find(given) {
         return Err(Failure::input(format!("--{flag}: with softvt serve the client drives; leave it out")));
     }
     Ok(Serve {
-        run: common(matches, options)?,
+        run,
+        profile: typed(matches).profile()?.0,
         host: text(matches, "host"),
         port: matches.get_one("port").copied().unwrap_or_default(),
         seats: matches.get_one::<u16>("threads").map_or(1, |n| usize::from(*n)),
@@ -307,22 +321,29 @@ fn common(matches: &ArgMatches, options: &[OptionSpec]) -> Result<Run, Failure> 
         twin: matches.contains_id("twin"),
         set: many(matches, "set").iter().map(|word| pair("--set", word)).collect::<Result<_, _>>()?,
         out: out.map(PathBuf::from),
-        ..Run::of(PathBuf::from(text(matches, "file")), choice(matches))
+        ..Run::of(PathBuf::from(text(matches, "file")), Choice::expert())
     })
 }
 
-fn choice(matches: &ArgMatches) -> Choice {
-    Choice {
-        word: text(matches, "policy"),
+/// The same with the policy that was typed. What is wrong with its files names those files itself.
+fn driven(run: Run, matches: &ArgMatches) -> Result<Run, Failure> {
+    Ok(Run { policy: who::choose(typed(matches))?, ..run })
+}
+
+fn typed(matches: &ArgMatches) -> Typed {
+    let given = |name: &str| matches.value_source(name) == Some(ValueSource::CommandLine);
+    let protocol = || match text(matches, "protocol").as_str() {
+        "vla-eval" => Protocol::VlaEval,
+        _ => Protocol::Openpi,
+    };
+    Typed {
+        word: matches.get_one("policy").cloned().unwrap_or(Word::Noop),
         name: matches.get_one("name").cloned(),
-        profile: text(matches, "profile"),
-        protocol: match text(matches, "protocol").as_str() {
-            "vla-eval" => Protocol::VlaEval,
-            _ => Protocol::Openpi,
-        },
-        replan: matches.get_one::<u16>("replan").map_or(10, |n| usize::from(*n)),
+        profile: given("profile").then(|| text(matches, "profile")),
+        protocol: given("protocol").then(protocol),
+        replan: matches.get_one::<u16>("replan").filter(|_| given("replan")).map(|n| usize::from(*n)),
         binary: matches.get_one::<String>("gripper").map(|code| code == "binary"),
-        patience: matches.get_one("policy-timeout").copied().unwrap_or_default(),
+        patience: matches.get_one("policy-timeout").filter(|_| given("policy-timeout")).copied(),
     }
 }
 

@@ -14,6 +14,7 @@ use super::{
     files::{self, Calibrated, make_folder},
     info::{self, RunInfo},
     progress::Progress,
+    recorded::{Replayed, Wanted},
 };
 use crate::{
     benchmark::{Goal, ObjectType, Suite, Task, seed::Split, settings::Settings},
@@ -57,6 +58,8 @@ pub(super) struct Batch<'a> {
     released: Thresholds,
     /// SHA-256 of every file that the results depend on.
     pub sources: BTreeMap<String, String>,
+    /// Whose actions are carried out once more.
+    replayed: Option<Replayed>,
     cache: RestCache,
     looks: Looks,
     pub out: PathBuf,
@@ -83,7 +86,10 @@ impl<'a> Batch<'a> {
         for (name, value) in &run.shifts {
             script::check_shift(&suite.shifts, name, *value).map_err(|e| wrong("--shift", e.to_string()))?;
         }
-        let drivers = Drivers::new(&run.policy)?;
+        let replayed = recorded(run, suite, &jobs)?;
+        let drivers = Drivers::new(&run.policy, &suite.name, run.twin)?;
+        let mut sources = loaded.bundle.hashes();
+        sources.extend(run.policy.sources());
         let made_by = format!("softvt {}", env!("CARGO_PKG_VERSION"));
         Ok(Self {
             run,
@@ -94,7 +100,8 @@ impl<'a> Batch<'a> {
             jobs,
             limits: BTreeMap::new(),
             released: Thresholds::new(0.5, Vec::new(), made_by),
-            sources: loaded.bundle.hashes(),
+            sources,
+            replayed,
             cache: RestCache::default(),
             looks: Looks::default(),
             out,
@@ -294,8 +301,10 @@ impl<'a> Batch<'a> {
             suite: &self.suite.name,
             twin: self.run.twin.then_some("rigid"),
             policy: self.run.policy.name(),
-            profile: self.run.policy.profile()?,
-            replan: self.run.policy.is_remote().then_some(self.run.policy.replan),
+            profile: self.run.policy.profile(),
+            policy_file: self.run.policy.file(),
+            replayed: self.replayed.as_ref(),
+            replan: self.run.policy.replan(),
             privileged: self.run.policy.is_privileged(),
             seed: self.run.seed,
             split: Split::Validation.name(),
@@ -541,6 +550,18 @@ impl<'a> Batch<'a> {
         }
         replace(&dir.join(format!("episode_{:05}.jsonl", id.episode)), &text).map_err(folder_failure)
     }
+}
+
+/// Whose actions are carried out once more, if any are: they must be those of this very suite, and all there.
+///
+/// # Errors
+/// What differs or is missing.
+pub(super) fn recorded(run: &Run, suite: &Suite, jobs: &[(&Task, u32)]) -> Result<Option<Replayed>, Failure> {
+    let Some(runs) = run.policy.recorded() else { return Ok(None) };
+    let jobs: Vec<(usize, u32)> = jobs.iter().map(|(task, episode)| (task.id, *episode)).collect();
+    let wanted =
+        Wanted { suite: &suite.name, twin: run.twin, seed: run.seed, split: Split::Validation, jobs: &jobs };
+    runs.check(&wanted).map(Some)
 }
 
 /// Makes whoever drives an episode.

@@ -1,113 +1,156 @@
-//! Who drives: what `--policy` names, made ready for many episodes.
+//! Who drives: a policy that was chosen, made ready for many episodes.
 
-use std::{
-    path::{Path, PathBuf},
-    sync::Arc,
-    time::Duration,
-};
+use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
-use super::{Failure, code};
+use super::{Failure, code, recorded::RecordedRuns};
 use crate::{
     benchmark::seed::Stream,
     policy::{
-        Action, Chunked, Policy, PolicyError, TaskBrief, builtin,
+        Chunked, Policy, PolicyError, TaskBrief, builtin,
         profile::Profile,
         recorded::Recorded,
         remote::{Connections, Protocol, Remote, Server},
     },
-    report::{
-        actions,
-        runs::{self, StoredRun},
-    },
     rollout::{Controller, stop},
-    script::{self, ExpertController},
+    script::{self, ExpertController, PolicyFile},
 };
 
-/// Policies that need no server and no file.
-pub const POLICIES: [(&str, &str); 4] = [
-    ("expert", "the task's scripted expert (privileged: it sees the true state)"),
-    ("expert-binary", "the same expert with a gripper that is only open or shut (privileged)"),
-    ("noop", "holds still with the gripper open"),
-    ("random", "wanders at random"),
-];
+/// How an expert's hand closes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Hand {
+    /// As far as the expert says.
+    Told,
+    /// Only open or shut.
+    Binary,
+    /// Until it feels that it holds something.
+    Servo,
+}
 
-/// The flags about a policy.
-#[derive(Clone, Debug)]
-pub struct Choice {
-    /// What `--policy` says.
-    pub word: String,
-    /// How results call it, if `--name` says.
-    pub name: Option<String>,
-    /// `--profile`.
-    pub profile: String,
-    /// `--protocol`.
+impl Hand {
+    /// What `--policy` calls it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Told => "expert",
+            Self::Binary => "expert-binary",
+            Self::Servo => "tactile-servo",
+        }
+    }
+}
+
+/// A policy's server and how it is spoken to.
+#[derive(Debug)]
+pub struct Answering {
+    /// Its address.
+    pub url: String,
+    /// How it talks.
     pub protocol: Protocol,
-    /// `--replan`.
+    /// What it gets and what its numbers mean.
+    pub profile: Profile,
+    /// SHA-256 of the files that the profile is made of.
+    pub sources: BTreeMap<String, String>,
+    /// Actions of each answer that are carried out.
     pub replan: usize,
-    /// `--gripper`: whether the policy's gripper is only open or shut, if that is to differ from its profile.
-    pub binary: Option<bool>,
-    /// `--policy-timeout`.
+    /// Longest wait for it and for each answer.
     pub patience: Duration,
 }
 
+/// Who drives.
+#[derive(Clone, Debug)]
+pub enum Driver {
+    /// The task's expert.
+    Expert(Hand),
+    /// Who holds still.
+    Noop,
+    /// Who wanders.
+    Random,
+    /// A policy in Lua, and how many actions of a list are carried out if that is said.
+    Lua(Arc<PolicyFile>, Option<usize>),
+    /// A server.
+    Server(Arc<Answering>),
+    /// Whatever was commanded in a run.
+    Recorded(Arc<RecordedRuns>),
+    /// Actions that somebody else hands over.
+    Given,
+}
+
+/// Who drives, and how results call it.
+#[derive(Clone, Debug)]
+pub struct Choice {
+    driver: Driver,
+    name: String,
+}
+
 impl Choice {
+    /// A driver under a name.
+    pub fn new(driver: Driver, name: String) -> Self {
+        Self { driver, name }
+    }
+
     /// The tasks' experts.
     pub fn expert() -> Self {
-        Self {
-            word: "expert".to_owned(),
-            name: None,
-            profile: String::new(),
-            protocol: Protocol::default(),
-            replan: 1,
-            binary: None,
-            patience: Duration::ZERO,
-        }
+        Self::new(Driver::Expert(Hand::Told), Hand::Told.name().to_owned())
     }
 
     /// Recorded actions that somebody else hands over.
     pub fn replay() -> Self {
-        Self { word: "noop".to_owned(), name: Some("replay".to_owned()), ..Self::expert() }
+        Self::new(Driver::Given, "replay".to_owned())
     }
 
-    /// Whether it carries out what a run recorded.
-    pub fn is_recorded(&self) -> bool {
-        !is_built_in(&self.word) && is_run(&self.word)
+    /// A client of `softvt serve`.
+    pub fn client() -> Self {
+        Self::new(Driver::Given, "client".to_owned())
     }
 
     /// How results call it.
     pub fn name(&self) -> &str {
-        match &self.name {
-            Some(name) => name,
-            None if self.is_remote() => &self.profile,
-            None if self.is_recorded() => "replay",
-            None => &self.word,
-        }
+        &self.name
     }
 
     /// Whether it sees the true state.
     pub fn is_privileged(&self) -> bool {
-        matches!(self.word.as_str(), "expert" | "expert-binary")
-    }
-
-    /// Whether it answers over a network.
-    pub fn is_remote(&self) -> bool {
-        self.word.contains("://")
+        matches!(self.driver, Driver::Expert(_))
     }
 
     /// The profile, if the policy has one.
-    ///
-    /// # Errors
-    /// There is none of that name.
-    pub fn profile(&self) -> Result<Option<Profile>, Failure> {
-        if !self.is_remote() {
-            return Ok(None);
+    pub fn profile(&self) -> Option<&Profile> {
+        match &self.driver {
+            Driver::Server(server) => Some(&server.profile),
+            _ => None,
         }
-        let mut profile = Profile::named(&self.profile)
-            .ok_or_else(|| Failure::input(format!("--profile {}: there is none", self.profile)))?;
-        if let Some(binary) = self.binary {
-            profile.actions.gripper.binary = binary;
+    }
+
+    /// Actions of each answer that are carried out, if anybody has a say in that.
+    pub fn replan(&self) -> Option<usize> {
+        match &self.driver {
+            Driver::Server(server) => Some(server.replan),
+            Driver::Lua(_, replan) => *replan,
+            _ => None,
         }
-        Ok(Some(profile))
+    }
+
+    /// The file of a policy in Lua, as messages name it.
+    pub fn file(&self) -> Option<&str> {
+        match &self.driver {
+            Driver::Lua(file, _) => Some(&file.main),
+            _ => None,
+        }
+    }
+
+    /// SHA-256 of the files that the policy or its profile is made of, by name.
+    pub fn sources(&self) -> BTreeMap<String, String> {
+        match &self.driver {
+            Driver::Lua(file, _) => file.hashes(),
+            Driver::Server(server) => server.sources.clone(),
+            _ => BTreeMap::new(),
+        }
+    }
+
+    /// The runs whose actions are carried out, if any are.
+    pub fn recorded(&self) -> Option<&RecordedRuns> {
+        match &self.driver {
+            Driver::Recorded(runs) => Some(runs),
+            _ => None,
+        }
     }
 }
 
@@ -115,35 +158,32 @@ impl Choice {
 pub struct Drivers {
     choice: Choice,
     connections: Option<Arc<Connections>>,
-    recorded: Vec<StoredRun>,
+    /// The script's name of the suite, and whether it is its twin.
+    of: (String, bool),
 }
 
 impl Drivers {
-    /// Connects, if there is anyone to connect to.
+    /// Connects, if there is anyone to connect to. `suite` is the script's name of it, `twin` whether soft objects are rigid.
     ///
     /// # Errors
-    /// The profile does not exist, the server cannot be reached.
-    pub fn new(choice: &Choice) -> Result<Self, Failure> {
-        let connections = match choice.profile()? {
-            None => None,
-            Some(profile) => {
+    /// The server cannot be reached.
+    pub fn new(choice: &Choice, suite: &str, twin: bool) -> Result<Self, Failure> {
+        let connections = match &choice.driver {
+            Driver::Server(server) => {
                 let connections = Connections::new(Server {
-                    url: choice.word.clone(),
-                    protocol: choice.protocol,
-                    profile,
-                    patience: choice.patience,
+                    url: server.url.clone(),
+                    protocol: server.protocol,
+                    profile: server.profile.clone(),
+                    patience: server.patience,
                     api_key: std::env::var(API_KEY).ok(),
                     stop: &stop::FLAG,
                 });
                 connections.try_out().map_err(policy_failure)?;
                 Some(Arc::new(connections))
             }
+            _ => None,
         };
-        let recorded = match choice.is_recorded() {
-            true => runs::load(Path::new(&choice.word)).map_err(Failure::input)?,
-            false => Vec::new(),
-        };
-        Ok(Self { choice: choice.clone(), connections, recorded })
+        Ok(Self { choice: choice.clone(), connections, of: (suite.to_owned(), twin) })
     }
 
     /// Whoever drives the episode `brief`.
@@ -151,47 +191,38 @@ impl Drivers {
     /// # Errors
     /// The task has no expert, or it does not start.
     pub fn drive(&self, opened: script::Episode, brief: TaskBrief) -> Result<Box<dyn Controller>, Failure> {
-        let chunked = |policy: Box<dyn Policy>, brief| -> Box<dyn Controller> {
-            Box::new(Chunked::new(policy, brief, self.choice.replan))
+        let chunked = |policy: Box<dyn Policy>, replan| -> Box<dyn Controller> {
+            Box::new(Chunked::new(policy, brief.clone(), replan))
         };
-        if let Some(connections) = &self.connections {
-            return Ok(chunked(Box::new(Remote::new(connections.clone())), brief));
-        }
-        if self.choice.is_recorded() {
-            let actions = self.actions_of(&brief)?;
-            return Ok(Box::new(Chunked::new(Box::new(Recorded::new(actions, None)), brief, 1)));
-        }
-        match self.choice.word.as_str() {
-            "noop" => Ok(chunked(Box::<builtin::Noop>::default(), brief)),
-            "random" => {
-                let mut stream = opened.seed.stream(Stream::Script);
-                Ok(chunked(Box::new(builtin::Random::new(rand::RngCore::next_u64(&mut stream))), brief))
+        Ok(match (&self.choice.driver, &self.connections) {
+            (Driver::Server(server), Some(connections)) => {
+                chunked(Box::new(Remote::new(connections.clone())), server.replan)
             }
-            policy => {
+            (Driver::Recorded(runs), _) => {
+                let actions = runs.actions(&self.of.0, self.of.1, &brief)?;
+                chunked(Box::new(Recorded::new(actions, None)), 1)
+            }
+            (Driver::Lua(file, replan), _) => {
+                let policy = file.start(&opened.seed).map_err(Failure::input)?;
+                chunked(Box::new(policy), replan.unwrap_or(usize::MAX))
+            }
+            (Driver::Noop, _) => chunked(Box::<builtin::Noop>::default(), 1),
+            (Driver::Random, _) => {
+                let seed = rand::RngCore::next_u64(&mut opened.seed.stream(Stream::Script));
+                chunked(Box::new(builtin::Random::new(seed)), 1)
+            }
+            (Driver::Expert(hand), _) => {
                 let expert = opened.expert().map_err(Failure::input)?;
                 let expert = expert.ok_or_else(|| Failure::input("the task has no expert"))?;
-                Ok(Box::new(ExpertController::new(expert, policy == "expert-binary")))
+                Box::new(match hand {
+                    Hand::Servo => ExpertController::servo(expert),
+                    Hand::Told | Hand::Binary => ExpertController::new(expert, *hand == Hand::Binary),
+                })
             }
-        }
+            // Nobody has handed any over yet.
+            (Driver::Given | Driver::Server(_), _) => chunked(Box::new(Recorded::new(Vec::new(), None)), 1),
+        })
     }
-}
-
-impl Drivers {
-    /// What was recorded of an episode.
-    fn actions_of(&self, brief: &TaskBrief) -> Result<Vec<Action>, Failure> {
-        let run = self.recorded.iter().find(|run| run.text("suite") == brief.suite).or(self.recorded.first());
-        let dir = run.map_or_else(|| PathBuf::from(&self.choice.word), |run| run.dir.clone());
-        actions::read(&actions::path(&dir, brief.task, brief.episode)).map_err(Failure::input)
-    }
-}
-
-fn is_built_in(word: &str) -> bool {
-    POLICIES.iter().any(|(name, _)| *name == word)
-}
-
-/// Whether a folder holds a run, or runs.
-fn is_run(word: &str) -> bool {
-    Path::new(word).is_dir()
 }
 
 /// Where a server's key comes from: not from the command line, which others can read.
@@ -203,19 +234,4 @@ fn policy_failure(error: PolicyError) -> Failure {
         PolicyError::Address(message) => Failure::input(message),
         other => Failure { code: code::POLICY, message: other.to_string() },
     }
-}
-
-/// What may stand behind `--policy`.
-///
-/// # Errors
-/// A fragment for people.
-pub fn policy_word(word: &str) -> Result<String, String> {
-    if is_built_in(word) || word.contains("://") || is_run(word) {
-        return Ok(word.to_owned());
-    }
-    let known = POLICIES.map(|(name, _)| name).join(", ");
-    let near = POLICIES.iter().map(|(name, _)| (strsim::jaro_winkler(name, word), *name));
-    let meant = near.filter(|(alike, _)| *alike > 0.8).max_by(|a, b| a.0.total_cmp(&b.0));
-    let hint = meant.map_or(String::new(), |(_, name)| format!("; did you mean {name}?"));
-    Err(format!("expected {known}, a server such as ws://host:8000, or the folder of a run{hint}"))
 }

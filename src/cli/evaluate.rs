@@ -8,7 +8,7 @@ use std::{
 use super::{
     Failure,
     args::{Run, Video},
-    batch::Batch,
+    batch::{Batch, recorded},
     conditions, experiment, print, require,
 };
 use crate::{
@@ -28,6 +28,7 @@ use crate::{
 pub fn run(run: &Run) -> Result<(), Failure> {
     let loaded = script::load(&run.file, &run.script_words).map_err(Failure::input)?;
     check_video(run, &loaded.plan)?;
+    check_recorded(run, &loaded.plan)?;
     match &loaded.plan {
         Plan::Suite(suite) => {
             let summary = evaluate(run, &loaded, suite, out_dir(run, &run.name_of(suite), None))?;
@@ -100,6 +101,17 @@ fn check_video(run: &Run, plan: &Plan) -> Result<(), Failure> {
             );
             return Err(Failure::input(message));
         }
+    }
+    Ok(())
+}
+
+/// What was recorded must hold every episode of every suite: before any of them runs.
+fn check_recorded(run: &Run, plan: &Plan) -> Result<(), Failure> {
+    if run.policy.recorded().is_none() {
+        return Ok(());
+    }
+    for suite in plan.suites() {
+        recorded(run, suite, &jobs(run, suite, &chosen(run, suite)?))?;
     }
     Ok(())
 }

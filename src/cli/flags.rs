@@ -4,9 +4,11 @@ use std::time::Duration;
 
 use clap::{Arg, ArgAction, value_parser};
 
-use super::{Failure, drivers::policy_word, replay, require, shard};
+use super::{
+    Failure, replay, require, shard,
+    who::{self, policy_word, profile_word},
+};
 use crate::{
-    policy::profile::PROFILES,
     script::{OptionSpec, OptionValue},
     serve::split_named,
 };
@@ -89,8 +91,8 @@ fn on_script(command: clap::Command) -> clap::Command {
         .arg(
             flag("profile", "What a policy gets and what its numbers mean")
                 .value_name("PROFILE")
-                .default_value("visuo_tactile")
-                .value_parser(PROFILES.map(|(name, _)| name)),
+                .default_value(who::PROFILE)
+                .value_parser(profile_word),
         )
         .arg(
             flag("protocol", "How a policy's server talks")

@@ -8,7 +8,7 @@ use std::{
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use super::{Failure, batch::folder_failure};
+use super::{Failure, batch::folder_failure, recorded::Replayed};
 use crate::{
     benchmark::settings::Settings,
     policy::profile::Profile,
@@ -26,7 +26,13 @@ pub struct RunInfo<'a> {
     pub policy: &'a str,
     /// What a policy behind a network gets, and what its numbers mean.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub profile: Option<Profile>,
+    pub profile: Option<&'a Profile>,
+    /// The file of a policy in Lua; its SHA-256 is among the sources.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub policy_file: Option<&'a str>,
+    /// Whose actions were carried out once more.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub replayed: Option<&'a Replayed>,
     /// Actions of a chunk that are carried out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub replan: Option<usize>,

@@ -4,8 +4,8 @@ use std::{collections::BTreeSet, path::Path};
 
 use serde_json::{Value, json};
 
-use super::{Failure, drivers::POLICIES, print};
-use crate::{benchmark::Plan, script};
+use super::{Failure, print, who::POLICIES};
+use crate::{benchmark::Plan, policy::profile::PROFILES, script};
 
 /// Lists suites, tasks, assets or policies.
 ///
@@ -13,7 +13,7 @@ use crate::{benchmark::Plan, script};
 /// A suite in the working folder cannot be loaded.
 pub fn run(what: &str, as_json: bool) -> Result<(), Failure> {
     let rows = match what {
-        "policies" => POLICIES.iter().map(|(name, about)| json!({ "name": name, "about": about })).collect(),
+        "policies" => policies(),
         "assets" => {
             scripts("assets").iter().map(|path| json!({ "name": stem(path), "file": path })).collect()
         }
@@ -29,6 +29,38 @@ pub fn run(what: &str, as_json: bool) -> Result<(), Failure> {
         print(&format!("{}\n", cells.join("  ")));
     }
     Ok(())
+}
+
+/// Policies and profiles: those with a name, and those in Lua, which are named by their files.
+fn policies() -> Vec<Value> {
+    let named = |kind: &str, list: &[(&str, &str)]| -> Vec<Value> {
+        list.iter().map(|(name, about)| json!({ "kind": kind, "name": name, "about": about })).collect()
+    };
+    let files = |kind: &str, tree: &str| -> Vec<Value> {
+        let files = scripts(tree).into_iter();
+        files.map(|path| json!({ "kind": kind, "about": first_comment(&path), "name": path })).collect()
+    };
+    [
+        named("policy", &POLICIES),
+        files("policy", "scripts/policies"),
+        named("profile", &PROFILES),
+        files("profile", "scripts/profiles"),
+    ]
+    .concat()
+}
+
+/// The first sentence of a Lua file, if it begins with one.
+fn first_comment(path: &str) -> String {
+    let text = std::fs::read_to_string(path).ok();
+    let text = text.or_else(|| String::from_utf8(script::embedded(path)?.to_vec()).ok()).unwrap_or_default();
+    let lines = text.lines().map_while(|line| line.strip_prefix("--"));
+    let words: Vec<&str> = lines.map(str::trim).take_while(|line| !line.is_empty()).collect();
+    let words = words.join(" ");
+    words
+        .split_once(". ")
+        .map_or(words.clone(), |(first, _)| first.to_owned())
+        .trim_end_matches('.')
+        .to_owned()
 }
 
 fn text(value: &Value) -> String {

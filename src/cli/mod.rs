@@ -15,12 +15,14 @@ mod info;
 mod init;
 mod list;
 mod progress;
+mod recorded;
 mod replay;
 mod report;
 mod require;
 mod serve;
 mod shard;
 mod view;
+mod who;
 
 use std::{panic, process::ExitCode, thread, time::Duration};
 

@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     benchmark::{Plan, Suite},
-    policy::{Observation, profile::Profile},
+    policy::Observation,
     rollout::stop,
     script::{self, EpisodeRequest, Loaded},
     serve::{self, Door, Offer, Offered, Wanted},
@@ -26,14 +26,10 @@ use crate::{
 pub fn run(serve: &Serve) -> Result<(), Failure> {
     let loaded = script::load(&serve.run.file, &serve.run.script_words).map_err(Failure::input)?;
     let suites = suites_of(serve, &loaded)?;
-    // A client is shown what a policy's server would be shown.
-    let server = Choice { word: "ws://client".to_owned(), ..serve.run.policy.clone() };
-    let profile = server.profile()?.ok_or_else(|| Failure::input("--profile: there is none"))?;
-    let client = Choice { name: Some("client".to_owned()), ..Choice::replay() };
-    let run = Run { policy: client, ..serve.run.clone() };
+    let run = Run { policy: Choice::client(), ..serve.run.clone() };
     let door = open(serve)?;
     let batches = batches(serve, &run, &loaded, &suites)?;
-    let offer = offer(serve, &loaded, (profile, &suites), &batches);
+    let offer = offer(serve, &loaded, &suites, &batches);
     let hello = serve::hello(&offer, &first_look(serve, &offer)?);
     let address = door.address().map_err(|e| Failure::input(format!("{}: {e}", serve.host)))?;
     print(&format!("ws://{address}\n"));
@@ -92,12 +88,7 @@ fn batches<'a>(
     Ok(batches)
 }
 
-fn offer<'a>(
-    serve: &'a Serve,
-    loaded: &Loaded,
-    (profile, suites): (Profile, &[&'a Suite]),
-    batches: &'a [Batch<'a>],
-) -> Offer<'a> {
+fn offer<'a>(serve: &'a Serve, loaded: &Loaded, suites: &[&'a Suite], batches: &'a [Batch<'a>]) -> Offer<'a> {
     let run = &serve.run;
     let all: Vec<Offered> = suites.iter().map(|suite| Offered { name: run.name_of(suite), suite }).collect();
     let open = move |wanted: &Wanted| {
@@ -117,7 +108,7 @@ fn offer<'a>(
     };
     Offer {
         suites: all,
-        profile,
+        profile: serve.profile.clone(),
         privileged: serve.privileged,
         seed: run.seed,
         split: serve.split,

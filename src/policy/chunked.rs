@@ -2,7 +2,9 @@
 
 use std::collections::VecDeque;
 
-use super::{Action, ActionChunk, Command, Observation, Policy, PolicyError, Streams, TaskBrief, osc::Osc};
+use super::{
+    Action, ActionChunk, Command, Observation, Policy, PolicyError, Streams, TaskBrief, osc, osc::Osc,
+};
 
 /// A policy whose chunks are carried out.
 pub struct Chunked<'a> {
@@ -28,7 +30,11 @@ impl Follower {
                 self.osc = Osc::default();
                 action
             }
-            Command::Step { translation_b, rotation_b, closure } => {
+            Command::Step { whole: true, translation_b, rotation_b, closure } => {
+                self.osc = Osc::default();
+                osc::whole(now, translation_b, rotation_b, closure)
+            }
+            Command::Step { whole: false, translation_b, rotation_b, closure } => {
                 self.osc.step(now, translation_b, rotation_b, closure)
             }
         }

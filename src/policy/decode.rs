@@ -4,13 +4,13 @@ use rmpv::Value;
 
 use super::{
     Action, ActionChunk, Command, PolicyError,
-    profile::{ACTION_LEN, ActionCode, PoseCode},
+    profile::{ACTION_LEN, ActionCode, PoseCode, Units},
     wire::{entry, kind, names, numbers},
 };
 use crate::geometry::Vec3;
 
 /// The most actions of one reply; a longer one is a mistake.
-const LONGEST: usize = 10_000;
+pub const LONGEST: usize = 10_000;
 
 /// The chunk of a reply with the entry `actions` (or `action`): rows of at least seven numbers, or one row.
 ///
@@ -48,6 +48,10 @@ pub fn rows(shape: &[usize], found: &[f64], code: &ActionCode) -> Result<ActionC
         (0, _) => return Err(wrong("no action at all")),
         (LONGEST.., _) => return Err(wrong("too many")),
         (_, ..ACTION_LEN) => return Err(wrong("too few numbers an action")),
+        _ if code.length.is_some_and(|length| length != width) => {
+            let length = code.length.unwrap_or_default();
+            return Err(wrong(&format!("the profile says {length} numbers an action")));
+        }
         _ => {}
     }
     let commands: Result<Vec<Command>, PolicyError> =
@@ -60,7 +64,7 @@ pub fn rows(shape: &[usize], found: &[f64], code: &ActionCode) -> Result<ActionC
 /// # Errors
 /// One of them is not finite.
 pub fn command(row: &[f64], code: &ActionCode) -> Result<Command, PolicyError> {
-    let &[x, y, z, rx, ry, rz, gripper] = row else {
+    let [_, _, _, _, _, _, gripper] = row else {
         return Err(PolicyError::Reply(format!(
             "an action has {} numbers; expected {ACTION_LEN}",
             row.len()
@@ -69,16 +73,21 @@ pub fn command(row: &[f64], code: &ActionCode) -> Result<Command, PolicyError> {
     if row.iter().any(|number| !number.is_finite()) {
         return Err(PolicyError::Action(format!("the action {row:?} holds a number that is not finite")));
     }
+    let Units { scale, offset } = code.units.unwrap_or(Units::SAME);
+    let [x, y, z, rx, ry, rz] = std::array::from_fn(|i| scale[i] * row[i] + offset[i]);
     let (first, second) = (Vec3::new(x, y, z), Vec3::new(rx, ry, rz));
-    let closure = code.gripper.closure(gripper);
+    let closure = code.gripper.closure(*gripper);
+    // robosuite's controller cuts what is beyond −1..=1 off too.
+    let step = |whole, translation_m: f64, rotation_rad: f64| Command::Step {
+        whole,
+        translation_b: first.map(|x| x.clamp(-1.0, 1.0)) * translation_m,
+        rotation_b: second.map(|x| x.clamp(-1.0, 1.0)) * rotation_rad,
+        closure,
+    };
     Ok(match code.pose {
         PoseCode::Absolute => Command::Pose(Action { position_b: first, axis_angle_b: second, closure }),
-        PoseCode::DeltaOsc { translation_m, rotation_rad } => Command::Step {
-            // The controller cuts what is beyond −1..=1 off too.
-            translation_b: first.map(|x| x.clamp(-1.0, 1.0)) * translation_m,
-            rotation_b: second.map(|x| x.clamp(-1.0, 1.0)) * rotation_rad,
-            closure,
-        },
+        PoseCode::Delta { translation_m, rotation_rad } => step(true, translation_m, rotation_rad),
+        PoseCode::DeltaOsc { translation_m, rotation_rad } => step(false, translation_m, rotation_rad),
     })
 }
 
@@ -133,10 +142,37 @@ mod tests {
         let code = Profile::named("libero").unwrap().actions;
         let step = command(&[1.0, -9.0, 0.5, 0.0, 0.0, 2.0, 1.0], &code).unwrap();
         let expected = Command::Step {
+            whole: false,
             translation_b: Vec3::new(0.05, -0.05, 0.025),
             rotation_b: Vec3::new(0.0, 0.0, 0.5),
             closure: 1.0,
         };
         assert_eq!(step, expected);
+    }
+
+    #[test]
+    fn other_units_are_scaled_and_moved_before_they_are_read() {
+        let mut code = Profile::named("visuo_tactile").unwrap().actions;
+        // Millimetres from a point half a metre in front of the base, degrees.
+        let (mm, degree) = (1e-3, 1.0_f64.to_radians());
+        code.units = Some(Units {
+            scale: [mm, mm, mm, degree, degree, degree],
+            offset: [0.5, 0.0, 0.1, 0.0, 0.0, 0.0],
+        });
+        let Command::Pose(action) = command(&[20.0, -30.0, 0.0, 180.0, 0.0, 0.0, 1.0], &code).unwrap() else {
+            panic!("a pose");
+        };
+        assert!((action.position_b - Vec3::new(0.52, -0.03, 0.1)).norm() < 1e-12);
+        assert!((action.axis_angle_b - Vec3::new(std::f64::consts::PI, 0.0, 0.0)).norm() < 1e-12);
+    }
+
+    #[test]
+    fn a_profile_that_says_how_long_actions_are_takes_no_others() {
+        let code = ActionCode { length: Some(32), ..Profile::named("visuo_tactile").unwrap().actions };
+        assert_eq!(rows(&[2, 32], &[0.25; 64], &code).unwrap().commands.len(), 2);
+        match rows(&[2, 7], &[0.25; 14], &code) {
+            Err(PolicyError::Reply(message)) => assert!(message.contains("32 numbers"), "{message}"),
+            other => panic!("{other:?}"),
+        }
     }
 }

@@ -32,8 +32,10 @@ pub struct Action {
 pub enum Command {
     /// A pose.
     Pose(Action),
-    /// A step away from where the tool is when its turn comes; see [`osc`].
+    /// A step away from where the tool is when its turn comes.
     Step {
+        /// Whether it is carried out in full, or as far as robosuite's controller gets; see [`osc`].
+        whole: bool,
         /// Translation in the base frame, m.
         translation_b: Vec3,
         /// Rotation about the axes of the base frame, rad.

@@ -64,6 +64,8 @@ pub struct CameraPicture {
 pub struct TouchFrame {
     /// The colour picture, 320 × 240; `docs/tactile.md` draws its frame.
     pub picture: RgbImage,
+    /// The picture of the untouched gel.
+    pub untouched: Arc<RgbImage>,
     /// Initial and present places of the 11 × 9 markers, row by row, (x, y) px: the shape (2, 99, 2).
     pub markers: Markers,
 }
@@ -88,6 +90,17 @@ impl Observation {
     /// A camera's picture by name.
     pub fn camera(&self, name: &str) -> Option<&RgbImage> {
         self.cameras.iter().find(|camera| camera.name == name).map(|camera| &camera.picture)
+    }
+}
+
+impl TouchFrame {
+    /// How far each channel of each pixel is from the untouched picture, 0 to 255.
+    pub fn change(&self) -> RgbImage {
+        let mut change = self.picture.clone();
+        for (value, rest) in change.iter_mut().zip(self.untouched.iter()) {
+            *value = value.abs_diff(*rest);
+        }
+        change
     }
 }
 

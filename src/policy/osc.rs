@@ -23,13 +23,18 @@ impl Osc {
     pub fn step(&mut self, now: &Observation, translation_b: Vec3, rotation_b: Vec3, closure: f64) -> Action {
         let moved = spring(&translation_b, &mut self.velocity);
         let turned = spring(&rotation_b, &mut self.spin);
-        let orientation =
-            rotation::from_axis_angle(&turned) * rotation::from_axis_angle(&now.ee_axis_angle_b);
-        Action {
-            position_b: now.ee_position_b + moved,
-            axis_angle_b: rotation::axis_angle(&orientation),
-            closure,
-        }
+        whole(now, moved, turned, closure)
+    }
+}
+
+/// The pose a step away from where the tool is now.
+pub fn whole(now: &Observation, translation_b: Vec3, rotation_b: Vec3, closure: f64) -> Action {
+    let orientation =
+        rotation::from_axis_angle(&rotation_b) * rotation::from_axis_angle(&now.ee_axis_angle_b);
+    Action {
+        position_b: now.ee_position_b + translation_b,
+        axis_angle_b: rotation::axis_angle(&orientation),
+        closure,
     }
 }
 

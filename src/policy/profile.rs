@@ -137,6 +137,33 @@ pub struct ActionCode {
     pub pose: PoseCode,
     /// What the seventh is.
     pub gripper: GripperCode,
+    /// How an actor's own units become those of `pose`, if they differ.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub units: Option<Units>,
+    /// How many numbers an action must have, padding included; any from seven on if none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub length: Option<usize>,
+}
+
+/// `scale · number + offset`, for each of the first six numbers of an action.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Units {
+    /// Factors.
+    pub scale: [f64; 6],
+    /// What is added then, m and rad.
+    pub offset: [f64; 6],
+}
+
+impl Units {
+    /// Numbers as they are.
+    pub const SAME: Self = Self { scale: [1.0; 6], offset: [0.0; 6] };
+}
+
+impl ActionCode {
+    /// A code without units and padding of its own.
+    pub fn plain(pose: PoseCode, gripper: GripperCode) -> Self {
+        Self { pose, gripper, units: None, length: None }
+    }
 }
 
 /// Numbers of an action that are used.
@@ -148,6 +175,13 @@ pub const ACTION_LEN: usize = 7;
 pub enum PoseCode {
     /// Tool pose in the base frame: m, and axis-angle in rad.
     Absolute,
+    /// Shares −1..=1 of a step away from where the tool is when the action's turn comes, taken in full.
+    Delta {
+        /// Longest step along each axis, m.
+        translation_m: f64,
+        /// Longest turn about each axis, rad.
+        rotation_rad: f64,
+    },
     /// What robosuite's operational-space controller gets: shares −1..=1 of a step away from where the tool is.
     DeltaOsc {
         /// Longest step along each axis, m.
@@ -209,7 +243,7 @@ impl Profile {
             input(both("tactile_marker_motion"), Source::MarkerMotion),
         ];
         let closure = GripperCode { open: 0.0, shut: 1.0, binary: false };
-        let absolute = |gripper| ActionCode { pose: PoseCode::Absolute, gripper };
+        let absolute = |gripper| ActionCode::plain(PoseCode::Absolute, gripper);
         let actions = match name {
             "vision" => absolute(GripperCode { binary: true, ..closure }),
             "visuo_tactile" => {
@@ -230,10 +264,10 @@ impl Profile {
                 let parts = vec![StatePart::Position, StatePart::AxisAngle, StatePart::FingerPair];
                 inputs[2].source = Source::State { parts };
                 inputs[..3].iter_mut().for_each(|input| input.keys.truncate(1));
-                ActionCode {
-                    pose: PoseCode::DeltaOsc { translation_m: 0.05, rotation_rad: 0.5 },
-                    gripper: GripperCode { open: -1.0, shut: 1.0, binary: true },
-                }
+                ActionCode::plain(
+                    PoseCode::DeltaOsc { translation_m: 0.05, rotation_rad: 0.5 },
+                    GripperCode { open: -1.0, shut: 1.0, binary: true },
+                )
             }
             _ => return None,
         };

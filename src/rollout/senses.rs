@@ -261,7 +261,12 @@ impl Senses {
     /// As [`Senses::touch`].
     pub fn touch_frame(&mut self, frame: &Frame) -> Result<[TouchFrame; 2], SenseError> {
         let both = self.touch(frame)?;
-        Ok(both.map(|touched| TouchFrame { picture: touched.picture, markers: touched.markers }))
+        let untouched = self.looks.sensor(&self.spec)?.untouched.clone();
+        Ok(both.map(|touched| TouchFrame {
+            picture: touched.picture,
+            untouched: untouched.clone(),
+            markers: touched.markers,
+        }))
     }
 
     /// True forces on the left and right gel.

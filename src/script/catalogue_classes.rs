@@ -225,7 +225,9 @@ pub static RNG: Class = Class {
             "stream",
             &[(
                 "name",
-                Type::Choice(&["layout", "arm", "material", "light", "camera", "sensor", "expert", "script"]),
+                Type::Choice(&[
+                    "layout", "arm", "material", "light", "camera", "sensor", "expert", "script", "policy",
+                ]),
             )],
             &["softvt.Rng"],
             "Another stream, from its start.",
@@ -417,7 +419,8 @@ pub static ARM: Class = Class {
             "grasp",
             &[("closure", CLOSURE), ("options?", RATE)],
             &[],
-            "Closes on an object; a binary gripper, which knows only open and shut, shuts here and not in close_to.",
+            "Closes on an object; a binary gripper, which knows only open and shut, shuts here and not in close_to, and a \
+             tactile servo closes until both fingers feel that they hold something, whatever closure says.",
         ),
         method(
             "release",
@@ -426,6 +429,13 @@ pub static ARM: Class = Class {
             "Lets go of an object, opening to a closure or wide.",
         ),
         method("open", &[("options?", RATE)], &[], "Opens the gripper."),
+        method(
+            "feel",
+            &[],
+            &["{left: softvt.Touch, right: softvt.Touch}"],
+            "What the fingers feel now; the first time it waits for a control step. In simulation:drive and under --policy \
+             tactile-servo.",
+        ),
         method("wait", &[("seconds", Type::Number("s", Range::closed(0.0, 600.0)))], &[], "Holds still."),
         method(
             "give_up",
@@ -467,4 +477,8 @@ pub static CLASSES: &[&Class] = &[
     &SEEN,
     &ARM,
     &LIST,
+    &super::catalogue_policy::BRIEF,
+    &super::catalogue_policy::OBSERVATION,
+    &super::catalogue_policy::TOUCH,
+    &super::catalogue_policy::MARKERS,
 ];

@@ -9,6 +9,7 @@ use super::{
 /// Largest edge of a picture that a script may make, pixels.
 pub(super) const MOST_EDGE: f64 = 8192.0;
 const EDGE: Type = Type::Integer(Range::closed(1.0, MOST_EDGE));
+const PIXEL: Type = Type::Integer(Range::closed(0.0, MOST_EDGE));
 const REGION: Type = Type::Vector(4, "x, y, width, height in pixels");
 /// Where a picture may be put on another, pixels.
 const PLACE: Type = Type::Number("pixels", Range::closed(-1e5, 1e5));
@@ -169,6 +170,7 @@ pub static FELT: Class = Class {
         ("arrows", "softvt.Image", "The same with the motion of its markers as arrows, lengthened."),
         ("initial", "number[][]", "Places of the 99 markers without a touch, px, row by row."),
         ("present", "number[][]", "Their places now, px."),
+        ("markers", "softvt.Markers", "The markers, with what their motion says."),
         ("force", "number[]", "True force on the gel, N, pad frame; a pressing body makes z negative."),
         ("depth_mm", "number", "Greatest depth of the dent, mm."),
     ],
@@ -184,6 +186,12 @@ pub static IMAGE: Class = Class {
     written: &[],
     methods: &[
         method("mean", &[("region?", REGION)], &["number[]"], "Mean red, green and blue, 0..255."),
+        method(
+            "pixel",
+            &[("x", PIXEL), ("y", PIXEL)],
+            &["number[]"],
+            "Red, green and blue of a pixel, 0..255; the first is 0, 0.",
+        ),
         method("crop", &[("region", REGION)], &["softvt.Image"], "A part as a picture of its own."),
         method(
             "resize",

@@ -4,7 +4,7 @@ use super::{Expert, ExpertCommand, ExpertView, ObjectView, ScriptError, reach::L
 use crate::{
     benchmark::control::CONTROL_DT,
     geometry::Vec3,
-    policy::{Action, Observation},
+    policy::{Action, Observation, Streams},
     robot::rotation,
     rollout::{ControlError, Controller, Handle, Simulation},
 };
@@ -13,22 +13,38 @@ use crate::{
 pub struct ExpertController {
     expert: Expert,
     binary: bool,
+    servo: bool,
     lag: Lag,
 }
 
 impl ExpertController {
     /// `binary` replaces the expert's closure by fully open or fully shut, as a binary gripper action would.
     pub fn new(expert: Expert, binary: bool) -> Self {
-        Self { expert, binary, lag: Lag::default() }
+        Self { expert, binary, servo: false, lag: Lag::default() }
+    }
+
+    /// Closes, wherever the expert grasps, until the fingers feel that they hold something, whatever the expert says.
+    pub fn servo(expert: Expert) -> Self {
+        Self { expert: expert.as_servo(), binary: false, servo: true, lag: Lag::default() }
     }
 }
 
 impl Controller for ExpertController {
+    fn streams(&self) -> Streams {
+        Streams { touch: self.servo, ..Streams::default() }
+    }
+
+    fn looks(&self) -> bool {
+        self.expert.feels()
+    }
+
     fn gave_up(&self) -> Option<&str> {
         self.expert.gave_up()
     }
 
     fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, ControlError> {
+        let touch = observation.touch.as_ref().and_then(|touch| touch.frames.last());
+        self.expert.feel(touch.cloned());
         let glance = Glance::new(sim, observation.time_s, &mut self.lag);
         let command = next(&mut self.expert, glance, &mut self.lag);
         let command = command.map_err(|error| ControlError::Script(error.to_string()))?;

@@ -13,9 +13,11 @@ use super::{
     sandbox::{base, fail, locked},
     schema::{self, number, unknown},
     sources::embedded,
+    touch_api,
 };
 use crate::{
     geometry::{Pose, Vec3, shape::Aabb},
+    policy::TouchFrame,
     robot::{Obstacle, clearance, gripper::OPENING},
     scene::{Asset, Body},
 };
@@ -79,9 +81,39 @@ pub struct Expert {
     run: Coroutine,
 }
 
+/// What fingers feel at one control step, left and right.
+pub type Felt = Arc<[TouchFrame; 2]>;
+
+/// How an expert closes on things.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Grip {
+    /// As far as it says.
+    #[default]
+    Told,
+    /// Until the fingers feel that they hold something.
+    Servo,
+}
+
 impl Expert {
     pub(super) fn start(machine: Machine, function: &Function) -> Result<Self, ScriptError> {
-        Ok(Self { machine, run: Coroutine::new(function.clone()) })
+        let run = Coroutine::new(function.clone(), Hands { grip: Grip::Told, feel: false });
+        Ok(Self { machine, run })
+    }
+
+    /// The same expert, which has not begun yet, as a tactile servo.
+    pub(super) fn as_servo(mut self) -> Self {
+        self.run.hands = Hands { grip: Grip::Servo, feel: true };
+        self
+    }
+
+    /// Whether it wants to know what the fingers feel at the next control step.
+    pub fn feels(&self) -> bool {
+        self.run.feels
+    }
+
+    /// What the fingers feel at the next control step, if that is known.
+    pub fn feel(&mut self, felt: Option<Felt>) {
+        self.run.feel(felt);
     }
 
     /// Lets the expert see `view` and gives its next command; none once it is done.
@@ -107,10 +139,23 @@ impl Expert {
     }
 }
 
+/// What an expert's hands can do.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Hands {
+    /// How they close.
+    pub grip: Grip,
+    /// Whether what the fingers feel can be had.
+    pub feel: bool,
+}
+
 /// An expert as a coroutine of any machine.
 pub(super) struct Coroutine {
     function: Function,
     view: Shared,
+    hands: Hands,
+    felt: Arc<Mutex<Option<Felt>>>,
+    /// Whether it wants to know what the fingers feel at the next control step.
+    pub feels: bool,
     thread: Option<Thread>,
     /// The reason that it gave to `arm:give_up`, after which it is not resumed.
     pub gave_up: Option<String>,
@@ -120,8 +165,14 @@ pub(super) struct Coroutine {
 const LONGEST_REASON: usize = 300;
 
 impl Coroutine {
-    pub fn new(function: Function) -> Self {
-        Self { function, view: Arc::default(), thread: None, gave_up: None }
+    pub fn new(function: Function, hands: Hands) -> Self {
+        let (view, felt) = (Arc::default(), Arc::default());
+        Self { function, view, hands, felt, feels: false, thread: None, gave_up: None }
+    }
+
+    /// What the fingers feel at the next control step, if that is known.
+    pub fn feel(&mut self, felt: Option<Felt>) {
+        *locked(&self.felt) = felt;
     }
 
     /// Lets the expert see `view` and gives its next command; none once it is done.
@@ -143,6 +194,7 @@ impl Coroutine {
             self.gave_up = Some(reason.chars().take(LONGEST_REASON).collect());
             return Ok(None);
         }
+        self.feels = values.next().is_some_and(|value| value.as_boolean() == Some(true));
         match (pose, closure.filter(|closure| (0.0..=1.0).contains(closure)), gripping) {
             (Some(pose_w), Some(closure), Some(gripping)) => {
                 Ok(Some(ExpertCommand { pose_b: view.base_w.inv_mul(&pose_w), closure, gripping }))
@@ -170,7 +222,7 @@ impl Coroutine {
             Some(_) => Ok(MultiValue::new()),
             None => {
                 let host = lua.create_userdata(Host(self.view.clone()))?;
-                let arm = arm(lua, &host)?;
+                let arm = arm(lua, &host, fingers(lua, self.hands, &self.felt)?)?;
                 let thread = lua.create_thread(self.function.clone())?;
                 let scene = lua.create_userdata(View(self.view.clone()))?;
                 self.thread.insert(thread).resume((arm, scene))
@@ -180,11 +232,29 @@ impl Coroutine {
 }
 
 /// The arm's Lua side, from the embedded library.
-fn arm(lua: &Lua, host: &mlua::AnyUserData) -> mlua::Result<Table> {
-    let text =
-        embedded("scripts/softvt/arm.lua").ok_or_else(|| fail(lua, "the embedded library has no arm"))?;
-    let chunk = lua.load(text).set_name("=softvt.arm").set_mode(ChunkMode::Text).set_environment(base(lua)?);
-    chunk.call((host, checks(lua)?))
+fn arm(lua: &Lua, host: &mlua::AnyUserData, fingers: Table) -> mlua::Result<Table> {
+    let servo: Table = own_chunk(lua, "servo")?.call(())?;
+    own_chunk(lua, "arm")?.call((host, checks(lua)?, servo, fingers))
+}
+
+/// A file of the library's own Lua, out of the reach of scripts.
+fn own_chunk(lua: &Lua, name: &str) -> mlua::Result<mlua::chunk::Chunk<'static>> {
+    let text = embedded(&format!("scripts/softvt/{name}.lua"))
+        .ok_or_else(|| fail(lua, format!("the embedded library has no {name}")))?;
+    let chunk = lua.load(text).set_name(format!("=softvt.{name}")).set_mode(ChunkMode::Text);
+    Ok(chunk.set_environment(base(lua)?))
+}
+
+/// What the fingers are for, and what they feel now.
+fn fingers(lua: &Lua, hands: Hands, felt: &Arc<Mutex<Option<Felt>>>) -> mlua::Result<Table> {
+    let table = lua.create_table()?;
+    table.set("servo", hands.grip == Grip::Servo)?;
+    table.set("feel", hands.feel)?;
+    let felt = felt.clone();
+    let now =
+        move |lua: &Lua, ()| locked(&felt).clone().map(|felt| touch_api::fingers(lua, &felt)).transpose();
+    table.set("felt", lua.create_function(now)?)?;
+    Ok(table)
 }
 
 /// Checks for the arm's Lua side; errors stand at the expert's own line.

@@ -112,6 +112,15 @@ impl LuaImage {
         Ok(sum.map(|s| s as f64 / (f64::from(w) * f64::from(h))))
     }
 
+    fn pixel(&self, lua: &Lua, x: u32, y: u32) -> mlua::Result<[u8; 3]> {
+        let picture = &locked(&self.0).picture;
+        let (width, height) = picture.dimensions();
+        picture.get_pixel_checked(x, y).map(|pixel| pixel.0).ok_or_else(|| {
+            let message = format!("expected a pixel of {width} × {height}, got {x}, {y}; the first is 0, 0");
+            fail(lua, format!("image:pixel: {message}"))
+        })
+    }
+
     fn crop(&self, lua: &Lua, region: [f64; 4]) -> mlua::Result<Self> {
         let picture = &locked(&self.0).picture;
         let [x, y, w, h] = part(lua, "crop", picture, Some(region))?;
@@ -180,6 +189,9 @@ impl Hosted for LuaImage {
     fn methods<M: UserDataMethods<Self>>(methods: &mut M) {
         method(methods, "mean", |lua, this: &Self, region: Option<[f64; 4]>| {
             lua.create_sequence_from(this.mean(lua, region)?)
+        });
+        method(methods, "pixel", |lua, this: &Self, (x, y): (u32, u32)| {
+            lua.create_sequence_from(this.pixel(lua, x, y)?)
         });
         method(methods, "crop", |lua, this: &Self, region: [f64; 4]| this.crop(lua, region));
         method(methods, "resize", |lua, this: &Self, (width, height): (u32, u32)| {

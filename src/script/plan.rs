@@ -10,6 +10,7 @@ use mlua::{Function, Lua, MultiValue, Table, Value};
 use super::{
     Bundle, OptionSpec, ScriptError, catalogue,
     catalogue_conditions::CONDITIONS,
+    catalogue_policy::{self, POLICY, PROFILE},
     conditions,
     experiment::points,
     options::{self, Session},
@@ -83,7 +84,7 @@ pub(super) struct Machine {
 }
 
 /// A machine that has run the main file, and what the file returned.
-fn open(
+pub(super) fn open(
     main: &str,
     library: Library,
     argv: &[String],
@@ -113,6 +114,15 @@ impl Machine {
         let Some(Value::Table(table)) = values.front() else {
             return Err(no_plan(lua, values));
         };
+        for (record, flag) in [(&POLICY, "--policy"), (&PROFILE, "--profile")] {
+            if schema::is_made(lua, record, table) {
+                let message = format!(
+                    "is no plan but what {flag} takes: softvt SUITE.lua {flag} {}",
+                    self.vm.shared.main
+                );
+                return Err(fail(lua, message));
+            }
+        }
         if schema::is_made(lua, &catalogue::SUITE, table) {
             return Ok(Plan::Suite(Box::new(suite(lua, table)?)));
         }
@@ -166,7 +176,7 @@ fn no_plan(lua: &Lua, values: &MultiValue) -> mlua::Error {
 fn install(vm: &Vm, session: &Arc<Mutex<Session>>) -> mlua::Result<()> {
     let lua = &vm.lua;
     vm.api.set("version", env!("CARGO_PKG_VERSION"))?;
-    for (name, record) in catalogue::CONSTRUCTORS {
+    for (name, record) in catalogue::CONSTRUCTORS.iter().chain(catalogue_policy::CONSTRUCTORS) {
         let make = lua.create_function(move |lua, value: Value| schema::make(lua, record, &value))?;
         vm.api.set(*name, make)?;
     }

@@ -232,9 +232,12 @@ impl Type {
             (Self::Any, value) if !value.is_nil() => kept(),
             (Self::Choice(names), Value::String(text)) => {
                 let text = text.to_string_lossy();
-                match names.iter().any(|name| *name == text) {
-                    true => kept(),
-                    false => Err(wrong()),
+                match (names.iter().any(|name| *name == text), closest(&text, names.iter().copied())) {
+                    (true, _) => kept(),
+                    (false, Some(close)) => {
+                        Err(Fault::new(format!("{}; did you mean {close:?}?", wrong().message)))
+                    }
+                    (false, None) => Err(wrong()),
                 }
             }
             (Self::Colour, Value::Table(list)) => {

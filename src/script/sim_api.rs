@@ -14,7 +14,7 @@ use super::{
     controller::{Glance, Planner, next},
     data::json,
     deadline::Clock,
-    expert::{Coroutine, ExpertCommand, ExpertView},
+    expert::{Coroutine, ExpertCommand, ExpertView, Felt, Grip, Hands},
     host::{Hosted, hosted, method},
     image_api::LuaImage,
     random::Rng,
@@ -22,6 +22,7 @@ use super::{
     sandbox::{fail, locked},
     scene_api::{LuaScene, empty_scene},
     schema::{self, finite},
+    touch_api::LuaMarkers,
 };
 use crate::{
     benchmark::{
@@ -175,6 +176,13 @@ impl Inner {
         true
     }
 
+    /// What the fingers feel now.
+    fn touch(&mut self, lua: &Lua) -> mlua::Result<Felt> {
+        let frame = Senses::frame(&self.sim);
+        let felt = self.senses.touch_frame(&frame);
+        felt.map(Arc::new).map_err(|e| fail(lua, format!("arm:feel: {e}")))
+    }
+
     fn watch(&mut self) {
         for (index, watched) in self.watched.iter_mut().enumerate() {
             if let Some(d) = deformation(&self.sim, index, &watched.reference) {
@@ -222,12 +230,15 @@ struct LuaSimulation(Arc<Mutex<Inner>>);
 impl LuaSimulation {
     /// Runs an expert to its end.
     fn drive(&self, lua: &Lua, expert: Function) -> mlua::Result<MultiValue> {
-        let (mut expert, mut lag) = (Bound { run: Coroutine::new(expert), lua }, Lag::default());
+        let hands = Hands { grip: Grip::Told, feel: true };
+        let (mut expert, mut lag) = (Bound { run: Coroutine::new(expert, hands), lua }, Lag::default());
         loop {
             // The expert itself may look at the simulation, so it is not held while the expert runs.
             let glance = {
-                let inner = locked(&self.0);
+                let mut inner = locked(&self.0);
                 let _honest_work = inner.clock.pause();
+                let felt = expert.run.feels.then(|| inner.touch(lua)).transpose()?;
+                expert.run.feel(felt);
                 Glance::new(&inner.sim, inner.time(), &mut lag)
             };
             let Some(command) = next(&mut expert, glance, &mut lag)? else { break };
@@ -283,6 +294,7 @@ impl LuaSimulation {
         table.set("initial", places(&felt.markers[0])?)?;
         table.set("present", places(&felt.markers[1])?)?;
         let load = frame.patches.get(index).map_or(PadLoad::default(), PadLoad::of_patch);
+        table.set("markers", LuaMarkers::new(felt.markers))?;
         table.set("force", lua.create_sequence_from(load.force.iter().copied())?)?;
         table.set("depth_mm", felt.field.as_ref().map_or(0.0, |field| 1e3 * field.depth()))?;
         Ok(table)

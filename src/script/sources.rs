@@ -279,17 +279,19 @@ pub fn embedded(path: &str) -> Option<&'static [u8]> {
     dir.get_file(rest).map(include_dir::File::contents)
 }
 
-/// Paths of the embedded Lua files of a tree (`suites`, `scripts` or `assets`), sorted.
+/// Paths of the embedded Lua files of a tree (`suites`, `scripts` or `assets`, or a folder of one), sorted.
 pub fn embedded_scripts(tree: &str) -> Vec<String> {
-    let dir = match tree {
+    let (root, folder) = tree.split_once('/').map_or((tree, None), |(root, folder)| (root, Some(folder)));
+    let whole = match root {
         "scripts" => &SCRIPTS,
         "suites" => &SUITES,
         "assets" => &ASSETS,
         _ => return Vec::new(),
     };
+    let Some(dir) = folder.map_or(Some(whole), |folder| whole.get_dir(folder)) else { return Vec::new() };
     let mut names = Vec::new();
     collect(dir, &mut names);
-    names.iter_mut().for_each(|name| *name = format!("{tree}/{}.lua", name.replace('.', "/")));
+    names.iter_mut().for_each(|name| *name = format!("{root}/{}.lua", name.replace('.', "/")));
     names.sort();
     names
 }

@@ -16,13 +16,19 @@ pub const STUB_FILE: &str = "library/softvt.d.lua";
 /// Settings for Lua language servers: where the stubs are.
 pub const LUARC: &str = "{\n  \"runtime.version\": \"Lua 5.4\",\n  \"workspace.library\": [\"library\"]\n}\n";
 
+/// Every constructor that takes one table.
+fn constructors() -> impl Iterator<Item = (&'static str, &'static Record)> {
+    CONSTRUCTORS.iter().chain(super::catalogue_policy::CONSTRUCTORS).copied()
+}
+
 /// Every table that a script may write, in order.
 fn records() -> impl Iterator<Item = &'static Record> {
-    let made = CONSTRUCTORS.iter().map(|(_, record)| *record);
+    let made = constructors().map(|(_, record)| record);
     let shapes = SHAPES.iter().chain(METHODS).map(|(_, record)| *record);
     made.chain([&LAYOUT])
         .chain(PLAIN.iter().copied())
         .chain(super::catalogue_world::RECORDS.iter().copied())
+        .chain(super::catalogue_policy::PLAIN.iter().copied())
         .chain(shapes)
         .chain([&MASK, &MESH])
         .chain(MASKS.iter().map(|(_, record)| *record))
@@ -91,7 +97,7 @@ pub fn stubs() -> String {
         stub_class(&mut out, class);
     }
     out.push_str("---The softvt library.\nsoftvt = {}\n\n---Version of softvt.\n---@type string\nsoftvt.version = \"\"\n\n");
-    for (name, record) in CONSTRUCTORS {
+    for (name, record) in constructors() {
         let _ =
             writeln!(out, "---{}\n---@param spec {}\n---@return {}", record.doc, record.class, record.class);
         let _ = writeln!(out, "function softvt.{name}(spec) end\n");
@@ -145,7 +151,7 @@ fn stub_function(out: &mut String, prefix: &str, function: &Signature) {
 pub fn reference() -> String {
     let mut out = String::from(INTRODUCTION);
     out.push_str("\n## Functions\n\n");
-    for (name, record) in CONSTRUCTORS {
+    for (name, record) in constructors() {
         let _ = writeln!(out, "- `softvt.{name}{{…}}`: {} See `{}`.", record.doc, record.class);
     }
     functions(&mut out, "softvt.", FUNCTIONS);
@@ -214,7 +220,8 @@ const INTRODUCTION: &str = "# The Lua surface
 
 <!-- Generated from the binding table; to write it anew: SOFTVT_WRITE_DOCS=1 cargo test --release --lib script::stubs -->
 
-A Lua file returns a plan: a suite, a list of suites, or an experiment; `softvt FILE.lua` does what it says. Every table
+A Lua file returns a plan: a suite, a list of suites, or an experiment; `softvt FILE.lua` does what it says. A file behind
+`--policy` returns a policy, one behind `--profile` a profile (docs/policies.md). Every table
 is checked when it is built: a wrong type, a value out of range or an unknown key is an error with file and line.
 Everything is in SI units, in the world frame (z up) unless it says otherwise.
 
@@ -264,7 +271,7 @@ mod tests {
         lua.load(stubs()).exec().unwrap();
         let has = "local names = {} for name in pairs(softvt) do names[#names + 1] = name end return #names";
         let count: usize = lua.load(has).eval().unwrap();
-        assert_eq!(count, CONSTRUCTORS.len() + FUNCTIONS.len() + 3);
+        assert_eq!(count, constructors().count() + FUNCTIONS.len() + 3);
     }
 
     #[test]
@@ -278,7 +285,7 @@ mod tests {
         let error = crate::script::load(&folder.path().join("x.lua"), &[]).unwrap_err();
         let mut names: Vec<String> = error.message.split(' ').map(str::to_string).collect();
         let mut table: Vec<String> = ["version".to_string(), "shape".into(), "mask".into()].into();
-        table.extend(CONSTRUCTORS.iter().map(|(name, _)| name.to_string()));
+        table.extend(constructors().map(|(name, _)| name.to_string()));
         table.extend(FUNCTIONS.iter().map(|function| function.name.to_string()));
         table.extend(SHAPES.iter().map(|(name, _)| format!("shape.{name}")));
         table.extend(MASKS.iter().map(|(name, _)| format!("mask.{name}")));

@@ -168,7 +168,10 @@ fn an_episode_is_driven_from_its_start_to_its_end() {
     assert_eq!(get(get(&middle, "info"), "carried_out").as_u64(), Some(11));
     let end = client.ask(&step(5));
     assert_eq!(get(get(&end, "info"), "carried_out").as_u64(), Some(1), "the budget ends it");
-    assert_eq!((get(&end, "truncated").as_bool(), get(&end, "terminated").as_bool()), (Some(true), Some(false)));
+    assert_eq!(
+        (get(&end, "truncated").as_bool(), get(&end, "terminated").as_bool()),
+        (Some(true), Some(false))
+    );
     assert_eq!(get(&end, "reward").as_f64(), Some(0.0));
     let record = get(get(&end, "info"), "record");
     assert_eq!(keys(record), ["goal", "outcome", "steps"], "nothing hidden is told");
@@ -358,14 +361,20 @@ fn pictures_are_drawn_in_the_size_that_is_asked_for() {
         found.1.as_array().expect("a list").iter().filter_map(Value::as_u64).collect::<Vec<_>>()
     };
     assert_eq!(shape(&[]), [224, 224, 3]);
-    assert_eq!(shape(&[("camera", "wrist".into()), ("width", 64.into()), ("height", 48.into())]), [48, 64, 3]);
+    assert_eq!(
+        shape(&[("camera", "wrist".into()), ("width", 64.into()), ("height", 48.into())]),
+        [48, 64, 3]
+    );
     assert_eq!(shape(&[("camera", "right".into())]), [240, 320, 3]);
 }
 
 #[test]
 fn what_cannot_be_served_is_refused() {
     let project = project();
-    project.write("e.lua", b"return softvt.experiment { name = \"e\", points = function() return {} end, run = function() end }");
+    project.write(
+        "e.lua",
+        b"return softvt.experiment { name = \"e\", points = function() return {} end, run = function() end }",
+    );
     let taken = TcpListener::bind("127.0.0.1:0").expect("a port");
     let port = taken.local_addr().expect("an address").port();
     for (words, told) in [

@@ -224,6 +224,11 @@ fn request(server: &Server) -> Result<ClientRequestBuilder, PolicyError> {
     if uri.host().is_none_or(str::is_empty) {
         return Err(wrong("no host"));
     }
+    let authority = uri.authority().map_or("", |authority| authority.as_str());
+    let port = authority.rsplit_once(':').map(|(_, port)| port).filter(|port| !port.ends_with(']'));
+    if let Some(port) = port.filter(|port| !port.parse::<u16>().is_ok_and(|port| port > 0)) {
+        return Err(wrong(&format!("{port:?} is no port, which is a whole number in 1..65535")));
+    }
     let request = ClientRequestBuilder::new(uri);
     Ok(match &server.api_key {
         Some(key) => request.with_header("Authorization", format!("Api-Key {key}")),

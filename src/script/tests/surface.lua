@@ -84,6 +84,9 @@ local function run()
     all("softvt.Arm", arm)
     all("softvt.View", view)
     all("softvt.Seen", view:object "cube")
+    local touch = arm:feel().left
+    all("softvt.Touch", touch)
+    all("softvt.Markers", touch.markers)
   end)
   all("softvt.Simulation", simulation)
   said[#said + 1] = { what = "seen", said = table.concat(SEEN, " "), kind = "string" }

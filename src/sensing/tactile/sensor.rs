@@ -1,5 +1,7 @@
 //! A sensor as one thing: its gel, its optics and its markers.
 
+use std::sync::Arc;
+
 use image::RgbImage;
 
 use super::{
@@ -34,6 +36,8 @@ enum Eye {
 pub struct Sensor {
     /// Its gel.
     pub gel: Gel,
+    /// What it sees without a touch.
+    pub untouched: Arc<RgbImage>,
     eye: Eye,
     markers: MarkerModel,
 }
@@ -49,6 +53,18 @@ pub struct Touched {
     pub picture: RgbImage,
 }
 
+impl Eye {
+    fn picture(&self, gel: &Gel, field: Option<&GelField>) -> RgbImage {
+        let [wide, high] = PICTURE;
+        let mut picture = RgbImage::new(wide as u32, high as u32);
+        match self {
+            Self::Polynomial { optics, shadows } => optics.picture(gel, field, *shadows, &mut picture),
+            Self::Taxim(taxim) => taxim.picture(gel, field, &mut picture),
+        }
+        picture
+    }
+}
+
 impl Sensor {
     /// A sensor of these numbers with the gel pad of a GelSight Mini.
     ///
@@ -62,7 +78,8 @@ impl Sensor {
             }
             OpticsModel::Taxim { tables } => Eye::Taxim(Box::new(Taxim::load(tables)?)),
         };
-        Ok(Self { gel, eye, markers: spec.markers })
+        let untouched = Arc::new(eye.picture(&gel, None));
+        Ok(Self { gel, untouched, eye, markers: spec.markers })
     }
 
     /// What the sensor sees of a touch.
@@ -71,14 +88,7 @@ impl Sensor {
     /// A load or friction that is no number, or a load without a skin over the pad.
     pub fn see(&self, input: &PadInput, scratch: &mut Scratch) -> Result<Touched, FieldError> {
         let field = sense(&self.gel, input, scratch)?;
-        let [wide, high] = PICTURE;
-        let mut picture = RgbImage::new(wide as u32, high as u32);
-        match &self.eye {
-            Eye::Polynomial { optics, shadows } => {
-                optics.picture(&self.gel, field.as_ref(), *shadows, &mut picture);
-            }
-            Eye::Taxim(taxim) => taxim.picture(&self.gel, field.as_ref(), &mut picture),
-        }
+        let picture = self.eye.picture(&self.gel, field.as_ref());
         let markers = markers(&self.gel, &self.markers, field.as_ref());
         Ok(Touched { field, markers, picture })
     }

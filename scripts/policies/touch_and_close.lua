@@ -1,0 +1,49 @@
+-- Goes down, closes until both fingers feel something, and lifts it: what touch alone can do, without knowing where things
+-- are. When what it holds drags harder than it is pressed, it closes a little more.
+--
+--   softvt suites/object_soft.lua --policy scripts/policies/touch_and_close.lua --episodes 1
+local DOWN, UP = 0.01, 0.005       -- m a control step
+local LOWEST, LIFT = 0.025, 0.10   -- m over the base, m
+local HELD, STEP = 0.08, 0.0125    -- px of marker motion, closure a control step
+
+local phase, start, height, closure
+
+-- The lesser of what a measure says of both fingers.
+local function least(touch, measure)
+  return math.min(measure(touch.left.markers), measure(touch.right.markers))
+end
+
+local phases = {}
+
+function phases.down()
+  height = math.max(LOWEST, height - DOWN)
+  if height == LOWEST then phase = "close" end
+end
+
+function phases.close(touch)
+  if closure == 1 or least(touch, function(m) return m:press() end) > HELD then
+    phase = "lift"
+  else
+    closure = math.min(1, closure + STEP)
+  end
+end
+
+function phases.lift(touch)
+  height = math.min(LOWEST + LIFT, height + UP)
+  if least(touch, function(m) return m:press() - m:drag() end) < 0 then closure = math.min(1, closure + STEP) end
+end
+
+return softvt.policy {
+  name = "touch_and_close",
+  looks = { touch = true },
+  reset = function() phase, start, closure = "down", nil, 0 end,
+  act = function(obs)
+    if not start then
+      start = { obs.position[1], obs.position[2] }
+      height = obs.position[3]
+    end
+    phases[phase](obs.touch)
+    -- Straight down: half a turn about x.
+    return { position = { start[1], start[2], height }, axis_angle = { math.pi, 0, 0 }, closure = closure }
+  end,
+}

@@ -1,0 +1,16 @@
+-- LIBERO's interface, as the built-in profile libero has it: to start from.
+--
+--   softvt suites/object_soft.lua --policy ws://host:8000 --profile scripts/profiles/libero.lua
+return softvt.profile {
+  name = "libero",
+  inputs = {
+    { keys = { "observation/image" }, source = "camera", camera = "third_person", half_turn = true },
+    { keys = { "observation/wrist_image" }, source = "camera", camera = "wrist", half_turn = true },
+    { keys = { "observation/state" }, source = "state", parts = { "position", "axis_angle", "finger_pair" } },
+    { keys = { "prompt" }, source = "prompt" },
+  },
+  actions = {
+    pose = "delta_osc", translation_m = 0.05, rotation_rad = 0.5,
+    gripper = { open = -1, shut = 1, binary = true },
+  },
+}

@@ -1,0 +1,250 @@
+//! Who is to drive, from what was typed: `--policy` and the flags that go with it, read once and checked.
+
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::Duration,
+};
+
+use super::{
+    Failure,
+    drivers::{Answering, Choice, Driver, Hand},
+    recorded::RecordedRuns,
+};
+use crate::{
+    policy::{
+        profile::{PROFILES, Profile},
+        remote::Protocol,
+    },
+    script::{PolicyFile, load_profile},
+};
+
+/// Policies that need no server and no file.
+pub const POLICIES: [(&str, &str); 5] = [
+    ("expert", "the task's scripted expert (privileged: it sees the true state)"),
+    ("expert-binary", "the same expert with a gripper that is only open or shut (privileged)"),
+    ("tactile-servo", "the same expert, closing until its fingers feel that the grasp holds (privileged)"),
+    ("noop", "holds still with the gripper open"),
+    ("random", "wanders at random"),
+];
+
+/// What `--policy` names.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Word {
+    /// The task's expert.
+    Expert(Hand),
+    /// Who holds still.
+    Noop,
+    /// Who wanders.
+    Random,
+    /// A policy in Lua.
+    Lua(PathBuf),
+    /// An address.
+    Server(String),
+    /// The folder of a run, or of several.
+    Run(PathBuf),
+}
+
+/// What was typed about a policy; what was not is none.
+#[derive(Clone, Debug)]
+pub struct Typed {
+    /// `--policy`.
+    pub word: Word,
+    /// `--name`.
+    pub name: Option<String>,
+    /// `--profile`.
+    pub profile: Option<String>,
+    /// `--protocol`.
+    pub protocol: Option<Protocol>,
+    /// `--replan`.
+    pub replan: Option<usize>,
+    /// `--gripper`: whether it is only open or shut.
+    pub binary: Option<bool>,
+    /// `--policy-timeout`.
+    pub patience: Option<Duration>,
+}
+
+/// Actions of a server's answers that are carried out, unless somebody says otherwise.
+pub const REPLAN: usize = 10;
+/// The profile that a server gets, unless somebody says otherwise.
+pub const PROFILE: &str = "visuo_tactile";
+/// Longest wait for a server, unless somebody says otherwise.
+pub const PATIENCE: Duration = Duration::from_secs(60);
+
+/// What stands behind `--policy`.
+///
+/// # Errors
+/// A fragment for people.
+pub fn policy_word(word: &str) -> Result<Word, String> {
+    Ok(match word {
+        "expert" => Word::Expert(Hand::Told),
+        "expert-binary" => Word::Expert(Hand::Binary),
+        "tactile-servo" => Word::Expert(Hand::Servo),
+        "noop" => Word::Noop,
+        "random" => Word::Random,
+        address if address.contains("://") => Word::Server(address.to_owned()),
+        file if file.ends_with(".lua") => Word::Lua(file.into()),
+        folder if Path::new(folder).is_dir() => Word::Run(folder.into()),
+        other => return Err(no_policy(other)),
+    })
+}
+
+fn no_policy(word: &str) -> String {
+    let known = POLICIES.map(|(name, _)| name).join(", ");
+    let near = POLICIES.iter().map(|(name, _)| (strsim::jaro_winkler(name, word), *name));
+    let meant = near.filter(|(alike, _)| *alike > 0.8).max_by(|a, b| a.0.total_cmp(&b.0));
+    let hint = meant.map_or(String::new(), |(_, name)| format!("; did you mean {name}?"));
+    format!(
+        "expected {known}, a Lua file such as my_policy.lua, a server such as ws://host:8000, or the folder of a run{hint}"
+    )
+}
+
+/// What stands behind `--profile`: a name that is known, or a Lua file.
+///
+/// # Errors
+/// A fragment for people.
+pub fn profile_word(word: &str) -> Result<String, String> {
+    if word.ends_with(".lua") || PROFILES.iter().any(|(name, _)| *name == word) {
+        return Ok(word.to_owned());
+    }
+    let known = PROFILES.map(|(name, _)| name);
+    let near = known.iter().map(|name| (strsim::jaro_winkler(name, word), name));
+    let meant = near.filter(|(alike, _)| *alike > 0.8).max_by(|a, b| a.0.total_cmp(&b.0));
+    let hint = meant.map_or(String::new(), |(_, name)| format!("; did you mean {name}?"));
+    Err(format!("[possible values: {}, or a Lua file such as my_profile.lua]{hint}", known.join(", ")))
+}
+
+/// Makes what was typed ready: reads the files that it names.
+///
+/// # Errors
+/// A file that is wrong, a folder that holds no run, or a flag that this policy has no use for.
+pub fn choose(typed: Typed) -> Result<Choice, Failure> {
+    typed.refuse_unused()?;
+    let Typed { word, name, .. } = &typed;
+    let (driver, own) = match word {
+        Word::Expert(hand) => (Driver::Expert(*hand), hand.name().to_owned()),
+        Word::Noop => (Driver::Noop, "noop".to_owned()),
+        Word::Random => (Driver::Random, "random".to_owned()),
+        Word::Lua(path) => {
+            let file = PolicyFile::load(path).map_err(Failure::input)?;
+            let replan = typed.replan.or(file.replan);
+            let name = file.name.clone();
+            (Driver::Lua(Arc::new(file), replan), name)
+        }
+        Word::Server(url) => {
+            let answering = typed.answering(url)?;
+            let name = answering.profile.name.clone();
+            (Driver::Server(Arc::new(answering)), name)
+        }
+        Word::Run(dir) => (Driver::Recorded(Arc::new(RecordedRuns::load(dir)?)), "replay".to_owned()),
+    };
+    Ok(Choice::new(driver, name.clone().unwrap_or(own)))
+}
+
+impl Typed {
+    /// Refuses flags that would be silently without effect.
+    fn refuse_unused(&self) -> Result<(), Failure> {
+        let (server, lua) = (matches!(self.word, Word::Server(_)), matches!(self.word, Word::Lua(_)));
+        let flags = [
+            ("--profile", self.profile.is_some() && !server),
+            ("--protocol", self.protocol.is_some() && !server),
+            ("--gripper", self.binary.is_some() && !server),
+            ("--policy-timeout", self.patience.is_some() && !server),
+            ("--replan", self.replan.is_some() && !server && !lua),
+        ];
+        let Some((flag, _)) = flags.into_iter().find(|(_, useless)| *useless) else { return Ok(()) };
+        let who = match flag {
+            "--replan" => "servers and Lua policies",
+            _ => "policies that answer over a network",
+        };
+        Err(Failure::input(format!("{flag}: is for {who}; --policy {} has no use for it", self.word.typed())))
+    }
+
+    /// What is shown to whoever is not of this process, and SHA-256 of the files that say so, by name.
+    ///
+    /// # Errors
+    /// A file that is wrong.
+    pub fn profile(&self) -> Result<(Profile, BTreeMap<String, String>), Failure> {
+        let word = self.profile.as_deref().unwrap_or(PROFILE);
+        let (mut profile, sources) = match Profile::named(word) {
+            Some(profile) => (profile, BTreeMap::new()),
+            None => load_profile(Path::new(word)).map_err(Failure::input)?,
+        };
+        if let Some(binary) = self.binary {
+            profile.actions.gripper.binary = binary;
+        }
+        Ok((profile, sources))
+    }
+
+    /// How a server is spoken to.
+    fn answering(&self, url: &str) -> Result<Answering, Failure> {
+        let (profile, sources) = self.profile()?;
+        Ok(Answering {
+            url: url.to_owned(),
+            protocol: self.protocol.unwrap_or_default(),
+            profile,
+            sources,
+            replan: self.replan.unwrap_or(REPLAN),
+            patience: self.patience.unwrap_or(PATIENCE),
+        })
+    }
+}
+
+impl Word {
+    /// How it was typed.
+    fn typed(&self) -> String {
+        match self {
+            Self::Expert(hand) => hand.name().to_owned(),
+            Self::Noop => "noop".to_owned(),
+            Self::Random => "random".to_owned(),
+            Self::Lua(path) | Self::Run(path) => path.display().to_string(),
+            Self::Server(url) => url.clone(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn typed(word: Word) -> Typed {
+        Typed { word, name: None, profile: None, protocol: None, replan: None, binary: None, patience: None }
+    }
+
+    #[test]
+    fn every_policy_that_is_listed_is_known_by_its_name() {
+        for (name, _) in POLICIES {
+            let choice = choose(typed(policy_word(name).unwrap())).unwrap();
+            assert_eq!(choice.name(), name);
+            assert_eq!(choice.is_privileged(), name.starts_with("expert") || name == "tactile-servo");
+        }
+    }
+
+    #[test]
+    fn words_are_told_apart_by_their_form() {
+        assert_eq!(policy_word("ws://x:1"), Ok(Word::Server("ws://x:1".into())));
+        assert_eq!(policy_word("a/b.lua"), Ok(Word::Lua("a/b.lua".into())));
+        assert_eq!(policy_word("."), Ok(Word::Run(".".into())));
+        assert!(policy_word("exprt").unwrap_err().ends_with("did you mean expert?"));
+        assert!(profile_word("visoin").unwrap_err().ends_with("did you mean vision?"));
+    }
+
+    #[test]
+    fn a_flag_that_would_do_nothing_is_refused() {
+        let said = |typed: Typed| choose(typed).unwrap_err().message;
+        let noop = || typed(Word::Noop);
+        assert_eq!(
+            said(Typed { replan: Some(3), ..noop() }),
+            "--replan: is for servers and Lua policies; --policy noop has no use for it"
+        );
+        for (flag, typed) in [
+            ("--profile", Typed { profile: Some("vision".into()), ..noop() }),
+            ("--protocol", Typed { protocol: Some(Protocol::VlaEval), ..noop() }),
+            ("--gripper", Typed { binary: Some(true), ..typed(Word::Lua("x.lua".into())) }),
+            ("--policy-timeout", Typed { patience: Some(PATIENCE), ..typed(Word::Expert(Hand::Servo)) }),
+        ] {
+            assert!(said(typed).starts_with(&format!("{flag}: is for policies that answer")));
+        }
+    }
+}
