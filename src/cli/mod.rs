@@ -1,5 +1,6 @@
 //! The command line: flags, exit codes, progress.
 
+mod again;
 mod args;
 mod batch;
 mod check;
@@ -19,6 +20,7 @@ mod replay;
 mod report;
 mod require;
 mod shard;
+mod side_files;
 mod view;
 
 use std::{panic, process::ExitCode, thread, time::Duration};

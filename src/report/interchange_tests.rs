@@ -87,9 +87,15 @@ fn files_land_where_the_scorer_finds_them() {
     write_scores(root.path(), &records(), &thresholds).unwrap();
     let identity = sample().identity;
     let frame = DebugFrame::new(&identity, 0, true, DebugShape::new("bun", None));
-    let path = write_debug_log(root.path(), &identity, &[frame.clone(), frame]).unwrap();
+    let path = debug_log_path(root.path(), identity.task, identity.episode);
     assert!(path.ends_with("softvtbench/task_000/episode_00000/policy_action_debug.jsonl"));
-    assert_eq!(fs::read_to_string(path).unwrap().lines().count(), 2);
+    for (frames, rows) in [(vec![frame.clone(), frame], 2), (vec![], 1)] {
+        write_debug_log(&path, &identity, &frames).unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap().lines().count(), rows);
+    }
+    assert!(has_scores(root.path()));
+    fs::remove_file(root.path().join("softvtbench/episodes.csv")).unwrap();
+    assert!(!has_scores(root.path()));
     let written = Thresholds::read(&root.path().join("softvtbench/thresholds.json")).unwrap();
     assert!(written.envelopes.is_empty() && written.limit("bun").is_some());
 }
