@@ -126,7 +126,23 @@ fn debug_frames(finished: &Finished) -> Vec<DebugFrame> {
         let shape = DebugShape::new(&identity.asset, measured);
         DebugFrame::new(identity, step as u32, frame.success_now, shape)
     };
-    finished.frames.iter().enumerate().map(frame).collect()
+    let mut frames: Vec<DebugFrame> = finished.frames.iter().enumerate().map(frame).collect();
+    if frames.len() < finished.record.stats.steps as usize {
+        frames.push(broken_off(finished, frames.len()));
+    }
+    frames
+}
+
+/// The row of a control step in which the physics failed: if the rollout's peak is above that of all steps before, it is of
+/// this one.
+fn broken_off(finished: &Finished, step: usize) -> DebugFrame {
+    let (identity, verdict) = (&finished.record.identity, &finished.record.verdict);
+    let before = finished.frames.iter().filter_map(|frame| Some(frame.deformation.as_ref()?.rms_pct));
+    let before = before.fold(0.0, f64::max);
+    let peak = verdict.d_peak.filter(|peak| *peak > before);
+    let shape =
+        DebugShape::broken_off(&identity.asset, finished.reference.as_ref(), peak, verdict.d_peak_max);
+    DebugFrame::new(identity, step as u32, false, shape)
 }
 
 /// A film that could not be made.

@@ -67,9 +67,9 @@ pub struct DebugShape {
     pub fem_deformation_max: Option<f64>,
     /// Diagonal of the reference's bounding box.
     pub fem_bbox_diag: Option<f64>,
-    /// How far the bounding box's extents are from the reference's.
+    /// How far the bounding box's extents are from the reference's; null also where only the peak of D is known.
     pub fem_bbox_delta: Option<f64>,
-    /// Extents of the bounding box.
+    /// Extents of the bounding box; null also where only the peak of D is known.
     pub fem_bbox_dims: Option<[f64; 3]>,
 }
 
@@ -88,6 +88,27 @@ impl DebugShape {
             fem_bbox_diag: of(|r, _| r.diagonal_m()),
             fem_bbox_delta: of(|r, d| (d.bbox_m - r.bbox_m()).norm()),
             fem_bbox_dims: measured.map(|(_, d)| d.bbox_m.into()),
+        }
+    }
+}
+
+impl DebugShape {
+    /// Of a control step that broke off: its peaks (% of the diagonal) are known if they are those of the rollout.
+    pub fn broken_off(
+        asset: &str,
+        reference: Option<&Reference>,
+        rms_pct: Option<f64>,
+        max_pct: Option<f64>,
+    ) -> Self {
+        let known = reference.zip(rms_pct);
+        Self {
+            fem_deformation_known: known.is_some(),
+            fem_deformation_metric_id: known.map(|_| METRIC_ID.into()),
+            fem_deformation_nodes: known.map(|(reference, _)| reference.len()),
+            fem_deformation_rms: known.map(|(_, rms_pct)| rms_pct),
+            fem_deformation_max: known.and(max_pct),
+            fem_bbox_diag: known.map(|(reference, _)| reference.diagonal_m()),
+            ..Self::new(asset, None)
         }
     }
 }

@@ -15,6 +15,8 @@ mod interrupt;
 mod joints;
 mod measures;
 mod observe;
+mod reports;
+mod scorer;
 mod servers;
 mod spread;
 mod support;

@@ -68,7 +68,7 @@ fn row(judged: &Judged, record: &EpisodeRecord, why: &str, out: &Path) -> Markup
             td.number { (id.episode) }
             td.text { (id.asset) }
             td.text {
-                (why)
+                (unbroken(why))
                 @if let Some(video) = video { br; a href=(video) { "video" } }
                 @else { @for command in commands(judged, id) { br; code { (command) } } }
             }
@@ -93,9 +93,14 @@ fn still(judged: &Judged, record: &EpisodeRecord, why: &str, out: &Path, room: &
                 Some(video) => a href=(video) { (picture) },
                 None => (picture),
             }
-            figcaption { b { (place) } ": " (why) }
+            figcaption { b { (place) } ": " (unbroken(why)) }
         }
     })
+}
+
+/// A sentence in which no unit is parted from its number.
+fn unbroken(text: &str) -> String {
+    text.replace(" %", "\u{a0}%").replace("τ ", "τ\u{a0}")
 }
 
 /// What to type to see an episode that was not drawn, and to see it come out the same again.
@@ -113,9 +118,14 @@ fn commands(judged: &Judged, id: &Identity) -> [String; 2] {
     let policy = if info["profile"].is_object() { "ws://HOST:PORT".to_owned() } else { text("policy") };
     let mut add = |flag: &str, value: String| view.extend([flag.to_owned(), value]);
     add("--task", id.task.to_string());
-    add("--episode", id.episode.to_string());
+    // What is so by default is left out, for a short line.
+    if id.episode > 0 {
+        add("--episode", id.episode.to_string());
+    }
     add("--policy", policy);
-    add("--seed", id.seed.to_string());
+    if id.seed > 0 {
+        add("--seed", id.seed.to_string());
+    }
     if let Some(twin) = info["twin"].as_str() {
         add("--twin", twin.to_owned());
     }

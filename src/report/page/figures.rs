@@ -200,7 +200,7 @@ pub fn kappa_curves(runs: &[Judged]) -> Markup {
                 @for quarter in 0..=4 {
                     @let at = level(25.0 * f64::from(quarter));
                     line.grid x1="0" x2="100%" y1=(y(at)) y2=(y(at)) {}
-                    text.tick x="0" y=(y(at - 3.0)) { (25 * quarter) " %" }
+                    @if quarter > 0 { text.tick x="0" y=(y(at - 3.0)) { (25 * quarter) " %" } }
                 }
                 line.limit x1="50%" x2="50%" y1=(y(level(100.0))) y2=(y(level(0.0))) {}
                 @for (i, judged) in runs.iter().enumerate() { (curve(judged, i)) }

@@ -114,7 +114,10 @@ fn deformation(runs: &[Judged]) -> Markup {
             figcaption { "Peak deformation of every valid episode over the threshold τ of its object: right of the line is not safe. Hollow dots missed the goal; bars reach from P5 to P95, the tick is the median." }
         }
         @for judged in runs.iter().filter(|judged| judged.soft() && judged.summary.by_asset.len() > 1) {
-            (folded(runs, judged, &html! { figure { (figures::by_asset(judged)) figcaption { "The same by object." } } }))
+            details.extra {
+                summary { "By object: " (judged.name()) }
+                figure { (figures::by_asset(judged)) }
+            }
         }
         h3 { "Strictness of the threshold" }
         (table(&kappas))
@@ -128,24 +131,37 @@ fn deformation(runs: &[Judged]) -> Markup {
 
 /// A table that can be scrolled where it is too wide.
 fn table(table: &Table) -> Markup {
-    let class = |column: usize| if column < table.texts { "text" } else { "number" };
+    let indices = table.rows.iter().all(|row| row[0].chars().all(|c| c.is_ascii_digit()));
+    let class = |column: usize| match column {
+        0 if indices => "index",
+        column if column < table.texts => "text",
+        _ => "number",
+    };
     html! {
         div.scroll tabindex="0" role="group" aria-label=(table.caption) {
             table {
-                caption { (table.caption) }
+                caption { span { (table.caption) } }
                 thead { tr { @for (i, head) in table.head.iter().enumerate() { th scope="col" class=(class(i)) { (head) } } } }
                 tbody {
                     @for row in &table.rows {
                         tr {
-                            @for (i, cell) in row.iter().enumerate() {
-                                @if i == 0 { th scope="row" class=(class(i)) { (cell) } }
-                                @else { td class=(class(i)) { (cell) } }
+                            @for (i, text) in row.iter().enumerate() {
+                                @if i == 0 { th scope="row" class=(class(i)) { (text) } }
+                                @else { td class=(class(i)) { (cell(text, i < table.texts)) } }
                             }
                         }
                     }
                 }
             }
         }
+    }
+}
+
+/// A cell: the interval of a number stands below it.
+fn cell(text: &str, is_text: bool) -> Markup {
+    match text.split_once(" [").filter(|_| !is_text) {
+        Some((number, interval)) => html! { (number) " " span.interval { "[" (interval) } },
+        None => html! { (text) },
     }
 }
 
