@@ -7,29 +7,26 @@ use std::{
 };
 
 use super::{
-    Failure,
-    args::{Run, Video},
+    Failure, again,
+    args::Run,
     code,
     drivers::Drivers,
-    files::{self, Calibrated, make_folder},
-    info::{self, RunInfo},
+    files::{self, Calibrated},
     progress::Progress,
     recorded::{Replayed, Wanted},
+    side_files::SideFiles,
 };
 use crate::{
     benchmark::{Goal, ObjectType, Suite, Task, seed::Split, settings::Settings},
     evaluation::{record::EpisodeRecord, safety::Limit, summary::Summary, thresholds::Thresholds},
     policy::{Streams, TaskBrief},
     report::{
-        actions,
-        film::{self, Caption, FilmError},
-        interchange::{self, DebugFrame, DebugShape},
-        run_folder::{EPISODES, RUN, RunFolder, RunFolderError, SUMMARY, replace},
+        interchange,
+        run_folder::{EPISODES, RUN, RunFolder, RunFolderError, SUMMARY, write_json},
     },
     rollout::{
         BuildError, ControlError, Controller, Episode, EpisodeError, EpisodeSpec, Finished, Looks, RestCache,
-        ScoreFrame, SenseError, Senses, Simulation, Which, batch, check_senses, check_support, stop,
-        target_asset,
+        SenseError, Senses, Simulation, Which, batch, check_senses, check_support, stop, target_asset,
     },
     scene::{Asset, Body, Scene},
     script::{self, Loaded},
@@ -47,26 +44,26 @@ enum Trial {
 /// One suite under way.
 pub(super) struct Batch<'a> {
     pub run: &'a Run,
-    loaded: &'a Loaded,
+    pub loaded: &'a Loaded,
     pub suite: &'a Suite,
     /// Name in results.
-    name: String,
-    settings: Settings,
-    jobs: Vec<(&'a Task, u32)>,
-    limits: BTreeMap<String, Option<Limit>>,
+    pub name: String,
+    pub settings: Settings,
+    pub jobs: Vec<(&'a Task, u32)>,
+    pub limits: BTreeMap<String, Option<Limit>>,
     /// The thresholds in use as one file of SoftVTBench's form.
     released: Thresholds,
     /// SHA-256 of every file that the results depend on.
     pub sources: BTreeMap<String, String>,
     /// Whose actions are carried out once more.
-    replayed: Option<Replayed>,
+    pub(super) replayed: Option<Replayed>,
     cache: RestCache,
     looks: Looks,
     pub out: PathBuf,
     /// Whether rollouts are drawn.
     pub films: bool,
     /// Whether whoever drives sees the true forces at the pads.
-    force_observed: bool,
+    pub force_observed: bool,
     pub drive: Drive,
 }
 
@@ -275,62 +272,17 @@ impl<'a> Batch<'a> {
         known.is_none_or(|known| *known == asset.fingerprint()).then_some(limit)
     }
 
-    /// Writes down what is needed to repeat the run; if it stands there already, it must be the same.
-    ///
-    /// # Errors
-    /// The file cannot be written, or is that of another run.
-    pub fn write_info(&self, folder: &RunFolder, tasks: &[&Task], episodes: u32) -> Result<(), Failure> {
-        let info = self.info(tasks, episodes)?;
-        info::write(folder, &info)
-    }
-
-    /// Whether the run in the folder is this one.
-    ///
-    /// # Errors
-    /// Its `run.json` cannot be read.
-    pub fn is_of(&self, tasks: &[&Task], episodes: u32) -> Result<bool, Failure> {
-        info::is_of(&self.out, &self.info(tasks, episodes)?)
-    }
-
-    fn info(&self, tasks: &[&Task], episodes: u32) -> Result<RunInfo<'_>, Failure> {
-        let options =
-            self.loaded.options.iter().map(|o| (o.name.clone(), format!("{:?}", o.value))).collect();
-        let info = RunInfo {
-            softvt: env!("CARGO_PKG_VERSION"),
-            script: self.loaded.main.clone(),
-            suite: &self.suite.name,
-            twin: self.run.twin.then_some("rigid"),
-            policy: self.run.policy.name(),
-            profile: self.run.policy.profile(),
-            policy_file: self.run.policy.file(),
-            replayed: self.replayed.as_ref(),
-            replan: self.run.policy.replan(),
-            privileged: self.run.policy.is_privileged(),
-            seed: self.run.seed,
-            split: Split::Validation.name(),
-            tasks: tasks.iter().map(|t| t.id).collect(),
-            episodes,
-            shard: self.run.shard.map(|shard| shard.to_string()),
-            shifts: &self.run.shifts,
-            options,
-            arguments: &self.run.script_words,
-            set: &self.run.set,
-            settings: &self.settings,
-            sources: self.sources.clone(),
-            thresholds: self.limits.iter().map(|(a, l)| (a.clone(), l.map(|l| l.tau_pct()))).collect(),
-            force_observed: self.force_observed,
-        };
-        Ok(info)
-    }
-
     /// Runs the episodes that are not `done` and sums all up.
     ///
     /// # Errors
     /// A script, policy or file that fails, or an interrupt; finished episodes are kept.
-    pub fn go(&self, mut folder: RunFolder, done: Vec<EpisodeRecord>) -> Result<Summary, Failure> {
+    pub fn go(&self, mut folder: RunFolder, done: Vec<EpisodeRecord>) -> Result<Done, Failure> {
         let mut records = done;
         let left = self.left(&records);
-        let outcome = self.run_episodes(&left, &mut folder, &mut records);
+        let outcome = match again::make_lost_files(self, &records) {
+            Ok(()) => self.run_episodes(&left, &mut folder, &mut records),
+            failed => failed,
+        };
         let kept = format!("{} of {} episodes are in {}", records.len(), self.jobs.len(), self.out.display());
         let interrupted = || {
             Failure::interrupted(format!(
@@ -354,12 +306,32 @@ impl<'a> Batch<'a> {
         }
         records.sort_by_key(|r| (r.identity.task, r.identity.episode));
         folder.put_in_order(&records).map_err(folder_failure)?;
-        let summary = Summary::of(&self.name, self.run.policy.name(), &records);
         interchange::write_scores(&self.out, &records, &self.released).map_err(folder_failure)?;
+        let done = self.summed_up(records);
         // The last of all: a folder with a summary is finished.
-        folder.write_json(SUMMARY, &summary).map_err(folder_failure)?;
+        write_json(&self.out.join(SUMMARY), &done.summary).map_err(folder_failure)?;
         crate::message::tell(&format!("softvt: {}", self.out.display()));
-        Ok(summary)
+        Ok(done)
+    }
+
+    /// Episodes with what they come to.
+    pub fn summed_up(&self, records: Vec<EpisodeRecord>) -> Done {
+        let policy = &self.run.policy;
+        let summary = Summary::of(&self.name, policy.name(), &records).of_privileged(policy.is_privileged());
+        Done { summary, records }
+    }
+
+    /// Whether nothing of a finished run is missing: no episode, and no file of one.
+    pub fn is_whole(&self, done: &[EpisodeRecord]) -> bool {
+        let files = self.files();
+        self.left(done).is_empty()
+            && interchange::has_scores(&self.out)
+            && done.iter().all(|record| files.lost(record).is_empty())
+    }
+
+    /// The files of its episodes beside their lines.
+    pub fn files(&self) -> SideFiles<'_> {
+        SideFiles::of(self.run, &self.out)
     }
 
     /// Refuses episodes of another run, or one that is there twice.
@@ -407,6 +379,7 @@ impl<'a> Batch<'a> {
         folder: &mut RunFolder,
         records: &mut Vec<EpisodeRecord>,
     ) -> Result<(), Failure> {
+        let files = self.files();
         let mut progress = Progress::new(left.len(), &self.name);
         let outcome = batch::run(
             left.len(),
@@ -414,26 +387,15 @@ impl<'a> Batch<'a> {
             &stop::FLAG,
             |index| {
                 let job = left[index];
-                let mut finished = self.episode(job, self.may_show(job))?;
-                let drawn = self.write_video(&mut finished);
+                let mut finished = self.episode(job, files.may_show(self.jobs[job].1), &self.drive)?;
+                let drawn = files.draw(&mut finished);
                 Ok((finished, drawn))
             },
             |_, (finished, drawn)| {
-                self.write_trace(&finished)?;
-                self.write_debug_log(&finished)?;
-                let id = &finished.record.identity;
-                let actions_path = actions::path(&self.out, id.task, id.episode);
-                actions::write(&actions_path, &finished.actions).map_err(folder_failure)?;
+                files.write(&finished)?;
                 folder.append(&finished.record).map_err(folder_failure)?;
                 progress.tick(&line(&finished.record));
-                // The episode counts whether or not it can be drawn.
-                if let Err(failure) = drawn {
-                    crate::message::tell(&format!(
-                        "softvt: no video of {}: {}",
-                        line(&finished.record),
-                        failure.message
-                    ));
-                }
+                tell_undrawn(&finished, drawn);
                 records.push(finished.record);
                 Ok(())
             },
@@ -442,35 +404,14 @@ impl<'a> Batch<'a> {
         outcome
     }
 
-    /// Whether a job's rollout may have to be drawn.
-    fn may_show(&self, job: usize) -> bool {
-        match &self.run.video {
-            None => false,
-            Some(Video::Episodes(chosen)) => chosen.contains(&self.jobs[job].1),
-            Some(Video::All | Video::Failed) => true,
-        }
-    }
-
-    /// The video of an episode, if it was asked for.
-    fn write_video(&self, finished: &mut Finished) -> Result<(), Failure> {
-        let (record, Some(mut film)) = (&finished.record, finished.film.take()) else { return Ok(()) };
-        if self.run.video == Some(Video::Failed) && record.verdict.safety {
-            return Ok(());
-        }
-        let id = &record.identity;
-        let path = self.out.join(format!("video/task_{:03}/episode_{:05}.mp4", id.task, id.episode));
-        make_folder(path.parent().unwrap_or(&self.out))?;
-        film::write_video(&mut film, &Caption::of(record), &path, stop::requested).map_err(film_failure)
-    }
-
-    /// Runs one job; with `film` what is needed to draw it is kept.
+    /// Runs one job by `drive`; with `film` what is needed to draw it is kept.
     ///
     /// # Errors
     /// A script, the scene or whoever drives fails.
-    pub fn episode(&self, job: usize, film: bool) -> Result<Finished, Failure> {
+    pub fn episode(&self, job: usize, film: bool, drive: &Drive) -> Result<Finished, Failure> {
         let (task, episode) = self.jobs[job];
         let (spec, opened) = self.spec(task, &self.request(task, episode))?;
-        let driver = (self.drive)(opened, self.brief(task, episode))?;
+        let driver = drive(opened, self.brief(task, episode))?;
         let mut driver = batch::Stoppable { driver, stop: &stop::FLAG };
         let started = self.start(EpisodeSpec { film, ..spec })?;
         started.run(&mut driver).map_err(|e| self.episode_failure(&e))
@@ -523,33 +464,6 @@ impl<'a> Batch<'a> {
         };
         Failure { code, message }
     }
-
-    /// SoftVTBench's log of every control step, which its own scorer reads.
-    fn write_debug_log(&self, finished: &Finished) -> Result<(), Failure> {
-        let identity = &finished.record.identity;
-        let frame = |(step, frame): (usize, &ScoreFrame)| {
-            let measured = finished.reference.as_ref().zip(frame.deformation.as_ref());
-            let shape = DebugShape::new(&identity.asset, measured);
-            DebugFrame::new(identity, step as u32, frame.success_now, shape)
-        };
-        let frames: Vec<DebugFrame> = finished.frames.iter().enumerate().map(frame).collect();
-        interchange::write_debug_log(&self.out, identity, &frames).map(|_| ()).map_err(folder_failure)
-    }
-
-    fn write_trace(&self, finished: &Finished) -> Result<(), Failure> {
-        if self.run.trace.is_none() {
-            return Ok(());
-        }
-        let id = &finished.record.identity;
-        let dir = self.out.join(format!("trace/task_{:03}", id.task));
-        make_folder(&dir)?;
-        let mut text = String::new();
-        for step in &finished.trace {
-            text += &serde_json::to_string(step).map_err(Failure::input)?;
-            text.push('\n');
-        }
-        replace(&dir.join(format!("episode_{:05}.jsonl", id.episode)), &text).map_err(folder_failure)
-    }
 }
 
 /// Whose actions are carried out once more, if any are: they must be those of this very suite, and all there.
@@ -567,11 +481,19 @@ pub(super) fn recorded(run: &Run, suite: &Suite, jobs: &[(&Task, u32)]) -> Resul
 /// Makes whoever drives an episode.
 pub type Drive = Box<dyn Fn(script::Episode, TaskBrief) -> Result<Box<dyn Controller>, Failure> + Sync>;
 
-/// A film that could not be made.
-pub(super) fn film_failure(error: FilmError) -> Failure {
-    match error {
-        FilmError::Interrupted => Failure::interrupted("interrupted"),
-        other => Failure::input(other),
+/// The episodes of a run that came to its end, in order, and what they come to.
+pub struct Done {
+    /// What they come to.
+    pub summary: Summary,
+    /// The episodes.
+    pub records: Vec<EpisodeRecord>,
+}
+
+/// An episode counts whether or not it can be drawn.
+pub(super) fn tell_undrawn(finished: &Finished, drawn: Result<(), Failure>) {
+    if let Err(failure) = drawn {
+        let message = format!("softvt: no video of {}: {}", line(&finished.record), failure.message);
+        crate::message::tell(&message);
     }
 }
 
@@ -580,7 +502,7 @@ pub(super) fn folder_failure(error: RunFolderError) -> Failure {
 }
 
 /// One episode in one line.
-fn line(record: &EpisodeRecord) -> String {
+pub(super) fn line(record: &EpisodeRecord) -> String {
     let v = &record.verdict;
     let d = v.d_peak.map_or(String::new(), |d| format!(", D {d:.2} %"));
     let outcome = match (record.outcome.is_valid(), v.safety, v.goal) {

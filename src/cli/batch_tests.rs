@@ -1,7 +1,10 @@
 use super::*;
 use crate::{
     benchmark::Plan,
-    cli::args::{self, Command},
+    cli::{
+        args::{self, Command},
+        info::{self, RunInfo},
+    },
     policy::{Action, ActionChunk, Chunked, Observation, Policy, PolicyError},
     report::run_folder::{EPISODES, RUN},
 };
@@ -47,7 +50,7 @@ fn every_file_of_a_run_says_whether_the_policy_saw_true_forces() {
         }
         batch.prepare(&tasks).expect("nothing is wrong");
         let folder = RunFolder::create(&dir).expect("a folder");
-        batch.write_info(&folder, &tasks, 1).expect("written");
+        info::write(&folder, &RunInfo::of(&batch, &tasks, 1)).expect("written");
         batch.go(folder, Vec::new()).expect("it runs");
         for file in [RUN, EPISODES, SUMMARY] {
             let text = std::fs::read_to_string(dir.join(file)).expect("written");

@@ -8,17 +8,11 @@ use crate::report::{comparison, runs};
 /// Prints the paired differences of the run or runs in `second` from those in `first`.
 ///
 /// # Errors
-/// A folder holds no run, or they share no episode.
+/// A folder holds no run or two of one suite, or they share no episode.
 pub fn run(first: &Path, second: &Path, json: bool) -> Result<(), Failure> {
     let [a, b] = [first, second].map(runs::load);
     let (a, b) = (a.map_err(Failure::input)?, b.map_err(Failure::input)?);
-    let compared = comparison::compare(&a, &b).ok_or_else(|| {
-        Failure::input(format!(
-            "{} and {} share no episode: they differ in suite, tasks, seed or split",
-            first.display(),
-            second.display()
-        ))
-    })?;
+    let compared = comparison::compare(&a, &b).map_err(Failure::input)?;
     print(&match json {
         true => format!("{:#}\n", serde_json::json!(compared)),
         false => comparison::table(&compared),

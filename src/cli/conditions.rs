@@ -14,10 +14,11 @@ use super::{
 };
 use crate::{
     benchmark::{Condition, ObjectType, REFERENCE, Suite, Task},
+    evaluation::summary::method,
     message,
     report::{
         conditions::{Outcome, Row, Rows, table},
-        run_folder::{RunFolder, read_episodes, replace},
+        run_folder::{RunFolder, replace},
     },
     script::Loaded,
 };
@@ -182,17 +183,17 @@ fn compare(
     (cases, batches): (&[Case], Vec<Option<Batch>>),
     tasks: &[&Task],
 ) -> Result<Rows, Failure> {
-    let mut reference = None;
+    let (mut reference, mut forces) = (None, false);
     let mut rows = Vec::new();
     for (case, batch) in cases.iter().zip(batches) {
         let mut outcome = None;
         if let Some(batch) = batch {
             let name = message::plain(&case.name);
             message::tell(&format!("softvt: {}, {name} ({} of {})", suite.name, rows.len() + 1, cases.len()));
-            carry_out(&batch, tasks)?;
-            let records = read_episodes(&batch.out).map_err(Failure::input)?;
-            outcome = Some(Outcome::new(case.folder.clone(), &records, reference.as_deref()));
-            reference.get_or_insert(records);
+            let done = carry_out(&batch, tasks)?;
+            outcome = Some(Outcome::new(case.folder.clone(), &done.records, reference.as_deref()));
+            reference.get_or_insert(done.records);
+            forces |= done.summary.force_observed;
         }
         rows.push(Row {
             condition: case.name.clone(),
@@ -203,7 +204,8 @@ fn compare(
         });
     }
     let deformable = suite.object_type == ObjectType::Deformable && !run.twin;
-    Ok(Rows { suite: run.name_of(suite), policy: run.policy.name().to_owned(), deformable, rows })
+    let policy = method(run.policy.name(), run.policy.is_privileged(), forces);
+    Ok(Rows { suite: run.name_of(suite), policy, deformable, rows })
 }
 
 fn write(run: &Run, loaded: &Loaded, compared: &[Rows], out: &Path) -> Result<(), Failure> {

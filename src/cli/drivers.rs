@@ -111,6 +111,11 @@ impl Choice {
         matches!(self.driver, Driver::Expert(_))
     }
 
+    /// Whether it answers over a network.
+    pub fn is_remote(&self) -> bool {
+        matches!(self.driver, Driver::Server(_))
+    }
+
     /// The profile, if the policy has one.
     pub fn profile(&self) -> Option<&Profile> {
         match &self.driver {

@@ -8,8 +8,10 @@ use std::{
 use super::{
     Failure,
     args::{Run, Video},
-    batch::{Batch, recorded},
-    conditions, experiment, print, require,
+    batch::{Batch, Done, recorded},
+    conditions, experiment,
+    info::{self, RunInfo},
+    print, require,
 };
 use crate::{
     benchmark::{Plan, Suite, Task},
@@ -155,7 +157,7 @@ pub fn single(run: &Run, task: usize) -> Result<EpisodeRecord, Failure> {
     let tasks = suite.tasks.iter().filter(|t| t.id == task);
     let jobs = tasks.map(|task| (task, 0)).collect();
     let batch = Batch::new(run, &loaded, suite, (jobs, PathBuf::new()))?;
-    batch.episode(0, false).map(|finished| finished.record)
+    batch.episode(0, false, &batch.drive).map(|finished| finished.record)
 }
 
 /// The episodes of the tasks that `--task` names, or a shard's part of them.
@@ -170,28 +172,29 @@ fn evaluate(run: &Run, loaded: &Loaded, suite: &Suite, out: PathBuf) -> Result<S
     let tasks = chosen(run, suite)?;
     let mut batch = Batch::new(run, loaded, suite, (jobs(run, suite, &tasks), out))?;
     batch.prepare(&tasks)?;
-    carry_out(&batch, &tasks)
+    Ok(carry_out(&batch, &tasks)?.summary)
 }
 
-/// Runs the jobs of a batch that is prepared, into its folder; those that are done there already only if none is left.
+/// Runs the jobs of a batch that is prepared, into its folder; those that are done there stay.
 ///
 /// # Errors
 /// The folder holds another run, or one that is not to be resumed; an episode fails.
-pub(super) fn carry_out(batch: &Batch, tasks: &[&Task]) -> Result<Summary, Failure> {
+pub(super) fn carry_out(batch: &Batch, tasks: &[&Task]) -> Result<Done, Failure> {
     let run = batch.run;
     // The same command again on a finished folder changes nothing.
     let episodes = run.episodes.unwrap_or(batch.suite.episodes);
-    let finished = is_finished(&batch.out) && batch.is_of(tasks, episodes)?;
+    let info = RunInfo::of(batch, tasks, episodes);
+    let finished = is_finished(&batch.out) && info::is_of(&batch.out, &info)?;
     let opened = match run.resume || finished {
         true => RunFolder::resume(&batch.out),
         false => RunFolder::create(&batch.out).map(|folder| (folder, Vec::new())),
     };
     let (folder, done) = opened.map_err(|e| Failure::input(format!("{}: {e}", run.file.display())))?;
     batch.check_done(&folder, &done)?;
-    batch.write_info(&folder, tasks, episodes)?;
-    if finished && batch.left(&done).is_empty() {
+    info::write(&folder, &info)?;
+    if finished && batch.is_whole(&done) {
         crate::message::tell(&format!("softvt: {} is finished already", batch.out.display()));
-        return Ok(Summary::of(&run.name_of(batch.suite), run.policy.name(), &done));
+        return Ok(batch.summed_up(done));
     }
     batch.go(folder, done)
 }

@@ -8,11 +8,15 @@ use std::{
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use super::{Failure, batch::folder_failure, recorded::Replayed};
+use super::{
+    Failure,
+    batch::{Batch, folder_failure},
+    recorded::Replayed,
+};
 use crate::{
-    benchmark::settings::Settings,
+    benchmark::{Task, seed::Split, settings::Settings},
     policy::profile::Profile,
-    report::run_folder::{RUN, RunFolder},
+    report::run_folder::{RUN, RunFolder, write_json},
 };
 
 /// Everything needed to repeat a run.
@@ -57,13 +61,46 @@ pub struct RunInfo<'a> {
     pub force_observed: bool,
 }
 
+impl<'a> RunInfo<'a> {
+    /// That of a batch that is prepared.
+    pub fn of(batch: &'a Batch, tasks: &[&Task], episodes: u32) -> Self {
+        let run = batch.run;
+        let options = batch.loaded.options.iter();
+        Self {
+            softvt: env!("CARGO_PKG_VERSION"),
+            script: batch.loaded.main.clone(),
+            suite: &batch.suite.name,
+            twin: run.twin.then_some("rigid"),
+            policy: run.policy.name(),
+            profile: run.policy.profile(),
+            policy_file: run.policy.file(),
+            replayed: batch.replayed.as_ref(),
+            replan: run.policy.replan(),
+            privileged: run.policy.is_privileged(),
+            seed: run.seed,
+            split: Split::Validation.name(),
+            tasks: tasks.iter().map(|t| t.id).collect(),
+            episodes,
+            shard: run.shard.map(|shard| shard.to_string()),
+            shifts: &run.shifts,
+            options: options.map(|o| (o.name.clone(), format!("{:?}", o.value))).collect(),
+            arguments: &run.script_words,
+            set: &run.set,
+            settings: &batch.settings,
+            sources: batch.sources.clone(),
+            thresholds: batch.limits.iter().map(|(a, l)| (a.clone(), l.map(|l| l.tau_pct()))).collect(),
+            force_observed: batch.force_observed,
+        }
+    }
+}
+
 /// Writes it down; if it stands there already, it must be the same.
 ///
 /// # Errors
 /// The file cannot be written, or is that of another run.
 pub fn write(folder: &RunFolder, info: &RunInfo) -> Result<(), Failure> {
     let Some(known) = folder.read(RUN).map_err(folder_failure)? else {
-        return folder.write_json(RUN, info).map_err(folder_failure);
+        return write_json(&folder.path().join(RUN), info).map_err(folder_failure);
     };
     let path = folder.path().join(RUN).display().to_string();
     let known: Value = serde_json::from_str(&known)
@@ -87,14 +124,28 @@ pub fn is_of(dir: &Path, info: &RunInfo) -> Result<bool, Failure> {
     Ok(serde_json::from_str::<Value>(&text).is_ok_and(|known| known == json!(info)))
 }
 
-/// Longest value that is told.
-const TOLD: usize = 60;
+/// Letters of the longest value that is told whole: a hash is.
+const TOLD: usize = 80;
+/// Letters before the first difference of longer ones.
+const BEFORE: usize = 16;
+
+/// Two values that differ, each short, with that in which they differ.
+fn told(a: &Value, b: &Value) -> [String; 2] {
+    let [a, b] = [a, b].map(|value| value.to_string().chars().collect::<Vec<char>>());
+    let same = a.iter().zip(&b).take_while(|(a, b)| a == b).count();
+    let from = if a.len().max(b.len()) <= TOLD { 0 } else { same.saturating_sub(BEFORE) };
+    [a, b].map(|letters| {
+        let head = if from > 0 { "…" } else { "" };
+        let tail = if letters.len() > from + TOLD { "…" } else { "" };
+        let shown: String = letters.into_iter().skip(from).take(TOLD).collect();
+        format!("{head}{shown}{tail}")
+    })
+}
 
 /// Where two documents differ first, with both values.
 pub fn difference(known: &Value, now: &Value) -> Option<String> {
     let (Value::Object(a), Value::Object(b)) = (known, now) else {
-        let short = |value: &Value| value.to_string().chars().take(TOLD).collect::<String>();
-        return (known != now).then(|| format!("{} then, {} now", short(known), short(now)));
+        return (known != now).then(|| told(known, now).join(" then, ") + " now");
     };
     let names: BTreeSet<&String> = a.keys().chain(b.keys()).collect();
     names.into_iter().find_map(|name| {
@@ -118,5 +169,19 @@ mod tests {
         assert_eq!(difference(&a, &b).unwrap(), "settings.physics.dt: 0.0166 then, 0.01 now");
         let c = json!({ "seed": 0, "settings": { "physics": { "dt": 0.0166 } } });
         assert_eq!(difference(&a, &c).unwrap(), "shifts: [] then, null now");
+    }
+
+    #[test]
+    fn what_differs_is_shown_however_late_it_comes() {
+        let hash = |last: char| "0123456789abcdef".repeat(4)[..63].to_owned() + &last.to_string();
+        let (a, b) = (json!({ "x.lua": hash('1') }), json!({ "x.lua": hash('2') }));
+        let told = difference(&a, &b).unwrap();
+        assert!(told.contains(&hash('1')) && told.contains(&hash('2')), "{told}");
+        let list = |last: usize| json!({ "tasks": (0..100).chain([last]).collect::<Vec<_>>() });
+        let told = difference(&list(777), &list(888)).unwrap();
+        assert_eq!(told, "tasks: …,95,96,97,98,99,777] then, …,95,96,97,98,99,888] now");
+        let long = |letter: &str| json!({ "a": "x".repeat(300) + letter + &"y".repeat(300) });
+        let told = difference(&long("1"), &long("2")).unwrap();
+        assert!(told.contains("x1y") && told.contains("x2y") && told.chars().count() < 200, "{told}");
     }
 }

@@ -1,5 +1,6 @@
 //! The command line: flags, exit codes, progress.
 
+mod again;
 mod args;
 mod batch;
 mod check;
@@ -21,6 +22,7 @@ mod report;
 mod require;
 mod serve;
 mod shard;
+mod side_files;
 mod view;
 mod who;
 

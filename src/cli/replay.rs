@@ -4,17 +4,11 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use super::{
-    Failure, args::Run, batch::Batch, code, drivers::Choice, evaluate::chosen, info::difference, print,
-};
+use super::{Failure, again, args::Run, batch::Batch, code, drivers::Choice, evaluate::chosen, print};
 use crate::{
     benchmark::{Plan, Suite},
-    evaluation::record::{EpisodeRecord, Outcome},
-    policy::{Chunked, recorded::Recorded},
-    report::{
-        actions,
-        runs::{self, StoredRun},
-    },
+    evaluation::record::EpisodeRecord,
+    report::runs::{self, StoredRun},
     script,
 };
 
@@ -62,31 +56,15 @@ pub fn run(dir: &Path, which: Which) -> Result<(), Failure> {
     let run = Run { tasks: vec![task.to_string()], ..run };
     let tasks = chosen(&run, suite)?;
     let mut batch = Batch::new(&run, &loaded, suite, (vec![(tasks[0], episode)], PathBuf::new()))?;
-    let path = actions::path(&stored.dir, task, episode);
-    let recorded = actions::read(&path).map_err(Failure::input)?;
-    let ending = match &record.outcome {
-        Outcome::Error { message } => Some(message.clone()),
-        _ => None,
-    };
-    batch.drive = Box::new(move |_, brief| {
-        Ok(Box::new(Chunked::new(Box::new(Recorded::new(recorded.clone(), ending.clone())), brief, 1)))
-    });
+    batch.drive = again::drive(&stored.dir, record)?;
     batch.prepare(&tasks)?;
     same_sources(stored, &batch)?;
-    let mut again = batch.episode(0, false)?.record;
-    // Who drove, and what was looked at, is not simulated again.
-    again.identity.policy.clone_from(&record.identity.policy);
-    again.stats.force_observed = record.stats.force_observed;
-    again.stats.camera_inside = record.stats.camera_inside;
-    let bytes = |record: &EpisodeRecord| serde_json::to_string(record).map_err(Failure::input);
-    if bytes(&again)? == bytes(record)? {
-        print(&format!(
-            "task {task} episode {episode}: the same to the byte, final state {}\n",
-            again.stats.state_hash
-        ));
+    let simulated = again::known(batch.episode(0, false, &batch.drive)?.record, record);
+    let Some(what) = again::difference(record, &simulated)? else {
+        let hash = &simulated.stats.state_hash;
+        print(&format!("task {task} episode {episode}: the same to the byte, final state {hash}\n"));
         return Ok(());
-    }
-    let what = difference(&json!(record), &json!(again)).unwrap_or_default();
+    };
     Err(Failure {
         code: code::INTERNAL,
         message: format!(

@@ -4,31 +4,37 @@ use std::path::{Path, PathBuf};
 
 use super::{Failure, files::make_folder};
 use crate::report::{
+    judged::judge,
     page,
     run_folder::replace,
     runs,
-    tables::{self, Judged},
+    tables::{Table, all_tables},
 };
+
+/// What the LaTeX file needs.
+const LATEX_HEAD: &str =
+    "% Needs \\usepackage{booktabs}; of names in other alphabets, LuaLaTeX or XeLaTeX.\n";
 
 /// Writes `report.html`, `report.md` and `report.tex` into `out`.
 ///
 /// # Errors
 /// A folder holds no run, or a file cannot be written.
 pub fn run(dirs: &[PathBuf], out: &Path) -> Result<(), Failure> {
-    let mut judged = Vec::new();
+    let mut stored = Vec::new();
     for dir in dirs {
-        judged.extend(runs::load(dir).map_err(Failure::input)?.into_iter().map(Judged::new));
+        stored.extend(runs::load(dir).map_err(Failure::input)?);
     }
-    judged.sort_by(|a, b| a.summary.suite.cmp(&b.summary.suite));
-    let mut all = vec![tables::main_table(&judged)];
-    all.extend(tables::deformation_table(&judged));
-    all.extend(judged.iter().map(tables::task_table));
-    let joined = |text: fn(&tables::Table) -> String| all.iter().map(text).collect::<Vec<_>>().join("\n");
+    let judged = judge(stored);
+    for remark in judged.iter().flat_map(|judged| judged.run.remarks()) {
+        crate::message::tell(&format!("softvt: {remark}"));
+    }
+    let all = all_tables(&judged);
+    let joined = |text: fn(&Table) -> String| all.iter().map(text).collect::<Vec<_>>().join("\n");
     make_folder(out)?;
     for (name, text) in [
-        ("report.html", page::page(&judged)),
-        ("report.md", joined(tables::Table::markdown)),
-        ("report.tex", joined(tables::Table::latex)),
+        ("report.html", page::page(&judged, out)),
+        ("report.md", joined(Table::markdown)),
+        ("report.tex", LATEX_HEAD.to_owned() + &joined(Table::latex)),
     ] {
         replace(&out.join(name), text).map_err(Failure::input)?;
     }

@@ -1,25 +1,14 @@
 //! `softvt view`: one episode as a video and stills.
 
 use super::{
-    Failure,
-    args::View,
-    batch::{Batch, film_failure},
-    evaluate::chosen,
-    files::make_folder,
-    print,
+    Failure, args::View, batch::Batch, evaluate::chosen, files::make_folder, print, side_files::film_failure,
 };
 use crate::{
     benchmark::Plan,
-    physics::world::Frame,
-    report::film::{Caption, write_panels, write_stills, write_video},
+    report::film::{Caption, worst_moment, write_panels, write_stills, write_video},
     rollout::stop,
     script,
 };
-
-/// How hard the pads are pressed on, N: what is worst for something that does not deform.
-fn press(frame: &Frame) -> f64 {
-    frame.patches.iter().flat_map(|patch| &patch.points).map(|point| point.pressure * point.area).sum()
-}
 
 /// Runs one episode and writes into the folder: `episode.mp4`, one of its pictures as `episode.png`, and stills of its
 /// first, worst and last states. Files of the same name are replaced.
@@ -52,12 +41,11 @@ pub fn run(view: &View) -> Result<(), Failure> {
     batch.films = true;
     batch.prepare(&[task])?;
     make_folder(&dir)?;
-    let finished = batch.episode(0, true)?;
+    let finished = batch.episode(0, true, &batch.drive)?;
     let caption = Caption::of(&finished.record);
     let Some(mut film) = finished.film else { return Ok(()) };
     let last = film.frames.len().saturating_sub(1);
-    let hard = |at: usize| film.d_pct[at].unwrap_or_else(|| press(&film.frames[at]));
-    let worst = (0..=last).max_by(|&a, &b| hard(a).total_cmp(&hard(b)).then(b.cmp(&a))).unwrap_or(0);
+    let worst = worst_moment(&film);
     let moments = [("start", 0), ("worst", worst), ("end", last)];
     let mut written =
         write_stills(&mut film, &moments, view.native, &dir, stop::requested).map_err(film_failure)?;

@@ -100,6 +100,9 @@ pub struct Summary {
     pub suite: String,
     /// Policy name.
     pub policy: String,
+    /// Whether the policy sees the true state, which no robot does.
+    #[serde(default)]
+    pub privileged: bool,
     /// Whether the policy saw the true forces at the pads in any episode; no real sensor gives them.
     #[serde(default)]
     pub force_observed: bool,
@@ -158,6 +161,7 @@ impl Summary {
         Self {
             suite: suite.into(),
             policy: policy.into(),
+            privileged: false,
             force_observed: records.iter().any(|r| r.stats.force_observed),
             scores: Scores::of(&records),
             kappa: kappa_curve(&records),
@@ -166,6 +170,25 @@ impl Summary {
             gave_up: records.iter().filter_map(|record| given_up(record)).collect(),
         }
     }
+}
+
+impl Summary {
+    /// The same of a policy that is privileged or not: its episodes do not say.
+    pub fn of_privileged(self, privileged: bool) -> Self {
+        Self { privileged, ..self }
+    }
+
+    /// The policy, and what it has that no robot has: as every table names it.
+    pub fn method(&self) -> String {
+        method(&self.policy, self.privileged, self.force_observed)
+    }
+}
+
+/// A policy's name with what it has that no robot has.
+pub fn method(policy: &str, privileged: bool, force_observed: bool) -> String {
+    let marks = [(privileged, "privileged"), (force_observed, "force_observed")];
+    let marks: Vec<&str> = marks.into_iter().filter_map(|(is, mark)| is.then_some(mark)).collect();
+    if marks.is_empty() { policy.to_owned() } else { format!("{policy} ({})", marks.join(", ")) }
 }
 
 fn grouped<'a, K: Ord>(

@@ -4,32 +4,18 @@ use std::{collections::BTreeMap, fmt::Write};
 
 use serde::Serialize;
 
-use super::runs::StoredRun;
+use super::{
+    differences::{Deformation, KEY, WIDTH, head, rows, shortened},
+    runs::StoredRun,
+};
 use crate::evaluation::{
-    difference::{MeanDifference, RateDifference},
+    paired::{Pair, Paired, by_task, key, pairs},
     record::EpisodeRecord,
+    summary::method,
 };
 
-/// What makes an episode of two runs the same.
-type Key<'a> = (&'a str, usize, u32, u64, &'a str, &'a str);
-
-fn key(record: &EpisodeRecord) -> Key<'_> {
-    let id = &record.identity;
-    (&id.suite, id.task, id.episode, id.seed, &id.split, &id.layout)
-}
-
-/// Differences over a group of episodes: the second run minus the first.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Differences {
-    /// Goal Success, points.
-    pub goal: RateDifference,
-    /// NoDrop, points.
-    pub no_drop: RateDifference,
-    /// Safety Success, points.
-    pub safety: RateDifference,
-    /// Peak D where both have one, % of the diagonal.
-    pub d_peak: MeanDifference,
-}
+/// Columns of a policy's name at the head.
+const POLICY: usize = 40;
 
 /// One task of a suite.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -40,80 +26,164 @@ pub struct TaskDifferences {
     pub task: usize,
     /// Instruction.
     pub prompt: String,
-    /// Its differences.
+    /// Its differences: the second run minus the first.
     #[serde(flatten)]
-    pub differences: Differences,
+    pub differences: Paired,
 }
 
 /// Two runs compared.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Comparison {
-    /// What the first is called.
+    /// What the first is called, with what its policy has that no robot has.
     pub first: String,
     /// What the second is called.
     pub second: String,
+    /// Whether something that is judged deforms.
+    pub deformable: bool,
     /// Episodes that only one of them has.
     pub unmatched: usize,
     /// What the runs were not alike in besides their policies: paths of `run.json`.
     pub unlike: Vec<String>,
+    /// Runs of which episodes are missing: a sentence each.
+    pub partial: Vec<String>,
     /// All episodes that both have.
-    pub all: Differences,
+    pub all: Paired,
     /// By task, in order.
     pub by_task: Vec<TaskDifferences>,
 }
 
-impl Differences {
-    fn of(pairs: &[(&EpisodeRecord, &EpisodeRecord)]) -> Self {
-        let rate = |test: fn(&EpisodeRecord) -> bool| {
-            let holds = |r: &EpisodeRecord| r.outcome.is_valid() && test(r);
-            RateDifference::of(pairs.iter().map(|(a, b)| (holds(a), holds(b))))
-        };
-        Self {
-            goal: rate(|r| r.verdict.goal),
-            no_drop: rate(|r| r.verdict.no_drop),
-            safety: rate(|r| r.verdict.safety),
-            d_peak: MeanDifference::of(pairs.iter().filter_map(|(a, b)| {
-                let peak = |r: &EpisodeRecord| r.verdict.d_peak.filter(|_| r.outcome.is_valid());
-                peak(a).zip(peak(b))
-            })),
-        }
-    }
+/// Why two runs cannot be compared.
+#[derive(Debug, thiserror::Error)]
+pub enum CompareError {
+    /// A folder has an episode in two runs: nobody knows which one is meant.
+    #[error(
+        "{first} and {second} both hold suite {suite} task {task} episode {episode}: compare one run of a suite at a time; name its folder"
+    )]
+    Twice {
+        /// A run's folder.
+        first: String,
+        /// Another's.
+        second: String,
+        /// Of the episode.
+        suite: String,
+        /// Of the episode.
+        task: usize,
+        /// Index.
+        episode: u32,
+    },
+    /// A run has no episode yet.
+    #[error("{dir} has no episode yet")]
+    Empty {
+        /// Its folder.
+        dir: String,
+    },
+    /// They have no episode in common.
+    #[error("{first} and {second} share no episode: {why}")]
+    Nothing {
+        /// The folder of one.
+        first: String,
+        /// The other's.
+        second: String,
+        /// In what their episodes differ.
+        why: String,
+    },
 }
 
-/// Compares the episodes that both have; `None` if there is none.
-pub fn compare(first: &[StoredRun], second: &[StoredRun]) -> Option<Comparison> {
-    let index = |runs: &'_ [StoredRun]| -> usize { runs.iter().map(|run| run.records.len()).sum() };
-    let of_second: BTreeMap<Key, &EpisodeRecord> =
-        second.iter().flat_map(|run| &run.records).map(|record| (key(record), record)).collect();
-    let of_first: BTreeMap<Key, &EpisodeRecord> =
-        first.iter().flat_map(|run| &run.records).map(|record| (key(record), record)).collect();
-    let pairs: Vec<(&EpisodeRecord, &EpisodeRecord)> =
-        of_first.iter().filter_map(|(key, a)| Some((*a, *of_second.get(key)?))).collect();
+/// Compares the episodes that both have: `first` and `second` are the runs of two folders, of several suites each or of one.
+///
+/// # Errors
+/// An episode is there twice on one side, or none is on both.
+pub fn compare(first: &[StoredRun], second: &[StoredRun]) -> Result<Comparison, CompareError> {
+    for runs in [first, second] {
+        once(runs)?;
+    }
+    let count = |runs: &[StoredRun]| -> usize { runs.iter().map(|run| run.records.len()).sum() };
+    let pairs = pairs(records(first), records(second));
     if pairs.is_empty() {
-        return None;
+        return Err(nothing(first, second));
     }
-    let mut tasks: BTreeMap<(&str, usize), Vec<(&EpisodeRecord, &EpisodeRecord)>> = BTreeMap::new();
-    for pair in &pairs {
-        tasks.entry((&pair.0.identity.suite, pair.0.identity.task)).or_default().push(*pair);
-    }
-    let by_task = tasks.into_iter().map(|((suite, task), pairs)| TaskDifferences {
+    let task = |((suite, task), pairs): ((&str, usize), Vec<Pair>)| TaskDifferences {
         suite: suite.to_owned(),
         task,
         prompt: pairs[0].0.identity.prompt.clone(),
-        differences: Differences::of(&pairs),
-    });
-    Some(Comparison {
+        differences: Paired::of(&pairs),
+    };
+    let all = || first.iter().chain(second);
+    Ok(Comparison {
         first: name(first),
         second: name(second),
-        unmatched: index(first) + index(second) - 2 * pairs.len(),
+        deformable: pairs.iter().any(|(a, _)| a.identity.soft),
+        unmatched: count(first) + count(second) - 2 * pairs.len(),
         unlike: unlike(first, second),
-        all: Differences::of(&pairs),
-        by_task: by_task.collect(),
+        partial: all()
+            .filter(|run| run.is_partial())
+            .flat_map(|run| run.remarks().into_iter().take(1))
+            .collect(),
+        all: Paired::of(&pairs),
+        by_task: by_task(&pairs).into_iter().map(task).collect(),
     })
 }
 
+fn records(runs: &[StoredRun]) -> impl Iterator<Item = &EpisodeRecord> {
+    runs.iter().flat_map(|run| &run.records)
+}
+
+/// No episode may be there twice: one of the two would be left out in silence.
+fn once(runs: &[StoredRun]) -> Result<(), CompareError> {
+    let mut known = BTreeMap::new();
+    for run in runs {
+        let dir = || run.dir.display().to_string();
+        if run.records.is_empty() && runs.len() == 1 {
+            return Err(CompareError::Empty { dir: dir() });
+        }
+        for record in &run.records {
+            if let Some(other) = known.insert(key(record), &run.dir) {
+                let id = &record.identity;
+                return Err(CompareError::Twice {
+                    first: other.display().to_string(),
+                    second: dir(),
+                    suite: id.suite.clone(),
+                    task: id.task,
+                    episode: id.episode,
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Says in what the episodes of two runs differ that have none in common.
+fn nothing(first: &[StoredRun], second: &[StoredRun]) -> CompareError {
+    let of = |runs: &[StoredRun], what: fn(&StoredRun) -> String| {
+        let mut values: Vec<String> = runs.iter().map(what).collect();
+        values.sort();
+        values.dedup();
+        values
+    };
+    let fields: [(&str, fn(&StoredRun) -> String); 4] = [
+        ("suite", |run| run.suite().to_owned()),
+        ("seed", |run| run.info["seed"].to_string()),
+        ("split", |run| run.text("split").to_owned()),
+        ("tasks", |run| run.info["tasks"].to_string()),
+    ];
+    let differ = fields.iter().find_map(|(name, what)| {
+        let (a, b) = (of(first, *what), of(second, *what));
+        a.iter()
+            .all(|value| !b.contains(value))
+            .then(|| format!("{name} {} there, {} here", a.join(", "), b.join(", ")))
+    });
+    let dir = |runs: &[StoredRun]| runs.first().map_or_else(String::new, |run| run.dir.display().to_string());
+    CompareError::Nothing {
+        first: dir(first),
+        second: dir(second),
+        why: differ.unwrap_or_else(|| "what is finished of them does not overlap".to_owned()),
+    }
+}
+
 fn name(runs: &[StoredRun]) -> String {
-    let mut names: Vec<&str> = runs.iter().map(|run| run.text("policy")).collect();
+    let mut names: Vec<String> =
+        runs.iter().map(|run| method(run.text("policy"), run.is_privileged(), run.sees_forces())).collect();
+    names.sort();
     names.dedup();
     names.join(", ")
 }
@@ -123,7 +193,7 @@ fn unlike(first: &[StoredRun], second: &[StoredRun]) -> Vec<String> {
     const JUDGED_BY: [&str; 7] = ["softvt", "twin", "shifts", "options", "settings", "sources", "thresholds"];
     let mut found: Vec<String> = Vec::new();
     for a in first {
-        let Some(b) = second.iter().find(|b| b.text("suite") == a.text("suite")) else { continue };
+        let Some(b) = second.iter().find(|b| b.suite() == a.suite()) else { continue };
         found.extend(
             JUDGED_BY.iter().filter(|field| a.info[**field] != b.info[**field]).map(|f| (*f).to_owned()),
         );
@@ -133,61 +203,43 @@ fn unlike(first: &[StoredRun], second: &[StoredRun]) -> Vec<String> {
     found
 }
 
-/// The comparison as a table.
+/// The comparison as a table of at most 100 columns.
 pub fn table(comparison: &Comparison) -> String {
     let mut out = String::new();
     // Writing to a String cannot fail.
-    let mut line = |text: String| {
+    let mut line = |text: &str| {
         let _ = writeln!(out, "{}", text.trim_end());
     };
-    line(format!("{} → {}: {} paired episodes", comparison.first, comparison.second, comparison.all.goal.n));
-    line(format!(
-        "{:<34} {:>20} {:>20} {:>22}",
-        "", "Goal, points", "Safety, points", "D peak, % of diagonal"
+    let rule = "─".repeat(WIDTH);
+    let deformation = if comparison.deformable { Deformation::Peak } else { Deformation::None };
+    line(&format!(
+        "{} → {} · {} paired episodes",
+        shortened(&comparison.first, POLICY),
+        shortened(&comparison.second, POLICY),
+        comparison.all.pairs
     ));
+    line(&rule);
+    line(&head("", ["first", "second"]));
     let mut suite = "";
     for task in &comparison.by_task {
         if task.suite != suite {
             suite = &task.suite;
-            line(suite.to_owned());
+            line(&rule);
+            line(&shortened(suite, WIDTH));
         }
-        let prompt: String = task.prompt.chars().take(28).collect();
-        line(row(&format!("{:>3} {prompt}", task.task), &task.differences));
+        let name = format!("{:>3} {}", task.task, task.prompt);
+        rows(&name, &task.differences, deformation).iter().for_each(|row| line(row));
     }
-    line(row("all", &comparison.all));
-    line(format!(
-        "{:<34} {:>20} {:>20}",
-        "episodes gained, lost",
-        counts(&comparison.all.goal),
-        counts(&comparison.all.safety)
-    ));
-    line(format!(
-        "{:<34} {:>20.4} {:>20.4}",
-        "p (McNemar, exact)", comparison.all.goal.p, comparison.all.safety.p
-    ));
+    line(&rule);
+    rows("all", &comparison.all, deformation).iter().for_each(|row| line(row));
+    line(&rule);
+    line(KEY);
     if comparison.unmatched > 0 {
-        line(format!("{} episodes that only one run has are left out", comparison.unmatched));
+        line(&format!("{} episodes that only one run has are left out", comparison.unmatched));
     }
+    comparison.partial.iter().for_each(|remark| line(remark));
     if !comparison.unlike.is_empty() {
-        line(format!("the runs also differ in {} (run.json)", comparison.unlike.join(", ")));
+        line(&format!("the runs also differ in {} (run.json)", comparison.unlike.join(", ")));
     }
-    line("second minus first; 95 % intervals: Agresti and Min for rates, bootstrap for D".to_owned());
     out
-}
-
-fn row(name: &str, d: &Differences) -> String {
-    let rate = |of: &RateDifference| spread(of.difference, of.interval95, 1);
-    let d_peak = spread(d.d_peak.difference, d.d_peak.interval95, 2);
-    format!("{name:<34} {:>20} {:>20} {d_peak:>22}", rate(&d.goal), rate(&d.safety))
-}
-
-fn spread(value: Option<f64>, interval: Option<[f64; 2]>, digits: usize) -> String {
-    let Some(value) = value else { return "–".to_owned() };
-    let bounds =
-        interval.map_or_else(String::new, |[low, high]| format!(" [{low:+.digits$}, {high:+.digits$}]"));
-    format!("{value:+.digits$}{bounds}")
-}
-
-fn counts(of: &RateDifference) -> String {
-    format!("{}, {}", of.gained, of.lost)
 }

@@ -4,17 +4,16 @@ use std::fmt::Write;
 
 use serde::{Deserialize, Serialize};
 
+use super::differences::{Deformation, KEY, WIDTH, head, rows, shortened};
 use crate::evaluation::{
-    paired::{Change, Paired, d_over_tau},
+    paired::{Paired, d_over_tau, pairs},
     record::EpisodeRecord,
     statistics::{Distribution, Rate},
     summary::Scores,
 };
 
 /// Columns of a condition's name.
-const NAME: usize = 20;
-/// Columns of the whole table.
-const WIDTH: usize = 98;
+const NAME: usize = 40;
 
 /// What a run of one condition came to.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -49,7 +48,7 @@ impl Outcome {
             no_drop_rate: scores.no_drop_rate,
             safety_success_rate: scores.safety_success_rate,
             d_over_tau: Distribution::of(records.iter().filter_map(d_over_tau).collect()),
-            paired: reference.map(|reference| Paired::of(reference, records)),
+            paired: reference.map(|reference| Paired::of(&pairs(reference, records))),
         }
     }
 }
@@ -74,7 +73,7 @@ pub struct Row {
 pub struct Rows {
     /// Suite name.
     pub suite: String,
-    /// Policy name.
+    /// Policy name, with what it has that no robot has.
     pub policy: String,
     /// Whether targets deform, so that D/τ says something.
     pub deformable: bool,
@@ -82,7 +81,8 @@ pub struct Rows {
     pub rows: Vec<Row>,
 }
 
-/// The table of a suite, in plain text of at most 100 columns.
+/// The tables of a suite, in plain text of at most 100 columns: the rates of every condition, and how each differs from the
+/// reference, episode by episode.
 pub fn table(suite: &Rows) -> String {
     let mut out = String::new();
     let conditions = suite.rows.len().saturating_sub(1);
@@ -90,26 +90,39 @@ pub fn table(suite: &Rows) -> String {
     line(
         &mut out,
         &format!(
-            "{} · policy {} · {conditions} conditions against the reference · {episodes} episodes a condition",
+            "{} · policy {} · {conditions} conditions · {episodes} episodes each",
             suite.suite, suite.policy
         ),
     );
     rule(&mut out);
-    let heading =
-        ["Goal", "NoDrop", "Safety", "D/τ", "inval.", "Goal +/-", "NoDrop +/-", "Safety +/-", "Δ D/τ +/-"];
+    let heading = ["Goal, %", "NoDrop, %", "Safety, %", "D peak/τ", "invalid"];
     line(&mut out, &cells("condition", heading.map(str::to_owned)));
     rule(&mut out);
     for row in &suite.rows {
         line(&mut out, &row_text(row, suite.deformable));
     }
     rule(&mut out);
-    line(&mut out, "+/-: episodes better / worse than the same one of the reference; of D/τ, less is better");
     for row in &suite.rows {
         if let Some(why) = &row.not_applicable {
             line(&mut out, &format!("{}: N/A, {why}", row.condition));
         }
     }
+    against_reference(&mut out, suite);
     out
+}
+
+fn against_reference(out: &mut String, suite: &Rows) {
+    let deformation = if suite.deformable { Deformation::OverTau } else { Deformation::None };
+    line(out, &head("against the reference", ["there", "here"]));
+    rule(out);
+    for row in &suite.rows {
+        let paired = row.outcome.as_ref().and_then(|outcome| outcome.paired.as_ref());
+        for text in paired.map(|paired| rows(&row.condition, paired, deformation)).unwrap_or_default() {
+            line(out, &text);
+        }
+    }
+    rule(out);
+    line(out, KEY);
 }
 
 fn row_text(row: &Row, deformable: bool) -> String {
@@ -117,21 +130,8 @@ fn row_text(row: &Row, deformable: bool) -> String {
         return cells(&row.condition, std::array::from_fn(|_| "N/A".to_owned()));
     };
     let percent = |rate: &Rate| rate.rate.map_or_else(|| "–".to_owned(), |rate| format!("{rate:.1}"));
-    let counts = |change: Change| format!("{}/{}", change.better, change.worse);
-    let absent = || if deformable { "–" } else { "N/A" }.to_owned();
-    let ratio = outcome.d_over_tau.mean.map_or_else(absent, |mean| format!("{mean:.3}"));
-    let compared = match &outcome.paired {
-        None => Default::default(),
-        Some(paired) => [
-            counts(paired.goal),
-            counts(paired.no_drop),
-            counts(paired.safety),
-            paired
-                .d_over_tau_mean
-                .map_or_else(absent, |mean| format!("{mean:+.3} {}", counts(paired.d_over_tau))),
-        ],
-    };
-    let [goal, no_drop, safety, deformation] = compared;
+    let absent = if deformable { "–" } else { "N/A" };
+    let ratio = outcome.d_over_tau.mean.map_or_else(|| absent.to_owned(), |mean| format!("{mean:.3}"));
     cells(
         &row.condition,
         [
@@ -140,23 +140,15 @@ fn row_text(row: &Row, deformable: bool) -> String {
             percent(&outcome.safety_success_rate),
             ratio,
             outcome.invalid.to_string(),
-            goal,
-            no_drop,
-            safety,
-            deformation,
         ],
     )
 }
 
-fn cells(name: &str, cells: [String; 9]) -> String {
-    let short: String = match name.chars().count() <= NAME {
-        true => name.to_owned(),
-        false => name.chars().take(NAME - 1).chain(['…']).collect(),
-    };
-    let mut text = format!("{short:<NAME$}");
-    for (cell, width) in cells.iter().zip([6, 7, 7, 6, 7, 9, 11, 11, 14]) {
+fn cells(name: &str, cells: [String; 5]) -> String {
+    let mut text = format!("{:<NAME$}", shortened(name, NAME));
+    for cell in cells {
         // Writing to a String cannot fail.
-        let _ = write!(text, "{cell:>width$}");
+        let _ = write!(text, "{cell:>11}");
     }
     text
 }
@@ -192,7 +184,7 @@ mod tests {
             rows: vec![
                 row("reference", Some(Outcome::new("reference".into(), &reference, None))),
                 row("heavy", Some(Outcome::new("heavy".into(), &[worse], Some(&reference)))),
-                row("a condition with a long name", None),
+                row("a condition with a name that is very long", None),
             ],
         };
         let text = table(&suite);
@@ -201,8 +193,18 @@ mod tests {
             text.lines().find(|line| line.starts_with(start)).unwrap().split_whitespace().collect()
         };
         assert_eq!(words("reference"), ["reference", "100.0", "100.0", "100.0", "0.333", "0"]);
-        let heavy = ["heavy", "100.0", "100.0", "0.0", "1.500", "0", "0/0", "0/0", "0/1", "+1.167", "0/1"];
-        assert_eq!(words("heavy"), heavy);
-        assert!(text.contains("a condition with a …   N/A") && text.contains("N/A, nothing in it deforms"));
+        assert_eq!(words("heavy  "), ["heavy", "100.0", "100.0", "0.0", "1.500", "0"]);
+        let (_, against) = text.split_once("against the reference  ").unwrap();
+        let rows: Vec<&str> = against.lines().skip_while(|line| !line.starts_with("heavy")).take(4).collect();
+        let cell = |row: usize, columns: &[&str]| {
+            assert!(columns.iter().all(|cell| rows[row].contains(cell)), "{columns:?} in {}", rows[row]);
+        };
+        cell(0, &["heavy", "Goal, %", "100.0   100.0", "+0.0 ", " 0     0 "]);
+        cell(2, &["Safety, %", "100.0     0.0", "-100.0", " 0     1 ", "1.000"]);
+        cell(3, &["D peak/τ", "0.33    1.50", "+1.17", " 0     1"]);
+        assert!(
+            text.contains("a condition with a name that is very lo…")
+                && text.contains(": N/A, nothing in it deforms")
+        );
     }
 }

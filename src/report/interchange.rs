@@ -25,6 +25,12 @@ use super::run_folder::{RunFolderError, io_error, replace};
 
 /// Name of the folder in a run folder.
 pub const FOLDER: &str = "softvtbench";
+/// One row an episode.
+const EPISODES_CSV: &str = "episodes.csv";
+/// Rates, %.
+const SUMMARY_JSON: &str = "summary.json";
+/// τ by asset, % of the bounding-box diagonal.
+pub const THRESHOLDS_JSON: &str = "thresholds.json";
 
 /// One control step of `policy_action_debug.jsonl`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -61,9 +67,9 @@ pub struct DebugShape {
     pub fem_deformation_max: Option<f64>,
     /// Diagonal of the reference's bounding box.
     pub fem_bbox_diag: Option<f64>,
-    /// How far the bounding box's extents are from the reference's.
+    /// How far the bounding box's extents are from the reference's; null also where only the peak of D is known.
     pub fem_bbox_delta: Option<f64>,
-    /// Extents of the bounding box.
+    /// Extents of the bounding box; null also where only the peak of D is known.
     pub fem_bbox_dims: Option<[f64; 3]>,
 }
 
@@ -86,7 +92,33 @@ impl DebugShape {
     }
 }
 
+impl DebugShape {
+    /// Of a control step that broke off: its peaks (% of the diagonal) are known if they are those of the rollout.
+    pub fn broken_off(
+        asset: &str,
+        reference: Option<&Reference>,
+        rms_pct: Option<f64>,
+        max_pct: Option<f64>,
+    ) -> Self {
+        let known = reference.zip(rms_pct);
+        Self {
+            fem_deformation_known: known.is_some(),
+            fem_deformation_metric_id: known.map(|_| METRIC_ID.into()),
+            fem_deformation_nodes: known.map(|(reference, _)| reference.len()),
+            fem_deformation_rms: known.map(|(_, rms_pct)| rms_pct),
+            fem_deformation_max: known.and(max_pct),
+            fem_bbox_diag: known.map(|(reference, _)| reference.diagonal_m()),
+            ..Self::new(asset, None)
+        }
+    }
+}
+
 impl DebugFrame {
+    /// The only row of an episode that ended before its first control step: the scorer counts no episode without one.
+    pub fn none(identity: &Identity) -> Self {
+        Self::new(identity, 0, false, DebugShape::new(&identity.asset, None))
+    }
+
     /// The frame of control step `frame` of an episode.
     pub fn new(identity: &Identity, frame: u32, success_now: bool, shape: DebugShape) -> Self {
         Self {
@@ -100,29 +132,37 @@ impl DebugFrame {
     }
 }
 
-/// Writes an episode's `policy_action_debug.jsonl` below the run folder `dir` and says where.
+/// Where an episode's `policy_action_debug.jsonl` is in the run folder `dir`.
+pub fn debug_log_path(dir: &Path, task: usize, episode: u32) -> PathBuf {
+    // Zero-padded, so that the scorer, which sorts paths, meets the episodes in our order.
+    dir.join(FOLDER).join(format!("task_{task:03}/episode_{episode:05}/policy_action_debug.jsonl"))
+}
+
+/// Writes an episode's `policy_action_debug.jsonl` to `path`.
 ///
 /// # Errors
 /// The file cannot be written.
 pub fn write_debug_log(
-    dir: &Path,
+    path: &Path,
     identity: &Identity,
     frames: &[DebugFrame],
-) -> Result<PathBuf, RunFolderError> {
-    // Zero-padded, so that the scorer, which sorts paths, meets the episodes in our order.
-    let episode = format!("task_{:03}/episode_{:05}", identity.task, identity.episode);
-    let folder = dir.join(FOLDER).join(episode);
-    fs::create_dir_all(&folder).map_err(io_error("make the folder", &folder))?;
-    let path = folder.join("policy_action_debug.jsonl");
+) -> Result<(), RunFolderError> {
+    let folder = path.parent().unwrap_or(path);
+    fs::create_dir_all(folder).map_err(io_error("make the folder", folder))?;
+    let none = [DebugFrame::none(identity)];
     let mut text = String::new();
-    for frame in frames {
+    for frame in if frames.is_empty() { &none[..] } else { frames } {
         let line = serde_json::to_string(frame)
             .map_err(|source| RunFolderError::Json { path: path.display().to_string(), source })?;
         text.push_str(&line);
         text.push('\n');
     }
-    replace(&path, &text)?;
-    Ok(path)
+    replace(path, &text)
+}
+
+/// Whether all that [`write_scores`] writes is there.
+pub fn has_scores(dir: &Path) -> bool {
+    [EPISODES_CSV, SUMMARY_JSON, THRESHOLDS_JSON].iter().all(|name| dir.join(FOLDER).join(name).is_file())
 }
 
 /// Writes `episodes.csv`, `summary.json` and `thresholds.json` of one suite's `records` below the run folder `dir`.
@@ -137,9 +177,9 @@ pub fn write_scores(
     let folder = dir.join(FOLDER);
     fs::create_dir_all(&folder).map_err(io_error("make the folder", &folder))?;
     let released = Thresholds { envelopes: BTreeMap::new(), ..thresholds.clone() };
-    replace(&folder.join("episodes.csv"), episodes_csv(records))?;
-    replace(&folder.join("summary.json"), format!("{:#}\n", summary(records)))?;
-    replace(&folder.join("thresholds.json"), released.to_text())
+    replace(&folder.join(EPISODES_CSV), episodes_csv(records))?;
+    replace(&folder.join(SUMMARY_JSON), format!("{:#}\n", summary(records)))?;
+    replace(&folder.join(THRESHOLDS_JSON), released.to_text())
 }
 
 /// `compression_sweep.jsonl`: the sweep rows of an asset. Their closure is the *opening*, 1 open … 0 shut.
@@ -208,7 +248,7 @@ fn episodes_csv(records: &[EpisodeRecord]) -> String {
             number(verdict.tau),
             truth(deform_ok(record)),
             truth(safe_success(record)),
-            record.stats.steps,
+            record.stats.steps.max(1),
             quoted(&reason(record)),
         );
     }

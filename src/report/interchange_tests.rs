@@ -74,6 +74,15 @@ fn a_debug_frame_says_how_the_target_is_shaped() {
     assert_eq!(frame["fem_deformation_rms"], d.rms_pct);
     assert!((frame["fem_bbox_diag"].as_f64().unwrap() - 0.07).abs() < 1e-12);
     assert!((frame["fem_bbox_delta"].as_f64().unwrap() - 0.03).abs() < 1e-12);
+    let broken = serde_json::to_value(DebugShape::broken_off("bun", Some(&reference), Some(9.5), Some(20.0)));
+    let broken = broken.unwrap();
+    assert_eq!(
+        (&broken["fem_deformation_known"], &broken["fem_deformation_rms"]),
+        (&json!(true), &json!(9.5))
+    );
+    assert!(broken["fem_bbox_dims"].is_null() && broken["fem_bbox_diag"] == frame["fem_bbox_diag"]);
+    let unknown = DebugShape::broken_off("bun", Some(&reference), None, Some(20.0));
+    assert_eq!(unknown, DebugShape::new("bun", None), "its peak was before");
     let unknown = serde_json::to_value(DebugShape::new("box", None)).unwrap();
     assert_eq!(unknown["fem_deformation_known"], false);
     assert!(unknown["fem_deformation_rms"].is_null());
@@ -87,9 +96,15 @@ fn files_land_where_the_scorer_finds_them() {
     write_scores(root.path(), &records(), &thresholds).unwrap();
     let identity = sample().identity;
     let frame = DebugFrame::new(&identity, 0, true, DebugShape::new("bun", None));
-    let path = write_debug_log(root.path(), &identity, &[frame.clone(), frame]).unwrap();
+    let path = debug_log_path(root.path(), identity.task, identity.episode);
     assert!(path.ends_with("softvtbench/task_000/episode_00000/policy_action_debug.jsonl"));
-    assert_eq!(fs::read_to_string(path).unwrap().lines().count(), 2);
+    for (frames, rows) in [(vec![frame.clone(), frame], 2), (vec![], 1)] {
+        write_debug_log(&path, &identity, &frames).unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap().lines().count(), rows);
+    }
+    assert!(has_scores(root.path()));
+    fs::remove_file(root.path().join("softvtbench/episodes.csv")).unwrap();
+    assert!(!has_scores(root.path()));
     let written = Thresholds::read(&root.path().join("softvtbench/thresholds.json")).unwrap();
     assert!(written.envelopes.is_empty() && written.limit("bun").is_some());
 }

@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use super::{
     interchange,
-    run_folder::{EPISODES, RUN, RunFolderError, SUMMARY, io_error, line, replace},
+    run_folder::{EPISODES, RUN, RunFolderError, SUMMARY, io_error, line, replace, write_json},
     runs::{RunsError, StoredRun, load},
 };
 use crate::evaluation::{record::EpisodeRecord, summary::Summary, thresholds::Thresholds};
@@ -126,22 +126,18 @@ fn write(
             copy(&run.dir.join(name), &folder.join(name))?;
         }
     }
-    let json = |path: PathBuf, text: serde_json::Result<String>| {
-        let text =
-            text.map_err(|source| RunFolderError::Json { path: path.display().to_string(), source })?;
-        replace(&path, text + "\n")
-    };
     let lines: Result<String, RunFolderError> =
         records.iter().map(|r| line(r, &folder.join(EPISODES))).collect();
     replace(&folder.join(EPISODES), lines?)?;
-    json(folder.join(RUN), serde_json::to_string_pretty(info))?;
-    let path = runs[0].dir.join(interchange::FOLDER).join("thresholds.json");
+    write_json(&folder.join(RUN), info)?;
+    let path = runs[0].dir.join(interchange::FOLDER).join(interchange::THRESHOLDS_JSON);
     let text = fs::read_to_string(&path).map_err(io_error("read", &path))?;
     let thresholds = Thresholds::parse(&text, &path.display().to_string())
         .map_err(|error| MergeError::Unfit(error.to_string()))?;
     interchange::write_scores(folder, records, &thresholds)?;
-    let summary = Summary::of(runs[0].text("suite"), runs[0].text("policy"), records);
-    json(folder.join(SUMMARY), serde_json::to_string_pretty(&summary))?;
+    let summary = Summary::of(runs[0].text("suite"), runs[0].text("policy"), records)
+        .of_privileged(runs[0].is_privileged());
+    write_json(&folder.join(SUMMARY), &summary)?;
     Ok(summary)
 }
 

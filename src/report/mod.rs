@@ -3,12 +3,15 @@
 pub mod actions;
 pub mod comparison;
 pub mod conditions;
+mod differences;
 pub mod envelope;
 pub mod film;
 pub mod interchange;
+pub mod judged;
 pub mod merge;
 pub mod page;
 pub mod run_folder;
 pub mod runs;
+mod table_text;
 pub mod tables;
 pub mod terminal;

@@ -195,18 +195,16 @@ impl RunFolder {
         let _ = fs::remove_dir(&self.dir);
         Ok(())
     }
+}
 
-    /// Writes `value` as indented JSON to the file `name` of the folder, aside and then renamed: a reader sees the old
-    /// file or the new one, never a part.
-    ///
-    /// # Errors
-    /// The value is no JSON, or the file cannot be written.
-    pub fn write_json<T: Serialize>(&self, name: &str, value: &T) -> Result<(), RunFolderError> {
-        let path = self.dir.join(name);
-        let text = serde_json::to_string_pretty(value)
-            .map_err(|source| RunFolderError::Json { path: path.display().to_string(), source })?;
-        replace(&path, &(text + "\n"))
-    }
+/// Writes `value` as indented JSON, aside and then renamed: a reader sees the old file or the new one, never a part.
+///
+/// # Errors
+/// The value is no JSON, or the file cannot be written.
+pub fn write_json<T: Serialize>(path: &Path, value: &T) -> Result<(), RunFolderError> {
+    let text = serde_json::to_string_pretty(value)
+        .map_err(|source| RunFolderError::Json { path: path.display().to_string(), source })?;
+    replace(path, text + "\n")
 }
 
 /// Keeps other processes out until the file is closed, which the system does for a process that dies.
@@ -333,7 +331,7 @@ mod tests {
         assert!(error.contains("already holds a run (episodes.jsonl)") && error.contains("--out"), "{error}");
         assert_eq!(indices(root.path()), [0]);
         fs::remove_file(root.path().join(EPISODES)).unwrap();
-        folder.write_json(RUN, &1).unwrap();
+        write_json(&root.path().join(RUN), &1).unwrap();
         assert!(RunFolder::create(root.path()).unwrap_err().to_string().contains("run.json"));
     }
 
@@ -365,10 +363,10 @@ mod tests {
     #[test]
     fn json_is_replaced_whole_and_nothing_stays_aside() {
         let root = tempfile::tempdir().unwrap();
-        let folder = RunFolder::create(root.path()).unwrap();
-        folder.write_json(SUMMARY, &vec![1, 2]).unwrap();
-        folder.write_json(SUMMARY, &vec![3]).unwrap();
-        assert_eq!(fs::read_to_string(root.path().join(SUMMARY)).unwrap(), "[\n  3\n]\n");
-        assert_eq!(fs::read_dir(root.path()).unwrap().count(), 2);
+        let path = root.path().join(SUMMARY);
+        write_json(&path, &vec![1, 2]).unwrap();
+        write_json(&path, &vec![3]).unwrap();
+        assert_eq!(fs::read_to_string(path).unwrap(), "[\n  3\n]\n");
+        assert_eq!(fs::read_dir(root.path()).unwrap().count(), 1);
     }
 }

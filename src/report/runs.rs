@@ -7,8 +7,11 @@ use std::{
 
 use serde_json::Value;
 
-use super::run_folder::{EPISODES, RUN, RunFolderError, io_error, read_episodes};
+use super::run_folder::{EPISODES, RUN, RunFolderError, SUMMARY, io_error, read_episodes};
 use crate::evaluation::record::EpisodeRecord;
+
+/// The version that made what this binary makes.
+const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// What is in a run folder.
 #[derive(Clone, Debug)]
@@ -19,6 +22,8 @@ pub struct StoredRun {
     pub info: Value,
     /// Its episodes, in the order of the tasks.
     pub records: Vec<EpisodeRecord>,
+    /// Whether it came to its end.
+    pub finished: bool,
 }
 
 /// Why runs cannot be read.
@@ -27,6 +32,26 @@ pub enum RunsError {
     /// The system refused, or a line is not an episode.
     #[error(transparent)]
     Folder(#[from] RunFolderError),
+    /// The same, of a run that another version made: which is the likely cause.
+    #[error("{error}; softvt {version} made this run, and this is softvt {VERSION}: read it with that one")]
+    Version {
+        /// What is wrong.
+        error: Box<Self>,
+        /// Who made it.
+        version: String,
+    },
+    /// There is nothing of that name.
+    #[error("there is no folder {dir}")]
+    Missing {
+        /// The folder.
+        dir: String,
+    },
+    /// A file is not a folder.
+    #[error("{path} is a file; give the folder of a run")]
+    File {
+        /// The file.
+        path: String,
+    },
     /// There is no run.
     #[error("{dir} holds no run: neither it nor a folder in it has {RUN} and {EPISODES}")]
     None {
@@ -49,9 +74,55 @@ impl StoredRun {
         self.info[field].as_str().unwrap_or_default()
     }
 
-    /// Suite and policy.
-    pub fn suite_and_policy(&self) -> (&str, &str) {
-        (self.text("suite"), self.text("policy"))
+    /// The suite's name in results: that of a twin is its own.
+    pub fn suite(&self) -> &str {
+        self.records.first().map_or(self.text("suite"), |record| &record.identity.suite)
+    }
+
+    /// Whether its policy sees the true state.
+    pub fn is_privileged(&self) -> bool {
+        self.info["privileged"].as_bool() == Some(true)
+    }
+
+    /// Whether its policy sees the true forces at the pads.
+    pub fn sees_forces(&self) -> bool {
+        self.info["force_observed"].as_bool() == Some(true)
+    }
+
+    /// Episodes that it has when it is done: all, or a shard's part of them.
+    pub fn wanted(&self) -> usize {
+        let tasks = self.info["tasks"].as_array().map_or(0, Vec::len);
+        let all = tasks * self.info["episodes"].as_u64().unwrap_or(0) as usize;
+        let shard = self.text("shard").split_once('/');
+        match shard.and_then(|(i, n)| Some((i.parse::<usize>().ok()?, n.parse::<usize>().ok()?))) {
+            Some((index, count)) if index > 0 && count > 0 => (all + count - index.min(all + count)) / count,
+            _ => all,
+        }
+    }
+
+    /// Whether episodes are missing: it is at work, or was broken off.
+    pub fn is_partial(&self) -> bool {
+        !self.finished || self.records.len() < self.wanted()
+    }
+
+    /// What a reader of its results should know: a sentence each.
+    pub fn remarks(&self) -> Vec<String> {
+        let mut found = Vec::new();
+        let dir = self.dir.display();
+        if self.is_partial() {
+            found.push(format!(
+                "{dir} is not finished: it has {} of {} episodes; it is at work, or goes on with --resume",
+                self.records.len(),
+                self.wanted()
+            ));
+        }
+        if self.text("softvt") != VERSION {
+            found.push(format!(
+                "softvt {} made {dir}, and this is softvt {VERSION}: numbers of two versions may differ",
+                self.text("softvt")
+            ));
+        }
+        found
     }
 }
 
@@ -63,15 +134,21 @@ pub fn load(dir: &Path) -> Result<Vec<StoredRun>, RunsError> {
     if dir.join(RUN).is_file() {
         return Ok(vec![one(dir)?]);
     }
+    let shown = || dir.display().to_string();
+    if dir.is_file() {
+        return Err(RunsError::File { path: shown() });
+    }
     let mut inner: Vec<PathBuf> = match fs::read_dir(dir) {
         Ok(entries) => entries.filter_map(Result::ok).map(|entry| entry.path()).collect(),
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            return Err(RunsError::Missing { dir: shown() });
+        }
         Err(error) => return Err(io_error("read", dir)(error).into()),
     };
     inner.retain(|path| path.join(RUN).is_file());
     inner.sort();
     if inner.is_empty() {
-        return Err(RunsError::None { dir: dir.display().to_string() });
+        return Err(RunsError::None { dir: shown() });
     }
     inner.iter().map(|dir| one(dir)).collect()
 }
@@ -81,12 +158,25 @@ fn one(dir: &Path) -> Result<StoredRun, RunsError> {
     let text = fs::read_to_string(&path).map_err(io_error("read", &path))?;
     let wrong = |what: String| RunsError::Info { path: path.display().to_string(), what };
     let info: Value = serde_json::from_str(&text).map_err(|e| wrong(e.to_string()))?;
-    for field in ["softvt", "script", "suite", "policy"] {
-        if info[field].as_str().is_none() {
-            return Err(wrong(format!("it has no {field}")));
+    let version = info["softvt"].as_str().unwrap_or_default().to_owned();
+    let read = || -> Result<StoredRun, RunsError> {
+        for field in ["softvt", "script", "suite", "policy"] {
+            if info[field].as_str().is_none() {
+                return Err(wrong(format!("it has no {field}")));
+            }
         }
-    }
-    let mut records = read_episodes(dir)?;
-    records.sort_by_key(|r| (r.identity.task, r.identity.episode));
-    Ok(StoredRun { dir: dir.to_owned(), info, records })
+        for (field, fits) in [("tasks", info["tasks"].is_array()), ("episodes", info["episodes"].is_u64())] {
+            if !fits {
+                return Err(wrong(format!("it has no {field}")));
+            }
+        }
+        let mut records = read_episodes(dir)?;
+        records.sort_by_key(|r| (r.identity.task, r.identity.episode));
+        let finished = dir.join(SUMMARY).is_file();
+        Ok(StoredRun { dir: dir.to_owned(), info: info.clone(), records, finished })
+    };
+    read().map_err(|error| match version == VERSION || version.is_empty() {
+        true => error,
+        false => RunsError::Version { error: Box::new(error), version },
+    })
 }

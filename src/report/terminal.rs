@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use super::differences::shortened;
 use crate::evaluation::{
     safety::KAPPAS,
     statistics::{Distribution, Rate},
@@ -21,7 +22,10 @@ pub fn table(summary: &Summary) -> String {
     let mut out = String::new();
     let scores = &summary.scores;
     let soft = scores.deformation_ok_rate.is_some();
-    line(&mut out, &format!("{} · policy {} · {} episodes", summary.suite, summary.policy, scores.episodes));
+    line(
+        &mut out,
+        &format!("{} · policy {} · {} episodes", summary.suite, summary.method(), scores.episodes),
+    );
     rule(&mut out);
     line(
         &mut out,
@@ -93,6 +97,9 @@ fn footer(out: &mut String, summary: &Summary) {
             ),
         );
     }
+    if summary.privileged {
+        line(out, "the policy saw the true state (privileged): no robot has it");
+    }
     if summary.force_observed {
         line(out, "the policy saw true forces at the pads (force_observed): no real sensor gives them");
     }
@@ -119,10 +126,7 @@ fn gave_up(out: &mut String, summary: &Summary) {
     }
     line(out, &format!("{} gave up in {} episodes:", summary.policy, all.len()));
     for GivenUp { task, episode, reason } in all.iter().take(MOST_REASONS) {
-        line(
-            out,
-            &shortened(&format!("  task {task} episode {episode}: {}", reason.replace('\n', " ")), WIDTH),
-        );
+        line(out, &shortened(&format!("  task {task} episode {episode}: {reason}"), WIDTH));
     }
     if all.len() > MOST_REASONS {
         line(out, &format!("  … and {} more, in summary.json", all.len() - MOST_REASONS));
@@ -146,13 +150,6 @@ fn line(out: &mut String, text: &str) {
 fn rule(out: &mut String) {
     // Writing to a String cannot fail.
     let _ = writeln!(out, "{}", "─".repeat(WIDTH));
-}
-
-fn shortened(text: &str, width: usize) -> String {
-    if text.chars().count() <= width {
-        return text.into();
-    }
-    text.chars().take(width - 1).chain(['…']).collect()
 }
 
 /// What distinguishes the prompts: whole words that all begin or end with are left out.

@@ -11,7 +11,7 @@ use super::{
 use crate::policy::{
     Observation,
     encode::{Content, content},
-    profile::{ACTION_LEN, ActionCode, PoseCode, Source, StatePart},
+    profile::{ACTION_LEN, ActionCode, PoseCode, Source, StatePart, Units},
 };
 
 /// Farther than the arm gets along any axis of its base, m.
@@ -40,11 +40,15 @@ pub fn observation(offer: &Offer, first: &Observation) -> Value {
 
 /// An action of seven numbers.
 pub fn action(code: &ActionCode) -> Value {
-    let mut high = match code.pose {
-        PoseCode::Absolute => vec![REACH_M, REACH_M, REACH_M, HALF_TURN, HALF_TURN, HALF_TURN],
-        PoseCode::DeltaOsc { .. } => vec![1.0; ACTION_LEN - 1],
+    let most = match code.pose {
+        PoseCode::Absolute => [REACH_M, REACH_M, REACH_M, HALF_TURN, HALF_TURN, HALF_TURN],
+        PoseCode::Delta { .. } | PoseCode::DeltaOsc { .. } => [1.0; ACTION_LEN - 1],
     };
-    let mut low: Vec<f64> = high.iter().map(|x| -x).collect();
+    let Units { scale, offset } = code.units.unwrap_or(Units::SAME);
+    // In the actor's own units, whose factors may be negative.
+    let end = |i: usize, sign: f64| (sign * scale[i].signum() * most[i] - offset[i]) / scale[i];
+    let mut low: Vec<f64> = (0..most.len()).map(|i| end(i, -1.0)).collect();
+    let mut high: Vec<f64> = (0..most.len()).map(|i| end(i, 1.0)).collect();
     low.push(code.gripper.open.min(code.gripper.shut));
     high.push(code.gripper.open.max(code.gripper.shut));
     numbers("<f8", &[ACTION_LEN], low, high)

@@ -16,6 +16,8 @@ mod joints;
 mod killed;
 mod measures;
 mod observe;
+mod reports;
+mod scorer;
 mod serve;
 mod servers;
 mod spread;

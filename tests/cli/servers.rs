@@ -300,6 +300,17 @@ fn a_server_that_dies_loses_no_finished_episode_and_the_run_goes_on_to_the_same_
     }
     let again = run(&broken, &address, "--episodes 3");
     assert!(again.code == 0 && again.err.contains("finished already"), "{}", again.err);
+    // Files of finished episodes come back from the actions, without the policy; without actions they are told to be lost.
+    let log = "run/softvtbench/task_000/episode_00001/policy_action_debug.jsonl";
+    let text = broken.text(log);
+    std::fs::remove_file(broken.path(log)).expect("removed");
+    let again = run(&broken, &address, "--episodes 3");
+    assert!(again.code == 0 && again.err.contains("1 finished episodes lack files"), "{}", again.err);
+    assert_eq!(broken.text(log), text);
+    std::fs::remove_dir_all(broken.path("run/actions")).expect("removed");
+    let again = run(&broken, &address, "--episodes 3");
+    assert!(again.code == 0 && again.err.contains("3 finished episodes lack their actions"), "{}", again.err);
+    assert_eq!(broken.text("run/episodes.jsonl"), whole.text("run/episodes.jsonl"));
 }
 
 #[test]

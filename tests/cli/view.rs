@@ -74,6 +74,11 @@ fn a_run_draws_the_episodes_that_were_asked_for() {
     assert_eq!(drawn("--video=1", "chosen"), [false, true]);
     assert_eq!(drawn("--video", "failed"), [true, true], "waiting is not safe");
     assert_eq!(drawn("--video=all", "all"), [true, true]);
+    // Of what is not safe there is a still of the worst moment, as large as a picture of the video.
+    let still = fs::read(project.path("failed/video/task_000/episode_00001.png")).expect("written");
+    assert_eq!(png_size(&still), [1024, 1056]);
+    assert!(shows_something(&still, [1024, 1056]));
+    assert!(!project.path("chosen/video/task_000/episode_00000.png").exists());
     assert_eq!(
         project.text("none/episodes.jsonl"),
         project.text("all/episodes.jsonl"),

@@ -15,6 +15,7 @@ use crate::{
     dataset::video::{VideoError, VideoWriter},
     evaluation::record::EpisodeRecord,
     message::number,
+    physics::world::Frame,
     rollout::{CAMERA_PICTURES, FINGER_PICTURES, FINGERS, Film, SenseError},
     scene::Camera,
     sensing::{
@@ -185,6 +186,27 @@ fn chart(canvas: &mut Canvas, film: &Film, caption: &Caption, index: usize, [x, 
 
 fn round(x: f64) -> f64 {
     (100.0 * x).round() / 100.0
+}
+
+/// Where the video of an episode is in a run folder.
+pub fn video_path(dir: &Path, task: usize, episode: u32) -> PathBuf {
+    dir.join(format!("video/task_{task:03}/episode_{episode:05}.mp4"))
+}
+
+/// Where the still of an episode's worst moment is in a run folder.
+pub fn still_path(dir: &Path, task: usize, episode: u32) -> PathBuf {
+    video_path(dir, task, episode).with_extension("png")
+}
+
+/// The state in which the target is deformed most; where it does not deform, in which the pads are pressed on most.
+pub fn worst_moment(film: &Film) -> usize {
+    // Forces on the pads, N.
+    let press = |frame: &Frame| -> f64 {
+        frame.patches.iter().flat_map(|patch| &patch.points).map(|point| point.pressure * point.area).sum()
+    };
+    let hard = |at: usize| film.d_pct[at].unwrap_or_else(|| press(&film.frames[at]));
+    let all = 0..film.frames.len().min(film.d_pct.len());
+    all.max_by(|&a, &b| hard(a).total_cmp(&hard(b)).then(b.cmp(&a))).unwrap_or(0)
 }
 
 /// Writes one picture of the video as a PNG file.

@@ -1,67 +1,49 @@
-//! One or several runs as one HTML file that needs no other: tables, figures, failures with their films, settings.
+//! One or several runs as one HTML file that needs no network and no script: tables, figures, failures with their stills,
+//! settings.
 
+mod failures;
 mod figures;
+mod pictures;
+mod settings;
 
-use std::{fs, path::Path};
+use std::path::Path;
 
-use data_encoding::BASE64;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use super::tables::{Judged, Table, deformation_table, main_table, reason, task_table};
-use crate::evaluation::record::EpisodeRecord;
+use super::{
+    judged::Judged,
+    tables::{Table, deformation_table, kappa_table, main_table, task_table},
+};
 
-/// Failed episodes of a run that are listed.
-const LISTED: usize = 60;
-/// Bytes of films that the page carries; the others are named.
-const FILMS: usize = 24 << 20;
+/// Runs whose details are open from the start.
+const OPEN: usize = 4;
 
-/// The page of some runs.
-pub fn page(runs: &[Judged]) -> String {
-    let mut room = FILMS;
-    let suites: Vec<String> = runs.iter().map(|judged| judged.summary.suite.clone()).collect();
+/// The page of some runs, to be written into the folder `out`.
+pub fn page(runs: &[Judged], out: &Path) -> String {
     let episodes: usize = runs.iter().map(|judged| judged.run.records.len()).sum();
-    let soft = || runs.iter().filter(|judged| !judged.summary.kappa.is_empty());
+    let title = format!("softvt: {}", suites(runs).join(", "));
     let markup = html! {
         (DOCTYPE)
         html lang="en" {
             head {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
-                title { "softvt: " (named(&suites)) }
+                meta name="color-scheme" content="light dark";
+                title { (title) }
                 style { (PreEscaped(include_str!("page.css"))) }
             }
             body {
-                h1 { "softvt: " (named(&suites)) }
-                p.lead { (episodes) " episodes in " (runs.len()) @if runs.len() == 1 { " run" } @else { " runs" } ", softvt " (env!("CARGO_PKG_VERSION")) }
-                (table(&main_table(runs)))
-                figure {
-                    (figures::goal_and_safety(runs))
-                    figcaption { "What completes the task and what does so safely; whiskers are 95 % Wilson intervals." }
+                header {
+                    h1 { (title) }
+                    p.lead { (counted(episodes, "episode")) " in " (counted(runs.len(), "run")) " · softvt " (env!("CARGO_PKG_VERSION")) }
+                    (contents(runs))
                 }
-                @if let Some(deformation) = deformation_table(runs) {
-                    h2 { "Deformation" }
-                    (table(&deformation))
-                    @for judged in soft() {
-                        figure {
-                            (figures::distributions(judged))
-                            figcaption { (judged.summary.suite) ", " (judged.method()) ": peak deformation of every valid episode." }
-                        }
-                    }
-                    figure {
-                        (figures::kappa_curves(runs))
-                        figcaption { "Safety Success as the thresholds are made stricter (left) or looser (right)." }
-                    }
-                }
-                h2 { "Tasks" }
-                @for judged in runs { (table(&task_table(judged))) }
-                h2 { "Failures" }
-                @for judged in runs { (failures(judged, &mut room)) }
-                h2 { "Settings" }
-                @for judged in runs {
-                    details {
-                        summary { (judged.summary.suite) ", " (judged.method()) ": " (judged.run.dir.display()) }
-                        pre { (format!("{:#}", judged.run.info)) }
-                    }
+                main {
+                    (results(runs))
+                    (deformation(runs))
+                    (section("tasks", "Tasks", &html! { @for judged in runs { (folded(runs, judged, &table(&task_table(judged)))) } }))
+                    (section("failures", "Episodes that are not safe", &failures::failures(runs, out)))
+                    (section("settings", "Settings", &html! { @for judged in runs { (settings::settings(judged)) } }))
                 }
             }
         }
@@ -69,24 +51,105 @@ pub fn page(runs: &[Judged]) -> String {
     markup.into_string()
 }
 
-/// Names without repetition.
-fn named(names: &[String]) -> String {
-    let mut names = names.to_vec();
-    names.sort();
+/// Names of suites without repetition.
+fn suites(runs: &[Judged]) -> Vec<String> {
+    let mut names: Vec<String> = runs.iter().map(|judged| judged.summary.suite.clone()).collect();
     names.dedup();
-    names.join(", ")
+    names
 }
 
-fn table(table: &Table) -> Markup {
-    let class = |column: usize| if column < table.texts { "text" } else { "" };
+fn counted(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
+}
+
+fn contents(runs: &[Judged]) -> Markup {
+    let soft = runs.iter().any(Judged::soft);
     html! {
-        div.scroll {
+        nav aria-label="Contents" {
+            a href="#results" { "Results" }
+            @if soft { a href="#deformation" { "Deformation" } }
+            a href="#tasks" { "Tasks" }
+            a href="#failures" { "Not safe" }
+            a href="#settings" { "Settings" }
+        }
+    }
+}
+
+fn section(id: &str, heading: &str, content: &Markup) -> Markup {
+    html! { section id=(id) { h2 { (heading) } (content) } }
+}
+
+/// Something about one run under its name, which can be folded away.
+fn folded(runs: &[Judged], judged: &Judged, content: &Markup) -> Markup {
+    html! { details open[runs.len() <= OPEN] { summary { (judged.name()) } (content) } }
+}
+
+fn results(runs: &[Judged]) -> Markup {
+    let any = |test: fn(&Judged) -> bool| runs.iter().any(test);
+    let content = html! {
+        (table(&main_table(runs)))
+        @if any(|judged| judged.summary.privileged) {
+            p.note { b { "privileged" } ": the policy sees the true state, which no robot has." }
+        }
+        @if any(|judged| judged.summary.force_observed) {
+            p.note { b { "force_observed" } ": the policy sees the true forces at the pads, which no real sensor gives." }
+        }
+        @for remark in runs.iter().flat_map(|judged| judged.run.remarks()) { p.warning { (remark) } }
+        figure {
+            (figures::goal_and_safety(runs))
+            figcaption { "What reaches the goal, and what does so safely. The gap between the two is what success alone hides. Whiskers are 95 % Wilson intervals." }
+        }
+    };
+    section("results", "Results", &content)
+}
+
+fn deformation(runs: &[Judged]) -> Markup {
+    let (Some(deformations), Some(kappas)) = (deformation_table(runs), kappa_table(runs)) else {
+        return html! {};
+    };
+    let content = html! {
+        (table(&deformations))
+        figure {
+            (figures::distributions(runs))
+            figcaption { "Peak deformation of every valid episode over the threshold τ of its object: right of the line is not safe. Hollow dots missed the goal; bars reach from P5 to P95, the tick is the median." }
+        }
+        @for judged in runs.iter().filter(|judged| judged.soft() && judged.summary.by_asset.len() > 1) {
+            details.extra {
+                summary { "By object: " (judged.name()) }
+                figure { (figures::by_asset(judged)) }
+            }
+        }
+        h3 { "Strictness of the threshold" }
+        (table(&kappas))
+        figure {
+            (figures::kappa_curves(runs))
+            figcaption { "Safety Success as the thresholds are made stricter (left) or looser (right); nominal is κ = 0.5." }
+        }
+    };
+    section("deformation", "Deformation", &content)
+}
+
+/// A table that can be scrolled where it is too wide.
+fn table(table: &Table) -> Markup {
+    let indices = table.rows.iter().all(|row| row[0].chars().all(|c| c.is_ascii_digit()));
+    let class = |column: usize| match column {
+        0 if indices => "index",
+        column if column < table.texts => "text",
+        _ => "number",
+    };
+    html! {
+        div.scroll tabindex="0" role="group" aria-label=(table.caption) {
             table {
-                caption { (table.caption) }
-                thead { tr { @for (i, head) in table.head.iter().enumerate() { th class=(class(i)) { (head) } } } }
+                caption { span { (table.caption) } }
+                thead { tr { @for (i, head) in table.head.iter().enumerate() { th scope="col" class=(class(i)) { (head) } } } }
                 tbody {
                     @for row in &table.rows {
-                        tr { @for (i, cell) in row.iter().enumerate() { td class=(class(i)) { (cell) } } }
+                        tr {
+                            @for (i, text) in row.iter().enumerate() {
+                                @if i == 0 { th scope="row" class=(class(i)) { (text) } }
+                                @else { td class=(class(i)) { (cell(text, i < table.texts)) } }
+                            }
+                        }
                     }
                 }
             }
@@ -94,51 +157,14 @@ fn table(table: &Table) -> Markup {
     }
 }
 
-/// The episodes of a run that are not safe, with their reasons, and films where there are.
-fn failures(judged: &Judged, room: &mut usize) -> Markup {
-    let all: Vec<(&EpisodeRecord, String)> =
-        judged.run.records.iter().filter_map(|record| Some((record, reason(record)?))).collect();
-    let films: Vec<(String, Markup)> = all
-        .iter()
-        .take(LISTED)
-        .filter_map(|(record, reason)| {
-            let id = &record.identity;
-            let path =
-                judged.run.dir.join(format!("video/task_{:03}/episode_{:05}.mp4", id.task, id.episode));
-            Some((format!("task {} episode {}: {reason}", id.task, id.episode), film(&path, room)?))
-        })
-        .collect();
-    let rows = all.iter().take(LISTED).map(|(record, reason)| {
-        let id = &record.identity;
-        vec![id.task.to_string(), id.episode.to_string(), id.asset.clone(), reason.clone()]
-    });
-    let head = ["Task", "Episode", "Object", "Why"].map(str::to_owned).to_vec();
-    let caption = match all.len() {
-        0 => format!("{}, {}: none", judged.summary.suite, judged.method()),
-        count => format!(
-            "{}, {}: {count} of {} episodes are not safe{}",
-            judged.summary.suite,
-            judged.method(),
-            judged.run.records.len(),
-            if count > LISTED { format!("; the first {LISTED}") } else { String::new() }
-        ),
-    };
-    html! {
-        @if all.is_empty() { p.note { (caption) } }
-        @else { (table(&Table { caption, head, texts: 4, rows: rows.collect() })) }
-        @if !films.is_empty() {
-            div.films { @for (about, film) in &films { article { (film) p { (about) } } } }
-        }
+/// A cell: the interval of a number stands below it.
+fn cell(text: &str, is_text: bool) -> Markup {
+    match text.split_once(" [").filter(|_| !is_text) {
+        Some((number, interval)) => html! { (number) " " span.interval { "[" (interval) } },
+        None => html! { (text) },
     }
 }
 
-/// A film in the page, or where it is if the page would become too large; `None` if there is none.
-fn film(path: &Path, room: &mut usize) -> Option<Markup> {
-    let bytes = fs::read(path).ok()?;
-    if bytes.len() > *room {
-        return Some(html! { p.note { "film: " (path.display()) } });
-    }
-    *room -= bytes.len();
-    let data = format!("data:video/mp4;base64,{}", BASE64.encode(&bytes));
-    Some(html! { video controls muted preload="metadata" src=(data) {} })
-}
+#[cfg(test)]
+#[path = "page_tests.rs"]
+mod tests;

@@ -1,0 +1,154 @@
+//! What an episode leaves beside its line: its actions, its log for other scorers, its trace, its video and still.
+
+use std::path::{Path, PathBuf};
+
+use super::{
+    Failure,
+    args::{Run, Video},
+    batch::folder_failure,
+    files::make_folder,
+};
+use crate::{
+    evaluation::record::{EpisodeRecord, Identity},
+    report::{
+        actions,
+        film::{self, Caption, FilmError},
+        interchange::{self, DebugFrame, DebugShape},
+        run_folder::replace,
+    },
+    rollout::{Finished, ScoreFrame, stop},
+};
+
+/// Where they are, and which of them are wanted.
+pub(super) struct SideFiles<'a> {
+    dir: &'a Path,
+    trace: bool,
+    video: Option<&'a Video>,
+}
+
+impl<'a> SideFiles<'a> {
+    /// Those of a run in the folder `dir`.
+    pub fn of(run: &'a Run, dir: &'a Path) -> Self {
+        Self { dir, trace: run.trace.is_some(), video: run.video.as_ref() }
+    }
+
+    /// Whether an episode may have to be drawn.
+    pub fn may_show(&self, episode: u32) -> bool {
+        match self.video {
+            None => false,
+            Some(Video::Episodes(chosen)) => chosen.contains(&episode),
+            Some(Video::All | Video::Failed) => true,
+        }
+    }
+
+    /// Whether a finished episode has to be drawn.
+    fn shows(&self, record: &EpisodeRecord) -> bool {
+        let safe = self.video == Some(&Video::Failed) && record.verdict.safety;
+        self.may_show(record.identity.episode) && !safe
+    }
+
+    /// Those of a finished episode that are wanted and not there.
+    pub fn lost(&self, record: &EpisodeRecord) -> Vec<PathBuf> {
+        let id = &record.identity;
+        let mut wanted = vec![
+            actions::path(self.dir, id.task, id.episode),
+            interchange::debug_log_path(self.dir, id.task, id.episode),
+        ];
+        if self.trace {
+            wanted.push(self.trace_path(id));
+        }
+        if self.shows(record) {
+            wanted.push(film::video_path(self.dir, id.task, id.episode));
+            if !record.verdict.safety {
+                wanted.push(film::still_path(self.dir, id.task, id.episode));
+            }
+        }
+        wanted.retain(|path| !path.is_file());
+        wanted
+    }
+
+    /// Writes all but the pictures.
+    ///
+    /// # Errors
+    /// A file cannot be written.
+    pub fn write(&self, finished: &Finished) -> Result<(), Failure> {
+        let id = &finished.record.identity;
+        self.write_trace(finished)?;
+        let path = interchange::debug_log_path(self.dir, id.task, id.episode);
+        interchange::write_debug_log(&path, id, &debug_frames(finished)).map_err(folder_failure)?;
+        let path = actions::path(self.dir, id.task, id.episode);
+        actions::write(&path, &finished.actions).map_err(folder_failure)
+    }
+
+    /// Draws what is wanted of an episode: its video, and of one that is not safe a still of its worst moment.
+    ///
+    /// # Errors
+    /// A picture cannot be made or written.
+    pub fn draw(&self, finished: &mut Finished) -> Result<(), Failure> {
+        let (record, Some(mut film)) = (&finished.record, finished.film.take()) else { return Ok(()) };
+        if !self.shows(record) {
+            return Ok(());
+        }
+        let (id, caption) = (&record.identity, Caption::of(record));
+        let path = film::video_path(self.dir, id.task, id.episode);
+        make_folder(path.parent().unwrap_or(self.dir))?;
+        if !record.verdict.safety {
+            let (worst, still) = (film::worst_moment(&film), film::still_path(self.dir, id.task, id.episode));
+            film::write_panels(&mut film, &caption, worst, &still).map_err(film_failure)?;
+        }
+        film::write_video(&mut film, &caption, &path, stop::requested).map_err(film_failure)
+    }
+
+    fn trace_path(&self, id: &Identity) -> PathBuf {
+        self.dir.join(format!("trace/task_{:03}/episode_{:05}.jsonl", id.task, id.episode))
+    }
+
+    fn write_trace(&self, finished: &Finished) -> Result<(), Failure> {
+        if !self.trace {
+            return Ok(());
+        }
+        let path = self.trace_path(&finished.record.identity);
+        make_folder(path.parent().unwrap_or(self.dir))?;
+        let mut text = String::new();
+        for step in &finished.trace {
+            text += &serde_json::to_string(step).map_err(Failure::input)?;
+            text.push('\n');
+        }
+        replace(&path, &text).map_err(folder_failure)
+    }
+}
+
+/// SoftVTBench's log of every control step, which its own scorer reads.
+fn debug_frames(finished: &Finished) -> Vec<DebugFrame> {
+    let identity = &finished.record.identity;
+    let frame = |(step, frame): (usize, &ScoreFrame)| {
+        let measured = finished.reference.as_ref().zip(frame.deformation.as_ref());
+        let shape = DebugShape::new(&identity.asset, measured);
+        DebugFrame::new(identity, step as u32, frame.success_now, shape)
+    };
+    let mut frames: Vec<DebugFrame> = finished.frames.iter().enumerate().map(frame).collect();
+    if frames.len() < finished.record.stats.steps as usize {
+        frames.push(broken_off(finished, frames.len()));
+    }
+    frames
+}
+
+/// The row of a control step in which the physics failed: if the rollout's peak is above that of all steps before, it is of
+/// this one.
+fn broken_off(finished: &Finished, step: usize) -> DebugFrame {
+    let (identity, verdict) = (&finished.record.identity, &finished.record.verdict);
+    let before = finished.frames.iter().filter_map(|frame| Some(frame.deformation.as_ref()?.rms_pct));
+    let before = before.fold(0.0, f64::max);
+    let peak = verdict.d_peak.filter(|peak| *peak > before);
+    let shape =
+        DebugShape::broken_off(&identity.asset, finished.reference.as_ref(), peak, verdict.d_peak_max);
+    DebugFrame::new(identity, step as u32, false, shape)
+}
+
+/// A film that could not be made.
+pub(super) fn film_failure(error: FilmError) -> Failure {
+    match error {
+        FilmError::Interrupted => Failure::interrupted("interrupted"),
+        other => Failure::input(other),
+    }
+}

@@ -1,0 +1,208 @@
+//! What is made of finished runs: comparisons, pages, tables; and runs that cannot be read.
+
+use std::fs;
+
+use serde_json::{Value, json};
+
+use crate::support::{Project, Small};
+
+/// Two short runs of the same two episodes, and one of another seed.
+fn project() -> Project {
+    let project = Small { task: "budget_steps = 8", ..Small::default() }.project();
+    for (policy, out) in [("noop", "a"), ("random", "b"), ("noop --seed 7", "other")] {
+        project.succeeds(&format!("x.lua --episodes 2 --policy {policy} --out runs/{out}"));
+    }
+    project
+}
+
+/// Changes a document of a project.
+fn edit(project: &Project, path: &str, change: impl Fn(&mut Value)) {
+    let mut document = project.json(path);
+    change(&mut document);
+    project.write(path, document.to_string().as_bytes());
+}
+
+#[test]
+fn two_runs_are_paired_episode_by_episode_and_by_task() {
+    let project = project();
+    let compared: Value =
+        serde_json::from_str(&project.succeeds("compare runs/a runs/b --json").out).expect("JSON");
+    assert_eq!((&compared["first"], &compared["second"]), (&json!("noop"), &json!("random")));
+    let goal = &compared["all"]["goal"];
+    assert_eq!(
+        (&goal["n"], &goal["better"], &goal["worse"], &goal["same"]),
+        (&2.into(), &0.into(), &0.into(), &2.into())
+    );
+    assert_eq!(goal["difference"], 0.0);
+    assert_eq!(goal["interval95"].as_array().map(Vec::len), Some(2));
+    assert_eq!(compared["by_task"][0]["safety"]["n"], 2);
+    let text = project.succeeds("compare runs/a runs/b").out;
+    assert!(text.starts_with("noop → random · 2 paired episodes\n"), "{text}");
+    assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
+    assert!(text.contains("95 % interval") && text.contains("better"), "{text}");
+    // An expert sees the true state, and every table says so.
+    project.succeeds("x.lua --episodes 2 --out runs/c");
+    assert!(project.succeeds("compare runs/a runs/c").out.contains("noop → expert (privileged) · "));
+    let said = project.succeeds("x.lua --episodes 2 --out runs/c");
+    assert!(said.out.contains("policy expert (privileged) · 2 episodes"), "{}", said.out);
+    assert_eq!(project.json("runs/c/summary.json")["privileged"], true);
+}
+
+#[test]
+fn a_folder_with_two_runs_of_one_suite_is_not_compared_in_silence() {
+    let project = project();
+    let message = project.refusal("compare runs runs/a");
+    assert_eq!(
+        message,
+        "runs/a and runs/b both hold suite one task 0 episode 0: compare one run of a suite at a time; name its folder"
+    );
+    assert!(project.refusal("compare runs/a runs").contains("runs/a and runs/b both hold"));
+}
+
+#[test]
+fn runs_of_different_seeds_share_no_episode() {
+    let message = project().refusal("compare runs/a runs/other");
+    assert_eq!(message, "runs/a and runs/other share no episode: seed 0 there, 7 here");
+}
+
+#[test]
+fn what_is_no_run_is_named() {
+    let project = project();
+    fs::create_dir(project.path("empty")).expect("made");
+    let torn = project.text("runs/a/episodes.jsonl");
+    for (dir, path, text) in [
+        ("json", "run.json", "{\"softvt\": ".to_owned()),
+        ("fields", "run.json", json!({ "softvt": env!("CARGO_PKG_VERSION"), "script": "x.lua" }).to_string()),
+        ("line", "episodes.jsonl", format!("{}\n{torn}", &torn[..50])),
+        ("none", "episodes.jsonl", String::new()),
+    ] {
+        for name in ["run.json", "episodes.jsonl"] {
+            project.write(&format!("bad/{dir}/{name}"), project.text(&format!("runs/a/{name}")).as_bytes());
+        }
+        project.write(&format!("bad/{dir}/{path}"), text.as_bytes());
+    }
+    fs::remove_file(project.path("bad/none/episodes.jsonl")).expect("removed");
+    for (dir, words) in [
+        ("nowhere", "there is no folder nowhere"),
+        ("x.lua", "x.lua is a file; give the folder of a run"),
+        ("empty", "empty holds no run: neither it nor a folder in it has run.json and episodes.jsonl"),
+        ("bad/json", "bad/json/run.json: not that of a run: EOF while parsing"),
+        ("bad/fields", "bad/fields/run.json: not that of a run: it has no suite"),
+        ("bad/line", "bad/line/episodes.jsonl:1: not an episode record"),
+        ("bad/none", "cannot read bad/none/episodes.jsonl"),
+    ] {
+        for command in [format!("compare {dir} runs/a"), format!("report runs/a {dir} --out page")] {
+            let message = project.refusal(&command);
+            assert!(message.starts_with(words), "{command}: {message}");
+            assert!(!message.contains("this is softvt"), "no other version: {message}");
+            assert!(!project.path("page").exists(), "{command}");
+        }
+    }
+}
+
+#[test]
+fn a_run_of_another_version_is_read_with_a_word_or_refused_with_the_cause() {
+    let project = project();
+    edit(&project, "runs/a/run.json", |run| run["softvt"] = json!("0.0.1"));
+    let said = project.succeeds("report runs/a --out page");
+    assert!(said.err.contains("softvt 0.0.1 made runs/a, and this is softvt"), "{}", said.err);
+    assert!(project.text("page/report.html").contains("softvt 0.0.1 made runs/a"));
+    assert!(
+        project.succeeds("compare runs/a runs/b").out.contains("the runs also differ in softvt (run.json)")
+    );
+    let lines = project.text("runs/a/episodes.jsonl").replace("\"no_drop\"", "\"drops\"");
+    project.write("runs/a/episodes.jsonl", lines.as_bytes());
+    let message = project.refusal("report runs/a --out page");
+    assert!(
+        message.starts_with("runs/a/episodes.jsonl:1: not an episode record: missing field"),
+        "{message}"
+    );
+    let cause = format!("; softvt 0.0.1 made this run, and this is softvt {}: ", env!("CARGO_PKG_VERSION"));
+    assert!(message.contains(&cause), "{message}");
+}
+
+#[test]
+fn a_run_in_progress_shows_what_it_has() {
+    let project = project();
+    let lines = project.text("runs/a/episodes.jsonl");
+    // The second line is torn, as by a crash; there is no summary yet.
+    let whole = lines.find('\n').expect("a line") + 1;
+    project.write("runs/a/episodes.jsonl", &lines.as_bytes()[..whole + 40]);
+    fs::remove_file(project.path("runs/a/summary.json")).expect("removed");
+    let remark = "runs/a is not finished: it has 1 of 2 episodes";
+    let said = project.succeeds("report runs/a runs/b --out page");
+    assert!(said.err.contains(remark), "{}", said.err);
+    assert!(project.text("page/report.md").contains("| noop | 1 of 2 |"));
+    let said = project.succeeds("compare runs/a runs/b");
+    assert!(said.out.contains("1 paired episodes") && said.out.contains(remark), "{}", said.out);
+    assert!(said.out.contains("1 episodes that only one run has are left out"), "{}", said.out);
+    project.write("runs/a/episodes.jsonl", b"");
+    assert_eq!(project.refusal("compare runs/a runs/b"), "runs/a has no episode yet");
+    project.succeeds("report runs/a --out page");
+}
+
+#[test]
+fn a_report_says_how_to_see_an_episode_and_the_words_work() {
+    let project = project();
+    project.succeeds("report runs --out page");
+    let page = project.text("page/report.html");
+    for file in ["report.md", "report.tex"] {
+        assert!(project.text(&format!("page/{file}")).contains("noop"), "{file}");
+    }
+    let commands: Vec<&str> =
+        page.split("<code>softvt ").skip(1).filter_map(|part| part.split("</code>").next()).collect();
+    let of = |start: &str, part: &str| -> String {
+        let fits = |command: &&&str| command.starts_with(start) && command.contains(part);
+        (*commands.iter().find(fits).unwrap_or_else(|| panic!("{start} {part} in {commands:?}"))).to_owned()
+    };
+    assert!(project.succeeds(&of("replay", "runs/other 0/1")).out.contains("the same to the byte"));
+    let view = of("view", "--seed 7");
+    assert_eq!(view, "view x.lua --task 0 --policy noop --seed 7 --out seen");
+    project.succeeds(&view);
+    assert!(project.path("seen/episode.mp4").exists());
+}
+
+#[test]
+fn lost_files_of_finished_episodes_are_made_again_to_the_same_bytes() {
+    let project = Small { task: "budget_steps = 8", expert: "arm:close_to(1)", ..Small::default() }.project();
+    let line = "x.lua --episodes 3 --trace --out run";
+    project.succeeds(line);
+    let files = [
+        "actions/task_000/episode_00000.npy",
+        "softvtbench/task_000/episode_00001/policy_action_debug.jsonl",
+        "trace/task_000/episode_00002.jsonl",
+        "softvtbench/episodes.csv",
+        "softvtbench/thresholds.json",
+        "summary.json",
+        "episodes.jsonl",
+    ];
+    let bytes = |file: &str| fs::read(project.path(&format!("run/{file}"))).unwrap_or_default();
+    let before = files.map(bytes);
+    files[..5]
+        .iter()
+        .for_each(|file| fs::remove_file(project.path(&format!("run/{file}"))).expect("removed"));
+    let said = project.succeeds(line);
+    let told =
+        "3 finished episodes lack files, first run/actions/task_000/episode_00000.npy: they are made again";
+    assert!(said.err.contains(told), "{}", said.err);
+    assert!(files.map(bytes) == before);
+    assert!(project.succeeds(line).err.contains("finished already"));
+    // Without its summary the folder is unfinished, and goes on as such.
+    fs::remove_file(project.path("run/summary.json")).expect("removed");
+    project.succeeds(&format!("{line} --resume"));
+    assert!(files.map(bytes) == before);
+    // Pictures can be had afterwards.
+    project.succeeds(&format!("{line} --video=1"));
+    let drawn =
+        |e: u32, kind: &str| project.path(&format!("run/video/task_000/episode_0000{e}.{kind}")).exists();
+    assert!(drawn(1, "mp4") && drawn(1, "png") && !drawn(0, "mp4"));
+    assert!(files.map(bytes) == before);
+    // What does not come out as recorded is told, and nothing is put in its place.
+    let lines = project.text("run/episodes.jsonl").replacen("\"state_hash\":\"", "\"state_hash\":\"f", 1);
+    project.write("run/episodes.jsonl", lines.as_bytes());
+    fs::remove_file(project.path("run/actions/task_000/episode_00000.npy")).expect("removed");
+    let said = project.succeeds(line);
+    assert!(said.err.contains("it does not come out as recorded (state_hash:"), "{}", said.err);
+    assert!(!project.path("run/actions/task_000/episode_00000.npy").exists());
+    assert_eq!(project.text("run/episodes.jsonl"), lines);
+}
