@@ -63,6 +63,8 @@ pub(super) struct Batch<'a> {
     pub films: bool,
     /// Whether whoever drives sees the true forces at the pads.
     force_observed: bool,
+    /// Which list its episodes are of.
+    pub split: Split,
     pub drive: Drive,
 }
 
@@ -99,6 +101,7 @@ impl<'a> Batch<'a> {
             out,
             films: run.video.is_some(),
             force_observed: false,
+            split: Split::Validation,
             drive: Box::new(move |opened, brief| drivers.drive(opened, brief)),
         })
     }
@@ -130,7 +133,7 @@ impl<'a> Batch<'a> {
             task: task.id,
             episode: u64::from(episode),
             base_seed: self.run.seed,
-            split: Split::Validation,
+            split: self.split,
             shifts: self.run.shifts.clone(),
         }
     }
@@ -256,7 +259,11 @@ impl<'a> Batch<'a> {
         info::is_of(&self.out, &self.info(tasks, episodes)?)
     }
 
-    fn info(&self, tasks: &[&Task], episodes: u32) -> Result<RunInfo<'_>, Failure> {
+    /// What is needed to repeat the run.
+    ///
+    /// # Errors
+    /// There is no such profile.
+    pub fn info(&self, tasks: &[&Task], episodes: u32) -> Result<RunInfo<'_>, Failure> {
         let options =
             self.loaded.options.iter().map(|o| (o.name.clone(), format!("{:?}", o.value))).collect();
         let info = RunInfo {
@@ -269,7 +276,7 @@ impl<'a> Batch<'a> {
             replan: self.run.policy.is_remote().then_some(self.run.policy.replan),
             privileged: self.run.policy.is_privileged(),
             seed: self.run.seed,
-            split: Split::Validation.name(),
+            split: self.split.name(),
             tasks: tasks.iter().map(|t| t.id).collect(),
             episodes,
             shard: self.run.shard.map(|shard| shard.to_string()),
@@ -437,7 +444,7 @@ impl<'a> Batch<'a> {
             suite: &self.name,
             episode,
             seed: self.run.seed,
-            split: Split::Validation,
+            split: self.split,
             policy: self.run.policy.name(),
         };
         let scenes = (&opened.nominal, opened.scene.clone());

@@ -5,6 +5,7 @@ mod batch;
 mod check;
 mod compare;
 mod conditions;
+mod dataset;
 mod doctor;
 mod drivers;
 mod evaluate;
@@ -15,6 +16,7 @@ mod info;
 mod init;
 mod list;
 mod progress;
+mod record;
 mod replay;
 mod report;
 mod require;
@@ -121,6 +123,9 @@ fn carry_out(words: &[String]) -> Result<(), Failure> {
         Command::Replay { dir, which } => replay::run(&dir, which),
         Command::Report { runs, out } => report::run(&runs, &out),
         Command::View(view) => view::run(&view),
+        Command::Record(record) => record::run(&record),
+        Command::DatasetCheck { path, replays } => dataset::check(&path, replays),
+        Command::DatasetStats { path, out, json } => dataset::stats(&path, out.as_deref(), json),
         Command::Doctor => doctor::run(),
         Command::Shown => Ok(()),
     }

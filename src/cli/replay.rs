@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use super::{
-    Failure, args::Run, batch::Batch, code, drivers::Choice, evaluate::chosen, info::difference, print,
+    Failure, args::Run, batch::Batch, code, dataset, drivers::Choice, evaluate::chosen, info::difference, print,
 };
 use crate::{
-    benchmark::{Plan, Suite},
+    benchmark::{Plan, Suite, seed::Split},
     evaluation::record::{EpisodeRecord, Outcome},
-    policy::{Chunked, recorded::Recorded},
+    policy::{Action, Chunked, recorded::Recorded},
     report::{
         actions,
         runs::{self, StoredRun},
@@ -45,6 +45,9 @@ pub fn which(word: &str) -> Result<Which, String> {
 /// # Errors
 /// The run cannot be read, its scripts have changed since, or (exit code 1) something comes out different.
 pub fn run(dir: &Path, which: Which) -> Result<(), Failure> {
+    if dataset::is_dataset(dir) {
+        return dataset::replay(dir, which);
+    }
     let stored = runs::load(dir).map_err(Failure::input)?;
     let [stored] = &stored[..] else {
         let names: Vec<String> = stored.iter().map(|run| run.dir.display().to_string()).collect();
@@ -55,6 +58,23 @@ pub fn run(dir: &Path, which: Which) -> Result<(), Failure> {
         )));
     };
     let record = find(stored, which)?;
+    let path = actions::path(&stored.dir, record.identity.task, record.identity.episode);
+    let recorded = actions::read(&path).map_err(Failure::input)?;
+    let state = again(stored, record, recorded)?;
+    let (task, episode) = (record.identity.task, record.identity.episode);
+    print(&format!("task {task} episode {episode}: the same to the byte, final state {state}\n"));
+    Ok(())
+}
+
+/// Simulates an episode of a run again by its actions, and returns the hash of its final state.
+///
+/// # Errors
+/// The scripts have changed since, or (exit code 1) something comes out different.
+pub(super) fn again(
+    stored: &StoredRun,
+    record: &EpisodeRecord,
+    recorded: Vec<Action>,
+) -> Result<String, Failure> {
     let run = run_of(stored)?;
     let loaded = script::load(&run.file, &run.script_words).map_err(Failure::input)?;
     let suite = suite_of(&loaded.plan, &run, stored)?;
@@ -62,8 +82,7 @@ pub fn run(dir: &Path, which: Which) -> Result<(), Failure> {
     let run = Run { tasks: vec![task.to_string()], ..run };
     let tasks = chosen(&run, suite)?;
     let mut batch = Batch::new(&run, &loaded, suite, (vec![(tasks[0], episode)], PathBuf::new()))?;
-    let path = actions::path(&stored.dir, task, episode);
-    let recorded = actions::read(&path).map_err(Failure::input)?;
+    batch.split = split_of(stored)?;
     let ending = match &record.outcome {
         Outcome::Error { message } => Some(message.clone()),
         _ => None,
@@ -80,11 +99,7 @@ pub fn run(dir: &Path, which: Which) -> Result<(), Failure> {
     again.stats.camera_inside = record.stats.camera_inside;
     let bytes = |record: &EpisodeRecord| serde_json::to_string(record).map_err(Failure::input);
     if bytes(&again)? == bytes(record)? {
-        print(&format!(
-            "task {task} episode {episode}: the same to the byte, final state {}\n",
-            again.stats.state_hash
-        ));
-        return Ok(());
+        return Ok(again.stats.state_hash);
     }
     let what = difference(&json!(record), &json!(again)).unwrap_or_default();
     Err(Failure {
@@ -108,6 +123,16 @@ fn find(stored: &StoredRun, which: Which) -> Result<&EpisodeRecord, Failure> {
             stored.dir.display(),
             stored.records.len()
         ))
+    })
+}
+
+/// Which list the episodes of a run are of.
+fn split_of(stored: &StoredRun) -> Result<Split, Failure> {
+    let named = |split: &Split| split.name() == stored.text("split");
+    let found = [Split::Validation, Split::Demonstration, Split::Experiment].into_iter().find(named);
+    found.ok_or_else(|| {
+        let dir = stored.dir.display();
+        Failure::input(format!("{dir}: there is no list of episodes {:?}", stored.text("split")))
     })
 }
 
