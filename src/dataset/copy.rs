@@ -40,6 +40,9 @@ fn write_all(parts: &[PathBuf], aside: &Path, environment: &Value) -> Result<(),
     writer.close()
 }
 
+/// Number of HDF5's shuffle filter.
+const SHUFFLE: u16 = 2;
+
 struct Copy<'a, 'b> {
     source: &'a H5File,
     from: &'a Path,
@@ -82,8 +85,10 @@ impl Copy<'_, '_> {
         let failed = |error| DatasetError::hdf5(self.from, from)(error);
         let shape = data.shape();
         let rows = data.chunk_dims().and_then(|chunk| chunk.first().copied()).unwrap_or(1).max(1);
-        // The level is of no consequence: nothing is compressed anew.
-        let copy = self.writer.dataset::<T>(into, (shape[0], rows), &shape[1..], 1)?;
+        let filters = data.filters().map_err(failed)?;
+        let shuffle = filters.iter().find(|filter| filter.id == SHUFFLE);
+        let together = shuffle.and_then(|filter| filter.cd_values.first()).map_or(1, |bytes| *bytes as usize);
+        let copy = self.writer.dataset::<T>(into, (shape[0], rows), &shape[1..], together)?;
         let mut place = vec![0; shape.len()];
         for index in 0..shape[0].div_ceil(rows) {
             place[0] = index;

@@ -68,18 +68,19 @@ impl Scenery {
         let [width, height] = CELL;
         let mut sheet = RgbImage::new(2 * width, 2 * height);
         for (at, picture) in (0_u32..).zip(&self.shown) {
-            let scale = f64::min(
-                f64::from(width) / f64::from(picture.width()),
-                f64::from(height) / f64::from(picture.height()),
-            );
-            let edge = |pixels: u32| (scale * f64::from(pixels)).round() as u32;
-            let (w, h) = (edge(picture.width()), edge(picture.height()));
-            let cell = match (w, h) == picture.dimensions() {
-                true => picture.clone(),
-                false => imageops::resize(picture, w, h, imageops::FilterType::Triangle),
+            let (w, h) = picture.dimensions();
+            let small;
+            let cell = if w <= width && h <= height {
+                picture
+            } else {
+                let scale = f64::min(f64::from(width) / f64::from(w), f64::from(height) / f64::from(h));
+                let edge = |pixels: u32| ((scale * f64::from(pixels)) as u32).max(1);
+                small = imageops::resize(picture, edge(w), edge(h), imageops::FilterType::Triangle);
+                &small
             };
+            let (w, h) = cell.dimensions();
             let (x, y) = (at % 2 * width + (width - w) / 2, at / 2 * height + (height - h) / 2);
-            imageops::replace(&mut sheet, &cell, i64::from(x), i64::from(y));
+            imageops::replace(&mut sheet, cell, i64::from(x), i64::from(y));
         }
         sheet
     }

@@ -78,7 +78,7 @@ impl Recorder<'_> {
                 Some(reels) => reels,
                 none => none.insert(Reels::new(&scenery, &mut writer, steps, self.pictures)?),
             };
-            reels.push(aside, step, &scenery)?;
+            reels.push(aside, &scenery, step + 1 == steps)?;
             felt.push(scenery.markers);
         }
         demonstration.set_markers(&felt);
@@ -90,9 +90,48 @@ impl Recorder<'_> {
     }
 }
 
+/// Pictures of a chunk, as [`PICTURES`]: what a resting camera sees, and what a finger feels, hardly changes in four steps; a
+/// camera on the hand sees something else in every one.
+const ROWS: [usize; 4] = [4, 1, 4, 4];
+
+/// Pictures on their way into an array, chunk by chunk.
+struct Roll {
+    array: H5Dataset,
+    name: &'static str,
+    rows: usize,
+    bytes: Vec<u8>,
+    done: usize,
+}
+
+impl Roll {
+    fn push(&mut self, path: &Path, picture: &RgbImage) -> Result<(), DatasetError> {
+        self.bytes.extend_from_slice(picture);
+        if self.bytes.len() < self.rows * picture.len() {
+            return Ok(());
+        }
+        self.flush(path)
+    }
+
+    fn flush(&mut self, path: &Path) -> Result<(), DatasetError> {
+        self.array.write_chunk(self.done, &self.bytes).map_err(|e| DatasetError::hdf5(path, self.name)(e))?;
+        self.done += 1;
+        self.bytes.clear();
+        Ok(())
+    }
+
+    /// Fills the last chunk up with its last picture: HDF5 has none that are not full.
+    fn end(&mut self, path: &Path, picture: usize) -> Result<(), DatasetError> {
+        while !self.bytes.is_empty() && self.bytes.len() < self.rows * picture {
+            let last = self.bytes.len() - picture;
+            self.bytes.extend_from_within(last..);
+        }
+        if self.bytes.is_empty() { Ok(()) } else { self.flush(path) }
+    }
+}
+
 /// Everything that takes a picture a step.
 struct Reels {
-    arrays: Vec<H5Dataset>,
+    rolls: Vec<Roll>,
     videos: Vec<VideoWriter>,
     preview: VideoWriter,
 }
@@ -106,18 +145,24 @@ impl Reels {
     ) -> Result<Self, DatasetError> {
         let video = |picture: &RgbImage| VideoWriter::new(picture.width() as usize, picture.height() as usize, rate());
         let named = PICTURES.into_iter().zip(&scenery.pictures).take(if pictures { PICTURES.len() } else { 0 });
-        let arrays =
-            named.map(|(name, picture)| writer.pictures(0, name, steps, picture.dimensions())).collect::<Result<_, _>>()?;
+        let roll = |((name, picture), rows): ((&'static str, &RgbImage), usize)| {
+            let rows = rows.min(steps);
+            let array = writer.pictures(0, name, (steps, rows), picture.dimensions())?;
+            Ok(Roll { array, name, rows, bytes: Vec::with_capacity(rows * picture.len()), done: 0 })
+        };
         Ok(Self {
-            arrays,
+            rolls: named.zip(ROWS).map(roll).collect::<Result<_, DatasetError>>()?,
             videos: scenery.shown.iter().map(video).collect::<Result<_, _>>()?,
             preview: video(&scenery.preview())?,
         })
     }
 
-    fn push(&mut self, path: &Path, step: usize, scenery: &Scenery) -> Result<(), DatasetError> {
-        for ((array, name), picture) in self.arrays.iter().zip(PICTURES).zip(&scenery.pictures) {
-            array.write_chunk(step, picture).map_err(|e| DatasetError::hdf5(path, name)(e))?;
+    fn push(&mut self, path: &Path, scenery: &Scenery, last: bool) -> Result<(), DatasetError> {
+        for (roll, picture) in self.rolls.iter_mut().zip(&scenery.pictures) {
+            roll.push(path, picture)?;
+            if last {
+                roll.end(path, picture.len())?;
+            }
         }
         for (video, picture) in self.videos.iter_mut().zip(&scenery.shown) {
             video.push(picture)?;

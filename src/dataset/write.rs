@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeSet, path::Path};
 
-use rust_hdf5::{H5Dataset, H5File, H5Group, H5Type};
+use rust_hdf5::{FilterPipeline, H5Dataset, H5File, H5Group, H5Type};
 use serde_json::{Value, json};
 
 use super::{DatasetError, Demonstration, Numbers, Stream};
@@ -10,9 +10,8 @@ use crate::{benchmark::control::CONTROL_DT, evaluation::record::EpisodeRecord};
 
 /// Bytes of a chunk of numbers, at most: a reader of one step reads no more.
 const CHUNK: usize = 1 << 18;
-/// Compression (zlib) of numbers and of pictures: beyond this, pictures cost twice the time for a tenth less.
-const NUMBERS: u32 = 4;
-const PIXELS: u32 = 1;
+/// Compression (zlib): beyond this, pictures cost twice the time for a few percent less.
+const LEVEL: u32 = 4;
 
 /// A file that is being written.
 pub(super) struct Writer<'a> {
@@ -105,39 +104,45 @@ impl<'a> Writer<'a> {
     ) -> Result<(), DatasetError> {
         let width = stream.row.iter().product::<usize>() * size_of::<T>();
         let rows = (CHUNK / width.max(1)).clamp(1, steps.max(1));
-        let data = self.dataset::<T>(key, (steps, rows), &stream.row, NUMBERS)?;
+        let data = self.dataset::<T>(key, (steps, rows), &stream.row, size_of::<T>())?;
         let failed = |error| DatasetError::hdf5(self.path, key)(error);
         data.write_raw(numbers).map_err(failed)?;
         annotate(&data, &stream.notes).map_err(failed)
     }
 
-    /// A data set of `steps` rows in chunks of `rows`.
+    /// A data set of `steps` rows in chunks of `rows`. Before compression the bytes of a chunk are put side by side that are
+    /// `together` bytes apart (HDF5's shuffle filter).
     pub fn dataset<T: H5Type>(
         &mut self,
         key: &str,
         (steps, rows): (usize, usize),
         row: &[usize],
-        level: u32,
+        together: usize,
     ) -> Result<H5Dataset, DatasetError> {
         let (group, name) = key.rsplit_once('/').unwrap_or(("", key));
         let group = self.group(group)?;
         let [shape, chunk] = [steps, rows].map(|first| [&[first], row].concat());
         let builder = group.new_dataset::<T>().shape(shape).chunk(&chunk);
-        // Bytes of numbers compress better side by side; those of pixels do not.
-        let builder = if size_of::<T>() > 1 { builder.shuffle_deflate(level) } else { builder.deflate(level) };
-        builder.create(name).map_err(|e| DatasetError::hdf5(self.path, key)(e))
+        let filters = match together {
+            1 => FilterPipeline::deflate(LEVEL),
+            _ => FilterPipeline::shuffle_deflate(together as u32, LEVEL),
+        };
+        builder.filter_pipeline(filters).create(name).map_err(|e| DatasetError::hdf5(self.path, key)(e))
     }
 
-    /// Room for the pictures of a stream, a chunk a step.
+    /// Room for the pictures of a stream, `rows` in a chunk. The values of one pixel in all pictures of a chunk are stored side by
+    /// side: what does not move takes little room then.
     pub fn pictures(
         &mut self,
         demo: usize,
         name: &str,
-        steps: usize,
+        (steps, rows): (usize, usize),
         (width, height): (u32, u32),
     ) -> Result<H5Dataset, DatasetError> {
         let key = format!("data/demo_{demo}/obs/{name}");
-        let data = self.dataset::<u8>(&key, (steps, 1), &[height as usize, width as usize, 3], PIXELS)?;
+        let row = [height as usize, width as usize, 3];
+        let together = if rows > 1 { row.iter().product() } else { 1 };
+        let data = self.dataset::<u8>(&key, (steps, rows), &row, together)?;
         let notes = [("axes".to_owned(), "step, row from the top, column, RGB (sRGB)".to_owned())];
         annotate(&data, &notes).map_err(|e| DatasetError::hdf5(self.path, &key)(e))?;
         Ok(data)
