@@ -84,7 +84,8 @@ pub fn replay(path: &Path, which: Which) -> Result<(), Failure> {
                 [] => return Err(none()),
                 _ => {
                     let files: Vec<&str> = found.iter().map(|entry| entry.hdf5_path.as_str()).collect();
-                    let several = format!("several suites have a task {task}: name one of {}", files.join(", "));
+                    let several =
+                        format!("several suites have a task {task}: name one of {}", files.join(", "));
                     return Err(Failure::input(format!("{}: {several}", path.display())));
                 }
             }

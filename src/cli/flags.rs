@@ -214,18 +214,53 @@ fn runner() -> clap::Command {
 
 fn record() -> clap::Command {
     on_script(clap::Command::new("record").about("Records demonstrations: HDF5, videos, and a manifest"))
-        .arg(flag("demos", "Demonstrations a task").value_name("N").default_value("50").value_parser(value_parser!(u32).range(1..=100_000)))
-        .arg(flag("out", "Where to write: a new folder, or with --resume that of a recording").value_name("DIR").required(true))
-        .arg(list("task", "Only these tasks: indices or parts of prompts, joined by commas").value_name("TASK"))
-        .arg(flag("attempts", "Most attempts at a task, kept or not [default: 4 a demonstration, at least 20]").value_name("N").value_parser(value_parser!(u32).range(1..=1_000_000)))
-        .arg(flag("images", "Where pictures are: in the HDF5 files and as videos, or only as videos").value_name("WHERE").default_value("hdf5").value_parser(["hdf5", "video"]))
-        .arg(flag("no-privileged", "Leaves out the true state: node positions, deformation, contact, forces").action(ArgAction::SetTrue))
-        .arg(flag("threads", "Threads; the data do not depend on it").value_name("N").value_parser(value_parser!(u16).range(1..=1024)))
-        .arg(flag("resume", "Goes on with the recording in --out, if one was broken off there").action(ArgAction::SetTrue))
+        .arg(
+            flag("demos", "Demonstrations a task")
+                .value_name("N")
+                .default_value("50")
+                .value_parser(value_parser!(u32).range(1..=100_000)),
+        )
+        .arg(
+            flag("out", "Where to write: a new folder, or with --resume that of a recording")
+                .value_name("DIR")
+                .required(true),
+        )
+        .arg(
+            list("task", "Only these tasks: indices or parts of prompts, joined by commas")
+                .value_name("TASK"),
+        )
+        .arg(
+            flag(
+                "attempts",
+                "Most attempts at a task, kept or not [default: 4 a demonstration, at least 20]",
+            )
+            .value_name("N")
+            .value_parser(value_parser!(u32).range(1..=1_000_000)),
+        )
+        .arg(
+            flag("images", "Where pictures are: in the HDF5 files and as videos, or only as videos")
+                .value_name("WHERE")
+                .default_value("hdf5")
+                .value_parser(["hdf5", "video"]),
+        )
+        .arg(
+            flag("no-privileged", "Leaves out the true state: node positions, deformation, contact, forces")
+                .action(ArgAction::SetTrue),
+        )
+        .arg(
+            flag("threads", "Threads; the data do not depend on it")
+                .value_name("N")
+                .value_parser(value_parser!(u16).range(1..=1024)),
+        )
+        .arg(
+            flag("resume", "Goes on with the recording in --out, if one was broken off there")
+                .action(ArgAction::SetTrue),
+        )
 }
 
 fn dataset() -> clap::Command {
-    let path = || Arg::new("path").value_name("DATASET").required(true).help("Its folder, or one of its HDF5 files");
+    let path =
+        || Arg::new("path").value_name("DATASET").required(true).help("Its folder, or one of its HDF5 files");
     clap::Command::new("dataset")
         .about("Looks into recorded demonstrations")
         .subcommand_required(true)

@@ -12,6 +12,7 @@ mod evaluate;
 mod experiment;
 mod files;
 mod flags;
+mod grips;
 mod info;
 mod init;
 mod list;

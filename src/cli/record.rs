@@ -5,9 +5,8 @@
 //! together from them, so that a recording that was broken off goes on where it was.
 
 use std::{
-    collections::{BTreeMap, BTreeSet},
+    collections::BTreeMap,
     path::{Path, PathBuf},
-    sync::{Arc, Mutex},
 };
 
 use serde_json::{Value, json};
@@ -18,6 +17,7 @@ use super::{
     batch::{Batch, folder_failure},
     code,
     evaluate::{chosen, own_folders, plain},
+    grips::{Grips, note_grips},
     info::difference,
     print,
     progress::Progress,
@@ -33,10 +33,9 @@ use crate::{
         recorder::{Recorder, rate},
     },
     evaluation::record::{EpisodeRecord, Outcome},
-    policy::{Action, Observation, Streams},
     report::{actions, run_folder::RunFolder},
-    rollout::{ControlError, Controller, Finished, Simulation, batch, stop},
-    script::{self, ExpertController, Loaded},
+    rollout::{Finished, batch, stop},
+    script::{self, Loaded},
 };
 
 /// What to record.
@@ -53,9 +52,6 @@ pub struct Record {
     /// Whether the true state is kept.
     pub privileged: bool,
 }
-
-/// When the gripper was meant to hold, by task and attempt.
-type Grips = Arc<Mutex<BTreeMap<(usize, u32), Vec<bool>>>>;
 
 /// A suite that is being recorded.
 struct Session<'a> {
@@ -149,7 +145,12 @@ fn check_folder(root: &Path, resume: bool, recording: &Value) -> Result<bool, Fa
 }
 
 impl<'a> Session<'a> {
-    fn new(record: &'a Record, loaded: &'a Loaded, suite: &'a Suite, root: &'a Path) -> Result<Self, Failure> {
+    fn new(
+        record: &'a Record,
+        loaded: &'a Loaded,
+        suite: &'a Suite,
+        root: &'a Path,
+    ) -> Result<Self, Failure> {
         let run = &record.run;
         let name = plain(&run.name_of(suite));
         let tasks = chosen(run, suite)?;
@@ -209,7 +210,8 @@ impl<'a> Session<'a> {
     /// Attempts at a task that are needed whatever comes of them, and not done: as many as there are demonstrations missing.
     fn due(&self, task: usize) -> Vec<u32> {
         let of_task = self.records.iter().filter(|r| r.identity.task == task);
-        let done: BTreeMap<u32, bool> = of_task.map(|r| (r.identity.episode, rejected(r).is_none())).collect();
+        let done: BTreeMap<u32, bool> =
+            of_task.map(|r| (r.identity.episode, rejected(r).is_none())).collect();
         due(&done, self.record.demos, self.record.attempts)
     }
 
@@ -308,10 +310,23 @@ impl<'a> Session<'a> {
     /// Which have not, and why.
     fn enough(&self) -> Result<(), Failure> {
         let short = |task: &&&Task| self.kept(task.id).len() < self.record.demos as usize;
-        let told: Vec<String> = self.tasks.iter().filter(short).map(|task| {
-            let count = self.count(task, 0, 0);
-            format!("{}: task {}: {} of {} demonstrations after {} attempts ({})", self.suite, task.id, count.demos, self.record.demos, count.attempts, reasons(&count.rejected))
-        }).collect();
+        let told: Vec<String> = self
+            .tasks
+            .iter()
+            .filter(short)
+            .map(|task| {
+                let count = self.count(task, 0, 0);
+                format!(
+                    "{}: task {}: {} of {} demonstrations after {} attempts ({})",
+                    self.suite,
+                    task.id,
+                    count.demos,
+                    self.record.demos,
+                    count.attempts,
+                    reasons(&count.rejected)
+                )
+            })
+            .collect();
         if told.is_empty() {
             return Ok(());
         }
@@ -362,7 +377,8 @@ fn finish(sessions: &[Session], root: &Path) -> Result<(), Failure> {
     }
     manifest::write(root, &entries).map_err(failure)?;
     let _ = std::fs::remove_dir(root.join(PARTS));
-    let (pictures, privileged) = sessions.first().map_or((false, false), |s| (s.record.pictures, s.record.privileged));
+    let (pictures, privileged) =
+        sessions.first().map_or((false, false), |s| (s.record.pictures, s.record.privileged));
     let softvt = env!("CARGO_PKG_VERSION").to_owned();
     let card = Card { softvt, fps: rate(), pictures, privileged, tasks };
     card.write(root).map_err(failure)?;
@@ -426,52 +442,10 @@ fn failure(error: DatasetError) -> Failure {
     }
 }
 
-/// Lets the experts of a batch say when the gripper is meant to hold; others have only their closure.
-fn note_grips(run: &Run, batch: &mut Batch, grips: &Grips) {
-    if !run.policy.is_privileged() {
-        return;
-    }
-    let (grips, binary) = (grips.clone(), run.policy.word == "expert-binary");
-    batch.drive = Box::new(move |opened, brief| {
-        let expert = opened.expert().map_err(Failure::input)?;
-        let expert = expert.ok_or_else(|| Failure::input("the task has no expert"))?;
-        let driver = ExpertController::new(expert, binary);
-        Ok(Box::new(Noting { driver, shut: Vec::new(), whose: (brief.task, brief.episode), grips: grips.clone() }))
-    });
-}
-
-/// An expert whose grip is noted.
-struct Noting {
-    driver: ExpertController,
-    shut: Vec<bool>,
-    whose: (usize, u32),
-    grips: Grips,
-}
-
-impl Controller for Noting {
-    fn streams(&self) -> Streams {
-        self.driver.streams()
-    }
-
-    fn gave_up(&self) -> Option<&str> {
-        self.driver.gave_up()
-    }
-
-    fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, ControlError> {
-        let action = self.driver.act(sim, observation)?;
-        self.shut.push(self.driver.gripping());
-        Ok(action)
-    }
-
-    fn finish(&mut self) {
-        if let Ok(mut all) = self.grips.lock() {
-            all.insert(self.whose, std::mem::take(&mut self.shut));
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
 
     /// Runs attempts of which `good` says what becomes, in any order, and returns which were run.

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use super::{
-    Failure, args::Run, batch::Batch, code, dataset, drivers::Choice, evaluate::chosen, info::difference, print,
+    Failure, args::Run, batch::Batch, code, dataset, drivers::Choice, evaluate::chosen, info::difference,
+    print,
 };
 use crate::{
     benchmark::{Plan, Suite, seed::Split},

@@ -80,7 +80,10 @@ pub fn folder(root: &Path) -> Result<Findings, DatasetError> {
         let of_task = |e: &&Entry| e.task_id == task.task && e.suite == task.suite;
         let listed = entries.iter().filter(of_task).count();
         if listed != task.demos {
-            let what = format!("{listed} lines of {} task {}, dataset.json says {}", task.suite, task.task, task.demos);
+            let what = format!(
+                "{listed} lines of {} task {}, dataset.json says {}",
+                task.suite, task.task, task.demos
+            );
             findings.say(&root.join(super::layout::MANIFEST), "lines", what);
         }
     }
@@ -121,16 +124,16 @@ pub fn file(path: &Path) -> Result<Findings, DatasetError> {
 fn films(findings: &mut Findings, root: &Path, entry: &Entry) {
     for (stream, file) in &entry.video_files {
         let path = root.join(file);
-        let length = std::fs::read(&path)
-            .map_err(DatasetError::io("read", &path))
-            .map(|bytes| video::length(&bytes));
+        let length =
+            std::fs::read(&path).map_err(DatasetError::io("read", &path)).map(|bytes| video::length(&bytes));
         let Some(length) = findings.take(length) else { continue };
         findings.videos += 1;
         match length {
             None => findings.say(&path, stream, "no MP4 file, or cut off".to_owned()),
             Some((frames, hertz)) => {
                 if frames != entry.num_samples {
-                    let what = format!("{frames} pictures, the demonstration has {} steps", entry.num_samples);
+                    let what =
+                        format!("{frames} pictures, the demonstration has {} steps", entry.num_samples);
                     findings.say(&path, stream, what);
                 }
                 if (hertz - f64::from(rate())).abs() > 1e-9 {
@@ -195,7 +198,8 @@ fn stream(findings: &mut Findings, file: &TaskFile, (demo, steps): (usize, usize
     if let Some(at) = bad {
         findings.say(file.path(), &key, format!("step {}: a number that is not finite", at / width.max(1)));
     }
-    if PICTURES.iter().any(|picture| name == format!("obs/{picture}")) && !matches!(stream.row[..], [_, _, 3]) {
+    if PICTURES.iter().any(|picture| name == format!("obs/{picture}")) && !matches!(stream.row[..], [_, _, 3])
+    {
         let what = format!("expected the shape (steps, height, width, 3), got {:?} a step", stream.row);
         findings.say(file.path(), &key, what);
     }
@@ -214,7 +218,10 @@ fn quaternions(findings: &mut Findings, file: &TaskFile, key: &str, numbers: &Nu
         (length - 1.0).abs() > SAME || row[3] < 0.0
     });
     if let Some(step) = bad {
-        let what = format!("step {step}: no quaternion w x y z of length 1 with w >= 0: {:?}", &numbers[7 * step + 3..7 * step + 7]);
+        let what = format!(
+            "step {step}: no quaternion w x y z of length 1 with w >= 0: {:?}",
+            &numbers[7 * step + 3..7 * step + 7]
+        );
         findings.say(file.path(), key, what);
     }
 }
@@ -235,12 +242,14 @@ fn consistent(findings: &mut Findings, file: &TaskFile, demo: usize) {
         (q.coords - other.coords).norm().min((q.coords + other.coords).norm()) > SAME
     });
     if let Some(step) = turned {
-        let what = format!("step {step}: the quaternion is not the rotation of obs/state: is its order w x y z?");
+        let what =
+            format!("step {step}: the quaternion is not the rotation of obs/state: is its order w x y z?");
         findings.say(file.path(), &key("obs/eef_pose"), what);
     }
     let late = times.iter().enumerate().position(|(step, t)| (t - step as f64 * CONTROL_DT).abs() > SAME);
     if let Some(step) = late {
-        let what = format!("step {step}: {} s, expected {} at {} Hz", times[step], step as f64 * CONTROL_DT, rate());
+        let what =
+            format!("step {step}: {} s, expected {} at {} Hz", times[step], step as f64 * CONTROL_DT, rate());
         findings.say(file.path(), &key("timestamps"), what);
     }
     let both = actions.chunks_exact(7).zip(binary.chunks_exact(7));

@@ -93,7 +93,8 @@ impl Copy<'_, '_> {
         for index in 0..shape[0].div_ceil(rows) {
             place[0] = index;
             let (bytes, mask) = data.read_chunk_raw_at(&place).map_err(failed)?;
-            copy.write_chunk_raw(index, &bytes, mask).map_err(|e| DatasetError::hdf5(self.writer.path, into)(e))?;
+            copy.write_chunk_raw(index, &bytes, mask)
+                .map_err(|e| DatasetError::hdf5(self.writer.path, into)(e))?;
         }
         let mut notes = Vec::new();
         for name in data.attr_names().map_err(failed)? {

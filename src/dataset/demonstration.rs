@@ -4,7 +4,10 @@ use crate::{
     benchmark::control::CONTROL_DT,
     evaluation::record::EpisodeRecord,
     policy::Action,
-    robot::{gripper::{self, OPENING}, rotation},
+    robot::{
+        gripper::{self, OPENING},
+        rotation,
+    },
     rollout::{Film, Finished},
     sensing::tactile::{MARKERS, Markers},
 };
@@ -87,7 +90,13 @@ impl Demonstration {
     pub fn new(finished: &Finished, film: &Film, shut: Vec<bool>, privileged: bool) -> Self {
         let actions = finished.actions.clone();
         let privileged = if privileged { hidden::streams(finished, film) } else { Vec::new() };
-        Self { record: finished.record.clone(), observed: observed(film, &actions), shut, actions, privileged }
+        Self {
+            record: finished.record.clone(),
+            observed: observed(film, &actions),
+            shut,
+            actions,
+            privileged,
+        }
     }
 
     /// Control steps.
@@ -127,7 +136,8 @@ impl Demonstration {
                 .note("gripper", "binary: 1 while the gripper is meant to hold, else 0"),
             Stream::f64("rewards", &[], (0..steps).map(|step| f64::from(u8::from(last(step)))).collect()),
             Stream::u8("dones", &[], (0..steps).map(|step| u8::from(last(step))).collect()),
-            Stream::f64("timestamps", &[], (0..steps).map(|step| step as f64 * CONTROL_DT).collect()).of("s", ""),
+            Stream::f64("timestamps", &[], (0..steps).map(|step| step as f64 * CONTROL_DT).collect())
+                .of("s", ""),
         ]
     }
 }
@@ -135,7 +145,8 @@ impl Demonstration {
 /// What the robot measures of itself before each action.
 fn observed(film: &Film, actions: &[Action]) -> Vec<Stream> {
     let stances: Vec<_> = film.frames.iter().take(actions.len()).map(|f| film.senses.stance(f)).collect();
-    let each = |numbers: &dyn Fn(usize) -> Vec<f64>| (0..stances.len()).flat_map(numbers).collect::<Vec<f64>>();
+    let each =
+        |numbers: &dyn Fn(usize) -> Vec<f64>| (0..stances.len()).flat_map(numbers).collect::<Vec<f64>>();
     let width = |i: usize| gripper::width(stances[i].fingers);
     let commanded = |i: usize| i.checked_sub(1).map_or(0.0, |before| actions[before].closure.clamp(0.0, 1.0));
     let pose = each(&|i| {

@@ -36,7 +36,8 @@ fn forces(finished: &Finished, film: &Film) -> Vec<Stream> {
             .of("m, rad, 1, N", "robot base; forces: pad")
             .note("meaning", "the actions, then the force on the left and on the right gel"),
         Stream::f64("privileged/gripper_net_force", &[2, 3], force).of("N", "pad"),
-        Stream::f64("privileged/gripper_net_moment", &[2, 3], of(&|pad| pad.load.moment)).of("N m", "pad, about its apex"),
+        Stream::f64("privileged/gripper_net_moment", &[2, 3], of(&|pad| pad.load.moment))
+            .of("N m", "pad, about its apex"),
     ]
 }
 
@@ -59,7 +60,8 @@ fn contact(finished: &Finished) -> Vec<Stream> {
         Stream::f64("privileged/pad_force", &[2], shifted(trace, vec![0.0; 2], |t| t.pad_force_n.to_vec()))
             .of("N", "")
             .note("meaning", "normal force of the left and the right pad on the target"),
-        Stream::f64("privileged/slip", &[2], shifted(trace, vec![0.0; 2], |t| t.slip_mm.to_vec())).of("mm", ""),
+        Stream::f64("privileged/slip", &[2], shifted(trace, vec![0.0; 2], |t| t.slip_mm.to_vec()))
+            .of("mm", ""),
         Stream::u8("privileged/dropped", &[], shifted(trace, vec![0], |t| vec![u8::from(t.dropped)])),
     ]
 }
@@ -72,7 +74,8 @@ fn deformation(finished: &Finished) -> Vec<Stream> {
     let of = |pick: &dyn Fn(&ScoreFrame) -> Option<f64>| {
         shifted(frames, vec![0.0], |frame| vec![pick(frame).unwrap_or(f64::NAN)])
     };
-    let size = |f: &ScoreFrame| f.deformation.map_or(vec![f64::NAN; 3], |d| d.bbox_m.iter().copied().collect());
+    let size =
+        |f: &ScoreFrame| f.deformation.map_or(vec![f64::NAN; 3], |d| d.bbox_m.iter().copied().collect());
     let percent = |name: &str, numbers| {
         Stream::f64(format!("privileged/soft_extras/{name}"), &[], numbers)
             .of("% of the settled bounding box's diagonal", "")

@@ -68,7 +68,9 @@ impl Entry {
             d_peak: record.verdict.d_peak,
             seed: id.seed,
             state_hash: record.stats.state_hash.clone(),
-            video_files: videos.map(|(i, name)| ((*name).to_owned(), place.video_relative(demo, i))).collect(),
+            video_files: videos
+                .map(|(i, name)| ((*name).to_owned(), place.video_relative(demo, i)))
+                .collect(),
         }
     }
 }

@@ -74,7 +74,8 @@ impl TaskFile {
     pub fn environment(&self) -> Result<Value, DatasetError> {
         let key = "/data, attribute env_args";
         let text = self.data.attr_string("env_args").map_err(|e| DatasetError::hdf5(&self.path, key)(e))?;
-        serde_json::from_str(&text).map_err(|e| DatasetError::content(&self.path, key, format!("no JSON: {e}")))
+        serde_json::from_str(&text)
+            .map_err(|e| DatasetError::content(&self.path, key, format!("no JSON: {e}")))
     }
 
     fn group(&self, demo: usize) -> Result<H5Group, DatasetError> {
@@ -179,7 +180,12 @@ impl TaskFile {
     ///
     /// # Errors
     /// There is no such picture, or it is none of 8 bits and three channels.
-    pub fn picture(&self, demo: usize, name: &str, step: usize) -> Result<(Vec<u8>, [usize; 2]), DatasetError> {
+    pub fn picture(
+        &self,
+        demo: usize,
+        name: &str,
+        step: usize,
+    ) -> Result<(Vec<u8>, [usize; 2]), DatasetError> {
         let data = self.dataset(demo, name)?;
         let key = format!("/data/demo_{demo}/{name}");
         let &[_, height, width, 3] = &data.shape()[..] else {
@@ -196,13 +202,19 @@ impl TaskFile {
     /// As there.
     pub fn actions(&self, demo: usize) -> Result<Vec<Action>, DatasetError> {
         let shape = self.shape(demo, "actions")?;
-        let wrong = |what: String| DatasetError::content(&self.path, format!("/data/demo_{demo}/actions"), what);
+        let wrong =
+            |what: String| DatasetError::content(&self.path, format!("/data/demo_{demo}/actions"), what);
         if shape.len() != 2 || shape[1] < 7 {
             return Err(wrong(format!("expected the shape (steps, 7), got {shape:?}")));
         }
         let (numbers, width) = self.doubles(demo, "actions")?;
         if let Some(at) = numbers.iter().position(|x| !x.is_finite()) {
-            return Err(wrong(format!("step {}, number {}: {} is not finite", at / width, at % width, numbers[at])));
+            return Err(wrong(format!(
+                "step {}, number {}: {} is not finite",
+                at / width,
+                at % width,
+                numbers[at]
+            )));
         }
         let action = |row: &[f64]| Action {
             position_b: Vec3::new(row[0], row[1], row[2]),

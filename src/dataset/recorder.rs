@@ -143,8 +143,11 @@ impl Reels {
         steps: usize,
         pictures: bool,
     ) -> Result<Self, DatasetError> {
-        let video = |picture: &RgbImage| VideoWriter::new(picture.width() as usize, picture.height() as usize, rate());
-        let named = PICTURES.into_iter().zip(&scenery.pictures).take(if pictures { PICTURES.len() } else { 0 });
+        let video = |picture: &RgbImage| {
+            VideoWriter::new(picture.width() as usize, picture.height() as usize, rate())
+        };
+        let named =
+            PICTURES.into_iter().zip(&scenery.pictures).take(if pictures { PICTURES.len() } else { 0 });
         let roll = |((name, picture), rows): ((&'static str, &RgbImage), usize)| {
             let rows = rows.min(steps);
             let array = writer.pictures(0, name, (steps, rows), picture.dimensions())?;

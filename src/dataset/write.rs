@@ -22,7 +22,12 @@ pub(super) struct Writer<'a> {
 
 impl<'a> Writer<'a> {
     /// A new file with `/data` and its attributes.
-    pub fn create(path: &'a Path, environment: &Value, total: usize, demos: usize) -> Result<Self, DatasetError> {
+    pub fn create(
+        path: &'a Path,
+        environment: &Value,
+        total: usize,
+        demos: usize,
+    ) -> Result<Self, DatasetError> {
         let failed = |error| DatasetError::hdf5(path, "/data")(error);
         let file = H5File::create(path).map_err(|e| DatasetError::hdf5(path, "/")(e))?;
         let data = file.create_group("data").map_err(failed)?;
@@ -51,7 +56,12 @@ impl<'a> Writer<'a> {
     }
 
     /// Attributes of a demonstration.
-    pub fn describe(&mut self, demo: usize, record: &EpisodeRecord, steps: usize) -> Result<(), DatasetError> {
+    pub fn describe(
+        &mut self,
+        demo: usize,
+        record: &EpisodeRecord,
+        steps: usize,
+    ) -> Result<(), DatasetError> {
         let key = format!("data/demo_{demo}");
         let group = self.group(&key)?;
         let failed = |error| DatasetError::hdf5(self.path, &key)(error);
