@@ -1,7 +1,5 @@
 //! Episodes that are simulated again by their recorded actions.
 
-use std::path::Path;
-
 use super::{
     Failure,
     batch::{Batch, Drive, line, tell_undrawn},
@@ -9,25 +7,20 @@ use super::{
 };
 use crate::{
     evaluation::record::{EpisodeRecord, Outcome},
-    policy::{Chunked, recorded::Recorded},
+    policy::{Action, Chunked, recorded::Recorded},
     report::actions,
     rollout::{Finished, batch, stop},
 };
 
-/// Whoever drove the episode of `record`, as its actions in the run folder `dir` say.
-///
-/// # Errors
-/// They cannot be read.
-pub(super) fn drive(dir: &Path, record: &EpisodeRecord) -> Result<Drive, Failure> {
-    let path = actions::path(dir, record.identity.task, record.identity.episode);
-    let recorded = actions::read(&path).map_err(Failure::input)?;
+/// Whoever drove the episode of `record`, as its actions say.
+pub(super) fn drive(recorded: Vec<Action>, record: &EpisodeRecord) -> Drive {
     let ending = match &record.outcome {
         Outcome::Error { message } => Some(message.clone()),
         _ => None,
     };
-    Ok(Box::new(move |_, brief| {
+    Box::new(move |_, brief| {
         Ok(Box::new(Chunked::new(Box::new(Recorded::new(recorded.clone(), ending.clone())), brief, 1)))
-    }))
+    })
 }
 
 /// What came out when an episode was simulated again, with what is not simulated again: who drove, what it said, and what
@@ -110,7 +103,11 @@ fn simulate(
     let Some(job) = job else { return Ok(None) };
     let film = files.may_show(id.episode);
     let mut finished = match recorded {
-        true => batch.episode(job, film, &drive(&batch.out, record)?)?,
+        true => {
+            let path = actions::path(&batch.out, id.task, id.episode);
+            let recorded = actions::read(&path).map_err(Failure::input)?;
+            batch.episode(job, film, &drive(recorded, record))?
+        }
         false => batch.episode(job, film, &batch.drive)?,
     };
     finished.record = known(finished.record, record);

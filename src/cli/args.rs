@@ -7,7 +7,9 @@ use clap::{ArgMatches, error::ErrorKind, parser::ValueSource};
 use super::{
     Failure, code,
     drivers::Choice,
-    flags, replay,
+    flags,
+    record::Record,
+    replay,
     require::Requirement,
     shard::Shard,
     who::{self, Typed, Word},
@@ -73,6 +75,24 @@ pub enum Command {
     View(View),
     /// Serve episodes to clients.
     Serve(Serve),
+    /// Record demonstrations.
+    Record(Record),
+    /// Say what is wrong with a data set.
+    DatasetCheck {
+        /// Its folder, or one of its files.
+        path: PathBuf,
+        /// Demonstrations to simulate again.
+        replays: usize,
+    },
+    /// Say what is in a data set.
+    DatasetStats {
+        /// Its folder, or one of its files.
+        path: PathBuf,
+        /// Where to draw.
+        out: Option<PathBuf>,
+        /// As JSON.
+        json: bool,
+    },
     /// Check the installation.
     Doctor,
     /// Help or version was shown.
@@ -237,6 +257,11 @@ pub fn parse(words: &[String]) -> Result<Command, Failure> {
         Some(("check", m)) => driven(common(m, &options).map_err(named)?, m).map(Command::Check),
         Some(("serve", m)) => serve(common(m, &options).map_err(named)?, m).map(Command::Serve),
         Some(("doctor", _)) => Ok(Command::Doctor),
+        Some(("record", m)) => {
+            let record = record(m, &options).map_err(named)?;
+            Ok(Command::Record(Record { run: driven(record.run, m)?, ..record }))
+        }
+        Some(("dataset", m)) => Ok(dataset(m)),
         Some(("view", m)) => {
             let view = view(m, &options).map_err(named)?;
             Ok(Command::View(View { run: driven(view.run, m)?, ..view }))
@@ -301,6 +326,45 @@ fn serve(run: Run, matches: &ArgMatches) -> Result<Serve, Failure> {
     })
 }
 
+fn record(matches: &ArgMatches, options: &[OptionSpec]) -> Result<Record, Failure> {
+    let run = common(matches, options)?;
+    let demos = matches.get_one("demos").copied().unwrap_or(50);
+    Ok(Record {
+        run: Run {
+            tasks: many(matches, "task"),
+            threads: threads(matches),
+            resume: matches.get_flag("resume"),
+            // What touched what, and how hard, comes from it.
+            trace: Some(false),
+            ..run
+        },
+        demos,
+        attempts: matches.get_one("attempts").copied().unwrap_or(demos.saturating_mul(4).max(20)),
+        pictures: text(matches, "images") == "hdf5",
+        privileged: !matches.get_flag("no-privileged"),
+    })
+}
+
+fn dataset(matches: &ArgMatches) -> Command {
+    match matches.subcommand() {
+        Some(("stats", m)) => Command::DatasetStats {
+            path: PathBuf::from(text(m, "path")),
+            out: m.get_one::<String>("out").map(PathBuf::from),
+            json: m.get_flag("json"),
+        },
+        Some((_, m)) => Command::DatasetCheck {
+            path: PathBuf::from(text(m, "path")),
+            replays: m.get_one("replay").copied().map_or(1, |n: u32| n as usize),
+        },
+        None => Command::Shown,
+    }
+}
+
+fn threads(matches: &ArgMatches) -> usize {
+    let available = std::thread::available_parallelism().map_or(1, |n| n.get());
+    matches.get_one::<u16>("threads").map_or(available, |n| usize::from(*n))
+}
+
 /// What commands on scripts share.
 fn common(matches: &ArgMatches, options: &[OptionSpec]) -> Result<Run, Failure> {
     let mut script_words = Vec::new();
@@ -352,7 +416,6 @@ fn many(matches: &ArgMatches, name: &str) -> Vec<String> {
 }
 
 fn run(matches: &ArgMatches, options: &[OptionSpec]) -> Result<Run, Failure> {
-    let available = std::thread::available_parallelism().map_or(1, |n| n.get());
     let video = matches.get_one::<String>("video").map(|word| match word.as_str() {
         "failed" => Video::Failed,
         "all" => Video::All,
@@ -361,7 +424,7 @@ fn run(matches: &ArgMatches, options: &[OptionSpec]) -> Result<Run, Failure> {
     Ok(Run {
         tasks: many(matches, "task"),
         episodes: matches.get_one("episodes").copied(),
-        threads: matches.get_one::<u16>("threads").map_or(available, |n| usize::from(*n)),
+        threads: threads(matches),
         trace: matches.get_one::<String>("trace").map(|kind| kind == "nodes"),
         video,
         resume: matches.get_flag("resume"),

@@ -64,6 +64,8 @@ pub(super) struct Batch<'a> {
     pub films: bool,
     /// Whether whoever drives sees the true forces at the pads.
     pub force_observed: bool,
+    /// Which list its episodes are of.
+    pub split: Split,
     pub drive: Drive,
 }
 
@@ -104,6 +106,7 @@ impl<'a> Batch<'a> {
             out,
             films: run.video.is_some(),
             force_observed: false,
+            split: Split::Validation,
             drive: Box::new(move |opened, brief| drivers.drive(opened, brief)),
         })
     }
@@ -134,7 +137,7 @@ impl<'a> Batch<'a> {
             task: task.id,
             episode: u64::from(episode),
             base_seed: self.run.seed,
-            split: Split::Validation,
+            split: self.split,
             shifts: self.run.shifts.clone(),
         }
     }

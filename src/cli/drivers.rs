@@ -106,9 +106,17 @@ impl Choice {
         &self.name
     }
 
+    /// The hand of the tasks' experts, if they drive.
+    pub fn hand(&self) -> Option<Hand> {
+        match self.driver {
+            Driver::Expert(hand) => Some(hand),
+            _ => None,
+        }
+    }
+
     /// Whether it sees the true state.
     pub fn is_privileged(&self) -> bool {
-        matches!(self.driver, Driver::Expert(_))
+        self.hand().is_some()
     }
 
     /// Whether it answers over a network.
@@ -216,18 +224,24 @@ impl Drivers {
                 let seed = rand::RngCore::next_u64(&mut opened.seed.stream(Stream::Script));
                 chunked(Box::new(builtin::Random::new(seed)), 1)
             }
-            (Driver::Expert(hand), _) => {
-                let expert = opened.expert().map_err(Failure::input)?;
-                let expert = expert.ok_or_else(|| Failure::input("the task has no expert"))?;
-                Box::new(match hand {
-                    Hand::Servo => ExpertController::servo(expert),
-                    Hand::Told | Hand::Binary => ExpertController::new(expert, *hand == Hand::Binary),
-                })
-            }
+            (Driver::Expert(hand), _) => Box::new(expert(opened, *hand)?),
             // Nobody has handed any over yet.
             (Driver::Given | Driver::Server(_), _) => chunked(Box::new(Recorded::new(Vec::new(), None)), 1),
         })
     }
+}
+
+/// The task's expert with one of its hands.
+///
+/// # Errors
+/// The task has none, or it does not start.
+pub fn expert(opened: script::Episode, hand: Hand) -> Result<ExpertController, Failure> {
+    let expert = opened.expert().map_err(Failure::input)?;
+    let expert = expert.ok_or_else(|| Failure::input("the task has no expert"))?;
+    Ok(match hand {
+        Hand::Servo => ExpertController::servo(expert),
+        Hand::Told | Hand::Binary => ExpertController::new(expert, hand == Hand::Binary),
+    })
 }
 
 /// Where a server's key comes from: not from the command line, which others can read.

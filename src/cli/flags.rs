@@ -33,7 +33,8 @@ pub fn command(options: &[OptionSpec]) -> Result<clap::Command, Failure> {
             .arg(script_arg(option, long.clone()))
             .mut_subcommand("check", |check| check.arg(script_arg(option, long.clone())))
             .mut_subcommand("serve", |serve| serve.arg(script_arg(option, long.clone())))
-            .mut_subcommand("view", |view| view.arg(script_arg(option, long)));
+            .mut_subcommand("view", |view| view.arg(script_arg(option, long.clone())))
+            .mut_subcommand("record", |record| record.arg(script_arg(option, long)));
     }
     Ok(command)
 }
@@ -254,7 +255,77 @@ fn runner() -> clap::Command {
                 .arg(flag("out", "Where to write").value_name("DIR").required(true)),
         )
         .subcommand(server())
+        .subcommand(record())
+        .subcommand(dataset())
         .subcommand(clap::Command::new("doctor").about("Checks the installation and runs a golden episode"))
+}
+
+fn record() -> clap::Command {
+    on_script(clap::Command::new("record").about("Records demonstrations: HDF5, videos, and a manifest"))
+        .arg(
+            flag("demos", "Demonstrations a task")
+                .value_name("N")
+                .default_value("50")
+                .value_parser(value_parser!(u32).range(1..=100_000)),
+        )
+        .arg(
+            flag("out", "Where to write: a new folder, or with --resume that of a recording")
+                .value_name("DIR")
+                .required(true),
+        )
+        .arg(
+            list("task", "Only these tasks: indices or parts of prompts, joined by commas")
+                .value_name("TASK"),
+        )
+        .arg(
+            flag(
+                "attempts",
+                "Most attempts at a task, kept or not [default: 4 a demonstration, at least 20]",
+            )
+            .value_name("N")
+            .value_parser(value_parser!(u32).range(1..=1_000_000)),
+        )
+        .arg(
+            flag("images", "Where pictures are: in the HDF5 files and as videos, or only as videos")
+                .value_name("WHERE")
+                .default_value("hdf5")
+                .value_parser(["hdf5", "video"]),
+        )
+        .arg(
+            flag("no-privileged", "Leaves out the true state: node positions, deformation, contact, forces")
+                .action(ArgAction::SetTrue),
+        )
+        .arg(
+            flag("threads", "Threads; the data do not depend on it")
+                .value_name("N")
+                .value_parser(value_parser!(u16).range(1..=1024)),
+        )
+        .arg(
+            flag("resume", "Goes on with the recording in --out, if one was broken off there")
+                .action(ArgAction::SetTrue),
+        )
+}
+
+fn dataset() -> clap::Command {
+    let path =
+        || Arg::new("path").value_name("DATASET").required(true).help("Its folder, or one of its HDF5 files");
+    clap::Command::new("dataset")
+        .about("Looks into recorded demonstrations")
+        .subcommand_required(true)
+        .arg_required_else_help(true)
+        .subcommand(
+            clap::Command::new("check")
+                .about("Says what is wrong with a data set: counts, shapes, rates, numbers, videos, and whether it can be repeated")
+                .arg(path())
+                .arg(flag("replay", "Demonstrations to simulate again, spread over the tasks").value_name("N").default_value("1").value_parser(value_parser!(u32))),
+        )
+        .subcommand(
+            clap::Command::new("stats")
+                .about("Prints and draws the distributions of actions, lengths and deformations")
+                .arg(path())
+                .arg(flag("out", "Where to draw [default: stats.svg in the folder of the data set]").value_name("FILE.svg"))
+                .arg(flag("json", "Print JSON on the standard output").action(ArgAction::SetTrue)),
+        )
 }
 
 fn video(word: &str) -> Result<String, String> {

@@ -14,7 +14,7 @@ use super::{
     recorded::Replayed,
 };
 use crate::{
-    benchmark::{Task, seed::Split, settings::Settings},
+    benchmark::{Task, settings::Settings},
     policy::profile::Profile,
     report::run_folder::{RUN, RunFolder, write_json},
 };
@@ -78,7 +78,7 @@ impl<'a> RunInfo<'a> {
             replan: run.policy.replan(),
             privileged: run.policy.is_privileged(),
             seed: run.seed,
-            split: Split::Validation.name(),
+            split: batch.split.name(),
             tasks: tasks.iter().map(|t| t.id).collect(),
             episodes,
             shard: run.shard.map(|shard| shard.to_string()),

@@ -6,16 +6,19 @@ mod batch;
 mod check;
 mod compare;
 mod conditions;
+mod dataset;
 mod doctor;
 mod drivers;
 mod evaluate;
 mod experiment;
 mod files;
 mod flags;
+mod grips;
 mod info;
 mod init;
 mod list;
 mod progress;
+mod record;
 mod recorded;
 mod replay;
 mod report;
@@ -127,6 +130,9 @@ fn carry_out(words: &[String]) -> Result<(), Failure> {
         Command::Report { runs, out } => report::run(&runs, &out),
         Command::View(view) => view::run(&view),
         Command::Serve(serve) => serve::run(&serve),
+        Command::Record(record) => record::run(&record),
+        Command::DatasetCheck { path, replays } => dataset::check(&path, replays),
+        Command::DatasetStats { path, out, json } => dataset::stats(&path, out.as_deref(), json),
         Command::Doctor => doctor::run(),
         Command::Shown => Ok(()),
     }

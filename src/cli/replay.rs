@@ -4,11 +4,18 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use super::{Failure, again, args::Run, batch::Batch, code, drivers::Choice, evaluate::chosen, print};
+use super::{
+    Failure, again as once_more, args::Run, batch::Batch, code, dataset, drivers::Choice, evaluate::chosen,
+    print,
+};
 use crate::{
-    benchmark::{Plan, Suite},
+    benchmark::{Plan, Suite, seed::Split},
     evaluation::record::EpisodeRecord,
-    report::runs::{self, StoredRun},
+    policy::Action,
+    report::{
+        actions,
+        runs::{self, StoredRun},
+    },
     script,
 };
 
@@ -39,6 +46,9 @@ pub fn which(word: &str) -> Result<Which, String> {
 /// # Errors
 /// The run cannot be read, its scripts have changed since, or (exit code 1) something comes out different.
 pub fn run(dir: &Path, which: Which) -> Result<(), Failure> {
+    if dataset::is_dataset(dir) {
+        return dataset::replay(dir, which);
+    }
     let stored = runs::load(dir).map_err(Failure::input)?;
     let [stored] = &stored[..] else {
         let names: Vec<String> = stored.iter().map(|run| run.dir.display().to_string()).collect();
@@ -49,6 +59,23 @@ pub fn run(dir: &Path, which: Which) -> Result<(), Failure> {
         )));
     };
     let record = find(stored, which)?;
+    let path = actions::path(&stored.dir, record.identity.task, record.identity.episode);
+    let recorded = actions::read(&path).map_err(Failure::input)?;
+    let state = again(stored, record, recorded)?;
+    let (task, episode) = (record.identity.task, record.identity.episode);
+    print(&format!("task {task} episode {episode}: the same to the byte, final state {state}\n"));
+    Ok(())
+}
+
+/// Simulates an episode of a run again by its actions, and returns the hash of its final state.
+///
+/// # Errors
+/// The scripts have changed since, or (exit code 1) something comes out different.
+pub(super) fn again(
+    stored: &StoredRun,
+    record: &EpisodeRecord,
+    recorded: Vec<Action>,
+) -> Result<String, Failure> {
     let run = run_of(stored)?;
     let loaded = script::load(&run.file, &run.script_words).map_err(Failure::input)?;
     let suite = suite_of(&loaded.plan, &run, stored)?;
@@ -56,14 +83,13 @@ pub fn run(dir: &Path, which: Which) -> Result<(), Failure> {
     let run = Run { tasks: vec![task.to_string()], ..run };
     let tasks = chosen(&run, suite)?;
     let mut batch = Batch::new(&run, &loaded, suite, (vec![(tasks[0], episode)], PathBuf::new()))?;
-    batch.drive = again::drive(&stored.dir, record)?;
+    batch.split = split_of(stored)?;
+    batch.drive = once_more::drive(recorded, record);
     batch.prepare(&tasks)?;
     same_sources(stored, &batch)?;
-    let simulated = again::known(batch.episode(0, false, &batch.drive)?.record, record);
-    let Some(what) = again::difference(record, &simulated)? else {
-        let hash = &simulated.stats.state_hash;
-        print(&format!("task {task} episode {episode}: the same to the byte, final state {hash}\n"));
-        return Ok(());
+    let simulated = once_more::known(batch.episode(0, false, &batch.drive)?.record, record);
+    let Some(what) = once_more::difference(record, &simulated)? else {
+        return Ok(simulated.stats.state_hash);
     };
     Err(Failure {
         code: code::INTERNAL,
@@ -86,6 +112,16 @@ fn find(stored: &StoredRun, which: Which) -> Result<&EpisodeRecord, Failure> {
             stored.dir.display(),
             stored.records.len()
         ))
+    })
+}
+
+/// Which list the episodes of a run are of.
+fn split_of(stored: &StoredRun) -> Result<Split, Failure> {
+    let named = |split: &Split| split.name() == stored.text("split");
+    let found = [Split::Validation, Split::Demonstration, Split::Experiment].into_iter().find(named);
+    found.ok_or_else(|| {
+        let dir = stored.dir.display();
+        Failure::input(format!("{dir}: there is no list of episodes {:?}", stored.text("split")))
     })
 }
 

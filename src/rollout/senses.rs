@@ -83,13 +83,13 @@ impl SenseError {
 
 /// An object of the scene as the sensors know it.
 #[derive(Clone, Debug)]
-struct Part {
-    name: String,
+pub(super) struct Part {
+    pub(super) name: String,
     asset: Arc<Asset>,
-    kind: Kind,
+    pub(super) kind: Kind,
     start_w: Pose,
     /// Its frame in that of its link, if it has one.
-    offset: Pose,
+    pub(super) offset: Pose,
     colliders: Vec<ColliderId>,
     rest: Option<Arc<Rest>>,
 }
@@ -99,9 +99,9 @@ struct Part {
 pub struct Senses {
     scene: Arc<Scene>,
     spec: TactileSpec,
-    robot: RobotSpec,
-    tree: usize,
-    parts: Vec<Part>,
+    pub(super) robot: RobotSpec,
+    pub(super) tree: usize,
+    pub(super) parts: Vec<Part>,
     looks: Looks,
     stage: Option<Arc<Stage>>,
     eye: camera::Scratch,

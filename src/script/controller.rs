@@ -14,18 +14,24 @@ pub struct ExpertController {
     expert: Expert,
     binary: bool,
     servo: bool,
+    gripping: bool,
     lag: Lag,
 }
 
 impl ExpertController {
     /// `binary` replaces the expert's closure by fully open or fully shut, as a binary gripper action would.
     pub fn new(expert: Expert, binary: bool) -> Self {
-        Self { expert, binary, servo: false, lag: Lag::default() }
+        Self { expert, binary, servo: false, gripping: false, lag: Lag::default() }
     }
 
     /// Closes, wherever the expert grasps, until the fingers feel that they hold something, whatever the expert says.
     pub fn servo(expert: Expert) -> Self {
-        Self { expert: expert.as_servo(), binary: false, servo: true, lag: Lag::default() }
+        Self { expert: expert.as_servo(), binary: false, servo: true, gripping: false, lag: Lag::default() }
+    }
+
+    /// Whether the gripper is meant to hold something, as last commanded.
+    pub fn gripping(&self) -> bool {
+        self.gripping
     }
 }
 
@@ -49,6 +55,7 @@ impl Controller for ExpertController {
         let command = next(&mut self.expert, glance, &mut self.lag);
         let command = command.map_err(|error| ControlError::Script(error.to_string()))?;
         Ok(command.map(|command| {
+            self.gripping = command.gripping;
             let shut = if command.gripping { 1.0 } else { 0.0 };
             Action {
                 position_b: command.pose_b.translation.vector,

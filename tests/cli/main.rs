@@ -16,6 +16,7 @@ mod joints;
 mod killed;
 mod measures;
 mod observe;
+mod recording;
 mod reports;
 mod scorer;
 mod serve;

@@ -1,6 +1,7 @@
 //! H.264 in MP4: small files that ordinary players and browsers open, without an external program.
 
 mod colour;
+mod length;
 mod mp4;
 
 use std::path::{Path, PathBuf};
@@ -8,6 +9,8 @@ use std::path::{Path, PathBuf};
 use rusty_h264_common::YuvFrame;
 use rusty_h264_encoder::{EncodeError, Encoder, EncoderConfig, Preset};
 use thiserror::Error;
+
+pub use length::length;
 
 /// Quantiser of the encoder, 0 (lossless) to 51: pictures of this benchmark come out at about 40 dB.
 const QUANTISER: u8 = 22;

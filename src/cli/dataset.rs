@@ -1,0 +1,150 @@
+//! `softvt dataset`: looking into recorded demonstrations; and simulating one again.
+
+use std::path::{Path, PathBuf};
+
+use super::{
+    Failure, print,
+    replay::{self, Which},
+};
+use crate::{
+    dataset::{
+        TaskFile, check, files,
+        layout::{DATASET, RECORDING},
+        manifest::{self, Entry},
+        stats,
+    },
+    report::runs::StoredRun,
+};
+
+/// Whether a path is that of a data set: an HDF5 file, or the folder of a recording.
+pub fn is_dataset(path: &Path) -> bool {
+    let hdf5 = path.extension().is_some_and(|end| end == "hdf5" || end == "h5");
+    hdf5 || path.join(DATASET).is_file() || path.join(RECORDING).is_file()
+}
+
+/// Says what is wrong with a data set; `replays` of its demonstrations are simulated again.
+///
+/// # Errors
+/// Something is wrong.
+pub fn check(path: &Path, replays: usize) -> Result<(), Failure> {
+    finished(path)?;
+    let findings = if path.is_dir() { check::folder(path) } else { check::file(path) };
+    let findings = findings.map_err(Failure::input)?;
+    if !findings.wrong.is_empty() {
+        let count = findings.wrong.len();
+        let told = findings.wrong.join("\n");
+        return Err(Failure::input(format!("{told}\n{}: {count} things are wrong", path.display())));
+    }
+    print(&format!(
+        "{} demonstrations, {} steps, {} videos: nothing is wrong\n",
+        findings.demos, findings.steps, findings.videos
+    ));
+    for (file, demo) in spread(&all(path)?, replays) {
+        let state = repeat(&file, demo)?;
+        print(&format!("{} demo_{demo}: the same to the byte, final state {state}\n", file.display()));
+    }
+    Ok(())
+}
+
+/// Prints and draws how a data set is distributed.
+///
+/// # Errors
+/// It cannot be read, or the drawing not written.
+pub fn stats(path: &Path, out: Option<&Path>, json: bool) -> Result<(), Failure> {
+    finished(path)?;
+    let mut paths: Vec<PathBuf> = all(path)?.into_iter().map(|(file, _)| file).collect();
+    paths.dedup();
+    let spreads = stats::of(&paths).map_err(Failure::input)?;
+    match json {
+        true => print(&format!("{:#}\n", serde_json::json!(spreads))),
+        false => print(&stats::table(&spreads)),
+    }
+    let beside = if path.is_dir() { path.join("stats.svg") } else { path.with_extension("stats.svg") };
+    let out = out.map_or(beside, Path::to_path_buf);
+    files::write(&out, stats::svg(&spreads).as_bytes()).map_err(Failure::input)?;
+    crate::message::tell(&format!("softvt: {}", out.display()));
+    Ok(())
+}
+
+/// Simulates a demonstration again: `task/demo`, or the number of its line in the manifest or file.
+///
+/// # Errors
+/// There is no such demonstration, or (exit code 1) it comes out different.
+pub fn replay(path: &Path, which: Which) -> Result<(), Failure> {
+    finished(path)?;
+    let none = || Failure::input(format!("{} has no such demonstration: {which:?}", path.display()));
+    let (file, demo) = match which {
+        Which::Line(line) => all(path)?.into_iter().nth(line).ok_or_else(none)?,
+        Which::Of(task, demo) if path.is_dir() => {
+            let entries = manifest::read(path).map_err(Failure::input)?;
+            let fits = |entry: &&Entry| entry.task_id == task && entry.demo_id == demo as usize;
+            let found: Vec<&Entry> = entries.iter().filter(fits).collect();
+            match found[..] {
+                [entry] => (path.join(&entry.hdf5_path), entry.demo_id),
+                [] => return Err(none()),
+                _ => {
+                    let files: Vec<&str> = found.iter().map(|entry| entry.hdf5_path.as_str()).collect();
+                    let several =
+                        format!("several suites have a task {task}: name one of {}", files.join(", "));
+                    return Err(Failure::input(format!("{}: {several}", path.display())));
+                }
+            }
+        }
+        Which::Of(_, demo) => (path.to_owned(), demo as usize),
+    };
+    let state = repeat(&file, demo)?;
+    print(&format!("{} demo_{demo}: the same to the byte, final state {state}\n", file.display()));
+    Ok(())
+}
+
+/// Refuses a folder whose recording is not finished.
+fn finished(path: &Path) -> Result<(), Failure> {
+    if path.is_dir() && path.join(RECORDING).is_file() && !path.join(DATASET).is_file() {
+        return Err(Failure::input(format!(
+            "{}: the recording was broken off; finish it with softvt record … --resume --out {0}",
+            path.display()
+        )));
+    }
+    Ok(())
+}
+
+/// Every demonstration: its file and its number in it.
+fn all(path: &Path) -> Result<Vec<(PathBuf, usize)>, Failure> {
+    if path.is_dir() {
+        let entries = manifest::read(path).map_err(Failure::input)?;
+        return Ok(entries.iter().map(|entry| (path.join(&entry.hdf5_path), entry.demo_id)).collect());
+    }
+    let file = TaskFile::open(path).map_err(Failure::input)?;
+    Ok(file.demos().iter().map(|demo| (path.to_owned(), *demo)).collect())
+}
+
+/// `count` of them, evenly spread, the first always.
+fn spread(all: &[(PathBuf, usize)], count: usize) -> Vec<(PathBuf, usize)> {
+    let count = count.min(all.len());
+    (0..count).map(|i| all[i * all.len() / count].clone()).collect()
+}
+
+/// Simulates a demonstration again by the actions in its file.
+fn repeat(path: &Path, demo: usize) -> Result<String, Failure> {
+    let file = TaskFile::open(path).map_err(Failure::input)?;
+    let record = file.record(demo).map_err(Failure::input)?;
+    let info = file.environment().map_err(Failure::input)?["env_kwargs"].clone();
+    let actions = file.actions(demo).map_err(Failure::input)?;
+    let stored = StoredRun { dir: path.to_owned(), info, records: Vec::new(), finished: true };
+    replay::again(&stored, &record, actions)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sample_is_spread_over_the_whole() {
+        let all: Vec<(PathBuf, usize)> = (0..10).map(|demo| (PathBuf::from("x"), demo)).collect();
+        let picked = |count| spread(&all, count).into_iter().map(|(_, demo)| demo).collect::<Vec<_>>();
+        assert_eq!(picked(1), [0]);
+        assert_eq!(picked(2), [0, 5]);
+        assert_eq!(picked(20).len(), 10);
+        assert_eq!(picked(0), [0; 0]);
+    }
+}

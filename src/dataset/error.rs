@@ -1,0 +1,75 @@
+//! What can be wrong with a data set.
+
+use std::{fmt::Display, io, path::Path};
+
+use rust_hdf5::Hdf5Error;
+
+use super::video::VideoError;
+use crate::rollout::SenseError;
+
+/// Why demonstrations cannot be written or read.
+#[derive(Debug, thiserror::Error)]
+pub enum DatasetError {
+    /// The system refused.
+    #[error("cannot {action} {path}: {source}")]
+    Io {
+        /// What was tried.
+        action: &'static str,
+        /// On which file.
+        path: String,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The file is no HDF5, or a broken one.
+    #[error("{path}: {key}: {what}")]
+    Hdf5 {
+        /// The file.
+        path: String,
+        /// The group or data set in it.
+        key: String,
+        /// What is wrong.
+        what: String,
+    },
+    /// The file is whole and does not hold what it should.
+    #[error("{path}: {key}: {what}")]
+    Content {
+        /// The file.
+        path: String,
+        /// The group, data set or line in it.
+        key: String,
+        /// What is wrong, and what was expected.
+        what: String,
+    },
+    /// A stream cannot be made.
+    #[error(transparent)]
+    Sense(#[from] SenseError),
+    /// A video cannot be made.
+    #[error(transparent)]
+    Video(#[from] VideoError),
+    /// The end was asked for.
+    #[error("interrupted")]
+    Interrupted,
+}
+
+impl DatasetError {
+    /// What the system said of an action on a file.
+    pub fn io(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self + use<> {
+        let path = path.display().to_string();
+        move |source| Self::Io { action, path, source }
+    }
+
+    /// What the HDF5 library said of a key of a file.
+    pub(super) fn hdf5(path: &Path, key: impl Display) -> impl FnOnce(Hdf5Error) -> Self {
+        let (path, key) = (path.display().to_string(), key.to_string());
+        move |error| match error {
+            Hdf5Error::Io(source) => Self::Io { action: "read or write", path, source },
+            Hdf5Error::NotFound(_) => Self::Hdf5 { path, key, what: "it is not there".to_owned() },
+            other => Self::Hdf5 { path, key, what: other.to_string() },
+        }
+    }
+
+    /// Something is not as it should be.
+    pub(super) fn content(path: &Path, key: impl Display, what: impl Into<String>) -> Self {
+        Self::Content { path: path.display().to_string(), key: key.to_string(), what: what.into() }
+    }
+}

@@ -1,0 +1,105 @@
+//! `manifest.jsonl`: one line a demonstration, by SoftVTBench's names.
+
+use std::{collections::BTreeMap, path::Path};
+
+use serde::{Deserialize, Serialize};
+
+use super::{
+    DatasetError, files,
+    layout::{MANIFEST, TaskPlace, VIDEOS},
+};
+use crate::evaluation::record::EpisodeRecord;
+
+/// Version of this form.
+pub const SCHEMA: u32 = 1;
+
+/// A line.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Entry {
+    /// [`SCHEMA`].
+    pub schema_version: u32,
+    /// Suite.
+    pub suite: String,
+    /// The same, by SoftVTBench's name.
+    pub task_suite: String,
+    /// Task index.
+    pub task_id: usize,
+    /// Attempt that it is of: its index in the split of demonstrations.
+    pub episode: u32,
+    /// Number of the demonstration in its file.
+    pub demo_id: usize,
+    /// HDF5 file, from the folder of the data set.
+    pub hdf5_path: String,
+    /// Control steps.
+    pub num_samples: usize,
+    /// The instruction.
+    pub language: String,
+    /// Asset of the target.
+    pub asset_name: String,
+    /// Always: only safe demonstrations that reach the goal are kept.
+    pub success: bool,
+    /// Peak D, %; null for a rigid target.
+    pub d_peak: Option<f64>,
+    /// Base seed.
+    pub seed: u64,
+    /// Hash of the final state.
+    pub state_hash: String,
+    /// Videos by stream, from the folder of the data set.
+    pub video_files: BTreeMap<String, String>,
+}
+
+impl Entry {
+    /// That of demonstration `demo` of a task.
+    pub fn new(place: &TaskPlace, demo: usize, record: &EpisodeRecord) -> Self {
+        let id = &record.identity;
+        let videos = VIDEOS.iter().enumerate();
+        Self {
+            schema_version: SCHEMA,
+            suite: id.suite.clone(),
+            task_suite: id.suite.clone(),
+            task_id: id.task,
+            episode: id.episode,
+            demo_id: demo,
+            hdf5_path: place.hdf5_relative(),
+            num_samples: record.stats.steps as usize,
+            language: id.prompt.clone(),
+            asset_name: id.asset.clone(),
+            success: record.verdict.safety,
+            d_peak: record.verdict.d_peak,
+            seed: id.seed,
+            state_hash: record.stats.state_hash.clone(),
+            video_files: videos
+                .map(|(i, name)| ((*name).to_owned(), place.video_relative(demo, i)))
+                .collect(),
+        }
+    }
+}
+
+/// Writes all lines.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write(root: &Path, entries: &[Entry]) -> Result<(), DatasetError> {
+    let path = root.join(MANIFEST);
+    let mut text = String::new();
+    for entry in entries {
+        let line = serde_json::to_string(entry);
+        text += &line.map_err(|e| DatasetError::content(&path, "line", e.to_string()))?;
+        text.push('\n');
+    }
+    files::write(&path, text.as_bytes())
+}
+
+/// Reads all lines.
+///
+/// # Errors
+/// The file cannot be read, or a line is none.
+pub fn read(root: &Path) -> Result<Vec<Entry>, DatasetError> {
+    let path = root.join(MANIFEST);
+    let text = files::read_text(&path)?;
+    let parse = |(i, line): (usize, &str)| {
+        serde_json::from_str(line)
+            .map_err(|e| DatasetError::content(&path, format!("line {}", i + 1), e.to_string()))
+    };
+    text.lines().enumerate().map(parse).collect()
+}

@@ -1,0 +1,258 @@
+//! HDF5 files of demonstrations, ours and others of robomimic's layout.
+
+use std::path::{Path, PathBuf};
+
+use rust_hdf5::{DatatypeMessage, H5Dataset, H5File, H5Group};
+use serde_json::Value;
+
+use super::{DatasetError, Demonstration, Numbers, Stream};
+use crate::{evaluation::record::EpisodeRecord, geometry::Vec3, policy::Action};
+
+/// The file of a task: `/data/demo_0` and so on.
+pub struct TaskFile {
+    pub(super) file: H5File,
+    path: PathBuf,
+    data: H5Group,
+    demos: Vec<usize>,
+}
+
+/// The actions of a demonstration, absolute as softvt records them, with the continuous code of the gripper.
+///
+/// # Errors
+/// The file is no HDF5 of this layout, has no such demonstration, or its actions are not `(steps, 7)` finite numbers, or more
+/// a step.
+pub fn actions(path: &Path, demo: usize) -> Result<Vec<Action>, DatasetError> {
+    TaskFile::open(path)?.actions(demo)
+}
+
+/// What kind of numbers a data set holds: `f64`, `f32`, `u8` or `other`.
+pub(super) fn kind_of(path: &Path, key: &str, data: &H5Dataset) -> Result<&'static str, DatasetError> {
+    let kind = data.datatype().map_err(|e| DatasetError::hdf5(path, key)(e))?;
+    Ok(match kind {
+        DatatypeMessage::FloatingPoint { size: 8, .. } => "f64",
+        DatatypeMessage::FloatingPoint { size: 4, .. } => "f32",
+        DatatypeMessage::FixedPoint { size: 1, signed: false, .. } => "u8",
+        _ => "other",
+    })
+}
+
+impl TaskFile {
+    /// Opens a file and lists its demonstrations.
+    ///
+    /// # Errors
+    /// It cannot be read, is no HDF5, is cut off, or has no `/data/demo_0`.
+    pub fn open(path: &Path) -> Result<Self, DatasetError> {
+        // The library names no file.
+        std::fs::metadata(path).map_err(DatasetError::io("read", path))?;
+        let file = H5File::open(path).map_err(|e| DatasetError::hdf5(path, "no HDF5 file, or cut off")(e))?;
+        let data = file.root_group().group("data").map_err(|e| DatasetError::hdf5(path, "/data")(e))?;
+        let names = data.group_names().map_err(|e| DatasetError::hdf5(path, "/data")(e))?;
+        let mut demos: Vec<usize> =
+            names.iter().filter_map(|name| name.strip_prefix("demo_")?.parse().ok()).collect();
+        demos.sort_unstable();
+        if demos.is_empty() {
+            let what = "it has no demonstrations; expected groups demo_0, demo_1, …";
+            return Err(DatasetError::content(path, "/data", what));
+        }
+        Ok(Self { file, path: path.to_owned(), data, demos })
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Numbers of its demonstrations, in order.
+    pub fn demos(&self) -> &[usize] {
+        &self.demos
+    }
+
+    /// `env_args`: the world in which they were made, and how.
+    ///
+    /// # Errors
+    /// It is not there or no JSON.
+    pub fn environment(&self) -> Result<Value, DatasetError> {
+        let key = "/data, attribute env_args";
+        let text = self.data.attr_string("env_args").map_err(|e| DatasetError::hdf5(&self.path, key)(e))?;
+        serde_json::from_str(&text)
+            .map_err(|e| DatasetError::content(&self.path, key, format!("no JSON: {e}")))
+    }
+
+    fn group(&self, demo: usize) -> Result<H5Group, DatasetError> {
+        if !self.demos.contains(&demo) {
+            let what = format!("there is no demo_{demo}; there are {} demonstrations", self.demos.len());
+            return Err(DatasetError::content(&self.path, "/data", what));
+        }
+        let name = format!("demo_{demo}");
+        self.data.group(&name).map_err(|e| DatasetError::hdf5(&self.path, format!("/data/{name}"))(e))
+    }
+
+    /// Text of an attribute of a demonstration.
+    ///
+    /// # Errors
+    /// It is not there or no text.
+    pub fn text(&self, demo: usize, attribute: &str) -> Result<String, DatasetError> {
+        let key = format!("/data/demo_{demo}, attribute {attribute}");
+        self.group(demo)?.attr_string(attribute).map_err(|e| DatasetError::hdf5(&self.path, key)(e))
+    }
+
+    /// How a demonstration was judged.
+    ///
+    /// # Errors
+    /// It was not recorded by softvt.
+    pub fn record(&self, demo: usize) -> Result<EpisodeRecord, DatasetError> {
+        let text = self.text(demo, "metadata_json")?;
+        serde_json::from_str(&text).map_err(|e| {
+            let key = format!("/data/demo_{demo}, attribute metadata_json");
+            DatasetError::content(&self.path, key, format!("no record of softvt: {e}"))
+        })
+    }
+
+    /// Control steps of a demonstration.
+    ///
+    /// # Errors
+    /// It has no actions.
+    pub fn steps(&self, demo: usize) -> Result<usize, DatasetError> {
+        Ok(self.dataset(demo, "actions")?.shape().first().copied().unwrap_or(0))
+    }
+
+    fn dataset(&self, demo: usize, name: &str) -> Result<H5Dataset, DatasetError> {
+        self.group(demo)?;
+        let key = format!("data/demo_{demo}/{name}");
+        self.file.dataset(&key).map_err(|e| DatasetError::hdf5(&self.path, format!("/{key}"))(e))
+    }
+
+    /// Shape of a data set of a demonstration.
+    ///
+    /// # Errors
+    /// There is none of that name.
+    pub fn shape(&self, demo: usize, name: &str) -> Result<Vec<usize>, DatasetError> {
+        Ok(self.dataset(demo, name)?.shape())
+    }
+
+    /// Every data set of a demonstration, by its path below it.
+    ///
+    /// # Errors
+    /// The file is broken.
+    pub fn names(&self, demo: usize) -> Result<Vec<String>, DatasetError> {
+        let mut names = Vec::new();
+        collect(&self.group(demo)?, "", &mut names)
+            .map_err(|e| DatasetError::hdf5(&self.path, format!("/data/demo_{demo}"))(e))?;
+        Ok(names)
+    }
+
+    /// A stream of a demonstration.
+    ///
+    /// # Errors
+    /// There is none of that name, or it cannot be read.
+    pub fn stream(&self, demo: usize, name: &str) -> Result<Stream, DatasetError> {
+        let data = self.dataset(demo, name)?;
+        let key = format!("/data/demo_{demo}/{name}");
+        let failed = |error| DatasetError::hdf5(&self.path, &key)(error);
+        let numbers = match kind_of(&self.path, &key, &data)? {
+            "f32" => data.read_raw().map(Numbers::F32),
+            "u8" => data.read_raw().map(Numbers::U8),
+            _ => data.read_numeric_as().map(Numbers::F64),
+        };
+        let mut notes = Vec::new();
+        for name in data.attr_names().map_err(failed)? {
+            // Others may keep numbers there.
+            if let Ok(text) = data.attr(&name).and_then(|attr| attr.read_string()) {
+                notes.push((name, text));
+            }
+        }
+        let row = data.shape().get(1..).unwrap_or_default().to_vec();
+        Ok(Stream { name: name.to_owned(), row, numbers: numbers.map_err(failed)?, notes })
+    }
+
+    /// Numbers of a stream as doubles, with its width a step.
+    ///
+    /// # Errors
+    /// As [`TaskFile::stream`].
+    pub fn doubles(&self, demo: usize, name: &str) -> Result<(Vec<f64>, usize), DatasetError> {
+        let data = self.dataset(demo, name)?;
+        let key = format!("/data/demo_{demo}/{name}");
+        let numbers = data.read_numeric_as().map_err(|e| DatasetError::hdf5(&self.path, &key)(e))?;
+        Ok((numbers, data.shape().iter().skip(1).product()))
+    }
+
+    /// One picture of a stream: its bytes, and its height and width.
+    ///
+    /// # Errors
+    /// There is no such picture, or it is none of 8 bits and three channels.
+    pub fn picture(
+        &self,
+        demo: usize,
+        name: &str,
+        step: usize,
+    ) -> Result<(Vec<u8>, [usize; 2]), DatasetError> {
+        let data = self.dataset(demo, name)?;
+        let key = format!("/data/demo_{demo}/{name}");
+        let &[_, height, width, 3] = &data.shape()[..] else {
+            let what = format!("expected the shape (steps, height, width, 3), got {:?}", data.shape());
+            return Err(DatasetError::content(&self.path, key, what));
+        };
+        let bytes = data.read_slice(&[step, 0, 0, 0], &[1, height, width, 3]);
+        Ok((bytes.map_err(|e| DatasetError::hdf5(&self.path, key)(e))?, [height, width]))
+    }
+
+    /// See [`actions`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn actions(&self, demo: usize) -> Result<Vec<Action>, DatasetError> {
+        let shape = self.shape(demo, "actions")?;
+        let wrong =
+            |what: String| DatasetError::content(&self.path, format!("/data/demo_{demo}/actions"), what);
+        if shape.len() != 2 || shape[1] < 7 {
+            return Err(wrong(format!("expected the shape (steps, 7), got {shape:?}")));
+        }
+        let (numbers, width) = self.doubles(demo, "actions")?;
+        if let Some(at) = numbers.iter().position(|x| !x.is_finite()) {
+            return Err(wrong(format!(
+                "step {}, number {}: {} is not finite",
+                at / width,
+                at % width,
+                numbers[at]
+            )));
+        }
+        let action = |row: &[f64]| Action {
+            position_b: Vec3::new(row[0], row[1], row[2]),
+            axis_angle_b: Vec3::new(row[3], row[4], row[5]),
+            closure: row[6],
+        };
+        Ok(numbers.chunks_exact(width).map(action).collect())
+    }
+
+    /// A demonstration without its pictures.
+    ///
+    /// # Errors
+    /// It was not recorded by softvt, or is broken.
+    pub fn read(&self, demo: usize) -> Result<Demonstration, DatasetError> {
+        let shut = self.doubles(demo, "actions_binary")?.0.chunks(7).map(|row| row[6] > 0.5).collect();
+        let mut read = Demonstration {
+            record: self.record(demo)?,
+            actions: self.actions(demo)?,
+            shut,
+            observed: Vec::new(),
+            privileged: Vec::new(),
+        };
+        for name in self.names(demo)? {
+            let hidden = name.starts_with("privileged/");
+            if !hidden && (!name.starts_with("obs/") || name.ends_with("_rgb")) {
+                continue;
+            }
+            let stream = self.stream(demo, &name)?;
+            if hidden { read.privileged.push(stream) } else { read.observed.push(stream) }
+        }
+        Ok(read)
+    }
+}
+
+fn collect(group: &H5Group, above: &str, names: &mut Vec<String>) -> rust_hdf5::Result<()> {
+    names.extend(group.dataset_names()?.iter().map(|name| format!("{above}{name}")));
+    for inner in group.group_names()? {
+        collect(&group.group(&inner)?, &format!("{above}{inner}/"), names)?;
+    }
+    Ok(())
+}

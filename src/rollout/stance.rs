@@ -1,0 +1,55 @@
+//! Where the robot and the objects are in a kept state, as numbers.
+
+use super::{senses::Senses, simulation::Kind};
+use crate::{
+    benchmark::control::CONTROL_DT,
+    geometry::{Pose, Vec3},
+    physics::world::Frame,
+    robot::{ik::DiffIk, panda::ARM_DOFS},
+};
+
+/// What the robot measures of itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stance {
+    /// Tool in the base frame.
+    pub tool_b: Pose,
+    /// Arm joint angles, rad.
+    pub joints: [f64; ARM_DOFS],
+    /// Positions of the left and right finger, m: 0 (shut) to 0.04.
+    pub fingers: [f64; 2],
+}
+
+/// Where a thing is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum BodyState<'a> {
+    /// Nodes of a soft body, m, world.
+    Nodes(&'a [Vec3]),
+    /// Object frame of a rigid one, world.
+    Pose(Pose),
+}
+
+impl Senses {
+    /// The robot in a state.
+    pub fn stance(&self, frame: &Frame) -> Stance {
+        let q = &frame.joints[self.tree];
+        let joints = std::array::from_fn(|i| q[i]);
+        Stance {
+            tool_b: DiffIk::new(&self.robot.ik, joints, CONTROL_DT).tool_pose(&joints),
+            joints,
+            fingers: [q[ARM_DOFS], q[ARM_DOFS + 1]],
+        }
+    }
+
+    /// All that can move in the scene, by name, in its order.
+    pub fn bodies<'a>(&'a self, frame: &'a Frame) -> impl Iterator<Item = (&'a str, BodyState<'a>)> {
+        self.parts.iter().filter_map(|part| {
+            let state = match part.kind {
+                Kind::Soft(body) => BodyState::Nodes(&frame.nodes[body]),
+                Kind::Rigid(body) => BodyState::Pose(frame.rigid[body]),
+                Kind::Link { tree, link } => BodyState::Pose(frame.links[tree][link] * part.offset),
+                Kind::Static => return None,
+            };
+            Some((part.name.as_str(), state))
+        })
+    }
+}

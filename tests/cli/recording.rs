@@ -1,0 +1,119 @@
+//! Demonstrations from the command line: what is kept, what is refused, and that nothing depends on threads or breaks.
+
+use std::{collections::BTreeMap, fs, path::Path};
+
+use crate::support::Project;
+
+/// A rigid cube that stands on a slab, or beside it in some attempts: the goal is reached by waiting, or not at all.
+const SUITE: &str = r#"
+local function solid(name, size, body)
+  return softvt.asset { name = name, shape = softvt.shape.box { size = size }:grounded(), body = body }
+end
+local floor = softvt.asset { name = "floor", shape = softvt.shape.box { size = { 2, 2, 0.05 } }:translate(0, 0, -0.025), body = softvt.static {} }
+local slab = solid("slab", { 0.1, 0.1, 0.02 }, softvt.static {})
+local cube = solid("cube", { 0.04, 0.04, 0.04 }, softvt.rigid { density = 300 })
+local layout = softvt.layout("one", function(scene)
+  local beside = math.random() < 0.4
+  scene:add { name = "floor", asset = floor, xyz = { 0, 0, 0 } }
+  scene:add { name = "slab", asset = slab, xyz = { 0, 0.2, 0 } }
+  scene:add { name = "cube", asset = cube, xyz = { 0, beside and 0.35 or 0.2, beside and 0 or 0.02 } }
+end)
+return softvt.suite { name = "one", object_type = "rigid", variation = "spatial", episodes = 1, tasks = {
+  softvt.task { prompt = "wait", layout = layout, goal = softvt.on { object = "cube", target = "slab" }, budget_steps = 30,
+    expert = function(arm, scene) arm:wait(1) end },
+} }
+"#;
+
+fn project() -> Project {
+    Project::new(&[("x.lua", SUITE)])
+}
+
+/// Every file below a folder, by its path.
+fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(dir) = folders.pop() {
+        for entry in fs::read_dir(&dir).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                let name = path.strip_prefix(folder).expect("below it").display().to_string();
+                found.insert(name, fs::read(&path).expect("read"));
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn the_first_good_attempts_are_kept_whatever_the_threads_and_wherever_it_was_broken_off() {
+    let project = project();
+    let said = project.succeeds("record x.lua --demos 3 --out a --threads 1").out;
+    let card = project.json("a/dataset.json");
+    let task = &card["tasks"][0];
+    let attempts = task["attempts"].as_u64().expect("a count");
+    let rejected = task["rejected"]["goal not reached"].as_u64().expect("some start beside the slab");
+    assert_eq!((task["demos"].as_u64(), attempts), (Some(3), 3 + rejected), "{task}");
+    assert!(said.contains(&format!("3 demonstrations of {attempts} attempts")), "{said}");
+    let lines = project.lines("a/attempts/one/episodes.jsonl");
+    assert_eq!(lines.len() as u64, attempts, "those not kept are there too");
+    assert!(lines.iter().all(|line| line["split"] == "demonstration"));
+    let good: Vec<_> =
+        lines.iter().filter(|line| line["safety"] == true).map(|line| &line["episode"]).collect();
+    let manifest = project.lines("a/manifest.jsonl");
+    assert_eq!(manifest.iter().map(|line| &line["episode"]).collect::<Vec<_>>(), good);
+    // Too few attempts end it; more of them go on with what is there.
+    let few = project.refusal("record x.lua --demos 3 --out b --threads 3 --attempts 2");
+    assert!(few.contains("task 0:") && few.contains("of 3 demonstrations after 2 attempts"), "{few}");
+    assert!(project.refusal("dataset check b").contains("was broken off"));
+    assert!(project.refusal("record x.lua --demos 3 --out b").contains("--resume"));
+    project.succeeds("record x.lua --demos 3 --out b --threads 3 --resume");
+    assert!(files(&project.path("a")) == files(&project.path("b")), "not the same bytes");
+    let again = project.succeeds("record x.lua --demos 3 --out b");
+    assert!(again.err.contains("finished already"), "{}", again.err);
+}
+
+#[test]
+fn a_data_set_is_checked_summed_up_and_repeated() {
+    let project = project();
+    project.succeeds("record x.lua --demos 2 --out a --images video --no-privileged");
+    let checked = project.succeeds("dataset check a --replay 2").out;
+    assert!(
+        checked.contains("2 demonstrations,") && checked.contains("8 videos: nothing is wrong"),
+        "{checked}"
+    );
+    assert_eq!(checked.matches("the same to the byte").count(), 2, "{checked}");
+    assert!(project.succeeds("replay a 0/1").out.contains("demo_1: the same to the byte"));
+    assert!(project.succeeds("replay a/hdf5/one_task0_demo.hdf5 0").out.contains("demo_0"));
+    assert!(project.refusal("replay a 0/2").contains("no such demonstration"));
+    assert!(project.succeeds("dataset stats a").out.contains("length (steps)"));
+    assert!(project.text("a/stats.svg").starts_with("<svg"));
+    project.write("a/videos/one_task0/demo_0_eye_in_hand_rgb.mp4", b"no film");
+    let hdf5 = project.path("a/hdf5/one_task0_demo.hdf5");
+    let whole = fs::read(&hdf5).expect("read");
+    fs::write(&hdf5, &whole[..whole.len() / 2]).expect("written");
+    let wrong = project.refusal("dataset check a");
+    for words in [
+        "demo_0_eye_in_hand_rgb.mp4: eye_in_hand_rgb: no MP4 file",
+        "one_task0_demo.hdf5",
+        "a: 2 things are wrong",
+    ] {
+        assert!(wrong.contains(words), "{wrong}");
+    }
+}
+
+#[test]
+fn a_folder_with_something_else_in_it_is_refused_and_left_alone() {
+    let project = project();
+    project.write("mine/meta/info.json", b"{}");
+    let said = project.refusal("record x.lua --demos 1 --out mine --resume");
+    assert!(said.contains("--out mine: it holds meta and no recording of softvt"), "{said}");
+    assert_eq!(files(&project.path("mine")).len(), 1);
+    project.write("other/recording.json", b"{\"softvt\":\"0.0.1\"}");
+    let said = project.refusal("record x.lua --demos 1 --out other --resume");
+    assert!(said.contains("it holds another recording (demos: null then, 1 now)"), "{said}");
+    project.write("wrong.lua", b"return nil + 1");
+    assert!(project.refusal("record wrong.lua --out new").contains("wrong.lua:1"));
+    assert!(!project.path("new").exists(), "nothing is left of a mistake");
+}
