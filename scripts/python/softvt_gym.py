@@ -1,6 +1,6 @@
 """softvt as a Gymnasium environment: a client of `softvt serve` (docs/serve.md).
 
-    pip install numpy gymnasium msgpack "websockets>=15"
+    pip install numpy gymnasium msgpack websocket-client
 
     env = SoftVTEnv.launch("suites/object_soft.lua", "--profile", "vision")   # or SoftVTEnv("ws://127.0.0.1:8765")
     observation, info = env.reset(seed=0, options={"task": 3})
@@ -17,7 +17,7 @@ import gymnasium
 import msgpack
 import numpy as np
 from gymnasium import spaces
-from websockets.sync.client import connect
+from websocket import create_connection
 
 
 class SoftVTEnv(gymnasium.Env):
@@ -29,8 +29,7 @@ class SoftVTEnv(gymnasium.Env):
         """`camera` is what `render` shows: a camera of the scene, its first if none, or "left" or "right" for a finger."""
         self.url, self.render_mode, self.camera = url, render_mode, camera
         self._server = None
-        # The server says nothing while it simulates, so it cannot be asked whether it is still there.
-        self._socket = connect(url, compression=None, max_size=None, ping_interval=None, proxy=None)
+        self._socket = create_connection(url)
         self.about = self._hear()
         self.observation_space = spaces.Dict(
             {key: _space(entry) for key, entry in self.about["observation_space"].items()}
@@ -100,7 +99,7 @@ class SoftVTEnv(gymnasium.Env):
     def _ask(self, kind, **fields):
         if self._socket is None:
             raise RuntimeError("the environment is closed")
-        self._socket.send(msgpack.packb({"type": kind, **fields}, default=_pack))
+        self._socket.send_binary(msgpack.packb({"type": kind, **fields}, default=_pack))
         return self._hear()
 
     def _hear(self):

@@ -1,7 +1,7 @@
 //! The server's side of a websocket: waits that end when the run does, and clients that vanish.
 
 use std::{
-    io::{self, ErrorKind},
+    io::{self, ErrorKind, Read},
     net::TcpStream,
     sync::atomic::{AtomicBool, Ordering},
     time::{Duration, Instant},
@@ -14,14 +14,16 @@ use tungstenite::{
     protocol::{CloseFrame, WebSocketConfig, frame::coding::CloseCode},
 };
 
-/// The longest message that is taken: a state of a long episode is half a megabyte.
-pub const LARGEST: usize = 8 << 20;
+/// The longest message that is taken: a state of 50,000 actions is 2.7 MiB.
+pub const LARGEST: usize = 4 << 20;
 /// Between two looks at the clock and at the wish to end.
 pub const SLICE: Duration = Duration::from_millis(50);
 /// How long a client may take to say what it wants when it comes.
 pub const GREETING: Duration = Duration::from_secs(10);
 /// How long it may take to take an answer: somebody may have stopped it for a while.
 const PATIENCE: Duration = Duration::from_secs(60);
+/// How long what a client still sends is listened to after the end, so that it hears what was said last.
+const FAREWELL: Duration = Duration::from_secs(3);
 /// Silence after which a client is asked whether it is there: to a machine that is gone that fails in the end.
 const QUIET: Duration = Duration::from_secs(60);
 /// Deepest nesting of a message.
@@ -136,13 +138,14 @@ impl<'a> Link<'a> {
     pub fn close(mut self) {
         let code = if is_set(self.stop) { CloseCode::Away } else { CloseCode::Normal };
         let _ = self.socket.close(Some(CloseFrame { code, reason: "".into() }));
-        let deadline = Instant::now() + Duration::from_secs(1);
         // What has not been read yet would make the system throw away what was said last.
+        let (deadline, stream) = (Instant::now() + FAREWELL, self.socket.get_mut());
+        let mut rest = vec![0; 1 << 16];
         while Instant::now() < deadline && !is_set(self.stop) {
-            match self.socket.read() {
-                Ok(_) => {}
-                Err(Error::Io(error)) if is_wait(&error) => {}
-                Err(_) => return,
+            match stream.read(&mut rest) {
+                Ok(0) => return,
+                Err(error) if !is_wait(&error) => return,
+                _ => {}
             }
         }
     }

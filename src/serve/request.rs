@@ -18,7 +18,7 @@ pub type Row = [f64; ACTION_LEN];
 /// The most actions of one request: a longer one would keep its client waiting for minutes without a word.
 const LONGEST: usize = 1000;
 /// The most actions of a state: longer than any episode.
-const LONGEST_STATE: usize = 100_000;
+const LONGEST_STATE: usize = 50_000;
 
 /// A request.
 #[derive(Clone, Debug, PartialEq)]
