@@ -243,7 +243,8 @@ fn usage(file: Option<&str>, text: &str) -> Failure {
 fn script_file(words: &[String]) -> Option<&str> {
     let mut previous = "";
     for word in words.iter().skip(1) {
-        if word.ends_with(".lua") && !word.starts_with('-') && !["--policy", "--profile"].contains(&previous) {
+        if word.ends_with(".lua") && !word.starts_with('-') && !["--policy", "--profile"].contains(&previous)
+        {
             return Some(word);
         }
         previous = word;

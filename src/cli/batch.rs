@@ -510,11 +510,7 @@ impl<'a> Batch<'a> {
 ///
 /// # Errors
 /// What differs or is missing.
-pub(super) fn recorded(
-    run: &Run,
-    suite: &Suite,
-    jobs: &[(&Task, u32)],
-) -> Result<Option<Replayed>, Failure> {
+pub(super) fn recorded(run: &Run, suite: &Suite, jobs: &[(&Task, u32)]) -> Result<Option<Replayed>, Failure> {
     let Some(runs) = run.policy.recorded() else { return Ok(None) };
     let jobs: Vec<(usize, u32)> = jobs.iter().map(|(task, episode)| (task.id, *episode)).collect();
     let wanted =

@@ -56,7 +56,11 @@ fn first_comment(path: &str) -> String {
     let lines = text.lines().map_while(|line| line.strip_prefix("--"));
     let words: Vec<&str> = lines.map(str::trim).take_while(|line| !line.is_empty()).collect();
     let words = words.join(" ");
-    words.split_once(". ").map_or(words.clone(), |(first, _)| first.to_owned()).trim_end_matches('.').to_owned()
+    words
+        .split_once(". ")
+        .map_or(words.clone(), |(first, _)| first.to_owned())
+        .trim_end_matches('.')
+        .to_owned()
 }
 
 fn text(value: &Value) -> String {

@@ -101,8 +101,7 @@ impl RecordedRuns {
 
     fn no_suite(&self, wanted: &Wanted<'_>) -> Failure {
         let called = |suite: &str, twin: bool| format!("{suite}{}", if twin { " as rigid twin" } else { "" });
-        let have: Vec<String> =
-            self.runs.iter().map(|run| called(run.text("suite"), is_twin(run))).collect();
+        let have: Vec<String> = self.runs.iter().map(|run| called(run.text("suite"), is_twin(run))).collect();
         Failure::input(format!(
             "--policy {}: it holds no run of suite {}; it has {}",
             self.dir.display(),

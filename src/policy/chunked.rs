@@ -2,7 +2,9 @@
 
 use std::collections::VecDeque;
 
-use super::{Action, ActionChunk, Command, Observation, Policy, PolicyError, Streams, TaskBrief, osc, osc::Osc};
+use super::{
+    Action, ActionChunk, Command, Observation, Policy, PolicyError, Streams, TaskBrief, osc, osc::Osc,
+};
 
 /// A policy whose chunks are carried out.
 pub struct Chunked<'a> {

@@ -168,8 +168,7 @@ mod tests {
 
     #[test]
     fn a_profile_that_says_how_long_actions_are_takes_no_others() {
-        let code =
-            ActionCode { length: Some(32), ..Profile::named("visuo_tactile").unwrap().actions };
+        let code = ActionCode { length: Some(32), ..Profile::named("visuo_tactile").unwrap().actions };
         assert_eq!(rows(&[2, 32], &[0.25; 64], &code).unwrap().commands.len(), 2);
         match rows(&[2, 7], &[0.25; 14], &code) {
             Err(PolicyError::Reply(message)) => assert!(message.contains("32 numbers"), "{message}"),

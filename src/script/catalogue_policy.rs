@@ -90,13 +90,26 @@ pub static INPUT: Record = Record {
         field("keys", Type::List(&Type::Text), Required, "Keys it is sent under."),
         field(
             "source",
-            Type::Choice(&["camera", "state", "prompt", "tactile_image", "tactile", "marker_motion", "force"]),
+            Type::Choice(&[
+                "camera",
+                "state",
+                "prompt",
+                "tactile_image",
+                "tactile",
+                "marker_motion",
+                "force",
+            ]),
             Required,
             "What it is: a camera's picture; numbers of the robot; the instruction; the mosaic of 8 tactile pictures of both \
              fingers; the last picture of one finger; the markers' first and last 8 places; the last 8 true forces on the gels.",
         ),
         field("camera", Type::Name, Optional, "With camera: its name in the scene."),
-        field("half_turn", Type::Boolean, Optional, "With camera: whether the picture is turned by half a turn."),
+        field(
+            "half_turn",
+            Type::Boolean,
+            Optional,
+            "With camera: whether the picture is turned by half a turn.",
+        ),
         field(
             "parts",
             Type::List(&Type::Choice(&[
@@ -132,7 +145,12 @@ pub static GRIPPER: Record = Record {
     fields: &[
         field("open", NUMBER, Required, "The value that opens."),
         field("shut", NUMBER, Required, "The value that shuts."),
-        field("binary", Type::Boolean, Boolean(false), "Whether all beyond the middle shuts and all else opens."),
+        field(
+            "binary",
+            Type::Boolean,
+            Boolean(false),
+            "Whether all beyond the middle shuts and all else opens.",
+        ),
     ],
 };
 
@@ -257,7 +275,12 @@ pub static MARKERS: Class = Class {
     ],
     written: &[],
     methods: &[
-        method("mean", &[], &["number[]"], "Mean motion along x and y: the gel is dragged along its surface."),
+        method(
+            "mean",
+            &[],
+            &["number[]"],
+            "Mean motion along x and y: the gel is dragged along its surface.",
+        ),
         method("largest", &[], &["number"], "The longest motion."),
         method(
             "press",
@@ -285,7 +308,12 @@ pub static MARKERS: Class = Class {
             &["number[]"],
             "Pure shear of the markers: stretch along x against y, and along the diagonal x = y.",
         ),
-        method("moved", &[("px", PIXELS)], &["boolean[]"], "Contact mask: which markers moved by more than px."),
+        method(
+            "moved",
+            &[("px", PIXELS)],
+            &["boolean[]"],
+            "Contact mask: which markers moved by more than px.",
+        ),
         method(
             "area",
             &[("px", PIXELS)],

@@ -251,7 +251,8 @@ fn fingers(lua: &Lua, hands: Hands, felt: &Arc<Mutex<Option<Felt>>>) -> mlua::Re
     table.set("servo", hands.grip == Grip::Servo)?;
     table.set("feel", hands.feel)?;
     let felt = felt.clone();
-    let now = move |lua: &Lua, ()| locked(&felt).clone().map(|felt| touch_api::fingers(lua, &felt)).transpose();
+    let now =
+        move |lua: &Lua, ()| locked(&felt).clone().map(|felt| touch_api::fingers(lua, &felt)).transpose();
     table.set("felt", lua.create_function(now)?)?;
     Ok(table)
 }

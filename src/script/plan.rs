@@ -116,7 +116,10 @@ impl Machine {
         };
         for (record, flag) in [(&POLICY, "--policy"), (&PROFILE, "--profile")] {
             if schema::is_made(lua, record, table) {
-                let message = format!("is no plan but what {flag} takes: softvt SUITE.lua {flag} {}", self.vm.shared.main);
+                let message = format!(
+                    "is no plan but what {flag} takes: softvt SUITE.lua {flag} {}",
+                    self.vm.shared.main
+                );
                 return Err(fail(lua, message));
             }
         }

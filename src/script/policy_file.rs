@@ -109,7 +109,7 @@ fn made(lua: &Lua, values: &MultiValue) -> mlua::Result<Table> {
             Ok(table.clone())
         }
         other => {
-            let got = other.map_or("nothing".to_owned(), schema::got);
+            let got = other.map_or("nothing".to_owned(), schema::got_made);
             Err(fail(lua, format!("a policy's file returns softvt.policy{{…}}, got {got}")))
         }
     }
@@ -224,9 +224,9 @@ fn action(lua: &Lua, table: &Table) -> Result<Action, Wrong> {
     let turns: (Option<[f64; 3]>, Option<[f64; 4]>) = (checked.get("axis_angle")?, checked.get("rotation")?);
     let axis_angle_b = match turns {
         (Some(axis_angle), None) => Vec3::from(axis_angle),
-        (None, Some(quat)) => turn::turn(quat).map(|turn| rotation::axis_angle(&turn)).ok_or_else(|| {
-            Fault::new("expected a quaternion other than 0".to_owned()).inside("rotation")
-        })?,
+        (None, Some(quat)) => turn::turn(quat)
+            .map(|turn| rotation::axis_angle(&turn))
+            .ok_or_else(|| Fault::new("expected a quaternion other than 0".to_owned()).inside("rotation"))?,
         _ => return Err(Fault::new("give either axis_angle or rotation".to_owned()).into()),
     };
     let position_b = Vec3::from(checked.get::<[f64; 3]>("position")?);

@@ -36,7 +36,7 @@ fn read(lua: &Lua, values: &MultiValue) -> mlua::Result<Profile> {
     let table = match values.front() {
         Some(Value::Table(table)) if schema::is_made(lua, &PROFILE, table) => table,
         other => {
-            let got = other.map_or("nothing".to_owned(), schema::got);
+            let got = other.map_or("nothing".to_owned(), schema::got_made);
             return Err(fail(lua, format!("a profile's file returns softvt.profile{{…}}, got {got}")));
         }
     };
@@ -83,8 +83,7 @@ impl Whole<'_> {
         };
         for key in ["camera", "half_turn", "parts", "layout", "finger"] {
             if !own.contains(&key) && !entry.get::<Value>(key)?.is_nil() {
-                let message =
-                    format!("inputs[{index}].{key}: a source {source:?} has none; leave it out");
+                let message = format!("inputs[{index}].{key}: a source {source:?} has none; leave it out");
                 return Err(self.wrong(key, message));
             }
         }
@@ -138,16 +137,16 @@ impl Whole<'_> {
             "absolute" => {
                 for key in ["translation_m", "rotation_rad"] {
                     if !table.get::<Value>(key)?.is_nil() {
-                        let message = format!("actions.{key}: pose = \"absolute\" has no steps; leave it out");
+                        let message =
+                            format!("actions.{key}: pose = \"absolute\" has no steps; leave it out");
                         return Err(self.wrong(key, message));
                     }
                 }
                 PoseCode::Absolute
             }
-            "delta" => PoseCode::Delta {
-                translation_m: step("translation_m")?,
-                rotation_rad: step("rotation_rad")?,
-            },
+            "delta" => {
+                PoseCode::Delta { translation_m: step("translation_m")?, rotation_rad: step("rotation_rad")? }
+            }
             _ => PoseCode::DeltaOsc {
                 translation_m: step("translation_m")?,
                 rotation_rad: step("rotation_rad")?,

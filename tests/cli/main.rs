@@ -15,6 +15,7 @@ mod interrupt;
 mod joints;
 mod measures;
 mod observe;
+mod policies;
 mod servers;
 mod spread;
 mod support;

@@ -6,8 +6,8 @@ use super::{Project, limits};
 use crate::script::{
     Experiment,
     catalogue::CONSTRUCTORS,
-    catalogue_policy,
     catalogue_classes::{CLASSES, FUNCTIONS, SHAPE},
+    catalogue_policy,
     catalogue_shapes::{METHODS, SHAPES},
     catalogue_visuals::{MASK_CLASS, MASKS},
 };
