@@ -109,7 +109,7 @@ fn made(lua: &Lua, values: &MultiValue) -> mlua::Result<Table> {
             Ok(table.clone())
         }
         other => {
-            let got = other.map_or("nothing".to_owned(), schema::got);
+            let got = other.map_or("nothing".to_owned(), schema::got_made);
             Err(fail(lua, format!("a policy's file returns softvt.policy{{…}}, got {got}")))
         }
     }

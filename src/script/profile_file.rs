@@ -36,7 +36,7 @@ fn read(lua: &Lua, values: &MultiValue) -> mlua::Result<Profile> {
     let table = match values.front() {
         Some(Value::Table(table)) if schema::is_made(lua, &PROFILE, table) => table,
         other => {
-            let got = other.map_or("nothing".to_owned(), schema::got);
+            let got = other.map_or("nothing".to_owned(), schema::got_made);
             return Err(fail(lua, format!("a profile's file returns softvt.profile{{…}}, got {got}")));
         }
     };

@@ -162,6 +162,15 @@ pub(super) fn got(value: &Value) -> String {
     }
 }
 
+/// The same, with the constructor of a table that one made.
+pub(super) fn got_made(value: &Value) -> String {
+    let made = value.as_table().and_then(|table| table.metatable());
+    match made.and_then(|meta| meta.get::<Option<String>>("__name").ok().flatten()) {
+        Some(name) => format!("{name}{{…}}"),
+        None => got(value),
+    }
+}
+
 /// `a table`, or of an object of the host its class: `a softvt.Pose`.
 pub(super) fn kind(value: &Value) -> String {
     match value {

@@ -16,6 +16,7 @@ mod joints;
 mod killed;
 mod measures;
 mod observe;
+mod policies;
 mod recording;
 mod reports;
 mod scorer;

@@ -25,7 +25,7 @@ fn with_options(words: &str) -> String {
 #[test]
 fn an_unknown_policy_is_told_with_those_there_are() {
     assert_snapshot!(small("--policy noob"), @r"
-    x.lua: invalid value 'noob' for '--policy <POLICY>': expected expert, expert-binary, noop, random, a server such as ws://host:8000, or the folder of a run; did you mean noop?
+    x.lua: invalid value 'noob' for '--policy <POLICY>': expected expert, expert-binary, tactile-servo, noop, random, a Lua file such as my_policy.lua, a server such as ws://host:8000, or the folder of a run; did you mean noop?
 
     For more information, try '--help'.
     ");

@@ -5,6 +5,7 @@ mod episodes;
 mod hostile;
 mod joints;
 mod options;
+mod policies;
 mod surface;
 mod visuals;
 mod weigh;

@@ -136,7 +136,7 @@ mod tests {
         let motion = moved(|_, _| [-0.75, 0.5]);
         near(motion.mean()[0], -0.75);
         near(motion.mean()[1], 0.5);
-        [motion.divergence(), motion.twist(), motion.press()].map(|x| near(x, 0.0));
+        [motion.divergence(), motion.twist(), motion.press()].into_iter().for_each(|x| near(x, 0.0));
         near(motion.largest(), 0.75_f64.hypot(0.5));
         near(motion.drag(), 0.75_f64.hypot(0.5));
         near(moved(|_, _| [0.75, 0.5]).drag(), 0.5);
@@ -150,7 +150,7 @@ mod tests {
         });
         near(motion.twist(), angle.sin());
         near(motion.divergence(), 2.0 * (angle.cos() - 1.0));
-        motion.shear().map(|x| near(x, 0.0));
+        motion.shear().into_iter().for_each(|x| near(x, 0.0));
         assert!(motion.press() < 0.01, "{}", motion.press());
     }
 

@@ -1,0 +1,347 @@
+//! Policies and profiles in Lua: what they are read as, what they see, and what becomes of nonsense.
+
+use std::sync::Arc;
+
+use image::{Rgb, RgbImage};
+
+use super::*;
+use crate::{
+    benchmark::seed::{EpisodeSeed, Split},
+    geometry::Vec3,
+    policy::{
+        Action, ActionChunk, CameraPicture, Command, Observation, Policy, PolicyError, TaskBrief, TouchFrame,
+        TouchHistory, profile::Profile,
+    },
+    script::{LuaPolicy, PolicyFile, load_profile},
+    sensing::tactile::untouched,
+};
+
+fn seed(episode: u64) -> EpisodeSeed {
+    let (suite, layout) = ("one".to_owned(), "one".to_owned());
+    EpisodeSeed { suite, layout, episode, base: 0, split: Split::Validation }
+}
+
+/// A finger whose markers have all moved by `by` px, with a picture that is `lit` brighter than the untouched one.
+fn finger(by: [f32; 2], lit: u8) -> TouchFrame {
+    let rest = RgbImage::from_pixel(320, 240, Rgb([100, 100, 100]));
+    TouchFrame {
+        picture: RgbImage::from_pixel(320, 240, Rgb([100 + lit, 100, 100 - lit])),
+        untouched: Arc::new(rest),
+        markers: [untouched(), untouched().map(|[x, y]| [x + by[0], y + by[1]])],
+    }
+}
+
+fn observation() -> Observation {
+    let mut picture = RgbImage::from_pixel(8, 6, Rgb([0, 0, 0]));
+    picture.put_pixel(2, 1, Rgb([10, 20, 30]));
+    let before = Arc::new([finger([0.0, 0.0], 0), finger([0.0, 0.0], 0)]);
+    let now = Arc::new([finger([-0.5, 0.25], 40), finger([0.5, 0.0], 0)]);
+    Observation {
+        time_s: 1.5,
+        ee_position_b: Vec3::new(0.5, -0.125, 0.25),
+        ee_axis_angle_b: Vec3::new(std::f64::consts::PI, 0.0, 0.0),
+        joints: [0.0, 0.5, 0.0, -2.0, 0.0, 2.5, 0.75],
+        gripper_width_m: 0.0625,
+        closure: 0.25,
+        prompt: "take it".into(),
+        cameras: vec![CameraPicture { name: "wrist".into(), picture }],
+        touch: Some(TouchHistory { frames: vec![before, now] }),
+        forces: None,
+        force_history: Vec::new(),
+    }
+}
+
+fn brief() -> TaskBrief {
+    TaskBrief { suite: "one".into(), task: 3, prompt: "take it".into(), episode: 7 }
+}
+
+const LOOKS: &str = "looks = { cameras = { 'wrist' }, touch = true }";
+const POSE: &str = "position = { 0.5, 0, 0.25 }, axis_angle = { 3, 0, 0 }";
+
+/// A policy whose `act` is `body`, in an episode.
+fn policy(body: &str) -> (Project, LuaPolicy) {
+    let text = format!("return softvt.policy {{ name = 'p', {LOOKS}, act = function(obs)\n{body}\nend }}");
+    start(&text)
+}
+
+fn start(text: &str) -> (Project, LuaPolicy) {
+    let project = Project::new(&[("p.lua", text)]);
+    let file = PolicyFile::load_with(&project.path("p.lua"), &limits()).unwrap();
+    let policy = file.start(&seed(0)).unwrap();
+    (project, policy)
+}
+
+fn act(body: &str) -> Result<ActionChunk, PolicyError> {
+    policy(body).1.act(&observation())
+}
+
+/// The message of a policy that must end the run, without its folder.
+fn refusal(body: &str) -> String {
+    let (project, mut policy) = policy(body);
+    match policy.act(&observation()) {
+        Err(PolicyError::Script(message)) => {
+            message.replace(&format!("{}/", project.path("").display()).replace("//", "/"), "")
+        }
+        other => panic!("{body}: {other:?}"),
+    }
+}
+
+#[test]
+fn an_observation_is_what_the_host_saw() {
+    let checks = [
+        "assert(obs.time == 1.5 and obs.width == 0.0625 and obs.closure == 0.25 and obs.prompt == 'take it')",
+        "assert(obs.position[2] == -0.125 and #obs.position == 3 and #obs.joints == 7 and obs.joints[4] == -2)",
+        "assert(math.abs(obs.axis_angle[1] - math.pi) < 1e-12 and math.abs(obs.rotation[2] - 1) < 1e-12)",
+        "local image = obs:camera 'wrist' assert(image.width == 8 and image.height == 6)",
+        "local p = obs:camera('wrist'):pixel(2, 1) assert(p[1] == 10 and p[2] == 20 and p[3] == 30)",
+        "local m = obs:camera('wrist'):mean { 2, 1, 1, 1 } assert(m[3] == 30)",
+        "local m = obs.touch.left.markers:mean() assert(m[1] == -0.5 and m[2] == 0.25)",
+        "assert(obs.touch.right.markers:drag() == 0 and obs.touch.left.markers:press() < 1e-6)",
+        "local mask = obs.touch.left.markers:moved(0.5) assert(#mask == 99 and mask[1] and mask[99])",
+        "assert(obs.touch.left.markers:area(0.5) == 1 and obs.touch.left.markers:area(0.6) == 0)",
+        "local m = obs.touch.left.markers assert(m.motion[99][2] == 0.25 and m.initial[1][1] == 15 and m.present[1][1] == 14.5)",
+        "local c = obs.touch.left.change:mean() assert(c[1] == 40 and c[2] == 0 and c[3] == 40)",
+        "assert(#obs.touch_history == 2 and obs.touch_history[1].left.markers:largest() == 0)",
+    ];
+    for check in checks {
+        let chunk = act(&format!("{check}\nreturn {{ {POSE}, closure = 0 }}"));
+        assert!(chunk.is_ok(), "{check}: {chunk:?}");
+    }
+}
+
+#[test]
+fn actions_come_alone_or_as_lists_with_either_way_to_say_a_turn() {
+    let expected = Action {
+        position_b: Vec3::new(0.5, 0.0, 0.25),
+        axis_angle_b: Vec3::new(3.0, 0.0, 0.0),
+        closure: 0.5,
+    };
+    let one = act(&format!("return {{ {POSE}, closure = 0.5 }}")).unwrap();
+    assert_eq!(one.commands, [Command::Pose(expected)]);
+    let two = act(&format!("local a = {{ {POSE}, closure = 0.5 }} return {{ a, a }}")).unwrap();
+    assert_eq!(two.commands.len(), 2);
+    let turned =
+        act("return { position = obs.position, rotation = { 0, 2, 0, 0 }, closure = obs.closure }").unwrap();
+    let Command::Pose(action) = turned.commands[0] else { panic!("a pose") };
+    assert!((action.axis_angle_b - Vec3::new(std::f64::consts::PI, 0.0, 0.0)).norm() < 1e-9);
+    assert_eq!((action.position_b, action.closure), (Vec3::new(0.5, -0.125, 0.25), 0.25));
+}
+
+#[test]
+fn nonsense_ends_the_run_with_the_line_of_act() {
+    let at = "p.lua:1: policy.act";
+    for (body, said) in [
+        ("return", format!("{at}: expected an action or a list of actions, got nil")),
+        ("return 'left'", format!("{at}: expected an action or a list of actions, got \"left\"")),
+        ("return {}", format!("{at}: expected 1 to 10000 actions, got 0")),
+        ("return { 1, 2 }", format!("{at}.[1]: expected an action, got 1").replace(".[", "[")),
+        (
+            "return { positon = { 0, 0, 0 }, closure = 0 }",
+            format!("{at}: unknown key \"positon\"; did you mean \"position\"?"),
+        ),
+        (
+            "return { position = { 0, 0 }, closure = 0 }",
+            format!("{at}.position: expected a list of 3 numbers"),
+        ),
+        (
+            "return { position = { 0, 0, 0 }, closure = 0 }",
+            format!("{at}: give either axis_angle or rotation"),
+        ),
+        (
+            "return { position = { 0, 0, 0 }, axis_angle = { 0, 0, 0 }, closure = 2 }",
+            format!("{at}.closure: expected"),
+        ),
+        (
+            "return { position = { 0, 0, 0 }, rotation = { 0, 0, 0, 0 }, closure = 1 }",
+            format!("{at}.rotation: expected a quaternion other than 0"),
+        ),
+        ("error 'lost'", "p.lua:2: lost".into()),
+        ("return obs.poses", "p.lua:2: obs: unknown key \"poses\"; did you mean \"position\"?".into()),
+        (
+            "return obs:camera 'wirst'",
+            "p.lua:2: obs:camera: unknown camera \"wirst\"; did you mean \"wrist\"?".into(),
+        ),
+        (
+            "return obs.force",
+            "p.lua:2: obs.force: the policy does not look at it; say looks = { force = true }".into(),
+        ),
+        ("obs.time = 3", "p.lua:2: obs.time: is only read".into()),
+        ("while true do end", "p.lua:2: the script ran for more than 0.3 s".into()),
+        (
+            "local t = {} for i = 1, 1e9 do t[i] = { i } end",
+            "p.lua:2: the script used more than its 16 MiB".into(),
+        ),
+    ] {
+        let message = refusal(body);
+        assert!(message.starts_with(&said), "{body}\n{message}\n{said}");
+    }
+}
+
+#[test]
+fn a_number_that_is_none_fails_the_episode_alone() {
+    for body in [
+        "return { position = { 0/0, 0, 0 }, axis_angle = { 0, 0, 0 }, closure = 0 }",
+        "return { position = { 0, 0, 0 }, axis_angle = { 0, 0, 0 }, closure = 1/0 }",
+        "return { { position = { 0, 0, 0 }, rotation = { 1, 0, 0, -1/0 }, closure = 0 } }",
+    ] {
+        match act(body) {
+            Err(PolicyError::Action(message)) => assert!(message.contains("not finite"), "{message}"),
+            other => panic!("{body}: {other:?}"),
+        }
+    }
+}
+
+#[test]
+fn an_episode_is_a_function_of_its_seed_and_no_other_episode() {
+    let text = format!(
+        "local count, told = 0\nreturn softvt.policy {{ name = 'p', reset = function(task) told = task end,\n\
+         act = function() count = count + 1 assert(told.task == 3 and told.episode == 7 and told.suite == 'one')\n\
+         return {{ {POSE}, closure = count * math.random() / 8 }} end }}"
+    );
+    let project = Project::new(&[("p.lua", &text)]);
+    let file = PolicyFile::load_with(&project.path("p.lua"), &limits()).unwrap();
+    let episode = |number: u64| -> Vec<Command> {
+        let mut policy = file.start(&seed(number)).unwrap();
+        policy.reset(&brief()).unwrap();
+        (0..3).flat_map(|_| policy.act(&observation()).unwrap().commands).collect()
+    };
+    assert_eq!(episode(1), episode(1));
+    assert_ne!(episode(1), episode(2));
+}
+
+#[test]
+fn files_that_hold_no_policy_are_told() {
+    let message = |text: &str| {
+        let project = Project::new(&[("p.lua", text)]);
+        let error = PolicyFile::load_with(&project.path("p.lua"), &limits()).unwrap_err();
+        error.to_string().replace(&format!("{}/", project.path("").display()).replace("//", "/"), "")
+    };
+    for (text, said) in [
+        ("return 3", "p.lua: a policy's file returns softvt.policy{…}, got 3"),
+        ("return softvt.policy { name = 'p' }", "p.lua:1: policy.act: missing"),
+        (
+            "return softvt.policy { name = 'p', act = print, looks = { touhc = true } }",
+            "p.lua:1: policy.looks: unknown key \"touhc\"; did you mean \"touch\"?",
+        ),
+        (
+            "return softvt.policy { name = 'p', act = print,\nreplan = 0 }",
+            "p.lua:2: policy.replan: expected a whole number",
+        ),
+        ("x = = 1", "p.lua:1: syntax error"),
+    ] {
+        let found = message(text);
+        assert!(found.starts_with(said), "{text}\n{found}");
+    }
+}
+
+#[test]
+fn the_shipped_policies_act() {
+    for name in ["hold", "touch_and_close"] {
+        let path = format!("{}/scripts/policies/{name}.lua", env!("CARGO_MANIFEST_DIR"));
+        let file = PolicyFile::load(path.as_ref()).unwrap();
+        assert_eq!(file.name, name);
+        let mut policy = file.start(&seed(0)).unwrap();
+        policy.reset(&brief()).unwrap();
+        let chunk = policy.act(&observation()).unwrap();
+        let Command::Pose(action) = chunk.commands[0] else { panic!("a pose") };
+        assert_eq!((action.position_b.x, action.closure), (0.5, 0.0));
+    }
+}
+
+fn profile(text: &str) -> Result<Profile, String> {
+    let project = Project::new(&[("p.lua", text)]);
+    let folder = format!("{}/", project.path("").display()).replace("//", "/");
+    let read = load_profile(&project.path("p.lua"));
+    read.map(|(profile, _)| profile).map_err(|e| e.to_string().replace(&folder, ""))
+}
+
+/// A shipped profile's text, changed.
+fn changed(name: &str, changes: &[(&str, &str)]) -> String {
+    let path = format!("{}/scripts/profiles/{name}.lua", env!("CARGO_MANIFEST_DIR"));
+    changes.iter().fold(fs::read_to_string(path).unwrap(), |text, (from, to)| {
+        assert!(text.contains(from), "{name}: {from}");
+        text.replace(from, to)
+    })
+}
+
+#[test]
+fn the_built_in_profiles_can_be_said_in_lua() {
+    let tactile = "{ keys = both \"tactile_image\", source = \"tactile_image\" },\n    { keys = both \"tactile_marker_motion\", source = \"marker_motion\" },";
+    let vision = [
+        ("name = \"visuo_tactile\"", "name = \"vision\""),
+        (tactile, ""),
+        ("shut = 1 }", "shut = 1, binary = true }"),
+    ];
+    let force = format!("{tactile}\n{{ keys = both \"tactile_gripper_force\", source = \"force\" }},");
+    let released = [
+        ("name = \"visuo_tactile\"", "name = \"softvtbench\""),
+        ("{ \"prompt\" }", "{ \"prompt\", \"observation/prompt\" }"),
+        (tactile, force.as_str()),
+        ("open = 0, shut = 1", "open = 0.04, shut = 0"),
+    ];
+    for (name, text) in [
+        ("libero", changed("libero", &[])),
+        ("visuo_tactile", changed("visuo_tactile", &[])),
+        ("vision", changed("visuo_tactile", &vision)),
+        ("softvtbench", changed("visuo_tactile", &released)),
+    ] {
+        assert_eq!(profile(&text).unwrap(), Profile::named(name).unwrap());
+    }
+}
+
+#[test]
+fn a_profile_may_name_other_cameras_units_and_paddings() {
+    let changes = [
+        ("camera = \"wrist\", half_turn = true", "camera = \"side\""),
+        ("pose = \"delta_osc\"", "pose = \"delta\", length = 32, scale = { 2, 2, 2, 1, 1, 1 }"),
+    ];
+    let profile = profile(&changed("libero", &changes)).unwrap();
+    assert_eq!(profile.streams().cameras, ["third_person", "side"]);
+    let units = profile.actions.units.unwrap();
+    assert_eq!((profile.actions.length, units.scale[0], units.offset), (Some(32), 2.0, [0.0; 6]));
+}
+
+#[test]
+fn what_is_wrong_with_a_profile_is_told_with_its_line() {
+    for (from, to, said) in [
+        (
+            "name = \"libero\"",
+            "nam = \"libero\"",
+            "p.lua:5: profile: unknown key \"nam\"; did you mean \"name\"?",
+        ),
+        ("source = \"prompt\"", "source = \"promt\"", "p.lua:7: profile.inputs[4].source: expected one of"),
+        ("\"finger_pair\"", "\"finger_pairs\"", "did you mean \"finger_pair\"?"),
+        (
+            "camera = \"wrist\", half_turn = true",
+            "half_turn = true",
+            "profile.inputs[2].camera: missing; a source \"camera\" needs it",
+        ),
+        (
+            "source = \"prompt\"",
+            "source = \"prompt\", camera = \"wrist\"",
+            "profile.inputs[4].camera: a source \"prompt\" has none; leave it out",
+        ),
+        (
+            "{ \"prompt\" }",
+            "{ \"observation/state\" }",
+            "profile.inputs[4].keys: \"observation/state\" is sent twice",
+        ),
+        ("{ \"prompt\" }", "{}", "profile.inputs[4].keys: give at least one"),
+        (
+            "translation_m = 0.05,",
+            "",
+            "profile.actions.translation_m: missing; pose = \"delta_osc\" needs it",
+        ),
+        ("\"delta_osc\"", "\"absolute\"", "profile.actions.translation_m: pose = \"absolute\" has no steps"),
+        ("open = -1", "open = 1", "profile.actions.gripper.shut: is 1 like open"),
+        ("rotation_rad = 0.5", "rotation_rad = 0/0", "profile.actions.rotation_rad: expected radians"),
+        (
+            "return softvt.profile",
+            "return ",
+            "p.lua: a profile's file returns softvt.profile{…}, got a table",
+        ),
+    ] {
+        let found = profile(&changed("libero", &[(from, to)])).unwrap_err();
+        assert!(found.starts_with("p.lua:") && found.contains(said), "{to}\n{found}\n{said}");
+    }
+}

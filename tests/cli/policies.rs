@@ -1,0 +1,233 @@
+//! Policies in Lua, recorded actions, the tactile servo, and the flags that go with them.
+
+use std::net::TcpListener;
+
+use crate::support::{Project, Small};
+
+/// Twelve control steps of a cube on a floor.
+fn project(policy: &str) -> Project {
+    let project = Small { task: "budget_steps = 12", ..Small::default() }.project();
+    project.write("p.lua", policy.as_bytes());
+    project
+}
+
+/// A policy that wanders by chance, from what it sees, in lists of three.
+const WANDERS: &str = "local n = 0
+return softvt.policy { name = 'wanders', looks = { touch = true, cameras = { 'wrist' } }, replan = 2,
+  reset = function(task) n = task.episode end,
+  act = function(obs)
+    n = n + 1
+    local light, list = obs:camera('wrist'):mean()[1] / 255, {}
+    for i = 1, 3 do
+      list[i] = { position = { obs.position[1] + 0.01 * math.random(), obs.position[2], obs.position[3] - 0.001 * n * light },
+                  axis_angle = obs.axis_angle, closure = 0.1 * math.random() }
+    end
+    return list
+  end }
+";
+
+#[test]
+fn a_lua_policys_results_do_not_depend_on_threads_or_on_being_broken_off() {
+    let project = project(WANDERS);
+    let line = "x.lua --policy p.lua --episodes 3";
+    project.succeeds(&format!("{line} --threads 1 --out one"));
+    project.succeeds(&format!("{line} --threads 2 --out two"));
+    // As a crash after the first episode would leave it.
+    project.succeeds(&format!("{line} --threads 1 --out three"));
+    let first = project.text("three/episodes.jsonl").lines().next().expect("a line").to_owned() + "\n";
+    project.write("three/episodes.jsonl", first.as_bytes());
+    std::fs::remove_file(project.path("three/summary.json")).expect("removed");
+    project.succeeds(&format!("{line} --threads 2 --resume --out three"));
+    for file in ["run.json", "episodes.jsonl", "summary.json"] {
+        let one = project.text(&format!("one/{file}"));
+        assert_eq!(one, project.text(&format!("two/{file}")), "{file} on two threads");
+        assert_eq!(one, project.text(&format!("three/{file}")), "{file} resumed");
+    }
+    let info = project.json("one/run.json");
+    assert_eq!((info["policy"].as_str(), info["privileged"].as_bool()), (Some("wanders"), Some(false)));
+    assert_eq!((info["policy_file"].as_str(), info["replan"].as_u64()), (Some("p.lua"), Some(2)));
+    assert!(info["sources"]["p.lua"].as_str().is_some_and(|hash| hash.len() == 64));
+    assert!(project.succeeds("replay one 0/2").out.contains("the same to the byte"));
+    project.write("p.lua", WANDERS.replace("0.01", "0.02").as_bytes());
+    let message = project.refusal(&format!("{line} --resume --out three"));
+    assert!(message.contains("is of another run: sources.p.lua"), "{message}");
+}
+
+#[test]
+fn a_policy_that_fails_ends_the_run_and_keeps_what_is_finished() {
+    let good = "return { position = obs.position, axis_angle = obs.axis_angle, closure = 0 }";
+    for (bad, said) in [
+        ("error 'lost'", "p.lua:3: lost"),
+        ("return 7", "p.lua:2: policy.act: expected an action or a list of actions, got 7"),
+        ("while true do end", "p.lua:3: the script ran for more than 5 s"),
+    ] {
+        let project = project(&format!(
+            "local episode\nreturn softvt.policy {{ name = 'p', reset = function(t) episode = t.episode end, act = function(obs)\nif episode == 1 then {bad} end {good} end }}"
+        ));
+        let message = project.refusal("x.lua --policy p.lua --episodes 2 --threads 1 --out run");
+        assert!(message.contains(said) && message.contains("1 of 2 episodes are in run"), "{bad}: {message}");
+        assert_eq!(project.lines("run/episodes.jsonl").len(), 1);
+    }
+}
+
+#[test]
+fn a_number_that_is_none_fails_its_episode_and_no_other() {
+    let project = project(
+        "local episode\nreturn softvt.policy { name = 'p', reset = function(t) episode = t.episode end, act = function(obs)\n\
+         return { position = obs.position, axis_angle = obs.axis_angle, closure = episode == 0 and 0/0 or 0 } end }",
+    );
+    project.succeeds("x.lua --policy p.lua --episodes 2 --threads 1 --out run");
+    let lines = project.lines("run/episodes.jsonl");
+    assert_eq!(lines[0]["outcome"]["kind"], "error");
+    assert!(
+        lines[0]["outcome"]["message"].as_str().is_some_and(|m| m.contains("not finite")),
+        "{}",
+        lines[0]
+    );
+    assert_eq!(lines[1]["outcome"]["kind"], "timeout");
+}
+
+#[test]
+fn a_camera_that_is_not_there_is_told_before_anything_runs() {
+    let policy =
+        "return softvt.policy { name = 'p', looks = { cameras = { 'sied' } }, act = function() end }";
+    let project = project(policy);
+    let message = project.refusal("x.lua --policy p.lua --out run");
+    assert!(message.contains("there is no camera \"sied\"; the scene has third_person, wrist"), "{message}");
+    assert!(!project.path("run").exists());
+}
+
+#[test]
+fn recorded_actions_must_be_those_of_this_very_suite_and_all_there() {
+    let project = project(WANDERS);
+    project.succeeds("x.lua --policy p.lua --episodes 2 --out run");
+    project.succeeds("x.lua --policy run --episodes 2 --out again");
+    let (first, again) = (project.lines("run/episodes.jsonl"), project.lines("again/episodes.jsonl"));
+    assert!(first.iter().zip(&again).all(|(a, b)| a["state_hash"] == b["state_hash"]), "the same motions");
+    let info = project.json("again/run.json");
+    assert_eq!((info["policy"].as_str(), info["replayed"]["run"].as_str()), (Some("replay"), Some("run")));
+    assert!(info["replayed"]["sha256"].as_str().is_some_and(|hash| hash.len() == 64));
+    let refused = |words: &str, said: &str| {
+        let message = project.refusal(&format!("x.lua --policy run {words} --out no"));
+        assert!(message.contains(said), "{words}: {message}");
+        assert!(!project.path("no").exists());
+    };
+    refused("--episodes 2 --seed 1", "--policy run: it is of seed 0, and this run of seed 1");
+    refused("--episodes 2 --twin rigid", "it holds no run of suite one as rigid twin; it has one");
+    refused(
+        "--episodes 4",
+        "it lacks 2 of the 4 episodes that are wanted: task 0 episode 2, task 0 episode 3",
+    );
+    std::fs::remove_file(project.path("run/actions/task_000/episode_00001.npy")).expect("removed");
+    refused("--episodes 2", "it lacks 1 of the 2 episodes that are wanted: task 0 episode 1");
+    let other = project.text("x.lua").replace("name = \"one\", object", "name = \"two\", object");
+    project.write("x.lua", other.as_bytes());
+    refused("--episodes 1", "it holds no run of suite two; it has one");
+}
+
+#[test]
+fn flags_without_use_and_bad_files_are_refused_before_anything_runs() {
+    let project = project(WANDERS);
+    project.write(
+        "profile.lua",
+        b"return softvt.profile { name = 'x',\n inputs = {}, actions = {\n pose = 'absolut' } }",
+    );
+    for (words, said) in [
+        (
+            "--policy noop --replan 3",
+            "--replan: is for servers and Lua policies; --policy noop has no use for it",
+        ),
+        (
+            "--protocol vla-eval",
+            "--protocol: is for policies that answer over a network; --policy expert has no use",
+        ),
+        ("--policy random --profile vision", "--profile: is for policies that answer over a network"),
+        (
+            "--policy p.lua --gripper binary",
+            "--gripper: is for policies that answer over a network; --policy p.lua",
+        ),
+        ("--policy q.lua", "q.lua: no such file"),
+        ("--policy profile.lua", "profile.lua:"),
+        (
+            "--policy ws://127.0.0.1:9 --profile profile.lua",
+            "profile.lua:3: profile.actions.pose: expected one of",
+        ),
+        ("--policy ws://127.0.0.1:99999", "\"99999\" is no port"),
+        ("--policy ws://127.0.0.1:0", "\"0\" is no port"),
+        ("--policy ws://127.0.0.1:x", "--policy ws://127.0.0.1:x: "),
+    ] {
+        let message = project.refusal(&format!("x.lua {words} --out run"));
+        assert!(message.contains(said), "{words}: {message}");
+        assert!(!project.path("run").exists(), "{words}");
+    }
+    let message = project.refusal("p.lua");
+    assert!(message.contains("is no plan but what --policy takes"), "{message}");
+}
+
+#[test]
+fn a_profile_in_lua_is_spoken_to_a_server_as_the_same_built_in() {
+    // Nobody listens there: the profile was read, and only the connection fails.
+    let free = TcpListener::bind("127.0.0.1:0").expect("a port").local_addr().expect("an address");
+    let project = project(WANDERS);
+    let words =
+        format!("x.lua --policy ws://{free} --policy-timeout 0.2 --profile scripts/profiles/libero.lua");
+    let said = project.softvt(&words);
+    assert_eq!(said.code, 3, "{}", said.err);
+    assert!(said.err.contains("no policy server at"), "{}", said.err);
+}
+
+#[test]
+fn policies_and_profiles_in_lua_are_listed() {
+    let project = project(WANDERS);
+    project.write("scripts/policies/mine.lua", b"-- Mine. It is good.\nreturn 1\n");
+    let listed = project.succeeds("list policies").out;
+    for line in [
+        "tactile-servo",
+        "Mine  scripts/policies/mine.lua",
+        "scripts/policies/hold.lua",
+        "scripts/profiles/libero.lua",
+    ] {
+        assert!(listed.contains(line), "{line}\n{listed}");
+    }
+    let rows: serde_json::Value =
+        serde_json::from_str(&project.succeeds("list policies --json").out).expect("JSON");
+    assert!(
+        rows.as_array()
+            .is_some_and(|rows| rows.iter().any(|r| r["kind"] == "profile" && r["name"] == "vision"))
+    );
+}
+
+/// An expert that takes the cube from above, shut as far as it goes if nobody feels anything, and holds it up.
+const GREEDY: &str = "local c = scene:object('cube').xyz
+    local at = softvt.pose { xyz = { c[1], c[2], 0.022 } }
+    arm:move_to(at:moved { 0, 0, 0.05 }, { speed = 0.5 })
+    arm:move_to(at, { speed = 0.25 }) arm:grasp(0.9, { rate = 0.6 })
+    arm:move_by({ 0, 0, 0.06 }, { speed = 0.2 }) arm:wait(0.5)
+    if scene:object('cube').xyz[3] < 0.06 then arm:give_up('it did not come along') end";
+
+#[test]
+fn the_tactile_servo_closes_until_it_feels_the_object_whatever_the_expert_says() {
+    let project = Small { task: "budget_steps = 120", expert: GREEDY, ..Small::default() }.project();
+    let mut d = Vec::new();
+    for policy in ["expert", "tactile-servo"] {
+        let said = project.succeeds(&format!("x.lua --policy {policy} --threads 1 --out {policy}"));
+        let episode = &project.lines(&format!("{policy}/episodes.jsonl"))[0];
+        assert!(episode["gave_up"].is_null(), "{policy} lifts it: {episode}\n{}", said.err);
+        assert_eq!(project.json(&format!("{policy}/run.json"))["privileged"], true);
+        d.push(episode["d_peak"].as_f64().expect("a number"));
+    }
+    assert!(d[1] < 0.2 * d[0], "told {} %, felt {} %", d[0], d[1]);
+    assert!(project.succeeds("replay tactile-servo 0/0").out.contains("the same to the byte"));
+}
+
+#[test]
+fn an_expert_that_is_not_felt_for_is_told_where_feeling_is() {
+    let project = Small { expert: "arm:feel()", ..Small::default() }.project();
+    let message = project.refusal("x.lua --out run");
+    assert!(
+        message.contains(
+            "x.lua:12: arm:feel: fingers are felt in simulation:drive and under --policy tactile-servo"
+        ),
+        "{message}"
+    );
+}
