@@ -135,8 +135,9 @@ fn write(
     let thresholds = Thresholds::parse(&text, &path.display().to_string())
         .map_err(|error| MergeError::Unfit(error.to_string()))?;
     interchange::write_scores(folder, records, &thresholds)?;
-    let summary = Summary::of(runs[0].text("suite"), runs[0].text("policy"), records)
-        .of_privileged(runs[0].is_privileged());
+    // That of a twin is not the name of its suite.
+    let suite = records.first().map_or(runs[0].suite(), |record| &record.identity.suite);
+    let summary = Summary::of(suite, runs[0].text("policy"), records).of_privileged(runs[0].is_privileged());
     write_json(&folder.join(SUMMARY), &summary)?;
     Ok(summary)
 }

@@ -32,6 +32,8 @@ fn each_condition_is_an_ordinary_run_of_the_same_episodes() {
     let starts: Vec<&str> = rows.iter().map(|row| row.split("  ").next().unwrap_or_default()).collect();
     assert_eq!(starts[1..7], ["condition", "reference", "heavy x2", "same", "hard", "weak"], "{}", said.out);
     assert!(said.out.lines().all(|line| line.chars().count() <= 100), "{}", said.out);
+    let (_, against) = said.out.split_once("against the reference ").expect("a second table");
+    assert!(against.contains("95 % interval") && against.contains("\nheavy x2"), "{}", said.out);
     let alone = project.succeeds("suites/one.lua --policy noop --shift mass=2 --out alone");
     assert!(!alone.out.is_empty());
     assert_eq!(project.text("run/heavy_x2/episodes.jsonl"), project.text("alone/episodes.jsonl"));
@@ -53,7 +55,9 @@ fn the_comparison_is_written_and_light_alone_changes_no_result() {
     assert_eq!(names, ["reference", "heavy x2", "same", "hard", "weak"]);
     assert!(rows[0]["outcome"]["paired"].is_null());
     let same = &rows[2]["outcome"];
-    assert_eq!(same["paired"]["goal"], serde_json::json!({ "better": 0, "worse": 0, "same": 2 }));
+    let goal = &same["paired"]["goal"];
+    assert_eq!((&goal["better"], &goal["worse"], &goal["same"]), (&0.into(), &0.into(), &2.into()));
+    assert_eq!((&goal["difference"], goal["interval95"].as_array().map(Vec::len)), (&0.0.into(), Some(2)));
     assert_eq!(project.text("run/same/episodes.jsonl"), project.text("run/reference/episodes.jsonl"));
     assert_ne!(project.text("run/heavy_x2/episodes.jsonl"), project.text("run/reference/episodes.jsonl"));
 }

@@ -206,3 +206,20 @@ fn lost_files_of_finished_episodes_are_made_again_to_the_same_bytes() {
     assert!(!project.path("run/actions/task_000/episode_00000.npy").exists());
     assert_eq!(project.text("run/episodes.jsonl"), lines);
 }
+
+#[test]
+fn shards_are_merged_to_the_bytes_of_one_run_also_of_a_twin() {
+    let project = Small { task: "budget_steps = 8", ..Small::default() }.project();
+    for (twin, name) in [("", "soft"), ("--twin rigid", "rigid")] {
+        let line = format!("x.lua --episodes 3 {twin} --out {name}");
+        project.succeeds(&line);
+        (1..=2).for_each(|i| drop(project.succeeds(&format!("{line}_{i} --shard {i}/2"))));
+        project.succeeds(&format!("merge {name}_all {name}_1 {name}_2"));
+        for file in ["run.json", "episodes.jsonl", "summary.json", "softvtbench/summary.json"] {
+            let [merged, whole] = ["_all", ""].map(|end| project.text(&format!("{name}{end}/{file}")));
+            assert_eq!(merged, whole, "{name} {file}");
+        }
+        let summary = project.json(&format!("{name}_all/summary.json"));
+        assert_eq!((&summary["episodes"], &summary["privileged"]), (&3.into(), &true.into()));
+    }
+}
