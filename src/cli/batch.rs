@@ -17,29 +17,20 @@ use super::{
     side_files::SideFiles,
 };
 use crate::{
-    benchmark::{Goal, ObjectType, Suite, Task, seed::Split, settings::Settings},
+    benchmark::{Suite, Task, seed::Split, settings::Settings},
     evaluation::{record::EpisodeRecord, safety::Limit, summary::Summary, thresholds::Thresholds},
-    policy::{Streams, TaskBrief},
+    policy::TaskBrief,
     report::{
         interchange,
         run_folder::{EPISODES, RUN, RunFolder, RunFolderError, SUMMARY, write_json},
     },
     rollout::{
         BuildError, ControlError, Controller, Episode, EpisodeError, EpisodeSpec, Finished, Looks, RestCache,
-        SenseError, Senses, Simulation, Which, batch, check_senses, check_support, stop, target_asset,
+        Which, batch, stop, target_asset,
     },
-    scene::{Asset, Body, Scene},
+    scene::{Asset, Body},
     script::{self, Loaded},
 };
-
-/// Why a first look at a scene fails.
-#[derive(Debug, thiserror::Error)]
-enum Trial {
-    #[error(transparent)]
-    Build(#[from] BuildError),
-    #[error(transparent)]
-    Sense(#[from] SenseError),
-}
 
 /// One suite under way.
 pub(super) struct Batch<'a> {
@@ -57,8 +48,8 @@ pub(super) struct Batch<'a> {
     pub sources: BTreeMap<String, String>,
     /// Whose actions are carried out once more.
     pub(super) replayed: Option<Replayed>,
-    cache: RestCache,
-    looks: Looks,
+    pub(super) cache: RestCache,
+    pub(super) looks: Looks,
     pub out: PathBuf,
     /// Whether rollouts are drawn.
     pub films: bool,
@@ -118,7 +109,7 @@ impl<'a> Batch<'a> {
     }
 
     /// An episode as its layout, the shifts and the run make it.
-    fn open(&self, request: &script::EpisodeRequest) -> Result<script::Episode, Failure> {
+    pub(super) fn open(&self, request: &script::EpisodeRequest) -> Result<script::Episode, Failure> {
         let mut opened = script::Episode::open(self.loaded, request).map_err(Failure::input)?;
         if self.run.twin {
             (opened.scene, opened.nominal) = (opened.scene.rigid_twin(), opened.nominal.rigid_twin());
@@ -126,7 +117,7 @@ impl<'a> Batch<'a> {
         Ok(opened)
     }
 
-    fn brief(&self, task: &Task, episode: u32) -> TaskBrief {
+    pub(super) fn brief(&self, task: &Task, episode: u32) -> TaskBrief {
         TaskBrief { suite: self.name.clone(), task: task.id, prompt: task.prompt.clone(), episode }
     }
 
@@ -140,25 +131,6 @@ impl<'a> Batch<'a> {
             split: self.split,
             shifts: self.run.shifts.clone(),
         }
-    }
-
-    /// Reads the thresholds of the targets of all tasks, and looks once at whatever will be looked at in the first episode of
-    /// each: what is wrong with a scene's senses is told before anything runs.
-    ///
-    /// # Errors
-    /// A layout, a threshold file, a camera, the light or a tactile sensor that is wrong.
-    pub fn prepare(&mut self, tasks: &[&Task]) -> Result<(), Failure> {
-        for task in tasks {
-            let first = self.jobs.iter().find(|(of, _)| of.id == task.id).map_or(0, |(_, episode)| *episode);
-            let opened = self.open(&self.request(task, first))?;
-            self.right_kind(task, &opened.nominal)?;
-            self.learn_limit(target_asset(&opened.nominal, task).cloned())?;
-            let scene = Arc::new(opened.scene.clone());
-            let streams = (self.drive)(opened, self.brief(task, first))?.streams();
-            self.force_observed |= streams.force;
-            self.try_out(scene, streams).map_err(|error| self.trial_failure(error, task, first))?;
-        }
-        Ok(())
     }
 
     /// Reads the thresholds of the targets of tasks, and does nothing else to prepare them.
@@ -183,61 +155,6 @@ impl<'a> Batch<'a> {
             self.limits.insert(asset.name.clone(), limit);
         }
         Ok(())
-    }
-
-    /// Builds the first scene of a task, and looks for all that can be wrong with it before anything moves.
-    ///
-    /// # Errors
-    /// What is wrong.
-    pub fn examine(&self, task: &Task, scene: Scene) -> Result<(), Failure> {
-        self.right_kind(task, &scene)?;
-        let scene = Arc::new(if self.run.twin { scene.rigid_twin() } else { scene });
-        let settings = &self.settings;
-        let look = || -> Result<(), Trial> {
-            check_senses(&scene, &settings.tactile, &self.looks)?;
-            let sim = Simulation::new(scene.clone(), &settings.physics, &settings.robot, &self.cache)?;
-            check_support(&sim)?;
-            Ok(Senses::new(&sim, &settings.tactile, &self.looks).stand_outside(&Senses::frame(&sim))?)
-        };
-        look().map_err(|error| self.trial_failure(error, task, 0))
-    }
-
-    /// What can be deformed is not the target of a suite whose tables say N/A to deformation.
-    fn right_kind(&self, task: &Task, scene: &Scene) -> Result<(), Failure> {
-        let (Goal::On { object, .. } | Goal::In { object, .. }) = &task.goal;
-        let target = scene.objects.iter().find(|known| known.name == *object);
-        let soft = target.filter(|object| matches!(object.asset.body, Body::Soft(_)));
-        match soft.filter(|_| self.suite.object_type == ObjectType::Rigid && !self.run.twin) {
-            None => Ok(()),
-            Some(target) => Err(Failure::input(format!(
-                "{}: the target of task {}, {object}, is soft, and suite {} has object_type = \"rigid\"; say \
-                 \"deformable\"",
-                target.placed_at, task.id, self.suite.name
-            ))),
-        }
-    }
-
-    fn trial_failure(&self, error: Trial, task: &Task, episode: u32) -> Failure {
-        self.episode_failure(&match error {
-            Trial::Build(error) => EpisodeError::Build(error),
-            Trial::Sense(source) => EpisodeError::Sense { task: task.id, episode, source },
-        })
-    }
-
-    /// Looks once at what a policy asks for, and a film shows, of a scene in which nothing has moved yet.
-    fn try_out(&self, scene: Arc<Scene>, mut streams: Streams) -> Result<(), Trial> {
-        let settings = &self.settings;
-        check_senses(&scene, &settings.tactile, &self.looks)?;
-        if self.films {
-            streams.touch = true;
-            streams.cameras.extend(scene.cameras.iter().map(|camera| camera.name.clone()));
-        }
-        if streams.cameras.is_empty() && !streams.touch {
-            return Ok(());
-        }
-        let sim = Simulation::new(scene, &settings.physics, &settings.robot, &self.cache)?;
-        let mut senses = Senses::new(&sim, &settings.tactile, &self.looks);
-        Ok(senses.try_out(&Senses::frame(&sim), &streams)?)
     }
 
     /// Takes over the limits of another batch of the same suite, whose layouts are the same.
@@ -452,7 +369,7 @@ impl<'a> Batch<'a> {
         Ok((EpisodeSpec { limit, trace: self.run.trace, ..spec }, opened))
     }
 
-    fn episode_failure(&self, error: &EpisodeError) -> Failure {
+    pub(super) fn episode_failure(&self, error: &EpisodeError) -> Failure {
         let code = match error {
             // What fails after the end was asked for may fail because of that.
             _ if stop::requested() => code::INTERRUPTED,

@@ -12,6 +12,7 @@ mod drivers;
 mod evaluate;
 mod experiment;
 mod files;
+mod first_look;
 mod flags;
 mod grips;
 mod info;

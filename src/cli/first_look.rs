@@ -1,0 +1,98 @@
+//! A first look at the scenes of a suite: what is wrong with them is told before anything runs.
+
+use std::sync::Arc;
+
+use super::{Failure, batch::Batch};
+use crate::{
+    benchmark::{Goal, ObjectType, Task},
+    policy::Streams,
+    rollout::{
+        BuildError, EpisodeError, SenseError, Senses, Simulation, check_senses, check_support, target_asset,
+    },
+    scene::{Body, Scene},
+};
+
+/// Why a first look at a scene fails.
+#[derive(Debug, thiserror::Error)]
+enum Trial {
+    #[error(transparent)]
+    Build(#[from] BuildError),
+    #[error(transparent)]
+    Sense(#[from] SenseError),
+}
+
+impl Batch<'_> {
+    /// Reads the thresholds of the targets of all tasks, and looks once at whatever will be looked at in the first episode of
+    /// each: what is wrong with a scene's senses is told before anything runs.
+    ///
+    /// # Errors
+    /// A layout, a threshold file, a camera, the light or a tactile sensor that is wrong.
+    pub fn prepare(&mut self, tasks: &[&Task]) -> Result<(), Failure> {
+        for task in tasks {
+            let first = self.jobs.iter().find(|(of, _)| of.id == task.id).map_or(0, |(_, episode)| *episode);
+            let opened = self.open(&self.request(task, first))?;
+            self.right_kind(task, &opened.nominal)?;
+            self.learn_limit(target_asset(&opened.nominal, task).cloned())?;
+            let scene = Arc::new(opened.scene.clone());
+            let streams = (self.drive)(opened, self.brief(task, first))?.streams();
+            self.force_observed |= streams.force;
+            self.try_out(scene, streams).map_err(|error| self.trial_failure(error, task, first))?;
+        }
+        Ok(())
+    }
+
+    /// Builds the first scene of a task, and looks for all that can be wrong with it before anything moves.
+    ///
+    /// # Errors
+    /// What is wrong.
+    pub fn examine(&self, task: &Task, scene: Scene) -> Result<(), Failure> {
+        self.right_kind(task, &scene)?;
+        let scene = Arc::new(if self.run.twin { scene.rigid_twin() } else { scene });
+        let settings = &self.settings;
+        let look = || -> Result<(), Trial> {
+            check_senses(&scene, &settings.tactile, &self.looks)?;
+            let sim = Simulation::new(scene.clone(), &settings.physics, &settings.robot, &self.cache)?;
+            check_support(&sim)?;
+            Ok(Senses::new(&sim, &settings.tactile, &self.looks).stand_outside(&Senses::frame(&sim))?)
+        };
+        look().map_err(|error| self.trial_failure(error, task, 0))
+    }
+
+    /// What can be deformed is not the target of a suite whose tables say N/A to deformation.
+    fn right_kind(&self, task: &Task, scene: &Scene) -> Result<(), Failure> {
+        let (Goal::On { object, .. } | Goal::In { object, .. }) = &task.goal;
+        let target = scene.objects.iter().find(|known| known.name == *object);
+        let soft = target.filter(|object| matches!(object.asset.body, Body::Soft(_)));
+        match soft.filter(|_| self.suite.object_type == ObjectType::Rigid && !self.run.twin) {
+            None => Ok(()),
+            Some(target) => Err(Failure::input(format!(
+                "{}: the target of task {}, {object}, is soft, and suite {} has object_type = \"rigid\"; say \
+                 \"deformable\"",
+                target.placed_at, task.id, self.suite.name
+            ))),
+        }
+    }
+
+    fn trial_failure(&self, error: Trial, task: &Task, episode: u32) -> Failure {
+        self.episode_failure(&match error {
+            Trial::Build(error) => EpisodeError::Build(error),
+            Trial::Sense(source) => EpisodeError::Sense { task: task.id, episode, source },
+        })
+    }
+
+    /// Looks once at what a policy asks for, and a film shows, of a scene in which nothing has moved yet.
+    fn try_out(&self, scene: Arc<Scene>, mut streams: Streams) -> Result<(), Trial> {
+        let settings = &self.settings;
+        check_senses(&scene, &settings.tactile, &self.looks)?;
+        if self.films {
+            streams.touch = true;
+            streams.cameras.extend(scene.cameras.iter().map(|camera| camera.name.clone()));
+        }
+        if streams.cameras.is_empty() && !streams.touch {
+            return Ok(());
+        }
+        let sim = Simulation::new(scene, &settings.physics, &settings.robot, &self.cache)?;
+        let mut senses = Senses::new(&sim, &settings.tactile, &self.looks);
+        Ok(senses.try_out(&Senses::frame(&sim), &streams)?)
+    }
+}
