@@ -52,3 +52,27 @@ impl Offer<'_> {
         serde_json::to_string(&self.profile.actions).unwrap_or_default()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::benchmark::seed::Split;
+
+    fn state(episode: u32, actions: &[f64]) -> State {
+        let suite = "one".to_owned();
+        let wanted = Wanted { suite, task: 0, episode, seed: 0, split: Split::Validation };
+        State { wanted, actions: actions.iter().map(|x| [*x; ACTION_LEN]).collect() }
+    }
+
+    #[test]
+    fn a_state_lies_on_the_way_to_those_that_begin_with_it() {
+        let far = state(0, &[0.0, 1.0, 2.0]);
+        assert_eq!(state(0, &[]).left_to(&far), Some(3));
+        assert_eq!(state(0, &[0.0, 1.0]).left_to(&far), Some(1));
+        assert_eq!(far.left_to(&far), Some(0));
+        assert_eq!(far.left_to(&state(0, &[0.0, 1.0])), None, "nobody goes back in time");
+        assert_eq!(state(0, &[0.0, 1.5]).left_to(&far), None, "another way");
+        assert_eq!(state(1, &[0.0]).left_to(&far), None, "another episode");
+        assert_eq!(state(0, &[-0.0]).left_to(&far), None, "the same number, but not to the bit");
+    }
+}
