@@ -14,7 +14,7 @@ use super::{
     files::{self, Calibrated, make_folder},
     info::{self, RunInfo},
     progress::Progress,
-    recorded::{Replayed, Wanted},
+    recorded::{Replayed, recorded},
 };
 use crate::{
     benchmark::{Suite, Task, seed::Split, settings::Settings},
@@ -450,12 +450,13 @@ impl<'a> Batch<'a> {
             policy: self.run.policy.name(),
         };
         let scenes = (&opened.nominal, opened.scene.clone());
-        let spec = EpisodeSpec {
+        let mut spec = EpisodeSpec {
             limit,
             film,
             trace: self.run.trace,
             ..EpisodeSpec::new(&which, task, scenes, &self.settings)
         };
+        spec.identity.privileged = self.run.policy.is_privileged();
         let driver = (self.drive)(opened, self.brief(task, episode))?;
         let mut driver = batch::Stoppable { driver, stop: &stop::FLAG };
         let started = Episode::start(spec, &self.cache, &self.looks).map_err(|e| self.episode_failure(&e))?;
@@ -504,18 +505,6 @@ impl<'a> Batch<'a> {
         }
         replace(&dir.join(format!("episode_{:05}.jsonl", id.episode)), &text).map_err(folder_failure)
     }
-}
-
-/// Whose actions are carried out once more, if any are: they must be those of this very suite, and all there.
-///
-/// # Errors
-/// What differs or is missing.
-pub(super) fn recorded(run: &Run, suite: &Suite, jobs: &[(&Task, u32)]) -> Result<Option<Replayed>, Failure> {
-    let Some(runs) = run.policy.recorded() else { return Ok(None) };
-    let jobs: Vec<(usize, u32)> = jobs.iter().map(|(task, episode)| (task.id, *episode)).collect();
-    let wanted =
-        Wanted { suite: &suite.name, twin: run.twin, seed: run.seed, split: Split::Validation, jobs: &jobs };
-    runs.check(&wanted).map(Some)
 }
 
 /// Makes whoever drives an episode.

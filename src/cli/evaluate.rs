@@ -8,8 +8,10 @@ use std::{
 use super::{
     Failure,
     args::{Run, Video},
-    batch::{Batch, recorded},
-    conditions, experiment, print, require,
+    batch::Batch,
+    conditions, experiment, print,
+    recorded::recorded,
+    require,
 };
 use crate::{
     benchmark::{Plan, Suite, Task},

@@ -76,6 +76,7 @@ pub fn run(dir: &Path, which: Which) -> Result<(), Failure> {
     let mut again = batch.episode(0, false)?.record;
     // Who drove, and what was looked at, is not simulated again.
     again.identity.policy.clone_from(&record.identity.policy);
+    again.identity.privileged = record.identity.privileged;
     again.stats.force_observed = record.stats.force_observed;
     again.stats.camera_inside = record.stats.camera_inside;
     let bytes = |record: &EpisodeRecord| serde_json::to_string(record).map_err(Failure::input);

@@ -100,6 +100,9 @@ pub struct Summary {
     pub suite: String,
     /// Policy name.
     pub policy: String,
+    /// Whether the policy saw the true state in any episode, as experts do.
+    #[serde(default)]
+    pub privileged: bool,
     /// Whether the policy saw the true forces at the pads in any episode; no real sensor gives them.
     #[serde(default)]
     pub force_observed: bool,
@@ -158,6 +161,7 @@ impl Summary {
         Self {
             suite: suite.into(),
             policy: policy.into(),
+            privileged: records.iter().any(|r| r.identity.privileged),
             force_observed: records.iter().any(|r| r.stats.force_observed),
             scores: Scores::of(&records),
             kappa: kappa_curve(&records),
