@@ -27,6 +27,7 @@ pub(super) fn drive(recorded: Vec<Action>, record: &EpisodeRecord) -> Drive {
 /// was looked at.
 pub(super) fn known(mut again: EpisodeRecord, record: &EpisodeRecord) -> EpisodeRecord {
     again.identity.policy.clone_from(&record.identity.policy);
+    again.identity.privileged = record.identity.privileged;
     again.stats.force_observed = record.stats.force_observed;
     again.stats.camera_inside = record.stats.camera_inside;
     again.stats.gave_up.clone_from(&record.stats.gave_up);

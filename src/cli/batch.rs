@@ -13,7 +13,7 @@ use super::{
     drivers::Drivers,
     files::{self, Calibrated},
     progress::Progress,
-    recorded::{Replayed, Wanted},
+    recorded::{Replayed, recorded},
     side_files::SideFiles,
 };
 use crate::{
@@ -237,7 +237,7 @@ impl<'a> Batch<'a> {
     /// Episodes with what they come to.
     pub fn summed_up(&self, records: Vec<EpisodeRecord>) -> Done {
         let policy = &self.run.policy;
-        let summary = Summary::of(&self.name, policy.name(), &records).of_privileged(policy.is_privileged());
+        let summary = Summary::of(&self.name, policy.name(), &records);
         Done { summary, records }
     }
 
@@ -365,7 +365,8 @@ impl<'a> Batch<'a> {
             policy: self.run.policy.name(),
         };
         let scenes = (&opened.nominal, opened.scene.clone());
-        let spec = EpisodeSpec::new(&which, task, scenes, &self.settings);
+        let mut spec = EpisodeSpec::new(&which, task, scenes, &self.settings);
+        spec.identity.privileged = self.run.policy.is_privileged();
         Ok((EpisodeSpec { limit, trace: self.run.trace, ..spec }, opened))
     }
 
@@ -384,18 +385,6 @@ impl<'a> Batch<'a> {
         };
         Failure { code, message }
     }
-}
-
-/// Whose actions are carried out once more, if any are: they must be those of this very suite, and all there.
-///
-/// # Errors
-/// What differs or is missing.
-pub(super) fn recorded(run: &Run, suite: &Suite, jobs: &[(&Task, u32)]) -> Result<Option<Replayed>, Failure> {
-    let Some(runs) = run.policy.recorded() else { return Ok(None) };
-    let jobs: Vec<(usize, u32)> = jobs.iter().map(|(task, episode)| (task.id, *episode)).collect();
-    let wanted =
-        Wanted { suite: &suite.name, twin: run.twin, seed: run.seed, split: Split::Validation, jobs: &jobs };
-    runs.check(&wanted).map(Some)
 }
 
 /// Makes whoever drives an episode.

@@ -8,10 +8,12 @@ use std::{
 use super::{
     Failure,
     args::{Run, Video},
-    batch::{Batch, Done, recorded},
+    batch::{Batch, Done},
     conditions, experiment,
     info::{self, RunInfo},
-    print, require,
+    print,
+    recorded::recorded,
+    require,
 };
 use crate::{
     benchmark::{Plan, Suite, Task},

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
-use super::Failure;
+use super::{Failure, args::Run};
 use crate::{
-    benchmark::seed::Split,
+    benchmark::{Suite, Task, seed::Split},
     policy::{Action, TaskBrief},
     report::{
         actions,
@@ -48,6 +48,18 @@ pub struct Replayed {
 
 /// Episodes that a message names.
 const TOLD: usize = 3;
+
+/// Whose actions are carried out once more, if any are: they must be those of this very suite, and all there.
+///
+/// # Errors
+/// What differs or is missing.
+pub fn recorded(run: &Run, suite: &Suite, jobs: &[(&Task, u32)]) -> Result<Option<Replayed>, Failure> {
+    let Some(runs) = run.policy.recorded() else { return Ok(None) };
+    let jobs: Vec<(usize, u32)> = jobs.iter().map(|(task, episode)| (task.id, *episode)).collect();
+    let wanted =
+        Wanted { suite: &suite.name, twin: run.twin, seed: run.seed, split: Split::Validation, jobs: &jobs };
+    runs.check(&wanted).map(Some)
+}
 
 impl RecordedRuns {
     /// Reads the folder of a run, or of several.

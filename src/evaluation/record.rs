@@ -54,6 +54,9 @@ pub struct Identity {
     pub split: String,
     /// Policy name.
     pub policy: String,
+    /// Whether it sees the true state, as experts do.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub privileged: bool,
     /// Asset of the target.
     pub asset: String,
     /// Whether the target deforms.
@@ -121,6 +124,7 @@ pub(crate) mod tests {
             seed: 11,
             split: "eval".into(),
             policy: "expert".into(),
+            privileged: false,
             asset: "bun".into(),
             soft: true,
         };

@@ -100,7 +100,7 @@ pub struct Summary {
     pub suite: String,
     /// Policy name.
     pub policy: String,
-    /// Whether the policy sees the true state, which no robot does.
+    /// Whether the policy saw the true state in any episode, as experts do.
     #[serde(default)]
     pub privileged: bool,
     /// Whether the policy saw the true forces at the pads in any episode; no real sensor gives them.
@@ -161,7 +161,7 @@ impl Summary {
         Self {
             suite: suite.into(),
             policy: policy.into(),
-            privileged: false,
+            privileged: records.iter().any(|r| r.identity.privileged),
             force_observed: records.iter().any(|r| r.stats.force_observed),
             scores: Scores::of(&records),
             kappa: kappa_curve(&records),
@@ -173,11 +173,6 @@ impl Summary {
 }
 
 impl Summary {
-    /// The same of a policy that is privileged or not: its episodes do not say.
-    pub fn of_privileged(self, privileged: bool) -> Self {
-        Self { privileged, ..self }
-    }
-
     /// The policy, and what it has that no robot has: as every table names it.
     pub fn method(&self) -> String {
         method(&self.policy, self.privileged, self.force_observed)

@@ -273,7 +273,7 @@ fn summary(records: &[EpisodeRecord]) -> Value {
             (asset.to_owned(), asset_summary(&group))
         })
         .collect();
-    json!({
+    let mut scores = json!({
         "n_episodes": n,
         "n_goal_known": n,
         "n_safe_unknown": all.iter().filter(|r| safe_success(r).is_none()).count(),
@@ -283,7 +283,12 @@ fn summary(records: &[EpisodeRecord]) -> Value {
         "rigid_mode": n > 0 && all.iter().all(|r| !r.identity.soft),
         "deformation_metric_id": METRIC_ID,
         "by_asset": by_asset,
-    })
+    });
+    // Not among SoftVTBench's fields: a policy that may be compared with others leaves the file as it is there.
+    if all.iter().any(|r| r.identity.privileged) {
+        scores["privileged"] = json!(true);
+    }
+    scores
 }
 
 fn asset_summary(group: &[&EpisodeRecord]) -> Value {

@@ -44,8 +44,7 @@ pub fn judge(mut runs: Vec<StoredRun>) -> Vec<Judged> {
 }
 
 fn summed_up(run: StoredRun) -> Judged {
-    let mut summary =
-        Summary::of(run.suite(), run.text("policy"), &run.records).of_privileged(run.is_privileged());
+    let mut summary = Summary::of(run.suite(), run.text("policy"), &run.records);
     summary.force_observed |= run.sees_forces();
     let method = [summary.method()].into_iter().chain(changes(&run)).collect::<Vec<_>>().join(" · ");
     Judged { run, summary, method }
@@ -129,7 +128,9 @@ pub(super) mod tests {
 
     /// A finished run of `records` in the folder `dir`.
     pub(in crate::report) fn stored(dir: &str, policy: &str, mut records: Vec<EpisodeRecord>) -> StoredRun {
-        records.iter_mut().for_each(|record| record.identity.policy = policy.into());
+        for record in &mut records {
+            (record.identity.policy, record.identity.privileged) = (policy.into(), policy == "expert");
+        }
         let suite = records.first().map_or("suite", |record| &record.identity.suite);
         let info = json!({
             "softvt": env!("CARGO_PKG_VERSION"), "script": "x.lua", "suite": suite, "policy": policy,

@@ -137,7 +137,7 @@ fn write(
     interchange::write_scores(folder, records, &thresholds)?;
     // That of a twin is not the name of its suite.
     let suite = records.first().map_or(runs[0].suite(), |record| &record.identity.suite);
-    let summary = Summary::of(suite, runs[0].text("policy"), records).of_privileged(runs[0].is_privileged());
+    let summary = Summary::of(suite, runs[0].text("policy"), records);
     write_json(&folder.join(SUMMARY), &summary)?;
     Ok(summary)
 }

@@ -65,6 +65,7 @@ impl EpisodeSpec {
             seed: which.seed,
             split: which.split.name().to_owned(),
             policy: which.policy.to_owned(),
+            privileged: false,
             soft: target.is_some_and(|asset| matches!(asset.body, Body::Soft(_))),
             asset: target.map_or(String::new(), |asset| asset.name.clone()),
         };

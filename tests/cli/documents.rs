@@ -119,6 +119,23 @@ fn the_readmes_suite_and_object_work() {
     assert!(shown.contains(&format!("\n{message}\n")), "{message}");
 }
 
+#[test]
+fn the_policy_and_the_profile_of_the_page_work() {
+    let project = Project::new(&[]);
+    let files: Vec<Fence> =
+        fences("docs/policies.md").into_iter().filter(|fence| fence.file().is_some()).collect();
+    let paths: Vec<&str> = files.iter().filter_map(Fence::file).collect();
+    assert_eq!(paths, ["my_profile.lua", "my_policy.lua"]);
+    files.iter().for_each(|f| project.write(f.file().unwrap_or_default(), f.text.as_bytes()));
+    let said =
+        project.succeeds("suites/object_soft.lua --task 0 --policy my_policy.lua --episodes 1 --out run");
+    assert!(said.err.contains("pick up the"), "it prints the prompt: {}", said.err);
+    assert_eq!(project.json("run/run.json")["policy"], "feeler");
+    let profile =
+        "suites/object_soft.lua --policy ws://127.0.0.1:9 --policy-timeout 0.1 --profile my_profile.lua";
+    assert!(project.softvt(profile).err.contains("no policy server"), "the profile is read");
+}
+
 /// The commands of the README that run a suite or a script that is there.
 #[test]
 fn every_script_that_a_page_names_is_there_and_takes_the_flags_that_it_shows() {

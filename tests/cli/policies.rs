@@ -85,6 +85,9 @@ fn a_number_that_is_none_fails_its_episode_and_no_other() {
         lines[0]
     );
     assert_eq!(lines[1]["outcome"]["kind"], "timeout");
+    assert!(lines[1]["privileged"].is_null(), "it sees observations alone");
+    assert_eq!(project.json("run/summary.json")["privileged"], false);
+    assert!(project.json("run/softvtbench/summary.json")["privileged"].is_null());
 }
 
 #[test]
@@ -213,7 +216,10 @@ fn the_tactile_servo_closes_until_it_feels_the_object_whatever_the_expert_says()
         let said = project.succeeds(&format!("x.lua --policy {policy} --threads 1 --out {policy}"));
         let episode = &project.lines(&format!("{policy}/episodes.jsonl"))[0];
         assert!(episode["gave_up"].is_null(), "{policy} lifts it: {episode}\n{}", said.err);
-        assert_eq!(project.json(&format!("{policy}/run.json"))["privileged"], true);
+        for file in ["run.json", "summary.json", "softvtbench/summary.json"] {
+            assert_eq!(project.json(&format!("{policy}/{file}"))["privileged"], true, "{file}");
+        }
+        assert_eq!(episode["privileged"], true);
         d.push(episode["d_peak"].as_f64().expect("a number"));
     }
     assert!(d[1] < 0.2 * d[0], "told {} %, felt {} %", d[0], d[1]);
