@@ -152,15 +152,18 @@ fn once(runs: &[StoredRun]) -> Result<(), CompareError> {
     Ok(())
 }
 
+/// What a run says of itself.
+type Said = fn(&StoredRun) -> String;
+
 /// Says in what the episodes of two runs differ that have none in common.
 fn nothing(first: &[StoredRun], second: &[StoredRun]) -> CompareError {
-    let of = |runs: &[StoredRun], what: fn(&StoredRun) -> String| {
+    let of = |runs: &[StoredRun], what: Said| {
         let mut values: Vec<String> = runs.iter().map(what).collect();
         values.sort();
         values.dedup();
         values
     };
-    let fields: [(&str, fn(&StoredRun) -> String); 4] = [
+    let fields: [(&str, Said); 4] = [
         ("suite", |run| run.suite().to_owned()),
         ("seed", |run| run.info["seed"].to_string()),
         ("split", |run| run.text("split").to_owned()),
