@@ -1,6 +1,7 @@
 //! The command line: flags, exit codes, progress.
 
 mod args;
+mod attempts;
 mod batch;
 mod check;
 mod compare;
