@@ -5,7 +5,7 @@ use crate::{
         args::{self, Command},
         info::{self, RunInfo},
     },
-    policy::{Action, ActionChunk, Chunked, Observation, Policy, PolicyError},
+    policy::{Action, ActionChunk, Chunked, Observation, Policy, PolicyError, Streams},
     report::run_folder::{EPISODES, RUN},
 };
 

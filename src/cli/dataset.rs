@@ -72,7 +72,13 @@ pub fn stats(path: &Path, out: Option<&Path>, json: bool) -> Result<(), Failure>
 /// There is no such demonstration, or (exit code 1) it comes out different.
 pub fn replay(path: &Path, which: Which) -> Result<(), Failure> {
     finished(path)?;
-    let none = || Failure::input(format!("{} has no such demonstration: {which:?}", path.display()));
+    let count = all(path)?.len();
+    let none = || {
+        let dir = path.display();
+        Failure::input(format!(
+            "{dir} has no such demonstration; it has {count}: name one by TASK/DEMO, or by its number from 0"
+        ))
+    };
     let (file, demo) = match which {
         Which::Line(line) => all(path)?.into_iter().nth(line).ok_or_else(none)?,
         Which::Of(task, demo) if path.is_dir() => {

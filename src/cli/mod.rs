@@ -2,6 +2,7 @@
 
 mod again;
 mod args;
+mod attempts;
 mod batch;
 mod check;
 mod compare;

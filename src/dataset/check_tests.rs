@@ -62,7 +62,7 @@ fn write(demonstration: &Demonstration, name: &str) -> (tempfile::TempDir, PathB
     let mut writer = Writer::create(&path, &json!({ "env_name": "softvt" }), STEPS, 1).unwrap();
     writer.describe(0, &demonstration.record, STEPS).unwrap();
     writer.numbers(0, demonstration).unwrap();
-    writer.close().unwrap();
+    writer.close(Ok(())).unwrap();
     (folder, path)
 }
 

@@ -28,16 +28,17 @@ pub fn assemble(parts: &[PathBuf], into: &Path, environment: &Value) -> Result<(
 }
 
 fn write_all(parts: &[PathBuf], aside: &Path, environment: &Value) -> Result<(), DatasetError> {
-    let sources = parts.iter().map(|path| TaskFile::open(path)).collect::<Result<Vec<_>, _>>()?;
-    let steps = sources.iter().map(|source| source.steps(0)).collect::<Result<Vec<_>, _>>()?;
+    let steps = parts.iter().map(|part| TaskFile::open(part)?.steps(0)).collect::<Result<Vec<_>, _>>()?;
     let mut writer = Writer::create(aside, environment, steps.iter().sum(), parts.len())?;
-    for (demo, (source, steps)) in sources.iter().zip(steps).enumerate() {
+    // One at a time: there may be more of them than files that may be open.
+    let copied = parts.iter().zip(steps).enumerate().try_for_each(|(demo, (part, steps))| {
+        let source = TaskFile::open(part)?;
         writer.describe(demo, &source.record(0)?, steps)?;
         let mut copy = Copy { source: &source.file, from: source.path(), writer: &mut writer };
         let group = copy.open("data/demo_0")?;
-        copy.group(&group, "data/demo_0", &format!("data/demo_{demo}"))?;
-    }
-    writer.close()
+        copy.group(&group, "data/demo_0", &format!("data/demo_{demo}"))
+    });
+    writer.close(copied)
 }
 
 /// Number of HDF5's shuffle filter.

@@ -64,7 +64,12 @@ impl DatasetError {
         move |error| match error {
             Hdf5Error::Io(source) => Self::Io { action: "read or write", path, source },
             Hdf5Error::NotFound(_) => Self::Hdf5 { path, key, what: "it is not there".to_owned() },
-            other => Self::Hdf5 { path, key, what: other.to_string() },
+            // Its layers name themselves before what the system said.
+            other => {
+                let what = other.to_string();
+                let said = what.rsplit_once("I/O error: ").map(|(_, said)| said.to_owned());
+                Self::Hdf5 { path, key, what: said.unwrap_or(what) }
+            }
         }
     }
 

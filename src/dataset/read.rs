@@ -1,6 +1,10 @@
 //! HDF5 files of demonstrations, ours and others of robomimic's layout.
 
-use std::path::{Path, PathBuf};
+use std::{
+    fs::File,
+    io::Read,
+    path::{Path, PathBuf},
+};
 
 use rust_hdf5::{DatatypeMessage, H5Dataset, H5File, H5Group};
 use serde_json::Value;
@@ -43,8 +47,12 @@ impl TaskFile {
     /// It cannot be read, is no HDF5, is cut off, or has no `/data/demo_0`.
     pub fn open(path: &Path) -> Result<Self, DatasetError> {
         // The library names no file.
-        std::fs::metadata(path).map_err(DatasetError::io("read", path))?;
+        let size = std::fs::metadata(path).map_err(DatasetError::io("read", path))?.len();
         let file = H5File::open(path).map_err(|e| DatasetError::hdf5(path, "no HDF5 file, or cut off")(e))?;
+        if let Some(end) = end_of(path).filter(|end| *end > size) {
+            let what = format!("cut off: {size} bytes of {end}");
+            return Err(DatasetError::content(path, "/", what));
+        }
         let data = file.root_group().group("data").map_err(|e| DatasetError::hdf5(path, "/data")(e))?;
         let names = data.group_names().map_err(|e| DatasetError::hdf5(path, "/data")(e))?;
         let mut demos: Vec<usize> =
@@ -247,6 +255,22 @@ impl TaskFile {
         }
         Ok(read)
     }
+}
+
+/// Where a file says that it ends (HDF5 file format, II.A: the superblock), if it begins as such files do.
+fn end_of(path: &Path) -> Option<u64> {
+    let mut head = Vec::new();
+    File::open(path).and_then(|file| file.take(64).read_to_end(&mut head)).ok()?;
+    // Behind signature and versions, sizes and flags come base address, extension or free space, and the end; 8 bytes each.
+    let (width, at) = match head.get(8)? {
+        0 => (13, 40),
+        1 => (13, 44),
+        _ => (9, 28),
+    };
+    if head.get(width) != Some(&8) {
+        return None;
+    }
+    Some(u64::from_le_bytes(head.get(at..at + 8)?.try_into().ok()?))
 }
 
 fn collect(group: &H5Group, above: &str, names: &mut Vec<String>) -> rust_hdf5::Result<()> {

@@ -63,8 +63,19 @@ impl Recorder<'_> {
         demonstration: &mut Demonstration,
         stop: impl Fn() -> bool,
     ) -> Result<(), DatasetError> {
-        let steps = demonstration.steps();
-        let mut writer = Writer::create(aside, self.environment, steps, 1)?;
+        let mut writer = Writer::create(aside, self.environment, demonstration.steps(), 1)?;
+        let written = self.fill(&mut writer, film, demonstration, stop);
+        writer.close(written)
+    }
+
+    fn fill(
+        &self,
+        writer: &mut Writer,
+        film: &mut Film,
+        demonstration: &mut Demonstration,
+        stop: impl Fn() -> bool,
+    ) -> Result<(), DatasetError> {
+        let (steps, path) = (demonstration.steps(), writer.path);
         writer.describe(0, &demonstration.record, steps)?;
         let mut easel = Easel::new(film)?;
         let mut reels: Option<Reels> = None;
@@ -76,17 +87,14 @@ impl Recorder<'_> {
             let Some(scenery) = easel.draw(step)? else { break };
             let reels = match &mut reels {
                 Some(reels) => reels,
-                none => none.insert(Reels::new(&scenery, &mut writer, steps, self.pictures)?),
+                none => none.insert(Reels::new(&scenery, writer, steps, self.pictures)?),
             };
-            reels.push(aside, &scenery, step + 1 == steps)?;
+            reels.push(path, &scenery, step + 1 == steps)?;
             felt.push(scenery.markers);
         }
         demonstration.set_markers(&felt);
         writer.numbers(0, demonstration)?;
-        if let Some(reels) = reels {
-            reels.save(self)?;
-        }
-        writer.close()
+        reels.map_or(Ok(()), |reels| reels.save(self))
     }
 }
 

@@ -158,8 +158,13 @@ impl<'a> Writer<'a> {
         Ok(data)
     }
 
-    /// Ends the file.
-    pub fn close(self) -> Result<(), DatasetError> {
+    /// Ends the file, or gives it up if what was to be `written` into it could not be.
+    pub fn close(self, written: Result<(), DatasetError>) -> Result<(), DatasetError> {
+        if written.is_err() {
+            // What is wrong is known already.
+            let _ = self.file.close_no_sync();
+            return written;
+        }
         let path = self.path;
         self.file.close().map_err(|e| DatasetError::hdf5(path, "/")(e))
     }

@@ -115,5 +115,8 @@ fn a_folder_with_something_else_in_it_is_refused_and_left_alone() {
     assert!(said.contains("it holds another recording (demos: null then, 1 now)"), "{said}");
     project.write("wrong.lua", b"return nil + 1");
     assert!(project.refusal("record wrong.lua --out new").contains("wrong.lua:1"));
+    let stuck = SUITE.replace("arm:wait(1)", "arm:wait(0.1) error 'lost'");
+    project.write("stuck.lua", stuck.as_bytes());
+    assert!(project.refusal("record stuck.lua --out new").contains("lost"));
     assert!(!project.path("new").exists(), "nothing is left of a mistake");
 }
