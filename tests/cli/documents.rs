@@ -146,7 +146,6 @@ fn every_script_that_a_page_names_is_there_and_takes_the_flags_that_it_shows() {
         "docs/assets.md",
         "docs/calibration.md",
         "docs/tactile.md",
-        "docs/policies.md",
         "docs/serve.md",
     ];
     let mut tried = 0;
