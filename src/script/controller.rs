@@ -25,7 +25,7 @@ impl ExpertController {
 
     /// Closes, wherever the expert grasps, until the fingers feel that they hold something, whatever the expert says.
     pub fn servo(expert: Expert) -> Self {
-        Self { expert: expert.as_servo(), binary: false, servo: true, lag: Lag::default() }
+        Self { expert: expert.into_servo(), binary: false, servo: true, lag: Lag::default() }
     }
 }
 

@@ -169,7 +169,7 @@ fn nonsense_ends_the_run_with_the_line_of_act() {
         ("while true do end", "p.lua:2: the script ran for more than 0.3 s".into()),
         (
             "local t = {} for i = 1, 1e9 do t[i] = { i } end",
-            "p.lua:2: the script used more than its 16 MiB".into(),
+            "p.lua: the script used more than its 16 MiB".into(),
         ),
     ] {
         let message = refusal(body);
@@ -334,7 +334,7 @@ fn what_is_wrong_with_a_profile_is_told_with_its_line() {
         ),
         ("\"delta_osc\"", "\"absolute\"", "profile.actions.translation_m: pose = \"absolute\" has no steps"),
         ("open = -1", "open = 1", "profile.actions.gripper.shut: is 1 like open"),
-        ("rotation_rad = 0.5", "rotation_rad = 0/0", "profile.actions.rotation_rad: expected radians"),
+        ("rotation_rad = 0.5", "rotation_rad = 0/0", "profile.actions.rotation_rad: expected a number"),
         (
             "return softvt.profile",
             "return ",
