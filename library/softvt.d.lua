@@ -104,6 +104,20 @@
 ---@field finish? fun(rows: table[], opt: table): softvt.Finish? Sums up all rows.
 ---@field columns? string[] Columns of the table, in order; by default all, sorted.
 
+---A policy, which the file behind --policy returns. Every episode has a machine of its own, in which the file is run anew; math.random is seeded by the episode.
+---@class softvt.Policy
+---@field name string Its name in results, unless --name says otherwise.
+---@field looks? softvt.Looks What it looks at.
+---@field reset? fun(task: softvt.Brief) Called when the episode begins.
+---@field act fun(obs: softvt.Observation): softvt.Action|softvt.Action[] Gives the action of this control step, or a list of them for the next ones.
+---@field replan? integer How many actions of a list are carried out, unless --replan says otherwise; all of them if left out. Expects a whole number in 1..10000.
+
+---What a policy's server gets and what its numbers mean; the file behind --profile returns one.
+---@class softvt.Profile
+---@field name string Its name in results, unless --name says otherwise.
+---@field inputs softvt.Input[] What is sent, in order.
+---@field actions softvt.ActionCode How replies are read.
+
 ---How a scene is laid out. Tasks with the same layout name share their initial states.
 ---@class softvt.Layout
 ---@field name string Name; part of the seed.
@@ -258,6 +272,45 @@
 ---@field fingerprint? string What was calibrated, as simulation:watch tells it; another object of that name is then not taken for it.
 ---@field holds table<string, any>[] Rows closure, trials, held, slip_mm, d_peak_pct of the lower-bound scan.
 ---@field sweep table<string, any>[] Rows closure, gripper_width_mm, d_peak_pct, force_n, min_det_f, node_speed_m_s, both_pads, slip_mm, stable of the compression sweep.
+
+---What a policy looks at; nothing else is computed.
+---@class softvt.Looks
+---@field cameras? string[] Cameras of the scene, by name.
+---@field touch? boolean Whether it feels what the fingers feel. Default false.
+---@field force? boolean Whether it gets the true forces on the gels, which no real sensor gives: results say force_observed. Default false.
+
+---A command for one control step (0.05 s): a pose of the tool centre point in the robot's base frame and a closure. Give axis_angle or rotation.
+---@class softvt.Action
+---@field position number[] Position. Expects a list of 3 numbers (m, base frame).
+---@field axis_angle? number[] Orientation as axis-angle. Expects a list of 3 numbers (rad, base frame).
+---@field rotation? number[] Orientation as quaternion. Expects a list of 4 numbers (w, x, y, z, base frame).
+---@field closure number Gripper, 0 open to 1 shut. Expects a number in 0..1.
+
+---One entry of the observations that a server gets.
+---@class softvt.Input
+---@field keys string[] Keys it is sent under.
+---@field source "camera"|"state"|"prompt"|"tactile_image"|"tactile"|"marker_motion"|"force" What it is: a camera's picture; numbers of the robot; the instruction; the mosaic of 8 tactile pictures of both fingers; the last picture of one finger; the markers' first and last 8 places; the last 8 true forces on the gels.
+---@field camera? string With camera: its name in the scene.
+---@field half_turn? boolean With camera: whether the picture is turned by half a turn.
+---@field parts? ("position"|"axis_angle"|"quaternion_wxyz"|"quaternion_xyzw"|"joints"|"gripper_width"|"finger_position"|"finger_pair"|"closure")[] With state: its parts in order, of 3, 3, 4, 4, 7, 1, 1, 2 and 1 numbers, in m and rad in the base frame.
+---@field layout? "rows"|"columns" With tactile_image: the left finger above (rows, if left out) or at the left.
+---@field finger? "left"|"right" With tactile: which.
+
+---How the numbers of an action are read: three of position, three of orientation (axis-angle), one of the gripper; more are padding.
+---@class softvt.ActionCode
+---@field pose "absolute"|"delta"|"delta_osc" absolute: a pose in the base frame. delta: shares -1 to 1 of a step away from where the tool is. delta_osc: the same, as far as robosuite's controller gets within a control step.
+---@field translation_m? number With delta and delta_osc: the step that 1 means, m. Expects a number in above 0..10.
+---@field rotation_rad? number With delta and delta_osc: the turn that 1 means, rad. Expects a number in above 0..10.
+---@field scale? number[] The first six numbers are multiplied by these first. Expects a list of 6 numbers.
+---@field offset? number[] Then these are added. Expects a list of 6 numbers.
+---@field length? integer How many numbers an action must have, padding included; any from 7 on if left out. Expects a whole number in 7..4096.
+---@field gripper softvt.GripperCode The seventh number.
+
+---The seventh number of an action: one value opens, one shuts, those between in proportion.
+---@class softvt.GripperCode
+---@field open number The value that opens. Expects a number.
+---@field shut number The value that shuts. Expects a number.
+---@field binary? boolean Whether all beyond the middle shuts and all else opens. Default false.
 
 ---A box centred on the origin.
 ---@class softvt.BoxSpec
@@ -693,6 +746,7 @@ function Simulation:tool() end
 ---@field arrows softvt.Image The same with the motion of its markers as arrows, lengthened.
 ---@field initial number[][] Places of the 99 markers without a touch, px, row by row.
 ---@field present number[][] Their places now, px.
+---@field markers softvt.Markers The markers, with what their motion says.
 ---@field force number[] True force on the gel, N, pad frame; a pressing body makes z negative.
 ---@field depth_mm number Greatest depth of the dent, mm.
 local Felt = {}
@@ -707,6 +761,12 @@ local Image = {}
 ---@param region? number[]
 ---@return number[]
 function Image:mean(region) end
+
+---Red, green and blue of a pixel, 0..255; the first is 0, 0.
+---@param x integer
+---@param y integer
+---@return number[]
+function Image:pixel(x, y) end
 
 ---A part as a picture of its own.
 ---@param region number[]
@@ -771,7 +831,7 @@ function Pose:distance(other) end
 local Rng = {}
 
 ---Another stream, from its start.
----@param name "layout"|"arm"|"material"|"light"|"camera"|"sensor"|"expert"|"script"
+---@param name "layout"|"arm"|"material"|"light"|"camera"|"sensor"|"expert"|"script"|"policy"
 ---@return softvt.Rng
 function Rng:stream(name) end
 
@@ -966,7 +1026,7 @@ function Arm:move_by(offset, options) end
 ---@param options? {rate: number?}
 function Arm:close_to(closure, options) end
 
----Closes on an object; a binary gripper, which knows only open and shut, shuts here and not in close_to.
+---Closes on an object; a binary gripper, which knows only open and shut, shuts here and not in close_to, and a tactile servo closes until both fingers feel that they hold something, whatever closure says.
 ---@param closure number
 ---@param options? {rate: number?}
 function Arm:grasp(closure, options) end
@@ -979,6 +1039,10 @@ function Arm:release(options) end
 ---@param options? {rate: number?}
 function Arm:open(options) end
 
+---What the fingers feel now; the first time it waits for a control step. In simulation:drive and under --policy tactile-servo.
+---@return {left: softvt.Touch, right: softvt.Touch}
+function Arm:feel() end
+
 ---Holds still.
 ---@param seconds number
 function Arm:wait(seconds) end
@@ -990,6 +1054,86 @@ function Arm:give_up(reason) end
 ---A list that belongs to an object: scene.base, look.albedo, scene.objects. #, [i], ipairs, pairs, table.unpack and table.concat work on it, and it may be given wherever a list is expected. Numbers that may be written one by one go to the object at once: scene.base[1] = 0.1 is as good as scene.base = { 0.1, 0, 0 }. Any other list refuses to be written.
 ---@class softvt.List
 local List = {}
+
+---Which episode begins: what a policy is told of it.
+---@class softvt.Brief
+---@field suite string Name of the suite.
+---@field task integer Index of the task, from 0.
+---@field prompt string The instruction.
+---@field episode integer Index of the episode, from 0.
+local Brief = {}
+
+---What a policy sees at a control step. Poses are of the tool centre point in the robot's base frame; hidden state has no field here.
+---@class softvt.Observation
+---@field time number Time since the policy took over, s.
+---@field position number[] Tool position, m.
+---@field axis_angle number[] Tool orientation as axis-angle, rad.
+---@field rotation number[] The same as quaternion w, x, y, z with w of 0 or more.
+---@field joints number[] The seven joint angles of the arm, rad.
+---@field width number Measured distance of the gels, 0 to 0.08 m.
+---@field closure number Closure commanded last, 0 open to 1 shut.
+---@field prompt string The instruction.
+---@field touch {left: softvt.Touch, right: softvt.Touch} What the fingers feel; with looks.touch.
+---@field touch_history {left: softvt.Touch, right: softvt.Touch}[] The same of the last 1 to 8 control steps, oldest first; with looks.touch.
+---@field force {left: number[], right: number[]} True forces on the gels, N, pad frame: a pressing body makes z negative; with looks.force.
+local Observation = {}
+
+---What a camera of looks.cameras sees, 224 × 224 unless the scene says otherwise.
+---@param name string
+---@return softvt.Image
+function Observation:camera(name) end
+
+---A finger's tactile sensor at one control step; docs/tactile.md draws its frames.
+---@class softvt.Touch
+---@field picture softvt.Image The colour picture, 320 × 240.
+---@field change softvt.Image How far each channel of each pixel is from the untouched gel's picture.
+---@field markers softvt.Markers The 11 × 9 markers.
+local Touch = {}
+
+---The 99 markers of a finger, row by row, in px of its picture: x to the right (to the hand), y down. 1 px is 0.063 mm.
+---@class softvt.Markers
+---@field initial number[][] Their places without a touch.
+---@field present number[][] Their places now.
+---@field motion number[][] How far each has moved.
+local Markers = {}
+
+---Mean motion along x and y: the gel is dragged along its surface.
+---@return number[]
+function Markers:mean() end
+
+---The longest motion.
+---@return number
+function Markers:largest() end
+
+---How hard the gel is pressed: root mean square of the motion that is neither mean nor twist. It grows with the normal force, about 0.3 px a newton on round dough and rigid things and less on what is flat and soft.
+---@return number
+function Markers:press() end
+
+---How hard something is on its way out of the grasp: mean motion to the fingertip or across, 0 if it is pushed in.
+---@return number
+function Markers:drag() end
+
+---Trace of the motion's gradient: positive where a dent pushes the markers outwards.
+---@return number
+function Markers:divergence() end
+
+---Turn of the markers, rad: positive is clockwise in the picture.
+---@return number
+function Markers:twist() end
+
+---Pure shear of the markers: stretch along x against y, and along the diagonal x = y.
+---@return number[]
+function Markers:shear() end
+
+---Contact mask: which markers moved by more than px.
+---@param px number
+---@return boolean[]
+function Markers:moved(px) end
+
+---Share of the markers that moved by more than px; all of the picture is 20.3 × 15.2 mm.
+---@param px number
+---@return number
+function Markers:area(px) end
 
 ---The softvt library.
 softvt = {}
@@ -1072,6 +1216,16 @@ function softvt.conditions(spec) end
 ---@param spec softvt.Experiment
 ---@return softvt.Experiment
 function softvt.experiment(spec) end
+
+---A policy, which the file behind --policy returns. Every episode has a machine of its own, in which the file is run anew; math.random is seeded by the episode.
+---@param spec softvt.Policy
+---@return softvt.Policy
+function softvt.policy(spec) end
+
+---What a policy's server gets and what its numbers mean; the file behind --profile returns one.
+---@param spec softvt.Profile
+---@return softvt.Profile
+function softvt.profile(spec) end
 
 ---A layout by name and function, or by a table of name and build.
 ---@param name string|softvt.Layout

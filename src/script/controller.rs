@@ -26,7 +26,7 @@ impl ExpertController {
 
     /// Closes, wherever the expert grasps, until the fingers feel that they hold something, whatever the expert says.
     pub fn servo(expert: Expert) -> Self {
-        Self { expert: expert.as_servo(), binary: false, servo: true, gripping: false, lag: Lag::default() }
+        Self { expert: expert.into_servo(), binary: false, servo: true, gripping: false, lag: Lag::default() }
     }
 
     /// Whether the gripper is meant to hold something, as last commanded.

