@@ -205,7 +205,7 @@ fn runner() -> clap::Command {
         .subcommand(
             clap::Command::new("list")
                 .about("Lists suites, tasks, assets or policies")
-                .arg(Arg::new("what").required(true).value_parser(["suites", "tasks", "assets", "policies"]))
+                .arg(Arg::new("what").required(true).value_parser(["suites", "tasks", "assets", "policies", "profiles"]))
                 .arg(json.clone()),
         )
         .subcommand(

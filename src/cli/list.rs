@@ -7,13 +7,14 @@ use serde_json::{Value, json};
 use super::{Failure, print, who::POLICIES};
 use crate::{benchmark::Plan, policy::profile::PROFILES, script};
 
-/// Lists suites, tasks, assets or policies.
+/// Lists suites, tasks, assets, policies or profiles.
 ///
 /// # Errors
 /// A suite in the working folder cannot be loaded.
 pub fn run(what: &str, as_json: bool) -> Result<(), Failure> {
     let rows = match what {
-        "policies" => policies(),
+        "policies" => named(&POLICIES, "scripts/policies"),
+        "profiles" => named(&PROFILES, "scripts/profiles"),
         "assets" => {
             scripts("assets").iter().map(|path| json!({ "name": stem(path), "file": path })).collect()
         }
@@ -31,22 +32,11 @@ pub fn run(what: &str, as_json: bool) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Policies and profiles: those with a name, and those in Lua, which are named by their files.
-fn policies() -> Vec<Value> {
-    let named = |kind: &str, list: &[(&str, &str)]| -> Vec<Value> {
-        list.iter().map(|(name, about)| json!({ "kind": kind, "name": name, "about": about })).collect()
-    };
-    let files = |kind: &str, tree: &str| -> Vec<Value> {
-        let files = scripts(tree).into_iter();
-        files.map(|path| json!({ "kind": kind, "about": first_comment(&path), "name": path })).collect()
-    };
-    [
-        named("policy", &POLICIES),
-        files("policy", "scripts/policies"),
-        named("profile", &PROFILES),
-        files("profile", "scripts/profiles"),
-    ]
-    .concat()
+/// What is known by a name, and what is in Lua, which is named by its file.
+fn named(list: &[(&str, &str)], tree: &str) -> Vec<Value> {
+    let own = list.iter().map(|(name, about)| json!({ "name": name, "about": about }));
+    let files = scripts(tree).into_iter();
+    own.chain(files.map(|path| json!({ "name": path, "about": first_comment(&path) }))).collect()
 }
 
 /// The first sentence of a Lua file, if it begins with one.

@@ -223,7 +223,8 @@ const LEAST_SIZE: f64 = 1e-3;
 
 fn check_scale(object: &Object, cache: &RestCache) -> Result<(), BuildError> {
     let longest = cache.bounds(&object.asset.shape).size().max();
-    if longest >= LEAST_SIZE {
+    // What is empty is told as such, when it is meshed.
+    if longest >= LEAST_SIZE || longest == 0.0 {
         return Ok(());
     }
     let what = format!(

@@ -9,10 +9,13 @@ fn project(conditions: &str, object_type: &str) -> Project {
     let small = Small { expert: "arm:close_to(1, { rate = 2 })", ..Small::default() };
     let shifts = "local shifts = require \"shifts\"\n";
     let declared = "shifts = shifts.soft, episodes = 2,";
-    let text = small
+    let mut text = small
         .text()
         .replacen("episodes = 1,", declared, 1)
         .replace("\"deformable\"", &format!("\"{object_type}\""));
+    if object_type == "rigid" {
+        text = text.replace("softvt.soft { youngs_pa = 2e4, poisson = 0.3,", "softvt.rigid {");
+    }
     let plan = format!(
         "return softvt.conditions {{ name = \"trial\", suites = {{ require \"suites.one\" }}, conditions = {{\n{conditions}\n}} }}\n"
     );

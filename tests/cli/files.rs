@@ -25,12 +25,19 @@ fn what_there_is_is_listed_as_text_and_as_json_in_any_folder() {
     assert_eq!(of_suite.len(), 10);
     assert!(of_suite[1]["prompt"].as_str().is_some_and(|p| p.starts_with("pick up the left white spiral")));
     assert!(json("assets").iter().filter(|a| a["name"] == "plate" || a["name"] == "sesame_bun").count() == 2);
-    let policies: Vec<Value> = json("policies").iter().map(|p| p["name"].clone()).collect();
-    assert_eq!(policies, ["expert", "expert-binary", "noop", "random"]);
-    for what in ["suites", "tasks", "assets", "policies"] {
+    let names = |what: &str| json(what).iter().map(|row| row["name"].clone()).collect::<Vec<_>>();
+    assert_eq!(names("policies")[..5], ["expert", "expert-binary", "tactile-servo", "noop", "random"]);
+    assert!(names("policies").contains(&"scripts/policies/hold.lua".into()));
+    assert_eq!(names("profiles")[..4], ["vision", "visuo_tactile", "softvtbench", "libero"]);
+    assert!(names("profiles").contains(&"scripts/profiles/libero.lua".into()));
+    for what in ["suites", "tasks", "assets", "policies", "profiles"] {
         assert_eq!(project.succeeds(&format!("list {what}")).out.lines().count(), json(what).len());
     }
-    assert!(project.refusal("list robots").contains("[possible values: suites, tasks, assets, policies]"));
+    assert!(
+        project
+            .refusal("list robots")
+            .contains("[possible values: suites, tasks, assets, policies, profiles]")
+    );
 }
 
 #[test]
