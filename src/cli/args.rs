@@ -74,7 +74,7 @@ pub enum Command {
     /// Draw one episode.
     View(View),
     /// Serve episodes to clients.
-    Serve(Serve),
+    Serve(Box<Serve>),
     /// Record demonstrations.
     Record(Record),
     /// Say what is wrong with a data set.
@@ -255,7 +255,9 @@ pub fn parse(words: &[String]) -> Result<Command, Failure> {
             Ok(Command::Report { runs, out: PathBuf::from(text(m, "out")) })
         }
         Some(("check", m)) => driven(common(m, &options).map_err(named)?, m).map(Command::Check),
-        Some(("serve", m)) => serve(common(m, &options).map_err(named)?, m).map(Command::Serve),
+        Some(("serve", m)) => {
+            serve(common(m, &options).map_err(named)?, m).map(|serve| Command::Serve(Box::new(serve)))
+        }
         Some(("doctor", _)) => Ok(Command::Doctor),
         Some(("record", m)) => {
             let record = record(m, &options).map_err(named)?;
