@@ -77,6 +77,7 @@ impl<'a> Batch<'a> {
             script::check_shift(&suite.shifts, name, *value).map_err(|e| wrong("--shift", e.to_string()))?;
         }
         let replayed = recorded(run, suite, &jobs)?;
+        let force_observed = replayed.as_ref().is_some_and(|replayed| replayed.force_observed);
         let drivers = Drivers::new(&run.policy, &suite.name, run.twin)?;
         let mut sources = loaded.bundle.hashes();
         sources.extend(run.policy.sources());
@@ -96,7 +97,7 @@ impl<'a> Batch<'a> {
             looks: Looks::default(),
             out,
             films: run.video.is_some(),
-            force_observed: false,
+            force_observed,
             split: Split::Validation,
             drive: Box::new(move |opened, brief| drivers.drive(opened, brief)),
         })
@@ -119,6 +120,11 @@ impl<'a> Batch<'a> {
 
     pub(super) fn brief(&self, task: &Task, episode: u32) -> TaskBrief {
         TaskBrief { suite: self.name.clone(), task: task.id, prompt: task.prompt.clone(), episode }
+    }
+
+    /// Whether whoever drives sees the true state, or saw it when the actions were recorded.
+    pub fn is_privileged(&self) -> bool {
+        self.run.policy.is_privileged() || self.replayed.as_ref().is_some_and(|replayed| replayed.privileged)
     }
 
     /// Which episode of a task it is.
@@ -366,7 +372,7 @@ impl<'a> Batch<'a> {
         };
         let scenes = (&opened.nominal, opened.scene.clone());
         let mut spec = EpisodeSpec::new(&which, task, scenes, &self.settings);
-        spec.identity.privileged = self.run.policy.is_privileged();
+        spec.identity.privileged = self.is_privileged();
         Ok((EpisodeSpec { limit, trace: self.run.trace, ..spec }, opened))
     }
 

@@ -31,9 +31,12 @@ pub fn check(path: &Path, replays: usize) -> Result<(), Failure> {
     let findings = if path.is_dir() { check::folder(path) } else { check::file(path) };
     let findings = findings.map_err(Failure::input)?;
     if !findings.wrong.is_empty() {
-        let count = findings.wrong.len();
+        let count = match findings.wrong.len() {
+            1 => "one thing is".to_owned(),
+            more => format!("{more} things are"),
+        };
         let told = findings.wrong.join("\n");
-        return Err(Failure::input(format!("{told}\n{}: {count} things are wrong", path.display())));
+        return Err(Failure::input(format!("{told}\n{}: {count} wrong", path.display())));
     }
     print(&format!(
         "{} demonstrations, {} steps, {} videos: nothing is wrong\n",

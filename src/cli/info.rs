@@ -76,7 +76,7 @@ impl<'a> RunInfo<'a> {
             policy_file: run.policy.file(),
             replayed: batch.replayed.as_ref(),
             replan: run.policy.replan(),
-            privileged: run.policy.is_privileged(),
+            privileged: batch.is_privileged(),
             seed: run.seed,
             split: batch.split.name(),
             tasks: tasks.iter().map(|t| t.id).collect(),

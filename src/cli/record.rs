@@ -34,7 +34,10 @@ use crate::{
         recorder::{Recorder, rate},
     },
     evaluation::record::EpisodeRecord,
-    report::{actions, run_folder::RunFolder},
+    report::{
+        actions,
+        run_folder::{RunFolder, SUMMARY, write_json},
+    },
     rollout::{Finished, batch, stop},
     script::{self, Loaded},
 };
@@ -201,7 +204,11 @@ impl<'a> Session<'a> {
             }
             Err(failure) => Err(Failure { message: format!("{}\n{go_on}", failure.message), ..failure }),
             Ok(()) if stop::requested() => Err(Failure::interrupted(format!("interrupted; {go_on}"))),
-            Ok(()) => self.enough(),
+            Ok(()) => {
+                self.enough()?;
+                let done = self.batch.summed_up(self.records.clone());
+                write_json(&self.batch.out.join(SUMMARY), &done.summary).map_err(folder_failure)
+            }
         }
     }
 

@@ -42,6 +42,12 @@ pub struct Wanted<'a> {
 pub struct Replayed {
     /// The folder, as it was typed.
     pub run: String,
+    /// Who drove it.
+    pub policy: String,
+    /// Whether whoever drove it saw the true state.
+    pub privileged: bool,
+    /// Whether whoever drove it saw the true forces at the pads.
+    pub force_observed: bool,
     /// SHA-256 of its episodes and actions.
     pub sha256: String,
 }
@@ -104,7 +110,13 @@ impl RecordedRuns {
                 missing.len()
             )));
         }
-        Ok(Replayed { run: run.dir.display().to_string(), sha256: digest(run).map_err(Failure::input)? })
+        Ok(Replayed {
+            run: run.dir.display().to_string(),
+            policy: run.text("policy").to_owned(),
+            privileged: run.is_privileged(),
+            force_observed: run.sees_forces(),
+            sha256: digest(run).map_err(Failure::input)?,
+        })
     }
 
     fn of(&self, suite: &str, twin: bool) -> Option<&StoredRun> {

@@ -154,6 +154,10 @@ impl Whole<'_> {
         };
         let (scale, offset): (Option<[f64; 6]>, Option<[f64; 6]>) =
             (table.get("scale")?, table.get("offset")?);
+        if let Some(at) = scale.and_then(|scale| scale.iter().position(|factor| *factor == 0.0)) {
+            let message = format!("actions.scale[{}]: expected a number other than 0, got 0", at + 1);
+            return Err(self.wrong("scale", message));
+        }
         let units = (scale.is_some() || offset.is_some()).then(|| Units {
             scale: scale.unwrap_or(Units::SAME.scale),
             offset: offset.unwrap_or(Units::SAME.offset),

@@ -110,6 +110,18 @@ fn recorded_actions_must_be_those_of_this_very_suite_and_all_there() {
     let info = project.json("again/run.json");
     assert_eq!((info["policy"].as_str(), info["replayed"]["run"].as_str()), (Some("replay"), Some("run")));
     assert!(info["replayed"]["sha256"].as_str().is_some_and(|hash| hash.len() == 64));
+    // Whoever repeats what was done with the true state in sight has had it in sight.
+    project.succeeds("x.lua --out seen");
+    project.succeeds("x.lua --policy seen --out echo");
+    assert_eq!(project.json("echo/run.json")["replayed"]["policy"], "expert");
+    for of in [
+        &project.json("echo/run.json"),
+        &project.json("echo/summary.json"),
+        &project.lines("echo/episodes.jsonl")[0],
+    ] {
+        assert_eq!(of["privileged"], true);
+    }
+    assert_eq!(info["privileged"], false);
     let refused = |words: &str, said: &str| {
         let message = project.refusal(&format!("x.lua --policy run {words} --out no"));
         assert!(message.contains(said), "{words}: {message}");
