@@ -92,12 +92,17 @@ pub fn policy_word(word: &str) -> Result<Word, String> {
 
 fn no_policy(word: &str) -> String {
     let known = POLICIES.map(|(name, _)| name).join(", ");
-    let near = POLICIES.iter().map(|(name, _)| (strsim::jaro_winkler(name, word), *name));
-    let meant = near.filter(|(alike, _)| *alike > 0.8).max_by(|a, b| a.0.total_cmp(&b.0));
-    let hint = meant.map_or(String::new(), |(_, name)| format!("; did you mean {name}?"));
+    let hint = meant(word, &POLICIES);
     format!(
         "expected {known}, a Lua file such as my_policy.lua, a server such as ws://host:8000, or the folder of a run{hint}"
     )
+}
+
+/// Which of the names that are known was meant, as the end of a message; empty if none is near.
+fn meant(word: &str, known: &[(&str, &str)]) -> String {
+    let near = known.iter().map(|(name, _)| (strsim::jaro_winkler(name, word), name));
+    let meant = near.filter(|(alike, _)| *alike > 0.8).max_by(|a, b| a.0.total_cmp(&b.0));
+    meant.map_or(String::new(), |(_, name)| format!("; did you mean {name}?"))
 }
 
 /// What stands behind `--profile`: a name that is known, or a Lua file.
@@ -109,9 +114,7 @@ pub fn profile_word(word: &str) -> Result<String, String> {
         return Ok(word.to_owned());
     }
     let known = PROFILES.map(|(name, _)| name);
-    let near = known.iter().map(|name| (strsim::jaro_winkler(name, word), name));
-    let meant = near.filter(|(alike, _)| *alike > 0.8).max_by(|a, b| a.0.total_cmp(&b.0));
-    let hint = meant.map_or(String::new(), |(_, name)| format!("; did you mean {name}?"));
+    let hint = meant(word, &PROFILES);
     Err(format!("[possible values: {}, or a Lua file such as my_profile.lua]{hint}", known.join(", ")))
 }
 
