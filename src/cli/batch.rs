@@ -57,6 +57,7 @@ pub(super) struct Batch<'a> {
     pub force_observed: bool,
     /// Which list its episodes are of.
     pub split: Split,
+    pub(super) drivers: Arc<Drivers>,
     pub drive: Drive,
 }
 
@@ -78,7 +79,8 @@ impl<'a> Batch<'a> {
         }
         let replayed = recorded(run, suite, &jobs)?;
         let force_observed = replayed.as_ref().is_some_and(|replayed| replayed.force_observed);
-        let drivers = Drivers::new(&run.policy, &suite.name, run.twin)?;
+        let drivers = Arc::new(Drivers::new(&run.policy, &suite.name, run.twin));
+        let driving = drivers.clone();
         let mut sources = loaded.bundle.hashes();
         sources.extend(run.policy.sources());
         let made_by = format!("softvt {}", env!("CARGO_PKG_VERSION"));
@@ -99,7 +101,8 @@ impl<'a> Batch<'a> {
             films: run.video.is_some(),
             force_observed,
             split: Split::Validation,
-            drive: Box::new(move |opened, brief| drivers.drive(opened, brief)),
+            drivers,
+            drive: Box::new(move |opened, brief| driving.drive(opened, brief)),
         })
     }
 

@@ -139,7 +139,7 @@ fn repeat(path: &Path, demo: usize) -> Result<String, Failure> {
     let record = file.record(demo).map_err(Failure::input)?;
     let info = file.environment().map_err(Failure::input)?["env_kwargs"].clone();
     let actions = file.actions(demo).map_err(Failure::input)?;
-    let stored = StoredRun { dir: path.to_owned(), info, records: Vec::new(), finished: true };
+    let stored = StoredRun { dir: path.to_owned(), info, records: Vec::new(), finished: true, torn: false };
     replay::again(&stored, &record, actions)
 }
 

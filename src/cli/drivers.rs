@@ -6,7 +6,7 @@ use super::{Failure, code, recorded::RecordedRuns};
 use crate::{
     benchmark::seed::Stream,
     policy::{
-        Chunked, Policy, PolicyError, TaskBrief, builtin,
+        Chunked, Policy, PolicyError, Streams, TaskBrief, builtin,
         profile::Profile,
         recorded::Recorded,
         remote::{Connections, Protocol, Remote, Server},
@@ -46,6 +46,8 @@ pub struct Answering {
     pub protocol: Protocol,
     /// What it gets and what its numbers mean.
     pub profile: Profile,
+    /// What `--profile` said, or would have had to say.
+    pub profile_word: String,
     /// SHA-256 of the files that the profile is made of.
     pub sources: BTreeMap<String, String>,
     /// Actions of each answer that are carried out.
@@ -132,6 +134,17 @@ impl Choice {
         }
     }
 
+    /// What it looks at and where that is said, if it is known before it drives.
+    pub fn looks(&self) -> Option<(String, Streams)> {
+        match &self.driver {
+            Driver::Server(server) => {
+                Some((format!("--profile {}: inputs", server.profile_word), server.profile.streams()))
+            }
+            Driver::Lua(file, _) => Some((format!("{}: policy.looks", file.looks_at), file.streams.clone())),
+            _ => None,
+        }
+    }
+
     /// Actions of each answer that are carried out, if anybody has a say in that.
     pub fn replan(&self) -> Option<usize> {
         match &self.driver {
@@ -176,27 +189,28 @@ pub struct Drivers {
 }
 
 impl Drivers {
-    /// Connects, if there is anyone to connect to. `suite` is the script's name of it, `twin` whether soft objects are rigid.
+    /// `suite` is the script's name of it, `twin` whether soft objects are rigid.
+    pub fn new(choice: &Choice, suite: &str, twin: bool) -> Self {
+        let connections = match &choice.driver {
+            Driver::Server(server) => Some(Arc::new(Connections::new(Server {
+                url: server.url.clone(),
+                protocol: server.protocol,
+                profile: server.profile.clone(),
+                patience: server.patience,
+                api_key: std::env::var(API_KEY).ok(),
+                stop: &stop::FLAG,
+            }))),
+            _ => None,
+        };
+        Self { choice: choice.clone(), connections, of: (suite.to_owned(), twin) }
+    }
+
+    /// Connects, if there is anyone to connect to.
     ///
     /// # Errors
     /// The server cannot be reached.
-    pub fn new(choice: &Choice, suite: &str, twin: bool) -> Result<Self, Failure> {
-        let connections = match &choice.driver {
-            Driver::Server(server) => {
-                let connections = Connections::new(Server {
-                    url: server.url.clone(),
-                    protocol: server.protocol,
-                    profile: server.profile.clone(),
-                    patience: server.patience,
-                    api_key: std::env::var(API_KEY).ok(),
-                    stop: &stop::FLAG,
-                });
-                connections.try_out().map_err(policy_failure)?;
-                Some(Arc::new(connections))
-            }
-            _ => None,
-        };
-        Ok(Self { choice: choice.clone(), connections, of: (suite.to_owned(), twin) })
+    pub fn connect(&self) -> Result<(), Failure> {
+        self.connections.as_ref().map_or(Ok(()), |connections| connections.try_out().map_err(policy_failure))
     }
 
     /// Whoever drives the episode `brief`.

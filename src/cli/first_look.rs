@@ -10,6 +10,7 @@ use crate::{
         BuildError, EpisodeError, SenseError, Senses, Simulation, check_senses, check_support, target_asset,
     },
     scene::{Body, Scene},
+    script::schema,
 };
 
 /// Why a first look at a scene fails.
@@ -26,7 +27,7 @@ impl Batch<'_> {
     /// each: what is wrong with a scene's senses is told before anything runs.
     ///
     /// # Errors
-    /// A layout, a threshold file, a camera, the light or a tactile sensor that is wrong.
+    /// A layout, a threshold file, a camera, the light or a tactile sensor that is wrong; a server that is not there.
     pub fn prepare(&mut self, tasks: &[&Task]) -> Result<(), Failure> {
         for task in tasks {
             let first = self.jobs.iter().find(|(of, _)| of.id == task.id).map_or(0, |(_, episode)| *episode);
@@ -34,11 +35,24 @@ impl Batch<'_> {
             self.right_kind(task, &opened.nominal)?;
             self.learn_limit(target_asset(&opened.nominal, task).cloned())?;
             let scene = Arc::new(opened.scene.clone());
+            self.has_cameras(&scene, task)?;
+            self.drivers.connect()?;
             let streams = (self.drive)(opened, self.brief(task, first))?.streams();
             self.force_observed |= streams.force;
             self.try_out(scene, streams).map_err(|error| self.trial_failure(error, task, first))?;
         }
         Ok(())
+    }
+
+    /// What the policy's own file says that it looks at is there.
+    fn has_cameras(&self, scene: &Scene, task: &Task) -> Result<(), Failure> {
+        let Some((place, streams)) = self.run.policy.looks() else { return Ok(()) };
+        let missing = streams.cameras.iter().find(|name| scene.camera(name).is_none());
+        missing.map_or(Ok(()), |name| {
+            let known = scene.cameras.iter().map(|camera| camera.name.as_str());
+            let unknown = schema::unknown("camera", name, known);
+            Err(Failure::input(format!("{place}: {unknown} (scene of task {})", task.id)))
+        })
     }
 
     /// Builds the first scene of a task, and looks for all that can be wrong with it before anything moves.

@@ -150,7 +150,7 @@ fn watch_interrupts() {
         if stop::request() {
             end();
         }
-        message::tell("softvt: stopping; finished episodes stay (press again to stop at once)");
+        message::tell("softvt: stopping; press again to stop at once");
         thread::spawn(move || {
             thread::sleep(PATIENCE);
             message::tell(&format!(

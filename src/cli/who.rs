@@ -187,6 +187,7 @@ impl Typed {
             url: url.to_owned(),
             protocol: self.protocol.unwrap_or_default(),
             profile,
+            profile_word: self.profile.clone().unwrap_or_else(|| PROFILE.to_owned()),
             sources,
             replan: self.replan.unwrap_or(REPLAN),
             patience: self.patience.unwrap_or(PATIENCE),

@@ -75,6 +75,25 @@ pub fn kind(value: &Value) -> &'static str {
     }
 }
 
+/// Values inside of values that are read.
+const NESTED: usize = 64;
+
+/// The one msgpack value that a message is.
+///
+/// # Errors
+/// A fragment for people: what the bytes are instead.
+pub fn unpack(mut bytes: &[u8]) -> Result<Value, String> {
+    use rmpv::decode::{Error, read_value_with_max_depth};
+    match read_value_with_max_depth(&mut bytes, NESTED) {
+        Ok(value) if bytes.is_empty() => Ok(value),
+        Ok(_) => Err(format!("more than one msgpack value: {} bytes stand behind it", bytes.len())),
+        Err(Error::DepthLimitExceeded) => Err(format!("no msgpack: nested more than {NESTED} times")),
+        Err(Error::InvalidMarkerRead(_) | Error::InvalidDataRead(_)) => {
+            Err("no msgpack: the end is missing".to_owned())
+        }
+    }
+}
+
 /// Numbers and the lengths of their axes.
 ///
 /// # Errors

@@ -137,7 +137,7 @@ pub(super) mod tests {
             "privileged": policy == "expert", "seed": 11, "split": "eval", "tasks": [0], "force_observed": false,
             "episodes": records.len(), "shifts": [], "set": [], "arguments": [],
         });
-        StoredRun { dir: Path::new(dir).into(), info, records, finished: true }
+        StoredRun { dir: Path::new(dir).into(), info, records, finished: true, torn: false }
     }
 
     #[test]

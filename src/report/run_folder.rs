@@ -256,6 +256,11 @@ pub fn read_episodes(dir: &Path) -> Result<Vec<EpisodeRecord>, RunFolderError> {
     parse(&fs::read(&path).map_err(io_error("read", &path))?, &path)
 }
 
+/// Whether the last line of its episodes was broken off while it was written.
+pub(super) fn is_torn(dir: &Path) -> bool {
+    fs::read(dir.join(EPISODES)).is_ok_and(|bytes| bytes.last().is_some_and(|byte| *byte != b'\n'))
+}
+
 fn parse(bytes: &[u8], path: &Path) -> Result<Vec<EpisodeRecord>, RunFolderError> {
     // What follows the last line break was torn.
     let lines: Vec<&[u8]> = bytes.split(|byte| *byte == b'\n').collect();

@@ -7,7 +7,7 @@ use std::{
 
 use serde_json::Value;
 
-use super::run_folder::{EPISODES, RUN, RunFolderError, SUMMARY, io_error, read_episodes};
+use super::run_folder::{EPISODES, RUN, RunFolderError, SUMMARY, io_error, is_torn, read_episodes};
 use crate::evaluation::record::EpisodeRecord;
 
 /// The version that made what this binary makes.
@@ -24,6 +24,8 @@ pub struct StoredRun {
     pub records: Vec<EpisodeRecord>,
     /// Whether it came to its end.
     pub finished: bool,
+    /// Whether its last episode was broken off while it was written.
+    pub torn: bool,
 }
 
 /// Why runs cannot be read.
@@ -116,6 +118,12 @@ impl StoredRun {
                 self.wanted()
             ));
         }
+        if self.torn {
+            found.push(format!(
+                "the last line of {dir}/{EPISODES} was broken off while it was written and counts for nothing; \
+                 --resume runs that episode again"
+            ));
+        }
         if self.text("softvt") != VERSION {
             found.push(format!(
                 "softvt {} made {dir}, and this is softvt {VERSION}: numbers of two versions may differ",
@@ -173,7 +181,7 @@ fn one(dir: &Path) -> Result<StoredRun, RunsError> {
         let mut records = read_episodes(dir)?;
         records.sort_by_key(|r| (r.identity.task, r.identity.episode));
         let finished = dir.join(SUMMARY).is_file();
-        Ok(StoredRun { dir: dir.to_owned(), info: info.clone(), records, finished })
+        Ok(StoredRun { dir: dir.to_owned(), info: info.clone(), records, finished, torn: is_torn(dir) })
     };
     read().map_err(|error| match version == VERSION || version.is_empty() {
         true => error,

@@ -226,7 +226,7 @@ impl Clock {
         state.file = file.into();
         let message = format!(
             "{file}: the script called a library function that did not return within {}; \
-             look for a hostile string pattern or a huge repeat count",
+             look for a string pattern that never comes to an end, or a huge repeat count",
             seconds(limit)
         );
         let clock = Arc::downgrade(&self.state);

@@ -5,10 +5,7 @@ use std::{
     sync::{Arc, Mutex},
 };
 
-use image::{
-    ImageFormat, Rgb, RgbImage,
-    imageops::{self, FilterType},
-};
+use image::{ImageFormat, Rgb, RgbImage, imageops};
 use mlua::{Lua, Table, UserDataMethods, Value};
 
 use super::{
@@ -20,7 +17,7 @@ use super::{
     sandbox::{fail, locked},
     schema,
 };
-use crate::report::film::Canvas;
+use crate::{report::film::Canvas, sensing::scaling::scaled};
 
 /// Longest text that is written on a picture, bytes.
 const MOST_TEXT: usize = 1000;
@@ -129,11 +126,9 @@ impl LuaImage {
 
     fn resized(&self, lua: &Lua, width: u32, height: u32) -> mlua::Result<Self> {
         let picture = &locked(&self.0).picture;
-        // The picture on the way, as tall as the new one and as wide as the old one, has four floats a pixel.
-        let between = 16 * picture.width() as usize * height as usize;
-        Self::made(lua, (width, height), between, || {
-            imageops::resize(picture, width, height, FilterType::Triangle)
-        })
+        // The picture on the way is as wide as the new one and as tall as the old one.
+        let between = 3 * width as usize * picture.height() as usize;
+        Self::made(lua, (width, height), between, || scaled(picture, width, height))
     }
 
     fn paste(&self, other: &Self, x: f64, y: f64) {

@@ -22,13 +22,23 @@ pub(super) fn check(
     let values = (1..=count).map(|place| list.raw_get::<Value>(place));
     let values: Vec<Value> = values.collect::<mlua::Result<_>>().map_err(|e| Fault::new(e.to_string()))?;
     if entries.len() != count || values.iter().any(Value::is_nil) {
-        return Err(wrong());
+        return Err(counted(list, wrong()));
     }
     let checked = values.iter().enumerate().map(|(index, value)| {
         entry(value, range).map_err(|message| Fault::new(message).inside(format!("[{}]", index + 1)))
     });
     let numbers: Vec<f64> = checked.collect::<Result<_, _>>()?;
     lua.create_sequence_from(numbers).map(Value::Table).map_err(|e| Fault::new(e.to_string()))
+}
+
+/// `a list of 2` for `a table`, where it is one.
+fn counted(list: &Table, fault: Fault) -> Fault {
+    let length = list.raw_len();
+    let plain = length > 0 && list.pairs::<Value, Value>().count() == length;
+    match fault.message.strip_suffix(&got(&Value::Table(list.clone()))).filter(|_| plain) {
+        Some(before) => Fault { message: format!("{before}a list of {length}"), ..fault },
+        None => fault,
+    }
 }
 
 /// One entry; the message is a fragment.

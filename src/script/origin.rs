@@ -35,6 +35,14 @@ fn made_at(lua: &Lua, table: &Table) -> Option<(String, usize)> {
     Some((file.to_owned(), line.parse().ok()?))
 }
 
+/// File and line of the key that `path` leads to in the call that made `table`, as messages name them.
+pub(super) fn place(lua: &Lua, table: &Table, path: &[&str]) -> Option<String> {
+    let (file, line) = made_at(lua, table)?;
+    let path: Vec<String> = path.iter().map(|&key| key.to_owned()).collect();
+    let line = line_of(lua, &file, line, &path);
+    Some(format!("{file}:{line}"))
+}
+
 /// An error at the line of `key` in the call that made `table`, as far as the text shows it.
 pub(super) fn fail_at(lua: &Lua, table: &Table, key: &str, message: impl Into<String>) -> mlua::Error {
     let Some((file, line)) = made_at(lua, table) else { return fail(lua, message) };

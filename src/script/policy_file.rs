@@ -9,6 +9,7 @@ use super::{
     catalogue_policy::{ACTION, POLICY},
     lists,
     observation_api::{LuaObservation, brief},
+    origin,
     plan::{Machine, open},
     sandbox::{Limits, describe, fail, locked},
     schema::{self, Fault},
@@ -33,6 +34,8 @@ pub struct PolicyFile {
     pub replan: Option<usize>,
     /// What it looks at.
     pub streams: Streams,
+    /// File and line that say which cameras it looks at.
+    pub looks_at: String,
     /// The file, as messages name it.
     pub main: String,
     bundle: Arc<Bundle>,
@@ -64,7 +67,7 @@ impl PolicyFile {
     pub fn load_with(path: &Path, limits: &Limits) -> Result<Self, ScriptError> {
         let (library, main) = Library::open(path)?;
         let (machine, values) = open(&main, library, &[], limits)?;
-        let read = || -> mlua::Result<(String, Option<usize>, Streams)> {
+        let read = || -> mlua::Result<Self> {
             let table = made(&machine.vm.lua, &values)?;
             let looks: Table = table.get("looks")?;
             let streams = Streams {
@@ -72,11 +75,18 @@ impl PolicyFile {
                 touch: looks.get("touch")?,
                 force: looks.get("force")?,
             };
-            Ok((table.get("name")?, table.get("replan")?, streams))
+            let looks_at = origin::place(&machine.vm.lua, &table, &["looks", "cameras"]);
+            Ok(Self {
+                name: table.get("name")?,
+                replan: table.get("replan")?,
+                streams,
+                looks_at: looks_at.unwrap_or_else(|| main.clone()),
+                main: main.clone(),
+                bundle: Arc::new(locked(&machine.vm.shared.library).bundle().clone()),
+                limits: limits.clone(),
+            })
         };
-        let (name, replan, streams) = read().map_err(|e| machine.vm.explain(&e))?;
-        let bundle = Arc::new(locked(&machine.vm.shared.library).bundle().clone());
-        Ok(Self { name, replan, streams, main, bundle, limits: limits.clone() })
+        read().map_err(|e| machine.vm.explain(&e))
     }
 
     /// SHA-256 of every file that it is made of, by name.

@@ -2,4 +2,5 @@
 
 pub mod camera;
 pub mod panda;
+pub mod scaling;
 pub mod tactile;

@@ -14,6 +14,8 @@ use tungstenite::{
     protocol::{CloseFrame, WebSocketConfig, frame::coding::CloseCode},
 };
 
+use crate::policy::wire::unpack;
+
 /// The longest message that is taken: a state of 50,000 actions is 2.7 MiB.
 pub const LARGEST: usize = 4 << 20;
 /// Between two looks at the clock and at the wish to end.
@@ -26,8 +28,6 @@ const PATIENCE: Duration = Duration::from_secs(60);
 const FAREWELL: Duration = Duration::from_secs(3);
 /// Silence after which a client is asked whether it is there: to a machine that is gone that fails in the end.
 const QUIET: Duration = Duration::from_secs(60);
-/// Deepest nesting of a message.
-const DEEPEST: usize = 64;
 
 /// What came from a client.
 #[derive(Debug)]
@@ -89,7 +89,12 @@ impl<'a> Link<'a> {
         let mut quiet_since = Instant::now();
         loop {
             match self.socket.read() {
-                Ok(Message::Binary(bytes)) => return unpack(&bytes),
+                Ok(Message::Binary(bytes)) => {
+                    return unpack(&bytes).map_or_else(
+                        |what| Heard::Nonsense(format!("the message is {what}")),
+                        Heard::Message,
+                    );
+                }
                 Ok(Message::Text(_)) => {
                     return Heard::Nonsense("the message is a text frame; expected msgpack".to_owned());
                 }
@@ -148,14 +153,6 @@ impl<'a> Link<'a> {
                 _ => {}
             }
         }
-    }
-}
-
-fn unpack(mut bytes: &[u8]) -> Heard {
-    match rmpv::decode::read_value_with_max_depth(&mut bytes, DEEPEST) {
-        Ok(value) if bytes.is_empty() => Heard::Message(value),
-        Ok(_) => Heard::Nonsense(format!("the message has {} bytes behind its msgpack value", bytes.len())),
-        Err(error) => Heard::Nonsense(format!("the message is no msgpack: {error}")),
     }
 }
 

@@ -3,8 +3,8 @@
 use crate::support::{Project, refusal, said};
 
 const LOOP: &str = "x.lua:1: the script ran for more than 10 s; look for an endless loop";
-const STUCK: &str = "x.lua: the script called a library function that did not return within 10 s; look for a hostile \
-                     string pattern or a huge repeat count";
+const STUCK: &str = "x.lua: the script called a library function that did not return within 10 s; look for a \
+                     string pattern that never comes to an end, or a huge repeat count";
 
 const CASES: [(&str, &str, &str); 4] = [
     ("a loop", "while true do end", LOOP),

@@ -96,7 +96,20 @@ fn a_camera_that_is_not_there_is_told_before_anything_runs() {
         "return softvt.policy { name = 'p', looks = { cameras = { 'sied' } }, act = function() end }";
     let project = project(policy);
     let message = project.refusal("x.lua --policy p.lua --out run");
-    assert!(message.contains("there is no camera \"sied\"; the scene has third_person, wrist"), "{message}");
+    assert_eq!(
+        message,
+        "p.lua:1: policy.looks: unknown camera \"sied\"; there are third_person, wrist (scene of task 0)"
+    );
+    // Before anyone is asked for an answer: nobody listens there.
+    let profile = "return softvt.profile { name = 'v', \
+         inputs = { { keys = { 'a' }, source = 'camera', camera = 'wirst' } }, \
+         actions = { pose = 'absolute', gripper = { open = 0, shut = 1 } } }";
+    project.write("v.lua", profile.as_bytes());
+    let message = project.refusal("x.lua --policy ws://127.0.0.1:1 --profile v.lua --out run");
+    assert_eq!(
+        message,
+        "--profile v.lua: inputs: unknown camera \"wirst\"; did you mean \"wrist\"? (scene of task 0)"
+    );
     assert!(!project.path("run").exists());
 }
 

@@ -132,6 +132,8 @@ fn a_run_in_progress_shows_what_it_has() {
     let remark = "runs/a is not finished: it has 1 of 2 episodes";
     let said = project.succeeds("report runs/a runs/b --out page");
     assert!(said.err.contains(remark), "{}", said.err);
+    let torn = "the last line of runs/a/episodes.jsonl was broken off";
+    assert!(said.err.contains(torn) && project.text("page/report.html").contains(torn), "{}", said.err);
     assert!(project.text("page/report.md").contains("| noop | 1 of 2 |"));
     let said = project.succeeds("compare runs/a runs/b");
     assert!(said.out.contains("1 paired episodes") && said.out.contains(remark), "{}", said.out);

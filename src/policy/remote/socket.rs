@@ -15,6 +15,7 @@ use tungstenite::{
 };
 
 use super::{PolicyError, Server};
+use crate::policy::wire::unpack;
 
 /// The longest message that is taken: a chunk of actions is some ten kilobytes.
 const LARGEST: usize = 64 << 20;
@@ -24,8 +25,6 @@ const SLICE: Duration = Duration::from_millis(50);
 const PAUSES: [Duration; 2] = [Duration::from_millis(100), Duration::from_secs(2)];
 /// Characters of a server's own text that are told.
 const TOLD: usize = 2000;
-/// Deepest nesting of a message.
-const DEEPEST: usize = 64;
 
 /// An open connection.
 #[derive(Debug)]
@@ -114,13 +113,8 @@ impl Socket {
         PolicyError::Transport(format!("the policy server {} {what}", self.url))
     }
 
-    fn unpack(&self, mut bytes: &[u8]) -> Result<Value, PolicyError> {
-        let value = rmpv::decode::read_value_with_max_depth(&mut bytes, DEEPEST)
-            .map_err(|error| self.wrong(&format!("sent bytes that are no msgpack: {error}")))?;
-        if !bytes.is_empty() {
-            return Err(self.wrong(&format!("sent {} bytes behind its msgpack value", bytes.len())));
-        }
-        Ok(value)
+    fn unpack(&self, bytes: &[u8]) -> Result<Value, PolicyError> {
+        unpack(bytes).map_err(|what| self.wrong(&format!("sent bytes that are {what}")))
     }
 
     fn wait(&self, deadline: Instant, what: &str) -> Result<(), PolicyError> {

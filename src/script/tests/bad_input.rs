@@ -279,8 +279,8 @@ fn a_list_of_numbers_is_told_which_of_them_is_wrong() {
         ("{ 1, 0 / 0, 1 }", "[2]: expected a number, got NaN, which is not a finite number"),
         ("{ 1, 1, 1 / 0 }", "[3]: expected a number, got inf, which is not a finite number"),
         ("{ 'a', 1, 1 }", "[1]: expected a number, got \"a\""),
-        ("{ 1, 1 }", ": expected a list of 3 numbers (m), got a table"),
-        ("{ 1, 1, 1, 1 }", ": expected a list of 3 numbers (m), got a table"),
+        ("{ 1, 1 }", ": expected a list of 3 numbers (m), got a list of 2"),
+        ("{ 1, 1, 1, 1 }", ": expected a list of 3 numbers (m), got a list of 4"),
         ("{ 1, 1, x = 1 }", ": expected a list of 3 numbers (m), got a table"),
         ("0 / 0", ": expected a list of 3 numbers (m), got NaN, which is not a finite number"),
     ] {

@@ -71,7 +71,10 @@ fn what_the_host_keeps_for_a_script_is_counted_for_each_machine() {
     let picture = "softvt.image { width = 4096, height = 4096, colour = { 0, 0, 0 } }";
     refused(&hoard(picture), full);
     refused(&format!("local big = {picture}\n{}", hoard("big:crop { 0, 0, 4096, 4096 }")), full);
-    refused("return softvt.image { width = 8192, height = 1, colour = { 0, 0, 0 } }:resize(1, 8192)", full);
+    refused(
+        "return softvt.image { width = 8192, height = 8192, colour = { 0, 0, 0 } }:resize(8191, 8192)",
+        full,
+    );
     refused(
         "softvt.image { width = 8192, height = 8192, colour = { 0, 0, 0 } }:text('a', { at = { 0, 9 }, colour = { 0, 0, 0 } })",
         full,

@@ -2,16 +2,15 @@
 
 use std::borrow::Borrow;
 
-use image::{
-    RgbImage,
-    imageops::{self, FilterType},
-};
+use image::RgbImage;
 use serde::{Deserialize, Serialize};
+
+use crate::sensing::scaling::Scaler;
 
 /// Frames of history a finger.
 pub const CELLS: usize = 8;
 /// Cells along an edge, and pixels along the edge of a cell.
-const EDGE: usize = 4;
+const EDGE: u32 = 4;
 const CELL: u32 = 56;
 
 /// Where the fingers' frames go, oldest first.
@@ -28,21 +27,18 @@ pub enum MosaicLayout {
 /// 4 × 4 cells of 56 × 56: the last 8 frames of the left and of the right finger. `history` is oldest first, left and
 /// right; a shorter one is filled up in front with its oldest frame; an empty one leaves the picture black.
 pub fn mosaic<T: Borrow<RgbImage>>(history: [&[T]; 2], layout: MosaicLayout) -> RgbImage {
-    let mut picture = RgbImage::new(EDGE as u32 * CELL, EDGE as u32 * CELL);
+    let mut picture = RgbImage::new(EDGE * CELL, EDGE * CELL);
+    let mut scaler = Scaler::default();
     for (finger, frames) in history.into_iter().enumerate() {
+        let finger = finger as u32;
         for place in 0..CELLS {
             let Some(frame) = frames.get((place + frames.len()).saturating_sub(CELLS)) else { continue };
+            let place = place as u32;
             let (column, row) = match layout {
                 MosaicLayout::Rows => (place % EDGE, 2 * finger + place / EDGE),
                 MosaicLayout::Columns => (2 * finger + place % 2, place / 2),
             };
-            let small = imageops::resize(frame.borrow(), CELL, CELL, FilterType::Triangle);
-            imageops::replace(
-                &mut picture,
-                &small,
-                i64::from(CELL) * column as i64,
-                i64::from(CELL) * row as i64,
-            );
+            scaler.put(frame.borrow(), &mut picture, [CELL * column, CELL * row, CELL, CELL]);
         }
     }
     picture
