@@ -28,21 +28,30 @@ pub enum MosaicLayout {
 /// 4 × 4 cells of 56 × 56: the last 8 frames of the left and of the right finger. `history` is oldest first, left and
 /// right; a shorter one is filled up in front with its oldest frame; an empty one leaves the picture black.
 pub fn mosaic<T: Borrow<RgbImage>>(history: [&[T]; 2], layout: MosaicLayout) -> RgbImage {
+    let [left, right] = history.map(|frames| {
+        let last = &frames[frames.len().saturating_sub(CELLS)..];
+        last.iter().map(|frame| mosaic_cell(frame.borrow())).collect::<Vec<_>>()
+    });
+    mosaic_of_cells([&left, &right], layout)
+}
+
+/// A finger's picture as it stands in the mosaic: 56 × 56.
+pub fn mosaic_cell(picture: &RgbImage) -> RgbImage {
+    imageops::resize(picture, CELL, CELL, FilterType::Triangle)
+}
+
+/// [`mosaic`] of pictures that are cells already; whoever makes one a step scales each picture down once, not eight times.
+pub fn mosaic_of_cells<T: Borrow<RgbImage>>(history: [&[T]; 2], layout: MosaicLayout) -> RgbImage {
     let mut picture = RgbImage::new(EDGE as u32 * CELL, EDGE as u32 * CELL);
-    for (finger, frames) in history.into_iter().enumerate() {
+    for (finger, cells) in history.into_iter().enumerate() {
         for place in 0..CELLS {
-            let Some(frame) = frames.get((place + frames.len()).saturating_sub(CELLS)) else { continue };
+            let Some(cell) = cells.get((place + cells.len()).saturating_sub(CELLS)) else { continue };
             let (column, row) = match layout {
                 MosaicLayout::Rows => (place % EDGE, 2 * finger + place / EDGE),
                 MosaicLayout::Columns => (2 * finger + place % 2, place / 2),
             };
-            let small = imageops::resize(frame.borrow(), CELL, CELL, FilterType::Triangle);
-            imageops::replace(
-                &mut picture,
-                &small,
-                i64::from(CELL) * column as i64,
-                i64::from(CELL) * row as i64,
-            );
+            let corner = [column, row].map(|at| i64::from(CELL) * at as i64);
+            imageops::replace(&mut picture, cell.borrow(), corner[0], corner[1]);
         }
     }
     picture
