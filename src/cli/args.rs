@@ -7,7 +7,7 @@ use clap::{ArgMatches, error::ErrorKind, parser::ValueSource};
 use super::{
     Failure, code,
     drivers::Choice,
-    flags,
+    export, flags,
     record::Record,
     replay,
     require::Requirement,
@@ -16,6 +16,7 @@ use super::{
 };
 use crate::{
     benchmark::{Suite, seed::Split},
+    dataset::lerobot::Export,
     policy::{profile::Profile, remote::Protocol},
     script::{self, OptionSpec},
 };
@@ -93,6 +94,8 @@ pub enum Command {
         /// As JSON.
         json: bool,
     },
+    /// Export a data set for those who train.
+    DatasetExport(Export),
     /// Check the installation.
     Doctor,
     /// Help or version was shown.
@@ -301,7 +304,8 @@ fn script_file(words: &[String]) -> Option<&str> {
     None
 }
 
-fn text(matches: &ArgMatches, name: &str) -> String {
+/// A flag's text; empty if it was not given.
+pub fn text(matches: &ArgMatches, name: &str) -> String {
     matches.get_one::<String>(name).cloned().unwrap_or_default()
 }
 
@@ -354,6 +358,7 @@ fn dataset(matches: &ArgMatches) -> Command {
             out: m.get_one::<String>("out").map(PathBuf::from),
             json: m.get_flag("json"),
         },
+        Some(("export", m)) => Command::DatasetExport(export::typed(m)),
         Some((_, m)) => Command::DatasetCheck {
             path: PathBuf::from(text(m, "path")),
             replays: m.get_one("replay").copied().map_or(1, |n: u32| n as usize),
@@ -362,7 +367,8 @@ fn dataset(matches: &ArgMatches) -> Command {
     }
 }
 
-fn threads(matches: &ArgMatches) -> usize {
+/// Threads: as many as there are processors if it is not said.
+pub fn threads(matches: &ArgMatches) -> usize {
     let available = std::thread::available_parallelism().map_or(1, |n| n.get());
     matches.get_one::<u16>("threads").map_or(available, |n| usize::from(*n))
 }
@@ -413,7 +419,8 @@ fn typed(matches: &ArgMatches) -> Typed {
     }
 }
 
-fn many(matches: &ArgMatches, name: &str) -> Vec<String> {
+/// All values of a flag.
+pub fn many(matches: &ArgMatches, name: &str) -> Vec<String> {
     matches.get_many::<String>(name).unwrap_or_default().cloned().collect()
 }
 

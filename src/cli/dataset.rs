@@ -107,7 +107,10 @@ pub fn replay(path: &Path, which: Which) -> Result<(), Failure> {
 }
 
 /// Refuses a folder whose recording is not finished.
-fn finished(path: &Path) -> Result<(), Failure> {
+///
+/// # Errors
+/// It is not.
+pub fn finished(path: &Path) -> Result<(), Failure> {
     if path.is_dir() && path.join(RECORDING).is_file() && !path.join(DATASET).is_file() {
         return Err(Failure::input(format!(
             "{}: the recording was broken off; finish it with softvt record … --resume --out {0}",

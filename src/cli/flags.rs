@@ -5,7 +5,7 @@ use std::time::Duration;
 use clap::{Arg, ArgAction, value_parser};
 
 use super::{
-    Failure, replay, require, shard,
+    Failure, export, replay, require, shard,
     who::{self, policy_word, profile_word},
 };
 use crate::{
@@ -69,11 +69,13 @@ fn shown(value: &OptionValue) -> String {
     }
 }
 
-fn flag(name: &'static str, help: &'static str) -> Arg {
+/// A flag.
+pub fn flag(name: &'static str, help: &'static str) -> Arg {
     Arg::new(name).long(name).help(help)
 }
 
-fn list(name: &'static str, help: &'static str) -> Arg {
+/// A flag whose values may be joined by commas, or given one by one.
+pub fn list(name: &'static str, help: &'static str) -> Arg {
     flag(name, help).action(ArgAction::Append).value_delimiter(',')
 }
 
@@ -310,7 +312,7 @@ fn dataset() -> clap::Command {
     let path =
         || Arg::new("path").value_name("DATASET").required(true).help("Its folder, or one of its HDF5 files");
     clap::Command::new("dataset")
-        .about("Looks into recorded demonstrations")
+        .about("Looks into recorded demonstrations, and exports them")
         .subcommand_required(true)
         .arg_required_else_help(true)
         .subcommand(
@@ -319,6 +321,7 @@ fn dataset() -> clap::Command {
                 .arg(path())
                 .arg(flag("replay", "Demonstrations to simulate again, spread over the tasks").value_name("N").default_value("1").value_parser(value_parser!(u32))),
         )
+        .subcommand(export::command(path()))
         .subcommand(
             clap::Command::new("stats")
                 .about("Prints and draws the distributions of actions, lengths and deformations")

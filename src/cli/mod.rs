@@ -12,6 +12,7 @@ mod doctor;
 mod drivers;
 mod evaluate;
 mod experiment;
+mod export;
 mod files;
 mod first_look;
 mod flags;
@@ -135,6 +136,7 @@ fn carry_out(words: &[String]) -> Result<(), Failure> {
         Command::Record(record) => record::run(&record),
         Command::DatasetCheck { path, replays } => dataset::check(&path, replays),
         Command::DatasetStats { path, out, json } => dataset::stats(&path, out.as_deref(), json),
+        Command::DatasetExport(export) => export::run(&export),
         Command::Doctor => doctor::run(),
         Command::Shown => Ok(()),
     }

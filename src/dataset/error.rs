@@ -40,6 +40,14 @@ pub enum DatasetError {
         /// What is wrong, and what was expected.
         what: String,
     },
+    /// Something else is where it should go.
+    #[error("--out {out}: {what}")]
+    Taken {
+        /// The folder.
+        out: String,
+        /// What is there, and what to do.
+        what: String,
+    },
     /// A stream cannot be made.
     #[error(transparent)]
     Sense(#[from] SenseError),

@@ -12,6 +12,7 @@ mod error;
 pub mod files;
 mod hidden;
 pub mod layout;
+pub mod lerobot;
 pub mod manifest;
 pub mod pictures;
 mod read;

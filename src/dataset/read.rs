@@ -3,6 +3,7 @@
 use std::{
     fs::File,
     io::Read,
+    ops::Range,
     path::{Path, PathBuf},
 };
 
@@ -194,13 +195,26 @@ impl TaskFile {
         name: &str,
         step: usize,
     ) -> Result<(Vec<u8>, [usize; 2]), DatasetError> {
+        self.pictures(demo, name, step..step + 1)
+    }
+
+    /// Pictures of a stream: the bytes of all, one after the other, and the height and width of each.
+    ///
+    /// # Errors
+    /// As [`TaskFile::picture`].
+    pub fn pictures(
+        &self,
+        demo: usize,
+        name: &str,
+        steps: Range<usize>,
+    ) -> Result<(Vec<u8>, [usize; 2]), DatasetError> {
         let data = self.dataset(demo, name)?;
         let key = format!("/data/demo_{demo}/{name}");
         let &[_, height, width, 3] = &data.shape()[..] else {
             let what = format!("expected the shape (steps, height, width, 3), got {:?}", data.shape());
             return Err(DatasetError::content(&self.path, key, what));
         };
-        let bytes = data.read_slice(&[step, 0, 0, 0], &[1, height, width, 3]);
+        let bytes = data.read_slice(&[steps.start, 0, 0, 0], &[steps.len(), height, width, 3]);
         Ok((bytes.map_err(|e| DatasetError::hdf5(&self.path, key)(e))?, [height, width]))
     }
 

@@ -14,6 +14,7 @@ mod given_up;
 mod interrupt;
 mod joints;
 mod killed;
+mod lerobot;
 mod measures;
 mod observe;
 mod policies;

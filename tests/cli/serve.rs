@@ -14,7 +14,7 @@ use tungstenite::{Error, Message, WebSocket};
 use crate::support::{Project, Small};
 
 /// A server that ends with the test.
-struct Server {
+pub struct Server {
     child: Child,
     address: String,
 }
@@ -27,7 +27,7 @@ impl Drop for Server {
 }
 
 impl Server {
-    fn start(project: &Project, words: &str) -> Self {
+    pub fn start(project: &Project, words: &str) -> Self {
         let mut child = Command::new(cargo_bin!("softvt"))
             .current_dir(project.path(""))
             .args(["serve", "x.lua", "--port", "0"])
@@ -49,7 +49,7 @@ impl Server {
     }
 
     /// A client that has been greeted, and the greeting.
-    fn client(&self) -> (Client, Value) {
+    pub fn client(&self) -> (Client, Value) {
         let (socket, _) =
             tungstenite::client(format!("ws://{}", self.address), self.stream()).expect("shaken hands");
         let mut client = Client(socket);
@@ -67,7 +67,7 @@ impl Server {
     }
 }
 
-struct Client(WebSocket<TcpStream>);
+pub struct Client(WebSocket<TcpStream>);
 
 impl Client {
     fn hear(&mut self) -> Value {
@@ -83,7 +83,7 @@ impl Client {
         self.0.send(Message::binary(bytes)).expect("sent");
     }
 
-    fn ask(&mut self, value: &Value) -> Value {
+    pub fn ask(&mut self, value: &Value) -> Value {
         self.send(value);
         self.hear()
     }
@@ -102,11 +102,11 @@ impl Client {
     }
 }
 
-fn map(entries: &[(&str, Value)]) -> Value {
+pub fn map(entries: &[(&str, Value)]) -> Value {
     Value::Map(entries.iter().map(|(key, value)| (Value::from(*key), value.clone())).collect())
 }
 
-fn of(kind: &str) -> Value {
+pub fn of(kind: &str) -> Value {
     map(&[("type", kind.into())])
 }
 
@@ -115,7 +115,7 @@ fn reset(episode: u64) -> Value {
 }
 
 /// An array as Python's clients pack it.
-fn array(shape: &[usize], numbers: &[f64]) -> Value {
+pub fn array(shape: &[usize], numbers: &[f64]) -> Value {
     let key = |name: &str| Value::Binary(name.as_bytes().to_vec());
     Value::Map(vec![
         (key("__ndarray__"), true.into()),
@@ -131,7 +131,7 @@ fn step(times: usize) -> Value {
     map(&[("type", "step".into()), ("actions", array(&[times, 7], &ACTION.repeat(times)))])
 }
 
-fn get<'a>(value: &'a Value, name: &str) -> &'a Value {
+pub fn get<'a>(value: &'a Value, name: &str) -> &'a Value {
     let entries = value.as_map().unwrap_or_else(|| panic!("no map: {value}"));
     let found = entries.iter().find(|(key, _)| key.as_str() == Some(name));
     &found.unwrap_or_else(|| panic!("no {name} in {value}")).1

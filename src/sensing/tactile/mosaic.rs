@@ -2,15 +2,15 @@
 
 use std::borrow::Borrow;
 
-use image::RgbImage;
+use image::{RgbImage, imageops};
 use serde::{Deserialize, Serialize};
 
-use crate::sensing::scaling::Scaler;
+use crate::sensing::scaling::scaled;
 
 /// Frames of history a finger.
 pub const CELLS: usize = 8;
 /// Cells along an edge, and pixels along the edge of a cell.
-const EDGE: u32 = 4;
+const EDGE: usize = 4;
 const CELL: u32 = 56;
 
 /// Where the fingers' frames go, oldest first.
@@ -27,18 +27,30 @@ pub enum MosaicLayout {
 /// 4 × 4 cells of 56 × 56: the last 8 frames of the left and of the right finger. `history` is oldest first, left and
 /// right; a shorter one is filled up in front with its oldest frame; an empty one leaves the picture black.
 pub fn mosaic<T: Borrow<RgbImage>>(history: [&[T]; 2], layout: MosaicLayout) -> RgbImage {
-    let mut picture = RgbImage::new(EDGE * CELL, EDGE * CELL);
-    let mut scaler = Scaler::default();
-    for (finger, frames) in history.into_iter().enumerate() {
-        let finger = finger as u32;
+    let [left, right] = history.map(|frames| {
+        let last = &frames[frames.len().saturating_sub(CELLS)..];
+        last.iter().map(|frame| mosaic_cell(frame.borrow())).collect::<Vec<_>>()
+    });
+    mosaic_of_cells([&left, &right], layout)
+}
+
+/// A finger's picture as it stands in the mosaic: 56 × 56.
+pub fn mosaic_cell(picture: &RgbImage) -> RgbImage {
+    scaled(picture, CELL, CELL)
+}
+
+/// [`mosaic`] of pictures that are cells already; whoever makes one a step scales each picture down once, not eight times.
+pub fn mosaic_of_cells<T: Borrow<RgbImage>>(history: [&[T]; 2], layout: MosaicLayout) -> RgbImage {
+    let mut picture = RgbImage::new(EDGE as u32 * CELL, EDGE as u32 * CELL);
+    for (finger, cells) in history.into_iter().enumerate() {
         for place in 0..CELLS {
-            let Some(frame) = frames.get((place + frames.len()).saturating_sub(CELLS)) else { continue };
-            let place = place as u32;
+            let Some(cell) = cells.get((place + cells.len()).saturating_sub(CELLS)) else { continue };
             let (column, row) = match layout {
                 MosaicLayout::Rows => (place % EDGE, 2 * finger + place / EDGE),
                 MosaicLayout::Columns => (2 * finger + place % 2, place / 2),
             };
-            scaler.put(frame.borrow(), &mut picture, [CELL * column, CELL * row, CELL, CELL]);
+            let corner = [column, row].map(|at| i64::from(CELL) * at as i64);
+            imageops::replace(&mut picture, cell.borrow(), corner[0], corner[1]);
         }
     }
     picture

@@ -1,0 +1,209 @@
+//! Exports to LeRobot: each row is what a policy is sent at that step, nothing depends on threads, and what cannot be exported
+//! is told.
+
+use std::{
+    fs::{self, File},
+    path::Path,
+};
+
+use parquet::{
+    file::reader::{FileReader, SerializedFileReader},
+    record::{Field, Row},
+};
+use rmpv::Value;
+
+use crate::{
+    recording::files,
+    serve::{Server, array, get, map},
+    support::Project,
+};
+
+/// A cube rests on its slab while the fingers close on a block that stands between them.
+const SUITE: &str = r#"
+local function solid(name, size, body)
+  return softvt.asset { name = name, shape = softvt.shape.box { size = size }:grounded(), body = body }
+end
+local floor = softvt.asset { name = "floor", shape = softvt.shape.box { size = { 2, 2, 0.05 } }:translate(0, 0, -0.025), body = softvt.static {} }
+local slab = solid("slab", { 0.1, 0.1, 0.02 }, softvt.static {})
+local block = solid("block", { 0.03, 0.06, 0.03 }, softvt.static {})
+local cube = solid("cube", { 0.04, 0.04, 0.04 }, softvt.rigid { density = 300 })
+local layout = softvt.layout("one", function(scene)
+  scene:add { name = "floor", asset = floor, xyz = { 0, 0, 0 } }
+  scene:add { name = "slab", asset = slab, xyz = { 0, 0.2, 0 } }
+  scene:add { name = "block", asset = block, xyz = { -0.127, -0.005, 0.271 } }
+  scene:add { name = "cube", asset = cube, xyz = { 0, 0.2, 0.02 } }
+end)
+local function task(prompt)
+  return softvt.task { prompt = prompt, layout = layout, budget_steps = 40,
+    goal = softvt.on { object = "cube", target = "slab", hold_s = 0.8 },
+    expert = function(arm, scene) arm:grasp(0.6, { rate = 1 }) arm:move_by({ 0.004, 0, 0.002 }) arm:wait(1) end }
+end
+return softvt.suite { name = "one", object_type = "rigid", variation = "spatial", episodes = 1,
+  tasks = { task("wait a while"), task("wait for it") } }
+"#;
+
+fn project() -> Project {
+    Project::new(&[("x.lua", SUITE)])
+}
+
+fn rows(path: &Path) -> Vec<Row> {
+    let reader = SerializedFileReader::new(File::open(path).expect("a table")).expect("Parquet");
+    reader.get_row_iter(None).expect("rows").map(|row| row.expect("a row")).collect()
+}
+
+fn field<'a>(row: &'a Row, name: &str) -> &'a Field {
+    let found = row.get_column_iter().find(|(column, _)| *column == name);
+    found.unwrap_or_else(|| panic!("no {name}")).1
+}
+
+/// Numbers of nested lists, in order.
+fn numbers(field: &Field) -> Vec<f32> {
+    match field {
+        Field::Float(x) => vec![*x],
+        Field::ListInternal(list) => list.elements().iter().flat_map(numbers).collect(),
+        other => panic!("no numbers: {other:?}"),
+    }
+}
+
+fn whole(field: &Field) -> i64 {
+    match field {
+        Field::Long(n) => *n,
+        other => panic!("no whole number: {other:?}"),
+    }
+}
+
+/// Bytes of the pixels of a PNG file.
+fn pixels(field: &Field) -> Vec<u8> {
+    let Field::Group(group) = field else { panic!("no picture: {field:?}") };
+    let bytes = group.get_column_iter().find(|(name, _)| *name == "bytes").map(|(_, bytes)| bytes.clone());
+    let Some(Field::Bytes(bytes)) = bytes else { panic!("no bytes in {field:?}") };
+    image::load_from_memory(bytes.data()).expect("a PNG file").to_rgb8().into_raw()
+}
+
+/// The bytes of an array as clients get it.
+fn sent(observation: &Value, name: &str) -> Vec<u8> {
+    let entries = get(observation, name).as_map().expect("an array");
+    let data =
+        entries.iter().find(|(key, _)| key.as_str() == Some("data") || key.as_slice() == Some(b"data"));
+    data.and_then(|(_, data)| data.as_slice()).expect("data").to_vec()
+}
+
+fn floats(bytes: &[u8]) -> Vec<f32> {
+    bytes.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect()
+}
+
+#[test]
+fn a_row_is_what_a_policy_is_sent_at_its_step() {
+    let project = project();
+    project.succeeds("record x.lua --task 0 --demos 1 --out data");
+    project.succeeds("dataset export data --format lerobot-v2.1 --out out");
+    let rows = rows(&project.path("out/data/chunk-000/episode_000000.parquet"));
+    let actions =
+        softvt::dataset::actions(&project.path("data/hdf5/one_task0_demo.hdf5"), 0).expect("actions");
+    assert!(
+        rows.len() >= 12 && rows.len() == actions.len(),
+        "longer than a policy's history: {}",
+        rows.len()
+    );
+    let server = Server::start(&project, "--profile visuo_tactile --split demonstration");
+    let (mut client, _) = server.client();
+    let episode = project.lines("data/manifest.jsonl")[0]["episode"].as_u64().expect("an attempt");
+    let reset = map(&[("type", "reset".into()), ("task", 0.into()), ("episode", episode.into())]);
+    let mut answer = client.ask(&reset);
+    let mut touched = false;
+    for (step, (row, action)) in rows.iter().zip(&actions).enumerate() {
+        let observation = get(&answer, "observation");
+        for name in ["image", "wrist_image", "tactile_image"] {
+            assert!(pixels(field(row, name)) == sent(observation, name), "{name} at step {step}");
+        }
+        assert_eq!(numbers(field(row, "state")), floats(&sent(observation, "state")), "step {step}");
+        // Of nine states a row keeps the initial one and the last two.
+        let markers = floats(&sent(observation, "tactile_marker_motion"));
+        let kept: Vec<f32> = [0, 7, 8].into_iter().flat_map(|i| markers[396 * i..][..396].to_vec()).collect();
+        assert_eq!(numbers(field(row, "tactile_marker_motion")), kept, "step {step}");
+        touched |= kept[396..792] != kept[792..];
+        let (p, r) = (action.position_b, action.axis_angle_b);
+        let command = [p.x, p.y, p.z, r.x, r.y, r.z, action.closure];
+        assert_eq!(numbers(field(row, "actions")), command.map(|x| x as f32), "step {step}");
+        answer = client.ask(&map(&[("type", "step".into()), ("actions", array(&[1, 7], &command))]));
+    }
+    assert!(touched, "the block moves markers");
+    assert_eq!(get(&answer, "terminated").as_bool(), Some(true));
+}
+
+#[test]
+fn both_versions_hold_the_same_rows_whatever_the_threads() {
+    let project = project();
+    project.succeeds("record x.lua --demos 2 --out data --no-privileged");
+    let said = project.succeeds("dataset export data --format lerobot-v2.1 --out a --threads 1").out;
+    assert!(said.starts_with("4 episodes, ") && said.ends_with(" frames, 2 prompts: a\n"), "{said}");
+    project.succeeds("dataset export data --format lerobot-v2.1 --out b --threads 3");
+    assert!(files(&project.path("a")) == files(&project.path("b")), "not the same bytes");
+    project.succeeds("dataset export data/ --format lerobot-v3.0 --out c/");
+    let apart: Vec<Row> = (0..4)
+        .flat_map(|i| rows(&project.path(&format!("a/data/chunk-000/episode_{i:06}.parquet"))))
+        .collect();
+    let together = rows(&project.path("c/data/chunk-000/file-000.parquet"));
+    assert_eq!(apart.len(), together.len());
+    for (index, (one, other)) in apart.iter().zip(&together).enumerate() {
+        assert_eq!(whole(field(other, "index")), index as i64);
+        for (name, value) in one.get_column_iter() {
+            match name.ends_with("image") {
+                true => assert!(pixels(value) == pixels(field(other, name)), "{name}"),
+                false => assert_eq!(value, field(other, name), "{name}"),
+            }
+        }
+    }
+    let info = project.json("c/meta/info.json");
+    assert_eq!(info["total_frames"], together.len());
+    assert_eq!((&info["splits"]["train"], &info["total_tasks"]), (&"0:4".into(), &2.into()));
+    let episodes = rows(&project.path("c/meta/episodes/chunk-000/file-000.parquet"));
+    let ends: Vec<i64> = episodes.iter().map(|row| whole(field(row, "dataset_to_index"))).collect();
+    assert_eq!(ends.last(), Some(&(together.len() as i64)));
+    project.succeeds("dataset export data --format lerobot-v3.0 --gripper binary --task it --out d");
+    let binary = rows(&project.path("d/data/chunk-000/file-000.parquet"));
+    assert_eq!(binary.len() as i64, ends[3] - ends[1], "only the second task");
+    let shut: Vec<f32> = binary.iter().map(|row| numbers(field(row, "actions"))[6]).collect();
+    assert!(shut.iter().all(|x| [0.0, 1.0].contains(x)) && shut.contains(&1.0), "{shut:?}");
+    assert_eq!(project.lines("d/meta/softvt.jsonl")[0]["task_id"], 1);
+}
+
+#[test]
+fn what_cannot_be_exported_is_told_and_nothing_is_left() {
+    let project = project();
+    project.succeeds("record x.lua --task 0 --demos 1 --out data");
+    project.succeeds("record x.lua --task 0 --demos 1 --images video --out plain");
+    project.write("full/mine", b"mine");
+    project.write("broken/recording.json", b"{}");
+    let hdf5 = project.path("data/hdf5/one_task0_demo.hdf5");
+    for (words, said) in [
+        ("data --format lerobot-v3.0 --out full", "--out full: it holds mine; nothing was written"),
+        ("data --format lerobot-v3.0 --out full/mine", "--out full/mine: it is no folder"),
+        ("data --format lerobot-v3.0 --out x --task 7", "no task fits --task \"7\""),
+        ("data --format lerobot-v3.0 --out x --task dance", "no task fits --task \"dance\""),
+        ("data --format lerobot-v3.0 --out x --gripper wide", "[possible values: binary, continuous]"),
+        ("data --format lerobot-v2.0 --out x", "[possible values: lerobot-v2.1, lerobot-v3.0]"),
+        ("data --out x", "--format"),
+        ("data --format lerobot-v2.1", "--out"),
+        ("full --format lerobot-v2.1 --out x", "full: dataset.json: it is not there; expected the folder"),
+        ("nowhere --format lerobot-v2.1 --out x", "nowhere: dataset.json: it is not there"),
+        ("broken --format lerobot-v2.1 --out x", "broken: the recording was broken off"),
+        ("plain --format lerobot-v2.1 --out x", "record it with --images hdf5"),
+    ] {
+        let told = project.refusal(&format!("dataset export {words}"));
+        assert!(told.contains(said), "{words}: {told}");
+    }
+    let whole = fs::read(&hdf5).expect("read");
+    fs::write(&hdf5, &whole[..whole.len() / 2]).expect("written");
+    let told = project.refusal("dataset export data --format lerobot-v2.1 --out x");
+    assert!(told.contains("one_task0_demo.hdf5") && told.contains("cut off"), "{told}");
+    // One step fewer than the manifest says.
+    fs::write(&hdf5, &whole).expect("written");
+    let manifest = project.text("data/manifest.jsonl");
+    let steps = format!("\"num_samples\":{}", project.lines("data/manifest.jsonl")[0]["num_samples"]);
+    project.write("data/manifest.jsonl", manifest.replace(&steps, "\"num_samples\":3").as_bytes());
+    let told = project.refusal("dataset export data --format lerobot-v2.1 --out x");
+    assert!(told.contains("/data/demo_0/obs/state: expected the shape [3, 7], got ["), "{told}");
+    assert!(!project.path("x").exists() && !project.path("x.part").exists());
+    assert_eq!(files(&project.path("full")).len(), 1);
+}
