@@ -69,3 +69,92 @@ fn yaw(pose: &Pose) -> f64 {
     let x = pose.rotation * Vec3::x();
     x.y.atan2(x.x)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::{collections::BTreeMap, sync::Arc};
+
+    use super::*;
+    use crate::{
+        geometry::{Quat, shape::Shape},
+        scene::{Asset, Friction, Lighting, Region},
+    };
+
+    fn object(name: &str, asset: &str, size: f64) -> Object {
+        let asset = Asset {
+            name: asset.to_owned(),
+            shape: Shape::Box { half: Vec3::repeat(size / 2.0) },
+            body: Body::Rigid { density: 100.0 },
+            friction: Friction::default(),
+            visuals: Vec::new(),
+            hints: BTreeMap::new(),
+        };
+        let pose_w = Pose::translation(0.0, 0.0, 0.25);
+        let placed_at = String::new();
+        Object { name: name.to_owned(), asset: Arc::new(asset), pose_w, joints: Vec::new(), placed_at }
+    }
+
+    fn scene() -> Scene {
+        Scene {
+            objects: vec![
+                object("table", "table", 1.0),
+                object("left", "red_cup", 0.1),
+                object("right", "red_cup", 0.1),
+                object("saucer", "china", 0.1),
+            ],
+            base_w: Pose::translation(-0.6, 0.0, 0.0),
+            start_q: [0.0; 7],
+            gravity: Vec3::zeros(),
+            workspace: Region { min: Vec3::zeros(), max: Vec3::zeros() },
+            lighting: Lighting::default(),
+            cameras: Vec::new(),
+        }
+    }
+
+    fn thing(name: &str, x: f64, soft: bool) -> Standing {
+        let turn = Quat::from_axis_angle(&Vec3::z_axis(), 0.3);
+        Standing {
+            name: name.to_owned(),
+            pose: Pose::from_parts(Vec3::new(x, 0.1, 0.9).into(), turn),
+            in_base: true,
+            soft,
+        }
+    }
+
+    fn named(places: &[Place]) -> Vec<(&str, f64)> {
+        places.iter().map(|place| (place.name.as_str(), (100.0 * place.xy[0]).round())).collect()
+    }
+
+    #[test]
+    fn things_of_one_kind_are_taken_in_the_order_of_their_numbers() {
+        let things = [
+            thing("my_red_cup_2", 0.9, false),
+            thing("table_1", 0.0, false),
+            thing("my_red_cup_1", 0.7, false),
+        ];
+        let found = places(&scene(), "right", &things);
+        assert_eq!(named(&found), [("left", 10.0), ("right", 30.0)]);
+        assert!((found[0].yaw.unwrap() - 0.3).abs() < 1e-12);
+        let mut moved = scene();
+        crate::scene::Start { joints: Some([0.5; 7]), places: found }.apply(&mut moved);
+        let at = moved.objects[2].pose_w.translation.vector;
+        assert!((at - Vec3::new(0.3, 0.1, 0.25)).norm() < 1e-12, "the height is the layout's: {at}");
+        assert_eq!((moved.start_q, &moved.objects[0]), ([0.5; 7], &scene().objects[0]));
+    }
+
+    #[test]
+    fn a_soft_thing_without_a_name_of_ours_is_the_target_and_without_the_target_nothing_is_placed() {
+        let things = [thing("pastry_7", 0.7, true), thing("china_1", 0.8, false)];
+        let found = places(&scene(), "left", &things);
+        assert_eq!(named(&found), [("left", 10.0), ("saucer", 20.0)]);
+        assert_eq!(found[0].yaw, None, "how it is turned is not known");
+        assert_eq!(places(&scene(), "left", &things[1..]), []);
+    }
+
+    #[test]
+    fn a_thing_that_lies_on_its_side_in_its_own_frame_keeps_our_yaw() {
+        let mut lying = thing("red_cup_1", 0.7, false);
+        lying.pose.rotation *= Quat::from_axis_angle(&Vec3::x_axis(), 1.57);
+        assert_eq!(places(&scene(), "left", &[lying])[0].yaw, None);
+    }
+}
