@@ -19,7 +19,7 @@ pub(super) fn drive(recorded: Vec<Action>, record: &EpisodeRecord) -> Drive {
         _ => None,
     };
     Box::new(move |_, brief| {
-        Ok(Box::new(Chunked::new(Box::new(Recorded::new(recorded.clone(), ending.clone())), brief, 1)))
+        Ok(Box::new(Chunked::new(Box::new(Recorded::poses(&recorded, ending.clone())), brief, 1)))
     })
 }
 

@@ -8,7 +8,9 @@ use super::{
     Failure, code,
     drivers::Choice,
     export, flags,
+    import::Import,
     record::Record,
+    recording::Output,
     replay,
     require::Requirement,
     shard::Shard,
@@ -82,9 +84,11 @@ pub enum Command {
     DatasetCheck {
         /// Its folder, or one of its files.
         path: PathBuf,
-        /// Demonstrations to simulate again.
+        /// Most demonstrations to simulate again.
         replays: usize,
     },
+    /// Re-execute demonstrations of other worlds.
+    DatasetImport(Box<Import>),
     /// Say what is in a data set.
     DatasetStats {
         /// Its folder, or one of its files.
@@ -264,9 +268,10 @@ pub fn parse(words: &[String]) -> Result<Command, Failure> {
         Some(("doctor", _)) => Ok(Command::Doctor),
         Some(("record", m)) => {
             let record = record(m, &options).map_err(named)?;
-            Ok(Command::Record(Record { run: driven(record.run, m)?, ..record }))
+            let output = Output { run: driven(record.output.run, m)?, ..record.output };
+            Ok(Command::Record(Record { output, ..record }))
         }
-        Some(("dataset", m)) => Ok(dataset(m)),
+        Some(("dataset", m)) => dataset(m, &options).map_err(named),
         Some(("view", m)) => {
             let view = view(m, &options).map_err(named)?;
             Ok(Command::View(View { run: driven(view.run, m)?, ..view }))
@@ -333,38 +338,55 @@ fn serve(run: Run, matches: &ArgMatches) -> Result<Serve, Failure> {
 }
 
 fn record(matches: &ArgMatches, options: &[OptionSpec]) -> Result<Record, Failure> {
-    let run = common(matches, options)?;
     let demos = matches.get_one("demos").copied().unwrap_or(50);
     Ok(Record {
+        output: output(matches, options)?,
+        demos,
+        attempts: matches.get_one("attempts").copied().unwrap_or(demos.saturating_mul(4).max(20)),
+    })
+}
+
+/// What is common to all commands that make data sets.
+fn output(matches: &ArgMatches, options: &[OptionSpec]) -> Result<Output, Failure> {
+    Ok(Output {
         run: Run {
             tasks: many(matches, "task"),
             threads: threads(matches),
             resume: matches.get_flag("resume"),
             // What touched what, and how hard, comes from it.
             trace: Some(false),
-            ..run
+            ..common(matches, options)?
         },
-        demos,
-        attempts: matches.get_one("attempts").copied().unwrap_or(demos.saturating_mul(4).max(20)),
         pictures: text(matches, "images") == "hdf5",
         privileged: !matches.get_flag("no-privileged"),
     })
 }
 
-fn dataset(matches: &ArgMatches) -> Command {
-    match matches.subcommand() {
+fn import(matches: &ArgMatches, options: &[OptionSpec]) -> Result<Import, Failure> {
+    let Output { run, pictures, privileged } = output(matches, options)?;
+    Ok(Import {
+        output: Output { run: Run { policy: Choice::import(), ..run }, pictures, privileged },
+        files: many(matches, "files").into_iter().map(PathBuf::from).collect(),
+        attempts: matches.get_one("attempts").copied(),
+        layout: matches.get_flag("layout"),
+    })
+}
+
+fn dataset(matches: &ArgMatches, options: &[OptionSpec]) -> Result<Command, Failure> {
+    Ok(match matches.subcommand() {
         Some(("stats", m)) => Command::DatasetStats {
             path: PathBuf::from(text(m, "path")),
             out: m.get_one::<String>("out").map(PathBuf::from),
             json: m.get_flag("json"),
         },
         Some(("export", m)) => Command::DatasetExport(export::typed(m)),
+        Some(("import", m)) => Command::DatasetImport(Box::new(import(m, options)?)),
         Some((_, m)) => Command::DatasetCheck {
             path: PathBuf::from(text(m, "path")),
-            replays: m.get_one("replay").copied().map_or(1, |n: u32| n as usize),
+            replays: m.get_one("replay").copied().unwrap_or(1),
         },
         None => Command::Shown,
-    }
+    })
 }
 
 /// Threads: as many as there are processors if it is not said.

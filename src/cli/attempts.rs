@@ -4,6 +4,9 @@ use std::collections::BTreeMap;
 
 use crate::evaluation::record::{EpisodeRecord, Outcome};
 
+/// What the error of an attempt begins with that could not start as its demonstration says.
+pub const NO_START: &str = "cannot start as the demonstration says: ";
+
 /// Attempts that must be run before anything can be said of more; `done` says of each that is done whether it is good.
 pub fn due(done: &BTreeMap<u32, bool>, demos: u32, most: u32) -> Vec<u32> {
     let mut end = 0;
@@ -23,6 +26,7 @@ pub fn rejected(record: &EpisodeRecord) -> Option<String> {
     let reason = match &record.outcome {
         _ if verdict.safety => return None,
         Outcome::Invalid { reason, .. } => return Some(format!("invalid ({reason})")),
+        Outcome::Error { message } if message.starts_with(NO_START) => "could not start",
         Outcome::Error { .. } => "ended by an error",
         _ if record.stats.gave_up.is_some() => "given up",
         _ if !verdict.goal => "goal not reached",
@@ -37,7 +41,11 @@ pub fn rejected(record: &EpisodeRecord) -> Option<String> {
 /// One attempt in one line.
 pub fn line(record: &EpisodeRecord) -> String {
     let id = &record.identity;
-    let said = rejected(record).map_or_else(|| "kept".to_owned(), |reason| format!("not kept: {reason}"));
+    let said = match (rejected(record), &record.outcome) {
+        (None, _) => "kept".to_owned(),
+        (Some(reason), Outcome::Error { message }) => format!("not kept: {reason} ({message})"),
+        (Some(reason), _) => format!("not kept: {reason}"),
+    };
     format!("task {} attempt {}: {said}, {:.1} s", id.task, id.episode, record.stats.time_s)
 }
 

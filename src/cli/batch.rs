@@ -18,7 +18,13 @@ use super::{
 };
 use crate::{
     benchmark::{Suite, Task, seed::Split, settings::Settings},
-    evaluation::{record::EpisodeRecord, safety::Limit, summary::Summary, thresholds::Thresholds},
+    dataset::card::Imported,
+    evaluation::{
+        record::{EpisodeRecord, Origin},
+        safety::Limit,
+        summary::Summary,
+        thresholds::Thresholds,
+    },
     policy::TaskBrief,
     report::{
         interchange,
@@ -58,6 +64,10 @@ pub(super) struct Batch<'a> {
     /// Which list its episodes are of.
     pub split: Split,
     pub(super) drivers: Arc<Drivers>,
+    /// Foreign demonstrations that episodes re-execute, by task and episode.
+    pub origins: BTreeMap<(usize, u32), Origin>,
+    /// The files that those are from.
+    pub imported: Vec<Imported>,
     pub drive: Drive,
 }
 
@@ -101,6 +111,8 @@ impl<'a> Batch<'a> {
             films: run.video.is_some(),
             force_observed,
             split: Split::Validation,
+            origins: BTreeMap::new(),
+            imported: Vec::new(),
             drivers,
             drive: Box::new(move |opened, brief| driving.drive(opened, brief)),
         })
@@ -339,11 +351,27 @@ impl<'a> Batch<'a> {
     /// A script, the scene or whoever drives fails.
     pub fn episode(&self, job: usize, film: bool, drive: &Drive) -> Result<Finished, Failure> {
         let (task, episode) = self.jobs[job];
-        let (spec, opened) = self.spec(task, &self.request(task, episode))?;
+        let origin = self.origins.get(&(task.id, episode));
+        self.episode_from(job, origin, film, drive)?.map_err(|e| self.episode_failure(&e))
+    }
+
+    /// The same from the start of a foreign demonstration, or from that of the layout.
+    ///
+    /// # Errors
+    /// A script or whoever drives does not begin; within, what is wrong with the scene or happens on the way.
+    pub fn episode_from(
+        &self,
+        job: usize,
+        origin: Option<&Origin>,
+        film: bool,
+        drive: &Drive,
+    ) -> Result<Result<Finished, EpisodeError>, Failure> {
+        let (task, episode) = self.jobs[job];
+        let (spec, opened) = self.spec(task, &self.request(task, episode), origin)?;
         let driver = drive(opened, self.brief(task, episode))?;
         let mut driver = batch::Stoppable { driver, stop: &stop::FLAG };
-        let started = self.start(EpisodeSpec { film, ..spec })?;
-        started.run(&mut driver).map_err(|e| self.episode_failure(&e))
+        let started = Episode::start(EpisodeSpec { film, ..spec }, &self.cache, &self.looks);
+        Ok(started.and_then(|started| started.run(&mut driver)))
     }
 
     /// The settled start of an episode, for somebody else to drive.
@@ -351,10 +379,7 @@ impl<'a> Batch<'a> {
     /// # Errors
     /// A script or the scene fails.
     pub fn begin(&self, task: &Task, request: &script::EpisodeRequest) -> Result<Episode, Failure> {
-        self.start(self.spec(task, request)?.0)
-    }
-
-    fn start(&self, spec: EpisodeSpec) -> Result<Episode, Failure> {
+        let (spec, _) = self.spec(task, request, None)?;
         Episode::start(spec, &self.cache, &self.looks).map_err(|e| self.episode_failure(&e))
     }
 
@@ -363,8 +388,12 @@ impl<'a> Batch<'a> {
         &self,
         task: &Task,
         request: &script::EpisodeRequest,
+        origin: Option<&Origin>,
     ) -> Result<(EpisodeSpec, script::Episode), Failure> {
-        let opened = self.open(request)?;
+        let mut opened = self.open(request)?;
+        if let Some(origin) = origin {
+            origin.start.apply(&mut opened.scene);
+        }
         let limit = target_asset(&opened.nominal, task).and_then(|asset| self.limit_of(asset));
         let which = Which {
             suite: &self.name,
@@ -376,6 +405,7 @@ impl<'a> Batch<'a> {
         let scenes = (&opened.nominal, opened.scene.clone());
         let mut spec = EpisodeSpec::new(&which, task, scenes, &self.settings);
         spec.identity.privileged = self.is_privileged();
+        spec.identity.origin = origin.cloned().map(Box::new);
         Ok((EpisodeSpec { limit, trace: self.run.trace, ..spec }, opened))
     }
 

@@ -1,9 +1,12 @@
 //! `softvt dataset`: looking into recorded demonstrations; and simulating one again.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 
 use super::{
-    Failure, print,
+    Failure, again, print,
     replay::{self, Which},
 };
 use crate::{
@@ -14,6 +17,7 @@ use crate::{
         stats,
     },
     report::runs::StoredRun,
+    rollout::{batch, stop},
 };
 
 /// Whether a path is that of a data set: an HDF5 file, or the folder of a recording.
@@ -42,11 +46,47 @@ pub fn check(path: &Path, replays: usize) -> Result<(), Failure> {
         "{} demonstrations, {} steps, {} videos: nothing is wrong\n",
         findings.demos, findings.steps, findings.videos
     ));
-    for (file, demo) in spread(&all(path)?, replays) {
-        let state = repeat(&file, demo)?;
-        print(&format!("{} demo_{demo}: the same to the byte, final state {state}\n", file.display()));
+    repeat_all(&spread(&all(path)?, replays))
+}
+
+/// Simulates demonstrations again by their actions alone, and says of each whether it comes out the same, and of how many the
+/// goal is reached.
+///
+/// # Errors
+/// One cannot be simulated, or (exit code 1) comes out different.
+fn repeat_all(demos: &[(PathBuf, usize)]) -> Result<(), Failure> {
+    let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
+    let mut done: BTreeMap<usize, Repeated> = BTreeMap::new();
+    let repeat = |index: usize| repeat(&demos[index].0, demos[index].1);
+    batch::run(demos.len(), threads, &stop::FLAG, repeat, |index, repeated| {
+        done.insert(index, repeated);
+        Ok(())
+    })?;
+    if stop::requested() {
+        return Err(Failure::interrupted("interrupted"));
     }
-    Ok(())
+    for ((file, demo), Repeated { state, different, .. }) in demos.iter().zip(done.values()) {
+        let how = different.as_ref().map_or_else(
+            || format!("the same to the byte, final state {state}"),
+            |what| format!("does not come out the same: {what}"),
+        );
+        print(&format!("{} demo_{demo}: {how}\n", file.display()));
+    }
+    let count = |of: fn(&Repeated) -> bool| done.values().filter(|repeated| of(repeated)).count();
+    let (same, goal) = (count(|one| one.different.is_none()), count(|one| one.goal));
+    if demos.len() > 1 {
+        let all = demos.len();
+        print(&format!(
+            "by their actions alone: {same} of {all} the same to the byte, {goal} of {all} reach the goal\n"
+        ));
+    }
+    if same == demos.len() {
+        return Ok(());
+    }
+    Err(Failure::wrong_here(format!(
+        "{} demonstrations do not come out the same; softvt doctor says whether this machine computes as published",
+        demos.len() - same
+    )))
 }
 
 /// Prints and draws how a data set is distributed.
@@ -101,9 +141,7 @@ pub fn replay(path: &Path, which: Which) -> Result<(), Failure> {
         }
         Which::Of(_, demo) => (path.to_owned(), demo as usize),
     };
-    let state = repeat(&file, demo)?;
-    print(&format!("{} demo_{demo}: the same to the byte, final state {state}\n", file.display()));
-    Ok(())
+    repeat_all(&[(file, demo)])
 }
 
 /// Refuses a folder whose recording is not finished.
@@ -136,14 +174,29 @@ fn spread(all: &[(PathBuf, usize)], count: usize) -> Vec<(PathBuf, usize)> {
     (0..count).map(|i| all[i * all.len() / count].clone()).collect()
 }
 
+/// What came of a demonstration that was simulated again.
+struct Repeated {
+    /// Hash of the final state.
+    state: String,
+    /// In what it differs from what was recorded, if it does.
+    different: Option<String>,
+    /// Whether the goal was reached.
+    goal: bool,
+}
+
 /// Simulates a demonstration again by the actions in its file.
-fn repeat(path: &Path, demo: usize) -> Result<String, Failure> {
+fn repeat(path: &Path, demo: usize) -> Result<Repeated, Failure> {
     let file = TaskFile::open(path).map_err(Failure::input)?;
     let record = file.record(demo).map_err(Failure::input)?;
     let info = file.environment().map_err(Failure::input)?["env_kwargs"].clone();
     let actions = file.actions(demo).map_err(Failure::input)?;
     let stored = StoredRun { dir: path.to_owned(), info, records: Vec::new(), finished: true, torn: false };
-    replay::again(&stored, &record, actions)
+    let simulated = replay::simulate(&stored, &record, actions)?;
+    Ok(Repeated {
+        different: again::difference(&record, &simulated)?,
+        goal: simulated.verdict.goal,
+        state: simulated.stats.state_hash,
+    })
 }
 
 #[cfg(test)]

@@ -98,6 +98,11 @@ impl Choice {
         Self::new(Driver::Given, "replay".to_owned())
     }
 
+    /// Whoever drove in another world.
+    pub fn import() -> Self {
+        Self::new(Driver::Given, "import".to_owned())
+    }
+
     /// A client of `softvt serve`.
     pub fn client() -> Self {
         Self::new(Driver::Given, "client".to_owned())
@@ -227,7 +232,7 @@ impl Drivers {
             }
             (Driver::Recorded(runs), _) => {
                 let actions = runs.actions(&self.of.0, self.of.1, &brief)?;
-                chunked(Box::new(Recorded::new(actions, None)), 1)
+                chunked(Box::new(Recorded::poses(&actions, None)), 1)
             }
             (Driver::Lua(file, replan), _) => {
                 let policy = file.start(&opened.seed).map_err(Failure::input)?;

@@ -34,7 +34,10 @@ pub fn command(options: &[OptionSpec]) -> Result<clap::Command, Failure> {
             .mut_subcommand("check", |check| check.arg(script_arg(option, long.clone())))
             .mut_subcommand("serve", |serve| serve.arg(script_arg(option, long.clone())))
             .mut_subcommand("view", |view| view.arg(script_arg(option, long.clone())))
-            .mut_subcommand("record", |record| record.arg(script_arg(option, long)));
+            .mut_subcommand("record", |record| record.arg(script_arg(option, long.clone())))
+            .mut_subcommand("dataset", |dataset| {
+                dataset.mut_subcommand("import", |import| import.arg(script_arg(option, long)))
+            });
     }
     Ok(command)
 }
@@ -79,12 +82,14 @@ pub fn list(name: &'static str, help: &'static str) -> Arg {
     flag(name, help).action(ArgAction::Append).value_delimiter(',')
 }
 
-/// A command on a script with what decides how an episode goes.
+/// A command on a script with what decides how an episode goes: who drives, and in what.
 fn on_script(command: clap::Command) -> clap::Command {
+    on_scenes(driver(command))
+}
+
+/// Who drives.
+fn driver(command: clap::Command) -> clap::Command {
     command
-        .arg(
-            Arg::new("file").value_name("FILE.lua").help("The script whose plan to carry out").required(true),
-        )
         .arg(
             flag("policy", "Who drives")
                 .value_name("POLICY")
@@ -121,6 +126,14 @@ fn on_script(command: clap::Command) -> clap::Command {
                 .value_parser(patience),
         )
         .arg(flag("name", "How results call the policy").value_name("NAME").value_parser(policy_name))
+}
+
+/// The script, and what changes its scenes and their physics.
+fn on_scenes(command: clap::Command) -> clap::Command {
+    command
+        .arg(
+            Arg::new("file").value_name("FILE.lua").help("The script whose plan to carry out").required(true),
+        )
         .arg(
             flag("seed", "Base seed")
                 .value_name("S")
@@ -263,17 +276,13 @@ fn runner() -> clap::Command {
 }
 
 fn record() -> clap::Command {
-    on_script(clap::Command::new("record").about("Records demonstrations: HDF5, videos, and a manifest"))
+    let about = "Records demonstrations: HDF5, videos, and a manifest";
+    data_set(on_script(clap::Command::new("record").about(about)))
         .arg(
             flag("demos", "Demonstrations a task")
                 .value_name("N")
                 .default_value("50")
                 .value_parser(value_parser!(u32).range(1..=100_000)),
-        )
-        .arg(
-            flag("out", "Where to write: a new folder, or with --resume that of a recording")
-                .value_name("DIR")
-                .required(true),
         )
         .arg(
             list("task", "Only these tasks: indices or parts of prompts, joined by commas")
@@ -286,6 +295,39 @@ fn record() -> clap::Command {
             )
             .value_name("N")
             .value_parser(value_parser!(u32).range(1..=1_000_000)),
+        )
+}
+
+fn import() -> clap::Command {
+    let about = "Re-executes demonstrations of robomimic, LIBERO, SoftVTBench or softvt in a suite, and records those that are safe and \
+                 reach the goal";
+    data_set(on_scenes(clap::Command::new("import").about(about)))
+        .arg(
+            Arg::new("files").value_name("FILE.hdf5").required(true).num_args(1..).help("Files of demonstrations"),
+        )
+        .arg(
+            flag("task", "The task of all these demonstrations, if they do not say it: its index or part of its prompt")
+                .value_name("TASK")
+                .action(ArgAction::Append),
+        )
+        .arg(
+            flag("attempts", "Most demonstrations of a task to re-execute, the first ones [default: all]")
+                .value_name("N")
+                .value_parser(value_parser!(u32).range(1..=1_000_000)),
+        )
+        .arg(
+            flag("layout", "Objects start where the suite's layouts put them, whatever the files say")
+                .action(ArgAction::SetTrue),
+        )
+}
+
+/// What commands have in common that make data sets.
+fn data_set(command: clap::Command) -> clap::Command {
+    command
+        .arg(
+            flag("out", "Where to write: a new folder, or with --resume that of a recording")
+                .value_name("DIR")
+                .required(true),
         )
         .arg(
             flag("images", "Where pictures are: in the HDF5 files and as videos, or only as videos")
@@ -312,16 +354,17 @@ fn dataset() -> clap::Command {
     let path =
         || Arg::new("path").value_name("DATASET").required(true).help("Its folder, or one of its HDF5 files");
     clap::Command::new("dataset")
-        .about("Looks into recorded demonstrations, and exports them")
+        .about("Looks into recorded demonstrations, exports them, and takes in those of others")
         .subcommand_required(true)
         .arg_required_else_help(true)
         .subcommand(
             clap::Command::new("check")
                 .about("Says what is wrong with a data set: counts, shapes, rates, numbers, videos, and whether it can be repeated")
                 .arg(path())
-                .arg(flag("replay", "Demonstrations to simulate again, spread over the tasks").value_name("N").default_value("1").value_parser(value_parser!(u32))),
+                .arg(flag("replay", "Demonstrations to simulate again, spread over the tasks: a number, or all").value_name("N").default_value("1").value_parser(replays)),
         )
         .subcommand(export::command(path()))
+        .subcommand(import())
         .subcommand(
             clap::Command::new("stats")
                 .about("Prints and draws the distributions of actions, lengths and deformations")
@@ -337,6 +380,13 @@ fn video(word: &str) -> Result<String, String> {
         Ok(word.to_owned())
     } else {
         Err("expected failed, all, or episodes such as 0,3".to_owned())
+    }
+}
+
+fn replays(word: &str) -> Result<usize, String> {
+    match word {
+        "all" => Ok(usize::MAX),
+        number => number.parse().map_err(|_| "expected a number, or all".to_owned()),
     }
 }
 

@@ -15,6 +15,7 @@ use super::{
 };
 use crate::{
     benchmark::{Task, settings::Settings},
+    dataset::card::Imported,
     policy::profile::Profile,
     report::run_folder::{RUN, RunFolder, write_json},
 };
@@ -37,6 +38,9 @@ pub struct RunInfo<'a> {
     /// Whose actions were carried out once more.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub replayed: Option<&'a Replayed>,
+    /// The files of foreign demonstrations that are re-executed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub imported: Option<&'a [Imported]>,
     /// Actions of a chunk that are carried out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub replan: Option<usize>,
@@ -75,6 +79,7 @@ impl<'a> RunInfo<'a> {
             profile: run.policy.profile(),
             policy_file: run.policy.file(),
             replayed: batch.replayed.as_ref(),
+            imported: Some(&batch.imported[..]).filter(|files| !files.is_empty()),
             replan: run.policy.replan(),
             privileged: batch.is_privileged(),
             seed: run.seed,
@@ -98,7 +103,7 @@ impl<'a> RunInfo<'a> {
 ///
 /// # Errors
 /// The file cannot be written, or is that of another run.
-pub fn write(folder: &RunFolder, info: &RunInfo) -> Result<(), Failure> {
+pub fn write(folder: &RunFolder, info: &impl Serialize) -> Result<(), Failure> {
     let Some(known) = folder.read(RUN).map_err(folder_failure)? else {
         return write_json(&folder.path().join(RUN), info).map_err(folder_failure);
     };

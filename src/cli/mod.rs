@@ -17,12 +17,15 @@ mod files;
 mod first_look;
 mod flags;
 mod grips;
+mod import;
+mod import_task;
 mod info;
 mod init;
 mod list;
 mod progress;
 mod record;
 mod recorded;
+mod recording;
 mod replay;
 mod report;
 mod require;
@@ -135,6 +138,7 @@ fn carry_out(words: &[String]) -> Result<(), Failure> {
         Command::Serve(serve) => serve::run(&serve),
         Command::Record(record) => record::run(&record),
         Command::DatasetCheck { path, replays } => dataset::check(&path, replays),
+        Command::DatasetImport(import) => import::run(&import),
         Command::DatasetStats { path, out, json } => dataset::stats(&path, out.as_deref(), json),
         Command::DatasetExport(export) => export::run(&export),
         Command::Doctor => doctor::run(),

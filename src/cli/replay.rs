@@ -76,18 +76,8 @@ pub(super) fn again(
     record: &EpisodeRecord,
     recorded: Vec<Action>,
 ) -> Result<String, Failure> {
-    let run = run_of(stored)?;
-    let loaded = script::load(&run.file, &run.script_words).map_err(Failure::input)?;
-    let suite = suite_of(&loaded.plan, &run, stored)?;
+    let simulated = simulate(stored, record, recorded)?;
     let (task, episode) = (record.identity.task, record.identity.episode);
-    let run = Run { tasks: vec![task.to_string()], ..run };
-    let tasks = chosen(&run, suite)?;
-    let mut batch = Batch::new(&run, &loaded, suite, (vec![(tasks[0], episode)], PathBuf::new()))?;
-    batch.split = split_of(stored)?;
-    batch.drive = once_more::drive(recorded, record);
-    batch.prepare(&tasks)?;
-    same_sources(stored, &batch)?;
-    let simulated = once_more::known(batch.episode(0, false, &batch.drive)?.record, record);
     let Some(what) = once_more::difference(record, &simulated)? else {
         return Ok(simulated.stats.state_hash);
     };
@@ -97,6 +87,30 @@ pub(super) fn again(
             "task {task} episode {episode} does not come out the same: {what}; softvt doctor says whether this machine computes as published"
         ),
     })
+}
+
+/// An episode of a run once more by its actions, with what is not simulated again.
+///
+/// # Errors
+/// The scripts have changed since, or the episode cannot be run.
+pub(super) fn simulate(
+    stored: &StoredRun,
+    record: &EpisodeRecord,
+    recorded: Vec<Action>,
+) -> Result<EpisodeRecord, Failure> {
+    let run = run_of(stored)?;
+    let loaded = script::load(&run.file, &run.script_words).map_err(Failure::input)?;
+    let suite = suite_of(&loaded.plan, &run, stored)?;
+    let (task, episode) = (record.identity.task, record.identity.episode);
+    let run = Run { tasks: vec![task.to_string()], ..run };
+    let tasks = chosen(&run, suite)?;
+    let mut batch = Batch::new(&run, &loaded, suite, (vec![(tasks[0], episode)], PathBuf::new()))?;
+    batch.split = split_of(stored)?;
+    batch.drive = once_more::drive(recorded, record);
+    batch.origins.extend(record.identity.origin.iter().map(|origin| ((task, episode), (**origin).clone())));
+    batch.prepare(&tasks)?;
+    same_sources(stored, &batch)?;
+    Ok(once_more::known(batch.episode(0, false, &batch.drive)?.record, record))
 }
 
 fn find(stored: &StoredRun, which: Which) -> Result<&EpisodeRecord, Failure> {

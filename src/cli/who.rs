@@ -9,6 +9,7 @@ use std::{
 
 use super::{
     Failure,
+    dataset::is_dataset,
     drivers::{Answering, Choice, Driver, Hand},
     recorded::RecordedRuns,
 };
@@ -85,9 +86,19 @@ pub fn policy_word(word: &str) -> Result<Word, String> {
         "random" => Word::Random,
         address if address.contains("://") => Word::Server(address.to_owned()),
         file if file.ends_with(".lua") => Word::Lua(file.into()),
+        data if is_dataset(Path::new(data)) => return Err(no_driver(data)),
         folder if Path::new(folder).is_dir() => Word::Run(folder.into()),
         other => return Err(no_policy(other)),
     })
+}
+
+/// What to do with demonstrations instead of letting them drive: they begin in episodes that no run has.
+fn no_driver(data: &str) -> String {
+    format!(
+        "{data} holds demonstrations, which drive in the episodes that they were recorded in: softvt replay {data} 0/0 simulates one \
+         again, softvt dataset check {data} --replay all all of them, softvt dataset import SUITE.lua FILE.hdf5 --out DIR those \
+         of another world"
+    )
 }
 
 fn no_policy(word: &str) -> String {

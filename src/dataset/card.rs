@@ -34,6 +34,21 @@ pub struct TaskCount {
     pub video_bytes: u64,
 }
 
+/// A file of foreign demonstrations.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Imported {
+    /// Its name, without the folders above.
+    pub file: String,
+    /// SHA-256, hexadecimal.
+    pub sha256: String,
+    /// How it is laid out.
+    pub layout: String,
+    /// Its demonstrations.
+    pub demos: usize,
+    /// What was carried out of them.
+    pub commands: String,
+}
+
 /// A data set.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Card {
@@ -45,6 +60,9 @@ pub struct Card {
     pub pictures: bool,
     /// Whether the privileged streams are there.
     pub privileged: bool,
+    /// The files of foreign demonstrations that were re-executed, if it was made of such.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub imported: Vec<Imported>,
     /// Its tasks.
     pub tasks: Vec<TaskCount>,
 }
@@ -112,8 +130,24 @@ impl Card {
                 "| {suite} | {id} | {prompt} | {asset} | {demos} | {samples} | {attempts} | {reasons} |"
             );
         }
+        page += &self.sources();
         page += PAGE;
         page
+    }
+
+    /// Where imported demonstrations are from.
+    fn sources(&self) -> String {
+        if self.imported.is_empty() {
+            return String::new();
+        }
+        let mut text = "\nImported: demonstrations of other worlds, re-executed in this one under its physics and sensors and judged anew.\n\n\
+                        | file | SHA-256 | layout | demos | carried out |\n|---|---|---|---|---|\n"
+            .to_owned();
+        for Imported { file, sha256, layout, demos, commands } in &self.imported {
+            // Writing into a string cannot fail.
+            let _ = writeln!(text, "| {file} | {sha256} | {layout} | {demos} | {commands} |");
+        }
+        text
     }
 }
 

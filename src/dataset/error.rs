@@ -20,7 +20,15 @@ pub enum DatasetError {
         /// What the system said.
         source: io::Error,
     },
-    /// The file is no HDF5, or a broken one.
+    /// There is no HDF5 file.
+    #[error("{path} {what}")]
+    NoFile {
+        /// What should be one.
+        path: String,
+        /// What it is instead.
+        what: String,
+    },
+    /// The file is damaged, or what is looked for is not in it.
     #[error("{path}: {key}: {what}")]
     Hdf5 {
         /// The file.
@@ -76,7 +84,8 @@ impl DatasetError {
             other => {
                 let what = other.to_string();
                 let said = what.rsplit_once("I/O error: ").map(|(_, said)| said.to_owned());
-                Self::Hdf5 { path, key, what: said.unwrap_or(what) }
+                let damaged = || format!("it cannot be read; is the file damaged? ({what})");
+                Self::Hdf5 { path, key, what: said.unwrap_or_else(damaged) }
             }
         }
     }

@@ -8,7 +8,7 @@ use super::{
     DatasetError, files,
     layout::{MANIFEST, TaskPlace, VIDEOS},
 };
-use crate::evaluation::record::EpisodeRecord;
+use crate::evaluation::record::{EpisodeRecord, Origin};
 
 /// Version of this form.
 pub const SCHEMA: u32 = 1;
@@ -44,6 +44,9 @@ pub struct Entry {
     pub seed: u64,
     /// Hash of the final state.
     pub state_hash: String,
+    /// The foreign demonstration that it re-executes, if any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub origin: Option<Box<Origin>>,
     /// Videos by stream, from the folder of the data set.
     pub video_files: BTreeMap<String, String>,
 }
@@ -68,6 +71,7 @@ impl Entry {
             d_peak: record.verdict.d_peak,
             seed: id.seed,
             state_hash: record.stats.state_hash.clone(),
+            origin: id.origin.clone(),
             video_files: videos
                 .map(|(i, name)| ((*name).to_owned(), place.video_relative(demo, i)))
                 .collect(),

@@ -11,6 +11,7 @@ mod demonstration;
 mod error;
 pub mod files;
 mod hidden;
+pub mod import;
 pub mod layout;
 pub mod lerobot;
 pub mod manifest;

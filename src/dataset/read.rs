@@ -47,13 +47,23 @@ impl TaskFile {
     /// # Errors
     /// It cannot be read, is no HDF5, is cut off, or has no `/data/demo_0`.
     pub fn open(path: &Path) -> Result<Self, DatasetError> {
-        // The library names no file.
-        let size = std::fs::metadata(path).map_err(DatasetError::io("read", path))?.len();
-        let file = H5File::open(path).map_err(|e| DatasetError::hdf5(path, "no HDF5 file, or cut off")(e))?;
-        if let Some(end) = end_of(path).filter(|end| *end > size) {
-            let what = format!("cut off: {size} bytes of {end}");
-            return Err(DatasetError::content(path, "/", what));
+        let about = std::fs::metadata(path).map_err(DatasetError::io("read", path))?;
+        let file = || path.display().to_string();
+        if about.is_dir() {
+            return Err(DatasetError::NoFile { path: file(), what: "is a folder, no HDF5 file".to_owned() });
         }
+        match end_of(path) {
+            None => {
+                let what = "is no HDF5 file: it does not begin as one".to_owned();
+                return Err(DatasetError::NoFile { path: file(), what });
+            }
+            Some(end) if end > about.len() => {
+                let what = cut_short(about.len(), end);
+                return Err(DatasetError::NoFile { path: file(), what });
+            }
+            Some(_) => {}
+        }
+        let file = H5File::open(path).map_err(|e| DatasetError::hdf5(path, "/")(e))?;
         let data = file.root_group().group("data").map_err(|e| DatasetError::hdf5(path, "/data")(e))?;
         let names = data.group_names().map_err(|e| DatasetError::hdf5(path, "/data")(e))?;
         let mut demos: Vec<usize> =
@@ -125,7 +135,24 @@ impl TaskFile {
         Ok(self.dataset(demo, "actions")?.shape().first().copied().unwrap_or(0))
     }
 
-    fn dataset(&self, demo: usize, name: &str) -> Result<H5Dataset, DatasetError> {
+    /// Text of an attribute of `/data`, if it has such.
+    pub(super) fn about(&self, attribute: &str) -> Option<String> {
+        self.data.attr_string(attribute).ok()
+    }
+
+    /// Whether a demonstration has a data set.
+    pub(super) fn has(&self, demo: usize, name: &str) -> bool {
+        self.dataset(demo, name).is_ok()
+    }
+
+    /// Names of the groups in a group of a demonstration; none if it is not there.
+    pub(super) fn groups(&self, demo: usize, path: &str) -> Vec<String> {
+        let inner =
+            path.split('/').try_fold(self.group(demo).ok(), |group, name| Some(group?.group(name).ok()));
+        inner.flatten().and_then(|group| group.group_names().ok()).unwrap_or_default()
+    }
+
+    pub(super) fn dataset(&self, demo: usize, name: &str) -> Result<H5Dataset, DatasetError> {
         self.group(demo)?;
         let key = format!("data/demo_{demo}/{name}");
         self.file.dataset(&key).map_err(|e| DatasetError::hdf5(&self.path, format!("/{key}"))(e))
@@ -271,18 +298,36 @@ impl TaskFile {
     }
 }
 
-/// Where a file says that it ends (HDF5 file format, II.A: the superblock), if it begins as such files do.
+fn cut_short(size: u64, end: u64) -> String {
+    match end {
+        u64::MAX => format!("is cut short: only {size} bytes are there"),
+        end => format!("is cut short: {size} of {end} bytes are there"),
+    }
+}
+
+/// What HDF5 files begin with.
+const SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
+
+/// Where a file says that it ends (HDF5 file format, II.A: the superblock); none if it does not begin as such files do.
 fn end_of(path: &Path) -> Option<u64> {
     let mut head = Vec::new();
     File::open(path).and_then(|file| file.take(64).read_to_end(&mut head)).ok()?;
+    if !head.starts_with(SIGNATURE) {
+        return None;
+    }
+    Some(stated_end(&head).unwrap_or(u64::MAX))
+}
+
+/// The end that a superblock states, 0 if its numbers are not of 8 bytes; none if it is cut short itself.
+fn stated_end(head: &[u8]) -> Option<u64> {
     // Behind signature and versions, sizes and flags come base address, extension or free space, and the end; 8 bytes each.
     let (width, at) = match head.get(8)? {
         0 => (13, 40),
         1 => (13, 44),
         _ => (9, 28),
     };
-    if head.get(width) != Some(&8) {
-        return None;
+    if *head.get(width)? != 8 {
+        return Some(0);
     }
     Some(u64::from_le_bytes(head.get(at..at + 8)?.try_into().ok()?))
 }

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::judge::Verdict;
+use crate::scene::Start;
 
 /// How a rollout ended.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -61,6 +62,24 @@ pub struct Identity {
     pub asset: String,
     /// Whether the target deforms.
     pub soft: bool,
+    /// Which foreign demonstration it re-executes, if any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub origin: Option<Box<Origin>>,
+}
+
+/// A demonstration that was made in another world, of which an episode takes its start and its actions.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Origin {
+    /// Its file, without the folders above.
+    pub file: String,
+    /// SHA-256 of the file, hexadecimal.
+    pub sha256: String,
+    /// Name of the demonstration in the file.
+    pub demo: String,
+    /// How the file is laid out.
+    pub layout: String,
+    /// What the episode starts from instead of what its layout made.
+    pub start: Start,
 }
 
 /// What the run itself counted.
@@ -127,6 +146,7 @@ pub(crate) mod tests {
             privileged: false,
             asset: "bun".into(),
             soft: true,
+            origin: None,
         };
         let verdict = Verdict {
             goal: true,

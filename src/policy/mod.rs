@@ -5,7 +5,7 @@ mod chunked;
 pub mod decode;
 pub mod encode;
 mod observation;
-mod osc;
+pub mod osc;
 pub mod profile;
 pub mod recorded;
 pub mod remote;

@@ -6,7 +6,11 @@
 //! solution is x(t) = g + e^{−ωt} ((x₀ − g) + (v₀ + ω (x₀ − g)) t) with ω = √kp. Position and rotation vector both follow it.
 
 use super::{Action, Observation};
-use crate::{benchmark::control::CONTROL_DT, geometry::Vec3, robot::rotation};
+use crate::{
+    benchmark::control::CONTROL_DT,
+    geometry::{Quat, Vec3},
+    robot::rotation,
+};
 
 /// Stiffness of the spring, 1/s².
 const KP: f64 = 150.0;
@@ -29,13 +33,15 @@ impl Osc {
 
 /// The pose a step away from where the tool is now.
 pub fn whole(now: &Observation, translation_b: Vec3, rotation_b: Vec3, closure: f64) -> Action {
-    let orientation =
-        rotation::from_axis_angle(&rotation_b) * rotation::from_axis_angle(&now.ee_axis_angle_b);
-    Action {
-        position_b: now.ee_position_b + translation_b,
-        axis_angle_b: rotation::axis_angle(&orientation),
-        closure,
-    }
+    let tool_b = (now.ee_position_b, rotation::from_axis_angle(&now.ee_axis_angle_b));
+    goal(tool_b, translation_b, rotation_b, closure)
+}
+
+/// The pose a step away from a place and an orientation of the tool: the goal that robosuite's controller sets itself. The
+/// turn is about the axes of the base.
+pub fn goal((at_b, turned_b): (Vec3, Quat), translation_b: Vec3, rotation_b: Vec3, closure: f64) -> Action {
+    let orientation = rotation::from_axis_angle(&rotation_b) * turned_b;
+    Action { position_b: at_b + translation_b, axis_angle_b: rotation::axis_angle(&orientation), closure }
 }
 
 /// How far the spring gets towards a goal `step` away in a control step; leaves it with its velocity then.

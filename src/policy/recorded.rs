@@ -1,19 +1,35 @@
-//! Actions that were recorded before, carried out again.
+//! Commands that were recorded before, carried out again.
 
-use super::{Action, ActionChunk, Observation, Policy, PolicyError};
+use super::{Action, ActionChunk, Command, Observation, Policy, PolicyError};
+use crate::geometry::Vec3;
 
-/// Carries out recorded actions, one a control step.
+/// Carries out recorded commands, one a control step.
 #[derive(Clone, Debug)]
 pub struct Recorded {
-    actions: std::vec::IntoIter<Action>,
-    last: Option<Action>,
+    commands: std::vec::IntoIter<Command>,
+    last: Option<Command>,
     ending: Option<String>,
 }
 
 impl Recorded {
-    /// Behind the last of `actions` it stays there; or fails as the recorded episode did, if that is given.
-    pub fn new(actions: Vec<Action>, ending: Option<String>) -> Self {
-        Self { actions: actions.into_iter(), last: None, ending }
+    /// Behind the last of `commands` the tool stays there; or fails as the recorded episode did, if that is given.
+    pub fn new(commands: Vec<Command>, ending: Option<String>) -> Self {
+        Self { commands: commands.into_iter(), last: None, ending }
+    }
+
+    /// The same for poses.
+    pub fn poses(actions: &[Action], ending: Option<String>) -> Self {
+        Self::new(actions.iter().copied().map(Command::Pose).collect(), ending)
+    }
+}
+
+/// What keeps the tool where a command has brought it.
+fn held(command: Command) -> Command {
+    match command {
+        Command::Pose(_) => command,
+        Command::Step { whole, closure, .. } => {
+            Command::Step { whole, translation_b: Vec3::zeros(), rotation_b: Vec3::zeros(), closure }
+        }
     }
 }
 
@@ -23,14 +39,15 @@ impl Policy for Recorded {
     }
 
     fn act(&mut self, observation: &Observation) -> Result<ActionChunk, PolicyError> {
-        if let Some(action) = self.actions.next() {
-            self.last = Some(action);
-            return Ok(action.into());
+        if let Some(command) = self.commands.next() {
+            self.last = Some(command);
+            return Ok(ActionChunk { commands: vec![command] });
         }
         if let Some(message) = &self.ending {
             return Err(PolicyError::Action(message.clone()));
         }
         let (position_b, axis_angle_b) = (observation.ee_position_b, observation.ee_axis_angle_b);
-        Ok(self.last.unwrap_or(Action { position_b, axis_angle_b, closure: 0.0 }).into())
+        let still = Command::Pose(Action { position_b, axis_angle_b, closure: 0.0 });
+        Ok(ActionChunk { commands: vec![self.last.map_or(still, held)] })
     }
 }

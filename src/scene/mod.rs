@@ -5,6 +5,7 @@ mod articulated;
 mod camera;
 mod light;
 mod print;
+mod start;
 mod visual;
 
 mod fingerprint;
@@ -19,6 +20,7 @@ pub use articulated::{Joint, Motion, Part, part_poses};
 pub use camera::{Camera, CameraMount, POLICY_EDGE, fovy_of_lens};
 pub use light::{KeyLight, Lighting, Sky};
 pub use print::{Letters, Line, MOST_LETTERS, Print, Typeface};
+pub use start::{Place, Start};
 pub use visual::{Layer, Mask, Visual};
 
 /// How an object moves.

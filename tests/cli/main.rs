@@ -11,6 +11,7 @@ mod documents;
 mod endless;
 mod files;
 mod given_up;
+mod importing;
 mod interrupt;
 mod joints;
 mod killed;

@@ -1,0 +1,205 @@
+//! Which task a foreign demonstration is of: by `--task`, by its instruction, or by the index that it gives itself.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::{Failure, args::Run, evaluate::chosen};
+use crate::{
+    benchmark::{Suite, Task},
+    dataset::import::{Begins, Foreign, ForeignDemo, ForeignTask, Layout},
+};
+
+/// A demonstration with the task and attempt that it becomes.
+pub struct Matched<'a> {
+    /// Its file.
+    pub file: &'a Foreign,
+    /// The demonstration.
+    pub demo: &'a ForeignDemo,
+    /// Place of the suite in the list.
+    pub suite: usize,
+    /// Index of the task.
+    pub task: usize,
+    /// Number of the attempt.
+    pub attempt: u32,
+}
+
+/// Finds the tasks of all demonstrations, at most `most` of each task, and numbers their attempts: those of softvt keep their
+/// numbers, the others take those that are free, in order.
+///
+/// # Errors
+/// One is of no task, of several, or of another seed; or two are of one attempt.
+pub fn match_all<'a>(
+    run: &Run,
+    suites: &[&Suite],
+    files: &'a [Foreign],
+    most: u32,
+) -> Result<Vec<Matched<'a>>, Failure> {
+    let forced = named(run, suites)?;
+    let mut found: Vec<(Matched, Option<u32>)> = Vec::new();
+    let mut count: BTreeMap<(usize, usize), u32> = BTreeMap::new();
+    for file in files {
+        for demo in &file.demos {
+            let (suite, task) = match forced {
+                Some(forced) => forced,
+                None => task_of(run, suites, file, demo)?,
+            };
+            let count = count.entry((suite, task)).or_default();
+            *count += 1;
+            if *count <= most {
+                let own = own_attempt(run, file, demo)?;
+                found.push((Matched { file, demo, suite, task, attempt: 0 }, own));
+            }
+        }
+    }
+    number(&mut found)?;
+    Ok(found.into_iter().map(|(matched, _)| matched).collect())
+}
+
+/// The one task that `--task` names, if it is given: its suite's place in the list, and its index.
+///
+/// # Errors
+/// It names none or several.
+fn named(run: &Run, suites: &[&Suite]) -> Result<Option<(usize, usize)>, Failure> {
+    if run.tasks.is_empty() {
+        return Ok(None);
+    }
+    let mut found = Vec::new();
+    let mut refused = None;
+    for (index, suite) in suites.iter().enumerate() {
+        match chosen(run, suite) {
+            Ok(tasks) => found.extend(tasks.iter().map(|task| (index, task.id))),
+            Err(failure) => refused = Some(failure),
+        }
+    }
+    match (&found[..], refused) {
+        ([one], _) => Ok(Some(*one)),
+        ([], Some(failure)) => Err(failure),
+        _ => Err(Failure::input(format!(
+            "{}: --task {}: {} tasks are named; an import is of the one that the demonstrations are of",
+            run.file.display(),
+            run.tasks.join(","),
+            found.len()
+        ))),
+    }
+}
+
+fn number(found: &mut [(Matched, Option<u32>)]) -> Result<(), Failure> {
+    let mut taken: BTreeSet<(usize, usize, u32)> = BTreeSet::new();
+    for (one, own) in found.iter_mut() {
+        let Some(attempt) = own else { continue };
+        one.attempt = *attempt;
+        if !taken.insert((one.suite, one.task, *attempt)) {
+            return Err(Failure::input(format!(
+                "{}: {}: another demonstration is of the same task and attempt {attempt}; import them apart",
+                one.file.path.display(),
+                one.demo.name
+            )));
+        }
+    }
+    for (one, _) in found.iter_mut().filter(|(_, own)| own.is_none()) {
+        while !taken.insert((one.suite, one.task, one.attempt)) {
+            one.attempt += 1;
+        }
+    }
+    Ok(())
+}
+
+/// The attempt that a demonstration of softvt's was.
+fn own_attempt(run: &Run, file: &Foreign, demo: &ForeignDemo) -> Result<Option<u32>, Failure> {
+    match &demo.begins {
+        Begins::Elsewhere { .. } => Ok(None),
+        Begins::Episode { seed, attempt, .. } if *seed == run.seed => Ok(Some(*attempt)),
+        Begins::Episode { seed, .. } => Err(Failure::input(format!(
+            "{}: {}: it was recorded with the seed {seed}, and this import is of the seed {}; give --seed {seed}",
+            file.path.display(),
+            demo.name,
+            run.seed
+        ))),
+    }
+}
+
+/// Letters in their plainest form: case, blanks and a full stop do not count.
+fn plainly(text: &str) -> String {
+    let words = text.to_lowercase().replace('_', " ");
+    words.split_whitespace().collect::<Vec<_>>().join(" ").trim_end_matches('.').to_owned()
+}
+
+fn task_of(
+    run: &Run,
+    suites: &[&Suite],
+    file: &Foreign,
+    demo: &ForeignDemo,
+) -> Result<(usize, usize), Failure> {
+    let ForeignTask { suite, id, prompts } = &demo.task;
+    let all =
+        || suites.iter().enumerate().flat_map(|(i, suite)| suite.tasks.iter().map(move |task| (i, task)));
+    let named = |index: usize| {
+        suite
+            .as_ref()
+            .is_some_and(|name| plainly(&name.replace('-', "_")) == plainly(&run.name_of(suites[index])))
+    };
+    let is_ours = (0..suites.len()).any(named);
+    if file.layout == Layout::Softvt && !is_ours {
+        return Err(no_task(run, suites, file, demo));
+    }
+    let of_suite = |index: usize| !is_ours || named(index);
+    for prompt in prompts {
+        let says =
+            |(index, task): &(usize, &Task)| of_suite(*index) && plainly(&task.prompt) == plainly(prompt);
+        let fits: Vec<(usize, &Task)> = all().filter(says).collect();
+        let by_index = fits.iter().find(|(_, task)| Some(task.id) == *id);
+        match (&fits[..], by_index) {
+            ([], _) => {}
+            ([(index, task)], _) | (_, Some((index, task))) => return Ok((*index, task.id)),
+            _ => {
+                let ids: Vec<String> =
+                    fits.iter().map(|(i, task)| format!("{} task {}", suites[*i].name, task.id)).collect();
+                return Err(Failure::input(format!(
+                    "{}: {}: its instruction, {prompt:?}, is that of {}; name one with --task",
+                    file.path.display(),
+                    demo.name,
+                    ids.join(", ")
+                )));
+            }
+        }
+    }
+    let by_index: Vec<(usize, usize)> = all()
+        .filter(|(index, task)| of_suite(*index) && Some(task.id) == *id)
+        .map(|(i, task)| (i, task.id))
+        .collect();
+    let may_go_by_index = prompts.is_empty() && (is_ours || suite.is_none());
+    match by_index[..] {
+        [one] if may_go_by_index => Ok(one),
+        _ => Err(no_task(run, suites, file, demo)),
+    }
+}
+
+fn no_task(run: &Run, suites: &[&Suite], file: &Foreign, demo: &ForeignDemo) -> Failure {
+    let ForeignTask { suite, prompts, .. } = &demo.task;
+    let said = match (prompts.first(), suite) {
+        (Some(prompt), Some(suite)) => format!("{prompt:?} of the suite {suite}"),
+        (Some(prompt), None) => format!("{prompt:?}"),
+        (None, Some(suite)) => format!("a task of the suite {suite}"),
+        (None, None) => "a task that it does not tell".to_owned(),
+    };
+    let list = |suite: &&Suite| {
+        let tasks = suite.tasks.iter().map(|task| format!("\n  {} {}: {}", suite.name, task.id, task.prompt));
+        tasks.collect::<String>()
+    };
+    let listed: String = suites.iter().map(list).collect();
+    Failure::input(format!(
+        "{}: {}: it is of {said}, and {} has no such task; name one with --task if one is meant:{listed}",
+        file.path.display(),
+        demo.name,
+        run.file.display()
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn case_blanks_and_full_stops_do_not_count() {
+        assert_eq!(plainly(" Pick  up the_Cup. "), "pick up the cup");
+    }
+}

@@ -1,0 +1,55 @@
+//! The folder of a data set in the making.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use super::{super::info::difference, Failure, failure};
+use crate::dataset::{
+    files,
+    layout::{self, DATASET, PARTS, RECORDING},
+};
+
+/// Whether the folder holds this very recording, finished.
+///
+/// # Errors
+/// It holds another, or something else, or this one and it is not to go on.
+pub fn check(root: &Path, resume: bool, recording: &Value) -> Result<bool, Failure> {
+    let dir = root.display();
+    let path = root.join(RECORDING);
+    if !path.is_file() {
+        let found = std::fs::read_dir(root).ok().and_then(|mut entries| entries.next()?.ok());
+        return match found {
+            None => Ok(false),
+            Some(entry) => Err(Failure::input(format!(
+                "--out {dir}: it holds {} and no recording of softvt; nothing was written; give a new folder",
+                entry.file_name().to_string_lossy()
+            ))),
+        };
+    }
+    let known: Value = serde_json::from_str(&files::read_text(&path).map_err(failure)?)
+        .map_err(|e| Failure::input(format!("{}: no recording of softvt: {e}", path.display())))?;
+    if let Some(what) = difference(&known, recording) {
+        return Err(Failure::input(format!(
+            "--out {dir}: it holds another recording ({what}); give a new folder, or what it was started with"
+        )));
+    }
+    if !resume && !root.join(DATASET).is_file() {
+        return Err(Failure::input(format!(
+            "--out {dir}: it holds a recording that was broken off; go on with it by --resume, or give a new folder"
+        )));
+    }
+    Ok(root.join(DATASET).is_file())
+}
+
+/// Takes back what was written of a recording without any attempt; the folder itself goes too if nothing else is in it.
+pub fn take_back(root: &Path) {
+    let attempts = root.join(layout::ATTEMPTS);
+    // Folders with something in them stay, and then it is known what they are of.
+    let _ = std::fs::remove_dir(&attempts);
+    if !attempts.exists() {
+        let _ = std::fs::remove_dir_all(root.join(PARTS));
+        let _ = std::fs::remove_file(root.join(RECORDING));
+        let _ = std::fs::remove_dir(root);
+    }
+}

@@ -1,0 +1,214 @@
+//! SoftVTBench's files: absolute poses in the frame of the robot's base.
+//!
+//! Its actions are the pose *measured* when the action was taken, the finger's position and, in the longer form, the forces on
+//! both fingers (core/recorders/recorders.py); quaternions are w x y z.
+
+use super::{
+    super::{DatasetError, TaskFile},
+    Begins, ForeignDemo, Standing,
+    header::Header,
+    pose_of,
+    rows::{if_there, numbers, rows, wrong},
+    tool,
+};
+use crate::{
+    geometry::{Pose, Quat, Vec3},
+    policy::{Action, Command, profile::GripperCode},
+    robot::rotation,
+};
+
+/// The key of the recorded poses.
+const POSES: &str = "obs/eef_pose";
+const JOINTS: &str = "obs/arm_joint_pos";
+/// How far the recorded tool may be from ours, m: its frame may lie a little further out.
+const NEAR: f64 = 0.03;
+/// The gap in the middle between two orders of a quaternion's numbers that tells them apart, rad.
+const TOLD_APART: f64 = 0.3;
+/// A finger that is pressed by more than this holds something, N.
+const PRESSED: f64 = 0.1;
+/// Fingers count as measured, not commanded, if they are as near as this to the observed ones in every step, m.
+const MEASURED: f64 = 1e-4;
+/// Positions of a finger, m, with some slack, and its two codes.
+const FINGER: [f64; 2] = [-0.001, 0.045];
+const FINGERS: GripperCode = GripperCode { open: 0.04, shut: 0.0, binary: false };
+const SIGN: GripperCode = GripperCode { open: 1.0, shut: -1.0, binary: true };
+
+/// An action: seven numbers, and whether both fingers are pressed, if that is there.
+struct Row {
+    numbers: [f64; 7],
+    pressed: bool,
+}
+
+/// A demonstration of such a file.
+///
+/// # Errors
+/// Something is missing, or is not as expected.
+pub(super) fn demo(file: &TaskFile, header: &Header, demo: usize) -> Result<ForeignDemo, DatasetError> {
+    let actions = actions(file, demo)?;
+    let poses = poses(file, demo, &actions)?;
+    let joints = if_there::<7>(file, demo, JOINTS, actions.len())?;
+    let at_t = joints.as_ref().map_or(Ok(Vec3::zeros()), |joints| offset(file, demo, &poses, joints))?;
+    let grip = gripper(file, demo, &actions)?;
+    let measured = are_measured(file, demo, &actions)?;
+    let command = |row: &Row| {
+        let [x, y, z, a, b, c, finger] = row.numbers;
+        let axis_angle_b = Vec3::new(a, b, c);
+        let position_b = Vec3::new(x, y, z) - rotation::from_axis_angle(&axis_angle_b) * at_t;
+        Command::Pose(Action { position_b, axis_angle_b, closure: grip.closure(finger) })
+    };
+    let start = numbers(file, demo, "initial_state/articulation/robot/joint_position").ok();
+    let start = start.and_then(|(all, _)| all.get(..7)?.try_into().ok());
+    Ok(ForeignDemo {
+        name: format!("demo_{demo}"),
+        task: header.task(file, demo),
+        shut: actions.iter().map(|row| row.pressed || grip.closure(row.numbers[6]) > 0.5).collect(),
+        held: actions.iter().map(|row| measured && row.pressed).collect(),
+        commands: actions.iter().map(command).collect(),
+        begins: Begins::Elsewhere {
+            joints: start.or(joints.map(|all| all[0])).map(tool::within_limits),
+            things: things(file, demo)?,
+        },
+        said: "absolute poses and the fingers' positions",
+    })
+}
+
+fn actions(file: &TaskFile, demo: usize) -> Result<Vec<Row>, DatasetError> {
+    const KEY: &str = "actions";
+    if file.shape(demo, KEY)?.get(1) == Some(&7) {
+        let all = rows::<7>(file, demo, KEY, None)?;
+        return Ok(all.into_iter().map(|numbers| Row { numbers, pressed: false }).collect());
+    }
+    let all = rows::<13>(file, demo, KEY, None)?;
+    let pressed = |force: &[f64]| Vec3::from_column_slice(force).norm() > PRESSED;
+    let row = |row: &[f64; 13]| Row {
+        numbers: std::array::from_fn(|i| row[i]),
+        pressed: pressed(&row[7..10]) && pressed(&row[10..]),
+    };
+    Ok(all.iter().map(row).collect())
+}
+
+/// The recorded poses of the tool.
+///
+/// # Errors
+/// The quaternions are none, or of another order.
+fn poses(file: &TaskFile, demo: usize, actions: &[Row]) -> Result<Vec<Pose>, DatasetError> {
+    let all = rows::<7>(file, demo, POSES, Some(actions.len()))?;
+    let length = |row: &[f64; 7]| row[3..].iter().map(|x| x * x).sum::<f64>().sqrt();
+    if let Some(step) = all.iter().position(|row| (length(row) - 1.0).abs() > 1e-2) {
+        let what = format!("step {step}: no quaternion w x y z of length 1: {:?}", &all[step][3..]);
+        return Err(wrong(file, demo, POSES, what));
+    }
+    let order = |[w, x, y, z]: [usize; 4]| -> Vec<Quat> {
+        let q = |row: &[f64; 7]| nalgebra::Quaternion::new(row[3 + w], row[3 + x], row[3 + y], row[3 + z]);
+        all.iter().map(|row| Quat::new_normalize(q(row))).collect()
+    };
+    let commanded = |row: &Row| {
+        let [_, _, _, a, b, c, _] = row.numbers;
+        rotation::from_axis_angle(&Vec3::new(a, b, c))
+    };
+    let commanded: Vec<Quat> = actions.iter().map(commanded).collect();
+    let apart = [[0, 1, 2, 3], [3, 0, 1, 2]].map(|places| tool::mean_angle(&order(places), &commanded));
+    if apart[1] + TOLD_APART < apart[0] {
+        let what = format!(
+            "its quaternions are of the order x y z w: {:.0}° from the actions' rotations as w x y z, {:.0}° as x y z w; expected w x \
+             y z",
+            apart[0].to_degrees(),
+            apart[1].to_degrees()
+        );
+        return Err(wrong(file, demo, POSES, what));
+    }
+    let pose = |(row, rotation): (&[f64; 7], Quat)| {
+        Pose::from_parts(Vec3::new(row[0], row[1], row[2]).into(), rotation)
+    };
+    Ok(all.iter().zip(order([0, 1, 2, 3])).map(pose).collect())
+}
+
+/// Where the recorded tool is in ours, m.
+///
+/// # Errors
+/// Too far off, or not always the same: another robot or frame.
+fn offset(file: &TaskFile, demo: usize, poses: &[Pose], joints: &[[f64; 7]]) -> Result<Vec3, DatasetError> {
+    let by_joints = tool::by_joints(file, demo, JOINTS, joints)?;
+    let at_t = tool::compare(file, demo, (POSES, poses), &by_joints)?;
+    if at_t.norm() > NEAR {
+        let what = format!(
+            "{:.0} mm from where {JOINTS} puts the tool: expected poses in the frame of the robot's base",
+            1e3 * at_t.norm()
+        );
+        return Err(wrong(file, demo, POSES, what));
+    }
+    Ok(at_t)
+}
+
+/// How the gripper's number is coded: a finger's position, or 1 open and -1 shut.
+///
+/// # Errors
+/// Neither.
+fn gripper(file: &TaskFile, demo: usize, actions: &[Row]) -> Result<GripperCode, DatasetError> {
+    let number = |row: &Row| row.numbers[6];
+    let within = |low: f64, high: f64| actions.iter().map(number).all(|x| (low..=high).contains(&x));
+    if within(FINGER[0], FINGER[1]) {
+        return Ok(FINGERS);
+    }
+    if actions.iter().map(number).all(|x| x.abs() == 1.0) {
+        return Ok(SIGN);
+    }
+    let odd = |row: &Row| !(FINGER[0]..=FINGER[1]).contains(&number(row));
+    let step = actions.iter().position(odd).unwrap_or_default();
+    let what = format!(
+        "step {step}, number 6: {}, expected a finger's position of 0 (shut) to 0.04 m, or 1 (open) and -1 (shut) alone",
+        number(&actions[step])
+    );
+    Err(wrong(file, demo, "actions", what))
+}
+
+/// Whether the fingers of the actions are those that were measured.
+fn are_measured(file: &TaskFile, demo: usize, actions: &[Row]) -> Result<bool, DatasetError> {
+    let Some(fingers) = if_there::<2>(file, demo, "obs/gripper_pos", actions.len())? else {
+        return Ok(false);
+    };
+    Ok(actions.iter().zip(fingers).all(|(row, fingers)| (row.numbers[6] - fingers[0]).abs() < MEASURED))
+}
+
+/// What stands around at the start: `initial_state`, or the first of `states`.
+fn things(file: &TaskFile, demo: usize) -> Result<Vec<Standing>, DatasetError> {
+    let first = |name: &str| file.has(demo, name).then(|| numbers(file, demo, name)).transpose();
+    let pose = |folder: &str, name: &str| -> Result<Option<Pose>, DatasetError> {
+        for last in ["root_pose", "root_pose_w"] {
+            if let Some((all, _)) = first(&format!("{folder}/{name}/{last}"))? {
+                return Ok(all.get(..7).and_then(pose_of));
+            }
+        }
+        Ok(None)
+    };
+    for root in ["initial_state", "states"] {
+        let mut things = Vec::new();
+        let base = pose(&format!("{root}/articulation"), "robot")?;
+        let seen = |pose_w: Pose| base.map_or(pose_w, |base| base.inverse() * pose_w);
+        for kind in ["rigid_object", "articulation"] {
+            let folder = format!("{root}/{kind}");
+            for name in file.groups(demo, &folder).into_iter().filter(|name| name != "robot") {
+                let Some(pose_w) = pose(&folder, &name)? else { continue };
+                things.push(Standing { name, pose: seen(pose_w), in_base: base.is_some(), soft: false });
+            }
+        }
+        let folder = format!("{root}/deformable_object");
+        for name in file.groups(demo, &folder) {
+            let nodes =
+                ["nodal_position", "nodal_pos_w"].map(|last| first(&format!("{folder}/{name}/{last}")));
+            let Some((all, shape)) = nodes.into_iter().find_map(Result::transpose).transpose()? else {
+                continue;
+            };
+            // One step of them: all but the first axis.
+            let count = shape.iter().skip(usize::from(shape.len() > 2)).product::<usize>().min(all.len());
+            let nodes = all[..count].as_chunks::<3>().0;
+            let centre = nodes.iter().map(|x| Vec3::from(*x)).sum::<Vec3>() / nodes.len().max(1) as f64;
+            let pose = seen(Pose::translation(centre.x, centre.y, centre.z));
+            things.push(Standing { name, pose, in_base: base.is_some(), soft: true });
+        }
+        if !things.is_empty() {
+            return Ok(things);
+        }
+    }
+    Ok(Vec::new())
+}

@@ -1,0 +1,400 @@
+//! Small files in the layouts of others, and what becomes of them.
+
+use std::{fs, path::PathBuf};
+
+use serde_json::{Value, json};
+
+use super::{libero::goals, mujoco::Model, *};
+use crate::{
+    benchmark::control::CONTROL_DT,
+    dataset::write::Writer,
+    geometry::Quat,
+    policy::Action,
+    robot::{IkSpec, ik::DiffIk, rotation},
+};
+
+const STEPS: usize = 6;
+const START: [f64; 7] = [0.0, -0.161, 0.0, -2.4446, 0.0, 2.2268, 0.7854];
+
+/// Joint angles at step k of an arm that swings.
+fn joints(k: usize) -> [f64; 7] {
+    std::array::from_fn(|i| START[i] + 0.03 * (i as f64 + 1.0) * (0.7 * k as f64).sin())
+}
+
+fn tool(k: usize) -> Pose {
+    DiffIk::new(&IkSpec::default(), START, CONTROL_DT).tool_pose(&joints(k))
+}
+
+/// Shares of a step at step k.
+fn share(k: usize) -> [f64; 7] {
+    let x = k as f64;
+    [0.5 * x.sin(), -0.3, 0.1 * x, 0.2, -0.4 * x.cos(), 0.1, if k < 3 { -1.0 } else { 1.0 }]
+}
+
+/// A file in the making.
+struct Made {
+    folder: tempfile::TempDir,
+    environment: Value,
+    about: Vec<(&'static str, String)>,
+    demo: Vec<(&'static str, String)>,
+    /// Name, shape of a step, numbers.
+    data: Vec<(String, Vec<usize>, Vec<f64>)>,
+}
+
+impl Made {
+    fn new(environment: Value) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        Self { folder, environment, about: Vec::new(), demo: Vec::new(), data: Vec::new() }
+    }
+
+    /// As LIBERO writes it: observations after each action, states before it.
+    fn libero() -> Self {
+        let kwargs =
+            json!({ "robots": ["Panda"], "control_freq": 20, "controller_configs": { "type": "OSC_POSE" } });
+        let mut made =
+            Self::new(json!({ "env_name": "Libero_Floor_Manipulation", "type": 1, "env_kwargs": kwargs }));
+        made.each("actions", |k| share(k).to_vec());
+        made.each("obs/joint_states", |k| joints(k + 1).to_vec());
+        let site =
+            |k: usize| Pose::translation(-0.6, 0.0, 0.0) * tool(k + 1) * Pose::translation(0.0, 0.0, -0.0069);
+        made.each("obs/ee_pos", |k| site(k).translation.vector.as_slice().to_vec());
+        made.each("obs/ee_ori", |k| rotation::axis_angle(&site(k).rotation).as_slice().to_vec());
+        made.each("states", |k| [&[0.05 * k as f64], &joints(k)[..], &[0.04, -0.04], &[0.0; 9]].concat());
+        made
+    }
+
+    /// As SoftVTBench writes it, in whose tactile world the tool lies 3.6 mm further out.
+    fn softvtbench() -> Self {
+        let mut made = Self::new(json!({ "env_name": "Isaac", "type": 2 }));
+        let seen = |k: usize| tool(k) * Pose::translation(0.0, 0.0, 0.0036);
+        let finger = |k: usize| if k < 3 { 0.04 } else { 0.03 };
+        let pressed = |k: usize| if k < 4 { 0.0 } else { 2.0 };
+        made.each("actions", |k| {
+            let (at, turn) = (seen(k).translation.vector, rotation::axis_angle(&seen(k).rotation));
+            [at.as_slice(), turn.as_slice(), &[finger(k)], &[0.0, 0.0, pressed(k)], &[0.0, 0.0, pressed(k)]]
+                .concat()
+        });
+        made.each("obs/eef_pose", |k| {
+            let (at, q) = (seen(k).translation.vector, rotation::canonical(&seen(k).rotation));
+            vec![at.x, at.y, at.z, q.w, q.i, q.j, q.k]
+        });
+        made.each("obs/arm_joint_pos", |k| joints(k).to_vec());
+        made.each("obs/gripper_pos", |k| vec![finger(k); 2]);
+        made.demo.push(("language", "Pick up the  CUP.".to_owned()));
+        made
+    }
+
+    fn each(&mut self, name: &str, row: impl Fn(usize) -> Vec<f64>) {
+        let width = row(0).len();
+        self.put(name, &[width], (0..STEPS).flat_map(row).collect());
+    }
+
+    fn put(&mut self, name: &str, row: &[usize], numbers: Vec<f64>) {
+        self.data.retain(|(known, ..)| known != name);
+        self.data.push((name.to_owned(), row.to_vec(), numbers));
+    }
+
+    fn without(mut self, name: &str) -> Self {
+        self.data.retain(|(known, ..)| !known.starts_with(name));
+        self
+    }
+
+    fn write(&self) -> PathBuf {
+        let path = self.folder.path().join("pick_up_the_cup_demo.hdf5");
+        let mut writer = Writer::create(&path, &self.environment, STEPS, 1).unwrap();
+        for (name, text) in &self.about {
+            writer.group("data").unwrap().set_attr_string(name, text).unwrap();
+        }
+        for (name, text) in &self.demo {
+            writer.group("data/demo_0").unwrap().set_attr_string(name, text).unwrap();
+        }
+        for (name, row, numbers) in &self.data {
+            let steps = numbers.len() / row.iter().product::<usize>();
+            let data = writer.dataset::<f64>(&format!("data/demo_0/{name}"), (steps, steps), row, 8).unwrap();
+            data.write_raw(numbers).unwrap();
+        }
+        writer.close(Ok(())).unwrap();
+        path
+    }
+
+    fn read(&self) -> (Layout, ForeignDemo) {
+        let read = read(&self.write()).unwrap();
+        (read.layout, read.demos.into_iter().next().unwrap())
+    }
+
+    fn refusal(&self) -> String {
+        let said = read(&self.write()).unwrap_err().to_string();
+        assert!(said.contains("pick_up_the_cup_demo.hdf5: /data"), "{said}");
+        said
+    }
+}
+
+fn poses(demo: &ForeignDemo) -> Vec<Action> {
+    let pose = |command: &Command| match command {
+        Command::Pose(action) => *action,
+        Command::Step { .. } => panic!("a step"),
+    };
+    demo.commands.iter().map(pose).collect()
+}
+
+/// How far a command is from the pose that robosuite's controller was given at step k, computed with matrices.
+fn off(command: &Action, tool: &Pose, k: usize) -> f64 {
+    let [x, y, z, a, b, c, _] = share(k);
+    let at = tool.translation.vector + Vec3::new(x, y, z) * 0.05;
+    let spin = Vec3::new(a, b, c) * 0.5;
+    // Rodrigues' formula, premultiplied: the axes are those of the base.
+    let (angle, cross) = (spin.norm(), (spin / spin.norm()).cross_matrix());
+    let turned =
+        crate::geometry::Mat3::identity() + cross * angle.sin() + cross * cross * (1.0 - angle.cos());
+    let wanted = turned * tool.rotation.to_rotation_matrix().into_inner();
+    let got = rotation::from_axis_angle(&command.axis_angle_b).to_rotation_matrix().into_inner();
+    (command.position_b - at).norm() + (wanted - got).norm()
+}
+
+#[test]
+fn liberos_steps_become_the_poses_that_its_controller_was_given() {
+    let made = Made::libero();
+    let (layout, demo) = made.read();
+    assert_eq!((layout, demo.task.prompts.clone()), (Layout::Libero, vec!["pick up the cup".to_owned()]));
+    // By the states, which are of before each action, though the observations are of after it.
+    for (k, action) in poses(&demo).iter().enumerate() {
+        assert!(off(action, &tool(k), k) < 1e-9, "step {k}");
+        assert_eq!(action.closure, f64::from(u8::from(k >= 3)));
+    }
+    assert_eq!(demo.shut, [false, false, false, true, true, true]);
+    assert_eq!(demo.begins, Begins::Elsewhere { joints: Some(joints(0)), things: Vec::new() });
+    // Without the states the observations are taken for LIBERO's, of which the first is of after the first action.
+    let (_, demo) = made.without("states").read();
+    for (k, action) in poses(&demo).iter().enumerate() {
+        assert!(off(action, &tool(k.max(1)), k) < 1e-9, "step {k}");
+    }
+}
+
+#[test]
+fn observations_of_before_each_action_are_told_by_the_states_too() {
+    let mut made = Made::libero().without("obs/ee");
+    made.each("obs/joint_states", |k| joints(k).to_vec());
+    let (_, demo) = made.read();
+    poses(&demo).iter().enumerate().for_each(|(k, action)| assert!(off(action, &tool(k), k) < 1e-9));
+}
+
+#[test]
+fn without_joints_the_recorded_tool_is_brought_into_our_frames() {
+    let (_, demo) = Made::libero().without("obs/joint").without("states").read();
+    for (k, action) in poses(&demo).iter().enumerate() {
+        assert!(off(action, &tool(k.max(1)), k) < 1e-9, "step {k}");
+    }
+    let mut lost = Made::libero().without("obs/joint").without("states");
+    lost.each("obs/ee_pos", |_| vec![3.0, 0.0, 1.0]);
+    assert!(lost.refusal().contains("where the robot stands is not known"));
+    // Without poses either, steps stay steps, of which robosuite's spring makes way.
+    let (_, demo) = Made::libero().without("obs/").without("states").read();
+    let Command::Step { whole: false, translation_b, rotation_b, .. } = demo.commands[1] else {
+        panic!("no step")
+    };
+    let [x, _, _, _, b, _, _] = share(1);
+    assert!((translation_b.x - 0.05 * x).abs() < 1e-15 && (rotation_b.y - 0.5 * b).abs() < 1e-15);
+    assert_eq!(demo.begins, Begins::Elsewhere { joints: None, things: Vec::new() });
+}
+
+#[test]
+fn a_goal_without_a_turn_keeps_the_last_goals_orientation() {
+    let tool = [tool(0), tool(1), tool(2)];
+    let step =
+        |turn: Vec3| Command::Step { whole: false, translation_b: Vec3::x(), rotation_b: turn, closure: 0.0 };
+    let found = goals(&tool, &[step(Vec3::zeros()), step(Vec3::z() * 0.1), step(Vec3::zeros())]);
+    let turned = |k: usize| match found[k] {
+        Command::Pose(action) => rotation::from_axis_angle(&action.axis_angle_b),
+        Command::Step { .. } => panic!("a step"),
+    };
+    let spun = Quat::from_axis_angle(&Vec3::z_axis(), 0.1) * tool[1].rotation;
+    assert!(turned(0).angle_to(&tool[0].rotation) < 1e-9);
+    assert!(turned(1).angle_to(&spun) < 1e-9 && turned(2).angle_to(&spun) < 1e-9);
+}
+
+const MODEL: &str = r#"<mujoco><default><joint type="free"/></default><!-- <body name="no"/> --><worldbody>
+  <body name="robot0_base" pos="-0.6 0 0.1"><body name="robot0_link1"><joint name="j1" axis="0 0 1"/>
+    <body name="robot0_link2"><joint name="j2" type='hinge'/></body></body></body>
+  <body name="cup_1_main" pos="9 9 9"><geom type="box"/><body name="cup_1_inner"/><freejoint name="cup_1_joint0"/></body>
+  <body name="stove_1_main" pos="0.1 0.2 0.3" quat="0 0 0 2"><geom/></body>
+  <body name="ball"><joint type="ball"/></body>
+</worldbody></mujoco>"#;
+
+#[test]
+fn things_of_a_mujoco_state_are_found_by_the_model() {
+    let model = Model::read(MODEL).unwrap();
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    let positions = [0.1, 0.2, 0.4, -0.3, 0.5, half, 0.0, 0.0, half, 1.0, 0.0, 0.0, 0.0];
+    let state = [&[0.0], &positions[..], &[0.0; 2 + 6 + 3]].concat();
+    let things = model.standing(&state).unwrap();
+    let named = |name: &str| things.iter().find(|thing| thing.name == name).unwrap();
+    let cup = named("cup_1");
+    assert!((cup.pose.translation.vector - Vec3::new(1.0, -0.3, 0.4)).norm() < 1e-12 && cup.in_base);
+    assert!((cup.pose.rotation * Vec3::x() - Vec3::y()).norm() < 1e-12);
+    assert!((named("stove_1").pose.rotation * Vec3::x() + Vec3::x()).norm() < 1e-12);
+    assert_eq!(model.standing(&state[1..]), None, "a state of another model");
+    assert_eq!(Model::read("<mujoco/>"), None);
+}
+
+#[test]
+fn softvtbenchs_poses_are_moved_from_its_tool_to_ours() {
+    let made = Made::softvtbench();
+    let (layout, mut demo) = made.read();
+    assert_eq!(layout, Layout::SoftVtBench);
+    assert_eq!(demo.task.prompts[0], "Pick up the  CUP.");
+    for (k, action) in poses(&demo).iter().enumerate() {
+        let away = action.position_b - tool(k).translation.vector;
+        let turned = rotation::from_axis_angle(&action.axis_angle_b).angle_to(&tool(k).rotation);
+        assert!(away.norm() < 1e-9 && turned < 1e-7, "step {k}: {away}");
+        assert!((action.closure - if k < 3 { 0.0 } else { 0.25 }).abs() < 1e-12);
+    }
+    assert_eq!(demo.shut, [false, false, false, false, true, true]);
+    // Fingers that a thing has stopped say nothing of how hard they press on one that gives way to nothing.
+    demo.hold_rigid();
+    let percent: Vec<f64> = poses(&demo).iter().map(|a| (100.0 * a.closure).round()).collect();
+    assert_eq!(percent, [0.0, 0.0, 0.0, 25.0, 100.0, 100.0]);
+}
+
+#[test]
+fn softvtbenchs_things_are_those_of_the_initial_state() {
+    let mut made = Made::softvtbench();
+    made.put("initial_state/articulation/robot/root_pose", &[7], vec![-0.66, 0.0, 0.912, 1.0, 0.0, 0.0, 0.0]);
+    made.put("initial_state/articulation/robot/joint_position", &[9], [&START[..], &[0.04; 2]].concat());
+    made.put("initial_state/rigid_object/plate_1/root_pose", &[7], vec![0.04, 0.1, 0.9, 1.0, 0.0, 0.0, 0.0]);
+    let nodes = vec![0.0, 0.0, 0.9, 0.2, 0.0, 0.9, 0.1, 0.3, 0.93];
+    made.put("initial_state/deformable_object/soft_bun/nodal_position", &[3, 3], nodes);
+    let Begins::Elsewhere { joints, things } = made.read().1.begins else { panic!("an episode") };
+    assert_eq!(joints, Some(START));
+    let at = |i: usize| things[i].pose.translation.vector;
+    assert_eq!((things[0].name.as_str(), things[1].name.as_str(), things.len()), ("plate_1", "soft_bun", 2));
+    assert!((at(0) - Vec3::new(0.7, 0.1, -0.012)).norm() < 1e-12 && !things[0].soft);
+    assert!((at(1) - Vec3::new(0.76, 0.1, -0.002)).norm() < 1e-12 && things[1].soft);
+}
+
+#[test]
+fn what_is_wrong_with_a_file_is_told_with_its_key() {
+    type Spoil = fn(&mut Made);
+    let libero: [(Spoil, &str); 8] = [
+        (|m| m.each("actions", |k| share(k)[..6].to_vec()), "actions of shape [6, 6]"),
+        (
+            |m| {
+                m.put(
+                    "actions",
+                    &[7],
+                    [&[0.0; 7 * (STEPS - 1)][..], &[0.0, 0.0, 1.4, 0.0, 0.0, 0.0, 0.0]].concat(),
+                )
+            },
+            "actions: step 5, number 2: 1.4, expected shares of a step in -1..1",
+        ),
+        (
+            |m| m.put("actions", &[7], vec![f64::NAN; 7 * STEPS]),
+            "actions: step 0, number 0: NaN is not finite",
+        ),
+        (|m| m.each("obs/joint_states", |_| vec![0.0; 6]), "6 joints a step; a Panda has 7"),
+        (|m| m.each("obs/joint_states", |_| vec![0.0; 7]), "joint 4 is at 0 rad, outside of a Panda's"),
+        (
+            |m| m.put("obs/joint_states", &[7], vec![0.0; 7]),
+            "obs/joint_states: expected the shape (6, 7), got [1, 7]",
+        ),
+        (
+            |m| m.each("obs/ee_pos", |k| vec![0.1 * k as f64, 0.0, 0.0]),
+            "not where the joint angles put the tool",
+        ),
+        (|m| m.data.retain(|(name, ..)| name != "obs/ee_ori"), "obs/ee_ori: it is not there"),
+    ];
+    for (spoil, words) in libero {
+        let mut made = Made::libero();
+        spoil(&mut made);
+        let said = made.refusal();
+        assert!(said.contains(words), "{words}: {said}");
+    }
+    let softvtbench: [(Spoil, &str); 4] = [
+        (
+            |m| {
+                m.data
+                    .iter_mut()
+                    .find(|(name, ..)| name == "obs/eef_pose")
+                    .unwrap()
+                    .2
+                    .as_chunks_mut::<7>()
+                    .0
+                    .iter_mut()
+                    .for_each(|row| row[3..].rotate_left(1))
+            },
+            "obs/eef_pose: its quaternions are of the order x y z w",
+        ),
+        (
+            |m| {
+                m.data
+                    .iter_mut()
+                    .find(|(name, ..)| name == "obs/eef_pose")
+                    .unwrap()
+                    .2
+                    .as_chunks_mut::<7>()
+                    .0
+                    .iter_mut()
+                    .for_each(|row| row[0] -= 0.66)
+            },
+            "mm from where obs/arm_joint_pos puts the tool: expected poses in the frame of the robot's base",
+        ),
+        (
+            |m| m.data.iter_mut().find(|(name, ..)| name == "actions").unwrap().2[6] = 0.3,
+            "number 6: 0.3, expected a finger's",
+        ),
+        (
+            |m| m.data.iter_mut().find(|(name, ..)| name == "obs/eef_pose").unwrap().2[3] = 2.0,
+            "no quaternion w x y z of length 1",
+        ),
+    ];
+    for (spoil, words) in softvtbench {
+        let mut made = Made::softvtbench();
+        spoil(&mut made);
+        let said = made.refusal();
+        assert!(said.contains(words), "{words}: {said}");
+    }
+}
+
+#[test]
+fn another_robot_controller_or_rate_is_refused() {
+    for (path, value, words) in [
+        ("robots", json!(["Sawyer"]), "the robot is Sawyer"),
+        ("robots", json!(["Panda", "Panda"]), "there are 2 robots"),
+        ("control_freq", json!(10), "10 control steps a second; expected 20"),
+        ("controller_configs", json!({ "type": "JOINT_POSITION" }), "the controller is JOINT_POSITION"),
+        ("controller_configs", json!({ "type": "OSC_POSE", "output_max": [1, 2, 3, 4, 5, 6] }), "output_max"),
+    ] {
+        let mut made = Made::libero();
+        made.environment["env_kwargs"][path] = value;
+        let said = made.refusal();
+        assert!(said.contains(words), "{words}: {said}");
+    }
+    let mut made = Made::softvtbench();
+    made.about.push(("robot_type", "UR10e".to_owned()));
+    assert!(made.refusal().contains("the robot is UR10e"));
+}
+
+#[test]
+fn what_is_no_file_of_demonstrations_is_told_in_a_sentence() {
+    let made = Made::libero();
+    let whole = fs::read(made.write()).unwrap();
+    let path = made.folder.path().join("x.hdf5");
+    let said = || read(&path).unwrap_err().to_string();
+    fs::write(&path, &whole[..whole.len() / 2]).unwrap();
+    assert!(
+        said().ends_with(&format!(
+            "x.hdf5 is cut short: {} of {} bytes are there",
+            whole.len() / 2,
+            whole.len()
+        )),
+        "{}",
+        said()
+    );
+    fs::write(&path, &whole[..20]).unwrap();
+    assert!(said().ends_with("x.hdf5 is cut short: only 20 bytes are there"), "{}", said());
+    fs::write(&path, "PK").unwrap();
+    assert!(said().ends_with("x.hdf5 is no HDF5 file: it does not begin as one"), "{}", said());
+    assert!(read(made.folder.path()).unwrap_err().to_string().ends_with("is a folder, no HDF5 file"));
+    let mut other = Made::new(Value::Null);
+    other.each("actions", |_| vec![0.0; 7]);
+    assert!(other.refusal().contains("of no layout that is known"));
+}

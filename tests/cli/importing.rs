@@ -1,0 +1,180 @@
+//! Foreign demonstrations from the command line: what becomes of them, and what is refused.
+
+use std::path::Path;
+
+use rust_hdf5::H5File;
+use softvt::dataset::{Numbers, TaskFile};
+
+use crate::support::Project;
+
+/// A rigid cube that stands on a slab: the goal is reached by waiting.
+const SUITE: &str = r#"
+local function solid(name, size, body)
+  return softvt.asset { name = name, shape = softvt.shape.box { size = size }:grounded(), body = body }
+end
+local floor = softvt.asset { name = "floor", shape = softvt.shape.box { size = { 2, 2, 0.05 } }:translate(0, 0, -0.025), body = softvt.static {} }
+local slab = solid("slab", { 0.1, 0.1, 0.02 }, softvt.static {})
+local cube = solid("cube", { 0.04, 0.04, 0.04 }, softvt.rigid { density = 300 })
+local layout = softvt.layout("one", function(scene)
+  local x = 0.01 * math.random()
+  scene:add { name = "floor", asset = floor, xyz = { 0, 0, 0 } }
+  scene:add { name = "slab", asset = slab, xyz = { 0, 0.2, 0 } }
+  scene:add { name = "cube", asset = cube, xyz = { x, 0.2, 0.02 } }
+  scene:add { name = "other", asset = cube, xyz = { 0, 0, 0 } }
+end)
+local function task(prompt)
+  return softvt.task { prompt = prompt, layout = layout, goal = softvt.on { object = "cube", target = "slab" }, budget_steps = 30,
+    expert = function(arm, scene) arm:wait(1) end }
+end
+return softvt.suite { name = "one", object_type = "rigid", variation = "spatial", episodes = 1,
+  tasks = { task "wait", task "wait longer" } }
+"#;
+
+/// A project with a data set of two demonstrations of task 0.
+fn recorded() -> Project {
+    let project = Project::new(&[("x.lua", SUITE)]);
+    project.succeeds("record x.lua --task 0 --demos 2 --out data --images video --no-privileged");
+    project
+}
+
+const OWN: &str = "data/hdf5/one_task0_demo.hdf5";
+
+/// What a file of SoftVTBench's says besides its poses.
+struct Said<'a> {
+    language: &'a str,
+    /// Where the cube stands.
+    cube: [f64; 2],
+    /// How many of its poses stand still where the tool was; those behind are zeros.
+    still: usize,
+}
+
+/// Writes such a file, of one demonstration that holds still where the recorded arm stood.
+fn write(from: &Path, into: &Path, said: &Said) {
+    let read = TaskFile::open(from).expect("a file");
+    let numbers = |name: &str| match read.stream(0, name).expect("a stream").numbers {
+        Numbers::F64(numbers) => numbers,
+        _ => panic!("{name} is of doubles"),
+    };
+    let (state, pose, joints) = (numbers("obs/state"), numbers("obs/eef_pose"), numbers("obs/arm_joint_pos"));
+    let file = H5File::create(into).expect("made");
+    let data = file.create_group("data").expect("a group");
+    let demo = data.create_group("demo_0").expect("a group");
+    demo.set_attr_string("language", said.language).expect("written");
+    let observed = demo.create_group("obs").expect("a group");
+    let steps = 12;
+    let put = |group: &rust_hdf5::H5Group, name: &str, row: &[f64]| {
+        let all: Vec<f64> = (0..steps)
+            .flat_map(|i| if i < said.still { row.to_vec() } else { vec![0.0; row.len()] })
+            .collect();
+        let array = group.new_dataset::<f64>().shape([steps, row.len()]).create(name).expect("an array");
+        array.write_raw(&all).expect("written");
+    };
+    put(&demo, "actions", &[&state[..6], &[0.04]].concat());
+    put(&observed, "eef_pose", &pose[..7]);
+    put(&observed, "arm_joint_pos", &joints[..7]);
+    let start = demo.create_group("initial_state").expect("a group");
+    let kind = start.create_group("rigid_object").expect("a group");
+    let cube = kind.create_group("cube_1").expect("a group");
+    let root = cube.new_dataset::<f64>().shape([1, 7]).create("root_pose").expect("an array");
+    root.write_raw(&[said.cube[0], said.cube[1], 0.9, 1.0, 0.0, 0.0, 0.0]).expect("written");
+    file.close().expect("closed");
+}
+
+#[test]
+fn softvts_own_demonstrations_end_in_the_same_states() {
+    let project = recorded();
+    let said = project.succeeds(&format!("dataset import x.lua {OWN} --out again --images video"));
+    assert!(said.err.contains("one_task0_demo.hdf5: softvt, 2 demonstrations"), "{}", said.err);
+    let states = |folder: &str| -> Vec<_> {
+        let lines = project.lines(&format!("{folder}/manifest.jsonl"));
+        lines.iter().map(|line| (line["episode"].clone(), line["state_hash"].clone())).collect()
+    };
+    assert_eq!(states("data"), states("again"));
+    let origin = &project.lines("again/manifest.jsonl")[1]["origin"];
+    assert_eq!((&origin["demo"], &origin["layout"]), (&"demo_1".into(), &"softvt".into()), "{origin}");
+    assert!(project.text("again/README.md").contains(origin["sha256"].as_str().expect("a hash")));
+    let checked = project.succeeds("dataset check again --replay all").out;
+    assert!(checked.contains("2 of 2 the same to the byte, 2 of 2 reach the goal"), "{checked}");
+    assert!(project.succeeds("replay again/attempts/one 0/1").out.contains("the same to the byte"));
+    let once_more = project.succeeds(&format!("dataset import x.lua {OWN} --out again --images video"));
+    assert!(once_more.err.contains("is finished already"), "{}", once_more.err);
+}
+
+#[test]
+fn things_start_where_the_file_has_them_and_what_cannot_be_is_a_rejection() {
+    let project = recorded();
+    let make = |name: &str, cube: [f64; 2]| {
+        write(&project.path(OWN), &project.path(name), &Said { language: "Wait.", cube, still: 12 });
+    };
+    make("on.hdf5", [0.02, 0.21]);
+    make("beside.hdf5", [0.0, 0.4]);
+    make("inside.hdf5", [0.0, 0.0]);
+    let words = "dataset import x.lua on.hdf5 beside.hdf5 inside.hdf5 --out made --images video";
+    let said = project.succeeds(words);
+    assert!(said.err.contains("could not start") && said.err.contains("overlap"), "{}", said.err);
+    let task = &project.json("made/dataset.json")["tasks"][0];
+    assert_eq!((&task["demos"], &task["attempts"]), (&1.into(), &3.into()), "{task}");
+    assert_eq!(
+        task["rejected"],
+        serde_json::json!({ "goal not reached": 1, "could not start": 1 }),
+        "{task}"
+    );
+    let line = &project.lines("made/manifest.jsonl")[0];
+    assert_eq!(line["origin"]["start"]["places"][0]["xy"], serde_json::json!([0.02, 0.21]), "{line}");
+    // All attempts can be simulated again, those that did not start too.
+    for attempt in 0..3 {
+        let again = project.succeeds(&format!("replay made/attempts/one 0/{attempt}"));
+        assert!(again.out.contains("the same to the byte"), "{}", again.out);
+    }
+    project.succeeds("dataset check made");
+    project.succeeds("dataset import x.lua inside.hdf5 --out kept --images video --layout");
+}
+
+#[test]
+fn what_cannot_be_imported_is_refused_and_nothing_is_written() {
+    let project = recorded();
+    let make = |name: &str, language: &str, still: usize| {
+        write(&project.path(OWN), &project.path(name), &Said { language, cube: [0.0, 0.2], still });
+    };
+    make("odd.hdf5", "sing", 12);
+    make("torn.hdf5", "wait", 9);
+    project.write("short.hdf5", &std::fs::read(project.path(OWN)).expect("read")[..900]);
+    project.write("mine/notes.txt", b"mine");
+    project.write(
+        "two.lua",
+        SUITE.replace("name = \"one\", object_type", "name = \"two\", object_type").as_bytes(),
+    );
+    project.write("world.lua", b"return softvt.experiment { name = 'e', grid = { a = { 1 } }, run = function() return { b = 1 } end }");
+    for (words, told) in [
+        ("x.lua short.hdf5", "short.hdf5 is cut short: 900 of"),
+        ("x.lua none.hdf5", "cannot read none.hdf5"),
+        ("x.lua x.lua", "x.lua is no HDF5 file"),
+        ("x.lua odd.hdf5", "odd.hdf5: demo_0: it is of \"sing\", and x.lua has no such task"),
+        (
+            "x.lua torn.hdf5",
+            "torn.hdf5: /data/demo_0/obs/eef_pose: step 9: no quaternion w x y z of length 1",
+        ),
+        ("x.lua odd.hdf5 --task 7", "--task 7: suite one has no such task"),
+        ("x.lua odd.hdf5 --task wait", "2 tasks are named"),
+        (
+            "x.lua OWN --seed 3",
+            "it was recorded with the seed 0, and this import is of the seed 3; give --seed 0",
+        ),
+        ("two.lua OWN", "it is of \"wait\" of the suite one, and two.lua has no such task"),
+        ("world.lua OWN", "softvt dataset import needs a suite"),
+        ("x.lua OWN OWN", "are the same to the byte"),
+    ] {
+        let words = words.replace("OWN", OWN);
+        let said = project.refusal(&format!("dataset import {words} --out new"));
+        assert!(said.contains(told), "{words}: {said}");
+        assert!(!project.path("new").exists(), "{words}");
+    }
+    let said = project.refusal(&format!("dataset import x.lua {OWN} --out mine"));
+    assert!(said.contains("it holds notes.txt and no recording of softvt"), "{said}");
+    let said = project.refusal(&format!("dataset import x.lua {OWN} --out data"));
+    assert!(said.contains("it holds another recording"), "{said}");
+    for data in ["data", OWN] {
+        let said = project.refusal(&format!("x.lua --policy {data} --out run"));
+        assert!(said.contains("holds demonstrations") && said.contains("softvt dataset check"), "{said}");
+    }
+}
