@@ -18,19 +18,22 @@ use crate::{
     support::Project,
 };
 
-/// A cube rests on its slab while the fingers close on a block that stands between them.
+/// A cube rests on its slab while the fingers close on a block that stands on a pillar between them.
 const SUITE: &str = r#"
 local function solid(name, size, body)
   return softvt.asset { name = name, shape = softvt.shape.box { size = size }:grounded(), body = body }
 end
 local floor = softvt.asset { name = "floor", shape = softvt.shape.box { size = { 2, 2, 0.05 } }:translate(0, 0, -0.025), body = softvt.static {} }
 local slab = solid("slab", { 0.1, 0.1, 0.02 }, softvt.static {})
-local block = solid("block", { 0.03, 0.06, 0.03 }, softvt.static {})
+local pillar = solid("pillar", { 0.03, 0.03, 0.26 }, softvt.static {})
+local block = solid("block", { 0.03, 0.05, 0.05 }, softvt.rigid { density = 300 })
 local cube = solid("cube", { 0.04, 0.04, 0.04 }, softvt.rigid { density = 300 })
 local layout = softvt.layout("one", function(scene)
+  scene.base = { -0.6, 0, 0 }
   scene:add { name = "floor", asset = floor, xyz = { 0, 0, 0 } }
   scene:add { name = "slab", asset = slab, xyz = { 0, 0.2, 0 } }
-  scene:add { name = "block", asset = block, xyz = { -0.127, -0.005, 0.271 } }
+  scene:add { name = "pillar", asset = pillar, xyz = { -0.127, -0.005, 0 } }
+  scene:add { name = "block", asset = block, xyz = { -0.127, -0.005, 0.26 } }
   scene:add { name = "cube", asset = cube, xyz = { 0, 0.2, 0.02 } }
 end)
 local function task(prompt)
@@ -160,7 +163,7 @@ fn both_versions_hold_the_same_rows_whatever_the_threads() {
     let episodes = rows(&project.path("c/meta/episodes/chunk-000/file-000.parquet"));
     let ends: Vec<i64> = episodes.iter().map(|row| whole(field(row, "dataset_to_index"))).collect();
     assert_eq!(ends.last(), Some(&(together.len() as i64)));
-    project.succeeds("dataset export data --format lerobot-v3.0 --gripper binary --task it --out d");
+    project.succeeds("dataset export data --format lerobot-v3.0 --gripper binary --task for --out d");
     let binary = rows(&project.path("d/data/chunk-000/file-000.parquet"));
     assert_eq!(binary.len() as i64, ends[3] - ends[1], "only the second task");
     let shut: Vec<f32> = binary.iter().map(|row| numbers(field(row, "actions"))[6]).collect();
