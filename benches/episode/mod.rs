@@ -44,6 +44,7 @@ pub fn open(loaded: &Loaded, task: usize, film: bool) -> (EpisodeSpec, ExpertCon
             privileged: true,
             asset: String::new(),
             soft: true,
+            origin: None,
         },
         task,
         scene: Arc::new(opened.scene.clone()),

@@ -165,7 +165,10 @@ fn fit(
 fn begin(batch: &Batch, one: &Matched, layout: bool) -> Result<(Start, import::ForeignDemo), Failure> {
     let mut demo = one.demo.clone();
     let (joints, things) = match &one.demo.begins {
-        Begins::Episode { start, .. } => return Ok((start.clone(), demo)),
+        Begins::Episode { start, .. } => {
+            let places = if layout { Vec::new() } else { start.places.clone() };
+            return Ok((Start { places, ..*start }, demo));
+        }
         Begins::Elsewhere { joints, things } => (*joints, if layout { &[][..] } else { things }),
     };
     let mut start = Start { joints, places: Vec::new() };

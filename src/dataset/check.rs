@@ -116,6 +116,11 @@ pub fn folder(root: &Path) -> Result<Findings, DatasetError> {
 pub fn file(path: &Path) -> Result<Findings, DatasetError> {
     let file = TaskFile::open(path)?;
     let mut findings = Findings::default();
+    if file.environment().is_ok_and(|environment| environment["env_name"] != "softvt") {
+        let what = "softvt did not record it; softvt dataset import re-executes what others have recorded";
+        findings.say(path, "/data, attribute env_args", what.to_owned());
+        return Ok(findings);
+    }
     contents(&mut findings, &file);
     Ok(findings)
 }

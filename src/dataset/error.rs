@@ -84,7 +84,8 @@ impl DatasetError {
             other => {
                 let what = other.to_string();
                 let said = what.rsplit_once("I/O error: ").map(|(_, said)| said.to_owned());
-                let damaged = || format!("it cannot be read; is the file damaged? ({what})");
+                let (_, cause) = what.rsplit_once("error: ").unwrap_or(("", &what));
+                let damaged = || format!("it cannot be read; is the file damaged? ({cause})");
                 Self::Hdf5 { path, key, what: said.unwrap_or_else(damaged) }
             }
         }

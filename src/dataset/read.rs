@@ -120,7 +120,11 @@ impl TaskFile {
     /// # Errors
     /// It was not recorded by softvt.
     pub fn record(&self, demo: usize) -> Result<EpisodeRecord, DatasetError> {
-        let text = self.text(demo, "metadata_json")?;
+        let text = self.text(demo, "metadata_json").map_err(|_| {
+            let what =
+                "softvt did not record it; softvt dataset import re-executes what others have recorded";
+            DatasetError::content(&self.path, format!("/data/demo_{demo}"), what)
+        })?;
         serde_json::from_str(&text).map_err(|e| {
             let key = format!("/data/demo_{demo}, attribute metadata_json");
             DatasetError::content(&self.path, key, format!("no record of softvt: {e}"))

@@ -83,7 +83,8 @@ fn a_data_set_is_checked_summed_up_and_repeated() {
         checked.contains("2 demonstrations,") && checked.contains("8 videos: nothing is wrong"),
         "{checked}"
     );
-    assert_eq!(checked.matches("the same to the byte").count(), 2, "{checked}");
+    assert_eq!(checked.matches("the same to the byte, final state").count(), 2, "{checked}");
+    assert!(checked.contains("2 of 2 reach the goal"), "{checked}");
     assert!(project.succeeds("replay a 0/1").out.contains("demo_1: the same to the byte"));
     assert!(project.succeeds("replay a/hdf5/one_task0_demo.hdf5 0").out.contains("demo_0"));
     assert!(project.refusal("replay a 0/2").contains("no such demonstration"));

@@ -25,7 +25,7 @@ pub fn finish(output: &Output, sessions: &[Session], root: &Path) -> Result<(), 
     let size = |path: &Path| std::fs::metadata(path).map_or(0, |meta| meta.len());
     for session in sessions {
         for task in &session.tasks {
-            let place = session.place(task);
+            let place = session.place(task.id);
             let new = session.kept(task.id).into_iter().enumerate().map(|(k, r)| Entry::new(&place, k, r));
             let new: Vec<Entry> = new.collect();
             let videos = new.iter().flat_map(|entry| entry.video_files.values());

@@ -192,7 +192,7 @@ impl<'a> Session<'a> {
                 let kept = self.kept(task.id).len();
                 if kept > 0 && self.wanted.least().map_or(self.due(task.id).is_empty(), |least| kept == least)
                 {
-                    self.put_together(task)?;
+                    self.put_together(task.id)?;
                 }
             }
             if jobs.is_empty() || stop::requested() {
@@ -251,7 +251,7 @@ impl<'a> Session<'a> {
         // What was noted may be of fewer steps than were taken, the hand staying as it was, or of more.
         shut.resize(finished.actions.len(), shut.last().copied().unwrap_or_default());
         let demonstration = Demonstration::new(&finished, &film, shut, self.output.privileged);
-        let place = TaskPlace { root: self.root.clone(), suite: self.suite.clone(), task };
+        let place = self.place(task);
         let recorder = Recorder {
             hdf5: place.part(attempt, "hdf5"),
             videos: VIDEOS.map(|video| place.part(attempt, &format!("{video}.mp4"))),
@@ -283,15 +283,15 @@ impl<'a> Session<'a> {
     }
 
     /// Where the files of a task are.
-    pub(super) fn place(&self, task: &Task) -> TaskPlace {
-        TaskPlace { root: self.root.clone(), suite: self.suite.clone(), task: task.id }
+    pub(super) fn place(&self, task: usize) -> TaskPlace {
+        TaskPlace { root: self.root.clone(), suite: self.suite.clone(), task }
     }
 
     /// Makes the file of a task that has all its demonstrations, unless it is there; its parts go then.
-    fn put_together(&self, task: &Task) -> Result<(), Failure> {
+    fn put_together(&self, task: usize) -> Result<(), Failure> {
         let place = self.place(task);
         if !place.hdf5().is_file() {
-            let kept = self.kept(task.id);
+            let kept = self.kept(task);
             for (demo, record) in kept.iter().enumerate() {
                 for (part, film) in place.films(record.identity.episode, demo) {
                     self.take_over(&part, &film)?;

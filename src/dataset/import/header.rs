@@ -213,8 +213,8 @@ mod tests {
 
     #[test]
     fn files_are_named_by_what_is_said() {
-        let name = "a/b/pick_up_the_cup.bddl";
-        assert_eq!(sentence(name, ".bddl").as_deref(), Some("pick up the cup"));
+        let name = "a/b/lift_the_cup.bddl";
+        assert_eq!(sentence(name, ".bddl").as_deref(), Some("lift the cup"));
         assert_eq!(sentence(name, "_demo.hdf5"), None);
     }
 }

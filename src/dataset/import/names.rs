@@ -17,11 +17,11 @@ const UPRIGHT: f64 = 0.99;
 /// that tells things of one kind apart: the first of them is the first in the scene. A soft body without a name of ours is the
 /// target.
 pub fn places(scene: &Scene, target: &str, things: &[Standing]) -> Vec<Place> {
-    let mut things: Vec<(&str, u32, &Standing)> = things.iter().map(|thing| numbered(thing)).collect();
+    let mut things: Vec<(&str, u32, &Standing)> = things.iter().map(numbered).collect();
     things.sort_by_key(|(_, number, _)| *number);
     let mut taken = vec![false; things.len()];
     let mut places = Vec::new();
-    for object in scene.objects.iter().filter(|object| moves(object)) {
+    for object in scene.objects.iter().filter(moves) {
         let fits = |exact: bool, taken: &[bool]| {
             let asset = &object.asset.name;
             let ends = |stem: &str, name: &str| stem == name || stem.ends_with(&format!("_{name}"));

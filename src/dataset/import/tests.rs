@@ -14,7 +14,7 @@ use crate::{
 };
 
 const STEPS: usize = 6;
-const START: [f64; 7] = [0.0, -0.161, 0.0, -2.4446, 0.0, 2.2268, 0.7854];
+const START: [f64; 7] = [0.0, -0.161, 0.0, -2.4446, 0.0, 2.2268, 0.78];
 
 /// Joint angles at step k of an arm that swings.
 fn joints(k: usize) -> [f64; 7] {
@@ -30,6 +30,9 @@ fn share(k: usize) -> [f64; 7] {
     let x = k as f64;
     [0.5 * x.sin(), -0.3, 0.1 * x, 0.2, -0.4 * x.cos(), 0.1, if k < 3 { -1.0 } else { 1.0 }]
 }
+
+/// What makes a file wrong.
+type Spoil = fn(&mut Made);
 
 /// A file in the making.
 struct Made {
@@ -198,6 +201,26 @@ fn without_joints_the_recorded_tool_is_brought_into_our_frames() {
 }
 
 #[test]
+fn robomimics_quaternions_of_another_order_are_told_by_the_joints() {
+    let mut made = Made::libero().without("obs/ee").without("obs/joint");
+    made.each("obs/robot0_joint_pos", |k| joints(k).to_vec());
+    made.each("obs/robot0_eef_pos", |k| tool(k).translation.vector.as_slice().to_vec());
+    let quaternion = |k: usize| rotation::canonical(&tool(k).rotation).coords;
+    made.each("obs/robot0_eef_quat", |k| quaternion(k).as_slice().to_vec());
+    let (_, demo) = made.read();
+    poses(&demo).iter().enumerate().for_each(|(k, action)| assert!(off(action, &tool(k), k) < 1e-9));
+    made.each("obs/robot0_eef_quat", |k| {
+        let q = quaternion(k);
+        vec![q.w, q.x, q.y, q.z]
+    });
+    let said = made.refusal();
+    assert!(
+        said.contains("obs/robot0_eef_quat: step") && said.contains("another order of the quaternion's"),
+        "{said}"
+    );
+}
+
+#[test]
 fn a_goal_without_a_turn_keeps_the_last_goals_orientation() {
     let tool = [tool(0), tool(1), tool(2)];
     let step =
@@ -272,8 +295,7 @@ fn softvtbenchs_things_are_those_of_the_initial_state() {
 }
 
 #[test]
-fn what_is_wrong_with_a_file_is_told_with_its_key() {
-    type Spoil = fn(&mut Made);
+fn what_is_wrong_with_a_file_of_liberos_is_told_with_its_key() {
     let libero: [(Spoil, &str); 8] = [
         (|m| m.each("actions", |k| share(k)[..6].to_vec()), "actions of shape [6, 6]"),
         (
@@ -308,6 +330,10 @@ fn what_is_wrong_with_a_file_is_told_with_its_key() {
         let said = made.refusal();
         assert!(said.contains(words), "{words}: {said}");
     }
+}
+
+#[test]
+fn what_is_wrong_with_a_file_of_softvtbenchs_is_told_with_its_key() {
     let softvtbench: [(Spoil, &str); 4] = [
         (
             |m| {

@@ -19,6 +19,9 @@ const BEYOND: f64 = 0.05;
 /// How far the spread of two records of the tool may be, m and rad, once what is constant between them is taken off.
 const APART: (f64, f64) = (0.02, 0.1);
 
+/// How far a recorded tool may point away from ours, rad.
+const ASIDE: f64 = 0.2;
+
 /// Tool poses in the base frame by joint angles.
 ///
 /// # Errors
@@ -73,6 +76,16 @@ pub(super) fn compare(
     let shift = |r: &Pose, j: &Pose| r.translation.vector - j.translation.vector;
     let turn = |r: &Pose, j: &Pose| j.rotation.inverse() * r.rotation;
     let (middle, first) = (mean(&shift), turn(&recorded[0], &by_joints[0]));
+    // Frames of one hand differ by a turn about the line along which it points.
+    let aside = (first * Vec3::z()).angle(&Vec3::z());
+    if aside > ASIDE {
+        let what = format!(
+            "step 0: it points {:.0}° away from where the joint angles point the tool: another order of the quaternion's numbers, or \
+             another robot?",
+            aside.to_degrees()
+        );
+        return Err(wrong(file, demo, name, what));
+    }
     let worst = pairs().enumerate().find_map(|(step, (r, j))| {
         let away = (shift(r, j) - middle).norm();
         let turned = turn(r, j).angle_to(&first);
