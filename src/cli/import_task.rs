@@ -39,7 +39,10 @@ pub fn match_all<'a>(
     for file in files {
         for demo in &file.demos {
             let (suite, task) = match forced {
-                Some(forced) => forced,
+                // Episodes of softvt's own are of their very task.
+                Some(forced) if file.layout != Layout::Softvt => forced,
+                Some(forced) if task_of(run, suites, file, demo)? == forced => forced,
+                Some(_) => return Err(of_another(run, file, demo)),
                 None => task_of(run, suites, file, demo)?,
             };
             let count = count.entry((suite, task)).or_default();
@@ -171,6 +174,16 @@ fn task_of(
         [one] if may_go_by_index => Ok(one),
         _ => Err(no_task(run, suites, file, demo)),
     }
+}
+
+fn of_another(run: &Run, file: &Foreign, demo: &ForeignDemo) -> Failure {
+    let id = demo.task.id.map_or(String::new(), |id| format!(" {id}"));
+    Failure::input(format!(
+        "{}: {}: --task {}: it was recorded by softvt and is of task{id}; leave --task out",
+        file.path.display(),
+        demo.name,
+        run.tasks.join(",")
+    ))
 }
 
 fn no_task(run: &Run, suites: &[&Suite], file: &Foreign, demo: &ForeignDemo) -> Failure {

@@ -7,7 +7,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use rust_hdf5::{DatatypeMessage, H5Dataset, H5File, H5Group};
+use rust_hdf5::{DatatypeMessage, H5Dataset, H5File, H5Group, Hdf5Error};
 use serde_json::Value;
 
 use super::{DatasetError, Demonstration, Numbers, Stream};
@@ -66,8 +66,16 @@ impl TaskFile {
         let file = H5File::open(path).map_err(|e| DatasetError::hdf5(path, "/")(e))?;
         let data = file.root_group().group("data").map_err(|e| DatasetError::hdf5(path, "/data")(e))?;
         let names = data.group_names().map_err(|e| DatasetError::hdf5(path, "/data")(e))?;
-        let mut demos: Vec<usize> =
-            names.iter().filter_map(|name| name.strip_prefix("demo_")?.parse().ok()).collect();
+        let mut demos = Vec::new();
+        for name in names.iter().filter(|name| name.starts_with("demo_")) {
+            match name["demo_".len()..].parse::<usize>() {
+                Ok(number) if *name == format!("demo_{number}") => demos.push(number),
+                _ => {
+                    let what = "expected the names demo_0, demo_1, …, without zeros in front";
+                    return Err(DatasetError::content(path, format!("/data/{name}"), what));
+                }
+            }
+        }
         demos.sort_unstable();
         if demos.is_empty() {
             let what = "it has no demonstrations; expected groups demo_0, demo_1, …";
@@ -144,9 +152,20 @@ impl TaskFile {
         self.data.attr_string(attribute).ok()
     }
 
-    /// Whether a demonstration has a data set.
+    /// Whether a demonstration has a data set, be it one that cannot be read.
     pub(super) fn has(&self, demo: usize, name: &str) -> bool {
-        self.dataset(demo, name).is_ok()
+        self.dataset(demo, name).is_ok() || self.lists(demo, name)
+    }
+
+    /// Whether the group above it lists a data set.
+    fn lists(&self, demo: usize, name: &str) -> bool {
+        let (above, last) = name.rsplit_once('/').map_or((None, name), |(above, last)| (Some(above), last));
+        let group = above
+            .into_iter()
+            .flat_map(|path| path.split('/'))
+            .try_fold(self.group(demo).ok(), |group, name| Some(group?.group(name).ok()));
+        let listed = group.flatten().and_then(|group| group.dataset_names().ok());
+        listed.is_some_and(|names| names.iter().any(|known| known.trim_start_matches('/').ends_with(last)))
     }
 
     /// Names of the groups in a group of a demonstration; none if it is not there.
@@ -159,7 +178,11 @@ impl TaskFile {
     pub(super) fn dataset(&self, demo: usize, name: &str) -> Result<H5Dataset, DatasetError> {
         self.group(demo)?;
         let key = format!("data/demo_{demo}/{name}");
-        self.file.dataset(&key).map_err(|e| DatasetError::hdf5(&self.path, format!("/{key}"))(e))
+        self.file.dataset(&key).map_err(|error| {
+            // What the library says of names that are not there depends on who wrote the group.
+            let error = if self.lists(demo, name) { error } else { Hdf5Error::NotFound(key.clone()) };
+            DatasetError::hdf5(&self.path, format!("/{key}"))(error)
+        })
     }
 
     /// Shape of a data set of a demonstration.

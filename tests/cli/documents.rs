@@ -131,9 +131,16 @@ fn the_policy_and_the_profile_of_the_page_work() {
         project.succeeds("suites/object_soft.lua --task 0 --policy my_policy.lua --episodes 1 --out run");
     assert!(said.err.contains("pick up the"), "it prints the prompt: {}", said.err);
     assert_eq!(project.json("run/run.json")["policy"], "feeler");
-    let profile =
-        "suites/object_soft.lua --policy ws://127.0.0.1:9 --policy-timeout 0.1 --profile my_profile.lua";
-    assert!(project.softvt(profile).err.contains("no policy server"), "the profile is read");
+    let said = |profile: &str| {
+        let words = format!(
+            "suites/object_soft.lua --policy ws://127.0.0.1:9 --policy-timeout 0.1 --profile {profile}"
+        );
+        project.softvt(&words).err
+    };
+    assert!(said("my_profile.lua").contains("inputs: unknown camera \"side\""), "no layout has added it");
+    let third = files[0].text.replace("\"side\"", "\"third_person\"");
+    project.write("third.lua", third.as_bytes());
+    assert!(said("third.lua").contains("no policy server"), "the profile is read");
 }
 
 /// The commands of the README that run a suite or a script that is there.

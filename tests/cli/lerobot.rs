@@ -199,7 +199,7 @@ fn what_cannot_be_exported_is_told_and_nothing_is_left() {
     let whole = fs::read(&hdf5).expect("read");
     fs::write(&hdf5, &whole[..whole.len() / 2]).expect("written");
     let told = project.refusal("dataset export data --format lerobot-v2.1 --out x");
-    assert!(told.contains("one_task0_demo.hdf5") && told.contains("cut off"), "{told}");
+    assert!(told.contains("one_task0_demo.hdf5") && told.contains("cut short"), "{told}");
     // One step fewer than the manifest says.
     fs::write(&hdf5, &whole).expect("written");
     let manifest = project.text("data/manifest.jsonl");

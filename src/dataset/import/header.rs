@@ -122,8 +122,8 @@ impl Header {
         let stated = self.environment["env_kwargs"]["control_freq"].as_f64();
         let (key, rate) = match stated {
             Some(rate) => ("/data, attribute env_args, control_freq", rate),
-            None => match file.about("fps").and_then(|text| whole_number(&text)) {
-                Some(rate) => ("/data, attribute fps", rate as f64),
+            None => match file.about("fps").and_then(|text| rate(&text)) {
+                Some(rate) => ("/data, attribute fps", rate),
                 None => return Ok(()),
             },
         };
@@ -193,6 +193,15 @@ fn whole_number(text: &str) -> Option<usize> {
     }
 }
 
+/// A rate as an attribute of a group: text, or an integer by its byte. Of one in floating point nothing is known.
+fn rate(text: &str) -> Option<f64> {
+    let mut letters = text.chars();
+    match (letters.next(), letters.next()) {
+        (Some(byte), None) if byte.is_ascii() => Some(f64::from(u32::from(byte))),
+        _ => text.trim().parse().ok(),
+    }
+}
+
 /// The sentence that a file is named by: LIBERO writes blanks as underscores.
 fn sentence(name: &str, ending: &str) -> Option<String> {
     let name = name.rsplit(['/', '\\']).next()?;
@@ -208,6 +217,14 @@ mod tests {
         assert_eq!(
             ["", "\u{7}", "\u{14}", "3", "x"].map(whole_number),
             [Some(0), Some(7), Some(20), Some(3), None]
+        );
+    }
+
+    #[test]
+    fn rates_are_read_from_their_first_byte_or_from_text() {
+        assert_eq!(
+            ["", "\u{14}", "<", "2", "20", "12.5"].map(rate),
+            [None, Some(20.0), Some(60.0), Some(50.0), Some(20.0), Some(12.5)]
         );
     }
 

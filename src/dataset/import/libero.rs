@@ -38,10 +38,9 @@ const NEAR_START: ([f64; 3], f64) = ([0.46, 0.0, 0.26], 0.25);
 /// Something is missing, or is not as expected.
 pub(super) fn demo(file: &TaskFile, header: &Header, demo: usize) -> Result<ForeignDemo, DatasetError> {
     let steps = steps(file, header, demo)?;
-    let model = file.text(demo, "model_file").ok().and_then(|xml| Model::read(&xml));
-    let states = if file.has(demo, "states") { Some(numbers(file, demo, "states")?) } else { None };
-    let states = states.filter(|(_, shape)| shape.len() == 2 && shape[0] == steps.len()).unwrap_or_default();
-    let states: Vec<&[f64]> = states.0.chunks_exact(states.1.get(1).copied().unwrap_or(1).max(1)).collect();
+    let model = model(file, demo)?;
+    let (numbers, width) = states(file, demo, (steps.len(), model.as_ref()))?;
+    let states: Vec<&[f64]> = numbers.chunks_exact(width).collect();
     let arm = arm(file, demo, (&states, steps.len()))?;
     let tool = tool_poses(file, demo, steps.len(), model.as_ref())?;
     let (commands, said) = match (&arm, &tool) {
@@ -53,7 +52,8 @@ pub(super) fn demo(file: &TaskFile, header: &Header, demo: usize) -> Result<Fore
             let before = tool::by_joints(file, demo, arm.name, &arm.before)?;
             (goals(&before, &steps), "steps away from where the recorded joint angles put the tool")
         }
-        (None, Some((_, recorded))) => {
+        (None, Some((name, recorded))) => {
+            tool::check_start(file, demo, (name, &recorded[0]))?;
             (goals(&late(recorded), &steps), "steps away from the recorded poses of the tool")
         }
         (None, None) => {
@@ -76,6 +76,44 @@ pub(super) fn demo(file: &TaskFile, header: &Header, demo: usize) -> Result<Fore
         },
         said,
     })
+}
+
+/// The world as MuJoCo's, if the file tells it.
+fn model(file: &TaskFile, demo: usize) -> Result<Option<Model>, DatasetError> {
+    let Some(xml) = file.text(demo, "model_file").ok().filter(|xml| !xml.trim().is_empty()) else {
+        return Ok(None);
+    };
+    let what = || "no model of MuJoCo's: it has no body in a worldbody".to_owned();
+    Model::read(&xml).map(Some).ok_or_else(|| wrong(file, demo, "attribute model_file", what()))
+}
+
+/// MuJoCo's states before each action, and how many numbers each has; none if there are none, or if there is no model that says
+/// what they are: others keep something else there.
+///
+/// # Errors
+/// They are not of the model.
+fn states(
+    file: &TaskFile,
+    demo: usize,
+    (steps, model): (usize, Option<&Model>),
+) -> Result<(Vec<f64>, usize), DatasetError> {
+    const KEY: &str = "states";
+    if !file.has(demo, KEY) {
+        return Ok((Vec::new(), 1));
+    }
+    let (all, shape) = numbers(file, demo, KEY)?;
+    match (shape[..] == [steps, shape.last().copied().unwrap_or(0)], model) {
+        (true, None) => Ok((all, shape[1].max(1))),
+        (false, None) => Ok((Vec::new(), 1)),
+        (true, Some(model)) if shape[1] == model.width() => Ok((all, shape[1])),
+        (_, Some(model)) => {
+            let what = format!(
+                "expected the shape ({steps}, {}), a state of model_file before each action, got {shape:?}",
+                model.width()
+            );
+            Err(wrong(file, demo, KEY, what))
+        }
+    }
 }
 
 /// The steps, as our own profile for LIBERO's policies reads them.

@@ -85,17 +85,23 @@ impl Model {
 
     /// A body's pose in the world while nothing moves.
     fn pose(&self, body: usize) -> Option<Pose> {
-        let Body { pose, above, .. } = &self.bodies[body];
-        let above = above.map_or(Some(Pose::identity()), |above| self.pose(above));
-        Some(above? * (*pose)?)
+        // Step by step, and not by calling itself: files of others may nest as deep as they like.
+        let outwards = std::iter::successors(Some(body), |body| self.bodies[*body].above);
+        outwards
+            .map(|body| self.bodies[body].pose)
+            .try_fold(Pose::identity(), |inner, pose| Some(pose? * inner))
+    }
+
+    /// Numbers of a state of this model.
+    pub fn width(&self) -> usize {
+        let joints = self.bodies.iter().flat_map(|body| &body.joints);
+        1 + joints.map(|joint| joint.size().iter().sum::<usize>()).sum::<usize>()
     }
 
     /// What stands around in a state: free bodies where the state has them, and those that are fixed to the world where the
     /// model has them. None if the state is not of this model.
     pub fn standing(&self, state: &[f64]) -> Option<Vec<Standing>> {
-        let joints = || self.bodies.iter().flat_map(|body| &body.joints);
-        let count = |which: usize| joints().map(|joint| joint.size()[which]).sum::<usize>();
-        if state.len() != 1 + count(0) + count(1) {
+        if state.len() != self.width() {
             return None;
         }
         let (mut at, mut things) = (1, Vec::new());

@@ -24,6 +24,10 @@ const JOINTS: &str = "obs/arm_joint_pos";
 const NEAR: f64 = 0.03;
 /// The gap in the middle between two orders of a quaternion's numbers that tells them apart, rad.
 const TOLD_APART: f64 = 0.3;
+/// How far actions may be from the recorded poses in the middle over all steps: m, and rad.
+const LEADING: (f64, f64) = (0.1, 0.6);
+/// A robot that is turned by more than this does not look at its table, rad.
+const BACKWARDS: f64 = 2.8;
 /// A finger that is pressed by more than this holds something, N.
 const PRESSED: f64 = 0.1;
 /// Fingers count as measured, not commanded, if they are as near as this to the observed ones in every step, m.
@@ -48,6 +52,7 @@ pub(super) fn demo(file: &TaskFile, header: &Header, demo: usize) -> Result<Fore
     let poses = poses(file, demo, &actions)?;
     let joints = if_there::<7>(file, demo, JOINTS, actions.len())?;
     let at_t = joints.as_ref().map_or(Ok(Vec3::zeros()), |joints| offset(file, demo, &poses, joints))?;
+    check_lead(file, demo, &actions, &poses)?;
     let grip = gripper(file, demo, &actions)?;
     let measured = are_measured(file, demo, &actions)?;
     let command = |row: &Row| {
@@ -56,8 +61,7 @@ pub(super) fn demo(file: &TaskFile, header: &Header, demo: usize) -> Result<Fore
         let position_b = Vec3::new(x, y, z) - rotation::from_axis_angle(&axis_angle_b) * at_t;
         Command::Pose(Action { position_b, axis_angle_b, closure: grip.closure(finger) })
     };
-    let start = numbers(file, demo, "initial_state/articulation/robot/joint_position").ok();
-    let start = start.and_then(|(all, _)| all.get(..7)?.try_into().ok());
+    let start = start(file, demo)?;
     Ok(ForeignDemo {
         name: format!("demo_{demo}"),
         task: header.task(file, demo),
@@ -70,6 +74,31 @@ pub(super) fn demo(file: &TaskFile, header: &Header, demo: usize) -> Result<Fore
         },
         said: "absolute poses and the fingers' positions",
     })
+}
+
+/// Joint angles of the arm at the start, if the file has them.
+///
+/// # Errors
+/// They are none of a Panda: seven, with or without both fingers.
+fn start(file: &TaskFile, demo: usize) -> Result<Option<[f64; 7]>, DatasetError> {
+    const KEY: &str = "initial_state/articulation/robot/joint_position";
+    if !file.has(demo, KEY) {
+        return Ok(None);
+    }
+    let (all, shape) = numbers(file, demo, KEY)?;
+    let arm: Option<[f64; 7]> = all.get(..7).and_then(|seven| seven.try_into().ok());
+    match (arm, shape.last()) {
+        (Some(arm), Some(7 | 9)) => {
+            tool::by_joints(file, demo, KEY, &[arm])?;
+            Ok(Some(arm))
+        }
+        _ => {
+            let what = format!(
+                "expected 7 joint angles of a Panda, or 9 with both fingers, got the shape {shape:?}: is it another robot?"
+            );
+            Err(wrong(file, demo, KEY, what))
+        }
+    }
 }
 
 fn actions(file: &TaskFile, demo: usize) -> Result<Vec<Row>, DatasetError> {
@@ -121,6 +150,31 @@ fn poses(file: &TaskFile, demo: usize, actions: &[Row]) -> Result<Vec<Pose>, Dat
         Pose::from_parts(Vec3::new(row[0], row[1], row[2]).into(), rotation)
     };
     Ok(all.iter().zip(order([0, 1, 2, 3])).map(pose).collect())
+}
+
+/// Actions lead the tool, but not far.
+///
+/// # Errors
+/// They are of another frame or unit, or no poses.
+fn check_lead(file: &TaskFile, demo: usize, actions: &[Row], poses: &[Pose]) -> Result<(), DatasetError> {
+    let apart = |(row, pose): (&Row, &Pose)| {
+        let [x, y, z, a, b, c, _] = row.numbers;
+        let turn = rotation::from_axis_angle(&Vec3::new(a, b, c));
+        [(Vec3::new(x, y, z) - pose.translation.vector).norm(), turn.angle_to(&pose.rotation)]
+    };
+    let sums =
+        actions.iter().zip(poses).map(apart).fold([0.0; 2], |sum, one| [sum[0] + one[0], sum[1] + one[1]]);
+    let [away, turned] = sums.map(|sum| sum / poses.len() as f64);
+    if away <= LEADING.0 && turned <= LEADING.1 {
+        return Ok(());
+    }
+    let what = format!(
+        "{:.0} mm and {:.0}° from {POSES} in the middle over all steps: expected absolute poses in the frame of the robot's base, m and \
+         rad (axis-angle)",
+        1e3 * away,
+        turned.to_degrees()
+    );
+    Err(wrong(file, demo, "actions", what))
 }
 
 /// Where the recorded tool is in ours, m.
@@ -175,15 +229,26 @@ fn things(file: &TaskFile, demo: usize) -> Result<Vec<Standing>, DatasetError> {
     let first = |name: &str| file.has(demo, name).then(|| numbers(file, demo, name)).transpose();
     let pose = |folder: &str, name: &str| -> Result<Option<Pose>, DatasetError> {
         for last in ["root_pose", "root_pose_w"] {
-            if let Some((all, _)) = first(&format!("{folder}/{name}/{last}"))? {
-                return Ok(all.get(..7).and_then(pose_of));
+            let key = format!("{folder}/{name}/{last}");
+            let Some((all, shape)) = first(&key)? else { continue };
+            let length = all.get(3..7).map(|q| q.iter().map(|x| x * x).sum::<f64>().sqrt());
+            if shape.last() != Some(&7) || !length.is_some_and(|length| (length - 1.0).abs() < 1e-2) {
+                let what = format!(
+                    "expected a place (m) and a quaternion w x y z of length 1, got the shape {shape:?}"
+                );
+                return Err(wrong(file, demo, &key, what));
             }
+            return Ok(all.get(..7).and_then(pose_of));
         }
         Ok(None)
     };
     for root in ["initial_state", "states"] {
         let mut things = Vec::new();
         let base = pose(&format!("{root}/articulation"), "robot")?;
+        if base.is_some_and(|base| base.rotation.angle() > BACKWARDS) {
+            let what = "the robot stands turned by half a turn or on its head: are its quaternions of another order than w x y z?";
+            return Err(wrong(file, demo, &format!("{root}/articulation/robot"), what.to_owned()));
+        }
         let seen = |pose_w: Pose| base.map_or(pose_w, |base| base.inverse() * pose_w);
         for kind in ["rigid_object", "articulation"] {
             let folder = format!("{root}/{kind}");

@@ -296,8 +296,9 @@ fn softvtbenchs_things_are_those_of_the_initial_state() {
 
 #[test]
 fn what_is_wrong_with_a_file_of_liberos_is_told_with_its_key() {
-    let libero: [(Spoil, &str); 8] = [
-        (|m| m.each("actions", |k| share(k)[..6].to_vec()), "actions of shape [6, 6]"),
+    let libero: [(Spoil, &str); 9] = [
+        (|m| m.demo.push(("model_file", "<mujoco/>".to_owned())), "model_file: no model of MuJoCo's"),
+        (|m| m.demo.push(("model_file", MODEL.to_owned())), "states: expected the shape (6, "),
         (
             |m| {
                 m.put(
@@ -334,7 +335,20 @@ fn what_is_wrong_with_a_file_of_liberos_is_told_with_its_key() {
 
 #[test]
 fn what_is_wrong_with_a_file_of_softvtbenchs_is_told_with_its_key() {
-    let softvtbench: [(Spoil, &str); 4] = [
+    const ROBOT: &str = "initial_state/articulation/robot";
+    let softvtbench: [(Spoil, &str); 10] = [
+        (
+            |m| m.each("actions", |k| [&[1e3 * tool(k).translation.x, 0.0, 0.0], &[0.0; 4][..]].concat()),
+            "from obs/eef_pose in the middle over all steps",
+        ),
+        (|m| m.each("actions", |k| [tool(k).translation.vector.as_slice(), &[0.0; 4]].concat()), "and 1"),
+        (|m| m.put(&format!("{ROBOT}/joint_position"), &[8], vec![0.0; 8]), "is it another robot?"),
+        (|m| m.put(&format!("{ROBOT}/joint_position"), &[9], vec![f64::NAN; 9]), "NaN is not finite"),
+        (|m| m.put(&format!("{ROBOT}/joint_position"), &[9], vec![100.0; 9]), "outside of a Panda's"),
+        (
+            |m| m.put(&format!("{ROBOT}/root_pose"), &[7], vec![0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]),
+            "another order than w x y z",
+        ),
         (
             |m| {
                 m.data
@@ -423,4 +437,51 @@ fn what_is_no_file_of_demonstrations_is_told_in_a_sentence() {
     let mut other = Made::new(Value::Null);
     other.each("actions", |_| vec![0.0; 7]);
     assert!(other.refusal().contains("of no layout that is known"));
+}
+
+#[test]
+fn quaternions_in_another_order_are_noticed_with_joints_and_without() {
+    let made = |order: fn(Quat) -> [f64; 4], joints: bool| {
+        let mut made = Made::libero().without("obs/ee").without("states");
+        made.each("obs/robot0_joint_pos", |k| self::joints(k).to_vec());
+        let site =
+            |k: usize| Pose::translation(-0.6, 0.0, 0.0) * tool(k) * Pose::translation(0.0, 0.0, -0.0069);
+        made.each("obs/robot0_eef_pos", |k| site(k).translation.vector.as_slice().to_vec());
+        made.each("obs/robot0_eef_quat", |k| order(site(k).rotation).to_vec());
+        let made = made.without("obs/joint");
+        if joints { made } else { made.without("obs/robot0_joint") }
+    };
+    for joints in [true, false] {
+        made(|q| [q.i, q.j, q.k, q.w], joints).read();
+        let said = made(|q| [q.w, q.i, q.j, q.k], joints).refusal();
+        assert!(said.contains("robot0_eef_quat") && said.contains("another order"), "{said}");
+    }
+}
+
+#[test]
+fn a_model_may_nest_as_deep_as_it_likes() {
+    let deep = "<body>".repeat(200_000);
+    let model = Model::read(&format!("<mujoco><worldbody>{deep}</worldbody></mujoco>")).unwrap();
+    assert_eq!(model.width(), 1);
+    let deep = "<body pos='0 0 1'>".repeat(200_000);
+    let text =
+        format!("<mujoco><worldbody>{deep}<body name='robot0_base' pos='1 0 0'/></worldbody></mujoco>");
+    assert_eq!(
+        Model::read(&text).unwrap().base_w.unwrap().translation.vector,
+        Vec3::new(1.0, 0.0, 200_000.0)
+    );
+}
+
+#[test]
+fn demonstrations_have_plain_names() {
+    let made = Made::libero();
+    let path = made.write();
+    let file = rust_hdf5::H5File::open_rw(&path).unwrap();
+    file.create_group("data/demo_00").unwrap();
+    file.close().unwrap();
+    let said = read(&path).unwrap_err().to_string();
+    assert!(
+        said.ends_with("/data/demo_00: expected the names demo_0, demo_1, …, without zeros in front"),
+        "{said}"
+    );
 }

@@ -21,6 +21,12 @@ const APART: (f64, f64) = (0.02, 0.1);
 
 /// How far a recorded tool may point away from ours, rad.
 const ASIDE: f64 = 0.2;
+/// How far it may be turned about the line along which it points, rad: hands are drawn in frames a quarter turn apart, and a
+/// quaternion in another order is half a turn away where the hand points down.
+const SPUN: f64 = 2.5;
+/// Where an arm begins, rad: robosuite's Panda (robots/panda_robot.py), and how far its tool may point away from there, rad.
+const HOME: ArmAngles = [0.0, 0.196, 0.0, -2.618, 0.0, 2.942, 0.785];
+const FROM_HOME: f64 = 1.0;
 
 /// Tool poses in the base frame by joint angles.
 ///
@@ -76,14 +82,7 @@ pub(super) fn compare(
     let shift = |r: &Pose, j: &Pose| r.translation.vector - j.translation.vector;
     let turn = |r: &Pose, j: &Pose| j.rotation.inverse() * r.rotation;
     let (middle, first) = (mean(&shift), turn(&recorded[0], &by_joints[0]));
-    // Frames of one hand differ by a turn about the line along which it points.
-    let aside = (first * Vec3::z()).angle(&Vec3::z());
-    if aside > ASIDE {
-        let what = format!(
-            "step 0: it points {:.0}° away from where the joint angles point the tool: another order of the quaternion's numbers, or \
-             another robot?",
-            aside.to_degrees()
-        );
+    if let Some(what) = of_another_hand(&first, ASIDE, "where the joint angles have the tool") {
         return Err(wrong(file, demo, name, what));
     }
     let worst = pairs().enumerate().find_map(|(step, (r, j))| {
@@ -101,6 +100,37 @@ pub(super) fn compare(
         return Err(wrong(file, demo, name, what));
     }
     Ok(mean(&|r, j| j.rotation.inverse() * shift(r, j)))
+}
+
+/// What is wrong with a hand that is turned by `turn` from where it should be. Frames of one hand differ by a turn about the
+/// line along which it points, but not by half a turn.
+fn of_another_hand(turn: &Quat, aside: f64, from: &str) -> Option<String> {
+    let away = (turn * Vec3::z()).angle(&Vec3::z());
+    let spun = 2.0 * turn.k.atan2(turn.w).rem_euclid(std::f64::consts::PI);
+    let spun = spun.min(2.0 * std::f64::consts::PI - spun);
+    (away > aside || spun > SPUN).then(|| {
+        format!(
+            "step 0: it points {:.0}° away from {from} and is turned by {:.0}° about that line: another order of the quaternion's \
+             numbers, or another robot?",
+            away.to_degrees(),
+            spun.to_degrees()
+        )
+    })
+}
+
+/// Compares the first recorded pose with where arms begin, for want of joint angles.
+///
+/// # Errors
+/// The hand points elsewhere, or is turned by half a turn: another order of the quaternion's numbers.
+pub(super) fn check_start(
+    file: &TaskFile,
+    demo: usize,
+    (name, recorded): (&str, &Pose),
+) -> Result<(), DatasetError> {
+    let home = DiffIk::new(&IkSpec::default(), HOME, CONTROL_DT).tool_pose(&HOME);
+    let turn = home.rotation.inverse() * recorded.rotation;
+    of_another_hand(&turn, FROM_HOME, "where arms begin")
+        .map_or(Ok(()), |what| Err(wrong(file, demo, name, what)))
 }
 
 /// How far apart two rotations are, rad, in the middle over all steps.

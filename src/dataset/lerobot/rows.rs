@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     dataset::{DatasetError, TaskFile, layout::PICTURES},
-    sensing::tactile::{HISTORY, MARKERS, MosaicLayout, mosaic_cell, mosaic_of_cells},
+    sensing::tactile::{HISTORY, MARKERS, MosaicLayout, PICTURE, mosaic_cell, mosaic_of_cells},
 };
 
 /// Pictures that are unpacked at once: whole chunks of the file.
@@ -137,9 +137,9 @@ fn seen(
     let mut all: [Vec<RgbImage>; 4] = Default::default();
     for (at, (pictures, name)) in all.iter_mut().zip(PICTURES).enumerate() {
         let name = format!("obs/{name}");
-        if let Some([height, width]) = [Some(third), Some(wrist), None, None][at] {
-            shaped(file, (demo, steps), &name, &[height, width, 3])?;
-        }
+        let finger = [PICTURE[1], PICTURE[0]];
+        let [height, width] = [third, wrist, finger, finger][at];
+        shaped(file, (demo, steps), &name, &[height, width, 3])?;
         let (bytes, [height, width]) = file.pictures(demo, &name, block.clone())?;
         let each = bytes.chunks_exact((3 * height * width).max(1));
         *pictures =

@@ -1,6 +1,9 @@
 //! Which demonstrations of a data set become episodes.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
 
 use crate::dataset::{
     DatasetError, TaskFile,
@@ -50,6 +53,12 @@ pub(super) fn choose(root: &Path, words: &[String]) -> Result<Chosen, DatasetErr
         return Err(DatasetError::content(&card_path, "pictures", what));
     }
     let entries = fitting(root, manifest::read(root)?, words)?;
+    let mut seen = BTreeSet::new();
+    if let Some(twice) = entries.iter().find(|entry| !seen.insert((&entry.hdf5_path, entry.demo_id))) {
+        let what = format!("{} demo_{} is there twice", twice.hdf5_path, twice.demo_id);
+        return Err(DatasetError::content(&root.join(MANIFEST), "lines", what));
+    }
+    drop(seen);
     let (mut sources, mut prompts, mut first) = (Vec::new(), Vec::<String>::new(), 0);
     for entry in entries {
         let known = prompts.iter().position(|prompt| *prompt == entry.language);
