@@ -160,19 +160,19 @@ impl TaskFile {
     /// Whether the group above it lists a data set.
     fn lists(&self, demo: usize, name: &str) -> bool {
         let (above, last) = name.rsplit_once('/').map_or((None, name), |(above, last)| (Some(above), last));
-        let group = above
-            .into_iter()
-            .flat_map(|path| path.split('/'))
-            .try_fold(self.group(demo).ok(), |group, name| Some(group?.group(name).ok()));
-        let listed = group.flatten().and_then(|group| group.dataset_names().ok());
-        listed.is_some_and(|names| names.iter().any(|known| known.trim_start_matches('/').ends_with(last)))
+        let listed = self.inner(demo, above).and_then(|group| group.dataset_names().ok());
+        listed.is_some_and(|names| names.iter().any(|known| known == last))
+    }
+
+    /// A group of a demonstration by its path below it, or the demonstration's own.
+    fn inner(&self, demo: usize, path: Option<&str>) -> Option<H5Group> {
+        let mut names = path.into_iter().flat_map(|path| path.split('/'));
+        names.try_fold(self.group(demo).ok()?, |group, name| group.group(name).ok())
     }
 
     /// Names of the groups in a group of a demonstration; none if it is not there.
     pub(super) fn groups(&self, demo: usize, path: &str) -> Vec<String> {
-        let inner =
-            path.split('/').try_fold(self.group(demo).ok(), |group, name| Some(group?.group(name).ok()));
-        inner.flatten().and_then(|group| group.group_names().ok()).unwrap_or_default()
+        self.inner(demo, Some(path)).and_then(|group| group.group_names().ok()).unwrap_or_default()
     }
 
     pub(super) fn dataset(&self, demo: usize, name: &str) -> Result<H5Dataset, DatasetError> {
