@@ -69,8 +69,10 @@ pub fn openpi(observation: &Observation, profile: &Profile) -> Value {
     let mut entries = Vec::new();
     for input in &profile.inputs {
         let Some(content) = content(observation, &input.source) else { continue };
+        let Some((last, others)) = input.keys.split_last() else { continue };
         let value = content.into_value(true);
-        entries.extend(input.keys.iter().map(|key| (Value::from(key.as_str()), value.clone())));
+        entries.extend(others.iter().map(|key| (Value::from(key.as_str()), value.clone())));
+        entries.push((Value::from(last.as_str()), value));
     }
     Value::Map(entries)
 }

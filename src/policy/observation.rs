@@ -7,7 +7,7 @@ use image::RgbImage;
 
 use crate::{
     geometry::Vec3,
-    sensing::tactile::{HISTORY, MARKERS, Markers, MosaicLayout, PadLoad, Taxels, mosaic},
+    sensing::tactile::{HISTORY, MARKERS, Markers, MosaicLayout, PadLoad, Taxels, mosaic, mosaic_cell},
 };
 
 /// The streams that somebody looks at; others are never computed.
@@ -64,6 +64,8 @@ pub struct CameraPicture {
 pub struct TouchFrame {
     /// The colour picture, 320 × 240; `docs/tactile.md` draws its frame.
     pub picture: RgbImage,
+    /// The same as it stands in the mosaic, 56 × 56.
+    pub cell: RgbImage,
     /// The picture of the untouched gel.
     pub untouched: Arc<RgbImage>,
     /// Initial and present places of the 11 × 9 markers, row by row, (x, y) px: the shape (2, 99, 2).
@@ -94,6 +96,11 @@ impl Observation {
 }
 
 impl TouchFrame {
+    /// What a sensor gives. The cell is made here, while the picture is still in the processor's cache.
+    pub fn new(picture: RgbImage, untouched: Arc<RgbImage>, markers: Markers) -> Self {
+        Self { cell: mosaic_cell(&picture), picture, untouched, markers }
+    }
+
     /// How far each channel of each pixel is from the untouched picture, 0 to 255.
     pub fn change(&self) -> RgbImage {
         let mut change = self.picture.clone();
@@ -113,7 +120,7 @@ impl TouchHistory {
     /// The 4 × 4 mosaic of both fingers' pictures, 224 × 224.
     pub fn mosaic(&self, layout: MosaicLayout) -> RgbImage {
         let [left, right] =
-            [0, 1].map(|side| self.frames.iter().map(|frame| &frame[side].picture).collect::<Vec<_>>());
+            [0, 1].map(|side| self.frames.iter().map(|frame| &frame[side].cell).collect::<Vec<_>>());
         mosaic([&left, &right], layout)
     }
 

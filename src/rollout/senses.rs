@@ -262,11 +262,7 @@ impl Senses {
     pub fn touch_frame(&mut self, frame: &Frame) -> Result<[TouchFrame; 2], SenseError> {
         let both = self.touch(frame)?;
         let untouched = self.looks.sensor(&self.spec)?.untouched.clone();
-        Ok(both.map(|touched| TouchFrame {
-            picture: touched.picture,
-            untouched: untouched.clone(),
-            markers: touched.markers,
-        }))
+        Ok(both.map(|touched| TouchFrame::new(touched.picture, untouched.clone(), touched.markers)))
     }
 
     /// True forces on the left and right gel.

@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     dataset::{DatasetError, TaskFile, layout::PICTURES},
-    sensing::tactile::{HISTORY, MARKERS, MosaicLayout, PICTURE, mosaic_cell, mosaic_of_cells},
+    sensing::tactile::{HISTORY, MARKERS, MosaicLayout, PICTURE, mosaic, mosaic_cell},
 };
 
 /// Pictures that are unpacked at once: whole chunks of the file.
@@ -82,7 +82,7 @@ pub(super) fn read(
                 }
                 cells.push(mosaic_cell(picture));
             }
-            let mosaic = mosaic_of_cells([&felt[0], &felt[1]], MosaicLayout::Rows);
+            let mosaic = mosaic([&felt[0], &felt[1]], MosaicLayout::Rows);
             for (key, picture) in [third, wrist, mosaic].iter().enumerate() {
                 rows.push(key, picture).map_err(|what| {
                     DatasetError::content(

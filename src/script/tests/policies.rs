@@ -24,11 +24,9 @@ fn seed(episode: u64) -> EpisodeSeed {
 /// A finger whose markers have all moved by `by` px, with a picture that is `lit` brighter than the untouched one.
 fn finger(by: [f32; 2], lit: u8) -> TouchFrame {
     let rest = RgbImage::from_pixel(320, 240, Rgb([100, 100, 100]));
-    TouchFrame {
-        picture: RgbImage::from_pixel(320, 240, Rgb([100 + lit, 100, 100 - lit])),
-        untouched: Arc::new(rest),
-        markers: [untouched(), untouched().map(|[x, y]| [x + by[0], y + by[1]])],
-    }
+    let picture = RgbImage::from_pixel(320, 240, Rgb([100 + lit, 100, 100 - lit]));
+    let markers = [untouched(), untouched().map(|[x, y]| [x + by[0], y + by[1]])];
+    TouchFrame::new(picture, Arc::new(rest), markers)
 }
 
 fn observation() -> Observation {

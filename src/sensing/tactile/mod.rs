@@ -37,7 +37,7 @@ pub use field::{FieldError, GelField, Give, PadInput, sense};
 pub use gel::{Gel, Scratch};
 pub use load::{PadLoad, Taxels};
 pub use markers::{ARROW_GAIN, MARKERS, MarkerStyle, Markers, Places, draw_markers, markers, untouched};
-pub use mosaic::{CELLS as HISTORY, MosaicLayout, mosaic, mosaic_cell, mosaic_of_cells};
+pub use mosaic::{CELLS as HISTORY, MosaicLayout, mosaic, mosaic_cell};
 pub use motion::Motion;
 pub use optics::{Optics, OpticsError};
 pub use relief::Surface;

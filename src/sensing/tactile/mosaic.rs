@@ -24,23 +24,14 @@ pub enum MosaicLayout {
     Columns,
 }
 
-/// 4 × 4 cells of 56 × 56: the last 8 frames of the left and of the right finger. `history` is oldest first, left and
-/// right; a shorter one is filled up in front with its oldest frame; an empty one leaves the picture black.
-pub fn mosaic<T: Borrow<RgbImage>>(history: [&[T]; 2], layout: MosaicLayout) -> RgbImage {
-    let [left, right] = history.map(|frames| {
-        let last = &frames[frames.len().saturating_sub(CELLS)..];
-        last.iter().map(|frame| mosaic_cell(frame.borrow())).collect::<Vec<_>>()
-    });
-    mosaic_of_cells([&left, &right], layout)
-}
-
 /// A finger's picture as it stands in the mosaic: 56 × 56.
 pub fn mosaic_cell(picture: &RgbImage) -> RgbImage {
     scaled(picture, CELL, CELL)
 }
 
-/// [`mosaic`] of pictures that are cells already; whoever makes one a step scales each picture down once, not eight times.
-pub fn mosaic_of_cells<T: Borrow<RgbImage>>(history: [&[T]; 2], layout: MosaicLayout) -> RgbImage {
+/// 4 × 4 cells: the last 8 of the left and of the right finger, by [`mosaic_cell`]. `history` is oldest first, left and
+/// right; a shorter one is filled up in front with its oldest cell; an empty one leaves the picture black.
+pub fn mosaic<T: Borrow<RgbImage>>(history: [&[T]; 2], layout: MosaicLayout) -> RgbImage {
     let mut picture = RgbImage::new(EDGE as u32 * CELL, EDGE as u32 * CELL);
     for (finger, cells) in history.into_iter().enumerate() {
         for place in 0..CELLS {
@@ -62,31 +53,31 @@ mod tests {
 
     use super::*;
 
-    fn frames(from: u8, count: u8) -> Vec<RgbImage> {
-        (0..count).map(|i| RgbImage::from_pixel(320, 240, Rgb([from + i, 0, 0]))).collect()
+    fn cells(from: u8, count: u8) -> Vec<RgbImage> {
+        (0..count).map(|i| mosaic_cell(&RgbImage::from_pixel(320, 240, Rgb([from + i, 0, 0])))).collect()
     }
 
-    fn cell(picture: &RgbImage, column: u32, row: u32) -> u8 {
+    fn red(picture: &RgbImage, column: u32, row: u32) -> u8 {
         picture.get_pixel(56 * column + 20, 56 * row + 30)[0]
     }
 
     #[test]
     fn the_left_finger_is_above_and_time_runs_to_the_right() {
-        let (left, right) = (frames(10, 8), frames(50, 8));
+        let (left, right) = (cells(10, 8), cells(50, 8));
         let picture = mosaic([&left, &right], MosaicLayout::Rows);
         assert_eq!(picture.dimensions(), (224, 224));
-        assert_eq!([cell(&picture, 0, 0), cell(&picture, 3, 0), cell(&picture, 0, 1)], [10, 13, 14]);
-        assert_eq!([cell(&picture, 0, 2), cell(&picture, 3, 3)], [50, 57]);
+        assert_eq!([red(&picture, 0, 0), red(&picture, 3, 0), red(&picture, 0, 1)], [10, 13, 14]);
+        assert_eq!([red(&picture, 0, 2), red(&picture, 3, 3)], [50, 57]);
         let picture = mosaic([&left, &right], MosaicLayout::Columns);
-        assert_eq!([cell(&picture, 1, 0), cell(&picture, 0, 1), cell(&picture, 2, 0)], [11, 12, 50]);
+        assert_eq!([red(&picture, 1, 0), red(&picture, 0, 1), red(&picture, 2, 0)], [11, 12, 50]);
     }
 
     #[test]
     fn a_short_history_starts_with_its_oldest_frame_and_a_long_one_keeps_its_last() {
-        let (short, long) = (frames(10, 3), frames(50, 20));
+        let (short, long) = (cells(10, 3), cells(50, 20));
         let picture = mosaic([&short, &long], MosaicLayout::Rows);
-        let upper: Vec<u8> = (0..8).map(|i| cell(&picture, i % 4, i / 4)).collect();
+        let upper: Vec<u8> = (0..8).map(|i| red(&picture, i % 4, i / 4)).collect();
         assert_eq!(upper, [10, 10, 10, 10, 10, 10, 11, 12]);
-        assert_eq!([cell(&picture, 0, 2), cell(&picture, 3, 3)], [62, 69]);
+        assert_eq!([red(&picture, 0, 2), red(&picture, 3, 3)], [62, 69]);
     }
 }
