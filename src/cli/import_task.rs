@@ -77,7 +77,8 @@ fn named(run: &Run, suites: &[&Suite]) -> Result<Option<(usize, usize)>, Failure
         ([one], _) => Ok(Some(*one)),
         ([], Some(failure)) => Err(failure),
         _ => Err(Failure::input(format!(
-            "{}: --task {}: {} tasks are named; an import is of the one that the demonstrations are of",
+            "{}: --task {}: that is {} tasks; name the one that the demonstrations are of, or leave --task out and go by their \
+             instructions",
             run.file.display(),
             run.tasks.join(","),
             found.len()
@@ -187,12 +188,20 @@ fn of_another(run: &Run, file: &Foreign, demo: &ForeignDemo) -> Failure {
 }
 
 fn no_task(run: &Run, suites: &[&Suite], file: &Foreign, demo: &ForeignDemo) -> Failure {
-    let ForeignTask { suite, prompts, .. } = &demo.task;
-    let said = match (prompts.first(), suite) {
-        (Some(prompt), Some(suite)) => format!("{prompt:?} of the suite {suite}"),
-        (Some(prompt), None) => format!("{prompt:?}"),
-        (None, Some(suite)) => format!("a task of the suite {suite}"),
-        (None, None) => "a task that it does not tell".to_owned(),
+    let ForeignTask { suite, id, prompts } = &demo.task;
+    let task = match (prompts.first(), id) {
+        (Some(prompt), _) => Some(format!("{prompt:?}")),
+        (None, Some(id)) => Some(format!("task {id}")),
+        (None, None) => None,
+    };
+    let script = run.file.display();
+    let said = match (task, suite) {
+        (Some(task), Some(suite)) => {
+            format!("it is of {task} of the suite {suite}, and {script} has no such task")
+        }
+        (Some(task), None) => format!("it is of {task}, and {script} has no such task"),
+        (None, Some(suite)) => format!("it is of the suite {suite}, but does not say of which task"),
+        (None, None) => "it does not say of which task it is, by an instruction or an index".to_owned(),
     };
     let list = |suite: &&Suite| {
         let tasks = suite.tasks.iter().map(|task| format!("\n  {} {}: {}", suite.name, task.id, task.prompt));
@@ -200,10 +209,9 @@ fn no_task(run: &Run, suites: &[&Suite], file: &Foreign, demo: &ForeignDemo) -> 
     };
     let listed: String = suites.iter().map(list).collect();
     Failure::input(format!(
-        "{}: {}: it is of {said}, and {} has no such task; name one with --task if one is meant:{listed}",
+        "{}: {}: {said}; name one with --task if one is meant:{listed}",
         file.path.display(),
-        demo.name,
-        run.file.display()
+        demo.name
     ))
 }
 

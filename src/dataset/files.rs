@@ -17,6 +17,17 @@ pub fn make_folder(dir: &Path) -> Result<(), DatasetError> {
     fs::create_dir_all(dir).map_err(DatasetError::io("make the folder", dir))
 }
 
+/// A folder and those above it that are not there yet, the deepest first.
+pub fn missing(dir: &Path) -> Vec<PathBuf> {
+    let named = dir.ancestors().filter(|path| !path.as_os_str().is_empty());
+    named.take_while(|path| fs::symlink_metadata(path).is_err()).map(Path::to_owned).collect()
+}
+
+/// Removes folders, the deepest first, as long as they are empty.
+pub fn take_back(folders: &[PathBuf]) {
+    let _ = folders.iter().try_for_each(fs::remove_dir);
+}
+
 /// Where a file is made before it gets its name.
 pub fn aside(path: &Path) -> PathBuf {
     let mut name = OsString::from(path.file_name().unwrap_or_default());

@@ -2,7 +2,7 @@
 
 use std::{
     fs::File,
-    io::Read,
+    io::{Read, Seek, SeekFrom},
     ops::Range,
     path::{Path, PathBuf},
 };
@@ -128,15 +128,17 @@ impl TaskFile {
     /// # Errors
     /// It was not recorded by softvt.
     pub fn record(&self, demo: usize) -> Result<EpisodeRecord, DatasetError> {
-        let text = self.text(demo, "metadata_json").map_err(|_| {
-            let what =
-                "softvt did not record it; softvt dataset import re-executes what others have recorded";
-            DatasetError::content(&self.path, format!("/data/demo_{demo}"), what)
+        let key = format!("/data/demo_{demo}, attribute metadata_json");
+        let text = self.text(demo, "metadata_json").map_err(|error| match self.environment() {
+            Ok(environment) if environment["env_name"] == "softvt" => error,
+            _ => {
+                let what =
+                    "softvt did not record it; softvt dataset import re-executes what others have recorded";
+                DatasetError::content(&self.path, format!("/data/demo_{demo}"), what)
+            }
         })?;
-        serde_json::from_str(&text).map_err(|e| {
-            let key = format!("/data/demo_{demo}, attribute metadata_json");
-            DatasetError::content(&self.path, key, format!("no record of softvt: {e}"))
-        })
+        serde_json::from_str(&text)
+            .map_err(|e| DatasetError::content(&self.path, key, format!("no record of softvt: {e}")))
     }
 
     /// Control steps of a demonstration.
@@ -335,14 +337,22 @@ fn cut_short(size: u64, end: u64) -> String {
 /// What HDF5 files begin with.
 const SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
 
-/// Where a file says that it ends (HDF5 file format, II.A: the superblock); none if it does not begin as such files do.
+/// Where a file says that it ends, 0 if that is not known; none if it does not begin as such files do. Something else may
+/// stand in front of it, as long as 512 bytes or a multiple of them by a power of two (HDF5 file format, II.A).
 fn end_of(path: &Path) -> Option<u64> {
-    let mut head = Vec::new();
-    File::open(path).and_then(|file| file.take(64).read_to_end(&mut head)).ok()?;
-    if !head.starts_with(SIGNATURE) {
-        return None;
+    let mut file = File::open(path).ok()?;
+    let mut head = |from: u64| -> Option<Vec<u8>> {
+        let mut head = Vec::new();
+        file.seek(SeekFrom::Start(from)).ok()?;
+        file.by_ref().take(64).read_to_end(&mut head).ok()?;
+        (!head.is_empty()).then_some(head)
+    };
+    let first = head(0)?;
+    if first.starts_with(SIGNATURE) {
+        return Some(stated_end(&first).unwrap_or(u64::MAX));
     }
-    Some(stated_end(&head).unwrap_or(u64::MAX))
+    let mut heads = (9..63).map_while(|power| head(1 << power));
+    heads.any(|head| head.starts_with(SIGNATURE)).then_some(0)
 }
 
 /// The end that a superblock states, 0 if its numbers are not of 8 bytes; none if it is cut short itself.

@@ -5,22 +5,17 @@ use std::path::Path;
 use rust_hdf5::H5File;
 use softvt::dataset::{Numbers, TaskFile};
 
-use crate::support::Project;
+use crate::support::{Project, SOLIDS};
 
 /// A rigid cube that stands on a slab: the goal is reached by waiting.
 const SUITE: &str = r#"
-local function solid(name, size, body)
-  return softvt.asset { name = name, shape = softvt.shape.box { size = size }:grounded(), body = body }
-end
-local floor = softvt.asset { name = "floor", shape = softvt.shape.box { size = { 2, 2, 0.05 } }:translate(0, 0, -0.025), body = softvt.static {} }
-local slab = solid("slab", { 0.1, 0.1, 0.02 }, softvt.static {})
-local cube = solid("cube", { 0.04, 0.04, 0.04 }, softvt.rigid { density = 300 })
+local solids = require "solids"
 local layout = softvt.layout("one", function(scene)
   local x = 0.01 * math.random()
-  scene:add { name = "floor", asset = floor, xyz = { 0, 0, 0 } }
-  scene:add { name = "slab", asset = slab, xyz = { 0, 0.2, 0 } }
-  scene:add { name = "cube", asset = cube, xyz = { x, 0.2, 0.02 } }
-  scene:add { name = "other", asset = cube, xyz = { 0, 0, 0 } }
+  scene:add { name = "floor", asset = solids.floor, xyz = { 0, 0, 0 } }
+  scene:add { name = "slab", asset = solids.slab, xyz = { 0, 0.2, 0 } }
+  scene:add { name = "cube", asset = solids.cube, xyz = { x, 0.2, 0.02 } }
+  scene:add { name = "other", asset = solids.cube, xyz = { 0, 0, 0 } }
 end)
 local function task(prompt)
   return softvt.task { prompt = prompt, layout = layout, goal = softvt.on { object = "cube", target = "slab" }, budget_steps = 30,
@@ -32,7 +27,7 @@ return softvt.suite { name = "one", object_type = "rigid", variation = "spatial"
 
 /// A project with a data set of two demonstrations of task 0.
 fn recorded() -> Project {
-    let project = Project::new(&[("x.lua", SUITE)]);
+    let project = Project::new(&[("x.lua", SUITE), SOLIDS]);
     project.succeeds("record x.lua --task 0 --demos 2 --out data --images video --no-privileged");
     project
 }
@@ -155,7 +150,7 @@ fn what_cannot_be_imported_is_refused_and_nothing_is_written() {
             "torn.hdf5: /data/demo_0/obs/eef_pose: step 9: no quaternion w x y z of length 1",
         ),
         ("x.lua odd.hdf5 --task 7", "--task 7: suite one has no such task"),
-        ("x.lua odd.hdf5 --task wait", "2 tasks are named"),
+        ("x.lua odd.hdf5 --task wait", "--task wait: that is 2 tasks; name the one"),
         (
             "x.lua OWN --seed 3",
             "it was recorded with the seed 0, and this import is of the seed 3; give --seed 0",
@@ -172,7 +167,9 @@ fn what_cannot_be_imported_is_refused_and_nothing_is_written() {
     let said = project.refusal(&format!("dataset import x.lua {OWN} --out mine"));
     assert!(said.contains("it holds notes.txt and no recording of softvt"), "{said}");
     let said = project.refusal(&format!("dataset import x.lua {OWN} --out data"));
-    assert!(said.contains("it holds another recording"), "{said}");
+    assert!(said.contains("--out data: it holds what softvt record made"), "{said}");
+    let said = project.refusal(&format!("dataset import x.lua {OWN} --out x.lua"));
+    assert!(said.contains("--out x.lua: it is no folder"), "{said}");
     for data in ["data", OWN] {
         let said = project.refusal(&format!("x.lua --policy {data} --out run"));
         assert!(said.contains("holds demonstrations") && said.contains("softvt dataset check"), "{said}");

@@ -15,26 +15,21 @@ use rmpv::Value;
 use crate::{
     recording::files,
     serve::{Server, array, get, map},
-    support::Project,
+    support::{Project, SOLIDS},
 };
 
 /// A cube rests on its slab while the fingers close on a block that stands on a pillar between them.
 const SUITE: &str = r#"
-local function solid(name, size, body)
-  return softvt.asset { name = name, shape = softvt.shape.box { size = size }:grounded(), body = body }
-end
-local floor = softvt.asset { name = "floor", shape = softvt.shape.box { size = { 2, 2, 0.05 } }:translate(0, 0, -0.025), body = softvt.static {} }
-local slab = solid("slab", { 0.1, 0.1, 0.02 }, softvt.static {})
-local pillar = solid("pillar", { 0.03, 0.03, 0.26 }, softvt.static {})
-local block = solid("block", { 0.03, 0.05, 0.05 }, softvt.rigid { density = 300 })
-local cube = solid("cube", { 0.04, 0.04, 0.04 }, softvt.rigid { density = 300 })
+local solids = require "solids"
+local pillar = solids.solid("pillar", { 0.03, 0.03, 0.26 }, softvt.static {})
+local block = solids.solid("block", { 0.03, 0.05, 0.05 }, softvt.rigid { density = 300 })
 local layout = softvt.layout("one", function(scene)
   scene.base = { -0.6, 0, 0 }
-  scene:add { name = "floor", asset = floor, xyz = { 0, 0, 0 } }
-  scene:add { name = "slab", asset = slab, xyz = { 0, 0.2, 0 } }
+  scene:add { name = "floor", asset = solids.floor, xyz = { 0, 0, 0 } }
+  scene:add { name = "slab", asset = solids.slab, xyz = { 0, 0.2, 0 } }
   scene:add { name = "pillar", asset = pillar, xyz = { -0.127, -0.005, 0 } }
   scene:add { name = "block", asset = block, xyz = { -0.127, -0.005, 0.26 } }
-  scene:add { name = "cube", asset = cube, xyz = { 0, 0.2, 0.02 } }
+  scene:add { name = "cube", asset = solids.cube, xyz = { 0, 0.2, 0.02 } }
 end)
 local function task(prompt)
   return softvt.task { prompt = prompt, layout = layout, budget_steps = 40,
@@ -46,7 +41,7 @@ return softvt.suite { name = "one", object_type = "rigid", variation = "spatial"
 "#;
 
 fn project() -> Project {
-    Project::new(&[("x.lua", SUITE)])
+    Project::new(&[("x.lua", SUITE), SOLIDS])
 }
 
 fn rows(path: &Path) -> Vec<Row> {

@@ -2,21 +2,16 @@
 
 use std::{collections::BTreeMap, fs, path::Path};
 
-use crate::support::Project;
+use crate::support::{Project, SOLIDS};
 
 /// A rigid cube that stands on a slab, or beside it in some attempts: the goal is reached by waiting, or not at all.
 const SUITE: &str = r#"
-local function solid(name, size, body)
-  return softvt.asset { name = name, shape = softvt.shape.box { size = size }:grounded(), body = body }
-end
-local floor = softvt.asset { name = "floor", shape = softvt.shape.box { size = { 2, 2, 0.05 } }:translate(0, 0, -0.025), body = softvt.static {} }
-local slab = solid("slab", { 0.1, 0.1, 0.02 }, softvt.static {})
-local cube = solid("cube", { 0.04, 0.04, 0.04 }, softvt.rigid { density = 300 })
+local solids = require "solids"
 local layout = softvt.layout("one", function(scene)
   local beside = math.random() < 0.4
-  scene:add { name = "floor", asset = floor, xyz = { 0, 0, 0 } }
-  scene:add { name = "slab", asset = slab, xyz = { 0, 0.2, 0 } }
-  scene:add { name = "cube", asset = cube, xyz = { 0, beside and 0.35 or 0.2, beside and 0 or 0.02 } }
+  scene:add { name = "floor", asset = solids.floor, xyz = { 0, 0, 0 } }
+  scene:add { name = "slab", asset = solids.slab, xyz = { 0, 0.2, 0 } }
+  scene:add { name = "cube", asset = solids.cube, xyz = { 0, beside and 0.35 or 0.2, beside and 0 or 0.02 } }
 end)
 return softvt.suite { name = "one", object_type = "rigid", variation = "spatial", episodes = 1, tasks = {
   softvt.task { prompt = "wait", layout = layout, goal = softvt.on { object = "cube", target = "slab" }, budget_steps = 30,
@@ -25,7 +20,7 @@ return softvt.suite { name = "one", object_type = "rigid", variation = "spatial"
 "#;
 
 fn project() -> Project {
-    Project::new(&[("x.lua", SUITE)])
+    Project::new(&[("x.lua", SUITE), SOLIDS])
 }
 
 /// Every file below a folder, by its path.

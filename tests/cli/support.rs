@@ -5,6 +5,22 @@ use std::{fs, path::PathBuf, time::Duration};
 use assert_cmd::{Command, cargo::cargo_bin_cmd};
 use serde_json::Value;
 
+/// `solids.lua` for small scenes: a floor, a slab, a cube that lies well on it, and what makes others.
+pub const SOLIDS: (&str, &str) = (
+    "solids.lua",
+    r#"
+local function solid(name, size, body)
+  return softvt.asset { name = name, shape = softvt.shape.box { size = size }:grounded(), body = body }
+end
+return {
+  solid = solid,
+  floor = softvt.asset { name = "floor", shape = softvt.shape.box { size = { 2, 2, 0.05 } }:translate(0, 0, -0.025), body = softvt.static {} },
+  slab = solid("slab", { 0.1, 0.1, 0.02 }, softvt.static {}),
+  cube = solid("cube", { 0.04, 0.04, 0.04 }, softvt.rigid { density = 300 }),
+}
+"#,
+);
+
 /// What a run said.
 pub struct Said {
     pub code: i32,

@@ -1,6 +1,6 @@
 //! The folder of a data set in the making.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
@@ -17,6 +17,9 @@ use crate::dataset::{
 pub fn check(root: &Path, resume: bool, recording: &Value) -> Result<bool, Failure> {
     let dir = root.display();
     let path = root.join(RECORDING);
+    if root.exists() && !root.is_dir() {
+        return Err(Failure::input(format!("--out {dir}: it is no folder; give a new folder")));
+    }
     if !path.is_file() {
         let found = std::fs::read_dir(root).ok().and_then(|mut entries| entries.next()?.ok());
         return match found {
@@ -29,6 +32,16 @@ pub fn check(root: &Path, resume: bool, recording: &Value) -> Result<bool, Failu
     }
     let known: Value = serde_json::from_str(&files::read_text(&path).map_err(failure)?)
         .map_err(|e| Failure::input(format!("{}: no recording of softvt: {e}", path.display())))?;
+    let made_by = |recording: &Value| match recording.get("imported") {
+        Some(_) => "softvt dataset import",
+        None => "softvt record",
+    };
+    if made_by(&known) != made_by(recording) {
+        return Err(Failure::input(format!(
+            "--out {dir}: it holds what {} made; give a new folder",
+            made_by(&known)
+        )));
+    }
     if let Some(what) = difference(&known, recording) {
         return Err(Failure::input(format!(
             "--out {dir}: it holds another recording ({what}); give a new folder, or what it was started with"
@@ -42,14 +55,14 @@ pub fn check(root: &Path, resume: bool, recording: &Value) -> Result<bool, Failu
     Ok(root.join(DATASET).is_file())
 }
 
-/// Takes back what was written of a recording without any attempt; the folder itself goes too if nothing else is in it.
-pub fn take_back(root: &Path) {
+/// Takes back what was written of a recording without any attempt, and the folders that were `missing` before it.
+pub fn take_back(root: &Path, missing: &[PathBuf]) {
     let attempts = root.join(layout::ATTEMPTS);
     // Folders with something in them stay, and then it is known what they are of.
     let _ = std::fs::remove_dir(&attempts);
     if !attempts.exists() {
         let _ = std::fs::remove_dir_all(root.join(PARTS));
         let _ = std::fs::remove_file(root.join(RECORDING));
-        let _ = std::fs::remove_dir(root);
+        files::take_back(missing);
     }
 }

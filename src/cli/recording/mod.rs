@@ -43,12 +43,15 @@ pub fn carry_out<'a>(
         crate::message::tell(&format!("softvt: {} is finished already", root.display()));
         return Ok(());
     }
-    let mut sessions = sessions()?;
+    let missing = files::missing(&root);
     let text = format!("{recording:#}\n");
-    files::write(&root.join(RECORDING), text.as_bytes()).map_err(failure)?;
-    for session in &mut sessions {
-        session.go().inspect_err(|_| folder::take_back(&root))?;
-    }
+    // Before anything that takes long: a folder that cannot be written to is told at once.
+    let noted = files::write(&root.join(RECORDING), text.as_bytes()).map_err(failure);
+    let recorded = noted.and_then(|()| sessions()).and_then(|mut sessions| {
+        sessions.iter_mut().try_for_each(Session::go)?;
+        Ok(sessions)
+    });
+    let sessions = recorded.inspect_err(|_| folder::take_back(&root, &missing))?;
     finish::finish(output, &sessions, &root)
 }
 

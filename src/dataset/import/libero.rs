@@ -150,13 +150,7 @@ fn arm(
 ) -> Result<Option<Arm>, DatasetError> {
     let named = ["obs/joint_states", "obs/robot0_joint_pos"].into_iter().find(|name| file.has(demo, name));
     let Some(name) = named else { return Ok(None) };
-    if let [_, joints] = file.shape(demo, name)?[..]
-        && joints != 7
-    {
-        let what = format!("{joints} joints a step; a Panda has 7: is it another robot?");
-        return Err(wrong(file, demo, name, what));
-    }
-    let observed = rows::<7>(file, demo, name, Some(steps))?;
+    let observed = tool::joints(file, demo, name, steps)?;
     let before = match agreement(states, &observed) {
         Some(true) => states.iter().map(|state| std::array::from_fn(|i| state[1 + i])).collect(),
         Some(false) => observed.clone(),

@@ -1,5 +1,7 @@
 //! Rows of numbers out of foreign files, checked as far as they can be without knowing what they mean.
 
+use rust_hdf5::DatatypeMessage;
+
 use super::super::{DatasetError, TaskFile, read::kind_of};
 
 /// The key of a data set, as messages name it.
@@ -59,7 +61,12 @@ pub(super) fn numbers(
     let data = file.dataset(demo, name)?;
     let shape = data.shape();
     if !matches!(kind_of(file.path(), &key(demo, name), &data)?, "f64" | "f32") {
-        let what = "expected numbers of type float32 or float64".to_owned();
+        let got = match data.datatype() {
+            Ok(DatatypeMessage::FloatingPoint { size, .. }) => format!("float{}", 8 * size),
+            Ok(DatatypeMessage::FixedPoint { .. }) => "integers".to_owned(),
+            _ => "something else".to_owned(),
+        };
+        let what = format!("expected numbers of type float32 or float64, got {got}");
         return Err(wrong(file, demo, name, what));
     }
     let (numbers, width) = file.doubles(demo, name)?;

@@ -50,7 +50,8 @@ struct Row {
 pub(super) fn demo(file: &TaskFile, header: &Header, demo: usize) -> Result<ForeignDemo, DatasetError> {
     let actions = actions(file, demo)?;
     let poses = poses(file, demo, &actions)?;
-    let joints = if_there::<7>(file, demo, JOINTS, actions.len())?;
+    let joints =
+        file.has(demo, JOINTS).then(|| tool::joints(file, demo, JOINTS, actions.len())).transpose()?;
     let at_t = joints.as_ref().map_or(Ok(Vec3::zeros()), |joints| offset(file, demo, &poses, joints))?;
     check_lead(file, demo, &actions, &poses)?;
     let grip = gripper(file, demo, &actions)?;

@@ -411,6 +411,13 @@ fn another_robot_controller_or_rate_is_refused() {
     let mut made = Made::softvtbench();
     made.about.push(("robot_type", "UR10e".to_owned()));
     assert!(made.refusal().contains("the robot is UR10e"));
+    let mut made = Made::softvtbench().without("obs/arm_joint_pos");
+    made.each("obs/arm_joint_pos", |k| joints(k)[..6].to_vec());
+    let said = made.refusal();
+    assert!(
+        said.ends_with("obs/arm_joint_pos: 6 joints a step; a Panda has 7: is it another robot?"),
+        "{said}"
+    );
 }
 
 #[test]
@@ -431,6 +438,11 @@ fn what_is_no_file_of_demonstrations_is_told_in_a_sentence() {
     );
     fs::write(&path, &whole[..20]).unwrap();
     assert!(said().ends_with("x.hdf5 is cut short: only 20 bytes are there"), "{}", said());
+    // Something else may stand in front, as HDF5 allows it.
+    for (before, read) in [(512, true), (1024, true), (700, false)] {
+        fs::write(&path, [&vec![0; before], &whole[..]].concat()).unwrap();
+        assert_eq!(super::read(&path).is_ok(), read, "{before}");
+    }
     fs::write(&path, "PK").unwrap();
     assert!(said().ends_with("x.hdf5 is no HDF5 file: it does not begin as one"), "{}", said());
     assert!(read(made.folder.path()).unwrap_err().to_string().ends_with("is a folder, no HDF5 file"));

@@ -2,7 +2,7 @@
 
 use super::{
     super::{DatasetError, TaskFile},
-    rows::wrong,
+    rows::{rows, wrong},
 };
 use crate::{
     benchmark::control::CONTROL_DT,
@@ -27,6 +27,25 @@ const SPUN: f64 = 2.5;
 /// Where an arm begins, rad: robosuite's Panda (robots/panda_robot.py), and how far its tool may point away from there, rad.
 const HOME: ArmAngles = [0.0, 0.196, 0.0, -2.618, 0.0, 2.942, 0.785];
 const FROM_HOME: f64 = 1.0;
+
+/// Joint angles of an arm in each of so many steps, rad.
+///
+/// # Errors
+/// They are not there, or not seven a step.
+pub(super) fn joints(
+    file: &TaskFile,
+    demo: usize,
+    name: &str,
+    steps: usize,
+) -> Result<Vec<ArmAngles>, DatasetError> {
+    match file.shape(demo, name)?[..] {
+        [_, joints] if joints != 7 => {
+            let what = format!("{joints} joints a step; a Panda has 7: is it another robot?");
+            Err(wrong(file, demo, name, what))
+        }
+        _ => rows::<7>(file, demo, name, Some(steps)),
+    }
+}
 
 /// Tool poses in the base frame by joint angles.
 ///

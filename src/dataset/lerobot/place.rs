@@ -14,6 +14,8 @@ const MARK: &str = ".softvt-export";
 pub(super) struct Place {
     aside: PathBuf,
     out: PathBuf,
+    /// The folders that were made to put it in, the deepest first.
+    above: Vec<PathBuf>,
     // The lock goes with it.
     _mark: File,
 }
@@ -34,13 +36,18 @@ impl Place {
         if fs::symlink_metadata(&aside).is_ok() {
             clear(&aside)?;
         }
-        files::make_folder(aside.parent().unwrap_or(&aside))?;
-        fs::create_dir(&aside).map_err(DatasetError::io("make the folder", &aside))?;
-        let path = aside.join(MARK);
-        let mark = File::create(&path).map_err(DatasetError::io("write", &path))?;
+        let parent = aside.parent().unwrap_or(&aside);
+        let above = files::missing(parent);
+        let make = || {
+            files::make_folder(parent)?;
+            fs::create_dir(&aside).map_err(DatasetError::io("make the folder", &aside))?;
+            let path = aside.join(MARK);
+            File::create(&path).map_err(DatasetError::io("write", &path))
+        };
+        let mark = make().inspect_err(|_| files::take_back(&above))?;
         // A file system without locks has no protection from a second export to the same folder, which is rare.
         let _ = mark.try_lock();
-        Ok(Self { aside, out, _mark: mark })
+        Ok(Self { aside, out, above, _mark: mark })
     }
 
     /// The folder while it is being written.
@@ -68,6 +75,7 @@ impl Place {
     /// Takes everything back.
     pub fn give_up(&self) {
         let _ = fs::remove_dir_all(&self.aside);
+        files::take_back(&self.above);
     }
 }
 
@@ -124,6 +132,8 @@ mod tests {
     fn a_folder_has_its_name_when_it_is_whole() {
         let home = tempfile::tempdir().unwrap();
         let out = home.path().join("new/out");
+        Place::claim(&out).unwrap().give_up();
+        assert_eq!(names(home.path()), [""; 0]);
         let place = Place::claim(&out).unwrap();
         fs::write(place.dir().join("x"), "x").unwrap();
         assert!(!out.exists());
