@@ -137,6 +137,32 @@ fn a_server_is_asked_once_a_chunk_and_its_actions_are_carried_out() {
 }
 
 #[test]
+fn pings_are_answered_and_what_was_closed_while_nothing_was_asked_is_opened_again() {
+    let pongs = std::sync::Arc::new(std::sync::atomic::AtomicUsize::new(0));
+    let count = pongs.clone();
+    let address = server(9, move |_, mut socket| {
+        let _ = socket.send(packed(&Value::Map(Vec::new())));
+        let first = observation(&mut socket).expect("a question");
+        // What comes together is there when the next question is asked.
+        let _ = socket.write(hold(&first, 50));
+        let _ = socket.write(Message::Ping("still there?".into()));
+        let _ = socket.flush();
+        if let Ok(Message::Pong(_)) = socket.read() {
+            count.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        }
+        let Some(second) = observation(&mut socket) else { return };
+        let _ = socket.write(hold(&second, 50));
+        let _ = socket.write(Message::Close(None));
+        let _ = socket.flush();
+        let _ = socket.read();
+    });
+    let project = project();
+    let said = run(&project, &address, "--episodes 2 --replan 5");
+    assert_eq!(said.code, 0, "{}", said.err);
+    assert_eq!(pongs.load(std::sync::atomic::Ordering::Relaxed), 3, "six questions over three connections");
+}
+
+#[test]
 fn a_server_that_is_not_there_is_told() {
     let free = TcpListener::bind("127.0.0.1:0").expect("a port").local_addr().expect("an address");
     let said = fails(&format!("ws://{free}"), "--policy-timeout 0.3");

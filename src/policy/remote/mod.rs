@@ -75,9 +75,16 @@ impl Connections {
         Ok(())
     }
 
+    /// A connection that still stands, an idle one if there is any: servers close those on which pings go unanswered for
+    /// long, as while tasks are made ready.
     fn take(&self) -> Result<Connection, PolicyError> {
-        let idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner).pop();
-        idle.map_or_else(|| self.open(), Ok)
+        let idle = || self.idle.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        while let Some(mut connection) = idle() {
+            if connection.socket.is_open() {
+                return Ok(connection);
+            }
+        }
+        self.open()
     }
 
     fn open(&self) -> Result<Connection, PolicyError> {
@@ -129,10 +136,12 @@ impl Policy for Remote {
 
     fn act(&mut self, observation: &Observation) -> Result<ActionChunk, PolicyError> {
         let Server { profile, protocol, .. } = &self.connections.server;
-        let mut connection = match self.connection.take() {
-            Some(connection) => connection,
-            None => self.connections.take()?,
-        };
+        let mut kept = self.connection.take();
+        // openpi's servers know of no episodes: the next question may come over another connection.
+        if *protocol == Protocol::Openpi {
+            kept = kept.and_then(|mut kept| kept.socket.is_open().then_some(kept));
+        }
+        let mut connection = kept.map_or_else(|| self.connections.take(), Ok)?;
         let answer = match protocol {
             Protocol::Openpi => openpi::infer(&mut connection.socket, observation, profile),
             Protocol::VlaEval => vla_eval::infer(&mut connection, observation, profile),

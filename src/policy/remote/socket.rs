@@ -23,6 +23,8 @@ const LARGEST: usize = 64 << 20;
 const SLICE: Duration = Duration::from_millis(50);
 /// Between two attempts to connect: doubled each time up to the longest.
 const PAUSES: [Duration; 2] = [Duration::from_millis(100), Duration::from_secs(2)];
+/// Most messages that a server sends without being asked, such as pings.
+const UNASKED: usize = 1000;
 /// Characters of a server's own text that are told.
 const TOLD: usize = 2000;
 
@@ -106,6 +108,24 @@ impl Socket {
                 Err(error) => return Err(self.lost(&error)),
             }
         }
+    }
+
+    /// Takes what came while nobody listened, so that pings are answered; whether the connection still stands.
+    pub fn is_open(&mut self) -> bool {
+        let waits =
+            |socket: &WebSocket<TcpStream>, waits: bool| socket.get_ref().set_nonblocking(!waits).is_ok();
+        if !waits(&self.socket, false) {
+            return false;
+        }
+        for _ in 0..UNASKED {
+            match self.socket.read() {
+                Ok(Message::Ping(_) | Message::Pong(_)) => {}
+                Err(Error::Io(error)) if is_wait(&error) => return waits(&self.socket, true),
+                // Nothing was asked: whoever talks or hangs up then is spoken to anew.
+                _ => return false,
+            }
+        }
+        false
     }
 
     /// Tells what is wrong with what the server sent.
