@@ -17,6 +17,17 @@ pub fn make_folder(dir: &Path) -> Result<(), DatasetError> {
     fs::create_dir_all(dir).map_err(DatasetError::io("make the folder", dir))
 }
 
+/// Makes a folder and those above it, in which files can be made.
+///
+/// # Errors
+/// The system refuses.
+pub fn make_writable(dir: &Path) -> Result<(), DatasetError> {
+    make_folder(dir)?;
+    let probe = dir.join(".softvt");
+    let made = File::create(&probe).and_then(|_| fs::remove_file(&probe));
+    made.map_err(DatasetError::io("write into", dir))
+}
+
 /// A folder and those above it that are not there yet, the deepest first.
 pub fn missing(dir: &Path) -> Vec<PathBuf> {
     let named = dir.ancestors().filter(|path| !path.as_os_str().is_empty());

@@ -1,6 +1,9 @@
 //! The folder of a data set in the making.
 
-use std::path::{Path, PathBuf};
+use std::{
+    io::ErrorKind,
+    path::{Path, PathBuf},
+};
 
 use serde_json::Value;
 
@@ -60,7 +63,8 @@ pub fn take_back(root: &Path, missing: &[PathBuf]) {
     let attempts = root.join(layout::ATTEMPTS);
     // Folders with something in them stay, and then it is known what they are of.
     let _ = std::fs::remove_dir(&attempts);
-    if !attempts.exists() {
+    let gone = std::fs::symlink_metadata(&attempts).is_err_and(|e| e.kind() == ErrorKind::NotFound);
+    if gone {
         let _ = std::fs::remove_dir_all(root.join(PARTS));
         let _ = std::fs::remove_file(root.join(RECORDING));
         files::take_back(missing);

@@ -44,14 +44,14 @@ pub fn carry_out<'a>(
         return Ok(());
     }
     let missing = files::missing(&root);
-    let text = format!("{recording:#}\n");
     // Before anything that takes long: a folder that cannot be written to is told at once.
-    let noted = files::write(&root.join(RECORDING), text.as_bytes()).map_err(failure);
-    let recorded = noted.and_then(|()| sessions()).and_then(|mut sessions| {
-        sessions.iter_mut().try_for_each(Session::go)?;
-        Ok(sessions)
-    });
-    let sessions = recorded.inspect_err(|_| folder::take_back(&root, &missing))?;
+    let ready = files::make_writable(&root).map_err(failure).and_then(|()| sessions());
+    let mut sessions = ready.inspect_err(|_| files::take_back(&missing))?;
+    let text = format!("{recording:#}\n");
+    files::write(&root.join(RECORDING), text.as_bytes()).map_err(failure)?;
+    for session in &mut sessions {
+        session.go().inspect_err(|_| folder::take_back(&root, &missing))?;
+    }
     finish::finish(output, &sessions, &root)
 }
 
