@@ -1,6 +1,6 @@
 //! The rate of control.
 
-use crate::message::number;
+use crate::text::format_number;
 
 /// Time between two commands, s: policies act, and records are written, at 20 Hz.
 pub const CONTROL_DT: f64 = 0.05;
@@ -23,7 +23,7 @@ pub fn check_dt(dt: f64) -> Result<(), String> {
         (CONTROL_DT / (CONTROL_DT / dt).ceil(), CONTROL_DT / (CONTROL_DT / dt).floor().max(1.0));
     Err(format!(
         "physics.dt: control runs at 20 Hz, so dt must divide {CONTROL_DT} s; got {}, near are {below:.6} and {above:.6}",
-        number(dt)
+        format_number(dt)
     ))
 }
 

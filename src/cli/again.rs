@@ -9,7 +9,7 @@ use crate::{
     evaluation::record::{EpisodeRecord, Outcome},
     policy::{Action, Chunked, recorded::Recorded},
     report::actions,
-    rollout::{Finished, batch, stop},
+    rollout::{Finished, batch, cancel},
 };
 
 /// Whoever drove the episode of `record`, as its actions say.
@@ -61,14 +61,14 @@ pub(super) fn make_lost_files(batch: &Batch, done: &[EpisodeRecord]) -> Result<(
     let (can, cannot): (Vec<_>, Vec<_>) =
         lost.into_iter().partition(|record| has_actions(record) || !batch.run.policy.is_remote());
     if let Some(first) = cannot.first() {
-        crate::message::tell(&format!(
+        crate::text::eprint_line(&format!(
             "softvt: {} finished episodes lack their actions, so that their files cannot be made again, first: {}; their results stay",
             cannot.len(),
             line(first)
         ));
     }
     if let Some(path) = can.first().and_then(|record| files.lost(record).into_iter().next()) {
-        crate::message::tell(&format!(
+        crate::text::eprint_line(&format!(
             "softvt: {} finished episodes lack files, first {}: they are made again",
             can.len(),
             path.display()
@@ -77,7 +77,7 @@ pub(super) fn make_lost_files(batch: &Batch, done: &[EpisodeRecord]) -> Result<(
     batch::run(
         can.len(),
         batch.run.threads,
-        &stop::FLAG,
+        &cancel::FLAG,
         |index| simulate(batch, can[index], has_actions(can[index]), &files),
         |_, made| {
             let Some((finished, drawn)) = made else { return Ok(()) };
@@ -113,7 +113,7 @@ fn simulate(
     };
     finished.record = known(finished.record, record);
     if let Some(what) = difference(record, &finished.record)? {
-        crate::message::tell(&format!(
+        crate::text::eprint_line(&format!(
             "softvt: no files of {}: it does not come out as recorded ({what}); its results stay",
             line(record)
         ));

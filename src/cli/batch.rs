@@ -32,7 +32,7 @@ use crate::{
     },
     rollout::{
         BuildError, ControlError, Controller, Episode, EpisodeError, EpisodeSpec, Finished, Looks, RestCache,
-        Which, batch, stop, target_asset,
+        Which, batch, cancel, target_asset,
     },
     scene::{Asset, Body},
     script::{self, Loaded},
@@ -189,11 +189,11 @@ impl<'a> Batch<'a> {
         let name = &asset.name;
         let cure = format!("its episodes cannot count as safe; softvt scripts/calibrate.lua --asset {name}");
         match files::calibrated(&self.run.file, asset)? {
-            Calibrated::Never => crate::message::tell(&format!(
+            Calibrated::Never => crate::text::eprint_line(&format!(
                 "softvt: {name} is not calibrated (assets/calibration/{name}.json): {cure}"
             )),
             Calibrated::Another(path) => {
-                crate::message::tell(&format!(
+                crate::text::eprint_line(&format!(
                     "softvt: {path} is about another {name} (its shape, material or friction differ): {cure}"
                 ));
             }
@@ -242,7 +242,7 @@ impl<'a> Batch<'a> {
             Err(failure) => {
                 return Err(Failure { message: format!("{}\n{kept}", failure.message), ..failure });
             }
-            Ok(()) if stop::requested() => return Err(interrupted()),
+            Ok(()) if cancel::requested() => return Err(interrupted()),
             Ok(()) => {}
         }
         records.sort_by_key(|r| (r.identity.task, r.identity.episode));
@@ -251,7 +251,7 @@ impl<'a> Batch<'a> {
         let done = self.summed_up(records);
         // The last of all: a folder with a summary is finished.
         write_json(&self.out.join(SUMMARY), &done.summary).map_err(folder_failure)?;
-        crate::message::tell(&format!("softvt: {}", self.out.display()));
+        crate::text::eprint_line(&format!("softvt: {}", self.out.display()));
         Ok(done)
     }
 
@@ -325,7 +325,7 @@ impl<'a> Batch<'a> {
         let outcome = batch::run(
             left.len(),
             self.run.threads,
-            &stop::FLAG,
+            &cancel::FLAG,
             |index| {
                 let job = left[index];
                 let mut finished = self.episode(job, files.may_show(self.jobs[job].1), &self.drive)?;
@@ -369,7 +369,7 @@ impl<'a> Batch<'a> {
         let (task, episode) = self.jobs[job];
         let (spec, opened) = self.spec(task, &self.request(task, episode), origin)?;
         let driver = drive(opened, self.brief(task, episode))?;
-        let mut driver = batch::Stoppable { driver, stop: &stop::FLAG };
+        let mut driver = batch::Stoppable { driver, stop: &cancel::FLAG };
         let started = Episode::start(EpisodeSpec { film, ..spec }, &self.cache, &self.looks);
         Ok(started.and_then(|started| started.run(&mut driver)))
     }
@@ -412,7 +412,7 @@ impl<'a> Batch<'a> {
     pub(super) fn episode_failure(&self, error: &EpisodeError) -> Failure {
         let code = match error {
             // What fails after the end was asked for may fail because of that.
-            _ if stop::requested() => code::INTERRUPTED,
+            _ if cancel::requested() => code::INTERRUPTED,
             EpisodeError::Control { source: ControlError::Policy(_), .. } => code::POLICY,
             _ => code::INPUT,
         };
@@ -441,7 +441,7 @@ pub struct Done {
 pub(super) fn tell_undrawn(finished: &Finished, drawn: Result<(), Failure>) {
     if let Err(failure) = drawn {
         let message = format!("softvt: no video of {}: {}", line(&finished.record), failure.message);
-        crate::message::tell(&message);
+        crate::text::eprint_line(&message);
     }
 }
 

@@ -8,10 +8,10 @@ use std::{
 use super::{Failure, args::Run, batch::Batch, conditions, evaluate::own_folders, print};
 use crate::{
     benchmark::{Goal, Plan, Suite, Task},
-    message,
-    rollout::{Looks, RestCache, batch as parallel, stop, target_asset},
+    rollout::{Looks, RestCache, batch as parallel, cancel, target_asset},
     scene::Asset,
     script::{self, Loaded, Scenes},
+    text,
 };
 
 /// Reads a script, makes its plan, and builds the first scene of every task; nothing is settled, run or drawn.
@@ -61,7 +61,7 @@ fn suite_is_right(
             Goal::In { object, target, .. } => ("in", object, target),
         };
         let id = task.id;
-        print(&format!("{id:>4} {}: {object} {way} {target}{expert}\n", message::plain(&task.prompt)));
+        print(&format!("{id:>4} {}: {object} {way} {target}{expert}\n", text::escape_control(&task.prompt)));
     }
     Ok(())
 }
@@ -86,9 +86,9 @@ fn first_targets(
         batch.examine(task, scene)?;
         Ok(target_asset(&nominal, task).cloned())
     };
-    parallel::run(tasks.len(), threads, &stop::FLAG, examine, |job, target| {
+    parallel::run(tasks.len(), threads, &cancel::FLAG, examine, |job, target| {
         targets[job] = target;
         Ok(())
     })?;
-    if stop::requested() { Err(Failure::interrupted("interrupted")) } else { Ok(targets) }
+    if cancel::requested() { Err(Failure::interrupted("interrupted")) } else { Ok(targets) }
 }

@@ -15,12 +15,12 @@ use super::{
 use crate::{
     benchmark::{Condition, ObjectType, REFERENCE, Suite, Task},
     evaluation::summary::method,
-    message,
     report::{
         conditions::{Outcome, Row, Rows, table},
         run_folder::{RunFolder, replace},
     },
     script::Loaded,
+    text,
 };
 
 /// The comparison of all suites, in the folder of all runs.
@@ -94,7 +94,7 @@ pub fn check(
         prepared(loaded, suite, (&cases, &first), Path::new(""))?;
     }
     let names: Vec<&str> = conditions.iter().map(|condition| condition.name.as_str()).collect();
-    print(&format!("conditions: {REFERENCE}, {}\n", message::plain(&names.join(", "))));
+    print(&format!("conditions: {REFERENCE}, {}\n", text::escape_control(&names.join(", "))));
     Ok(())
 }
 
@@ -188,8 +188,13 @@ fn compare(
     for (case, batch) in cases.iter().zip(batches) {
         let mut outcome = None;
         if let Some(batch) = batch {
-            let name = message::plain(&case.name);
-            message::tell(&format!("softvt: {}, {name} ({} of {})", suite.name, rows.len() + 1, cases.len()));
+            let name = text::escape_control(&case.name);
+            text::eprint_line(&format!(
+                "softvt: {}, {name} ({} of {})",
+                suite.name,
+                rows.len() + 1,
+                cases.len()
+            ));
             let done = carry_out(&batch, tasks)?;
             outcome = Some(Outcome::new(case.folder.clone(), &done.records, reference.as_deref()));
             reference.get_or_insert(done.records);
@@ -223,6 +228,6 @@ fn write(run: &Run, loaded: &Loaded, compared: &[Rows], out: &Path) -> Result<()
     if run.json {
         print(&text);
     }
-    message::tell(&format!("softvt: {}", path.display()));
+    text::eprint_line(&format!("softvt: {}", path.display()));
     Ok(())
 }

@@ -17,7 +17,7 @@ use crate::{
         stats,
     },
     report::runs::StoredRun,
-    rollout::{batch, stop},
+    rollout::{batch, cancel},
 };
 
 /// Whether a path is that of a data set: an HDF5 file, or the folder of a recording.
@@ -58,11 +58,11 @@ fn repeat_all(demos: &[(PathBuf, usize)]) -> Result<(), Failure> {
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
     let mut done: BTreeMap<usize, Repeated> = BTreeMap::new();
     let repeat = |index: usize| repeat(&demos[index].0, demos[index].1);
-    batch::run(demos.len(), threads, &stop::FLAG, repeat, |index, repeated| {
+    batch::run(demos.len(), threads, &cancel::FLAG, repeat, |index, repeated| {
         done.insert(index, repeated);
         Ok(())
     })?;
-    if stop::requested() {
+    if cancel::requested() {
         return Err(Failure::interrupted("interrupted"));
     }
     for ((file, demo), Repeated { state, different, .. }) in demos.iter().zip(done.values()) {
@@ -105,7 +105,7 @@ pub fn stats(path: &Path, out: Option<&Path>, json: bool) -> Result<(), Failure>
     let beside = if path.is_dir() { path.join("stats.svg") } else { path.with_extension("stats.svg") };
     let out = out.map_or(beside, Path::to_path_buf);
     files::write(&out, stats::svg(&spreads).as_bytes()).map_err(Failure::input)?;
-    crate::message::tell(&format!("softvt: {}", out.display()));
+    crate::text::eprint_line(&format!("softvt: {}", out.display()));
     Ok(())
 }
 

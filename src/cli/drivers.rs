@@ -11,7 +11,7 @@ use crate::{
         recorded::Recorded,
         remote::{Connections, Protocol, Remote, Server},
     },
-    rollout::{Controller, stop},
+    rollout::{Controller, cancel},
     script::{self, ExpertController, PolicyFile},
 };
 
@@ -203,7 +203,7 @@ impl Drivers {
                 profile: server.profile.clone(),
                 patience: server.patience,
                 api_key: std::env::var(API_KEY).ok(),
-                stop: &stop::FLAG,
+                stop: &cancel::FLAG,
             }))),
             _ => None,
         };

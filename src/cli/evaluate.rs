@@ -195,7 +195,7 @@ pub(super) fn carry_out(batch: &Batch, tasks: &[&Task]) -> Result<Done, Failure>
     batch.check_done(&folder, &done)?;
     info::write(&folder, &info)?;
     if finished && batch.is_whole(&done) {
-        crate::message::tell(&format!("softvt: {} is finished already", batch.out.display()));
+        crate::text::eprint_line(&format!("softvt: {} is finished already", batch.out.display()));
         return Ok(batch.summed_up(done));
     }
     batch.go(folder, done)

@@ -9,7 +9,7 @@ use std::{
 use super::{Failure, args::Run, files::make_folder, print, progress::Progress};
 use crate::{
     report::run_folder::replace,
-    rollout::{batch, stop},
+    rollout::{batch, cancel},
     script::{Experiment, Loaded, Row},
 };
 
@@ -26,7 +26,7 @@ pub fn run(run: &Run, loaded: &Loaded, name: &str, points: usize, columns: &[Str
     let outcome = batch::run(
         points,
         run.threads,
-        &stop::FLAG,
+        &cancel::FLAG,
         |point| {
             let machine = match take() {
                 Some(machine) => machine,
@@ -34,7 +34,7 @@ pub fn run(run: &Run, loaded: &Loaded, name: &str, points: usize, columns: &[Str
             };
             let rows = machine.run(point).map_err(Failure::input)?;
             // What was cut short may have caught its errors and gone on to a row that is not one.
-            if stop::requested() {
+            if cancel::requested() {
                 return Err(Failure::interrupted("interrupted"));
             }
             idle.lock().unwrap_or_else(|p| p.into_inner()).push(machine);
@@ -49,7 +49,7 @@ pub fn run(run: &Run, loaded: &Loaded, name: &str, points: usize, columns: &[Str
     progress.finish();
     let done = rows.iter().filter(|rows| !rows.is_empty()).count();
     let rows: Vec<Row> = rows.into_iter().flatten().collect();
-    if stop::requested() {
+    if cancel::requested() {
         show(run, &rows, columns);
         let message =
             format!("interrupted; the rows of {done} of {points} points are above, no file was written");
@@ -86,7 +86,7 @@ fn write(base: &Path, relative: &str, bytes: &[u8]) -> Result<(), Failure> {
         make_folder(&folder)?;
     }
     replace(path, bytes).map_err(Failure::input)?;
-    crate::message::tell(&format!("softvt: wrote {}", path.display()));
+    crate::text::eprint_line(&format!("softvt: wrote {}", path.display()));
     Ok(())
 }
 

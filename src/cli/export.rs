@@ -17,7 +17,7 @@ use crate::{
         DatasetError,
         lerobot::{self, Export, Gripper, Version},
     },
-    rollout::stop,
+    rollout::cancel,
 };
 
 /// Words of the formats.
@@ -74,7 +74,7 @@ pub fn run(export: &Export) -> Result<(), Failure> {
     }
     dataset::finished(&export.data)?;
     let mut progress: Option<Progress> = None;
-    let done = lerobot::export(export, stop::requested, |total, episode| {
+    let done = lerobot::export(export, cancel::requested, |total, episode| {
         progress.get_or_insert_with(|| Progress::new(total, "export")).tick(episode);
     });
     if let Some(progress) = &progress {

@@ -69,7 +69,9 @@ pub fn run(import: &Import) -> Result<(), Failure> {
     recording::carry_out(output, &asked, || {
         for source in &sources {
             let Imported { file, layout, demos, commands, .. } = source;
-            crate::message::tell(&format!("softvt: {file}: {layout}, {demos} demonstrations: {commands}"));
+            crate::text::eprint_line(&format!(
+                "softvt: {file}: {layout}, {demos} demonstrations: {commands}"
+            ));
         }
         let mut sessions = Vec::new();
         for (index, suite) in suites.iter().enumerate() {
@@ -154,7 +156,7 @@ fn fit(
     });
     if elsewhere > 0 {
         let name = &batch.suite.name;
-        crate::message::tell(&format!(
+        crate::text::eprint_line(&format!(
             "softvt: {name}: in {placed} of {elsewhere} demonstrations things stand where the file has them, in the others where the layout puts them"
         ));
     }

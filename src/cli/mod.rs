@@ -39,7 +39,7 @@ use std::{panic, process::ExitCode, thread, time::Duration};
 
 use args::Command;
 
-use crate::{message, rollout::stop};
+use crate::{rollout::cancel, text};
 
 /// Exit codes, the same for every command.
 pub mod code {
@@ -67,7 +67,7 @@ pub struct Failure {
 impl Failure {
     /// The user's input is wrong; unless the end was asked for before: what fails from then on may fail because of that.
     fn input(message: impl ToString) -> Self {
-        let code = if stop::requested() { code::INTERRUPTED } else { code::INPUT };
+        let code = if cancel::requested() { code::INTERRUPTED } else { code::INPUT };
         Self { code, message: message.to_string() }
     }
 
@@ -95,7 +95,7 @@ impl Failure {
 /// Runs the command line of this process and returns its exit code.
 pub fn main() -> ExitCode {
     panic::set_hook(Box::new(|info| {
-        message::tell(&format!(
+        text::eprint_line(&format!(
             "softvt: internal error: {info}\nThis is a defect of softvt; please report it with the command that led here."
         ));
     }));
@@ -104,7 +104,7 @@ pub fn main() -> ExitCode {
         Ok(Ok(())) => code::OK,
         Ok(Err(failure)) => {
             if !failure.message.is_empty() {
-                message::tell(&format!("softvt: {}", message::plain(&failure.message)));
+                text::eprint_line(&format!("softvt: {}", text::escape_control(&failure.message)));
             }
             failure.code
         }
@@ -153,13 +153,13 @@ const PATIENCE: Duration = Duration::from_secs(3);
 fn watch_interrupts() {
     let end = || std::process::exit(i32::from(code::INTERRUPTED));
     let handler = move || {
-        if stop::request() {
+        if cancel::request() {
             end();
         }
-        message::tell("softvt: stopping; press again to stop at once");
+        text::eprint_line("softvt: stopping; press again to stop at once");
         thread::spawn(move || {
             thread::sleep(PATIENCE);
-            message::tell(&format!(
+            text::eprint_line(&format!(
                 "softvt: interrupted; something did not end within {} s",
                 PATIENCE.as_secs()
             ));
@@ -174,5 +174,5 @@ fn watch_interrupts() {
 fn print(text: &str) {
     use std::io::Write;
     let mut out = std::io::stdout().lock();
-    let _ = out.write_all(message::plain(text).as_bytes()).and_then(|()| out.flush());
+    let _ = out.write_all(text::escape_control(text).as_bytes()).and_then(|()| out.flush());
 }

@@ -4,7 +4,7 @@ use std::io::IsTerminal;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::message;
+use crate::text;
 
 /// Progress of a batch of jobs.
 pub struct Progress {
@@ -33,12 +33,15 @@ impl Progress {
         self.done += 1;
         match &self.bar {
             Some(bar) => {
-                bar.set_message(message::plain(message).into_owned());
+                bar.set_message(text::escape_control(message).into_owned());
                 bar.inc(1);
             }
-            None => {
-                crate::message::tell(&format!("[{}/{}] {}", self.done, self.total, message::plain(message)))
-            }
+            None => crate::text::eprint_line(&format!(
+                "[{}/{}] {}",
+                self.done,
+                self.total,
+                text::escape_control(message)
+            )),
         }
     }
 

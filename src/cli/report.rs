@@ -26,7 +26,7 @@ pub fn run(dirs: &[PathBuf], out: &Path) -> Result<(), Failure> {
     }
     let judged = judge(stored);
     for remark in judged.iter().flat_map(|judged| judged.run.remarks()) {
-        crate::message::tell(&format!("softvt: {remark}"));
+        crate::text::eprint_line(&format!("softvt: {remark}"));
     }
     let all = all_tables(&judged);
     let joined = |text: fn(&Table) -> String| all.iter().map(text).collect::<Vec<_>>().join("\n");
@@ -38,6 +38,6 @@ pub fn run(dirs: &[PathBuf], out: &Path) -> Result<(), Failure> {
     ] {
         replace(&out.join(name), text).map_err(Failure::input)?;
     }
-    crate::message::tell(&format!("softvt: {}", out.join("report.html").display()));
+    crate::text::eprint_line(&format!("softvt: {}", out.join("report.html").display()));
     Ok(())
 }

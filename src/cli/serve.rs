@@ -14,7 +14,7 @@ use super::{
 use crate::{
     benchmark::{Plan, Suite},
     policy::Observation,
-    rollout::stop,
+    rollout::cancel,
     script::{self, EpisodeRequest, Loaded},
     serve::{self, Door, Offer, Offered, Wanted},
 };
@@ -33,7 +33,7 @@ pub fn run(serve: &Serve) -> Result<(), Failure> {
     let hello = serve::hello(&offer, &first_look(serve, &offer)?);
     let address = door.address().map_err(|e| Failure::input(format!("{}: {e}", serve.host)))?;
     print(&format!("ws://{address}\n"));
-    serve::serve(&door, &offer, hello, serve.seats, &stop::FLAG);
+    serve::serve(&door, &offer, hello, serve.seats, &cancel::FLAG);
     Err(Failure::interrupted("interrupted"))
 }
 

@@ -44,7 +44,7 @@ impl std::fmt::Display for Shard {
 pub fn merge(out: &Path, shards: &[PathBuf]) -> Result<(), Failure> {
     let summaries = merge::merge(out, shards).map_err(Failure::input)?;
     summaries.iter().for_each(|summary| print(&terminal::table(summary)));
-    crate::message::tell(&format!("softvt: {}", out.display()));
+    crate::text::eprint_line(&format!("softvt: {}", out.display()));
     Ok(())
 }
 

@@ -16,7 +16,7 @@ use crate::{
         interchange::{self, DebugFrame, DebugShape},
         run_folder::replace,
     },
-    rollout::{Finished, ScoreFrame, stop},
+    rollout::{Finished, ScoreFrame, cancel},
 };
 
 /// Where they are, and which of them are wanted.
@@ -96,7 +96,7 @@ impl<'a> SideFiles<'a> {
             let (worst, still) = (film::worst_moment(&film), film::still_path(self.dir, id.task, id.episode));
             film::write_panels(&mut film, &caption, worst, &still).map_err(film_failure)?;
         }
-        film::write_video(&mut film, &caption, &path, stop::requested).map_err(film_failure)
+        film::write_video(&mut film, &caption, &path, cancel::requested).map_err(film_failure)
     }
 
     fn trace_path(&self, id: &Identity) -> PathBuf {

@@ -6,7 +6,7 @@ use super::{
 use crate::{
     benchmark::Plan,
     report::film::{Caption, worst_moment, write_panels, write_stills, write_video},
-    rollout::stop,
+    rollout::cancel,
     script,
 };
 
@@ -48,11 +48,11 @@ pub fn run(view: &View) -> Result<(), Failure> {
     let worst = worst_moment(&film);
     let moments = [("start", 0), ("worst", worst), ("end", last)];
     let mut written =
-        write_stills(&mut film, &moments, view.native, &dir, stop::requested).map_err(film_failure)?;
+        write_stills(&mut film, &moments, view.native, &dir, cancel::requested).map_err(film_failure)?;
     written.push(dir.join("episode.png"));
     write_panels(&mut film, &caption, worst, &dir.join("episode.png")).map_err(film_failure)?;
     let video = dir.join("episode.mp4");
-    write_video(&mut film, &caption, &video, stop::requested).map_err(film_failure)?;
+    write_video(&mut film, &caption, &video, cancel::requested).map_err(film_failure)?;
     written.push(video);
     written.iter().for_each(|path| print(&format!("{}\n", path.display())));
     Ok(())

@@ -50,7 +50,7 @@ impl Default for Rules {
 
 /// A rule outside of its range.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("rules.{name}: expected {expected}, got {}", crate::message::number(*.value))]
+#[error("rules.{name}: expected {expected}, got {}", crate::text::format_number(*.value))]
 pub struct RuleError {
     name: &'static str,
     expected: &'static str,

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::message::number;
+use crate::text::format_number;
 
 /// Parameters of the mechanics. The defaults are what the benchmark runs with.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -77,17 +77,23 @@ impl Params {
         ];
         for (name, value) in positive {
             if !(value > 0.0 && value.is_finite()) {
-                return Err(format!("physics.{name}: expected a positive number, got {}", number(value)));
+                return Err(format!(
+                    "physics.{name}: expected a positive number, got {}",
+                    format_number(value)
+                ));
             }
         }
         for (name, value) in not_negative {
             if !(value >= 0.0 && value.is_finite()) {
-                return Err(format!("physics.{name}: expected 0 or more, got {}", number(value)));
+                return Err(format!("physics.{name}: expected 0 or more, got {}", format_number(value)));
             }
         }
         // Below, settling alone would take minutes.
         if !(1e-4..=0.05).contains(&self.dt) {
-            return Err(format!("physics.dt: expected seconds in 0.0001..0.05, got {}", number(self.dt)));
+            return Err(format!(
+                "physics.dt: expected seconds in 0.0001..0.05, got {}",
+                format_number(self.dt)
+            ));
         }
         Ok(())
     }

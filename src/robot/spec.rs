@@ -61,7 +61,7 @@ fn positive(field: &'static str, value: f64, unit: &str) -> Result<(), SpecError
 
 /// A number of the robot out of its range.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("robot.{field}: expected {expected}, got {}", crate::message::number(*.value))]
+#[error("robot.{field}: expected {expected}, got {}", crate::text::format_number(*.value))]
 pub struct SpecError {
     /// Path of the field.
     pub field: &'static str,

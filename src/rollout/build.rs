@@ -14,7 +14,6 @@ use crate::{
         shape::{Aabb, Shape},
         voxelise::{GeometryError, VoxelSpec, voxel_mesh},
     },
-    message::number,
     physics::{
         World,
         contact::{Friction, Mover, Surface},
@@ -23,6 +22,7 @@ use crate::{
         rigid::{RigidBody, RigidError},
     },
     scene::{Body, Object, Scene, SoftMaterial},
+    text::format_number,
 };
 
 /// An object cannot be made.
@@ -64,7 +64,7 @@ pub enum BuildError {
     #[error(
         "objects {first} and {second}{} overlap by {} mm at the start; move them apart",
         placed(.second_at),
-        number((1e4 * .depth).round() / 10.0)
+        format_number((1e4 * .depth).round() / 10.0)
     )]
     Overlap {
         /// Name of one.
@@ -82,7 +82,7 @@ pub enum BuildError {
     /// An object is in the robot.
     #[error(
         "object {object} starts inside of the robot's hand ({part}), {} mm deep; move it away, or the arm (scene.start_q)",
-        number((1e4 * .depth).round() / 10.0)
+        format_number((1e4 * .depth).round() / 10.0)
     )]
     InRobot {
         /// Object name.
@@ -158,13 +158,19 @@ pub(super) fn meshed(
 fn check(name: &str, m: &SoftMaterial) -> Result<(), BuildError> {
     let wrong = |what: String| Err(BuildError::Material { asset: name.to_owned(), what });
     if !(m.youngs_pa > 0.0 && m.youngs_pa.is_finite()) {
-        return wrong(format!("Young's modulus is {} Pa, expected a positive number", number(m.youngs_pa)));
+        return wrong(format!(
+            "Young's modulus is {} Pa, expected a positive number",
+            format_number(m.youngs_pa)
+        ));
     }
     if !(0.0..0.5).contains(&m.poisson) {
-        return wrong(format!("Poisson's ratio is {}, expected 0 <= poisson < 0.5", number(m.poisson)));
+        return wrong(format!(
+            "Poisson's ratio is {}, expected 0 <= poisson < 0.5",
+            format_number(m.poisson)
+        ));
     }
     if !(m.density > 0.0 && m.density.is_finite()) {
-        return wrong(format!("density is {} kg/m³, expected a positive number", number(m.density)));
+        return wrong(format!("density is {} kg/m³, expected a positive number", format_number(m.density)));
     }
     Ok(())
 }
@@ -182,9 +188,9 @@ fn check_size(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<(), 
     let what = format!(
         "it is {} × {} × {} m, about {samples:.0e} contact samples {} mm apart, expected at most {MOST_SAMPLES:.0e}; \
          sizes are in metres; a truly large body needs a larger grasp_spacing",
-        number(size.x),
-        number(size.y),
-        number(size.z),
+        format_number(size.x),
+        format_number(size.y),
+        format_number(size.z),
         1e3 * material.grasp_spacing
     );
     Err(BuildError::Material { asset: name.to_owned(), what })
@@ -199,7 +205,7 @@ fn check_thickness(name: &str, shape: &Shape, material: &SoftMaterial) -> Result
     if !(thin > 0.0 && thin < edge * (1.0 - 1e-6)) {
         return Ok(());
     }
-    let mm = |metres: f64| number((1e5 * metres).round() / 100.0);
+    let mm = |metres: f64| format_number((1e5 * metres).round() / 100.0);
     let needed = (long / thin * (1.0 - 1e-6)).ceil();
     let cure = if needed <= SoftMaterial::FINEST as f64 {
         format!("resolution = {needed} would serve")
@@ -229,7 +235,7 @@ fn check_scale(object: &Object, cache: &RestCache) -> Result<(), BuildError> {
     }
     let what = format!(
         "it is {longest:.1e} m long, expected at least {} m; sizes are in metres (a mesh has a scale)",
-        number(LEAST_SIZE)
+        format_number(LEAST_SIZE)
     );
     Err(BuildError::Material { asset: object.asset.name.clone(), what })
 }
@@ -242,8 +248,8 @@ fn check_sheet(object: &Object, cache: &RestCache) -> Result<(), BuildError> {
             what: format!(
                 "it is about {} mm thick, or its walls are, expected at least {} mm: what meets a thinner one may pass \
                  through it",
-                number((1e4 * wall).round() / 10.0),
-                number(1e3 * LEAST_SHEET)
+                format_number((1e4 * wall).round() / 10.0),
+                format_number(1e3 * LEAST_SHEET)
             ),
         }),
     }

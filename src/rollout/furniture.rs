@@ -7,13 +7,13 @@ use super::{
 };
 use crate::{
     geometry::{Pose, Vec3, shape::Shape},
-    message::number,
     physics::{
         World,
         contact::{Friction, Mover},
         joints::{JointKind, Link, Tree},
     },
     scene::{Motion, Object, Part},
+    text::format_number,
 };
 
 /// Walls of moving parts are at least this thick, m: a thinner one could be crossed between two steps.
@@ -96,8 +96,8 @@ fn check_walls(object: &Object, part: &Part, cache: &RestCache) -> Result<(), Bu
                 "part {}: its walls are about {} mm thick, expected at least {} mm: what meets a thinner one may pass \
                  through it",
                 part.name,
-                number((1e4 * wall).round() / 10.0),
-                number(1e3 * LEAST_WALL)
+                format_number((1e4 * wall).round() / 10.0),
+                format_number(1e3 * LEAST_WALL)
             ),
         }),
     }

@@ -2,6 +2,7 @@
 
 pub mod batch;
 mod build;
+pub mod cancel;
 mod command;
 mod control;
 pub mod episode;
@@ -19,7 +20,6 @@ pub mod simulation;
 mod spec;
 mod stance;
 mod state_hash;
-pub mod stop;
 mod streams;
 mod trace;
 

@@ -1,8 +1,8 @@
 //! Coming to rest before an episode begins.
 
 use super::{
+    cancel,
     simulation::{Handle, Kind, Simulation},
-    stop,
 };
 use crate::{geometry::shape::Aabb, physics::world::StepFailure, scene::Scene};
 
@@ -79,7 +79,7 @@ impl Simulation {
         let mut quiet = 0.0;
         let mut waited = 0.0;
         while quiet < SETTLED_FOR {
-            if stop::requested() {
+            if cancel::requested() {
                 return Err(SettleError::Interrupted);
             }
             self.step().map_err(|failure| SettleError::Failed {

@@ -13,8 +13,8 @@ use super::{
 };
 use crate::{
     geometry::Vec3,
-    message::number,
     scene::{Asset, Body, Friction, Joint, Motion, Part, part_poses},
+    text::format_number,
 };
 
 /// Installs `softvt.slider`, `softvt.hinge` and `softvt.articulated`, which check what no single field can say.
@@ -46,7 +46,8 @@ fn joint_table(lua: &Lua, record: &'static Record, value: &Value) -> mlua::Resul
     match lower < upper {
         true => Ok(made),
         false => {
-            let message = format!("expected more than lower, {}, got {}", number(lower), number(upper));
+            let message =
+                format!("expected more than lower, {}, got {}", format_number(lower), format_number(upper));
             Err(at_key(lua, record, "upper", message))
         }
     }
@@ -163,9 +164,9 @@ pub(super) fn start(lua: &Lua, asset: &Asset, given: Option<Table>) -> mlua::Res
         };
         let joint = &parts[index].joint;
         if !(joint.lower..=joint.upper).contains(&value) {
-            let (low, high) = (number(joint.lower), number(joint.upper));
+            let (low, high) = (format_number(joint.lower), format_number(joint.upper));
             let message =
-                format!("expected a value in {low}..{high} ({}), got {}", joint.unit(), number(value));
+                format!("expected a value in {low}..{high} ({}), got {}", joint.unit(), format_number(value));
             return Err(wrong(&["joints", &name], message));
         }
         values[index] = value;

@@ -18,7 +18,7 @@ use cpu_time::{ProcessTime, ThreadTime};
 use mlua::{HookTriggers, Lua, VmState, debug::Debug};
 
 use super::{error::ScriptError, sandbox::here};
-use crate::rollout::stop;
+use crate::rollout::cancel;
 
 /// Instructions between two looks at the clock; about 0.3 ms.
 const STRIDE: u32 = 20_000;
@@ -29,7 +29,7 @@ pub type OnStuck = Arc<dyn Fn(&str) + Send + Sync>;
 /// Prints the message and ends the process with the exit code of bad input; finished episodes are already on disk.
 pub fn end_process() -> OnStuck {
     Arc::new(|message| {
-        crate::message::tell(&format!("softvt: {message}"));
+        crate::text::eprint_line(&format!("softvt: {message}"));
         std::process::exit(2);
     })
 }
@@ -200,7 +200,7 @@ impl Clock {
     fn expired(&self) -> Option<ScriptError> {
         let mut state = lock(&self.state);
         state.beat += 1;
-        if stop::requested() {
+        if cancel::requested() {
             return Some(ScriptError::new(state.file.clone(), "interrupted"));
         }
         state.until.is_some_and(|until| used() > until).then(|| {

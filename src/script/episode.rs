@@ -16,8 +16,8 @@ use crate::{
         Shift,
         seed::{EpisodeSeed, Split, Stream},
     },
-    message::number,
     scene::{Body, Scene},
+    text::format_number,
 };
 
 /// Which episode.
@@ -188,7 +188,7 @@ pub fn check_shift(shifts: &[Shift], name: &str, value: f64) -> Result<(), Strin
             "shift {name}: expected a number{} ({}), got {}",
             range.words(),
             shift.unit,
-            number(value)
+            format_number(value)
         )),
     }
 }

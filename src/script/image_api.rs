@@ -89,7 +89,7 @@ fn part(lua: &Lua, method: &str, picture: &RgbImage, region: Option<[f64; 4]>) -
     if whole && w > 0 && h > 0 && x + w <= width && y + h <= height {
         return Ok([x, y, w, h]);
     }
-    let [x, y, w, h] = region.map(crate::message::number);
+    let [x, y, w, h] = region.map(crate::text::format_number);
     let message =
         format!("expected x, y, width, height within {width} × {height} pixels, got {{{x}, {y}, {w}, {h}}}");
     Err(fail(lua, format!("image:{method}: region: {message}")))

@@ -61,7 +61,7 @@ impl Default for Limits {
             point: Duration::from_secs(60),
             grace: Duration::from_millis(1500),
             on_stuck: end_process(),
-            print: Arc::new(|text| crate::message::tell(&crate::message::plain(text))),
+            print: Arc::new(|text| crate::text::eprint_line(&crate::text::escape_control(text))),
         }
     }
 }

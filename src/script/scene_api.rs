@@ -16,9 +16,9 @@ use super::{
 };
 use crate::{
     geometry::{Pose, Quat, Vec3},
-    message::number,
     robot::panda::{self, ARM_DOFS},
     scene::{Asset, Body, Camera, Friction, Lighting, Object, Region, Scene, SoftMaterial},
+    text::format_number,
 };
 
 pub(super) const fn field(name: &'static str, ty: Type, doc: &'static str) -> Field {
@@ -72,7 +72,7 @@ fn place_at(lua: &Lua, label: &str, xyz: Vec3) -> mlua::Result<Vec3> {
     if xyz.amax() <= FARTHEST {
         return Ok(xyz);
     }
-    let [x, y, z] = [xyz.x, xyz.y, xyz.z].map(number);
+    let [x, y, z] = [xyz.x, xyz.y, xyz.z].map(format_number);
     Err(fail(
         lua,
         format!("{label}: expected a place within {FARTHEST} m of the origin, got {{{x}, {y}, {z}}}"),
@@ -88,7 +88,7 @@ fn within_limits(lua: &Lua, q: [f64; ARM_DOFS]) -> mlua::Result<[f64; ARM_DOFS]>
                 "scene.start_q[{}]: expected radians in {lower}..{upper}, the limits of {}, got {}",
                 index + 1,
                 link.name,
-                number(q)
+                format_number(q)
             );
             return Err(fail(lua, message));
         }

@@ -7,7 +7,7 @@ use super::{
     lists, numbers, origin,
     sandbox::{fail, here},
 };
-use crate::message;
+use crate::text;
 
 /// What a value may be.
 #[derive(Clone, Copy, Debug)]
@@ -153,9 +153,9 @@ pub(super) fn got(value: &Value) -> String {
         Value::String(text) => quoted(&text.to_string_lossy()),
         Value::Integer(number) => number.to_string(),
         Value::Number(number) if !number.is_finite() => {
-            format!("{}, which is not a finite number", message::number(*number))
+            format!("{}, which is not a finite number", text::format_number(*number))
         }
-        Value::Number(number) => message::number(*number),
+        Value::Number(number) => text::format_number(*number),
         Value::Boolean(flag) => flag.to_string(),
         Value::Nil => "nil".into(),
         other => kind(other),

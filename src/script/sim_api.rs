@@ -33,7 +33,7 @@ use crate::{
     evaluation::deformation::Reference,
     geometry::Pose,
     robot::{Side, rotation},
-    rollout::{Kind, Looks, RestCache, SenseError, Senses, Simulation, stop},
+    rollout::{Kind, Looks, RestCache, SenseError, Senses, Simulation, cancel},
     sensing::tactile::{MarkerStyle, PadLoad, Places},
 };
 
@@ -155,7 +155,7 @@ impl Inner {
 
     /// One control step; false once the physics has failed.
     fn control_step(&mut self, command: Option<(&Pose, f64)>) -> bool {
-        if stop::requested() {
+        if cancel::requested() {
             self.failed = Some("interrupted".into());
         }
         if let Some((pose_b, closure)) = command {

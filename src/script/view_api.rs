@@ -14,8 +14,8 @@ use super::{
 };
 use crate::{
     geometry::{Pose, Quat, Vec3},
-    message,
     scene::{Camera, CameraMount, Scene, Visual},
+    text,
 };
 
 /// Cameras of a scene; each draws its own pictures.
@@ -139,7 +139,7 @@ fn direction(lua: &Lua, label: &str, numbers: [f64; 3]) -> mlua::Result<Vec3> {
 
 /// `{0, 1e300, 0}`.
 fn braced(numbers: &[f64]) -> String {
-    format!("{{{}}}", numbers.iter().map(|x| message::number(*x)).collect::<Vec<_>>().join(", "))
+    format!("{{{}}}", numbers.iter().map(|x| text::format_number(*x)).collect::<Vec<_>>().join(", "))
 }
 
 /// File and line of the script that is at work, as messages name them.

@@ -24,7 +24,7 @@ use crate::{
         fem::Rest,
         world::{StepFailure, Touch},
     },
-    rollout::{soft_rest, stop},
+    rollout::{cancel, soft_rest},
     scene::SoftMaterial,
 };
 
@@ -167,7 +167,7 @@ impl Hosted for LuaWorld {
             Ok(())
         });
         method(methods, "report_timing", |_, this: &Self, ()| {
-            crate::message::tell(&locked(&this.0).timing.to_string());
+            crate::text::eprint_line(&locked(&this.0).timing.to_string());
             Ok(())
         });
     }
@@ -175,7 +175,7 @@ impl Hosted for LuaWorld {
 
 /// One step; true, or false and why the world is void from now on.
 fn step(lua: &Lua, inner: &mut Inner) -> mlua::Result<MultiValue> {
-    if stop::requested() {
+    if cancel::requested() {
         return Err(fail(lua, "interrupted"));
     }
     if inner.failed.is_none() {

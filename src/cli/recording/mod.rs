@@ -40,7 +40,7 @@ pub fn carry_out<'a>(
 ) -> Result<(), Failure> {
     let root = output.run.out.clone().unwrap_or_default();
     if folder::check(&root, output.run.resume, recording)? {
-        crate::message::tell(&format!("softvt: {} is finished already", root.display()));
+        crate::text::eprint_line(&format!("softvt: {} is finished already", root.display()));
         return Ok(());
     }
     let missing = files::missing(&root);

@@ -35,7 +35,7 @@ use crate::{
         actions,
         run_folder::{RunFolder, SUMMARY, write_json},
     },
-    rollout::{EpisodeError, Finished, SettleError, batch, stop},
+    rollout::{EpisodeError, Finished, SettleError, batch, cancel},
     scene::Start,
     script::Loaded,
 };
@@ -169,7 +169,7 @@ impl<'a> Session<'a> {
                 Err(Failure::interrupted(format!("interrupted; {go_on}")))
             }
             Err(failure) => Err(Failure { message: format!("{}\n{go_on}", failure.message), ..failure }),
-            Ok(()) if stop::requested() => Err(Failure::interrupted(format!("interrupted; {go_on}"))),
+            Ok(()) if cancel::requested() => Err(Failure::interrupted(format!("interrupted; {go_on}"))),
             Ok(()) => {
                 self.enough()?;
                 let done = self.batch.summed_up(self.records.clone());
@@ -195,7 +195,7 @@ impl<'a> Session<'a> {
                     self.put_together(task.id)?;
                 }
             }
-            if jobs.is_empty() || stop::requested() {
+            if jobs.is_empty() || cancel::requested() {
                 return Ok(());
             }
         }
@@ -223,7 +223,7 @@ impl<'a> Session<'a> {
         let outcome = batch::run(
             jobs.len(),
             self.output.run.threads,
-            &stop::FLAG,
+            &cancel::FLAG,
             |index| session.attempt(jobs[index]),
             |_, finished| {
                 let id = &finished.record.identity;
@@ -259,7 +259,7 @@ impl<'a> Session<'a> {
             pictures: self.output.pictures,
             environment: &self.environment,
         };
-        recorder.write(&mut film, demonstration, stop::requested).map_err(failure)?;
+        recorder.write(&mut film, demonstration, cancel::requested).map_err(failure)?;
         Ok(finished)
     }
 

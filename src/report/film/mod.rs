@@ -14,7 +14,6 @@ use crate::{
     benchmark::control::CONTROL_DT,
     dataset::video::{VideoError, VideoWriter},
     evaluation::record::EpisodeRecord,
-    message::number,
     physics::world::Frame,
     rollout::{CAMERA_PICTURES, FINGER_PICTURES, FINGERS, Film, SenseError},
     scene::Camera,
@@ -22,6 +21,7 @@ use crate::{
         camera::Picture,
         tactile::{MarkerStyle, Touched},
     },
+    text::format_number,
 };
 
 use super::run_folder::{RunFolderError, replace};
@@ -170,7 +170,12 @@ fn chart(canvas: &mut Canvas, film: &Film, caption: &Caption, index: usize, [x, 
     if let Some(tau) = caption.tau_pct {
         let level = place(0, tau)[1];
         canvas.line(&[[x, level], [x + width, level]], 1.5, 6.0, HARM);
-        canvas.write(&format!("τ {} %", number(round(tau))), (x + width + 8.0, level + 5.0), 16.0, HARM);
+        canvas.write(
+            &format!("τ {} %", format_number(round(tau))),
+            (x + width + 8.0, level + 5.0),
+            16.0,
+            HARM,
+        );
     }
     let known: Vec<[f32; 2]> =
         film.d_pct.iter().enumerate().take(index + 1).filter_map(|(at, d)| Some(place(at, (*d)?))).collect();

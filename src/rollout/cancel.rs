@@ -1,16 +1,16 @@
-//! The wish to end: one flag for the process, since signals are the process's. Whatever takes long looks at it.
+//! Process-wide cancellation flag, set by the signal handler and polled by long-running loops.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Set once; never cleared.
 pub static FLAG: AtomicBool = AtomicBool::new(false);
 
-/// Asks everything to end; says whether it had been asked before.
+/// Requests cancellation. Returns true if it had been requested before.
 pub fn request() -> bool {
     FLAG.swap(true, Ordering::Relaxed)
 }
 
-/// Whether the end was asked for.
+/// True once cancellation has been requested.
 pub fn requested() -> bool {
     FLAG.load(Ordering::Relaxed)
 }
