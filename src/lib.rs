@@ -7,6 +7,7 @@
 //!
 //! Units are SI throughout; a name carries its unit where it is not SI or not obvious. Frames are suffixes:
 //! `_w` world, `_b` robot base, `_h` hand, `_p` pad, `_o` object.
+#![warn(unreachable_pub)]
 
 #[warn(missing_docs)]
 pub mod benchmark;

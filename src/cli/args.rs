@@ -25,7 +25,7 @@ use crate::{
 
 /// A command.
 #[derive(Debug)]
-pub enum Command {
+pub(super) enum Command {
     /// Do what a script's plan says.
     Run(Run),
     /// List what there is.
@@ -108,7 +108,7 @@ pub enum Command {
 
 /// What to run and how.
 #[derive(Clone, Debug)]
-pub struct Run {
+pub(super) struct Run {
     /// The script.
     pub file: PathBuf,
     /// Words for the script's own options.
@@ -147,7 +147,7 @@ pub struct Run {
 
 impl Run {
     /// A script under a policy, one thread, all else as it is by default.
-    pub fn of(file: PathBuf, policy: Choice) -> Self {
+    pub(super) fn of(file: PathBuf, policy: Choice) -> Self {
         Self {
             file,
             policy,
@@ -170,7 +170,7 @@ impl Run {
     }
 
     /// A suite's name in results: that of a twin is its own, though its episodes start as the suite's do.
-    pub fn name_of(&self, suite: &Suite) -> String {
+    pub(super) fn name_of(&self, suite: &Suite) -> String {
         let twin = if self.twin { "_rigid_twin" } else { "" };
         format!("{}{twin}", suite.name)
     }
@@ -178,7 +178,7 @@ impl Run {
 
 /// Which rollouts of a run become videos.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Video {
+pub(super) enum Video {
     /// Those that are not safe.
     Failed,
     /// All.
@@ -189,7 +189,7 @@ pub enum Video {
 
 /// Which episode to draw, and how.
 #[derive(Debug)]
-pub struct View {
+pub(super) struct View {
     /// Suite, policy, seed, shifts, settings and folder as for a run; its `tasks` name one.
     pub run: Run,
     /// Episode of the task.
@@ -200,7 +200,7 @@ pub struct View {
 
 /// What to serve, where and to how many.
 #[derive(Debug)]
-pub struct Serve {
+pub(super) struct Serve {
     /// Suite, seed, shifts and settings as for a run.
     pub run: Run,
     /// What clients are shown and what their numbers mean.
@@ -221,7 +221,7 @@ pub struct Serve {
 ///
 /// # Errors
 /// Usage errors, with what was meant where it can be guessed.
-pub fn parse(words: &[String]) -> Result<Command, Failure> {
+pub(super) fn parse(words: &[String]) -> Result<Command, Failure> {
     let options = match script_file(words) {
         Some(file) => script::declared_options(Path::new(file)).map_err(Failure::input)?,
         None => Vec::new(),
@@ -310,7 +310,7 @@ fn script_file(words: &[String]) -> Option<&str> {
 }
 
 /// A flag's text; empty if it was not given.
-pub fn text(matches: &ArgMatches, name: &str) -> String {
+pub(super) fn text(matches: &ArgMatches, name: &str) -> String {
     matches.get_one::<String>(name).cloned().unwrap_or_default()
 }
 
@@ -390,7 +390,7 @@ fn dataset(matches: &ArgMatches, options: &[OptionSpec]) -> Result<Command, Fail
 }
 
 /// Threads: as many as there are processors if it is not said.
-pub fn threads(matches: &ArgMatches) -> usize {
+pub(super) fn threads(matches: &ArgMatches) -> usize {
     let available = std::thread::available_parallelism().map_or(1, |n| n.get());
     matches.get_one::<u16>("threads").map_or(available, |n| usize::from(*n))
 }
@@ -442,7 +442,7 @@ fn typed(matches: &ArgMatches) -> Typed {
 }
 
 /// All values of a flag.
-pub fn many(matches: &ArgMatches, name: &str) -> Vec<String> {
+pub(super) fn many(matches: &ArgMatches, name: &str) -> Vec<String> {
     matches.get_many::<String>(name).unwrap_or_default().cloned().collect()
 }
 

@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use crate::evaluation::record::{EpisodeRecord, Outcome};
 
 /// What the error of an attempt begins with that could not start as its demonstration says.
-pub const NO_START: &str = "cannot start as the demonstration says: ";
+pub(super) const NO_START: &str = "cannot start as the demonstration says: ";
 
 /// Attempts that must be run before anything can be said of more; `done` says of each that is done whether it is good.
-pub fn due(done: &BTreeMap<u32, bool>, demos: u32, most: u32) -> Vec<u32> {
+pub(super) fn due(done: &BTreeMap<u32, bool>, demos: u32, most: u32) -> Vec<u32> {
     let mut end = 0;
     loop {
         let missing: Vec<u32> = (0..end).filter(|attempt| !done.contains_key(attempt)).collect();
@@ -21,7 +21,7 @@ pub fn due(done: &BTreeMap<u32, bool>, demos: u32, most: u32) -> Vec<u32> {
 }
 
 /// Why an attempt is no demonstration; none if it is.
-pub fn rejected(record: &EpisodeRecord) -> Option<String> {
+pub(super) fn rejected(record: &EpisodeRecord) -> Option<String> {
     let verdict = &record.verdict;
     let reason = match &record.outcome {
         _ if verdict.safety => return None,
@@ -39,7 +39,7 @@ pub fn rejected(record: &EpisodeRecord) -> Option<String> {
 }
 
 /// One attempt in one line.
-pub fn line(record: &EpisodeRecord) -> String {
+pub(super) fn line(record: &EpisodeRecord) -> String {
     let id = &record.identity;
     let said = match (rejected(record), &record.outcome) {
         (None, _) => "kept".to_owned(),

@@ -76,7 +76,7 @@ impl<'a> Batch<'a> {
     ///
     /// # Errors
     /// A setting or shift that the suite does not have, or a value out of its range.
-    pub fn new(
+    pub(super) fn new(
         run: &'a Run,
         loaded: &'a Loaded,
         suite: &'a Suite,
@@ -119,7 +119,7 @@ impl<'a> Batch<'a> {
     }
 
     /// The same with what was made of assets for other suites.
-    pub fn sharing(mut self, cache: &RestCache, looks: &Looks) -> Self {
+    pub(super) fn sharing(mut self, cache: &RestCache, looks: &Looks) -> Self {
         (self.cache, self.looks) = (cache.clone(), looks.clone());
         self
     }
@@ -138,12 +138,12 @@ impl<'a> Batch<'a> {
     }
 
     /// Whether whoever drives sees the true state, or saw it when the actions were recorded.
-    pub fn is_privileged(&self) -> bool {
+    pub(super) fn is_privileged(&self) -> bool {
         self.run.policy.is_privileged() || self.replayed.as_ref().is_some_and(|replayed| replayed.privileged)
     }
 
     /// Which episode of a task it is.
-    pub fn request(&self, task: &Task, episode: u32) -> script::EpisodeRequest {
+    pub(super) fn request(&self, task: &Task, episode: u32) -> script::EpisodeRequest {
         script::EpisodeRequest {
             suite: self.suite.name.clone(),
             task: task.id,
@@ -158,7 +158,7 @@ impl<'a> Batch<'a> {
     ///
     /// # Errors
     /// A layout or a threshold file that is wrong.
-    pub fn learn_limits(&mut self, tasks: &[Task]) -> Result<(), Failure> {
+    pub(super) fn learn_limits(&mut self, tasks: &[Task]) -> Result<(), Failure> {
         tasks.iter().try_for_each(|task| {
             let opened = self.open(&self.request(task, 0))?;
             self.learn_limit(target_asset(&opened.nominal, task).cloned())
@@ -169,7 +169,7 @@ impl<'a> Batch<'a> {
     ///
     /// # Errors
     /// A threshold file that is wrong.
-    pub fn learn_limit(&mut self, target: Option<Arc<Asset>>) -> Result<(), Failure> {
+    pub(super) fn learn_limit(&mut self, target: Option<Arc<Asset>>) -> Result<(), Failure> {
         let soft = target.filter(|asset| matches!(asset.body, Body::Soft(_)));
         if let Some(asset) = soft.filter(|asset| !self.limits.contains_key(&asset.name)) {
             let limit = self.find_limit(&asset)?;
@@ -179,7 +179,7 @@ impl<'a> Batch<'a> {
     }
 
     /// Takes over the limits of another batch of the same suite, whose layouts are the same.
-    pub fn share_limits(&mut self, other: &Self) {
+    pub(super) fn share_limits(&mut self, other: &Self) {
         self.limits.clone_from(&other.limits);
         self.released.clone_from(&other.released);
         self.sources.clone_from(&other.sources);
@@ -217,7 +217,7 @@ impl<'a> Batch<'a> {
     ///
     /// # Errors
     /// A script, policy or file that fails, or an interrupt; finished episodes are kept.
-    pub fn go(&self, mut folder: RunFolder, done: Vec<EpisodeRecord>) -> Result<Done, Failure> {
+    pub(super) fn go(&self, mut folder: RunFolder, done: Vec<EpisodeRecord>) -> Result<Done, Failure> {
         let mut records = done;
         let left = self.left(&records);
         let outcome = match again::make_lost_files(self, &records) {
@@ -256,14 +256,14 @@ impl<'a> Batch<'a> {
     }
 
     /// Episodes with what they come to.
-    pub fn summed_up(&self, records: Vec<EpisodeRecord>) -> Done {
+    pub(super) fn summed_up(&self, records: Vec<EpisodeRecord>) -> Done {
         let policy = &self.run.policy;
         let summary = Summary::of(&self.name, policy.name(), &records);
         Done { summary, records }
     }
 
     /// Whether nothing of a finished run is missing: no episode, and no file of one.
-    pub fn is_whole(&self, done: &[EpisodeRecord]) -> bool {
+    pub(super) fn is_whole(&self, done: &[EpisodeRecord]) -> bool {
         let files = self.files();
         self.left(done).is_empty()
             && interchange::has_scores(&self.out)
@@ -271,7 +271,7 @@ impl<'a> Batch<'a> {
     }
 
     /// The files of its episodes beside their lines.
-    pub fn files(&self) -> SideFiles<'_> {
+    pub(super) fn files(&self) -> SideFiles<'_> {
         SideFiles::of(self.run, &self.out)
     }
 
@@ -279,7 +279,7 @@ impl<'a> Batch<'a> {
     ///
     /// # Errors
     /// The first such line of the folder's `episodes.jsonl`.
-    pub fn check_done(&self, folder: &RunFolder, done: &[EpisodeRecord]) -> Result<(), Failure> {
+    pub(super) fn check_done(&self, folder: &RunFolder, done: &[EpisodeRecord]) -> Result<(), Failure> {
         let path = folder.path().join(EPISODES).display().to_string();
         if !done.is_empty() && folder.read(RUN).map_err(folder_failure)?.is_none() {
             return Err(Failure::input(format!(
@@ -308,7 +308,7 @@ impl<'a> Batch<'a> {
     }
 
     /// The jobs that are not done.
-    pub fn left(&self, done: &[EpisodeRecord]) -> Vec<usize> {
+    pub(super) fn left(&self, done: &[EpisodeRecord]) -> Vec<usize> {
         let done: BTreeSet<_> = done.iter().map(|r| (r.identity.task, r.identity.episode)).collect();
         (0..self.jobs.len()).filter(|&job| !done.contains(&(self.jobs[job].0.id, self.jobs[job].1))).collect()
     }
@@ -349,7 +349,7 @@ impl<'a> Batch<'a> {
     ///
     /// # Errors
     /// A script, the scene or whoever drives fails.
-    pub fn episode(&self, job: usize, film: bool, drive: &Drive) -> Result<Finished, Failure> {
+    pub(super) fn episode(&self, job: usize, film: bool, drive: &Drive) -> Result<Finished, Failure> {
         let (task, episode) = self.jobs[job];
         let origin = self.origins.get(&(task.id, episode));
         self.episode_from(job, origin, film, drive)?.map_err(|e| self.episode_failure(&e))
@@ -359,7 +359,7 @@ impl<'a> Batch<'a> {
     ///
     /// # Errors
     /// A script or whoever drives does not begin; within, what is wrong with the scene or happens on the way.
-    pub fn episode_from(
+    pub(super) fn episode_from(
         &self,
         job: usize,
         origin: Option<&Origin>,
@@ -378,7 +378,7 @@ impl<'a> Batch<'a> {
     ///
     /// # Errors
     /// A script or the scene fails.
-    pub fn begin(&self, task: &Task, request: &script::EpisodeRequest) -> Result<Episode, Failure> {
+    pub(super) fn begin(&self, task: &Task, request: &script::EpisodeRequest) -> Result<Episode, Failure> {
         let (spec, _) = self.spec(task, request, None)?;
         Episode::start(spec, &self.cache, &self.looks).map_err(|e| self.episode_failure(&e))
     }
@@ -427,10 +427,11 @@ impl<'a> Batch<'a> {
 }
 
 /// Makes whoever drives an episode.
-pub type Drive = Box<dyn Fn(script::Episode, TaskBrief) -> Result<Box<dyn Controller>, Failure> + Sync>;
+pub(super) type Drive =
+    Box<dyn Fn(script::Episode, TaskBrief) -> Result<Box<dyn Controller>, Failure> + Sync>;
 
 /// The episodes of a run that came to its end, in order, and what they come to.
-pub struct Done {
+pub(super) struct Done {
     /// What they come to.
     pub summary: Summary,
     /// The episodes.

@@ -18,7 +18,7 @@ use crate::{
 ///
 /// # Errors
 /// The first thing that is wrong.
-pub fn run(run: &Run) -> Result<(), Failure> {
+pub(super) fn run(run: &Run) -> Result<(), Failure> {
     let loaded = script::load(&run.file, &run.script_words).map_err(Failure::input)?;
     let file = run.file.display();
     // Suites have assets in common.

@@ -9,7 +9,7 @@ use crate::report::{comparison, runs};
 ///
 /// # Errors
 /// A folder holds no run or two of one suite, or they share no episode.
-pub fn run(first: &Path, second: &Path, json: bool) -> Result<(), Failure> {
+pub(super) fn run(first: &Path, second: &Path, json: bool) -> Result<(), Failure> {
     let [a, b] = [first, second].map(runs::load);
     let (a, b) = (a.map_err(Failure::input)?, b.map_err(Failure::input)?);
     let compared = comparison::compare(&a, &b).map_err(Failure::input)?;

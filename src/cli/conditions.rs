@@ -53,7 +53,7 @@ struct Case {
 ///
 /// # Errors
 /// A condition that a suite does not know, a folder that holds a run, or an episode that fails; finished runs are kept.
-pub fn run(
+pub(super) fn run(
     run: &Run,
     loaded: &Loaded,
     (suites, conditions): (&[Suite], &[Condition]),
@@ -83,7 +83,7 @@ pub fn run(
 ///
 /// # Errors
 /// The first thing that is wrong.
-pub fn check(
+pub(super) fn check(
     run: &Run,
     loaded: &Loaded,
     (suites, conditions): (&[Suite], &[Condition]),

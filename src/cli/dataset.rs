@@ -21,7 +21,7 @@ use crate::{
 };
 
 /// Whether a path is that of a data set: an HDF5 file, or the folder of a recording.
-pub fn is_dataset(path: &Path) -> bool {
+pub(super) fn is_dataset(path: &Path) -> bool {
     let hdf5 = path.extension().is_some_and(|end| end == "hdf5" || end == "h5");
     hdf5 || path.join(DATASET).is_file() || path.join(RECORDING).is_file()
 }
@@ -30,7 +30,7 @@ pub fn is_dataset(path: &Path) -> bool {
 ///
 /// # Errors
 /// Something is wrong.
-pub fn check(path: &Path, replays: usize) -> Result<(), Failure> {
+pub(super) fn check(path: &Path, replays: usize) -> Result<(), Failure> {
     finished(path)?;
     let findings = if path.is_dir() { check::folder(path) } else { check::file(path) };
     let findings = findings.map_err(Failure::input)?;
@@ -93,7 +93,7 @@ fn repeat_all(demos: &[(PathBuf, usize)]) -> Result<(), Failure> {
 ///
 /// # Errors
 /// It cannot be read, or the drawing not written.
-pub fn stats(path: &Path, out: Option<&Path>, json: bool) -> Result<(), Failure> {
+pub(super) fn stats(path: &Path, out: Option<&Path>, json: bool) -> Result<(), Failure> {
     finished(path)?;
     let mut paths: Vec<PathBuf> = all(path)?.into_iter().map(|(file, _)| file).collect();
     paths.dedup();
@@ -113,7 +113,7 @@ pub fn stats(path: &Path, out: Option<&Path>, json: bool) -> Result<(), Failure>
 ///
 /// # Errors
 /// There is no such demonstration, or (exit code 1) it comes out different.
-pub fn replay(path: &Path, which: Which) -> Result<(), Failure> {
+pub(super) fn replay(path: &Path, which: Which) -> Result<(), Failure> {
     finished(path)?;
     let count = all(path)?.len();
     let none = || {
@@ -148,7 +148,7 @@ pub fn replay(path: &Path, which: Which) -> Result<(), Failure> {
 ///
 /// # Errors
 /// It is not.
-pub fn finished(path: &Path) -> Result<(), Failure> {
+pub(super) fn finished(path: &Path) -> Result<(), Failure> {
     if path.is_dir() && path.join(RECORDING).is_file() && !path.join(DATASET).is_file() {
         return Err(Failure::input(format!(
             "{}: the recording was broken off; finish it with softvt record … --resume --out {0}",

@@ -19,7 +19,7 @@ struct Golden {
 ///
 /// # Errors
 /// The golden episode cannot be run, or ends otherwise than the published one.
-pub fn run() -> Result<(), Failure> {
+pub(super) fn run() -> Result<(), Failure> {
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
     print(&format!(
         "softvt     {}\nplatform   {} {}, {threads} threads\nfeatures   {}\nlua        5.4, embedded\n",

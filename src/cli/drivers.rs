@@ -17,7 +17,7 @@ use crate::{
 
 /// How an expert's hand closes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Hand {
+pub(super) enum Hand {
     /// As far as the expert says.
     Told,
     /// Only open or shut.
@@ -28,7 +28,7 @@ pub enum Hand {
 
 impl Hand {
     /// What `--policy` calls it.
-    pub fn name(self) -> &'static str {
+    pub(super) fn name(self) -> &'static str {
         match self {
             Self::Told => "expert",
             Self::Binary => "expert-binary",
@@ -39,7 +39,7 @@ impl Hand {
 
 /// A policy's server and how it is spoken to.
 #[derive(Debug)]
-pub struct Answering {
+pub(super) struct Answering {
     /// Its address.
     pub url: String,
     /// How it talks.
@@ -58,7 +58,7 @@ pub struct Answering {
 
 /// Who drives.
 #[derive(Clone, Debug)]
-pub enum Driver {
+pub(super) enum Driver {
     /// The task's expert.
     Expert(Hand),
     /// Who holds still.
@@ -77,44 +77,44 @@ pub enum Driver {
 
 /// Who drives, and how results call it.
 #[derive(Clone, Debug)]
-pub struct Choice {
+pub(super) struct Choice {
     driver: Driver,
     name: String,
 }
 
 impl Choice {
     /// A driver under a name.
-    pub fn new(driver: Driver, name: String) -> Self {
+    pub(super) fn new(driver: Driver, name: String) -> Self {
         Self { driver, name }
     }
 
     /// The tasks' experts.
-    pub fn expert() -> Self {
+    pub(super) fn expert() -> Self {
         Self::new(Driver::Expert(Hand::Told), Hand::Told.name().to_owned())
     }
 
     /// Recorded actions that somebody else hands over.
-    pub fn replay() -> Self {
+    pub(super) fn replay() -> Self {
         Self::new(Driver::Given, "replay".to_owned())
     }
 
     /// Whoever drove in another world.
-    pub fn import() -> Self {
+    pub(super) fn import() -> Self {
         Self::new(Driver::Given, "import".to_owned())
     }
 
     /// A client of `softvt serve`.
-    pub fn client() -> Self {
+    pub(super) fn client() -> Self {
         Self::new(Driver::Given, "client".to_owned())
     }
 
     /// How results call it.
-    pub fn name(&self) -> &str {
+    pub(super) fn name(&self) -> &str {
         &self.name
     }
 
     /// The hand of the tasks' experts, if they drive.
-    pub fn hand(&self) -> Option<Hand> {
+    pub(super) fn hand(&self) -> Option<Hand> {
         match self.driver {
             Driver::Expert(hand) => Some(hand),
             _ => None,
@@ -122,17 +122,17 @@ impl Choice {
     }
 
     /// Whether it sees the true state.
-    pub fn is_privileged(&self) -> bool {
+    pub(super) fn is_privileged(&self) -> bool {
         self.hand().is_some()
     }
 
     /// Whether it answers over a network.
-    pub fn is_remote(&self) -> bool {
+    pub(super) fn is_remote(&self) -> bool {
         matches!(self.driver, Driver::Server(_))
     }
 
     /// The profile, if the policy has one.
-    pub fn profile(&self) -> Option<&Profile> {
+    pub(super) fn profile(&self) -> Option<&Profile> {
         match &self.driver {
             Driver::Server(server) => Some(&server.profile),
             _ => None,
@@ -140,7 +140,7 @@ impl Choice {
     }
 
     /// What it looks at and where that is said, if it is known before it drives.
-    pub fn looks(&self) -> Option<(String, Streams)> {
+    pub(super) fn looks(&self) -> Option<(String, Streams)> {
         match &self.driver {
             Driver::Server(server) => {
                 Some((format!("--profile {}: inputs", server.profile_word), server.profile.streams()))
@@ -151,7 +151,7 @@ impl Choice {
     }
 
     /// Actions of each answer that are carried out, if anybody has a say in that.
-    pub fn replan(&self) -> Option<usize> {
+    pub(super) fn replan(&self) -> Option<usize> {
         match &self.driver {
             Driver::Server(server) => Some(server.replan),
             Driver::Lua(_, replan) => *replan,
@@ -160,7 +160,7 @@ impl Choice {
     }
 
     /// The file of a policy in Lua, as messages name it.
-    pub fn file(&self) -> Option<&str> {
+    pub(super) fn file(&self) -> Option<&str> {
         match &self.driver {
             Driver::Lua(file, _) => Some(&file.main),
             _ => None,
@@ -168,7 +168,7 @@ impl Choice {
     }
 
     /// SHA-256 of the files that the policy or its profile is made of, by name.
-    pub fn sources(&self) -> BTreeMap<String, String> {
+    pub(super) fn sources(&self) -> BTreeMap<String, String> {
         match &self.driver {
             Driver::Lua(file, _) => file.hashes(),
             Driver::Server(server) => server.sources.clone(),
@@ -177,7 +177,7 @@ impl Choice {
     }
 
     /// The runs whose actions are carried out, if any are.
-    pub fn recorded(&self) -> Option<&RecordedRuns> {
+    pub(super) fn recorded(&self) -> Option<&RecordedRuns> {
         match &self.driver {
             Driver::Recorded(runs) => Some(runs),
             _ => None,
@@ -186,7 +186,7 @@ impl Choice {
 }
 
 /// Makes whoever drives an episode.
-pub struct Drivers {
+pub(super) struct Drivers {
     choice: Choice,
     connections: Option<Arc<Connections>>,
     /// The script's name of the suite, and whether it is its twin.
@@ -195,7 +195,7 @@ pub struct Drivers {
 
 impl Drivers {
     /// `suite` is the script's name of it, `twin` whether soft objects are rigid.
-    pub fn new(choice: &Choice, suite: &str, twin: bool) -> Self {
+    pub(super) fn new(choice: &Choice, suite: &str, twin: bool) -> Self {
         let connections = match &choice.driver {
             Driver::Server(server) => Some(Arc::new(Connections::new(Server {
                 url: server.url.clone(),
@@ -214,7 +214,7 @@ impl Drivers {
     ///
     /// # Errors
     /// The server cannot be reached.
-    pub fn connect(&self) -> Result<(), Failure> {
+    pub(super) fn connect(&self) -> Result<(), Failure> {
         self.connections.as_ref().map_or(Ok(()), |connections| connections.try_out().map_err(policy_failure))
     }
 
@@ -222,7 +222,11 @@ impl Drivers {
     ///
     /// # Errors
     /// The task has no expert, or it does not start.
-    pub fn drive(&self, opened: script::Episode, brief: TaskBrief) -> Result<Box<dyn Controller>, Failure> {
+    pub(super) fn drive(
+        &self,
+        opened: script::Episode,
+        brief: TaskBrief,
+    ) -> Result<Box<dyn Controller>, Failure> {
         let chunked = |policy: Box<dyn Policy>, replan| -> Box<dyn Controller> {
             Box::new(Chunked::new(policy, brief.clone(), replan))
         };
@@ -254,7 +258,7 @@ impl Drivers {
 ///
 /// # Errors
 /// The task has none, or it does not start.
-pub fn expert(opened: script::Episode, hand: Hand) -> Result<ExpertController, Failure> {
+pub(super) fn expert(opened: script::Episode, hand: Hand) -> Result<ExpertController, Failure> {
     let expert = opened.expert().map_err(Failure::input)?;
     let expert = expert.ok_or_else(|| Failure::input("the task has no expert"))?;
     Ok(match hand {

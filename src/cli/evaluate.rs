@@ -29,7 +29,7 @@ use crate::{
 ///
 /// # Errors
 /// Anything that is wrong with the script, the flags, the folder or the policy.
-pub fn run(run: &Run) -> Result<(), Failure> {
+pub(super) fn run(run: &Run) -> Result<(), Failure> {
     let loaded = script::load(&run.file, &run.script_words).map_err(Failure::input)?;
     check_video(run, &loaded.plan)?;
     check_recorded(run, &loaded.plan)?;
@@ -151,7 +151,7 @@ fn out_dir(run: &Run, suite: &str, level: Option<&str>) -> PathBuf {
 ///
 /// # Errors
 /// The script is no suite, or the episode cannot be run.
-pub fn single(run: &Run, task: usize) -> Result<EpisodeRecord, Failure> {
+pub(super) fn single(run: &Run, task: usize) -> Result<EpisodeRecord, Failure> {
     let loaded = script::load(&run.file, &run.script_words).map_err(Failure::input)?;
     let Plan::Suite(suite) = &loaded.plan else {
         return Err(Failure::input(format!("{} is not a suite", run.file.display())));

@@ -17,7 +17,13 @@ use crate::{
 ///
 /// # Errors
 /// The script fails, or a file cannot be written.
-pub fn run(run: &Run, loaded: &Loaded, name: &str, points: usize, columns: &[String]) -> Result<(), Failure> {
+pub(super) fn run(
+    run: &Run,
+    loaded: &Loaded,
+    name: &str,
+    points: usize,
+    columns: &[String],
+) -> Result<(), Failure> {
     // Machines are not shared between threads but used again: opening one runs the whole script.
     let idle: Mutex<Vec<Experiment>> = Mutex::default();
     let take = || idle.lock().unwrap_or_else(|p| p.into_inner()).pop();

@@ -24,7 +24,7 @@ use crate::{
 const FORMATS: [&str; 2] = ["lerobot-v2.1", "lerobot-v3.0"];
 
 /// Its words; `path` is that of the data set.
-pub fn command(path: Arg) -> clap::Command {
+pub(super) fn command(path: Arg) -> clap::Command {
     clap::Command::new("export")
         .about("Writes a recording as a LeRobot data set, for training: docs/train-openpi.md")
         .arg(path.help("The folder of a finished recording"))
@@ -53,7 +53,7 @@ pub fn command(path: Arg) -> clap::Command {
 }
 
 /// What was typed.
-pub fn typed(matches: &ArgMatches) -> Export {
+pub(super) fn typed(matches: &ArgMatches) -> Export {
     Export {
         data: PathBuf::from(text(matches, "path")),
         out: PathBuf::from(text(matches, "out")),
@@ -68,7 +68,7 @@ pub fn typed(matches: &ArgMatches) -> Export {
 ///
 /// # Errors
 /// See [`lerobot::export`]; nothing is left then.
-pub fn run(export: &Export) -> Result<(), Failure> {
+pub(super) fn run(export: &Export) -> Result<(), Failure> {
     if export.out.to_string_lossy().trim().is_empty() {
         return Err(Failure::input("--out: expected a new folder, got \"\""));
     }

@@ -13,7 +13,7 @@ use crate::{
 ///
 /// # Errors
 /// The system refuses.
-pub fn make_folder(dir: &Path) -> Result<(), Failure> {
+pub(super) fn make_folder(dir: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(dir)
         .map_err(|e| Failure::input(format!("cannot make the folder {}: {e}", dir.display())))
 }
@@ -23,7 +23,7 @@ pub fn make_folder(dir: &Path) -> Result<(), Failure> {
 ///
 /// # Errors
 /// The file exists but cannot be read.
-pub fn find(script: &Path, relative: &str) -> Result<Option<(String, String)>, Failure> {
+pub(super) fn find(script: &Path, relative: &str) -> Result<Option<(String, String)>, Failure> {
     let mut roots: Vec<PathBuf> =
         script.parent().into_iter().flat_map(Path::ancestors).take(3).map(Path::to_path_buf).collect();
     roots.push(PathBuf::new());
@@ -40,7 +40,7 @@ pub fn find(script: &Path, relative: &str) -> Result<Option<(String, String)>, F
 }
 
 /// What is known of an asset's limit.
-pub enum Calibrated {
+pub(super) enum Calibrated {
     /// Nothing.
     Never,
     /// The file (as messages name it) is about another object of that name.
@@ -62,7 +62,7 @@ pub enum Calibrated {
 ///
 /// # Errors
 /// Its file cannot be read or is not a threshold file.
-pub fn calibrated(script: &Path, asset: &Asset) -> Result<Calibrated, Failure> {
+pub(super) fn calibrated(script: &Path, asset: &Asset) -> Result<Calibrated, Failure> {
     let name = &asset.name;
     let relative = format!("assets/calibration/{name}.json");
     let Some((text, path)) = find(script, &relative)? else {

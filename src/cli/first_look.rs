@@ -28,7 +28,7 @@ impl Batch<'_> {
     ///
     /// # Errors
     /// A layout, a threshold file, a camera, the light or a tactile sensor that is wrong; a server that is not there.
-    pub fn prepare(&mut self, tasks: &[&Task]) -> Result<(), Failure> {
+    pub(super) fn prepare(&mut self, tasks: &[&Task]) -> Result<(), Failure> {
         for task in tasks {
             let first = self.jobs.iter().find(|(of, _)| of.id == task.id).map_or(0, |(_, episode)| *episode);
             let opened = self.open(&self.request(task, first))?;
@@ -59,7 +59,7 @@ impl Batch<'_> {
     ///
     /// # Errors
     /// What is wrong.
-    pub fn examine(&self, task: &Task, scene: Scene) -> Result<(), Failure> {
+    pub(super) fn examine(&self, task: &Task, scene: Scene) -> Result<(), Failure> {
         self.right_kind(task, &scene)?;
         let scene = Arc::new(if self.run.twin { scene.rigid_twin() } else { scene });
         let settings = &self.settings;

@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// The whole command with the script's options in a section of their own.
-pub fn command(options: &[OptionSpec]) -> Result<clap::Command, Failure> {
+pub(super) fn command(options: &[OptionSpec]) -> Result<clap::Command, Failure> {
     let mut command = runner();
     let own: Vec<String> = command
         .get_arguments()
@@ -73,12 +73,12 @@ fn shown(value: &OptionValue) -> String {
 }
 
 /// A flag.
-pub fn flag(name: &'static str, help: &'static str) -> Arg {
+pub(super) fn flag(name: &'static str, help: &'static str) -> Arg {
     Arg::new(name).long(name).help(help)
 }
 
 /// A flag whose values may be joined by commas, or given one by one.
-pub fn list(name: &'static str, help: &'static str) -> Arg {
+pub(super) fn list(name: &'static str, help: &'static str) -> Arg {
     flag(name, help).action(ArgAction::Append).value_delimiter(',')
 }
 
@@ -158,7 +158,7 @@ fn on_scenes(command: clap::Command) -> clap::Command {
 }
 
 /// What says who drives: with `softvt serve` that is the client.
-pub const DRIVERS: [&str; 5] = ["policy", "protocol", "replan", "policy-timeout", "name"];
+pub(super) const DRIVERS: [&str; 5] = ["policy", "protocol", "replan", "policy-timeout", "name"];
 
 fn server() -> clap::Command {
     let command = clap::Command::new("serve")

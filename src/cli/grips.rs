@@ -14,10 +14,10 @@ use crate::{
 };
 
 /// Whether the gripper was meant to hold in each control step, by task and attempt.
-pub type Grips = Arc<Mutex<BTreeMap<(usize, u32), Vec<bool>>>>;
+pub(super) type Grips = Arc<Mutex<BTreeMap<(usize, u32), Vec<bool>>>>;
 
 /// Lets the experts of a batch say when the gripper is meant to hold; others have only their closure.
-pub fn note_grips(run: &Run, batch: &mut Batch, grips: &Grips) {
+pub(super) fn note_grips(run: &Run, batch: &mut Batch, grips: &Grips) {
     let Some(hand) = run.policy.hand() else { return };
     let grips = grips.clone();
     batch.drive = Box::new(move |opened, brief| {

@@ -30,7 +30,7 @@ use crate::{
 
 /// What to import.
 #[derive(Clone, Debug)]
-pub struct Import {
+pub(super) struct Import {
     /// What is kept, and where.
     pub output: Output,
     /// Files of demonstrations.
@@ -46,7 +46,7 @@ pub struct Import {
 /// # Errors
 /// The script is no suite, a file is none or of nothing in it, the folder holds something else, an attempt or a file fails,
 /// nothing is kept.
-pub fn run(import: &Import) -> Result<(), Failure> {
+pub(super) fn run(import: &Import) -> Result<(), Failure> {
     let Import { output, files, attempts, layout } = import;
     let run = &output.run;
     let loaded = script::load(&run.file, &run.script_words).map_err(Failure::input)?;

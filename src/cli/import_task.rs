@@ -9,7 +9,7 @@ use crate::{
 };
 
 /// A demonstration with the task and attempt that it becomes.
-pub struct Matched<'a> {
+pub(super) struct Matched<'a> {
     /// Its file.
     pub file: &'a Foreign,
     /// The demonstration.
@@ -27,7 +27,7 @@ pub struct Matched<'a> {
 ///
 /// # Errors
 /// One is of no task, of several, or of another seed; or two are of one attempt.
-pub fn match_all<'a>(
+pub(super) fn match_all<'a>(
     run: &Run,
     suites: &[&Suite],
     files: &'a [Foreign],

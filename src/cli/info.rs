@@ -22,7 +22,7 @@ use crate::{
 
 /// Everything needed to repeat a run.
 #[derive(Serialize)]
-pub struct RunInfo<'a> {
+pub(super) struct RunInfo<'a> {
     pub softvt: &'a str,
     pub script: String,
     pub suite: &'a str,
@@ -67,7 +67,7 @@ pub struct RunInfo<'a> {
 
 impl<'a> RunInfo<'a> {
     /// That of a batch that is prepared.
-    pub fn of(batch: &'a Batch, tasks: &[&Task], episodes: u32) -> Self {
+    pub(super) fn of(batch: &'a Batch, tasks: &[&Task], episodes: u32) -> Self {
         let run = batch.run;
         let options = batch.loaded.options.iter();
         Self {
@@ -103,7 +103,7 @@ impl<'a> RunInfo<'a> {
 ///
 /// # Errors
 /// The file cannot be written, or is that of another run.
-pub fn write(folder: &RunFolder, info: &impl Serialize) -> Result<(), Failure> {
+pub(super) fn write(folder: &RunFolder, info: &impl Serialize) -> Result<(), Failure> {
     let Some(known) = folder.read(RUN).map_err(folder_failure)? else {
         return write_json(&folder.path().join(RUN), info).map_err(folder_failure);
     };
@@ -122,7 +122,7 @@ pub fn write(folder: &RunFolder, info: &impl Serialize) -> Result<(), Failure> {
 ///
 /// # Errors
 /// The file is there and cannot be read.
-pub fn is_of(dir: &Path, info: &RunInfo) -> Result<bool, Failure> {
+pub(super) fn is_of(dir: &Path, info: &RunInfo) -> Result<bool, Failure> {
     let path = dir.join(RUN);
     let text = std::fs::read_to_string(&path)
         .map_err(|e| Failure::input(format!("cannot read {}: {e}", path.display())))?;
@@ -148,7 +148,7 @@ fn told(a: &Value, b: &Value) -> [String; 2] {
 }
 
 /// Where two documents differ first, with both values.
-pub fn difference(known: &Value, now: &Value) -> Option<String> {
+pub(super) fn difference(known: &Value, now: &Value) -> Option<String> {
     let (Value::Object(a), Value::Object(b)) = (known, now) else {
         return (known != now).then(|| told(known, now).join(" then, ") + " now");
     };

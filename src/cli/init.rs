@@ -21,7 +21,7 @@ const TEMPLATE: [(&str, &str); 2] = [
 ///
 /// # Errors
 /// A file cannot be written.
-pub fn run(dir: &Path) -> Result<(), Failure> {
+pub(super) fn run(dir: &Path) -> Result<(), Failure> {
     let stub = dir.join(STUB_FILE);
     write(&stub, stubs().as_bytes())?;
     let settings = dir.join(".luarc.json");
@@ -36,7 +36,7 @@ pub fn run(dir: &Path) -> Result<(), Failure> {
 ///
 /// # Errors
 /// One of them is there already, or cannot be written; nothing is written then.
-pub fn task(dir: &Path) -> Result<(), Failure> {
+pub(super) fn task(dir: &Path) -> Result<(), Failure> {
     let files: Vec<(PathBuf, &[u8])> =
         TEMPLATE.iter().filter_map(|(path, from)| Some((dir.join(path), embedded(from)?))).collect();
     if let Some((there, _)) = files.iter().find(|(path, _)| path.exists()) {

@@ -11,7 +11,7 @@ use crate::{benchmark::Plan, policy::profile::PROFILES, script};
 ///
 /// # Errors
 /// A suite in the working folder cannot be loaded.
-pub fn run(what: &str, as_json: bool) -> Result<(), Failure> {
+pub(super) fn run(what: &str, as_json: bool) -> Result<(), Failure> {
     let rows = match what {
         "policies" => named(&POLICIES, "scripts/policies"),
         "profiles" => named(&PROFILES, "scripts/profiles"),

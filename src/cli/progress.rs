@@ -7,7 +7,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use crate::text;
 
 /// Progress of a batch of jobs.
-pub struct Progress {
+pub(super) struct Progress {
     bar: Option<ProgressBar>,
     total: usize,
     done: usize,
@@ -15,7 +15,7 @@ pub struct Progress {
 
 impl Progress {
     /// For `total` jobs.
-    pub fn new(total: usize, what: &str) -> Self {
+    pub(super) fn new(total: usize, what: &str) -> Self {
         let bar = std::io::stderr().is_terminal().then(|| {
             let bar = ProgressBar::new(total as u64);
             let template =
@@ -29,7 +29,7 @@ impl Progress {
     }
 
     /// One job has ended.
-    pub fn tick(&mut self, message: &str) {
+    pub(super) fn tick(&mut self, message: &str) {
         self.done += 1;
         match &self.bar {
             Some(bar) => {
@@ -46,7 +46,7 @@ impl Progress {
     }
 
     /// No more jobs.
-    pub fn finish(&self) {
+    pub(super) fn finish(&self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
         }

@@ -12,7 +12,7 @@ use crate::script;
 
 /// What to record.
 #[derive(Clone, Debug)]
-pub struct Record {
+pub(super) struct Record {
     /// What is kept, and where.
     pub output: Output,
     /// Demonstrations a task.
@@ -25,7 +25,7 @@ pub struct Record {
 ///
 /// # Errors
 /// The script is no suite, the folder holds something else, an attempt or a file fails, too few attempts are good.
-pub fn run(record: &Record) -> Result<(), Failure> {
+pub(super) fn run(record: &Record) -> Result<(), Failure> {
     let Record { output, demos, attempts } = record;
     let run = &output.run;
     let loaded = script::load(&run.file, &run.script_words).map_err(Failure::input)?;

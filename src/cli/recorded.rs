@@ -18,13 +18,13 @@ use crate::{
 
 /// The runs in a folder.
 #[derive(Debug)]
-pub struct RecordedRuns {
+pub(super) struct RecordedRuns {
     dir: PathBuf,
     runs: Vec<StoredRun>,
 }
 
 /// Which episodes are wanted.
-pub struct Wanted<'a> {
+pub(super) struct Wanted<'a> {
     /// The script's name of the suite.
     pub suite: &'a str,
     /// Whether soft objects are made rigid.
@@ -39,7 +39,7 @@ pub struct Wanted<'a> {
 
 /// Whose actions were carried out, as `run.json` says it.
 #[derive(Clone, Debug, Serialize)]
-pub struct Replayed {
+pub(super) struct Replayed {
     /// The folder, as it was typed.
     pub run: String,
     /// Who drove it.
@@ -59,7 +59,7 @@ const TOLD: usize = 3;
 ///
 /// # Errors
 /// What differs or is missing.
-pub fn recorded(run: &Run, suite: &Suite, jobs: &[(&Task, u32)]) -> Result<Option<Replayed>, Failure> {
+pub(super) fn recorded(run: &Run, suite: &Suite, jobs: &[(&Task, u32)]) -> Result<Option<Replayed>, Failure> {
     let Some(runs) = run.policy.recorded() else { return Ok(None) };
     let jobs: Vec<(usize, u32)> = jobs.iter().map(|(task, episode)| (task.id, *episode)).collect();
     let wanted =
@@ -72,7 +72,7 @@ impl RecordedRuns {
     ///
     /// # Errors
     /// It holds none.
-    pub fn load(dir: &Path) -> Result<Self, Failure> {
+    pub(super) fn load(dir: &Path) -> Result<Self, Failure> {
         let runs = runs::load(dir).map_err(|e| Failure::input(format!("--policy: {e}")))?;
         Ok(Self { dir: dir.to_owned(), runs })
     }
@@ -81,7 +81,7 @@ impl RecordedRuns {
     ///
     /// # Errors
     /// It is of another suite, seed, split or twin, or lacks episodes.
-    pub fn check(&self, wanted: &Wanted<'_>) -> Result<Replayed, Failure> {
+    pub(super) fn check(&self, wanted: &Wanted<'_>) -> Result<Replayed, Failure> {
         let run = self.of(wanted.suite, wanted.twin).ok_or_else(|| self.no_suite(wanted))?;
         let wrong = |what: String| Failure::input(format!("--policy {}: {what}", run.dir.display()));
         let seed = run.info["seed"].as_u64();
@@ -138,7 +138,7 @@ impl RecordedRuns {
     ///
     /// # Errors
     /// The actions cannot be read.
-    pub fn actions(&self, suite: &str, twin: bool, brief: &TaskBrief) -> Result<Vec<Action>, Failure> {
+    pub(super) fn actions(&self, suite: &str, twin: bool, brief: &TaskBrief) -> Result<Vec<Action>, Failure> {
         let dir = self.of(suite, twin).map_or(&self.dir, |run| &run.dir);
         actions::read(&actions::path(dir, brief.task, brief.episode)).map_err(Failure::input)
     }

@@ -21,7 +21,7 @@ use crate::{
 
 /// Which episode of a run: `TASK/EPISODE`, or the number of its line from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Which {
+pub(super) enum Which {
     /// A line.
     Line(usize),
     /// A task's episode.
@@ -32,7 +32,7 @@ pub enum Which {
 ///
 /// # Errors
 /// A fragment for people.
-pub fn which(word: &str) -> Result<Which, String> {
+pub(super) fn which(word: &str) -> Result<Which, String> {
     let pair =
         word.split_once('/').and_then(|(task, e)| Some(Which::Of(task.parse().ok()?, e.parse().ok()?)));
     let found = pair.or_else(|| word.parse().ok().map(Which::Line));
@@ -45,7 +45,7 @@ pub fn which(word: &str) -> Result<Which, String> {
 ///
 /// # Errors
 /// The run cannot be read, its scripts have changed since, or (exit code 1) something comes out different.
-pub fn run(dir: &Path, which: Which) -> Result<(), Failure> {
+pub(super) fn run(dir: &Path, which: Which) -> Result<(), Failure> {
     if dataset::is_dataset(dir) {
         return dataset::replay(dir, which);
     }

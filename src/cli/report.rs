@@ -19,7 +19,7 @@ const LATEX_HEAD: &str =
 ///
 /// # Errors
 /// A folder holds no run, or a file cannot be written.
-pub fn run(dirs: &[PathBuf], out: &Path) -> Result<(), Failure> {
+pub(super) fn run(dirs: &[PathBuf], out: &Path) -> Result<(), Failure> {
     let mut stored = Vec::new();
     for dir in dirs {
         stored.extend(runs::load(dir).map_err(Failure::input)?);

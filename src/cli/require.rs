@@ -24,7 +24,7 @@ fn share(rate: &Rate) -> Option<f64> {
 
 /// One requirement, such as `safety>=0.9`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Requirement {
+pub(super) struct Requirement {
     text: String,
     measure: usize,
     order: Order,
@@ -47,7 +47,7 @@ const ORDERS: [(&str, Order); 4] =
 ///
 /// # Errors
 /// A fragment for people.
-pub fn parse(word: &str) -> Result<Requirement, String> {
+pub(super) fn parse(word: &str) -> Result<Requirement, String> {
     let names = || MEASURES.map(|(name, _)| name).join(", ");
     let cut = ORDERS.iter().find_map(|(sign, order)| Some((word.split_once(sign)?, *order)));
     let ((name, bound), order) =
@@ -90,7 +90,7 @@ impl Requirement {
 ///
 /// # Errors
 /// Those that are not met, with an exit code of their own.
-pub fn check(requirements: &[Requirement], summaries: &[Summary]) -> Result<(), Failure> {
+pub(super) fn check(requirements: &[Requirement], summaries: &[Summary]) -> Result<(), Failure> {
     let missed: Vec<String> =
         summaries.iter().flat_map(|s| requirements.iter().filter_map(|r| r.missed(s))).collect();
     if missed.is_empty() { Ok(()) } else { Err(Failure::unmet(missed.join("\n"))) }

@@ -23,7 +23,7 @@ use crate::{
 ///
 /// # Errors
 /// The script has no suite, its first episode cannot be shown, the address cannot be had; at the end, that it was asked for.
-pub fn run(serve: &Serve) -> Result<(), Failure> {
+pub(super) fn run(serve: &Serve) -> Result<(), Failure> {
     let loaded = script::load(&serve.run.file, &serve.run.script_words).map_err(Failure::input)?;
     let suites = suites_of(serve, &loaded)?;
     let run = Run { policy: Choice::client(), ..serve.run.clone() };

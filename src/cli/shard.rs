@@ -7,7 +7,7 @@ use crate::report::{merge, terminal};
 
 /// The `index`-th (from 1) of `count` parts of a run: every `count`-th episode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Shard {
+pub(super) struct Shard {
     index: usize,
     count: usize,
 }
@@ -16,7 +16,7 @@ pub struct Shard {
 ///
 /// # Errors
 /// A fragment for people.
-pub fn parse(word: &str) -> Result<Shard, String> {
+pub(super) fn parse(word: &str) -> Result<Shard, String> {
     let parts = word.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
     match parts {
         Some((index, count)) if (1..=count).contains(&index) => Ok(Shard { index, count }),
@@ -26,7 +26,7 @@ pub fn parse(word: &str) -> Result<Shard, String> {
 
 impl Shard {
     /// Whether the `job`-th episode of the whole run (from 0) is in it.
-    pub fn has(&self, job: usize) -> bool {
+    pub(super) fn has(&self, job: usize) -> bool {
         job % self.count == self.index - 1
     }
 }
@@ -41,7 +41,7 @@ impl std::fmt::Display for Shard {
 ///
 /// # Errors
 /// They do not belong together, or a file cannot be read or written.
-pub fn merge(out: &Path, shards: &[PathBuf]) -> Result<(), Failure> {
+pub(super) fn merge(out: &Path, shards: &[PathBuf]) -> Result<(), Failure> {
     let summaries = merge::merge(out, shards).map_err(Failure::input)?;
     summaries.iter().for_each(|summary| print(&terminal::table(summary)));
     crate::text::eprint_line(&format!("softvt: {}", out.display()));

@@ -28,12 +28,12 @@ pub(super) struct SideFiles<'a> {
 
 impl<'a> SideFiles<'a> {
     /// Those of a run in the folder `dir`.
-    pub fn of(run: &'a Run, dir: &'a Path) -> Self {
+    pub(super) fn of(run: &'a Run, dir: &'a Path) -> Self {
         Self { dir, trace: run.trace.is_some(), video: run.video.as_ref() }
     }
 
     /// Whether an episode may have to be drawn.
-    pub fn may_show(&self, episode: u32) -> bool {
+    pub(super) fn may_show(&self, episode: u32) -> bool {
         match self.video {
             None => false,
             Some(Video::Episodes(chosen)) => chosen.contains(&episode),
@@ -48,7 +48,7 @@ impl<'a> SideFiles<'a> {
     }
 
     /// Those of a finished episode that are wanted and not there.
-    pub fn lost(&self, record: &EpisodeRecord) -> Vec<PathBuf> {
+    pub(super) fn lost(&self, record: &EpisodeRecord) -> Vec<PathBuf> {
         let id = &record.identity;
         let mut wanted = vec![
             actions::path(self.dir, id.task, id.episode),
@@ -71,7 +71,7 @@ impl<'a> SideFiles<'a> {
     ///
     /// # Errors
     /// A file cannot be written.
-    pub fn write(&self, finished: &Finished) -> Result<(), Failure> {
+    pub(super) fn write(&self, finished: &Finished) -> Result<(), Failure> {
         let id = &finished.record.identity;
         self.write_trace(finished)?;
         let path = interchange::debug_log_path(self.dir, id.task, id.episode);
@@ -84,7 +84,7 @@ impl<'a> SideFiles<'a> {
     ///
     /// # Errors
     /// A picture cannot be made or written.
-    pub fn draw(&self, finished: &mut Finished) -> Result<(), Failure> {
+    pub(super) fn draw(&self, finished: &mut Finished) -> Result<(), Failure> {
         let (record, Some(mut film)) = (&finished.record, finished.film.take()) else { return Ok(()) };
         if !self.shows(record) {
             return Ok(());

@@ -15,7 +15,7 @@ use crate::{
 ///
 /// # Errors
 /// The script is no suite, the task or episode fails, a stream cannot be made or a file not written.
-pub fn run(view: &View) -> Result<(), Failure> {
+pub(super) fn run(view: &View) -> Result<(), Failure> {
     let run = &view.run;
     let loaded = script::load(&run.file, &run.script_words).map_err(Failure::input)?;
     let Plan::Suite(suite) = &loaded.plan else {

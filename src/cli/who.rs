@@ -22,7 +22,7 @@ use crate::{
 };
 
 /// Policies that need no server and no file.
-pub const POLICIES: [(&str, &str); 5] = [
+pub(super) const POLICIES: [(&str, &str); 5] = [
     ("expert", "the task's scripted expert (privileged: it sees the true state)"),
     ("expert-binary", "the same expert with a gripper that is only open or shut (privileged)"),
     ("tactile-servo", "the same expert, closing until its fingers feel that the grasp holds (privileged)"),
@@ -32,7 +32,7 @@ pub const POLICIES: [(&str, &str); 5] = [
 
 /// What `--policy` names.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Word {
+pub(super) enum Word {
     /// The task's expert.
     Expert(Hand),
     /// Who holds still.
@@ -49,7 +49,7 @@ pub enum Word {
 
 /// What was typed about a policy; what was not is none.
 #[derive(Clone, Debug)]
-pub struct Typed {
+pub(super) struct Typed {
     /// `--policy`.
     pub word: Word,
     /// `--name`.
@@ -67,17 +67,17 @@ pub struct Typed {
 }
 
 /// Actions of a server's answers that are carried out, unless somebody says otherwise.
-pub const REPLAN: usize = 10;
+pub(super) const REPLAN: usize = 10;
 /// The profile that a server gets, unless somebody says otherwise.
-pub const PROFILE: &str = "visuo_tactile";
+pub(super) const PROFILE: &str = "visuo_tactile";
 /// Longest wait for a server, unless somebody says otherwise.
-pub const PATIENCE: Duration = Duration::from_secs(60);
+pub(super) const PATIENCE: Duration = Duration::from_secs(60);
 
 /// What stands behind `--policy`.
 ///
 /// # Errors
 /// A fragment for people.
-pub fn policy_word(word: &str) -> Result<Word, String> {
+pub(super) fn policy_word(word: &str) -> Result<Word, String> {
     Ok(match word {
         "expert" => Word::Expert(Hand::Told),
         "expert-binary" => Word::Expert(Hand::Binary),
@@ -120,7 +120,7 @@ fn meant(word: &str, known: &[(&str, &str)]) -> String {
 ///
 /// # Errors
 /// A fragment for people.
-pub fn profile_word(word: &str) -> Result<String, String> {
+pub(super) fn profile_word(word: &str) -> Result<String, String> {
     if word.ends_with(".lua") || PROFILES.iter().any(|(name, _)| *name == word) {
         return Ok(word.to_owned());
     }
@@ -133,7 +133,7 @@ pub fn profile_word(word: &str) -> Result<String, String> {
 ///
 /// # Errors
 /// A file that is wrong, a folder that holds no run, or a flag that this policy has no use for.
-pub fn choose(typed: Typed) -> Result<Choice, Failure> {
+pub(super) fn choose(typed: Typed) -> Result<Choice, Failure> {
     typed.refuse_unused()?;
     let Typed { word, name, .. } = &typed;
     let (driver, own) = match word {
@@ -179,7 +179,7 @@ impl Typed {
     ///
     /// # Errors
     /// A file that is wrong.
-    pub fn profile(&self) -> Result<(Profile, BTreeMap<String, String>), Failure> {
+    pub(super) fn profile(&self) -> Result<(Profile, BTreeMap<String, String>), Failure> {
         let word = self.profile.as_deref().unwrap_or(PROFILE);
         let (mut profile, sources) = match Profile::named(word) {
             Some(profile) => (profile, BTreeMap::new()),

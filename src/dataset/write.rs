@@ -22,7 +22,7 @@ pub(super) struct Writer<'a> {
 
 impl<'a> Writer<'a> {
     /// A new file with `/data` and its attributes.
-    pub fn create(
+    pub(super) fn create(
         path: &'a Path,
         environment: &Value,
         total: usize,
@@ -41,7 +41,7 @@ impl<'a> Writer<'a> {
     }
 
     /// The group of a path, made with those above it if need be.
-    pub fn group(&mut self, path: &str) -> Result<H5Group, DatasetError> {
+    pub(super) fn group(&mut self, path: &str) -> Result<H5Group, DatasetError> {
         let failed = |error| DatasetError::hdf5(self.path, path)(error);
         let mut group = self.file.root_group();
         let mut so_far = String::new();
@@ -56,7 +56,7 @@ impl<'a> Writer<'a> {
     }
 
     /// Attributes of a demonstration.
-    pub fn describe(
+    pub(super) fn describe(
         &mut self,
         demo: usize,
         record: &EpisodeRecord,
@@ -89,7 +89,7 @@ impl<'a> Writer<'a> {
     }
 
     /// All numbers of a demonstration.
-    pub fn numbers(&mut self, demo: usize, demonstration: &Demonstration) -> Result<(), DatasetError> {
+    pub(super) fn numbers(&mut self, demo: usize, demonstration: &Demonstration) -> Result<(), DatasetError> {
         let outer = demonstration.outer();
         for stream in outer.iter().chain(&demonstration.observed).chain(&demonstration.privileged) {
             self.stream(&format!("data/demo_{demo}/{}", stream.name), stream, demonstration.steps())?;
@@ -122,7 +122,7 @@ impl<'a> Writer<'a> {
 
     /// A data set of `steps` rows in chunks of `rows`. Before compression the bytes of a chunk are put side by side that are
     /// `together` bytes apart (HDF5's shuffle filter).
-    pub fn dataset<T: H5Type>(
+    pub(super) fn dataset<T: H5Type>(
         &mut self,
         key: &str,
         (steps, rows): (usize, usize),
@@ -142,7 +142,7 @@ impl<'a> Writer<'a> {
 
     /// Room for the pictures of a stream, `rows` in a chunk. The values of one pixel in all pictures of a chunk are stored side by
     /// side: what does not move takes little room then.
-    pub fn pictures(
+    pub(super) fn pictures(
         &mut self,
         demo: usize,
         name: &str,
@@ -159,7 +159,7 @@ impl<'a> Writer<'a> {
     }
 
     /// Ends the file, or gives it up if what was to be `written` into it could not be.
-    pub fn close(self, written: Result<(), DatasetError>) -> Result<(), DatasetError> {
+    pub(super) fn close(self, written: Result<(), DatasetError>) -> Result<(), DatasetError> {
         if written.is_err() {
             // What is wrong is known already.
             let _ = self.file.close_no_sync();

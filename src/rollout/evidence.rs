@@ -116,7 +116,7 @@ fn upward(touch: &Touch) -> f64 {
 }
 
 /// Height of the lowest point of an object, m.
-pub fn lowest(sim: &Simulation, object: &Handle) -> f64 {
+pub(super) fn lowest(sim: &Simulation, object: &Handle) -> f64 {
     match object.kind {
         Kind::Soft(index) => {
             let body = &sim.world.soft[index].body;

@@ -39,7 +39,7 @@ impl<K: Clone, V: Clone> Made<K, V> {
     ///
     /// # Errors
     /// Those of `make`; the next one tries again.
-    pub fn get<E>(
+    pub(super) fn get<E>(
         &self,
         key: &K,
         same: impl Fn(&K) -> bool,

@@ -19,7 +19,7 @@ pub(super) struct Recent {
 
 impl Recent {
     /// Takes the state after a control step.
-    pub fn push(&mut self, frame: Frame) {
+    pub(super) fn push(&mut self, frame: Frame) {
         if self.frames.len() == HISTORY {
             self.frames.pop_front();
         }
@@ -27,7 +27,7 @@ impl Recent {
     }
 
     /// Adds to an observation what is looked at.
-    pub fn observe(
+    pub(super) fn observe(
         &mut self,
         senses: &mut Senses,
         blind: Observation,

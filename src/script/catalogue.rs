@@ -18,7 +18,7 @@ const fn field(name: &'static str, ty: Type, presence: Presence, doc: &'static s
 }
 
 /// Coulomb friction of a surface.
-pub static FRICTION: Record = Record {
+pub(super) static FRICTION: Record = Record {
     label: "friction",
     class: "softvt.Friction",
     kind: "softvt.Friction",
@@ -40,7 +40,7 @@ pub static FRICTION: Record = Record {
 };
 
 /// A finite-element soft body.
-pub static SOFT: Record = Record {
+pub(super) static SOFT: Record = Record {
     label: "asset.body",
     class: "softvt.Soft",
     kind: "softvt.soft",
@@ -70,7 +70,7 @@ pub static SOFT: Record = Record {
 };
 
 /// A free rigid body.
-pub static RIGID: Record = Record {
+pub(super) static RIGID: Record = Record {
     label: "asset.body",
     class: "softvt.Rigid",
     kind: "softvt.rigid",
@@ -79,7 +79,7 @@ pub static RIGID: Record = Record {
 };
 
 /// A part of the world.
-pub static STATIC: Record = Record {
+pub(super) static STATIC: Record = Record {
     label: "asset.body",
     class: "softvt.Static",
     kind: "softvt.static",
@@ -88,7 +88,7 @@ pub static STATIC: Record = Record {
 };
 
 /// What is only seen.
-pub static SCENERY: Record = Record {
+pub(super) static SCENERY: Record = Record {
     label: "asset.body",
     class: "softvt.Scenery",
     kind: "softvt.scenery",
@@ -97,7 +97,7 @@ pub static SCENERY: Record = Record {
 };
 
 /// A kind of object.
-pub static ASSET: Record = Record {
+pub(super) static ASSET: Record = Record {
     label: "asset",
     class: "softvt.Asset",
     kind: "softvt.asset",
@@ -128,7 +128,7 @@ pub static ASSET: Record = Record {
 };
 
 /// Where things stand.
-pub static LAYOUT: Record = Record {
+pub(super) static LAYOUT: Record = Record {
     label: "layout",
     class: "softvt.Layout",
     kind: "softvt.layout",
@@ -145,7 +145,7 @@ pub static LAYOUT: Record = Record {
 };
 
 /// Rest on a target.
-pub static ON: Record = Record {
+pub(super) static ON: Record = Record {
     label: "task.goal",
     class: "softvt.On",
     kind: "softvt.on",
@@ -154,7 +154,7 @@ pub static ON: Record = Record {
 };
 
 /// Rest inside a target.
-pub static INSIDE: Record = Record {
+pub(super) static INSIDE: Record = Record {
     label: "task.goal",
     class: "softvt.Inside",
     kind: "softvt.inside",
@@ -179,7 +179,7 @@ const GOAL_FIELDS: &[Field] = &[
 ];
 
 /// One task.
-pub static TASK: Record = Record {
+pub(super) static TASK: Record = Record {
     label: "task",
     class: "softvt.Task",
     kind: "softvt.task",
@@ -204,7 +204,7 @@ pub static TASK: Record = Record {
 };
 
 /// A change of the scene that a run may ask for.
-pub static SHIFT: Record = Record {
+pub(super) static SHIFT: Record = Record {
     label: "shift",
     class: "softvt.Shift",
     kind: "softvt.shift",
@@ -225,7 +225,7 @@ pub static SHIFT: Record = Record {
 };
 
 /// Tasks reported together.
-pub static SUITE: Record = Record {
+pub(super) static SUITE: Record = Record {
     label: "suite",
     class: "softvt.Suite",
     kind: "softvt.suite",
@@ -252,7 +252,7 @@ pub static SUITE: Record = Record {
 };
 
 /// A scripted run over a grid.
-pub static EXPERIMENT: Record = Record {
+pub(super) static EXPERIMENT: Record = Record {
     label: "experiment",
     class: "softvt.Experiment",
     kind: "softvt.experiment",
@@ -299,7 +299,7 @@ pub static EXPERIMENT: Record = Record {
 };
 
 /// What an experiment's `finish` may return.
-pub static FINISH: Record = Record {
+pub(super) static FINISH: Record = Record {
     label: "finish",
     class: "softvt.Finish",
     kind: "softvt.Finish",
@@ -321,7 +321,7 @@ pub static FINISH: Record = Record {
 };
 
 /// An option of a script.
-pub static OPTION: Record = Record {
+pub(super) static OPTION: Record = Record {
     label: "option",
     class: "softvt.Option",
     kind: "softvt.Option",
@@ -338,7 +338,7 @@ pub static OPTION: Record = Record {
 };
 
 /// How far a hand would be from things.
-pub static CLEARANCE: Record = Record {
+pub(super) static CLEARANCE: Record = Record {
     label: "scene:clearance",
     class: "softvt.Clearance",
     kind: "softvt.Clearance",
@@ -355,7 +355,7 @@ pub static CLEARANCE: Record = Record {
 };
 
 /// What `scene:add` takes.
-pub static PLACE: Record = Record {
+pub(super) static PLACE: Record = Record {
     label: "scene:add",
     class: "softvt.Place",
     kind: "softvt.Place",
@@ -387,7 +387,7 @@ pub static PLACE: Record = Record {
 };
 
 /// Where a pose is.
-pub static POSE: Record = Record {
+pub(super) static POSE: Record = Record {
     label: "pose",
     class: "softvt.PoseSpec",
     kind: "softvt.PoseSpec",
@@ -405,7 +405,7 @@ pub static POSE: Record = Record {
 };
 
 /// Constructors of the form `softvt.name{…}` that only check their table, by name.
-pub static CONSTRUCTORS: &[(&str, &Record)] = &[
+pub(super) static CONSTRUCTORS: &[(&str, &Record)] = &[
     ("suite", &SUITE),
     ("task", &TASK),
     ("on", &ON),
@@ -424,5 +424,5 @@ pub static CONSTRUCTORS: &[(&str, &Record)] = &[
 ];
 
 /// Tables that functions take but no constructor makes.
-pub static PLAIN: &[&Record] =
+pub(super) static PLAIN: &[&Record] =
     &[&FRICTION, &PART, &VISUAL, &LAYER, &CONDITION, &FINISH, &OPTION, &PLACE, &POSE, &CLEARANCE];

@@ -9,7 +9,7 @@ use super::{
 
 /// A function or method.
 #[derive(Clone, Copy, Debug)]
-pub struct Signature {
+pub(super) struct Signature {
     /// Name, without the object.
     pub name: &'static str,
     /// Parameters: name (with `?` if it may be left out) and type; arguments are checked by them.
@@ -22,7 +22,7 @@ pub struct Signature {
 
 /// A class of objects.
 #[derive(Clone, Copy, Debug)]
-pub struct Class {
+pub(super) struct Class {
     /// Name, `softvt.Rng`.
     pub name: &'static str,
     /// One or two sentences.
@@ -53,7 +53,7 @@ const SHAPE_VALUE: Type = Type::Object("softvt.Shape");
 const POSE_VALUE: Type = Type::Object("softvt.Pose");
 
 /// Functions of `softvt` that are not constructors of one table.
-pub static FUNCTIONS: &[Signature] = &[
+pub(super) static FUNCTIONS: &[Signature] = &[
     method(
         "layout",
         &[
@@ -113,7 +113,7 @@ pub static FUNCTIONS: &[Signature] = &[
 ];
 
 /// Methods of a shape that do not take one table; the others come from the table of shapes.
-pub static SHAPE: Class = Class {
+pub(super) static SHAPE: Class = Class {
     name: "softvt.Shape",
     doc: "A solid. Methods give a new shape and leave this one as it is.",
     fields: &[],
@@ -169,7 +169,7 @@ pub static SHAPE: Class = Class {
 };
 
 /// `softvt.Pose`.
-pub static POSE: Class = Class {
+pub(super) static POSE: Class = Class {
     name: "softvt.Pose",
     doc: "An immutable pose in the world frame.",
     fields: &[
@@ -215,7 +215,7 @@ pub static POSE: Class = Class {
 };
 
 /// `softvt.Rng`.
-pub static RNG: Class = Class {
+pub(super) static RNG: Class = Class {
     name: "softvt.Rng",
     doc: "A named stream of random numbers, a function of suite, layout, episode, seed and split alone.",
     fields: &[],
@@ -246,7 +246,7 @@ pub static RNG: Class = Class {
 };
 
 /// `softvt.Scene`.
-pub static SCENE: Class = Class {
+pub(super) static SCENE: Class = Class {
     name: "softvt.Scene",
     doc: "The scene that a layout or a shift builds.",
     fields: &[
@@ -273,7 +273,7 @@ pub static SCENE: Class = Class {
 };
 
 /// `softvt.Light`.
-pub static LIGHT: Class = Class {
+pub(super) static LIGHT: Class = Class {
     name: "softvt.Light",
     doc: "The light of a scene: one key light and a sky. Its numbers may be read and written.",
     fields: &[],
@@ -282,7 +282,7 @@ pub static LIGHT: Class = Class {
 };
 
 /// `softvt.Camera`.
-pub static CAMERA: Class = Class {
+pub(super) static CAMERA: Class = Class {
     name: "softvt.Camera",
     doc: "A pinhole camera; its numbers may be read and written.",
     fields: &[("name", "string", "Its name."), ("mount", "\"world\"|\"hand\"", "What it is fixed to.")],
@@ -296,7 +296,7 @@ pub static CAMERA: Class = Class {
 };
 
 /// `softvt.Look`.
-pub static LOOK: Class = Class {
+pub(super) static LOOK: Class = Class {
     name: "softvt.Look",
     doc: "A material of a placed object; its numbers may be read and written, the layers over it stay.",
     fields: &[],
@@ -305,7 +305,7 @@ pub static LOOK: Class = Class {
 };
 
 /// `softvt.Object`.
-pub static OBJECT: Class = Class {
+pub(super) static OBJECT: Class = Class {
     name: "softvt.Object",
     doc: "A placed object; its numbers may be read and written.",
     fields: &[
@@ -333,7 +333,7 @@ pub static OBJECT: Class = Class {
 };
 
 /// `softvt.View`.
-pub static VIEW: Class = Class {
+pub(super) static VIEW: Class = Class {
     name: "softvt.View",
     doc: "The true scene at this control step, as an expert sees it.",
     fields: &[],
@@ -357,7 +357,7 @@ pub static VIEW: Class = Class {
 };
 
 /// `softvt.Seen`.
-pub static SEEN: Class = Class {
+pub(super) static SEEN: Class = Class {
     name: "softvt.Seen",
     doc: "An object as an expert sees it, at one moment.",
     fields: &[
@@ -376,7 +376,7 @@ pub static SEEN: Class = Class {
 };
 
 /// `softvt.Arm`.
-pub static ARM: Class = Class {
+pub(super) static ARM: Class = Class {
     name: "softvt.Arm",
     doc: "What an expert drives. Each motion lasts as many control steps as it needs.",
     fields: &[
@@ -447,7 +447,7 @@ pub static ARM: Class = Class {
 };
 
 /// `softvt.List`.
-pub static LIST: Class = Class {
+pub(super) static LIST: Class = Class {
     name: "softvt.List",
     doc: "A list that belongs to an object: scene.base, look.albedo, scene.objects. #, [i], ipairs, pairs, table.unpack and \
           table.concat work on it, and it may be given wherever a list is expected. Numbers that may be written one by one \
@@ -459,7 +459,7 @@ pub static LIST: Class = Class {
 };
 
 /// Objects that the host hands to scripts; a shape apart.
-pub static CLASSES: &[&Class] = &[
+pub(super) static CLASSES: &[&Class] = &[
     &super::classes_world::WORLD,
     &super::classes_world::BODY,
     &super::classes_world::SOLID,

@@ -12,7 +12,7 @@ const fn field(name: &'static str, ty: Type, presence: Presence, doc: &'static s
 }
 
 /// One condition.
-pub static CONDITION: Record = Record {
+pub(super) static CONDITION: Record = Record {
     label: "conditions.conditions",
     class: "softvt.Condition",
     kind: "softvt.Condition",
@@ -41,7 +41,7 @@ pub static CONDITION: Record = Record {
 };
 
 /// Suites under conditions.
-pub static CONDITIONS: Record = Record {
+pub(super) static CONDITIONS: Record = Record {
     label: "conditions",
     class: "softvt.Conditions",
     kind: "softvt.conditions",

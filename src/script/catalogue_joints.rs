@@ -12,7 +12,7 @@ const fn field(name: &'static str, ty: Type, presence: Presence, doc: &'static s
 }
 
 /// A joint that slides.
-pub static SLIDER: Record = Record {
+pub(super) static SLIDER: Record = Record {
     label: "slider",
     class: "softvt.Slider",
     kind: "softvt.slider",
@@ -32,7 +32,7 @@ pub static SLIDER: Record = Record {
 };
 
 /// A joint that turns.
-pub static HINGE: Record = Record {
+pub(super) static HINGE: Record = Record {
     label: "hinge",
     class: "softvt.Hinge",
     kind: "softvt.hinge",
@@ -63,7 +63,7 @@ pub static HINGE: Record = Record {
 };
 
 /// A part on a joint.
-pub static PART: Record = Record {
+pub(super) static PART: Record = Record {
     label: "part",
     class: "softvt.Part",
     kind: "softvt.Part",
@@ -100,7 +100,7 @@ pub static PART: Record = Record {
 };
 
 /// A thing of parts.
-pub static ARTICULATED: Record = Record {
+pub(super) static ARTICULATED: Record = Record {
     label: "articulated",
     class: "softvt.Articulated",
     kind: "softvt.articulated",

@@ -17,7 +17,7 @@ const STEP: Type = Type::Number("", Range { max: 10.0, ..Range::POSITIVE });
 const PIXELS: Type = Type::Number("px", Range::closed(0.0, 1e3));
 
 /// What a policy looks at.
-pub static LOOKS: Record = Record {
+pub(super) static LOOKS: Record = Record {
     label: "policy.looks",
     class: "softvt.Looks",
     kind: "softvt.Looks",
@@ -35,7 +35,7 @@ pub static LOOKS: Record = Record {
 };
 
 /// A policy.
-pub static POLICY: Record = Record {
+pub(super) static POLICY: Record = Record {
     label: "policy",
     class: "softvt.Policy",
     kind: "softvt.policy",
@@ -66,7 +66,7 @@ pub static POLICY: Record = Record {
 };
 
 /// What a policy commands.
-pub static ACTION: Record = Record {
+pub(super) static ACTION: Record = Record {
     label: "action",
     class: "softvt.Action",
     kind: "softvt.Action",
@@ -81,7 +81,7 @@ pub static ACTION: Record = Record {
 };
 
 /// An entry of an observation that is sent.
-pub static INPUT: Record = Record {
+pub(super) static INPUT: Record = Record {
     label: "profile.inputs",
     class: "softvt.Input",
     kind: "softvt.Input",
@@ -137,7 +137,7 @@ pub static INPUT: Record = Record {
 };
 
 /// The gripper's number of an action.
-pub static GRIPPER: Record = Record {
+pub(super) static GRIPPER: Record = Record {
     label: "profile.actions.gripper",
     class: "softvt.GripperCode",
     kind: "softvt.GripperCode",
@@ -155,7 +155,7 @@ pub static GRIPPER: Record = Record {
 };
 
 /// How replies are read.
-pub static ACTIONS: Record = Record {
+pub(super) static ACTIONS: Record = Record {
     label: "profile.actions",
     class: "softvt.ActionCode",
     kind: "softvt.ActionCode",
@@ -184,7 +184,7 @@ pub static ACTIONS: Record = Record {
 };
 
 /// A profile.
-pub static PROFILE: Record = Record {
+pub(super) static PROFILE: Record = Record {
     label: "profile",
     class: "softvt.Profile",
     kind: "softvt.profile",
@@ -197,13 +197,13 @@ pub static PROFILE: Record = Record {
 };
 
 /// Constructors.
-pub static CONSTRUCTORS: &[(&str, &Record)] = &[("policy", &POLICY), ("profile", &PROFILE)];
+pub(super) static CONSTRUCTORS: &[(&str, &Record)] = &[("policy", &POLICY), ("profile", &PROFILE)];
 
 /// Tables that no constructor makes.
-pub static PLAIN: &[&Record] = &[&LOOKS, &ACTION, &INPUT, &ACTIONS, &GRIPPER];
+pub(super) static PLAIN: &[&Record] = &[&LOOKS, &ACTION, &INPUT, &ACTIONS, &GRIPPER];
 
 /// What a policy is told of an episode; a plain table.
-pub static BRIEF: Class = Class {
+pub(super) static BRIEF: Class = Class {
     name: "softvt.Brief",
     doc: "Which episode begins: what a policy is told of it.",
     fields: &[
@@ -217,7 +217,7 @@ pub static BRIEF: Class = Class {
 };
 
 /// `softvt.Observation`.
-pub static OBSERVATION: Class = Class {
+pub(super) static OBSERVATION: Class = Class {
     name: "softvt.Observation",
     doc: "What a policy sees at a control step. Poses are of the tool centre point in the robot's base frame; hidden state has \
           no field here.",
@@ -252,7 +252,7 @@ pub static OBSERVATION: Class = Class {
 };
 
 /// `softvt.Touch`.
-pub static TOUCH: Class = Class {
+pub(super) static TOUCH: Class = Class {
     name: "softvt.Touch",
     doc: "A finger's tactile sensor at one control step; docs/tactile.md draws its frames.",
     fields: &[
@@ -265,7 +265,7 @@ pub static TOUCH: Class = Class {
 };
 
 /// `softvt.Markers`.
-pub static MARKERS: Class = Class {
+pub(super) static MARKERS: Class = Class {
     name: "softvt.Markers",
     doc: "The 99 markers of a finger, row by row, in px of its picture: x to the right (to the hand), y down. 1 px is 0.063 mm.",
     fields: &[

@@ -14,7 +14,7 @@ const fn field(name: &'static str, ty: Type, presence: Presence, doc: &'static s
 macro_rules! record {
     ($name:ident, $label:literal, $class:literal, $doc:literal, $fields:expr) => {
         #[doc = $doc]
-        pub static $name: Record =
+        pub(crate) static $name: Record =
             Record { label: $label, class: $class, kind: $class, doc: $doc, fields: $fields };
     };
 }
@@ -219,7 +219,7 @@ record!(
 );
 
 /// Constructors `softvt.shape.name{…}`.
-pub static SHAPES: &[(&str, &Record)] = &[
+pub(super) static SHAPES: &[(&str, &Record)] = &[
     ("box", &BOX),
     ("sphere", &SPHERE),
     ("ellipsoid", &ELLIPSOID),
@@ -232,7 +232,7 @@ pub static SHAPES: &[(&str, &Record)] = &[
 ];
 
 /// Methods of a shape that take one table.
-pub static METHODS: &[(&str, &Record)] = &[
+pub(super) static METHODS: &[(&str, &Record)] = &[
     ("rotate", &ROTATE),
     ("twist", &TWIST),
     ("bend", &BEND),

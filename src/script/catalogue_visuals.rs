@@ -19,7 +19,7 @@ const fn field(name: &'static str, ty: Type, presence: Presence, doc: &'static s
 }
 
 /// What a surface looks like.
-pub static VISUAL: Record = Record {
+pub(super) static VISUAL: Record = Record {
     label: "visual",
     class: "softvt.Visual",
     kind: "softvt.Visual",
@@ -33,7 +33,7 @@ pub static VISUAL: Record = Record {
 };
 
 /// A layer of a visual.
-pub static LAYER: Record = Record {
+pub(super) static LAYER: Record = Record {
     label: "layer",
     class: "softvt.Layer",
     kind: "softvt.Layer",
@@ -267,7 +267,7 @@ mask!(
 );
 
 /// Constructors `softvt.mask.name{…}`.
-pub static MASKS: &[(&str, &Record)] = &[
+pub(super) static MASKS: &[(&str, &Record)] = &[
     ("checker", &CHECKER),
     ("stripes", &STRIPES),
     ("gradient", &GRADIENT),
@@ -283,7 +283,7 @@ pub static MASKS: &[(&str, &Record)] = &[
 ];
 
 /// `softvt.Mask`.
-pub static MASK_CLASS: Class = Class {
+pub(super) static MASK_CLASS: Class = Class {
     name: "softvt.Mask",
     doc: "A number between 0 and 1 at every point of a surface: where a layer is. It never changes; methods give new masks.",
     fields: &[],

@@ -12,7 +12,7 @@ const fn field(name: &'static str, ty: Type, presence: Presence, doc: &'static s
 }
 
 /// A world.
-pub static WORLD: Record = Record {
+pub(super) static WORLD: Record = Record {
     label: "softvt.world",
     class: "softvt.WorldSpec",
     kind: "softvt.WorldSpec",
@@ -37,7 +37,7 @@ pub static WORLD: Record = Record {
 };
 
 /// A soft body of a world.
-pub static WORLD_SOFT: Record = Record {
+pub(super) static WORLD_SOFT: Record = Record {
     label: "world:soft",
     class: "softvt.WorldSoft",
     kind: "softvt.WorldSoft",
@@ -67,7 +67,7 @@ pub static WORLD_SOFT: Record = Record {
 };
 
 /// A prescribed or fixed solid of a world.
-pub static WORLD_SOLID: Record = Record {
+pub(super) static WORLD_SOLID: Record = Record {
     label: "world:solid",
     class: "softvt.WorldSolid",
     kind: "softvt.WorldSolid",
@@ -82,7 +82,7 @@ pub static WORLD_SOLID: Record = Record {
 };
 
 /// A settled scene with the robot.
-pub static SIMULATE: Record = Record {
+pub(super) static SIMULATE: Record = Record {
     label: "softvt.simulate",
     class: "softvt.SimulateSpec",
     kind: "softvt.SimulateSpec",
@@ -102,7 +102,7 @@ pub static SIMULATE: Record = Record {
 };
 
 /// What an envelope is made of.
-pub static ENVELOPE: Record = Record {
+pub(super) static ENVELOPE: Record = Record {
     label: "softvt.envelope",
     class: "softvt.EnvelopeSpec",
     kind: "softvt.EnvelopeSpec",
@@ -133,7 +133,7 @@ pub static ENVELOPE: Record = Record {
 };
 
 /// What `softvt.image` takes.
-pub static NEW_IMAGE: Record = Record {
+pub(super) static NEW_IMAGE: Record = Record {
     label: "softvt.image",
     class: "softvt.NewImage",
     kind: "softvt.NewImage",
@@ -146,7 +146,7 @@ pub static NEW_IMAGE: Record = Record {
 };
 
 /// What `image:text` takes.
-pub static TEXT: Record = Record {
+pub(super) static TEXT: Record = Record {
     label: "image:text",
     class: "softvt.Text",
     kind: "softvt.Text",
@@ -159,7 +159,7 @@ pub static TEXT: Record = Record {
 };
 
 /// What `simulation:see` takes.
-pub static SEE: Record = Record {
+pub(super) static SEE: Record = Record {
     label: "simulation:see",
     class: "softvt.See",
     kind: "softvt.See",
@@ -182,7 +182,7 @@ pub static SEE: Record = Record {
 };
 
 /// What `scene:add_camera` takes.
-pub static NEW_CAMERA: Record = Record {
+pub(super) static NEW_CAMERA: Record = Record {
     label: "scene:add_camera",
     class: "softvt.NewCamera",
     kind: "softvt.NewCamera",
@@ -248,5 +248,5 @@ pub static NEW_CAMERA: Record = Record {
 };
 
 /// All of them.
-pub static RECORDS: &[&Record] =
+pub(super) static RECORDS: &[&Record] =
     &[&NEW_CAMERA, &NEW_IMAGE, &TEXT, &SEE, &WORLD, &WORLD_SOFT, &WORLD_SOLID, &SIMULATE, &ENVELOPE];

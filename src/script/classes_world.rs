@@ -16,7 +16,7 @@ const PLACE: Type = Type::Number("pixels", Range::closed(-1e5, 1e5));
 const SOLID_VALUE: Type = Type::Object("softvt.Solid");
 
 /// `softvt.World`.
-pub static WORLD: Class = Class {
+pub(super) static WORLD: Class = Class {
     name: "softvt.World",
     doc: "The mechanics alone: soft bodies among solids that stand still or move as prescribed.",
     fields: &[],
@@ -50,7 +50,7 @@ pub static WORLD: Class = Class {
 };
 
 /// `softvt.Body`.
-pub static BODY: Class = Class {
+pub(super) static BODY: Class = Class {
     name: "softvt.Body",
     doc: "A soft body of a world.",
     fields: &[],
@@ -103,7 +103,7 @@ pub static BODY: Class = Class {
 };
 
 /// `softvt.Solid`.
-pub static SOLID: Class = Class {
+pub(super) static SOLID: Class = Class {
     name: "softvt.Solid",
     doc: "A solid of a world.",
     fields: &[],
@@ -117,7 +117,7 @@ pub static SOLID: Class = Class {
 };
 
 /// `softvt.Simulation`.
-pub static SIMULATION: Class = Class {
+pub(super) static SIMULATION: Class = Class {
     name: "softvt.Simulation",
     doc: "A settled scene with the robot.",
     fields: &[],
@@ -161,7 +161,7 @@ pub static SIMULATION: Class = Class {
 };
 
 /// `softvt.Felt`.
-pub static FELT: Class = Class {
+pub(super) static FELT: Class = Class {
     name: "softvt.Felt",
     doc: "A finger's tactile sensor at one moment; docs/tactile.md draws its frames.",
     fields: &[
@@ -179,7 +179,7 @@ pub static FELT: Class = Class {
 };
 
 /// `softvt.Image`.
-pub static IMAGE: Class = Class {
+pub(super) static IMAGE: Class = Class {
     name: "softvt.Image",
     doc: "A picture of 8-bit sRGB pixels. Regions are x, y, width, height in pixels from the top left.",
     fields: &[("width", "integer", "Width, pixels."), ("height", "integer", "Height, pixels.")],

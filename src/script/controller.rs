@@ -96,7 +96,7 @@ pub(super) struct Glance {
 
 impl Glance {
     /// Looks at the true state.
-    pub fn new(sim: &Simulation, time_s: f64, lag: &mut Lag) -> Self {
+    pub(super) fn new(sim: &Simulation, time_s: f64, lag: &mut Lag) -> Self {
         Self { view: view(sim, time_s), complaint: lag.complaint(sim) }
     }
 }

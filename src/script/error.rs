@@ -79,7 +79,7 @@ pub(super) struct Context<'a> {
 
 impl Context<'_> {
     /// Strips what only an implementer of the virtual machine would want to read.
-    pub fn explain(&self, error: &mlua::Error) -> ScriptError {
+    pub(super) fn explain(&self, error: &mlua::Error) -> ScriptError {
         if let Some(own) = own(error) {
             return own;
         }

@@ -165,18 +165,18 @@ pub(super) struct Coroutine {
 const LONGEST_REASON: usize = 300;
 
 impl Coroutine {
-    pub fn new(function: Function, hands: Hands) -> Self {
+    pub(super) fn new(function: Function, hands: Hands) -> Self {
         let (view, felt) = (Arc::default(), Arc::default());
         Self { function, view, hands, felt, feels: false, thread: None, gave_up: None }
     }
 
     /// What the fingers feel at the next control step, if that is known.
-    pub fn feel(&mut self, felt: Option<Felt>) {
+    pub(super) fn feel(&mut self, felt: Option<Felt>) {
         *locked(&self.felt) = felt;
     }
 
     /// Lets the expert see `view` and gives its next command; none once it is done.
-    pub fn step(&mut self, lua: &Lua, view: &ExpertView) -> mlua::Result<Option<ExpertCommand>> {
+    pub(super) fn step(&mut self, lua: &Lua, view: &ExpertView) -> mlua::Result<Option<ExpertCommand>> {
         if self.gave_up.is_some() {
             return Ok(None);
         }
@@ -208,7 +208,7 @@ impl Coroutine {
     }
 
     /// The error that `complaint` raises in the script where it waits for the next control step.
-    pub fn refuse(&mut self, lua: &Lua, complaint: &str) -> mlua::Error {
+    pub(super) fn refuse(&mut self, lua: &Lua, complaint: &str) -> mlua::Error {
         let over = self.gave_up.is_some();
         let waiting = self.thread.as_ref().filter(|thread| !over && thread.is_resumable());
         let raised = waiting.and_then(|thread| thread.resume::<MultiValue>(complaint).err());

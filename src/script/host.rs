@@ -26,22 +26,22 @@ pub(super) enum Read {
 
 impl Read {
     /// A number that may be missing.
-    pub fn optional(number: Option<f64>) -> Self {
+    pub(super) fn optional(number: Option<f64>) -> Self {
         Self::Value(number.map_or(Value::Nil, Value::Number))
     }
 
     /// A number.
-    pub fn number(number: f64) -> Self {
+    pub(super) fn number(number: f64) -> Self {
         Self::Value(Value::Number(number))
     }
 
     /// A text.
-    pub fn text(lua: &Lua, text: &str) -> mlua::Result<Self> {
+    pub(super) fn text(lua: &Lua, text: &str) -> mlua::Result<Self> {
         lua.create_string(text).map(|text| Self::Value(Value::String(text)))
     }
 
     /// Numbers that belong together; `mend` says how they are changed.
-    pub fn together(lua: &Lua, numbers: &[f64], mend: &str) -> mlua::Result<Self> {
+    pub(super) fn together(lua: &Lua, numbers: &[f64], mend: &str) -> mlua::Result<Self> {
         Ok(Self::Fixed(lua.create_sequence_from(numbers.iter().copied())?, mend.to_owned()))
     }
 }

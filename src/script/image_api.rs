@@ -35,7 +35,7 @@ struct Kept {
 
 impl LuaImage {
     /// Takes a picture into the machine.
-    pub fn new(lua: &Lua, picture: RgbImage) -> mlua::Result<Self> {
+    pub(super) fn new(lua: &Lua, picture: RgbImage) -> mlua::Result<Self> {
         let held = hold(lua, picture.as_raw().len())?;
         Ok(Self(Arc::new(Mutex::new(Kept { picture, _held: held }))))
     }

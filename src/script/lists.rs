@@ -28,12 +28,12 @@ pub(super) struct LuaList {
 
 impl LuaList {
     /// Numbers that are read by `get` and, all of them, written by `set`.
-    pub fn live(label: String, get: Get, set: Set) -> Self {
+    pub(super) fn live(label: String, get: Get, set: Set) -> Self {
         Self { label, content: Content::Live { get, set } }
     }
 
     /// A list that refuses to be written; `mend` says what to do instead.
-    pub fn fixed(label: String, entries: Table, mend: &str) -> Self {
+    pub(super) fn fixed(label: String, entries: Table, mend: &str) -> Self {
         Self { label, content: Content::Fixed { entries, mend: mend.to_owned() } }
     }
 

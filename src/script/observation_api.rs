@@ -26,7 +26,7 @@ const FINISHED: &str = "it is measured";
 pub(super) struct LuaObservation(Arc<Observation>);
 
 impl LuaObservation {
-    pub fn new(observation: &Observation) -> Self {
+    pub(super) fn new(observation: &Observation) -> Self {
         Self(Arc::new(observation.clone()))
     }
 

@@ -106,12 +106,12 @@ pub(super) struct Session {
 }
 
 impl Session {
-    pub fn new(argv: &[String]) -> Arc<Mutex<Self>> {
+    pub(super) fn new(argv: &[String]) -> Arc<Mutex<Self>> {
         Arc::new(Mutex::new(Self { words: argv.iter().cloned().map(Some).collect(), options: Vec::new() }))
     }
 
     /// An error for the first word that no option took.
-    pub fn leftover(&self, main: &str) -> Result<(), ScriptError> {
+    pub(super) fn leftover(&self, main: &str) -> Result<(), ScriptError> {
         let Some(word) = self.words.iter().flatten().next() else { return Ok(()) };
         let name = word.split('=').next().unwrap_or(word);
         if !name.starts_with('-') {

@@ -18,7 +18,7 @@ pub(super) struct MathRandom(Arc<Mutex<ChaCha8Rng>>);
 
 impl MathRandom {
     /// Installs `math.random`, seeded alike in every machine so that loading a script twice gives the same plan.
-    pub fn install(lua: &Lua) -> mlua::Result<Self> {
+    pub(super) fn install(lua: &Lua) -> mlua::Result<Self> {
         let shared = Self(Arc::new(Mutex::new(seed::keyed(&["softvt load"]))));
         let rng = shared.clone();
         let random = lua.create_function(move |lua, args: MultiValue| {
@@ -30,7 +30,7 @@ impl MathRandom {
     }
 
     /// Goes on with `rng`.
-    pub fn reseed(&self, rng: ChaCha8Rng) {
+    pub(super) fn reseed(&self, rng: ChaCha8Rng) {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = rng;
     }
 }
@@ -63,7 +63,7 @@ pub(super) struct Rng {
 }
 
 impl Rng {
-    pub fn new(seed: EpisodeSeed, stream: Stream) -> Self {
+    pub(super) fn new(seed: EpisodeSeed, stream: Stream) -> Self {
         Self { draws: Arc::new(Mutex::new(seed.stream(stream))), seed }
     }
 }

@@ -22,12 +22,12 @@ pub(super) struct Lag {
 
 impl Lag {
     /// Notes what the tool was sent to, robot base frame.
-    pub fn sent(&mut self, command_b: &Pose) {
+    pub(super) fn sent(&mut self, command_b: &Pose) {
         self.command_b = Some(*command_b);
     }
 
     /// What to tell the script once the tool has been away for a second from a pose that it cannot take.
-    pub fn complaint(&mut self, sim: &Simulation) -> Option<String> {
+    pub(super) fn complaint(&mut self, sim: &Simulation) -> Option<String> {
         let command_b = self.command_b?;
         let (linear, angular) = pose_error(&sim.rig.tool_b(&sim.world), &command_b);
         self.steps = if is_away(linear.norm(), angular.norm()) { self.steps + 1 } else { 0 };

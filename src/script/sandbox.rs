@@ -93,7 +93,7 @@ pub(super) struct Vm {
 
 impl Vm {
     /// A machine that reads from `library`; `main` is the file that messages fall back to.
-    pub fn new(main: &str, library: Library, limits: &Limits) -> Result<Self, ScriptError> {
+    pub(super) fn new(main: &str, library: Library, limits: &Limits) -> Result<Self, ScriptError> {
         let shared = Arc::new(Shared {
             main: main.into(),
             library: Mutex::new(library),
@@ -137,7 +137,7 @@ impl Vm {
     }
 
     /// Runs the main file and gives what it returns.
-    pub fn run_main(&self) -> Result<MultiValue, ScriptError> {
+    pub(super) fn run_main(&self) -> Result<MultiValue, ScriptError> {
         let main = &self.shared.main;
         let text = locked(&self.shared.library).text(main)?;
         let _deadline = self.deadline(self.shared.limits.load);
@@ -147,7 +147,7 @@ impl Vm {
     }
 
     /// Calls a function of the script within the time of one call.
-    pub fn call<R: FromLuaMulti>(
+    pub(super) fn call<R: FromLuaMulti>(
         &self,
         function: &Function,
         args: impl IntoLuaMulti,
@@ -157,7 +157,7 @@ impl Vm {
     }
 
     /// Calls a function of an experiment within the time of one point.
-    pub fn call_point<R: FromLuaMulti>(
+    pub(super) fn call_point<R: FromLuaMulti>(
         &self,
         function: &Function,
         args: impl IntoLuaMulti,
@@ -167,7 +167,7 @@ impl Vm {
     }
 
     /// Starts the time of one call.
-    pub fn call_deadline(&self) -> Deadline {
+    pub(super) fn call_deadline(&self) -> Deadline {
         self.deadline(self.shared.limits.call)
     }
 
@@ -177,7 +177,7 @@ impl Vm {
     }
 
     /// An error of the machine for people.
-    pub fn explain(&self, error: &mlua::Error) -> ScriptError {
+    pub(super) fn explain(&self, error: &mlua::Error) -> ScriptError {
         explain(&self.shared, error)
     }
 }

@@ -108,7 +108,7 @@ pub(super) struct LuaScene {
 }
 
 impl LuaScene {
-    pub fn new(scene: Scene) -> Self {
+    pub(super) fn new(scene: Scene) -> Self {
         Self { scene: Arc::new(Mutex::new(scene)), assets: Arc::default() }
     }
 

@@ -36,12 +36,12 @@ struct Node {
 
 impl LuaShape {
     /// The shape.
-    pub fn shape(&self) -> &Shape {
+    pub(super) fn shape(&self) -> &Shape {
         &self.0.shape
     }
 
     /// What it keeps in memory, bytes.
-    pub fn bytes(&self) -> usize {
+    pub(super) fn bytes(&self) -> usize {
         self.0.bytes
     }
 

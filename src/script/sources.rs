@@ -71,7 +71,7 @@ pub(super) struct Library {
 
 impl Library {
     /// The library of the script at `main`, which is read; gives the name of its file too.
-    pub fn open(main: &Path) -> Result<(Self, String), ScriptError> {
+    pub(super) fn open(main: &Path) -> Result<(Self, String), ScriptError> {
         let name = display(main);
         let folder = match main.parent() {
             Some(parent) if parent != Path::new("") => parent.to_path_buf(),
@@ -100,33 +100,33 @@ impl Library {
     }
 
     /// A library that serves what `bundle` holds and nothing else.
-    pub fn frozen(bundle: Bundle) -> Self {
+    pub(super) fn frozen(bundle: Bundle) -> Self {
         Self { roots: Vec::new(), main: PathBuf::new(), bundle, frozen: true }
     }
 
     /// What has been read so far.
-    pub fn bundle(&self) -> &Bundle {
+    pub(super) fn bundle(&self) -> &Bundle {
         &self.bundle
     }
 
     /// Names of the files read so far.
-    pub fn names(&self) -> Vec<String> {
+    pub(super) fn names(&self) -> Vec<String> {
         self.bundle.files.keys().cloned().collect()
     }
 
     /// Text of a file that was read before.
-    pub fn text(&self, file: &str) -> Result<String, ScriptError> {
+    pub(super) fn text(&self, file: &str) -> Result<String, ScriptError> {
         let source = self.bundle.files.get(file).ok_or_else(|| ScriptError::new(file, "was not read"))?;
         lua_text(file, &source.bytes)
     }
 
     /// Bytes of a file that was read before.
-    pub fn bytes(&self, file: &str) -> Option<Arc<[u8]>> {
+    pub(super) fn bytes(&self, file: &str) -> Option<Arc<[u8]>> {
         self.bundle.files.get(file).map(|source| source.bytes.clone())
     }
 
     /// The file of module `module` (`experts.pick_place`); messages are fragments without a position.
-    pub fn module(&mut self, module: &str) -> Result<String, String> {
+    pub(super) fn module(&mut self, module: &str) -> Result<String, String> {
         let plain = |part: &str| {
             !part.is_empty() && part.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_' || b == b'-')
         };
@@ -154,7 +154,7 @@ impl Library {
     }
 
     /// A data file (a mesh) inside of the roots, by relative path: beside the Lua file that asks for it first.
-    pub fn data(&mut self, path: &str, asker: Option<&str>) -> Result<String, String> {
+    pub(super) fn data(&mut self, path: &str, asker: Option<&str>) -> Result<String, String> {
         let inside =
             |part: &str| !part.is_empty() && part != "." && part != ".." && !part.contains(['\\', '\0', ':']);
         if !path.split('/').all(inside) {
@@ -180,7 +180,7 @@ impl Library {
     }
 
     /// A data file by its path from the project's root, or none if there is no such file; `path` must lead inside.
-    pub fn data_if_there(&mut self, path: &str) -> Result<Option<String>, String> {
+    pub(super) fn data_if_there(&mut self, path: &str) -> Result<Option<String>, String> {
         if self.bundle.absent.contains(path) {
             return Ok(None);
         }

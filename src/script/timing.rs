@@ -12,12 +12,12 @@ pub(super) struct Timing {
 
 impl Timing {
     /// Starts a phase.
-    pub fn phase(&mut self, name: &str) {
+    pub(super) fn phase(&mut self, name: &str) {
         self.phases.push((name.to_owned(), Duration::ZERO, 0.0));
     }
 
     /// Runs a step of `dt` (s) on the account of the present phase.
-    pub fn measure<R>(&mut self, dt: f64, work: impl FnOnce() -> R) -> R {
+    pub(super) fn measure<R>(&mut self, dt: f64, work: impl FnOnce() -> R) -> R {
         let start = ThreadTime::now();
         let result = work();
         if self.phases.is_empty() {

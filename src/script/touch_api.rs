@@ -35,7 +35,7 @@ pub(super) struct LuaMarkers {
 
 impl LuaMarkers {
     /// The markers of one finger.
-    pub fn new(markers: Markers) -> Self {
+    pub(super) fn new(markers: Markers) -> Self {
         Self { motion: Arc::new(Motion::of(&markers)), markers: Arc::new(markers) }
     }
 }

@@ -175,7 +175,7 @@ const UP: [f64; 3] = [0.0, 0.0, 1.0];
 
 impl LuaCamera {
     /// The scene's camera of a name.
-    pub fn named(lua: &Lua, scene: &Shared, name: &str) -> mlua::Result<Self> {
+    pub(super) fn named(lua: &Lua, scene: &Shared, name: &str) -> mlua::Result<Self> {
         let cameras = locked(scene);
         let names = cameras.cameras.iter().map(|camera| camera.name.as_str());
         match cameras.cameras.iter().position(|camera| camera.name == name) {
@@ -185,7 +185,7 @@ impl LuaCamera {
     }
 
     /// A new one from its checked table.
-    pub fn add(lua: &Lua, scene: &Shared, spec: &Table) -> mlua::Result<Self> {
+    pub(super) fn add(lua: &Lua, scene: &Shared, spec: &Table) -> mlua::Result<Self> {
         const LABEL: &str = "scene:add_camera";
         let name: String = spec.get("name")?;
         let at = Vec3::from(spec.get::<[f64; 3]>("position")?);
@@ -286,7 +286,7 @@ impl Hosted for LuaCamera {
 
 impl LuaLook {
     /// The looks of an object, by material id.
-    pub fn all(scene: &Shared, object: usize) -> Vec<Self> {
+    pub(super) fn all(scene: &Shared, object: usize) -> Vec<Self> {
         let count = locked(scene).objects[object].asset.visuals.len();
         (0..count).map(|index| Self(scene.clone(), object, index)).collect()
     }

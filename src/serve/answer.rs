@@ -22,17 +22,17 @@ const PROTOCOL: u32 = 1;
 const UNSTEADY: &str = "camera_inside";
 
 /// An entry of a map.
-pub fn pair(name: &str, value: Value) -> (Value, Value) {
+pub(super) fn pair(name: &str, value: Value) -> (Value, Value) {
     (Value::from(name), value)
 }
 
 /// An answer of a kind.
-pub fn plain(kind: &str, entries: Vec<(Value, Value)>) -> Value {
+pub(super) fn plain(kind: &str, entries: Vec<(Value, Value)>) -> Value {
     Value::Map(std::iter::once(pair("type", kind.into())).chain(entries).collect())
 }
 
 /// What is said instead of an answer.
-pub fn error(message: &str) -> Value {
+pub(super) fn error(message: &str) -> Value {
     plain("error", vec![pair("error", message.into())])
 }
 
@@ -67,7 +67,7 @@ pub fn hello(offer: &Offer, first: &Observation) -> Value {
 ///
 /// # Errors
 /// Something cannot be sensed; a message for people.
-pub fn stands(
+pub(super) fn stands(
     kind: &str,
     running: &mut Running,
     offer: &Offer,
@@ -90,13 +90,13 @@ pub fn stands(
 }
 
 /// A picture as an array, uint8 (height, width, 3).
-pub fn picture(picture: RgbImage) -> Value {
+pub(super) fn picture(picture: RgbImage) -> Value {
     let shape = vec![picture.height() as usize, picture.width() as usize, 3];
     Array::bytes(shape, picture.into_raw()).into_value(true)
 }
 
 /// The one key of an entry that a profile sends under several.
-pub fn key(input: &Input) -> &str {
+pub(super) fn key(input: &Input) -> &str {
     input.keys.iter().min_by_key(|key| key.len()).map_or("", String::as_str)
 }
 

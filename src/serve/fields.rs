@@ -10,7 +10,7 @@ const REPEATED: usize = 80;
 const EXACT: f64 = 9_007_199_254_740_992.0;
 
 /// The fields of one request.
-pub struct Fields<'a> {
+pub(super) struct Fields<'a> {
     /// What kind of request it is, for messages.
     pub kind: &'a str,
     map: &'a [(Value, Value)],
@@ -21,7 +21,7 @@ impl<'a> Fields<'a> {
     ///
     /// # Errors
     /// A field that is not known.
-    pub fn new(kind: &'a str, map: &'a [(Value, Value)], known: &[&str]) -> Result<Self, String> {
+    pub(super) fn new(kind: &'a str, map: &'a [(Value, Value)], known: &[&str]) -> Result<Self, String> {
         let fields = Self { kind, map };
         let unknown = map.iter().map(|(key, _)| text(key)).find(|name| match name {
             Some(name) => !known.contains(&name.as_str()),
@@ -37,12 +37,12 @@ impl<'a> Fields<'a> {
     }
 
     /// A message about this request.
-    pub fn wrong(&self, what: &str) -> String {
+    pub(super) fn wrong(&self, what: &str) -> String {
         format!("{}: {what}", self.kind)
     }
 
     /// A field, unless it is absent or nil.
-    pub fn get(&self, name: &str) -> Option<&'a Value> {
+    pub(super) fn get(&self, name: &str) -> Option<&'a Value> {
         let found = self.map.iter().find(|(key, _)| text(key).as_deref() == Some(name));
         found.map(|(_, value)| value).filter(|value| !value.is_nil())
     }
@@ -51,7 +51,7 @@ impl<'a> Fields<'a> {
     ///
     /// # Errors
     /// It is not.
-    pub fn need<T>(&self, name: &str, value: Option<T>) -> Result<T, String> {
+    pub(super) fn need<T>(&self, name: &str, value: Option<T>) -> Result<T, String> {
         value.ok_or_else(|| self.wrong(&format!("it has no field {name}")))
     }
 
@@ -59,7 +59,7 @@ impl<'a> Fields<'a> {
     ///
     /// # Errors
     /// It is something else.
-    pub fn text(&self, name: &str) -> Result<Option<String>, String> {
+    pub(super) fn text(&self, name: &str) -> Result<Option<String>, String> {
         let Some(value) = self.get(name) else { return Ok(None) };
         let found = text(value);
         found.map(Some).ok_or_else(|| self.wrong(&format!("{name} is {}; expected text", kind(value))))
@@ -69,7 +69,7 @@ impl<'a> Fields<'a> {
     ///
     /// # Errors
     /// It is something else.
-    pub fn whole(&self, name: &str, most: u64) -> Result<Option<u64>, String> {
+    pub(super) fn whole(&self, name: &str, most: u64) -> Result<Option<u64>, String> {
         let Some(value) = self.get(name) else { return Ok(None) };
         let found = value.as_u64().or_else(|| {
             let (shape, found) = numbers(value).ok()?;
@@ -85,7 +85,7 @@ impl<'a> Fields<'a> {
 }
 
 /// Text, whichever of the two types msgpack has for it.
-pub fn text(value: &Value) -> Option<String> {
+pub(super) fn text(value: &Value) -> Option<String> {
     match value {
         Value::String(text) => text.as_str().map(str::to_owned),
         Value::Binary(bytes) => String::from_utf8(bytes.clone()).ok(),
@@ -94,7 +94,7 @@ pub fn text(value: &Value) -> Option<String> {
 }
 
 /// The beginning of a client's own text.
-pub fn short(text: &str) -> String {
+pub(super) fn short(text: &str) -> String {
     let cut = text.char_indices().nth(REPEATED);
     cut.map_or_else(|| text.to_owned(), |(at, _)| format!("{}…", &text[..at]))
 }

@@ -17,11 +17,11 @@ use tungstenite::{
 use crate::policy::wire::unpack;
 
 /// The longest message that is taken: a state of 50,000 actions is 2.7 MiB.
-pub const LARGEST: usize = 4 << 20;
+pub(super) const LARGEST: usize = 4 << 20;
 /// Between two looks at the clock and at the wish to end.
-pub const SLICE: Duration = Duration::from_millis(50);
+pub(super) const SLICE: Duration = Duration::from_millis(50);
 /// How long a client may take to say what it wants when it comes.
-pub const GREETING: Duration = Duration::from_secs(10);
+pub(super) const GREETING: Duration = Duration::from_secs(10);
 /// How long it may take to take an answer: somebody may have stopped it for a while.
 const PATIENCE: Duration = Duration::from_secs(60);
 /// How long what a client still sends is listened to after the end, so that it hears what was said last.
@@ -31,7 +31,7 @@ const QUIET: Duration = Duration::from_secs(60);
 
 /// What came from a client.
 #[derive(Debug)]
-pub enum Heard {
+pub(super) enum Heard {
     /// A message.
     Message(Value),
     /// Something that is none; a message for people.
@@ -44,7 +44,7 @@ pub enum Heard {
 
 /// A connection to a client.
 #[derive(Debug)]
-pub struct Link<'a> {
+pub(super) struct Link<'a> {
     socket: WebSocket<TcpStream>,
     stop: &'a AtomicBool,
 }
@@ -54,7 +54,7 @@ impl<'a> Link<'a> {
     ///
     /// # Errors
     /// The client speaks no websocket, is too slow, or there is no room for it.
-    pub fn accept(
+    pub(super) fn accept(
         stream: TcpStream,
         stop: &'a AtomicBool,
         full: impl FnOnce() -> Option<String>,
@@ -85,7 +85,7 @@ impl<'a> Link<'a> {
     }
 
     /// The next message. An end of the run counts as the end of the connection.
-    pub fn hear(&mut self) -> Heard {
+    pub(super) fn hear(&mut self) -> Heard {
         let mut quiet_since = Instant::now();
         loop {
             match self.socket.read() {
@@ -124,7 +124,7 @@ impl<'a> Link<'a> {
     ///
     /// # Errors
     /// The client is gone or does not take it.
-    pub fn say(&mut self, value: &Value) -> Result<(), Error> {
+    pub(super) fn say(&mut self, value: &Value) -> Result<(), Error> {
         let mut bytes = Vec::new();
         rmpv::encode::write_value(&mut bytes, value).map_err(io::Error::from)?;
         let deadline = Instant::now() + PATIENCE;
@@ -140,7 +140,7 @@ impl<'a> Link<'a> {
     }
 
     /// Ends the connection in order, as far as the client lets it.
-    pub fn close(mut self) {
+    pub(super) fn close(mut self) {
         let code = if is_set(self.stop) { CloseCode::Away } else { CloseCode::Normal };
         let _ = self.socket.close(Some(CloseFrame { code, reason: "".into() }));
         // What has not been read yet would make the system throw away what was said last.
@@ -161,6 +161,6 @@ fn is_set(stop: &AtomicBool) -> bool {
 }
 
 /// Whether a wait ended without anything having happened.
-pub fn is_wait(error: &io::Error) -> bool {
+pub(super) fn is_wait(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted)
 }

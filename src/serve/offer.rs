@@ -34,7 +34,7 @@ pub struct Offered<'a> {
 ///
 /// # Errors
 /// Why it cannot be made; a message for people.
-pub type Open<'a> = Box<dyn Fn(&Wanted) -> Result<Episode, String> + Sync + 'a>;
+pub(super) type Open<'a> = Box<dyn Fn(&Wanted) -> Result<Episode, String> + Sync + 'a>;
 
 /// All that a server offers.
 pub struct Offer<'a> {

@@ -13,7 +13,7 @@ use crate::policy::{
 };
 
 /// Seven numbers in the code of the profile.
-pub type Row = [f64; ACTION_LEN];
+pub(super) type Row = [f64; ACTION_LEN];
 
 /// The most actions of one request: a longer one would keep its client waiting for minutes without a word.
 const LONGEST: usize = 1000;
@@ -22,7 +22,7 @@ const LONGEST_STATE: usize = 50_000;
 
 /// A request.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Request {
+pub(super) enum Request {
     /// Begin an episode.
     Reset(Wanted),
     /// Carry out actions, at least one.
@@ -50,7 +50,7 @@ impl Request {
     ///
     /// # Errors
     /// It is no request; a message for people.
-    pub fn read(message: &Value, offer: &Offer) -> Result<Self, String> {
+    pub(super) fn read(message: &Value, offer: &Offer) -> Result<Self, String> {
         let Some(map) = message.as_map() else {
             return Err(format!("the message is {}; expected a map with a type of {KINDS}", kind(message)));
         };

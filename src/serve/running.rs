@@ -9,7 +9,7 @@ use crate::{
 
 /// An episode that a client drives. A copy of it goes on as it would itself.
 #[derive(Clone)]
-pub struct Running {
+pub(super) struct Running {
     /// Where it stands.
     pub state: State,
     /// The episode.
@@ -22,7 +22,7 @@ impl Running {
     ///
     /// # Errors
     /// It cannot be made; a message for people.
-    pub fn start(offer: &Offer, state: State) -> Result<Self, String> {
+    pub(super) fn start(offer: &Offer, state: State) -> Result<Self, String> {
         let mut episode = (offer.open)(&state.wanted)?;
         episode.watch(offer.profile.streams());
         Ok(Self { state, episode, follower: Follower::default() })
@@ -32,7 +32,7 @@ impl Running {
     ///
     /// # Errors
     /// It cannot be sensed.
-    pub fn observe(&mut self, offer: &Offer) -> Result<Observation, EpisodeError> {
+    pub(super) fn observe(&mut self, offer: &Offer) -> Result<Observation, EpisodeError> {
         self.episode.observe(&offer.profile.streams())
     }
 
@@ -40,7 +40,7 @@ impl Running {
     ///
     /// # Errors
     /// The action is none; a message for people.
-    pub fn advance(&mut self, offer: &Offer, row: &Row) -> Result<(), String> {
+    pub(super) fn advance(&mut self, offer: &Offer, row: &Row) -> Result<(), String> {
         if self.episode.outcome().is_some() {
             return Ok(());
         }
@@ -54,7 +54,7 @@ impl Running {
     }
 
     /// Whether the goal was reached.
-    pub fn succeeded(&self) -> bool {
+    pub(super) fn succeeded(&self) -> bool {
         self.episode.outcome() == Some(&Outcome::Completed)
     }
 }

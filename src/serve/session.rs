@@ -20,7 +20,7 @@ use crate::robot::Side;
 const KEPT: usize = 4;
 
 /// One client's episode.
-pub struct Session<'a> {
+pub(super) struct Session<'a> {
     offer: &'a Offer<'a>,
     stop: &'a AtomicBool,
     running: Option<Running>,
@@ -30,12 +30,12 @@ pub struct Session<'a> {
 
 impl<'a> Session<'a> {
     /// No episode yet; `stop` ends what takes long.
-    pub fn new(offer: &'a Offer<'a>, stop: &'a AtomicBool) -> Self {
+    pub(super) fn new(offer: &'a Offer<'a>, stop: &'a AtomicBool) -> Self {
         Self { offer, stop, running: None, kept: VecDeque::new() }
     }
 
     /// Gives up the episode: nobody knows in which state it is.
-    pub fn forget(&mut self) {
+    pub(super) fn forget(&mut self) {
         self.running = None;
     }
 
@@ -43,7 +43,7 @@ impl<'a> Session<'a> {
     ///
     /// # Errors
     /// Why it cannot be carried out; a message for people.
-    pub fn answer(&mut self, request: Request) -> Result<Value, String> {
+    pub(super) fn answer(&mut self, request: Request) -> Result<Value, String> {
         match request {
             Request::Reset(wanted) => {
                 self.go_to(&State { wanted, actions: Vec::new() })?;

@@ -24,7 +24,7 @@ const MARKER_PX: f64 = 1e4;
 const FORCE_N: f64 = 1e6;
 
 /// The entries of an observation, by example.
-pub fn observation(offer: &Offer, first: &Observation) -> Value {
+pub(super) fn observation(offer: &Offer, first: &Observation) -> Value {
     let entries = offer.profile.inputs.iter().filter_map(|input| {
         let space = match content(first, &input.source)? {
             Content::Text(_) => text(offer),
@@ -39,7 +39,7 @@ pub fn observation(offer: &Offer, first: &Observation) -> Value {
 }
 
 /// An action of seven numbers.
-pub fn action(code: &ActionCode) -> Value {
+pub(super) fn action(code: &ActionCode) -> Value {
     let most = match code.pose {
         PoseCode::Absolute => [REACH_M, REACH_M, REACH_M, HALF_TURN, HALF_TURN, HALF_TURN],
         PoseCode::Delta { .. } | PoseCode::DeltaOsc { .. } => [1.0; ACTION_LEN - 1],

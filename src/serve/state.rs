@@ -10,7 +10,7 @@ use crate::policy::{profile::ACTION_LEN, wire::Array};
 
 /// Where an episode stands.
 #[derive(Clone, Debug, PartialEq)]
-pub struct State {
+pub(super) struct State {
     /// Which episode.
     pub wanted: Wanted,
     /// What was done in it, in the code of the profile.
@@ -19,7 +19,7 @@ pub struct State {
 
 impl State {
     /// Whether one state lies on the way to another: how many actions are then left to do.
-    pub fn left_to(&self, other: &Self) -> Option<usize> {
+    pub(super) fn left_to(&self, other: &Self) -> Option<usize> {
         let same = |(a, b): (&Row, &Row)| a.map(f64::to_bits) == b.map(f64::to_bits);
         let on_the_way = self.wanted == other.wanted
             && self.actions.len() <= other.actions.len()
@@ -28,7 +28,7 @@ impl State {
     }
 
     /// As msgpack.
-    pub fn to_value(&self, offer: &Offer) -> Value {
+    pub(super) fn to_value(&self, offer: &Offer) -> Value {
         let Wanted { suite, task, episode, seed, split } = &self.wanted;
         let data = self.actions.iter().flatten().flat_map(|number| number.to_le_bytes()).collect();
         let actions = Array { dtype: "<f8", shape: vec![self.actions.len(), ACTION_LEN], data };

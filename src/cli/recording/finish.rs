@@ -20,7 +20,7 @@ use crate::{
 ///
 /// # Errors
 /// Nothing was kept, or a file cannot be written.
-pub fn finish(output: &Output, sessions: &[Session], root: &Path) -> Result<(), Failure> {
+pub(super) fn finish(output: &Output, sessions: &[Session], root: &Path) -> Result<(), Failure> {
     let (mut entries, mut tasks) = (Vec::new(), Vec::new());
     let size = |path: &Path| std::fs::metadata(path).map_or(0, |meta| meta.len());
     for session in sessions {
@@ -75,7 +75,7 @@ fn nothing_kept(tasks: &[TaskCount], root: &Path) -> Failure {
 }
 
 /// How a task went; nothing of its files.
-pub fn count(session: &Session, task: &Task) -> TaskCount {
+pub(super) fn count(session: &Session, task: &Task) -> TaskCount {
     let kept = session.kept(task.id);
     let mut rejects = BTreeMap::new();
     let of_task = || session.records.iter().filter(|r| r.identity.task == task.id);

@@ -17,7 +17,7 @@ use crate::dataset::{
 ///
 /// # Errors
 /// It holds another, or something else, or this one and it is not to go on.
-pub fn check(root: &Path, resume: bool, recording: &Value) -> Result<bool, Failure> {
+pub(super) fn check(root: &Path, resume: bool, recording: &Value) -> Result<bool, Failure> {
     let dir = root.display();
     let path = root.join(RECORDING);
     if root.exists() && !root.is_dir() {
@@ -59,7 +59,7 @@ pub fn check(root: &Path, resume: bool, recording: &Value) -> Result<bool, Failu
 }
 
 /// Takes back what was written of a recording without any attempt, and the folders that were `missing` before it.
-pub fn take_back(root: &Path, missing: &[PathBuf]) {
+pub(super) fn take_back(root: &Path, missing: &[PathBuf]) {
     let attempts = root.join(layout::ATTEMPTS);
     // Folders with something in them stay, and then it is known what they are of.
     let _ = std::fs::remove_dir(&attempts);

@@ -16,11 +16,11 @@ use crate::{
     dataset::{DatasetError, files, layout::RECORDING},
 };
 
-pub use session::{Session, Wanted};
+pub(super) use session::{Session, Wanted};
 
 /// What is made, and where.
 #[derive(Clone, Debug)]
-pub struct Output {
+pub(super) struct Output {
     /// Script, tasks, seed, threads, settings and folder.
     pub run: Run,
     /// Whether pictures go into the HDF5 files.
@@ -33,7 +33,7 @@ pub struct Output {
 ///
 /// # Errors
 /// The folder holds something else, an attempt or a file fails, too few attempts are good.
-pub fn carry_out<'a>(
+pub(super) fn carry_out<'a>(
     output: &'a Output,
     recording: &Value,
     sessions: impl FnOnce() -> Result<Vec<Session<'a>>, Failure>,
@@ -59,7 +59,7 @@ pub fn carry_out<'a>(
 ///
 /// # Errors
 /// It has none, or two that would share a folder.
-pub fn suites_of<'a>(command: &str, run: &Run, plan: &'a Plan) -> Result<Vec<&'a Suite>, Failure> {
+pub(super) fn suites_of<'a>(command: &str, run: &Run, plan: &'a Plan) -> Result<Vec<&'a Suite>, Failure> {
     match plan {
         Plan::Suite(suite) => Ok(vec![suite]),
         Plan::Suites { suites } => {

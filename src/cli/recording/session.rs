@@ -42,7 +42,7 @@ use crate::{
 
 /// How many attempts there are, and how many become demonstrations.
 #[derive(Clone, Debug)]
-pub enum Wanted {
+pub(crate) enum Wanted {
     /// The first good ones of so many attempts at most.
     First {
         /// Demonstrations a task.
@@ -89,7 +89,7 @@ impl Wanted {
 }
 
 /// A suite that is being recorded.
-pub struct Session<'a> {
+pub(crate) struct Session<'a> {
     output: &'a Output,
     root: PathBuf,
     /// Its attempts.
@@ -111,7 +111,7 @@ impl<'a> Session<'a> {
     ///
     /// # Errors
     /// A setting or scene that is wrong.
-    pub fn new(
+    pub(crate) fn new(
         output: &'a Output,
         (loaded, suite): (&'a Loaded, &'a Suite),
         (tasks, wanted): (Vec<&'a Task>, Wanted),
@@ -149,7 +149,7 @@ impl<'a> Session<'a> {
     ///
     /// # Errors
     /// The folder holds other attempts, an attempt or a file fails, or too few are good; what is finished stays.
-    pub fn go(&mut self) -> Result<(), Failure> {
+    pub(crate) fn go(&mut self) -> Result<(), Failure> {
         let (mut folder, done) = RunFolder::resume(&self.batch.out).map_err(folder_failure)?;
         self.batch.check_done(&folder, &done)?;
         info::write(&folder, &self.info)?;

@@ -54,7 +54,7 @@ impl Header {
     ///
     /// # Errors
     /// It is none of the layouts, or of another robot, controller or rate.
-    pub fn read(file: &TaskFile) -> Result<Self, DatasetError> {
+    pub(super) fn read(file: &TaskFile) -> Result<Self, DatasetError> {
         let environment = match file.about("env_args") {
             Some(_) => file.environment()?,
             None => Value::Null,
@@ -66,7 +66,7 @@ impl Header {
     }
 
     /// Which task a demonstration is of.
-    pub fn task(&self, file: &TaskFile, demo: usize) -> ForeignTask {
+    pub(super) fn task(&self, file: &TaskFile, demo: usize) -> ForeignTask {
         let own =
             |name| file.text(demo, name).ok().or_else(|| file.about(name)).filter(|text| !text.is_empty());
         let problem = own("problem_info").and_then(|text| serde_json::from_str::<Value>(&text).ok());
@@ -137,7 +137,7 @@ impl Header {
     ///
     /// # Errors
     /// It is not the same along all axes.
-    pub fn longest_step(&self, file: &TaskFile) -> Result<[f64; 2], DatasetError> {
+    pub(super) fn longest_step(&self, file: &TaskFile) -> Result<[f64; 2], DatasetError> {
         let stated = &self.environment["env_kwargs"]["controller_configs"]["output_max"];
         let most: Vec<f64> = match stated {
             Value::Number(one) => vec![one.as_f64().unwrap_or(f64::NAN); 6],

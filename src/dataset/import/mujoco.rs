@@ -48,7 +48,7 @@ const BASE: &str = "robot0_base";
 
 impl Model {
     /// Reads the bodies of a model; none if it has none.
-    pub fn read(xml: &str) -> Option<Self> {
+    pub(super) fn read(xml: &str) -> Option<Self> {
         let mut model = Self::default();
         let mut open: Vec<(String, Option<usize>)> = Vec::new();
         for tag in tags(xml) {
@@ -93,14 +93,14 @@ impl Model {
     }
 
     /// Numbers of a state of this model.
-    pub fn width(&self) -> usize {
+    pub(super) fn width(&self) -> usize {
         let joints = self.bodies.iter().flat_map(|body| &body.joints);
         1 + joints.map(|joint| joint.size().iter().sum::<usize>()).sum::<usize>()
     }
 
     /// What stands around in a state: free bodies where the state has them, and those that are fixed to the world where the
     /// model has them. None if the state is not of this model.
-    pub fn standing(&self, state: &[f64]) -> Option<Vec<Standing>> {
+    pub(super) fn standing(&self, state: &[f64]) -> Option<Vec<Standing>> {
         if state.len() != self.width() {
             return None;
         }

@@ -54,7 +54,7 @@ impl Feature {
     }
 
     /// The column that holds it.
-    pub fn column(&self) -> Column {
+    pub(super) fn column(&self) -> Column {
         let kind = match self.dtype {
             "image" => Kind::Picture,
             "int64" => Kind::I64,

@@ -25,7 +25,7 @@ impl Place {
     ///
     /// # Errors
     /// Something is at `out`, or in the way beside it, or is just being written; or the system refuses.
-    pub fn claim(out: &Path) -> Result<Self, DatasetError> {
+    pub(super) fn claim(out: &Path) -> Result<Self, DatasetError> {
         free(out)?;
         // A link to an empty folder cannot be replaced by a folder, but what it leads to can.
         let out = fs::canonicalize(out).unwrap_or_else(|_| out.to_path_buf());
@@ -51,7 +51,7 @@ impl Place {
     }
 
     /// The folder while it is being written.
-    pub fn dir(&self) -> &Path {
+    pub(super) fn dir(&self) -> &Path {
         &self.aside
     }
 
@@ -59,7 +59,7 @@ impl Place {
     ///
     /// # Errors
     /// The system refuses; nothing is left then.
-    pub fn settle(self) -> Result<(), DatasetError> {
+    pub(super) fn settle(self) -> Result<(), DatasetError> {
         if let Err(error) = fs::rename(&self.aside, &self.out) {
             self.give_up();
             return Err(DatasetError::io("rename", &self.out)(error));
@@ -73,7 +73,7 @@ impl Place {
     }
 
     /// Takes everything back.
-    pub fn give_up(&self) {
+    pub(super) fn give_up(&self) {
         let _ = fs::remove_dir_all(&self.aside);
         files::take_back(&self.above);
     }

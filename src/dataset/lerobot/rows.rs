@@ -191,7 +191,7 @@ impl Rows {
     }
 
     /// Pictures and vectors as a whole: of pictures each channel, of vectors each number.
-    pub fn summaries(&self) -> Vec<FeatureSummary> {
+    pub(super) fn summaries(&self) -> Vec<FeatureSummary> {
         let pictures = KEYS.iter().zip(&self.tallies).map(|(name, channels)| {
             self.feature(name, &[3, 1, 1], channels.iter().cloned().map(Summary::counted).collect())
         });
@@ -208,13 +208,13 @@ impl Rows {
     }
 
     /// Each number of the markers as a whole, without quantiles.
-    pub fn every_marker(&self) -> FeatureSummary {
+    pub(super) fn every_marker(&self) -> FeatureSummary {
         let parts = self.moments().into_iter().map(Summary::bare).collect();
         self.feature("tactile_marker_motion", &MARKER_SHAPE, parts)
     }
 
     /// x and y of all markers together.
-    pub fn markers_together(&self) -> FeatureSummary {
+    pub(super) fn markers_together(&self) -> FeatureSummary {
         let each = self.moments();
         let parts = (0..2).map(|axis| {
             let mut tally = Tally::new(MARKER_STEP, (MARKER_RANGE / MARKER_STEP) as usize + 1);

@@ -41,12 +41,12 @@ impl Moments {
     }
 
     /// Of numbers.
-    pub fn of(numbers: impl Iterator<Item = f64> + Clone) -> Self {
+    pub(super) fn of(numbers: impl Iterator<Item = f64> + Clone) -> Self {
         Self::weighted(numbers.map(|x| (x, 1.0)))
     }
 
     /// Of these and the others (Chan, Golub and LeVeque 1979).
-    pub fn merge(&mut self, other: &Self) {
+    pub(super) fn merge(&mut self, other: &Self) {
         let count = self.count + other.count;
         if other.count == 0.0 {
             return;
@@ -65,7 +65,7 @@ impl Moments {
     }
 
     /// Of all numbers of several.
-    pub fn together<'a>(all: impl Iterator<Item = &'a Self>) -> Self {
+    pub(super) fn together<'a>(all: impl Iterator<Item = &'a Self>) -> Self {
         all.fold(Self::NONE, |mut sum, one| {
             sum.merge(one);
             sum
@@ -82,17 +82,17 @@ pub(super) struct Tally {
 
 impl Tally {
     /// Empty, with `bins` numbers `step` apart.
-    pub fn new(step: f64, bins: usize) -> Self {
+    pub(super) fn new(step: f64, bins: usize) -> Self {
         Self { step, counts: vec![0; bins] }
     }
 
     /// Counts the number with an index.
-    pub fn count(&mut self, bin: usize) {
+    pub(super) fn count(&mut self, bin: usize) {
         self.counts[bin] += 1;
     }
 
     /// Counts the number that is nearest.
-    pub fn count_nearest(&mut self, x: f64) {
+    pub(super) fn count_nearest(&mut self, x: f64) {
         // Casts saturate: what is below is counted as the first.
         let bin = (x / self.step).round() as usize;
         let last = self.counts.len() - 1;
@@ -135,27 +135,27 @@ pub(super) struct Summary {
 
 impl Summary {
     /// Of numbers that are kept.
-    pub fn of(numbers: Vec<f64>) -> Self {
+    pub(super) fn of(numbers: Vec<f64>) -> Self {
         Self { moments: Moments::of(numbers.iter().copied()), spread: Spread::All(numbers) }
     }
 
     /// Of numbers that were counted, all of which are among those of the tally.
-    pub fn counted(tally: Tally) -> Self {
+    pub(super) fn counted(tally: Tally) -> Self {
         Self { moments: Moments::weighted(tally.numbers()), spread: Spread::Tally(tally) }
     }
 
     /// Of numbers whose quantiles are taken from those nearest to them in a tally.
-    pub fn near(moments: Moments, tally: Tally) -> Self {
+    pub(super) fn near(moments: Moments, tally: Tally) -> Self {
         Self { moments, spread: Spread::Tally(tally) }
     }
 
     /// Without quantiles.
-    pub fn bare(moments: Moments) -> Self {
+    pub(super) fn bare(moments: Moments) -> Self {
         Self { moments, spread: Spread::None }
     }
 
     /// Of these and the others, which are kept in the same way.
-    pub fn merge(&mut self, other: &Self) {
+    pub(super) fn merge(&mut self, other: &Self) {
         self.moments.merge(&other.moments);
         match (&mut self.spread, &other.spread) {
             (Spread::All(numbers), Spread::All(more)) => numbers.extend(more),
@@ -214,13 +214,13 @@ pub(super) struct Figures {
 
 impl FeatureSummary {
     /// Takes more steps in.
-    pub fn merge(&mut self, other: &Self) {
+    pub(super) fn merge(&mut self, other: &Self) {
         self.steps += other.steps;
         self.parts.iter_mut().zip(&other.parts).for_each(|(part, more)| part.merge(more));
     }
 
     /// The figures, with or without quantiles.
-    pub fn figures(&self, quantiles: bool) -> Figures {
+    pub(super) fn figures(&self, quantiles: bool) -> Figures {
         let each = |pick: fn(&Moments) -> f64| self.parts.iter().map(|part| pick(&part.moments)).collect();
         let mut figures = vec![
             ("min", each(|m| m.min)),
@@ -253,7 +253,7 @@ pub(super) enum Nest {
 
 impl Nest {
     /// Numbers in a shape.
-    pub fn new(numbers: &[f64], shape: &[usize], leaf: fn(f64) -> Self) -> Self {
+    pub(super) fn new(numbers: &[f64], shape: &[usize], leaf: fn(f64) -> Self) -> Self {
         let Some((first, rest)) = shape.split_first() else {
             return leaf(numbers.first().copied().unwrap_or_default());
         };
@@ -264,7 +264,7 @@ impl Nest {
 
 impl Figures {
     /// As JSON has them: figures by name, and `count`.
-    pub fn nested(&self, leaf: fn(f64) -> Nest) -> Vec<(&'static str, Nest)> {
+    pub(super) fn nested(&self, leaf: fn(f64) -> Nest) -> Vec<(&'static str, Nest)> {
         let count = ("count", Nest::List(vec![Nest::Whole(self.steps)]));
         let figures = self.figures.iter();
         figures.map(|(name, numbers)| (*name, Nest::new(numbers, &self.shape, leaf))).chain([count]).collect()

@@ -64,7 +64,7 @@ pub(super) enum Values {
 
 impl Column {
     /// A column.
-    pub fn new(name: impl Into<String>, kind: Kind, shape: &[usize]) -> Self {
+    pub(super) fn new(name: impl Into<String>, kind: Kind, shape: &[usize]) -> Self {
         Self { name: name.into(), kind, shape: shape.to_vec() }
     }
 
@@ -128,7 +128,7 @@ impl Table {
     ///
     /// # Errors
     /// The system refuses.
-    pub fn create(
+    pub(super) fn create(
         path: PathBuf,
         columns: &Arc<[Column]>,
         notes: &[(&str, String)],
@@ -159,7 +159,7 @@ impl Table {
     }
 
     /// Bytes of the file so far.
-    pub fn bytes(&self) -> usize {
+    pub(super) fn bytes(&self) -> usize {
         self.writer.bytes_written()
     }
 
@@ -167,7 +167,7 @@ impl Table {
     ///
     /// # Errors
     /// The system refuses.
-    pub fn append(&mut self, rows: usize, values: Vec<Values>) -> Result<(), DatasetError> {
+    pub(super) fn append(&mut self, rows: usize, values: Vec<Values>) -> Result<(), DatasetError> {
         debug_assert_eq!(values.len(), self.columns.len());
         let added = group(&mut self.writer, &self.columns, rows, values);
         added.map_err(failed(&self.path))
@@ -177,7 +177,7 @@ impl Table {
     ///
     /// # Errors
     /// The system refuses.
-    pub fn finish(self) -> Result<(), DatasetError> {
+    pub(super) fn finish(self) -> Result<(), DatasetError> {
         let file = self.writer.into_inner().map_err(failed(&self.path))?;
         file.sync_all().map_err(DatasetError::io("write", &self.path))
     }

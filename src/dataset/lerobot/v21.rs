@@ -66,7 +66,7 @@ pub(super) struct Writer {
 
 impl Writer {
     /// Begins in a folder that is empty.
-    pub fn begin(dir: &Path, features: &[Feature]) -> Result<Self, DatasetError> {
+    pub(super) fn begin(dir: &Path, features: &[Feature]) -> Result<Self, DatasetError> {
         files::make_folder(&dir.join("meta"))?;
         Ok(Self {
             dir: dir.to_owned(),

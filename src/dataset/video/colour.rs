@@ -15,7 +15,7 @@ fn weigh(weights: [i32; 3], [r, g, b]: [i32; 3], shift: i32) -> i32 {
 }
 
 /// Fills `frame` from `rgb`; chroma is the mean of 2 × 2 pixels.
-pub fn to_yuv(rgb: &[u8], frame: &mut YuvFrame) {
+pub(super) fn to_yuv(rgb: &[u8], frame: &mut YuvFrame) {
     let width = frame.width;
     for (y, pixel) in frame.y.iter_mut().zip(rgb.as_chunks::<3>().0) {
         *y = (16 + weigh(Y, pixel.map(i32::from), BITS)) as u8;
@@ -37,7 +37,7 @@ pub fn to_yuv(rgb: &[u8], frame: &mut YuvFrame) {
 
 /// The picture of a frame, chroma repeated.
 #[cfg(test)]
-pub fn to_rgb(frame: &YuvFrame) -> Vec<u8> {
+pub(super) fn to_rgb(frame: &YuvFrame) -> Vec<u8> {
     let half = frame.width / 2;
     let pixel = |i: usize| {
         let at = i / frame.width / 2 * half + i % frame.width / 2;

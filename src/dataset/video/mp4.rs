@@ -10,7 +10,7 @@ struct Sample {
 }
 
 /// A video track in memory.
-pub struct Track {
+pub(super) struct Track {
     width: usize,
     height: usize,
     rate: u32,
@@ -21,17 +21,17 @@ pub struct Track {
 }
 
 impl Track {
-    pub fn new(width: usize, height: usize, rate: u32) -> Self {
+    pub(super) fn new(width: usize, height: usize, rate: u32) -> Self {
         Self { width, height, rate, sps: Vec::new(), pps: Vec::new(), samples: Vec::new() }
     }
 
     /// Pictures so far.
-    pub fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.samples.len()
     }
 
     /// Adds one access unit in Annex B form: parameter sets go to the index, slices get their lengths before them.
-    pub fn push(&mut self, unit: &[u8]) {
+    pub(super) fn push(&mut self, unit: &[u8]) {
         let mut sample = Sample { bytes: Vec::with_capacity(unit.len()), key: false };
         for nal in nal_units(unit) {
             match nal[0] & 31 {
@@ -48,7 +48,7 @@ impl Track {
     }
 
     /// The whole file.
-    pub fn file(&self) -> Vec<u8> {
+    pub(super) fn file(&self) -> Vec<u8> {
         let brands = b"isomiso2avc1mp41";
         let mut file = boxed(b"ftyp", &[b"isom".as_slice(), &512_u32.to_be_bytes(), brands].concat());
         // The index holds the place of the first picture, which comes after the index: its length does not depend on it.

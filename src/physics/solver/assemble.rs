@@ -8,7 +8,7 @@ const MAX_LOCAL: usize = 48;
 
 /// Local Hessian of a patch: the endpoints' own coordinates (3 a node, 6 a screw), dense.
 #[derive(Clone, Debug)]
-pub struct Local {
+pub(super) struct Local {
     size_a: usize,
     size: usize,
     /// Column-major lower triangle of side `MAX_LOCAL`.
@@ -30,7 +30,7 @@ fn size_of(end: &Endpoint) -> usize {
 }
 
 /// Velocities of an endpoint's own coordinates, gathered once a patch.
-pub fn gather(problem: &Problem, offsets: &[usize], end: &Endpoint, v: &[f64]) -> [Vec3; 8] {
+pub(super) fn gather(problem: &Problem, offsets: &[usize], end: &Endpoint, v: &[f64]) -> [Vec3; 8] {
     let mut u = [Vec3::zeros(); 8];
     match end {
         Endpoint::Known => {}
@@ -54,7 +54,13 @@ pub fn gather(problem: &Problem, offsets: &[usize], end: &Endpoint, v: &[f64]) -
 
 /// Velocity of a point on an endpoint.
 #[inline]
-pub fn velocity(problem: &Problem, end: &Endpoint, u: &[Vec3; 8], weights: &[f64; 8], p: &Vec3) -> Vec3 {
+pub(super) fn velocity(
+    problem: &Problem,
+    end: &Endpoint,
+    u: &[Vec3; 8],
+    weights: &[f64; 8],
+    p: &Vec3,
+) -> Vec3 {
     match end {
         Endpoint::Known => Vec3::zeros(),
         // Faces have four nodes, voxels eight: with the number known, the sums are unrolled.
@@ -71,7 +77,7 @@ fn mean<const N: usize>(u: &[Vec3; 8], weights: &[f64; 8]) -> Vec3 {
 
 /// Adds an impulse at a point to the forces on an endpoint's own coordinates (the transpose of [`velocity`]).
 #[inline]
-pub fn pull(
+pub(super) fn pull(
     problem: &Problem,
     end: &Endpoint,
     force: &mut [Vec3; 8],
@@ -90,7 +96,7 @@ pub fn pull(
 }
 
 /// Adds `sign` times the forces on an endpoint's own coordinates to the gradient (the transpose of [`gather`]).
-pub fn spread(
+pub(super) fn spread(
     problem: &Problem,
     offsets: &[usize],
     end: &Endpoint,
@@ -158,7 +164,7 @@ impl Piece {
 
 impl Local {
     /// Empties the local system for a patch between `a` and `b`.
-    pub fn start(&mut self, a: &Endpoint, b: &Endpoint) {
+    pub(super) fn start(&mut self, a: &Endpoint, b: &Endpoint) {
         self.size_a = size_of(a);
         self.size = self.size_a + size_of(b);
         for column in 0..self.size {
@@ -167,7 +173,14 @@ impl Local {
     }
 
     /// Adds one point's curvature.
-    pub fn add(&mut self, problem: &Problem, a: &Endpoint, b: &Endpoint, point: &Point, curvature: &Mat3) {
+    pub(super) fn add(
+        &mut self,
+        problem: &Problem,
+        a: &Endpoint,
+        b: &Endpoint,
+        point: &Point,
+        curvature: &Mat3,
+    ) {
         let mut left = [Piece::Scale(0.0); 8];
         let mut right = [Piece::Scale(0.0); 8];
         let na = pieces(problem, a, &point.weights_a, &point.p, &mut left);
@@ -193,14 +206,14 @@ impl Local {
     }
 
     /// Adds the local system to the island's Hessian (side `n`, lower triangle).
-    pub fn scatter(&self, map: &Map, hessian: &mut [f64], n: usize) {
+    pub(super) fn scatter(&self, map: &Map, hessian: &mut [f64], n: usize) {
         map.scatter_matrix(|r, c| self.hessian[r.min(c) * MAX_LOCAL + r.max(c)], hessian, n);
     }
 }
 
 /// How a patch's local coordinates read the island's velocities: each coordinate is a sparse row.
 #[derive(Clone, Debug, Default)]
-pub struct Map {
+pub(super) struct Map {
     /// Per local coordinate: (island index, coefficient).
     rows: Vec<Vec<(u32, f64)>>,
     used: usize,
@@ -208,7 +221,7 @@ pub struct Map {
 
 impl Map {
     /// Sets the map for a patch.
-    pub fn set(&mut self, problem: &Problem, offsets: &[usize], a: &Endpoint, b: &Endpoint) {
+    pub(super) fn set(&mut self, problem: &Problem, offsets: &[usize], a: &Endpoint, b: &Endpoint) {
         self.used = 0;
         [a, b].into_iter().for_each(|end| self.push(problem, offsets, end));
     }

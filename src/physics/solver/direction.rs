@@ -11,7 +11,7 @@ use super::{island::Island, law::Piece, newton::Solver, problem::Problem};
 const MAX_GUESSES: usize = 8;
 
 /// Number of velocities from the first one with a scalar row to the end of the island.
-pub fn tail(problem: &Problem, offsets: &[usize], island: &Island) -> usize {
+pub(super) fn tail(problem: &Problem, offsets: &[usize], island: &Island) -> usize {
     let rows = island.scalars.iter().map(|&row| &problem.scalars[row]);
     let first = rows.map(|row| offsets[row.block] + row.index).min().unwrap_or(island.size);
     island.size - first

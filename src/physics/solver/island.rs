@@ -4,7 +4,7 @@ use super::{newton::STEPS_PER_FACTOR, problem::Problem, secant::Secant};
 use crate::physics::sparse::dense;
 
 /// The blocks, patches and scalars of one connected island.
-pub struct Island {
+pub(super) struct Island {
     /// Blocks, ascending.
     pub blocks: Vec<usize>,
     /// Patches that touch them.
@@ -16,7 +16,7 @@ pub struct Island {
 }
 
 /// Splits a problem into islands of blocks that patches connect.
-pub fn islands(problem: &Problem) -> Vec<Island> {
+pub(super) fn islands(problem: &Problem) -> Vec<Island> {
     let mut root: Vec<usize> = (0..problem.blocks.len()).collect();
     for patch in &problem.patches {
         if let (Some(a), Some(b)) = (problem.block_of(&patch.a), problem.block_of(&patch.b)) {
@@ -71,7 +71,7 @@ struct Entry {
 
 /// Factored Hessians by island, the most recently used first.
 #[derive(Clone, Debug, Default)]
-pub struct Cache {
+pub(super) struct Cache {
     entries: Vec<Entry>,
     /// Factor of the last velocities' complement.
     tail: Vec<f64>,
@@ -87,7 +87,7 @@ impl Cache {
     ///
     /// A factor that has wasted as many steps as a new one costs is given up, so that altogether never more than twice
     /// the least is spent, however long each single pass would rather go on with it.
-    pub fn matches(&mut self, problem: &Problem, island: &Island) -> bool {
+    pub(super) fn matches(&mut self, problem: &Problem, island: &Island) -> bool {
         let found = self.entries.iter().position(|entry| same(entry, problem, island));
         if let Some(found) = found {
             self.entries[..=found].rotate_right(1);
@@ -107,14 +107,14 @@ impl Cache {
     }
 
     /// The buffer of the current factor, to be filled anew.
-    pub fn take(&mut self, island: &Island) -> Vec<f64> {
+    pub(super) fn take(&mut self, island: &Island) -> Vec<f64> {
         let mut factor = std::mem::take(&mut self.entries[0].factor);
         factor.resize(island.size * island.size, 0.0);
         factor
     }
 
     /// Puts the factored buffer back.
-    pub fn give(&mut self, factor: Vec<f64>, sound: bool) {
+    pub(super) fn give(&mut self, factor: Vec<f64>, sound: bool) {
         let entry = &mut self.entries[0];
         (entry.factor, entry.sound) = (factor, sound);
         (entry.first, entry.wasted) = (None, 0);
@@ -122,7 +122,7 @@ impl Cache {
     }
 
     /// Tells that a pass ended after `steps` with the current factor.
-    pub fn took(&mut self, steps: u32) {
+    pub(super) fn took(&mut self, steps: u32) {
         let entry = &mut self.entries[0];
         let first = *entry.first.get_or_insert(steps);
         entry.wasted += steps.saturating_sub(first.min(GOOD_STEPS));
@@ -130,7 +130,7 @@ impl Cache {
 
     /// Solves in place with the current factor, what was learnt since it was made, and `stiffness` added to the diagonal
     /// of the last velocities, for which the factor was left open.
-    pub fn solve(&mut self, island: &Island, stiffness: &[f64], b: &mut [f64]) {
+    pub(super) fn solve(&mut self, island: &Island, stiffness: &[f64], b: &mut [f64]) {
         let (n, t) = (island.size, stiffness.len());
         let (head, tail) = (n - t, &mut self.tail);
         let entry = &self.entries[0];
@@ -152,7 +152,7 @@ impl Cache {
 
     /// Corrects the current factor by a step from (`v0`, `g0`) to (`v`, `g`), of which the changes `others` (index,
     /// amount) are no matter of the factor's.
-    pub fn learn(
+    pub(super) fn learn(
         &mut self,
         before: (&[f64], &[f64]),
         after: (&[f64], &[f64]),

@@ -5,7 +5,7 @@ use crate::geometry::{Mat3, Vec3};
 
 /// What a contact point answers to a velocity.
 #[derive(Clone, Copy, Debug)]
-pub struct Answer {
+pub(super) struct Answer {
     /// Impulse on `a`, N s.
     pub impulse: Vec3,
     /// Cost, J.
@@ -20,7 +20,7 @@ pub struct Answer {
 
 /// The law of contact for one step length.
 #[derive(Clone, Copy, Debug)]
-pub struct Law {
+pub(super) struct Law {
     dt: f64,
     span: f64,
     per_span: f64,
@@ -28,7 +28,7 @@ pub struct Law {
 
 impl Law {
     /// The law for steps of `dt` and a dissipation time of `tau`, s.
-    pub fn new(dt: f64, tau: f64) -> Self {
+    pub(super) fn new(dt: f64, tau: f64) -> Self {
         Self { dt, span: dt + tau, per_span: 1.0 / (dt + tau) }
     }
 
@@ -37,7 +37,7 @@ impl Law {
     /// Normal: the spring at the end of the step with dissipation, `γ = dt k (−φ − (dt + τ) v_n)₊`. Tangent: with
     /// `z = s + (dt + τ) v_t` the spring `−dt k_t z`, cut off at the lagged bound `μ γ_n` (a Huber cost in `z`).
     #[inline]
-    pub fn contact(&self, point: &Point, v: &Vec3) -> Option<Answer> {
+    pub(super) fn contact(&self, point: &Point, v: &Vec3) -> Option<Answer> {
         let n = &point.normal;
         let vn = n.dot(v);
         let depth = -point.gap - self.span * vn;
@@ -77,7 +77,7 @@ impl Law {
     }
 
     /// Curvature of the cost at an answer of this point, kg.
-    pub fn curvature(&self, point: &Point, answer: &Answer) -> Mat3 {
+    pub(super) fn curvature(&self, point: &Point, answer: &Answer) -> Mat3 {
         let n = &point.normal;
         let onto_normal = n * n.transpose();
         let mut curvature = Mat3::zeros();

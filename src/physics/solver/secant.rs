@@ -18,20 +18,20 @@ struct Pair {
 
 /// The last pairs, oldest first.
 #[derive(Clone, Debug, Default)]
-pub struct Secant {
+pub(super) struct Secant {
     pairs: Vec<Pair>,
     used: usize,
 }
 
 impl Secant {
     /// Forgets all pairs: the factor is new.
-    pub fn clear(&mut self) {
+    pub(super) fn clear(&mut self) {
         self.used = 0;
     }
 
     /// Learns from a step from (`v0`, `g0`) to (`v`, `g`), of which the changes `others` (index, amount) of the gradient
     /// are not to be learnt.
-    pub fn learn(
+    pub(super) fn learn(
         &mut self,
         (v0, g0): (&[f64], &[f64]),
         (v, g): (&[f64], &[f64]),
@@ -60,7 +60,7 @@ impl Secant {
 
     /// Solves with the corrected factor in place; `solve` does so with the factor itself. The factor holds `stiffness`
     /// on the diagonal of the last velocities, which the pairs do not know of.
-    pub fn solve(&self, stiffness: &[f64], b: &mut [f64], solve: impl FnOnce(&mut [f64])) {
+    pub(super) fn solve(&self, stiffness: &[f64], b: &mut [f64], solve: impl FnOnce(&mut [f64])) {
         let head = b.len() - stiffness.len();
         let (mut weights, mut curvatures) = ([0.0; PAIRS], [0.0; PAIRS]);
         let pairs = self.pairs[..self.used].iter();

@@ -29,7 +29,7 @@ pub(super) struct Meeting {
 
 impl Meeting {
     /// The point between surfaces of this friction and these layers in series; without weights and drift.
-    pub fn point(&self, friction: &Friction, layer: &Layer) -> Point {
+    pub(super) fn point(&self, friction: &Friction, layer: &Layer) -> Point {
         Point {
             weights_a: [0.0; 8],
             weights_b: [0.0; 8],

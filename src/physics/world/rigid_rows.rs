@@ -197,7 +197,7 @@ impl World {
 
 impl RigidContacts {
     /// The pairs of colliders (first, second), how far they had slid (m) and the solved points, of those that press.
-    pub fn points<'a>(
+    pub(super) fn points<'a>(
         &'a self,
         solved: &'a [Point],
     ) -> impl Iterator<Item = ((usize, usize), f64, &'a Point)> {

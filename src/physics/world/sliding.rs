@@ -17,7 +17,7 @@ pub(super) struct Sliding<K>(Vec<(K, f64, f64)>);
 
 impl<K: PartialEq + Copy> Sliding<K> {
     /// Sums up the points of each pair.
-    pub fn of<'a>(points: impl Iterator<Item = (K, &'a Point)>) -> Self {
+    pub(super) fn of<'a>(points: impl Iterator<Item = (K, &'a Point)>) -> Self {
         let mut sums: Vec<(K, f64, f64)> = Vec::new();
         for (key, point) in points {
             // Points of a pair come in runs, so the last entry is nearly always it.
@@ -32,14 +32,14 @@ impl<K: PartialEq + Copy> Sliding<K> {
     }
 
     /// Whether a pair slides as a whole.
-    pub fn slides(&self, key: K) -> bool {
+    pub(super) fn slides(&self, key: K) -> bool {
         self.0.iter().any(|(known, all, slipping)| *known == key && *slipping >= SLIDING_SHARE * all)
     }
 }
 
 impl RowOf {
     /// The pair of surfaces that a row is between.
-    pub fn pair(&self) -> (usize, u32) {
+    pub(super) fn pair(&self) -> (usize, u32) {
         (self.soft, self.partner)
     }
 }

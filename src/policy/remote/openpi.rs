@@ -4,7 +4,7 @@ use super::socket::Socket;
 use crate::policy::{ActionChunk, Observation, PolicyError, decode, encode, profile::Profile, wire::kind};
 
 /// Takes the server's metadata.
-pub fn greet(socket: &mut Socket) -> Result<(), PolicyError> {
+pub(super) fn greet(socket: &mut Socket) -> Result<(), PolicyError> {
     let metadata = socket.receive()?;
     if metadata.as_map().is_none() {
         return Err(
@@ -15,7 +15,7 @@ pub fn greet(socket: &mut Socket) -> Result<(), PolicyError> {
 }
 
 /// Asks for a chunk.
-pub fn infer(
+pub(super) fn infer(
     socket: &mut Socket,
     observation: &Observation,
     profile: &Profile,

@@ -30,7 +30,7 @@ const TOLD: usize = 2000;
 
 /// An open connection.
 #[derive(Debug)]
-pub struct Socket {
+pub(super) struct Socket {
     url: String,
     socket: WebSocket<TcpStream>,
     patience: Duration,
@@ -42,7 +42,7 @@ impl Socket {
     ///
     /// # Errors
     /// A wrong address; nobody answers in time.
-    pub fn connect(server: &Server) -> Result<Self, PolicyError> {
+    pub(super) fn connect(server: &Server) -> Result<Self, PolicyError> {
         let request = request(server)?;
         let deadline = Instant::now() + server.patience;
         let mut pause = PAUSES[0];
@@ -71,7 +71,7 @@ impl Socket {
     ///
     /// # Errors
     /// The connection is gone, or the server does not take it in time.
-    pub fn send(&mut self, value: &Value) -> Result<(), PolicyError> {
+    pub(super) fn send(&mut self, value: &Value) -> Result<(), PolicyError> {
         let mut bytes = Vec::new();
         rmpv::encode::write_value(&mut bytes, value)
             .map_err(|e| PolicyError::Transport(format!("cannot pack an observation: {e}")))?;
@@ -90,7 +90,7 @@ impl Socket {
     ///
     /// # Errors
     /// The connection is gone, the server answers with text or bytes that are no msgpack, too much, or not in time.
-    pub fn receive(&mut self) -> Result<Value, PolicyError> {
+    pub(super) fn receive(&mut self) -> Result<Value, PolicyError> {
         let deadline = Instant::now() + self.patience;
         loop {
             match self.socket.read() {
@@ -111,7 +111,7 @@ impl Socket {
     }
 
     /// Takes what came while nobody listened, so that pings are answered; whether the connection still stands.
-    pub fn is_open(&mut self) -> bool {
+    pub(super) fn is_open(&mut self) -> bool {
         let waits =
             |socket: &WebSocket<TcpStream>, waits: bool| socket.get_ref().set_nonblocking(!waits).is_ok();
         if !waits(&self.socket, false) {
@@ -129,7 +129,7 @@ impl Socket {
     }
 
     /// Tells what is wrong with what the server sent.
-    pub fn wrong(&self, what: &str) -> PolicyError {
+    pub(super) fn wrong(&self, what: &str) -> PolicyError {
         PolicyError::Transport(format!("the policy server {} {what}", self.url))
     }
 

@@ -16,7 +16,7 @@ use crate::policy::{
 const VERSION: u64 = 1;
 
 /// Says hello.
-pub fn greet(connection: &mut Connection) -> Result<(), PolicyError> {
+pub(super) fn greet(connection: &mut Connection) -> Result<(), PolicyError> {
     let version = concat!("softvt ", env!("CARGO_PKG_VERSION"));
     let hello = map([
         ("harness_version", Value::from(version)),
@@ -37,7 +37,7 @@ pub fn greet(connection: &mut Connection) -> Result<(), PolicyError> {
 }
 
 /// Starts an episode.
-pub fn start(connection: &mut Connection, brief: &TaskBrief) -> Result<(), PolicyError> {
+pub(super) fn start(connection: &mut Connection, brief: &TaskBrief) -> Result<(), PolicyError> {
     let task = map([
         ("name", Value::from(brief.prompt.as_str())),
         ("suite", Value::from(brief.suite.as_str())),
@@ -48,12 +48,12 @@ pub fn start(connection: &mut Connection, brief: &TaskBrief) -> Result<(), Polic
 }
 
 /// Ends an episode.
-pub fn end(connection: &mut Connection) -> Result<(), PolicyError> {
+pub(super) fn end(connection: &mut Connection) -> Result<(), PolicyError> {
     send(connection, "episode_end", map([]))
 }
 
 /// Asks for a chunk.
-pub fn infer(
+pub(super) fn infer(
     connection: &mut Connection,
     observation: &Observation,
     profile: &Profile,

@@ -20,7 +20,7 @@ const LISTED: usize = 60;
 const STILLS: usize = 12 << 20;
 
 /// The episodes of all runs that are not safe, for a page in the folder `out`.
-pub fn failures(runs: &[Judged], out: &Path) -> Markup {
+pub(super) fn failures(runs: &[Judged], out: &Path) -> Markup {
     // Each run gets its share, so that those of the first do not take it all.
     let share = STILLS / runs.len().max(1);
     html! { @for judged in runs { (of_run(judged, out, share)) } }

@@ -45,7 +45,7 @@ fn by_suite<'a>(runs: impl Iterator<Item = &'a Judged>) -> BTreeMap<&'a str, Vec
 }
 
 /// Goal and Safety Success, a pair of bars a run, with their intervals.
-pub fn goal_and_safety(runs: &[Judged]) -> Markup {
+pub(super) fn goal_and_safety(runs: &[Judged]) -> Markup {
     html! {
         p.legend {
             span.key { (swatch("goal")) "Goal Success" }
@@ -125,7 +125,7 @@ fn dots_of<'a>(name: &'a str, judged: &Judged, asset: Option<&str>) -> Dots<'a> 
 }
 
 /// Peak deformation over its threshold: a strip a run.
-pub fn distributions(runs: &[Judged]) -> Markup {
+pub(super) fn distributions(runs: &[Judged]) -> Markup {
     let suites: Vec<(&str, Vec<Dots>)> = by_suite(runs.iter().filter(|judged| judged.soft()))
         .into_iter()
         .map(|(suite, runs)| {
@@ -136,7 +136,7 @@ pub fn distributions(runs: &[Judged]) -> Markup {
 }
 
 /// The same of one run: a strip an object.
-pub fn by_asset(judged: &Judged) -> Markup {
+pub(super) fn by_asset(judged: &Judged) -> Markup {
     let assets = judged.summary.by_asset.keys();
     strips(&[("", assets.map(|asset| dots_of(asset, judged, Some(asset))).collect())])
 }
@@ -192,7 +192,7 @@ fn spread_mark(of: &Distribution, most: f64) -> Markup {
 }
 
 /// Safety over the strictness of the thresholds: a plot a suite, a line a run.
-pub fn kappa_curves(runs: &[Judged]) -> Markup {
+pub(super) fn kappa_curves(runs: &[Judged]) -> Markup {
     html! {
         @for (suite, runs) in by_suite(runs.iter().filter(|judged| judged.soft())) {
             p.suite { (suite) }

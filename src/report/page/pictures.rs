@@ -20,11 +20,11 @@ const LARGEST: u32 = 4096;
 
 /// Bytes of pictures that a page may still carry.
 #[derive(Debug)]
-pub struct Room(pub usize);
+pub(super) struct Room(pub usize);
 
 /// A PNG file as an address that holds it, made smaller if it is wide, with its width and height; `None` if there is none,
 /// if it is no picture, or if the page carries enough already.
-pub fn embedded(path: &Path, room: &mut Room) -> Option<(String, [u32; 2])> {
+pub(super) fn embedded(path: &Path, room: &mut Room) -> Option<(String, [u32; 2])> {
     let bytes = fs::read(path).ok()?;
     let mut reader = ImageReader::with_format(Cursor::new(bytes), ImageFormat::Png);
     let mut limits = Limits::default();
@@ -51,7 +51,7 @@ pub fn embedded(path: &Path, room: &mut Room) -> Option<(String, [u32; 2])> {
 }
 
 /// The address of a file as a page in the folder `from` names it; both exist.
-pub fn link(from: &Path, file: &Path) -> Option<String> {
+pub(super) fn link(from: &Path, file: &Path) -> Option<String> {
     let (from, file) = (from.canonicalize().ok()?, file.canonicalize().ok()?);
     let (from, file): (Vec<Component>, Vec<Component>) =
         (from.components().collect(), file.components().collect());

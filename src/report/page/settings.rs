@@ -6,7 +6,7 @@ use serde_json::Value;
 use crate::report::judged::Judged;
 
 /// The fields of `run.json` that one asks for first, and all of it below.
-pub fn settings(judged: &Judged) -> Markup {
+pub(super) fn settings(judged: &Judged) -> Markup {
     let info = &judged.run.info;
     let fields = [
         ("Folder", judged.run.dir.display().to_string()),

@@ -18,33 +18,38 @@ use super::{Limits, Loaded, ScriptError, load_with};
 pub(super) struct Project(tempfile::TempDir);
 
 impl Project {
-    pub fn new(files: &[(&str, &str)]) -> Self {
+    pub(super) fn new(files: &[(&str, &str)]) -> Self {
         let project = Self(tempfile::tempdir().unwrap());
         files.iter().for_each(|(path, text)| project.write(path, text.as_bytes()));
         project
     }
 
-    pub fn write(&self, path: &str, bytes: &[u8]) {
+    pub(super) fn write(&self, path: &str, bytes: &[u8]) {
         let path = self.path(path);
         fs::create_dir_all(path.parent().unwrap()).unwrap();
         fs::write(path, bytes).unwrap();
     }
 
-    pub fn path(&self, path: &str) -> PathBuf {
+    pub(super) fn path(&self, path: &str) -> PathBuf {
         self.0.path().join(path)
     }
 
-    pub fn load(&self, path: &str, argv: &[&str]) -> Result<Loaded, ScriptError> {
+    pub(super) fn load(&self, path: &str, argv: &[&str]) -> Result<Loaded, ScriptError> {
         self.load_with(path, argv, &limits())
     }
 
-    pub fn load_with(&self, path: &str, argv: &[&str], limits: &Limits) -> Result<Loaded, ScriptError> {
+    pub(super) fn load_with(
+        &self,
+        path: &str,
+        argv: &[&str],
+        limits: &Limits,
+    ) -> Result<Loaded, ScriptError> {
         let argv: Vec<String> = argv.iter().map(|word| word.to_string()).collect();
         load_with(&self.path(path), &argv, limits)
     }
 
     /// The message, with the folder's name taken off.
-    pub fn error(&self, path: &str, argv: &[&str]) -> String {
+    pub(super) fn error(&self, path: &str, argv: &[&str]) -> String {
         let folder = format!("{}/", self.0.path().display());
         self.load(path, argv).expect_err("the script must fail").to_string().replace(&folder, "")
     }

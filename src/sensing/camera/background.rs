@@ -52,7 +52,7 @@ fn eight(of: &[Vec<f32>; 3], first: usize) -> V8 {
 }
 
 impl Spots {
-    pub fn new() -> Self {
+    pub(super) fn new() -> Self {
         Self {
             display: channels(),
             direct: channels(),
@@ -68,7 +68,7 @@ impl Spots {
     }
 
     /// To be called when all is drawn; keeps the samples.
-    pub fn finish(&mut self, pass: &Pass, samples: &Samples<ROWS>) {
+    pub(super) fn finish(&mut self, pass: &Pass, samples: &Samples<ROWS>) {
         self.samples = samples.clone();
         self.most = Vec::new();
         for i in (0..PIXELS).filter(|&i| (0..3).any(|c| self.n[c][i] != 0.0)) {
@@ -85,7 +85,7 @@ impl Spots {
     }
 
     /// Whether what moves takes light from any of it, and the blobs that do.
-    pub fn hidden_by(&self, pass: &Pass) -> (bool, Vec<Blob>) {
+    pub(super) fn hidden_by(&self, pass: &Pass) -> (bool, Vec<Blob>) {
         if self.least == f32::MAX {
             return (false, Vec::new());
         }
@@ -94,7 +94,7 @@ impl Spots {
     }
 
     /// Display values under what moves, but for eights of pixels of which `skipped` says that they are covered by it.
-    pub fn relight(
+    pub(super) fn relight(
         &self,
         pass: &Pass,
         (shaded, blobs): &(bool, Vec<Blob>),

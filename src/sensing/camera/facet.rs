@@ -126,7 +126,7 @@ impl Facet {
     }
 
     /// Part of a curved surface that faces mostly along the unit vector `n`, seen along that, with texels of edge `texel`, m.
-    pub fn curved(n: &V3, corners: &[V3], texel: f32, curved: Curved) -> Self {
+    pub(super) fn curved(n: &V3, corners: &[V3], texel: f32, curved: Curved) -> Self {
         Self::over(n, corners, |_| texel, Ground::Curved(curved))
     }
 
@@ -147,7 +147,7 @@ impl Facet {
     }
 
     /// Place of a point of the object frame, texels of the finest copy.
-    pub fn place(&self, p: &V3) -> [f32; 2] {
+    pub(super) fn place(&self, p: &V3) -> [f32; 2] {
         let d = p - self.origin;
         [d.dot(&self.u) / self.texel, d.dot(&self.v) / self.texel]
     }
@@ -173,7 +173,7 @@ impl Facet {
     }
 
     /// Albedo and roughness at places (texels), averaged over about `footprint`, m.
-    pub fn sample(&self, [u, v]: [F8; 2], footprint: F8) -> (V8, F8) {
+    pub(super) fn sample(&self, [u, v]: [F8; 2], footprint: F8) -> (V8, F8) {
         let mips = self.mips.get_or_init(|| self.paint());
         let last = F8::splat((mips.len() - 1) as f32);
         let texels = footprint * F8::splat(1.0 / self.texel);

@@ -24,45 +24,45 @@ pub(super) struct V8 {
 
 impl V8 {
     #[inline(always)]
-    pub fn splat(v: &V3) -> Self {
+    pub(super) fn splat(v: &V3) -> Self {
         Self { x: F8::splat(v.x), y: F8::splat(v.y), z: F8::splat(v.z) }
     }
 
     #[inline(always)]
-    pub fn from_arrays(of: &[[f32; LANES]; 3]) -> Self {
+    pub(super) fn from_arrays(of: &[[f32; LANES]; 3]) -> Self {
         Self { x: F8::new(of[0]), y: F8::new(of[1]), z: F8::new(of[2]) }
     }
 
     #[inline(always)]
-    pub fn to_arrays(self) -> [[f32; LANES]; 3] {
+    pub(super) fn to_arrays(self) -> [[f32; LANES]; 3] {
         [self.x.to_array(), self.y.to_array(), self.z.to_array()]
     }
 
     #[inline(always)]
-    pub fn dot(self, o: Self) -> F8 {
+    pub(super) fn dot(self, o: Self) -> F8 {
         self.x * o.x + self.y * o.y + self.z * o.z
     }
 
     #[inline(always)]
-    pub fn times(self, o: Self) -> Self {
+    pub(super) fn times(self, o: Self) -> Self {
         Self { x: self.x * o.x, y: self.y * o.y, z: self.z * o.z }
     }
 
     /// Of unit length; zero stays zero.
     #[inline(always)]
-    pub fn unit(self) -> Self {
+    pub(super) fn unit(self) -> Self {
         let squared = self.dot(self).fast_max(F8::splat(1e-30));
         self * (F8::ONE / squared.sqrt())
     }
 
     #[inline(always)]
-    pub fn map(self, each: impl Fn(F8) -> F8) -> Self {
+    pub(super) fn map(self, each: impl Fn(F8) -> F8) -> Self {
         Self { x: each(self.x), y: each(self.y), z: each(self.z) }
     }
 
     /// `self` where the mask is set, else `other`.
     #[inline(always)]
-    pub fn or(self, mask: F8, other: Self) -> Self {
+    pub(super) fn or(self, mask: F8, other: Self) -> Self {
         Self {
             x: mask.select(self.x, other.x),
             y: mask.select(self.y, other.y),

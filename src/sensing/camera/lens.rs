@@ -92,7 +92,7 @@ fn check(camera: &Camera) -> Result<(), CameraError> {
 
 impl Lens {
     /// `camera` where `view` has it.
-    pub fn new(camera: &Camera, view: &FrameView) -> Result<Self, CameraError> {
+    pub(super) fn new(camera: &Camera, view: &FrameView) -> Result<Self, CameraError> {
         check(camera)?;
         let pose: Pose = match camera.mount {
             CameraMount::World => camera.pose,
@@ -126,12 +126,12 @@ impl Lens {
         })
     }
 
-    pub fn see(&self, p_w: &V3) -> Seen {
+    pub(super) fn see(&self, p_w: &V3) -> Seen {
         self.project(self.to_view.turn(&(p_w - self.eye)))
     }
 
     /// The image of a point of the camera frame.
-    pub fn project(&self, view: V3) -> Seen {
+    pub(super) fn project(&self, view: V3) -> Seen {
         let w = -1.0 / view.z;
         let scale = self.focal * w;
         let middle = |edge: usize| 0.5 * edge as f32;
@@ -140,7 +140,7 @@ impl Lens {
 
     /// The ray through the top left of the image, world, as long as a unit along the axis; and what it changes by a pixel
     /// to the right, and a pixel down.
-    pub fn rays(&self) -> [V3; 3] {
+    pub(super) fn rays(&self) -> [V3; 3] {
         let slope = |edge: usize| 0.5 * edge as f32 / self.focal;
         let pixel = 1.0 / self.focal;
         [
@@ -152,12 +152,12 @@ impl Lens {
     }
 
     /// Depth along the axis of a point of the world, m.
-    pub fn depth(&self, p_w: &V3) -> f32 {
+    pub(super) fn depth(&self, p_w: &V3) -> f32 {
         -self.to_view.turn(&(p_w - self.eye)).z
     }
 
     /// Whether a ball can be in the image.
-    pub fn may_see(&self, centre: &V3, radius: f32) -> bool {
+    pub(super) fn may_see(&self, centre: &V3, radius: f32) -> bool {
         let c = self.to_view.turn(&(centre - self.eye));
         let inside = |along: f32, edge: usize| {
             let half = 0.5 * edge as f32 / self.focal;

@@ -25,7 +25,7 @@ pub(super) struct Pass<'a> {
 
 impl Pass<'_> {
     /// Adds the triangles of the things that move, or of those that do not.
-    pub fn show(&self, moving: bool, screen: &mut Screen) {
+    pub(super) fn show(&self, moving: bool, screen: &mut Screen) {
         for (i, (thing, drawn)) in self.stage.things.iter().zip(self.drawn).enumerate() {
             let moves = !matches!(thing.mount, Mount::Fixed(_));
             if let Some(drawn) = drawn.as_ref().filter(|_| moves == moving) {
@@ -36,12 +36,12 @@ impl Pass<'_> {
     }
 
     /// Object number of a triangle; 0 for none.
-    pub fn object(&self, id: u32) -> u16 {
+    pub(super) fn object(&self, id: u32) -> u16 {
         if id == NONE { 0 } else { self.stage.things[thing_of(id)].object }
     }
 
     /// What tells surfaces apart that are not to be blended before they are lit.
-    pub fn surface(&self, id: u32) -> (usize, u32) {
+    pub(super) fn surface(&self, id: u32) -> (usize, u32) {
         if id == NONE {
             return (usize::MAX, 0);
         }
@@ -52,7 +52,7 @@ impl Pass<'_> {
 
     /// Light from points under what is fixed.
     #[inline(always)]
-    pub fn under_fixed(&self, points: &Points) -> Split {
+    pub(super) fn under_fixed(&self, points: &Points) -> Split {
         let to_eye = (V8::splat(&self.rays.eye) - points.p).unit();
         let light = &self.stage.light;
         let mut split = light.split(points, to_eye);
@@ -64,13 +64,13 @@ impl Pass<'_> {
 
     /// Shares of the key light and of the sky that what moves leaves at points.
     #[inline(always)]
-    pub fn under_moving(&self, points: &Points) -> (F8, F8) {
+    pub(super) fn under_moving(&self, points: &Points) -> (F8, F8) {
         let key = self.stage.light.unshadowed(points.p, &points.n, self.moving_shadow);
         (key, open_sky(self.moving_blobs, points.p, points.n, points.thing))
     }
 
     /// Radiance where nothing is, at eight pixels.
-    pub fn nothing(&self, x: F8, y: F8) -> V8 {
+    pub(super) fn nothing(&self, x: F8, y: F8) -> V8 {
         self.stage.light.sky(self.rays.up(x, y))
     }
 }

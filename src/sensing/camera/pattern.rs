@@ -16,13 +16,13 @@ pub(super) struct Look {
 
 impl Look {
     /// What textures hold: albedo and roughness.
-    pub fn painted(&self) -> [f32; 4] {
+    pub(super) fn painted(&self) -> [f32; 4] {
         [self.albedo.x, self.albedo.y, self.albedo.z, self.roughness]
     }
 
     /// Albedo, roughness, metalness, openness.
     #[inline(always)]
-    pub fn numbers(&self) -> [f32; 6] {
+    pub(super) fn numbers(&self) -> [f32; 6] {
         let a = &self.albedo;
         [a.x, a.y, a.z, self.roughness, self.metalness, self.open]
     }

@@ -21,18 +21,18 @@ pub(super) struct Rigid {
 }
 
 impl Rigid {
-    pub fn of(pose: &Pose) -> Self {
+    pub(super) fn of(pose: &Pose) -> Self {
         Self {
             rotation: pose.rotation.to_rotation_matrix().matrix().cast(),
             translation: pose.translation.vector.cast(),
         }
     }
 
-    pub fn turn(&self, v: &V3) -> V3 {
+    pub(super) fn turn(&self, v: &V3) -> V3 {
         self.rotation * v
     }
 
-    pub fn point(&self, p: &V3) -> V3 {
+    pub(super) fn point(&self, p: &V3) -> V3 {
         self.rotation * p + self.translation
     }
 }
@@ -43,7 +43,7 @@ fn finite(pose: &Pose) -> bool {
 
 impl Posed {
     /// A level of a rigid thing at `pose`.
-    pub fn rigid(level: &Level, pose: &Pose, name: &str) -> Result<Self, CameraError> {
+    pub(super) fn rigid(level: &Level, pose: &Pose, name: &str) -> Result<Self, CameraError> {
         let mut posed = Self::default();
         posed.place(level, pose, name)?;
         Ok(posed)
@@ -63,7 +63,12 @@ impl Posed {
     }
 
     /// A level of any moving thing as `view` has it.
-    pub fn update(&mut self, thing: &Thing, level: &Level, view: &FrameView) -> Result<(), CameraError> {
+    pub(super) fn update(
+        &mut self,
+        thing: &Thing,
+        level: &Level,
+        view: &FrameView,
+    ) -> Result<(), CameraError> {
         let Mount::Soft(body) = thing.mount else {
             return self.place(level, &frame_of(thing, view)?, &thing.name);
         };

@@ -44,7 +44,7 @@ fn place<const PER_UNIT: usize>(row: usize) -> [f32; 2] {
 
 impl<const PER_UNIT: usize> Samples<PER_UNIT> {
     /// Empty samples at `w`; `units` high.
-    pub fn new(columns: usize, units: usize, w: f32, with_ids: bool) -> Self {
+    pub(super) fn new(columns: usize, units: usize, w: f32, with_ids: bool) -> Self {
         let rows = units * PER_UNIT;
         let all = rows * (columns + LANES);
         let id = vec![NONE; if with_ids { all } else { 0 }];
@@ -52,12 +52,12 @@ impl<const PER_UNIT: usize> Samples<PER_UNIT> {
     }
 
     /// Length of a row in memory.
-    pub fn stride(&self) -> usize {
+    pub(super) fn stride(&self) -> usize {
         self.columns + LANES
     }
 
     /// Empties what was drawn to.
-    pub fn clear(&mut self, w: f32) {
+    pub(super) fn clear(&mut self, w: f32) {
         let [from, to] = self.touched.map(|row| row * self.stride());
         if from < to {
             self.w[from..to].fill(w);
@@ -71,12 +71,12 @@ impl<const PER_UNIT: usize> Samples<PER_UNIT> {
     /// Draws a triangle (x, y in units from the top left, w) where nothing is nearer. Its corners run clockwise as seen
     /// in an image with y down; others face away. `origin` is the place of the first unit.
     #[inline(always)]
-    pub fn draw<const IDS: bool>(&mut self, at: &[[f32; 3]; 3], origin: [f32; 2], id: u32) {
+    pub(super) fn draw<const IDS: bool>(&mut self, at: &[[f32; 3]; 3], origin: [f32; 2], id: u32) {
         self.draw_rows::<IDS, 0, 1>(at, origin, id);
     }
 
     /// The same for every `STEP`th row, from `FIRST` on.
-    pub fn draw_rows<const IDS: bool, const FIRST: usize, const STEP: usize>(
+    pub(super) fn draw_rows<const IDS: bool, const FIRST: usize, const STEP: usize>(
         &mut self,
         at: &[[f32; 3]; 3],
         origin: [f32; 2],

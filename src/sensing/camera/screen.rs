@@ -45,13 +45,13 @@ pub(super) struct Screen {
 
 impl Screen {
     /// Forgets all triangles.
-    pub fn clear(&mut self, lens: &Lens) {
+    pub(super) fn clear(&mut self, lens: &Lens) {
         self.shown.clear();
         self.tiles = [lens.width.div_ceil(TILE), lens.height.div_ceil(TILE)];
     }
 
     /// Adds the triangles that face the camera; their numbers are `first_id` and on.
-    pub fn add(&mut self, lens: &Lens, positions: &[V3], triangles: &[[u32; 3]], first_id: u32) {
+    pub(super) fn add(&mut self, lens: &Lens, positions: &[V3], triangles: &[[u32; 3]], first_id: u32) {
         let mut seen = std::mem::take(&mut self.seen);
         seen.clear();
         seen.extend(positions.iter().map(|p| lens.see(p)));
@@ -107,7 +107,7 @@ impl Screen {
     }
 
     /// Sorts the triangles into tiles, each in the order in which they were added.
-    pub fn sort(&mut self) {
+    pub(super) fn sort(&mut self) {
         let [columns, rows] = self.tiles;
         let range = |[from, to]: [u16; 2]| usize::from(from)..usize::from(to) + 1;
         self.starts.clear();
@@ -135,12 +135,12 @@ impl Screen {
     }
 
     /// Whether any triangle can touch a tile.
-    pub fn touches(&self, tile: usize) -> bool {
+    pub(super) fn touches(&self, tile: usize) -> bool {
         self.starts[tile] < self.starts[tile + 1]
     }
 
     /// Tiles across and down.
-    pub fn tiles(&self) -> [usize; 2] {
+    pub(super) fn tiles(&self) -> [usize; 2] {
         self.tiles
     }
 
@@ -155,7 +155,7 @@ impl Screen {
 
     /// What is left of a tile's triangles, in their order, without those behind one that covers all of it; and whether it
     /// is that one alone.
-    pub fn visible(&self, tile: usize, origin: [f32; 2], left: &mut Triangles) -> bool {
+    pub(super) fn visible(&self, tile: usize, origin: [f32; 2], left: &mut Triangles) -> bool {
         let size = TILE as f32;
         let around = |at: &[[f32; 3]; 3]| {
             [0, 1].into_iter().all(|axis| {

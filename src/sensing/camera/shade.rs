@@ -34,7 +34,7 @@ pub(super) struct Split {
 impl Split {
     /// With shares of both reaching the points.
     #[inline(always)]
-    pub fn dimmed(&self, direct: F8, ambient: F8) -> V8 {
+    pub(super) fn dimmed(&self, direct: F8, ambient: F8) -> V8 {
         self.direct * direct + self.ambient * ambient
     }
 }
@@ -54,7 +54,7 @@ pub(super) struct Light {
 }
 
 impl Light {
-    pub fn new(lighting: &Lighting) -> Self {
+    pub(super) fn new(lighting: &Lighting) -> Self {
         let scaled = |colour: [f64; 3], by: f64| V3::from(colour.map(|c| (c * by) as f32));
         let sky = &lighting.sky;
         Self {
@@ -78,7 +78,7 @@ impl Light {
 
     /// The sky in directions (unit z components `up`).
     #[inline(always)]
-    pub fn sky(&self, up: F8) -> V8 {
+    pub(super) fn sky(&self, up: F8) -> V8 {
         self.towards(up, up.abs().fast_min(F8::ONE).sqrt())
     }
 
@@ -94,7 +94,7 @@ impl Light {
     /// Heitz, Understanding the Masking-Shadowing Function, JCGT 2014) and Schlick's Fresnel term; the sky's reflection
     /// by Karis's fit (Physically Based Shading on Mobile, 2014).
     #[inline(always)]
-    pub fn split(&self, s: &Points, to_eye: V8) -> Split {
+    pub(super) fn split(&self, s: &Points, to_eye: V8) -> Split {
         let one = F8::ONE;
         let n_v = s.n.dot(to_eye).fast_max(F8::splat(0.02));
         let diffuse = s.albedo * (one - s.metalness);
@@ -132,13 +132,13 @@ impl Light {
 
     /// What of the key light casters leave at points.
     #[inline(always)]
-    pub fn unshadowed(&self, p: V8, n: &V8, map: &ShadowMap) -> F8 {
+    pub(super) fn unshadowed(&self, p: V8, n: &V8, map: &ShadowMap) -> F8 {
         map.light(&map.places(p), n, self.lit(n))
     }
 
     /// The same by two maps: a fine one where it reaches, and a wide one, if there is any, elsewhere.
     #[inline(always)]
-    pub fn unshadowed_afar(&self, p: V8, n: &V8, fine: &ShadowMap, wide: Option<&ShadowMap>) -> F8 {
+    pub(super) fn unshadowed_afar(&self, p: V8, n: &V8, fine: &ShadowMap, wide: Option<&ShadowMap>) -> F8 {
         let (at, lit) = (fine.places(p), self.lit(n));
         let near = fine.light(&at, n, lit);
         let beyond = lit & !fine.inside(&at);
@@ -181,14 +181,14 @@ pub(super) struct Blob {
 
 impl Blob {
     /// That of a box, world.
-    pub fn of_bounds(thing: usize, [low, high]: &[V3; 2]) -> Self {
+    pub(super) fn of_bounds(thing: usize, [low, high]: &[V3; 2]) -> Self {
         let radii = ((high - low) * 0.5).add_scalar(1e-4);
         let reach = 2.6 * radii.max();
         Self { thing, centre: (low + high) * 0.5, radii, reach2: reach * reach }
     }
 
     /// Whether it hides sky from anything in a box.
-    pub fn reaches(&self, [low, high]: &[V3; 2]) -> bool {
+    pub(super) fn reaches(&self, [low, high]: &[V3; 2]) -> bool {
         let nearest = self.centre.sup(low).inf(high);
         (nearest - self.centre).norm_squared() < self.reach2
     }

@@ -80,12 +80,12 @@ pub(super) struct Places {
 
 impl ShadowMap {
     /// An empty map for a light, of the ball in which shadows are fine.
-    pub fn new(lighting: &Lighting) -> Self {
+    pub(super) fn new(lighting: &Lighting) -> Self {
         Self::around(lighting, lighting.shadow_radius_m as f32)
     }
 
     /// An empty map of all around the middle of that ball up to `radius`, m.
-    pub fn around(lighting: &Lighting, radius: f32) -> Self {
+    pub(super) fn around(lighting: &Lighting, radius: f32) -> Self {
         let up: V3 = lighting.key.direction_w.normalize().cast();
         let side = if up.z.abs() < 0.99 { V3::z() } else { V3::x() };
         let u = side.cross(&up).normalize();
@@ -106,7 +106,7 @@ impl ShadowMap {
     }
 
     /// Takes all casters away.
-    pub fn clear(&mut self) {
+    pub(super) fn clear(&mut self) {
         self.heights.clear(EMPTY);
     }
 
@@ -118,7 +118,7 @@ impl ShadowMap {
 
     /// Places of points, world.
     #[inline(always)]
-    pub fn places(&self, p_w: V8) -> Places {
+    pub(super) fn places(&self, p_w: V8) -> Places {
         let d = p_w - V8::splat(&self.centre);
         let [scale, middle] = [self.texels_per_metre, 0.5 * EDGE as f32].map(F8::splat);
         let u = d.dot(V8::splat(&self.axes[0])) * scale + middle;
@@ -129,7 +129,7 @@ impl ShadowMap {
     }
 
     /// Adds casters.
-    pub fn draw(&mut self, positions: &[V3], triangles: &[[u32; 3]]) {
+    pub(super) fn draw(&mut self, positions: &[V3], triangles: &[[u32; 3]]) {
         let mut places = std::mem::take(&mut self.places);
         places.clear();
         places.extend(positions.iter().map(|p| self.place(p)));
@@ -144,7 +144,7 @@ impl ShadowMap {
     }
 
     /// To be called when all casters are drawn.
-    pub fn finish(&mut self) {
+    pub(super) fn finish(&mut self) {
         self.own.fill([EMPTY; 2]);
         self.ranges.fill([EMPTY; 2]);
         let [from, to] = self.heights.touched;
@@ -184,7 +184,7 @@ impl ShadowMap {
     }
 
     /// Whether a shadow can fall on anything at least as high as `least` above level ground between two corners, texels.
-    pub fn may_shade(&self, from: [f32; 2], to: [f32; 2], least: f32) -> bool {
+    pub(super) fn may_shade(&self, from: [f32; 2], to: [f32; 2], least: f32) -> bool {
         let tile = |x: f32| (x.max(0.0) as usize / TILE).min(TILES - 1);
         let columns = tile(from[0])..tile(to[0]) + 1;
         (tile(from[1])..tile(to[1]) + 1)
@@ -193,14 +193,14 @@ impl ShadowMap {
 
     /// Which points the map knows something about.
     #[inline(always)]
-    pub fn inside(&self, at: &Places) -> F8 {
+    pub(super) fn inside(&self, at: &Places) -> F8 {
         let (low, high) = (F8::splat(MARGIN as f32), F8::splat((MARGIN + INNER) as f32));
         at.u.simd_ge(low) & at.v.simd_ge(low) & at.u.simd_lt(high) & at.v.simd_lt(high)
     }
 
     /// Shares of the light that reach eight points of normals `n`, of those in `wanted`; 1 for others.
     #[inline(always)]
-    pub fn light(&self, at: &Places, n: &V8, wanted: F8) -> F8 {
+    pub(super) fn light(&self, at: &Places, n: &V8, wanted: F8) -> F8 {
         let inside = (self.inside(at) & wanted).to_bitmask();
         let [first, last] = self.heights.touched;
         if inside == 0 || first >= last {

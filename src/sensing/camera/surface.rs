@@ -45,7 +45,7 @@ pub(super) struct Rays {
 }
 
 impl Rays {
-    pub fn new(lens: &Lens) -> Self {
+    pub(super) fn new(lens: &Lens) -> Self {
         Self { eye: lens.eye, rays: lens.rays(), pixel: 1.0 / lens.focal }
     }
 
@@ -57,7 +57,7 @@ impl Rays {
     }
 
     /// z components of unit vectors along the rays through eight pixels from (x, y) on.
-    pub fn up(&self, x: F8, y: F8) -> F8 {
+    pub(super) fn up(&self, x: F8, y: F8) -> F8 {
         let [base, right, down] = self.rays.each_ref().map(V8::splat);
         (base + right * x + down * y).unit().z
     }
@@ -81,7 +81,7 @@ pub(super) struct Patch<'a> {
 }
 
 impl<'a> Patch<'a> {
-    pub fn new(drawn: &Drawn<'a>, rays: &Rays, id: u32) -> Self {
+    pub(super) fn new(drawn: &Drawn<'a>, rays: &Rays, id: u32) -> Self {
         let number = triangle_of(id);
         let corners = drawn.level.triangles[number].map(|v| v as usize);
         let p = corners.map(|v| drawn.posed.positions[v] - rays.eye);
@@ -105,7 +105,7 @@ impl<'a> Patch<'a> {
     }
 
     /// Eight pixels from (x, y) (their middles) to the right, all of which this triangle covers.
-    pub fn row(&self, rays: &Rays, x: f32, y: f32) -> Points {
+    pub(super) fn row(&self, rays: &Rays, x: f32, y: f32) -> Points {
         let [first, right] = [rays.through(x, y), rays.rays[1].cast()];
         let lean =
             self.lean.map(|n| F8::splat(n.dot(&first) as f32) + F8::splat(n.dot(&right) as f32) * STEPS);
@@ -136,7 +136,7 @@ impl<'a> Patch<'a> {
     }
 
     /// Adds the point that the ray through (x, y) meets, or the nearest of the triangle.
-    pub fn put(&self, batch: &mut Batch<'a>, rays: &Rays, x: f32, y: f32) {
+    pub(super) fn put(&self, batch: &mut Batch<'a>, rays: &Rays, x: f32, y: f32) {
         let ray = rays.through(x, y);
         let lean = self.lean.map(|n| n.dot(&ray));
         let sum = lean[0] + lean[1] + lean[2];
@@ -190,7 +190,7 @@ pub(super) struct Batch<'a> {
 
 impl Batch<'_> {
     /// The points; those beyond `count` are old ones.
-    pub fn points(&self, rays: &Rays) -> Points {
+    pub(super) fn points(&self, rays: &Rays) -> Points {
         let from_eye = V8::from_arrays(&self.p);
         let n = V8::from_arrays(&self.n).unit();
         let look = |i: usize| F8::new(self.looks[i]);

@@ -37,7 +37,7 @@ impl Goal {
     }
 
     /// Pixels and shares.
-    pub fn each(&self) -> impl Iterator<Item = (usize, usize, f32)> {
+    pub(super) fn each(&self) -> impl Iterator<Item = (usize, usize, f32)> {
         (0..self.count).map(|lane| (lane, self.pixel[lane] as usize % PIXELS, self.share[lane]))
     }
 }
@@ -71,7 +71,7 @@ impl Display {
 impl Display {
     /// Eight pixels from `first` on.
     #[inline(always)]
-    pub fn set(&mut self, first: usize, display: V8) {
+    pub(super) fn set(&mut self, first: usize, display: V8) {
         for (all, own) in self.0.iter_mut().zip(display.to_arrays()) {
             if let Some(all) = all.get_mut(first..).and_then(|all| all.first_chunk_mut::<LANES>()) {
                 *all = own;
@@ -109,7 +109,7 @@ pub(super) struct Window {
 }
 
 impl Window {
-    pub fn of(tile: usize, screen: &Screen, pass: &Pass) -> Self {
+    pub(super) fn of(tile: usize, screen: &Screen, pass: &Pass) -> Self {
         let columns = screen.tiles()[0];
         let (x, y) = (tile % columns * TILE, tile / columns * TILE);
         let (width, height) = ((pass.lens.width - x).min(TILE), (pass.lens.height - y).min(TILE));
@@ -117,17 +117,17 @@ impl Window {
     }
 
     /// Draws the triangles of the tile.
-    pub fn draw(&self, triangles: &Triangles, samples: &mut Samples<ROWS>) {
+    pub(super) fn draw(&self, triangles: &Triangles, samples: &mut Samples<ROWS>) {
         triangles.iter().for_each(|(id, at)| samples.draw::<true>(at, self.origin(), *id));
     }
 
     /// The triangles of the tile that nothing hides wholly; true if one alone covers it.
-    pub fn visible(&self, screen: &Screen, triangles: &mut Triangles) -> bool {
+    pub(super) fn visible(&self, screen: &Screen, triangles: &mut Triangles) -> bool {
         screen.visible(self.tile, self.origin(), triangles)
     }
 
     /// Lights a tile that shows one triangle only.
-    pub fn draw_sole<'a>(
+    pub(super) fn draw_sole<'a>(
         &self,
         &(id, ref at): &(u32, [[f32; 3]; 3]),
         pass: &Pass<'a>,
@@ -150,7 +150,7 @@ impl Window {
     }
 
     /// Writes display values into the picture.
-    pub fn write(&self, display: &Display, picture: &mut Picture) {
+    pub(super) fn write(&self, display: &Display, picture: &mut Picture) {
         for y in 0..self.height {
             let at = 3 * ((self.y + y) * picture.width + self.x);
             let row = &mut picture.rgb[at..at + 3 * self.width];
@@ -194,12 +194,12 @@ pub(super) struct Resolver<'a, 'p> {
 }
 
 impl<'a, 'p> Resolver<'a, 'p> {
-    pub fn new(pass: &'p Pass<'a>, window: Window, samples: &'p Samples<ROWS>) -> Self {
+    pub(super) fn new(pass: &'p Pass<'a>, window: Window, samples: &'p Samples<ROWS>) -> Self {
         Self { pass, window, samples, patch: None, batch: Batch::default() }
     }
 
     /// Every pixel, or only those that show something that moves, also into the picture's depths and objects.
-    pub fn run(&mut self, only_moving: bool, sink: &mut impl Sink, picture: &mut Picture) {
+    pub(super) fn run(&mut self, only_moving: bool, sink: &mut impl Sink, picture: &mut Picture) {
         for y in 0..self.window.height {
             for x in (0..self.window.width).step_by(LANES) {
                 let rows = self.ids(x, y);
@@ -235,7 +235,7 @@ impl<'a, 'p> Resolver<'a, 'p> {
     }
 
     /// Whether all that eight pixels of the tile from one on show moves.
-    pub fn moves(&self, first: usize) -> bool {
+    pub(super) fn moves(&self, first: usize) -> bool {
         let rows = self.ids(first % TILE, first / TILE);
         let all = rows.iter().fold(u32x8::MAX, |all, row| all & u32x8::new(*row));
         (all & u32x8::splat(MOVING)).to_bitmask() == 0xFF

@@ -44,7 +44,7 @@ pub(super) struct Tone {
 }
 
 impl Tone {
-    pub fn new(exposure: f64) -> Self {
+    pub(super) fn new(exposure: f64) -> Self {
         let mut curve = Box::new([0.0; ENTRIES]);
         for (i, value) in curve.iter_mut().enumerate() {
             let root = i as f64 / (ENTRIES - 1) as f64;
@@ -57,7 +57,7 @@ impl Tone {
 
     /// Display values, 0..=255, not yet rounded.
     #[inline(always)]
-    pub fn display(&self, radiance: V8) -> V8 {
+    pub(super) fn display(&self, radiance: V8) -> V8 {
         let scale = F8::splat((ENTRIES - 1) as f32);
         neutral(radiance * F8::splat(self.exposure)).map(|c| {
             let at = whole(c.fast_max(F8::ZERO).fast_min(F8::ONE).sqrt() * scale + F8::splat(0.5));

@@ -22,7 +22,7 @@ pub(super) struct Pillow {
 
 impl Pillow {
     /// Triangles, placed by `pose`.
-    pub fn mesh(&self, pose: &Pose) -> Mesh {
+    pub(super) fn mesh(&self, pose: &Pose) -> Mesh {
         let count = RINGS[usize::from(self.edge >= WIDE)];
         let edge = |k: usize| {
             let angle = FRAC_PI_2 * k as f64 / count as f64;

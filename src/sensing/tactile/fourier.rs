@@ -43,7 +43,7 @@ fn fast_length(n: usize) -> usize {
 
 impl Plane {
     /// A plane in which images of the field are at least `margin` cells apart.
-    pub fn new(columns: usize, rows: usize, margin: usize) -> Self {
+    pub(super) fn new(columns: usize, rows: usize, margin: usize) -> Self {
         let (wide, high) = (fast_length(columns + margin), fast_length(rows + margin));
         let (mut real, mut complex) = (RealFftPlanner::new(), FftPlanner::new());
         Self {
@@ -59,7 +59,7 @@ impl Plane {
         }
     }
 
-    pub fn buffers(&self) -> Buffers {
+    pub(super) fn buffers(&self) -> Buffers {
         let lengths = [
             self.along.get_scratch_len(),
             self.along_back.get_scratch_len(),
@@ -73,13 +73,13 @@ impl Plane {
         }
     }
 
-    pub fn spectrum(&self) -> Vec<Complex32> {
+    pub(super) fn spectrum(&self) -> Vec<Complex32> {
         vec![Complex32::default(); self.half * self.high]
     }
 
     /// Angular frequencies of entry (`run`, `at`) along x and y, 1/m, for cells of edge `cell`; the highest, whose
     /// sign is not defined, as 0 in the second pair, which odd kernels use.
-    pub fn frequency(&self, run: usize, at: usize, cell: f64) -> ([f64; 2], [f64; 2]) {
+    pub(super) fn frequency(&self, run: usize, at: usize, cell: f64) -> ([f64; 2], [f64; 2]) {
         let step = |n: usize| std::f64::consts::TAU / (n as f64 * cell);
         let signed = if at > self.high / 2 { at as f64 - self.high as f64 } else { at as f64 };
         let k = [run as f64 * step(self.wide), signed * step(self.high)];
@@ -89,7 +89,7 @@ impl Plane {
     }
 
     /// The spectrum of `field`; rows of zeros cost nothing.
-    pub fn forward(&self, field: &[f32], spectrum: &mut [Complex32], buffers: &mut Buffers) {
+    pub(super) fn forward(&self, field: &[f32], spectrum: &mut [Complex32], buffers: &mut Buffers) {
         let Buffers { line, half_line, scratch } = buffers;
         spectrum.fill(Complex32::default());
         for (j, row) in field.chunks_exact(self.columns).enumerate() {
@@ -108,7 +108,7 @@ impl Plane {
     }
 
     /// The field of a spectrum, times `wide · high`; the spectrum is spent.
-    pub fn inverse(&self, spectrum: &mut [Complex32], field: &mut [f32], buffers: &mut Buffers) {
+    pub(super) fn inverse(&self, spectrum: &mut [Complex32], field: &mut [f32], buffers: &mut Buffers) {
         let Buffers { line, half_line, scratch } = buffers;
         self.across_back.process_with_scratch(spectrum, scratch);
         for (j, row) in field.chunks_exact_mut(self.columns).enumerate() {

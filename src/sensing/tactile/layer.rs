@@ -41,7 +41,7 @@ const DEEP: f64 = 20.0;
 
 impl Layer {
     /// The response to wave number `k`, 1/m.
-    pub fn response(&self, k: f64) -> Response {
+    pub(super) fn response(&self, k: f64) -> Response {
         let (nu, mu, h) = (self.poisson, self.shear_modulus, self.thickness);
         if k * h < 1e-6 {
             let normal = h * (1.0 - 2.0 * nu) / (2.0 * mu * (1.0 - nu));

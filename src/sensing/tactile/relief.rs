@@ -28,7 +28,7 @@ pub(super) struct Relief {
 
 impl Relief {
     /// Draws the skins from below, nearest last.
-    pub fn of(gel: &Gel, surfaces: &[Surface]) -> Self {
+    pub(super) fn of(gel: &Gel, surfaces: &[Surface]) -> Self {
         let (columns, rows) = (FINE * gel.columns, FINE * gel.rows);
         let cell = gel.cell / FINE as f64;
         let mut relief = Self { columns, rows, cell, height: vec![f32::INFINITY; columns * rows] };
@@ -48,7 +48,7 @@ impl Relief {
     }
 
     /// The height at the centre of the coarse cell (i, j).
-    pub fn at_cell(&self, i: usize, j: usize) -> f32 {
+    pub(super) fn at_cell(&self, i: usize, j: usize) -> f32 {
         self.height[(FINE * j + FINE / 2) * self.columns + FINE * i + FINE / 2]
     }
 

@@ -48,14 +48,14 @@ pub(super) struct Shade<'a> {
 
 impl<'a> Shade<'a> {
     /// Of a window with pixels of edge `pitch`, m.
-    pub fn new(window: &'a Window, pitch: f32) -> Self {
+    pub(super) fn new(window: &'a Window, pitch: f32) -> Self {
         let scale = 1.0 / pitch;
         let highest = window.u.iter().fold(0.0_f32, |most, u| most.max(-u)) * scale;
         Self { window, highest, scale }
     }
 
     /// Dims `light`, pixels of `row` from column `first` of the window, by what stands before the lamp.
-    pub fn cast(&self, lamp: &Lamp, row: usize, first: usize, light: &mut [f32]) {
+    pub(super) fn cast(&self, lamp: &Lamp, row: usize, first: usize, light: &mut [f32]) {
         let wide = self.window.size[0];
         for (i, light) in light.iter_mut().enumerate() {
             let here = -self.window.u[row * wide + first + i] * self.scale;

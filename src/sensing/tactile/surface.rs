@@ -31,7 +31,7 @@ struct Reading {
 
 impl Window {
     /// The window of a field, one pixel wider than what changes.
-    pub fn of(gel: &Gel, field: &GelField) -> Self {
+    pub(super) fn of(gel: &Gel, field: &GelField) -> Self {
         let Some((from, size)) = extent(gel, &field.displacement[2]) else { return Self::default() };
         let centre = |axis: usize, p: usize| (p as f64 + 0.5 - 0.5 * PICTURE[axis] as f64) * gel.view.pitch;
         let count = [gel.columns, gel.rows];
@@ -113,7 +113,7 @@ impl Window {
     }
 
     /// The pixel's slope along x and y from its four neighbours; 0 at the window's rim, where the surface is flat.
-    pub fn slopes(&self, row: usize, pitch: f32, along: &mut [f32], across: &mut [f32]) {
+    pub(super) fn slopes(&self, row: usize, pitch: f32, along: &mut [f32], across: &mut [f32]) {
         let n = self.size[0];
         along.fill(0.0);
         across.fill(0.0);
