@@ -60,7 +60,7 @@ pub(super) static LAYER: Record = Record {
 macro_rules! mask {
     ($name:ident, $label:literal, $class:literal, $doc:literal, $fields:expr) => {
         #[doc = $doc]
-        pub static $name: Record =
+        pub(crate) static $name: Record =
             Record { label: $label, class: $class, kind: $class, doc: $doc, fields: $fields };
     };
 }
