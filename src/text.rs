@@ -1,4 +1,4 @@
-//! Formatting of numbers and text in messages.
+//! Text in messages: numbers, control characters, and suggestions for misspelt names.
 
 use std::borrow::Cow;
 
@@ -25,6 +25,65 @@ pub fn eprint_line(line: &str) {
     let _ = writeln!(std::io::stderr().lock(), "{line}");
 }
 
+/// The candidate that `word` most likely misspells or abbreviates, if any is close.
+///
+/// Close are at most one edit per three letters (Damerau–Levenshtein distance), and words of which one starts with the
+/// other. The parts of a dotted name (`chest.top_drawer`) are compared separately, and a name without a dot also matches
+/// the last part alone.
+pub fn suggest<'a>(word: &str, candidates: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    let ranked = candidates.filter_map(|candidate| Some((rank_of_name(word, candidate)?, candidate)));
+    ranked.min_by_key(|(rank, _)| *rank).map(|(_, candidate)| candidate)
+}
+
+/// Similarity of a candidate to a word, the most similar first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Rank {
+    difference: Difference,
+    edits: usize,
+    length: usize,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Difference {
+    Misspelt,
+    Abbreviated,
+    Extended,
+}
+
+fn rank_of_name(word: &str, candidate: &str) -> Option<Rank> {
+    match (word.split_once('.'), candidate.split_once('.')) {
+        (Some((object, part)), Some((known_object, known_part))) => {
+            let both = rank_of_word(object, known_object).zip(rank_of_word(part, known_part));
+            let of_parts = both.map(|(a, b)| Rank {
+                difference: a.difference.max(b.difference),
+                edits: a.edits + b.edits,
+                length: candidate.len(),
+            });
+            // A correct object outweighs a part that matches nothing on its own.
+            of_parts.or_else(|| rank_of_word(word, candidate))
+        }
+        (None, Some((_, known_part))) => {
+            rank_of_word(word, candidate).or_else(|| rank_of_word(word, known_part))
+        }
+        _ => rank_of_word(word, candidate),
+    }
+}
+
+fn rank_of_word(word: &str, candidate: &str) -> Option<Rank> {
+    let edits = strsim::damerau_levenshtein(word, candidate);
+    let allowed = (word.chars().count() / 3).max(1);
+    let difference = if edits <= allowed {
+        Difference::Misspelt
+    } else if word.len() > 2 && candidate.starts_with(word) {
+        Difference::Abbreviated
+    } else if candidate.len() > 2 && word.starts_with(candidate) {
+        Difference::Extended
+    } else {
+        return None;
+    };
+    Some(Rank { difference, edits, length: candidate.len() })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -39,5 +98,22 @@ mod tests {
     fn control_characters_are_shown() {
         assert_eq!(escape_control("a\u{1b}[2J\rb\tc\nd"), "a\\u{1b}[2J\\rb\tc\nd");
         assert!(matches!(escape_control("µ = 0.5"), Cow::Borrowed(_)));
+    }
+
+    #[test]
+    fn suggestions_cover_misspelt_abbreviated_and_partial_names() {
+        let known = ["c", "lid", "c.top_drawer", "c.middle_drawer", "chest.top_drawer"];
+        for (word, meant) in [
+            ("c.top", Some("c.top_drawer")),
+            ("c.topdrawer", Some("c.top_drawer")),
+            ("chset.top", Some("chest.top_drawer")),
+            ("middle_drawer", Some("c.middle_drawer")),
+            ("lidd", Some("lid")),
+            ("lids", Some("lid")),
+            ("c.handle", None),
+            ("xyz", None),
+        ] {
+            assert_eq!(suggest(word, known.into_iter()), meant, "{word}");
+        }
     }
 }

@@ -19,6 +19,7 @@ use crate::{
         remote::Protocol,
     },
     script::{PolicyFile, load_profile},
+    text,
 };
 
 /// Policies that need no server and no file.
@@ -103,17 +104,16 @@ fn no_driver(data: &str) -> String {
 
 fn no_policy(word: &str) -> String {
     let known = POLICIES.map(|(name, _)| name).join(", ");
-    let hint = meant(word, &POLICIES);
+    let hint = suggestion(word, &POLICIES);
     format!(
         "expected {known}, a Lua file such as my_policy.lua, a server such as ws://host:8000, or the folder of a run{hint}"
     )
 }
 
-/// Which of the names that are known was meant, as the end of a message; empty if none is near.
-fn meant(word: &str, known: &[(&str, &str)]) -> String {
-    let near = known.iter().map(|(name, _)| (strsim::jaro_winkler(name, word), name));
-    let meant = near.filter(|(alike, _)| *alike > 0.8).max_by(|a, b| a.0.total_cmp(&b.0));
-    meant.map_or(String::new(), |(_, name)| format!("; did you mean {name}?"))
+/// The end of a message that suggests the closest known name; empty if none is close.
+fn suggestion(word: &str, known: &[(&str, &str)]) -> String {
+    let close = text::suggest(word, known.iter().map(|(name, _)| *name));
+    close.map_or(String::new(), |name| format!("; did you mean {name}?"))
 }
 
 /// What stands behind `--profile`: a name that is known, or a Lua file.
@@ -125,7 +125,7 @@ pub(super) fn profile_word(word: &str) -> Result<String, String> {
         return Ok(word.to_owned());
     }
     let known = PROFILES.map(|(name, _)| name);
-    let hint = meant(word, &PROFILES);
+    let hint = suggestion(word, &PROFILES);
     Err(format!("[possible values: {}, or a Lua file such as my_profile.lua]{hint}", known.join(", ")))
 }
 

@@ -5,7 +5,7 @@ use parry3d_f64::{
     partitioning::{Bvh, BvhBuildStrategy},
 };
 
-use super::{mesh::to_parry, shape::Aabb};
+use super::{Aabb, mesh::to_parry};
 
 /// The box of something that may touch others.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,16 +2,23 @@
 //!
 //! Everything here is in the *object frame* (`_o`), in metres, and knows nothing of materials or motion.
 
+mod aabb;
+mod basis;
 pub mod broad_phase;
 pub mod convex;
+pub mod hex8;
 pub mod import;
 pub mod mass;
 pub mod mesh;
 pub mod samples;
 pub mod shape;
 pub mod skin;
+pub mod union_find;
 pub mod voxel;
 pub mod voxelise;
+
+pub use aabb::Aabb;
+pub use basis::{basis_from_reference, orthonormal_basis};
 
 /// A point or vector, m unless said otherwise.
 pub type Vec3 = nalgebra::Vector3<f64>;

@@ -22,7 +22,6 @@ mod relief;
 mod tree;
 mod warp;
 
-pub use bounds::Aabb;
 pub use check::ShapeError;
 pub use contact::Contact;
 pub use profile::Profile;

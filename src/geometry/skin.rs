@@ -6,9 +6,9 @@
 use fast_surface_nets::{SurfaceNetsBuffer, ndshape::RuntimeShape, surface_nets};
 
 use super::{
-    Mat3, Vec3,
+    Aabb, Mat3, Vec3,
     mesh::Mesh,
-    shape::{Aabb, Shape},
+    shape::Shape,
     voxel::{Embedding, VoxelMesh},
 };
 
@@ -71,7 +71,7 @@ fn finish(shape: &Shape, mut mesh: Mesh, normals: Vec<Vec3>) -> Skin {
     let materials =
         mesh.triangles.iter().map(|t| shape.material(&(corners(t).iter().sum::<Vec3>() / 3.0))).collect();
     if mesh.uvs.is_empty()
-        && let Some(bounds) = Aabb::around(&mesh.vertices)
+        && let Some(bounds) = Aabb::from_points(&mesh.vertices)
     {
         mesh.uvs = mesh.triangles.iter().map(|t| unwrap(&bounds, &corners(t))).collect();
     }

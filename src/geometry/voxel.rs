@@ -3,7 +3,7 @@
 //! Corner `c` of a voxel sits at `(c & 1, c >> 1 & 1, c >> 2 & 1)` in voxel edges from its lowest corner, and its
 //! trilinear weight at local coordinates `ξ ∈ [0, 1]³` is the product over axes of `ξ` or `1 − ξ`.
 
-use super::Vec3;
+use super::{Vec3, hex8};
 
 /// Sub-points of a voxel along one axis; a voxel's filled part is known on `SUB³` cells.
 pub const SUB: usize = 6;
@@ -73,11 +73,7 @@ pub struct Embedding {
 impl Embedding {
     /// Trilinear weights of the element's eight corners.
     pub fn weights(&self) -> [f64; 8] {
-        std::array::from_fn(|c| {
-            (0..3)
-                .map(|axis| if c >> axis & 1 == 1 { self.local[axis] } else { 1.0 - self.local[axis] })
-                .product()
-        })
+        hex8::weights(&self.local)
     }
 }
 

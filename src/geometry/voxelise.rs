@@ -1,7 +1,7 @@
 //! Cutting a shape into the voxel hexahedral mesh of a soft body, and finding points in it.
 
 use super::{
-    Vec3,
+    Vec3, hex8,
     shape::{Shape, ShapeError},
     voxel::{Embedding, Fill, SUB, VoxelMesh},
 };
@@ -106,7 +106,8 @@ fn fill_of(shape: &Shape, corner: &Vec3, edge: f64) -> Fill {
 fn number_nodes(mesh: &mut VoxelMesh) {
     let [nx, ny, nz] = mesh.grid;
     let corner = |cell: usize, c: usize| {
-        let (i, j, k) = (cell % nx + (c & 1), cell / nx % ny + (c >> 1 & 1), cell / nx / ny + (c >> 2 & 1));
+        let [i, j, k] = hex8::corner_index(c);
+        let (i, j, k) = (cell % nx + i, cell / nx % ny + j, cell / nx / ny + k);
         i + (nx + 1) * (j + (ny + 1) * k)
     };
     let cells: Vec<usize> =

@@ -5,10 +5,7 @@ use super::{
     pads::{self, BodyBox},
     panda,
 };
-use crate::geometry::{
-    Pose, Vec3,
-    shape::{Aabb, Shape},
-};
+use crate::geometry::{Aabb, Pose, Vec3, shape::Shape};
 
 /// Spacing of the points that stand for the surface of the hand, m. A thing can be nearer than was found by at most
 /// 0.71 of it.
@@ -36,8 +33,8 @@ pub fn clearance(tool_w: &Pose, width: f64, obstacles: &[Obstacle<'_>], enough: 
         for (index, obstacle) in obstacles.iter().enumerate() {
             let to_object = obstacle.pose_w.inverse() * centre_w;
             let half = part.half;
-            let reach = Aabb { min: -half, max: half }.moved(&to_object);
-            if gap(&reach, &obstacle.bounds) >= nearest.0 {
+            let reach = Aabb::from_half_extents(half).transformed(&to_object);
+            if reach.distance(&obstacle.bounds) >= nearest.0 {
                 continue;
             }
             for p in surface_points(&half) {
@@ -82,12 +79,6 @@ fn surface_points(half: &Vec3) -> impl Iterator<Item = Vec3> + use<> {
             })
         })
     })
-}
-
-/// Least distance between two boxes, m; 0 where they meet.
-fn gap(a: &Aabb, b: &Aabb) -> f64 {
-    let apart = |i: usize| (b.min[i] - a.max[i]).max(a.min[i] - b.max[i]).max(0.0);
-    Vec3::new(apart(0), apart(1), apart(2)).norm()
 }
 
 #[cfg(test)]

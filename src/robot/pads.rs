@@ -13,10 +13,7 @@ use nalgebra::Quaternion;
 
 use super::Side;
 use crate::{
-    geometry::{
-        Mat3, Pose, Quat, Vec3,
-        shape::{Aabb, Contact},
-    },
+    geometry::{Aabb, Mat3, Pose, Quat, Vec3, shape::Contact},
     physics::contact::{GelSample, Solid, Surface},
 };
 

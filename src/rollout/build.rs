@@ -9,9 +9,10 @@ use super::{
 };
 use crate::{
     geometry::{
+        Aabb,
         mass::mass_properties,
         samples::{SampleSpec, surface_samples},
-        shape::{Aabb, Shape},
+        shape::Shape,
         voxelise::{GeometryError, VoxelSpec, voxel_mesh},
     },
     physics::{
@@ -334,7 +335,7 @@ pub(super) fn check_base(scene: &Scene) -> Result<(), BuildError> {
 /// # Errors
 /// The first one that does not.
 pub fn check_support(sim: &Simulation) -> Result<(), BuildError> {
-    let boxes: Vec<Aabb> = sim.objects.iter().map(|h| h.bounds.moved(&h.start_w)).collect();
+    let boxes: Vec<Aabb> = sim.objects.iter().map(|h| h.bounds.transformed(&h.start_w)).collect();
     for (handle, own) in sim.objects.iter().zip(&boxes) {
         let holds = |(other, below): (&Handle, &Aabb)| {
             let beneath = (0..2).all(|i| below.min[i] < own.max[i] && own.min[i] < below.max[i]);

@@ -122,6 +122,6 @@ pub(super) fn lowest(sim: &Simulation, object: &Handle) -> f64 {
             let body = &sim.world.soft[index].body;
             body.x.iter().map(|x: &Vec3| x.z).fold(f64::INFINITY, f64::min)
         }
-        _ => object.bounds.moved(&sim.pose(object)).min.z,
+        _ => object.bounds.transformed(&sim.pose(object)).min.z,
     }
 }

@@ -9,9 +9,9 @@ use super::{
 };
 use crate::{
     geometry::{
-        Pose,
+        Aabb, Pose,
         mass::{MassProperties, mass_properties, rough_mass_properties},
-        shape::{Aabb, Shape},
+        shape::Shape,
     },
     physics::{
         World,

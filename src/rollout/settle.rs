@@ -4,7 +4,7 @@ use super::{
     cancel,
     simulation::{Handle, Kind, Simulation},
 };
-use crate::{geometry::shape::Aabb, physics::world::StepFailure, scene::Scene};
+use crate::{geometry::Aabb, physics::world::StepFailure, scene::Scene};
 
 /// Speed below which a node counts as settled, m/s.
 const SETTLED_SPEED: f64 = 1e-3;
@@ -103,8 +103,9 @@ impl Simulation {
         let height = self.centre(object).z;
         let fixed =
             self.objects.iter().filter(|other| other.kind == Kind::Static && !other.colliders.is_empty());
-        let floor =
-            fixed.map(|other| Aabb::moved(&other.bounds, &other.start_w).min.z).fold(f64::INFINITY, f64::min);
+        let floor = fixed
+            .map(|other| Aabb::transformed(&other.bounds, &other.start_w).min.z)
+            .fold(f64::INFINITY, f64::min);
         let fallen = object.start_w.translation.z - height;
         match fallen > FALLEN && height < floor {
             true => SettleError::Fell { object: name, fallen, placed_at },

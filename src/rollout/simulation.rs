@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     benchmark::control::CONTROL_DT,
-    geometry::{Pose, Vec3, shape::Aabb},
+    geometry::{Aabb, Pose, Vec3},
     physics::{
         Params, World,
         contact::{ColliderId, Partner},

@@ -16,7 +16,7 @@ use super::{
     touch_api,
 };
 use crate::{
-    geometry::{Pose, Vec3, shape::Aabb},
+    geometry::{Aabb, Pose, Vec3},
     policy::TouchFrame,
     robot::{Obstacle, clearance, gripper::OPENING},
     scene::{Asset, Body},

@@ -20,7 +20,6 @@ mod episode;
 mod error;
 mod experiment;
 mod expert;
-mod guess;
 mod host;
 mod image_api;
 mod lists;

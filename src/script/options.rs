@@ -8,8 +8,9 @@ use super::{
     ScriptError,
     catalogue::OPTION,
     sandbox::{fail, locked},
-    schema::{self, Range, Type, closest},
+    schema::{self, Range, Type},
 };
+use crate::text::suggest;
 
 /// The value of an option.
 #[derive(Clone, Debug, PartialEq)]
@@ -120,7 +121,7 @@ impl Session {
         }
         let flags: Vec<String> = self.options.iter().map(OptionSpec::flag).collect();
         let error = ScriptError::new(main, format!("unknown option {name}"));
-        Err(match closest(name, flags.iter().map(String::as_str)) {
+        Err(match suggest(name, flags.iter().map(String::as_str)) {
             Some(close) => error.hint(format!("did you mean {close}?")),
             None if flags.is_empty() => error.hint("the script declares no options of its own"),
             None => error.hint(format!("the script declares {}", flags.join(", "))),

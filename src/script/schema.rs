@@ -2,7 +2,7 @@
 
 use mlua::{Lua, Table, Value};
 
-pub use super::{guess::closest, range::Range};
+pub use super::range::Range;
 use super::{
     lists, numbers, origin,
     sandbox::{fail, here},
@@ -131,7 +131,7 @@ impl Fault {
 
 /// `unknown key "promt"; did you mean "prompt"?`
 pub fn unknown<'a>(what: &str, word: &str, known: impl Iterator<Item = &'a str> + Clone) -> String {
-    match closest(word, known.clone()) {
+    match text::suggest(word, known.clone()) {
         Some(close) => format!("unknown {what} {word:?}; did you mean {close:?}?"),
         None => format!("unknown {what} {word:?}; there are {}", known.collect::<Vec<_>>().join(", ")),
     }
@@ -241,7 +241,7 @@ impl Type {
             (Self::Any, value) if !value.is_nil() => kept(),
             (Self::Choice(names), Value::String(text)) => {
                 let text = text.to_string_lossy();
-                match (names.iter().any(|name| *name == text), closest(&text, names.iter().copied())) {
+                match (names.iter().any(|name| *name == text), text::suggest(&text, names.iter().copied())) {
                     (true, _) => kept(),
                     (false, Some(close)) => {
                         Err(Fault::new(format!("{}; did you mean {close:?}?", wrong().message)))

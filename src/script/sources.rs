@@ -12,6 +12,7 @@ use include_dir::{Dir, include_dir};
 use sha2::{Digest, Sha256};
 
 use super::error::ScriptError;
+use crate::text::suggest;
 
 static SCRIPTS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/scripts");
 static SUITES: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/suites");
@@ -248,7 +249,7 @@ impl Library {
                 names.iter_mut().filter(|n| !n.contains('.')).for_each(|n| *n = format!("assets.{n}"));
             }
         }
-        super::schema::closest(module, names.iter().map(String::as_str)).map(str::to_string)
+        suggest(module, names.iter().map(String::as_str)).map(str::to_string)
     }
 }
 
@@ -327,7 +328,7 @@ fn missing(main: &Path, name: &str) -> ScriptError {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     known.extend(entries.map(|e| display(&e.path())).filter(|n| n.ends_with(".lua")));
     let error = ScriptError::new(name, "no such file");
-    match super::schema::closest(name, known.iter().map(String::as_str)) {
+    match suggest(name, known.iter().map(String::as_str)) {
         Some(close) => error.hint(format!("did you mean {close}?")),
         None => error.hint("give the path of a Lua file; `softvt list suites` shows the standard ones"),
     }

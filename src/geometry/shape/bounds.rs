@@ -1,56 +1,7 @@
 //! Bounding boxes.
 
-use super::{Axis, Pose, Shape, Vec3};
-
-/// An axis-aligned box.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Aabb {
-    /// Lowest corner, m.
-    pub min: Vec3,
-    /// Highest corner, m.
-    pub max: Vec3,
-}
-
-impl Aabb {
-    /// The smallest box around points; `None` for none.
-    pub fn around<'a>(points: impl IntoIterator<Item = &'a Vec3>) -> Option<Self> {
-        points.into_iter().fold(None, |sofar, p| {
-            let Self { min, max } = sofar.unwrap_or(Self { min: *p, max: *p });
-            Some(Self { min: min.inf(p), max: max.sup(p) })
-        })
-    }
-
-    /// Edge lengths, m.
-    pub fn size(&self) -> Vec3 {
-        self.max - self.min
-    }
-
-    /// Its middle.
-    pub fn centre(&self) -> Vec3 {
-        0.5 * (self.min + self.max)
-    }
-
-    /// The box grown by `margin` (m) on every side.
-    pub fn grown(&self, margin: f64) -> Self {
-        Self { min: self.min.add_scalar(-margin), max: self.max.add_scalar(margin) }
-    }
-
-    /// The smallest box around both.
-    pub fn joined(&self, other: &Self) -> Self {
-        Self { min: self.min.inf(&other.min), max: self.max.sup(&other.max) }
-    }
-
-    /// The box around this one after it has been moved rigidly.
-    pub fn moved(&self, pose: &Pose) -> Self {
-        let centre = pose.rotation * self.centre() + pose.translation.vector;
-        let half = pose.rotation.to_rotation_matrix().into_inner().abs() * (0.5 * self.size());
-        Self { min: centre - half, max: centre + half }
-    }
-
-    fn symmetric(half: Vec3) -> Self {
-        Self { min: -half, max: half }
-    }
-}
+use super::{Axis, Shape, Vec3};
+use crate::geometry::Aabb;
 
 /// Cells along the longest edge in the search for the extreme points of a composite shape.
 const CELLS: f64 = 40.0;
@@ -128,12 +79,12 @@ impl Shape {
     /// A box that surely holds the shape, not tight.
     pub(crate) fn reach(&self) -> Aabb {
         match self {
-            Self::Placed { shape, pose } => shape.reach().moved(pose),
+            Self::Placed { shape, pose } => shape.reach().transformed(pose),
             Self::Scaled { shape, scale } => {
                 let inner = shape.reach();
                 Aabb { min: inner.min.component_mul(scale), max: inner.max.component_mul(scale) }
             }
-            Self::Rounded { shape, radius } => shape.reach().grown(*radius),
+            Self::Rounded { shape, radius } => shape.reach().loosened(*radius),
             Self::Shell { shape, .. } | Self::Paint { shape, .. } => shape.reach(),
             Self::Union(parts) => joined(parts),
             Self::Intersect(parts) => parts
@@ -143,16 +94,16 @@ impl Shape {
                     min: a.min.sup(&b.min),
                     max: a.max.inf(&b.max).sup(&a.min.sup(&b.min)),
                 })
-                .unwrap_or(Aabb::symmetric(Vec3::zeros())),
+                .unwrap_or(Aabb::from_half_extents(Vec3::zeros())),
             Self::Subtract { from, .. } | Self::SmoothSubtract { from, .. } => from.reach(),
             // Each blend raises the seam by at most a quarter of its width, in first-order distance.
-            Self::SmoothUnion { parts, blend } => joined(parts).grown(0.5 * blend * parts.len() as f64),
+            Self::SmoothUnion { parts, blend } => joined(parts).loosened(0.5 * blend * parts.len() as f64),
             Self::Twist { shape, axis, .. } => twisted(&shape.reach(), *axis),
             Self::Bend { shape, along, towards, curvature } => {
                 bent(&shape.reach(), *along, *towards, *curvature)
             }
             Self::Displace { shape, reliefs } => {
-                shape.reach().grown(1.5 * reliefs.iter().map(super::Relief::reach).sum::<f64>())
+                shape.reach().loosened(1.5 * reliefs.iter().map(super::Relief::reach).sum::<f64>())
             }
             _ => self.bounds(),
         }
@@ -230,7 +181,11 @@ fn outward(side: usize) -> Vec3 {
 }
 
 fn joined(parts: &[Shape]) -> Aabb {
-    parts.iter().map(Shape::reach).reduce(|a, b| a.joined(&b)).unwrap_or(Aabb::symmetric(Vec3::zeros()))
+    parts
+        .iter()
+        .map(Shape::reach)
+        .reduce(|a, b| a.merged(&b))
+        .unwrap_or(Aabb::from_half_extents(Vec3::zeros()))
 }
 
 /// A twist keeps distances from the axis.
@@ -238,7 +193,7 @@ fn twisted(inner: &Aabb, axis: Axis) -> Aabb {
     let far = inner.min.abs().sup(&inner.max.abs());
     let k = axis.index();
     let radius = far[(k + 1) % 3].hypot(far[(k + 2) % 3]);
-    let mut outer = Aabb::symmetric(Vec3::repeat(radius));
+    let mut outer = Aabb::from_half_extents(Vec3::repeat(radius));
     (outer.min[k], outer.max[k]) = (inner.min[k], inner.max[k]);
     outer
 }
@@ -261,8 +216,8 @@ fn bent(inner: &Aabb, along: Axis, towards: Axis, curvature: f64) -> Aabb {
             low[k] = radius - (radius - level) * angle.cos();
             (high[i], high[k]) = (low[i], low[k]);
             let point = Aabb { min: low, max: high };
-            outer = Some(outer.map_or(point, |sofar| sofar.joined(&point)));
+            outer = Some(outer.map_or(point, |sofar| sofar.merged(&point)));
         }
     }
-    outer.map_or(*inner, |found| found.grown(0.01 * found.size().max()))
+    outer.map_or(*inner, |found| found.loosened(0.01 * found.size().max()))
 }

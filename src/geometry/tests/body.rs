@@ -2,7 +2,7 @@ use std::f64::consts::PI;
 
 use super::{composite_shapes, euler, exact_shapes, lathe, random_unit, rng};
 use crate::geometry::{
-    Mat3, Pose, Quat, Vec3,
+    Mat3, Pose, Quat, Vec3, hex8,
     mass::mass_properties,
     samples::{SampleSpec, surface_samples},
     shape::{Axis, Shape},
@@ -29,7 +29,7 @@ fn a_cube_at_resolution_six_has_343_nodes_and_full_voxels() {
     for nodes in &mesh.elements {
         let corner = mesh.nodes[nodes[0] as usize];
         for (c, &node) in nodes.iter().enumerate() {
-            let step = Vec3::new((c & 1) as f64, (c >> 1 & 1) as f64, (c >> 2 & 1) as f64);
+            let step = hex8::corner(c);
             assert!((mesh.nodes[node as usize] - corner - step * mesh.edge).norm() < 1e-15);
         }
     }

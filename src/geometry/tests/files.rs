@@ -2,11 +2,11 @@ use super::rng;
 use rand::Rng;
 
 use crate::geometry::{
-    Vec3,
+    Aabb, Vec3,
     broad_phase::{Candidate, candidate_pairs},
     import::{ImportError, ImportOptions, MeshFormat, import},
     mesh::{Mesh, MeshError},
-    shape::{Aabb, Shape},
+    shape::Shape,
     skin::skin,
 };
 
@@ -89,7 +89,7 @@ fn scale_and_the_upward_axis_are_honoured() {
     let corners = "v 0 0 0\nv 1 0 0\nv 1 3 0\nv 0 3 0\nv 0 0 1\nv 1 0 1\nv 1 3 1\nv 0 3 1\n";
     let options = ImportOptions { scale: 1e-3, z_up: false };
     let mesh = import(format!("{corners}{tall}").as_bytes(), MeshFormat::Obj, &options).expect("a brick");
-    let size = Aabb::around(&mesh.vertices).expect("corners").size();
+    let size = Aabb::from_points(&mesh.vertices).expect("corners").size();
     assert!((size - Vec3::new(1e-3, 1e-3, 3e-3)).norm() < 1e-15 && mesh.volume() > 0.0, "{size:?}");
 }
 

@@ -2,9 +2,9 @@ use rand::Rng;
 
 use super::{composite_shapes, crate_with_low_sides, exact_shapes, lathe, random_unit, rng, wedge};
 use crate::geometry::{
-    Vec3,
+    Aabb, Vec3,
     mesh::Mesh,
-    shape::{Aabb, Axis, Profile, Shape, ShapeError},
+    shape::{Axis, Profile, Shape, ShapeError},
     skin::skin,
 };
 
@@ -135,7 +135,7 @@ fn bounds_of_turned_and_composite_shapes_are_tight() {
     for (name, shape) in exact_shapes().into_iter().chain(composite_shapes()) {
         let bounds = shape.bounds();
         let mesh = exact_surface(&shape).unwrap_or_else(|| skin(&shape, 0.7e-3).mesh);
-        let found = Aabb::around(&mesh.vertices).expect("a skin");
+        let found = Aabb::from_points(&mesh.vertices).expect("a skin");
         let off = (bounds.min - found.min).abs().max().max((bounds.max - found.max).abs().max());
         assert!(off < 5e-5, "{name}: {off}");
         let outside = mesh.vertices.iter().map(|v| (v - v.sup(&bounds.min).inf(&bounds.max)).norm());

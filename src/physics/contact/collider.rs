@@ -4,8 +4,8 @@ use std::{fmt::Debug, sync::Arc};
 
 use super::solid::Solid;
 use crate::geometry::{
-    Pose, Vec3,
-    shape::{Aabb, Contact, Shape},
+    Aabb, Pose, Vec3,
+    shape::{Contact, Shape},
 };
 
 /// A solid's surface as contact samples feel it, in its own frame.

@@ -2,7 +2,7 @@
 
 use super::collider::Collider;
 use crate::{
-    geometry::{Mat3, Pose, Vec3, shape::Aabb},
+    geometry::{Aabb, Mat3, Pose, Vec3},
     physics::fem::SoftBody,
 };
 
@@ -54,7 +54,7 @@ pub struct Whereabouts {
 impl Whereabouts {
     /// Looks where `body` is.
     pub fn look(&mut self, body: &SoftBody) {
-        self.body = Aabb::around(&body.x);
+        self.body = Aabb::from_points(&body.x);
         self.fastest = body.max_speed();
         self.groups.clear();
         self.groups.extend(body.rest.groups.iter().map(|group| {
@@ -85,24 +85,25 @@ pub fn detect(
     let around = whereabouts.body.unwrap_or(bounds);
     let lever = (around.centre() - moving.origin).norm() + around.size().norm();
     let speed = whereabouts.fastest + moving.linear.norm() + moving.angular.norm() * lever;
-    let (there, far) = (bounds.moved(&moving.pose), reach.max(AHEAD * dt * speed));
-    if apart(&around, &there, far) {
+    let near_collider = bounds.transformed(&moving.pose).loosened(reach.max(AHEAD * dt * speed));
+    if !around.intersects(&near_collider) {
         return;
     }
     let view = View::new(moving);
     for (index, (group, around)) in body.rest.groups.iter().zip(&whereabouts.groups).enumerate() {
-        if apart(around, &there, far) {
+        if !around.intersects(&near_collider) {
             continue;
         }
         let seen = Seen::new(body, &group.nodes[..group.count], moving, &view);
         let ahead = AHEAD * dt * seen.fastest;
         let look = reach.max(ahead);
-        if apart(&seen.bounds, &bounds, look) {
+        let near_surface = bounds.loosened(look);
+        if !seen.bounds.intersects(&near_surface) {
             continue;
         }
         let mut close = false;
         for sample in group.first..group.last {
-            let Some(candidate) = test(body, collider, (&seen, &view), (index, sample), look) else {
+            let Some(candidate) = test(body, collider, (&seen, &view), (index, sample), &near_surface) else {
                 continue;
             };
             close |= candidate.gap < reach;
@@ -176,18 +177,17 @@ fn mean(count: usize, values: &[Vec3; 8], weights: &[f64; 8]) -> Vec3 {
     if count <= 4 { of(4) } else { of(8) }
 }
 
-/// One sample against the surface, if it is within `look` of its bounds and the two face each other.
+/// One sample against the surface, if it is within `near_surface` and the two face each other.
 fn test(
     body: &SoftBody,
     collider: &Collider,
     (seen, view): (&Seen, &View),
     (group, sample): (usize, usize),
-    look: f64,
+    near_surface: &Aabb,
 ) -> Option<Candidate> {
     let data = &body.rest.samples[sample];
     let local = mean(seen.count, &seen.x, &data.weights);
-    let bounds = &collider.bounds;
-    if (0..3).any(|i| local[i] < bounds.min[i] - look || local[i] > bounds.max[i] + look) {
+    if !near_surface.contains(&local) {
         return None;
     }
     let facing = body.rotation[data.surface.at.element as usize] * data.surface.n_o;
@@ -205,8 +205,4 @@ fn test(
         normal: view.to_world * contact.normal,
         coverage: contact.coverage,
     })
-}
-
-fn apart(a: &Aabb, b: &Aabb, reach: f64) -> bool {
-    (0..3).any(|i| a.min[i] > b.max[i] + reach || b.min[i] > a.max[i] + reach)
 }

@@ -7,7 +7,7 @@
 
 use super::collider::Surface;
 use crate::{
-    geometry::{Mat3, Vec3, shape::Aabb, voxel::Embedding},
+    geometry::{Aabb, Mat3, Vec3, hex8, voxel::Embedding},
     physics::fem::SoftBody,
 };
 
@@ -154,16 +154,9 @@ impl<'a> SoftField<'a> {
 /// The trilinear map and its derivative.
 fn trilinear(corners: &[Vec3; 8], local: &Vec3) -> (Vec3, Mat3) {
     let (mut x, mut jacobian) = (Vec3::zeros(), Mat3::zeros());
-    for (c, corner) in corners.iter().enumerate() {
-        let factor: [f64; 3] =
-            std::array::from_fn(|axis| if c >> axis & 1 == 1 { local[axis] } else { 1.0 - local[axis] });
-        let slope: [f64; 3] = std::array::from_fn(|axis| if c >> axis & 1 == 1 { 1.0 } else { -1.0 });
-        x += corner * (factor[0] * factor[1] * factor[2]);
-        let gradient = Vec3::new(
-            slope[0] * factor[1] * factor[2],
-            factor[0] * slope[1] * factor[2],
-            factor[0] * factor[1] * slope[2],
-        );
+    let (weights, gradients) = (hex8::weights(local), hex8::gradients(local, 1.0));
+    for ((corner, weight), gradient) in corners.iter().zip(weights).zip(gradients) {
+        x += corner * weight;
         jacobian += corner * gradient.transpose();
     }
     (x, jacobian)
@@ -195,8 +188,8 @@ fn look(speed: f64, (dt, margin, reach): Limits) -> f64 {
 
 /// Whether two bodies are close or fast enough for their samples to be worth a look.
 pub fn may_touch(a: &SoftBody, b: &SoftBody, limits: Limits) -> bool {
-    let (Some(box_a), Some(box_b)) = (Aabb::around(&a.x), Aabb::around(&b.x)) else { return false };
-    overlap(&box_a.grown(look(a.max_speed() + b.max_speed(), limits)), &box_b)
+    let (Some(box_a), Some(box_b)) = (Aabb::from_points(&a.x), Aabb::from_points(&b.x)) else { return false };
+    box_a.loosened(look(a.max_speed() + b.max_speed(), limits)).intersects(&box_b)
 }
 
 /// Collects the samples of `body` that press on `field` or will, and calls `near` with the group and element of every
@@ -208,14 +201,14 @@ pub fn detect_soft(
     out: &mut Vec<Pressing>,
     near: &mut dyn FnMut(usize, u32),
 ) {
-    let Some(around) = Aabb::around(&field.body.x) else { return };
+    let Some(around) = Aabb::from_points(&field.body.x) else { return };
     let field_speed = field.body.max_speed();
     for (index, group) in body.rest.groups.iter().enumerate() {
         let nodes = &group.nodes[..group.count];
         let speed = nodes.iter().map(|&n| body.v[n as usize].norm()).fold(0.0, f64::max) + field_speed;
-        let wide = around.grown(look(speed, limits));
-        let Some(span) = Aabb::around(nodes.iter().map(|&n| &body.x[n as usize])) else { continue };
-        if !overlap(&wide, &span) {
+        let wide = around.loosened(look(speed, limits));
+        let Some(span) = Aabb::from_points(nodes.iter().map(|&n| &body.x[n as usize])) else { continue };
+        if !wide.intersects(&span) {
             continue;
         }
         for sample in group.first..group.last {
@@ -242,7 +235,7 @@ fn press(
     let nodes = &body.rest.groups[group].nodes[..body.rest.groups[group].count];
     let data = &body.rest.samples[sample];
     let p = weighted(&body.x, nodes, &data.weights);
-    if (0..3).any(|i| p[i] < wide.min[i] || p[i] > wide.max[i]) {
+    if !wide.contains(&p) {
         return None;
     }
     let facing = body.rotation[data.surface.at.element as usize] * data.surface.n_o;
@@ -254,8 +247,4 @@ fn press(
 
 fn weighted(values: &[Vec3], nodes: &[u32], weights: &[f64; 8]) -> Vec3 {
     nodes.iter().zip(weights).map(|(&node, w)| values[node as usize] * *w).sum()
-}
-
-fn overlap(a: &Aabb, b: &Aabb) -> bool {
-    (0..3).all(|i| a.min[i] <= b.max[i] && b.min[i] <= a.max[i])
 }

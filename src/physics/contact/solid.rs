@@ -6,10 +6,7 @@ use std::sync::OnceLock;
 use super::manifold::{
     ContactPoint, Piece, SkinSamples, field::Skin, gel::gel_vs_shape, manifold, pieces, skin_samples,
 };
-use crate::geometry::{
-    Pose, Vec3,
-    shape::{Aabb, Shape},
-};
+use crate::geometry::{Aabb, Pose, Vec3, shape::Shape};
 
 /// What rigid solids need to find their contact points.
 #[derive(Debug)]

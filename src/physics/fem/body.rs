@@ -8,7 +8,7 @@ use super::{
     rotation::polar,
 };
 use crate::geometry::{
-    Mat3, Pose, Vec3,
+    Mat3, Pose, Vec3, hex8,
     voxel::{Fill, SUB, SurfaceSample, VoxelMesh},
 };
 
@@ -115,9 +115,7 @@ impl Rest {
             spacing,
             stiffness,
             stiffness_of,
-            corners: std::array::from_fn(|c| {
-                Vec3::new((c & 1) as f64, (c >> 1 & 1) as f64, (c >> 2 & 1) as f64) * h
-            }),
+            corners: std::array::from_fn(|c| hex8::corner(c) * h),
             mean: element::mean_gradients(h),
             mesh,
         })

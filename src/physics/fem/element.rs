@@ -6,7 +6,7 @@
 //! almost empty stays regular.
 
 use crate::geometry::{
-    Vec3,
+    Vec3, hex8,
     voxel::{Fill, SUB},
 };
 
@@ -22,25 +22,9 @@ pub fn gauss_points() -> [Vec3; 8] {
     std::array::from_fn(|g| Vec3::new(at(g & 1), at(g >> 1 & 1), at(g >> 2 & 1)))
 }
 
-/// Gradients of the eight trilinear shape functions at local `xi` of a cube of edge `h`, 1/m.
-pub fn gradients(xi: &Vec3, h: f64) -> [Vec3; 8] {
-    std::array::from_fn(|corner| {
-        let side = |axis: usize| corner >> axis & 1 == 1;
-        let weight = |axis: usize| if side(axis) { xi[axis] } else { 1.0 - xi[axis] };
-        let slope = |axis: usize| if side(axis) { 1.0 / h } else { -1.0 / h };
-        Vec3::new(
-            slope(0) * weight(1) * weight(2),
-            weight(0) * slope(1) * weight(2),
-            weight(0) * weight(1) * slope(2),
-        )
-    })
-}
-
 /// Volume averages of the shape gradients over the whole cube: `±1/(4h)` on each axis.
 pub fn mean_gradients(h: f64) -> [Vec3; 8] {
-    std::array::from_fn(|corner| {
-        Vec3::from_fn(|axis, _| if corner >> axis & 1 == 1 { 0.25 / h } else { -0.25 / h })
-    })
+    std::array::from_fn(|corner| hex8::corner_sign(corner) * (0.25 / h))
 }
 
 /// Lamé parameters (λ, μ) in Pa.
@@ -71,13 +55,13 @@ fn integrate(points: &[(Vec3, f64)], h: f64, youngs: f64, poisson: f64) -> Stiff
     let volume: f64 = points.iter().map(|(_, w)| w).sum();
     let mut mean = [Vec3::zeros(); 8];
     for (xi, w) in points {
-        for (m, g) in mean.iter_mut().zip(gradients(xi, h)) {
+        for (m, g) in mean.iter_mut().zip(hex8::gradients(xi, h)) {
             *m += g * (w / volume);
         }
     }
     let mut k = Box::new([0.0; 576]);
     for (xi, w) in points {
-        add_point(&mut k, &gradients(xi, h), &mean, *w, lambda, mu);
+        add_point(&mut k, &hex8::gradients(xi, h), &mean, *w, lambda, mu);
     }
     k
 }
@@ -111,7 +95,7 @@ mod tests {
     fn field(h: f64, f: impl Fn(Vec3) -> Vec3) -> [f64; 24] {
         let mut u = [0.0; 24];
         for a in 0..8 {
-            let x = Vec3::new((a & 1) as f64, (a >> 1 & 1) as f64, (a >> 2 & 1) as f64) * h;
+            let x = hex8::corner(a) * h;
             u[3 * a..3 * a + 3].copy_from_slice(f(x).as_slice());
         }
         u

@@ -86,15 +86,15 @@ pub fn min_det(x: &Corners, h: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::{
-        geometry::{Quat, voxel::Fill},
-        physics::fem::element::{gauss_points, gradients, mean_gradients, stiffness},
+        geometry::{Quat, hex8, voxel::Fill},
+        physics::fem::element::{gauss_points, mean_gradients, stiffness},
     };
     use proptest::prelude::*;
 
     const H: f64 = 0.01;
 
     fn cube() -> Corners {
-        std::array::from_fn(|a| Vec3::new((a & 1) as f64, (a >> 1 & 1) as f64, (a >> 2 & 1) as f64) * H)
+        std::array::from_fn(|a| hex8::corner(a) * H)
     }
 
     fn evaluate(x: &Corners, last: Mat3) -> Elastic {
@@ -122,7 +122,7 @@ mod tests {
         #[test]
         fn least_determinant_is_that_of_the_gradients(e in prop::collection::vec(-0.4f64..0.4, 24)) {
             let x = bent(&e);
-            let det = |xi: &Vec3| deformation_gradient(&x, &gradients(xi, H)).determinant();
+            let det = |xi: &Vec3| deformation_gradient(&x, &hex8::gradients(xi, H)).determinant();
             let plain = gauss_points().iter().map(det).fold(f64::INFINITY, f64::min);
             prop_assert!((min_det(&x, H) - plain).abs() < 1e-12);
         }

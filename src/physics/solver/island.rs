@@ -1,7 +1,7 @@
 //! Connected islands of a problem, and the factors that they keep between steps.
 
 use super::{newton::STEPS_PER_FACTOR, problem::Problem, secant::Secant};
-use crate::physics::sparse::dense;
+use crate::{geometry::union_find::UnionFind, physics::sparse::dense};
 
 /// The blocks, patches and scalars of one connected island.
 pub(super) struct Island {
@@ -17,17 +17,16 @@ pub(super) struct Island {
 
 /// Splits a problem into islands of blocks that patches connect.
 pub(super) fn islands(problem: &Problem) -> Vec<Island> {
-    let mut root: Vec<usize> = (0..problem.blocks.len()).collect();
+    let mut connected = UnionFind::new(problem.blocks.len());
     for patch in &problem.patches {
         if let (Some(a), Some(b)) = (problem.block_of(&patch.a), problem.block_of(&patch.b)) {
-            let (a, b) = (find(&mut root, a), find(&mut root, b));
-            root[a.max(b)] = a.min(b);
+            connected.union(a, b);
         }
     }
     let mut islands: Vec<Island> = Vec::new();
-    let mut of_root = vec![usize::MAX; root.len()];
+    let mut of_root = vec![usize::MAX; problem.blocks.len()];
     for block in 0..problem.blocks.len() {
-        let r = find(&mut root, block);
+        let r = connected.find(block);
         if of_root[r] == usize::MAX {
             of_root[r] = islands.len();
             islands.push(Island { blocks: Vec::new(), patches: Vec::new(), scalars: Vec::new(), size: 0 });
@@ -37,22 +36,14 @@ pub(super) fn islands(problem: &Problem) -> Vec<Island> {
     }
     for (index, patch) in problem.patches.iter().enumerate() {
         if let Some(block) = problem.block_of(&patch.a).or(problem.block_of(&patch.b)) {
-            islands[of_root[find(&mut root, block)]].patches.push(index);
+            islands[of_root[connected.find(block)]].patches.push(index);
         }
     }
     for (index, scalar) in problem.scalars.iter().enumerate() {
-        islands[of_root[find(&mut root, scalar.block)]].scalars.push(index);
+        islands[of_root[connected.find(scalar.block)]].scalars.push(index);
     }
     islands.retain(|island| island.size > 0);
     islands
-}
-
-fn find(root: &mut [usize], mut at: usize) -> usize {
-    while root[at] != at {
-        root[at] = root[root[at]];
-        at = root[at];
-    }
-    at
 }
 
 /// A factored Hessian and what it belongs to.

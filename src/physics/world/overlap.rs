@@ -2,7 +2,7 @@
 
 use super::{World, rigid_rows::Pair};
 use crate::{
-    geometry::{Pose, Quat, Vec3, shape::Aabb},
+    geometry::{Aabb, Pose, Quat, Vec3},
     physics::{contact::Collider, fem::SoftBody},
 };
 
@@ -75,7 +75,7 @@ fn sunk(body: &SoftBody, pose: &Pose, bounds: &Aabb, field: &dyn Fn(&Vec3) -> f6
             let nodes = group.nodes[..group.count].iter().map(|&node| &body.x[node as usize]);
             let p_w = nodes.zip(&sample.weights).map(|(x, w)| x * *w).sum::<Vec3>();
             let p = pose.inverse_transform_point(&p_w.into()).coords;
-            if (0..3).all(|i| bounds.min[i] <= p[i] && p[i] <= bounds.max[i]) {
+            if bounds.contains(&p) {
                 depth = f64::max(depth, -field(&p));
             }
         }

@@ -12,9 +12,8 @@ use super::{
 };
 use crate::{
     geometry::{
-        Vec3,
+        Aabb, Vec3,
         broad_phase::{Candidate, candidate_pairs},
-        shape::Aabb,
     },
     physics::{
         contact::{ContactPoint, Mover, Part},
@@ -118,7 +117,7 @@ impl World {
     /// Where a collider is or may be soon, and with which others it forms one thing.
     fn box_of(&self, id: usize) -> Candidate {
         let (collider, moving) = (&self.colliders[id], &self.moving[id]);
-        let bounds = collider.bounds.moved(&moving.pose);
+        let bounds = collider.bounds.transformed(&moving.pose);
         let lever = farthest(&bounds, &moving.origin);
         let speed = moving.linear.norm() + moving.angular.norm() * lever;
         let rigid = self.rigid.len() as u32;
@@ -127,7 +126,7 @@ impl World {
             (Mover::Static | Mover::Kinematic(_), None) => 0,
             (Mover::Rigid(index), None) => 1 + index as u32,
         };
-        Candidate { bounds: bounds.grown(self.params.margin.max(AHEAD * self.params.dt * speed)), group }
+        Candidate { bounds: bounds.loosened(self.params.margin.max(AHEAD * self.params.dt * speed)), group }
     }
 
     /// Whether a collider's motion is known before the solve.

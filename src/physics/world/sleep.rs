@@ -2,7 +2,7 @@
 
 use super::World;
 use crate::{
-    geometry::{Vec3, shape::Aabb},
+    geometry::{Aabb, Vec3},
     physics::contact::{Mover, Partner},
 };
 
@@ -20,9 +20,9 @@ impl World {
         }
         let stirring = self.stirring();
         for soft in self.soft.iter_mut().filter(|s| s.asleep) {
-            let Some(around) = Aabb::around(&soft.body.x) else { continue };
-            let around = around.grown(NEAR);
-            if stirring.iter().any(|(_, bounds)| overlap(&around, bounds)) {
+            let Some(around) = Aabb::from_points(&soft.body.x) else { continue };
+            let around = around.loosened(NEAR);
+            if stirring.iter().any(|(_, bounds)| around.intersects(bounds)) {
                 soft.asleep = false;
                 soft.slow_for = 0.0;
             }
@@ -55,8 +55,8 @@ impl World {
     fn is_near(&self, stirring: &[(Option<Mover>, Aabb)], own: impl Fn(Mover) -> bool) -> bool {
         let mut mine = self.colliders.iter().zip(&self.moving).filter(|(c, _)| own(c.mover));
         mine.any(|(collider, moving)| {
-            let around = collider.bounds.moved(&moving.pose).grown(NEAR);
-            stirring.iter().any(|(by, bounds)| !by.is_some_and(&own) && overlap(&around, bounds))
+            let around = collider.bounds.transformed(&moving.pose).loosened(NEAR);
+            stirring.iter().any(|(by, bounds)| !by.is_some_and(&own) && around.intersects(bounds))
         })
     }
 
@@ -64,11 +64,11 @@ impl World {
     fn stirring(&self) -> Vec<(Option<Mover>, Aabb)> {
         let colliders = (0..self.colliders.len()).filter(|&id| self.stirs(id)).map(|id| {
             let collider = &self.colliders[id];
-            (Some(collider.mover), collider.bounds.moved(&self.moving[id].pose))
+            (Some(collider.mover), collider.bounds.transformed(&self.moving[id].pose))
         });
         let soft = (0..self.soft.len())
             .filter(|&index| self.is_lively(index))
-            .filter_map(|index| Some((None, Aabb::around(&self.soft[index].body.x)?)));
+            .filter_map(|index| Some((None, Aabb::from_points(&self.soft[index].body.x)?)));
         colliders.chain(soft).collect()
     }
 
@@ -184,8 +184,4 @@ impl World {
 /// Whether a mover is a link of a tree.
 fn is_link_of(index: usize) -> impl Fn(Mover) -> bool {
     move |mover| matches!(mover, Mover::Link { tree, .. } if tree == index)
-}
-
-fn overlap(a: &Aabb, b: &Aabb) -> bool {
-    (0..3).all(|i| a.min[i] <= b.max[i] && b.min[i] <= a.max[i])
 }

@@ -4,7 +4,10 @@
 use std::{collections::BTreeMap, sync::Arc};
 
 use super::{V3, facet::Facet, model::Level, pattern};
-use crate::{geometry::shape::Shape, scene::Visual};
+use crate::{
+    geometry::{shape::Shape, union_find::UnionFind},
+    scene::Visual,
+};
 
 /// Texels are painted so far beyond the triangles that they belong to, texels: their neighbours are looked at, too.
 const BEYOND: f32 = 1.5;
@@ -63,28 +66,19 @@ fn parts(level: &Level) -> Vec<(usize, Vec<usize>)> {
             2 * axis + usize::from(n[axis] < 0.0)
         })
         .collect();
-    let mut above: Vec<usize> = (0..level.triangles.len()).collect();
+    let mut connected = UnionFind::new(level.triangles.len());
     let mut last: BTreeMap<(u32, usize), usize> = BTreeMap::new();
     for (t, (corners, &axis)) in level.triangles.iter().zip(&axis_of).enumerate() {
         for &v in corners {
             let other = *last.entry((v, axis)).or_insert(t);
-            let (a, b) = (root(&mut above, other), root(&mut above, t));
-            above[a.max(b)] = a.min(b);
+            connected.union(other, t);
         }
     }
     let mut parts: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-    for t in 0..above.len() {
-        parts.entry(root(&mut above, t)).or_default().push(t);
+    for t in 0..level.triangles.len() {
+        parts.entry(connected.find(t)).or_default().push(t);
     }
     parts.into_iter().map(|(first, triangles)| (axis_of[first], triangles)).collect()
-}
-
-fn root(above: &mut [usize], mut t: usize) -> usize {
-    while above[t] != t {
-        above[t] = above[above[t]];
-        t = above[t];
-    }
-    t
 }
 
 /// Albedo and roughness of the texels of a part; `place` is where points are, texels.

@@ -15,10 +15,11 @@ use super::{
 };
 use crate::{
     geometry::{
-        Vec3,
+        Vec3, basis_from_reference,
         mesh::Mesh,
         shape::{Profile, Shape},
         skin,
+        union_find::UnionFind,
         voxel::{Embedding, VoxelMesh},
     },
     scene::Visual,
@@ -377,8 +378,7 @@ pub(super) fn bake(
 fn materials_near(shape: &Shape, p: &V3, n: &V3, spacing: f32) -> Vec<u16> {
     const STEPS: i32 = 2;
     let side = if n.z.abs() < 0.9 { V3::z() } else { V3::x() };
-    let u = side.cross(n).normalize();
-    let v = n.cross(&u);
+    let [u, v] = basis_from_reference(n, &side);
     let step = 0.7 * spacing / STEPS as f32;
     let at = |i: i32, j: i32| p + u * (i as f32 * step) + v * (j as f32 * step);
     (-STEPS..=STEPS)
@@ -469,20 +469,12 @@ pub(super) fn split(points: &[V3], triangles: &[[u32; 3]]) -> (Vec<u32>, Vec<[u3
 
 /// Numbers the sets of triangles that hang together by vertices.
 fn patches(triangles: &[[u32; 3]], vertices: usize) -> Vec<u32> {
-    let mut above: Vec<u32> = (0..vertices as u32).collect();
-    let root = |above: &mut Vec<u32>, mut v: u32| {
-        while above[v as usize] != v {
-            above[v as usize] = above[above[v as usize] as usize];
-            v = above[v as usize];
-        }
-        v
-    };
-    for t in triangles {
-        let roots = t.map(|v| root(&mut above, v));
-        let least = roots[0].min(roots[1]).min(roots[2]);
-        roots.iter().for_each(|&r| above[r as usize] = least);
+    let mut connected = UnionFind::new(vertices);
+    for &[a, b, c] in triangles {
+        connected.union(a as usize, b as usize);
+        connected.union(a as usize, c as usize);
     }
-    triangles.iter().map(|t| root(&mut above, t[0])).collect()
+    triangles.iter().map(|t| connected.find(t[0] as usize) as u32).collect()
 }
 
 /// Unit normals of vertices: the sum of the area normals of the triangles around.

@@ -9,7 +9,7 @@ use super::{
     lanes::{F8, LANES, STEPS, V8},
     raster::Samples,
 };
-use crate::scene::Lighting;
+use crate::{geometry::basis_from_reference, scene::Lighting};
 
 /// Texels along an edge of the part of the map in which shadows fall.
 const INNER: usize = 768;
@@ -88,8 +88,8 @@ impl ShadowMap {
     pub(super) fn around(lighting: &Lighting, radius: f32) -> Self {
         let up: V3 = lighting.key.direction_w.normalize().cast();
         let side = if up.z.abs() < 0.99 { V3::z() } else { V3::x() };
-        let u = side.cross(&up).normalize();
-        let axes = [u, up.cross(&u), up];
+        let [u, v] = basis_from_reference(&up, &side);
+        let axes = [u, v, up];
         let texels_per_metre = INNER as f32 / (2.0 * radius);
         let steep = up.z.signum() * up.z.abs().max(LEVELLEST) * texels_per_metre;
         Self {

@@ -8,10 +8,7 @@ use super::{
     lowest::lowest_points,
     skin::{Ring, SAMPLE_AREA, SkinSamples},
 };
-use crate::geometry::{
-    Pose, Vec3,
-    shape::{Aabb, Shape},
-};
+use crate::geometry::{Aabb, Pose, Vec3, shape::Shape};
 
 /// Tilt (sine) of a ring up to which all of it carries, and from which only its lowest point does.
 const RING_FLAT: [f64; 2] = [0.05, 0.1];
@@ -34,8 +31,7 @@ impl Probe<'_> {
     /// Whether `p_a` is surely farther than `reach` (m) from the second body.
     pub(super) fn is_beyond(&self, p_a: &Vec3, reach: f64) -> bool {
         let p_b = self.a_in_b * nalgebra::Point3::from(*p_a);
-        let (low, high) = (&self.bounds_b.min, &self.bounds_b.max);
-        (0..3).any(|i| p_b[i] < low[i] - reach || p_b[i] > high[i] + reach)
+        !self.bounds_b.loosened(reach).contains(&p_b.coords)
     }
 
     /// Gap at `p_a` (first body's frame).

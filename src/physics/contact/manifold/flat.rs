@@ -5,7 +5,7 @@
 //! moves, which counts the less the flatter it is (see [`super::field`]); points spread over it count for the rest.
 
 use super::{POINT_AREA, skin::onto};
-use crate::geometry::{Vec3, shape::Shape};
+use crate::geometry::{Vec3, orthonormal_basis, shape::Shape};
 
 /// Curvature from which the moving lowest point carries alone, 1/m: 1/250 mm.
 pub(super) const CURVED: f64 = 4.0;
@@ -92,7 +92,7 @@ impl Seed {
     fn at(shape: &Shape, p: &Vec3, aside: f64) -> Option<Self> {
         let p = onto(shape, *p);
         let (gap, normal) = shape.distance_and_normal(&p);
-        let (u, v) = across(&normal);
+        let [u, v] = orthonormal_basis(&normal);
         let mut bend = 0.0;
         for way in [u, -u, v, -v] {
             let turn = (shape.distance_and_normal(&(p + way * aside)).1 - normal).norm();
@@ -124,7 +124,7 @@ fn faces<'a>(shape: &'a Shape, seeds: &[Seed]) -> Vec<Face<'a>> {
 impl Face<'_> {
     /// The extreme points of the face in directions all around.
     fn outline(&self, step: f64) -> Vec<Vec3> {
-        let (u, v) = across(&self.normal);
+        let [u, v] = orthonormal_basis(&self.normal);
         (0..DIRECTIONS)
             .filter_map(|k| {
                 let (sin, cos) = (std::f64::consts::TAU * f64::from(k) / f64::from(DIRECTIONS)).sin_cos();
@@ -177,10 +177,4 @@ impl Face<'_> {
         }
         best
     }
-}
-
-/// Two unit vectors across `normal` and each other.
-pub(super) fn across(normal: &Vec3) -> (Vec3, Vec3) {
-    let u = Vec3::ith(normal.iamin(), 1.0).cross(normal).normalize();
-    (u, normal.cross(&u))
 }

@@ -3,10 +3,7 @@
 
 use super::ContactPoint;
 use crate::{
-    geometry::{
-        Pose,
-        shape::{Aabb, Shape},
-    },
+    geometry::{Aabb, Pose, shape::Shape},
     physics::contact::solid::GelSample,
 };
 
@@ -28,7 +25,7 @@ pub fn gel_vs_shape(
         let p_b = (a_in_b * nalgebra::Point3::from(sample.p)).coords;
         // A sample may lie beyond an edge and still cover it with half of its patch.
         let reach = margin + 0.5 * sample.area.sqrt();
-        if (0..3).any(|i| p_b[i] < bounds_b.min[i] - reach || p_b[i] > bounds_b.max[i] + reach) {
+        if !bounds_b.loosened(reach).contains(&p_b) {
             continue;
         }
         let facing = a_in_b.rotation * sample.normal;

@@ -10,10 +10,10 @@ use std::f64::consts::{FRAC_PI_4, TAU};
 use super::{
     ContactPoint, MOVING, POINT_AREA,
     field::{Probe, golden_minimum},
-    flat::{CURVED, across},
+    flat::CURVED,
     skin::{Ring, SAMPLE_AREA, SkinSamples, onto},
 };
-use crate::geometry::{Vec3, shape::Shape};
+use crate::geometry::{Vec3, orthonormal_basis, shape::Shape};
 
 /// How far aside of a lowest point the rise of the gap is looked at, m; on small bodies this share of the distance of seeds.
 const ASIDE: f64 = 1e-3;
@@ -119,7 +119,7 @@ impl Smooth<'_> {
     /// How much the gap rises aside of a point, m, in eight directions.
     fn rises(&self, p: &Vec3) -> [f64; 8] {
         let here = self.probe.gap(p);
-        let (u, v) = across(&self.shape.distance_and_normal(p).1);
+        let [u, v] = orthonormal_basis(&self.shape.distance_and_normal(p).1);
         let ways = [u, v, (u + v).normalize(), (u - v).normalize()];
         std::array::from_fn(|k| {
             let way = if k < 4 { ways[k] } else { -ways[k - 4] };
@@ -130,7 +130,7 @@ impl Smooth<'_> {
     /// The direction near the given one of eight in which the gap rises least, and how far the rise along it, ahead or
     /// behind, is that of a point (1) or of a line (0).
     fn line_way(&self, p: &Vec3, eighth: usize) -> (Vec3, f64) {
-        let (u, v) = across(&self.shape.distance_and_normal(p).1);
+        let [u, v] = orthonormal_basis(&self.shape.distance_and_normal(p).1);
         // The order of `rises`: along u, v and the two between them, then the opposite ones.
         let angle = [0.0, 2.0, 1.0, -1.0, 4.0, 6.0, 5.0, 3.0][eighth] * FRAC_PI_4;
         let at = |angle: f64| u * angle.cos() + v * angle.sin();

@@ -1,7 +1,7 @@
 //! A box over a half-space: its corners.
 
 use super::ContactPoint;
-use crate::geometry::{Pose, Vec3};
+use crate::geometry::{Pose, Vec3, hex8};
 
 /// The corners of a box of half extents `half` within `margin` of the half-space's face.
 ///
@@ -12,7 +12,7 @@ pub(super) fn corners(plane_w: &Pose, half: &Vec3, box_w: &Pose, margin: f64, ou
     let down = -(box_w.rotation.inverse() * n_w);
     let face = Vec3::new(half.y * half.z, half.x * half.z, half.x * half.y);
     for corner in 0..8u32 {
-        let sign = Vec3::from_fn(|axis, _| if corner >> axis & 1 == 1 { 1.0 } else { -1.0 });
+        let sign = hex8::corner_sign(corner as usize);
         let p_w = box_w * nalgebra::Point3::from(half.component_mul(&sign));
         let phi = n_w.dot(&(p_w.coords - plane_w.translation.vector));
         let area = (0..3).map(|axis| face[axis] * (sign[axis] * down[axis]).max(0.0)).sum::<f64>();

@@ -4,10 +4,10 @@ use nalgebra::SymmetricEigen;
 
 use super::{
     POINT_AREA, Piece,
-    flat::{Spot, across, spots},
+    flat::{Spot, spots},
 };
 use crate::geometry::{
-    Mat3, Pose, Vec3,
+    Mat3, Pose, Vec3, hex8, orthonormal_basis,
     shape::{Profile, Shape},
 };
 
@@ -101,7 +101,7 @@ fn edges(shape: &Shape, frame_o: &Pose, samples: &mut SkinSamples) {
     };
     match shape {
         Shape::Box { half } => samples.fixed.extend((0..8).map(|corner| {
-            let sign = Vec3::from_fn(|axis, _| if corner >> axis & 1 == 1 { 1.0 } else { -1.0 });
+            let sign = hex8::corner_sign(corner);
             (frame_o * nalgebra::Point3::from(half.component_mul(&sign))).coords
         })),
         Shape::Cylinder { radius, half_height } => {
@@ -143,7 +143,7 @@ fn general(shape: &Shape, frame_o: &Pose, samples: &mut SkinSamples) {
 /// Whether the skin has an edge at `p`, and not a rounding.
 fn is_sharp(shape: &Shape, p: &Vec3) -> bool {
     let normal = shape.distance_and_normal(p).1;
-    let (u, v) = across(&normal);
+    let [u, v] = orthonormal_basis(&normal);
     let (s, d) = ((u + v).normalize(), (u - v).normalize());
     // Inwards too: on an edge itself the normal is one face's, and what lies off the other leads back to the edge.
     let ways = [u, -u, v, -v, s, -s, d, -d, -normal];

@@ -6,7 +6,7 @@ use super::{
     clip::{self, Corner},
     feature::{Face, Features, Line, facing},
 };
-use crate::geometry::{Pose, Vec3};
+use crate::geometry::{Pose, Vec3, orthonormal_basis};
 
 /// Features overlap if they miss each other by less than this, m: above the rounding of a refined normal.
 const SLACK_M: f64 = 1e-6;
@@ -35,8 +35,8 @@ struct Cross {
 
 impl Cross {
     fn new(origin: Vec3, n: Vec3) -> Self {
-        let u = Vec3::ith(n.iamin(), 1.0).cross(&n).normalize();
-        Self { origin, n, u, v: n.cross(&u) }
+        let [u, v] = orthonormal_basis(&n);
+        Self { origin, n, u, v }
     }
 
     fn flat(&self, p: &Vec3) -> [f64; 2] {
