@@ -28,7 +28,7 @@ use crate::{
     policy::TaskBrief,
     report::{
         interchange,
-        run_folder::{EPISODES, RUN, RunFolder, RunFolderError, SUMMARY, write_json},
+        run_folder::{EPISODES, RUN, RunFolder, SUMMARY},
     },
     rollout::{
         BuildError, ControlError, Controller, Episode, EpisodeError, EpisodeSpec, Finished, Looks, RestCache,
@@ -250,7 +250,7 @@ impl<'a> Batch<'a> {
         interchange::write_scores(&self.out, &records, &self.released).map_err(folder_failure)?;
         let done = self.summed_up(records);
         // The last of all: a folder with a summary is finished.
-        write_json(&self.out.join(SUMMARY), &done.summary).map_err(folder_failure)?;
+        crate::files::write_json(&self.out.join(SUMMARY), &done.summary).map_err(Failure::input)?;
         crate::text::eprint_line(&format!("softvt: {}", self.out.display()));
         Ok(done)
     }
@@ -446,7 +446,7 @@ pub(super) fn tell_undrawn(finished: &Finished, drawn: Result<(), Failure>) {
     }
 }
 
-pub(super) fn folder_failure(error: RunFolderError) -> Failure {
+pub(super) fn folder_failure(error: impl std::fmt::Display) -> Failure {
     Failure::input(error)
 }
 

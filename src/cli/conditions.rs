@@ -17,7 +17,7 @@ use crate::{
     evaluation::summary::method,
     report::{
         conditions::{Outcome, Row, Rows, table},
-        run_folder::{RunFolder, replace},
+        run_folder::RunFolder,
     },
     script::Loaded,
     text,
@@ -224,7 +224,7 @@ fn write(run: &Run, loaded: &Loaded, compared: &[Rows], out: &Path) -> Result<()
     let text = format!("{:#}\n", serde_json::json!(document));
     make_folder(out)?;
     let path = out.join(FILE);
-    replace(&path, &text).map_err(Failure::input)?;
+    crate::files::replace(&path, &text).map_err(Failure::input)?;
     if run.json {
         print(&text);
     }

@@ -11,11 +11,12 @@ use super::{
 };
 use crate::{
     dataset::{
-        TaskFile, check, files,
+        TaskFile, check,
         layout::{DATASET, RECORDING},
         manifest::{self, Entry},
         stats,
     },
+    files,
     report::runs::StoredRun,
     rollout::{batch, cancel},
 };
@@ -104,7 +105,7 @@ pub(super) fn stats(path: &Path, out: Option<&Path>, json: bool) -> Result<(), F
     }
     let beside = if path.is_dir() { path.join("stats.svg") } else { path.with_extension("stats.svg") };
     let out = out.map_or(beside, Path::to_path_buf);
-    files::write(&out, stats::svg(&spreads).as_bytes()).map_err(Failure::input)?;
+    files::replace(&out, stats::svg(&spreads).as_bytes()).map_err(Failure::input)?;
     crate::text::eprint_line(&format!("softvt: {}", out.display()));
     Ok(())
 }

@@ -8,7 +8,7 @@ use std::{
 
 use super::{Failure, args::Run, files::make_folder, print, progress::Progress};
 use crate::{
-    report::run_folder::replace,
+    files::replace,
     rollout::{batch, cancel},
     script::{Experiment, Loaded, Row},
 };

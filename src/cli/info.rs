@@ -16,8 +16,9 @@ use super::{
 use crate::{
     benchmark::{Task, settings::Settings},
     dataset::card::Imported,
+    files::write_json,
     policy::profile::Profile,
-    report::run_folder::{RUN, RunFolder, write_json},
+    report::run_folder::{RUN, RunFolder},
 };
 
 /// Everything needed to repeat a run.
@@ -105,7 +106,7 @@ impl<'a> RunInfo<'a> {
 /// The file cannot be written, or is that of another run.
 pub(super) fn write(folder: &RunFolder, info: &impl Serialize) -> Result<(), Failure> {
     let Some(known) = folder.read(RUN).map_err(folder_failure)? else {
-        return write_json(&folder.path().join(RUN), info).map_err(folder_failure);
+        return write_json(&folder.path().join(RUN), info).map_err(Failure::input);
     };
     let path = folder.path().join(RUN).display().to_string();
     let known: Value = serde_json::from_str(&known)

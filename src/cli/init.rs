@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::{Failure, files::make_folder, print};
 use crate::{
-    report::run_folder::replace,
+    files::replace,
     script::{
         embedded,
         stubs::{LUARC, STUB_FILE, stubs},

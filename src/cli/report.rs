@@ -5,9 +5,7 @@ use std::path::{Path, PathBuf};
 use super::{Failure, files::make_folder};
 use crate::report::{
     judged::judge,
-    page,
-    run_folder::replace,
-    runs,
+    page, runs,
     tables::{Table, all_tables},
 };
 
@@ -36,7 +34,7 @@ pub(super) fn run(dirs: &[PathBuf], out: &Path) -> Result<(), Failure> {
         ("report.md", joined(Table::markdown)),
         ("report.tex", LATEX_HEAD.to_owned() + &joined(Table::latex)),
     ] {
-        replace(&out.join(name), text).map_err(Failure::input)?;
+        crate::files::replace(&out.join(name), text).map_err(Failure::input)?;
     }
     crate::text::eprint_line(&format!("softvt: {}", out.join("report.html").display()));
     Ok(())

@@ -14,7 +14,6 @@ use crate::{
         actions,
         film::{self, Caption, FilmError},
         interchange::{self, DebugFrame, DebugShape},
-        run_folder::replace,
     },
     rollout::{Finished, ScoreFrame, cancel},
 };
@@ -114,7 +113,7 @@ impl<'a> SideFiles<'a> {
             text += &serde_json::to_string(step).map_err(Failure::input)?;
             text.push('\n');
         }
-        replace(&path, &text).map_err(folder_failure)
+        crate::files::replace(&path, &text).map_err(Failure::input)
     }
 }
 

@@ -5,9 +5,10 @@ use std::{collections::BTreeMap, fmt::Write, path::Path};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    DatasetError, files,
+    DatasetError,
     layout::{CARD, DATASET},
 };
+use crate::files;
 
 /// A task and how it went.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -83,11 +84,11 @@ impl Card {
     /// # Errors
     /// A file cannot be written.
     pub fn write(&self, root: &Path) -> Result<(), DatasetError> {
-        files::write(&root.join(CARD), self.page().as_bytes())?;
+        files::replace(&root.join(CARD), self.page().as_bytes())?;
         let path = root.join(DATASET);
         let text = serde_json::to_string_pretty(self)
             .map_err(|e| DatasetError::content(&path, "JSON", e.to_string()))?;
-        files::write(&path, (text + "\n").as_bytes())
+        Ok(files::replace(&path, (text + "\n").as_bytes())?)
     }
 
     /// Reads `dataset.json`.

@@ -6,25 +6,26 @@ use rust_hdf5::{H5Dataset, H5File, H5Group, H5Type};
 use serde_json::Value;
 
 use super::{
-    DatasetError, files,
+    DatasetError,
     read::{TaskFile, kind_of},
     write::{Writer, annotate},
 };
+use crate::files;
 
 /// Makes the file of a task: demonstration k from `/data/demo_0` of part k. It appears whole or not at all.
 ///
 /// # Errors
 /// A part cannot be read, or the file not written.
 pub fn assemble(parts: &[PathBuf], into: &Path, environment: &Value) -> Result<(), DatasetError> {
-    files::make_folder(into.parent().unwrap_or(into))?;
-    let aside = files::aside(into);
+    files::create_folder(into.parent().unwrap_or(into))?;
+    let aside = files::temp_path(into);
     let written = write_all(parts, &aside, environment);
     if written.is_err() {
         // On a full disk its room is needed; the parts stay.
-        let _ = files::remove(&aside);
+        let _ = files::remove_if_present(&aside);
     }
     written?;
-    files::settle(&aside, into)
+    Ok(files::persist(&aside, into)?)
 }
 
 fn write_all(parts: &[PathBuf], aside: &Path, environment: &Value) -> Result<(), DatasetError> {

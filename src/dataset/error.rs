@@ -5,21 +5,13 @@ use std::{fmt::Display, io, path::Path};
 use rust_hdf5::Hdf5Error;
 
 use super::video::VideoError;
-use crate::rollout::SenseError;
+use crate::{files::FileError, rollout::SenseError};
 
 /// Why demonstrations cannot be written or read.
 #[derive(Debug, thiserror::Error)]
 pub enum DatasetError {
-    /// The system refused.
-    #[error("cannot {action} {path}: {source}")]
-    Io {
-        /// What was tried.
-        action: &'static str,
-        /// On which file.
-        path: String,
-        /// What the system said.
-        source: io::Error,
-    },
+    #[error(transparent)]
+    File(#[from] FileError),
     /// There is no HDF5 file.
     #[error("{path} {what}")]
     NoFile {
@@ -68,17 +60,17 @@ pub enum DatasetError {
 }
 
 impl DatasetError {
-    /// What the system said of an action on a file.
-    pub fn io(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self + use<> {
-        let path = path.display().to_string();
-        move |source| Self::Io { action, path, source }
+    /// Converts the `io::Error` of `action` on `path`, for `map_err`.
+    pub(crate) fn io(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self + use<> {
+        let convert = FileError::io(action, path);
+        move |source| Self::File(convert(source))
     }
 
     /// What the HDF5 library said of a key of a file.
     pub(super) fn hdf5(path: &Path, key: impl Display) -> impl FnOnce(Hdf5Error) -> Self {
         let (path, key) = (path.display().to_string(), key.to_string());
         move |error| match error {
-            Hdf5Error::Io(source) => Self::Io { action: "read or write", path, source },
+            Hdf5Error::Io(source) => Self::File(FileError::Io { action: "read or write", path, source }),
             Hdf5Error::NotFound(_) => Self::Hdf5 { path, key, what: "it is not there".to_owned() },
             // Its layers name themselves before what the system said.
             other => {

@@ -5,10 +5,13 @@ use std::{collections::BTreeMap, path::Path};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    DatasetError, files,
+    DatasetError,
     layout::{MANIFEST, TaskPlace, VIDEOS},
 };
-use crate::evaluation::record::{EpisodeRecord, Origin};
+use crate::{
+    evaluation::record::{EpisodeRecord, Origin},
+    files,
+};
 
 /// Version of this form.
 pub const SCHEMA: u32 = 1;
@@ -91,7 +94,7 @@ pub fn write(root: &Path, entries: &[Entry]) -> Result<(), DatasetError> {
         text += &line.map_err(|e| DatasetError::content(&path, "line", e.to_string()))?;
         text.push('\n');
     }
-    files::write(&path, text.as_bytes())
+    Ok(files::replace(&path, text.as_bytes())?)
 }
 
 /// Reads all lines.

@@ -9,7 +9,6 @@ pub mod check;
 mod copy;
 mod demonstration;
 mod error;
-pub mod files;
 mod hidden;
 pub mod import;
 pub mod layout;

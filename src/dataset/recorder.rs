@@ -7,13 +7,13 @@ use rust_hdf5::H5Dataset;
 use serde_json::Value;
 
 use super::{
-    DatasetError, Demonstration, files,
+    DatasetError, Demonstration,
     layout::{PICTURES, VIDEOS},
     pictures::{Easel, Scenery},
     video::VideoWriter,
     write::Writer,
 };
-use crate::{benchmark::control::CONTROL_DT, rollout::Film};
+use crate::{benchmark::control::CONTROL_DT, files, rollout::Film};
 
 /// What is written of a demonstration, and where.
 pub struct Recorder<'a> {
@@ -45,15 +45,15 @@ impl Recorder<'_> {
         mut demonstration: Demonstration,
         stop: impl Fn() -> bool,
     ) -> Result<(), DatasetError> {
-        files::make_folder(self.hdf5.parent().unwrap_or(&self.hdf5))?;
-        let aside = files::aside(&self.hdf5);
+        files::create_folder(self.hdf5.parent().unwrap_or(&self.hdf5))?;
+        let aside = files::temp_path(&self.hdf5);
         let written = self.draw(&aside, film, &mut demonstration, stop);
         if written.is_err() {
             // A torn file is of no use, and on a full disk its room is.
-            let _ = files::remove(&aside);
+            let _ = files::remove_if_present(&aside);
         }
         written?;
-        files::settle(&aside, &self.hdf5)
+        Ok(files::persist(&aside, &self.hdf5)?)
     }
 
     fn draw(
@@ -184,8 +184,8 @@ impl Reels {
     fn save(self, to: &Recorder) -> Result<(), DatasetError> {
         debug_assert_eq!(self.videos.len(), VIDEOS.len());
         for (video, path) in self.videos.into_iter().zip(&to.videos) {
-            files::write(path, &video.finish()?)?;
+            files::replace(path, &video.finish()?)?;
         }
-        files::write(&to.preview, &self.preview.finish()?)
+        Ok(files::replace(&to.preview, &self.preview.finish()?)?)
     }
 }

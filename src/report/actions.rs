@@ -6,8 +6,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::run_folder::{RunFolderError, io_error, replace};
-use crate::{geometry::Vec3, policy::Action};
+use crate::{
+    files::{FileError, replace},
+    geometry::Vec3,
+    policy::Action,
+};
 
 const MAGIC: &[u8] = b"\x93NUMPY\x01\x00";
 /// The data begin at a multiple of this.
@@ -19,7 +22,7 @@ const WIDTH: usize = 7;
 pub enum ActionsError {
     /// The system refused.
     #[error(transparent)]
-    Io(#[from] RunFolderError),
+    Io(#[from] FileError),
     /// It is no such array.
     #[error("{path}: {what}; expected float64 numbers of shape (steps, 7), as softvt writes them")]
     Format {
@@ -39,9 +42,7 @@ pub fn path(dir: &Path, task: usize, episode: u32) -> PathBuf {
 ///
 /// # Errors
 /// The file cannot be written.
-pub fn write(path: &Path, actions: &[Action]) -> Result<(), RunFolderError> {
-    let folder = path.parent().unwrap_or(path);
-    fs::create_dir_all(folder).map_err(io_error("make the folder", folder))?;
+pub fn write(path: &Path, actions: &[Action]) -> Result<(), FileError> {
     let mut header =
         format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({}, {WIDTH}), }}", actions.len());
     let length = MAGIC.len() + 2 + header.len() + 1;
@@ -61,7 +62,7 @@ pub fn write(path: &Path, actions: &[Action]) -> Result<(), RunFolderError> {
 /// # Errors
 /// The file cannot be read or is no such array.
 pub fn read(path: &Path) -> Result<Vec<Action>, ActionsError> {
-    let bytes = fs::read(path).map_err(io_error("read", path))?;
+    let bytes = fs::read(path).map_err(FileError::io("read", path))?;
     parse(&bytes)
         .map_err(|what| ActionsError::Format { path: path.display().to_string(), what: what.to_owned() })
 }

@@ -6,22 +6,22 @@
 use std::{
     collections::BTreeMap,
     fmt::Write,
-    fs,
     path::{Path, PathBuf},
 };
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use crate::evaluation::{
-    calibration::Envelope,
-    deformation::{Deformation, METRIC_ID, Reference},
-    record::{EpisodeRecord, Identity},
-    statistics::percentile,
-    thresholds::Thresholds,
+use crate::{
+    evaluation::{
+        calibration::Envelope,
+        deformation::{Deformation, METRIC_ID, Reference},
+        record::{EpisodeRecord, Identity},
+        statistics::percentile,
+        thresholds::Thresholds,
+    },
+    files::{FileError, replace},
 };
-
-use super::run_folder::{RunFolderError, io_error, replace};
 
 /// Name of the folder in a run folder.
 pub const FOLDER: &str = "softvtbench";
@@ -142,18 +142,11 @@ pub fn debug_log_path(dir: &Path, task: usize, episode: u32) -> PathBuf {
 ///
 /// # Errors
 /// The file cannot be written.
-pub fn write_debug_log(
-    path: &Path,
-    identity: &Identity,
-    frames: &[DebugFrame],
-) -> Result<(), RunFolderError> {
-    let folder = path.parent().unwrap_or(path);
-    fs::create_dir_all(folder).map_err(io_error("make the folder", folder))?;
+pub fn write_debug_log(path: &Path, identity: &Identity, frames: &[DebugFrame]) -> Result<(), FileError> {
     let none = [DebugFrame::none(identity)];
     let mut text = String::new();
     for frame in if frames.is_empty() { &none[..] } else { frames } {
-        let line = serde_json::to_string(frame)
-            .map_err(|source| RunFolderError::Json { path: path.display().to_string(), source })?;
+        let line = serde_json::to_string(frame).map_err(FileError::json(path))?;
         text.push_str(&line);
         text.push('\n');
     }
@@ -169,13 +162,8 @@ pub fn has_scores(dir: &Path) -> bool {
 ///
 /// # Errors
 /// A file cannot be written.
-pub fn write_scores(
-    dir: &Path,
-    records: &[EpisodeRecord],
-    thresholds: &Thresholds,
-) -> Result<(), RunFolderError> {
+pub fn write_scores(dir: &Path, records: &[EpisodeRecord], thresholds: &Thresholds) -> Result<(), FileError> {
     let folder = dir.join(FOLDER);
-    fs::create_dir_all(&folder).map_err(io_error("make the folder", &folder))?;
     let released = Thresholds { envelopes: BTreeMap::new(), ..thresholds.clone() };
     replace(&folder.join(EPISODES_CSV), episodes_csv(records))?;
     replace(&folder.join(SUMMARY_JSON), format!("{:#}\n", summary(records)))?;

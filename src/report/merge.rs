@@ -10,10 +10,13 @@ use serde_json::Value;
 
 use super::{
     interchange,
-    run_folder::{EPISODES, RUN, RunFolderError, SUMMARY, io_error, line, replace, write_json},
+    run_folder::{EPISODES, RUN, RunFolderError, SUMMARY, io_error, line},
     runs::{RunsError, StoredRun, load},
 };
-use crate::evaluation::{record::EpisodeRecord, summary::Summary, thresholds::Thresholds};
+use crate::{
+    evaluation::{record::EpisodeRecord, summary::Summary, thresholds::Thresholds},
+    files::{self, FileError},
+};
 
 /// Folders that hold files of single episodes.
 const PER_EPISODE: [&str; 4] = ["actions", "trace", "video", interchange::FOLDER];
@@ -27,6 +30,8 @@ pub enum MergeError {
     /// A file cannot be written.
     #[error(transparent)]
     Folder(#[from] RunFolderError),
+    #[error(transparent)]
+    File(#[from] FileError),
     /// They do not belong together.
     #[error("{0}")]
     Unfit(String),
@@ -120,7 +125,7 @@ fn write(
     info: &Value,
     records: &[EpisodeRecord],
 ) -> Result<Summary, MergeError> {
-    fs::create_dir_all(folder).map_err(io_error("make the folder", folder))?;
+    files::create_folder(folder)?;
     for run in runs {
         for name in PER_EPISODE {
             copy(&run.dir.join(name), &folder.join(name))?;
@@ -128,8 +133,8 @@ fn write(
     }
     let lines: Result<String, RunFolderError> =
         records.iter().map(|r| line(r, &folder.join(EPISODES))).collect();
-    replace(&folder.join(EPISODES), lines?)?;
-    write_json(&folder.join(RUN), info)?;
+    files::replace(&folder.join(EPISODES), lines?)?;
+    files::write_json(&folder.join(RUN), info)?;
     let path = runs[0].dir.join(interchange::FOLDER).join(interchange::THRESHOLDS_JSON);
     let text = fs::read_to_string(&path).map_err(io_error("read", &path))?;
     let thresholds = Thresholds::parse(&text, &path.display().to_string())
@@ -138,7 +143,7 @@ fn write(
     // That of a twin is not the name of its suite.
     let suite = records.first().map_or(runs[0].suite(), |record| &record.identity.suite);
     let summary = Summary::of(suite, runs[0].text("policy"), records);
-    write_json(&folder.join(SUMMARY), &summary)?;
+    files::write_json(&folder.join(SUMMARY), &summary)?;
     Ok(summary)
 }
 
@@ -150,7 +155,7 @@ fn copy(from: &Path, to: &Path) -> Result<(), RunFolderError> {
     folders.sort();
     for folder in folders {
         let inner = to.join(folder.file_name().unwrap_or_default());
-        fs::create_dir_all(&inner).map_err(io_error("make the folder", &inner))?;
+        files::create_folder(&inner)?;
         copy(&folder, &inner)?;
         let files = fs::read_dir(&folder).map_err(io_error("read", &folder))?;
         for file in files.filter_map(Result::ok).map(|e| e.path()).filter(|p| p.is_file()) {

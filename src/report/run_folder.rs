@@ -10,9 +10,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use serde::Serialize;
-
-use crate::evaluation::record::EpisodeRecord;
+use crate::{
+    evaluation::record::EpisodeRecord,
+    files::{self, FileError},
+};
 
 /// One line an episode.
 pub const EPISODES: &str = "episodes.jsonl";
@@ -40,24 +41,8 @@ pub enum RunFolderError {
         /// The folder.
         dir: String,
     },
-    /// The system refused.
-    #[error("cannot {action} {path}: {source}")]
-    Io {
-        /// What was tried.
-        action: &'static str,
-        /// On which file.
-        path: String,
-        /// What the system said.
-        source: io::Error,
-    },
-    /// A record cannot be written as JSON.
-    #[error("cannot write {path} as JSON: {source}")]
-    Json {
-        /// The file.
-        path: String,
-        /// What is wrong.
-        source: serde_json::Error,
-    },
+    #[error(transparent)]
+    File(#[from] FileError),
     /// A line is not an episode.
     #[error("{path}:{line}: not an episode record: {source}")]
     BadLine {
@@ -94,7 +79,7 @@ impl RunFolder {
     /// # Errors
     /// The folder holds a run, or cannot be made or written to.
     pub fn create(dir: &Path) -> Result<Self, RunFolderError> {
-        fs::create_dir_all(dir).map_err(io_error("make the folder", dir))?;
+        files::create_folder(dir)?;
         Self::check(dir)?;
         let path = dir.join(EPISODES);
         // `create_new`: of two runs started at once on one folder, one must lose here.
@@ -116,7 +101,7 @@ impl RunFolder {
     /// # Errors
     /// Another process is at work there, a line is not an episode, the system refuses.
     pub fn resume(dir: &Path) -> Result<(Self, Vec<EpisodeRecord>), RunFolderError> {
-        fs::create_dir_all(dir).map_err(io_error("make the folder", dir))?;
+        files::create_folder(dir)?;
         let path = dir.join(EPISODES);
         let mut options = OpenOptions::new();
         let mut episodes =
@@ -172,7 +157,7 @@ impl RunFolder {
             records.iter().map(|record| line(record, &path)).collect();
         let lines = lines?;
         if fs::read(&path).map_err(io_error("read", &path))? != lines.as_bytes() {
-            replace(&path, &lines)?;
+            files::replace(&path, &lines)?;
         }
         Ok(())
     }
@@ -183,28 +168,12 @@ impl RunFolder {
     /// A file cannot be removed.
     pub fn discard(self) -> Result<(), RunFolderError> {
         for name in [RUN, EPISODES] {
-            let path = self.dir.join(name);
-            match fs::remove_file(&path) {
-                Err(source) if source.kind() != io::ErrorKind::NotFound => {
-                    return Err(io_error("remove", &path)(source));
-                }
-                _ => {}
-            }
+            files::remove_if_present(&self.dir.join(name))?;
         }
         // It may hold the user's own files; then it stays.
         let _ = fs::remove_dir(&self.dir);
         Ok(())
     }
-}
-
-/// Writes `value` as indented JSON, aside and then renamed: a reader sees the old file or the new one, never a part.
-///
-/// # Errors
-/// The value is no JSON, or the file cannot be written.
-pub fn write_json<T: Serialize>(path: &Path, value: &T) -> Result<(), RunFolderError> {
-    let text = serde_json::to_string_pretty(value)
-        .map_err(|source| RunFolderError::Json { path: path.display().to_string(), source })?;
-    replace(path, text + "\n")
 }
 
 /// Keeps other processes out until the file is closed, which the system does for a process that dies.
@@ -217,34 +186,7 @@ fn lock(episodes: &File, dir: &Path) -> Result<(), RunFolderError> {
 }
 
 pub(super) fn line(record: &EpisodeRecord, path: &Path) -> Result<String, RunFolderError> {
-    let line = serde_json::to_string(record)
-        .map_err(|source| RunFolderError::Json { path: path.display().to_string(), source })?;
-    Ok(line + "\n")
-}
-
-/// Replaces `path` by `content`: written aside, synced, renamed.
-///
-/// # Errors
-/// The file cannot be written.
-pub fn replace(path: &Path, content: impl AsRef<[u8]>) -> Result<(), RunFolderError> {
-    let mut name = path.file_name().unwrap_or_default().to_os_string();
-    name.push(".part");
-    let aside = path.with_file_name(name);
-    // Made anew: what a link of that name leads to must not be written to.
-    match fs::remove_file(&aside) {
-        Err(source) if source.kind() != io::ErrorKind::NotFound => {
-            return Err(io_error("replace", &aside)(source));
-        }
-        _ => {}
-    }
-    let mut file =
-        OpenOptions::new().write(true).create_new(true).open(&aside).map_err(io_error("make", &aside))?;
-    file.write_all(content.as_ref()).map_err(io_error("write to", &aside))?;
-    file.sync_all().map_err(io_error("sync", &aside))?;
-    fs::rename(&aside, path).map_err(io_error("replace", path))?;
-    // The new name itself must outlast a power cut; a system that cannot sync folders keeps it in order some other way.
-    let _ = path.parent().map(File::open).transpose().map(|folder| folder.map(|folder| folder.sync_all()));
-    Ok(())
+    Ok(serde_json::to_string(record).map_err(FileError::json(path))? + "\n")
 }
 
 /// Reads the episodes of a run folder. A last line that was torn by a crash is left out.
@@ -278,8 +220,8 @@ pub(super) fn io_error(
     action: &'static str,
     path: &Path,
 ) -> impl FnOnce(io::Error) -> RunFolderError + use<> {
-    let path = path.display().to_string();
-    move |source| RunFolderError::Io { action, path, source }
+    let convert = FileError::io(action, path);
+    move |source| RunFolderError::File(convert(source))
 }
 
 #[cfg(test)]
@@ -336,7 +278,7 @@ mod tests {
         assert!(error.contains("already holds a run (episodes.jsonl)") && error.contains("--out"), "{error}");
         assert_eq!(indices(root.path()), [0]);
         fs::remove_file(root.path().join(EPISODES)).unwrap();
-        write_json(&root.path().join(RUN), &1).unwrap();
+        files::write_json(&root.path().join(RUN), &1).unwrap();
         assert!(RunFolder::create(root.path()).unwrap_err().to_string().contains("run.json"));
     }
 
@@ -363,15 +305,5 @@ mod tests {
         fs::write(&path, format!("{{\"suite\":\n{whole}")).unwrap();
         let error = read_episodes(root.path()).unwrap_err().to_string();
         assert!(error.contains("episodes.jsonl:1: not an episode record"), "{error}");
-    }
-
-    #[test]
-    fn json_is_replaced_whole_and_nothing_stays_aside() {
-        let root = tempfile::tempdir().unwrap();
-        let path = root.path().join(SUMMARY);
-        write_json(&path, &vec![1, 2]).unwrap();
-        write_json(&path, &vec![3]).unwrap();
-        assert_eq!(fs::read_to_string(path).unwrap(), "[\n  3\n]\n");
-        assert_eq!(fs::read_dir(root.path()).unwrap().count(), 1);
     }
 }

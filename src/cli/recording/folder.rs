@@ -8,9 +8,9 @@ use std::{
 use serde_json::Value;
 
 use super::{super::info::difference, Failure, failure};
-use crate::dataset::{
+use crate::{
+    dataset::layout::{self, DATASET, PARTS, RECORDING},
     files,
-    layout::{self, DATASET, PARTS, RECORDING},
 };
 
 /// Whether the folder holds this very recording, finished.
@@ -67,6 +67,6 @@ pub(super) fn take_back(root: &Path, missing: &[PathBuf]) {
     if gone {
         let _ = std::fs::remove_dir_all(root.join(PARTS));
         let _ = std::fs::remove_file(root.join(RECORDING));
-        files::take_back(missing);
+        files::remove_empty_folders(missing);
     }
 }

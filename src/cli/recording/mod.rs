@@ -13,7 +13,8 @@ use serde_json::Value;
 use super::{Failure, args::Run, evaluate::own_folders};
 use crate::{
     benchmark::{Plan, Suite},
-    dataset::{DatasetError, files, layout::RECORDING},
+    dataset::{DatasetError, layout::RECORDING},
+    files,
 };
 
 pub(super) use session::{Session, Wanted};
@@ -43,12 +44,12 @@ pub(super) fn carry_out<'a>(
         crate::text::eprint_line(&format!("softvt: {} is finished already", root.display()));
         return Ok(());
     }
-    let missing = files::missing(&root);
+    let missing = files::missing_folders(&root);
     // Before anything that takes long: a folder that cannot be written to is told at once.
-    let ready = files::make_writable(&root).map_err(failure).and_then(|()| sessions());
-    let mut sessions = ready.inspect_err(|_| files::take_back(&missing))?;
+    let ready = files::create_writable_folder(&root).map_err(failure).and_then(|()| sessions());
+    let mut sessions = ready.inspect_err(|_| files::remove_empty_folders(&missing))?;
     let text = format!("{recording:#}\n");
-    files::write(&root.join(RECORDING), text.as_bytes()).map_err(failure)?;
+    files::replace(&root.join(RECORDING), text.as_bytes()).map_err(failure)?;
     for session in &mut sessions {
         session.go().inspect_err(|_| folder::take_back(&root, &missing))?;
     }
@@ -73,8 +74,8 @@ pub(super) fn suites_of<'a>(command: &str, run: &Run, plan: &'a Plan) -> Result<
     }
 }
 
-fn failure(error: DatasetError) -> Failure {
-    match error {
+fn failure(error: impl Into<DatasetError>) -> Failure {
+    match error.into() {
         DatasetError::Interrupted => Failure::interrupted("interrupted"),
         other => Failure::input(other),
     }

@@ -25,15 +25,15 @@ use crate::{
     dataset::{
         DatasetError, Demonstration, assemble,
         card::reasons,
-        files,
         layout::{self, TaskPlace, VIDEOS},
         recorder::Recorder,
     },
     evaluation::record::{EpisodeRecord, Origin},
+    files,
     policy::{Chunked, recorded::Recorded},
     report::{
         actions,
-        run_folder::{RunFolder, SUMMARY, write_json},
+        run_folder::{RunFolder, SUMMARY},
     },
     rollout::{EpisodeError, Finished, SettleError, batch, cancel},
     scene::Start,
@@ -173,7 +173,7 @@ impl<'a> Session<'a> {
             Ok(()) => {
                 self.enough()?;
                 let done = self.batch.summed_up(self.records.clone());
-                write_json(&self.batch.out.join(SUMMARY), &done.summary).map_err(folder_failure)
+                files::write_json(&self.batch.out.join(SUMMARY), &done.summary).map_err(Failure::input)
             }
         }
     }
@@ -313,7 +313,7 @@ impl<'a> Session<'a> {
         if !part.is_file() && into.is_file() {
             return Ok(());
         }
-        files::make_folder(into.parent().unwrap_or(&self.root)).map_err(failure)?;
+        files::create_folder(into.parent().unwrap_or(&self.root)).map_err(failure)?;
         std::fs::rename(part, into).map_err(|error| failure(DatasetError::io("move into place", part)(error)))
     }
 

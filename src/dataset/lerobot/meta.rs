@@ -12,14 +12,17 @@ use super::{
     table::{Column, Kind, Table, Values},
     timestamp, v21, v30,
 };
-use crate::dataset::{DatasetError, files, recorder::rate};
+use crate::{
+    dataset::{DatasetError, recorder::rate},
+    files,
+};
 
 /// Files in a folder.
 pub(super) const CHUNK: usize = 1000;
 
 /// Writes a file of JSON for people and programs.
 pub(super) fn json(path: &Path, value: &Value) -> Result<(), DatasetError> {
-    files::write(path, format!("{value:#}\n").as_bytes())
+    Ok(files::replace(path, format!("{value:#}\n").as_bytes())?)
 }
 
 /// Writes everything but what tells of single episodes; `info.json` last: LeRobot opens nothing without it.
@@ -35,7 +38,7 @@ pub(super) fn write(
         Version::V30 => task_table(dir, &chosen.prompts)?,
     }
     origins(dir, export, chosen)?;
-    files::write(&dir.join("README.md"), card(export, chosen, exported).as_bytes())?;
+    files::replace(&dir.join("README.md"), card(export, chosen, exported).as_bytes())?;
     json(&dir.join("meta/info.json"), &info(export.version, features, exported))
 }
 
@@ -75,7 +78,7 @@ fn task_lines(dir: &Path, prompts: &[String]) -> Result<(), DatasetError> {
     let line =
         |(index, prompt): (usize, &String)| format!("{}\n", json!({ "task_index": index, "task": prompt }));
     let text: String = prompts.iter().enumerate().map(line).collect();
-    files::write(&dir.join("meta/tasks.jsonl"), text.as_bytes())
+    Ok(files::replace(&dir.join("meta/tasks.jsonl"), text.as_bytes())?)
 }
 
 /// A table as pandas writes a frame whose index are the prompts: its note says so.
@@ -119,7 +122,7 @@ fn origins(dir: &Path, export: &Export, chosen: &Chosen) -> Result<(), DatasetEr
         format!("{told}\n")
     };
     let text: String = chosen.sources.iter().enumerate().map(line).collect();
-    files::write(&dir.join("meta/softvt.jsonl"), text.as_bytes())
+    Ok(files::replace(&dir.join("meta/softvt.jsonl"), text.as_bytes())?)
 }
 
 fn code(gripper: Gripper) -> &'static str {

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::dataset::{DatasetError, files};
+use crate::{dataset::DatasetError, files};
 
 /// Whoever has it is being written, or was when something broke it off; the writer keeps it locked.
 const MARK: &str = ".softvt-export";
@@ -32,19 +32,19 @@ impl Place {
         if out.file_name().is_none() {
             return Err(DatasetError::content(&out, "--out", "it has no name; give a new folder"));
         }
-        let aside = files::aside(&out);
+        let aside = files::temp_path(&out);
         if fs::symlink_metadata(&aside).is_ok() {
             clear(&aside)?;
         }
         let parent = aside.parent().unwrap_or(&aside);
-        let above = files::missing(parent);
+        let above = files::missing_folders(parent);
         let make = || {
-            files::make_folder(parent)?;
+            files::create_folder(parent)?;
             fs::create_dir(&aside).map_err(DatasetError::io("make the folder", &aside))?;
             let path = aside.join(MARK);
             File::create(&path).map_err(DatasetError::io("write", &path))
         };
-        let mark = make().inspect_err(|_| files::take_back(&above))?;
+        let mark = make().inspect_err(|_| files::remove_empty_folders(&above))?;
         // A file system without locks has no protection from a second export to the same folder, which is rare.
         let _ = mark.try_lock();
         Ok(Self { aside, out, above, _mark: mark })
@@ -64,7 +64,7 @@ impl Place {
             self.give_up();
             return Err(DatasetError::io("rename", &self.out)(error));
         }
-        files::remove(&self.out.join(MARK))?;
+        files::remove_if_present(&self.out.join(MARK))?;
         // The new name itself must outlast a power cut; a system that cannot sync folders keeps it in order some other way.
         for folder in [Some(self.out.as_path()), self.out.parent()].into_iter().flatten() {
             let _ = File::open(folder).map(|folder| folder.sync_all());
@@ -75,7 +75,7 @@ impl Place {
     /// Takes everything back.
     pub(super) fn give_up(&self) {
         let _ = fs::remove_dir_all(&self.aside);
-        files::take_back(&self.above);
+        files::remove_empty_folders(&self.above);
     }
 }
 

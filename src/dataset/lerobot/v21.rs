@@ -18,7 +18,7 @@ use super::{
     summary::Nest,
     table::{Column, Table},
 };
-use crate::dataset::{DatasetError, files};
+use crate::{dataset::DatasetError, files};
 
 /// Where a table is, in Python's words.
 pub(super) const DATA_PATH: &str = "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet";
@@ -67,7 +67,7 @@ pub(super) struct Writer {
 impl Writer {
     /// Begins in a folder that is empty.
     pub(super) fn begin(dir: &Path, features: &[Feature]) -> Result<Self, DatasetError> {
-        files::make_folder(&dir.join("meta"))?;
+        files::create_folder(&dir.join("meta"))?;
         Ok(Self {
             dir: dir.to_owned(),
             columns: features.iter().map(Feature::column).collect(),
@@ -88,7 +88,7 @@ impl Form for Writer {
         let Episode { index, source, rows, summaries } = episode;
         let path = format!("data/chunk-{:03}/episode_{index:06}.parquet", index / CHUNK);
         let path = self.dir.join(path);
-        files::make_folder(path.parent().unwrap_or(&self.dir))?;
+        files::create_folder(path.parent().unwrap_or(&self.dir))?;
         let mut table = Table::create(path, &self.columns, std::slice::from_ref(&self.note))?;
         let steps = rows.steps;
         table.append(steps, Episode::columns(rows, (index, source), picture))?;

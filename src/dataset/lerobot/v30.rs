@@ -14,7 +14,7 @@ use super::{
     summary::{Figures, Nest},
     table::{Column, Kind, Table},
 };
-use crate::dataset::{DatasetError, files};
+use crate::{dataset::DatasetError, files};
 
 /// Where a table is, in Python's words.
 pub(super) const DATA_PATH: &str = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet";
@@ -26,7 +26,7 @@ const TOLD: usize = 10_000;
 /// Makes the folder of the n-th file of a kind, and says where the file goes.
 fn place(dir: &Path, kind: &str, file: usize) -> Result<PathBuf, DatasetError> {
     let folder = dir.join(format!("{kind}/chunk-{:03}", file / CHUNK));
-    files::make_folder(&folder)?;
+    files::create_folder(&folder)?;
     Ok(folder.join(format!("file-{:03}.parquet", file % CHUNK)))
 }
 
@@ -56,7 +56,7 @@ pub(super) struct Writer {
 impl Writer {
     /// Begins in a folder that is empty.
     pub(super) fn begin(dir: &Path, features: &[Feature]) -> Result<Self, DatasetError> {
-        files::make_folder(&dir.join("meta"))?;
+        files::create_folder(&dir.join("meta"))?;
         Ok(Self {
             dir: dir.to_owned(),
             columns: features.iter().map(Feature::column).collect(),

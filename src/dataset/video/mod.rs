@@ -4,13 +4,15 @@ mod colour;
 mod length;
 mod mp4;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use rusty_h264_common::YuvFrame;
 use rusty_h264_encoder::{EncodeError, Encoder, EncoderConfig, Preset};
 use thiserror::Error;
 
 pub use length::length;
+
+use crate::files::{self, FileError};
 
 /// Quantiser of the encoder, 0 (lossless) to 51: pictures of this benchmark come out at about 40 dB.
 const QUANTISER: u8 = 22;
@@ -41,14 +43,8 @@ pub enum VideoError {
     /// A video without pictures.
     #[error("no picture was put into the video")]
     Empty,
-    /// The file could not be written.
-    #[error("{path}: {source}")]
-    File {
-        /// Where.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    File(#[from] FileError),
 }
 
 /// Takes pictures one by one; the file appears whole, at [`VideoWriter::save`].
@@ -117,11 +113,7 @@ impl VideoWriter {
     /// # Errors
     /// No picture, or the file's.
     pub fn save(self, path: &Path) -> Result<(), VideoError> {
-        let bytes = self.finish()?;
-        let aside = path.with_extension("mp4.part");
-        std::fs::write(&aside, bytes)
-            .and_then(|()| std::fs::rename(&aside, path))
-            .map_err(|source| VideoError::File { path: path.to_owned(), source })
+        Ok(files::replace(path, self.finish()?)?)
     }
 }
 

@@ -14,6 +14,7 @@ use crate::{
     benchmark::control::CONTROL_DT,
     dataset::video::{VideoError, VideoWriter},
     evaluation::record::EpisodeRecord,
+    files::{FileError, replace},
     physics::world::Frame,
     rollout::{CAMERA_PICTURES, FINGER_PICTURES, FINGERS, Film, SenseError},
     scene::Camera,
@@ -23,8 +24,6 @@ use crate::{
     },
     text::format_number,
 };
-
-use super::run_folder::{RunFolderError, replace};
 
 /// Edge of a camera's panel, height of a finger's and of the strip below, pixels.
 const PANEL: u32 = 512;
@@ -53,7 +52,7 @@ pub enum FilmError {
     Picture(#[from] ImageError),
     /// A file cannot be written.
     #[error(transparent)]
-    File(#[from] RunFolderError),
+    File(#[from] FileError),
     /// There is nothing to be drawn.
     #[error("the rollout has no states to be drawn")]
     Empty,

@@ -1,0 +1,146 @@
+//! Files that appear complete or not at all, and the folders they are written to.
+//!
+//! A file is written to a sibling with the suffix `.part`, synced, and renamed. The name of the sibling is fixed, so that
+//! the next attempt replaces what a killed process left; `tempfile` would leave one file with a random name per kill, and
+//! gives its files mode 0600.
+
+use std::{
+    ffi::OsString,
+    fs::{self, File, OpenOptions},
+    io::{self, Write},
+    path::{Path, PathBuf},
+};
+
+use serde::Serialize;
+
+/// Error of a file operation, with the file it was about.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
+pub enum FileError {
+    #[error("cannot {action} {path}: {source}")]
+    Io { action: &'static str, path: String, source: io::Error },
+    #[error("cannot write {path} as JSON: {source}")]
+    Json { path: String, source: serde_json::Error },
+}
+
+impl FileError {
+    /// Converts the `io::Error` of `action` on `path`, for `map_err`.
+    pub(crate) fn io(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self + use<> {
+        let path = path.display().to_string();
+        move |source| Self::Io { action, path, source }
+    }
+
+    /// Converts the error of serialising the content of `path`, for `map_err`.
+    pub(crate) fn json(path: &Path) -> impl FnOnce(serde_json::Error) -> Self + use<> {
+        let path = path.display().to_string();
+        move |source| Self::Json { path, source }
+    }
+}
+
+/// Creates a folder and its missing parents.
+///
+/// # Errors
+/// A path component is not a folder, or the system refuses.
+pub fn create_folder(dir: &Path) -> Result<(), FileError> {
+    fs::create_dir_all(dir).map_err(FileError::io("make the folder", dir))
+}
+
+/// Creates a folder and its missing parents, and checks that files can be created in it.
+///
+/// # Errors
+/// As [`create_folder`], or the folder is read-only.
+pub fn create_writable_folder(dir: &Path) -> Result<(), FileError> {
+    create_folder(dir)?;
+    let probe = dir.join(".softvt");
+    let created = File::create(&probe).and_then(|_| fs::remove_file(&probe));
+    created.map_err(FileError::io("write into", dir))
+}
+
+/// The folders that [`create_folder`] would create for `dir`, deepest first.
+pub fn missing_folders(dir: &Path) -> Vec<PathBuf> {
+    let named = dir.ancestors().filter(|path| !path.as_os_str().is_empty());
+    named.take_while(|path| fs::symlink_metadata(path).is_err()).map(Path::to_owned).collect()
+}
+
+/// Removes `folders` in order, up to the first that is not empty.
+pub fn remove_empty_folders(folders: &[PathBuf]) {
+    let _ = folders.iter().try_for_each(fs::remove_dir);
+}
+
+/// Path at which a file or folder is written before [`persist`] gives it its name.
+pub fn temp_path(path: &Path) -> PathBuf {
+    let mut name = OsString::from(path.file_name().unwrap_or_default());
+    name.push(".part");
+    path.with_file_name(name)
+}
+
+/// Syncs a complete file at `temp` and renames it to `path`. Both are durable afterwards.
+///
+/// # Errors
+/// The system refuses to sync or rename.
+pub fn persist(temp: &Path, path: &Path) -> Result<(), FileError> {
+    File::open(temp).and_then(|file| file.sync_all()).map_err(FileError::io("sync", temp))?;
+    fs::rename(temp, path).map_err(FileError::io("replace", path))?;
+    // The new name must survive a power failure as well. Systems that cannot sync folders have other means.
+    let _ = path.parent().map(File::open).transpose().map(|folder| folder.map(|folder| folder.sync_all()));
+    Ok(())
+}
+
+/// Replaces `path` by `content`, creating missing folders. Readers see the old or the new file, never a part of it.
+///
+/// # Errors
+/// The system refuses; the temporary file is removed.
+pub fn replace(path: &Path, content: impl AsRef<[u8]>) -> Result<(), FileError> {
+    create_folder(path.parent().unwrap_or(path))?;
+    let temp = temp_path(path);
+    // Created, not truncated: if the name is a symbolic link, its target must not be overwritten.
+    remove_if_present(&temp)?;
+    let file = OpenOptions::new().write(true).create_new(true).open(&temp);
+    file.and_then(|mut file| file.write_all(content.as_ref()))
+        .inspect_err(|_| drop(fs::remove_file(&temp)))
+        .map_err(FileError::io("write", path))?;
+    persist(&temp, path)
+}
+
+/// Replaces `path` by `value` as indented JSON; see [`replace`].
+///
+/// # Errors
+/// The value cannot be represented in JSON, or the file cannot be written.
+pub fn write_json<T: Serialize + ?Sized>(path: &Path, value: &T) -> Result<(), FileError> {
+    let text = serde_json::to_string_pretty(value).map_err(FileError::json(path))?;
+    replace(path, text + "\n")
+}
+
+/// Removes a file if it exists.
+///
+/// # Errors
+/// The file exists and the system refuses.
+pub fn remove_if_present(path: &Path) -> Result<(), FileError> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(FileError::io("remove", path)(error)),
+        _ => Ok(()),
+    }
+}
+
+/// Reads a UTF-8 file.
+///
+/// # Errors
+/// The file is missing, unreadable or not UTF-8.
+pub fn read_text(path: &Path) -> Result<String, FileError> {
+    fs::read_to_string(path).map_err(FileError::io("read", path))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn json_is_replaced_and_no_temporary_file_remains() {
+        let root = tempfile::tempdir().unwrap();
+        let path = root.path().join("summary.json");
+        write_json(&path, &vec![1, 2]).unwrap();
+        write_json(&path, &vec![3]).unwrap();
+        assert_eq!(fs::read_to_string(path).unwrap(), "[\n  3\n]\n");
+        assert_eq!(fs::read_dir(root.path()).unwrap().count(), 1);
+    }
+}
