@@ -18,11 +18,11 @@ use std::{
 use rmpv::Value;
 use softvt::{
     policy::{
-        ActionChunk, Chunked, Observation, Policy, PolicyError, Streams, TaskBrief,
+        ActionChunk, ChunkedPolicy, Observation, Policy, PolicyError, SensorStreams, TaskBrief,
         profile::Profile,
-        remote::{Connections, Protocol, Remote, Server},
+        remote::{PolicyConnections, PolicyServer, Protocol, RemotePolicy},
     },
-    rollout::{Episode, Looks, RestCache},
+    rollout::{AssetCache, Episode, SensorAssets},
 };
 use tungstenite::{Message, accept};
 
@@ -95,7 +95,7 @@ fn hold(seen: &Value) -> Value {
 
 /// A policy, and how long each of its answers took.
 struct Timed<'a> {
-    inner: Remote,
+    inner: RemotePolicy,
     took: &'a mut Vec<Duration>,
 }
 
@@ -104,7 +104,7 @@ impl Policy for Timed<'_> {
         self.inner.name()
     }
 
-    fn streams(&self) -> Streams {
+    fn streams(&self) -> SensorStreams {
         self.inner.streams()
     }
 
@@ -124,20 +124,21 @@ impl Policy for Timed<'_> {
 fn overheads(profile: &str) -> Vec<f64> {
     static STOP: AtomicBool = AtomicBool::new(false);
     let (url, answers) = serve(Duration::ZERO);
-    let remote = Remote::new(Arc::new(Connections::new(Server {
+    let remote = RemotePolicy::new(Arc::new(PolicyConnections::new(PolicyServer {
         url,
         protocol: Protocol::Openpi,
         profile: Profile::named(profile).expect("a profile"),
-        patience: Duration::from_secs(60),
+        timeout: Duration::from_secs(60),
         api_key: None,
-        stop: &STOP,
+        cancel: &STOP,
     })));
     let (spec, _) = episode::open(&episode::load(), 0, false);
     let (suite, prompt) = (spec.identity.suite.clone(), spec.task.prompt.clone());
     let mut took = Vec::new();
     let policy = Timed { inner: remote, took: &mut took };
-    let mut driver = Chunked::new(Box::new(policy), TaskBrief { suite, task: 0, prompt, episode: 0 }, 10);
-    let started = Episode::start(spec, &RestCache::default(), &Looks::default()).expect("it starts");
+    let mut driver =
+        ChunkedPolicy::new(Box::new(policy), TaskBrief { suite, task: 0, prompt, episode: 0 }, 10);
+    let started = Episode::start(spec, &AssetCache::default(), &SensorAssets::default()).expect("it starts");
     started.run(&mut driver).expect("it runs");
     drop(driver);
     let answers = answers.lock().expect("answers");

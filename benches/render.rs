@@ -12,7 +12,7 @@ use std::path::PathBuf;
 use cpu_time::ThreadTime;
 use softvt::{
     physics::world::Frame,
-    rollout::{Controller, Episode, Film, Looks, RestCache},
+    rollout::{AssetCache, Controller, Episode, SensorAssets, StateRecording},
     scene::Camera,
     script::Loaded,
     sensing::camera::{Scratch, render},
@@ -23,27 +23,27 @@ const ROUNDS: usize = 8;
 const PICTURES: usize = 16;
 
 /// All states of an episode, and what draws them.
-fn film(loaded: &Loaded, task: usize) -> Film {
+fn film(loaded: &Loaded, task: usize) -> StateRecording {
     let (spec, mut expert) = episode::open(loaded, task, true);
-    let started = Episode::start(spec, &RestCache::default(), &Looks::default()).expect("it starts");
-    started.run(&mut expert as &mut dyn Controller).expect("it runs").film.expect("it was asked for")
+    let started = Episode::start(spec, &AssetCache::default(), &SensorAssets::default()).expect("it starts");
+    started.run(&mut expert as &mut dyn Controller).expect("it runs").recording.expect("it was asked for")
 }
 
 /// States spread evenly over an episode.
-fn chosen(film: &Film) -> Vec<Frame> {
+fn chosen(film: &StateRecording) -> Vec<Frame> {
     let last = film.frames.len() - 1;
     (0..PICTURES).map(|i| film.frames[i * last / (PICTURES - 1)].clone()).collect()
 }
 
-fn report(film: &mut Film, name: &str, goal_ms: f64, camera: &Camera, mut scratch: Scratch) {
+fn report(film: &mut StateRecording, name: &str, goal_ms: f64, camera: &Camera, mut scratch: Scratch) {
     let chosen_words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
     let png = std::env::args().any(|word| word == "--png");
     if !(png || chosen_words.is_empty() || chosen_words.iter().any(|word| name.contains(word.as_str()))) {
         return;
     }
     let frames = chosen(film);
-    let views: Vec<_> = frames.iter().map(|frame| film.senses.view(frame)).collect();
-    let stage = film.senses.stage().expect("everything can be drawn");
+    let views: Vec<_> = frames.iter().map(|frame| film.sensors.view(frame)).collect();
+    let stage = film.sensors.render_scene().expect("everything can be drawn");
     let mut shoot = |picture: usize| {
         let start = ThreadTime::now();
         render(stage, &views[picture], camera, &mut scratch).expect("the camera is good");
@@ -80,7 +80,7 @@ fn main() {
         let middle = set.frames[set.frames.len() / 2].clone();
         for (camera, edge) in [(&third, 1024), (&third, 224), (&wrist, 512), (&wrist, 224)] {
             let camera = camera.clone().with_edge(edge);
-            let picture = set.senses.see(&middle, &camera).expect("a picture");
+            let picture = set.sensors.render(&middle, &camera).expect("a picture");
             let path = folder.join(format!("{task}_{}_{edge}.png", camera.name));
             picture.into_image().save(&path).expect("the folder can be written");
         }

@@ -7,8 +7,8 @@ mod episode;
 
 use cpu_time::ThreadTime;
 use softvt::{
-    policy::{Action, Observation, Streams},
-    rollout::{ControlError, Controller, Episode, Looks, RestCache, Simulation},
+    policy::{Action, Observation, SensorStreams},
+    rollout::{AssetCache, ControlError, Controller, Episode, SensorAssets, Simulation},
     script::{ExpertController, Loaded},
 };
 
@@ -18,12 +18,12 @@ const GOAL: f64 = 4.0;
 /// An expert that also looks; time runs from its first action on.
 struct Looking {
     expert: ExpertController,
-    streams: Streams,
+    streams: SensorStreams,
     since: Option<ThreadTime>,
 }
 
 impl Controller for Looking {
-    fn streams(&self) -> Streams {
+    fn streams(&self) -> SensorStreams {
         self.streams.clone()
     }
 
@@ -34,7 +34,7 @@ impl Controller for Looking {
 }
 
 /// Simulated seconds and CPU seconds of an episode.
-fn episode(loaded: &Loaded, streams: &Streams, shared: &(RestCache, Looks)) -> (f64, f64) {
+fn episode(loaded: &Loaded, streams: &SensorStreams, shared: &(AssetCache, SensorAssets)) -> (f64, f64) {
     let (spec, expert) = episode::open(loaded, 0, false);
     let mut driver = Looking { expert, streams: streams.clone(), since: None };
     let started = Episode::start(spec, &shared.0, &shared.1).expect("it starts");
@@ -45,13 +45,13 @@ fn episode(loaded: &Loaded, streams: &Streams, shared: &(RestCache, Looks)) -> (
 
 fn main() {
     let loaded = episode::load();
-    let shared = (RestCache::default(), Looks::default());
+    let shared = (AssetCache::default(), SensorAssets::default());
     let cameras: Vec<String> = ["third_person", "wrist"].map(str::to_owned).into();
     let cases = [
-        ("blind", Streams::default()),
-        ("cameras", Streams { cameras: cameras.clone(), ..Streams::default() }),
-        ("touch", Streams { touch: true, ..Streams::default() }),
-        ("all streams", Streams { cameras, touch: true, force: true }),
+        ("blind", SensorStreams::default()),
+        ("cameras", SensorStreams { cameras: cameras.clone(), ..SensorStreams::default() }),
+        ("touch", SensorStreams { touch: true, ..SensorStreams::default() }),
+        ("all streams", SensorStreams { cameras, touch: true, force: true }),
     ];
     println!("{:<12} {:>10} {:>12} {:>12}", "case", "simulated", "CPU s / s", "× real time");
     for (name, streams) in cases {

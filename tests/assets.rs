@@ -10,7 +10,7 @@ use softvt::{
         samples::{SampleSpec, surface_samples},
         voxelise::{VoxelSpec, voxel_mesh},
     },
-    rollout::{RestCache, Simulation},
+    rollout::{AssetCache, Simulation},
     scene::{Asset, Body, Mask, Scene},
     script::{self, Episode, EpisodeRequest, Loaded},
 };
@@ -119,7 +119,7 @@ fn every_recipe_has_a_voxel_mesh_and_samples_all_around() {
 }
 
 /// The nodes of all soft bodies at rest, bit by bit.
-fn at_rest(scene: Scene, cache: &RestCache) -> Vec<[u64; 3]> {
+fn at_rest(scene: Scene, cache: &AssetCache) -> Vec<[u64; 3]> {
     let mut sim =
         Simulation::new(Arc::new(scene), &Default::default(), &Default::default(), cache).expect("builds");
     sim.settle().unwrap_or_else(|e| panic!("{e}"));
@@ -129,7 +129,7 @@ fn at_rest(scene: Scene, cache: &RestCache) -> Vec<[u64; 3]> {
 
 #[test]
 fn what_is_only_seen_changes_no_bit_of_what_moves() {
-    let cache = RestCache::default();
+    let cache = AssetCache::default();
     let seen = scene(&suite(), 0, 0);
     let mut bare = seen.clone();
     bare.objects.retain(|object| object.asset.body != Body::Scenery);
@@ -140,7 +140,7 @@ fn what_is_only_seen_changes_no_bit_of_what_moves() {
 #[test]
 fn every_layout_settles_and_both_tasks_of_a_pair_start_from_one_state() {
     let loaded = suite();
-    let cache = RestCache::default();
+    let cache = AssetCache::default();
     let settled = |task: usize| at_rest(scene(&loaded, task, 1), &cache);
     for pair in 0..5 {
         assert!(settled(2 * pair) == settled(2 * pair + 1), "pair {pair}");
@@ -328,9 +328,13 @@ fn rigid_things_stand_still_alone_and_stacked() {
     all.extend([["ramekin", "black_bowl"].as_slice(), &["cookies", "black_bowl"], &["plate", "black_bowl"]]);
     for (scene, names) in stacks(&all).into_iter().zip(all) {
         let upright: Vec<f64> = scene.objects.iter().map(|object| object.pose_w.translation.z).collect();
-        let mut sim =
-            Simulation::new(Arc::new(scene), &Default::default(), &Default::default(), &RestCache::default())
-                .expect("builds");
+        let mut sim = Simulation::new(
+            Arc::new(scene),
+            &Default::default(),
+            &Default::default(),
+            &AssetCache::default(),
+        )
+        .expect("builds");
         sim.settle().unwrap_or_else(|e| panic!("{names:?}: {e}"));
         let settled: Vec<Pose> = sim.objects.iter().map(|object| sim.pose(object)).collect();
         for _ in 0..120 {

@@ -6,7 +6,7 @@ use softvt::{
     benchmark::seed::Split,
     geometry::Vec3,
     physics::{contact::Partner, world::Drive},
-    rollout::{Handle, Kind, Looks, RestCache, Senses, Simulation, state_hash},
+    rollout::{AssetCache, Kind, ObjectInstance, SensorAssets, SensorSuite, Simulation, state_hash},
     scene::{Asset, Camera, Scene},
     script::{self, Episode, EpisodeRequest},
     sensing::tactile::TactileSpec,
@@ -51,7 +51,7 @@ fn scene() -> Scene {
 /// The scene at rest.
 fn settled() -> Simulation {
     let sim =
-        Simulation::new(Arc::new(scene()), &Default::default(), &Default::default(), &RestCache::default());
+        Simulation::new(Arc::new(scene()), &Default::default(), &Default::default(), &AssetCache::default());
     let mut sim = sim.unwrap_or_else(|e| panic!("{e}"));
     sim.settle().unwrap_or_else(|e| panic!("{e}"));
     sim
@@ -61,7 +61,7 @@ fn run(sim: &mut Simulation, seconds: f64) {
     (0..(60.0 * seconds) as usize).for_each(|_| sim.step().expect("a step that converges"));
 }
 
-fn object<'a>(sim: &'a Simulation, name: &str) -> &'a Handle {
+fn object<'a>(sim: &'a Simulation, name: &str) -> &'a ObjectInstance {
     sim.object(name).unwrap_or_else(|| panic!("no {name}"))
 }
 
@@ -111,18 +111,18 @@ fn a_bowl_rests_on_the_floor_of_an_open_drawer_and_all_of_it_falls_asleep() {
     let (cabinet, stove) = (link(&sim, "cabinet.top_drawer").0, link(&sim, "stove.knob").0);
     assert!(sim.world.rigid[0].asleep, "the bowl");
     assert!(sim.world.trees[cabinet].asleep && sim.world.trees[stove].asleep, "cabinet and stove");
-    assert!(!sim.world.trees[sim.rig.tree].asleep, "the robot");
+    assert!(!sim.world.trees[sim.robot.tree].asleep, "the robot");
 }
 
 #[test]
 fn a_drawer_that_is_pushed_takes_its_bowl_along_and_pictures_show_it() {
     let mut sim = settled();
     let (tree, link) = link(&sim, "cabinet.top_drawer");
-    let mut senses = Senses::new(&sim, &TactileSpec::default(), &Looks::default());
+    let mut senses = SensorSuite::new(&sim, &TactileSpec::default(), &SensorAssets::default());
     let camera = Camera { width: 160, height: 160, ..Camera::third_person_table() };
     let drawer = 1 + sim.objects.iter().position(|o| o.name == "cabinet.top_drawer").expect("a part") as u16;
     let mut column = |sim: &Simulation| {
-        let seen = senses.see(&Senses::frame(sim), &camera).expect("a picture").segmentation;
+        let seen = senses.render(&SensorSuite::frame(sim), &camera).expect("a picture").segmentation;
         let columns = seen.iter().enumerate().filter(|(_, id)| **id == drawer).map(|(i, _)| (i % 160) as f64);
         let count = columns.clone().count();
         assert!(count > 50, "{count} pixels of the drawer");

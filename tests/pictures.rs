@@ -10,7 +10,7 @@ use softvt::{
     geometry::{Pose, Quat, Vec3, shape::Shape},
     physics::Params,
     robot::RobotSpec,
-    rollout::{Looks, RestCache, Senses, Simulation},
+    rollout::{AssetCache, SensorAssets, SensorSuite, Simulation},
     scene::{Camera, Layer, Lighting, Mask, Visual},
     script::{self, EpisodeRequest},
     sensing::{
@@ -53,16 +53,20 @@ fn the_first_task_of_spatial_soft_looks_as_it_did() {
     };
     let scene = script::Episode::open(&loaded, &request).expect("the suite opens").scene;
     let sim =
-        Simulation::new(Arc::new(scene), &Params::default(), &RobotSpec::default(), &RestCache::default())
+        Simulation::new(Arc::new(scene), &Params::default(), &RobotSpec::default(), &AssetCache::default())
             .expect("the scene builds");
-    let looks = Looks::default();
-    let fresh = || Senses::new(&sim, &TactileSpec::default(), &looks);
+    let looks = SensorAssets::default();
+    let fresh = || SensorSuite::new(&sim, &TactileSpec::default(), &looks);
     let mut senses = fresh();
-    let frame = Senses::frame(&sim);
+    let frame = SensorSuite::frame(&sim);
     for name in ["third_person", "wrist"] {
         let camera = senses.camera(name).expect("the scene has it").clone().with_edge(224);
-        let picture = senses.see(&frame, &camera).expect("a picture");
-        assert_eq!(picture, fresh().see(&frame, &camera).expect("a picture"), "{name}: what cameras share");
+        let picture = senses.render(&frame, &camera).expect("a picture");
+        assert_eq!(
+            picture,
+            fresh().render(&frame, &camera).expect("a picture"),
+            "{name}: what cameras share"
+        );
         check(&format!("spatial_soft_{name}.png"), picture);
     }
 }

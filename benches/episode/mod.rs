@@ -53,7 +53,7 @@ pub fn open(loaded: &Loaded, task: usize, film: bool) -> (EpisodeSpec, ExpertCon
         params: settings.physics,
         robot: settings.robot,
         tactile: settings.tactile,
-        film,
+        record_states: film,
         trace: None,
     };
     let expert = opened.expert().expect("a script").expect("an expert");

@@ -12,7 +12,7 @@ use sha2::{Digest, Sha256};
 
 /// What a stream of random numbers is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stream {
+pub enum RandomStream {
     /// Where objects stand.
     Layout,
     /// Joint angles of the arm at the start.
@@ -33,7 +33,7 @@ pub enum Stream {
     Policy,
 }
 
-impl Stream {
+impl RandomStream {
     /// Every stream, in order.
     pub const ALL: [Self; 9] = [
         Self::Layout,
@@ -104,7 +104,7 @@ pub struct EpisodeSeed {
 
 impl EpisodeSeed {
     /// The generator of one stream, at its start.
-    pub fn stream(&self, stream: Stream) -> ChaCha8Rng {
+    pub fn stream(&self, stream: RandomStream) -> ChaCha8Rng {
         let split = self.split.name();
         let episode = self.episode.to_string();
         let base = self.base.to_string();
@@ -161,16 +161,16 @@ mod tests {
     #[test]
     fn every_part_of_the_seed_moves_the_stream() {
         let first = |s: &EpisodeSeed, stream| s.stream(stream).next_u64();
-        let base = first(&seed(), Stream::Layout);
+        let base = first(&seed(), RandomStream::Layout);
         let others = [
             EpisodeSeed { suite: "sl".into(), layout: "".into(), ..seed() },
             EpisodeSeed { episode: 4, ..seed() },
             EpisodeSeed { base: 8, ..seed() },
             EpisodeSeed { split: Split::Demonstration, ..seed() },
         ];
-        assert!(others.iter().all(|other| first(other, Stream::Layout) != base));
-        assert_ne!(first(&seed(), Stream::Arm), base);
-        assert_eq!(first(&seed(), Stream::Layout), base);
+        assert!(others.iter().all(|other| first(other, RandomStream::Layout) != base));
+        assert_ne!(first(&seed(), RandomStream::Arm), base);
+        assert_eq!(first(&seed(), RandomStream::Layout), base);
     }
 
     #[test]

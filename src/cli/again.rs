@@ -7,9 +7,9 @@ use super::{
 };
 use crate::{
     evaluation::record::{EpisodeRecord, Outcome},
-    policy::{Action, Chunked, recorded::Recorded},
+    policy::{Action, ChunkedPolicy, recorded::RecordedPolicy},
     report::actions,
-    rollout::{Finished, batch, cancel},
+    rollout::{FinishedEpisode, batch, cancel},
 };
 
 /// Whoever drove the episode of `record`, as its actions say.
@@ -19,7 +19,7 @@ pub(super) fn drive(recorded: Vec<Action>, record: &EpisodeRecord) -> Drive {
         _ => None,
     };
     Box::new(move |_, brief| {
-        Ok(Box::new(Chunked::new(Box::new(Recorded::poses(&recorded, ending.clone())), brief, 1)))
+        Ok(Box::new(ChunkedPolicy::new(Box::new(RecordedPolicy::poses(&recorded, ending.clone())), brief, 1)))
     })
 }
 
@@ -89,7 +89,7 @@ pub(super) fn make_lost_files(batch: &Batch, done: &[EpisodeRecord]) -> Result<(
 }
 
 /// An episode, and whether it could be drawn.
-type Made = (Finished, Result<(), Failure>);
+type Made = (FinishedEpisode, Result<(), Failure>);
 
 /// A finished episode once more; nothing, and a word about it, if it does not come out as its record says.
 fn simulate(

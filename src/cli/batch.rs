@@ -31,8 +31,8 @@ use crate::{
         run_folder::{EPISODES, RUN, RunFolder, SUMMARY},
     },
     rollout::{
-        BuildError, ControlError, Controller, Episode, EpisodeError, EpisodeSpec, Finished, Looks, RestCache,
-        Which, batch, cancel, target_asset,
+        AssetCache, BuildError, ControlError, Controller, Episode, EpisodeError, EpisodeRef, EpisodeSpec,
+        FinishedEpisode, SensorAssets, batch, cancel, target_asset,
     },
     scene::{Asset, Body},
     script::{self, Loaded},
@@ -54,8 +54,8 @@ pub(super) struct Batch<'a> {
     pub sources: BTreeMap<String, String>,
     /// Whose actions are carried out once more.
     pub(super) replayed: Option<Replayed>,
-    pub(super) cache: RestCache,
-    pub(super) looks: Looks,
+    pub(super) cache: AssetCache,
+    pub(super) looks: SensorAssets,
     pub out: PathBuf,
     /// Whether rollouts are drawn.
     pub films: bool,
@@ -105,8 +105,8 @@ impl<'a> Batch<'a> {
             released: Thresholds::new(0.5, Vec::new(), made_by),
             sources,
             replayed,
-            cache: RestCache::default(),
-            looks: Looks::default(),
+            cache: AssetCache::default(),
+            looks: SensorAssets::default(),
             out,
             films: run.video.is_some(),
             force_observed,
@@ -119,7 +119,7 @@ impl<'a> Batch<'a> {
     }
 
     /// The same with what was made of assets for other suites.
-    pub(super) fn sharing(mut self, cache: &RestCache, looks: &Looks) -> Self {
+    pub(super) fn sharing(mut self, cache: &AssetCache, looks: &SensorAssets) -> Self {
         (self.cache, self.looks) = (cache.clone(), looks.clone());
         self
     }
@@ -349,7 +349,7 @@ impl<'a> Batch<'a> {
     ///
     /// # Errors
     /// A script, the scene or whoever drives fails.
-    pub(super) fn episode(&self, job: usize, film: bool, drive: &Drive) -> Result<Finished, Failure> {
+    pub(super) fn episode(&self, job: usize, film: bool, drive: &Drive) -> Result<FinishedEpisode, Failure> {
         let (task, episode) = self.jobs[job];
         let origin = self.origins.get(&(task.id, episode));
         self.episode_from(job, origin, film, drive)?.map_err(|e| self.episode_failure(&e))
@@ -365,12 +365,12 @@ impl<'a> Batch<'a> {
         origin: Option<&Origin>,
         film: bool,
         drive: &Drive,
-    ) -> Result<Result<Finished, EpisodeError>, Failure> {
+    ) -> Result<Result<FinishedEpisode, EpisodeError>, Failure> {
         let (task, episode) = self.jobs[job];
         let (spec, opened) = self.spec(task, &self.request(task, episode), origin)?;
         let driver = drive(opened, self.brief(task, episode))?;
-        let mut driver = batch::Stoppable { driver, stop: &cancel::FLAG };
-        let started = Episode::start(EpisodeSpec { film, ..spec }, &self.cache, &self.looks);
+        let mut driver = batch::Cancellable { driver, stop: &cancel::FLAG };
+        let started = Episode::start(EpisodeSpec { record_states: film, ..spec }, &self.cache, &self.looks);
         Ok(started.and_then(|started| started.run(&mut driver)))
     }
 
@@ -395,7 +395,7 @@ impl<'a> Batch<'a> {
             origin.start.apply(&mut opened.scene);
         }
         let limit = target_asset(&opened.nominal, task).and_then(|asset| self.limit_of(asset));
-        let which = Which {
+        let which = EpisodeRef {
             suite: &self.name,
             episode: request.episode as u32,
             seed: request.base_seed,
@@ -439,7 +439,7 @@ pub(super) struct Done {
 }
 
 /// An episode counts whether or not it can be drawn.
-pub(super) fn tell_undrawn(finished: &Finished, drawn: Result<(), Failure>) {
+pub(super) fn tell_undrawn(finished: &FinishedEpisode, drawn: Result<(), Failure>) {
     if let Err(failure) = drawn {
         let message = format!("softvt: no video of {}: {}", line(&finished.record), failure.message);
         crate::text::eprint_line(&message);

@@ -5,7 +5,7 @@ use crate::{
         args::{self, Command},
         info::{self, RunInfo},
     },
-    policy::{Action, ActionChunk, Chunked, Observation, Policy, PolicyError, Streams},
+    policy::{Action, ActionChunk, ChunkedPolicy, Observation, Policy, PolicyError, SensorStreams},
     report::run_folder::{EPISODES, RUN},
 };
 
@@ -17,8 +17,8 @@ impl Policy for Feeler {
         "feeler"
     }
 
-    fn streams(&self) -> Streams {
-        Streams { force: true, ..Streams::default() }
+    fn streams(&self) -> SensorStreams {
+        SensorStreams { force: true, ..SensorStreams::default() }
     }
 
     fn act(&mut self, seen: &Observation) -> Result<ActionChunk, PolicyError> {
@@ -28,7 +28,7 @@ impl Policy for Feeler {
 }
 
 fn feeler(_: script::Episode, brief: TaskBrief) -> Result<Box<dyn Controller>, Failure> {
-    Ok(Box::new(Chunked::new(Box::new(Feeler), brief, 1)))
+    Ok(Box::new(ChunkedPolicy::new(Box::new(Feeler), brief, 1)))
 }
 
 #[test]

@@ -8,7 +8,7 @@ use std::{
 use super::{Failure, args::Run, batch::Batch, conditions, evaluate::own_folders, print};
 use crate::{
     benchmark::{Goal, Plan, Suite, Task},
-    rollout::{Looks, RestCache, batch as parallel, cancel, target_asset},
+    rollout::{AssetCache, SensorAssets, batch as parallel, cancel, target_asset},
     scene::Asset,
     script::{self, Loaded, Scenes},
     text,
@@ -22,7 +22,7 @@ pub(super) fn run(run: &Run) -> Result<(), Failure> {
     let loaded = script::load(&run.file, &run.script_words).map_err(Failure::input)?;
     let file = run.file.display();
     // Suites have assets in common.
-    let made = (RestCache::rough(), Looks::default());
+    let made = (AssetCache::rough(), SensorAssets::default());
     match &loaded.plan {
         Plan::Suite(suite) => suite_is_right(run, &loaded, suite, &made)?,
         Plan::Suites { suites } => {
@@ -46,7 +46,7 @@ fn suite_is_right(
     run: &Run,
     loaded: &Loaded,
     suite: &Suite,
-    (cache, looks): &(RestCache, Looks),
+    (cache, looks): &(AssetCache, SensorAssets),
 ) -> Result<(), Failure> {
     let tasks: Vec<_> = suite.tasks.iter().collect();
     let mut batch = Batch::new(run, loaded, suite, (Vec::new(), PathBuf::new()))?.sharing(cache, looks);

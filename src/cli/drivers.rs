@@ -4,12 +4,12 @@ use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 use super::{Failure, code, recorded::RecordedRuns};
 use crate::{
-    benchmark::seed::Stream,
+    benchmark::seed::RandomStream,
     policy::{
-        Chunked, Policy, PolicyError, Streams, TaskBrief, builtin,
+        ChunkedPolicy, Policy, PolicyError, SensorStreams, TaskBrief, builtin,
         profile::Profile,
-        recorded::Recorded,
-        remote::{Connections, Protocol, Remote, Server},
+        recorded::RecordedPolicy,
+        remote::{PolicyConnections, PolicyServer, Protocol, RemotePolicy},
     },
     rollout::{Controller, cancel},
     script::{self, ExpertController, PolicyFile},
@@ -140,7 +140,7 @@ impl Choice {
     }
 
     /// What it looks at and where that is said, if it is known before it drives.
-    pub(super) fn looks(&self) -> Option<(String, Streams)> {
+    pub(super) fn looks(&self) -> Option<(String, SensorStreams)> {
         match &self.driver {
             Driver::Server(server) => {
                 Some((format!("--profile {}: inputs", server.profile_word), server.profile.streams()))
@@ -188,7 +188,7 @@ impl Choice {
 /// Makes whoever drives an episode.
 pub(super) struct Drivers {
     choice: Choice,
-    connections: Option<Arc<Connections>>,
+    connections: Option<Arc<PolicyConnections>>,
     /// The script's name of the suite, and whether it is its twin.
     of: (String, bool),
 }
@@ -197,13 +197,13 @@ impl Drivers {
     /// `suite` is the script's name of it, `twin` whether soft objects are rigid.
     pub(super) fn new(choice: &Choice, suite: &str, twin: bool) -> Self {
         let connections = match &choice.driver {
-            Driver::Server(server) => Some(Arc::new(Connections::new(Server {
+            Driver::Server(server) => Some(Arc::new(PolicyConnections::new(PolicyServer {
                 url: server.url.clone(),
                 protocol: server.protocol,
                 profile: server.profile.clone(),
-                patience: server.patience,
+                timeout: server.patience,
                 api_key: std::env::var(API_KEY).ok(),
-                stop: &cancel::FLAG,
+                cancel: &cancel::FLAG,
             }))),
             _ => None,
         };
@@ -215,7 +215,7 @@ impl Drivers {
     /// # Errors
     /// The server cannot be reached.
     pub(super) fn connect(&self) -> Result<(), Failure> {
-        self.connections.as_ref().map_or(Ok(()), |connections| connections.try_out().map_err(policy_failure))
+        self.connections.as_ref().map_or(Ok(()), |connections| connections.check().map_err(policy_failure))
     }
 
     /// Whoever drives the episode `brief`.
@@ -228,28 +228,30 @@ impl Drivers {
         brief: TaskBrief,
     ) -> Result<Box<dyn Controller>, Failure> {
         let chunked = |policy: Box<dyn Policy>, replan| -> Box<dyn Controller> {
-            Box::new(Chunked::new(policy, brief.clone(), replan))
+            Box::new(ChunkedPolicy::new(policy, brief.clone(), replan))
         };
         Ok(match (&self.choice.driver, &self.connections) {
             (Driver::Server(server), Some(connections)) => {
-                chunked(Box::new(Remote::new(connections.clone())), server.replan)
+                chunked(Box::new(RemotePolicy::new(connections.clone())), server.replan)
             }
             (Driver::Recorded(runs), _) => {
                 let actions = runs.actions(&self.of.0, self.of.1, &brief)?;
-                chunked(Box::new(Recorded::poses(&actions, None)), 1)
+                chunked(Box::new(RecordedPolicy::poses(&actions, None)), 1)
             }
             (Driver::Lua(file, replan), _) => {
                 let policy = file.start(&opened.seed).map_err(Failure::input)?;
                 chunked(Box::new(policy), replan.unwrap_or(usize::MAX))
             }
-            (Driver::Noop, _) => chunked(Box::<builtin::Noop>::default(), 1),
+            (Driver::Noop, _) => chunked(Box::<builtin::NoopPolicy>::default(), 1),
             (Driver::Random, _) => {
-                let seed = rand::RngCore::next_u64(&mut opened.seed.stream(Stream::Script));
-                chunked(Box::new(builtin::Random::new(seed)), 1)
+                let seed = rand::RngCore::next_u64(&mut opened.seed.stream(RandomStream::Script));
+                chunked(Box::new(builtin::RandomPolicy::new(seed)), 1)
             }
             (Driver::Expert(hand), _) => Box::new(expert(opened, *hand)?),
             // Nobody has handed any over yet.
-            (Driver::Given | Driver::Server(_), _) => chunked(Box::new(Recorded::new(Vec::new(), None)), 1),
+            (Driver::Given | Driver::Server(_), _) => {
+                chunked(Box::new(RecordedPolicy::new(Vec::new(), None)), 1)
+            }
         })
     }
 }

@@ -5,9 +5,10 @@ use std::sync::Arc;
 use super::{Failure, batch::Batch};
 use crate::{
     benchmark::{Goal, ObjectType, Task},
-    policy::Streams,
+    policy::SensorStreams,
     rollout::{
-        BuildError, EpisodeError, SenseError, Senses, Simulation, check_senses, check_support, target_asset,
+        BuildError, EpisodeError, SensingError, SensorSuite, Simulation, check_sensors, check_support,
+        target_asset,
     },
     scene::{Body, Scene},
     script::schema,
@@ -19,7 +20,7 @@ enum Trial {
     #[error(transparent)]
     Build(#[from] BuildError),
     #[error(transparent)]
-    Sense(#[from] SenseError),
+    Sense(#[from] SensingError),
 }
 
 impl Batch<'_> {
@@ -64,10 +65,11 @@ impl Batch<'_> {
         let scene = Arc::new(if self.run.twin { scene.rigid_twin() } else { scene });
         let settings = &self.settings;
         let look = || -> Result<(), Trial> {
-            check_senses(&scene, &settings.tactile, &self.looks)?;
+            check_sensors(&scene, &settings.tactile, &self.looks)?;
             let sim = Simulation::new(scene.clone(), &settings.physics, &settings.robot, &self.cache)?;
             check_support(&sim)?;
-            Ok(Senses::new(&sim, &settings.tactile, &self.looks).stand_outside(&Senses::frame(&sim))?)
+            Ok(SensorSuite::new(&sim, &settings.tactile, &self.looks)
+                .check_camera_positions(&SensorSuite::frame(&sim))?)
         };
         look().map_err(|error| self.trial_failure(error, task, 0))
     }
@@ -95,9 +97,9 @@ impl Batch<'_> {
     }
 
     /// Looks once at what a policy asks for, and a film shows, of a scene in which nothing has moved yet.
-    fn try_out(&self, scene: Arc<Scene>, mut streams: Streams) -> Result<(), Trial> {
+    fn try_out(&self, scene: Arc<Scene>, mut streams: SensorStreams) -> Result<(), Trial> {
         let settings = &self.settings;
-        check_senses(&scene, &settings.tactile, &self.looks)?;
+        check_sensors(&scene, &settings.tactile, &self.looks)?;
         if self.films {
             streams.touch = true;
             streams.cameras.extend(scene.cameras.iter().map(|camera| camera.name.clone()));
@@ -106,7 +108,7 @@ impl Batch<'_> {
             return Ok(());
         }
         let sim = Simulation::new(scene, &settings.physics, &settings.robot, &self.cache)?;
-        let mut senses = Senses::new(&sim, &settings.tactile, &self.looks);
-        Ok(senses.try_out(&Senses::frame(&sim), &streams)?)
+        let mut senses = SensorSuite::new(&sim, &settings.tactile, &self.looks);
+        Ok(senses.validate(&SensorSuite::frame(&sim), &streams)?)
     }
 }

@@ -354,7 +354,7 @@ fn dataset() -> clap::Command {
     let path =
         || Arg::new("path").value_name("DATASET").required(true).help("Its folder, or one of its HDF5 files");
     clap::Command::new("dataset")
-        .about("Looks into recorded demonstrations, exports them, and takes in those of others")
+        .about("SensorAssets into recorded demonstrations, exports them, and takes in those of others")
         .subcommand_required(true)
         .arg_required_else_help(true)
         .subcommand(

@@ -8,7 +8,7 @@ use std::{
 
 use super::{args::Run, batch::Batch, drivers::expert};
 use crate::{
-    policy::{Action, Observation, Streams},
+    policy::{Action, Observation, SensorStreams},
     rollout::{ControlError, Controller, Simulation},
     script::ExpertController,
 };
@@ -39,7 +39,7 @@ struct Noting {
 }
 
 impl Controller for Noting {
-    fn streams(&self) -> Streams {
+    fn streams(&self) -> SensorStreams {
         self.driver.streams()
     }
 

@@ -22,7 +22,7 @@ use crate::{
         import::{self, Begins, Foreign},
     },
     evaluation::record::Origin,
-    policy::{Chunked, Command, recorded::Recorded},
+    policy::{ChunkedPolicy, ToolCommand, recorded::RecordedPolicy},
     rollout::target_asset,
     scene::{Body, Start},
     script,
@@ -129,7 +129,7 @@ fn fit(
     (own, sources): (&[&Matched], &[Imported]),
     layout: bool,
 ) -> Result<(), Failure> {
-    let mut commands: BTreeMap<(usize, u32), Vec<Command>> = BTreeMap::new();
+    let mut commands: BTreeMap<(usize, u32), Vec<ToolCommand>> = BTreeMap::new();
     let (mut placed, mut elsewhere) = (0, 0);
     for one in own {
         let place = (one.task, one.attempt);
@@ -152,7 +152,7 @@ fn fit(
     batch.imported = sources.to_vec();
     batch.drive = Box::new(move |_, brief| {
         let commands = commands.get(&(brief.task, brief.episode)).cloned().unwrap_or_default();
-        Ok(Box::new(Chunked::new(Box::new(Recorded::new(commands, None)), brief, 1)))
+        Ok(Box::new(ChunkedPolicy::new(Box::new(RecordedPolicy::new(commands, None)), brief, 1)))
     });
     if elsewhere > 0 {
         let name = &batch.suite.name;

@@ -16,7 +16,7 @@ use crate::{
     policy::Observation,
     rollout::cancel,
     script::{self, EpisodeRequest, Loaded},
-    serve::{self, Door, Offer, Offered, Wanted},
+    serve::{self, EpisodeId, ServedSuite, Server, ServerConfig},
 };
 
 /// Serves the suites of a script until the end is asked for.
@@ -53,10 +53,10 @@ fn suites_of<'a>(serve: &Serve, loaded: &'a Loaded) -> Result<Vec<&'a Suite>, Fa
     Err(Failure::input(message))
 }
 
-fn open(serve: &Serve) -> Result<Door, Failure> {
+fn open(serve: &Serve) -> Result<Server, Failure> {
     let Serve { host, port, .. } = serve;
     let bare = host.trim_start_matches('[').trim_end_matches(']');
-    Door::open(bare, *port).map_err(|error| {
+    Server::open(bare, *port).map_err(|error| {
         Failure::input(match error.kind() {
             ErrorKind::AddrInUse => {
                 format!("--port {port}: somebody listens at {host} there already; name another, or 0 for a free one")
@@ -88,10 +88,16 @@ fn batches<'a>(
     Ok(batches)
 }
 
-fn offer<'a>(serve: &'a Serve, loaded: &Loaded, suites: &[&'a Suite], batches: &'a [Batch<'a>]) -> Offer<'a> {
+fn offer<'a>(
+    serve: &'a Serve,
+    loaded: &Loaded,
+    suites: &[&'a Suite],
+    batches: &'a [Batch<'a>],
+) -> ServerConfig<'a> {
     let run = &serve.run;
-    let all: Vec<Offered> = suites.iter().map(|suite| Offered { name: run.name_of(suite), suite }).collect();
-    let open = move |wanted: &Wanted| {
+    let all: Vec<ServedSuite> =
+        suites.iter().map(|suite| ServedSuite { name: run.name_of(suite), suite }).collect();
+    let open = move |wanted: &EpisodeId| {
         let found = batches.iter().find(|batch| run.name_of(batch.suite) == wanted.suite);
         let batch = found.ok_or_else(|| format!("suite {:?}: there is none", wanted.suite))?;
         let task = batch.suite.tasks.iter().find(|task| task.id == wanted.task);
@@ -106,7 +112,7 @@ fn offer<'a>(serve: &'a Serve, loaded: &Loaded, suites: &[&'a Suite], batches: &
         };
         batch.begin(task, &request).map_err(|failure| failure.message)
     };
-    Offer {
+    ServerConfig {
         suites: all,
         profile: serve.profile.clone(),
         privileged: serve.privileged,
@@ -131,13 +137,13 @@ fn made_by(run: &Run, loaded: &Loaded) -> String {
 }
 
 /// What a client sees at the start of the first episode: what is wrong with a scene or its senses is told before anyone comes.
-fn first_look(serve: &Serve, offer: &Offer) -> Result<Observation, Failure> {
+fn first_look(serve: &Serve, offer: &ServerConfig) -> Result<Observation, Failure> {
     let first = offer.suites.iter().find_map(|one| Some((one, one.suite.tasks.first()?)));
     let (one, task) = first.ok_or_else(|| Failure::input("there is no task to serve"))?;
     let (seed, split) = (serve.run.seed, serve.split);
-    let wanted = Wanted { suite: one.name.clone(), task: task.id, episode: 0, seed, split };
+    let wanted = EpisodeId { suite: one.name.clone(), task: task.id, episode: 0, seed, split };
     let mut episode = (offer.open)(&wanted).map_err(Failure::input)?;
     let streams = offer.profile.streams();
-    episode.watch(streams.clone());
+    episode.begin(streams.clone());
     episode.observe(&streams).map_err(|e| Failure::input(format!("{}: {e}", serve.run.file.display())))
 }

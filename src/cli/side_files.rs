@@ -15,7 +15,7 @@ use crate::{
         film::{self, Caption, FilmError},
         interchange::{self, DebugFrame, DebugShape},
     },
-    rollout::{Finished, ScoreFrame, cancel},
+    rollout::{FinishedEpisode, ScoreFrame, cancel},
 };
 
 /// Where they are, and which of them are wanted.
@@ -70,7 +70,7 @@ impl<'a> SideFiles<'a> {
     ///
     /// # Errors
     /// A file cannot be written.
-    pub(super) fn write(&self, finished: &Finished) -> Result<(), Failure> {
+    pub(super) fn write(&self, finished: &FinishedEpisode) -> Result<(), Failure> {
         let id = &finished.record.identity;
         self.write_trace(finished)?;
         let path = interchange::debug_log_path(self.dir, id.task, id.episode);
@@ -83,8 +83,8 @@ impl<'a> SideFiles<'a> {
     ///
     /// # Errors
     /// A picture cannot be made or written.
-    pub(super) fn draw(&self, finished: &mut Finished) -> Result<(), Failure> {
-        let (record, Some(mut film)) = (&finished.record, finished.film.take()) else { return Ok(()) };
+    pub(super) fn draw(&self, finished: &mut FinishedEpisode) -> Result<(), Failure> {
+        let (record, Some(mut film)) = (&finished.record, finished.recording.take()) else { return Ok(()) };
         if !self.shows(record) {
             return Ok(());
         }
@@ -102,7 +102,7 @@ impl<'a> SideFiles<'a> {
         self.dir.join(format!("trace/task_{:03}/episode_{:05}.jsonl", id.task, id.episode))
     }
 
-    fn write_trace(&self, finished: &Finished) -> Result<(), Failure> {
+    fn write_trace(&self, finished: &FinishedEpisode) -> Result<(), Failure> {
         if !self.trace {
             return Ok(());
         }
@@ -118,7 +118,7 @@ impl<'a> SideFiles<'a> {
 }
 
 /// SoftVTBench's log of every control step, which its own scorer reads.
-fn debug_frames(finished: &Finished) -> Vec<DebugFrame> {
+fn debug_frames(finished: &FinishedEpisode) -> Vec<DebugFrame> {
     let identity = &finished.record.identity;
     let frame = |(step, frame): (usize, &ScoreFrame)| {
         let measured = finished.reference.as_ref().zip(frame.deformation.as_ref());
@@ -134,7 +134,7 @@ fn debug_frames(finished: &Finished) -> Vec<DebugFrame> {
 
 /// The row of a control step in which the physics failed: if the rollout's peak is above that of all steps before, it is of
 /// this one.
-fn broken_off(finished: &Finished, step: usize) -> DebugFrame {
+fn broken_off(finished: &FinishedEpisode, step: usize) -> DebugFrame {
     let (identity, verdict) = (&finished.record.identity, &finished.record.verdict);
     let before = finished.frames.iter().filter_map(|frame| Some(frame.deformation.as_ref()?.rms_pct));
     let before = before.fold(0.0, f64::max);

@@ -43,7 +43,7 @@ pub(super) fn run(view: &View) -> Result<(), Failure> {
     make_folder(&dir)?;
     let finished = batch.episode(0, true, &batch.drive)?;
     let caption = Caption::of(&finished.record);
-    let Some(mut film) = finished.film else { return Ok(()) };
+    let Some(mut film) = finished.recording else { return Ok(()) };
     let last = film.frames.len().saturating_sub(1);
     let worst = worst_moment(&film);
     let moments = [("start", 0), ("worst", worst), ("end", last)];

@@ -8,7 +8,7 @@ use crate::{
         gripper::{self, OPENING},
         rotation,
     },
-    rollout::{Film, Finished},
+    rollout::{FinishedEpisode, StateRecording},
     sensing::tactile::{MARKERS, Markers},
 };
 
@@ -87,7 +87,7 @@ impl Stream {
 
 impl Demonstration {
     /// That of a finished rollout with a film and a trace; `shut` as whoever drove meant it, in every control step.
-    pub fn new(finished: &Finished, film: &Film, shut: Vec<bool>, privileged: bool) -> Self {
+    pub fn new(finished: &FinishedEpisode, film: &StateRecording, shut: Vec<bool>, privileged: bool) -> Self {
         let actions = finished.actions.clone();
         let privileged = if privileged { hidden::streams(finished, film) } else { Vec::new() };
         Self {
@@ -143,8 +143,9 @@ impl Demonstration {
 }
 
 /// What the robot measures of itself before each action.
-fn observed(film: &Film, actions: &[Action]) -> Vec<Stream> {
-    let stances: Vec<_> = film.frames.iter().take(actions.len()).map(|f| film.senses.stance(f)).collect();
+fn observed(film: &StateRecording, actions: &[Action]) -> Vec<Stream> {
+    let stances: Vec<_> =
+        film.frames.iter().take(actions.len()).map(|f| film.sensors.proprioception(f)).collect();
     let each =
         |numbers: &dyn Fn(usize) -> Vec<f64>| (0..stances.len()).flat_map(numbers).collect::<Vec<f64>>();
     let width = |i: usize| gripper::width(stances[i].fingers);

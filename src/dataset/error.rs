@@ -5,7 +5,7 @@ use std::{fmt::Display, io, path::Path};
 use rust_hdf5::Hdf5Error;
 
 use super::video::VideoError;
-use crate::{files::FileError, rollout::SenseError};
+use crate::{files::FileError, rollout::SensingError};
 
 /// Why demonstrations cannot be written or read.
 #[derive(Debug, thiserror::Error)]
@@ -50,7 +50,7 @@ pub enum DatasetError {
     },
     /// A stream cannot be made.
     #[error(transparent)]
-    Sense(#[from] SenseError),
+    Sense(#[from] SensingError),
     /// A video cannot be made.
     #[error(transparent)]
     Video(#[from] VideoError),

@@ -5,13 +5,13 @@ use crate::{
     geometry::{Pose, Vec3},
     policy::PadForce,
     robot::rotation,
-    rollout::{BodyState, Film, Finished, ScoreFrame, Senses, StepTrace},
+    rollout::{BodyConfiguration, FinishedEpisode, ScoreFrame, SensorSuite, StateRecording, StepTrace},
 };
 
 use super::demonstration::Stream;
 
 /// All of them: row i is of the state before action i, as everywhere in a demonstration.
-pub(super) fn streams(finished: &Finished, film: &Film) -> Vec<Stream> {
+pub(super) fn streams(finished: &FinishedEpisode, film: &StateRecording) -> Vec<Stream> {
     let mut all = forces(finished, film);
     all.extend(contact(finished));
     all.extend(deformation(finished));
@@ -20,9 +20,9 @@ pub(super) fn streams(finished: &Finished, film: &Film) -> Vec<Stream> {
 }
 
 /// True loads of the pads, and SoftVTBench's actions with forces.
-fn forces(finished: &Finished, film: &Film) -> Vec<Stream> {
+fn forces(finished: &FinishedEpisode, film: &StateRecording) -> Vec<Stream> {
     let steps = finished.actions.len();
-    let loads: Vec<[PadForce; 2]> = film.frames.iter().take(steps).map(Senses::forces).collect();
+    let loads: Vec<[PadForce; 2]> = film.frames.iter().take(steps).map(SensorSuite::pad_forces).collect();
     let of = |pick: &dyn Fn(&PadForce) -> Vec3| -> Vec<f64> {
         loads.iter().flatten().flat_map(|pad| <[f64; 3]>::from(pick(pad))).collect()
     };
@@ -48,7 +48,7 @@ fn shifted<T, N: Clone>(after: &[T], first: Vec<N>, numbers: impl Fn(&T) -> Vec<
     first.into_iter().chain(after[..before].iter().flat_map(numbers)).collect()
 }
 
-fn contact(finished: &Finished) -> Vec<Stream> {
+fn contact(finished: &FinishedEpisode) -> Vec<Stream> {
     let trace = &finished.trace;
     if trace.is_empty() {
         return Vec::new();
@@ -67,7 +67,7 @@ fn contact(finished: &Finished) -> Vec<Stream> {
 }
 
 /// D of a soft target, by SoftVTBench's names.
-fn deformation(finished: &Finished) -> Vec<Stream> {
+fn deformation(finished: &FinishedEpisode) -> Vec<Stream> {
     let Some(reference) = &finished.reference else { return Vec::new() };
     let at_rest: [f64; 3] = reference.bbox_m().into();
     let frames = &finished.frames;
@@ -91,18 +91,18 @@ fn deformation(finished: &Finished) -> Vec<Stream> {
 }
 
 /// Nodes of soft bodies, and poses of what moves and does not deform.
-fn bodies(film: &Film, steps: usize) -> Vec<Stream> {
+fn bodies(film: &StateRecording, steps: usize) -> Vec<Stream> {
     let mut all: Vec<Stream> = Vec::new();
     for (at, frame) in film.frames.iter().take(steps).enumerate() {
-        for (index, (name, state)) in film.senses.bodies(frame).enumerate() {
+        for (index, (name, state)) in film.sensors.body_configurations(frame).enumerate() {
             if at == 0 {
                 all.push(empty(name, &state));
             }
             match (&mut all[index].numbers, state) {
-                (super::Numbers::F32(into), BodyState::Nodes(nodes)) => {
+                (super::Numbers::F32(into), BodyConfiguration::Nodes(nodes)) => {
                     into.extend(nodes.iter().flatten().map(|x| *x as f32));
                 }
-                (super::Numbers::F64(into), BodyState::Pose(pose)) => into.extend(pose_row(&pose)),
+                (super::Numbers::F64(into), BodyConfiguration::Pose(pose)) => into.extend(pose_row(&pose)),
                 _ => {}
             }
         }
@@ -110,13 +110,13 @@ fn bodies(film: &Film, steps: usize) -> Vec<Stream> {
     all
 }
 
-fn empty(name: &str, state: &BodyState) -> Stream {
+fn empty(name: &str, state: &BodyConfiguration) -> Stream {
     match state {
-        BodyState::Nodes(nodes) => {
+        BodyConfiguration::Nodes(nodes) => {
             let path = format!("privileged/states/deformable_object/{name}/nodal_pos_w");
             Stream::f32(path, &[nodes.len(), 3], Vec::new()).of("m", "world")
         }
-        BodyState::Pose(_) => {
+        BodyConfiguration::Pose(_) => {
             let path = format!("privileged/states/rigid_object/{name}/root_pose_w");
             let meaning = "position, quaternion w x y z with w >= 0";
             Stream::f64(path, &[7], Vec::new()).of("m, 1", "world").note("meaning", meaning)

@@ -4,7 +4,7 @@ use image::{RgbImage, imageops};
 
 use super::DatasetError;
 use crate::{
-    rollout::Film,
+    rollout::StateRecording,
     scene::Camera,
     sensing::tactile::{MarkerStyle, Markers},
 };
@@ -27,7 +27,7 @@ pub struct Scenery {
 
 /// Draws the states of a film.
 pub struct Easel<'a> {
-    film: &'a mut Film,
+    film: &'a mut StateRecording,
     cameras: Vec<Camera>,
 }
 
@@ -36,8 +36,8 @@ impl<'a> Easel<'a> {
     ///
     /// # Errors
     /// It has not.
-    pub fn new(film: &'a mut Film) -> Result<Self, DatasetError> {
-        let camera = |name: &str| Ok(film.senses.camera(name)?.clone());
+    pub fn new(film: &'a mut StateRecording) -> Result<Self, DatasetError> {
+        let camera = |name: &str| Ok(film.sensors.camera(name)?.clone());
         let cameras = CAMERAS.into_iter().map(camera).collect::<Result<_, DatasetError>>()?;
         Ok(Self { film, cameras })
     }
@@ -48,10 +48,10 @@ impl<'a> Easel<'a> {
     /// A stream cannot be made.
     pub fn draw(&mut self, step: usize) -> Result<Option<Scenery>, DatasetError> {
         let Some(frame) = self.film.frames.get(step) else { return Ok(None) };
-        let senses = &mut self.film.senses;
-        let third = senses.see(frame, &self.cameras[0])?.into_image();
-        let wrist = senses.see(frame, &self.cameras[1])?.into_image();
-        let touched = senses.touch(frame)?;
+        let senses = &mut self.film.sensors;
+        let third = senses.render(frame, &self.cameras[0])?.into_image();
+        let wrist = senses.render(frame, &self.cameras[1])?.into_image();
+        let touched = senses.tactile_readings(frame)?;
         let [left, right] = [0, 1].map(|side: usize| touched[side].with_markers(MarkerStyle::Dots));
         let [bare_left, bare_right] = [0, 1].map(|side: usize| touched[side].picture.clone());
         Ok(Some(Scenery {

@@ -13,7 +13,7 @@ use super::{
     video::VideoWriter,
     write::Writer,
 };
-use crate::{benchmark::control::CONTROL_DT, files, rollout::Film};
+use crate::{benchmark::control::CONTROL_DT, files, rollout::StateRecording};
 
 /// What is written of a demonstration, and where.
 pub struct Recorder<'a> {
@@ -41,7 +41,7 @@ impl Recorder<'_> {
     /// A stream cannot be made, a file not written, or the end was asked for; the HDF5 file is not there then.
     pub fn write(
         &self,
-        film: &mut Film,
+        film: &mut StateRecording,
         mut demonstration: Demonstration,
         stop: impl Fn() -> bool,
     ) -> Result<(), DatasetError> {
@@ -59,7 +59,7 @@ impl Recorder<'_> {
     fn draw(
         &self,
         aside: &Path,
-        film: &mut Film,
+        film: &mut StateRecording,
         demonstration: &mut Demonstration,
         stop: impl Fn() -> bool,
     ) -> Result<(), DatasetError> {
@@ -71,7 +71,7 @@ impl Recorder<'_> {
     fn fill(
         &self,
         writer: &mut Writer,
-        film: &mut Film,
+        film: &mut StateRecording,
         demonstration: &mut Demonstration,
         stop: impl Fn() -> bool,
     ) -> Result<(), DatasetError> {

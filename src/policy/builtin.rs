@@ -8,11 +8,11 @@ use crate::geometry::Vec3;
 
 /// Stays where it is with the gripper open.
 #[derive(Debug, Default)]
-pub struct Noop {
+pub struct NoopPolicy {
     hold: Option<(Vec3, Vec3)>,
 }
 
-impl Policy for Noop {
+impl Policy for NoopPolicy {
     fn name(&self) -> &str {
         "noop"
     }
@@ -29,13 +29,13 @@ const STRIDE: f64 = 0.02;
 
 /// Wanders at random over the table, opening and closing.
 #[derive(Debug)]
-pub struct Random {
+pub struct RandomPolicy {
     rng: ChaCha8Rng,
     closure: f64,
     hold: Option<Vec3>,
 }
 
-impl Random {
+impl RandomPolicy {
     /// A walk from `seed`.
     pub fn new(seed: u64) -> Self {
         Self { rng: ChaCha8Rng::seed_from_u64(seed), closure: 0.0, hold: None }
@@ -47,7 +47,7 @@ impl Random {
     }
 }
 
-impl Policy for Random {
+impl Policy for RandomPolicy {
     fn name(&self) -> &str {
         "random"
     }

@@ -3,45 +3,46 @@
 use std::collections::VecDeque;
 
 use super::{
-    Action, ActionChunk, Command, Observation, Policy, PolicyError, Streams, TaskBrief, osc, osc::Osc,
+    Action, ActionChunk, Observation, Policy, PolicyError, SensorStreams, TaskBrief, ToolCommand, osc,
+    osc::OscController,
 };
 
 /// A policy whose chunks are carried out.
-pub struct Chunked<'a> {
+pub struct ChunkedPolicy<'a> {
     policy: Box<dyn Policy + 'a>,
     /// Actions of a chunk that are carried out.
     replan: usize,
     brief: Option<TaskBrief>,
-    rest: VecDeque<Command>,
-    follower: Follower,
+    rest: VecDeque<ToolCommand>,
+    follower: CommandResolver,
 }
 
 /// Commands become poses one after another: a step away from where the tool is remembers how fast the last one left it.
 #[derive(Clone, Debug, Default)]
-pub struct Follower {
-    osc: Osc,
+pub struct CommandResolver {
+    osc: OscController,
 }
 
-impl Follower {
+impl CommandResolver {
     /// The pose that a command means when its turn comes.
-    pub fn action(&mut self, now: &Observation, command: Command) -> Action {
+    pub fn action(&mut self, now: &Observation, command: ToolCommand) -> Action {
         match command {
-            Command::Pose(action) => {
-                self.osc = Osc::default();
+            ToolCommand::Pose(action) => {
+                self.osc = OscController::default();
                 action
             }
-            Command::Step { whole: true, translation_b, rotation_b, closure } => {
-                self.osc = Osc::default();
+            ToolCommand::Step { whole: true, translation_b, rotation_b, closure } => {
+                self.osc = OscController::default();
                 osc::whole(now, translation_b, rotation_b, closure)
             }
-            Command::Step { whole: false, translation_b, rotation_b, closure } => {
+            ToolCommand::Step { whole: false, translation_b, rotation_b, closure } => {
                 self.osc.step(now, translation_b, rotation_b, closure)
             }
         }
     }
 }
 
-impl<'a> Chunked<'a> {
+impl<'a> ChunkedPolicy<'a> {
     /// `policy` in the episode `brief`; the first `replan` actions of each of its chunks are carried out, or all if they are
     /// fewer.
     pub fn new(policy: Box<dyn Policy + 'a>, brief: TaskBrief, replan: usize) -> Self {
@@ -50,17 +51,17 @@ impl<'a> Chunked<'a> {
             replan: replan.max(1),
             brief: Some(brief),
             rest: VecDeque::new(),
-            follower: Follower::default(),
+            follower: CommandResolver::default(),
         }
     }
 
     /// What the policy looks at, when it looks.
-    pub fn streams(&self) -> Streams {
+    pub fn streams(&self) -> SensorStreams {
         self.policy.streams()
     }
 
     /// Whether the policy is asked in this control step; in others nothing need be sensed for it.
-    pub fn looks(&self) -> bool {
+    pub fn wants_observation(&self) -> bool {
         self.rest.is_empty()
     }
 

@@ -3,8 +3,8 @@
 use rmpv::Value;
 
 use super::{
-    Action, ActionChunk, Command, PolicyError,
-    profile::{ACTION_LEN, ActionCode, PoseCode, Units},
+    Action, ActionChunk, PolicyError, ToolCommand,
+    profile::{ACTION_LEN, ActionEncoding, ActionUnits, PoseEncoding},
     wire::{entry, kind, names, numbers},
 };
 use crate::geometry::Vec3;
@@ -16,7 +16,7 @@ pub const LONGEST: usize = 10_000;
 ///
 /// # Errors
 /// The reply is no such thing: [`PolicyError::Reply`]; it holds a number that is not finite: [`PolicyError::Action`].
-pub fn chunk(reply: &Value, code: &ActionCode) -> Result<ActionChunk, PolicyError> {
+pub fn chunk(reply: &Value, code: &ActionEncoding) -> Result<ActionChunk, PolicyError> {
     let wrong = |what: String| PolicyError::Reply(format!("the policy's reply {what}"));
     if reply.as_map().is_none() {
         return Err(wrong(format!("is {}; expected a map with the entry actions", kind(reply))));
@@ -33,7 +33,7 @@ pub fn chunk(reply: &Value, code: &ActionCode) -> Result<ActionChunk, PolicyErro
 ///
 /// # Errors
 /// As [`chunk`].
-pub fn rows(shape: &[usize], found: &[f64], code: &ActionCode) -> Result<ActionChunk, PolicyError> {
+pub fn rows(shape: &[usize], found: &[f64], code: &ActionEncoding) -> Result<ActionChunk, PolicyError> {
     let wrong = |what: &str| {
         PolicyError::Reply(format!(
             "the policy's reply has actions of shape {shape:?}: {what}; expected (horizon, {ACTION_LEN} or more)"
@@ -54,7 +54,7 @@ pub fn rows(shape: &[usize], found: &[f64], code: &ActionCode) -> Result<ActionC
         }
         _ => {}
     }
-    let commands: Result<Vec<Command>, PolicyError> =
+    let commands: Result<Vec<ToolCommand>, PolicyError> =
         found.chunks_exact(width).map(|row| command(&row[..ACTION_LEN], code)).collect();
     Ok(ActionChunk { commands: commands? })
 }
@@ -63,7 +63,7 @@ pub fn rows(shape: &[usize], found: &[f64], code: &ActionCode) -> Result<ActionC
 ///
 /// # Errors
 /// One of them is not finite.
-pub fn command(row: &[f64], code: &ActionCode) -> Result<Command, PolicyError> {
+pub fn command(row: &[f64], code: &ActionEncoding) -> Result<ToolCommand, PolicyError> {
     let [_, _, _, _, _, _, gripper] = row else {
         return Err(PolicyError::Reply(format!(
             "an action has {} numbers; expected {ACTION_LEN}",
@@ -73,28 +73,30 @@ pub fn command(row: &[f64], code: &ActionCode) -> Result<Command, PolicyError> {
     if row.iter().any(|number| !number.is_finite()) {
         return Err(PolicyError::Action(format!("the action {row:?} holds a number that is not finite")));
     }
-    let Units { scale, offset } = code.units.unwrap_or(Units::SAME);
+    let ActionUnits { scale, offset } = code.units.unwrap_or(ActionUnits::SAME);
     let [x, y, z, rx, ry, rz] = std::array::from_fn(|i| scale[i] * row[i] + offset[i]);
     let (first, second) = (Vec3::new(x, y, z), Vec3::new(rx, ry, rz));
     let closure = code.gripper.closure(*gripper);
     // robosuite's controller cuts what is beyond −1..=1 off too.
-    let step = |whole, translation_m: f64, rotation_rad: f64| Command::Step {
+    let step = |whole, translation_m: f64, rotation_rad: f64| ToolCommand::Step {
         whole,
         translation_b: first.map(|x| x.clamp(-1.0, 1.0)) * translation_m,
         rotation_b: second.map(|x| x.clamp(-1.0, 1.0)) * rotation_rad,
         closure,
     };
     Ok(match code.pose {
-        PoseCode::Absolute => Command::Pose(Action { position_b: first, axis_angle_b: second, closure }),
-        PoseCode::Delta { translation_m, rotation_rad } => step(true, translation_m, rotation_rad),
-        PoseCode::DeltaOsc { translation_m, rotation_rad } => step(false, translation_m, rotation_rad),
+        PoseEncoding::Absolute => {
+            ToolCommand::Pose(Action { position_b: first, axis_angle_b: second, closure })
+        }
+        PoseEncoding::Delta { translation_m, rotation_rad } => step(true, translation_m, rotation_rad),
+        PoseEncoding::DeltaOsc { translation_m, rotation_rad } => step(false, translation_m, rotation_rad),
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::policy::{profile::Profile, wire::Array};
+    use crate::policy::{profile::Profile, wire::WireArray};
 
     fn read(value: Value) -> Result<ActionChunk, PolicyError> {
         chunk(&value, &Profile::named("visuo_tactile").unwrap().actions)
@@ -102,7 +104,7 @@ mod tests {
 
     fn reply(shape: Vec<usize>, fill: f32) -> Value {
         let count = shape.iter().product();
-        let actions = Array::floats(shape, vec![fill; count]).into_value(true);
+        let actions = WireArray::floats(shape, vec![fill; count]).into_value(true);
         Value::Map(vec![("actions".into(), actions)])
     }
 
@@ -112,7 +114,7 @@ mod tests {
         assert_eq!(chunk.commands.len(), 50);
         let quarter = Vec3::repeat(0.25);
         let expected = Action { position_b: quarter, axis_angle_b: quarter, closure: 0.25 };
-        assert_eq!(chunk.commands[49], Command::Pose(expected));
+        assert_eq!(chunk.commands[49], ToolCommand::Pose(expected));
         assert_eq!(read(reply(vec![7], 0.1)).unwrap().commands.len(), 1);
         assert_eq!(read(reply(vec![1, 4, 7], 0.1)).unwrap().commands.len(), 4);
     }
@@ -141,7 +143,7 @@ mod tests {
     fn liberos_steps_are_scaled_and_cut_off() {
         let code = Profile::named("libero").unwrap().actions;
         let step = command(&[1.0, -9.0, 0.5, 0.0, 0.0, 2.0, 1.0], &code).unwrap();
-        let expected = Command::Step {
+        let expected = ToolCommand::Step {
             whole: false,
             translation_b: Vec3::new(0.05, -0.05, 0.025),
             rotation_b: Vec3::new(0.0, 0.0, 0.5),
@@ -155,11 +157,12 @@ mod tests {
         let mut code = Profile::named("visuo_tactile").unwrap().actions;
         // Millimetres from a point half a metre in front of the base, degrees.
         let (mm, degree) = (1e-3, 1.0_f64.to_radians());
-        code.units = Some(Units {
+        code.units = Some(ActionUnits {
             scale: [mm, mm, mm, degree, degree, degree],
             offset: [0.5, 0.0, 0.1, 0.0, 0.0, 0.0],
         });
-        let Command::Pose(action) = command(&[20.0, -30.0, 0.0, 180.0, 0.0, 0.0, 1.0], &code).unwrap() else {
+        let ToolCommand::Pose(action) = command(&[20.0, -30.0, 0.0, 180.0, 0.0, 0.0, 1.0], &code).unwrap()
+        else {
             panic!("a pose");
         };
         assert!((action.position_b - Vec3::new(0.52, -0.03, 0.1)).norm() < 1e-12);
@@ -168,7 +171,7 @@ mod tests {
 
     #[test]
     fn a_profile_that_says_how_long_actions_are_takes_no_others() {
-        let code = ActionCode { length: Some(32), ..Profile::named("visuo_tactile").unwrap().actions };
+        let code = ActionEncoding { length: Some(32), ..Profile::named("visuo_tactile").unwrap().actions };
         assert_eq!(rows(&[2, 32], &[0.25; 64], &code).unwrap().commands.len(), 2);
         match rows(&[2, 7], &[0.25; 14], &code) {
             Err(PolicyError::Reply(message)) => assert!(message.contains("32 numbers"), "{message}"),

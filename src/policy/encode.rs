@@ -5,8 +5,8 @@ use rmpv::Value;
 
 use super::{
     Observation,
-    profile::{Finger, Profile, Source, StatePart},
-    wire::Array,
+    profile::{Finger, InputSource, Profile, StatePart},
+    wire::WireArray,
 };
 use crate::{
     robot::rotation,
@@ -15,15 +15,15 @@ use crate::{
 
 /// An entry of an observation before it is packed.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Content {
+pub enum ObservationEntry {
     /// Numbers or pictures.
-    Array(Array),
+    Array(WireArray),
     /// Text.
     Text(String),
 }
 
-impl Content {
-    /// As msgpack; see [`Array::into_value`].
+impl ObservationEntry {
+    /// As msgpack; see [`WireArray::into_value`].
     pub fn into_value(self, bin_keys: bool) -> Value {
         match self {
             Self::Array(array) => array.into_value(bin_keys),
@@ -33,35 +33,35 @@ impl Content {
 }
 
 /// What an entry holds; `None` if the observation lacks what it is made of.
-pub fn content(observation: &Observation, source: &Source) -> Option<Content> {
+pub fn content(observation: &Observation, source: &InputSource) -> Option<ObservationEntry> {
     let array = match source {
-        Source::Prompt => return Some(Content::Text(observation.prompt.clone())),
-        Source::Camera { camera, half_turn } => {
+        InputSource::Prompt => return Some(ObservationEntry::Text(observation.prompt.clone())),
+        InputSource::Camera { camera, half_turn } => {
             let picture = observation.camera(camera)?;
             if *half_turn { bytes(imageops::rotate180(picture)) } else { bytes(picture.clone()) }
         }
-        Source::State { parts } => {
+        InputSource::State { parts } => {
             let numbers: Vec<f32> = parts.iter().flat_map(|part| state(observation, *part)).collect();
-            Array::floats(vec![numbers.len()], numbers)
+            WireArray::floats(vec![numbers.len()], numbers)
         }
-        Source::TactileImage { layout } => bytes(observation.touch.as_ref()?.mosaic((*layout).into())),
-        Source::Tactile { finger } => {
-            bytes(observation.touch.as_ref()?.now()?[usize::from(*finger == Finger::Right)].picture.clone())
+        InputSource::TactileImage { layout } => bytes(observation.touch.as_ref()?.mosaic((*layout).into())),
+        InputSource::Tactile { finger } => {
+            bytes(observation.touch.as_ref()?.now()?[usize::from(*finger == Finger::Right)].image.clone())
         }
-        Source::MarkerMotion => {
+        InputSource::MarkerMotion => {
             let rows = observation.touch.as_ref()?.marker_motion();
-            Array::floats(vec![rows.len(), 2 * MARKERS, 2], rows.into_iter().flatten().flatten())
+            WireArray::floats(vec![rows.len(), 2 * MARKERS, 2], rows.into_iter().flatten().flatten())
         }
-        Source::Force => {
+        InputSource::Force => {
             let rows = (0..HISTORY).map(|place| {
                 let past = &observation.force_history;
                 past.get((place + past.len()).saturating_sub(HISTORY))
             });
             let rows: Option<Vec<&[f64; 6]>> = rows.collect();
-            Array::floats(vec![HISTORY, 6], rows?.into_iter().flatten().map(|x| *x as f32))
+            WireArray::floats(vec![HISTORY, 6], rows?.into_iter().flatten().map(|x| *x as f32))
         }
     };
-    Some(Content::Array(array))
+    Some(ObservationEntry::Array(array))
 }
 
 /// The whole observation as openpi's clients send it.
@@ -77,9 +77,9 @@ pub fn openpi(observation: &Observation, profile: &Profile) -> Value {
     Value::Map(entries)
 }
 
-fn bytes(picture: RgbImage) -> Array {
+fn bytes(picture: RgbImage) -> WireArray {
     let shape = vec![picture.height() as usize, picture.width() as usize, 3];
-    Array::bytes(shape, picture.into_raw())
+    WireArray::bytes(shape, picture.into_raw())
 }
 
 fn state(o: &Observation, part: StatePart) -> Vec<f32> {

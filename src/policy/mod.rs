@@ -13,8 +13,8 @@ pub mod wire;
 
 use crate::geometry::Vec3;
 
-pub use chunked::{Chunked, Follower};
-pub use observation::{CameraPicture, Observation, PadForce, Streams, TouchFrame, TouchHistory};
+pub use chunked::{ChunkedPolicy, CommandResolver};
+pub use observation::{CameraImage, Observation, PadForce, SensorStreams, TactileFrame, TactileHistory};
 
 /// What a policy commands for one control step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,7 +29,7 @@ pub struct Action {
 
 /// What one of a chunk's actions commands.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Command {
+pub enum ToolCommand {
     /// A pose.
     Pose(Action),
     /// A step away from where the tool is when its turn comes.
@@ -49,12 +49,12 @@ pub enum Command {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ActionChunk {
     /// At least one, in order.
-    pub commands: Vec<Command>,
+    pub commands: Vec<ToolCommand>,
 }
 
 impl From<Action> for ActionChunk {
     fn from(action: Action) -> Self {
-        Self { commands: vec![Command::Pose(action)] }
+        Self { commands: vec![ToolCommand::Pose(action)] }
     }
 }
 
@@ -99,8 +99,8 @@ pub trait Policy: Send {
     /// Its name in results.
     fn name(&self) -> &str;
     /// What it looks at; nothing else is computed.
-    fn streams(&self) -> Streams {
-        Streams::default()
+    fn streams(&self) -> SensorStreams {
+        SensorStreams::default()
     }
     /// An episode begins.
     ///

@@ -12,7 +12,7 @@ use crate::{
 
 /// The streams that somebody looks at; others are never computed.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Streams {
+pub struct SensorStreams {
     /// Cameras of the scene, by name.
     pub cameras: Vec<String>,
     /// The tactile sensors.
@@ -38,10 +38,10 @@ pub struct Observation {
     pub closure: f64,
     /// The instruction.
     pub prompt: String,
-    /// Pictures of the cameras asked for, in the order of [`Streams::cameras`].
-    pub cameras: Vec<CameraPicture>,
+    /// Pictures of the cameras asked for, in the order of [`SensorStreams::cameras`].
+    pub cameras: Vec<CameraImage>,
     /// What the fingers felt, if asked for.
-    pub touch: Option<TouchHistory>,
+    pub touch: Option<TactileHistory>,
     /// True forces at the left and right pad, if asked for.
     pub forces: Option<[PadForce; 2]>,
     /// Resultants of the last control steps, oldest first, 1 to 8, if asked for: force on the left and the right gel, N, in the
@@ -52,18 +52,18 @@ pub struct Observation {
 /// A camera's picture: rows from the top, RGB, 8 bits a channel, sRGB. A camera that gets inside of something during an
 /// episode, on the hand or in the world, sees what is beyond that thing; results count such steps as `camera_inside`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct CameraPicture {
+pub struct CameraImage {
     /// Name of the camera.
     pub name: String,
     /// The picture; its size is the camera's, 224 × 224 unless the scene says otherwise.
-    pub picture: RgbImage,
+    pub image: RgbImage,
 }
 
 /// One finger's sensor at one control step.
 #[derive(Clone, Debug, PartialEq)]
-pub struct TouchFrame {
+pub struct TactileFrame {
     /// The colour picture, 320 × 240; `docs/tactile.md` draws its frame.
-    pub picture: RgbImage,
+    pub image: RgbImage,
     /// The same as it stands in the mosaic, 56 × 56.
     pub cell: RgbImage,
     /// The picture of the untouched gel.
@@ -74,9 +74,9 @@ pub struct TouchFrame {
 
 /// The last control steps of both fingers.
 #[derive(Clone, Debug, PartialEq)]
-pub struct TouchHistory {
+pub struct TactileHistory {
     /// Left and right finger, oldest first; 1 to 8 frames.
-    pub frames: Vec<Arc<[TouchFrame; 2]>>,
+    pub frames: Vec<Arc<[TactileFrame; 2]>>,
 }
 
 /// True force on one gel.
@@ -91,19 +91,19 @@ pub struct PadForce {
 impl Observation {
     /// A camera's picture by name.
     pub fn camera(&self, name: &str) -> Option<&RgbImage> {
-        self.cameras.iter().find(|camera| camera.name == name).map(|camera| &camera.picture)
+        self.cameras.iter().find(|camera| camera.name == name).map(|camera| &camera.image)
     }
 }
 
-impl TouchFrame {
+impl TactileFrame {
     /// What a sensor gives. The cell is made here, while the picture is still in the processor's cache.
-    pub fn new(picture: RgbImage, untouched: Arc<RgbImage>, markers: Markers) -> Self {
-        Self { cell: mosaic_cell(&picture), picture, untouched, markers }
+    pub fn new(image: RgbImage, untouched: Arc<RgbImage>, markers: Markers) -> Self {
+        Self { cell: mosaic_cell(&image), image, untouched, markers }
     }
 
     /// How far each channel of each pixel is from the untouched picture, 0 to 255.
     pub fn change(&self) -> RgbImage {
-        let mut change = self.picture.clone();
+        let mut change = self.image.clone();
         for (value, rest) in change.iter_mut().zip(self.untouched.iter()) {
             *value = value.abs_diff(*rest);
         }
@@ -111,9 +111,9 @@ impl TouchFrame {
     }
 }
 
-impl TouchHistory {
+impl TactileHistory {
     /// Left and right finger now.
-    pub fn now(&self) -> Option<&[TouchFrame; 2]> {
+    pub fn now(&self) -> Option<&[TactileFrame; 2]> {
         self.frames.last().map(AsRef::as_ref)
     }
 
@@ -127,7 +127,7 @@ impl TouchHistory {
     /// The shape (1 + 8, 198, 2) of SoftVTBench's policies: initial places of the left and right markers, then the
     /// present ones of the last 8 control steps, oldest first; a short history starts with its oldest frame.
     pub fn marker_motion(&self) -> Vec<[[f32; 2]; 2 * MARKERS]> {
-        let row = |frame: &[TouchFrame; 2], when: usize| -> [[f32; 2]; 2 * MARKERS] {
+        let row = |frame: &[TactileFrame; 2], when: usize| -> [[f32; 2]; 2 * MARKERS] {
             std::array::from_fn(|m| frame[m / MARKERS].markers[when][m % MARKERS])
         };
         let Some(first) = self.frames.first() else { return Vec::new() };

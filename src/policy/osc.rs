@@ -17,12 +17,12 @@ const KP: f64 = 150.0;
 
 /// Velocities of the tool between two steps, as the spring left them.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Osc {
+pub struct OscController {
     velocity: Vec3,
     spin: Vec3,
 }
 
-impl Osc {
+impl OscController {
     /// The pose at the end of a control step whose goal is a step away from where the tool is now.
     pub fn step(&mut self, now: &Observation, translation_b: Vec3, rotation_b: Vec3, closure: f64) -> Action {
         let moved = spring(&translation_b, &mut self.velocity);

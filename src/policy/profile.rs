@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Streams;
+use super::SensorStreams;
 use crate::sensing::tactile::MosaicLayout;
 
 /// Names of the cameras that every scene has.
@@ -14,24 +14,24 @@ pub struct Profile {
     /// Name, as in results.
     pub name: String,
     /// What is sent, in order.
-    pub inputs: Vec<Input>,
+    pub inputs: Vec<ProfileInput>,
     /// How replies are read.
-    pub actions: ActionCode,
+    pub actions: ActionEncoding,
 }
 
 /// One entry of an observation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Input {
+pub struct ProfileInput {
     /// Keys it is sent under.
     pub keys: Vec<String>,
     /// What it is.
-    pub source: Source,
+    pub source: InputSource,
 }
 
 /// Where an entry comes from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
-pub enum Source {
+pub enum InputSource {
     /// A camera's picture, uint8 (height, width, 3).
     Camera {
         /// Name of the camera.
@@ -132,14 +132,14 @@ impl StatePart {
 
 /// How an action is coded: three numbers of position, three of orientation, one of the gripper; more are padding.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ActionCode {
+pub struct ActionEncoding {
     /// What the first six are.
-    pub pose: PoseCode,
+    pub pose: PoseEncoding,
     /// What the seventh is.
-    pub gripper: GripperCode,
+    pub gripper: GripperEncoding,
     /// How an actor's own units become those of `pose`, if they differ.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub units: Option<Units>,
+    pub units: Option<ActionUnits>,
     /// How many numbers an action must have, padding included; any from seven on if none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub length: Option<usize>,
@@ -147,21 +147,21 @@ pub struct ActionCode {
 
 /// `scale · number + offset`, for each of the first six numbers of an action.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Units {
+pub struct ActionUnits {
     /// Factors.
     pub scale: [f64; 6],
     /// What is added then, m and rad.
     pub offset: [f64; 6],
 }
 
-impl Units {
+impl ActionUnits {
     /// Numbers as they are.
     pub const SAME: Self = Self { scale: [1.0; 6], offset: [0.0; 6] };
 }
 
-impl ActionCode {
+impl ActionEncoding {
     /// A code without units and padding of its own.
-    pub fn plain(pose: PoseCode, gripper: GripperCode) -> Self {
+    pub fn plain(pose: PoseEncoding, gripper: GripperEncoding) -> Self {
         Self { pose, gripper, units: None, length: None }
     }
 }
@@ -172,7 +172,7 @@ pub const ACTION_LEN: usize = 7;
 /// What the first six numbers of an action are.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
-pub enum PoseCode {
+pub enum PoseEncoding {
     /// Tool pose in the base frame: m, and axis-angle in rad.
     Absolute,
     /// Shares −1..=1 of a step away from where the tool is when the action's turn comes, taken in full.
@@ -193,7 +193,7 @@ pub enum PoseCode {
 
 /// The gripper's number: one value opens, one shuts, those between do in proportion unless the code is binary.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct GripperCode {
+pub struct GripperEncoding {
     /// The value that opens.
     pub open: f64,
     /// The value that shuts.
@@ -202,7 +202,7 @@ pub struct GripperCode {
     pub binary: bool,
 }
 
-impl GripperCode {
+impl GripperEncoding {
     /// The closure that a number means.
     pub fn closure(&self, number: f64) -> f64 {
         // Never −0.
@@ -229,44 +229,45 @@ impl Profile {
     /// A profile by name.
     pub fn named(name: &str) -> Option<Self> {
         let both = |name: &str| vec![format!("observation/{name}"), name.to_owned()];
-        let plain = |camera: &str| Source::Camera { camera: camera.to_owned(), half_turn: false };
+        let plain = |camera: &str| InputSource::Camera { camera: camera.to_owned(), half_turn: false };
         let finger = vec![StatePart::Position, StatePart::AxisAngle, StatePart::FingerPosition];
-        let input = |keys: Vec<String>, source| Input { keys, source };
+        let input = |keys: Vec<String>, source| ProfileInput { keys, source };
         let mut inputs = vec![
             input(both("image"), plain(CAMERAS[0])),
             input(both("wrist_image"), plain(CAMERAS[1])),
-            input(both("state"), Source::State { parts: finger }),
-            input(vec!["prompt".to_owned()], Source::Prompt),
+            input(both("state"), InputSource::State { parts: finger }),
+            input(vec!["prompt".to_owned()], InputSource::Prompt),
         ];
         let touch = [
-            input(both("tactile_image"), Source::TactileImage { layout: Mosaic::Rows }),
-            input(both("tactile_marker_motion"), Source::MarkerMotion),
+            input(both("tactile_image"), InputSource::TactileImage { layout: Mosaic::Rows }),
+            input(both("tactile_marker_motion"), InputSource::MarkerMotion),
         ];
-        let closure = GripperCode { open: 0.0, shut: 1.0, binary: false };
-        let absolute = |gripper| ActionCode::plain(PoseCode::Absolute, gripper);
+        let closure = GripperEncoding { open: 0.0, shut: 1.0, binary: false };
+        let absolute = |gripper| ActionEncoding::plain(PoseEncoding::Absolute, gripper);
         let actions = match name {
-            "vision" => absolute(GripperCode { binary: true, ..closure }),
+            "vision" => absolute(GripperEncoding { binary: true, ..closure }),
             "visuo_tactile" => {
                 inputs.extend(touch);
                 absolute(closure)
             }
             "softvtbench" => {
                 inputs.extend(touch);
-                inputs.push(input(both("tactile_gripper_force"), Source::Force));
+                inputs.push(input(both("tactile_gripper_force"), InputSource::Force));
                 inputs[3].keys.push("observation/prompt".to_owned());
                 // The commanded position of either finger.
-                absolute(GripperCode { open: 0.04, shut: 0.0, binary: false })
+                absolute(GripperEncoding { open: 0.04, shut: 0.0, binary: false })
             }
             "libero" => {
-                let turned = |camera: &str| Source::Camera { camera: camera.to_owned(), half_turn: true };
+                let turned =
+                    |camera: &str| InputSource::Camera { camera: camera.to_owned(), half_turn: true };
                 inputs[0].source = turned(CAMERAS[0]);
                 inputs[1].source = turned(CAMERAS[1]);
                 let parts = vec![StatePart::Position, StatePart::AxisAngle, StatePart::FingerPair];
-                inputs[2].source = Source::State { parts };
+                inputs[2].source = InputSource::State { parts };
                 inputs[..3].iter_mut().for_each(|input| input.keys.truncate(1));
-                ActionCode::plain(
-                    PoseCode::DeltaOsc { translation_m: 0.05, rotation_rad: 0.5 },
-                    GripperCode { open: -1.0, shut: 1.0, binary: true },
+                ActionEncoding::plain(
+                    PoseEncoding::DeltaOsc { translation_m: 0.05, rotation_rad: 0.5 },
+                    GripperEncoding { open: -1.0, shut: 1.0, binary: true },
                 )
             }
             _ => return None,
@@ -275,18 +276,20 @@ impl Profile {
     }
 
     /// What has to be sensed for it.
-    pub fn streams(&self) -> Streams {
-        let mut streams = Streams::default();
+    pub fn streams(&self) -> SensorStreams {
+        let mut streams = SensorStreams::default();
         for input in &self.inputs {
             match &input.source {
-                Source::Camera { camera, .. } if !streams.cameras.contains(camera) => {
+                InputSource::Camera { camera, .. } if !streams.cameras.contains(camera) => {
                     streams.cameras.push(camera.clone());
                 }
-                Source::TactileImage { .. } | Source::Tactile { .. } | Source::MarkerMotion => {
+                InputSource::TactileImage { .. }
+                | InputSource::Tactile { .. }
+                | InputSource::MarkerMotion => {
                     streams.touch = true;
                 }
-                Source::Force => streams.force = true,
-                Source::Camera { .. } | Source::State { .. } | Source::Prompt => {}
+                InputSource::Force => streams.force = true,
+                InputSource::Camera { .. } | InputSource::State { .. } | InputSource::Prompt => {}
             }
         }
         streams

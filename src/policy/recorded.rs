@@ -1,39 +1,39 @@
 //! Commands that were recorded before, carried out again.
 
-use super::{Action, ActionChunk, Command, Observation, Policy, PolicyError};
+use super::{Action, ActionChunk, Observation, Policy, PolicyError, ToolCommand};
 use crate::geometry::Vec3;
 
 /// Carries out recorded commands, one a control step.
 #[derive(Clone, Debug)]
-pub struct Recorded {
-    commands: std::vec::IntoIter<Command>,
-    last: Option<Command>,
+pub struct RecordedPolicy {
+    commands: std::vec::IntoIter<ToolCommand>,
+    last: Option<ToolCommand>,
     ending: Option<String>,
 }
 
-impl Recorded {
+impl RecordedPolicy {
     /// Behind the last of `commands` the tool stays there; or fails as the recorded episode did, if that is given.
-    pub fn new(commands: Vec<Command>, ending: Option<String>) -> Self {
+    pub fn new(commands: Vec<ToolCommand>, ending: Option<String>) -> Self {
         Self { commands: commands.into_iter(), last: None, ending }
     }
 
     /// The same for poses.
     pub fn poses(actions: &[Action], ending: Option<String>) -> Self {
-        Self::new(actions.iter().copied().map(Command::Pose).collect(), ending)
+        Self::new(actions.iter().copied().map(ToolCommand::Pose).collect(), ending)
     }
 }
 
 /// What keeps the tool where a command has brought it.
-fn held(command: Command) -> Command {
+fn held(command: ToolCommand) -> ToolCommand {
     match command {
-        Command::Pose(_) => command,
-        Command::Step { whole, closure, .. } => {
-            Command::Step { whole, translation_b: Vec3::zeros(), rotation_b: Vec3::zeros(), closure }
+        ToolCommand::Pose(_) => command,
+        ToolCommand::Step { whole, closure, .. } => {
+            ToolCommand::Step { whole, translation_b: Vec3::zeros(), rotation_b: Vec3::zeros(), closure }
         }
     }
 }
 
-impl Policy for Recorded {
+impl Policy for RecordedPolicy {
     fn name(&self) -> &str {
         "replay"
     }
@@ -47,7 +47,7 @@ impl Policy for Recorded {
             return Err(PolicyError::Action(message.clone()));
         }
         let (position_b, axis_angle_b) = (observation.ee_position_b, observation.ee_axis_angle_b);
-        let still = Command::Pose(Action { position_b, axis_angle_b, closure: 0.0 });
+        let still = ToolCommand::Pose(Action { position_b, axis_angle_b, closure: 0.0 });
         Ok(ActionChunk { commands: vec![self.last.map_or(still, held)] })
     }
 }

@@ -7,7 +7,7 @@ use rmpv::Value;
 
 /// An array to be sent: C order, little endian.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Array {
+pub struct WireArray {
     /// numpy's name of the type of its numbers.
     pub dtype: &'static str,
     /// Lengths of its axes.
@@ -16,7 +16,7 @@ pub struct Array {
     pub data: Vec<u8>,
 }
 
-impl Array {
+impl WireArray {
     /// Bytes, such as pictures.
     pub fn bytes(shape: Vec<usize>, data: Vec<u8>) -> Self {
         Self { dtype: "|u1", shape, data }
@@ -193,7 +193,7 @@ mod tests {
 
     #[test]
     fn an_array_packs_as_openpis_client_packs_it() {
-        let zeros = Array::floats(vec![2, 3], [0.0; 6]).into_value(true);
+        let zeros = WireArray::floats(vec![2, 3], [0.0; 6]).into_value(true);
         let mut packed = Vec::new();
         rmpv::encode::write_value(&mut packed, &Value::Map(vec![("a".into(), zeros)])).unwrap();
         let mut expected = b"\x81\xa1a\x84\xc4\x0b__ndarray__\xc3\xc4\x04data\xc4\x18".to_vec();
@@ -205,7 +205,7 @@ mod tests {
     #[test]
     fn arrays_come_back_with_both_kinds_of_keys() {
         for bin in [true, false] {
-            let value = Array::floats(vec![2, 2], [1.0, -2.5, 3.0, 1e-3]).into_value(bin);
+            let value = WireArray::floats(vec![2, 2], [1.0, -2.5, 3.0, 1e-3]).into_value(bin);
             let (shape, found) = numbers(&value).unwrap();
             assert_eq!((shape, found[1]), (vec![2, 2], -2.5));
         }
@@ -216,7 +216,7 @@ mod tests {
     #[test]
     fn every_type_of_number_is_read_at_its_width_sign_and_order() {
         let of = |dtype: &'static str, data: &[u8]| {
-            let array = Array { dtype, shape: vec![1], data: data.to_vec() };
+            let array = WireArray { dtype, shape: vec![1], data: data.to_vec() };
             numbers(&array.into_value(true)).map(|(_, found)| found[0])
         };
         assert_eq!(of("<f2", &[0x00, 0xC1]), Ok(-2.5));

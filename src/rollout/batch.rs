@@ -6,7 +6,7 @@ use std::sync::{
 };
 
 use super::{ControlError, Controller, Simulation};
-use crate::policy::{Action, Observation, Streams};
+use crate::policy::{Action, Observation, SensorStreams};
 
 /// Runs `jobs` jobs on `threads` threads; `done` gets each result as it comes, on this thread.
 ///
@@ -57,15 +57,15 @@ pub fn run<T: Send, E: Send>(
 }
 
 /// Whoever drives, until the run is told to stop.
-pub struct Stoppable<'a> {
+pub struct Cancellable<'a> {
     /// Who drives.
     pub driver: Box<dyn Controller>,
     /// Set when the run must end.
     pub stop: &'a AtomicBool,
 }
 
-impl Controller for Stoppable<'_> {
-    fn streams(&self) -> Streams {
+impl Controller for Cancellable<'_> {
+    fn streams(&self) -> SensorStreams {
         self.driver.streams()
     }
 
@@ -80,8 +80,8 @@ impl Controller for Stoppable<'_> {
         self.driver.act(sim, observation)
     }
 
-    fn looks(&self) -> bool {
-        self.driver.looks()
+    fn wants_observation(&self) -> bool {
+        self.driver.wants_observation()
     }
 
     fn finish(&mut self) {

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use super::{
-    furniture,
-    rest_cache::RestCache,
-    simulation::{Handle, Kind, Simulation},
+    articulated,
+    asset_cache::AssetCache,
+    simulation::{Kind, ObjectInstance, Simulation},
 };
 use crate::{
     geometry::{
@@ -228,7 +228,7 @@ const LEAST_SHEET: f64 = 2e-3;
 /// The longest side of an object is at least this long, m: less is nearly always a wrong scale.
 const LEAST_SIZE: f64 = 1e-3;
 
-fn check_scale(object: &Object, cache: &RestCache) -> Result<(), BuildError> {
+fn check_scale(object: &Object, cache: &AssetCache) -> Result<(), BuildError> {
     let longest = cache.bounds(&object.asset.shape).size().max();
     // What is empty is told as such, when it is meshed.
     if longest >= LEAST_SIZE || longest == 0.0 {
@@ -241,7 +241,7 @@ fn check_scale(object: &Object, cache: &RestCache) -> Result<(), BuildError> {
     Err(BuildError::Material { asset: object.asset.name.clone(), what })
 }
 
-fn check_sheet(object: &Object, cache: &RestCache) -> Result<(), BuildError> {
+fn check_sheet(object: &Object, cache: &AssetCache) -> Result<(), BuildError> {
     match cache.wall(&object.asset.shape).filter(|wall| *wall < LEAST_SHEET) {
         None => Ok(()),
         Some(wall) => Err(BuildError::Material {
@@ -264,9 +264,9 @@ const OVERLAP: f64 = 1e-3;
 pub(super) fn add_all(
     world: &mut World,
     scene: &Scene,
-    cache: &RestCache,
-) -> Result<Vec<Handle>, BuildError> {
-    let mut handles: Vec<Handle> = Vec::new();
+    cache: &AssetCache,
+) -> Result<Vec<ObjectInstance>, BuildError> {
+    let mut handles: Vec<ObjectInstance> = Vec::new();
     for object in &scene.objects {
         if handles.iter().any(|known| known.name == object.name) {
             return Err(BuildError::TwoNames(object.name.clone()).of(object));
@@ -337,7 +337,7 @@ pub(super) fn check_base(scene: &Scene) -> Result<(), BuildError> {
 pub fn check_support(sim: &Simulation) -> Result<(), BuildError> {
     let boxes: Vec<Aabb> = sim.objects.iter().map(|h| h.bounds.transformed(&h.start_w)).collect();
     for (handle, own) in sim.objects.iter().zip(&boxes) {
-        let holds = |(other, below): (&Handle, &Aabb)| {
+        let holds = |(other, below): (&ObjectInstance, &Aabb)| {
             let beneath = (0..2).all(|i| below.min[i] < own.max[i] && own.min[i] < below.max[i]);
             other.name != handle.name
                 && !matches!(other.asset.body, Body::Scenery)
@@ -360,8 +360,8 @@ pub fn check_support(sim: &Simulation) -> Result<(), BuildError> {
 fn add(
     world: &mut World,
     object: &Object,
-    cache: &RestCache,
-    handles: &mut Vec<Handle>,
+    cache: &AssetCache,
+    handles: &mut Vec<ObjectInstance>,
 ) -> Result<(), BuildError> {
     let asset = &object.asset;
     check_scale(object, cache)?;
@@ -390,7 +390,7 @@ fn add(
             (Kind::Rigid(index), vec![world.add_collider(collider)])
         }
         Body::Articulated(carried) => {
-            let (tree, made) = furniture::add(world, object, carried, handles.len(), cache)?;
+            let (tree, made) = articulated::add(world, object, carried, handles.len(), cache)?;
             parts = made;
             let base = collider(world, Mover::Static, object.pose_w).as_base_of(tree);
             (Kind::Static, vec![world.add_collider(base)])
@@ -401,7 +401,7 @@ fn add(
         }
         Body::Scenery => (Kind::Static, Vec::new()),
     };
-    handles.push(Handle {
+    handles.push(ObjectInstance {
         name: object.name.clone(),
         asset: asset.clone(),
         kind,

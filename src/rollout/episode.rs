@@ -3,20 +3,20 @@
 use image::RgbImage;
 
 use super::{
+    asset_cache::AssetCache,
     build::BuildError,
     command::{check_action, is_far},
-    control::{ControlError, Controller},
-    evidence::Witness,
+    controller::{ControlError, Controller},
+    evidence::EvidenceCollector,
     judging::judge,
-    looks::Looks,
-    recent::Recent,
-    rest_cache::RestCache,
-    senses::{Film, SenseError, Senses},
+    observation_history::Recent,
+    sensor_assets::SensorAssets,
+    sensor_check::check_sensors,
+    sensors::{SensingError, SensorSuite, StateRecording},
     settle::SettleError,
     simulation::{Kind, Simulation},
     spec::EpisodeSpec,
     state_hash::state_hash,
-    streams::check_senses,
     trace::StepTrace,
 };
 use crate::{
@@ -28,13 +28,13 @@ use crate::{
     },
     geometry::Pose,
     physics::world::{Frame, StepFailure},
-    policy::{Action, Observation, Streams},
+    policy::{Action, Observation, SensorStreams},
     robot::{Side, rotation},
 };
 
 /// A finished episode.
 #[derive(Debug)]
-pub struct Finished {
+pub struct FinishedEpisode {
     /// The record.
     pub record: EpisodeRecord,
     /// One entry a control step, if asked for.
@@ -46,7 +46,7 @@ pub struct Finished {
     /// Settled shape of a soft target.
     pub reference: Option<Reference>,
     /// What is needed to draw the rollout, if asked for.
-    pub film: Option<Film>,
+    pub recording: Option<StateRecording>,
 }
 
 /// What another scorer needs to know of a control step.
@@ -96,7 +96,7 @@ pub enum EpisodeError {
         /// Episode index.
         episode: u32,
         /// What happened.
-        source: SenseError,
+        source: SensingError,
     },
     /// Whoever drives failed.
     #[error("task {task}, episode {episode}: {source}")]
@@ -111,7 +111,7 @@ pub enum EpisodeError {
 }
 
 impl EpisodeSpec {
-    fn sense_error(&self, source: SenseError) -> EpisodeError {
+    fn sense_error(&self, source: SensingError) -> EpisodeError {
         EpisodeError::Sense { task: self.task.id, episode: self.identity.episode, source }
     }
 }
@@ -134,7 +134,7 @@ pub struct Episode {
     outcome: Option<Outcome>,
     /// The running scene.
     pub sim: Simulation,
-    witness: Witness,
+    evidence: EvidenceCollector,
     judge: Judge,
     target: usize,
     start_hold: Action,
@@ -145,17 +145,17 @@ pub struct Episode {
     trace: Vec<StepTrace>,
     frames: Vec<ScoreFrame>,
     actions: Vec<Action>,
-    senses: Senses,
+    sensors: SensorSuite,
     recent: Recent,
-    reel: Option<Reel>,
+    recorded: Option<RecordedStates>,
     /// What is looked at.
-    streams: Streams,
+    streams: SensorStreams,
     far_commands: u32,
 }
 
 /// What a film keeps while it is being taken.
 #[derive(Clone, Default)]
-struct Reel {
+struct RecordedStates {
     frames: Vec<Frame>,
     d_pct: Vec<Option<f64>>,
 }
@@ -165,8 +165,13 @@ impl Episode {
     ///
     /// # Errors
     /// The scene cannot be sensed or built or does not come to rest, or the goal names nothing in it.
-    pub fn start(spec: EpisodeSpec, cache: &RestCache, looks: &Looks) -> Result<Self, EpisodeError> {
-        check_senses(&spec.scene, &spec.tactile, looks).map_err(|source| spec.sense_error(source))?;
+    pub fn start(
+        spec: EpisodeSpec,
+        cache: &AssetCache,
+        sensor_assets: &SensorAssets,
+    ) -> Result<Self, EpisodeError> {
+        check_sensors(&spec.scene, &spec.tactile, sensor_assets)
+            .map_err(|source| spec.sense_error(source))?;
         let mut sim = Simulation::new(spec.scene.clone(), &spec.params, &spec.robot, cache)?;
         let (object, place, hold_s) = match &spec.task.goal {
             Goal::On { object, target, hold_s } | Goal::In { object, target, hold_s } => {
@@ -188,20 +193,20 @@ impl Episode {
             episode: spec.identity.episode,
             source,
         })?;
-        let witness = Witness::new(&sim, target, place);
-        let judge = judge(&spec, &sim, &witness, (target, place), hold_s);
-        let tool = sim.rig.tool_b(&sim.world);
+        let evidence = EvidenceCollector::new(&sim, target, place);
+        let judge = judge(&spec, &sim, &evidence, (target, place), hold_s);
+        let tool = sim.robot.tool_b(&sim.world);
         let start_hold = Action {
             position_b: tool.translation.vector,
             axis_angle_b: rotation::axis_angle(&tool.rotation),
             closure: 0.0,
         };
-        let senses = Senses::new(&sim, &spec.tactile, looks);
-        let reel = spec.film.then(Reel::default);
+        let sensors = SensorSuite::new(&sim, &spec.tactile, sensor_assets);
+        let recorded = spec.record_states.then(RecordedStates::default);
         Ok(Self {
             spec,
             sim,
-            witness,
+            evidence,
             judge,
             target,
             start_hold,
@@ -212,10 +217,10 @@ impl Episode {
             trace: Vec::new(),
             frames: Vec::new(),
             actions: Vec::new(),
-            senses,
+            sensors,
             recent: Recent::default(),
-            reel,
-            streams: Streams::default(),
+            recorded,
+            streams: SensorStreams::default(),
             far_commands: 0,
             outcome: None,
         })
@@ -225,12 +230,12 @@ impl Episode {
     ///
     /// # Errors
     /// Whoever drives failed.
-    pub fn run(mut self, controller: &mut dyn Controller) -> Result<Finished, EpisodeError> {
+    pub fn run(mut self, controller: &mut dyn Controller) -> Result<FinishedEpisode, EpisodeError> {
         let mut action = self.start_hold;
         let streams = controller.streams();
-        self.watch(streams.clone());
+        self.begin(streams.clone());
         while self.outcome.is_none() {
-            let looked_at = if controller.looks() { &streams } else { &Streams::default() };
+            let looked_at = if controller.wants_observation() { &streams } else { &SensorStreams::default() };
             let observation = self.observe(looked_at)?;
             match controller.act(&self.sim, &observation) {
                 Ok(Some(wanted)) => action = wanted,
@@ -248,9 +253,9 @@ impl Episode {
     }
 
     /// Says once, before the first step, what will be looked at: that much of the past is kept.
-    pub fn watch(&mut self, streams: Streams) {
+    pub fn begin(&mut self, streams: SensorStreams) {
         self.streams = streams;
-        self.remember(self.witness.reference(self.target).map(|_| 0.0));
+        self.remember(self.evidence.reference(self.target).map(|_| 0.0));
         self.outcome = self.ending();
     }
 
@@ -272,7 +277,7 @@ impl Episode {
             return Some(Outcome::Error { message });
         }
         self.actions.push(*action);
-        self.far_commands += u32::from(is_far(&self.sim.rig.tool_b(&self.sim.world), action));
+        self.far_commands += u32::from(is_far(&self.sim.robot.tool_b(&self.sim.world), action));
         if let Err(failure) = self.control_step(action) {
             return Some(self.invalid(&failure));
         }
@@ -296,22 +301,22 @@ impl Episode {
     ///
     /// # Errors
     /// A stream cannot be made.
-    pub fn observe(&mut self, streams: &Streams) -> Result<Observation, EpisodeError> {
-        let tool = self.sim.rig.tool_b(&self.sim.world);
+    pub fn observe(&mut self, streams: &SensorStreams) -> Result<Observation, EpisodeError> {
+        let tool = self.sim.robot.tool_b(&self.sim.world);
         let blind = Observation {
             time_s: self.time(),
             ee_position_b: tool.translation.vector,
             ee_axis_angle_b: rotation::axis_angle(&tool.rotation),
-            joints: self.sim.rig.q(&self.sim.world),
-            gripper_width_m: self.sim.rig.width(&self.sim.world),
-            closure: self.sim.rig.closure(),
+            joints: self.sim.robot.q(&self.sim.world),
+            gripper_width_m: self.sim.robot.width(&self.sim.world),
+            closure: self.sim.robot.closure(),
             prompt: self.spec.task.prompt.clone(),
             cameras: Vec::new(),
             touch: None,
             forces: None,
             force_history: Vec::new(),
         };
-        let seen = self.recent.observe(&mut self.senses, blind, streams);
+        let seen = self.recent.observe(&mut self.sensors, blind, streams);
         seen.map_err(|source| self.spec.sense_error(source))
     }
 
@@ -320,30 +325,34 @@ impl Episode {
     ///
     /// # Errors
     /// There is no such camera, or it has no picture of that size.
-    pub fn picture(&mut self, camera: &str, size: [Option<usize>; 2]) -> Result<RgbImage, SenseError> {
-        let mut camera = self.senses.camera(camera)?.clone();
+    pub fn render_camera(
+        &mut self,
+        camera: &str,
+        size: [Option<usize>; 2],
+    ) -> Result<RgbImage, SensingError> {
+        let mut camera = self.sensors.camera(camera)?.clone();
         camera.width = size[0].unwrap_or(camera.width);
         camera.height = size[1].unwrap_or(camera.height);
-        Ok(self.senses.see(&Senses::frame(&self.sim), &camera)?.into_image())
+        Ok(self.sensors.render(&SensorSuite::frame(&self.sim), &camera)?.into_image())
     }
 
     /// What a finger's sensor sees now, for onlookers too.
     ///
     /// # Errors
-    /// As [`Senses::finger`].
-    pub fn finger_picture(&mut self, side: Side) -> Result<RgbImage, SenseError> {
-        Ok(self.senses.finger(&Senses::frame(&self.sim), side)?.picture)
+    /// As [`SensorSuite::tactile_reading`].
+    pub fn render_tactile(&mut self, side: Side) -> Result<RgbImage, SensingError> {
+        Ok(self.sensors.tactile_reading(&SensorSuite::frame(&self.sim), side)?.picture)
     }
 
     /// Keeps what may be looked at later: for the sensors and for the film.
     fn remember(&mut self, d_pct: Option<f64>) {
-        if self.streams == Streams::default() && self.reel.is_none() {
+        if self.streams == SensorStreams::default() && self.recorded.is_none() {
             return;
         }
-        let frame = Senses::frame(&self.sim);
-        if let Some(reel) = &mut self.reel {
-            reel.frames.push(frame.clone());
-            reel.d_pct.push(d_pct);
+        let frame = SensorSuite::frame(&self.sim);
+        if let Some(recorded) = &mut self.recorded {
+            recorded.frames.push(frame.clone());
+            recorded.d_pct.push(d_pct);
         }
         self.recent.push(frame);
     }
@@ -355,7 +364,7 @@ impl Episode {
     fn control_step(&mut self, action: &Action) -> Result<(), StepFailure> {
         let rotation = rotation::from_axis_angle(&action.axis_angle_b);
         let pose_b = Pose::from_parts(action.position_b.into(), rotation);
-        self.sim.rig.command(&mut self.sim.world, &pose_b, action.closure);
+        self.sim.robot.command(&mut self.sim.world, &pose_b, action.closure);
         self.steps += 1;
         let mut worst: Option<Deformation> = None;
         for _ in 0..steps_per_control(self.spec.params.dt) {
@@ -367,7 +376,7 @@ impl Episode {
                 self.min_det_f = self.min_det_f.min(self.sim.world.soft[index].min_det_f.0);
             }
             let time = self.time();
-            let evidence = self.witness.evidence(&self.sim, time);
+            let evidence = self.evidence.collect(&self.sim, time);
             let now = evidence.target.deformation;
             self.judge.observe(&evidence);
             worst = worst.into_iter().chain(now).max_by(|a, b| a.rms_pct.total_cmp(&b.rms_pct));
@@ -403,7 +412,7 @@ impl Episode {
     pub fn trace(&self) -> StepTrace {
         let at = (self.steps, self.time());
         let dropped = self.judge.dropped().is_some();
-        StepTrace::new(&self.sim, &self.witness, self.target, at, dropped, self.spec.trace == Some(true))
+        StepTrace::new(&self.sim, &self.evidence, self.target, at, dropped, self.spec.trace == Some(true))
     }
 
     /// Its record, as far as it has come.
@@ -425,10 +434,21 @@ impl Episode {
         EpisodeRecord { identity: self.spec.identity.clone(), outcome, verdict: self.verdict(), stats }
     }
 
-    fn finish(self, gave_up: Option<String>) -> Finished {
+    fn finish(self, gave_up: Option<String>) -> FinishedEpisode {
         let record = self.record(gave_up);
-        let film = self.reel.map(|Reel { frames, d_pct }| Film { senses: self.senses, frames, d_pct });
-        let reference = self.witness.reference(self.target).cloned();
-        Finished { record, trace: self.trace, frames: self.frames, actions: self.actions, reference, film }
+        let recording = self.recorded.map(|RecordedStates { frames, d_pct }| StateRecording {
+            sensors: self.sensors,
+            frames,
+            d_pct,
+        });
+        let reference = self.evidence.reference(self.target).cloned();
+        FinishedEpisode {
+            record,
+            trace: self.trace,
+            frames: self.frames,
+            actions: self.actions,
+            reference,
+            recording,
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! The hidden state as the judge wants it.
 
-use super::simulation::{Handle, Kind, Simulation};
+use super::simulation::{Kind, ObjectInstance, Simulation};
 use crate::{
     evaluation::{
         deformation::{Deformation, Reference},
@@ -13,7 +13,7 @@ use crate::{
 
 /// Who is the target, where it must go, who else could move, and their settled shapes.
 #[derive(Clone, Debug)]
-pub struct Witness {
+pub struct EvidenceCollector {
     target: usize,
     place: usize,
     others: Vec<usize>,
@@ -21,7 +21,7 @@ pub struct Witness {
     bodies: Vec<BodyEvidence>,
 }
 
-impl Witness {
+impl EvidenceCollector {
     /// Takes the settled state as the deformation reference.
     pub fn new(sim: &Simulation, target: usize, place: usize) -> Self {
         let movable = |i: &usize| *i != target && sim.objects[*i].kind.movable().is_some();
@@ -57,22 +57,26 @@ impl Witness {
     }
 
     /// The evidence of the step that just ended.
-    pub fn evidence<'a>(&'a mut self, sim: &Simulation, time_s: f64) -> Evidence<'a> {
+    pub fn collect<'a>(&'a mut self, sim: &Simulation, time_s: f64) -> Evidence<'a> {
         let dt = sim.world.params.dt;
         self.bodies = self.others.iter().map(|&i| self.body(sim, i)).collect();
         let target = &sim.objects[self.target];
         let place = &sim.objects[self.place];
-        let from_place = partners(place).map(|partner| upward(&sim.touch(target, partner))).sum::<f64>();
-        let from_robot =
-            sim.rig.body.iter().map(|&c| sim.touch(target, Partner::Collider(c)).normal_force).sum::<f64>();
+        let from_place = partners(place).map(|partner| upward(&sim.contact(target, partner))).sum::<f64>();
+        let from_robot = sim
+            .robot
+            .body
+            .iter()
+            .map(|&c| sim.contact(target, Partner::Collider(c)).normal_force)
+            .sum::<f64>();
         Evidence {
             time_s,
-            hand_w: sim.rig.hand_w(&sim.world),
+            hand_w: sim.robot.hand_w(&sim.world),
             gripper: GripperEvidence {
-                width_m: sim.rig.width(&sim.world),
-                commanded_width_m: target_width(sim.rig.closure()),
+                width_m: sim.robot.width(&sim.world),
+                commanded_width_m: target_width(sim.robot.closure()),
             },
-            pads: sim.pad_touches(target).map(|touch| PadEvidence {
+            pads: sim.pad_contacts(target).map(|touch| PadEvidence {
                 normal_impulse_ns: touch.normal_force * dt,
                 travel_m: touch.travel,
             }),
@@ -88,7 +92,7 @@ impl Witness {
 
     fn body(&self, sim: &Simulation, index: usize) -> BodyEvidence {
         let object = &sim.objects[index];
-        let robot = |partner| matches!(partner, Partner::Collider(c) if sim.rig.pads.contains(&c) || sim.rig.body.contains(&c));
+        let robot = |partner| matches!(partner, Partner::Collider(c) if sim.robot.pads.contains(&c) || sim.robot.body.contains(&c));
         let touches = object.kind.movable().map_or(&[][..], |body| sim.world.touches_on(body));
         let others = touches.iter().filter(|(partner, _)| !robot(Partner::of(*partner)));
         let support: f64 = others.map(|(_, touch)| upward(touch)).sum();
@@ -102,7 +106,7 @@ impl Witness {
 }
 
 /// What an object is to those that it touches: its colliders, or a soft body.
-fn partners(object: &Handle) -> impl Iterator<Item = Partner> + '_ {
+fn partners(object: &ObjectInstance) -> impl Iterator<Item = Partner> + '_ {
     let soft = match object.kind {
         Kind::Soft(index) => Some(Partner::Soft(index)),
         _ => None,
@@ -116,7 +120,7 @@ fn upward(touch: &Touch) -> f64 {
 }
 
 /// Height of the lowest point of an object, m.
-pub(super) fn lowest(sim: &Simulation, object: &Handle) -> f64 {
+pub(super) fn lowest(sim: &Simulation, object: &ObjectInstance) -> f64 {
     match object.kind {
         Kind::Soft(index) => {
             let body = &sim.world.soft[index].body;

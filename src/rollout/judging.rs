@@ -1,8 +1,8 @@
 //! The judge of an episode: what it must know of the settled scene.
 
 use super::{
-    evidence::{Witness, lowest},
-    simulation::{Handle, Kind, Simulation},
+    evidence::{EvidenceCollector, lowest},
+    simulation::{Kind, ObjectInstance, Simulation},
     spec::EpisodeSpec,
 };
 use crate::{
@@ -19,7 +19,7 @@ use crate::{
 pub(super) fn judge(
     spec: &EpisodeSpec,
     sim: &Simulation,
-    witness: &Witness,
+    evidence: &EvidenceCollector,
     (target, place): (usize, usize),
     hold_s: f64,
 ) -> Judge {
@@ -34,12 +34,12 @@ pub(super) fn judge(
         soft: matches!(sim.objects[target].kind, Kind::Soft(_)),
         limit: spec.limit,
         target_lowest_z_w: lowest(sim, &sim.objects[target]),
-        others_lowest_z_w: witness.others_lowest(sim),
+        others_lowest_z_w: evidence.others_lowest(sim),
     })
 }
 
 /// Where the goal is, from the shape of what it names.
-fn place_of(goal: &Goal, place: &Handle) -> Place {
+fn place_of(goal: &Goal, place: &ObjectInstance) -> Place {
     let bounds = place.bounds;
     match goal {
         Goal::On { .. } => Place::On { radius_m: 0.5 * bounds.size().xy().min() },

@@ -2,7 +2,7 @@
 
 use super::{
     cancel,
-    simulation::{Handle, Kind, Simulation},
+    simulation::{Kind, ObjectInstance, Simulation},
 };
 use crate::{geometry::Aabb, physics::world::StepFailure, scene::Scene};
 
@@ -98,7 +98,7 @@ impl Simulation {
     }
 
     /// What there is to say of an object that moves at `speed` (m/s) when all should be at rest.
-    fn unsettled(&self, object: &Handle, speed: f64) -> SettleError {
+    fn unsettled(&self, object: &ObjectInstance, speed: f64) -> SettleError {
         let (name, placed_at) = (object.name.clone(), placed_at(&self.scene, &object.name));
         let height = self.centre(object).z;
         let fixed =
@@ -114,7 +114,7 @@ impl Simulation {
     }
 
     /// The fastest object and the speed of its fastest point, m/s; the first of them where several are.
-    fn fastest(&self) -> Option<(&Handle, f64)> {
+    fn fastest(&self) -> Option<(&ObjectInstance, f64)> {
         let speeds = self.objects.iter().map(|object| (object, self.speed(object)));
         speeds.reduce(|best, next| if next.1 > best.1 { next } else { best })
     }

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use super::{
+    asset_cache::AssetCache,
     build::{self, BuildError},
-    rest_cache::RestCache,
-    rig::Rig,
+    robot_instance::RobotInstance,
 };
 use crate::{
     benchmark::control::CONTROL_DT,
@@ -51,7 +51,7 @@ impl Kind {
 
 /// What a part belongs to.
 #[derive(Clone, Debug, PartialEq)]
-pub struct PartOf {
+pub struct ArticulatedPart {
     /// Index of the handle of the whole object.
     pub object: usize,
     /// Name within the object.
@@ -62,7 +62,7 @@ pub struct PartOf {
 
 /// An object of the scene in the world.
 #[derive(Clone, Debug)]
-pub struct Handle {
+pub struct ObjectInstance {
     /// Name in the scene.
     pub name: String,
     /// What it is.
@@ -76,10 +76,10 @@ pub struct Handle {
     /// Bounds of its shape at rest, object frame (of a part: the whole object's with all joints at 0).
     pub bounds: Aabb,
     /// What it is a part of.
-    pub part: Option<PartOf>,
+    pub part: Option<ArticulatedPart>,
 }
 
-impl Handle {
+impl ObjectInstance {
     /// Where things are put on it or in it: its lowest point on its centre line, object frame, m. An asset stands there by
     /// itself; a part is where it is in its object.
     pub fn foot_o(&self) -> Vec3 {
@@ -98,9 +98,9 @@ pub struct Simulation {
     /// All bodies.
     pub world: World,
     /// The robot.
-    pub rig: Rig,
+    pub robot: RobotInstance,
     /// The objects, in scene order, each followed by its parts.
-    pub objects: Vec<Handle>,
+    pub objects: Vec<ObjectInstance>,
 }
 
 impl Simulation {
@@ -111,15 +111,15 @@ impl Simulation {
     pub fn new(
         scene: Arc<Scene>,
         params: &Params,
-        robot: &RobotSpec,
-        cache: &RestCache,
+        robot_spec: &RobotSpec,
+        cache: &AssetCache,
     ) -> Result<Self, BuildError> {
         let mut world = World::new(params.clone(), scene.gravity);
         let objects = build::add_all(&mut world, &scene, cache)?;
-        let rig = Rig::new(&mut world, robot, &scene.base_w, &scene.start_q, CONTROL_DT);
+        let robot = RobotInstance::new(&mut world, robot_spec, &scene.base_w, &scene.start_q, CONTROL_DT);
         build::check_overlap(&mut world, &scene)?;
         build::check_base(&scene)?;
-        Ok(Self { scene, world, rig, objects })
+        Ok(Self { scene, world, robot, objects })
     }
 
     /// One physics step.
@@ -127,12 +127,12 @@ impl Simulation {
     /// # Errors
     /// The step failed; the run is invalid.
     pub fn step(&mut self) -> Result<(), StepFailure> {
-        self.rig.advance(&mut self.world);
+        self.robot.advance(&mut self.world);
         self.world.step()
     }
 
     /// Speed of the fastest point of an object, m/s (of its centre and 0.1 m of lever for a rigid one).
-    pub fn speed(&self, object: &Handle) -> f64 {
+    pub fn speed(&self, object: &ObjectInstance) -> f64 {
         match object.kind {
             Kind::Soft(index) => self.world.soft[index].body.max_speed(),
             Kind::Rigid(index) => {
@@ -151,23 +151,23 @@ impl Simulation {
 
     /// What a collider or soft body did to an object in the last step in which the object was awake; nothing to what
     /// never moves.
-    pub fn touch(&self, object: &Handle, partner: Partner) -> Touch {
+    pub fn contact(&self, object: &ObjectInstance, partner: Partner) -> Touch {
         object.kind.movable().map_or(Touch::default(), |body| self.world.touch_on(body, partner))
     }
 
     /// What the left and right pad did to an object.
-    pub fn pad_touches(&self, object: &Handle) -> [Touch; 2] {
-        self.rig.pads.map(|pad| self.touch(object, Partner::Collider(pad)))
+    pub fn pad_contacts(&self, object: &ObjectInstance) -> [Touch; 2] {
+        self.robot.pads.map(|pad| self.contact(object, Partner::Collider(pad)))
     }
 
     /// Object by name.
-    pub fn object(&self, name: &str) -> Option<&Handle> {
+    pub fn object(&self, name: &str) -> Option<&ObjectInstance> {
         self.objects.iter().find(|o| o.name == name)
     }
 
     /// Centre of an object, m, world: the mean of a soft body's nodes, the centre of mass of a rigid one, the middle of a
     /// part's bounds.
-    pub fn centre(&self, object: &Handle) -> Vec3 {
+    pub fn centre(&self, object: &ObjectInstance) -> Vec3 {
         match object.kind {
             Kind::Soft(index) => {
                 let x = &self.world.soft[index].body.x;
@@ -180,13 +180,13 @@ impl Simulation {
     }
 
     /// The parts of the object with handle `index`.
-    pub fn parts(&self, index: usize) -> impl Iterator<Item = (&Handle, &PartOf)> {
+    pub fn parts(&self, index: usize) -> impl Iterator<Item = (&ObjectInstance, &ArticulatedPart)> {
         let parts = self.objects.iter().filter_map(|handle| Some((handle, handle.part.as_ref()?)));
         parts.filter(move |(_, part)| part.object == index)
     }
 
     /// Joint value of a part, m or rad.
-    pub fn joint(&self, object: &Handle) -> Option<f64> {
+    pub fn joint(&self, object: &ObjectInstance) -> Option<f64> {
         match object.kind {
             Kind::Link { tree, link } => Some(self.world.trees[tree].state.q[link]),
             _ => None,
@@ -194,7 +194,7 @@ impl Simulation {
     }
 
     /// Object frame in the world; of a soft body its mean rotation about its centre.
-    pub fn pose(&self, object: &Handle) -> Pose {
+    pub fn pose(&self, object: &ObjectInstance) -> Pose {
         match object.kind {
             Kind::Soft(index) => {
                 let body = &self.world.soft[index].body;
@@ -212,6 +212,6 @@ impl Simulation {
 }
 
 /// Frame of a part's joint in its object frame; the link frame of the mechanics coincides with it.
-pub(super) fn joint_frame(object: &Handle) -> Pose {
+pub(super) fn joint_frame(object: &ObjectInstance) -> Pose {
     object.part.as_ref().map_or(Pose::identity(), |part| Pose::from(part.joint.origin_o))
 }

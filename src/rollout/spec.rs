@@ -13,7 +13,7 @@ use crate::{
 
 /// Which episode of a task, in which run.
 #[derive(Clone, Copy, Debug)]
-pub struct Which<'a> {
+pub struct EpisodeRef<'a> {
     /// Suite name.
     pub suite: &'a str,
     /// Index of the episode in its split.
@@ -46,7 +46,7 @@ pub struct EpisodeSpec {
     /// Parameters of the tactile sensors.
     pub tactile: TactileSpec,
     /// Whether to keep what is needed to draw the rollout later.
-    pub film: bool,
+    pub record_states: bool,
     /// Whether to keep a trace, and whether with node positions.
     pub trace: Option<bool>,
 }
@@ -54,7 +54,12 @@ pub struct EpisodeSpec {
 impl EpisodeSpec {
     /// An episode of `task` in `scene`, without limit, film and trace. `nominal` is the scene before any shift: an episode
     /// is told by the asset that its layout made the target.
-    pub fn new(which: &Which, task: &Task, (nominal, scene): (&Scene, Scene), settings: &Settings) -> Self {
+    pub fn new(
+        which: &EpisodeRef,
+        task: &Task,
+        (nominal, scene): (&Scene, Scene),
+        settings: &Settings,
+    ) -> Self {
         let target = target_asset(nominal, task);
         let identity = Identity {
             suite: which.suite.to_owned(),
@@ -79,7 +84,7 @@ impl EpisodeSpec {
             params: settings.physics.clone(),
             robot: settings.robot.clone(),
             tactile: settings.tactile.clone(),
-            film: false,
+            record_states: false,
             trace: None,
         }
     }

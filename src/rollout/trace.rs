@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::{
-    evidence::Witness,
+    evidence::EvidenceCollector,
     simulation::{Kind, Simulation},
 };
 use crate::robot::rotation;
@@ -67,23 +67,23 @@ impl StepTrace {
     /// What can be said of the state after control step `step`.
     pub fn new(
         sim: &Simulation,
-        witness: &Witness,
+        evidence: &EvidenceCollector,
         target: usize,
         (step, time_s): (u32, f64),
         dropped: bool,
         nodes: bool,
     ) -> Self {
-        let tool = sim.rig.tool_b(&sim.world);
-        let touch = sim.pad_touches(&sim.objects[target]);
+        let tool = sim.robot.tool_b(&sim.world);
+        let touch = sim.pad_contacts(&sim.objects[target]);
         let energy = sim.world.energy();
         Self {
             step,
             time_s,
             ee_position_b: tool.translation.vector.into(),
             ee_axis_angle_b: rotation::axis_angle(&tool.rotation).into(),
-            joints: sim.rig.q(&sim.world),
-            gripper_width_m: sim.rig.width(&sim.world),
-            closure: sim.rig.closure(),
+            joints: sim.robot.q(&sim.world),
+            gripper_width_m: sim.robot.width(&sim.world),
+            closure: sim.robot.closure(),
             pad_force_n: touch.map(|t| t.normal_force),
             friction_utilisation: touch.map(|t| if t.capacity > 0.0 { t.shear() / t.capacity } else { 0.0 }),
             slip_mm: touch.map(|t| 1e3 * t.travel),
@@ -92,13 +92,13 @@ impl StepTrace {
             newton: sim.world.stats.newton,
             objects: (0..sim.objects.len())
                 .filter(|&i| sim.objects[i].kind != Kind::Static)
-                .map(|i| object(sim, witness, i, nodes))
+                .map(|i| object(sim, evidence, i, nodes))
                 .collect(),
         }
     }
 }
 
-fn object(sim: &Simulation, witness: &Witness, index: usize, nodes: bool) -> ObjectTrace {
+fn object(sim: &Simulation, evidence: &EvidenceCollector, index: usize, nodes: bool) -> ObjectTrace {
     let handle = &sim.objects[index];
     let pose = sim.pose(handle);
     let q = rotation::canonical(&pose.rotation);
@@ -114,7 +114,7 @@ fn object(sim: &Simulation, witness: &Witness, index: usize, nodes: bool) -> Obj
         name: handle.name.clone(),
         position_w: pose.translation.vector.into(),
         quaternion_w: [q.w, q.i, q.j, q.k],
-        d_pct: witness.deformation(sim, index).map(|d| d.rms_pct),
+        d_pct: evidence.deformation(sim, index).map(|d| d.rms_pct),
         min_det_f: soft.map(|s| s.min_det_f.0),
         asleep,
         touches: touches.iter().map(|(partner, _)| name(*partner)).collect(),

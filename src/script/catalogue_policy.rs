@@ -19,8 +19,8 @@ const PIXELS: Type = Type::Number("px", Range::closed(0.0, 1e3));
 /// What a policy looks at.
 pub(super) static LOOKS: Record = Record {
     label: "policy.looks",
-    class: "softvt.Looks",
-    kind: "softvt.Looks",
+    class: "softvt.SensorAssets",
+    kind: "softvt.SensorAssets",
     doc: "What a policy looks at; nothing else is computed.",
     fields: &[
         field("cameras", Type::List(&Type::Name), Optional, "Cameras of the scene, by name."),
@@ -139,8 +139,8 @@ pub(super) static INPUT: Record = Record {
 /// The gripper's number of an action.
 pub(super) static GRIPPER: Record = Record {
     label: "profile.actions.gripper",
-    class: "softvt.GripperCode",
-    kind: "softvt.GripperCode",
+    class: "softvt.GripperEncoding",
+    kind: "softvt.GripperEncoding",
     doc: "The seventh number of an action: one value opens, one shuts, those between in proportion.",
     fields: &[
         field("open", NUMBER, Required, "The value that opens."),
@@ -157,8 +157,8 @@ pub(super) static GRIPPER: Record = Record {
 /// How replies are read.
 pub(super) static ACTIONS: Record = Record {
     label: "profile.actions",
-    class: "softvt.ActionCode",
-    kind: "softvt.ActionCode",
+    class: "softvt.ActionEncoding",
+    kind: "softvt.ActionEncoding",
     doc: "How the numbers of an action are read: three of position, three of orientation (axis-angle), one of the gripper; \
           more are padding.",
     fields: &[

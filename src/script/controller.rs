@@ -4,9 +4,9 @@ use super::{Expert, ExpertCommand, ExpertView, ObjectView, ScriptError, reach::L
 use crate::{
     benchmark::control::CONTROL_DT,
     geometry::Vec3,
-    policy::{Action, Observation, Streams},
+    policy::{Action, Observation, SensorStreams},
     robot::rotation,
-    rollout::{ControlError, Controller, Handle, Simulation},
+    rollout::{ControlError, Controller, ObjectInstance, Simulation},
 };
 
 /// Drives by a Lua expert; once it is done, the last command stays.
@@ -36,11 +36,11 @@ impl ExpertController {
 }
 
 impl Controller for ExpertController {
-    fn streams(&self) -> Streams {
-        Streams { touch: self.servo, ..Streams::default() }
+    fn streams(&self) -> SensorStreams {
+        SensorStreams { touch: self.servo, ..SensorStreams::default() }
     }
 
-    fn looks(&self) -> bool {
+    fn wants_observation(&self) -> bool {
         self.expert.feels()
     }
 
@@ -122,14 +122,14 @@ fn view(sim: &Simulation, time_s: f64) -> ExpertView {
     ExpertView {
         time_s,
         dt_s: CONTROL_DT,
-        base_w: sim.rig.base_w,
-        tcp_b: sim.rig.tool_b(&sim.world),
-        width_m: sim.rig.width(&sim.world),
-        closure: sim.rig.closure(),
+        base_w: sim.robot.base_w,
+        tcp_b: sim.robot.tool_b(&sim.world),
+        width_m: sim.robot.width(&sim.world),
+        closure: sim.robot.closure(),
         pad_force_n: sim
             .objects
             .iter()
-            .map(|object| sim.pad_touches(object))
+            .map(|object| sim.pad_contacts(object))
             .fold([0.0; 2], |sum, touch| [sum[0] + touch[0].normal_force, sum[1] + touch[1].normal_force]),
         objects: (0..sim.objects.len())
             .filter(|&index| sim.objects[index].part.is_none())
@@ -141,7 +141,7 @@ fn view(sim: &Simulation, time_s: f64) -> ExpertView {
     }
 }
 
-fn seen(sim: &Simulation, object: &Handle, name: &str) -> ObjectView {
+fn seen(sim: &Simulation, object: &ObjectInstance, name: &str) -> ObjectView {
     let pose = sim.pose(object);
     let bounds = object.bounds;
     let centre_w = (pose * nalgebra::Point3::from(bounds.centre())).coords;

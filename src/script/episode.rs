@@ -14,7 +14,7 @@ use super::{
 use crate::{
     benchmark::{
         Shift,
-        seed::{EpisodeSeed, Split, Stream},
+        seed::{EpisodeSeed, RandomStream, Split},
     },
     scene::{Body, Scene},
     text::format_number,
@@ -66,7 +66,7 @@ impl Episode {
     /// If the machine cannot make a coroutine.
     pub fn expert(self) -> Result<Option<expert::Expert>, ScriptError> {
         let Some(function) = self.expert else { return Ok(None) };
-        self.machine.vm.random.reseed(self.seed.stream(Stream::Expert));
+        self.machine.vm.random.reseed(self.seed.stream(RandomStream::Expert));
         expert::Expert::start(self.machine, &function).map(Some)
     }
 }
@@ -116,10 +116,10 @@ fn start(machine: &Machine, values: &MultiValue, request: &EpisodeRequest) -> Re
         base: request.base_seed,
         split: request.split,
     };
-    machine.vm.random.reseed(seed.stream(Stream::Script));
+    machine.vm.random.reseed(seed.stream(RandomStream::Script));
     let scene = LuaScene::new(empty_scene());
     let userdata = machine.vm.lua.create_userdata(scene.clone()).map_err(|e| machine.vm.explain(&e))?;
-    machine.vm.call::<()>(&parts.build, (&userdata, Rng::new(seed.clone(), Stream::Layout)))?;
+    machine.vm.call::<()>(&parts.build, (&userdata, Rng::new(seed.clone(), RandomStream::Layout)))?;
     let nominal = locked(&scene.scene).clone();
     let mut current = scene;
     for (name, value) in &request.shifts {

@@ -17,7 +17,7 @@ use super::{
 };
 use crate::{
     geometry::{Aabb, Pose, Vec3},
-    policy::TouchFrame,
+    policy::TactileFrame,
     robot::{Obstacle, clearance, gripper::OPENING},
     scene::{Asset, Body},
 };
@@ -82,7 +82,7 @@ pub struct Expert {
 }
 
 /// What fingers feel at one control step, left and right.
-pub type Felt = Arc<[TouchFrame; 2]>;
+pub type Felt = Arc<[TactileFrame; 2]>;
 
 /// How an expert closes on things.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

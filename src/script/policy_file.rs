@@ -17,10 +17,11 @@ use super::{
     turn,
 };
 use crate::{
-    benchmark::seed::{EpisodeSeed, Stream},
+    benchmark::seed::{EpisodeSeed, RandomStream},
     geometry::Vec3,
     policy::{
-        Action, ActionChunk, Command, Observation, Policy, PolicyError, Streams, TaskBrief, decode::LONGEST,
+        Action, ActionChunk, Observation, Policy, PolicyError, SensorStreams, TaskBrief, ToolCommand,
+        decode::LONGEST,
     },
     robot::rotation,
 };
@@ -33,7 +34,7 @@ pub struct PolicyFile {
     /// How many actions of a list are carried out, if it says.
     pub replan: Option<usize>,
     /// What it looks at.
-    pub streams: Streams,
+    pub streams: SensorStreams,
     /// File and line that say which cameras it looks at.
     pub looks_at: String,
     /// The file, as messages name it.
@@ -70,7 +71,7 @@ impl PolicyFile {
         let read = || -> mlua::Result<Self> {
             let table = made(&machine.vm.lua, &values)?;
             let looks: Table = table.get("looks")?;
-            let streams = Streams {
+            let streams = SensorStreams {
                 cameras: looks.get::<Option<_>>("cameras")?.unwrap_or_default(),
                 touch: looks.get("touch")?,
                 force: looks.get("force")?,
@@ -106,7 +107,7 @@ impl PolicyFile {
             Ok((table.get("act")?, table.get("reset")?))
         };
         let (act, reset) = functions().map_err(|e| machine.vm.explain(&e))?;
-        machine.vm.random.reseed(seed.stream(Stream::Policy));
+        machine.vm.random.reseed(seed.stream(RandomStream::Policy));
         Ok(LuaPolicy { name: self.name.clone(), streams: self.streams.clone(), machine, act, reset })
     }
 }
@@ -128,7 +129,7 @@ fn made(lua: &Lua, values: &MultiValue) -> mlua::Result<Table> {
 /// A policy in Lua, in one episode.
 pub struct LuaPolicy {
     name: String,
-    streams: Streams,
+    streams: SensorStreams,
     machine: Machine,
     act: Function,
     reset: Option<Function>,
@@ -139,7 +140,7 @@ impl Policy for LuaPolicy {
         &self.name
     }
 
-    fn streams(&self) -> Streams {
+    fn streams(&self) -> SensorStreams {
         self.streams.clone()
     }
 
@@ -221,7 +222,7 @@ fn commands(lua: &Lua, answer: &Value) -> Result<ActionChunk, Wrong> {
             Wrong::Fault(fault) => Wrong::Fault(place(fault)),
             other => other,
         })?;
-        chunk.commands.push(Command::Pose(action));
+        chunk.commands.push(ToolCommand::Pose(action));
     }
     Ok(chunk)
 }

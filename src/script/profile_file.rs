@@ -17,7 +17,8 @@ use super::{
     sources::Library,
 };
 use crate::policy::profile::{
-    ActionCode, Finger, GripperCode, Input, PoseCode, Profile, Source, StatePart, Units,
+    ActionEncoding, ActionUnits, Finger, GripperEncoding, InputSource, PoseEncoding, Profile, ProfileInput,
+    StatePart,
 };
 
 /// Reads the profile at `path`; also gives the SHA-256 of every file that it is made of, by name.
@@ -68,7 +69,7 @@ impl Whole<'_> {
         fail_at(self.lua, self.table, key, format!("profile.{message}"))
     }
 
-    fn input(&self, index: usize, entry: &Table) -> mlua::Result<Input> {
+    fn input(&self, index: usize, entry: &Table) -> mlua::Result<ProfileInput> {
         let keys: Vec<String> = entry.get("keys")?;
         if keys.is_empty() {
             return Err(self.wrong("keys", format!("inputs[{index}].keys: give at least one")));
@@ -91,34 +92,38 @@ impl Whole<'_> {
             self.wrong("source", format!("inputs[{index}].{key}: missing; a source {source:?} needs it"))
         };
         let source = match source.as_str() {
-            "camera" => Source::Camera {
+            "camera" => InputSource::Camera {
                 camera: entry.get::<Option<_>>("camera")?.ok_or_else(|| needed("camera"))?,
                 half_turn: entry.get::<Option<_>>("half_turn")?.unwrap_or(false),
             },
             "state" => {
                 let parts: Option<Vec<String>> = entry.get("parts")?;
                 let parts = parts.filter(|parts| !parts.is_empty()).ok_or_else(|| needed("parts"))?;
-                Source::State { parts: parts.iter().filter_map(|part| word::<StatePart>(part)).collect() }
+                InputSource::State {
+                    parts: parts.iter().filter_map(|part| word::<StatePart>(part)).collect(),
+                }
             }
-            "prompt" => Source::Prompt,
+            "prompt" => InputSource::Prompt,
             "tactile_image" => {
                 let layout = entry.get::<Option<String>>("layout")?;
-                Source::TactileImage { layout: layout.and_then(|layout| word(&layout)).unwrap_or_default() }
+                InputSource::TactileImage {
+                    layout: layout.and_then(|layout| word(&layout)).unwrap_or_default(),
+                }
             }
             "tactile" => {
                 let finger: Option<String> = entry.get("finger")?;
                 let finger = finger.and_then(|finger| word::<Finger>(&finger));
-                Source::Tactile { finger: finger.ok_or_else(|| needed("finger"))? }
+                InputSource::Tactile { finger: finger.ok_or_else(|| needed("finger"))? }
             }
-            "marker_motion" => Source::MarkerMotion,
-            _ => Source::Force,
+            "marker_motion" => InputSource::MarkerMotion,
+            _ => InputSource::Force,
         };
-        Ok(Input { keys, source })
+        Ok(ProfileInput { keys, source })
     }
 
-    fn actions(&self, table: &Table) -> mlua::Result<ActionCode> {
+    fn actions(&self, table: &Table) -> mlua::Result<ActionEncoding> {
         let gripper: Table = table.get("gripper")?;
-        let gripper = GripperCode {
+        let gripper = GripperEncoding {
             open: gripper.get("open")?,
             shut: gripper.get("shut")?,
             binary: gripper.get("binary")?,
@@ -142,12 +147,13 @@ impl Whole<'_> {
                         return Err(self.wrong(key, message));
                     }
                 }
-                PoseCode::Absolute
+                PoseEncoding::Absolute
             }
-            "delta" => {
-                PoseCode::Delta { translation_m: step("translation_m")?, rotation_rad: step("rotation_rad")? }
-            }
-            _ => PoseCode::DeltaOsc {
+            "delta" => PoseEncoding::Delta {
+                translation_m: step("translation_m")?,
+                rotation_rad: step("rotation_rad")?,
+            },
+            _ => PoseEncoding::DeltaOsc {
                 translation_m: step("translation_m")?,
                 rotation_rad: step("rotation_rad")?,
             },
@@ -158,11 +164,11 @@ impl Whole<'_> {
             let message = format!("actions.scale[{}]: expected a number other than 0, got 0", at + 1);
             return Err(self.wrong("scale", message));
         }
-        let units = (scale.is_some() || offset.is_some()).then(|| Units {
-            scale: scale.unwrap_or(Units::SAME.scale),
-            offset: offset.unwrap_or(Units::SAME.offset),
+        let units = (scale.is_some() || offset.is_some()).then(|| ActionUnits {
+            scale: scale.unwrap_or(ActionUnits::SAME.scale),
+            offset: offset.unwrap_or(ActionUnits::SAME.offset),
         });
-        Ok(ActionCode { pose, gripper, units, length: table.get("length")? })
+        Ok(ActionEncoding { pose, gripper, units, length: table.get("length")? })
     }
 }
 

@@ -10,7 +10,7 @@ use super::{
     host::{Hosted, hosted, method},
     sandbox::{fail, locked},
 };
-use crate::benchmark::seed::{self, EpisodeSeed, Stream};
+use crate::benchmark::seed::{self, EpisodeSeed, RandomStream};
 
 /// The generator behind `math.random`, which the host reseeds between phases.
 #[derive(Clone)]
@@ -63,7 +63,7 @@ pub(super) struct Rng {
 }
 
 impl Rng {
-    pub(super) fn new(seed: EpisodeSeed, stream: Stream) -> Self {
+    pub(super) fn new(seed: EpisodeSeed, stream: RandomStream) -> Self {
         Self { draws: Arc::new(Mutex::new(seed.stream(stream))), seed }
     }
 }
@@ -89,7 +89,7 @@ impl Hosted for Rng {
 
     fn methods<M: UserDataMethods<Self>>(methods: &mut M) {
         method(methods, "stream", |_, this: &Self, name: String| {
-            let stream = Stream::ALL.into_iter().find(|stream| stream.name() == name);
+            let stream = RandomStream::ALL.into_iter().find(|stream| stream.name() == name);
             Ok(stream.map(|stream| Self::new(this.seed.clone(), stream)))
         });
         method(methods, "uniform", |lua, this: &Self, (low, high): (f64, f64)| {

@@ -29,14 +29,14 @@ impl Lag {
     /// What to tell the script once the tool has been away for a second from a pose that it cannot take.
     pub(super) fn complaint(&mut self, sim: &Simulation) -> Option<String> {
         let command_b = self.command_b?;
-        let (linear, angular) = pose_error(&sim.rig.tool_b(&sim.world), &command_b);
+        let (linear, angular) = pose_error(&sim.robot.tool_b(&sim.world), &command_b);
         self.steps = if is_away(linear.norm(), angular.norm()) { self.steps + 1 } else { 0 };
         if self.steps < PATIENCE {
             return None;
         }
         self.steps = 0;
-        let miss = sim.rig.reach(&sim.world, &command_b).err()?;
-        is_away(miss.distance, miss.angle).then(|| message(&miss, &sim.rig.base_w))
+        let miss = sim.robot.reach(&sim.world, &command_b).err()?;
+        is_away(miss.distance, miss.angle).then(|| message(&miss, &sim.robot.base_w))
     }
 }
 

@@ -27,13 +27,13 @@ use super::{
 use crate::{
     benchmark::{
         control::steps_per_control,
-        seed::{EpisodeSeed, Split, Stream},
+        seed::{EpisodeSeed, RandomStream, Split},
         settings::Settings,
     },
     evaluation::deformation::Reference,
     geometry::Pose,
     robot::{Side, rotation},
-    rollout::{Kind, Looks, RestCache, SenseError, Senses, Simulation, cancel},
+    rollout::{AssetCache, Kind, SensingError, SensorAssets, SensorSuite, Simulation, cancel},
     sensing::tactile::{MarkerStyle, PadLoad, Places},
 };
 
@@ -45,7 +45,7 @@ struct Inner {
     physics_steps: u64,
     failed: Option<String>,
     clock: Clock,
-    senses: Senses,
+    senses: SensorSuite,
     _held: Held,
 }
 
@@ -61,7 +61,7 @@ struct Watched {
 /// Installs `softvt.simulate` and `softvt.settings`.
 pub(super) fn install(lua: &Lua, api: &Table, clock: &Clock) -> mlua::Result<()> {
     let clock = clock.clone();
-    let (cache, looks) = (RestCache::default(), Looks::default());
+    let (cache, looks) = (AssetCache::default(), SensorAssets::default());
     let make =
         lua.create_function(move |lua, value: Value| simulate(lua, &value, &clock, (&cache, &looks)))?;
     api.set("simulate", make)
@@ -102,7 +102,7 @@ fn simulate(
     lua: &Lua,
     value: &Value,
     clock: &Clock,
-    (cache, looks): (&RestCache, &Looks),
+    (cache, looks): (&AssetCache, &SensorAssets),
 ) -> mlua::Result<LuaSimulation> {
     let spec = schema::checked(lua, &SIMULATE, value)?;
     let settings = settings(lua, "softvt.simulate: settings", spec.get("settings")?)?;
@@ -116,7 +116,7 @@ fn simulate(
         split: Split::Experiment,
     };
     let scene = LuaScene::new(empty_scene());
-    layout.get::<Function>("build")?.call::<()>((scene.clone(), Rng::new(seed, Stream::Layout)))?;
+    layout.get::<Function>("build")?.call::<()>((scene.clone(), Rng::new(seed, RandomStream::Layout)))?;
     let scene = Arc::new(locked(&scene.scene).clone());
     let _honest_work = clock.pause();
     let mut sim = Simulation::new(scene, &settings.physics, &settings.robot, cache)
@@ -142,7 +142,7 @@ fn simulate(
             start_z: sim.centre(object).z,
         })
         .collect();
-    let senses = Senses::new(&sim, &settings.tactile, looks);
+    let senses = SensorSuite::new(&sim, &settings.tactile, looks);
     let inner =
         Inner { sim, watched, physics_steps: 0, failed: None, clock: clock.clone(), senses, _held: held };
     Ok(LuaSimulation(Arc::new(Mutex::new(inner))))
@@ -159,7 +159,7 @@ impl Inner {
             self.failed = Some("interrupted".into());
         }
         if let Some((pose_b, closure)) = command {
-            self.sim.rig.command(&mut self.sim.world, pose_b, closure);
+            self.sim.robot.command(&mut self.sim.world, pose_b, closure);
         }
         let _honest_work = self.clock.pause();
         for _ in 0..steps_per_control(self.sim.world.params.dt) {
@@ -178,8 +178,8 @@ impl Inner {
 
     /// What the fingers feel now.
     fn touch(&mut self, lua: &Lua) -> mlua::Result<Felt> {
-        let frame = Senses::frame(&self.sim);
-        let felt = self.senses.touch_frame(&frame);
+        let frame = SensorSuite::frame(&self.sim);
+        let felt = self.senses.tactile_frames(&frame);
         felt.map(Arc::new).map_err(|e| fail(lua, format!("arm:feel: {e}")))
     }
 
@@ -261,19 +261,19 @@ impl LuaSimulation {
 
     /// What a camera sees.
     fn see(&self, lua: &Lua, spec: &Table) -> mlua::Result<LuaImage> {
-        let wrong = |e: SenseError| fail(lua, format!("simulation:see: {e}"));
+        let wrong = |e: SensingError| fail(lua, format!("simulation:see: {e}"));
         let mut inner = locked(&self.0);
         let Inner { sim, senses, clock, physics_steps, .. } = &mut *inner;
         let _honest_work = clock.pause();
         let mut camera = senses.camera(&spec.get::<String>("camera")?).map_err(wrong)?.clone();
         camera.width = spec.get::<Option<usize>>("width")?.unwrap_or(camera.width);
         camera.height = spec.get::<Option<usize>>("height")?.unwrap_or(camera.height);
-        let frame = Senses::frame(sim);
+        let frame = SensorSuite::frame(sim);
         // Before anything has moved, only whoever wrote the layout can have put the camera inside of something.
         let seen = if *physics_steps == 0 {
-            senses.see_from_outside(&frame, &camera)
+            senses.render_unobstructed(&frame, &camera)
         } else {
-            senses.see(&frame, &camera)
+            senses.render(&frame, &camera)
         };
         LuaImage::new(lua, seen.map_err(wrong)?.into_image())
     }
@@ -284,8 +284,9 @@ impl LuaSimulation {
         let mut inner = locked(&self.0);
         let Inner { sim, senses, clock, .. } = &mut *inner;
         let _honest_work = clock.pause();
-        let frame = Senses::frame(sim);
-        let felt = senses.finger(&frame, side).map_err(|e| fail(lua, format!("simulation:feel: {e}")))?;
+        let frame = SensorSuite::frame(sim);
+        let felt =
+            senses.tactile_reading(&frame, side).map_err(|e| fail(lua, format!("simulation:feel: {e}")))?;
         let places = |places: &Places| lua.create_sequence_from(places.iter().map(|p| p.to_vec()));
         let table = lua.create_table()?;
         table.set("picture", LuaImage::new(lua, felt.picture.clone())?)?;
@@ -311,7 +312,7 @@ impl LuaSimulation {
         };
         let (object, watched) = (&sim.objects[index], &inner.watched[index]);
         let table = lua.create_table()?;
-        table.set("width_m", finite(sim.rig.width(&sim.world)))?;
+        table.set("width_m", finite(sim.robot.width(&sim.world)))?;
         table.set("height_m", finite(sim.centre(object).z - watched.start_z))?;
         table.set("speed", finite(sim.speed(object)))?;
         table.set("asset", object.asset.name.as_str())?;
@@ -320,7 +321,7 @@ impl LuaSimulation {
         let joints = sim.parts(index).map(|(handle, part)| (part.name.as_str(), sim.joint(handle)));
         table.set("joints", lua.create_table_from(joints)?)?;
         if object.kind.movable().is_some() {
-            let touch = sim.pad_touches(object);
+            let touch = sim.pad_contacts(object);
             table.set("pad_force", lua.create_sequence_from(touch.map(|t| t.normal_force))?)?;
             table.set("slip_mm", lua.create_sequence_from(touch.map(|t| 1e3 * t.travel))?)?;
         }
@@ -353,7 +354,7 @@ impl Hosted for LuaSimulation {
         method(methods, "time", |_, this: &Self, ()| Ok(locked(&this.0).time()));
         method(methods, "tool", |lua, this: &Self, ()| {
             let inner = locked(&this.0);
-            let tool = inner.sim.rig.base_w * inner.sim.rig.tool_b(&inner.sim.world);
+            let tool = inner.sim.robot.base_w * inner.sim.robot.tool_b(&inner.sim.world);
             let turn = rotation::axis_angle(&tool.rotation);
             Ok((
                 lua.create_sequence_from(tool.translation.vector.iter().copied())?,

@@ -13,7 +13,7 @@ use super::{
     options::strict,
 };
 use crate::{
-    policy::TouchFrame,
+    policy::TactileFrame,
     sensing::tactile::{Markers, Motion, Places},
 };
 
@@ -50,7 +50,7 @@ pub(super) fn fingers(lua: &Lua, felt: &Felt) -> mlua::Result<Table> {
 }
 
 impl LuaTouch {
-    fn frame(&self) -> &TouchFrame {
+    fn frame(&self) -> &TactileFrame {
         &self.felt[self.side]
     }
 }
@@ -67,7 +67,7 @@ impl Hosted for LuaTouch {
     fn read(&self, lua: &Lua, key: &str) -> mlua::Result<Read> {
         let frame = self.frame();
         let value = match key {
-            "picture" => lua.create_userdata(LuaImage::new(lua, frame.picture.clone())?)?,
+            "picture" => lua.create_userdata(LuaImage::new(lua, frame.image.clone())?)?,
             "change" => lua.create_userdata(LuaImage::new(lua, frame.change())?)?,
             _ => lua.create_userdata(LuaMarkers::new(frame.markers))?,
         };

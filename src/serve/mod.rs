@@ -1,17 +1,17 @@
 //! Episodes for somebody else to drive over a network: reset, step, render, get and set the state. `docs/serve.md` is the
 //! protocol.
 
-mod answer;
-mod door;
+mod catalog;
+mod connection;
 mod fields;
-mod link;
-mod offer;
+mod live_episode;
 mod request;
-mod running;
+mod response;
+mod server;
 mod session;
 mod space;
 mod state;
 
-pub use answer::hello;
-pub use door::{Door, serve};
-pub use offer::{Offer, Offered, Wanted, split_named};
+pub use catalog::{EpisodeId, ServedSuite, ServerConfig, split_named};
+pub use response::hello;
+pub use server::{Server, serve};

@@ -3,8 +3,8 @@
 use rmpv::Value;
 
 use super::{
+    catalog::{EpisodeId, ServerConfig, split_named},
     fields::{Fields, short, text},
-    offer::{Offer, Wanted, split_named},
     state::State,
 };
 use crate::policy::{
@@ -24,7 +24,7 @@ const LONGEST_STATE: usize = 50_000;
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Request {
     /// Begin an episode.
-    Reset(Wanted),
+    Reset(EpisodeId),
     /// Carry out actions, at least one.
     Step(Vec<Row>),
     /// Draw what a camera or a finger sees.
@@ -50,7 +50,7 @@ impl Request {
     ///
     /// # Errors
     /// It is no request; a message for people.
-    pub(super) fn read(message: &Value, offer: &Offer) -> Result<Self, String> {
+    pub(super) fn read(message: &Value, offer: &ServerConfig) -> Result<Self, String> {
         let Some(map) = message.as_map() else {
             return Err(format!("the message is {}; expected a map with a type of {KINDS}", kind(message)));
         };
@@ -85,7 +85,7 @@ impl Request {
 /// The fields that name an episode.
 const WANTED: [&str; 5] = ["suite", "task", "episode", "seed", "split"];
 
-fn wanted(fields: &Fields, offer: &Offer) -> Result<Wanted, String> {
+fn wanted(fields: &Fields, offer: &ServerConfig) -> Result<EpisodeId, String> {
     let told = |what: String| fields.wrong(&what);
     let suite = fields.text("suite")?;
     let suite = offer.suite(suite.as_deref()).map_err(told)?.name.clone();
@@ -96,7 +96,7 @@ fn wanted(fields: &Fields, offer: &Offer) -> Result<Wanted, String> {
         None => offer.split,
         Some(name) => split_named(&name).map_err(|e| told(format!("split is {:?}; {e}", short(&name))))?,
     };
-    let wanted = Wanted { suite, task, episode, seed, split };
+    let wanted = EpisodeId { suite, task, episode, seed, split };
     offer.task(&wanted).map_err(told)?;
     Ok(wanted)
 }
@@ -131,7 +131,7 @@ fn rows(value: &Value, most: usize) -> Result<Vec<Row>, String> {
     }
 }
 
-fn state(fields: &Fields, offer: &Offer) -> Result<Request, String> {
+fn state(fields: &Fields, offer: &ServerConfig) -> Result<Request, String> {
     let value = fields.need("state", fields.get("state"))?;
     let map = value.as_map().ok_or_else(|| {
         fields.wrong(&format!("state is {}; expected what get_state answered", kind(value)))

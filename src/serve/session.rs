@@ -8,10 +8,10 @@ use std::{
 use rmpv::Value;
 
 use super::{
-    answer,
-    offer::Offer,
+    catalog::ServerConfig,
+    live_episode::LiveEpisode,
     request::{Request, Row},
-    running::Running,
+    response,
     state::State,
 };
 use crate::robot::Side;
@@ -21,16 +21,16 @@ const KEPT: usize = 4;
 
 /// One client's episode.
 pub(super) struct Session<'a> {
-    offer: &'a Offer<'a>,
+    offer: &'a ServerConfig<'a>,
     stop: &'a AtomicBool,
-    running: Option<Running>,
+    running: Option<LiveEpisode>,
     /// Copies of where episodes stood, the one used last at the end.
-    kept: VecDeque<Running>,
+    kept: VecDeque<LiveEpisode>,
 }
 
 impl<'a> Session<'a> {
     /// No episode yet; `stop` ends what takes long.
-    pub(super) fn new(offer: &'a Offer<'a>, stop: &'a AtomicBool) -> Self {
+    pub(super) fn new(offer: &'a ServerConfig<'a>, stop: &'a AtomicBool) -> Self {
         Self { offer, stop, running: None, kept: VecDeque::new() }
     }
 
@@ -56,18 +56,18 @@ impl<'a> Session<'a> {
             Request::Step(rows) => self.step(&rows),
             Request::Render { camera, size } => self.render(camera, size),
             Request::GetState => self.get_state(),
-            Request::Close => Ok(answer::plain("close", Vec::new())),
+            Request::Close => Ok(response::plain("close", Vec::new())),
         }
     }
 
-    fn running(&mut self, kind: &str) -> Result<&mut Running, String> {
+    fn running(&mut self, kind: &str) -> Result<&mut LiveEpisode, String> {
         self.running.as_mut().ok_or_else(|| format!("{kind}: there is no episode yet; reset first"))
     }
 
     /// What a client is told when it comes to a state other than by steps.
     fn stands(&mut self, kind: &str) -> Result<Value, String> {
         let offer = self.offer;
-        answer::stands(kind, self.running(kind)?, offer, None)
+        response::stands(kind, self.running(kind)?, offer, None)
     }
 
     /// Brings the episode to a state: from where one stood on the way to it, if there is such a one, or from its start.
@@ -78,7 +78,7 @@ impl<'a> Session<'a> {
             Some((_, one)) => one.clone(),
             None => {
                 let start = State { actions: Vec::new(), ..state.clone() };
-                let running = Running::start(self.offer, start)?;
+                let running = LiveEpisode::start(self.offer, start)?;
                 self.keep(running.clone());
                 running
             }
@@ -96,7 +96,7 @@ impl<'a> Session<'a> {
     }
 
     /// Keeps a copy of where an episode stands, instead of one that was not used for long.
-    fn keep(&mut self, copy: Running) {
+    fn keep(&mut self, copy: LiveEpisode) {
         self.kept.retain(|one| one.state != copy.state);
         if self.kept.len() == KEPT {
             self.kept.pop_front();
@@ -119,7 +119,7 @@ impl<'a> Session<'a> {
                 break;
             }
         }
-        answer::stands("step", self.running("step")?, offer, Some(carried_out))
+        response::stands("step", self.running("step")?, offer, Some(carried_out))
     }
 
     fn render(&mut self, camera: Option<String>, size: [Option<usize>; 2]) -> Result<Value, String> {
@@ -136,18 +136,18 @@ impl<'a> Session<'a> {
             Some(_) if size != [None, None] => {
                 return Err(format!("render: {camera}: pictures of the fingers have one size; give none"));
             }
-            Some(side) => running.episode.finger_picture(side),
-            None => running.episode.picture(&camera, size),
+            Some(side) => running.episode.render_tactile(side),
+            None => running.episode.render_camera(&camera, size),
         };
         let picture = picture.map_err(|e| format!("render: {e}"))?;
-        Ok(answer::plain("render", vec![answer::pair("image", answer::picture(picture))]))
+        Ok(response::plain("render", vec![response::pair("image", response::picture(picture))]))
     }
 
     fn get_state(&mut self) -> Result<Value, String> {
         let copy = self.running("get_state")?.clone();
         let state = copy.state.to_value(self.offer);
         self.keep(copy);
-        Ok(answer::plain("get_state", vec![answer::pair("state", state)]))
+        Ok(response::plain("get_state", vec![response::pair("state", state)]))
     }
 
     fn check_stop(&self) -> Result<(), String> {

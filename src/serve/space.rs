@@ -5,13 +5,13 @@ use std::f64::consts::PI;
 use rmpv::Value;
 
 use super::{
-    answer::{key, pair},
-    offer::Offer,
+    catalog::ServerConfig,
+    response::{key, pair},
 };
 use crate::policy::{
     Observation,
-    encode::{Content, content},
-    profile::{ACTION_LEN, ActionCode, PoseCode, Source, StatePart, Units},
+    encode::{ObservationEntry, content},
+    profile::{ACTION_LEN, ActionEncoding, ActionUnits, InputSource, PoseEncoding, StatePart},
 };
 
 /// Farther than the arm gets along any axis of its base, m.
@@ -24,11 +24,11 @@ const MARKER_PX: f64 = 1e4;
 const FORCE_N: f64 = 1e6;
 
 /// The entries of an observation, by example.
-pub(super) fn observation(offer: &Offer, first: &Observation) -> Value {
+pub(super) fn observation(offer: &ServerConfig, first: &Observation) -> Value {
     let entries = offer.profile.inputs.iter().filter_map(|input| {
         let space = match content(first, &input.source)? {
-            Content::Text(_) => text(offer),
-            Content::Array(array) => {
+            ObservationEntry::Text(_) => text(offer),
+            ObservationEntry::Array(array) => {
                 let (low, high) = bounds(&input.source);
                 numbers(array.dtype, &array.shape, low, high)
             }
@@ -39,12 +39,12 @@ pub(super) fn observation(offer: &Offer, first: &Observation) -> Value {
 }
 
 /// An action of seven numbers.
-pub(super) fn action(code: &ActionCode) -> Value {
+pub(super) fn action(code: &ActionEncoding) -> Value {
     let most = match code.pose {
-        PoseCode::Absolute => [REACH_M, REACH_M, REACH_M, HALF_TURN, HALF_TURN, HALF_TURN],
-        PoseCode::Delta { .. } | PoseCode::DeltaOsc { .. } => [1.0; ACTION_LEN - 1],
+        PoseEncoding::Absolute => [REACH_M, REACH_M, REACH_M, HALF_TURN, HALF_TURN, HALF_TURN],
+        PoseEncoding::Delta { .. } | PoseEncoding::DeltaOsc { .. } => [1.0; ACTION_LEN - 1],
     };
-    let Units { scale, offset } = code.units.unwrap_or(Units::SAME);
+    let ActionUnits { scale, offset } = code.units.unwrap_or(ActionUnits::SAME);
     // In the actor's own units, whose factors may be negative.
     let end = |i: usize, sign: f64| (sign * scale[i].signum() * most[i] - offset[i]) / scale[i];
     let mut low: Vec<f64> = (0..most.len()).map(|i| end(i, -1.0)).collect();
@@ -55,7 +55,7 @@ pub(super) fn action(code: &ActionCode) -> Value {
 }
 
 /// Text; the longest prompt there is.
-fn text(offer: &Offer) -> Value {
+fn text(offer: &ServerConfig) -> Value {
     let prompts = offer.suites.iter().flat_map(|one| &one.suite.tasks).map(|task| task.prompt.as_str());
     let longest = prompts.clone().map(|prompt| prompt.chars().count()).max().unwrap_or(0);
     let mut letters: Vec<char> = prompts.flat_map(str::chars).collect();
@@ -80,20 +80,20 @@ fn numbers(dtype: &str, shape: &[usize], low: Vec<f64>, high: Vec<f64>) -> Value
     ])
 }
 
-fn bounds(source: &Source) -> (Vec<f64>, Vec<f64>) {
+fn bounds(source: &InputSource) -> (Vec<f64>, Vec<f64>) {
     let within = |most: f64| (vec![-most], vec![most]);
     match source {
-        Source::Camera { .. } | Source::TactileImage { .. } | Source::Tactile { .. } => {
+        InputSource::Camera { .. } | InputSource::TactileImage { .. } | InputSource::Tactile { .. } => {
             (vec![0.0], vec![255.0])
         }
-        Source::State { parts } => {
+        InputSource::State { parts } => {
             let of = |part: &StatePart| vec![largest(*part); part.count()];
             let high: Vec<f64> = parts.iter().flat_map(of).collect();
             (high.iter().map(|x| -x).collect(), high)
         }
-        Source::MarkerMotion => within(MARKER_PX),
-        Source::Force => within(FORCE_N),
-        Source::Prompt => within(f64::INFINITY),
+        InputSource::MarkerMotion => within(MARKER_PX),
+        InputSource::Force => within(FORCE_N),
+        InputSource::Prompt => within(f64::INFINITY),
     }
 }
 

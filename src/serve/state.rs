@@ -3,16 +3,16 @@
 use rmpv::Value;
 
 use super::{
-    offer::{Offer, Wanted},
+    catalog::{EpisodeId, ServerConfig},
     request::Row,
 };
-use crate::policy::{profile::ACTION_LEN, wire::Array};
+use crate::policy::{profile::ACTION_LEN, wire::WireArray};
 
 /// Where an episode stands.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct State {
     /// Which episode.
-    pub wanted: Wanted,
+    pub wanted: EpisodeId,
     /// What was done in it, in the code of the profile.
     pub actions: Vec<Row>,
 }
@@ -28,10 +28,10 @@ impl State {
     }
 
     /// As msgpack.
-    pub(super) fn to_value(&self, offer: &Offer) -> Value {
-        let Wanted { suite, task, episode, seed, split } = &self.wanted;
+    pub(super) fn to_value(&self, offer: &ServerConfig) -> Value {
+        let EpisodeId { suite, task, episode, seed, split } = &self.wanted;
         let data = self.actions.iter().flatten().flat_map(|number| number.to_le_bytes()).collect();
-        let actions = Array { dtype: "<f8", shape: vec![self.actions.len(), ACTION_LEN], data };
+        let actions = WireArray { dtype: "<f8", shape: vec![self.actions.len(), ACTION_LEN], data };
         let pair = |name: &str, value: Value| (Value::from(name), value);
         Value::Map(vec![
             pair("suite", suite.as_str().into()),
@@ -46,7 +46,7 @@ impl State {
     }
 }
 
-impl Offer<'_> {
+impl ServerConfig<'_> {
     /// What an action means, as text that tells it from others.
     pub fn code(&self) -> String {
         serde_json::to_string(&self.profile.actions).unwrap_or_default()
@@ -60,7 +60,7 @@ mod tests {
 
     fn state(episode: u32, actions: &[f64]) -> State {
         let suite = "one".to_owned();
-        let wanted = Wanted { suite, task: 0, episode, seed: 0, split: Split::Validation };
+        let wanted = EpisodeId { suite, task: 0, episode, seed: 0, split: Split::Validation };
         State { wanted, actions: actions.iter().map(|x| [*x; ACTION_LEN]).collect() }
     }
 

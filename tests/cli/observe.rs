@@ -6,9 +6,11 @@ use std::{path::Path, sync::Arc};
 use softvt::{
     benchmark::{Plan, seed::Split, settings::Settings},
     evaluation::{record::EpisodeRecord, summary::Summary},
-    policy::{Action, ActionChunk, Chunked, Observation, Policy, PolicyError, Streams, TaskBrief},
+    policy::{
+        Action, ActionChunk, ChunkedPolicy, Observation, Policy, PolicyError, SensorStreams, TaskBrief,
+    },
     report::terminal,
-    rollout::{Episode, EpisodeSpec, Looks, RestCache, Senses, Simulation, Which},
+    rollout::{AssetCache, Episode, EpisodeRef, EpisodeSpec, SensorAssets, SensorSuite, Simulation},
     script::{self, EpisodeRequest, Loaded},
     sensing::tactile::MosaicLayout,
 };
@@ -27,17 +29,17 @@ fn request(suite: &str, task: usize) -> EpisodeRequest {
 }
 
 /// Keeps what it was shown.
-struct Witness {
-    streams: Streams,
+struct EvidenceCollector {
+    streams: SensorStreams,
     seen: Vec<Observation>,
 }
 
-impl Policy for &mut Witness {
+impl Policy for &mut EvidenceCollector {
     fn name(&self) -> &str {
         "witness"
     }
 
-    fn streams(&self) -> Streams {
+    fn streams(&self) -> SensorStreams {
         self.streams.clone()
     }
 
@@ -49,20 +51,20 @@ impl Policy for &mut Witness {
 }
 
 /// What a policy that asks for `streams` sees in a short episode of a project, and the record; or why not.
-fn played(project: &Project, streams: Streams) -> Result<(Vec<Observation>, EpisodeRecord), String> {
+fn played(project: &Project, streams: SensorStreams) -> Result<(Vec<Observation>, EpisodeRecord), String> {
     let loaded = script::load(&project.path("x.lua"), &[]).expect("it loads");
     let Plan::Suite(suite) = &loaded.plan else { panic!("a suite") };
     let opened = script::Episode::open(&loaded, &request("one", 0)).expect("it opens");
     let which =
-        Which { suite: &suite.name, episode: 0, seed: 0, split: Split::Validation, policy: "witness" };
+        EpisodeRef { suite: &suite.name, episode: 0, seed: 0, split: Split::Validation, policy: "witness" };
     let scenes = (&opened.nominal, opened.scene.clone());
     let spec = EpisodeSpec::new(&which, &suite.tasks[0], scenes, &suite.settings);
     assert_eq!((spec.identity.asset.as_str(), spec.identity.soft), ("cube", true));
     let episode =
-        Episode::start(spec, &RestCache::default(), &Looks::default()).map_err(|e| e.to_string())?;
-    let mut witness = Witness { streams, seen: Vec::new() };
+        Episode::start(spec, &AssetCache::default(), &SensorAssets::default()).map_err(|e| e.to_string())?;
+    let mut witness = EvidenceCollector { streams, seen: Vec::new() };
     let brief = TaskBrief { suite: "one".into(), task: 0, prompt: "wait".into(), episode: 0 };
-    let mut driver = Chunked::new(Box::new(&mut witness), brief, 1);
+    let mut driver = ChunkedPolicy::new(Box::new(&mut witness), brief, 1);
     let outcome = episode.run(&mut driver).map_err(|e| e.to_string());
     drop(driver);
     outcome.map(|finished| (witness.seen, finished.record))
@@ -73,22 +75,23 @@ fn short() -> Small {
 }
 
 /// What a policy that asks for `streams` sees, or why not.
-fn shown(streams: Streams) -> Result<Vec<Observation>, String> {
+fn shown(streams: SensorStreams) -> Result<Vec<Observation>, String> {
     played(&short().project(), streams).map(|(seen, _)| seen)
 }
 
 #[test]
 fn a_policy_gets_the_streams_it_asks_for_and_no_others() {
-    let all = Streams { cameras: vec!["wrist".into(), "third_person".into()], touch: true, force: true };
+    let all =
+        SensorStreams { cameras: vec!["wrist".into(), "third_person".into()], touch: true, force: true };
     let seen = shown(all.clone()).expect("shown");
     assert_eq!(seen.len(), 10);
     for (step, observation) in seen.iter().enumerate() {
         let names: Vec<&str> = observation.cameras.iter().map(|c| c.name.as_str()).collect();
         assert_eq!(names, ["wrist", "third_person"]);
-        assert!(observation.cameras.iter().all(|c| c.picture.dimensions() == (224, 224)));
+        assert!(observation.cameras.iter().all(|c| c.image.dimensions() == (224, 224)));
         let touch = observation.touch.as_ref().expect("asked for");
         assert_eq!(touch.frames.len(), (step + 1).min(8));
-        assert_eq!(touch.now().expect("a frame")[0].picture.dimensions(), (320, 240));
+        assert_eq!(touch.now().expect("a frame")[0].image.dimensions(), (320, 240));
         assert_eq!(touch.mosaic(MosaicLayout::Rows).dimensions(), (224, 224));
         assert_eq!(touch.marker_motion().len(), 9);
         assert_eq!(
@@ -102,7 +105,7 @@ fn a_policy_gets_the_streams_it_asks_for_and_no_others() {
         assert_eq!(observation.prompt, "wait");
     }
     assert_eq!(seen, shown(all).expect("shown"), "the same bytes again");
-    let blind = shown(Streams::default()).expect("shown");
+    let blind = shown(SensorStreams::default()).expect("shown");
     assert!(blind.iter().all(|o| o.cameras.is_empty() && o.touch.is_none() && o.forces.is_none()));
     assert_eq!(blind[9].joints, seen[9].joints, "looking changes nothing");
 }
@@ -110,7 +113,7 @@ fn a_policy_gets_the_streams_it_asks_for_and_no_others() {
 #[test]
 fn results_say_whether_the_policy_saw_true_forces() {
     for force in [false, true] {
-        let streams = Streams { force, ..Streams::default() };
+        let streams = SensorStreams { force, ..SensorStreams::default() };
         let (seen, record) = played(&short().project(), streams).expect("played");
         assert_eq!(seen[0].forces.is_some(), force);
         assert_eq!(record.stats.force_observed, force);
@@ -135,7 +138,7 @@ fn a_camera_that_something_is_around_shows_what_is_beyond_and_is_counted() {
     // In the cube, on its way to the floor below and the robot behind; the batch would have refused it.
     let camera =
         "scene:add_camera { name = \"mole\", position = { 0, 0.1, 0.02 }, look_at = { -1, 0.1, 0.2 } }";
-    let streams = Streams { cameras: vec!["mole".into(), "wrist".into()], ..Streams::default() };
+    let streams = SensorStreams { cameras: vec!["mole".into(), "wrist".into()], ..SensorStreams::default() };
     let (seen, record) = played(&with(camera), streams.clone()).expect("an episode is never ended by that");
     assert_eq!((seen.len(), record.stats.camera_inside), (10, 10));
     let picture = seen[9].camera("mole").expect("asked for");
@@ -164,7 +167,7 @@ fn senses_that_cannot_be_are_told_before_the_episode_with_the_line_that_set_them
     ] {
         let project = with(lines);
         // Nobody looks, and still it is wrong; the library tells it as the program does, which has run nothing then.
-        let message = played(&project, Streams::default()).expect_err(words);
+        let message = played(&project, SensorStreams::default()).expect_err(words);
         assert!(message.contains(words), "{message}");
         let message = project.refusal("x.lua --episodes 3 --out run");
         let path = project.path("x.lua").display().to_string();
@@ -175,7 +178,7 @@ fn senses_that_cannot_be_are_told_before_the_episode_with_the_line_that_set_them
 
 #[test]
 fn an_unknown_stream_is_named() {
-    let streams = Streams { cameras: vec!["agentview".into()], ..Streams::default() };
+    let streams = SensorStreams { cameras: vec!["agentview".into()], ..SensorStreams::default() };
     let message = shown(streams).expect_err("no such camera");
     assert!(
         message.contains("there is no camera \"agentview\"; the scene has third_person, wrist"),
@@ -191,15 +194,15 @@ fn loaded() -> Loaded {
 fn left_and_right_of_all_ten_prompts_are_those_of_the_picture() {
     let loaded = loaded();
     let Plan::Suite(suite) = &loaded.plan else { panic!("a suite") };
-    let (settings, rests, looks) = (Settings::default(), RestCache::default(), Looks::default());
+    let (settings, rests, looks) = (Settings::default(), AssetCache::default(), SensorAssets::default());
     for task in &suite.tasks {
         let scene =
             script::Episode::open(&loaded, &request("spatial_soft", task.id)).expect("it opens").scene;
         let sim =
             Simulation::new(Arc::new(scene), &settings.physics, &settings.robot, &rests).expect("it builds");
-        let mut senses = Senses::new(&sim, &settings.tactile, &looks);
+        let mut senses = SensorSuite::new(&sim, &settings.tactile, &looks);
         let camera = senses.camera("third_person").expect("there").clone();
-        let picture = senses.see(&Senses::frame(&sim), &camera).expect("drawn");
+        let picture = senses.render(&SensorSuite::frame(&sim), &camera).expect("drawn");
         let column = |name: &str| {
             let id = sim.objects.iter().position(|o| o.name == name).expect("placed") as u16 + 1;
             let of = picture.segmentation.iter().enumerate().filter(|(_, s)| **s == id);
@@ -217,7 +220,7 @@ fn left_and_right_of_all_ten_prompts_are_those_of_the_picture() {
 
 #[test]
 fn an_observation_has_no_field_for_hidden_state() {
-    let observation = shown(Streams::default()).expect("shown").swap_remove(0);
+    let observation = shown(SensorStreams::default()).expect("shown").swap_remove(0);
     // Every field by name: a new one must be added here, and be no secret.
     let Observation {
         time_s: _,

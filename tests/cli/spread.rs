@@ -5,7 +5,7 @@ use std::{path::Path, sync::Arc};
 
 use softvt::{
     benchmark::{Plan, seed::Split, settings::Settings},
-    rollout::{RestCache, Simulation, state_hash},
+    rollout::{AssetCache, Simulation, state_hash},
     scene::Scene,
     script::{self, Episode, EpisodeRequest, Loaded},
 };
@@ -115,7 +115,7 @@ fn start_states_spread_over_20_mm_30_degrees_and_a_fiftieth_of_a_radian() {
 fn both_tasks_of_a_mirrored_pair_settle_to_byte_identical_states() {
     let loaded = loaded();
     let Plan::Suite(suite) = &loaded.plan else { panic!("a suite") };
-    let cache = RestCache::default();
+    let cache = AssetCache::default();
     let Settings { physics, robot, .. } = Settings::default();
     let settled = |scene: Scene| {
         let mut sim = Simulation::new(Arc::new(scene), &physics, &robot, &cache).expect("built");

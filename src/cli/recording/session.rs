@@ -30,12 +30,12 @@ use crate::{
     },
     evaluation::record::{EpisodeRecord, Origin},
     files,
-    policy::{Chunked, recorded::Recorded},
+    policy::{ChunkedPolicy, recorded::Recorded},
     report::{
         actions,
         run_folder::{RunFolder, SUMMARY},
     },
-    rollout::{EpisodeError, Finished, SettleError, batch, cancel},
+    rollout::{EpisodeError, FinishedEpisode, SettleError, batch, cancel},
     scene::Start,
     script::Loaded,
 };
@@ -241,10 +241,11 @@ impl<'a> Session<'a> {
     }
 
     /// Runs an attempt and, if it is good, writes its files.
-    fn attempt(&self, (task, attempt): (usize, u32)) -> Result<Finished, Failure> {
+    fn attempt(&self, (task, attempt): (usize, u32)) -> Result<FinishedEpisode, Failure> {
         let mut finished = self.run((task, attempt))?;
         let noted = self.grips.lock().ok().and_then(|mut all| all.remove(&(task, attempt)));
-        let Some(mut film) = finished.film.take().filter(|_| rejected(&finished.record).is_none()) else {
+        let Some(mut film) = finished.recording.take().filter(|_| rejected(&finished.record).is_none())
+        else {
             return Ok(finished);
         };
         let mut shut = noted.unwrap_or_else(|| finished.actions.iter().map(|a| a.closure > 0.5).collect());
@@ -264,7 +265,7 @@ impl<'a> Session<'a> {
     }
 
     /// Simulates an attempt. One that cannot start as a foreign demonstration says is one that has failed.
-    fn run(&self, place: (usize, u32)) -> Result<Finished, Failure> {
+    fn run(&self, place: (usize, u32)) -> Result<FinishedEpisode, Failure> {
         let batch = &self.batch;
         let job = batch.jobs.iter().position(|(task, attempt)| (task.id, *attempt) == place);
         let job = job.ok_or_else(|| Failure::wrong_here("an attempt that is none of the recording"))?;
@@ -276,7 +277,11 @@ impl<'a> Session<'a> {
         };
         let ending = format!("{NO_START}{error}");
         let refused: Drive = Box::new(move |_, brief| {
-            Ok(Box::new(Chunked::new(Box::new(Recorded::new(Vec::new(), Some(ending.clone()))), brief, 1)))
+            Ok(Box::new(ChunkedPolicy::new(
+                Box::new(RecordedPolicy::new(Vec::new(), Some(ending.clone()))),
+                brief,
+                1,
+            )))
         });
         let nowhere = origin.map(|origin| Origin { start: Start::default(), ..origin.clone() });
         batch.episode_from(job, nowhere.as_ref(), true, &refused)?.map_err(|e| batch.episode_failure(&e))

@@ -16,8 +16,8 @@ use super::{
 use crate::{
     geometry::{Pose, Quat, Vec3},
     policy::{
-        Command, decode, osc,
-        profile::{ActionCode, PoseCode, Profile},
+        ToolCommand, decode, osc,
+        profile::{ActionEncoding, PoseEncoding, Profile},
     },
     robot::{ik::ArmAngles, rotation},
 };
@@ -66,7 +66,7 @@ pub(super) fn demo(file: &TaskFile, header: &Header, demo: usize) -> Result<Fore
         task: header.task(file, demo),
         shut: steps
             .iter()
-            .map(|step| matches!(step, Command::Step { closure, .. } if *closure > 0.5))
+            .map(|step| matches!(step, ToolCommand::Step { closure, .. } if *closure > 0.5))
             .collect(),
         held: vec![false; commands.len()],
         commands,
@@ -117,7 +117,7 @@ fn states(
 }
 
 /// The steps, as our own profile for LIBERO's policies reads them.
-fn steps(file: &TaskFile, header: &Header, demo: usize) -> Result<Vec<Command>, DatasetError> {
+fn steps(file: &TaskFile, header: &Header, demo: usize) -> Result<Vec<ToolCommand>, DatasetError> {
     let actions = rows::<7>(file, demo, "actions", None)?;
     for (step, row) in actions.iter().enumerate() {
         if let Some(i) = row.iter().position(|x| x.abs() > 1.0 + SLACK) {
@@ -128,7 +128,7 @@ fn steps(file: &TaskFile, header: &Header, demo: usize) -> Result<Vec<Command>, 
     let [translation_m, rotation_rad] = header.longest_step(file)?;
     let gripper = Profile::named("libero").map(|profile| profile.actions.gripper);
     let gripper = gripper.ok_or_else(|| wrong(file, demo, "actions", "no profile reads it".to_owned()))?;
-    let code = ActionCode::plain(PoseCode::DeltaOsc { translation_m, rotation_rad }, gripper);
+    let code = ActionEncoding::plain(PoseEncoding::DeltaOsc { translation_m, rotation_rad }, gripper);
     let read =
         |row: &[f64; 7]| decode::command(row, &code).map_err(|e| wrong(file, demo, "actions", e.to_string()));
     actions.iter().map(read).collect()
@@ -264,16 +264,16 @@ fn site_poses(
 }
 
 /// The poses that robosuite's controller was given: a step away from the tool each.
-pub(super) fn goals(tool_b: &[Pose], steps: &[Command]) -> Vec<Command> {
+pub(super) fn goals(tool_b: &[Pose], steps: &[ToolCommand]) -> Vec<ToolCommand> {
     let mut turned = tool_b.first().map_or(Quat::identity(), |pose| pose.rotation);
-    let goal = |(pose, step): (&Pose, &Command)| {
-        let Command::Step { translation_b, rotation_b, closure, .. } = *step else { return *step };
+    let goal = |(pose, step): (&Pose, &ToolCommand)| {
+        let ToolCommand::Step { translation_b, rotation_b, closure, .. } = *step else { return *step };
         if rotation_b != Vec3::zeros() {
             turned = pose.rotation;
         }
         let action = osc::goal((pose.translation.vector, turned), translation_b, rotation_b, closure);
         turned = rotation::from_axis_angle(&action.axis_angle_b);
-        Command::Pose(action)
+        ToolCommand::Pose(action)
     };
     tool_b.iter().zip(steps).map(goal).collect()
 }

@@ -19,7 +19,7 @@ use sha2::{Digest, Sha256};
 use super::{DatasetError, TaskFile};
 use crate::{
     geometry::{Pose, Vec3},
-    policy::Command,
+    policy::ToolCommand,
     scene::Start,
 };
 
@@ -47,7 +47,7 @@ pub struct ForeignDemo {
     /// What it says that it is of.
     pub task: ForeignTask,
     /// What is commanded in each control step.
-    pub commands: Vec<Command>,
+    pub commands: Vec<ToolCommand>,
     /// Whether the gripper is meant to hold in each control step.
     pub shut: Vec<bool>,
     /// Whether, in each control step, the hand holds something and its closure is only where the thing has stopped it.
@@ -109,8 +109,8 @@ impl ForeignDemo {
     pub fn hold_rigid(&mut self) {
         for (command, _) in self.commands.iter_mut().zip(&self.held).filter(|(_, held)| **held) {
             match command {
-                Command::Pose(action) => action.closure = 1.0,
-                Command::Step { closure, .. } => *closure = 1.0,
+                ToolCommand::Pose(action) => action.closure = 1.0,
+                ToolCommand::Step { closure, .. } => *closure = 1.0,
             }
         }
     }

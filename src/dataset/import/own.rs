@@ -6,7 +6,7 @@ use super::{
     header::Header,
     rows::{key, rows},
 };
-use crate::{benchmark::seed::Split, policy::Command};
+use crate::{benchmark::seed::Split, policy::ToolCommand};
 
 /// A demonstration of softvt's.
 ///
@@ -19,7 +19,7 @@ pub(super) fn demo(file: &TaskFile, _: &Header, demo: usize) -> Result<ForeignDe
         let what = format!("it is of the split {}, no recorded demonstration", id.split);
         return Err(DatasetError::content(file.path(), key(demo, "metadata_json"), what));
     }
-    let commands: Vec<Command> = file.actions(demo)?.into_iter().map(Command::Pose).collect();
+    let commands: Vec<ToolCommand> = file.actions(demo)?.into_iter().map(ToolCommand::Pose).collect();
     let binary = rows::<7>(file, demo, "actions_binary", Some(commands.len()))?;
     Ok(ForeignDemo {
         name: format!("demo_{demo}"),

@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     geometry::{Pose, Quat, Vec3},
-    policy::{Action, Command, profile::GripperCode},
+    policy::{Action, ToolCommand, profile::GripperEncoding},
     robot::rotation,
 };
 
@@ -34,8 +34,8 @@ const PRESSED: f64 = 0.1;
 const MEASURED: f64 = 1e-4;
 /// Positions of a finger, m, with some slack, and its two codes.
 const FINGER: [f64; 2] = [-0.001, 0.045];
-const FINGERS: GripperCode = GripperCode { open: 0.04, shut: 0.0, binary: false };
-const SIGN: GripperCode = GripperCode { open: 1.0, shut: -1.0, binary: true };
+const FINGERS: GripperEncoding = GripperEncoding { open: 0.04, shut: 0.0, binary: false };
+const SIGN: GripperEncoding = GripperEncoding { open: 1.0, shut: -1.0, binary: true };
 
 /// An action: seven numbers, and whether both fingers are pressed, if that is there.
 struct Row {
@@ -60,7 +60,7 @@ pub(super) fn demo(file: &TaskFile, header: &Header, demo: usize) -> Result<Fore
         let [x, y, z, a, b, c, finger] = row.numbers;
         let axis_angle_b = Vec3::new(a, b, c);
         let position_b = Vec3::new(x, y, z) - rotation::from_axis_angle(&axis_angle_b) * at_t;
-        Command::Pose(Action { position_b, axis_angle_b, closure: grip.closure(finger) })
+        ToolCommand::Pose(Action { position_b, axis_angle_b, closure: grip.closure(finger) })
     };
     let start = start(file, demo)?;
     Ok(ForeignDemo {
@@ -199,7 +199,7 @@ fn offset(file: &TaskFile, demo: usize, poses: &[Pose], joints: &[[f64; 7]]) -> 
 ///
 /// # Errors
 /// Neither.
-fn gripper(file: &TaskFile, demo: usize, actions: &[Row]) -> Result<GripperCode, DatasetError> {
+fn gripper(file: &TaskFile, demo: usize, actions: &[Row]) -> Result<GripperEncoding, DatasetError> {
     let number = |row: &Row| row.numbers[6];
     let within = |low: f64, high: f64| actions.iter().map(number).all(|x| (low..=high).contains(&x));
     if within(FINGER[0], FINGER[1]) {

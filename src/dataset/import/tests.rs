@@ -133,9 +133,9 @@ impl Made {
 }
 
 fn poses(demo: &ForeignDemo) -> Vec<Action> {
-    let pose = |command: &Command| match command {
-        Command::Pose(action) => *action,
-        Command::Step { .. } => panic!("a step"),
+    let pose = |command: &ToolCommand| match command {
+        ToolCommand::Pose(action) => *action,
+        ToolCommand::Step { .. } => panic!("a step"),
     };
     demo.commands.iter().map(pose).collect()
 }
@@ -192,7 +192,7 @@ fn without_joints_the_recorded_tool_is_brought_into_our_frames() {
     assert!(lost.refusal().contains("where the robot stands is not known"));
     // Without poses either, steps stay steps, of which robosuite's spring makes way.
     let (_, demo) = Made::libero().without("obs/").without("states").read();
-    let Command::Step { whole: false, translation_b, rotation_b, .. } = demo.commands[1] else {
+    let ToolCommand::Step { whole: false, translation_b, rotation_b, .. } = demo.commands[1] else {
         panic!("no step")
     };
     let [x, _, _, _, b, _, _] = share(1);
@@ -223,12 +223,16 @@ fn robomimics_quaternions_of_another_order_are_told_by_the_joints() {
 #[test]
 fn a_goal_without_a_turn_keeps_the_last_goals_orientation() {
     let tool = [tool(0), tool(1), tool(2)];
-    let step =
-        |turn: Vec3| Command::Step { whole: false, translation_b: Vec3::x(), rotation_b: turn, closure: 0.0 };
+    let step = |turn: Vec3| ToolCommand::Step {
+        whole: false,
+        translation_b: Vec3::x(),
+        rotation_b: turn,
+        closure: 0.0,
+    };
     let found = goals(&tool, &[step(Vec3::zeros()), step(Vec3::z() * 0.1), step(Vec3::zeros())]);
     let turned = |k: usize| match found[k] {
-        Command::Pose(action) => rotation::from_axis_angle(&action.axis_angle_b),
-        Command::Step { .. } => panic!("a step"),
+        ToolCommand::Pose(action) => rotation::from_axis_angle(&action.axis_angle_b),
+        ToolCommand::Step { .. } => panic!("a step"),
     };
     let spun = Quat::from_axis_angle(&Vec3::z_axis(), 0.1) * tool[1].rotation;
     assert!(turned(0).angle_to(&tool[0].rotation) < 1e-9);

@@ -9,7 +9,7 @@ use std::{
     time::Duration,
 };
 
-use super::{ActionChunk, Observation, Policy, PolicyError, Streams, TaskBrief, profile::Profile};
+use super::{ActionChunk, Observation, Policy, PolicyError, SensorStreams, TaskBrief, profile::Profile};
 use socket::Socket;
 
 /// How a server talks.
@@ -24,7 +24,7 @@ pub enum Protocol {
 
 /// Where a server is and how it is spoken to.
 #[derive(Clone, Debug)]
-pub struct Server {
+pub struct PolicyServer {
     /// `ws://host:port`, with a path or not.
     pub url: String,
     /// What is said.
@@ -32,36 +32,36 @@ pub struct Server {
     /// Which keys and units.
     pub profile: Profile,
     /// Longest wait for a connection and for each answer.
-    pub patience: Duration,
+    pub timeout: Duration,
     /// Sent as `Authorization: Api-Key …`, if there is one.
     pub api_key: Option<String>,
     /// Set when the run must end.
-    pub stop: &'static AtomicBool,
+    pub cancel: &'static AtomicBool,
 }
 
 /// The connections to one server: one for each episode that runs, kept for the next.
 #[derive(Debug)]
-pub struct Connections {
-    server: Server,
-    idle: Mutex<Vec<Connection>>,
+pub struct PolicyConnections {
+    server: PolicyServer,
+    idle: Mutex<Vec<PolicyConnection>>,
 }
 
 /// An open connection.
 #[derive(Debug)]
-struct Connection {
+struct PolicyConnection {
     socket: Socket,
     /// Number of the last message (vla-eval).
     seq: u64,
 }
 
-impl Connections {
+impl PolicyConnections {
     /// None yet.
-    pub fn new(server: Server) -> Self {
+    pub fn new(server: PolicyServer) -> Self {
         Self { server, idle: Mutex::new(Vec::new()) }
     }
 
     /// What is spoken to.
-    pub fn server(&self) -> &Server {
+    pub fn server(&self) -> &PolicyServer {
         &self.server
     }
 
@@ -69,7 +69,7 @@ impl Connections {
     ///
     /// # Errors
     /// It is not or does not.
-    pub fn try_out(&self) -> Result<(), PolicyError> {
+    pub fn check(&self) -> Result<(), PolicyError> {
         let connection = self.take()?;
         self.put(connection);
         Ok(())
@@ -77,7 +77,7 @@ impl Connections {
 
     /// A connection that still stands, an idle one if there is any: servers close those on which pings go unanswered for
     /// long, as while tasks are made ready.
-    fn take(&self) -> Result<Connection, PolicyError> {
+    fn take(&self) -> Result<PolicyConnection, PolicyError> {
         let idle = || self.idle.lock().unwrap_or_else(PoisonError::into_inner).pop();
         while let Some(mut connection) = idle() {
             if connection.socket.is_open() {
@@ -87,8 +87,8 @@ impl Connections {
         self.open()
     }
 
-    fn open(&self) -> Result<Connection, PolicyError> {
-        let mut connection = Connection { socket: Socket::connect(&self.server)?, seq: 0 };
+    fn open(&self) -> Result<PolicyConnection, PolicyError> {
+        let mut connection = PolicyConnection { socket: Socket::connect(&self.server)?, seq: 0 };
         match self.server.protocol {
             Protocol::Openpi => openpi::greet(&mut connection.socket)?,
             Protocol::VlaEval => vla_eval::greet(&mut connection)?,
@@ -96,32 +96,32 @@ impl Connections {
         Ok(connection)
     }
 
-    fn put(&self, connection: Connection) {
+    fn put(&self, connection: PolicyConnection) {
         self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(connection);
     }
 }
 
 /// A policy behind a connection.
 #[derive(Debug)]
-pub struct Remote {
-    connections: Arc<Connections>,
+pub struct RemotePolicy {
+    connections: Arc<PolicyConnections>,
     /// None before the first episode and after something went wrong.
-    connection: Option<Connection>,
+    connection: Option<PolicyConnection>,
 }
 
-impl Remote {
+impl RemotePolicy {
     /// A policy on a connection of its own, opened when the episode begins.
-    pub fn new(connections: Arc<Connections>) -> Self {
+    pub fn new(connections: Arc<PolicyConnections>) -> Self {
         Self { connections, connection: None }
     }
 }
 
-impl Policy for Remote {
+impl Policy for RemotePolicy {
     fn name(&self) -> &str {
         &self.connections.server.url
     }
 
-    fn streams(&self) -> Streams {
+    fn streams(&self) -> SensorStreams {
         self.connections.server.profile.streams()
     }
 
@@ -135,7 +135,7 @@ impl Policy for Remote {
     }
 
     fn act(&mut self, observation: &Observation) -> Result<ActionChunk, PolicyError> {
-        let Server { profile, protocol, .. } = &self.connections.server;
+        let PolicyServer { profile, protocol, .. } = &self.connections.server;
         let mut kept = self.connection.take();
         // openpi's servers know of no episodes: the next question may come over another connection.
         if *protocol == Protocol::Openpi {

@@ -14,7 +14,7 @@ use tungstenite::{
     protocol::WebSocketConfig,
 };
 
-use super::{PolicyError, Server};
+use super::{PolicyError, PolicyServer};
 use crate::policy::wire::unpack;
 
 /// The longest message that is taken: a chunk of actions is some ten kilobytes.
@@ -33,8 +33,8 @@ const TOLD: usize = 2000;
 pub(super) struct Socket {
     url: String,
     socket: WebSocket<TcpStream>,
-    patience: Duration,
-    stop: &'static AtomicBool,
+    timeout: Duration,
+    cancel: &'static AtomicBool,
 }
 
 impl Socket {
@@ -42,15 +42,15 @@ impl Socket {
     ///
     /// # Errors
     /// A wrong address; nobody answers in time.
-    pub(super) fn connect(server: &Server) -> Result<Self, PolicyError> {
+    pub(super) fn connect(server: &PolicyServer) -> Result<Self, PolicyError> {
         let request = request(server)?;
-        let deadline = Instant::now() + server.patience;
+        let deadline = Instant::now() + server.timeout;
         let mut pause = PAUSES[0];
         loop {
             let refused = match attempt(&request, server, deadline) {
                 Ok(socket) => {
                     let url = server.url.clone();
-                    return Ok(Self { url, socket, patience: server.patience, stop: server.stop });
+                    return Ok(Self { url, socket, timeout: server.timeout, cancel: server.cancel });
                 }
                 Err(Attempt::Final(error)) => return Err(error),
                 Err(Attempt::Again(what)) => what,
@@ -59,10 +59,10 @@ impl Socket {
                 return Err(PolicyError::Transport(format!(
                     "no policy server at {}: {refused}; tried for {} s: start it, or raise --policy-timeout",
                     server.url,
-                    server.patience.as_secs_f64()
+                    server.timeout.as_secs_f64()
                 )));
             }
-            rest(pause, server.stop)?;
+            rest(pause, server.cancel)?;
             pause = (2 * pause).min(PAUSES[1]);
         }
     }
@@ -75,7 +75,7 @@ impl Socket {
         let mut bytes = Vec::new();
         rmpv::encode::write_value(&mut bytes, value)
             .map_err(|e| PolicyError::Transport(format!("cannot pack an observation: {e}")))?;
-        let deadline = Instant::now() + self.patience;
+        let deadline = Instant::now() + self.timeout;
         let mut sent = self.socket.send(Message::binary(bytes));
         while let Err(Error::Io(error)) = &sent
             && is_wait(error)
@@ -91,7 +91,7 @@ impl Socket {
     /// # Errors
     /// The connection is gone, the server answers with text or bytes that are no msgpack, too much, or not in time.
     pub(super) fn receive(&mut self) -> Result<Value, PolicyError> {
-        let deadline = Instant::now() + self.patience;
+        let deadline = Instant::now() + self.timeout;
         loop {
             match self.socket.read() {
                 Ok(Message::Binary(bytes)) => return self.unpack(&bytes),
@@ -138,13 +138,13 @@ impl Socket {
     }
 
     fn wait(&self, deadline: Instant, what: &str) -> Result<(), PolicyError> {
-        if self.stop.load(Ordering::Relaxed) {
+        if self.cancel.load(Ordering::Relaxed) {
             return Err(PolicyError::Interrupted);
         }
         if Instant::now() < deadline {
             return Ok(());
         }
-        let seconds = self.patience.as_secs_f64();
+        let seconds = self.timeout.as_secs_f64();
         Err(self.wrong(&format!("{what} within {seconds} s; raise --policy-timeout if it needs longer")))
     }
 
@@ -170,7 +170,7 @@ enum Attempt {
 
 fn attempt(
     request: &ClientRequestBuilder,
-    server: &Server,
+    server: &PolicyServer,
     deadline: Instant,
 ) -> Result<WebSocket<TcpStream>, Attempt> {
     let again = |error: io::Error| Attempt::Again(error.to_string());
@@ -184,7 +184,7 @@ fn attempt(
         match shake {
             Ok((socket, _)) => return Ok(socket),
             Err(HandshakeError::Interrupted(middle)) => {
-                if server.stop.load(Ordering::Relaxed) {
+                if server.cancel.load(Ordering::Relaxed) {
                     return Err(Attempt::Final(PolicyError::Interrupted));
                 }
                 if Instant::now() > deadline {
@@ -223,7 +223,7 @@ fn open(url: &str, deadline: Instant) -> io::Result<TcpStream> {
 /// openpi's, if the address names none.
 const DEFAULT_PORT: u16 = 8000;
 
-fn request(server: &Server) -> Result<ClientRequestBuilder, PolicyError> {
+fn request(server: &PolicyServer) -> Result<ClientRequestBuilder, PolicyError> {
     let wrong = |what: &str| {
         PolicyError::Address(format!("--policy {}: {what}; expected ws://HOST:PORT", server.url))
     };

@@ -5,18 +5,18 @@
 
 use rmpv::Value;
 
-use super::Connection;
+use super::PolicyConnection;
 use crate::policy::{
     ActionChunk, Observation, PolicyError, TaskBrief, decode,
     encode::content,
-    profile::{Profile, Source},
+    profile::{InputSource, Profile},
     wire::{entry, names},
 };
 
 const VERSION: u64 = 1;
 
 /// Says hello.
-pub(super) fn greet(connection: &mut Connection) -> Result<(), PolicyError> {
+pub(super) fn greet(connection: &mut PolicyConnection) -> Result<(), PolicyError> {
     let version = concat!("softvt ", env!("CARGO_PKG_VERSION"));
     let hello = map([
         ("harness_version", Value::from(version)),
@@ -37,7 +37,7 @@ pub(super) fn greet(connection: &mut Connection) -> Result<(), PolicyError> {
 }
 
 /// Starts an episode.
-pub(super) fn start(connection: &mut Connection, brief: &TaskBrief) -> Result<(), PolicyError> {
+pub(super) fn start(connection: &mut PolicyConnection, brief: &TaskBrief) -> Result<(), PolicyError> {
     let task = map([
         ("name", Value::from(brief.prompt.as_str())),
         ("suite", Value::from(brief.suite.as_str())),
@@ -48,13 +48,13 @@ pub(super) fn start(connection: &mut Connection, brief: &TaskBrief) -> Result<()
 }
 
 /// Ends an episode.
-pub(super) fn end(connection: &mut Connection) -> Result<(), PolicyError> {
+pub(super) fn end(connection: &mut PolicyConnection) -> Result<(), PolicyError> {
     send(connection, "episode_end", map([]))
 }
 
 /// Asks for a chunk.
 pub(super) fn infer(
-    connection: &mut Connection,
+    connection: &mut PolicyConnection,
     observation: &Observation,
     profile: &Profile,
 ) -> Result<ActionChunk, PolicyError> {
@@ -87,14 +87,14 @@ fn observed(observation: &Observation, profile: &Profile) -> Value {
         let key = |name: &str| name.rsplit('/').next().unwrap_or(name).to_owned();
         let own = input.keys.first().map_or(String::new(), |name| key(name));
         match &input.source {
-            Source::Camera { camera, .. } if camera == "third_person" => {
+            InputSource::Camera { camera, .. } if camera == "third_person" => {
                 images.push(("agentview".to_owned(), value))
             }
-            Source::Camera { camera, .. } => images.push((camera.clone(), value)),
-            Source::TactileImage { .. } | Source::Tactile { .. } => images.push((own, value)),
-            Source::State { .. } => rest.push(("states".to_owned(), value)),
-            Source::Prompt => rest.push(("task_description".to_owned(), value)),
-            Source::MarkerMotion | Source::Force => rest.push((own, value)),
+            InputSource::Camera { camera, .. } => images.push((camera.clone(), value)),
+            InputSource::TactileImage { .. } | InputSource::Tactile { .. } => images.push((own, value)),
+            InputSource::State { .. } => rest.push(("states".to_owned(), value)),
+            InputSource::Prompt => rest.push(("task_description".to_owned(), value)),
+            InputSource::MarkerMotion | InputSource::Force => rest.push((own, value)),
         }
     }
     rest.insert(0, ("images".to_owned(), named(images)));
@@ -109,7 +109,7 @@ fn map<const N: usize>(entries: [(&str, Value); N]) -> Value {
     Value::Map(entries.into_iter().map(|(key, value)| (Value::from(key), value)).collect())
 }
 
-fn send(connection: &mut Connection, kind: &str, payload: Value) -> Result<(), PolicyError> {
+fn send(connection: &mut PolicyConnection, kind: &str, payload: Value) -> Result<(), PolicyError> {
     connection.seq += 1;
     let message = map([
         ("type", Value::from(kind)),
@@ -121,13 +121,13 @@ fn send(connection: &mut Connection, kind: &str, payload: Value) -> Result<(), P
     connection.socket.send(&message)
 }
 
-fn receive(connection: &mut Connection) -> Result<(String, Value), PolicyError> {
+fn receive(connection: &mut PolicyConnection) -> Result<(String, Value), PolicyError> {
     let value = connection.socket.receive()?;
     let (kind, payload) = parts(connection, &value)?;
     Ok((kind.to_owned(), payload.clone()))
 }
 
-fn parts<'a>(connection: &Connection, value: &'a Value) -> Result<(&'a str, &'a Value), PolicyError> {
+fn parts<'a>(connection: &PolicyConnection, value: &'a Value) -> Result<(&'a str, &'a Value), PolicyError> {
     let kind = entry(value, "type").and_then(Value::as_str);
     kind.zip(entry(value, "payload")).ok_or_else(|| {
         let has = names(value);

@@ -16,7 +16,7 @@ use crate::{
     evaluation::record::EpisodeRecord,
     files::{FileError, replace},
     physics::world::Frame,
-    rollout::{CAMERA_PICTURES, FINGER_PICTURES, FINGERS, Film, SenseError},
+    rollout::{CAMERA_IMAGE_SUFFIXES, SensingError, StateRecording, TACTILE_IMAGE_SUFFIXES, TACTILE_IMAGES},
     scene::Camera,
     sensing::{
         camera::Picture,
@@ -43,7 +43,7 @@ const HARM: Ink = [240, 96, 84];
 pub enum FilmError {
     /// A stream cannot be made.
     #[error(transparent)]
-    Sense(#[from] SenseError),
+    Sense(#[from] SensingError),
     /// The video cannot be encoded or written.
     #[error(transparent)]
     Video(#[from] VideoError),
@@ -96,7 +96,7 @@ impl Caption {
 /// # Errors
 /// A stream cannot be made, or the file not written.
 pub fn write_video(
-    film: &mut Film,
+    film: &mut StateRecording,
     caption: &Caption,
     path: &Path,
     stop: impl Fn() -> bool,
@@ -117,16 +117,16 @@ fn rate() -> u32 {
 }
 
 /// One picture of the video.
-fn panels(film: &mut Film, caption: &Caption, index: usize) -> Result<RgbImage, FilmError> {
+fn panels(film: &mut StateRecording, caption: &Caption, index: usize) -> Result<RgbImage, FilmError> {
     let mut canvas = Canvas::new(2 * PANEL, PANEL + FINGER + STRIP, GROUND);
     let frame = film.frames.get(index).ok_or(FilmError::Empty)?;
     for (side, name) in CAMERAS.into_iter().enumerate() {
-        let camera = film.senses.camera(name)?.clone().with_edge(PANEL as usize);
-        let picture = film.senses.see(frame, &camera)?.into_image();
+        let camera = film.sensors.camera(name)?.clone().with_edge(PANEL as usize);
+        let picture = film.sensors.render(frame, &camera)?.into_image();
         canvas.place(&picture, PANEL * side as u32, 0);
         label(&mut canvas, ["third person", "wrist"][side], PANEL * side as u32, 0);
     }
-    for (side, touched) in film.senses.touch(frame)?.iter().enumerate() {
+    for (side, touched) in film.sensors.tactile_readings(frame)?.iter().enumerate() {
         let picture = touched.with_markers(MarkerStyle::Dots);
         let x = PANEL * side as u32;
         canvas.place_resized(&picture, (x, PANEL), (PANEL, FINGER));
@@ -144,7 +144,7 @@ fn label(canvas: &mut Canvas, name: &str, x: u32, y: u32) {
 }
 
 /// Words and the deformation so far.
-fn strip(canvas: &mut Canvas, film: &Film, caption: &Caption, index: usize) {
+fn strip(canvas: &mut Canvas, film: &StateRecording, caption: &Caption, index: usize) {
     let top = (PANEL + FINGER) as f32;
     canvas.write(&caption.prompt, (16.0, top + 28.0), 20.0, WORDS);
     let time = index as f64 * CONTROL_DT;
@@ -159,7 +159,13 @@ fn strip(canvas: &mut Canvas, film: &Film, caption: &Caption, index: usize) {
 }
 
 /// D against time with τ, in the box `[x, y, width, height]`.
-fn chart(canvas: &mut Canvas, film: &Film, caption: &Caption, index: usize, [x, y, width, height]: [f32; 4]) {
+fn chart(
+    canvas: &mut Canvas,
+    film: &StateRecording,
+    caption: &Caption,
+    index: usize,
+    [x, y, width, height]: [f32; 4],
+) {
     let worst = film.d_pct.iter().flatten().fold(0.0, |a: f64, b| a.max(*b));
     let scale = 1.15 * worst.max(caption.tau_pct.unwrap_or(0.0)).max(0.1);
     let steps = film.frames.len().saturating_sub(1).max(1) as f32;
@@ -203,7 +209,7 @@ pub fn still_path(dir: &Path, task: usize, episode: u32) -> PathBuf {
 }
 
 /// The state in which the target is deformed most; where it does not deform, in which the pads are pressed on most.
-pub fn worst_moment(film: &Film) -> usize {
+pub fn worst_moment(film: &StateRecording) -> usize {
     // Forces on the pads, N.
     let press = |frame: &Frame| -> f64 {
         frame.patches.iter().flat_map(|patch| &patch.points).map(|point| point.pressure * point.area).sum()
@@ -217,7 +223,12 @@ pub fn worst_moment(film: &Film) -> usize {
 ///
 /// # Errors
 /// A stream cannot be made, or the file not written.
-pub fn write_panels(film: &mut Film, caption: &Caption, index: usize, path: &Path) -> Result<(), FilmError> {
+pub fn write_panels(
+    film: &mut StateRecording,
+    caption: &Caption,
+    index: usize,
+    path: &Path,
+) -> Result<(), FilmError> {
     Ok(replace(path, png(&panels(film, caption, index)?)?)?)
 }
 
@@ -234,7 +245,7 @@ fn native(camera: &Camera) -> usize {
 /// # Errors
 /// A stream cannot be made, or a file not written.
 pub fn write_stills(
-    film: &mut Film,
+    film: &mut StateRecording,
     moments: &[(&str, usize)],
     full_size: bool,
     dir: &Path,
@@ -252,15 +263,15 @@ pub fn write_stills(
             written.push(path);
             Ok(())
         };
-        for camera in film.senses.cameras().to_vec() {
+        for camera in film.sensors.cameras().to_vec() {
             let camera = if full_size { camera.clone().with_edge(native(&camera)) } else { camera };
-            let seen = film.senses.see(frame, &camera)?;
-            for (kind, bytes) in CAMERA_PICTURES.into_iter().zip(camera_pictures(seen)?) {
+            let seen = film.sensors.render(frame, &camera)?;
+            for (kind, bytes) in CAMERA_IMAGE_SUFFIXES.into_iter().zip(camera_pictures(seen)?) {
                 put(&camera.name, kind, bytes)?;
             }
         }
-        for (name, touched) in FINGERS.into_iter().zip(&film.senses.touch(frame)?) {
-            for (kind, picture) in FINGER_PICTURES.into_iter().zip(tactile(touched)) {
+        for (name, touched) in TACTILE_IMAGES.into_iter().zip(&film.sensors.tactile_readings(frame)?) {
+            for (kind, picture) in TACTILE_IMAGE_SUFFIXES.into_iter().zip(tactile(touched)) {
                 put(name, kind, png(&picture)?)?;
             }
         }

@@ -3,7 +3,7 @@ use crate::{
     benchmark::seed::Split,
     geometry::{Pose, Vec3},
     physics::joints,
-    rollout::{RestCache, Simulation},
+    rollout::{AssetCache, Simulation},
     scene::{Motion, Scene},
     script::{Episode, EpisodeRequest},
 };
@@ -151,7 +151,7 @@ fn walls_that_others_could_pass_through_are_refused_where_the_object_is_placed()
         .replace("shape = box:translate(0, 0, 0.05)", "shape = box:shell(0.0015):translate(0, 0, 0.05)");
     let scene = open(&suite(&thin, "scene:add { name = 'chest', asset = chest, at = { 0, 0 } }")).unwrap();
     let built =
-        Simulation::new(Arc::new(scene), &Default::default(), &Default::default(), &RestCache::default());
+        Simulation::new(Arc::new(scene), &Default::default(), &Default::default(), &AssetCache::default());
     let message = built.expect_err("too thin").to_string();
     let expected = "9: asset chest: part drawer: its walls are about 1.6 mm thick, expected at least 4 mm";
     assert!(message.contains(expected), "{message}");
@@ -170,7 +170,7 @@ fn where_the_parts_of_a_scene_are_is_where_the_mechanics_has_them() {
     assert_eq!(object.asset.parts()[1].joint.motion, Motion::Turn);
     let placed = crate::scene::part_poses(object.asset.parts(), &object.joints);
     let sim =
-        Simulation::new(Arc::new(scene), &Default::default(), &Default::default(), &RestCache::default());
+        Simulation::new(Arc::new(scene), &Default::default(), &Default::default(), &AssetCache::default());
     let sim = sim.expect("builds");
     let names: Vec<&str> = sim.objects.iter().map(|o| o.name.as_str()).collect();
     assert_eq!(names, ["chest", "chest.drawer", "chest.door", "chest.knob", "marble"]);

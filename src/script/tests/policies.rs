@@ -9,8 +9,8 @@ use crate::{
     benchmark::seed::{EpisodeSeed, Split},
     geometry::Vec3,
     policy::{
-        Action, ActionChunk, CameraPicture, Command, Observation, Policy, PolicyError, TaskBrief, TouchFrame,
-        TouchHistory, profile::Profile,
+        Action, ActionChunk, CameraImage, Observation, Policy, PolicyError, TactileFrame, TactileHistory,
+        TaskBrief, ToolCommand, profile::Profile,
     },
     script::{LuaPolicy, PolicyFile, load_profile},
     sensing::tactile::untouched,
@@ -22,11 +22,11 @@ fn seed(episode: u64) -> EpisodeSeed {
 }
 
 /// A finger whose markers have all moved by `by` px, with a picture that is `lit` brighter than the untouched one.
-fn finger(by: [f32; 2], lit: u8) -> TouchFrame {
+fn finger(by: [f32; 2], lit: u8) -> TactileFrame {
     let rest = RgbImage::from_pixel(320, 240, Rgb([100, 100, 100]));
     let picture = RgbImage::from_pixel(320, 240, Rgb([100 + lit, 100, 100 - lit]));
     let markers = [untouched(), untouched().map(|[x, y]| [x + by[0], y + by[1]])];
-    TouchFrame::new(picture, Arc::new(rest), markers)
+    TactileFrame::new(picture, Arc::new(rest), markers)
 }
 
 fn observation() -> Observation {
@@ -42,8 +42,8 @@ fn observation() -> Observation {
         gripper_width_m: 0.0625,
         closure: 0.25,
         prompt: "take it".into(),
-        cameras: vec![CameraPicture { name: "wrist".into(), picture }],
-        touch: Some(TouchHistory { frames: vec![before, now] }),
+        cameras: vec![CameraImage { name: "wrist".into(), image: picture }],
+        touch: Some(TactileHistory { frames: vec![before, now] }),
         forces: None,
         force_history: Vec::new(),
     }
@@ -115,12 +115,12 @@ fn actions_come_alone_or_as_lists_with_either_way_to_say_a_turn() {
         closure: 0.5,
     };
     let one = act(&format!("return {{ {POSE}, closure = 0.5 }}")).unwrap();
-    assert_eq!(one.commands, [Command::Pose(expected)]);
+    assert_eq!(one.commands, [ToolCommand::Pose(expected)]);
     let two = act(&format!("local a = {{ {POSE}, closure = 0.5 }} return {{ a, a }}")).unwrap();
     assert_eq!(two.commands.len(), 2);
     let turned =
         act("return { position = obs.position, rotation = { 0, 2, 0, 0 }, closure = obs.closure }").unwrap();
-    let Command::Pose(action) = turned.commands[0] else { panic!("a pose") };
+    let ToolCommand::Pose(action) = turned.commands[0] else { panic!("a pose") };
     assert!((action.axis_angle_b - Vec3::new(std::f64::consts::PI, 0.0, 0.0)).norm() < 1e-9);
     assert_eq!((action.position_b, action.closure), (Vec3::new(0.5, -0.125, 0.25), 0.25));
 }
@@ -198,7 +198,7 @@ fn an_episode_is_a_function_of_its_seed_and_no_other_episode() {
     );
     let project = Project::new(&[("p.lua", &text)]);
     let file = PolicyFile::load_with(&project.path("p.lua"), &limits()).unwrap();
-    let episode = |number: u64| -> Vec<Command> {
+    let episode = |number: u64| -> Vec<ToolCommand> {
         let mut policy = file.start(&seed(number)).unwrap();
         policy.reset(&brief()).unwrap();
         (0..3).flat_map(|_| policy.act(&observation()).unwrap().commands).collect()
@@ -241,7 +241,7 @@ fn the_shipped_policies_act() {
         let mut policy = file.start(&seed(0)).unwrap();
         policy.reset(&brief()).unwrap();
         let chunk = policy.act(&observation()).unwrap();
-        let Command::Pose(action) = chunk.commands[0] else { panic!("a pose") };
+        let ToolCommand::Pose(action) = chunk.commands[0] else { panic!("a pose") };
         assert_eq!((action.position_b.x, action.closure), (0.5, 0.0));
     }
 }

@@ -20,7 +20,7 @@ use crate::{
 
 /// The robot of a simulation.
 #[derive(Clone, Debug)]
-pub struct Rig {
+pub struct RobotInstance {
     /// Its numbers.
     pub spec: RobotSpec,
     /// Its joint tree in the world.
@@ -35,7 +35,7 @@ pub struct Rig {
     gripper: Gripper,
 }
 
-impl Rig {
+impl RobotInstance {
     /// Puts the robot at `base_w` with joint angles `q`, gripper open.
     pub fn new(
         world: &mut World,

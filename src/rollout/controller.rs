@@ -1,7 +1,7 @@
 //! Whoever drives the robot, as an episode sees it.
 
 use super::simulation::Simulation;
-use crate::policy::{Action, Chunked, Observation, PolicyError, Streams};
+use crate::policy::{Action, ChunkedPolicy, Observation, PolicyError, SensorStreams};
 
 /// What went wrong with whoever drives.
 #[derive(Debug, thiserror::Error)]
@@ -23,11 +23,11 @@ pub enum ControlError {
 /// Whoever drives the robot: a policy behind its observation, or a privileged planner.
 pub trait Controller {
     /// What it looks at, when it looks; the same for the whole episode.
-    fn streams(&self) -> Streams {
-        Streams::default()
+    fn streams(&self) -> SensorStreams {
+        SensorStreams::default()
     }
     /// Whether it looks in this control step; if not, nothing is sensed for it.
-    fn looks(&self) -> bool {
+    fn wants_observation(&self) -> bool {
         true
     }
     /// Why it has given up, if it has: the last action stays then.
@@ -44,21 +44,21 @@ pub trait Controller {
 }
 
 /// A policy sees the observation and nothing else.
-impl Controller for Chunked<'_> {
-    fn streams(&self) -> Streams {
-        Chunked::streams(self)
+impl Controller for ChunkedPolicy<'_> {
+    fn streams(&self) -> SensorStreams {
+        ChunkedPolicy::streams(self)
     }
 
-    fn looks(&self) -> bool {
-        Chunked::looks(self)
+    fn wants_observation(&self) -> bool {
+        ChunkedPolicy::wants_observation(self)
     }
 
     fn act(&mut self, _sim: &Simulation, observation: &Observation) -> Result<Option<Action>, ControlError> {
-        Chunked::act(self, observation).map(Some).map_err(ControlError::from)
+        ChunkedPolicy::act(self, observation).map(Some).map_err(ControlError::from)
     }
 
     fn finish(&mut self) {
-        Chunked::finish(self);
+        ChunkedPolicy::finish(self);
     }
 }
 

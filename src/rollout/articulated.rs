@@ -1,9 +1,9 @@
 //! Articulated objects in the world: a fixed base and a joint tree, one handle for the whole and one for each part.
 
 use super::{
+    asset_cache::AssetCache,
     build::BuildError,
-    rest_cache::RestCache,
-    simulation::{Handle, Kind, PartOf},
+    simulation::{ArticulatedPart, Kind, ObjectInstance},
 };
 use crate::{
     geometry::{Pose, Vec3, shape::Shape},
@@ -31,8 +31,8 @@ pub(super) fn add(
     object: &Object,
     parts: &[Part],
     base: usize,
-    cache: &RestCache,
-) -> Result<(usize, Vec<Handle>), BuildError> {
+    cache: &AssetCache,
+) -> Result<(usize, Vec<ObjectInstance>), BuildError> {
     for part in parts {
         check_walls(object, part, cache)?;
     }
@@ -48,21 +48,21 @@ pub(super) fn add(
         let friction = part.asset.friction;
         let friction = Friction { static_mu: friction.static_mu, dynamic_mu: friction.dynamic_mu };
         let collider = cache.collider(world, &name, placed, &part.asset.shape, friction);
-        Handle {
+        ObjectInstance {
             name,
             asset: part.asset.clone(),
             kind: Kind::Link { tree, link },
             start_w: world.trees[tree].poses()[link] * placed.1,
             colliders: vec![world.add_collider(collider)],
             bounds: cache.bounds(&part.asset.shape),
-            part: Some(PartOf { object: base, name: part.name.clone(), joint: part.joint.clone() }),
+            part: Some(ArticulatedPart { object: base, name: part.name.clone(), joint: part.joint.clone() }),
         }
     });
     Ok((tree, handles.collect()))
 }
 
 /// A part as a link whose frame is the object's, moved to the origin of its joint.
-fn link(part: &Part, parts: &[Part], cache: &RestCache) -> Link {
+fn link(part: &Part, parts: &[Part], cache: &AssetCache) -> Link {
     let m = cache.mass(&part.asset.shape, part.density);
     let joint = &part.joint;
     let axis = nalgebra::Unit::new_normalize(joint.axis_o);
@@ -87,7 +87,7 @@ fn link(part: &Part, parts: &[Part], cache: &RestCache) -> Link {
     }
 }
 
-fn check_walls(object: &Object, part: &Part, cache: &RestCache) -> Result<(), BuildError> {
+fn check_walls(object: &Object, part: &Part, cache: &AssetCache) -> Result<(), BuildError> {
     match cache.wall(&part.asset.shape) {
         None => Ok(()),
         Some(wall) => Err(BuildError::Material {

@@ -14,15 +14,15 @@ type Kept<K, V> = Vec<(K, Cell<V>)>;
 
 /// Values by key: the ones used last.
 #[derive(Debug)]
-pub(super) struct Made<K, V>(Arc<Mutex<Kept<K, V>>>);
+pub(super) struct SharedCache<K, V>(Arc<Mutex<Kept<K, V>>>);
 
-impl<K, V> Clone for Made<K, V> {
+impl<K, V> Clone for SharedCache<K, V> {
     fn clone(&self) -> Self {
         Self(self.0.clone())
     }
 }
 
-impl<K, V> Default for Made<K, V> {
+impl<K, V> Default for SharedCache<K, V> {
     fn default() -> Self {
         Self(Arc::default())
     }
@@ -32,7 +32,7 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
 }
 
-impl<K: Clone, V: Clone> Made<K, V> {
+impl<K: Clone, V: Clone> SharedCache<K, V> {
     /// The value of a kept key that is the `same`, else what `make` makes, kept under `key`. Who wants the same meanwhile
     /// waits, so that two workers never make it both; others go on. What was not used for longest gives way: a value is a
     /// function of its key, so it can only have to be made again.
@@ -83,7 +83,7 @@ mod tests {
 
     use super::*;
 
-    fn double(made: &Made<usize, usize>, key: usize, count: &AtomicUsize) -> usize {
+    fn double(made: &SharedCache<usize, usize>, key: usize, count: &AtomicUsize) -> usize {
         let value: Result<_, Infallible> = made.get(
             &key,
             |known| *known == key,
@@ -97,7 +97,7 @@ mod tests {
 
     #[test]
     fn what_was_used_last_is_kept_and_no_more_than_so_much() {
-        let (made, count) = (Made::default(), AtomicUsize::new(0));
+        let (made, count) = (SharedCache::default(), AtomicUsize::new(0));
         for key in 0..10 * MOST {
             assert_eq!(double(&made, key, &count), 2 * key);
             assert_eq!(double(&made, 0, &count), 0, "in use all the time");
@@ -110,7 +110,7 @@ mod tests {
 
     #[test]
     fn others_are_made_while_one_is_being_made_and_the_same_is_waited_for() {
-        let (made, count) = (Made::<usize, usize>::default(), AtomicUsize::new(0));
+        let (made, count) = (SharedCache::<usize, usize>::default(), AtomicUsize::new(0));
         let (started, begun) = mpsc::channel();
         let (go, wait) = mpsc::channel::<()>();
         std::thread::scope(|scope| {
@@ -136,7 +136,7 @@ mod tests {
 
     #[test]
     fn what_failed_is_tried_again() {
-        let made = Made::<(), u8>::default();
+        let made = SharedCache::<(), u8>::default();
         assert_eq!(made.get(&(), |()| true, || Err("no")), Err("no"));
         assert_eq!(made.get(&(), |()| true, || Ok::<_, &str>(3)), Ok(3));
     }

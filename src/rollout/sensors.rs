@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use super::{
-    looks::Looks,
+    sensor_assets::SensorAssets,
     simulation::{Kind, Simulation, joint_frame},
 };
 use crate::{
@@ -14,11 +14,11 @@ use crate::{
         fem::Rest,
         world::{ContactPatch, Frame, Presser},
     },
-    policy::{PadForce, TouchFrame},
+    policy::{PadForce, TactileFrame},
     robot::{RobotSpec, Side, pads, panda},
     scene::{Asset, Body, Camera, Scene},
     sensing::{
-        camera::{self, CameraError, FrameView, Mount, Picture, Stage, Thing, render},
+        camera::{self, CameraError, FrameView, Mount, Picture, Stage, Thing},
         tactile::{
             self, FieldError, Give, PadInput, PadLoad, SensorError, Skin, Surface, TactileSpec, Taxels,
             Touched,
@@ -28,7 +28,7 @@ use crate::{
 
 /// Why something cannot be sensed.
 #[derive(Debug, thiserror::Error)]
-pub enum SenseError {
+pub enum SensingError {
     /// A picture cannot be drawn.
     #[error(transparent)]
     Camera(#[from] CameraError),
@@ -44,7 +44,7 @@ pub enum SenseError {
         /// File and line.
         at: String,
         /// What is wrong.
-        source: Box<SenseError>,
+        source: Box<SensingError>,
     },
     /// Two pictures have one name.
     #[error(
@@ -71,7 +71,7 @@ pub enum SenseError {
     Skin(String),
 }
 
-impl SenseError {
+impl SensingError {
     /// The same error with the place in the script that set the camera.
     pub(super) fn set_by(self, camera: &Camera) -> Self {
         match &camera.set_at {
@@ -96,20 +96,20 @@ pub(super) struct Part {
 
 /// The sensors of one simulation.
 #[derive(Debug)]
-pub struct Senses {
+pub struct SensorSuite {
     scene: Arc<Scene>,
     spec: TactileSpec,
     pub(super) robot: RobotSpec,
     pub(super) tree: usize,
     pub(super) parts: Vec<Part>,
-    looks: Looks,
+    assets: SensorAssets,
     stage: Option<Arc<Stage>>,
     eye: camera::Scratch,
     touch: tactile::Scratch,
 }
 
 /// A copy draws the same scene with a working memory of its own, which it fills when it first looks.
-impl Clone for Senses {
+impl Clone for SensorSuite {
     fn clone(&self) -> Self {
         Self {
             scene: self.scene.clone(),
@@ -117,7 +117,7 @@ impl Clone for Senses {
             robot: self.robot.clone(),
             tree: self.tree,
             parts: self.parts.clone(),
-            looks: self.looks.clone(),
+            assets: self.assets.clone(),
             stage: self.stage.clone(),
             eye: camera::Scratch::default(),
             touch: tactile::Scratch::default(),
@@ -131,10 +131,10 @@ const TAXELS: [usize; 2] = [25, 21];
 /// it.
 pub const ROBOT: u16 = 1000;
 
-impl Senses {
+impl SensorSuite {
     /// The sensors of `sim`; nothing is computed yet.
-    pub fn new(sim: &Simulation, spec: &TactileSpec, looks: &Looks) -> Self {
-        let part = |object: &super::Handle| Part {
+    pub fn new(sim: &Simulation, spec: &TactileSpec, assets: &SensorAssets) -> Self {
+        let part = |object: &super::ObjectInstance| Part {
             name: object.name.clone(),
             asset: object.asset.clone(),
             kind: object.kind,
@@ -149,10 +149,10 @@ impl Senses {
         Self {
             scene: sim.scene.clone(),
             spec: spec.clone(),
-            robot: sim.rig.spec.clone(),
-            tree: sim.rig.tree,
+            robot: sim.robot.spec.clone(),
+            tree: sim.robot.tree,
             parts: sim.objects.iter().map(part).collect(),
-            looks: looks.clone(),
+            assets: assets.clone(),
             stage: None,
             eye: camera::Scratch::default(),
             touch: tactile::Scratch::default(),
@@ -161,15 +161,15 @@ impl Senses {
 
     /// All that the sensors need of the present state.
     pub fn frame(sim: &Simulation) -> Frame {
-        sim.world.snapshot(&sim.rig.pads)
+        sim.world.snapshot(&sim.robot.pads)
     }
 
     /// The scene's camera of a name.
     ///
     /// # Errors
     /// There is none.
-    pub fn camera(&self, name: &str) -> Result<&Camera, SenseError> {
-        self.scene.camera(name).ok_or_else(|| SenseError::NoCamera {
+    pub fn camera(&self, name: &str) -> Result<&Camera, SensingError> {
+        self.scene.camera(name).ok_or_else(|| SensingError::NoCamera {
             name: name.to_owned(),
             have: self.scene.cameras.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(", "),
         })
@@ -185,21 +185,21 @@ impl Senses {
     ///
     /// # Errors
     /// A number of the camera or light out of range, a thing that cannot be drawn.
-    pub fn see(&mut self, frame: &Frame, camera: &Camera) -> Result<Picture, SenseError> {
+    pub fn render(&mut self, frame: &Frame, camera: &Camera) -> Result<Picture, SensingError> {
         let stage = match self.stage.take() {
             Some(stage) => stage,
             None => Arc::new(self.build()?),
         };
-        let picture = render(&stage, &self.view(frame), camera, &mut self.eye);
+        let picture = camera::render(&stage, &self.view(frame), camera, &mut self.eye);
         self.stage = Some(stage);
-        picture.map_err(|error| SenseError::from(error).set_by(camera))
+        picture.map_err(|error| SensingError::from(error).set_by(camera))
     }
 
     /// Everything that is drawn, for [`render`]; made when somebody first looks.
     ///
     /// # Errors
     /// A thing that cannot be drawn, a number of the light out of range.
-    pub fn stage(&mut self) -> Result<&Stage, SenseError> {
+    pub fn render_scene(&mut self) -> Result<&Stage, SensingError> {
         let stage = match self.stage.take() {
             Some(stage) => stage,
             None => Arc::new(self.build()?),
@@ -213,7 +213,7 @@ impl Senses {
 
     /// The robot with nothing around it.
     pub(super) fn robot_alone(&self) -> Result<Stage, CameraError> {
-        let things = self.looks.robot()?.things(self.tree, self.scene.base_w, ROBOT);
+        let things = self.assets.robot()?.things(self.tree, self.scene.base_w, ROBOT);
         Stage::new(things.into_iter().collect(), self.scene.lighting.clone())
     }
 
@@ -234,14 +234,14 @@ impl Senses {
     /// The same for a camera where somebody put it, before anything has moved.
     ///
     /// # Errors
-    /// As [`Senses::see`]; also if the camera stands inside of something.
-    pub fn see_from_outside(&mut self, frame: &Frame, camera: &Camera) -> Result<Picture, SenseError> {
-        let picture = self.see(frame, camera)?;
+    /// As [`SensorSuite::render`]; also if the camera stands inside of something.
+    pub fn render_unobstructed(&mut self, frame: &Frame, camera: &Camera) -> Result<Picture, SensingError> {
+        let picture = self.render(frame, camera)?;
         match &picture.inside {
             None => Ok(picture),
             Some(object) => {
                 let inside = CameraError::Inside { camera: camera.name.clone(), object: object.clone() };
-                Err(SenseError::from(inside).set_by(camera))
+                Err(SensingError::from(inside).set_by(camera))
             }
         }
     }
@@ -250,23 +250,23 @@ impl Senses {
     ///
     /// # Errors
     /// The sensor cannot be made, or a number of the state is none.
-    pub fn touch(&mut self, frame: &Frame) -> Result<[Touched; 2], SenseError> {
-        let left = self.finger(frame, Side::Left)?;
-        Ok([left, self.finger(frame, Side::Right)?])
+    pub fn tactile_readings(&mut self, frame: &Frame) -> Result<[Touched; 2], SensingError> {
+        let left = self.tactile_reading(frame, Side::Left)?;
+        Ok([left, self.tactile_reading(frame, Side::Right)?])
     }
 
     /// The same as a policy gets it.
     ///
     /// # Errors
-    /// As [`Senses::touch`].
-    pub fn touch_frame(&mut self, frame: &Frame) -> Result<[TouchFrame; 2], SenseError> {
-        let both = self.touch(frame)?;
-        let untouched = self.looks.sensor(&self.spec)?.untouched.clone();
-        Ok(both.map(|touched| TouchFrame::new(touched.picture, untouched.clone(), touched.markers)))
+    /// As [`SensorSuite::tactile_readings`].
+    pub fn tactile_frames(&mut self, frame: &Frame) -> Result<[TactileFrame; 2], SensingError> {
+        let both = self.tactile_readings(frame)?;
+        let untouched = self.assets.sensor(&self.spec)?.untouched.clone();
+        Ok(both.map(|touched| TactileFrame::new(touched.picture, untouched.clone(), touched.markers)))
     }
 
     /// True forces on the left and right gel.
-    pub fn forces(frame: &Frame) -> [PadForce; 2] {
+    pub fn pad_forces(frame: &Frame) -> [PadForce; 2] {
         let pad = pads::PadSurface::default();
         [0, 1].map(|side| match frame.patches.get(side) {
             Some(patch) => {
@@ -279,9 +279,9 @@ impl Senses {
     /// What one finger feels.
     ///
     /// # Errors
-    /// As [`Senses::touch`].
-    pub fn finger(&mut self, frame: &Frame, side: Side) -> Result<Touched, SenseError> {
-        let sensor = self.looks.sensor(&self.spec)?;
+    /// As [`SensorSuite::tactile_readings`].
+    pub fn tactile_reading(&mut self, frame: &Frame, side: Side) -> Result<Touched, SensingError> {
+        let sensor = self.assets.sensor(&self.spec)?;
         let index = usize::from(side == Side::Right);
         let none = ContactPatch { collider: 0, points: Vec::new() };
         // What touches the very rim alone, where no cell of the grid has its centre, cannot be seen.
@@ -293,7 +293,7 @@ impl Senses {
         let mut give = None;
         for part in self.parts.iter().filter(|part| part.presses(patch)) {
             let mesh = part.rest.as_ref().map(|rest| &rest.mesh);
-            let skin = self.looks.skin(&part.name, &part.asset, mesh)?;
+            let skin = self.assets.skin(&part.name, &part.asset, mesh)?;
             let mut vertices = Vec::new();
             let w_p = pad_w.inverse();
             match part.kind {
@@ -331,13 +331,13 @@ impl Senses {
             Ok(Thing {
                 name: part.name.clone(),
                 object: index as u16 + 1,
-                model: self.looks.model(&part.name, &part.asset, mesh)?,
+                model: self.assets.model(&part.name, &part.asset, mesh)?,
                 mount,
                 casts_shadow: true,
             })
         };
         let mut things: Vec<Thing> = self.parts.iter().enumerate().map(draw).collect::<Result<_, _>>()?;
-        things.extend(self.looks.robot()?.things(self.tree, self.scene.base_w, ROBOT));
+        things.extend(self.assets.robot()?.things(self.tree, self.scene.base_w, ROBOT));
         Ok(things)
     }
 }
@@ -362,9 +362,9 @@ impl Part {
 
 /// All that was to be seen of a rollout, to be drawn later.
 #[derive(Debug)]
-pub struct Film {
+pub struct StateRecording {
     /// The sensors.
-    pub senses: Senses,
+    pub sensors: SensorSuite,
     /// The settled state and the state after each control step.
     pub frames: Vec<Frame>,
     /// The target's deformation in each frame, % of the diagonal; `None` for a rigid one.

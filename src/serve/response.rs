@@ -4,15 +4,15 @@ use image::RgbImage;
 use rmpv::Value;
 use serde_json::{Map, json};
 
-use super::{offer::Offer, running::Running, space};
+use super::{catalog::ServerConfig, live_episode::LiveEpisode, space};
 use crate::{
     benchmark::control::CONTROL_DT,
     evaluation::record::Outcome,
     policy::{
         Observation,
         encode::content,
-        profile::{Input, Profile},
-        wire::Array,
+        profile::{Profile, ProfileInput},
+        wire::WireArray,
     },
 };
 
@@ -39,7 +39,7 @@ pub(super) fn error(message: &str) -> Value {
 /// The first message: what there is, what is seen and what is done.
 ///
 /// `first` is what the client will see at the start of the first episode.
-pub fn hello(offer: &Offer, first: &Observation) -> Value {
+pub fn hello(offer: &ServerConfig, first: &Observation) -> Value {
     let suites = offer.suites.iter().map(|one| {
         let tasks =
             one.suite.tasks.iter().map(
@@ -69,8 +69,8 @@ pub fn hello(offer: &Offer, first: &Observation) -> Value {
 /// Something cannot be sensed; a message for people.
 pub(super) fn stands(
     kind: &str,
-    running: &mut Running,
-    offer: &Offer,
+    running: &mut LiveEpisode,
+    offer: &ServerConfig,
     carried_out: Option<usize>,
 ) -> Result<Value, String> {
     let seen = running.observe(offer).map_err(|e| e.to_string())?;
@@ -92,21 +92,26 @@ pub(super) fn stands(
 /// A picture as an array, uint8 (height, width, 3).
 pub(super) fn picture(picture: RgbImage) -> Value {
     let shape = vec![picture.height() as usize, picture.width() as usize, 3];
-    Array::bytes(shape, picture.into_raw()).into_value(true)
+    WireArray::bytes(shape, picture.into_raw()).into_value(true)
 }
 
 /// The one key of an entry that a profile sends under several.
-pub(super) fn key(input: &Input) -> &str {
+pub(super) fn key(input: &ProfileInput) -> &str {
     input.keys.iter().min_by_key(|key| key.len()).map_or("", String::as_str)
 }
 
 fn observation(seen: &Observation, profile: &Profile) -> Value {
-    let entry = |input: &Input| Some(pair(key(input), content(seen, &input.source)?.into_value(true)));
+    let entry = |input: &ProfileInput| Some(pair(key(input), content(seen, &input.source)?.into_value(true)));
     Value::Map(profile.inputs.iter().filter_map(entry).collect())
 }
 
 /// Without the right to the true state: what any policy could know, and whether the goal was reached.
-fn info(running: &Running, offer: &Offer, seen: &Observation, carried_out: Option<usize>) -> Value {
+fn info(
+    running: &LiveEpisode,
+    offer: &ServerConfig,
+    seen: &Observation,
+    carried_out: Option<usize>,
+) -> Value {
     let outcome = running.episode.outcome();
     let mut info = Map::new();
     let mut put = |name: &str, value| info.insert(name.to_owned(), value);
@@ -128,7 +133,7 @@ fn info(running: &Running, offer: &Offer, seen: &Observation, carried_out: Optio
     of_json(&serde_json::Value::Object(info))
 }
 
-fn record(running: &Running, offer: &Offer, outcome: &Outcome) -> serde_json::Value {
+fn record(running: &LiveEpisode, offer: &ServerConfig, outcome: &Outcome) -> serde_json::Value {
     if !offer.privileged {
         let kind = json!(outcome)["kind"].clone();
         let steps = running.state.actions.len();

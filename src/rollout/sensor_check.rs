@@ -1,13 +1,13 @@
 //! What of the sensors can be told to be wrong before anything runs, and how their pictures are called.
 
 use super::{
-    looks::Looks,
-    senses::{SenseError, Senses},
+    sensor_assets::SensorAssets,
+    sensors::{SensingError, SensorSuite},
 };
 use crate::{
     geometry::Pose,
     physics::world::Frame,
-    policy::Streams,
+    policy::SensorStreams,
     scene::{Camera, CameraMount, Scene},
     sensing::{
         camera::{CameraError, Scratch, check_cameras, check_light, render},
@@ -16,11 +16,11 @@ use crate::{
 };
 
 /// What is added to a camera's name for its picture, its depth and its segmentation.
-pub const CAMERA_PICTURES: [&str; 3] = ["", "_depth", "_segmentation"];
+pub const CAMERA_IMAGE_SUFFIXES: [&str; 3] = ["", "_depth", "_segmentation"];
 /// What is added to a finger's name for its picture, and for the picture with its markers as dots and as arrows.
-pub const FINGER_PICTURES: [&str; 3] = ["", "_markers", "_arrows"];
+pub const TACTILE_IMAGE_SUFFIXES: [&str; 3] = ["", "_markers", "_arrows"];
 /// Names of the left and right finger's pictures.
-pub const FINGERS: [&str; 2] = ["tactile_left", "tactile_right"];
+pub const TACTILE_IMAGES: [&str; 2] = ["tactile_left", "tactile_right"];
 
 /// Edge of the pictures that only try out whether there can be one, pixels.
 const TRIAL_EDGE: usize = 16;
@@ -30,51 +30,55 @@ const TRIAL_EDGE: usize = 16;
 ///
 /// # Errors
 /// What is wrong, with the place in the script that set it.
-pub fn check_senses(scene: &Scene, spec: &TactileSpec, looks: &Looks) -> Result<(), SenseError> {
+pub fn check_sensors(
+    scene: &Scene,
+    spec: &TactileSpec,
+    sensor_assets: &SensorAssets,
+) -> Result<(), SensingError> {
     check_cameras(&scene.cameras)
-        .map_err(|(index, error)| SenseError::from(error).set_by(&scene.cameras[index]))?;
+        .map_err(|(index, error)| SensingError::from(error).set_by(&scene.cameras[index]))?;
     check_names(&scene.cameras)?;
     check_light(&scene.lighting)?;
     // The others have no file that could be missing.
     if let OpticsModel::Taxim { .. } = spec.optics {
-        looks.sensor(spec)?;
+        sensor_assets.sensor(spec)?;
     }
     Ok(())
 }
 
 /// No camera may be called as a picture of another or of a finger is: one file would replace the other.
-fn check_names(cameras: &[Camera]) -> Result<(), SenseError> {
+fn check_names(cameras: &[Camera]) -> Result<(), SensingError> {
     let called = |owner: &str, kinds: [&str; 3]| kinds.map(|kind| format!("{owner}{kind}"));
     let mut taken: Vec<(String, String)> = Vec::new();
-    for finger in FINGERS {
-        taken.extend(called(finger, FINGER_PICTURES).map(|name| (name, "a finger".to_owned())));
+    for finger in TACTILE_IMAGES {
+        taken.extend(called(finger, TACTILE_IMAGE_SUFFIXES).map(|name| (name, "a finger".to_owned())));
     }
     for camera in cameras {
-        for name in called(&camera.name, CAMERA_PICTURES) {
+        for name in called(&camera.name, CAMERA_IMAGE_SUFFIXES) {
             if let Some((_, owner)) = taken.iter().find(|(known, _)| *known == name) {
                 let (camera_name, owner) = (camera.name.clone(), owner.clone());
-                return Err(SenseError::Name { camera: camera_name, picture: name, owner }.set_by(camera));
+                return Err(SensingError::Name { camera: camera_name, picture: name, owner }.set_by(camera));
             }
         }
         let owner = format!("camera {}", camera.name);
-        taken.extend(called(&camera.name, CAMERA_PICTURES).map(|name| (name, owner.clone())));
+        taken.extend(called(&camera.name, CAMERA_IMAGE_SUFFIXES).map(|name| (name, owner.clone())));
     }
     Ok(())
 }
 
-impl Senses {
+impl SensorSuite {
     /// Looks once at `streams` in the state in which an episode starts: whatever would go wrong in its first control step
     /// goes wrong here.
     ///
     /// # Errors
-    /// As [`Senses::see_from_outside`] and [`Senses::touch`].
-    pub fn try_out(&mut self, frame: &Frame, streams: &Streams) -> Result<(), SenseError> {
+    /// As [`SensorSuite::render_unobstructed`] and [`SensorSuite::tactile_readings`].
+    pub fn validate(&mut self, frame: &Frame, streams: &SensorStreams) -> Result<(), SensingError> {
         for name in &streams.cameras {
             let camera = self.camera(name)?.clone().with_edge(TRIAL_EDGE);
-            self.see_from_outside(frame, &camera)?;
+            self.render_unobstructed(frame, &camera)?;
         }
         if streams.touch {
-            self.touch(frame)?;
+            self.tactile_readings(frame)?;
         }
         Ok(())
     }
@@ -84,7 +88,7 @@ impl Senses {
     ///
     /// # Errors
     /// A camera inside of something, or a picture of the robot alone that cannot be drawn.
-    pub fn stand_outside(&mut self, frame: &Frame) -> Result<(), SenseError> {
+    pub fn check_camera_positions(&mut self, frame: &Frame) -> Result<(), SensingError> {
         let robot = self.robot_alone()?;
         let view = self.view(frame);
         for camera in self.cameras() {
@@ -98,12 +102,12 @@ impl Senses {
                 None => {
                     let picture =
                         render(&robot, &view, &camera.clone().with_edge(TRIAL_EDGE), &mut Scratch::default());
-                    picture.map_err(|error| SenseError::from(error).set_by(camera))?.inside
+                    picture.map_err(|error| SensingError::from(error).set_by(camera))?.inside
                 }
             };
             if let Some(object) = object {
                 let inside = CameraError::Inside { camera: camera.name.clone(), object };
-                return Err(SenseError::from(inside).set_by(camera));
+                return Err(SensingError::from(inside).set_by(camera));
             }
         }
         Ok(())

@@ -3,9 +3,9 @@
 use std::{convert::Infallible, sync::Arc};
 
 use super::{
+    articulated,
     build::{BuildError, check_soft, meshed, soft_rest},
-    furniture,
-    made::Made,
+    shared_cache::SharedCache,
 };
 use crate::{
     geometry::{
@@ -23,12 +23,12 @@ use crate::{
 
 /// Rest data of assets, and what takes a search over their shapes: bounds, masses, walls, where their skin can touch.
 #[derive(Clone, Debug, Default)]
-pub struct RestCache {
-    rests: Made<Arc<Asset>, Arc<Rest>>,
-    bounds: Made<Shape, Aabb>,
-    masses: Made<Shape, MassProperties>,
-    solids: Made<Shape, Arc<Solid>>,
-    walls: Made<Shape, Option<f64>>,
+pub struct AssetCache {
+    rests: SharedCache<Arc<Asset>, Arc<Rest>>,
+    bounds: SharedCache<Shape, Aabb>,
+    masses: SharedCache<Shape, MassProperties>,
+    solids: SharedCache<Shape, Arc<Solid>>,
+    walls: SharedCache<Shape, Option<f64>>,
     /// Whether masses and contact samples need only be about right.
     rough: bool,
 }
@@ -37,7 +37,7 @@ pub struct RestCache {
 const ROUGH_SPACING: f64 = 4.0;
 
 /// The value of a shape; making it cannot fail.
-fn of_shape<V: Clone>(made: &Made<Shape, V>, shape: &Shape, make: impl FnOnce() -> V) -> V {
+fn of_shape<V: Clone>(made: &SharedCache<Shape, V>, shape: &Shape, make: impl FnOnce() -> V) -> V {
     let value: Result<_, Infallible> = made.get(shape, |known| known == shape, || Ok(make()));
     value.unwrap_or_else(|never| match never {})
 }
@@ -48,7 +48,7 @@ fn rough_rest(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<Arc<
     meshed(name, shape, &rough, rough_mass_properties(shape, 1.0).mass)
 }
 
-impl RestCache {
+impl AssetCache {
     /// For scenes that are looked at before anything moves, and never run: what takes long is made roughly.
     pub fn rough() -> Self {
         Self { rough: true, ..Self::default() }
@@ -68,7 +68,7 @@ impl RestCache {
 
     /// Thickness of walls that are thinner than a moving part's may be, m, if there are such.
     pub(super) fn wall(&self, shape: &Shape) -> Option<f64> {
-        of_shape(&self.walls, shape, || furniture::thin_wall(shape))
+        of_shape(&self.walls, shape, || articulated::thin_wall(shape))
     }
 
     /// A collider of a hard shape in a frame of its mover.

@@ -1,6 +1,6 @@
 //! Where the robot and the objects are in a kept state, as numbers.
 
-use super::{senses::Senses, simulation::Kind};
+use super::{sensors::SensorSuite, simulation::Kind};
 use crate::{
     benchmark::control::CONTROL_DT,
     geometry::{Pose, Vec3},
@@ -10,7 +10,7 @@ use crate::{
 
 /// What the robot measures of itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stance {
+pub struct Proprioception {
     /// Tool in the base frame.
     pub tool_b: Pose,
     /// Arm joint angles, rad.
@@ -21,19 +21,19 @@ pub struct Stance {
 
 /// Where a thing is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum BodyState<'a> {
+pub enum BodyConfiguration<'a> {
     /// Nodes of a soft body, m, world.
     Nodes(&'a [Vec3]),
     /// Object frame of a rigid one, world.
     Pose(Pose),
 }
 
-impl Senses {
+impl SensorSuite {
     /// The robot in a state.
-    pub fn stance(&self, frame: &Frame) -> Stance {
+    pub fn proprioception(&self, frame: &Frame) -> Proprioception {
         let q = &frame.joints[self.tree];
         let joints = std::array::from_fn(|i| q[i]);
-        Stance {
+        Proprioception {
             tool_b: DiffIk::new(&self.robot.ik, joints, CONTROL_DT).tool_pose(&joints),
             joints,
             fingers: [q[ARM_DOFS], q[ARM_DOFS + 1]],
@@ -41,12 +41,15 @@ impl Senses {
     }
 
     /// All that can move in the scene, by name, in its order.
-    pub fn bodies<'a>(&'a self, frame: &'a Frame) -> impl Iterator<Item = (&'a str, BodyState<'a>)> {
+    pub fn body_configurations<'a>(
+        &'a self,
+        frame: &'a Frame,
+    ) -> impl Iterator<Item = (&'a str, BodyConfiguration<'a>)> {
         self.parts.iter().filter_map(|part| {
             let state = match part.kind {
-                Kind::Soft(body) => BodyState::Nodes(&frame.nodes[body]),
-                Kind::Rigid(body) => BodyState::Pose(frame.rigid[body]),
-                Kind::Link { tree, link } => BodyState::Pose(frame.links[tree][link] * part.offset),
+                Kind::Soft(body) => BodyConfiguration::Nodes(&frame.nodes[body]),
+                Kind::Rigid(body) => BodyConfiguration::Pose(frame.rigid[body]),
+                Kind::Link { tree, link } => BodyConfiguration::Pose(frame.links[tree][link] * part.offset),
                 Kind::Static => return None,
             };
             Some((part.name.as_str(), state))

@@ -19,19 +19,19 @@ use crate::policy::wire::unpack;
 /// The longest message that is taken: a state of 50,000 actions is 2.7 MiB.
 pub(super) const LARGEST: usize = 4 << 20;
 /// Between two looks at the clock and at the wish to end.
-pub(super) const SLICE: Duration = Duration::from_millis(50);
+pub(super) const POLL_INTERVAL: Duration = Duration::from_millis(50);
 /// How long a client may take to say what it wants when it comes.
-pub(super) const GREETING: Duration = Duration::from_secs(10);
+pub(super) const HANDSHAKE_TIMEOUT: Duration = Duration::from_secs(10);
 /// How long it may take to take an answer: somebody may have stopped it for a while.
-const PATIENCE: Duration = Duration::from_secs(60);
+const WRITE_TIMEOUT: Duration = Duration::from_secs(60);
 /// How long what a client still sends is listened to after the end, so that it hears what was said last.
-const FAREWELL: Duration = Duration::from_secs(3);
+const CLOSE_DRAIN_TIMEOUT: Duration = Duration::from_secs(3);
 /// Silence after which a client is asked whether it is there: to a machine that is gone that fails in the end.
-const QUIET: Duration = Duration::from_secs(60);
+const PING_INTERVAL: Duration = Duration::from_secs(60);
 
 /// What came from a client.
 #[derive(Debug)]
-pub(super) enum Heard {
+pub(super) enum Incoming {
     /// A message.
     Message(Value),
     /// Something that is none; a message for people.
@@ -44,12 +44,12 @@ pub(super) enum Heard {
 
 /// A connection to a client.
 #[derive(Debug)]
-pub(super) struct Link<'a> {
+pub(super) struct Connection<'a> {
     socket: WebSocket<TcpStream>,
     stop: &'a AtomicBool,
 }
 
-impl<'a> Link<'a> {
+impl<'a> Connection<'a> {
     /// Shakes hands, unless `full` says why there is no room.
     ///
     /// # Errors
@@ -70,7 +70,7 @@ impl<'a> Link<'a> {
                 Err(refusal)
             }
         };
-        let deadline = Instant::now() + GREETING;
+        let deadline = Instant::now() + HANDSHAKE_TIMEOUT;
         let mut shake = accept_hdr_with_config(stream, callback, Some(config));
         loop {
             match shake {
@@ -85,37 +85,37 @@ impl<'a> Link<'a> {
     }
 
     /// The next message. An end of the run counts as the end of the connection.
-    pub(super) fn hear(&mut self) -> Heard {
+    pub(super) fn hear(&mut self) -> Incoming {
         let mut quiet_since = Instant::now();
         loop {
             match self.socket.read() {
                 Ok(Message::Binary(bytes)) => {
                     return unpack(&bytes).map_or_else(
-                        |what| Heard::Nonsense(format!("the message is {what}")),
-                        Heard::Message,
+                        |what| Incoming::Nonsense(format!("the message is {what}")),
+                        Incoming::Message,
                     );
                 }
                 Ok(Message::Text(_)) => {
-                    return Heard::Nonsense("the message is a text frame; expected msgpack".to_owned());
+                    return Incoming::Nonsense("the message is a text frame; expected msgpack".to_owned());
                 }
                 Ok(Message::Close(_)) => {
                     let _ = self.socket.flush();
-                    return Heard::Closed;
+                    return Incoming::Closed;
                 }
                 Ok(_) => quiet_since = Instant::now(),
                 Err(Error::Io(error)) if is_wait(&error) => {
                     if is_set(self.stop) {
-                        return Heard::Closed;
+                        return Incoming::Closed;
                     }
-                    if quiet_since.elapsed() > QUIET {
+                    if quiet_since.elapsed() > PING_INTERVAL {
                         quiet_since = Instant::now();
                         let _ = self.socket.send(Message::Ping(Vec::new().into()));
                     }
                 }
                 Err(Error::Capacity(_)) => {
-                    return Heard::Lost(format!("the message is longer than {} MiB", LARGEST >> 20));
+                    return Incoming::Lost(format!("the message is longer than {} MiB", LARGEST >> 20));
                 }
-                Err(_) => return Heard::Closed,
+                Err(_) => return Incoming::Closed,
             }
         }
     }
@@ -127,7 +127,7 @@ impl<'a> Link<'a> {
     pub(super) fn say(&mut self, value: &Value) -> Result<(), Error> {
         let mut bytes = Vec::new();
         rmpv::encode::write_value(&mut bytes, value).map_err(io::Error::from)?;
-        let deadline = Instant::now() + PATIENCE;
+        let deadline = Instant::now() + WRITE_TIMEOUT;
         let mut sent = self.socket.send(Message::binary(bytes));
         while let Err(Error::Io(error)) = &sent
             && is_wait(error)
@@ -144,7 +144,7 @@ impl<'a> Link<'a> {
         let code = if is_set(self.stop) { CloseCode::Away } else { CloseCode::Normal };
         let _ = self.socket.close(Some(CloseFrame { code, reason: "".into() }));
         // What has not been read yet would make the system throw away what was said last.
-        let (deadline, stream) = (Instant::now() + FAREWELL, self.socket.get_mut());
+        let (deadline, stream) = (Instant::now() + CLOSE_DRAIN_TIMEOUT, self.socket.get_mut());
         let mut rest = vec![0; 1 << 16];
         while Instant::now() < deadline && !is_set(self.stop) {
             match stream.read(&mut rest) {

@@ -8,7 +8,7 @@ use crate::{
 
 /// Which episode a client wants.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Wanted {
+pub struct EpisodeId {
     /// Name of the suite.
     pub suite: String,
     /// Index of the task in it.
@@ -23,7 +23,7 @@ pub struct Wanted {
 
 /// A suite that is served.
 #[derive(Clone, Debug)]
-pub struct Offered<'a> {
+pub struct ServedSuite<'a> {
     /// Its name, as in results.
     pub name: String,
     /// The suite.
@@ -34,12 +34,12 @@ pub struct Offered<'a> {
 ///
 /// # Errors
 /// Why it cannot be made; a message for people.
-pub(super) type Open<'a> = Box<dyn Fn(&Wanted) -> Result<Episode, String> + Sync + 'a>;
+pub(super) type Open<'a> = Box<dyn Fn(&EpisodeId) -> Result<Episode, String> + Sync + 'a>;
 
 /// All that a server offers.
-pub struct Offer<'a> {
+pub struct ServerConfig<'a> {
     /// The suites, the first of which is meant where a client names none.
-    pub suites: Vec<Offered<'a>>,
+    pub suites: Vec<ServedSuite<'a>>,
     /// What clients see and what their numbers mean.
     pub profile: Profile,
     /// Whether clients are told the true state too.
@@ -54,12 +54,12 @@ pub struct Offer<'a> {
     pub open: Open<'a>,
 }
 
-impl Offer<'_> {
+impl ServerConfig<'_> {
     /// A suite by name; the first if none is named.
     ///
     /// # Errors
     /// There is none of that name; a fragment for people.
-    pub fn suite(&self, name: Option<&str>) -> Result<&Offered<'_>, String> {
+    pub fn suite(&self, name: Option<&str>) -> Result<&ServedSuite<'_>, String> {
         let found = match name {
             None => self.suites.first(),
             Some(name) => self.suites.iter().find(|suite| suite.name == name),
@@ -72,8 +72,8 @@ impl Offer<'_> {
     ///
     /// # Errors
     /// There is none of that index; a fragment for people.
-    pub fn task(&self, wanted: &Wanted) -> Result<&Task, String> {
-        let Offered { suite, name } = self.suite(Some(&wanted.suite))?;
+    pub fn task(&self, wanted: &EpisodeId) -> Result<&Task, String> {
+        let ServedSuite { suite, name } = self.suite(Some(&wanted.suite))?;
         let found = suite.tasks.iter().find(|task| task.id == wanted.task);
         found.ok_or_else(|| {
             let last = suite.tasks.len().saturating_sub(1);

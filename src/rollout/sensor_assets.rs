@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{made::Made, senses::SenseError};
+use super::{sensors::SensingError, shared_cache::SharedCache};
 use crate::{
     geometry::voxel::VoxelMesh,
     scene::Asset,
@@ -15,14 +15,14 @@ use crate::{
 
 /// Shared by all episodes of a run; what was not used for long is forgotten and made again when it is asked for.
 #[derive(Clone, Debug, Default)]
-pub struct Looks {
-    models: Made<Arc<Asset>, Arc<Model>>,
-    skins: Made<Arc<Asset>, Arc<Skin>>,
-    sensors: Made<TactileSpec, Arc<Sensor>>,
-    robot: Made<(), Arc<RobotModel>>,
+pub struct SensorAssets {
+    models: SharedCache<Arc<Asset>, Arc<Model>>,
+    skins: SharedCache<Arc<Asset>, Arc<Skin>>,
+    sensors: SharedCache<TactileSpec, Arc<Sensor>>,
+    robot: SharedCache<(), Arc<RobotModel>>,
 }
 
-impl Looks {
+impl SensorAssets {
     /// The drawn form of an asset; `mesh` is that of its soft body.
     pub(super) fn model(
         &self,
@@ -46,16 +46,15 @@ impl Looks {
         name: &str,
         asset: &Arc<Asset>,
         mesh: Option<&VoxelMesh>,
-    ) -> Result<Arc<Skin>, SenseError> {
+    ) -> Result<Arc<Skin>, SensingError> {
         self.skins.get(
             asset,
             |known| alike(known, asset),
             || {
                 let skin = match mesh {
                     None => Skin::of_shape(&asset.shape),
-                    Some(mesh) => {
-                        Skin::of_soft(&asset.shape, mesh).ok_or_else(|| SenseError::Skin(name.to_owned()))?
-                    }
+                    Some(mesh) => Skin::of_soft(&asset.shape, mesh)
+                        .ok_or_else(|| SensingError::Skin(name.to_owned()))?,
                 };
                 Ok(Arc::new(skin))
             },
@@ -68,7 +67,7 @@ impl Looks {
     }
 
     /// The tactile sensor of these numbers.
-    pub(super) fn sensor(&self, spec: &TactileSpec) -> Result<Arc<Sensor>, SenseError> {
+    pub(super) fn sensor(&self, spec: &TactileSpec) -> Result<Arc<Sensor>, SensingError> {
         self.sensors.get(spec, |known| known == spec, || Ok(Arc::new(Sensor::new(spec)?)))
     }
 }

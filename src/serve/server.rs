@@ -12,17 +12,17 @@ use std::{
 use rmpv::Value;
 
 use super::{
-    answer,
-    link::{GREETING, Heard, Link, SLICE, is_wait},
-    offer::Offer,
+    catalog::ServerConfig,
+    connection::{Connection, HANDSHAKE_TIMEOUT, Incoming, POLL_INTERVAL, is_wait},
     request::Request,
+    response,
     session::Session,
 };
 
 /// Between two looks whether somebody stands at the door.
-const LOOK: Duration = Duration::from_millis(10);
+const ACCEPT_POLL_INTERVAL: Duration = Duration::from_millis(10);
 /// Connections beyond the seats, of which nobody knows yet what they want.
-const WAITING: usize = 16;
+const BACKLOG: usize = 16;
 /// What is asked to learn whether the server is there, and what it says.
 const HEALTH: &[u8] = b"GET /healthz";
 const HEALTHY: &[u8] =
@@ -30,11 +30,11 @@ const HEALTHY: &[u8] =
 
 /// An address where clients are heard.
 #[derive(Debug)]
-pub struct Door {
+pub struct Server {
     listener: TcpListener,
 }
 
-impl Door {
+impl Server {
     /// Takes an address; port 0 is any that is free.
     ///
     /// # Errors
@@ -55,8 +55,8 @@ impl Door {
 }
 
 /// What all visitors share.
-struct House<'a> {
-    offer: &'a Offer<'a>,
+struct ServerState<'a> {
+    offer: &'a ServerConfig<'a>,
     hello: Value,
     seats: usize,
     seated: AtomicUsize,
@@ -64,17 +64,17 @@ struct House<'a> {
 }
 
 /// Serves `seats` clients at once until `stop` is set; `hello` is what each is told first.
-pub fn serve(door: &Door, offer: &Offer, hello: Value, seats: usize, stop: &AtomicBool) {
-    let house = House { offer, hello, seats, seated: AtomicUsize::new(0), stop };
+pub fn serve(door: &Server, offer: &ServerConfig, hello: Value, seats: usize, stop: &AtomicBool) {
+    let house = ServerState { offer, hello, seats, seated: AtomicUsize::new(0), stop };
     let inside = AtomicUsize::new(0);
     thread::scope(|scope| {
         while !stop.load(Ordering::Relaxed) {
             // Whoever was at the door may be gone again, and the system may be short of handles: both pass.
             let Ok((stream, _)) = door.listener.accept() else {
-                thread::sleep(LOOK);
+                thread::sleep(ACCEPT_POLL_INTERVAL);
                 continue;
             };
-            let Some(counted) = Counted::one_of(&inside, seats + WAITING) else { continue };
+            let Some(counted) = SlotGuard::one_of(&inside, seats + BACKLOG) else { continue };
             let house = &house;
             let visit = move || {
                 let _counted = counted;
@@ -87,28 +87,28 @@ pub fn serve(door: &Door, offer: &Offer, hello: Value, seats: usize, stop: &Atom
 }
 
 /// One of those that are counted, until it goes.
-struct Counted<'a>(&'a AtomicUsize);
+struct SlotGuard<'a>(&'a AtomicUsize);
 
-impl<'a> Counted<'a> {
+impl<'a> SlotGuard<'a> {
     fn one_of(count: &'a AtomicUsize, most: usize) -> Option<Self> {
         let taken = count.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| (n < most).then_some(n + 1));
         taken.is_ok().then_some(Self(count))
     }
 }
 
-impl Drop for Counted<'_> {
+impl Drop for SlotGuard<'_> {
     fn drop(&mut self) {
         self.0.fetch_sub(1, Ordering::Relaxed);
     }
 }
 
 /// Everything between a connection's beginning and its end. What goes wrong with it is its own.
-fn visit(stream: TcpStream, house: &House) {
+fn visit(stream: TcpStream, house: &ServerState) {
     let prepared = stream
         .set_nonblocking(false)
         .and_then(|()| stream.set_nodelay(true))
-        .and_then(|()| stream.set_read_timeout(Some(SLICE)))
-        .and_then(|()| stream.set_write_timeout(Some(SLICE)));
+        .and_then(|()| stream.set_read_timeout(Some(POLL_INTERVAL)))
+        .and_then(|()| stream.set_write_timeout(Some(POLL_INTERVAL)));
     if prepared.is_err() {
         return;
     }
@@ -119,18 +119,18 @@ fn visit(stream: TcpStream, house: &House) {
     }
     let mut seat = None;
     let full = || {
-        seat = Counted::one_of(&house.seated, house.seats);
+        seat = SlotGuard::one_of(&house.seated, house.seats);
         let why = || format!("the server has {} clients, and no seat is free (--threads)\n", house.seats);
         seat.is_none().then(why)
     };
-    if let Ok(link) = Link::accept(stream, house.stop, full) {
+    if let Ok(link) = Connection::accept(stream, house.stop, full) {
         converse(link, house);
     }
 }
 
 /// Whether a connection begins with a question after health; `None` if nothing comes.
 fn asks_for_health(stream: &TcpStream, stop: &AtomicBool) -> Option<bool> {
-    let deadline = Instant::now() + GREETING;
+    let deadline = Instant::now() + HANDSHAKE_TIMEOUT;
     let mut begun = [0; HEALTH.len() + 1];
     while Instant::now() < deadline && !stop.load(Ordering::Relaxed) {
         match stream.peek(&mut begun) {
@@ -140,7 +140,7 @@ fn asks_for_health(stream: &TcpStream, stop: &AtomicBool) -> Option<bool> {
             }
             // Another beginning is no question after health however it goes on.
             Ok(count) if !HEALTH.starts_with(&begun[..count.min(HEALTH.len())]) => return Some(false),
-            Ok(_) => thread::sleep(LOOK),
+            Ok(_) => thread::sleep(ACCEPT_POLL_INTERVAL),
             Err(error) if is_wait(&error) => {}
             Err(_) => return None,
         }
@@ -157,17 +157,17 @@ fn say_healthy(mut stream: TcpStream) {
 }
 
 /// Answers one message after another.
-fn converse(mut link: Link, house: &House) {
+fn converse(mut link: Connection, house: &ServerState) {
     if link.say(&house.hello).is_err() {
         return;
     }
     let mut session = Session::new(house.offer, house.stop);
     loop {
         let (answer, last) = match link.hear() {
-            Heard::Closed => return link.close(),
-            Heard::Lost(why) => (answer::error(&why), true),
-            Heard::Nonsense(why) => (answer::error(&why), false),
-            Heard::Message(message) => respond(&mut session, house.offer, &message),
+            Incoming::Closed => return link.close(),
+            Incoming::Lost(why) => (response::error(&why), true),
+            Incoming::Nonsense(why) => (response::error(&why), false),
+            Incoming::Message(message) => respond(&mut session, house.offer, &message),
         };
         if link.say(&answer).is_err() {
             return;
@@ -179,18 +179,18 @@ fn converse(mut link: Link, house: &House) {
 }
 
 /// The answer to a message, and whether it is the last.
-fn respond(session: &mut Session, offer: &Offer, message: &Value) -> (Value, bool) {
+fn respond(session: &mut Session, offer: &ServerConfig, message: &Value) -> (Value, bool) {
     let request = match Request::read(message, offer) {
         Ok(request) => request,
-        Err(why) => return (answer::error(&why), false),
+        Err(why) => return (response::error(&why), false),
     };
     let last = request == Request::Close;
     match catch_unwind(AssertUnwindSafe(|| session.answer(request))) {
         Ok(Ok(answer)) => (answer, last),
-        Ok(Err(why)) => (answer::error(&why), false),
+        Ok(Err(why)) => (response::error(&why), false),
         Err(_) => {
             session.forget();
-            (answer::error("internal error of the server; the episode is lost: reset"), false)
+            (response::error("internal error of the server; the episode is lost: reset"), false)
         }
     }
 }
