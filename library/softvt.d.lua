@@ -116,7 +116,7 @@
 ---@class softvt.Profile
 ---@field name string Its name in results, unless --name says otherwise.
 ---@field inputs softvt.Input[] What is sent, in order.
----@field actions softvt.ActionCode How replies are read.
+---@field actions softvt.ActionEncoding How replies are read.
 
 ---How a scene is laid out. Tasks with the same layout name share their initial states.
 ---@class softvt.Layout
@@ -297,17 +297,17 @@
 ---@field finger? "left"|"right" With tactile: which.
 
 ---How the numbers of an action are read: three of position, three of orientation (axis-angle), one of the gripper; more are padding.
----@class softvt.ActionCode
+---@class softvt.ActionEncoding
 ---@field pose "absolute"|"delta"|"delta_osc" absolute: a pose in the base frame. delta: shares -1 to 1 of a step away from where the tool is. delta_osc: the same, as far as robosuite's controller gets within a control step.
 ---@field translation_m? number With delta and delta_osc: the step that 1 means, m. Expects a number in above 0..10.
 ---@field rotation_rad? number With delta and delta_osc: the turn that 1 means, rad. Expects a number in above 0..10.
 ---@field scale? number[] The first six numbers are multiplied by these first. Expects a list of 6 numbers.
 ---@field offset? number[] Then these are added. Expects a list of 6 numbers.
 ---@field length? integer How many numbers an action must have, padding included; any from 7 on if left out. Expects a whole number in 7..4096.
----@field gripper softvt.GripperCode The seventh number.
+---@field gripper softvt.GripperEncoding The seventh number.
 
 ---The seventh number of an action: one value opens, one shuts, those between in proportion.
----@class softvt.GripperCode
+---@class softvt.GripperEncoding
 ---@field open number The value that opens. Expects a number.
 ---@field shut number The value that shuts. Expects a number.
 ---@field binary? boolean Whether all beyond the middle shuts and all else opens. Default false.

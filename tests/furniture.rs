@@ -106,7 +106,7 @@ fn a_bowl_rests_on_the_floor_of_an_open_drawer_and_all_of_it_falls_asleep() {
     assert!((sim.joint(drawer).expect("a joint") - 0.12).abs() < 1e-5);
     let bowl = object(&sim, "bowl");
     let weight = 9.81 * sim.world.rigid[0].body.mass;
-    let carried = sim.touch(bowl, Partner::Collider(drawer.colliders[0])).force_w.z;
+    let carried = sim.contact(bowl, Partner::Collider(drawer.colliders[0])).force_w.z;
     assert!((carried / weight - 1.0).abs() < 0.01, "the drawer carries {carried} of {weight} N");
     let (cabinet, stove) = (link(&sim, "cabinet.top_drawer").0, link(&sim, "stove.knob").0);
     assert!(sim.world.rigid[0].asleep, "the bowl");
