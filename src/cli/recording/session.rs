@@ -30,7 +30,7 @@ use crate::{
     },
     evaluation::record::{EpisodeRecord, Origin},
     files,
-    policy::{ChunkedPolicy, recorded::Recorded},
+    policy::{ChunkedPolicy, recorded::RecordedPolicy},
     report::{
         actions,
         run_folder::{RunFolder, SUMMARY},
