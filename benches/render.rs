@@ -15,7 +15,7 @@ use softvt::{
     rollout::{AssetCache, Controller, Episode, SensorAssets, StateRecording},
     scene::Camera,
     script::Loaded,
-    sensing::camera::{Scratch, render},
+    sensing::camera::Renderer,
 };
 
 /// Runs of which the fastest counts, and pictures of a run: the states that are drawn in turn.
@@ -35,7 +35,7 @@ fn chosen(film: &StateRecording) -> Vec<Frame> {
     (0..PICTURES).map(|i| film.frames[i * last / (PICTURES - 1)].clone()).collect()
 }
 
-fn report(film: &mut StateRecording, name: &str, goal_ms: f64, camera: &Camera, mut scratch: Scratch) {
+fn report(film: &mut StateRecording, name: &str, goal_ms: f64, camera: &Camera, mut scratch: Renderer) {
     let chosen_words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
     let png = std::env::args().any(|word| word == "--png");
     if !(png || chosen_words.is_empty() || chosen_words.iter().any(|word| name.contains(word.as_str()))) {
@@ -46,7 +46,7 @@ fn report(film: &mut StateRecording, name: &str, goal_ms: f64, camera: &Camera, 
     let stage = film.sensors.render_scene().expect("everything can be drawn");
     let mut shoot = |picture: usize| {
         let start = ThreadTime::now();
-        render(stage, &views[picture], camera, &mut scratch).expect("the camera is good");
+        scratch.render(stage, &views[picture], camera).expect("the camera is good");
         1e3 * start.elapsed().as_secs_f64()
     };
     let first = shoot(0);
@@ -68,12 +68,12 @@ fn main() {
     let large = third.clone().with_edge(1024);
     println!("CPU milliseconds a picture, one thread");
     println!("{:<28} {:>6} {:>9}   {:<5} {:>8}", "picture", "goal", "measured", "met", "first");
-    report(&mut set, "third person 224, cached", 3.0, &third, Scratch::default());
-    report(&mut set, "third person 224, uncached", 4.0, &third, Scratch::uncached());
-    report(&mut set, "wrist 224", 4.0, &wrist, Scratch::default());
-    report(&mut set, "third person 1024, cached", 25.0, &large, Scratch::default());
-    report(&mut set, "third person 1024, uncached", 60.0, &large, Scratch::uncached());
-    report(&mut set, "wrist 512", 20.0, &wrist.clone().with_edge(512), Scratch::default());
+    report(&mut set, "third person 224, cached", 3.0, &third, Renderer::default());
+    report(&mut set, "third person 224, uncached", 4.0, &third, Renderer::without_cache());
+    report(&mut set, "wrist 224", 4.0, &wrist, Renderer::default());
+    report(&mut set, "third person 1024, cached", 25.0, &large, Renderer::default());
+    report(&mut set, "third person 1024, uncached", 60.0, &large, Renderer::without_cache());
+    report(&mut set, "wrist 512", 20.0, &wrist.clone().with_edge(512), Renderer::default());
     let Some(folder) = folder else { return };
     for task in [0, 2, 4, 6, 8] {
         let mut set = film(&loaded, task);
@@ -82,7 +82,7 @@ fn main() {
             let camera = camera.clone().with_edge(edge);
             let picture = set.sensors.render(&middle, &camera).expect("a picture");
             let path = folder.join(format!("{task}_{}_{edge}.png", camera.name));
-            picture.into_image().save(&path).expect("the folder can be written");
+            picture.into_rgb_image().save(&path).expect("the folder can be written");
         }
     }
 }

@@ -12,8 +12,8 @@ use crate::{
     evaluation::record::{EpisodeRecord, Identity},
     report::{
         actions,
-        film::{self, Caption, FilmError},
         interchange::{self, DebugFrame, DebugShape},
+        video::{self, Caption, FilmError},
     },
     rollout::{FinishedEpisode, ScoreFrame, cancel},
 };
@@ -57,9 +57,9 @@ impl<'a> SideFiles<'a> {
             wanted.push(self.trace_path(id));
         }
         if self.shows(record) {
-            wanted.push(film::video_path(self.dir, id.task, id.episode));
+            wanted.push(video::video_path(self.dir, id.task, id.episode));
             if !record.verdict.safety {
-                wanted.push(film::still_path(self.dir, id.task, id.episode));
+                wanted.push(video::still_path(self.dir, id.task, id.episode));
             }
         }
         wanted.retain(|path| !path.is_file());
@@ -89,13 +89,14 @@ impl<'a> SideFiles<'a> {
             return Ok(());
         }
         let (id, caption) = (&record.identity, Caption::of(record));
-        let path = film::video_path(self.dir, id.task, id.episode);
+        let path = video::video_path(self.dir, id.task, id.episode);
         make_folder(path.parent().unwrap_or(self.dir))?;
         if !record.verdict.safety {
-            let (worst, still) = (film::worst_moment(&film), film::still_path(self.dir, id.task, id.episode));
-            film::write_panels(&mut film, &caption, worst, &still).map_err(film_failure)?;
+            let (worst, still) =
+                (video::worst_moment(&film), video::still_path(self.dir, id.task, id.episode));
+            video::write_panels(&mut film, &caption, worst, &still).map_err(film_failure)?;
         }
-        film::write_video(&mut film, &caption, &path, cancel::requested).map_err(film_failure)
+        video::write_video(&mut film, &caption, &path, cancel::requested).map_err(film_failure)
     }
 
     fn trace_path(&self, id: &Identity) -> PathBuf {

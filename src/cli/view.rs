@@ -5,7 +5,7 @@ use super::{
 };
 use crate::{
     benchmark::Plan,
-    report::film::{Caption, worst_moment, write_panels, write_stills, write_video},
+    report::video::{Caption, worst_moment, write_panels, write_stills, write_video},
     rollout::cancel,
     script,
 };

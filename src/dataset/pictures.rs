@@ -49,8 +49,8 @@ impl<'a> Easel<'a> {
     pub fn draw(&mut self, step: usize) -> Result<Option<Scenery>, DatasetError> {
         let Some(frame) = self.film.frames.get(step) else { return Ok(None) };
         let senses = &mut self.film.sensors;
-        let third = senses.render(frame, &self.cameras[0])?.into_image();
-        let wrist = senses.render(frame, &self.cameras[1])?.into_image();
+        let third = senses.render(frame, &self.cameras[0])?.into_rgb_image();
+        let wrist = senses.render(frame, &self.cameras[1])?.into_rgb_image();
         let touched = senses.tactile_readings(frame)?;
         let [left, right] = [0, 1].map(|side: usize| touched[side].with_markers(MarkerStyle::Dots));
         let [bare_left, bare_right] = [0, 1].map(|side: usize| touched[side].picture.clone());

@@ -333,7 +333,7 @@ impl Episode {
         let mut camera = self.sensors.camera(camera)?.clone();
         camera.width = size[0].unwrap_or(camera.width);
         camera.height = size[1].unwrap_or(camera.height);
-        Ok(self.sensors.render(&SensorSuite::frame(&self.sim), &camera)?.into_image())
+        Ok(self.sensors.render(&SensorSuite::frame(&self.sim), &camera)?.into_rgb_image())
     }
 
     /// What a finger's sensor sees now, for onlookers too.

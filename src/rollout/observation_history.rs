@@ -40,7 +40,7 @@ impl Recent {
             let camera = sensors.camera(name)?.clone();
             let picture = sensors.render(frame, &camera)?;
             inside |= picture.inside.is_some();
-            cameras.push(CameraImage { name: camera.name, image: picture.into_image() });
+            cameras.push(CameraImage { name: camera.name, image: picture.into_rgb_image() });
         }
         self.inside += u32::from(inside);
         let forces = streams.force.then(|| SensorSuite::pad_forces(frame));

@@ -7,8 +7,8 @@ use crate::{
     geometry::voxel::VoxelMesh,
     scene::Asset,
     sensing::{
-        camera::{CameraError, Model},
-        panda::RobotModel,
+        camera::{CameraError, RenderMesh},
+        panda::RobotMeshes,
         tactile::{Sensor, Skin, TactileSpec},
     },
 };
@@ -16,10 +16,10 @@ use crate::{
 /// Shared by all episodes of a run; what was not used for long is forgotten and made again when it is asked for.
 #[derive(Clone, Debug, Default)]
 pub struct SensorAssets {
-    models: SharedCache<Arc<Asset>, Arc<Model>>,
+    models: SharedCache<Arc<Asset>, Arc<RenderMesh>>,
     skins: SharedCache<Arc<Asset>, Arc<Skin>>,
     sensors: SharedCache<TactileSpec, Arc<Sensor>>,
-    robot: SharedCache<(), Arc<RobotModel>>,
+    robot: SharedCache<(), Arc<RobotMeshes>>,
 }
 
 impl SensorAssets {
@@ -29,12 +29,14 @@ impl SensorAssets {
         name: &str,
         asset: &Arc<Asset>,
         mesh: Option<&VoxelMesh>,
-    ) -> Result<Arc<Model>, CameraError> {
+    ) -> Result<Arc<RenderMesh>, CameraError> {
         let same = |known: &Arc<Asset>| alike(known, asset) && known.visuals == asset.visuals;
         self.models.get(asset, same, || {
             let model = match mesh {
-                None => Model::of_shape(name, &asset.shape, &asset.visuals)?,
-                Some(mesh) => Model::of_skin(name, &asset.shape, &asset.visuals)?.embedded(name, mesh)?,
+                None => RenderMesh::of_shape(name, &asset.shape, &asset.visuals)?,
+                Some(mesh) => {
+                    RenderMesh::of_skin(name, &asset.shape, &asset.visuals)?.embedded(name, mesh)?
+                }
             };
             Ok(Arc::new(model))
         })
@@ -62,8 +64,8 @@ impl SensorAssets {
     }
 
     /// The drawn form of the robot.
-    pub(super) fn robot(&self) -> Result<Arc<RobotModel>, CameraError> {
-        self.robot.get(&(), |()| true, || Ok(Arc::new(RobotModel::new()?)))
+    pub(super) fn robot(&self) -> Result<Arc<RobotMeshes>, CameraError> {
+        self.robot.get(&(), |()| true, || Ok(Arc::new(RobotMeshes::new()?)))
     }
 
     /// The tactile sensor of these numbers.

@@ -10,7 +10,7 @@ use crate::{
     policy::SensorStreams,
     scene::{Camera, CameraMount, Scene},
     sensing::{
-        camera::{CameraError, Scratch, check_cameras, check_light, render},
+        camera::{CameraError, Renderer, check_cameras, check_light},
         tactile::{OpticsModel, TactileSpec},
     },
 };
@@ -101,7 +101,7 @@ impl SensorSuite {
                 Some(name) => Some(name.to_owned()),
                 None => {
                     let picture =
-                        render(&robot, &view, &camera.clone().with_edge(TRIAL_EDGE), &mut Scratch::default());
+                        Renderer::default().render(&robot, &view, &camera.clone().with_edge(TRIAL_EDGE));
                     picture.map_err(|error| SensingError::from(error).set_by(camera))?.inside
                 }
             };

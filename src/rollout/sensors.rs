@@ -18,7 +18,7 @@ use crate::{
     robot::{RobotSpec, Side, pads, panda},
     scene::{Asset, Body, Camera, Scene},
     sensing::{
-        camera::{self, CameraError, FrameView, Mount, Picture, Stage, Thing},
+        camera::{self, Attachment, CameraError, FrameView, RenderObject, RenderScene, RenderedImage},
         tactile::{
             self, FieldError, Give, PadInput, PadLoad, SensorError, Skin, Surface, TactileSpec, Taxels,
             Touched,
@@ -103,8 +103,8 @@ pub struct SensorSuite {
     pub(super) tree: usize,
     pub(super) parts: Vec<Part>,
     assets: SensorAssets,
-    stage: Option<Arc<Stage>>,
-    eye: camera::Scratch,
+    stage: Option<Arc<RenderScene>>,
+    eye: camera::Renderer,
     touch: tactile::Scratch,
 }
 
@@ -119,7 +119,7 @@ impl Clone for SensorSuite {
             parts: self.parts.clone(),
             assets: self.assets.clone(),
             stage: self.stage.clone(),
-            eye: camera::Scratch::default(),
+            eye: camera::Renderer::default(),
             touch: tactile::Scratch::default(),
         }
     }
@@ -154,7 +154,7 @@ impl SensorSuite {
             parts: sim.objects.iter().map(part).collect(),
             assets: assets.clone(),
             stage: None,
-            eye: camera::Scratch::default(),
+            eye: camera::Renderer::default(),
             touch: tactile::Scratch::default(),
         }
     }
@@ -185,12 +185,12 @@ impl SensorSuite {
     ///
     /// # Errors
     /// A number of the camera or light out of range, a thing that cannot be drawn.
-    pub fn render(&mut self, frame: &Frame, camera: &Camera) -> Result<Picture, SensingError> {
+    pub fn render(&mut self, frame: &Frame, camera: &Camera) -> Result<RenderedImage, SensingError> {
         let stage = match self.stage.take() {
             Some(stage) => stage,
             None => Arc::new(self.build()?),
         };
-        let picture = camera::render(&stage, &self.view(frame), camera, &mut self.eye);
+        let picture = self.eye.render(&stage, &self.view(frame), camera);
         self.stage = Some(stage);
         picture.map_err(|error| SensingError::from(error).set_by(camera))
     }
@@ -199,7 +199,7 @@ impl SensorSuite {
     ///
     /// # Errors
     /// A thing that cannot be drawn, a number of the light out of range.
-    pub fn render_scene(&mut self) -> Result<&Stage, SensingError> {
+    pub fn render_scene(&mut self) -> Result<&RenderScene, SensingError> {
         let stage = match self.stage.take() {
             Some(stage) => stage,
             None => Arc::new(self.build()?),
@@ -207,14 +207,14 @@ impl SensorSuite {
         Ok(self.stage.insert(stage))
     }
 
-    fn build(&self) -> Result<Stage, CameraError> {
-        Stage::new(self.things()?, self.scene.lighting.clone())
+    fn build(&self) -> Result<RenderScene, CameraError> {
+        RenderScene::new(self.things()?, self.scene.lighting.clone())
     }
 
     /// The robot with nothing around it.
-    pub(super) fn robot_alone(&self) -> Result<Stage, CameraError> {
-        let things = self.assets.robot()?.things(self.tree, self.scene.base_w, ROBOT);
-        Stage::new(things.into_iter().collect(), self.scene.lighting.clone())
+    pub(super) fn robot_alone(&self) -> Result<RenderScene, CameraError> {
+        let things = self.assets.robot()?.objects(self.tree, self.scene.base_w, ROBOT);
+        RenderScene::new(things.into_iter().collect(), self.scene.lighting.clone())
     }
 
     /// The object that a point of the world is inside of where the objects start.
@@ -228,14 +228,18 @@ impl SensorSuite {
     /// What pictures need of a state.
     pub fn view<'a>(&self, frame: &'a Frame) -> FrameView<'a> {
         let hand_w = frame.links[self.tree][panda::HAND_LINK] * panda::hand_in_link();
-        FrameView::of(frame, Some(hand_w))
+        FrameView::new(frame, Some(hand_w))
     }
 
     /// The same for a camera where somebody put it, before anything has moved.
     ///
     /// # Errors
     /// As [`SensorSuite::render`]; also if the camera stands inside of something.
-    pub fn render_unobstructed(&mut self, frame: &Frame, camera: &Camera) -> Result<Picture, SensingError> {
+    pub fn render_unobstructed(
+        &mut self,
+        frame: &Frame,
+        camera: &Camera,
+    ) -> Result<RenderedImage, SensingError> {
         let picture = self.render(frame, camera)?;
         match &picture.inside {
             None => Ok(picture),
@@ -319,25 +323,26 @@ impl SensorSuite {
     }
 
     /// Everything that is drawn.
-    fn things(&self) -> Result<Vec<Thing>, CameraError> {
+    fn things(&self) -> Result<Vec<RenderObject>, CameraError> {
         let draw = |(index, part): (usize, &Part)| {
-            let mesh = part.rest.as_ref().map(|rest| &rest.mesh);
-            let mount = match part.kind {
-                Kind::Soft(body) => Mount::Soft(body),
-                Kind::Rigid(body) => Mount::Rigid(body),
-                Kind::Link { tree, link } => Mount::Link { tree, link, offset: part.offset },
-                Kind::Static => Mount::Fixed(part.start_w),
+            let voxels = part.rest.as_ref().map(|rest| &rest.mesh);
+            let attachment = match part.kind {
+                Kind::Soft(body) => Attachment::Soft(body),
+                Kind::Rigid(body) => Attachment::Rigid(body),
+                Kind::Link { tree, link } => Attachment::Link { tree, link, offset: part.offset },
+                Kind::Static => Attachment::Fixed(part.start_w),
             };
-            Ok(Thing {
+            Ok(RenderObject {
                 name: part.name.clone(),
-                object: index as u16 + 1,
-                model: self.assets.model(&part.name, &part.asset, mesh)?,
-                mount,
+                segmentation_id: index as u16 + 1,
+                mesh: self.assets.model(&part.name, &part.asset, voxels)?,
+                attachment,
                 casts_shadow: true,
             })
         };
-        let mut things: Vec<Thing> = self.parts.iter().enumerate().map(draw).collect::<Result<_, _>>()?;
-        things.extend(self.assets.robot()?.things(self.tree, self.scene.base_w, ROBOT));
+        let mut things: Vec<RenderObject> =
+            self.parts.iter().enumerate().map(draw).collect::<Result<_, _>>()?;
+        things.extend(self.assets.robot()?.objects(self.tree, self.scene.base_w, ROBOT));
         Ok(things)
     }
 }

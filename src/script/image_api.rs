@@ -17,7 +17,7 @@ use super::{
     sandbox::{fail, locked},
     schema,
 };
-use crate::{report::film::Canvas, sensing::scaling::scaled};
+use crate::{report::video::Canvas, sensing::scaling::scaled};
 
 /// Longest text that is written on a picture, bytes.
 const MOST_TEXT: usize = 1000;

@@ -275,7 +275,7 @@ impl LuaSimulation {
         } else {
             senses.render(&frame, &camera)
         };
-        LuaImage::new(lua, seen.map_err(wrong)?.into_image())
+        LuaImage::new(lua, seen.map_err(wrong)?.into_rgb_image())
     }
 
     /// What a finger feels.

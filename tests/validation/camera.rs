@@ -5,25 +5,27 @@ use std::sync::Arc;
 use softvt::{
     geometry::{Pose, Quat, Vec3, shape::Shape},
     scene::{Camera, Layer, Lighting, Mask, Visual},
-    sensing::camera::{FrameView, Model, Mount, Picture, Scratch, Stage, Thing, render},
+    sensing::camera::{
+        Attachment, FrameView, RenderMesh, RenderObject, RenderScene, RenderedImage, Renderer,
+    },
 };
 
 /// Edge of the pictures, pixels.
 const EDGE: usize = 224;
 
-fn thing(object: u16, shape: &Shape, visual: Visual, pose: Pose) -> Thing {
-    let model = Model::of_shape("thing", shape, &[visual]).expect("a surface");
-    Thing {
+fn thing(object: u16, shape: &Shape, visual: Visual, pose: Pose) -> RenderObject {
+    let model = RenderMesh::of_shape("thing", shape, &[visual]).expect("a surface");
+    RenderObject {
         name: format!("thing {object}"),
-        object,
-        model: Arc::new(model),
-        mount: Mount::Fixed(pose),
+        segmentation_id: object,
+        mesh: Arc::new(model),
+        attachment: Attachment::Fixed(pose),
         casts_shadow: false,
     }
 }
 
 /// A ground whose top is z = 0, object 1.
-fn ground(visual: Visual) -> Thing {
+fn ground(visual: Visual) -> RenderObject {
     let half = Vec3::new(1.0, 1.0, 0.1);
     thing(1, &Shape::Box { half }, visual, Pose::translation(0.0, 0.0, -0.1))
 }
@@ -38,9 +40,9 @@ fn above() -> Camera {
     camera(Vec3::z(), Vec3::zeros(), Vec3::y())
 }
 
-fn draw(things: Vec<Thing>, camera: &Camera) -> Picture {
-    let stage = Stage::new(things, Lighting::default()).expect("the default light is good");
-    render(&stage, &FrameView::still(), camera, &mut Scratch::default()).expect("a picture")
+fn draw(objects: Vec<RenderObject>, camera: &Camera) -> RenderedImage {
+    let stage = RenderScene::new(objects, Lighting::default()).expect("the default light is good");
+    Renderer::default().render(&stage, &FrameView::empty(), camera).expect("a picture")
 }
 
 /// Pixels a unit of slope.

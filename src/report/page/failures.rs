@@ -9,8 +9,8 @@ use super::pictures::{Room, embedded, link};
 use crate::{
     evaluation::record::{EpisodeRecord, Identity},
     report::{
-        film::{still_path, video_path},
         judged::Judged,
+        video::{still_path, video_path},
     },
 };
 

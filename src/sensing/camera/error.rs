@@ -35,7 +35,7 @@ pub enum CameraError {
     },
     /// A thing to be drawn has no triangles or wrong ones.
     #[error("{name} cannot be drawn: {reason}")]
-    Model {
+    RenderMesh {
         /// Name of the thing.
         name: String,
         /// What is wrong and what to do.

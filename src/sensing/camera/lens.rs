@@ -1,6 +1,6 @@
 //! A camera in its place: checks, and the way from the world to the image.
 
-use super::{CameraError, FrameView, V3, pose::Rigid, screen::Seen};
+use crate::sensing::camera::{CameraError, FrameView, V3, raster::binning::Seen, scene::pose::Rigid};
 use crate::{
     geometry::Pose,
     scene::{Camera, CameraMount},
@@ -15,7 +15,7 @@ const MOST_CAMERAS: usize = 64;
 
 /// A camera in the world.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Lens {
+pub(crate) struct Lens {
     pub width: usize,
     pub height: usize,
     pub near: f32,
@@ -92,7 +92,7 @@ fn check(camera: &Camera) -> Result<(), CameraError> {
 
 impl Lens {
     /// `camera` where `view` has it.
-    pub(super) fn new(camera: &Camera, view: &FrameView) -> Result<Self, CameraError> {
+    pub(crate) fn new(camera: &Camera, view: &FrameView) -> Result<Self, CameraError> {
         check(camera)?;
         let pose: Pose = match camera.mount {
             CameraMount::World => camera.pose,
@@ -126,12 +126,12 @@ impl Lens {
         })
     }
 
-    pub(super) fn see(&self, p_w: &V3) -> Seen {
+    pub(crate) fn see(&self, p_w: &V3) -> Seen {
         self.project(self.to_view.turn(&(p_w - self.eye)))
     }
 
     /// The image of a point of the camera frame.
-    pub(super) fn project(&self, view: V3) -> Seen {
+    pub(crate) fn project(&self, view: V3) -> Seen {
         let w = -1.0 / view.z;
         let scale = self.focal * w;
         let middle = |edge: usize| 0.5 * edge as f32;
@@ -140,7 +140,7 @@ impl Lens {
 
     /// The ray through the top left of the image, world, as long as a unit along the axis; and what it changes by a pixel
     /// to the right, and a pixel down.
-    pub(super) fn rays(&self) -> [V3; 3] {
+    pub(crate) fn rays(&self) -> [V3; 3] {
         let slope = |edge: usize| 0.5 * edge as f32 / self.focal;
         let pixel = 1.0 / self.focal;
         [
@@ -152,12 +152,12 @@ impl Lens {
     }
 
     /// Depth along the axis of a point of the world, m.
-    pub(super) fn depth(&self, p_w: &V3) -> f32 {
+    pub(crate) fn depth(&self, p_w: &V3) -> f32 {
         -self.to_view.turn(&(p_w - self.eye)).z
     }
 
     /// Whether a ball can be in the image.
-    pub(super) fn may_see(&self, centre: &V3, radius: f32) -> bool {
+    pub(crate) fn may_see(&self, centre: &V3, radius: f32) -> bool {
         let c = self.to_view.turn(&(centre - self.eye));
         let inside = |along: f32, edge: usize| {
             let half = 0.5 * edge as f32 / self.focal;

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::{
-    lanes::{F8, V8},
-    shadow::ShadowMap,
+    shade::shadow::ShadowMap,
+    simd::{F8, V8},
     *,
 };
 use crate::{
@@ -12,12 +12,19 @@ use crate::{
     scene::{Camera, CameraMount, Layer, Lighting, Mask, Visual},
 };
 
-fn thing(object: u16, model: Model, mount: Mount) -> Thing {
-    Thing { name: format!("thing {object}"), object, model: Arc::new(model), mount, casts_shadow: true }
+fn thing(object: u16, model: RenderMesh, mount: Attachment) -> RenderObject {
+    RenderObject {
+        name: format!("thing {object}"),
+        segmentation_id: object,
+        mesh: Arc::new(model),
+        attachment: mount,
+        casts_shadow: true,
+    }
 }
 
-fn ball(object: u16, radius: f64, mount: Mount) -> Thing {
-    let model = Model::of_shape("ball", &Shape::Sphere { radius }, &[Visual::default()]).expect("a ball");
+fn ball(object: u16, radius: f64, mount: Attachment) -> RenderObject {
+    let model =
+        RenderMesh::of_shape("ball", &Shape::Sphere { radius }, &[Visual::default()]).expect("a ball");
     thing(object, model, mount)
 }
 
@@ -33,10 +40,10 @@ fn checker(size_m: f64) -> Visual {
 }
 
 /// A ground whose top is z = 0.
-fn ground(visual: Visual) -> Thing {
+fn ground(visual: Visual) -> RenderObject {
     let half = Vec3::new(1.0, 1.0, 0.1);
-    let model = Model::of_shape("ground", &Shape::Box { half }, &[visual]).expect("a box");
-    let mut ground = thing(1, model, Mount::Fixed(Pose::translation(0.0, 0.0, -0.1)));
+    let model = RenderMesh::of_shape("ground", &Shape::Box { half }, &[visual]).expect("a box");
+    let mut ground = thing(1, model, Attachment::Fixed(Pose::translation(0.0, 0.0, -0.1)));
     ground.casts_shadow = false;
     ground
 }
@@ -51,12 +58,12 @@ fn above(height: f64) -> Camera {
     camera(Vec3::new(0.0, 0.0, height), Vec3::zeros(), Vec3::y())
 }
 
-fn stage(things: Vec<Thing>) -> Stage {
-    Stage::new(things, Lighting::default()).expect("the default light is good")
+fn stage(objects: Vec<RenderObject>) -> RenderScene {
+    RenderScene::new(objects, Lighting::default()).expect("the default light is good")
 }
 
-fn draw(stage: &Stage, camera: &Camera) -> Picture {
-    render(stage, &FrameView::still(), camera, &mut Scratch::default()).expect("a picture")
+fn draw(stage: &RenderScene, camera: &Camera) -> RenderedImage {
+    Renderer::default().render(stage, &FrameView::empty(), camera).expect("a picture")
 }
 
 fn focal(camera: &Camera) -> f64 {
@@ -69,11 +76,11 @@ fn a_straight_outline_is_straight_in_the_objects() {
     for shift in [0.0, 0.3, 0.5, 0.8] {
         let camera = above(1.0);
         let half = Vec3::new(0.1, 0.1, 0.01);
-        let model = Model::of_shape("box", &Shape::Box { half }, &[Visual::default()]).expect("a box");
+        let model = RenderMesh::of_shape("box", &Shape::Box { half }, &[Visual::default()]).expect("a box");
         let x = shift / focal(&camera);
         let stage = stage(vec![
             ground(Visual::default()),
-            thing(2, model, Mount::Fixed(Pose::translation(x, 0.0, 0.0))),
+            thing(2, model, Attachment::Fixed(Pose::translation(x, 0.0, 0.0))),
         ]);
         let picture = draw(&stage, &camera);
         let rows = picture.segmentation.chunks(224).filter(|row| row.contains(&2));
@@ -83,18 +90,19 @@ fn a_straight_outline_is_straight_in_the_objects() {
 }
 
 /// A still scene with something of everything, and its camera.
-fn still_life() -> (Vec<Thing>, Camera) {
-    let cube = Model::of_mesh("cube", &box_mesh(&Vec3::repeat(0.05)), &[], &[checker(0.02)]).expect("a cube");
+fn still_life() -> (Vec<RenderObject>, Camera) {
+    let cube =
+        RenderMesh::of_mesh("cube", &box_mesh(&Vec3::repeat(0.05)), &[], &[checker(0.02)]).expect("a cube");
     let things = vec![
         ground(checker(0.13)),
-        ball(2, 0.06, Mount::Fixed(Pose::translation(0.15, 0.05, 0.06))),
-        thing(3, cube, Mount::Rigid(0)),
+        ball(2, 0.06, Attachment::Fixed(Pose::translation(0.15, 0.05, 0.06))),
+        thing(3, cube, Attachment::Rigid(0)),
     ];
     (things, camera(Vec3::new(0.7, 0.0, 0.6), Vec3::zeros(), Vec3::z()))
 }
 
 fn cube_view(rigid: &[Pose]) -> FrameView<'_> {
-    FrameView { rigid, ..FrameView::still() }
+    FrameView { rigid, ..FrameView::empty() }
 }
 
 /// Mean difference of two rows of bytes.
@@ -106,12 +114,12 @@ fn difference(a: &[f64], b: &[u8]) -> f64 {
 fn a_kept_background_gives_the_picture_that_is_drawn_from_nothing() {
     let (things, camera) = still_life();
     let stage = stage(things);
-    let (mut kept, mut fresh) = (Scratch::default(), Scratch::uncached());
+    let (mut kept, mut fresh) = (Renderer::default(), Renderer::without_cache());
     for height in [0.05, 0.2] {
         let rigid = [Pose::translation(-0.1, -0.1, height)];
         let view = cube_view(&rigid);
-        let a = render(&stage, &view, &camera, &mut kept).expect("a picture");
-        let b = render(&stage, &view, &camera, &mut fresh).expect("a picture");
+        let a = kept.render(&stage, &view, &camera).expect("a picture");
+        let b = fresh.render(&stage, &view, &camera).expect("a picture");
         assert_eq!(a.segmentation, b.segmentation);
         assert_eq!(a.depth, b.depth);
         let mean = difference(&a.rgb.iter().map(|v| f64::from(*v)).collect::<Vec<_>>(), &b.rgb);
@@ -146,11 +154,11 @@ fn the_small_picture_is_the_large_one_made_small() {
     let (things, camera) = still_life();
     let stage = stage(things);
     let rigid = [Pose::translation(-0.1, -0.1, 0.05)];
-    let mut scratch = Scratch::uncached();
-    let small = render(&stage, &cube_view(&rigid), &camera, &mut scratch).expect("a picture");
+    let mut scratch = Renderer::without_cache();
+    let small = scratch.render(&stage, &cube_view(&rigid), &camera).expect("a picture");
     for edge in [512, 1024] {
         let camera = camera.clone().with_edge(edge);
-        let large = render(&stage, &cube_view(&rigid), &camera, &mut scratch).expect("a picture");
+        let large = scratch.render(&stage, &cube_view(&rigid), &camera).expect("a picture");
         let mean = difference(&box_resized(&large.rgb, edge, 224), &small.rgb);
         assert!(mean < 2.0, "{edge}: mean difference {mean} of 255");
     }
@@ -161,7 +169,7 @@ fn pictures_are_the_same_bytes_on_any_thread() {
     let (things, camera) = still_life();
     let stage = stage(things);
     let rigid = [Pose::translation(-0.1, -0.1, 0.05)];
-    let shoot = || render(&stage, &cube_view(&rigid), &camera, &mut Scratch::default()).expect("a picture");
+    let shoot = || Renderer::default().render(&stage, &cube_view(&rigid), &camera).expect("a picture");
     let here = shoot();
     std::thread::scope(|scope| {
         let there: Vec<_> = (0..3).map(|_| scope.spawn(shoot)).collect();
@@ -175,8 +183,8 @@ fn a_shadow_falls_where_the_light_throws_it() {
     let camera = above(1.2);
     let with_ball = |height: Option<f64>| {
         let mut things = vec![ground(Visual::default())];
-        things.extend(height.map(|h| ball(2, 0.04, Mount::Fixed(Pose::translation(0.0, 0.0, h)))));
-        let stage = Stage::new(things, lighting.clone()).expect("a stage");
+        things.extend(height.map(|h| ball(2, 0.04, Attachment::Fixed(Pose::translation(0.0, 0.0, h)))));
+        let stage = RenderScene::new(things, lighting.clone()).expect("a stage");
         draw(&stage, &camera)
     };
     let (bare, shaded) = (with_ball(None), with_ball(Some(0.25)));
@@ -198,16 +206,17 @@ fn a_shadow_falls_where_the_light_throws_it() {
 }
 
 /// A thing as rigid body 0 whose shadows are thrown by its coarsest form.
-fn lone(model: Model, casts_shadow: bool) -> Vec<Thing> {
-    vec![Thing { casts_shadow, ..thing(1, model, Mount::Rigid(0)) }]
+fn lone(model: RenderMesh, casts_shadow: bool) -> Vec<RenderObject> {
+    vec![RenderObject { casts_shadow, ..thing(1, model, Attachment::Rigid(0)) }]
 }
 
 #[test]
 fn smooth_surfaces_throw_no_shadow_on_what_of_themselves_faces_the_light() {
     let visuals = [Visual::plain([0.8; 3], 0.6, 0.0)];
-    let solid =
-        |shape: Shape| Model::of_solids("solid", &[Solid::new(shape, 3e-3, 0)], &visuals).expect("a solid");
-    let shape = |shape: &Shape| Model::of_shape("shape", shape, &visuals).expect("a shape");
+    let solid = |shape: Shape| {
+        RenderMesh::of_solids("solid", &[RenderSolid::new(shape, 3e-3, 0)], &visuals).expect("a solid")
+    };
+    let shape = |shape: &Shape| RenderMesh::of_shape("shape", shape, &visuals).expect("a shape");
     let tube = Shape::Cylinder { radius: 0.06, half_height: 0.15 };
     let ball = Shape::Sphere { radius: 0.1 };
     let slab = Shape::Box { half: Vec3::new(0.2, 0.2, 0.02) };
@@ -218,9 +227,10 @@ fn smooth_surfaces_throw_no_shadow_on_what_of_themselves_faces_the_light() {
         lighting.key.direction_w = direction.into();
         for (i, model) in models.iter().enumerate() {
             let draw = |casts_shadow: bool| {
-                let stage = Stage::new(lone(model.clone(), casts_shadow), lighting.clone()).expect("a stage");
+                let stage =
+                    RenderScene::new(lone(model.clone(), casts_shadow), lighting.clone()).expect("a stage");
                 let view = [Pose::identity()];
-                render(&stage, &cube_view(&view), &camera, &mut Scratch::uncached()).expect("a picture")
+                Renderer::without_cache().render(&stage, &cube_view(&view), &camera).expect("a picture")
             };
             let (with, without) = (draw(true), draw(false));
             let apart = with.rgb.iter().zip(&without.rgb).map(|(a, b)| a.abs_diff(*b));
@@ -270,7 +280,7 @@ fn the_border_of_a_shadow_gets_darker_all_the_way_and_lies_where_the_edge_throws
 }
 
 /// Bytes of the red channel at a point of the world.
-fn red(picture: &Picture, camera: &Camera, p: Vec3) -> i32 {
+fn red(picture: &RenderedImage, camera: &Camera, p: Vec3) -> i32 {
     let view = camera.pose.inverse_transform_point(&p.into()).coords;
     let pixel = |along: f64| (112.0 + focal(camera) * along / -view.z) as usize;
     i32::from(picture.rgb[3 * (224 * pixel(-view.y) + pixel(view.x))])
@@ -278,17 +288,17 @@ fn red(picture: &Picture, camera: &Camera, p: Vec3) -> i32 {
 
 #[test]
 fn a_roof_and_a_wall_darken_what_lies_behind_them_also_far_from_where_shadows_are_fine() {
-    // Light along −x and down by as much; a wall of 1 m at x = 3 and a roof of 2 m a side over the origin.
+    // Illumination along −x and down by as much; a wall of 1 m at x = 3 and a roof of 2 m a side over the origin.
     let mut lighting = Lighting { shadow_centre_w: Vec3::zeros(), ..Lighting::default() };
     (lighting.key.direction_w, lighting.key.softness_rad) = (Vec3::new(1.0, 0.0, 1.0), 0.01);
     let slab = |half: Vec3, at: Vec3| {
-        let model = Model::of_shape("slab", &Shape::Box { half }, &[Visual::default()]).expect("a box");
-        thing(1, model, Mount::Fixed(Pose::from_parts(at.into(), Quat::identity())))
+        let model = RenderMesh::of_shape("slab", &Shape::Box { half }, &[Visual::default()]).expect("a box");
+        thing(1, model, Attachment::Fixed(Pose::from_parts(at.into(), Quat::identity())))
     };
     let floor = slab(Vec3::new(6.0, 3.0, 0.05), Vec3::new(0.0, 0.0, -0.05));
     let wall = slab(Vec3::new(0.02, 1.5, 0.5), Vec3::new(3.02, 0.0, 0.5));
     let roof = slab(Vec3::new(1.0, 1.0, 0.02), Vec3::new(0.0, 0.0, 2.0));
-    let stage = Stage::new(vec![floor, wall, roof], lighting).expect("a stage");
+    let stage = RenderScene::new(vec![floor, wall, roof], lighting).expect("a stage");
     // From the side, under the roof: its shadow lies 2 m towards −x.
     let camera = camera(Vec3::new(0.0, -6.0, 1.5), Vec3::new(0.0, 0.0, 0.5), Vec3::z());
     let camera = Camera { fovy_rad: 1.2, ..camera };
@@ -307,7 +317,7 @@ fn a_roof_and_a_wall_darken_what_lies_behind_them_also_far_from_where_shadows_ar
 #[test]
 fn the_right_of_the_third_person_image_is_the_worlds_positive_y() {
     for camera in [Camera::third_person_table(), Camera::third_person_floor()] {
-        let at = |object, y| ball(object, 0.03, Mount::Fixed(Pose::translation(0.0, y, 0.03)));
+        let at = |object, y| ball(object, 0.03, Attachment::Fixed(Pose::translation(0.0, y, 0.03)));
         let picture = draw(&stage(vec![at(1, -0.2), at(2, 0.2)]), &camera);
         let column = |object| picture.segmentation.iter().position(|&s| s == object).expect("in sight") % 224;
         assert!(column(1) < 112 && column(2) > 112);
@@ -316,7 +326,7 @@ fn the_right_of_the_third_person_image_is_the_worlds_positive_y() {
 
 #[test]
 fn bad_cameras_are_refused_with_the_name_of_the_field() {
-    let stage = stage(vec![ball(1, 0.1, Mount::Fixed(Pose::identity()))]);
+    let stage = stage(vec![ball(1, 0.1, Attachment::Fixed(Pose::identity()))]);
     let good = above(1.0);
     let nowhere = Pose::translation(f64::NAN, 0.0, 0.0);
     for (camera, words) in [
@@ -335,16 +345,18 @@ fn bad_cameras_are_refused_with_the_name_of_the_field() {
         (Camera { pose: nowhere, ..good.clone() }, "position: expected metres within ±1e6"),
         (Camera { mount: CameraMount::Hand, ..good.clone() }, "mount: expected a hand in the state"),
     ] {
-        let error = render(&stage, &FrameView::still(), &camera, &mut Scratch::default()).expect_err(words);
+        let error = Renderer::default().render(&stage, &FrameView::empty(), &camera).expect_err(words);
         assert!(error.to_string().contains(words), "{error}");
     }
 }
 
 #[test]
 fn a_camera_inside_of_a_thing_says_so_and_sees_what_is_beyond_it() {
-    let marked = |ball: Thing| vec![ground(checker(0.1)), ball];
-    let (here, away) =
-        (Mount::Fixed(Pose::translation(0.0, 0.0, 1.0)), Mount::Fixed(Pose::translation(9.0, 0.0, 1.0)));
+    let marked = |ball: RenderObject| vec![ground(checker(0.1)), ball];
+    let (here, away) = (
+        Attachment::Fixed(Pose::translation(0.0, 0.0, 1.0)),
+        Attachment::Fixed(Pose::translation(9.0, 0.0, 1.0)),
+    );
     let within = draw(&stage(marked(ball(2, 0.1, here))), &above(1.0));
     assert_eq!(within.inside.as_deref(), Some("thing 2"));
     let without = draw(&stage(marked(ball(2, 0.1, away))), &above(1.0));
@@ -374,16 +386,16 @@ fn cameras_are_checked_without_a_picture_one_by_one_and_together() {
 #[test]
 fn bad_meshes_states_and_lights_are_refused() {
     let visuals = [Visual::default()];
-    let empty = Model::of_mesh("egg", &Mesh::default(), &[], &visuals).expect_err("empty");
+    let empty = RenderMesh::of_mesh("egg", &Mesh::default(), &[], &visuals).expect_err("empty");
     assert!(empty.to_string().starts_with("egg cannot be drawn: the mesh is empty"), "{empty}");
     let cube = box_mesh(&Vec3::repeat(0.1));
-    let unknown = Model::of_mesh("egg", &cube, &[3; 12], &visuals).expect_err("no such visual");
+    let unknown = RenderMesh::of_mesh("egg", &cube, &[3; 12], &visuals).expect_err("no such visual");
     assert!(unknown.to_string().contains("material 3 has no visual; there are 1"), "{unknown}");
-    let lost = stage(vec![ball(1, 0.1, Mount::Rigid(4))]);
-    let error = render(&lost, &FrameView::still(), &above(1.0), &mut Scratch::default()).expect_err("lost");
+    let lost = stage(vec![ball(1, 0.1, Attachment::Rigid(4))]);
+    let error = Renderer::default().render(&lost, &FrameView::empty(), &above(1.0)).expect_err("lost");
     assert!(error.to_string().contains("the state has no rigid body 4"), "{error}");
     let mut light = Lighting::default();
     light.key.direction_w = Vec3::zeros();
-    let dark = Stage::new(Vec::new(), light).expect_err("no direction");
+    let dark = RenderScene::new(Vec::new(), light).expect_err("no direction");
     assert!(dark.to_string().starts_with("light: direction: expected a direction"), "{dark}");
 }

@@ -6,7 +6,7 @@ use super::{
     DARK, GREY, METAL, Part, SHELL,
     solid::{blended, block, case, drum, flat_below, limb, ring},
 };
-use crate::{geometry::Pose, sensing::camera::Solid};
+use crate::{geometry::Pose, sensing::camera::RenderSolid};
 
 /// Edge of the cells of the shells, m.
 const CELL: f64 = 8.5e-3;
@@ -33,7 +33,7 @@ pub(super) fn base() -> Part {
         link: None,
         name: "base",
         solids: vec![
-            Solid::new(flat_below(body), FINE, SHELL),
+            RenderSolid::new(flat_below(body), FINE, SHELL),
             case(&plugs, [0.024, 0.046, 0.036], 4e-3, 4e-3, DARK),
             collar([0.0, 0.0, 0.122], [0.0, 0.0, 0.139], 0.0585),
             ring([0.0, 0.0, 0.120], [0.0, 0.0, 0.160], NECK, 2e-3, GREY),
@@ -42,7 +42,7 @@ pub(super) fn base() -> Part {
 }
 
 /// The clean rim of a shell at a seam, from inside of the shell to the seam.
-fn collar(from: [f64; 3], to: [f64; 3], radius: f64) -> Solid {
+fn collar(from: [f64; 3], to: [f64; 3], radius: f64) -> RenderSolid {
     ring(from, to, radius + 1e-3, 2.5e-3, SHELL)
 }
 
@@ -51,7 +51,7 @@ pub(super) fn links() -> Vec<Part> {
     vec![shoulder(), upper_arm(), elbow_above(), elbow_below(), forearm(), wrist(), flange()]
 }
 
-fn part(link: usize, name: &'static str, solids: Vec<Solid>) -> Part {
+fn part(link: usize, name: &'static str, solids: Vec<RenderSolid>) -> Part {
     Part { link: Some(link), name, solids }
 }
 
@@ -62,7 +62,7 @@ fn shoulder() -> Part {
     let cap = |side: f64| ring([0.0, side * 0.050, 0.0], [0.0, side * 0.0715, 0.0], 0.0385, 3e-3, GREY);
     let shell = blended(vec![column, bulge], 0.032);
     let rim = collar([0.0, 0.0, -0.175], [0.0, 0.0, -0.191], TUBE);
-    part(0, "shoulder", vec![Solid::new(shell, CELL, SHELL), rim, cap(-1.0), cap(1.0)])
+    part(0, "shoulder", vec![RenderSolid::new(shell, CELL, SHELL), rim, cap(-1.0), cap(1.0)])
 }
 
 /// Link 2: the upper arm, along −y of its frame.
@@ -72,7 +72,7 @@ fn upper_arm() -> Part {
     let shell = blended(vec![tube, core], 0.032);
     let rim = collar([0.0, -0.175, 0.0], [0.0, -0.191, 0.0], TUBE);
     let seam = ring([0.0, -0.175, 0.0], [0.0, -0.212, 0.0], NECK, 2e-3, GREY);
-    part(1, "upper arm", vec![Solid::new(shell, CELL, SHELL), rim, seam])
+    part(1, "upper arm", vec![RenderSolid::new(shell, CELL, SHELL), rim, seam])
 }
 
 /// Link 3: from the upper arm out to the elbow's axis at x = 82.5 mm.
@@ -83,7 +83,7 @@ fn elbow_above() -> Part {
     let shell = blended(vec![tube, crown, bulge], 0.03);
     let cap = |side: f64| ring([0.0825, side * 0.04, 0.0], [0.0825, side * 0.0690, 0.0], 0.0460, 5e-3, DARK);
     let rim = collar([0.0, 0.0, -0.105], [0.0, 0.0, -0.1215], TUBE);
-    part(2, "elbow", vec![Solid::new(shell, CELL, SHELL), rim, cap(-1.0), cap(1.0)])
+    part(2, "elbow", vec![RenderSolid::new(shell, CELL, SHELL), rim, cap(-1.0), cap(1.0)])
 }
 
 /// Link 4: from the elbow's axis back to the forearm's at x = −82.5 mm.
@@ -94,7 +94,7 @@ fn elbow_below() -> Part {
     let shell = blended(vec![core, crown, tube], 0.035);
     let seam = ring([-0.0825, 0.105, 0.0], [-0.0825, 0.142, 0.0], NECK, 2e-3, DARK);
     let rim = collar([-0.0825, 0.103, 0.0], [-0.0825, 0.1195, 0.0], TUBE);
-    part(3, "elbow, lower half", vec![Solid::new(shell, CELL, SHELL), rim, seam])
+    part(3, "elbow, lower half", vec![RenderSolid::new(shell, CELL, SHELL), rim, seam])
 }
 
 /// Link 5: the slanted forearm, which leaves its axis for y = 80 mm and holds the wrist from there.
@@ -107,7 +107,7 @@ fn forearm() -> Part {
     let shell = blended(vec![tube, dome, slant, back, hub], 0.040);
     let cap = ring([0.0, 0.095, 0.0], [0.0, 0.1175, 0.0], 0.036, 4e-3, DARK);
     let rim = collar([0.0, 0.0, -0.245], [0.0, 0.0, -0.2615], TUBE);
-    part(4, "forearm", vec![Solid::new(shell, FINE, SHELL), rim, cap])
+    part(4, "forearm", vec![RenderSolid::new(shell, FINE, SHELL), rim, cap])
 }
 
 /// Link 6: the wrist, from the drum about its axis to the housing of the last joint at x = 88 mm.
@@ -120,7 +120,7 @@ fn wrist() -> Part {
     let pilot = ring([0.088, 0.040, 0.0], [0.088, 0.0620, 0.0], 0.033, 3e-3, DARK);
     let seam = ring([0.088, -0.038, 0.0], [0.088, -0.068, 0.0], 0.0420, 2e-3, GREY);
     let rim = collar([0.088, -0.034, 0.0], [0.088, -0.0512, 0.0], 0.0478);
-    part(5, "wrist", vec![Solid::new(shell, FINE, SHELL), rim, cap, pilot, seam])
+    part(5, "wrist", vec![RenderSolid::new(shell, FINE, SHELL), rim, cap, pilot, seam])
 }
 
 /// Link 7: the last body with its grip lobe, and the flange.
@@ -129,5 +129,5 @@ fn flange() -> Part {
     let lobe = limb([0.020, 0.0, 0.076], [0.060, 0.0, 0.076], 0.0200);
     let face = ring([0.0, 0.0, 0.080], [0.0, 0.0, 0.107], 0.0315, 1e-3, METAL);
     let button = ring([0.066, 0.0, 0.076], [0.0820, 0.0, 0.076], 0.011, 3e-3, DARK);
-    part(6, "flange", vec![body, Solid::new(lobe, 6e-3, SHELL), face, button])
+    part(6, "flange", vec![body, RenderSolid::new(lobe, 6e-3, SHELL), face, button])
 }

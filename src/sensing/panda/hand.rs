@@ -10,7 +10,7 @@ use crate::{
         Side, pads,
         panda::{HAND_LINK, finger_link, hand_in_link},
     },
-    sensing::camera::{Form, Solid},
+    sensing::camera::{RenderSolid, Tessellation},
 };
 
 /// The hand's body, 204 × 63 mm in plan and 66 mm high, with shoulders that fall off to rounded ends (Franka hand, public
@@ -41,11 +41,11 @@ pub(super) fn hand() -> Part {
 }
 
 /// The hand's body is as deep as the flange where it is bolted on, and shallower where the fingers come out.
-fn tapered(mut body: Solid) -> Solid {
+fn tapered(mut body: RenderSolid) -> RenderSolid {
     const FULL: f64 = 0.026;
     const END: f64 = 0.0655;
     const LEFT: f64 = 0.76;
-    if let Form::Mesh(mesh) = &mut body.form {
+    if let Tessellation::Mesh(mesh) = &mut body.form {
         for v in &mut mesh.vertices {
             v.x *= 1.0 - (1.0 - LEFT) * ((v.z - FULL) / (END - FULL)).clamp(0.0, 1.0);
         }

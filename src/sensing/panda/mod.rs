@@ -3,7 +3,7 @@
 
 mod arm;
 mod hand;
-mod pillow;
+mod rounded_plate;
 mod solid;
 
 #[cfg(test)]
@@ -11,7 +11,7 @@ mod tests;
 
 use std::sync::Arc;
 
-use super::camera::{CameraError, Model, Mount, Solid, Thing};
+use super::camera::{Attachment, CameraError, RenderMesh, RenderObject, RenderSolid};
 use crate::{geometry::Pose, robot::Side, scene::Visual};
 
 /// Numbers of the looks in [`visuals`].
@@ -29,7 +29,7 @@ struct Part {
     link: Option<usize>,
     name: &'static str,
     /// Its solids, in the frame of the link.
-    solids: Vec<Solid>,
+    solids: Vec<RenderSolid>,
 }
 
 /// Painted shells, black plastic, grey rings, bare metal, the sensors' anodised cases, and their gels' silvered skins.
@@ -46,11 +46,11 @@ fn visuals() -> Vec<Visual> {
 
 /// The robot's drawn form, made once and shared by all episodes.
 #[derive(Clone, Debug)]
-pub struct RobotModel {
-    parts: Vec<(Option<usize>, &'static str, Arc<Model>)>,
+pub struct RobotMeshes {
+    parts: Vec<(Option<usize>, &'static str, Arc<RenderMesh>)>,
 }
 
-impl RobotModel {
+impl RobotMeshes {
     /// Makes all meshes, in a few tenths of a second.
     ///
     /// # Errors
@@ -63,26 +63,26 @@ impl RobotModel {
         parts.extend(Side::BOTH.map(hand::finger));
         let mut made = Vec::new();
         for part in parts {
-            let model = Model::of_solids(part.name, &part.solids, &visuals)?;
+            let model = RenderMesh::of_solids(part.name, &part.solids, &visuals)?;
             made.push((part.link, part.name, Arc::new(model)));
         }
         for (side, name) in Side::BOTH.into_iter().zip(["left gel", "right gel"]) {
             let mesh = hand::gel(side);
-            let model = Model::of_mesh(name, &mesh, &vec![GEL as u16; mesh.triangles.len()], &visuals)?;
+            let model = RenderMesh::of_mesh(name, &mesh, &vec![GEL as u16; mesh.triangles.len()], &visuals)?;
             made.push((Some(crate::robot::panda::finger_link(side)), name, Arc::new(model)));
         }
         Ok(Self { parts: made })
     }
 
-    /// The robot of joint tree number `tree`, its base at `base_w` (world), as object number `object` of segmentations.
-    pub fn things(&self, tree: usize, base_w: Pose, object: u16) -> Vec<Thing> {
-        let thing = |(link, name, model): &(Option<usize>, &'static str, Arc<Model>)| Thing {
+    /// The robot of joint tree number `tree`, its base at `base_w` (world), as object number `segmentation_id` of segmentations.
+    pub fn objects(&self, tree: usize, base_w: Pose, segmentation_id: u16) -> Vec<RenderObject> {
+        let thing = |(link, name, model): &(Option<usize>, &'static str, Arc<RenderMesh>)| RenderObject {
             name: format!("panda {name}"),
-            object,
-            model: model.clone(),
-            mount: match *link {
-                None => Mount::Fixed(base_w),
-                Some(link) => Mount::Link { tree, link, offset: Pose::identity() },
+            segmentation_id,
+            mesh: model.clone(),
+            attachment: match *link {
+                None => Attachment::Fixed(base_w),
+                Some(link) => Attachment::Link { tree, link, offset: Pose::identity() },
             },
             casts_shadow: true,
         };

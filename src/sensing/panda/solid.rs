@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use nalgebra::{Quaternion, Unit};
 
-use super::pillow::Pillow;
+use super::rounded_plate::RoundedPlate;
 use crate::{
     geometry::{Pose, Quat, Vec3, shape::Shape},
-    sensing::camera::Solid,
+    sensing::camera::RenderSolid,
 };
 
 /// Pieces of a turn around large drums and around small ones.
@@ -39,11 +39,11 @@ pub(super) fn drum(from: [f64; 3], to: [f64; 3], radius: f64, edge: f64) -> Shap
 }
 
 /// A [`drum`] that stands for itself.
-pub(super) fn ring(from: [f64; 3], to: [f64; 3], radius: f64, edge: f64, visual: usize) -> Solid {
+pub(super) fn ring(from: [f64; 3], to: [f64; 3], radius: f64, edge: f64, visual: usize) -> RenderSolid {
     let (pose, half) = between(from, to);
     let turns = TURNS[usize::from(radius < SMALL)];
-    let mesh = Pillow { corners: vec![[0.0; 2]], round: radius, half, edge, turns }.mesh(&pose);
-    Solid::of_mesh(drum(from, to, radius, edge), mesh, visual)
+    let mesh = RoundedPlate { corners: vec![[0.0; 2]], round: radius, half, edge, turns }.mesh(&pose);
+    RenderSolid::of_mesh(drum(from, to, radius, edge), mesh, visual)
 }
 
 /// A box of these half extents about `centre` whose edges are rounded by `edge`, m.
@@ -54,26 +54,26 @@ pub(super) fn block(centre: [f64; 3], half: [f64; 3], edge: f64) -> Shape {
 
 /// A box in the frame `pose` of these half extents that stands for itself; its outline in x and y is rounded by `corner`,
 /// its edges in z by `edge`, m.
-pub(super) fn case(pose: &Pose, half: [f64; 3], corner: f64, edge: f64, visual: usize) -> Solid {
+pub(super) fn case(pose: &Pose, half: [f64; 3], corner: f64, edge: f64, visual: usize) -> RenderSolid {
     let [x, y] = [half[0] - corner, half[1] - corner];
     let corners = vec![[-x, -y], [x, -y], [x, y], [-x, y]];
-    let pillow = Pillow { corners, round: corner, half: half[2], edge, turns: CORNER_TURNS };
-    Solid::of_mesh(block([0.0; 3], half, edge).placed(*pose), pillow.mesh(pose), visual)
+    let pillow = RoundedPlate { corners, round: corner, half: half[2], edge, turns: CORNER_TURNS };
+    RenderSolid::of_mesh(block([0.0; 3], half, edge).placed(*pose), pillow.mesh(pose), visual)
 }
 
 /// A convex polygon (y, z) drawn out to `half` on either side of x = 0, outline and edges rounded by `edge`, m, in `pose`.
-pub(super) fn slab(pose: &Pose, corners: &[[f64; 2]], half: f64, edge: f64, visual: usize) -> Solid {
+pub(super) fn slab(pose: &Pose, corners: &[[f64; 2]], half: f64, edge: f64, visual: usize) -> RenderSolid {
     // x, y, z become y, z, x.
     let cycle =
         Pose::from_parts(Vec3::zeros().into(), Quat::new_unchecked(Quaternion::new(0.5, 0.5, 0.5, 0.5)));
-    let pillow = Pillow { corners: corners.to_vec(), round: edge, half, edge, turns: 2 * CORNER_TURNS };
+    let pillow = RoundedPlate { corners: corners.to_vec(), round: edge, half, edge, turns: 2 * CORNER_TURNS };
     let mesh = pillow.mesh(&(pose * cycle));
     let (low, high) = corners.iter().fold(([f64::MAX; 2], [f64::MIN; 2]), |(low, high), c| {
         (std::array::from_fn(|i| low[i].min(c[i])), std::array::from_fn(|i| high[i].max(c[i])))
     });
     let middle = [0.0, 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1])];
     let extent = [half, 0.5 * (high[0] - low[0]) + edge, 0.5 * (high[1] - low[1]) + edge];
-    Solid::of_mesh(block(middle, extent, edge).placed(*pose), mesh, visual)
+    RenderSolid::of_mesh(block(middle, extent, edge).placed(*pose), mesh, visual)
 }
 
 /// Shapes grown together with fillets of `blend`, m.

@@ -8,12 +8,12 @@ use crate::{
     physics::joints::forward,
     robot::{GripperSpec, pads, panda},
     scene::{Camera, Lighting},
-    sensing::camera::{FrameView, Scratch, Stage, render},
+    sensing::camera::{FrameView, RenderScene, Renderer},
 };
 
-fn model() -> &'static RobotModel {
-    static MODEL: OnceLock<RobotModel> = OnceLock::new();
-    MODEL.get_or_init(|| RobotModel::new().expect("every part has a surface"))
+fn model() -> &'static RobotMeshes {
+    static MODEL: OnceLock<RobotMeshes> = OnceLock::new();
+    MODEL.get_or_init(|| RobotMeshes::new().expect("every part has a surface"))
 }
 
 /// A pose in which no joint stands at zero: joints 1 to 7, then the fingers half open.
@@ -27,22 +27,22 @@ fn it_is_modest_in_triangles() {
 
 #[test]
 fn every_link_is_drawn_and_none_twice() {
-    let things = model().things(3, Pose::identity(), 9);
-    assert!(things.iter().all(|thing| thing.object == 9 && thing.casts_shadow));
+    let objects = model().objects(3, Pose::identity(), 9);
+    assert!(objects.iter().all(|thing| thing.segmentation_id == 9 && thing.casts_shadow));
     let drawn = |link: usize| {
-        let own = |t: &&Thing| matches!(t.mount, Mount::Link { tree: 3, link: l, .. } if l == link);
-        things.iter().filter(own).count()
+        let own = |t: &&RenderObject| matches!(t.attachment, Attachment::Link { tree: 3, link: l, .. } if l == link);
+        objects.iter().filter(own).count()
     };
     let mut expected = vec![1; panda::DOFS];
     // The hand moves with the last link; a gel is drawn beside each finger.
     expected[panda::HAND_LINK] = 2;
     Side::BOTH.iter().for_each(|&side| expected[panda::finger_link(side)] = 2);
     assert_eq!((0..panda::DOFS).map(drawn).collect::<Vec<_>>(), expected);
-    assert_eq!(things.iter().filter(|t| matches!(t.mount, Mount::Fixed(_))).count(), 1);
+    assert_eq!(objects.iter().filter(|t| matches!(t.attachment, Attachment::Fixed(_))).count(), 1);
 }
 
 /// The shapes of the parts, posed: link (0 for the base, then one more each), solids.
-fn posed(q: &[f64; panda::DOFS]) -> Vec<(usize, Vec<Solid>)> {
+fn posed(q: &[f64; panda::DOFS]) -> Vec<(usize, Vec<RenderSolid>)> {
     let poses = forward(&panda::tree(Pose::identity(), &GripperSpec::default()), q);
     let mut parts = vec![arm::base()];
     parts.extend(arm::links());
@@ -102,13 +102,13 @@ fn the_gels_that_are_seen_are_those_that_touch() {
 
 #[test]
 fn a_camera_sees_a_pale_arm_and_dark_sensors() {
-    let things = model().things(0, Pose::translation(-0.66, 0.0, 0.0), 200);
-    let stage = Stage::new(things, Lighting::default()).expect("good light");
+    let objects = model().objects(0, Pose::translation(-0.66, 0.0, 0.0), 200);
+    let stage = RenderScene::new(objects, Lighting::default()).expect("good light");
     let tree = panda::tree(Pose::translation(-0.66, 0.0, 0.0), &GripperSpec::default());
     let links = [forward(&tree, &[0.0, -0.19, 0.0, -2.4, 0.0, 2.245, 0.79, 0.04, 0.04])];
     let view = FrameView { nodes: &[], rigid: &[], links: &links, hand_w: None };
     let picture =
-        render(&stage, &view, &Camera::third_person_table(), &mut Scratch::default()).expect("a picture");
+        Renderer::default().render(&stage, &view, &Camera::third_person_table()).expect("a picture");
     let mut tones: Vec<u32> = (0..224 * 224)
         .filter(|&i| picture.segmentation[i] == 200)
         .map(|i| picture.rgb[3 * i..3 * i + 3].iter().map(|&c| u32::from(c)).sum::<u32>() / 3)

@@ -1,0 +1,7 @@
+pub(crate) mod lathe_mesh;
+pub(crate) mod primitive_mesh;
+pub(crate) mod render_mesh;
+pub(crate) mod simplify;
+pub(crate) mod solid;
+pub(crate) mod texture_chart;
+pub(crate) mod uv_atlas;

@@ -1,0 +1,2 @@
+pub(crate) mod binning;
+pub(crate) mod sample_buffer;

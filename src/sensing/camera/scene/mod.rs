@@ -1,0 +1,2 @@
+pub(crate) mod pose;
+pub(crate) mod render_scene;

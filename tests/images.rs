@@ -1,0 +1,131 @@
+//! Pictures that people have looked at, in `tests/golden/camera`: they must come out byte for byte.
+//!
+//! Whoever changes how things look writes them anew with `SOFTVT_WRITE_GOLDEN=1 cargo test --release --test images`, and
+//! looks at them before committing.
+
+use std::{path::PathBuf, sync::Arc};
+
+use softvt::{
+    benchmark::{Plan, seed::Split},
+    geometry::{Pose, Quat, Vec3, shape::Shape},
+    physics::Params,
+    robot::RobotSpec,
+    rollout::{AssetCache, SensorAssets, SensorSuite, Simulation},
+    scene::{Camera, Layer, Lighting, Mask, Visual},
+    script::{self, EpisodeRequest},
+    sensing::{
+        camera::{Attachment, FrameView, RenderMesh, RenderObject, RenderScene, RenderedImage, Renderer},
+        tactile::TactileSpec,
+    },
+};
+
+/// Compares a picture with the one that is kept, or keeps it.
+fn check(name: &str, picture: RenderedImage) {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/golden/camera").join(name);
+    let image = picture.into_rgb_image();
+    if std::env::var_os("SOFTVT_WRITE_GOLDEN").is_some() {
+        image.save(&path).expect("the folder can be written");
+        return;
+    }
+    let kept = image::open(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display())).into_rgb8();
+    assert_eq!(kept.dimensions(), image.dimensions(), "{name}");
+    let apart = kept.as_raw().iter().zip(image.as_raw()).map(|(a, b)| a.abs_diff(*b));
+    let (count, most) = apart.fold((0, 0), |(n, most), d| (n + usize::from(d > 0), most.max(d)));
+    assert!(
+        count == 0,
+        "{name}: {count} bytes differ, by up to {most}; if that is meant, write it anew with SOFTVT_WRITE_GOLDEN=1 and look at it"
+    );
+}
+
+/// The first episode of the suite's first task before anything moves: no mechanics, only the layout.
+#[test]
+fn the_first_task_of_spatial_soft_looks_as_it_did() {
+    let suite = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("suites/spatial_soft.lua");
+    let loaded = script::load(&suite, &[]).expect("the suite loads");
+    let Plan::Suite(suite) = &loaded.plan else { panic!("it is a suite") };
+    let request = EpisodeRequest {
+        suite: suite.name.clone(),
+        task: 0,
+        episode: 0,
+        base_seed: 0,
+        split: Split::Validation,
+        shifts: Vec::new(),
+    };
+    let scene = script::Episode::open(&loaded, &request).expect("the suite opens").scene;
+    let sim =
+        Simulation::new(Arc::new(scene), &Params::default(), &RobotSpec::default(), &AssetCache::default())
+            .expect("the scene builds");
+    let looks = SensorAssets::default();
+    let fresh = || SensorSuite::new(&sim, &TactileSpec::default(), &looks);
+    let mut senses = fresh();
+    let frame = SensorSuite::frame(&sim);
+    for name in ["third_person", "wrist"] {
+        let camera = senses.camera(name).expect("the scene has it").clone().with_edge(224);
+        let picture = senses.render(&frame, &camera).expect("a picture");
+        assert_eq!(
+            picture,
+            fresh().render(&frame, &camera).expect("a picture"),
+            "{name}: what cameras share"
+        );
+        check(&format!("spatial_soft_{name}.png"), picture);
+    }
+}
+
+fn layer(mask: Mask, albedo: [f64; 3], relief_m: f64) -> Layer {
+    Layer { mask, albedo, roughness: 0.5, opacity: 1.0, relief_m }
+}
+
+/// Eight balls: plastic and metal of two roughnesses each, and four patterns.
+#[test]
+fn materials_look_as_they_did() {
+    let noise = |octaves, from, to| Mask::Noise { size_m: [0.03; 3], octaves, from, to, seed: 5 };
+    let visuals = [
+        Visual::plain([0.72, 0.10, 0.08], 0.25, 0.0),
+        Visual::plain([0.10, 0.30, 0.62], 0.9, 0.0),
+        Visual::plain([0.92, 0.72, 0.34], 0.2, 1.0),
+        Visual::plain([0.62, 0.62, 0.63], 0.55, 1.0),
+        Visual::plain([0.8; 3], 0.6, 0.0).with(layer(Mask::Checker { size_m: 0.025 }, [0.05; 3], 0.0)),
+        Visual::plain([0.86, 0.80, 0.66], 0.6, 0.0).with(layer(
+            Mask::Stripes { axis: [0.0, 0.0, 1.0], pitch_m: 0.02, share: 0.4 },
+            [0.55, 0.25, 0.08],
+            8e-4,
+        )),
+        Visual::plain([0.70, 0.48, 0.26], 0.8, 0.0).with(layer(
+            noise(4, 0.35, 0.75),
+            [0.34, 0.17, 0.06],
+            1e-3,
+        )),
+        Visual::plain([0.9; 3], 0.4, 0.0).with(layer(
+            Mask::Specks { spacing_m: 0.012, radius_m: 2.5e-3, seed: 3 },
+            [0.25, 0.12, 0.04],
+            5e-4,
+        )),
+    ];
+    let board =
+        Visual::plain([0.42, 0.43, 0.45], 0.7, 0.0).with(layer(noise(3, 0.3, 0.8), [0.36, 0.37, 0.39], 0.0));
+    let still = |name: String, object, shape: &Shape, visual: Visual, at: [f64; 3]| RenderObject {
+        mesh: Arc::new(RenderMesh::of_shape(&name, shape, &[visual]).expect("a surface")),
+        name,
+        segmentation_id: object,
+        attachment: Attachment::Fixed(Pose::from_parts(Vec3::from(at).into(), Quat::identity())),
+        casts_shadow: true,
+    };
+    let slab = Shape::Box { half: Vec3::new(0.6, 0.6, 0.02) };
+    let mut things = vec![still("board".to_owned(), 1, &slab, board, [0.0, 0.0, -0.02])];
+    for (i, visual) in visuals.into_iter().enumerate() {
+        let at = [if i < 4 { -0.08 } else { 0.08 }, 0.13 * (i % 4) as f64 - 0.195, 0.05];
+        things.push(still(format!("ball {i}"), i as u16 + 2, &Shape::Sphere { radius: 0.05 }, visual, at));
+    }
+    let eye = Vec3::new(0.75, 0.0, 0.55);
+    let turn = Quat::face_towards(&(eye - Vec3::new(0.0, 0.0, 0.03)), &Vec3::z());
+    let camera = Camera {
+        pose: Pose::from_parts(eye.into(), turn),
+        width: 288,
+        height: 160,
+        fovy_rad: 0.38,
+        ..Camera::third_person_table()
+    };
+    let stage = RenderScene::new(things, Lighting::default()).expect("good light");
+    let picture = Renderer::default().render(&stage, &FrameView::empty(), &camera).expect("a picture");
+    check("materials.png", picture);
+}
