@@ -1,66 +1,33 @@
-//! Lua: the only room that knows it. Sandbox, bindings, options, plans, experts, stubs.
+//! Lua: the only module that knows it.
+//!
+//! Layers, each of which uses those before it: `vm` (the sandboxed virtual machine), `schema` (checked tables and objects),
+//! `api` (everything a script reaches as `softvt.…`), `plan` (loading a file), `run` (episodes, experts, experiments).
 
-mod articulated;
-mod budget;
-mod catalogue;
-mod catalogue_classes;
-mod catalogue_conditions;
-mod catalogue_joints;
-mod catalogue_policy;
-mod catalogue_shapes;
-mod catalogue_visuals;
-mod catalogue_world;
-mod classes_world;
-mod conditions;
-mod controller;
-mod data;
-mod deadline;
-mod envelope_api;
-mod episode;
-mod error;
-mod experiment;
-mod expert;
-mod host;
-mod image_api;
-mod lists;
-mod numbers;
-mod observation_api;
-mod options;
-mod origin;
+mod api;
 mod plan;
-mod policy_file;
-mod pose;
-mod position;
-mod profile_file;
-mod random;
-mod range;
-mod reach;
-mod sandbox;
-mod scene_api;
+mod run;
 pub mod schema;
-mod shapes;
-mod sim_api;
-mod sources;
 pub mod stubs;
-mod timing;
-mod touch_api;
-mod turn;
-mod view_api;
-mod visuals;
-mod world_api;
+mod vm;
 
-pub use controller::ExpertController;
-pub use deadline::{Clock, Deadline, OnStuck, Pause, end_process};
-pub use episode::{Episode, EpisodeRequest, Scenes, check_shift};
-pub use error::ScriptError;
-pub use experiment::{Experiment, Finish, Row};
-pub use expert::{Expert, ExpertCommand, ExpertView, Felt, Grip, ObjectView};
-pub use options::{OptionSpec, OptionValue};
-pub use plan::{Loaded, declared_options, load, load_with};
-pub use policy_file::{LuaPolicy, PolicyFile};
-pub use profile_file::load_profile;
-pub use sandbox::{Limits, Print};
-pub use sources::{Bundle, Source, embedded, embedded_scripts, sha256};
+pub use plan::{
+    Loaded, declared_options, load, load_with,
+    options::{OptionSpec, OptionValue},
+    policy_file::{LuaPolicy, PolicyFile},
+    profile_file::load_profile,
+};
+pub use run::{
+    controller::ExpertController,
+    episode::{Episode, EpisodeRequest, Scenes, check_shift},
+    experiment::{Experiment, Finish, Row},
+    expert::{Expert, ExpertCommand, ExpertView, Felt, Grip, ObjectView},
+};
+pub use vm::{
+    Limits, Print,
+    error::ScriptError,
+    library::{Bundle, Source, embedded, embedded_scripts, sha256},
+    watchdog::{Clock, Deadline, OnStuck, Pause, end_process},
+};
 
 #[cfg(test)]
 mod tests;

@@ -2,11 +2,11 @@
 
 use std::fmt::Write;
 
-use super::{
-    catalogue::{CONSTRUCTORS, LAYOUT, PLAIN},
-    catalogue_classes::{CLASSES, Class, FUNCTIONS, SHAPE, Signature},
-    catalogue_shapes::{MASK, MESH, METHODS, SHAPES},
-    catalogue_visuals::{MASK_CLASS, MASKS},
+use crate::script::{
+    api::catalogue::{CONSTRUCTORS, LAYOUT, PLAIN},
+    api::catalogue_classes::{CLASSES, Class, FUNCTIONS, SHAPE, Signature},
+    api::catalogue_shapes::{MASK, MESH, METHODS, SHAPES},
+    api::catalogue_visuals::{MASK_CLASS, MASKS},
     schema::{Field, Presence, Record, Type},
 };
 
@@ -18,7 +18,7 @@ pub const LUARC: &str = "{\n  \"runtime.version\": \"Lua 5.4\",\n  \"workspace.l
 
 /// Every constructor that takes one table.
 fn constructors() -> impl Iterator<Item = (&'static str, &'static Record)> {
-    CONSTRUCTORS.iter().chain(super::catalogue_policy::CONSTRUCTORS).copied()
+    CONSTRUCTORS.iter().chain(crate::script::api::catalogue_policy::CONSTRUCTORS).copied()
 }
 
 /// Every table that a script may write, in order.
@@ -27,8 +27,8 @@ fn records() -> impl Iterator<Item = &'static Record> {
     let shapes = SHAPES.iter().chain(METHODS).map(|(_, record)| *record);
     made.chain([&LAYOUT])
         .chain(PLAIN.iter().copied())
-        .chain(super::catalogue_world::RECORDS.iter().copied())
-        .chain(super::catalogue_policy::PLAIN.iter().copied())
+        .chain(crate::script::api::catalogue_world::RECORDS.iter().copied())
+        .chain(crate::script::api::catalogue_policy::PLAIN.iter().copied())
         .chain(shapes)
         .chain([&MASK, &MESH])
         .chain(MASKS.iter().map(|(_, record)| *record))

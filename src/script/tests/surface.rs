@@ -5,11 +5,11 @@ use std::{collections::BTreeSet, fmt::Write, time::Duration};
 use super::{Project, limits};
 use crate::script::{
     Experiment,
-    catalogue::CONSTRUCTORS,
-    catalogue_classes::{CLASSES, FUNCTIONS, SHAPE},
-    catalogue_policy,
-    catalogue_shapes::{METHODS, SHAPES},
-    catalogue_visuals::{MASK_CLASS, MASKS},
+    api::catalogue::CONSTRUCTORS,
+    api::catalogue_classes::{CLASSES, FUNCTIONS, SHAPE},
+    api::catalogue_policy,
+    api::catalogue_shapes::{METHODS, SHAPES},
+    api::catalogue_visuals::{MASK_CLASS, MASKS},
 };
 
 /// Makes one of each class, calls everything with everything, and gives what was said.
