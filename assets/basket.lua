@@ -1,10 +1,10 @@
 -- A basket of wicker, 170 × 157 × 142 mm; inside 132 × 143 mm, with a bar to carry it by on either end.
 --
--- Its sides are low: a hand with its sensors is 205 mm wide and would stop on top of full walls, from where flat things
--- fall by 80 mm; over the low sides it reaches down and sets them down.
+-- Its sides are low, because a hand with its sensors is 205 mm wide: full walls would stop it 80 mm above the floor of the
+-- basket. Over the low sides it can place flat objects.
 --
--- 379 g, as in LIBERO (100 kg/m³ of the box around it). Its walls are 7 and 8 mm thick and plain to the touch: the weave is drawn.
-local packages = require "packages"
+-- 379 g, as in LIBERO (100 kg/m³ of the box around it). Its walls are 7 and 8 mm thick and smooth; the weave is a visual material.
+local packaging = require "packaging"
 
 local mask = softvt.mask
 local mm = 1e-3
@@ -31,7 +31,7 @@ for _, side in ipairs { -1, 1 } do
   for _, y in ipairs { -28, 28 } do rim(rod("z", 3.5, 18, { side * 80, y, 131 })) end
 end
 
--- One layer of the look after the other.
+-- Layers of the visual material.
 local layers = {}
 local function lay(where, albedo, opacity)
   table.insert(layers, { mask = where, albedo = albedo, roughness = 0.6, opacity = opacity or 1 })
@@ -72,7 +72,7 @@ lay(wound, WILLOW)
 lay(wound:both(mask.noise { size_m = 6 * mm, octaves = 3, from = 0.35, to = 0.75, seed = 9 }), PALE, 0.8)
 lay(wound:both(middle({ 1, 1, 0.8 }, 6 * mm, 0.30, 0.84):inverted()), BARK, 0.5)
 lay(wound:both(middle({ 1, 1, 0.8 }, 6 * mm, 0.14, 1):inverted()), GAP, 0.85)
-local tag = packages.label { on = { "+x", "-x" }, out = 74 }
+local tag = packaging.label { on = { "+x", "-x" }, out = 74 }
 tag.bar(0, 84, 54, 22, { 0.10, 0.042, 0.016 })
 tag.bar(0, 84, 52.6, 20.6, { 0.60, 0.46, 0.27 })
 tag.text("PICNIC", 0, 86, 8, { 0.10, 0.042, 0.016 }, { weight = 0.2 })

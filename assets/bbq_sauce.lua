@@ -1,19 +1,19 @@
 -- A flat bottle of barbecue sauce, 47 × 29 × 107 mm.
 --
 -- 15 g, as in LIBERO (100 kg/m³ of the box around it).
-local packages = require "packages"
+local packaging = require "packaging"
 
 local mm = 1e-3
 local SAUCE, BLACK, CREAM = { 0.085, 0.017, 0.006 }, { 0.014, 0.012, 0.011 }, { 0.90, 0.80, 0.60 }
 local EMBER, FLAME, SPARK = { 0.56, 0.045, 0.008 }, { 0.82, 0.22, 0.012 }, { 0.92, 0.60, 0.06 }
 
-local glass = packages.turned {
+local glass = packaging.revolve {
   { 0, 0 }, { 23.5, 0 }, { 23.5, 73 }, { 22.5, 77 }, { 19, 83 }, { 14.5, 87 }, { 13, 91 }, { 0, 91 },
 }:scale(1, 29 / 47, 1)
-local cap = packages.turned { { 0, 88 }, { 10, 88 }, { 10, 106 }, { 9, 107 }, { 0, 107 } }:paint { material = 1 }
+local cap = packaging.revolve { { 0, 88 }, { 10, 88 }, { 10, 106 }, { 9, 107 }, { 0, 107 } }:paint { material = 1 }
 
 -- Flames on a black label. A tongue leans and tapers to its tip.
-local label = packages.label { on = { "+y", "-y" }, out = 14, round = 2 }
+local label = packaging.label { on = { "+y", "-y" }, out = 14, round = 2 }
 label.belt(7, 64, CREAM)
 label.belt(8, 63, BLACK)
 local function tongue(x, wide, high, colour)
@@ -37,7 +37,7 @@ return softvt.asset {
   name = "bbq_sauce",
   shape = glass:union(cap),
   body = softvt.rigid { density = 152.0 },
-  -- As low as the palm, 39 mm over the tool centre, lets it be.
+  -- The lowest grasp that the palm, 39 mm above the tool centre, allows.
   hints = { grasp_height_m = 70 * mm },
   visuals = { { albedo = SAUCE, roughness = 0.16, layers = label.layers }, { albedo = EMBER, roughness = 0.36 } },
 }

@@ -2,10 +2,10 @@
 --
 -- 58 g, as in LIBERO (100 kg/m³ of the box around it).
 local material = require "materials"
-local packages = require "packages"
+local packaging = require "packaging"
 
 local mm = 1e-3
-local body = packages.turned {
+local body = packaging.revolve {
   { 0, 0 }, { 26, 0 }, { 27, 1 }, { 27.6, 4 }, { 34.5, 7.5 }, { 42, 14 }, { 47.5, 22 }, { 51, 31 }, { 53, 41 }, { 53.5, 49.5 },
   { 52.6, 51 }, { 50, 51 }, { 49, 49.5 }, { 48.5, 41.5 }, { 46.6, 32.5 }, { 43.4, 24.4 }, { 38.6, 17.4 }, { 32.2, 11.8 },
   { 24, 8.4 }, { 14, 7 }, { 0, 6.6 },
@@ -25,7 +25,7 @@ return softvt.asset {
   name = "black_bowl",
   shape = body,
   body = softvt.rigid { density = 673.4 },
-  -- It is taken by its rim from above, the wall between the fingers: where the wall is, and how high the tool centre then is.
+  -- Grasped by its rim from above, with the wall between the fingers: radius of the wall, and height of the tool centre.
   hints = { grasp_rim_m = 51 * mm, grasp_width_m = 5 * mm, grasp_height_m = 43 * mm, surface_m = 6.6 * mm },
   visuals = { glaze },
 }

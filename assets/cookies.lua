@@ -1,12 +1,12 @@
 -- A box of cookies, 62 × 83 × 19 mm, lying.
 --
 -- 10 g, as in LIBERO (100 kg/m³ of the box around it).
-local packages = require "packages"
+local packaging = require "packaging"
 
 local RED, CREAM, DOUGH, CHIP = { 0.42, 0.018, 0.022 }, { 0.90, 0.81, 0.60 }, { 0.56, 0.27, 0.075 }, { 0.055, 0.018, 0.007 }
 
 -- On top, read from +x: the name, and three cookies with chips.
-local top = packages.label { on = { "+z" }, out = 19, turn = math.pi / 2 }
+local top = packaging.label { on = { "+z" }, out = 19, turn = math.pi / 2 }
 local CHIPS = { { -5.5, 3 }, { 0.5, 6 }, { 5, 2.5 }, { -2, -1 }, { 3.5, -4 }, { -5, -4.5 }, { 0, -7.5 } }
 for _, at in ipairs { { -24, -11 }, { 24, -11 }, { 0, -13 } } do
   local x, y = table.unpack(at)
@@ -23,14 +23,14 @@ top.text("CRUMBLE & CO", 0, 27.3, 3.2, CREAM, { weight = 0.16 })
 
 local layers = top.layers
 for _, face in ipairs { { { "+x", "-x" }, 31, 9 }, { { "+y", "-y" }, 41.5, 7 } } do
-  local side = packages.label { on = face[1], out = face[2] }
+  local side = packaging.label { on = face[1], out = face[2] }
   side.text("COOKIES", 0, 9.5, face[3], CREAM, { weight = 0.2 })
   table.move(side.layers, 1, #side.layers, #layers + 1, layers)
 end
 
 return softvt.asset {
   name = "cookies",
-  shape = packages.carton(62, 83, 19),
+  shape = packaging.carton(62, 83, 19),
   body = softvt.rigid { density = 100 },
   visuals = { { albedo = RED, roughness = 0.36, layers = layers } },
 }

@@ -1,4 +1,4 @@
--- A soft toy cylinder, 53 mm across and 60 mm high: coral foam with rounded edges. It stands on its end.
+-- A soft toy cylinder, 53 mm across and 60 mm high: coral foam with rounded edges. It is placed upright.
 local material = require "materials"
 
 local mm = 1e-3

@@ -1,4 +1,4 @@
--- A floor of boards to stand things on: its top is the plane z = 0 of the world. At x = 0.75, y = 0 it covers the floor of
+-- A floor of boards that supports objects: its top is the plane z = 0 of the world. At x = 0.75, y = 0 it covers the floor of
 -- scenery.floor_room board by board.
 local material = require "materials"
 

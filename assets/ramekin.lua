@@ -2,17 +2,16 @@
 --
 -- 33 g, as in LIBERO (100 kg/m³ of the box around it). A black bowl set into it rests 29.7 mm up.
 local material = require "materials"
-local packages = require "packages"
+local packaging = require "packaging"
 
 local mm = 1e-3
--- Flutes are cut into the side and end under a plain lip; above the foot they are filled up again, so that it stands on a
--- plain edge.
+-- Flutes are cut into the side below a plain lip. They are filled above the foot, so that the foot has a plain edge.
 local function flutes(depth, from, to)
   return { axis = "z", count = 40, height = depth, mask = { axis = "z", from = from * mm, to = to * mm } }
 end
-local solid = packages.turned { { 0, 0 }, { 42, 0 }, { 43.4, 32 }, { 44.5, 34.4 }, { 44.5, 41 }, { 43.5, 42 }, { 0, 42 } }
+local solid = packaging.revolve { { 0, 0 }, { 42, 0 }, { 43.4, 32 }, { 44.5, 34.4 }, { 44.5, 41 }, { 43.5, 42 }, { 0, 42 } }
   :ridges(flutes(-1 * mm, 33.5, 30)):ridges(flutes(1 * mm, 8, 4))
-local hollow = packages.turned { { 0, 6 }, { 34, 6 }, { 36.4, 9 }, { 38.5, 39 }, { 39.8, 42.1 }, { 39.8, 50 }, { 0, 50 } }
+local hollow = packaging.revolve { { 0, 6 }, { 34, 6 }, { 36.4, 9 }, { 38.5, 39 }, { 39.8, 42.1 }, { 39.8, 50 }, { 0, 50 } }
 
 -- White glaze that pools blue-green where it is thick, inside at the bottom.
 local glaze = material.ceramic { base = { 0.84, 0.85, 0.81 }, shade = { 0.76, 0.79, 0.74 }, roughness = 0.16, seed = 31 }

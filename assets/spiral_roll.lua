@@ -5,8 +5,7 @@ local material = require "materials"
 local mm = 1e-3
 local LENGTH, WIDTH, HEIGHT = 58 * mm, 47 * mm, 40 * mm
 
--- The spiral and the pleats stand on the drum and add their height to it; below the table top it is cut off, pleats and
--- all, so that it lies flat.
+-- The spiral and the pleats add their height to the drum. The part below the table top is cut off, so that it lies flat.
 local SPIRAL, PLEAT, EDGE, BELOW = 2 * mm, 1.2 * mm, 11 * mm, 2 * mm
 local radius, height = LENGTH / 2 - PLEAT, HEIGHT - SPIRAL + BELOW
 local drum = softvt.shape.cylinder { radius = radius - EDGE, height = height - 2 * EDGE }
@@ -19,7 +18,7 @@ local spiral = {
 }
 local pleats = { axis = "z", count = 14, height = PLEAT / 0.8, mask = { axis = "z", from = 31 * mm, to = 26 * mm } }
 
--- Frosting where the spiral stands out of the drum; dough in its groove and below.
+-- Frosting on the raised spiral; dough in its groove and below.
 local upper = softvt.shape.box { size = { 0.1, 0.1, 0.04 } }:translate(0, 0, 0.049)
 local groove = oval:round(0.7 * mm):intersect(upper)
 

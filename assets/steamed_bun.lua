@@ -16,7 +16,7 @@ local bun = dome:subtract(table_top, 4 * mm)
 local skin = material.dough { seed = 81 }
 for _, side in ipairs { -1, 1 } do
   local eye = softvt.shape.sphere { radius = 4 * mm }:translate(21 * mm, side * 9 * mm, 36 * mm)
-  -- Not too glossy: a lamp mirrored in an eye would make it white.
+  -- Not too glossy, since the reflection of a lamp would make an eye white.
   table.insert(skin.layers, {
     mask = softvt.mask.inside { shape = eye, soft_m = 1.5 * mm }, albedo = { 0.012, 0.011, 0.010 }, roughness = 0.6,
   })

@@ -2,11 +2,11 @@
 --
 -- 29 g, as in LIBERO (100 kg/m³ of the box around it).
 local material = require "materials"
-local packages = require "packages"
+local packaging = require "packaging"
 
 local RED, CREAM, GREEN, DARK = { 0.56, 0.022, 0.014 }, { 0.89, 0.80, 0.58 }, { 0.025, 0.19, 0.03 }, { 0.30, 0.010, 0.008 }
 
-local label = packages.label { on = { "+x", "-x" }, out = 30.2, wrap = 30.2, round = 8 }
+local label = packaging.label { on = { "+x", "-x" }, out = 30.2, wrap = 30.2, round = 8 }
 label.belt(40, 72.4, DARK)
 label.belt(38, 39, DARK)
 label.belt(4, 7, GREEN)
@@ -23,7 +23,7 @@ end
 
 return softvt.asset {
   name = "tomato_sauce",
-  shape = packages.can(),
+  shape = packaging.can(),
   body = softvt.rigid { density = 136.9 },
   visuals = { material.steel { along = "x", seed = 13 }, { albedo = CREAM, roughness = 0.42, layers = label.layers } },
 }

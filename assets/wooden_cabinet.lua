@@ -1,7 +1,7 @@
 -- A wooden cabinet, 255 × 221 × 218 mm with its handles, with three drawers that slide out of its front (−y) by 150 mm.
 --
 -- Inside, each drawer is 225 × 174 mm and 40 mm deep under its rim. Open by q it shows q of its length in front of the
--- cabinet: at 0.12 m a bowl of 107 mm stands in the top drawer with 13 mm to spare along the drawer and 118 mm across it.
+-- cabinet: at 0.12 m a bowl of 107 mm fits into the top drawer with 13 mm to spare along the drawer and 118 mm across it.
 -- Panels are 8 mm, walls of drawers 5 mm thick; all of it is boxes, so that contact with it is exact.
 local material = require "materials"
 
@@ -29,7 +29,7 @@ for level = 0, 3 do
   if level < 3 then body = body:union(block(-half + PANEL, half - PANEL, FRONT, BACK - PANEL, z, z + PANEL)) end
 end
 
--- The drawer of a level (0 is the lowest), shut.
+-- The closed drawer of a level (0 is the lowest).
 local function drawer(level)
   local z = level * bay + PANEL + PLAY
   local side, back, rim = half - PANEL - PLAY - 0.25, BACK - PANEL - PLAY, z + WALL + 40

@@ -1,4 +1,4 @@
--- The names of all assets, in the order in which pages and tables show them.
+-- Names of all assets, in the order of pages and tables.
 return {
   soft = {
     "spiral_roll", "steamed_bun", "twisted_stick", "long_roll", "small_ridged_roll", "sesame_bun", "croissant", "curved_layered",
@@ -8,5 +8,5 @@ return {
     "black_bowl", "plate", "ramekin", "basket", "alphabet_soup", "tomato_sauce", "bbq_sauce", "ketchup", "salad_dressing", "milk",
     "orange_juice", "butter", "cream_cheese", "cookies", "chocolate_pudding",
   },
-  furniture = { "wooden_cabinet", "flat_stove" },
+  articulated = { "wooden_cabinet", "flat_stove" },
 }

@@ -1,15 +1,15 @@
--- Calibrates soft assets after the SoftVTBench paper (appendix C.3), with the expert's own grasp.
+-- Calibrates soft assets by the protocol of the SoftVTBench paper (appendix C.3), with the expert's grasp.
 --
--- Lower bound: closures from loose to tight, each tried in five grasp–lift–hold trials that miss the middle by up to 5 mm
--- and 10°; the smallest closure at which all hold. Upper bound: the settled object is squeezed where it lies, step by
--- step; D_ref is the largest stable deformation and τ = κ D_ref. Between the last stable step and the first that is
--- not, a second squeeze goes in steps an eighth as large, so that D_ref does not hang on the step.
+-- Lower bound: the smallest closure, from loose to tight, at which five grasp–lift–hold trials succeed. Trials are displaced by
+-- up to 5 mm and 10°. Upper bound: the settled object is squeezed in place, step by step. D_ref is the largest stable
+-- deformation, and τ = κ D_ref. A second squeeze between the last stable and the first unstable step uses steps an eighth as
+-- large, so that D_ref does not depend on the step.
 --
 --   softvt scripts/calibrate.lua --asset spiral_roll,sesame_bun
 --
--- Writes assets/calibration/<asset>.json, the sweep rows in SoftVTBench's fields and the envelope's plot beside it, and
--- scripts/calibrated.lua; where all standard assets are calibrated, docs/calibration.md too, which shows all plots.
-local envelopes = require "envelopes"
+-- Writes assets/calibration/<asset>.json, the rows of the sweep in SoftVTBench's fields, the plot of the envelope, and
+-- scripts/calibrated.lua. If all standard assets are calibrated, it also writes docs/calibration.md with all plots.
+local calibration_page = require "calibration_page"
 local grasp = require "experts.grasp"
 local known = require "calibrated"
 local soft_assets = require("asset_names").soft
@@ -19,41 +19,41 @@ local opt = softvt.options {
   asset = { default = soft_assets, help = "assets to calibrate" },
   step = { default = 0.02, min = 0.002, max = 0.2, help = "step of the closure" },
   trials = { default = 5, integer = true, min = 1, max = 100, help = "hold trials at each closure" },
-  hold_s = { default = 2, unit = "s", min = 0.1, max = 60, help = "how long a trial holds" },
-  kappa = { default = 0.5, min = 0.05, max = 1, help = "share of the largest stable deformation that is safe" },
+  hold_s = { default = 2, unit = "s", min = 0.1, max = 60, help = "duration of a trial's hold" },
+  kappa = { default = 0.5, min = 0.05, max = 1, help = "τ as a fraction of the largest stable deformation" },
 }
 
--- Files are served from here on by name, so every asset is read when the plan is made.
+-- Episodes use only files that were read when the plan was made, so every asset is required here.
 local assets = {}
 for _, name in ipairs(opt.asset) do assets[name] = require("assets." .. name) end
 
-local OFFSET, TURN = 0.005, math.rad(10)  -- how far trials miss the middle
-local LIFT, SLIP_MM = 0.10, 2             -- m; mm of slip that fails a trial
-local QUIET_S, QUIET_SPEED = 0.5, 0.005   -- s and m/s of a squeeze at rest
-local PATIENCE_S = 3                      -- s that a squeeze may take to come to rest
-local FINE = 8                            -- fine steps in one step
+local OFFSET, TURN = 0.005, math.rad(10)  -- largest displacement of trials, m and rad
+local LIFT, SLIP_MM = 0.10, 2             -- lift, m; slip that fails a trial, mm
+local REST_S, REST_SPEED = 0.5, 0.005     -- duration and node speed of a squeeze at rest, s and m/s
+local REST_TIMEOUT_S = 3                  -- largest time until a squeeze is at rest, s
+local FINE = 8                            -- fine steps per step
 local BEYOND = 3                          -- closures tried beyond the first that holds, for the plot
-local TOUCH_N = 1e-3
+local CONTACT_N = 1e-3                    -- pad force that counts as contact, N
 
--- The object alone on the table. A trial's `miss` is drawn with the scene, so that it depends on the asset and the number
--- of the trial alone: closures differ by nothing else.
-local function alone(name, miss)
+-- A layout of the object alone on the table. The displacement of a trial is drawn with the scene, so it depends only on the asset and
+-- the index of the trial, not on the closure.
+local function single_object(name, displacement)
   return softvt.layout("calibrate_" .. name, function(scene, rng)
     scene:add { name = "table", asset = table_top, xyz = { 0, 0, 0 } }
     scene:add { name = "object", asset = assets[name], at = { -0.05, 0 } }
-    if miss then
-      miss.offset = { rng:uniform(-OFFSET, OFFSET), rng:uniform(-OFFSET, OFFSET) }
-      miss.turn = rng:uniform(-TURN, TURN)
+    if displacement then
+      displacement.offset = { rng:uniform(-OFFSET, OFFSET), rng:uniform(-OFFSET, OFFSET) }
+      displacement.turn = rng:uniform(-TURN, TURN)
     end
   end)
 end
 
--- Takes the object at a closure, as the expert does; `miss` displaces the grasp.
-local function take(closure, miss)
+-- Grasps the object at a closure, as the expert does, displaced by `displacement`.
+local function grasp_at(closure, displacement)
   return function(arm, scene)
     local object = scene:object "object"
     local height = grasp.height(object)
-    local at = grasp.pose(object, height, miss and miss.offset, miss and miss.turn)
+    local at = grasp.pose(object, height, displacement and displacement.offset, displacement and displacement.turn)
     arm:move_to(at:moved { 0, 0, 0.08 }, { speed = 0.6, turn = 3 })
     arm:move_to(at, { speed = 0.25 })
     arm:wait(0.1)
@@ -64,32 +64,32 @@ end
 
 local function lift(arm) arm:move_by({ 0, 0, LIFT }, { speed = 0.25 }) end
 
--- The closure at which the gels are a step away from touching an object, on the grid of steps.
-local function loose(name, step)
+-- The largest closure on the grid of steps at which the gels do not touch the object.
+local function first_closure(name, step)
   local view
-  softvt.simulate { layout = alone(name) }:drive(function(arm, scene)
+  softvt.simulate { layout = single_object(name) }:drive(function(arm, scene)
     view = scene:object "object"
     arm:wait(0.05)
   end)
   return math.floor((1 - grasp.width(view) / 0.08) / step) * step
 end
 
--- How far the object has fallen behind the tool since `before`, mm.
+-- Distance by which the object has fallen behind the tool since `before`, mm.
 local function lag_mm(sim, before)
   local tool, seen = sim:tool(), sim:watch "object"
   return 1e3 * ((tool[3] - before.tool) - (seen.height_m - before.height))
 end
 
-local function mark(sim) return { tool = (sim:tool())[3], height = sim:watch "object".height_m } end
+local function heights(sim) return { tool = (sim:tool())[3], height = sim:watch "object".height_m } end
 
--- Grasp–lift–hold trial number `k`: whether it held, how far the object slipped (mm) and its peak D (%).
-local function trial(name, closure, k, hold_s)
-  local miss = {}
-  local sim = softvt.simulate { layout = alone(name, miss), episode = k }
-  local ok = sim:drive(take(closure, miss))
-  local before = mark(sim)
+-- Grasp–lift–hold trial `k`. Returns whether it held, the slip (mm) and the peak D (%).
+local function hold_trial(name, closure, k, hold_s)
+  local displacement = {}
+  local sim = softvt.simulate { layout = single_object(name, displacement), episode = k }
+  local ok = sim:drive(grasp_at(closure, displacement))
+  local before = heights(sim)
   ok = ok and sim:drive(lift)
-  -- What has not come along by now never will.
+  -- An object that was not lifted by now is not held.
   if ok and lag_mm(sim, before) < 0.5e3 * LIFT then ok = sim:wait(hold_s) end
   local slip = math.abs(lag_mm(sim, before))
   local seen = sim:watch "object"
@@ -102,7 +102,7 @@ local function scan_holds(name, first, o)
   while closure <= 1 and beyond <= BEYOND do
     local row = { asset = name, kind = "hold", closure = closure, trials = o.trials, held = 0, slip_mm = 0, d_peak_pct = 0 }
     for k = 1, o.trials do
-      local result = trial(name, closure, k, o.hold_s)
+      local result = hold_trial(name, closure, k, o.hold_s)
       if result.held then row.held = row.held + 1 end
       row.slip_mm = math.max(row.slip_mm, result.slip_mm)
       row.d_peak_pct = math.max(row.d_peak_pct, result.d_peak_pct)
@@ -114,22 +114,22 @@ local function scan_holds(name, first, o)
   return rows
 end
 
--- One closure of a squeeze: closes on and waits until it has been quiet for long enough, or for as long as it may take.
--- What a row says of speed, det F and contact is of the last QUIET_S seconds.
+-- One step of a squeeze: closes further and waits until the object is at rest or the timeout passes. Speed, det F and contact of
+-- a row are those of the last REST_S seconds.
 local function squeeze(sim, name, closure)
   local row = { asset = name, kind = "sweep", closure = closure, stable = false }
   local ok, problem = sim:drive(function(arm) arm:close_to(closure, { rate = 0.2 }) end)
-  local waited, quiet = 0, 0
-  while ok and quiet < QUIET_S and waited < PATIENCE_S do
+  local elapsed_s, resting_s = 0, 0
+  while ok and resting_s < REST_S and elapsed_s < REST_TIMEOUT_S do
     ok, problem = sim:wait(0.05)
-    waited = waited + 0.05
+    elapsed_s = elapsed_s + 0.05
     local seen = sim:watch "object"
-    local touching = math.min(table.unpack(seen.pad_force)) > TOUCH_N
-    if quiet == 0 then row.min_det_f, row.node_speed_m_s, row.both_pads = math.huge, 0, true end
+    local touching = math.min(table.unpack(seen.pad_force)) > CONTACT_N
+    if resting_s == 0 then row.min_det_f, row.node_speed_m_s, row.both_pads = math.huge, 0, true end
     row.min_det_f = math.min(row.min_det_f, seen.min_det_f or 1)
     row.node_speed_m_s = math.max(row.node_speed_m_s, seen.speed)
     row.both_pads = row.both_pads and touching
-    quiet = seen.speed < QUIET_SPEED and quiet + 0.05 or 0
+    resting_s = seen.speed < REST_SPEED and resting_s + 0.05 or 0
   end
   if not ok then return nil, problem end
   local seen = sim:watch "object"
@@ -146,11 +146,11 @@ local function squeeze(sim, name, closure)
   return row
 end
 
--- Squeezes from `first` on by `step` and adds the rows, until a squeeze that was stable is so no more (or the physics
--- gives up, or the gripper is shut); gives the last stable closure and whether something came after it.
+-- Squeezes from `first` in steps of `step` and appends the rows. Ends at the first unstable squeeze after a stable one, at a failed
+-- physics step, or with the gripper closed. Returns the last stable closure, and true if an unstable one followed.
 local function sweep(name, first, step, rows)
-  local sim = softvt.simulate { layout = alone(name) }
-  sim:drive(take(first))
+  local sim = softvt.simulate { layout = single_object(name) }
+  sim:drive(grasp_at(first))
   local last
   local closure = first
   while closure <= 1 + 1e-9 do
@@ -163,10 +163,10 @@ local function sweep(name, first, step, rows)
   return last, false
 end
 
--- A point is one half of an asset's calibration, so that halves and assets run side by side.
+-- The holds and the sweep of each asset are separate points, so that they run in parallel.
 local function run(point, o)
   local name = point.asset
-  local first = loose(name, o.step)
+  local first = first_closure(name, o.step)
   if point.part == "hold" then return scan_holds(name, first, o) end
   local rows = {}
   local last, more = sweep(name, first, o.step, rows)
@@ -174,7 +174,7 @@ local function run(point, o)
   return rows
 end
 
--- The rows of one kind without what the envelope does not know.
+-- The rows of one kind, reduced to the fields of the envelope.
 local function pick(rows, name, kind)
   local picked = {}
   for _, row in ipairs(rows) do
@@ -190,8 +190,8 @@ end
 
 local function library_of(closures)
   local lines = {
-    "-- Closures that a calibration found, by asset: the smallest that holds, and the one that deforms by τ.",
-    "-- Written by scripts/calibrate.lua; the experts close in between.", "return {",
+    "-- Calibrated closures per asset: the smallest that holds, and the one at which D equals τ.",
+    "-- Written by scripts/calibrate.lua; experts close to a value in between.", "return {",
   }
   for name, c in pairs(closures) do
     lines[#lines + 1] = ("  %s = { lower = %.4f, at_tau = %.4f },"):format(name, c.lower, c.at_tau)
@@ -200,7 +200,7 @@ local function library_of(closures)
   return table.concat(lines, "\n")
 end
 
--- Whether all standard assets are among `found`.
+-- True if all standard assets are in `found`.
 local function complete(found)
   for _, name in ipairs(soft_assets) do
     if not found[name] then return false end
@@ -232,7 +232,7 @@ local function finish(rows, o)
     closures[name] = found.safe_window and { lower = found.lower, at_tau = found.closure_at_tau } or nil
   end
   files["scripts/calibrated.lua"] = library_of(closures)
-  if complete(envelope_of) then files["docs/calibration.md"] = envelopes(soft_assets, envelope_of) end
+  if complete(envelope_of) then files["docs/calibration.md"] = calibration_page(soft_assets, envelope_of) end
   return { text = table.concat(text, "\n"), files = files }
 end
 

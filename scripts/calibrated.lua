@@ -1,5 +1,5 @@
--- Closures that a calibration found, by asset: the smallest that holds, and the one that deforms by τ.
--- Written by scripts/calibrate.lua; the experts close in between.
+-- Calibrated closures per asset: the smallest that holds, and the one at which D equals τ.
+-- Written by scripts/calibrate.lua; experts close to a value in between.
 return {
   braided_roll = { lower = 0.4800, at_tau = 0.6333 },
   capsule = { lower = 0.4800, at_tau = 0.7683 },

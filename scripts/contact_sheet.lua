@@ -1,31 +1,31 @@
--- A contact sheet: every asset alone on the table, seen from near by, in one picture.
+-- A contact sheet: a close view of every asset on the table, in one image.
 --
 --   softvt scripts/contact_sheet.lua
 --   softvt scripts/contact_sheet.lua --asset my_pastry --write my_pastry.png
 local names = require "asset_names"
-local studio = require "studio"
+local views = require "asset_views"
 
--- Soft things first, then what they meet, then what stands around; the table and the floor are under all of them.
+-- Soft objects, rigid objects, articulations. The table and the floor are not listed.
 local STANDARD = {}
-for _, group in ipairs { names.soft, names.rigid, names.furniture } do
+for _, group in ipairs { names.soft, names.rigid, names.articulated } do
   table.move(group, 1, #group, #STANDARD + 1, STANDARD)
 end
 
 local opt = softvt.options {
   asset = { default = STANDARD, help = "assets to draw" },
-  write = { default = "docs/pictures/assets.png", help = "the picture to write" },
-  columns = { default = 6, integer = true, min = 1, max = 12, help = "pictures side by side" },
-  edge = { default = 320, unit = "pixels", integer = true, min = 64, max = 1024, help = "edge of each picture" },
+  write = { default = "docs/pictures/assets.png", help = "image file to write" },
+  columns = { default = 6, integer = true, min = 1, max = 12, help = "images per row" },
+  edge = { default = 320, unit = "pixels", integer = true, min = 64, max = 1024, help = "edge of each image" },
 }
 
--- Files are served from here on by name, so every asset is read when the plan is made.
+-- Episodes use only files that were read when the plan was made, so every asset is required here.
 local assets = {}
 for _, name in ipairs(opt.asset) do assets[name] = require("assets." .. name) end
 
 local WORDS, GROUND = { 40, 44, 50 }, { 244, 243, 240 }
-local LABEL = 34  -- pixels under each picture
+local LABEL = 34  -- pixels below each image
 
-local function size_of(name) return studio.size(assets[name]) end
+local function size_of(name) return views.size(assets[name]) end
 
 return softvt.experiment {
   name = "contact_sheet",
@@ -43,7 +43,7 @@ return softvt.experiment {
     local sheet = softvt.image { width = columns * opt.edge, height = rows * cell, colour = GROUND }
     for index, name in ipairs(opt.asset) do
       local x, y = (index - 1) % columns * opt.edge, (index - 1) // columns * cell
-      sheet:paste(studio.portrait(assets[name], opt.edge), x, y)
+      sheet:paste(views.portrait(assets[name], opt.edge), x, y)
       local words = ("%s, %.0f mm"):format(name:gsub("_", " "), 1e3 * math.max(table.unpack(size_of(name))))
       sheet:text(words, { at = { x + 12, y + opt.edge + 23 }, size = 19, colour = WORDS })
     end

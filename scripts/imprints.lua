@@ -1,16 +1,15 @@
--- What the fingers see of each soft asset in the expert's grasp: the tactile picture, its markers, and their motion, in one
--- panel; and the numbers behind it.
+-- Tactile images of each soft asset in the expert's grasp: image, markers and marker motion in one panel, and their numbers.
 --
 --   softvt scripts/imprints.lua
 --   softvt scripts/imprints.lua --asset my_pastry --write my_imprint.png
 local soft_assets = require("asset_names").soft
-local studio = require "studio"
+local views = require "asset_views"
 
 local opt = softvt.options {
   asset = { default = soft_assets, help = "soft assets to grasp" },
   lift_mm = { default = 60, unit = "mm", min = 0, max = 200, help = "height of the lift" },
-  write = { default = "docs/pictures/imprints.png", help = "the picture to write" },
-  columns = { default = 2, integer = true, min = 1, max = 6, help = "assets side by side" },
+  write = { default = "docs/pictures/imprints.png", help = "image file to write" },
+  columns = { default = 2, integer = true, min = 1, max = 6, help = "assets per row" },
 }
 
 local assets = {}
@@ -20,7 +19,7 @@ local WORDS, GROUND = { 40, 44, 50 }, { 244, 243, 240 }
 local LABEL, GAP = 28, 6  -- pixels
 local WIDTH, HEIGHT = 240, 180
 
-local function held(name) return studio.held(assets[name], opt.lift_mm * 1e-3) end
+local function held(name) return views.held(assets[name], opt.lift_mm * 1e-3) end
 
 -- Mean motion of the markers, px.
 local function drift(felt)

@@ -1,5 +1,5 @@
--- Looks for assets: each function gives one entry of an asset's `visuals`. Colours are linear RGB; every field of the table
--- that it takes may be left out.
+-- Visual materials: each function returns one entry of an asset's `visuals`. Colours are linear RGB; all arguments are
+-- optional.
 --
 --   local material = require "materials"
 --   visuals = { material.ceramic {}, material.crust { top = { 0.5, 0.2, 0.04 } } }
@@ -12,13 +12,12 @@ local function layer(where, albedo, roughness, opacity, relief_m)
   return { mask = where, albedo = albedo, roughness = roughness, opacity = opacity or 1, relief_m = relief_m or 0 }
 end
 
--- Fine unevenness of a skin: it is drawn only.
+-- Fine surface roughness, visual only.
 local function pores(size, depth, seed, base)
   return layer(mask.noise { size_m = size, octaves = 2, from = 0.3, to = 0.7, seed = seed }, base, 0.5, 0, depth)
 end
 
--- A baked crust: pale at its foot, browner where it faced the heat, with darker blisters. `sheen` is the roughness of the
--- egg wash.
+-- A baked crust: pale at the bottom, brown at the top, with dark blisters. `sheen` is the roughness of the egg wash.
 function material.crust(o)
   local base, top = o.base or { 0.66, 0.36, 0.11 }, o.top or { 0.40, 0.16, 0.035 }
   local foot, sheen, seed = o.foot or { 0.80, 0.58, 0.30 }, o.sheen or 0.36, o.seed or 1
@@ -72,7 +71,7 @@ function material.seeds(o)
   }
 end
 
--- Flour dusted on what faces up, over any look.
+-- Flour on upward-facing surfaces, on top of another material.
 function material.floured(look, o)
   local dust = mask.noise { size_m = o.size_m or 3 * mm, octaves = 3, from = 0.5, to = 0.8, seed = o.seed or 1 }
   look.layers = look.layers or {}
@@ -169,7 +168,7 @@ function material.fabric(o)
   }
 end
 
--- Paint on plaster or boards: nearly one colour, not quite.
+-- Paint on plaster or boards, with slight variations of colour.
 function material.paint(o)
   local base, seed = o.base or { 0.30, 0.33, 0.33 }, o.seed or 1
   local worn = o.worn or { base[1] * 0.82, base[2] * 0.82, base[3] * 0.82 }

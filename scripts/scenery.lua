@@ -1,4 +1,4 @@
--- What stands around a scene. It is drawn and never touched: physics does not know it.
+-- Visual surroundings of a scene, without collision.
 local material = require "materials"
 local mask = softvt.mask
 local mm = 1e-3
@@ -11,7 +11,7 @@ local function seen(name, shape, look)
   return softvt.asset { name = name, shape = shape, body = softvt.scenery {}, visuals = { look } }
 end
 
--- A board floor whose top is its origin; darker where something stands close above it (`under`, a shape).
+-- A board floor whose top is its origin; darker close below the shape `under`.
 local function floor(under)
   local look = material.floorboards()
   if under then
@@ -33,7 +33,7 @@ local skirting = seen(
   material.paint { base = { 0.62, 0.60, 0.55 }, seed = 33 }
 )
 
--- Legs and apron of the table; its top is an asset of its own, since things stand on it.
+-- Legs and apron of the table. The table top is an asset, because objects rest on it.
 local LEG, HIGH = 0.07, 0.85
 local legs
 for _, x in ipairs { -0.53, 0.53 } do
@@ -63,13 +63,13 @@ local function walls(scene, floor_z)
   scene:add { name = "side_skirting", asset = skirting, xyz = { 0.75, 2.5, floor_z }, yaw = -math.pi / 2 }
 end
 
--- A room around a scene whose support is its floor, z = 0: walls behind the robot and on the side away from the light. The
--- floor is the scene's own: assets/floor.lua.
+-- A room for scenes supported by the floor, z = 0: walls behind the robot and on the side away from the light. The floor
+-- itself is an asset, assets/floor.lua.
 function scenery.floor_room(scene)
   walls(scene, 0)
 end
 
--- A room around a scene whose support is a table with its top at z = 0, the robot beside it on a stand.
+-- A room for scenes supported by a table with its top at z = 0, with the robot on a stand next to it.
 function scenery.table_room(scene)
   local floor_z = -HIGH - 0.05
   scene:add { name = "floor", asset = shaded_floor, xyz = { 0.75, 0, floor_z } }

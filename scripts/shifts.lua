@@ -1,5 +1,5 @@
--- Changes of a scene that a suite may declare: factors on the material of every object that has it, on the mass of all that
--- moves, and on the light; and the standard conditions, which change one of them at a time.
+-- Shifts that a suite may declare: factors on material parameters of all objects, on the mass of everything that moves, and on the
+-- light. Also the nine standard conditions, which change one factor at a time.
 
 local function factor(name, keys, min, max)
   return softvt.shift {
@@ -17,7 +17,7 @@ end
 
 local shifts = {
   stiffness = factor("stiffness", { "youngs_pa" }, 0.01, 100),
-  -- Of soft and rigid bodies, and of the moving parts of furniture; sizes stay.
+  -- Applies to soft and rigid bodies and to the moving parts of articulations; sizes stay.
   mass = softvt.shift {
     name = "mass", unit = "1", default = 1, min = 0.01, max = 100,
     apply = function(scene, value)
@@ -25,7 +25,7 @@ local shifts = {
       return scene
     end,
   },
-  -- Of two surfaces the larger coefficient counts: that of the pads is a setting, robot.pads.
+  -- A pair of surfaces takes the larger coefficient. The friction of the pads is a setting, robot.pads.
   friction = factor("friction", { "static_mu", "dynamic_mu" }, 0, 10),
   light = softvt.shift {
     name = "light", unit = "1", default = 1, min = 0.01, max = 20,
@@ -37,14 +37,14 @@ local shifts = {
   },
 }
 
--- What suites of soft and of rigid objects declare.
+-- The shifts of soft and of rigid suites.
 shifts.soft = { shifts.mass, shifts.stiffness, shifts.light, shifts.friction }
 shifts.rigid = { shifts.mass, shifts.light, shifts.friction }
 
 -- Three levels of light, as factors on lamp and sky.
 shifts.lights = { { "dim", 0.3 }, { "low", 0.6 }, { "bright", 2 } }
 
--- The nine standard conditions. Stiffness can change nothing of what does not deform.
+-- The nine standard conditions. Stiffness applies to deformable suites only.
 shifts.conditions = {}
 for _, factor in ipairs { 1.25, 1.75, 2.5 } do
   table.insert(shifts.conditions, { name = "mass x" .. factor, shift = { mass = factor } })

@@ -1,12 +1,12 @@
--- The squeeze: a free soft body on a table is gripped by two rigid flat pads with sharp edges, lifted and held. Motions are
--- prescribed, so that other simulators and static solutions can be compared with it row by row. D is measured from the
--- shape at rest, not from the settled one as in the benchmark.
+-- The squeeze experiment: two rigid flat pads with sharp edges grip, lift and hold a free soft body. Motions are prescribed, so
+-- that other simulators and static solvers can be compared row by row. D is measured from the rest shape, not from the settled
+-- shape as in the benchmark.
 --
 --   softvt scripts/squeeze.lua --gap-mm 48,42,36 --json
 local mm = 1e-3
 
 local opt = softvt.options {
-  shape = { default = "cube", choices = { "cube", "sphere", "cylinder", "capsule" }, help = "what is squeezed; cylinder and capsule lie on their side" },
+  shape = { default = "cube", choices = { "cube", "sphere", "cylinder", "capsule" }, help = "shape of the body; cylinder and capsule lie on their side" },
   size_mm = { default = 50, unit = "mm", min = 1, max = 1000, help = "edge of the cube" },
   radius_mm = { default = 25, unit = "mm", min = 1, max = 500, help = "radius of the round shapes" },
   length_mm = { default = 80, unit = "mm", min = 1, max = 1000, help = "total length of cylinder and capsule" },
@@ -18,7 +18,7 @@ local opt = softvt.options {
   beta_s = { default = 2e-3, unit = "s", min = 0, max = 1, help = "stiffness-proportional damping" },
   pad_mm = { default = 22, unit = "mm", min = 1, max = 200, help = "edge of the pads" },
   pad_offset_mm = { default = { 0, 0 }, unit = "mm", help = "pads moved along y and z" },
-  gap_mm = { default = { 48, 46, 44, 42, 38, 34, 30 }, unit = "mm", help = "distances of the closed pads, a row each" },
+  gap_mm = { default = { 48, 46, 44, 42, 38, 34, 30 }, unit = "mm", help = "distances of the closed pads, one row each" },
   lift_mm = { default = 100, unit = "mm", min = 0, max = 1000, help = "height of the lift" },
   hold_s = { default = 0.5, unit = "s", min = 0, max = 600, help = "time in the air" },
   dt = { default = 1 / 60, unit = "s", min = 1e-4, max = 0.05, help = "time step" },
@@ -29,7 +29,7 @@ local CLEARANCE, CLOSING = 2 * mm, 0.04  -- m and m/s, each pad
 local PAD_THICKNESS = 10 * mm
 local GRIP_WINDOW_S, HOLD_WINDOW_S = 0.05, 0.3
 
--- The shape, centred and lying; its width between the pads, which is its height too.
+-- Returns the centred shape, and its width between the pads, which equals its height.
 local function shape_of(o)
   local radius, length = o.radius_mm * mm, o.length_mm * mm
   local lying = { axis = "x", angle = math.pi / 2 }
@@ -58,13 +58,13 @@ local function build(o)
   return { world = world, body = body, pads = pads, width = width }
 end
 
--- Minimum-jerk share of the way (Flash and Hogan, 1985).
+-- Minimum-jerk time scaling on [0, 1] (Flash and Hogan, 1985).
 local function smooth(u)
   u = math.max(0, math.min(1, u))
   return u * u * u * (10 + u * (6 * u - 15))
 end
 
--- Where the inner faces are (distance from the middle, rise) at a time.
+-- Position of the pads' inner faces (distance from the centre plane, rise) as a function of time.
 local function motion(o, width, gap)
   local open = width / 2 + CLEARANCE
   local closed_at = SETTLE_S + (open - gap / 2) / CLOSING

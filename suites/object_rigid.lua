@@ -1,4 +1,4 @@
--- Object-Rigid: ten groceries, one basket; the prompt says which one to put into it (LIBERO's object suite).
+-- Object-Rigid: the prompt names one of ten groceries to put into the basket (LIBERO's object suite).
 local layouts = require "layouts.floor"
 local pick_place = require "experts.pick_place"
 local shifts = require "shifts"

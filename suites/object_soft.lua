@@ -1,9 +1,9 @@
--- Object-Soft: ten soft things, one basket; each stands among the distractors of the same task of Object-Rigid.
+-- Object-Soft: ten soft objects to put into the basket, each among the distractors of the same task of Object-Rigid.
 local layouts = require "layouts.floor"
 local pick_place = require "experts.pick_place"
 local shifts = require "shifts"
 
-local things = {
+local objects = {
   { "steamed_bun", "pale cream round steamed-bun pastry" },
   { "croissant", "soft pastry" },
   { "yellow_roll", "soft pastry" },
@@ -17,10 +17,10 @@ local things = {
 }
 
 local tasks = {}
-for k, thing in ipairs(things) do
-  local asset, says = thing[1], thing[2]
+for k, object in ipairs(objects) do
+  local asset, description = object[1], object[2]
   tasks[k] = softvt.task {
-    prompt = ("pick up the %s and place it in the basket"):format(says),
+    prompt = ("pick up the %s and place it in the basket"):format(description),
     layout = layouts.soft(asset, k),
     goal = softvt.inside { object = asset, target = "basket", hold_s = 0.4 },
     expert = pick_place { object = asset, target = "basket" },

@@ -1,5 +1,5 @@
--- The nine standard shifts, one factor at a time, against the unchanged reference: same tasks, initial states and seeds. A
--- table a suite, conditions.json, and an ordinary run folder for each condition.
+-- The nine standard shifts, one factor at a time, compared with the unmodified reference at the same tasks, initial states and
+-- seeds. Writes one table per suite, conditions.json, and an ordinary run folder per condition.
 --
 --   softvt suites/shifts.lua
 --   softvt suites/shifts.lua --suite object_soft,spatial_rigid --episodes 1

@@ -1,16 +1,16 @@
--- Two instances of the same soft object left and right of a plate. Left and right are those of the third-person image:
--- image right is +y of the world. Both tasks of a mirrored pair use one layout, so that they start from the same state.
+-- Two instances of the same soft object left and right of a plate. Left and right refer to the third-person image, whose
+-- right is +y of the world. Both tasks of a mirrored pair use one layout, so they start from the same state.
 local arrange = require "layouts.arrange"
 local plate = require "assets.plate"
 local scenery = require "scenery"
 local table_top = require "assets.table"
 
 local mm = 1e-3
--- Spread of the start states: position, turn.
-local REACH, TURN = 20 * mm, math.rad(30)
+-- Random ranges of position and yaw, in either direction.
+local POSITION_RANGE, YAW_RANGE = 20 * mm, math.rad(30)
 
--- Where left, right and plate stand, x and y in mm. An open hand with its sensors needs 70 mm to either side of what it
--- grasps, the spread takes 20 mm more, and a plate has a radius of 69 mm.
+-- Positions of the left and right object and of the plate, x and y in mm. An open hand with its sensors needs 70 mm on either
+-- side of the grasped object, the random range adds 20 mm, and the plate has a radius of 69 mm.
 local PLACES = {
   { left = { -50, -190 }, right = { -50, 190 }, plate = { 40, 0 } },
   { left = { 10, -200 }, right = { 10, 200 }, plate = { -60, 0 } },
@@ -21,7 +21,7 @@ local PLACES = {
 
 local layouts = {}
 
--- Two of `asset` at the k-th arrangement.
+-- Two instances of `asset` in the k-th arrangement.
 function layouts.pair(asset, k)
   local places = assert(PLACES[k], "there are five arrangements")
   local recipe = require("assets." .. asset)
@@ -30,8 +30,8 @@ function layouts.pair(asset, k)
     scene:add { name = "plate", asset = plate, at = { places.plate[1] * mm, places.plate[2] * mm } }
     for _, side in ipairs { "left", "right" } do
       local x, y = places[side][1] * mm, places[side][2] * mm
-      local at = { x + rng:uniform(-REACH, REACH), y + rng:uniform(-REACH, REACH) }
-      scene:add { name = side, asset = recipe, at = at, yaw = rng:uniform(-TURN, TURN) }
+      local at = { x + rng:uniform(-POSITION_RANGE, POSITION_RANGE), y + rng:uniform(-POSITION_RANGE, POSITION_RANGE) }
+      scene:add { name = side, asset = recipe, at = at, yaw = rng:uniform(-YAW_RANGE, YAW_RANGE) }
     end
     scenery.table_room(scene)
     arrange.arm(scene, rng)

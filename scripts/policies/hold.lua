@@ -1,4 +1,4 @@
--- Holds still with the gripper open: the smallest policy there is, to start from.
+-- Keeps its pose with the gripper open: a minimal policy to start from.
 --
 --   softvt suites/object_soft.lua --policy scripts/policies/hold.lua --episodes 1
 local pose

@@ -1,14 +1,14 @@
--- Goes down, closes until both fingers feel something, and lifts it: what touch alone can do, without knowing where things
--- are. When what it holds drags harder than it is pressed, it closes a little more.
+-- Moves down, closes until both fingers report contact, and lifts. It uses touch alone and does not know where objects are.
+-- When the object drags harder than it presses, the gripper closes slightly more.
 --
 --   softvt suites/object_soft.lua --policy scripts/policies/touch_and_close.lua --episodes 1
-local DOWN, UP = 0.01, 0.005       -- m a control step
-local LOWEST, LIFT = 0.025, 0.10   -- m over the base, m
-local HELD, STEP = 0.08, 0.0125    -- px of marker motion, closure a control step
+local DOWN, UP = 0.01, 0.005       -- m per control step
+local LOWEST, LIFT = 0.025, 0.10   -- height above the base, and lift, m
+local HELD, STEP = 0.08, 0.0125    -- px of marker motion; closure per control step
 
 local phase, start, height, closure
 
--- The lesser of what a measure says of both fingers.
+-- The smaller value of a measure over both fingers.
 local function least(touch, measure)
   return math.min(measure(touch.left.markers), measure(touch.right.markers))
 end
@@ -43,7 +43,7 @@ return softvt.policy {
       height = obs.position[3]
     end
     phases[phase](obs.touch)
-    -- Straight down: half a turn about x.
+    -- The gripper points down: a rotation by 180° about x.
     return { position = { start[1], start[2], height }, axis_angle = { math.pi, 0, 0 }, closure = closure }
   end,
 }

@@ -1,4 +1,4 @@
--- LIBERO's interface, as the built-in profile libero has it: to start from.
+-- LIBERO's interface; equals the built-in profile libero. A starting point for your own profile.
 --
 --   softvt suites/object_soft.lua --policy ws://host:8000 --profile scripts/profiles/libero.lua
 return softvt.profile {

@@ -1,21 +1,21 @@
--- What an expert drives: motions that each last as many control steps as they need, built on one primitive that sends a
--- command and waits for the next control step. Poses are of the tool centre point, in the world frame.
+-- The arm as experts control it. Each motion takes as many control steps as it needs; all are built on one primitive that sends
+-- a command and waits for the next control step. Poses are of the tool centre point, in the world frame.
 local host, check, servo, fingers = ...
 local yield, ceil, max = coroutine.yield, math.ceil, math.max
 
 local Arm = {}
 
--- Largest slope of the quintic below: the mean speed of a motion is the limit divided by it.
+-- Largest slope of the quintic below. The mean speed of a motion is the speed limit divided by it.
 local PEAK = 1.875
 
--- Minimum-jerk share of the way (Flash and Hogan, 1985).
+-- Minimum-jerk time scaling on [0, 1] (Flash and Hogan, 1985).
 local function smooth(u) return u * u * u * (10 + u * (6 * u - 15)) end
 
--- From here on no servo holds, and nobody feels.
-local function let_go(self) self.holds, self.feeling = nil, false end
+-- Ends the tactile servo and its readings.
+local function end_servo(self) self.holds, self.feeling = nil, false end
 
--- Sends one command and comes back at the next control step, or with what is wrong with it. A servo that holds something
--- may close further than it is told.
+-- Sends one command and returns at the next control step, or raises the error that the host reports. While the servo holds an
+-- object it may close further than commanded.
 function Arm:command(pose, closure)
   if self.holds then
     self.holds = servo.keep(max(self.holds, closure), fingers.felt())
@@ -26,9 +26,9 @@ function Arm:command(pose, closure)
   if refusal then check.refuse(refusal) end
 end
 
--- What the fingers feel in this control step. They are looked at only where somebody asks, and then from the next one on.
+-- Returns the readings of the fingers in this control step. They are computed on request only, from the next step on.
 function Arm:feel()
-  if not fingers.feel then check.refuse("arm:feel: fingers are felt in simulation:drive and under --policy tactile-servo") end
+  if not fingers.feel then check.refuse("arm:feel: finger readings are available in simulation:drive and under --policy tactile-servo") end
   local felt = fingers.felt()
   if felt then return felt end
   local before = self.feeling
@@ -40,17 +40,17 @@ end
 
 local function travel(self, pose, options, closure)
   local from, start = self.target, self.closure
-  if closure < start then let_go(self) end
+  if closure < start then end_servo(self) end
   local metres, radians = from:distance(pose)
   local seconds = PEAK * max(metres / options.speed, radians / options.turn)
   local steps = max(1, ceil(seconds / host.dt))
   for step = 1, steps do
-    local share = smooth(step / steps)
-    self:command(from:towards(pose, share), start * (1 - share) + closure * share)
+    local s = smooth(step / steps)
+    self:command(from:towards(pose, s), start * (1 - s) + closure * s)
   end
 end
 
--- Moves straight and smoothly; options: speed (m/s), turn (rad/s), closure to reach on the way.
+-- Moves along a straight line. Options: speed (m/s), turn (rad/s), closure to reach during the motion.
 function Arm:move_to(pose, options)
   options = check.options("arm:move_to", options, { speed = 0.25, turn = 1.5, closure = self.closure })
   travel(self, pose, options, options.closure)
@@ -59,23 +59,23 @@ end
 -- Moves by an offset in the world frame, m.
 function Arm:move_by(offset, options) self:move_to(self.target:moved(offset), options) end
 
--- Closes or opens to a closure at a rate (1/s: 1 is the whole stroke in a second).
+-- Closes or opens to a closure at a rate (1/s; 1 is the full stroke per second).
 function Arm:close_to(closure, options)
   options = check.options("arm:close_to", options, { rate = 0.5 })
   local start = self.closure
-  if closure < start then let_go(self) end
-  local way = closure - start
-  local steps = max(1, ceil((way < 0 and -way or way) / options.rate / host.dt))
+  if closure < start then end_servo(self) end
+  local change = closure - start
+  local steps = max(1, ceil((change < 0 and -change or change) / options.rate / host.dt))
   for step = 1, steps do self:command(self.target, start * (1 - step / steps) + closure * (step / steps)) end
 end
 
--- Closes on an object: to the closure that the expert knows, or, as a servo, until the fingers feel it. A binary gripper,
--- which knows only open and shut, shuts here and not in close_to.
+-- Closes on an object: to the given closure, or with the tactile servo until the fingers report a firm grasp. A binary gripper
+-- closes fully here, and not in close_to.
 function Arm:grasp(closure, options)
   self.gripping = true
   if not fingers.servo then return self:close_to(closure, options) end
   options = check.options("arm:grasp", options, { rate = 0.5 })
-  let_go(self)
+  end_servo(self)
   self.feeling = true
   self.holds = servo.close(self.closure, options.rate * host.dt, function(next)
     self:command(self.target, next)
@@ -83,34 +83,34 @@ function Arm:grasp(closure, options)
   end)
 end
 
--- Lets go of an object, opening to a closure (options.closure) or wide.
+-- Releases an object by opening to options.closure (default: fully open).
 function Arm:release(options)
   options = check.options("arm:release", options, { rate = 0.5, closure = 0 })
   self.gripping = false
-  let_go(self)
+  end_servo(self)
   self:close_to(options.closure, { rate = options.rate })
 end
 
--- Opens the gripper wide.
+-- Opens the gripper fully.
 function Arm:open(options)
   self.gripping = false
-  let_go(self)
+  end_servo(self)
   self:close_to(0, options)
 end
 
--- Holds still for a time, s.
+-- Keeps the pose for a time, s.
 function Arm:wait(seconds)
   for _ = 1, ceil(seconds / host.dt - 1e-9) do self:command(self.target, self.closure) end
 end
 
--- Ends the expert with a reason; the last command stays, and the host never comes back here.
+-- Ends the expert with a reason. The last command stays in effect, and the coroutine is not resumed.
 function Arm:give_up(reason) yield(self.target, self.closure, self.gripping, reason) end
 
 local measured = { pose = true, width = true, force = true, time = true, dt = true }
 local own = { target = true, closure = true, gripping = true }
 local state, methods, arm = { target = host.pose, closure = host.closure, gripping = false, feeling = false }, {}, nil
 
--- Methods see the state of the arm; scripts see the methods, which check what they are given.
+-- Methods work on the state of the arm; scripts get wrappers that check their arguments.
 for name, method in pairs(Arm) do
   methods[name] = function(self, ...)
     if self ~= arm then check.no_self(name, self) end
@@ -129,7 +129,7 @@ arm = setmetatable({}, {
   end,
   __newindex = function(_, key)
     if not (measured[key] or own[key] or methods[key]) then check.unknown(key) end
-    check.refuse("arm." .. key .. ": is only read; the methods of the arm change what it does")
+    check.refuse("arm." .. key .. ": is read-only; use the methods of the arm")
   end,
   __tostring = function() return "softvt.Arm" end,
   __metatable = "softvt.Arm",

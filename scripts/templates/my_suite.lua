@@ -1,7 +1,7 @@
--- A suite: what is asked, where things stand, when it is done, and who can do it.
+-- A suite: tasks with a prompt, a layout, a goal and an expert.
 --
---   softvt check suites/my_suite.lua     is it right?
---   softvt suites/my_suite.lua           the expert does it
+--   softvt check suites/my_suite.lua     reports errors
+--   softvt suites/my_suite.lua           runs the expert
 --   softvt view suites/my_suite.lua --out seen
 local arrange = require "layouts.arrange"
 local pick_place = require "experts.pick_place"
@@ -9,15 +9,15 @@ local scenery = require "scenery"
 local shifts = require "shifts"
 
 local mm = 1e-3
-local objects = { thing = require "assets.my_object", plate = require "assets.plate", table = require "assets.table" }
+local assets = { loaf = require "assets.my_object", plate = require "assets.plate", table = require "assets.table" }
 
--- Where things stand at the start of an episode. Everything random comes from rng, so that an episode's number says it all.
--- z = 0 is the top of the table, the robot's base is at x = -0.66, and +y is to the right in the picture.
+-- The initial scene of an episode. All random numbers come from rng, so the index of an episode determines it.
+-- z = 0 is the top of the table, the robot's base is at x = -0.66, and +y is to the right in the third-person image.
 local layout = softvt.layout("my_layout", function(scene, rng)
-  scene:add { name = "table", asset = objects.table, xyz = { 0, 0, 0 } }
+  scene:add { name = "table", asset = assets.table, xyz = { 0, 0, 0 } }
   arrange.add(scene, rng, {
-    { name = "plate", asset = objects.plate, at = { 40 * mm, 120 * mm } },
-    { name = "thing", asset = objects.thing, at = { -40 * mm, -120 * mm }, reach = 20 * mm, turn = math.rad(30) },
+    { name = "plate", asset = assets.plate, at = { 40 * mm, 120 * mm } },
+    { name = "loaf", asset = assets.loaf, at = { -40 * mm, -120 * mm }, position_range = 20 * mm, yaw_range = math.rad(30) },
   }, 20 * mm)
   scenery.table_room(scene)
   arrange.arm(scene, rng)
@@ -26,15 +26,15 @@ end)
 return softvt.suite {
   name = "my_suite",
   object_type = "deformable", -- or "rigid"
-  variation = "object",       -- or "spatial": what differs between the tasks
+  variation = "object",       -- or "spatial": what varies between the tasks
   episodes = 5,
   tasks = {
     softvt.task {
       prompt = "pick up the loaf and place it on the plate",
       layout = layout,
-      -- Done once the thing has lain on the plate, let go of, for 0.4 s; softvt.inside is for baskets.
-      goal = softvt.on { object = "thing", target = "plate", hold_s = 0.4 },
-      expert = pick_place { object = "thing", target = "plate" },
+      -- Reached once the loaf has rested on the plate, released, for 0.4 s. Use softvt.inside for containers.
+      goal = softvt.on { object = "loaf", target = "plate", hold_s = 0.4 },
+      expert = pick_place { object = "loaf", target = "plate" },
     },
   },
   shifts = shifts.soft,

@@ -1,49 +1,50 @@
--- What packages have in common: their forms, in mm, and the printing on them.
+-- Shapes of packages, with dimensions in mm, and printed labels.
 --
---   local packages = require "packages"
---   local label = packages.label { on = { "+y", "-y" }, out = 18 }
+--   local packaging = require "packaging"
+--   local label = packaging.label { on = { "+y", "-y" }, out = 18 }
 --   label.oval(0, 50, 30, 44, { 0.9, 0.8, 0.6 })
 --   label.text("KETCHUP", 0, 60, 6, { 0.5, 0.02, 0.02 })
 --   visuals = { { albedo = { 0.5, 0.02, 0.02 }, layers = label.layers } }
 local mask = softvt.mask
 local mm = 1e-3
 
-local packages = {}
+local packaging = {}
 
--- A solid of revolution from corners (r, z) in mm.
-function packages.turned(corners)
+-- A solid of revolution of the polygon with corners (r, z), mm.
+function packaging.revolve(corners)
   local metres = {}
   for i, corner in ipairs(corners) do metres[i] = { corner[1] * mm, corner[2] * mm } end
   return softvt.shape.lathe { corners = metres }
 end
 
--- A solid from corners (x, z) in mm, drawn out along y.
-function packages.drawn(corners, length)
+-- The polygon with corners (x, z), mm, extruded along y.
+function packaging.extrude(corners, length)
   local metres = {}
   for i, corner in ipairs(corners) do metres[i] = { corner[1] * mm, corner[2] * mm } end
   return softvt.shape.prism { corners = metres, length = length * mm }
 end
 
--- A cardboard box in mm with its lowest face at z = 0.
-function packages.carton(x, y, z)
+-- A cardboard box, mm, with its lowest face at z = 0.
+function packaging.carton(x, y, z)
   return softvt.shape.box { size = { x * mm, y * mm, z * mm } }:translate(0, 0, z / 2 * mm)
 end
 
--- What lies between two heights, mm.
-function packages.band(from, to)
+-- The region between two heights, mm.
+function packaging.band(from, to)
   return softvt.shape.box { size = { 1, 1, (to - from) * mm } }:translate(0, 0, (from + to) / 2 * mm)
 end
 
--- A tin, 62 mm across and 76 mm high, with its seams: material 0 is its metal, 1 its label.
-function packages.can()
-  local tin = packages.turned {
+-- A can with seams, 62 mm across and 76 mm high. Material 0 is the metal, 1 the label.
+function packaging.can()
+  local tin = packaging.revolve {
     { 0, 0 }, { 30, 0 }, { 31, 0.8 }, { 31, 2.6 }, { 30.2, 3.4 }, { 30.2, 72.6 }, { 31, 73.4 }, { 31, 75.2 }, { 30.2, 76 },
     { 29.2, 76 }, { 28.4, 74 }, { 0, 74 },
   }
-  return tin:paint { material = 1, region = packages.band(3.8, 72.2) }
+  return tin:paint { material = 1, region = packaging.band(3.8, 72.2) }
 end
 
--- How a face's sheet lies in the object: turns about x, then z. Its x runs to the reader's right, its y up, its z outwards.
+-- Orientation of each face's label in the object: rotations about x, then z. In the label's frame x points to the reader's
+-- right, y up and z outwards.
 local HALF = math.pi / 2
 local FACES = {
   ["-y"] = { HALF, 0 }, ["+x"] = { HALF, HALF }, ["+y"] = { HALF, math.pi }, ["-x"] = { HALF, -HALF }, ["+z"] = { 0, 0 },
@@ -54,7 +55,7 @@ local function onto(shape, face)
   return shape:rotate { axis = "x", angle = tip }:rotate { axis = "z", angle = turn }
 end
 
--- A point of a sheet, mm, in the object.
+-- Transforms a point of a label (mm) to the object frame.
 local function point(x, y, z, face)
   if face == "+z" then return { x * mm, y * mm, z * mm } end
   local turn = FACES[face][2]
@@ -62,22 +63,21 @@ local function point(x, y, z, face)
   return { (x * cos + z * sin) * mm, (x * sin - z * cos) * mm, y * mm }
 end
 
--- A label: the same print on each of the faces `on`, which are named by the direction in which they look ("+z" is the top).
--- Places are mm to the reader's right and up from the object's origin; `out` is how far the faces are from it, `turn` turns
--- what is on top. On round things `round` is how near to the middle motifs reach; with `wrap`, a radius in mm, text runs round
--- the z axis.
-function packages.label(spec)
+-- A label: the same print on each of the faces `on`, named by their outward direction ("+z" is the top). Positions are in mm
+-- to the reader's right and up from the object's origin; `out` is the distance of the faces from it, `turn` rotates the
+-- print. On round objects, `round` is the inner limit of motifs; with `wrap`, a radius in mm, text runs around the z axis.
+function packaging.label(spec)
   local label = { layers = {} }
   local out, turn = spec.out, spec.turn or 0
   local inner = spec.round or out - 0.5
 
-  -- Another layer on top of the others.
+  -- Adds a layer on top.
   function label.ink(where, albedo, more)
     more = more or {}
     table.insert(label.layers, { mask = where, albedo = albedo, roughness = more.roughness or 0.42, opacity = more.opacity or 1 })
   end
 
-  -- A motif: a shape whose x and y are those of the sheet.
+  -- A motif: a shape in the label's frame.
   function label.motif(shape, x, y, albedo, more)
     local all
     for _, face in ipairs(spec.on) do
@@ -99,7 +99,7 @@ function packages.label(spec)
     label.motif(more and more.lean and shape:rotate { axis = "z", angle = more.lean } or shape, x, y, albedo, more)
   end
 
-  -- A leaf: where two discs overlap.
+  -- A leaf: the intersection of two discs.
   function label.leaf(x, y, long, lean, albedo)
     local disc = softvt.shape.cylinder { radius = 0.72 * long * mm, height = 0.2 }
     local leaf = disc:translate(0, 0.52 * long * mm, 0):intersect(disc:translate(0, -0.52 * long * mm, 0))
@@ -108,10 +108,10 @@ function packages.label(spec)
 
   -- A polygon from corners (x, y) in mm.
   function label.polygon(x, y, corners, albedo)
-    label.motif(packages.drawn(corners, 200):rotate { axis = "x", angle = -HALF }, x, y, albedo)
+    label.motif(packaging.extrude(corners, 200):rotate { axis = "x", angle = -HALF }, x, y, albedo)
   end
 
-  -- A line of text about (x, y), its capitals `high` mm high.
+  -- A line of text centred at (x, y) with capitals of height `high`, mm.
   function label.text(words, x, y, high, albedo, more)
     more = more or {}
     for _, face in ipairs(spec.on) do
@@ -129,10 +129,10 @@ function packages.label(spec)
     end
   end
 
-  -- A belt all around between two heights, mm.
-  function label.belt(from, to, albedo, more) label.ink(mask.inside { shape = packages.band(from, to) }, albedo, more) end
+  -- A belt around the object between two heights, mm.
+  function label.belt(from, to, albedo, more) label.ink(mask.inside { shape = packaging.band(from, to) }, albedo, more) end
 
   return label
 end
 
-return packages
+return packaging

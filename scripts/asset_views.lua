@@ -1,21 +1,21 @@
--- Pictures of one asset alone on the table: what it looks like, and what the fingers feel of it in the expert's grasp.
+-- Views of a single asset on the table: an image, and a simulation of the expert's grasp for its tactile images.
 local grasp = require "experts.grasp"
 local table_top = require "assets.table"
 
-local studio = {}
+local views = {}
 
 -- Vertical field of view of portraits, rad.
 local FOVY = math.rad(28)
 
 -- Edge lengths of an asset's bounding box, m.
-function studio.size(asset)
+function views.size(asset)
   local low, high = asset.shape:bounds()
   return { high[1] - low[1], high[2] - low[2], high[3] - low[3] }
 end
 
--- A picture of the asset, `edge` pixels wide and high: its bounding sphere just fits.
-function studio.portrait(asset, edge)
-  local size = studio.size(asset)
+-- An image of the asset, `edge` pixels wide and high. Its bounding sphere fills the image.
+function views.portrait(asset, edge)
+  local size = views.size(asset)
   local across = math.sqrt(size[1] ^ 2 + size[2] ^ 2 + size[3] ^ 2)
   local reach = 0.99 * across / 2 / math.sin(FOVY / 2)
   local layout = softvt.layout("portrait_" .. asset.name, function(scene)
@@ -30,8 +30,8 @@ function studio.portrait(asset, edge)
   return softvt.simulate { layout = layout }:see { camera = "portrait" }
 end
 
--- The asset in the expert's grasp, lifted by `lift` (m): a simulation to feel.
-function studio.held(asset, lift)
+-- A simulation of the asset in the expert's grasp, lifted by `lift` (m).
+function views.held(asset, lift)
   local layout = softvt.layout("imprint_" .. asset.name, function(scene)
     scene:add { name = "table", asset = table_top, xyz = { 0, 0, 0 } }
     scene:add { name = "object", asset = asset, at = { -0.05, 0 } }
@@ -52,4 +52,4 @@ function studio.held(asset, lift)
   return sim
 end
 
-return studio
+return views

@@ -1,21 +1,21 @@
--- Whether an asset stays where it is put: each alone on the table, settled, then watched for some seconds. One that rolls
--- away needs a flatter foot; scripts/contact_sheet.lua draws how it lies.
+-- Checks that assets rest stably: each is settled alone on the table and observed for some seconds. An asset that rolls needs
+-- a flatter base; scripts/contact_sheet.lua shows how it lies.
 --
---   softvt scripts/rest.lua --asset my_pastry
+--   softvt scripts/rest_check.lua --asset my_pastry
 local soft_assets = require("asset_names").soft
 local table_top = require "assets.table"
 
 local opt = softvt.options {
-  asset = { default = soft_assets, help = "assets to watch" },
-  wait_s = { default = 3, unit = "s", min = 0.1, max = 60, help = "how long each is watched" },
-  yaw_deg = { default = 25, unit = "°", min = -180, max = 180, help = "how it is turned" },
+  asset = { default = soft_assets, help = "assets to check" },
+  wait_s = { default = 3, unit = "s", min = 0.1, max = 60, help = "time of observation" },
+  yaw_deg = { default = 25, unit = "°", min = -180, max = 180, help = "yaw of the asset" },
 }
 
--- Files are served from here on by name, so every asset is read when the plan is made.
+-- Episodes use only files that were read when the plan was made, so every asset is required here.
 local assets = {}
 for _, name in ipairs(opt.asset) do assets[name] = require("assets." .. name) end
 
--- What may not be called rest: mm, degrees, m/s.
+-- Limits of an asset at rest: mm, degrees, m/s.
 local MOVED_MM, TURNED_DEG, SPEED = 0.1, 0.5, 1e-3
 
 local function alone(name)
@@ -25,8 +25,8 @@ local function alone(name)
   end)
 end
 
--- Where the object is now.
-local function place(sim)
+-- The current state of the object.
+local function state(sim)
   local seen
   sim:drive(function(arm, scene)
     seen = scene:object "object"
@@ -36,18 +36,18 @@ local function place(sim)
 end
 
 return softvt.experiment {
-  name = "rest",
+  name = "rest_check",
   columns = { "asset", "rests", "moved_mm", "sunk_mm", "turned_deg", "speed_m_s", "asleep" },
   grid = { asset = opt.asset },
   run = function(point)
     local sim = softvt.simulate { layout = alone(point.asset) }
-    local before = place(sim)
+    local before = state(sim)
     local ok, why = sim:wait(opt.wait_s)
     if not ok then error(point.asset .. ": " .. why) end
-    local after, seen = place(sim), sim:watch "object"
+    local after, seen = state(sim), sim:watch "object"
     local moved = 1e3 * math.sqrt((after.xyz[1] - before.xyz[1]) ^ 2 + (after.xyz[2] - before.xyz[2]) ^ 2)
     local sunk = 1e3 * (before.xyz[3] - after.xyz[3])
-    -- From the yaw that it was given: settling may turn it too.
+    -- Relative to the initial yaw, because settling may rotate the object too.
     local turned = math.deg(after.yaw) - opt.yaw_deg
     return {
       asset = point.asset, moved_mm = moved, sunk_mm = sunk, turned_deg = turned, speed_m_s = seen.speed, asleep = seen.asleep,
