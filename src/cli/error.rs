@@ -1,0 +1,81 @@
+//! Errors that end a command, with their exit codes.
+
+use std::process::ExitCode;
+
+use crate::rollout::cancel;
+
+/// Exit codes, the same for every command. `docs/cli.md` lists them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub(crate) enum Exit {
+    Success = 0,
+    /// A bug of softvt, or a machine that computes other results than the published ones.
+    Internal = 1,
+    /// Invalid input: usage, script, asset or file.
+    Input = 2,
+    /// The policy or its connection failed.
+    Policy = 3,
+    /// A `--require` condition does not hold.
+    RequirementNotMet = 99,
+    /// Ctrl-C. FinishedEpisode episodes are on disk.
+    Interrupted = 130,
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        Self::from(exit as u8)
+    }
+}
+
+/// An error that ends a command: an exit code and a message for standard error.
+#[derive(Debug, thiserror::Error)]
+#[error("{message}")]
+pub(crate) struct CliError {
+    pub exit: Exit,
+    /// Without the program's name. Nothing is printed if it is empty.
+    pub message: String,
+}
+
+impl CliError {
+    fn new(exit: Exit, message: impl ToString) -> Self {
+        Self { exit, message: message.to_string() }
+    }
+
+    /// Invalid input. After Ctrl-C the exit code is that of an interrupt, since the interrupt may be the cause.
+    pub(crate) fn input(message: impl ToString) -> Self {
+        let exit = if cancel::requested() { Exit::Interrupted } else { Exit::Input };
+        Self::new(exit, message)
+    }
+
+    pub(crate) fn policy(message: impl ToString) -> Self {
+        Self::new(Exit::Policy, message)
+    }
+
+    pub(crate) fn requirement_not_met(message: impl ToString) -> Self {
+        Self::new(Exit::RequirementNotMet, message)
+    }
+
+    /// A result that no input can explain.
+    pub(crate) fn internal(message: impl ToString) -> Self {
+        Self::new(Exit::Internal, message)
+    }
+
+    pub(crate) fn interrupted(message: impl ToString) -> Self {
+        Self::new(Exit::Interrupted, message)
+    }
+
+    /// Puts `prefix` and a colon before the message.
+    pub(crate) fn prefixed(self, prefix: impl std::fmt::Display) -> Self {
+        Self { message: format!("{prefix}: {}", self.message), ..self }
+    }
+
+    /// Names the part of the request that failed, in parentheses after the message.
+    pub(crate) fn within(self, part: &str) -> Self {
+        Self { message: format!("{} ({part})", self.message), ..self }
+    }
+
+    /// Adds a line to the message.
+    pub(crate) fn with_line(self, line: &str) -> Self {
+        Self { message: format!("{}\n{line}", self.message), ..self }
+    }
+}
