@@ -11,7 +11,7 @@ use softvt::{
         Pose, Vec3,
         samples::{SampleSpec, surface_samples},
         shape::Shape,
-        voxelise::{VoxelSpec, voxel_mesh},
+        voxel::{VoxelSpec, voxel_mesh},
     },
     physics::{
         Params, World,

@@ -8,7 +8,7 @@ use softvt::{
         Pose, Vec3,
         mass::mass_properties,
         samples::{SampleSpec, surface_samples},
-        voxelise::{VoxelSpec, voxel_mesh},
+        voxel::{VoxelSpec, voxel_mesh},
     },
     rollout::{AssetCache, Simulation},
     scene::{Asset, Body, Mask, Scene},

@@ -11,7 +11,7 @@ use softvt::{
     physics::Params,
     robot::RobotSpec,
     rollout::{AssetCache, SensorAssets, SensorSuite, Simulation},
-    scene::{Camera, Layer, Lighting, Mask, Visual},
+    scene::{Camera, Lighting, Mask, Visual, VisualLayer},
     script::{self, EpisodeRequest},
     sensing::{
         camera::{Attachment, FrameView, RenderMesh, RenderObject, RenderScene, RenderedImage, Renderer},
@@ -71,8 +71,8 @@ fn the_first_task_of_spatial_soft_looks_as_it_did() {
     }
 }
 
-fn layer(mask: Mask, albedo: [f64; 3], relief_m: f64) -> Layer {
-    Layer { mask, albedo, roughness: 0.5, opacity: 1.0, relief_m }
+fn layer(mask: Mask, albedo: [f64; 3], relief_m: f64) -> VisualLayer {
+    VisualLayer { mask, albedo, roughness: 0.5, opacity: 1.0, relief_m }
 }
 
 /// Eight balls: plastic and metal of two roughnesses each, and four patterns.

@@ -5,7 +5,7 @@ use crate::{
     evaluation::record::EpisodeRecord,
     policy::Action,
     robot::{
-        gripper::{self, OPENING},
+        gripper::{self, MAX_WIDTH},
         rotation,
     },
     rollout::{FinishedEpisode, StateRecording},
@@ -170,7 +170,7 @@ fn observed(film: &StateRecording, actions: &[Action]) -> Vec<Stream> {
         Stream::f64("obs/arm_joint_pos", &[7], each(&|i| stances[i].joints.to_vec())).of("rad", ""),
         Stream::f64("obs/gripper_pos", &[2], each(&|i| stances[i].fingers.to_vec())).of("m", ""),
         Stream::f64("obs/gripper_width", &[1], each(&|i| vec![width(i)])).of("m", ""),
-        Stream::f64("obs/gripper_close_norm", &[1], each(&|i| vec![1.0 - width(i) / OPENING]))
+        Stream::f64("obs/gripper_close_norm", &[1], each(&|i| vec![1.0 - width(i) / MAX_WIDTH]))
             .of("1", "")
             .note("meaning", "measured: 1 - width / 0.08 m"),
         Stream::f64("obs/gripper_closure", &[1], each(&|i| vec![commanded(i)]))

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::judge::Verdict;
-use crate::scene::Start;
+use crate::scene::InitialState;
 
 /// How a rollout ended.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -79,7 +79,7 @@ pub struct Origin {
     /// How the file is laid out.
     pub layout: String,
     /// What the episode starts from instead of what its layout made.
-    pub start: Start,
+    pub start: InitialState,
 }
 
 /// What the run itself counted.

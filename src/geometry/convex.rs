@@ -1,4 +1,4 @@
-//! Closest points and penetration of two convex pieces, by parry's GJK and EPA.
+//! ClosestPoints points and penetration of two convex pieces, by parry's GJK and EPA.
 
 use parry3d_f64::{
     math as parry,
@@ -6,11 +6,14 @@ use parry3d_f64::{
     shape::{Cuboid, Cylinder, Segment, SupportMap},
 };
 
-use super::{Pose, Vec3};
+use super::{
+    Pose, Vec3,
+    parry::{from_parry, pose_to_parry, to_parry},
+};
 
 /// A convex piece about the origin of its own frame, m.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Convex {
+pub enum ConvexShape {
     /// A box of these half extents.
     Box(Vec3),
     /// A cylinder along z.
@@ -26,7 +29,7 @@ pub enum Convex {
 
 /// The closest points of two separated pieces, or the shallowest way out of two overlapping ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Closest {
+pub struct ClosestPoints {
     /// On the surface of the first, world, m.
     pub a_w: Vec3,
     /// On the surface of the second, world, m.
@@ -35,10 +38,16 @@ pub struct Closest {
     pub n_w: Vec3,
 }
 
-/// Closest points of `a` and `b`; `None` if they are farther apart than `reach` (m) or the search failed.
-pub fn closest(a: &Convex, pose_a: &Pose, b: &Convex, pose_b: &Pose, reach: f64) -> Option<Closest> {
+/// ClosestPoints points of `a` and `b`; `None` if they are farther apart than `reach` (m) or the search failed.
+pub fn closest_points(
+    a: &ConvexShape,
+    pose_a: &Pose,
+    b: &ConvexShape,
+    pose_b: &Pose,
+    reach: f64,
+) -> Option<ClosestPoints> {
     let (frame_a, frame_b) = (pose_a * own_frame(a), pose_b * own_frame(b));
-    let relative = to_parry(&frame_a.inv_mul(&frame_b));
+    let relative = pose_to_parry(&frame_a.inv_mul(&frame_b));
     let (map_a, map_b) = (support_map(a), support_map(b));
     let found = details::contact_support_map_support_map_with_params(
         &relative,
@@ -49,32 +58,27 @@ pub fn closest(a: &Convex, pose_a: &Pose, b: &Convex, pose_b: &Pose, reach: f64)
         None,
     );
     let GJKResult::ClosestPoints(on_a, on_b, normal) = found else { return None };
-    let point = |p: parry::Vector| frame_a * nalgebra::Point3::new(p.x, p.y, p.z);
-    let n_w = frame_a.rotation * Vec3::new(normal.x, normal.y, normal.z);
-    Some(Closest { a_w: point(on_a).coords, b_w: point(on_b).coords, n_w: n_w.try_normalize(0.0)? })
+    let point = |p: parry::Vector| frame_a * nalgebra::Point3::from(from_parry(p));
+    let n_w = frame_a.rotation * from_parry(normal);
+    Some(ClosestPoints { a_w: point(on_a).coords, b_w: point(on_b).coords, n_w: n_w.try_normalize(0.0)? })
 }
 
 /// parry's cylinder stands along y, ours along z: the frame of parry's shape in ours.
-fn own_frame(piece: &Convex) -> Pose {
+fn own_frame(piece: &ConvexShape) -> Pose {
     let turn = match piece {
-        Convex::Cylinder { .. } => Vec3::x() * std::f64::consts::FRAC_PI_2,
-        Convex::Box(_) | Convex::Segment(_) => Vec3::zeros(),
+        ConvexShape::Cylinder { .. } => Vec3::x() * std::f64::consts::FRAC_PI_2,
+        ConvexShape::Box(_) | ConvexShape::Segment(_) => Vec3::zeros(),
     };
     Pose::new(Vec3::zeros(), turn)
 }
 
-fn support_map(piece: &Convex) -> Box<dyn SupportMap> {
+fn support_map(piece: &ConvexShape) -> Box<dyn SupportMap> {
     match *piece {
-        Convex::Box(half) => Box::new(Cuboid::new(parry::Vector::new(half.x, half.y, half.z))),
-        Convex::Cylinder { radius, half_height } => Box::new(Cylinder::new(half_height, radius)),
-        Convex::Segment(half) => {
+        ConvexShape::Box(half) => Box::new(Cuboid::new(to_parry(&half))),
+        ConvexShape::Cylinder { radius, half_height } => Box::new(Cylinder::new(half_height, radius)),
+        ConvexShape::Segment(half) => {
             let end = parry::Vector::new(0.0, 0.0, half);
             Box::new(Segment::new(-end, end))
         }
     }
-}
-
-fn to_parry(pose: &Pose) -> parry::Pose {
-    let (t, q) = (pose.translation.vector, pose.rotation.quaternion());
-    parry::Pose::from_parts(parry::Vector::new(t.x, t.y, t.z), parry::Rotation::from_xyzw(q.i, q.j, q.k, q.w))
 }

@@ -57,7 +57,7 @@ impl MeshFormat {
     ///
     /// # Errors
     /// If it is none of `obj`, `stl`, `glb`.
-    pub fn of_extension(extension: &str) -> Result<Self, ImportError> {
+    pub fn from_extension(extension: &str) -> Result<Self, ImportError> {
         match extension.to_ascii_lowercase().as_str() {
             "obj" => Ok(Self::Obj),
             "stl" => Ok(Self::Stl),
@@ -84,7 +84,7 @@ pub fn import(bytes: &[u8], format: MeshFormat, options: &ImportOptions) -> Resu
     let upright =
         if options.z_up { Mat3::identity() } else { Mat3::new(1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0) };
     mesh.vertices.iter_mut().for_each(|v| *v = upright * *v * options.scale);
-    mesh.check()?;
+    mesh.validate()?;
     Ok(mesh)
 }
 

@@ -3,8 +3,8 @@
 use super::{
     Mat3, Pose, Vec3,
     mesh::Mesh,
-    shape::{Profile, Shape},
-    skin::bare_skin,
+    shape::{Polygon, Shape},
+    surface_mesh::surface_triangles,
 };
 
 /// Mass properties of a solid.
@@ -32,7 +32,7 @@ pub fn mass_properties(shape: &Shape, density: f64) -> MassProperties {
 }
 
 /// [`mass_properties`] to about a hundredth, in a sixtieth of the time.
-pub fn rough_mass_properties(shape: &Shape, density: f64) -> MassProperties {
+pub fn approximate_mass_properties(shape: &Shape, density: f64) -> MassProperties {
     unit_density(shape, ROUGH_CELLS).scaled(density)
 }
 
@@ -88,7 +88,7 @@ fn unit_density(shape: &Shape, cells: f64) -> MassProperties {
         Shape::Placed { shape, pose } => unit_density(shape, cells).moved(pose),
         Shape::Paint { shape, .. } => unit_density(shape, cells),
         Shape::Mesh(solid) => of_mesh(solid.mesh()),
-        _ => of_mesh(&bare_skin(shape, shape.reach().size().max() / cells).0),
+        _ => of_mesh(&surface_triangles(shape, shape.loose_bounds().size().max() / cells).0),
     }
 }
 
@@ -104,7 +104,7 @@ fn capsule(radius: f64, half_length: f64) -> MassProperties {
 }
 
 /// The hull of a prism. Fans over the end faces may overlap outside of a hollow polygon; signed integrals do not mind.
-fn prism_mesh(section: &Profile, half_length: f64) -> Mesh {
+fn prism_mesh(section: &Polygon, half_length: f64) -> Mesh {
     let corners = section.points();
     let n = corners.len() as u32;
     let end = |y: f64| corners.iter().map(move |p| Vec3::new(p[0], y, p[1]));
@@ -117,7 +117,7 @@ fn prism_mesh(section: &Profile, half_length: f64) -> Mesh {
 
 /// Exact integrals over a revolved polygon, turned into line integrals around it by Green's theorem; along an edge the
 /// integrands are polynomials of degree 4, which three Gauss points integrate exactly.
-fn revolved(profile: &Profile) -> MassProperties {
+fn revolved(profile: &Polygon) -> MassProperties {
     use std::f64::consts::PI;
     let gauss = [(0.5 - 0.15_f64.sqrt(), 5.0 / 18.0), (0.5, 4.0 / 9.0), (0.5 + 0.15_f64.sqrt(), 5.0 / 18.0)];
     let (mut volume, mut first, mut axial, mut height) = (0.0, 0.0, 0.0, 0.0);

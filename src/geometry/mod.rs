@@ -4,20 +4,19 @@
 
 mod aabb;
 mod basis;
-pub mod broad_phase;
 pub mod convex;
 pub mod hex8;
 pub mod import;
 pub mod mass;
 pub mod mesh;
+mod parry;
 pub mod samples;
 pub mod shape;
-pub mod skin;
+pub mod surface_mesh;
 pub mod union_find;
 pub mod voxel;
-pub mod voxelise;
 
-pub use aabb::Aabb;
+pub use aabb::{Aabb, GroupedAabb, overlapping_pairs};
 pub use basis::{basis_from_reference, orthonormal_basis};
 
 /// A point or vector, m unless said otherwise.

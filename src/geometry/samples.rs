@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 
 use super::{
     Quat, Vec3,
-    shape::{Profile, Shape},
-    skin::bare_skin,
+    shape::{Polygon, Shape},
+    surface_mesh::surface_triangles,
     voxel::{SurfaceSample, VoxelMesh},
 };
 
@@ -101,7 +101,7 @@ fn exact_patches(shape: &Shape, turn: &Quat, spec: &SampleSpec) -> Option<Vec<Pa
 /// Gathers the triangles of a skin by cells of the wanted spacing and by the side that they face, so that the two sides
 /// of an edge are not mixed; the area of the skin is kept exactly.
 fn skin_patches(shape: &Shape, spec: &SampleSpec) -> Vec<Patch> {
-    let (mesh, _) = bare_skin(shape, spec.grasp_spacing.min(spec.other_spacing));
+    let (mesh, _) = surface_triangles(shape, spec.grasp_spacing.min(spec.other_spacing));
     let mut cells: BTreeMap<(usize, [i64; 3]), Gathered> = BTreeMap::new();
     for triangle in &mesh.triangles {
         let [a, b, c] = triangle.map(|v| mesh.vertices[v as usize]);
@@ -148,7 +148,7 @@ fn box_patches(half: &Vec3, turn: &Quat, spec: &SampleSpec) -> Vec<Patch> {
 }
 
 /// The walls of a prism by regular grids, its ends by a grid whose cells are clipped to the polygon.
-fn prism_patches(section: &Profile, half_length: f64, turn: &Quat, spec: &SampleSpec) -> Vec<Patch> {
+fn prism_patches(section: &Polygon, half_length: f64, turn: &Quat, spec: &SampleSpec) -> Vec<Patch> {
     let mut patches = Vec::new();
     for (a, b) in section.walls() {
         let span = [b[0] - a[0], b[1] - a[1]];
@@ -181,7 +181,7 @@ enum Generator {
 
 fn generators(shape: &Shape) -> Option<Vec<Generator>> {
     use std::f64::consts::{FRAC_PI_2, TAU};
-    let lines = |profile: &Profile| profile.walls().map(|(from, to)| Generator::Line { from, to }).collect();
+    let lines = |profile: &Polygon| profile.walls().map(|(from, to)| Generator::Line { from, to }).collect();
     match shape {
         Shape::Sphere { radius } => {
             Some(vec![Generator::Arc { centre: [0.0; 2], radius: *radius, from: -FRAC_PI_2, to: FRAC_PI_2 }])

@@ -2,7 +2,7 @@
 
 use super::{
     Side,
-    pads::{self, BodyBox},
+    pads::{self, CollisionBox},
     panda,
 };
 use crate::geometry::{Aabb, Pose, Vec3, shape::Shape};
@@ -49,16 +49,16 @@ pub fn clearance(tool_w: &Pose, width: f64, obstacles: &[Obstacle<'_>], enough: 
 }
 
 /// The hand's boxes in the tool frame.
-fn hand(width: f64) -> impl Iterator<Item = BodyBox> {
+fn hand(width: f64) -> impl Iterator<Item = CollisionBox> {
     let hand_in_tool = panda::tool_in_hand().inverse();
     let link_in_tool = hand_in_tool * panda::hand_in_link().inverse();
     let fingers = Side::BOTH.into_iter().flat_map(move |side| {
         let finger_in_tool = hand_in_tool * panda::finger_in_hand(side, width / 2.0);
-        let gel = BodyBox { half: pads::gel_half(), pose: pads::gel_centre_in_finger(side) };
+        let gel = CollisionBox { half: pads::gel_half(), pose: pads::gel_centre_in_finger(side) };
         let parts = pads::finger_boxes(side).into_iter().chain([gel]);
-        parts.map(move |part| BodyBox { pose: finger_in_tool * part.pose, ..part })
+        parts.map(move |part| CollisionBox { pose: finger_in_tool * part.pose, ..part })
     });
-    let palm = pads::hand_boxes().map(move |part| BodyBox { pose: link_in_tool * part.pose, ..part });
+    let palm = pads::hand_boxes().map(move |part| CollisionBox { pose: link_in_tool * part.pose, ..part });
     fingers.chain(palm)
 }
 

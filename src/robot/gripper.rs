@@ -8,12 +8,12 @@ use serde::{Deserialize, Serialize};
 use super::GripperSpec;
 
 /// Largest width between the gel apexes, m.
-pub const OPENING: f64 = 0.08;
+pub const MAX_WIDTH: f64 = 0.08;
 
 /// How a policy says how far to close.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Encoding {
+pub enum GripperEncoding {
     /// The value is the closure, 0..=1; values beyond mean the nearer end.
     #[default]
     Continuous,
@@ -23,7 +23,7 @@ pub enum Encoding {
     Sign,
 }
 
-impl Encoding {
+impl GripperEncoding {
     /// The closure that `value` asks for, 0 (open) ..= 1 (shut).
     ///
     /// # Errors
@@ -51,12 +51,12 @@ pub struct GripperError {
 
 /// Target width of a closure in 0..=1, m.
 pub fn target_width(closure: f64) -> f64 {
-    OPENING * (1.0 - closure)
+    MAX_WIDTH * (1.0 - closure)
 }
 
 /// Closure whose target is `width` (m), 0..=1.
 pub fn closure_of_width(width: f64) -> f64 {
-    (1.0 - width / OPENING).clamp(0.0, 1.0)
+    (1.0 - width / MAX_WIDTH).clamp(0.0, 1.0)
 }
 
 /// Measured width: the distance between the gel apexes at finger coordinates left and right, m.
@@ -67,20 +67,20 @@ pub fn width(fingers: [f64; 2]) -> f64 {
 /// The moving target of the two fingers. Both get the same one, so that a light object off centre is pushed to the
 /// middle and a fixed one is held by unequal drive forces.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Gripper {
+pub struct GripperSetpoint {
     speed: f64,
     goal: f64,
     target: f64,
 }
 
-impl Gripper {
+impl GripperSetpoint {
     /// A gripper whose target is at rest at `width` (m).
     pub fn new(spec: &GripperSpec, width: f64) -> Self {
-        let target = width.clamp(0.0, OPENING) / 2.0;
+        let target = width.clamp(0.0, MAX_WIDTH) / 2.0;
         Self { speed: spec.speed, goal: target, target }
     }
 
-    /// Takes a closure, 0 (open) ..= 1 (shut), as [`Encoding::closure`] gives it; it holds until the next one.
+    /// Takes a closure, 0 (open) ..= 1 (shut), as [`GripperEncoding::closure`] gives it; it holds until the next one.
     pub fn command(&mut self, closure: f64) {
         self.goal = target_width(closure.clamp(0.0, 1.0)) / 2.0;
     }
@@ -116,26 +116,26 @@ mod tests {
 
     #[test]
     fn each_encoding_reads_its_own_numbers() {
-        let read = |encoding: Encoding, value| encoding.closure(value).expect("finite");
+        let read = |encoding: GripperEncoding, value| encoding.closure(value).expect("finite");
         assert_eq!(
-            [-0.2, 0.0, 0.3, 1.0, 1.7].map(|v| read(Encoding::Continuous, v)),
+            [-0.2, 0.0, 0.3, 1.0, 1.7].map(|v| read(GripperEncoding::Continuous, v)),
             [0.0, 0.0, 0.3, 1.0, 1.0]
         );
-        assert_eq!([0.0, 0.5, 0.51, 1.0].map(|v| read(Encoding::Binary, v)), [0.0, 0.0, 1.0, 1.0]);
-        assert_eq!([-1.0, 0.0, 1e-9, 1.0].map(|v| read(Encoding::Sign, v)), [1.0, 1.0, 0.0, 0.0]);
+        assert_eq!([0.0, 0.5, 0.51, 1.0].map(|v| read(GripperEncoding::Binary, v)), [0.0, 0.0, 1.0, 1.0]);
+        assert_eq!([-1.0, 0.0, 1e-9, 1.0].map(|v| read(GripperEncoding::Sign, v)), [1.0, 1.0, 0.0, 0.0]);
     }
 
     #[test]
     fn a_command_that_is_no_number_is_refused() {
         for value in [f64::NAN, f64::INFINITY] {
-            let error = Encoding::Continuous.closure(value).expect_err("refused");
+            let error = GripperEncoding::Continuous.closure(value).expect_err("refused");
             assert!(error.to_string().contains("expected a finite number"));
         }
     }
 
     #[test]
     fn the_target_moves_at_the_finger_speed_and_stops_at_its_goal() {
-        let mut gripper = Gripper::new(&GripperSpec::default(), OPENING);
+        let mut gripper = GripperSetpoint::new(&GripperSpec::default(), MAX_WIDTH);
         gripper.command(0.5);
         let dt = 1.0 / 60.0;
         let mut path = Vec::new();

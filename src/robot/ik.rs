@@ -89,8 +89,8 @@ impl DiffIk {
     ///
     /// # Errors
     /// The pose is out of reach: says by how much the nearest pose found misses it.
-    pub fn solve(&self, seed: &ArmAngles, target_b: &Pose) -> Result<ArmAngles, Unreachable> {
-        let mut nearest: Option<Unreachable> = None;
+    pub fn solve(&self, seed: &ArmAngles, target_b: &Pose) -> Result<ArmAngles, UnreachablePose> {
+        let mut nearest: Option<UnreachablePose> = None;
         for start in std::iter::once((*seed).into()).chain(self.postures()) {
             let mut q = self.within_limits(&start);
             for _ in 0..SOLVE_STEPS {
@@ -190,10 +190,14 @@ impl DiffIk {
         (error, Jacobian::from_column_slice(jacobian.as_slice()))
     }
 
-    fn residual(&self, q: &Joints, target_b: &Pose) -> Unreachable {
+    fn residual(&self, q: &Joints, target_b: &Pose) -> UnreachablePose {
         let tool = self.tool_pose(&(*q).into());
         let (linear, angular) = pose_error(&tool, target_b);
-        Unreachable { target_b: target_b.translation.vector, distance: linear.norm(), angle: angular.norm() }
+        UnreachablePose {
+            target_b: target_b.translation.vector,
+            distance: linear.norm(),
+            angle: angular.norm(),
+        }
     }
 
     fn within_limits(&self, q: &Joints) -> Joints {
@@ -214,7 +218,7 @@ pub fn pose_error(now: &Pose, target: &Pose) -> (Vec3, Vec3) {
      {:.1}°; move it towards the robot or turn it towards straight down",
     target_b.x, target_b.y, target_b.z, distance * 1e3, angle.to_degrees()
 )]
-pub struct Unreachable {
+pub struct UnreachablePose {
     /// Where the tool should be, base frame, m.
     pub target_b: Vec3,
     /// How far the nearest pose found is away, m.
@@ -223,7 +227,7 @@ pub struct Unreachable {
     pub angle: f64,
 }
 
-impl Unreachable {
+impl UnreachablePose {
     fn is_reached(&self) -> bool {
         self.distance <= REACHED.0 && self.angle <= REACHED.1
     }

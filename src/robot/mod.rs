@@ -13,9 +13,9 @@ pub mod rotation;
 pub mod spec;
 
 pub use clearance::{Obstacle, clearance};
-pub use gripper::{Encoding, Gripper, GripperError};
-pub use ik::{DiffIk, Unreachable};
-pub use pads::{BodyBox, PadContact, PadSurface};
+pub use gripper::{GripperEncoding, GripperError, GripperSetpoint};
+pub use ik::{DiffIk, UnreachablePose};
+pub use pads::{CollisionBox, PadContact, PadSurface};
 pub use spec::{ArmSpec, GripperSpec, IkSpec, PadSpec, RobotSpec, SpecError};
 
 /// A finger, its pad and its tactile sensor.

@@ -152,7 +152,7 @@ pub fn pad_pose_in_finger(side: Side) -> Pose {
 
 /// A box that stands for part of a link in collisions.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BodyBox {
+pub struct CollisionBox {
     /// Half extents, m.
     pub half: Vec3,
     /// Frame of its centre in the link frame.
@@ -160,11 +160,11 @@ pub struct BodyBox {
 }
 
 /// What a finger has besides its gel: the sensor's case and the bracket that carries it, in the finger's link frame.
-pub fn finger_boxes(side: Side) -> [BodyBox; 2] {
+pub fn finger_boxes(side: Side) -> [CollisionBox; 2] {
     let out = outward(side);
     let depth = PadSurface::default().thickness + CASE_HALF.y;
     let bracket_z = (APEX_Z - CASE_HALF.z) / 2.0;
-    let at = |half, z| BodyBox { half, pose: Pose::translation(0.0, out * depth, z) };
+    let at = |half, z| CollisionBox { half, pose: Pose::translation(0.0, out * depth, z) };
     [at(CASE_HALF, APEX_Z), at(Vec3::new(0.0105, 0.010, bracket_z), bracket_z)]
 }
 
@@ -180,9 +180,9 @@ pub(super) fn gel_centre_in_finger(side: Side) -> Pose {
 }
 
 /// The hand's body, in the frame of the link that carries it.
-pub fn hand_boxes() -> [BodyBox; 1] {
+pub fn hand_boxes() -> [CollisionBox; 1] {
     let pose = super::panda::hand_in_link() * Pose::translation(0.0, 0.0, HAND_HALF.z);
-    [BodyBox { half: HAND_HALF, pose }]
+    [CollisionBox { half: HAND_HALF, pose }]
 }
 
 /// Centre of mass (finger frame, m) and inertia about it (kg m²) of a finger of `mass` kg: a uniform box of the

@@ -5,7 +5,7 @@ use crate::{
     physics::joints::{JointKind, Link, Tree},
 };
 
-use super::{GripperSpec, Side, gripper::OPENING, pads};
+use super::{GripperSpec, Side, gripper::MAX_WIDTH, pads};
 
 /// Degrees of freedom of the arm; the fingers follow in the tree.
 pub const ARM_DOFS: usize = 7;
@@ -194,7 +194,7 @@ fn finger(side: Side, gripper: &GripperSpec) -> Link {
         com,
         inertia,
         lower: 0.0,
-        upper: OPENING / 2.0,
+        upper: MAX_WIDTH / 2.0,
         velocity_limit: gripper.speed,
         effort_limit: gripper.effort,
         friction: 0.0,

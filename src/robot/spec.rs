@@ -89,7 +89,7 @@ impl Default for ArmSpec {
 }
 
 /// Finger drives: `f = kp (q_target − q) − kd q̇` a finger, within `effort`. How far the gripper opens is its
-/// geometry ([`super::gripper::OPENING`]), not a choice.
+/// geometry ([`super::gripper::MAX_WIDTH`]), not a choice.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GripperSpec {

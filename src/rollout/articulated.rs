@@ -12,7 +12,7 @@ use crate::{
         contact::{Friction, Mover},
         joints::{JointKind, Link, Tree},
     },
-    scene::{Motion, Object, Part},
+    scene::{JointMotion, Object, Part},
     text::format_number,
 };
 
@@ -72,8 +72,8 @@ fn link(part: &Part, parts: &[Part], cache: &AssetCache) -> Link {
         parent: part.parent,
         placement: Pose::from(joint.origin_o - carrier),
         kind: match joint.motion {
-            Motion::Slide => JointKind::Prismatic(axis),
-            Motion::Turn => JointKind::Revolute(axis),
+            JointMotion::Slide => JointKind::Prismatic(axis),
+            JointMotion::Turn => JointKind::Revolute(axis),
         },
         mass: m.mass,
         com: m.com - joint.origin_o,

@@ -10,7 +10,7 @@ use super::{
 use crate::{
     geometry::{
         Aabb, Pose,
-        mass::{MassProperties, mass_properties, rough_mass_properties},
+        mass::{MassProperties, approximate_mass_properties, mass_properties},
         shape::Shape,
     },
     physics::{
@@ -45,7 +45,7 @@ fn of_shape<V: Clone>(made: &SharedCache<Shape, V>, shape: &Shape, make: impl Fn
 fn rough_rest(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<Arc<Rest>, BuildError> {
     check_soft(name, shape, material)?;
     let rough = SoftMaterial { grasp_spacing: ROUGH_SPACING * material.grasp_spacing, ..material.clone() };
-    meshed(name, shape, &rough, rough_mass_properties(shape, 1.0).mass)
+    meshed(name, shape, &rough, approximate_mass_properties(shape, 1.0).mass)
 }
 
 impl AssetCache {
@@ -61,7 +61,7 @@ impl AssetCache {
 
     /// Mass properties of a shape at a uniform density, kg/m³.
     pub(super) fn mass(&self, shape: &Shape, density: f64) -> MassProperties {
-        let make = if self.rough { rough_mass_properties } else { mass_properties };
+        let make = if self.rough { approximate_mass_properties } else { mass_properties };
         let unit = of_shape(&self.masses, shape, || make(shape, 1.0));
         MassProperties { mass: unit.mass * density, com: unit.com, inertia: unit.inertia * density }
     }

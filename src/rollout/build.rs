@@ -13,11 +13,11 @@ use crate::{
         mass::mass_properties,
         samples::{SampleSpec, surface_samples},
         shape::Shape,
-        voxelise::{GeometryError, VoxelSpec, voxel_mesh},
+        voxel::{VoxelMeshError, VoxelSpec, voxel_mesh},
     },
     physics::{
         World,
-        contact::{Friction, Mover, Surface},
+        contact::{Mover, Surface},
         fem::{Material, Rest},
         joints::TreeError,
         rigid::{RigidBody, RigidError},
@@ -35,7 +35,7 @@ pub enum BuildError {
         /// Asset name.
         asset: String,
         /// What is wrong.
-        source: GeometryError,
+        source: VoxelMeshError,
     },
     /// Its mass properties are impossible.
     #[error("asset {asset}: {source}")]
@@ -208,11 +208,14 @@ fn check_thickness(name: &str, shape: &Shape, material: &SoftMaterial) -> Result
     }
     let mm = |metres: f64| format_number((1e5 * metres).round() / 100.0);
     let needed = (long / thin * (1.0 - 1e-6)).ceil();
-    let cure = if needed <= SoftMaterial::FINEST as f64 {
+    let cure = if needed <= SoftMaterial::MAX_RESOLUTION as f64 {
         format!("resolution = {needed} would serve")
     } else {
-        let least = mm(long / SoftMaterial::FINEST as f64);
-        format!("no resolution up to {} would serve; make it at least {least} mm thick", SoftMaterial::FINEST)
+        let least = mm(long / SoftMaterial::MAX_RESOLUTION as f64);
+        format!(
+            "no resolution up to {} would serve; make it at least {least} mm thick",
+            SoftMaterial::MAX_RESOLUTION
+        )
     };
     let what = format!(
         "it is {} mm thick, thinner than a voxel: at resolution {} they are {} mm; {cure}",
@@ -368,17 +371,16 @@ fn add(
     if matches!(asset.body, Body::Rigid { .. }) {
         check_sheet(object, cache)?;
     }
-    let friction = Friction { static_mu: asset.friction.static_mu, dynamic_mu: asset.friction.dynamic_mu };
     let collider = |world: &World, mover, pose| {
         let (name, shape) = (&object.name, &asset.shape);
-        cache.collider(world, name, (mover, pose), shape, friction)
+        cache.collider(world, name, (mover, pose), shape, asset.friction)
     };
     let mut parts = Vec::new();
     let (kind, colliders) = match &asset.body {
         Body::Soft(material) => {
             let rest = cache.rest(asset, material)?;
             let surface: Arc<dyn Surface> = Arc::new(asset.shape.clone());
-            let index = world.add_soft(&object.name, rest, Some(surface), &object.pose_w, friction);
+            let index = world.add_soft(&object.name, rest, Some(surface), &object.pose_w, asset.friction);
             (Kind::Soft(index), Vec::new())
         }
         Body::Rigid { density } => {

@@ -11,7 +11,7 @@ use crate::{
     },
     robot::{
         RobotSpec, Side,
-        gripper::{self, Gripper},
+        gripper::{self, GripperSetpoint},
         ik::DiffIk,
         pads::{self, PadSurface},
         panda::{self, ARM_DOFS},
@@ -32,7 +32,7 @@ pub struct RobotInstance {
     /// Base in the world.
     pub base_w: Pose,
     ik: DiffIk,
-    gripper: Gripper,
+    gripper: GripperSetpoint,
 }
 
 impl RobotInstance {
@@ -45,7 +45,7 @@ impl RobotInstance {
         control_dt: f64,
     ) -> Self {
         let tree = panda::tree(*base_w, &spec.gripper);
-        let open = gripper::OPENING / 2.0;
+        let open = gripper::MAX_WIDTH / 2.0;
         let all: Vec<f64> = q.iter().copied().chain([open, open]).collect();
         let drive =
             |kp, kd, target, effort| Some(Drive { kp, kd, target, target_velocity: 0.0, effort, force: 0.0 });
@@ -75,7 +75,7 @@ impl RobotInstance {
             body,
             base_w: *base_w,
             ik: DiffIk::new(&spec.ik, *q, control_dt),
-            gripper: Gripper::new(&spec.gripper, gripper::OPENING),
+            gripper: GripperSetpoint::new(&spec.gripper, gripper::MAX_WIDTH),
             spec: spec.clone(),
         }
     }
@@ -127,7 +127,7 @@ impl RobotInstance {
         &self,
         world: &World,
         pose_b: &Pose,
-    ) -> Result<[f64; ARM_DOFS], crate::robot::ik::Unreachable> {
+    ) -> Result<[f64; ARM_DOFS], crate::robot::ik::UnreachablePose> {
         self.ik.solve(&self.q(world), pose_b)
     }
 }
@@ -144,7 +144,7 @@ fn add_pad(world: &mut World, spec: &RobotSpec, tree: usize, side: Side) -> Coll
 fn add_box(world: &mut World, tree: usize, link: usize, half: Vec3, pose: Pose) -> ColliderId {
     let layer = world.rigid_layer();
     // Steel and plastic: the friction of any rigid prop.
-    let friction = Friction { static_mu: 0.6, dynamic_mu: 0.5 };
+    let friction = Friction::default();
     let mover = Mover::Link { tree, link };
     world.add_collider(Collider::new(
         "gripper",

@@ -42,12 +42,12 @@ pub struct Camera {
 }
 
 /// Vertical field of view, rad, of a lens of some focal length behind an aperture of some height (one unit for both).
-pub fn fovy_of_lens(focal: f64, aperture: f64) -> f64 {
+pub fn fovy_from_lens(focal: f64, aperture: f64) -> f64 {
     2.0 * (0.5 * aperture / focal).atan()
 }
 
 /// Edge of the images that a policy sees, pixels.
-pub const POLICY_EDGE: usize = 224;
+pub const POLICY_IMAGE_EDGE: usize = 224;
 
 impl Camera {
     /// The third-person camera over the table (SoftVTBench's environment: focal 18, aperture 15, its table at
@@ -67,11 +67,11 @@ impl Camera {
             name: "wrist".to_owned(),
             mount: CameraMount::Hand,
             pose: placed(Vec3::new(0.05, 0.0, 0.0), [0.0, FRAC_1_SQRT_2, FRAC_1_SQRT_2, 0.0]),
-            fovy_rad: fovy_of_lens(9.77, 15.0),
+            fovy_rad: fovy_from_lens(9.77, 15.0),
             near_m: 0.01,
             far_m: 20.0,
-            width: POLICY_EDGE,
-            height: POLICY_EDGE,
+            width: POLICY_IMAGE_EDGE,
+            height: POLICY_IMAGE_EDGE,
             set_at: None,
         }
     }
@@ -81,11 +81,11 @@ impl Camera {
             name: "third_person".to_owned(),
             mount: CameraMount::World,
             pose: placed(eye_w, wxyz),
-            fovy_rad: fovy_of_lens(18.0, 15.0),
+            fovy_rad: fovy_from_lens(18.0, 15.0),
             near_m: 0.05,
             far_m: 20.0,
-            width: POLICY_EDGE,
-            height: POLICY_EDGE,
+            width: POLICY_IMAGE_EDGE,
+            height: POLICY_IMAGE_EDGE,
             set_at: None,
         }
     }

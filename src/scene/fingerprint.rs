@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use sha2::{Digest, Sha256};
 
-use super::{Asset, Body, Part};
+use super::asset::{Asset, Body, Part};
 
 impl Asset {
     /// A short hash (16 hexadecimal digits of a SHA-256) of the shape, the body with its material and resolution, and the friction: all that a
@@ -75,7 +75,8 @@ mod tests {
     use super::*;
     use crate::{
         geometry::{Pose, Vec3, mesh::Mesh, shape::Shape},
-        scene::{Friction, SoftMaterial, Visual},
+        physics::contact::Friction,
+        scene::{SoftMaterial, Visual},
     };
 
     fn bun() -> Asset {
@@ -137,7 +138,7 @@ mod tests {
         let tetrahedron = |height: f64| {
             let vertices = [Vec3::zeros(), Vec3::x(), Vec3::y(), Vec3::z() * height].to_vec();
             let triangles = vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
-            let shape = Mesh { vertices, triangles, uvs: Vec::new() }.into_shape().expect("a solid");
+            let shape = Shape::from_mesh(Mesh { vertices, triangles, uvs: Vec::new() }).expect("a solid");
             Asset { shape, ..bun() }.fingerprint()
         };
         assert_eq!(tetrahedron(1.0), tetrahedron(1.0));

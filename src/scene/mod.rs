@@ -1,128 +1,25 @@
-//! A scene as plain data: assets, placed objects, their looks, the robot's place, light, cameras, regions. Knows no
-//! physics.
+//! A scene as plain data: assets, placed objects and their appearance, the robot's base, lighting, cameras, the workspace.
+//!
+//! Lengths are metres, angles radians, colours linear RGB. The world frame has z up and z = 0 on the support surface.
 
-mod articulated;
+mod asset;
 mod camera;
+mod decal;
+mod fingerprint;
 mod light;
-mod print;
-mod start;
 mod visual;
 
-mod fingerprint;
-
-use std::{collections::BTreeMap, sync::Arc};
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use crate::geometry::{Pose, Vec3, mass::mass_properties, shape::Shape};
+use crate::geometry::{Pose, Quat, Vec3};
 
-pub use articulated::{Joint, Motion, Part, part_poses};
-pub use camera::{Camera, CameraMount, POLICY_EDGE, fovy_of_lens};
+pub use asset::{Asset, Body, Joint, JointMotion, Part, SoftMaterial, part_poses};
+pub use camera::{Camera, CameraMount, POLICY_IMAGE_EDGE, fovy_from_lens};
+pub use decal::{GlyphCoverage, MAX_LETTERS, TextDecal, TextLine, Typeface};
 pub use light::{KeyLight, Lighting, Sky};
-pub use print::{Letters, Line, MOST_LETTERS, Print, Typeface};
-pub use start::{Place, Start};
-pub use visual::{Layer, Mask, Visual};
-
-/// How an object moves.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Body {
-    /// A finite-element soft body.
-    Soft(SoftMaterial),
-    /// A free rigid body of uniform density, kg/m³.
-    Rigid {
-        /// Density, kg/m³.
-        density: f64,
-    },
-    /// Parts on joints; the asset's own shape is their base, which is part of the world.
-    Articulated(Vec<Part>),
-    /// Part of the world; never moves.
-    Static,
-    /// Part of the picture only: it never moves and nothing touches it.
-    Scenery,
-}
-
-/// Linear-elastic isotropic material and discretisation of a soft body.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct SoftMaterial {
-    /// Young's modulus, Pa.
-    pub youngs_pa: f64,
-    /// Poisson's ratio, 0 ≤ ν < 0.5.
-    pub poisson: f64,
-    /// Density, kg/m³.
-    pub density: f64,
-    /// Voxels along the longest edge of the bounding box, at most [`Self::FINEST`].
-    pub resolution: usize,
-    /// Spacing of the contact samples on surfaces that a gripper can reach, m.
-    pub grasp_spacing: f64,
-}
-
-impl SoftMaterial {
-    /// Largest resolution.
-    pub const FINEST: usize = 64;
-}
-
-/// Coulomb friction coefficients of a surface; a pair of surfaces takes the larger of each.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Friction {
-    /// Static coefficient.
-    pub static_mu: f64,
-    /// Dynamic coefficient, not above the static one.
-    pub dynamic_mu: f64,
-}
-
-impl Default for Friction {
-    /// 0.6 / 0.5, that of every object and surface but the pads.
-    fn default() -> Self {
-        Self { static_mu: 0.6, dynamic_mu: 0.5 }
-    }
-}
-
-/// A kind of object: its shape at rest with its lowest point at z = 0 and its centre on the z axis.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Asset {
-    /// Name, unique in a scene's library.
-    pub name: String,
-    /// Shape in the object frame, m.
-    pub shape: Shape,
-    /// How it moves.
-    pub body: Body,
-    /// Friction of its surface.
-    pub friction: Friction,
-    /// Appearances by material id of the shape (0 is the default).
-    pub visuals: Vec<Visual>,
-    /// Free-form hints for experts (grasp axis, height …), numbers only, read by scripts.
-    pub hints: BTreeMap<String, f64>,
-}
-
-impl Asset {
-    /// Its parts on joints, if it is articulated; a carrier comes before what it carries.
-    pub fn parts(&self) -> &[Part] {
-        match &self.body {
-            Body::Articulated(parts) => parts,
-            _ => &[],
-        }
-    }
-
-    /// Mass of a soft or rigid body, or of the moving parts of an articulated one, kg; none of what never moves.
-    pub fn mass(&self) -> Option<f64> {
-        match &self.body {
-            Body::Soft(SoftMaterial { density, .. }) | Body::Rigid { density } => {
-                Some(mass_properties(&self.shape, *density).mass)
-            }
-            Body::Articulated(parts) => Some(parts.iter().map(Part::mass).sum()),
-            Body::Static | Body::Scenery => None,
-        }
-    }
-
-    /// Makes whatever of it moves `factor` times as heavy.
-    pub fn scale_mass(&mut self, factor: f64) {
-        match &mut self.body {
-            Body::Soft(SoftMaterial { density, .. }) | Body::Rigid { density } => *density *= factor,
-            Body::Articulated(parts) => parts.iter_mut().for_each(|part| part.scale_mass(factor)),
-            Body::Static | Body::Scenery => {}
-        }
-    }
-}
+pub use visual::{Mask, Visual, VisualLayer};
 
 /// An asset put somewhere.
 #[derive(Clone, Debug, PartialEq)]
@@ -133,7 +30,7 @@ pub struct Object {
     pub asset: Arc<Asset>,
     /// Object frame in the world.
     pub pose_w: Pose,
-    /// Start values of the joints of an articulated object, in the order of its parts, m or rad.
+    /// InitialState values of the joints of an articulated object, in the order of its parts, m or rad.
     pub joints: Vec<f64>,
     /// Where it was placed, `file:line`, for messages; empty if no script did.
     pub placed_at: String,
@@ -191,5 +88,44 @@ impl Scene {
     /// A camera by name.
     pub fn camera(&self, name: &str) -> Option<&Camera> {
         self.cameras.iter().find(|camera| camera.name == name)
+    }
+}
+
+/// What is put elsewhere in a scene before anything is simulated: a demonstration that was made in another world brings its own
+/// start. Nothing is checked here; a scene whose objects overlap is refused when it is built, as any is.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct InitialState {
+    /// Arm joint angles, rad; those of the layout if none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joints: Option<[f64; 7]>,
+    /// Objects that stand elsewhere.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub places: Vec<ObjectPlacement>,
+}
+
+/// Where an object stands; its height is the layout's.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ObjectPlacement {
+    /// Name in the scene.
+    pub name: String,
+    /// ObjectPlacement of its origin on the ground, m, world.
+    pub xy: [f64; 2],
+    /// Turn about the vertical, rad; the layout's if none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub yaw: Option<f64>,
+}
+
+impl InitialState {
+    /// Puts everything there; names that the scene does not have are passed over.
+    pub fn apply(&self, scene: &mut Scene) {
+        scene.start_q = self.joints.unwrap_or(scene.start_q);
+        for place in &self.places {
+            let Some(object) = scene.objects.iter_mut().find(|object| object.name == place.name) else {
+                continue;
+            };
+            let at = Vec3::new(place.xy[0], place.xy[1], object.pose_w.translation.z);
+            let turn = place.yaw.map(|yaw| Quat::from_axis_angle(&Vec3::z_axis(), yaw));
+            object.pose_w = Pose::from_parts(at.into(), turn.unwrap_or(object.pose_w.rotation));
+        }
     }
 }

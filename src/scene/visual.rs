@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::Print;
+use super::decal::TextDecal;
 use crate::geometry::shape::Shape;
 
 /// The look of a surface (metal/rough model). Colours are linear RGB.
@@ -15,7 +15,7 @@ pub struct Visual {
     /// Metalness, 0..=1.
     pub metalness: f64,
     /// Painted over the base one after the other.
-    pub layers: Vec<Layer>,
+    pub layers: Vec<VisualLayer>,
 }
 
 impl Default for Visual {
@@ -32,7 +32,7 @@ impl Visual {
 
     /// The same with another layer on top.
     #[must_use]
-    pub fn with(mut self, layer: Layer) -> Self {
+    pub fn with(mut self, layer: VisualLayer) -> Self {
         self.layers.push(layer);
         self
     }
@@ -40,7 +40,7 @@ impl Visual {
 
 /// A colour laid over what is below where a mask says so.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Layer {
+pub struct VisualLayer {
     /// Where.
     pub mask: Mask,
     /// Colour, linear RGB, 0..=1.
@@ -156,7 +156,7 @@ pub enum Mask {
     /// The letters of a line of text, where the surface faces who reads it.
     Text {
         /// The line.
-        print: Arc<Print>,
+        print: Arc<TextDecal>,
     },
     /// One minus a mask.
     Inverse {

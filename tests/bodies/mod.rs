@@ -8,7 +8,7 @@ use softvt::{
         mass::mass_properties,
         samples::{SampleSpec, surface_samples},
         shape::Shape,
-        voxelise::{VoxelSpec, voxel_mesh},
+        voxel::{VoxelSpec, voxel_mesh},
     },
     physics::{
         World,

@@ -162,7 +162,7 @@ fn meshed(radius: f64) -> Shape {
             triangles.extend([[a, b, c], [a, c, d]]);
         }
     }
-    Mesh { vertices, triangles, uvs: Vec::new() }.into_shape().expect("a closed mesh")
+    Shape::from_mesh(Mesh { vertices, triangles, uvs: Vec::new() }).expect("a closed mesh")
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use softvt::{
     geometry::{Pose, Quat, Vec3, shape::Shape},
-    scene::{Camera, Layer, Lighting, Mask, Visual},
+    scene::{Camera, Lighting, Mask, Visual, VisualLayer},
     sensing::camera::{
         Attachment, FrameView, RenderMesh, RenderObject, RenderScene, RenderedImage, Renderer,
     },
@@ -77,7 +77,7 @@ fn step(values: &[f64]) -> f64 {
 
 /// Corners of a checkerboard of 0.1 m seen from 1 m: their errors, pixels.
 pub fn corners() -> Vec<f64> {
-    let layer = Layer {
+    let layer = VisualLayer {
         mask: Mask::Checker { size_m: 0.1 },
         albedo: [0.5; 3],
         roughness: 1.0,

@@ -6,7 +6,7 @@ use softvt::{
     geometry::{
         Mat3, Pose, Vec3,
         shape::Shape,
-        voxelise::{VoxelSpec, voxel_mesh},
+        voxel::{VoxelSpec, voxel_mesh},
     },
     physics::fem::{Material, Rest, SoftBody, element::lame},
 };

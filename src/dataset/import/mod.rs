@@ -20,7 +20,7 @@ use super::{DatasetError, TaskFile};
 use crate::{
     geometry::{Pose, Vec3},
     policy::ToolCommand,
-    scene::Start,
+    scene::InitialState,
 };
 
 pub use header::Layout;
@@ -86,7 +86,7 @@ pub enum Begins {
         /// Index in the split of demonstrations.
         attempt: u32,
         /// What the layout is overruled with.
-        start: Start,
+        start: InitialState,
     },
 }
 

@@ -3,7 +3,7 @@
 use super::Standing;
 use crate::{
     geometry::{Pose, Vec3},
-    scene::{Body, Object, Place, Scene},
+    scene::{Body, Object, ObjectPlacement, Scene},
 };
 
 /// What is longer than this is the ground, m.
@@ -16,7 +16,7 @@ const UPRIGHT: f64 = 0.99;
 /// A thing is an object of the same name, or of which the asset's name, or the object's, is the name's ending, behind a number
 /// that tells things of one kind apart: the first of them is the first in the scene. A soft body without a name of ours is the
 /// target.
-pub fn places(scene: &Scene, target: &str, things: &[Standing]) -> Vec<Place> {
+pub fn places(scene: &Scene, target: &str, things: &[Standing]) -> Vec<ObjectPlacement> {
     let mut things: Vec<(&str, u32, &Standing)> = things.iter().map(numbered).collect();
     things.sort_by_key(|(_, number, _)| *number);
     let mut taken = vec![false; things.len()];
@@ -57,11 +57,15 @@ fn numbered(thing: &Standing) -> (&str, u32, &Standing) {
     (stem, number, thing)
 }
 
-fn place(scene: &Scene, object: &Object, thing: &Standing) -> Place {
+fn place(scene: &Scene, object: &Object, thing: &Standing) -> ObjectPlacement {
     let pose_w = if thing.in_base { scene.base_w * thing.pose } else { thing.pose };
     let at = pose_w.translation.vector;
     let upright = (pose_w.rotation * Vec3::z()).z > UPRIGHT;
-    Place { name: object.name.clone(), xy: [at.x, at.y], yaw: (upright && !thing.soft).then(|| yaw(&pose_w)) }
+    ObjectPlacement {
+        name: object.name.clone(),
+        xy: [at.x, at.y],
+        yaw: (upright && !thing.soft).then(|| yaw(&pose_w)),
+    }
 }
 
 /// Turn about the vertical, rad.
@@ -77,7 +81,8 @@ mod tests {
     use super::*;
     use crate::{
         geometry::{Quat, shape::Shape},
-        scene::{Asset, Friction, Lighting, Region},
+        physics::contact::Friction,
+        scene::{Asset, Lighting, Region},
     };
 
     fn object(name: &str, asset: &str, size: f64) -> Object {
@@ -121,7 +126,7 @@ mod tests {
         }
     }
 
-    fn named(places: &[Place]) -> Vec<(&str, f64)> {
+    fn named(places: &[ObjectPlacement]) -> Vec<(&str, f64)> {
         places.iter().map(|place| (place.name.as_str(), (100.0 * place.xy[0]).round())).collect()
     }
 
@@ -136,7 +141,7 @@ mod tests {
         assert_eq!(named(&found), [("left", 10.0), ("right", 30.0)]);
         assert!((found[0].yaw.unwrap() - 0.3).abs() < 1e-12);
         let mut moved = scene();
-        crate::scene::Start { joints: Some([0.5; 7]), places: found }.apply(&mut moved);
+        crate::scene::InitialState { joints: Some([0.5; 7]), places: found }.apply(&mut moved);
         let at = moved.objects[2].pose_w.translation.vector;
         assert!((at - Vec3::new(0.3, 0.1, 0.25)).norm() < 1e-12, "the height is the layout's: {at}");
         assert_eq!((moved.start_q, &moved.objects[0]), ([0.5; 7], &scene().objects[0]));

@@ -1,7 +1,11 @@
 //! Bounding boxes.
 
-use super::{Axis, Shape, Vec3};
-use crate::geometry::Aabb;
+use super::{
+    displacement::Displacement,
+    tree::{Shape, to_local},
+    warp::Axis,
+};
+use crate::geometry::{Aabb, Vec3};
 
 /// Cells along the longest edge in the search for the extreme points of a composite shape.
 const CELLS: f64 = 40.0;
@@ -30,7 +34,7 @@ impl Shape {
             Self::Cylinder { radius, half_height } => {
                 p.z.abs() - half_height > reach || beyond(p.xy().norm_squared(), *radius)
             }
-            Self::Placed { shape, pose } => shape.is_farther(&super::to_local(pose, p), reach),
+            Self::Placed { shape, pose } => shape.is_farther(&to_local(pose, p), reach),
             Self::Paint { shape, .. } => shape.is_farther(p, reach),
             _ => false,
         }
@@ -77,33 +81,33 @@ impl Shape {
     }
 
     /// A box that surely holds the shape, not tight.
-    pub(crate) fn reach(&self) -> Aabb {
+    pub(crate) fn loose_bounds(&self) -> Aabb {
         match self {
-            Self::Placed { shape, pose } => shape.reach().transformed(pose),
+            Self::Placed { shape, pose } => shape.loose_bounds().transformed(pose),
             Self::Scaled { shape, scale } => {
-                let inner = shape.reach();
+                let inner = shape.loose_bounds();
                 Aabb { min: inner.min.component_mul(scale), max: inner.max.component_mul(scale) }
             }
-            Self::Rounded { shape, radius } => shape.reach().loosened(*radius),
-            Self::Shell { shape, .. } | Self::Paint { shape, .. } => shape.reach(),
+            Self::Rounded { shape, radius } => shape.loose_bounds().loosened(*radius),
+            Self::Shell { shape, .. } | Self::Paint { shape, .. } => shape.loose_bounds(),
             Self::Union(parts) => joined(parts),
             Self::Intersect(parts) => parts
                 .iter()
-                .map(Self::reach)
+                .map(Self::loose_bounds)
                 .reduce(|a, b| Aabb {
                     min: a.min.sup(&b.min),
                     max: a.max.inf(&b.max).sup(&a.min.sup(&b.min)),
                 })
                 .unwrap_or(Aabb::from_half_extents(Vec3::zeros())),
-            Self::Subtract { from, .. } | Self::SmoothSubtract { from, .. } => from.reach(),
+            Self::Subtract { from, .. } | Self::SmoothSubtract { from, .. } => from.loose_bounds(),
             // Each blend raises the seam by at most a quarter of its width, in first-order distance.
             Self::SmoothUnion { parts, blend } => joined(parts).loosened(0.5 * blend * parts.len() as f64),
-            Self::Twist { shape, axis, .. } => twisted(&shape.reach(), *axis),
+            Self::Twist { shape, axis, .. } => twisted(&shape.loose_bounds(), *axis),
             Self::Bend { shape, along, towards, curvature } => {
-                bent(&shape.reach(), *along, *towards, *curvature)
+                bent(&shape.loose_bounds(), *along, *towards, *curvature)
             }
             Self::Displace { shape, reliefs } => {
-                shape.reach().loosened(1.5 * reliefs.iter().map(super::Relief::reach).sum::<f64>())
+                shape.loose_bounds().loosened(1.5 * reliefs.iter().map(Displacement::max_height).sum::<f64>())
             }
             _ => self.bounds(),
         }
@@ -111,7 +115,7 @@ impl Shape {
 
     /// Projects grid points near the surface on it, keeps the extreme ones and lets them climb.
     fn search_bounds(&self) -> Aabb {
-        let reach = self.reach();
+        let reach = self.loose_bounds();
         let cell = reach.size().max() / CELLS;
         let count = reach.size().map(|edge| (edge / cell).ceil() as usize + 1);
         let mut extremes: [Option<Vec3>; 6] = [None; 6];
@@ -148,7 +152,7 @@ impl Shape {
     pub(crate) fn project(&self, p: &Vec3, reach: f64) -> Option<Vec3> {
         let mut q = *p;
         for _ in 0..8 {
-            let (distance, normal) = self.estimate(&q);
+            let (distance, normal) = self.first_order(&q);
             q -= normal * distance;
             if distance.abs() < 1e-9 {
                 break;
@@ -161,7 +165,7 @@ impl Shape {
     fn climb(&self, start: Vec3, direction: &Vec3, cell: f64) -> Vec3 {
         let (mut at, mut step) = (start, cell);
         while step > 1e-7 {
-            let normal = self.estimate(&at).1;
+            let normal = self.first_order(&at).1;
             let slope = direction - normal * normal.dot(direction);
             let next = (slope.norm() > 1e-9)
                 .then(|| self.project(&(at + slope.normalize() * step), 2.0 * step))
@@ -183,7 +187,7 @@ fn outward(side: usize) -> Vec3 {
 fn joined(parts: &[Shape]) -> Aabb {
     parts
         .iter()
-        .map(Shape::reach)
+        .map(Shape::loose_bounds)
         .reduce(|a, b| a.merged(&b))
         .unwrap_or(Aabb::from_half_extents(Vec3::zeros()))
 }

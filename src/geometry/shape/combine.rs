@@ -4,7 +4,7 @@
 //! angle). Taking the surfaces as planes gives the distance to their common edge where that is nearest, which is exact
 //! for planes and right to first order for the rest; [`intersect_exactly`] repeats this where it arrives.
 
-use super::Vec3;
+use crate::geometry::Vec3;
 
 /// A signed distance and a unit normal.
 pub(super) type Field = (f64, Vec3);

@@ -1,6 +1,10 @@
 //! What a contact sample feels of a shape, with sharp faces covered in part.
 
-use super::{Shape, Vec3, primitive, to_local};
+use super::{
+    primitive,
+    tree::{Shape, to_local},
+};
+use crate::geometry::Vec3;
 
 /// A shape as a contact sample feels it.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,6 +1,7 @@
 //! Exact distance and normal of the primitives.
 
-use super::{Profile, Vec3};
+use super::polygon::Polygon;
+use crate::geometry::Vec3;
 
 /// The x axis stands in for a normal that is not defined (the centre of a ball, the axis of a tube).
 fn unit_or_x(v: Vec3, length: f64) -> Vec3 {
@@ -65,7 +66,7 @@ pub(super) fn torus(p: &Vec3, major: f64, minor: f64) -> (f64, Vec3) {
     (length - minor, unit_or_x(arm, length))
 }
 
-pub(super) fn prism(p: &Vec3, section: &Profile, half_length: f64) -> (f64, Vec3) {
+pub(super) fn prism(p: &Vec3, section: &Polygon, half_length: f64) -> (f64, Vec3) {
     let (flat, gradient) = section.distance([p.x, p.z]);
     let side = p.y.abs() - half_length;
     let across = Vec3::new(gradient[0], 0.0, gradient[1]);
@@ -77,7 +78,7 @@ pub(super) fn prism(p: &Vec3, section: &Profile, half_length: f64) -> (f64, Vec3
     if flat > side { (flat, across) } else { (side, along) }
 }
 
-pub(super) fn lathe(p: &Vec3, profile: &Profile) -> (f64, Vec3) {
+pub(super) fn lathe(p: &Vec3, profile: &Polygon) -> (f64, Vec3) {
     let r = length(p.x, p.y);
     let (distance, gradient) = profile.distance([r, p.z]);
     (distance, unit_or_x(Vec3::new(p.x, p.y, 0.0), r) * gradient[0] + Vec3::z() * gradient[1])

@@ -1,7 +1,30 @@
-//! Warps of space: where a point of the warped shape lies in the straight one, and how gradients come back.
+//! Coordinate axes, and the inverse maps of warps along them: from a point of the warped shape to the point of the straight
+//! one, with the Jacobian that transforms gradients.
 
-use super::{Axis, Vec3};
-use crate::geometry::Mat3;
+use crate::geometry::{Mat3, Vec3};
+
+/// A coordinate axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Axis {
+    /// First axis.
+    X,
+    /// Second axis.
+    Y,
+    /// Third axis.
+    Z,
+}
+
+impl Axis {
+    /// 0, 1 or 2.
+    pub fn index(self) -> usize {
+        self as usize
+    }
+
+    /// Its unit vector.
+    pub fn unit(self) -> Vec3 {
+        Vec3::ith(self.index(), 1.0)
+    }
+}
 
 /// The straight point and the Jacobian ∂(straight)/∂(warped) of a twist of `rate` rad/m about `axis`.
 pub(super) fn untwist(p: &Vec3, axis: Axis, rate: f64) -> (Vec3, Mat3) {

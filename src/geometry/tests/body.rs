@@ -6,9 +6,9 @@ use crate::geometry::{
     mass::mass_properties,
     samples::{SampleSpec, surface_samples},
     shape::{Axis, Shape},
-    skin::skin,
+    surface_mesh::SurfaceMesh,
     voxel::VoxelMesh,
-    voxelise::{GeometryError, VoxelSpec, voxel_mesh},
+    voxel::{VoxelMeshError, VoxelSpec, voxel_mesh},
 };
 
 fn cut(shape: &Shape, resolution: usize) -> VoxelMesh {
@@ -16,14 +16,14 @@ fn cut(shape: &Shape, resolution: usize) -> VoxelMesh {
 }
 
 fn filled_volume(mesh: &VoxelMesh) -> f64 {
-    mesh.fill.iter().map(|fill| fill.fraction()).sum::<f64>() * mesh.edge.powi(3)
+    mesh.occupancy.iter().map(|fill| fill.fraction()).sum::<f64>() * mesh.edge.powi(3)
 }
 
 #[test]
 fn a_cube_at_resolution_six_has_343_nodes_and_full_voxels() {
     let mesh = cut(&Shape::cuboid(Vec3::repeat(0.056)), 6);
     assert_eq!((mesh.nodes.len(), mesh.elements.len(), mesh.grid), (343, 216, [6; 3]));
-    assert!(mesh.fill.iter().all(|fill| fill.fraction() == 1.0));
+    assert!(mesh.occupancy.iter().all(|fill| fill.fraction() == 1.0));
     assert!((mesh.nodes[0] - Vec3::repeat(-0.028)).norm() < 1e-15);
     assert!((mesh.nodes[342] - Vec3::repeat(0.028)).norm() < 1e-15);
     for nodes in &mesh.elements {
@@ -61,16 +61,16 @@ fn empty_and_impossible_bodies_are_refused() {
     let nothing = ball.clone().subtract(Shape::Sphere { radius: 0.02 });
     let refused =
         |shape: &Shape, resolution| voxel_mesh(shape, &VoxelSpec { resolution }).expect_err("refused");
-    assert_eq!(refused(&nothing, 6), GeometryError::Empty);
-    assert_eq!(refused(&ball, 0), GeometryError::Resolution(0));
-    assert!(matches!(refused(&Shape::Sphere { radius: f64::NAN }, 6), GeometryError::Shape(_)));
+    assert_eq!(refused(&nothing, 6), VoxelMeshError::Empty);
+    assert_eq!(refused(&ball, 0), VoxelMeshError::Resolution(0));
+    assert!(matches!(refused(&Shape::Sphere { radius: f64::NAN }, 6), VoxelMeshError::Shape(_)));
 }
 
 #[test]
 fn material_points_return_to_their_rest_position() {
     for (name, shape) in exact_shapes().into_iter().chain(composite_shapes()) {
         let mesh = cut(&shape, 6);
-        let skin = skin(&shape, 2e-3);
+        let skin = SurfaceMesh::from_shape(&shape, 2e-3);
         for (vertex, at) in skin.mesh.vertices.iter().zip(skin.embed(&mesh).expect("near voxels")) {
             assert!((mesh.rest_position(&at) - vertex).norm() < 1e-12, "{name}: {vertex:?} {at:?}");
         }
@@ -81,9 +81,9 @@ fn material_points_return_to_their_rest_position() {
 fn skins_are_watertight_and_of_the_right_genus() {
     for (name, shape) in exact_shapes().into_iter().chain(composite_shapes()) {
         for cell in [1e-3, 1.7e-3] {
-            let skin = skin(&shape, cell);
+            let skin = SurfaceMesh::from_shape(&shape, cell);
             let mesh = &skin.mesh;
-            assert_eq!(mesh.check_closed(), Ok(()), "{name} at {cell}");
+            assert_eq!(mesh.validate_closed(), Ok(()), "{name} at {cell}");
             assert!(mesh.volume() > 0.0, "{name}");
             let surfaces_less_holes = match name {
                 "torus" | "box less box" => 0,
@@ -110,7 +110,7 @@ fn skins_are_watertight_and_of_the_right_genus() {
 #[test]
 fn skins_keep_sharp_edges() {
     let size = Vec3::new(0.05, 0.04, 0.03);
-    let mesh = skin(&Shape::cuboid(size), 1e-3).mesh;
+    let mesh = SurfaceMesh::from_shape(&Shape::cuboid(size), 1e-3).mesh;
     assert!((mesh.volume() / size.product() - 1.0).abs() < 1e-5, "{}", mesh.volume());
     let area = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
     assert!((mesh.area() / area - 1.0).abs() < 1e-4, "{}", mesh.area() / area);
@@ -161,7 +161,7 @@ fn samples_sum_to_the_exact_area() {
 #[test]
 fn samples_of_composites_sum_to_the_area_of_a_fine_skin() {
     for (name, shape) in composite_shapes() {
-        check_samples(name, &shape, skin(&shape, 0.5e-3).mesh.area(), 5e-3);
+        check_samples(name, &shape, SurfaceMesh::from_shape(&shape, 0.5e-3).mesh.area(), 5e-3);
     }
 }
 
@@ -180,7 +180,7 @@ fn mass_properties_match_closed_forms_and_integration() {
     let near = |a: &Mat3, b: &Mat3, tolerance: f64| (a - b).abs().max() <= tolerance * b.abs().max();
     for (name, shape) in exact_shapes() {
         let exact = mass_properties(&shape, 300.0);
-        let solid = skin(&shape, 0.8e-3).mesh.into_shape().expect("a solid");
+        let solid = Shape::from_mesh(SurfaceMesh::from_shape(&shape, 0.8e-3).mesh).expect("a solid");
         let integrated = mass_properties(&solid, 300.0);
         assert!((exact.mass / integrated.mass - 1.0).abs() < 3e-3, "{name}: {exact:?} {integrated:?}");
         assert!((exact.com - integrated.com).norm() < 3e-5, "{name}");

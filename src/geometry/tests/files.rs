@@ -2,12 +2,12 @@ use super::rng;
 use rand::Rng;
 
 use crate::geometry::{
-    Aabb, Vec3,
-    broad_phase::{Candidate, candidate_pairs},
+    Aabb, GroupedAabb, Vec3,
     import::{ImportError, ImportOptions, MeshFormat, import},
     mesh::{Mesh, MeshError},
+    overlapping_pairs,
     shape::Shape,
-    skin::skin,
+    surface_mesh::SurfaceMesh,
 };
 
 const METRES: ImportOptions = ImportOptions { scale: 1.0, z_up: true };
@@ -73,7 +73,7 @@ fn every_format_reads_the_same_cube() {
     let from_glb = import(&glb(&cube), MeshFormat::Gltf, &METRES).expect("a cube");
     for (name, mesh, centre) in [("obj", cube, 0.5), ("stl", from_stl, 0.5), ("glb", from_glb, 1.5)] {
         assert!((mesh.volume() - 1.0).abs() < 1e-12, "{name}");
-        let shape = mesh.into_shape().expect("a solid");
+        let shape = Shape::from_mesh(mesh).expect("a solid");
         let bounds = shape.bounds();
         assert_eq!((bounds.size(), bounds.centre().x), (Vec3::repeat(1.0), centre), "{name}");
         assert!((shape.distance(&bounds.centre()) + 0.5).abs() < 1e-12, "{name}");
@@ -96,7 +96,8 @@ fn scale_and_the_upward_axis_are_honoured() {
 #[test]
 fn open_empty_flat_and_broken_files_are_refused_with_their_reason() {
     let open = CUBE.rsplit_once("f 4").expect("a last face").0;
-    let refusal = |text: &str| read_obj(text).and_then(|mesh| Ok(mesh.into_shape()?)).expect_err("refused");
+    let refusal =
+        |text: &str| read_obj(text).and_then(|mesh| Ok(Shape::from_mesh(mesh)?)).expect_err("refused");
     assert_eq!(refusal(open), ImportError::Mesh(MeshError::Open { edges: 4 }));
     assert_eq!(
         refusal(open).to_string(),
@@ -117,7 +118,7 @@ fn open_empty_flat_and_broken_files_are_refused_with_their_reason() {
     }
     let cut_short = &glb(&read_obj(CUBE).expect("a cube"))[..200];
     assert!(import(cut_short, MeshFormat::Gltf, &METRES).is_err());
-    assert_eq!(MeshFormat::of_extension("FBX"), Err(ImportError::Extension("fbx".into())));
+    assert_eq!(MeshFormat::from_extension("FBX"), Err(ImportError::Extension("fbx".into())));
     let millimetres = ImportOptions { scale: -1.0, z_up: true };
     assert_eq!(import(CUBE.as_bytes(), MeshFormat::Obj, &millimetres), Err(ImportError::Scale(-1.0)));
 }
@@ -127,15 +128,16 @@ fn a_mesh_that_is_inside_out_is_turned() {
     let mut cube = read_obj(CUBE).expect("a cube");
     cube.triangles.iter_mut().for_each(|t| t.swap(0, 1));
     assert!(cube.volume() < 0.0);
-    let shape = cube.into_shape().expect("a solid");
+    let shape = Shape::from_mesh(cube).expect("a solid");
     assert!((shape.distance(&Vec3::repeat(0.5)) + 0.5).abs() < 1e-12);
 }
 
 #[test]
 fn the_distance_to_an_imported_mesh_is_that_to_the_shape_it_was_made_of() {
     let shape = Shape::Torus { major: 0.025, minor: 0.01 };
-    let mesh = import(&stl(&skin(&shape, 1e-3).mesh), MeshFormat::Stl, &METRES).expect("a mesh");
-    let imported = mesh.into_shape().expect("a solid");
+    let mesh =
+        import(&stl(&SurfaceMesh::from_shape(&shape, 1e-3).mesh), MeshFormat::Stl, &METRES).expect("a mesh");
+    let imported = Shape::from_mesh(mesh).expect("a solid");
     let mut rng = rng();
     for _ in 0..500 {
         let p = Vec3::from_fn(|_, _| rng.random_range(-0.04..0.04));
@@ -150,11 +152,11 @@ fn the_distance_to_an_imported_mesh_is_that_to_the_shape_it_was_made_of() {
 fn candidate_pairs_are_those_of_brute_force() {
     let mut rng = rng();
     for count in [0, 1, 2, 3, 40] {
-        let candidates: Vec<Candidate> = (0..count)
+        let candidates: Vec<GroupedAabb> = (0..count)
             .map(|_| {
                 let min = Vec3::from_fn(|_, _| rng.random_range(0.0..1.0));
                 let size = Vec3::from_fn(|_, _| rng.random_range(0.0..0.3));
-                Candidate { bounds: Aabb { min, max: min + size }, group: rng.random_range(0..5) }
+                GroupedAabb { bounds: Aabb { min, max: min + size }, group: rng.random_range(0..5) }
             })
             .collect();
         let overlap = |a: &Aabb, b: &Aabb| (0..3).all(|k| a.min[k] <= b.max[k] && b.min[k] <= a.max[k]);
@@ -167,6 +169,6 @@ fn candidate_pairs_are_those_of_brute_force() {
             }
         }
         expected.sort_unstable();
-        assert_eq!(candidate_pairs(&candidates), expected);
+        assert_eq!(overlapping_pairs(&candidates), expected);
     }
 }

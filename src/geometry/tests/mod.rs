@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 use super::{
     Vec3,
     mesh::Mesh,
-    shape::{Axis, Bumps, Mask, Relief, Ridges, Shape},
+    shape::{Axis, Bumps, Displacement, Ramp, Ridges, Shape},
 };
 
 fn rng() -> ChaCha8Rng {
@@ -26,8 +26,8 @@ fn random_unit(rng: &mut ChaCha8Rng) -> Vec3 {
     }
 }
 
-fn ridges(axis: Axis, height: f64, count: i32, pitch: f64) -> Relief {
-    Relief::Ridges(Ridges {
+fn ridges(axis: Axis, height: f64, count: i32, pitch: f64) -> Displacement {
+    Displacement::Ridges(Ridges {
         axis,
         height,
         count,
@@ -35,12 +35,12 @@ fn ridges(axis: Axis, height: f64, count: i32, pitch: f64) -> Relief {
         radial_pitch: f64::INFINITY,
         phase: 0.3,
         sharpness: 1.0,
-        mask: Some(Mask { axis: Axis::Z, from: -0.01, to: 0.01 }),
+        mask: Some(Ramp { axis: Axis::Z, from: -0.01, to: 0.01 }),
     })
 }
 
-fn seeds() -> Relief {
-    Relief::Bumps(Bumps { height: 0.5e-3, radius: 3e-3, spacing: 8e-3, seed: 3, mask: None })
+fn seeds() -> Displacement {
+    Displacement::Bumps(Bumps { height: 0.5e-3, radius: 3e-3, spacing: 8e-3, seed: 3, mask: None })
 }
 
 /// Primitives and what keeps them exact.

@@ -4,16 +4,16 @@ use super::{composite_shapes, crate_with_low_sides, exact_shapes, lathe, random_
 use crate::geometry::{
     Aabb, Vec3,
     mesh::Mesh,
-    shape::{Axis, Profile, Shape, ShapeError},
-    skin::skin,
+    shape::{Axis, Polygon, Shape, ShapeError},
+    surface_mesh::SurfaceMesh,
 };
 
 /// Largest error of `distance_and_normal` against parry's exact distance to a fine skin, as a share of the distance
 /// (beyond the 40 µm that the chords of the skin may be off), over points up to 5 mm from the surface.
 fn worst_distance_error(shape: &Shape) -> (f64, Vec3) {
-    let skin = skin(shape, 0.8e-3);
+    let skin = SurfaceMesh::from_shape(shape, 0.8e-3);
     let truth =
-        exact_surface(shape).unwrap_or_else(|| skin.mesh.clone()).into_shape().expect("a closed skin");
+        Shape::from_mesh(exact_surface(shape).unwrap_or_else(|| skin.mesh.clone())).expect("a closed skin");
     let mut rng = rng();
     let mut worst = (0.0, Vec3::zeros());
     for _ in 0..1500 {
@@ -107,7 +107,7 @@ fn distances_of_combinations_and_warps_are_within_five_percent() {
 fn normals_are_gradients_of_the_distance() {
     let mut rng = rng();
     for (name, shape) in exact_shapes().into_iter().chain(composite_shapes()) {
-        let fine = skin(&shape, 3e-3);
+        let fine = SurfaceMesh::from_shape(&shape, 3e-3);
         for vertex in fine.mesh.vertices.iter().step_by(7) {
             let p = vertex + random_unit(&mut rng) * 2e-5;
             let (_, normal) = shape.distance_and_normal(&p);
@@ -134,7 +134,7 @@ fn normals_are_gradients_of_the_distance() {
 fn bounds_of_turned_and_composite_shapes_are_tight() {
     for (name, shape) in exact_shapes().into_iter().chain(composite_shapes()) {
         let bounds = shape.bounds();
-        let mesh = exact_surface(&shape).unwrap_or_else(|| skin(&shape, 0.7e-3).mesh);
+        let mesh = exact_surface(&shape).unwrap_or_else(|| SurfaceMesh::from_shape(&shape, 0.7e-3).mesh);
         let found = Aabb::from_points(&mesh.vertices).expect("a skin");
         let off = (bounds.min - found.min).abs().max().max((bounds.max - found.max).abs().max());
         assert!(off < 5e-5, "{name}: {off}");
@@ -220,14 +220,14 @@ fn rays_hit_where_the_line_meets_the_surface() {
     assert!((hit - 0.07).abs() < 1e-6, "{hit}");
     assert_eq!(ball.ray(&Vec3::zeros(), &Vec3::y(), 1.0), None);
     assert_eq!(ball.ray(&Vec3::zeros(), &Vec3::x(), 0.05), None);
-    let mesh = skin(&ball, 1e-3).mesh.into_shape().expect("a solid");
+    let mesh = Shape::from_mesh(SurfaceMesh::from_shape(&ball, 1e-3).mesh).expect("a solid");
     let hit = mesh.ray(&Vec3::zeros(), &Vec3::x(), 1.0).expect("a hit");
     assert!((hit - 0.07).abs() < 2e-5, "{hit}");
 }
 
 #[test]
 fn impossible_shapes_name_the_number_and_the_mend() {
-    let message = |shape: &Shape| shape.check().expect_err("refused").to_string();
+    let message = |shape: &Shape| shape.validate().expect_err("refused").to_string();
     assert_eq!(
         message(&Shape::Sphere { radius: -0.1 }),
         "sphere: radius is -0.1 m; give a finite length above 0"
@@ -239,7 +239,7 @@ fn impossible_shapes_name_the_number_and_the_mend() {
     assert!(message(&wedge().scaled(Vec3::new(1.0, 0.0, 1.0))).contains("factor is 0"));
     let nested = Shape::Sphere { radius: 0.1 }.subtract(Shape::Sphere { radius: 0.0 }).twisted(Axis::Z, 1.0);
     assert!(message(&nested).starts_with("sphere: radius is 0"));
-    let profile = |points: &[[f64; 2]]| Profile::revolved(points.to_vec()).expect_err("refused");
+    let profile = |points: &[[f64; 2]]| Polygon::revolved(points.to_vec()).expect_err("refused");
     assert_eq!(profile(&[[0.0, 0.0], [1.0, 0.0]]), ShapeError::ProfileSize { corners: 2 });
     assert!(matches!(
         profile(&[[0.0, 0.0], [-1.0, 0.0], [0.0, 1.0]]),
@@ -247,7 +247,7 @@ fn impossible_shapes_name_the_number_and_the_mend() {
     ));
     assert_eq!(profile(&[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]), ShapeError::ProfileArea);
     assert_eq!(profile(&[[0.0, 0.0], [2.0, 2.0], [2.0, 0.0], [0.0, 3.0]]), ShapeError::ProfileCrossing);
-    assert!(exact_shapes().into_iter().chain(composite_shapes()).all(|(_, shape)| shape.check().is_ok()));
+    assert!(exact_shapes().into_iter().chain(composite_shapes()).all(|(_, shape)| shape.validate().is_ok()));
 }
 
 #[test]

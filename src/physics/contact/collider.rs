@@ -2,6 +2,8 @@
 
 use std::{fmt::Debug, sync::Arc};
 
+use serde::{Deserialize, Serialize};
+
 use super::solid::Solid;
 use crate::geometry::{
     Aabb, Pose, Vec3,
@@ -55,13 +57,20 @@ pub enum Mover {
     },
 }
 
-/// Coulomb coefficients of one surface; a pair takes the larger of each.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Coulomb friction coefficients of a surface. A pair of surfaces takes the larger of each coefficient.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Friction {
     /// Static coefficient.
     pub static_mu: f64,
-    /// Dynamic coefficient.
+    /// Dynamic coefficient, not above the static one.
     pub dynamic_mu: f64,
+}
+
+impl Default for Friction {
+    /// 0.6 / 0.5: every object and surface except the gel pads.
+    fn default() -> Self {
+        Self { static_mu: 0.6, dynamic_mu: 0.5 }
+    }
 }
 
 impl Friction {

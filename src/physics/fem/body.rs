@@ -9,7 +9,7 @@ use super::{
 };
 use crate::geometry::{
     Mat3, Pose, Vec3, hex8,
-    voxel::{Fill, SUB, SurfaceSample, VoxelMesh},
+    voxel::{OccupancyMask, SUBCELLS, SurfaceSample, VoxelMesh},
 };
 
 /// Isotropic linear elasticity.
@@ -81,7 +81,7 @@ impl Rest {
     pub fn bytes(&self) -> usize {
         let (nodes, elements) = (self.mesh.nodes.len(), self.mesh.elements.len());
         let own = nodes * (size_of::<f64>() + 4 * size_of::<Vec3>())
-            + elements * (size_of::<[u32; 8]>() + size_of::<Fill>() + 2 * size_of::<Mat3>())
+            + elements * (size_of::<[u32; 8]>() + size_of::<OccupancyMask>() + 2 * size_of::<Mat3>())
             + self.samples.len() * size_of::<Sample>()
             + self.stiffness.len() * size_of::<Stiffness>();
         own + (FACTOR_BYTES * (nodes as f64).powf(4.0 / 3.0)) as usize
@@ -90,9 +90,9 @@ impl Rest {
     /// Builds the rest data; `volume` (m³) is the body's true volume, which fixes its mass.
     pub fn new(mesh: VoxelMesh, material: Material, volume: f64, samples: Vec<SurfaceSample>) -> Arc<Self> {
         let h = mesh.edge;
-        let mut fills: Vec<Fill> = Vec::new();
+        let mut fills: Vec<OccupancyMask> = Vec::new();
         let stiffness_of = mesh
-            .fill
+            .occupancy
             .iter()
             .map(|fill| match fills.iter().position(|f| f == fill) {
                 Some(at) => at as u32,
@@ -108,7 +108,7 @@ impl Rest {
         let (samples, groups) = group_samples(&mesh, samples);
         Arc::new(Self {
             mass: node_masses(&mesh, material.density, volume),
-            watched: mesh.fill.iter().map(|f| f.fraction() >= WATCHED_FILL).collect(),
+            watched: mesh.occupancy.iter().map(|f| f.fraction() >= WATCHED_FILL).collect(),
             material,
             samples,
             groups,
@@ -134,11 +134,11 @@ impl Rest {
 
 /// Masses lumped by the shape functions over the filled part, floored, then scaled to `density · volume` in all.
 fn node_masses(mesh: &VoxelMesh, density: f64, volume: f64) -> Vec<f64> {
-    let cell = mesh.edge.powi(3) / (SUB * SUB * SUB) as f64;
+    let cell = mesh.edge.powi(3) / (SUBCELLS * SUBCELLS * SUBCELLS) as f64;
     let mut mass = vec![0.0; mesh.nodes.len()];
-    for (nodes, fill) in mesh.elements.iter().zip(&mesh.fill) {
-        for sub in (0..SUB * SUB * SUB).filter(|&sub| fill.contains(sub)) {
-            let at = crate::geometry::voxel::Embedding { element: 0, local: Fill::centre(sub) };
+    for (nodes, fill) in mesh.elements.iter().zip(&mesh.occupancy) {
+        for sub in (0..SUBCELLS * SUBCELLS * SUBCELLS).filter(|&sub| fill.contains(sub)) {
+            let at = crate::geometry::voxel::Embedding { element: 0, local: OccupancyMask::centre(sub) };
             for (&node, w) in nodes.iter().zip(at.weights()) {
                 mass[node as usize] += density * cell * w;
             }

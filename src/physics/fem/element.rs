@@ -7,7 +7,7 @@
 
 use crate::geometry::{
     Vec3, hex8,
-    voxel::{Fill, SUB},
+    voxel::{OccupancyMask, SUBCELLS},
 };
 
 /// Stiffness of the empty part of a voxel relative to the full one.
@@ -33,16 +33,16 @@ pub fn lame(youngs: f64, poisson: f64) -> (f64, f64) {
 }
 
 /// Stiffness of a voxel of edge `h` of which `fill` is material.
-pub fn stiffness(h: f64, fill: &Fill, youngs: f64, poisson: f64) -> Stiffness {
+pub fn stiffness(h: f64, fill: &OccupancyMask, youngs: f64, poisson: f64) -> Stiffness {
     let gauss: Vec<(Vec3, f64)> = gauss_points().iter().map(|xi| (*xi, h.powi(3) / 8.0)).collect();
     let full = integrate(&gauss, h, youngs, poisson);
-    if *fill == Fill::full() {
+    if *fill == OccupancyMask::full() {
         return full;
     }
-    let cells = SUB * SUB * SUB;
+    let cells = SUBCELLS * SUBCELLS * SUBCELLS;
     let points: Vec<(Vec3, f64)> = (0..cells)
         .filter(|&cell| fill.contains(cell))
-        .map(|cell| (Fill::centre(cell), h.powi(3) / cells as f64))
+        .map(|cell| (OccupancyMask::centre(cell), h.powi(3) / cells as f64))
         .collect();
     let mut part = integrate(&points, h, youngs, poisson);
     part.iter_mut().zip(full.iter()).for_each(|(k, ghost)| *k += GHOST * ghost);
@@ -103,7 +103,7 @@ mod tests {
 
     #[test]
     fn rigid_motion_needs_no_force_and_stiffness_is_symmetric() {
-        let k = stiffness(0.01, &Fill::full(), 3e4, 0.45);
+        let k = stiffness(0.01, &OccupancyMask::full(), 3e4, 0.45);
         let scale = k.iter().cloned().fold(0.0, f64::max);
         for u in [field(0.01, |_| Vec3::x()), field(0.01, |x| Vec3::new(0.3, -0.2, 0.5).cross(&x) * 100.0)] {
             assert!(apply(&k, &u).iter().all(|f| f.abs() < 1e-12 * scale));
@@ -124,20 +124,22 @@ mod tests {
         let exact =
             0.5 * h.powi(3) * (lambda * f64::powi(strain.trace(), 2) + 2.0 * mu * strain.norm_squared());
         let u = field(h, |x| grad * x);
-        let k = stiffness(h, &Fill::full(), youngs, poisson);
+        let k = stiffness(h, &OccupancyMask::full(), youngs, poisson);
         let energy: f64 = 0.5 * apply(&k, &u).iter().zip(u).map(|(f, u)| f * u).sum::<f64>();
         assert!((energy / exact - 1.0).abs() < 1e-12, "{energy} vs {exact}");
     }
 
     #[test]
     fn a_half_filled_voxel_carries_half_the_uniform_energy_and_the_ghost() {
-        let mut half = Fill::default();
-        (0..SUB * SUB * SUB).filter(|cell| cell % SUB < SUB / 2).for_each(|cell| half.insert(cell));
+        let mut half = OccupancyMask::default();
+        (0..SUBCELLS * SUBCELLS * SUBCELLS)
+            .filter(|cell| cell % SUBCELLS < SUBCELLS / 2)
+            .for_each(|cell| half.insert(cell));
         let u = field(0.01, |x| Vec3::new(x.x, 0.0, 0.0));
-        let energy = |fill: &Fill| {
+        let energy = |fill: &OccupancyMask| {
             let k = stiffness(0.01, fill, 1e4, 0.2);
             apply(&k, &u).iter().zip(u).map(|(f, u)| f * u).sum::<f64>()
         };
-        assert!((energy(&half) / energy(&Fill::full()) - 0.5 - GHOST).abs() < 1e-12);
+        assert!((energy(&half) / energy(&OccupancyMask::full()) - 0.5 - GHOST).abs() < 1e-12);
     }
 }

@@ -86,7 +86,7 @@ pub fn min_det(x: &Corners, h: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::{
-        geometry::{Quat, hex8, voxel::Fill},
+        geometry::{Quat, hex8, voxel::OccupancyMask},
         physics::fem::element::{gauss_points, mean_gradients, stiffness},
     };
     use proptest::prelude::*;
@@ -98,7 +98,7 @@ mod tests {
     }
 
     fn evaluate(x: &Corners, last: Mat3) -> Elastic {
-        elastic(x, &cube(), &mean_gradients(H), &stiffness(H, &Fill::full(), 3e4, 0.4), last)
+        elastic(x, &cube(), &mean_gradients(H), &stiffness(H, &OccupancyMask::full(), 3e4, 0.4), last)
     }
 
     fn bent(e: &[f64]) -> Corners {

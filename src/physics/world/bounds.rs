@@ -69,7 +69,7 @@ mod tests {
             Mat3, Pose, Vec3,
             samples::{SampleSpec, surface_samples},
             shape::Shape,
-            voxelise::{VoxelSpec, voxel_mesh},
+            voxel::{VoxelSpec, voxel_mesh},
         },
         physics::{Params, contact::Friction, fem::Material, rigid::RigidBody, world::Touch},
     };

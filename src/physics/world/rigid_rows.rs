@@ -11,10 +11,7 @@ use super::{
     sliding::Sliding,
 };
 use crate::{
-    geometry::{
-        Aabb, Vec3,
-        broad_phase::{Candidate, candidate_pairs},
-    },
+    geometry::{Aabb, GroupedAabb, Vec3, overlapping_pairs},
     physics::{
         contact::{ContactPoint, Mover, Part},
         solver::{Endpoint, Patch, Point},
@@ -95,8 +92,8 @@ impl World {
         pairs.clear();
         let ids: Vec<usize> =
             (0..self.colliders.len()).filter(|&i| self.colliders[i].solid.is_some()).collect();
-        let boxes: Vec<Candidate> = ids.iter().map(|&id| self.box_of(id)).collect();
-        for (i, j) in candidate_pairs(&boxes) {
+        let boxes: Vec<GroupedAabb> = ids.iter().map(|&id| self.box_of(id)).collect();
+        for (i, j) in overlapping_pairs(&boxes) {
             let (i, j) = (ids[i], ids[j]);
             let (a, b) = if self.is_known(j) { (i, j) } else { (j, i) };
             if self.is_known(a) {
@@ -115,7 +112,7 @@ impl World {
     }
 
     /// Where a collider is or may be soon, and with which others it forms one thing.
-    fn box_of(&self, id: usize) -> Candidate {
+    fn box_of(&self, id: usize) -> GroupedAabb {
         let (collider, moving) = (&self.colliders[id], &self.moving[id]);
         let bounds = collider.bounds.transformed(&moving.pose);
         let lever = farthest(&bounds, &moving.origin);
@@ -126,7 +123,7 @@ impl World {
             (Mover::Static | Mover::Kinematic(_), None) => 0,
             (Mover::Rigid(index), None) => 1 + index as u32,
         };
-        Candidate { bounds: bounds.loosened(self.params.margin.max(AHEAD * self.params.dt * speed)), group }
+        GroupedAabb { bounds: bounds.loosened(self.params.margin.max(AHEAD * self.params.dt * speed)), group }
     }
 
     /// Whether a collider's motion is known before the solve.

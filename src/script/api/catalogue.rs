@@ -56,7 +56,7 @@ pub(crate) static SOFT: Record = Record {
         field("density", Type::Number("kg/m³", Range::POSITIVE), Required, "Density."),
         field(
             "resolution",
-            Type::Integer(Range::closed(1.0, SoftMaterial::FINEST as f64)),
+            Type::Integer(Range::closed(1.0, SoftMaterial::MAX_RESOLUTION as f64)),
             Presence::Integer(6),
             "Voxels along the longest edge of the bounding box.",
         ),

@@ -13,7 +13,8 @@ use crate::script::{
 };
 use crate::{
     geometry::Vec3,
-    scene::{Asset, Body, Friction, Joint, Motion, Part, part_poses},
+    physics::contact::Friction,
+    scene::{Asset, Body, Joint, JointMotion, Part, part_poses},
     text::format_number,
 };
 
@@ -134,7 +135,7 @@ fn joint(lua: &Lua, table: &Table) -> mlua::Result<Joint> {
     let turns = schema::is_made(lua, &HINGE, table);
     let origin: [f64; 3] = if turns { table.get("origin")? } else { [0.0; 3] };
     Ok(Joint {
-        motion: if turns { Motion::Turn } else { Motion::Slide },
+        motion: if turns { JointMotion::Turn } else { JointMotion::Slide },
         axis_o: Vec3::from(table.get::<[f64; 3]>("axis")?).normalize(),
         origin_o: Vec3::from(origin),
         lower: table.get("lower")?,

@@ -17,8 +17,9 @@ use crate::script::{
 };
 use crate::{
     geometry::{Pose, Quat, Vec3},
+    physics::contact::Friction,
     robot::panda::{self, ARM_DOFS},
-    scene::{Asset, Body, Camera, Friction, Lighting, Object, Region, Scene, SoftMaterial},
+    scene::{Asset, Body, Camera, Lighting, Object, Region, Scene, SoftMaterial},
     text::format_number,
 };
 

@@ -8,7 +8,7 @@ use crate::geometry::{
     Quat, Vec3,
     import::{ImportOptions, MeshFormat, import},
     mass::mass_properties,
-    shape::{Axis, Bumps, Mask, Relief, Ridges, Shape, ShapeError, TreeSize},
+    shape::{Axis, Bumps, Displacement, Ramp, Ridges, Shape, ShapeError, TreeSize},
 };
 use crate::script::{
     api::catalogue_classes::{Class, SHAPE},
@@ -62,7 +62,7 @@ impl LuaShape {
                 ),
             ));
         }
-        shape.check().map_err(|error| fail(lua, format!("shape.{error}")))?;
+        shape.validate().map_err(|error| fail(lua, format!("shape.{error}")))?;
         let bytes = nodes * size_of::<Shape>() + more;
         Ok(Self(Arc::new(Node { shape, bytes, _held: hold(lua, bytes)? })))
     }
@@ -123,9 +123,9 @@ fn mesh(lua: &Lua, value: &Value) -> mlua::Result<LuaShape> {
     drop(hold(lua, MESH_TO_FILE * bytes.len())?);
     let extension = path.rsplit_once('.').map_or("", |(_, extension)| extension);
     let options = ImportOptions { scale: spec.get("scale")?, z_up: spec.get("z_up")? };
-    let shape = MeshFormat::of_extension(extension)
+    let shape = MeshFormat::from_extension(extension)
         .and_then(|format| import(&bytes, format, &options))
-        .and_then(|mesh| Ok(mesh.into_shape()?));
+        .and_then(|mesh| Ok(Shape::from_mesh(mesh)?));
     let shape = shape.map_err(|error| fail(lua, format!("mesh: {path}: {error}")))?;
     LuaShape::new(lua, shape, MESH_TO_FILE * bytes.len())
 }
@@ -165,14 +165,14 @@ fn axis(spec: &Table, key: &str) -> mlua::Result<Axis> {
     })
 }
 
-fn mask(spec: &Table) -> mlua::Result<Option<Mask>> {
+fn mask(spec: &Table) -> mlua::Result<Option<Ramp>> {
     let Some(mask) = spec.get::<Option<Table>>("mask")? else { return Ok(None) };
-    Ok(Some(Mask { axis: axis(&mask, "axis")?, from: mask.get("from")?, to: mask.get("to")? }))
+    Ok(Some(Ramp { axis: axis(&mask, "axis")?, from: mask.get("from")?, to: mask.get("to")? }))
 }
 
-fn ridges(spec: &Table) -> mlua::Result<Relief> {
+fn ridges(spec: &Table) -> mlua::Result<Displacement> {
     let pitch = |key: &str| spec.get::<Option<f64>>(key).map(|pitch| pitch.unwrap_or(f64::INFINITY));
-    Ok(Relief::Ridges(Ridges {
+    Ok(Displacement::Ridges(Ridges {
         axis: axis(spec, "axis")?,
         height: spec.get("height")?,
         count: spec.get("count")?,
@@ -184,8 +184,8 @@ fn ridges(spec: &Table) -> mlua::Result<Relief> {
     }))
 }
 
-fn bumps(spec: &Table) -> mlua::Result<Relief> {
-    Ok(Relief::Bumps(Bumps {
+fn bumps(spec: &Table) -> mlua::Result<Displacement> {
+    Ok(Displacement::Bumps(Bumps {
         height: spec.get("height")?,
         radius: spec.get("radius")?,
         spacing: spec.get("spacing")?,

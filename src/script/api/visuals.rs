@@ -16,7 +16,7 @@ use crate::script::{
 };
 use crate::{
     geometry::shape::Shape,
-    scene::{Layer, Line, MOST_LETTERS, Mask, Print, Typeface, Visual},
+    scene::{MAX_LETTERS, Mask, TextDecal, TextLine, Typeface, Visual, VisualLayer},
 };
 
 /// Masks that one may be made of: each is computed at every point that is drawn.
@@ -101,7 +101,7 @@ pub(crate) fn install(lua: &Lua, api: &Table) -> mlua::Result<()> {
             };
             sound(record, &spec, &wrong)?;
             if *name == "text" {
-                let print = Print::new(line(&spec, &wrong)?);
+                let print = TextDecal::new(line(&spec, &wrong)?);
                 let bytes = print.bytes();
                 return LuaMask::new(lua, Mask::Text { print: Arc::new(print) }, 1, bytes);
             }
@@ -157,13 +157,13 @@ fn direction(spec: &Table) -> mlua::Result<[f64; 3]> {
 }
 
 /// A line of text that can be printed.
-fn line(spec: &Table, wrong: &dyn Fn(&str, &str) -> mlua::Error) -> mlua::Result<Line> {
+fn line(spec: &Table, wrong: &dyn Fn(&str, &str) -> mlua::Error) -> mlua::Result<TextLine> {
     let Ok(text) = spec.get::<String>("text") else {
         return Err(wrong("text", "expected letters in UTF-8"));
     };
     let count = text.chars().count();
-    if count > MOST_LETTERS {
-        return Err(wrong("text", &format!("expected at most {MOST_LETTERS} letters, got {count}")));
+    if count > MAX_LETTERS {
+        return Err(wrong("text", &format!("expected at most {MAX_LETTERS} letters, got {count}")));
     }
     let facing = match spec.get::<Value>("facing")? {
         Value::String(name) => facing_of(&name.to_string_lossy()),
@@ -181,7 +181,7 @@ fn line(spec: &Table, wrong: &dyn Fn(&str, &str) -> mlua::Error) -> mlua::Result
         ));
     }
     let typeface = if spec.get::<String>("font")? == "mono" { Typeface::Mono } else { Typeface::Sans };
-    let line = Line {
+    let line = TextLine {
         text,
         typeface,
         height_m: spec.get("height_m")?,
@@ -284,8 +284,8 @@ fn visual(table: &Table) -> mlua::Result<Visual> {
     })
 }
 
-fn layer(table: &Table) -> mlua::Result<Layer> {
-    Ok(Layer {
+fn layer(table: &Table) -> mlua::Result<VisualLayer> {
+    Ok(VisualLayer {
         mask: table.get::<Option<LuaMask>>("mask")?.map_or(Mask::Whole, |mask| (*mask.0.mask).clone()),
         albedo: table.get("albedo")?,
         roughness: table.get("roughness")?,

@@ -18,7 +18,7 @@ use crate::script::{
 use crate::{
     geometry::{Aabb, Pose, Vec3},
     policy::TactileFrame,
-    robot::{Obstacle, clearance, gripper::OPENING},
+    robot::{Obstacle, clearance, gripper::MAX_WIDTH},
     scene::{Asset, Body},
 };
 
@@ -416,7 +416,7 @@ fn room(
 ) -> mlua::Result<(f64, Option<String>)> {
     let (width, ignored): (f64, Vec<String>) = match options {
         Some(options) => (options.get("width")?, options.get::<Option<_>>("ignore")?.unwrap_or_default()),
-        None => (OPENING, Vec::new()),
+        None => (MAX_WIDTH, Vec::new()),
     };
     with(lua, &this.0, |view| {
         let known = || view.objects.iter().map(|object| object.name.as_str());

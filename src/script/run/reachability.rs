@@ -2,7 +2,7 @@
 
 use crate::{
     geometry::Pose,
-    robot::ik::{Unreachable, pose_error},
+    robot::ik::{UnreachablePose, pose_error},
     rollout::Simulation,
 };
 
@@ -45,7 +45,7 @@ fn is_away(distance: f64, angle: f64) -> bool {
 }
 
 /// Scripts give poses in the world frame.
-fn message(miss: &Unreachable, base_w: &Pose) -> String {
+fn message(miss: &UnreachablePose, base_w: &Pose) -> String {
     let target = base_w.transform_point(&miss.target_b.into());
     let base = base_w.translation.vector;
     format!(

@@ -4,7 +4,7 @@ use crate::{
     geometry::{Pose, Vec3},
     physics::joints,
     rollout::{AssetCache, Simulation},
-    scene::{Motion, Scene},
+    scene::{JointMotion, Scene},
     script::{Episode, EpisodeRequest},
 };
 
@@ -167,7 +167,7 @@ fn where_the_parts_of_a_scene_are_is_where_the_mechanics_has_them() {
     let scene = open(&suite(&chest(SLIDER, more), place)).unwrap();
     let object = scene.objects[0].clone();
     assert_eq!(object.joints, [0.05, 0.6, 0.2], "the knob starts at its nearest limit");
-    assert_eq!(object.asset.parts()[1].joint.motion, Motion::Turn);
+    assert_eq!(object.asset.parts()[1].joint.motion, JointMotion::Turn);
     let placed = crate::scene::part_poses(object.asset.parts(), &object.joints);
     let sim =
         Simulation::new(Arc::new(scene), &Default::default(), &Default::default(), &AssetCache::default());

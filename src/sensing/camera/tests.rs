@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     geometry::{Pose, Quat, Vec3, mesh::Mesh, shape::Shape},
-    scene::{Camera, CameraMount, Layer, Lighting, Mask, Visual},
+    scene::{Camera, CameraMount, Lighting, Mask, Visual, VisualLayer},
 };
 
 fn thing(object: u16, model: RenderMesh, mount: Attachment) -> RenderObject {
@@ -30,7 +30,7 @@ fn ball(object: u16, radius: f64, mount: Attachment) -> RenderObject {
 
 fn checker(size_m: f64) -> Visual {
     let mask = Mask::Checker { size_m };
-    Visual::plain([0.1; 3], 1.0, 0.0).with(Layer {
+    Visual::plain([0.1; 3], 1.0, 0.0).with(VisualLayer {
         mask,
         albedo: [0.5; 3],
         roughness: 1.0,

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::{
-    geometry::{Mat3, Pose, Vec3, shape::Shape, skin, voxel::VoxelMesh},
+    geometry::{Mat3, Pose, Vec3, shape::Shape, surface_mesh::SurfaceMesh, voxel::VoxelMesh},
     sensing::camera,
 };
 
@@ -64,7 +64,7 @@ impl Skin {
     }
 
     fn fine(shape: &Shape) -> Self {
-        let mesh = skin::skin(shape, CELL.max(shape.bounds().size().max() / MOST_CELLS)).mesh;
+        let mesh = SurfaceMesh::from_shape(shape, CELL.max(shape.bounds().size().max() / MOST_CELLS)).mesh;
         Self { vertices: mesh.vertices, triangles: mesh.triangles, embedding: None }
     }
 
@@ -193,7 +193,7 @@ mod tests {
     use super::*;
     use crate::geometry::{
         Quat,
-        voxelise::{VoxelSpec, voxel_mesh},
+        voxel::{VoxelSpec, voxel_mesh},
     };
 
     fn ball() -> (Skin, VoxelMesh) {

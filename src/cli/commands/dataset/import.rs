@@ -26,7 +26,7 @@ use crate::{
     evaluation::record::Origin,
     policy::{ChunkedPolicy, ToolCommand, recorded::RecordedPolicy},
     rollout::target_asset,
-    scene::{Body, Start},
+    scene::{Body, InitialState},
     script,
 };
 
@@ -170,16 +170,16 @@ fn begin(
     batch: &SuiteRun,
     one: &MatchedDemo,
     layout: bool,
-) -> Result<(Start, import::ForeignDemo), CliError> {
+) -> Result<(InitialState, import::ForeignDemo), CliError> {
     let mut demo = one.demo.clone();
     let (joints, things) = match &one.demo.begins {
         Begins::Episode { start, .. } => {
             let places = if layout { Vec::new() } else { start.places.clone() };
-            return Ok((Start { places, ..*start }, demo));
+            return Ok((InitialState { places, ..*start }, demo));
         }
         Begins::Elsewhere { joints, things } => (*joints, if layout { &[][..] } else { things }),
     };
-    let mut start = Start { joints, places: Vec::new() };
+    let mut start = InitialState { joints, places: Vec::new() };
     if things.is_empty() && !demo.held.contains(&true) {
         return Ok((start, demo));
     }

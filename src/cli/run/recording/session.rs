@@ -34,7 +34,7 @@ use crate::{
         run_folder::{RunFolder, SUMMARY},
     },
     rollout::{EpisodeError, FinishedEpisode, SettleError, batch, cancel},
-    scene::Start,
+    scene::InitialState,
     script::Loaded,
 };
 
@@ -271,7 +271,9 @@ impl<'a> SuiteRecording<'a> {
         let origin = batch.origins.get(&place);
         let error = match (batch.episode_from(job, origin, true, &batch.drive)?, origin) {
             (Ok(finished), _) => return Ok(finished),
-            (Err(error), Some(origin)) if no_start(&error) && origin.start != Start::default() => error,
+            (Err(error), Some(origin)) if no_start(&error) && origin.start != InitialState::default() => {
+                error
+            }
             (Err(error), _) => return Err(batch.episode_failure(&error)),
         };
         let ending = format!("{NO_START}{error}");
@@ -282,7 +284,7 @@ impl<'a> SuiteRecording<'a> {
                 1,
             )))
         });
-        let nowhere = origin.map(|origin| Origin { start: Start::default(), ..origin.clone() });
+        let nowhere = origin.map(|origin| Origin { start: InitialState::default(), ..origin.clone() });
         batch.episode_from(job, nowhere.as_ref(), true, &refused)?.map_err(|e| batch.episode_failure(&e))
     }
 

@@ -3,7 +3,7 @@
 use super::Piece;
 use crate::geometry::{
     Pose, Vec3,
-    convex::{self, Closest, Convex},
+    convex::{self, ClosestPoints, ConvexShape},
 };
 
 /// How much farther apart a refined direction must show the pieces before it displaces one along a face or an axis,
@@ -22,7 +22,7 @@ pub(super) struct Axis {
     /// Whether some pair of points is really this far apart; two boxes corner to corner are farther.
     pub true_gap: bool,
     /// The touching points, where an iteration looked for them.
-    pub closest: Option<Closest>,
+    pub closest: Option<ClosestPoints>,
 }
 
 /// The contact normal of `a` and `b` in rank order, or `None` if they are at least `margin` (m) apart.
@@ -76,19 +76,19 @@ pub(super) fn contact_axis(a: &Piece, pose_a: &Pose, b: &Piece, pose_b: &Pose, m
 }
 
 /// The closest points of the pieces themselves, from those of their cores.
-fn refine(a: &Piece, pose_a: &Pose, b: &Piece, pose_b: &Pose, margin: f64) -> Option<Closest> {
+fn refine(a: &Piece, pose_a: &Pose, b: &Piece, pose_b: &Pose, margin: f64) -> Option<ClosestPoints> {
     let ((core_a, radius_a), (core_b, radius_b)) = (core(a)?, core(b)?);
-    let found = convex::closest(&core_a, pose_a, &core_b, pose_b, margin + radius_a + radius_b)?;
+    let found = convex::closest_points(&core_a, pose_a, &core_b, pose_b, margin + radius_a + radius_b)?;
     let (a_w, b_w) = (found.a_w + found.n_w * radius_a, found.b_w - found.n_w * radius_b);
-    Some(Closest { a_w, b_w, ..found })
+    Some(ClosestPoints { a_w, b_w, ..found })
 }
 
 /// A piece as a convex core and the thickness of a skin around it, m.
-fn core(piece: &Piece) -> Option<(Convex, f64)> {
+fn core(piece: &Piece) -> Option<(ConvexShape, f64)> {
     match *piece {
-        Piece::Box { half } => Some((Convex::Box(half), 0.0)),
-        Piece::Cylinder { radius, half_height } => Some((Convex::Cylinder { radius, half_height }, 0.0)),
-        Piece::Capsule { radius, half_height } => Some((Convex::Segment(half_height), radius)),
+        Piece::Box { half } => Some((ConvexShape::Box(half), 0.0)),
+        Piece::Cylinder { radius, half_height } => Some((ConvexShape::Cylinder { radius, half_height }, 0.0)),
+        Piece::Capsule { radius, half_height } => Some((ConvexShape::Segment(half_height), radius)),
         Piece::Plane | Piece::Sphere { .. } => None,
     }
 }

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::geometry::{
     Mat3, Pose, Vec3, hex8, orthonormal_basis,
-    shape::{Profile, Shape},
+    shape::{Polygon, Shape},
 };
 
 /// Grid cells along the longest side of a shape in the search for its sharp edges.
@@ -153,7 +153,7 @@ fn is_sharp(shape: &Shape, p: &Vec3) -> bool {
 
 /// The convex corners of a revolved profile, (r, z), and whether they are sharp; those on the axis only if they are tips,
 /// blunt ones only if the solid can stand on them.
-fn rims(profile: &Profile) -> impl Iterator<Item = ([f64; 2], bool)> + '_ {
+fn rims(profile: &Polygon) -> impl Iterator<Item = ([f64; 2], bool)> + '_ {
     let points = profile.points();
     let count = points.len();
     (0..count).filter_map(move |i| {

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::geometry::{Vec3, mesh::Mesh, shape::Profile};
+use crate::geometry::{Vec3, mesh::Mesh, shape::Polygon};
 
 /// Corners are drawn rounded over so much of the edges beside them, m; the surface moves by less than a fifth of it.
 const ROUNDED: f64 = 1e-3;
@@ -15,14 +15,14 @@ const TURNED: [f64; 2] = [0.75, 2.2];
 const ON_AXIS: f64 = 1e-9;
 
 /// The rings of a revolved profile, about `cell` (m) wide.
-pub(crate) fn lathed(profile: &Profile, cell: f64) -> Mesh {
+pub(crate) fn lathed(profile: &Polygon, cell: f64) -> Mesh {
     let widest = profile.points().iter().map(|p| p[0]).fold(0.0, f64::max);
     let turns = (TAU * widest / (TURNED[1] * cell)).ceil() as usize;
     turned(profile, TURNED[0] * cell, turns.clamp(24, 400))
 }
 
 /// The profile revolved about z in `turns` pieces, its edges cut to at most `step`, m.
-fn turned(profile: &Profile, step: f64, turns: usize) -> Mesh {
+fn turned(profile: &Polygon, step: f64, turns: usize) -> Mesh {
     let ring = cut(&rounded(profile.points()), step);
     let mut vertices = Vec::new();
     // First vertex of each ring of vertices; one on the axis is a single vertex.
@@ -112,7 +112,7 @@ mod tests {
     #[test]
     fn a_turned_profile_is_closed_faces_outwards_and_encloses_its_volume() {
         let profile =
-            Profile::revolved(vec![[0.0, 0.0], [0.05, 0.0], [0.05, 0.02], [0.0, 0.02]]).expect("a profile");
+            Polygon::revolved(vec![[0.0, 0.0], [0.05, 0.0], [0.05, 0.02], [0.0, 0.02]]).expect("a profile");
         let mesh = turned(&profile, 2e-3, 128);
         let volume: f64 = mesh
             .triangles

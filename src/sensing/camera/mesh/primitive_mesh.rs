@@ -4,7 +4,7 @@
 use crate::geometry::{
     Vec3,
     mesh::Mesh,
-    shape::{Profile, Shape},
+    shape::{Polygon, Shape},
 };
 use crate::sensing::camera::{mesh::lathe_mesh::lathed, mesh::render_mesh::box_mesh};
 
@@ -18,7 +18,7 @@ pub(crate) fn triangles(shape: &Shape, cell: f64) -> Option<Mesh> {
         Shape::Prism { section, half_length } => Some(prism(section, *half_length)),
         Shape::Lathe(profile) => Some(lathed(profile, cell)),
         Shape::Cylinder { radius: r, half_height: h } => {
-            Profile::revolved(vec![[0.0, -h], [*r, -h], [*r, *h], [0.0, *h]]).ok().map(|p| lathed(&p, cell))
+            Polygon::revolved(vec![[0.0, -h], [*r, -h], [*r, *h], [0.0, *h]]).ok().map(|p| lathed(&p, cell))
         }
         Shape::Paint { shape, .. } => triangles(shape, cell),
         Shape::Placed { shape, pose } => {
@@ -54,7 +54,7 @@ fn union(parts: &[Shape], cell: f64) -> Option<Mesh> {
 }
 
 /// A polygon in (x, z), which may be hollow, drawn out along y.
-fn prism(section: &Profile, half_length: f64) -> Mesh {
+fn prism(section: &Polygon, half_length: f64) -> Mesh {
     let corners = section.points();
     let n = corners.len() as u32;
     let end = |y: f64| corners.iter().map(move |p| Vec3::new(p[0], y, p[1]));

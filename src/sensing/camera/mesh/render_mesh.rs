@@ -17,8 +17,8 @@ use crate::{
     geometry::{
         Vec3, basis_from_reference,
         mesh::Mesh,
-        shape::{Profile, Shape},
-        skin,
+        shape::{Polygon, Shape},
+        surface_mesh::SurfaceMesh,
         union_find::UnionFind,
         voxel::{Embedding, VoxelMesh},
     },
@@ -188,7 +188,7 @@ pub(crate) fn check(
     visuals: &[Visual],
 ) -> Result<(), CameraError> {
     let wrong = |reason: String| Err(CameraError::RenderMesh { name: name.to_owned(), reason });
-    if let Err(error) = mesh.check() {
+    if let Err(error) = mesh.validate() {
         return wrong(error.to_string());
     }
     if mesh.triangles.len() >= 1 << TRIANGLE_BITS {
@@ -244,7 +244,7 @@ pub fn flat_faces(shape: &Shape) -> Option<Mesh> {
 /// Triangles about `cell` (m) wide on a shape, and their materials.
 fn triangles(shape: &Shape, cell: f64) -> (Mesh, Vec<u16>) {
     let Some(profile) = revolved(shape) else {
-        let skin = skin::skin(shape, cell);
+        let skin = SurfaceMesh::from_shape(shape, cell);
         return (skin.mesh, skin.materials);
     };
     materials_of(lathed(profile, cell), shape)
@@ -258,7 +258,7 @@ fn materials_of(mesh: Mesh, shape: &Shape) -> (Mesh, Vec<u16>) {
 }
 
 /// The profile of a shape that is one of revolution where it stands, painted or not.
-fn revolved(shape: &Shape) -> Option<&Profile> {
+fn revolved(shape: &Shape) -> Option<&Polygon> {
     match shape {
         Shape::Lathe(profile) => Some(profile),
         Shape::Paint { shape, .. } => revolved(shape),

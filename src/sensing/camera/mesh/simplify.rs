@@ -250,13 +250,13 @@ impl<'a> Work<'a> {
 mod tests {
     use super::*;
     use crate::{
-        geometry::{shape::Shape, skin},
-        scene::{Layer, Mask, Visual},
+        geometry::{shape::Shape, surface_mesh::SurfaceMesh},
+        scene::{Mask, Visual, VisualLayer},
         sensing::camera::mesh::render_mesh::bake,
     };
 
     fn level(shape: &Shape, cell: f64, visual: Visual) -> Lod {
-        let mesh = skin::skin(shape, cell).mesh;
+        let mesh = SurfaceMesh::from_shape(shape, cell).mesh;
         let materials = vec![0; mesh.triangles.len()];
         bake(&mesh, &materials, &[visual], cell as f32, Some(shape))
     }
@@ -284,7 +284,8 @@ mod tests {
     fn a_pattern_keeps_its_triangles_and_what_is_plain_does_not() {
         let shape = Shape::Cylinder { radius: 0.08, half_height: 0.01 };
         let spots = Mask::Inside { shape: Shape::Sphere { radius: 0.03 }.into(), soft_m: 0.004 };
-        let dark = Layer { mask: spots, albedo: [0.02; 3], roughness: 0.5, opacity: 1.0, relief_m: 0.0 };
+        let dark =
+            VisualLayer { mask: spots, albedo: [0.02; 3], roughness: 0.5, opacity: 1.0, relief_m: 0.0 };
         let fine = level(&shape, 3e-3, Visual::plain([0.8; 3], 0.5, 0.0).with(dark));
         let coarse = decimated(&fine, 2e-4);
         let near = |of: &Lod, from: f32, to: f32| {

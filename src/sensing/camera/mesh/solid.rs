@@ -6,7 +6,7 @@ use crate::sensing::camera::{
     mesh::simplify::decimated,
 };
 use crate::{
-    geometry::{Pose, mesh::Mesh, shape::Shape, skin},
+    geometry::{Pose, mesh::Mesh, shape::Shape, surface_mesh::SurfaceMesh},
     scene::Visual,
 };
 
@@ -57,7 +57,7 @@ impl RenderSolid {
     fn triangles(&self) -> Mesh {
         match &self.form {
             Tessellation::Mesh(mesh) => mesh.clone(),
-            Tessellation::Skin { cell_m } => skin::skin(&self.shape, *cell_m).mesh,
+            Tessellation::Skin { cell_m } => SurfaceMesh::from_shape(&self.shape, *cell_m).mesh,
         }
     }
 }

@@ -172,22 +172,22 @@ fn filled(texels: Vec<Option<[f32; 4]>>, size: [usize; 2]) -> Vec<[f32; 4]> {
 mod tests {
     use super::*;
     use crate::{
-        scene::{Layer, Line, Mask, Print},
+        scene::{Mask, TextDecal, TextLine, VisualLayer},
         sensing::camera::{RenderMesh, simd::F8},
     };
 
     /// A word facing +x, white on black.
     fn printed() -> Visual {
-        let line = Line {
+        let line = TextLine {
             text: "soft".into(),
             height_m: 0.012,
             weight: 0.15,
             at: [0.03, 0.0, 0.0],
             facing: [1.0, 0.0, 0.0],
-            ..Line::default()
+            ..TextLine::default()
         };
-        let mask = Mask::Text { print: Arc::new(Print::new(line)) };
-        let layer = Layer { mask, albedo: [1.0; 3], roughness: 0.5, opacity: 1.0, relief_m: 0.0 };
+        let mask = Mask::Text { print: Arc::new(TextDecal::new(line)) };
+        let layer = VisualLayer { mask, albedo: [1.0; 3], roughness: 0.5, opacity: 1.0, relief_m: 0.0 };
         Visual::plain([0.0; 3], 0.5, 0.0).with(layer)
     }
 

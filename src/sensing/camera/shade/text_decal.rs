@@ -1,7 +1,7 @@
 //! Lines of text on surfaces.
 
 use crate::sensing::camera::V3;
-use crate::{geometry::Vec3, scene::Print};
+use crate::{geometry::Vec3, scene::TextDecal};
 
 /// Surfaces that lean farther away from who reads a line have no letters on them: cosine.
 const GRAZING: f32 = 0.1;
@@ -9,15 +9,15 @@ const GRAZING: f32 = 0.1;
 const ASIDE: f64 = 0.5;
 
 /// Share of the letters of a line in a square of edge `spacing` (m) about `p` (object frame, m) on a surface of normal `n`.
-pub(crate) fn share(print: &Print, p: &V3, n: &V3, spacing: f32) -> f32 {
+pub(crate) fn share(print: &TextDecal, p: &V3, n: &V3, spacing: f32) -> f32 {
     let Some([right, up]) = place(print, &p.cast(), n) else { return 0.0 };
     let (sin, cos) = print.line.turn.sin_cos();
-    print.letters().share(right * cos + up * sin, up * cos - right * sin, f64::from(spacing)) as f32
+    print.coverage().share(right * cos + up * sin, up * cos - right * sin, f64::from(spacing)) as f32
 }
 
 /// Where a point of a surface lies for who reads the line, to the right and up from its middle, m; none if nothing of the
 /// line is there.
-fn place(print: &Print, p: &Vec3, n: &V3) -> Option<[f64; 2]> {
+fn place(print: &TextDecal, p: &Vec3, n: &V3) -> Option<[f64; 2]> {
     let line = &print.line;
     let at = Vec3::from(line.at);
     let facing = Vec3::from(line.facing).normalize();
@@ -33,7 +33,7 @@ fn place(print: &Print, p: &Vec3, n: &V3) -> Option<[f64; 2]> {
     let head = if facing.z.abs() > 0.999 { Vec3::y() } else { Vec3::z() };
     let up = (head - facing * facing.dot(&head)).normalize();
     let from = p - at;
-    let depth = 0.5 * print.letters().length_m() + line.height_m;
+    let depth = 0.5 * print.coverage().length_m() + line.height_m;
     let seen = n.cast::<f64>().dot(&facing) > f64::from(GRAZING) && from.dot(&facing).abs() < depth;
     seen.then(|| [from.dot(&up.cross(&facing)), from.dot(&up)])
 }
@@ -41,15 +41,15 @@ fn place(print: &Print, p: &Vec3, n: &V3) -> Option<[f64; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Line;
+    use crate::scene::TextLine;
 
-    fn value(line: &Line, p: [f64; 3], n: [f32; 3]) -> f32 {
+    fn value(line: &TextLine, p: [f64; 3], n: [f32; 3]) -> f32 {
         let p = Vec3::from(p).cast();
-        share(&Print::new(line.clone()), &p, &n.into(), 5e-4)
+        share(&TextDecal::new(line.clone()), &p, &n.into(), 5e-4)
     }
 
     /// Ink to the left and to the right of the middle; an L has more on its left.
-    fn sides(line: &Line, n: [f32; 3], place: impl Fn(f64, f64) -> [f64; 3]) -> [f32; 2] {
+    fn sides(line: &TextLine, n: [f32; 3], place: impl Fn(f64, f64) -> [f64; 3]) -> [f32; 2] {
         [-1.0, 1.0].map(|side| {
             let all = (1..=12).flat_map(|i| (-12..=12).map(move |j| (f64::from(i), f64::from(j))));
             all.map(|(i, j)| value(line, place(side * i * 5e-4, j * 5e-4), n)).sum()
@@ -58,13 +58,13 @@ mod tests {
 
     #[test]
     fn text_reads_upright_from_where_it_faces_and_is_not_mirrored() {
-        let line = |facing: [f64; 3]| Line {
+        let line = |facing: [f64; 3]| TextLine {
             text: "L".into(),
             height_m: 0.01,
             weight: 0.1,
             at: [0.001, 0.002, 0.003],
             facing,
-            ..Line::default()
+            ..TextLine::default()
         };
         // The reader's right and up for each direction.
         for (n, right, up) in [
@@ -88,14 +88,14 @@ mod tests {
 
     #[test]
     fn a_wrapped_line_goes_round_and_a_turned_one_turns() {
-        let line = Line {
+        let line = TextLine {
             text: "L".into(),
             height_m: 0.01,
             weight: 0.1,
             at: [0.0, 0.0, 0.05],
             facing: [0.0, -2.0, 0.0],
             wrap_m: Some(0.01),
-            ..Line::default()
+            ..TextLine::default()
         };
         let n = |turn: f64| [turn.sin() as f32, -turn.cos() as f32, 0.0];
         let place = |r: f64, u: f64| [0.01 * (r / 0.01).sin(), -0.01 * (r / 0.01).cos(), 0.05 + u];
@@ -107,8 +107,8 @@ mod tests {
             [-1.0, 1.0].map(|side| (1..=12).map(|i| ink(side * f64::from(i) * 5e-4)).sum::<f32>());
         assert!(left > 1.5 * right && right > 0.5, "{left} {right}");
         assert_eq!(value(&line, [0.0, 0.01, 0.05], [0.0, 1.0, 0.0]), 0.0, "not behind");
-        let upright = Line { wrap_m: None, facing: [0.0, 0.0, 1.0], at: [0.0; 3], ..line };
-        let turned = Line { turn: std::f64::consts::FRAC_PI_2, ..upright.clone() };
+        let upright = TextLine { wrap_m: None, facing: [0.0, 0.0, 1.0], at: [0.0; 3], ..line };
+        let turned = TextLine { turn: std::f64::consts::FRAC_PI_2, ..upright.clone() };
         for (r, u) in [(-0.002, 0.003), (0.001, -0.0044), (0.002, 0.002)] {
             let up = [0.0, 0.0, 1.0];
             let before = value(&upright, [r, u, 0.0], up);

@@ -16,8 +16,8 @@ pub enum Typeface {
 
 /// A line of text and where it stands, in the object frame at rest.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Line {
-    /// What it says, at most [`MOST_LETTERS`] letters.
+pub struct TextLine {
+    /// What it says, at most [`MAX_LETTERS`] letters.
     pub text: String,
     /// Its typeface.
     pub typeface: Typeface,
@@ -37,7 +37,7 @@ pub struct Line {
 }
 
 /// Most letters of a line.
-pub const MOST_LETTERS: usize = 64;
+pub const MAX_LETTERS: usize = 64;
 /// Height of a capital letter in the field, texels.
 const CAPITAL: f32 = 44.0;
 /// Texels left free around the line.
@@ -45,21 +45,21 @@ const MARGIN: usize = 2;
 
 /// A line with the field of its letters, which is made when it is first looked at.
 #[derive(Debug, Default)]
-pub struct Print {
+pub struct TextDecal {
     /// The line.
-    pub line: Line,
-    letters: OnceLock<Letters>,
+    pub line: TextLine,
+    letters: OnceLock<GlyphCoverage>,
 }
 
-impl PartialEq for Print {
+impl PartialEq for TextDecal {
     fn eq(&self, other: &Self) -> bool {
         self.line == other.line
     }
 }
 
-impl Print {
+impl TextDecal {
     /// A print of a line.
-    pub fn new(line: Line) -> Self {
+    pub fn new(line: TextLine) -> Self {
         Self { line, letters: OnceLock::new() }
     }
 
@@ -71,12 +71,12 @@ impl Print {
     }
 
     /// Its letters.
-    pub fn letters(&self) -> &Letters {
-        self.letters.get_or_init(|| Letters::of(&self.line))
+    pub fn coverage(&self) -> &GlyphCoverage {
+        self.letters.get_or_init(|| GlyphCoverage::of(&self.line))
     }
 }
 
-impl Line {
+impl TextLine {
     /// The first letter that the typeface does not have.
     pub fn missing(&self) -> Option<char> {
         let font = font(self.typeface)?;
@@ -95,7 +95,7 @@ fn font(typeface: Typeface) -> Option<FontRef<'static>> {
 /// How much of each place letters cover, as sums over all texels above and to the left (Crow, Summed-Area Tables for Texture
 /// Mapping, 1984): the mean over any rectangle takes four looks.
 #[derive(Debug, Default)]
-pub struct Letters {
+pub struct GlyphCoverage {
     size: [usize; 2],
     /// One row and one column more than texels.
     sums: Vec<f64>,
@@ -105,8 +105,8 @@ pub struct Letters {
     middle: f64,
 }
 
-impl Letters {
-    fn of(line: &Line) -> Self {
+impl GlyphCoverage {
+    fn of(line: &TextLine) -> Self {
         let Some(font) = font(line.typeface) else { return Self::default() };
         let em = CAPITAL / capital(&font);
         let thick = line.weight as f32 * CAPITAL;
@@ -231,14 +231,14 @@ fn sums(cover: &[f32], [width, height]: [usize; 2]) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    fn letters(text: &str, weight: f64) -> Print {
-        Print::new(Line { text: text.into(), height_m: 0.01, weight, ..Line::default() })
+    fn letters(text: &str, weight: f64) -> TextDecal {
+        TextDecal::new(TextLine { text: text.into(), height_m: 0.01, weight, ..TextLine::default() })
     }
 
     #[test]
     fn a_capital_letter_is_as_high_as_asked_and_stands_in_the_middle() {
         let print = letters("H", 0.0);
-        let lit = |up: f64| (-20..=20).any(|i| print.letters().share(f64::from(i) * 2e-4, up, 1e-4) > 0.5);
+        let lit = |up: f64| (-20..=20).any(|i| print.coverage().share(f64::from(i) * 2e-4, up, 1e-4) > 0.5);
         assert!(lit(0.0) && lit(0.0047) && lit(-0.0047));
         assert!(!lit(0.0053) && !lit(-0.0053));
     }
@@ -246,8 +246,8 @@ mod tests {
     #[test]
     fn letters_run_to_the_right_and_the_middle_of_a_line_is_its_place() {
         let print = letters("l.", 0.1);
-        let left = print.letters().share(-1.5e-3, 0.002, 2e-3);
-        let right = print.letters().share(1.5e-3, 0.002, 2e-3);
+        let left = print.coverage().share(-1.5e-3, 0.002, 2e-3);
+        let right = print.coverage().share(1.5e-3, 0.002, 2e-3);
         assert!(left > 3.0 * right, "l stands left of its stop: {left} {right}");
     }
 
@@ -258,7 +258,7 @@ mod tests {
             let steps = (0.08 / width) as i32;
             let at = |i: i32| (f64::from(i) + 0.5) * width - 0.04;
             let all = (0..steps).flat_map(|i| (0..steps).map(move |j| (i, j)));
-            all.map(|(i, j)| print.letters().share(at(i), at(j), width)).sum::<f64>() * width * width
+            all.map(|(i, j)| print.coverage().share(at(i), at(j), width)).sum::<f64>() * width * width
         };
         let fine = ink(2.5e-4);
         assert!(fine > 1e-5, "{fine} m²");
@@ -266,14 +266,14 @@ mod tests {
             assert!((ink(width) / fine - 1.0).abs() < 1e-6, "{width}: {} of {fine}", ink(width));
         }
         assert!(
-            fine > 1.2 * letters("softvt", 0.0).letters().share(0.0, 0.0, 0.08) * 0.0064,
+            fine > 1.2 * letters("softvt", 0.0).coverage().share(0.0, 0.0, 0.08) * 0.0064,
             "thicker strokes"
         );
     }
 
     #[test]
     fn a_letter_that_the_typeface_lacks_is_found() {
-        let line = |text: &str| Line { text: text.into(), ..Line::default() };
+        let line = |text: &str| TextLine { text: text.into(), ..TextLine::default() };
         assert_eq!(line("Käse & Öl").missing(), None);
         assert_eq!(line("ab漢").missing(), Some('漢'));
         assert_eq!(line("a\nb").missing(), Some('\n'));

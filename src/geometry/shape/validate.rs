@@ -1,78 +1,18 @@
-//! Whether a shape can be built at all.
+//! Validation of the numbers of a shape.
 
-use super::{Bumps, Mask, Relief, Ridges, Shape, Vec3};
-
-/// Why a shape cannot be.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ShapeError {
-    /// A size is not positive and finite.
-    #[error("{kind}: {field} is {value} m; give a finite length above 0")]
-    Size {
-        /// The kind of shape.
-        kind: &'static str,
-        /// The size.
-        field: &'static str,
-        /// Its value, m.
-        value: f64,
-    },
-    /// A number is outside of its range.
-    #[error("{kind}: {field} is {value}; {mend}")]
-    Number {
-        /// The kind of shape.
-        kind: &'static str,
-        /// The number.
-        field: &'static str,
-        /// Its value.
-        value: f64,
-        /// What would do.
-        mend: &'static str,
-    },
-    /// A combination has no parts.
-    #[error("{kind}: has no parts; give at least one")]
-    Empty {
-        /// The kind of shape.
-        kind: &'static str,
-    },
-    /// Too few corners.
-    #[error("profile: has {corners} corners; give at least 3")]
-    ProfileSize {
-        /// How many.
-        corners: usize,
-    },
-    /// A corner is not finite or lies on the wrong side of the axis.
-    #[error("profile: corner {index} is ({r}, {z}); give finite numbers, and r ≥ 0 for a lathe")]
-    ProfilePoint {
-        /// Index of the corner, from 0.
-        index: usize,
-        /// First coordinate, m.
-        r: f64,
-        /// Second coordinate, m.
-        z: f64,
-    },
-    /// Two neighbouring corners coincide.
-    #[error(
-        "profile: corner ({r}, {z}) is given twice in a row; leave one out (the last joins the first by itself)"
-    )]
-    ProfileRepeat {
-        /// First coordinate, m.
-        r: f64,
-        /// Second coordinate, m.
-        z: f64,
-    },
-    /// Nothing is enclosed.
-    #[error("profile: encloses no area; go around the cross-section, not along a line")]
-    ProfileArea,
-    /// Edges cross.
-    #[error("profile: its edges cross each other; list the corners in order around the cross-section")]
-    ProfileCrossing,
-}
+use super::{
+    displacement::{Bumps, Displacement, Ramp, Ridges},
+    error::ShapeError,
+    tree::Shape,
+};
+use crate::geometry::Vec3;
 
 impl Shape {
     /// Checks every number of the tree.
     ///
     /// # Errors
     /// Names the first kind and field that cannot be, its value and the mend.
-    pub fn check(&self) -> Result<(), ShapeError> {
+    pub fn validate(&self) -> Result<(), ShapeError> {
         match self {
             Self::Box { half } => sizes("box", "half extent", half),
             Self::Sphere { radius } => size("sphere", "radius", *radius),
@@ -92,46 +32,46 @@ impl Shape {
             }
             Self::Prism { half_length, .. } => size("prism", "half length", *half_length),
             Self::Lathe(_) | Self::Mesh(_) => Ok(()),
-            _ => self.check_composite(),
+            _ => self.validate_composite(),
         }
     }
 
-    /// [`Shape::check`] of the kinds that hold others.
-    fn check_composite(&self) -> Result<(), ShapeError> {
+    /// [`Shape::validate`] of the kinds that hold others.
+    fn validate_composite(&self) -> Result<(), ShapeError> {
         match self {
             Self::Placed { shape, pose } => {
                 let offset = pose.translation.vector;
                 finite("move", "offset", offset.sum() + pose.rotation.coords.sum())?;
-                shape.check()
+                shape.validate()
             }
             Self::Scaled { shape, scale } => {
                 let mend = "give a finite factor above 0";
                 let worst = scale.min();
                 ensure(worst > 0.0 && scale.sum().is_finite(), "scale", "factor", worst, mend)?;
-                shape.check()
+                shape.validate()
             }
             Self::Rounded { shape, radius } => {
                 at_least_zero("round", "radius", *radius)?;
-                shape.check()
+                shape.validate()
             }
             Self::Shell { shape, thickness } => {
                 size("shell", "thickness", *thickness)?;
-                shape.check()
+                shape.validate()
             }
             Self::Union(parts) => all("union", parts),
             Self::Intersect(parts) => all("intersection", parts),
-            Self::Subtract { from, cut } => from.check().and_then(|()| cut.check()),
+            Self::Subtract { from, cut } => from.validate().and_then(|()| cut.validate()),
             Self::SmoothUnion { parts, blend } => {
                 size("smooth union", "blend", *blend)?;
                 all("smooth union", parts)
             }
             Self::SmoothSubtract { from, cut, blend } => {
                 size("smooth subtraction", "blend", *blend)?;
-                from.check().and_then(|()| cut.check())
+                from.validate().and_then(|()| cut.validate())
             }
             Self::Twist { shape, rate, .. } => {
                 finite("twist", "rate", *rate)?;
-                shape.check()
+                shape.validate()
             }
             Self::Bend { shape, along, towards, curvature } => {
                 finite("bend", "curvature", *curvature)?;
@@ -143,23 +83,23 @@ impl Shape {
                     axis,
                     "bend towards another axis than along",
                 )?;
-                shape.check()
+                shape.validate()
             }
             Self::Displace { shape, reliefs } => {
-                reliefs.iter().try_for_each(Relief::check)?;
-                shape.check()
+                reliefs.iter().try_for_each(Displacement::validate)?;
+                shape.validate()
             }
             Self::Paint { shape, region, .. } => {
-                region.as_ref().map_or(Ok(()), |region| region.check())?;
-                shape.check()
+                region.as_ref().map_or(Ok(()), |region| region.validate())?;
+                shape.validate()
             }
             _ => Ok(()),
         }
     }
 }
 
-impl Relief {
-    fn check(&self) -> Result<(), ShapeError> {
+impl Displacement {
+    fn validate(&self) -> Result<(), ShapeError> {
         match self {
             Self::Ridges(Ridges { height, pitch, radial_pitch, phase, sharpness, mask, .. }) => {
                 finite("ridges", "height", *height)?;
@@ -169,21 +109,21 @@ impl Relief {
                     ensure(value.abs() > 0.0, "ridges", field, value, mend)?;
                 }
                 ensure((1.0..=8.0).contains(sharpness), "ridges", "sharpness", *sharpness, "give 1 to 8")?;
-                mask.as_ref().map_or(Ok(()), Mask::check)
+                mask.as_ref().map_or(Ok(()), Ramp::validate)
             }
             Self::Bumps(Bumps { height, radius, spacing, mask, .. }) => {
                 finite("bumps", "height", *height)?;
                 size("bumps", "spacing", *spacing)?;
                 let mend = "give a radius above 0, at most half of the spacing";
                 ensure(*radius > 0.0 && *radius <= 0.5 * spacing, "bumps", "radius", *radius, mend)?;
-                mask.as_ref().map_or(Ok(()), Mask::check)
+                mask.as_ref().map_or(Ok(()), Ramp::validate)
             }
         }
     }
 }
 
-impl Mask {
-    fn check(&self) -> Result<(), ShapeError> {
+impl Ramp {
+    fn validate(&self) -> Result<(), ShapeError> {
         let span = self.to - self.from;
         ensure(span.is_finite() && span != 0.0, "mask", "to − from", span, "give two different finite places")
     }
@@ -219,5 +159,5 @@ fn all(kind: &'static str, parts: &[Shape]) -> Result<(), ShapeError> {
     if parts.is_empty() {
         return Err(ShapeError::Empty { kind });
     }
-    parts.iter().try_for_each(Shape::check)
+    parts.iter().try_for_each(Shape::validate)
 }

@@ -1,12 +1,21 @@
 //! Exact signed distance to a closed polygon in a plane.
 
-use super::ShapeError;
+use std::fmt;
+
+use super::error::ShapeError;
 
 /// A simple closed polygon, counter-clockwise; for a lathe its coordinates are (r, z) with r ≥ 0.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Profile {
+#[derive(Clone, PartialEq)]
+pub struct Polygon {
     points: Vec<[f64; 2]>,
     edges: Vec<Edge>,
+}
+
+// Fingerprints of assets hash the `Debug` text of shapes: the name printed here is part of them.
+impl fmt::Debug for Polygon {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Profile").field("points", &self.points).field("edges", &self.edges).finish()
+    }
 }
 
 /// An edge from `start` by `span`.
@@ -19,7 +28,7 @@ struct Edge {
     on_axis: bool,
 }
 
-impl Profile {
+impl Polygon {
     /// A profile to be revolved, from its corners (r, z), m, in order; the last is joined to the first.
     ///
     /// # Errors
@@ -37,7 +46,7 @@ impl Profile {
     /// A profile that is not revolved, from its corners in order; the last is joined to the first.
     ///
     /// # Errors
-    /// As [`Profile::revolved`], but coordinates may be negative.
+    /// As [`Polygon::revolved`], but coordinates may be negative.
     pub fn flat(points: Vec<[f64; 2]>) -> Result<Self, ShapeError> {
         if let Some(index) = points.iter().position(|p| !(p[0].is_finite() && p[1].is_finite())) {
             return Err(ShapeError::ProfilePoint { index, r: points[index][0], z: points[index][1] });

@@ -6,7 +6,7 @@
 use fast_surface_nets::{SurfaceNetsBuffer, ndshape::RuntimeShape, surface_nets};
 
 use super::{
-    Aabb, Mat3, Vec3,
+    Aabb, Mat3, Vec3, hex8,
     mesh::Mesh,
     shape::Shape,
     voxel::{Embedding, VoxelMesh},
@@ -14,7 +14,7 @@ use super::{
 
 /// A closed triangle mesh on the surface of a shape.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Skin {
+pub struct SurfaceMesh {
     /// Vertices, triangles (counter-clockwise seen from outside) and texture coordinates by triangle corner.
     pub mesh: Mesh,
     /// Outward unit normal at each vertex.
@@ -28,22 +28,15 @@ const MOST_POINTS: f64 = 2e7;
 /// Edge of the blocks of cells that are skipped together where they lie far from the surface.
 const BLOCK: usize = 4;
 
-/// The skin of `shape` with cells of edge `cell`, m. An imported mesh is its own skin.
-///
-/// The skin is empty only if the shape is, or if it is all thinner than a cell.
-pub fn skin(shape: &Shape, cell: f64) -> Skin {
-    let (mesh, normals) = bare_skin(shape, cell);
-    finish(shape, mesh, normals)
-}
-
-/// What [`skin`] is made of, without materials and texture coordinates: the triangles and the normals at the vertices.
-pub(super) fn bare_skin(shape: &Shape, cell: f64) -> (Mesh, Vec<Vec3>) {
+/// The triangles of [`SurfaceMesh::from_shape`] and the normals at their vertices, without materials and texture
+/// coordinates.
+pub(super) fn surface_triangles(shape: &Shape, cell: f64) -> (Mesh, Vec<Vec3>) {
     if let Shape::Mesh(solid) = shape {
         let mesh = solid.mesh().clone();
-        let normals = mesh.vertices.iter().map(|v| shape.estimate(v).1).collect();
+        let normals = mesh.vertices.iter().map(|v| shape.first_order(v).1).collect();
         return (mesh, normals);
     }
-    let grid = Grid::over(&shape.reach(), cell);
+    let grid = Grid::over(&shape.loose_bounds(), cell);
     let mut values = grid.sample(shape);
     grid.compose_well(&mut values);
     let mut buffer = SurfaceNetsBuffer::default();
@@ -52,13 +45,21 @@ pub(super) fn bare_skin(shape: &Shape, cell: f64) -> (Mesh, Vec<Vec3>) {
     surface_nets(&values, &array, [0; 3], top, &mut buffer);
     let vertices: Vec<Vec3> =
         buffer.surface_points.iter().map(|at| grid.vertex(shape, &values, at.map(|i| i as usize))).collect();
-    let normals: Vec<Vec3> = vertices.iter().map(|v| shape.estimate(v).1).collect();
+    let normals: Vec<Vec3> = vertices.iter().map(|v| shape.first_order(v).1).collect();
     let triangles =
         buffer.indices.chunks_exact(6).flat_map(|quad| split(shape, &vertices, &normals, quad)).collect();
     (Mesh { vertices, triangles, uvs: Vec::new() }, normals)
 }
 
-impl Skin {
+impl SurfaceMesh {
+    /// Triangulates the surface of `shape` with cells of edge `cell`, m. A mesh shape keeps its own triangles.
+    ///
+    /// Empty only if the shape is empty or thinner than a cell everywhere.
+    pub fn from_shape(shape: &Shape, cell: f64) -> Self {
+        let (mesh, normals) = surface_triangles(shape, cell);
+        with_materials(shape, mesh, normals)
+    }
+
     /// Where each vertex sits in a voxel mesh; `None` if one is more than two voxels away from it.
     pub fn embed(&self, mesh: &VoxelMesh) -> Option<Vec<Embedding>> {
         self.mesh.vertices.iter().map(|v| mesh.locate(v)).collect()
@@ -66,7 +67,7 @@ impl Skin {
 }
 
 /// Adds texture coordinates and materials.
-fn finish(shape: &Shape, mut mesh: Mesh, normals: Vec<Vec3>) -> Skin {
+fn with_materials(shape: &Shape, mut mesh: Mesh, normals: Vec<Vec3>) -> SurfaceMesh {
     let corners = |t: &[u32; 3]| t.map(|v| mesh.vertices[v as usize]);
     let materials =
         mesh.triangles.iter().map(|t| shape.material(&(corners(t).iter().sum::<Vec3>() / 3.0))).collect();
@@ -75,7 +76,7 @@ fn finish(shape: &Shape, mut mesh: Mesh, normals: Vec<Vec3>) -> Skin {
     {
         mesh.uvs = mesh.triangles.iter().map(|t| unwrap(&bounds, &corners(t))).collect();
     }
-    Skin { mesh, normals, materials }
+    SurfaceMesh { mesh, normals, materials }
 }
 
 /// The two triangles of a quad. Surface nets cut a quad along its shorter diagonal, which may bridge a sharp edge; where
@@ -173,7 +174,8 @@ impl Grid {
                 .map(|c| c % (nx - 1) + nx * (c / (nx - 1) % (ny - 1) + ny * (c / (nx - 1) / (ny - 1))))
             {
                 let corners: [usize; 8] = std::array::from_fn(|c| {
-                    cell + (0..3).map(|axis| (c >> axis & 1) * strides[axis]).sum::<usize>()
+                    let step = hex8::corner_index(c);
+                    cell + (0..3).map(|axis| step[axis] * strides[axis]).sum::<usize>()
                 });
                 let inside = corners.iter().filter(|&&c| values[c] < 0.0).count();
                 if inside > 0 && inside < 8 {
@@ -191,7 +193,7 @@ impl Grid {
     fn vertex(&self, shape: &Shape, values: &[f32], at: [usize; 3]) -> Vec3 {
         let [nx, ny, _] = self.count;
         let corners: [([usize; 3], f64); 8] = std::array::from_fn(|c| {
-            let [x, y, z] = std::array::from_fn(|axis| at[axis] + (c >> axis & 1));
+            let [x, y, z] = std::array::from_fn(|axis| at[axis] + hex8::corner_index(c)[axis]);
             ([x, y, z], f64::from(values[x + nx * (y + ny * z)]))
         });
         let crossed: Vec<[(Vec3, f64); 2]> = (0..8)
@@ -202,7 +204,7 @@ impl Grid {
         let linear = |[a, b]: &[(Vec3, f64); 2]| a.0 + (b.0 - a.0) * (a.1 / (a.1 - b.1));
         let mean = crossed.iter().map(linear).sum::<Vec3>() / crossed.len() as f64;
         let smooth = || shape.project(&mean, self.cell).unwrap_or(mean);
-        let guesses = crossed.iter().map(|edge| shape.estimate(&linear(edge)));
+        let guesses = crossed.iter().map(|edge| shape.first_order(&linear(edge)));
         if alike(guesses, BEND, STRAY * self.cell) {
             return smooth();
         }
@@ -210,7 +212,7 @@ impl Grid {
         let planes: Vec<(Vec3, Vec3)> = crossed
             .iter()
             .map(|[a, b]| crossing(shape, a.0, b.0))
-            .map(|p| (p, shape.estimate(&p).1))
+            .map(|p| (p, shape.first_order(&p).1))
             .collect();
         if alike(planes.iter().map(|plane| (0.0, plane.1)), SHARP, 0.0) {
             return smooth();

@@ -1,10 +1,13 @@
 //! Height fields that displace a surface.
 
-use super::{Axis, Vec3};
+use std::fmt;
+
+use super::warp::Axis;
+use crate::geometry::{Vec3, hex8};
 
 /// A height over the surface it displaces, m, positive outwards.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Relief {
+pub enum Displacement {
     /// Regular ridges.
     Ridges(Ridges),
     /// Scattered bumps.
@@ -30,7 +33,7 @@ pub struct Ridges {
     /// Exponent on the raised cosine: 1 is a sine wave, larger gives narrow crests and wide valleys.
     pub sharpness: f64,
     /// Where the ridges are.
-    pub mask: Option<Mask>,
+    pub mask: Option<Ramp>,
 }
 
 /// Bumps (seeds, raisins) on a jittered cubic lattice; those that the surface cuts show.
@@ -45,12 +48,12 @@ pub struct Bumps {
     /// Selects the jitter.
     pub seed: u64,
     /// Where the bumps are.
-    pub mask: Option<Mask>,
+    pub mask: Option<Ramp>,
 }
 
 /// A weight that rises smoothly from 0 at `from` to 1 at `to` along an axis (`from > to` falls).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Mask {
+#[derive(Clone, Copy, PartialEq)]
+pub struct Ramp {
     /// The axis.
     pub axis: Axis,
     /// Where it is 0, m.
@@ -59,11 +62,22 @@ pub struct Mask {
     pub to: f64,
 }
 
+// Fingerprints of assets hash the `Debug` text of shapes: the name printed here is part of them.
+impl fmt::Debug for Ramp {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Mask")
+            .field("axis", &self.axis)
+            .field("from", &self.from)
+            .field("to", &self.to)
+            .finish()
+    }
+}
+
 /// Ridges around an axis fade within this distance of it for each ridge (at least one), where they would run into each
 /// other, m.
 const FADE: f64 = 1e-3;
 
-impl Relief {
+impl Displacement {
     /// Height and its gradient at a point.
     pub(super) fn height(&self, p: &Vec3) -> (f64, Vec3) {
         let ((height, gradient), mask) = match self {
@@ -76,7 +90,7 @@ impl Relief {
     }
 
     /// Largest height, m, ≥ 0.
-    pub(super) fn reach(&self) -> f64 {
+    pub(super) fn max_height(&self) -> f64 {
         match self {
             Self::Ridges(ridges) => ridges.height.max(0.0),
             Self::Bumps(bumps) => bumps.height.max(0.0),
@@ -84,7 +98,7 @@ impl Relief {
     }
 }
 
-impl Mask {
+impl Ramp {
     fn weight(&self, p: &Vec3) -> (f64, f64) {
         let span = self.to - self.from;
         let t = ((p[self.axis.index()] - self.from) / span).clamp(0.0, 1.0);
@@ -131,7 +145,7 @@ impl Bumps {
         let base = (p / self.spacing).map(|x| (x - 0.5).floor());
         let mut best = (0.0, Vec3::zeros());
         for cell in 0..8 {
-            let corner = base + Vec3::new((cell & 1) as f64, (cell >> 1 & 1) as f64, (cell >> 2) as f64);
+            let corner = base + hex8::corner(cell);
             let arm = p - (corner + self.jitter(&corner)) * self.spacing;
             let t = arm.norm_squared() / (self.radius * self.radius);
             if t < 1.0 && (1.0 - t).powi(2) > best.0 {

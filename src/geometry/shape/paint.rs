@@ -1,10 +1,41 @@
-//! A shape without its paint, and what paint there is.
+//! Materials of a shape: lookup at a point, and the shape without them.
 
 use std::sync::Arc;
 
-use super::Shape;
+use super::{
+    tree::{Shape, to_local},
+    warp,
+};
+use crate::geometry::Vec3;
 
 impl Shape {
+    /// Material id at a point on or near the surface; 0 where nothing is painted.
+    pub fn material(&self, p_o: &Vec3) -> u16 {
+        match self {
+            Self::Placed { shape, pose } => shape.material(&to_local(pose, p_o)),
+            Self::Scaled { shape, scale } => shape.material(&p_o.component_div(scale)),
+            Self::Twist { shape, axis, rate } => shape.material(&warp::untwist(p_o, *axis, *rate).0),
+            Self::Bend { shape, along, towards, curvature } => {
+                shape.material(&warp::unbend(p_o, *along, *towards, *curvature).0)
+            }
+            Self::Rounded { shape, .. } | Self::Shell { shape, .. } | Self::Displace { shape, .. } => {
+                shape.material(p_o)
+            }
+            Self::Union(parts) | Self::Intersect(parts) | Self::SmoothUnion { parts, .. } => {
+                nearest_part(parts, p_o).map_or(0, |part| part.material(p_o))
+            }
+            Self::Subtract { from, .. } | Self::SmoothSubtract { from, .. } => from.material(p_o),
+            Self::Paint { shape, material, region } => {
+                if region.as_ref().is_none_or(|region| region.distance(p_o) < 0.0) {
+                    *material
+                } else {
+                    shape.material(p_o)
+                }
+            }
+            _ => 0,
+        }
+    }
+
     /// The same solid, unpainted: two shapes that differ in colours alone give equal ones.
     pub fn unpainted(&self) -> Self {
         let arc = |shape: &Arc<Self>| Arc::new(shape.unpainted());
@@ -59,4 +90,13 @@ impl Shape {
             _ => 0,
         }
     }
+}
+
+/// The part whose surface is nearest to `p_o`, the first of equals.
+fn nearest_part<'a>(parts: &'a [Shape], p_o: &Vec3) -> Option<&'a Shape> {
+    parts
+        .iter()
+        .map(|part| (part.distance(p_o).abs(), part))
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, part)| part)
 }

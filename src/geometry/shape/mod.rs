@@ -1,0 +1,27 @@
+//! Composable signed-distance shapes.
+//!
+//! A [`Shape`] is a tree: primitives at the leaves, placements, combinations and warps above them. Every node gives its
+//! signed distance and outward unit normal ([`Shape::distance_and_normal`]): exact where the node allows it, otherwise
+//! found by projection on the surface.
+
+mod bounds;
+mod combine;
+mod contact;
+mod displacement;
+mod distance;
+mod error;
+mod mesh_solid;
+mod paint;
+mod polygon;
+mod primitive;
+mod tree;
+mod validate;
+mod warp;
+
+pub use contact::Contact;
+pub use displacement::{Bumps, Displacement, Ramp, Ridges};
+pub use error::ShapeError;
+pub use mesh_solid::MeshSolid;
+pub use polygon::Polygon;
+pub use tree::{Shape, TreeSize};
+pub use warp::Axis;
