@@ -7,6 +7,7 @@ pub mod calibration;
 pub mod deformation;
 pub mod difference;
 pub mod drop;
+pub mod envelope_plot;
 pub mod evidence;
 pub mod goal;
 pub mod judge;

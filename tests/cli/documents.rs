@@ -3,7 +3,7 @@
 
 use std::{path::Path, time::Duration};
 
-use softvt::{evaluation::thresholds::Thresholds, report::envelope::plot, script};
+use softvt::{evaluation::envelope_plot::plot, evaluation::thresholds::Thresholds, script};
 
 use crate::support::{Project, Said, said};
 

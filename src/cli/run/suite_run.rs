@@ -32,8 +32,8 @@ use crate::{
     },
     policy::TaskBrief,
     report::{
-        interchange,
         run_folder::{EPISODES, RUN, RunFolder, SUMMARY},
+        softvtbench_files,
     },
     rollout::{
         AssetCache, BuildError, ControlError, Controller, Episode, EpisodeError, EpisodeRef, EpisodeSpec,
@@ -69,7 +69,7 @@ pub(crate) struct SuiteRun<'a> {
     /// Which list its episodes are of.
     pub split: Split,
     pub(crate) drivers: Arc<ControllerSource>,
-    /// Foreign demonstrations that episodes re-execute, by task and episode.
+    /// ForeignFile demonstrations that episodes re-execute, by task and episode.
     pub origins: BTreeMap<(usize, u32), Origin>,
     /// The files that those are from.
     pub imported: Vec<Imported>,
@@ -256,7 +256,7 @@ impl<'a> SuiteRun<'a> {
         }
         records.sort_by_key(|r| (r.identity.task, r.identity.episode));
         folder.put_in_order(&records).map_err(folder_failure)?;
-        interchange::write_scores(&self.out, &records, &self.released).map_err(folder_failure)?;
+        softvtbench_files::write_scores(&self.out, &records, &self.released).map_err(folder_failure)?;
         let done = self.summed_up(records);
         // The last of all: a folder with a summary is finished.
         crate::files::write_json(&self.out.join(SUMMARY), &done.summary).map_err(CliError::input)?;
@@ -275,7 +275,7 @@ impl<'a> SuiteRun<'a> {
     pub(crate) fn is_whole(&self, done: &[EpisodeRecord]) -> bool {
         let files = self.files();
         self.left(done).is_empty()
-            && interchange::has_scores(&self.out)
+            && softvtbench_files::has_scores(&self.out)
             && done.iter().all(|record| files.lost(record).is_empty())
     }
 

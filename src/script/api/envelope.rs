@@ -11,9 +11,10 @@ use crate::script::{
 use crate::{
     evaluation::{
         calibration::{self, Envelope, HoldRow, StableRule, SweepRow},
+        envelope_plot::plot,
         thresholds::Thresholds,
     },
-    report::{envelope::plot, interchange::sweep_jsonl},
+    report::softvtbench_files::sweep_jsonl,
 };
 
 /// Installs `softvt.envelope`, `softvt.calibration` and `softvt.stable`.

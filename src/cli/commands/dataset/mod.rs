@@ -19,10 +19,10 @@ use crate::{
     dataset::{
         TaskFile, check,
         layout::{DATASET, RECORDING},
-        manifest::{self, Entry},
+        manifest::{self, ManifestEntry},
         stats,
     },
-    report::runs::StoredRun,
+    report::stored_run::StoredRun,
     rollout::{batch, cancel},
 };
 
@@ -132,8 +132,8 @@ pub(crate) fn replay(path: &Path, which: EpisodeSelector) -> Result<(), CliError
         EpisodeSelector::Line(line) => all(path)?.into_iter().nth(line).ok_or_else(none)?,
         EpisodeSelector::Of(task, demo) if path.is_dir() => {
             let entries = manifest::read(path).map_err(CliError::input)?;
-            let fits = |entry: &&Entry| entry.task_id == task && entry.demo_id == demo as usize;
-            let found: Vec<&Entry> = entries.iter().filter(fits).collect();
+            let fits = |entry: &&ManifestEntry| entry.task_id == task && entry.demo_id == demo as usize;
+            let found: Vec<&ManifestEntry> = entries.iter().filter(fits).collect();
             match found[..] {
                 [entry] => (path.join(&entry.hdf5_path), entry.demo_id),
                 [] => return Err(none()),

@@ -1,6 +1,6 @@
 //! Which thing of another world is which object of ours.
 
-use super::Standing;
+use super::ForeignObjectPose;
 use crate::{
     geometry::{Pose, Vec3},
     scene::{Body, Object, ObjectPlacement, Scene},
@@ -16,8 +16,8 @@ const UPRIGHT: f64 = 0.99;
 /// A thing is an object of the same name, or of which the asset's name, or the object's, is the name's ending, behind a number
 /// that tells things of one kind apart: the first of them is the first in the scene. A soft body without a name of ours is the
 /// target.
-pub fn places(scene: &Scene, target: &str, things: &[Standing]) -> Vec<ObjectPlacement> {
-    let mut things: Vec<(&str, u32, &Standing)> = things.iter().map(numbered).collect();
+pub fn match_objects(scene: &Scene, target: &str, things: &[ForeignObjectPose]) -> Vec<ObjectPlacement> {
+    let mut things: Vec<(&str, u32, &ForeignObjectPose)> = things.iter().map(numbered).collect();
     things.sort_by_key(|(_, number, _)| *number);
     let mut taken = vec![false; things.len()];
     let mut places = Vec::new();
@@ -51,13 +51,13 @@ fn moves(object: &&Object) -> bool {
 }
 
 /// A thing's name without the number at its end, and the number.
-fn numbered(thing: &Standing) -> (&str, u32, &Standing) {
+fn numbered(thing: &ForeignObjectPose) -> (&str, u32, &ForeignObjectPose) {
     let split = thing.name.rsplit_once('_').and_then(|(stem, end)| Some((stem, end.parse().ok()?)));
     let (stem, number) = split.unwrap_or((&thing.name, 0));
     (stem, number, thing)
 }
 
-fn place(scene: &Scene, object: &Object, thing: &Standing) -> ObjectPlacement {
+fn place(scene: &Scene, object: &Object, thing: &ForeignObjectPose) -> ObjectPlacement {
     let pose_w = if thing.in_base { scene.base_w * thing.pose } else { thing.pose };
     let at = pose_w.translation.vector;
     let upright = (pose_w.rotation * Vec3::z()).z > UPRIGHT;
@@ -116,9 +116,9 @@ mod tests {
         }
     }
 
-    fn thing(name: &str, x: f64, soft: bool) -> Standing {
+    fn thing(name: &str, x: f64, soft: bool) -> ForeignObjectPose {
         let turn = Quat::from_axis_angle(&Vec3::z_axis(), 0.3);
-        Standing {
+        ForeignObjectPose {
             name: name.to_owned(),
             pose: Pose::from_parts(Vec3::new(x, 0.1, 0.9).into(), turn),
             in_base: true,
@@ -137,7 +137,7 @@ mod tests {
             thing("table_1", 0.0, false),
             thing("my_red_cup_1", 0.7, false),
         ];
-        let found = places(&scene(), "right", &things);
+        let found = match_objects(&scene(), "right", &things);
         assert_eq!(named(&found), [("left", 10.0), ("right", 30.0)]);
         assert!((found[0].yaw.unwrap() - 0.3).abs() < 1e-12);
         let mut moved = scene();
@@ -150,16 +150,16 @@ mod tests {
     #[test]
     fn a_soft_thing_without_a_name_of_ours_is_the_target_and_without_the_target_nothing_is_placed() {
         let things = [thing("pastry_7", 0.7, true), thing("china_1", 0.8, false)];
-        let found = places(&scene(), "left", &things);
+        let found = match_objects(&scene(), "left", &things);
         assert_eq!(named(&found), [("left", 10.0), ("saucer", 20.0)]);
         assert_eq!(found[0].yaw, None, "how it is turned is not known");
-        assert_eq!(places(&scene(), "left", &things[1..]), []);
+        assert_eq!(match_objects(&scene(), "left", &things[1..]), []);
     }
 
     #[test]
     fn a_thing_that_lies_on_its_side_in_its_own_frame_keeps_our_yaw() {
         let mut lying = thing("red_cup_1", 0.7, false);
         lying.pose.rotation *= Quat::from_axis_angle(&Vec3::x_axis(), 1.57);
-        assert_eq!(places(&scene(), "left", &[lying])[0].yaw, None);
+        assert_eq!(match_objects(&scene(), "left", &[lying])[0].yaw, None);
     }
 }

@@ -30,7 +30,7 @@ pub struct StoredRun {
 
 /// Why runs cannot be read.
 #[derive(Debug, thiserror::Error)]
-pub enum RunsError {
+pub enum StoredRunError {
     /// The system refused, or a line is not an episode.
     #[error(transparent)]
     Folder(#[from] RunFolderError),
@@ -138,36 +138,36 @@ impl StoredRun {
 ///
 /// # Errors
 /// There is none; one cannot be read.
-pub fn load(dir: &Path) -> Result<Vec<StoredRun>, RunsError> {
+pub fn load(dir: &Path) -> Result<Vec<StoredRun>, StoredRunError> {
     if dir.join(RUN).is_file() {
         return Ok(vec![one(dir)?]);
     }
     let shown = || dir.display().to_string();
     if dir.is_file() {
-        return Err(RunsError::File { path: shown() });
+        return Err(StoredRunError::File { path: shown() });
     }
     let mut inner: Vec<PathBuf> = match fs::read_dir(dir) {
         Ok(entries) => entries.filter_map(Result::ok).map(|entry| entry.path()).collect(),
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
-            return Err(RunsError::Missing { dir: shown() });
+            return Err(StoredRunError::Missing { dir: shown() });
         }
         Err(error) => return Err(io_error("read", dir)(error).into()),
     };
     inner.retain(|path| path.join(RUN).is_file());
     inner.sort();
     if inner.is_empty() {
-        return Err(RunsError::None { dir: shown() });
+        return Err(StoredRunError::None { dir: shown() });
     }
     inner.iter().map(|dir| one(dir)).collect()
 }
 
-fn one(dir: &Path) -> Result<StoredRun, RunsError> {
+fn one(dir: &Path) -> Result<StoredRun, StoredRunError> {
     let path = dir.join(RUN);
     let text = fs::read_to_string(&path).map_err(io_error("read", &path))?;
-    let wrong = |what: String| RunsError::Info { path: path.display().to_string(), what };
+    let wrong = |what: String| StoredRunError::Info { path: path.display().to_string(), what };
     let info: Value = serde_json::from_str(&text).map_err(|e| wrong(e.to_string()))?;
     let version = info["softvt"].as_str().unwrap_or_default().to_owned();
-    let read = || -> Result<StoredRun, RunsError> {
+    let read = || -> Result<StoredRun, StoredRunError> {
         for field in ["softvt", "script", "suite", "policy"] {
             if info[field].as_str().is_none() {
                 return Err(wrong(format!("it has no {field}")));
@@ -185,6 +185,6 @@ fn one(dir: &Path) -> Result<StoredRun, RunsError> {
     };
     read().map_err(|error| match version == VERSION || version.is_empty() {
         true => error,
-        false => RunsError::Version { error: Box::new(error), version },
+        false => StoredRunError::Version { error: Box::new(error), version },
     })
 }

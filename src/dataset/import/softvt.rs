@@ -2,7 +2,7 @@
 
 use super::{
     super::{DatasetError, TaskFile},
-    Begins, ForeignDemo, ForeignTask,
+    ForeignDemo, ForeignTask, InitialCondition,
     header::Header,
     rows::{key, rows},
 };
@@ -31,7 +31,7 @@ pub(super) fn demo(file: &TaskFile, _: &Header, demo: usize) -> Result<ForeignDe
         held: vec![false; commands.len()],
         shut: binary.iter().map(|row| row[6] > 0.5).collect(),
         commands,
-        begins: Begins::Episode {
+        begins: InitialCondition::SoftvtEpisode {
             seed: id.seed,
             attempt: id.episode,
             start: id.origin.as_ref().map(|origin| origin.start.clone()).unwrap_or_default(),

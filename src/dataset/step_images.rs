@@ -16,22 +16,22 @@ const CELL: [u32; 2] = [320, 240];
 
 /// All that is seen and felt before an action.
 #[derive(Clone, Debug)]
-pub struct Scenery {
-    /// As [`super::layout::PICTURES`].
+pub struct StepImages {
+    /// As [`super::layout::IMAGE_STREAMS`].
     pub pictures: [RgbImage; 4],
-    /// As [`super::layout::VIDEOS`].
+    /// As [`super::layout::VIDEO_STREAMS`].
     pub shown: [RgbImage; 4],
     /// Places of the left and right finger's markers, px.
     pub markers: [Markers; 2],
 }
 
 /// Draws the states of a film.
-pub struct Easel<'a> {
+pub struct StepRenderer<'a> {
     film: &'a mut StateRecording,
     cameras: Vec<Camera>,
 }
 
-impl<'a> Easel<'a> {
+impl<'a> StepRenderer<'a> {
     /// For a film whose scene has the cameras `third_person` and `wrist`.
     ///
     /// # Errors
@@ -46,7 +46,7 @@ impl<'a> Easel<'a> {
     ///
     /// # Errors
     /// A stream cannot be made.
-    pub fn draw(&mut self, step: usize) -> Result<Option<Scenery>, DatasetError> {
+    pub fn draw(&mut self, step: usize) -> Result<Option<StepImages>, DatasetError> {
         let Some(frame) = self.film.frames.get(step) else { return Ok(None) };
         let senses = &mut self.film.sensors;
         let third = senses.render(frame, &self.cameras[0])?.into_rgb_image();
@@ -54,7 +54,7 @@ impl<'a> Easel<'a> {
         let touched = senses.tactile_readings(frame)?;
         let [left, right] = [0, 1].map(|side: usize| touched[side].with_markers(MarkerStyle::Dots));
         let [bare_left, bare_right] = [0, 1].map(|side: usize| touched[side].picture.clone());
-        Ok(Some(Scenery {
+        Ok(Some(StepImages {
             shown: [third.clone(), wrist.clone(), left, right],
             pictures: [third, wrist, bare_left, bare_right],
             markers: [0, 1].map(|side: usize| touched[side].markers),
@@ -62,7 +62,7 @@ impl<'a> Easel<'a> {
     }
 }
 
-impl Scenery {
+impl StepImages {
     /// The four pictures of the videos in one.
     pub fn preview(&self) -> RgbImage {
         let [width, height] = CELL;

@@ -8,18 +8,18 @@ use serde_json::Value;
 
 use super::{
     DatasetError, Demonstration,
-    layout::{PICTURES, VIDEOS},
-    pictures::{Easel, Scenery},
+    hdf5::Hdf5Writer,
+    layout::{IMAGE_STREAMS, VIDEO_STREAMS},
+    step_images::{StepImages, StepRenderer},
     video::VideoWriter,
-    write::Writer,
 };
 use crate::{benchmark::control::CONTROL_DT, files, rollout::StateRecording};
 
 /// What is written of a demonstration, and where.
-pub struct Recorder<'a> {
+pub struct DemonstrationWriter<'a> {
     /// The HDF5 file: it holds `/data/demo_0`.
     pub hdf5: PathBuf,
-    /// Videos, as [`VIDEOS`].
+    /// Videos, as [`VIDEO_STREAMS`].
     pub videos: [PathBuf; 4],
     /// The 2 × 2 preview.
     pub preview: PathBuf,
@@ -30,11 +30,11 @@ pub struct Recorder<'a> {
 }
 
 /// Pictures a second: one a control step.
-pub fn rate() -> u32 {
+pub fn frame_rate() -> u32 {
     (1.0 / CONTROL_DT).round() as u32
 }
 
-impl Recorder<'_> {
+impl DemonstrationWriter<'_> {
     /// Draws every state before an action and writes all files; the HDF5 last, so that whoever has it has all.
     ///
     /// # Errors
@@ -63,21 +63,21 @@ impl Recorder<'_> {
         demonstration: &mut Demonstration,
         stop: impl Fn() -> bool,
     ) -> Result<(), DatasetError> {
-        let mut writer = Writer::create(aside, self.environment, demonstration.steps(), 1)?;
+        let mut writer = Hdf5Writer::create(aside, self.environment, demonstration.steps(), 1)?;
         let written = self.fill(&mut writer, film, demonstration, stop);
         writer.close(written)
     }
 
     fn fill(
         &self,
-        writer: &mut Writer,
+        writer: &mut Hdf5Writer,
         film: &mut StateRecording,
         demonstration: &mut Demonstration,
         stop: impl Fn() -> bool,
     ) -> Result<(), DatasetError> {
         let (steps, path) = (demonstration.steps(), writer.path);
         writer.describe(0, &demonstration.record, steps)?;
-        let mut easel = Easel::new(film)?;
+        let mut easel = StepRenderer::new(film)?;
         let mut reels: Option<Reels> = None;
         let mut felt = Vec::with_capacity(steps);
         for step in 0..steps {
@@ -98,7 +98,7 @@ impl Recorder<'_> {
     }
 }
 
-/// Pictures of a chunk, as [`PICTURES`]: what a resting camera sees, and what a finger feels, hardly changes in four steps; a
+/// Pictures of a chunk, as [`IMAGE_STREAMS`]: what a resting camera sees, and what a finger feels, hardly changes in four steps; a
 /// camera on the hand sees something else in every one.
 const ROWS: [usize; 4] = [4, 1, 4, 4];
 
@@ -146,16 +146,19 @@ struct Reels {
 
 impl Reels {
     fn new(
-        scenery: &Scenery,
-        writer: &mut Writer,
+        scenery: &StepImages,
+        writer: &mut Hdf5Writer,
         steps: usize,
         pictures: bool,
     ) -> Result<Self, DatasetError> {
         let video = |picture: &RgbImage| {
-            VideoWriter::new(picture.width() as usize, picture.height() as usize, rate())
+            VideoWriter::new(picture.width() as usize, picture.height() as usize, frame_rate())
         };
-        let named =
-            PICTURES.into_iter().zip(&scenery.pictures).take(if pictures { PICTURES.len() } else { 0 });
+        let named = IMAGE_STREAMS.into_iter().zip(&scenery.pictures).take(if pictures {
+            IMAGE_STREAMS.len()
+        } else {
+            0
+        });
         let roll = |((name, picture), rows): ((&'static str, &RgbImage), usize)| {
             let rows = rows.min(steps);
             let array = writer.pictures(0, name, (steps, rows), picture.dimensions())?;
@@ -168,7 +171,7 @@ impl Reels {
         })
     }
 
-    fn push(&mut self, path: &Path, scenery: &Scenery, last: bool) -> Result<(), DatasetError> {
+    fn push(&mut self, path: &Path, scenery: &StepImages, last: bool) -> Result<(), DatasetError> {
         for (roll, picture) in self.rolls.iter_mut().zip(&scenery.pictures) {
             roll.push(path, picture)?;
             if last {
@@ -181,8 +184,8 @@ impl Reels {
         Ok(self.preview.push(&scenery.preview())?)
     }
 
-    fn save(self, to: &Recorder) -> Result<(), DatasetError> {
-        debug_assert_eq!(self.videos.len(), VIDEOS.len());
+    fn save(self, to: &DemonstrationWriter) -> Result<(), DatasetError> {
+        debug_assert_eq!(self.videos.len(), VIDEO_STREAMS.len());
         for (video, path) in self.videos.into_iter().zip(&to.videos) {
             files::replace(path, &video.finish()?)?;
         }

@@ -4,7 +4,10 @@ use std::fmt::Write;
 
 use serde::{Deserialize, Serialize};
 
-use super::differences::{Deformation, KEY, WIDTH, head, rows, shortened};
+use super::{
+    comparison::{Deformation, KEY, head, rows},
+    text_table::{WIDTH, push_line, push_rule, shortened},
+};
 use crate::evaluation::{
     paired::{Paired, d_over_tau, pairs},
     record::EpisodeRecord,
@@ -17,7 +20,7 @@ const NAME: usize = 40;
 
 /// What a run of one condition came to.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Outcome {
+pub struct ConditionOutcome {
     /// Its run folder, from the folder of all.
     pub folder: String,
     /// Episodes.
@@ -36,7 +39,7 @@ pub struct Outcome {
     pub paired: Option<Paired>,
 }
 
-impl Outcome {
+impl ConditionOutcome {
     /// Of the episodes of a run, against those of its reference.
     pub fn new(folder: String, records: &[EpisodeRecord], reference: Option<&[EpisodeRecord]>) -> Self {
         let scores = Scores::of(&records.iter().collect::<Vec<_>>());
@@ -55,7 +58,7 @@ impl Outcome {
 
 /// One row: a condition of one suite.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Row {
+pub struct ConditionRow {
     /// Its name.
     pub condition: String,
     /// Its shifts.
@@ -63,14 +66,14 @@ pub struct Row {
     /// Its settings.
     pub set: Vec<(String, String)>,
     /// What came of it; null where it could change nothing and was not run.
-    pub outcome: Option<Outcome>,
+    pub outcome: Option<ConditionOutcome>,
     /// Why it was not run; null where it was.
     pub not_applicable: Option<String>,
 }
 
 /// One suite under all conditions, the reference first.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Rows {
+pub struct ConditionTable {
     /// Suite name.
     pub suite: String,
     /// Policy name, with what it has that no robot has.
@@ -78,54 +81,54 @@ pub struct Rows {
     /// Whether targets deform, so that D/τ says something.
     pub deformable: bool,
     /// The rows.
-    pub rows: Vec<Row>,
+    pub rows: Vec<ConditionRow>,
 }
 
 /// The tables of a suite, in plain text of at most 100 columns: the rates of every condition, and how each differs from the
 /// reference, episode by episode.
-pub fn table(suite: &Rows) -> String {
+pub fn table(suite: &ConditionTable) -> String {
     let mut out = String::new();
     let conditions = suite.rows.len().saturating_sub(1);
     let episodes = suite.rows.iter().find_map(|row| row.outcome.as_ref()).map_or(0, |o| o.episodes);
-    line(
+    push_line(
         &mut out,
         &format!(
             "{} · policy {} · {conditions} conditions · {episodes} episodes each",
             suite.suite, suite.policy
         ),
     );
-    rule(&mut out);
+    push_rule(&mut out, WIDTH);
     let heading = ["Goal, %", "NoDrop, %", "Safety, %", "D peak/τ", "invalid"];
-    line(&mut out, &cells("condition", heading.map(str::to_owned)));
-    rule(&mut out);
+    push_line(&mut out, &cells("condition", heading.map(str::to_owned)));
+    push_rule(&mut out, WIDTH);
     for row in &suite.rows {
-        line(&mut out, &row_text(row, suite.deformable));
+        push_line(&mut out, &row_text(row, suite.deformable));
     }
-    rule(&mut out);
+    push_rule(&mut out, WIDTH);
     for row in &suite.rows {
         if let Some(why) = &row.not_applicable {
-            line(&mut out, &format!("{}: N/A, {why}", row.condition));
+            push_line(&mut out, &format!("{}: N/A, {why}", row.condition));
         }
     }
     against_reference(&mut out, suite);
     out
 }
 
-fn against_reference(out: &mut String, suite: &Rows) {
+fn against_reference(out: &mut String, suite: &ConditionTable) {
     let deformation = if suite.deformable { Deformation::OverTau } else { Deformation::None };
-    line(out, &head("against the reference", ["there", "here"]));
-    rule(out);
+    push_line(out, &head("against the reference", ["there", "here"]));
+    push_rule(out, WIDTH);
     for row in &suite.rows {
         let paired = row.outcome.as_ref().and_then(|outcome| outcome.paired.as_ref());
         for text in paired.map(|paired| rows(&row.condition, paired, deformation)).unwrap_or_default() {
-            line(out, &text);
+            push_line(out, &text);
         }
     }
-    rule(out);
-    line(out, KEY);
+    push_rule(out, WIDTH);
+    push_line(out, KEY);
 }
 
-fn row_text(row: &Row, deformable: bool) -> String {
+fn row_text(row: &ConditionRow, deformable: bool) -> String {
     let Some(outcome) = &row.outcome else {
         return cells(&row.condition, std::array::from_fn(|_| "N/A".to_owned()));
     };
@@ -153,23 +156,20 @@ fn cells(name: &str, cells: [String; 5]) -> String {
     text
 }
 
-fn line(out: &mut String, text: &str) {
-    out.push_str(text.trim_end());
-    out.push('\n');
-}
-
-fn rule(out: &mut String) {
-    line(out, &"─".repeat(WIDTH));
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::evaluation::record::tests::sample;
 
-    fn row(condition: &str, outcome: Option<Outcome>) -> Row {
+    fn row(condition: &str, outcome: Option<ConditionOutcome>) -> ConditionRow {
         let not_applicable = outcome.is_none().then(|| "nothing in it deforms".to_owned());
-        Row { condition: condition.into(), shift: Vec::new(), set: Vec::new(), outcome, not_applicable }
+        ConditionRow {
+            condition: condition.into(),
+            shift: Vec::new(),
+            set: Vec::new(),
+            outcome,
+            not_applicable,
+        }
     }
 
     #[test]
@@ -177,13 +177,13 @@ mod tests {
         let reference = [sample()];
         let mut worse = sample();
         (worse.verdict.safety, worse.verdict.d_peak) = (false, Some(1.5));
-        let suite = Rows {
+        let suite = ConditionTable {
             suite: "buns".into(),
             policy: "expert".into(),
             deformable: true,
             rows: vec![
-                row("reference", Some(Outcome::new("reference".into(), &reference, None))),
-                row("heavy", Some(Outcome::new("heavy".into(), &[worse], Some(&reference)))),
+                row("reference", Some(ConditionOutcome::new("reference".into(), &reference, None))),
+                row("heavy", Some(ConditionOutcome::new("heavy".into(), &[worse], Some(&reference)))),
                 row("a condition with a name that is very long", None),
             ],
         };

@@ -7,15 +7,18 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use rust_hdf5::{DatatypeMessage, H5Dataset, H5File, H5Group, Hdf5Error};
+use rust_hdf5::{H5Dataset, H5File, H5Group, Hdf5Error};
 use serde_json::Value;
 
-use super::{DatasetError, Demonstration, Numbers, Stream};
+use super::{
+    super::{DataStream, DatasetError, Demonstration, StreamValues},
+    NumberType,
+};
 use crate::{evaluation::record::EpisodeRecord, geometry::Vec3, policy::Action};
 
 /// The file of a task: `/data/demo_0` and so on.
 pub struct TaskFile {
-    pub(super) file: H5File,
+    pub(in crate::dataset) file: H5File,
     path: PathBuf,
     data: H5Group,
     demos: Vec<usize>,
@@ -30,17 +33,6 @@ pub fn actions(path: &Path, demo: usize) -> Result<Vec<Action>, DatasetError> {
     TaskFile::open(path)?.actions(demo)
 }
 
-/// What kind of numbers a data set holds: `f64`, `f32`, `u8` or `other`.
-pub(super) fn kind_of(path: &Path, key: &str, data: &H5Dataset) -> Result<&'static str, DatasetError> {
-    let kind = data.datatype().map_err(|e| DatasetError::hdf5(path, key)(e))?;
-    Ok(match kind {
-        DatatypeMessage::FloatingPoint { size: 8, .. } => "f64",
-        DatatypeMessage::FloatingPoint { size: 4, .. } => "f32",
-        DatatypeMessage::FixedPoint { size: 1, signed: false, .. } => "u8",
-        _ => "other",
-    })
-}
-
 impl TaskFile {
     /// Opens a file and lists its demonstrations.
     ///
@@ -50,16 +42,16 @@ impl TaskFile {
         let about = std::fs::metadata(path).map_err(DatasetError::io("read", path))?;
         let file = || path.display().to_string();
         if about.is_dir() {
-            return Err(DatasetError::NoFile { path: file(), what: "is a folder, no HDF5 file".to_owned() });
+            return Err(DatasetError::NotHdf5 { path: file(), what: "is a folder, no HDF5 file".to_owned() });
         }
         match end_of(path) {
             None => {
                 let what = "is no HDF5 file: it does not begin as one".to_owned();
-                return Err(DatasetError::NoFile { path: file(), what });
+                return Err(DatasetError::NotHdf5 { path: file(), what });
             }
             Some(end) if end > about.len() => {
                 let what = cut_short(about.len(), end);
-                return Err(DatasetError::NoFile { path: file(), what });
+                return Err(DatasetError::NotHdf5 { path: file(), what });
             }
             Some(_) => {}
         }
@@ -89,7 +81,7 @@ impl TaskFile {
         &self.path
     }
 
-    /// Numbers of its demonstrations, in order.
+    /// StreamValues of its demonstrations, in order.
     pub fn demos(&self) -> &[usize] {
         &self.demos
     }
@@ -150,12 +142,12 @@ impl TaskFile {
     }
 
     /// Text of an attribute of `/data`, if it has such.
-    pub(super) fn about(&self, attribute: &str) -> Option<String> {
+    pub(in crate::dataset) fn about(&self, attribute: &str) -> Option<String> {
         self.data.attr_string(attribute).ok()
     }
 
     /// Whether a demonstration has a data set, be it one that cannot be read.
-    pub(super) fn has(&self, demo: usize, name: &str) -> bool {
+    pub(in crate::dataset) fn has(&self, demo: usize, name: &str) -> bool {
         self.dataset(demo, name).is_ok() || self.lists(demo, name)
     }
 
@@ -173,11 +165,11 @@ impl TaskFile {
     }
 
     /// Names of the groups in a group of a demonstration; none if it is not there.
-    pub(super) fn groups(&self, demo: usize, path: &str) -> Vec<String> {
+    pub(in crate::dataset) fn groups(&self, demo: usize, path: &str) -> Vec<String> {
         self.inner(demo, Some(path)).and_then(|group| group.group_names().ok()).unwrap_or_default()
     }
 
-    pub(super) fn dataset(&self, demo: usize, name: &str) -> Result<H5Dataset, DatasetError> {
+    pub(in crate::dataset) fn dataset(&self, demo: usize, name: &str) -> Result<H5Dataset, DatasetError> {
         self.group(demo)?;
         let key = format!("data/demo_{demo}/{name}");
         self.file.dataset(&key).map_err(|error| {
@@ -210,27 +202,27 @@ impl TaskFile {
     ///
     /// # Errors
     /// There is none of that name, or it cannot be read.
-    pub fn stream(&self, demo: usize, name: &str) -> Result<Stream, DatasetError> {
+    pub fn stream(&self, demo: usize, name: &str) -> Result<DataStream, DatasetError> {
         let data = self.dataset(demo, name)?;
         let key = format!("/data/demo_{demo}/{name}");
         let failed = |error| DatasetError::hdf5(&self.path, &key)(error);
-        let numbers = match kind_of(&self.path, &key, &data)? {
-            "f32" => data.read_raw().map(Numbers::F32),
-            "u8" => data.read_raw().map(Numbers::U8),
-            _ => data.read_numeric_as().map(Numbers::F64),
+        let values = match NumberType::of(&self.path, &key, &data)? {
+            NumberType::F32 => data.read_raw().map(StreamValues::F32),
+            NumberType::U8 => data.read_raw().map(StreamValues::U8),
+            _ => data.read_numeric_as().map(StreamValues::F64),
         };
-        let mut notes = Vec::new();
+        let mut attributes = Vec::new();
         for name in data.attr_names().map_err(failed)? {
             // Others may keep numbers there.
             if let Ok(text) = data.attr(&name).and_then(|attr| attr.read_string()) {
-                notes.push((name, text));
+                attributes.push((name, text));
             }
         }
-        let row = data.shape().get(1..).unwrap_or_default().to_vec();
-        Ok(Stream { name: name.to_owned(), row, numbers: numbers.map_err(failed)?, notes })
+        let row_shape = data.shape().get(1..).unwrap_or_default().to_vec();
+        Ok(DataStream { name: name.to_owned(), row_shape, values: values.map_err(failed)?, attributes })
     }
 
-    /// Numbers of a stream as doubles, with its width a step.
+    /// StreamValues of a stream as doubles, with its width a step.
     ///
     /// # Errors
     /// As [`TaskFile::stream`].
@@ -307,21 +299,22 @@ impl TaskFile {
     /// # Errors
     /// It was not recorded by softvt, or is broken.
     pub fn read(&self, demo: usize) -> Result<Demonstration, DatasetError> {
-        let shut = self.doubles(demo, "actions_binary")?.0.chunks(7).map(|row| row[6] > 0.5).collect();
+        let gripper_closed =
+            self.doubles(demo, "actions_binary")?.0.chunks(7).map(|row| row[6] > 0.5).collect();
         let mut read = Demonstration {
             record: self.record(demo)?,
             actions: self.actions(demo)?,
-            shut,
+            gripper_closed,
             observed: Vec::new(),
             privileged: Vec::new(),
         };
         for name in self.names(demo)? {
-            let hidden = name.starts_with("privileged/");
-            if !hidden && (!name.starts_with("obs/") || name.ends_with("_rgb")) {
+            let is_privileged = name.starts_with("privileged/");
+            if !is_privileged && (!name.starts_with("obs/") || name.ends_with("_rgb")) {
                 continue;
             }
             let stream = self.stream(demo, &name)?;
-            if hidden { read.privileged.push(stream) } else { read.observed.push(stream) }
+            if is_privileged { read.privileged.push(stream) } else { read.observed.push(stream) }
         }
         Ok(read)
     }

@@ -3,11 +3,11 @@
 use std::{collections::BTreeMap, path::Path};
 
 use super::{
-    DatasetError, Numbers, TaskFile,
+    DatasetError, StreamValues, TaskFile,
     card::Card,
-    layout::PICTURES,
-    manifest::{self, Entry},
-    recorder::rate,
+    demonstration_writer::frame_rate,
+    layout::IMAGE_STREAMS,
+    manifest::{self, ManifestEntry},
     video,
 };
 use crate::{
@@ -71,13 +71,13 @@ impl Findings {
 pub fn folder(root: &Path) -> Result<Findings, DatasetError> {
     let (card, entries) = (Card::read(root)?, manifest::read(root)?);
     let mut findings = Findings::default();
-    let mut files: BTreeMap<&str, Vec<&Entry>> = BTreeMap::new();
+    let mut files: BTreeMap<&str, Vec<&ManifestEntry>> = BTreeMap::new();
     for entry in &entries {
         files.entry(&entry.hdf5_path).or_default().push(entry);
         films(&mut findings, root, entry);
     }
     for task in &card.tasks {
-        let of_task = |e: &&Entry| e.task_id == task.task && e.suite == task.suite;
+        let of_task = |e: &&ManifestEntry| e.task_id == task.task && e.suite == task.suite;
         let listed = entries.iter().filter(of_task).count();
         if listed != task.demos {
             let what = format!(
@@ -126,7 +126,7 @@ pub fn file(path: &Path) -> Result<Findings, DatasetError> {
 }
 
 /// Videos of a demonstration: as many pictures as steps, at the rate of control.
-fn films(findings: &mut Findings, root: &Path, entry: &Entry) {
+fn films(findings: &mut Findings, root: &Path, entry: &ManifestEntry) {
     for (stream, file) in &entry.video_files {
         let path = root.join(file);
         let length =
@@ -141,8 +141,12 @@ fn films(findings: &mut Findings, root: &Path, entry: &Entry) {
                         format!("{frames} pictures, the demonstration has {} steps", entry.num_samples);
                     findings.say(&path, stream, what);
                 }
-                if (hertz - f64::from(rate())).abs() > 1e-9 {
-                    findings.say(&path, stream, format!("{hertz} pictures a second, expected {}", rate()));
+                if (hertz - f64::from(frame_rate())).abs() > 1e-9 {
+                    findings.say(
+                        &path,
+                        stream,
+                        format!("{hertz} pictures a second, expected {}", frame_rate()),
+                    );
                 }
             }
         }
@@ -186,36 +190,37 @@ fn stream(findings: &mut Findings, file: &TaskFile, (demo, steps): (usize, usize
     let key = format!("/data/demo_{demo}/{name}");
     let read = file.stream(demo, name);
     let Some(stream) = findings.take(read) else { return };
-    let width: usize = stream.row.iter().product();
-    let count = match &stream.numbers {
-        Numbers::F64(numbers) => numbers.len(),
-        Numbers::F32(numbers) => numbers.len(),
-        Numbers::U8(numbers) => numbers.len(),
+    let width: usize = stream.row_shape.iter().product();
+    let count = match &stream.values {
+        StreamValues::F64(numbers) => numbers.len(),
+        StreamValues::F32(numbers) => numbers.len(),
+        StreamValues::U8(numbers) => numbers.len(),
     };
     if count != steps * width {
         findings.say(file.path(), &key, format!("{} steps, the actions have {steps}", count / width.max(1)));
     }
-    let bad = match &stream.numbers {
-        Numbers::F64(numbers) => numbers.iter().position(|x| !x.is_finite()),
-        Numbers::F32(numbers) => numbers.iter().position(|x| !x.is_finite()),
-        Numbers::U8(_) => None,
+    let bad = match &stream.values {
+        StreamValues::F64(numbers) => numbers.iter().position(|x| !x.is_finite()),
+        StreamValues::F32(numbers) => numbers.iter().position(|x| !x.is_finite()),
+        StreamValues::U8(_) => None,
     };
     if let Some(at) = bad {
         findings.say(file.path(), &key, format!("step {}: a number that is not finite", at / width.max(1)));
     }
-    if PICTURES.iter().any(|picture| name == format!("obs/{picture}")) && !matches!(stream.row[..], [_, _, 3])
+    if IMAGE_STREAMS.iter().any(|picture| name == format!("obs/{picture}"))
+        && !matches!(stream.row_shape[..], [_, _, 3])
     {
-        let what = format!("expected the shape (steps, height, width, 3), got {:?} a step", stream.row);
+        let what = format!("expected the shape (steps, height, width, 3), got {:?} a step", stream.row_shape);
         findings.say(file.path(), &key, what);
     }
     if name.ends_with("/root_pose_w") && width == 7 {
-        quaternions(findings, file, &key, &stream.numbers);
+        quaternions(findings, file, &key, &stream.values);
     }
 }
 
 /// Quaternions of poses must be of length 1 and have w ≥ 0.
-fn quaternions(findings: &mut Findings, file: &TaskFile, key: &str, numbers: &Numbers) {
-    let Numbers::F64(numbers) = numbers else {
+fn quaternions(findings: &mut Findings, file: &TaskFile, key: &str, numbers: &StreamValues) {
+    let StreamValues::F64(numbers) = numbers else {
         return findings.say(file.path(), key, "expected float64".to_owned());
     };
     let bad = numbers.chunks_exact(7).position(|row| {
@@ -240,7 +245,7 @@ fn consistent(findings: &mut Findings, file: &TaskFile, demo: usize) {
     let (poses, states, times) = (get("obs/eef_pose"), get("obs/state"), get("timestamps"));
     let (actions, binary) = (get("actions"), get("actions_binary"));
     let key = |name: &str| format!("/data/demo_{demo}/{name}");
-    quaternions(findings, file, &key("obs/eef_pose"), &Numbers::F64(poses.clone()));
+    quaternions(findings, file, &key("obs/eef_pose"), &StreamValues::F64(poses.clone()));
     let turned = poses.chunks_exact(7).zip(states.chunks_exact(7)).position(|(pose, state)| {
         let q = Quat::new_unchecked(nalgebra::Quaternion::new(pose[3], pose[4], pose[5], pose[6]));
         let other = rotation::from_axis_angle(&Vec3::new(state[3], state[4], state[5]));
@@ -253,8 +258,12 @@ fn consistent(findings: &mut Findings, file: &TaskFile, demo: usize) {
     }
     let late = times.iter().enumerate().position(|(step, t)| (t - step as f64 * CONTROL_DT).abs() > SAME);
     if let Some(step) = late {
-        let what =
-            format!("step {step}: {} s, expected {} at {} Hz", times[step], step as f64 * CONTROL_DT, rate());
+        let what = format!(
+            "step {step}: {} s, expected {} at {} Hz",
+            times[step],
+            step as f64 * CONTROL_DT,
+            frame_rate()
+        );
         findings.say(file.path(), &key("timestamps"), what);
     }
     let both = actions.chunks_exact(7).zip(binary.chunks_exact(7));
@@ -265,5 +274,4 @@ fn consistent(findings: &mut Findings, file: &TaskFile, demo: usize) {
 }
 
 #[cfg(test)]
-#[path = "check_tests.rs"]
 mod tests;

@@ -5,7 +5,7 @@ use std::{collections::BTreeSet, path::Path};
 use rust_hdf5::{FilterPipeline, H5Dataset, H5File, H5Group, H5Type};
 use serde_json::{Value, json};
 
-use super::{DatasetError, Demonstration, Numbers, Stream};
+use super::super::{DataStream, DatasetError, Demonstration, StreamValues};
 use crate::{benchmark::control::CONTROL_DT, evaluation::record::EpisodeRecord};
 
 /// Bytes of a chunk of numbers, at most: a reader of one step reads no more.
@@ -14,15 +14,15 @@ const CHUNK: usize = 1 << 18;
 const LEVEL: u32 = 4;
 
 /// A file that is being written.
-pub(super) struct Writer<'a> {
+pub(in crate::dataset) struct Hdf5Writer<'a> {
     pub file: H5File,
     pub path: &'a Path,
     made: BTreeSet<String>,
 }
 
-impl<'a> Writer<'a> {
+impl<'a> Hdf5Writer<'a> {
     /// A new file with `/data` and its attributes.
-    pub(super) fn create(
+    pub(in crate::dataset) fn create(
         path: &'a Path,
         environment: &Value,
         total: usize,
@@ -41,7 +41,7 @@ impl<'a> Writer<'a> {
     }
 
     /// The group of a path, made with those above it if need be.
-    pub(super) fn group(&mut self, path: &str) -> Result<H5Group, DatasetError> {
+    pub(in crate::dataset) fn group(&mut self, path: &str) -> Result<H5Group, DatasetError> {
         let failed = |error| DatasetError::hdf5(self.path, path)(error);
         let mut group = self.file.root_group();
         let mut so_far = String::new();
@@ -56,7 +56,7 @@ impl<'a> Writer<'a> {
     }
 
     /// Attributes of a demonstration.
-    pub(super) fn describe(
+    pub(in crate::dataset) fn describe(
         &mut self,
         demo: usize,
         record: &EpisodeRecord,
@@ -89,40 +89,44 @@ impl<'a> Writer<'a> {
     }
 
     /// All numbers of a demonstration.
-    pub(super) fn numbers(&mut self, demo: usize, demonstration: &Demonstration) -> Result<(), DatasetError> {
-        let outer = demonstration.outer();
+    pub(in crate::dataset) fn numbers(
+        &mut self,
+        demo: usize,
+        demonstration: &Demonstration,
+    ) -> Result<(), DatasetError> {
+        let outer = demonstration.top_level_streams();
         for stream in outer.iter().chain(&demonstration.observed).chain(&demonstration.privileged) {
             self.stream(&format!("data/demo_{demo}/{}", stream.name), stream, demonstration.steps())?;
         }
         Ok(())
     }
 
-    fn stream(&mut self, key: &str, stream: &Stream, steps: usize) -> Result<(), DatasetError> {
-        match &stream.numbers {
-            Numbers::F64(numbers) => self.array(key, stream, steps, numbers),
-            Numbers::F32(numbers) => self.array(key, stream, steps, numbers),
-            Numbers::U8(numbers) => self.array(key, stream, steps, numbers),
+    fn stream(&mut self, key: &str, stream: &DataStream, steps: usize) -> Result<(), DatasetError> {
+        match &stream.values {
+            StreamValues::F64(numbers) => self.array(key, stream, steps, numbers),
+            StreamValues::F32(numbers) => self.array(key, stream, steps, numbers),
+            StreamValues::U8(numbers) => self.array(key, stream, steps, numbers),
         }
     }
 
     fn array<T: H5Type>(
         &mut self,
         key: &str,
-        stream: &Stream,
+        stream: &DataStream,
         steps: usize,
         numbers: &[T],
     ) -> Result<(), DatasetError> {
-        let width = stream.row.iter().product::<usize>() * size_of::<T>();
+        let width = stream.row_shape.iter().product::<usize>() * size_of::<T>();
         let rows = (CHUNK / width.max(1)).clamp(1, steps.max(1));
-        let data = self.dataset::<T>(key, (steps, rows), &stream.row, size_of::<T>())?;
+        let data = self.dataset::<T>(key, (steps, rows), &stream.row_shape, size_of::<T>())?;
         let failed = |error| DatasetError::hdf5(self.path, key)(error);
         data.write_raw(numbers).map_err(failed)?;
-        annotate(&data, &stream.notes).map_err(failed)
+        annotate(&data, &stream.attributes).map_err(failed)
     }
 
     /// A data set of `steps` rows in chunks of `rows`. Before compression the bytes of a chunk are put side by side that are
     /// `together` bytes apart (HDF5's shuffle filter).
-    pub(super) fn dataset<T: H5Type>(
+    pub(in crate::dataset) fn dataset<T: H5Type>(
         &mut self,
         key: &str,
         (steps, rows): (usize, usize),
@@ -142,7 +146,7 @@ impl<'a> Writer<'a> {
 
     /// Room for the pictures of a stream, `rows` in a chunk. The values of one pixel in all pictures of a chunk are stored side by
     /// side: what does not move takes little room then.
-    pub(super) fn pictures(
+    pub(in crate::dataset) fn pictures(
         &mut self,
         demo: usize,
         name: &str,
@@ -159,7 +163,7 @@ impl<'a> Writer<'a> {
     }
 
     /// Ends the file, or gives it up if what was to be `written` into it could not be.
-    pub(super) fn close(self, written: Result<(), DatasetError>) -> Result<(), DatasetError> {
+    pub(in crate::dataset) fn close(self, written: Result<(), DatasetError>) -> Result<(), DatasetError> {
         if written.is_err() {
             // What is wrong is known already.
             let _ = self.file.close_no_sync();
@@ -171,7 +175,7 @@ impl<'a> Writer<'a> {
 }
 
 /// Puts notes at a data set.
-pub(super) fn annotate(data: &H5Dataset, notes: &[(String, String)]) -> rust_hdf5::Result<()> {
+pub(in crate::dataset) fn annotate(data: &H5Dataset, notes: &[(String, String)]) -> rust_hdf5::Result<()> {
     for (name, text) in notes {
         data.new_attr::<rust_hdf5::VarLenUnicode>().shape(()).create(name)?.write_string(text)?;
     }

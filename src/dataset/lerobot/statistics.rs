@@ -8,7 +8,7 @@ pub(super) const QUANTILES: [(&str, f64); 5] =
 
 /// Extremes, mean and spread of numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Moments {
+pub(super) struct RunningMoments {
     count: f64,
     min: f64,
     max: f64,
@@ -17,7 +17,7 @@ pub(super) struct Moments {
     squares: f64,
 }
 
-impl Moments {
+impl RunningMoments {
     /// Of no numbers.
     const NONE: Self =
         Self { count: 0.0, min: f64::INFINITY, max: f64::NEG_INFINITY, mean: 0.0, squares: 0.0 };
@@ -75,12 +75,12 @@ impl Moments {
 
 /// How often each of evenly spaced numbers from zero on occurs.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Tally {
+pub(super) struct ValueCounts {
     step: f64,
     counts: Vec<u64>,
 }
 
-impl Tally {
+impl ValueCounts {
     /// Empty, with `bins` numbers `step` apart.
     pub(super) fn new(step: f64, bins: usize) -> Self {
         Self { step, counts: vec![0; bins] }
@@ -117,49 +117,52 @@ impl Tally {
 
 /// What quantiles are taken from.
 #[derive(Clone, Debug, PartialEq)]
-enum Spread {
+enum ColumnStatistics {
     /// None are.
     None,
     /// All the numbers.
     All(Vec<f64>),
     /// How often each occurs.
-    Tally(Tally),
+    ValueCounts(ValueCounts),
 }
 
 /// Numbers as a whole.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Summary {
-    moments: Moments,
-    spread: Spread,
+pub(super) struct ValueStatistics {
+    moments: RunningMoments,
+    spread: ColumnStatistics,
 }
 
-impl Summary {
+impl ValueStatistics {
     /// Of numbers that are kept.
     pub(super) fn of(numbers: Vec<f64>) -> Self {
-        Self { moments: Moments::of(numbers.iter().copied()), spread: Spread::All(numbers) }
+        Self { moments: RunningMoments::of(numbers.iter().copied()), spread: ColumnStatistics::All(numbers) }
     }
 
     /// Of numbers that were counted, all of which are among those of the tally.
-    pub(super) fn counted(tally: Tally) -> Self {
-        Self { moments: Moments::weighted(tally.numbers()), spread: Spread::Tally(tally) }
+    pub(super) fn counted(tally: ValueCounts) -> Self {
+        Self {
+            moments: RunningMoments::weighted(tally.numbers()),
+            spread: ColumnStatistics::ValueCounts(tally),
+        }
     }
 
     /// Of numbers whose quantiles are taken from those nearest to them in a tally.
-    pub(super) fn near(moments: Moments, tally: Tally) -> Self {
-        Self { moments, spread: Spread::Tally(tally) }
+    pub(super) fn near(moments: RunningMoments, tally: ValueCounts) -> Self {
+        Self { moments, spread: ColumnStatistics::ValueCounts(tally) }
     }
 
     /// Without quantiles.
-    pub(super) fn bare(moments: Moments) -> Self {
-        Self { moments, spread: Spread::None }
+    pub(super) fn bare(moments: RunningMoments) -> Self {
+        Self { moments, spread: ColumnStatistics::None }
     }
 
     /// Of these and the others, which are kept in the same way.
     pub(super) fn merge(&mut self, other: &Self) {
         self.moments.merge(&other.moments);
         match (&mut self.spread, &other.spread) {
-            (Spread::All(numbers), Spread::All(more)) => numbers.extend(more),
-            (Spread::Tally(tally), Spread::Tally(more)) => {
+            (ColumnStatistics::All(numbers), ColumnStatistics::All(more)) => numbers.extend(more),
+            (ColumnStatistics::ValueCounts(tally), ColumnStatistics::ValueCounts(more)) => {
                 tally.counts.iter_mut().zip(&more.counts).for_each(|(count, more)| *count += more);
             }
             _ => {}
@@ -175,20 +178,22 @@ impl Summary {
             low + (at((place as u64 + 1).min(last)) - low) * place.fract()
         };
         match &self.spread {
-            Spread::None => None,
-            Spread::All(numbers) => {
+            ColumnStatistics::None => None,
+            ColumnStatistics::All(numbers) => {
                 let mut sorted = numbers.clone();
                 sorted.sort_by(f64::total_cmp);
                 Some(QUANTILES.map(|(_, q)| between(&|place| sorted[place as usize], q)))
             }
-            Spread::Tally(tally) => Some(QUANTILES.map(|(_, q)| between(&|place| tally.at(place), q))),
+            ColumnStatistics::ValueCounts(tally) => {
+                Some(QUANTILES.map(|(_, q)| between(&|place| tally.at(place), q)))
+            }
         }
     }
 }
 
 /// A feature as a whole: a summary of each of its numbers, in the order of `shape`.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct FeatureSummary {
+pub(super) struct FeatureStatistics {
     /// Its name.
     pub name: &'static str,
     /// Shape of each figure.
@@ -196,7 +201,7 @@ pub(super) struct FeatureSummary {
     /// Steps it is of.
     pub steps: u64,
     /// The parts.
-    pub parts: Vec<Summary>,
+    pub parts: Vec<ValueStatistics>,
 }
 
 /// The figures of a feature.
@@ -212,7 +217,7 @@ pub(super) struct Figures {
     pub figures: Vec<(&'static str, Vec<f64>)>,
 }
 
-impl FeatureSummary {
+impl FeatureStatistics {
     /// Takes more steps in.
     pub(super) fn merge(&mut self, other: &Self) {
         self.steps += other.steps;
@@ -221,14 +226,15 @@ impl FeatureSummary {
 
     /// The figures, with or without quantiles.
     pub(super) fn figures(&self, quantiles: bool) -> Figures {
-        let each = |pick: fn(&Moments) -> f64| self.parts.iter().map(|part| pick(&part.moments)).collect();
+        let each =
+            |pick: fn(&RunningMoments) -> f64| self.parts.iter().map(|part| pick(&part.moments)).collect();
         let mut figures = vec![
             ("min", each(|m| m.min)),
             ("max", each(|m| m.max)),
             ("mean", each(|m| m.mean)),
-            ("std", each(Moments::deviation)),
+            ("std", each(RunningMoments::deviation)),
         ];
-        let kept = self.parts.iter().map(Summary::quantiles).collect::<Option<Vec<[f64; 5]>>>();
+        let kept = self.parts.iter().map(ValueStatistics::quantiles).collect::<Option<Vec<[f64; 5]>>>();
         if let Some(kept) = kept.filter(|_| quantiles) {
             let named = QUANTILES.iter().enumerate();
             figures.extend(named.map(|(at, (name, _))| (*name, kept.iter().map(|part| part[at]).collect())));
@@ -240,7 +246,7 @@ impl FeatureSummary {
 /// Numbers as nested lists.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
-pub(super) enum Nest {
+pub(super) enum NestedList {
     /// Whole.
     Whole(u64),
     /// A number.
@@ -248,10 +254,10 @@ pub(super) enum Nest {
     /// A number in as many digits as single precision needs.
     Single(f32),
     /// A list.
-    List(Vec<Nest>),
+    List(Vec<NestedList>),
 }
 
-impl Nest {
+impl NestedList {
     /// Numbers in a shape.
     pub(super) fn new(numbers: &[f64], shape: &[usize], leaf: fn(f64) -> Self) -> Self {
         let Some((first, rest)) = shape.split_first() else {
@@ -264,10 +270,13 @@ impl Nest {
 
 impl Figures {
     /// As JSON has them: figures by name, and `count`.
-    pub(super) fn nested(&self, leaf: fn(f64) -> Nest) -> Vec<(&'static str, Nest)> {
-        let count = ("count", Nest::List(vec![Nest::Whole(self.steps)]));
+    pub(super) fn nested(&self, leaf: fn(f64) -> NestedList) -> Vec<(&'static str, NestedList)> {
+        let count = ("count", NestedList::List(vec![NestedList::Whole(self.steps)]));
         let figures = self.figures.iter();
-        figures.map(|(name, numbers)| (*name, Nest::new(numbers, &self.shape, leaf))).chain([count]).collect()
+        figures
+            .map(|(name, numbers)| (*name, NestedList::new(numbers, &self.shape, leaf)))
+            .chain([count])
+            .collect()
     }
 }
 
@@ -277,8 +286,8 @@ mod tests {
 
     use super::*;
 
-    fn figures(summary: Summary) -> Vec<f64> {
-        let all = FeatureSummary { name: "x", shape: vec![1], steps: 1, parts: vec![summary] };
+    fn figures(summary: ValueStatistics) -> Vec<f64> {
+        let all = FeatureStatistics { name: "x", shape: vec![1], steps: 1, parts: vec![summary] };
         all.figures(true).figures.into_iter().map(|(_, numbers)| numbers[0]).collect()
     }
 
@@ -286,19 +295,19 @@ mod tests {
     fn figures_are_those_that_numpy_gives() {
         // numpy.quantile([3, 1, 2, 10], [.01, .1, .5, .9, .99]), min, max, mean and std.
         let expected = [1.0, 10.0, 4.0, 3.535533905932738, 1.03, 1.3, 2.5, 7.9, 9.79];
-        let found = figures(Summary::of(vec![3.0, 1.0, 2.0, 10.0]));
+        let found = figures(ValueStatistics::of(vec![3.0, 1.0, 2.0, 10.0]));
         assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{found:?}");
-        let still = figures(Summary::of(vec![0.1; 7]));
+        let still = figures(ValueStatistics::of(vec![0.1; 7]));
         assert_eq!(still, [0.1, 0.1, 0.1, 0.0, 0.1, 0.1, 0.1, 0.1, 0.1]);
     }
 
     proptest! {
         #[test]
         fn counted_numbers_have_the_figures_of_numbers_that_are_kept(bytes in prop::collection::vec(0_u8.., 1..300)) {
-            let mut tally = Tally::new(1.0 / 255.0, 256);
+            let mut tally = ValueCounts::new(1.0 / 255.0, 256);
             bytes.iter().for_each(|byte| tally.count(usize::from(*byte)));
-            let kept = figures(Summary::of(bytes.iter().map(|byte| f64::from(*byte) / 255.0).collect()));
-            let counted = figures(Summary::counted(tally));
+            let kept = figures(ValueStatistics::of(bytes.iter().map(|byte| f64::from(*byte) / 255.0).collect()));
+            let counted = figures(ValueStatistics::counted(tally));
             prop_assert!(kept.iter().zip(&counted).all(|(a, b)| (a - b).abs() < 1e-12), "{kept:?} {counted:?}");
         }
 
@@ -307,9 +316,9 @@ mod tests {
             numbers in prop::collection::vec(-1e3..1e3_f64, 2..200), cut in 0.0..1.0,
         ) {
             let cut = (cut * numbers.len() as f64) as usize;
-            let mut parts = Summary::of(numbers[..cut].to_vec());
-            parts.merge(&Summary::of(numbers[cut..].to_vec()));
-            let (parts, whole) = (figures(parts), figures(Summary::of(numbers)));
+            let mut parts = ValueStatistics::of(numbers[..cut].to_vec());
+            parts.merge(&ValueStatistics::of(numbers[cut..].to_vec()));
+            let (parts, whole) = (figures(parts), figures(ValueStatistics::of(numbers)));
             prop_assert!(parts.iter().zip(&whole).all(|(a, b)| (a - b).abs() < 1e-8), "{parts:?} {whole:?}");
         }
     }
@@ -317,8 +326,9 @@ mod tests {
     #[test]
     fn numbers_are_nested_in_the_order_of_their_shape() {
         let numbers: Vec<f64> = (0..6).map(f64::from).collect();
-        let nested = serde_json::to_string(&Nest::new(&numbers, &[3, 1, 2], Nest::Number)).unwrap();
+        let nested =
+            serde_json::to_string(&NestedList::new(&numbers, &[3, 1, 2], NestedList::Number)).unwrap();
         assert_eq!(nested, "[[[0.0,1.0]],[[2.0,3.0]],[[4.0,5.0]]]");
-        assert_eq!(serde_json::to_string(&Nest::Single(0.1)).unwrap(), "0.1");
+        assert_eq!(serde_json::to_string(&NestedList::Single(0.1)).unwrap(), "0.1");
     }
 }

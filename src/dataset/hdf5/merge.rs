@@ -6,9 +6,10 @@ use rust_hdf5::{H5Dataset, H5File, H5Group, H5Type};
 use serde_json::Value;
 
 use super::{
-    DatasetError,
-    read::{TaskFile, kind_of},
-    write::{Writer, annotate},
+    super::DatasetError,
+    NumberType,
+    read::TaskFile,
+    write::{Hdf5Writer, annotate},
 };
 use crate::files;
 
@@ -16,7 +17,7 @@ use crate::files;
 ///
 /// # Errors
 /// A part cannot be read, or the file not written.
-pub fn assemble(parts: &[PathBuf], into: &Path, environment: &Value) -> Result<(), DatasetError> {
+pub fn merge_parts(parts: &[PathBuf], into: &Path, environment: &Value) -> Result<(), DatasetError> {
     files::create_folder(into.parent().unwrap_or(into))?;
     let aside = files::temp_path(into);
     let written = write_all(parts, &aside, environment);
@@ -30,7 +31,7 @@ pub fn assemble(parts: &[PathBuf], into: &Path, environment: &Value) -> Result<(
 
 fn write_all(parts: &[PathBuf], aside: &Path, environment: &Value) -> Result<(), DatasetError> {
     let steps = parts.iter().map(|part| TaskFile::open(part)?.steps(0)).collect::<Result<Vec<_>, _>>()?;
-    let mut writer = Writer::create(aside, environment, steps.iter().sum(), parts.len())?;
+    let mut writer = Hdf5Writer::create(aside, environment, steps.iter().sum(), parts.len())?;
     // One at a time: there may be more of them than files that may be open.
     let copied = parts.iter().zip(steps).enumerate().try_for_each(|(demo, (part, steps))| {
         let source = TaskFile::open(part)?;
@@ -48,7 +49,7 @@ const SHUFFLE: u16 = 2;
 struct Copy<'a, 'b> {
     source: &'a H5File,
     from: &'a Path,
-    writer: &'a mut Writer<'b>,
+    writer: &'a mut Hdf5Writer<'b>,
 }
 
 impl Copy<'_, '_> {
@@ -76,9 +77,9 @@ impl Copy<'_, '_> {
     }
 
     fn dataset(&mut self, data: &H5Dataset, from: &str, into: &str) -> Result<(), DatasetError> {
-        match kind_of(self.from, from, data)? {
-            "f64" => self.chunks::<f64>(data, from, into),
-            "f32" => self.chunks::<f32>(data, from, into),
+        match NumberType::of(self.from, from, data)? {
+            NumberType::F64 => self.chunks::<f64>(data, from, into),
+            NumberType::F32 => self.chunks::<f32>(data, from, into),
             _ => self.chunks::<u8>(data, from, into),
         }
     }

@@ -9,9 +9,9 @@ use std::{
 use serde_json::Value;
 
 use super::{
-    interchange,
     run_folder::{EPISODES, RUN, RunFolderError, SUMMARY, io_error, line},
-    runs::{RunsError, StoredRun, load},
+    softvtbench_files,
+    stored_run::{StoredRun, StoredRunError, load},
 };
 use crate::{
     evaluation::{record::EpisodeRecord, summary::Summary, thresholds::Thresholds},
@@ -19,14 +19,14 @@ use crate::{
 };
 
 /// Folders that hold files of single episodes.
-const PER_EPISODE: [&str; 4] = ["actions", "trace", "video", interchange::FOLDER];
+const PER_EPISODE: [&str; 4] = ["actions", "trace", "video", softvtbench_files::FOLDER];
 
 /// Why shards cannot be merged.
 #[derive(Debug, thiserror::Error)]
 pub enum MergeError {
     /// A run cannot be read.
     #[error(transparent)]
-    Runs(#[from] RunsError),
+    Runs(#[from] StoredRunError),
     /// A file cannot be written.
     #[error(transparent)]
     Folder(#[from] RunFolderError),
@@ -135,11 +135,11 @@ fn write(
         records.iter().map(|r| line(r, &folder.join(EPISODES))).collect();
     files::replace(&folder.join(EPISODES), lines?)?;
     files::write_json(&folder.join(RUN), info)?;
-    let path = runs[0].dir.join(interchange::FOLDER).join(interchange::THRESHOLDS_JSON);
+    let path = runs[0].dir.join(softvtbench_files::FOLDER).join(softvtbench_files::THRESHOLDS_JSON);
     let text = fs::read_to_string(&path).map_err(io_error("read", &path))?;
     let thresholds = Thresholds::parse(&text, &path.display().to_string())
         .map_err(|error| MergeError::Unfit(error.to_string()))?;
-    interchange::write_scores(folder, records, &thresholds)?;
+    softvtbench_files::write_scores(folder, records, &thresholds)?;
     // That of a twin is not the name of its suite.
     let suite = records.first().map_or(runs[0].suite(), |record| &record.identity.suite);
     let summary = Summary::of(suite, runs[0].text("policy"), records);

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::runs::StoredRun;
+use super::stored_run::StoredRun;
 use crate::evaluation::{
     record::{EpisodeRecord, Outcome},
     summary::Summary,
@@ -10,7 +10,7 @@ use crate::evaluation::{
 
 /// A run with its results.
 #[derive(Clone, Debug)]
-pub struct Judged {
+pub struct RunSummary {
     /// What was run.
     pub run: StoredRun,
     /// What came out.
@@ -20,7 +20,7 @@ pub struct Judged {
 }
 
 /// Sums runs up, in the order of their suites. A folder that is given twice counts once.
-pub fn judge(mut runs: Vec<StoredRun>) -> Vec<Judged> {
+pub fn summarize_runs(mut runs: Vec<StoredRun>) -> Vec<RunSummary> {
     let place = |run: &StoredRun| run.dir.canonicalize().unwrap_or_else(|_| run.dir.clone());
     let mut seen = Vec::new();
     runs.retain(|run| {
@@ -29,7 +29,7 @@ pub fn judge(mut runs: Vec<StoredRun>) -> Vec<Judged> {
         seen.push(place);
         new
     });
-    let mut all: Vec<Judged> = runs.into_iter().map(summed_up).collect();
+    let mut all: Vec<RunSummary> = runs.into_iter().map(summed_up).collect();
     all.sort_by(|a, b| a.summary.suite.cmp(&b.summary.suite));
     let mut count: BTreeMap<(String, String), usize> = BTreeMap::new();
     for judged in &all {
@@ -43,11 +43,11 @@ pub fn judge(mut runs: Vec<StoredRun>) -> Vec<Judged> {
     all
 }
 
-fn summed_up(run: StoredRun) -> Judged {
+fn summed_up(run: StoredRun) -> RunSummary {
     let mut summary = Summary::of(run.suite(), run.text("policy"), &run.records);
     summary.force_observed |= run.sees_forces();
     let method = [summary.method()].into_iter().chain(changes(&run)).collect::<Vec<_>>().join(" · ");
-    Judged { run, summary, method }
+    RunSummary { run, summary, method }
 }
 
 /// What was changed of the suite, such as `mass=2`.
@@ -63,7 +63,7 @@ fn changes(run: &StoredRun) -> Option<String> {
     (!words.is_empty()).then(|| words.join(", "))
 }
 
-impl Judged {
+impl RunSummary {
     /// Whether its targets deform.
     pub fn soft(&self) -> bool {
         self.summary.scores.deformation_ok_rate.is_some()
@@ -149,7 +149,10 @@ pub(super) mod tests {
         let mut felt = stored("runs/c", "pi", vec![sample()]);
         felt.info["force_observed"] = json!(true);
         let names = |runs: &[&StoredRun]| -> Vec<String> {
-            judge(runs.iter().map(|run| (*run).clone()).collect()).into_iter().map(|j| j.method).collect()
+            summarize_runs(runs.iter().map(|run| (*run).clone()).collect())
+                .into_iter()
+                .map(|j| j.method)
+                .collect()
         };
         assert_eq!(
             names(&[&plain, &heavy, &felt]),

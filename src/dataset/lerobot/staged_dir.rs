@@ -11,7 +11,7 @@ use crate::{dataset::DatasetError, files};
 const MARK: &str = ".softvt-export";
 
 /// Where a folder is made before it gets its name.
-pub(super) struct Place {
+pub(super) struct StagedDir {
     aside: PathBuf,
     out: PathBuf,
     /// The folders that were made to put it in, the deepest first.
@@ -20,8 +20,8 @@ pub(super) struct Place {
     _mark: File,
 }
 
-impl Place {
-    /// Begins a folder beside `out`; what a broken-off export left there goes.
+impl StagedDir {
+    /// InitialCondition a folder beside `out`; what a broken-off export left there goes.
     ///
     /// # Errors
     /// Something is at `out`, or in the way beside it, or is just being written; or the system refuses.
@@ -86,7 +86,7 @@ impl Place {
 pub(super) fn free(out: &Path) -> Result<(), DatasetError> {
     let taken = |what: &str| {
         let told = format!("{what}; nothing was written; give a new folder");
-        Err(DatasetError::Taken { out: out.display().to_string(), what: told })
+        Err(DatasetError::OutputNotEmpty { out: out.display().to_string(), what: told })
     };
     match fs::read_dir(out) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(()),
@@ -103,7 +103,7 @@ pub(super) fn free(out: &Path) -> Result<(), DatasetError> {
 /// Removes what a broken-off export left.
 fn clear(aside: &Path) -> Result<(), DatasetError> {
     let in_the_way = |what: &str| {
-        Err(DatasetError::Taken {
+        Err(DatasetError::OutputNotEmpty {
             out: aside.display().to_string(),
             what: format!("{what}; nothing was written; give another --out"),
         })
@@ -132,9 +132,9 @@ mod tests {
     fn a_folder_has_its_name_when_it_is_whole() {
         let home = tempfile::tempdir().unwrap();
         let out = home.path().join("new/out");
-        Place::claim(&out).unwrap().give_up();
+        StagedDir::claim(&out).unwrap().give_up();
         assert_eq!(names(home.path()), [""; 0]);
-        let place = Place::claim(&out).unwrap();
+        let place = StagedDir::claim(&out).unwrap();
         fs::write(place.dir().join("x"), "x").unwrap();
         assert!(!out.exists());
         place.settle().unwrap();
@@ -149,16 +149,16 @@ mod tests {
         fs::create_dir(&aside).unwrap();
         fs::write(aside.join(MARK), "").unwrap();
         fs::write(aside.join("torn"), "torn").unwrap();
-        let place = Place::claim(&out).unwrap();
+        let place = StagedDir::claim(&out).unwrap();
         assert_eq!(names(&aside), [MARK]);
-        let second = Place::claim(&out).err().unwrap().to_string();
+        let second = StagedDir::claim(&out).err().unwrap().to_string();
         assert!(second.contains("another export is writing it"), "{second}");
         place.give_up();
         drop(place);
         assert_eq!(names(home.path()), [""; 0]);
         fs::create_dir(&aside).unwrap();
         fs::write(aside.join("mine"), "mine").unwrap();
-        let refused = Place::claim(&out).err().unwrap().to_string();
+        let refused = StagedDir::claim(&out).err().unwrap().to_string();
         assert!(refused.contains("out.part: it is in the way"), "{refused}");
         assert_eq!(names(&aside), ["mine"]);
     }
@@ -168,11 +168,11 @@ mod tests {
         let home = tempfile::tempdir().unwrap();
         let out = home.path().join("out");
         fs::create_dir(&out).unwrap();
-        Place::claim(&out).unwrap().settle().unwrap();
+        StagedDir::claim(&out).unwrap().settle().unwrap();
         fs::write(out.join("mine"), "mine").unwrap();
-        let refused = Place::claim(&out).err().unwrap().to_string();
+        let refused = StagedDir::claim(&out).err().unwrap().to_string();
         assert!(refused.contains("it holds mine; nothing was written"), "{refused}");
-        let file = Place::claim(&out.join("mine")).err().unwrap().to_string();
+        let file = StagedDir::claim(&out.join("mine")).err().unwrap().to_string();
         assert!(file.contains("it is no folder"), "{file}");
     }
 }

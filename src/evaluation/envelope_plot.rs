@@ -1,6 +1,6 @@
 //! An asset's safe interaction envelope as a plain-text plot: D over closure, with the lower bound and τ.
 
-use crate::evaluation::{
+use super::{
     calibration::{Envelope, HoldRow},
     safety::Limit,
 };
@@ -146,11 +146,11 @@ fn labelled(label: &str, text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use crate::evaluation::calibration::{
+    use super::super::calibration::{
         limit,
         tests::{hold, squeeze},
     };
+    use super::*;
 
     fn envelope(lower: f64) -> Envelope {
         let holds =

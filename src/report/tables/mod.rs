@@ -1,6 +1,8 @@
 //! Tables of runs as data; [`super::table_text`] writes them.
 
-use super::judged::Judged;
+use std::fmt::Write;
+
+use super::run_summary::RunSummary;
 use crate::evaluation::{
     safety::KAPPAS,
     statistics::{Distribution, Rate},
@@ -31,19 +33,19 @@ pub fn rate(rate: &Rate) -> String {
 }
 
 /// The same where something deforms.
-fn soft_rate(judged: &Judged, of: &Rate) -> String {
+fn soft_rate(judged: &RunSummary, of: &Rate) -> String {
     if judged.soft() { rate(of) } else { "N/A".to_owned() }
 }
 
 /// How many episodes a run has, and of how many if it is not finished.
-fn episodes(judged: &Judged) -> String {
+fn episodes(judged: &RunSummary) -> String {
     let count = judged.run.records.len();
     if judged.run.is_partial() { format!("{count} of {}", judged.run.wanted()) } else { count.to_string() }
 }
 
 /// The paper's main table: Goal and Safety by suite and method.
-pub fn main_table(runs: &[Judged]) -> Table {
-    let row = |judged: &Judged| {
+pub fn main_table(runs: &[RunSummary]) -> Table {
+    let row = |judged: &RunSummary| {
         let s = &judged.summary.scores;
         let gap = s.goal_safe_gap.map_or_else(|| "–".to_owned(), |gap| format!("{gap:.1}"));
         vec![
@@ -66,12 +68,12 @@ pub fn main_table(runs: &[Judged]) -> Table {
 }
 
 /// The paper's deformation table; `None` if nothing deforms.
-pub fn deformation_table(runs: &[Judged]) -> Option<Table> {
+pub fn deformation_table(runs: &[RunSummary]) -> Option<Table> {
     let numbers = |d: &Distribution| {
         let one = |x: Option<f64>| x.map_or_else(|| "–".to_owned(), |x| format!("{x:.2}"));
         [one(d.mean), one(d.p5), one(d.median), one(d.p95), d.n.to_string()]
     };
-    let row = |judged: &Judged| {
+    let row = |judged: &RunSummary| {
         let head = [judged.summary.suite.clone(), judged.method.clone()];
         head.into_iter().chain(numbers(&judged.summary.scores.deformation)).collect()
     };
@@ -84,8 +86,8 @@ pub fn deformation_table(runs: &[Judged]) -> Option<Table> {
 }
 
 /// Safety at the κ of the sensitivity table; `None` if nothing deforms.
-pub fn kappa_table(runs: &[Judged]) -> Option<Table> {
-    let row = |judged: &Judged| {
+pub fn kappa_table(runs: &[RunSummary]) -> Option<Table> {
+    let row = |judged: &RunSummary| {
         let known = &judged.summary.kappa;
         let at = KAPPAS.map(|kappa| known.iter().find(|row| row.kappa == kappa));
         let cells = at.map(|row| row.map_or_else(|| "–".to_owned(), |row| rate(&row.safety_success_rate)));
@@ -101,17 +103,17 @@ pub fn kappa_table(runs: &[Judged]) -> Option<Table> {
 }
 
 fn soft_table(
-    runs: &[Judged],
+    runs: &[RunSummary],
     caption: &str,
     head: Vec<String>,
-    row: impl Fn(&Judged) -> Vec<String>,
+    row: impl Fn(&RunSummary) -> Vec<String>,
 ) -> Option<Table> {
     let rows: Vec<Vec<String>> = runs.iter().filter(|judged| judged.soft()).map(row).collect();
     (!rows.is_empty()).then(|| Table { caption: caption.to_owned(), head, texts: 2, rows })
 }
 
 /// The tasks of a run.
-pub fn task_table(judged: &Judged) -> Table {
+pub fn task_table(judged: &RunSummary) -> Table {
     let row = |task: &TaskScores| {
         let s = &task.scores;
         let tau = judged.summary.by_asset.get(&task.asset).and_then(|asset| asset.tau);
@@ -137,7 +139,7 @@ pub fn task_table(judged: &Judged) -> Table {
 }
 
 /// All tables of some runs, in the order in which one reads them.
-pub fn all_tables(runs: &[Judged]) -> Vec<Table> {
+pub fn all_tables(runs: &[RunSummary]) -> Vec<Table> {
     let mut all = vec![main_table(runs)];
     all.extend(deformation_table(runs));
     all.extend(kappa_table(runs));
@@ -145,45 +147,107 @@ pub fn all_tables(runs: &[Judged]) -> Vec<Table> {
     all
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{
-        evaluation::record::tests::sample,
-        report::judged::{judge, tests::stored},
-    };
+/// Letters of the longest cell that stays on one line in LaTeX.
+const ONE_LINE: usize = 44;
 
-    #[test]
-    fn rigid_suites_have_no_safety_and_privileged_ones_say_so_in_every_table() {
-        let mut rigid = sample();
-        rigid.identity.suite = "rigid".into();
-        rigid.identity.soft = false;
-        (rigid.verdict.d_peak, rigid.verdict.tau, rigid.verdict.deformation_ok) = (None, None, None);
-        let runs = judge(vec![stored("a", "expert", vec![sample()]), stored("b", "expert", vec![rigid])]);
-        let all = all_tables(&runs);
-        assert_eq!(all.len(), 5);
-        for table in &all {
-            let marked = |text: &String| text.contains("expert (privileged)");
-            assert!(
-                marked(&table.caption) || table.rows.iter().all(|row| row.iter().any(marked)),
-                "{table:?}"
-            );
-            assert!(table.rows.iter().all(|row| row.len() == table.head.len()));
-        }
-        let [rigid, soft] = &all[0].rows[..] else { panic!("two rows") };
-        assert_eq!((&rigid[5][..], &rigid[6][..]), ("N/A", "N/A"));
-        assert_eq!((&soft[5][..], &soft[6][..]), ("100.0 [20.7, 100.0]", "0.0"));
-        assert_eq!(
-            all[1].rows,
-            [strings(["suite", "expert (privileged)", "0.33", "0.33", "0.33", "0.33", "1"])]
-        );
+impl Table {
+    /// As a table of markdown.
+    pub fn markdown(&self) -> String {
+        let row = |cells: &[String]| {
+            format!("| {} |\n", cells.iter().map(|cell| markdown(cell)).collect::<Vec<_>>().join(" | "))
+        };
+        let rule: Vec<&str> =
+            (0..self.head.len()).map(|i| if i < self.texts { "---" } else { "---:" }).collect();
+        let body: String = self.rows.iter().map(|cells| row(cells)).collect();
+        format!("{}\n\n{}| {} |\n{body}\n", markdown(&self.caption), row(&self.head), rule.join(" | "))
     }
 
-    #[test]
-    fn a_run_in_progress_shows_how_far_it_is() {
-        let mut run = stored("a", "noop", vec![sample()]);
-        run.info["episodes"] = serde_json::json!(20);
-        let table = main_table(&judge(vec![run]));
-        assert_eq!(table.rows[0][2], "1 of 20");
+    /// As a table of LaTeX with booktabs.
+    pub fn latex(&self) -> String {
+        let row = |cells: &[String]| {
+            format!("    {} \\\\\n", cells.iter().map(|cell| latex(cell)).collect::<Vec<_>>().join(" & "))
+        };
+        let columns: String = (0..self.head.len()).map(|column| self.latex_column(column)).collect();
+        let mut out = String::new();
+        // Writing to a String cannot fail.
+        let _ = writeln!(
+            out,
+            "\\begin{{table*}}\n  \\centering\n  \\footnotesize\n  \\caption{{{}}}",
+            latex(&self.caption)
+        );
+        let _ = writeln!(out, "  \\begin{{tabular}}{{{columns}}}\n    \\toprule");
+        out += &row(&self.head);
+        out += "    \\midrule\n";
+        out.extend(self.rows.iter().map(|cells| row(cells)));
+        out += "    \\bottomrule\n  \\end{tabular}\n\\end{table*}\n";
+        out
+    }
+
+    /// Long texts are broken into lines.
+    fn latex_column(&self, column: usize) -> &'static str {
+        let long = self.rows.iter().any(|row| row[column].chars().count() > ONE_LINE);
+        match (column < self.texts, long) {
+            (true, true) => "p{0.28\\textwidth}",
+            (true, false) => "l",
+            _ => "r",
+        }
     }
 }
+
+/// Text for markdown.
+fn markdown(text: &str) -> String {
+    let letters: Vec<char> = text.chars().collect();
+    let mut out = String::with_capacity(text.len());
+    for (i, &c) in letters.iter().enumerate() {
+        // Inside of a word an underscore is no emphasis.
+        let beside =
+            |at: Option<usize>| at.and_then(|at| letters.get(at)).is_some_and(|c| c.is_alphanumeric());
+        match c {
+            '_' if beside(i.checked_sub(1)) && beside(Some(i + 1)) => out.push(c),
+            '\\' | '|' | '`' | '*' | '_' | '~' | '$' | '#' => out.extend(['\\', c]),
+            '<' => out += "&lt;",
+            '>' => out += "&gt;",
+            '&' => out += "&amp;",
+            c if c.is_control() => out.push(' '),
+            c => out.push(c),
+        }
+    }
+    // Brackets are those of intervals; only with an address behind them would they be a link.
+    out.replace("](", "]\\(")
+}
+
+/// Text for LaTeX.
+fn latex(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    // Behind the end of a row a bracket would be a length.
+    if text.starts_with(['[', '*']) {
+        out += "{}";
+    }
+    for c in text.chars() {
+        match c {
+            '&' | '%' | '$' | '#' | '_' | '{' | '}' => out.extend(['\\', c]),
+            '\\' => out += "\\textbackslash{}",
+            '~' => out += "\\textasciitilde{}",
+            '^' => out += "\\textasciicircum{}",
+            '<' => out += "\\textless{}",
+            '>' => out += "\\textgreater{}",
+            '|' => out += "\\textbar{}",
+            'τ' => out += "$\\tau$",
+            'κ' => out += "$\\kappa$",
+            'π' => out += "$\\pi$",
+            '≤' => out += "$\\leq$",
+            '≥' => out += "$\\geq$",
+            '→' => out += "$\\rightarrow$",
+            '×' => out += "$\\times$",
+            '·' => out += "$\\cdot$",
+            '–' => out += "--",
+            '…' => out += "\\ldots{}",
+            c if c.is_control() => out.push(' '),
+            other => out.push(other),
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests;

@@ -6,8 +6,8 @@ use super::*;
 use crate::{
     evaluation::record::{EpisodeRecord, tests::sample},
     report::{
-        judged::{judge, tests::stored},
-        runs::StoredRun,
+        run_summary::{summarize_runs, tests::stored},
+        stored_run::StoredRun,
     },
 };
 
@@ -29,7 +29,7 @@ fn episodes(suite: &str, count: u32) -> Vec<EpisodeRecord> {
 }
 
 fn made(runs: Vec<StoredRun>) -> String {
-    page(&judge(runs), Path::new("."))
+    page(&summarize_runs(runs), Path::new("."))
 }
 
 /// Elements that are opened must be closed in order; of attributes, none may come from a name.
@@ -110,7 +110,7 @@ fn stills_are_in_the_page_and_lead_to_their_videos() {
     let run = stored(&dir.display().to_string(), "noop", episodes("soft", 4));
     let out = root.path().join("page");
     fs::create_dir_all(&out).unwrap();
-    let page = page(&judge(vec![run]), &out);
+    let page = page(&summarize_runs(vec![run]), &out);
     well_formed(&page);
     let link = "<a href=\"../run/video/task_000/episode_00001.mp4\">";
     assert!(page.contains(&format!("{link}<img src=\"data:image/png;base64,")), "{page}");

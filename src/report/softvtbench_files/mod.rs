@@ -321,5 +321,4 @@ fn quoted(field: &str) -> String {
 }
 
 #[cfg(test)]
-#[path = "interchange_tests.rs"]
 mod tests;

@@ -8,18 +8,18 @@ use std::{
 use crate::dataset::{
     DatasetError, TaskFile,
     card::Card,
-    layout::{DATASET, MANIFEST, PICTURES},
-    manifest::{self, Entry},
+    layout::{DATASET, IMAGE_STREAMS, MANIFEST},
+    manifest::{self, ManifestEntry},
 };
 
 /// A demonstration that becomes an episode.
 #[derive(Clone, Debug)]
-pub(super) struct Source {
+pub(super) struct SelectedDemo {
     /// Its HDF5 file.
     pub path: PathBuf,
     /// Its line of the manifest.
-    pub entry: Entry,
-    /// Index of its instruction among [`Chosen::prompts`].
+    pub entry: ManifestEntry,
+    /// Index of its instruction among [`Selection::prompts`].
     pub task: usize,
     /// Steps of the episodes before it.
     pub first: usize,
@@ -27,9 +27,9 @@ pub(super) struct Source {
 
 /// What is exported.
 #[derive(Clone, Debug)]
-pub(super) struct Chosen {
+pub(super) struct Selection {
     /// The demonstrations, in the order of the manifest.
-    pub sources: Vec<Source>,
+    pub sources: Vec<SelectedDemo>,
     /// Their instructions, each once, in the order in which they come.
     pub prompts: Vec<String>,
     /// Height and width of the pictures of both cameras in the first of them.
@@ -41,7 +41,7 @@ pub(super) struct Chosen {
 ///
 /// # Errors
 /// It is none, has no pictures, or a word fits no task.
-pub(super) fn choose(root: &Path, words: &[String]) -> Result<Chosen, DatasetError> {
+pub(super) fn choose(root: &Path, words: &[String]) -> Result<Selection, DatasetError> {
     let card_path = root.join(DATASET);
     if !card_path.is_file() {
         let what = "it is not there; expected the folder of a finished softvt record";
@@ -67,18 +67,22 @@ pub(super) fn choose(root: &Path, words: &[String]) -> Result<Chosen, DatasetErr
             prompts.push(entry.language.clone());
         }
         let steps = entry.num_samples;
-        sources.push(Source { path: root.join(&entry.hdf5_path), entry, task, first });
+        sources.push(SelectedDemo { path: root.join(&entry.hdf5_path), entry, task, first });
         first += steps;
     }
     let Some(one) = sources.first() else {
         return Err(DatasetError::content(&root.join(MANIFEST), "lines", "there are none"));
     };
     let sizes = sizes(one)?;
-    Ok(Chosen { sources, prompts, sizes })
+    Ok(Selection { sources, prompts, sizes })
 }
 
-fn fitting(root: &Path, entries: Vec<Entry>, words: &[String]) -> Result<Vec<Entry>, DatasetError> {
-    let fits = |entry: &Entry, word: &str| match word.parse::<usize>() {
+fn fitting(
+    root: &Path,
+    entries: Vec<ManifestEntry>,
+    words: &[String],
+) -> Result<Vec<ManifestEntry>, DatasetError> {
+    let fits = |entry: &ManifestEntry, word: &str| match word.parse::<usize>() {
         Ok(index) => entry.task_id == index,
         Err(_) => entry.language.contains(word),
     };
@@ -95,15 +99,15 @@ fn fitting(root: &Path, entries: Vec<Entry>, words: &[String]) -> Result<Vec<Ent
             return Err(DatasetError::content(root, MANIFEST, what));
         }
     }
-    let wanted = |entry: &Entry| words.is_empty() || words.iter().any(|word| fits(entry, word));
+    let wanted = |entry: &ManifestEntry| words.is_empty() || words.iter().any(|word| fits(entry, word));
     Ok(entries.into_iter().filter(wanted).collect())
 }
 
 /// Height and width of the pictures of both cameras.
-fn sizes(source: &Source) -> Result<[[usize; 2]; 2], DatasetError> {
+fn sizes(source: &SelectedDemo) -> Result<[[usize; 2]; 2], DatasetError> {
     let file = TaskFile::open(&source.path)?;
     let mut sizes = [[0; 2]; 2];
-    for (size, name) in sizes.iter_mut().zip(PICTURES) {
+    for (size, name) in sizes.iter_mut().zip(IMAGE_STREAMS) {
         *size = file.pictures(source.entry.demo_id, &format!("obs/{name}"), 0..1)?.1;
     }
     Ok(sizes)

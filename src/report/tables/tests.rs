@@ -1,5 +1,37 @@
 use super::*;
-use crate::report::tables::strings;
+use crate::{
+    evaluation::record::tests::sample,
+    report::run_summary::{summarize_runs, tests::stored},
+};
+
+#[test]
+fn rigid_suites_have_no_safety_and_privileged_ones_say_so_in_every_table() {
+    let mut rigid = sample();
+    rigid.identity.suite = "rigid".into();
+    rigid.identity.soft = false;
+    (rigid.verdict.d_peak, rigid.verdict.tau, rigid.verdict.deformation_ok) = (None, None, None);
+    let runs =
+        summarize_runs(vec![stored("a", "expert", vec![sample()]), stored("b", "expert", vec![rigid])]);
+    let all = all_tables(&runs);
+    assert_eq!(all.len(), 5);
+    for table in &all {
+        let marked = |text: &String| text.contains("expert (privileged)");
+        assert!(marked(&table.caption) || table.rows.iter().all(|row| row.iter().any(marked)), "{table:?}");
+        assert!(table.rows.iter().all(|row| row.len() == table.head.len()));
+    }
+    let [rigid, soft] = &all[0].rows[..] else { panic!("two rows") };
+    assert_eq!((&rigid[5][..], &rigid[6][..]), ("N/A", "N/A"));
+    assert_eq!((&soft[5][..], &soft[6][..]), ("100.0 [20.7, 100.0]", "0.0"));
+    assert_eq!(all[1].rows, [strings(["suite", "expert (privileged)", "0.33", "0.33", "0.33", "0.33", "1"])]);
+}
+
+#[test]
+fn a_run_in_progress_shows_how_far_it_is() {
+    let mut run = stored("a", "noop", vec![sample()]);
+    run.info["episodes"] = serde_json::json!(20);
+    let table = main_table(&summarize_runs(vec![run]));
+    assert_eq!(table.rows[0][2], "1 of 20");
+}
 
 /// Names that would break out of a table or a page.
 const HOSTILE: [&str; 9] = [

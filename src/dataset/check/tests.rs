@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::*;
 use crate::{
-    dataset::{Demonstration, Stream, actions, assemble, write::Writer},
+    dataset::{DataStream, Demonstration, actions, hdf5::Hdf5Writer, merge_parts},
     evaluation::record::tests::sample,
     policy::Action,
 };
@@ -28,17 +28,17 @@ fn demonstration(salt: f64) -> Demonstration {
         vec![p.x, p.y, p.z, q.w, q.i, q.j, q.k]
     };
     let zeros = |name: &str, row: &[usize]| {
-        Stream::f64(name, row, vec![0.1 + salt; STEPS * row.iter().product::<usize>()]).of("m", "")
+        DataStream::f64(name, row, vec![0.1 + salt; STEPS * row.iter().product::<usize>()]).unit("m", "")
     };
     let mut made = Demonstration {
         record: sample(),
         actions: (0..STEPS)
             .map(|step| Action { position_b: place(step), axis_angle_b: turn(step), closure: 0.3 })
             .collect(),
-        shut: (0..STEPS).map(|step| step > 4).collect(),
+        gripper_closed: (0..STEPS).map(|step| step > 4).collect(),
         observed: vec![
-            Stream::f64("obs/eef_pose", &[7], each(&pose)),
-            Stream::f64("obs/state", &[7], each(&state)),
+            DataStream::f64("obs/eef_pose", &[7], each(&pose)),
+            DataStream::f64("obs/state", &[7], each(&state)),
             zeros("obs/arm_joint_pos", &[7]),
             zeros("obs/gripper_pos", &[2]),
             zeros("obs/gripper_width", &[1]),
@@ -46,10 +46,10 @@ fn demonstration(salt: f64) -> Demonstration {
             zeros("obs/gripper_closure", &[1]),
         ],
         privileged: vec![
-            Stream::f32("privileged/states/deformable_object/bun/nodal_pos_w", &[70_000, 3], {
+            DataStream::f32("privileged/states/deformable_object/bun/nodal_pos_w", &[70_000, 3], {
                 (0..STEPS * 210_000).map(|i| (i as f32 * 1e-4).sin()).collect()
             }),
-            Stream::u8("privileged/contact", &[2], vec![1; 2 * STEPS]).note("meaning", "touching"),
+            DataStream::u8("privileged/contact", &[2], vec![1; 2 * STEPS]).attribute("meaning", "touching"),
         ],
     };
     made.set_markers(&[[[[[1.5; 2]; MARKERS]; 2]; 2]; STEPS]);
@@ -59,7 +59,7 @@ fn demonstration(salt: f64) -> Demonstration {
 fn write(demonstration: &Demonstration, name: &str) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
-    let mut writer = Writer::create(&path, &json!({ "env_name": "softvt" }), STEPS, 1).unwrap();
+    let mut writer = Hdf5Writer::create(&path, &json!({ "env_name": "softvt" }), STEPS, 1).unwrap();
     writer.describe(0, &demonstration.record, STEPS).unwrap();
     writer.numbers(0, demonstration).unwrap();
     writer.close(Ok(())).unwrap();
@@ -67,7 +67,7 @@ fn write(demonstration: &Demonstration, name: &str) -> (tempfile::TempDir, PathB
 }
 
 /// What is said of a file in which `change` has spoilt a stream.
-fn said(change: impl Fn(&mut Vec<Stream>)) -> String {
+fn said(change: impl Fn(&mut Vec<DataStream>)) -> String {
     let mut made = demonstration(0.0);
     change(&mut made.observed);
     let (_folder, path) = write(&made, "task.hdf5");
@@ -76,8 +76,8 @@ fn said(change: impl Fn(&mut Vec<Stream>)) -> String {
     wrong.join("\n")
 }
 
-fn numbers(stream: &mut Stream) -> &mut Vec<f64> {
-    let Numbers::F64(numbers) = &mut stream.numbers else { panic!("{} is of doubles", stream.name) };
+fn numbers(stream: &mut DataStream) -> &mut Vec<f64> {
+    let StreamValues::F64(numbers) = &mut stream.values else { panic!("{} is of doubles", stream.name) };
     numbers
 }
 
@@ -88,14 +88,14 @@ fn demonstrations_come_back_to_the_bit_from_the_file_of_a_task() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("hdf5/task.hdf5");
     let environment = json!({ "env_name": "softvt", "env_kwargs": { "seed": 7 } });
-    assemble(&parts.each_ref().map(|(_, path)| path.clone()), &path, &environment).unwrap();
+    merge_parts(&parts.each_ref().map(|(_, path)| path.clone()), &path, &environment).unwrap();
     let read = TaskFile::open(&path).unwrap();
     assert_eq!((read.demos(), read.environment().unwrap()), (&[0, 1][..], environment));
     for (demo, made) in both.iter().enumerate() {
         let mut back = read.read(demo).unwrap();
-        let order = |streams: &mut Vec<Stream>| {
+        let order = |streams: &mut Vec<DataStream>| {
             streams.sort_by(|a, b| a.name.cmp(&b.name));
-            streams.iter_mut().for_each(|stream| stream.notes.sort());
+            streams.iter_mut().for_each(|stream| stream.attributes.sort());
         };
         let mut made = made.clone();
         for streams in [&mut back.observed, &mut back.privileged, &mut made.observed, &mut made.privileged] {
@@ -117,7 +117,7 @@ fn what_is_wrong_with_a_stream_is_told_with_its_file_and_key() {
     assert!(missing.contains("/data/demo_0/obs/arm_joint_pos: it is not there"), "{missing}");
     let bare = said(|streams| numbers(&mut streams[3])[5] = f64::NAN);
     assert!(bare.contains("obs/gripper_pos: step 2: a number that is not finite"), "{bare}");
-    let shape = said(|streams| streams[2] = Stream::f64("obs/arm_joint_pos", &[6], vec![0.0; 6 * STEPS]));
+    let shape = said(|streams| streams[2] = DataStream::f64("obs/arm_joint_pos", &[6], vec![0.0; 6 * STEPS]));
     assert!(shape.contains("obs/arm_joint_pos: expected the shape (steps, 7), got [9, 6]"), "{shape}");
 }
 

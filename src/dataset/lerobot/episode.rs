@@ -8,12 +8,12 @@ use image::{
 };
 
 use super::{
-    Gripper,
+    GripperCoding,
     features::{MARKER_SHAPE, PICTURES as KEYS, STATE},
-    summary::{FeatureSummary, Moments, Summary, Tally},
+    statistics::{FeatureStatistics, RunningMoments, ValueCounts, ValueStatistics},
 };
 use crate::{
-    dataset::{DatasetError, TaskFile, layout::PICTURES},
+    dataset::{DatasetError, TaskFile, layout::IMAGE_STREAMS},
     sensing::tactile::{HISTORY, MARKERS, MosaicLayout, PICTURE, mosaic, mosaic_cell},
 };
 
@@ -28,7 +28,7 @@ const MARKER_RANGE: f64 = 400.0;
 
 /// The rows of an episode.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Rows {
+pub(super) struct EpisodeRows {
     /// How many.
     pub steps: usize,
     /// PNG files, by picture and step.
@@ -40,7 +40,7 @@ pub(super) struct Rows {
     /// steps × (3, 198, 2).
     pub markers: Vec<f32>,
     /// How often each value occurs in each channel of each picture.
-    tallies: [[Tally; 3]; 3],
+    tallies: [[ValueCounts; 3]; 3],
 }
 
 /// Reads a demonstration of `steps` steps whose cameras' pictures have the `sizes` (height, width).
@@ -51,20 +51,20 @@ pub(super) fn read(
     file: &TaskFile,
     (demo, steps): (usize, usize),
     sizes: [[usize; 2]; 2],
-    gripper: Gripper,
+    gripper: GripperCoding,
     stop: &(impl Fn() -> bool + ?Sized),
-) -> Result<Rows, DatasetError> {
+) -> Result<EpisodeRows, DatasetError> {
     let actions = match gripper {
-        Gripper::Continuous => "actions",
-        Gripper::Binary => "actions_binary",
+        GripperCoding::Continuous => "actions",
+        GripperCoding::Binary => "actions_binary",
     };
-    let mut rows = Rows {
+    let mut rows = EpisodeRows {
         steps,
         pictures: Default::default(),
         state: numbers(file, (demo, steps), "obs/state", &[STATE])?,
         actions: numbers(file, (demo, steps), actions, &[STATE])?,
         markers: markers(&numbers(file, (demo, steps), "obs/gripper_marker_motion", &[2, 2, MARKERS, 2])?),
-        tallies: std::array::from_fn(|_| std::array::from_fn(|_| Tally::new(1.0 / 255.0, 256))),
+        tallies: std::array::from_fn(|_| std::array::from_fn(|_| ValueCounts::new(1.0 / 255.0, 256))),
     };
     let mut felt: [Vec<RgbImage>; 2] = Default::default();
     for from in (0..steps).step_by(BLOCK) {
@@ -135,7 +135,7 @@ fn seen(
     block: Range<usize>,
 ) -> Result<[Vec<RgbImage>; 4], DatasetError> {
     let mut all: [Vec<RgbImage>; 4] = Default::default();
-    for (at, (pictures, name)) in all.iter_mut().zip(PICTURES).enumerate() {
+    for (at, (pictures, name)) in all.iter_mut().zip(IMAGE_STREAMS).enumerate() {
         let name = format!("obs/{name}");
         let finger = [PICTURE[1], PICTURE[0]];
         let [height, width] = [third, wrist, finger, finger][at];
@@ -152,7 +152,7 @@ fn seen(
     Ok(all)
 }
 
-/// Rows of (3, 198, 2) out of those of the file: finger, initial and present, marker, (x, y).
+/// EpisodeRows of (3, 198, 2) out of those of the file: finger, initial and present, marker, (x, y).
 fn markers(stored: &[f32]) -> Vec<f32> {
     let steps: Vec<&[f32]> = stored.chunks_exact(4 * PLACES).collect();
     let mut rows = Vec::with_capacity(steps.len() * MARKER_ROW);
@@ -179,7 +179,7 @@ fn png(picture: &RgbImage) -> Result<Vec<u8>, String> {
     Ok(file)
 }
 
-impl Rows {
+impl EpisodeRows {
     fn push(&mut self, key: usize, picture: &RgbImage) -> Result<(), String> {
         for pixel in picture.pixels() {
             for (tally, value) in self.tallies[key].iter_mut().zip(pixel.0) {
@@ -191,42 +191,42 @@ impl Rows {
     }
 
     /// Pictures and vectors as a whole: of pictures each channel, of vectors each number.
-    pub(super) fn summaries(&self) -> Vec<FeatureSummary> {
+    pub(super) fn summaries(&self) -> Vec<FeatureStatistics> {
         let pictures = KEYS.iter().zip(&self.tallies).map(|(name, channels)| {
-            self.feature(name, &[3, 1, 1], channels.iter().cloned().map(Summary::counted).collect())
+            self.feature(name, &[3, 1, 1], channels.iter().cloned().map(ValueStatistics::counted).collect())
         });
         let vectors = [("state", &self.state), ("actions", &self.actions)];
         let vectors = vectors.map(|(name, numbers)| {
             let column = |i: usize| numbers.iter().skip(i).step_by(STATE).map(|x| f64::from(*x)).collect();
-            self.feature(name, &[STATE], (0..STATE).map(|i| Summary::of(column(i))).collect())
+            self.feature(name, &[STATE], (0..STATE).map(|i| ValueStatistics::of(column(i))).collect())
         });
         pictures.chain(vectors).collect()
     }
 
-    fn feature(&self, name: &'static str, shape: &[usize], parts: Vec<Summary>) -> FeatureSummary {
-        FeatureSummary { name, shape: shape.to_vec(), steps: self.steps as u64, parts }
+    fn feature(&self, name: &'static str, shape: &[usize], parts: Vec<ValueStatistics>) -> FeatureStatistics {
+        FeatureStatistics { name, shape: shape.to_vec(), steps: self.steps as u64, parts }
     }
 
     /// Each number of the markers as a whole, without quantiles.
-    pub(super) fn every_marker(&self) -> FeatureSummary {
-        let parts = self.moments().into_iter().map(Summary::bare).collect();
+    pub(super) fn every_marker(&self) -> FeatureStatistics {
+        let parts = self.moments().into_iter().map(ValueStatistics::bare).collect();
         self.feature("tactile_marker_motion", &MARKER_SHAPE, parts)
     }
 
     /// x and y of all markers together.
-    pub(super) fn markers_together(&self) -> FeatureSummary {
+    pub(super) fn markers_together(&self) -> FeatureStatistics {
         let each = self.moments();
         let parts = (0..2).map(|axis| {
-            let mut tally = Tally::new(MARKER_STEP, (MARKER_RANGE / MARKER_STEP) as usize + 1);
+            let mut tally = ValueCounts::new(MARKER_STEP, (MARKER_RANGE / MARKER_STEP) as usize + 1);
             self.markers.iter().skip(axis).step_by(2).for_each(|x| tally.count_nearest(f64::from(*x)));
-            Summary::near(Moments::together(each.iter().skip(axis).step_by(2)), tally)
+            ValueStatistics::near(RunningMoments::together(each.iter().skip(axis).step_by(2)), tally)
         });
         self.feature("tactile_marker_motion", &[2], parts.collect())
     }
 
-    fn moments(&self) -> Vec<Moments> {
+    fn moments(&self) -> Vec<RunningMoments> {
         let column = |i: usize| self.markers.iter().skip(i).step_by(MARKER_ROW).map(|x| f64::from(*x));
-        (0..MARKER_ROW).map(|i| Moments::of(column(i))).collect()
+        (0..MARKER_ROW).map(|i| RunningMoments::of(column(i))).collect()
     }
 }
 

@@ -23,7 +23,7 @@ use crate::dataset::DatasetError;
 
 /// What a column is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum ColumnType {
     /// A PNG file and its name.
     Picture,
     /// Single precision.
@@ -38,44 +38,46 @@ pub(super) enum Kind {
 
 /// A column: a value a row, or nested lists of one shape.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Column {
+pub(super) struct ParquetColumn {
     /// Name.
     pub name: String,
     /// Of what.
-    pub kind: Kind,
+    pub kind: ColumnType,
     /// Lengths of the lists, the outermost first; empty for a value.
     pub shape: Vec<usize>,
 }
 
-/// Rows of a column.
+/// EpisodeRows of a column.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Values {
+pub(super) enum ColumnValues {
     /// PNG files and their names.
     Pictures(Vec<(Vec<u8>, String)>),
-    /// Of [`Kind::F32`].
+    /// Of [`ColumnType::F32`].
     F32(Vec<f32>),
-    /// Of [`Kind::F64`].
+    /// Of [`ColumnType::F64`].
     F64(Vec<f64>),
-    /// Of [`Kind::I64`].
+    /// Of [`ColumnType::I64`].
     I64(Vec<i64>),
-    /// Of [`Kind::Text`].
+    /// Of [`ColumnType::Text`].
     Text(Vec<String>),
 }
 
-impl Column {
+impl ParquetColumn {
     /// A column.
-    pub(super) fn new(name: impl Into<String>, kind: Kind, shape: &[usize]) -> Self {
+    pub(super) fn new(name: impl Into<String>, kind: ColumnType, shape: &[usize]) -> Self {
         Self { name: name.into(), kind, shape: shape.to_vec() }
     }
 
     /// The column in Parquet's language of schemas. Everything may be null, as Arrow's writers have it, and nothing is.
     fn declared(&self) -> String {
         let mut text = match self.kind {
-            Kind::Picture => "optional group {} { optional binary bytes; optional binary path (STRING); }",
-            Kind::F32 => "optional float {};",
-            Kind::F64 => "optional double {};",
-            Kind::I64 => "optional int64 {};",
-            Kind::Text => "optional binary {} (STRING);",
+            ColumnType::Picture => {
+                "optional group {} { optional binary bytes; optional binary path (STRING); }"
+            }
+            ColumnType::F32 => "optional float {};",
+            ColumnType::F64 => "optional double {};",
+            ColumnType::I64 => "optional int64 {};",
+            ColumnType::Text => "optional binary {} (STRING);",
         }
         .to_owned();
         for _ in &self.shape {
@@ -89,7 +91,7 @@ impl Column {
     fn levels(&self, rows: usize) -> (Vec<i16>, Option<Vec<i16>>) {
         let depth = self.shape.len();
         let row: usize = self.shape.iter().product();
-        let definition = if self.kind == Kind::Picture { 2 } else { 2 * depth as i16 + 1 };
+        let definition = if self.kind == ColumnType::Picture { 2 } else { 2 * depth as i16 + 1 };
         let definitions = vec![definition; rows * row];
         if depth == 0 {
             return (definitions, None);
@@ -106,9 +108,9 @@ impl Column {
 }
 
 /// A file that is being written, one group of rows after the other.
-pub(super) struct Table {
+pub(super) struct ParquetTable {
     writer: SerializedFileWriter<File>,
-    columns: Arc<[Column]>,
+    columns: Arc<[ParquetColumn]>,
     path: PathBuf,
 }
 
@@ -123,14 +125,14 @@ fn failed(path: &Path) -> impl Fn(ParquetError) -> DatasetError {
     }
 }
 
-impl Table {
-    /// Begins a file with what programs are to know of it: `notes`, by name.
+impl ParquetTable {
+    /// InitialCondition a file with what programs are to know of it: `notes`, by name.
     ///
     /// # Errors
     /// The system refuses.
     pub(super) fn create(
         path: PathBuf,
-        columns: &Arc<[Column]>,
+        columns: &Arc<[ParquetColumn]>,
         notes: &[(&str, String)],
     ) -> Result<Self, DatasetError> {
         let mut schema = "message schema {".to_owned();
@@ -147,7 +149,9 @@ impl Table {
             .set_dictionary_enabled(false)
             .set_offset_index_disabled(true)
             .set_statistics_enabled(EnabledStatistics::None);
-        for column in columns.iter().filter(|column| column.kind == Kind::I64 && column.shape.is_empty()) {
+        for column in
+            columns.iter().filter(|column| column.kind == ColumnType::I64 && column.shape.is_empty())
+        {
             // Readers skip episodes by them.
             let place = ColumnPath::new(vec![column.name.clone()]);
             properties = properties.set_column_statistics_enabled(place, EnabledStatistics::Chunk);
@@ -167,7 +171,7 @@ impl Table {
     ///
     /// # Errors
     /// The system refuses.
-    pub(super) fn append(&mut self, rows: usize, values: Vec<Values>) -> Result<(), DatasetError> {
+    pub(super) fn append(&mut self, rows: usize, values: Vec<ColumnValues>) -> Result<(), DatasetError> {
         debug_assert_eq!(values.len(), self.columns.len());
         let added = group(&mut self.writer, &self.columns, rows, values);
         added.map_err(failed(&self.path))
@@ -185,24 +189,24 @@ impl Table {
 
 fn group(
     writer: &mut SerializedFileWriter<File>,
-    columns: &[Column],
+    columns: &[ParquetColumn],
     rows: usize,
-    values: Vec<Values>,
+    values: Vec<ColumnValues>,
 ) -> Result<(), ParquetError> {
     let mut group = writer.next_row_group()?;
     for (column, values) in columns.iter().zip(values) {
         let levels = column.levels(rows);
         match values {
-            Values::Pictures(pictures) => {
+            ColumnValues::Pictures(pictures) => {
                 let (files, names): (Vec<ByteArray>, Vec<ByteArray>) =
                     pictures.into_iter().map(|(file, name)| (file.into(), name.into_bytes().into())).unzip();
                 leaf::<ByteArrayType>(&mut group, &files, &levels)?;
                 leaf::<ByteArrayType>(&mut group, &names, &levels)?;
             }
-            Values::F32(numbers) => leaf::<FloatType>(&mut group, &numbers, &levels)?,
-            Values::F64(numbers) => leaf::<DoubleType>(&mut group, &numbers, &levels)?,
-            Values::I64(numbers) => leaf::<Int64Type>(&mut group, &numbers, &levels)?,
-            Values::Text(texts) => {
+            ColumnValues::F32(numbers) => leaf::<FloatType>(&mut group, &numbers, &levels)?,
+            ColumnValues::F64(numbers) => leaf::<DoubleType>(&mut group, &numbers, &levels)?,
+            ColumnValues::I64(numbers) => leaf::<Int64Type>(&mut group, &numbers, &levels)?,
+            ColumnValues::Text(texts) => {
                 let texts: Vec<ByteArray> = texts.into_iter().map(|text| text.into_bytes().into()).collect();
                 leaf::<ByteArrayType>(&mut group, &texts, &levels)?;
             }
@@ -231,12 +235,12 @@ mod tests {
 
     #[test]
     fn levels_say_where_each_list_begins() {
-        let cube = Column::new("x", Kind::F32, &[2, 2, 3]);
+        let cube = ParquetColumn::new("x", ColumnType::F32, &[2, 2, 3]);
         let (definitions, repetitions) = cube.levels(2);
         assert_eq!(definitions, [7; 24]);
         let row = [0, 3, 3, 2, 3, 3, 1, 3, 3, 2, 3, 3];
         assert_eq!(repetitions, Some([row, row].concat()));
-        assert_eq!(Column::new("x", Kind::I64, &[]).levels(2), (vec![1, 1], None));
+        assert_eq!(ParquetColumn::new("x", ColumnType::I64, &[]).levels(2), (vec![1, 1], None));
     }
 
     #[test]
@@ -244,20 +248,21 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.parquet");
         let columns = [
-            Column::new("picture", Kind::Picture, &[]),
-            Column::new("a/b", Kind::F32, &[2, 1]),
-            Column::new("count", Kind::I64, &[]),
-            Column::new("figure", Kind::F64, &[1]),
-            Column::new("tasks", Kind::Text, &[1]),
+            ParquetColumn::new("picture", ColumnType::Picture, &[]),
+            ParquetColumn::new("a/b", ColumnType::F32, &[2, 1]),
+            ParquetColumn::new("count", ColumnType::I64, &[]),
+            ParquetColumn::new("figure", ColumnType::F64, &[1]),
+            ParquetColumn::new("tasks", ColumnType::Text, &[1]),
         ];
-        let mut table = Table::create(path.clone(), &columns.into(), &[("note", "what".to_owned())]).unwrap();
+        let mut table =
+            ParquetTable::create(path.clone(), &columns.into(), &[("note", "what".to_owned())]).unwrap();
         for row in 0..2_i64 {
             let values = vec![
-                Values::Pictures(vec![(vec![137, row as u8], "x.png".to_owned())]),
-                Values::F32(vec![0.5, row as f32]),
-                Values::I64(vec![row]),
-                Values::F64(vec![0.1]),
-                Values::Text(vec!["put ü".to_owned()]),
+                ColumnValues::Pictures(vec![(vec![137, row as u8], "x.png".to_owned())]),
+                ColumnValues::F32(vec![0.5, row as f32]),
+                ColumnValues::I64(vec![row]),
+                ColumnValues::F64(vec![0.1]),
+                ColumnValues::Text(vec!["put ü".to_owned()]),
             ];
             table.append(1, values).unwrap();
         }
@@ -282,9 +287,9 @@ mod tests {
         if !full.exists() {
             return;
         }
-        let columns = [Column::new("x", Kind::F64, &[1000])];
-        let mut table = Table::create(full.to_owned(), &columns.into(), &[]).unwrap();
-        let added = table.append(100, vec![Values::F64(vec![0.0; 100_000])]);
+        let columns = [ParquetColumn::new("x", ColumnType::F64, &[1000])];
+        let mut table = ParquetTable::create(full.to_owned(), &columns.into(), &[]).unwrap();
+        let added = table.append(100, vec![ColumnValues::F64(vec![0.0; 100_000])]);
         let error = added.and_then(|()| table.finish()).unwrap_err().to_string();
         assert!(error.contains("cannot write /dev/full: No space left"), "{error}");
     }
