@@ -30,14 +30,15 @@ use crate::{
         summary::Summary,
         thresholds::Thresholds,
     },
+    parallel,
     policy::TaskBrief,
     report::{
         run_folder::{EPISODES, RUN, RunFolder, SUMMARY},
         softvtbench_files,
     },
     rollout::{
-        AssetCache, BuildError, ControlError, Controller, Episode, EpisodeError, EpisodeRef, EpisodeSpec,
-        FinishedEpisode, SensorAssets, batch, cancel, target_asset,
+        AssetCache, BuildError, Cancellable, ControlError, Controller, Episode, EpisodeError, EpisodeRef,
+        EpisodeSpec, FinishedEpisode, SensorAssets, cancel, target_asset,
     },
     scene::{Asset, Body},
     script::{self, Loaded},
@@ -331,10 +332,10 @@ impl<'a> SuiteRun<'a> {
     ) -> Result<(), CliError> {
         let files = self.files();
         let mut progress = Progress::new(left.len(), &self.name);
-        let outcome = batch::run(
+        let outcome = parallel::run(
             left.len(),
             self.run.threads,
-            &cancel::FLAG,
+            cancel::requested,
             |index| {
                 let job = left[index];
                 let mut finished = self.episode(job, files.may_show(self.jobs[job].1), &self.drive)?;
@@ -383,7 +384,7 @@ impl<'a> SuiteRun<'a> {
         let (task, episode) = self.jobs[job];
         let (spec, opened) = self.spec(task, &self.request(task, episode), origin)?;
         let driver = drive(opened, self.brief(task, episode))?;
-        let mut driver = batch::Cancellable { driver, stop: &cancel::FLAG };
+        let mut driver = Cancellable(driver);
         let started = Episode::start(EpisodeSpec { record_states: film, ..spec }, &self.cache, &self.looks);
         Ok(started.and_then(|started| started.run(&mut driver)))
     }

@@ -7,7 +7,6 @@
 mod episode;
 mod features;
 mod meta;
-mod ordered_pool;
 mod parquet_table;
 mod selection;
 mod staged_dir;
@@ -139,9 +138,10 @@ fn write(
         LeRobotVersion::V21 => Box::new(v21::Writer::begin(dir, features)?),
         LeRobotVersion::V30 => Box::new(v30::Writer::begin(dir, features)?),
     };
-    ordered_pool::in_order(
+    crate::parallel::run_in_order(
         sources.len(),
         export.threads,
+        || false,
         |index| read(export, chosen, index, stop),
         |index, episode| {
             form.add(episode)?;

@@ -23,7 +23,8 @@ use crate::{
         stats,
     },
     report::stored_run::StoredRun,
-    rollout::{batch, cancel},
+    parallel,
+    rollout::cancel,
 };
 
 /// Whether a path is that of a data set: an HDF5 file, or the folder of a recording.
@@ -64,7 +65,7 @@ fn repeat_all(demos: &[(PathBuf, usize)]) -> Result<(), CliError> {
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
     let mut done: BTreeMap<usize, ReplayOutcome> = BTreeMap::new();
     let repeat = |index: usize| repeat(&demos[index].0, demos[index].1);
-    batch::run(demos.len(), threads, &cancel::FLAG, repeat, |index, repeated| {
+    parallel::run(demos.len(), threads, cancel::requested, repeat, |index, repeated| {
         done.insert(index, repeated);
         Ok(())
     })?;

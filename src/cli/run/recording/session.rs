@@ -29,12 +29,13 @@ use crate::{
         merge_parts,
     },
     evaluation::record::{EpisodeRecord, Origin},
+    parallel,
     policy::{ChunkedPolicy, recorded::RecordedPolicy},
     report::{
         actions,
         run_folder::{RunFolder, SUMMARY},
     },
-    rollout::{EpisodeError, FinishedEpisode, SettleError, batch, cancel},
+    rollout::{EpisodeError, FinishedEpisode, SettleError, cancel},
     scene::InitialState,
     script::Loaded,
 };
@@ -220,10 +221,10 @@ impl<'a> SuiteRecording<'a> {
         let mut progress = Progress::new(jobs.len(), &self.suite);
         let mut records = std::mem::take(&mut self.records);
         let session = &*self;
-        let outcome = batch::run(
+        let outcome = parallel::run(
             jobs.len(),
             self.output.run.threads,
-            &cancel::FLAG,
+            cancel::requested,
             |index| session.attempt(jobs[index]),
             |_, finished| {
                 let id = &finished.record.identity;
