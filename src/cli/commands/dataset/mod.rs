@@ -22,8 +22,8 @@ use crate::{
         manifest::{self, ManifestEntry},
         stats,
     },
-    report::stored_run::StoredRun,
     parallel,
+    report::stored_run::StoredRun,
     rollout::cancel,
 };
 
