@@ -2,7 +2,7 @@
 
 use super::{
     calibration::{Envelope, HoldRow},
-    safety::Limit,
+    safety::DeformationLimit,
 };
 
 /// Columns of the plot itself.
@@ -38,7 +38,7 @@ impl Axis {
 
 /// The plot of `asset`: stable squeezes `●`, unstable `○`, τ as a dashed line; below it the holds of the lower-bound scan
 /// (`+` all trials held, `~` some, `-` none) and the zones.
-pub fn plot(asset: &str, envelope: &Envelope, limit: Option<Limit>) -> String {
+pub fn plot(asset: &str, envelope: &Envelope, limit: Option<DeformationLimit>) -> String {
     let Some(axis) = Axis::of(envelope) else {
         return format!("{asset}: no rows, nothing to plot\n");
     };
@@ -51,7 +51,7 @@ pub fn plot(asset: &str, envelope: &Envelope, limit: Option<Limit>) -> String {
     lines.iter().map(|line| format!("{}\n", line.trim_end())).collect()
 }
 
-fn heading(asset: &str, limit: Option<Limit>) -> String {
+fn heading(asset: &str, limit: Option<DeformationLimit>) -> String {
     match limit {
         Some(limit) => format!(
             "{asset} · D_ref {:.3} % · τ {:.3} % (κ {})",
@@ -63,7 +63,7 @@ fn heading(asset: &str, limit: Option<Limit>) -> String {
     }
 }
 
-fn curve(envelope: &Envelope, limit: Option<Limit>, axis: &Axis) -> Vec<String> {
+fn curve(envelope: &Envelope, limit: Option<DeformationLimit>, axis: &Axis) -> Vec<String> {
     let peak = envelope.sweep.iter().map(|row| row.d_peak_pct).fold(0.0_f64, f64::max);
     // The unstable tail may be many times D_ref; what matters lies below twice D_ref.
     let top = limit.map_or(peak, |limit| peak.min(2.0 * limit.d_ref_pct)).max(1e-9);
@@ -147,7 +147,7 @@ fn labelled(label: &str, text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::super::calibration::{
-        limit,
+        deformation_limit,
         tests::{hold, squeeze},
     };
     use super::*;
@@ -162,7 +162,7 @@ mod tests {
 
     fn plotted(lower: f64) -> String {
         let envelope = envelope(lower);
-        plot("bun", &envelope, limit(&envelope.sweep, 0.5))
+        plot("bun", &envelope, deformation_limit(&envelope.sweep, 0.5))
     }
 
     #[test]

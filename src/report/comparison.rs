@@ -9,10 +9,9 @@ use super::{
     text_table::{WIDTH, shortened},
 };
 use crate::evaluation::{
-    difference::{MeanDifference, RateDifference},
-    paired::{Pair, Paired, by_task, key, pairs},
+    paired_stats::{EpisodeKey, EpisodePair, MeanDifference, PairedComparison, RateDifference, TaskKey, group_by_task, pair_episodes},
     record::EpisodeRecord,
-    summary::method,
+    summary::method_label,
 };
 
 /// Columns of a policy's name at the head.
@@ -29,7 +28,7 @@ pub struct TaskDifferences {
     pub prompt: String,
     /// Its differences: the second run minus the first.
     #[serde(flatten)]
-    pub differences: Paired,
+    pub differences: PairedComparison,
 }
 
 /// Two runs compared.
@@ -48,7 +47,7 @@ pub struct Comparison {
     /// Runs of which episodes are missing: a sentence each.
     pub partial: Vec<String>,
     /// All episodes that both have.
-    pub all: Paired,
+    pub all: PairedComparison,
     /// By task, in order.
     pub by_task: Vec<TaskDifferences>,
 }
@@ -99,29 +98,29 @@ pub fn compare(first: &[StoredRun], second: &[StoredRun]) -> Result<Comparison, 
         once(runs)?;
     }
     let count = |runs: &[StoredRun]| -> usize { runs.iter().map(|run| run.records.len()).sum() };
-    let pairs = pairs(records(first), records(second));
+    let pairs = pair_episodes(records(first), records(second));
     if pairs.is_empty() {
         return Err(nothing(first, second));
     }
-    let task = |((suite, task), pairs): ((&str, usize), Vec<Pair>)| TaskDifferences {
+    let task = |(TaskKey { suite, task }, pairs): (TaskKey, Vec<EpisodePair>)| TaskDifferences {
         suite: suite.to_owned(),
         task,
-        prompt: pairs[0].0.identity.prompt.clone(),
-        differences: Paired::of(&pairs),
+        prompt: pairs[0].first.identity.prompt.clone(),
+        differences: PairedComparison::of(&pairs),
     };
     let all = || first.iter().chain(second);
     Ok(Comparison {
         first: name(first),
         second: name(second),
-        deformable: pairs.iter().any(|(a, _)| a.identity.soft),
+        deformable: pairs.iter().any(|pair| pair.first.identity.soft),
         unmatched: count(first) + count(second) - 2 * pairs.len(),
         unlike: unlike(first, second),
         partial: all()
             .filter(|run| run.is_partial())
             .flat_map(|run| run.remarks().into_iter().take(1))
             .collect(),
-        all: Paired::of(&pairs),
-        by_task: by_task(&pairs).into_iter().map(task).collect(),
+        all: PairedComparison::of(&pairs),
+        by_task: group_by_task(&pairs).into_iter().map(task).collect(),
     })
 }
 
@@ -138,7 +137,7 @@ fn once(runs: &[StoredRun]) -> Result<(), CompareError> {
             return Err(CompareError::Empty { dir: dir() });
         }
         for record in &run.records {
-            if let Some(other) = known.insert(key(record), &run.dir) {
+            if let Some(other) = known.insert(EpisodeKey::of(record), &run.dir) {
                 let id = &record.identity;
                 return Err(CompareError::Twice {
                     first: other.display().to_string(),
@@ -185,8 +184,10 @@ fn nothing(first: &[StoredRun], second: &[StoredRun]) -> CompareError {
 }
 
 fn name(runs: &[StoredRun]) -> String {
-    let mut names: Vec<String> =
-        runs.iter().map(|run| method(run.text("policy"), run.is_privileged(), run.sees_forces())).collect();
+    let mut names: Vec<String> = runs
+        .iter()
+        .map(|run| method_label(run.text("policy"), run.is_privileged(), run.sees_forces()))
+        .collect();
     names.sort();
     names.dedup();
     names.join(", ")
@@ -271,7 +272,7 @@ pub(super) fn head(name: &str, [first, second]: [&str; 2]) -> String {
 }
 
 /// A row a measure, the first with the name.
-pub(super) fn rows(name: &str, of: &Paired, deformation: Deformation) -> Vec<String> {
+pub(super) fn rows(name: &str, of: &PairedComparison, deformation: Deformation) -> Vec<String> {
     let mut all =
         vec![rate("Goal, %", &of.goal), rate("NoDrop, %", &of.no_drop), rate("Safety, %", &of.safety)];
     match deformation {

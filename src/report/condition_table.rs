@@ -9,7 +9,7 @@ use super::{
     text_table::{WIDTH, push_line, push_rule, shortened},
 };
 use crate::evaluation::{
-    paired::{Paired, d_over_tau, pairs},
+    paired_stats::{PairedComparison, d_over_tau, pair_episodes},
     record::EpisodeRecord,
     statistics::{Distribution, Rate},
     summary::Scores,
@@ -36,7 +36,7 @@ pub struct ConditionOutcome {
     /// Peak D over τ of valid episodes that have both.
     pub d_over_tau: Distribution,
     /// Against the reference; null for the reference itself.
-    pub paired: Option<Paired>,
+    pub paired: Option<PairedComparison>,
 }
 
 impl ConditionOutcome {
@@ -51,7 +51,7 @@ impl ConditionOutcome {
             no_drop_rate: scores.no_drop_rate,
             safety_success_rate: scores.safety_success_rate,
             d_over_tau: Distribution::of(records.iter().filter_map(d_over_tau).collect()),
-            paired: reference.map(|reference| Paired::of(&pairs(reference, records))),
+            paired: reference.map(|reference| PairedComparison::of(&pair_episodes(reference, records))),
         }
     }
 }

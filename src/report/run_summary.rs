@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::stored_run::StoredRun;
 use crate::evaluation::{
     record::{EpisodeRecord, Outcome},
-    summary::Summary,
+    summary::SuiteSummary,
 };
 
 /// A run with its results.
@@ -14,7 +14,7 @@ pub struct RunSummary {
     /// What was run.
     pub run: StoredRun,
     /// What came out.
-    pub summary: Summary,
+    pub summary: SuiteSummary,
     /// The policy, what of it no robot has, and what tells this run from the others of its suite.
     pub method: String,
 }
@@ -44,9 +44,9 @@ pub fn summarize_runs(mut runs: Vec<StoredRun>) -> Vec<RunSummary> {
 }
 
 fn summed_up(run: StoredRun) -> RunSummary {
-    let mut summary = Summary::of(run.suite(), run.text("policy"), &run.records);
+    let mut summary = SuiteSummary::of(run.suite(), run.text("policy"), &run.records);
     summary.force_observed |= run.sees_forces();
-    let method = [summary.method()].into_iter().chain(changes(&run)).collect::<Vec<_>>().join(" · ");
+    let method = [summary.method_label()].into_iter().chain(changes(&run)).collect::<Vec<_>>().join(" · ");
     RunSummary { run, summary, method }
 }
 

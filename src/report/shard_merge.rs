@@ -14,7 +14,7 @@ use super::{
     stored_run::{StoredRun, StoredRunError, load},
 };
 use crate::{
-    evaluation::{record::EpisodeRecord, summary::Summary, thresholds::Thresholds},
+    evaluation::{record::EpisodeRecord, summary::SuiteSummary, thresholds::ThresholdFile},
     files::{self, FileError},
 };
 
@@ -41,7 +41,7 @@ pub enum MergeError {
 ///
 /// # Errors
 /// A shard is missing, unfinished, twice there or of another run; `out` exists; a file cannot be read or written.
-pub fn merge(out: &Path, dirs: &[PathBuf]) -> Result<Vec<Summary>, MergeError> {
+pub fn merge(out: &Path, dirs: &[PathBuf]) -> Result<Vec<SuiteSummary>, MergeError> {
     if out.exists() {
         return Err(MergeError::Unfit(format!("{} exists already; name a new folder", out.display())));
     }
@@ -124,7 +124,7 @@ fn write(
     runs: &[StoredRun],
     info: &Value,
     records: &[EpisodeRecord],
-) -> Result<Summary, MergeError> {
+) -> Result<SuiteSummary, MergeError> {
     files::create_folder(folder)?;
     for run in runs {
         for name in PER_EPISODE {
@@ -137,12 +137,12 @@ fn write(
     files::write_json(&folder.join(RUN), info)?;
     let path = runs[0].dir.join(softvtbench_files::FOLDER).join(softvtbench_files::THRESHOLDS_JSON);
     let text = fs::read_to_string(&path).map_err(io_error("read", &path))?;
-    let thresholds = Thresholds::parse(&text, &path.display().to_string())
+    let thresholds = ThresholdFile::parse(&text, &path.display().to_string())
         .map_err(|error| MergeError::Unfit(error.to_string()))?;
     softvtbench_files::write_scores(folder, records, &thresholds)?;
     // That of a twin is not the name of its suite.
     let suite = records.first().map_or(runs[0].suite(), |record| &record.identity.suite);
-    let summary = Summary::of(suite, runs[0].text("policy"), records);
+    let summary = SuiteSummary::of(suite, runs[0].text("policy"), records);
     files::write_json(&folder.join(SUMMARY), &summary)?;
     Ok(summary)
 }

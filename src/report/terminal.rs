@@ -4,7 +4,7 @@ use super::text_table::{push_line, push_rule, shortened};
 use crate::evaluation::{
     safety::KAPPAS,
     statistics::{Distribution, Rate},
-    summary::{GivenUp, Scores, Summary},
+    summary::{AbortedEpisode, Scores, SuiteSummary},
 };
 
 /// Columns of the task's name.
@@ -16,13 +16,13 @@ const WIDTH: usize = 98;
 const MOST_REASONS: usize = 10;
 
 /// The results of one suite: a row a task, all together, and the rates with their intervals.
-pub fn table(summary: &Summary) -> String {
+pub fn table(summary: &SuiteSummary) -> String {
     let mut out = String::new();
     let scores = &summary.scores;
     let soft = scores.deformation_ok_rate.is_some();
     push_line(
         &mut out,
-        &format!("{} · policy {} · {} episodes", summary.suite, summary.method(), scores.episodes),
+        &format!("{} · policy {} · {} episodes", summary.suite, summary.method_label(), scores.episodes),
     );
     push_rule(&mut out, WIDTH);
     push_line(
@@ -67,7 +67,7 @@ fn row(number: &str, name: &str, scores: &Scores, tau: Option<f64>, soft: bool) 
     )
 }
 
-fn footer(out: &mut String, summary: &Summary) {
+fn footer(out: &mut String, summary: &SuiteSummary) {
     let scores = &summary.scores;
     let deformation_ok = scores.deformation_ok_rate;
     for (name, rate) in [
@@ -120,13 +120,13 @@ fn footer(out: &mut String, summary: &Summary) {
 }
 
 /// Why whoever drove gave up, an episode a line.
-fn gave_up(out: &mut String, summary: &Summary) {
+fn gave_up(out: &mut String, summary: &SuiteSummary) {
     let all = &summary.gave_up;
     if all.is_empty() {
         return;
     }
     push_line(out, &format!("{} gave up in {} episodes:", summary.policy, all.len()));
-    for GivenUp { task, episode, reason } in all.iter().take(MOST_REASONS) {
+    for AbortedEpisode { task, episode, reason } in all.iter().take(MOST_REASONS) {
         push_line(out, &shortened(&format!("  task {task} episode {episode}: {reason}"), WIDTH));
     }
     if all.len() > MOST_REASONS {
@@ -188,7 +188,7 @@ mod tests {
 
     #[test]
     fn the_table_says_it_all_in_less_than_100_columns() {
-        let text = table(&Summary::of("suite", "expert", &records()));
+        let text = table(&SuiteSummary::of("suite", "expert", &records()));
         assert!(text.lines().all(|line| line.chars().count() < 100), "{text}");
         let row = |start: &str| text.lines().find(|line| line.starts_with(start)).unwrap_or_default();
         let words = |line: &str| line.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
@@ -215,14 +215,14 @@ mod tests {
             r.identity.soft = false;
             (r.verdict.d_peak, r.verdict.deformation_ok, r.verdict.tau) = (None, None, None);
         });
-        let text = table(&Summary::of("suite", "expert", &[rigid]));
+        let text = table(&SuiteSummary::of("suite", "expert", &[rigid]));
         assert!(text.contains("N/A") && !text.contains('κ'), "{text}");
         assert!(text.contains("lift it"));
     }
 
     #[test]
     fn an_empty_run_has_a_table_too() {
-        let text = table(&Summary::of("suite", "expert", &[]));
+        let text = table(&SuiteSummary::of("suite", "expert", &[]));
         assert!(text.contains("0 episodes"), "{text}");
     }
 

@@ -5,7 +5,7 @@
 //! quintic, and the hold.
 
 use softvt::{
-    evaluation::deformation::Reference,
+    evaluation::deformation::ReferenceShape,
     geometry::{Pose, Quat, Vec3, samples::SampleSpec, shape::Shape},
     physics::{
         Params, World,
@@ -167,7 +167,7 @@ pub struct Scene {
     pub world: World,
     pub options: Squeeze,
     pads: [(usize, usize, f64); 2],
-    reference: Reference,
+    reference: ReferenceShape,
     start: Vec3,
 }
 
@@ -194,7 +194,7 @@ impl Scene {
             let mover = (Mover::Kinematic(frame), Pose::identity());
             (frame, put(&mut world, "pad", mover, &Shape::cuboid(size), rough), side)
         });
-        let reference = Reference::new(&rest.mesh.nodes, &rest.mass).expect("a body with size");
+        let reference = ReferenceShape::new(&rest.mesh.nodes, &rest.mass).expect("a body with size");
         let start = world.soft[0].body.centre();
         Self { world, options: *options, pads, reference, start }
     }

@@ -14,7 +14,7 @@ use crate::{
         run::suite_run::{is_finished, run_suite},
         run::{calibration::make_folder, suite_run::SuiteRun},
     },
-    evaluation::summary::method,
+    evaluation::summary::method_label,
     report::{
         condition_table::{ConditionOutcome, ConditionRow, ConditionTable, table},
         run_folder::RunFolder,
@@ -214,7 +214,7 @@ fn compare(
         });
     }
     let deformable = suite.object_type == ObjectType::Deformable && !run.twin;
-    let policy = method(run.policy.name(), run.policy.is_privileged(), forces);
+    let policy = method_label(run.policy.name(), run.policy.is_privileged(), forces);
     Ok(ConditionTable { suite: run.name_of(suite), policy, deformable, rows })
 }
 

@@ -26,9 +26,9 @@ use crate::{
     dataset::card::Imported,
     evaluation::{
         record::{EpisodeRecord, Origin},
-        safety::Limit,
-        summary::Summary,
-        thresholds::Thresholds,
+        safety::{DeformationLimit, NOMINAL_KAPPA},
+        summary::SuiteSummary,
+        thresholds::ThresholdFile,
     },
     parallel,
     policy::TaskBrief,
@@ -53,9 +53,9 @@ pub(crate) struct SuiteRun<'a> {
     pub name: String,
     pub settings: Settings,
     pub jobs: Vec<(&'a Task, u32)>,
-    pub limits: BTreeMap<String, Option<Limit>>,
+    pub limits: BTreeMap<String, Option<DeformationLimit>>,
     /// The thresholds in use as one file of SoftVTBench's form.
-    released: Thresholds,
+    released: ThresholdFile,
     /// SHA-256 of every file that the results depend on.
     pub sources: BTreeMap<String, String>,
     /// Whose actions are carried out once more.
@@ -108,7 +108,7 @@ impl<'a> SuiteRun<'a> {
             settings,
             jobs,
             limits: BTreeMap::new(),
-            released: Thresholds::new(0.5, Vec::new(), made_by),
+            released: ThresholdFile::new(NOMINAL_KAPPA, Vec::new(), made_by),
             sources,
             replayed,
             cache: AssetCache::default(),
@@ -191,7 +191,7 @@ impl<'a> SuiteRun<'a> {
         self.sources.clone_from(&other.sources);
     }
 
-    fn find_limit(&mut self, asset: &Asset) -> Result<Option<Limit>, CliError> {
+    fn find_limit(&mut self, asset: &Asset) -> Result<Option<DeformationLimit>, CliError> {
         let name = &asset.name;
         let cure = format!("its episodes cannot count as safe; softvt scripts/calibrate.lua --asset {name}");
         match calibration::calibrated(&self.run.file, asset)? {
@@ -213,7 +213,7 @@ impl<'a> SuiteRun<'a> {
     }
 
     /// The limit of an object as its layout made it in this episode, whatever a shift makes of it then.
-    fn limit_of(&self, asset: &Asset) -> Option<Limit> {
+    fn limit_of(&self, asset: &Asset) -> Option<DeformationLimit> {
         let limit = self.limits.get(&asset.name).copied().flatten()?;
         let known = self.released.fingerprints.get(&asset.name);
         known.is_none_or(|known| *known == asset.fingerprint()).then_some(limit)
@@ -268,7 +268,7 @@ impl<'a> SuiteRun<'a> {
     /// Episodes with what they come to.
     pub(crate) fn summed_up(&self, records: Vec<EpisodeRecord>) -> SuiteResult {
         let policy = &self.run.policy;
-        let summary = Summary::of(&self.name, policy.name(), &records);
+        let summary = SuiteSummary::of(&self.name, policy.name(), &records);
         SuiteResult { summary, records }
     }
 
@@ -477,7 +477,7 @@ pub(crate) type ControllerFactory =
 /// The episodes of a run that came to its end, in order, and what they come to.
 pub(crate) struct SuiteResult {
     /// What they come to.
-    pub summary: Summary,
+    pub summary: SuiteSummary,
     /// The episodes.
     pub records: Vec<EpisodeRecord>,
 }

@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use crate::evaluation::statistics::{quantile, quantile_by};
+
 /// Names of the quantiles, and the quantiles.
 pub(super) const QUANTILES: [(&str, f64); 5] =
     [("q01", 0.01), ("q10", 0.10), ("q50", 0.50), ("q90", 0.90), ("q99", 0.99)];
@@ -171,21 +173,20 @@ impl ValueStatistics {
 
     /// Quantiles as [`QUANTILES`]: linear between neighbours, as numpy takes them. None if they are not kept.
     fn quantiles(&self) -> Option<[f64; 5]> {
-        let last = (self.moments.count as u64).saturating_sub(1);
-        let between = |at: &dyn Fn(u64) -> f64, share: f64| {
-            let place = share * last as f64;
-            let low = at(place as u64);
-            low + (at((place as u64 + 1).min(last)) - low) * place.fract()
-        };
         match &self.spread {
             ColumnStatistics::None => None,
             ColumnStatistics::All(numbers) => {
                 let mut sorted = numbers.clone();
                 sorted.sort_by(f64::total_cmp);
-                Some(QUANTILES.map(|(_, q)| between(&|place| sorted[place as usize], q)))
+                Some(QUANTILES.map(|(_, q)| quantile(&sorted, q).unwrap_or(f64::NAN)))
+            }
+            Spread::Tally(tally) => {
+                let count = self.moments.count as usize;
+                let at = |rank: usize| tally.at(rank as u64);
+                Some(QUANTILES.map(|(_, q)| quantile_by(count, at, q).unwrap_or(f64::NAN)))
             }
             ColumnStatistics::ValueCounts(tally) => {
-                Some(QUANTILES.map(|(_, q)| between(&|place| tally.at(place), q)))
+                Some(QUANTILES.map(|(_, q)| quantile_by(self.moments.count as usize, |rank| tally.at(rank as u64), q).unwrap_or(f64::NAN)))
             }
         }
     }

@@ -7,7 +7,7 @@ use maud::{Markup, html};
 
 use crate::{
     evaluation::{
-        paired::d_over_tau,
+        paired_stats::d_over_tau,
         statistics::{Distribution, Rate},
     },
     report::run_summary::RunSummary,

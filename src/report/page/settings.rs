@@ -11,7 +11,7 @@ pub(super) fn settings(judged: &RunSummary) -> Markup {
     let fields = [
         ("Folder", judged.run.dir.display().to_string()),
         ("Script", words(&info["script"], &info["arguments"])),
-        ("Policy", judged.summary.method()),
+        ("Policy", judged.summary.method_label()),
         ("softvt", plain(&info["softvt"])),
         ("Seed, split", format!("{}, {}", plain(&info["seed"]), plain(&info["split"]))),
         ("Episodes", format!("{} of {}", judged.run.records.len(), judged.run.wanted())),

@@ -15,10 +15,10 @@ use serde_json::{Value, json};
 use crate::{
     evaluation::{
         calibration::Envelope,
-        deformation::{Deformation, METRIC_ID, Reference},
+        deformation::{Deformation, METRIC_ID, ReferenceShape},
         record::{EpisodeRecord, Identity},
-        statistics::percentile,
-        thresholds::Thresholds,
+        statistics::quantile,
+        thresholds::ThresholdFile,
     },
     files::{FileError, replace},
 };
@@ -76,8 +76,8 @@ pub struct DebugShape {
 impl DebugShape {
     /// From the worst `deformation` of a control step and the reference it was measured against; `None` where there is
     /// none, as for a rigid target.
-    pub fn new(asset: &str, measured: Option<(&Reference, &Deformation)>) -> Self {
-        let of = |f: fn(&Reference, &Deformation) -> f64| measured.map(|(r, d)| f(r, d));
+    pub fn new(asset: &str, measured: Option<(&ReferenceShape, &Deformation)>) -> Self {
+        let of = |f: fn(&ReferenceShape, &Deformation) -> f64| measured.map(|(r, d)| f(r, d));
         Self {
             fem_deformation_known: measured.is_some(),
             fem_deformation_metric_id: measured.map(|_| METRIC_ID.into()),
@@ -96,7 +96,7 @@ impl DebugShape {
     /// Of a control step that broke off: its peaks (% of the diagonal) are known if they are those of the rollout.
     pub fn broken_off(
         asset: &str,
-        reference: Option<&Reference>,
+        reference: Option<&ReferenceShape>,
         rms_pct: Option<f64>,
         max_pct: Option<f64>,
     ) -> Self {
@@ -162,9 +162,9 @@ pub fn has_scores(dir: &Path) -> bool {
 ///
 /// # Errors
 /// A file cannot be written.
-pub fn write_scores(dir: &Path, records: &[EpisodeRecord], thresholds: &Thresholds) -> Result<(), FileError> {
+pub fn write_scores(dir: &Path, records: &[EpisodeRecord], thresholds: &ThresholdFile) -> Result<(), FileError> {
     let folder = dir.join(FOLDER);
-    let released = Thresholds { envelopes: BTreeMap::new(), ..thresholds.clone() };
+    let released = ThresholdFile { envelopes: BTreeMap::new(), ..thresholds.clone() };
     replace(&folder.join(EPISODES_CSV), episodes_csv(records))?;
     replace(&folder.join(SUMMARY_JSON), format!("{:#}\n", summary(records)))?;
     replace(&folder.join(THRESHOLDS_JSON), released.to_text())
@@ -289,7 +289,7 @@ fn asset_summary(group: &[&EpisodeRecord]) -> Value {
         "goal": goal,
         "safe": safe,
         "tau": group.first().and_then(|r| r.verdict.tau),
-        "d_peak_p50": percentile(&peaks, 50.0).map(|d| decimals(d, 4)),
+        "d_peak_p50": quantile(&peaks, 0.5).map(|d| decimals(d, 4)),
         "d_peak_max": peaks.last().map(|d| decimals(*d, 4)),
         "goal_success_rate": rate(goal, group.len()),
         "safe_success_rate": rate(safe, group.len()),

@@ -65,7 +65,7 @@ fn a_rigid_episode_is_safe_when_its_goal_is_reached() {
 #[test]
 fn a_debug_frame_says_how_the_target_is_shaped() {
     let nodes = [Vec3::zeros(), Vec3::x() * 0.06, Vec3::y() * 0.03, Vec3::z() * 0.02];
-    let reference = Reference::new(&nodes, &[1.0; 4]).unwrap();
+    let reference = ReferenceShape::new(&nodes, &[1.0; 4]).unwrap();
     let now = nodes.map(|x| Vec3::new(0.5 * x.x, x.y, x.z));
     let d = reference.measure(&now).unwrap();
     let shape = DebugShape::new("bun", Some((&reference, &d)));
@@ -93,7 +93,7 @@ fn a_debug_frame_says_how_the_target_is_shaped() {
 #[test]
 fn files_land_where_the_scorer_finds_them() {
     let root = tempfile::tempdir().unwrap();
-    let mut thresholds = Thresholds::new(0.5, vec![], "softvt".into());
+    let mut thresholds = ThresholdFile::new(0.5, vec![], "softvt".into());
     thresholds.insert("bun", Envelope::new(vec![hold(0.3, 5)], vec![squeeze(0.3, 2.0, true)], 0.5));
     write_scores(root.path(), &records(), &thresholds).unwrap();
     let identity = sample().identity;
@@ -107,7 +107,7 @@ fn files_land_where_the_scorer_finds_them() {
     assert!(has_scores(root.path()));
     fs::remove_file(root.path().join("softvtbench/episodes.csv")).unwrap();
     assert!(!has_scores(root.path()));
-    let written = Thresholds::read(&root.path().join("softvtbench/thresholds.json")).unwrap();
+    let written = ThresholdFile::read(&root.path().join("softvtbench/thresholds.json")).unwrap();
     assert!(written.envelopes.is_empty() && written.limit("bun").is_some());
 }
 

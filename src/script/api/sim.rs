@@ -30,7 +30,7 @@ use crate::{
         seed::{EpisodeSeed, RandomStream, Split},
         settings::Settings,
     },
-    evaluation::deformation::Reference,
+    evaluation::deformation::ReferenceShape,
     geometry::Pose,
     robot::{Side, rotation},
     rollout::{AssetCache, Kind, SensingError, SensorAssets, SensorSuite, Simulation, cancel},
@@ -53,7 +53,7 @@ struct Inner {
 const BYTES_A_SIMULATION: usize = 4 << 20;
 
 struct Watched {
-    reference: Option<Reference>,
+    reference: Option<ReferenceShape>,
     d_peak: f64,
     start_z: f64,
 }
@@ -134,7 +134,7 @@ fn simulate(
             reference: match object.kind {
                 Kind::Soft(i) => {
                     let body = &sim.world.soft[i].body;
-                    Reference::new(&body.x, &body.rest.mass).ok()
+                    ReferenceShape::new(&body.x, &body.rest.mass).ok()
                 }
                 _ => None,
             },
@@ -200,7 +200,7 @@ impl Inner {
     }
 }
 
-fn deformation(sim: &Simulation, object: usize, reference: &Option<Reference>) -> Option<f64> {
+fn deformation(sim: &Simulation, object: usize, reference: &Option<ReferenceShape>) -> Option<f64> {
     let Kind::Soft(index) = sim.objects[object].kind else { return None };
     reference.as_ref()?.measure(&sim.world.soft[index].body.x).ok().map(|d| d.rms_pct)
 }

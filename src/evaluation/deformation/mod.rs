@@ -1,87 +1,68 @@
-//! How far a soft body is from its reference shape once its rigid motion is removed: FEM-RMS deformation D.
+//! FEM-RMS deformation D: distance of a soft body from its reference shape after removal of the rigid motion.
 //!
-//! `D = sqrt( Σ wᵢ |xᵢ − c − R (Xᵢ − C)|² / Σ wᵢ ) / diagonal`, in percent, with `R` the best proper rotation (Kabsch,
-//! 1976). `R` is found as the leading eigenvector of Horn's 4×4 matrix (Horn, "Closed-form solution of absolute
-//! orientation using unit quaternions", 1987): the same optimum as the SVD with a flipped last singular vector, but it
-//! is a proper rotation by construction, also for flat and collapsed bodies.
+//! With nodes `xᵢ` now and `Xᵢ` in the reference shape, weights `wᵢ`, weighted means `c` and `C`, and the diagonal `d` of the
+//! reference's axis-aligned bounding box in the frame in which its nodes were given:
+//!
+//! `D = 100 % · sqrt( Σ wᵢ |xᵢ − c − R (Xᵢ − C)|² / Σ wᵢ ) / d`
+//!
+//! `R` is the proper rotation that minimises the sum (Kabsch, 1976), found as the leading eigenvector of Horn's 4×4 matrix
+//! (Horn, "Closed-form solution of absolute orientation using unit quaternions", 1987). That is the same optimum as the SVD
+//! with a flipped last singular vector, but it is a proper rotation by construction, also for flat and collapsed bodies.
+//!
+//! The score uses uniform weights ([`METRIC_ID`], as SoftVTBench); the mass-weighted value and the largest node displacement
+//! are reported next to it. The reference is the settled shape, so sagging under gravity does not count.
 
 use nalgebra::{Matrix4, Quaternion, SymmetricEigen};
 
 use crate::geometry::{Mat3, Quat, Vec3};
 
-/// The name of the uniform RMS measure, shared with SoftVTBench.
+/// Name of D with uniform weights, shared with SoftVTBench.
 pub const METRIC_ID: &str = "fem_rms_rigid_aligned_bbox_pct_v1";
 
-/// A bounding box with a smaller diagonal than this is a point, m.
+/// Diagonal of a bounding box below which a body counts as a point, m.
 const SMALLEST_DIAGONAL_M: f64 = 1e-12;
 
-/// Why a deformation cannot be measured.
+/// Reasons why a deformation cannot be measured.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs)] // The messages say it.
 pub enum DeformationError {
-    /// A rotation needs three points.
     #[error("a deformation needs at least 3 nodes, got {0}: use a finer voxel mesh")]
     TooFewNodes(usize),
-    /// There is one weight a node.
-    #[error("{nodes} nodes but {weights} node weights: give one weight a node")]
-    WeightCount {
-        /// Number of nodes.
-        nodes: usize,
-        /// Number of weights.
-        weights: usize,
-    },
-    /// A weight is negative or not finite, or all are zero.
+    #[error("{nodes} nodes but {weights} node weights: give one weight per node")]
+    WeightCount { nodes: usize, weights: usize },
     #[error("node weight {node} is {value}: weights must be finite, not negative, and not all zero")]
-    BadWeight {
-        /// Node index.
-        node: usize,
-        /// Its weight.
-        value: f64,
-    },
-    /// The measured body has other nodes than the reference.
+    BadWeight { node: usize, value: f64 },
     #[error(
         "the reference has {expected} nodes, the measured body {got}: measure the body the reference is of"
     )]
-    NodeCount {
-        /// Nodes of the reference.
-        expected: usize,
-        /// Nodes given.
-        got: usize,
-    },
-    /// A node is not a number, infinite or absurdly far away.
+    NodeCount { expected: usize, got: usize },
     #[error("node {node} is not finite ({x}, {y}, {z}): the simulation has diverged")]
-    NonFinite {
-        /// Node index.
-        node: usize,
-        /// Its position, m.
-        x: f64,
-        /// Its position, m.
-        y: f64,
-        /// Its position, m.
-        z: f64,
-    },
-    /// All nodes of the reference are one point.
+    NonFinite { node: usize, x: f64, y: f64, z: f64 },
     #[error("the reference's bounding-box diagonal is {0} m: the body has no size")]
     NoSize(f64),
 }
 
-/// A body's deformation at one moment.
+/// Deformation of a body at one moment; percentages are of the diagonal of the reference's bounding box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Deformation {
-    /// D, uniform over the nodes, % of the reference's bounding-box diagonal ([`METRIC_ID`]).
+    /// D with uniform weights, % ([`METRIC_ID`]).
     pub rms_pct: f64,
-    /// The same with the reference's node weights in the fit and in the mean, %.
+    /// D with the node weights of the reference in the fit and in the mean, %.
     pub weighted_pct: f64,
     /// Largest node displacement of the uniform fit, %.
     pub max_pct: f64,
-    /// The fitted rotation, reference to current.
+    /// Rotation of the uniform fit, from the reference to the current shape.
     pub rotation: Quat,
     /// Extents of the current world-aligned bounding box, m.
     pub bbox_m: Vec3,
 }
 
-/// A reference shape, prepared so that measuring neither allocates nor repeats work.
+/// Shape that deformations are measured from, usually the settled one.
+///
+/// Sums over the reference nodes are precomputed, so that [`ReferenceShape::measure`] is two passes over the nodes without
+/// allocation.
 #[derive(Clone, Debug)]
-pub struct Reference {
+pub struct ReferenceShape {
     /// Node positions about their uniform mean, m.
     nodes: Vec<Vec3>,
     /// Node weights, summing to one.
@@ -93,8 +74,8 @@ pub struct Reference {
     diagonal_m: f64,
 }
 
-/// First moments of a set of nodes and their products with the reference, as one pass gathers them.
-struct Moments {
+/// Means of a set of nodes and their covariance sums with the reference, from one pass.
+struct AlignmentSums {
     mean: Vec3,
     weighted_mean: Vec3,
     product: Mat3,
@@ -102,11 +83,12 @@ struct Moments {
     bbox_m: Vec3,
 }
 
-impl Reference {
-    /// Prepares the reference shape from its settled `nodes` (m, any frame) and their `weights` (volume or mass).
+impl ReferenceShape {
+    /// Prepares a reference from its `nodes` (m, any frame) and one weight per node (volume or mass; only ratios matter).
     ///
     /// # Errors
-    /// Fewer than three nodes, a node that is not finite, weights that do not fit, or a body without size.
+    /// Fewer than three nodes, a node that is not finite, weights of another number, negative, not finite or all zero, or a
+    /// body without size.
     pub fn new(nodes: &[Vec3], weights: &[f64]) -> Result<Self, DeformationError> {
         if nodes.len() < 3 {
             return Err(DeformationError::TooFewNodes(nodes.len()));
@@ -140,37 +122,37 @@ impl Reference {
         self.bbox_m
     }
 
-    /// Number of nodes.
+    /// Number of nodes, at least three.
     pub fn len(&self) -> usize {
         self.nodes.len()
     }
 
-    /// Never: a reference has at least three nodes.
+    /// Always false; a reference has at least three nodes.
     pub fn is_empty(&self) -> bool {
         self.nodes.is_empty()
     }
 
-    /// Measures the deformation of `nodes` (m, any frame, in the order of the reference). Does not allocate.
+    /// Deformation of `nodes` (m, any frame, in the order of the reference).
     ///
     /// # Errors
-    /// Another number of nodes than the reference's, or a node that is not finite.
+    /// Another number of nodes than the reference has, or a node that is not finite.
     pub fn measure(&self, nodes: &[Vec3]) -> Result<Deformation, DeformationError> {
         if nodes.len() != self.nodes.len() {
             return Err(DeformationError::NodeCount { expected: self.nodes.len(), got: nodes.len() });
         }
-        let moments = self.moments(nodes)?;
-        let rotation = best_rotation(&moments.product);
+        let sums = self.sums(nodes)?;
+        let rotation = best_rotation(&sums.product);
         let (fit, weighted_fit) = (
             rotation.to_rotation_matrix().into_inner(),
-            best_rotation(&moments.weighted_product).to_rotation_matrix().into_inner(),
+            best_rotation(&sums.weighted_product).to_rotation_matrix().into_inner(),
         );
         let (mut sum, mut weighted_sum, mut largest) = (0.0_f64, 0.0_f64, 0.0_f64);
         for ((x, rest), weight) in nodes.iter().zip(&self.nodes).zip(&self.weights) {
             let x = x - nodes[0];
-            let square = (x - moments.mean - fit * rest).norm_squared();
+            let square = (x - sums.mean - fit * rest).norm_squared();
             sum += square;
             largest = largest.max(square);
-            let weighted = x - moments.weighted_mean - weighted_fit * (rest - self.weighted_centre);
+            let weighted = x - sums.weighted_mean - weighted_fit * (rest - self.weighted_centre);
             weighted_sum += weight * weighted.norm_squared();
         }
         // Finite nodes may still be so far away that their squares overflow.
@@ -183,11 +165,11 @@ impl Reference {
             weighted_pct: percent * weighted_sum.sqrt(),
             max_pct: percent * largest.sqrt(),
             rotation,
-            bbox_m: moments.bbox_m,
+            bbox_m: sums.bbox_m,
         })
     }
 
-    fn moments(&self, nodes: &[Vec3]) -> Result<Moments, DeformationError> {
+    fn sums(&self, nodes: &[Vec3]) -> Result<AlignmentSums, DeformationError> {
         let (mut sum, mut weighted_sum) = (Vec3::zeros(), Vec3::zeros());
         let (mut product, mut weighted_product) = (Mat3::zeros(), Mat3::zeros());
         let (mut low, mut high) = (nodes[0], nodes[0]);
@@ -206,7 +188,7 @@ impl Reference {
             return Err(first_bad_node(nodes).unwrap_or_else(|| far_node(nodes)));
         }
         let mean = sum / nodes.len() as f64;
-        Ok(Moments { mean, weighted_mean: weighted_sum, product, weighted_product, bbox_m: high - low })
+        Ok(AlignmentSums { mean, weighted_mean: weighted_sum, product, weighted_product, bbox_m: high - low })
     }
 }
 
@@ -262,5 +244,4 @@ fn non_finite(nodes: &[Vec3], node: usize) -> DeformationError {
 }
 
 #[cfg(test)]
-#[path = "deformation_tests.rs"]
 mod tests;

@@ -11,9 +11,9 @@ fn cube(n: usize) -> (Vec<Vec3>, Vec<f64>) {
     (nodes, cells.map(|c| end(c[0]) * end(c[1]) * end(c[2])).collect())
 }
 
-fn reference() -> (Reference, Vec<Vec3>) {
+fn reference() -> (ReferenceShape, Vec<Vec3>) {
     let (nodes, weights) = cube(7);
-    (Reference::new(&nodes, &weights).unwrap(), nodes)
+    (ReferenceShape::new(&nodes, &weights).unwrap(), nodes)
 }
 
 fn map(nodes: &[Vec3], f: impl Fn(&Vec3) -> Vec3) -> Vec<Vec3> {
@@ -27,7 +27,7 @@ fn squeezed(nodes: &[Vec3], eps: f64) -> Vec<Vec3> {
 }
 
 #[test]
-fn rigid_motion_is_no_deformation_also_at_half_a_turn() {
+fn rigid_motion_is_not_a_deformation_also_at_half_a_turn() {
     let (reference, nodes) = reference();
     for axis in [Vec3::x(), Vec3::y(), Vec3::z(), Vec3::new(1.0, 1.0, 0.0), Vec3::new(1.0, -2.0, 3.0)] {
         for degrees in [0.0_f64, 1e-6, 90.0, 179.999_999, 180.0, 270.0] {
@@ -47,7 +47,7 @@ fn rigid_motion_is_no_deformation_also_at_half_a_turn() {
 fn a_mirrored_body_is_deformed() {
     // Two different legs, so that no rotation undoes the mirror.
     let nodes = [Vec3::zeros(), Vec3::x() * 0.06, Vec3::y() * 0.03, Vec3::z() * 0.02];
-    let reference = Reference::new(&nodes, &[1.0; 4]).unwrap();
+    let reference = ReferenceShape::new(&nodes, &[1.0; 4]).unwrap();
     let d = reference.measure(&map(&nodes, |x| Vec3::new(x.x, x.y, -x.z))).unwrap();
     assert!(d.rms_pct > 1.0, "{d:?}");
     assert!((d.rotation.to_rotation_matrix().into_inner().determinant() - 1.0).abs() < 1e-12);
@@ -88,7 +88,7 @@ fn the_rotation_that_is_removed_would_be_38_percent_at_a_quarter_turn() {
 #[test]
 fn bad_input_is_refused_by_name() {
     let (reference, nodes) = reference();
-    let new = |n: &[Vec3], w: &[f64]| Reference::new(n, w).unwrap_err();
+    let new = |n: &[Vec3], w: &[f64]| ReferenceShape::new(n, w).unwrap_err();
     assert_eq!(new(&nodes[..2], &[1.0; 2]), DeformationError::TooFewNodes(2));
     assert_eq!(new(&nodes[..4], &[1.0; 3]), DeformationError::WeightCount { nodes: 4, weights: 3 });
     assert!(matches!(new(&nodes[..3], &[1.0, -1.0, 1.0]), DeformationError::BadWeight { node: 1, .. }));
@@ -103,7 +103,7 @@ fn bad_input_is_refused_by_name() {
     }
 }
 
-/// Kabsch by singular values, as the released code does it, to compare with.
+/// Kabsch by singular values, as in the released code: an independent reference.
 fn rms_by_svd(rest: &[Vec3], now: &[Vec3]) -> f64 {
     let mean = |x: &[Vec3]| x.iter().sum::<Vec3>() / x.len() as f64;
     let (c, cc) = (mean(now), mean(rest));
@@ -121,7 +121,7 @@ fn rms_by_svd(rest: &[Vec3], now: &[Vec3]) -> f64 {
 
 proptest! {
     #[test]
-    fn it_is_kabsch_and_blind_to_rigid_motion(
+    fn it_is_kabsch_and_invariant_to_rigid_motion(
         offsets in prop::collection::vec(-0.03..0.03_f64, 81),
         axis in prop::array::uniform3(-1.0..1.0_f64),
         angle in -3.2..3.2_f64,
@@ -129,7 +129,7 @@ proptest! {
         mirrored in any::<bool>(),
     ) {
         let (rest, weights) = cube(3);
-        let reference = Reference::new(&rest, &weights).unwrap();
+        let reference = ReferenceShape::new(&rest, &weights).unwrap();
         let noisy: Vec<Vec3> = rest
             .iter()
             .zip(offsets.chunks(3))

@@ -1,5 +1,7 @@
-//! What a run says: rates and distributions over its episodes (`summary.json`). Rates are in percent over *all*
-//! episodes: an invalid one, or one whose evidence is missing, succeeded at nothing and is counted.
+//! Summary of a run (`summary.json`): rates and distributions over its episodes.
+//!
+//! Rates are in percent over *all* episodes: an invalid episode, or one with missing evidence, counts as a failure.
+//! Distributions of D are over the valid episodes with a measured D.
 
 use std::collections::BTreeMap;
 
@@ -7,21 +9,21 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     record::EpisodeRecord,
-    safety::{Limit, Peak, safe},
+    safety::{DeformationLimit, PeakDeformation, is_safe},
     statistics::{Distribution, Rate},
 };
 
-/// Steps of the κ curve in 0..=1.
+/// Number of intervals of the κ curve between 0 and 1.
 const KAPPA_STEPS: u32 = 20;
 
-/// Rates and deformation of a group of episodes.
+/// Success rates and deformation of a group of episodes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scores {
-    /// Episodes.
+    /// Number of episodes.
     pub episodes: usize,
-    /// Episodes that were invalid or could not be run.
+    /// Number of episodes that were invalid or could not be run.
     pub invalid: usize,
-    /// Valid episodes whose safety could not be judged: a missing threshold or missing evidence.
+    /// Number of valid episodes whose safety could not be judged, for lack of a threshold or of evidence.
     pub safety_unknown: usize,
     /// Goal Success.
     pub goal_success_rate: Rate,
@@ -33,22 +35,22 @@ pub struct Scores {
     pub safety_success_rate: Rate,
     /// Goal Success minus Safety Success, percentage points.
     pub goal_safe_gap: Option<f64>,
-    /// Episodes without slip; reported only.
+    /// NoSlip; reported only.
     pub no_slip_rate: Rate,
-    /// The released code's looser Goal Success.
+    /// Goal Success by the looser predicate of SoftVTBench's released code.
     pub goal_v1_rate: Rate,
-    /// Episodes in which another object was lifted first.
+    /// Share of episodes in which another object was lifted first.
     pub wrong_instance_rate: Rate,
-    /// Peak D over all valid episodes, %.
+    /// Peak D of all valid episodes, %.
     pub deformation: Distribution,
-    /// Peak D over those that reached the goal, %.
+    /// Peak D of the valid episodes that reached the goal, %.
     pub deformation_goal: Distribution,
 }
 
-/// One κ of the sensitivity curve.
+/// One point of the curve of safety over κ.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct KappaRow {
-    /// κ.
+    /// Share of D_ref that is allowed.
     pub kappa: f64,
     /// D_peak ≤ κ·D_ref.
     pub deformation_ok_rate: Rate,
@@ -56,72 +58,72 @@ pub struct KappaRow {
     pub safety_success_rate: Rate,
 }
 
-/// The scores of one task.
+/// Scores of one task.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TaskScores {
-    /// Index in the suite.
+    /// Index of the task in the suite.
     pub task: usize,
-    /// What the policy was told.
+    /// Instruction given to the policy.
     pub prompt: String,
-    /// Asset of the target, of the first episode.
+    /// Asset of the target in the first episode.
     pub asset: String,
-    /// Its scores.
+    /// Scores of its episodes.
     #[serde(flatten)]
     pub scores: Scores,
 }
 
-/// The scores of one asset.
+/// Scores of the episodes with one target asset.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AssetScores {
-    /// Nominal τ, %.
+    /// τ at the nominal κ, %.
     pub tau: Option<f64>,
-    /// D_ref, %.
+    /// D_ref of the asset, %.
     pub d_ref: Option<f64>,
-    /// Its scores.
+    /// Scores of its episodes.
     #[serde(flatten)]
     pub scores: Scores,
 }
 
-/// An episode in which whoever drove gave up.
+/// Episode that its controller aborted.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct GivenUp {
+pub struct AbortedEpisode {
     /// Index of the task.
     pub task: usize,
     /// Index of the episode in the task.
     pub episode: u32,
-    /// Why.
+    /// Reason given by the controller.
     pub reason: String,
 }
 
-/// `summary.json`: one suite, one policy.
+/// Contents of `summary.json`: one suite, one policy.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Summary {
-    /// Suite name.
+pub struct SuiteSummary {
+    /// Name of the suite.
     pub suite: String,
-    /// Policy name.
+    /// Name of the policy.
     pub policy: String,
-    /// Whether the policy saw the true state in any episode, as experts do.
+    /// True if the policy saw the true state in any episode, as experts do.
     #[serde(default)]
     pub privileged: bool,
-    /// Whether the policy saw the true forces at the pads in any episode; no real sensor gives them.
+    /// True if the policy saw the true forces at the pads in any episode; no real sensor gives them.
     #[serde(default)]
     pub force_observed: bool,
-    /// All episodes together.
+    /// Scores of all episodes together.
     #[serde(flatten)]
     pub scores: Scores,
-    /// Safety over κ in 0..=1; empty where no target deforms.
+    /// Safety over κ from 0 to 1; empty where no target deforms.
     pub kappa: Vec<KappaRow>,
-    /// By task, in order.
+    /// Scores by task, in order.
     pub by_task: Vec<TaskScores>,
-    /// By asset of the target.
+    /// Scores by asset of the target.
     pub by_asset: BTreeMap<String, AssetScores>,
-    /// The episodes in which whoever drove gave up, in order.
+    /// Episodes that the controller aborted, in order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub gave_up: Vec<GivenUp>,
+    pub gave_up: Vec<AbortedEpisode>,
 }
 
 impl Scores {
-    /// The scores of `records`.
+    /// Scores of `records`.
     pub fn of(records: &[&EpisodeRecord]) -> Self {
         let valid: Vec<_> = records.iter().copied().filter(|r| r.outcome.is_valid()).collect();
         let rate = |test: fn(&EpisodeRecord) -> bool| {
@@ -150,8 +152,8 @@ impl Scores {
     }
 }
 
-impl Summary {
-    /// The summary of one suite's episodes under one policy; those of other suites are left out. It does not depend on
+impl SuiteSummary {
+    /// Summary of the episodes of one suite under one policy; records of other suites are left out. It does not depend on
     /// the order of `records`.
     pub fn of(suite: &str, policy: &str, records: &[EpisodeRecord]) -> Self {
         let mut records: Vec<_> = records.iter().filter(|r| r.identity.suite == suite).collect();
@@ -167,20 +169,18 @@ impl Summary {
             kappa: kappa_curve(&records),
             by_task: tasks.into_iter().map(|(task, group)| task_scores(task, &group)).collect(),
             by_asset: assets.into_iter().map(|(asset, group)| (asset, asset_scores(&group))).collect(),
-            gave_up: records.iter().filter_map(|record| given_up(record)).collect(),
+            gave_up: records.iter().filter_map(|record| aborted(record)).collect(),
         }
     }
-}
 
-impl Summary {
-    /// The policy, and what it has that no robot has: as every table names it.
-    pub fn method(&self) -> String {
-        method(&self.policy, self.privileged, self.force_observed)
+    /// Label of the method in tables, as [`method_label`].
+    pub fn method_label(&self) -> String {
+        method_label(&self.policy, self.privileged, self.force_observed)
     }
 }
 
-/// A policy's name with what it has that no robot has.
-pub fn method(policy: &str, privileged: bool, force_observed: bool) -> String {
+/// Name of a policy, marked if it saw the true state ("privileged") or the true pad forces ("force_observed").
+pub fn method_label(policy: &str, privileged: bool, force_observed: bool) -> String {
     let marks = [(privileged, "privileged"), (force_observed, "force_observed")];
     let marks: Vec<&str> = marks.into_iter().filter_map(|(is, mark)| is.then_some(mark)).collect();
     if marks.is_empty() { policy.to_owned() } else { format!("{policy} ({})", marks.join(", ")) }
@@ -195,9 +195,9 @@ fn grouped<'a, K: Ord>(
     groups
 }
 
-fn given_up(record: &EpisodeRecord) -> Option<GivenUp> {
+fn aborted(record: &EpisodeRecord) -> Option<AbortedEpisode> {
     let reason = record.stats.gave_up.clone()?;
-    Some(GivenUp { task: record.identity.task, episode: record.identity.episode, reason })
+    Some(AbortedEpisode { task: record.identity.task, episode: record.identity.episode, reason })
 }
 
 fn task_scores(task: usize, group: &[&EpisodeRecord]) -> TaskScores {
@@ -213,7 +213,7 @@ fn asset_scores(group: &[&EpisodeRecord]) -> AssetScores {
     }
 }
 
-/// Safety as a function of κ; only τ changes.
+/// Safety as a function of κ; everything but τ stays.
 fn kappa_curve(records: &[&EpisodeRecord]) -> Vec<KappaRow> {
     if !records.iter().any(|r| r.identity.soft) {
         return Vec::new();
@@ -223,23 +223,22 @@ fn kappa_curve(records: &[&EpisodeRecord]) -> Vec<KappaRow> {
             let kappa = f64::from(step) / f64::from(KAPPA_STEPS);
             KappaRow {
                 kappa,
-                deformation_ok_rate: Rate::of(records, |r| within(r, kappa) == Some(true)),
+                deformation_ok_rate: Rate::of(records, |r| is_within(r, kappa) == Some(true)),
                 safety_success_rate: Rate::of(records, |r| {
                     let v = &r.verdict;
-                    safe(v.goal, v.no_drop, r.identity.soft, within(r, kappa))
+                    is_safe(v.goal, v.no_drop, r.identity.soft, is_within(r, kappa))
                 }),
             }
         })
         .collect()
 }
 
-fn within(record: &EpisodeRecord, kappa: f64) -> Option<bool> {
+fn is_within(record: &EpisodeRecord, kappa: f64) -> Option<bool> {
     let verdict = &record.verdict;
-    let limit = verdict.d_ref.map(|d_ref_pct| Limit { d_ref_pct, kappa });
-    let peak = Peak { d_pct: verdict.d_peak, missing: verdict.missing_deformation };
-    if record.outcome.is_valid() { peak.within(limit.map(|l| l.tau_pct())) } else { None }
+    let limit = verdict.d_ref.map(|d_ref_pct| DeformationLimit { d_ref_pct, kappa });
+    let peak = PeakDeformation { d_pct: verdict.d_peak, missing: verdict.missing_deformation };
+    if record.outcome.is_valid() { peak.is_within(limit.map(|l| l.tau_pct())) } else { None }
 }
 
 #[cfg(test)]
-#[path = "summary_tests.rs"]
 mod tests;
