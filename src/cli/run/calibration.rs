@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::{
     cli::error::CliError,
-    evaluation::{safety::{DeformationLimit, NOMINAL_KAPPA}, thresholds::ThresholdFile},
+    evaluation::{safety::DeformationLimit, thresholds::ThresholdFile},
     scene::Asset,
     script,
 };

@@ -162,7 +162,11 @@ pub fn has_scores(dir: &Path) -> bool {
 ///
 /// # Errors
 /// A file cannot be written.
-pub fn write_scores(dir: &Path, records: &[EpisodeRecord], thresholds: &ThresholdFile) -> Result<(), FileError> {
+pub fn write_scores(
+    dir: &Path,
+    records: &[EpisodeRecord],
+    thresholds: &ThresholdFile,
+) -> Result<(), FileError> {
     let folder = dir.join(FOLDER);
     let released = ThresholdFile { envelopes: BTreeMap::new(), ..thresholds.clone() };
     replace(&folder.join(EPISODES_CSV), episodes_csv(records))?;
