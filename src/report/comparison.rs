@@ -9,7 +9,10 @@ use super::{
     text_table::{WIDTH, shortened},
 };
 use crate::evaluation::{
-    paired_stats::{EpisodeKey, EpisodePair, MeanDifference, PairedComparison, RateDifference, TaskKey, group_by_task, pair_episodes},
+    paired_stats::{
+        EpisodeKey, EpisodePair, MeanDifference, PairedComparison, RateDifference, TaskKey, group_by_task,
+        pair_episodes,
+    },
     record::EpisodeRecord,
     summary::method_label,
 };

@@ -180,13 +180,10 @@ impl ValueStatistics {
                 sorted.sort_by(f64::total_cmp);
                 Some(QUANTILES.map(|(_, q)| quantile(&sorted, q).unwrap_or(f64::NAN)))
             }
-            Spread::Tally(tally) => {
+            ColumnStatistics::ValueCounts(tally) => {
                 let count = self.moments.count as usize;
                 let at = |rank: usize| tally.at(rank as u64);
                 Some(QUANTILES.map(|(_, q)| quantile_by(count, at, q).unwrap_or(f64::NAN)))
-            }
-            ColumnStatistics::ValueCounts(tally) => {
-                Some(QUANTILES.map(|(_, q)| quantile_by(self.moments.count as usize, |rank| tally.at(rank as u64), q).unwrap_or(f64::NAN)))
             }
         }
     }
