@@ -68,7 +68,7 @@ impl RobotInstance {
             let link = panda::finger_link(side);
             body.extend(pads::finger_boxes(side).map(|b| add_box(world, tree, link, b.half, b.pose)));
         }
-        body.extend(pads::hand_boxes().map(|b| add_box(world, tree, panda::HAND_LINK, b.half, b.pose)));
+        body.extend(panda::hand_boxes().map(|b| add_box(world, tree, panda::HAND_LINK, b.half, b.pose)));
         Self {
             tree,
             pads,
