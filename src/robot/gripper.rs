@@ -43,7 +43,9 @@ impl GripperEncoding {
 
 /// A gripper command that is not a finite number.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("gripper command is {value}, expected a finite number: a closure of 0 (open) to 1 (closed), or a sign")]
+#[error(
+    "gripper command is {value}, expected a finite number: a closure of 0 (open) to 1 (closed), or a sign"
+)]
 pub struct GripperError {
     /// Value given.
     pub value: f64,
