@@ -4,7 +4,7 @@
 //! [`ROUNDS`] runs: other load on the machine lengthens the wall clock, not this.
 //! `cargo bench --bench squeeze -- "gap 42"` runs the cases whose names contain the words.
 
-use std::{sync::Arc, time::Instant};
+use std::time::Instant;
 
 use softvt::{
     geometry::{
@@ -14,9 +14,9 @@ use softvt::{
         voxel::{VoxelSpec, voxel_mesh},
     },
     physics::{
-        Params, World,
-        contact::{Collider, Friction, Mover},
-        fem::{Material, Rest},
+        BodyId, ColliderId, KinematicId, PhysicsParams, SoftId, World,
+        contact::Friction,
+        fem::{ElasticMaterial, FemModel},
     },
 };
 
@@ -44,8 +44,8 @@ struct Case {
 /// The scene and the indices that drive it.
 struct Scene {
     world: World,
-    body: usize,
-    pads: [(usize, usize, f64); 2],
+    body: SoftId,
+    pads: [(KinematicId, ColliderId, f64); 2],
     gap: f64,
 }
 
@@ -67,22 +67,20 @@ impl Scene {
         let shape = Shape::Box { half: Vec3::repeat(0.5 * EDGE) };
         let mesh = voxel_mesh(&shape, &VoxelSpec { resolution: case.resolution }).expect("a cube has a mesh");
         let samples = surface_samples(&shape, &mesh, &SampleSpec::default());
-        let material = Material { youngs_pa: 3e4, poisson: 0.4, density: 300.0 };
-        let rest = Rest::new(mesh, material, EDGE.powi(3), samples);
-        let params = Params { beta: 2e-3, sleeping, dt: case.dt, ..Params::default() };
+        let material = ElasticMaterial { youngs_pa: 3e4, poisson: 0.4, density: 300.0 };
+        let rest = FemModel::new(mesh, material, EDGE.powi(3), samples);
+        let params =
+            PhysicsParams { rayleigh_stiffness: 2e-3, sleeping, dt: case.dt, ..PhysicsParams::default() };
         let mut world = World::new(params, Vec3::new(0.0, 0.0, -9.81));
-        let none = Friction { static_mu: 0.0, dynamic_mu: 0.0 };
         let grip = Friction { static_mu: 1.2, dynamic_mu: 1.2 };
-        let body = world.add_soft("cube", rest, None, &Pose::translation(0.0, 0.0, 0.5 * EDGE), none);
-        let layer = world.rigid_layer();
-        let table = Arc::new(Shape::Box { half: Vec3::new(0.5, 0.5, 0.05) });
-        let below = (Mover::Static, Pose::translation(0.0, 0.0, -0.05));
-        world.add_collider(Collider::new("table", below, table, grip, layer));
+        let body =
+            world.add_soft("cube", rest, None, &Pose::translation(0.0, 0.0, 0.5 * EDGE), Friction::NONE);
+        let table = Shape::Box { half: Vec3::new(0.5, 0.5, 0.05) };
+        world.add_shape("table", BodyId::World, Pose::translation(0.0, 0.0, -0.05), &table, grip);
         let pads = [-1.0, 1.0].map(|side| {
             let frame = world.add_kinematic(pad_pose(side, 0.5 * EDGE + CLEARANCE, 0.0));
-            let surface = Arc::new(Shape::Box { half: PAD_HALF });
-            let on = (Mover::Kinematic(frame), Pose::identity());
-            (frame, world.add_collider(Collider::new("pad", on, surface, grip, layer)), side)
+            let pad = Shape::Box { half: PAD_HALF };
+            (frame, world.add_shape("pad", frame, Pose::identity(), &pad, grip), side)
         });
         Self { world, body, pads, gap: case.gap }
     }
@@ -107,7 +105,7 @@ impl Scene {
     }
 
     fn force(&self) -> f64 {
-        self.world.touch(self.body, self.pads[0].1).normal_force
+        self.world.contact(self.body, self.pads[0].1).normal_force
     }
 
     fn run(mut self) -> Outcome {
@@ -117,9 +115,9 @@ impl Scene {
             let start = CpuClock::now();
             while self.world.time() + 0.5 * self.world.params.dt < end {
                 self.step();
-                out.newton += self.world.stats.newton;
-                out.factored += self.world.stats.factored;
-                out.newton_max = out.newton_max.max(self.world.stats.newton_max);
+                out.newton += self.world.stats().newton;
+                out.factored += self.world.stats().factored;
+                out.newton_max = out.newton_max.max(self.world.stats().newton_max);
             }
             out.cpu[phase] = start.elapsed();
             out.simulated[phase] = self.world.time() - begun;
@@ -129,7 +127,7 @@ impl Scene {
             }
         }
         out.force_hold = self.force();
-        out.refills = self.world.soft[self.body].refills();
+        out.refills = self.world.soft(self.body).factorizations();
         out
     }
 }
@@ -187,7 +185,7 @@ fn report_asleep(case: &Case) {
     for _ in 0..seconds(3.0) {
         scene.world.step().expect("a resting cube is well behaved");
     }
-    assert!(scene.world.soft[scene.body].asleep, "the cube should sleep after 3 s at rest");
+    assert!(scene.world.soft(scene.body).is_asleep(), "the cube should sleep after 3 s at rest");
     let start = CpuClock::now();
     (0..seconds(200.0)).for_each(|_| scene.world.step().expect("a sleeping cube is well behaved"));
     println!("{:<28} {:.6}", "asleep", start.elapsed() / 200.0);

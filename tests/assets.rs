@@ -123,8 +123,8 @@ fn at_rest(scene: Scene, cache: &AssetCache) -> Vec<[u64; 3]> {
     let mut sim =
         Simulation::new(Arc::new(scene), &Default::default(), &Default::default(), cache).expect("builds");
     sim.settle().unwrap_or_else(|e| panic!("{e}"));
-    let bodies = sim.world.soft.iter();
-    bodies.flat_map(|soft| soft.body.x.iter().map(|x| x.map(f64::to_bits).into())).collect()
+    let bodies = sim.world.soft_bodies().iter();
+    bodies.flat_map(|soft| soft.state.x.iter().map(|x| x.map(f64::to_bits).into())).collect()
 }
 
 #[test]

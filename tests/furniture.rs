@@ -5,8 +5,8 @@ use std::sync::Arc;
 use softvt::{
     benchmark::seed::Split,
     geometry::Vec3,
-    physics::{contact::Partner, world::Drive},
-    rollout::{AssetCache, Kind, ObjectInstance, SensorAssets, SensorSuite, Simulation, state_hash},
+    physics::{BodyId, ContactPartner, LinkId, world::JointDrive},
+    rollout::{AssetCache, ObjectInstance, SensorAssets, SensorSuite, Simulation, state_hash},
     scene::{Asset, Camera, Scene},
     script::{self, Episode, EpisodeRequest},
     sensing::tactile::TactileSpec,
@@ -65,17 +65,17 @@ fn object<'a>(sim: &'a Simulation, name: &str) -> &'a ObjectInstance {
     sim.object(name).unwrap_or_else(|| panic!("no {name}"))
 }
 
-/// Joint tree and link of a part.
-fn link(sim: &Simulation, name: &str) -> (usize, usize) {
-    let Kind::Link { tree, link } = object(sim, name).kind else { panic!("{name} is no part") };
-    (tree, link)
+/// The link of a part.
+fn link(sim: &Simulation, name: &str) -> LinkId {
+    let BodyId::Link(link) = object(sim, name).body else { panic!("{name} is not a part") };
+    link
 }
 
 /// Pushes a joint at a speed (m/s or rad/s) with at most `effort` (N or N m), as a finger would.
-fn push(sim: &mut Simulation, (tree, link): (usize, usize), target_velocity: f64, effort: f64) {
-    let tree = &mut sim.world.trees[tree];
-    tree.asleep = false;
-    tree.drives[link] = Some(Drive { kp: 0.0, kd: 1e3, target: 0.0, target_velocity, effort, force: 0.0 });
+fn push(sim: &mut Simulation, link: LinkId, target_velocity: f64, effort: f64) {
+    let articulation = sim.world.articulation_mut(link.articulation);
+    articulation.drives_mut()[link.index] =
+        Some(JointDrive { kp: 0.0, kd: 1e3, target: 0.0, target_velocity, effort, force: 0.0 });
 }
 
 /// Size of an asset with all joints at 0, m.
@@ -105,19 +105,22 @@ fn a_bowl_rests_on_the_floor_of_an_open_drawer_and_all_of_it_falls_asleep() {
     let drawer = object(&sim, "cabinet.top_drawer");
     assert!((sim.joint(drawer).expect("a joint") - 0.12).abs() < 1e-5);
     let bowl = object(&sim, "bowl");
-    let weight = 9.81 * sim.world.rigid[0].body.mass;
-    let carried = sim.contact(bowl, Partner::Collider(drawer.colliders[0])).force_w.z;
+    let weight = 9.81 * sim.world.rigid_bodies()[0].state.mass;
+    let carried = sim.contact(bowl, ContactPartner::Collider(drawer.colliders[0])).force_w.z;
     assert!((carried / weight - 1.0).abs() < 0.01, "the drawer carries {carried} of {weight} N");
-    let (cabinet, stove) = (link(&sim, "cabinet.top_drawer").0, link(&sim, "stove.knob").0);
-    assert!(sim.world.rigid[0].asleep, "the bowl");
-    assert!(sim.world.trees[cabinet].asleep && sim.world.trees[stove].asleep, "cabinet and stove");
-    assert!(!sim.world.trees[sim.robot.tree].asleep, "the robot");
+    let [cabinet, stove] = ["cabinet.top_drawer", "stove.knob"].map(|name| link(&sim, name).articulation);
+    assert!(sim.world.rigid_bodies()[0].is_asleep(), "the bowl");
+    assert!(
+        sim.world.articulation(cabinet).is_asleep() && sim.world.articulation(stove).is_asleep(),
+        "cabinet and stove"
+    );
+    assert!(!sim.world.articulation(sim.robot.articulation).is_asleep(), "the robot");
 }
 
 #[test]
 fn a_drawer_that_is_pushed_takes_its_bowl_along_and_pictures_show_it() {
     let mut sim = settled();
-    let (tree, link) = link(&sim, "cabinet.top_drawer");
+    let link = link(&sim, "cabinet.top_drawer");
     let mut senses = SensorSuite::new(&sim, &TactileSpec::default(), &SensorAssets::default());
     let camera = Camera { width: 160, height: 160, ..Camera::third_person_table() };
     let drawer = 1 + sim.objects.iter().position(|o| o.name == "cabinet.top_drawer").expect("a part") as u16;
@@ -131,12 +134,12 @@ fn a_drawer_that_is_pushed_takes_its_bowl_along_and_pictures_show_it() {
     let (before, seen) = (sim.centre(object(&sim, "bowl")), column(&sim));
     // A push shut that the bowl's friction can follow: 0.5 × 9.81 m/s² would be its limit.
     for step in 1..=36 {
-        push(&mut sim, (tree, link), f64::max(-0.02 * f64::from(step), -0.15), 20.0);
+        push(&mut sim, link, f64::max(-0.02 * f64::from(step), -0.15), 20.0);
         run(&mut sim, 1.0 / 60.0);
     }
-    sim.world.trees[tree].drives[link] = None;
+    sim.world.articulation_mut(link.articulation).drives_mut()[link.index] = None;
     run(&mut sim, 1.0);
-    let moved = 0.12 - sim.world.trees[tree].state.q[link];
+    let moved = 0.12 - sim.world.articulation(link.articulation).state.q[link.index];
     let along = sim.centre(object(&sim, "bowl")) - before;
     assert!(moved > 0.04, "pushed by {moved} m");
     assert!((along.y - moved).abs() < 2e-3 && along.x.abs() < 1e-3, "{moved} m, the bowl by {along:?}");
@@ -147,24 +150,24 @@ fn a_drawer_that_is_pushed_takes_its_bowl_along_and_pictures_show_it() {
 #[test]
 fn a_knob_turns_within_its_limits_and_stops() {
     let mut sim = settled();
-    let (tree, link) = link(&sim, "stove.knob");
-    let set = sim.world.trees[tree].state.q[link];
+    let link = link(&sim, "stove.knob");
+    let set = sim.world.articulation(link.articulation).state.q[link.index];
     assert!((set - 1.0).abs() < 1e-6, "friction holds it where it was set: {set}");
-    push(&mut sim, (tree, link), 4.0, 1.0);
+    push(&mut sim, link, 4.0, 1.0);
     run(&mut sim, 2.0);
-    sim.world.trees[tree].drives[link] = None;
+    sim.world.articulation_mut(link.articulation).drives_mut()[link.index] = None;
     run(&mut sim, 1.0);
-    let q = sim.world.trees[tree].state.q[link];
+    let q = sim.world.articulation(link.articulation).state.q[link.index];
     assert!((1.4 * std::f64::consts::PI..=1.5 * std::f64::consts::PI + 1e-3).contains(&q), "{q} rad");
-    assert!(sim.world.trees[tree].asleep);
+    assert!(sim.world.articulation(link.articulation).is_asleep());
 }
 
 #[test]
 fn the_same_scene_goes_the_same_way_to_the_bit() {
     let end = || {
         let mut sim = settled();
-        let (tree, link) = link(&sim, "cabinet.top_drawer");
-        sim.world.trees[tree].state.v[link] = -0.3;
+        let link = link(&sim, "cabinet.top_drawer");
+        sim.world.articulation_mut(link.articulation).state.v[link.index] = -0.3;
         run(&mut sim, 0.5);
         state_hash(&sim)
     };

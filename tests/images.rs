@@ -8,7 +8,7 @@ use std::{path::PathBuf, sync::Arc};
 use softvt::{
     benchmark::{Plan, seed::Split},
     geometry::{Pose, Quat, Vec3, shape::Shape},
-    physics::Params,
+    physics::PhysicsParams,
     robot::RobotSpec,
     rollout::{AssetCache, SensorAssets, SensorSuite, Simulation},
     scene::{Camera, Lighting, Mask, Visual, VisualLayer},
@@ -52,9 +52,13 @@ fn the_first_task_of_spatial_soft_looks_as_it_did() {
         shifts: Vec::new(),
     };
     let scene = script::Episode::open(&loaded, &request).expect("the suite opens").scene;
-    let sim =
-        Simulation::new(Arc::new(scene), &Params::default(), &RobotSpec::default(), &AssetCache::default())
-            .expect("the scene builds");
+    let sim = Simulation::new(
+        Arc::new(scene),
+        &PhysicsParams::default(),
+        &RobotSpec::default(),
+        &AssetCache::default(),
+    )
+    .expect("the scene builds");
     let looks = SensorAssets::default();
     let fresh = || SensorSuite::new(&sim, &TactileSpec::default(), &looks);
     let mut senses = fresh();

@@ -1,71 +1,69 @@
-//! Input of the judge after every physics step: plain numbers in the world frame, hidden from policies.
-//!
-//! Forces enter as impulses (force times the length of the physics step), so that they may be summed over a control step.
+//! What the judge is shown after every physics step: plain numbers, world frame, hidden from policies.
 
 use crate::geometry::{Pose, Vec3};
 
 use super::deformation::Deformation;
 
-/// Contact between one gripper pad and the target.
+/// One pad against the target.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PadEvidence {
     /// Normal impulse between pad and target in this step, N s.
     pub normal_impulse_ns: f64,
-    /// Distance that the contact patch has slid along the pad since this contact began, m.
+    /// How far the touched patch has slid along the pad since this contact began, m.
     pub travel_m: f64,
 }
 
-/// Opening of the gripper.
+/// The gripper.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GripperEvidence {
-    /// Measured distance between the apexes of the two gels, m.
+    /// Measured apex-to-apex width, m.
     pub width_m: f64,
-    /// Commanded distance between the apexes of the two gels, m.
+    /// Commanded apex-to-apex width, m.
     pub commanded_width_m: f64,
 }
 
-/// State of one movable body.
+/// One movable body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BodyEvidence {
-    /// Centre, m: mean of the nodes of a soft body, centre of mass of a rigid one.
+    /// Centre (mean of the nodes of a soft body, centre of mass of a rigid one), m.
     pub centre_w: Vec3,
-    /// Height of the lowest point, m.
+    /// Height of its lowest point, m.
     pub lowest_z_w: f64,
-    /// Sum of the upward impulses on the body in this step from everything but the robot, N s. A sleeping body keeps the
-    /// value with which it fell asleep.
+    /// Upward impulse on it in this step from everything but the robot, N s. A sleeping body keeps that it fell
+    /// asleep with.
     pub support_impulse_ns: f64,
-    /// Present deformation; `None` for a rigid body, and for a soft one when it could not be measured.
+    /// Its deformation; `None` for a rigid body, and for a soft one when it could not be measured.
     pub deformation: Option<Deformation>,
 }
 
-/// State of the object that the target must be placed on or in.
+/// What the target must be placed on or in.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GoalEvidence {
-    /// Pose of its object frame (origin at the centre of its footprint).
+pub struct PlaceEvidence {
+    /// Its object frame in the world.
     pub pose_w: Pose,
     /// Upward impulse from it on the target in this step, N s.
     pub support_impulse_ns: f64,
 }
 
-/// State at the end of one physics step.
+/// One physics step, as it ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Evidence<'a> {
     /// Time since the policy took over, s.
     pub time_s: f64,
-    /// Origin of the hand frame, m.
+    /// Hand frame origin, m.
     pub hand_w: Vec3,
-    /// Opening of the gripper.
+    /// The gripper.
     pub gripper: GripperEvidence,
     /// Left and right pad against the target.
     pub pads: [PadEvidence; 2],
     /// Normal impulse in this step between the target and the rest of the robot (hand, fingers, sensor cases), N s.
     pub robot_impulse_ns: f64,
-    /// State of the target.
+    /// The target.
     pub target: BodyEvidence,
-    /// States of the other movable bodies, in the same order in every step.
+    /// The other movable bodies, always in the same order.
     pub others: &'a [BodyEvidence],
-    /// State of the object at the goal.
-    pub goal: GoalEvidence,
+    /// Where the target must go.
+    pub place: PlaceEvidence,
 }
 
 impl BodyEvidence {
@@ -77,9 +75,9 @@ impl BodyEvidence {
 }
 
 impl Evidence<'_> {
-    /// True if every number that the criteria read is finite. Deformations are not included: a missing one is counted apart.
+    /// Whether every number that the rules read is finite. Deformations are looked at apart.
     pub fn is_finite(&self) -> bool {
-        let pose = self.goal.pose_w.to_homogeneous();
+        let pose = self.place.pose_w.to_homogeneous();
         self.time_s.is_finite()
             && self.hand_w.iter().chain(pose.iter()).all(|v| v.is_finite())
             && self.gripper.width_m.is_finite()
@@ -88,6 +86,6 @@ impl Evidence<'_> {
             && self.robot_impulse_ns.is_finite()
             && self.target.is_finite()
             && self.others.iter().all(BodyEvidence::is_finite)
-            && self.goal.support_impulse_ns.is_finite()
+            && self.place.support_impulse_ns.is_finite()
     }
 }

@@ -1,11 +1,8 @@
-//! Record of one episode: one line of `episodes.jsonl`.
-//!
-//! [`EpisodeRecord`] flattens four parts into one JSON object: the [`Identity`] of the episode, its [`Outcome`], the
-//! [`Verdict`] of the judge and the [`RolloutStats`].
+//! The record of one episode: one line of `episodes.jsonl`.
 
 use serde::{Deserialize, Serialize};
 
-use super::{drop::DropEvent, safety::KappaVerdict};
+use super::judge::Verdict;
 use crate::scene::InitialState;
 
 /// How a rollout ended.
@@ -14,172 +11,119 @@ use crate::scene::InitialState;
 pub enum Outcome {
     /// The goal held for long enough.
     Completed,
-    /// The budget of control steps was spent.
+    /// The budget was spent.
     Timeout,
-    /// The physics state became invalid.
+    /// The physics could not be trusted any more.
     Invalid {
-        /// One of "inverted", "not_finite", "not_converged", "too_fast", "too_hard" …
+        /// Why: "inverted", "not_finite", "not_converged", "too_fast", "too_hard" …
         reason: String,
         /// Physics step since the policy took over.
         step: u64,
-        /// Index of the node concerned, if there is one.
+        /// The node it was seen at, where there is one.
         node: Option<u32>,
     },
     /// The episode could not be run to its end.
     Error {
-        /// Message of the error.
+        /// What went wrong.
         message: String,
     },
 }
 
 impl Outcome {
-    /// True if the evidence of the rollout can be judged.
+    /// Whether the rollout's evidence can be judged.
     pub fn is_valid(&self) -> bool {
         matches!(self, Self::Completed | Self::Timeout)
     }
 }
 
-/// Task, initial state and policy of an episode.
+/// Which episode this is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Identity {
-    /// Name of the suite.
+    /// Suite name.
     pub suite: String,
-    /// Index of the task in the suite.
+    /// Task index in the suite.
     pub task: usize,
-    /// Instruction given to the policy.
+    /// What the policy was told.
     pub prompt: String,
-    /// Name of the layout.
+    /// Layout name.
     pub layout: String,
-    /// Index of the episode in the task.
+    /// Episode index in the task.
     pub episode: u32,
     /// Base seed.
     pub seed: u64,
-    /// Split of the initial states: "eval", "demo" …
+    /// Split: "eval", "demo" …
     pub split: String,
-    /// Name of the policy.
+    /// Policy name.
     pub policy: String,
-    /// True if the policy sees the true state, as experts do.
+    /// Whether it sees the true state, as experts do.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub privileged: bool,
     /// Asset of the target.
     pub asset: String,
-    /// True if the target is a soft body.
+    /// Whether the target deforms.
     pub soft: bool,
-    /// Foreign demonstration that the episode re-executes, if any.
+    /// Which foreign demonstration it re-executes, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub origin: Option<Box<Origin>>,
 }
 
-/// Demonstration of another simulator or robot, of which an episode takes the initial state and the actions.
+/// A demonstration that was made in another world, of which an episode takes its start and its actions.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Origin {
-    /// Name of its file, without folders.
+    /// Its file, without the folders above.
     pub file: String,
     /// SHA-256 of the file, hexadecimal.
     pub sha256: String,
     /// Name of the demonstration in the file.
     pub demo: String,
-    /// Format of the file.
+    /// How the file is laid out.
     pub layout: String,
-    /// Initial state that replaces the one of the layout.
+    /// What the episode starts from instead of what its layout made.
     pub start: InitialState,
 }
 
-/// Judgement of one episode. Percentages are of the diagonal of the settled bounding box.
-///
-/// [`super::judge`] defines each field.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Verdict {
-    /// Goal Success.
-    pub goal: bool,
-    /// Time at which the goal had held for long enough, s; null without success.
-    pub goal_time_s: Option<f64>,
-    /// Goal Success by the looser predicate of SoftVTBench's released code.
-    pub goal_v1: bool,
-    /// NoDrop.
-    pub no_drop: bool,
-    /// The first event that made NoDrop false.
-    pub drop: Option<DropEvent>,
-    /// NoSlip; reported only, not part of Safety Success.
-    pub no_slip: bool,
-    /// Largest slip along a pad in a grasp, mm.
-    pub slip_mm: f64,
-    /// Peak D of the target, %; null for a rigid one.
-    pub d_peak: Option<f64>,
-    /// Peak mass-weighted D of the target, %.
-    pub d_peak_weighted: Option<f64>,
-    /// Peak of the largest node displacement of the target, %.
-    pub d_peak_max: Option<f64>,
-    /// Peak D over the other soft bodies, %.
-    pub d_peak_other: Option<f64>,
-    /// True if the first object that was lifted is not the target.
-    pub wrong_instance: bool,
-    /// Nominal κ.
-    pub kappa: Option<f64>,
-    /// τ at the nominal κ, %; null without a calibration.
-    pub tau: Option<f64>,
-    /// D_ref, %; null without a calibration.
-    pub d_ref: Option<f64>,
-    /// D_peak ≤ τ; null for a rigid target and where evidence is missing.
-    pub deformation_ok: Option<bool>,
-    /// Safety Success.
-    pub safety: bool,
-    /// True if there was the evidence to judge safety at all.
-    pub safety_known: bool,
-    /// Safety at each κ of the sensitivity table.
-    pub kappas: Vec<KappaVerdict>,
-    /// Number of physics steps whose evidence was not finite.
-    pub missing_evidence: u64,
-    /// Number of physics steps at which the target's D could not be measured.
-    pub missing_deformation: u64,
-    /// Largest normal force on one pad, N.
-    pub peak_pad_force_n: f64,
-    /// Mean normal force per pad while both pads touched, N.
-    pub mean_pad_force_n: f64,
-}
-
-/// Counters of the rollout.
+/// What the run itself counted.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RolloutStats {
-    /// Number of control steps.
+    /// Control steps.
     pub steps: u32,
     /// Simulated time since the policy took over, s.
     pub time_s: f64,
-    /// Smallest det F over all Gauss points of the target and all steps; null for a rigid one.
+    /// Smallest det F of any Gauss point of the target at any step; null for a rigid one.
     pub min_det_f: Option<f64>,
-    /// Mean Newton iterations per physics step.
+    /// Mean Newton iterations a physics step.
     pub newton_mean: f64,
-    /// Largest number of Newton iterations in one physics step.
+    /// Most Newton iterations in one physics step.
     pub newton_max: u32,
-    /// True if the policy saw the true forces at the pads, which no real sensor gives.
+    /// Whether the policy saw the true forces at the pads, which no real sensor gives.
     #[serde(default)]
     pub force_observed: bool,
-    /// Number of observations with an image of a camera that was inside an object; it shows the scene beyond that object.
+    /// Observations with a picture of a camera that stood inside of something: it shows what is beyond that thing.
     #[serde(default)]
     pub camera_inside: u32,
-    /// Number of control steps whose command was farther from the tool than one step of the inverse kinematics reaches (0.2 m,
-    /// 0.6 rad): out of reach, or in the wrong frame or unit.
+    /// Control steps whose command was farther from the tool than a step of the inverse kinematics looks (0.2 m, 0.6 rad):
+    /// out of reach, or in the wrong frame or unit.
     #[serde(default)]
     pub far_commands: u32,
-    /// Reason given by the controller for aborting the episode, if it did.
+    /// Why whoever drove gave up, if it said so.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gave_up: Option<String>,
     /// Hash of the final state, hexadecimal.
     pub state_hash: String,
 }
 
-/// One episode. Fields keep their order, and numbers every bit, through JSON.
+/// One episode. Fields keep their order and floats their bits through JSON.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EpisodeRecord {
-    /// Task, initial state and policy.
+    /// Which episode.
     #[serde(flatten)]
     pub identity: Identity,
     /// How it ended.
     pub outcome: Outcome,
-    /// Judgement.
+    /// What is said of it.
     #[serde(flatten)]
     pub verdict: Verdict,
-    /// Counters of the rollout.
+    /// What was counted.
     #[serde(flatten)]
     pub stats: RolloutStats,
 }

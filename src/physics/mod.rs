@@ -1,9 +1,13 @@
-//! The mechanics: soft bodies, rigid bodies, joint trees, contact, and the one solve that moves them all.
+//! Mechanics: soft bodies, rigid bodies, articulations, contact, and the one convex solve that moves them all.
 //!
-//! Knows no Lua, no files and no images. [`World`] owns the state; [`World::step`] is the whole algorithm.
+//! [`World`] owns the state, and [`World::step`] is the algorithm: its documentation has examples. The modules below it can be
+//! used on their own: [`fem`] (corotational finite elements), [`rigid`], [`joints`] (articulated dynamics), [`contact`]
+//! (detection), [`solver`] (the convex problem of a step) and [`sparse`] (multifrontal Cholesky). No module here depends on
+//! scripts, files or images.
 
 pub mod contact;
 pub mod fem;
+pub mod ids;
 pub mod joints;
 pub mod params;
 pub mod rigid;
@@ -11,5 +15,6 @@ pub mod solver;
 pub mod sparse;
 pub mod world;
 
-pub use params::Params;
+pub use ids::{ArticulationId, BodyId, ColliderId, ContactPartner, KinematicId, LinkId, RigidId, SoftId};
+pub use params::PhysicsParams;
 pub use world::World;

@@ -1,99 +1,113 @@
-//! Every number of the mechanics in one place.
+//! Parameters of the mechanics.
 
 use serde::{Deserialize, Serialize};
 
 use crate::text::format_number;
 
-/// Parameters of the mechanics. The defaults are what the benchmark runs with.
+/// Parameters of the mechanics. The defaults are those of the benchmark.
+///
+/// [`PhysicsParams::check`] rejects values outside of the valid ranges; a [`World`](super::World) assumes valid ones.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Params {
-    /// Time step, s. Control runs at 20 Hz whatever it is.
+pub struct PhysicsParams {
+    /// Time step, s. Control runs at 20 Hz independently of it, so it must divide 0.05 s in the benchmark.
     pub dt: f64,
-    /// Mass-proportional damping of soft bodies (air drag), 1/s. 0; the paper's engine uses 2.5.
-    pub alpha: f64,
-    /// Stiffness-proportional damping of soft bodies, s. 5 ms settles a grasped body in under 0.3 s.
-    pub beta: f64,
-    /// Dissipation time of contact springs, s. Small against `dt`, so that a sliding surface is not held off.
-    pub tau: f64,
-    /// Normal modulus per area of colliders without a soft layer, Pa/m: near rigid for E ≤ 1 MPa.
+    /// Mass-proportional Rayleigh damping of soft bodies (α, as air drag), 1/s. The paper's engine uses 2.5.
+    #[serde(alias = "alpha")]
+    pub rayleigh_mass: f64,
+    /// Stiffness-proportional Rayleigh damping of soft bodies (β), s. 5 ms settles a grasped body in under 0.3 s.
+    #[serde(alias = "beta")]
+    pub rayleigh_stiffness: f64,
+    /// Dissipation time scale τ_d of contact springs, s (Castro et al. 2022). A surface that recedes faster than the springs
+    /// relax is released; the value is small compared with `dt`, so that friction does not lift a sliding surface.
+    #[serde(alias = "tau")]
+    pub dissipation_time: f64,
+    /// Normal contact stiffness per area of nearly rigid colliders, Pa/m: near rigid for Young's moduli up to 1 MPa.
     pub rigid_modulus: f64,
-    /// Tangential over normal contact stiffness (Mindlin 1949 gives 0.5…0.8 for bodies; creep does not depend on it).
+    /// Tangential over normal contact stiffness. Mindlin (1949) gives 0.5 to 0.8 for solids; creep does not depend on it.
     pub shear_ratio: f64,
-    /// Samples closer than this, or than 1.5 steps of approach, get a row, m.
+    /// Gap below which a sample becomes a contact point, m; fast samples do so within 1.5 steps of approach.
     pub margin: f64,
     /// Speed below which a body may fall asleep, m/s.
     pub sleep_speed: f64,
-    /// How long a body must be that slow, s.
-    pub sleep_after: f64,
-    /// Whether bodies fall asleep at all.
+    /// Time for which a body must be that slow before it sleeps, s.
+    #[serde(alias = "sleep_after")]
+    pub sleep_delay: f64,
+    /// True if bodies may fall asleep at all.
     pub sleeping: bool,
-    /// Time for which an element may be inverted before the run is invalid, s.
-    pub inverted_after: f64,
-    /// Speed beyond which the run is invalid, m/s: nothing that a gripper of 0.2 m/s, an arm or a fall onto a table moves is
-    /// near it.
-    pub most_speed: f64,
+    /// Longest time for which an element may be inverted before the run is invalid, s.
+    #[serde(alias = "inverted_after")]
+    pub max_inverted_time: f64,
+    /// Largest speed of a valid state, m/s: far above that of a gripper (0.2 m/s), an arm, or a fall onto a table.
+    #[serde(alias = "most_speed")]
+    pub max_speed: f64,
 }
 
-impl Default for Params {
+impl Default for PhysicsParams {
     fn default() -> Self {
         Self {
             dt: 1.0 / 60.0,
-            alpha: 0.0,
-            beta: 5e-3,
-            tau: 5e-3,
+            rayleigh_mass: 0.0,
+            rayleigh_stiffness: 5e-3,
+            dissipation_time: 5e-3,
             rigid_modulus: 1e9,
             shear_ratio: 0.5,
             margin: 2e-4,
             sleep_speed: 1e-4,
-            sleep_after: 0.5,
+            sleep_delay: 0.5,
             sleeping: true,
-            inverted_after: 0.1,
-            most_speed: 100.0,
+            max_inverted_time: 0.1,
+            max_speed: 100.0,
         }
     }
 }
 
-impl Params {
-    /// Checks every number.
+/// A parameter outside of its range.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("physics.{name}: expected {expected}, got {}", format_number(*value))]
+pub struct ParamError {
+    /// Name of the field.
+    pub name: &'static str,
+    /// The valid range.
+    pub expected: &'static str,
+    /// The value.
+    pub value: f64,
+}
+
+impl PhysicsParams {
+    /// Checks the range of every parameter.
     ///
     /// # Errors
-    /// The first number out of its range; a fragment for people.
-    pub fn check(&self) -> Result<(), String> {
+    /// The first parameter out of range.
+    pub fn check(&self) -> Result<(), ParamError> {
         let positive = [
             ("dt", self.dt),
             ("rigid_modulus", self.rigid_modulus),
             ("shear_ratio", self.shear_ratio),
             ("margin", self.margin),
-            ("sleep_after", self.sleep_after),
-            ("most_speed", self.most_speed),
+            ("sleep_delay", self.sleep_delay),
+            ("max_speed", self.max_speed),
         ];
         let not_negative = [
-            ("alpha", self.alpha),
-            ("beta", self.beta),
-            ("tau", self.tau),
+            ("rayleigh_mass", self.rayleigh_mass),
+            ("rayleigh_stiffness", self.rayleigh_stiffness),
+            ("dissipation_time", self.dissipation_time),
             ("sleep_speed", self.sleep_speed),
-            ("inverted_after", self.inverted_after),
+            ("max_inverted_time", self.max_inverted_time),
         ];
         for (name, value) in positive {
             if !(value > 0.0 && value.is_finite()) {
-                return Err(format!(
-                    "physics.{name}: expected a positive number, got {}",
-                    format_number(value)
-                ));
+                return Err(ParamError { name, expected: "a positive number", value });
             }
         }
         for (name, value) in not_negative {
             if !(value >= 0.0 && value.is_finite()) {
-                return Err(format!("physics.{name}: expected 0 or more, got {}", format_number(value)));
+                return Err(ParamError { name, expected: "0 or more", value });
             }
         }
-        // Below, settling alone would take minutes.
+        // With a smaller step, settling alone would take minutes.
         if !(1e-4..=0.05).contains(&self.dt) {
-            return Err(format!(
-                "physics.dt: expected seconds in 0.0001..0.05, got {}",
-                format_number(self.dt)
-            ));
+            return Err(ParamError { name: "dt", expected: "seconds in 0.0001..0.05", value: self.dt });
         }
         Ok(())
     }

@@ -2,7 +2,10 @@
 
 use std::fmt::Write;
 
-use crate::evaluation::paired_stats::{MeanDifference, PairedComparison, RateDifference};
+use crate::evaluation::{
+    difference::{MeanDifference, RateDifference},
+    paired::Paired,
+};
 
 /// Columns of the name at the left.
 const NAME: usize = 29;
@@ -29,7 +32,7 @@ pub(super) fn head(name: &str, [first, second]: [&str; 2]) -> String {
 }
 
 /// A row a measure, the first with the name.
-pub(super) fn rows(name: &str, of: &PairedComparison, deformation: Deformation) -> Vec<String> {
+pub(super) fn rows(name: &str, of: &Paired, deformation: Deformation) -> Vec<String> {
     let mut all =
         vec![rate("Goal, %", &of.goal), rate("NoDrop, %", &of.no_drop), rate("Safety, %", &of.safety)];
     match deformation {

@@ -1,75 +1,71 @@
 //! The gripper: from a policy's closure to finger targets.
 //!
-//! Three separate quantities: *closure* is commanded (0 open to 1 closed), *width* is measured (m between the gel
-//! apexes), *force* results from the contact solve.
+//! Three quantities, never mixed: *closure* is what is commanded (0 open … 1 shut), *width* is what is measured (m
+//! between the gel apexes), force is what the solve finds.
 
 use serde::{Deserialize, Serialize};
 
-use super::spec::GripperSpec;
+use super::GripperSpec;
 
 /// Largest width between the gel apexes, m.
 pub const MAX_WIDTH: f64 = 0.08;
 
-/// Encoding of the gripper component of an action.
+/// How a policy says how far to close.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum GripperEncoding {
-    /// The value is the closure; it is clamped to 0..=1.
+    /// The value is the closure, 0..=1; values beyond mean the nearer end.
     #[default]
     Continuous,
-    /// The value is a closure of which only the side of 0.5 counts: closed above, open otherwise.
+    /// The value is a closure that is only asked whether it is above a half: open or shut, nothing between.
     Binary,
-    /// The sign counts, as in SoftVTBench: positive opens, zero and negative close.
+    /// The sign opens (positive) or shuts (zero and negative), as in SoftVTBench.
     Sign,
 }
 
 impl GripperEncoding {
-    /// Decodes a closure, 0 (open) ..= 1 (closed).
+    /// The closure that `value` asks for, 0 (open) ..= 1 (shut).
     ///
     /// # Errors
-    /// If the value is not finite.
+    /// A value that is no finite number asks for nothing.
     pub fn closure(self, value: f64) -> Result<f64, GripperError> {
         if !value.is_finite() {
             return Err(GripperError { value });
         }
-        let closed = match self {
+        let shut = match self {
             Self::Continuous => return Ok(value.clamp(0.0, 1.0)),
             Self::Binary => value > 0.5,
             Self::Sign => value <= 0.0,
         };
-        Ok(if closed { 1.0 } else { 0.0 })
+        Ok(if shut { 1.0 } else { 0.0 })
     }
 }
 
-/// A gripper command that is not a finite number.
+/// A gripper command that is no number.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error(
-    "gripper command is {value}, expected a finite number: a closure of 0 (open) to 1 (closed), or a sign"
-)]
+#[error("gripper command is {value}, expected a finite number: a closure of 0 (open) to 1 (shut), or a sign")]
 pub struct GripperError {
-    /// Value given.
+    /// What was commanded.
     pub value: f64,
 }
 
-/// Target width (m) of a closure in 0..=1.
+/// Target width of a closure in 0..=1, m.
 pub fn target_width(closure: f64) -> f64 {
     MAX_WIDTH * (1.0 - closure)
 }
 
-/// Closure in 0..=1 whose target width is `width` (m), clamped; the inverse of [`target_width`].
+/// Closure whose target is `width` (m), 0..=1.
 pub fn closure_of_width(width: f64) -> f64 {
     (1.0 - width / MAX_WIDTH).clamp(0.0, 1.0)
 }
 
-/// Measured width (m between the gel apexes) at the joint coordinates (m) of the left and right finger.
+/// Measured width: the distance between the gel apexes at finger coordinates left and right, m.
 pub fn width(fingers: [f64; 2]) -> f64 {
     fingers[0] + fingers[1]
 }
 
-/// Setpoint of the finger drives, which moves towards the commanded closure at the finger speed.
-///
-/// Both fingers receive the same setpoint: a light object off centre is pushed to the middle, and a fixed one is held by
-/// unequal drive forces.
+/// The moving target of the two fingers. Both get the same one, so that a light object off centre is pushed to the
+/// middle and a fixed one is held by unequal drive forces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GripperSetpoint {
     speed: f64,
@@ -78,29 +74,29 @@ pub struct GripperSetpoint {
 }
 
 impl GripperSetpoint {
-    /// A setpoint at rest at `width` (m).
+    /// A gripper whose target is at rest at `width` (m).
     pub fn new(spec: &GripperSpec, width: f64) -> Self {
         let target = width.clamp(0.0, MAX_WIDTH) / 2.0;
         Self { speed: spec.speed, goal: target, target }
     }
 
-    /// Sets the commanded closure, 0 (open) ..= 1 (closed); valid until the next call.
+    /// Takes a closure, 0 (open) ..= 1 (shut), as [`GripperEncoding::closure`] gives it; it holds until the next one.
     pub fn command(&mut self, closure: f64) {
         self.goal = target_width(closure.clamp(0.0, 1.0)) / 2.0;
     }
 
-    /// Moves the setpoint for `dt` (s), at most at the finger speed.
+    /// Moves the target on by `dt` (s) at no more than the finger speed.
     pub fn advance(&mut self, dt: f64) {
-        let step = self.speed * dt;
-        self.target += (self.goal - self.target).clamp(-step, step);
+        let reach = self.speed * dt;
+        self.target += (self.goal - self.target).clamp(-reach, reach);
     }
 
-    /// Target joint coordinate of each finger, m.
+    /// Target coordinate of each finger, m.
     pub fn finger_target(&self) -> f64 {
         self.target
     }
 
-    /// Last commanded closure, 0..=1.
+    /// Closure last commanded, 0..=1.
     pub fn closure(&self) -> f64 {
         closure_of_width(2.0 * self.goal)
     }
@@ -119,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn each_encoding_decodes_its_own_range() {
+    fn each_encoding_reads_its_own_numbers() {
         let read = |encoding: GripperEncoding, value| encoding.closure(value).expect("finite");
         assert_eq!(
             [-0.2, 0.0, 0.3, 1.0, 1.7].map(|v| read(GripperEncoding::Continuous, v)),
@@ -130,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn a_command_that_is_not_finite_is_refused() {
+    fn a_command_that_is_no_number_is_refused() {
         for value in [f64::NAN, f64::INFINITY] {
             let error = GripperEncoding::Continuous.closure(value).expect_err("refused");
             assert!(error.to_string().contains("expected a finite number"));
@@ -138,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn the_setpoint_moves_at_the_finger_speed_and_stops_at_its_goal() {
+    fn the_target_moves_at_the_finger_speed_and_stops_at_its_goal() {
         let mut gripper = GripperSetpoint::new(&GripperSpec::default(), MAX_WIDTH);
         gripper.command(0.5);
         let dt = 1.0 / 60.0;

@@ -3,14 +3,13 @@
 use super::{
     asset_cache::AssetCache,
     build::BuildError,
-    simulation::{ArticulatedPart, Kind, ObjectInstance},
+    simulation::{ArticulatedPart, ObjectInstance},
 };
 use crate::{
     geometry::{Pose, Vec3, shape::Shape},
     physics::{
-        World,
-        contact::{Friction, Mover},
-        joints::{JointKind, Link, Tree},
+        ArticulationId, LinkId, World,
+        joints::{JointKind, JointTree, Link},
     },
     scene::{JointMotion, Object, Part},
     text::format_number,
@@ -32,33 +31,32 @@ pub(super) fn add(
     parts: &[Part],
     base: usize,
     cache: &AssetCache,
-) -> Result<(usize, Vec<ObjectInstance>), BuildError> {
+) -> Result<(ArticulationId, Vec<ObjectInstance>), BuildError> {
     for part in parts {
         check_walls(object, part, cache)?;
     }
     let links = parts.iter().map(|part| link(part, parts, cache)).collect();
-    let tree = Tree { links, base_w: object.pose_w };
+    let tree = JointTree { links, base_w: object.pose_w };
     tree.validate().map_err(|source| BuildError::Joints { object: object.name.clone(), source })?;
     let drives = vec![None; parts.len()];
-    let tree = world.add_tree(&object.name, tree, &object.joints, drives, true);
-    let handles = parts.iter().enumerate().map(|(link, part)| {
+    let articulation = world.add_articulation(&object.name, tree, &object.joints, drives, true);
+    let handles = parts.iter().enumerate().map(|(index, part)| {
         let name = format!("{}.{}", object.name, part.name);
-        let mover = Mover::Link { tree, link };
-        let placed = (mover, Pose::from(-part.joint.origin_o));
-        let friction = part.asset.friction;
-        let friction = Friction { static_mu: friction.static_mu, dynamic_mu: friction.dynamic_mu };
-        let collider = cache.collider(world, &name, placed, &part.asset.shape, friction);
+        let link = LinkId { articulation, index };
+        let pose_in_link = Pose::from(-part.joint.origin_o);
+        let (shape, friction) = (&part.asset.shape, part.asset.friction);
+        let collider = cache.collider(world, &name, link.into(), pose_in_link, shape, friction);
         ObjectInstance {
             name,
             asset: part.asset.clone(),
-            kind: Kind::Link { tree, link },
-            start_w: world.trees[tree].poses()[link] * placed.1,
+            body: link.into(),
+            start_w: world.link_pose(link) * pose_in_link,
             colliders: vec![world.add_collider(collider)],
             bounds: cache.bounds(&part.asset.shape),
             part: Some(ArticulatedPart { object: base, name: part.name.clone(), joint: part.joint.clone() }),
         }
     });
-    Ok((tree, handles.collect()))
+    Ok((articulation, handles.collect()))
 }
 
 /// A part as a link whose frame is the object's, moved to the origin of its joint.

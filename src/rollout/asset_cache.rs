@@ -14,20 +14,20 @@ use crate::{
         shape::Shape,
     },
     physics::{
-        World,
-        contact::{Collider, Friction, Mover, Solid},
-        fem::Rest,
+        BodyId, World,
+        contact::{Collider, CollisionGeometry, Friction},
+        fem::FemModel,
     },
     scene::{Asset, SoftMaterial},
 };
 
-/// Rest data of assets, and what takes a search over their shapes: bounds, masses, walls, where their skin can touch.
+/// Finite-element models of assets, and what takes a search over their shapes: bounds, masses, walls, where their skin can touch.
 #[derive(Clone, Debug, Default)]
 pub struct AssetCache {
-    rests: SharedCache<Arc<Asset>, Arc<Rest>>,
+    rests: SharedCache<Arc<Asset>, Arc<FemModel>>,
     bounds: SharedCache<Shape, Aabb>,
     masses: SharedCache<Shape, MassProperties>,
-    solids: SharedCache<Shape, Arc<Solid>>,
+    solids: SharedCache<Shape, Arc<CollisionGeometry>>,
     walls: SharedCache<Shape, Option<f64>>,
     /// Whether masses and contact samples need only be about right.
     rough: bool,
@@ -42,7 +42,7 @@ fn of_shape<V: Clone>(made: &SharedCache<Shape, V>, shape: &Shape, make: impl Fn
     value.unwrap_or_else(|never| match never {})
 }
 
-fn rough_rest(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<Arc<Rest>, BuildError> {
+fn rough_rest(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<Arc<FemModel>, BuildError> {
     check_soft(name, shape, material)?;
     let rough = SoftMaterial { grasp_spacing: ROUGH_SPACING * material.grasp_spacing, ..material.clone() };
     meshed(name, shape, &rough, approximate_mass_properties(shape, 1.0).mass)
@@ -71,30 +71,35 @@ impl AssetCache {
         of_shape(&self.walls, shape, || articulated::thin_wall(shape))
     }
 
-    /// A collider of a hard shape in a frame of its mover.
+    /// A collider of a hard shape at `pose_in_parent` on `parent`.
     pub(super) fn collider(
         &self,
         world: &World,
         name: &str,
-        (mover, pose_in_mover): (Mover, Pose),
+        parent: BodyId,
+        pose_in_parent: Pose,
         shape: &Shape,
         friction: Friction,
     ) -> Collider {
         Collider {
             name: name.to_owned(),
-            mover,
-            pose_in_mover,
+            parent,
+            pose_in_parent,
             surface: Arc::new(shape.clone()),
             friction,
-            layer: world.rigid_layer(),
+            stiffness: world.rigid_surface_stiffness(),
             bounds: self.bounds(shape),
             base_of: None,
-            solid: Some(of_shape(&self.solids, shape, || Arc::new(Solid::new(shape)))),
+            solid: Some(of_shape(&self.solids, shape, || Arc::new(CollisionGeometry::new(shape)))),
         }
     }
 
-    /// Rest data of a soft asset.
-    pub(super) fn rest(&self, asset: &Arc<Asset>, material: &SoftMaterial) -> Result<Arc<Rest>, BuildError> {
+    /// FemModel data of a soft asset.
+    pub(super) fn rest(
+        &self,
+        asset: &Arc<Asset>,
+        material: &SoftMaterial,
+    ) -> Result<Arc<FemModel>, BuildError> {
         self.rests.get(
             asset,
             |known| known.shape == asset.shape && known.body == asset.body,

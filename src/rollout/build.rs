@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::{
     articulated,
     asset_cache::AssetCache,
-    simulation::{Kind, ObjectInstance, Simulation},
+    simulation::{ObjectInstance, Simulation},
 };
 use crate::{
     geometry::{
@@ -16,11 +16,11 @@ use crate::{
         voxel::{VoxelMeshError, VoxelSpec, voxel_mesh},
     },
     physics::{
-        World,
-        contact::{Mover, Surface},
-        fem::{Material, Rest},
-        joints::TreeError,
-        rigid::{RigidBody, RigidError},
+        BodyId, World,
+        contact::ContactSurface,
+        fem::{ElasticMaterial, FemModel},
+        joints::JointTreeError,
+        rigid::{RigidError, RigidState},
     },
     scene::{Body, Object, Scene, SoftMaterial},
     text::format_number,
@@ -59,7 +59,7 @@ pub enum BuildError {
         /// Object name.
         object: String,
         /// What is wrong.
-        source: TreeError,
+        source: JointTreeError,
     },
     /// Two objects are in each other.
     #[error(
@@ -123,11 +123,11 @@ impl BuildError {
     }
 }
 
-/// Rest data of a soft body of `shape`.
+/// FemModel data of a soft body of `shape`.
 ///
 /// # Errors
 /// A shape that cannot be meshed, or a material number out of range; `name` is what messages call it.
-pub fn soft_rest(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<Arc<Rest>, BuildError> {
+pub fn soft_rest(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<Arc<FemModel>, BuildError> {
     check_soft(name, shape, material)?;
     meshed(name, shape, material, mass_properties(shape, 1.0).mass)
 }
@@ -139,21 +139,24 @@ pub(super) fn check_soft(name: &str, shape: &Shape, material: &SoftMaterial) -> 
     check_thickness(name, shape, material)
 }
 
-/// Rest data of a soft body of some volume, m³, that can be.
+/// FemModel data of a soft body of some volume, m³, that can be.
 pub(super) fn meshed(
     name: &str,
     shape: &Shape,
     material: &SoftMaterial,
     volume: f64,
-) -> Result<Arc<Rest>, BuildError> {
+) -> Result<Arc<FemModel>, BuildError> {
     let spec = VoxelSpec { resolution: material.resolution };
     let mesh =
         voxel_mesh(shape, &spec).map_err(|source| BuildError::Geometry { asset: name.to_owned(), source })?;
     let spacing = SampleSpec { grasp_spacing: material.grasp_spacing, ..SampleSpec::default() };
     let samples = surface_samples(shape, &mesh, &spacing);
-    let law =
-        Material { youngs_pa: material.youngs_pa, poisson: material.poisson, density: material.density };
-    Ok(Rest::new(mesh, law, volume, samples))
+    let law = ElasticMaterial {
+        youngs_pa: material.youngs_pa,
+        poisson: material.poisson,
+        density: material.density,
+    };
+    Ok(FemModel::new(mesh, law, volume, samples))
 }
 
 fn check(name: &str, m: &SoftMaterial) -> Result<(), BuildError> {
@@ -281,7 +284,7 @@ pub(super) fn add_all(
 
 /// Nothing may start inside of anything else, nor of the robot, which is in `world` already.
 pub(super) fn check_overlap(world: &mut World, scene: &Scene) -> Result<(), BuildError> {
-    let found = world.overlaps(OVERLAP);
+    let found = world.penetrations(OVERLAP);
     let Some(deepest) = found.iter().max_by(|a, b| a.depth.total_cmp(&b.depth)) else { return Ok(()) };
     // A part is named after its object and a dot, which no object's name holds.
     let index = |name: &str| {
@@ -347,7 +350,7 @@ pub fn check_support(sim: &Simulation) -> Result<(), BuildError> {
                 && beneath
                 && below.min.z < own.min.z
         };
-        if handle.kind.movable().is_some() && !sim.objects.iter().zip(&boxes).any(holds) {
+        if handle.body.is_free() && !sim.objects.iter().zip(&boxes).any(holds) {
             let object = sim.scene.objects.iter().find(|object| object.name == handle.name);
             let error = BuildError::NothingBelow(handle.name.clone());
             return Err(match object {
@@ -371,42 +374,41 @@ fn add(
     if matches!(asset.body, Body::Rigid { .. }) {
         check_sheet(object, cache)?;
     }
-    let collider = |world: &World, mover, pose| {
-        let (name, shape) = (&object.name, &asset.shape);
-        cache.collider(world, name, (mover, pose), shape, asset.friction)
+    let collider = |world: &World, parent: BodyId, pose_in_parent| {
+        cache.collider(world, &object.name, parent, pose_in_parent, &asset.shape, asset.friction)
     };
     let mut parts = Vec::new();
-    let (kind, colliders) = match &asset.body {
+    let (body, colliders) = match &asset.body {
         Body::Soft(material) => {
             let rest = cache.rest(asset, material)?;
-            let surface: Arc<dyn Surface> = Arc::new(asset.shape.clone());
-            let index = world.add_soft(&object.name, rest, Some(surface), &object.pose_w, asset.friction);
-            (Kind::Soft(index), Vec::new())
+            let surface: Arc<dyn ContactSurface> = Arc::new(asset.shape.clone());
+            let id = world.add_soft(&object.name, rest, Some(surface), &object.pose_w, asset.friction);
+            (id.into(), Vec::new())
         }
         Body::Rigid { density } => {
             let m = cache.mass(&asset.shape, *density);
-            let body = RigidBody::new(&object.pose_w, m.com, m.mass, m.inertia)
+            let body = RigidState::new(&object.pose_w, m.com, m.mass, m.inertia)
                 .map_err(|source| BuildError::Rigid { asset: asset.name.clone(), source })?;
-            let index = world.add_rigid(&object.name, body);
-            let collider = collider(world, Mover::Rigid(index), crate::geometry::Pose::identity());
-            (Kind::Rigid(index), vec![world.add_collider(collider)])
+            let body = BodyId::Rigid(world.add_rigid(&object.name, body));
+            let collider = collider(world, body, crate::geometry::Pose::identity());
+            (body, vec![world.add_collider(collider)])
         }
         Body::Articulated(carried) => {
-            let (tree, made) = articulated::add(world, object, carried, handles.len(), cache)?;
+            let (articulation, made) = articulated::add(world, object, carried, handles.len(), cache)?;
             parts = made;
-            let base = collider(world, Mover::Static, object.pose_w).as_base_of(tree);
-            (Kind::Static, vec![world.add_collider(base)])
+            let base = collider(world, BodyId::World, object.pose_w).as_base_of(articulation);
+            (BodyId::World, vec![world.add_collider(base)])
         }
         Body::Static => {
-            let collider = collider(world, Mover::Static, object.pose_w);
-            (Kind::Static, vec![world.add_collider(collider)])
+            let collider = collider(world, BodyId::World, object.pose_w);
+            (BodyId::World, vec![world.add_collider(collider)])
         }
-        Body::Scenery => (Kind::Static, Vec::new()),
+        Body::Scenery => (BodyId::World, Vec::new()),
     };
     handles.push(ObjectInstance {
         name: object.name.clone(),
         asset: asset.clone(),
-        kind,
+        body,
         start_w: object.pose_w,
         colliders,
         bounds: cache.bounds(&asset.shape),

@@ -3,10 +3,7 @@
 use crate::{
     geometry::Pose,
     policy::Action,
-    robot::{
-        ik::{LINEARISATION_RANGE, PoseError},
-        rotation,
-    },
+    robot::{ik::REACH, rotation},
 };
 
 /// Whether a command is farther from the tool than a step of the inverse kinematics looks; both in the base frame.
@@ -15,8 +12,7 @@ pub(super) fn is_far(tool_b: &Pose, action: &Action) -> bool {
         &rotation::from_axis_angle(&rotation::axis_angle(&tool_b.rotation)),
         &rotation::from_axis_angle(&action.axis_angle_b),
     );
-    let error = PoseError { translation: action.position_b - tool_b.translation.vector, rotation: turn };
-    !LINEARISATION_RANGE.contains(&error)
+    (action.position_b - tool_b.translation.vector).norm() > REACH.0 || turn.norm() > REACH.1
 }
 
 /// Numbers of a command are at most this large, m and rad: what is larger is no pose, and its squares are no numbers.

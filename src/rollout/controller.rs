@@ -1,52 +1,49 @@
-//! The interface of an episode to its controller.
+//! Whoever drives the robot, as an episode sees it.
 
 use super::simulation::Simulation;
 use crate::policy::{Action, ChunkedPolicy, Observation, PolicyError, SensorStreams};
 
-/// Failure of a controller.
+/// What went wrong with whoever drives.
 #[derive(Debug, thiserror::Error)]
 pub enum ControlError {
-    /// A script failed: an error in the user's input.
+    /// A script failed: the user's input.
     #[error("{0}")]
     Script(String),
-    /// A policy server failed or sent an invalid response.
+    /// A policy failed: the server or its answers.
     #[error("{0}")]
     Policy(String),
-    /// The controller returned an action that cannot be executed. The episode fails; the run continues.
+    /// A policy's answer cannot be carried out; this episode has failed and others may go on.
     #[error("{0}")]
     Action(String),
-    /// The run was cancelled.
+    /// The run was told to stop.
     #[error("interrupted")]
     Interrupted,
 }
 
-/// Controls the robot during an episode. Implemented by observation-only policies and by privileged experts.
-///
-/// [`Episode::run`](super::Episode::run) calls [`act`](Self::act) once per control step (20 Hz) with the simulation and an
-/// [`Observation`]. A policy uses the observation alone; an expert may read the true state from the simulation. The sensors in
-/// [`streams`](Self::streams) are computed only in steps for which [`wants_observation`](Self::wants_observation) is true.
+/// Whoever drives the robot: a policy behind its observation, or a privileged planner.
 pub trait Controller {
-    /// Sensor streams of its observations, the same for the whole episode.
+    /// What it looks at, when it looks; the same for the whole episode.
     fn streams(&self) -> SensorStreams {
         SensorStreams::default()
     }
-    /// True if the sensor streams are needed in this control step. Otherwise the observation has proprioception alone.
+    /// Whether it looks in this control step; if not, nothing is sensed for it.
     fn wants_observation(&self) -> bool {
         true
     }
-    /// Reason why the controller aborted its task, if it did. The last action is then held until the episode ends.
+    /// Why it has given up, if it has: the last action stays then.
     fn gave_up(&self) -> Option<&str> {
         None
     }
-    /// Action of this control step, `None` to repeat the previous one.
+    /// The action of this control step; `None` to keep the last one.
     ///
     /// # Errors
-    /// [`ControlError::Action`] ends the episode with the outcome `error`; any other error ends the run.
+    /// What went wrong.
     fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, ControlError>;
-    /// Called once after the last control step.
+    /// The episode is over.
     fn finish(&mut self) {}
 }
 
+/// A policy sees the observation and nothing else.
 impl Controller for ChunkedPolicy<'_> {
     fn streams(&self) -> SensorStreams {
         ChunkedPolicy::streams(self)
@@ -73,33 +70,5 @@ impl From<PolicyError> for ControlError {
             PolicyError::Script(message) | PolicyError::Address(message) => Self::Script(message),
             PolicyError::Interrupted => Self::Interrupted,
         }
-    }
-}
-
-/// A controller that fails with [`ControlError::Interrupted`] once the process is [cancelled](super::cancel).
-pub struct Cancellable(pub Box<dyn Controller>);
-
-impl Controller for Cancellable {
-    fn streams(&self) -> SensorStreams {
-        self.0.streams()
-    }
-
-    fn wants_observation(&self) -> bool {
-        self.0.wants_observation()
-    }
-
-    fn gave_up(&self) -> Option<&str> {
-        self.0.gave_up()
-    }
-
-    fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, ControlError> {
-        if super::cancel::requested() {
-            return Err(ControlError::Interrupted);
-        }
-        self.0.act(sim, observation)
-    }
-
-    fn finish(&mut self) {
-        self.0.finish();
     }
 }

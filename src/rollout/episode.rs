@@ -14,7 +14,7 @@ use super::{
     sensor_check::check_sensors,
     sensors::{SensingError, SensorSuite, StateRecording},
     settle::SettleError,
-    simulation::{Kind, Simulation},
+    simulation::Simulation,
     spec::EpisodeSpec,
     state_hash::state_hash,
     trace::StepTrace,
@@ -22,12 +22,15 @@ use super::{
 use crate::{
     benchmark::{Goal, control::steps_per_control},
     evaluation::{
-        deformation::{Deformation, ReferenceShape},
-        judge::Judge,
-        record::{EpisodeRecord, Outcome, RolloutStats, Verdict},
+        deformation::{Deformation, Reference},
+        judge::{Judge, Verdict},
+        record::{EpisodeRecord, Outcome, RolloutStats},
     },
     geometry::Pose,
-    physics::world::{Frame, StepFailure},
+    physics::{
+        BodyId,
+        world::{Frame, StepFailure},
+    },
     policy::{Action, Observation, SensorStreams},
     robot::{Side, rotation},
 };
@@ -44,7 +47,7 @@ pub struct FinishedEpisode {
     /// What was commanded in each control step.
     pub actions: Vec<Action>,
     /// Settled shape of a soft target.
-    pub reference: Option<ReferenceShape>,
+    pub reference: Option<Reference>,
     /// What is needed to draw the rollout, if asked for.
     pub recording: Option<StateRecording>,
 }
@@ -287,7 +290,7 @@ impl Episode {
 
     /// How a state that can be trusted ends the episode, if it does.
     fn ending(&self) -> Option<Outcome> {
-        if self.judge.is_goal_reached() {
+        if self.judge.goal_reached() {
             return Some(Outcome::Completed);
         }
         (self.steps >= self.spec.task.budget_steps).then_some(Outcome::Timeout)
@@ -370,10 +373,10 @@ impl Episode {
         for _ in 0..steps_per_control(self.spec.params.dt) {
             self.physics_steps += 1;
             self.sim.step()?;
-            let stats = self.sim.world.stats;
+            let stats = self.sim.world.stats();
             self.newton = (self.newton.0 + u64::from(stats.newton), self.newton.1.max(stats.newton_max));
-            if let Kind::Soft(index) = self.sim.objects[self.target].kind {
-                self.min_det_f = self.min_det_f.min(self.sim.world.soft[index].min_det_f.0);
+            if let BodyId::Soft(index) = self.sim.objects[self.target].body {
+                self.min_det_f = self.min_det_f.min(self.sim.world.soft(index).min_det_f().det_f);
             }
             let time = self.time();
             let evidence = self.evidence.collect(&self.sim, time);
@@ -381,7 +384,7 @@ impl Episode {
             self.judge.observe(&evidence);
             worst = worst.into_iter().chain(now).max_by(|a, b| a.rms_pct.total_cmp(&b.rms_pct));
         }
-        self.frames.push(ScoreFrame { success_now: self.judge.is_goal_reached(), deformation: worst });
+        self.frames.push(ScoreFrame { success_now: self.judge.goal_reached(), deformation: worst });
         if self.spec.trace.is_some() {
             self.trace.push(self.trace());
         }
@@ -393,11 +396,11 @@ impl Episode {
             StepFailure::Diverged { .. } => ("not_converged", None),
             StepFailure::NotFinite { node, .. } => ("not_finite", Some(*node as u32)),
             StepFailure::Indefinite { .. } => ("indefinite", None),
-            StepFailure::TooFast { node, .. } => ("too_fast", node.map(|node| node as u32)),
-            StepFailure::TooHard { .. } => ("too_hard", None),
+            StepFailure::SpeedLimitExceeded { node, .. } => ("too_fast", node.map(|node| node as u32)),
+            StepFailure::ForceLimitExceeded { .. } => ("too_hard", None),
             StepFailure::Inverted { body, element, .. } => {
-                let soft = self.sim.world.soft.iter().find(|s| s.name == *body);
-                ("inverted", soft.map(|s| s.body.rest.mesh.elements[*element][0]))
+                let soft = self.sim.world.soft_bodies().iter().find(|s| s.name == *body);
+                ("inverted", soft.map(|s| s.state.model.mesh.elements[*element][0]))
             }
         };
         Outcome::Invalid { reason: reason.to_owned(), step: self.physics_steps, node }
@@ -411,13 +414,13 @@ impl Episode {
     /// The present state, as a run would write it down.
     pub fn trace(&self) -> StepTrace {
         let at = (self.steps, self.time());
-        let dropped = self.judge.first_drop().is_some();
+        let dropped = self.judge.dropped().is_some();
         StepTrace::new(&self.sim, &self.evidence, self.target, at, dropped, self.spec.trace == Some(true))
     }
 
     /// Its record, as far as it has come.
     pub fn record(&self, gave_up: Option<String>) -> EpisodeRecord {
-        let soft = matches!(self.sim.objects[self.target].kind, Kind::Soft(_));
+        let soft = matches!(self.sim.objects[self.target].body, BodyId::Soft(_));
         let stats = RolloutStats {
             steps: self.steps,
             time_s: self.time(),

@@ -1,13 +1,13 @@
 //! The hidden state as the judge wants it.
 
-use super::simulation::{Kind, ObjectInstance, Simulation};
+use super::simulation::{ObjectInstance, Simulation};
 use crate::{
     evaluation::{
-        deformation::{Deformation, ReferenceShape},
-        evidence::{BodyEvidence, Evidence, GoalEvidence, GripperEvidence, PadEvidence},
+        deformation::{Deformation, Reference},
+        evidence::{BodyEvidence, Evidence, GripperEvidence, PadEvidence, PlaceEvidence},
     },
     geometry::{Pose, Vec3},
-    physics::{contact::Partner, world::Touch},
+    physics::{BodyId, ContactPartner, world::ContactSummary},
     robot::gripper::target_width,
 };
 
@@ -17,21 +17,21 @@ pub struct EvidenceCollector {
     target: usize,
     place: usize,
     others: Vec<usize>,
-    references: Vec<Option<ReferenceShape>>,
+    references: Vec<Option<Reference>>,
     bodies: Vec<BodyEvidence>,
 }
 
 impl EvidenceCollector {
     /// Takes the settled state as the deformation reference.
     pub fn new(sim: &Simulation, target: usize, place: usize) -> Self {
-        let movable = |i: &usize| *i != target && sim.objects[*i].kind.movable().is_some();
+        let movable = |i: &usize| *i != target && sim.objects[*i].body.is_free();
         let references = sim
             .objects
             .iter()
-            .map(|object| match object.kind {
-                Kind::Soft(index) => {
-                    let body = &sim.world.soft[index].body;
-                    ReferenceShape::new(&body.x, &body.rest.mass).ok()
+            .map(|object| match object.body {
+                BodyId::Soft(index) => {
+                    let body = &sim.world.soft(index).state;
+                    Reference::new(&body.x, &body.model.mass).ok()
                 }
                 _ => None,
             })
@@ -47,12 +47,12 @@ impl EvidenceCollector {
 
     /// Deformation of an object now; `None` if it is rigid or cannot be measured.
     pub fn deformation(&self, sim: &Simulation, object: usize) -> Option<Deformation> {
-        let Kind::Soft(index) = sim.objects[object].kind else { return None };
-        self.references[object].as_ref()?.measure(&sim.world.soft[index].body.x).ok()
+        let BodyId::Soft(index) = sim.objects[object].body else { return None };
+        self.references[object].as_ref()?.measure(&sim.world.soft(index).state.x).ok()
     }
 
     /// The settled shape of an object.
-    pub fn reference(&self, object: usize) -> Option<&ReferenceShape> {
+    pub fn reference(&self, object: usize) -> Option<&Reference> {
         self.references[object].as_ref()
     }
 
@@ -67,7 +67,7 @@ impl EvidenceCollector {
             .robot
             .body
             .iter()
-            .map(|&c| sim.contact(target, Partner::Collider(c)).normal_force)
+            .map(|&c| sim.contact(target, ContactPartner::Collider(c)).normal_force)
             .sum::<f64>();
         Evidence {
             time_s,
@@ -82,7 +82,7 @@ impl EvidenceCollector {
             }),
             robot_impulse_ns: from_robot * dt,
             target: self.body(sim, self.target),
-            goal: GoalEvidence {
+            place: PlaceEvidence {
                 pose_w: sim.pose(place) * Pose::from(place.foot_o()),
                 support_impulse_ns: from_place * dt,
             },
@@ -92,10 +92,9 @@ impl EvidenceCollector {
 
     fn body(&self, sim: &Simulation, index: usize) -> BodyEvidence {
         let object = &sim.objects[index];
-        let robot = |partner| matches!(partner, Partner::Collider(c) if sim.robot.pads.contains(&c) || sim.robot.body.contains(&c));
-        let touches = object.kind.movable().map_or(&[][..], |body| sim.world.touches_on(body));
-        let others = touches.iter().filter(|(partner, _)| !robot(Partner::of(*partner)));
-        let support: f64 = others.map(|(_, touch)| upward(touch)).sum();
+        let robot = |partner| matches!(partner, ContactPartner::Collider(c) if sim.robot.pads.contains(&c) || sim.robot.body.contains(&c));
+        let others = sim.world.contacts(object.body).iter().filter(|contact| !robot(contact.partner));
+        let support: f64 = others.map(|contact| upward(&contact.summary)).sum();
         BodyEvidence {
             centre_w: sim.centre(object),
             lowest_z_w: lowest(sim, object),
@@ -106,24 +105,24 @@ impl EvidenceCollector {
 }
 
 /// What an object is to those that it touches: its colliders, or a soft body.
-fn partners(object: &ObjectInstance) -> impl Iterator<Item = Partner> + '_ {
-    let soft = match object.kind {
-        Kind::Soft(index) => Some(Partner::Soft(index)),
+fn partners(object: &ObjectInstance) -> impl Iterator<Item = ContactPartner> + '_ {
+    let soft = match object.body {
+        BodyId::Soft(index) => Some(ContactPartner::Soft(index)),
         _ => None,
     };
-    object.colliders.iter().map(|&c| Partner::Collider(c)).chain(soft)
+    object.colliders.iter().map(|&c| ContactPartner::Collider(c)).chain(soft)
 }
 
 /// Upward part of a force, N.
-fn upward(touch: &Touch) -> f64 {
+fn upward(touch: &ContactSummary) -> f64 {
     touch.force_w.z.max(0.0)
 }
 
 /// Height of the lowest point of an object, m.
 pub(super) fn lowest(sim: &Simulation, object: &ObjectInstance) -> f64 {
-    match object.kind {
-        Kind::Soft(index) => {
-            let body = &sim.world.soft[index].body;
+    match object.body {
+        BodyId::Soft(index) => {
+            let body = &sim.world.soft(index).state;
             body.x.iter().map(|x: &Vec3| x.z).fold(f64::INFINITY, f64::min)
         }
         _ => object.bounds.transformed(&sim.pose(object)).min.z,

@@ -2,16 +2,17 @@
 
 use super::{
     evidence::{EvidenceCollector, lowest},
-    simulation::{Kind, ObjectInstance, Simulation},
+    simulation::{ObjectInstance, Simulation},
     spec::EpisodeSpec,
 };
 use crate::{
     benchmark::{Goal, control::steps_per_control},
     evaluation::{
-        goal::GoalRegion,
-        judge::{Judge, JudgeConfig},
+        goal::Place,
+        judge::{Judge, Setup},
     },
     geometry::Vec3,
+    physics::BodyId,
     scene::Region,
 };
 
@@ -23,15 +24,15 @@ pub(super) fn judge(
     (target, place): (usize, usize),
     hold_s: f64,
 ) -> Judge {
-    Judge::new(JudgeConfig {
-        criteria: spec.criteria.clone(),
+    Judge::new(Setup {
+        rules: spec.rules.clone(),
         workspace: spec.scene.workspace,
-        goal: place_of(&spec.task.goal, &sim.objects[place]),
+        place: place_of(&spec.task.goal, &sim.objects[place]),
         hold_s,
         dt_s: spec.params.dt,
         steps_per_control: steps_per_control(spec.params.dt),
         target_weight_n: weight(sim, target),
-        is_target_soft: matches!(sim.objects[target].kind, Kind::Soft(_)),
+        soft: matches!(sim.objects[target].body, BodyId::Soft(_)),
         limit: spec.limit,
         target_lowest_z_w: lowest(sim, &sim.objects[target]),
         others_lowest_z_w: evidence.others_lowest(sim),
@@ -39,26 +40,24 @@ pub(super) fn judge(
 }
 
 /// Where the goal is, from the shape of what it names.
-fn place_of(goal: &Goal, place: &ObjectInstance) -> GoalRegion {
+fn place_of(goal: &Goal, place: &ObjectInstance) -> Place {
     let bounds = place.bounds;
     match goal {
-        Goal::On { .. } => GoalRegion::On { radius_m: 0.5 * bounds.size().xy().min() },
+        Goal::On { .. } => Place::On { radius_m: 0.5 * bounds.size().xy().min() },
         Goal::In { .. } => {
             let wall = place.asset.hints.get("wall_m").copied().unwrap_or(0.0);
             let inset = Vec3::new(wall, wall, 0.0);
             let foot = place.foot_o();
-            GoalRegion::In {
-                inside: Region { min: bounds.min + inset - foot, max: bounds.max - inset - foot },
-            }
+            Place::In { inside: Region { min: bounds.min + inset - foot, max: bounds.max - inset - foot } }
         }
     }
 }
 
 fn weight(sim: &Simulation, object: usize) -> f64 {
-    let mass = match sim.objects[object].kind {
-        Kind::Soft(index) => sim.world.soft[index].body.rest.total_mass(),
-        Kind::Rigid(index) => sim.world.rigid[index].body.mass,
-        Kind::Link { .. } | Kind::Static => 0.0,
+    let mass = match sim.objects[object].body {
+        BodyId::Soft(index) => sim.world.soft(index).state.model.total_mass(),
+        BodyId::Rigid(index) => sim.world.rigid(index).state.mass,
+        BodyId::Link(_) | BodyId::Kinematic(_) | BodyId::World => 0.0,
     };
     mass * sim.scene.gravity.norm()
 }

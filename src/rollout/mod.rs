@@ -2,6 +2,7 @@
 
 mod articulated;
 mod asset_cache;
+pub mod batch;
 mod build;
 pub mod cancel;
 mod command;
@@ -24,7 +25,7 @@ mod trace;
 
 pub use asset_cache::AssetCache;
 pub use build::{BuildError, check_support, soft_rest};
-pub use controller::{Cancellable, ControlError, Controller};
+pub use controller::{ControlError, Controller};
 pub use episode::{Episode, EpisodeError, FinishedEpisode, ScoreFrame};
 pub use proprioception::{BodyConfiguration, Proprioception};
 pub use robot_instance::RobotInstance;
@@ -32,7 +33,7 @@ pub use sensor_assets::SensorAssets;
 pub use sensor_check::{CAMERA_IMAGE_SUFFIXES, TACTILE_IMAGE_SUFFIXES, TACTILE_IMAGES, check_sensors};
 pub use sensors::{SensingError, SensorSuite, StateRecording};
 pub use settle::SettleError;
-pub use simulation::{ArticulatedPart, Kind, ObjectInstance, Simulation};
+pub use simulation::{ArticulatedPart, ObjectInstance, Simulation};
 pub use spec::{EpisodeRef, EpisodeSpec, target_asset};
 pub use state_hash::state_hash;
 pub use trace::{ObjectTrace, StepTrace};

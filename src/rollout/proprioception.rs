@@ -1,10 +1,10 @@
 //! Where the robot and the objects are in a kept state, as numbers.
 
-use super::{sensors::SensorSuite, simulation::Kind};
+use super::sensors::SensorSuite;
 use crate::{
     benchmark::control::CONTROL_DT,
     geometry::{Pose, Vec3},
-    physics::world::Frame,
+    physics::{BodyId, world::Frame},
     robot::{ik::DiffIk, panda::ARM_DOFS},
 };
 
@@ -31,7 +31,7 @@ pub enum BodyConfiguration<'a> {
 impl SensorSuite {
     /// The robot in a state.
     pub fn proprioception(&self, frame: &Frame) -> Proprioception {
-        let q = &frame.joints[self.tree];
+        let q = &frame.joints[self.articulation.index()];
         let joints = std::array::from_fn(|i| q[i]);
         Proprioception {
             tool_b: DiffIk::new(&self.robot.ik, joints, CONTROL_DT).tool_pose(&joints),
@@ -46,11 +46,11 @@ impl SensorSuite {
         frame: &'a Frame,
     ) -> impl Iterator<Item = (&'a str, BodyConfiguration<'a>)> {
         self.parts.iter().filter_map(|part| {
-            let state = match part.kind {
-                Kind::Soft(body) => BodyConfiguration::Nodes(&frame.nodes[body]),
-                Kind::Rigid(body) => BodyConfiguration::Pose(frame.rigid[body]),
-                Kind::Link { tree, link } => BodyConfiguration::Pose(frame.links[tree][link] * part.offset),
-                Kind::Static => return None,
+            let state = match part.body {
+                BodyId::Soft(body) => BodyConfiguration::Nodes(frame.soft(body)),
+                BodyId::Rigid(body) => BodyConfiguration::Pose(*frame.rigid(body)),
+                BodyId::Link(link) => BodyConfiguration::Pose(frame.link(link) * part.offset),
+                BodyId::World | BodyId::Kinematic(_) => return None,
             };
             Some((part.name.as_str(), state))
         })

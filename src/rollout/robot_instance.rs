@@ -5,9 +5,9 @@ use std::sync::Arc;
 use crate::{
     geometry::{Pose, Vec3, shape::Shape},
     physics::{
-        World,
-        contact::{Collider, ColliderId, Friction, Layer, Mover},
-        world::Drive,
+        ArticulationId, ColliderId, LinkId, World,
+        contact::{Collider, Friction, SurfaceStiffness},
+        world::JointDrive,
     },
     robot::{
         RobotSpec, Side,
@@ -23,8 +23,8 @@ use crate::{
 pub struct RobotInstance {
     /// Its numbers.
     pub spec: RobotSpec,
-    /// Its joint tree in the world.
-    pub tree: usize,
+    /// Its articulation in the world.
+    pub articulation: ArticulationId,
     /// Colliders of the left and right gel pad.
     pub pads: [ColliderId; 2],
     /// All other colliders of the robot.
@@ -47,8 +47,9 @@ impl RobotInstance {
         let tree = panda::tree(*base_w, &spec.gripper);
         let open = gripper::MAX_WIDTH / 2.0;
         let all: Vec<f64> = q.iter().copied().chain([open, open]).collect();
-        let drive =
-            |kp, kd, target, effort| Some(Drive { kp, kd, target, target_velocity: 0.0, effort, force: 0.0 });
+        let drive = |kp, kd, target, effort| {
+            Some(JointDrive { kp, kd, target, target_velocity: 0.0, effort, force: 0.0 })
+        };
         let drives = all
             .iter()
             .zip(&tree.links)
@@ -61,16 +62,20 @@ impl RobotInstance {
                 }
             })
             .collect();
-        let tree = world.add_tree("panda", tree, &all, drives, false);
-        let pads = Side::BOTH.map(|side| add_pad(world, spec, tree, side));
+        let articulation = world.add_articulation("panda", tree, &all, drives, false);
+        let pads = Side::BOTH.map(|side| add_pad(world, spec, articulation, side));
         let mut body = Vec::new();
         for side in Side::BOTH {
             let link = panda::finger_link(side);
-            body.extend(pads::finger_boxes(side).map(|b| add_box(world, tree, link, b.half, b.pose)));
+            body.extend(
+                pads::finger_boxes(side)
+                    .map(|b| add_box(world, LinkId { articulation, index: link }, b.half, b.pose)),
+            );
         }
-        body.extend(panda::hand_boxes().map(|b| add_box(world, tree, panda::HAND_LINK, b.half, b.pose)));
+        let hand = LinkId { articulation, index: panda::HAND_LINK };
+        body.extend(pads::hand_boxes().map(|b| add_box(world, hand, b.half, b.pose)));
         Self {
-            tree,
+            articulation,
             pads,
             body,
             base_w: *base_w,
@@ -83,7 +88,7 @@ impl RobotInstance {
     /// Takes a command for the coming control step: the tool's pose in the base frame and the closure.
     pub fn command(&mut self, world: &mut World, pose_b: &Pose, closure: f64) {
         let target = self.ik.step(&self.q(world), pose_b);
-        let drives = &mut world.trees[self.tree].drives;
+        let drives = world.articulation_mut(self.articulation).drives_mut();
         drives.iter_mut().flatten().zip(target).for_each(|(drive, q)| drive.target = q);
         self.gripper.command(closure);
     }
@@ -92,13 +97,13 @@ impl RobotInstance {
     pub fn advance(&mut self, world: &mut World) {
         self.gripper.advance(world.params.dt);
         let target = self.gripper.finger_target();
-        let drives = &mut world.trees[self.tree].drives;
+        let drives = world.articulation_mut(self.articulation).drives_mut();
         drives[ARM_DOFS..].iter_mut().flatten().for_each(|drive| drive.target = target);
     }
 
     /// Arm joint angles, rad.
     pub fn q(&self, world: &World) -> [f64; ARM_DOFS] {
-        std::array::from_fn(|i| world.trees[self.tree].state.q[i])
+        std::array::from_fn(|i| world.articulation(self.articulation).state.q[i])
     }
 
     /// Tool (TCP) pose in the base frame.
@@ -108,12 +113,14 @@ impl RobotInstance {
 
     /// Hand frame origin in the world, m.
     pub fn hand_w(&self, world: &World) -> Vec3 {
-        (world.trees[self.tree].poses()[panda::HAND_LINK] * panda::hand_in_link()).translation.vector
+        (world.articulation(self.articulation).poses()[panda::HAND_LINK] * panda::hand_in_link())
+            .translation
+            .vector
     }
 
     /// Measured width, m.
     pub fn width(&self, world: &World) -> f64 {
-        let q = &world.trees[self.tree].state.q;
+        let q = &world.articulation(self.articulation).state.q;
         gripper::width([q[ARM_DOFS], q[ARM_DOFS + 1]])
     }
 
@@ -132,25 +139,24 @@ impl RobotInstance {
     }
 }
 
-fn add_pad(world: &mut World, spec: &RobotSpec, tree: usize, side: Side) -> ColliderId {
-    let mover = Mover::Link { tree, link: panda::finger_link(side) };
+fn add_pad(world: &mut World, spec: &RobotSpec, articulation: ArticulationId, side: Side) -> ColliderId {
+    let link = LinkId { articulation, index: panda::finger_link(side) };
     let friction = Friction { static_mu: spec.pads.static_mu, dynamic_mu: spec.pads.dynamic_mu };
-    let layer = Layer { normal: spec.pads.normal_modulus, shear: spec.pads.tangential_modulus };
+    let stiffness =
+        SurfaceStiffness { normal: spec.pads.normal_modulus, shear: spec.pads.tangential_modulus };
     let name = if side == Side::Left { "left pad" } else { "right pad" };
     let surface = Arc::new(PadSurface::default());
-    world.add_collider(Collider::new(name, (mover, pads::pad_pose_in_finger(side)), surface, friction, layer))
+    world.add_collider(Collider::new(
+        name,
+        link,
+        pads::pad_pose_in_finger(side),
+        surface,
+        friction,
+        stiffness,
+    ))
 }
 
-fn add_box(world: &mut World, tree: usize, link: usize, half: Vec3, pose: Pose) -> ColliderId {
-    let layer = world.rigid_layer();
+fn add_box(world: &mut World, link: LinkId, half: Vec3, pose: Pose) -> ColliderId {
     // Steel and plastic: the friction of any rigid prop.
-    let friction = Friction::default();
-    let mover = Mover::Link { tree, link };
-    world.add_collider(Collider::new(
-        "gripper",
-        (mover, pose),
-        Arc::new(Shape::Box { half }),
-        friction,
-        layer,
-    ))
+    world.add_shape("gripper", link, pose, &Shape::Box { half }, Friction::default())
 }

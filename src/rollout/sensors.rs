@@ -5,14 +5,14 @@ use std::sync::Arc;
 
 use super::{
     sensor_assets::SensorAssets,
-    simulation::{Kind, Simulation, joint_frame},
+    simulation::{Simulation, joint_frame},
 };
 use crate::{
     geometry::{Pose, Vec3},
     physics::{
-        contact::ColliderId,
-        fem::Rest,
-        world::{ContactPatch, Frame, Presser},
+        ArticulationId, BodyId, ColliderId, ContactPartner,
+        fem::FemModel,
+        world::{ContactPatch, Frame},
     },
     policy::{PadForce, TactileFrame},
     robot::{RobotSpec, Side, pads, panda},
@@ -86,12 +86,12 @@ impl SensingError {
 pub(super) struct Part {
     pub(super) name: String,
     asset: Arc<Asset>,
-    pub(super) kind: Kind,
+    pub(super) body: BodyId,
     start_w: Pose,
     /// Its frame in that of its link, if it has one.
     pub(super) offset: Pose,
     colliders: Vec<ColliderId>,
-    rest: Option<Arc<Rest>>,
+    rest: Option<Arc<FemModel>>,
 }
 
 /// The sensors of one simulation.
@@ -100,7 +100,7 @@ pub struct SensorSuite {
     scene: Arc<Scene>,
     spec: TactileSpec,
     pub(super) robot: RobotSpec,
-    pub(super) tree: usize,
+    pub(super) articulation: ArticulationId,
     pub(super) parts: Vec<Part>,
     assets: SensorAssets,
     stage: Option<Arc<RenderScene>>,
@@ -115,7 +115,7 @@ impl Clone for SensorSuite {
             scene: self.scene.clone(),
             spec: self.spec.clone(),
             robot: self.robot.clone(),
-            tree: self.tree,
+            articulation: self.articulation,
             parts: self.parts.clone(),
             assets: self.assets.clone(),
             stage: self.stage.clone(),
@@ -137,12 +137,12 @@ impl SensorSuite {
         let part = |object: &super::ObjectInstance| Part {
             name: object.name.clone(),
             asset: object.asset.clone(),
-            kind: object.kind,
+            body: object.body,
             start_w: object.start_w,
             offset: joint_frame(object).inverse(),
             colliders: object.colliders.clone(),
-            rest: match object.kind {
-                Kind::Soft(body) => Some(sim.world.soft[body].body.rest.clone()),
+            rest: match object.body {
+                BodyId::Soft(body) => Some(sim.world.soft(body).state.model.clone()),
                 _ => None,
             },
         };
@@ -150,7 +150,7 @@ impl SensorSuite {
             scene: sim.scene.clone(),
             spec: spec.clone(),
             robot: sim.robot.spec.clone(),
-            tree: sim.robot.tree,
+            articulation: sim.robot.articulation,
             parts: sim.objects.iter().map(part).collect(),
             assets: assets.clone(),
             stage: None,
@@ -213,7 +213,7 @@ impl SensorSuite {
 
     /// The robot with nothing around it.
     pub(super) fn robot_alone(&self) -> Result<RenderScene, CameraError> {
-        let things = self.assets.robot()?.objects(self.tree, self.scene.base_w, ROBOT);
+        let things = self.assets.robot()?.objects(self.articulation.index(), self.scene.base_w, ROBOT);
         RenderScene::new(things.into_iter().collect(), self.scene.lighting.clone())
     }
 
@@ -227,7 +227,7 @@ impl SensorSuite {
 
     /// What pictures need of a state.
     pub fn view<'a>(&self, frame: &'a Frame) -> FrameView<'a> {
-        let hand_w = frame.links[self.tree][panda::HAND_LINK] * panda::hand_in_link();
+        let hand_w = frame.links[self.articulation.index()][panda::HAND_LINK] * panda::hand_in_link();
         FrameView::new(frame, Some(hand_w))
     }
 
@@ -287,12 +287,13 @@ impl SensorSuite {
     pub fn tactile_reading(&mut self, frame: &Frame, side: Side) -> Result<Touched, SensingError> {
         let sensor = self.assets.sensor(&self.spec)?;
         let index = usize::from(side == Side::Right);
-        let none = ContactPatch { collider: 0, points: Vec::new() };
+        let none = ContactPatch { collider: ColliderId::new(0), points: Vec::new() };
         // What touches the very rim alone, where no cell of the grid has its centre, cannot be seen.
         let inside = |p: &Vec3| sensor.gel.pad.edge_distance(p.x, p.y) < -sensor.gel.cell;
         let patch = frame.patches.get(index).filter(|patch| patch.points.iter().any(|p| inside(&p.p_p)));
         let patch = patch.unwrap_or(&none);
-        let pad_w = frame.links[self.tree][panda::finger_link(side)] * pads::pad_pose_in_finger(side);
+        let pad_w =
+            frame.links[self.articulation.index()][panda::finger_link(side)] * pads::pad_pose_in_finger(side);
         let mut placed: Vec<(Arc<Skin>, Vec<Vec3>)> = Vec::new();
         let mut give = None;
         for part in self.parts.iter().filter(|part| part.presses(patch)) {
@@ -300,13 +301,11 @@ impl SensorSuite {
             let skin = self.assets.skin(&part.name, &part.asset, mesh)?;
             let mut vertices = Vec::new();
             let w_p = pad_w.inverse();
-            match part.kind {
-                Kind::Soft(body) => skin.soft(&frame.nodes[body], &w_p, &mut vertices),
-                Kind::Rigid(body) => skin.rigid(&(w_p * frame.rigid[body]), &mut vertices),
-                Kind::Link { tree, link } => {
-                    skin.rigid(&(w_p * frame.links[tree][link] * part.offset), &mut vertices)
-                }
-                Kind::Static => skin.rigid(&(w_p * part.start_w), &mut vertices),
+            match part.body {
+                BodyId::Soft(body) => skin.soft(frame.soft(body), &w_p, &mut vertices),
+                BodyId::Rigid(body) => skin.rigid(&(w_p * frame.rigid(body)), &mut vertices),
+                BodyId::Link(link) => skin.rigid(&(w_p * frame.link(link) * part.offset), &mut vertices),
+                BodyId::World | BodyId::Kinematic(_) => skin.rigid(&(w_p * part.start_w), &mut vertices),
             }
             placed.push((skin, vertices));
             give = part.give();
@@ -326,11 +325,15 @@ impl SensorSuite {
     fn things(&self) -> Result<Vec<RenderObject>, CameraError> {
         let draw = |(index, part): (usize, &Part)| {
             let voxels = part.rest.as_ref().map(|rest| &rest.mesh);
-            let attachment = match part.kind {
-                Kind::Soft(body) => Attachment::Soft(body),
-                Kind::Rigid(body) => Attachment::Rigid(body),
-                Kind::Link { tree, link } => Attachment::Link { tree, link, offset: part.offset },
-                Kind::Static => Attachment::Fixed(part.start_w),
+            let attachment = match part.body {
+                BodyId::Soft(body) => Attachment::Soft(body.index()),
+                BodyId::Rigid(body) => Attachment::Rigid(body.index()),
+                BodyId::Link(link) => Attachment::Link {
+                    tree: link.articulation.index(),
+                    link: link.index,
+                    offset: part.offset,
+                },
+                BodyId::World | BodyId::Kinematic(_) => Attachment::Fixed(part.start_w),
             };
             Ok(RenderObject {
                 name: part.name.clone(),
@@ -342,7 +345,7 @@ impl SensorSuite {
         };
         let mut things: Vec<RenderObject> =
             self.parts.iter().enumerate().map(draw).collect::<Result<_, _>>()?;
-        things.extend(self.assets.robot()?.objects(self.tree, self.scene.base_w, ROBOT));
+        things.extend(self.assets.robot()?.objects(self.articulation.index(), self.scene.base_w, ROBOT));
         Ok(things)
     }
 }
@@ -350,10 +353,9 @@ impl SensorSuite {
 impl Part {
     /// Whether any point of a patch is its own.
     fn presses(&self, patch: &ContactPatch) -> bool {
-        patch.points.iter().any(|point| match (&point.by, self.kind) {
-            (Presser::Soft { body, .. }, Kind::Soft(own)) => *body == own,
-            (Presser::Solid { collider }, _) => self.colliders.contains(collider),
-            _ => false,
+        patch.points.iter().any(|point| match point.partner {
+            ContactPartner::Soft(id) => self.body == BodyId::Soft(id),
+            ContactPartner::Collider(id) => self.colliders.contains(&id),
         })
     }
 

@@ -2,9 +2,13 @@
 
 use super::{
     cancel,
-    simulation::{Kind, ObjectInstance, Simulation},
+    simulation::{ObjectInstance, Simulation},
 };
-use crate::{geometry::Aabb, physics::world::StepFailure, scene::Scene};
+use crate::{
+    geometry::Aabb,
+    physics::{BodyId, world::StepFailure},
+    scene::Scene,
+};
 
 /// Speed below which a node counts as settled, m/s.
 const SETTLED_SPEED: f64 = 1e-3;
@@ -102,7 +106,7 @@ impl Simulation {
         let (name, placed_at) = (object.name.clone(), placed_at(&self.scene, &object.name));
         let height = self.centre(object).z;
         let fixed =
-            self.objects.iter().filter(|other| other.kind == Kind::Static && !other.colliders.is_empty());
+            self.objects.iter().filter(|other| other.body == BodyId::World && !other.colliders.is_empty());
         let floor = fixed
             .map(|other| Aabb::transformed(&other.bounds, &other.start_w).min.z)
             .fold(f64::INFINITY, f64::min);

@@ -11,43 +11,12 @@ use crate::{
     benchmark::control::CONTROL_DT,
     geometry::{Aabb, Pose, Vec3},
     physics::{
-        Params, World,
-        contact::{ColliderId, Partner},
-        joints,
-        world::{Movable, StepFailure, Touch},
+        BodyId, ColliderId, ContactPartner, PhysicsParams, World, joints,
+        world::{ContactSummary, StepFailure},
     },
     robot::RobotSpec,
     scene::{Asset, Joint, Scene},
 };
-
-/// What an object is in the world.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// A soft body, by index.
-    Soft(usize),
-    /// A rigid body, by index.
-    Rigid(usize),
-    /// A part on a joint.
-    Link {
-        /// Index of the joint tree.
-        tree: usize,
-        /// Index of the link, which is also that of the joint.
-        link: usize,
-    },
-    /// Part of the world.
-    Static,
-}
-
-impl Kind {
-    /// It as a free body of the world, if it is one.
-    pub fn movable(self) -> Option<Movable> {
-        match self {
-            Self::Soft(index) => Some(Movable::Soft(index)),
-            Self::Rigid(index) => Some(Movable::Rigid(index)),
-            Self::Link { .. } | Self::Static => None,
-        }
-    }
-}
 
 /// What a part belongs to.
 #[derive(Clone, Debug, PartialEq)]
@@ -67,8 +36,8 @@ pub struct ObjectInstance {
     pub name: String,
     /// What it is.
     pub asset: Arc<Asset>,
-    /// What it became.
-    pub kind: Kind,
+    /// Its body in the world.
+    pub body: BodyId,
     /// Where it was put.
     pub start_w: Pose,
     /// Its colliders.
@@ -110,7 +79,7 @@ impl Simulation {
     /// An object that cannot be made, two of one name, or one that starts inside of another or of the robot.
     pub fn new(
         scene: Arc<Scene>,
-        params: &Params,
+        params: &PhysicsParams,
         robot_spec: &RobotSpec,
         cache: &AssetCache,
     ) -> Result<Self, BuildError> {
@@ -133,31 +102,32 @@ impl Simulation {
 
     /// Speed of the fastest point of an object, m/s (of its centre and 0.1 m of lever for a rigid one).
     pub fn speed(&self, object: &ObjectInstance) -> f64 {
-        match object.kind {
-            Kind::Soft(index) => self.world.soft[index].body.max_speed(),
-            Kind::Rigid(index) => {
-                let body = &self.world.rigid[index].body;
+        match object.body {
+            BodyId::Soft(index) => self.world.soft(index).state.max_speed(),
+            BodyId::Rigid(index) => {
+                let body = &self.world.rigid(index).state;
                 body.v.norm() + 0.1 * body.w.norm()
             }
-            Kind::Link { tree, link } => {
-                let tree = &self.world.trees[tree];
-                let velocity = joints::velocities(&tree.tree, tree.poses(), tree.state.v.as_slice())[link];
+            BodyId::Link(link) => {
+                let articulation = self.world.articulation(link.articulation);
+                let (tree, poses) = (articulation.tree(), articulation.poses());
+                let velocity = joints::velocities(tree, poses, articulation.state.v.as_slice())[link.index];
                 let centre = self.centre(object);
-                velocity.at(&tree.poses()[link], &centre).norm() + 0.1 * velocity.angular.norm()
+                velocity.at(&poses[link.index], &centre).norm() + 0.1 * velocity.angular.norm()
             }
-            Kind::Static => 0.0,
+            BodyId::World | BodyId::Kinematic(_) => 0.0,
         }
     }
 
     /// What a collider or soft body did to an object in the last step in which the object was awake; nothing to what
     /// never moves.
-    pub fn contact(&self, object: &ObjectInstance, partner: Partner) -> Touch {
-        object.kind.movable().map_or(Touch::default(), |body| self.world.touch_on(body, partner))
+    pub fn contact(&self, object: &ObjectInstance, partner: ContactPartner) -> ContactSummary {
+        self.world.contact(object.body, partner)
     }
 
     /// What the left and right pad did to an object.
-    pub fn pad_contacts(&self, object: &ObjectInstance) -> [Touch; 2] {
-        self.robot.pads.map(|pad| self.contact(object, Partner::Collider(pad)))
+    pub fn pad_contacts(&self, object: &ObjectInstance) -> [ContactSummary; 2] {
+        self.robot.pads.map(|pad| self.contact(object, ContactPartner::Collider(pad)))
     }
 
     /// Object by name.
@@ -168,14 +138,14 @@ impl Simulation {
     /// Centre of an object, m, world: the mean of a soft body's nodes, the centre of mass of a rigid one, the middle of a
     /// part's bounds.
     pub fn centre(&self, object: &ObjectInstance) -> Vec3 {
-        match object.kind {
-            Kind::Soft(index) => {
-                let x = &self.world.soft[index].body.x;
+        match object.body {
+            BodyId::Soft(index) => {
+                let x = &self.world.soft(index).state.x;
                 x.iter().sum::<Vec3>() / x.len() as f64
             }
-            Kind::Rigid(index) => self.world.rigid[index].body.pose_w.translation.vector,
-            Kind::Link { .. } => (self.pose(object) * nalgebra::Point3::from(object.bounds.centre())).coords,
-            Kind::Static => object.start_w.translation.vector,
+            BodyId::Rigid(index) => self.world.rigid(index).state.pose_w.translation.vector,
+            BodyId::Link(_) => (self.pose(object) * nalgebra::Point3::from(object.bounds.centre())).coords,
+            BodyId::World | BodyId::Kinematic(_) => object.start_w.translation.vector,
         }
     }
 
@@ -187,26 +157,26 @@ impl Simulation {
 
     /// Joint value of a part, m or rad.
     pub fn joint(&self, object: &ObjectInstance) -> Option<f64> {
-        match object.kind {
-            Kind::Link { tree, link } => Some(self.world.trees[tree].state.q[link]),
+        match object.body {
+            BodyId::Link(link) => Some(self.world.articulation(link.articulation).state.q[link.index]),
             _ => None,
         }
     }
 
     /// Object frame in the world; of a soft body its mean rotation about its centre.
     pub fn pose(&self, object: &ObjectInstance) -> Pose {
-        match object.kind {
-            Kind::Soft(index) => {
-                let body = &self.world.soft[index].body;
+        match object.body {
+            BodyId::Soft(index) => {
+                let body = &self.world.soft(index).state;
                 let rotation = crate::geometry::Quat::from_matrix(&body.frame);
-                let nodes = &body.rest.mesh.nodes;
+                let nodes = &body.model.mesh.nodes;
                 let rest_centre = nodes.iter().sum::<Vec3>() / nodes.len() as f64;
                 let at = self.centre(object) - rotation * rest_centre;
                 Pose::from_parts(at.into(), rotation)
             }
-            Kind::Rigid(index) => self.world.rigid[index].body.object_w(),
-            Kind::Link { tree, link } => self.world.trees[tree].poses()[link] * joint_frame(object).inverse(),
-            Kind::Static => object.start_w,
+            BodyId::Rigid(index) => self.world.rigid(index).state.object_w(),
+            BodyId::Link(link) => self.world.link_pose(link) * joint_frame(object).inverse(),
+            BodyId::World | BodyId::Kinematic(_) => object.start_w,
         }
     }
 }

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use crate::{
     benchmark::{Task, seed::Split, settings::Settings},
-    evaluation::{criteria::SuccessCriteria, record::Identity, safety::DeformationLimit},
-    physics::Params,
+    evaluation::{record::Identity, rules::Rules, safety::Limit},
+    physics::PhysicsParams,
     robot::RobotSpec,
     scene::{Asset, Body, Scene},
     sensing::tactile::TactileSpec,
@@ -36,11 +36,11 @@ pub struct EpisodeSpec {
     /// The scene before settling.
     pub scene: Arc<Scene>,
     /// Deformation limit by asset name; `None` if the target was never calibrated.
-    pub limit: Option<DeformationLimit>,
+    pub limit: Option<Limit>,
     /// Judging thresholds.
-    pub criteria: SuccessCriteria,
+    pub rules: Rules,
     /// Parameters of the mechanics.
-    pub params: Params,
+    pub params: PhysicsParams,
     /// Parameters of the robot.
     pub robot: RobotSpec,
     /// Parameters of the tactile sensors.
@@ -80,7 +80,7 @@ impl EpisodeSpec {
             task: task.clone(),
             scene: Arc::new(scene),
             limit: None,
-            criteria: settings.criteria.clone(),
+            rules: settings.rules.clone(),
             params: settings.physics.clone(),
             robot: settings.robot.clone(),
             tactile: settings.tactile.clone(),

@@ -2,10 +2,8 @@
 
 use serde::Serialize;
 
-use super::{
-    evidence::EvidenceCollector,
-    simulation::{Kind, Simulation},
-};
+use super::{evidence::EvidenceCollector, simulation::Simulation};
+use crate::physics::BodyId;
 use crate::robot::rotation;
 
 /// One control step.
@@ -89,9 +87,9 @@ impl StepTrace {
             slip_mm: touch.map(|t| 1e3 * t.travel),
             dropped,
             energy_j: [energy.kinetic, energy.elastic, energy.potential],
-            newton: sim.world.stats.newton,
+            newton: sim.world.stats().newton,
             objects: (0..sim.objects.len())
-                .filter(|&i| sim.objects[i].kind != Kind::Static)
+                .filter(|&i| sim.objects[i].body != BodyId::World)
                 .map(|i| object(sim, evidence, i, nodes))
                 .collect(),
         }
@@ -102,22 +100,21 @@ fn object(sim: &Simulation, evidence: &EvidenceCollector, index: usize, nodes: b
     let handle = &sim.objects[index];
     let pose = sim.pose(handle);
     let q = rotation::canonical(&pose.rotation);
-    let (soft, asleep) = match handle.kind {
-        Kind::Soft(index) => (Some(&sim.world.soft[index]), sim.world.soft[index].asleep),
-        Kind::Rigid(index) => (None, sim.world.rigid[index].asleep),
-        Kind::Link { tree, .. } => (None, sim.world.trees[tree].asleep),
-        Kind::Static => (None, false),
+    let (soft, asleep) = match handle.body {
+        BodyId::Soft(index) => (Some(sim.world.soft(index)), sim.world.soft(index).is_asleep()),
+        BodyId::Rigid(index) => (None, sim.world.rigid(index).is_asleep()),
+        BodyId::Link(link) => (None, sim.world.articulation(link.articulation).is_asleep()),
+        BodyId::World | BodyId::Kinematic(_) => (None, false),
     };
-    let touches = handle.kind.movable().map_or(&[][..], |body| sim.world.touches_on(body));
-    let name = |partner: u32| sim.world.partner_name(partner).to_owned();
+    let contacts = sim.world.contacts(handle.body).iter();
     ObjectTrace {
         name: handle.name.clone(),
         position_w: pose.translation.vector.into(),
         quaternion_w: [q.w, q.i, q.j, q.k],
         d_pct: evidence.deformation(sim, index).map(|d| d.rms_pct),
-        min_det_f: soft.map(|s| s.min_det_f.0),
+        min_det_f: soft.map(|s| s.min_det_f().det_f),
         asleep,
-        touches: touches.iter().map(|(partner, _)| name(*partner)).collect(),
-        nodes: soft.filter(|_| nodes).map(|s| s.body.x.iter().map(|x| (*x).into()).collect()),
+        touches: contacts.map(|contact| sim.world.partner_name(contact.partner).to_owned()).collect(),
+        nodes: soft.filter(|_| nodes).map(|s| s.state.x.iter().map(|x| (*x).into()).collect()),
     }
 }

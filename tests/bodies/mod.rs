@@ -1,40 +1,25 @@
-//! What the tests of contact and the validation of the mechanics put into a world.
+//! Helpers shared by the contact tests and the validation of the mechanics.
 
 use std::sync::Arc;
 
 use softvt::{
-    geometry::{
-        Pose,
-        mass::mass_properties,
-        samples::{SampleSpec, surface_samples},
-        shape::Shape,
-        voxel::{VoxelSpec, voxel_mesh},
-    },
+    geometry::{samples::SampleSpec, shape::Shape},
     physics::{
-        World,
-        contact::{Collider, Friction, Mover},
-        fem::{Material, Rest},
+        fem::{ElasticMaterial, FemModel},
+        world::SoftBodyBuilder,
     },
 };
 
 /// Gravity, m/s².
 pub const GRAVITY: f64 = 9.81;
 
-/// The rest data of a soft body.
-pub fn soft_rest(shape: &Shape, material: Material, resolution: usize, spec: &SampleSpec) -> Arc<Rest> {
-    let mesh = voxel_mesh(shape, &VoxelSpec { resolution }).expect("a mesh");
-    let samples = surface_samples(shape, &mesh, spec);
-    Rest::new(mesh, material, mass_properties(shape, 1.0).mass, samples)
-}
-
-/// A collider of a hard shape.
-pub fn put(
-    world: &mut World,
-    name: &str,
-    (mover, pose): (Mover, Pose),
+/// The finite-element model of a soft body.
+pub fn fem_model(
     shape: &Shape,
-    mu: Friction,
-) -> usize {
-    let layer = world.rigid_layer();
-    world.add_collider(Collider::new(name, (mover, pose), Arc::new(shape.clone()), mu, layer))
+    material: ElasticMaterial,
+    resolution: usize,
+    spec: &SampleSpec,
+) -> Arc<FemModel> {
+    let body = SoftBodyBuilder::new("body", shape, material).resolution(resolution).samples(*spec);
+    body.model().expect("a mesh")
 }

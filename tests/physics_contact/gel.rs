@@ -5,9 +5,8 @@ use std::sync::Arc;
 use softvt::{
     geometry::{Pose, Vec3, shape::Shape},
     physics::{
-        World,
-        contact::{Collider, Friction, Layer, Mover, Partner},
-        world::Movable,
+        BodyId, ColliderId, ContactPartner, KinematicId, RigidId, World,
+        contact::{Collider, Friction, SurfaceStiffness},
     },
     robot::{Side, pads::PadSurface},
     sensing::tactile::PadLoad,
@@ -15,12 +14,12 @@ use softvt::{
 
 use crate::scene::*;
 
-const GEL: Layer = Layer { normal: 3e8, shear: 4e7 };
+const GEL: SurfaceStiffness = SurfaceStiffness { normal: 3e8, shear: 4e7 };
 
 /// Two prescribed pads whose apexes are `apart` (m) from each other along y, at height z.
 struct Hand {
-    frames: [usize; 2],
-    pads: [usize; 2],
+    frames: [KinematicId; 2],
+    pads: [ColliderId; 2],
 }
 
 fn pad_pose(side: Side, apart: f64, lift: f64) -> Pose {
@@ -36,7 +35,8 @@ impl Hand {
         let pads = frames.map(|frame| {
             world.add_collider(Collider::new(
                 "pad",
-                (Mover::Kinematic(frame), Pose::identity()),
+                frame,
+                Pose::identity(),
                 Arc::new(PadSurface::default()),
                 friction(1.5, 1.2),
                 GEL,
@@ -59,13 +59,13 @@ impl Hand {
         }
     }
 
-    fn force(&self, world: &World, body: usize) -> [f64; 2] {
-        self.pads.map(|pad| world.touch_on(Movable::Rigid(body), Partner::Collider(pad)).normal_force)
+    fn force(&self, world: &World, body: RigidId) -> [f64; 2] {
+        self.pads.map(|pad| world.contact(body, pad).normal_force)
     }
 }
 
 /// A body of 0.2 kg on a floor, squeezed `depth` m by each pad at its middle height.
-fn grasped(shape: &Shape, pose: Pose, width: f64, depth: f64) -> (World, usize, Hand, f64) {
+fn grasped(shape: &Shape, pose: Pose, width: f64, depth: f64) -> (World, RigidId, Hand, f64) {
     grasped_of(shape, pose, width, depth, friction(0.6, 0.5))
 }
 
@@ -76,7 +76,7 @@ fn grasped_of(
     width: f64,
     depth: f64,
     surface: Friction,
-) -> (World, usize, Hand, f64) {
+) -> (World, RigidId, Hand, f64) {
     let mut world = world();
     floor(&mut world, friction(0.6, 0.5));
     let body = rigid(&mut world, shape, 0.2, pose, surface);
@@ -111,7 +111,7 @@ fn a_rigid_box_is_grasped_lifted_and_held_without_creep() {
         let (mut world, body, hand, shut) = grasped(&shape, at(0.0, 0.0, height), 0.05, 1.5e-4);
         hand.go(&mut world, (shut, height), (shut, height + 0.2), 1.0);
         run(&mut world, 0.3);
-        let place = |world: &World| world.rigid[body].body.pose_w;
+        let place = |world: &World| world.rigid(body).state.pose_w;
         let before = place(&world);
         assert!((before.translation.vector.z - height - 0.2).abs() < 1e-3, "{name} at {before}");
         run(&mut world, 5.0);
@@ -131,7 +131,7 @@ fn what_the_pads_cannot_hold_slides_out_of_them() {
     assert!(force > 0.0 && 1.5 * force < 0.2 * GRAVITY, "{force} N");
     hand.go(&mut world, (shut, 0.02), (shut, 0.12), 0.5);
     run(&mut world, 0.3);
-    let z = world.rigid[body].body.pose_w.translation.vector.z;
+    let z = world.rigid(body).state.pose_w.translation.vector.z;
     assert!(z < 0.021, "carried to {z} m");
 }
 
@@ -177,18 +177,19 @@ fn bodies_are_told_alike_what_touches_them() {
     let shape = cuboid(0.05, 0.05, 0.05);
     let low = rigid(&mut world, &shape, 0.3, at(0.0, 0.0, 0.025), friction(0.6, 0.5));
     let high = rigid(&mut world, &shape, 0.2, at(0.0, 0.0, 0.075), friction(0.6, 0.5));
-    let bun = soft_rest(&cuboid(0.04, 0.04, 0.04), SOFT, 4, 0.002);
+    let bun = fem_model(&cuboid(0.04, 0.04, 0.04), SOFT, 4, 0.002);
     let bun = soft(&mut world, &cuboid(0.04, 0.04, 0.04), &bun, at(0.0, 0.0, 0.12), friction(0.6, 0.5));
     run(&mut world, 1.5);
-    let up = |on, partner| world.touch_on(on, partner).force_w.z;
-    let bun_weight = world.soft[bun].body.rest.total_mass() * GRAVITY;
-    let collider = |body| ground + 1 + body;
+    let up = |on, partner| world.contact(on, partner).force_w.z;
+    let bun_weight = world.soft(bun).state.model.total_mass() * GRAVITY;
+    // The floor's collider is followed by one per body.
+    let collider = |body: RigidId| ColliderId::new(1 + body.index());
     for (on, partner, expected) in [
-        (Movable::Rigid(low), Partner::Collider(ground), 0.5 * GRAVITY + bun_weight),
-        (Movable::Rigid(low), Partner::Collider(collider(high)), -0.2 * GRAVITY - bun_weight),
-        (Movable::Rigid(high), Partner::Collider(collider(low)), 0.2 * GRAVITY + bun_weight),
-        (Movable::Rigid(high), Partner::Soft(bun), -bun_weight),
-        (Movable::Soft(bun), Partner::Collider(collider(high)), bun_weight),
+        (BodyId::Rigid(low), ContactPartner::Collider(ground), 0.5 * GRAVITY + bun_weight),
+        (BodyId::Rigid(low), ContactPartner::Collider(collider(high)), -0.2 * GRAVITY - bun_weight),
+        (BodyId::Rigid(high), ContactPartner::Collider(collider(low)), 0.2 * GRAVITY + bun_weight),
+        (BodyId::Rigid(high), ContactPartner::Soft(bun), -bun_weight),
+        (BodyId::Soft(bun), ContactPartner::Collider(collider(high)), bun_weight),
     ] {
         let found = up(on, partner);
         assert!(

@@ -2,13 +2,13 @@
 
 use softvt::{
     geometry::{Pose, Vec3, shape::Shape},
-    physics::{World, contact::Mover},
+    physics::{BodyId, RigidId, World},
 };
 
 use crate::scene::*;
 
-fn position(world: &World, body: usize) -> Vec3 {
-    world.rigid[body].body.pose_w.translation.vector
+fn position(world: &World, body: RigidId) -> Vec3 {
+    world.rigid(body).state.pose_w.translation.vector
 }
 
 #[test]
@@ -29,8 +29,8 @@ fn a_thousandfold_mass_rests_on_a_light_box() {
     let light = rigid(&mut world, &shape, 0.1, at(0.0, 0.0, 0.025), friction(0.6, 0.5));
     let heavy = rigid(&mut world, &shape, 100.0, at(0.001, 0.0, 0.0752), friction(0.6, 0.5));
     run(&mut world, 3.0);
-    let speed = world.rigid.iter().map(|r| r.body.v.norm() + r.body.w.norm()).fold(0.0, f64::max);
-    let sunk = [light, heavy].map(|i| [0.025, 0.075][i] - position(&world, i).z);
+    let speed = world.rigid_bodies().iter().map(|r| r.state.v.norm() + r.state.w.norm()).fold(0.0, f64::max);
+    let sunk = [(light, 0.025), (heavy, 0.075)].map(|(body, z)| z - position(&world, body).z);
     assert!(speed < 1e-4 && sunk[1] < 2.5e-3 && sunk[0] > 0.0, "{speed} m/s, sunk {sunk:?} m");
 }
 
@@ -42,13 +42,7 @@ fn a_prescribed_pusher_pushes_and_a_box_bigger_than_what_it_rests_on_is_held_by_
     let small = rigid(&mut world, &block, 0.2, at(0.0, 0.0, 0.02), friction(0.6, 0.5));
     let tray = rigid(&mut world, &cuboid(0.12, 0.12, 0.01), 0.2, at(0.0, 0.0, 0.045), friction(0.6, 0.5));
     let hand = world.add_kinematic(at(-0.03, 0.0, 0.02));
-    put(
-        &mut world,
-        "hand",
-        (Mover::Kinematic(hand), Pose::identity()),
-        &cuboid(0.02, 0.02, 0.02),
-        friction(0.6, 0.5),
-    );
+    world.add_shape("hand", hand, Pose::identity(), &cuboid(0.02, 0.02, 0.02), friction(0.6, 0.5));
     run(&mut world, 0.2);
     let speed = 0.05;
     for step in 0..60 {
@@ -68,12 +62,12 @@ fn a_lathe_bowl_stands_on_its_foot() {
     let profile = vec![[0.0, 0.0], [0.03, 0.0], [0.05, 0.03], [0.046, 0.03], [0.028, 0.005], [0.0, 0.005]];
     let bowl = Shape::lathe(profile).expect("a bowl");
     let inertia = nalgebra::Matrix3::from_diagonal(&Vec3::new(1.5e-4, 1.5e-4, 2e-4));
-    let body = softvt::physics::rigid::RigidBody::new(&at(0.0, 0.0, 0.002), Vec3::z() * 0.012, 0.2, inertia)
+    let body = softvt::physics::rigid::RigidState::new(&at(0.0, 0.0, 0.002), Vec3::z() * 0.012, 0.2, inertia)
         .expect("a real body");
     let index = world.add_rigid("bowl", body);
-    put(&mut world, "bowl", (Mover::Rigid(index), Pose::identity()), &bowl, friction(0.6, 0.5));
+    world.add_shape("bowl", index, Pose::identity(), &bowl, friction(0.6, 0.5));
     run(&mut world, 1.0);
-    let object = world.rigid[index].body.object_w();
+    let object = world.rigid(index).state.object_w();
     let tilt = (object.rotation * Vec3::z()).angle(&Vec3::z());
     let z = object.translation.vector.z;
     assert!(z.abs() < 1e-4 && tilt < 1e-3, "z {z} m, tilt {tilt} rad");
@@ -88,14 +82,14 @@ fn a_resting_box_falls_asleep_and_a_push_wakes_it() {
     let low = rigid(&mut world, &shape, 0.3, at(0.0, 0.0, 0.025), friction(0.6, 0.5));
     let high = rigid(&mut world, &shape, 0.3, at(0.0, 0.0, 0.076), friction(0.6, 0.5));
     run(&mut world, 2.0);
-    assert!(world.rigid[low].asleep && world.rigid[high].asleep);
+    assert!(world.rigid(low).is_asleep() && world.rigid(high).is_asleep());
     let ball =
         rigid(&mut world, &Shape::Sphere { radius: 0.02 }, 0.3, at(-0.1, 0.0, 0.075), friction(0.6, 0.5));
-    world.rigid[ball].body.v = Vec3::x() * 2.0;
+    world.rigid_mut(ball).state.v = Vec3::x() * 2.0;
     run(&mut world, 0.1);
     let (upper, lower) = (position(&world, high), position(&world, low));
     assert!(upper.x > 0.005, "pushed: {upper}");
-    assert!(lower.x < 0.5 * upper.x && !world.rigid[high].asleep, "{lower}");
+    assert!(lower.x < 0.5 * upper.x && !world.rigid(high).is_asleep(), "{lower}");
 }
 
 #[test]
@@ -105,22 +99,22 @@ fn fast_bodies_are_stopped_by_a_thin_shelf() {
     let cone = Shape::lathe(vec![[0.0, -0.01], [0.01, 0.01], [0.0, 0.01]]).expect("a cone");
     for (shape, carrier) in [(&ball, &ball), (&die, &die), (&cone, &ball)] {
         let mut world = world();
-        put(
-            &mut world,
+        world.add_shape(
             "shelf",
-            (Mover::Static, Pose::identity()),
+            BodyId::World,
+            Pose::identity(),
             &cuboid(0.2, 0.2, 0.004),
             friction(0.6, 0.5),
         );
         let pose = turned(at(0.01, 0.02, 0.1), Vec3::new(0.5, 0.3, 0.0));
         let body = rigid(&mut world, carrier, 0.1, pose, friction(0.6, 0.5));
         if shape != carrier {
-            let last = world.add_rigid("cone", world.rigid[body].body.clone());
-            put(&mut world, "cone", (Mover::Rigid(last), Pose::identity()), shape, friction(0.6, 0.5));
-            world.rigid[body].body.pose_w.translation.vector.x += 10.0;
+            let last = world.add_rigid("cone", world.rigid(body).state.clone());
+            world.add_shape("cone", last, Pose::identity(), shape, friction(0.6, 0.5));
+            world.rigid_mut(body).state.pose_w.translation.vector.x += 10.0;
         }
-        let body = world.rigid.len() - 1;
-        world.rigid[body].body.v = Vec3::z() * -5.0;
+        let body = RigidId::new(world.rigid_bodies().len() - 1);
+        world.rigid_mut(body).state.v = Vec3::z() * -5.0;
         run(&mut world, 0.5);
         let z = position(&world, body).z;
         assert!(z > 0.005 && z < 0.03, "{shape:?} ends at {z} m");

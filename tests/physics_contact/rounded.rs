@@ -2,7 +2,7 @@
 
 use softvt::{
     geometry::{Pose, Quat, Vec3, mesh::Mesh, shape::Shape},
-    physics::{World, contact::Mover},
+    physics::{BodyId, World},
 };
 
 use crate::scene::*;
@@ -21,7 +21,7 @@ fn rest(shape: &Shape, mass: f64, object_w: Pose, support: &dyn Fn(&mut World)) 
     support(&mut world);
     let body = uniform(&mut world, shape, mass, object_w, friction(0.6, 0.5));
     run(&mut world, 1.0);
-    let body = &world.rigid[body].body;
+    let body = &world.rigid(body).state;
     let now = body.object_w();
     Rest {
         sunk: (object_w.translation.vector - now.translation.vector).z,
@@ -50,7 +50,7 @@ fn flat(world: &mut World) {
 }
 
 fn fixed(world: &mut World, shape: &Shape, pose: Pose) {
-    put(world, "support", (Mover::Static, pose), shape, friction(0.6, 0.5));
+    world.add_shape("support", BodyId::World, pose, shape, friction(0.6, 0.5));
 }
 
 /// A slab with rounded edges, top at z = 0.
@@ -181,9 +181,9 @@ fn an_egg_rolls_from_rest_on_half_a_degree_as_a_ball_does() {
     let egg = Shape::Ellipsoid { radii: Vec3::new(0.02, 0.03, 0.02) };
     let body = uniform(&mut world, &egg, 0.1, at(0.0, 0.0, 0.02), friction(0.6, 0.5));
     run(&mut world, 0.2);
-    let before = world.rigid[body].body.v.x;
+    let before = world.rigid(body).state.v.x;
     run(&mut world, 0.3);
-    let ratio = (world.rigid[body].body.v.x - before) / 0.3 / (5.0 / 7.0 * GRAVITY * slope.sin());
+    let ratio = (world.rigid(body).state.v.x - before) / 0.3 / (5.0 / 7.0 * GRAVITY * slope.sin());
     assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
 }
 
@@ -198,16 +198,16 @@ fn a_box_with_rounded_edges_sticks_below_its_angle_and_slides_above_it() {
         (world, body)
     };
     let (mut held, body) = on_slope(0.6f64.atan() - 0.02);
-    let before = held.rigid[body].body.pose_w.translation.vector;
+    let before = held.rigid(body).state.pose_w.translation.vector;
     run(&mut held, 2.0);
-    let crept = (held.rigid[body].body.pose_w.translation.vector - before).norm();
+    let crept = (held.rigid(body).state.pose_w.translation.vector - before).norm();
     assert!(crept < 1e-6, "crept {crept} m");
     let angle = 0.6f64.atan() + 0.02;
     let (mut slides, body) = on_slope(angle);
     run(&mut slides, 0.2);
-    let before = slides.rigid[body].body.v.x;
+    let before = slides.rigid(body).state.v.x;
     run(&mut slides, 0.3);
-    let found = (slides.rigid[body].body.v.x - before) / 0.3;
+    let found = (slides.rigid(body).state.v.x - before) / 0.3;
     let expected = GRAVITY * (angle.sin() - 0.4 * angle.cos());
     assert!((found / expected - 1.0).abs() < 0.01, "{found} instead of {expected}");
 }
@@ -223,7 +223,7 @@ fn two_flat_fingers_lift_a_box_with_rounded_edges_without_slip() {
         let place = |side: f64, squeeze: f64, z: f64| at(side * (0.029 - squeeze), 0.0, z);
         let fingers = [-1.0, 1.0].map(|side| (side, world.add_kinematic(place(side, 0.0, 0.024))));
         for (_, id) in fingers {
-            put(&mut world, "finger", (Mover::Kinematic(id), Pose::identity()), &finger, friction(0.6, 0.5));
+            world.add_shape("finger", id, Pose::identity(), &finger, friction(0.6, 0.5));
         }
         run(&mut world, 0.2);
         let mut lifted = 0.0;
@@ -236,7 +236,7 @@ fn two_flat_fingers_lift_a_box_with_rounded_edges_without_slip() {
             }
             world.step().expect("a step that converges");
         }
-        let now = world.rigid[body].body.object_w();
+        let now = world.rigid(body).state.object_w();
         let slid = (now.translation.vector - Vec3::z() * (0.024 + lifted)).norm();
         let turned = now.rotation.angle();
         assert!(slid < 5e-5 && turned < 2e-3, "{share}: slid {slid} m, turned {turned}");

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use softvt::{
     geometry::{Pose, samples::SampleSpec, shape::Shape},
     physics::{
-        World,
+        SoftId, World,
         contact::Friction,
-        fem::{Material, Rest},
+        fem::{ElasticMaterial, FemModel},
     },
 };
 
@@ -15,15 +15,15 @@ use crate::bodies;
 pub use crate::solids::*;
 
 /// A soft material like bread.
-pub const SOFT: Material = Material { youngs_pa: 3e4, poisson: 0.4, density: 300.0 };
+pub const SOFT: ElasticMaterial = ElasticMaterial { youngs_pa: 3e4, poisson: 0.4, density: 300.0 };
 
 /// The rest data of a soft block with samples every `spacing` m.
-pub fn soft_rest(shape: &Shape, material: Material, resolution: usize, spacing: f64) -> Arc<Rest> {
+pub fn fem_model(shape: &Shape, material: ElasticMaterial, resolution: usize, spacing: f64) -> Arc<FemModel> {
     let spec = SampleSpec { grasp_spacing: spacing, other_spacing: spacing };
-    bodies::soft_rest(shape, material, resolution, &spec)
+    bodies::fem_model(shape, material, resolution, &spec)
 }
 
 /// Adds a soft block that other soft blocks feel; its index.
-pub fn soft(world: &mut World, shape: &Shape, rest: &Arc<Rest>, pose: Pose, mu: Friction) -> usize {
+pub fn soft(world: &mut World, shape: &Shape, rest: &Arc<FemModel>, pose: Pose, mu: Friction) -> SoftId {
     world.add_soft("soft", rest.clone(), Some(Arc::new(shape.clone())), &pose, mu)
 }

@@ -2,11 +2,7 @@
 
 use softvt::{
     geometry::{Pose, Vec3, shape::Shape, voxel::Embedding},
-    physics::{
-        World,
-        contact::{Mover, Partner},
-        fem::SoftBody,
-    },
+    physics::{BodyId, SoftId, World, fem::FemState},
 };
 
 use crate::scene::*;
@@ -20,24 +16,20 @@ fn bread() -> softvt::physics::contact::Friction {
 /// Squeezes what is between x = −length/2 and length/2 by `squeeze` (m) between two plates; their force, N.
 fn squeeze(world: &mut World, length: f64, squeeze: f64) -> f64 {
     let plate = cuboid(0.02, 0.1, 0.1);
-    let plates: Vec<(usize, usize, f64)> = [-1.0, 1.0]
-        .into_iter()
-        .map(|side| {
-            let k = world.add_kinematic(at(side * (0.5 * length + 0.01), 0.0, 0.0));
-            let mover = (Mover::Kinematic(k), Pose::identity());
-            (k, put(world, "plate", mover, &plate, bread()), side)
-        })
-        .collect();
+    let plates = [-1.0, 1.0].map(|side| {
+        let k = world.add_kinematic(at(side * (0.5 * length + 0.01), 0.0, 0.0));
+        (k, world.add_shape("plate", k, Pose::identity(), &plate, bread()), side)
+    });
     for step in 0..60 {
         let share = (f64::from(step + 1) / 30.0).min(1.0);
-        for &(k, _, side) in &plates {
+        for (k, _, side) in plates {
             world.move_kinematic(k, at(side * (0.5 * length + 0.01 - 0.5 * squeeze * share), 0.0, 0.0));
         }
         world.step().expect("a step that converges");
     }
-    let last = world.soft.len() - 1;
-    let left = world.touch(0, plates[0].1).force_w.x;
-    let right = world.touch(last, plates[1].1).force_w.x;
+    let last = SoftId::new(world.soft_bodies().len() - 1);
+    let left = world.contact(SoftId::new(0), plates[0].1).force_w.x;
+    let right = world.contact(last, plates[1].1).force_w.x;
     assert!((left + right).abs() < 1e-3 * left, "unbalanced: {left} {right} N");
     left
 }
@@ -45,7 +37,7 @@ fn squeeze(world: &mut World, length: f64, squeeze: f64) -> f64 {
 #[test]
 fn two_cubes_face_to_face_are_as_stiff_as_one_of_double_length() {
     let (cube, bar) = (cuboid(0.05, 0.05, 0.05), cuboid(0.1, 0.05, 0.05));
-    let (rest, long) = (soft_rest(&cube, SOFT, 6, 2e-3), soft_rest(&bar, SOFT, 12, 2e-3));
+    let (rest, long) = (fem_model(&cube, SOFT, 6, 2e-3), fem_model(&bar, SOFT, 12, 2e-3));
     let free = || World::new(world().params, Vec3::zeros());
     let mut one = free();
     soft(&mut one, &bar, &long, Pose::identity(), bread());
@@ -55,8 +47,7 @@ fn two_cubes_face_to_face_are_as_stiff_as_one_of_double_length() {
     let (alone, pair) = (squeeze(&mut one, 0.1, 0.01), squeeze(&mut two, 0.1, 0.01));
     assert!((pair / alone - 1.0).abs() < 0.03, "{pair} N for two, {alone} N for one");
     // What one does to the other is what the other does to it, and what the plates do.
-    let (on_left, on_right) =
-        (two.touch_by(left, Partner::Soft(right)).force_w, two.touch_by(right, Partner::Soft(left)).force_w);
+    let (on_left, on_right) = (two.contact(left, right).force_w, two.contact(right, left).force_w);
     assert!(
         (on_left + on_right).norm() < 1e-9 && (on_right.x / pair - 1.0).abs() < 0.01,
         "{on_left} {on_right}"
@@ -67,15 +58,15 @@ fn two_cubes_face_to_face_are_as_stiff_as_one_of_double_length() {
 fn a_soft_collision_keeps_momentum() {
     let mut world = World::new(world().params, Vec3::zeros());
     let cube = cuboid(0.05, 0.05, 0.05);
-    let rest = soft_rest(&cube, SOFT, 4, 3e-3);
+    let rest = fem_model(&cube, SOFT, 4, 3e-3);
     let a = soft(&mut world, &cube, &rest, at(-0.03, 0.0, 0.0), bread());
     let b =
         soft(&mut world, &cube, &rest, turned(at(0.035, 0.012, 0.006), Vec3::new(0.2, 0.4, 0.3)), bread());
-    world.soft[a].body.v.iter_mut().for_each(|v| *v = Vec3::new(1.0, 0.1, 0.0));
+    world.soft_mut(a).state.v.iter_mut().for_each(|v| *v = Vec3::new(1.0, 0.1, 0.0));
     let sums = |world: &World| {
         let mut sums = (Vec3::zeros(), Vec3::zeros());
-        for body in [a, b].map(|i| &world.soft[i].body) {
-            for ((x, v), m) in body.x.iter().zip(&body.v).zip(&body.rest.mass) {
+        for body in [a, b].map(|i| &world.soft(i).state) {
+            for ((x, v), m) in body.x.iter().zip(&body.v).zip(&body.model.mass) {
                 sums = (sums.0 + v * *m, sums.1 + x.cross(v) * *m);
             }
         }
@@ -87,14 +78,14 @@ fn a_soft_collision_keeps_momentum() {
     let lever = 0.05 * linear.norm();
     assert!((linear_now - linear).norm() < 1e-5 * linear.norm(), "{linear_now} {linear}");
     assert!((angular_now - angular).norm() < 0.01 * lever, "{angular_now} {angular}");
-    assert!(world.energy().total() < 0.95 * energy && world.soft[b].body.velocity().x > 0.3, "they met");
+    assert!(world.energy().total() < 0.95 * energy && world.soft(b).state.velocity().x > 0.3, "they met");
 }
 
 #[test]
 fn a_soft_block_sticks_below_the_static_angle_and_slides_above_it_with_dynamic_friction() {
     let (mu_s, mu_d) = (0.6f64, 0.4f64);
     let shape = cuboid(0.06, 0.06, 0.02);
-    let rest = soft_rest(&shape, SOFT, 3, 3e-3);
+    let rest = fem_model(&shape, SOFT, 3, 3e-3);
     let scene = |angle: f64| {
         let mut world = world();
         floor(&mut world, friction(mu_s, mu_d));
@@ -103,15 +94,15 @@ fn a_soft_block_sticks_below_the_static_angle_and_slides_above_it_with_dynamic_f
         world
     };
     let mut held = scene(mu_s.atan() - 0.03);
-    let before = held.soft[0].body.centre();
+    let before = held.soft_bodies()[0].state.centre();
     run(&mut held, 3.0);
-    let crept = (held.soft[0].body.centre() - before).norm();
+    let crept = (held.soft_bodies()[0].state.centre() - before).norm();
     assert!(crept < 1e-5, "crept {crept} m in 3 s");
     let angle = mu_s.atan() + 0.05;
     let mut sliding = scene(angle);
-    let v0 = sliding.soft[0].body.velocity().x;
+    let v0 = sliding.soft_bodies()[0].state.velocity().x;
     run(&mut sliding, 0.3);
-    let found = (sliding.soft[0].body.velocity().x - v0) / 0.3;
+    let found = (sliding.soft_bodies()[0].state.velocity().x - v0) / 0.3;
     let expected = GRAVITY * (angle.sin() - mu_d * angle.cos());
     assert!((found / expected - 1.0).abs() < 0.02, "{found} instead of {expected}");
 }
@@ -122,17 +113,17 @@ fn two_stacked_soft_blocks_fall_asleep_and_a_third_wakes_them() {
     world.params.sleeping = true;
     floor(&mut world, bread());
     let shape = cuboid(0.05, 0.05, 0.025);
-    let rest = soft_rest(&shape, SOFT, 4, 4e-3);
+    let rest = fem_model(&shape, SOFT, 4, 4e-3);
     let low = soft(&mut world, &shape, &rest, at(0.0, 0.0, 0.0125), bread());
     let high = soft(&mut world, &shape, &rest, at(0.004, 0.0, 0.0376), bread());
     run(&mut world, 3.0);
-    assert!(world.soft[low].asleep && world.soft[high].asleep);
-    let asleep_at = world.soft[high].body.centre();
+    assert!(world.soft(low).is_asleep() && world.soft(high).is_asleep());
+    let asleep_at = world.soft(high).state.centre();
     let third = soft(&mut world, &shape, &rest, at(0.0, 0.0, 0.07), bread());
     run(&mut world, 0.2);
-    assert!(!world.soft[high].asleep, "a falling block wakes it");
+    assert!(!world.soft(high).is_asleep(), "a falling block wakes it");
     run(&mut world, 3.0);
-    let (high, third) = (world.soft[high].body.centre(), world.soft[third].body.centre());
+    let (high, third) = (world.soft(high).state.centre(), world.soft(third).state.centre());
     assert!(high.z < asleep_at.z && third.z - high.z > 0.0245, "{high} {third}");
 }
 
@@ -140,26 +131,26 @@ fn two_stacked_soft_blocks_fall_asleep_and_a_third_wakes_them() {
 fn soft_cubes_that_meet_at_two_metres_a_second_do_not_enter_each_other() {
     let mut world = World::new(world().params, Vec3::zeros());
     let cube = cuboid(0.05, 0.05, 0.05);
-    let rest = soft_rest(&cube, SOFT, 4, 3e-3);
+    let rest = fem_model(&cube, SOFT, 4, 3e-3);
     soft(&mut world, &cube, &rest, at(-0.06, 0.0, 0.0), bread());
     soft(&mut world, &cube, &rest, turned(at(0.06, 0.0, 0.0), Vec3::x() * 0.3), bread());
     for (index, speed) in [(0, 1.0), (1, -1.0)] {
-        world.soft[index].body.v.iter_mut().for_each(|v| *v = Vec3::x() * speed);
+        world.soft_mut(SoftId::new(index)).state.v.iter_mut().for_each(|v| *v = Vec3::x() * speed);
     }
     let mut nearest = f64::INFINITY;
     for _ in 0..40 {
         world.step().expect("a step that converges");
         // They meet head on, turned about the line between them: all of one stays on one side.
-        let front = world.soft[0].body.x.iter().map(|x| x.x).fold(f64::NEG_INFINITY, f64::max);
-        let back = world.soft[1].body.x.iter().map(|x| x.x).fold(f64::INFINITY, f64::min);
+        let front = world.soft_bodies()[0].state.x.iter().map(|x| x.x).fold(f64::NEG_INFINITY, f64::max);
+        let back = world.soft_bodies()[1].state.x.iter().map(|x| x.x).fold(f64::INFINITY, f64::min);
         nearest = nearest.min(back - front);
     }
     assert!(nearest < 1e-3 && nearest > -2e-3, "{nearest} m apart at the nearest");
 }
 
 /// The deepest that any material of a soft body is behind the surface of `shape`, m; sampled four times along an element's edge.
-fn depth(body: &SoftBody, shape: &Shape) -> f64 {
-    let mesh = &body.rest.mesh;
+fn depth(body: &FemState, shape: &Shape) -> f64 {
+    let mesh = &body.model.mesh;
     let inside = (0..64).map(|i| Vec3::new((i % 4) as f64, (i / 4 % 4) as f64, (i / 16) as f64) / 3.0);
     let points = inside.flat_map(|local| {
         (0..mesh.elements.len()).map(move |e| {
@@ -174,19 +165,19 @@ fn depth(body: &SoftBody, shape: &Shape) -> f64 {
 fn drop_into(shape: &Shape, from: Pose) -> (f64, f64, Vec3) {
     let mut world = world();
     floor(&mut world, bread());
-    put(&mut world, "vessel", (Mover::Static, Pose::identity()), shape, bread());
+    world.add_shape("vessel", BodyId::World, Pose::identity(), shape, bread());
     let cube = cuboid(0.05, 0.05, 0.05);
-    let rest = soft_rest(&cube, SOFT, 6, 1.5e-3);
+    let rest = fem_model(&cube, SOFT, 6, 1.5e-3);
     soft(&mut world, &cube, &rest, from, bread());
-    world.soft[0].body.v.iter_mut().for_each(|v| *v = Vec3::z() * -2.0);
+    world.soft_mut(SoftId::new(0)).state.v.iter_mut().for_each(|v| *v = Vec3::z() * -2.0);
     let mut deepest = 0.0f64;
     for step in 0..45 {
         world.step().expect("a step that converges");
         if step % 3 == 2 {
-            deepest = deepest.max(depth(&world.soft[0].body, shape));
+            deepest = deepest.max(depth(&world.soft_bodies()[0].state, shape));
         }
     }
-    (deepest, depth(&world.soft[0].body, shape), world.soft[0].body.centre())
+    (deepest, depth(&world.soft_bodies()[0].state, shape), world.soft_bodies()[0].state.centre())
 }
 
 #[test]
@@ -229,10 +220,10 @@ fn a_soft_cube_dropped_at_two_metres_a_second_crosses_no_wall() {
 fn no_step_of_a_free_fall_gains_energy() {
     let mut world = world();
     let cube = cuboid(0.05, 0.05, 0.05);
-    let rest = soft_rest(&cube, SOFT, 4, 5e-3);
+    let rest = fem_model(&cube, SOFT, 4, 5e-3);
     soft(&mut world, &cube, &rest, at(0.0, 0.0, 1.0), bread());
     // Spinning, stretched and falling.
-    let body = &mut world.soft[0].body;
+    let body = &mut world.soft_mut(SoftId::new(0)).state;
     for (x, v) in body.x.iter_mut().zip(body.v.iter_mut()) {
         let r = *x - Vec3::z();
         *v = Vec3::new(0.0, 5.0, 10.0).cross(&r);

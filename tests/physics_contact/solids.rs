@@ -2,14 +2,10 @@
 
 use softvt::{
     geometry::{Mat3, Pose, Quat, Vec3, mass::mass_properties, shape::Shape},
-    physics::{
-        Params, World,
-        contact::{Friction, Mover},
-        rigid::RigidBody,
-    },
+    physics::{BodyId, ColliderId, PhysicsParams, RigidId, World, contact::Friction, rigid::RigidState},
 };
 
-pub use crate::bodies::{GRAVITY, put};
+pub use crate::bodies::GRAVITY;
 
 /// Surfaces with both coefficients.
 pub fn friction(static_mu: f64, dynamic_mu: f64) -> Friction {
@@ -23,7 +19,7 @@ pub fn world() -> World {
 
 /// A world whose gravity leans by `angle` (rad) towards +x: a slope that stays flat.
 pub fn tilted(angle: f64) -> World {
-    World::new(Params { sleeping: false, ..Params::default() }, gravity(angle))
+    World::new(PhysicsParams { sleeping: false, ..PhysicsParams::default() }, gravity(angle))
 }
 
 /// Gravity on a slope of `angle` (rad) down +x, in the slope's frame.
@@ -44,8 +40,8 @@ pub fn turned(pose: Pose, turn: Vec3) -> Pose {
 }
 
 /// A static floor whose top is z = 0.
-pub fn floor(world: &mut World, mu: Friction) -> usize {
-    put(world, "floor", (Mover::Static, at(0.0, 0.0, -0.05)), &cuboid(40.0, 40.0, 0.1), mu)
+pub fn floor(world: &mut World, mu: Friction) -> ColliderId {
+    world.add_shape("floor", BodyId::World, at(0.0, 0.0, -0.05), &cuboid(40.0, 40.0, 0.1), mu)
 }
 
 /// Mass and inertia of the primitives used here, kg and kg m².
@@ -66,20 +62,20 @@ fn inertia(shape: &Shape, mass: f64) -> Mat3 {
 }
 
 /// A free rigid body with one collider; its index.
-pub fn rigid(world: &mut World, shape: &Shape, mass: f64, pose: Pose, mu: Friction) -> usize {
-    let body = RigidBody::new(&pose, Vec3::zeros(), mass, inertia(shape, mass)).expect("a real body");
+pub fn rigid(world: &mut World, shape: &Shape, mass: f64, pose: Pose, mu: Friction) -> RigidId {
+    let body = RigidState::new(&pose, Vec3::zeros(), mass, inertia(shape, mass)).expect("a real body");
     let index = world.add_rigid("body", body);
-    put(world, "body", (Mover::Rigid(index), Pose::identity()), shape, mu);
+    world.add_shape("body", index, Pose::identity(), shape, mu);
     index
 }
 
 /// A free uniform body of any shape; its index.
-pub fn uniform(world: &mut World, shape: &Shape, mass: f64, object_w: Pose, mu: Friction) -> usize {
+pub fn uniform(world: &mut World, shape: &Shape, mass: f64, object_w: Pose, mu: Friction) -> RigidId {
     let one = mass_properties(shape, 1.0);
     let density = mass / one.mass;
-    let body = RigidBody::new(&object_w, one.com, mass, one.inertia * density).expect("a real body");
+    let body = RigidState::new(&object_w, one.com, mass, one.inertia * density).expect("a real body");
     let index = world.add_rigid("body", body);
-    put(world, "body", (Mover::Rigid(index), Pose::identity()), shape, mu);
+    world.add_shape("body", index, Pose::identity(), shape, mu);
     index
 }
 

@@ -8,7 +8,7 @@ use softvt::{
         shape::Shape,
         voxel::{VoxelSpec, voxel_mesh},
     },
-    physics::fem::{Material, Rest, SoftBody, element::lame},
+    physics::fem::{ElasticMaterial, FemModel, FemState, element::lame},
 };
 
 use crate::support::GRAVITY;
@@ -16,15 +16,15 @@ use crate::support::GRAVITY;
 const YOUNGS: f64 = 3e4;
 const POISSON: f64 = 0.4;
 
-fn block(size: Vec3, resolution: usize, youngs_pa: f64, poisson: f64) -> SoftBody {
+fn block(size: Vec3, resolution: usize, youngs_pa: f64, poisson: f64) -> FemState {
     let mesh = voxel_mesh(&Shape::cuboid(size), &VoxelSpec { resolution }).expect("a block");
-    let material = Material { youngs_pa, poisson, density: 300.0 };
-    SoftBody::new(Rest::new(mesh, material, size.product(), Vec::new()), &Pose::identity())
+    let material = ElasticMaterial { youngs_pa, poisson, density: 300.0 };
+    FemState::new(FemModel::new(mesh, material, size.product(), Vec::new()), &Pose::identity())
 }
 
 /// Puts every node at `place(rest)` and evaluates the forces.
-fn deform(body: &mut SoftBody, place: impl Fn(&Vec3) -> Vec3) {
-    let rest = body.rest.clone();
+fn deform(body: &mut FemState, place: impl Fn(&Vec3) -> Vec3) {
+    let rest = body.model.clone();
     body.x.iter_mut().zip(&rest.mesh.nodes).for_each(|(x, p)| *x = place(p));
     body.update_elastic();
 }
@@ -43,7 +43,7 @@ pub fn patch() -> (f64, f64) {
     deform(&mut body, |p| f * p);
     let inner = |p: &Vec3| p.amax() < 0.025 - 1e-9;
     let largest = |inside: bool| {
-        let nodes = body.rest.mesh.nodes.iter().zip(&body.force);
+        let nodes = body.model.mesh.nodes.iter().zip(&body.force);
         nodes.filter(|(p, _)| inner(p) == inside).map(|(_, f)| f.norm()).fold(0.0, f64::max)
     };
     let eigen = (f.transpose() * f).symmetric_eigen();
@@ -61,7 +61,7 @@ pub fn bar(n: usize) -> (f64, f64) {
     let thin = 1.0 - POISSON * strain;
     deform(&mut body, |p| p.component_mul(&Vec3::new(1.0 + strain, thin, thin)));
     let at_end = |p: &Vec3| p.x > 0.5 * length - 1e-9;
-    let nodes = || body.rest.mesh.nodes.iter().zip(&body.force);
+    let nodes = || body.model.mesh.nodes.iter().zip(&body.force);
     let pull: f64 = nodes().filter(|(p, _)| at_end(p)).map(|(_, f)| -f.x).sum();
     let largest = nodes().map(|(_, f)| f.x.abs()).fold(0.0, f64::max);
     let across = nodes().map(|(_, f)| f.yz().norm()).fold(0.0, f64::max);
@@ -75,9 +75,9 @@ pub fn cantilever(n: usize, poisson: f64) -> f64 {
     let (length, side, youngs, density) = (0.1, 0.02, 3e5, 300.0);
     let body = block(Vec3::new(length, side, side), 5 * n, youngs, poisson);
     let clamped = |p: &Vec3| p.x < -0.5 * length + 1e-9;
-    let nodes = body.rest.mesh.nodes.clone();
+    let nodes = body.model.mesh.nodes.clone();
     let free: Arc<[bool]> = nodes.iter().map(|p| !clamped(p)).collect();
-    let load: Vec<Vec3> = body.rest.mass.iter().map(|m| Vec3::z() * (-GRAVITY * m)).collect();
+    let load: Vec<Vec3> = body.model.mass.iter().map(|m| Vec3::z() * (-GRAVITY * m)).collect();
     let u = solve_linear(body, &free, &load);
     let (sum, count) = nodes
         .iter()
@@ -94,11 +94,11 @@ pub fn cantilever(n: usize, poisson: f64) -> f64 {
 
 /// Small displacements under `load` with the nodes that are not `free` held: conjugate gradients, the stiffness taken as
 /// the central difference of the body's forces at rest.
-fn solve_linear(mut body: SoftBody, free: &[bool], load: &[Vec3]) -> Vec<Vec3> {
+fn solve_linear(mut body: FemState, free: &[bool], load: &[Vec3]) -> Vec<Vec3> {
     let masked = |v: Vec<Vec3>| -> Vec<Vec3> {
         v.into_iter().zip(free).map(|(v, free)| if *free { v } else { Vec3::zeros() }).collect()
     };
-    let rest = body.rest.clone();
+    let rest = body.model.clone();
     let mut stiffness = |v: &[Vec3]| {
         let scale = 1e-6 * rest.mesh.edge / v.iter().map(|v| v.amax()).fold(f64::MIN_POSITIVE, f64::max);
         let mut side = |sign: f64| {
@@ -132,8 +132,8 @@ fn solve_linear(mut body: SoftBody, free: &[bool], load: &[Vec3]) -> Vec<Vec3> {
 pub fn rigid_motion(angle: f64) -> f64 {
     let mesh = voxel_mesh(&Shape::Sphere { radius: 0.025 }, &VoxelSpec { resolution: 6 }).expect("a sphere");
     let scale = YOUNGS * mesh.edge * mesh.edge;
-    let material = Material { youngs_pa: YOUNGS, poisson: POISSON, density: 300.0 };
-    let mut body = SoftBody::new(Rest::new(mesh, material, 6.5e-5, Vec::new()), &Pose::identity());
+    let material = ElasticMaterial { youngs_pa: YOUNGS, poisson: POISSON, density: 300.0 };
+    let mut body = FemState::new(FemModel::new(mesh, material, 6.5e-5, Vec::new()), &Pose::identity());
     let axis = nalgebra::Unit::new_normalize(Vec3::new(1.0, 2.0, -0.5));
     let turn = nalgebra::Rotation3::from_axis_angle(&axis, angle);
     deform(&mut body, |p| turn * p + Vec3::new(0.4, -0.2, 0.3));

@@ -1,6 +1,9 @@
 //! A free soft body: energy and momentum without contact.
 
-use softvt::{geometry::Vec3, physics::fem::SoftBody};
+use softvt::{
+    geometry::Vec3,
+    physics::{KinematicId, SoftId, fem::FemState},
+};
 
 use crate::support::{Body, Scene, Squeeze};
 
@@ -45,11 +48,13 @@ pub fn flight(throw: &Throw) -> Flight {
     let options = Squeeze { body: throw.body, grounded: false, beta: throw.beta, ..Squeeze::default() };
     let mut scene = Scene::new(&options);
     let world = &mut scene.world;
-    world.kinematic.iter_mut().enumerate().for_each(|(i, k)| {
-        k.pose.translation.vector.x += if i == 0 { -10.0 } else { 10.0 };
-        k.next = k.pose;
-    });
-    let body = &mut world.soft[0].body;
+    for (pad, away) in [-10.0, 10.0].into_iter().enumerate() {
+        let pad = KinematicId::new(pad);
+        let mut pose = *world.kinematic(pad).pose();
+        pose.translation.vector.x += away;
+        world.place_kinematic(pad, pose);
+    }
+    let body = &mut world.soft_mut(SoftId::new(0)).state;
     let centre = body.centre();
     let w = Vec3::new(0.3, 1.0, 0.2).normalize() * throw.spin;
     for (x, v) in body.x.iter_mut().zip(&mut body.v) {
@@ -67,7 +72,7 @@ pub fn flight(throw: &Throw) -> Flight {
         largest_gain = largest_gain.max((now - last) / start);
         last = now;
     }
-    let body = &world.soft[0].body;
+    let body = &world.soft_bodies()[0].state;
     Flight {
         largest_gain,
         kept: last / start,
@@ -77,9 +82,9 @@ pub fn flight(throw: &Throw) -> Flight {
 }
 
 /// Angular momentum about the centre of mass, kg m²/s.
-fn spin_of(body: &SoftBody) -> Vec3 {
+fn spin_of(body: &FemState) -> Vec3 {
     let (centre, drift) = (body.centre(), body.velocity());
-    let parts = body.x.iter().zip(&body.v).zip(&body.rest.mass);
+    let parts = body.x.iter().zip(&body.v).zip(&body.model.mass);
     parts.map(|((x, v), m)| (x - centre).cross(&(v - drift)) * *m).sum()
 }
 

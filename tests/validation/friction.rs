@@ -90,14 +90,15 @@ fn covering_force(options: &Squeeze, layer: f64) -> f64 {
 pub fn fall(load: f64) -> Fall {
     let mut options = Squeeze { pad: 0.6, grounded: false, ..Squeeze::default() }.gap_mm(48.0);
     let probe = Scene::new(&options);
-    let layer = probe.world.rigid_layer().in_series(&probe.world.soft[0].layer).normal;
+    let layer =
+        probe.world.rigid_surface_stiffness().in_series(&probe.world.soft_bodies()[0].stiffness).normal;
     options.friction = probe.weight() / (2.0 * covering_force(&options, layer) * load);
     let mut scene = gripped(&options);
     carry(&mut scene, 0.5, 0.5 * GRAVITY, still);
     scene.world.gravity = -GRAVITY * Vec3::z();
     let mut speed = |seconds: f64| {
         carry(&mut scene, seconds, GRAVITY, still);
-        -scene.world.soft[0].body.velocity().z
+        -scene.world.soft_bodies()[0].state.velocity().z
     };
     let (from, to) = (speed(0.2), speed(0.1));
     Fall { acceleration: (to - from) / 0.1, expected: GRAVITY * (1.0 - 1.0 / load) }

@@ -1,21 +1,18 @@
 //! Bodies on joints against closed forms, and what stands on and in them.
 
-use std::sync::Arc;
-
 use nalgebra::Unit;
 use softvt::{
     geometry::{Mat3, Pose, Vec3, mass::mass_properties, shape::Shape},
     physics::{
-        World,
-        contact::{Collider, Mover},
-        joints::{JointKind, Link, Tree},
-        rigid::RigidBody,
+        ArticulationId, LinkId, RigidId, World,
+        joints::{JointKind, JointTree, Link},
+        rigid::RigidState,
     },
 };
 
 use crate::{
     rigid::{MU, drift},
-    solids::{GRAVITY, cuboid, floor, friction, put, run, tilted, world},
+    solids::{GRAVITY, cuboid, floor, friction, run, tilted, world},
 };
 
 /// Mass of the jointed part, kg.
@@ -42,8 +39,8 @@ fn link(kind: JointKind, (lower, upper): (f64, f64), damping: f64, dry: f64) -> 
 }
 
 fn jointed(mut world: World, link: Link, q: f64) -> World {
-    let tree = Tree { links: vec![link], base_w: Pose::identity() };
-    world.add_tree("furniture", tree, &[q], vec![None], true);
+    let tree = JointTree { links: vec![link], base_w: Pose::identity() };
+    world.add_articulation("furniture", tree, &[q], vec![None], true);
     world
 }
 
@@ -67,7 +64,7 @@ pub fn period(angle: f64) -> f64 {
     let (mut crossings, mut last) = (Vec::new(), angle);
     while crossings.len() < 21 {
         world.step().expect("a step that converges");
-        let q = world.trees[0].state.q[0];
+        let q = world.articulations()[0].state.q[0];
         if (q < 0.0) != (last < 0.0) {
             crossings.push(world.time() - dt * q / (q - last));
         }
@@ -86,13 +83,13 @@ pub fn period(angle: f64) -> f64 {
 pub fn swing(angle: f64) -> [f64; 2] {
     let mut world = pendulum(angle);
     let energy = |before: f64, world: &World| {
-        let state = &world.trees[0].state;
+        let state = &world.articulations()[0].state;
         let middle = 0.5 * (before + state.q[0]);
         MASS * ROD * ROD / 6.0 * state.v[0].powi(2) + 0.5 * MASS * GRAVITY * ROD * (1.0 - middle.cos())
     };
     let mut seen: Vec<f64> = Vec::new();
     for _ in 0..1200 {
-        let before = world.trees[0].state.q[0];
+        let before = world.articulations()[0].state.q[0];
         world.step().expect("a step that converges");
         seen.push(energy(before, &world));
     }
@@ -116,9 +113,9 @@ pub fn stopping(speed: f64, dt: f64) -> [f64; 2] {
     let (damping, dry) = (1.2, 0.8);
     let mut world = drawer(world(), damping, dry);
     world.params.dt = dt;
-    world.trees[0].state.v[0] = speed;
+    world.articulation_mut(ArticulationId::new(0)).state.v[0] = speed;
     run(&mut world, 1.0);
-    let way = world.trees[0].state.q[0] - 0.02;
+    let way = world.articulations()[0].state.q[0] - 0.02;
     [way, MASS / damping * (speed - dry / damping * (1.0 + damping * speed / dry).ln())]
 }
 
@@ -127,7 +124,7 @@ pub fn terminal() -> f64 {
     let (slope, damping, dry) = (0.3f64, 40.0, 0.5);
     let mut world = drawer(tilted(slope), damping, dry);
     run(&mut world, 0.5);
-    world.trees[0].state.v[0] / ((MASS * GRAVITY * slope.sin() - dry) / damping)
+    world.articulations()[0].state.v[0] / ((MASS * GRAVITY * slope.sin() - dry) / damping)
 }
 
 /// How far a drawer creeps in 10 s at 95 % of its friction, m.
@@ -135,21 +132,21 @@ pub fn creep() -> f64 {
     let slope = 0.3f64;
     let mut world = drawer(tilted(slope), 0.0, MASS * GRAVITY * slope.sin() / 0.95);
     run(&mut world, 0.5);
-    let before = world.trees[0].state.q[0];
+    let before = world.articulations()[0].state.q[0];
     run(&mut world, 10.0);
-    (world.trees[0].state.q[0] - before).abs()
+    (world.articulations()[0].state.q[0] - before).abs()
 }
 
 /// How far a drawer that runs into its end at 1 m/s goes beyond it at most, and where it rests from there, m.
 pub fn stop() -> [f64; 2] {
     let mut world = drawer(world(), 0.0, 0.2);
-    world.trees[0].state.v[0] = 1.0;
+    world.articulation_mut(ArticulationId::new(0)).state.v[0] = 1.0;
     let mut most = f64::NEG_INFINITY;
     for _ in 0..120 {
         world.step().expect("a step that converges");
-        most = most.max(world.trees[0].state.q[0] - 0.15);
+        most = most.max(world.articulations()[0].state.q[0] - 0.15);
     }
-    [most, (world.trees[0].state.q[0] - 0.15).abs()]
+    [most, (world.articulations()[0].state.q[0] - 0.15).abs()]
 }
 
 /// A vessel of revolution: foot, rim and height, mm.
@@ -171,11 +168,11 @@ fn bowl() -> Shape {
     vessel(27.0, 53.5, 48.0)
 }
 
-fn add(world: &mut World, shape: &Shape, at: Pose) -> usize {
+fn add(world: &mut World, shape: &Shape, at: Pose) -> RigidId {
     let m = mass_properties(shape, 1500.0);
-    let body = RigidBody::new(&at, m.com, m.mass, m.inertia).expect("a real body");
+    let body = RigidState::new(&at, m.com, m.mass, m.inertia).expect("a real body");
     let index = world.add_rigid("vessel", body);
-    put(world, "vessel", (Mover::Rigid(index), Pose::identity()), shape, friction(MU.0, MU.1));
+    world.add_shape("vessel", index, Pose::identity(), shape, friction(MU.0, MU.1));
     index
 }
 
@@ -210,19 +207,17 @@ pub fn bowl_in_drawer() -> Carried {
         .union(board([0.19, 0.005, 0.05], [0.0, 0.0975, 0.03]))
         .union(board([0.19, 0.005, 0.05], [0.0, -0.0975, 0.03]));
     let mut world = drawer(world(), 6.0, 1.2);
-    let mover = Mover::Link { tree: 0, link: 0 };
-    let layer = world.rigid_layer();
-    let pose = Pose::identity();
-    let mu = friction(MU.0, MU.1);
-    world.add_collider(Collider::new("drawer", (mover, pose), Arc::new(shape), mu, layer));
+    let link = LinkId { articulation: ArticulationId::new(0), index: 0 };
+    world.add_shape("drawer", link, Pose::identity(), &shape, friction(MU.0, MU.1));
     let body = add(&mut world, &bowl(), Pose::translation(0.03, 0.02, 0.005));
     run(&mut world, 1.0);
     let drift = drift(&mut world, 5.0);
-    let place = |world: &World| (world.rigid[body].body.pose_w.translation.x, world.trees[0].state.q[0]);
+    let place =
+        |world: &World| (world.rigid(body).state.pose_w.translation.x, world.articulations()[0].state.q[0]);
     let before = place(&world);
     // 2 N beyond friction and damping for as long as it takes; the tray speeds up at less than the bowl's friction can.
-    while world.trees[0].state.q[0] < before.1 + 0.03 {
-        world.trees[0].state.v[0] += 2.0 / MASS * world.params.dt;
+    while world.articulations()[0].state.q[0] < before.1 + 0.03 {
+        world.articulation_mut(ArticulationId::new(0)).state.v[0] += 2.0 / MASS * world.params.dt;
         world.step().expect("a step that converges");
     }
     run(&mut world, 1.0);

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use softvt::{
     geometry::{Pose, Vec3, shape::Shape},
-    physics::World,
+    physics::{RigidId, World},
 };
 
 use crate::solids::{
@@ -21,15 +21,15 @@ fn can() -> Shape {
     Shape::Cylinder { radius: 0.033, half_height: 0.05 }
 }
 
-fn on_floor(shape: &Shape, pose: Pose) -> (World, usize) {
+fn on_floor(shape: &Shape, pose: Pose) -> (World, RigidId) {
     let mut world = world();
     floor(&mut world, friction(MU.0, MU.1));
     let body = rigid(&mut world, shape, 0.3, pose, friction(MU.0, MU.1));
     (world, body)
 }
 
-fn position(world: &World, body: usize) -> Vec3 {
-    world.rigid[body].body.pose_w.translation.vector
+fn position(world: &World, body: RigidId) -> Vec3 {
+    world.rigid(body).state.pose_w.translation.vector
 }
 
 /// Relative errors of speed and way after a free fall of one second: the solver stops at its tolerance, and positions
@@ -37,18 +37,18 @@ fn position(world: &World, body: usize) -> Vec3 {
 pub fn fall() -> [f64; 2] {
     let mut world = world();
     let body = rigid(&mut world, &cuboid(0.05, 0.06, 0.07), 0.3, Pose::identity(), friction(MU.0, MU.1));
-    world.rigid[body].body.w = Vec3::new(1.0, 2.0, 3.0);
+    world.rigid_mut(body).state.w = Vec3::new(1.0, 2.0, 3.0);
     run(&mut world, 1.0);
     let way = -position(&world, body).z;
-    [-world.rigid[body].body.v.z / GRAVITY - 1.0, way / (0.5 * GRAVITY) - 1.0]
+    [-world.rigid(body).state.v.z / GRAVITY - 1.0, way / (0.5 * GRAVITY) - 1.0]
 }
 
 /// Acceleration along x between 0.2 s and 0.5 s.
-fn acceleration(mut world: World, body: usize) -> f64 {
+fn acceleration(mut world: World, body: RigidId) -> f64 {
     run(&mut world, 0.2);
-    let before = world.rigid[body].body.v.x;
+    let before = world.rigid(body).state.v.x;
     run(&mut world, 0.3);
-    (world.rigid[body].body.v.x - before) / 0.3
+    (world.rigid(body).state.v.x - before) / 0.3
 }
 
 /// A block on a slope that has grown to `angle` (rad), and its acceleration over that of dynamic friction; and how far
@@ -142,7 +142,7 @@ impl Standing {
         floor(&mut world, friction(5.0, 5.0));
         let body = uniform(&mut world, &self.shape, 0.3, self.pose, friction(0.0, 0.0));
         lean(&mut world, angle, 1.5);
-        world.rigid[body].body.pose_w.rotation.angle_to(&self.pose.rotation) > 0.05
+        world.rigid(body).state.pose_w.rotation.angle_to(&self.pose.rotation) > 0.05
     }
 
     /// The angle at which it tips, rad, to a fiftieth of a degree; within two degrees of the closed form.
@@ -158,10 +158,10 @@ impl Standing {
 
 /// How far any body moves (m) and turns (rad) within `seconds`.
 pub fn drift(world: &mut World, seconds: f64) -> [f64; 2] {
-    let before: Vec<Pose> = world.rigid.iter().map(|r| r.body.pose_w).collect();
+    let before: Vec<Pose> = world.rigid_bodies().iter().map(|r| r.state.pose_w).collect();
     run(world, seconds);
-    let moved = world.rigid.iter().zip(&before).map(|(rigid, before)| {
-        let now = rigid.body.pose_w;
+    let moved = world.rigid_bodies().iter().zip(&before).map(|(rigid, before)| {
+        let now = rigid.state.pose_w;
         let way = (now.translation.vector - before.translation.vector).norm();
         [way, now.rotation.angle_to(&before.rotation)]
     });
@@ -209,15 +209,16 @@ fn colliding() -> World {
     let tilt = turned(at(0.12, 0.01, -0.01), Vec3::new(0.3, 0.2, 0.5));
     let a = rigid(&mut world, &shape, 0.3, Pose::identity(), friction(MU.0, MU.1));
     let b = rigid(&mut world, &shape, 0.5, tilt, friction(MU.0, MU.1));
-    (world.rigid[a].body.v, world.rigid[a].body.w) = (Vec3::new(1.0, 0.2, 0.1), Vec3::new(0.0, 1.0, 2.0));
-    world.rigid[b].body.v = Vec3::new(-0.5, 0.0, 0.0);
+    let first = &mut world.rigid_mut(a).state;
+    (first.v, first.w) = (Vec3::new(1.0, 0.2, 0.1), Vec3::new(0.0, 1.0, 2.0));
+    world.rigid_mut(b).state.v = Vec3::new(-0.5, 0.0, 0.0);
     world
 }
 
 pub fn collision() -> Collision {
     let mut world = colliding();
     let sums = |world: &World| {
-        let bodies = world.rigid.iter().map(|r| &r.body);
+        let bodies = world.rigid_bodies().iter().map(|r| &r.state);
         let linear = bodies.clone().map(|b| b.momentum()).sum::<Vec3>();
         (linear, bodies.map(|b| b.angular_momentum()).sum::<Vec3>())
     };
@@ -236,15 +237,15 @@ pub fn largest_gains() -> Vec<(&'static str, f64)> {
     let block = cuboid(0.05, 0.06, 0.07);
     let tumbling = || {
         let (mut world, body) = on_floor(&block, turned(at(0.0, 0.0, 0.3), Vec3::new(0.4, 0.3, 0.2)));
-        world.rigid[body].body.w = Vec3::new(4.0, 3.0, 1.0);
-        world.rigid[body].body.v = Vec3::x() * 0.5;
+        world.rigid_mut(body).state.w = Vec3::new(4.0, 3.0, 1.0);
+        world.rigid_mut(body).state.v = Vec3::x() * 0.5;
         world
     };
     let rolling = || {
         let (mut world, _) = on_floor(&Shape::Sphere { radius: 0.03 }, at(0.0, 0.0, 0.03));
         world.gravity = gravity(0.05);
-        world.rigid[0].body.v = -Vec3::x();
-        world.rigid[0].body.w = -Vec3::y() / 0.03;
+        world.rigid_mut(RigidId::new(0)).state.v = -Vec3::x();
+        world.rigid_mut(RigidId::new(0)).state.w = -Vec3::y() / 0.03;
         world
     };
     let tipping = || on_floor(&cuboid(0.03, 0.03, 0.2), turned(at(0.0, 0.0, 0.105), Vec3::y() * 0.2)).0;
@@ -254,7 +255,8 @@ pub fn largest_gains() -> Vec<(&'static str, f64)> {
         let shape = rounded_box(Vec3::new(0.05, 0.06, 0.07), 0.012);
         let pose = turned(at(0.0, 0.0, 0.3), Vec3::new(0.4, 0.3, 0.2));
         let body = uniform(&mut world, &shape, 0.3, pose, friction(MU.0, MU.1));
-        (world.rigid[body].body.w, world.rigid[body].body.v) = (Vec3::new(4.0, 3.0, 1.0), Vec3::x() * 0.5);
+        let state = &mut world.rigid_mut(body).state;
+        (state.w, state.v) = (Vec3::new(4.0, 3.0, 1.0), Vec3::x() * 0.5);
         world
     };
     let scenes: [(&str, &dyn Fn() -> World); 5] = [

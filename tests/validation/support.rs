@@ -5,20 +5,18 @@
 //! quintic, and the hold.
 
 use softvt::{
-    evaluation::deformation::ReferenceShape,
+    evaluation::deformation::Reference,
     geometry::{Pose, Quat, Vec3, samples::SampleSpec, shape::Shape},
     physics::{
-        Params, World,
-        contact::{Friction, Mover},
-        fem::Material,
-        world::StepFailure,
+        BodyId, ColliderId, KinematicId, PhysicsParams, SoftId, World, contact::Friction,
+        fem::ElasticMaterial, world::StepFailure,
     },
 };
 
 pub use crate::bodies::GRAVITY;
-use crate::bodies::{put, soft_rest};
+use crate::bodies::fem_model;
 
-/// Rest before the pads close, s.
+/// FemModel before the pads close, s.
 const REST_S: f64 = 0.10;
 /// Closing speed of each pad, m/s, and its clearance before, m.
 const CLOSING: f64 = 0.040;
@@ -166,18 +164,26 @@ pub struct Seen {
 pub struct Scene {
     pub world: World,
     pub options: Squeeze,
-    pads: [(usize, usize, f64); 2],
-    reference: ReferenceShape,
+    pads: [(KinematicId, ColliderId, f64); 2],
+    reference: Reference,
     start: Vec3,
 }
 
 impl Scene {
     pub fn new(options: &Squeeze) -> Self {
         let shape = options.body.shape();
-        let material =
-            Material { youngs_pa: options.youngs_pa, poisson: options.poisson, density: options.density };
-        let rest = soft_rest(&shape, material, options.resolution, &SampleSpec::default());
-        let params = Params { beta: options.beta, dt: options.dt, sleeping: false, ..Params::default() };
+        let material = ElasticMaterial {
+            youngs_pa: options.youngs_pa,
+            poisson: options.poisson,
+            density: options.density,
+        };
+        let rest = fem_model(&shape, material, options.resolution, &SampleSpec::default());
+        let params = PhysicsParams {
+            rayleigh_stiffness: options.beta,
+            dt: options.dt,
+            sleeping: false,
+            ..PhysicsParams::default()
+        };
         let mut world = World::new(params, Vec3::zeros());
         let friction = |mu: f64| Friction { static_mu: mu, dynamic_mu: mu };
         let (smooth, rough) = (friction(0.0), friction(options.friction));
@@ -186,16 +192,16 @@ impl Scene {
         if options.grounded {
             world.gravity = -GRAVITY * Vec3::z();
             let table = Shape::cuboid(Vec3::new(1.0, 1.0, 0.1));
-            put(&mut world, "table", (Mover::Static, Pose::translation(0.0, 0.0, -0.05)), &table, rough);
+            world.add_shape("table", BodyId::World, Pose::translation(0.0, 0.0, -0.05), &table, rough);
         }
         let size = Vec3::new(2.0 * PAD_DEPTH, options.pad, options.pad);
         let pads = [-1.0, 1.0].map(|side| {
             let frame = world.add_kinematic(pad_pose(options, side, 0.0, &Pose::identity()));
-            let mover = (Mover::Kinematic(frame), Pose::identity());
-            (frame, put(&mut world, "pad", mover, &Shape::cuboid(size), rough), side)
+            let shape = Shape::cuboid(size);
+            (frame, world.add_shape("pad", frame, Pose::identity(), &shape, rough), side)
         });
-        let reference = ReferenceShape::new(&rest.mesh.nodes, &rest.mass).expect("a body with size");
-        let start = world.soft[0].body.centre();
+        let reference = Reference::new(&rest.mesh.nodes, &rest.mass).expect("a body with size");
+        let start = world.soft_bodies()[0].state.centre();
         Self { world, options: *options, pads, reference, start }
     }
 
@@ -210,26 +216,26 @@ impl Scene {
     }
 
     fn seen(&self, hand: &Pose) -> Seen {
-        let soft = &self.world.soft[0];
-        let centre = soft.body.centre();
+        let soft = &self.world.soft_bodies()[0];
+        let centre = soft.state.centre();
         let pivot = Vec3::z() * (0.5 * self.options.body.width());
         let local = |p: &Vec3| hand.rotation.inverse() * (p - pivot - hand.translation.vector);
-        let touches = self.pads.map(|(_, collider, _)| self.world.touch(0, collider));
+        let touches = self.pads.map(|(_, collider, _)| self.world.contact(SoftId::new(0), collider));
         Seen {
             t: self.world.time(),
-            d_pct: self.reference.measure(&soft.body.x).map_or(f64::NAN, |d| d.rms_pct),
+            d_pct: self.reference.measure(&soft.state.x).map_or(f64::NAN, |d| d.rms_pct),
             moved_h: local(&centre) - (self.start - pivot),
             rise: (centre - self.start).z,
             force: 0.5 * (touches[0].normal_force + touches[1].normal_force),
             capacity: touches[0].capacity + touches[1].capacity,
-            min_det_f: soft.min_det_f.0,
-            sliding: touches.iter().any(|t| t.slipping == t.samples),
+            min_det_f: soft.min_det_f().det_f,
+            sliding: touches.iter().any(|t| t.slipping_points == t.points),
         }
     }
 
     /// The body's weight under 9.81 m/s², N.
     pub fn weight(&self) -> f64 {
-        self.world.soft[0].body.rest.total_mass() * GRAVITY
+        self.world.soft_bodies()[0].state.model.total_mass() * GRAVITY
     }
 }
 

@@ -1,6 +1,6 @@
 //! Small-strain pad stiffness of the cube against converged truth, and how it changes with the pads.
 
-use softvt::evaluation::deformation::ReferenceShape;
+use softvt::evaluation::deformation::Reference;
 
 use crate::support::{Scene, Squeeze};
 
@@ -27,16 +27,16 @@ pub fn small_strain(resolution: usize, pad_mm: f64, offset_mm: [f64; 2]) -> (f64
         let seen = scene.step(&softvt::geometry::Pose::identity()).expect("a step");
         force = seen.force;
     }
-    let body = &scene.world.soft[0].body;
+    let body = &scene.world.soft_bodies()[0].state;
     let on = |c: &f64| {
         let at = (c + 0.025) * 6.0 / 0.05;
         (at - at.round()).abs() < 1e-6
     };
     let on_lattice: Vec<usize> =
-        (0..body.x.len()).filter(|&n| body.rest.mesh.nodes[n].iter().all(on)).collect();
-    let rest: Vec<_> = on_lattice.iter().map(|&n| body.rest.mesh.nodes[n]).collect();
+        (0..body.x.len()).filter(|&n| body.model.mesh.nodes[n].iter().all(on)).collect();
+    let rest: Vec<_> = on_lattice.iter().map(|&n| body.model.mesh.nodes[n]).collect();
     let now: Vec<_> = on_lattice.iter().map(|&n| body.x[n]).collect();
-    let reference = ReferenceShape::new(&rest, &vec![1.0; rest.len()]).expect("a cube");
+    let reference = Reference::new(&rest, &vec![1.0; rest.len()]).expect("a cube");
     let d = reference.measure(&now).expect("a cube").rms_pct;
     (force / CLOSE, d / (1e3 * CLOSE))
 }

@@ -14,8 +14,7 @@ use crate::{
         run::selection::check_distinct_out_dirs,
         run::{conditions, suite_run::SuiteRun},
     },
-    parallel,
-    rollout::{AssetCache, SensorAssets, cancel, target_asset},
+    rollout::{AssetCache, SensorAssets, batch as parallel, cancel, target_asset},
     scene::Asset,
     script::{self, Loaded, Scenes},
     text,
@@ -93,7 +92,7 @@ fn first_targets(
         batch.examine(task, scene)?;
         Ok(target_asset(&nominal, task).cloned())
     };
-    parallel::run(tasks.len(), threads, cancel::requested, examine, |job, target| {
+    parallel::run(tasks.len(), threads, &cancel::FLAG, examine, |job, target| {
         targets[job] = target;
         Ok(())
     })?;

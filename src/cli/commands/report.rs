@@ -5,9 +5,8 @@ use std::path::{Path, PathBuf};
 use crate::{
     cli::{error::CliError, run::calibration::make_folder},
     report::{
-        page,
-        run_summary::summarize_runs,
-        stored_run,
+        judged::judge,
+        page, runs,
         tables::{Table, all_tables},
     },
 };
@@ -23,9 +22,9 @@ const LATEX_HEAD: &str =
 pub(crate) fn run(dirs: &[PathBuf], out: &Path) -> Result<(), CliError> {
     let mut stored = Vec::new();
     for dir in dirs {
-        stored.extend(stored_run::load(dir).map_err(CliError::input)?);
+        stored.extend(runs::load(dir).map_err(CliError::input)?);
     }
-    let judged = summarize_runs(stored);
+    let judged = judge(stored);
     for remark in judged.iter().flat_map(|judged| judged.run.remarks()) {
         crate::text::eprint_line(&format!("softvt: {remark}"));
     }

@@ -14,8 +14,7 @@ use crate::{
         run::config::RunConfig,
     },
     files::replace,
-    parallel,
-    rollout::cancel,
+    rollout::{batch, cancel},
     script::{Experiment, Loaded, Row},
 };
 
@@ -35,10 +34,10 @@ pub(crate) fn run(
     let take = || idle.lock().unwrap_or_else(|p| p.into_inner()).pop();
     let mut rows: Vec<Vec<Row>> = vec![Vec::new(); points];
     let mut progress = Progress::new(points, name);
-    let outcome = parallel::run(
+    let outcome = batch::run(
         points,
         run.threads,
-        cancel::requested,
+        &cancel::FLAG,
         |point| {
             let machine = match take() {
                 Some(machine) => machine,

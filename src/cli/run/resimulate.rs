@@ -9,10 +9,9 @@ use crate::{
         },
     },
     evaluation::record::{EpisodeRecord, Outcome},
-    parallel,
     policy::{Action, ChunkedPolicy, recorded::RecordedPolicy},
     report::actions,
-    rollout::{FinishedEpisode, cancel},
+    rollout::{FinishedEpisode, batch, cancel},
 };
 
 /// Whoever drove the episode of `record`, as its actions say.
@@ -77,10 +76,10 @@ pub(crate) fn make_lost_files(batch: &SuiteRun, done: &[EpisodeRecord]) -> Resul
             path.display()
         ));
     }
-    parallel::run(
+    batch::run(
         can.len(),
         batch.run.threads,
-        cancel::requested,
+        &cancel::FLAG,
         |index| simulate(batch, can[index], has_actions(can[index]), &files),
         |_, made| {
             let Some((finished, drawn)) = made else { return Ok(()) };

@@ -26,19 +26,18 @@ use crate::{
     dataset::card::Imported,
     evaluation::{
         record::{EpisodeRecord, Origin},
-        safety::{DeformationLimit, NOMINAL_KAPPA},
-        summary::SuiteSummary,
-        thresholds::ThresholdFile,
+        safety::Limit,
+        summary::Summary,
+        thresholds::Thresholds,
     },
-    parallel,
     policy::TaskBrief,
     report::{
+        interchange,
         run_folder::{EPISODES, RUN, RunFolder, SUMMARY},
-        softvtbench_files,
     },
     rollout::{
-        AssetCache, BuildError, Cancellable, ControlError, Controller, Episode, EpisodeError, EpisodeRef,
-        EpisodeSpec, FinishedEpisode, SensorAssets, cancel, target_asset,
+        AssetCache, BuildError, ControlError, Controller, Episode, EpisodeError, EpisodeRef, EpisodeSpec,
+        FinishedEpisode, SensorAssets, batch, cancel, target_asset,
     },
     scene::{Asset, Body},
     script::{self, Loaded},
@@ -53,9 +52,9 @@ pub(crate) struct SuiteRun<'a> {
     pub name: String,
     pub settings: Settings,
     pub jobs: Vec<(&'a Task, u32)>,
-    pub limits: BTreeMap<String, Option<DeformationLimit>>,
+    pub limits: BTreeMap<String, Option<Limit>>,
     /// The thresholds in use as one file of SoftVTBench's form.
-    released: ThresholdFile,
+    released: Thresholds,
     /// SHA-256 of every file that the results depend on.
     pub sources: BTreeMap<String, String>,
     /// Whose actions are carried out once more.
@@ -70,7 +69,7 @@ pub(crate) struct SuiteRun<'a> {
     /// Which list its episodes are of.
     pub split: Split,
     pub(crate) drivers: Arc<ControllerSource>,
-    /// ForeignFile demonstrations that episodes re-execute, by task and episode.
+    /// Foreign demonstrations that episodes re-execute, by task and episode.
     pub origins: BTreeMap<(usize, u32), Origin>,
     /// The files that those are from.
     pub imported: Vec<Imported>,
@@ -108,7 +107,7 @@ impl<'a> SuiteRun<'a> {
             settings,
             jobs,
             limits: BTreeMap::new(),
-            released: ThresholdFile::new(NOMINAL_KAPPA, Vec::new(), made_by),
+            released: Thresholds::new(0.5, Vec::new(), made_by),
             sources,
             replayed,
             cache: AssetCache::default(),
@@ -191,7 +190,7 @@ impl<'a> SuiteRun<'a> {
         self.sources.clone_from(&other.sources);
     }
 
-    fn find_limit(&mut self, asset: &Asset) -> Result<Option<DeformationLimit>, CliError> {
+    fn find_limit(&mut self, asset: &Asset) -> Result<Option<Limit>, CliError> {
         let name = &asset.name;
         let cure = format!("its episodes cannot count as safe; softvt scripts/calibrate.lua --asset {name}");
         match calibration::calibrated(&self.run.file, asset)? {
@@ -213,7 +212,7 @@ impl<'a> SuiteRun<'a> {
     }
 
     /// The limit of an object as its layout made it in this episode, whatever a shift makes of it then.
-    fn limit_of(&self, asset: &Asset) -> Option<DeformationLimit> {
+    fn limit_of(&self, asset: &Asset) -> Option<Limit> {
         let limit = self.limits.get(&asset.name).copied().flatten()?;
         let known = self.released.fingerprints.get(&asset.name);
         known.is_none_or(|known| *known == asset.fingerprint()).then_some(limit)
@@ -257,7 +256,7 @@ impl<'a> SuiteRun<'a> {
         }
         records.sort_by_key(|r| (r.identity.task, r.identity.episode));
         folder.put_in_order(&records).map_err(folder_failure)?;
-        softvtbench_files::write_scores(&self.out, &records, &self.released).map_err(folder_failure)?;
+        interchange::write_scores(&self.out, &records, &self.released).map_err(folder_failure)?;
         let done = self.summed_up(records);
         // The last of all: a folder with a summary is finished.
         crate::files::write_json(&self.out.join(SUMMARY), &done.summary).map_err(CliError::input)?;
@@ -268,7 +267,7 @@ impl<'a> SuiteRun<'a> {
     /// Episodes with what they come to.
     pub(crate) fn summed_up(&self, records: Vec<EpisodeRecord>) -> SuiteResult {
         let policy = &self.run.policy;
-        let summary = SuiteSummary::of(&self.name, policy.name(), &records);
+        let summary = Summary::of(&self.name, policy.name(), &records);
         SuiteResult { summary, records }
     }
 
@@ -276,7 +275,7 @@ impl<'a> SuiteRun<'a> {
     pub(crate) fn is_whole(&self, done: &[EpisodeRecord]) -> bool {
         let files = self.files();
         self.left(done).is_empty()
-            && softvtbench_files::has_scores(&self.out)
+            && interchange::has_scores(&self.out)
             && done.iter().all(|record| files.lost(record).is_empty())
     }
 
@@ -332,10 +331,10 @@ impl<'a> SuiteRun<'a> {
     ) -> Result<(), CliError> {
         let files = self.files();
         let mut progress = Progress::new(left.len(), &self.name);
-        let outcome = parallel::run(
+        let outcome = batch::run(
             left.len(),
             self.run.threads,
-            cancel::requested,
+            &cancel::FLAG,
             |index| {
                 let job = left[index];
                 let mut finished = self.episode(job, files.may_show(self.jobs[job].1), &self.drive)?;
@@ -384,7 +383,7 @@ impl<'a> SuiteRun<'a> {
         let (task, episode) = self.jobs[job];
         let (spec, opened) = self.spec(task, &self.request(task, episode), origin)?;
         let driver = drive(opened, self.brief(task, episode))?;
-        let mut driver = Cancellable(driver);
+        let mut driver = batch::Cancellable { driver, stop: &cancel::FLAG };
         let started = Episode::start(EpisodeSpec { record_states: film, ..spec }, &self.cache, &self.looks);
         Ok(started.and_then(|started| started.run(&mut driver)))
     }
@@ -477,7 +476,7 @@ pub(crate) type ControllerFactory =
 /// The episodes of a run that came to its end, in order, and what they come to.
 pub(crate) struct SuiteResult {
     /// What they come to.
-    pub summary: SuiteSummary,
+    pub summary: Summary,
     /// The episodes.
     pub records: Vec<EpisodeRecord>,
 }

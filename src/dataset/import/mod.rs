@@ -6,11 +6,11 @@
 mod header;
 mod libero;
 mod mujoco;
-mod object_matching;
+mod names;
+mod own;
 mod rows;
-mod softvt;
 mod softvtbench;
-mod tool_pose;
+mod tool;
 
 use std::path::{Path, PathBuf};
 
@@ -23,18 +23,18 @@ use crate::{
     scene::InitialState,
 };
 
-pub use header::ForeignLayout;
-pub use object_matching::match_objects;
+pub use header::Layout;
+pub use names::places;
 
 /// A file of demonstrations.
 #[derive(Clone, Debug)]
-pub struct ForeignFile {
+pub struct Foreign {
     /// Where it is.
     pub path: PathBuf,
     /// SHA-256 of its bytes, hexadecimal.
     pub sha256: String,
     /// How it is laid out.
-    pub layout: ForeignLayout,
+    pub layout: Layout,
     /// Its demonstrations, in order.
     pub demos: Vec<ForeignDemo>,
 }
@@ -53,7 +53,7 @@ pub struct ForeignDemo {
     /// Whether, in each control step, the hand holds something and its closure is only where the thing has stopped it.
     pub held: Vec<bool>,
     /// What it starts from.
-    pub begins: InitialCondition,
+    pub begins: Begins,
     /// Where its commands come from, for people.
     pub said: &'static str,
 }
@@ -71,16 +71,16 @@ pub struct ForeignTask {
 
 /// Where a demonstration begins.
 #[derive(Clone, Debug, PartialEq)]
-pub enum InitialCondition {
+pub enum Begins {
     /// In a world of its own: what it says of the arm (joint angles, rad) and of what stands around.
-    OtherSimulator {
+    Elsewhere {
         /// Joint angles, rad.
         joints: Option<[f64; 7]>,
         /// What stands around.
-        things: Vec<ForeignObjectPose>,
+        things: Vec<Standing>,
     },
     /// In an episode of a suite of softvt.
-    SoftvtEpisode {
+    Episode {
         /// Base seed.
         seed: u64,
         /// Index in the split of demonstrations.
@@ -92,7 +92,7 @@ pub enum InitialCondition {
 
 /// A thing of another world.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ForeignObjectPose {
+pub struct Standing {
     /// Its name there.
     pub name: String,
     /// Place and orientation.
@@ -120,16 +120,16 @@ impl ForeignDemo {
 ///
 /// # Errors
 /// It is none of the layouts that are known, is of another robot or rate, or something in it is missing or wrong.
-pub fn read(path: &Path) -> Result<ForeignFile, DatasetError> {
+pub fn read(path: &Path) -> Result<Foreign, DatasetError> {
     let file = TaskFile::open(path)?;
     let header = header::Header::read(&file)?;
     let demo = |&demo: &usize| match header.layout {
-        ForeignLayout::Softvt => softvt::demo(&file, &header, demo),
-        ForeignLayout::SoftVtBench => softvtbench::demo(&file, &header, demo),
-        ForeignLayout::Libero => libero::demo(&file, &header, demo),
+        Layout::Softvt => own::demo(&file, &header, demo),
+        Layout::SoftVtBench => softvtbench::demo(&file, &header, demo),
+        Layout::Libero => libero::demo(&file, &header, demo),
     };
     let demos = file.demos().iter().map(demo).collect::<Result<_, _>>()?;
-    Ok(ForeignFile { path: path.to_owned(), sha256: digest(path)?, layout: header.layout, demos })
+    Ok(Foreign { path: path.to_owned(), sha256: digest(path)?, layout: header.layout, demos })
 }
 
 /// SHA-256 of a file, hexadecimal.

@@ -1,28 +1,32 @@
-//! Colliders: surfaces that contact samples can meet, and what carries them.
+//! Colliders: surfaces of everything but soft bodies, attached to a body or to the world.
 
 use std::{fmt::Debug, sync::Arc};
 
 use serde::{Deserialize, Serialize};
 
-use super::solid::Solid;
-use crate::geometry::{
-    Aabb, Pose, Vec3,
-    shape::{Contact, Shape},
+use super::solid::CollisionGeometry;
+use crate::{
+    geometry::{
+        Aabb, Pose, Vec3,
+        shape::{Contact, Shape},
+    },
+    physics::ids::{ArticulationId, BodyId},
 };
 
-/// A solid's surface as contact samples feel it, in its own frame.
-pub trait Surface: Debug + Send + Sync {
-    /// Contact of a square sample of edge `spacing` (m) at `p` whose own outward normal is `facing`.
+/// The surface of a solid in its own frame, m. [`Shape`] implements it.
+pub trait ContactSurface: Debug + Send + Sync {
+    /// Signed distance, outward normal and coverage for a square sample of edge `spacing` (m) at `p` with outward normal
+    /// `facing`.
     fn contact(&self, p: &Vec3, facing: &Vec3, spacing: f64) -> Contact;
     /// A box around the solid.
     fn bounds(&self) -> Aabb;
-    /// How other rigid colliders meet it; without a solid, only soft bodies feel it.
-    fn solid(&self) -> Option<Solid> {
+    /// Geometry for contact with other colliders. Without it, the surface touches soft bodies only.
+    fn solid(&self) -> Option<CollisionGeometry> {
         None
     }
 }
 
-impl Surface for Shape {
+impl ContactSurface for Shape {
     fn contact(&self, p: &Vec3, facing: &Vec3, spacing: f64) -> Contact {
         Self::contact(self, p, facing, spacing)
     }
@@ -31,33 +35,12 @@ impl Surface for Shape {
         Self::bounds(self)
     }
 
-    fn solid(&self) -> Option<Solid> {
-        Some(Solid::new(self))
+    fn solid(&self) -> Option<CollisionGeometry> {
+        Some(CollisionGeometry::new(self))
     }
 }
 
-/// Index of a collider in its world.
-pub type ColliderId = usize;
-
-/// What carries a collider.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mover {
-    /// Nothing: part of the world.
-    Static,
-    /// A kinematic frame, by index: its motion is prescribed.
-    Kinematic(usize),
-    /// A free rigid body, by index (its object frame).
-    Rigid(usize),
-    /// A link of a joint tree.
-    Link {
-        /// Tree index.
-        tree: usize,
-        /// Link index in the tree.
-        link: usize,
-    },
-}
-
-/// Coulomb friction coefficients of a surface. A pair of surfaces takes the larger of each coefficient.
+/// Coulomb friction coefficients of a surface; a pair of surfaces takes the larger of each.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Friction {
     /// Static coefficient.
@@ -67,13 +50,16 @@ pub struct Friction {
 }
 
 impl Default for Friction {
-    /// 0.6 / 0.5: every object and surface except the gel pads.
+    /// 0.6 / 0.5, that of every object and surface but the pads.
     fn default() -> Self {
         Self { static_mu: 0.6, dynamic_mu: 0.5 }
     }
 }
 
 impl Friction {
+    /// No friction at all.
+    pub const NONE: Self = Self { static_mu: 0.0, dynamic_mu: 0.0 };
+
     /// The coefficients of a pair.
     pub fn with(&self, other: &Self) -> Self {
         Self {
@@ -83,75 +69,76 @@ impl Friction {
     }
 }
 
-/// Stiffness of a surface layer per area, Pa/m.
+/// Stiffness of a surface per area, Pa/m: contact is a bed of springs in both directions.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Layer {
-    /// Normal.
+pub struct SurfaceStiffness {
+    /// In the normal direction.
     pub normal: f64,
-    /// Tangential.
+    /// In the tangential directions.
     pub shear: f64,
 }
 
-impl Layer {
-    /// Two layers in series.
+impl SurfaceStiffness {
+    /// Two surfaces pressed on each other: springs in series.
     pub fn in_series(&self, other: &Self) -> Self {
         let series = |a: f64, b: f64| 1.0 / (1.0 / a + 1.0 / b);
         Self { normal: series(self.normal, other.normal), shear: series(self.shear, other.shear) }
     }
 }
 
-/// A surface somewhere in the world.
+/// A surface attached to a body, a kinematic frame or the world.
 #[derive(Clone, Debug)]
 pub struct Collider {
     /// Name, for messages and logs.
     pub name: String,
-    /// What carries it.
-    pub mover: Mover,
-    /// Its frame in that of its mover.
-    pub pose_in_mover: Pose,
-    /// Its surface.
-    pub surface: Arc<dyn Surface>,
-    /// Its friction.
+    /// The body that carries it; never a soft body.
+    pub parent: BodyId,
+    /// Collider frame in the parent's frame (the object frame of a rigid body, the link frame of a link).
+    pub pose_in_parent: Pose,
+    /// The surface that samples of soft bodies touch.
+    pub surface: Arc<dyn ContactSurface>,
+    /// Friction of the surface.
     pub friction: Friction,
-    /// Its compliance.
-    pub layer: Layer,
-    /// Its bounds, in its own frame.
+    /// Stiffness of the surface.
+    pub stiffness: SurfaceStiffness,
+    /// Bounds in the collider's frame.
     pub bounds: Aabb,
-    /// The joint tree that it is part of without moving with one of its links: the fixed base of a piece of furniture. It
-    /// never touches the links of that tree.
-    pub base_of: Option<usize>,
-    /// How other rigid colliders meet it, if they can.
-    pub solid: Option<Arc<Solid>>,
+    /// The articulation whose fixed base this is, such as the corpus of a chest of drawers. It never touches that
+    /// articulation's links.
+    pub base_of: Option<ArticulationId>,
+    /// Geometry for contact with other colliders; without it, there is none.
+    pub solid: Option<Arc<CollisionGeometry>>,
 }
 
 impl Collider {
-    /// A collider of `surface` at `pose_in_mover` on `mover`.
+    /// A collider of `surface` at `pose_in_parent` on `parent`.
     pub fn new(
         name: &str,
-        (mover, pose_in_mover): (Mover, Pose),
-        surface: Arc<dyn Surface>,
+        parent: impl Into<BodyId>,
+        pose_in_parent: Pose,
+        surface: Arc<dyn ContactSurface>,
         friction: Friction,
-        layer: Layer,
+        stiffness: SurfaceStiffness,
     ) -> Self {
         let bounds = surface.bounds();
         let solid = surface.solid().map(Arc::new);
         Self {
             name: name.to_owned(),
-            mover,
-            pose_in_mover,
+            parent: parent.into(),
+            pose_in_parent,
             surface,
             friction,
-            layer,
+            stiffness,
             bounds,
             base_of: None,
             solid,
         }
     }
 
-    /// The same as the fixed base of joint tree `tree`.
+    /// The same collider as the fixed base of `articulation`.
     #[must_use]
-    pub fn as_base_of(mut self, tree: usize) -> Self {
-        self.base_of = Some(tree);
+    pub fn as_base_of(mut self, articulation: ArticulationId) -> Self {
+        self.base_of = Some(articulation);
         self
     }
 }

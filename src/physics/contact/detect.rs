@@ -1,63 +1,84 @@
-//! Finds the samples of a soft body that are near a collider.
+//! Search for the samples of a soft body near a collider.
 
 use super::collider::Collider;
 use crate::{
     geometry::{Aabb, Mat3, Pose, Vec3},
-    physics::fem::SoftBody,
+    physics::fem::FemState,
 };
 
 /// A sample near a surface, at the start of the step.
 #[derive(Clone, Copy, Debug)]
-pub struct Candidate {
+pub struct ContactCandidate {
     /// Sample group of the body.
     pub group: usize,
     /// Sample of the body.
     pub sample: usize,
-    /// Where the sample is, m, world.
+    /// Position of the sample, m, world.
     pub p: Vec3,
-    /// Gap, m.
+    /// Gap, m; negative is overlap.
     pub gap: f64,
-    /// Outward normal of the surface, world.
+    /// Outward unit normal of the surface, world.
     pub normal: Vec3,
-    /// Share of the sample's patch that the surface covers.
+    /// Covered share of the sample's area, 0..=1.
     pub coverage: f64,
 }
 
-/// Where a collider is and how its mover moves.
+/// Pose and velocity of a collider at the start of the step.
 #[derive(Clone, Copy, Debug)]
-pub struct Moving {
+pub struct ColliderMotion {
     /// Collider frame in the world.
     pub pose: Pose,
-    /// Velocity of the mover's origin, m/s.
+    /// Velocity of the parent's origin, m/s, world.
     pub linear: Vec3,
-    /// Angular velocity, rad/s.
+    /// Angular velocity, rad/s, world.
     pub angular: Vec3,
-    /// The mover's origin, m, world.
+    /// The parent's origin, m, world; of a rigid body its centre of mass.
     pub origin: Vec3,
 }
 
-impl Moving {
-    /// Velocity of the mover's point at `p`, m/s.
+impl ColliderMotion {
+    /// Velocity of the parent's material point at `p` (m, world), m/s.
     pub fn velocity(&self, p: &Vec3) -> Vec3 {
         self.linear + self.angular.cross(&(p - self.origin))
     }
 }
 
-/// Where a body and its sample groups are at the start of a step, which is the same for all colliders.
-#[derive(Clone, Debug, Default)]
-pub struct Whereabouts {
-    body: Option<Aabb>,
-    groups: Vec<Aabb>,
-    fastest: f64,
+/// Distances and times that limit a search for contacts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DetectionLimits {
+    /// Time step, s.
+    pub dt: f64,
+    /// Samples closer than this become contact points, m.
+    pub margin: f64,
+    /// Nodes of samples closer than this are retained in the reduced system, m.
+    pub reach: f64,
 }
 
-impl Whereabouts {
-    /// Looks where `body` is.
-    pub fn look(&mut self, body: &SoftBody) {
+impl DetectionLimits {
+    /// Steps of approach within which a contact point is created (speculative contact).
+    pub const STEPS_AHEAD: f64 = 1.5;
+
+    /// Approach within [`Self::STEPS_AHEAD`] steps at a speed (m/s), m.
+    pub(super) fn ahead(&self, speed: f64) -> f64 {
+        Self::STEPS_AHEAD * self.dt * speed
+    }
+}
+
+/// Bounds of a body and its sample groups at the start of a step, shared by the searches against all colliders.
+#[derive(Clone, Debug, Default)]
+pub struct BodyBounds {
+    body: Option<Aabb>,
+    groups: Vec<Aabb>,
+    max_speed: f64,
+}
+
+impl BodyBounds {
+    /// Computes the bounds of `body`.
+    pub fn update(&mut self, body: &FemState) {
         self.body = Aabb::from_points(&body.x);
-        self.fastest = body.max_speed();
+        self.max_speed = body.max_speed();
         self.groups.clear();
-        self.groups.extend(body.rest.groups.iter().map(|group| {
+        self.groups.extend(body.model.groups.iter().map(|group| {
             let first = body.x[group.nodes[0] as usize];
             let nodes = group.nodes[1..group.count].iter().map(|&node| &body.x[node as usize]);
             nodes.fold(Aabb { min: first, max: first }, |Aabb { min, max }, x| Aabb {
@@ -68,141 +89,142 @@ impl Whereabouts {
     }
 }
 
-/// Steps of approach within which a sample gets a row.
-const AHEAD: f64 = 1.5;
-
-/// Collects the candidates of `body` against `collider` into `out`, in sample order, and calls `near` with every group
-/// that is within `reach` of it, so that its nodes can be kept before they are needed.
+/// Collects the candidates of `body` against `collider` into `out`, in sample order.
+///
+/// Calls `near` with every sample group within [`DetectionLimits::reach`], so that its nodes are retained before the contact
+/// begins.
 pub fn detect(
-    (body, whereabouts): (&SoftBody, &Whereabouts),
+    body: &FemState,
+    body_bounds: &BodyBounds,
     collider: &Collider,
-    moving: &Moving,
-    (dt, margin, reach): (f64, f64, f64),
-    out: &mut Vec<Candidate>,
+    motion: &ColliderMotion,
+    limits: DetectionLimits,
+    out: &mut Vec<ContactCandidate>,
     near: &mut dyn FnMut(usize),
 ) {
+    let DetectionLimits { margin, reach, .. } = limits;
     let bounds = collider.bounds;
-    let around = whereabouts.body.unwrap_or(bounds);
-    let lever = (around.centre() - moving.origin).norm() + around.size().norm();
-    let speed = whereabouts.fastest + moving.linear.norm() + moving.angular.norm() * lever;
-    let near_collider = bounds.transformed(&moving.pose).loosened(reach.max(AHEAD * dt * speed));
+    let around = body_bounds.body.unwrap_or(bounds);
+    let lever = (around.centre() - motion.origin).norm() + around.size().norm();
+    let speed = body_bounds.max_speed + motion.linear.norm() + motion.angular.norm() * lever;
+    let near_collider = bounds.transformed(&motion.pose).loosened(reach.max(limits.ahead(speed)));
     if !around.intersects(&near_collider) {
         return;
     }
-    let view = View::new(moving);
-    for (index, (group, around)) in body.rest.groups.iter().zip(&whereabouts.groups).enumerate() {
+    let frame = ColliderFrame::new(motion);
+    for (index, (group, around)) in body.model.groups.iter().zip(&body_bounds.groups).enumerate() {
         if !around.intersects(&near_collider) {
             continue;
         }
-        let seen = Seen::new(body, &group.nodes[..group.count], moving, &view);
-        let ahead = AHEAD * dt * seen.fastest;
-        let look = reach.max(ahead);
-        let near_surface = bounds.loosened(look);
-        if !seen.bounds.intersects(&near_surface) {
+        let nodes = LocalNodeGroup::new(body, &group.nodes[..group.count], motion, &frame);
+        let ahead = limits.ahead(nodes.max_speed);
+        let near_surface = bounds.loosened(reach.max(ahead));
+        if !nodes.bounds.intersects(&near_surface) {
             continue;
         }
-        let mut close = false;
+        let mut is_near = false;
         for sample in group.first..group.last {
-            let Some(candidate) = test(body, collider, (&seen, &view), (index, sample), &near_surface) else {
-                continue;
-            };
-            close |= candidate.gap < reach;
-            let weights = &body.rest.samples[sample].weights;
+            let candidate = test_sample(body, collider, &frame, &nodes, index, sample, &near_surface);
+            let Some(candidate) = candidate else { continue };
+            is_near |= candidate.gap < reach;
+            let weights = &body.model.samples[sample].weights;
             if candidate.gap < margin
-                || (candidate.gap < ahead && candidate.gap < AHEAD * dt * seen.speed(weights))
+                || (candidate.gap < ahead && candidate.gap < limits.ahead(nodes.speed(weights)))
             {
                 out.push(candidate);
             }
         }
-        if close {
+        if is_near {
             near(index);
         }
     }
 }
 
-/// A collider's frame in the world.
-struct View {
+/// A collider's frame in the world, as a matrix.
+struct ColliderFrame {
     to_world: Mat3,
     origin: Vec3,
 }
 
-impl View {
-    fn new(moving: &Moving) -> Self {
+impl ColliderFrame {
+    fn new(motion: &ColliderMotion) -> Self {
         Self {
-            to_world: *moving.pose.rotation.to_rotation_matrix().matrix(),
-            origin: moving.pose.translation.vector,
+            to_world: *motion.pose.rotation.to_rotation_matrix().matrix(),
+            origin: motion.pose.translation.vector,
         }
     }
 }
 
-/// The nodes of a group as a collider sees them, in its frame.
-struct Seen {
+/// Positions of a group's nodes in a collider's frame, and their velocities against the collider.
+struct LocalNodeGroup {
     count: usize,
     x: [Vec3; 8],
     v: [Vec3; 8],
     bounds: Aabb,
-    fastest: f64,
+    max_speed: f64,
 }
 
-impl Seen {
-    fn new(body: &SoftBody, nodes: &[u32], moving: &Moving, view: &View) -> Self {
-        let mut seen = Self {
+impl LocalNodeGroup {
+    fn new(body: &FemState, nodes: &[u32], motion: &ColliderMotion, frame: &ColliderFrame) -> Self {
+        let mut local = Self {
             count: nodes.len(),
             x: [Vec3::zeros(); 8],
             v: [Vec3::zeros(); 8],
             bounds: Aabb { min: Vec3::repeat(f64::INFINITY), max: Vec3::repeat(f64::NEG_INFINITY) },
-            fastest: 0.0,
+            max_speed: 0.0,
         };
         for (i, &node) in nodes.iter().enumerate() {
             let x = &body.x[node as usize];
-            seen.x[i] = view.to_world.tr_mul(&(x - view.origin));
-            seen.v[i] = body.v[node as usize] - moving.velocity(x);
-            seen.bounds.min = seen.bounds.min.inf(&seen.x[i]);
-            seen.bounds.max = seen.bounds.max.sup(&seen.x[i]);
-            seen.fastest = seen.fastest.max(seen.v[i].norm_squared());
+            local.x[i] = frame.to_world.tr_mul(&(x - frame.origin));
+            local.v[i] = body.v[node as usize] - motion.velocity(x);
+            local.bounds.min = local.bounds.min.inf(&local.x[i]);
+            local.bounds.max = local.bounds.max.sup(&local.x[i]);
+            local.max_speed = local.max_speed.max(local.v[i].norm_squared());
         }
-        seen.fastest = seen.fastest.sqrt();
-        seen
+        local.max_speed = local.max_speed.sqrt();
+        local
     }
 
-    /// Speed of a sample against the mover, m/s.
+    /// Speed of a sample against the collider, m/s.
     fn speed(&self, weights: &[f64; 8]) -> f64 {
-        mean(self.count, &self.v, weights).norm()
+        weighted_mean(self.count, &self.v, weights).norm()
     }
 }
 
-/// Weighted mean over `count` nodes; with the four of a face known, the sum is unrolled.
-fn mean(count: usize, values: &[Vec3; 8], weights: &[f64; 8]) -> Vec3 {
-    let of = |n: usize| (1..n).fold(values[0] * weights[0], |sum, i| sum + values[i] * weights[i]);
-    if count <= 4 { of(4) } else { of(8) }
+/// Weighted mean over `count` nodes. The four nodes of a face are the common case, for which the sum is unrolled.
+fn weighted_mean(count: usize, values: &[Vec3; 8], weights: &[f64; 8]) -> Vec3 {
+    let over = |n: usize| (1..n).fold(values[0] * weights[0], |sum, i| sum + values[i] * weights[i]);
+    if count <= 4 { over(4) } else { over(8) }
 }
 
-/// One sample against the surface, if it is within `near_surface` and the two face each other.
-fn test(
-    body: &SoftBody,
+/// One sample against the surface, if it is within `near_surface` (collider frame) and the two face each other.
+fn test_sample(
+    body: &FemState,
     collider: &Collider,
-    (seen, view): (&Seen, &View),
-    (group, sample): (usize, usize),
+    frame: &ColliderFrame,
+    nodes: &LocalNodeGroup,
+    group: usize,
+    sample: usize,
     near_surface: &Aabb,
-) -> Option<Candidate> {
-    let data = &body.rest.samples[sample];
-    let local = mean(seen.count, &seen.x, &data.weights);
+) -> Option<ContactCandidate> {
+    let data = &body.model.samples[sample];
+    let local = weighted_mean(nodes.count, &nodes.x, &data.weights);
     if !near_surface.contains(&local) {
         return None;
     }
     let facing = body.rotation[data.surface.at.element as usize] * data.surface.n_o;
-    let local_facing = view.to_world.tr_mul(&facing);
+    let local_facing = frame.to_world.tr_mul(&facing);
     let contact = collider.surface.contact(&local, &local_facing, data.surface.area.sqrt());
-    // A sample that looks the way the surface does has it behind its back: the far side of a thin body.
+    // Normals that agree mean that the surface is behind the sample: the far side of a thin body.
     if contact.coverage <= 0.0 || local_facing.dot(&contact.normal) > 0.3 {
         return None;
     }
-    Some(Candidate {
+    Some(ContactCandidate {
         group,
         sample,
-        p: view.to_world * local + view.origin,
+        p: frame.to_world * local + frame.origin,
         gap: contact.phi,
-        normal: view.to_world * contact.normal,
+        normal: frame.to_world * contact.normal,
         coverage: contact.coverage,
     })
 }

@@ -1,15 +1,20 @@
-//! Contact: what surfaces are made of, where they meet, and what they remember.
+//! Contact detection: colliders, contact samples of soft bodies, manifolds of rigid bodies, and the state that contacts keep
+//! between steps.
+//!
+//! Soft bodies touch with the samples of their surface: colliders by [`detect`], other soft bodies by [`detect_soft`].
+//! Colliders touch each other by [`CollisionGeometry::meet`]. What is found becomes contact points of the
+//! [solver](super::solver) in [`World`](super::World).
 
 mod collider;
+mod contact_history;
 mod detect;
 pub mod manifold;
-mod memory;
 mod soft_field;
 mod solid;
 
-pub use collider::{Collider, ColliderId, Friction, Layer, Mover, Surface};
-pub use detect::{Candidate, Moving, Whereabouts, detect};
-pub use manifold::ContactPoint;
-pub use memory::{Memory, Partner, Slot};
-pub use soft_field::{Felt, Pressing, SoftField, detect_soft, may_touch};
-pub use solid::{GelSample, Part, Solid};
+pub use collider::{Collider, ContactSurface, Friction, SurfaceStiffness};
+pub use contact_history::{ContactHistory, ContactRecord};
+pub use detect::{BodyBounds, ColliderMotion, ContactCandidate, DetectionLimits, detect};
+pub use manifold::ManifoldPoint;
+pub use soft_field::{FieldCandidate, FieldContact, SoftField, detect_soft, may_touch};
+pub use solid::{CollisionGeometry, GelSample, PairId};

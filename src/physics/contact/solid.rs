@@ -1,27 +1,27 @@
-//! A collider as other rigid colliders meet it: convex pieces where its shape is made of them, samples of its skin and its
+//! A collider as other rigid colliders meet it: convex primitives where its shape is made of them, samples of its skin and its
 //! distance field otherwise; or a compliant skin, which is felt where it is sampled.
 
 use std::sync::OnceLock;
 
 use super::manifold::{
-    ContactPoint, Piece, SkinSamples, field::Skin, gel::gel_vs_shape, manifold, pieces, skin_samples,
+    ManifoldPoint, Primitive, SkinSamples, field::Skin, gel::gel_vs_shape, manifold, primitives, skin_samples,
 };
 use crate::geometry::{Aabb, Pose, Vec3, shape::Shape};
 
 /// What rigid solids need to find their contact points.
 #[derive(Debug)]
-pub enum Solid {
+pub enum CollisionGeometry {
     /// A hard shape.
-    Hard(Box<Hard>),
+    HardSolid(Box<HardSolid>),
     /// A compliant skin: it meets hard shapes at its samples, and other skins not at all.
     Gel(Vec<GelSample>),
 }
 
 /// A hard shape with what is derived from it.
 #[derive(Debug)]
-pub struct Hard {
+pub struct HardSolid {
     shape: Shape,
-    pieces: Option<Vec<(Piece, Pose)>>,
+    primitives: Option<Vec<(Primitive, Pose)>>,
     /// Chosen when first needed: it takes some milliseconds, and most colliders never meet a general shape.
     samples: OnceLock<SkinSamples>,
     /// The same: that of a displaced shape takes a search.
@@ -39,15 +39,15 @@ pub struct GelSample {
     pub area: f64,
 }
 
-/// Says which pieces (or whose samples) a contact point belongs to, within a pair of solids.
-pub type Part = u32;
+/// Says which primitives (or whose samples) a contact point belongs to, within a pair of solids.
+pub type PairId = u32;
 
-impl Solid {
+impl CollisionGeometry {
     /// The solid of a shape.
     pub fn new(shape: &Shape) -> Self {
-        Self::Hard(Box::new(Hard {
+        Self::HardSolid(Box::new(HardSolid {
             shape: shape.clone(),
-            pieces: pieces(shape),
+            primitives: primitives(shape),
             samples: OnceLock::new(),
             bounds: OnceLock::new(),
         }))
@@ -60,39 +60,41 @@ impl Solid {
         other: &Self,
         other_pose: &Pose,
         margin: f64,
-        out: &mut Vec<(Part, ContactPoint)>,
+        out: &mut Vec<(PairId, ManifoldPoint)>,
     ) {
         let mut found = Vec::new();
         match (self, other) {
-            (Self::Hard(mine), Self::Hard(theirs)) => mine.meet(pose, theirs, other_pose, margin, out),
-            (Self::Gel(gel), Self::Hard(hard)) => {
+            (Self::HardSolid(mine), Self::HardSolid(theirs)) => {
+                mine.meet(pose, theirs, other_pose, margin, out)
+            }
+            (Self::Gel(gel), Self::HardSolid(hard)) => {
                 gel_vs_shape(gel, pose, hard.field(), other_pose, margin, &mut found);
                 out.extend(found.drain(..).map(|point| (0, point)));
             }
-            (Self::Hard(hard), Self::Gel(gel)) => {
+            (Self::HardSolid(hard), Self::Gel(gel)) => {
                 gel_vs_shape(gel, other_pose, hard.field(), pose, margin, &mut found);
-                out.extend(found.drain(..).map(|point| (0, ContactPoint { n_w: -point.n_w, ..point })));
+                out.extend(found.drain(..).map(|point| (0, ManifoldPoint { n_w: -point.n_w, ..point })));
             }
             (Self::Gel(_), Self::Gel(_)) => {}
         }
     }
 }
 
-impl Solid {
+impl CollisionGeometry {
     /// How far the deepest point of two hard solids is under the other's surface, m; 0 if they do not overlap. Compliant
     /// skins are not looked at.
     pub fn depth(&self, pose: &Pose, other: &Self, other_pose: &Pose) -> f64 {
-        let (Self::Hard(mine), Self::Hard(theirs)) = (self, other) else { return 0.0 };
+        let (Self::HardSolid(mine), Self::HardSolid(theirs)) = (self, other) else { return 0.0 };
         let mut found = Vec::new();
         mine.meet(pose, theirs, other_pose, 0.0, &mut found);
         found.iter().map(|(_, point)| -point.phi).fold(mine.seed_depth(pose, theirs, other_pose), f64::max)
     }
 }
 
-impl Hard {
+impl HardSolid {
     /// Depth of the deepest place of either skin in the other's field, m. Pieces need none: their manifold is exact.
     fn seed_depth(&self, pose: &Pose, other: &Self, other_pose: &Pose) -> f64 {
-        if self.pieces.is_some() && other.pieces.is_some() {
+        if self.primitives.is_some() && other.primitives.is_some() {
             return 0.0;
         }
         let deepest = |skin: &Self, from: &Pose, into: &Self, frame: &Pose| {
@@ -117,14 +119,14 @@ impl Hard {
         other: &Self,
         other_pose: &Pose,
         margin: f64,
-        out: &mut Vec<(Part, ContactPoint)>,
+        out: &mut Vec<(PairId, ManifoldPoint)>,
     ) {
         let mut found = Vec::new();
-        if let (Some(mine), Some(theirs)) = (&self.pieces, &other.pieces) {
+        if let (Some(mine), Some(theirs)) = (&self.primitives, &other.primitives) {
             for (i, (a, frame_a)) in mine.iter().enumerate() {
                 for (j, (b, frame_b)) in theirs.iter().enumerate() {
                     manifold(a, &(pose * frame_a), b, &(other_pose * frame_b), margin, &mut found);
-                    let part = (i * theirs.len() + j) as Part;
+                    let part = (i * theirs.len() + j) as PairId;
                     out.extend(found.drain(..).map(|point| (part, point)));
                 }
             }
@@ -145,11 +147,11 @@ impl Hard {
         theirs.lowest(margin, &mut found);
         flip(&mut found);
         let is_theirs = |i: usize| (first..second).contains(&i) || i >= third;
-        out.extend(found.drain(..).enumerate().map(|(i, point)| (Part::from(is_theirs(i)), point)));
+        out.extend(found.drain(..).enumerate().map(|(i, point)| (PairId::from(is_theirs(i)), point)));
     }
 }
 
 /// Turns the normals around.
-fn flip(points: &mut [ContactPoint]) {
+fn flip(points: &mut [ManifoldPoint]) {
     points.iter_mut().for_each(|point| point.n_w = -point.n_w);
 }

@@ -14,7 +14,7 @@ use crate::geometry::{
 
 /// Isotropic linear elasticity.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Material {
+pub struct ElasticMaterial {
     /// Young's modulus, Pa.
     pub youngs_pa: f64,
     /// Poisson's ratio, 0 ≤ ν < 0.5.
@@ -43,7 +43,7 @@ pub struct SampleGroup {
 
 /// A contact sample: where it sits, its weights in its group's node order, and what it stands for.
 #[derive(Clone, Debug)]
-pub struct Sample {
+pub struct ContactSample {
     /// The geometric sample.
     pub surface: SurfaceSample,
     /// Weights of the group's nodes.
@@ -52,16 +52,16 @@ pub struct Sample {
 
 /// What never changes about a soft body.
 #[derive(Debug)]
-pub struct Rest {
+pub struct FemModel {
     /// The voxel mesh at rest, object frame.
     pub mesh: VoxelMesh,
-    /// Material.
-    pub material: Material,
+    /// ElasticMaterial.
+    pub material: ElasticMaterial,
     /// Node masses, kg; they sum to density × volume.
     pub mass: Vec<f64>,
     /// Contact samples, ordered by group.
-    pub samples: Vec<Sample>,
-    /// Sample groups.
+    pub samples: Vec<ContactSample>,
+    /// ContactSample groups.
     pub groups: Vec<SampleGroup>,
     /// Typical side of a sample's patch, m.
     pub spacing: f64,
@@ -76,19 +76,24 @@ pub struct Rest {
 /// grows as that of nested dissection does.
 const FACTOR_BYTES: f64 = 2048.0;
 
-impl Rest {
+impl FemModel {
     /// About what a body takes in memory once it has been stepped, bytes.
     pub fn bytes(&self) -> usize {
         let (nodes, elements) = (self.mesh.nodes.len(), self.mesh.elements.len());
         let own = nodes * (size_of::<f64>() + 4 * size_of::<Vec3>())
             + elements * (size_of::<[u32; 8]>() + size_of::<OccupancyMask>() + 2 * size_of::<Mat3>())
-            + self.samples.len() * size_of::<Sample>()
+            + self.samples.len() * size_of::<ContactSample>()
             + self.stiffness.len() * size_of::<Stiffness>();
         own + (FACTOR_BYTES * (nodes as f64).powf(4.0 / 3.0)) as usize
     }
 
     /// Builds the rest data; `volume` (m³) is the body's true volume, which fixes its mass.
-    pub fn new(mesh: VoxelMesh, material: Material, volume: f64, samples: Vec<SurfaceSample>) -> Arc<Self> {
+    pub fn new(
+        mesh: VoxelMesh,
+        material: ElasticMaterial,
+        volume: f64,
+        samples: Vec<SurfaceSample>,
+    ) -> Arc<Self> {
         let h = mesh.edge;
         let mut fills: Vec<OccupancyMask> = Vec::new();
         let stiffness_of = mesh
@@ -152,7 +157,7 @@ fn node_masses(mesh: &VoxelMesh, density: f64, volume: f64) -> Vec<f64> {
 }
 
 /// Groups samples that are carried by the same nodes (an element, or one face of it) and orders them by group.
-fn group_samples(mesh: &VoxelMesh, samples: Vec<SurfaceSample>) -> (Vec<Sample>, Vec<SampleGroup>) {
+fn group_samples(mesh: &VoxelMesh, samples: Vec<SurfaceSample>) -> (Vec<ContactSample>, Vec<SampleGroup>) {
     let key = |s: &SurfaceSample| {
         let weights = s.at.weights();
         let mask = weights.iter().enumerate().fold(0u8, |m, (c, w)| if *w > 1e-12 { m | 1 << c } else { m });
@@ -160,7 +165,7 @@ fn group_samples(mesh: &VoxelMesh, samples: Vec<SurfaceSample>) -> (Vec<Sample>,
     };
     let mut keyed: Vec<((u32, u8), SurfaceSample)> = samples.into_iter().map(|s| (key(&s), s)).collect();
     keyed.sort_by_key(|(key, _)| *key);
-    let (mut out, mut groups): (Vec<Sample>, Vec<SampleGroup>) =
+    let (mut out, mut groups): (Vec<ContactSample>, Vec<SampleGroup>) =
         (Vec::with_capacity(keyed.len()), Vec::new());
     let mut last_key = None;
     for (key, surface) in keyed {
@@ -175,7 +180,7 @@ fn group_samples(mesh: &VoxelMesh, samples: Vec<SurfaceSample>) -> (Vec<Sample>,
         let all = surface.at.weights();
         let mut weights = [0.0; 8];
         corners.iter().enumerate().for_each(|(i, &c)| weights[i] = all[c]);
-        out.push(Sample { surface, weights });
+        out.push(ContactSample { surface, weights });
         if let Some(group) = groups.last_mut() {
             group.last = out.len();
         }
@@ -183,16 +188,25 @@ fn group_samples(mesh: &VoxelMesh, samples: Vec<SurfaceSample>) -> (Vec<Sample>,
     (out, groups)
 }
 
+/// Smallest volume ratio in a body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MinDetF {
+    /// Determinant of the deformation gradient; 1 at rest, ≤ 0 for an inverted element.
+    pub det_f: f64,
+    /// The element.
+    pub element: usize,
+}
+
 /// A soft body in motion.
 #[derive(Clone, Debug)]
-pub struct SoftBody {
-    /// Rest data.
-    pub rest: Arc<Rest>,
+pub struct FemState {
+    /// FemModel data.
+    pub model: Arc<FemModel>,
     /// Node positions, m, world.
     pub x: Vec<Vec3>,
     /// Node velocities, m/s, world.
     pub v: Vec<Vec3>,
-    /// Elastic node forces at `x`, N, world; made by [`SoftBody::update_elastic`].
+    /// Elastic node forces at `x`, N, world; made by [`FemState::update_elastic`].
     pub force: Vec<Vec3>,
     /// Element rotations at `x`.
     pub rotation: Vec<Mat3>,
@@ -202,27 +216,27 @@ pub struct SoftBody {
     pub elastic_energy: f64,
 }
 
-impl SoftBody {
-    /// Puts a body at rest at `pose`.
-    pub fn new(rest: Arc<Rest>, pose: &Pose) -> Self {
+impl FemState {
+    /// A body at rest in its rest configuration at `pose`.
+    pub fn new(model: Arc<FemModel>, pose: &Pose) -> Self {
         let x: Vec<Vec3> =
-            rest.mesh.nodes.iter().map(|p| pose * nalgebra::Point3::from(*p)).map(|p| p.coords).collect();
+            model.mesh.nodes.iter().map(|p| pose * nalgebra::Point3::from(*p)).map(|p| p.coords).collect();
         let r = *pose.rotation.to_rotation_matrix().matrix();
         let nodes = x.len();
         Self {
-            rotation: vec![r; rest.mesh.elements.len()],
+            rotation: vec![r; model.mesh.elements.len()],
             frame: r,
             v: vec![Vec3::zeros(); nodes],
             force: vec![Vec3::zeros(); nodes],
             elastic_energy: 0.0,
             x,
-            rest,
+            model,
         }
     }
 
     /// Evaluates rotations, forces and energy at the present positions.
     pub fn update_elastic(&mut self) {
-        let rest = &*self.rest;
+        let rest = &*self.model;
         self.force.fill(Vec3::zeros());
         self.elastic_energy = 0.0;
         let mut mean = Mat3::zeros();
@@ -240,15 +254,15 @@ impl SoftBody {
         self.frame = polar(&(mean / rest.mesh.elements.len() as f64), self.frame);
     }
 
-    /// Least det F over the Gauss points of all elements that hold enough material, and the element it is in.
-    pub fn min_det_f(&self) -> (f64, usize) {
-        let rest = &*self.rest;
-        let mut least = (f64::INFINITY, 0);
+    /// Smallest det F over the Gauss points of all elements that hold enough material.
+    pub fn min_det_f(&self) -> MinDetF {
+        let rest = &*self.model;
+        let mut least = MinDetF { det_f: f64::INFINITY, element: 0 };
         for (e, nodes) in rest.mesh.elements.iter().enumerate().filter(|(e, _)| rest.watched[*e]) {
             let x: Corners = std::array::from_fn(|c| self.x[nodes[c] as usize]);
             let det = force::min_det(&x, rest.mesh.edge);
-            if det < least.0 {
-                least = (det, e);
+            if det < least.det_f {
+                least = MinDetF { det_f: det, element: e };
             }
         }
         least
@@ -265,13 +279,13 @@ impl SoftBody {
     }
 
     fn weighted(&self, values: &[Vec3]) -> Vec3 {
-        let sum: Vec3 = values.iter().zip(&self.rest.mass).map(|(x, m)| x * *m).sum();
-        sum / self.rest.total_mass()
+        let sum: Vec3 = values.iter().zip(&self.model.mass).map(|(x, m)| x * *m).sum();
+        sum / self.model.total_mass()
     }
 
     /// Kinetic energy, J.
     pub fn kinetic_energy(&self) -> f64 {
-        0.5 * self.v.iter().zip(&self.rest.mass).map(|(v, m)| m * v.norm_squared()).sum::<f64>()
+        0.5 * self.v.iter().zip(&self.model.mass).map(|(v, m)| m * v.norm_squared()).sum::<f64>()
     }
 
     /// Largest node speed, m/s.

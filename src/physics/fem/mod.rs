@@ -8,8 +8,8 @@
 pub mod body;
 pub mod element;
 pub mod force;
+pub mod rigid_motion;
 pub mod rotation;
-pub mod spin;
 pub mod system;
 
-pub use body::{Material, Rest, SoftBody};
+pub use body::{ElasticMaterial, FemModel, FemState, MinDetF};

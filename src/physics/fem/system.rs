@@ -6,10 +6,10 @@
 //! that a body that is merely held needs not even be turned. A slightly old tangent changes no equilibrium: the force
 //! is always evaluated exactly, `A` only says how the step answers it.
 
-use super::body::{Rest, SoftBody};
+use super::body::{FemModel, FemState};
 use crate::{
     geometry::{Mat3, Vec3},
-    physics::sparse::{BlockMatrix, Factor, Symbolic},
+    physics::sparse::{BlockMatrix, CholeskyFactor, SymbolicFactor},
 };
 
 /// Change of an element's rotation (Frobenius norm, about √2 × radians) that makes the factor be refilled.
@@ -25,29 +25,29 @@ pub struct StepCoefficients {
     /// Time step, s.
     pub dt: f64,
     /// Mass-proportional damping, 1/s.
-    pub alpha: f64,
+    pub rayleigh_mass: f64,
     /// Stiffness-proportional damping, s.
-    pub beta: f64,
+    pub rayleigh_stiffness: f64,
 }
 
 /// The factored system of one body.
 #[derive(Clone, Debug)]
-pub struct System {
+pub struct VelocitySystem {
     blocks: Blocks,
-    plan: Option<Symbolic>,
-    factor: Factor,
+    plan: Option<SymbolicFactor>,
+    factor: CholeskyFactor,
     factored: Vec<Mat3>,
     turn: Mat3,
     /// The Schur complement in the world, empty while it is lent out or has to be turned again.
     turned: Vec<f64>,
     coefficients: Option<StepCoefficients>,
     last_used: Vec<u64>,
-    kept: Vec<u32>,
-    kept_index: Vec<u32>,
-    kept_version: u64,
+    retained: Vec<u32>,
+    retained_index: Vec<u32>,
+    retained_version: u64,
     work: Vec<f64>,
     /// Factorisations done so far (for profiles and tests).
-    pub refills: u64,
+    pub factorizations: u64,
 }
 
 /// The matrix: diagonal blocks and, per node, blocks to its higher neighbours.
@@ -59,7 +59,7 @@ struct Blocks {
     slot: Vec<Vec<u32>>,
     diagonal: Vec<[f64; 9]>,
     off: Vec<[f64; 9]>,
-    /// Slot of each of the 36 corner pairs of each element; the top bit says "transposed", diagonal pairs hold the node.
+    /// ContactRecord of each of the 36 corner pairs of each element; the top bit says "transposed", diagonal pairs hold the node.
     pairs: Vec<[u32; 36]>,
 }
 
@@ -75,7 +75,7 @@ impl BlockMatrix for Blocks {
 }
 
 impl Blocks {
-    fn new(rest: &Rest) -> Self {
+    fn new(rest: &FemModel) -> Self {
         let nodes = rest.mesh.nodes.len();
         let mut neighbours: Vec<Vec<u32>> = vec![Vec::new(); nodes];
         for element in &rest.mesh.elements {
@@ -128,13 +128,13 @@ impl Blocks {
         Self { places: places.collect(), neighbours, slot, diagonal, off, pairs }
     }
 
-    fn assemble(&mut self, rest: &Rest, rotations: &[Mat3], c: &StepCoefficients) {
+    fn assemble(&mut self, rest: &FemModel, rotations: &[Mat3], c: &StepCoefficients) {
         self.off.iter_mut().for_each(|b| *b = [0.0; 9]);
         for (block, m) in self.diagonal.iter_mut().zip(&rest.mass) {
-            let m = (1.0 + c.alpha * c.dt) * m;
+            let m = (1.0 + c.rayleigh_mass * c.dt) * m;
             *block = [m, 0.0, 0.0, 0.0, m, 0.0, 0.0, 0.0, m];
         }
-        let scale = c.dt * (c.dt + c.beta);
+        let scale = c.dt * (c.dt + c.rayleigh_stiffness);
         for (e, (pairs, r)) in self.pairs.iter().zip(rotations).enumerate() {
             let k0 = &rest.stiffness[rest.stiffness_of[e] as usize];
             for (at, (a, b)) in corner_pairs().enumerate() {
@@ -161,24 +161,24 @@ fn corner_pairs() -> impl Iterator<Item = (usize, usize)> {
     (0..8).flat_map(|a| (0..=a).map(move |b| (a, b)))
 }
 
-impl System {
+impl VelocitySystem {
     /// An empty system for a body.
-    pub fn new(rest: &Rest) -> Self {
+    pub fn new(rest: &FemModel) -> Self {
         let nodes = rest.mesh.nodes.len();
         Self {
             blocks: Blocks::new(rest),
             plan: None,
-            factor: Factor::default(),
+            factor: CholeskyFactor::default(),
             factored: Vec::new(),
             turn: Mat3::identity(),
             turned: Vec::new(),
             coefficients: None,
             last_used: vec![0; nodes],
-            kept: Vec::new(),
-            kept_index: vec![u32::MAX; nodes],
-            kept_version: 0,
+            retained: Vec::new(),
+            retained_index: vec![u32::MAX; nodes],
+            retained_version: 0,
             work: vec![0.0; 3 * nodes],
-            refills: 0,
+            factorizations: 0,
         }
     }
 
@@ -188,25 +188,26 @@ impl System {
     }
 
     /// Nodes kept in the reduced system, ascending.
-    pub fn kept(&self) -> &[u32] {
-        &self.kept
+    pub fn retained(&self) -> &[u32] {
+        &self.retained
     }
 
     /// Changes whenever the kept nodes do.
-    pub fn kept_version(&self) -> u64 {
-        self.kept_version
+    pub fn retained_version(&self) -> u64 {
+        self.retained_version
     }
 
     /// Index of a node among the kept ones.
-    pub fn kept_index(&self, node: u32) -> usize {
-        self.kept_index[node as usize] as usize
+    pub fn retained_index(&self, node: u32) -> usize {
+        self.retained_index[node as usize] as usize
     }
 
     /// Brings plan and factor up to date with the body and the marks of `step`. `false` if `A` is not positive definite.
-    pub fn prepare(&mut self, body: &SoftBody, c: &StepCoefficients, step: u64) -> bool {
-        let new_plan = self.choose_kept(step);
+    pub fn prepare(&mut self, body: &FemState, c: &StepCoefficients, step: u64) -> bool {
+        let new_plan = self.update_retained(step);
         if new_plan || self.plan.is_none() {
-            self.plan = Some(Symbolic::new(&self.blocks.neighbours, &self.blocks.places, &self.kept));
+            self.plan =
+                Some(SymbolicFactor::new(&self.blocks.neighbours, &self.blocks.places, &self.retained));
         }
         if new_plan || (body.frame - self.turn).norm_squared() > STALE_TURN * STALE_TURN {
             self.turn = body.frame;
@@ -224,35 +225,39 @@ impl System {
         self.turned.clear();
         self.factored.clear();
         self.factored.extend(body.rotation.iter().map(|r| to_body * r));
-        self.blocks.assemble(&body.rest, &self.factored, c);
+        self.blocks.assemble(&body.model, &self.factored, c);
         self.coefficients = Some(*c);
-        self.refills += 1;
+        self.factorizations += 1;
         let Some(plan) = &self.plan else { return false };
         self.factor.refill(plan, &self.blocks)
     }
 
     /// Updates the kept set; whether it changed.
-    fn choose_kept(&mut self, step: u64) -> bool {
+    fn update_retained(&mut self, step: u64) -> bool {
         let current = |used: &u64| *used == step;
-        let missing =
-            self.last_used.iter().zip(&self.kept_index).any(|(used, at)| current(used) && *at == u32::MAX);
+        let missing = self
+            .last_used
+            .iter()
+            .zip(&self.retained_index)
+            .any(|(used, at)| current(used) && *at == u32::MAX);
         let live = self.last_used.iter().filter(|u| **u > 0 && **u + KEEP_STEPS >= step).count();
-        let bloated = self.kept.len() > live + live / 4 + 8;
+        let bloated = self.retained.len() > live + live / 4 + 8;
         if !missing && !bloated {
             return false;
         }
-        self.kept_version += 1;
-        self.kept.clear();
+        self.retained_version += 1;
+        self.retained.clear();
         let recent = |used: u64| used > 0 && used + KEEP_STEPS >= step;
-        self.kept.extend((0..self.last_used.len() as u32).filter(|&n| recent(self.last_used[n as usize])));
-        self.kept_index.fill(u32::MAX);
-        self.kept.iter().enumerate().for_each(|(i, &n)| self.kept_index[n as usize] = i as u32);
+        self.retained
+            .extend((0..self.last_used.len() as u32).filter(|&n| recent(self.last_used[n as usize])));
+        self.retained_index.fill(u32::MAX);
+        self.retained.iter().enumerate().for_each(|(i, &n)| self.retained_index[n as usize] = i as u32);
         true
     }
 
-    /// Lends the reduced matrix of the kept nodes (Schur complement, column-major lower, world); [`System::give_back`]
+    /// Lends the reduced matrix of the kept nodes (Schur complement, column-major lower, world); [`VelocitySystem::give_back`]
     /// spares the next step from making it anew.
-    pub fn lend_matrix(&mut self) -> Vec<f64> {
+    pub fn take_matrix(&mut self) -> Vec<f64> {
         let mut matrix = std::mem::take(&mut self.turned);
         if let Some(plan) = self.plan.as_ref().filter(|_| matrix.is_empty()) {
             let side = 3 * plan.kept;
@@ -263,7 +268,7 @@ impl System {
     }
 
     /// Takes the matrix back, unchanged.
-    pub fn give_back(&mut self, matrix: Vec<f64>) {
+    pub fn return_matrix(&mut self, matrix: Vec<f64>) {
         self.turned = matrix;
     }
 

@@ -4,7 +4,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{Tree, kinematics::joint_velocity, tree::point_inertia};
+use super::{JointTree, kinematics::joint_velocity, tree::point_inertia};
 use crate::geometry::{Mat3, Pose, Vec3};
 
 /// A spatial velocity, acceleration or (moment, force) pair at the world origin.
@@ -54,7 +54,7 @@ struct Inertia {
 }
 
 impl Inertia {
-    fn of(tree: &Tree, poses: &[Pose], index: usize) -> Self {
+    fn of(tree: &JointTree, poses: &[Pose], index: usize) -> Self {
         let link = &tree.links[index];
         let com = poses[index].transform_point(&link.com.into()).coords;
         let turn = poses[index].rotation.to_rotation_matrix();
@@ -81,7 +81,7 @@ pub struct Scratch {
 }
 
 impl Scratch {
-    fn load(&mut self, tree: &Tree, poses: &[Pose]) {
+    fn load(&mut self, tree: &JointTree, poses: &[Pose]) {
         self.axes.clear();
         self.inertias.clear();
         for index in 0..tree.dofs() {
@@ -93,14 +93,14 @@ impl Scratch {
 }
 
 /// The joint-space mass matrix `M(q)`, n×n (kg m², kg m, kg by kinds of joint), symmetric positive definite.
-pub fn mass_matrix(tree: &Tree, poses: &[Pose]) -> DMatrix<f64> {
+pub fn mass_matrix(tree: &JointTree, poses: &[Pose]) -> DMatrix<f64> {
     let mut out = DMatrix::zeros(tree.dofs(), tree.dofs());
     mass_matrix_into(tree, poses, &mut Scratch::default(), &mut out);
     out
 }
 
 /// As [`mass_matrix`], into an n×n matrix.
-pub fn mass_matrix_into(tree: &Tree, poses: &[Pose], scratch: &mut Scratch, out: &mut DMatrix<f64>) {
+pub fn mass_matrix_into(tree: &JointTree, poses: &[Pose], scratch: &mut Scratch, out: &mut DMatrix<f64>) {
     scratch.load(tree, poses);
     out.fill(0.0);
     for index in (0..tree.dofs()).rev() {
@@ -124,7 +124,7 @@ pub fn mass_matrix_into(tree: &Tree, poses: &[Pose], scratch: &mut Scratch, out:
 
 /// The effort that keeps the joints from accelerating at speeds `v` under `gravity` (world, m/s²): Coriolis,
 /// centrifugal and gravity terms, N m or N. With `v = 0` it is the gravity compensation.
-pub fn bias(tree: &Tree, poses: &[Pose], v: &[f64], gravity: &Vec3) -> DVector<f64> {
+pub fn bias(tree: &JointTree, poses: &[Pose], v: &[f64], gravity: &Vec3) -> DVector<f64> {
     let mut out = DVector::zeros(tree.dofs());
     bias_into(tree, poses, v, gravity, &mut Scratch::default(), &mut out);
     out
@@ -132,7 +132,7 @@ pub fn bias(tree: &Tree, poses: &[Pose], v: &[f64], gravity: &Vec3) -> DVector<f
 
 /// As [`bias`], into a vector of n entries.
 pub fn bias_into(
-    tree: &Tree,
+    tree: &JointTree,
     poses: &[Pose],
     v: &[f64],
     gravity: &Vec3,
@@ -167,7 +167,7 @@ pub fn bias_into(
 }
 
 /// Kinetic energy at joint speeds `v`, J: the sum over links, independent of [`mass_matrix`].
-pub fn kinetic_energy(tree: &Tree, poses: &[Pose], v: &[f64]) -> f64 {
+pub fn kinetic_energy(tree: &JointTree, poses: &[Pose], v: &[f64]) -> f64 {
     let velocities = super::velocities(tree, poses, v);
     let energy = |index: usize| {
         let (link, pose, velocity) = (&tree.links[index], &poses[index], &velocities[index]);
@@ -179,7 +179,7 @@ pub fn kinetic_energy(tree: &Tree, poses: &[Pose], v: &[f64]) -> f64 {
 }
 
 /// Potential energy under `gravity` (world, m/s²), zero with every centre of mass at the world origin, J.
-pub fn potential_energy(tree: &Tree, poses: &[Pose], gravity: &Vec3) -> f64 {
+pub fn potential_energy(tree: &JointTree, poses: &[Pose], gravity: &Vec3) -> f64 {
     let energy = |(link, pose): (&super::Link, &Pose)| {
         -link.mass * gravity.dot(&pose.transform_point(&link.com.into()).coords)
     };

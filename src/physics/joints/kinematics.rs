@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{JointKind, Tree};
+use super::{JointKind, JointTree};
 use crate::geometry::{Pose, Vec3};
 
 /// Velocity of a link in world coordinates.
@@ -22,14 +22,14 @@ impl LinkVelocity {
 }
 
 /// Link frames in the world at joint coordinates `q` (one per link).
-pub fn forward(tree: &Tree, q: &[f64]) -> Vec<Pose> {
+pub fn forward(tree: &JointTree, q: &[f64]) -> Vec<Pose> {
     let mut poses = Vec::with_capacity(tree.dofs());
     forward_into(tree, q, &mut poses);
     poses
 }
 
 /// As [`forward`], into a buffer.
-pub fn forward_into(tree: &Tree, q: &[f64], poses: &mut Vec<Pose>) {
+pub fn forward_into(tree: &JointTree, q: &[f64], poses: &mut Vec<Pose>) {
     poses.clear();
     for (link, &q) in tree.links.iter().zip(q) {
         let parent = link.parent.map_or(tree.base_w, |parent| poses[parent]);
@@ -41,14 +41,14 @@ pub fn forward_into(tree: &Tree, q: &[f64], poses: &mut Vec<Pose>) {
 }
 
 /// Velocities of all links at joint speeds `v`.
-pub fn velocities(tree: &Tree, poses: &[Pose], v: &[f64]) -> Vec<LinkVelocity> {
+pub fn velocities(tree: &JointTree, poses: &[Pose], v: &[f64]) -> Vec<LinkVelocity> {
     let mut out = Vec::with_capacity(tree.dofs());
     velocities_into(tree, poses, v, &mut out);
     out
 }
 
 /// As [`velocities`], into a buffer.
-pub fn velocities_into(tree: &Tree, poses: &[Pose], v: &[f64], out: &mut Vec<LinkVelocity>) {
+pub fn velocities_into(tree: &JointTree, poses: &[Pose], v: &[f64], out: &mut Vec<LinkVelocity>) {
     out.clear();
     for (index, link) in tree.links.iter().enumerate() {
         let origin = poses[index].translation.vector;
@@ -65,26 +65,32 @@ pub fn velocities_into(tree: &Tree, poses: &[Pose], v: &[f64], out: &mut Vec<Lin
 
 /// The 6×n matrix from joint speeds to (velocity of the link's origin, angular velocity), world coordinates, linear
 /// rows first.
-pub fn jacobian(tree: &Tree, poses: &[Pose], link: usize) -> DMatrix<f64> {
+pub fn jacobian(tree: &JointTree, poses: &[Pose], link: usize) -> DMatrix<f64> {
     let mut out = DMatrix::zeros(6, tree.dofs());
     jacobian_into(tree, poses, link, &mut out);
     out
 }
 
 /// As [`jacobian`], into a 6×n matrix.
-pub fn jacobian_into(tree: &Tree, poses: &[Pose], link: usize, out: &mut DMatrix<f64>) {
+pub fn jacobian_into(tree: &JointTree, poses: &[Pose], link: usize, out: &mut DMatrix<f64>) {
     point_jacobian_into(tree, poses, link, &poses[link].translation.vector, out);
 }
 
 /// As [`jacobian`], but of the material point of `link` that is at `p_w` (world, m).
-pub fn point_jacobian(tree: &Tree, poses: &[Pose], link: usize, p_w: &Vec3) -> DMatrix<f64> {
+pub fn point_jacobian(tree: &JointTree, poses: &[Pose], link: usize, p_w: &Vec3) -> DMatrix<f64> {
     let mut out = DMatrix::zeros(6, tree.dofs());
     point_jacobian_into(tree, poses, link, p_w, &mut out);
     out
 }
 
 /// As [`point_jacobian`], into a 6×n matrix.
-pub fn point_jacobian_into(tree: &Tree, poses: &[Pose], link: usize, p_w: &Vec3, out: &mut DMatrix<f64>) {
+pub fn point_jacobian_into(
+    tree: &JointTree,
+    poses: &[Pose],
+    link: usize,
+    p_w: &Vec3,
+    out: &mut DMatrix<f64>,
+) {
     out.fill(0.0);
     let mut at = Some(link);
     while let Some(index) = at {
@@ -96,7 +102,7 @@ pub fn point_jacobian_into(tree: &Tree, poses: &[Pose], link: usize, p_w: &Vec3,
 }
 
 /// What unit speed of joint `index` gives a point at `p_w` of its link: (velocity, angular velocity), world.
-pub(super) fn joint_velocity(tree: &Tree, poses: &[Pose], index: usize, p_w: &Vec3) -> (Vec3, Vec3) {
+pub(super) fn joint_velocity(tree: &JointTree, poses: &[Pose], index: usize, p_w: &Vec3) -> (Vec3, Vec3) {
     match tree.links[index].kind {
         JointKind::Revolute(axis) => {
             let axis = poses[index].rotation * axis.into_inner();

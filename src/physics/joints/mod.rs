@@ -16,7 +16,7 @@ pub use kinematics::{
     LinkVelocity, forward, forward_into, jacobian, jacobian_into, point_jacobian, point_jacobian_into,
     velocities, velocities_into,
 };
-pub use tree::{JointKind, Link, Tree, TreeError, TreeState};
+pub use tree::{JointKind, JointState, JointTree, JointTreeError, Link};
 
 #[cfg(test)]
 mod tests;

@@ -16,7 +16,7 @@ fn pose(rng: &mut ChaCha8Rng) -> Pose {
 }
 
 /// A branching tree with both kinds of joint about arbitrary axes.
-fn any_tree(seed: u64) -> Tree {
+fn any_tree(seed: u64) -> JointTree {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let parents = [None, Some(0), Some(1), Some(1), Some(3), None, Some(5)];
     let mut link = |(index, parent): (usize, Option<usize>)| {
@@ -41,7 +41,7 @@ fn any_tree(seed: u64) -> Tree {
         }
     };
     let links = parents.into_iter().enumerate().map(&mut link).collect();
-    let tree = Tree { links, base_w: pose(&mut rng) };
+    let tree = JointTree { links, base_w: pose(&mut rng) };
     tree.validate().expect("a possible mechanism");
     tree
 }
@@ -58,7 +58,7 @@ fn shifted(q: &[f64], index: usize, by: f64) -> Vec<f64> {
 }
 
 /// Double pendulum of point masses on massless rods in the x–z plane, angles from the downward vertical, relative.
-fn double_pendulum(masses: [f64; 2], lengths: [f64; 2]) -> Tree {
+fn double_pendulum(masses: [f64; 2], lengths: [f64; 2]) -> JointTree {
     let link = |index: usize| Link {
         name: format!("rod{index}"),
         parent: index.checked_sub(1),
@@ -74,7 +74,7 @@ fn double_pendulum(masses: [f64; 2], lengths: [f64; 2]) -> Tree {
         friction: 0.0,
         damping: 0.0,
     };
-    Tree { links: vec![link(0), link(1)], base_w: Pose::translation(0.3, -0.2, 1.0) }
+    JointTree { links: vec![link(0), link(1)], base_w: Pose::translation(0.3, -0.2, 1.0) }
 }
 
 #[test]
@@ -178,14 +178,14 @@ fn double_pendulum_matches_its_closed_form() {
     }
 }
 
-fn rates(tree: &Tree, q: &DVector<f64>, v: &DVector<f64>) -> (DVector<f64>, DVector<f64>) {
+fn rates(tree: &JointTree, q: &DVector<f64>, v: &DVector<f64>) -> (DVector<f64>, DVector<f64>) {
     let poses = forward(tree, q.as_slice());
     let load = -bias(tree, &poses, v.as_slice(), &GRAVITY);
     let acceleration = mass_matrix(tree, &poses).cholesky().expect("positive definite").solve(&load);
     (v.clone(), acceleration)
 }
 
-fn rk4(tree: &Tree, state: &mut TreeState, dt: f64) {
+fn rk4(tree: &JointTree, state: &mut JointState, dt: f64) {
     let (q, v) = (&state.q, &state.v);
     let (q1, v1) = rates(tree, q, v);
     let (q2, v2) = rates(tree, &(q + &q1 * (dt / 2.0)), &(v + &v1 * (dt / 2.0)));
@@ -198,8 +198,8 @@ fn rk4(tree: &Tree, state: &mut TreeState, dt: f64) {
 #[test]
 fn free_motion_conserves_energy() {
     let tree = any_tree(3);
-    let mut state = TreeState::at_rest(&numbers(31, tree.dofs()));
-    let energy = |state: &TreeState| {
+    let mut state = JointState::at_rest(&numbers(31, tree.dofs()));
+    let energy = |state: &JointState| {
         let poses = forward(&tree, state.q.as_slice());
         let kinetic = kinetic_energy(&tree, &poses, state.v.as_slice());
         (kinetic, kinetic + potential_energy(&tree, &poses, &GRAVITY))
@@ -221,7 +221,7 @@ fn welding_a_body_leaves_the_energy_of_the_pair() {
     let frame =
         Pose::from_parts(Vec3::new(0.1, 0.2, -0.1).into(), Quat::from_scaled_axis(Vec3::new(0.3, 1.0, -0.4)));
     let (com, inertia) = (Vec3::new(0.05, 0.0, 0.02), Mat3::from_diagonal(&Vec3::new(0.01, 0.02, 0.015)));
-    let alone = |tree: &Tree, poses: &[Pose]| {
+    let alone = |tree: &JointTree, poses: &[Pose]| {
         let mut only = tree.clone();
         only.links.iter_mut().enumerate().filter(|(i, _)| *i != 4).for_each(|(_, link)| {
             link.mass = 0.0;

@@ -80,14 +80,14 @@ pub(super) fn point_inertia(mass: f64, r: &Vec3) -> Mat3 {
 
 /// A fixed-base tree of links, one joint each; degree of freedom `i` is link `i`'s joint.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Tree {
+pub struct JointTree {
     /// The links; a parent comes before its children.
     pub links: Vec<Link>,
     /// Base frame in the world.
     pub base_w: Pose,
 }
 
-impl Tree {
+impl JointTree {
     /// Degrees of freedom.
     pub fn dofs(&self) -> usize {
         self.links.len()
@@ -97,9 +97,9 @@ impl Tree {
     ///
     /// # Errors
     /// Names the first link that no mechanism could have, and what is wrong with it.
-    pub fn validate(&self) -> Result<(), TreeError> {
+    pub fn validate(&self) -> Result<(), JointTreeError> {
         for (index, link) in self.links.iter().enumerate() {
-            let wrong = |what: String| Err(TreeError { link: link.name.clone(), what });
+            let wrong = |what: String| Err(JointTreeError { link: link.name.clone(), what });
             if let Some(parent) = link.parent.filter(|&parent| parent >= index) {
                 return wrong(format!("its parent has index {parent}, but parents come before link {index}"));
             }
@@ -145,7 +145,7 @@ fn inertia_fault(inertia: &Mat3) -> Option<String> {
 /// A link that no mechanism could have.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("link {link}: {what}")]
-pub struct TreeError {
+pub struct JointTreeError {
     /// The link's name.
     pub link: String,
     /// What is wrong and what was expected.
@@ -154,14 +154,14 @@ pub struct TreeError {
 
 /// Joint coordinates and speeds of a tree.
 #[derive(Clone, Debug, PartialEq)]
-pub struct TreeState {
+pub struct JointState {
     /// Joint coordinates, rad or m.
     pub q: DVector<f64>,
     /// Joint speeds, rad/s or m/s.
     pub v: DVector<f64>,
 }
 
-impl TreeState {
+impl JointState {
     /// At rest with coordinates `q`.
     pub fn at_rest(q: &[f64]) -> Self {
         Self { q: DVector::from_column_slice(q), v: DVector::zeros(q.len()) }

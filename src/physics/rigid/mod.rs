@@ -29,7 +29,7 @@ pub enum RigidError {
 
 /// A free rigid body.
 #[derive(Clone, Debug, PartialEq)]
-pub struct RigidBody {
+pub struct RigidState {
     /// The centre of mass in the world; the axes are the object's own (not the principal ones).
     pub pose_w: Pose,
     /// Centre of mass in the object frame, m.
@@ -44,7 +44,7 @@ pub struct RigidBody {
     pub inertia_o: Mat3,
 }
 
-impl RigidBody {
+impl RigidState {
     /// A body at rest whose *object frame* is at `object_w`; `com_o` (m) and `inertia_o` (kg m², about the centre of
     /// mass) are in the object frame.
     ///
@@ -124,7 +124,7 @@ pub struct FreeSpin {
 /// by the Cayley map of dt ω̄. The first keeps every quadratic invariant, hence energy; with the second the *vector*
 /// of angular momentum stays too, because L₁ = cay(−dt ω̄) L₀ (Austin, Krishnaprasad & Wang, "Almost Poisson
 /// integration of rigid body systems", J. Comput. Phys. 107, 1993).
-pub fn free_spin(body: &RigidBody, dt: f64) -> FreeSpin {
+pub fn free_spin(body: &RigidState, dt: f64) -> FreeSpin {
     let start = body.pose_w.rotation;
     let mut omega = start.inverse() * body.w;
     let substeps = (dt * omega.norm() / SPIN_SUBSTEP_RAD).ceil().max(1.0);
@@ -164,7 +164,7 @@ fn cayley(x: &Vec3) -> Quat {
 ///
 /// What torques and contacts changed of the angular velocity (`w` less the free one) turns the body through the
 /// exponential map, on top of the torque-free turn. The quaternion is renormalised.
-pub fn advance(body: &mut RigidBody, v: Vec3, w: Vec3, spin: &FreeSpin, dt: f64) {
+pub fn advance(body: &mut RigidState, v: Vec3, w: Vec3, spin: &FreeSpin, dt: f64) {
     let extra = Quat::from_scaled_axis((w - spin.end_w) * dt);
     body.pose_w.rotation = Quat::new_normalize((extra * spin.turn * body.pose_w.rotation).into_inner());
     body.pose_w.translation.vector += v * dt;

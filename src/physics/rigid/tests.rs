@@ -3,7 +3,7 @@ use super::*;
 const GRAVITY: Vec3 = Vec3::new(0.0, 0.0, -9.81);
 
 /// A brick of 3:2:1 with its object frame off its centre of mass.
-fn brick() -> RigidBody {
+fn brick() -> RigidState {
     let (mass, size): (f64, _) = (0.6, Vec3::new(0.12, 0.08, 0.04));
     let moment = |a: f64, b: f64| mass / 12.0 * (a * a + b * b);
     let inertia = Mat3::from_diagonal(&Vec3::new(
@@ -12,10 +12,10 @@ fn brick() -> RigidBody {
         moment(size.x, size.y),
     ));
     let pose = Pose::new(Vec3::new(0.3, -0.2, 0.5), Vec3::new(0.4, -0.7, 0.2));
-    RigidBody::new(&pose, Vec3::new(0.01, 0.02, -0.03), mass, inertia).expect("a real brick")
+    RigidState::new(&pose, Vec3::new(0.01, 0.02, -0.03), mass, inertia).expect("a real brick")
 }
 
-fn drift(body: &mut RigidBody, dt: f64, steps: usize) {
+fn drift(body: &mut RigidState, dt: f64, steps: usize) {
     for _ in 0..steps {
         let spin = free_spin(body, dt);
         let v = body.v;
@@ -62,7 +62,7 @@ fn a_symmetric_top_precesses_at_the_closed_form_rate() {
     // Body-frame precession of the transverse spin: (I_z − I_x)/I_x · ω_z (Goldstein, Classical Mechanics, 5.6).
     let (transverse, axial) = (2e-4, 3e-4);
     let inertia = Mat3::from_diagonal(&Vec3::new(transverse, transverse, axial));
-    let mut body = RigidBody::new(&Pose::identity(), Vec3::zeros(), 0.5, inertia).expect("a real top");
+    let mut body = RigidState::new(&Pose::identity(), Vec3::zeros(), 0.5, inertia).expect("a real top");
     body.w = Vec3::new(1.0, 0.0, 5.0);
     let (dt, steps) = (1.0 / 240.0, 240);
     drift(&mut body, dt, steps);
@@ -117,7 +117,7 @@ fn the_object_frame_and_the_momenta_refer_to_the_right_points() {
 
 #[test]
 fn bodies_that_cannot_exist_are_refused_by_value() {
-    let with = |mass: f64, inertia| RigidBody::new(&Pose::identity(), Vec3::zeros(), mass, inertia);
+    let with = |mass: f64, inertia| RigidState::new(&Pose::identity(), Vec3::zeros(), mass, inertia);
     assert_eq!(with(-1.0, Mat3::identity()), Err(RigidError::Mass(-1.0)));
     assert!(matches!(with(f64::NAN, Mat3::identity()), Err(RigidError::Mass(_))));
     let lopsided = Mat3::from_diagonal(&Vec3::new(1.0, 1.0, 2.5));

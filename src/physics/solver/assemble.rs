@@ -1,21 +1,21 @@
 //! Velocities of points and the gather and scatter between points and blocks.
 
-use super::problem::{Endpoint, Point, Problem};
+use super::problem::{ContactPoint, ContactProblem, Endpoint};
 use crate::geometry::{Mat3, Vec3};
 
-/// Rows of a patch's local system: up to two endpoints of eight nodes.
+/// Rows of a cluster's local system: up to two endpoints of eight nodes.
 const MAX_LOCAL: usize = 48;
 
-/// Local Hessian of a patch: the endpoints' own coordinates (3 a node, 6 a screw), dense.
+/// ClusterHessian Hessian of a cluster: the endpoints' own coordinates (3 a node, 6 a frame), dense.
 #[derive(Clone, Debug)]
-pub(super) struct Local {
+pub(super) struct ClusterHessian {
     size_a: usize,
     size: usize,
     /// Column-major lower triangle of side `MAX_LOCAL`.
     hessian: Vec<f64>,
 }
 
-impl Default for Local {
+impl Default for ClusterHessian {
     fn default() -> Self {
         Self { size_a: 0, size: 0, hessian: vec![0.0; MAX_LOCAL * MAX_LOCAL] }
     }
@@ -25,12 +25,12 @@ fn size_of(end: &Endpoint) -> usize {
     match end {
         Endpoint::Known => 0,
         Endpoint::Nodes { count, .. } => 3 * count,
-        Endpoint::Screw(_) => 6,
+        Endpoint::Frame(_) => 6,
     }
 }
 
-/// Velocities of an endpoint's own coordinates, gathered once a patch.
-pub(super) fn gather(problem: &Problem, offsets: &[usize], end: &Endpoint, v: &[f64]) -> [Vec3; 8] {
+/// Velocities of an endpoint's own coordinates, gathered once a cluster.
+pub(super) fn gather(problem: &ContactProblem, offsets: &[usize], end: &Endpoint, v: &[f64]) -> [Vec3; 8] {
     let mut u = [Vec3::zeros(); 8];
     match end {
         Endpoint::Known => {}
@@ -40,10 +40,10 @@ pub(super) fn gather(problem: &Problem, offsets: &[usize], end: &Endpoint, v: &[
                 u[i] = Vec3::new(v[start], v[start + 1], v[start + 2]);
             }
         }
-        Endpoint::Screw(screw) => {
-            let screw = &problem.screws[*screw];
-            let start = offsets[screw.block];
-            for (column, v) in screw.jacobian.chunks_exact(6).zip(&v[start..]) {
+        Endpoint::Frame(frame) => {
+            let frame = &problem.frames[*frame];
+            let start = offsets[frame.block];
+            for (column, v) in frame.jacobian.chunks_exact(6).zip(&v[start..]) {
                 u[0] += Vec3::new(column[0], column[1], column[2]) * *v;
                 u[1] += Vec3::new(column[3], column[4], column[5]) * *v;
             }
@@ -55,7 +55,7 @@ pub(super) fn gather(problem: &Problem, offsets: &[usize], end: &Endpoint, v: &[
 /// Velocity of a point on an endpoint.
 #[inline]
 pub(super) fn velocity(
-    problem: &Problem,
+    problem: &ContactProblem,
     end: &Endpoint,
     u: &[Vec3; 8],
     weights: &[f64; 8],
@@ -66,7 +66,7 @@ pub(super) fn velocity(
         // Faces have four nodes, voxels eight: with the number known, the sums are unrolled.
         Endpoint::Nodes { count: 4, .. } => mean::<4>(u, weights),
         Endpoint::Nodes { .. } => mean::<8>(u, weights),
-        Endpoint::Screw(screw) => u[0] + u[1].cross(&(p - problem.screws[*screw].origin)),
+        Endpoint::Frame(frame) => u[0] + u[1].cross(&(p - problem.frames[*frame].origin)),
     }
 }
 
@@ -78,7 +78,7 @@ fn mean<const N: usize>(u: &[Vec3; 8], weights: &[f64; 8]) -> Vec3 {
 /// Adds an impulse at a point to the forces on an endpoint's own coordinates (the transpose of [`velocity`]).
 #[inline]
 pub(super) fn pull(
-    problem: &Problem,
+    problem: &ContactProblem,
     end: &Endpoint,
     force: &mut [Vec3; 8],
     weights: &[f64; 8],
@@ -88,16 +88,16 @@ pub(super) fn pull(
         Endpoint::Known => {}
         Endpoint::Nodes { count: 4, .. } => (0..4).for_each(|i| force[i] += impulse * weights[i]),
         Endpoint::Nodes { .. } => (0..8).for_each(|i| force[i] += impulse * weights[i]),
-        Endpoint::Screw(screw) => {
+        Endpoint::Frame(frame) => {
             force[0] += impulse;
-            force[1] += (p - problem.screws[*screw].origin).cross(impulse);
+            force[1] += (p - problem.frames[*frame].origin).cross(impulse);
         }
     }
 }
 
 /// Adds `sign` times the forces on an endpoint's own coordinates to the gradient (the transpose of [`gather`]).
 pub(super) fn spread(
-    problem: &Problem,
+    problem: &ContactProblem,
     offsets: &[usize],
     end: &Endpoint,
     (sign, force): (f64, &[Vec3; 8]),
@@ -111,10 +111,10 @@ pub(super) fn spread(
                 gradient[start..start + 3].iter_mut().zip(f.iter()).for_each(|(g, f)| *g += sign * f);
             }
         }
-        Endpoint::Screw(screw) => {
-            let screw = &problem.screws[*screw];
-            let start = offsets[screw.block];
-            for (column, g) in screw.jacobian.chunks_exact(6).zip(&mut gradient[start..]) {
+        Endpoint::Frame(frame) => {
+            let frame = &problem.frames[*frame];
+            let start = offsets[frame.block];
+            for (column, g) in frame.jacobian.chunks_exact(6).zip(&mut gradient[start..]) {
                 let along = Vec3::new(column[0], column[1], column[2]).dot(&force[0]);
                 *g += sign * (along + Vec3::new(column[3], column[4], column[5]).dot(&force[1]));
             }
@@ -122,17 +122,23 @@ pub(super) fn spread(
     }
 }
 
-/// The 3 × 3 pieces by which an endpoint's coordinates move a point: `w I` for nodes, `I` and `−[r]×` for a screw.
-fn pieces(problem: &Problem, end: &Endpoint, weights: &[f64; 8], p: &Vec3, out: &mut [Piece; 8]) -> usize {
+/// The 3 × 3 pieces by which an endpoint's coordinates move a point: `w I` for nodes, `I` and `−[r]×` for a frame.
+fn pieces(
+    problem: &ContactProblem,
+    end: &Endpoint,
+    weights: &[f64; 8],
+    p: &Vec3,
+    out: &mut [Piece; 8],
+) -> usize {
     match end {
         Endpoint::Known => 0,
         Endpoint::Nodes { count, .. } => {
             (0..*count).for_each(|i| out[i] = Piece::Scale(weights[i]));
             *count
         }
-        Endpoint::Screw(screw) => {
+        Endpoint::Frame(frame) => {
             out[0] = Piece::Scale(1.0);
-            out[1] = Piece::Arm(p - problem.screws[*screw].origin);
+            out[1] = Piece::Arm(p - problem.frames[*frame].origin);
             2
         }
     }
@@ -162,8 +168,8 @@ impl Piece {
     }
 }
 
-impl Local {
-    /// Empties the local system for a patch between `a` and `b`.
+impl ClusterHessian {
+    /// Empties the local system for a cluster between `a` and `b`.
     pub(super) fn start(&mut self, a: &Endpoint, b: &Endpoint) {
         self.size_a = size_of(a);
         self.size = self.size_a + size_of(b);
@@ -175,10 +181,10 @@ impl Local {
     /// Adds one point's curvature.
     pub(super) fn add(
         &mut self,
-        problem: &Problem,
+        problem: &ContactProblem,
         a: &Endpoint,
         b: &Endpoint,
-        point: &Point,
+        point: &ContactPoint,
         curvature: &Mat3,
     ) {
         let mut left = [Piece::Scale(0.0); 8];
@@ -206,22 +212,22 @@ impl Local {
     }
 
     /// Adds the local system to the island's Hessian (side `n`, lower triangle).
-    pub(super) fn scatter(&self, map: &Map, hessian: &mut [f64], n: usize) {
+    pub(super) fn scatter(&self, map: &DofMap, hessian: &mut [f64], n: usize) {
         map.scatter_matrix(|r, c| self.hessian[r.min(c) * MAX_LOCAL + r.max(c)], hessian, n);
     }
 }
 
-/// How a patch's local coordinates read the island's velocities: each coordinate is a sparse row.
+/// How a cluster's local coordinates read the island's velocities: each coordinate is a sparse row.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Map {
+pub(super) struct DofMap {
     /// Per local coordinate: (island index, coefficient).
     rows: Vec<Vec<(u32, f64)>>,
     used: usize,
 }
 
-impl Map {
-    /// Sets the map for a patch.
-    pub(super) fn set(&mut self, problem: &Problem, offsets: &[usize], a: &Endpoint, b: &Endpoint) {
+impl DofMap {
+    /// Sets the map for a cluster.
+    pub(super) fn set(&mut self, problem: &ContactProblem, offsets: &[usize], a: &Endpoint, b: &Endpoint) {
         self.used = 0;
         [a, b].into_iter().for_each(|end| self.push(problem, offsets, end));
     }
@@ -236,7 +242,7 @@ impl Map {
         row
     }
 
-    fn push(&mut self, problem: &Problem, offsets: &[usize], end: &Endpoint) {
+    fn push(&mut self, problem: &ContactProblem, offsets: &[usize], end: &Endpoint) {
         match end {
             Endpoint::Known => {}
             Endpoint::Nodes { block, at, count } => {
@@ -245,11 +251,11 @@ impl Map {
                     self.next().push((index, 1.0));
                 }
             }
-            Endpoint::Screw(screw) => {
-                let screw = &problem.screws[*screw];
+            Endpoint::Frame(frame) => {
+                let frame = &problem.frames[*frame];
                 for row in 0..6 {
-                    let start = offsets[screw.block];
-                    let entries = screw.jacobian.iter().skip(row).step_by(6).enumerate();
+                    let start = offsets[frame.block];
+                    let entries = frame.jacobian.iter().skip(row).step_by(6).enumerate();
                     self.next().extend(
                         entries.filter(|(_, j)| **j != 0.0).map(|(column, j)| ((start + column) as u32, *j)),
                     );

@@ -3,27 +3,27 @@
 use super::{
     assemble::{gather, pull, spread, velocity},
     island::Island,
-    law::{Answer, Law},
+    law::{ConstraintResponse, Law},
     newton::Solver,
-    problem::{Patch, Point, Problem},
+    problem::{ContactCluster, ContactPoint, ContactProblem},
 };
 use crate::{geometry::Vec3, physics::sparse::dense};
 
-/// Calls `visit` with every point of a patch, its relative velocity and its answer at `v`.
+/// Calls `visit` with every point of a cluster, its relative velocity and its answer at `v`.
 #[inline]
 fn answers(
-    problem: &Problem,
+    problem: &ContactProblem,
     offsets: &[usize],
-    patch: &Patch,
+    cluster: &ContactCluster,
     v: &[f64],
-    mut visit: impl FnMut(&Point, Vec3, Option<Answer>),
+    mut visit: impl FnMut(&ContactPoint, Vec3, Option<ConstraintResponse>),
 ) {
-    let law = Law::new(problem.dt, problem.tau);
-    let ua = gather(problem, offsets, &patch.a, v);
-    let ub = gather(problem, offsets, &patch.b, v);
-    for point in &problem.points[patch.first..patch.last] {
-        let relative = velocity(problem, &patch.a, &ua, &point.weights_a, &point.p)
-            - velocity(problem, &patch.b, &ub, &point.weights_b, &point.p)
+    let law = Law::new(problem.dt, problem.dissipation_time);
+    let ua = gather(problem, offsets, &cluster.a, v);
+    let ub = gather(problem, offsets, &cluster.b, v);
+    for point in &problem.points[cluster.first..cluster.last] {
+        let relative = velocity(problem, &cluster.a, &ua, &point.weights_a, &point.p)
+            - velocity(problem, &cluster.b, &ub, &point.weights_b, &point.p)
             - point.drift;
         visit(point, relative, law.contact(point, &relative));
     }
@@ -33,27 +33,27 @@ impl Solver {
     /// Cost and gradient at `v`.
     pub(super) fn evaluate(
         &mut self,
-        problem: &Problem,
+        problem: &ContactProblem,
         island: &Island,
         v: &[f64],
         gradient: &mut [f64],
     ) -> f64 {
         let mut cost = self.momentum_terms(problem, island, v, gradient);
-        for patch in island.patches.iter().map(|&index| &problem.patches[index]) {
+        for cluster in island.clusters.iter().map(|&index| &problem.clusters[index]) {
             let (mut on_a, mut on_b, mut touched) = ([Vec3::zeros(); 8], [Vec3::zeros(); 8], false);
-            answers(problem, &self.offsets, patch, v, |point, _, answer| {
+            answers(problem, &self.offsets, cluster, v, |point, _, answer| {
                 let Some(answer) = answer else { return };
                 touched = true;
                 cost += answer.cost;
-                pull(problem, &patch.a, &mut on_a, &point.weights_a, (&point.p, &answer.impulse));
-                pull(problem, &patch.b, &mut on_b, &point.weights_b, (&point.p, &answer.impulse));
+                pull(problem, &cluster.a, &mut on_a, &point.weights_a, (&point.p, &answer.impulse));
+                pull(problem, &cluster.b, &mut on_b, &point.weights_b, (&point.p, &answer.impulse));
             });
             if touched {
-                spread(problem, &self.offsets, &patch.a, (-1.0, &on_a), gradient);
-                spread(problem, &self.offsets, &patch.b, (1.0, &on_b), gradient);
+                spread(problem, &self.offsets, &cluster.a, (-1.0, &on_a), gradient);
+                spread(problem, &self.offsets, &cluster.b, (1.0, &on_b), gradient);
             }
         }
-        for scalar in island.scalars.iter().map(|&row| &problem.scalars[row]) {
+        for scalar in island.constraints.iter().map(|&row| &problem.constraints[row]) {
             let at = self.offsets[scalar.block] + scalar.index;
             let (force, value) = scalar.answer(problem.dt, v[at]);
             cost += value;
@@ -63,7 +63,13 @@ impl Solver {
     }
 
     /// `½ vᵀA v − rᵀv` and its gradient.
-    fn momentum_terms(&mut self, problem: &Problem, island: &Island, v: &[f64], gradient: &mut [f64]) -> f64 {
+    fn momentum_terms(
+        &mut self,
+        problem: &ContactProblem,
+        island: &Island,
+        v: &[f64],
+        gradient: &mut [f64],
+    ) -> f64 {
         let mut cost = 0.0;
         for &block in &island.blocks {
             let (b, start) = (&problem.blocks[block], self.offsets[block]);
@@ -82,7 +88,7 @@ impl Solver {
     /// Hessian at `v` but for the scalar rows: column-major lower triangle of side `island.size`.
     pub(super) fn assemble_hessian(
         &mut self,
-        problem: &Problem,
+        problem: &ContactProblem,
         island: &Island,
         v: &[f64],
         hessian: &mut [f64],
@@ -97,37 +103,37 @@ impl Solver {
                 hessian[target..target + source.len()].copy_from_slice(source);
             }
         }
-        let law = Law::new(problem.dt, problem.tau);
-        for patch in island.patches.iter().map(|&index| &problem.patches[index]) {
+        let law = Law::new(problem.dt, problem.dissipation_time);
+        for cluster in island.clusters.iter().map(|&index| &problem.clusters[index]) {
             let (local, mut touched) = (&mut self.local, false);
-            local.start(&patch.a, &patch.b);
-            answers(problem, &self.offsets, patch, v, |point, _, answer| {
+            local.start(&cluster.a, &cluster.b);
+            answers(problem, &self.offsets, cluster, v, |point, _, answer| {
                 let Some(answer) = answer else { return };
                 touched = true;
-                local.add(problem, &patch.a, &patch.b, point, &law.curvature(point, &answer));
+                local.add(problem, &cluster.a, &cluster.b, point, &law.curvature(point, &answer));
             });
             if touched {
-                self.map.set(problem, &self.offsets, &patch.a, &patch.b);
+                self.map.set(problem, &self.offsets, &cluster.a, &cluster.b);
                 self.local.scatter(&self.map, hessian, n);
             }
         }
     }
 
-    /// Writes impulses into the points; returns (change against the lagged ones, total) of the normal impulses.
-    pub(super) fn record(&mut self, problem: &mut Problem, island: &Island) -> (f64, f64) {
+    /// Writes impulses into the points; returns (change against the previous_normal_impulse ones, total) of the normal impulses.
+    pub(super) fn record(&mut self, problem: &mut ContactProblem, island: &Island) -> (f64, f64) {
         let (mut change, mut total) = (0.0, 0.0);
         let mut points = std::mem::take(&mut self.solved);
-        for &index in &island.patches {
-            let patch = problem.patches[index];
+        for &index in &island.clusters {
+            let cluster = problem.clusters[index];
             points.clear();
-            answers(problem, &self.offsets, &patch, &self.v, |_, v, answer| points.push((v, answer)));
-            for (point, (v, answer)) in problem.points[patch.first..patch.last].iter_mut().zip(&points) {
+            answers(problem, &self.offsets, &cluster, &self.v, |_, v, answer| points.push((v, answer)));
+            for (point, (v, answer)) in problem.points[cluster.first..cluster.last].iter_mut().zip(&points) {
                 let normal = answer.map_or(0.0, |answer| answer.normal);
-                change += (normal - point.lagged).abs();
+                change += (normal - point.previous_normal_impulse).abs();
                 total += normal;
                 point.normal_impulse = normal;
                 point.shear_impulse = answer.map_or(Vec3::zeros(), |a| a.impulse - point.normal * normal);
-                point.slipping = answer.is_some_and(|answer| answer.slipping);
+                point.is_slipping = answer.is_some_and(|answer| answer.is_slipping);
                 point.velocity = *v;
             }
         }

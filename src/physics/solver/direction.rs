@@ -5,73 +5,73 @@
 //! left out of the kept factor and each step is solved with them as they will be at its end: a proximal Newton method
 //! (Lee, Sun, Saunders 2014) with the scalar rows as the part that is not smoothed.
 
-use super::{island::Island, law::Piece, newton::Solver, problem::Problem};
+use super::{island::Island, law::LinearSegment, newton::Solver, problem::ContactProblem};
 
-/// Guesses of the pieces on which the scalar rows end before the present ones are taken.
+/// Guesses of the segments on which the scalar rows end before the present ones are taken.
 const MAX_GUESSES: usize = 8;
 
 /// Number of velocities from the first one with a scalar row to the end of the island.
-pub(super) fn tail(problem: &Problem, offsets: &[usize], island: &Island) -> usize {
-    let rows = island.scalars.iter().map(|&row| &problem.scalars[row]);
+pub(super) fn tail(problem: &ContactProblem, offsets: &[usize], island: &Island) -> usize {
+    let rows = island.constraints.iter().map(|&row| &problem.constraints[row]);
     let first = rows.map(|row| offsets[row.block] + row.index).min().unwrap_or(island.size);
     island.size - first
 }
 
 impl Solver {
     /// Writes the step from the present velocities into `step`; it always goes downhill.
-    pub(super) fn find_step(&mut self, problem: &Problem, island: &Island) {
-        self.pieces.clear();
-        self.pieces.extend(island.scalars.iter().map(|&row| {
-            let row = &problem.scalars[row];
-            row.piece(problem.dt, self.v[self.offsets[row.block] + row.index])
+    pub(super) fn find_step(&mut self, problem: &ContactProblem, island: &Island) {
+        self.segments.clear();
+        self.segments.extend(island.constraints.iter().map(|&row| {
+            let row = &problem.constraints[row];
+            row.segment(problem.dt, self.v[self.offsets[row.block] + row.index])
         }));
-        let present = self.pieces.clone();
+        let present = self.segments.clone();
         for _ in 0..MAX_GUESSES {
             self.step_on_pieces(problem, island);
             if !self.guess_again(problem, island) {
                 return;
             }
         }
-        self.pieces = present;
+        self.segments = present;
         self.step_on_pieces(problem, island);
     }
 
-    /// Solves the model with the scalar rows on the guessed pieces.
-    fn step_on_pieces(&mut self, problem: &Problem, island: &Island) {
+    /// Solves the model with the scalar rows on the guessed segments.
+    fn step_on_pieces(&mut self, problem: &ContactProblem, island: &Island) {
         self.step.iter_mut().zip(&self.gradient).for_each(|(s, g)| *s = -g);
         self.stiffness.clear();
         self.stiffness.resize(tail(problem, &self.offsets, island), 0.0);
         let first = island.size - self.stiffness.len();
-        for (&row, piece) in island.scalars.iter().zip(&self.pieces) {
-            let row = &problem.scalars[row];
+        for (&row, segment) in island.constraints.iter().zip(&self.segments) {
+            let row = &problem.constraints[row];
             let at = self.offsets[row.block] + row.index;
-            let (slope, curvature) = row.on(*piece, problem.dt, self.v[at]);
+            let (slope, curvature) = row.on(*segment, problem.dt, self.v[at]);
             self.step[at] -= slope + problem.dt * row.answer(problem.dt, self.v[at]).0;
             self.stiffness[at - first] += curvature;
         }
         self.cache.solve(island, &self.stiffness, &mut self.step);
     }
 
-    /// Moves each guess towards the piece on which its row has ended, by one piece; whether any moved.
-    fn guess_again(&mut self, problem: &Problem, island: &Island) -> bool {
+    /// Moves each guess towards the segment on which its row has ended, by one segment; whether any moved.
+    fn guess_again(&mut self, problem: &ContactProblem, island: &Island) -> bool {
         let mut moved = false;
-        for (&row, piece) in island.scalars.iter().zip(&mut self.pieces) {
-            let row = &problem.scalars[row];
+        for (&row, segment) in island.constraints.iter().zip(&mut self.segments) {
+            let row = &problem.constraints[row];
             let at = self.offsets[row.block] + row.index;
-            let ended = row.piece(problem.dt, self.v[at] + self.step[at]);
-            if ended != *piece {
+            let ended = row.segment(problem.dt, self.v[at] + self.step[at]);
+            if ended != *segment {
                 moved = true;
-                *piece = if *piece == Piece::Inside { ended } else { Piece::Inside };
+                *segment = if *segment == LinearSegment::Inside { ended } else { LinearSegment::Inside };
             }
         }
         moved
     }
 
     /// Teaches the kept factor the last step, less what the scalar rows did.
-    pub(super) fn learn(&mut self, problem: &Problem, island: &Island) {
+    pub(super) fn learn(&mut self, problem: &ContactProblem, island: &Island) {
         let (old, new) = (&self.trial, &self.v);
-        let by_rows = island.scalars.iter().map(|&row| {
-            let row = &problem.scalars[row];
+        let by_rows = island.constraints.iter().map(|&row| {
+            let row = &problem.constraints[row];
             let at = self.offsets[row.block] + row.index;
             let force = |v: &[f64]| row.answer(problem.dt, v[at]).0;
             (at, problem.dt * (force(old) - force(new)))

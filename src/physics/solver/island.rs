@@ -1,25 +1,25 @@
 //! Connected islands of a problem, and the factors that they keep between steps.
 
-use super::{newton::STEPS_PER_FACTOR, problem::Problem, secant::Secant};
+use super::{newton::FACTOR_COST_IN_STEPS, problem::ContactProblem, secant::Secant};
 use crate::{geometry::union_find::UnionFind, physics::sparse::dense};
 
-/// The blocks, patches and scalars of one connected island.
+/// The blocks, clusters and constraints of one connected island.
 pub(super) struct Island {
     /// Blocks, ascending.
     pub blocks: Vec<usize>,
     /// Patches that touch them.
-    pub patches: Vec<usize>,
-    /// Scalar rows on them.
-    pub scalars: Vec<usize>,
+    pub clusters: Vec<usize>,
+    /// ScalarConstraint rows on them.
+    pub constraints: Vec<usize>,
     /// Velocities in all.
     pub size: usize,
 }
 
-/// Splits a problem into islands of blocks that patches connect.
-pub(super) fn islands(problem: &Problem) -> Vec<Island> {
+/// Splits a problem into islands of blocks that clusters connect.
+pub(super) fn islands(problem: &ContactProblem) -> Vec<Island> {
     let mut connected = UnionFind::new(problem.blocks.len());
-    for patch in &problem.patches {
-        if let (Some(a), Some(b)) = (problem.block_of(&patch.a), problem.block_of(&patch.b)) {
+    for cluster in &problem.clusters {
+        if let (Some(a), Some(b)) = (problem.block_of(&cluster.a), problem.block_of(&cluster.b)) {
             connected.union(a, b);
         }
     }
@@ -29,18 +29,23 @@ pub(super) fn islands(problem: &Problem) -> Vec<Island> {
         let r = connected.find(block);
         if of_root[r] == usize::MAX {
             of_root[r] = islands.len();
-            islands.push(Island { blocks: Vec::new(), patches: Vec::new(), scalars: Vec::new(), size: 0 });
+            islands.push(Island {
+                blocks: Vec::new(),
+                clusters: Vec::new(),
+                constraints: Vec::new(),
+                size: 0,
+            });
         }
         islands[of_root[r]].blocks.push(block);
         islands[of_root[r]].size += problem.blocks[block].dim;
     }
-    for (index, patch) in problem.patches.iter().enumerate() {
-        if let Some(block) = problem.block_of(&patch.a).or(problem.block_of(&patch.b)) {
-            islands[of_root[connected.find(block)]].patches.push(index);
+    for (index, cluster) in problem.clusters.iter().enumerate() {
+        if let Some(block) = problem.block_of(&cluster.a).or(problem.block_of(&cluster.b)) {
+            islands[of_root[connected.find(block)]].clusters.push(index);
         }
     }
-    for (index, scalar) in problem.scalars.iter().enumerate() {
-        islands[of_root[connected.find(scalar.block)]].scalars.push(index);
+    for (index, scalar) in problem.constraints.iter().enumerate() {
+        islands[of_root[connected.find(scalar.block)]].constraints.push(index);
     }
     islands.retain(|island| island.size > 0);
     islands
@@ -64,7 +69,7 @@ struct Entry {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Cache {
     entries: Vec<Entry>,
-    /// Factor of the last velocities' complement.
+    /// CholeskyFactor of the last velocities' complement.
     tail: Vec<f64>,
 }
 
@@ -78,12 +83,12 @@ impl Cache {
     ///
     /// A factor that has wasted as many steps as a new one costs is given up, so that altogether never more than twice
     /// the least is spent, however long each single pass would rather go on with it.
-    pub(super) fn matches(&mut self, problem: &Problem, island: &Island) -> bool {
+    pub(super) fn matches(&mut self, problem: &ContactProblem, island: &Island) -> bool {
         let found = self.entries.iter().position(|entry| same(entry, problem, island));
         if let Some(found) = found {
             self.entries[..=found].rotate_right(1);
             let entry = &self.entries[0];
-            return entry.sound && f64::from(entry.wasted) < STEPS_PER_FACTOR;
+            return entry.sound && f64::from(entry.wasted) < FACTOR_COST_IN_STEPS;
         }
         if self.entries.len() < REMEMBERED {
             self.entries.push(Entry::default());
@@ -153,7 +158,7 @@ impl Cache {
     }
 }
 
-fn same(entry: &Entry, problem: &Problem, island: &Island) -> bool {
+fn same(entry: &Entry, problem: &ContactProblem, island: &Island) -> bool {
     entry.key.len() == island.blocks.len()
         && entry
             .key

@@ -1,11 +1,11 @@
 //! The laws of the rows: impulse, cost and curvature as functions of the row's velocity.
 
-use super::problem::Point;
+use super::problem::ContactPoint;
 use crate::geometry::{Mat3, Vec3};
 
 /// What a contact point answers to a velocity.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Answer {
+pub(super) struct ConstraintResponse {
     /// Impulse on `a`, N s.
     pub impulse: Vec3,
     /// Cost, J.
@@ -13,7 +13,7 @@ pub(super) struct Answer {
     /// Normal part of the impulse, N s.
     pub normal: f64,
     /// Whether friction is at its bound.
-    pub slipping: bool,
+    pub is_slipping: bool,
     /// Stretch `z` of the tangential spring, m.
     stretch: Vec3,
 }
@@ -27,31 +27,31 @@ pub(super) struct Law {
 }
 
 impl Law {
-    /// The law for steps of `dt` and a dissipation time of `tau`, s.
-    pub(super) fn new(dt: f64, tau: f64) -> Self {
-        Self { dt, span: dt + tau, per_span: 1.0 / (dt + tau) }
+    /// The law for steps of `dt` and a dissipation time of `dissipation_time`, s.
+    pub(super) fn new(dt: f64, dissipation_time: f64) -> Self {
+        Self { dt, span: dt + dissipation_time, per_span: 1.0 / (dt + dissipation_time) }
     }
 
-    /// Answer of a point at relative velocity `v`; `None` if it is open and nothing of the last pass is left to rub.
+    /// ConstraintResponse of a point at relative velocity `v`; `None` if it is open and nothing of the last pass is left to rub.
     ///
     /// Normal: the spring at the end of the step with dissipation, `γ = dt k (−φ − (dt + τ) v_n)₊`. Tangent: with
-    /// `z = s + (dt + τ) v_t` the spring `−dt k_t z`, cut off at the lagged bound `μ γ_n` (a Huber cost in `z`).
+    /// `z = s + (dt + τ) v_t` the spring `−dt k_t z`, cut off at the previous_normal_impulse bound `μ γ_n` (a Huber cost in `z`).
     #[inline]
-    pub(super) fn contact(&self, point: &Point, v: &Vec3) -> Option<Answer> {
+    pub(super) fn contact(&self, point: &ContactPoint, v: &Vec3) -> Option<ConstraintResponse> {
         let n = &point.normal;
         let vn = n.dot(v);
         let depth = -point.gap - self.span * vn;
-        let bound = point.mu * point.lagged;
+        let bound = point.mu * point.previous_normal_impulse;
         if depth <= 0.0 && bound <= 0.0 {
             return None;
         }
         let depth = depth.max(0.0);
         let normal = self.dt * point.stiffness * depth;
-        let mut answer = Answer {
+        let mut answer = ConstraintResponse {
             impulse: n * normal,
             cost: 0.5 * normal * depth * self.per_span,
             normal,
-            slipping: false,
+            is_slipping: false,
             stretch: Vec3::zeros(),
         };
         if bound > 0.0 {
@@ -62,7 +62,7 @@ impl Law {
     }
 
     #[inline]
-    fn rub(&self, answer: &mut Answer, c: f64, bound: f64) {
+    fn rub(&self, answer: &mut ConstraintResponse, c: f64, bound: f64) {
         let z = answer.stretch;
         let square = z.norm_squared();
         if c * c * square <= bound * bound {
@@ -72,24 +72,24 @@ impl Law {
             let size = square.sqrt();
             answer.impulse -= z * (bound / size);
             answer.cost += bound * self.per_span * (size - 0.5 * bound / c);
-            answer.slipping = true;
+            answer.is_slipping = true;
         }
     }
 
     /// Curvature of the cost at an answer of this point, kg.
-    pub(super) fn curvature(&self, point: &Point, answer: &Answer) -> Mat3 {
+    pub(super) fn curvature(&self, point: &ContactPoint, answer: &ConstraintResponse) -> Mat3 {
         let n = &point.normal;
         let onto_normal = n * n.transpose();
         let mut curvature = Mat3::zeros();
         if answer.normal > 0.0 {
             curvature = onto_normal * (self.dt * point.stiffness * self.span);
         }
-        let bound = point.mu * point.lagged;
+        let bound = point.mu * point.previous_normal_impulse;
         if bound <= 0.0 {
             return curvature;
         }
         let plane = Mat3::identity() - onto_normal;
-        if answer.slipping {
+        if answer.is_slipping {
             let size = answer.stretch.norm();
             let direction = answer.stretch / size;
             curvature + (plane - direction * direction.transpose()) * (bound * self.span / size)
@@ -101,7 +101,7 @@ impl Law {
 
 /// A row on one velocity of one block.
 #[derive(Clone, Copy, Debug)]
-pub struct Scalar {
+pub struct ScalarConstraint {
     /// The block.
     pub block: usize,
     /// Index of the velocity in the block.
@@ -114,15 +114,17 @@ pub struct Scalar {
     pub error: f64,
     /// Target velocity (m/s or rad/s) of the damping.
     pub target_velocity: f64,
-    /// Least and greatest force (N or N m); a limit stop has one of them at zero.
-    pub range: (f64, f64),
+    /// Smallest force (N or N m); 0 for a lower stop.
+    pub min_force: f64,
+    /// Largest force (N or N m); 0 for an upper stop.
+    pub max_force: f64,
     /// Result: the force (N or N m).
     pub force: f64,
 }
 
-/// The pieces of a scalar row's law: at its least force, on its line, at its greatest force.
+/// The segments of a scalar row's law: at its least force, on its line, at its greatest force.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Piece {
+pub enum LinearSegment {
     /// At the least force.
     Least,
     /// Between the two.
@@ -131,28 +133,28 @@ pub enum Piece {
     Greatest,
 }
 
-impl Scalar {
+impl ScalarConstraint {
     /// Force without the range.
     fn free(&self, dt: f64, v: f64) -> f64 {
         self.stiffness * self.error + self.damping * self.target_velocity
             - (self.stiffness * dt + self.damping) * v
     }
 
-    /// The piece that acts at velocity `v`.
-    pub fn piece(&self, dt: f64, v: f64) -> Piece {
+    /// The segment that acts at velocity `v`.
+    pub fn segment(&self, dt: f64, v: f64) -> LinearSegment {
         match self.free(dt, v) {
-            free if free <= self.range.0 => Piece::Least,
-            free if free >= self.range.1 => Piece::Greatest,
-            _ => Piece::Inside,
+            free if free <= self.min_force => LinearSegment::Least,
+            free if free >= self.max_force => LinearSegment::Greatest,
+            _ => LinearSegment::Inside,
         }
     }
 
-    /// Slope and curvature of the cost at `v` if it went on there as on `piece`.
-    pub fn on(&self, piece: Piece, dt: f64, v: f64) -> (f64, f64) {
-        match piece {
-            Piece::Least => (-dt * self.range.0, 0.0),
-            Piece::Greatest => (-dt * self.range.1, 0.0),
-            Piece::Inside => (-dt * self.free(dt, v), dt * (self.stiffness * dt + self.damping)),
+    /// Slope and curvature of the cost at `v` if it went on there as on `segment`.
+    pub fn on(&self, segment: LinearSegment, dt: f64, v: f64) -> (f64, f64) {
+        match segment {
+            LinearSegment::Least => (-dt * self.min_force, 0.0),
+            LinearSegment::Greatest => (-dt * self.max_force, 0.0),
+            LinearSegment::Inside => (-dt * self.free(dt, v), dt * (self.stiffness * dt + self.damping)),
         }
     }
 
@@ -160,7 +162,7 @@ impl Scalar {
     pub fn answer(&self, dt: f64, v: f64) -> (f64, f64) {
         let gain = self.stiffness * dt + self.damping;
         let free = self.free(dt, v);
-        let force = free.clamp(self.range.0, self.range.1);
+        let force = free.clamp(self.min_force, self.max_force);
         // d(cost)/dv = −dt force; outside of the range the cost goes on linearly.
         let cost = if gain > 0.0 {
             dt / gain * (0.5 * force * force + force * (free - force))
@@ -176,8 +178,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn point(gap: f64, offset: [f64; 2], lagged: f64) -> Point {
-        Point {
+    fn point(gap: f64, offset: [f64; 2], previous_normal_impulse: f64) -> ContactPoint {
+        ContactPoint {
             weights_a: [0.0; 8],
             weights_b: [0.0; 8],
             p: Vec3::zeros(),
@@ -188,11 +190,11 @@ mod tests {
             gap,
             offset: Vec3::new(offset[0], offset[1], 0.0),
             mu: 1.2,
-            lagged,
+            previous_normal_impulse,
             normal_impulse: 0.0,
             shear_impulse: Vec3::zeros(),
             velocity: Vec3::zeros(),
-            slipping: false,
+            is_slipping: false,
         }
     }
 
@@ -200,11 +202,11 @@ mod tests {
         #[test]
         fn impulse_is_minus_the_gradient_and_curvature_its_derivative(
             v in prop::array::uniform3(-0.1f64..0.1), gap in -1e-3f64..1e-3, offset in prop::array::uniform2(-1e-3f64..1e-3),
-            lagged in 0.0f64..5e-3,
+            previous_normal_impulse in 0.0f64..5e-3,
         ) {
-            let (law, v, p) = (Law::new(1.0 / 60.0, 0.01), Vec3::from(v), point(gap, offset, lagged));
-            let open = Answer {
-                impulse: Vec3::zeros(), cost: 0.0, normal: 0.0, slipping: false, stretch: Vec3::zeros(),
+            let (law, v, p) = (Law::new(1.0 / 60.0, 0.01), Vec3::from(v), point(gap, offset, previous_normal_impulse));
+            let open = ConstraintResponse {
+                impulse: Vec3::zeros(), cost: 0.0, normal: 0.0, is_slipping: false, stretch: Vec3::zeros(),
             };
             let answer = |v: &Vec3| law.contact(&p, v).unwrap_or(open);
             let at = answer(&v);
@@ -214,7 +216,7 @@ mod tests {
                 let moved = |s: f64| answer(&(v + Vec3::ith(i, s)));
                 let (up, down) = (moved(e), moved(-e));
                 prop_assert!(((up.cost - down.cost) / (2.0 * e) + at.impulse[i]).abs() < 1e-6);
-                let kink = (up.normal > 0.0) != (down.normal > 0.0) || up.slipping != down.slipping;
+                let kink = (up.normal > 0.0) != (down.normal > 0.0) || up.is_slipping != down.is_slipping;
                 let slope = (up.impulse - down.impulse) / (2.0 * e);
                 prop_assert!(kink || (slope + curvature.column(i)).norm() < 1e-3, "{slope} {curvature}");
             }
@@ -222,13 +224,13 @@ mod tests {
 
         #[test]
         fn a_scalar_row_is_the_gradient_of_its_cost(v in -2.0f64..2.0, error in -0.1f64..0.1) {
-            let row = Scalar {
-                block: 0, index: 0, stiffness: 2000.0, damping: 100.0, error, target_velocity: 0.1, range: (-70.0, 70.0), force: 0.0,
+            let row = ScalarConstraint {
+                block: 0, index: 0, stiffness: 2000.0, damping: 100.0, error, target_velocity: 0.1, min_force: -70.0, max_force: 70.0, force: 0.0,
             };
             let (dt, e) = (1.0 / 60.0, 1e-6);
             let slope = (row.answer(dt, v + e).1 - row.answer(dt, v - e).1) / (2.0 * e);
             prop_assert!((slope + dt * row.answer(dt, v).0).abs() < 1e-5);
-            let (on_piece, _) = row.on(row.piece(dt, v), dt, v);
+            let (on_piece, _) = row.on(row.segment(dt, v), dt, v);
             prop_assert!((on_piece + dt * row.answer(dt, v).0).abs() < 1e-12);
         }
     }

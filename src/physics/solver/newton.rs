@@ -1,11 +1,11 @@
-//! Newton's method with an exact line search on each island, and the lagged passes around it.
+//! Newton's method with an exact line search on each island, and the previous_normal_impulse passes around it.
 
 use super::{
-    assemble::{Local, Map},
+    assemble::{ClusterHessian, DofMap},
     direction::tail,
     island::{Cache, Island, islands},
-    law::{Answer, Piece},
-    problem::Problem,
+    law::{ConstraintResponse, LinearSegment},
+    problem::ContactProblem,
 };
 use crate::{geometry::Vec3, physics::sparse::dense};
 
@@ -17,20 +17,20 @@ const ABSOLUTE: f64 = 1e-10;
 const MAX_NEWTON: u32 = 240;
 /// Newton steps after which every one gets a factor of its own: with many stiff points that open and close, what old factors
 /// were taught may lead nowhere.
-const PATIENT: u32 = 60;
-/// Most lagged passes.
+const REFACTOR_EVERY_STEP_AFTER: u32 = 60;
+/// Most previous_normal_impulse passes.
 const MAX_PASSES: usize = 3;
 /// Change of the normal impulses that ends the passes.
 const PASS_CHANGE: f64 = 0.01;
 
 /// A new factor costs about as much as this many steps with the old one.
-pub(super) const STEPS_PER_FACTOR: f64 = 8.0;
+pub(super) const FACTOR_COST_IN_STEPS: f64 = 8.0;
 /// Steps after which an old factor, corrected by what they taught, is judged.
-const TRIAL_STEPS: u32 = 2;
+const STALE_FACTOR_TRIAL: u32 = 2;
 
 /// What a solve took.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Stats {
+pub struct SolverStats {
     /// Newton steps over all passes and islands.
     pub newton: u32,
     /// Most Newton steps of one island.
@@ -41,11 +41,11 @@ pub struct Stats {
 
 /// The solve did not converge: which block, and how far it was.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Failure {
+pub struct SolverFailure {
     /// A block of the island that failed.
     pub block: usize,
     /// Scaled gradient over tolerance.
-    pub excess: f64,
+    pub residual_ratio: f64,
 }
 
 /// Buffers of the solver.
@@ -60,21 +60,21 @@ pub struct Solver {
     pub(super) product: Vec<f64>,
     scale: Vec<f64>,
     pub(super) cache: Cache,
-    /// The piece on which each scalar row of the island is taken to end.
-    pub(super) pieces: Vec<Piece>,
+    /// The segment on which each scalar row of the island is taken to end.
+    pub(super) segments: Vec<LinearSegment>,
     /// Curvature of the scalar rows at the island's last velocities.
     pub(super) stiffness: Vec<f64>,
-    pub(super) local: Local,
-    pub(super) map: Map,
-    /// Velocities and answers of one patch.
-    pub(super) solved: Vec<(Vec3, Option<Answer>)>,
+    pub(super) local: ClusterHessian,
+    pub(super) map: DofMap,
+    /// Velocities and answers of one cluster.
+    pub(super) solved: Vec<(Vec3, Option<ConstraintResponse>)>,
     factored: u32,
 }
 
 impl Solver {
-    /// Solves the problem in place: velocities in the blocks, impulses in points and scalars.
-    pub fn solve(&mut self, problem: &mut Problem) -> Result<Stats, Failure> {
-        let mut stats = Stats::default();
+    /// Solves the problem in place: velocities in the blocks, impulses in points and constraints.
+    pub fn solve(&mut self, problem: &mut ContactProblem) -> Result<SolverStats, SolverFailure> {
+        let mut stats = SolverStats::default();
         self.factored = 0;
         for island in islands(problem) {
             let taken = self.solve_island(problem, &island)?;
@@ -85,7 +85,7 @@ impl Solver {
         Ok(stats)
     }
 
-    fn solve_island(&mut self, problem: &mut Problem, island: &Island) -> Result<u32, Failure> {
+    fn solve_island(&mut self, problem: &mut ContactProblem, island: &Island) -> Result<u32, SolverFailure> {
         self.prepare(problem, island);
         let mut taken = 0;
         for pass in 0..MAX_PASSES {
@@ -96,7 +96,9 @@ impl Solver {
             }
             if pass + 1 < MAX_PASSES {
                 island_points(problem, island).into_iter().for_each(|range| {
-                    problem.points[range].iter_mut().for_each(|p| p.lagged = p.normal_impulse);
+                    problem.points[range]
+                        .iter_mut()
+                        .for_each(|p| p.previous_normal_impulse = p.normal_impulse);
                 });
             }
         }
@@ -104,14 +106,14 @@ impl Solver {
             let (start, dim) = (self.offsets[block], problem.blocks[block].dim);
             problem.blocks[block].v.copy_from_slice(&self.v[start..start + dim]);
         }
-        for &row in &island.scalars {
-            let scalar = &mut problem.scalars[row];
+        for &row in &island.constraints {
+            let scalar = &mut problem.constraints[row];
             scalar.force = scalar.answer(problem.dt, self.v[self.offsets[scalar.block] + scalar.index]).0;
         }
         Ok(taken)
     }
 
-    fn prepare(&mut self, problem: &Problem, island: &Island) {
+    fn prepare(&mut self, problem: &ContactProblem, island: &Island) {
         self.offsets.resize(problem.blocks.len(), 0);
         self.v.clear();
         self.scale.clear();
@@ -132,23 +134,23 @@ impl Solver {
     ///
     /// The cost is piecewise quadratic and mostly the same from step to step, so an old factor of its Hessian is used
     /// for as long as that is cheaper than a new one; the gradient itself is always exact.
-    fn newton(&mut self, problem: &Problem, island: &Island) -> Result<u32, Failure> {
+    fn newton(&mut self, problem: &ContactProblem, island: &Island) -> Result<u32, SolverFailure> {
         let mut cost = self.gradient_at_v(problem, island);
-        let mut excess = self.excess(problem, island);
+        let mut residual_ratio = self.residual_ratio(problem, island);
         let mut usable = self.cache.matches(problem, island);
-        // Steps with this factor, and the excess before them.
-        let mut since = (0, excess);
+        // Steps with this factor, and the residual_ratio before them.
+        let mut since = (0, residual_ratio);
         for taken in 0..MAX_NEWTON {
-            if excess <= 1.0 {
+            if residual_ratio <= 1.0 {
                 self.cache.took(since.0);
                 return Ok(taken);
             }
             let fresh = !usable;
-            if fresh && !(excess.is_finite() && self.refactor(problem, island)) {
+            if fresh && !(residual_ratio.is_finite() && self.refactor(problem, island)) {
                 break;
             }
             if fresh {
-                since = (0, excess);
+                since = (0, residual_ratio);
             }
             self.find_step(problem, island);
             let Some(lower) = self.line_search(problem, island, cost) else {
@@ -157,24 +159,24 @@ impl Solver {
                     continue;
                 }
                 // No descent left in floating point: as converged as it can be if it is near.
-                return if excess < 1e3 {
+                return if residual_ratio < 1e3 {
                     Ok(taken)
                 } else {
-                    Err(Failure { block: island.blocks[0], excess })
+                    Err(SolverFailure { block: island.blocks[0], residual_ratio })
                 };
             };
             cost = lower;
             self.learn(problem, island);
-            excess = self.excess(problem, island);
+            residual_ratio = self.residual_ratio(problem, island);
             since.0 += 1;
-            usable = taken + 1 < PATIENT
-                && (since.0 < TRIAL_STEPS || steps_left(since, excess) < STEPS_PER_FACTOR);
+            usable = taken + 1 < REFACTOR_EVERY_STEP_AFTER
+                && (since.0 < STALE_FACTOR_TRIAL || steps_left(since, residual_ratio) < FACTOR_COST_IN_STEPS);
         }
-        Err(Failure { block: island.blocks[0], excess })
+        Err(SolverFailure { block: island.blocks[0], residual_ratio })
     }
 
     /// Cost and gradient at the present velocities.
-    fn gradient_at_v(&mut self, problem: &Problem, island: &Island) -> f64 {
+    fn gradient_at_v(&mut self, problem: &ContactProblem, island: &Island) -> f64 {
         let v = std::mem::take(&mut self.v);
         let mut gradient = std::mem::take(&mut self.gradient);
         let cost = self.evaluate(problem, island, &v, &mut gradient);
@@ -183,7 +185,7 @@ impl Solver {
     }
 
     /// Assembles the Hessian at the present velocities and factors it down to the velocities with scalar rows.
-    fn refactor(&mut self, problem: &Problem, island: &Island) -> bool {
+    fn refactor(&mut self, problem: &ContactProblem, island: &Island) -> bool {
         let mut hessian = self.cache.take(island);
         let v = std::mem::take(&mut self.v);
         self.assemble_hessian(problem, island, &v, &mut hessian);
@@ -197,7 +199,7 @@ impl Solver {
     }
 
     /// Scaled gradient over tolerance.
-    fn excess(&self, problem: &Problem, island: &Island) -> f64 {
+    fn residual_ratio(&self, problem: &ContactProblem, island: &Island) -> f64 {
         let norm =
             |values: &[f64]| values.iter().zip(&self.scale).map(|(g, s)| (g * s).powi(2)).sum::<f64>().sqrt();
         let mut rhs = 0.0;
@@ -212,7 +214,7 @@ impl Solver {
 
     /// Moves along `step` to a lower cost, which it returns with the gradient there: the full step if it is good, else
     /// the minimum on the line.
-    fn line_search(&mut self, problem: &Problem, island: &Island, cost: f64) -> Option<f64> {
+    fn line_search(&mut self, problem: &ContactProblem, island: &Island, cost: f64) -> Option<f64> {
         let slope: f64 = self.gradient.iter().zip(&self.step).map(|(g, s)| g * s).sum();
         if slope.is_nan() || slope >= 0.0 {
             return None;
@@ -246,7 +248,7 @@ impl Solver {
     }
 
     /// Cost and slope at `v + at · step`; leaves that point in `trial`.
-    fn probe(&mut self, problem: &Problem, island: &Island, at: f64) -> (f64, f64) {
+    fn probe(&mut self, problem: &ContactProblem, island: &Island, at: f64) -> (f64, f64) {
         self.trial.iter_mut().zip(&self.v).zip(&self.step).for_each(|((t, v), s)| *t = v + at * s);
         let trial = std::mem::take(&mut self.trial);
         let mut gradient = std::mem::take(&mut self.trial_gradient);
@@ -257,7 +259,7 @@ impl Solver {
     }
 }
 
-/// Steps to convergence if they go on like the ones since then, which began at the excess `before`.
+/// Steps to convergence if they go on like the ones since then, which began at the residual_ratio `before`.
 fn steps_left((steps, before): (u32, f64), after: f64) -> f64 {
     if after <= 1.0 {
         return 0.0;
@@ -266,6 +268,6 @@ fn steps_left((steps, before): (u32, f64), after: f64) -> f64 {
     if gained > 0.0 { f64::from(steps) * after.ln() / gained } else { f64::INFINITY }
 }
 
-fn island_points(problem: &Problem, island: &Island) -> Vec<std::ops::Range<usize>> {
-    island.patches.iter().map(|&i| problem.patches[i].first..problem.patches[i].last).collect()
+fn island_points(problem: &ContactProblem, island: &Island) -> Vec<std::ops::Range<usize>> {
+    island.clusters.iter().map(|&i| problem.clusters[i].first..problem.clusters[i].last).collect()
 }

@@ -1,58 +1,63 @@
-//! The data of one solve.
+//! Data of one solve.
 
-use super::law::Scalar;
+use super::law::ScalarConstraint;
 use crate::geometry::Vec3;
 
-/// A block of generalised velocity.
+/// A block of generalised velocities with its own momentum equation `A v = r` (a *clique* of Drake's SAP).
+///
+/// `A` is the velocity system of one body: for a soft body the Schur complement on its retained nodes, for a rigid body its
+/// 6×6 inertia, for an articulation its mass matrix. It must be symmetric positive definite; the solver does not check this,
+/// but fails to converge otherwise.
 #[derive(Clone, Debug, Default)]
-pub struct Block {
+pub struct VelocityBlock {
     /// Number of velocities.
     pub dim: usize,
-    /// Symmetric positive definite `A`, column-major, lower triangle, side `dim`.
+    /// `A`, `dim × dim`, column-major. Only the lower triangle is read.
     pub matrix: Vec<f64>,
-    /// Right-hand side: the free motion solves `A v = rhs`.
+    /// `r`, `dim` momenta: without contact the solution is `A⁻¹ r`.
     pub rhs: Vec<f64>,
-    /// Start value, and the solution afterwards.
+    /// Initial guess, and the solution afterwards; `dim` velocities.
     pub v: Vec<f64>,
-    /// Says what the velocities mean: two blocks with the same identity and size are the same one in two steps.
+    /// Meaning of the velocities: blocks of equal identity and size in two problems describe the same coordinates, and a
+    /// factored Hessian is kept from one to the other.
     pub identity: u64,
 }
 
-/// The motion of a rigid frame as a linear function of a block's velocity.
+/// Jacobian of a rigid frame: its motion as a linear function of the velocities of one block.
 #[derive(Clone, Debug)]
-pub struct Screw {
+pub struct FrameJacobian {
     /// The block.
     pub block: usize,
-    /// 6 × dim, column-major: linear velocity of the frame's origin, then angular velocity, world.
+    /// `6 × dim`, column-major: linear velocity of the frame's origin, then angular velocity, world.
     pub jacobian: Vec<f64>,
     /// The frame's origin, m, world.
     pub origin: Vec3,
 }
 
-/// One side of a patch.
+/// One side of a contact cluster.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Endpoint {
-    /// Something whose velocity is known; it is in the points' `drift`.
+    /// A body whose velocity is known; it is part of the points' `drift`.
     Known,
-    /// A weighted mean of up to eight 3-vectors of a block.
+    /// A weighted mean of up to eight nodes of a block, with the weights in the points.
     Nodes {
         /// The block.
         block: usize,
-        /// First velocity index of each.
+        /// Index of the first of three velocities of each node.
         at: [u32; 8],
-        /// How many are used.
+        /// Number of nodes used: 4 for a face, 8 for a voxel.
         count: usize,
     },
-    /// A point of a rigid frame.
-    Screw(usize),
+    /// Points of a rigid frame, by its index in [`ContactProblem::frames`].
+    Frame(usize),
 }
 
-/// Contact samples between the same two endpoints.
+/// Contact points between the same two endpoints.
 #[derive(Clone, Copy, Debug)]
-pub struct Patch {
-    /// The side that the normal points to.
+pub struct ContactCluster {
+    /// The side that the normals point to.
     pub a: Endpoint,
-    /// The side that the normal points away from.
+    /// The side that the normals point away from.
     pub b: Endpoint,
     /// First point.
     pub first: usize,
@@ -60,78 +65,79 @@ pub struct Patch {
     pub last: usize,
 }
 
-/// One contact sample. Its relative velocity is `v_a − v_b − drift`.
+/// One contact point. Its relative velocity is `v_a − v_b − drift`.
 #[derive(Clone, Copy, Debug)]
-pub struct Point {
+pub struct ContactPoint {
     /// Weights of `a`'s nodes.
     pub weights_a: [f64; 8],
     /// Weights of `b`'s nodes.
     pub weights_b: [f64; 8],
-    /// Where it is, m, world (for the arms to screws).
+    /// Position, m, world.
     pub p: Vec3,
-    /// Unit normal from `b` to `a`.
+    /// Unit normal from `b` to `a`, world.
     pub normal: Vec3,
-    /// Known part of `b`'s velocity (or of `a`'s, negated), m/s.
+    /// Known part of `b`'s velocity (or of `a`'s, negated), m/s, world.
     pub drift: Vec3,
     /// Normal stiffness, N/m.
     pub stiffness: f64,
     /// Tangential stiffness, N/m.
     pub shear_stiffness: f64,
-    /// Gap at the start of the step, m (negative is overlap).
+    /// Gap at the start of the step, m; negative is overlap.
     pub gap: f64,
-    /// Tangential offset from the stick anchor at the start of the step, m.
+    /// Tangential offset from the stick anchor at the start of the step, m, world.
     pub offset: Vec3,
-    /// Friction coefficient in force during this step.
+    /// Friction coefficient of this step.
     pub mu: f64,
-    /// Normal impulse of the pass before, N s; the friction bound is `mu` times it.
-    pub lagged: f64,
+    /// Normal impulse of the previous pass, N s; the friction bound is `mu` times it. At the start of a solve that of the
+    /// last step.
+    pub previous_normal_impulse: f64,
     /// Result: normal impulse, N s.
     pub normal_impulse: f64,
-    /// Result: tangential impulse on `a`, N s.
+    /// Result: tangential impulse on `a`, N s, world.
     pub shear_impulse: Vec3,
-    /// Result: relative velocity, m/s.
+    /// Result: relative velocity, m/s, world.
     pub velocity: Vec3,
-    /// Result: whether the friction bound was reached.
-    pub slipping: bool,
+    /// Result: true if the friction bound was reached.
+    pub is_slipping: bool,
 }
 
-/// A whole problem; buffers are reused between steps.
+/// A whole problem; its buffers are reused between steps.
 #[derive(Clone, Debug, Default)]
-pub struct Problem {
+pub struct ContactProblem {
     /// Time step, s.
     pub dt: f64,
     /// Dissipation time of the contact springs, s.
-    pub tau: f64,
-    /// Blocks.
-    pub blocks: Vec<Block>,
-    /// Rigid frames that points refer to.
-    pub screws: Vec<Screw>,
-    /// Patches.
-    pub patches: Vec<Patch>,
-    /// Points of all patches.
-    pub points: Vec<Point>,
-    /// Scalar rows.
-    pub scalars: Vec<Scalar>,
+    pub dissipation_time: f64,
+    /// Velocity blocks.
+    pub blocks: Vec<VelocityBlock>,
+    /// Jacobians of the rigid frames that endpoints refer to.
+    pub frames: Vec<FrameJacobian>,
+    /// Contact clusters.
+    pub clusters: Vec<ContactCluster>,
+    /// Points of all clusters.
+    pub points: Vec<ContactPoint>,
+    /// Constraints on single velocities.
+    pub constraints: Vec<ScalarConstraint>,
 }
 
-impl Problem {
-    /// Forgets everything but the allocations.
-    pub fn clear(&mut self, dt: f64, tau: f64) {
+impl ContactProblem {
+    /// Empties the problem, keeping its allocations.
+    pub fn clear(&mut self, dt: f64, dissipation_time: f64) {
         self.dt = dt;
-        self.tau = tau;
+        self.dissipation_time = dissipation_time;
         self.blocks.clear();
-        self.screws.clear();
-        self.patches.clear();
+        self.frames.clear();
+        self.clusters.clear();
         self.points.clear();
-        self.scalars.clear();
+        self.constraints.clear();
     }
 
     /// The block that an endpoint moves with.
-    pub fn block_of(&self, end: &Endpoint) -> Option<usize> {
+    pub(super) fn block_of(&self, end: &Endpoint) -> Option<usize> {
         match end {
             Endpoint::Known => None,
             Endpoint::Nodes { block, .. } => Some(*block),
-            Endpoint::Screw(screw) => Some(self.screws[*screw].block),
+            Endpoint::Frame(frame) => Some(self.frames[*frame].block),
         }
     }
 }

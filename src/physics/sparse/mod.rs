@@ -2,12 +2,12 @@
 //!
 //! A multifrontal Cholesky (Duff & Reid 1983; Liu 1992) that eliminates every node except a *kept* set, whose Schur
 //! complement is then the assembled root front: exactly what a contact solve on few nodes of a large body needs.
-//! [`Symbolic`] depends on the pattern and the kept set only; [`Factor`] is refilled without allocating.
+//! [`SymbolicFactor`] depends on the pattern and the kept set only; [`CholeskyFactor`] is refilled without allocating.
 
 pub mod dense;
 mod dissection;
 mod numeric;
 mod symbolic;
 
-pub use numeric::{BlockMatrix, Factor};
-pub use symbolic::Symbolic;
+pub use numeric::{BlockMatrix, CholeskyFactor};
+pub use symbolic::SymbolicFactor;

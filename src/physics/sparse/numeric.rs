@@ -1,10 +1,10 @@
 //! The numbers of a factor: assembly front by front, elimination, and the two triangular sweeps.
 
-use super::{Symbolic, dense};
+use super::{SymbolicFactor, dense};
 
-/// A refillable factor of one [`Symbolic`] plan.
+/// A refillable factor of one [`SymbolicFactor`] plan.
 #[derive(Clone, Debug, Default)]
-pub struct Factor {
+pub struct CholeskyFactor {
     panels: Vec<f64>,
     stack: Vec<f64>,
     front: Vec<f64>,
@@ -19,10 +19,10 @@ pub trait BlockMatrix {
     fn column(&self, node: u32, visit: &mut dyn FnMut(u32, &[f64; 9], bool));
 }
 
-impl Factor {
-    /// Factors `matrix`; afterwards [`Factor::schur`] holds the complement of the kept nodes. `false` if it is not
+impl CholeskyFactor {
+    /// Factors `matrix`; afterwards [`CholeskyFactor::schur`] holds the complement of the kept nodes. `false` if it is not
     /// positive definite.
-    pub fn refill(&mut self, plan: &Symbolic, matrix: &dyn BlockMatrix) -> bool {
+    pub fn refill(&mut self, plan: &SymbolicFactor, matrix: &dyn BlockMatrix) -> bool {
         self.panels.resize(plan.factor_len, 0.0);
         self.stack.resize(plan.stack_len, 0.0);
         self.front.resize(plan.largest * plan.largest, 0.0);
@@ -54,7 +54,7 @@ impl Factor {
     }
 
     /// The matrix' own entries whose earlier position is eliminated in this front (or kept, in the root).
-    fn assemble(&mut self, plan: &Symbolic, index: usize, matrix: &dyn BlockMatrix) {
+    fn assemble(&mut self, plan: &SymbolicFactor, index: usize, matrix: &dyn BlockMatrix) {
         let front = &plan.fronts[index];
         let n = 3 * front.rows.len();
         let root = index + 1 == plan.fronts.len();
@@ -84,7 +84,7 @@ impl Factor {
     }
 
     /// Forward sweep on `b` (in elimination order, 3 per position): the kept part becomes the reduced right-hand side.
-    pub fn forward(&mut self, plan: &Symbolic, b: &mut [f64]) {
+    pub fn forward(&mut self, plan: &SymbolicFactor, b: &mut [f64]) {
         for front in plan.fronts.iter().filter(|f| f.pivots > 0) {
             let (n, k) = (3 * front.rows.len(), 3 * front.pivots);
             let work = &mut self.gather[..n];
@@ -95,7 +95,7 @@ impl Factor {
     }
 
     /// Backward sweep: given the kept part of `x`, completes the rest of a forward-swept vector to the solution.
-    pub fn backward(&mut self, plan: &Symbolic, x: &mut [f64]) {
+    pub fn backward(&mut self, plan: &SymbolicFactor, x: &mut [f64]) {
         for front in plan.fronts.iter().rev().filter(|f| f.pivots > 0) {
             let (n, k) = (3 * front.rows.len(), 3 * front.pivots);
             let work = &mut self.gather[..n];
@@ -205,8 +205,8 @@ mod tests {
         }
         for keep in [vec![], vec![3, 4, 77], (0..25).collect::<Vec<u32>>(), (0..125).collect()] {
             let places: Vec<[i32; 3]> = (0..125).map(|c| [c % 5, c / 5 % 5, c / 25]).collect();
-            let plan = Symbolic::new(&grid.neighbours, &places, &keep);
-            let mut factor = Factor::default();
+            let plan = SymbolicFactor::new(&grid.neighbours, &places, &keep);
+            let mut factor = CholeskyFactor::default();
             assert!(factor.refill(&plan, &grid));
             let mut y = vec![0.0; 3 * nodes];
             for (at, &node) in plan.order.iter().enumerate() {

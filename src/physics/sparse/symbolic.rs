@@ -4,7 +4,7 @@ use super::dissection;
 
 /// The plan of a factorisation for one pattern and one kept set.
 #[derive(Clone, Debug)]
-pub struct Symbolic {
+pub struct SymbolicFactor {
     /// Node at each position of the elimination order; the kept nodes are last, in ascending order.
     pub order: Vec<u32>,
     /// Position of each node.
@@ -43,7 +43,7 @@ const MERGE_ZEROS: f64 = 0.1;
 /// Fronts with at most this many pivots are merged whatever the zeros.
 const MERGE_SMALL: usize = 3;
 
-impl Symbolic {
+impl SymbolicFactor {
     /// Analyses the graph `neighbours` (symmetric, without self loops, ascending lists), keeping `keep` (ascending).
     /// `places` are the nodes' places in a lattice in which neighbours are at most one apart along each axis.
     pub fn new(neighbours: &[Vec<u32>], places: &[[i32; 3]], keep: &[u32]) -> Self {

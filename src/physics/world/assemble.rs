@@ -1,162 +1,152 @@
-//! From the state of the world to one convex problem: blocks, frames, patches, rows.
+//! Assembly of the convex problem of a step from the state of the world: velocity blocks, frame Jacobians, contacts and
+//! joint constraints.
 
-use super::{RowOf, StepFailure, World, points::Meeting};
+use super::{Articulation, StepFailure, World};
 use crate::{
     geometry::{Pose, Vec3},
     physics::{
-        contact::{Mover, Moving, Partner, Slot, Whereabouts, detect},
+        contact::ColliderMotion,
         fem::system::StepCoefficients,
+        ids::{ArticulationId, BodyId, RigidId, SoftId},
         joints,
-        rigid::free_spin,
-        solver::{Block, Endpoint, Patch, Point, Scalar, Screw},
+        rigid::{FreeSpin, free_spin},
+        solver::{Endpoint, FrameJacobian, ScalarConstraint, VelocityBlock},
     },
 };
 
-/// Distance at which a group's nodes are kept, so that a contact does not change the factor when it begins, m.
-pub(super) const REACH: f64 = 2.5e-3;
+/// Distance to a surface within which a group's nodes are retained in the reduced system, m. The factor then does not change
+/// when a contact begins.
+pub(super) const RETAIN_DISTANCE: f64 = 2.5e-3;
 /// Stiffness and damping of joint stops, relative to the joint's inertia over a step.
 const STOP_RATE: f64 = 0.5;
-/// The same of the stops and the dry friction of joints without a drive, which nothing but these holds.
+/// The same for the stops and the dry friction of joints without a drive, which nothing else holds.
 const FIRM_RATE: f64 = 50.0;
 
-/// Which block belongs to what.
+/// Velocity block of each body in the current problem; `None` for one that sleeps.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Layout {
+pub(super) struct BlockMap {
     pub soft: Vec<Option<usize>>,
     pub rigid: Vec<Option<usize>>,
-    pub trees: Vec<Option<usize>>,
-    pub momentum: Vec<Vec3>,
-    pub free_w: Vec<crate::physics::rigid::FreeSpin>,
-    screws: Vec<(Mover, usize)>,
+    pub articulations: Vec<Option<usize>>,
+    /// Torque-free rotation of each rigid body in this step.
+    pub free_spins: Vec<FreeSpin>,
+    momentum: Vec<Vec3>,
+    frames: Vec<(BodyId, usize)>,
+}
+
+impl BlockMap {
+    pub(super) fn soft(&self, id: SoftId) -> Option<usize> {
+        self.soft[id.index()]
+    }
 }
 
 impl World {
-    /// Where every collider is and how its mover moves.
-    pub(super) fn place_colliders(&mut self) {
-        let moving = self.colliders.iter().map(|c| self.moving_of(c.mover, &c.pose_in_mover)).collect();
-        self.moving = moving;
+    /// Updates pose and velocity of every collider.
+    pub(super) fn update_collider_motions(&mut self) {
+        let motions = self.colliders.iter().map(|c| self.collider_motion(c.parent, &c.pose_in_parent));
+        self.motions = motions.collect();
     }
 
-    fn moving_of(&self, mover: Mover, offset: &Pose) -> Moving {
-        let still = |pose: Pose| Moving {
+    fn collider_motion(&self, parent: BodyId, offset: &Pose) -> ColliderMotion {
+        let at_rest = |pose: Pose| ColliderMotion {
             pose: pose * offset,
             linear: Vec3::zeros(),
             angular: Vec3::zeros(),
             origin: pose.translation.vector,
         };
-        match mover {
-            Mover::Static => still(Pose::identity()),
-            Mover::Kinematic(index) => {
-                let k = &self.kinematic[index];
+        match parent {
+            // `add_collider` accepts no soft body as parent.
+            BodyId::World | BodyId::Soft(_) => at_rest(Pose::identity()),
+            BodyId::Kinematic(id) => {
+                let k = self.kinematic(id);
                 let dt = self.params.dt;
-                Moving {
+                ColliderMotion {
                     linear: (k.next.translation.vector - k.pose.translation.vector) / dt,
                     angular: (k.next.rotation * k.pose.rotation.inverse()).scaled_axis() / dt,
-                    ..still(k.pose)
+                    ..at_rest(k.pose)
                 }
             }
-            Mover::Rigid(index) => {
-                let body = &self.rigid[index].body;
-                let pose = body.object_w();
-                Moving {
-                    pose: pose * offset,
+            BodyId::Rigid(id) => {
+                let body = &self.rigid(id).state;
+                ColliderMotion {
+                    pose: body.object_w() * offset,
                     linear: body.v,
                     angular: body.w,
                     origin: body.pose_w.translation.vector,
                 }
             }
-            Mover::Link { tree, link } => {
-                let tree = &self.trees[tree];
-                let velocities = joints::velocities(&tree.tree, &tree.poses, tree.state.v.as_slice());
-                Moving {
-                    linear: velocities[link].linear,
-                    angular: velocities[link].angular,
-                    ..still(tree.poses[link])
+            BodyId::Link(id) => {
+                let Articulation { tree, poses, state, .. } = self.articulation(id.articulation);
+                let velocities = joints::velocities(tree, poses, state.v.as_slice());
+                ColliderMotion {
+                    linear: velocities[id.index].linear,
+                    angular: velocities[id.index].angular,
+                    ..at_rest(poses[id.index])
                 }
-            }
-        }
-    }
-
-    /// Fills the candidate list and marks the nodes that must stay in the reduced systems.
-    pub(super) fn detect(&mut self) {
-        self.candidates.clear();
-        let (mut found, mut whereabouts) = (Vec::new(), Whereabouts::default());
-        for (index, soft) in self.soft.iter_mut().enumerate().filter(|(_, s)| !s.asleep) {
-            soft.steps += 1;
-            let (system, body, step) = (&mut soft.system, &soft.body, soft.steps);
-            whereabouts.look(body);
-            for (id, collider) in self.colliders.iter().enumerate() {
-                found.clear();
-                let limits = (self.params.dt, self.params.margin, REACH);
-                detect((body, &whereabouts), collider, &self.moving[id], limits, &mut found, &mut |group| {
-                    let group = &body.rest.groups[group];
-                    group.nodes[..group.count].iter().for_each(|&node| system.mark(node, step));
-                });
-                for c in &found {
-                    let group = &body.rest.groups[c.group];
-                    group.nodes[..group.count].iter().for_each(|&node| system.mark(node, step));
-                }
-                self.candidates.extend(found.iter().map(|c| (index, id, *c)));
             }
         }
     }
 
     /// Builds the problem of this step.
     pub(super) fn assemble(&mut self) -> Result<(), StepFailure> {
-        self.problem.clear(self.params.dt, self.params.tau);
+        self.problem.clear(self.params.dt, self.params.dissipation_time);
         self.rows.clear();
-        self.layout.screws.clear();
-        self.soft_blocks()?;
-        self.rigid_blocks();
-        self.tree_blocks();
-        self.soft_patches();
-        self.pressing_patches();
-        self.rigid_patches();
+        self.blocks.frames.clear();
+        self.add_soft_blocks()?;
+        self.add_rigid_blocks();
+        self.add_articulation_blocks();
+        self.add_soft_collider_contacts();
+        self.add_soft_soft_contacts();
+        self.add_rigid_contacts();
         Ok(())
     }
 
-    fn soft_blocks(&mut self) -> Result<(), StepFailure> {
-        let c = StepCoefficients { dt: self.params.dt, alpha: self.params.alpha, beta: self.params.beta };
-        self.layout.soft.clear();
+    fn add_soft_blocks(&mut self) -> Result<(), StepFailure> {
+        let c = StepCoefficients {
+            dt: self.params.dt,
+            rayleigh_mass: self.params.rayleigh_mass,
+            rayleigh_stiffness: self.params.rayleigh_stiffness,
+        };
+        self.blocks.soft.clear();
         for (index, soft) in self.soft.iter_mut().enumerate() {
-            if soft.asleep {
-                self.layout.soft.push(None);
+            if soft.sleep.is_asleep {
+                self.blocks.soft.push(None);
                 continue;
             }
-            let body = &soft.body;
-            if !soft.system.prepare(body, &c, soft.steps) {
+            let body = &soft.state;
+            if !soft.system.prepare(body, &c, soft.steps_awake) {
                 return Err(StepFailure::Indefinite { step: self.step, body: soft.name.clone() });
             }
-            let momentum = &mut self.layout.momentum;
+            let momentum = &mut self.blocks.momentum;
             momentum.clear();
             momentum.extend(
                 (0..body.x.len())
-                    .map(|n| (body.v[n] + self.gravity * c.dt) * body.rest.mass[n] + body.force[n] * c.dt),
+                    .map(|n| (body.v[n] + self.gravity * c.dt) * body.model.mass[n] + body.force[n] * c.dt),
             );
-            let dim = 3 * soft.system.kept().len();
-            let identity = (index as u64) << 40 | soft.system.kept_version();
-            let matrix = soft.system.lend_matrix();
-            let mut block = Block { dim, matrix, rhs: vec![0.0; dim], v: vec![0.0; dim], identity };
+            let dim = 3 * soft.system.retained().len();
+            let identity = (index as u64) << 40 | soft.system.retained_version();
+            let matrix = soft.system.take_matrix();
+            let mut block = VelocityBlock { dim, matrix, rhs: vec![0.0; dim], v: vec![0.0; dim], identity };
             soft.system.reduce(momentum, &mut block.rhs);
-            for (i, &node) in soft.system.kept().iter().enumerate() {
+            for (i, &node) in soft.system.retained().iter().enumerate() {
                 block.v[3 * i..3 * i + 3].copy_from_slice(body.v[node as usize].as_slice());
             }
-            self.layout.soft.push(Some(self.problem.blocks.len()));
+            self.blocks.soft.push(Some(self.problem.blocks.len()));
             self.problem.blocks.push(block);
         }
         Ok(())
     }
 
-    fn rigid_blocks(&mut self) {
-        self.layout.rigid.clear();
-        self.layout.free_w.clear();
+    fn add_rigid_blocks(&mut self) {
+        self.blocks.rigid.clear();
+        self.blocks.free_spins.clear();
         let dt = self.params.dt;
         for rigid in &self.rigid {
-            let body = &rigid.body;
+            let body = &rigid.state;
             let spin = free_spin(body, dt);
-            self.layout.free_w.push(spin);
-            if rigid.asleep {
-                self.layout.rigid.push(None);
+            self.blocks.free_spins.push(spin);
+            if rigid.sleep.is_asleep {
+                self.blocks.rigid.push(None);
                 continue;
             }
             let inertia = body.inertia_w();
@@ -168,183 +158,186 @@ impl World {
             let linear = (body.v + self.gravity * dt) * body.mass;
             let angular = inertia * spin.end_w;
             let stack = |a: &Vec3, b: &Vec3| [a.as_slice(), b.as_slice()].concat();
-            self.layout.rigid.push(Some(self.problem.blocks.len()));
-            self.problem.blocks.push(Block {
+            self.blocks.rigid.push(Some(self.problem.blocks.len()));
+            self.problem.blocks.push(VelocityBlock {
                 dim: 6,
                 matrix,
                 rhs: stack(&linear, &angular),
                 v: stack(&body.v, &body.w),
-                identity: 1 << 60 | self.layout.rigid.len() as u64,
+                identity: 1 << 60 | self.blocks.rigid.len() as u64,
             });
         }
     }
 
-    fn tree_blocks(&mut self) {
-        self.layout.trees.clear();
+    fn add_articulation_blocks(&mut self) {
+        self.blocks.articulations.clear();
         let dt = self.params.dt;
-        for tree in &mut self.trees {
-            if tree.asleep {
-                self.layout.trees.push(None);
+        for articulation in &mut self.articulations {
+            if articulation.sleep.is_asleep {
+                self.blocks.articulations.push(None);
                 continue;
             }
-            let n = tree.tree.dofs();
+            let Articulation { tree, poses, state, scratch, .. } = articulation;
+            let n = tree.dofs();
             let mut mass = nalgebra::DMatrix::zeros(n, n);
-            joints::mass_matrix_into(&tree.tree, &tree.poses, &mut tree.scratch, &mut mass);
-            let gravity = if tree.gravity { self.gravity } else { Vec3::zeros() };
-            let bias = joints::bias(&tree.tree, &tree.poses, tree.state.v.as_slice(), &gravity);
-            let rhs = &mass * &tree.state.v - bias * dt;
+            joints::mass_matrix_into(tree, poses, scratch, &mut mass);
+            let gravity = if articulation.has_gravity { self.gravity } else { Vec3::zeros() };
+            let bias = joints::bias(tree, poses, state.v.as_slice(), &gravity);
+            let rhs = &mass * &state.v - bias * dt;
             let block = self.problem.blocks.len();
-            for (i, link) in tree.tree.links.iter().enumerate() {
-                mass[(i, i)] += dt * link.damping;
-                tree.bristles[i].stiffness = FIRM_RATE * mass[(i, i)] / (dt * dt);
-                self.problem.scalars.extend(joint_rows(tree, i, block, mass[(i, i)], dt));
+            for i in 0..n {
+                mass[(i, i)] += dt * articulation.tree.links[i].damping;
+                articulation.friction[i].stiffness = FIRM_RATE * mass[(i, i)] / (dt * dt);
+                let constraints = joint_constraints(articulation, i, block, mass[(i, i)], dt);
+                self.problem.constraints.extend(constraints);
             }
-            self.layout.trees.push(Some(block));
-            self.problem.blocks.push(Block {
+            self.blocks.articulations.push(Some(block));
+            self.problem.blocks.push(VelocityBlock {
                 dim: n,
                 matrix: mass.as_slice().to_vec(),
                 rhs: rhs.as_slice().to_vec(),
-                v: tree.state.v.as_slice().to_vec(),
-                identity: 1 << 61 | self.layout.trees.len() as u64,
+                v: articulation.state.v.as_slice().to_vec(),
+                identity: 1 << 61 | self.blocks.articulations.len() as u64,
             });
         }
     }
 
-    /// Rows between soft bodies and colliders.
-    fn soft_patches(&mut self) {
-        let candidates = std::mem::take(&mut self.candidates);
-        let mut at = 0;
-        while at < candidates.len() {
-            let (soft, id, first) = candidates[at];
-            let end = at
-                + candidates[at..]
-                    .iter()
-                    .take_while(|c| (c.0, c.1, c.2.group) == (soft, id, first.group))
-                    .count();
-            let Some(block) = self.layout.soft[soft] else { break };
-            let (a, b) =
-                (self.nodes_of(soft, first.group, block), self.endpoint_of(self.colliders[id].mover));
-            let start = self.problem.points.len();
-            for (_, _, candidate) in &candidates[at..end] {
-                self.push_row(soft, id, candidate, &b);
-            }
-            self.problem.patches.push(Patch { a, b, first: start, last: self.problem.points.len() });
-            at = end;
-        }
-        self.candidates = candidates;
-    }
-
-    pub(super) fn nodes_of(&self, soft: usize, group: usize, block: usize) -> Endpoint {
-        let soft = &self.soft[soft];
-        let group = &soft.body.rest.groups[group];
+    /// The endpoint of a sample group of a soft body.
+    pub(super) fn group_endpoint(&self, soft: SoftId, group: usize, block: usize) -> Endpoint {
+        let soft = self.soft(soft);
+        let group = &soft.state.model.groups[group];
         let mut at = [0; 8];
         for (at, &node) in at.iter_mut().zip(&group.nodes[..group.count]) {
-            *at = 3 * soft.system.kept_index(node) as u32;
+            *at = 3 * soft.system.retained_index(node) as u32;
         }
         Endpoint::Nodes { block, at, count: group.count }
     }
 
-    /// The endpoint of a mover; its frame is registered on first use.
-    pub(super) fn endpoint_of(&mut self, mover: Mover) -> Endpoint {
-        let (block, jacobian, origin) = match mover {
-            Mover::Static | Mover::Kinematic(_) => return Endpoint::Known,
-            _ if self.layout.screws.iter().any(|(m, _)| *m == mover) => {
-                let found = self.layout.screws.iter().find(|(m, _)| *m == mover);
-                return found.map_or(Endpoint::Known, |(_, screw)| Endpoint::Screw(*screw));
-            }
-            Mover::Rigid(index) => {
-                let Some(block) = self.layout.rigid[index] else { return Endpoint::Known };
-                let identity = (0..36).map(|e| if e % 7 == 0 { 1.0 } else { 0.0 }).collect();
-                (block, identity, self.rigid[index].body.pose_w.translation.vector)
-            }
-            Mover::Link { tree, link } => {
-                let Some(block) = self.layout.trees[tree] else { return Endpoint::Known };
-                let t = &self.trees[tree];
-                let jacobian = joints::jacobian(&t.tree, &t.poses, link).as_slice().to_vec();
-                (block, jacobian, t.poses[link].translation.vector)
-            }
-        };
-        self.layout.screws.push((mover, self.problem.screws.len()));
-        self.problem.screws.push(Screw { block, jacobian, origin });
-        Endpoint::Screw(self.problem.screws.len() - 1)
+    /// The endpoint of an element of a soft body.
+    pub(super) fn element_endpoint(&self, soft: SoftId, element: u32, block: usize) -> Endpoint {
+        let soft = self.soft(soft);
+        let nodes = &soft.state.model.mesh.elements[element as usize];
+        let at = nodes.map(|node| 3 * soft.system.retained_index(node) as u32);
+        Endpoint::Nodes { block, at, count: 8 }
     }
 
-    fn push_row(&mut self, soft: usize, id: usize, candidate: &super::Candidate, b: &Endpoint) {
-        let (body, collider, moving) = (&self.soft[soft], &self.colliders[id], &self.moving[id]);
-        let sample = &body.body.rest.samples[candidate.sample];
-        let local = moving.pose.inverse_transform_point(&candidate.p.into()).coords;
-        let partner = Partner::Collider(id).id();
-        let slot = body
-            .memory
-            .get(candidate.sample, partner, body.steps)
-            .copied()
-            .unwrap_or(Slot::fresh(partner, local));
-        let anchor_w = (moving.pose * nalgebra::Point3::from(slot.anchor)).coords;
-        let meeting = Meeting {
-            p: candidate.p,
-            normal: candidate.normal,
-            gap: candidate.gap,
-            area: sample.surface.area * candidate.coverage,
-            stretch: candidate.p - anchor_w,
-            impulse: slot.impulse,
-            sliding: slot.slipping,
+    /// The endpoint of a rigid body or link; its Jacobian is added to the problem on first use. `Known` for what sleeps or
+    /// has a prescribed motion.
+    pub(super) fn body_endpoint(&mut self, body: BodyId) -> Endpoint {
+        let (block, jacobian, origin) = match body {
+            BodyId::World | BodyId::Kinematic(_) | BodyId::Soft(_) => return Endpoint::Known,
+            _ if self.blocks.frames.iter().any(|(known, _)| *known == body) => {
+                let found = self.blocks.frames.iter().find(|(known, _)| *known == body);
+                return found.map_or(Endpoint::Known, |(_, frame)| Endpoint::Frame(*frame));
+            }
+            BodyId::Rigid(id) => {
+                let Some(block) = self.blocks.rigid[id.index()] else { return Endpoint::Known };
+                let identity = (0..36).map(|e| if e % 7 == 0 { 1.0 } else { 0.0 }).collect();
+                (block, identity, self.rigid(id).state.pose_w.translation.vector)
+            }
+            BodyId::Link(id) => {
+                let block = self.blocks.articulations[id.articulation.index()];
+                let Some(block) = block else { return Endpoint::Known };
+                let Articulation { tree, poses, .. } = self.articulation(id.articulation);
+                let jacobian = joints::jacobian(tree, poses, id.index).as_slice().to_vec();
+                (block, jacobian, poses[id.index].translation.vector)
+            }
         };
-        let known = *b == Endpoint::Known;
-        let point =
-            meeting.point(&collider.friction.with(&body.friction), &collider.layer.in_series(&body.layer));
-        self.problem.points.push(Point {
-            weights_a: sample.weights,
-            drift: if known { moving.velocity(&candidate.p) } else { Vec3::zeros() },
-            ..point
-        });
-        self.rows.push(RowOf {
-            soft,
-            candidate: *candidate,
-            partner,
-            anchor: slot.anchor,
-            travel: slot.travel,
-            pull: moving.pose.rotation.inverse().to_rotation_matrix().into_inner(),
-        });
+        self.blocks.frames.push((body, self.problem.frames.len()));
+        self.problem.frames.push(FrameJacobian { block, jacobian, origin });
+        Endpoint::Frame(self.problem.frames.len() - 1)
+    }
+
+    /// True if the motion of a body is known before the solve, because it is prescribed or the body sleeps.
+    pub(super) fn is_known(&self, body: BodyId) -> bool {
+        match body {
+            BodyId::World | BodyId::Kinematic(_) => true,
+            BodyId::Soft(id) => self.soft(id).is_asleep(),
+            BodyId::Rigid(id) => self.rigid(id).is_asleep(),
+            BodyId::Link(id) => self.articulation(id.articulation).is_asleep(),
+        }
+    }
+
+    /// Identifiers of all rigid bodies.
+    pub(super) fn rigid_ids(&self) -> impl Iterator<Item = RigidId> + use<> {
+        (0..self.rigid.len()).map(RigidId::new)
+    }
+
+    /// Identifiers of all articulations.
+    pub(super) fn articulation_ids(&self) -> impl Iterator<Item = ArticulationId> + use<> {
+        (0..self.articulations.len()).map(ArticulationId::new)
+    }
+
+    /// Identifiers of all soft bodies.
+    pub(super) fn soft_ids(&self) -> impl Iterator<Item = SoftId> + use<> {
+        (0..self.soft.len()).map(SoftId::new)
     }
 }
 
-/// Drive, stops, speed limit and dry friction of one joint; `inertia` is its diagonal of the mass matrix.
-fn joint_rows(
-    tree: &super::Articulation,
+/// Drive, stops, speed limit and dry friction of one joint; `inertia` is its diagonal entry of the mass matrix.
+///
+/// A drive comes first: its force is read from the first constraint of its joint.
+fn joint_constraints(
+    articulation: &Articulation,
     joint: usize,
     block: usize,
     inertia: f64,
     dt: f64,
-) -> impl Iterator<Item = Scalar> {
-    let link = &tree.tree.links[joint];
-    let (q, v) = (tree.state.q[joint], tree.state.v[joint]);
-    let row = |stiffness: f64, damping: f64, error: f64, target_velocity: f64, range: (f64, f64)| Scalar {
+) -> impl Iterator<Item = ScalarConstraint> + use<> {
+    let link = &articulation.tree.links[joint];
+    let (q, v) = (articulation.state.q[joint], articulation.state.v[joint]);
+    let free = ScalarConstraint {
         block,
         index: joint,
-        stiffness,
-        damping,
-        error,
-        target_velocity,
-        range,
+        stiffness: 0.0,
+        damping: 0.0,
+        error: 0.0,
+        target_velocity: 0.0,
+        min_force: f64::NEG_INFINITY,
+        max_force: f64::INFINITY,
         force: 0.0,
     };
-    let drive =
-        tree.drives[joint].map(|d| row(d.kp, d.kd, d.target - q, d.target_velocity, (-d.effort, d.effort)));
-    // A stop answers within about two steps whatever the inertia: k dt² and c dt are of the order of it.
+    let pushes_up = ScalarConstraint { min_force: 0.0, ..free };
+    let pushes_down = ScalarConstraint { max_force: 0.0, ..free };
+    let drive = articulation.drives[joint].map(|d| ScalarConstraint {
+        stiffness: d.kp,
+        damping: d.kd,
+        error: d.target - q,
+        target_velocity: d.target_velocity,
+        min_force: -d.effort,
+        max_force: d.effort,
+        ..free
+    });
+    // Stops bring a joint to rest within about two steps whatever its inertia: k dt² and c dt are of the order of it.
     let rate = if drive.is_some() { STOP_RATE } else { FIRM_RATE };
     let (k, c) = (rate * inertia / (dt * dt), STOP_RATE * inertia / dt);
-    // What has no drive may be struck within the step.
-    let near = |distance: f64| {
+    // A joint without a drive may be struck within the step, so its stops are always present.
+    let is_near = |distance: f64| {
         drive.is_none() || distance < 2.0 * v.abs() * dt + 0.02 * (link.upper - link.lower).min(1.0)
     };
-    let low = near(q - link.lower).then(|| row(k, 0.0, link.lower - q, 0.0, (0.0, f64::INFINITY)));
-    let high = near(link.upper - q).then(|| row(k, 0.0, link.upper - q, 0.0, (f64::NEG_INFINITY, 0.0)));
-    let fast = v.abs() > 0.5 * link.velocity_limit && link.velocity_limit.is_finite();
+    let lower = is_near(q - link.lower).then(|| ScalarConstraint {
+        stiffness: k,
+        error: link.lower - q,
+        ..pushes_up
+    });
+    let upper = is_near(link.upper - q).then(|| ScalarConstraint {
+        stiffness: k,
+        error: link.upper - q,
+        ..pushes_down
+    });
     let limit = link.velocity_limit;
-    let brake_up = fast.then(|| row(0.0, 10.0 * c, 0.0, limit, (f64::NEG_INFINITY, 0.0)));
-    let brake_down = fast.then(|| row(0.0, 10.0 * c, 0.0, -limit, (0.0, f64::INFINITY)));
-    let bristle = &tree.bristles[joint];
-    let dry = (link.friction > 0.0)
-        .then(|| row(bristle.stiffness, 0.0, bristle.from - q, 0.0, (-link.friction, link.friction)));
-    [drive, low, high, brake_up, brake_down, dry].into_iter().flatten()
+    let is_fast = v.abs() > 0.5 * limit && limit.is_finite();
+    let brake_up =
+        is_fast.then(|| ScalarConstraint { damping: 10.0 * c, target_velocity: limit, ..pushes_down });
+    let brake_down =
+        is_fast.then(|| ScalarConstraint { damping: 10.0 * c, target_velocity: -limit, ..pushes_up });
+    let friction = articulation.friction[joint];
+    let dry = (link.friction > 0.0).then(|| ScalarConstraint {
+        stiffness: friction.stiffness,
+        error: friction.anchor - q,
+        min_force: -link.friction,
+        max_force: link.friction,
+        ..free
+    });
+    [drive, lower, upper, brake_up, brake_down, dry].into_iter().flatten()
 }

@@ -1,321 +1,333 @@
-//! The world: all bodies, and the step that moves them.
+//! The world: all bodies and colliders, and the step that moves them.
+//!
+//! A [`World`] owns soft bodies, free rigid bodies, articulations, kinematic frames and colliders. `add_*` puts an object in
+//! and returns its [identifier](super::ids); [`SoftBodyBuilder`] and [`RigidBodyBuilder`] do so from a shape.
+//! [`World::step`] advances everything by [`PhysicsParams::dt`]. Units are SI; positions, velocities and forces are in the
+//! world frame unless a name says otherwise.
+//!
+//! A soft cube falls on a table and comes to rest:
+//!
+//! ```
+//! use softvt::{
+//!     geometry::{Pose, Vec3, shape::Shape},
+//!     physics::{BodyId, PhysicsParams, World, contact::Friction, fem::ElasticMaterial, world::SoftBodyBuilder},
+//! };
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let mut world = World::new(PhysicsParams::default(), Vec3::new(0.0, 0.0, -9.81));
+//! let table = Shape::cuboid(Vec3::new(0.4, 0.4, 0.02));
+//! world.add_shape("table", BodyId::World, Pose::translation(0.0, 0.0, -0.01), &table, Friction::default());
+//!
+//! let bread = ElasticMaterial { youngs_pa: 3e4, poisson: 0.3, density: 250.0 };
+//! let cube = SoftBodyBuilder::new("cube", &Shape::cuboid(Vec3::repeat(0.05)), bread)
+//!     .resolution(3)
+//!     .pose(Pose::translation(0.0, 0.0, 0.03))
+//!     .insert(&mut world)?;
+//!
+//! for _ in 0..90 {
+//!     world.step()?;
+//! }
+//! let cube = world.soft(cube);
+//! assert!((cube.state.centre().z - 0.025).abs() < 1e-3);
+//! assert!(cube.state.max_speed() < 1e-3);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! Two plates squeeze it by a fifth, and the force on each is read:
+//!
+//! ```
+//! use softvt::{
+//!     geometry::{Pose, Vec3, shape::Shape},
+//!     physics::{PhysicsParams, World, contact::Friction, fem::ElasticMaterial, world::SoftBodyBuilder},
+//! };
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let mut world = World::new(PhysicsParams::default(), Vec3::zeros());
+//! let bread = ElasticMaterial { youngs_pa: 3e4, poisson: 0.0, density: 250.0 };
+//! let cube = SoftBodyBuilder::new("cube", &Shape::cuboid(Vec3::repeat(0.05)), bread)
+//!     .resolution(3)
+//!     .friction(Friction::NONE)
+//!     .insert(&mut world)?;
+//! let plate = Shape::cuboid(Vec3::new(0.01, 0.08, 0.08));
+//! let plates = [-1.0, 1.0].map(|side| {
+//!     let frame = world.add_kinematic(Pose::translation(side * 0.031, 0.0, 0.0));
+//!     let collider = world.add_shape("plate", frame, Pose::identity(), &plate, Friction::NONE);
+//!     (side, frame, collider)
+//! });
+//!
+//! for step in 1..=90 {
+//!     for (side, frame, _) in plates {
+//!         let closed = 0.006 * (f64::from(step) / 60.0).min(1.0);
+//!         world.move_kinematic(frame, Pose::translation(side * (0.031 - closed), 0.0, 0.0));
+//!     }
+//!     world.step()?;
+//! }
+//! // Without friction and lateral strain the stress is uniform: E A ε = 3e4 × 0.05² × 0.2 = 15 N.
+//! let force = world.contact(cube, plates[0].2).normal_force;
+//! assert!((force / 15.0 - 1.0).abs() < 0.05, "{force} N");
+//! # Ok(())
+//! # }
+//! ```
 
 mod assemble;
-mod bounds;
 mod build;
-mod energy;
-mod frame;
+mod contact_points;
+mod divergence;
 mod integrate;
-mod overlap;
-mod points;
-mod rigid_rows;
+mod penetration;
+mod rigid_contacts;
 mod sleep;
-mod sliding;
-mod soft_rows;
-
-use std::sync::Arc;
+mod snapshot;
+mod soft_contacts;
+mod state;
 
 use crate::{
-    geometry::{Mat3, Pose, Vec3},
+    geometry::{Pose, Vec3},
     physics::{
-        contact::{Candidate, Collider, ColliderId, Friction, Layer, Memory, Moving, Partner, Surface},
-        fem::{SoftBody, system::System},
-        joints::{self, Tree, TreeState},
-        params::Params,
-        rigid::RigidBody,
-        solver::{Problem, Solver, Stats},
+        contact::{Collider, ColliderMotion, DetectionLimits},
+        ids::{ArticulationId, ColliderId, ContactPartner, KinematicId, LinkId, RigidId, SoftId},
+        params::PhysicsParams,
+        solver::{ContactProblem, Solver, SolverStats},
     },
 };
 
-pub use frame::{ContactPatch, Frame, Movable, PatchPoint, Presser, Touch};
-pub use overlap::Overlap;
+pub use build::{BodyError, RigidBodyBuilder, SoftBodyBuilder};
+pub use penetration::Penetration;
+pub use snapshot::{ContactPatch, ContactSummary, Energy, Frame, PatchPoint, SampleFace};
+pub use state::{Articulation, BodyContact, JointDrive, KinematicFrame, RigidBody, SoftBody};
 
-/// A soft body in the world.
-#[derive(Clone, Debug)]
-pub struct Soft {
-    /// Name, for messages and logs.
-    pub name: String,
-    /// The body.
-    pub body: SoftBody,
-    /// Friction of its surface.
-    pub friction: Friction,
-    /// Compliance of its surface.
-    pub layer: Layer,
-    /// Its surface at rest, object frame, as other soft bodies feel it; without one they do not.
-    pub surface: Option<Arc<dyn Surface>>,
-    /// Whether it sleeps: it neither moves nor costs anything until something touches it.
-    pub asleep: bool,
-    /// Least det F of its filled elements after the last step, and where.
-    pub min_det_f: (f64, usize),
-    /// What touched it in the last step in which it was awake, by [`Partner::id`](crate::physics::contact::Partner::id).
-    pub touches: Vec<(u32, Touch)>,
-    system: System,
-    memory: Memory,
-    /// Steps taken awake; memory and kept nodes count in these.
-    steps: u64,
-    slow_for: f64,
-    inverted_for: f64,
-}
-
-/// A free rigid body in the world.
-#[derive(Clone, Debug)]
-pub struct Rigid {
-    /// Name, for messages and logs.
-    pub name: String,
-    /// The body.
-    pub body: RigidBody,
-    /// Whether it sleeps: it stands still, as if it were part of the world, until something stirs near it.
-    pub asleep: bool,
-    /// What touched it in the last step in which it was awake, by [`Partner::id`](crate::physics::contact::Partner::id).
-    pub touches: Vec<(u32, Touch)>,
-    slow_for: f64,
-}
-
-/// A PD drive on one joint: force `clamp(kp (target − q) + kd (target_velocity − v), ±effort)`, solved with everything else.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Drive {
-    /// Stiffness, N m/rad or N/m.
-    pub kp: f64,
-    /// Damping, N m s/rad or N s/m.
-    pub kd: f64,
-    /// Target position, rad or m.
-    pub target: f64,
-    /// Target velocity, rad/s or m/s.
-    pub target_velocity: f64,
-    /// Effort limit, N m or N.
-    pub effort: f64,
-    /// Force of the last step, N m or N.
-    pub force: f64,
-}
-
-/// Dry friction of a joint as a stiff spring that gives way at the friction: a joint that sticks does not creep.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Bristle {
-    /// Where the spring is free, rad or m.
-    from: f64,
-    /// Its stiffness in the last step, N m/rad or N/m.
-    stiffness: f64,
-}
-
-/// A joint tree in the world.
-#[derive(Clone, Debug)]
-pub struct Articulation {
-    /// Name, for messages and logs.
-    pub name: String,
-    /// The mechanism.
-    pub tree: Tree,
-    /// Its coordinates and velocities.
-    pub state: TreeState,
-    /// One drive a joint, if it has one.
-    pub drives: Vec<Option<Drive>>,
-    /// Whether gravity acts on its links (off for an arm whose controller compensates it).
-    pub gravity: bool,
-    /// Whether it sleeps: its links stand still, as if they were part of the world, until something stirs near them. One
-    /// with a drive never does.
-    pub asleep: bool,
-    slow_for: f64,
-    /// Dry friction of each joint.
-    bristles: Vec<Bristle>,
-    poses: Vec<Pose>,
-    scratch: joints::Scratch,
-}
-
-impl Articulation {
-    /// Link frames in the world.
-    pub fn poses(&self) -> &[Pose] {
-        &self.poses
-    }
-
-    /// Whether any joint has a drive.
-    pub fn is_driven(&self) -> bool {
-        self.drives.iter().any(Option::is_some)
-    }
-}
-
-/// A frame whose motion is prescribed.
-#[derive(Clone, Copy, Debug)]
-pub struct Kinematic {
-    /// Where it is.
-    pub pose: Pose,
-    /// Where it will be after the next step.
-    pub next: Pose,
-}
-
-/// Why a step could not be taken; the run is invalid from then on.
+/// Why a step is invalid. The state of the world is void afterwards; nothing is repaired silently.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum StepFailure {
     /// The contact solve did not converge.
-    #[error("contact solve did not converge at step {step} (residual {excess:.1e} times the tolerance)")]
+    #[error(
+        "contact solve did not converge at step {step} (residual {residual_ratio:.1e} times the tolerance)"
+    )]
     Diverged {
         /// Step, counted from 1.
         step: u64,
         /// Residual over tolerance.
-        excess: f64,
+        residual_ratio: f64,
     },
-    /// A position is not a number any more.
+    /// A node position is NaN or infinite.
     #[error("node {node} of {body} is not finite at step {step}")]
     NotFinite {
         /// Step, counted from 1.
         step: u64,
-        /// Body name.
+        /// Name of the body.
         body: String,
-        /// Node index.
+        /// Index of the node.
         node: usize,
     },
-    /// The velocity system of a body is not positive definite.
+    /// The velocity system of a soft body is not positive definite.
     #[error("the system of {body} is not positive definite at step {step}")]
     Indefinite {
         /// Step, counted from 1.
         step: u64,
-        /// Body name.
+        /// Name of the body.
         body: String,
     },
-    /// Something is faster than anything in a scene can be.
-    #[error("{body} moves at {speed:.1} m/s at step {step}, beyond the {most} m/s of a valid state")]
-    TooFast {
+    /// A body is faster than [`PhysicsParams::max_speed`].
+    #[error("{body} moves at {speed:.1} m/s at step {step}, beyond the {limit} m/s of a valid state")]
+    SpeedLimitExceeded {
         /// Step, counted from 1.
         step: u64,
-        /// Body name.
+        /// Name of the body.
         body: String,
-        /// The node, of a soft body.
+        /// Index of the node, for a soft body.
         node: Option<usize>,
-        /// Its speed, m/s.
+        /// Speed, m/s.
         speed: f64,
-        /// [`Params::most_speed`].
-        most: f64,
+        /// The limit, m/s.
+        limit: f64,
     },
-    /// A soft body is touched with a force that neither its momentum nor its stress explains.
+    /// Contact forces on a soft body exceed what momentum change and material stress can balance.
     #[error(
-        "{body} is touched with {force:.1e} N at step {step}, beyond the {most:.1e} N that its mass and stress explain"
+        "{body} is touched with {force:.1e} N at step {step}, beyond the {limit:.1e} N that its mass and stress explain"
     )]
-    TooHard {
+    ForceLimitExceeded {
         /// Step, counted from 1.
         step: u64,
-        /// Body name.
+        /// Name of the body.
         body: String,
         /// Sum of the normal forces on it, N.
         force: f64,
-        /// What is the most, N.
-        most: f64,
+        /// The limit, N.
+        limit: f64,
     },
-    /// An element stayed inverted.
+    /// An element was inverted for longer than [`PhysicsParams::max_inverted_time`].
     #[error("inverted: element {element} of {body} has been inside out for over {seconds} s at step {step}")]
     Inverted {
         /// Step, counted from 1.
         step: u64,
-        /// Body name.
+        /// Name of the body.
         body: String,
-        /// Element index.
+        /// Index of the element.
         element: usize,
-        /// The tolerated time, s.
+        /// The limit, s.
         seconds: f64,
     },
 }
 
 impl StepFailure {
-    /// Name of the body that it was seen at, if there is one.
+    /// Name of the body at which the failure was found, if there is one.
     pub fn body(&self) -> Option<&str> {
         match self {
             Self::Diverged { .. } => None,
             Self::NotFinite { body, .. }
             | Self::Indefinite { body, .. }
-            | Self::TooFast { body, .. }
-            | Self::TooHard { body, .. }
+            | Self::SpeedLimitExceeded { body, .. }
+            | Self::ForceLimitExceeded { body, .. }
             | Self::Inverted { body, .. } => Some(body),
         }
     }
 }
 
-/// What a row of the problem is about.
-#[derive(Clone, Copy, Debug)]
-struct RowOf {
-    soft: usize,
-    candidate: Candidate,
-    partner: u32,
-    anchor: Vec3,
-    travel: f64,
-    /// Takes small vectors of the world to the frame of the anchor.
-    pull: Mat3,
-}
-
-/// All bodies of a scene and how they stand.
+/// All bodies and colliders of a scene, their state, and the buffers of the step.
+///
+/// Objects are added, never removed, so that identifiers stay valid. A clone is an independent world that continues
+/// identically: a step depends on nothing else, and its results are the same bits on every machine.
 #[derive(Clone, Debug, Default)]
 pub struct World {
-    /// Parameters.
-    pub params: Params,
-    /// Gravity, m/s².
+    /// Parameters. They may be changed between steps.
+    pub params: PhysicsParams,
+    /// Gravity, m/s². It may be changed between steps.
     pub gravity: Vec3,
-    /// Steps taken.
-    pub step: u64,
-    /// Soft bodies.
-    pub soft: Vec<Soft>,
-    /// Free rigid bodies.
-    pub rigid: Vec<Rigid>,
-    /// Joint trees.
-    pub trees: Vec<Articulation>,
-    /// Prescribed frames.
-    pub kinematic: Vec<Kinematic>,
-    /// What the last solve took.
-    pub stats: Stats,
+    step: u64,
+    soft: Vec<SoftBody>,
+    rigid: Vec<RigidBody>,
+    articulations: Vec<Articulation>,
+    kinematic: Vec<KinematicFrame>,
     colliders: Vec<Collider>,
-    moving: Vec<Moving>,
-    problem: Problem,
+    stats: SolverStats,
+    // Data of the current step, in buffers that are reused.
+    motions: Vec<ColliderMotion>,
+    problem: ContactProblem,
     solver: Solver,
-    rows: Vec<RowOf>,
-    candidates: Vec<(usize, ColliderId, Candidate)>,
-    pressing: Vec<soft_rows::Press>,
-    rigid_contacts: rigid_rows::RigidContacts,
-    layout: assemble::Layout,
+    blocks: assemble::BlockMap,
+    candidates: soft_contacts::Candidates,
+    rows: Vec<soft_contacts::SoftRow>,
+    rigid_contacts: rigid_contacts::RigidContacts,
 }
 
 impl World {
-    /// Advances everything by one time step.
-    ///
-    /// # Errors
-    /// [`StepFailure`]: the state is then void, nothing is repaired behind the caller's back.
-    pub fn step(&mut self) -> Result<(), StepFailure> {
-        self.step += 1;
-        self.place_colliders();
-        self.wake();
-        self.detect();
-        self.detect_pressing();
-        self.assemble()?;
-        let solved = self.solver.solve(&mut self.problem);
-        self.stats = solved.map_err(|f| StepFailure::Diverged { step: self.step, excess: f.excess })?;
-        self.integrate();
-        self.remember();
-        self.remember_rigid();
-        self.fall_asleep();
-        self.check()
+    /// An empty world with gravity in m/s².
+    pub fn new(params: PhysicsParams, gravity: Vec3) -> Self {
+        Self { params, gravity, ..Self::default() }
     }
 
-    /// Seconds since the start.
+    /// Advances everything by one time step of [`PhysicsParams::dt`].
+    ///
+    /// # Errors
+    /// [`StepFailure`]: the state is void from then on.
+    pub fn step(&mut self) -> Result<(), StepFailure> {
+        self.step += 1;
+        self.update_collider_motions();
+        self.wake_disturbed();
+        self.detect_soft_collider();
+        self.detect_soft_soft();
+        self.assemble()?;
+        let solved = self.solver.solve(&mut self.problem);
+        self.stats = solved
+            .map_err(|f| StepFailure::Diverged { step: self.step, residual_ratio: f.residual_ratio })?;
+        self.integrate();
+        self.record_contacts();
+        self.update_soft_history();
+        self.update_rigid_history();
+        self.put_resting_to_sleep();
+        self.check_state()
+    }
+
+    /// Number of steps taken.
+    pub fn step_count(&self) -> u64 {
+        self.step
+    }
+
+    /// Simulated time, s.
     pub fn time(&self) -> f64 {
         self.step as f64 * self.params.dt
     }
 
-    /// Name of a partner of a [`Touch`].
-    pub fn partner_name(&self, partner: u32) -> &str {
-        match Partner::of(partner) {
-            Partner::Collider(id) => &self.colliders[id].name,
-            Partner::Soft(index) => &self.soft[index].name,
-        }
+    /// Iteration counts of the last solve.
+    pub fn stats(&self) -> SolverStats {
+        self.stats
     }
 
-    /// The colliders, by id.
+    /// All soft bodies, in the order of their identifiers.
+    pub fn soft_bodies(&self) -> &[SoftBody] {
+        &self.soft
+    }
+
+    /// All free rigid bodies, in the order of their identifiers.
+    pub fn rigid_bodies(&self) -> &[RigidBody] {
+        &self.rigid
+    }
+
+    /// All articulations, in the order of their identifiers.
+    pub fn articulations(&self) -> &[Articulation] {
+        &self.articulations
+    }
+
+    /// All colliders, in the order of their identifiers.
     pub fn colliders(&self) -> &[Collider] {
         &self.colliders
     }
-}
 
-impl Soft {
-    /// How many nodes the contact solve keeps at present.
-    pub fn kept(&self) -> usize {
-        self.system.kept().len()
+    /// A soft body.
+    pub fn soft(&self, id: SoftId) -> &SoftBody {
+        &self.soft[id.index()]
     }
 
-    /// How often the body's system was factored.
-    pub fn refills(&self) -> u64 {
-        self.system.refills
+    /// A soft body, to change its state or friction.
+    pub fn soft_mut(&mut self, id: SoftId) -> &mut SoftBody {
+        &mut self.soft[id.index()]
+    }
+
+    /// A free rigid body.
+    pub fn rigid(&self, id: RigidId) -> &RigidBody {
+        &self.rigid[id.index()]
+    }
+
+    /// A free rigid body, to change its state.
+    pub fn rigid_mut(&mut self, id: RigidId) -> &mut RigidBody {
+        &mut self.rigid[id.index()]
+    }
+
+    /// An articulation.
+    pub fn articulation(&self, id: ArticulationId) -> &Articulation {
+        &self.articulations[id.index()]
+    }
+
+    /// An articulation, to change its state or drives.
+    pub fn articulation_mut(&mut self, id: ArticulationId) -> &mut Articulation {
+        &mut self.articulations[id.index()]
+    }
+
+    /// Link frame of a link after the last step, world.
+    pub fn link_pose(&self, id: LinkId) -> &Pose {
+        &self.articulation(id.articulation).poses[id.index]
+    }
+
+    /// A kinematic frame.
+    pub fn kinematic(&self, id: KinematicId) -> &KinematicFrame {
+        &self.kinematic[id.index()]
+    }
+
+    /// A collider.
+    pub fn collider(&self, id: ColliderId) -> &Collider {
+        &self.colliders[id.index()]
+    }
+
+    /// Name of a collider or soft body.
+    pub fn partner_name(&self, partner: ContactPartner) -> &str {
+        match partner {
+            ContactPartner::Collider(id) => &self.collider(id).name,
+            ContactPartner::Soft(id) => &self.soft(id).name,
+        }
+    }
+
+    fn detection_limits(&self) -> DetectionLimits {
+        DetectionLimits { dt: self.params.dt, margin: self.params.margin, reach: assemble::RETAIN_DISTANCE }
     }
 }

@@ -1,187 +1,206 @@
-//! Sleeping: a body that rests costs nothing until something that moves comes near.
+//! Sleep: a body at rest costs nothing until something moves near it.
 
 use super::World;
 use crate::{
     geometry::{Aabb, Vec3},
-    physics::contact::{Mover, Partner},
+    physics::ids::{BodyId, ColliderId, ContactPartner, SoftId},
 };
 
-/// Speed above which a link or a prescribed frame wakes what it touches, m/s (and rad/s at a lever of 1 m).
-const STIRRING: f64 = 1e-5;
-/// Distance at which it does, m.
-const NEAR: f64 = 3e-3;
+/// Speed above which a driven link or a kinematic frame wakes bodies near it, m/s (and rad/s at a lever of 1 m).
+const WAKING_SPEED: f64 = 1e-5;
+/// Distance within which it does, m.
+const WAKING_DISTANCE: f64 = 3e-3;
+
+/// Bounds of something that moves.
+struct Disturbance {
+    /// The body, unless it is soft.
+    body: Option<BodyId>,
+    bounds: Aabb,
+}
+
+/// Contacts of a body as far as sleep depends on them.
+#[derive(Clone, Copy, Default)]
+struct Support {
+    /// True if the body touches anything.
+    touches: bool,
+    /// True if it touches something that keeps it awake.
+    is_disturbed: bool,
+}
 
 impl World {
     /// Wakes bodies near others that move.
-    pub(super) fn wake(&mut self) {
-        let (soft, rigid) = (self.soft.iter().any(|s| s.asleep), self.rigid.iter().any(|r| r.asleep));
-        if !soft && !rigid && !self.trees.iter().any(|t| t.asleep) {
+    pub(super) fn wake_disturbed(&mut self) {
+        let soft_asleep = self.soft.iter().any(|s| s.is_asleep());
+        let rigid_asleep = self.rigid.iter().any(|r| r.is_asleep());
+        if !soft_asleep && !rigid_asleep && !self.articulations.iter().any(|a| a.is_asleep()) {
             return;
         }
-        let stirring = self.stirring();
-        for soft in self.soft.iter_mut().filter(|s| s.asleep) {
-            let Some(around) = Aabb::from_points(&soft.body.x) else { continue };
-            let around = around.loosened(NEAR);
-            if stirring.iter().any(|(_, bounds)| around.intersects(bounds)) {
-                soft.asleep = false;
-                soft.slow_for = 0.0;
+        let disturbances = self.disturbances();
+        for soft in self.soft.iter_mut().filter(|s| s.sleep.is_asleep) {
+            let Some(around) = Aabb::from_points(&soft.state.x) else { continue };
+            let around = around.loosened(WAKING_DISTANCE);
+            if disturbances.iter().any(|disturbance| around.intersects(&disturbance.bounds)) {
+                soft.sleep.wake();
             }
         }
-        for index in 0..self.rigid.len() {
-            if !self.rigid[index].asleep {
+        for id in self.rigid_ids() {
+            if !self.rigid(id).is_asleep() {
                 continue;
             }
-            let near = self.is_near(&stirring, |mover| mover == Mover::Rigid(index));
-            let body = &self.rigid[index].body;
-            // Somebody may have given it a push.
-            if near || body.v != Vec3::zeros() || body.w != Vec3::zeros() {
-                let rigid = &mut self.rigid[index];
-                (rigid.asleep, rigid.slow_for) = (false, 0.0);
+            let is_near = self.is_near(&disturbances, |body| body == BodyId::Rigid(id));
+            let state = &self.rigid(id).state;
+            // A velocity may have been set from outside.
+            if is_near || state.v != Vec3::zeros() || state.w != Vec3::zeros() {
+                self.rigid[id.index()].sleep.wake();
             }
         }
-        for index in 0..self.trees.len() {
-            if !self.trees[index].asleep {
+        for id in self.articulation_ids() {
+            if !self.articulation(id).is_asleep() {
                 continue;
             }
-            let near = self.is_near(&stirring, is_link_of(index));
-            let tree = &mut self.trees[index];
-            if near || tree.is_driven() || tree.state.v.iter().any(|&v| v != 0.0) {
-                (tree.asleep, tree.slow_for) = (false, 0.0);
+            let is_near = self.is_near(&disturbances, |body| body.is_link_of(id));
+            let articulation = &mut self.articulations[id.index()];
+            if is_near || articulation.is_driven() || articulation.state.v.iter().any(|&v| v != 0.0) {
+                articulation.sleep.wake();
             }
         }
     }
 
-    /// Whether any collider on movers that are `own` is near something else that stirs.
-    fn is_near(&self, stirring: &[(Option<Mover>, Aabb)], own: impl Fn(Mover) -> bool) -> bool {
-        let mut mine = self.colliders.iter().zip(&self.moving).filter(|(c, _)| own(c.mover));
-        mine.any(|(collider, moving)| {
-            let around = collider.bounds.transformed(&moving.pose).loosened(NEAR);
-            stirring.iter().any(|(by, bounds)| !by.is_some_and(&own) && around.intersects(bounds))
+    /// True if any collider on bodies that are `own` is near a disturbance that is not.
+    fn is_near(&self, disturbances: &[Disturbance], own: impl Fn(BodyId) -> bool) -> bool {
+        let mut colliders = self.colliders.iter().zip(&self.motions).filter(|(c, _)| own(c.parent));
+        colliders.any(|(collider, motion)| {
+            let around = collider.bounds.transformed(&motion.pose).loosened(WAKING_DISTANCE);
+            disturbances.iter().any(|disturbance| {
+                !disturbance.body.is_some_and(&own) && around.intersects(&disturbance.bounds)
+            })
         })
     }
 
-    /// Everything that moves: its mover, if it is a collider, and its bounds.
-    fn stirring(&self) -> Vec<(Option<Mover>, Aabb)> {
-        let colliders = (0..self.colliders.len()).filter(|&id| self.stirs(id)).map(|id| {
-            let collider = &self.colliders[id];
-            (Some(collider.mover), collider.bounds.transformed(&self.moving[id].pose))
+    /// Bounds of everything that moves.
+    fn disturbances(&self) -> Vec<Disturbance> {
+        let ids = (0..self.colliders.len()).map(ColliderId::new);
+        let colliders = ids.filter(|&id| self.is_collider_moving(id)).map(|id| {
+            let collider = self.collider(id);
+            let bounds = collider.bounds.transformed(&self.motions[id.index()].pose);
+            Disturbance { body: Some(collider.parent), bounds }
         });
-        let soft = (0..self.soft.len())
-            .filter(|&index| self.is_lively(index))
-            .filter_map(|index| Some((None, Aabb::from_points(&self.soft[index].body.x)?)));
+        let soft = self.soft_ids().filter(|&id| self.is_soft_moving(id)).filter_map(|id| {
+            Some(Disturbance { body: None, bounds: Aabb::from_points(&self.soft(id).state.x)? })
+        });
         colliders.chain(soft).collect()
     }
 
-    /// Whether a collider moves fast enough to wake others.
-    fn stirs(&self, id: usize) -> bool {
-        let moving = &self.moving[id];
-        let least = match self.colliders[id].mover {
-            Mover::Static => f64::INFINITY,
-            Mover::Kinematic(_) => STIRRING,
-            Mover::Link { tree, .. } if self.trees[tree].is_driven() => STIRRING,
-            Mover::Rigid(_) | Mover::Link { .. } => self.params.sleep_speed,
+    /// True if a collider moves fast enough to wake others.
+    fn is_collider_moving(&self, id: ColliderId) -> bool {
+        let motion = &self.motions[id.index()];
+        let threshold = match self.collider(id).parent {
+            BodyId::World | BodyId::Soft(_) => f64::INFINITY,
+            BodyId::Kinematic(_) => WAKING_SPEED,
+            BodyId::Link(link) if self.articulation(link.articulation).is_driven() => WAKING_SPEED,
+            BodyId::Rigid(_) | BodyId::Link(_) => self.params.sleep_speed,
         };
-        moving.linear.norm() + moving.angular.norm() > least
+        motion.linear.norm() + motion.angular.norm() > threshold
     }
 
-    /// Whether a body that touches a collider must stay awake. What a driven link holds does so even if it is still: the
-    /// link needs its force at every step, and so does the sensor on it.
-    fn keeps_awake(&self, id: usize) -> bool {
-        let driven = match self.colliders[id].mover {
-            Mover::Link { tree, .. } => self.trees[tree].is_driven(),
+    /// True if a body that touches a collider must stay awake.
+    ///
+    /// A driven link keeps a body awake even while both are still: the link needs the body's force in every step, and so does
+    /// the sensor on it.
+    fn keeps_awake(&self, id: ColliderId) -> bool {
+        let is_driven = match self.collider(id).parent {
+            BodyId::Link(link) => self.articulation(link.articulation).is_driven(),
             _ => false,
         };
-        driven || self.stirs(id)
+        is_driven || self.is_collider_moving(id)
     }
 
-    /// Whether a soft body moves fast enough to wake others.
-    fn is_lively(&self, soft: usize) -> bool {
-        let soft = &self.soft[soft];
-        !soft.asleep && soft.body.max_speed() > self.params.sleep_speed
+    /// True if a soft body moves fast enough to wake others.
+    fn is_soft_moving(&self, id: SoftId) -> bool {
+        let soft = self.soft(id);
+        !soft.is_asleep() && soft.state.max_speed() > self.params.sleep_speed
     }
 
-    /// Lets bodies fall asleep that have been slow, and touched nothing lively, for long enough.
-    pub(super) fn fall_asleep(&mut self) {
+    /// Puts bodies to sleep that were slow, and touched nothing that moves, for long enough.
+    pub(super) fn put_resting_to_sleep(&mut self) {
         if !self.params.sleeping {
             return;
         }
-        let (dt, after) = (self.params.dt, self.params.sleep_after);
-        for index in 0..self.soft.len() {
-            if self.soft[index].asleep {
+        let (dt, delay) = (self.params.dt, self.params.sleep_delay);
+        for id in self.soft_ids() {
+            if self.soft(id).is_asleep() {
                 continue;
             }
-            let (touches, stirred) = self.company_of_soft(index);
-            let moved = stirred || self.is_lively(index);
-            let soft = &mut self.soft[index];
-            soft.slow_for = if moved { 0.0 } else { soft.slow_for + dt };
-            if soft.slow_for >= after && touches {
-                soft.asleep = true;
-                soft.body.v.iter_mut().for_each(|v| *v = Vec3::zeros());
+            let support = self.soft_support(id);
+            let moved = support.is_disturbed || self.is_soft_moving(id);
+            let soft = &mut self.soft[id.index()];
+            soft.sleep.slow_time = if moved { 0.0 } else { soft.sleep.slow_time + dt };
+            if soft.sleep.slow_time >= delay && support.touches {
+                soft.sleep.is_asleep = true;
+                soft.state.v.iter_mut().for_each(|v| *v = Vec3::zeros());
             }
         }
-        for index in 0..self.rigid.len() {
-            if self.rigid[index].asleep {
+        for id in self.rigid_ids() {
+            if self.rigid(id).is_asleep() {
                 continue;
             }
-            let (touches, stirred) = self.company_of(|mover| mover == Mover::Rigid(index));
-            let rigid = &mut self.rigid[index];
-            let moved = stirred || rigid.body.v.norm() + rigid.body.w.norm() > self.params.sleep_speed;
-            rigid.slow_for = if moved { 0.0 } else { rigid.slow_for + dt };
-            if rigid.slow_for >= after && touches {
-                rigid.asleep = true;
-                (rigid.body.v, rigid.body.w) = (Vec3::zeros(), Vec3::zeros());
+            let support = self.rigid_support(|body| body == BodyId::Rigid(id));
+            let rigid = &mut self.rigid[id.index()];
+            let moved =
+                support.is_disturbed || rigid.state.v.norm() + rigid.state.w.norm() > self.params.sleep_speed;
+            rigid.sleep.slow_time = if moved { 0.0 } else { rigid.sleep.slow_time + dt };
+            if rigid.sleep.slow_time >= delay && support.touches {
+                rigid.sleep.is_asleep = true;
+                (rigid.state.v, rigid.state.w) = (Vec3::zeros(), Vec3::zeros());
             }
         }
-        for index in 0..self.trees.len() {
-            if self.trees[index].asleep || self.trees[index].is_driven() {
+        for id in self.articulation_ids() {
+            if self.articulation(id).is_asleep() || self.articulation(id).is_driven() {
                 continue;
             }
-            let stirred = self.company_of(is_link_of(index)).1;
-            let tree = &mut self.trees[index];
-            let moved = stirred || tree.state.v.amax() > self.params.sleep_speed;
-            tree.slow_for = if moved { 0.0 } else { tree.slow_for + dt };
-            if tree.slow_for >= after {
-                tree.asleep = true;
-                tree.state.v.fill(0.0);
+            let support = self.rigid_support(|body| body.is_link_of(id));
+            let articulation = &mut self.articulations[id.index()];
+            let moved = support.is_disturbed || articulation.state.v.amax() > self.params.sleep_speed;
+            articulation.sleep.slow_time = if moved { 0.0 } else { articulation.sleep.slow_time + dt };
+            if articulation.sleep.slow_time >= delay {
+                articulation.sleep.is_asleep = true;
+                articulation.state.v.fill(0.0);
             }
         }
     }
 
-    /// Whether a soft body touches anything, and anything that moves.
-    fn company_of_soft(&self, index: usize) -> (bool, bool) {
-        let mut company = (false, false);
+    /// Contacts of a soft body.
+    fn soft_support(&self, id: SoftId) -> Support {
+        let mut support = Support::default();
         for row in &self.rows {
-            let partner = match Partner::of(row.partner) {
-                _ if row.soft == index => Partner::of(row.partner),
-                Partner::Soft(other) if other == index => Partner::Soft(row.soft),
+            let partner = match row.partner {
+                partner if row.soft == id => partner,
+                ContactPartner::Soft(other) if other == id => row.soft.into(),
                 _ => continue,
             };
-            company.0 = true;
-            company.1 |= match partner {
-                Partner::Collider(id) => self.keeps_awake(id),
-                Partner::Soft(other) => self.is_lively(other),
+            support.touches = true;
+            support.is_disturbed |= match partner {
+                ContactPartner::Collider(collider) => self.keeps_awake(collider),
+                ContactPartner::Soft(other) => self.is_soft_moving(other),
             };
         }
-        company
+        support
     }
 
-    /// The same for a rigid body or a joint tree, by its movers.
-    fn company_of(&self, own: impl Fn(Mover) -> bool) -> (bool, bool) {
-        let mut company = (false, false);
-        for id in self.touching(&own) {
-            company = (true, company.1 || self.keeps_awake(id));
+    /// Contacts of a rigid body or of the links of an articulation.
+    fn rigid_support(&self, own: impl Fn(BodyId) -> bool) -> Support {
+        let mut support = Support::default();
+        for id in self.touching_colliders(&own) {
+            support.touches = true;
+            support.is_disturbed |= self.keeps_awake(id);
         }
         for row in &self.rows {
-            let Partner::Collider(id) = Partner::of(row.partner) else { continue };
-            if own(self.colliders[id].mover) {
-                company = (true, company.1 || self.is_lively(row.soft));
+            let ContactPartner::Collider(id) = row.partner else { continue };
+            if own(self.collider(id).parent) {
+                support.touches = true;
+                support.is_disturbed |= self.is_soft_moving(row.soft);
             }
         }
-        company
+        support
     }
-}
-
-/// Whether a mover is a link of a tree.
-fn is_link_of(index: usize) -> impl Fn(Mover) -> bool {
-    move |mover| matches!(mover, Mover::Link { tree, .. } if tree == index)
 }

@@ -30,10 +30,11 @@ use crate::{
         seed::{EpisodeSeed, RandomStream, Split},
         settings::Settings,
     },
-    evaluation::deformation::ReferenceShape,
+    evaluation::deformation::Reference,
     geometry::Pose,
+    physics::BodyId,
     robot::{Side, rotation},
-    rollout::{AssetCache, Kind, SensingError, SensorAssets, SensorSuite, Simulation, cancel},
+    rollout::{AssetCache, SensingError, SensorAssets, SensorSuite, Simulation, cancel},
     sensing::tactile::{MarkerStyle, PadLoad, Places},
 };
 
@@ -53,7 +54,7 @@ struct Inner {
 const BYTES_A_SIMULATION: usize = 4 << 20;
 
 struct Watched {
-    reference: Option<ReferenceShape>,
+    reference: Option<Reference>,
     d_peak: f64,
     start_z: f64,
 }
@@ -121,7 +122,7 @@ fn simulate(
     let _honest_work = clock.pause();
     let mut sim = Simulation::new(scene, &settings.physics, &settings.robot, cache)
         .map_err(|e| fail(lua, format!("softvt.simulate: {e}")))?;
-    let soft: usize = sim.world.soft.iter().map(|soft| soft.body.rest.bytes()).sum();
+    let soft: usize = sim.world.soft_bodies().iter().map(|soft| soft.state.model.bytes()).sum();
     let held = hold_in_world(lua, BYTES_A_SIMULATION + soft)?;
     sim.settle().map_err(|e| {
         let place = e.place().map_or(String::new(), |place| format!("{place}: "));
@@ -131,10 +132,10 @@ fn simulate(
         .objects
         .iter()
         .map(|object| Watched {
-            reference: match object.kind {
-                Kind::Soft(i) => {
-                    let body = &sim.world.soft[i].body;
-                    ReferenceShape::new(&body.x, &body.rest.mass).ok()
+            reference: match object.body {
+                BodyId::Soft(i) => {
+                    let body = &sim.world.soft(i).state;
+                    Reference::new(&body.x, &body.model.mass).ok()
                 }
                 _ => None,
             },
@@ -200,9 +201,9 @@ impl Inner {
     }
 }
 
-fn deformation(sim: &Simulation, object: usize, reference: &Option<ReferenceShape>) -> Option<f64> {
-    let Kind::Soft(index) = sim.objects[object].kind else { return None };
-    reference.as_ref()?.measure(&sim.world.soft[index].body.x).ok().map(|d| d.rms_pct)
+fn deformation(sim: &Simulation, object: usize, reference: &Option<Reference>) -> Option<f64> {
+    let BodyId::Soft(index) = sim.objects[object].body else { return None };
+    reference.as_ref()?.measure(&sim.world.soft(index).state.x).ok().map(|d| d.rms_pct)
 }
 
 /// An expert that runs in the machine that drives it.
@@ -320,17 +321,17 @@ impl LuaSimulation {
         table.set("joint", sim.joint(object))?;
         let joints = sim.parts(index).map(|(handle, part)| (part.name.as_str(), sim.joint(handle)));
         table.set("joints", lua.create_table_from(joints)?)?;
-        if object.kind.movable().is_some() {
+        if object.body.is_free() {
             let touch = sim.pad_contacts(object);
             table.set("pad_force", lua.create_sequence_from(touch.map(|t| t.normal_force))?)?;
             table.set("slip_mm", lua.create_sequence_from(touch.map(|t| 1e3 * t.travel))?)?;
         }
-        if let Kind::Soft(soft) = object.kind {
-            let body = &sim.world.soft[soft];
+        if let BodyId::Soft(soft) = object.body {
+            let body = sim.world.soft(soft);
             table.set("d_pct", deformation(sim, index, &watched.reference))?;
             table.set("d_peak_pct", watched.d_peak)?;
-            table.set("min_det_f", finite(body.min_det_f.0))?;
-            table.set("asleep", body.asleep)?;
+            table.set("min_det_f", finite(body.min_det_f().det_f))?;
+            table.set("asleep", body.is_asleep())?;
         }
         Ok(table)
     }

@@ -17,13 +17,13 @@ use crate::script::{
     vm::{fail, locked},
 };
 use crate::{
-    evaluation::deformation::{Deformation, ReferenceShape},
+    evaluation::deformation::{Deformation, Reference},
     geometry::{Pose, Quat, Vec3},
     physics::{
-        Params, World,
-        contact::{Collider, Friction, Mover},
-        fem::Rest,
-        world::{StepFailure, Touch},
+        BodyId, ColliderId, KinematicId, PhysicsParams, SoftId, World,
+        contact::Friction,
+        fem::FemModel,
+        world::{ContactSummary, StepFailure},
     },
     rollout::{cancel, soft_rest},
     scene::SoftMaterial,
@@ -32,7 +32,7 @@ use crate::{
 /// A world, its references and its timing.
 struct Inner {
     world: World,
-    references: Vec<ReferenceShape>,
+    references: Vec<Reference>,
     failed: Option<StepFailure>,
     newton: (u64, u32),
     timing: Timing,
@@ -54,12 +54,12 @@ pub(crate) fn install(lua: &Lua, api: &Table, clock: &Clock) -> mlua::Result<()>
         let given = if value.is_nil() { Value::Table(lua.create_table()?) } else { value };
         let spec = schema::checked(lua, &records::WORLD, &given)?;
         let gravity: Option<[f64; 3]> = spec.get("gravity")?;
-        let params = Params {
+        let params = PhysicsParams {
             dt: spec.get("dt")?,
-            alpha: spec.get("alpha")?,
-            beta: spec.get("beta_s")?,
+            rayleigh_mass: spec.get("alpha")?,
+            rayleigh_stiffness: spec.get("beta_s")?,
             sleeping: spec.get("sleeping")?,
-            ..Params::default()
+            ..PhysicsParams::default()
         };
         let gravity = gravity.map_or(Vec3::new(0.0, 0.0, -9.81), Vec3::from);
         Ok(LuaWorld(Arc::new(Mutex::new(Inner {
@@ -101,19 +101,19 @@ impl LuaWorld {
         };
         let name: String = spec.get("name")?;
         let mut inner = locked(&self.0);
-        let rest: Arc<Rest> = {
+        let rest: Arc<FemModel> = {
             let _honest_work = inner.clock.pause();
             soft_rest(&name, shape.shape(), &material).map_err(|e| fail(lua, format!("world:soft: {e}")))?
         };
         let held = hold_in_world(lua, rest.bytes())?;
-        let reference = ReferenceShape::new(&rest.mesh.nodes, &rest.mass)
+        let reference = Reference::new(&rest.mesh.nodes, &rest.mass)
             .map_err(|e| fail(lua, format!("world:soft: {e}")))?;
         let friction = friction(spec)?;
         let at = pose(spec.get("xyz")?, spec.get("turn")?);
-        let index = inner.world.add_soft(&name, rest, Some(Arc::new(shape.shape().clone())), &at, friction);
+        let id = inner.world.add_soft(&name, rest, Some(Arc::new(shape.shape().clone())), &at, friction);
         inner.references.push(reference);
         inner.held.push(held);
-        Ok(LuaBody { world: self.0.clone(), index })
+        Ok(LuaBody { world: self.0.clone(), id })
     }
 
     fn solid(&self, lua: &Lua, spec: &Table, moves: bool) -> mlua::Result<LuaSolid> {
@@ -125,20 +125,12 @@ impl LuaWorld {
         let mut inner = locked(&self.0);
         inner.held.push(held);
         let world = &mut inner.world;
-        let layer = world.rigid_layer();
-        let (kinematic, placed) = if moves {
-            let index = world.add_kinematic(at);
-            (Some(index), (Mover::Kinematic(index), Pose::identity()))
-        } else {
-            (None, (Mover::Static, at))
+        let kinematic = moves.then(|| world.add_kinematic(at));
+        let (parent, pose) = match kinematic {
+            Some(id) => (BodyId::Kinematic(id), Pose::identity()),
+            None => (BodyId::World, at),
         };
-        let collider = world.add_collider(Collider::new(
-            &name,
-            placed,
-            Arc::new(shape.shape().clone()),
-            friction,
-            layer,
-        ));
+        let collider = world.add_shape(&name, parent, pose, shape.shape(), friction);
         Ok(LuaSolid { world: self.0.clone(), kinematic, collider })
     }
 }
@@ -160,7 +152,7 @@ impl Hosted for LuaWorld {
         method(methods, "time", |_, this: &Self, ()| Ok(locked(&this.0).world.time()));
         method(methods, "newton", |_, this: &Self, ()| {
             let inner = locked(&this.0);
-            Ok((inner.newton.0 as f64 / inner.world.step.max(1) as f64, inner.newton.1))
+            Ok((inner.newton.0 as f64 / inner.world.step_count().max(1) as f64, inner.newton.1))
         });
         method(methods, "energy", |_, this: &Self, ()| Ok(locked(&this.0).world.energy().total()));
         method(methods, "phase", |_, this: &Self, name: String| {
@@ -186,8 +178,8 @@ fn step(lua: &Lua, inner: &mut Inner) -> mlua::Result<MultiValue> {
         if let Err(failure) = timing.measure(dt, || world.step()) {
             inner.failed = Some(failure);
         }
-        inner.newton.0 += u64::from(inner.world.stats.newton);
-        inner.newton.1 = inner.newton.1.max(inner.world.stats.newton_max);
+        inner.newton.0 += u64::from(inner.world.stats().newton);
+        inner.newton.1 = inner.newton.1.max(inner.world.stats().newton_max);
     }
     let message = match &inner.failed {
         None => Value::Nil,
@@ -200,29 +192,31 @@ fn step(lua: &Lua, inner: &mut Inner) -> mlua::Result<MultiValue> {
 #[derive(Clone)]
 struct LuaBody {
     world: Shared,
-    index: usize,
+    id: SoftId,
 }
 
 impl LuaBody {
-    fn touch(&self, lua: &Lua, method: &str, solid: &LuaSolid) -> mlua::Result<Touch> {
+    fn touch(&self, lua: &Lua, method: &str, solid: &LuaSolid) -> mlua::Result<ContactSummary> {
         if !Arc::ptr_eq(&solid.world, &self.world) {
             return Err(fail(lua, format!("body:{method}: solid: expected a solid of the body's own world")));
         }
-        Ok(locked(&self.world).world.touch(self.index, solid.collider))
+        Ok(locked(&self.world).world.contact(self.id, solid.collider))
     }
 
     fn deformation(&self, lua: &Lua) -> mlua::Result<Deformation> {
         let inner = locked(&self.world);
-        let nodes = &inner.world.soft[self.index].body.x;
-        inner.references[self.index].measure(nodes).map_err(|e| fail(lua, format!("body:deformation: {e}")))
+        let nodes = &inner.world.soft(self.id).state.x;
+        inner.references[self.id.index()]
+            .measure(nodes)
+            .map_err(|e| fail(lua, format!("body:deformation: {e}")))
     }
 
     fn set_reference(&self, lua: &Lua, which: &str) -> mlua::Result<()> {
         let mut inner = locked(&self.world);
-        let body = &inner.world.soft[self.index].body;
-        let nodes = if which == "rest" { &body.rest.mesh.nodes } else { &body.x };
-        let reference = ReferenceShape::new(nodes, &body.rest.mass).map_err(|e| fail(lua, e.to_string()))?;
-        inner.references[self.index] = reference;
+        let body = &inner.world.soft(self.id).state;
+        let nodes = if which == "rest" { &body.model.mesh.nodes } else { &body.x };
+        let reference = Reference::new(nodes, &body.model.mass).map_err(|e| fail(lua, e.to_string()))?;
+        inner.references[self.id.index()] = reference;
         Ok(())
     }
 }
@@ -239,21 +233,23 @@ impl Hosted for LuaBody {
     fn methods<M: UserDataMethods<Self>>(methods: &mut M) {
         let list = |lua: &Lua, v: &Vec3| lua.create_sequence_from(v.iter().copied());
         method(methods, "centre", move |lua, this: &Self, ()| {
-            list(lua, &locked(&this.world).world.soft[this.index].body.centre())
+            list(lua, &locked(&this.world).world.soft(this.id).state.centre())
         });
         method(methods, "velocity", move |lua, this: &Self, ()| {
-            list(lua, &locked(&this.world).world.soft[this.index].body.velocity())
+            list(lua, &locked(&this.world).world.soft(this.id).state.velocity())
         });
         method(methods, "speed", |_, this: &Self, ()| {
-            Ok(locked(&this.world).world.soft[this.index].body.max_speed())
+            Ok(locked(&this.world).world.soft(this.id).state.max_speed())
         });
         method(methods, "mass", |_, this: &Self, ()| {
-            Ok(locked(&this.world).world.soft[this.index].body.rest.total_mass())
+            Ok(locked(&this.world).world.soft(this.id).state.model.total_mass())
         });
         method(methods, "min_det_f", |_, this: &Self, ()| {
-            Ok(finite(locked(&this.world).world.soft[this.index].min_det_f.0))
+            Ok(finite(locked(&this.world).world.soft(this.id).min_det_f().det_f))
         });
-        method(methods, "asleep", |_, this: &Self, ()| Ok(locked(&this.world).world.soft[this.index].asleep));
+        method(methods, "asleep", |_, this: &Self, ()| {
+            Ok(locked(&this.world).world.soft(this.id).is_asleep())
+        });
         method(methods, "deformation", |lua, this: &Self, ()| {
             let d = this.deformation(lua)?;
             lua.create_table_from([
@@ -280,7 +276,7 @@ fn touches<M: UserDataMethods<LuaBody>>(methods: &mut M) {
     });
     method(methods, "slipping", |lua, this: &LuaBody, solid: Of| {
         let touch = this.touch(lua, "slipping", &solid)?;
-        Ok(touch.slipping as f64 / touch.samples.max(1) as f64)
+        Ok(touch.slipping_points as f64 / touch.points.max(1) as f64)
     });
 }
 
@@ -288,8 +284,8 @@ fn touches<M: UserDataMethods<LuaBody>>(methods: &mut M) {
 #[derive(Clone)]
 struct LuaSolid {
     world: Shared,
-    kinematic: Option<usize>,
-    collider: usize,
+    kinematic: Option<KinematicId>,
+    collider: ColliderId,
 }
 
 impl Hosted for LuaSolid {
@@ -303,13 +299,13 @@ impl Hosted for LuaSolid {
 
     fn methods<M: UserDataMethods<Self>>(methods: &mut M) {
         method(methods, "move_to", |lua, this: &Self, (xyz, turn): ([f64; 3], Option<[f64; 3]>)| {
-            let Some(index) = this.kinematic else {
+            let Some(id) = this.kinematic else {
                 return Err(fail(
                     lua,
                     "solid:move_to: a static solid cannot move; make it with world:kinematic",
                 ));
             };
-            locked(&this.world).world.move_kinematic(index, pose(xyz, turn));
+            locked(&this.world).world.move_kinematic(id, pose(xyz, turn));
             Ok(())
         });
     }

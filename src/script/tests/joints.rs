@@ -179,8 +179,8 @@ fn where_the_parts_of_a_scene_are_is_where_the_mechanics_has_them() {
         let gap = (ours.to_homogeneous() - theirs.to_homogeneous()).amax();
         assert!(gap < 1e-12, "{}: {gap}", part.name);
     }
-    let tree = &sim.world.trees[0];
-    let weight = joints::potential_energy(&tree.tree, tree.poses(), &-Vec3::z());
+    let tree = &sim.world.articulations()[0];
+    let weight = joints::potential_energy(tree.tree(), tree.poses(), &-Vec3::z());
     let parts = sim.parts(0).map(|(part, _)| sim.centre(part).z);
     let expected: f64 = parts.zip([500.0, 300.0, 300.0]).map(|(z, density)| z * density * 3e-4).sum();
     assert!((weight - expected).abs() < 1e-9, "{weight} {expected}");

@@ -121,13 +121,17 @@ impl Taxels {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::physics::world::{PatchPoint, Presser};
+    use crate::physics::{
+        ColliderId, SoftId,
+        world::{PatchPoint, SampleFace},
+    };
 
     /// Two samples on a flat pad: 20 kPa on 1 mm² at x = 2 mm, 40 kPa on 1 mm² at y = −3 mm; friction drags the body
     /// along +x with 5 kPa at the first.
     fn patch() -> (ContactPatch, PadSurface) {
         let point = |x: f64, y: f64, pressure: f64, shear: f64| PatchPoint {
-            by: Presser::Soft { body: 0, face: 0, weights: [0.125; 8] },
+            partner: SoftId::new(0).into(),
+            face: Some(SampleFace { group: 0, weights: [0.125; 8] }),
             p_p: Vec3::new(x, y, 0.0),
             area: 1e-6,
             gap: 0.0,
@@ -135,11 +139,11 @@ mod tests {
             pressure,
             shear_p: Vec3::new(shear, 0.0, 0.0),
             mu: 1.5,
-            slipping: false,
+            is_slipping: false,
         };
         let points = vec![point(2e-3, 0.0, 2e4, 5e3), point(0.0, -3e-3, 4e4, 0.0)];
         let flat = PadSurface { radius_x: 1e9, radius_y: 1e9, ..PadSurface::default() };
-        (ContactPatch { collider: 0, points }, flat)
+        (ContactPatch { collider: ColliderId::new(0), points }, flat)
     }
 
     #[test]

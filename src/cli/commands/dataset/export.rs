@@ -16,7 +16,7 @@ use crate::{
     },
     dataset::{
         DatasetError,
-        lerobot::{self, ExportConfig, GripperCoding, LeRobotVersion},
+        lerobot::{self, Export, Gripper, Version},
     },
     rollout::cancel,
 };
@@ -54,20 +54,12 @@ pub(crate) fn command(path: Arg) -> clap::Command {
 }
 
 /// What was typed.
-pub(crate) fn typed(matches: &ArgMatches) -> ExportConfig {
-    ExportConfig {
+pub(crate) fn typed(matches: &ArgMatches) -> Export {
+    Export {
         data: PathBuf::from(text(matches, "path")),
         out: PathBuf::from(text(matches, "out")),
-        version: if text(matches, "format") == FORMATS[0] {
-            LeRobotVersion::V21
-        } else {
-            LeRobotVersion::V30
-        },
-        gripper: if text(matches, "gripper") == "binary" {
-            GripperCoding::Binary
-        } else {
-            GripperCoding::Continuous
-        },
+        version: if text(matches, "format") == FORMATS[0] { Version::V21 } else { Version::V30 },
+        gripper: if text(matches, "gripper") == "binary" { Gripper::Binary } else { Gripper::Continuous },
         tasks: many(matches, "task"),
         threads: threads(matches),
     }
@@ -77,7 +69,7 @@ pub(crate) fn typed(matches: &ArgMatches) -> ExportConfig {
 ///
 /// # Errors
 /// See [`lerobot::export`]; nothing is left then.
-pub(crate) fn run(export: &ExportConfig) -> Result<(), CliError> {
+pub(crate) fn run(export: &Export) -> Result<(), CliError> {
     if export.out.to_string_lossy().trim().is_empty() {
         return Err(CliError::input("--out: expected a new folder, got \"\""));
     }

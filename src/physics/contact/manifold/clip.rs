@@ -1,4 +1,4 @@
-//! Overlap of convex polygons and lines in the plane, with names that survive small changes.
+//! Penetration of convex polygons and lines in the plane, with names that survive small changes.
 
 /// A corner of a convex polygon, counter-clockwise.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,8 +17,8 @@ const SNAP_M: f64 = 1e-6;
 
 /// The name of the point where an edge of the first body crosses one of the second; unlike any corner's name.
 pub(super) fn crossing(edge_a: u32, edge_b: u32) -> u32 {
-    const MOVING: u32 = super::MOVING;
-    (edge_a | edge_b) & MOVING | 2 << 28 | (edge_a & 0xfff) << 12 | edge_b & 0xfff
+    const NON_MATERIAL: u32 = super::NON_MATERIAL;
+    (edge_a | edge_b) & NON_MATERIAL | 2 << 28 | (edge_a & 0xfff) << 12 | edge_b & 0xfff
 }
 
 /// Twice the signed area of the triangle o, p, q, m².

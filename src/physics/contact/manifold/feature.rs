@@ -1,8 +1,8 @@
-//! The features of a piece that face a direction: a flat face, a side line.
+//! The features of a primitive that face a direction: a flat face, a side line.
 
 use std::f64::consts::TAU;
 
-use super::{MOVING, Piece};
+use super::{NON_MATERIAL, Primitive};
 use crate::geometry::{Pose, Vec3};
 
 /// Points that stand for a rim in flat contact: the true circle lies at most 0.9 % outside of their polygon, which
@@ -15,7 +15,7 @@ const CAP_WHOLE: f64 = 0.05;
 const CAP_GONE: f64 = 0.1;
 /// A side line counts in full from this tilt (sine) off the cap's flat position, where its place is undefined.
 const LINE_WHOLE: f64 = 1e-3;
-/// Name of a side line among a piece's features; its ends are the next two.
+/// Name of a side line among a primitive's features; its ends are the next two.
 const LINE: u32 = 128;
 
 /// A flat, convex face, its corners counter-clockwise about `normal`.
@@ -30,7 +30,7 @@ pub(super) struct Face {
     pub weight: f64,
 }
 
-/// A line along a piece's side.
+/// A line along a primitive's side.
 pub(super) struct Line {
     /// Ends, world, m.
     pub ends: [Vec3; 2],
@@ -42,7 +42,7 @@ pub(super) struct Line {
     pub weight: f64,
 }
 
-/// What of a piece faces a direction.
+/// What of a primitive faces a direction.
 pub(super) struct Features {
     /// A flat face, if one does.
     pub face: Option<Face>,
@@ -50,21 +50,21 @@ pub(super) struct Features {
     pub line: Option<Line>,
 }
 
-/// The features of `piece` that face `direction` (unit, world).
-pub(super) fn facing(piece: &Piece, pose: &Pose, direction: &Vec3) -> Features {
-    match *piece {
-        Piece::Plane => {
+/// The features of `primitive` that face `direction` (unit, world).
+pub(super) fn facing(primitive: &Primitive, pose: &Pose, direction: &Vec3) -> Features {
+    match *primitive {
+        Primitive::Plane => {
             let normal = pose.rotation * Vec3::z();
             let face = Face { corners: Vec::new(), normal, origin: pose.translation.vector, weight: 1.0 };
             Features { face: Some(face), line: None }
         }
-        Piece::Box { half } => Features { face: Some(box_face(&half, pose, direction)), line: None },
-        Piece::Cylinder { radius, half_height } => round(radius, half_height, pose, direction),
-        Piece::Capsule { radius, half_height } => {
+        Primitive::Box { half } => Features { face: Some(box_face(&half, pose, direction)), line: None },
+        Primitive::Cylinder { radius, half_height } => round(radius, half_height, pose, direction),
+        Primitive::Capsule { radius, half_height } => {
             let line = side_line(pose, &(direction * radius), half_height, 1.0);
             Features { face: None, line: Some(line) }
         }
-        Piece::Sphere { .. } => Features { face: None, line: None },
+        Primitive::Sphere { .. } => Features { face: None, line: None },
     }
 }
 
@@ -121,10 +121,10 @@ fn cap(radius: f64, z: f64, pose: &Pose, weight: f64) -> Face {
     Face { corners, normal, origin: pose.translation.vector + pose.rotation * Vec3::z() * z, weight }
 }
 
-/// The line along a piece's axis, moved by `offset`. It wanders over the material as the piece rolls.
+/// The line along a primitive's axis, moved by `offset`. It wanders over the material as the primitive rolls.
 fn side_line(pose: &Pose, offset: &Vec3, half_height: f64, weight: f64) -> Line {
     let half = pose.rotation * Vec3::z() * half_height;
     let centre = pose.translation.vector + offset;
-    let name = MOVING | LINE;
+    let name = NON_MATERIAL | LINE;
     Line { ends: [centre - half, centre + half], names: [name + 1, name + 2], name, weight }
 }

@@ -3,10 +3,10 @@
 use std::f64::consts::TAU;
 
 use super::{
-    ContactPoint, MOVING, POINT_AREA,
+    ManifoldPoint, NON_MATERIAL, POINT_AREA,
+    closest_points::lowest_points,
     feature::RIM,
-    lowest::lowest_points,
-    skin::{Ring, SAMPLE_AREA, SkinSamples},
+    feature_extraction::{Ring, SAMPLE_AREA, SkinSamples},
 };
 use crate::geometry::{Aabb, Pose, Vec3, shape::Shape};
 
@@ -46,13 +46,13 @@ impl Probe<'_> {
         (phi, self.a_in_b.rotation.inverse_transform_vector(&n_b))
     }
 
-    pub(super) fn contact(&self, p_a: &Vec3, area: f64, feature: u32) -> ContactPoint {
+    pub(super) fn contact(&self, p_a: &Vec3, area: f64, feature: u32) -> ManifoldPoint {
         let p_b = self.a_in_b * nalgebra::Point3::from(*p_a);
         let (phi, n_b) = self.shape_b.distance_and_normal(&p_b.coords);
         let n_w = -(self.pose_b.rotation * n_b);
         // The sample lies on the first body, the other surface a gap further along the normal.
         let p_w = (self.pose_b * p_b).coords + n_w * (0.5 * phi);
-        ContactPoint { p_w, n_w, phi, area, feature }
+        ManifoldPoint { p_w, n_w, phi, area, feature }
     }
 }
 
@@ -80,7 +80,7 @@ impl<'a> Skin<'a> {
 
     /// Appends the points whose gap is below `margin` (m) of corners and edges, flat faces, and rims with their moving lowest
     /// point.
-    pub fn fixed(&self, margin: f64, out: &mut Vec<ContactPoint>) {
+    pub fn fixed(&self, margin: f64, out: &mut Vec<ManifoldPoint>) {
         let fixed = self.samples.fixed.iter().map(|p| (p, SAMPLE_AREA)).zip(0..);
         let spots = self.samples.spots.iter().map(|spot| (&spot.p, spot.area)).zip(SPOTS..);
         for ((p_a, area), name) in fixed.chain(spots) {
@@ -99,13 +99,13 @@ impl<'a> Skin<'a> {
 
     /// Appends the lowest points and lines of smooth parts whose gap is below `margin` (m), as far as the points that are in
     /// `out` already do not carry there.
-    pub fn lowest(&self, margin: f64, out: &mut Vec<ContactPoint>) {
+    pub fn lowest(&self, margin: f64, out: &mut Vec<ManifoldPoint>) {
         lowest_points(&self.probe, self.samples, self.shape, margin, out);
     }
 }
 
 /// The fixed points of a nearly flat ring and its moving lowest point.
-fn ring_points(probe: &Probe, ring: &Ring, name: u32, margin: f64, out: &mut Vec<ContactPoint>) {
+fn ring_points(probe: &Probe, ring: &Ring, name: u32, margin: f64, out: &mut Vec<ManifoldPoint>) {
     let at = |angle: f64| {
         let (sin, cos) = angle.sin_cos();
         (ring.frame_o * nalgebra::Point3::new(ring.radius * cos, ring.radius * sin, 0.0)).coords
@@ -131,7 +131,8 @@ fn ring_points(probe: &Probe, ring: &Ring, name: u32, margin: f64, out: &mut Vec
         }
     }
     let angle = golden_minimum(|angle| probe.gap(&at(angle)), step * (least as f64 - 1.0), 2.0 * step);
-    let point = probe.contact(&at(angle), POINT_AREA * (tilt / RING_TILTED).min(1.0), MOVING | (name + RIM));
+    let point =
+        probe.contact(&at(angle), POINT_AREA * (tilt / RING_TILTED).min(1.0), NON_MATERIAL | (name + RIM));
     if point.phi < margin && point.area > 0.0 {
         out.push(point);
     }

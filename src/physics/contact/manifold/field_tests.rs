@@ -4,7 +4,7 @@ use super::field::Skin;
 use super::*;
 use crate::geometry::{Quat, shape::Shape};
 
-fn touch(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64) -> Vec<ContactPoint> {
+fn touch(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64) -> Vec<ManifoldPoint> {
     let mut out = Vec::new();
     let (samples, bounds) = (skin_samples(a), b.bounds());
     let skin = Skin::new((&samples, a), pose_a, (b, &bounds), pose_b);
@@ -162,10 +162,10 @@ fn shapes_made_of_primitives_fall_into_pieces_and_others_do_not() {
         .union(wall)
         .painted(2, None)
         .rotated(Quat::from_scaled_axis(Vec3::z()));
-    let parts = pieces(&tray).expect("two boxes");
+    let parts = primitives(&tray).expect("two boxes");
     assert_eq!(parts.len(), 2);
     let centre = Quat::from_scaled_axis(Vec3::z()) * Vec3::new(0.0, 0.1, 0.05);
     assert!((parts[1].1.translation.vector - centre).norm() < 1e-15);
-    assert_eq!(parts[1].0, Piece::Box { half: Vec3::new(0.1, 0.005, 0.05) });
-    assert_eq!(pieces(&bowl()), None);
+    assert_eq!(parts[1].0, Primitive::Box { half: Vec3::new(0.1, 0.005, 0.05) });
+    assert_eq!(primitives(&bowl()), None);
 }

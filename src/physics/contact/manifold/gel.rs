@@ -1,7 +1,7 @@
 //! Contact points of a compliant skin with a hard shape: a bed of springs, one at each sample of the skin, pressed in as
 //! deep as the sample lies inside of the shape (a Winkler foundation: Johnson, Contact Mechanics, 1985, 4.3).
 
-use super::ContactPoint;
+use super::ManifoldPoint;
 use crate::{
     geometry::{Aabb, Pose, shape::Shape},
     physics::contact::solid::GelSample,
@@ -18,7 +18,7 @@ pub fn gel_vs_shape(
     (shape_b, bounds_b): (&Shape, &Aabb),
     pose_b: &Pose,
     margin: f64,
-    out: &mut Vec<ContactPoint>,
+    out: &mut Vec<ManifoldPoint>,
 ) {
     let a_in_b = pose_b.inv_mul(pose_a);
     for (index, sample) in skin.iter().enumerate() {
@@ -33,7 +33,7 @@ pub fn gel_vs_shape(
         if felt.phi >= margin || felt.coverage <= 0.0 || facing.dot(&felt.normal) > BEHIND {
             continue;
         }
-        out.push(ContactPoint {
+        out.push(ManifoldPoint {
             p_w: (pose_b * nalgebra::Point3::from(p_b - felt.normal * (0.5 * felt.phi))).coords,
             n_w: -(pose_b.rotation * felt.normal),
             phi: felt.phi,

@@ -4,13 +4,19 @@ use rand_chacha::ChaCha8Rng;
 use super::*;
 use crate::geometry::Quat;
 
-pub(super) const BOX: Piece = Piece::Box { half: Vec3::new(0.03, 0.02, 0.05) };
-pub(super) const CAN: Piece = Piece::Cylinder { radius: 0.033, half_height: 0.05 };
-const PILL: Piece = Piece::Capsule { radius: 0.015, half_height: 0.03 };
-pub(super) const BALL: Piece = Piece::Sphere { radius: 0.025 };
-const ALL: [Piece; 5] = [Piece::Plane, BOX, CAN, PILL, BALL];
+pub(super) const BOX: Primitive = Primitive::Box { half: Vec3::new(0.03, 0.02, 0.05) };
+pub(super) const CAN: Primitive = Primitive::Cylinder { radius: 0.033, half_height: 0.05 };
+const PILL: Primitive = Primitive::Capsule { radius: 0.015, half_height: 0.03 };
+pub(super) const BALL: Primitive = Primitive::Sphere { radius: 0.025 };
+const ALL: [Primitive; 5] = [Primitive::Plane, BOX, CAN, PILL, BALL];
 
-pub(super) fn meet(a: &Piece, pose_a: &Pose, b: &Piece, pose_b: &Pose, margin: f64) -> Vec<ContactPoint> {
+pub(super) fn meet(
+    a: &Primitive,
+    pose_a: &Pose,
+    b: &Primitive,
+    pose_b: &Pose,
+    margin: f64,
+) -> Vec<ManifoldPoint> {
     let mut out = Vec::new();
     manifold(a, pose_a, b, pose_b, margin, &mut out);
     out
@@ -24,34 +30,35 @@ fn turned(pose: Pose, turn: Vec3) -> Pose {
     pose * Quat::from_scaled_axis(turn)
 }
 
-fn area(points: &[ContactPoint]) -> f64 {
+fn area(points: &[ManifoldPoint]) -> f64 {
     points.iter().map(|point| point.area).sum()
 }
 
-/// A random pose of `b` in which it overlaps `a` by `depth` along some direction, or nearly so.
-fn touching(rng: &mut ChaCha8Rng, a: &Piece, b: &Piece, depth: f64) -> (Pose, Pose) {
+/// A random pose of `b` in which it penetrations `a` by `depth` along some direction, or nearly so.
+fn touching(rng: &mut ChaCha8Rng, a: &Primitive, b: &Primitive, depth: f64) -> (Pose, Pose) {
     let mut unit = || {
         let v = Vec3::from_fn(|_, _| rng.random_range(-1.0..1.0));
         v.normalize()
     };
     let (turn_a, turn_b, mut n) = (unit() * 2.0, unit() * 2.0, unit());
     let pose_a = Pose::new(unit() * 0.3, turn_a);
-    if matches!(a, Piece::Plane) {
+    if matches!(a, Primitive::Plane) {
         n = pose_a.rotation * Vec3::z();
     }
     let mut pose_b = Pose::new(Vec3::zeros(), turn_b);
-    let shift = axis::support(a, &pose_a, &n) - axis::support(b, &pose_b, &-n) - n * depth;
+    let shift =
+        separating_axis::support(a, &pose_a, &n) - separating_axis::support(b, &pose_b, &-n) - n * depth;
     pose_b.translation.vector += shift;
     (pose_a, pose_b)
 }
 
-fn pairs() -> impl Iterator<Item = (Piece, Piece)> {
+fn pairs() -> impl Iterator<Item = (Primitive, Primitive)> {
     ALL.into_iter().enumerate().flat_map(|(i, a)| ALL[i..].iter().map(move |&b| (a, b))).skip(1)
 }
 
 #[test]
 fn a_box_flat_on_a_plane_stands_on_its_four_corners() {
-    let points = meet(&Piece::Plane, &at(0.0, 0.0, 0.1), &BOX, &at(0.2, 0.1, 0.149), 0.005);
+    let points = meet(&Primitive::Plane, &at(0.0, 0.0, 0.1), &BOX, &at(0.2, 0.1, 0.149), 0.005);
     assert_eq!(points.len(), 4);
     for point in &points {
         assert!((point.phi + 0.001).abs() < 1e-15 && point.n_w == Vec3::z());
@@ -63,7 +70,7 @@ fn a_box_flat_on_a_plane_stands_on_its_four_corners() {
 
 #[test]
 fn turned_square_on_square_meets_in_the_octagon() {
-    let square = Piece::Box { half: Vec3::new(0.02, 0.02, 0.01) };
+    let square = Primitive::Box { half: Vec3::new(0.02, 0.02, 0.01) };
     let upper = turned(at(0.0, 0.0, 0.0205), Vec3::z() * std::f64::consts::FRAC_PI_4);
     let points = meet(&square, &at(0.0, 0.0, 0.0), &square, &upper, 0.002);
     assert_eq!(points.len(), 8);
@@ -83,7 +90,7 @@ fn turned_square_on_square_meets_in_the_octagon() {
 #[test]
 fn flush_boxes_keep_the_names_of_their_points_under_rounding() {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
-    let cube = Piece::Box { half: Vec3::repeat(0.02) };
+    let cube = Primitive::Box { half: Vec3::repeat(0.02) };
     let names =
         |pose: &Pose| meet(&cube, &Pose::identity(), &cube, pose, 0.001).iter().map(|p| p.feature).collect();
     let expected: Vec<u32> = names(&at(0.0, 0.0, 0.04));
@@ -98,7 +105,7 @@ fn flush_boxes_keep_the_names_of_their_points_under_rounding() {
 
 #[test]
 fn crossed_edges_touch_in_one_point() {
-    let cube = Piece::Box { half: Vec3::repeat(0.02) };
+    let cube = Primitive::Box { half: Vec3::repeat(0.02) };
     let lower = turned(at(0.0, 0.0, 0.0), Vec3::x() * std::f64::consts::FRAC_PI_4);
     let height = 2.0 * 0.02 * 2f64.sqrt() - 0.0003;
     let upper = turned(at(0.001, 0.002, height), Vec3::y() * std::f64::consts::FRAC_PI_4);
@@ -111,7 +118,7 @@ fn crossed_edges_touch_in_one_point() {
 
 #[test]
 fn a_can_stands_on_its_whole_rim_and_leans_on_its_lowest_point() {
-    let standing = meet(&Piece::Plane, &Pose::identity(), &CAN, &at(0.0, 0.0, 0.0499), 0.005);
+    let standing = meet(&Primitive::Plane, &Pose::identity(), &CAN, &at(0.0, 0.0, 0.0499), 0.005);
     assert_eq!(standing.len(), feature::RIM as usize);
     let polygon = 0.5
         * f64::from(feature::RIM)
@@ -123,7 +130,8 @@ fn a_can_stands_on_its_whole_rim_and_leans_on_its_lowest_point() {
     );
     for heading in [0.0f64, 0.13, 2.0] {
         let tilt = Vec3::new(-heading.sin(), heading.cos(), 0.0) * 0.3;
-        let points = meet(&Piece::Plane, &Pose::identity(), &CAN, &turned(at(0.0, 0.0, 0.05), tilt), 0.01);
+        let points =
+            meet(&Primitive::Plane, &Pose::identity(), &CAN, &turned(at(0.0, 0.0, 0.05), tilt), 0.01);
         assert_eq!(points.len(), 1);
         let phi = 0.05 - 0.05 * 0.3f64.cos() - 0.033 * 0.3f64.sin();
         assert!((points[0].phi - phi).abs() < 1e-15 && points[0].is_moving());
@@ -132,16 +140,16 @@ fn a_can_stands_on_its_whole_rim_and_leans_on_its_lowest_point() {
 
 #[test]
 fn a_lying_can_and_a_lying_capsule_rest_on_the_ends_of_their_lowest_line() {
-    for (piece, radius, half) in [(CAN, 0.033, 0.05), (PILL, 0.015, 0.03)] {
+    for (primitive, radius, half) in [(CAN, 0.033, 0.05), (PILL, 0.015, 0.03)] {
         for roll in [0.0, 0.7] {
             let lying =
                 at(0.0, 0.0, radius - 1e-4) * Quat::from_scaled_axis(Vec3::y() * std::f64::consts::FRAC_PI_2);
             let pose = lying * Quat::from_scaled_axis(Vec3::z() * roll);
-            for (floor, floor_w) in [(Piece::Plane, Pose::identity()), (BOX, at(0.0, 0.0, -0.05))] {
-                let points = meet(&floor, &floor_w, &piece, &pose, 0.002);
-                let long = matches!(floor, Piece::Plane) || half < 0.03 + 1e-9;
+            for (floor, floor_w) in [(Primitive::Plane, Pose::identity()), (BOX, at(0.0, 0.0, -0.05))] {
+                let points = meet(&floor, &floor_w, &primitive, &pose, 0.002);
+                let long = matches!(floor, Primitive::Plane) || half < 0.03 + 1e-9;
                 let reach: f64 = if long { half } else { 0.03 };
-                assert_eq!(points.len(), 2, "{piece:?} on {floor:?}");
+                assert_eq!(points.len(), 2, "{primitive:?} on {floor:?}");
                 for p in &points {
                     assert!((p.p_w.x.abs() - reach).abs() < 1e-9 && p.p_w.y.abs() < 1e-9, "{:?}", p.p_w);
                     assert!((p.phi + 1e-4).abs() < 1e-9 && p.is_moving());
@@ -164,10 +172,13 @@ fn the_gap_is_the_largest_that_any_direction_shows() {
                 let gap = points.iter().map(|p| p.phi).fold(f64::INFINITY, f64::min);
                 assert!(gap < 0.0, "{a:?} {b:?} overlap without a contact point ({gap})");
                 let gap_along = |n: &Vec3| {
-                    if matches!(a, Piece::Plane) && (n - pose_a.rotation * Vec3::z()).norm() > 1e-9 {
+                    if matches!(a, Primitive::Plane) && (n - pose_a.rotation * Vec3::z()).norm() > 1e-9 {
                         return f64::NEG_INFINITY;
                     }
-                    n.dot(&(axis::support(&b, &pose_b, &-n) - axis::support(&a, &pose_a, n)))
+                    n.dot(
+                        &(separating_axis::support(&b, &pose_b, &-n)
+                            - separating_axis::support(&a, &pose_a, n)),
+                    )
                 };
                 let least = points.iter().min_by(|p, q| p.phi.total_cmp(&q.phi)).expect("a point");
                 assert!((gap_along(&least.n_w) - gap).abs() < 1.2e-5, "{a:?} {b:?}: {gap} not attained");
@@ -208,7 +219,7 @@ fn swapping_the_bodies_flips_the_normals_only() {
 }
 
 /// Force and torque (about the world's origin) of a layer of unit modulus.
-fn push(points: &[ContactPoint]) -> (Vec3, Vec3) {
+fn push(points: &[ManifoldPoint]) -> (Vec3, Vec3) {
     points.iter().fold((Vec3::zeros(), Vec3::zeros()), |(force, torque), p| {
         let f = p.n_w * (p.area * (-p.phi).max(0.0));
         (force + f, torque + p.p_w.cross(&f))
@@ -218,25 +229,32 @@ fn push(points: &[ContactPoint]) -> (Vec3, Vec3) {
 #[test]
 fn resting_contacts_change_little_when_a_pose_changes_little() {
     // From every upright, lying and slightly tilted rest on a floor, in steps of 0.05 mrad and 0.5 µm.
-    let floor = Piece::Box { half: Vec3::new(0.2, 0.2, 0.01) };
+    let floor = Primitive::Box { half: Vec3::new(0.2, 0.2, 0.01) };
     let floor_w = turned(at(0.01, 0.0, -0.01), Vec3::z() * 0.3);
-    for piece in [BOX, CAN, PILL, BALL] {
+    for primitive in [BOX, CAN, PILL, BALL] {
         for base in [Vec3::zeros(), Vec3::x() * std::f64::consts::FRAC_PI_2] {
-            for ground in [(floor, floor_w), (Piece::Plane, Pose::identity())] {
+            for ground in [(floor, floor_w), (Primitive::Plane, Pose::identity())] {
                 let mut last: Option<(Vec3, Vec3)> = None;
                 for k in 0..4000 {
                     let tilt = (f64::from(k) - 2000.0) * 5e-5;
                     let turn = Quat::from_scaled_axis(Vec3::new(0.3, 0.9, 0.1) * tilt)
                         * Quat::from_scaled_axis(base);
                     let mut pose = Pose::from_parts(nalgebra::Translation3::identity(), turn);
-                    pose.translation.vector.z -= axis::support(&piece, &pose, &-Vec3::z()).z + 1e-4;
-                    let now = push(&meet(&ground.0, &ground.1, &piece, &pose, 0.002));
+                    pose.translation.vector.z -=
+                        separating_axis::support(&primitive, &pose, &-Vec3::z()).z + 1e-4;
+                    let now = push(&meet(&ground.0, &ground.1, &primitive, &pose, 0.002));
                     if let Some(before) = last {
                         let jump = (now.0 - before.0).norm();
                         let scale = 1e-4 * POINT_AREA.max(now.0.norm() / 1e-4);
-                        assert!(jump < 0.06 * scale, "{piece:?} at {tilt}: force jumps by {jump} of {scale}");
+                        assert!(
+                            jump < 0.06 * scale,
+                            "{primitive:?} at {tilt}: force jumps by {jump} of {scale}"
+                        );
                         let twist = (now.1 - before.1).norm();
-                        assert!(twist < 0.06 * scale * 0.05, "{piece:?} at {tilt}: torque jumps by {twist}");
+                        assert!(
+                            twist < 0.06 * scale * 0.05,
+                            "{primitive:?} at {tilt}: torque jumps by {twist}"
+                        );
                     }
                     last = Some(now);
                 }
@@ -248,7 +266,7 @@ fn resting_contacts_change_little_when_a_pose_changes_little() {
 #[test]
 fn a_can_on_a_box_is_carried_by_the_part_of_its_cap_over_the_box() {
     // Centre 10 mm inside of the edge: the points must span the overlap and hold the centre of mass.
-    let table = Piece::Box { half: Vec3::new(0.1, 0.1, 0.02) };
+    let table = Primitive::Box { half: Vec3::new(0.1, 0.1, 0.02) };
     let can_w = at(0.09, 0.01, 0.07 - 1e-5);
     let points = meet(&table, &Pose::identity(), &CAN, &can_w, 0.001);
     let far = points.iter().map(|p| p.p_w.x).fold(0.0, f64::max);
@@ -272,7 +290,7 @@ fn stacked_cans_share_the_whole_disc() {
 
 #[test]
 fn a_can_leaning_on_a_wall_touches_its_edge_with_its_side() {
-    let wall = Piece::Box { half: Vec3::new(0.005, 0.1, 0.03) };
+    let wall = Primitive::Box { half: Vec3::new(0.005, 0.1, 0.03) };
     let lean = 0.3f64;
     // Axis in the x–z plane; the side line passes through the wall's upper edge at (−0.005, ·, 0.03).
     let axis_w = Vec3::new(lean.sin(), 0.0, lean.cos());
@@ -302,8 +320,8 @@ fn contacts_in_any_attitude_change_little_when_a_pose_changes_little() {
             jumps += u32::from((after - before).norm() > 0.05 * before.norm());
         }
         let allowed = match (a, b) {
-            (Piece::Box { .. }, Piece::Box { .. }) => 2,
-            (Piece::Box { .. } | Piece::Cylinder { .. }, Piece::Cylinder { .. }) => 30,
+            (Primitive::Box { .. }, Primitive::Box { .. }) => 2,
+            (Primitive::Box { .. } | Primitive::Cylinder { .. }, Primitive::Cylinder { .. }) => 30,
             _ => 0,
         };
         assert!(jumps <= allowed, "{a:?} {b:?}: {jumps} jumps in 2000");

@@ -1,0 +1,136 @@
+//! The contact normal of two convex primitives: the direction in which they are farthest apart.
+
+use super::Primitive;
+use crate::geometry::{
+    Pose, Vec3,
+    convex::{self, ClosestPoints, ConvexShape},
+};
+
+/// How much farther apart a refined direction must show the primitives before it displaces one along a face or an axis,
+/// m. Those are exact, the refined ones carry the rounding of an iteration.
+const PREFER_FACES_M: f64 = 1e-6;
+/// The same for edge against edge, as a share of the gap: nearly parallel edges repeat a face's direction.
+const PREFER_FACES_SHARE: f64 = 0.01;
+
+/// A contact normal.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Axis {
+    /// Unit, from the first primitive to the second, world.
+    pub n_w: Vec3,
+    /// Gap along it, m.
+    pub gap: f64,
+    /// Whether some pair of points is really this far apart; two boxes corner to corner are farther.
+    pub true_gap: bool,
+    /// The touching points, where an iteration looked for them.
+    pub closest: Option<ClosestPoints>,
+}
+
+/// The contact normal of `a` and `b` in rank order, or `None` if they are at least `margin` (m) apart.
+pub(super) fn contact_axis(
+    a: &Primitive,
+    pose_a: &Pose,
+    b: &Primitive,
+    pose_b: &Pose,
+    margin: f64,
+) -> Option<Axis> {
+    let gap_along = |n_w: &Vec3| n_w.dot(&(support(b, pose_b, &-n_w) - support(a, pose_a, n_w)));
+    let signed = |axis: &Vec3| {
+        let (ahead, behind) = (gap_along(axis), gap_along(&-axis));
+        if ahead >= behind { (ahead, *axis) } else { (behind, -axis) }
+    };
+    let (mut gap, mut n_w) = if matches!(a, Primitive::Plane) {
+        let n_w = faces(a, pose_a)[0];
+        (gap_along(&n_w), n_w)
+    } else {
+        faces(a, pose_a)
+            .iter()
+            .chain(&faces(b, pose_b))
+            .map(signed)
+            .fold((f64::NEG_INFINITY, Vec3::z()), |best, found| if found.0 > best.0 { found } else { best })
+    };
+    if gap >= margin {
+        return None;
+    }
+    if matches!(a, Primitive::Plane) {
+        return Some(Axis { n_w, gap, closest: None, true_gap: true });
+    }
+    let mut to_beat = gap + PREFER_FACES_M + PREFER_FACES_SHARE * gap.abs();
+    for edge_a in edges(a, pose_a) {
+        for edge_b in edges(b, pose_b) {
+            let Some(cross) = edge_a.cross(&edge_b).try_normalize(1e-6) else { continue };
+            let found = signed(&cross);
+            if found.0 > to_beat {
+                (gap, n_w) = found;
+                to_beat = gap;
+            }
+        }
+    }
+    if gap >= margin {
+        return None;
+    }
+    if matches!((a, b), (Primitive::Box { .. }, Primitive::Box { .. })) {
+        return Some(Axis { n_w, gap, closest: None, true_gap: gap <= 0.0 });
+    }
+    let closest = refine(a, pose_a, b, pose_b, margin);
+    if let Some(found) = closest {
+        let refined = gap_along(&found.n_w);
+        if refined > gap + PREFER_FACES_M {
+            (gap, n_w) = (refined, found.n_w);
+        }
+    }
+    (gap < margin).then_some(Axis { n_w, gap, closest, true_gap: true })
+}
+
+/// The closest points of the primitives themselves, from those of their cores.
+fn refine(a: &Primitive, pose_a: &Pose, b: &Primitive, pose_b: &Pose, margin: f64) -> Option<ClosestPoints> {
+    let ((core_a, radius_a), (core_b, radius_b)) = (core(a)?, core(b)?);
+    let found = convex::closest_points(&core_a, pose_a, &core_b, pose_b, margin + radius_a + radius_b)?;
+    let (a_w, b_w) = (found.a_w + found.n_w * radius_a, found.b_w - found.n_w * radius_b);
+    Some(ClosestPoints { a_w, b_w, ..found })
+}
+
+/// A primitive as a convex core and the thickness of a skin around it, m.
+fn core(primitive: &Primitive) -> Option<(ConvexShape, f64)> {
+    match *primitive {
+        Primitive::Box { half } => Some((ConvexShape::Box(half), 0.0)),
+        Primitive::Cylinder { radius, half_height } => {
+            Some((ConvexShape::Cylinder { radius, half_height }, 0.0))
+        }
+        Primitive::Capsule { radius, half_height } => Some((ConvexShape::Segment(half_height), radius)),
+        Primitive::Plane | Primitive::Sphere { .. } => None,
+    }
+}
+
+/// The point of a primitive farthest along `direction` (unit, world).
+pub(super) fn support(primitive: &Primitive, pose: &Pose, direction: &Vec3) -> Vec3 {
+    let d = pose.rotation.inverse() * direction;
+    let p = match *primitive {
+        Primitive::Plane => Vec3::zeros(),
+        Primitive::Box { half } => half.zip_map(&d, f64::copysign),
+        Primitive::Cylinder { radius, half_height } => {
+            let radial = Vec3::new(d.x, d.y, 0.0).try_normalize(0.0).unwrap_or(Vec3::x());
+            radial * radius + Vec3::z() * half_height.copysign(d.z)
+        }
+        Primitive::Capsule { radius, half_height } => d * radius + Vec3::z() * half_height.copysign(d.z),
+        Primitive::Sphere { radius } => d * radius,
+    };
+    pose.translation.vector + pose.rotation * p
+}
+
+/// Directions of flat faces, world.
+fn faces(primitive: &Primitive, pose: &Pose) -> Vec<Vec3> {
+    match primitive {
+        Primitive::Plane | Primitive::Cylinder { .. } => vec![pose.rotation * Vec3::z()],
+        Primitive::Box { .. } => (0..3).map(|axis| pose.rotation * Vec3::ith(axis, 1.0)).collect(),
+        Primitive::Capsule { .. } | Primitive::Sphere { .. } => Vec::new(),
+    }
+}
+
+/// Directions of straight edges and side lines, world.
+fn edges(primitive: &Primitive, pose: &Pose) -> Vec<Vec3> {
+    match primitive {
+        Primitive::Box { .. } => faces(primitive, pose),
+        Primitive::Cylinder { .. } | Primitive::Capsule { .. } => vec![pose.rotation * Vec3::z()],
+        Primitive::Plane | Primitive::Sphere { .. } => Vec::new(),
+    }
+}

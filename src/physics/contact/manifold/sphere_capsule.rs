@@ -1,0 +1,139 @@
+//! Spheres against anything, capsules against capsules: distances to points and segments.
+
+use super::{ManifoldPoint, NON_MATERIAL, POINT_AREA, Primitive};
+use crate::geometry::{Pose, Vec3};
+
+/// The middle witness of two capsules counts in full when it is this much closer than a straight line between the
+/// gaps at the segment's ends, m.
+const WITNESS_FADE_M: f64 = 1e-4;
+
+/// The one witness point of a sphere.
+pub(super) fn sphere(
+    a: &Primitive,
+    pose_a: &Pose,
+    radius: f64,
+    sphere_w: &Pose,
+    margin: f64,
+    out: &mut Vec<ManifoldPoint>,
+) {
+    let centre_w = sphere_w.translation.vector;
+    let (distance, n_a) = signed_distance(a, &(pose_a.inverse() * nalgebra::Point3::from(centre_w)).coords);
+    let (phi, n_w) = (distance - radius, pose_a.rotation * n_a);
+    if phi < margin {
+        let p_w = centre_w - n_w * (radius + 0.5 * phi);
+        out.push(ManifoldPoint { p_w, n_w, phi, area: POINT_AREA, feature: NON_MATERIAL });
+    }
+}
+
+/// Signed distance of `p` to a primitive and the outward unit normal there, in the primitive's frame; exact.
+pub(super) fn signed_distance(primitive: &Primitive, p: &Vec3) -> (f64, Vec3) {
+    match *primitive {
+        Primitive::Plane => (p.z, Vec3::z()),
+        Primitive::Box { half } => {
+            let sign = p.map(|x| 1f64.copysign(x));
+            let (distance, n) = outside_corner(&(p.abs() - half));
+            (distance, n.component_mul(&sign))
+        }
+        Primitive::Cylinder { radius, half_height } => {
+            let radial = Vec3::new(p.x, p.y, 0.0).try_normalize(0.0).unwrap_or(Vec3::x());
+            let (distance, n) = outside_corner(&Vec3::new(
+                radial.dot(p) - radius,
+                f64::NEG_INFINITY,
+                p.z.abs() - half_height,
+            ));
+            (distance, radial * n.x + Vec3::z() * n.z.copysign(p.z))
+        }
+        Primitive::Capsule { radius, half_height } => {
+            to_point(&(p - Vec3::z() * p.z.clamp(-half_height, half_height)), radius)
+        }
+        Primitive::Sphere { radius } => to_point(p, radius),
+    }
+}
+
+fn to_point(from: &Vec3, radius: f64) -> (f64, Vec3) {
+    let distance = from.norm();
+    (distance - radius, if distance > 0.0 { from / distance } else { Vec3::x() })
+}
+
+/// Distance and normal to the octant whose corner is at the origin, of a point at `excess`.
+fn outside_corner(excess: &Vec3) -> (f64, Vec3) {
+    let outside = excess.sup(&Vec3::zeros());
+    let distance = outside.norm();
+    if distance > 0.0 {
+        return (distance, outside / distance);
+    }
+    let axis = excess.imax();
+    (excess[axis], Vec3::ith(axis, 1.0))
+}
+
+/// Two capsules: the four end spheres against the other's core, and the closest pair of the cores between the ends.
+///
+/// Each is a true gap of the two bodies. The closest pair wanders where the cores are parallel, so it counts only as
+/// far as it is closer than the ends say.
+pub(super) fn capsules(
+    a: &Primitive,
+    pose_a: &Pose,
+    b: &Primitive,
+    pose_b: &Pose,
+    margin: f64,
+    out: &mut Vec<ManifoldPoint>,
+) {
+    let (
+        &Primitive::Capsule { radius: ra, half_height: ha },
+        &Primitive::Capsule { radius: rb, half_height: hb },
+    ) = (a, b)
+    else {
+        return;
+    };
+    let (core_a, core_b) = (core(pose_a, ha), core(pose_b, hb));
+    let mut push = |on_a: Vec3, on_b: Vec3, weight: f64, feature: u32| {
+        let (distance, n_w) = to_point(&(on_b - on_a), 0.0);
+        let phi = distance - ra - rb;
+        if phi < margin && weight > 0.0 {
+            let p_w = on_a + n_w * (ra + 0.5 * phi);
+            out.push(ManifoldPoint {
+                p_w,
+                n_w,
+                phi,
+                area: POINT_AREA * weight,
+                feature: NON_MATERIAL | feature,
+            });
+        }
+        phi
+    };
+    let ends_a = [0, 1].map(|i| push(core_a[i], on_segment(&core_b, &core_a[i]).0, 1.0, i as u32));
+    let ends_b = [0, 1].map(|i| push(on_segment(&core_a, &core_b[i]).0, core_b[i], 1.0, 2 + i as u32));
+    let (on_a, on_b) = between_segments(&core_a, &core_b);
+    let phi = (on_b - on_a).norm() - ra - rb;
+    let straight = |ends: [f64; 2], t: f64| ends[0] + (ends[1] - ends[0]) * t;
+    let (along_a, along_b) = (on_segment(&core_a, &on_a).1, on_segment(&core_b, &on_b).1);
+    let closer = straight(ends_a, along_a).min(straight(ends_b, along_b)) - phi;
+    push(on_a, on_b, (closer / WITNESS_FADE_M).clamp(0.0, 1.0), 4);
+}
+
+fn core(pose: &Pose, half_height: f64) -> [Vec3; 2] {
+    let half = pose.rotation * Vec3::z() * half_height;
+    [pose.translation.vector - half, pose.translation.vector + half]
+}
+
+/// The point of a segment closest to `p`, and its place 0..=1 along it.
+fn on_segment(segment: &[Vec3; 2], p: &Vec3) -> (Vec3, f64) {
+    let along = segment[1] - segment[0];
+    let length2 = along.norm_squared();
+    let t = if length2 > 0.0 { (along.dot(&(p - segment[0])) / length2).clamp(0.0, 1.0) } else { 0.5 };
+    (segment[0] + along * t, t)
+}
+
+/// The closest points of two segments (Ericson, Real-Time Collision Detection, 2005, 5.1.9).
+fn between_segments(a: &[Vec3; 2], b: &[Vec3; 2]) -> (Vec3, Vec3) {
+    let (along_a, along_b, apart) = (a[1] - a[0], b[1] - b[0], a[0] - b[0]);
+    let (aa, ab, bb) = (along_a.norm_squared(), along_a.dot(&along_b), along_b.norm_squared());
+    let det = aa * bb - ab * ab;
+    let t = if det > 1e-12 * aa * bb {
+        ((ab * along_b.dot(&apart) - bb * along_a.dot(&apart)) / det).clamp(0.0, 1.0)
+    } else {
+        0.5
+    };
+    let on_b = on_segment(b, &(a[0] + along_a * t)).0;
+    (on_segment(a, &on_b).0, on_b)
+}

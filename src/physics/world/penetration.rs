@@ -1,0 +1,87 @@
+//! Search for bodies that overlap, to reject impossible initial states.
+
+use super::{SoftBody, World, rigid_contacts::ColliderPair};
+use crate::{
+    geometry::{Aabb, Pose, Quat, Vec3},
+    physics::{contact::Collider, fem::FemState},
+};
+
+/// Two bodies that overlap.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Penetration {
+    /// Names of the colliders or soft bodies.
+    pub names: [String; 2],
+    /// Distance of the deepest point from the other's surface, m.
+    pub depth: f64,
+}
+
+impl World {
+    /// All pairs that overlap by more than `tolerance` (m), of which at least one can move, in the current state.
+    pub fn penetrations(&mut self, tolerance: f64) -> Vec<Penetration> {
+        self.update_collider_motions();
+        let mut found = self.collider_penetrations();
+        for (index, soft) in self.soft.iter().enumerate() {
+            for (collider, motion) in self.colliders.iter().zip(&self.motions) {
+                let depth = depth_in_field(&soft.state, &motion.pose, &collider.bounds, &|p| {
+                    signed_distance(collider, p)
+                });
+                found.push(Penetration { names: [soft.name.clone(), collider.name.clone()], depth });
+            }
+            for other in &self.soft[index + 1..] {
+                let depth = depth_in_soft(&soft.state, other).max(depth_in_soft(&other.state, soft));
+                found.push(Penetration { names: [soft.name.clone(), other.name.clone()], depth });
+            }
+        }
+        found.retain(|penetration| penetration.depth > tolerance);
+        found
+    }
+
+    fn collider_penetrations(&self) -> Vec<Penetration> {
+        let mut pairs = Vec::new();
+        self.near_pairs(&mut pairs);
+        let penetration = |&ColliderPair { a, b, .. }: &ColliderPair| {
+            let (a, b) = (a.min(b), a.max(b));
+            let [first, second] = [self.collider(a), self.collider(b)];
+            let (solid_a, solid_b) = (first.solid.as_ref()?, second.solid.as_ref()?);
+            let (pose_a, pose_b) = (&self.motions[a.index()].pose, &self.motions[b.index()].pose);
+            let depth = solid_a.depth(pose_a, solid_b, pose_b);
+            Some(Penetration { names: [first.name.clone(), second.name.clone()], depth })
+        };
+        pairs.iter().filter_map(penetration).collect()
+    }
+}
+
+/// Signed distance from a collider's surface, m.
+fn signed_distance(collider: &Collider, p: &Vec3) -> f64 {
+    collider.surface.contact(p, &Vec3::zeros(), 0.0).phi
+}
+
+/// Depth of the deepest sample of a soft body under another's surface, m.
+fn depth_in_soft(body: &FemState, other: &SoftBody) -> f64 {
+    let Some(surface) = &other.surface else { return 0.0 };
+    let field = |p: &Vec3| surface.contact(p, &Vec3::zeros(), 0.0).phi;
+    depth_in_field(body, &mean_object_frame(&other.state), &surface.bounds(), &field)
+}
+
+/// Object frame of a soft body, as if it were rigid, world.
+fn mean_object_frame(body: &FemState) -> Pose {
+    let mean = |nodes: &[Vec3]| nodes.iter().sum::<Vec3>() / nodes.len() as f64;
+    let turn = Quat::from_matrix(&body.frame);
+    Pose::from_parts((mean(&body.x) - turn * mean(&body.model.mesh.nodes)).into(), turn)
+}
+
+/// Depth of the deepest sample of `body` in a field within `bounds` in the frame `pose`, m; 0 if all are outside.
+fn depth_in_field(body: &FemState, pose: &Pose, bounds: &Aabb, field: &dyn Fn(&Vec3) -> f64) -> f64 {
+    let mut depth = 0.0;
+    for group in &body.model.groups {
+        for sample in &body.model.samples[group.first..group.last] {
+            let nodes = group.nodes[..group.count].iter().map(|&node| &body.x[node as usize]);
+            let p_w = nodes.zip(&sample.weights).map(|(x, w)| x * *w).sum::<Vec3>();
+            let p = pose.inverse_transform_point(&p_w.into()).coords;
+            if bounds.contains(&p) {
+                depth = f64::max(depth, -field(&p));
+            }
+        }
+    }
+    depth
+}

@@ -1,0 +1,250 @@
+//! Contacts between colliders: of rigid bodies, links, kinematic frames and the world.
+//!
+//! A contact point of two solids is seldom a material point of either (a corner of the lower one, the crossing of two edges,
+//! the lowest point of a ball). So its tangential spring has no anchor, but stores how far the touching *material* has moved:
+//! the stretch, which grows with the relative velocity and turns with the second body. At rest it holds as an anchor does,
+//! and rolling does not stretch it.
+
+use super::{
+    World,
+    contact_points::{ContactPair, EndStretch, SlidingPairs},
+};
+use crate::{
+    geometry::{Aabb, GroupedAabb, Vec3, overlapping_pairs},
+    physics::{
+        contact::{DetectionLimits, ManifoldPoint, PairId},
+        ids::{BodyId, ColliderId},
+        solver::{ContactCluster, ContactPoint, Endpoint},
+    },
+};
+
+/// Identity of a contact point of two colliders from step to step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct PointKey {
+    a: ColliderId,
+    b: ColliderId,
+    pair: PairId,
+    feature: u32,
+}
+
+impl PointKey {
+    /// The pair of surfaces.
+    fn surfaces(&self) -> (ColliderId, ColliderId) {
+        (self.a, self.b)
+    }
+}
+
+/// State of a contact point of two colliders between steps.
+#[derive(Clone, Copy, Debug)]
+struct PointState {
+    key: PointKey,
+    /// Distance by which the first collider's material is ahead of the second's, in the second's frame, m.
+    stretch: Vec3,
+    /// Normal impulse of the last step, N s.
+    normal_impulse: f64,
+    is_sliding: bool,
+    /// Distance slipped since first contact, m.
+    travel: f64,
+}
+
+impl PointState {
+    fn first(key: PointKey) -> Self {
+        Self { key, stretch: Vec3::zeros(), normal_impulse: 0.0, is_sliding: false, travel: 0.0 }
+    }
+}
+
+/// A contact point of the current problem.
+#[derive(Clone, Copy, Debug)]
+struct RigidRow {
+    key: PointKey,
+    /// Distance slipped before this step, m.
+    travel: f64,
+}
+
+/// Two colliders close enough to touch within the step; normals point from `b` to `a`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ColliderPair {
+    pub a: ColliderId,
+    pub b: ColliderId,
+    /// Gap below which contact points are created, m.
+    margin: f64,
+}
+
+/// Contacts between colliders: state between steps, and rows and buffers of the current one.
+#[derive(Clone, Debug, Default)]
+pub(super) struct RigidContacts {
+    /// Ascending by key.
+    states: Vec<PointState>,
+    /// In the order of their points, which follow those of soft bodies.
+    rows: Vec<RigidRow>,
+    pairs: Vec<ColliderPair>,
+    found: Vec<(PairId, ManifoldPoint)>,
+}
+
+/// A solved point of two colliders that presses.
+pub(super) struct PressingPoint<'a> {
+    pub a: ColliderId,
+    pub b: ColliderId,
+    /// Distance slipped before this step, m.
+    pub travel: f64,
+    pub point: &'a ContactPoint,
+}
+
+impl World {
+    /// Adds the contacts of all pairs of colliders near each other to the problem.
+    pub(super) fn add_rigid_contacts(&mut self) {
+        let mut contacts = std::mem::take(&mut self.rigid_contacts);
+        contacts.rows.clear();
+        self.near_pairs(&mut contacts.pairs);
+        for &ColliderPair { a, b, margin } in &contacts.pairs {
+            let (first, second) = (self.collider(a), self.collider(b));
+            let (Some(solid_a), Some(solid_b)) = (&first.solid, &second.solid) else { continue };
+            contacts.found.clear();
+            let (pose_a, pose_b) = (&self.motions[a.index()].pose, &self.motions[b.index()].pose);
+            solid_b.meet(pose_b, solid_a, pose_a, margin, &mut contacts.found);
+            if contacts.found.is_empty() {
+                continue;
+            }
+            let parents = (first.parent, second.parent);
+            let (end_a, end_b) = (self.body_endpoint(parents.0), self.body_endpoint(parents.1));
+            let first = self.problem.points.len();
+            for (pair, point) in &contacts.found {
+                let key = PointKey { a, b, pair: *pair, feature: point.feature };
+                let at = contacts.states.binary_search_by_key(&key, |state| state.key);
+                let state = at.map_or(PointState::first(key), |at| contacts.states[at]);
+                self.push_rigid(point, &state, end_b == Endpoint::Known);
+                contacts.rows.push(RigidRow { key, travel: state.travel });
+            }
+            let last = self.problem.points.len();
+            self.problem.clusters.push(ContactCluster { a: end_a, b: end_b, first, last });
+        }
+        self.rigid_contacts = contacts;
+    }
+
+    /// Finds the pairs of colliders on different bodies, of which at least one is free to move, that may touch within the
+    /// step.
+    pub(super) fn near_pairs(&self, pairs: &mut Vec<ColliderPair>) {
+        pairs.clear();
+        let ids: Vec<ColliderId> = (0..self.colliders.len())
+            .filter(|&i| self.colliders[i].solid.is_some())
+            .map(ColliderId::new)
+            .collect();
+        let boxes: Vec<GroupedAabb> = ids.iter().map(|&id| self.swept_box(id)).collect();
+        for (i, j) in overlapping_pairs(&boxes) {
+            let (i, j) = (ids[i], ids[j]);
+            let is_known = |id: ColliderId| self.is_known(self.collider(id).parent);
+            let (a, b) = if is_known(j) { (i, j) } else { (j, i) };
+            if is_known(a) {
+                continue;
+            }
+            let (motion_a, motion_b) = (&self.motions[a.index()], &self.motions[b.index()]);
+            // The fastest approach of any point of the smaller one.
+            let radius = |id: ColliderId| 0.5 * self.collider(id).bounds.size().norm();
+            let smaller = if radius(a) < radius(b) { a } else { b };
+            let centre = self.collider(smaller).bounds.centre();
+            let centre_w = (self.motions[smaller.index()].pose * nalgebra::Point3::from(centre)).coords;
+            let speed = (motion_a.velocity(&centre_w) - motion_b.velocity(&centre_w)).norm()
+                + (motion_a.angular - motion_b.angular).norm() * radius(smaller);
+            pairs.push(ColliderPair { a, b, margin: self.rigid_margin(speed) });
+        }
+    }
+
+    /// Gap below which two surfaces that approach at `speed` (m/s) may touch within the step, m.
+    fn rigid_margin(&self, speed: f64) -> f64 {
+        self.params.margin.max(DetectionLimits::STEPS_AHEAD * self.params.dt * speed)
+    }
+
+    /// Bounds of a collider over the step. Colliders of one group belong to one body and never touch each other.
+    fn swept_box(&self, id: ColliderId) -> GroupedAabb {
+        let (collider, motion) = (self.collider(id), &self.motions[id.index()]);
+        let bounds = collider.bounds.transformed(&motion.pose);
+        let lever = farthest_corner(&bounds, &motion.origin);
+        let speed = motion.linear.norm() + motion.angular.norm() * lever;
+        let rigid = self.rigid.len() as u32;
+        let group = match (collider.parent, collider.base_of) {
+            (BodyId::Link(link), _) => 1 + rigid + link.articulation.index() as u32,
+            (_, Some(articulation)) => 1 + rigid + articulation.index() as u32,
+            (BodyId::World | BodyId::Kinematic(_) | BodyId::Soft(_), None) => 0,
+            (BodyId::Rigid(id), None) => 1 + id.index() as u32,
+        };
+        GroupedAabb { bounds: bounds.loosened(self.rigid_margin(speed)), group }
+    }
+
+    fn push_rigid(&mut self, point: &ManifoldPoint, state: &PointState, is_b_known: bool) {
+        let (a, b) = (self.collider(state.key.a), self.collider(state.key.b));
+        let motion = &self.motions[state.key.b.index()];
+        let pair = ContactPair {
+            p: point.p_w,
+            normal: point.n_w,
+            gap: point.phi,
+            area: point.area,
+            stretch: motion.pose.rotation * state.stretch,
+            previous_normal_impulse: state.normal_impulse,
+            is_sliding: state.is_sliding,
+        };
+        let drift = if is_b_known { motion.velocity(&point.p_w) } else { Vec3::zeros() };
+        let point = pair.contact_point(&a.friction.with(&b.friction), &a.stiffness.in_series(&b.stiffness));
+        self.problem.points.push(ContactPoint { drift, ..point });
+    }
+
+    /// Updates the state of the points that touched. Pairs of which neither side moves keep theirs.
+    pub(super) fn update_rigid_history(&mut self) {
+        let mut contacts = std::mem::take(&mut self.rigid_contacts);
+        let is_known = |id: ColliderId| self.is_known(self.collider(id).parent);
+        contacts.states.retain(|state| is_known(state.key.a) && is_known(state.key.b));
+        let dt = self.params.dt;
+        let points = contacts.rows.iter().zip(&self.problem.points[self.rows.len()..]);
+        let sliding = SlidingPairs::new(points.clone().map(|(row, point)| (row.key.surfaces(), point)));
+        for (row, point) in points {
+            if point.normal_impulse <= 0.0 {
+                continue;
+            }
+            let EndStretch { stretch, slipped } = EndStretch::new(point, dt);
+            let kept = if slipped > 0.0 { stretch * (1.0 - slipped / stretch.norm()) } else { stretch };
+            let rotation = &self.motions[row.key.b.index()].pose.rotation;
+            contacts.states.push(PointState {
+                key: row.key,
+                stretch: rotation.inverse_transform_vector(&kept),
+                normal_impulse: point.normal_impulse,
+                is_sliding: sliding.contains(row.key.surfaces()),
+                travel: row.travel + slipped,
+            });
+        }
+        contacts.states.sort_unstable_by_key(|state| state.key);
+        self.rigid_contacts = contacts;
+    }
+
+    /// The other colliders that the colliders of a body touched in the last step.
+    pub(super) fn touching_colliders<'a>(
+        &'a self,
+        is_own: impl Fn(BodyId) -> bool + 'a,
+    ) -> impl Iterator<Item = ColliderId> + 'a {
+        let is_on_body = move |id: ColliderId| is_own(self.collider(id).parent);
+        self.rigid_contacts.states.iter().filter_map(move |state| match state.key {
+            PointKey { a, b, .. } if is_on_body(a) => Some(b),
+            PointKey { a, b, .. } if is_on_body(b) => Some(a),
+            _ => None,
+        })
+    }
+}
+
+impl RigidContacts {
+    /// The solved points that press; `solved` are the problem's points between colliders.
+    pub(super) fn pressing<'a>(
+        &'a self,
+        solved: &'a [ContactPoint],
+    ) -> impl Iterator<Item = PressingPoint<'a>> {
+        let pressing = self.rows.iter().zip(solved).filter(|(_, point)| point.normal_impulse > 0.0);
+        pressing.map(|(RigidRow { key, travel }, point)| PressingPoint {
+            a: key.a,
+            b: key.b,
+            travel: *travel,
+            point,
+        })
+    }
+}
+
+/// Distance of the farthest corner of a box from a point, m.
+fn farthest_corner(bounds: &Aabb, from: &Vec3) -> f64 {
+    (bounds.min - from).abs().sup(&(bounds.max - from).abs()).norm()
+}

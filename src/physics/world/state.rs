@@ -1,0 +1,197 @@
+//! State of the objects in a world.
+
+use std::sync::Arc;
+
+use crate::{
+    geometry::Pose,
+    physics::{
+        contact::{ContactHistory, ContactSurface, Friction, SurfaceStiffness},
+        fem::{FemState, MinDetF, system::VelocitySystem},
+        ids::ContactPartner,
+        joints::{self, JointState, JointTree},
+        rigid::RigidState,
+    },
+};
+
+use super::snapshot::ContactSummary;
+
+/// Contact of a body with one partner.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BodyContact {
+    /// The other side.
+    pub partner: ContactPartner,
+    /// Sums over the contact points, as seen by the body.
+    pub summary: ContactSummary,
+}
+
+/// A finite-element soft body of a [`World`](super::World).
+#[derive(Clone, Debug)]
+pub struct SoftBody {
+    /// Name, for messages and logs.
+    pub name: String,
+    /// Node positions and velocities. They may be set between steps; their number is fixed.
+    pub state: FemState,
+    /// Friction of its surface.
+    pub friction: Friction,
+    /// Contact stiffness of its surface.
+    pub stiffness: SurfaceStiffness,
+    pub(super) surface: Option<Arc<dyn ContactSurface>>,
+    pub(super) sleep: SleepState,
+    pub(super) min_det_f: MinDetF,
+    pub(super) contacts: Vec<BodyContact>,
+    pub(super) system: VelocitySystem,
+    pub(super) history: ContactHistory,
+    /// Steps taken awake: the clock of `history` and of the retained nodes, which stops during sleep.
+    pub(super) steps_awake: u64,
+    pub(super) inverted_time: f64,
+}
+
+impl SoftBody {
+    /// True while it sleeps: it neither moves nor costs anything until something moves near it.
+    pub fn is_asleep(&self) -> bool {
+        self.sleep.is_asleep
+    }
+
+    /// Smallest det F of its filled elements after the last step.
+    pub fn min_det_f(&self) -> MinDetF {
+        self.min_det_f
+    }
+
+    /// Number of nodes that the contact solve retains at present.
+    pub fn retained_nodes(&self) -> usize {
+        self.system.retained().len()
+    }
+
+    /// Number of times that its system matrix was factored.
+    pub fn factorizations(&self) -> u64 {
+        self.system.factorizations
+    }
+}
+
+/// A free rigid body of a [`World`](super::World).
+#[derive(Clone, Debug)]
+pub struct RigidBody {
+    /// Name, for messages and logs.
+    pub name: String,
+    /// Pose, velocity and mass properties. Pose and velocity may be set between steps; a velocity wakes the body.
+    pub state: RigidState,
+    pub(super) sleep: SleepState,
+    pub(super) contacts: Vec<BodyContact>,
+}
+
+impl RigidBody {
+    /// True while it sleeps: it is then treated as part of the world until something moves near it.
+    pub fn is_asleep(&self) -> bool {
+        self.sleep.is_asleep
+    }
+}
+
+/// Sleep of a body and the time that leads to it.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct SleepState {
+    pub is_asleep: bool,
+    /// Time for which the body has been slow, s.
+    pub slow_time: f64,
+}
+
+impl SleepState {
+    pub(super) fn wake(&mut self) {
+        *self = Self::default();
+    }
+}
+
+/// A PD drive on one joint, solved implicitly with everything else.
+///
+/// Its force is `clamp(kp (target − q) + kd (target_velocity − v), ±effort)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointDrive {
+    /// Stiffness, N m/rad or N/m.
+    pub kp: f64,
+    /// Damping, N m s/rad or N s/m.
+    pub kd: f64,
+    /// Target position, rad or m.
+    pub target: f64,
+    /// Target velocity, rad/s or m/s.
+    pub target_velocity: f64,
+    /// Effort limit, N m or N.
+    pub effort: f64,
+    /// Force of the last step, N m or N.
+    pub force: f64,
+}
+
+/// Dry friction of a joint as a stiff spring whose force is limited to the friction: a joint that sticks does not creep.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct JointFriction {
+    /// Joint coordinate at which the spring is free, rad or m.
+    pub anchor: f64,
+    /// Stiffness in the last step, N m/rad or N/m.
+    pub stiffness: f64,
+}
+
+/// An articulation of a [`World`](super::World): a tree of links and joints with a fixed base.
+#[derive(Clone, Debug)]
+pub struct Articulation {
+    /// Name, for messages and logs.
+    pub name: String,
+    /// Joint coordinates and velocities. They may be set between steps; their number is fixed.
+    pub state: JointState,
+    pub(super) tree: JointTree,
+    pub(super) drives: Vec<Option<JointDrive>>,
+    pub(super) has_gravity: bool,
+    pub(super) sleep: SleepState,
+    pub(super) friction: Vec<JointFriction>,
+    pub(super) poses: Vec<Pose>,
+    pub(super) scratch: joints::Scratch,
+}
+
+impl Articulation {
+    /// The mechanism.
+    pub fn tree(&self) -> &JointTree {
+        &self.tree
+    }
+
+    /// Link frames in the world after the last step.
+    pub fn poses(&self) -> &[Pose] {
+        &self.poses
+    }
+
+    /// The drive of each joint, if it has one.
+    pub fn drives(&self) -> &[Option<JointDrive>] {
+        &self.drives
+    }
+
+    /// The drive of each joint, to change targets and gains or to add and remove drives.
+    pub fn drives_mut(&mut self) -> &mut [Option<JointDrive>] {
+        &mut self.drives
+    }
+
+    /// True if any joint has a drive.
+    pub fn is_driven(&self) -> bool {
+        self.drives.iter().any(Option::is_some)
+    }
+
+    /// True while it sleeps: its links are then treated as part of the world until something moves near them. A driven
+    /// articulation never sleeps.
+    pub fn is_asleep(&self) -> bool {
+        self.sleep.is_asleep
+    }
+}
+
+/// A frame whose motion is prescribed.
+#[derive(Clone, Copy, Debug)]
+pub struct KinematicFrame {
+    pub(super) pose: Pose,
+    pub(super) next: Pose,
+}
+
+impl KinematicFrame {
+    /// Pose now, world.
+    pub fn pose(&self) -> &Pose {
+        &self.pose
+    }
+
+    /// Pose after the next step, world.
+    pub fn next(&self) -> &Pose {
+        &self.next
+    }
+}
