@@ -9,7 +9,7 @@
 ---@field episodes? integer Episodes a task by default. Expects a whole number in 1..1000000. Default 5.
 ---@field tasks softvt.Task[] The tasks, in order.
 ---@field shifts? softvt.Shift[] Changes that a run may ask for.
----@field settings? table<string, table<string, any>> What it changes of the mechanics, the robot and the judge: { physics = {…}, robot = {…}, rules = {…} }.
+---@field settings? table<string, table<string, any>> What it changes of the mechanics, the robot and the judge: { physics = {…}, robot = {…}, criteria = {…} }.
 
 ---One task of a suite.
 ---@class softvt.Task
@@ -263,7 +263,7 @@
 ---@field suite? string Part of the seed. Default "experiment".
 ---@field episode? integer Part of the seed. Expects a whole number in 0..1000000000. Default 0.
 ---@field seed? integer Part of the seed. Expects a whole number in 0..1000000000. Default 0.
----@field settings? table<string, table<string, any>> Changes of the mechanics, the robot and the judge: { physics = {…}, robot = {…}, rules = {…} }.
+---@field settings? table<string, table<string, any>> Changes of the mechanics, the robot and the judge: { physics = {…}, robot = {…}, criteria = {…} }.
 
 ---The rows of a calibration.
 ---@class softvt.EnvelopeSpec

@@ -3,7 +3,8 @@
 //! The modules form layers. Each may import those before it and none after it:
 //! [`geometry`] → [`physics`] → [`scene`], [`robot`] → [`sensing`], [`evaluation`] → [`benchmark`] → [`policy`] → [`rollout`]
 //! → [`dataset`] → [`report`] → [`script`] → [`serve`] → [`cli`]. `docs/architecture.md` draws them and follows one episode.
-//! All of them may use [`text`], which formats numbers and text for messages, and [`files`], which writes files atomically.
+//! All of them may use [`text`], which formats numbers and text for messages, [`files`], which writes files
+//! atomically, and [`parallel`], which runs jobs on threads.
 //!
 //! Units are SI throughout; a name carries its unit where it is not SI or not obvious. Frames are suffixes:
 //! `_w` world, `_b` robot base, `_h` hand, `_p` pad, `_o` object.
@@ -19,6 +20,8 @@ pub mod evaluation;
 pub mod files;
 #[warn(missing_docs)]
 pub mod geometry;
+#[warn(missing_docs)]
+pub mod parallel;
 #[warn(missing_docs)]
 pub mod physics;
 #[warn(missing_docs)]

@@ -49,7 +49,7 @@ pub fn open(loaded: &Loaded, task: usize, film: bool) -> (EpisodeSpec, ExpertCon
         task,
         scene: Arc::new(opened.scene.clone()),
         limit: None,
-        rules: settings.rules,
+        criteria: settings.criteria,
         params: settings.physics,
         robot: settings.robot,
         tactile: settings.tactile,

@@ -5,7 +5,8 @@ use serde_json::{Value, json};
 
 use super::control::check_dt;
 use crate::{
-    evaluation::rules::Rules, physics::PhysicsParams, robot::RobotSpec, sensing::tactile::TactileSpec,
+    evaluation::criteria::SuccessCriteria, physics::PhysicsParams, robot::RobotSpec,
+    sensing::tactile::TactileSpec,
 };
 
 /// All settings of a run. The default is the benchmark.
@@ -16,8 +17,9 @@ pub struct Settings {
     pub physics: PhysicsParams,
     /// The robot.
     pub robot: RobotSpec,
-    /// The judge's thresholds.
-    pub rules: Rules,
+    /// Thresholds of the judge.
+    #[serde(alias = "rules")]
+    pub criteria: SuccessCriteria,
     /// The tactile sensors.
     pub tactile: TactileSpec,
 }
@@ -45,6 +47,7 @@ impl Settings {
     }
 
     fn replaced(&self, path: &str, value: &str) -> Result<Self, String> {
+        let path = &current_path(path);
         let mut tree = serde_json::to_value(self).map_err(|e| e.to_string())?;
         let mut at = &mut tree;
         for key in path.split('.') {
@@ -80,11 +83,23 @@ impl Settings {
     /// The first number out of its range; a fragment for people.
     pub fn check(&self) -> Result<(), String> {
         self.robot.validate().map_err(|e| e.to_string())?;
-        self.rules.check().map_err(|e| e.to_string())?;
+        self.criteria.check().map_err(|e| e.to_string())?;
         self.tactile.validate().map_err(|e| e.to_string())?;
         self.physics.check().map_err(|e| e.to_string())?;
         check_dt(self.physics.dt)
     }
+}
+
+/// Former paths of settings and what they are called now. The same keys are serde aliases, for settings in tables and files.
+const RENAMED: [(&str, &str); 1] = [("rules", "criteria")];
+
+/// A path with its former keys replaced by the present ones.
+fn current_path(path: &str) -> String {
+    let renamed = RENAMED.iter().find_map(|(former, now)| {
+        let rest = path.strip_prefix(former)?;
+        (rest.is_empty() || rest.starts_with('.')).then(|| format!("{now}{rest}"))
+    });
+    renamed.unwrap_or_else(|| path.to_owned())
 }
 
 /// Names the kind of a setting that can be of several: `tactile.optics.model`.
@@ -133,6 +148,15 @@ mod tests {
         assert!(settings.with("robot.pads.static_mu", "0").is_err(), "the dynamic one would be above it");
         assert_eq!(settings.with_all(&pads("0")).expect("both at once").robot.pads.dynamic_mu, 0.0);
         assert!(settings.with("physics.dt", "fast").is_err_and(|e| e.contains("number")));
+    }
+
+    #[test]
+    fn former_names_of_settings_are_accepted() {
+        let settings = Settings::default();
+        let changed = settings.with("criteria.slip_m", "0.001").expect("a setting");
+        assert_eq!(settings.with("rules.slip_m", "0.001"), Ok(changed.clone()));
+        let former: Settings = serde_json::from_str(r#"{"rules":{"slip_m":0.001}}"#).expect("a setting");
+        assert_eq!(former, changed);
     }
 
     #[test]

@@ -14,7 +14,7 @@ pub enum DatasetError {
     File(#[from] FileError),
     /// There is no HDF5 file.
     #[error("{path} {what}")]
-    NoFile {
+    NotHdf5 {
         /// What should be one.
         path: String,
         /// What it is instead.
@@ -42,7 +42,7 @@ pub enum DatasetError {
     },
     /// Something else is where it should go.
     #[error("--out {out}: {what}")]
-    Taken {
+    OutputNotEmpty {
         /// The folder.
         out: String,
         /// What is there, and what to do.

@@ -16,15 +16,15 @@ pub const ATTEMPTS: &str = "attempts";
 pub const PARTS: &str = ".parts";
 
 /// Pictures of a step in order: third person, wrist, left and right finger.
-pub const PICTURES: [&str; 4] =
+pub const IMAGE_STREAMS: [&str; 4] =
     ["agentview_rgb", "eye_in_hand_rgb", "gsmini_left_tactile_rgb", "gsmini_right_tactile_rgb"];
 /// Their videos; the fingers' with markers.
-pub const VIDEOS: [&str; 4] =
+pub const VIDEO_STREAMS: [&str; 4] =
     ["agentview_rgb", "eye_in_hand_rgb", "gsmini_left_markers_rgb", "gsmini_right_markers_rgb"];
 
 /// A task of a suite in a data set.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct TaskPlace {
+pub struct TaskPaths {
     /// Folder of the data set.
     pub root: PathBuf,
     /// Name of the suite, as part of a path.
@@ -33,7 +33,7 @@ pub struct TaskPlace {
     pub task: usize,
 }
 
-impl TaskPlace {
+impl TaskPaths {
     /// What the names of its files begin with.
     pub fn name(&self) -> String {
         format!("{}_task{}", self.suite, self.task)
@@ -49,9 +49,9 @@ impl TaskPlace {
         self.root.join(self.hdf5_relative())
     }
 
-    /// A demonstration's video of a stream (an index of [`VIDEOS`]), from the folder of the data set.
+    /// A demonstration's video of a stream (an index of [`VIDEO_STREAMS`]), from the folder of the data set.
     pub fn video_relative(&self, demo: usize, stream: usize) -> String {
-        format!("videos/{}/demo_{demo}_{}.mp4", self.name(), VIDEOS[stream])
+        format!("videos/{}/demo_{demo}_{}.mp4", self.name(), VIDEO_STREAMS[stream])
     }
 
     /// A demonstration's preview.
@@ -59,7 +59,7 @@ impl TaskPlace {
         self.root.join(format!("previews/{}/demo_{demo}.mp4", self.name()))
     }
 
-    /// Where the finished parts of an attempt are: `kind` is `hdf5`, one of [`VIDEOS`] with `mp4`, or `preview.mp4`.
+    /// Where the finished parts of an attempt are: `kind` is `hdf5`, one of [`VIDEO_STREAMS`] with `mp4`, or `preview.mp4`.
     pub fn part(&self, attempt: u32, kind: &str) -> PathBuf {
         self.parts().join(format!("attempt_{attempt:05}.{kind}"))
     }
@@ -72,11 +72,11 @@ impl TaskPlace {
     /// Every file of an attempt but its HDF5, with its place in the finished data set as demonstration `demo`.
     pub fn films(&self, attempt: u32, demo: usize) -> Vec<(PathBuf, PathBuf)> {
         let video = |stream: usize| {
-            let part = self.part(attempt, &format!("{}.mp4", VIDEOS[stream]));
+            let part = self.part(attempt, &format!("{}.mp4", VIDEO_STREAMS[stream]));
             (part, self.root.join(self.video_relative(demo, stream)))
         };
         let preview = (self.part(attempt, "preview.mp4"), self.preview(demo));
-        (0..VIDEOS.len()).map(video).chain([preview]).collect()
+        (0..VIDEO_STREAMS.len()).map(video).chain([preview]).collect()
     }
 }
 

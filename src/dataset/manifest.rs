@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     DatasetError,
-    layout::{MANIFEST, TaskPlace, VIDEOS},
+    layout::{MANIFEST, TaskPaths, VIDEO_STREAMS},
 };
 use crate::{
     evaluation::record::{EpisodeRecord, Origin},
@@ -18,7 +18,7 @@ pub const SCHEMA: u32 = 1;
 
 /// A line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Entry {
+pub struct ManifestEntry {
     /// [`SCHEMA`].
     pub schema_version: u32,
     /// Suite.
@@ -54,11 +54,11 @@ pub struct Entry {
     pub video_files: BTreeMap<String, String>,
 }
 
-impl Entry {
+impl ManifestEntry {
     /// That of demonstration `demo` of a task.
-    pub fn new(place: &TaskPlace, demo: usize, record: &EpisodeRecord) -> Self {
+    pub fn new(place: &TaskPaths, demo: usize, record: &EpisodeRecord) -> Self {
         let id = &record.identity;
-        let videos = VIDEOS.iter().enumerate();
+        let videos = VIDEO_STREAMS.iter().enumerate();
         Self {
             schema_version: SCHEMA,
             suite: id.suite.clone(),
@@ -86,7 +86,7 @@ impl Entry {
 ///
 /// # Errors
 /// The file cannot be written.
-pub fn write(root: &Path, entries: &[Entry]) -> Result<(), DatasetError> {
+pub fn write(root: &Path, entries: &[ManifestEntry]) -> Result<(), DatasetError> {
     let path = root.join(MANIFEST);
     let mut text = String::new();
     for entry in entries {
@@ -101,7 +101,7 @@ pub fn write(root: &Path, entries: &[Entry]) -> Result<(), DatasetError> {
 ///
 /// # Errors
 /// The file cannot be read, or a line is none.
-pub fn read(root: &Path) -> Result<Vec<Entry>, DatasetError> {
+pub fn read(root: &Path) -> Result<Vec<ManifestEntry>, DatasetError> {
     let path = root.join(MANIFEST);
     let text = files::read_text(&path)?;
     let parse = |(i, line): (usize, &str)| {

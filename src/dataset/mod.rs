@@ -1,27 +1,27 @@
-//! What is kept of rollouts for people and for training: demonstrations as HDF5, and videos.
+//! Datasets of demonstrations: recording to HDF5 and video, reading, checking, statistics, and conversion from and to other
+//! formats.
 //!
-//! A [`Demonstration`] is the numbers of a rollout, stream by stream; pictures are drawn one step at a time
-//! ([`pictures::Easel`]) and go straight into files ([`recorder::Recorder`]), since those of a whole rollout would not fit into
-//! memory a hundred times. `docs/data.md` says what every stream is.
+//! A [`Demonstration`] holds the numbers of a rollout in memory, one [`DataStream`] per quantity. Images are rendered one step at
+//! a time ([`step_images::StepRenderer`]) and go straight into files ([`demonstration_writer::DemonstrationWriter`]), since the
+//! images of a whole rollout would not fit into memory. `docs/data.md` describes every stream.
 
 pub mod card;
 pub mod check;
-mod copy;
 mod demonstration;
+pub mod demonstration_writer;
 mod error;
-mod hidden;
+mod hdf5;
 pub mod import;
 pub mod layout;
 pub mod lerobot;
 pub mod manifest;
-pub mod pictures;
-mod read;
-pub mod recorder;
+mod privileged;
 pub mod stats;
+pub mod step_images;
+mod stream;
 pub mod video;
-mod write;
 
-pub use copy::assemble;
-pub use demonstration::{Demonstration, Numbers, Stream};
+pub use demonstration::Demonstration;
 pub use error::DatasetError;
-pub use read::{TaskFile, actions};
+pub use hdf5::{TaskFile, actions, merge_parts};
+pub use stream::{DataStream, StreamValues};

@@ -14,7 +14,7 @@ const BARS: usize = 24;
 
 /// One quantity over all demonstrations.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Spread {
+pub struct ColumnStatistics {
     /// What it is.
     pub name: String,
     /// How many numbers there are.
@@ -33,7 +33,7 @@ pub struct Spread {
     pub bins: Vec<usize>,
 }
 
-impl Spread {
+impl ColumnStatistics {
     /// That of some numbers, of which there must be one.
     fn new(name: &str, mut numbers: Vec<f64>) -> Option<Self> {
         numbers.sort_by(f64::total_cmp);
@@ -55,7 +55,7 @@ impl Spread {
 ///
 /// # Errors
 /// One of them cannot be read.
-pub fn of(paths: &[impl AsRef<Path>]) -> Result<Vec<Spread>, DatasetError> {
+pub fn of(paths: &[impl AsRef<Path>]) -> Result<Vec<ColumnStatistics>, DatasetError> {
     let mut columns: [Vec<f64>; 7] = Default::default();
     let (mut lengths, mut peaks, mut soft) = (Vec::new(), Vec::new(), Vec::new());
     for path in paths {
@@ -76,11 +76,11 @@ pub fn of(paths: &[impl AsRef<Path>]) -> Result<Vec<Spread>, DatasetError> {
     }
     let named = ACTION_NAMES.into_iter().zip(columns);
     let all = [("length (steps)", lengths), ("peak D (%)", peaks), ("D (%)", soft)].into_iter().chain(named);
-    Ok(all.filter_map(|(name, numbers)| Spread::new(name, numbers)).collect())
+    Ok(all.filter_map(|(name, numbers)| ColumnStatistics::new(name, numbers)).collect())
 }
 
 /// The numbers as a table.
-pub fn table(spreads: &[Spread]) -> String {
+pub fn table(spreads: &[ColumnStatistics]) -> String {
     let mut text = format!(
         "{:<16}{:>9}{:>10}{:>10}{:>10}{:>10}{:>10}\n",
         "", "count", "min", "median", "mean", "sd", "max"
@@ -101,7 +101,7 @@ const CELL: [usize; 2] = [260, 160];
 const ACROSS: usize = 4;
 
 /// The histograms as a picture.
-pub fn svg(spreads: &[Spread]) -> String {
+pub fn svg(spreads: &[ColumnStatistics]) -> String {
     let rows = spreads.len().div_ceil(ACROSS);
     let [width, height] = CELL;
     let mut page = format!(
@@ -143,11 +143,11 @@ mod tests {
 
     #[test]
     fn a_spread_says_what_the_numbers_say() {
-        let s = Spread::new("x", vec![4.0, 1.0, 2.0, 3.0]).unwrap();
+        let s = ColumnStatistics::new("x", vec![4.0, 1.0, 2.0, 3.0]).unwrap();
         assert_eq!((s.count, s.min, s.median, s.mean, s.max), (4, 1.0, 2.5, 2.5, 4.0));
         assert!((s.sd - 1.25_f64.sqrt()).abs() < 1e-12);
         assert_eq!((s.bins[0], s.bins[BARS - 1], s.bins.iter().sum::<usize>()), (1, 1, 4));
-        assert_eq!(Spread::new("none", Vec::new()), None);
+        assert_eq!(ColumnStatistics::new("none", Vec::new()), None);
         let page = svg(&[s]);
         assert!(page.starts_with("<svg") && page.matches("<rect").count() == BARS + 1, "{page}");
     }

@@ -1,70 +1,74 @@
-//! The safe interaction envelope of an asset, from its hold trials and its compression sweep.
+//! Safe interaction envelope of an asset: from the closure that just holds it to the closure that deforms it by τ.
 //!
-//! Lower bound: the smallest closure at which every grasp–lift–hold trial held. Upper: D_ref is the largest *stable*
-//! deformation of the sweep and τ = κ·D_ref (SoftVTBench, appendix C.3).
+//! - Lower bound: the smallest closure at which every grasp–lift–hold trial held.
+//! - Upper bound: the closure at which D reaches τ = κ·D_ref in the compression sweep. D_ref is the largest deformation of a
+//!   *stable* squeeze ([`StabilityCriteria`]; SoftVTBench, appendix C.3).
+//!
+//! Closure is 0 with the gripper open (80 mm) and 1 with the gels in contact. `softvt scripts/calibrate.lua` runs both scans.
 
 use serde::{Deserialize, Serialize};
 
-use super::safety::{Limit, six_decimals};
+use super::safety::{DeformationLimit, round_to_six_decimals};
 
-/// All trials at one closure of the lower-bound scan.
+/// Trials at one closure of the lower-bound scan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HoldRow {
-    /// Commanded closure, 0 open … 1 shut.
+    /// Commanded closure, 0 (open) to 1 (closed).
     pub closure: f64,
-    /// Trials made.
+    /// Number of trials.
     pub trials: u32,
-    /// Trials that held without slip or drop.
+    /// Number of trials that held without slip or drop.
     pub held: u32,
-    /// Largest slip of the trials, mm.
+    /// Largest slip over the trials, mm.
     pub slip_mm: f64,
-    /// Largest peak D of the trials, %.
+    /// Largest peak D over the trials, %.
     pub d_peak_pct: f64,
 }
 
-/// One closure of the compression sweep.
+/// Squeeze at one closure of the compression sweep.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SweepRow {
-    /// Commanded closure, 0 open … 1 shut.
+    /// Commanded closure, 0 (open) to 1 (closed).
     pub closure: f64,
     /// Measured apex-to-apex width, mm.
     pub gripper_width_mm: f64,
-    /// Peak D, %.
+    /// Peak D while squeezing, %.
     pub d_peak_pct: f64,
-    /// Mean normal force of the pads at rest, N.
+    /// Mean normal force per pad at rest, N.
     pub force_n: f64,
-    /// Smallest det F.
+    /// Smallest det F over all Gauss points and steps.
     pub min_det_f: f64,
-    /// Largest node speed over the window at rest, m/s.
+    /// Largest node speed over the observation window at rest, m/s.
     pub node_speed_m_s: f64,
-    /// Both pads touched at rest.
+    /// True if both pads touched at rest.
     pub both_pads: bool,
     /// Slip while squeezing, mm.
     pub slip_mm: f64,
-    /// Whether it counts for D_ref.
+    /// True if the squeeze counts for D_ref.
     pub stable: bool,
 }
 
-/// When a squeeze is stable.
+/// Bounds within which a squeeze is stable.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct StableRule {
-    /// det F must stay above.
+pub struct StabilityCriteria {
+    /// Exclusive lower bound of det F.
     pub min_det_f: f64,
-    /// Node speed must stay below, m/s.
+    /// Exclusive upper bound of the node speed at rest, m/s.
     pub node_speed_m_s: f64,
-    /// Slip must stay below, mm.
+    /// Exclusive upper bound of the slip, mm.
     pub slip_mm: f64,
 }
 
-impl Default for StableRule {
+impl Default for StabilityCriteria {
     fn default() -> Self {
         Self { min_det_f: 0.1, node_speed_m_s: 0.005, slip_mm: 2.0 }
     }
 }
 
-impl StableRule {
-    /// Whether `row`, its own `stable` aside, is a stable squeeze. Numbers that are not finite are not stable.
+impl StabilityCriteria {
+    /// True if `row` is a stable squeeze: both pads touch and every number is within its bound. `row.stable` is not read.
+    /// Numbers that are not finite are not stable.
     pub fn accepts(&self, row: &SweepRow) -> bool {
         row.both_pads
             && row.d_peak_pct.is_finite()
@@ -74,29 +78,30 @@ impl StableRule {
     }
 }
 
-/// The envelope of an asset, with the rows it came from.
+/// Envelope of an asset, with the rows it was computed from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Envelope {
-    /// Smallest closure that held in every trial; null when none did.
+    /// Smallest closure at which every trial held; null without one.
     pub closure_lower: Option<f64>,
-    /// Closure at which D reaches τ; null when the sweep never does.
+    /// Closure at which D reaches τ; null if the sweep does not reach it.
     pub closure_at_tau: Option<f64>,
     /// Closure of the row that gave D_ref; null without a stable squeeze.
     pub closure_at_d_ref: Option<f64>,
-    /// Lower-bound scan, loose to tight.
+    /// Lower-bound scan, by increasing closure.
     pub holds: Vec<HoldRow>,
-    /// Compression sweep, loose to tight.
+    /// Compression sweep, by increasing closure.
     pub sweep: Vec<SweepRow>,
 }
 
 impl Envelope {
-    /// Finds the bounds in the rows, which are put in order of closure.
+    /// Sorts the rows by closure and computes the bounds.
     pub fn new(mut holds: Vec<HoldRow>, mut sweep: Vec<SweepRow>, kappa: f64) -> Self {
         holds.sort_by(|a, b| a.closure.total_cmp(&b.closure));
         sweep.sort_by(|a, b| a.closure.total_cmp(&b.closure));
-        let limit = limit(&sweep, kappa);
-        let reference = limit
-            .and_then(|l| sweep.iter().find(|row| row.stable && six_decimals(row.d_peak_pct) == l.d_ref_pct));
+        let limit = deformation_limit(&sweep, kappa);
+        let reference = limit.and_then(|l| {
+            sweep.iter().find(|row| row.stable && round_to_six_decimals(row.d_peak_pct) == l.d_ref_pct)
+        });
         Self {
             closure_lower: lower_bound(&holds),
             closure_at_tau: limit.and_then(|l| closure_at(&sweep, l.tau_pct())),
@@ -106,7 +111,7 @@ impl Envelope {
         }
     }
 
-    /// Whether some closure both holds and stays within τ.
+    /// True if some closure both holds the object and stays below τ.
     pub fn has_safe_window(&self) -> bool {
         match (self.closure_lower, self.closure_at_tau) {
             (Some(lower), Some(upper)) => lower < upper,
@@ -115,20 +120,21 @@ impl Envelope {
     }
 }
 
-/// The limit that a sweep gives; `None` when no squeeze with any deformation was stable.
-pub fn limit(sweep: &[SweepRow], kappa: f64) -> Option<Limit> {
+/// Deformation limit of a sweep: D_ref is the largest D of a stable row, rounded to six decimals. `None` if no stable row
+/// has a deformation above zero.
+pub fn deformation_limit(sweep: &[SweepRow], kappa: f64) -> Option<DeformationLimit> {
     let stable = sweep.iter().filter(|row| row.stable && row.d_peak_pct.is_finite());
     let largest = stable.map(|row| row.d_peak_pct).fold(0.0_f64, f64::max);
-    (largest > 0.0).then_some(Limit { d_ref_pct: six_decimals(largest), kappa })
+    (largest > 0.0).then_some(DeformationLimit { d_ref_pct: round_to_six_decimals(largest), kappa })
 }
 
-/// The smallest closure at which every trial held; `holds` in order of closure.
+/// Smallest closure at which every trial held; `holds` by increasing closure.
 pub fn lower_bound(holds: &[HoldRow]) -> Option<f64> {
     holds.iter().find(|row| row.trials > 0 && row.held == row.trials).map(|row| row.closure)
 }
 
-/// The closure at which D first reaches `d_pct`, linear between the rows; `sweep` in order of closure. `None` when it
-/// starts above or never reaches it.
+/// Closure at which D first reaches `d_pct`, linear between the rows; `sweep` by increasing closure. `None` if the first row
+/// is above it or no row reaches it.
 pub fn closure_at(sweep: &[SweepRow], d_pct: f64) -> Option<f64> {
     sweep.windows(2).find(|pair| pair[0].d_peak_pct <= d_pct && pair[1].d_peak_pct >= d_pct).map(|pair| {
         let rise = pair[1].d_peak_pct - pair[0].d_peak_pct;
@@ -160,7 +166,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn the_envelope_lies_between_the_loosest_sure_hold_and_the_closure_at_tau() {
+    fn the_envelope_is_from_the_loosest_reliable_hold_to_the_closure_at_tau() {
         let holds = vec![hold(0.34, 5), hold(0.30, 0), hold(0.32, 4)];
         let sweep = vec![
             squeeze(0.3, 0.0, true),
@@ -176,25 +182,28 @@ pub(crate) mod tests {
             "D = 1.5 lies a quarter of the way"
         );
         assert!(envelope.has_safe_window());
-        assert_eq!(limit(&envelope.sweep, 0.5), Some(Limit { d_ref_pct: 3.0, kappa: 0.5 }));
+        assert_eq!(
+            deformation_limit(&envelope.sweep, 0.5),
+            Some(DeformationLimit { d_ref_pct: 3.0, kappa: 0.5 })
+        );
     }
 
     #[test]
-    fn without_a_stable_squeeze_or_a_sure_hold_there_is_no_window() {
+    fn without_a_stable_squeeze_or_a_reliable_hold_there_is_no_window() {
         let envelope = Envelope::new(vec![hold(0.3, 4)], vec![squeeze(0.3, 1.0, false)], 0.5);
         assert_eq!((envelope.closure_lower, envelope.closure_at_tau), (None, None));
         assert!(!envelope.has_safe_window());
-        assert_eq!(limit(&envelope.sweep, 0.5), None);
+        assert_eq!(deformation_limit(&envelope.sweep, 0.5), None);
         let late =
             Envelope::new(vec![hold(0.5, 5)], vec![squeeze(0.3, 0.0, true), squeeze(0.4, 2.0, true)], 0.5);
         assert!(!late.has_safe_window(), "it holds only beyond the limit");
     }
 
     #[test]
-    fn a_squeeze_is_stable_by_every_part_of_the_rule() {
-        let rule = StableRule::default();
+    fn every_criterion_of_stability_counts() {
+        let criteria = StabilityCriteria::default();
         let row = squeeze(0.3, 1.0, false);
-        assert!(rule.accepts(&row));
+        assert!(criteria.accepts(&row));
         for bad in [
             SweepRow { min_det_f: 0.1, ..row.clone() },
             SweepRow { node_speed_m_s: 0.005, ..row.clone() },
@@ -202,7 +211,7 @@ pub(crate) mod tests {
             SweepRow { slip_mm: 2.0, ..row.clone() },
             SweepRow { d_peak_pct: f64::NAN, ..row.clone() },
         ] {
-            assert!(!rule.accepts(&bad), "{bad:?}");
+            assert!(!criteria.accepts(&bad), "{bad:?}");
         }
     }
 }

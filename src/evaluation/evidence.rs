@@ -1,69 +1,71 @@
-//! What the judge is shown after every physics step: plain numbers, world frame, hidden from policies.
+//! Input of the judge after every physics step: plain numbers in the world frame, hidden from policies.
+//!
+//! Forces enter as impulses (force times the length of the physics step), so that they may be summed over a control step.
 
 use crate::geometry::{Pose, Vec3};
 
 use super::deformation::Deformation;
 
-/// One pad against the target.
+/// Contact between one gripper pad and the target.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PadEvidence {
     /// Normal impulse between pad and target in this step, N s.
     pub normal_impulse_ns: f64,
-    /// How far the touched patch has slid along the pad since this contact began, m.
+    /// Distance that the contact patch has slid along the pad since this contact began, m.
     pub travel_m: f64,
 }
 
-/// The gripper.
+/// Opening of the gripper.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GripperEvidence {
-    /// Measured apex-to-apex width, m.
+    /// Measured distance between the apexes of the two gels, m.
     pub width_m: f64,
-    /// Commanded apex-to-apex width, m.
+    /// Commanded distance between the apexes of the two gels, m.
     pub commanded_width_m: f64,
 }
 
-/// One movable body.
+/// State of one movable body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BodyEvidence {
-    /// Centre (mean of the nodes of a soft body, centre of mass of a rigid one), m.
+    /// Centre, m: mean of the nodes of a soft body, centre of mass of a rigid one.
     pub centre_w: Vec3,
-    /// Height of its lowest point, m.
+    /// Height of the lowest point, m.
     pub lowest_z_w: f64,
-    /// Upward impulse on it in this step from everything but the robot, N s. A sleeping body keeps that it fell
-    /// asleep with.
+    /// Sum of the upward impulses on the body in this step from everything but the robot, N s. A sleeping body keeps the
+    /// value with which it fell asleep.
     pub support_impulse_ns: f64,
-    /// Its deformation; `None` for a rigid body, and for a soft one when it could not be measured.
+    /// Present deformation; `None` for a rigid body, and for a soft one when it could not be measured.
     pub deformation: Option<Deformation>,
 }
 
-/// What the target must be placed on or in.
+/// State of the object that the target must be placed on or in.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PlaceEvidence {
-    /// Its object frame in the world.
+pub struct GoalEvidence {
+    /// Pose of its object frame (origin at the centre of its footprint).
     pub pose_w: Pose,
     /// Upward impulse from it on the target in this step, N s.
     pub support_impulse_ns: f64,
 }
 
-/// One physics step, as it ended.
+/// State at the end of one physics step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Evidence<'a> {
     /// Time since the policy took over, s.
     pub time_s: f64,
-    /// Hand frame origin, m.
+    /// Origin of the hand frame, m.
     pub hand_w: Vec3,
-    /// The gripper.
+    /// Opening of the gripper.
     pub gripper: GripperEvidence,
     /// Left and right pad against the target.
     pub pads: [PadEvidence; 2],
     /// Normal impulse in this step between the target and the rest of the robot (hand, fingers, sensor cases), N s.
     pub robot_impulse_ns: f64,
-    /// The target.
+    /// State of the target.
     pub target: BodyEvidence,
-    /// The other movable bodies, always in the same order.
+    /// States of the other movable bodies, in the same order in every step.
     pub others: &'a [BodyEvidence],
-    /// Where the target must go.
-    pub place: PlaceEvidence,
+    /// State of the object at the goal.
+    pub goal: GoalEvidence,
 }
 
 impl BodyEvidence {
@@ -75,9 +77,9 @@ impl BodyEvidence {
 }
 
 impl Evidence<'_> {
-    /// Whether every number that the rules read is finite. Deformations are looked at apart.
+    /// True if every number that the criteria read is finite. Deformations are not included: a missing one is counted apart.
     pub fn is_finite(&self) -> bool {
-        let pose = self.place.pose_w.to_homogeneous();
+        let pose = self.goal.pose_w.to_homogeneous();
         self.time_s.is_finite()
             && self.hand_w.iter().chain(pose.iter()).all(|v| v.is_finite())
             && self.gripper.width_m.is_finite()
@@ -86,6 +88,6 @@ impl Evidence<'_> {
             && self.robot_impulse_ns.is_finite()
             && self.target.is_finite()
             && self.others.iter().all(BodyEvidence::is_finite)
-            && self.place.support_impulse_ns.is_finite()
+            && self.goal.support_impulse_ns.is_finite()
     }
 }

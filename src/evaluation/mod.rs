@@ -1,18 +1,32 @@
-//! Judging: deformation, drop and slip, goal, safety, calibration and statistics. Small pure functions on plain numbers.
+//! Scores of an episode: deformation, drop, slip, goal, safety, calibration and statistics.
 //!
-//! One [`judge::Judge`] watches one episode: it is shown an [`evidence::Evidence`] after every physics step and gives a
-//! [`judge::Verdict`] at the end. [`record::EpisodeRecord`]s gather into a [`summary::Summary`].
+//! Everything here is a small pure function or state machine on plain numbers; the simulator is one source of them, a
+//! motion-capture system could be another. [`judge::Judge`] takes one [`evidence::Evidence`] per physics step and returns a
+//! [`record::Verdict`] at the end. Verdicts go into [`record::EpisodeRecord`]s, and those into a [`summary::SuiteSummary`].
+//!
+//! | question | module |
+//! |---|---|
+//! | How deformed is a soft body? | [`deformation`] |
+//! | Does the target rest at its goal, released? | [`goal`] |
+//! | Was the object dropped, or released on purpose? | [`drop`] |
+//! | How far did it slide in the grasp? | [`slip`] |
+//! | Goal, NoDrop and deformation limit together | [`safety`] |
+//! | Where does the limit τ of an asset come from? | [`calibration`], [`thresholds`] |
+//! | Every threshold of the judge | [`criteria`] |
+//! | Rates, intervals, paired tests | [`statistics`], [`paired_stats`], [`summary`] |
+//!
+//! The metrics are those of SoftVTBench; `docs/decisions.md` lists the choices made where the paper is silent.
 
 pub mod calibration;
+pub mod criteria;
 pub mod deformation;
-pub mod difference;
 pub mod drop;
+pub mod envelope_plot;
 pub mod evidence;
 pub mod goal;
 pub mod judge;
-pub mod paired;
+pub mod paired_stats;
 pub mod record;
-pub mod rules;
 pub mod safety;
 pub mod slip;
 pub mod statistics;

@@ -1,8 +1,11 @@
-//! The record of one episode: one line of `episodes.jsonl`.
+//! Record of one episode: one line of `episodes.jsonl`.
+//!
+//! [`EpisodeRecord`] flattens four parts into one JSON object: the [`Identity`] of the episode, its [`Outcome`], the
+//! [`Verdict`] of the judge and the [`RolloutStats`].
 
 use serde::{Deserialize, Serialize};
 
-use super::judge::Verdict;
+use super::{drop::DropEvent, safety::KappaVerdict};
 use crate::scene::InitialState;
 
 /// How a rollout ended.
@@ -11,119 +14,172 @@ use crate::scene::InitialState;
 pub enum Outcome {
     /// The goal held for long enough.
     Completed,
-    /// The budget was spent.
+    /// The budget of control steps was spent.
     Timeout,
-    /// The physics could not be trusted any more.
+    /// The physics state became invalid.
     Invalid {
-        /// Why: "inverted", "not_finite", "not_converged", "too_fast", "too_hard" …
+        /// One of "inverted", "not_finite", "not_converged", "too_fast", "too_hard" …
         reason: String,
         /// Physics step since the policy took over.
         step: u64,
-        /// The node it was seen at, where there is one.
+        /// Index of the node concerned, if there is one.
         node: Option<u32>,
     },
     /// The episode could not be run to its end.
     Error {
-        /// What went wrong.
+        /// Message of the error.
         message: String,
     },
 }
 
 impl Outcome {
-    /// Whether the rollout's evidence can be judged.
+    /// True if the evidence of the rollout can be judged.
     pub fn is_valid(&self) -> bool {
         matches!(self, Self::Completed | Self::Timeout)
     }
 }
 
-/// Which episode this is.
+/// Task, initial state and policy of an episode.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Identity {
-    /// Suite name.
+    /// Name of the suite.
     pub suite: String,
-    /// Task index in the suite.
+    /// Index of the task in the suite.
     pub task: usize,
-    /// What the policy was told.
+    /// Instruction given to the policy.
     pub prompt: String,
-    /// Layout name.
+    /// Name of the layout.
     pub layout: String,
-    /// Episode index in the task.
+    /// Index of the episode in the task.
     pub episode: u32,
     /// Base seed.
     pub seed: u64,
-    /// Split: "eval", "demo" …
+    /// Split of the initial states: "eval", "demo" …
     pub split: String,
-    /// Policy name.
+    /// Name of the policy.
     pub policy: String,
-    /// Whether it sees the true state, as experts do.
+    /// True if the policy sees the true state, as experts do.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub privileged: bool,
     /// Asset of the target.
     pub asset: String,
-    /// Whether the target deforms.
+    /// True if the target is a soft body.
     pub soft: bool,
-    /// Which foreign demonstration it re-executes, if any.
+    /// Foreign demonstration that the episode re-executes, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub origin: Option<Box<Origin>>,
 }
 
-/// A demonstration that was made in another world, of which an episode takes its start and its actions.
+/// Demonstration of another simulator or robot, of which an episode takes the initial state and the actions.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Origin {
-    /// Its file, without the folders above.
+    /// Name of its file, without folders.
     pub file: String,
     /// SHA-256 of the file, hexadecimal.
     pub sha256: String,
     /// Name of the demonstration in the file.
     pub demo: String,
-    /// How the file is laid out.
+    /// Format of the file.
     pub layout: String,
-    /// What the episode starts from instead of what its layout made.
+    /// Initial state that replaces the one of the layout.
     pub start: InitialState,
 }
 
-/// What the run itself counted.
+/// Judgement of one episode. Percentages are of the diagonal of the settled bounding box.
+///
+/// [`super::judge`] defines each field.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Verdict {
+    /// Goal Success.
+    pub goal: bool,
+    /// Time at which the goal had held for long enough, s; null without success.
+    pub goal_time_s: Option<f64>,
+    /// Goal Success by the looser predicate of SoftVTBench's released code.
+    pub goal_v1: bool,
+    /// NoDrop.
+    pub no_drop: bool,
+    /// The first event that made NoDrop false.
+    pub drop: Option<DropEvent>,
+    /// NoSlip; reported only, not part of Safety Success.
+    pub no_slip: bool,
+    /// Largest slip along a pad in a grasp, mm.
+    pub slip_mm: f64,
+    /// Peak D of the target, %; null for a rigid one.
+    pub d_peak: Option<f64>,
+    /// Peak mass-weighted D of the target, %.
+    pub d_peak_weighted: Option<f64>,
+    /// Peak of the largest node displacement of the target, %.
+    pub d_peak_max: Option<f64>,
+    /// Peak D over the other soft bodies, %.
+    pub d_peak_other: Option<f64>,
+    /// True if the first object that was lifted is not the target.
+    pub wrong_instance: bool,
+    /// Nominal κ.
+    pub kappa: Option<f64>,
+    /// τ at the nominal κ, %; null without a calibration.
+    pub tau: Option<f64>,
+    /// D_ref, %; null without a calibration.
+    pub d_ref: Option<f64>,
+    /// D_peak ≤ τ; null for a rigid target and where evidence is missing.
+    pub deformation_ok: Option<bool>,
+    /// Safety Success.
+    pub safety: bool,
+    /// True if there was the evidence to judge safety at all.
+    pub safety_known: bool,
+    /// Safety at each κ of the sensitivity table.
+    pub kappas: Vec<KappaVerdict>,
+    /// Number of physics steps whose evidence was not finite.
+    pub missing_evidence: u64,
+    /// Number of physics steps at which the target's D could not be measured.
+    pub missing_deformation: u64,
+    /// Largest normal force on one pad, N.
+    pub peak_pad_force_n: f64,
+    /// Mean normal force per pad while both pads touched, N.
+    pub mean_pad_force_n: f64,
+}
+
+/// Counters of the rollout.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RolloutStats {
-    /// Control steps.
+    /// Number of control steps.
     pub steps: u32,
     /// Simulated time since the policy took over, s.
     pub time_s: f64,
-    /// Smallest det F of any Gauss point of the target at any step; null for a rigid one.
+    /// Smallest det F over all Gauss points of the target and all steps; null for a rigid one.
     pub min_det_f: Option<f64>,
-    /// Mean Newton iterations a physics step.
+    /// Mean Newton iterations per physics step.
     pub newton_mean: f64,
-    /// Most Newton iterations in one physics step.
+    /// Largest number of Newton iterations in one physics step.
     pub newton_max: u32,
-    /// Whether the policy saw the true forces at the pads, which no real sensor gives.
+    /// True if the policy saw the true forces at the pads, which no real sensor gives.
     #[serde(default)]
     pub force_observed: bool,
-    /// Observations with a picture of a camera that stood inside of something: it shows what is beyond that thing.
+    /// Number of observations with an image of a camera that was inside an object; it shows the scene beyond that object.
     #[serde(default)]
     pub camera_inside: u32,
-    /// Control steps whose command was farther from the tool than a step of the inverse kinematics looks (0.2 m, 0.6 rad):
-    /// out of reach, or in the wrong frame or unit.
+    /// Number of control steps whose command was farther from the tool than one step of the inverse kinematics reaches (0.2 m,
+    /// 0.6 rad): out of reach, or in the wrong frame or unit.
     #[serde(default)]
     pub far_commands: u32,
-    /// Why whoever drove gave up, if it said so.
+    /// Reason given by the controller for aborting the episode, if it did.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gave_up: Option<String>,
     /// Hash of the final state, hexadecimal.
     pub state_hash: String,
 }
 
-/// One episode. Fields keep their order and floats their bits through JSON.
+/// One episode. Fields keep their order, and numbers every bit, through JSON.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EpisodeRecord {
-    /// Which episode.
+    /// Task, initial state and policy.
     #[serde(flatten)]
     pub identity: Identity,
     /// How it ended.
     pub outcome: Outcome,
-    /// What is said of it.
+    /// Judgement.
     #[serde(flatten)]
     pub verdict: Verdict,
-    /// What was counted.
+    /// Counters of the rollout.
     #[serde(flatten)]
     pub stats: RolloutStats,
 }

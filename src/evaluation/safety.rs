@@ -1,60 +1,65 @@
-//! Safety Success = Goal ∧ NoDrop ∧ D_peak ≤ τ, and the deformation limit τ = κ·D_ref.
+//! Safety Success = Goal ∧ NoDrop ∧ D_peak ≤ τ, with the deformation limit τ = κ·D_ref of the target's asset.
+//!
+//! D_ref is the largest stable deformation of the asset's compression sweep ([`super::calibration`]); κ is the share of it
+//! that the benchmark allows. For a rigid target the last term is left out. A peak that is unknown is not safe.
 
 use serde::{Deserialize, Serialize};
 
-/// The κ reported beside the nominal one (SoftVTBench, appendix C.3).
+/// The κ that are reported next to the nominal one (SoftVTBench, appendix C.3).
 pub const KAPPAS: [f64; 3] = [0.3, 0.5, 0.7];
 
-/// The nominal κ.
+/// The κ of the benchmark: τ is half of the largest stable deformation.
 pub const NOMINAL_KAPPA: f64 = 0.5;
 
 /// Rounds to the six decimals of a threshold file, so that a limit is the same number in memory and on disk.
-pub fn six_decimals(value: f64) -> f64 {
+pub fn round_to_six_decimals(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
 }
 
-/// The calibrated deformation limit of an asset.
+/// Calibrated deformation limit of an asset.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Limit {
-    /// Largest stable deformation of the compression sweep, %.
+pub struct DeformationLimit {
+    /// Largest stable deformation of the compression sweep, % of the bounding-box diagonal.
     pub d_ref_pct: f64,
     /// Nominal κ.
     pub kappa: f64,
 }
 
-impl Limit {
-    /// τ at `kappa`, %, to six decimals.
+impl DeformationLimit {
+    /// τ = κ·D_ref for any κ, %, rounded to six decimals.
     pub fn tau_at(&self, kappa: f64) -> f64 {
-        six_decimals(kappa * self.d_ref_pct)
+        round_to_six_decimals(kappa * self.d_ref_pct)
     }
 
-    /// The nominal τ, %.
+    /// τ at the nominal κ, %.
     pub fn tau_pct(&self) -> f64 {
         self.tau_at(self.kappa)
     }
 }
 
-/// Peak deformation as evidence.
+/// Largest deformation over the physics steps of an episode.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Peak {
-    /// The largest D seen, %; `None` if none was.
+pub struct PeakDeformation {
+    /// The largest D, %; `None` if it was never measured.
     pub d_pct: Option<f64>,
-    /// Steps at which D could not be measured.
+    /// Number of steps at which D could not be measured.
     pub missing: u64,
 }
 
-impl Peak {
-    /// Takes in the D of one step.
-    pub fn observe(&mut self, d_pct: Option<f64>) {
+impl PeakDeformation {
+    /// Takes in the D of one step; `None` and values that are not finite count as missing.
+    pub fn update(&mut self, d_pct: Option<f64>) {
         match d_pct.filter(|d| d.is_finite()) {
             Some(d) => self.d_pct = Some(self.d_pct.map_or(d, |peak| peak.max(d))),
             None => self.missing += 1,
         }
     }
 
-    /// Whether the deformation stayed within `tau_pct`: `Some(false)` once it was above, whatever is missing; `None`
-    /// where it was not and evidence or the limit is missing.
-    pub fn within(&self, tau_pct: Option<f64>) -> Option<bool> {
+    /// True if the deformation never exceeded `tau_pct`; equality is allowed.
+    ///
+    /// `Some(false)` if it was exceeded, even when other steps are missing. `None` if it was not exceeded, but steps or the
+    /// limit are missing.
+    pub fn is_within(&self, tau_pct: Option<f64>) -> Option<bool> {
         match (self.d_pct, tau_pct) {
             (Some(d), Some(tau)) if d > tau => Some(false),
             (Some(_), Some(_)) if self.missing == 0 => Some(true),
@@ -63,19 +68,19 @@ impl Peak {
     }
 }
 
-/// Safety Success. Deformation that is unknown is not safe; for a rigid object it does not apply.
-pub fn safe(goal: bool, no_drop: bool, soft: bool, deformation_ok: Option<bool>) -> bool {
-    goal && no_drop && (!soft || deformation_ok == Some(true))
+/// Safety Success. Unknown deformation of a soft target is not safe; for a rigid target deformation does not apply.
+pub fn is_safe(goal: bool, no_drop: bool, is_soft: bool, deformation_ok: Option<bool>) -> bool {
+    goal && no_drop && (!is_soft || deformation_ok == Some(true))
 }
 
-/// One row of the κ sensitivity of an episode.
+/// Safety of an episode at one κ of the sensitivity table.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct KappaVerdict {
-    /// κ.
+    /// Share of D_ref.
     pub kappa: f64,
     /// τ = κ·D_ref, %.
     pub tau_pct: f64,
-    /// D_peak ≤ τ.
+    /// D_peak ≤ τ; null where it is unknown.
     pub deformation_ok: Option<bool>,
     /// Safety Success at this κ.
     pub safety: bool,
@@ -85,37 +90,37 @@ pub struct KappaVerdict {
 mod tests {
     use super::*;
 
-    fn peak(ds: &[Option<f64>]) -> Peak {
-        let mut peak = Peak::default();
-        ds.iter().for_each(|d| peak.observe(*d));
+    fn peak(ds: &[Option<f64>]) -> PeakDeformation {
+        let mut peak = PeakDeformation::default();
+        ds.iter().for_each(|d| peak.update(*d));
         peak
     }
 
     #[test]
     fn tau_is_kappa_of_d_ref_to_six_decimals_and_the_limit_itself_is_safe() {
-        let limit = Limit { d_ref_pct: 2.359091, kappa: 0.5 };
+        let limit = DeformationLimit { d_ref_pct: 2.359091, kappa: 0.5 };
         assert_eq!(limit.tau_pct(), 1.179546);
         assert_eq!(limit.tau_at(0.3), 0.707727);
-        assert_eq!(peak(&[Some(1.179546)]).within(Some(limit.tau_pct())), Some(true));
-        assert_eq!(peak(&[Some(1.1795461)]).within(Some(limit.tau_pct())), Some(false));
+        assert_eq!(peak(&[Some(1.179546)]).is_within(Some(limit.tau_pct())), Some(true));
+        assert_eq!(peak(&[Some(1.1795461)]).is_within(Some(limit.tau_pct())), Some(false));
     }
 
     #[test]
     fn missing_evidence_is_never_safe() {
-        assert_eq!(peak(&[]).within(Some(1.0)), None);
-        assert_eq!(peak(&[Some(0.5), None]).within(Some(1.0)), None);
-        assert_eq!(peak(&[Some(0.5), Some(f64::NAN)]).within(Some(1.0)), None);
-        assert_eq!(peak(&[Some(0.5)]).within(None), None, "no threshold");
-        assert_eq!(peak(&[Some(1.5), None]).within(Some(1.0)), Some(false), "known to be too much");
-        assert!(!safe(true, true, true, None));
+        assert_eq!(peak(&[]).is_within(Some(1.0)), None);
+        assert_eq!(peak(&[Some(0.5), None]).is_within(Some(1.0)), None);
+        assert_eq!(peak(&[Some(0.5), Some(f64::NAN)]).is_within(Some(1.0)), None);
+        assert_eq!(peak(&[Some(0.5)]).is_within(None), None, "no threshold");
+        assert_eq!(peak(&[Some(1.5), None]).is_within(Some(1.0)), Some(false), "known to be too much");
+        assert!(!is_safe(true, true, true, None));
     }
 
     #[test]
     fn safety_needs_every_part_and_deformation_only_for_soft_objects() {
-        assert!(safe(true, true, true, Some(true)));
-        assert!(!safe(false, true, true, Some(true)));
-        assert!(!safe(true, false, true, Some(true)));
-        assert!(!safe(true, true, true, Some(false)));
-        assert!(safe(true, true, false, None));
+        assert!(is_safe(true, true, true, Some(true)));
+        assert!(!is_safe(false, true, true, Some(true)));
+        assert!(!is_safe(true, false, true, Some(true)));
+        assert!(!is_safe(true, true, true, Some(false)));
+        assert!(is_safe(true, true, false, None));
     }
 }

@@ -1,40 +1,43 @@
-//! NoSlip: how far a held object slid along the pads. Reported beside NoDrop, not part of it.
+//! NoSlip: sliding of a held object along the pads. Reported next to NoDrop, not part of it.
 
 use super::evidence::PadEvidence;
 
-/// What [`SlipWatch`] reads of a step.
+/// One physics step as [`SlipMonitor`] reads it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hold {
-    /// The two pads.
+pub struct SlipSample {
+    /// Left and right pad.
     pub pads: [PadEvidence; 2],
-    /// Both press on the target and the hand has not been told to release.
-    pub held: bool,
+    /// True if both pads press on the target and no release was commanded.
+    pub is_held: bool,
 }
 
-/// Measures slip since both pads closed on the target; a regrasp starts anew, the largest slip stays.
+/// Measures slip: the travel of the contact patch along a pad since both pads closed on the target.
+///
+/// Each grasp starts at zero again. The result is the maximum over both pads, all steps and all grasps, so motion back does
+/// not reduce it. NoSlip holds if it is at most [`super::criteria::SuccessCriteria::slip_m`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SlipWatch {
+pub struct SlipMonitor {
     start_m: Option<[f64; 2]>,
-    largest_m: f64,
+    max_m: f64,
 }
 
-impl SlipWatch {
-    /// Looks at one step.
-    pub fn observe(&mut self, hold: &Hold) {
-        if !hold.held {
+impl SlipMonitor {
+    /// Takes in one physics step.
+    pub fn update(&mut self, sample: &SlipSample) {
+        if !sample.is_held {
             self.start_m = None;
             return;
         }
-        let travel = hold.pads.map(|pad| pad.travel_m);
+        let travel = sample.pads.map(|pad| pad.travel_m);
         let start = *self.start_m.get_or_insert(travel);
         for (now, start) in travel.iter().zip(&start) {
-            self.largest_m = self.largest_m.max((now - start).abs());
+            self.max_m = self.max_m.max((now - start).abs());
         }
     }
 
     /// Largest slip on either pad in any grasp so far, m.
-    pub fn largest_m(&self) -> f64 {
-        self.largest_m
+    pub fn max_m(&self) -> f64 {
+        self.max_m
     }
 }
 
@@ -42,38 +45,39 @@ impl SlipWatch {
 mod tests {
     use super::*;
 
-    fn hold(travel_mm: [f64; 2], held: bool) -> Hold {
-        Hold { pads: travel_mm.map(|mm| PadEvidence { normal_impulse_ns: 0.05, travel_m: mm * 1e-3 }), held }
+    fn sample(travel_mm: [f64; 2], is_held: bool) -> SlipSample {
+        let pads = travel_mm.map(|mm| PadEvidence { normal_impulse_ns: 0.05, travel_m: mm * 1e-3 });
+        SlipSample { pads, is_held }
     }
 
     #[test]
     fn slip_counts_from_the_closure_and_takes_the_worse_pad() {
-        let mut slip = SlipWatch::default();
-        [hold([3.0, 1.0], true), hold([3.5, 1.2], true), hold([3.6, 3.1], true)]
+        let mut slip = SlipMonitor::default();
+        [sample([3.0, 1.0], true), sample([3.5, 1.2], true), sample([3.6, 3.1], true)]
             .iter()
-            .for_each(|h| slip.observe(h));
-        assert!((slip.largest_m() - 2.1e-3).abs() < 1e-12);
+            .for_each(|s| slip.update(s));
+        assert!((slip.max_m() - 2.1e-3).abs() < 1e-12);
     }
 
     #[test]
-    fn opening_the_hand_does_not_slip() {
-        let mut slip = SlipWatch::default();
-        [hold([0.0, 0.0], true), hold([9.0, 9.0], false)].iter().for_each(|h| slip.observe(h));
-        assert_eq!(slip.largest_m(), 0.0);
+    fn opening_the_hand_is_not_slip() {
+        let mut slip = SlipMonitor::default();
+        [sample([0.0, 0.0], true), sample([9.0, 9.0], false)].iter().for_each(|s| slip.update(s));
+        assert_eq!(slip.max_m(), 0.0);
     }
 
     #[test]
-    fn a_regrasp_starts_anew_and_the_largest_stays() {
-        let mut slip = SlipWatch::default();
-        for h in [
-            hold([0.0, 0.0], true),
-            hold([1.5, 0.0], true),
-            hold([5.0, 5.0], false),
-            hold([7.0, 7.0], true),
-            hold([7.5, 7.0], true),
+    fn a_regrasp_starts_at_zero_and_the_largest_slip_stays() {
+        let mut slip = SlipMonitor::default();
+        for s in [
+            sample([0.0, 0.0], true),
+            sample([1.5, 0.0], true),
+            sample([5.0, 5.0], false),
+            sample([7.0, 7.0], true),
+            sample([7.5, 7.0], true),
         ] {
-            slip.observe(&h);
+            slip.update(&s);
         }
-        assert!((slip.largest_m() - 1.5e-3).abs() < 1e-12);
+        assert!((slip.max_m() - 1.5e-3).abs() < 1e-12);
     }
 }

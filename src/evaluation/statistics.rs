@@ -1,33 +1,33 @@
-//! Rates with their uncertainty, and order statistics.
+//! Rates with confidence intervals, means and quantiles.
 
 use serde::{Deserialize, Serialize};
 
-/// Two-sided 95 % quantile of the normal distribution.
+/// Quantile of the normal distribution for a two-sided 95 % interval.
 pub(super) const Z95: f64 = 1.959_963_984_540_054;
 
-/// A share of episodes, in percent.
+/// Share of episodes with its uncertainty, in percent.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Rate {
-    /// The share, %; null without episodes.
+    /// Share, %; null without episodes.
     pub rate: Option<f64>,
-    /// Its 95 % Wilson score interval, %.
+    /// 95 % Wilson score interval of the share, %; null without episodes.
     pub wilson95: Option<[f64; 2]>,
 }
 
 impl Rate {
-    /// The rate of `count` in `total`.
+    /// Rate of `count` in `total`.
     pub fn new(count: usize, total: usize) -> Self {
         let rate = (total > 0).then(|| 100.0 * count as f64 / total as f64);
         Self { rate, wilson95: wilson95(count, total) }
     }
 
-    /// The share of `items` for which `test` holds.
+    /// Rate of the `items` for which `test` holds.
     pub fn of<T>(items: &[T], test: impl Fn(&T) -> bool) -> Self {
         Self::new(items.iter().filter(|item| test(item)).count(), items.len())
     }
 }
 
-/// Wilson score interval (Wilson, 1927) of `count` successes in `total` trials at 95 %, in percent; `None` without trials.
+/// 95 % Wilson score interval (Wilson, 1927) of `count` successes in `total` trials, in percent; `None` without trials.
 pub fn wilson95(count: usize, total: usize) -> Option<[f64; 2]> {
     if total == 0 {
         return None;
@@ -36,51 +36,56 @@ pub fn wilson95(count: usize, total: usize) -> Option<[f64; 2]> {
     let z2 = Z95 * Z95;
     let centre = (p + z2 / (2.0 * n)) / (1.0 + z2 / n);
     let half = Z95 / (1.0 + z2 / n) * (p * (1.0 - p) / n + z2 / (4.0 * n * n)).sqrt();
-    // At the ends the interval touches 0 and 100 exactly; rounding must not leave a crumb.
+    // At the ends the interval reaches 0 and 100 exactly; do not leave a rounding error there.
     let low = if count == 0 { 0.0 } else { 100.0 * (centre - half) };
     let high = if count == total { 100.0 } else { 100.0 * (centre + half) };
     Some([low, high])
 }
 
-/// The arithmetic mean; `None` of nothing.
+/// Arithmetic mean; `None` of an empty slice.
 pub fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
-/// The `percent`-th percentile of `sorted` values, linear between order statistics (type 7 of Hyndman and Fan, 1996;
-/// numpy's default); `None` of nothing.
-pub fn percentile(sorted: &[f64], percent: f64) -> Option<f64> {
-    let last = sorted.len().checked_sub(1)?;
-    let at = percent.clamp(0.0, 100.0) / 100.0 * last as f64;
-    let (low, share) = (at.floor() as usize, at.fract());
-    let high = (low + 1).min(last);
-    Some(sorted[low] + share * (sorted[high] - sorted[low]))
+/// Quantile of `sorted` values at `q` in 0 to 1: linear between order statistics (type 7 of Hyndman and Fan, 1996; numpy's
+/// default). `None` of an empty slice.
+pub fn quantile(sorted: &[f64], q: f64) -> Option<f64> {
+    quantile_by(sorted.len(), |rank| sorted[rank], q)
 }
 
-/// How a quantity is distributed; all null when there is none of it.
+/// As [`quantile`], of `count` values of which `at(rank)` returns the one at a rank from 0 to `count − 1`.
+pub fn quantile_by(count: usize, at: impl Fn(usize) -> f64, q: f64) -> Option<f64> {
+    let last = count.checked_sub(1)?;
+    let place = q.clamp(0.0, 1.0) * last as f64;
+    let (rank, share) = (place.floor() as usize, place.fract());
+    let low = at(rank);
+    Some(low + share * (at((rank + 1).min(last)) - low))
+}
+
+/// Mean and quantiles of a quantity; all null without values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Distribution {
-    /// Mean.
+    /// Arithmetic mean.
     pub mean: Option<f64>,
     /// 5th percentile.
     pub p5: Option<f64>,
-    /// Median.
+    /// Median (50th percentile).
     pub median: Option<f64>,
     /// 95th percentile.
     pub p95: Option<f64>,
-    /// How many values.
+    /// Number of values.
     pub n: usize,
 }
 
 impl Distribution {
-    /// The distribution of `values`, which are finite.
+    /// Distribution of `values`, which must be finite.
     pub fn of(mut values: Vec<f64>) -> Self {
         values.sort_by(f64::total_cmp);
         Self {
             mean: mean(&values),
-            p5: percentile(&values, 5.0),
-            median: percentile(&values, 50.0),
-            p95: percentile(&values, 95.0),
+            p5: quantile(&values, 0.05),
+            median: quantile(&values, 0.5),
+            p95: quantile(&values, 0.95),
             n: values.len(),
         }
     }
@@ -115,15 +120,15 @@ mod tests {
     }
 
     #[test]
-    fn percentiles_interpolate_as_numpy_does() {
+    fn quantiles_interpolate_as_numpy_does() {
         let values = [1.0, 2.0, 4.0, 8.0];
-        assert_eq!(percentile(&values, 0.0), Some(1.0));
-        assert_eq!(percentile(&values, 50.0), Some(3.0));
-        assert!((percentile(&values, 95.0).unwrap() - 7.4).abs() < 1e-12);
-        assert!((percentile(&values, 5.0).unwrap() - 1.15).abs() < 1e-12);
-        assert_eq!(percentile(&values, 100.0), Some(8.0));
-        assert_eq!(percentile(&[3.0], 95.0), Some(3.0));
-        assert_eq!(percentile(&[], 50.0), None);
+        assert_eq!(quantile(&values, 0.0), Some(1.0));
+        assert_eq!(quantile(&values, 0.5), Some(3.0));
+        assert!((quantile(&values, 0.95).unwrap() - 7.4).abs() < 1e-12);
+        assert!((quantile(&values, 0.05).unwrap() - 1.15).abs() < 1e-12);
+        assert_eq!(quantile(&values, 1.0), Some(8.0));
+        assert_eq!(quantile(&[3.0], 0.95), Some(3.0));
+        assert_eq!(quantile(&[], 0.5), None);
     }
 
     #[test]

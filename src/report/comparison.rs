@@ -5,13 +5,16 @@ use std::{collections::BTreeMap, fmt::Write};
 use serde::Serialize;
 
 use super::{
-    differences::{Deformation, KEY, WIDTH, head, rows, shortened},
-    runs::StoredRun,
+    stored_run::StoredRun,
+    text_table::{WIDTH, shortened},
 };
 use crate::evaluation::{
-    paired::{Pair, Paired, by_task, key, pairs},
+    paired_stats::{
+        EpisodeKey, EpisodePair, MeanDifference, PairedComparison, RateDifference, TaskKey, group_by_task,
+        pair_episodes,
+    },
     record::EpisodeRecord,
-    summary::method,
+    summary::method_label,
 };
 
 /// Columns of a policy's name at the head.
@@ -28,7 +31,7 @@ pub struct TaskDifferences {
     pub prompt: String,
     /// Its differences: the second run minus the first.
     #[serde(flatten)]
-    pub differences: Paired,
+    pub differences: PairedComparison,
 }
 
 /// Two runs compared.
@@ -47,7 +50,7 @@ pub struct Comparison {
     /// Runs of which episodes are missing: a sentence each.
     pub partial: Vec<String>,
     /// All episodes that both have.
-    pub all: Paired,
+    pub all: PairedComparison,
     /// By task, in order.
     pub by_task: Vec<TaskDifferences>,
 }
@@ -98,29 +101,29 @@ pub fn compare(first: &[StoredRun], second: &[StoredRun]) -> Result<Comparison, 
         once(runs)?;
     }
     let count = |runs: &[StoredRun]| -> usize { runs.iter().map(|run| run.records.len()).sum() };
-    let pairs = pairs(records(first), records(second));
+    let pairs = pair_episodes(records(first), records(second));
     if pairs.is_empty() {
         return Err(nothing(first, second));
     }
-    let task = |((suite, task), pairs): ((&str, usize), Vec<Pair>)| TaskDifferences {
+    let task = |(TaskKey { suite, task }, pairs): (TaskKey, Vec<EpisodePair>)| TaskDifferences {
         suite: suite.to_owned(),
         task,
-        prompt: pairs[0].0.identity.prompt.clone(),
-        differences: Paired::of(&pairs),
+        prompt: pairs[0].first.identity.prompt.clone(),
+        differences: PairedComparison::of(&pairs),
     };
     let all = || first.iter().chain(second);
     Ok(Comparison {
         first: name(first),
         second: name(second),
-        deformable: pairs.iter().any(|(a, _)| a.identity.soft),
+        deformable: pairs.iter().any(|pair| pair.first.identity.soft),
         unmatched: count(first) + count(second) - 2 * pairs.len(),
         unlike: unlike(first, second),
         partial: all()
             .filter(|run| run.is_partial())
             .flat_map(|run| run.remarks().into_iter().take(1))
             .collect(),
-        all: Paired::of(&pairs),
-        by_task: by_task(&pairs).into_iter().map(task).collect(),
+        all: PairedComparison::of(&pairs),
+        by_task: group_by_task(&pairs).into_iter().map(task).collect(),
     })
 }
 
@@ -137,7 +140,7 @@ fn once(runs: &[StoredRun]) -> Result<(), CompareError> {
             return Err(CompareError::Empty { dir: dir() });
         }
         for record in &run.records {
-            if let Some(other) = known.insert(key(record), &run.dir) {
+            if let Some(other) = known.insert(EpisodeKey::of(record), &run.dir) {
                 let id = &record.identity;
                 return Err(CompareError::Twice {
                     first: other.display().to_string(),
@@ -184,8 +187,10 @@ fn nothing(first: &[StoredRun], second: &[StoredRun]) -> CompareError {
 }
 
 fn name(runs: &[StoredRun]) -> String {
-    let mut names: Vec<String> =
-        runs.iter().map(|run| method(run.text("policy"), run.is_privileged(), run.sees_forces())).collect();
+    let mut names: Vec<String> = runs
+        .iter()
+        .map(|run| method_label(run.text("policy"), run.is_privileged(), run.sees_forces()))
+        .collect();
     names.sort();
     names.dedup();
     names.join(", ")
@@ -245,4 +250,88 @@ pub fn table(comparison: &Comparison) -> String {
         line(&format!("the runs also differ in {} (run.json)", comparison.unlike.join(", ")));
     }
     out
+}
+
+/// Columns of the name at the left.
+const NAME: usize = 29;
+
+/// What the rows say, to be written once below them.
+pub(super) const KEY: &str = "difference: second minus first · 95 % intervals: Agresti and Min for rates, bootstrap for D\nbetter, worse: episodes; of D, less is better · p: McNemar's exact test";
+
+/// Which deformation is compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Deformation {
+    /// Nothing deforms.
+    None,
+    /// Peak D, % of the diagonal.
+    Peak,
+    /// Peak D over τ.
+    OverTau,
+}
+
+/// The heads of the columns.
+pub(super) fn head(name: &str, [first, second]: [&str; 2]) -> String {
+    cells(name, ["", first, second, "differ.", "95 % interval", "better", "worse", "p"].map(str::to_owned))
+}
+
+/// A row a measure, the first with the name.
+pub(super) fn rows(name: &str, of: &PairedComparison, deformation: Deformation) -> Vec<String> {
+    let mut all =
+        vec![rate("Goal, %", &of.goal), rate("NoDrop, %", &of.no_drop), rate("Safety, %", &of.safety)];
+    match deformation {
+        Deformation::None => {}
+        Deformation::Peak => all.push(mean("D peak, %", &of.d_peak)),
+        Deformation::OverTau => all.push(mean("D peak/τ", &of.d_over_tau)),
+    }
+    let names = [name].into_iter().chain(std::iter::repeat(""));
+    all.into_iter().zip(names).map(|(row, name)| cells(name, row)).collect()
+}
+
+fn rate(measure: &str, of: &RateDifference) -> [String; 8] {
+    [
+        measure.to_owned(),
+        plain(of.first, 1),
+        plain(of.second, 1),
+        signed(of.difference, 1),
+        interval(of.interval95, 1),
+        of.better.to_string(),
+        of.worse.to_string(),
+        format!("{:.3}", of.p),
+    ]
+}
+
+fn mean(measure: &str, of: &MeanDifference) -> [String; 8] {
+    [
+        measure.to_owned(),
+        plain(of.first, 2),
+        plain(of.second, 2),
+        signed(of.difference, 2),
+        interval(of.interval95, 2),
+        of.better.to_string(),
+        of.worse.to_string(),
+        String::new(),
+    ]
+}
+
+fn plain(value: Option<f64>, digits: usize) -> String {
+    value.map_or_else(|| "–".to_owned(), |value| format!("{value:.digits$}"))
+}
+
+fn signed(value: Option<f64>, digits: usize) -> String {
+    value.map_or_else(|| "–".to_owned(), |value| format!("{value:+.digits$}"))
+}
+
+fn interval(of: Option<[f64; 2]>, digits: usize) -> String {
+    of.map_or_else(|| "–".to_owned(), |[low, high]| format!("[{low:+.digits$}, {high:+.digits$}]"))
+}
+
+fn cells(name: &str, cells: [String; 8]) -> String {
+    let mut text = format!("{:<NAME$}", shortened(name, NAME));
+    let [measure, rest @ ..] = cells;
+    // Writing to a String cannot fail.
+    let _ = write!(text, " {measure:<9}");
+    for (cell, width) in rest.iter().zip([7, 8, 8, 18, 7, 6, 6]) {
+        let _ = write!(text, "{cell:>width$}");
+    }
+    text.trim_end().to_owned()
 }

@@ -2,10 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::evaluation::{
-    difference::{MeanDifference, RateDifference},
-    paired::Paired,
-};
+use crate::evaluation::paired_stats::{MeanDifference, PairedComparison, RateDifference};
 
 /// Columns of the name at the left.
 const NAME: usize = 29;
@@ -32,7 +29,7 @@ pub(super) fn head(name: &str, [first, second]: [&str; 2]) -> String {
 }
 
 /// A row a measure, the first with the name.
-pub(super) fn rows(name: &str, of: &Paired, deformation: Deformation) -> Vec<String> {
+pub(super) fn rows(name: &str, of: &PairedComparison, deformation: Deformation) -> Vec<String> {
     let mut all =
         vec![rate("Goal, %", &of.goal), rate("NoDrop, %", &of.no_drop), rate("Safety, %", &of.safety)];
     match deformation {

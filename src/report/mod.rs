@@ -1,17 +1,15 @@
-//! What a run leaves behind: its folder, the results tables, envelope plots, films, and SoftVTBench's files.
+//! Run folders and everything derived from them: result tables, HTML report, videos, and files in SoftVTBench's format.
 
 pub mod actions;
 pub mod comparison;
-pub mod conditions;
-mod differences;
-pub mod envelope;
-pub mod interchange;
-pub mod judged;
-pub mod merge;
+pub mod condition_table;
 pub mod page;
 pub mod run_folder;
-pub mod runs;
-mod table_text;
+pub mod run_summary;
+pub mod shard_merge;
+pub mod softvtbench_files;
+pub mod stored_run;
 pub mod tables;
 pub mod terminal;
+mod text_table;
 pub mod video;

@@ -1,12 +1,10 @@
 //! The results table, in plain text of at most 100 columns.
 
-use std::fmt::Write;
-
-use super::differences::shortened;
+use super::text_table::{push_line, push_rule, shortened};
 use crate::evaluation::{
     safety::KAPPAS,
     statistics::{Distribution, Rate},
-    summary::{GivenUp, Scores, Summary},
+    summary::{AbortedEpisode, Scores, SuiteSummary},
 };
 
 /// Columns of the task's name.
@@ -18,31 +16,31 @@ const WIDTH: usize = 98;
 const MOST_REASONS: usize = 10;
 
 /// The results of one suite: a row a task, all together, and the rates with their intervals.
-pub fn table(summary: &Summary) -> String {
+pub fn table(summary: &SuiteSummary) -> String {
     let mut out = String::new();
     let scores = &summary.scores;
     let soft = scores.deformation_ok_rate.is_some();
-    line(
+    push_line(
         &mut out,
-        &format!("{} · policy {} · {} episodes", summary.suite, summary.method(), scores.episodes),
+        &format!("{} · policy {} · {} episodes", summary.suite, summary.method_label(), scores.episodes),
     );
-    rule(&mut out);
-    line(
+    push_rule(&mut out, WIDTH);
+    push_line(
         &mut out,
         &format!(
             "{:>3} {:<NAME$} {:>6} {:>6} {:>6} {:>7} {:>6} {:>6} {:>6} {:>6} {:>6}",
             "#", "task", "Goal", "NoDrop", "Safety", "D mean", "P5", "median", "P95", "τ", "inval."
         ),
     );
-    rule(&mut out);
+    push_rule(&mut out, WIDTH);
     let prompts: Vec<&str> = summary.by_task.iter().map(|t| t.prompt.as_str()).collect();
     for (task, name) in summary.by_task.iter().zip(distinct_parts(&prompts)) {
         let tau = summary.by_asset.get(&task.asset).and_then(|asset| asset.tau);
-        line(&mut out, &row(&task.task.to_string(), name, &task.scores, tau, soft));
+        push_line(&mut out, &row(&task.task.to_string(), name, &task.scores, tau, soft));
     }
-    rule(&mut out);
-    line(&mut out, &row("", "all", scores, None, soft));
-    rule(&mut out);
+    push_rule(&mut out, WIDTH);
+    push_line(&mut out, &row("", "all", scores, None, soft));
+    push_rule(&mut out, WIDTH);
     footer(&mut out, summary);
     out
 }
@@ -69,7 +67,7 @@ fn row(number: &str, name: &str, scores: &Scores, tau: Option<f64>, soft: bool) 
     )
 }
 
-fn footer(out: &mut String, summary: &Summary) {
+fn footer(out: &mut String, summary: &SuiteSummary) {
     let scores = &summary.scores;
     let deformation_ok = scores.deformation_ok_rate;
     for (name, rate) in [
@@ -78,18 +76,21 @@ fn footer(out: &mut String, summary: &Summary) {
         ("Deformation within τ", deformation_ok),
         ("Safety Success", Some(scores.safety_success_rate)),
     ] {
-        line(out, &format!("{name:<22}{}", rate.map_or_else(|| "   N/A".into(), |rate| interval(&rate))));
+        push_line(
+            out,
+            &format!("{name:<22}{}", rate.map_or_else(|| "   N/A".into(), |rate| interval(&rate))),
+        );
     }
     let gap = scores.goal_safe_gap.map_or_else(|| "–".into(), |gap| format!("{gap:.1}"));
-    line(out, &format!("{:<22}{gap:>6} points", "Goal–safety gap"));
+    push_line(out, &format!("{:<22}{gap:>6} points", "Goal–safety gap"));
     if !summary.kappa.is_empty() {
         let at = KAPPAS.iter().filter_map(|kappa| summary.kappa.iter().find(|row| row.kappa == *kappa));
         let text: Vec<String> =
             at.map(|row| format!("κ {} {} %", row.kappa, percent(&row.safety_success_rate))).collect();
-        line(out, &format!("{:<22}{}", "Safety Success at", text.join(" · ")));
+        push_line(out, &format!("{:<22}{}", "Safety Success at", text.join(" · ")));
         let (all, goal) = (scores.deformation.n, scores.deformation_goal);
         let of_goal = goal.mean.map_or_else(|| "–".into(), |mean| format!("{mean:.2} %"));
-        line(
+        push_line(
             out,
             &format!(
                 "D is the peak in % of the bounding-box diagonal; n {all}; mean {of_goal} over the {} at the goal",
@@ -98,13 +99,13 @@ fn footer(out: &mut String, summary: &Summary) {
         );
     }
     if summary.privileged {
-        line(out, "the policy saw the true state (privileged): no robot has it");
+        push_line(out, "the policy saw the true state (privileged): no robot has it");
     }
     if summary.force_observed {
-        line(out, "the policy saw true forces at the pads (force_observed): no real sensor gives them");
+        push_line(out, "the policy saw true forces at the pads (force_observed): no real sensor gives them");
     }
     if scores.safety_unknown > 0 {
-        line(
+        push_line(
             out,
             &format!(
                 "{} valid episodes lack the evidence to judge safety (no threshold, or D not measured): not safe",
@@ -113,23 +114,23 @@ fn footer(out: &mut String, summary: &Summary) {
         );
     }
     if scores.invalid > 0 {
-        line(out, &format!("{} invalid episodes count as failures in every rate", scores.invalid));
+        push_line(out, &format!("{} invalid episodes count as failures in every rate", scores.invalid));
     }
     gave_up(out, summary);
 }
 
 /// Why whoever drove gave up, an episode a line.
-fn gave_up(out: &mut String, summary: &Summary) {
+fn gave_up(out: &mut String, summary: &SuiteSummary) {
     let all = &summary.gave_up;
     if all.is_empty() {
         return;
     }
-    line(out, &format!("{} gave up in {} episodes:", summary.policy, all.len()));
-    for GivenUp { task, episode, reason } in all.iter().take(MOST_REASONS) {
-        line(out, &shortened(&format!("  task {task} episode {episode}: {reason}"), WIDTH));
+    push_line(out, &format!("{} gave up in {} episodes:", summary.policy, all.len()));
+    for AbortedEpisode { task, episode, reason } in all.iter().take(MOST_REASONS) {
+        push_line(out, &shortened(&format!("  task {task} episode {episode}: {reason}"), WIDTH));
     }
     if all.len() > MOST_REASONS {
-        line(out, &format!("  … and {} more, in summary.json", all.len() - MOST_REASONS));
+        push_line(out, &format!("  … and {} more, in summary.json", all.len() - MOST_REASONS));
     }
 }
 
@@ -140,16 +141,6 @@ fn percent(rate: &Rate) -> String {
 fn interval(rate: &Rate) -> String {
     let bounds = rate.wilson95.map(|[low, high]| format!("  [{low:.1}, {high:.1}]")).unwrap_or_default();
     format!("{:>6} %{bounds}", percent(rate))
-}
-
-fn line(out: &mut String, text: &str) {
-    out.push_str(text.trim_end());
-    out.push('\n');
-}
-
-fn rule(out: &mut String) {
-    // Writing to a String cannot fail.
-    let _ = writeln!(out, "{}", "─".repeat(WIDTH));
 }
 
 /// What distinguishes the prompts: whole words that all begin or end with are left out.
@@ -170,5 +161,77 @@ fn distinct_parts<'a>(prompts: &[&'a str]) -> Vec<&'a str> {
 }
 
 #[cfg(test)]
-#[path = "terminal_tests.rs"]
-mod tests;
+mod tests {
+    use super::*;
+    use crate::evaluation::record::{EpisodeRecord, Outcome, tests::sample};
+
+    fn episode(task: usize, prompt: &str, edit: impl Fn(&mut EpisodeRecord)) -> EpisodeRecord {
+        let mut record = sample();
+        record.identity.task = task;
+        record.identity.prompt = prompt.into();
+        edit(&mut record);
+        record
+    }
+
+    fn records() -> Vec<EpisodeRecord> {
+        let (left, right) =
+            ("pick up the left bun and place it there", "pick up the right bun and place it there");
+        vec![
+            episode(0, left, |_| ()),
+            episode(0, left, |r| {
+                r.verdict.d_peak = Some(1.5);
+                (r.verdict.deformation_ok, r.verdict.safety) = (Some(false), false);
+            }),
+            episode(1, right, |r| r.outcome = Outcome::Error { message: "x".into() }),
+        ]
+    }
+
+    #[test]
+    fn the_table_says_it_all_in_less_than_100_columns() {
+        let text = table(&SuiteSummary::of("suite", "expert", &records()));
+        assert!(text.lines().all(|line| line.chars().count() < 100), "{text}");
+        let row = |start: &str| text.lines().find(|line| line.starts_with(start)).unwrap_or_default();
+        let words = |line: &str| line.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+        assert_eq!(
+            words(row("  0 left")),
+            ["0", "left", "100.0", "100.0", "50.0", "0.92", "0.39", "0.92", "1.44", "1.00", "0"]
+        );
+        assert_eq!(
+            words(row("  1 right")),
+            ["1", "right", "0.0", "0.0", "0.0", "–", "–", "–", "–", "1.00", "1"]
+        );
+        assert_eq!(row("Safety Success  "), "Safety Success          33.3 %  [6.1, 79.2]");
+        assert_eq!(row("Goal–safety gap"), "Goal–safety gap         33.3 points");
+        assert_eq!(
+            row("Safety Success at"),
+            "Safety Success at     κ 0.3 33.3 % · κ 0.5 33.3 % · κ 0.7 33.3 %"
+        );
+        assert!(text.contains("1 invalid episodes count as failures"));
+    }
+
+    #[test]
+    fn a_rigid_suite_shows_not_applicable() {
+        let rigid = episode(0, "lift it", |r| {
+            r.identity.soft = false;
+            (r.verdict.d_peak, r.verdict.deformation_ok, r.verdict.tau) = (None, None, None);
+        });
+        let text = table(&SuiteSummary::of("suite", "expert", &[rigid]));
+        assert!(text.contains("N/A") && !text.contains('κ'), "{text}");
+        assert!(text.contains("lift it"));
+    }
+
+    #[test]
+    fn an_empty_run_has_a_table_too() {
+        let text = table(&SuiteSummary::of("suite", "expert", &[]));
+        assert!(text.contains("0 episodes"), "{text}");
+    }
+
+    #[test]
+    fn prompts_are_cut_to_what_distinguishes_them() {
+        assert_eq!(distinct_parts(&["put a on it", "put b c on it"]), ["a", "b c"]);
+        assert_eq!(distinct_parts(&["same", "same"]), ["same", "same"]);
+        assert_eq!(distinct_parts(&["put it", "put it down"]), ["it", "it down"]);
+        assert_eq!(distinct_parts(&["étoile à gauche", "étoile à droite"]), ["gauche", "droite"]);
+        assert!(distinct_parts(&[]).is_empty());
+    }
+}

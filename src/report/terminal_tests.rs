@@ -24,7 +24,7 @@ fn records() -> Vec<EpisodeRecord> {
 
 #[test]
 fn the_table_says_it_all_in_less_than_100_columns() {
-    let text = table(&Summary::of("suite", "expert", &records()));
+    let text = table(&SuiteSummary::of("suite", "expert", &records()));
     assert!(text.lines().all(|line| line.chars().count() < 100), "{text}");
     let row = |start: &str| text.lines().find(|line| line.starts_with(start)).unwrap_or_default();
     let words = |line: &str| line.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
@@ -45,14 +45,14 @@ fn a_rigid_suite_shows_not_applicable() {
         r.identity.soft = false;
         (r.verdict.d_peak, r.verdict.deformation_ok, r.verdict.tau) = (None, None, None);
     });
-    let text = table(&Summary::of("suite", "expert", &[rigid]));
+    let text = table(&SuiteSummary::of("suite", "expert", &[rigid]));
     assert!(text.contains("N/A") && !text.contains('κ'), "{text}");
     assert!(text.contains("lift it"));
 }
 
 #[test]
 fn an_empty_run_has_a_table_too() {
-    let text = table(&Summary::of("suite", "expert", &[]));
+    let text = table(&SuiteSummary::of("suite", "expert", &[]));
     assert!(text.contains("0 episodes"), "{text}");
 }
 

@@ -1,54 +1,62 @@
-//! How far the open hand is from things, for planners that must not knock over what they do not grasp.
+//! Distance between the hand and obstacles, for planners that keep clear of objects they do not grasp.
 
 use super::{
-    Side,
     pads::{self, CollisionBox},
     panda,
+    spec::Side,
 };
 use crate::geometry::{Aabb, Pose, Vec3, shape::Shape};
 
-/// Spacing of the points that stand for the surface of the hand, m. A thing can be nearer than was found by at most
-/// 0.71 of it.
+/// Spacing of the sample points on the surface of the hand, m. The distance found is too large by at most 0.71 of it.
 const SPACING: f64 = 6e-3;
 
-/// Something that the hand may meet.
+/// A shape to keep clear of.
 #[derive(Clone, Copy, Debug)]
 pub struct Obstacle<'a> {
-    /// Object frame in the world.
+    /// Object frame in the world frame.
     pub pose_w: Pose,
-    /// Its shape, object frame.
+    /// Shape, object frame.
     pub shape: &'a Shape,
     /// Bounds of the shape, object frame.
     pub bounds: Aabb,
 }
 
-/// Least distance, m, between the hand with its fingers `width` (m) apart and any of the obstacles, and which that is;
-/// negative inside. Distances beyond `enough` (m) are not told apart: what is farther than that is not looked at.
+/// Distance from the hand to the nearest obstacle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Clearance {
+    /// Signed distance, m; negative if they overlap.
+    pub distance: f64,
+    /// Index of the nearest obstacle; `None` if no obstacle is nearer than the search range.
+    pub nearest: Option<usize>,
+}
+
+/// Distance between the hand at tool pose `tool_w` (world), its gel apexes `width` (m) apart, and the nearest obstacle.
 ///
-/// The hand is the boxes that collide in the simulation; the arm is left out.
-pub fn clearance(tool_w: &Pose, width: f64, obstacles: &[Obstacle<'_>], enough: f64) -> (f64, Option<usize>) {
-    let mut nearest = (enough, None);
+/// Obstacles beyond `range` (m) are skipped: if all are, the distance is `range`. The hand is represented by its
+/// collision boxes; the arm is left out.
+pub fn clearance(tool_w: &Pose, width: f64, obstacles: &[Obstacle<'_>], range: f64) -> Clearance {
+    let mut found = Clearance { distance: range, nearest: None };
     for part in hand(width) {
         let centre_w = tool_w * part.pose;
         for (index, obstacle) in obstacles.iter().enumerate() {
             let to_object = obstacle.pose_w.inverse() * centre_w;
             let half = part.half;
             let reach = Aabb::from_half_extents(half).transformed(&to_object);
-            if reach.distance(&obstacle.bounds) >= nearest.0 {
+            if reach.distance(&obstacle.bounds) >= found.distance {
                 continue;
             }
             for p in surface_points(&half) {
                 let distance = obstacle.shape.distance(&to_object.transform_point(&p.into()).coords);
-                if distance < nearest.0 {
-                    nearest = (distance, Some(index));
+                if distance < found.distance {
+                    found = Clearance { distance, nearest: Some(index) };
                 }
             }
         }
     }
-    nearest
+    found
 }
 
-/// The hand's boxes in the tool frame.
+/// Collision boxes of hand and fingers in the tool frame.
 fn hand(width: f64) -> impl Iterator<Item = CollisionBox> {
     let hand_in_tool = panda::tool_in_hand().inverse();
     let link_in_tool = hand_in_tool * panda::hand_in_link().inverse();
@@ -58,11 +66,11 @@ fn hand(width: f64) -> impl Iterator<Item = CollisionBox> {
         let parts = pads::finger_boxes(side).into_iter().chain([gel]);
         parts.map(move |part| CollisionBox { pose: finger_in_tool * part.pose, ..part })
     });
-    let palm = pads::hand_boxes().map(move |part| CollisionBox { pose: link_in_tool * part.pose, ..part });
+    let palm = panda::hand_boxes().map(move |part| CollisionBox { pose: link_in_tool * part.pose, ..part });
     fingers.chain(palm)
 }
 
-/// Points all over the surface of a box, edges and corners included.
+/// Grid points on the surface of a box, including its edges and corners.
 fn surface_points(half: &Vec3) -> impl Iterator<Item = Vec3> + use<> {
     let half = *half;
     let count: [usize; 3] = std::array::from_fn(|i| (2.0 * half[i] / SPACING).ceil() as usize);
@@ -100,27 +108,28 @@ mod tests {
     }
 
     #[test]
-    fn a_hand_over_a_floor_is_as_far_from_it_as_its_cases_reach() {
+    fn clearance_over_a_floor_is_that_of_the_sensor_cases() {
         let floor = Shape::cuboid(Vec3::new(1.0, 1.0, 0.1));
-        let (found, which) = clearance(&down(0.0, 0.05), 0.04, &[obstacle(&floor, 0.0, 0.0, -0.05)], 1.0);
-        assert!((found - 0.034).abs() < 1e-9, "{found}");
-        assert_eq!(which, Some(0));
+        let found = clearance(&down(0.0, 0.05), 0.04, &[obstacle(&floor, 0.0, 0.0, -0.05)], 1.0);
+        assert!((found.distance - 0.034).abs() < 1e-9, "{found:?}");
+        assert_eq!(found.nearest, Some(0));
     }
 
     #[test]
-    fn what_fits_between_the_gels_is_half_the_rest_of_the_width_away() {
+    fn clearance_of_a_centred_cube_is_half_of_the_free_width() {
         let shape = cube(0.02);
-        let at = |width| clearance(&down(0.0, 0.0), width, &[obstacle(&shape, 0.0, 0.0, 0.0)], 1.0).0;
+        let at = |width| clearance(&down(0.0, 0.0), width, &[obstacle(&shape, 0.0, 0.0, 0.0)], 1.0).distance;
         assert!((at(0.05) - 0.015).abs() < 1e-9, "{}", at(0.05));
         assert!(at(0.016) < 0.0);
     }
 
     #[test]
-    fn a_finger_in_a_neighbour_is_inside_and_the_neighbour_is_named() {
+    fn a_finger_inside_an_obstacle_has_negative_clearance_to_it() {
         let (near, far) = (cube(0.03), cube(0.03));
         let obstacles = [obstacle(&far, 0.0, 0.5, 0.0), obstacle(&near, 0.0, -0.05, 0.0)];
-        let (found, which) = clearance(&down(0.0, 0.0), 0.08, &obstacles, 1.0);
-        assert!(found < -5e-3 && which == Some(1), "{found} {which:?}");
-        assert_eq!(clearance(&down(0.4, 0.0), 0.08, &obstacles, 0.1), (0.1, None));
+        let found = clearance(&down(0.0, 0.0), 0.08, &obstacles, 1.0);
+        assert!(found.distance < -5e-3 && found.nearest == Some(1), "{found:?}");
+        let far = clearance(&down(0.4, 0.0), 0.08, &obstacles, 0.1);
+        assert_eq!(far, Clearance { distance: 0.1, nearest: None });
     }
 }

@@ -1,71 +1,75 @@
 //! The gripper: from a policy's closure to finger targets.
 //!
-//! Three quantities, never mixed: *closure* is what is commanded (0 open … 1 shut), *width* is what is measured (m
-//! between the gel apexes), force is what the solve finds.
+//! Three separate quantities: *closure* is commanded (0 open to 1 closed), *width* is measured (m between the gel
+//! apexes), *force* results from the contact solve.
 
 use serde::{Deserialize, Serialize};
 
-use super::GripperSpec;
+use super::spec::GripperSpec;
 
 /// Largest width between the gel apexes, m.
 pub const MAX_WIDTH: f64 = 0.08;
 
-/// How a policy says how far to close.
+/// Encoding of the gripper component of an action.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum GripperEncoding {
-    /// The value is the closure, 0..=1; values beyond mean the nearer end.
+    /// The value is the closure; it is clamped to 0..=1.
     #[default]
     Continuous,
-    /// The value is a closure that is only asked whether it is above a half: open or shut, nothing between.
+    /// The value is a closure of which only the side of 0.5 counts: closed above, open otherwise.
     Binary,
-    /// The sign opens (positive) or shuts (zero and negative), as in SoftVTBench.
+    /// The sign counts, as in SoftVTBench: positive opens, zero and negative close.
     Sign,
 }
 
 impl GripperEncoding {
-    /// The closure that `value` asks for, 0 (open) ..= 1 (shut).
+    /// Decodes a closure, 0 (open) ..= 1 (closed).
     ///
     /// # Errors
-    /// A value that is no finite number asks for nothing.
+    /// If the value is not finite.
     pub fn closure(self, value: f64) -> Result<f64, GripperError> {
         if !value.is_finite() {
             return Err(GripperError { value });
         }
-        let shut = match self {
+        let closed = match self {
             Self::Continuous => return Ok(value.clamp(0.0, 1.0)),
             Self::Binary => value > 0.5,
             Self::Sign => value <= 0.0,
         };
-        Ok(if shut { 1.0 } else { 0.0 })
+        Ok(if closed { 1.0 } else { 0.0 })
     }
 }
 
-/// A gripper command that is no number.
+/// A gripper command that is not a finite number.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("gripper command is {value}, expected a finite number: a closure of 0 (open) to 1 (shut), or a sign")]
+#[error(
+    "gripper command is {value}, expected a finite number: a closure of 0 (open) to 1 (closed), or a sign"
+)]
 pub struct GripperError {
-    /// What was commanded.
+    /// Value given.
     pub value: f64,
 }
 
-/// Target width of a closure in 0..=1, m.
+/// Target width (m) of a closure in 0..=1.
 pub fn target_width(closure: f64) -> f64 {
     MAX_WIDTH * (1.0 - closure)
 }
 
-/// Closure whose target is `width` (m), 0..=1.
+/// Closure in 0..=1 whose target width is `width` (m), clamped; the inverse of [`target_width`].
 pub fn closure_of_width(width: f64) -> f64 {
     (1.0 - width / MAX_WIDTH).clamp(0.0, 1.0)
 }
 
-/// Measured width: the distance between the gel apexes at finger coordinates left and right, m.
+/// Measured width (m between the gel apexes) at the joint coordinates (m) of the left and right finger.
 pub fn width(fingers: [f64; 2]) -> f64 {
     fingers[0] + fingers[1]
 }
 
-/// The moving target of the two fingers. Both get the same one, so that a light object off centre is pushed to the
-/// middle and a fixed one is held by unequal drive forces.
+/// Setpoint of the finger drives, which moves towards the commanded closure at the finger speed.
+///
+/// Both fingers receive the same setpoint: a light object off centre is pushed to the middle, and a fixed one is held by
+/// unequal drive forces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GripperSetpoint {
     speed: f64,
@@ -74,29 +78,29 @@ pub struct GripperSetpoint {
 }
 
 impl GripperSetpoint {
-    /// A gripper whose target is at rest at `width` (m).
+    /// A setpoint at rest at `width` (m).
     pub fn new(spec: &GripperSpec, width: f64) -> Self {
         let target = width.clamp(0.0, MAX_WIDTH) / 2.0;
         Self { speed: spec.speed, goal: target, target }
     }
 
-    /// Takes a closure, 0 (open) ..= 1 (shut), as [`GripperEncoding::closure`] gives it; it holds until the next one.
+    /// Sets the commanded closure, 0 (open) ..= 1 (closed); valid until the next call.
     pub fn command(&mut self, closure: f64) {
         self.goal = target_width(closure.clamp(0.0, 1.0)) / 2.0;
     }
 
-    /// Moves the target on by `dt` (s) at no more than the finger speed.
+    /// Moves the setpoint for `dt` (s), at most at the finger speed.
     pub fn advance(&mut self, dt: f64) {
-        let reach = self.speed * dt;
-        self.target += (self.goal - self.target).clamp(-reach, reach);
+        let step = self.speed * dt;
+        self.target += (self.goal - self.target).clamp(-step, step);
     }
 
-    /// Target coordinate of each finger, m.
+    /// Target joint coordinate of each finger, m.
     pub fn finger_target(&self) -> f64 {
         self.target
     }
 
-    /// Closure last commanded, 0..=1.
+    /// Last commanded closure, 0..=1.
     pub fn closure(&self) -> f64 {
         closure_of_width(2.0 * self.goal)
     }
@@ -115,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn each_encoding_reads_its_own_numbers() {
+    fn each_encoding_decodes_its_own_range() {
         let read = |encoding: GripperEncoding, value| encoding.closure(value).expect("finite");
         assert_eq!(
             [-0.2, 0.0, 0.3, 1.0, 1.7].map(|v| read(GripperEncoding::Continuous, v)),
@@ -126,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn a_command_that_is_no_number_is_refused() {
+    fn a_command_that_is_not_finite_is_refused() {
         for value in [f64::NAN, f64::INFINITY] {
             let error = GripperEncoding::Continuous.closure(value).expect_err("refused");
             assert!(error.to_string().contains("expected a finite number"));
@@ -134,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn the_target_moves_at_the_finger_speed_and_stops_at_its_goal() {
+    fn the_setpoint_moves_at_the_finger_speed_and_stops_at_its_goal() {
         let mut gripper = GripperSetpoint::new(&GripperSpec::default(), MAX_WIDTH);
         gripper.command(0.5);
         let dt = 1.0 / 60.0;

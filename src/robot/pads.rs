@@ -1,8 +1,8 @@
-//! Finger tips: GelSight Mini sensors, their domed gel pads as contact surfaces, and what is behind them.
+//! Finger tips: the domed gel pads of the GelSight Mini as contact surfaces, and the collision boxes of the fingers.
 //!
 //! **Pad frame** (`_p`): origin at the gel's apex, +z out of the gel (towards the other finger), x along the finger
-//! *towards the hand*, y completing it. Both fingers have it, so y points to the hand's +x on the left finger and to
-//! its −x on the right one. The pad's long side (25.25 mm) lies along x.
+//! *towards the hand*, y completing a right-handed frame. Consequently y points to the hand's +x on the left finger and
+//! to its −x on the right one. The long side of the pad (25.25 mm) lies along x.
 //!
 //! Gel geometry: footprint 25.25 × 20.75 mm with corner radius 1.5 mm, 4.00 mm thick at the apex, radii of curvature
 //! 206 mm (long side) and 121 mm (short side), measured on the manufacturer's pad model as published with FEATS
@@ -11,29 +11,26 @@
 
 use nalgebra::Quaternion;
 
-use super::Side;
+use super::spec::Side;
 use crate::{
     geometry::{Aabb, Mat3, Pose, Quat, Vec3, shape::Contact},
     physics::contact::{CollisionGeometry, ContactSurface, GelSample},
 };
 
-/// Height of the gel's apex above the finger frame, m: that of Franka's own finger tips.
+/// Height of the gel's apex above the finger frame, m; equal to that of Franka's own finger tips.
 pub(super) const APEX_Z: f64 = 0.045;
 
 /// Half extents of the sensor's case, finger axes, m: 28 mm across, 24 mm deep, 32 mm along the finger.
 const CASE_HALF: Vec3 = Vec3::new(0.014, 0.012, 0.016);
 
-/// Half extents of the hand's body, hand axes, m (bounding box of Franka's hand without its camera mount).
-const HAND_HALF: Vec3 = Vec3::new(0.0316, 0.1025, 0.033);
-
-/// The gel's surface, z = h(x, y) in the pad frame.
+/// Geometry of a gel pad: a paraboloid dome z = h(x, y) over a rounded rectangle, in the pad frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PadSurface {
-    /// Extent along x, m.
+    /// Extent of the footprint along x, m.
     pub length: f64,
-    /// Extent along y, m.
+    /// Extent of the footprint along y, m.
     pub width: f64,
-    /// Radius of the footprint's corners, m.
+    /// Corner radius of the footprint, m.
     pub corner: f64,
     /// Thickness of the gel at the apex, m.
     pub thickness: f64,
@@ -57,35 +54,35 @@ impl Default for PadSurface {
     }
 }
 
-/// Where a point is in relation to a pad.
+/// Contact query of a point against a gel pad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PadContact {
-    /// Signed distance from the gel's surface, m; negative inside.
+    /// Signed distance to the gel's surface, m; negative inside.
     pub phi: f64,
     /// Unit normal of the gel's surface there, pad frame.
     pub normal_p: Vec3,
-    /// Share of the point's patch that lies over the pad, 0..=1.
+    /// Share of the point's patch over the footprint, 0..=1.
     pub coverage: f64,
 }
 
 impl PadSurface {
-    /// Height of the dome above the apex plane, m; 0 at the apex, negative elsewhere. A paraboloid: over the pad it
-    /// differs from a torus of the same radii by less than 3 µm.
+    /// Height of the dome at (x, y) (m, pad frame) relative to its apex, m; 0 at the apex, negative elsewhere. The
+    /// paraboloid differs from a torus of the same radii by less than 3 µm over the pad.
     pub fn height(&self, x: f64, y: f64) -> f64 {
         -0.5 * (x * x / self.radius_x + y * y / self.radius_y)
     }
 
-    /// Signed distance of (x, y) from the footprint's edge, m; negative inside.
+    /// Signed distance of (x, y) (m, pad frame) to the edge of the footprint, m; negative inside.
     pub fn edge_distance(&self, x: f64, y: f64) -> f64 {
         let beyond_x = x.abs() - self.length / 2.0 + self.corner;
         let beyond_y = y.abs() - self.width / 2.0 + self.corner;
         beyond_x.max(0.0).hypot(beyond_y.max(0.0)) + beyond_x.max(beyond_y).min(0.0) - self.corner
     }
 
-    /// How the point `p_p` (pad frame, m), which stands for a patch about `spacing` (m) wide, meets the gel.
+    /// Contact of the point `p_p` (pad frame, m) with the gel; the point represents a patch about `spacing` (m) wide.
     ///
-    /// The coverage runs from 1 to 0 over one spacing across the footprint's edge, so that moving a pad never makes
-    /// a patch's force jump. It is 0 behind the gel, where a point is no more in front of this pad.
+    /// The coverage falls from 1 to 0 over one spacing across the edge of the footprint, so that forces stay continuous
+    /// as a pad moves. It is 0 below the gel's base, where a point belongs to the sensor's case.
     pub fn contact(&self, p_p: &Vec3, spacing: f64) -> PadContact {
         let gradient = Vec3::new(p_p.x / self.radius_x, p_p.y / self.radius_y, 1.0);
         let steepness = gradient.norm();
@@ -101,9 +98,9 @@ impl PadSurface {
         }
     }
 
-    /// The dome in square patches about `spacing` (m) wide: centre and normal (pad frame) and the part of the patch's
-    /// area (m²) that lies on the footprint.
-    pub fn patches(&self, spacing: f64) -> Vec<(Vec3, Vec3, f64)> {
+    /// Samples of the dome: centres and normals (pad frame) of square patches about `spacing` (m) wide, with the area of
+    /// each patch (m²) that lies over the footprint.
+    pub fn samples(&self, spacing: f64) -> Vec<GelSample> {
         let count = |extent: f64| (extent / spacing).ceil().max(1.0) as usize;
         let (nx, ny) = (count(self.length), count(self.width));
         let (dx, dy) = (self.length / nx as f64, self.width / ny as f64);
@@ -113,17 +110,16 @@ impl PadSurface {
             .map(|(x, y)| {
                 let p_p = Vec3::new(x, y, self.height(x, y));
                 let contact = self.contact(&p_p, dx.max(dy));
-                (p_p, contact.normal_p, dx * dy * contact.coverage)
+                GelSample { p: p_p, normal: contact.normal_p, area: dx * dy * contact.coverage }
             })
-            .filter(|(_, _, area)| *area > 0.0)
+            .filter(|sample| sample.area > 0.0)
             .collect()
     }
 }
 
-/// Distance of the gel's samples that hard shapes press on, m: that of a soft body's samples where it is grasped.
+/// Spacing of the gel samples that meet hard shapes, m; equal to the spacing on grasped surfaces of soft bodies.
 const GEL_SPACING: f64 = 0.75e-3;
 
-/// The gel as contact samples and hard shapes feel it, in the pad frame.
 impl ContactSurface for PadSurface {
     fn contact(&self, p: &Vec3, _facing: &Vec3, spacing: f64) -> Contact {
         let contact = self.contact(p, spacing);
@@ -136,12 +132,11 @@ impl ContactSurface for PadSurface {
     }
 
     fn solid(&self) -> Option<CollisionGeometry> {
-        let patches = self.patches(GEL_SPACING).into_iter();
-        Some(CollisionGeometry::Gel(patches.map(|(p, normal, area)| GelSample { p, normal, area }).collect()))
+        Some(CollisionGeometry::Gel(self.samples(GEL_SPACING)))
     }
 }
 
-/// Pad frame in the frame of its finger's link.
+/// Pad frame in the link frame of its finger.
 pub fn pad_pose_in_finger(side: Side) -> Pose {
     let turn = match side {
         Side::Left => Quaternion::new(0.5, 0.5, 0.5, -0.5),
@@ -150,16 +145,16 @@ pub fn pad_pose_in_finger(side: Side) -> Pose {
     Pose::from_parts(Vec3::new(0.0, 0.0, APEX_Z).into(), Quat::new_unchecked(turn))
 }
 
-/// A box that stands for part of a link in collisions.
+/// Box that represents part of a link in collisions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CollisionBox {
     /// Half extents, m.
     pub half: Vec3,
-    /// Frame of its centre in the link frame.
+    /// Frame of the centre in the link frame.
     pub pose: Pose,
 }
 
-/// What a finger has besides its gel: the sensor's case and the bracket that carries it, in the finger's link frame.
+/// Collision boxes of a finger besides its gel, in its link frame: the case of the sensor, and the bracket that carries it.
 pub fn finger_boxes(side: Side) -> [CollisionBox; 2] {
     let out = outward(side);
     let depth = PadSurface::default().thickness + CASE_HALF.y;
@@ -168,25 +163,19 @@ pub fn finger_boxes(side: Side) -> [CollisionBox; 2] {
     [at(CASE_HALF, APEX_Z), at(Vec3::new(0.0105, 0.010, bracket_z), bracket_z)]
 }
 
-/// Half extents of the box around a gel, finger axes, m.
+/// Half extents of the bounding box of a gel, finger axes, m.
 pub(super) fn gel_half() -> Vec3 {
     let pad = PadSurface::default();
     Vec3::new(pad.width, pad.thickness, pad.length) / 2.0
 }
 
-/// Middle of the box around a gel, in the finger's link frame.
+/// Centre of the bounding box of a gel, in the link frame of the finger.
 pub(super) fn gel_centre_in_finger(side: Side) -> Pose {
     Pose::translation(0.0, outward(side) * gel_half().y, APEX_Z)
 }
 
-/// The hand's body, in the frame of the link that carries it.
-pub fn hand_boxes() -> [CollisionBox; 1] {
-    let pose = super::panda::hand_in_link() * Pose::translation(0.0, 0.0, HAND_HALF.z);
-    [CollisionBox { half: HAND_HALF, pose }]
-}
-
-/// Centre of mass (finger frame, m) and inertia about it (kg m²) of a finger of `mass` kg: a uniform box of the
-/// size of the sensor's case, which makes up nearly all of it.
+/// Centre of mass (finger frame, m) and inertia about it (kg m²) of a finger with mass `mass` (kg), modelled as a uniform
+/// box of the size of the sensor's case, which is nearly all of the mass.
 pub(super) fn finger_mass(side: Side, mass: f64) -> (Vec3, Mat3) {
     let case = finger_boxes(side)[0];
     let square = case.half.component_mul(&case.half);
@@ -194,7 +183,7 @@ pub(super) fn finger_mass(side: Side, mass: f64) -> (Vec3, Mat3) {
     (case.pose.translation.vector, Mat3::from_diagonal(&moments))
 }
 
-/// Direction along the hand's y in which a finger opens.
+/// Direction along the hand's y axis in which a finger opens, ±1.
 pub(super) fn outward(side: Side) -> f64 {
     match side {
         Side::Left => 1.0,
@@ -220,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn pad_frames_face_each_other_and_point_to_the_hand() {
+    fn pad_frames_face_each_other_with_x_towards_the_hand() {
         for (side, out) in [(Side::Left, 1.0), (Side::Right, -1.0)] {
             let pad = pad_pose_in_finger(side);
             let turned = |axis: Vec3| pad.rotation * axis;
@@ -231,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_of_a_finger_is_in_front_of_its_gel_and_fingers_never_meet_but_at_the_gels() {
+    fn no_collision_box_of_a_finger_reaches_in_front_of_its_gel() {
         for side in Side::BOTH {
             let to_pad = pad_pose_in_finger(side).inverse();
             for part in finger_boxes(side) {
@@ -243,7 +232,7 @@ mod tests {
         }
     }
 
-    /// Distance to the dome by search: Gauss–Newton on the foot point.
+    /// Distance to the dome by Gauss–Newton iteration on the closest point.
     fn distance(pad: &PadSurface, p_p: &Vec3) -> f64 {
         let (mut x, mut y) = (p_p.x, p_p.y);
         for _ in 0..50 {
@@ -281,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn the_covered_area_is_the_footprint_whatever_the_sampling() {
+    fn the_covered_area_equals_the_footprint_at_any_sampling() {
         let pad = PadSurface::default();
         let footprint = pad.length * pad.width - (4.0 - std::f64::consts::PI) * pad.corner.powi(2);
         for (spacing, offset) in [(0.75e-3, 0.0), (0.75e-3, 0.31e-3), (0.5e-3, 0.13e-3)] {
@@ -298,29 +287,29 @@ mod tests {
     }
 
     #[test]
-    fn patches_tile_the_footprint_and_lie_on_the_dome() {
+    fn samples_cover_the_footprint_and_lie_on_the_dome() {
         let pad = PadSurface::default();
         let footprint = pad.length * pad.width - (4.0 - std::f64::consts::PI) * pad.corner.powi(2);
-        let patches = pad.patches(0.75e-3);
-        let area: f64 = patches.iter().map(|(_, _, area)| area).sum();
+        let samples = pad.samples(0.75e-3);
+        let area: f64 = samples.iter().map(|sample| sample.area).sum();
         assert!((area / footprint - 1.0).abs() < 2e-3, "{area} {footprint}");
-        let mean = patches.iter().map(|(p, _, area)| p * *area).sum::<Vec3>() / area;
+        let mean = samples.iter().map(|sample| sample.p * sample.area).sum::<Vec3>() / area;
         assert!(mean.xy().norm() < 1e-12, "{mean}");
-        for (p, normal, _) in patches {
+        for GelSample { p, normal, .. } in samples {
             let contact = pad.contact(&p, 1e-3);
             assert!(contact.phi.abs() < 1e-15 && (contact.normal_p - normal).norm() < 1e-15);
         }
     }
 
     #[test]
-    fn a_point_behind_the_gel_does_not_touch_it() {
+    fn a_point_below_the_base_of_the_gel_is_not_covered() {
         let pad = PadSurface::default();
         assert_eq!(pad.contact(&Vec3::new(0.0, 0.0, -0.03), 1e-3).coverage, 0.0);
         assert_eq!(pad.contact(&Vec3::new(0.0, 0.0, -0.001), 1e-3).coverage, 1.0);
     }
 
     #[test]
-    fn normals_lean_outwards_from_the_apex() {
+    fn normals_tilt_outwards_from_the_apex() {
         let contact = PadSurface::default().contact(&Vec3::new(0.01, 0.0, 0.0), 1e-3);
         assert!(
             (contact.normal_p.x - 0.01 / 0.206 / (1.0 + (0.01_f64 / 0.206).powi(2)).sqrt()).abs() < 1e-15

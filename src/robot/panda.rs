@@ -1,53 +1,80 @@
-//! The arm itself: geometry, limits and mass properties of the Franka Emika Panda with its hand.
+//! Kinematics, limits and mass properties of the Franka Emika Panda with its hand, as a joint tree.
 
 use crate::{
     geometry::{Mat3, Pose, Quat, Vec3},
     physics::joints::{JointKind, JointTree, Link},
 };
 
-use super::{GripperSpec, Side, gripper::MAX_WIDTH, pads};
+use super::{
+    gripper::MAX_WIDTH,
+    pads::{self, CollisionBox},
+    spec::{GripperSpec, Side},
+};
 
-/// Degrees of freedom of the arm; the fingers follow in the tree.
+/// Degrees of freedom of the arm; those of the fingers follow in the tree.
 pub const ARM_DOFS: usize = 7;
 
-/// Degrees of freedom of the whole tree.
+/// Degrees of freedom of the tree: seven arm joints and two fingers.
 pub const DOFS: usize = ARM_DOFS + 2;
 
-/// The link that the hand is part of.
+/// Index of the link that includes the hand.
 pub const HAND_LINK: usize = 6;
 
 /// Height of the finger frames above the hand frame, m (Franka's description, `franka_hand.xacro`).
 const FINGER_Z: f64 = 0.0584;
 
-/// Modified Denavit–Hartenberg parameters (a, α, d) of each joint (Craig, Introduction to Robotics, 1986, §3.4;
-/// values: Franka Control Interface documentation, "Denavit–Hartenberg parameters"), m and quarter turns.
-const DH: [(f64, f64, f64); ARM_DOFS] = [
-    (0.0, 0.0, 0.333),
-    (0.0, -1.0, 0.0),
-    (0.0, 1.0, 0.316),
-    (0.0825, 1.0, 0.0),
-    (-0.0825, -1.0, 0.384),
-    (0.0, 1.0, 0.0),
-    (0.088, 1.0, 0.0),
+/// Half extents of the hand's body, hand axes, m (bounding box of Franka's hand without its camera mount).
+const HAND_HALF: Vec3 = Vec3::new(0.0316, 0.1025, 0.033);
+
+/// Modified Denavit–Hartenberg parameters of a joint (Craig, Introduction to Robotics, 1986, §3.4).
+struct DenavitHartenberg {
+    /// m.
+    a: f64,
+    /// α in quarter turns, which are exact.
+    quarter_turns: f64,
+    /// m.
+    d: f64,
+}
+
+/// Values: Franka Control Interface documentation, "Denavit–Hartenberg parameters".
+const DH: [DenavitHartenberg; ARM_DOFS] = [
+    DenavitHartenberg { a: 0.0, quarter_turns: 0.0, d: 0.333 },
+    DenavitHartenberg { a: 0.0, quarter_turns: -1.0, d: 0.0 },
+    DenavitHartenberg { a: 0.0, quarter_turns: 1.0, d: 0.316 },
+    DenavitHartenberg { a: 0.0825, quarter_turns: 1.0, d: 0.0 },
+    DenavitHartenberg { a: -0.0825, quarter_turns: -1.0, d: 0.384 },
+    DenavitHartenberg { a: 0.0, quarter_turns: 1.0, d: 0.0 },
+    DenavitHartenberg { a: 0.088, quarter_turns: 1.0, d: 0.0 },
 ];
 
 /// Distance of the flange from the last joint frame, m.
 const FLANGE_Z: f64 = 0.107;
 
-/// Joint limits: lower and upper position, rad; speed, rad/s; torque, N m (Franka Control Interface documentation,
-/// "Limits for Panda").
-const LIMITS: [(f64, f64, f64, f64); ARM_DOFS] = [
-    (-2.8973, 2.8973, 2.175, 87.0),
-    (-1.7628, 1.7628, 2.175, 87.0),
-    (-2.8973, 2.8973, 2.175, 87.0),
-    (-3.0718, -0.0698, 2.175, 87.0),
-    (-2.8973, 2.8973, 2.61, 12.0),
-    (-0.0175, 3.7525, 2.61, 12.0),
-    (-2.8973, 2.8973, 2.61, 12.0),
+/// Limits of a joint.
+struct JointLimits {
+    /// rad.
+    lower: f64,
+    /// rad.
+    upper: f64,
+    /// rad/s.
+    speed: f64,
+    /// N m.
+    torque: f64,
+}
+
+/// Values: Franka Control Interface documentation, "Limits for Panda".
+const LIMITS: [JointLimits; ARM_DOFS] = [
+    JointLimits { lower: -2.8973, upper: 2.8973, speed: 2.175, torque: 87.0 },
+    JointLimits { lower: -1.7628, upper: 1.7628, speed: 2.175, torque: 87.0 },
+    JointLimits { lower: -2.8973, upper: 2.8973, speed: 2.175, torque: 87.0 },
+    JointLimits { lower: -3.0718, upper: -0.0698, speed: 2.175, torque: 87.0 },
+    JointLimits { lower: -2.8973, upper: 2.8973, speed: 2.61, torque: 12.0 },
+    JointLimits { lower: -0.0175, upper: 3.7525, speed: 2.61, torque: 12.0 },
+    JointLimits { lower: -2.8973, upper: 2.8973, speed: 2.61, torque: 12.0 },
 ];
 
-/// Mass properties of a body in its link frame.
-struct Body {
+/// Mass properties of a link, in its link frame.
+struct LinkInertia {
     /// kg.
     mass: f64,
     /// m.
@@ -56,7 +83,7 @@ struct Body {
     inertia: [f64; 6],
 }
 
-impl Body {
+impl LinkInertia {
     fn com(&self) -> Vec3 {
         self.com.into()
     }
@@ -69,51 +96,51 @@ impl Body {
 
 /// Links 1 to 7 as identified by Gaz, Cognetti, Oliva, Robuffo Giordano and De Luca, Dynamic Identification of the
 /// Franka Emika Panda Robot With Retrieval of Feasible Parameters Using Penalty-Based Optimization, IEEE RA-L 4(4),
-/// 2019, in the rounding of Franka's own description (`franka_description`, `inertial.yaml`); none is adjusted. The
-/// identification finds what the torques show: the split of mass between links is one feasible choice of many.
-const BODIES: [Body; ARM_DOFS] = [
-    Body {
+/// 2019, rounded and unadjusted as in Franka's own description (`franka_description`, `inertial.yaml`). Torques determine
+/// only combinations of these parameters: the split of mass between links is one feasible choice of many.
+const LINK_INERTIAS: [LinkInertia; ARM_DOFS] = [
+    LinkInertia {
         mass: 4.970684,
         com: [0.003875, 0.002081, -0.04762],
         inertia: [0.70337, 0.70661, 0.009117, -0.000139, 0.006772, 0.019169],
     },
-    Body {
+    LinkInertia {
         mass: 0.646926,
         com: [-0.003141, -0.02872, 0.003495],
         inertia: [0.007962, 0.02811, 0.025995, -0.003925, 0.010254, 0.000704],
     },
-    Body {
+    LinkInertia {
         mass: 3.228604,
         com: [0.027518, 0.039252, -0.066502],
         inertia: [0.037242, 0.036155, 0.01083, -0.004761, -0.011396, -0.012805],
     },
-    Body {
+    LinkInertia {
         mass: 3.587895,
         com: [-0.05317, 0.104419, 0.027454],
         inertia: [0.025853, 0.019552, 0.028323, 0.007796, -0.001332, 0.008641],
     },
-    Body {
+    LinkInertia {
         mass: 1.225946,
         com: [-0.011953, 0.041065, -0.038437],
         inertia: [0.035549, 0.029474, 0.008627, -0.002117, -0.004037, 0.000229],
     },
-    Body {
+    LinkInertia {
         mass: 1.666555,
         com: [0.060149, -0.014117, -0.010517],
         inertia: [0.001964, 0.004354, 0.005433, 0.000109, -0.001158, 0.000341],
     },
-    Body {
+    LinkInertia {
         mass: 0.735522,
         com: [0.010517, -0.004252, 0.061597],
         inertia: [0.012516, 0.010027, 0.004815, -0.000428, -0.001196, -0.000741],
     },
 ];
 
-/// The hand without fingers, in the hand frame (Franka's description, `franka_hand/inertials.yaml`).
-const HAND: Body =
-    Body { mass: 0.73, com: [-0.01, 0.0, 0.03], inertia: [0.001, 0.0025, 0.0017, 0.0, 0.0, 0.0] };
+/// Hand without fingers, in the hand frame (Franka's description, `franka_hand/inertials.yaml`).
+const HAND: LinkInertia =
+    LinkInertia { mass: 0.73, com: [-0.01, 0.0, 0.03], inertia: [0.001, 0.0025, 0.0017, 0.0, 0.0, 0.0] };
 
-/// Index of a finger's link.
+/// Index of the link of a finger.
 pub fn finger_link(side: Side) -> usize {
     ARM_DOFS + side.index()
 }
@@ -126,13 +153,13 @@ pub fn hand_in_link() -> Pose {
     )
 }
 
-/// Tool frame in the hand frame: the nominal midpoint of the gel apexes, 103.4 mm out, where Franka's own tips have
-/// theirs, so that tool poses mean the same with either.
+/// Tool frame in the hand frame: at the nominal midpoint of the gel apexes, 103.4 mm along z. Franka's own finger tips
+/// have the same tool point, so that tool poses are comparable.
 pub fn tool_in_hand() -> Pose {
     Pose::translation(0.0, 0.0, FINGER_Z + pads::APEX_Z)
 }
 
-/// A finger's link in the hand frame, its gel's apex `q` (m) from the hand's middle plane.
+/// Link frame of a finger in the hand frame, with its gel apex at distance `q` (m) from the middle plane of the hand.
 pub fn finger_in_hand(side: Side, q: f64) -> Pose {
     Pose::translation(0.0, pads::outward(side) * q, FINGER_Z)
 }
@@ -142,10 +169,29 @@ pub fn tool_in_link() -> Pose {
     hand_in_link() * tool_in_hand()
 }
 
-/// The arm, hand and both fingers as a joint tree: joints 1 to 7, left finger, right finger. A finger's coordinate
-/// is the distance of its gel apex from the hand's middle plane, so that the width between the apexes is their sum.
+/// Collision boxes of the hand's body, in the frame of [`HAND_LINK`].
+pub fn hand_boxes() -> [CollisionBox; 1] {
+    [CollisionBox { half: HAND_HALF, pose: hand_in_link() * Pose::translation(0.0, 0.0, HAND_HALF.z) }]
+}
+
+/// The joint tree of arm, hand and fingers, with its base at `base_w` (world): joints 1 to 7 (rad), left finger, right
+/// finger (m).
 ///
-/// Joint friction is left out, as the arm's own torque control compensates it.
+/// The coordinate of a finger is the distance of its gel apex from the middle plane of the hand; the width between the
+/// apexes is the sum of both. The model has no joint friction, since the torque control of the real arm compensates it.
+///
+/// ```
+/// use softvt::{
+///     geometry::Pose,
+///     physics::joints::forward,
+///     robot::{GripperSpec, panda},
+/// };
+///
+/// let tree = panda::tree(Pose::identity(), &GripperSpec::default());
+/// let q = [0.0, -0.569, 0.0, -2.810, 0.0, 3.037, 0.741, 0.04, 0.04];
+/// let tool = forward(&tree, &q)[panda::HAND_LINK] * panda::tool_in_link();
+/// assert!((tool.translation.x - 0.4633).abs() < 1e-4 && (tool.translation.z - 0.3855).abs() < 1e-4);
+/// ```
 pub fn tree(base_w: Pose, gripper: &GripperSpec) -> JointTree {
     let mut links: Vec<Link> = (0..ARM_DOFS).map(arm_link).collect();
     links[HAND_LINK].weld(HAND.mass, &HAND.com(), &HAND.inertia(), &hand_in_link());
@@ -153,26 +199,26 @@ pub fn tree(base_w: Pose, gripper: &GripperSpec) -> JointTree {
     JointTree { links, base_w }
 }
 
-/// The seven arm links alone, in the base frame, for kinematics.
+/// The joint tree of the seven arm links without hand and fingers, in the base frame, for kinematics.
 pub fn arm_chain() -> JointTree {
     JointTree { links: (0..ARM_DOFS).map(arm_link).collect(), base_w: Pose::identity() }
 }
 
 fn arm_link(index: usize) -> Link {
-    let ((a, quarter_turns, d), (lower, upper, speed, torque)) = (DH[index], LIMITS[index]);
+    let (DenavitHartenberg { a, quarter_turns, d }, limits) = (&DH[index], &LIMITS[index]);
     let twist = Quat::from_axis_angle(&Vec3::x_axis(), quarter_turns * std::f64::consts::FRAC_PI_2);
     Link {
         name: format!("panda_link{}", index + 1),
         parent: index.checked_sub(1),
-        placement: Pose::from_parts((twist * Vec3::new(a, 0.0, d)).into(), twist),
+        placement: Pose::from_parts((twist * Vec3::new(*a, 0.0, *d)).into(), twist),
         kind: JointKind::Revolute(Vec3::z_axis()),
-        mass: BODIES[index].mass,
-        com: BODIES[index].com(),
-        inertia: BODIES[index].inertia(),
-        lower,
-        upper,
-        velocity_limit: speed,
-        effort_limit: torque,
+        mass: LINK_INERTIAS[index].mass,
+        com: LINK_INERTIAS[index].com(),
+        inertia: LINK_INERTIAS[index].inertia(),
+        lower: limits.lower,
+        upper: limits.upper,
+        velocity_limit: limits.speed,
+        effort_limit: limits.torque,
         friction: 0.0,
         damping: 0.0,
     }
@@ -219,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn the_tool_is_where_two_published_poses_put_it() {
+    fn forward_kinematics_match_two_published_tool_poses() {
         let start = tool(&START);
         assert!((start.translation.vector - Vec3::new(0.4727, -0.0054, 0.2861)).amax() < 5e-5, "{start}");
         let down = start.rotation * Vec3::z();
@@ -231,10 +277,10 @@ mod tests {
     }
 
     #[test]
-    fn every_link_is_a_possible_body_and_the_arm_weighs_what_was_identified() {
+    fn every_link_is_physically_feasible_and_masses_add_up() {
         let tree = whole();
-        tree.validate().expect("a possible mechanism");
-        let arm: f64 = BODIES.iter().map(|body| body.mass).sum();
+        tree.validate().expect("a feasible mechanism");
+        let arm: f64 = LINK_INERTIAS.iter().map(|body| body.mass).sum();
         assert!((arm - 16.062132).abs() < 1e-9);
         let total: f64 = tree.links.iter().map(|link| link.mass).sum();
         assert!((total - arm - 0.73 - 0.2).abs() < 1e-12);
@@ -252,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn the_drives_can_hold_the_arm_and_every_mass_is_felt() {
+    fn drives_hold_the_arm_and_the_mass_matrix_includes_the_fingers() {
         let tree = whole();
         let poses = forward(&tree, &START);
         let weight = bias(&tree, &poses, &[0.0; DOFS], &Vec3::new(0.0, 0.0, -9.81));

@@ -1,31 +1,31 @@
-//! Rotations as files and actions carry them: quaternions with w ≥ 0 and rotation vectors (axis times angle).
+//! Conventions for rotations in files and actions: quaternions with w ≥ 0, and rotation vectors (axis times angle).
 
 use crate::geometry::{Quat, Vec3};
 
-/// The one of the two quaternions of a rotation that has w ≥ 0; at w = 0 the one whose first non-zero component is
-/// positive, so that equal half turns have equal numbers.
+/// Canonical quaternion of a rotation: w ≥ 0, and at w = 0 a positive first non-zero component, so that equal half turns
+/// have equal components.
 pub fn canonical(rotation: &Quat) -> Quat {
     let q = rotation.quaternion();
     let first = [q.w, q.i, q.j, q.k].into_iter().find(|part| *part != 0.0);
     if first.is_some_and(|part| part < 0.0) { Quat::new_unchecked(-q) } else { *rotation }
 }
 
-/// Rotation vector of a rotation: unit axis times angle, rad, 0 ≤ angle ≤ π. Accurate at both ends: the angle comes
-/// from atan2, never from acos.
+/// Rotation vector of a rotation: unit axis times angle (rad), 0 ≤ angle ≤ π. The angle is computed with atan2, which is
+/// accurate near 0 and π, where acos is not.
 pub fn axis_angle(rotation: &Quat) -> Vec3 {
     let q = canonical(rotation);
     let axis = q.imag();
     let sine = axis.norm();
-    // Below this the sine is its angle to the last bit, and the quotient would divide by zero.
+    // Below this sine and angle are equal to the last bit, and the quotient could divide by zero.
     if sine < 1e-9 { axis * 2.0 } else { axis * (2.0 * sine.atan2(q.w) / sine) }
 }
 
-/// The rotation of a rotation vector (rad, of any length), w ≥ 0.
+/// Rotation of a rotation vector (rad, any length), with w ≥ 0.
 pub fn from_axis_angle(vector: &Vec3) -> Quat {
     canonical(&Quat::from_scaled_axis(*vector))
 }
 
-/// The rotation vector that turns `from` into `to`, in the frame both are given in, rad.
+/// Rotation vector (rad) that turns `from` into `to`, in the frame that both are given in.
 pub fn error(from: &Quat, to: &Quat) -> Vec3 {
     axis_angle(&(to * from.inverse()))
 }
@@ -42,11 +42,11 @@ mod tests {
         let part = -1.0..1.0_f64;
         (part.clone(), part.clone(), part)
             .prop_map(|(x, y, z)| Vec3::new(x, y, z))
-            .prop_filter("an axis needs a length", |axis| axis.norm() > 1e-3)
+            .prop_filter("an axis of non-zero length", |axis| axis.norm() > 1e-3)
             .prop_map(|axis| axis.normalize())
     }
 
-    /// Angles in [0, π], crowded towards both ends.
+    /// Angles in [0, π], denser towards both ends.
     fn any_angle() -> impl Strategy<Value = f64> {
         let near = (-14.0..0.0_f64).prop_map(|power| 10.0_f64.powf(power));
         prop_oneof![0.0..PI, near.clone(), near.prop_map(|gap| PI - gap), Just(0.0), Just(PI)]
@@ -54,7 +54,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn rotation_vectors_come_back(axis in any_axis(), angle in any_angle()) {
+        fn rotation_vectors_survive_a_round_trip(axis in any_axis(), angle in any_angle()) {
             let there = from_axis_angle(&(axis * angle));
             prop_assert!(there.w >= 0.0);
             let back = axis_angle(&there);
@@ -66,7 +66,7 @@ mod tests {
         }
 
         #[test]
-        fn both_quaternions_of_a_rotation_give_the_same_numbers(axis in any_axis(), angle in any_angle()) {
+        fn both_quaternions_of_a_rotation_have_one_canonical_form(axis in any_axis(), angle in any_angle()) {
             let one = Quat::from_scaled_axis(axis * angle);
             let other = Quat::new_unchecked(-one.into_inner());
             prop_assert_eq!(canonical(&one).into_inner(), canonical(&other).into_inner());
@@ -74,7 +74,7 @@ mod tests {
         }
 
         #[test]
-        fn the_error_turns_one_rotation_into_the_other(a in any_axis(), b in any_axis(), angle in any_angle()) {
+        fn the_error_rotates_one_orientation_into_the_other(a in any_axis(), b in any_axis(), angle in any_angle()) {
             let from = Quat::from_scaled_axis(b);
             let to = Quat::from_scaled_axis(a * angle) * from;
             let turned = from_axis_angle(&error(&from, &to)) * from;

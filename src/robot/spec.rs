@@ -1,8 +1,10 @@
-//! The numbers of the robot that an experiment may want to change, in one place.
+//! Parameters of the robot that experiments may change, with defaults and ranges.
 
 use serde::{Deserialize, Serialize};
 
-/// All of them.
+/// Parameters of arm, gripper, pads and inverse kinematics; the settings `robot.*` of an experiment.
+///
+/// Missing fields take their defaults, unknown fields are errors. [`Self::validate`] checks the ranges.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RobotSpec {
@@ -17,7 +19,7 @@ pub struct RobotSpec {
 }
 
 impl RobotSpec {
-    /// The profile `paper`: fingers as strong as in the paper's simulator, 200 N.
+    /// The profile `paper`: a finger force limit of 200 N, as in the paper's simulator.
     pub fn paper() -> Self {
         Self { gripper: GripperSpec { effort: 200.0, ..GripperSpec::default() }, ..Self::default() }
     }
@@ -25,7 +27,7 @@ impl RobotSpec {
     /// Checks that every number is finite and in its range.
     ///
     /// # Errors
-    /// Names the first field that is not, its value and the range.
+    /// The first field out of its range.
     pub fn validate(&self) -> Result<(), SpecError> {
         let (arm, gripper, pads, ik) = (&self.arm, &self.gripper, &self.pads, &self.ik);
         positive("arm.kp", arm.kp, "N m/rad")?;
@@ -59,26 +61,26 @@ fn positive(field: &'static str, value: f64, unit: &str) -> Result<(), SpecError
     Err(SpecError { field, value, expected: format!("a positive number ({unit})") })
 }
 
-/// A number of the robot out of its range.
+/// A robot parameter out of its range.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("robot.{field}: expected {expected}, got {}", crate::text::format_number(*.value))]
 pub struct SpecError {
-    /// Path of the field.
+    /// Path of the field below `robot`, for example `arm.kp`.
     pub field: &'static str,
-    /// Its value.
+    /// Value given.
     pub value: f64,
-    /// What it may be.
+    /// Range and unit.
     pub expected: String,
 }
 
-/// Joint drives of the arm: `τ = kp (q_target − q) − kd q̇`, within the torque limits of the real arm (the effort
-/// limits of [`super::panda::tree`]), on top of an exact gravity compensation.
+/// Joint drives of the arm: `τ = kp (q_target − q) − kd q̇`, limited to the torques of the real arm (the effort limits of
+/// [`panda::tree`](super::panda::tree)), in addition to exact gravity compensation. The same gains apply to all joints.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ArmSpec {
-    /// Stiffness, N m/rad.
+    /// Stiffness, N m/rad; positive.
     pub kp: f64,
-    /// Damping, N m s/rad.
+    /// Damping, N m s/rad; positive.
     pub kd: f64,
 }
 
@@ -88,20 +90,20 @@ impl Default for ArmSpec {
     }
 }
 
-/// Finger drives: `f = kp (q_target − q) − kd q̇` a finger, within `effort`. How far the gripper opens is its
-/// geometry ([`super::gripper::MAX_WIDTH`]), not a choice.
+/// Drive of each finger: `f = kp (q_target − q) − kd q̇`, limited to `effort`. The opening range is fixed by the hardware
+/// ([`MAX_WIDTH`](super::gripper::MAX_WIDTH)).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GripperSpec {
-    /// Stiffness, N/m.
+    /// Stiffness, N/m; positive.
     pub kp: f64,
-    /// Damping, N s/m.
+    /// Damping, N s/m; positive.
     pub kd: f64,
-    /// Largest force of a finger, N. The real hand holds 70 N continuously (Franka Emika, Hand data sheet).
+    /// Largest force per finger, N. The real hand holds 70 N continuously (Franka Emika, Hand data sheet).
     pub effort: f64,
-    /// Speed of a finger's target, m/s.
+    /// Speed at which the target of each finger moves, m/s.
     pub speed: f64,
-    /// Mass of a finger with its sensor, kg.
+    /// Mass of each finger with its sensor, kg.
     pub finger_mass: f64,
 }
 
@@ -111,8 +113,8 @@ impl Default for GripperSpec {
     }
 }
 
-/// How the gel pads touch: friction, and the give of gel and sensor a contact area (a wide-patch model of the 4 mm
-/// gel, which decides force and slip only).
+/// Contact of the gel pads: friction, and the compliance of gel and sensor per contact area (a model of the 4 mm gel for
+/// wide patches). It determines force and slip; tactile images are computed from a model of their own.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PadSpec {
@@ -136,9 +138,10 @@ impl Default for PadSpec {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct IkSpec {
-    /// Damping λ of the least squares, in the mixed unit of the Jacobian's singular values.
+    /// Damping λ of the least squares, in the mixed unit (m and rad per rad) of the Jacobian's singular values; positive.
+    /// Larger values are slower and more robust near singularities.
     pub lambda: f64,
-    /// Share of the way to the rest posture that the null space takes each control step, 0..=1.
+    /// Share of the way to the rest posture that the null space covers per control step, 0..=1.
     pub posture_gain: f64,
 }
 
@@ -148,12 +151,32 @@ impl Default for IkSpec {
     }
 }
 
+/// One of the two fingers, with its pad and tactile sensor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Side {
+    /// `panda_leftfinger`, which opens along +y of the hand.
+    Left,
+    /// `panda_rightfinger`, which opens along −y of the hand.
+    Right,
+}
+
+impl Side {
+    /// Left, then right: the order of all arrays over fingers.
+    pub const BOTH: [Self; 2] = [Self::Left, Self::Right];
+
+    /// 0 for left, 1 for right.
+    pub fn index(self) -> usize {
+        self as usize
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn defaults_are_valid_and_bad_numbers_are_named() {
+    fn defaults_are_valid_and_invalid_numbers_are_named() {
         RobotSpec::default().validate().expect("defaults");
         RobotSpec::paper().validate().expect("paper");
         let mut spec = RobotSpec::default();

@@ -3,7 +3,10 @@
 use crate::{
     geometry::Pose,
     policy::Action,
-    robot::{ik::REACH, rotation},
+    robot::{
+        ik::{LINEARISATION_RANGE, PoseError},
+        rotation,
+    },
 };
 
 /// Whether a command is farther from the tool than a step of the inverse kinematics looks; both in the base frame.
@@ -12,7 +15,8 @@ pub(super) fn is_far(tool_b: &Pose, action: &Action) -> bool {
         &rotation::from_axis_angle(&rotation::axis_angle(&tool_b.rotation)),
         &rotation::from_axis_angle(&action.axis_angle_b),
     );
-    (action.position_b - tool_b.translation.vector).norm() > REACH.0 || turn.norm() > REACH.1
+    let error = PoseError { translation: action.position_b - tool_b.translation.vector, rotation: turn };
+    !LINEARISATION_RANGE.contains(&error)
 }
 
 /// Numbers of a command are at most this large, m and rad: what is larger is no pose, and its squares are no numbers.

@@ -22,9 +22,9 @@ use super::{
 use crate::{
     benchmark::{Goal, control::steps_per_control},
     evaluation::{
-        deformation::{Deformation, Reference},
-        judge::{Judge, Verdict},
-        record::{EpisodeRecord, Outcome, RolloutStats},
+        deformation::{Deformation, ReferenceShape},
+        judge::Judge,
+        record::{EpisodeRecord, Outcome, RolloutStats, Verdict},
     },
     geometry::Pose,
     physics::{
@@ -47,7 +47,7 @@ pub struct FinishedEpisode {
     /// What was commanded in each control step.
     pub actions: Vec<Action>,
     /// Settled shape of a soft target.
-    pub reference: Option<Reference>,
+    pub reference: Option<ReferenceShape>,
     /// What is needed to draw the rollout, if asked for.
     pub recording: Option<StateRecording>,
 }
@@ -290,7 +290,7 @@ impl Episode {
 
     /// How a state that can be trusted ends the episode, if it does.
     fn ending(&self) -> Option<Outcome> {
-        if self.judge.goal_reached() {
+        if self.judge.is_goal_reached() {
             return Some(Outcome::Completed);
         }
         (self.steps >= self.spec.task.budget_steps).then_some(Outcome::Timeout)
@@ -384,7 +384,7 @@ impl Episode {
             self.judge.observe(&evidence);
             worst = worst.into_iter().chain(now).max_by(|a, b| a.rms_pct.total_cmp(&b.rms_pct));
         }
-        self.frames.push(ScoreFrame { success_now: self.judge.goal_reached(), deformation: worst });
+        self.frames.push(ScoreFrame { success_now: self.judge.is_goal_reached(), deformation: worst });
         if self.spec.trace.is_some() {
             self.trace.push(self.trace());
         }
@@ -414,7 +414,7 @@ impl Episode {
     /// The present state, as a run would write it down.
     pub fn trace(&self) -> StepTrace {
         let at = (self.steps, self.time());
-        let dropped = self.judge.dropped().is_some();
+        let dropped = self.judge.first_drop().is_some();
         StepTrace::new(&self.sim, &self.evidence, self.target, at, dropped, self.spec.trace == Some(true))
     }
 

@@ -3,8 +3,8 @@
 use super::simulation::{ObjectInstance, Simulation};
 use crate::{
     evaluation::{
-        deformation::{Deformation, Reference},
-        evidence::{BodyEvidence, Evidence, GripperEvidence, PadEvidence, PlaceEvidence},
+        deformation::{Deformation, ReferenceShape},
+        evidence::{BodyEvidence, Evidence, GoalEvidence, GripperEvidence, PadEvidence},
     },
     geometry::{Pose, Vec3},
     physics::{BodyId, ContactPartner, world::ContactSummary},
@@ -17,7 +17,7 @@ pub struct EvidenceCollector {
     target: usize,
     place: usize,
     others: Vec<usize>,
-    references: Vec<Option<Reference>>,
+    references: Vec<Option<ReferenceShape>>,
     bodies: Vec<BodyEvidence>,
 }
 
@@ -31,7 +31,7 @@ impl EvidenceCollector {
             .map(|object| match object.body {
                 BodyId::Soft(index) => {
                     let body = &sim.world.soft(index).state;
-                    Reference::new(&body.x, &body.model.mass).ok()
+                    ReferenceShape::new(&body.x, &body.model.mass).ok()
                 }
                 _ => None,
             })
@@ -52,7 +52,7 @@ impl EvidenceCollector {
     }
 
     /// The settled shape of an object.
-    pub fn reference(&self, object: usize) -> Option<&Reference> {
+    pub fn reference(&self, object: usize) -> Option<&ReferenceShape> {
         self.references[object].as_ref()
     }
 
@@ -82,7 +82,7 @@ impl EvidenceCollector {
             }),
             robot_impulse_ns: from_robot * dt,
             target: self.body(sim, self.target),
-            place: PlaceEvidence {
+            goal: GoalEvidence {
                 pose_w: sim.pose(place) * Pose::from(place.foot_o()),
                 support_impulse_ns: from_place * dt,
             },

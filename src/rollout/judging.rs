@@ -8,8 +8,8 @@ use super::{
 use crate::{
     benchmark::{Goal, control::steps_per_control},
     evaluation::{
-        goal::Place,
-        judge::{Judge, Setup},
+        goal::GoalRegion,
+        judge::{Judge, JudgeConfig},
     },
     geometry::Vec3,
     physics::BodyId,
@@ -24,15 +24,15 @@ pub(super) fn judge(
     (target, place): (usize, usize),
     hold_s: f64,
 ) -> Judge {
-    Judge::new(Setup {
-        rules: spec.rules.clone(),
+    Judge::new(JudgeConfig {
+        criteria: spec.criteria.clone(),
         workspace: spec.scene.workspace,
-        place: place_of(&spec.task.goal, &sim.objects[place]),
+        goal: place_of(&spec.task.goal, &sim.objects[place]),
         hold_s,
         dt_s: spec.params.dt,
         steps_per_control: steps_per_control(spec.params.dt),
         target_weight_n: weight(sim, target),
-        soft: matches!(sim.objects[target].body, BodyId::Soft(_)),
+        is_target_soft: matches!(sim.objects[target].body, BodyId::Soft(_)),
         limit: spec.limit,
         target_lowest_z_w: lowest(sim, &sim.objects[target]),
         others_lowest_z_w: evidence.others_lowest(sim),
@@ -40,15 +40,17 @@ pub(super) fn judge(
 }
 
 /// Where the goal is, from the shape of what it names.
-fn place_of(goal: &Goal, place: &ObjectInstance) -> Place {
+fn place_of(goal: &Goal, place: &ObjectInstance) -> GoalRegion {
     let bounds = place.bounds;
     match goal {
-        Goal::On { .. } => Place::On { radius_m: 0.5 * bounds.size().xy().min() },
+        Goal::On { .. } => GoalRegion::On { radius_m: 0.5 * bounds.size().xy().min() },
         Goal::In { .. } => {
             let wall = place.asset.hints.get("wall_m").copied().unwrap_or(0.0);
             let inset = Vec3::new(wall, wall, 0.0);
             let foot = place.foot_o();
-            Place::In { inside: Region { min: bounds.min + inset - foot, max: bounds.max - inset - foot } }
+            GoalRegion::In {
+                inside: Region { min: bounds.min + inset - foot, max: bounds.max - inset - foot },
+            }
         }
     }
 }

@@ -2,7 +2,6 @@
 
 mod articulated;
 mod asset_cache;
-pub mod batch;
 mod build;
 pub mod cancel;
 mod command;
@@ -25,7 +24,7 @@ mod trace;
 
 pub use asset_cache::AssetCache;
 pub use build::{BuildError, check_support, soft_rest};
-pub use controller::{ControlError, Controller};
+pub use controller::{Cancellable, ControlError, Controller};
 pub use episode::{Episode, EpisodeError, FinishedEpisode, ScoreFrame};
 pub use proprioception::{BodyConfiguration, Proprioception};
 pub use robot_instance::RobotInstance;

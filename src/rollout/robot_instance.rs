@@ -73,7 +73,7 @@ impl RobotInstance {
             );
         }
         let hand = LinkId { articulation, index: panda::HAND_LINK };
-        body.extend(pads::hand_boxes().map(|b| add_box(world, hand, b.half, b.pose)));
+        body.extend(panda::hand_boxes().map(|b| add_box(world, hand, b.half, b.pose)));
         Self {
             articulation,
             pads,

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::{
     benchmark::{Task, seed::Split, settings::Settings},
-    evaluation::{record::Identity, rules::Rules, safety::Limit},
+    evaluation::{criteria::SuccessCriteria, record::Identity, safety::DeformationLimit},
     physics::PhysicsParams,
     robot::RobotSpec,
     scene::{Asset, Body, Scene},
@@ -36,9 +36,9 @@ pub struct EpisodeSpec {
     /// The scene before settling.
     pub scene: Arc<Scene>,
     /// Deformation limit by asset name; `None` if the target was never calibrated.
-    pub limit: Option<Limit>,
+    pub limit: Option<DeformationLimit>,
     /// Judging thresholds.
-    pub rules: Rules,
+    pub criteria: SuccessCriteria,
     /// Parameters of the mechanics.
     pub params: PhysicsParams,
     /// Parameters of the robot.
@@ -80,7 +80,7 @@ impl EpisodeSpec {
             task: task.clone(),
             scene: Arc::new(scene),
             limit: None,
-            rules: settings.rules.clone(),
+            criteria: settings.criteria.clone(),
             params: settings.physics.clone(),
             robot: settings.robot.clone(),
             tactile: settings.tactile.clone(),

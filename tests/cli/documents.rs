@@ -3,7 +3,7 @@
 
 use std::{path::Path, time::Duration};
 
-use softvt::{evaluation::thresholds::Thresholds, report::envelope::plot, script};
+use softvt::{evaluation::envelope_plot::plot, evaluation::thresholds::ThresholdFile, script};
 
 use crate::support::{Project, Said, said};
 
@@ -197,7 +197,7 @@ fn the_calibration_page_shows_the_envelope_of_every_soft_asset() {
     for fence in soft {
         let asset = fence.text.split(' ').next().expect("a name").to_owned();
         let path = format!("assets/calibration/{asset}.json");
-        let file = Thresholds::parse(&read(&path), &path).expect("a threshold file");
+        let file = ThresholdFile::parse(&read(&path), &path).expect("a threshold file");
         let text = plot(&asset, &file.envelopes[&asset], file.limit(&asset));
         assert_eq!(fence.text, text, "{asset}: softvt scripts/calibrate.lua makes it anew");
         assert_eq!(read(&format!("assets/calibration/{asset}.txt")), text, "{asset}");

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use rust_hdf5::H5File;
-use softvt::dataset::{Numbers, TaskFile};
+use softvt::dataset::{StreamValues, TaskFile};
 
 use crate::support::{Project, SOLIDS};
 
@@ -46,8 +46,8 @@ struct Said<'a> {
 /// Writes such a file, of one demonstration that holds still where the recorded arm stood.
 fn write(from: &Path, into: &Path, said: &Said) {
     let read = TaskFile::open(from).expect("a file");
-    let numbers = |name: &str| match read.stream(0, name).expect("a stream").numbers {
-        Numbers::F64(numbers) => numbers,
+    let numbers = |name: &str| match read.stream(0, name).expect("a stream").values {
+        StreamValues::F64(numbers) => numbers,
         _ => panic!("{name} is of doubles"),
     };
     let (state, pose, joints) = (numbers("obs/state"), numbers("obs/eef_pose"), numbers("obs/arm_joint_pos"));

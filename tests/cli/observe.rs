@@ -5,7 +5,7 @@ use std::{path::Path, sync::Arc};
 
 use softvt::{
     benchmark::{Plan, seed::Split, settings::Settings},
-    evaluation::{record::EpisodeRecord, summary::Summary},
+    evaluation::{record::EpisodeRecord, summary::SuiteSummary},
     policy::{
         Action, ActionChunk, ChunkedPolicy, Observation, Policy, PolicyError, SensorStreams, TaskBrief,
     },
@@ -119,7 +119,7 @@ fn results_say_whether_the_policy_saw_true_forces() {
         assert_eq!(record.stats.force_observed, force);
         let line = serde_json::to_string(&record).expect("JSON");
         assert!(line.contains(&format!("\"force_observed\":{force},")), "{line}");
-        let summary = Summary::of("one", "witness", &[record]);
+        let summary = SuiteSummary::of("one", "witness", &[record]);
         assert_eq!(summary.force_observed, force);
         assert_eq!(terminal::table(&summary).contains("the policy saw true forces"), force);
     }

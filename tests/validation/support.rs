@@ -5,7 +5,7 @@
 //! quintic, and the hold.
 
 use softvt::{
-    evaluation::deformation::Reference,
+    evaluation::deformation::ReferenceShape,
     geometry::{Pose, Quat, Vec3, samples::SampleSpec, shape::Shape},
     physics::{
         BodyId, ColliderId, KinematicId, PhysicsParams, SoftId, World, contact::Friction,
@@ -165,7 +165,7 @@ pub struct Scene {
     pub world: World,
     pub options: Squeeze,
     pads: [(KinematicId, ColliderId, f64); 2],
-    reference: Reference,
+    reference: ReferenceShape,
     start: Vec3,
 }
 
@@ -200,7 +200,7 @@ impl Scene {
             let shape = Shape::cuboid(size);
             (frame, world.add_shape("pad", frame, Pose::identity(), &shape, rough), side)
         });
-        let reference = Reference::new(&rest.mesh.nodes, &rest.mass).expect("a body with size");
+        let reference = ReferenceShape::new(&rest.mesh.nodes, &rest.mass).expect("a body with size");
         let start = world.soft_bodies()[0].state.centre();
         Self { world, options: *options, pads, reference, start }
     }

@@ -1,6 +1,6 @@
 //! Small-strain pad stiffness of the cube against converged truth, and how it changes with the pads.
 
-use softvt::evaluation::deformation::Reference;
+use softvt::evaluation::deformation::ReferenceShape;
 
 use crate::support::{Scene, Squeeze};
 
@@ -36,7 +36,7 @@ pub fn small_strain(resolution: usize, pad_mm: f64, offset_mm: [f64; 2]) -> (f64
         (0..body.x.len()).filter(|&n| body.model.mesh.nodes[n].iter().all(on)).collect();
     let rest: Vec<_> = on_lattice.iter().map(|&n| body.model.mesh.nodes[n]).collect();
     let now: Vec<_> = on_lattice.iter().map(|&n| body.x[n]).collect();
-    let reference = Reference::new(&rest, &vec![1.0; rest.len()]).expect("a cube");
+    let reference = ReferenceShape::new(&rest, &vec![1.0; rest.len()]).expect("a cube");
     let d = reference.measure(&now).expect("a cube").rms_pct;
     (force / CLOSE, d / (1e3 * CLOSE))
 }

@@ -19,7 +19,7 @@ use crate::{
         error::CliError,
         run::{config::RunConfig, policy::PolicyConfig, recording::RecordingConfig},
     },
-    dataset::lerobot::Export,
+    dataset::lerobot::ExportConfig,
     policy::{profile::Profile, remote::Protocol},
     script::{self, OptionSpec},
 };
@@ -100,7 +100,7 @@ pub(crate) enum Command {
         json: bool,
     },
     /// Export a data set for those who train.
-    DatasetExport(Export),
+    DatasetExport(ExportConfig),
     /// Check the installation.
     Doctor,
     /// Help or version was shown.

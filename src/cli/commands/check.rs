@@ -14,7 +14,8 @@ use crate::{
         run::selection::check_distinct_out_dirs,
         run::{conditions, suite_run::SuiteRun},
     },
-    rollout::{AssetCache, SensorAssets, batch as parallel, cancel, target_asset},
+    parallel,
+    rollout::{AssetCache, SensorAssets, cancel, target_asset},
     scene::Asset,
     script::{self, Loaded, Scenes},
     text,
@@ -92,7 +93,7 @@ fn first_targets(
         batch.examine(task, scene)?;
         Ok(target_asset(&nominal, task).cloned())
     };
-    parallel::run(tasks.len(), threads, &cancel::FLAG, examine, |job, target| {
+    parallel::run(tasks.len(), threads, cancel::requested, examine, |job, target| {
         targets[job] = target;
         Ok(())
     })?;

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::{
     cli::{error::CliError, output::print},
-    report::{merge, terminal},
+    report::{shard_merge, terminal},
 };
 
 /// The `index`-th (from 1) of `count` parts of a run: every `count`-th episode.
@@ -44,7 +44,7 @@ impl std::fmt::Display for Shard {
 /// # Errors
 /// They do not belong together, or a file cannot be read or written.
 pub(crate) fn run(out: &Path, shards: &[PathBuf]) -> Result<(), CliError> {
-    let summaries = merge::merge(out, shards).map_err(CliError::input)?;
+    let summaries = shard_merge::merge(out, shards).map_err(CliError::input)?;
     summaries.iter().for_each(|summary| print(&terminal::table(summary)));
     crate::text::eprint_line(&format!("softvt: {}", out.display()));
     Ok(())

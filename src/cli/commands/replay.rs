@@ -18,7 +18,7 @@ use crate::{
     policy::Action,
     report::{
         actions,
-        runs::{self, StoredRun},
+        stored_run::{self, StoredRun},
     },
     script,
 };
@@ -54,7 +54,7 @@ pub(crate) fn run(dir: &Path, which: EpisodeSelector) -> Result<(), CliError> {
     if dataset::is_dataset(dir) {
         return dataset::replay(dir, which);
     }
-    let stored = runs::load(dir).map_err(CliError::input)?;
+    let stored = stored_run::load(dir).map_err(CliError::input)?;
     let [stored] = &stored[..] else {
         let names: Vec<String> = stored.iter().map(|run| run.dir.display().to_string()).collect();
         return Err(CliError::input(format!(

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use crate::{
     cli::{error::CliError, run::calibration::make_folder},
     report::{
-        judged::judge,
-        page, runs,
+        page,
+        run_summary::summarize_runs,
+        stored_run,
         tables::{Table, all_tables},
     },
 };
@@ -22,9 +23,9 @@ const LATEX_HEAD: &str =
 pub(crate) fn run(dirs: &[PathBuf], out: &Path) -> Result<(), CliError> {
     let mut stored = Vec::new();
     for dir in dirs {
-        stored.extend(runs::load(dir).map_err(CliError::input)?);
+        stored.extend(stored_run::load(dir).map_err(CliError::input)?);
     }
-    let judged = judge(stored);
+    let judged = summarize_runs(stored);
     for remark in judged.iter().flat_map(|judged| judged.run.remarks()) {
         crate::text::eprint_line(&format!("softvt: {remark}"));
     }

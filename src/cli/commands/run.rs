@@ -16,7 +16,7 @@ use crate::{
         output::print,
         run::{conditions, experiment, recorded_policy::recorded, requirements, suite_run::SuiteRun},
     },
-    evaluation::summary::Summary,
+    evaluation::summary::SuiteSummary,
     report::terminal,
     script::{self, Loaded},
 };
@@ -101,7 +101,7 @@ fn check_recorded(run: &RunConfig, plan: &Plan) -> Result<(), CliError> {
 }
 
 /// Tables, or one JSON document: an object for a suite, an array for a list of suites.
-fn show(run: &RunConfig, summaries: &[Summary], list: bool) {
+fn show(run: &RunConfig, summaries: &[SuiteSummary], list: bool) {
     match summaries {
         _ if !run.json => summaries.iter().for_each(|summary| print(&terminal::table(summary))),
         [summary] if !list => print(&format!("{:#}\n", serde_json::json!(summary))),
@@ -122,7 +122,7 @@ fn out_dir(run: &RunConfig, suite: &str, level: Option<&str>) -> PathBuf {
     }
 }
 
-fn evaluate(run: &RunConfig, loaded: &Loaded, suite: &Suite, out: PathBuf) -> Result<Summary, CliError> {
+fn evaluate(run: &RunConfig, loaded: &Loaded, suite: &Suite, out: PathBuf) -> Result<SuiteSummary, CliError> {
     let tasks = select_tasks(run, suite)?;
     let mut batch = SuiteRun::new(run, loaded, suite, (select_episodes(run, suite, &tasks), out))?;
     batch.prepare(&tasks)?;

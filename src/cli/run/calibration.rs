@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::{
     cli::error::CliError,
-    evaluation::{safety::Limit, thresholds::Thresholds},
+    evaluation::{safety::DeformationLimit, thresholds::ThresholdFile},
     scene::Asset,
     script,
 };
@@ -48,9 +48,9 @@ pub(crate) enum Calibrated {
     /// The limit, its file, and the file's text.
     Yes {
         /// The limit; none if no squeeze of the sweep was stable.
-        limit: Option<Limit>,
+        limit: Option<DeformationLimit>,
         /// All that the file says.
-        file: Box<Thresholds>,
+        file: Box<ThresholdFile>,
         /// Path from the project's root.
         path: String,
         /// The file's text.
@@ -68,7 +68,7 @@ pub(crate) fn calibrated(script: &Path, asset: &Asset) -> Result<Calibrated, Cli
     let Some((text, path)) = find(script, &relative)? else {
         return Ok(Calibrated::Never);
     };
-    let file = Thresholds::parse(&text, &path).map_err(CliError::input)?;
+    let file = ThresholdFile::parse(&text, &path).map_err(CliError::input)?;
     // Released files carry no fingerprint and are taken at their word.
     if file.fingerprints.get(name).is_some_and(|known| *known != asset.fingerprint()) {
         return Ok(Calibrated::Another(path));

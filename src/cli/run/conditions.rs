@@ -14,9 +14,9 @@ use crate::{
         run::suite_run::{is_finished, run_suite},
         run::{calibration::make_folder, suite_run::SuiteRun},
     },
-    evaluation::summary::method,
+    evaluation::summary::method_label,
     report::{
-        conditions::{Outcome, Row, Rows, table},
+        condition_table::{ConditionOutcome, ConditionRow, ConditionTable, table},
         run_folder::RunFolder,
     },
     script::Loaded,
@@ -33,7 +33,7 @@ struct ConditionsFile<'a> {
     script: &'a str,
     policy: &'a str,
     seed: u64,
-    suites: &'a [Rows],
+    suites: &'a [ConditionTable],
 }
 
 /// A suite under one condition, or as it is.
@@ -187,7 +187,7 @@ fn compare(
     suite: &Suite,
     (cases, batches): (&[ConditionCase], Vec<Option<SuiteRun>>),
     tasks: &[&Task],
-) -> Result<Rows, CliError> {
+) -> Result<ConditionTable, CliError> {
     let (mut reference, mut forces) = (None, false);
     let mut rows = Vec::new();
     for (case, batch) in cases.iter().zip(batches) {
@@ -201,11 +201,11 @@ fn compare(
                 cases.len()
             ));
             let done = run_suite(&batch, tasks)?;
-            outcome = Some(Outcome::new(case.folder.clone(), &done.records, reference.as_deref()));
+            outcome = Some(ConditionOutcome::new(case.folder.clone(), &done.records, reference.as_deref()));
             reference.get_or_insert(done.records);
             forces |= done.summary.force_observed;
         }
-        rows.push(Row {
+        rows.push(ConditionRow {
             condition: case.name.clone(),
             shift: case.shift.clone(),
             set: case.set.clone(),
@@ -214,11 +214,11 @@ fn compare(
         });
     }
     let deformable = suite.object_type == ObjectType::Deformable && !run.twin;
-    let policy = method(run.policy.name(), run.policy.is_privileged(), forces);
-    Ok(Rows { suite: run.name_of(suite), policy, deformable, rows })
+    let policy = method_label(run.policy.name(), run.policy.is_privileged(), forces);
+    Ok(ConditionTable { suite: run.name_of(suite), policy, deformable, rows })
 }
 
-fn write(run: &RunConfig, loaded: &Loaded, compared: &[Rows], out: &Path) -> Result<(), CliError> {
+fn write(run: &RunConfig, loaded: &Loaded, compared: &[ConditionTable], out: &Path) -> Result<(), CliError> {
     let document = ConditionsFile {
         softvt: env!("CARGO_PKG_VERSION"),
         script: &loaded.main,

@@ -12,7 +12,7 @@ use crate::{
     evaluation::record::{EpisodeRecord, Identity},
     report::{
         actions,
-        interchange::{self, DebugFrame, DebugShape},
+        softvtbench_files::{self, DebugFrame, DebugShape},
         video::{self, Caption, FilmError},
     },
     rollout::{FinishedEpisode, ScoreFrame, cancel},
@@ -51,7 +51,7 @@ impl<'a> EpisodeArtifacts<'a> {
         let id = &record.identity;
         let mut wanted = vec![
             actions::path(self.dir, id.task, id.episode),
-            interchange::debug_log_path(self.dir, id.task, id.episode),
+            softvtbench_files::debug_log_path(self.dir, id.task, id.episode),
         ];
         if self.trace {
             wanted.push(self.trace_path(id));
@@ -73,8 +73,8 @@ impl<'a> EpisodeArtifacts<'a> {
     pub(crate) fn write(&self, finished: &FinishedEpisode) -> Result<(), CliError> {
         let id = &finished.record.identity;
         self.write_trace(finished)?;
-        let path = interchange::debug_log_path(self.dir, id.task, id.episode);
-        interchange::write_debug_log(&path, id, &debug_frames(finished)).map_err(folder_failure)?;
+        let path = softvtbench_files::debug_log_path(self.dir, id.task, id.episode);
+        softvtbench_files::write_debug_log(&path, id, &debug_frames(finished)).map_err(folder_failure)?;
         let path = actions::path(self.dir, id.task, id.episode);
         actions::write(&path, &finished.actions).map_err(folder_failure)
     }

@@ -14,7 +14,8 @@ use crate::{
         run::config::RunConfig,
     },
     files::replace,
-    rollout::{batch, cancel},
+    parallel,
+    rollout::cancel,
     script::{Experiment, Loaded, Row},
 };
 
@@ -34,10 +35,10 @@ pub(crate) fn run(
     let take = || idle.lock().unwrap_or_else(|p| p.into_inner()).pop();
     let mut rows: Vec<Vec<Row>> = vec![Vec::new(); points];
     let mut progress = Progress::new(points, name);
-    let outcome = batch::run(
+    let outcome = parallel::run(
         points,
         run.threads,
-        &cancel::FLAG,
+        cancel::requested,
         |point| {
             let machine = match take() {
                 Some(machine) => machine,

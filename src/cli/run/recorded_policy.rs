@@ -12,7 +12,7 @@ use crate::{
     report::{
         actions,
         run_folder::EPISODES,
-        runs::{self, StoredRun},
+        stored_run::{self, StoredRun},
     },
 };
 
@@ -82,7 +82,7 @@ impl RecordedRuns {
     /// # Errors
     /// It holds none.
     pub(crate) fn load(dir: &Path) -> Result<Self, CliError> {
-        let runs = runs::load(dir).map_err(|e| CliError::input(format!("--policy: {e}")))?;
+        let runs = stored_run::load(dir).map_err(|e| CliError::input(format!("--policy: {e}")))?;
         Ok(Self { dir: dir.to_owned(), runs })
     }
 

@@ -2,11 +2,11 @@
 
 use crate::{
     cli::error::CliError,
-    evaluation::{statistics::Rate, summary::Summary},
+    evaluation::{statistics::Rate, summary::SuiteSummary},
 };
 
 /// Takes a number from a suite's results, if it is defined there.
-type Measure = fn(&Summary) -> Option<f64>;
+type Measure = fn(&SuiteSummary) -> Option<f64>;
 
 /// Names of what may be required, with what each is.
 const MEASURES: [(&str, Measure); 8] = [
@@ -71,7 +71,7 @@ pub(crate) fn parse(word: &str) -> Result<Requirement, String> {
 
 impl Requirement {
     /// What of it a suite's results do not meet: a sentence, or nothing.
-    fn missed(&self, summary: &Summary) -> Option<String> {
+    fn missed(&self, summary: &SuiteSummary) -> Option<String> {
         let (name, measure) = MEASURES[self.measure];
         let Some(value) = measure(summary) else {
             return Some(format!("{}: {}: {name} is not defined here", summary.suite, self.text));
@@ -92,7 +92,7 @@ impl Requirement {
 ///
 /// # Errors
 /// Those that are not met, with an exit code of their own.
-pub(crate) fn check(requirements: &[Requirement], summaries: &[Summary]) -> Result<(), CliError> {
+pub(crate) fn check(requirements: &[Requirement], summaries: &[SuiteSummary]) -> Result<(), CliError> {
     let missed: Vec<String> =
         summaries.iter().flat_map(|s| requirements.iter().filter_map(|r| r.missed(s))).collect();
     if missed.is_empty() { Ok(()) } else { Err(CliError::requirement_not_met(missed.join("\n"))) }
@@ -103,7 +103,7 @@ mod tests {
     use super::*;
     use crate::evaluation::record::tests::sample;
 
-    fn summary(safe: usize, of: usize) -> Summary {
+    fn summary(safe: usize, of: usize) -> SuiteSummary {
         let records: Vec<_> = (0..of)
             .map(|i| {
                 let mut record = sample();
@@ -112,12 +112,12 @@ mod tests {
                 record
             })
             .collect();
-        Summary::of("suite", "expert", &records)
+        SuiteSummary::of("suite", "expert", &records)
     }
 
     #[test]
     fn requirements_are_met_up_to_their_bounds() {
-        let missed = |word: &str, summary: &Summary| parse(word).unwrap().missed(summary);
+        let missed = |word: &str, summary: &SuiteSummary| parse(word).unwrap().missed(summary);
         let nine = summary(9, 10);
         for met in ["safety>=0.9", "safety >= 90 %", "goal>0.99", "gap<=0.1", "invalid<1", "d_p95<0.34"] {
             assert_eq!(missed(met, &nine), None, "{met}");

@@ -9,9 +9,10 @@ use crate::{
         },
     },
     evaluation::record::{EpisodeRecord, Outcome},
+    parallel,
     policy::{Action, ChunkedPolicy, recorded::RecordedPolicy},
     report::actions,
-    rollout::{FinishedEpisode, batch, cancel},
+    rollout::{FinishedEpisode, cancel},
 };
 
 /// Whoever drove the episode of `record`, as its actions say.
@@ -76,10 +77,10 @@ pub(crate) fn make_lost_files(batch: &SuiteRun, done: &[EpisodeRecord]) -> Resul
             path.display()
         ));
     }
-    batch::run(
+    parallel::run(
         can.len(),
         batch.run.threads,
-        &cancel::FLAG,
+        cancel::requested,
         |index| simulate(batch, can[index], has_actions(can[index]), &files),
         |_, made| {
             let Some((finished, drawn)) = made else { return Ok(()) };

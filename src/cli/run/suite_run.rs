@@ -26,18 +26,19 @@ use crate::{
     dataset::card::Imported,
     evaluation::{
         record::{EpisodeRecord, Origin},
-        safety::Limit,
-        summary::Summary,
-        thresholds::Thresholds,
+        safety::{DeformationLimit, NOMINAL_KAPPA},
+        summary::SuiteSummary,
+        thresholds::ThresholdFile,
     },
+    parallel,
     policy::TaskBrief,
     report::{
-        interchange,
         run_folder::{EPISODES, RUN, RunFolder, SUMMARY},
+        softvtbench_files,
     },
     rollout::{
-        AssetCache, BuildError, ControlError, Controller, Episode, EpisodeError, EpisodeRef, EpisodeSpec,
-        FinishedEpisode, SensorAssets, batch, cancel, target_asset,
+        AssetCache, BuildError, Cancellable, ControlError, Controller, Episode, EpisodeError, EpisodeRef,
+        EpisodeSpec, FinishedEpisode, SensorAssets, cancel, target_asset,
     },
     scene::{Asset, Body},
     script::{self, Loaded},
@@ -52,9 +53,9 @@ pub(crate) struct SuiteRun<'a> {
     pub name: String,
     pub settings: Settings,
     pub jobs: Vec<(&'a Task, u32)>,
-    pub limits: BTreeMap<String, Option<Limit>>,
+    pub limits: BTreeMap<String, Option<DeformationLimit>>,
     /// The thresholds in use as one file of SoftVTBench's form.
-    released: Thresholds,
+    released: ThresholdFile,
     /// SHA-256 of every file that the results depend on.
     pub sources: BTreeMap<String, String>,
     /// Whose actions are carried out once more.
@@ -69,7 +70,7 @@ pub(crate) struct SuiteRun<'a> {
     /// Which list its episodes are of.
     pub split: Split,
     pub(crate) drivers: Arc<ControllerSource>,
-    /// Foreign demonstrations that episodes re-execute, by task and episode.
+    /// ForeignFile demonstrations that episodes re-execute, by task and episode.
     pub origins: BTreeMap<(usize, u32), Origin>,
     /// The files that those are from.
     pub imported: Vec<Imported>,
@@ -107,7 +108,7 @@ impl<'a> SuiteRun<'a> {
             settings,
             jobs,
             limits: BTreeMap::new(),
-            released: Thresholds::new(0.5, Vec::new(), made_by),
+            released: ThresholdFile::new(NOMINAL_KAPPA, Vec::new(), made_by),
             sources,
             replayed,
             cache: AssetCache::default(),
@@ -190,7 +191,7 @@ impl<'a> SuiteRun<'a> {
         self.sources.clone_from(&other.sources);
     }
 
-    fn find_limit(&mut self, asset: &Asset) -> Result<Option<Limit>, CliError> {
+    fn find_limit(&mut self, asset: &Asset) -> Result<Option<DeformationLimit>, CliError> {
         let name = &asset.name;
         let cure = format!("its episodes cannot count as safe; softvt scripts/calibrate.lua --asset {name}");
         match calibration::calibrated(&self.run.file, asset)? {
@@ -212,7 +213,7 @@ impl<'a> SuiteRun<'a> {
     }
 
     /// The limit of an object as its layout made it in this episode, whatever a shift makes of it then.
-    fn limit_of(&self, asset: &Asset) -> Option<Limit> {
+    fn limit_of(&self, asset: &Asset) -> Option<DeformationLimit> {
         let limit = self.limits.get(&asset.name).copied().flatten()?;
         let known = self.released.fingerprints.get(&asset.name);
         known.is_none_or(|known| *known == asset.fingerprint()).then_some(limit)
@@ -256,7 +257,7 @@ impl<'a> SuiteRun<'a> {
         }
         records.sort_by_key(|r| (r.identity.task, r.identity.episode));
         folder.put_in_order(&records).map_err(folder_failure)?;
-        interchange::write_scores(&self.out, &records, &self.released).map_err(folder_failure)?;
+        softvtbench_files::write_scores(&self.out, &records, &self.released).map_err(folder_failure)?;
         let done = self.summed_up(records);
         // The last of all: a folder with a summary is finished.
         crate::files::write_json(&self.out.join(SUMMARY), &done.summary).map_err(CliError::input)?;
@@ -267,7 +268,7 @@ impl<'a> SuiteRun<'a> {
     /// Episodes with what they come to.
     pub(crate) fn summed_up(&self, records: Vec<EpisodeRecord>) -> SuiteResult {
         let policy = &self.run.policy;
-        let summary = Summary::of(&self.name, policy.name(), &records);
+        let summary = SuiteSummary::of(&self.name, policy.name(), &records);
         SuiteResult { summary, records }
     }
 
@@ -275,7 +276,7 @@ impl<'a> SuiteRun<'a> {
     pub(crate) fn is_whole(&self, done: &[EpisodeRecord]) -> bool {
         let files = self.files();
         self.left(done).is_empty()
-            && interchange::has_scores(&self.out)
+            && softvtbench_files::has_scores(&self.out)
             && done.iter().all(|record| files.lost(record).is_empty())
     }
 
@@ -331,10 +332,10 @@ impl<'a> SuiteRun<'a> {
     ) -> Result<(), CliError> {
         let files = self.files();
         let mut progress = Progress::new(left.len(), &self.name);
-        let outcome = batch::run(
+        let outcome = parallel::run(
             left.len(),
             self.run.threads,
-            &cancel::FLAG,
+            cancel::requested,
             |index| {
                 let job = left[index];
                 let mut finished = self.episode(job, files.may_show(self.jobs[job].1), &self.drive)?;
@@ -383,7 +384,7 @@ impl<'a> SuiteRun<'a> {
         let (task, episode) = self.jobs[job];
         let (spec, opened) = self.spec(task, &self.request(task, episode), origin)?;
         let driver = drive(opened, self.brief(task, episode))?;
-        let mut driver = batch::Cancellable { driver, stop: &cancel::FLAG };
+        let mut driver = Cancellable(driver);
         let started = Episode::start(EpisodeSpec { record_states: film, ..spec }, &self.cache, &self.looks);
         Ok(started.and_then(|started| started.run(&mut driver)))
     }
@@ -476,7 +477,7 @@ pub(crate) type ControllerFactory =
 /// The episodes of a run that came to its end, in order, and what they come to.
 pub(crate) struct SuiteResult {
     /// What they come to.
-    pub summary: Summary,
+    pub summary: SuiteSummary,
     /// The episodes.
     pub records: Vec<EpisodeRecord>,
 }

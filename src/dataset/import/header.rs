@@ -10,7 +10,7 @@ use crate::benchmark::control::CONTROL_DT;
 
 /// How a file is laid out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Layout {
+pub enum ForeignLayout {
     /// robosuite's controller driven by steps, as robomimic and LIBERO keep it.
     Libero,
     /// Absolute poses, as SoftVTBench keeps them.
@@ -19,7 +19,7 @@ pub enum Layout {
     Softvt,
 }
 
-impl Layout {
+impl ForeignLayout {
     /// Its name in messages and records.
     pub fn name(self) -> &'static str {
         match self {
@@ -32,7 +32,7 @@ impl Layout {
 
 /// What a file says of itself.
 pub(super) struct Header {
-    pub layout: Layout,
+    pub layout: ForeignLayout,
     /// `env_args`; null if there is none.
     pub environment: Value,
 }
@@ -159,10 +159,10 @@ impl Header {
 /// robosuite's own, which LIBERO keeps (controllers/config/osc_pose.json).
 const LONGEST_STEP: [f64; 2] = [0.05, 0.5];
 
-fn layout(file: &TaskFile, environment: &Value) -> Result<Layout, DatasetError> {
+fn layout(file: &TaskFile, environment: &Value) -> Result<ForeignLayout, DatasetError> {
     let first = file.demos()[0];
     if environment["env_name"] == "softvt" {
-        return Ok(Layout::Softvt);
+        return Ok(ForeignLayout::Softvt);
     }
     let shape = file.shape(first, "actions")?;
     let width = match shape[..] {
@@ -171,8 +171,8 @@ fn layout(file: &TaskFile, environment: &Value) -> Result<Layout, DatasetError> 
     };
     let robosuite = ROBOSUITE.iter().any(|name| file.has(first, name));
     match width {
-        7 | 13 if file.has(first, "obs/eef_pose") => Ok(Layout::SoftVtBench),
-        7 if robosuite || environment["type"] == 1 => Ok(Layout::Libero),
+        7 | 13 if file.has(first, "obs/eef_pose") => Ok(ForeignLayout::SoftVtBench),
+        7 if robosuite || environment["type"] == 1 => Ok(ForeignLayout::Libero),
         _ => {
             let what = format!(
                 "of no layout that is known: actions of shape {shape:?} and neither obs/eef_pose (SoftVTBench: 7 or 13 numbers an \

@@ -7,11 +7,11 @@
 
 use super::{
     super::{DatasetError, TaskFile},
-    Begins, ForeignDemo,
+    ForeignDemo, InitialCondition,
     header::Header,
-    mujoco::Model,
+    mujoco::MujocoModel,
     rows::{if_there, numbers, rows, wrong},
-    tool,
+    tool_pose,
 };
 use crate::{
     geometry::{Pose, Quat, Vec3},
@@ -45,15 +45,15 @@ pub(super) fn demo(file: &TaskFile, header: &Header, demo: usize) -> Result<Fore
     let tool = tool_poses(file, demo, steps.len(), model.as_ref())?;
     let (commands, said) = match (&arm, &tool) {
         (Some(arm), recorded) => {
-            let observed = tool::by_joints(file, demo, arm.name, &arm.observed)?;
+            let observed = tool_pose::by_joints(file, demo, arm.name, &arm.observed)?;
             if let Some((name, recorded)) = recorded {
-                tool::compare(file, demo, (name, recorded), &observed)?;
+                tool_pose::compare(file, demo, (name, recorded), &observed)?;
             }
-            let before = tool::by_joints(file, demo, arm.name, &arm.before)?;
+            let before = tool_pose::by_joints(file, demo, arm.name, &arm.before)?;
             (goals(&before, &steps), "steps away from where the recorded joint angles put the tool")
         }
         (None, Some((name, recorded))) => {
-            tool::check_start(file, demo, (name, &recorded[0]))?;
+            tool_pose::check_start(file, demo, (name, &recorded[0]))?;
             (goals(&late(recorded), &steps), "steps away from the recorded poses of the tool")
         }
         (None, None) => {
@@ -70,8 +70,8 @@ pub(super) fn demo(file: &TaskFile, header: &Header, demo: usize) -> Result<Fore
             .collect(),
         held: vec![false; commands.len()],
         commands,
-        begins: Begins::Elsewhere {
-            joints: arm.map(|arm| tool::within_limits(arm.before[0])),
+        begins: InitialCondition::OtherSimulator {
+            joints: arm.map(|arm| tool_pose::within_limits(arm.before[0])),
             things: things.unwrap_or_default(),
         },
         said,
@@ -79,12 +79,12 @@ pub(super) fn demo(file: &TaskFile, header: &Header, demo: usize) -> Result<Fore
 }
 
 /// The world as MuJoCo's, if the file tells it.
-fn model(file: &TaskFile, demo: usize) -> Result<Option<Model>, DatasetError> {
+fn model(file: &TaskFile, demo: usize) -> Result<Option<MujocoModel>, DatasetError> {
     let Some(xml) = file.text(demo, "model_file").ok().filter(|xml| !xml.trim().is_empty()) else {
         return Ok(None);
     };
     let what = || "no model of MuJoCo's: it has no body in a worldbody".to_owned();
-    Model::read(&xml).map(Some).ok_or_else(|| wrong(file, demo, "attribute model_file", what()))
+    MujocoModel::read(&xml).map(Some).ok_or_else(|| wrong(file, demo, "attribute model_file", what()))
 }
 
 /// MuJoCo's states before each action, and how many numbers each has; none if there are none, or if there is no model that says
@@ -95,7 +95,7 @@ fn model(file: &TaskFile, demo: usize) -> Result<Option<Model>, DatasetError> {
 fn states(
     file: &TaskFile,
     demo: usize,
-    (steps, model): (usize, Option<&Model>),
+    (steps, model): (usize, Option<&MujocoModel>),
 ) -> Result<(Vec<f64>, usize), DatasetError> {
     const KEY: &str = "states";
     if !file.has(demo, KEY) {
@@ -150,7 +150,7 @@ fn arm(
 ) -> Result<Option<Arm>, DatasetError> {
     let named = ["obs/joint_states", "obs/robot0_joint_pos"].into_iter().find(|name| file.has(demo, name));
     let Some(name) = named else { return Ok(None) };
-    let observed = tool::joints(file, demo, name, steps)?;
+    let observed = tool_pose::joints(file, demo, name, steps)?;
     let before = match agreement(states, &observed) {
         Some(true) => states.iter().map(|state| std::array::from_fn(|i| state[1 + i])).collect(),
         Some(false) => observed.clone(),
@@ -188,7 +188,7 @@ fn tool_poses(
     file: &TaskFile,
     demo: usize,
     steps: usize,
-    model: Option<&Model>,
+    model: Option<&MujocoModel>,
 ) -> Result<Option<(&'static str, Vec<Pose>)>, DatasetError> {
     let Some((name, site)) = site_poses(file, demo, steps)? else { return Ok(None) };
     let near = |base: &Pose| {

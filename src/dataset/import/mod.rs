@@ -6,11 +6,11 @@
 mod header;
 mod libero;
 mod mujoco;
-mod names;
-mod own;
+mod object_matching;
 mod rows;
+mod softvt;
 mod softvtbench;
-mod tool;
+mod tool_pose;
 
 use std::path::{Path, PathBuf};
 
@@ -23,18 +23,18 @@ use crate::{
     scene::InitialState,
 };
 
-pub use header::Layout;
-pub use names::places;
+pub use header::ForeignLayout;
+pub use object_matching::match_objects;
 
 /// A file of demonstrations.
 #[derive(Clone, Debug)]
-pub struct Foreign {
+pub struct ForeignFile {
     /// Where it is.
     pub path: PathBuf,
     /// SHA-256 of its bytes, hexadecimal.
     pub sha256: String,
     /// How it is laid out.
-    pub layout: Layout,
+    pub layout: ForeignLayout,
     /// Its demonstrations, in order.
     pub demos: Vec<ForeignDemo>,
 }
@@ -53,7 +53,7 @@ pub struct ForeignDemo {
     /// Whether, in each control step, the hand holds something and its closure is only where the thing has stopped it.
     pub held: Vec<bool>,
     /// What it starts from.
-    pub begins: Begins,
+    pub begins: InitialCondition,
     /// Where its commands come from, for people.
     pub said: &'static str,
 }
@@ -71,16 +71,16 @@ pub struct ForeignTask {
 
 /// Where a demonstration begins.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Begins {
+pub enum InitialCondition {
     /// In a world of its own: what it says of the arm (joint angles, rad) and of what stands around.
-    Elsewhere {
+    OtherSimulator {
         /// Joint angles, rad.
         joints: Option<[f64; 7]>,
         /// What stands around.
-        things: Vec<Standing>,
+        things: Vec<ForeignObjectPose>,
     },
     /// In an episode of a suite of softvt.
-    Episode {
+    SoftvtEpisode {
         /// Base seed.
         seed: u64,
         /// Index in the split of demonstrations.
@@ -92,7 +92,7 @@ pub enum Begins {
 
 /// A thing of another world.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Standing {
+pub struct ForeignObjectPose {
     /// Its name there.
     pub name: String,
     /// Place and orientation.
@@ -120,16 +120,16 @@ impl ForeignDemo {
 ///
 /// # Errors
 /// It is none of the layouts that are known, is of another robot or rate, or something in it is missing or wrong.
-pub fn read(path: &Path) -> Result<Foreign, DatasetError> {
+pub fn read(path: &Path) -> Result<ForeignFile, DatasetError> {
     let file = TaskFile::open(path)?;
     let header = header::Header::read(&file)?;
     let demo = |&demo: &usize| match header.layout {
-        Layout::Softvt => own::demo(&file, &header, demo),
-        Layout::SoftVtBench => softvtbench::demo(&file, &header, demo),
-        Layout::Libero => libero::demo(&file, &header, demo),
+        ForeignLayout::Softvt => softvt::demo(&file, &header, demo),
+        ForeignLayout::SoftVtBench => softvtbench::demo(&file, &header, demo),
+        ForeignLayout::Libero => libero::demo(&file, &header, demo),
     };
     let demos = file.demos().iter().map(demo).collect::<Result<_, _>>()?;
-    Ok(Foreign { path: path.to_owned(), sha256: digest(path)?, layout: header.layout, demos })
+    Ok(ForeignFile { path: path.to_owned(), sha256: digest(path)?, layout: header.layout, demos })
 }
 
 /// SHA-256 of a file, hexadecimal.

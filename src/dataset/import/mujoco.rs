@@ -4,35 +4,35 @@
 //! before those in it, as the model names them (MuJoCo, XML reference, "body"): a free joint has seven positions (place,
 //! quaternion w x y z) and six velocities, a ball four and three, any other one and one.
 
-use super::{Standing, pose_of};
+use super::{ForeignObjectPose, pose_of};
 use crate::geometry::Pose;
 
 /// Bodies of a model, in their order.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Model {
-    bodies: Vec<Body>,
+pub(super) struct MujocoModel {
+    bodies: Vec<MujocoBody>,
     /// Where the robot stands, world.
     pub base_w: Option<Pose>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
-struct Body {
+struct MujocoBody {
     name: String,
     /// What it is in.
     above: Option<usize>,
     /// In that body; none if it is told in another way than by `pos` and `quat`.
     pose: Option<Pose>,
-    joints: Vec<Joint>,
+    joints: Vec<MujocoJoint>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Joint {
+enum MujocoJoint {
     Free,
     Ball,
     Single,
 }
 
-impl Joint {
+impl MujocoJoint {
     /// Positions and velocities.
     fn size(self) -> [usize; 2] {
         match self {
@@ -43,10 +43,10 @@ impl Joint {
     }
 }
 
-/// Body that robosuite's robot stands on.
+/// MujocoBody that robosuite's robot stands on.
 const BASE: &str = "robot0_base";
 
-impl Model {
+impl MujocoModel {
     /// Reads the bodies of a model; none if it has none.
     pub(super) fn read(xml: &str) -> Option<Self> {
         let mut model = Self::default();
@@ -64,13 +64,13 @@ impl Model {
             match (name, direct) {
                 ("body", _) if in_world => {
                     body = Some(model.bodies.len());
-                    model.bodies.push(Body::of(tag, above));
+                    model.bodies.push(MujocoBody::of(tag, above));
                 }
-                ("freejoint", Some(at)) => model.bodies[at].joints.push(Joint::Free),
+                ("freejoint", Some(at)) => model.bodies[at].joints.push(MujocoJoint::Free),
                 ("joint", Some(at)) => model.bodies[at].joints.push(match attribute(tag, "type") {
-                    Some("free") => Joint::Free,
-                    Some("ball") => Joint::Ball,
-                    _ => Joint::Single,
+                    Some("free") => MujocoJoint::Free,
+                    Some("ball") => MujocoJoint::Ball,
+                    _ => MujocoJoint::Single,
                 }),
                 _ => {}
             }
@@ -100,7 +100,7 @@ impl Model {
 
     /// What stands around in a state: free bodies where the state has them, and those that are fixed to the world where the
     /// model has them. None if the state is not of this model.
-    pub(super) fn standing(&self, state: &[f64]) -> Option<Vec<Standing>> {
+    pub(super) fn standing(&self, state: &[f64]) -> Option<Vec<ForeignObjectPose>> {
         if state.len() != self.width() {
             return None;
         }
@@ -109,20 +109,20 @@ impl Model {
             let first = at;
             at += body.joints.iter().map(|joint| joint.size()[0]).sum::<usize>();
             let pose_w = match body.joints[..] {
-                [Joint::Free] => pose_of(&state[first..first + 7]),
+                [MujocoJoint::Free] => pose_of(&state[first..first + 7]),
                 [] if body.above.is_none() => self.pose(index),
                 _ => None,
             };
             let Some(pose_w) = pose_w else { continue };
             let pose = self.base_w.map_or(pose_w, |base| base.inverse() * pose_w);
             let name = body.name.trim_end_matches("_main").to_owned();
-            things.push(Standing { name, pose, in_base: self.base_w.is_some(), soft: false });
+            things.push(ForeignObjectPose { name, pose, in_base: self.base_w.is_some(), soft: false });
         }
         Some(things)
     }
 }
 
-impl Body {
+impl MujocoBody {
     fn of(tag: &str, above: Option<usize>) -> Self {
         let numbers = |name, or: &[f64]| -> Option<Vec<f64>> {
             let Some(text) = attribute(tag, name) else { return Some(or.to_vec()) };

@@ -2,7 +2,7 @@
 
 use rust_hdf5::DatatypeMessage;
 
-use super::super::{DatasetError, TaskFile, read::kind_of};
+use super::super::{DatasetError, TaskFile, hdf5::NumberType};
 
 /// The key of a data set, as messages name it.
 pub(super) fn key(demo: usize, name: &str) -> String {
@@ -60,7 +60,7 @@ pub(super) fn numbers(
 ) -> Result<(Vec<f64>, Vec<usize>), DatasetError> {
     let data = file.dataset(demo, name)?;
     let shape = data.shape();
-    if !matches!(kind_of(file.path(), &key(demo, name), &data)?, "f64" | "f32") {
+    if !matches!(NumberType::of(file.path(), &key(demo, name), &data)?, NumberType::F64 | NumberType::F32) {
         let got = match data.datatype() {
             Ok(DatatypeMessage::FloatingPoint { size, .. }) => format!("float{}", 8 * size),
             Ok(DatatypeMessage::FixedPoint { .. }) => "integers".to_owned(),

@@ -5,11 +5,11 @@
 
 use super::{
     super::{DatasetError, TaskFile},
-    Begins, ForeignDemo, Standing,
+    ForeignDemo, ForeignObjectPose, InitialCondition,
     header::Header,
     pose_of,
     rows::{if_there, numbers, rows, wrong},
-    tool,
+    tool_pose,
 };
 use crate::{
     geometry::{Pose, Quat, Vec3},
@@ -51,7 +51,7 @@ pub(super) fn demo(file: &TaskFile, header: &Header, demo: usize) -> Result<Fore
     let actions = actions(file, demo)?;
     let poses = poses(file, demo, &actions)?;
     let joints =
-        file.has(demo, JOINTS).then(|| tool::joints(file, demo, JOINTS, actions.len())).transpose()?;
+        file.has(demo, JOINTS).then(|| tool_pose::joints(file, demo, JOINTS, actions.len())).transpose()?;
     let at_t = joints.as_ref().map_or(Ok(Vec3::zeros()), |joints| offset(file, demo, &poses, joints))?;
     check_lead(file, demo, &actions, &poses)?;
     let grip = gripper(file, demo, &actions)?;
@@ -69,8 +69,8 @@ pub(super) fn demo(file: &TaskFile, header: &Header, demo: usize) -> Result<Fore
         shut: actions.iter().map(|row| row.pressed || grip.closure(row.numbers[6]) > 0.5).collect(),
         held: actions.iter().map(|row| measured && row.pressed).collect(),
         commands: actions.iter().map(command).collect(),
-        begins: Begins::Elsewhere {
-            joints: start.or(joints.map(|all| all[0])).map(tool::within_limits),
+        begins: InitialCondition::OtherSimulator {
+            joints: start.or(joints.map(|all| all[0])).map(tool_pose::within_limits),
             things: things(file, demo)?,
         },
         said: "absolute poses and the fingers' positions",
@@ -90,7 +90,7 @@ fn start(file: &TaskFile, demo: usize) -> Result<Option<[f64; 7]>, DatasetError>
     let arm: Option<[f64; 7]> = all.get(..7).and_then(|seven| seven.try_into().ok());
     match (arm, shape.last()) {
         (Some(arm), Some(7 | 9)) => {
-            tool::by_joints(file, demo, KEY, &[arm])?;
+            tool_pose::by_joints(file, demo, KEY, &[arm])?;
             Ok(Some(arm))
         }
         _ => {
@@ -137,7 +137,7 @@ fn poses(file: &TaskFile, demo: usize, actions: &[Row]) -> Result<Vec<Pose>, Dat
         rotation::from_axis_angle(&Vec3::new(a, b, c))
     };
     let commanded: Vec<Quat> = actions.iter().map(commanded).collect();
-    let apart = [[0, 1, 2, 3], [3, 0, 1, 2]].map(|places| tool::mean_angle(&order(places), &commanded));
+    let apart = [[0, 1, 2, 3], [3, 0, 1, 2]].map(|places| tool_pose::mean_angle(&order(places), &commanded));
     if apart[1] + TOLD_APART < apart[0] {
         let what = format!(
             "its quaternions are of the order x y z w: {:.0}° from the actions' rotations as w x y z, {:.0}° as x y z w; expected w x \
@@ -183,8 +183,8 @@ fn check_lead(file: &TaskFile, demo: usize, actions: &[Row], poses: &[Pose]) -> 
 /// # Errors
 /// Too far off, or not always the same: another robot or frame.
 fn offset(file: &TaskFile, demo: usize, poses: &[Pose], joints: &[[f64; 7]]) -> Result<Vec3, DatasetError> {
-    let by_joints = tool::by_joints(file, demo, JOINTS, joints)?;
-    let at_t = tool::compare(file, demo, (POSES, poses), &by_joints)?;
+    let by_joints = tool_pose::by_joints(file, demo, JOINTS, joints)?;
+    let at_t = tool_pose::compare(file, demo, (POSES, poses), &by_joints)?;
     if at_t.norm() > NEAR {
         let what = format!(
             "{:.0} mm from where {JOINTS} puts the tool: expected poses in the frame of the robot's base",
@@ -226,7 +226,7 @@ fn are_measured(file: &TaskFile, demo: usize, actions: &[Row]) -> Result<bool, D
 }
 
 /// What stands around at the start: `initial_state`, or the first of `states`.
-fn things(file: &TaskFile, demo: usize) -> Result<Vec<Standing>, DatasetError> {
+fn things(file: &TaskFile, demo: usize) -> Result<Vec<ForeignObjectPose>, DatasetError> {
     let first = |name: &str| file.has(demo, name).then(|| numbers(file, demo, name)).transpose();
     let pose = |folder: &str, name: &str| -> Result<Option<Pose>, DatasetError> {
         for last in ["root_pose", "root_pose_w"] {
@@ -255,7 +255,12 @@ fn things(file: &TaskFile, demo: usize) -> Result<Vec<Standing>, DatasetError> {
             let folder = format!("{root}/{kind}");
             for name in file.groups(demo, &folder).into_iter().filter(|name| name != "robot") {
                 let Some(pose_w) = pose(&folder, &name)? else { continue };
-                things.push(Standing { name, pose: seen(pose_w), in_base: base.is_some(), soft: false });
+                things.push(ForeignObjectPose {
+                    name,
+                    pose: seen(pose_w),
+                    in_base: base.is_some(),
+                    soft: false,
+                });
             }
         }
         let folder = format!("{root}/deformable_object");
@@ -270,7 +275,7 @@ fn things(file: &TaskFile, demo: usize) -> Result<Vec<Standing>, DatasetError> {
             let nodes = all[..count].as_chunks::<3>().0;
             let centre = nodes.iter().map(|x| Vec3::from(*x)).sum::<Vec3>() / nodes.len().max(1) as f64;
             let pose = seen(Pose::translation(centre.x, centre.y, centre.z));
-            things.push(Standing { name, pose, in_base: base.is_some(), soft: true });
+            things.push(ForeignObjectPose { name, pose, in_base: base.is_some(), soft: true });
         }
         if !things.is_empty() {
             return Ok(things);

@@ -4,10 +4,10 @@ use std::{fs, path::PathBuf};
 
 use serde_json::{Value, json};
 
-use super::{libero::goals, mujoco::Model, *};
+use super::{libero::goals, mujoco::MujocoModel, *};
 use crate::{
     benchmark::control::CONTROL_DT,
-    dataset::write::Writer,
+    dataset::hdf5::Hdf5Writer,
     geometry::Quat,
     policy::Action,
     robot::{IkSpec, ik::DiffIk, rotation},
@@ -104,7 +104,7 @@ impl Made {
 
     fn write(&self) -> PathBuf {
         let path = self.folder.path().join("pick_up_the_cup_demo.hdf5");
-        let mut writer = Writer::create(&path, &self.environment, STEPS, 1).unwrap();
+        let mut writer = Hdf5Writer::create(&path, &self.environment, STEPS, 1).unwrap();
         for (name, text) in &self.about {
             writer.group("data").unwrap().set_attr_string(name, text).unwrap();
         }
@@ -120,7 +120,7 @@ impl Made {
         path
     }
 
-    fn read(&self) -> (Layout, ForeignDemo) {
+    fn read(&self) -> (ForeignLayout, ForeignDemo) {
         let read = read(&self.write()).unwrap();
         (read.layout, read.demos.into_iter().next().unwrap())
     }
@@ -158,14 +158,17 @@ fn off(command: &Action, tool: &Pose, k: usize) -> f64 {
 fn liberos_steps_become_the_poses_that_its_controller_was_given() {
     let made = Made::libero();
     let (layout, demo) = made.read();
-    assert_eq!((layout, demo.task.prompts.clone()), (Layout::Libero, vec!["pick up the cup".to_owned()]));
+    assert_eq!(
+        (layout, demo.task.prompts.clone()),
+        (ForeignLayout::Libero, vec!["pick up the cup".to_owned()])
+    );
     // By the states, which are of before each action, though the observations are of after it.
     for (k, action) in poses(&demo).iter().enumerate() {
         assert!(off(action, &tool(k), k) < 1e-9, "step {k}");
         assert_eq!(action.closure, f64::from(u8::from(k >= 3)));
     }
     assert_eq!(demo.shut, [false, false, false, true, true, true]);
-    assert_eq!(demo.begins, Begins::Elsewhere { joints: Some(joints(0)), things: Vec::new() });
+    assert_eq!(demo.begins, InitialCondition::OtherSimulator { joints: Some(joints(0)), things: Vec::new() });
     // Without the states the observations are taken for LIBERO's, of which the first is of after the first action.
     let (_, demo) = made.without("states").read();
     for (k, action) in poses(&demo).iter().enumerate() {
@@ -197,7 +200,7 @@ fn without_joints_the_recorded_tool_is_brought_into_our_frames() {
     };
     let [x, _, _, _, b, _, _] = share(1);
     assert!((translation_b.x - 0.05 * x).abs() < 1e-15 && (rotation_b.y - 0.5 * b).abs() < 1e-15);
-    assert_eq!(demo.begins, Begins::Elsewhere { joints: None, things: Vec::new() });
+    assert_eq!(demo.begins, InitialCondition::OtherSimulator { joints: None, things: Vec::new() });
 }
 
 #[test]
@@ -249,7 +252,7 @@ const MODEL: &str = r#"<mujoco><default><joint type="free"/></default><!-- <body
 
 #[test]
 fn things_of_a_mujoco_state_are_found_by_the_model() {
-    let model = Model::read(MODEL).unwrap();
+    let model = MujocoModel::read(MODEL).unwrap();
     let half = std::f64::consts::FRAC_1_SQRT_2;
     let positions = [0.1, 0.2, 0.4, -0.3, 0.5, half, 0.0, 0.0, half, 1.0, 0.0, 0.0, 0.0];
     let state = [&[0.0], &positions[..], &[0.0; 2 + 6 + 3]].concat();
@@ -260,14 +263,14 @@ fn things_of_a_mujoco_state_are_found_by_the_model() {
     assert!((cup.pose.rotation * Vec3::x() - Vec3::y()).norm() < 1e-12);
     assert!((named("stove_1").pose.rotation * Vec3::x() + Vec3::x()).norm() < 1e-12);
     assert_eq!(model.standing(&state[1..]), None, "a state of another model");
-    assert_eq!(Model::read("<mujoco/>"), None);
+    assert_eq!(MujocoModel::read("<mujoco/>"), None);
 }
 
 #[test]
 fn softvtbenchs_poses_are_moved_from_its_tool_to_ours() {
     let made = Made::softvtbench();
     let (layout, mut demo) = made.read();
-    assert_eq!(layout, Layout::SoftVtBench);
+    assert_eq!(layout, ForeignLayout::SoftVtBench);
     assert_eq!(demo.task.prompts[0], "Pick up the  CUP.");
     for (k, action) in poses(&demo).iter().enumerate() {
         let away = action.position_b - tool(k).translation.vector;
@@ -290,7 +293,9 @@ fn softvtbenchs_things_are_those_of_the_initial_state() {
     made.put("initial_state/rigid_object/plate_1/root_pose", &[7], vec![0.04, 0.1, 0.9, 1.0, 0.0, 0.0, 0.0]);
     let nodes = vec![0.0, 0.0, 0.9, 0.2, 0.0, 0.9, 0.1, 0.3, 0.93];
     made.put("initial_state/deformable_object/soft_bun/nodal_position", &[3, 3], nodes);
-    let Begins::Elsewhere { joints, things } = made.read().1.begins else { panic!("an episode") };
+    let InitialCondition::OtherSimulator { joints, things } = made.read().1.begins else {
+        panic!("an episode")
+    };
     assert_eq!(joints, Some(START));
     let at = |i: usize| things[i].pose.translation.vector;
     assert_eq!((things[0].name.as_str(), things[1].name.as_str(), things.len()), ("plate_1", "soft_bun", 2));
@@ -477,13 +482,13 @@ fn quaternions_in_another_order_are_noticed_with_joints_and_without() {
 #[test]
 fn a_model_may_nest_as_deep_as_it_likes() {
     let deep = "<body>".repeat(200_000);
-    let model = Model::read(&format!("<mujoco><worldbody>{deep}</worldbody></mujoco>")).unwrap();
+    let model = MujocoModel::read(&format!("<mujoco><worldbody>{deep}</worldbody></mujoco>")).unwrap();
     assert_eq!(model.width(), 1);
     let deep = "<body pos='0 0 1'>".repeat(200_000);
     let text =
         format!("<mujoco><worldbody>{deep}<body name='robot0_base' pos='1 0 0'/></worldbody></mujoco>");
     assert_eq!(
-        Model::read(&text).unwrap().base_w.unwrap().translation.vector,
+        MujocoModel::read(&text).unwrap().base_w.unwrap().translation.vector,
         Vec3::new(1.0, 0.0, 200_000.0)
     );
 }

@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
-use super::table::{Column, Kind};
+use super::parquet_table::{ColumnType, ParquetColumn};
 use crate::sensing::tactile::MARKERS;
 
 /// Pictures of a row, in order.
@@ -54,14 +54,14 @@ impl Feature {
     }
 
     /// The column that holds it.
-    pub(super) fn column(&self) -> Column {
+    pub(super) fn column(&self) -> ParquetColumn {
         let kind = match self.dtype {
-            "image" => Kind::Picture,
-            "int64" => Kind::I64,
-            _ => Kind::F32,
+            "image" => ColumnType::Picture,
+            "int64" => ColumnType::I64,
+            _ => ColumnType::F32,
         };
         let single = self.is_picture() || self.shape == [1];
-        Column::new(self.name, kind, if single { &[] } else { &self.shape })
+        ParquetColumn::new(self.name, kind, if single { &[] } else { &self.shape })
     }
 
     /// What Hugging Face's `datasets` calls it.

@@ -5,15 +5,15 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use super::{
-    Export, Exported, Gripper, Version,
+    ExportConfig, ExportSummary, GripperCoding, LeRobotVersion,
     features::{self, Feature},
-    source::{Chosen, Source},
-    summary::{FeatureSummary, Summary},
-    table::{Column, Kind, Table, Values},
+    parquet_table::{ColumnType, ColumnValues, ParquetColumn, ParquetTable},
+    selection::{SelectedDemo, Selection},
+    statistics::{FeatureStatistics, ValueStatistics},
     timestamp, v21, v30,
 };
 use crate::{
-    dataset::{DatasetError, recorder::rate},
+    dataset::{DatasetError, demonstration_writer::frame_rate},
     files,
 };
 
@@ -28,22 +28,22 @@ pub(super) fn json(path: &Path, value: &Value) -> Result<(), DatasetError> {
 /// Writes everything but what tells of single episodes; `info.json` last: LeRobot opens nothing without it.
 pub(super) fn write(
     dir: &Path,
-    export: &Export,
-    chosen: &Chosen,
+    export: &ExportConfig,
+    chosen: &Selection,
     features: &[Feature],
-    exported: Exported,
+    exported: ExportSummary,
 ) -> Result<(), DatasetError> {
     match export.version {
-        Version::V21 => task_lines(dir, &chosen.prompts)?,
-        Version::V30 => task_table(dir, &chosen.prompts)?,
+        LeRobotVersion::V21 => task_lines(dir, &chosen.prompts)?,
+        LeRobotVersion::V30 => task_table(dir, &chosen.prompts)?,
     }
     origins(dir, export, chosen)?;
     files::replace(&dir.join("README.md"), card(export, chosen, exported).as_bytes())?;
     json(&dir.join("meta/info.json"), &info(export.version, features, exported))
 }
 
-fn info(version: Version, features: &[Feature], exported: Exported) -> Value {
-    let Exported { episodes, frames, tasks } = exported;
+fn info(version: LeRobotVersion, features: &[Feature], exported: ExportSummary) -> Value {
+    let ExportSummary { episodes, frames, tasks } = exported;
     let mut info = json!({
         "codebase_version": version.code(),
         "robot_type": "franka",
@@ -52,22 +52,22 @@ fn info(version: Version, features: &[Feature], exported: Exported) -> Value {
         "total_tasks": tasks,
     });
     match version {
-        Version::V21 => {
+        LeRobotVersion::V21 => {
             info["total_videos"] = json!(0);
             info["total_chunks"] = json!(episodes.div_ceil(CHUNK));
             info["chunks_size"] = json!(CHUNK);
         }
-        Version::V30 => {
+        LeRobotVersion::V30 => {
             info["chunks_size"] = json!(CHUNK);
             info["data_files_size_in_mb"] = json!(v30::TABLE_MB);
             info["video_files_size_in_mb"] = json!(200);
         }
     }
-    info["fps"] = json!(rate());
+    info["fps"] = json!(frame_rate());
     info["splits"] = json!({ "train": format!("0:{episodes}") });
     info["data_path"] = json!(match version {
-        Version::V21 => v21::DATA_PATH,
-        Version::V30 => v30::DATA_PATH,
+        LeRobotVersion::V21 => v21::DATA_PATH,
+        LeRobotVersion::V30 => v30::DATA_PATH,
     });
     info["video_path"] = Value::Null;
     info["features"] = features::info(features);
@@ -95,17 +95,20 @@ fn task_table(dir: &Path, prompts: &[String]) -> Result<(), DatasetError> {
         "creator": { "library": "softvt", "version": env!("CARGO_PKG_VERSION") },
         "pandas_version": "2.2.0",
     });
-    let columns = [Column::new("task_index", Kind::I64, &[]), Column::new(INDEX, Kind::Text, &[])];
+    let columns = [
+        ParquetColumn::new("task_index", ColumnType::I64, &[]),
+        ParquetColumn::new(INDEX, ColumnType::Text, &[]),
+    ];
     let path = dir.join("meta/tasks.parquet");
-    let mut table = Table::create(path, &columns.into(), &[("pandas", note.to_string())])?;
+    let mut table = ParquetTable::create(path, &columns.into(), &[("pandas", note.to_string())])?;
     let indices = (0..prompts.len()).map(|i| i as i64).collect();
-    table.append(prompts.len(), vec![Values::I64(indices), Values::Text(prompts.to_vec())])?;
+    table.append(prompts.len(), vec![ColumnValues::I64(indices), ColumnValues::Text(prompts.to_vec())])?;
     table.finish()
 }
 
 /// Which demonstration each episode is.
-fn origins(dir: &Path, export: &Export, chosen: &Chosen) -> Result<(), DatasetError> {
-    let line = |(index, source): (usize, &Source)| {
+fn origins(dir: &Path, export: &ExportConfig, chosen: &Selection) -> Result<(), DatasetError> {
+    let line = |(index, source): (usize, &SelectedDemo)| {
         let entry = &source.entry;
         let told = json!({
             "episode_index": index,
@@ -125,19 +128,19 @@ fn origins(dir: &Path, export: &Export, chosen: &Chosen) -> Result<(), DatasetEr
     Ok(files::replace(&dir.join("meta/softvt.jsonl"), text.as_bytes())?)
 }
 
-fn code(gripper: Gripper) -> &'static str {
+fn code(gripper: GripperCoding) -> &'static str {
     match gripper {
-        Gripper::Continuous => "continuous",
-        Gripper::Binary => "binary",
+        GripperCoding::Continuous => "continuous",
+        GripperCoding::Binary => "binary",
     }
 }
 
 /// The page for people, with what Hugging Face's hub reads of it.
-fn card(export: &Export, chosen: &Chosen, exported: Exported) -> String {
-    let Exported { episodes, frames, tasks } = exported;
+fn card(export: &ExportConfig, chosen: &Selection, exported: ExportSummary) -> String {
+    let ExportSummary { episodes, frames, tasks } = exported;
     let gripper = match export.gripper {
-        Gripper::Continuous => "the commanded closure, 0 open to 1 shut",
-        Gripper::Binary => "1 while the gripper is meant to hold, else 0",
+        GripperCoding::Continuous => "the commanded closure, 0 open to 1 shut",
+        GripperCoding::Binary => "1 while the gripper is meant to hold, else 0",
     };
     let prompts: String = chosen.prompts.iter().map(|prompt| format!("- {prompt}\n")).collect();
     format!(
@@ -155,19 +158,19 @@ fn card(export: &Export, chosen: &Chosen, exported: Exported) -> String {
          | `actions` | absolute tool position and axis-angle; {gripper} |\n\n\
          `meta/softvt.jsonl` says of which demonstration each episode is.\n\n{prompts}",
         export.version.code(),
-        rate(),
+        frame_rate(),
         env!("CARGO_PKG_VERSION"),
     )
 }
 
 /// The numbers that LeRobot adds to every row, as a whole.
-pub(super) fn numbered(index: usize, source: &Source) -> Vec<FeatureSummary> {
+pub(super) fn numbered(index: usize, source: &SelectedDemo) -> Vec<FeatureStatistics> {
     let steps = source.entry.num_samples;
-    let all = |name, numbers: Vec<f64>| FeatureSummary {
+    let all = |name, numbers: Vec<f64>| FeatureStatistics {
         name,
         shape: vec![1],
         steps: steps as u64,
-        parts: vec![Summary::of(numbers)],
+        parts: vec![ValueStatistics::of(numbers)],
     };
     let counted = |from: usize| (from..from + steps).map(|i| i as f64).collect();
     let same = |number: usize| vec![number as f64; steps];

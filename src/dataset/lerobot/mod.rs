@@ -4,32 +4,31 @@
 //! states of the markers only the last two, as SoftVTBench has it. `docs/data.md` says what is in the folder. Demonstrations are
 //! read and their pictures packed on several threads, and written in order; each thread holds one of them.
 
+mod episode;
 mod features;
 mod meta;
-mod place;
-mod rows;
-mod source;
-mod summary;
-mod table;
-mod turns;
+mod parquet_table;
+mod selection;
+mod staged_dir;
+mod statistics;
 mod v21;
 mod v30;
 
 use std::path::PathBuf;
 
 use self::{
+    episode::EpisodeRows,
     features::Feature,
-    place::Place,
-    rows::Rows,
-    source::{Chosen, Source},
-    summary::FeatureSummary,
-    table::Values,
+    parquet_table::ColumnValues,
+    selection::{SelectedDemo, Selection},
+    staged_dir::StagedDir,
+    statistics::FeatureStatistics,
 };
-use super::{DatasetError, TaskFile, recorder::rate};
+use super::{DatasetError, TaskFile, demonstration_writer::frame_rate};
 
 /// A version of LeRobot's layout.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Version {
+pub enum LeRobotVersion {
     /// A table an episode: what openpi and SoftVTBench train from.
     V21,
     /// Many episodes a table: LeRobot's own since 0.4.
@@ -38,7 +37,7 @@ pub enum Version {
 
 /// Which code of the gripper becomes the seventh number of the actions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Gripper {
+pub enum GripperCoding {
     /// Closure, 0 open to 1 shut.
     Continuous,
     /// 1 while the expert means to hold, else 0.
@@ -47,15 +46,15 @@ pub enum Gripper {
 
 /// What to export, and how.
 #[derive(Clone, Debug)]
-pub struct Export {
+pub struct ExportConfig {
     /// Folder of a finished recording.
     pub data: PathBuf,
     /// New folder.
     pub out: PathBuf,
     /// Layout.
-    pub version: Version,
+    pub version: LeRobotVersion,
     /// Code of the gripper.
-    pub gripper: Gripper,
+    pub gripper: GripperCoding,
     /// Only the tasks that fit one of these: indices, or parts of prompts; all if there are none.
     pub tasks: Vec<String>,
     /// Threads; the files do not depend on it.
@@ -64,16 +63,16 @@ pub struct Export {
 
 /// What was exported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Exported {
+pub struct ExportSummary {
     /// Episodes.
     pub episodes: usize,
-    /// Rows of all.
+    /// EpisodeRows of all.
     pub frames: usize,
     /// Different prompts.
     pub tasks: usize,
 }
 
-impl Version {
+impl LeRobotVersion {
     /// As `info.json` has it.
     fn code(self) -> &'static str {
         match self {
@@ -84,19 +83,19 @@ impl Version {
 }
 
 /// An episode on its way into the files.
-struct Episode<'a> {
+struct ExportedEpisode<'a> {
     /// Its number.
     index: usize,
-    source: &'a Source,
-    rows: Rows,
+    source: &'a SelectedDemo,
+    rows: EpisodeRows,
     /// Every feature as a whole.
-    summaries: Vec<FeatureSummary>,
+    summaries: Vec<FeatureStatistics>,
 }
 
 /// Writes the files of a version, episode by episode.
-trait Form: Send {
+trait FormatWriter: Send {
     /// Adds the next episode.
-    fn add(&mut self, episode: Episode<'_>) -> Result<(), DatasetError>;
+    fn add(&mut self, episode: ExportedEpisode<'_>) -> Result<(), DatasetError>;
     /// Ends all files.
     fn finish(self: Box<Self>) -> Result<(), DatasetError>;
 }
@@ -108,14 +107,14 @@ trait Form: Send {
 /// The recording is none, unfinished, without pictures or broken; a word fits no task; something is at `out`; a file cannot be
 /// written; or the end was asked for.
 pub fn export(
-    export: &Export,
+    export: &ExportConfig,
     stop: impl Fn() -> bool + Sync,
     mut told: impl FnMut(usize, &str) + Send,
-) -> Result<Exported, DatasetError> {
-    place::free(&export.out)?;
-    let chosen = source::choose(&export.data, &export.tasks)?;
+) -> Result<ExportSummary, DatasetError> {
+    staged_dir::free(&export.out)?;
+    let chosen = selection::choose(&export.data, &export.tasks)?;
     let features = features::all(chosen.sizes);
-    let place = Place::claim(&export.out)?;
+    let place = StagedDir::claim(&export.out)?;
     let written = write(export, &chosen, &features, &place, &stop, &mut told);
     match written {
         Ok(exported) => place.settle().map(|()| exported),
@@ -127,21 +126,22 @@ pub fn export(
 }
 
 fn write(
-    export: &Export,
-    chosen: &Chosen,
+    export: &ExportConfig,
+    chosen: &Selection,
     features: &[Feature],
-    place: &Place,
+    place: &StagedDir,
     stop: &(impl Fn() -> bool + Sync),
     told: &mut (impl FnMut(usize, &str) + Send),
-) -> Result<Exported, DatasetError> {
+) -> Result<ExportSummary, DatasetError> {
     let (sources, dir) = (&chosen.sources, place.dir());
-    let mut form: Box<dyn Form> = match export.version {
-        Version::V21 => Box::new(v21::Writer::begin(dir, features)?),
-        Version::V30 => Box::new(v30::Writer::begin(dir, features)?),
+    let mut form: Box<dyn FormatWriter> = match export.version {
+        LeRobotVersion::V21 => Box::new(v21::Writer::begin(dir, features)?),
+        LeRobotVersion::V30 => Box::new(v30::Writer::begin(dir, features)?),
     };
-    turns::in_order(
+    crate::parallel::run_in_order(
         sources.len(),
         export.threads,
+        || false,
         |index| read(export, chosen, index, stop),
         |index, episode| {
             form.add(episode)?;
@@ -152,50 +152,56 @@ fn write(
     )?;
     form.finish()?;
     let frames = sources.iter().map(|source| source.entry.num_samples).sum();
-    let exported = Exported { episodes: sources.len(), frames, tasks: chosen.prompts.len() };
+    let exported = ExportSummary { episodes: sources.len(), frames, tasks: chosen.prompts.len() };
     meta::write(dir, export, chosen, features, exported)?;
     Ok(exported)
 }
 
 /// One episode, ready to be written.
 fn read<'a>(
-    export: &Export,
-    chosen: &'a Chosen,
+    export: &ExportConfig,
+    chosen: &'a Selection,
     index: usize,
     stop: &(impl Fn() -> bool + Sync),
-) -> Result<Episode<'a>, DatasetError> {
+) -> Result<ExportedEpisode<'a>, DatasetError> {
     let source = &chosen.sources[index];
     let file = TaskFile::open(&source.path)?;
     let (demo, steps) = (source.entry.demo_id, source.entry.num_samples);
-    let rows = rows::read(&file, (demo, steps), chosen.sizes, export.gripper, stop)?;
+    let rows = episode::read(&file, (demo, steps), chosen.sizes, export.gripper, stop)?;
     let mut summaries = rows.summaries();
     summaries.push(match export.version {
-        Version::V21 => rows.every_marker(),
-        Version::V30 => rows.markers_together(),
+        LeRobotVersion::V21 => rows.every_marker(),
+        LeRobotVersion::V30 => rows.markers_together(),
     });
     summaries.extend(meta::numbered(index, source));
-    Ok(Episode { index, source, rows, summaries })
+    Ok(ExportedEpisode { index, source, rows, summaries })
 }
 
 /// Time of a step, s.
 fn timestamp(step: usize) -> f32 {
-    (step as f64 / f64::from(rate())) as f32
+    (step as f64 / f64::from(frame_rate())) as f32
 }
 
-impl Episode<'_> {
+impl ExportedEpisode<'_> {
     /// The columns of its table, in the order of the features; `name` is what the picture of a step is called.
-    fn columns(rows: Rows, (index, source): (usize, &Source), name: fn(usize) -> String) -> Vec<Values> {
+    fn columns(
+        rows: EpisodeRows,
+        (index, source): (usize, &SelectedDemo),
+        name: fn(usize) -> String,
+    ) -> Vec<ColumnValues> {
         let steps = rows.steps;
-        let same = |number: usize| Values::I64(vec![number as i64; steps]);
-        let counted = |from: usize| Values::I64((from..from + steps).map(|i| i as i64).collect());
+        let same = |number: usize| ColumnValues::I64(vec![number as i64; steps]);
+        let counted = |from: usize| ColumnValues::I64((from..from + steps).map(|i| i as i64).collect());
         let pictures = rows.pictures.into_iter().map(|files| {
-            Values::Pictures(files.into_iter().enumerate().map(|(step, file)| (file, name(step))).collect())
+            ColumnValues::Pictures(
+                files.into_iter().enumerate().map(|(step, file)| (file, name(step))).collect(),
+            )
         });
         let rest = [
-            Values::F32(rows.state),
-            Values::F32(rows.actions),
-            Values::F32(rows.markers),
-            Values::F32((0..steps).map(timestamp).collect()),
+            ColumnValues::F32(rows.state),
+            ColumnValues::F32(rows.actions),
+            ColumnValues::F32(rows.markers),
+            ColumnValues::F32((0..steps).map(timestamp).collect()),
             counted(0),
             same(index),
             counted(source.first),

@@ -1,4 +1,4 @@
-//! Version 2.1: a table an episode, and lines of JSON about them.
+//! LeRobotVersion 2.1: a table an episode, and lines of JSON about them.
 
 use std::{
     collections::BTreeMap,
@@ -12,11 +12,11 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::{
-    Episode, FeatureSummary, Form,
+    ExportedEpisode, FeatureStatistics, FormatWriter,
     features::{self, Feature},
     meta::CHUNK,
-    summary::Nest,
-    table::{Column, Table},
+    parquet_table::{ParquetColumn, ParquetTable},
+    statistics::NestedList,
 };
 use crate::{dataset::DatasetError, files};
 
@@ -52,20 +52,20 @@ impl Lines {
 #[derive(Serialize)]
 struct Line {
     episode_index: usize,
-    stats: BTreeMap<&'static str, BTreeMap<&'static str, Nest>>,
+    stats: BTreeMap<&'static str, BTreeMap<&'static str, NestedList>>,
 }
 
 /// Writes it.
 pub(super) struct Writer {
     dir: PathBuf,
-    columns: Arc<[Column]>,
+    columns: Arc<[ParquetColumn]>,
     note: (&'static str, String),
     episodes: Lines,
     stats: Lines,
 }
 
 impl Writer {
-    /// Begins in a folder that is empty.
+    /// InitialCondition in a folder that is empty.
     pub(super) fn begin(dir: &Path, features: &[Feature]) -> Result<Self, DatasetError> {
         files::create_folder(&dir.join("meta"))?;
         Ok(Self {
@@ -83,21 +83,21 @@ fn picture(step: usize) -> String {
     format!("frame_{step:06}.png")
 }
 
-impl Form for Writer {
-    fn add(&mut self, episode: Episode<'_>) -> Result<(), DatasetError> {
-        let Episode { index, source, rows, summaries } = episode;
+impl FormatWriter for Writer {
+    fn add(&mut self, episode: ExportedEpisode<'_>) -> Result<(), DatasetError> {
+        let ExportedEpisode { index, source, rows, summaries } = episode;
         let path = format!("data/chunk-{:03}/episode_{index:06}.parquet", index / CHUNK);
         let path = self.dir.join(path);
         files::create_folder(path.parent().unwrap_or(&self.dir))?;
-        let mut table = Table::create(path, &self.columns, std::slice::from_ref(&self.note))?;
+        let mut table = ParquetTable::create(path, &self.columns, std::slice::from_ref(&self.note))?;
         let steps = rows.steps;
-        table.append(steps, Episode::columns(rows, (index, source), picture))?;
+        table.append(steps, ExportedEpisode::columns(rows, (index, source), picture))?;
         table.finish()?;
         let told = json!({ "episode_index": index, "tasks": [source.entry.language], "length": steps });
         self.episodes.add(&told)?;
         // What was measured in single precision needs no more digits: this file is read whole.
-        let single = |x: f64| Nest::Single(x as f32);
-        let named = |summary: &FeatureSummary| {
+        let single = |x: f64| NestedList::Single(x as f32);
+        let named = |summary: &FeatureStatistics| {
             let figures: BTreeMap<_, _> = summary.figures(false).nested(single).into_iter().collect();
             (summary.name, figures)
         };

@@ -1,4 +1,4 @@
-//! Version 3.0: many episodes a table, a group of rows each, and tables about them.
+//! LeRobotVersion 3.0: many episodes a table, a group of rows each, and tables about them.
 
 use std::{
     path::{Path, PathBuf},
@@ -8,11 +8,11 @@ use std::{
 use serde_json::{Map, Value, json};
 
 use super::{
-    Episode, FeatureSummary, Form, Values,
+    ColumnValues, ExportedEpisode, FeatureStatistics, FormatWriter,
     features::{self, Feature},
     meta::{self, CHUNK},
-    summary::{Figures, Nest},
-    table::{Column, Kind, Table},
+    parquet_table::{ColumnType, ParquetColumn, ParquetTable},
+    statistics::{Figures, NestedList},
 };
 use crate::{dataset::DatasetError, files};
 
@@ -44,17 +44,17 @@ struct Told {
 /// Writes it.
 pub(super) struct Writer {
     dir: PathBuf,
-    columns: Arc<[Column]>,
+    columns: Arc<[ParquetColumn]>,
     note: (&'static str, String),
     /// The table that is being written, and how many there were before it.
-    table: Option<Table>,
+    table: Option<ParquetTable>,
     file: usize,
     told: Vec<Told>,
-    whole: Vec<FeatureSummary>,
+    whole: Vec<FeatureStatistics>,
 }
 
 impl Writer {
-    /// Begins in a folder that is empty.
+    /// InitialCondition in a folder that is empty.
     pub(super) fn begin(dir: &Path, features: &[Feature]) -> Result<Self, DatasetError> {
         files::create_folder(&dir.join("meta"))?;
         Ok(Self {
@@ -69,7 +69,7 @@ impl Writer {
     }
 
     /// The table that takes `bytes` more.
-    fn table(&mut self, bytes: usize) -> Result<&mut Table, DatasetError> {
+    fn table(&mut self, bytes: usize) -> Result<&mut ParquetTable, DatasetError> {
         let table = match self.table.take() {
             Some(table) if table.bytes() + bytes <= TABLE_MB << 20 => table,
             full => {
@@ -78,7 +78,7 @@ impl Writer {
                     self.file += 1;
                 }
                 let path = place(&self.dir, "data", self.file)?;
-                Table::create(path, &self.columns, std::slice::from_ref(&self.note))?
+                ParquetTable::create(path, &self.columns, std::slice::from_ref(&self.note))?
             }
         };
         Ok(self.table.insert(table))
@@ -90,12 +90,12 @@ fn picture(step: usize) -> String {
     format!("frame-{step:06}.png")
 }
 
-impl Form for Writer {
-    fn add(&mut self, episode: Episode<'_>) -> Result<(), DatasetError> {
-        let Episode { index, source, rows, summaries } = episode;
+impl FormatWriter for Writer {
+    fn add(&mut self, episode: ExportedEpisode<'_>) -> Result<(), DatasetError> {
+        let ExportedEpisode { index, source, rows, summaries } = episode;
         let steps = rows.steps;
         let bytes = rows.pictures.iter().flatten().map(Vec::len).sum();
-        let values = Episode::columns(rows, (index, source), picture);
+        let values = ExportedEpisode::columns(rows, (index, source), picture);
         self.table(bytes)?.append(steps, values)?;
         self.told.push(Told {
             index,
@@ -114,7 +114,7 @@ impl Form for Writer {
     }
 
     fn finish(mut self: Box<Self>) -> Result<(), DatasetError> {
-        self.table.take().map_or(Ok(()), Table::finish)?;
+        self.table.take().map_or(Ok(()), ParquetTable::finish)?;
         for (file, told) in self.told.chunks(TOLD).enumerate() {
             episodes(&self.dir, file, told)?;
         }
@@ -125,7 +125,7 @@ impl Form for Writer {
 
 /// A feature in `stats.json`.
 fn stats(figures: &Figures) -> (String, Value) {
-    let named = figures.nested(Nest::Number).into_iter();
+    let named = figures.nested(NestedList::Number).into_iter();
     let all: Map<String, Value> = named.map(|(name, nest)| (name.to_owned(), json!(nest))).collect();
     (figures.name.to_owned(), Value::Object(all))
 }
@@ -134,12 +134,12 @@ fn stats(figures: &Figures) -> (String, Value) {
 fn episodes(dir: &Path, file: usize, told: &[Told]) -> Result<(), DatasetError> {
     let whole = |name: &str, number: &dyn Fn(&Told) -> usize| {
         let numbers = told.iter().map(|t| number(t) as i64).collect();
-        (Column::new(name, Kind::I64, &[]), Values::I64(numbers))
+        (ParquetColumn::new(name, ColumnType::I64, &[]), ColumnValues::I64(numbers))
     };
     let prompts = told.iter().map(|t| t.prompt.clone()).collect();
     let mut all = vec![
         whole("episode_index", &|t| t.index),
-        (Column::new("tasks", Kind::Text, &[1]), Values::Text(prompts)),
+        (ParquetColumn::new("tasks", ColumnType::Text, &[1]), ColumnValues::Text(prompts)),
         whole("length", &|t| t.steps),
         whole("data/chunk_index", &|t| t.file / CHUNK),
         whole("data/file_index", &|t| t.file % CHUNK),
@@ -148,19 +148,23 @@ fn episodes(dir: &Path, file: usize, told: &[Told]) -> Result<(), DatasetError> 
     ];
     for (at, feature) in told.first().map_or(&[][..], |first| &first.figures).iter().enumerate() {
         for (which, (figure, _)) in feature.figures.iter().enumerate() {
-            let column = Column::new(format!("stats/{}/{figure}", feature.name), Kind::F64, &feature.shape);
+            let column = ParquetColumn::new(
+                format!("stats/{}/{figure}", feature.name),
+                ColumnType::F64,
+                &feature.shape,
+            );
             let numbers = told.iter().flat_map(|t| t.figures[at].figures[which].1.iter().copied());
-            all.push((column, Values::F64(numbers.collect())));
+            all.push((column, ColumnValues::F64(numbers.collect())));
         }
         let counts = told.iter().map(|t| t.figures[at].steps as i64).collect();
         let name = format!("stats/{}/count", feature.name);
-        all.push((Column::new(name, Kind::I64, &[1]), Values::I64(counts)));
+        all.push((ParquetColumn::new(name, ColumnType::I64, &[1]), ColumnValues::I64(counts)));
     }
     all.push(whole("meta/episodes/chunk_index", &|_| file / CHUNK));
     all.push(whole("meta/episodes/file_index", &|_| file % CHUNK));
-    let (columns, values): (Vec<Column>, Vec<Values>) = all.into_iter().unzip();
+    let (columns, values): (Vec<ParquetColumn>, Vec<ColumnValues>) = all.into_iter().unzip();
     let path = place(dir, "meta/episodes", file)?;
-    let mut table = Table::create(path, &columns.into(), &[])?;
+    let mut table = ParquetTable::create(path, &columns.into(), &[])?;
     table.append(told.len(), values)?;
     table.finish()
 }

@@ -5,11 +5,11 @@ use std::path::Path;
 use maud::{Markup, html};
 use serde_json::Value;
 
-use super::pictures::{Room, embedded, link};
+use super::images::{Room, embedded, link};
 use crate::{
     evaluation::record::{EpisodeRecord, Identity},
     report::{
-        judged::Judged,
+        run_summary::RunSummary,
         video::{still_path, video_path},
     },
 };
@@ -20,13 +20,13 @@ const LISTED: usize = 60;
 const STILLS: usize = 12 << 20;
 
 /// The episodes of all runs that are not safe, for a page in the folder `out`.
-pub(super) fn failures(runs: &[Judged], out: &Path) -> Markup {
+pub(super) fn failures(runs: &[RunSummary], out: &Path) -> Markup {
     // Each run gets its share, so that those of the first do not take it all.
     let share = STILLS / runs.len().max(1);
     html! { @for judged in runs { (of_run(judged, out, share)) } }
 }
 
-fn of_run(judged: &Judged, out: &Path, share: usize) -> Markup {
+fn of_run(judged: &RunSummary, out: &Path, share: usize) -> Markup {
     let all = judged.unsafe_episodes();
     let count = judged.run.records.len();
     let mut room = Room(share);
@@ -59,7 +59,7 @@ fn of_run(judged: &Judged, out: &Path, share: usize) -> Markup {
     }
 }
 
-fn row(judged: &Judged, record: &EpisodeRecord, why: &str, out: &Path) -> Markup {
+fn row(judged: &RunSummary, record: &EpisodeRecord, why: &str, out: &Path) -> Markup {
     let id = &record.identity;
     let video = link(out, &video_path(&judged.run.dir, id.task, id.episode));
     html! {
@@ -77,7 +77,13 @@ fn row(judged: &Judged, record: &EpisodeRecord, why: &str, out: &Path) -> Markup
 }
 
 /// The worst moment of an episode, if it was drawn.
-fn still(judged: &Judged, record: &EpisodeRecord, why: &str, out: &Path, room: &mut Room) -> Option<Markup> {
+fn still(
+    judged: &RunSummary,
+    record: &EpisodeRecord,
+    why: &str,
+    out: &Path,
+    room: &mut Room,
+) -> Option<Markup> {
     let id = &record.identity;
     let place = format!("Task {} episode {}", id.task, id.episode);
     let (address, [width, height]) = embedded(&still_path(&judged.run.dir, id.task, id.episode), room)?;
@@ -104,7 +110,7 @@ fn unbroken(text: &str) -> String {
 }
 
 /// What to type to see an episode that was not drawn, and to see it come out the same again.
-fn commands(judged: &Judged, id: &Identity) -> [String; 2] {
+fn commands(judged: &RunSummary, id: &Identity) -> [String; 2] {
     let info = &judged.run.info;
     let text = |field: &str| info[field].as_str().unwrap_or_default().to_owned();
     let (script, own) = script_of(judged);
@@ -146,7 +152,7 @@ fn commands(judged: &Judged, id: &Identity) -> [String; 2] {
 }
 
 /// The script that returns the suite itself, and whether it is the one that was run: a list of suites cannot be looked at.
-fn script_of(judged: &Judged) -> (String, bool) {
+fn script_of(judged: &RunSummary) -> (String, bool) {
     let main = judged.run.text("script");
     let beside = Path::new(main).with_file_name(format!("{}.lua", judged.run.text("suite")));
     let beside = beside.display().to_string();

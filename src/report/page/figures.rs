@@ -7,10 +7,10 @@ use maud::{Markup, html};
 
 use crate::{
     evaluation::{
-        paired::d_over_tau,
+        paired_stats::d_over_tau,
         statistics::{Distribution, Rate},
     },
-    report::judged::Judged,
+    report::run_summary::RunSummary,
 };
 
 /// Height of a bar, and from one to the next, pixels.
@@ -38,14 +38,14 @@ fn short(number: f64) -> String {
 }
 
 /// Runs by suite, in order.
-fn by_suite<'a>(runs: impl Iterator<Item = &'a Judged>) -> BTreeMap<&'a str, Vec<&'a Judged>> {
-    let mut suites: BTreeMap<&str, Vec<&Judged>> = BTreeMap::new();
+fn by_suite<'a>(runs: impl Iterator<Item = &'a RunSummary>) -> BTreeMap<&'a str, Vec<&'a RunSummary>> {
+    let mut suites: BTreeMap<&str, Vec<&RunSummary>> = BTreeMap::new();
     runs.for_each(|judged| suites.entry(&judged.summary.suite).or_default().push(judged));
     suites
 }
 
 /// Goal and Safety Success, a pair of bars a run, with their intervals.
-pub(super) fn goal_and_safety(runs: &[Judged]) -> Markup {
+pub(super) fn goal_and_safety(runs: &[RunSummary]) -> Markup {
     html! {
         p.legend {
             span.key { (swatch("goal")) "Goal Success" }
@@ -119,13 +119,13 @@ fn axis(labels: &[&str]) -> Markup {
 /// A strip of dots: its name, and D/τ with whether the goal was reached.
 type Dots<'a> = (&'a str, Vec<(f64, bool)>);
 
-fn dots_of<'a>(name: &'a str, judged: &Judged, asset: Option<&str>) -> Dots<'a> {
+fn dots_of<'a>(name: &'a str, judged: &RunSummary, asset: Option<&str>) -> Dots<'a> {
     let own = judged.run.records.iter().filter(|r| asset.is_none_or(|asset| r.identity.asset == asset));
     (name, own.filter_map(|r| Some((d_over_tau(r)?, r.verdict.goal))).collect())
 }
 
 /// Peak deformation over its threshold: a strip a run.
-pub(super) fn distributions(runs: &[Judged]) -> Markup {
+pub(super) fn distributions(runs: &[RunSummary]) -> Markup {
     let suites: Vec<(&str, Vec<Dots>)> = by_suite(runs.iter().filter(|judged| judged.soft()))
         .into_iter()
         .map(|(suite, runs)| {
@@ -136,7 +136,7 @@ pub(super) fn distributions(runs: &[Judged]) -> Markup {
 }
 
 /// The same of one run: a strip an object.
-pub(super) fn by_asset(judged: &Judged) -> Markup {
+pub(super) fn by_asset(judged: &RunSummary) -> Markup {
     let assets = judged.summary.by_asset.keys();
     strips(&[("", assets.map(|asset| dots_of(asset, judged, Some(asset))).collect())])
 }
@@ -192,7 +192,7 @@ fn spread_mark(of: &Distribution, most: f64) -> Markup {
 }
 
 /// Safety over the strictness of the thresholds: a plot a suite, a line a run.
-pub(super) fn kappa_curves(runs: &[Judged]) -> Markup {
+pub(super) fn kappa_curves(runs: &[RunSummary]) -> Markup {
     html! {
         @for (suite, runs) in by_suite(runs.iter().filter(|judged| judged.soft())) {
             p.suite { (suite) }
@@ -232,7 +232,7 @@ fn style(index: usize) -> String {
     format!("curve c{} d{}", index % 6, index / 6 % 4)
 }
 
-fn curve(judged: &Judged, index: usize) -> Markup {
+fn curve(judged: &RunSummary, index: usize) -> Markup {
     let points: Vec<(f64, f64)> = judged
         .summary
         .kappa

@@ -3,7 +3,7 @@
 
 mod failures;
 mod figures;
-mod pictures;
+mod images;
 mod settings;
 
 use std::path::Path;
@@ -11,7 +11,7 @@ use std::path::Path;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::{
-    judged::Judged,
+    run_summary::RunSummary,
     tables::{Table, deformation_table, kappa_table, main_table, task_table},
 };
 
@@ -19,7 +19,7 @@ use super::{
 const OPEN: usize = 4;
 
 /// The page of some runs, to be written into the folder `out`.
-pub fn page(runs: &[Judged], out: &Path) -> String {
+pub fn page(runs: &[RunSummary], out: &Path) -> String {
     let episodes: usize = runs.iter().map(|judged| judged.run.records.len()).sum();
     let title = format!("softvt: {}", suites(runs).join(", "));
     let markup = html! {
@@ -52,7 +52,7 @@ pub fn page(runs: &[Judged], out: &Path) -> String {
 }
 
 /// Names of suites without repetition.
-fn suites(runs: &[Judged]) -> Vec<String> {
+fn suites(runs: &[RunSummary]) -> Vec<String> {
     let mut names: Vec<String> = runs.iter().map(|judged| judged.summary.suite.clone()).collect();
     names.dedup();
     names
@@ -62,8 +62,8 @@ fn counted(count: usize, what: &str) -> String {
     format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
-fn contents(runs: &[Judged]) -> Markup {
-    let soft = runs.iter().any(Judged::soft);
+fn contents(runs: &[RunSummary]) -> Markup {
+    let soft = runs.iter().any(RunSummary::soft);
     html! {
         nav aria-label="Contents" {
             a href="#results" { "Results" }
@@ -80,12 +80,12 @@ fn section(id: &str, heading: &str, content: &Markup) -> Markup {
 }
 
 /// Something about one run under its name, which can be folded away.
-fn folded(runs: &[Judged], judged: &Judged, content: &Markup) -> Markup {
+fn folded(runs: &[RunSummary], judged: &RunSummary, content: &Markup) -> Markup {
     html! { details open[runs.len() <= OPEN] { summary { (judged.name()) } (content) } }
 }
 
-fn results(runs: &[Judged]) -> Markup {
-    let any = |test: fn(&Judged) -> bool| runs.iter().any(test);
+fn results(runs: &[RunSummary]) -> Markup {
+    let any = |test: fn(&RunSummary) -> bool| runs.iter().any(test);
     let content = html! {
         (table(&main_table(runs)))
         @if any(|judged| judged.summary.privileged) {
@@ -103,7 +103,7 @@ fn results(runs: &[Judged]) -> Markup {
     section("results", "Results", &content)
 }
 
-fn deformation(runs: &[Judged]) -> Markup {
+fn deformation(runs: &[RunSummary]) -> Markup {
     let (Some(deformations), Some(kappas)) = (deformation_table(runs), kappa_table(runs)) else {
         return html! {};
     };
@@ -166,5 +166,4 @@ fn cell(text: &str, is_text: bool) -> Markup {
 }
 
 #[cfg(test)]
-#[path = "page_tests.rs"]
 mod tests;

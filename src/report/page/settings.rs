@@ -3,15 +3,15 @@
 use maud::{Markup, html};
 use serde_json::Value;
 
-use crate::report::judged::Judged;
+use crate::report::run_summary::RunSummary;
 
 /// The fields of `run.json` that one asks for first, and all of it below.
-pub(super) fn settings(judged: &Judged) -> Markup {
+pub(super) fn settings(judged: &RunSummary) -> Markup {
     let info = &judged.run.info;
     let fields = [
         ("Folder", judged.run.dir.display().to_string()),
         ("Script", words(&info["script"], &info["arguments"])),
-        ("Policy", judged.summary.method()),
+        ("Policy", judged.summary.method_label()),
         ("softvt", plain(&info["softvt"])),
         ("Seed, split", format!("{}, {}", plain(&info["seed"]), plain(&info["split"]))),
         ("Episodes", format!("{} of {}", judged.run.records.len(), judged.run.wanted())),

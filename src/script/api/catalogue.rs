@@ -246,7 +246,7 @@ pub(crate) static SUITE: Record = Record {
             "settings",
             Type::Map(&Type::Map(&Type::Any)),
             Optional,
-            "What it changes of the mechanics, the robot and the judge: { physics = {…}, robot = {…}, rules = {…} }.",
+            "What it changes of the mechanics, the robot and the judge: { physics = {…}, robot = {…}, criteria = {…} }.",
         ),
     ],
 };

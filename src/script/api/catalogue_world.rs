@@ -96,7 +96,7 @@ pub(crate) static SIMULATE: Record = Record {
             "settings",
             Type::Map(&Type::Map(&Type::Any)),
             Optional,
-            "Changes of the mechanics, the robot and the judge: { physics = {…}, robot = {…}, rules = {…} }.",
+            "Changes of the mechanics, the robot and the judge: { physics = {…}, robot = {…}, criteria = {…} }.",
         ),
     ],
 };

@@ -10,10 +10,11 @@ use crate::script::{
 };
 use crate::{
     evaluation::{
-        calibration::{self, Envelope, HoldRow, StableRule, SweepRow},
-        thresholds::Thresholds,
+        calibration::{self, Envelope, HoldRow, StabilityCriteria, SweepRow},
+        envelope_plot::plot,
+        thresholds::ThresholdFile,
     },
-    report::{envelope::plot, interchange::sweep_jsonl},
+    report::softvtbench_files::sweep_jsonl,
 };
 
 /// Installs `softvt.envelope`, `softvt.calibration` and `softvt.stable`.
@@ -22,7 +23,7 @@ pub(crate) fn install(lua: &Lua, api: &Table) -> mlua::Result<()> {
     api.set("calibration", lua.create_function(|lua, asset: Value| calibration(lua, &asset))?)?;
     let stable = |lua: &Lua, row: Value| {
         let row: SweepRow = read(lua, "softvt.stable", &row)?;
-        Ok(StableRule::default().accepts(&row))
+        Ok(StabilityCriteria::default().accepts(&row))
     };
     api.set("stable", lua.create_function(stable)?)
 }
@@ -35,7 +36,7 @@ fn envelope(lua: &Lua, value: &Value) -> mlua::Result<Table> {
     let sweep: Vec<SweepRow> = read(lua, "softvt.envelope: sweep", &spec.get("sweep")?)?;
     let envelope = Envelope::new(holds, sweep, kappa);
     let made_by = format!("softvt {}", env!("CARGO_PKG_VERSION"));
-    let mut file = Thresholds::new(kappa, vec![format!("{asset}.sweep.jsonl")], made_by);
+    let mut file = ThresholdFile::new(kappa, vec![format!("{asset}.sweep.jsonl")], made_by);
     file.insert(&asset, envelope.clone());
     if let Some(fingerprint) = spec.get::<Option<String>>("fingerprint")? {
         file.fingerprints.insert(asset.clone(), fingerprint);
@@ -57,7 +58,7 @@ fn calibration(lua: &Lua, asset: &Value) -> mlua::Result<Option<Table>> {
         found.and_then(|file| Some((library.bytes(&file)?, file)))
     };
     let Some((bytes, path)) = bytes else { return Ok(None) };
-    let file = Thresholds::parse(&String::from_utf8_lossy(&bytes), &path)
+    let file = ThresholdFile::parse(&String::from_utf8_lossy(&bytes), &path)
         .map_err(|e| fail(lua, format!("{label}: {e}")))?;
     match file.envelopes.get(&asset) {
         Some(envelope) => told(lua, &asset, envelope, &file).map(Some),
@@ -66,8 +67,8 @@ fn calibration(lua: &Lua, asset: &Value) -> mlua::Result<Option<Table>> {
 }
 
 /// An envelope as scripts see it.
-fn told(lua: &Lua, asset: &str, envelope: &Envelope, file: &Thresholds) -> mlua::Result<Table> {
-    let limit = calibration::limit(&envelope.sweep, file.calibration.kappa);
+fn told(lua: &Lua, asset: &str, envelope: &Envelope, file: &ThresholdFile) -> mlua::Result<Table> {
+    let limit = calibration::deformation_limit(&envelope.sweep, file.calibration.kappa);
     let result = lua.create_table()?;
     result.set("lower", envelope.closure_lower)?;
     result.set("closure_at_tau", envelope.closure_at_tau)?;

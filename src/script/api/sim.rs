@@ -30,7 +30,7 @@ use crate::{
         seed::{EpisodeSeed, RandomStream, Split},
         settings::Settings,
     },
-    evaluation::deformation::Reference,
+    evaluation::deformation::ReferenceShape,
     geometry::Pose,
     physics::BodyId,
     robot::{Side, rotation},
@@ -54,7 +54,7 @@ struct Inner {
 const BYTES_A_SIMULATION: usize = 4 << 20;
 
 struct Watched {
-    reference: Option<Reference>,
+    reference: Option<ReferenceShape>,
     d_peak: f64,
     start_z: f64,
 }
@@ -135,7 +135,7 @@ fn simulate(
             reference: match object.body {
                 BodyId::Soft(i) => {
                     let body = &sim.world.soft(i).state;
-                    Reference::new(&body.x, &body.model.mass).ok()
+                    ReferenceShape::new(&body.x, &body.model.mass).ok()
                 }
                 _ => None,
             },
@@ -201,7 +201,7 @@ impl Inner {
     }
 }
 
-fn deformation(sim: &Simulation, object: usize, reference: &Option<Reference>) -> Option<f64> {
+fn deformation(sim: &Simulation, object: usize, reference: &Option<ReferenceShape>) -> Option<f64> {
     let BodyId::Soft(index) = sim.objects[object].body else { return None };
     reference.as_ref()?.measure(&sim.world.soft(index).state.x).ok().map(|d| d.rms_pct)
 }

@@ -17,7 +17,7 @@ use crate::script::{
     vm::{fail, locked},
 };
 use crate::{
-    evaluation::deformation::{Deformation, Reference},
+    evaluation::deformation::{Deformation, ReferenceShape},
     geometry::{Pose, Quat, Vec3},
     physics::{
         BodyId, ColliderId, KinematicId, PhysicsParams, SoftId, World,
@@ -32,7 +32,7 @@ use crate::{
 /// A world, its references and its timing.
 struct Inner {
     world: World,
-    references: Vec<Reference>,
+    references: Vec<ReferenceShape>,
     failed: Option<StepFailure>,
     newton: (u64, u32),
     timing: Timing,
@@ -106,7 +106,7 @@ impl LuaWorld {
             soft_rest(&name, shape.shape(), &material).map_err(|e| fail(lua, format!("world:soft: {e}")))?
         };
         let held = hold_in_world(lua, rest.bytes())?;
-        let reference = Reference::new(&rest.mesh.nodes, &rest.mass)
+        let reference = ReferenceShape::new(&rest.mesh.nodes, &rest.mass)
             .map_err(|e| fail(lua, format!("world:soft: {e}")))?;
         let friction = friction(spec)?;
         let at = pose(spec.get("xyz")?, spec.get("turn")?);
@@ -215,7 +215,7 @@ impl LuaBody {
         let mut inner = locked(&self.world);
         let body = &inner.world.soft(self.id).state;
         let nodes = if which == "rest" { &body.model.mesh.nodes } else { &body.x };
-        let reference = Reference::new(nodes, &body.model.mass).map_err(|e| fail(lua, e.to_string()))?;
+        let reference = ReferenceShape::new(nodes, &body.model.mass).map_err(|e| fail(lua, e.to_string()))?;
         inner.references[self.id.index()] = reference;
         Ok(())
     }

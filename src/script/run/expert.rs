@@ -435,8 +435,8 @@ fn room(
             .iter()
             .map(|o| Obstacle { pose_w: o.pose_w, shape: &o.asset.shape, bounds: o.bounds })
             .collect();
-        let (metres, nearest) = clearance(&pose.0, width, &obstacles, FAR);
-        Ok((metres, nearest.map(|index| objects[index].name.clone())))
+        let found = clearance(&pose.0, width, &obstacles, FAR);
+        Ok((found.distance, found.nearest.map(|index| objects[index].name.clone())))
     })
 }
 

@@ -2,12 +2,12 @@
 
 use crate::{
     geometry::Pose,
-    robot::ik::{UnreachablePose, pose_error},
+    robot::ik::{PoseError, PoseTolerance, UnreachablePose},
     rollout::Simulation,
 };
 
 /// Farther from its command than this the tool is not where it was sent, m and rad.
-const AWAY: (f64, f64) = (0.02, 0.2);
+const TRACKING_LIMIT: PoseTolerance = PoseTolerance { distance: 0.02, angle: 0.2 };
 
 /// Control steps that the tool may be away before its reach is searched, which costs tens of milliseconds; a fast motion
 /// lags by this much for less long, and is found reachable at once otherwise.
@@ -29,19 +29,16 @@ impl Lag {
     /// What to tell the script once the tool has been away for a second from a pose that it cannot take.
     pub(crate) fn complaint(&mut self, sim: &Simulation) -> Option<String> {
         let command_b = self.command_b?;
-        let (linear, angular) = pose_error(&sim.robot.tool_b(&sim.world), &command_b);
-        self.steps = if is_away(linear.norm(), angular.norm()) { self.steps + 1 } else { 0 };
+        let error = PoseError::between(&sim.robot.tool_b(&sim.world), &command_b);
+        self.steps = if TRACKING_LIMIT.contains(&error) { 0 } else { self.steps + 1 };
         if self.steps < PATIENCE {
             return None;
         }
         self.steps = 0;
         let miss = sim.robot.reach(&sim.world, &command_b).err()?;
-        is_away(miss.distance, miss.angle).then(|| message(&miss, &sim.robot.base_w))
+        let is_away = miss.distance > TRACKING_LIMIT.distance || miss.angle > TRACKING_LIMIT.angle;
+        is_away.then(|| message(&miss, &sim.robot.base_w))
     }
-}
-
-fn is_away(distance: f64, angle: f64) -> bool {
-    distance > AWAY.0 || angle > AWAY.1
 }
 
 /// Scripts give poses in the world frame.

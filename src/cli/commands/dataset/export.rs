@@ -16,7 +16,7 @@ use crate::{
     },
     dataset::{
         DatasetError,
-        lerobot::{self, Export, Gripper, Version},
+        lerobot::{self, ExportConfig, GripperCoding, LeRobotVersion},
     },
     rollout::cancel,
 };
@@ -54,12 +54,20 @@ pub(crate) fn command(path: Arg) -> clap::Command {
 }
 
 /// What was typed.
-pub(crate) fn typed(matches: &ArgMatches) -> Export {
-    Export {
+pub(crate) fn typed(matches: &ArgMatches) -> ExportConfig {
+    ExportConfig {
         data: PathBuf::from(text(matches, "path")),
         out: PathBuf::from(text(matches, "out")),
-        version: if text(matches, "format") == FORMATS[0] { Version::V21 } else { Version::V30 },
-        gripper: if text(matches, "gripper") == "binary" { Gripper::Binary } else { Gripper::Continuous },
+        version: if text(matches, "format") == FORMATS[0] {
+            LeRobotVersion::V21
+        } else {
+            LeRobotVersion::V30
+        },
+        gripper: if text(matches, "gripper") == "binary" {
+            GripperCoding::Binary
+        } else {
+            GripperCoding::Continuous
+        },
         tasks: many(matches, "task"),
         threads: threads(matches),
     }
@@ -69,7 +77,7 @@ pub(crate) fn typed(matches: &ArgMatches) -> Export {
 ///
 /// # Errors
 /// See [`lerobot::export`]; nothing is left then.
-pub(crate) fn run(export: &Export) -> Result<(), CliError> {
+pub(crate) fn run(export: &ExportConfig) -> Result<(), CliError> {
     if export.out.to_string_lossy().trim().is_empty() {
         return Err(CliError::input("--out: expected a new folder, got \"\""));
     }

@@ -21,7 +21,7 @@ use crate::{
     },
     dataset::{
         card::Imported,
-        import::{self, Begins, Foreign},
+        import::{self, ForeignFile, InitialCondition},
     },
     evaluation::record::Origin,
     policy::{ChunkedPolicy, ToolCommand, recorded::RecordedPolicy},
@@ -53,7 +53,7 @@ pub(crate) fn run(import: &Import) -> Result<(), CliError> {
     let run = &output.run;
     let loaded = script::load(&run.file, &run.script_words).map_err(CliError::input)?;
     let suites = suites_of("dataset import", run, &loaded.plan)?;
-    let files: Vec<Foreign> =
+    let files: Vec<ForeignFile> =
         files.iter().map(|path| import::read(path).map_err(CliError::input)).collect::<Result<_, _>>()?;
     let sources = sources(&files)?;
     let matched = match_all(run, &suites, &files, attempts.unwrap_or(u32::MAX))?;
@@ -99,8 +99,8 @@ pub(crate) fn run(import: &Import) -> Result<(), CliError> {
 ///
 /// # Errors
 /// Two of them are one.
-fn sources(files: &[Foreign]) -> Result<Vec<Imported>, CliError> {
-    let mut seen: BTreeMap<&str, &Foreign> = BTreeMap::new();
+fn sources(files: &[ForeignFile]) -> Result<Vec<Imported>, CliError> {
+    let mut seen: BTreeMap<&str, &ForeignFile> = BTreeMap::new();
     for file in files {
         if let Some(twin) = seen.insert(&file.sha256, file) {
             return Err(CliError::input(format!(
@@ -110,7 +110,7 @@ fn sources(files: &[Foreign]) -> Result<Vec<Imported>, CliError> {
             )));
         }
     }
-    let about = |file: &Foreign| Imported {
+    let about = |file: &ForeignFile| Imported {
         file: base_name(file),
         sha256: file.sha256.clone(),
         layout: file.layout.name().to_owned(),
@@ -120,7 +120,7 @@ fn sources(files: &[Foreign]) -> Result<Vec<Imported>, CliError> {
     Ok(files.iter().map(about).collect())
 }
 
-fn base_name(file: &Foreign) -> String {
+fn base_name(file: &ForeignFile) -> String {
     file.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
@@ -136,7 +136,7 @@ fn fit(
     for one in own {
         let place = (one.task, one.attempt);
         let (start, demo) = begin(batch, one, layout)?;
-        elsewhere += usize::from(matches!(demo.begins, Begins::Elsewhere { .. }));
+        elsewhere += usize::from(matches!(demo.begins, InitialCondition::OtherSimulator { .. }));
         placed += usize::from(!start.places.is_empty());
         let origin = Origin {
             file: base_name(one.file),
@@ -173,11 +173,13 @@ fn begin(
 ) -> Result<(InitialState, import::ForeignDemo), CliError> {
     let mut demo = one.demo.clone();
     let (joints, things) = match &one.demo.begins {
-        Begins::Episode { start, .. } => {
+        InitialCondition::SoftvtEpisode { start, .. } => {
             let places = if layout { Vec::new() } else { start.places.clone() };
             return Ok((InitialState { places, ..*start }, demo));
         }
-        Begins::Elsewhere { joints, things } => (*joints, if layout { &[][..] } else { things }),
+        InitialCondition::OtherSimulator { joints, things } => {
+            (*joints, if layout { &[][..] } else { things })
+        }
     };
     let mut start = InitialState { joints, places: Vec::new() };
     if things.is_empty() && !demo.held.contains(&true) {
@@ -186,7 +188,7 @@ fn begin(
     let task: Option<&Task> = batch.suite.tasks.iter().find(|task| task.id == one.task);
     let task = task.ok_or_else(|| CliError::internal("a task that is none of the suite"))?;
     let opened = batch.open(&batch.request(task, one.attempt))?;
-    start.places = import::places(&opened.scene, task.goal.object(), things);
+    start.places = import::match_objects(&opened.scene, task.goal.object(), things);
     if target_asset(&opened.scene, task).is_some_and(|asset| matches!(asset.body, Body::Rigid { .. })) {
         demo.hold_rigid();
     }

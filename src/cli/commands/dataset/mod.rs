@@ -19,11 +19,12 @@ use crate::{
     dataset::{
         TaskFile, check,
         layout::{DATASET, RECORDING},
-        manifest::{self, Entry},
+        manifest::{self, ManifestEntry},
         stats,
     },
-    report::runs::StoredRun,
-    rollout::{batch, cancel},
+    parallel,
+    report::stored_run::StoredRun,
+    rollout::cancel,
 };
 
 /// Whether a path is that of a data set: an HDF5 file, or the folder of a recording.
@@ -64,7 +65,7 @@ fn repeat_all(demos: &[(PathBuf, usize)]) -> Result<(), CliError> {
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
     let mut done: BTreeMap<usize, ReplayOutcome> = BTreeMap::new();
     let repeat = |index: usize| repeat(&demos[index].0, demos[index].1);
-    batch::run(demos.len(), threads, &cancel::FLAG, repeat, |index, repeated| {
+    parallel::run(demos.len(), threads, cancel::requested, repeat, |index, repeated| {
         done.insert(index, repeated);
         Ok(())
     })?;
@@ -132,8 +133,8 @@ pub(crate) fn replay(path: &Path, which: EpisodeSelector) -> Result<(), CliError
         EpisodeSelector::Line(line) => all(path)?.into_iter().nth(line).ok_or_else(none)?,
         EpisodeSelector::Of(task, demo) if path.is_dir() => {
             let entries = manifest::read(path).map_err(CliError::input)?;
-            let fits = |entry: &&Entry| entry.task_id == task && entry.demo_id == demo as usize;
-            let found: Vec<&Entry> = entries.iter().filter(fits).collect();
+            let fits = |entry: &&ManifestEntry| entry.task_id == task && entry.demo_id == demo as usize;
+            let found: Vec<&ManifestEntry> = entries.iter().filter(fits).collect();
             match found[..] {
                 [entry] => (path.join(&entry.hdf5_path), entry.demo_id),
                 [] => return Err(none()),

@@ -5,13 +5,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::{
     benchmark::{Suite, Task},
     cli::{error::CliError, run::config::RunConfig, run::selection::select_tasks},
-    dataset::import::{Begins, Foreign, ForeignDemo, ForeignTask, Layout},
+    dataset::import::{ForeignDemo, ForeignFile, ForeignLayout, ForeignTask, InitialCondition},
 };
 
 /// A demonstration with the task and attempt that it becomes.
 pub(crate) struct MatchedDemo<'a> {
     /// Its file.
-    pub file: &'a Foreign,
+    pub file: &'a ForeignFile,
     /// The demonstration.
     pub demo: &'a ForeignDemo,
     /// Place of the suite in the list.
@@ -30,7 +30,7 @@ pub(crate) struct MatchedDemo<'a> {
 pub(crate) fn match_all<'a>(
     run: &RunConfig,
     suites: &[&Suite],
-    files: &'a [Foreign],
+    files: &'a [ForeignFile],
     most: u32,
 ) -> Result<Vec<MatchedDemo<'a>>, CliError> {
     let forced = named(run, suites)?;
@@ -40,7 +40,7 @@ pub(crate) fn match_all<'a>(
         for demo in &file.demos {
             let (suite, task) = match forced {
                 // Episodes of softvt's own are of their very task.
-                Some(forced) if file.layout != Layout::Softvt => forced,
+                Some(forced) if file.layout != ForeignLayout::Softvt => forced,
                 Some(forced) if task_of(run, suites, file, demo)? == forced => forced,
                 Some(_) => return Err(of_another(run, file, demo)),
                 None => task_of(run, suites, file, demo)?,
@@ -108,11 +108,11 @@ fn number(found: &mut [(MatchedDemo, Option<u32>)]) -> Result<(), CliError> {
 }
 
 /// The attempt that a demonstration of softvt's was.
-fn own_attempt(run: &RunConfig, file: &Foreign, demo: &ForeignDemo) -> Result<Option<u32>, CliError> {
+fn own_attempt(run: &RunConfig, file: &ForeignFile, demo: &ForeignDemo) -> Result<Option<u32>, CliError> {
     match &demo.begins {
-        Begins::Elsewhere { .. } => Ok(None),
-        Begins::Episode { seed, attempt, .. } if *seed == run.seed => Ok(Some(*attempt)),
-        Begins::Episode { seed, .. } => Err(CliError::input(format!(
+        InitialCondition::OtherSimulator { .. } => Ok(None),
+        InitialCondition::SoftvtEpisode { seed, attempt, .. } if *seed == run.seed => Ok(Some(*attempt)),
+        InitialCondition::SoftvtEpisode { seed, .. } => Err(CliError::input(format!(
             "{}: {}: it was recorded with the seed {seed}, and this import is of the seed {}; give --seed {seed}",
             file.path.display(),
             demo.name,
@@ -130,7 +130,7 @@ fn plainly(text: &str) -> String {
 fn task_of(
     run: &RunConfig,
     suites: &[&Suite],
-    file: &Foreign,
+    file: &ForeignFile,
     demo: &ForeignDemo,
 ) -> Result<(usize, usize), CliError> {
     let ForeignTask { suite, id, prompts } = &demo.task;
@@ -142,7 +142,7 @@ fn task_of(
             .is_some_and(|name| plainly(&name.replace('-', "_")) == plainly(&run.name_of(suites[index])))
     };
     let is_ours = (0..suites.len()).any(named);
-    if file.layout == Layout::Softvt && !is_ours {
+    if file.layout == ForeignLayout::Softvt && !is_ours {
         return Err(no_task(run, suites, file, demo));
     }
     let of_suite = |index: usize| !is_ours || named(index);
@@ -177,7 +177,7 @@ fn task_of(
     }
 }
 
-fn of_another(run: &RunConfig, file: &Foreign, demo: &ForeignDemo) -> CliError {
+fn of_another(run: &RunConfig, file: &ForeignFile, demo: &ForeignDemo) -> CliError {
     let id = demo.task.id.map_or(String::new(), |id| format!(" {id}"));
     CliError::input(format!(
         "{}: {}: --task {}: it was recorded by softvt and is of task{id}; leave --task out",
@@ -187,7 +187,7 @@ fn of_another(run: &RunConfig, file: &Foreign, demo: &ForeignDemo) -> CliError {
     ))
 }
 
-fn no_task(run: &RunConfig, suites: &[&Suite], file: &Foreign, demo: &ForeignDemo) -> CliError {
+fn no_task(run: &RunConfig, suites: &[&Suite], file: &ForeignFile, demo: &ForeignDemo) -> CliError {
     let ForeignTask { suite, id, prompts } = &demo.task;
     let task = match (prompts.first(), id) {
         (Some(prompt), _) => Some(format!("{prompt:?}")),

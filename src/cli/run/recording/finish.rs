@@ -14,9 +14,9 @@ use crate::{
     },
     dataset::{
         card::{Card, TaskCount, reasons},
+        demonstration_writer::frame_rate,
         layout::{MANIFEST, PARTS},
-        manifest::{self, Entry},
-        recorder::rate,
+        manifest::{self, ManifestEntry},
     },
 };
 
@@ -34,8 +34,9 @@ pub(crate) fn finish(
     for session in sessions {
         for task in &session.tasks {
             let place = session.place(task.id);
-            let new = session.kept(task.id).into_iter().enumerate().map(|(k, r)| Entry::new(&place, k, r));
-            let new: Vec<Entry> = new.collect();
+            let new =
+                session.kept(task.id).into_iter().enumerate().map(|(k, r)| ManifestEntry::new(&place, k, r));
+            let new: Vec<ManifestEntry> = new.collect();
             let videos = new.iter().flat_map(|entry| entry.video_files.values());
             let video_bytes = videos.map(|file| size(&root.join(file))).sum();
             tasks.push(TaskCount { hdf5_bytes: size(&place.hdf5()), video_bytes, ..count(session, task) });
@@ -49,7 +50,7 @@ pub(crate) fn finish(
     let _ = std::fs::remove_dir(root.join(PARTS));
     let card = Card {
         softvt: env!("CARGO_PKG_VERSION").to_owned(),
-        fps: rate(),
+        fps: frame_rate(),
         pictures: output.pictures,
         privileged: output.privileged,
         imported: sessions.first().map(|session| session.batch.imported.clone()).unwrap_or_default(),

@@ -22,18 +22,20 @@ use crate::{
         },
     },
     dataset::{
-        DatasetError, Demonstration, assemble,
+        DatasetError, Demonstration,
         card::reasons,
-        layout::{self, TaskPlace, VIDEOS},
-        recorder::Recorder,
+        demonstration_writer::DemonstrationWriter,
+        layout::{self, TaskPaths, VIDEO_STREAMS},
+        merge_parts,
     },
     evaluation::record::{EpisodeRecord, Origin},
+    parallel,
     policy::{ChunkedPolicy, recorded::RecordedPolicy},
     report::{
         actions,
         run_folder::{RunFolder, SUMMARY},
     },
-    rollout::{EpisodeError, FinishedEpisode, SettleError, batch, cancel},
+    rollout::{EpisodeError, FinishedEpisode, SettleError, cancel},
     scene::InitialState,
     script::Loaded,
 };
@@ -219,10 +221,10 @@ impl<'a> SuiteRecording<'a> {
         let mut progress = Progress::new(jobs.len(), &self.suite);
         let mut records = std::mem::take(&mut self.records);
         let session = &*self;
-        let outcome = batch::run(
+        let outcome = parallel::run(
             jobs.len(),
             self.output.run.threads,
-            &cancel::FLAG,
+            cancel::requested,
             |index| session.attempt(jobs[index]),
             |_, finished| {
                 let id = &finished.record.identity;
@@ -252,9 +254,9 @@ impl<'a> SuiteRecording<'a> {
         shut.resize(finished.actions.len(), shut.last().copied().unwrap_or_default());
         let demonstration = Demonstration::new(&finished, &film, shut, self.output.privileged);
         let place = self.place(task);
-        let recorder = Recorder {
+        let recorder = DemonstrationWriter {
             hdf5: place.part(attempt, "hdf5"),
-            videos: VIDEOS.map(|video| place.part(attempt, &format!("{video}.mp4"))),
+            videos: VIDEO_STREAMS.map(|video| place.part(attempt, &format!("{video}.mp4"))),
             preview: place.part(attempt, "preview.mp4"),
             pictures: self.output.pictures,
             environment: &self.environment,
@@ -289,8 +291,8 @@ impl<'a> SuiteRecording<'a> {
     }
 
     /// Where the files of a task are.
-    pub(crate) fn place(&self, task: usize) -> TaskPlace {
-        TaskPlace { root: self.root.clone(), suite: self.suite.clone(), task }
+    pub(crate) fn place(&self, task: usize) -> TaskPaths {
+        TaskPaths { root: self.root.clone(), suite: self.suite.clone(), task }
     }
 
     /// Makes the file of a task that has all its demonstrations, unless it is there; its parts go then.
@@ -304,7 +306,7 @@ impl<'a> SuiteRecording<'a> {
                 }
             }
             let parts: Vec<PathBuf> = kept.iter().map(|r| place.part(r.identity.episode, "hdf5")).collect();
-            assemble(&parts, &place.hdf5(), &self.environment).map_err(failure)?;
+            merge_parts(&parts, &place.hdf5(), &self.environment).map_err(failure)?;
         }
         match std::fs::remove_dir_all(place.parts()) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => {

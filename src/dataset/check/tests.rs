@@ -1,0 +1,155 @@
+//! Files with one thing wrong each, and what is said of them.
+
+use std::{fs, path::PathBuf};
+
+use serde_json::json;
+
+use super::*;
+use crate::{
+    dataset::{DataStream, Demonstration, actions, hdf5::Hdf5Writer, merge_parts},
+    evaluation::record::tests::sample,
+    policy::Action,
+};
+
+const STEPS: usize = 9;
+
+/// A demonstration whose tool turns while it rises.
+fn demonstration(salt: f64) -> Demonstration {
+    let turn = |step: usize| Vec3::new(2.9 - 0.1 * step as f64, 0.3 + salt, -0.2);
+    let place = |step: usize| Vec3::new(0.4 + salt, 1.0 / 3.0, 0.01 * step as f64);
+    let q = |step: usize| rotation::from_axis_angle(&turn(step));
+    let each = |row: &dyn Fn(usize) -> Vec<f64>| (0..STEPS).flat_map(row).collect::<Vec<f64>>();
+    let state = |step: usize| {
+        let (p, r) = (place(step), turn(step));
+        vec![p.x, p.y, p.z, r.x, r.y, r.z, 0.04]
+    };
+    let pose = |step: usize| {
+        let (p, q) = (place(step), q(step));
+        vec![p.x, p.y, p.z, q.w, q.i, q.j, q.k]
+    };
+    let zeros = |name: &str, row: &[usize]| {
+        DataStream::f64(name, row, vec![0.1 + salt; STEPS * row.iter().product::<usize>()]).unit("m", "")
+    };
+    let mut made = Demonstration {
+        record: sample(),
+        actions: (0..STEPS)
+            .map(|step| Action { position_b: place(step), axis_angle_b: turn(step), closure: 0.3 })
+            .collect(),
+        gripper_closed: (0..STEPS).map(|step| step > 4).collect(),
+        observed: vec![
+            DataStream::f64("obs/eef_pose", &[7], each(&pose)),
+            DataStream::f64("obs/state", &[7], each(&state)),
+            zeros("obs/arm_joint_pos", &[7]),
+            zeros("obs/gripper_pos", &[2]),
+            zeros("obs/gripper_width", &[1]),
+            zeros("obs/gripper_close_norm", &[1]),
+            zeros("obs/gripper_closure", &[1]),
+        ],
+        privileged: vec![
+            DataStream::f32("privileged/states/deformable_object/bun/nodal_pos_w", &[70_000, 3], {
+                (0..STEPS * 210_000).map(|i| (i as f32 * 1e-4).sin()).collect()
+            }),
+            DataStream::u8("privileged/contact", &[2], vec![1; 2 * STEPS]).attribute("meaning", "touching"),
+        ],
+    };
+    made.set_markers(&[[[[[1.5; 2]; MARKERS]; 2]; 2]; STEPS]);
+    made
+}
+
+fn write(demonstration: &Demonstration, name: &str) -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    let mut writer = Hdf5Writer::create(&path, &json!({ "env_name": "softvt" }), STEPS, 1).unwrap();
+    writer.describe(0, &demonstration.record, STEPS).unwrap();
+    writer.numbers(0, demonstration).unwrap();
+    writer.close(Ok(())).unwrap();
+    (folder, path)
+}
+
+/// What is said of a file in which `change` has spoilt a stream.
+fn said(change: impl Fn(&mut Vec<DataStream>)) -> String {
+    let mut made = demonstration(0.0);
+    change(&mut made.observed);
+    let (_folder, path) = write(&made, "task.hdf5");
+    let wrong = file(&path).unwrap().wrong;
+    assert!(wrong.iter().all(|line| line.contains("task.hdf5: /data/demo_0/")), "{wrong:?}");
+    wrong.join("\n")
+}
+
+fn numbers(stream: &mut DataStream) -> &mut Vec<f64> {
+    let StreamValues::F64(numbers) = &mut stream.values else { panic!("{} is of doubles", stream.name) };
+    numbers
+}
+
+#[test]
+fn demonstrations_come_back_to_the_bit_from_the_file_of_a_task() {
+    let both = [demonstration(0.0), demonstration(1e-9)];
+    let parts = both.each_ref().map(|made| write(made, "part.hdf5"));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("hdf5/task.hdf5");
+    let environment = json!({ "env_name": "softvt", "env_kwargs": { "seed": 7 } });
+    merge_parts(&parts.each_ref().map(|(_, path)| path.clone()), &path, &environment).unwrap();
+    let read = TaskFile::open(&path).unwrap();
+    assert_eq!((read.demos(), read.environment().unwrap()), (&[0, 1][..], environment));
+    for (demo, made) in both.iter().enumerate() {
+        let mut back = read.read(demo).unwrap();
+        let order = |streams: &mut Vec<DataStream>| {
+            streams.sort_by(|a, b| a.name.cmp(&b.name));
+            streams.iter_mut().for_each(|stream| stream.attributes.sort());
+        };
+        let mut made = made.clone();
+        for streams in [&mut back.observed, &mut back.privileged, &mut made.observed, &mut made.privileged] {
+            order(streams);
+        }
+        assert_eq!(back, made);
+        assert_eq!(actions(&path, demo).unwrap(), made.actions);
+    }
+    assert!(actions(&path, 2).unwrap_err().to_string().contains("there is no demo_2; there are 2"));
+    let findings = file(&path).unwrap();
+    assert_eq!(findings.wrong, [""; 0]);
+    assert_eq!((findings.demos, findings.steps), (2, 2 * STEPS));
+}
+
+#[test]
+fn what_is_wrong_with_a_stream_is_told_with_its_file_and_key() {
+    assert_eq!(said(|_| ()), "");
+    let missing = said(|streams| drop(streams.remove(2)));
+    assert!(missing.contains("/data/demo_0/obs/arm_joint_pos: it is not there"), "{missing}");
+    let bare = said(|streams| numbers(&mut streams[3])[5] = f64::NAN);
+    assert!(bare.contains("obs/gripper_pos: step 2: a number that is not finite"), "{bare}");
+    let shape = said(|streams| streams[2] = DataStream::f64("obs/arm_joint_pos", &[6], vec![0.0; 6 * STEPS]));
+    assert!(shape.contains("obs/arm_joint_pos: expected the shape (steps, 7), got [9, 6]"), "{shape}");
+}
+
+#[test]
+fn quaternions_of_another_order_or_sign_are_told_apart() {
+    let turned = said(|streams| {
+        numbers(&mut streams[0]).chunks_exact_mut(7).for_each(|row| row[3..].rotate_left(1));
+    });
+    assert!(turned.contains("obs/eef_pose: step 0"), "{turned}");
+    assert!(turned.contains("is its order w x y z?"), "{turned}");
+    let signed = said(|streams| {
+        numbers(&mut streams[0])
+            .chunks_exact_mut(7)
+            .for_each(|row| row[3..].iter_mut().for_each(|x| *x = -*x));
+    });
+    assert!(signed.contains("with w >= 0"), "{signed}");
+    assert!(!signed.contains("order"), "the same rotation: {signed}");
+}
+
+#[test]
+fn a_file_that_is_cut_off_anywhere_is_told_by_its_name() {
+    let (folder, path) = write(&demonstration(0.0), "whole.hdf5");
+    let whole = fs::read(&path).unwrap();
+    for share in [0.0, 0.001, 0.3, 0.7, 0.99, 0.9999] {
+        let cut = folder.path().join("cut.hdf5");
+        fs::write(&cut, &whole[..(share * whole.len() as f64) as usize]).unwrap();
+        let said = match file(&cut) {
+            Ok(findings) => findings.wrong.join("\n"),
+            Err(error) => error.to_string(),
+        };
+        assert!(said.contains("cut.hdf5"), "{share}: {said:?}");
+    }
+    let none = folder.path().join("none.hdf5");
+    assert!(actions(&none, 0).unwrap_err().to_string().starts_with("cannot read"), "it is not there");
+}

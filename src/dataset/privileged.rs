@@ -1,0 +1,138 @@
+//! Streams that no real robot has: true shapes, forces, contact and deformation.
+
+use crate::{
+    evaluation::deformation::METRIC_ID,
+    geometry::{Pose, Vec3},
+    policy::PadForce,
+    robot::rotation,
+    rollout::{BodyConfiguration, FinishedEpisode, ScoreFrame, SensorSuite, StateRecording, StepTrace},
+};
+
+use super::stream::{DataStream, StreamValues};
+
+/// All of them: row i is of the state before action i, as everywhere in a demonstration.
+pub(super) fn streams(finished: &FinishedEpisode, film: &StateRecording) -> Vec<DataStream> {
+    let mut all = forces(finished, film);
+    all.extend(contact(finished));
+    all.extend(deformation(finished));
+    all.extend(bodies(film, finished.actions.len()));
+    all
+}
+
+/// True loads of the pads, and SoftVTBench's actions with forces.
+fn forces(finished: &FinishedEpisode, film: &StateRecording) -> Vec<DataStream> {
+    let steps = finished.actions.len();
+    let loads: Vec<[PadForce; 2]> = film.frames.iter().take(steps).map(SensorSuite::pad_forces).collect();
+    let of = |pick: &dyn Fn(&PadForce) -> Vec3| -> Vec<f64> {
+        loads.iter().flatten().flat_map(|pad| <[f64; 3]>::from(pick(pad))).collect()
+    };
+    let force = of(&|pad| pad.load.force);
+    let with_forces = finished.actions.iter().zip(force.as_chunks::<6>().0).flat_map(|(a, force)| {
+        let (p, r) = (a.position_b, a.axis_angle_b);
+        [p.x, p.y, p.z, r.x, r.y, r.z, a.closure].into_iter().chain(*force).collect::<Vec<f64>>()
+    });
+    vec![
+        DataStream::f64("privileged/actions_with_force", &[13], with_forces.collect())
+            .unit("m, rad, 1, N", "robot base; forces: pad")
+            .attribute("meaning", "the actions, then the force on the left and on the right gel"),
+        DataStream::f64("privileged/gripper_net_force", &[2, 3], force).unit("N", "pad"),
+        DataStream::f64("privileged/gripper_net_moment", &[2, 3], of(&|pad| pad.load.moment))
+            .unit("N m", "pad, about its apex"),
+    ]
+}
+
+/// What the state after step i - 1 says in row i; `first` of the settled state.
+fn shifted<T, N: Clone>(after: &[T], first: Vec<N>, numbers: impl Fn(&T) -> Vec<N>) -> Vec<N> {
+    // The state after the last action is no row's.
+    let before = after.len().saturating_sub(1);
+    first.into_iter().chain(after[..before].iter().flat_map(numbers)).collect()
+}
+
+fn contact(finished: &FinishedEpisode) -> Vec<DataStream> {
+    let trace = &finished.trace;
+    if trace.is_empty() {
+        return Vec::new();
+    }
+    let touching = |t: &StepTrace| t.pad_force_n.map(|force| u8::from(force > 0.0)).to_vec();
+    vec![
+        DataStream::u8("privileged/contact", &[2], shifted(trace, vec![0; 2], touching))
+            .attribute("meaning", "whether the left and the right pad press on the target"),
+        DataStream::f64(
+            "privileged/pad_force",
+            &[2],
+            shifted(trace, vec![0.0; 2], |t| t.pad_force_n.to_vec()),
+        )
+        .unit("N", "")
+        .attribute("meaning", "normal force of the left and the right pad on the target"),
+        DataStream::f64("privileged/slip", &[2], shifted(trace, vec![0.0; 2], |t| t.slip_mm.to_vec()))
+            .unit("mm", ""),
+        DataStream::u8("privileged/dropped", &[], shifted(trace, vec![0], |t| vec![u8::from(t.dropped)])),
+    ]
+}
+
+/// D of a soft target, by SoftVTBench's names.
+fn deformation(finished: &FinishedEpisode) -> Vec<DataStream> {
+    let Some(reference) = &finished.reference else { return Vec::new() };
+    let at_rest: [f64; 3] = reference.bbox_m().into();
+    let frames = &finished.frames;
+    let of = |pick: &dyn Fn(&ScoreFrame) -> Option<f64>| {
+        shifted(frames, vec![0.0], |frame| vec![pick(frame).unwrap_or(f64::NAN)])
+    };
+    let size =
+        |f: &ScoreFrame| f.deformation.map_or(vec![f64::NAN; 3], |d| d.bbox_m.iter().copied().collect());
+    let percent = |name: &str, numbers| {
+        DataStream::f64(format!("privileged/soft_extras/{name}"), &[], numbers)
+            .unit("% of the settled bounding box's diagonal", "")
+            .attribute("metric_id", METRIC_ID)
+            .attribute("meaning", "worst over the physics steps of the control step before")
+    };
+    vec![
+        percent("fem_deformation_rms", of(&|f| Some(f.deformation?.rms_pct))),
+        percent("fem_deformation_max", of(&|f| Some(f.deformation?.max_pct))),
+        DataStream::f64(
+            "privileged/soft_extras/fem_bbox_dims",
+            &[3],
+            shifted(frames, at_rest.to_vec(), size),
+        )
+        .unit("m", "world"),
+    ]
+}
+
+/// Nodes of soft bodies, and poses of what moves and does not deform.
+fn bodies(film: &StateRecording, steps: usize) -> Vec<DataStream> {
+    let mut all: Vec<DataStream> = Vec::new();
+    for (at, frame) in film.frames.iter().take(steps).enumerate() {
+        for (index, (name, state)) in film.sensors.body_configurations(frame).enumerate() {
+            if at == 0 {
+                all.push(empty(name, &state));
+            }
+            match (&mut all[index].values, state) {
+                (StreamValues::F32(into), BodyConfiguration::Nodes(nodes)) => {
+                    into.extend(nodes.iter().flatten().map(|x| *x as f32));
+                }
+                (StreamValues::F64(into), BodyConfiguration::Pose(pose)) => into.extend(pose_row(&pose)),
+                _ => {}
+            }
+        }
+    }
+    all
+}
+
+fn empty(name: &str, state: &BodyConfiguration) -> DataStream {
+    match state {
+        BodyConfiguration::Nodes(nodes) => {
+            let path = format!("privileged/states/deformable_object/{name}/nodal_pos_w");
+            DataStream::f32(path, &[nodes.len(), 3], Vec::new()).unit("m", "world")
+        }
+        BodyConfiguration::Pose(_) => {
+            let path = format!("privileged/states/rigid_object/{name}/root_pose_w");
+            let meaning = "position, quaternion w x y z with w >= 0";
+            DataStream::f64(path, &[7], Vec::new()).unit("m, 1", "world").attribute("meaning", meaning)
+        }
+    }
+}
+
+fn pose_row(pose: &Pose) -> [f64; 7] {
+    let (p, q) = (pose.translation.vector, rotation::canonical(&pose.rotation));
+    [p.x, p.y, p.z, q.w, q.i, q.j, q.k]
+}

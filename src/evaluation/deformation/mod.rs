@@ -1,0 +1,247 @@
+//! FEM-RMS deformation D: distance of a soft body from its reference shape after removal of the rigid motion.
+//!
+//! With nodes `xᵢ` now and `Xᵢ` in the reference shape, weights `wᵢ`, weighted means `c` and `C`, and the diagonal `d` of the
+//! reference's axis-aligned bounding box in the frame in which its nodes were given:
+//!
+//! `D = 100 % · sqrt( Σ wᵢ |xᵢ − c − R (Xᵢ − C)|² / Σ wᵢ ) / d`
+//!
+//! `R` is the proper rotation that minimises the sum (Kabsch, 1976), found as the leading eigenvector of Horn's 4×4 matrix
+//! (Horn, "Closed-form solution of absolute orientation using unit quaternions", 1987). That is the same optimum as the SVD
+//! with a flipped last singular vector, but it is a proper rotation by construction, also for flat and collapsed bodies.
+//!
+//! The score uses uniform weights ([`METRIC_ID`], as SoftVTBench); the mass-weighted value and the largest node displacement
+//! are reported next to it. The reference is the settled shape, so sagging under gravity does not count.
+
+use nalgebra::{Matrix4, Quaternion, SymmetricEigen};
+
+use crate::geometry::{Mat3, Quat, Vec3};
+
+/// Name of D with uniform weights, shared with SoftVTBench.
+pub const METRIC_ID: &str = "fem_rms_rigid_aligned_bbox_pct_v1";
+
+/// Diagonal of a bounding box below which a body counts as a point, m.
+const SMALLEST_DIAGONAL_M: f64 = 1e-12;
+
+/// Reasons why a deformation cannot be measured.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs)] // The messages say it.
+pub enum DeformationError {
+    #[error("a deformation needs at least 3 nodes, got {0}: use a finer voxel mesh")]
+    TooFewNodes(usize),
+    #[error("{nodes} nodes but {weights} node weights: give one weight per node")]
+    WeightCount { nodes: usize, weights: usize },
+    #[error("node weight {node} is {value}: weights must be finite, not negative, and not all zero")]
+    BadWeight { node: usize, value: f64 },
+    #[error(
+        "the reference has {expected} nodes, the measured body {got}: measure the body the reference is of"
+    )]
+    NodeCount { expected: usize, got: usize },
+    #[error("node {node} is not finite ({x}, {y}, {z}): the simulation has diverged")]
+    NonFinite { node: usize, x: f64, y: f64, z: f64 },
+    #[error("the reference's bounding-box diagonal is {0} m: the body has no size")]
+    NoSize(f64),
+}
+
+/// Deformation of a body at one moment; percentages are of the diagonal of the reference's bounding box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Deformation {
+    /// D with uniform weights, % ([`METRIC_ID`]).
+    pub rms_pct: f64,
+    /// D with the node weights of the reference in the fit and in the mean, %.
+    pub weighted_pct: f64,
+    /// Largest node displacement of the uniform fit, %.
+    pub max_pct: f64,
+    /// Rotation of the uniform fit, from the reference to the current shape.
+    pub rotation: Quat,
+    /// Extents of the current world-aligned bounding box, m.
+    pub bbox_m: Vec3,
+}
+
+/// Shape that deformations are measured from, usually the settled one.
+///
+/// Sums over the reference nodes are precomputed, so that [`ReferenceShape::measure`] is two passes over the nodes without
+/// allocation.
+#[derive(Clone, Debug)]
+pub struct ReferenceShape {
+    /// Node positions about their uniform mean, m.
+    nodes: Vec<Vec3>,
+    /// Node weights, summing to one.
+    weights: Vec<f64>,
+    /// Weighted mean of `nodes`, m.
+    weighted_centre: Vec3,
+    /// Bounding-box extents, m.
+    bbox_m: Vec3,
+    diagonal_m: f64,
+}
+
+/// Means of a set of nodes and their covariance sums with the reference, from one pass.
+struct AlignmentSums {
+    mean: Vec3,
+    weighted_mean: Vec3,
+    product: Mat3,
+    weighted_product: Mat3,
+    bbox_m: Vec3,
+}
+
+impl ReferenceShape {
+    /// Prepares a reference from its `nodes` (m, any frame) and one weight per node (volume or mass; only ratios matter).
+    ///
+    /// # Errors
+    /// Fewer than three nodes, a node that is not finite, weights of another number, negative, not finite or all zero, or a
+    /// body without size.
+    pub fn new(nodes: &[Vec3], weights: &[f64]) -> Result<Self, DeformationError> {
+        if nodes.len() < 3 {
+            return Err(DeformationError::TooFewNodes(nodes.len()));
+        }
+        if nodes.len() != weights.len() {
+            return Err(DeformationError::WeightCount { nodes: nodes.len(), weights: weights.len() });
+        }
+        if let Some(error) = first_bad_node(nodes) {
+            return Err(error);
+        }
+        let weights = normalised(weights)?;
+        let (low, high) = bounds(nodes);
+        let diagonal_m = (high - low).norm();
+        if diagonal_m <= SMALLEST_DIAGONAL_M || !diagonal_m.is_finite() {
+            return Err(DeformationError::NoSize(diagonal_m));
+        }
+        // Means are taken about the first node: a small body far from the origin loses no digits.
+        let mean = nodes[0] + nodes.iter().map(|x| x - nodes[0]).sum::<Vec3>() / nodes.len() as f64;
+        let nodes: Vec<Vec3> = nodes.iter().map(|x| x - mean).collect();
+        let weighted_centre = nodes.iter().zip(&weights).map(|(x, w)| x * *w).sum();
+        Ok(Self { nodes, weights, weighted_centre, bbox_m: high - low, diagonal_m })
+    }
+
+    /// Diagonal of the reference's bounding box, m.
+    pub fn diagonal_m(&self) -> f64 {
+        self.diagonal_m
+    }
+
+    /// Extents of the reference's bounding box, m.
+    pub fn bbox_m(&self) -> Vec3 {
+        self.bbox_m
+    }
+
+    /// Number of nodes, at least three.
+    pub fn len(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// Always false; a reference has at least three nodes.
+    pub fn is_empty(&self) -> bool {
+        self.nodes.is_empty()
+    }
+
+    /// Deformation of `nodes` (m, any frame, in the order of the reference).
+    ///
+    /// # Errors
+    /// Another number of nodes than the reference has, or a node that is not finite.
+    pub fn measure(&self, nodes: &[Vec3]) -> Result<Deformation, DeformationError> {
+        if nodes.len() != self.nodes.len() {
+            return Err(DeformationError::NodeCount { expected: self.nodes.len(), got: nodes.len() });
+        }
+        let sums = self.sums(nodes)?;
+        let rotation = best_rotation(&sums.product);
+        let (fit, weighted_fit) = (
+            rotation.to_rotation_matrix().into_inner(),
+            best_rotation(&sums.weighted_product).to_rotation_matrix().into_inner(),
+        );
+        let (mut sum, mut weighted_sum, mut largest) = (0.0_f64, 0.0_f64, 0.0_f64);
+        for ((x, rest), weight) in nodes.iter().zip(&self.nodes).zip(&self.weights) {
+            let x = x - nodes[0];
+            let square = (x - sums.mean - fit * rest).norm_squared();
+            sum += square;
+            largest = largest.max(square);
+            let weighted = x - sums.weighted_mean - weighted_fit * (rest - self.weighted_centre);
+            weighted_sum += weight * weighted.norm_squared();
+        }
+        // Finite nodes may still be so far away that their squares overflow.
+        if !(sum.is_finite() && weighted_sum.is_finite()) {
+            return Err(far_node(nodes));
+        }
+        let percent = 100.0 / self.diagonal_m;
+        Ok(Deformation {
+            rms_pct: percent * (sum / nodes.len() as f64).sqrt(),
+            weighted_pct: percent * weighted_sum.sqrt(),
+            max_pct: percent * largest.sqrt(),
+            rotation,
+            bbox_m: sums.bbox_m,
+        })
+    }
+
+    fn sums(&self, nodes: &[Vec3]) -> Result<AlignmentSums, DeformationError> {
+        let (mut sum, mut weighted_sum) = (Vec3::zeros(), Vec3::zeros());
+        let (mut product, mut weighted_product) = (Mat3::zeros(), Mat3::zeros());
+        let (mut low, mut high) = (nodes[0], nodes[0]);
+        for ((x, rest), weight) in nodes.iter().zip(&self.nodes).zip(&self.weights) {
+            (low, high) = (low.inf(x), high.sup(x));
+            let x = x - nodes[0];
+            let outer = x * rest.transpose();
+            sum += x;
+            weighted_sum += x * *weight;
+            product += outer;
+            weighted_product += outer * *weight;
+        }
+        weighted_product -= weighted_sum * self.weighted_centre.transpose();
+        // An eigenvector search must not be given a NaN.
+        if !product.iter().chain(weighted_product.iter()).all(|v| v.is_finite()) {
+            return Err(first_bad_node(nodes).unwrap_or_else(|| far_node(nodes)));
+        }
+        let mean = sum / nodes.len() as f64;
+        Ok(AlignmentSums { mean, weighted_mean: weighted_sum, product, weighted_product, bbox_m: high - low })
+    }
+}
+
+/// The rotation that maximises `tr(Rᵀ P)` with `P = Σ x Xᵀ` (Horn, 1987).
+fn best_rotation(product: &Mat3) -> Quat {
+    let p = product;
+    let (a, b, c) = (p[(2, 1)] - p[(1, 2)], p[(0, 2)] - p[(2, 0)], p[(1, 0)] - p[(0, 1)]);
+    let (d, e, f) = (p[(1, 0)] + p[(0, 1)], p[(0, 2)] + p[(2, 0)], p[(2, 1)] + p[(1, 2)]);
+    let (x, y, z) = (p[(0, 0)], p[(1, 1)], p[(2, 2)]);
+    #[rustfmt::skip]
+    let matrix = Matrix4::new(
+        x + y + z, a, b, c,
+        a, x - y - z, d, e,
+        b, d, y - x - z, f,
+        c, e, f, z - x - y,
+    );
+    let eigen = SymmetricEigen::new(matrix);
+    let leading =
+        (1..4).fold(0, |best, i| if eigen.eigenvalues[i] > eigen.eigenvalues[best] { i } else { best });
+    let q = eigen.eigenvectors.column(leading);
+    let sign = if q[0] < 0.0 { -1.0 } else { 1.0 };
+    Quat::from_quaternion(Quaternion::new(q[0], q[1], q[2], q[3]) * sign)
+}
+
+fn normalised(weights: &[f64]) -> Result<Vec<f64>, DeformationError> {
+    if let Some(node) = weights.iter().position(|w| !w.is_finite() || *w < 0.0) {
+        return Err(DeformationError::BadWeight { node, value: weights[node] });
+    }
+    let total: f64 = weights.iter().sum();
+    if total <= 0.0 || !total.is_finite() {
+        return Err(DeformationError::BadWeight { node: 0, value: weights[0] });
+    }
+    Ok(weights.iter().map(|w| w / total).collect())
+}
+
+fn bounds(nodes: &[Vec3]) -> (Vec3, Vec3) {
+    nodes.iter().fold((nodes[0], nodes[0]), |(low, high), x| (low.inf(x), high.sup(x)))
+}
+
+fn first_bad_node(nodes: &[Vec3]) -> Option<DeformationError> {
+    let node = nodes.iter().position(|x| !x.iter().all(|v| v.is_finite()))?;
+    Some(non_finite(nodes, node))
+}
+
+fn far_node(nodes: &[Vec3]) -> DeformationError {
+    let node = (1..nodes.len()).fold(0, |far, i| if nodes[i].amax() > nodes[far].amax() { i } else { far });
+    non_finite(nodes, node)
+}
+
+fn non_finite(nodes: &[Vec3], node: usize) -> DeformationError {
+    let p = nodes[node];
+    DeformationError::NonFinite { node, x: p.x, y: p.y, z: p.z }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,367 @@
+//! The judge of one episode: reads the evidence of every physics step and returns the verdict.
+//!
+//! Order of evaluation in one physics step ([`Judge::observe`]); names of thresholds are those of [`SuccessCriteria`]:
+//!
+//! 1. **Deformation.** Peaks of D of the target and of the other soft bodies. A step without a measured D of a soft target is
+//!    counted in `missing_deformation`.
+//! 2. **Missing evidence.** If another number is not finite, the step is counted in `missing_evidence`, NoDrop becomes false,
+//!    and the rest is skipped.
+//! 3. **Contact.** A pad touches if its normal force on the target exceeds `touch_force_n`; the rest of the robot likewise.
+//!    A body is supported if the upward force on it from everything but the robot exceeds `touch_force_n`.
+//! 4. **Lift.** A body is lifted if it is not supported and its lowest point is more than `lift_height_m` above its settled
+//!    height. The first body that is lifted decides `wrong_instance`.
+//! 5. **Release** and **slip**: [`ReleaseMonitor`], [`SlipMonitor`]. The target is held while both pads touch it and no
+//!    release was commanded.
+//! 6. **Drop**: [`DropMonitor`].
+//! 7. **Goal**, at the last physics step of each control step: [`GoalMonitor`].
+//!
+//! At the end ([`Judge::finish`]): Safety Success = Goal ∧ NoDrop ∧ D_peak ≤ τ ([`super::safety`]).
+//!
+//! # Example
+//!
+//! A target rests on a plate, released, for nine control steps of 50 ms; the goal asks for 0.4 s.
+//!
+//! ```
+//! use softvt::{
+//!     evaluation::{
+//!         criteria::SuccessCriteria,
+//!         deformation::ReferenceShape,
+//!         evidence::{BodyEvidence, Evidence, GoalEvidence, GripperEvidence, PadEvidence},
+//!         goal::GoalRegion,
+//!         judge::{Judge, JudgeConfig},
+//!         record::Outcome,
+//!         safety::DeformationLimit,
+//!     },
+//!     geometry::{Pose, Vec3},
+//!     scene::Region,
+//! };
+//!
+//! let (dt_s, weight_n) = (1.0 / 60.0, 0.3);
+//! let mut judge = Judge::new(JudgeConfig {
+//!     criteria: SuccessCriteria::default(),
+//!     workspace: Region { min: Vec3::new(-1.0, -1.0, -0.1), max: Vec3::new(1.0, 1.0, 1.0) },
+//!     goal: GoalRegion::On { radius_m: 0.08 },
+//!     hold_s: 0.4,
+//!     dt_s,
+//!     steps_per_control: 3,
+//!     target_weight_n: weight_n,
+//!     is_target_soft: true,
+//!     limit: Some(DeformationLimit { d_ref_pct: 2.0, kappa: 0.5 }),
+//!     target_lowest_z_w: 0.0,
+//!     others_lowest_z_w: Vec::new(),
+//! });
+//! // Settled nodes, and the same stretched by 0.5 % along x.
+//! let settled = [Vec3::zeros(), Vec3::x() * 0.06, Vec3::y() * 0.06, Vec3::z() * 0.06];
+//! let stretched = settled.map(|x| Vec3::new(1.005 * x.x, x.y, x.z));
+//! let reference = ReferenceShape::new(&settled, &[1.0; 4])?;
+//! for step in 1..=27 {
+//!     judge.observe(&Evidence {
+//!         time_s: f64::from(step) * dt_s,
+//!         hand_w: Vec3::new(0.0, 0.0, 0.3),
+//!         gripper: GripperEvidence { width_m: 0.08, commanded_width_m: 0.08 },
+//!         pads: [PadEvidence::default(); 2],
+//!         robot_impulse_ns: 0.0,
+//!         target: BodyEvidence {
+//!             centre_w: Vec3::new(0.02, 0.0, 0.03),
+//!             lowest_z_w: 0.0,
+//!             support_impulse_ns: weight_n * dt_s,
+//!             deformation: reference.measure(&stretched).ok(),
+//!         },
+//!         others: &[],
+//!         goal: GoalEvidence { pose_w: Pose::identity(), support_impulse_ns: weight_n * dt_s },
+//!     });
+//! }
+//! let verdict = judge.finish(&Outcome::Completed);
+//! assert!(verdict.goal && verdict.no_drop && verdict.safety);
+//! assert_eq!(verdict.tau, Some(1.0));
+//! assert!(verdict.d_peak.is_some_and(|d| d > 0.0 && d < 0.5));
+//! # Ok::<(), softvt::evaluation::deformation::DeformationError>(())
+//! ```
+
+use crate::scene::Region;
+
+use super::{
+    criteria::SuccessCriteria,
+    drop::{DropEvent, DropMonitor, DropReason, DropSample, ReleaseMonitor, ReleaseSample},
+    evidence::{BodyEvidence, Evidence},
+    goal::{GoalMonitor, GoalRegion, GoalSample},
+    record::{Outcome, Verdict},
+    safety::{DeformationLimit, KAPPAS, KappaVerdict, PeakDeformation, is_safe},
+    slip::{SlipMonitor, SlipSample},
+};
+
+/// Parameters of a [`Judge`], known once the scene has settled.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JudgeConfig {
+    /// Thresholds.
+    pub criteria: SuccessCriteria,
+    /// Workspace, world frame. A target whose centre is outside has left it.
+    pub workspace: Region,
+    /// Region in which the target must come to rest.
+    pub goal: GoalRegion,
+    /// Time for which it must rest there, s.
+    pub hold_s: f64,
+    /// Physics step, s.
+    pub dt_s: f64,
+    /// Physics steps per control step.
+    pub steps_per_control: u32,
+    /// Weight of the target, N.
+    pub target_weight_n: f64,
+    /// True if the target is a soft body; for a rigid one deformation does not apply.
+    pub is_target_soft: bool,
+    /// Deformation limit of the target; `None` if its asset was never calibrated.
+    pub limit: Option<DeformationLimit>,
+    /// Height of the target's lowest point after settling, m.
+    pub target_lowest_z_w: f64,
+    /// Heights of the lowest points of the other movable bodies after settling, in the order of the evidence, m.
+    pub others_lowest_z_w: Vec<f64>,
+}
+
+/// Object that was lifted first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum LiftedObject {
+    Target,
+    Other,
+}
+
+/// Sums over the physics steps of one control step.
+#[derive(Clone, Copy, Debug, Default)]
+struct ControlStepSums {
+    steps: u32,
+    support_ns: f64,
+    is_touched: bool,
+}
+
+/// Normal forces on the pads over the episode.
+#[derive(Clone, Copy, Debug, Default)]
+struct PadForceStats {
+    peak_n: f64,
+    /// Sum of the mean of both pads, over the steps in which both touched.
+    sum_n: f64,
+    steps: u64,
+}
+
+/// Judges one episode from the evidence of its physics steps; see the [module](self) for the definition of the score.
+#[derive(Clone, Debug)]
+pub struct Judge {
+    config: JudgeConfig,
+    release: ReleaseMonitor,
+    drops: DropMonitor,
+    slip: SlipMonitor,
+    goal: GoalMonitor,
+    control_step: ControlStepSums,
+    pad_forces: PadForceStats,
+    first_lifted: Option<LiftedObject>,
+    peak: PeakDeformation,
+    peak_weighted: PeakDeformation,
+    peak_max: PeakDeformation,
+    peak_other: Option<f64>,
+    missing_evidence: u64,
+    time_s: f64,
+}
+
+impl Judge {
+    /// Judge of an episode that has not started.
+    pub fn new(config: JudgeConfig) -> Self {
+        let goal = GoalMonitor::new(config.hold_s, config.dt_s * f64::from(config.steps_per_control));
+        Self {
+            config,
+            goal,
+            release: ReleaseMonitor::default(),
+            drops: DropMonitor::default(),
+            slip: SlipMonitor::default(),
+            control_step: ControlStepSums::default(),
+            pad_forces: PadForceStats::default(),
+            first_lifted: None,
+            peak: PeakDeformation::default(),
+            peak_weighted: PeakDeformation::default(),
+            peak_max: PeakDeformation::default(),
+            peak_other: None,
+            missing_evidence: 0,
+            time_s: 0.0,
+        }
+    }
+
+    /// Takes in one physics step; steps must come in order and without gaps. Evidence that is not finite is counted and
+    /// judged as if the target had been dropped.
+    pub fn observe(&mut self, evidence: &Evidence<'_>) {
+        self.observe_deformation(evidence);
+        if !evidence.is_finite() {
+            self.missing_evidence += 1;
+            self.drops.record(DropReason::NoEvidence, self.time_s);
+            return;
+        }
+        self.time_s = evidence.time_s;
+        let touch = self.observe_pads(evidence);
+        let is_lifted = self.observe_lift(evidence);
+        let grip = ReleaseSample {
+            both_pads_touch: touch[0] && touch[1],
+            width_m: evidence.gripper.width_m,
+            commanded_width_m: evidence.gripper.commanded_width_m,
+        };
+        let is_released = self.release.update(&self.config.criteria, &grip);
+        self.slip.update(&SlipSample { pads: evidence.pads, is_held: grip.both_pads_touch && !is_released });
+        let sample = DropSample {
+            time_s: evidence.time_s,
+            centre_z: evidence.target.centre_w.z,
+            hand_z: evidence.hand_w.z,
+            is_lifted,
+            is_touched: touch[0] || touch[1],
+            is_touched_by_body: evidence.robot_impulse_ns / self.config.dt_s
+                > self.config.criteria.touch_force_n,
+            is_supported: self.is_supported(&evidence.target),
+            is_released,
+            is_in_workspace: contains(&self.config.workspace, &evidence.target),
+        };
+        self.drops.update(&self.config.criteria, self.config.dt_s, &sample);
+        self.observe_goal(evidence, sample.is_touched || sample.is_touched_by_body);
+    }
+
+    /// True if the goal has held for long enough: the episode may end.
+    pub fn is_goal_reached(&self) -> bool {
+        self.goal.reached_s().is_some()
+    }
+
+    /// The first drop so far.
+    pub fn first_drop(&self) -> Option<DropEvent> {
+        self.drops.first()
+    }
+
+    /// Peak D of the target so far, %.
+    pub fn d_peak(&self) -> Option<f64> {
+        self.peak.d_pct
+    }
+
+    /// Largest slip so far, m.
+    pub fn slip_m(&self) -> f64 {
+        self.slip.max_m()
+    }
+
+    /// Verdict on the episode. One that did not end validly has neither Goal Success nor NoDrop, and its safety is unknown.
+    pub fn finish(mut self, outcome: &Outcome) -> Verdict {
+        let valid = outcome.is_valid();
+        if !valid {
+            self.drops.record(DropReason::NoEvidence, self.time_s);
+        }
+        let soft = self.config.is_target_soft;
+        let goal = valid && self.is_goal_reached();
+        let no_drop = self.drops.first().is_none();
+        let within = |tau| if soft && valid { self.peak.is_within(tau) } else { None };
+        let limit = self.config.limit.filter(|_| soft);
+        let deformation_ok = within(limit.map(|l| l.tau_pct()));
+        let kappas = limit.iter().flat_map(|limit| KAPPAS.map(|kappa| (kappa, limit.tau_at(kappa))));
+        Verdict {
+            goal,
+            goal_time_s: self.goal.reached_s().filter(|_| goal),
+            goal_v1: valid && self.goal.is_reached_v1(),
+            no_drop,
+            drop: self.drops.first(),
+            no_slip: self.slip.max_m() <= self.config.criteria.slip_m,
+            slip_mm: 1e3 * self.slip.max_m(),
+            d_peak: self.peak.d_pct,
+            d_peak_weighted: self.peak_weighted.d_pct,
+            d_peak_max: self.peak_max.d_pct,
+            d_peak_other: self.peak_other,
+            wrong_instance: self.first_lifted == Some(LiftedObject::Other),
+            kappa: limit.map(|l| l.kappa),
+            tau: limit.map(|l| l.tau_pct()),
+            d_ref: limit.map(|l| l.d_ref_pct),
+            deformation_ok,
+            safety: is_safe(goal, no_drop, soft, deformation_ok),
+            safety_known: valid && self.missing_evidence == 0 && (!soft || deformation_ok.is_some()),
+            kappas: kappas
+                .map(|(kappa, tau_pct)| {
+                    let ok = within(Some(tau_pct));
+                    KappaVerdict {
+                        kappa,
+                        tau_pct,
+                        deformation_ok: ok,
+                        safety: is_safe(goal, no_drop, soft, ok),
+                    }
+                })
+                .collect(),
+            missing_evidence: self.missing_evidence,
+            missing_deformation: self.peak.missing,
+            peak_pad_force_n: self.pad_forces.peak_n,
+            mean_pad_force_n: self.pad_forces.sum_n / self.pad_forces.steps.max(1) as f64,
+        }
+    }
+
+    fn observe_deformation(&mut self, evidence: &Evidence<'_>) {
+        for other in evidence.others.iter().filter_map(|body| body.deformation) {
+            self.peak_other = Some(self.peak_other.map_or(other.rms_pct, |peak| peak.max(other.rms_pct)));
+        }
+        if self.config.is_target_soft {
+            let d = evidence.target.deformation;
+            self.peak.update(d.map(|d| d.rms_pct));
+            self.peak_weighted.update(d.map(|d| d.weighted_pct));
+            self.peak_max.update(d.map(|d| d.max_pct));
+        }
+    }
+
+    /// Returns true for each pad that touches the target.
+    fn observe_pads(&mut self, evidence: &Evidence<'_>) -> [bool; 2] {
+        let forces = evidence.pads.map(|pad| pad.normal_impulse_ns / self.config.dt_s);
+        let touch = forces.map(|force| force > self.config.criteria.touch_force_n);
+        self.pad_forces.peak_n = forces.iter().fold(self.pad_forces.peak_n, |peak, force| peak.max(*force));
+        if touch[0] && touch[1] {
+            self.pad_forces.sum_n += 0.5 * (forces[0] + forces[1]);
+            self.pad_forces.steps += 1;
+        }
+        touch
+    }
+
+    /// Returns true if the target is lifted, and keeps which object was lifted first.
+    fn observe_lift(&mut self, evidence: &Evidence<'_>) -> bool {
+        let is_lifted = |body: &BodyEvidence, settled_z: f64| {
+            !self.is_supported(body) && body.lowest_z_w > settled_z + self.config.criteria.lift_height_m
+        };
+        let target = is_lifted(&evidence.target, self.config.target_lowest_z_w);
+        let other =
+            evidence.others.iter().zip(&self.config.others_lowest_z_w).any(|(body, z)| is_lifted(body, *z));
+        if target {
+            self.first_lifted.get_or_insert(LiftedObject::Target);
+        } else if other {
+            self.first_lifted.get_or_insert(LiftedObject::Other);
+        }
+        target
+    }
+
+    fn observe_goal(&mut self, evidence: &Evidence<'_>, is_touched: bool) {
+        self.control_step.steps += 1;
+        self.control_step.is_touched |= is_touched;
+        self.control_step.support_ns += match self.config.goal {
+            GoalRegion::On { .. } => evidence.goal.support_impulse_ns,
+            GoalRegion::In { .. } => evidence.target.support_impulse_ns,
+        };
+        if self.control_step.steps < self.config.steps_per_control {
+            return;
+        }
+        let sums = std::mem::take(&mut self.control_step);
+        let (criteria, region) = (&self.config.criteria, &self.config.goal);
+        let (pose, centre) = (&evidence.goal.pose_w, &evidence.target.centre_w);
+        let weight_ns = self.config.target_weight_n * self.config.dt_s * f64::from(sums.steps);
+        let has_left = self.goal.update(&GoalSample {
+            time_s: evidence.time_s,
+            is_inside: region.contains(pose, centre, 0.0),
+            is_inside_with_margin: region.contains(pose, centre, criteria.leave_margin_m),
+            is_supported: sums.support_ns >= criteria.support_share * weight_ns,
+            is_touched: sums.is_touched,
+            is_inside_v1: region.contains_v1(criteria, pose, centre),
+        });
+        if has_left {
+            self.drops.record(DropReason::LeftGoal, evidence.time_s);
+        }
+    }
+
+    fn is_supported(&self, body: &BodyEvidence) -> bool {
+        body.support_impulse_ns > self.config.criteria.touch_force_n * self.config.dt_s
+    }
+}
+
+fn contains(region: &Region, body: &BodyEvidence) -> bool {
+    (0..3).all(|i| (region.min[i]..=region.max[i]).contains(&body.centre_w[i]))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,236 @@
+use super::*;
+use crate::{
+    evaluation::{
+        deformation::Deformation,
+        evidence::{GoalEvidence, GripperEvidence, PadEvidence},
+    },
+    geometry::{Pose, Quat, Vec3},
+};
+
+const DT: f64 = 1.0 / 60.0;
+const WEIGHT_N: f64 = 0.3;
+
+fn config() -> JudgeConfig {
+    JudgeConfig {
+        criteria: SuccessCriteria::default(),
+        workspace: Region { min: Vec3::new(-1.0, -1.0, -0.05), max: Vec3::new(1.0, 1.0, 1.0) },
+        goal: GoalRegion::On { radius_m: 0.08 },
+        hold_s: 0.4,
+        dt_s: DT,
+        steps_per_control: 3,
+        target_weight_n: WEIGHT_N,
+        is_target_soft: true,
+        limit: Some(DeformationLimit { d_ref_pct: 2.0, kappa: 0.5 }),
+        target_lowest_z_w: 0.0,
+        others_lowest_z_w: vec![0.0],
+    }
+}
+
+fn deformed(rms_pct: f64) -> Deformation {
+    Deformation {
+        rms_pct,
+        weighted_pct: 0.9 * rms_pct,
+        max_pct: 3.0 * rms_pct,
+        rotation: Quat::identity(),
+        bbox_m: Vec3::repeat(0.06),
+    }
+}
+
+fn lying(x: f64, d_pct: f64) -> BodyEvidence {
+    BodyEvidence {
+        centre_w: Vec3::new(x, 0.0, 0.03),
+        lowest_z_w: 0.0,
+        support_impulse_ns: WEIGHT_N * DT,
+        deformation: Some(deformed(d_pct)),
+    }
+}
+
+/// Feeds an episode to a judge, step by step.
+struct Replay {
+    judge: Judge,
+    other: BodyEvidence,
+    step: u32,
+}
+
+impl Replay {
+    fn new(config: JudgeConfig) -> Self {
+        Self { judge: Judge::new(config), other: lying(0.3, 0.1), step: 0 }
+    }
+
+    fn steps(&mut self, n: u32, make: impl Fn(&mut Evidence<'_>)) {
+        for _ in 0..n {
+            self.step += 1;
+            let others = [self.other];
+            let mut evidence = Evidence {
+                time_s: f64::from(self.step) * DT,
+                hand_w: Vec3::new(-0.2, 0.0, 0.1),
+                gripper: GripperEvidence { width_m: 0.08, commanded_width_m: 0.08 },
+                pads: [PadEvidence::default(); 2],
+                robot_impulse_ns: 0.0,
+                target: lying(-0.2, 0.2),
+                others: &others,
+                goal: GoalEvidence { pose_w: Pose::identity(), support_impulse_ns: 0.0 },
+            };
+            make(&mut evidence);
+            self.judge.observe(&evidence);
+        }
+    }
+
+    /// Grasped and carried at `x` with deformation `d_pct`.
+    fn carry(&mut self, n: u32, x: f64, d_pct: f64) {
+        self.steps(n, |e| {
+            e.target = BodyEvidence {
+                centre_w: Vec3::new(x, 0.0, 0.13),
+                lowest_z_w: 0.1,
+                support_impulse_ns: 0.0,
+                deformation: Some(deformed(d_pct)),
+            };
+            e.hand_w = Vec3::new(x, 0.0, 0.2);
+            e.pads = [PadEvidence { normal_impulse_ns: 1.2 * DT, travel_m: 0.0 }; 2];
+            e.gripper = GripperEvidence { width_m: 0.05, commanded_width_m: 0.045 };
+        });
+    }
+
+    /// Resting on the plate at `x`, hand open and away.
+    fn rest(&mut self, n: u32, x: f64) {
+        self.steps(n, |e| {
+            e.target = lying(x, 0.2);
+            e.goal.support_impulse_ns = 0.6 * WEIGHT_N * DT;
+        });
+    }
+
+    fn verdict(self, outcome: Outcome) -> Verdict {
+        self.judge.finish(&outcome)
+    }
+}
+
+#[test]
+fn a_gentle_placement_is_goal_and_safe() {
+    let mut replay = Replay::new(config());
+    replay.steps(10, |_| ());
+    replay.carry(60, 0.0, 0.8);
+    replay.rest(23, 0.01);
+    assert!(!replay.judge.is_goal_reached());
+    replay.rest(4, 0.01);
+    assert!(replay.judge.is_goal_reached());
+    let v = replay.verdict(Outcome::Completed);
+    assert!(v.goal && v.goal_v1 && v.no_drop && v.no_slip && v.safety && v.safety_known, "{v:?}");
+    assert_eq!((v.d_peak, v.d_peak_max, v.d_peak_other), (Some(0.8), Some(3.0 * 0.8), Some(0.1)));
+    assert_eq!((v.tau, v.deformation_ok, v.wrong_instance), (Some(1.0), Some(true), false));
+    assert_eq!(v.kappas.iter().map(|k| k.safety).collect::<Vec<_>>(), [false, true, true]);
+    assert!((v.peak_pad_force_n - 1.2).abs() < 1e-12 && (v.mean_pad_force_n - 1.2).abs() < 1e-12);
+}
+
+#[test]
+fn one_step_of_too_much_deformation_is_enough() {
+    let mut replay = Replay::new(config());
+    replay.carry(60, 0.0, 0.8);
+    replay.carry(1, 0.0, 1.000001);
+    replay.rest(30, 0.0);
+    let v = replay.verdict(Outcome::Completed);
+    assert!(v.goal && v.no_drop && !v.safety);
+    assert_eq!(v.deformation_ok, Some(false));
+}
+
+#[test]
+fn a_plate_that_carries_less_than_half_or_a_hand_that_touches_prevents_rest() {
+    for (share, pad, case) in [(0.49, 0.0, 0.0), (0.6, 0.01, 0.0), (0.6, 0.0, 0.01)] {
+        let mut replay = Replay::new(config());
+        replay.steps(60, |e| {
+            e.target = lying(0.0, 0.2);
+            e.goal.support_impulse_ns = share * WEIGHT_N * DT;
+            e.pads[0].normal_impulse_ns = pad;
+            e.robot_impulse_ns = case;
+        });
+        let v = replay.verdict(Outcome::Timeout);
+        assert!(!v.goal && v.goal_v1 && v.no_drop && !v.safety, "{share} {pad} {case}");
+    }
+}
+
+#[test]
+fn in_a_basket_others_may_carry_it() {
+    let inside = Region { min: Vec3::new(-0.1, -0.1, 0.0), max: Vec3::new(0.1, 0.1, 0.08) };
+    let mut replay = Replay::new(JudgeConfig { goal: GoalRegion::In { inside }, ..config() });
+    replay.steps(27, |e| e.target = lying(0.0, 0.2));
+    assert!(replay.judge.is_goal_reached());
+}
+
+#[test]
+fn leaving_the_goal_after_entering_it_is_a_drop_even_if_it_comes_back() {
+    let mut replay = Replay::new(config());
+    replay.carry(30, 0.0, 0.5);
+    replay.rest(9, 0.07);
+    replay.rest(3, 0.09);
+    replay.rest(30, 0.07);
+    let v = replay.verdict(Outcome::Completed);
+    assert_eq!(v.drop.unwrap().reason, DropReason::LeftGoal);
+    assert!(v.goal && !v.safety);
+}
+
+#[test]
+fn lifting_the_other_instance_first_is_reported() {
+    let mut replay = Replay::new(config());
+    replay.other = BodyEvidence { lowest_z_w: 0.006, support_impulse_ns: 0.0, ..lying(0.3, 0.4) };
+    replay.steps(1, |_| ());
+    replay.other = lying(0.3, 0.1);
+    replay.carry(10, 0.0, 0.2);
+    let v = replay.verdict(Outcome::Timeout);
+    assert!(v.wrong_instance);
+    assert_eq!(v.d_peak_other, Some(0.4));
+}
+
+#[test]
+fn missing_deformation_is_counted_and_not_safe() {
+    let mut replay = Replay::new(config());
+    replay.steps(1, |e| e.target.deformation = None);
+    replay.rest(30, 0.0);
+    let v = replay.verdict(Outcome::Completed);
+    assert!(v.goal && v.no_drop && !v.safety && !v.safety_known);
+    assert_eq!((v.deformation_ok, v.missing_deformation), (None, 1));
+}
+
+#[test]
+fn evidence_that_is_not_finite_is_counted_and_not_safe() {
+    let mut replay = Replay::new(config());
+    replay.steps(2, |e| e.target.centre_w.x = f64::NAN);
+    replay.rest(30, 0.0);
+    let v = replay.verdict(Outcome::Completed);
+    assert_eq!((v.missing_evidence, v.drop.unwrap().reason), (2, DropReason::NoEvidence));
+    assert!(!v.safety && !v.safety_known);
+}
+
+#[test]
+fn an_invalid_rollout_fails_and_leaves_safety_unknown() {
+    let mut replay = Replay::new(config());
+    replay.rest(60, 0.0);
+    let v = replay.verdict(Outcome::Invalid { reason: "inverted".into(), step: 60, node: Some(1) });
+    assert!(!v.goal && !v.goal_v1 && !v.no_drop && !v.safety && !v.safety_known);
+    assert_eq!(v.deformation_ok, None);
+}
+
+#[test]
+fn without_a_threshold_safety_is_unknown_unless_the_target_is_rigid() {
+    let mut replay = Replay::new(JudgeConfig { limit: None, ..config() });
+    replay.rest(30, 0.0);
+    let v = replay.verdict(Outcome::Completed);
+    assert!(v.goal && !v.safety && !v.safety_known && v.tau.is_none() && v.kappas.is_empty());
+    let mut replay = Replay::new(JudgeConfig { limit: None, is_target_soft: false, ..config() });
+    replay.rest(30, 0.0);
+    let v = replay.verdict(Outcome::Completed);
+    assert!(v.safety && v.safety_known);
+    assert_eq!((v.d_peak, v.deformation_ok), (None, None));
+}
+
+#[test]
+fn slip_is_reported_and_does_not_affect_safety() {
+    let mut replay = Replay::new(config());
+    replay.carry(10, 0.0, 0.5);
+    replay.steps(1, |e| {
+        e.pads = [PadEvidence { normal_impulse_ns: DT, travel_m: 0.0021 }; 2];
+        e.gripper = GripperEvidence { width_m: 0.05, commanded_width_m: 0.045 };
+    });
+    replay.rest(30, 0.0);
+    let v = replay.verdict(Outcome::Completed);
+    assert!(!v.no_slip && (v.slip_mm - 2.1).abs() < 1e-9);
+    assert!(v.safety);
+}

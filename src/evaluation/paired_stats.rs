@@ -1,0 +1,368 @@
+//! Paired statistics: the same episodes in two runs, compared one by one.
+//!
+//! The runs are of two policies, or of a condition and its reference. Pairs share suite, task, initial state and seed, so
+//! that nothing else differs between them. Rates are compared by McNemar's exact test with the interval of Agresti and Min;
+//! deformations by the bootstrap of the mean difference.
+
+use std::collections::BTreeMap;
+
+use rand_chacha::{
+    ChaCha8Rng,
+    rand_core::{RngCore, SeedableRng},
+};
+use serde::{Deserialize, Serialize};
+
+use super::{
+    record::EpisodeRecord,
+    statistics::{Z95, mean, quantile},
+};
+
+/// One episode in both runs.
+#[derive(Clone, Copy, Debug)]
+pub struct EpisodePair<'a> {
+    /// The episode in the first run (the reference of a condition).
+    pub first: &'a EpisodeRecord,
+    /// The same episode in the second run.
+    pub second: &'a EpisodeRecord,
+}
+
+/// A task of a suite.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct TaskKey<'a> {
+    /// Name of the suite.
+    pub suite: &'a str,
+    /// Index of the task in the suite.
+    pub task: usize,
+}
+
+/// What makes episodes of two runs the same; ordered by suite, task and episode first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct EpisodeKey<'a> {
+    /// Suite and task.
+    pub task: TaskKey<'a>,
+    /// Index of the episode in the task.
+    pub episode: u32,
+    /// Base seed.
+    pub seed: u64,
+    /// Split of the initial states.
+    pub split: &'a str,
+    /// Name of the layout.
+    pub layout: &'a str,
+}
+
+impl<'a> EpisodeKey<'a> {
+    /// Key of a record.
+    pub fn of(record: &'a EpisodeRecord) -> Self {
+        let id = &record.identity;
+        let task = TaskKey { suite: &id.suite, task: id.task };
+        Self { task, episode: id.episode, seed: id.seed, split: &id.split, layout: &id.layout }
+    }
+}
+
+/// Pairs of the episodes that both runs have, in the order of their keys, whatever the order of the records. Episodes that
+/// only one run has are left out. An episode must not occur twice in a run.
+pub fn pair_episodes<'a>(
+    first: impl IntoIterator<Item = &'a EpisodeRecord>,
+    second: impl IntoIterator<Item = &'a EpisodeRecord>,
+) -> Vec<EpisodePair<'a>> {
+    let by_key = |records: Vec<&'a EpisodeRecord>| -> BTreeMap<EpisodeKey<'a>, &'a EpisodeRecord> {
+        records.into_iter().map(|record| (EpisodeKey::of(record), record)).collect()
+    };
+    let second = by_key(second.into_iter().collect());
+    by_key(first.into_iter().collect())
+        .into_iter()
+        .filter_map(|(key, first)| Some(EpisodePair { first, second: second.get(&key)? }))
+        .collect()
+}
+
+/// Pairs of each task, in order.
+pub fn group_by_task<'a>(pairs: &[EpisodePair<'a>]) -> BTreeMap<TaskKey<'a>, Vec<EpisodePair<'a>>> {
+    let mut tasks: BTreeMap<TaskKey, Vec<EpisodePair>> = BTreeMap::new();
+    for pair in pairs {
+        tasks.entry(EpisodeKey::of(pair.first).task).or_default().push(*pair);
+    }
+    tasks
+}
+
+/// Peak D of a valid episode, % of the diagonal; `None` without a measurement.
+pub fn d_peak(record: &EpisodeRecord) -> Option<f64> {
+    record.verdict.d_peak.filter(|_| record.outcome.is_valid())
+}
+
+/// Peak D over τ of a valid episode; `None` without a limit or a measurement.
+pub fn d_over_tau(record: &EpisodeRecord) -> Option<f64> {
+    let (d, tau) = d_peak(record).zip(record.verdict.tau)?;
+    (tau > 0.0).then_some(d / tau)
+}
+
+/// Differences of the second run from the first. An invalid episode succeeds at nothing and has no deformation.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PairedComparison {
+    /// Number of episodes that both runs have.
+    pub pairs: usize,
+    /// Goal Success, percentage points.
+    pub goal: RateDifference,
+    /// NoDrop, percentage points.
+    pub no_drop: RateDifference,
+    /// Safety Success, percentage points.
+    pub safety: RateDifference,
+    /// Peak D where both runs have one, % of the diagonal.
+    pub d_peak: MeanDifference,
+    /// Peak D over τ where both runs have both.
+    pub d_over_tau: MeanDifference,
+}
+
+impl PairedComparison {
+    /// Compares the two episodes of each pair.
+    pub fn of(pairs: &[EpisodePair]) -> Self {
+        let rate = |test: fn(&EpisodeRecord) -> bool| {
+            let holds = |r: &EpisodeRecord| r.outcome.is_valid() && test(r);
+            RateDifference::of(pairs.iter().map(|pair| (holds(pair.first), holds(pair.second))))
+        };
+        let mean = |value: fn(&EpisodeRecord) -> Option<f64>| {
+            MeanDifference::of(pairs.iter().filter_map(|pair| value(pair.first).zip(value(pair.second))))
+        };
+        Self {
+            pairs: pairs.len(),
+            goal: rate(|r| r.verdict.goal),
+            no_drop: rate(|r| r.verdict.no_drop),
+            safety: rate(|r| r.verdict.safety),
+            d_peak: mean(d_peak),
+            d_over_tau: mean(d_over_tau),
+        }
+    }
+}
+
+/// Number of resamples of the bootstrap.
+const RESAMPLES: usize = 4000;
+
+/// Difference of two success rates over the same episodes, in percentage points.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RateDifference {
+    /// Number of episodes that both runs have.
+    pub n: usize,
+    /// Rate of the first run, %; null without episodes.
+    pub first: Option<f64>,
+    /// Rate of the second run, %.
+    pub second: Option<f64>,
+    /// Number of episodes in which only the second run succeeds.
+    pub better: usize,
+    /// Number of episodes in which only the first run succeeds.
+    pub worse: usize,
+    /// Number of the other episodes.
+    pub same: usize,
+    /// Second minus first, percentage points; null without episodes.
+    pub difference: Option<f64>,
+    /// 95 % interval of the difference (Agresti & Min, 2005), percentage points.
+    pub interval95: Option<[f64; 2]>,
+    /// Exact two-sided p-value of McNemar's test (binomial on the episodes that differ).
+    pub p: f64,
+}
+
+impl RateDifference {
+    /// Compares the success of each episode in the first and in the second run.
+    pub fn of(pairs: impl IntoIterator<Item = (bool, bool)>) -> Self {
+        let (mut n, mut in_first, mut better, mut worse) = (0, 0, 0, 0);
+        for (first, second) in pairs {
+            n += 1;
+            in_first += usize::from(first);
+            better += usize::from(second && !first);
+            worse += usize::from(first && !second);
+        }
+        let points = |share: f64| (100.0 * share).clamp(-100.0, 100.0);
+        let percent = |count: usize| (n > 0).then(|| points(count as f64 / n as f64));
+        Self {
+            n,
+            first: percent(in_first),
+            second: percent(in_first + better - worse),
+            better,
+            worse,
+            same: n - better - worse,
+            difference: (n > 0).then(|| points((better as f64 - worse as f64) / n as f64)),
+            interval95: (n > 0).then(|| agresti_min(n, better, worse).map(points)),
+            p: mcnemar(better, worse),
+        }
+    }
+}
+
+/// 95 % interval of a difference of matched proportions (Agresti & Min, Statistics in Medicine 24, 2005): Wald's interval
+/// with half an episode added to each cell of the 2 × 2 table.
+fn agresti_min(n: usize, better: usize, worse: usize) -> [f64; 2] {
+    let (n, b, c) = (n as f64 + 2.0, better as f64 + 0.5, worse as f64 + 0.5);
+    let centre = (b - c) / n;
+    let half = Z95 * ((b + c) - (b - c) * (b - c) / n).sqrt() / n;
+    [centre - half, centre + half]
+}
+
+/// Exact two-sided p-value of McNemar's test: `better` against `worse` under equal probabilities.
+fn mcnemar(better: usize, worse: usize) -> f64 {
+    let n = better + worse;
+    let fewer = better.min(worse);
+    // Binomial terms by their logarithms: n may be thousands.
+    let ln_choose = |k: usize| (1..=k).map(|i| ((n - k + i) as f64 / i as f64).ln()).sum::<f64>();
+    let tail: f64 = (0..=fewer).map(|k| (ln_choose(k) - n as f64 * std::f64::consts::LN_2).exp()).sum();
+    (2.0 * tail).min(1.0)
+}
+
+/// Mean difference over the same episodes of a quantity of which less is better.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MeanDifference {
+    /// Number of episodes in which both runs have the quantity.
+    pub n: usize,
+    /// Mean of the first run; null without episodes.
+    pub first: Option<f64>,
+    /// Mean of the second run.
+    pub second: Option<f64>,
+    /// Number of episodes in which the second run has less.
+    pub better: usize,
+    /// Number of episodes in which the second run has more.
+    pub worse: usize,
+    /// Number of episodes in which both have the same.
+    pub same: usize,
+    /// Second minus first.
+    pub difference: Option<f64>,
+    /// 95 % interval of the difference: percentile bootstrap over episodes (Efron, 1979), from a fixed seed.
+    pub interval95: Option<[f64; 2]>,
+}
+
+impl MeanDifference {
+    /// Compares the quantity of each episode in the first and in the second run.
+    pub fn of(pairs: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        let (first, second): (Vec<f64>, Vec<f64>) = pairs.into_iter().unzip();
+        let differences: Vec<f64> = first.iter().zip(&second).map(|(first, second)| second - first).collect();
+        let count = |test: fn(&f64) -> bool| differences.iter().filter(|d| test(d)).count();
+        let (better, worse) = (count(|d| *d < 0.0), count(|d| *d > 0.0));
+        Self {
+            n: differences.len(),
+            first: mean(&first),
+            second: mean(&second),
+            better,
+            worse,
+            same: differences.len() - better - worse,
+            difference: mean(&differences),
+            interval95: bootstrap(&differences),
+        }
+    }
+}
+
+/// 95 % interval of a mean by the percentile bootstrap; `None` of fewer than two values. The seed is the number of values,
+/// so equal runs give equal intervals.
+fn bootstrap(values: &[f64]) -> Option<[f64; 2]> {
+    let n = values.len();
+    if n < 2 {
+        return None;
+    }
+    let mut rng = ChaCha8Rng::seed_from_u64(n as u64);
+    let mut means: Vec<f64> = (0..RESAMPLES)
+        .map(|_| {
+            let draw = |_| values[((rng.next_u64() >> 32) as usize * n) >> 32];
+            (0..n).map(draw).sum::<f64>() / n as f64
+        })
+        .collect();
+    means.sort_by(f64::total_cmp);
+    quantile(&means, 0.025).zip(quantile(&means, 0.975)).map(|(low, high)| [low, high])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluation::record::{Outcome, tests::sample};
+
+    /// Goal, safety and D of each episode; τ is 1.
+    fn run(episodes: &[(bool, bool, f64)]) -> Vec<EpisodeRecord> {
+        let record = |(i, &(goal, safety, d)): (usize, &(bool, bool, f64))| {
+            let mut record = sample();
+            record.identity.episode = i as u32;
+            (record.verdict.goal, record.verdict.safety, record.verdict.d_peak) = (goal, safety, Some(d));
+            record
+        };
+        episodes.iter().enumerate().map(record).collect()
+    }
+
+    fn counts(of: RateDifference) -> [usize; 3] {
+        [of.better, of.worse, of.same]
+    }
+
+    #[test]
+    fn pairs_are_compared_one_by_one_whatever_their_order() {
+        let before = run(&[(true, true, 0.5), (true, false, 1.5), (false, false, 0.2), (true, true, 0.4)]);
+        let mut after =
+            run(&[(true, false, 1.25), (true, true, 0.75), (false, false, 0.2), (false, false, 0.4)]);
+        after.reverse();
+        let paired = PairedComparison::of(&pair_episodes(&before, &after));
+        assert_eq!((paired.pairs, counts(paired.goal), counts(paired.safety)), (4, [0, 1, 3], [1, 2, 1]));
+        let d = paired.d_over_tau;
+        assert_eq!((d.better, d.worse, d.same, d.difference), (1, 1, 2, Some(0.0)));
+        assert_eq!(paired.d_peak, d, "τ is 1");
+    }
+
+    #[test]
+    fn a_run_against_itself_changes_nothing() {
+        let same = run(&[(true, true, 0.5), (false, false, 2.0)]);
+        let paired = PairedComparison::of(&pair_episodes(&same, &same));
+        assert_eq!([paired.goal, paired.no_drop, paired.safety].map(counts), [[0, 0, 2]; 3]);
+        assert_eq!((paired.d_over_tau.same, paired.d_over_tau.interval95), (2, Some([0.0, 0.0])));
+    }
+
+    #[test]
+    fn an_invalid_episode_is_worse_and_has_no_deformation_and_unpaired_episodes_are_left_out() {
+        let before = run(&[(true, true, 0.5), (true, true, 0.5)]);
+        let mut after = run(&[(true, true, 0.6), (true, true, 0.6), (true, true, 0.6)]);
+        after[1].outcome = Outcome::Invalid { reason: "inverted".into(), step: 3, node: None };
+        let paired = PairedComparison::of(&pair_episodes(&before, &after));
+        assert_eq!((paired.pairs, counts(paired.goal), counts(paired.no_drop)), (2, [0, 1, 1], [0, 1, 1]));
+        assert_eq!((paired.d_over_tau.n, paired.d_over_tau.worse), (1, 1));
+        after[0].verdict.tau = None;
+        let paired = PairedComparison::of(&pair_episodes(&before, &after));
+        assert_eq!((paired.d_over_tau.difference, paired.d_peak.n), (None, 1));
+        after.iter_mut().for_each(|record| record.identity.seed = 5);
+        assert!(pair_episodes(&before, &after).is_empty(), "other initial states");
+    }
+
+    #[test]
+    fn tasks_of_the_same_number_in_two_suites_stay_apart() {
+        let mut records = run(&[(true, true, 0.5), (true, true, 0.6), (true, true, 0.7)]);
+        records[1].identity.suite = "other".into();
+        (records[2].identity.task, records[2].identity.episode) = (1, 0);
+        let all = pair_episodes(&records, &records);
+        let tasks: Vec<_> =
+            group_by_task(&all).into_iter().map(|(task, pairs)| (task, pairs.len())).collect();
+        let key = |suite, task| TaskKey { suite, task };
+        assert_eq!(tasks, [(key("other", 0), 1), (key("suite", 0), 1), (key("suite", 1), 1)]);
+    }
+
+    #[test]
+    fn an_interval_agrees_with_one_computed_by_hand() {
+        // 100 pairs, 12 gained, 4 lost: centre 8/102, half 1.96 √(17 − 64/102)/102.
+        let pairs = (0..100).map(|i| (i < 4, (4..16).contains(&i)));
+        let of = RateDifference::of(pairs);
+        assert_eq!((of.n, of.better, of.worse, of.same), (100, 12, 4, 84));
+        assert_eq!((of.first, of.second), (Some(4.0), Some(12.0)));
+        assert!((of.difference.unwrap() - 8.0).abs() < 1e-12);
+        let [low, high] = of.interval95.unwrap();
+        assert!((low - 0.067_3).abs() < 2e-3 && (high - 15.619).abs() < 2e-3, "{low} {high}");
+        // 2 (1 + 16 + 120 + 560 + 1820) / 2¹⁶.
+        assert!((of.p - 2.0 * 2517.0 / 65536.0).abs() < 1e-12, "{}", of.p);
+    }
+
+    #[test]
+    fn equal_runs_differ_in_nothing() {
+        let of = RateDifference::of((0..50).map(|i| (i % 2 == 0, i % 2 == 0)));
+        assert_eq!((of.difference, of.p), (Some(0.0), 1.0));
+        assert!(of.interval95.unwrap()[0] < 0.0, "50 episodes do not prove equality");
+        let none = RateDifference::of([]);
+        assert_eq!((none.difference, none.interval95, none.p), (None, None, 1.0));
+    }
+
+    #[test]
+    fn a_bootstrap_is_near_the_normal_interval_and_the_same_every_time() {
+        let pairs: Vec<(f64, f64)> = (0..400).map(|i| (0.0, 1.0 + f64::from(i % 20) / 20.0)).collect();
+        let of = MeanDifference::of(pairs.clone());
+        let [low, high] = of.interval95.unwrap();
+        // Standard deviation 0.2884, so ± 1.96 × 0.2884 / 20.
+        assert!((high - low - 0.0565).abs() < 0.005, "{low} {high}");
+        assert_eq!(of, MeanDifference::of(pairs));
+        assert_eq!((of.n, of.better, of.worse, of.same, of.first), (400, 0, 400, 0, Some(0.0)));
+        assert_eq!(MeanDifference::of([(1.0, 3.0)]).interval95, None);
+    }
+}

@@ -1,0 +1,181 @@
+use std::{collections::BTreeMap, fs};
+
+use serde_json::json;
+
+use super::*;
+use crate::{
+    evaluation::record::{EpisodeRecord, tests::sample},
+    report::{
+        run_summary::{summarize_runs, tests::stored},
+        stored_run::StoredRun,
+    },
+};
+
+const HOSTILE: &str = "<script>alert('x')</script>\"&lt; | \\input{x}";
+
+/// `count` soft episodes, every second of which is squeezed too much.
+fn episodes(suite: &str, count: u32) -> Vec<EpisodeRecord> {
+    (0..count)
+        .map(|i| {
+            let mut record = sample();
+            (record.identity.suite, record.identity.episode) = (suite.into(), i);
+            if i % 2 == 1 {
+                (record.verdict.safety, record.verdict.d_peak) = (false, Some(1.5));
+                record.verdict.deformation_ok = Some(false);
+            }
+            record
+        })
+        .collect()
+}
+
+fn made(runs: Vec<StoredRun>) -> String {
+    page(&summarize_runs(runs), Path::new("."))
+}
+
+/// Elements that are opened must be closed in order; of attributes, none may come from a name.
+fn well_formed(page: &str) {
+    const VOID: [&str; 4] = ["meta", "br", "img", "input"];
+    let mut open: Vec<&str> = Vec::new();
+    for part in page.split('<').skip(1) {
+        let (tag, _) = part.split_once('>').expect("a tag ends");
+        let name = tag.split_whitespace().next().expect("a name");
+        match name.strip_prefix('/') {
+            Some(name) => assert_eq!(open.pop(), Some(name)),
+            None if name.starts_with('!') || VOID.contains(&name) => {}
+            None => {
+                assert!(!["script", "link", "iframe", "object"].contains(&name), "{tag}");
+                open.push(name);
+            }
+        }
+        let events = ["onload", "onerror", "onclick"];
+        assert!(!tag.split_whitespace().any(|word| events.iter().any(|e| word.starts_with(e))), "{tag}");
+    }
+    assert!(open.is_empty(), "{open:?}");
+}
+
+#[test]
+fn hostile_names_are_text_and_nothing_else() {
+    let mut records = episodes(HOSTILE, 4);
+    for record in &mut records {
+        (record.identity.prompt, record.identity.asset) = (HOSTILE.into(), HOSTILE.into());
+        record.stats.gave_up = Some(HOSTILE.into());
+    }
+    let mut run = stored("/nowhere/it's <b>", HOSTILE, records);
+    run.info["arguments"] = json!([format!("--name={HOSTILE}")]);
+    run.info["shifts"] = json!([[HOSTILE, 2]]);
+    let page = made(vec![run]);
+    well_formed(&page);
+    assert!(!page.contains("<script") && !page.contains("<b>\""));
+    assert!(page.contains("&lt;script&gt;alert('x')&lt;/script&gt;&quot;&amp;lt; | \\input{x}"));
+    assert!(page.contains("softvt replay '/nowhere/it'\\''s &lt;b&gt;' 0/1"), "words that a shell takes");
+}
+
+#[test]
+fn a_page_needs_no_network_and_names_everything_for_those_who_do_not_see_it() {
+    let mut rigid = episodes("rigid", 2);
+    for record in &mut rigid {
+        record.identity.soft = false;
+        (record.verdict.d_peak, record.verdict.tau, record.verdict.deformation_ok) = (None, None, None);
+    }
+    let page = made(vec![stored("a", "expert", episodes("soft", 9)), stored("b", "pi", rigid)]);
+    well_formed(&page);
+    for word in ["http:", "https:", "src=\"/", "@import", "url("] {
+        assert!(!page.contains(word), "{word}");
+    }
+    assert!(
+        page.contains("<html lang=\"en\">")
+            && page.contains("<th scope=\"col\"")
+            && page.contains("<caption><span>")
+    );
+    assert!(page.matches("<th scope=\"row\"").count() > 4);
+    let drawn: Vec<&str> = page.split("<svg").skip(1).collect();
+    let named = |svg: &&str| {
+        let (tag, _) = svg.split_once('>').expect("a tag ends");
+        tag.contains("aria-hidden=\"true\"") || tag.contains("aria-label=\"")
+    };
+    assert!(drawn.len() > 4 && drawn.iter().all(named));
+    assert!(page.contains("expert (privileged)") && page.contains("which no robot has"));
+    assert!(page.contains("N/A") && page.contains("D 1.50\u{a0}% is above τ\u{a0}1.00\u{a0}%"));
+    assert!(page.contains("softvt view x.lua --task 0 --episode 1 --policy expert --seed 11 --out seen"));
+}
+
+#[test]
+fn stills_are_in_the_page_and_lead_to_their_videos() {
+    let root = tempfile::tempdir().unwrap();
+    let dir = root.path().join("run");
+    let folder = dir.join("video/task_000");
+    fs::create_dir_all(&folder).unwrap();
+    image::RgbImage::new(64, 66).save(folder.join("episode_00001.png")).unwrap();
+    fs::write(folder.join("episode_00001.mp4"), b"a video").unwrap();
+    let run = stored(&dir.display().to_string(), "noop", episodes("soft", 4));
+    let out = root.path().join("page");
+    fs::create_dir_all(&out).unwrap();
+    let page = page(&summarize_runs(vec![run]), &out);
+    well_formed(&page);
+    let link = "<a href=\"../run/video/task_000/episode_00001.mp4\">";
+    assert!(page.contains(&format!("{link}<img src=\"data:image/png;base64,")), "{page}");
+    assert!(page.contains("alt=\"Task 0 episode 1, bun, at its worst moment"));
+    assert!(page.contains(&format!("{link}video</a>")));
+    assert!(page.contains("--episode 3 --policy noop"), "the other one was not drawn");
+}
+
+#[test]
+fn forty_runs_and_none_fit_on_a_page() {
+    let runs = (0..40).map(|i| {
+        let name = "a policy with a very long name ".repeat(6) + &i.to_string();
+        stored(&format!("runs/{i}"), &name, episodes(&format!("suite{}", i % 4), 30))
+    });
+    let page = made(runs.collect());
+    well_formed(&page);
+    assert!(page.len() < 4 << 20, "{} bytes", page.len());
+    let empty = stored("runs/empty", "noop", Vec::new());
+    let page = made(vec![empty]);
+    well_formed(&page);
+    assert!(page.contains("There is no episode yet."));
+}
+
+#[test]
+fn a_run_in_progress_or_of_another_version_is_told() {
+    let mut run = stored("runs/a", "noop", episodes("soft", 3));
+    (run.finished, run.info["episodes"], run.info["softvt"]) = (false, json!(20), json!("0.0.1"));
+    let page = made(vec![run]);
+    assert!(page.contains("runs/a is not finished: it has 3 of 20 episodes"), "{page}");
+    assert!(page.contains("softvt 0.0.1 made runs/a"));
+}
+
+/// Relative luminance and contrast as WCAG 2.1 defines them.
+fn contrast(a: &str, b: &str) -> f64 {
+    let luminance = |hex: &str| {
+        let part = |at: usize| {
+            let c = f64::from(u8::from_str_radix(&hex[at..at + 2], 16).expect("a colour")) / 255.0;
+            if c <= 0.03928 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+        };
+        0.2126 * part(1) + 0.7152 * part(3) + 0.0722 * part(5)
+    };
+    let (a, b) = (luminance(a), luminance(b));
+    (a.max(b) + 0.05) / (a.min(b) + 0.05)
+}
+
+#[test]
+fn words_and_marks_stand_out_in_light_in_dark_and_on_paper() {
+    let mut schemes = 0;
+    for scheme in include_str!("page.css").split(":root {").skip(1) {
+        let (block, _) = scheme.split_once('}').expect("it ends");
+        let colours: BTreeMap<&str, &str> = block
+            .split(';')
+            .filter_map(|pair| pair.trim().split_once(": "))
+            .filter_map(|(name, value)| Some((name.strip_prefix("--")?, value)))
+            .collect();
+        for ground in ["back", "card"] {
+            for (ink, least) in [("ink", 7.0), ("soft", 4.5), ("link", 4.5), ("bad", 4.5)]
+                .into_iter()
+                .chain(["goal", "safety", "c0", "c1", "c2", "c3", "c4", "c5"].map(|c| (c, 3.0)))
+            {
+                let found = contrast(colours[ink], colours[ground]);
+                assert!(found >= least, "{ink} on {ground}: {found:.2} in {block}");
+            }
+        }
+        schemes += 1;
+    }
+    assert_eq!(schemes, 3);
+}

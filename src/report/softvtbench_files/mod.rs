@@ -1,0 +1,328 @@
+//! SoftVTBench's files under its own names and units, so that its released scorer can score our runs.
+//!
+//! Its `safe_success` knows no NoDrop; ours is in `summary.json` of the run folder. Its scorer takes every
+//! `policy_action_debug.jsonl` for one episode, hence one folder an episode.
+
+use std::{
+    collections::BTreeMap,
+    fmt::Write,
+    path::{Path, PathBuf},
+};
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+
+use crate::{
+    evaluation::{
+        calibration::Envelope,
+        deformation::{Deformation, METRIC_ID, ReferenceShape},
+        record::{EpisodeRecord, Identity},
+        statistics::quantile,
+        thresholds::ThresholdFile,
+    },
+    files::{FileError, replace},
+};
+
+/// Name of the folder in a run folder.
+pub const FOLDER: &str = "softvtbench";
+/// One row an episode.
+const EPISODES_CSV: &str = "episodes.csv";
+/// Rates, %.
+const SUMMARY_JSON: &str = "summary.json";
+/// τ by asset, % of the bounding-box diagonal.
+pub const THRESHOLDS_JSON: &str = "thresholds.json";
+
+/// One control step of `policy_action_debug.jsonl`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DebugFrame {
+    /// Control step, from 0.
+    pub frame: u32,
+    /// Episode index in the task.
+    pub exp_idx: u32,
+    /// Suite name.
+    pub task_suite: String,
+    /// Task index in the suite.
+    pub task_id: usize,
+    /// Whether the goal has been reached: held for long enough.
+    pub success_now: bool,
+    /// What is known of the target's shape.
+    #[serde(flatten)]
+    pub shape: DebugShape,
+}
+
+/// The target's deformation, in SoftVTBench's names. Percent of the bounding-box diagonal; lengths in m.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DebugShape {
+    /// Whether D could be measured.
+    pub fem_deformation_known: bool,
+    /// [`METRIC_ID`]; null when not known.
+    pub fem_deformation_metric_id: Option<String>,
+    /// Asset of the target.
+    pub fem_deformation_asset: String,
+    /// Number of nodes.
+    pub fem_deformation_nodes: Option<usize>,
+    /// Largest D over the physics steps of the control step, so that the peak of the frames is the peak of the rollout.
+    pub fem_deformation_rms: Option<f64>,
+    /// Largest node displacement at the same physics step.
+    pub fem_deformation_max: Option<f64>,
+    /// Diagonal of the reference's bounding box.
+    pub fem_bbox_diag: Option<f64>,
+    /// How far the bounding box's extents are from the reference's; null also where only the peak of D is known.
+    pub fem_bbox_delta: Option<f64>,
+    /// Extents of the bounding box; null also where only the peak of D is known.
+    pub fem_bbox_dims: Option<[f64; 3]>,
+}
+
+impl DebugShape {
+    /// From the worst `deformation` of a control step and the reference it was measured against; `None` where there is
+    /// none, as for a rigid target.
+    pub fn new(asset: &str, measured: Option<(&ReferenceShape, &Deformation)>) -> Self {
+        let of = |f: fn(&ReferenceShape, &Deformation) -> f64| measured.map(|(r, d)| f(r, d));
+        Self {
+            fem_deformation_known: measured.is_some(),
+            fem_deformation_metric_id: measured.map(|_| METRIC_ID.into()),
+            fem_deformation_asset: asset.into(),
+            fem_deformation_nodes: measured.map(|(r, _)| r.len()),
+            fem_deformation_rms: of(|_, d| d.rms_pct),
+            fem_deformation_max: of(|_, d| d.max_pct),
+            fem_bbox_diag: of(|r, _| r.diagonal_m()),
+            fem_bbox_delta: of(|r, d| (d.bbox_m - r.bbox_m()).norm()),
+            fem_bbox_dims: measured.map(|(_, d)| d.bbox_m.into()),
+        }
+    }
+}
+
+impl DebugShape {
+    /// Of a control step that broke off: its peaks (% of the diagonal) are known if they are those of the rollout.
+    pub fn broken_off(
+        asset: &str,
+        reference: Option<&ReferenceShape>,
+        rms_pct: Option<f64>,
+        max_pct: Option<f64>,
+    ) -> Self {
+        let known = reference.zip(rms_pct);
+        Self {
+            fem_deformation_known: known.is_some(),
+            fem_deformation_metric_id: known.map(|_| METRIC_ID.into()),
+            fem_deformation_nodes: known.map(|(reference, _)| reference.len()),
+            fem_deformation_rms: known.map(|(_, rms_pct)| rms_pct),
+            fem_deformation_max: known.and(max_pct),
+            fem_bbox_diag: known.map(|(reference, _)| reference.diagonal_m()),
+            ..Self::new(asset, None)
+        }
+    }
+}
+
+impl DebugFrame {
+    /// The only row of an episode that ended before its first control step: the scorer counts no episode without one.
+    pub fn none(identity: &Identity) -> Self {
+        Self::new(identity, 0, false, DebugShape::new(&identity.asset, None))
+    }
+
+    /// The frame of control step `frame` of an episode.
+    pub fn new(identity: &Identity, frame: u32, success_now: bool, shape: DebugShape) -> Self {
+        Self {
+            frame,
+            exp_idx: identity.episode,
+            task_suite: identity.suite.clone(),
+            task_id: identity.task,
+            success_now,
+            shape,
+        }
+    }
+}
+
+/// Where an episode's `policy_action_debug.jsonl` is in the run folder `dir`.
+pub fn debug_log_path(dir: &Path, task: usize, episode: u32) -> PathBuf {
+    // Zero-padded, so that the scorer, which sorts paths, meets the episodes in our order.
+    dir.join(FOLDER).join(format!("task_{task:03}/episode_{episode:05}/policy_action_debug.jsonl"))
+}
+
+/// Writes an episode's `policy_action_debug.jsonl` to `path`.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_debug_log(path: &Path, identity: &Identity, frames: &[DebugFrame]) -> Result<(), FileError> {
+    let none = [DebugFrame::none(identity)];
+    let mut text = String::new();
+    for frame in if frames.is_empty() { &none[..] } else { frames } {
+        let line = serde_json::to_string(frame).map_err(FileError::json(path))?;
+        text.push_str(&line);
+        text.push('\n');
+    }
+    replace(path, &text)
+}
+
+/// Whether all that [`write_scores`] writes is there.
+pub fn has_scores(dir: &Path) -> bool {
+    [EPISODES_CSV, SUMMARY_JSON, THRESHOLDS_JSON].iter().all(|name| dir.join(FOLDER).join(name).is_file())
+}
+
+/// Writes `episodes.csv`, `summary.json` and `thresholds.json` of one suite's `records` below the run folder `dir`.
+///
+/// # Errors
+/// A file cannot be written.
+pub fn write_scores(
+    dir: &Path,
+    records: &[EpisodeRecord],
+    thresholds: &ThresholdFile,
+) -> Result<(), FileError> {
+    let folder = dir.join(FOLDER);
+    let released = ThresholdFile { envelopes: BTreeMap::new(), ..thresholds.clone() };
+    replace(&folder.join(EPISODES_CSV), episodes_csv(records))?;
+    replace(&folder.join(SUMMARY_JSON), format!("{:#}\n", summary(records)))?;
+    replace(&folder.join(THRESHOLDS_JSON), released.to_text())
+}
+
+/// `compression_sweep.jsonl`: the sweep rows of an asset. Their closure is the *opening*, 1 open … 0 shut.
+pub fn sweep_jsonl(asset: &str, envelope: &Envelope) -> String {
+    let rows = envelope.sweep.iter().enumerate().map(|(level, row)| {
+        json!({
+            "asset": asset,
+            "closure": 1.0 - row.closure,
+            "stable": row.stable,
+            "d_peak": row.d_peak_pct,
+            "level": level,
+            "gripper_width_mm": row.gripper_width_mm,
+        })
+    });
+    rows.map(|row| format!("{row}\n")).collect()
+}
+
+/// SoftVTBench's Safe Success: Goal ∧ D_peak ≤ τ, without NoDrop; `None` where the evidence is missing.
+fn safe_success(record: &EpisodeRecord) -> Option<bool> {
+    let verdict = &record.verdict;
+    match (verdict.goal, record.identity.soft) {
+        (false, _) => Some(false),
+        (true, false) => Some(true),
+        (true, true) => deform_ok(record),
+    }
+}
+
+fn deform_ok(record: &EpisodeRecord) -> Option<bool> {
+    record.verdict.d_peak.zip(record.verdict.tau).map(|(d, tau)| d <= tau)
+}
+
+/// Why the scorer cannot judge an episode, in its words.
+fn reason(record: &EpisodeRecord) -> String {
+    let mut reasons = Vec::new();
+    if record.verdict.d_peak.is_none() {
+        reasons.push("missing_fem_deformation_rms".to_owned());
+        reasons.push("missing_fem_deformation_metric_id".to_owned());
+    }
+    if record.verdict.tau.is_none() {
+        reasons.push(format!("missing_tau:{}", record.identity.asset));
+    }
+    reasons.join(";")
+}
+
+fn episodes_csv(records: &[EpisodeRecord]) -> String {
+    let mut out = String::from(
+        "source,task,episode,asset,goal_success,d_peak,tau,deform_ok,safe_success,frames,reason\r\n",
+    );
+    let truth = |value: Option<bool>| match value {
+        Some(true) => "True",
+        Some(false) => "False",
+        None => "",
+    };
+    let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.6}"));
+    for record in in_order(records) {
+        let (identity, verdict) = (&record.identity, &record.verdict);
+        // Writing to a String cannot fail.
+        let _ = write!(
+            out,
+            "jsonl,{},{},{},{},{},{},{},{},{},{}\r\n",
+            identity.task,
+            identity.episode,
+            quoted(&identity.asset),
+            truth(Some(verdict.goal)),
+            number(verdict.d_peak),
+            number(verdict.tau),
+            truth(deform_ok(record)),
+            truth(safe_success(record)),
+            record.stats.steps.max(1),
+            quoted(&reason(record)),
+        );
+    }
+    out
+}
+
+fn summary(records: &[EpisodeRecord]) -> Value {
+    let safe = |r: &&EpisodeRecord| safe_success(r) == Some(true);
+    let (all, n) = (in_order(records), records.len());
+    let goal_rate = rate(all.iter().filter(|r| r.verdict.goal).count(), n);
+    let safe_rate = rate(all.iter().copied().filter(|r| safe(r)).count(), n);
+    let mut assets: Vec<&str> = Vec::new();
+    for record in &all {
+        if !assets.contains(&record.identity.asset.as_str()) {
+            assets.push(&record.identity.asset);
+        }
+    }
+    let by_asset: serde_json::Map<_, _> = assets
+        .into_iter()
+        .map(|asset| {
+            let group: Vec<_> = all.iter().copied().filter(|r| r.identity.asset == asset).collect();
+            (asset.to_owned(), asset_summary(&group))
+        })
+        .collect();
+    let mut scores = json!({
+        "n_episodes": n,
+        "n_goal_known": n,
+        "n_safe_unknown": all.iter().filter(|r| safe_success(r).is_none()).count(),
+        "goal_success_rate": goal_rate,
+        "safe_success_rate": safe_rate,
+        "goal_safe_gap": goal_rate.zip(safe_rate).map(|(goal, safe)| decimals(goal - safe, 2)),
+        "rigid_mode": n > 0 && all.iter().all(|r| !r.identity.soft),
+        "deformation_metric_id": METRIC_ID,
+        "by_asset": by_asset,
+    });
+    // Not among SoftVTBench's fields: a policy that may be compared with others leaves the file as it is there.
+    if all.iter().any(|r| r.identity.privileged) {
+        scores["privileged"] = json!(true);
+    }
+    scores
+}
+
+fn asset_summary(group: &[&EpisodeRecord]) -> Value {
+    let goal = group.iter().filter(|r| r.verdict.goal).count();
+    let safe = group.iter().filter(|r| safe_success(r) == Some(true)).count();
+    let mut peaks: Vec<f64> = group.iter().filter_map(|r| r.verdict.d_peak).collect();
+    peaks.sort_by(f64::total_cmp);
+    json!({
+        "n": group.len(),
+        "goal": goal,
+        "safe": safe,
+        "tau": group.first().and_then(|r| r.verdict.tau),
+        "d_peak_p50": quantile(&peaks, 0.5).map(|d| decimals(d, 4)),
+        "d_peak_max": peaks.last().map(|d| decimals(*d, 4)),
+        "goal_success_rate": rate(goal, group.len()),
+        "safe_success_rate": rate(safe, group.len()),
+    })
+}
+
+fn in_order(records: &[EpisodeRecord]) -> Vec<&EpisodeRecord> {
+    let mut sorted: Vec<_> = records.iter().collect();
+    sorted.sort_by_key(|r| (r.identity.task, r.identity.episode));
+    sorted
+}
+
+fn rate(count: usize, total: usize) -> Option<f64> {
+    (total > 0).then(|| 100.0 * count as f64 / total as f64)
+}
+
+fn decimals(value: f64, digits: i32) -> f64 {
+    let scale = 10.0_f64.powi(digits);
+    (value * scale).round() / scale
+}
+
+/// A CSV field, quoted where it must be (RFC 4180).
+fn quoted(field: &str) -> String {
+    if field.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", field.replace('"', "\"\""))
+    } else {
+        field.to_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,120 @@
+use std::fs;
+
+use super::*;
+use crate::{
+    evaluation::{
+        calibration::tests::{hold, squeeze},
+        record::tests::sample,
+    },
+    geometry::Vec3,
+};
+
+fn episode(task: usize, asset: &str, edit: impl Fn(&mut EpisodeRecord)) -> EpisodeRecord {
+    let mut record = sample();
+    (record.identity.task, record.identity.asset) = (task, asset.into());
+    edit(&mut record);
+    record
+}
+
+fn records() -> Vec<EpisodeRecord> {
+    vec![
+        episode(1, "roll", |r| r.verdict.d_peak = Some(1.25)),
+        episode(0, "bun", |r| {
+            // Dropped: not safe for us, safe for them.
+            (r.verdict.no_drop, r.verdict.safety, r.verdict.d_peak) = (false, false, Some(1.0));
+        }),
+        episode(2, "cake", |r| r.verdict.tau = None),
+    ]
+}
+
+#[test]
+fn episodes_csv_has_their_columns_values_and_line_ends() {
+    let expected = "source,task,episode,asset,goal_success,d_peak,tau,deform_ok,safe_success,frames,reason\r\n\
+        jsonl,0,0,bun,True,1.000000,1.000000,True,True,168,\r\n\
+        jsonl,1,0,roll,True,1.250000,1.000000,False,False,168,\r\n\
+        jsonl,2,0,cake,True,0.333333,,,,168,missing_tau:cake\r\n";
+    assert_eq!(episodes_csv(&records()), expected);
+    assert_eq!(quoted("a,\"b\""), "\"a,\"\"b\"\"\"");
+}
+
+#[test]
+fn summary_has_their_fields_and_no_nodrop() {
+    let s = summary(&records());
+    assert_eq!(s["n_episodes"], 3);
+    assert_eq!(s["n_safe_unknown"], 1);
+    assert_eq!(s["goal_success_rate"], 100.0);
+    assert_eq!(s["safe_success_rate"], 100.0 / 3.0);
+    assert_eq!(s["goal_safe_gap"], 66.67);
+    assert_eq!(s["rigid_mode"], false);
+    let keys: Vec<_> = s["by_asset"].as_object().unwrap().keys().collect();
+    assert_eq!(keys, ["bun", "roll", "cake"]);
+    assert_eq!(s["by_asset"]["cake"]["d_peak_p50"], 0.3333);
+    assert!(s["by_asset"]["cake"]["tau"].is_null());
+}
+
+#[test]
+fn a_rigid_episode_is_safe_when_its_goal_is_reached() {
+    let rigid = episode(0, "box", |r| {
+        r.identity.soft = false;
+        (r.verdict.d_peak, r.verdict.tau) = (None, None);
+    });
+    let s = summary(&[rigid]);
+    assert_eq!((s["rigid_mode"].clone(), s["safe_success_rate"].clone()), (json!(true), json!(100.0)));
+}
+
+#[test]
+fn a_debug_frame_says_how_the_target_is_shaped() {
+    let nodes = [Vec3::zeros(), Vec3::x() * 0.06, Vec3::y() * 0.03, Vec3::z() * 0.02];
+    let reference = ReferenceShape::new(&nodes, &[1.0; 4]).unwrap();
+    let now = nodes.map(|x| Vec3::new(0.5 * x.x, x.y, x.z));
+    let d = reference.measure(&now).unwrap();
+    let shape = DebugShape::new("bun", Some((&reference, &d)));
+    let frame = serde_json::to_value(DebugFrame::new(&sample().identity, 7, false, shape)).unwrap();
+    assert_eq!((&frame["frame"], &frame["exp_idx"], &frame["task_id"]), (&json!(7), &json!(0), &json!(0)));
+    assert_eq!(frame["fem_deformation_metric_id"], METRIC_ID);
+    assert_eq!(frame["fem_deformation_nodes"], 4);
+    assert_eq!(frame["fem_deformation_rms"], d.rms_pct);
+    assert!((frame["fem_bbox_diag"].as_f64().unwrap() - 0.07).abs() < 1e-12);
+    assert!((frame["fem_bbox_delta"].as_f64().unwrap() - 0.03).abs() < 1e-12);
+    let broken = serde_json::to_value(DebugShape::broken_off("bun", Some(&reference), Some(9.5), Some(20.0)));
+    let broken = broken.unwrap();
+    assert_eq!(
+        (&broken["fem_deformation_known"], &broken["fem_deformation_rms"]),
+        (&json!(true), &json!(9.5))
+    );
+    assert!(broken["fem_bbox_dims"].is_null() && broken["fem_bbox_diag"] == frame["fem_bbox_diag"]);
+    let unknown = DebugShape::broken_off("bun", Some(&reference), None, Some(20.0));
+    assert_eq!(unknown, DebugShape::new("bun", None), "its peak was before");
+    let unknown = serde_json::to_value(DebugShape::new("box", None)).unwrap();
+    assert_eq!(unknown["fem_deformation_known"], false);
+    assert!(unknown["fem_deformation_rms"].is_null());
+}
+
+#[test]
+fn files_land_where_the_scorer_finds_them() {
+    let root = tempfile::tempdir().unwrap();
+    let mut thresholds = ThresholdFile::new(0.5, vec![], "softvt".into());
+    thresholds.insert("bun", Envelope::new(vec![hold(0.3, 5)], vec![squeeze(0.3, 2.0, true)], 0.5));
+    write_scores(root.path(), &records(), &thresholds).unwrap();
+    let identity = sample().identity;
+    let frame = DebugFrame::new(&identity, 0, true, DebugShape::new("bun", None));
+    let path = debug_log_path(root.path(), identity.task, identity.episode);
+    assert!(path.ends_with("softvtbench/task_000/episode_00000/policy_action_debug.jsonl"));
+    for (frames, rows) in [(vec![frame.clone(), frame], 2), (vec![], 1)] {
+        write_debug_log(&path, &identity, &frames).unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap().lines().count(), rows);
+    }
+    assert!(has_scores(root.path()));
+    fs::remove_file(root.path().join("softvtbench/episodes.csv")).unwrap();
+    assert!(!has_scores(root.path()));
+    let written = ThresholdFile::read(&root.path().join("softvtbench/thresholds.json")).unwrap();
+    assert!(written.envelopes.is_empty() && written.limit("bun").is_some());
+}
+
+#[test]
+fn their_closure_runs_the_other_way() {
+    let envelope = Envelope::new(vec![], vec![squeeze(0.25, 2.0, true)], 0.5);
+    let row: Value = serde_json::from_str(sweep_jsonl("bun", &envelope).trim()).unwrap();
+    assert_eq!((&row["closure"], &row["stable"], &row["level"]), (&json!(0.75), &json!(true), &json!(0)));
+    assert_eq!(row["gripper_width_mm"], 60.0);
+}

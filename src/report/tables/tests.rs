@@ -1,0 +1,123 @@
+use super::*;
+use crate::{
+    evaluation::record::tests::sample,
+    report::run_summary::{summarize_runs, tests::stored},
+};
+
+#[test]
+fn rigid_suites_have_no_safety_and_privileged_ones_say_so_in_every_table() {
+    let mut rigid = sample();
+    rigid.identity.suite = "rigid".into();
+    rigid.identity.soft = false;
+    (rigid.verdict.d_peak, rigid.verdict.tau, rigid.verdict.deformation_ok) = (None, None, None);
+    let runs =
+        summarize_runs(vec![stored("a", "expert", vec![sample()]), stored("b", "expert", vec![rigid])]);
+    let all = all_tables(&runs);
+    assert_eq!(all.len(), 5);
+    for table in &all {
+        let marked = |text: &String| text.contains("expert (privileged)");
+        assert!(marked(&table.caption) || table.rows.iter().all(|row| row.iter().any(marked)), "{table:?}");
+        assert!(table.rows.iter().all(|row| row.len() == table.head.len()));
+    }
+    let [rigid, soft] = &all[0].rows[..] else { panic!("two rows") };
+    assert_eq!((&rigid[5][..], &rigid[6][..]), ("N/A", "N/A"));
+    assert_eq!((&soft[5][..], &soft[6][..]), ("100.0 [20.7, 100.0]", "0.0"));
+    assert_eq!(all[1].rows, [strings(["suite", "expert (privileged)", "0.33", "0.33", "0.33", "0.33", "1"])]);
+}
+
+#[test]
+fn a_run_in_progress_shows_how_far_it_is() {
+    let mut run = stored("a", "noop", vec![sample()]);
+    run.info["episodes"] = serde_json::json!(20);
+    let table = main_table(&summarize_runs(vec![run]));
+    assert_eq!(table.rows[0][2], "1 of 20");
+}
+
+/// Names that would break out of a table or a page.
+const HOSTILE: [&str; 9] = [
+    "a_b | c & \\z",
+    "<script>alert('x')</script>",
+    "100 % $x^2$ #1 ~ {unbalanced \\end{tabular}",
+    "[4pt] *starred* `code`",
+    "![x](http://x.example/y.png)",
+    "two\nlines\tand \u{7} more",
+    "\\\\[9cm] \\input{/etc/passwd}",
+    "}}}{{",
+    "τ ≤ κ · D – … „ü“",
+];
+
+fn hostile() -> Table {
+    let long = "x".repeat(400);
+    let rows =
+        HOSTILE.iter().chain([&&long[..]]).map(|name| strings([name, name, "1.0 [0.0, 2.0]"])).collect();
+    Table { caption: HOSTILE.join(" "), head: strings(["a_b", "%", "n"]), texts: 2, rows }
+}
+
+/// How a LaTeX engine would read a line: the depth of braces at its end, and the `&` that part cells. Anything that is
+/// special and not meant to be is an error.
+fn read_latex(line: &str) -> (i32, usize) {
+    let (mut depth, mut parts, mut math) = (0, 0, false);
+    let mut letters = line.chars().peekable();
+    while let Some(c) = letters.next() {
+        match c {
+            '\\' => {
+                let next = letters.peek().copied().unwrap_or(' ');
+                if next.is_alphabetic() {
+                    let mut name = String::new();
+                    while let Some(c) = letters.next_if(|c| c.is_alphabetic()) {
+                        name.push(c);
+                    }
+                    let known = "textbackslash textasciitilde textasciicircum textless textgreater textbar ldots tau kappa pi leq geq rightarrow times cdot \
+                                 begin end centering footnotesize caption toprule midrule bottomrule textwidth";
+                    assert!(known.split_whitespace().any(|k| k == name), "\\{name} in {line}");
+                } else {
+                    letters.next();
+                }
+            }
+            '{' => depth += 1,
+            '}' => depth -= 1,
+            '$' => math = !math,
+            '&' => parts += 1,
+            '%' | '#' | '_' | '^' | '~' => panic!("a bare {c} in {line}"),
+            _ => {}
+        }
+        assert!(depth >= 0, "a brace too many in {line}");
+    }
+    assert!(!math, "a formula without an end in {line}");
+    (depth, parts)
+}
+
+#[test]
+fn hostile_names_leave_a_latex_table_whole() {
+    let text = hostile().latex();
+    assert_eq!(text.matches("\\begin{").count(), 2);
+    assert_eq!(text.matches("\\end{").count(), 2);
+    let mut rows = 0;
+    for line in text.lines() {
+        let (depth, parts) = read_latex(line);
+        assert_eq!(depth, 0, "{line}");
+        if line.ends_with(" \\\\") {
+            rows += 1;
+            assert_eq!(parts, 2, "{line}");
+            assert!(!line.trim_start().starts_with(['[', '*']), "a length: {line}");
+        }
+    }
+    assert_eq!(rows, 1 + HOSTILE.len() + 1);
+    assert!(text.contains("a\\_b \\textbar{} c \\& \\textbackslash{}z & "), "{text}");
+    assert!(text.contains("{p{0.28\\textwidth}p{0.28\\textwidth}r}"), "{text}");
+    assert!(text.contains("$\\tau$ $\\leq$ $\\kappa$ $\\cdot$ D -- \\ldots{}"), "{text}");
+}
+
+#[test]
+fn hostile_names_leave_a_markdown_table_whole() {
+    let text = hostile().markdown();
+    let rows: Vec<&str> = text.lines().filter(|line| line.starts_with("| ")).collect();
+    assert_eq!(rows.len(), 2 + HOSTILE.len() + 1);
+    for row in rows {
+        let bars = row.char_indices().filter(|(i, c)| *c == '|' && !row[..*i].ends_with('\\')).count();
+        assert_eq!(bars, 4, "{row}");
+        assert!(!row.contains('<') && !row.contains("]("), "{row}");
+    }
+    assert!(text.contains("| a_b \\| c &amp; \\\\z |"), "{text}");
+    assert!(text.contains("1.0 [0.0, 2.0] |"), "{text}");
+}
