@@ -10,7 +10,7 @@ use crate::{
     physics::contact::Friction,
 };
 
-/// How an object moves.
+/// Kind of body that an object is.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Body {
     /// A finite-element soft body.
@@ -20,53 +20,55 @@ pub enum Body {
         /// Density, kg/m³.
         density: f64,
     },
-    /// Parts on joints; the asset's own shape is their base, which is part of the world.
+    /// Parts on joints. The asset's own shape is their base, which is fixed to the world.
     Articulated(Vec<Part>),
-    /// Part of the world; never moves.
+    /// Fixed to the world; collides.
     Static,
-    /// Part of the picture only: it never moves and nothing touches it.
+    /// Rendered only: fixed and without collisions.
     Scenery,
 }
 
-/// Linear-elastic isotropic material and discretisation of a soft body.
+/// Isotropic linear-elastic material of a soft body, and its discretisation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SoftMaterial {
-    /// Young's modulus, Pa.
+    /// Young's modulus, Pa; the shipped pastries have 2.5e4 to 2.2e5.
     pub youngs_pa: f64,
     /// Poisson's ratio, 0 ≤ ν < 0.5.
     pub poisson: f64,
     /// Density, kg/m³.
     pub density: f64,
-    /// Voxels along the longest edge of the bounding box, at most [`Self::MAX_RESOLUTION`].
+    /// Voxels (finite elements) along the longest edge of the bounding box, 1..=[`Self::MAX_RESOLUTION`].
     pub resolution: usize,
-    /// Spacing of the contact samples on surfaces that a gripper can reach, m.
+    /// Spacing of the contact samples on surfaces that a gripper can reach (|n_z| ≤ 0.7 in the object frame), m.
     pub grasp_spacing: f64,
 }
 
 impl SoftMaterial {
-    /// Largest resolution.
+    /// Largest allowed resolution.
     pub const MAX_RESOLUTION: usize = 64;
 }
 
-/// A kind of object: its shape at rest with its lowest point at z = 0 and its centre on the z axis.
+/// A kind of object, which scenes place any number of times.
+///
+/// Object frame (`_o`): z up, lowest point at z = 0, centre on the z axis, in the rest state with all joints at 0.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Asset {
-    /// Name, unique in a scene's library.
+    /// Name, unique among the assets of a scene.
     pub name: String,
-    /// Shape in the object frame, m.
+    /// Shape at rest, object frame, m.
     pub shape: Shape,
-    /// How it moves.
+    /// Kind of body, with its material.
     pub body: Body,
-    /// Friction of its surface.
+    /// Coulomb friction of the surface.
     pub friction: Friction,
-    /// Appearances by material id of the shape (0 is the default).
+    /// Appearances, indexed by the material ids of the shape ([`Shape::material`]); 0 is the default.
     pub visuals: Vec<Visual>,
-    /// Free-form hints for experts (grasp axis, height …), numbers only, read by scripts.
+    /// Numbers for scripted experts by name, for example the grasp height; the simulation ignores them.
     pub hints: BTreeMap<String, f64>,
 }
 
 impl Asset {
-    /// Its parts on joints, if it is articulated; a carrier comes before what it carries.
+    /// Parts of an articulated object, parents before children; empty for other bodies.
     pub fn parts(&self) -> &[Part] {
         match &self.body {
             Body::Articulated(parts) => parts,
@@ -74,7 +76,7 @@ impl Asset {
         }
     }
 
-    /// Mass of a soft or rigid body, or of the moving parts of an articulated one, kg; none of what never moves.
+    /// Mass (kg) of a soft or rigid body, or of the moving parts of an articulated one; `None` for fixed objects.
     pub fn mass(&self) -> Option<f64> {
         match &self.body {
             Body::Soft(SoftMaterial { density, .. }) | Body::Rigid { density } => {
@@ -85,7 +87,7 @@ impl Asset {
         }
     }
 
-    /// Makes whatever of it moves `factor` times as heavy.
+    /// Multiplies the density of everything that moves by `factor`.
     pub fn scale_mass(&mut self, factor: f64) {
         match &mut self.body {
             Body::Soft(SoftMaterial { density, .. }) | Body::Rigid { density } => *density *= factor,
@@ -95,37 +97,37 @@ impl Asset {
     }
 }
 
-/// How a part moves against what carries it.
+/// Kind of motion that a joint allows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum JointMotion {
-    /// Along the axis; joint values are metres.
+    /// Prismatic: translation along the axis; joint values are metres.
     Slide,
-    /// About the axis; joint values are radians.
+    /// Revolute: rotation about the axis; joint values are radians.
     Turn,
 }
 
-/// A joint of one degree of freedom.
+/// A joint with one degree of freedom, between a part and its parent.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Joint {
-    /// How the part moves.
+    /// Translation or rotation.
     pub motion: JointMotion,
-    /// Unit direction, object frame with all joints at 0.
+    /// Unit vector of the axis, object frame with all joints at 0.
     pub axis_o: Vec3,
-    /// A point of the axis of a turning part, object frame with all joints at 0, m.
+    /// Point on the axis of a revolute joint, object frame with all joints at 0, m.
     pub origin_o: Vec3,
-    /// Lowest value, m or rad.
+    /// Lower limit, m or rad.
     pub lower: f64,
-    /// Highest value, m or rad.
+    /// Upper limit, m or rad.
     pub upper: f64,
     /// Viscous damping, N s/m or N m s/rad.
     pub damping: f64,
-    /// Dry friction, N or N m.
+    /// Dry (Coulomb) friction, N or N m.
     pub friction: f64,
 }
 
 impl Joint {
-    /// Unit of its values: "m" or "rad".
+    /// Unit of the joint's values: "m" or "rad".
     pub fn unit(&self) -> &'static str {
         match self.motion {
             JointMotion::Slide => "m",
@@ -133,43 +135,44 @@ impl Joint {
         }
     }
 
-    /// The value that it has if nothing else is said: 0, or the limit nearest to it.
+    /// Default value: 0, or the nearest limit.
     pub fn rest(&self) -> f64 {
         0f64.clamp(self.lower, self.upper)
     }
 }
 
-/// A part that a joint carries.
+/// A moving part of an articulated object.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Part {
-    /// Name, unique in the object: "top_drawer".
+    /// Name, unique in the object, for example "top_drawer".
     pub name: String,
-    /// Its shape and looks in the frame of the whole object with all joints at 0; its name is that of the part, its body
-    /// rigid.
+    /// Shape and appearance in the frame of the whole object with all joints at 0. The asset has the name of the part and
+    /// a rigid body.
     pub asset: Arc<Asset>,
     /// Density, kg/m³.
     pub density: f64,
-    /// Index of the part that carries it, below its own; `None` for the base.
+    /// Index of the parent part, less than the part's own; `None` for the base.
     pub parent: Option<usize>,
-    /// Its joint.
+    /// Joint to the parent.
     pub joint: Joint,
 }
 
 impl Part {
-    /// Its mass, kg.
+    /// Mass, kg.
     pub fn mass(&self) -> f64 {
         mass_properties(&self.asset.shape, self.density).mass
     }
 
-    /// Makes it `factor` times as heavy.
+    /// Multiplies the density by `factor`.
     pub(super) fn scale_mass(&mut self, factor: f64) {
         self.density *= factor;
         Arc::make_mut(&mut self.asset).scale_mass(factor);
     }
 }
 
-/// Frames of the parts in the frame of their object at joint values `joints` (m or rad, one a part): each takes the part's
-/// shape, given with all joints at 0, to where it is.
+/// Poses of the parts relative to the object frame at joint values `joints` (m or rad, one per part).
+///
+/// A pose maps the shape of its part, which is given with all joints at 0, to its place in the object frame.
 pub fn part_poses(parts: &[Part], joints: &[f64]) -> Vec<Pose> {
     let mut poses: Vec<Pose> = Vec::with_capacity(parts.len());
     for (part, &value) in parts.iter().zip(joints) {

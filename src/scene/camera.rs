@@ -1,4 +1,4 @@
-//! Cameras as plain data, and the two that the paper uses.
+//! Camera parameters, and the two cameras of the paper.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -7,61 +7,64 @@ use serde::{Deserialize, Serialize};
 
 use crate::geometry::{Pose, Quat, Vec3};
 
-/// What a camera is fixed to.
+/// Frame to which a camera is attached.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CameraMount {
-    /// The world.
+    /// World frame.
     World,
-    /// The robot's hand frame (`panda_hand`).
+    /// Hand frame of the robot (`panda_hand`).
     Hand,
 }
 
-/// A pinhole camera with square pixels. Its frame is OpenGL's: it looks along −z, +y is up in the image.
+/// A pinhole camera with square pixels and its optical axis at the image centre.
+///
+/// Camera frame as in OpenGL: view direction −z, +x to the right and +y up in the image.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Camera {
-    /// Name, as in a stream's name.
+    /// Name, unique in the scene; part of the names of image streams.
     pub name: String,
-    /// What it is fixed to.
+    /// Frame to which it is attached.
     pub mount: CameraMount,
     /// Camera frame in the frame of the mount.
     pub pose: Pose,
     /// Vertical field of view, rad.
     pub fovy_rad: f64,
-    /// Nothing nearer is seen, m along the optical axis.
+    /// Near clipping distance along the optical axis, m.
     pub near_m: f64,
-    /// Nothing farther is seen, m along the optical axis.
+    /// Far clipping distance along the optical axis, m.
     pub far_m: f64,
     /// Width of the image, pixels.
     pub width: usize,
     /// Height of the image, pixels.
     pub height: usize,
-    /// Where a script last set it, as messages name a place (`file:line`); `None` for one that no script touched.
+    /// Source location (`file:line`) where a script last set the camera, for messages; `None` for a default camera.
     #[serde(skip)]
     pub set_at: Option<String>,
 }
 
-/// Vertical field of view, rad, of a lens of some focal length behind an aperture of some height (one unit for both).
+/// Vertical field of view (rad) of a lens with this focal length and aperture height, both in the same unit.
 pub fn fovy_from_lens(focal: f64, aperture: f64) -> f64 {
     2.0 * (0.5 * aperture / focal).atan()
 }
 
-/// Edge of the images that a policy sees, pixels.
+/// Width and height of the default policy images, pixels.
 pub const POLICY_IMAGE_EDGE: usize = 224;
 
 impl Camera {
-    /// The third-person camera over the table (SoftVTBench's environment: focal 18, aperture 15, its table at
+    /// The third-person camera of table scenes (SoftVTBench's environment: focal length 18, aperture 15, table at
     /// z = 0.90 m). Image right is +y of the world.
     pub fn third_person_table() -> Self {
         Self::third_person(Vec3::new(0.6586, 0.0, 0.7104), [0.6380, 0.3048, 0.3048, 0.6380])
     }
 
-    /// The third-person camera over the floor, for scenes whose robot stands on it.
+    /// The third-person camera of floor scenes, in which the robot is mounted on the floor. Image right is +y of the world.
     pub fn third_person_floor() -> Self {
         Self::third_person(Vec3::new(0.8966, 0.0, 0.65), [0.6182, 0.3432, 0.3432, 0.6182])
     }
 
-    /// The camera on the hand (SoftVTBench's environment: focal 9.77, aperture 15). Image right is the hand's +y.
+    /// The wrist camera on the hand (SoftVTBench's environment: focal length 9.77, aperture 15). Image right is the hand's
+    /// +y.
     pub fn wrist() -> Self {
         Self {
             name: "wrist".to_owned(),
@@ -90,7 +93,7 @@ impl Camera {
         }
     }
 
-    /// The same camera with a square image of another edge, pixels.
+    /// The same camera with a square image of `edge` pixels.
     #[must_use]
     pub fn with_edge(mut self, edge: usize) -> Self {
         (self.width, self.height) = (edge, edge);

@@ -1,54 +1,54 @@
-//! Lines of text to be printed on surfaces.
+//! Lines of text printed on surfaces: their place and style, and their rasterised glyphs.
 
 use std::sync::OnceLock;
 
 use ab_glyph::{Font, FontRef, PxScale, ScaleFont, point};
 
-/// A typeface.
+/// Typeface of a text decal.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Typeface {
     /// Ubuntu Light, without serifs.
     #[default]
     Sans,
-    /// Hack, all letters of one width.
+    /// Hack, monospaced.
     Mono,
 }
 
-/// A line of text and where it stands, in the object frame at rest.
+/// A line of text with its place and style, in the object frame at rest.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TextLine {
-    /// What it says, at most [`MAX_LETTERS`] letters.
+    /// Text, at most [`MAX_LETTERS`] characters.
     pub text: String,
-    /// Its typeface.
+    /// Typeface.
     pub typeface: Typeface,
     /// Height of a capital letter, m.
     pub height_m: f64,
-    /// How much strokes are thickened, in heights of a capital letter, 0..=0.25.
+    /// Widening of the strokes, relative to the height of a capital letter, 0..=0.25.
     pub weight: f64,
-    /// Where the middle of the line is, m.
+    /// Centre of the line, m.
     pub at: [f64; 3],
-    /// From where it is read: the direction, of any length, in which the printed surface looks. A line that looks up or down
-    /// has its head towards +y, any other towards +z.
+    /// Outward direction of the printed surface, any length. The top of the letters points to +z, or to +y if the line
+    /// faces up or down.
     pub facing: [f64; 3],
-    /// Turn of the line on its surface, rad, counter-clockwise to who reads it.
+    /// Rotation of the line on its surface, rad, counter-clockwise as seen by the reader.
     pub turn: f64,
-    /// Radius of the cylinder about the z axis that the line is laid round, m; flat if there is none.
+    /// Radius of the cylinder about the z axis onto which the line is wrapped, m; `None` for a flat line.
     pub wrap_m: Option<f64>,
 }
 
-/// Most letters of a line.
+/// Largest number of characters of a line.
 pub const MAX_LETTERS: usize = 64;
-/// Height of a capital letter in the field, texels.
+/// Height of a capital letter in the raster, texels.
 const CAPITAL: f32 = 44.0;
-/// Texels left free around the line.
+/// Empty texels around the line.
 const MARGIN: usize = 2;
 
-/// A line with the field of its letters, which is made when it is first looked at.
+/// A line of text with its raster, which is computed at the first use.
 #[derive(Debug, Default)]
 pub struct TextDecal {
-    /// The line.
+    /// Text, place and style.
     pub line: TextLine,
-    letters: OnceLock<GlyphCoverage>,
+    coverage: OnceLock<GlyphCoverage>,
 }
 
 impl PartialEq for TextDecal {
@@ -58,26 +58,26 @@ impl PartialEq for TextDecal {
 }
 
 impl TextDecal {
-    /// A print of a line.
+    /// Creates a decal; the glyphs are rasterised later.
     pub fn new(line: TextLine) -> Self {
-        Self { line, letters: OnceLock::new() }
+        Self { line, coverage: OnceLock::new() }
     }
 
-    /// Memory that its letters take at most, bytes.
+    /// Upper bound of the memory of the raster, bytes.
     pub fn bytes(&self) -> usize {
         // A letter is at most two capitals wide and high.
         let texels = (2.0 * CAPITAL).powi(2) as usize;
         size_of::<f64>() * texels * (self.line.text.chars().count() + 1)
     }
 
-    /// Its letters.
+    /// The rasterised glyphs.
     pub fn coverage(&self) -> &GlyphCoverage {
-        self.letters.get_or_init(|| GlyphCoverage::of(&self.line))
+        self.coverage.get_or_init(|| GlyphCoverage::of(&self.line))
     }
 }
 
 impl TextLine {
-    /// The first letter that the typeface does not have.
+    /// The first character that the typeface cannot show.
     pub fn missing(&self) -> Option<char> {
         let font = font(self.typeface)?;
         self.text.chars().find(|&letter| letter.is_control() || font.glyph_id(letter).0 == 0)
@@ -92,16 +92,16 @@ fn font(typeface: Typeface) -> Option<FontRef<'static>> {
     FontRef::try_from_slice(bytes).ok()
 }
 
-/// How much of each place letters cover, as sums over all texels above and to the left (Crow, Summed-Area Tables for Texture
-/// Mapping, 1984): the mean over any rectangle takes four looks.
+/// Coverage of a line's area by glyphs, as a summed-area table (Crow, Summed-Area Tables for Texture Mapping, 1984): the
+/// mean over any rectangle takes four lookups.
 #[derive(Debug, Default)]
 pub struct GlyphCoverage {
     size: [usize; 2],
-    /// One row and one column more than texels.
+    /// Row by row, one row and one column more than texels.
     sums: Vec<f64>,
-    /// Texels in a metre.
+    /// Texels per metre.
     scale: f64,
-    /// Row at half the height of capital letters.
+    /// Row at half the height of a capital letter, texels.
     middle: f64,
 }
 
@@ -145,7 +145,8 @@ impl GlyphCoverage {
         }
     }
 
-    /// Share that letters cover of a square of edge `width` (m) about the place `right` and `up` (m) of the line's middle.
+    /// Share of a square covered by glyphs, 0..=1. The square has edge `width` (m); its centre is `right` and `up` (m) from the
+    /// centre of the line.
     pub fn share(&self, right: f64, up: f64, width: f64) -> f64 {
         if self.sums.is_empty() {
             return 0.0;
@@ -163,12 +164,12 @@ impl GlyphCoverage {
         (sum / (4.0 * half * half)).clamp(0.0, 1.0)
     }
 
-    /// Length of the line with its margins, m.
+    /// Length of the line including its margins, m.
     pub fn length_m(&self) -> f64 {
         self.size[0] as f64 / self.scale.max(1e-9)
     }
 
-    /// The sum over all above and left of (x, y), bilinear between texels.
+    /// Sum over all texels above and to the left of (x, y), interpolated bilinearly.
     fn sum(&self, x: f64, y: f64) -> f64 {
         let [columns, rows] = self.size;
         let (x, y) = (x.clamp(0.0, columns as f64), y.clamp(0.0, rows as f64));
@@ -181,20 +182,20 @@ impl GlyphCoverage {
     }
 }
 
-/// Height of a capital letter in ems of pixels.
+/// Height of a capital letter, in ems.
 fn capital(font: &FontRef) -> f32 {
     let outline = font.outline_glyph(font.glyph_id('H').with_scale(PxScale::from(100.0)));
     outline.map_or(0.7, |outline| outline.px_bounds().height() / 100.0)
 }
 
-/// Strokes grown by half of `thick` texels on either side.
+/// Dilates the strokes by half of `thick` texels on either side.
 fn thickened(cover: &[f32], [width, height]: [usize; 2], thick: f32) -> Vec<f32> {
     let radius = 0.5 * thick;
     let reach = radius.ceil() as isize;
     let mut out = vec![0.0_f32; cover.len()];
     for dy in -reach..=reach {
         for dx in -reach..=reach {
-            // The middle counts wholly, however thin the growth is.
+            // The centre has full weight even if the dilation is thinner than a texel.
             let away = (dx as f32).hypot(dy as f32);
             let share = if away == 0.0 { 1.0 } else { (radius + 0.5 - away).clamp(0.0, 1.0) };
             if share == 0.0 {
@@ -213,7 +214,7 @@ fn thickened(cover: &[f32], [width, height]: [usize; 2], thick: f32) -> Vec<f32>
     out
 }
 
-/// Sums over all texels above and to the left of each corner of a texel.
+/// The summed-area table of a raster.
 fn sums(cover: &[f32], [width, height]: [usize; 2]) -> Vec<f64> {
     let stride = width + 1;
     let mut sums = vec![0.0; stride * (height + 1)];
@@ -236,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn a_capital_letter_is_as_high_as_asked_and_stands_in_the_middle() {
+    fn a_capital_letter_has_its_height_and_is_vertically_centred() {
         let print = letters("H", 0.0);
         let lit = |up: f64| (-20..=20).any(|i| print.coverage().share(f64::from(i) * 2e-4, up, 1e-4) > 0.5);
         assert!(lit(0.0) && lit(0.0047) && lit(-0.0047));
@@ -244,15 +245,15 @@ mod tests {
     }
 
     #[test]
-    fn letters_run_to_the_right_and_the_middle_of_a_line_is_its_place() {
+    fn text_runs_to_the_right_and_is_centred() {
         let print = letters("l.", 0.1);
         let left = print.coverage().share(-1.5e-3, 0.002, 2e-3);
         let right = print.coverage().share(1.5e-3, 0.002, 2e-3);
-        assert!(left > 3.0 * right, "l stands left of its stop: {left} {right}");
+        assert!(left > 3.0 * right, "the l is left of the stop: {left} {right}");
     }
 
     #[test]
-    fn the_mean_over_squares_keeps_the_ink_however_wide_they_are() {
+    fn mean_coverage_is_independent_of_the_size_of_the_squares() {
         let print = letters("softvt", 0.08);
         let ink = |width: f64| {
             let steps = (0.08 / width) as i32;
@@ -267,12 +268,12 @@ mod tests {
         }
         assert!(
             fine > 1.2 * letters("softvt", 0.0).coverage().share(0.0, 0.0, 0.08) * 0.0064,
-            "thicker strokes"
+            "wider strokes"
         );
     }
 
     #[test]
-    fn a_letter_that_the_typeface_lacks_is_found() {
+    fn a_character_missing_from_the_typeface_is_found() {
         let line = |text: &str| TextLine { text: text.into(), ..TextLine::default() };
         assert_eq!(line("Käse & Öl").missing(), None);
         assert_eq!(line("ab漢").missing(), Some('漢'));

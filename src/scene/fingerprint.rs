@@ -1,4 +1,4 @@
-//! What an object is made of, as a short text that two objects share only if they are alike.
+//! Fingerprints of assets: short hashes that are equal only for mechanically equal assets.
 
 use std::fmt::Write;
 
@@ -7,9 +7,10 @@ use sha2::{Digest, Sha256};
 use super::asset::{Asset, Body, Part};
 
 impl Asset {
-    /// A short hash (16 hexadecimal digits of a SHA-256) of the shape, the body with its material and resolution, and the friction: all that a
-    /// calibration depends on. Looks (paint too), hints and the name do not count. Numbers count with seven digits, so that the last
-    /// bits of another platform's sines make no other object.
+    /// Hash of everything that a calibration depends on: shape, body with its material and resolution, and friction.
+    ///
+    /// 16 hexadecimal digits of a SHA-256. Appearance, hints and name do not enter. Numbers enter with seven significant
+    /// digits, since trigonometric functions differ between platforms in the last bits.
     pub fn fingerprint(&self) -> String {
         let body = match &self.body {
             Body::Articulated(parts) => {
@@ -20,13 +21,14 @@ impl Asset {
             }
             body => format!("{body:?}"),
         };
+        // Calibration files store these hashes: the `Debug` text of the types below must not change.
         let text = format!("({:?}, {body}, {:?})", self.shape.unpainted(), self.friction);
         let digest = Sha256::digest(rounded(&text).as_bytes());
         digest.iter().take(8).map(|byte| format!("{byte:02x}")).collect()
     }
 }
 
-/// The text with every number that has a fraction or an exponent written with seven digits.
+/// Rewrites all numbers with a fraction or an exponent in `text` with seven significant digits.
 fn rounded(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     let mut rest = text;
@@ -41,7 +43,7 @@ fn rounded(text: &str) -> String {
         }
         let (token, after) = rest.split_at(length);
         match token.parse::<f64>() {
-            // Adding zero makes the negative zero a positive one.
+            // Adding zero turns -0.0 into 0.0.
             Ok(x) if token.contains(['.', 'e']) => {
                 let _ = write!(out, "{:.6e}", if x.abs() < 1e-12 { 0.0 } else { x + 0.0 });
             }
@@ -52,7 +54,7 @@ fn rounded(text: &str) -> String {
     out
 }
 
-/// Length of the number at the beginning of `text`, 0 if there is none.
+/// Length of the number at the beginning of `text`, in bytes; 0 if there is no number.
 fn number_length(text: &str) -> usize {
     let digits = text.strip_prefix('-').unwrap_or(text);
     if !digits.starts_with(|c: char| c.is_ascii_digit()) {
@@ -100,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn shape_material_resolution_and_friction_count_and_looks_and_names_do_not() {
+    fn mechanical_properties_enter_and_appearance_and_name_do_not() {
         let known = bun().fingerprint();
         assert_eq!(known.len(), 16);
         let changed = |change: &dyn Fn(&mut Asset)| {
@@ -128,13 +130,13 @@ mod tests {
                 let inner = Shape::Sphere { radius: 0.03 }.painted(2, None).translated(Vec3::z() * 0.01);
                 a.shape = inner.painted(1, Some(brush())).translated(Vec3::z() * 0.02);
             }),
-            "paint between two moves"
+            "paint between two placements"
         );
-        assert!(!soft(&|m| m.youngs_pa = 2e4 * (1.0 + f64::EPSILON)), "the last bit is no other object");
+        assert!(!soft(&|m| m.youngs_pa = 2e4 * (1.0 + f64::EPSILON)), "the last bit does not enter");
     }
 
     #[test]
-    fn meshes_of_as_many_corners_are_told_apart() {
+    fn meshes_with_equal_counts_are_distinguished() {
         let tetrahedron = |height: f64| {
             let vertices = [Vec3::zeros(), Vec3::x(), Vec3::y(), Vec3::z() * height].to_vec();
             let triangles = vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
@@ -146,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_rounded_and_words_and_counts_are_kept() {
+    fn numbers_are_rounded_while_words_and_integers_are_kept() {
         assert_eq!(
             rounded("a1.5 { x: -0.0, n: 12, y: 1.25e-7 }"),
             "a1.5 { x: 0.000000e0, n: 12, y: 1.250000e-7 }"

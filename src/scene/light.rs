@@ -1,52 +1,54 @@
-//! Light as plain data: one key light, a sky, and the exposure.
+//! Lighting parameters: a key light, a sky, and the exposure.
 
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::Vec3;
 
-/// A far light with soft shadows.
+/// A distant light source with soft shadows.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct KeyLight {
-    /// Direction to the light, world; any length.
+    /// Direction towards the light, world frame; any length.
     pub direction_w: Vec3,
     /// Colour, linear RGB.
     pub colour: [f64; 3],
-    /// Irradiance on a surface that faces it; 1 shows white at full value for exposure 1 (that is π of radiance).
+    /// Irradiance on a surface that faces the light, relative to π: at 1 and exposure 1 a white diffuse surface has
+    /// radiance 1.
     pub strength: f64,
-    /// Half the angle under which it is seen, rad: how fast shadows soften with distance.
+    /// Angular radius of the light source, rad; determines how fast shadows soften with distance.
     pub softness_rad: f64,
 }
 
-/// Light from everywhere else.
+/// Environment light from all directions.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sky {
-    /// From straight above, linear RGB.
+    /// Radiance from straight above, linear RGB.
     pub zenith: [f64; 3],
-    /// From the horizon, linear RGB; also what is seen where nothing is.
+    /// Radiance from the horizon, linear RGB; also the colour of empty background.
     pub horizon: [f64; 3],
-    /// From straight below, linear RGB.
+    /// Radiance from straight below, linear RGB.
     pub ground: [f64; 3],
-    /// Factor on all of it.
+    /// Factor on the three colours.
     pub strength: f64,
 }
 
-/// All light of a scene.
+/// Lighting of a scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Lighting {
-    /// The key light.
+    /// Key light, the only one that casts shadows.
     pub key: KeyLight,
-    /// Everything else.
+    /// Environment light.
     pub sky: Sky,
-    /// Factor on what reaches the camera, before tone mapping.
+    /// Factor on the radiance that reaches the camera, before tone mapping.
     pub exposure: f64,
-    /// Middle of the ball in which what moves casts shadows, and in which those of fixed things are fine, world, m.
+    /// Centre of the shadow sphere, world frame, m. Moving objects cast shadows only inside of it, and shadows of fixed
+    /// objects have full resolution only inside of it.
     pub shadow_centre_w: Vec3,
-    /// Radius of that ball, m.
+    /// Radius of the shadow sphere, m.
     pub shadow_radius_m: f64,
 }
 
 impl Default for Lighting {
-    /// A large lamp high on the camera's left and a bright room.
+    /// A large lamp, high on the left of the third-person camera, in bright surroundings.
     fn default() -> Self {
         Self {
             key: KeyLight {

@@ -21,18 +21,18 @@ pub use decal::{GlyphCoverage, MAX_LETTERS, TextDecal, TextLine, Typeface};
 pub use light::{KeyLight, Lighting, Sky};
 pub use visual::{Mask, Visual, VisualLayer};
 
-/// An asset put somewhere.
+/// An asset placed in a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Object {
-    /// Name in the scene, unique: "left", "right", "plate".
+    /// Name, unique in the scene, for example "left" or "plate".
     pub name: String,
-    /// What it is.
+    /// Kind of object.
     pub asset: Arc<Asset>,
-    /// Object frame in the world.
+    /// Object frame in the world frame, before settling.
     pub pose_w: Pose,
-    /// InitialState values of the joints of an articulated object, in the order of its parts, m or rad.
+    /// Initial joint values of an articulated object, in the order of its parts, m or rad.
     pub joints: Vec<f64>,
-    /// Where it was placed, `file:line`, for messages; empty if no script did.
+    /// Source location (`file:line`) of the placing call, for messages; empty if no script placed the object.
     pub placed_at: String,
 }
 
@@ -45,27 +45,27 @@ pub struct Region {
     pub max: Vec3,
 }
 
-/// Everything an episode starts from, before settling.
+/// The state from which an episode starts, before settling.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
-    /// Placed objects; the order is part of the scene.
+    /// Placed objects. Their order determines the order of bodies in the simulation, and with it the last bits of results.
     pub objects: Vec<Object>,
-    /// Robot base in the world.
+    /// Robot base frame in the world frame.
     pub base_w: Pose,
-    /// Arm joint angles at the start, rad.
+    /// Initial joint angles of the arm, rad.
     pub start_q: [f64; 7],
-    /// Gravity, m/s², world frame.
+    /// Gravitational acceleration, m/s², world frame.
     pub gravity: Vec3,
-    /// An object outside of this box has left the workspace.
+    /// Box outside of which an object counts as having left the workspace.
     pub workspace: Region,
-    /// The light.
+    /// Light sources and exposure.
     pub lighting: Lighting,
-    /// The cameras; names are unique. A policy asks for pictures by name.
+    /// Cameras with unique names, by which policies request images.
     pub cameras: Vec<Camera>,
 }
 
 impl Scene {
-    /// Names of the objects, each followed by those of its parts: cabinet, cabinet.top_drawer.
+    /// Names of the objects, each followed by those of its parts, for example `cabinet`, `cabinet.top_drawer`.
     pub fn names(&self) -> Vec<String> {
         let of = |object: &Object| {
             let parts = object.asset.parts().iter().map(|part| format!("{}.{}", object.name, part.name));
@@ -74,7 +74,8 @@ impl Scene {
         self.objects.iter().flat_map(of).collect()
     }
 
-    /// The same scene with every soft body made rigid: same shapes, places, densities, friction and looks.
+    /// The rigid twin: the same scene with all soft bodies made rigid. Shapes, poses, densities, friction and appearance
+    /// stay the same.
     pub fn rigid_twin(mut self) -> Self {
         for object in &mut self.objects {
             if let Body::Soft(material) = &object.asset.body {
@@ -85,38 +86,39 @@ impl Scene {
         self
     }
 
-    /// A camera by name.
+    /// Returns the camera with this name.
     pub fn camera(&self, name: &str) -> Option<&Camera> {
         self.cameras.iter().find(|camera| camera.name == name)
     }
 }
 
-/// What is put elsewhere in a scene before anything is simulated: a demonstration that was made in another world brings its own
-/// start. Nothing is checked here; a scene whose objects overlap is refused when it is built, as any is.
+/// Overrides of the initial state of a scene, as given by a demonstration imported from another simulator.
+///
+/// Nothing is validated here: overlapping objects are refused when the simulation is built from the scene.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct InitialState {
-    /// Arm joint angles, rad; those of the layout if none.
+    /// Joint angles of the arm, rad; `None` keeps those of the layout.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joints: Option<[f64; 7]>,
-    /// Objects that stand elsewhere.
+    /// Objects with other poses than in the layout.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub places: Vec<ObjectPlacement>,
 }
 
-/// Where an object stands; its height is the layout's.
+/// Pose of an object on the support surface; its height is that of the layout.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ObjectPlacement {
-    /// Name in the scene.
+    /// Name of the object in the scene.
     pub name: String,
-    /// ObjectPlacement of its origin on the ground, m, world.
+    /// Horizontal position of the object's origin, m, world frame.
     pub xy: [f64; 2],
-    /// Turn about the vertical, rad; the layout's if none.
+    /// Angle about the vertical, rad; `None` keeps the orientation of the layout.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub yaw: Option<f64>,
 }
 
 impl InitialState {
-    /// Puts everything there; names that the scene does not have are passed over.
+    /// Applies the overrides to `scene`. Names that the scene does not contain are ignored.
     pub fn apply(&self, scene: &mut Scene) {
         scene.start_q = self.joints.unwrap_or(scene.start_q);
         for place in &self.places {

@@ -1,20 +1,22 @@
-//! What surfaces look like: a base and layers of procedural patterns over it, all in the object frame at rest.
+//! Appearance of surfaces: a base material with layers of procedural patterns, defined in the object frame at rest.
 
 use std::sync::Arc;
 
 use super::decal::TextDecal;
 use crate::geometry::shape::Shape;
 
-/// The look of a surface (metal/rough model). Colours are linear RGB.
+/// Visual material of a surface (metalness–roughness model). Colours are linear RGB.
+///
+/// The layers are blended over the base in order, like coats of paint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Visual {
     /// Base colour, 0..=1.
     pub albedo: [f64; 3],
-    /// Roughness, 0..=1 (the square is GGX's width).
+    /// Roughness, 0..=1; its square is the α of the GGX distribution.
     pub roughness: f64,
     /// Metalness, 0..=1.
     pub metalness: f64,
-    /// Painted over the base one after the other.
+    /// Layers over the base, from the bottom to the top.
     pub layers: Vec<VisualLayer>,
 }
 
@@ -25,12 +27,12 @@ impl Default for Visual {
 }
 
 impl Visual {
-    /// One colour all over.
+    /// A material without layers.
     pub fn plain(albedo: [f64; 3], roughness: f64, metalness: f64) -> Self {
         Self { albedo, roughness, metalness, layers: Vec::new() }
     }
 
-    /// The same with another layer on top.
+    /// The same material with another layer on top.
     #[must_use]
     pub fn with(mut self, layer: VisualLayer) -> Self {
         self.layers.push(layer);
@@ -38,27 +40,27 @@ impl Visual {
     }
 }
 
-/// A colour laid over what is below where a mask says so.
+/// A colour blended over the layers below, weighted by a mask.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VisualLayer {
-    /// Where.
+    /// Spatial weight of the layer.
     pub mask: Mask,
     /// Colour, linear RGB, 0..=1.
     pub albedo: [f64; 3],
     /// Roughness, 0..=1.
     pub roughness: f64,
-    /// Share of this layer where the mask is 1, 0..=1; 0 leaves the relief alone.
+    /// Opacity where the mask is 1, 0..=1; at 0 only the relief of the layer remains.
     pub opacity: f64,
-    /// Height of the drawn surface where the mask is 1, m (it is drawn only: nothing touches it).
+    /// Height by which the rendered surface is raised where the mask is 1, m. Rendered only: contact does not see it.
     pub relief_m: f64,
 }
 
-/// A number between 0 and 1 at every point of an object. Lengths are metres, points those of the object frame at rest.
+/// A weight in 0..=1 at every surface point of an object. Lengths are in metres, points in the object frame at rest.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Mask {
     /// 1 everywhere.
     Whole,
-    /// Cubes of edge `size_m`, every other one 1; a corner lies at the origin.
+    /// Alternating cubes of edge `size_m`, with a corner at the origin.
     Checker {
         /// Edge, m.
         size_m: f64,
@@ -67,54 +69,54 @@ pub enum Mask {
     Stripes {
         /// Direction, any length.
         axis: [f64; 3],
-        /// Distance from one to the next, m.
+        /// Period, m.
         pitch_m: f64,
-        /// Share that is 1, 0..=1.
+        /// Share of a period with weight 1, 0..=1.
         share: f64,
     },
     /// From 0 at `from_m` to 1 at `to_m` along `axis`, smoothly.
     Gradient {
         /// Direction, any length.
         axis: [f64; 3],
-        /// Where it is 0, m.
+        /// Coordinate of weight 0, m.
         from_m: f64,
-        /// Where it is 1, m.
+        /// Coordinate of weight 1, m.
         to_m: f64,
     },
-    /// Cloudy noise (fractal sum of octaves), stretched to 0 at `from` and 1 at `to`.
+    /// Fractal noise (a sum of octaves), mapped linearly to 0 at `from` and 1 at `to`.
     Noise {
         /// Size of the coarsest features along x, y, z, m.
         size_m: [f64; 3],
-        /// Octaves, each half the size and half the weight of the one before, 1..=8.
+        /// Number of octaves, 1..=8; each has half the size and half the weight of the one before.
         octaves: u32,
-        /// Value of the noise (0..=1, mean 0.5) that becomes 0.
+        /// Noise value (0..=1, mean 0.5) of weight 0.
         from: f64,
-        /// Value that becomes 1; below `from` for the inverse.
+        /// Noise value of weight 1; less than `from` for the inverse.
         to: f64,
-        /// Chooses the noise.
+        /// Seed of the noise.
         seed: u32,
     },
-    /// Year rings: cylinders about the line through `centre_m` along z, bent by noise.
+    /// Growth rings of wood: coaxial cylinders about the line through `centre_m` along z, distorted by noise.
     Rings {
-        /// A point of the axis, m.
+        /// Point on the axis, m.
         centre_m: [f64; 3],
-        /// Distance from one ring to the next, m.
+        /// Distance between rings, m.
         pitch_m: f64,
-        /// How far noise bends them, m.
+        /// Amplitude of the distortion, m.
         wobble_m: f64,
-        /// Chooses the noise.
+        /// Seed of the noise.
         seed: u32,
     },
-    /// Boards that lie along x, side by side in y: a constant a board between 0 and 1.
+    /// Floor boards along x, side by side in y: a random constant weight per board.
     Boards {
         /// Length of a board, m.
         length_m: f64,
         /// Width of a board, m.
         width_m: f64,
-        /// Chooses the values.
+        /// Seed of the weights.
         seed: u32,
     },
-    /// The gaps between the boards of the same sizes.
+    /// The gaps between boards of these sizes (see [`Mask::Boards`]).
     Seams {
         /// Length of a board, m.
         length_m: f64,
@@ -123,13 +125,13 @@ pub enum Mask {
         /// Width of a gap, m.
         gap_m: f64,
     },
-    /// Round specks, one in each cube of edge `spacing_m`, strewn about.
+    /// Spheres at random places, one in each cube of edge `spacing_m`.
     Specks {
-        /// Mean distance, m.
+        /// Mean distance between spheres, m.
         spacing_m: f64,
         /// Radius, m.
         radius_m: f64,
-        /// Chooses the places.
+        /// Seed of the places.
         seed: u32,
     },
     /// A plain weave in x and y.
@@ -137,35 +139,35 @@ pub enum Mask {
         /// Width of a thread, m.
         pitch_m: f64,
     },
-    /// Where the surface faces `axis`: by the cosine between its normal and that, 0 at `from`, 1 at `to`.
+    /// Weight by the cosine between the surface normal and `axis`: 0 at `from`, 1 at `to`.
     Facing {
         /// Direction, any length.
         axis: [f64; 3],
-        /// Cosine that becomes 0.
+        /// Cosine of weight 0.
         from: f64,
-        /// Cosine that becomes 1; below `from` for the inverse.
+        /// Cosine of weight 1; less than `from` for the inverse.
         to: f64,
     },
-    /// Inside of a shape.
+    /// Interior of a shape.
     Inside {
         /// The shape.
         shape: Arc<Shape>,
-        /// Width of the border, half of it on either side of the shape's surface, m.
+        /// Width of the transition, centred on the surface of the shape, m.
         soft_m: f64,
     },
-    /// The letters of a line of text, where the surface faces who reads it.
+    /// The glyphs of a line of text, on surfaces that face the reading direction.
     Text {
-        /// The line.
+        /// The text with its place and style.
         print: Arc<TextDecal>,
     },
-    /// One minus a mask.
+    /// One minus another mask.
     Inverse {
-        /// The mask.
+        /// The other mask.
         mask: Arc<Mask>,
     },
-    /// The product of masks: where all of them are.
+    /// The product of masks (their intersection).
     Both {
-        /// The masks.
+        /// The factors.
         masks: Vec<Arc<Mask>>,
     },
 }
