@@ -285,7 +285,7 @@ fn every_rigid_recipe_has_its_size_and_mass_and_stands_on_zero() {
 fn packages_say_what_they_are() {
     fn read(mask: &Mask, words: &mut Vec<String>) {
         match mask {
-            Mask::Text { print } => words.push(print.line.text.to_lowercase()),
+            Mask::Text { decal } => words.push(decal.line.text.to_lowercase()),
             Mask::Both { masks } => masks.iter().for_each(|mask| read(mask, words)),
             Mask::Inverse { mask } => read(mask, words),
             _ => {}

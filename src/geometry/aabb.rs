@@ -74,18 +74,18 @@ impl Aabb {
     }
 }
 
-/// The box of something that may touch others.
+/// A bounding box for the broad phase.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GroupedAabb {
-    /// Its box, in a frame common to all.
+    /// Bounds, in a frame common to all boxes.
     pub bounds: Aabb,
-    /// Things of one group never touch each other (the links of one robot, the walls of one basket).
+    /// Boxes of the same group never form a pair (the links of one robot, the walls of one basket).
     pub group: u32,
 }
 
-/// Index pairs (i < j) of candidates of different groups whose boxes overlap or touch, in ascending order.
-pub fn overlapping_pairs(candidates: &[GroupedAabb]) -> Vec<(usize, usize)> {
-    let boxes: Vec<bounding_volume::Aabb> = candidates
+/// Index pairs (i < j) of intersecting boxes of different groups, in ascending order.
+pub fn overlapping_pairs(grouped: &[GroupedAabb]) -> Vec<(usize, usize)> {
+    let boxes: Vec<bounding_volume::Aabb> = grouped
         .iter()
         .map(|c| bounding_volume::Aabb::new(to_parry(&c.bounds.min), to_parry(&c.bounds.max)))
         .collect();
@@ -93,9 +93,7 @@ pub fn overlapping_pairs(candidates: &[GroupedAabb]) -> Vec<(usize, usize)> {
     let mut pairs = Vec::new();
     for (i, bounds) in boxes.iter().enumerate() {
         let overlapping = tree.intersect_aabb(bounds).map(|j| j as usize);
-        pairs.extend(
-            overlapping.filter(|&j| i < j && candidates[i].group != candidates[j].group).map(|j| (i, j)),
-        );
+        pairs.extend(overlapping.filter(|&j| i < j && grouped[i].group != grouped[j].group).map(|j| (i, j)));
     }
     pairs.sort_unstable();
     pairs

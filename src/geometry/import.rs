@@ -1,4 +1,4 @@
-//! Reading a user's own object: OBJ, STL and binary or self-contained glTF.
+//! Import of triangle meshes from OBJ, STL and binary glTF (GLB) files.
 
 use std::io::Cursor;
 
@@ -7,56 +7,47 @@ use super::{
     mesh::{Mesh, MeshError},
 };
 
-/// How to read a mesh file.
+/// Unit and orientation of a mesh file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImportOptions {
-    /// Metres in a unit of the file (1e-3 for a file in millimetres).
+    /// Length of the unit of the file, m (1e-3 for a file in millimetres); positive.
     pub scale: f64,
-    /// Whether z is up in the file; otherwise y is, and the mesh is turned upright.
+    /// True if z is up in the file. Otherwise y is up, and the mesh is rotated.
     pub z_up: bool,
 }
 
-/// File formats, by the usual extensions.
+/// Supported file formats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MeshFormat {
-    /// Wavefront OBJ.
+    /// Wavefront OBJ, `.obj`.
     Obj,
-    /// STL, binary or ASCII.
+    /// Binary or ASCII STL, `.stl`.
     Stl,
-    /// glTF 2.0, binary (GLB).
+    /// Binary glTF 2.0, `.glb`.
     Gltf,
 }
 
-/// Why a file is no mesh. The caller names the file.
+/// Failure to import a mesh. The caller adds the name of the file.
+#[allow(missing_docs)] // The messages say it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ImportError {
-    /// The extension is not known.
-    #[error("\"{0}\" is no known mesh format; give an .obj, .stl or .glb file")]
+    #[error("\"{0}\" is not a supported mesh format; give an .obj, .stl or .glb file")]
     Extension(String),
-    /// The bytes do not parse.
     #[error("cannot be read as {format}: {reason}")]
-    Unreadable {
-        /// The format that was tried.
-        format: &'static str,
-        /// What the reader says.
-        reason: String,
-    },
-    /// The scale is not positive.
-    #[error("scale is {0}; give the metres in a unit of the file, above 0")]
+    Unreadable { format: &'static str, reason: String },
+    #[error("scale is {0}; give the length of the unit of the file in metres, above 0")]
     Scale(f64),
-    /// A node of a glTF scene holds something that is not read.
     #[error("uses {0}; export plain triangles into one .glb file")]
     Unsupported(&'static str),
-    /// What was read is no solid.
     #[error(transparent)]
     Mesh(#[from] MeshError),
 }
 
 impl MeshFormat {
-    /// The format that a file name's extension stands for.
+    /// Returns the format of a file name extension, in upper or lower case.
     ///
     /// # Errors
-    /// If it is none of `obj`, `stl`, `glb`.
+    /// If the extension is not `obj`, `stl` or `glb`.
     pub fn from_extension(extension: &str) -> Result<Self, ImportError> {
         match extension.to_ascii_lowercase().as_str() {
             "obj" => Ok(Self::Obj),
@@ -67,10 +58,12 @@ impl MeshFormat {
     }
 }
 
-/// Reads a mesh; all objects of the file become one. [`Mesh::into_shape`] makes a solid of it.
+/// Reads a mesh from the bytes of a file, in metres with z up. All objects of the file are merged into one mesh.
+///
+/// Materials are ignored. [`Shape::from_mesh`](super::shape::Shape::from_mesh) turns a closed mesh into a solid.
 ///
 /// # Errors
-/// If the bytes do not parse, or the mesh is empty, has coordinates that are not finite or indices that are wrong.
+/// If the bytes do not parse, the mesh is empty, or a coordinate or an index is invalid.
 pub fn import(bytes: &[u8], format: MeshFormat, options: &ImportOptions) -> Result<Mesh, ImportError> {
     if !(options.scale > 0.0 && options.scale.is_finite()) {
         return Err(ImportError::Scale(options.scale));
@@ -80,7 +73,7 @@ pub fn import(bytes: &[u8], format: MeshFormat, options: &ImportOptions) -> Resu
         MeshFormat::Stl => read_stl(bytes)?,
         MeshFormat::Gltf => read_gltf(bytes)?,
     };
-    // Turning y up into z up is a quarter turn about x.
+    // From y up to z up: a quarter turn about x.
     let upright =
         if options.z_up { Mat3::identity() } else { Mat3::new(1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0) };
     mesh.vertices.iter_mut().for_each(|v| *v = upright * *v * options.scale);
@@ -91,7 +84,7 @@ pub fn import(bytes: &[u8], format: MeshFormat, options: &ImportOptions) -> Resu
 fn read_obj(bytes: &[u8]) -> Result<Mesh, ImportError> {
     let unreadable = |reason: String| ImportError::Unreadable { format: "OBJ", reason };
     let options = tobj::LoadOptions { triangulate: true, single_index: true, ..Default::default() };
-    // Materials are not ours to read: appearances are given in the recipe.
+    // Appearance is defined in asset scripts, so material files are not opened.
     let no_materials = |_: &std::path::Path| Err(tobj::LoadError::OpenFileFailed);
     let (models, _) = tobj::load_obj_buf(&mut Cursor::new(bytes), &options, no_materials)
         .map_err(|error| unreadable(error.to_string()))?;
@@ -142,8 +135,8 @@ fn read_gltf(bytes: &[u8]) -> Result<Mesh, ImportError> {
     Ok(out)
 }
 
-/// Deeper scene trees are refused.
-const DEEPEST: usize = 64;
+/// Largest depth of a scene tree, which bounds the recursion.
+const MAX_DEPTH: usize = 64;
 
 fn read_node(
     node: &gltf::Node,
@@ -152,7 +145,7 @@ fn read_node(
     out: &mut Mesh,
     depth: usize,
 ) -> Result<(), ImportError> {
-    if depth > DEEPEST {
+    if depth > MAX_DEPTH {
         return Err(ImportError::Unsupported("a scene tree more than 64 deep"));
     }
     let columns = node.transform().matrix();
@@ -186,7 +179,7 @@ fn read_primitive(
     let uvs: Vec<[f64; 2]> = reader
         .read_tex_coords(0)
         .map_or_else(Vec::new, |uvs| uvs.into_f32().map(|uv| uv.map(f64::from)).collect());
-    // A mirrored node turns its triangles inside out.
+    // A mirroring transform reverses the orientation of triangles.
     let mirrored = pose.fixed_view::<3, 3>(0, 0).determinant() < 0.0;
     for t in indices.chunks_exact(3) {
         let t = if mirrored { [t[0], t[2], t[1]] } else { [t[0], t[1], t[2]] };

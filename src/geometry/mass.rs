@@ -7,7 +7,7 @@ use super::{
     surface_mesh::surface_triangles,
 };
 
-/// Mass properties of a solid.
+/// Mass, centre of mass and inertia of a uniform solid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MassProperties {
     /// Mass, kg.
@@ -18,22 +18,22 @@ pub struct MassProperties {
     pub inertia: Mat3,
 }
 
-/// Cells along the longest edge of the skin that shapes without a closed form are integrated over.
+/// Cells along the longest edge of the surface mesh over which shapes without a closed form are integrated.
 const CELLS: f64 = 96.0;
-/// The same where only the order of magnitude matters.
-const ROUGH_CELLS: f64 = 24.0;
+/// The same for approximate values.
+const COARSE_CELLS: f64 = 24.0;
 
-/// Mass properties of `shape` at a uniform `density`, kg/m³.
+/// Mass properties of `shape` with uniform `density`, kg/m³.
 ///
 /// Exact for boxes, spheres, ellipsoids, capsules, cylinders, tori, prisms, lathes, imported meshes and their placements;
-/// otherwise integrated over a fine closed skin.
+/// otherwise integrated over a fine closed surface mesh.
 pub fn mass_properties(shape: &Shape, density: f64) -> MassProperties {
     unit_density(shape, CELLS).scaled(density)
 }
 
-/// [`mass_properties`] to about a hundredth, in a sixtieth of the time.
+/// As [`mass_properties`], to about 1 %, in a sixtieth of the time.
 pub fn approximate_mass_properties(shape: &Shape, density: f64) -> MassProperties {
-    unit_density(shape, ROUGH_CELLS).scaled(density)
+    unit_density(shape, COARSE_CELLS).scaled(density)
 }
 
 impl MassProperties {
@@ -45,7 +45,7 @@ impl MassProperties {
         Self { mass, com: Vec3::zeros(), inertia: Mat3::from_diagonal(&diagonal) * mass }
     }
 
-    fn moved(self, pose: &Pose) -> Self {
+    fn transformed(self, pose: &Pose) -> Self {
         let turn = pose.rotation.to_rotation_matrix();
         Self {
             mass: self.mass,
@@ -85,14 +85,14 @@ fn unit_density(shape: &Shape, cells: f64) -> MassProperties {
         }
         Shape::Prism { section, half_length } => of_mesh(&prism_mesh(section, *half_length)),
         Shape::Lathe(profile) => revolved(profile),
-        Shape::Placed { shape, pose } => unit_density(shape, cells).moved(pose),
+        Shape::Placed { shape, pose } => unit_density(shape, cells).transformed(pose),
         Shape::Paint { shape, .. } => unit_density(shape, cells),
         Shape::Mesh(solid) => of_mesh(solid.mesh()),
         _ => of_mesh(&surface_triangles(shape, shape.loose_bounds().size().max() / cells).0),
     }
 }
 
-/// A cylinder and two half balls, whose centres of mass lie 3/8 of the radius over their flat side.
+/// A cylinder and two hemispheres, whose centres of mass lie 3/8 of the radius above their flat side.
 fn capsule(radius: f64, half_length: f64) -> MassProperties {
     let (r, h) = (radius * radius, half_length);
     let tube = 2.0 * std::f64::consts::PI * r * h;
@@ -103,7 +103,8 @@ fn capsule(radius: f64, half_length: f64) -> MassProperties {
     MassProperties::centred(mass, Vec3::new(across, across, axial) / mass)
 }
 
-/// The hull of a prism. Fans over the end faces may overlap outside of a hollow polygon; signed integrals do not mind.
+/// The surface of a prism. The triangle fans of its ends may overlap outside of a concave polygon, where their signed
+/// integrals cancel.
 fn prism_mesh(section: &Polygon, half_length: f64) -> Mesh {
     let corners = section.points();
     let n = corners.len() as u32;
@@ -115,7 +116,7 @@ fn prism_mesh(section: &Polygon, half_length: f64) -> Mesh {
     Mesh { vertices: end(-half_length).chain(end(half_length)).collect(), triangles, uvs: Vec::new() }
 }
 
-/// Exact integrals over a revolved polygon, turned into line integrals around it by Green's theorem; along an edge the
+/// Exact integrals over a revolved polygon, as line integrals along its boundary (Green's theorem). Along an edge the
 /// integrands are polynomials of degree 4, which three Gauss points integrate exactly.
 fn revolved(profile: &Polygon) -> MassProperties {
     use std::f64::consts::PI;

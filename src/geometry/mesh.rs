@@ -1,59 +1,38 @@
-//! Triangle meshes and the solids they bound.
+//! Triangle meshes: volume, area, welding and validation.
 
 use std::collections::BTreeMap;
 
 use super::Vec3;
 
-/// A triangle mesh in the object frame, m.
+/// A triangle mesh.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Mesh {
-    /// Corner positions.
+    /// Vertex positions, object frame, m.
     pub vertices: Vec<Vec3>,
-    /// Corner indices, counter-clockwise seen from outside.
+    /// Vertex indices of each triangle, counter-clockwise as seen from outside.
     pub triangles: Vec<[u32; 3]>,
     /// Texture coordinates of the three corners of each triangle, or empty.
     pub uvs: Vec<[[f64; 2]; 3]>,
 }
 
-/// Why a mesh bounds no solid.
+/// Reason why a mesh does not bound a solid.
+#[allow(missing_docs)] // The messages say it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MeshError {
-    /// No triangles.
     #[error("the mesh is empty: it has no triangles; export a closed surface")]
     Empty,
-    /// A coordinate is NaN or infinite.
     #[error("vertex {vertex} has a coordinate that is not a number; export the mesh again")]
-    NotFinite {
-        /// Index of the vertex.
-        vertex: usize,
-    },
-    /// A triangle names a vertex that is not there.
+    NotFinite { vertex: usize },
     #[error(
         "triangle {triangle} names vertex {vertex}, but there are {vertices} vertices; export the mesh again"
     )]
-    Index {
-        /// Index of the triangle.
-        triangle: usize,
-        /// The vertex it names.
-        vertex: u32,
-        /// How many there are.
-        vertices: usize,
-    },
-    /// Edges with a triangle on one side only.
+    Index { triangle: usize, vertex: u32, vertices: usize },
     #[error("the mesh is open: {edges} edges have a triangle on one side only; close its holes")]
-    Open {
-        /// How many.
-        edges: usize,
-    },
-    /// Edges with more than two triangles, or two triangles that disagree on which side is out.
+    Open { edges: usize },
     #[error(
         "{edges} edges are shared by more than two triangles or by two of opposite orientation; make the surface a manifold with consistent normals"
     )]
-    NonManifold {
-        /// How many.
-        edges: usize,
-    },
-    /// No volume.
+    NonManifold { edges: usize },
     #[error("the mesh encloses no volume; export a solid, not a sheet")]
     Flat,
 }
@@ -81,7 +60,7 @@ impl Mesh {
             .sum()
     }
 
-    /// Merges vertices at the same place and drops triangles that thereby vanish.
+    /// Merges vertices with equal positions and removes triangles that become degenerate.
     pub fn welded(&self) -> Self {
         let mut index = BTreeMap::new();
         let mut out = Self::default();
@@ -106,10 +85,10 @@ impl Mesh {
         out
     }
 
-    /// Checks indices and coordinates.
+    /// Validates indices and coordinates.
     ///
     /// # Errors
-    /// If the mesh is empty, a coordinate is not finite or a triangle names a missing vertex.
+    /// If the mesh has no triangles, a coordinate is not finite or an index is out of range.
     pub fn validate(&self) -> Result<(), MeshError> {
         if self.triangles.is_empty() {
             return Err(MeshError::Empty);
@@ -126,10 +105,10 @@ impl Mesh {
         Ok(())
     }
 
-    /// Checks that every edge is shared by exactly two triangles of like orientation.
+    /// Validates that every edge is shared by exactly two triangles of consistent orientation.
     ///
     /// # Errors
-    /// Counts the edges that are not.
+    /// The number of edges that are not.
     pub fn validate_closed(&self) -> Result<(), MeshError> {
         let mut uses: BTreeMap<[u32; 2], [u32; 2]> = BTreeMap::new();
         for t in &self.triangles {

@@ -1,7 +1,7 @@
-//! A fixed quadrature of a body's surface, embedded in its voxel mesh.
+//! Quadrature points of the surface of a soft body, embedded in its voxel mesh.
 //!
-//! Boxes are sampled by regular grids per face and bodies of revolution by rings, both with exact areas; other shapes
-//! by gathering the triangles of a fine skin.
+//! Boxes and prisms are sampled by regular grids per face and solids of revolution by rings, with exact areas; other shapes
+//! by clustering the triangles of a fine surface mesh.
 
 use std::collections::BTreeMap;
 
@@ -12,66 +12,68 @@ use super::{
     voxel::{SurfaceSample, VoxelMesh},
 };
 
-/// How densely to sample.
+/// Density of surface samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampleSpec {
-    /// Mean spacing where a gripper can reach (|n_z| ≤ 0.7), m.
+    /// Mean spacing on surfaces that a gripper can reach (|n_z| ≤ 0.7), m.
     pub grasp_spacing: f64,
-    /// Mean spacing elsewhere, m.
+    /// Mean spacing on other surfaces, m.
     pub other_spacing: f64,
 }
 
 impl Default for SampleSpec {
-    /// 0.75 mm and 2 mm.
+    /// 0.75 mm on graspable surfaces and 2 mm on others.
     fn default() -> Self {
         Self { grasp_spacing: 0.75e-3, other_spacing: 2e-3 }
     }
 }
 
 impl SampleSpec {
-    /// The spacing for a surface with this normal.
+    /// The spacing on a surface with this normal.
     fn spacing(&self, normal: &Vec3) -> f64 {
-        if normal.z.abs() <= STEEP { self.grasp_spacing } else { self.other_spacing }
+        if normal.z.abs() <= MAX_GRASP_NZ { self.grasp_spacing } else { self.other_spacing }
     }
 }
 
-/// A gripper with horizontal jaws reaches surfaces up to this |n_z|.
-const STEEP: f64 = 0.7;
+/// Largest |n_z| of surfaces that a gripper with horizontal jaws can reach.
+const MAX_GRASP_NZ: f64 = 0.7;
 
-/// A piece of surface.
+/// A sample before embedding.
 struct Patch {
     p: Vec3,
     n: Vec3,
     area: f64,
 }
 
-/// Triangles of a skin that become one sample.
+/// Triangles of a surface mesh that are merged into one sample.
 #[derive(Default)]
-struct Gathered {
+struct Cluster {
     moment: Vec3,
     normals: Vec3,
     area: f64,
-    /// Area and middle of the largest of them.
-    largest: (f64, Vec3),
+    /// Area of the largest triangle.
+    largest_area: f64,
+    /// Centroid of the largest triangle.
+    largest_centre: Vec3,
 }
 
-/// Samples lie on the surface to this, m.
-const OFF: f64 = 1e-4;
+/// Largest distance of a sample from the surface, m.
+const SURFACE_TOLERANCE: f64 = 1e-4;
 
-impl Gathered {
+impl Cluster {
     fn patch(&self, shape: &Shape) -> Patch {
         let middle = self.moment / self.area;
-        let on_surface = |p: &Vec3| shape.distance(p).abs() < OFF;
-        // In a crease the middle may have no surface nearby; the largest triangle lies on it.
-        let p = shape.project(&middle, self.area.sqrt()).filter(on_surface).unwrap_or(self.largest.1);
+        let on_surface = |p: &Vec3| shape.distance(p).abs() < SURFACE_TOLERANCE;
+        // In a concave edge the centroid may have no surface nearby; the largest triangle is on the surface.
+        let p = shape.project(&middle, self.area.sqrt()).filter(on_surface).unwrap_or(self.largest_centre);
         Patch { p, n: self.normals.normalize(), area: self.area }
     }
 }
 
-/// Samples the surface of `shape` and embeds the samples in its voxel mesh, sorted by element.
+/// Samples the surface of `shape` and embeds the samples in its voxel mesh `mesh`; sorted by element.
 pub fn surface_samples(shape: &Shape, mesh: &VoxelMesh, spec: &SampleSpec) -> Vec<SurfaceSample> {
     let mut samples: Vec<SurfaceSample> = exact_patches(shape, &Quat::identity(), spec)
-        .unwrap_or_else(|| skin_patches(shape, spec))
+        .unwrap_or_else(|| clustered_patches(shape, spec))
         .into_iter()
         .filter_map(|Patch { p, n, area }| Some(SurfaceSample { at: mesh.locate(&p)?, p_o: p, n_o: n, area }))
         .collect();
@@ -79,7 +81,7 @@ pub fn surface_samples(shape: &Shape, mesh: &VoxelMesh, spec: &SampleSpec) -> Ve
     samples
 }
 
-/// Patches of shapes whose surface is known in closed form; `turn` is how the shape is turned in the object frame.
+/// Patches of shapes with a closed form of their surface. `turn` is the rotation of the shape in the object frame.
 fn exact_patches(shape: &Shape, turn: &Quat, spec: &SampleSpec) -> Option<Vec<Patch>> {
     match shape {
         Shape::Box { half } => Some(box_patches(half, turn, spec)),
@@ -94,15 +96,15 @@ fn exact_patches(shape: &Shape, turn: &Quat, spec: &SampleSpec) -> Option<Vec<Pa
             Some(patches.into_iter().map(moved).collect())
         }
         Shape::Paint { shape, .. } => exact_patches(shape, turn, spec),
-        _ => Some(generators(shape)?.iter().flat_map(|piece| piece.revolve(turn, spec)).collect()),
+        _ => Some(generatrices(shape)?.iter().flat_map(|piece| piece.revolve(turn, spec)).collect()),
     }
 }
 
-/// Gathers the triangles of a skin by cells of the wanted spacing and by the side that they face, so that the two sides
-/// of an edge are not mixed; the area of the skin is kept exactly.
-fn skin_patches(shape: &Shape, spec: &SampleSpec) -> Vec<Patch> {
+/// Clusters the triangles of a surface mesh by cells of the required spacing and by the axis direction that they face, so
+/// that the sides of an edge are not mixed. The area of the mesh is preserved exactly.
+fn clustered_patches(shape: &Shape, spec: &SampleSpec) -> Vec<Patch> {
     let (mesh, _) = surface_triangles(shape, spec.grasp_spacing.min(spec.other_spacing));
-    let mut cells: BTreeMap<(usize, [i64; 3]), Gathered> = BTreeMap::new();
+    let mut cells: BTreeMap<(usize, [i64; 3]), Cluster> = BTreeMap::new();
     for triangle in &mesh.triangles {
         let [a, b, c] = triangle.map(|v| mesh.vertices[v as usize]);
         let normal_area = 0.5 * (b - a).cross(&(c - a));
@@ -115,15 +117,15 @@ fn skin_patches(shape: &Shape, spec: &SampleSpec) -> Vec<Patch> {
         let side = 2 * normal.iamax() + usize::from(normal[normal.iamax()] > 0.0);
         let cell = centre / spec.spacing(&normal);
         let key = (side, [cell.x, cell.y, cell.z].map(|x| x.floor() as i64));
-        let gathered = cells.entry(key).or_default();
-        if area > gathered.largest.0 {
-            gathered.largest = (area, centre);
+        let cluster = cells.entry(key).or_default();
+        if area > cluster.largest_area {
+            (cluster.largest_area, cluster.largest_centre) = (area, centre);
         }
-        gathered.moment += centre * area;
-        gathered.normals += normal_area;
-        gathered.area += area;
+        cluster.moment += centre * area;
+        cluster.normals += normal_area;
+        cluster.area += area;
     }
-    cells.into_values().map(|gathered| gathered.patch(shape)).collect()
+    cells.into_values().map(|cluster| cluster.patch(shape)).collect()
 }
 
 fn box_patches(half: &Vec3, turn: &Quat, spec: &SampleSpec) -> Vec<Patch> {
@@ -147,7 +149,7 @@ fn box_patches(half: &Vec3, turn: &Quat, spec: &SampleSpec) -> Vec<Patch> {
     patches
 }
 
-/// The walls of a prism by regular grids, its ends by a grid whose cells are clipped to the polygon.
+/// Patches of a prism: regular grids on its walls, and grids clipped to the polygon on its ends.
 fn prism_patches(section: &Polygon, half_length: f64, turn: &Quat, spec: &SampleSpec) -> Vec<Patch> {
     let mut patches = Vec::new();
     for (a, b) in section.walls() {
@@ -173,42 +175,43 @@ fn prism_patches(section: &Polygon, half_length: f64, turn: &Quat, spec: &Sample
     patches
 }
 
-/// A piece of the curve (r, z) that a surface of revolution is made of; the outside is to its right.
-enum Generator {
+/// A piece of the generatrix (r, z) of a surface of revolution; the outside is to its right.
+enum Generatrix {
     Line { from: [f64; 2], to: [f64; 2] },
     Arc { centre: [f64; 2], radius: f64, from: f64, to: f64 },
 }
 
-fn generators(shape: &Shape) -> Option<Vec<Generator>> {
+fn generatrices(shape: &Shape) -> Option<Vec<Generatrix>> {
     use std::f64::consts::{FRAC_PI_2, TAU};
-    let lines = |profile: &Polygon| profile.walls().map(|(from, to)| Generator::Line { from, to }).collect();
+    let lines = |profile: &Polygon| profile.walls().map(|(from, to)| Generatrix::Line { from, to }).collect();
     match shape {
         Shape::Sphere { radius } => {
-            Some(vec![Generator::Arc { centre: [0.0; 2], radius: *radius, from: -FRAC_PI_2, to: FRAC_PI_2 }])
+            Some(vec![Generatrix::Arc { centre: [0.0; 2], radius: *radius, from: -FRAC_PI_2, to: FRAC_PI_2 }])
         }
         Shape::Capsule { radius, half_length } => {
             let (r, h) = (*radius, *half_length);
-            let mut pieces = vec![Generator::Arc { centre: [0.0, -h], radius: r, from: -FRAC_PI_2, to: 0.0 }];
+            let mut pieces =
+                vec![Generatrix::Arc { centre: [0.0, -h], radius: r, from: -FRAC_PI_2, to: 0.0 }];
             if h > 0.0 {
-                pieces.push(Generator::Line { from: [r, -h], to: [r, h] });
+                pieces.push(Generatrix::Line { from: [r, -h], to: [r, h] });
             }
-            pieces.push(Generator::Arc { centre: [0.0, h], radius: r, from: 0.0, to: FRAC_PI_2 });
+            pieces.push(Generatrix::Arc { centre: [0.0, h], radius: r, from: 0.0, to: FRAC_PI_2 });
             Some(pieces)
         }
         Shape::Cylinder { radius, half_height } => {
             let (r, h) = (*radius, *half_height);
             let corners = [[0.0, -h], [r, -h], [r, h], [0.0, h]];
-            Some(corners.windows(2).map(|c| Generator::Line { from: c[0], to: c[1] }).collect())
+            Some(corners.windows(2).map(|c| Generatrix::Line { from: c[0], to: c[1] }).collect())
         }
         Shape::Torus { major, minor } => {
-            Some(vec![Generator::Arc { centre: [*major, 0.0], radius: *minor, from: 0.0, to: TAU }])
+            Some(vec![Generatrix::Arc { centre: [*major, 0.0], radius: *minor, from: 0.0, to: TAU }])
         }
         Shape::Lathe(profile) => Some(lines(profile)),
         _ => None,
     }
 }
 
-impl Generator {
+impl Generatrix {
     fn length(&self) -> f64 {
         match self {
             Self::Line { from, to } => (to[0] - from[0]).hypot(to[1] - from[1]),
@@ -216,7 +219,7 @@ impl Generator {
         }
     }
 
-    /// Place and outward normal in (r, z) at a share 0..=1 of the length.
+    /// Point and outward normal in (r, z) at a share 0..=1 of the length.
     fn at(&self, share: f64) -> ([f64; 2], [f64; 2]) {
         match self {
             Self::Line { from, to } => {
@@ -247,7 +250,7 @@ impl Generator {
         }
     }
 
-    /// Cuts the revolved surface into coarse patches, and those that a gripper reaches into finer ones.
+    /// Divides the surface of revolution into coarse patches, and those that a gripper can reach into finer ones.
     fn revolve(&self, turn: &Quat, spec: &SampleSpec) -> Vec<Patch> {
         let mut patches = Vec::new();
         let bands = (self.length() / spec.other_spacing - 1e-9).ceil().max(1.0);
@@ -266,7 +269,7 @@ impl Generator {
         patches
     }
 
-    /// Cuts one coarse patch, from `corner` by `size` in (share of length, angle).
+    /// Divides one coarse patch, from `corner` by `size` in (share of length, angle), if it is graspable.
     fn cut(&self, corner: [f64; 2], size: [f64; 2], turn: &Quat, spec: &SampleSpec, out: &mut Vec<Patch>) {
         let middle = self.patch(corner, size);
         let spacing = spec.spacing(&(turn * middle.n));

@@ -1,7 +1,7 @@
-//! The watertight triangle skin of a shape.
+//! Watertight triangle meshes of the surfaces of shapes.
 //!
-//! Connectivity comes from naive surface nets (Gibson 1998); vertices are then placed by the quadric error of dual
-//! contouring (Ju et al. 2002), so that sharp edges and corners stay sharp, and projected on the surface.
+//! Connectivity comes from naive surface nets (Gibson 1998). Vertices are placed by the quadric error of dual contouring
+//! (Ju et al. 2002), which preserves sharp edges and corners, and projected on the surface.
 
 use fast_surface_nets::{SurfaceNetsBuffer, ndshape::RuntimeShape, surface_nets};
 
@@ -12,10 +12,10 @@ use super::{
     voxel::{Embedding, VoxelMesh},
 };
 
-/// A closed triangle mesh on the surface of a shape.
+/// A closed triangle mesh of the surface of a shape.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SurfaceMesh {
-    /// Vertices, triangles (counter-clockwise seen from outside) and texture coordinates by triangle corner.
+    /// Vertices, outward-oriented triangles, and texture coordinates per triangle corner.
     pub mesh: Mesh,
     /// Outward unit normal at each vertex.
     pub normals: Vec<Vec3>,
@@ -23,9 +23,9 @@ pub struct SurfaceMesh {
     pub materials: Vec<u16>,
 }
 
-/// Most grid points of a skin; a smaller cell is enlarged to fit (memory, not quality, is bounded).
-const MOST_POINTS: f64 = 2e7;
-/// Edge of the blocks of cells that are skipped together where they lie far from the surface.
+/// Largest number of grid points, which bounds the memory; smaller cells are enlarged to fit.
+const MAX_POINTS: f64 = 2e7;
+/// Edge, in cells, of the blocks that are skipped as a whole where they are far from the surface.
 const BLOCK: usize = 4;
 
 /// The triangles of [`SurfaceMesh::from_shape`] and the normals at their vertices, without materials and texture
@@ -33,7 +33,7 @@ const BLOCK: usize = 4;
 pub(super) fn surface_triangles(shape: &Shape, cell: f64) -> (Mesh, Vec<Vec3>) {
     if let Shape::Mesh(solid) = shape {
         let mesh = solid.mesh().clone();
-        let normals = mesh.vertices.iter().map(|v| shape.first_order(v).1).collect();
+        let normals = mesh.vertices.iter().map(|v| shape.first_order(v).normal).collect();
         return (mesh, normals);
     }
     let grid = Grid::over(&shape.loose_bounds(), cell);
@@ -45,7 +45,7 @@ pub(super) fn surface_triangles(shape: &Shape, cell: f64) -> (Mesh, Vec<Vec3>) {
     surface_nets(&values, &array, [0; 3], top, &mut buffer);
     let vertices: Vec<Vec3> =
         buffer.surface_points.iter().map(|at| grid.vertex(shape, &values, at.map(|i| i as usize))).collect();
-    let normals: Vec<Vec3> = vertices.iter().map(|v| shape.first_order(v).1).collect();
+    let normals: Vec<Vec3> = vertices.iter().map(|v| shape.first_order(v).normal).collect();
     let triangles =
         buffer.indices.chunks_exact(6).flat_map(|quad| split(shape, &vertices, &normals, quad)).collect();
     (Mesh { vertices, triangles, uvs: Vec::new() }, normals)
@@ -60,7 +60,7 @@ impl SurfaceMesh {
         with_materials(shape, mesh, normals)
     }
 
-    /// Where each vertex sits in a voxel mesh; `None` if one is more than two voxels away from it.
+    /// Embeds each vertex in a voxel mesh; `None` if a vertex is more than two voxels away from it.
     pub fn embed(&self, mesh: &VoxelMesh) -> Option<Vec<Embedding>> {
         self.mesh.vertices.iter().map(|v| mesh.locate(v)).collect()
     }
@@ -79,8 +79,8 @@ fn with_materials(shape: &Shape, mut mesh: Mesh, normals: Vec<Vec3>) -> SurfaceM
     SurfaceMesh { mesh, normals, materials }
 }
 
-/// The two triangles of a quad. Surface nets cut a quad along its shorter diagonal, which may bridge a sharp edge; where
-/// normals differ, the diagonal whose middle lies nearer to the surface is taken.
+/// Splits a quad into two triangles. Surface nets split along the shorter diagonal, which may bridge a sharp edge. Where
+/// the normals differ, the diagonal with its midpoint nearer to the surface is used.
 fn split(shape: &Shape, vertices: &[Vec3], normals: &[Vec3], quad: &[u32]) -> [[u32; 3]; 2] {
     let (first, second) = ([quad[0], quad[1], quad[2]], [quad[3], quad[4], quad[5]]);
     let at = |v: u32| &normals[v as usize];
@@ -95,8 +95,8 @@ fn split(shape: &Shape, vertices: &[Vec3], normals: &[Vec3], quad: &[u32]) -> [[
     if off(r, s) < off(p, q) { [[s, q, r], [s, r, p]] } else { [first, second] }
 }
 
-/// Spherical texture coordinates about the longest axis (z if there is none), after scaling the bounding box to a cube.
-/// `u` may exceed 1 so that no triangle spans the seam.
+/// Spherical texture coordinates about the longest axis (z if the extents are similar), after scaling the bounding box to
+/// a cube. `u` may exceed 1, so that no triangle spans the seam.
 fn unwrap(bounds: &Aabb, corners: &[Vec3; 3]) -> [[f64; 2]; 3] {
     let size = bounds.size();
     let pole = if size.max() > 1.25 * size.z { size.imax() } else { 2 };
@@ -123,10 +123,10 @@ struct Grid {
 impl Grid {
     fn over(reach: &Aabb, cell: f64) -> Self {
         let size = reach.size().add_scalar(4.0 * cell);
-        let cell = cell.max((size.product() / MOST_POINTS).cbrt());
+        let cell = cell.max((size.product() / MAX_POINTS).cbrt());
         let count = std::array::from_fn(|axis| (reach.size()[axis] / cell).ceil() as usize + 5);
         let span = Vec3::from_fn(|axis, _| (count[axis] - 1) as f64 * cell);
-        // An offset by an odd share keeps flat faces off the lattice, where signs would be a matter of rounding.
+        // The offset keeps flat faces off the lattice, where rounding would determine the sign of distances.
         let offset = Vec3::new(0.131, 0.173, 0.117) * cell;
         Self { origin: reach.centre() - 0.5 * span + offset, cell, count }
     }
@@ -135,7 +135,7 @@ impl Grid {
         self.origin + Vec3::from_fn(|axis, _| at[axis] as f64) * self.cell
     }
 
-    /// Signed distance in cells at every point, x fastest; far from the surface only its sign counts.
+    /// Signed distance in cells at every point, x fastest; only its sign is valid far from the surface.
     fn sample(&self, shape: &Shape) -> Vec<f32> {
         let [nx, ny, nz] = self.count;
         let mut values = vec![1.0_f32; nx * ny * nz];
@@ -162,13 +162,13 @@ impl Grid {
         values
     }
 
-    /// Removes what is finer than the lattice and would make the surface touch itself: a set of lattice points is *well
-    /// composed* (Latecki 1997) if no face of a cell is a checkerboard and no cell has only two opposite corners on one
-    /// side; only then is the surface between a manifold. The least certain point of each such place changes sides.
+    /// Removes features finer than the lattice that would make the surface touch itself. A set of lattice points is *well
+    /// composed* (Latecki 1997) if no cell face is a checkerboard and no cell has only two opposite corners on one side;
+    /// only then is the surface a manifold. Wherever this is violated, the point with the smallest distance changes sides.
     fn compose_well(&self, values: &mut [f32]) {
         let [nx, ny, nz] = self.count;
         let strides = [1, nx, nx * ny];
-        for _ in 0..MOST_PASSES {
+        for _ in 0..MAX_PASSES {
             let mut changed = false;
             for cell in (0..(nx - 1) * (ny - 1) * (nz - 1))
                 .map(|c| c % (nx - 1) + nx * (c / (nx - 1) % (ny - 1) + ny * (c / (nx - 1) / (ny - 1))))
@@ -179,7 +179,7 @@ impl Grid {
                 });
                 let inside = corners.iter().filter(|&&c| values[c] < 0.0).count();
                 if inside > 0 && inside < 8 {
-                    changed |= mend_cell(&corners, inside, values);
+                    changed |= repair_cell(&corners, inside, values);
                 }
             }
             if !changed {
@@ -188,8 +188,8 @@ impl Grid {
         }
     }
 
-    /// The vertex of the cell whose lowest corner is `at`: where the surface is smooth, the mean of where it crosses the
-    /// cell's edges, projected on it; at an edge, the point that best fits the tangent planes there.
+    /// The vertex of the cell with lowest corner `at`. On a smooth surface it is the mean of the crossings with the cell's
+    /// edges, projected on the surface; at a sharp edge, the point that best fits the tangent planes of the crossings.
     fn vertex(&self, shape: &Shape, values: &[f32], at: [usize; 3]) -> Vec3 {
         let [nx, ny, _] = self.count;
         let corners: [([usize; 3], f64); 8] = std::array::from_fn(|c| {
@@ -204,44 +204,48 @@ impl Grid {
         let linear = |[a, b]: &[(Vec3, f64); 2]| a.0 + (b.0 - a.0) * (a.1 / (a.1 - b.1));
         let mean = crossed.iter().map(linear).sum::<Vec3>() / crossed.len() as f64;
         let smooth = || shape.project(&mean, self.cell).unwrap_or(mean);
-        let guesses = crossed.iter().map(|edge| shape.first_order(&linear(edge)));
+        let guesses = crossed.iter().map(|edge| {
+            let guess = shape.first_order(&linear(edge));
+            (guess.distance, guess.normal)
+        });
         if alike(guesses, BEND, STRAY * self.cell) {
             return smooth();
         }
-        // The field is not linear in this cell, so the crossings must be found for what they are.
+        // The field is not linear in this cell, so the crossings are found by bisection.
         let planes: Vec<(Vec3, Vec3)> = crossed
             .iter()
             .map(|[a, b]| crossing(shape, a.0, b.0))
-            .map(|p| (p, shape.first_order(&p).1))
+            .map(|p| (p, shape.first_order(&p).normal))
             .collect();
         if alike(planes.iter().map(|plane| (0.0, plane.1)), SHARP, 0.0) {
             return smooth();
         }
         let fit = best_fit(&planes, mean).sup(&self.point(corners[0].0)).inf(&self.point(corners[7].0));
-        // The two sides of a wall thinner than a cell have no edge between them.
+        // Reject fits off the surface, as between the two sides of a wall thinner than a cell.
         if shape.distance(&fit).abs() < LOOSE * self.cell { fit } else { smooth() }
     }
 }
 
-/// Whether all of some fields have distances within `stray` of 0 and normals within an angle of `cosine` of the first.
+/// True if all fields (distance, normal) have distances of at most `stray`, and normals within `cosine` of the first.
 fn alike(mut fields: impl Iterator<Item = (f64, Vec3)>, cosine: f64, stray: f64) -> bool {
     let Some(first) = fields.next() else { return true };
     first.0.abs() <= stray && fields.all(|field| field.0.abs() <= stray && field.1.dot(&first.1) >= cosine)
 }
 
-/// Where a linear guess is off by less than this, in cells, and normals turn by less than this cosine, a cell is smooth.
+/// A cell is smooth if its linear crossings are off the surface by at most this, in cells, and their normals differ by at
+/// most [`BEND`] (cosine).
 const STRAY: f64 = 0.03;
 /// See [`STRAY`].
 const BEND: f64 = 0.9;
 
-/// A fitted vertex farther from the surface than this, in cells, is no edge.
+/// Largest distance of a fitted vertex from the surface, in cells.
 const LOOSE: f64 = 0.1;
 
-/// Passes over the lattice; each mends what the one before has spoilt nearby.
-const MOST_PASSES: usize = 16;
+/// Largest number of passes over the lattice; a repair may invalidate neighbouring cells.
+const MAX_PASSES: usize = 16;
 
-/// Mends the first checkerboard face or pair of opposite corners of a cell; whether there was one.
-fn mend_cell(corners: &[usize; 8], inside: usize, values: &mut [f32]) -> bool {
+/// Repairs the first checkerboard face or pair of opposite corners of a cell; returns true if there was one.
+fn repair_cell(corners: &[usize; 8], inside: usize, values: &mut [f32]) -> bool {
     let is_in = |c: usize| values[corners[c]] < 0.0;
     let face = (0..3).flat_map(|axis| [0, 1].map(|side| (axis, side))).find_map(|(axis, side)| {
         let (i, j) = (1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
@@ -262,17 +266,17 @@ fn mend_cell(corners: &[usize; 8], inside: usize, values: &mut [f32]) -> bool {
     let least =
         odd.into_iter().map(|c| corners[c]).min_by(|a, b| values[*a].abs().total_cmp(&values[*b].abs()));
     if let Some(point) = least {
-        // The sign bit alone would leave an exact zero where it is.
+        // An exact zero has no side: it becomes the smallest negative number.
         values[point] =
             if values[point] < 0.0 { -values[point] } else { -values[point].max(f32::MIN_POSITIVE) };
     }
     true
 }
 
-/// Normals in a cell that differ by more than this cosine meet at an edge.
+/// Normals in a cell that differ by more than this (cosine) meet at a sharp edge.
 const SHARP: f64 = 0.8;
 
-/// Where the surface crosses the line between two points, by bisection; at their middle if it does not.
+/// Crossing of the surface with the line between two points, by bisection; the midpoint if there is no crossing.
 fn crossing(shape: &Shape, a: Vec3, b: Vec3) -> Vec3 {
     let inside_a = shape.distance(&a) < 0.0;
     if inside_a == (shape.distance(&b) < 0.0) {
@@ -287,11 +291,12 @@ fn crossing(shape: &Shape, a: Vec3, b: Vec3) -> Vec3 {
             high = middle;
         }
     }
-    // The inner end, where the normal is that of a face even next to an edge.
+    // At the inner end the normal is that of a face even next to a sharp edge.
     if inside_a { low } else { high }
 }
 
-/// Least squares of the distances to planes (point, normal), weakly held at `mean`; repeated so that the hold fades.
+/// Least squares of the distances to planes (point, normal), regularised towards `mean`. Repetition removes the bias of
+/// the regularisation.
 fn best_fit(planes: &[(Vec3, Vec3)], mean: Vec3) -> Vec3 {
     let hold = 0.01 * planes.len() as f64;
     let matrix = planes.iter().map(|(_, n)| n * n.transpose()).sum::<Mat3>() + Mat3::identity() * hold;

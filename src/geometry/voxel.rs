@@ -1,39 +1,39 @@
-//! The voxel hexahedral mesh of a soft body and what is embedded in it: plain data.
+//! Voxel meshes of soft bodies: hexahedral elements on a regular grid, cut from a shape, and points embedded in them.
 //!
-//! Corner `c` of a voxel sits at `(c & 1, c >> 1 & 1, c >> 2 & 1)` in voxel edges from its lowest corner, and its
-//! trilinear weight at local coordinates `ξ ∈ [0, 1]³` is the product over axes of `ξ` or `1 − ξ`.
+//! Corners and shape functions of an element are those of [`hex8`](super::hex8).
 
 use super::{
     Vec3, hex8,
     shape::{Shape, ShapeError},
 };
 
-/// Sub-points of a voxel along one axis; a voxel's filled part is known on `SUB³` cells.
+/// Sub-cells of a voxel along each axis, on which its filled part is known.
 pub const SUBCELLS: usize = 6;
 
-/// Which of the `SUB³` sub-cells of a voxel lie inside the body: bit `i + SUBCELLS (j + SUBCELLS k)`.
+/// Filled sub-cells of a voxel: bit `i + SUBCELLS (j + SUBCELLS k)` is set if the centre of the sub-cell is inside the
+/// body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct OccupancyMask(pub [u64; 4]);
 
 impl OccupancyMask {
-    /// A voxel that lies wholly inside.
+    /// The mask of a voxel that is entirely inside.
     pub fn full() -> Self {
         let mut fill = Self::default();
         (0..SUBCELLS * SUBCELLS * SUBCELLS).for_each(|cell| fill.insert(cell));
         fill
     }
 
-    /// Marks sub-cell `cell` as inside.
+    /// Sets the bit of sub-cell `cell`.
     pub fn insert(&mut self, cell: usize) {
         self.0[cell / 64] |= 1 << (cell % 64);
     }
 
-    /// Whether sub-cell `cell` is inside.
+    /// True if sub-cell `cell` is inside.
     pub fn contains(&self, cell: usize) -> bool {
         self.0[cell / 64] >> (cell % 64) & 1 == 1
     }
 
-    /// The share of the voxel that is inside, 0..=1.
+    /// Filled share of the voxel, 0..=1.
     pub fn fraction(&self) -> f64 {
         self.0.iter().map(|w| w.count_ones()).sum::<u32>() as f64 / (SUBCELLS * SUBCELLS * SUBCELLS) as f64
     }
@@ -45,96 +45,105 @@ impl OccupancyMask {
     }
 }
 
-/// A mesh of equal cubes over a body; nodes and elements in x-fastest order.
+/// A mesh of equal cubes that covers a shape; nodes and elements in x-fastest order.
 #[derive(Clone, Debug)]
 pub struct VoxelMesh {
-    /// Edge of a voxel, m.
+    /// Edge of the voxels, m.
     pub edge: f64,
-    /// Rest positions of the nodes, object frame.
+    /// Rest positions of the nodes, object frame, m.
     pub nodes: Vec<Vec3>,
-    /// Node indices of the eight corners of each voxel, in corner order.
+    /// Node indices of the eight corners of each element, in corner order.
     pub elements: Vec<[u32; 8]>,
-    /// Filled part of each voxel.
+    /// Filled part of each element.
     pub occupancy: Vec<OccupancyMask>,
-    /// Number of voxels along each axis of the grid the mesh was cut from.
+    /// Number of grid cells along each axis.
     pub grid: [usize; 3],
-    /// Lowest corner of that grid, object frame.
+    /// Lowest corner of the grid, object frame, m.
     pub origin: Vec3,
-    /// Element index at each grid cell (x fastest), `u32::MAX` where there is none.
+    /// Element index of each grid cell (x fastest); `u32::MAX` for empty cells.
     pub cell_element: Vec<u32>,
 }
 
-/// A material point of the body: where it sits in the voxel mesh.
+/// A material point, by its element and local coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Embedding {
     /// Element index.
     pub element: u32,
-    /// Local coordinates in the element, `[0, 1]³`.
+    /// Local coordinates in the element, nominally in `[0, 1]³`.
     pub local: Vec3,
 }
 
 impl Embedding {
-    /// Trilinear weights of the element's eight corners.
+    /// Values of the shape functions of the element's eight corners.
     pub fn weights(&self) -> [f64; 8] {
         hex8::weights(&self.local)
     }
 }
 
-/// A fixed quadrature point of the body's surface.
+/// A quadrature point of the surface of a body.
 #[derive(Clone, Copy, Debug)]
 pub struct SurfaceSample {
-    /// Where it sits in the voxel mesh.
+    /// Material point in the voxel mesh.
     pub at: Embedding,
     /// Rest position, object frame.
     pub p_o: Vec3,
     /// Outward unit normal at rest, object frame.
     pub n_o: Vec3,
-    /// Surface area it stands for, m².
+    /// Surface area that the sample represents, m².
     pub area: f64,
 }
 
-/// How to cut.
+/// Resolution of a voxel mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct VoxelSpec {
-    /// Voxels along the longest edge of the bounding box.
+    /// Voxels along the longest edge of the bounding box, 1..=[`MAX_RESOLUTION`].
     pub resolution: usize,
 }
 
-/// Why a shape has no voxel mesh.
+/// Failure to build a voxel mesh.
+#[allow(missing_docs)] // The messages say it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum VoxelMeshError {
-    /// The shape itself cannot be.
     #[error(transparent)]
     Shape(#[from] ShapeError),
-    /// The resolution is out of range.
     #[error("resolution is {0}; give 1 to {MAX_RESOLUTION} voxels along the longest edge")]
     Resolution(usize),
-    /// Nothing is inside.
     #[error("the shape is empty: nothing of it is left; check what is subtracted or intersected")]
     Empty,
-    /// Nothing is inside, or nothing that a voxel could see.
     #[error(
         "no point of a grid of {:.3} mm lies inside: the shape is empty (check what is subtracted or intersected) or \
          thinner than that (raise the resolution)",
         1e3 * .step
     )]
-    Nothing {
-        /// Spacing of the points that were tried, m.
-        step: f64,
-    },
+    Nothing { step: f64 },
 }
 
-/// Largest resolution: a million voxels for a cube.
+/// Largest resolution; a cube then has a million voxels.
 pub const MAX_RESOLUTION: usize = 100;
-/// A voxel exists from this filled share on.
-const LEAST_FILL: f64 = 0.01;
-/// How far outside of a voxel, in its edges, a point is still extrapolated rather than clamped.
-const SLIVER: f64 = 0.3;
+/// Filled share from which a grid cell becomes an element.
+const MIN_FILL: f64 = 0.01;
+/// Distance outside of a voxel, in edges, up to which points are extrapolated instead of clamped.
+const MAX_EXTRAPOLATION: f64 = 0.3;
 
-/// Cuts a shape into cubes of edge longest/resolution; the grid is centred on the bounding box and covers it.
+/// Builds the voxel mesh of a shape. The grid is centred on the bounding box and covers it; its edge is the longest extent
+/// divided by the resolution. Cells that are less than 1 % filled are left out.
 ///
 /// # Errors
-/// If the shape or the resolution cannot be, or the shape is empty.
+/// If the shape or the resolution is invalid, or the shape is empty or thinner than the sub-cells.
+///
+/// ```
+/// use softvt::geometry::{
+///     shape::Shape,
+///     voxel::{VoxelSpec, voxel_mesh},
+/// };
+///
+/// let ball = Shape::Sphere { radius: 0.03 };
+/// let mesh = voxel_mesh(&ball, &VoxelSpec { resolution: 6 })?;
+/// let filled: f64 = mesh.occupancy.iter().map(|cell| cell.fraction()).sum();
+/// let exact = 4.0 / 3.0 * std::f64::consts::PI * 0.03_f64.powi(3);
+/// assert!((filled * mesh.edge.powi(3) / exact - 1.0).abs() < 0.005);
+/// # Ok::<(), softvt::geometry::voxel::VoxelMeshError>(())
+/// ```
 pub fn voxel_mesh(shape: &Shape, spec: &VoxelSpec) -> Result<VoxelMesh, VoxelMeshError> {
     shape.validate()?;
     if !(1..=MAX_RESOLUTION).contains(&spec.resolution) {
@@ -145,7 +154,7 @@ pub fn voxel_mesh(shape: &Shape, spec: &VoxelSpec) -> Result<VoxelMesh, VoxelMes
     if !(edge > 0.0 && edge.is_finite()) {
         return Err(VoxelMeshError::Empty);
     }
-    // The slack keeps a size that is a whole number of edges from growing by a layer through rounding.
+    // The tolerance avoids an extra layer through rounding if the size is a whole number of edges.
     let grid = std::array::from_fn(|axis| ((bounds.size()[axis] / edge - 1e-6).ceil() as usize).max(1));
     let origin = bounds.centre() - Vec3::from_fn(|axis, _| 0.5 * edge * grid[axis] as f64);
     let mut mesh = VoxelMesh {
@@ -159,7 +168,7 @@ pub fn voxel_mesh(shape: &Shape, spec: &VoxelSpec) -> Result<VoxelMesh, VoxelMes
     };
     for cell in 0..mesh.cell_element.len() {
         let fill = fill_of(shape, &(origin + grid_step(cell, grid) * edge), edge);
-        if fill.fraction() >= LEAST_FILL {
+        if fill.fraction() >= MIN_FILL {
             mesh.cell_element[cell] = mesh.occupancy.len() as u32;
             mesh.occupancy.push(fill);
         }
@@ -178,7 +187,7 @@ fn grid_step(cell: usize, grid: [usize; 3]) -> Vec3 {
 
 fn fill_of(shape: &Shape, corner: &Vec3, edge: f64) -> OccupancyMask {
     let middle = shape.distance(&(corner + Vec3::repeat(0.5 * edge)));
-    // Farther than twice the half diagonal from the surface even a first-order distance leaves no doubt.
+    // Beyond twice the half diagonal, the sign of the first-order distance holds for the whole voxel.
     if middle.abs() > 3.0_f64.sqrt() * edge {
         return if middle < 0.0 { OccupancyMask::full() } else { OccupancyMask::default() };
     }
@@ -189,7 +198,7 @@ fn fill_of(shape: &Shape, corner: &Vec3, edge: f64) -> OccupancyMask {
     fill
 }
 
-/// Numbers the corners of existing voxels in x-fastest order.
+/// Numbers the corners of all elements in x-fastest order.
 fn number_nodes(mesh: &mut VoxelMesh) {
     let [nx, ny, nz] = mesh.grid;
     let corner = |cell: usize, c: usize| {
@@ -211,10 +220,11 @@ fn number_nodes(mesh: &mut VoxelMesh) {
 }
 
 impl VoxelMesh {
-    /// Where a rest point sits: in the voxel that holds it, or in the nearest existing one up to two edges away.
+    /// Embeds a rest point `p_o` (object frame, m) in the element that contains it, or in the nearest element up to two
+    /// edges away; `None` if there is none.
     ///
-    /// A point in a sliver too thin to have its own voxel is extrapolated from its neighbour (local coordinates up to 0.3
-    /// outside of [0, 1]), so that its rest position is exact; farther away the coordinates are clamped.
+    /// Points slightly outside of all elements (in slivers that are less than 1 % of a voxel) are extrapolated: local
+    /// coordinates may leave [0, 1] by 0.3, which keeps the rest position exact. Farther away they are clamped.
     pub fn locate(&self, p_o: &Vec3) -> Option<Embedding> {
         let at = (p_o - self.origin) / self.edge;
         let home: [i64; 3] =
@@ -235,13 +245,13 @@ impl VoxelMesh {
         best.map(|(_, element, cell)| self.embed(element, cell, &at))
     }
 
-    /// The rest position of a material point, object frame.
+    /// Rest position of a material point, object frame, m.
     pub fn rest_position(&self, at: &Embedding) -> Vec3 {
         let nodes = &self.elements[at.element as usize];
         at.weights().iter().zip(nodes).map(|(w, &node)| self.nodes[node as usize] * *w).sum()
     }
 
-    /// The element in a cell of the grid, if the cell is in the grid and holds one.
+    /// The element in a grid cell; `None` for empty cells and outside of the grid.
     pub fn element_at(&self, cell: [i64; 3]) -> Option<u32> {
         let within = (0..3).all(|axis| (0..self.grid[axis] as i64).contains(&cell[axis]));
         let [i, j, k] = cell.map(|x| x as usize);
@@ -251,7 +261,9 @@ impl VoxelMesh {
     }
 
     fn embed(&self, element: u32, cell: [i64; 3], at: &Vec3) -> Embedding {
-        let local = Vec3::from_fn(|axis, _| (at[axis] - cell[axis] as f64).clamp(-SLIVER, 1.0 + SLIVER));
+        let local = Vec3::from_fn(|axis, _| {
+            (at[axis] - cell[axis] as f64).clamp(-MAX_EXTRAPOLATION, 1.0 + MAX_EXTRAPOLATION)
+        });
         Embedding { element, local }
     }
 }

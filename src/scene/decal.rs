@@ -238,28 +238,28 @@ mod tests {
 
     #[test]
     fn a_capital_letter_has_its_height_and_is_vertically_centred() {
-        let print = letters("H", 0.0);
-        let lit = |up: f64| (-20..=20).any(|i| print.coverage().share(f64::from(i) * 2e-4, up, 1e-4) > 0.5);
+        let decal = letters("H", 0.0);
+        let lit = |up: f64| (-20..=20).any(|i| decal.coverage().share(f64::from(i) * 2e-4, up, 1e-4) > 0.5);
         assert!(lit(0.0) && lit(0.0047) && lit(-0.0047));
         assert!(!lit(0.0053) && !lit(-0.0053));
     }
 
     #[test]
     fn text_runs_to_the_right_and_is_centred() {
-        let print = letters("l.", 0.1);
-        let left = print.coverage().share(-1.5e-3, 0.002, 2e-3);
-        let right = print.coverage().share(1.5e-3, 0.002, 2e-3);
+        let decal = letters("l.", 0.1);
+        let left = decal.coverage().share(-1.5e-3, 0.002, 2e-3);
+        let right = decal.coverage().share(1.5e-3, 0.002, 2e-3);
         assert!(left > 3.0 * right, "the l is left of the stop: {left} {right}");
     }
 
     #[test]
     fn mean_coverage_is_independent_of_the_size_of_the_squares() {
-        let print = letters("softvt", 0.08);
+        let decal = letters("softvt", 0.08);
         let ink = |width: f64| {
             let steps = (0.08 / width) as i32;
             let at = |i: i32| (f64::from(i) + 0.5) * width - 0.04;
             let all = (0..steps).flat_map(|i| (0..steps).map(move |j| (i, j)));
-            all.map(|(i, j)| print.coverage().share(at(i), at(j), width)).sum::<f64>() * width * width
+            all.map(|(i, j)| decal.coverage().share(at(i), at(j), width)).sum::<f64>() * width * width
         };
         let fine = ink(2.5e-4);
         assert!(fine > 1e-5, "{fine} m²");

@@ -158,7 +158,7 @@ pub enum Mask {
     /// The glyphs of a line of text, on surfaces that face the reading direction.
     Text {
         /// The text with its place and style.
-        print: Arc<TextDecal>,
+        decal: Arc<TextDecal>,
     },
     /// One minus another mask.
     Inverse {

@@ -1,6 +1,7 @@
-//! Bounding boxes.
+//! Bounding boxes of shapes.
 
 use super::{
+    combine::SignedDistance,
     displacement::Displacement,
     tree::{Shape, to_local},
     warp::Axis,
@@ -13,8 +14,8 @@ const CELLS: f64 = 40.0;
 impl Shape {
     /// The tight bounding box.
     ///
-    /// Exact for primitives, placements, scalings, roundings and unions of them; for other kinds the extreme points are
-    /// searched on the surface to about 1 µm, which takes milliseconds: keep the answer.
+    /// Exact for primitives, and for placements, scalings, roundings and unions of them. For other shapes the extreme
+    /// points are searched on the surface, to about 1 µm. This takes milliseconds, so callers should cache the result.
     pub fn bounds(&self) -> Aabb {
         let exact = |axis: usize, sign: f64| self.support(&Vec3::ith(axis, sign)).map(|s| s * sign);
         let corner = |sign: f64| Some(Vec3::new(exact(0, sign)?, exact(1, sign)?, exact(2, sign)?));
@@ -24,7 +25,7 @@ impl Shape {
         }
     }
 
-    /// Whether it is surely more than `reach` (m) away from `p`, where that is quickly known.
+    /// True if a cheap test proves that the shape is more than `reach` (m) away from `p`.
     pub(super) fn is_farther(&self, p: &Vec3, reach: f64) -> bool {
         let reach = reach.max(0.0);
         let beyond = |across2: f64, radius: f64| across2 > (radius + reach).powi(2);
@@ -80,7 +81,7 @@ impl Shape {
         }
     }
 
-    /// A box that surely holds the shape, not tight.
+    /// A box that contains the shape; not tight.
     pub(crate) fn loose_bounds(&self) -> Aabb {
         match self {
             Self::Placed { shape, pose } => shape.loose_bounds().transformed(pose),
@@ -113,7 +114,7 @@ impl Shape {
         }
     }
 
-    /// Projects grid points near the surface on it, keeps the extreme ones and lets them climb.
+    /// Projects grid points near the surface on it, and moves the extreme ones along the surface to the extrema.
     fn search_bounds(&self) -> Aabb {
         let reach = self.loose_bounds();
         let cell = reach.size().max() / CELLS;
@@ -148,11 +149,11 @@ impl Shape {
         found
     }
 
-    /// The surface point that projections from `p` lead to, if that is within `reach` (m) of it.
+    /// Projects `p` iteratively on the surface; `None` if the result is farther than `reach` (m) from `p`.
     pub(crate) fn project(&self, p: &Vec3, reach: f64) -> Option<Vec3> {
         let mut q = *p;
         for _ in 0..8 {
-            let (distance, normal) = self.first_order(&q);
+            let SignedDistance { distance, normal } = self.first_order(&q);
             q -= normal * distance;
             if distance.abs() < 1e-9 {
                 break;
@@ -161,11 +162,11 @@ impl Shape {
         ((q - p).norm() <= reach && self.distance(&q).abs() < 1e-6).then_some(q)
     }
 
-    /// Walks on the surface from `start` as far as possible along `direction`.
+    /// Moves along the surface from `start` to a local maximum in `direction`.
     fn climb(&self, start: Vec3, direction: &Vec3, cell: f64) -> Vec3 {
         let (mut at, mut step) = (start, cell);
         while step > 1e-7 {
-            let normal = self.first_order(&at).1;
+            let normal = self.first_order(&at).normal;
             let slope = direction - normal * normal.dot(direction);
             let next = (slope.norm() > 1e-9)
                 .then(|| self.project(&(at + slope.normalize() * step), 2.0 * step))
@@ -192,7 +193,7 @@ fn joined(parts: &[Shape]) -> Aabb {
         .unwrap_or(Aabb::from_half_extents(Vec3::zeros()))
 }
 
-/// A twist keeps distances from the axis.
+/// Bounds of a twisted box: a twist preserves distances from the axis.
 fn twisted(inner: &Aabb, axis: Axis) -> Aabb {
     let far = inner.min.abs().sup(&inner.max.abs());
     let k = axis.index();
@@ -202,7 +203,8 @@ fn twisted(inner: &Aabb, axis: Axis) -> Aabb {
     outer
 }
 
-/// The images of a lattice on the two faces of the straight box that matter, and the bulge between them.
+/// Bounds of a bent box: of the images of sample points on its inner and outer face, with a margin for the bulge between
+/// them.
 fn bent(inner: &Aabb, along: Axis, towards: Axis, curvature: f64) -> Aabb {
     if curvature.abs() < 1e-9 {
         return *inner;

@@ -1,47 +1,49 @@
-//! What a contact sample feels of a shape, with sharp faces covered in part.
+//! Contact queries of surface samples against shapes, with partial coverage at sharp edges.
 
 use super::{
+    combine::SignedDistance,
     primitive,
     tree::{Shape, to_local},
 };
 use crate::geometry::Vec3;
 
-/// A shape as a contact sample feels it.
+/// Contact of a surface sample with a shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
     /// Signed distance, m; negative inside.
     pub phi: f64,
     /// Outward unit normal of the shape.
     pub normal: Vec3,
-    /// Share of the sample's patch that lies over the face, 0..=1.
+    /// Share of the sample's patch that covers the face, 0..=1.
     pub coverage: f64,
 }
 
-/// A face is felt by samples whose outward normal opposes its own by at least this cosine.
+/// Smallest cosine between a face normal and the opposite of the sample's normal at which the sample contacts the face.
 const FACING: f64 = 0.3;
-/// A face is also felt only down to this depth (m), or to this multiple of the depth under the nearest face: a sample of
-/// an edge that a body drags along a wall faces the wall's far end without being near it.
-const DEEP: f64 = 4e-3;
-const DEEP_RATIO: f64 = 3.0;
+/// Depth (m) down to which a sample contacts a face, or [`MAX_DEPTH_RATIO`] times the depth under the nearest face if that
+/// is more. A sample on an edge that slides along a wall faces the far end of the wall without being near it.
+const MAX_DEPTH: f64 = 4e-3;
+/// See [`MAX_DEPTH`].
+const MAX_DEPTH_RATIO: f64 = 3.0;
 
-/// One flat or round face of a sharp shape, as seen from a point.
+/// One flat or round face of a sharp-edged shape, relative to a query point.
 struct Face {
     phi: f64,
     normal: Vec3,
-    /// How far the point lies within the edges of the face, in each direction.
+    /// Distance of the point inside of the edges of the face, in each direction, m.
     inside: [f64; 2],
-    /// Half the thickness of the shape under the face: deeper than this, the far side is nearer.
+    /// Half the thickness of the shape under the face, m. Deeper points are nearer to the far side.
     depth: f64,
 }
 
 impl Shape {
-    /// The contact of a square sample of edge `spacing` (m) at `p_o` with outward normal `facing_o` (of the body that
-    /// carries the sample, in this shape's frame; zero if unknown).
+    /// Contact of a square sample of edge `spacing` (m) at `p_o`. `facing_o` is the outward normal of the body that carries
+    /// the sample, in this shape's frame; zero if unknown.
     ///
-    /// Boxes and cylinders have sharp edges. A sample belongs to the face that it faces, up to half a spacing beyond its
-    /// edge, with the covered share of its patch: so the total over a field of samples varies continuously as an edge
-    /// moves, and a deep sample near an edge is not taken for one of the side. All other shapes answer with
-    /// [`Shape::distance_and_normal`] and full coverage.
+    /// Boxes and cylinders have sharp edges. A sample contacts the face that it faces, up to half a spacing beyond the
+    /// edge, with the covered share of its patch. The total over a field of samples is therefore continuous as an edge
+    /// moves, and a deep sample near an edge does not switch to the adjacent face. All other shapes return
+    /// [`Shape::distance_and_normal`] with full coverage.
     pub fn contact(&self, p_o: &Vec3, facing_o: &Vec3, spacing: f64) -> Contact {
         match self {
             Self::Box { half } => sharp(box_faces(p_o, half), facing_o, spacing)
@@ -57,19 +59,19 @@ impl Shape {
             }
             Self::Paint { shape, .. } => shape.contact(p_o, facing_o, spacing),
             Self::Union(parts) => union(parts, p_o, facing_o, spacing),
-            _ => full(self.distance_and_normal(p_o)),
+            _ => full(self.refined(p_o)),
         }
     }
 }
 
-fn full((phi, normal): (f64, Vec3)) -> Contact {
+fn full(SignedDistance { distance: phi, normal }: SignedDistance) -> Contact {
     Contact { phi, normal, coverage: 1.0 }
 }
 
-/// The face that a sample feels: of those that it covers and faces, the one it faces most.
+/// Contact with the face that the sample faces most directly, among those that it covers; `None` if it covers none.
 fn sharp<const N: usize>(faces: [Face; N], facing: &Vec3, spacing: f64) -> Option<Contact> {
     let nearest = -faces.iter().fold(f64::NEG_INFINITY, |least, face| least.max(face.phi));
-    let deepest = DEEP.max(DEEP_RATIO * nearest);
+    let deepest = MAX_DEPTH.max(MAX_DEPTH_RATIO * nearest);
     let (mut most, mut best) = (FACING, None);
     for face in &faces {
         let alignment = -facing.dot(&face.normal);
@@ -85,7 +87,7 @@ fn sharp<const N: usize>(faces: [Face; N], facing: &Vec3, spacing: f64) -> Optio
     best
 }
 
-/// The covered share along one direction of a patch whose centre lies `inside` m within the edge.
+/// Covered share, along one direction, of a patch with its centre `inside` m within the edge.
 fn covered(inside: f64, spacing: f64) -> f64 {
     (inside / spacing + 0.5).clamp(0.0, 1.0)
 }
@@ -120,11 +122,11 @@ fn cylinder_faces(p: &Vec3, radius: f64, half_height: f64) -> [Face; 2] {
     [cap, side]
 }
 
-/// The deepest part, and all that agrees with it: flush parts cover a patch on their seam together.
+/// Contact with the deepest part. Flush parts add up their coverage, so that a patch on a seam is covered fully.
 fn union(parts: &[Shape], p: &Vec3, facing: &Vec3, spacing: f64) -> Contact {
     let mut best = Contact { phi: f64::INFINITY, normal: Vec3::z(), coverage: 1.0 };
     for part in parts {
-        // A face may be felt half a spacing beyond its edge.
+        // A sample may contact a face from half a spacing beyond its edge.
         if part.is_farther(p, best.phi + spacing) {
             continue;
         }
@@ -145,13 +147,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_edge_dragged_along_a_wall_does_not_feel_the_far_end_of_the_wall() {
+    fn an_edge_sliding_along_a_wall_does_not_contact_the_far_end() {
         let wall = Shape::cuboid(Vec3::new(0.01, 0.6, 0.6));
-        // Half a millimetre inside the wall's broad side, looking along it, from either end of the wall.
+        // Half a millimetre inside the broad side of the wall, facing along the wall in both directions.
         for z in [-0.2, -0.03, -0.001, 0.001, 0.03, 0.2] {
             for facing in [Vec3::z(), -Vec3::z()] {
-                let felt = wall.contact(&Vec3::new(0.0045, 0.0, z), &facing, 7.5e-4);
-                assert!((felt.phi + 5e-4).abs() < 1e-12 && felt.normal == Vec3::x(), "{felt:?} at {z}");
+                let contact = wall.contact(&Vec3::new(0.0045, 0.0, z), &facing, 7.5e-4);
+                assert!(
+                    (contact.phi + 5e-4).abs() < 1e-12 && contact.normal == Vec3::x(),
+                    "{contact:?} at {z}"
+                );
             }
         }
     }

@@ -1,11 +1,11 @@
-//! Height fields that displace a surface.
+//! Height fields that displace the surface of a shape.
 
 use std::fmt;
 
 use super::warp::Axis;
 use crate::geometry::{Vec3, hex8};
 
-/// A height over the surface it displaces, m, positive outwards.
+/// A height field over a surface; positive heights raise it outwards.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Displacement {
     /// Regular ridges.
@@ -14,51 +14,51 @@ pub enum Displacement {
     Bumps(Bumps),
 }
 
-/// Ridges `height · w((1 + cos ψ)/2)` with phase `ψ = count·θ + 2π (along/pitch + r/radial_pitch) + phase`: rings
+/// Ridges of height `height · w((1 + cos ψ)/2)` with phase `ψ = count·θ + 2π (along/pitch + r/radial_pitch) + phase`: rings
 /// along the axis (`pitch`), flutes around it (`count`), screws (both) or a spiral (`count`, `radial_pitch`).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ridges {
-    /// The axis.
+    /// Axis of the pattern.
     pub axis: Axis,
     /// Height from valley (0) to crest, m; negative for grooves.
     pub height: f64,
-    /// Ridges around the axis; 0 for none, negative for the other hand.
+    /// Number of ridges around the axis; 0 for rings, negative for opposite handedness.
     pub count: i32,
-    /// Distance of ridges along the axis, m; infinite for none.
+    /// Period along the axis, m; infinite for flutes.
     pub pitch: f64,
-    /// Distance of ridges away from the axis, m; infinite for none.
+    /// Period in the radial direction, m; infinite if the pattern does not depend on the radius.
     pub radial_pitch: f64,
     /// Phase at θ = 0, rad.
     pub phase: f64,
-    /// Exponent on the raised cosine: 1 is a sine wave, larger gives narrow crests and wide valleys.
+    /// Exponent of the raised cosine, 1..=8: 1 is a sine wave, larger values give narrow crests and wide valleys.
     pub sharpness: f64,
-    /// Where the ridges are.
+    /// Weight of the ridges along an axis; `None` for everywhere.
     pub mask: Option<Ramp>,
 }
 
-/// Bumps (seeds, raisins) on a jittered cubic lattice; those that the surface cuts show.
+/// Bumps (seeds, raisins) on a jittered cubic lattice; those that intersect the surface are visible.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bumps {
-    /// Height, m; negative for pits.
+    /// Height, m; negative for dents.
     pub height: f64,
-    /// Radius of a bump, m; at most half of `spacing`.
+    /// Radius of each bump, m; at most half of `spacing`.
     pub radius: f64,
     /// Edge of the lattice, m.
     pub spacing: f64,
-    /// Selects the jitter.
+    /// Seed of the jitter.
     pub seed: u64,
-    /// Where the bumps are.
+    /// Weight of the bumps along an axis; `None` for everywhere.
     pub mask: Option<Ramp>,
 }
 
-/// A weight that rises smoothly from 0 at `from` to 1 at `to` along an axis (`from > to` falls).
+/// A weight that changes smoothly from 0 at `from` to 1 at `to` along an axis; `from` may exceed `to`.
 #[derive(Clone, Copy, PartialEq)]
 pub struct Ramp {
-    /// The axis.
+    /// Axis along which the weight changes.
     pub axis: Axis,
-    /// Where it is 0, m.
+    /// Coordinate of weight 0, m.
     pub from: f64,
-    /// Where it is 1, m.
+    /// Coordinate of weight 1, m.
     pub to: f64,
 }
 
@@ -73,12 +73,11 @@ impl fmt::Debug for Ramp {
     }
 }
 
-/// Ridges around an axis fade within this distance of it for each ridge (at least one), where they would run into each
-/// other, m.
-const FADE: f64 = 1e-3;
+/// Distance from the axis within which ridges fade out, per ridge (at least one), m: there they would merge.
+const FADE_RADIUS: f64 = 1e-3;
 
 impl Displacement {
-    /// Height and its gradient at a point.
+    /// Height (m) and its gradient at a point.
     pub(super) fn height(&self, p: &Vec3) -> (f64, Vec3) {
         let ((height, gradient), mask) = match self {
             Self::Ridges(ridges) => (ridges.height(p), &ridges.mask),
@@ -89,7 +88,7 @@ impl Displacement {
         (height * weight, gradient * weight + mask.axis.unit() * (slope * height))
     }
 
-    /// Largest height, m, ≥ 0.
+    /// Upper bound of the height, m, ≥ 0.
     pub(super) fn max_height(&self) -> f64 {
         match self {
             Self::Ridges(ridges) => ridges.height.max(0.0),
@@ -129,7 +128,7 @@ impl Ridges {
         if self.count == 0 && self.radial_pitch.is_infinite() {
             return (value, gradient);
         }
-        let inner = (FADE * count.abs().max(1.0)).powi(2);
+        let inner = (FADE_RADIUS * count.abs().max(1.0)).powi(2);
         let fade = square / (square + inner);
         let d_fade = 2.0 * inner / (square + inner).powi(2);
         let mut gradient = gradient * fade;
@@ -141,7 +140,7 @@ impl Ridges {
 
 impl Bumps {
     fn height(&self, p: &Vec3) -> (f64, Vec3) {
-        // A bump reaches at most half a cell beyond its own, so two cells an axis can matter.
+        // A bump extends at most half a cell beyond its own, so two cells per axis can contribute.
         let base = (p / self.spacing).map(|x| (x - 0.5).floor());
         let mut best = (0.0, Vec3::zeros());
         for cell in 0..8 {
@@ -155,7 +154,7 @@ impl Bumps {
         (self.height * best.0, best.1 * self.height)
     }
 
-    /// Where in its lattice cell a bump sits, [0, 1)³: bits of a SplitMix64 hash (Steele et al. 2014) of the cell.
+    /// Position of a bump in its lattice cell, [0, 1)³, from the bits of a SplitMix64 hash (Steele et al. 2014) of the cell.
     fn jitter(&self, corner: &Vec3) -> Vec3 {
         let mut state = self.seed;
         for axis in 0..3 {

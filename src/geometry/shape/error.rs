@@ -1,66 +1,25 @@
 //! Errors of shape construction and validation.
 
-/// Why a shape cannot be.
+/// Invalid number or profile of a shape.
+#[allow(missing_docs)] // The messages say it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ShapeError {
-    /// A size is not positive and finite.
     #[error("{kind}: {field} is {value} m; give a finite length above 0")]
-    Size {
-        /// The kind of shape.
-        kind: &'static str,
-        /// The size.
-        field: &'static str,
-        /// Its value, m.
-        value: f64,
-    },
-    /// A number is outside of its range.
-    #[error("{kind}: {field} is {value}; {mend}")]
-    Number {
-        /// The kind of shape.
-        kind: &'static str,
-        /// The number.
-        field: &'static str,
-        /// Its value.
-        value: f64,
-        /// What would do.
-        mend: &'static str,
-    },
-    /// A combination has no parts.
+    Size { kind: &'static str, field: &'static str, value: f64 },
+    #[error("{kind}: {field} is {value}; {hint}")]
+    Number { kind: &'static str, field: &'static str, value: f64, hint: &'static str },
     #[error("{kind}: has no parts; give at least one")]
-    Empty {
-        /// The kind of shape.
-        kind: &'static str,
-    },
-    /// Too few corners.
+    Empty { kind: &'static str },
     #[error("profile: has {corners} corners; give at least 3")]
-    ProfileSize {
-        /// How many.
-        corners: usize,
-    },
-    /// A corner is not finite or lies on the wrong side of the axis.
+    ProfileSize { corners: usize },
     #[error("profile: corner {index} is ({r}, {z}); give finite numbers, and r ≥ 0 for a lathe")]
-    ProfilePoint {
-        /// Index of the corner, from 0.
-        index: usize,
-        /// First coordinate, m.
-        r: f64,
-        /// Second coordinate, m.
-        z: f64,
-    },
-    /// Two neighbouring corners coincide.
+    ProfilePoint { index: usize, r: f64, z: f64 },
     #[error(
         "profile: corner ({r}, {z}) is given twice in a row; leave one out (the last joins the first by itself)"
     )]
-    ProfileRepeat {
-        /// First coordinate, m.
-        r: f64,
-        /// Second coordinate, m.
-        z: f64,
-    },
-    /// Nothing is enclosed.
+    ProfileRepeat { r: f64, z: f64 },
     #[error("profile: encloses no area; go around the cross-section, not along a line")]
     ProfileArea,
-    /// Edges cross.
     #[error("profile: its edges cross each other; list the corners in order around the cross-section")]
     ProfileCrossing,
 }

@@ -1,4 +1,4 @@
-//! Solids bounded by a triangle mesh, with parry's bounding volume hierarchy for distances and rays.
+//! Solids bounded by a triangle mesh. Distances and rays use the bounding volume hierarchy of parry.
 
 use parry3d_f64::{
     query::{PointQuery, Ray, RayCast},
@@ -6,13 +6,14 @@ use parry3d_f64::{
 };
 use sha2::{Digest, Sha256};
 
+use super::combine::SignedDistance;
 use crate::geometry::{
     Vec3,
     mesh::{Mesh, MeshError},
     parry::{from_parry, to_parry},
 };
 
-/// A closed mesh with what makes distances to it fast.
+/// A closed, outward-oriented mesh with a bounding volume hierarchy.
 #[derive(Clone)]
 pub struct MeshSolid {
     mesh: Mesh,
@@ -25,6 +26,7 @@ impl PartialEq for MeshSolid {
     }
 }
 
+// Fingerprints of assets hash the `Debug` text of shapes: this format is part of them.
 impl std::fmt::Debug for MeshSolid {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Mesh { vertices, triangles, .. } = &self.mesh;
@@ -38,7 +40,7 @@ impl std::fmt::Debug for MeshSolid {
     }
 }
 
-/// SHA-256 of a mesh's corners, to a nanometre, and triangles.
+/// SHA-256 of the vertices of a mesh, rounded to a nanometre, and of its triangles.
 fn digest(mesh: &Mesh) -> String {
     let mut hash = Sha256::new();
     let coordinates = mesh.vertices.iter().flat_map(|v| v.iter());
@@ -67,24 +69,24 @@ impl MeshSolid {
         Ok(Self { mesh, tree })
     }
 
-    /// The mesh, closed and facing outwards.
+    /// The closed mesh, triangles oriented outwards.
     pub fn mesh(&self) -> &Mesh {
         &self.mesh
     }
 
-    /// Exact signed distance (sign by angle-weighted pseudo-normals, Baerentzen & Aanaes 2005) and its gradient.
-    pub(super) fn distance_and_normal(&self, p: &Vec3) -> (f64, Vec3) {
+    /// Exact signed distance; the sign is that of angle-weighted pseudo-normals (Baerentzen & Aanaes 2005).
+    pub(super) fn signed_distance(&self, p: &Vec3) -> SignedDistance {
         let (projection, _) = self.tree.project_local_point_and_get_feature(to_parry(p));
         let arm = p - from_parry(projection.point);
         let length = arm.norm();
         let sign = if projection.is_inside { -1.0 } else { 1.0 };
         if length > 1e-9 {
-            return (sign * length, arm * (sign / length));
+            return SignedDistance::new(sign * length, arm * (sign / length));
         }
-        (sign * length, self.face_normal(p))
+        SignedDistance::new(sign * length, self.face_normal(p))
     }
 
-    /// Normal of the face under a point of the surface, where the distance has no direction.
+    /// Normal of the face at a surface point, where the distance vector vanishes.
     fn face_normal(&self, p: &Vec3) -> Vec3 {
         use parry3d_f64::query::PointQueryWithLocation;
         let (_, (face, _)) = self.tree.project_local_point_and_get_location(to_parry(p), false);
@@ -93,7 +95,7 @@ impl MeshSolid {
     }
 
     pub(super) fn ray(&self, origin: &Vec3, direction: &Vec3, max: f64) -> Option<f64> {
-        if self.distance_and_normal(origin).0 < 0.0 {
+        if self.signed_distance(origin).distance < 0.0 {
             return Some(0.0);
         }
         self.tree.cast_local_ray(&Ray::new(to_parry(origin), to_parry(direction)), max, false)

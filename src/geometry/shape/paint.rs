@@ -9,7 +9,7 @@ use super::{
 use crate::geometry::Vec3;
 
 impl Shape {
-    /// Material id at a point on or near the surface; 0 where nothing is painted.
+    /// Material id at a point on or near the surface; 0 where the shape is not painted.
     pub fn material(&self, p_o: &Vec3) -> u16 {
         match self {
             Self::Placed { shape, pose } => shape.material(&to_local(pose, p_o)),
@@ -36,13 +36,13 @@ impl Shape {
         }
     }
 
-    /// The same solid, unpainted: two shapes that differ in colours alone give equal ones.
+    /// The same solid without materials: equal for shapes that differ only in paint.
     pub fn unpainted(&self) -> Self {
         let arc = |shape: &Arc<Self>| Arc::new(shape.unpainted());
         let all = |parts: &[Self]| parts.iter().map(Self::unpainted).collect();
         match self {
             Self::Paint { shape, .. } => shape.unpainted(),
-            // Moves in a row are one, also with paint between them.
+            // Merges placements that were separated by paint.
             Self::Placed { shape, pose } => shape.unpainted().placed(*pose),
             Self::Scaled { shape, scale } => Self::Scaled { shape: arc(shape), scale: *scale },
             Self::Rounded { shape, radius } => Self::Rounded { shape: arc(shape), radius: *radius },
@@ -73,7 +73,7 @@ impl Shape {
         }
     }
 
-    /// The highest material id that [`Shape::material`] may give.
+    /// The largest material id that [`Shape::material`] can return.
     pub fn highest_material(&self) -> u16 {
         let most = |parts: &[Self]| parts.iter().map(Self::highest_material).max().unwrap_or(0);
         match self {
@@ -92,7 +92,7 @@ impl Shape {
     }
 }
 
-/// The part whose surface is nearest to `p_o`, the first of equals.
+/// The part with the surface nearest to `p_o`; the first of several at the same distance.
 fn nearest_part<'a>(parts: &'a [Shape], p_o: &Vec3) -> Option<&'a Shape> {
     parts
         .iter()

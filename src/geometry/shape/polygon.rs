@@ -1,10 +1,10 @@
-//! Exact signed distance to a closed polygon in a plane.
+//! Simple polygons: cross-sections of prisms and profiles of lathes, with exact signed distances.
 
 use std::fmt;
 
 use super::error::ShapeError;
 
-/// A simple closed polygon, counter-clockwise; for a lathe its coordinates are (r, z) with r ≥ 0.
+/// A simple closed polygon with counter-clockwise corners, m: (x, z) for a prism, (r, z) with r ≥ 0 for a lathe.
 #[derive(Clone, PartialEq)]
 pub struct Polygon {
     points: Vec<[f64; 2]>,
@@ -18,22 +18,22 @@ impl fmt::Debug for Polygon {
     }
 }
 
-/// An edge from `start` by `span`.
+/// Edge from `start` to `start + span`.
 #[derive(Clone, Debug, PartialEq)]
 struct Edge {
     start: [f64; 2],
     span: [f64; 2],
     inverse_square: f64,
-    /// An edge on the axis of revolution separates inside from inside: it is no surface.
+    /// True for an edge on the axis of revolution, which is not part of the surface.
     on_axis: bool,
 }
 
 impl Polygon {
-    /// A profile to be revolved, from its corners (r, z), m, in order; the last is joined to the first.
+    /// A profile of revolution from its corners (r, z), m, in either direction. The last corner is joined to the first.
     ///
     /// # Errors
-    /// If there are fewer than three corners, a coordinate is not finite or has r < 0, two neighbours coincide, edges
-    /// cross, or nothing is enclosed.
+    /// If there are fewer than three corners, a coordinate is not finite, r < 0, neighbouring corners coincide, edges cross,
+    /// or the area is 0.
     pub fn revolved(points: Vec<[f64; 2]>) -> Result<Self, ShapeError> {
         if let Some(index) =
             points.iter().position(|p| !(p[0] >= 0.0 && p[0].is_finite() && p[1].is_finite()))
@@ -43,10 +43,10 @@ impl Polygon {
         Self::closed(points, true)
     }
 
-    /// A profile that is not revolved, from its corners in order; the last is joined to the first.
+    /// A cross-section from its corners (x, z), m, in either direction. The last corner is joined to the first.
     ///
     /// # Errors
-    /// As [`Polygon::revolved`], but coordinates may be negative.
+    /// As for [`Polygon::revolved`], but coordinates may be negative.
     pub fn flat(points: Vec<[f64; 2]>) -> Result<Self, ShapeError> {
         if let Some(index) = points.iter().position(|p| !(p[0].is_finite() && p[1].is_finite())) {
             return Err(ShapeError::ProfilePoint { index, r: points[index][0], z: points[index][1] });
@@ -77,12 +77,12 @@ impl Polygon {
         Ok(Self { points, edges })
     }
 
-    /// Its corners, counter-clockwise.
+    /// The corners, counter-clockwise.
     pub fn points(&self) -> &[[f64; 2]] {
         &self.points
     }
 
-    /// Its edges that are surface, each as its two ends.
+    /// The edges that are part of the surface (not on the axis of revolution), as pairs of end points.
     pub(crate) fn walls(&self) -> impl Iterator<Item = ([f64; 2], [f64; 2])> + '_ {
         self.edges
             .iter()
@@ -90,7 +90,7 @@ impl Polygon {
             .map(|e| (e.start, [e.start[0] + e.span[0], e.start[1] + e.span[1]]))
     }
 
-    /// The polygon cut by a square grid of edge `spacing` (m): centroid and area of what lies in each cell.
+    /// Cuts the polygon by a square grid of edge `spacing` (m); returns the centroid and area of the part in each cell.
     pub(crate) fn cells(&self, spacing: f64) -> Vec<([f64; 2], f64)> {
         let extreme = |axis: usize, worst: f64, pick: fn(f64, f64) -> f64| {
             self.points.iter().map(|p| p[axis]).fold(worst, pick)
@@ -112,7 +112,7 @@ impl Polygon {
         cells
     }
 
-    /// Signed distance at `p` and its gradient; exact everywhere.
+    /// Exact signed distance at `p`, m, and its gradient.
     pub(super) fn distance(&self, p: [f64; 2]) -> (f64, [f64; 2]) {
         let mut best = f64::INFINITY;
         let mut nearest = (&self.edges[0], [0.0; 2]);
@@ -152,7 +152,7 @@ impl Edge {
         Self { start: a, span, inverse_square: 1.0 / (span[0] * span[0] + span[1] * span[1]), on_axis }
     }
 
-    /// Which side of this edge a point lies on.
+    /// Positive for points to the left of the edge, negative for points to the right.
     fn side(&self, p: [f64; 2]) -> f64 {
         self.span[0] * (p[1] - self.start[1]) - self.span[1] * (p[0] - self.start[0])
     }
@@ -185,7 +185,7 @@ fn clip(points: &[[f64; 2]], axis: usize, at: f64, side: f64) -> Vec<[f64; 2]> {
     kept
 }
 
-/// Centroid and area of a polygon; `None` if it has none.
+/// Centroid and area of a polygon; `None` if the area is 0.
 fn centroid(points: &[[f64; 2]]) -> Option<([f64; 2], f64)> {
     let origin = points.first()?;
     let (mut twice, mut moment) = (0.0, [0.0; 2]);
@@ -198,7 +198,7 @@ fn centroid(points: &[[f64; 2]]) -> Option<([f64; 2], f64)> {
     (twice > 0.0).then(|| ([origin[0] + moment[0] / twice, origin[1] + moment[1] / twice], 0.5 * twice))
 }
 
-/// Whether two edges that are not neighbours cross properly.
+/// True if two edges that are not neighbours cross.
 fn crosses_itself(edges: &[Edge]) -> bool {
     let end = |e: &Edge| [e.start[0] + e.span[0], e.start[1] + e.span[1]];
     (0..edges.len()).any(|i| {

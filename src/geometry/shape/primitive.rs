@@ -1,85 +1,87 @@
-//! Exact distance and normal of the primitives.
+//! Signed distances and normals of the primitives; exact except for the ellipsoid.
 
-use super::polygon::Polygon;
+use super::{combine::SignedDistance, polygon::Polygon};
 use crate::geometry::Vec3;
 
-/// The x axis stands in for a normal that is not defined (the centre of a ball, the axis of a tube).
+/// The unit vector of `v`; the x axis where it is undefined (the centre of a sphere, the axis of a cylinder).
 fn unit_or_x(v: Vec3, length: f64) -> Vec3 {
     if length > 1e-12 { v / length } else { Vec3::x() }
 }
 
-pub(super) fn cuboid(p: &Vec3, half: &Vec3) -> (f64, Vec3) {
+pub(super) fn cuboid(p: &Vec3, half: &Vec3) -> SignedDistance {
     let q = p.abs() - half;
     let signed = |axis: usize, size: f64| if p[axis] < 0.0 { -size } else { size };
     let outside = q.sup(&Vec3::zeros());
     let length = outside.norm();
     if length > 1e-12 {
-        return (length, Vec3::from_fn(|axis, _| signed(axis, outside[axis] / length)));
+        let normal = Vec3::from_fn(|axis, _| signed(axis, outside[axis] / length));
+        return SignedDistance::new(length, normal);
     }
     let axis = q.imax();
-    (q[axis], Vec3::ith(axis, signed(axis, 1.0)))
+    SignedDistance::new(q[axis], Vec3::ith(axis, signed(axis, 1.0)))
 }
 
-pub(super) fn sphere(p: &Vec3, radius: f64) -> (f64, Vec3) {
+pub(super) fn sphere(p: &Vec3, radius: f64) -> SignedDistance {
     let length = p.norm();
-    (length - radius, unit_or_x(*p, length))
+    SignedDistance::new(length - radius, unit_or_x(*p, length))
 }
 
 /// First-order distance `f / |∇f|` of `f = |p / radii| − 1`.
-pub(super) fn ellipsoid(p: &Vec3, radii: &Vec3) -> (f64, Vec3) {
+pub(super) fn ellipsoid(p: &Vec3, radii: &Vec3) -> SignedDistance {
     let unit = p.component_div(radii);
     let length = unit.norm();
     if length < 1e-9 {
-        return (-radii.min(), Vec3::ith(radii.imin(), 1.0));
+        return SignedDistance::new(-radii.min(), Vec3::ith(radii.imin(), 1.0));
     }
     let gradient = unit.component_div(radii) / length;
     let slope = gradient.norm();
-    ((length - 1.0) / slope, gradient / slope)
+    SignedDistance::new((length - 1.0) / slope, gradient / slope)
 }
 
-/// Length of a vector in the plane. Square roots are exact on every machine, which a library's hypot need not be.
+/// Length of a vector in the plane. IEEE square roots are correctly rounded on every platform; `hypot` is not.
 pub(super) fn length(x: f64, y: f64) -> f64 {
     (x * x + y * y).sqrt()
 }
 
-pub(super) fn capsule(p: &Vec3, radius: f64, half_length: f64) -> (f64, Vec3) {
+pub(super) fn capsule(p: &Vec3, radius: f64, half_length: f64) -> SignedDistance {
     sphere(&Vec3::new(p.x, p.y, p.z - p.z.clamp(-half_length, half_length)), radius)
 }
 
-pub(super) fn cylinder(p: &Vec3, radius: f64, half_height: f64) -> (f64, Vec3) {
+pub(super) fn cylinder(p: &Vec3, radius: f64, half_height: f64) -> SignedDistance {
     let r = length(p.x, p.y);
     let (side, cap) = (r - radius, p.z.abs() - half_height);
     let radial = unit_or_x(Vec3::new(p.x, p.y, 0.0), r);
     let up = Vec3::z() * if p.z < 0.0 { -1.0 } else { 1.0 };
     if side > 0.0 && cap > 0.0 {
         let edge = length(side, cap);
-        return (edge, (radial * side + up * cap) / edge);
+        return SignedDistance::new(edge, (radial * side + up * cap) / edge);
     }
-    if side > cap { (side, radial) } else { (cap, up) }
+    if side > cap { SignedDistance::new(side, radial) } else { SignedDistance::new(cap, up) }
 }
 
-pub(super) fn torus(p: &Vec3, major: f64, minor: f64) -> (f64, Vec3) {
+pub(super) fn torus(p: &Vec3, major: f64, minor: f64) -> SignedDistance {
     let r = length(p.x, p.y);
     let radial = unit_or_x(Vec3::new(p.x, p.y, 0.0), r);
     let arm = radial * (r - major) + Vec3::z() * p.z;
     let length = arm.norm();
-    (length - minor, unit_or_x(arm, length))
+    SignedDistance::new(length - minor, unit_or_x(arm, length))
 }
 
-pub(super) fn prism(p: &Vec3, section: &Polygon, half_length: f64) -> (f64, Vec3) {
+pub(super) fn prism(p: &Vec3, section: &Polygon, half_length: f64) -> SignedDistance {
     let (flat, gradient) = section.distance([p.x, p.z]);
     let side = p.y.abs() - half_length;
     let across = Vec3::new(gradient[0], 0.0, gradient[1]);
     let along = Vec3::y() * if p.y < 0.0 { -1.0 } else { 1.0 };
     if flat > 0.0 && side > 0.0 {
         let edge = length(flat, side);
-        return (edge, (across * flat + along * side) / edge);
+        return SignedDistance::new(edge, (across * flat + along * side) / edge);
     }
-    if flat > side { (flat, across) } else { (side, along) }
+    if flat > side { SignedDistance::new(flat, across) } else { SignedDistance::new(side, along) }
 }
 
-pub(super) fn lathe(p: &Vec3, profile: &Polygon) -> (f64, Vec3) {
+pub(super) fn lathe(p: &Vec3, profile: &Polygon) -> SignedDistance {
     let r = length(p.x, p.y);
     let (distance, gradient) = profile.distance([r, p.z]);
-    (distance, unit_or_x(Vec3::new(p.x, p.y, 0.0), r) * gradient[0] + Vec3::z() * gradient[1])
+    let normal = unit_or_x(Vec3::new(p.x, p.y, 0.0), r) * gradient[0] + Vec3::z() * gradient[1];
+    SignedDistance::new(distance, normal)
 }

@@ -10,7 +10,12 @@ use crate::geometry::{
     mesh::{Mesh, MeshError},
 };
 
-/// A solid, described by its signed distance in the object frame (m; negative inside).
+/// A solid, defined by its signed distance in the object frame (m; negative inside).
+///
+/// Shapes are built by chaining (`Shape::cuboid(size).rounded(r).translated(v)`) and share their parts. The constructors
+/// accept any numbers; [`Shape::validate`] checks the tree.
+///
+/// Fingerprints of assets hash the `Debug` text of shapes, so the names of variants and fields are part of file formats.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
     /// A box centred on the origin.
@@ -49,7 +54,7 @@ pub enum Shape {
         /// Radius of the tube, m; less than `major`.
         minor: f64,
     },
-    /// A polygon in the plane (x, z), drawn out along y, centred on y = 0; a wedge is one with three corners.
+    /// A polygon in the plane (x, z), extruded along y, centred on y = 0.
     Prism {
         /// The cross-section.
         section: Arc<Polygon>,
@@ -60,127 +65,128 @@ pub enum Shape {
     Lathe(Arc<Polygon>),
     /// A closed, outward-oriented triangle mesh.
     Mesh(Arc<MeshSolid>),
-    /// A shape moved rigidly.
+    /// A rigidly transformed shape.
     Placed {
-        /// What is moved.
+        /// The inner shape.
         shape: Arc<Shape>,
-        /// Frame of `shape` in this one.
+        /// Frame of the inner shape in this frame.
         pose: Pose,
     },
-    /// A shape stretched along the axes.
+    /// A shape scaled along the axes.
     Scaled {
-        /// What is stretched.
+        /// The inner shape.
         shape: Arc<Shape>,
         /// Factors along x, y, z; all positive.
         scale: Vec3,
     },
-    /// A shape grown outwards, which rounds its convex edges.
+    /// A shape offset outwards, which rounds its convex edges.
     Rounded {
-        /// What is grown.
+        /// The inner shape.
         shape: Arc<Shape>,
-        /// Growth, m.
+        /// Offset, m.
         radius: f64,
     },
-    /// The skin of a shape: what lies within `thickness` under its surface.
+    /// A hollow shape: all points up to `thickness` below the surface.
     Shell {
-        /// What is hollowed.
+        /// The outer shape.
         shape: Arc<Shape>,
         /// Thickness of the wall, m.
         thickness: f64,
     },
-    /// What lies in any of the parts.
+    /// All points in at least one part.
     Union(Vec<Shape>),
-    /// What lies in all of the parts.
+    /// All points in every part.
     Intersect(Vec<Shape>),
-    /// What lies in `from` and not in `cut`.
+    /// All points in `from` but not in `cut`.
     Subtract {
-        /// What is cut.
+        /// Minuend.
         from: Arc<Shape>,
-        /// What is taken away.
+        /// Subtrahend.
         cut: Arc<Shape>,
     },
-    /// A union whose seams are filled by a fillet (quadratic polynomial blend).
+    /// A union with filleted seams (quadratic polynomial blend).
     SmoothUnion {
-        /// What is joined, blended one after the other.
+        /// Parts, blended in order.
         parts: Vec<Shape>,
-        /// Width of the blend, m; the seam rises by at most a quarter of it a part.
+        /// Width of the blend, m; each part raises the seam by at most a quarter of it.
         blend: f64,
     },
-    /// A subtraction whose edge is rounded.
+    /// A difference with rounded edges.
     SmoothSubtract {
-        /// What is cut.
+        /// Minuend.
         from: Arc<Shape>,
-        /// What is taken away.
+        /// Subtrahend.
         cut: Arc<Shape>,
         /// Width of the blend, m.
         blend: f64,
     },
     /// A shape twisted about an axis through the origin.
     Twist {
-        /// What is twisted.
+        /// The straight shape.
         shape: Arc<Shape>,
         /// Axis of the twist.
         axis: Axis,
-        /// Turn along the axis, rad/m.
+        /// Twist angle per length, rad/m.
         rate: f64,
     },
-    /// A shape along one axis, bent into an arc towards another; the origin stays.
+    /// A shape whose axis is bent into an arc; the origin is fixed.
     Bend {
-        /// What is bent.
+        /// The straight shape.
         shape: Arc<Shape>,
         /// The axis that becomes an arc.
         along: Axis,
-        /// The axis on which the centre of the arc lies; not `along`.
+        /// The axis on which the centre of the arc lies; differs from `along`.
         towards: Axis,
         /// Curvature of the arc, 1/m.
         curvature: f64,
     },
-    /// A shape whose surface is raised or lowered.
+    /// A shape with a displaced surface.
     Displace {
-        /// What is displaced.
+        /// The smooth shape.
         shape: Arc<Shape>,
-        /// Height fields, added up.
+        /// Height fields; their heights add up.
         reliefs: Vec<Displacement>,
     },
-    /// A shape, all or part of it, with another material.
+    /// A shape with another material, everywhere or in a region.
     Paint {
-        /// What is painted.
+        /// The shape.
         shape: Arc<Shape>,
         /// Material id.
         material: u16,
-        /// Where; everywhere if absent.
+        /// Region with the material; `None` for everywhere.
         region: Option<Arc<Shape>>,
     },
 }
 
 impl Shape {
-    /// A box with these full edge lengths, m.
+    /// A box with edge lengths `size`, m.
     pub fn cuboid(size: Vec3) -> Self {
         Self::Box { half: 0.5 * size }
     }
 
-    /// A wedge in a box of these full edge lengths (m), its apex at `apex` (−1…1) of the half width.
+    /// A wedge inscribed in a box with edge lengths `size` (m): a triangular prism along y with its apex at x = `apex` (in
+    /// half widths, −1..=1).
     ///
     /// # Errors
-    /// If the triangle encloses nothing or a number is not finite.
+    /// If the triangle has no area or a number is not finite.
     pub fn wedge(size: Vec3, apex: f64) -> Result<Self, ShapeError> {
         let half = 0.5 * size;
         let section = Polygon::flat(vec![[-half.x, -half.z], [half.x, -half.z], [apex * half.x, half.z]])?;
         Ok(Self::Prism { section: Arc::new(section), half_length: half.y })
     }
 
-    /// A polygon (x, z), drawn out to `length` (m) along y.
+    /// A polygon with corners (x, z), m, extruded to `length` (m) along y.
     ///
     /// # Errors
-    /// As [`Polygon::flat`].
+    /// If the polygon is invalid, see [`Polygon::flat`].
     pub fn prism(corners: Vec<[f64; 2]>, length: f64) -> Result<Self, ShapeError> {
         Ok(Self::Prism { section: Arc::new(Polygon::flat(corners)?), half_length: 0.5 * length })
     }
 
-    /// A profile of corners (r, z), m, revolved about the z axis.
+    /// A solid of revolution about the z axis, from the corners (r, z), m, of its profile.
     ///
     /// # Errors
-    /// As [`Polygon::revolved`].
+    /// If the polygon is invalid, see [`Polygon::revolved`].
     pub fn lathe(corners: Vec<[f64; 2]>) -> Result<Self, ShapeError> {
         Ok(Self::Lathe(Arc::new(Polygon::revolved(corners)?)))
     }
@@ -193,7 +199,7 @@ impl Shape {
         Ok(Self::Mesh(Arc::new(MeshSolid::new(mesh)?)))
     }
 
-    /// The shape moved by `pose`; moves in a row become one.
+    /// The shape transformed by `pose`. Consecutive placements are merged into one.
     pub fn placed(self, pose: Pose) -> Self {
         match self {
             Self::Placed { shape, pose: inner } => Self::Placed { shape, pose: pose * inner },
@@ -201,32 +207,32 @@ impl Shape {
         }
     }
 
-    /// The shape moved by `offset`, m.
+    /// The shape translated by `offset`, m.
     pub fn translated(self, offset: Vec3) -> Self {
         self.placed(Pose::translation(offset.x, offset.y, offset.z))
     }
 
-    /// The shape turned about the origin.
+    /// The shape rotated about the origin.
     pub fn rotated(self, turn: Quat) -> Self {
         self.placed(Pose::from_parts(Vec3::zeros().into(), turn))
     }
 
-    /// The shape stretched by factors along the axes.
+    /// The shape scaled by positive factors along the axes.
     pub fn scaled(self, scale: Vec3) -> Self {
         Self::Scaled { shape: Arc::new(self), scale }
     }
 
-    /// The shape grown by `radius` (m), with rounded edges.
+    /// The shape offset outwards by `radius` (m), which rounds its convex edges.
     pub fn rounded(self, radius: f64) -> Self {
         Self::Rounded { shape: Arc::new(self), radius }
     }
 
-    /// The wall of `thickness` (m) under the surface.
+    /// The wall of the shape, from its surface to `thickness` (m) below.
     pub fn shell(self, thickness: f64) -> Self {
         Self::Shell { shape: Arc::new(self), thickness }
     }
 
-    /// This or `other`.
+    /// The union with `other`.
     pub fn union(self, other: Self) -> Self {
         match self {
             Self::Union(mut parts) => {
@@ -237,22 +243,22 @@ impl Shape {
         }
     }
 
-    /// This and `other`.
+    /// The intersection with `other`.
     pub fn intersect(self, other: Self) -> Self {
         Self::Intersect(vec![self, other])
     }
 
-    /// This without `cut`.
+    /// The difference with `cut`.
     pub fn subtract(self, cut: Self) -> Self {
         Self::Subtract { from: Arc::new(self), cut: Arc::new(cut) }
     }
 
-    /// This or `other`, with a fillet of width `blend`, m.
+    /// The union with `other`, with a fillet of width `blend`, m.
     pub fn smooth_union(self, other: Self, blend: f64) -> Self {
         Self::SmoothUnion { parts: vec![self, other], blend }
     }
 
-    /// This without `cut`, the edge rounded over a width `blend`, m.
+    /// The difference with `cut`, with edges rounded over a width `blend`, m.
     pub fn smooth_subtract(self, cut: Self, blend: f64) -> Self {
         Self::SmoothSubtract { from: Arc::new(self), cut: Arc::new(cut), blend }
     }
@@ -262,12 +268,12 @@ impl Shape {
         Self::Twist { shape: Arc::new(self), axis, rate }
     }
 
-    /// The shape, straight along one axis, bent with `curvature` (1/m) towards another.
+    /// The shape with its axis `along` bent into an arc of `curvature` (1/m) towards another axis.
     pub fn bent(self, along: Axis, towards: Axis, curvature: f64) -> Self {
         Self::Bend { shape: Arc::new(self), along, towards, curvature }
     }
 
-    /// The shape with another relief on it.
+    /// The shape with an additional displacement.
     pub fn displaced(self, relief: Displacement) -> Self {
         match self {
             Self::Displace { shape, mut reliefs } => {
@@ -278,7 +284,7 @@ impl Shape {
         }
     }
 
-    /// The shape with a material id, everywhere or within a region.
+    /// The shape with a material id, everywhere or in a region.
     pub fn painted(self, material: u16, region: Option<Self>) -> Self {
         Self::Paint { shape: Arc::new(self), material, region: region.map(Arc::new) }
     }
@@ -289,24 +295,25 @@ pub(super) fn to_local(pose: &Pose, p_o: &Vec3) -> Vec3 {
     pose.rotation.inverse_transform_vector(&(p_o - pose.translation.vector))
 }
 
-/// Size of a shape's tree, shared parts counted as often as they occur: what every walk of it costs.
+/// Size of the tree of a shape, which bounds the cost of traversals and queries. Shared parts count every time they occur.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TreeSize {
-    /// Shapes in it, itself included.
+    /// Number of nodes, including the root.
     pub nodes: usize,
-    /// Shapes above one another, itself included.
+    /// Depth, including the root.
     pub depth: usize,
-    /// Primitives that one exact distance looks at, about: an intersection in an intersection is projected on anew at every
-    /// step of the outer one.
+    /// Approximate number of primitives evaluated per exact distance. Nested combinations multiply: each step of the outer
+    /// search repeats the inner one.
     pub work: f64,
 }
 
-/// How often a combination looks at its parts near its surface: for itself, for the nearest one, and where that leads.
-const LOOKS: f64 = 3.0;
+/// Evaluations of each part per distance to a combination near its surface: the point itself, the foot point on the
+/// nearest part, and the refined foot point.
+const EVALUATIONS: f64 = 3.0;
 
 impl Shape {
-    /// The shapes that this one is made of.
-    fn parts(&self) -> Vec<&Self> {
+    /// The direct children.
+    fn children(&self) -> Vec<&Self> {
         match self {
             Self::Placed { shape, .. }
             | Self::Scaled { shape, .. }
@@ -334,7 +341,7 @@ impl Shape {
         }
     }
 
-    /// Size of its tree.
+    /// Returns the size of the tree.
     pub fn tree_size(&self) -> TreeSize {
         let own = match self {
             Self::Displace { reliefs, .. } => reliefs.len().max(1),
@@ -347,7 +354,7 @@ impl Shape {
             work: sum.work + part.work,
         };
         let none = TreeSize { nodes: 0, depth: 0, work: 0.0 };
-        let parts = self.parts().into_iter().map(Self::tree_size).fold(none, sum);
+        let parts = self.children().into_iter().map(Self::tree_size).fold(none, sum);
         let region = match self {
             Self::Paint { region: Some(region), .. } => region.tree_size().work,
             _ => 0.0,
@@ -355,7 +362,7 @@ impl Shape {
         TreeSize {
             nodes: parts.nodes + own,
             depth: parts.depth + 1,
-            work: (parts.work - region).max(1.0) * if exact { LOOKS } else { 1.0 },
+            work: (parts.work - region).max(1.0) * if exact { EVALUATIONS } else { 1.0 },
         }
     }
 }
@@ -366,7 +373,7 @@ mod tests {
     use crate::geometry::Vec3;
 
     #[test]
-    fn shared_parts_count_as_often_as_they_occur() {
+    fn shared_parts_count_every_time_they_occur() {
         let size = |shape: &Shape| {
             let TreeSize { nodes, depth, .. } = shape.tree_size();
             (nodes, depth)
@@ -383,7 +390,7 @@ mod tests {
     }
 
     #[test]
-    fn cuts_in_cuts_multiply_and_one_cut_of_many_does_not() {
+    fn nested_cuts_multiply_the_work_and_one_union_of_cuts_does_not() {
         let ball = Shape::Sphere { radius: 0.01 };
         let one_by_one = (0..10).fold(ball.clone(), |rest, _| rest.subtract(ball.clone()));
         let holes = (0..9).fold(ball.clone(), |holes, _| holes.union(ball.clone()));

@@ -8,10 +8,10 @@ use super::{
 use crate::geometry::Vec3;
 
 impl Shape {
-    /// Checks every number of the tree.
+    /// Validates all numbers of the tree.
     ///
     /// # Errors
-    /// Names the first kind and field that cannot be, its value and the mend.
+    /// The first invalid number, with its value and a hint.
     pub fn validate(&self) -> Result<(), ShapeError> {
         match self {
             Self::Box { half } => sizes("box", "half extent", half),
@@ -27,8 +27,8 @@ impl Shape {
             }
             Self::Torus { major, minor } => {
                 size("torus", "minor radius", *minor)?;
-                let mend = "give a major radius larger than the minor one";
-                ensure(major.is_finite() && major > minor, "torus", "major radius", *major, mend)
+                let hint = "give a major radius larger than the minor one";
+                ensure(major.is_finite() && major > minor, "torus", "major radius", *major, hint)
             }
             Self::Prism { half_length, .. } => size("prism", "half length", *half_length),
             Self::Lathe(_) | Self::Mesh(_) => Ok(()),
@@ -36,7 +36,7 @@ impl Shape {
         }
     }
 
-    /// [`Shape::validate`] of the kinds that hold others.
+    /// [`Shape::validate`] for shapes with parts.
     fn validate_composite(&self) -> Result<(), ShapeError> {
         match self {
             Self::Placed { shape, pose } => {
@@ -45,9 +45,9 @@ impl Shape {
                 shape.validate()
             }
             Self::Scaled { shape, scale } => {
-                let mend = "give a finite factor above 0";
+                let hint = "give a finite factor above 0";
                 let worst = scale.min();
-                ensure(worst > 0.0 && scale.sum().is_finite(), "scale", "factor", worst, mend)?;
+                ensure(worst > 0.0 && scale.sum().is_finite(), "scale", "factor", worst, hint)?;
                 shape.validate()
             }
             Self::Rounded { shape, radius } => {
@@ -104,9 +104,9 @@ impl Displacement {
             Self::Ridges(Ridges { height, pitch, radial_pitch, phase, sharpness, mask, .. }) => {
                 finite("ridges", "height", *height)?;
                 finite("ridges", "phase", *phase)?;
-                let mend = "give a distance other than 0 (infinite for none)";
+                let hint = "give a distance other than 0 (infinite for none)";
                 for (field, value) in [("pitch", *pitch), ("radial pitch", *radial_pitch)] {
-                    ensure(value.abs() > 0.0, "ridges", field, value, mend)?;
+                    ensure(value.abs() > 0.0, "ridges", field, value, hint)?;
                 }
                 ensure((1.0..=8.0).contains(sharpness), "ridges", "sharpness", *sharpness, "give 1 to 8")?;
                 mask.as_ref().map_or(Ok(()), Ramp::validate)
@@ -114,8 +114,8 @@ impl Displacement {
             Self::Bumps(Bumps { height, radius, spacing, mask, .. }) => {
                 finite("bumps", "height", *height)?;
                 size("bumps", "spacing", *spacing)?;
-                let mend = "give a radius above 0, at most half of the spacing";
-                ensure(*radius > 0.0 && *radius <= 0.5 * spacing, "bumps", "radius", *radius, mend)?;
+                let hint = "give a radius above 0, at most half of the spacing";
+                ensure(*radius > 0.0 && *radius <= 0.5 * spacing, "bumps", "radius", *radius, hint)?;
                 mask.as_ref().map_or(Ok(()), Ramp::validate)
             }
         }
@@ -134,9 +134,9 @@ fn ensure(
     kind: &'static str,
     field: &'static str,
     value: f64,
-    mend: &'static str,
+    hint: &'static str,
 ) -> Result<(), ShapeError> {
-    if good { Ok(()) } else { Err(ShapeError::Number { kind, field, value, mend }) }
+    if good { Ok(()) } else { Err(ShapeError::Number { kind, field, value, hint }) }
 }
 
 fn size(kind: &'static str, field: &'static str, value: f64) -> Result<(), ShapeError> {

@@ -6,27 +6,27 @@ use crate::geometry::{Mat3, Vec3};
 /// A coordinate axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {
-    /// First axis.
+    /// The x axis.
     X,
-    /// Second axis.
+    /// The y axis.
     Y,
-    /// Third axis.
+    /// The z axis.
     Z,
 }
 
 impl Axis {
-    /// 0, 1 or 2.
+    /// Index of the coordinate: 0, 1 or 2.
     pub fn index(self) -> usize {
         self as usize
     }
 
-    /// Its unit vector.
+    /// Unit vector along the axis.
     pub fn unit(self) -> Vec3 {
         Vec3::ith(self.index(), 1.0)
     }
 }
 
-/// The straight point and the Jacobian ∂(straight)/∂(warped) of a twist of `rate` rad/m about `axis`.
+/// Point of the straight shape, and the Jacobian ∂(straight)/∂(twisted), of a twist of `rate` rad/m about `axis`.
 pub(super) fn untwist(p: &Vec3, axis: Axis, rate: f64) -> (Vec3, Mat3) {
     let k = axis.index();
     let (i, j) = ((k + 1) % 3, (k + 2) % 3);
@@ -41,8 +41,8 @@ pub(super) fn untwist(p: &Vec3, axis: Axis, rate: f64) -> (Vec3, Mat3) {
     (straight, jacobian)
 }
 
-/// The straight point and the Jacobian ∂(straight)/∂(bent) of a bend: `along` becomes the angle about the centre of the
-/// arc times its radius, `towards` the distance that is left to it.
+/// Point of the straight shape, and the Jacobian ∂(straight)/∂(bent), of a bend. The coordinate `along` becomes the angle
+/// about the centre of the arc times its radius, `towards` the remaining distance to the arc.
 pub(super) fn unbend(p: &Vec3, along: Axis, towards: Axis, curvature: f64) -> (Vec3, Mat3) {
     if curvature.abs() < 1e-9 {
         return (*p, Mat3::identity());

@@ -1,4 +1,4 @@
-//! Tests of the room, against closed forms and independent computation (parry's exact mesh distance).
+//! Tests of shapes and meshes against closed forms and the exact mesh distance of parry.
 
 mod body;
 mod files;
@@ -66,7 +66,7 @@ fn exact_shapes() -> Vec<(&'static str, Shape)> {
     ]
 }
 
-/// Combinations and warps, of the sizes and curvatures of pastries.
+/// Combinations and warps with sizes and curvatures of pastries.
 fn composite_shapes() -> Vec<(&'static str, Shape)> {
     let ball = Shape::Sphere { radius: 0.02 };
     let brick = Shape::cuboid(Vec3::new(0.05, 0.04, 0.03));
@@ -93,7 +93,7 @@ fn composite_shapes() -> Vec<(&'static str, Shape)> {
     ]
 }
 
-/// Combinations of combinations: a crate with rounded corners, its long sides cut low, and a hole in either end.
+/// Nested combinations: a crate with rounded corners, cut-down long sides, and a hole in each end.
 fn crate_with_low_sides() -> Shape {
     let upright = |x, y, z| {
         let sides = Shape::cuboid(Vec3::new(x - 0.02, y - 0.02, 0.2)).rounded(0.01);

@@ -103,7 +103,7 @@ pub(crate) fn install(lua: &Lua, api: &Table) -> mlua::Result<()> {
             if *name == "text" {
                 let print = TextDecal::new(line(&spec, &wrong)?);
                 let bytes = print.bytes();
-                return LuaMask::new(lua, Mask::Text { print: Arc::new(print) }, 1, bytes);
+                return LuaMask::new(lua, Mask::Text { decal: Arc::new(print) }, 1, bytes);
             }
             let shape = if *name == "inside" { spec.get::<LuaShape>("shape")?.bytes() } else { 0 };
             LuaMask::new(lua, mask(name, &spec)?, 1, size_of::<Mask>() + shape)

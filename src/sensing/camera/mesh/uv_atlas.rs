@@ -186,7 +186,7 @@ mod tests {
             facing: [1.0, 0.0, 0.0],
             ..TextLine::default()
         };
-        let mask = Mask::Text { print: Arc::new(TextDecal::new(line)) };
+        let mask = Mask::Text { decal: Arc::new(TextDecal::new(line)) };
         let layer = VisualLayer { mask, albedo: [1.0; 3], roughness: 0.5, opacity: 1.0, relief_m: 0.0 };
         Visual::plain([0.0; 3], 0.5, 0.0).with(layer)
     }

@@ -140,7 +140,7 @@ fn mask(mask: &Mask, p: &V3, n: &V3, spacing: f32) -> f32 {
             let width = (*soft_m as f32).max(spacing).max(1e-6);
             smooth(0.5 - shape.distance(&p.cast()) as f32 / width)
         }
-        Mask::Text { print } => text_decal::share(print, p, n, spacing),
+        Mask::Text { decal } => text_decal::share(decal, p, n, spacing),
         Mask::Inverse { mask } => 1.0 - self::mask(mask, p, n, spacing),
         Mask::Both { masks } => masks.iter().map(|m| self::mask(m, p, n, spacing)).product(),
     }

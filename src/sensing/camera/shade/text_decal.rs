@@ -9,16 +9,16 @@ const GRAZING: f32 = 0.1;
 const ASIDE: f64 = 0.5;
 
 /// Share of the letters of a line in a square of edge `spacing` (m) about `p` (object frame, m) on a surface of normal `n`.
-pub(crate) fn share(print: &TextDecal, p: &V3, n: &V3, spacing: f32) -> f32 {
-    let Some([right, up]) = place(print, &p.cast(), n) else { return 0.0 };
-    let (sin, cos) = print.line.turn.sin_cos();
-    print.coverage().share(right * cos + up * sin, up * cos - right * sin, f64::from(spacing)) as f32
+pub(crate) fn share(decal: &TextDecal, p: &V3, n: &V3, spacing: f32) -> f32 {
+    let Some([right, up]) = place(decal, &p.cast(), n) else { return 0.0 };
+    let (sin, cos) = decal.line.turn.sin_cos();
+    decal.coverage().share(right * cos + up * sin, up * cos - right * sin, f64::from(spacing)) as f32
 }
 
 /// Where a point of a surface lies for who reads the line, to the right and up from its middle, m; none if nothing of the
 /// line is there.
-fn place(print: &TextDecal, p: &Vec3, n: &V3) -> Option<[f64; 2]> {
-    let line = &print.line;
+fn place(decal: &TextDecal, p: &Vec3, n: &V3) -> Option<[f64; 2]> {
+    let line = &decal.line;
     let at = Vec3::from(line.at);
     let facing = Vec3::from(line.facing).normalize();
     if let Some(radius) = line.wrap_m {
@@ -33,7 +33,7 @@ fn place(print: &TextDecal, p: &Vec3, n: &V3) -> Option<[f64; 2]> {
     let head = if facing.z.abs() > 0.999 { Vec3::y() } else { Vec3::z() };
     let up = (head - facing * facing.dot(&head)).normalize();
     let from = p - at;
-    let depth = 0.5 * print.coverage().length_m() + line.height_m;
+    let depth = 0.5 * decal.coverage().length_m() + line.height_m;
     let seen = n.cast::<f64>().dot(&facing) > f64::from(GRAZING) && from.dot(&facing).abs() < depth;
     seen.then(|| [from.dot(&up.cross(&facing)), from.dot(&up)])
 }
