@@ -40,15 +40,15 @@ impl Demonstration {
     /// `gripper_closed` has one entry per control step; `with_privileged` adds the ground-truth streams.
     pub fn new(
         finished: &FinishedEpisode,
-        film: &StateRecording,
+        recording: &StateRecording,
         gripper_closed: Vec<bool>,
         with_privileged: bool,
     ) -> Self {
         let actions = finished.actions.clone();
-        let privileged = if with_privileged { privileged::streams(finished, film) } else { Vec::new() };
+        let privileged = if with_privileged { privileged::streams(finished, recording) } else { Vec::new() };
         Self {
             record: finished.record.clone(),
-            observed: observed(film, &actions),
+            observed: observed(recording, &actions),
             gripper_closed,
             actions,
             privileged,
@@ -103,20 +103,20 @@ impl Demonstration {
 }
 
 /// Proprioception before each action.
-fn observed(film: &StateRecording, actions: &[Action]) -> Vec<DataStream> {
-    let stances: Vec<_> =
-        film.frames.iter().take(actions.len()).map(|f| film.sensors.proprioception(f)).collect();
+fn observed(recording: &StateRecording, actions: &[Action]) -> Vec<DataStream> {
+    let states: Vec<_> =
+        recording.frames.iter().take(actions.len()).map(|f| recording.sensors.proprioception(f)).collect();
     let each =
-        |numbers: &dyn Fn(usize) -> Vec<f64>| (0..stances.len()).flat_map(numbers).collect::<Vec<f64>>();
-    let width = |i: usize| gripper::width(stances[i].fingers);
+        |numbers: &dyn Fn(usize) -> Vec<f64>| (0..states.len()).flat_map(numbers).collect::<Vec<f64>>();
+    let width = |i: usize| gripper::width(states[i].fingers);
     let commanded = |i: usize| i.checked_sub(1).map_or(0.0, |before| actions[before].closure.clamp(0.0, 1.0));
     let pose = each(&|i| {
-        let tool = stances[i].tool_b;
+        let tool = states[i].tool_b;
         let q = rotation::canonical(&tool.rotation);
         tool.translation.vector.iter().copied().chain([q.w, q.i, q.j, q.k]).collect()
     });
     let state = each(&|i| {
-        let tool = stances[i].tool_b;
+        let tool = states[i].tool_b;
         let turn = rotation::axis_angle(&tool.rotation);
         tool.translation.vector.iter().chain(turn.iter()).copied().chain([0.5 * width(i)]).collect()
     });
@@ -127,8 +127,8 @@ fn observed(film: &StateRecording, actions: &[Action]) -> Vec<DataStream> {
         DataStream::f64("obs/state", &[7], state)
             .unit("m, rad, m", BASE)
             .attribute("meaning", "tool position, axis-angle, position of one finger (0 shut to 0.04)"),
-        DataStream::f64("obs/arm_joint_pos", &[7], each(&|i| stances[i].joints.to_vec())).unit("rad", ""),
-        DataStream::f64("obs/gripper_pos", &[2], each(&|i| stances[i].fingers.to_vec())).unit("m", ""),
+        DataStream::f64("obs/arm_joint_pos", &[7], each(&|i| states[i].joints.to_vec())).unit("rad", ""),
+        DataStream::f64("obs/gripper_pos", &[2], each(&|i| states[i].fingers.to_vec())).unit("m", ""),
         DataStream::f64("obs/gripper_width", &[1], each(&|i| vec![width(i)])).unit("m", ""),
         DataStream::f64("obs/gripper_close_norm", &[1], each(&|i| vec![1.0 - width(i) / MAX_WIDTH]))
             .unit("1", "")

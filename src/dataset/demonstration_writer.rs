@@ -1,4 +1,4 @@
-//! A finished rollout into the files of one demonstration, each of which appears whole or not at all.
+//! [`DemonstrationWriter`]: renders a recorded rollout into the files of one demonstration.
 
 use std::path::{Path, PathBuf};
 
@@ -8,187 +8,186 @@ use serde_json::Value;
 
 use super::{
     DatasetError, Demonstration,
-    hdf5::Hdf5Writer,
-    layout::{IMAGE_STREAMS, VIDEO_STREAMS},
+    hdf5::{ChunkedSteps, Hdf5Writer},
+    layout::IMAGE_STREAMS,
     step_images::{StepImages, StepRenderer},
     video::VideoWriter,
 };
 use crate::{benchmark::control::CONTROL_DT, files, rollout::StateRecording};
 
-/// What is written of a demonstration, and where.
+/// Output files of a demonstration. Each appears complete or not at all.
 pub struct DemonstrationWriter<'a> {
-    /// The HDF5 file: it holds `/data/demo_0`.
+    /// The HDF5 file, which holds `/data/demo_0`.
     pub hdf5: PathBuf,
-    /// Videos, as [`VIDEO_STREAMS`].
+    /// Videos, in the order of [`super::layout::VIDEO_STREAMS`].
     pub videos: [PathBuf; 4],
     /// The 2 × 2 preview.
     pub preview: PathBuf,
-    /// Whether pictures go into the HDF5 file too.
-    pub pictures: bool,
+    /// True to store images in the HDF5 file as well.
+    pub store_images: bool,
     /// `env_args` of the HDF5 file.
     pub environment: &'a Value,
 }
 
-/// Pictures a second: one a control step.
+/// Frames per second of the videos: one frame per control step.
 pub fn frame_rate() -> u32 {
     (1.0 / CONTROL_DT).round() as u32
 }
 
 impl DemonstrationWriter<'_> {
-    /// Draws every state before an action and writes all files; the HDF5 last, so that whoever has it has all.
+    /// Renders the state before each action and writes all files. The HDF5 file is written last: its presence marks a complete
+    /// demonstration.
     ///
     /// # Errors
-    /// A stream cannot be made, a file not written, or the end was asked for; the HDF5 file is not there then.
+    /// A sensor cannot be simulated, a file not written, or `is_cancelled` returned true. There is no HDF5 file then.
     pub fn write(
         &self,
-        film: &mut StateRecording,
+        recording: &mut StateRecording,
         mut demonstration: Demonstration,
-        stop: impl Fn() -> bool,
+        is_cancelled: impl Fn() -> bool,
     ) -> Result<(), DatasetError> {
         files::create_folder(self.hdf5.parent().unwrap_or(&self.hdf5))?;
-        let aside = files::temp_path(&self.hdf5);
-        let written = self.draw(&aside, film, &mut demonstration, stop);
-        if written.is_err() {
-            // A torn file is of no use, and on a full disk its room is.
-            let _ = files::remove_if_present(&aside);
-        }
-        written?;
-        Ok(files::persist(&aside, &self.hdf5)?)
+        let temp = files::temp_path(&self.hdf5);
+        // On failure the space is freed, since the disk may be full.
+        self.write_to(&temp, recording, &mut demonstration, is_cancelled)
+            .inspect_err(|_| drop(files::remove_if_present(&temp)))?;
+        Ok(files::persist(&temp, &self.hdf5)?)
     }
 
-    fn draw(
+    fn write_to(
         &self,
-        aside: &Path,
-        film: &mut StateRecording,
+        temp: &Path,
+        recording: &mut StateRecording,
         demonstration: &mut Demonstration,
-        stop: impl Fn() -> bool,
+        is_cancelled: impl Fn() -> bool,
     ) -> Result<(), DatasetError> {
-        let mut writer = Hdf5Writer::create(aside, self.environment, demonstration.steps(), 1)?;
-        let written = self.fill(&mut writer, film, demonstration, stop);
+        let mut writer = Hdf5Writer::create(temp, self.environment, demonstration.steps(), 1)?;
+        let written = self.write_contents(&mut writer, recording, demonstration, is_cancelled);
         writer.close(written)
     }
 
-    fn fill(
+    fn write_contents(
         &self,
         writer: &mut Hdf5Writer,
-        film: &mut StateRecording,
+        recording: &mut StateRecording,
         demonstration: &mut Demonstration,
-        stop: impl Fn() -> bool,
+        is_cancelled: impl Fn() -> bool,
     ) -> Result<(), DatasetError> {
         let (steps, path) = (demonstration.steps(), writer.path);
-        writer.describe(0, &demonstration.record, steps)?;
-        let mut easel = StepRenderer::new(film)?;
-        let mut reels: Option<Reels> = None;
-        let mut felt = Vec::with_capacity(steps);
+        writer.write_attributes(0, &demonstration.record, steps)?;
+        let mut renderer = StepRenderer::new(recording)?;
+        let mut outputs: Option<ImageOutputs> = None;
+        let mut markers = Vec::with_capacity(steps);
         for step in 0..steps {
-            if stop() {
+            if is_cancelled() {
                 return Err(DatasetError::Interrupted);
             }
-            let Some(scenery) = easel.draw(step)? else { break };
-            let reels = match &mut reels {
-                Some(reels) => reels,
-                none => none.insert(Reels::new(&scenery, writer, steps, self.pictures)?),
+            let Some(images) = renderer.render(step)? else { break };
+            let outputs = match &mut outputs {
+                Some(outputs) => outputs,
+                // The sizes of the images are known from the first step on.
+                none => none.insert(ImageOutputs::new(&images, writer, steps, self.store_images)?),
             };
-            reels.push(path, &scenery, step + 1 == steps)?;
-            felt.push(scenery.markers);
+            outputs.push(path, &images, step + 1 == steps)?;
+            markers.push(images.markers);
         }
-        demonstration.set_markers(&felt);
-        writer.numbers(0, demonstration)?;
-        reels.map_or(Ok(()), |reels| reels.save(self))
+        demonstration.set_markers(&markers);
+        writer.write_streams(0, demonstration)?;
+        outputs.map_or(Ok(()), |outputs| outputs.finish(self))
     }
 }
 
-/// Pictures of a chunk, as [`IMAGE_STREAMS`]: what a resting camera sees, and what a finger feels, hardly changes in four steps; a
-/// camera on the hand sees something else in every one.
-const ROWS: [usize; 4] = [4, 1, 4, 4];
+/// Images per chunk, in the order of [`IMAGE_STREAMS`]. Images of the static camera and of the fingers hardly change within four
+/// steps and compress better together; those of the wrist camera change in every step.
+const IMAGES_PER_CHUNK: [usize; 4] = [4, 1, 4, 4];
 
-/// Pictures on their way into an array, chunk by chunk.
-struct Roll {
-    array: H5Dataset,
+/// Writes an image stream to HDF5, chunk by chunk.
+struct ImageStreamWriter {
+    dataset: H5Dataset,
     name: &'static str,
-    rows: usize,
+    images_per_chunk: usize,
+    /// Images of the current chunk.
     bytes: Vec<u8>,
-    done: usize,
+    chunks_written: usize,
 }
 
-impl Roll {
-    fn push(&mut self, path: &Path, picture: &RgbImage) -> Result<(), DatasetError> {
-        self.bytes.extend_from_slice(picture);
-        if self.bytes.len() < self.rows * picture.len() {
+impl ImageStreamWriter {
+    fn push(&mut self, path: &Path, image: &RgbImage) -> Result<(), DatasetError> {
+        self.bytes.extend_from_slice(image);
+        if self.bytes.len() < self.images_per_chunk * image.len() {
             return Ok(());
         }
-        self.flush(path)
+        self.write_chunk(path)
     }
 
-    fn flush(&mut self, path: &Path) -> Result<(), DatasetError> {
-        self.array.write_chunk(self.done, &self.bytes).map_err(|e| DatasetError::hdf5(path, self.name)(e))?;
-        self.done += 1;
+    fn write_chunk(&mut self, path: &Path) -> Result<(), DatasetError> {
+        let written = self.dataset.write_chunk(self.chunks_written, &self.bytes);
+        written.map_err(|e| DatasetError::hdf5(path, self.name)(e))?;
+        self.chunks_written += 1;
         self.bytes.clear();
         Ok(())
     }
 
-    /// Fills the last chunk up with its last picture: HDF5 has none that are not full.
-    fn end(&mut self, path: &Path, picture: usize) -> Result<(), DatasetError> {
-        while !self.bytes.is_empty() && self.bytes.len() < self.rows * picture {
-            let last = self.bytes.len() - picture;
+    /// Writes the last chunk, padded with its last image: HDF5 chunks are always full.
+    fn finish(&mut self, path: &Path, image_bytes: usize) -> Result<(), DatasetError> {
+        while !self.bytes.is_empty() && self.bytes.len() < self.images_per_chunk * image_bytes {
+            let last = self.bytes.len() - image_bytes;
             self.bytes.extend_from_within(last..);
         }
-        if self.bytes.is_empty() { Ok(()) } else { self.flush(path) }
+        if self.bytes.is_empty() { Ok(()) } else { self.write_chunk(path) }
     }
 }
 
-/// Everything that takes a picture a step.
-struct Reels {
-    rolls: Vec<Roll>,
+/// Writers that take one image per step.
+struct ImageOutputs {
+    streams: Vec<ImageStreamWriter>,
     videos: Vec<VideoWriter>,
     preview: VideoWriter,
 }
 
-impl Reels {
+impl ImageOutputs {
     fn new(
-        scenery: &StepImages,
+        first: &StepImages,
         writer: &mut Hdf5Writer,
         steps: usize,
-        pictures: bool,
+        store_images: bool,
     ) -> Result<Self, DatasetError> {
-        let video = |picture: &RgbImage| {
-            VideoWriter::new(picture.width() as usize, picture.height() as usize, frame_rate())
+        let video = |image: &RgbImage| {
+            VideoWriter::new(image.width() as usize, image.height() as usize, frame_rate())
         };
-        let named = IMAGE_STREAMS.into_iter().zip(&scenery.pictures).take(if pictures {
-            IMAGE_STREAMS.len()
-        } else {
-            0
-        });
-        let roll = |((name, picture), rows): ((&'static str, &RgbImage), usize)| {
-            let rows = rows.min(steps);
-            let array = writer.pictures(0, name, (steps, rows), picture.dimensions())?;
-            Ok(Roll { array, name, rows, bytes: Vec::with_capacity(rows * picture.len()), done: 0 })
-        };
+        let mut streams = Vec::new();
+        let named = IMAGE_STREAMS.into_iter().zip(&first.images).zip(IMAGES_PER_CHUNK);
+        for ((name, image), images_per_chunk) in named.filter(|_| store_images) {
+            let images_per_chunk = images_per_chunk.min(steps);
+            let length = ChunkedSteps { steps, per_chunk: images_per_chunk };
+            let dataset = writer.create_image_dataset(0, name, length, image.width(), image.height())?;
+            let bytes = Vec::with_capacity(images_per_chunk * image.len());
+            streams.push(ImageStreamWriter { dataset, name, images_per_chunk, bytes, chunks_written: 0 });
+        }
         Ok(Self {
-            rolls: named.zip(ROWS).map(roll).collect::<Result<_, DatasetError>>()?,
-            videos: scenery.shown.iter().map(video).collect::<Result<_, _>>()?,
-            preview: video(&scenery.preview())?,
+            streams,
+            videos: first.video_frames.iter().map(video).collect::<Result<_, _>>()?,
+            preview: video(&first.preview())?,
         })
     }
 
-    fn push(&mut self, path: &Path, scenery: &StepImages, last: bool) -> Result<(), DatasetError> {
-        for (roll, picture) in self.rolls.iter_mut().zip(&scenery.pictures) {
-            roll.push(path, picture)?;
-            if last {
-                roll.end(path, picture.len())?;
+    fn push(&mut self, path: &Path, images: &StepImages, is_last: bool) -> Result<(), DatasetError> {
+        for (stream, image) in self.streams.iter_mut().zip(&images.images) {
+            stream.push(path, image)?;
+            if is_last {
+                stream.finish(path, image.len())?;
             }
         }
-        for (video, picture) in self.videos.iter_mut().zip(&scenery.shown) {
-            video.push(picture)?;
+        for (video, frame) in self.videos.iter_mut().zip(&images.video_frames) {
+            video.push(frame)?;
         }
-        Ok(self.preview.push(&scenery.preview())?)
+        Ok(self.preview.push(&images.preview())?)
     }
 
-    fn save(self, to: &DemonstrationWriter) -> Result<(), DatasetError> {
-        debug_assert_eq!(self.videos.len(), VIDEO_STREAMS.len());
-        for (video, path) in self.videos.into_iter().zip(&to.videos) {
-            files::replace(path, &video.finish()?)?;
+    fn finish(self, files: &DemonstrationWriter) -> Result<(), DatasetError> {
+        for (video, path) in self.videos.into_iter().zip(&files.videos) {
+            video.save(path)?;
         }
-        Ok(files::replace(&to.preview, &self.preview.finish()?)?)
+        Ok(self.preview.save(&files.preview)?)
     }
 }

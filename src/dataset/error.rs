@@ -1,4 +1,4 @@
-//! What can be wrong with a data set.
+//! [`DatasetError`].
 
 use std::{fmt::Display, io, path::Path};
 
@@ -7,54 +7,22 @@ use rust_hdf5::Hdf5Error;
 use super::video::VideoError;
 use crate::{files::FileError, rollout::SensingError};
 
-/// Why demonstrations cannot be written or read.
+/// Error of reading, writing or rendering demonstrations. Messages name the file and the key in it.
 #[derive(Debug, thiserror::Error)]
 pub enum DatasetError {
     #[error(transparent)]
     File(#[from] FileError),
-    /// There is no HDF5 file.
     #[error("{path} {what}")]
-    NotHdf5 {
-        /// What should be one.
-        path: String,
-        /// What it is instead.
-        what: String,
-    },
-    /// The file is damaged, or what is looked for is not in it.
+    NotHdf5 { path: String, what: String },
+    /// `key` is a group, dataset, attribute or line of the file.
     #[error("{path}: {key}: {what}")]
-    Hdf5 {
-        /// The file.
-        path: String,
-        /// The group or data set in it.
-        key: String,
-        /// What is wrong.
-        what: String,
-    },
-    /// The file is whole and does not hold what it should.
-    #[error("{path}: {key}: {what}")]
-    Content {
-        /// The file.
-        path: String,
-        /// The group, data set or line in it.
-        key: String,
-        /// What is wrong, and what was expected.
-        what: String,
-    },
-    /// Something else is where it should go.
+    Content { path: String, key: String, what: String },
     #[error("--out {out}: {what}")]
-    OutputNotEmpty {
-        /// The folder.
-        out: String,
-        /// What is there, and what to do.
-        what: String,
-    },
-    /// A stream cannot be made.
+    OutputNotEmpty { out: String, what: String },
     #[error(transparent)]
-    Sense(#[from] SensingError),
-    /// A video cannot be made.
+    Sensing(#[from] SensingError),
     #[error(transparent)]
     Video(#[from] VideoError),
-    /// The end was asked for.
     #[error("interrupted")]
     Interrupted,
 }
@@ -66,25 +34,36 @@ impl DatasetError {
         move |source| Self::File(convert(source))
     }
 
-    /// What the HDF5 library said of a key of a file.
+    /// Converts an error of the HDF5 library about `key`, for `map_err`.
     pub(super) fn hdf5(path: &Path, key: impl Display) -> impl FnOnce(Hdf5Error) -> Self {
         let (path, key) = (path.display().to_string(), key.to_string());
         move |error| match error {
             Hdf5Error::Io(source) => Self::File(FileError::Io { action: "read or write", path, source }),
-            Hdf5Error::NotFound(_) => Self::Hdf5 { path, key, what: "it is not there".to_owned() },
-            // Its layers name themselves before what the system said.
+            Hdf5Error::NotFound(_) => Self::Content { path, key, what: "it is missing".to_owned() },
+            // Each layer of the library prefixes its name; only the innermost message is useful.
             other => {
-                let what = other.to_string();
-                let said = what.rsplit_once("I/O error: ").map(|(_, said)| said.to_owned());
-                let (_, cause) = what.rsplit_once("error: ").unwrap_or(("", &what));
-                let damaged = || format!("it cannot be read; is the file damaged? ({cause})");
-                Self::Hdf5 { path, key, what: said.unwrap_or_else(damaged) }
+                let text = other.to_string();
+                let what = match text.rsplit_once("I/O error: ") {
+                    Some((_, system_message)) => system_message.to_owned(),
+                    None => {
+                        let (_, cause) = text.rsplit_once("error: ").unwrap_or(("", &text));
+                        format!("it cannot be read; is the file damaged? ({cause})")
+                    }
+                };
+                Self::Content { path, key, what }
             }
         }
     }
 
-    /// Something is not as it should be.
     pub(super) fn content(path: &Path, key: impl Display, what: impl Into<String>) -> Self {
         Self::Content { path: path.display().to_string(), key: key.to_string(), what: what.into() }
+    }
+
+    pub(super) fn not_recorded_by_softvt(path: &Path, key: impl Display) -> Self {
+        Self::content(
+            path,
+            key,
+            "it was not recorded by softvt; softvt dataset import re-executes such demonstrations",
+        )
     }
 }

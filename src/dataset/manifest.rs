@@ -1,4 +1,4 @@
-//! `manifest.jsonl`: one line a demonstration, by SoftVTBench's names.
+//! `manifest.jsonl`: one line per demonstration, with SoftVTBench's field names.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -13,33 +13,30 @@ use crate::{
     files,
 };
 
-/// Version of this form.
-pub const SCHEMA: u32 = 1;
+/// Version of the format.
+pub const SCHEMA_VERSION: u32 = 1;
 
-/// A line.
+/// A line of the manifest.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ManifestEntry {
-    /// [`SCHEMA`].
+    /// [`SCHEMA_VERSION`].
     pub schema_version: u32,
-    /// Suite.
     pub suite: String,
-    /// The same, by SoftVTBench's name.
+    /// The suite again, under SoftVTBench's name.
     pub task_suite: String,
-    /// Task index.
     pub task_id: usize,
-    /// Attempt that it is of: its index in the split of demonstrations.
+    /// Index of the attempt in the split of demonstrations.
     pub episode: u32,
-    /// Number of the demonstration in its file.
+    /// Index of the demonstration in its file.
     pub demo_id: usize,
-    /// HDF5 file, from the folder of the data set.
+    /// HDF5 file, relative to the dataset.
     pub hdf5_path: String,
-    /// Control steps.
+    /// Number of control steps.
     pub num_samples: usize,
-    /// The instruction.
     pub language: String,
     /// Asset of the target.
     pub asset_name: String,
-    /// Always: only safe demonstrations that reach the goal are kept.
+    /// Always true: only safe demonstrations that reach the goal are kept.
     pub success: bool,
     /// Peak D, %; null for a rigid target.
     pub d_peak: Option<f64>,
@@ -47,26 +44,26 @@ pub struct ManifestEntry {
     pub seed: u64,
     /// Hash of the final state.
     pub state_hash: String,
-    /// The foreign demonstration that it re-executes, if any.
+    /// Imported demonstration of which it is a re-execution.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub origin: Option<Box<Origin>>,
-    /// Videos by stream, from the folder of the data set.
+    /// Videos by stream, relative to the dataset.
     pub video_files: BTreeMap<String, String>,
 }
 
 impl ManifestEntry {
-    /// That of demonstration `demo` of a task.
-    pub fn new(place: &TaskPaths, demo: usize, record: &EpisodeRecord) -> Self {
+    /// The line of demonstration `demo` of a task.
+    pub fn new(paths: &TaskPaths, demo: usize, record: &EpisodeRecord) -> Self {
         let id = &record.identity;
         let videos = VIDEO_STREAMS.iter().enumerate();
         Self {
-            schema_version: SCHEMA,
+            schema_version: SCHEMA_VERSION,
             suite: id.suite.clone(),
             task_suite: id.suite.clone(),
             task_id: id.task,
             episode: id.episode,
             demo_id: demo,
-            hdf5_path: place.hdf5_relative(),
+            hdf5_path: paths.hdf5_relative(),
             num_samples: record.stats.steps as usize,
             language: id.prompt.clone(),
             asset_name: id.asset.clone(),
@@ -76,13 +73,13 @@ impl ManifestEntry {
             state_hash: record.stats.state_hash.clone(),
             origin: id.origin.clone(),
             video_files: videos
-                .map(|(i, name)| ((*name).to_owned(), place.video_relative(demo, i)))
+                .map(|(i, name)| ((*name).to_owned(), paths.video_relative(demo, i)))
                 .collect(),
         }
     }
 }
 
-/// Writes all lines.
+/// Writes the manifest.
 ///
 /// # Errors
 /// The file cannot be written.
@@ -97,10 +94,10 @@ pub fn write(root: &Path, entries: &[ManifestEntry]) -> Result<(), DatasetError>
     Ok(files::replace(&path, text.as_bytes())?)
 }
 
-/// Reads all lines.
+/// Reads the manifest.
 ///
 /// # Errors
-/// The file cannot be read, or a line is none.
+/// The file cannot be read, or a line is not an entry.
 pub fn read(root: &Path) -> Result<Vec<ManifestEntry>, DatasetError> {
     let path = root.join(MANIFEST);
     let text = files::read_text(&path)?;

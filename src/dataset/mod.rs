@@ -23,5 +23,5 @@ pub mod video;
 
 pub use demonstration::Demonstration;
 pub use error::DatasetError;
-pub use hdf5::{TaskFile, actions, merge_parts};
+pub use hdf5::{FloatRows, ImageBlock, TaskFile, actions, merge_parts};
 pub use stream::{DataStream, StreamValues};

@@ -1,4 +1,4 @@
-//! Streams that no real robot has: true shapes, forces, contact and deformation.
+//! Ground-truth streams: shapes, forces, contact and deformation, which no real robot could measure.
 
 use crate::{
     evaluation::deformation::METRIC_ID,
@@ -10,19 +10,20 @@ use crate::{
 
 use super::stream::{DataStream, StreamValues};
 
-/// All of them: row i is of the state before action i, as everywhere in a demonstration.
-pub(super) fn streams(finished: &FinishedEpisode, film: &StateRecording) -> Vec<DataStream> {
-    let mut all = forces(finished, film);
+/// All privileged streams. Row i is the state before action i, as in every stream of a demonstration.
+pub(super) fn streams(finished: &FinishedEpisode, recording: &StateRecording) -> Vec<DataStream> {
+    let mut all = forces(finished, recording);
     all.extend(contact(finished));
     all.extend(deformation(finished));
-    all.extend(bodies(film, finished.actions.len()));
+    all.extend(bodies(recording, finished.actions.len()));
     all
 }
 
-/// True loads of the pads, and SoftVTBench's actions with forces.
-fn forces(finished: &FinishedEpisode, film: &StateRecording) -> Vec<DataStream> {
+/// Loads of the pads, and SoftVTBench's actions with forces.
+fn forces(finished: &FinishedEpisode, recording: &StateRecording) -> Vec<DataStream> {
     let steps = finished.actions.len();
-    let loads: Vec<[PadForce; 2]> = film.frames.iter().take(steps).map(SensorSuite::pad_forces).collect();
+    let loads: Vec<[PadForce; 2]> =
+        recording.frames.iter().take(steps).map(SensorSuite::pad_forces).collect();
     let of = |pick: &dyn Fn(&PadForce) -> Vec3| -> Vec<f64> {
         loads.iter().flatten().flat_map(|pad| <[f64; 3]>::from(pick(pad))).collect()
     };
@@ -41,9 +42,9 @@ fn forces(finished: &FinishedEpisode, film: &StateRecording) -> Vec<DataStream> 
     ]
 }
 
-/// What the state after step i - 1 says in row i; `first` of the settled state.
+/// Rows of the states before each action, given those after each step. `first` is the row of the settled state.
 fn shifted<T, N: Clone>(after: &[T], first: Vec<N>, numbers: impl Fn(&T) -> Vec<N>) -> Vec<N> {
-    // The state after the last action is no row's.
+    // The state after the last action has no row.
     let before = after.len().saturating_sub(1);
     first.into_iter().chain(after[..before].iter().flat_map(numbers)).collect()
 }
@@ -70,7 +71,7 @@ fn contact(finished: &FinishedEpisode) -> Vec<DataStream> {
     ]
 }
 
-/// D of a soft target, by SoftVTBench's names.
+/// D of a soft target, under SoftVTBench's names.
 fn deformation(finished: &FinishedEpisode) -> Vec<DataStream> {
     let Some(reference) = &finished.reference else { return Vec::new() };
     let at_rest: [f64; 3] = reference.bbox_m().into();
@@ -98,11 +99,11 @@ fn deformation(finished: &FinishedEpisode) -> Vec<DataStream> {
     ]
 }
 
-/// Nodes of soft bodies, and poses of what moves and does not deform.
-fn bodies(film: &StateRecording, steps: usize) -> Vec<DataStream> {
+/// Nodes of soft bodies and poses of rigid ones.
+fn bodies(recording: &StateRecording, steps: usize) -> Vec<DataStream> {
     let mut all: Vec<DataStream> = Vec::new();
-    for (at, frame) in film.frames.iter().take(steps).enumerate() {
-        for (index, (name, state)) in film.sensors.body_configurations(frame).enumerate() {
+    for (at, frame) in recording.frames.iter().take(steps).enumerate() {
+        for (index, (name, state)) in recording.sensors.body_configurations(frame).enumerate() {
             if at == 0 {
                 all.push(empty(name, &state));
             }

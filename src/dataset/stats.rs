@@ -1,4 +1,4 @@
-//! How actions, lengths and deformations of a data set are distributed.
+//! Distributions of actions, lengths and deformations in a dataset.
 
 use std::{fmt::Write, path::Path};
 
@@ -6,35 +6,29 @@ use serde::Serialize;
 
 use super::{DatasetError, TaskFile};
 
-/// Numbers of an action.
+/// Columns of an action.
 pub const ACTION_NAMES: [&str; 7] =
     ["x (m)", "y (m)", "z (m)", "turn x (rad)", "turn y (rad)", "turn z (rad)", "closure"];
-/// Bars of a histogram.
-const BARS: usize = 24;
+/// Bins of a histogram.
+const BINS: usize = 24;
 
-/// One quantity over all demonstrations.
+/// Distribution of one quantity over all demonstrations.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ColumnStatistics {
-    /// What it is.
     pub name: String,
-    /// How many numbers there are.
     pub count: usize,
-    /// The smallest.
     pub min: f64,
-    /// The mean.
     pub mean: f64,
     /// Standard deviation.
     pub sd: f64,
-    /// The middle one.
     pub median: f64,
-    /// The largest.
     pub max: f64,
-    /// How many are in each of equally wide bins from the smallest to the largest.
+    /// Counts in bins of equal width from `min` to `max`.
     pub bins: Vec<usize>,
 }
 
 impl ColumnStatistics {
-    /// That of some numbers, of which there must be one.
+    /// `None` if there are no numbers.
     fn new(name: &str, mut numbers: Vec<f64>) -> Option<Self> {
         numbers.sort_by(f64::total_cmp);
         let (&min, &max) = (numbers.first()?, numbers.last()?);
@@ -42,20 +36,20 @@ impl ColumnStatistics {
         let mean = numbers.iter().sum::<f64>() / count as f64;
         let sd = (numbers.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / count as f64).sqrt();
         let median = 0.5 * (numbers[(count - 1) / 2] + numbers[count / 2]);
-        let mut bins = vec![0; BARS];
+        let mut bins = vec![0; BINS];
         for x in &numbers {
             let share = if max > min { (x - min) / (max - min) } else { 0.5 };
-            bins[((share * BARS as f64) as usize).min(BARS - 1)] += 1;
+            bins[((share * BINS as f64) as usize).min(BINS - 1)] += 1;
         }
         Some(Self { name: name.to_owned(), count, min, mean, sd, median, max, bins })
     }
 }
 
-/// What is in some files.
+/// Statistics of the actions, lengths and deformations in HDF5 files.
 ///
 /// # Errors
-/// One of them cannot be read.
-pub fn of(paths: &[impl AsRef<Path>]) -> Result<Vec<ColumnStatistics>, DatasetError> {
+/// A file cannot be read.
+pub fn column_statistics(paths: &[impl AsRef<Path>]) -> Result<Vec<ColumnStatistics>, DatasetError> {
     let mut columns: [Vec<f64>; 7] = Default::default();
     let (mut lengths, mut peaks, mut soft) = (Vec::new(), Vec::new(), Vec::new());
     for path in paths {
@@ -68,9 +62,9 @@ pub fn of(paths: &[impl AsRef<Path>]) -> Result<Vec<ColumnStatistics>, DatasetEr
                 columns.iter_mut().zip(row).for_each(|(column, x)| column.push(*x));
             }
             peaks.extend(file.record(demo).ok().and_then(|record| record.verdict.d_peak));
-            // Those without privileged streams, and of rigid targets, have none.
-            if let Ok((d, _)) = file.doubles(demo, "privileged/soft_extras/fem_deformation_rms") {
-                soft.extend(d);
+            // Missing for rigid targets and without privileged streams.
+            if let Ok(d) = file.float_rows(demo, "privileged/soft_extras/fem_deformation_rms") {
+                soft.extend(d.values);
             }
         }
     }
@@ -79,13 +73,13 @@ pub fn of(paths: &[impl AsRef<Path>]) -> Result<Vec<ColumnStatistics>, DatasetEr
     Ok(all.filter_map(|(name, numbers)| ColumnStatistics::new(name, numbers)).collect())
 }
 
-/// The numbers as a table.
-pub fn table(spreads: &[ColumnStatistics]) -> String {
+/// The statistics as a plain-text table.
+pub fn table(columns: &[ColumnStatistics]) -> String {
     let mut text = format!(
         "{:<16}{:>9}{:>10}{:>10}{:>10}{:>10}{:>10}\n",
         "", "count", "min", "median", "mean", "sd", "max"
     );
-    for s in spreads {
+    for s in columns {
         // Writing into a string cannot fail.
         let _ = writeln!(
             text,
@@ -96,27 +90,28 @@ pub fn table(spreads: &[ColumnStatistics]) -> String {
     text
 }
 
-/// Width and height of a histogram with its words, and how many stand side by side.
-const CELL: [usize; 2] = [260, 160];
-const ACROSS: usize = 4;
+/// Width and height of a histogram with its labels, and histograms per row.
+const CELL_WIDTH: usize = 260;
+const CELL_HEIGHT: usize = 160;
+const COLUMNS: usize = 4;
 
-/// The histograms as a picture.
-pub fn svg(spreads: &[ColumnStatistics]) -> String {
-    let rows = spreads.len().div_ceil(ACROSS);
-    let [width, height] = CELL;
+/// The histograms as an SVG image.
+pub fn svg(columns: &[ColumnStatistics]) -> String {
+    let rows = columns.len().div_ceil(COLUMNS);
+    let (width, height) = (CELL_WIDTH, CELL_HEIGHT);
     let mut page = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} {1}\" \
          font-family=\"sans-serif\" font-size=\"12\">\n<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n",
-        ACROSS * width,
+        COLUMNS * width,
         rows * height
     );
-    for (at, s) in spreads.iter().enumerate() {
-        let (x, y) = (at % ACROSS * width + 20, at / ACROSS * height + 24);
+    for (at, s) in columns.iter().enumerate() {
+        let (x, y) = (at % COLUMNS * width + 20, at / COLUMNS * height + 24);
         let _ = writeln!(page, "<text x=\"{x}\" y=\"{y}\" font-weight=\"bold\">{}</text>", s.name);
-        let most = s.bins.iter().copied().max().unwrap_or(1).max(1) as f64;
-        let bar = (width - 40) as f64 / BARS as f64;
+        let max_count = s.bins.iter().copied().max().unwrap_or(1).max(1) as f64;
+        let bar = (width - 40) as f64 / BINS as f64;
         for (i, count) in s.bins.iter().enumerate() {
-            let high = (height - 64) as f64 * *count as f64 / most;
+            let high = (height - 64) as f64 * *count as f64 / max_count;
             let left = x as f64 + bar * i as f64;
             let top = (y + height - 56) as f64 - high;
             let _ = writeln!(
@@ -142,13 +137,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_spread_says_what_the_numbers_say() {
+    fn statistics_of_four_numbers_are_those_computed_by_hand() {
         let s = ColumnStatistics::new("x", vec![4.0, 1.0, 2.0, 3.0]).unwrap();
         assert_eq!((s.count, s.min, s.median, s.mean, s.max), (4, 1.0, 2.5, 2.5, 4.0));
         assert!((s.sd - 1.25_f64.sqrt()).abs() < 1e-12);
-        assert_eq!((s.bins[0], s.bins[BARS - 1], s.bins.iter().sum::<usize>()), (1, 1, 4));
+        assert_eq!((s.bins[0], s.bins[BINS - 1], s.bins.iter().sum::<usize>()), (1, 1, 4));
         assert_eq!(ColumnStatistics::new("none", Vec::new()), None);
         let page = svg(&[s]);
-        assert!(page.starts_with("<svg") && page.matches("<rect").count() == BARS + 1, "{page}");
+        assert!(page.starts_with("<svg") && page.matches("<rect").count() == BINS + 1, "{page}");
     }
 }

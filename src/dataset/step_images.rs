@@ -1,4 +1,4 @@
-//! Pictures of a step, and the 2 × 2 preview of them.
+//! Images of one step of a rollout, and the 2 × 2 preview of them.
 
 use image::{RgbImage, imageops};
 
@@ -9,79 +9,80 @@ use crate::{
     sensing::tactile::{MarkerStyle, Markers},
 };
 
-/// Names of the cameras that every scene has.
+/// Cameras that every scene has.
 const CAMERAS: [&str; 2] = ["third_person", "wrist"];
-/// Size of a cell of a preview: a finger's picture fits.
-const CELL: [u32; 2] = [320, 240];
+/// Cell of a preview, pixels: the size of a tactile image.
+const CELL_WIDTH: u32 = 320;
+const CELL_HEIGHT: u32 = 240;
 
-/// All that is seen and felt before an action.
+/// Camera and tactile images of one state.
 #[derive(Clone, Debug)]
 pub struct StepImages {
-    /// As [`super::layout::IMAGE_STREAMS`].
-    pub pictures: [RgbImage; 4],
-    /// As [`super::layout::VIDEO_STREAMS`].
-    pub shown: [RgbImage; 4],
-    /// Places of the left and right finger's markers, px.
+    /// In the order of [`super::layout::IMAGE_STREAMS`].
+    pub images: [RgbImage; 4],
+    /// In the order of [`super::layout::VIDEO_STREAMS`].
+    pub video_frames: [RgbImage; 4],
+    /// Marker positions of the left and right finger, px.
     pub markers: [Markers; 2],
 }
 
-/// Draws the states of a film.
+/// Renders the states of a recording.
 pub struct StepRenderer<'a> {
-    film: &'a mut StateRecording,
+    recording: &'a mut StateRecording,
     cameras: Vec<Camera>,
 }
 
 impl<'a> StepRenderer<'a> {
-    /// For a film whose scene has the cameras `third_person` and `wrist`.
-    ///
     /// # Errors
-    /// It has not.
-    pub fn new(film: &'a mut StateRecording) -> Result<Self, DatasetError> {
-        let camera = |name: &str| Ok(film.sensors.camera(name)?.clone());
+    /// The scene lacks the camera `third_person` or `wrist`.
+    pub fn new(recording: &'a mut StateRecording) -> Result<Self, DatasetError> {
+        let camera = |name: &str| Ok(recording.sensors.camera(name)?.clone());
         let cameras = CAMERAS.into_iter().map(camera).collect::<Result<_, DatasetError>>()?;
-        Ok(Self { film, cameras })
+        Ok(Self { recording, cameras })
     }
 
-    /// What is seen and felt in state `step`; none behind the last.
+    /// Renders state `step`; `None` after the last state.
     ///
     /// # Errors
-    /// A stream cannot be made.
-    pub fn draw(&mut self, step: usize) -> Result<Option<StepImages>, DatasetError> {
-        let Some(frame) = self.film.frames.get(step) else { return Ok(None) };
-        let senses = &mut self.film.sensors;
-        let third = senses.render(frame, &self.cameras[0])?.into_rgb_image();
-        let wrist = senses.render(frame, &self.cameras[1])?.into_rgb_image();
-        let touched = senses.tactile_readings(frame)?;
-        let [left, right] = [0, 1].map(|side: usize| touched[side].with_markers(MarkerStyle::Dots));
-        let [bare_left, bare_right] = [0, 1].map(|side: usize| touched[side].picture.clone());
+    /// A sensor cannot be simulated.
+    pub fn render(&mut self, step: usize) -> Result<Option<StepImages>, DatasetError> {
+        let Some(frame) = self.recording.frames.get(step) else { return Ok(None) };
+        let sensors = &mut self.recording.sensors;
+        let third_person = sensors.render(frame, &self.cameras[0])?.into_rgb_image();
+        let wrist = sensors.render(frame, &self.cameras[1])?.into_rgb_image();
+        let tactile = sensors.tactile_readings(frame)?;
+        let [left, right] = [0, 1].map(|side: usize| tactile[side].picture.clone());
+        let [left_markers, right_markers] =
+            [0, 1].map(|side: usize| tactile[side].with_markers(MarkerStyle::Dots));
         Ok(Some(StepImages {
-            shown: [third.clone(), wrist.clone(), left, right],
-            pictures: [third, wrist, bare_left, bare_right],
-            markers: [0, 1].map(|side: usize| touched[side].markers),
+            video_frames: [third_person.clone(), wrist.clone(), left_markers, right_markers],
+            images: [third_person, wrist, left, right],
+            markers: [0, 1].map(|side: usize| tactile[side].markers),
         }))
     }
 }
 
 impl StepImages {
-    /// The four pictures of the videos in one.
+    /// The four video frames in one image, scaled down where they are larger than a cell.
     pub fn preview(&self) -> RgbImage {
-        let [width, height] = CELL;
-        let mut sheet = RgbImage::new(2 * width, 2 * height);
-        for (at, picture) in (0_u32..).zip(&self.shown) {
-            let (w, h) = picture.dimensions();
-            let small;
-            let cell = if w <= width && h <= height {
-                picture
+        let mut preview = RgbImage::new(2 * CELL_WIDTH, 2 * CELL_HEIGHT);
+        for (at, image) in (0_u32..).zip(&self.video_frames) {
+            let (w, h) = image.dimensions();
+            let resized;
+            let cell = if w <= CELL_WIDTH && h <= CELL_HEIGHT {
+                image
             } else {
-                let scale = f64::min(f64::from(width) / f64::from(w), f64::from(height) / f64::from(h));
+                let scale =
+                    f64::min(f64::from(CELL_WIDTH) / f64::from(w), f64::from(CELL_HEIGHT) / f64::from(h));
                 let edge = |pixels: u32| ((scale * f64::from(pixels)) as u32).max(1);
-                small = imageops::resize(picture, edge(w), edge(h), imageops::FilterType::Triangle);
-                &small
+                resized = imageops::resize(image, edge(w), edge(h), imageops::FilterType::Triangle);
+                &resized
             };
             let (w, h) = cell.dimensions();
-            let (x, y) = (at % 2 * width + (width - w) / 2, at / 2 * height + (height - h) / 2);
-            imageops::replace(&mut sheet, cell, i64::from(x), i64::from(y));
+            let x = at % 2 * CELL_WIDTH + (CELL_WIDTH - w) / 2;
+            let y = at / 2 * CELL_HEIGHT + (CELL_HEIGHT - h) / 2;
+            imageops::replace(&mut preview, cell, i64::from(x), i64::from(y));
         }
-        sheet
+        preview
     }
 }

@@ -141,9 +141,9 @@ fn what_cannot_be_imported_is_refused_and_nothing_is_written() {
     );
     project.write("world.lua", b"return softvt.experiment { name = 'e', grid = { a = { 1 } }, run = function() return { b = 1 } end }");
     for (words, told) in [
-        ("x.lua short.hdf5", "short.hdf5 is cut short: 900 of"),
+        ("x.lua short.hdf5", "short.hdf5 is cut short: it has 900 of"),
         ("x.lua none.hdf5", "cannot read none.hdf5"),
-        ("x.lua x.lua", "x.lua is no HDF5 file"),
+        ("x.lua x.lua", "x.lua is not an HDF5 file"),
         ("x.lua odd.hdf5", "odd.hdf5: demo_0: it is of \"sing\", and x.lua has no such task"),
         (
             "x.lua torn.hdf5",

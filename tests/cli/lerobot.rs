@@ -183,8 +183,8 @@ fn what_cannot_be_exported_is_told_and_nothing_is_left() {
         ("data --format lerobot-v2.0 --out x", "[possible values: lerobot-v2.1, lerobot-v3.0]"),
         ("data --out x", "--format"),
         ("data --format lerobot-v2.1", "--out"),
-        ("full --format lerobot-v2.1 --out x", "full: dataset.json: it is not there; expected the folder"),
-        ("nowhere --format lerobot-v2.1 --out x", "nowhere: dataset.json: it is not there"),
+        ("full --format lerobot-v2.1 --out x", "full: dataset.json: it is missing; expected the folder"),
+        ("nowhere --format lerobot-v2.1 --out x", "nowhere: dataset.json: it is missing"),
         ("broken --format lerobot-v2.1 --out x", "broken: the recording was broken off"),
         ("plain --format lerobot-v2.1 --out x", "record it with --images hdf5"),
     ] {

@@ -1,4 +1,4 @@
-//! Files with one thing wrong each, and what is said of them.
+//! Files with one error each, and the problems found in them.
 
 use std::{fs, path::PathBuf};
 
@@ -60,20 +60,20 @@ fn write(demonstration: &Demonstration, name: &str) -> (tempfile::TempDir, PathB
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
     let mut writer = Hdf5Writer::create(&path, &json!({ "env_name": "softvt" }), STEPS, 1).unwrap();
-    writer.describe(0, &demonstration.record, STEPS).unwrap();
-    writer.numbers(0, demonstration).unwrap();
+    writer.write_attributes(0, &demonstration.record, STEPS).unwrap();
+    writer.write_streams(0, demonstration).unwrap();
     writer.close(Ok(())).unwrap();
     (folder, path)
 }
 
-/// What is said of a file in which `change` has spoilt a stream.
-fn said(change: impl Fn(&mut Vec<DataStream>)) -> String {
+/// The problems of a file whose streams `change` has damaged.
+fn problems(change: impl Fn(&mut Vec<DataStream>)) -> String {
     let mut made = demonstration(0.0);
     change(&mut made.observed);
     let (_folder, path) = write(&made, "task.hdf5");
-    let wrong = file(&path).unwrap().wrong;
-    assert!(wrong.iter().all(|line| line.contains("task.hdf5: /data/demo_0/")), "{wrong:?}");
-    wrong.join("\n")
+    let found = file(&path).unwrap().problems;
+    assert!(found.iter().all(|line| line.contains("task.hdf5: /data/demo_0/")), "{found:?}");
+    found.join("\n")
 }
 
 fn numbers(stream: &mut DataStream) -> &mut Vec<f64> {
@@ -82,7 +82,7 @@ fn numbers(stream: &mut DataStream) -> &mut Vec<f64> {
 }
 
 #[test]
-fn demonstrations_come_back_to_the_bit_from_the_file_of_a_task() {
+fn demonstrations_read_from_a_merged_file_are_identical() {
     let both = [demonstration(0.0), demonstration(1e-9)];
     let parts = both.each_ref().map(|made| write(made, "part.hdf5"));
     let folder = tempfile::tempdir().unwrap();
@@ -106,29 +106,30 @@ fn demonstrations_come_back_to_the_bit_from_the_file_of_a_task() {
     }
     assert!(actions(&path, 2).unwrap_err().to_string().contains("there is no demo_2; there are 2"));
     let findings = file(&path).unwrap();
-    assert_eq!(findings.wrong, [""; 0]);
+    assert_eq!(findings.problems, [""; 0]);
     assert_eq!((findings.demos, findings.steps), (2, 2 * STEPS));
 }
 
 #[test]
-fn what_is_wrong_with_a_stream_is_told_with_its_file_and_key() {
-    assert_eq!(said(|_| ()), "");
-    let missing = said(|streams| drop(streams.remove(2)));
-    assert!(missing.contains("/data/demo_0/obs/arm_joint_pos: it is not there"), "{missing}");
-    let bare = said(|streams| numbers(&mut streams[3])[5] = f64::NAN);
+fn problems_of_a_stream_name_its_file_and_key() {
+    assert_eq!(problems(|_| ()), "");
+    let missing = problems(|streams| drop(streams.remove(2)));
+    assert!(missing.contains("/data/demo_0/obs/arm_joint_pos: it is missing"), "{missing}");
+    let bare = problems(|streams| numbers(&mut streams[3])[5] = f64::NAN);
     assert!(bare.contains("obs/gripper_pos: step 2: a number that is not finite"), "{bare}");
-    let shape = said(|streams| streams[2] = DataStream::f64("obs/arm_joint_pos", &[6], vec![0.0; 6 * STEPS]));
+    let shape =
+        problems(|streams| streams[2] = DataStream::f64("obs/arm_joint_pos", &[6], vec![0.0; 6 * STEPS]));
     assert!(shape.contains("obs/arm_joint_pos: expected the shape (steps, 7), got [9, 6]"), "{shape}");
 }
 
 #[test]
-fn quaternions_of_another_order_or_sign_are_told_apart() {
-    let turned = said(|streams| {
+fn quaternions_of_another_order_or_sign_are_distinguished() {
+    let turned = problems(|streams| {
         numbers(&mut streams[0]).chunks_exact_mut(7).for_each(|row| row[3..].rotate_left(1));
     });
     assert!(turned.contains("obs/eef_pose: step 0"), "{turned}");
     assert!(turned.contains("is its order w x y z?"), "{turned}");
-    let signed = said(|streams| {
+    let signed = problems(|streams| {
         numbers(&mut streams[0])
             .chunks_exact_mut(7)
             .for_each(|row| row[3..].iter_mut().for_each(|x| *x = -*x));
@@ -138,18 +139,18 @@ fn quaternions_of_another_order_or_sign_are_told_apart() {
 }
 
 #[test]
-fn a_file_that_is_cut_off_anywhere_is_told_by_its_name() {
+fn a_file_truncated_anywhere_is_reported_by_name() {
     let (folder, path) = write(&demonstration(0.0), "whole.hdf5");
     let whole = fs::read(&path).unwrap();
     for share in [0.0, 0.001, 0.3, 0.7, 0.99, 0.9999] {
         let cut = folder.path().join("cut.hdf5");
         fs::write(&cut, &whole[..(share * whole.len() as f64) as usize]).unwrap();
         let said = match file(&cut) {
-            Ok(findings) => findings.wrong.join("\n"),
+            Ok(findings) => findings.problems.join("\n"),
             Err(error) => error.to_string(),
         };
         assert!(said.contains("cut.hdf5"), "{share}: {said:?}");
     }
     let none = folder.path().join("none.hdf5");
-    assert!(actions(&none, 0).unwrap_err().to_string().starts_with("cannot read"), "it is not there");
+    assert!(actions(&none, 0).unwrap_err().to_string().starts_with("cannot read"), "it is missing");
 }

@@ -11,8 +11,8 @@ use rust_hdf5::{DatatypeMessage, H5Dataset};
 use super::DatasetError;
 
 pub use merge::merge_parts;
-pub use read::{TaskFile, actions};
-pub(super) use write::Hdf5Writer;
+pub use read::{FloatRows, ImageBlock, TaskFile, actions};
+pub(super) use write::{ChunkedSteps, Hdf5Writer};
 
 /// Number types of the datasets that softvt reads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

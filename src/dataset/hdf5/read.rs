@@ -1,4 +1,4 @@
-//! HDF5 files of demonstrations, ours and others of robomimic's layout.
+//! Reading of HDF5 files of demonstrations, softvt's and others in robomimic's layout.
 
 use std::{
     fs::File,
@@ -16,19 +16,33 @@ use super::{
 };
 use crate::{evaluation::record::EpisodeRecord, geometry::Vec3, policy::Action};
 
-/// The file of a task: `/data/demo_0` and so on.
+/// The HDF5 file of a task, with the demonstrations `/data/demo_0`, `/data/demo_1`, …
 pub struct TaskFile {
-    pub(in crate::dataset) file: H5File,
+    pub(super) file: H5File,
     path: PathBuf,
     data: H5Group,
     demos: Vec<usize>,
 }
 
-/// The actions of a demonstration, absolute as softvt records them, with the continuous code of the gripper.
+/// Values of a stream as `f64`, `width` per step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FloatRows {
+    pub values: Vec<f64>,
+    pub width: usize,
+}
+
+/// RGB images of equal size, 8 bits per channel, one after the other.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImageBlock {
+    pub bytes: Vec<u8>,
+    pub height: usize,
+    pub width: usize,
+}
+
+/// Reads the actions of a demonstration; see [`TaskFile::actions`].
 ///
 /// # Errors
-/// The file is no HDF5 of this layout, has no such demonstration, or its actions are not `(steps, 7)` finite numbers, or more
-/// a step.
+/// Those of [`TaskFile::open`] and [`TaskFile::actions`].
 pub fn actions(path: &Path, demo: usize) -> Result<Vec<Action>, DatasetError> {
     TaskFile::open(path)?.actions(demo)
 }
@@ -37,21 +51,19 @@ impl TaskFile {
     /// Opens a file and lists its demonstrations.
     ///
     /// # Errors
-    /// It cannot be read, is no HDF5, is cut off, or has no `/data/demo_0`.
+    /// The file is unreadable, not HDF5, truncated, or has no group `/data/demo_0`.
     pub fn open(path: &Path) -> Result<Self, DatasetError> {
-        let about = std::fs::metadata(path).map_err(DatasetError::io("read", path))?;
-        let file = || path.display().to_string();
-        if about.is_dir() {
-            return Err(DatasetError::NotHdf5 { path: file(), what: "is a folder, no HDF5 file".to_owned() });
+        let metadata = std::fs::metadata(path).map_err(DatasetError::io("read", path))?;
+        let not_hdf5 = |what: String| Err(DatasetError::NotHdf5 { path: path.display().to_string(), what });
+        if metadata.is_dir() {
+            return not_hdf5("is a folder, not an HDF5 file".to_owned());
         }
-        match end_of(path) {
-            None => {
-                let what = "is no HDF5 file: it does not begin as one".to_owned();
-                return Err(DatasetError::NotHdf5 { path: file(), what });
-            }
-            Some(end) if end > about.len() => {
-                let what = cut_short(about.len(), end);
-                return Err(DatasetError::NotHdf5 { path: file(), what });
+        let size = metadata.len();
+        match end_of_file(path) {
+            None => return not_hdf5("is not an HDF5 file: it lacks the HDF5 signature".to_owned()),
+            Some(u64::MAX) => return not_hdf5(format!("is cut short: it has only {size} bytes")),
+            Some(end) if end > size => {
+                return not_hdf5(format!("is cut short: it has {size} of {end} bytes"));
             }
             Some(_) => {}
         }
@@ -63,7 +75,7 @@ impl TaskFile {
             match name["demo_".len()..].parse::<usize>() {
                 Ok(number) if *name == format!("demo_{number}") => demos.push(number),
                 _ => {
-                    let what = "expected the names demo_0, demo_1, …, without zeros in front";
+                    let what = "expected the names demo_0, demo_1, …, without leading zeros";
                     return Err(DatasetError::content(path, format!("/data/{name}"), what));
                 }
             }
@@ -76,25 +88,24 @@ impl TaskFile {
         Ok(Self { file, path: path.to_owned(), data, demos })
     }
 
-    /// Where it is.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// StreamValues of its demonstrations, in order.
+    /// Indices of the demonstrations, ascending.
     pub fn demos(&self) -> &[usize] {
         &self.demos
     }
 
-    /// `env_args`: the world in which they were made, and how.
+    /// `env_args`: the environment in which the demonstrations were recorded.
     ///
     /// # Errors
-    /// It is not there or no JSON.
+    /// The attribute is missing or not JSON.
     pub fn environment(&self) -> Result<Value, DatasetError> {
         let key = "/data, attribute env_args";
         let text = self.data.attr_string("env_args").map_err(|e| DatasetError::hdf5(&self.path, key)(e))?;
         serde_json::from_str(&text)
-            .map_err(|e| DatasetError::content(&self.path, key, format!("no JSON: {e}")))
+            .map_err(|e| DatasetError::content(&self.path, key, format!("not JSON: {e}")))
     }
 
     fn group(&self, demo: usize) -> Result<H5Group, DatasetError> {
@@ -106,34 +117,30 @@ impl TaskFile {
         self.data.group(&name).map_err(|e| DatasetError::hdf5(&self.path, format!("/data/{name}"))(e))
     }
 
-    /// Text of an attribute of a demonstration.
+    /// Text attribute of a demonstration.
     ///
     /// # Errors
-    /// It is not there or no text.
+    /// The attribute is missing or not text.
     pub fn text(&self, demo: usize, attribute: &str) -> Result<String, DatasetError> {
         let key = format!("/data/demo_{demo}, attribute {attribute}");
         self.group(demo)?.attr_string(attribute).map_err(|e| DatasetError::hdf5(&self.path, key)(e))
     }
 
-    /// How a demonstration was judged.
+    /// Episode record of a demonstration.
     ///
     /// # Errors
-    /// It was not recorded by softvt.
+    /// The demonstration was not recorded by softvt.
     pub fn record(&self, demo: usize) -> Result<EpisodeRecord, DatasetError> {
         let key = format!("/data/demo_{demo}, attribute metadata_json");
         let text = self.text(demo, "metadata_json").map_err(|error| match self.environment() {
             Ok(environment) if environment["env_name"] == "softvt" => error,
-            _ => {
-                let what =
-                    "softvt did not record it; softvt dataset import re-executes what others have recorded";
-                DatasetError::content(&self.path, format!("/data/demo_{demo}"), what)
-            }
+            _ => DatasetError::not_recorded_by_softvt(&self.path, format!("/data/demo_{demo}")),
         })?;
         serde_json::from_str(&text)
-            .map_err(|e| DatasetError::content(&self.path, key, format!("no record of softvt: {e}")))
+            .map_err(|e| DatasetError::content(&self.path, key, format!("not a record of softvt: {e}")))
     }
 
-    /// Control steps of a demonstration.
+    /// Number of control steps of a demonstration.
     ///
     /// # Errors
     /// It has no actions.
@@ -141,67 +148,68 @@ impl TaskFile {
         Ok(self.dataset(demo, "actions")?.shape().first().copied().unwrap_or(0))
     }
 
-    /// Text of an attribute of `/data`, if it has such.
-    pub(in crate::dataset) fn about(&self, attribute: &str) -> Option<String> {
-        self.data.attr_string(attribute).ok()
+    /// Text attribute of `/data`, if present.
+    pub(in crate::dataset) fn file_attribute(&self, name: &str) -> Option<String> {
+        self.data.attr_string(name).ok()
     }
 
-    /// Whether a demonstration has a data set, be it one that cannot be read.
+    /// True if a demonstration has a dataset of this name, readable or not.
     pub(in crate::dataset) fn has(&self, demo: usize, name: &str) -> bool {
-        self.dataset(demo, name).is_ok() || self.lists(demo, name)
+        self.dataset(demo, name).is_ok() || self.is_listed(demo, name)
     }
 
-    /// Whether the group above it lists a data set.
-    fn lists(&self, demo: usize, name: &str) -> bool {
-        let (above, last) = name.rsplit_once('/').map_or((None, name), |(above, last)| (Some(above), last));
-        let listed = self.inner(demo, above).and_then(|group| group.dataset_names().ok());
+    /// True if the parent group lists a dataset of this name.
+    fn is_listed(&self, demo: usize, name: &str) -> bool {
+        let (parent, last) =
+            name.rsplit_once('/').map_or((None, name), |(parent, last)| (Some(parent), last));
+        let listed = self.subgroup(demo, parent).and_then(|group| group.dataset_names().ok());
         listed.is_some_and(|names| names.iter().any(|known| known == last))
     }
 
-    /// A group of a demonstration by its path below it, or the demonstration's own.
-    fn inner(&self, demo: usize, path: Option<&str>) -> Option<H5Group> {
+    /// The group at `path` below a demonstration, or the demonstration's own.
+    fn subgroup(&self, demo: usize, path: Option<&str>) -> Option<H5Group> {
         let mut names = path.into_iter().flat_map(|path| path.split('/'));
         names.try_fold(self.group(demo).ok()?, |group, name| group.group(name).ok())
     }
 
-    /// Names of the groups in a group of a demonstration; none if it is not there.
+    /// Names of the groups in a group of a demonstration; empty if that is missing.
     pub(in crate::dataset) fn groups(&self, demo: usize, path: &str) -> Vec<String> {
-        self.inner(demo, Some(path)).and_then(|group| group.group_names().ok()).unwrap_or_default()
+        self.subgroup(demo, Some(path)).and_then(|group| group.group_names().ok()).unwrap_or_default()
     }
 
     pub(in crate::dataset) fn dataset(&self, demo: usize, name: &str) -> Result<H5Dataset, DatasetError> {
         self.group(demo)?;
         let key = format!("data/demo_{demo}/{name}");
         self.file.dataset(&key).map_err(|error| {
-            // What the library says of names that are not there depends on who wrote the group.
-            let error = if self.lists(demo, name) { error } else { Hdf5Error::NotFound(key.clone()) };
+            // The library's error for a missing name depends on the program that wrote the group.
+            let error = if self.is_listed(demo, name) { error } else { Hdf5Error::NotFound(key.clone()) };
             DatasetError::hdf5(&self.path, format!("/{key}"))(error)
         })
     }
 
-    /// Shape of a data set of a demonstration.
+    /// Shape of a dataset of a demonstration.
     ///
     /// # Errors
-    /// There is none of that name.
+    /// The dataset is missing.
     pub fn shape(&self, demo: usize, name: &str) -> Result<Vec<usize>, DatasetError> {
         Ok(self.dataset(demo, name)?.shape())
     }
 
-    /// Every data set of a demonstration, by its path below it.
+    /// Paths of all datasets of a demonstration, relative to it.
     ///
     /// # Errors
-    /// The file is broken.
+    /// The file is damaged.
     pub fn names(&self, demo: usize) -> Result<Vec<String>, DatasetError> {
         let mut names = Vec::new();
-        collect(&self.group(demo)?, "", &mut names)
+        collect_names(&self.group(demo)?, "", &mut names)
             .map_err(|e| DatasetError::hdf5(&self.path, format!("/data/demo_{demo}"))(e))?;
         Ok(names)
     }
 
-    /// A stream of a demonstration.
+    /// Reads a stream of a demonstration with its attributes.
     ///
     /// # Errors
-    /// There is none of that name, or it cannot be read.
+    /// The stream is missing or unreadable.
     pub fn stream(&self, demo: usize, name: &str) -> Result<DataStream, DatasetError> {
         let data = self.dataset(demo, name)?;
         let key = format!("/data/demo_{demo}/{name}");
@@ -213,7 +221,7 @@ impl TaskFile {
         };
         let mut attributes = Vec::new();
         for name in data.attr_names().map_err(failed)? {
-            // Others may keep numbers there.
+            // Other programs may store numbers here.
             if let Ok(text) = data.attr(&name).and_then(|attr| attr.read_string()) {
                 attributes.push((name, text));
             }
@@ -222,40 +230,22 @@ impl TaskFile {
         Ok(DataStream { name: name.to_owned(), row_shape, values: values.map_err(failed)?, attributes })
     }
 
-    /// StreamValues of a stream as doubles, with its width a step.
+    /// Reads a stream as `f64`.
     ///
     /// # Errors
     /// As [`TaskFile::stream`].
-    pub fn doubles(&self, demo: usize, name: &str) -> Result<(Vec<f64>, usize), DatasetError> {
+    pub fn float_rows(&self, demo: usize, name: &str) -> Result<FloatRows, DatasetError> {
         let data = self.dataset(demo, name)?;
         let key = format!("/data/demo_{demo}/{name}");
-        let numbers = data.read_numeric_as().map_err(|e| DatasetError::hdf5(&self.path, &key)(e))?;
-        Ok((numbers, data.shape().iter().skip(1).product()))
+        let values = data.read_numeric_as().map_err(|e| DatasetError::hdf5(&self.path, &key)(e))?;
+        Ok(FloatRows { values, width: data.shape().iter().skip(1).product() })
     }
 
-    /// One picture of a stream: its bytes, and its height and width.
+    /// Reads the images of some steps.
     ///
     /// # Errors
-    /// There is no such picture, or it is none of 8 bits and three channels.
-    pub fn picture(
-        &self,
-        demo: usize,
-        name: &str,
-        step: usize,
-    ) -> Result<(Vec<u8>, [usize; 2]), DatasetError> {
-        self.pictures(demo, name, step..step + 1)
-    }
-
-    /// Pictures of a stream: the bytes of all, one after the other, and the height and width of each.
-    ///
-    /// # Errors
-    /// As [`TaskFile::picture`].
-    pub fn pictures(
-        &self,
-        demo: usize,
-        name: &str,
-        steps: Range<usize>,
-    ) -> Result<(Vec<u8>, [usize; 2]), DatasetError> {
+    /// A step is missing, or the stream does not hold 8-bit RGB images.
+    pub fn images(&self, demo: usize, name: &str, steps: Range<usize>) -> Result<ImageBlock, DatasetError> {
         let data = self.dataset(demo, name)?;
         let key = format!("/data/demo_{demo}/{name}");
         let &[_, height, width, 3] = &data.shape()[..] else {
@@ -263,76 +253,62 @@ impl TaskFile {
             return Err(DatasetError::content(&self.path, key, what));
         };
         let bytes = data.read_slice(&[steps.start, 0, 0, 0], &[steps.len(), height, width, 3]);
-        Ok((bytes.map_err(|e| DatasetError::hdf5(&self.path, key)(e))?, [height, width]))
+        Ok(ImageBlock { bytes: bytes.map_err(|e| DatasetError::hdf5(&self.path, key)(e))?, height, width })
     }
 
-    /// See [`actions`].
+    /// Reads the actions of a demonstration: absolute tool poses in the base frame, continuous gripper closure.
     ///
     /// # Errors
-    /// As there.
+    /// The demonstration is missing, or its actions are not finite numbers of shape (steps, 7 or more).
     pub fn actions(&self, demo: usize) -> Result<Vec<Action>, DatasetError> {
         let shape = self.shape(demo, "actions")?;
-        let wrong =
+        let error =
             |what: String| DatasetError::content(&self.path, format!("/data/demo_{demo}/actions"), what);
         if shape.len() != 2 || shape[1] < 7 {
-            return Err(wrong(format!("expected the shape (steps, 7), got {shape:?}")));
+            return Err(error(format!("expected the shape (steps, 7), got {shape:?}")));
         }
-        let (numbers, width) = self.doubles(demo, "actions")?;
-        if let Some(at) = numbers.iter().position(|x| !x.is_finite()) {
-            return Err(wrong(format!(
-                "step {}, number {}: {} is not finite",
-                at / width,
-                at % width,
-                numbers[at]
-            )));
+        let FloatRows { values, width } = self.float_rows(demo, "actions")?;
+        if let Some(at) = values.iter().position(|x| !x.is_finite()) {
+            let (step, number, value) = (at / width, at % width, values[at]);
+            return Err(error(format!("step {step}, number {number}: {value} is not finite")));
         }
         let action = |row: &[f64]| Action {
             position_b: Vec3::new(row[0], row[1], row[2]),
             axis_angle_b: Vec3::new(row[3], row[4], row[5]),
             closure: row[6],
         };
-        Ok(numbers.chunks_exact(width).map(action).collect())
+        Ok(values.chunks_exact(width).map(action).collect())
     }
 
-    /// A demonstration without its pictures.
+    /// Reads a demonstration without its images.
     ///
     /// # Errors
-    /// It was not recorded by softvt, or is broken.
+    /// The demonstration was not recorded by softvt, or the file is damaged.
     pub fn read(&self, demo: usize) -> Result<Demonstration, DatasetError> {
-        let gripper_closed =
-            self.doubles(demo, "actions_binary")?.0.chunks(7).map(|row| row[6] > 0.5).collect();
+        let binary = self.float_rows(demo, "actions_binary")?.values;
         let mut read = Demonstration {
             record: self.record(demo)?,
             actions: self.actions(demo)?,
-            gripper_closed,
+            gripper_closed: binary.chunks(7).map(|row| row[6] > 0.5).collect(),
             observed: Vec::new(),
             privileged: Vec::new(),
         };
         for name in self.names(demo)? {
-            let is_privileged = name.starts_with("privileged/");
-            if !is_privileged && (!name.starts_with("obs/") || name.ends_with("_rgb")) {
-                continue;
+            if name.starts_with("privileged/") {
+                read.privileged.push(self.stream(demo, &name)?);
+            } else if name.starts_with("obs/") && !name.ends_with("_rgb") {
+                read.observed.push(self.stream(demo, &name)?);
             }
-            let stream = self.stream(demo, &name)?;
-            if is_privileged { read.privileged.push(stream) } else { read.observed.push(stream) }
         }
         Ok(read)
     }
 }
 
-fn cut_short(size: u64, end: u64) -> String {
-    match end {
-        u64::MAX => format!("is cut short: only {size} bytes are there"),
-        end => format!("is cut short: {size} of {end} bytes are there"),
-    }
-}
-
-/// What HDF5 files begin with.
 const SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
 
-/// Where a file says that it ends, 0 if that is not known; none if it does not begin as such files do. Something else may
-/// stand in front of it, as long as 512 bytes or a multiple of them by a power of two (HDF5 file format, II.A).
-fn end_of(path: &Path) -> Option<u64> {
+/// End of the file according to its superblock; 0 if that is unknown, `u64::MAX` if the superblock itself is truncated, `None`
+/// if there is no HDF5 signature. Other data may precede the signature, 512 · 2ⁿ bytes long (HDF5 file format, II.A).
+fn end_of_file(path: &Path) -> Option<u64> {
     let mut file = File::open(path).ok()?;
     let mut head = |from: u64| -> Option<Vec<u8>> {
         let mut head = Vec::new();
@@ -342,15 +318,15 @@ fn end_of(path: &Path) -> Option<u64> {
     };
     let first = head(0)?;
     if first.starts_with(SIGNATURE) {
-        return Some(stated_end(&first).unwrap_or(u64::MAX));
+        return Some(superblock_end(&first).unwrap_or(u64::MAX));
     }
     let mut heads = (9..63).map_while(|power| head(1 << power));
     heads.any(|head| head.starts_with(SIGNATURE)).then_some(0)
 }
 
-/// The end that a superblock states, 0 if its numbers are not of 8 bytes; none if it is cut short itself.
-fn stated_end(head: &[u8]) -> Option<u64> {
-    // Behind signature and versions, sizes and flags come base address, extension or free space, and the end; 8 bytes each.
+/// End of the file in a superblock; 0 if its addresses are not 8 bytes wide, `None` if it is truncated.
+fn superblock_end(head: &[u8]) -> Option<u64> {
+    // Signature, versions, sizes and flags are followed by base address, extension or free-space address, and end address.
     let (width, at) = match head.get(8)? {
         0 => (13, 40),
         1 => (13, 44),
@@ -362,10 +338,10 @@ fn stated_end(head: &[u8]) -> Option<u64> {
     Some(u64::from_le_bytes(head.get(at..at + 8)?.try_into().ok()?))
 }
 
-fn collect(group: &H5Group, above: &str, names: &mut Vec<String>) -> rust_hdf5::Result<()> {
+fn collect_names(group: &H5Group, above: &str, names: &mut Vec<String>) -> rust_hdf5::Result<()> {
     names.extend(group.dataset_names()?.iter().map(|name| format!("{above}{name}")));
     for inner in group.group_names()? {
-        collect(&group.group(&inner)?, &format!("{above}{inner}/"), names)?;
+        collect_names(&group.group(&inner)?, &format!("{above}{inner}/"), names)?;
     }
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! Streams into HDF5.
+//! [`Hdf5Writer`]: writes the streams of demonstrations.
 
 use std::{collections::BTreeSet, path::Path};
 
@@ -8,20 +8,28 @@ use serde_json::{Value, json};
 use super::super::{DataStream, DatasetError, Demonstration, StreamValues};
 use crate::{benchmark::control::CONTROL_DT, evaluation::record::EpisodeRecord};
 
-/// Bytes of a chunk of numbers, at most: a reader of one step reads no more.
-const CHUNK: usize = 1 << 18;
-/// Compression (zlib): beyond this, pictures cost twice the time for a few percent less.
-const LEVEL: u32 = 4;
+/// Largest chunk of numbers, bytes. Readers of one step decompress a whole chunk.
+const MAX_CHUNK_BYTES: usize = 1 << 18;
+/// Compression level (zlib): higher levels double the time for images and save a few percent.
+const COMPRESSION_LEVEL: u32 = 4;
+
+/// Length of a dataset and of its chunks, in steps.
+#[derive(Clone, Copy)]
+pub(in crate::dataset) struct ChunkedSteps {
+    pub steps: usize,
+    pub per_chunk: usize,
+}
 
 /// A file that is being written.
 pub(in crate::dataset) struct Hdf5Writer<'a> {
-    pub file: H5File,
+    file: H5File,
     pub path: &'a Path,
-    made: BTreeSet<String>,
+    /// Paths of the groups that exist.
+    groups: BTreeSet<String>,
 }
 
 impl<'a> Hdf5Writer<'a> {
-    /// A new file with `/data` and its attributes.
+    /// Creates a file with the group `/data` and its attributes. `total` is the number of steps in all demonstrations.
     pub(in crate::dataset) fn create(
         path: &'a Path,
         environment: &Value,
@@ -37,17 +45,17 @@ impl<'a> Hdf5Writer<'a> {
         put("fps", (1.0 / CONTROL_DT).round() as i64)?;
         data.set_attr_string("env_args", &environment.to_string()).map_err(failed)?;
         data.set_attr_string("quaternions", "w x y z, w >= 0").map_err(failed)?;
-        Ok(Self { file, path, made: ["data".to_owned()].into() })
+        Ok(Self { file, path, groups: ["data".to_owned()].into() })
     }
 
-    /// The group of a path, made with those above it if need be.
+    /// The group at `path`, created with its parents if necessary.
     pub(in crate::dataset) fn group(&mut self, path: &str) -> Result<H5Group, DatasetError> {
         let failed = |error| DatasetError::hdf5(self.path, path)(error);
         let mut group = self.file.root_group();
         let mut so_far = String::new();
         for name in path.split('/') {
             so_far = if so_far.is_empty() { name.to_owned() } else { format!("{so_far}/{name}") };
-            group = match self.made.insert(so_far.clone()) {
+            group = match self.groups.insert(so_far.clone()) {
                 true => group.create_group(name).map_err(failed)?,
                 false => group.group(name).map_err(failed)?,
             };
@@ -55,8 +63,8 @@ impl<'a> Hdf5Writer<'a> {
         Ok(group)
     }
 
-    /// Attributes of a demonstration.
-    pub(in crate::dataset) fn describe(
+    /// Writes the attributes of a demonstration.
+    pub(in crate::dataset) fn write_attributes(
         &mut self,
         demo: usize,
         record: &EpisodeRecord,
@@ -88,84 +96,83 @@ impl<'a> Hdf5Writer<'a> {
         Ok(())
     }
 
-    /// All numbers of a demonstration.
-    pub(in crate::dataset) fn numbers(
+    /// Writes all streams of a demonstration other than images.
+    pub(in crate::dataset) fn write_streams(
         &mut self,
         demo: usize,
         demonstration: &Demonstration,
     ) -> Result<(), DatasetError> {
-        let outer = demonstration.top_level_streams();
-        for stream in outer.iter().chain(&demonstration.observed).chain(&demonstration.privileged) {
-            self.stream(&format!("data/demo_{demo}/{}", stream.name), stream, demonstration.steps())?;
+        let top_level = demonstration.top_level_streams();
+        for stream in top_level.iter().chain(&demonstration.observed).chain(&demonstration.privileged) {
+            let (key, steps) = (format!("data/demo_{demo}/{}", stream.name), demonstration.steps());
+            match &stream.values {
+                StreamValues::F64(values) => self.write_stream(&key, stream, steps, values)?,
+                StreamValues::F32(values) => self.write_stream(&key, stream, steps, values)?,
+                StreamValues::U8(values) => self.write_stream(&key, stream, steps, values)?,
+            }
         }
         Ok(())
     }
 
-    fn stream(&mut self, key: &str, stream: &DataStream, steps: usize) -> Result<(), DatasetError> {
-        match &stream.values {
-            StreamValues::F64(numbers) => self.array(key, stream, steps, numbers),
-            StreamValues::F32(numbers) => self.array(key, stream, steps, numbers),
-            StreamValues::U8(numbers) => self.array(key, stream, steps, numbers),
-        }
-    }
-
-    fn array<T: H5Type>(
+    fn write_stream<T: H5Type>(
         &mut self,
         key: &str,
         stream: &DataStream,
         steps: usize,
-        numbers: &[T],
+        values: &[T],
     ) -> Result<(), DatasetError> {
         let width = stream.row_shape.iter().product::<usize>() * size_of::<T>();
-        let rows = (CHUNK / width.max(1)).clamp(1, steps.max(1));
-        let data = self.dataset::<T>(key, (steps, rows), &stream.row_shape, size_of::<T>())?;
+        let per_chunk = (MAX_CHUNK_BYTES / width.max(1)).clamp(1, steps.max(1));
+        let length = ChunkedSteps { steps, per_chunk };
+        let data = self.create_dataset::<T>(key, length, &stream.row_shape, size_of::<T>())?;
         let failed = |error| DatasetError::hdf5(self.path, key)(error);
-        data.write_raw(numbers).map_err(failed)?;
-        annotate(&data, &stream.attributes).map_err(failed)
+        data.write_raw(values).map_err(failed)?;
+        write_text_attributes(&data, &stream.attributes).map_err(failed)
     }
 
-    /// A data set of `steps` rows in chunks of `rows`. Before compression the bytes of a chunk are put side by side that are
-    /// `together` bytes apart (HDF5's shuffle filter).
-    pub(in crate::dataset) fn dataset<T: H5Type>(
+    /// Creates a dataset. Before compression, HDF5's shuffle filter groups the bytes of a chunk that are `shuffle_stride`
+    /// bytes apart; 1 disables it.
+    pub(in crate::dataset) fn create_dataset<T: H5Type>(
         &mut self,
         key: &str,
-        (steps, rows): (usize, usize),
-        row: &[usize],
-        together: usize,
+        length: ChunkedSteps,
+        row_shape: &[usize],
+        shuffle_stride: usize,
     ) -> Result<H5Dataset, DatasetError> {
         let (group, name) = key.rsplit_once('/').unwrap_or(("", key));
         let group = self.group(group)?;
-        let [shape, chunk] = [steps, rows].map(|first| [&[first], row].concat());
+        let [shape, chunk] = [length.steps, length.per_chunk].map(|first| [&[first], row_shape].concat());
         let builder = group.new_dataset::<T>().shape(shape).chunk(&chunk);
-        let filters = match together {
-            1 => FilterPipeline::deflate(LEVEL),
-            _ => FilterPipeline::shuffle_deflate(together as u32, LEVEL),
+        let filters = match shuffle_stride {
+            1 => FilterPipeline::deflate(COMPRESSION_LEVEL),
+            _ => FilterPipeline::shuffle_deflate(shuffle_stride as u32, COMPRESSION_LEVEL),
         };
         builder.filter_pipeline(filters).create(name).map_err(|e| DatasetError::hdf5(self.path, key)(e))
     }
 
-    /// Room for the pictures of a stream, `rows` in a chunk. The values of one pixel in all pictures of a chunk are stored side by
-    /// side: what does not move takes little room then.
-    pub(in crate::dataset) fn pictures(
+    /// Creates the dataset of an image stream. Within a chunk the values of one pixel in successive images are stored next to
+    /// each other, so that static parts of the image compress well.
+    pub(in crate::dataset) fn create_image_dataset(
         &mut self,
         demo: usize,
         name: &str,
-        (steps, rows): (usize, usize),
-        (width, height): (u32, u32),
+        length: ChunkedSteps,
+        width: u32,
+        height: u32,
     ) -> Result<H5Dataset, DatasetError> {
         let key = format!("data/demo_{demo}/obs/{name}");
-        let row = [height as usize, width as usize, 3];
-        let together = if rows > 1 { row.iter().product() } else { 1 };
-        let data = self.dataset::<u8>(&key, (steps, rows), &row, together)?;
-        let notes = [("axes".to_owned(), "step, row from the top, column, RGB (sRGB)".to_owned())];
-        annotate(&data, &notes).map_err(|e| DatasetError::hdf5(self.path, &key)(e))?;
+        let row_shape = [height as usize, width as usize, 3];
+        let shuffle_stride = if length.per_chunk > 1 { row_shape.iter().product() } else { 1 };
+        let data = self.create_dataset::<u8>(&key, length, &row_shape, shuffle_stride)?;
+        let axes = [("axes".to_owned(), "step, row from the top, column, RGB (sRGB)".to_owned())];
+        write_text_attributes(&data, &axes).map_err(|e| DatasetError::hdf5(self.path, &key)(e))?;
         Ok(data)
     }
 
-    /// Ends the file, or gives it up if what was to be `written` into it could not be.
+    /// Closes the file. If `written` is an error, the file is closed without syncing and the error returned.
     pub(in crate::dataset) fn close(self, written: Result<(), DatasetError>) -> Result<(), DatasetError> {
         if written.is_err() {
-            // What is wrong is known already.
+            // The first error is the one to report.
             let _ = self.file.close_no_sync();
             return written;
         }
@@ -174,9 +181,12 @@ impl<'a> Hdf5Writer<'a> {
     }
 }
 
-/// Puts notes at a data set.
-pub(in crate::dataset) fn annotate(data: &H5Dataset, notes: &[(String, String)]) -> rust_hdf5::Result<()> {
-    for (name, text) in notes {
+/// Writes text attributes of a dataset.
+pub(super) fn write_text_attributes(
+    data: &H5Dataset,
+    attributes: &[(String, String)],
+) -> rust_hdf5::Result<()> {
+    for (name, text) in attributes {
         data.new_attr::<rust_hdf5::VarLenUnicode>().shape(()).create(name)?.write_string(text)?;
     }
     Ok(())

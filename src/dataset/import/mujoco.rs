@@ -1,26 +1,25 @@
-//! Where things are in a flat state of MuJoCo's, by the model that was kept with it.
+//! Object poses in a flat MuJoCo state, by the model stored with it.
 //!
-//! A state is the time, the positions of all joints and their velocities. Joints stand in the order of their bodies, a body
-//! before those in it, as the model names them (MuJoCo, XML reference, "body"): a free joint has seven positions (place,
-//! quaternion w x y z) and six velocities, a ball four and three, any other one and one.
+//! A state holds the time, the positions of all joints and their velocities. Joints are in the order of their bodies, parents
+//! before children (MuJoCo, XML reference, "body"): a free joint has seven positions (position, quaternion w x y z) and six
+//! velocities, a ball joint four and three, any other joint one and one.
 
-use super::{ForeignObjectPose, pose_of};
+use super::{ForeignObjectPose, demo_reader::pose_from_row};
 use crate::geometry::Pose;
 
-/// Bodies of a model, in their order.
+/// Kinematic tree of a model.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct MujocoModel {
     bodies: Vec<MujocoBody>,
-    /// Where the robot stands, world.
+    /// Pose of the robot's base, world.
     pub base_w: Option<Pose>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
 struct MujocoBody {
     name: String,
-    /// What it is in.
-    above: Option<usize>,
-    /// In that body; none if it is told in another way than by `pos` and `quat`.
+    parent: Option<usize>,
+    /// Pose in the parent; `None` if it is given by other attributes than `pos` and `quat`.
     pose: Option<Pose>,
     joints: Vec<MujocoJoint>,
 }
@@ -33,12 +32,19 @@ enum MujocoJoint {
 }
 
 impl MujocoJoint {
-    /// Positions and velocities.
-    fn size(self) -> [usize; 2] {
+    fn positions(self) -> usize {
         match self {
-            Self::Free => [7, 6],
-            Self::Ball => [4, 3],
-            Self::Single => [1, 1],
+            Self::Free => 7,
+            Self::Ball => 4,
+            Self::Single => 1,
+        }
+    }
+
+    fn velocities(self) -> usize {
+        match self {
+            Self::Free => 6,
+            Self::Ball => 3,
+            Self::Single => 1,
         }
     }
 }
@@ -47,7 +53,7 @@ impl MujocoJoint {
 const BASE: &str = "robot0_base";
 
 impl MujocoModel {
-    /// Reads the bodies of a model; none if it has none.
+    /// Reads the bodies of an XML model; `None` if it has none.
     pub(super) fn read(xml: &str) -> Option<Self> {
         let mut model = Self::default();
         let mut open: Vec<(String, Option<usize>)> = Vec::new();
@@ -57,14 +63,14 @@ impl MujocoModel {
                 continue;
             }
             let name = tag.split(|c: char| c.is_whitespace() || c == '/').next().unwrap_or_default();
-            let above = open.iter().rev().find_map(|(_, body)| *body);
+            let parent = open.iter().rev().find_map(|(_, body)| *body);
             let direct = open.last().and_then(|(_, body)| *body);
             let in_world = open.iter().any(|(name, _)| name == "worldbody");
             let mut body = None;
             match (name, direct) {
                 ("body", _) if in_world => {
                     body = Some(model.bodies.len());
-                    model.bodies.push(MujocoBody::of(tag, above));
+                    model.bodies.push(MujocoBody::from_tag(tag, parent));
                 }
                 ("freejoint", Some(at)) => model.bodies[at].joints.push(MujocoJoint::Free),
                 ("joint", Some(at)) => model.bodies[at].joints.push(match attribute(tag, "type") {
@@ -83,47 +89,47 @@ impl MujocoModel {
         (!model.bodies.is_empty()).then_some(model)
     }
 
-    /// A body's pose in the world while nothing moves.
+    /// World pose of a body at zero joint positions.
     fn pose(&self, body: usize) -> Option<Pose> {
-        // Step by step, and not by calling itself: files of others may nest as deep as they like.
-        let outwards = std::iter::successors(Some(body), |body| self.bodies[*body].above);
+        // Iterative: foreign files may nest deeply enough to overflow the stack.
+        let outwards = std::iter::successors(Some(body), |body| self.bodies[*body].parent);
         outwards
             .map(|body| self.bodies[body].pose)
             .try_fold(Pose::identity(), |inner, pose| Some(pose? * inner))
     }
 
-    /// Numbers of a state of this model.
-    pub(super) fn width(&self) -> usize {
+    /// Length of a state vector.
+    pub(super) fn state_width(&self) -> usize {
         let joints = self.bodies.iter().flat_map(|body| &body.joints);
-        1 + joints.map(|joint| joint.size().iter().sum::<usize>()).sum::<usize>()
+        1 + joints.map(|joint| joint.positions() + joint.velocities()).sum::<usize>()
     }
 
-    /// What stands around in a state: free bodies where the state has them, and those that are fixed to the world where the
-    /// model has them. None if the state is not of this model.
-    pub(super) fn standing(&self, state: &[f64]) -> Option<Vec<ForeignObjectPose>> {
-        if state.len() != self.width() {
+    /// Object poses in a state: free bodies at their positions in the state, bodies fixed to the world at theirs in the model.
+    /// `None` if the state does not fit the model.
+    pub(super) fn object_poses(&self, state: &[f64]) -> Option<Vec<ForeignObjectPose>> {
+        if state.len() != self.state_width() {
             return None;
         }
-        let (mut at, mut things) = (1, Vec::new());
+        let (mut at, mut objects) = (1, Vec::new());
         for (index, body) in self.bodies.iter().enumerate() {
             let first = at;
-            at += body.joints.iter().map(|joint| joint.size()[0]).sum::<usize>();
+            at += body.joints.iter().map(|joint| joint.positions()).sum::<usize>();
             let pose_w = match body.joints[..] {
-                [MujocoJoint::Free] => pose_of(&state[first..first + 7]),
-                [] if body.above.is_none() => self.pose(index),
+                [MujocoJoint::Free] => pose_from_row(&state[first..first + 7]),
+                [] if body.parent.is_none() => self.pose(index),
                 _ => None,
             };
             let Some(pose_w) = pose_w else { continue };
             let pose = self.base_w.map_or(pose_w, |base| base.inverse() * pose_w);
             let name = body.name.trim_end_matches("_main").to_owned();
-            things.push(ForeignObjectPose { name, pose, in_base: self.base_w.is_some(), soft: false });
+            objects.push(ForeignObjectPose { name, pose, in_base: self.base_w.is_some(), is_soft: false });
         }
-        Some(things)
+        Some(objects)
     }
 }
 
 impl MujocoBody {
-    fn of(tag: &str, above: Option<usize>) -> Self {
+    fn from_tag(tag: &str, parent: Option<usize>) -> Self {
         let numbers = |name, or: &[f64]| -> Option<Vec<f64>> {
             let Some(text) = attribute(tag, name) else { return Some(or.to_vec()) };
             let read: Option<Vec<f64>> = text.split_whitespace().map(|word| word.parse().ok()).collect();
@@ -132,12 +138,12 @@ impl MujocoBody {
         let (at, turn) = (numbers("pos", &[0.0; 3]), numbers("quat", &[1.0, 0.0, 0.0, 0.0]));
         let other =
             ["euler", "axisangle", "xyaxes", "zaxis"].iter().any(|name| attribute(tag, name).is_some());
-        let pose = at.zip(turn).filter(|_| !other).and_then(|(at, turn)| pose_of(&[at, turn].concat()));
-        Self { name: attribute(tag, "name").unwrap_or_default().to_owned(), above, pose, joints: Vec::new() }
+        let pose = at.zip(turn).filter(|_| !other).and_then(|(at, turn)| pose_from_row(&[at, turn].concat()));
+        Self { name: attribute(tag, "name").unwrap_or_default().to_owned(), parent, pose, joints: Vec::new() }
     }
 }
 
-/// The insides of a document's tags, comments left out.
+/// Contents of the tags of an XML document, without comments.
 fn tags(xml: &str) -> impl Iterator<Item = &str> {
     let mut rest = xml;
     std::iter::from_fn(move || {
@@ -156,7 +162,7 @@ fn tags(xml: &str) -> impl Iterator<Item = &str> {
     })
 }
 
-/// An attribute of a tag.
+/// Value of an attribute of a tag.
 fn attribute<'a>(tag: &'a str, name: &str) -> Option<&'a str> {
     let mut rest = tag;
     loop {

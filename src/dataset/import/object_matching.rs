@@ -1,4 +1,4 @@
-//! Which thing of another world is which object of ours.
+//! Assignment of recorded object poses to the objects of a softvt scene.
 
 use super::ForeignObjectPose;
 use crate::{
@@ -6,69 +6,69 @@ use crate::{
     scene::{Body, Object, ObjectPlacement, Scene},
 };
 
-/// What is longer than this is the ground, m.
-const GROUND: f64 = 0.5;
-/// A thing whose own z axis is this near to the vertical stands as ours do, and its yaw is ours (cosine).
-const UPRIGHT: f64 = 0.99;
+/// Objects longer than this are furniture and are not placed, m.
+const FURNITURE_LENGTH: f64 = 0.5;
+/// Cosine of the largest tilt at which an object's z axis counts as vertical, so that its yaw can be taken over.
+const MIN_UPRIGHT_COSINE: f64 = 0.99;
 
-/// Where the objects of `scene` stand by what is known of another world; none if its `target` is not among that.
+/// Placements of the objects of `scene` according to `recorded` poses; empty if `target` is not among them.
 ///
-/// A thing is an object of the same name, or of which the asset's name, or the object's, is the name's ending, behind a number
-/// that tells things of one kind apart: the first of them is the first in the scene. A soft body without a name of ours is the
-/// target.
-pub fn match_objects(scene: &Scene, target: &str, things: &[ForeignObjectPose]) -> Vec<ObjectPlacement> {
-    let mut things: Vec<(&str, u32, &ForeignObjectPose)> = things.iter().map(numbered).collect();
-    things.sort_by_key(|(_, number, _)| *number);
-    let mut taken = vec![false; things.len()];
+/// Names are compared without a trailing number, which tells objects of one kind apart: the lowest number belongs to the first
+/// such object of the scene. A recorded object matches if its name is the object's, or ends in the name of the object or of its
+/// asset. A soft body that matches nothing is taken to be the target.
+pub fn match_objects(scene: &Scene, target: &str, recorded: &[ForeignObjectPose]) -> Vec<ObjectPlacement> {
+    let mut candidates: Vec<(&str, u32, &ForeignObjectPose)> = recorded.iter().map(numbered).collect();
+    candidates.sort_by_key(|(_, number, _)| *number);
+    let mut taken = vec![false; candidates.len()];
     let mut places = Vec::new();
-    for object in scene.objects.iter().filter(moves) {
+    for object in scene.objects.iter().filter(is_placeable) {
         let fits = |exact: bool, taken: &[bool]| {
             let asset = &object.asset.name;
             let ends = |stem: &str, name: &str| stem == name || stem.ends_with(&format!("_{name}"));
-            (0..things.len()).find(|&i| {
-                let (stem, _, thing) = things[i];
-                let same = thing.name == object.name || stem == object.name;
+            (0..candidates.len()).find(|&i| {
+                let (stem, _, recorded) = candidates[i];
+                let same = recorded.name == object.name || stem == object.name;
                 !taken[i] && (same || !exact && (ends(stem, asset) || ends(stem, &object.name)))
             })
         };
         let only_soft = || {
-            let soft = |i: &usize| !taken[*i] && things[*i].2.soft;
-            (0..things.len()).find(soft).filter(|_| object.name == target)
+            let soft = |i: &usize| !taken[*i] && candidates[*i].2.is_soft;
+            (0..candidates.len()).find(soft).filter(|_| object.name == target)
         };
         let found = fits(true, &taken).or_else(|| fits(false, &taken)).or_else(only_soft);
         if let Some(i) = found {
             taken[i] = true;
-            places.push(place(scene, object, things[i].2));
+            places.push(place(scene, object, candidates[i].2));
         }
     }
     if places.iter().any(|place| place.name == target) { places } else { Vec::new() }
 }
 
-/// Whether an object may stand elsewhere.
-fn moves(object: &&Object) -> bool {
+/// True for objects that may be placed elsewhere than in the layout.
+fn is_placeable(object: &&Object) -> bool {
     let size = object.asset.shape.bounds().size();
-    !matches!(object.asset.body, Body::Scenery) && size.x.max(size.y) < GROUND
+    !matches!(object.asset.body, Body::Scenery) && size.x.max(size.y) < FURNITURE_LENGTH
 }
 
-/// A thing's name without the number at its end, and the number.
-fn numbered(thing: &ForeignObjectPose) -> (&str, u32, &ForeignObjectPose) {
-    let split = thing.name.rsplit_once('_').and_then(|(stem, end)| Some((stem, end.parse().ok()?)));
-    let (stem, number) = split.unwrap_or((&thing.name, 0));
-    (stem, number, thing)
+/// Name without a trailing number, that number, and the object.
+fn numbered(recorded: &ForeignObjectPose) -> (&str, u32, &ForeignObjectPose) {
+    let split = recorded.name.rsplit_once('_').and_then(|(stem, end)| Some((stem, end.parse().ok()?)));
+    let (stem, number) = split.unwrap_or((&recorded.name, 0));
+    (stem, number, recorded)
 }
 
-fn place(scene: &Scene, object: &Object, thing: &ForeignObjectPose) -> ObjectPlacement {
-    let pose_w = if thing.in_base { scene.base_w * thing.pose } else { thing.pose };
+fn place(scene: &Scene, object: &Object, recorded: &ForeignObjectPose) -> ObjectPlacement {
+    let pose_w = if recorded.in_base { scene.base_w * recorded.pose } else { recorded.pose };
     let at = pose_w.translation.vector;
-    let upright = (pose_w.rotation * Vec3::z()).z > UPRIGHT;
+    let upright = (pose_w.rotation * Vec3::z()).z > MIN_UPRIGHT_COSINE;
     ObjectPlacement {
         name: object.name.clone(),
         xy: [at.x, at.y],
-        yaw: (upright && !thing.soft).then(|| yaw(&pose_w)),
+        yaw: (upright && !recorded.is_soft).then(|| yaw(&pose_w)),
     }
 }
 
-/// Turn about the vertical, rad.
+/// Rotation about the vertical, rad.
 fn yaw(pose: &Pose) -> f64 {
     let x = pose.rotation * Vec3::x();
     x.y.atan2(x.x)
@@ -116,13 +116,13 @@ mod tests {
         }
     }
 
-    fn thing(name: &str, x: f64, soft: bool) -> ForeignObjectPose {
+    fn object_pose(name: &str, x: f64, is_soft: bool) -> ForeignObjectPose {
         let turn = Quat::from_axis_angle(&Vec3::z_axis(), 0.3);
         ForeignObjectPose {
             name: name.to_owned(),
             pose: Pose::from_parts(Vec3::new(x, 0.1, 0.9).into(), turn),
             in_base: true,
-            soft,
+            is_soft,
         }
     }
 
@@ -131,34 +131,34 @@ mod tests {
     }
 
     #[test]
-    fn things_of_one_kind_are_taken_in_the_order_of_their_numbers() {
-        let things = [
-            thing("my_red_cup_2", 0.9, false),
-            thing("table_1", 0.0, false),
-            thing("my_red_cup_1", 0.7, false),
+    fn objects_of_one_kind_are_matched_in_the_order_of_their_numbers() {
+        let recorded = [
+            object_pose("my_red_cup_2", 0.9, false),
+            object_pose("table_1", 0.0, false),
+            object_pose("my_red_cup_1", 0.7, false),
         ];
-        let found = match_objects(&scene(), "right", &things);
+        let found = match_objects(&scene(), "right", &recorded);
         assert_eq!(named(&found), [("left", 10.0), ("right", 30.0)]);
         assert!((found[0].yaw.unwrap() - 0.3).abs() < 1e-12);
         let mut moved = scene();
         crate::scene::InitialState { joints: Some([0.5; 7]), places: found }.apply(&mut moved);
         let at = moved.objects[2].pose_w.translation.vector;
-        assert!((at - Vec3::new(0.3, 0.1, 0.25)).norm() < 1e-12, "the height is the layout's: {at}");
+        assert!((at - Vec3::new(0.3, 0.1, 0.25)).norm() < 1e-12, "the height is that of the layout: {at}");
         assert_eq!((moved.start_q, &moved.objects[0]), ([0.5; 7], &scene().objects[0]));
     }
 
     #[test]
-    fn a_soft_thing_without_a_name_of_ours_is_the_target_and_without_the_target_nothing_is_placed() {
-        let things = [thing("pastry_7", 0.7, true), thing("china_1", 0.8, false)];
-        let found = match_objects(&scene(), "left", &things);
+    fn an_unknown_soft_object_is_the_target_and_without_the_target_nothing_is_placed() {
+        let recorded = [object_pose("pastry_7", 0.7, true), object_pose("china_1", 0.8, false)];
+        let found = match_objects(&scene(), "left", &recorded);
         assert_eq!(named(&found), [("left", 10.0), ("saucer", 20.0)]);
-        assert_eq!(found[0].yaw, None, "how it is turned is not known");
-        assert_eq!(match_objects(&scene(), "left", &things[1..]), []);
+        assert_eq!(found[0].yaw, None, "its orientation is not known");
+        assert_eq!(match_objects(&scene(), "left", &recorded[1..]), []);
     }
 
     #[test]
-    fn a_thing_that_lies_on_its_side_in_its_own_frame_keeps_our_yaw() {
-        let mut lying = thing("red_cup_1", 0.7, false);
+    fn an_object_on_its_side_keeps_the_yaw_of_the_layout() {
+        let mut lying = object_pose("red_cup_1", 0.7, false);
         lying.pose.rotation *= Quat::from_axis_angle(&Vec3::x_axis(), 1.57);
         assert_eq!(match_objects(&scene(), "left", &[lying])[0].yaw, None);
     }

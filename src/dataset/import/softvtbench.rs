@@ -1,15 +1,13 @@
-//! SoftVTBench's files: absolute poses in the frame of the robot's base.
+//! SoftVTBench's files: absolute poses in the robot's base frame.
 //!
-//! Its actions are the pose *measured* when the action was taken, the finger's position and, in the longer form, the forces on
-//! both fingers (core/recorders/recorders.py); quaternions are w x y z.
+//! An action is the pose *measured* when the action was taken, the finger position and, in the longer form, the forces on both
+//! fingers (core/recorders/recorders.py). Quaternions are w x y z.
 
 use super::{
-    super::{DatasetError, TaskFile},
-    ForeignDemo, ForeignObjectPose, InitialCondition,
+    DatasetError, DemoReader, ForeignDemo, ForeignObjectPose, InitialCondition,
+    demo_reader::{FloatArray, pose_from_row},
     header::Header,
-    pose_of,
-    rows::{if_there, numbers, rows, wrong},
-    tool_pose,
+    tool_pose::{self, RecordedPoses},
 };
 use crate::{
     geometry::{Pose, Quat, Vec3},
@@ -17,269 +15,286 @@ use crate::{
     robot::rotation,
 };
 
-/// The key of the recorded poses.
 const POSES: &str = "obs/eef_pose";
 const JOINTS: &str = "obs/arm_joint_pos";
-/// How far the recorded tool may be from ours, m: its frame may lie a little further out.
-const NEAR: f64 = 0.03;
-/// The gap in the middle between two orders of a quaternion's numbers that tells them apart, rad.
-const TOLD_APART: f64 = 0.3;
-/// How far actions may be from the recorded poses in the middle over all steps: m, and rad.
-const LEADING: (f64, f64) = (0.1, 0.6);
-/// A robot that is turned by more than this does not look at its table, rad.
-const BACKWARDS: f64 = 2.8;
-/// A finger that is pressed by more than this holds something, N.
-const PRESSED: f64 = 0.1;
-/// Fingers count as measured, not commanded, if they are as near as this to the observed ones in every step, m.
-const MEASURED: f64 = 1e-4;
-/// Positions of a finger, m, with some slack, and its two codes.
-const FINGER: [f64; 2] = [-0.001, 0.045];
-const FINGERS: GripperEncoding = GripperEncoding { open: 0.04, shut: 0.0, binary: false };
+/// Largest distance of the recorded tool point from ours, m: its frame may be slightly farther out.
+const MAX_TOOL_OFFSET: f64 = 0.03;
+/// Difference of mean angles beyond which one quaternion order is taken to be the right one, rad.
+const ORDER_MARGIN: f64 = 0.3;
+/// Largest mean distance of actions from the recorded poses, m and rad.
+const MAX_LEAD_M: f64 = 0.1;
+const MAX_LEAD_RAD: f64 = 0.6;
+/// Largest plausible rotation of the robot's base, rad; more indicates another quaternion order.
+const MAX_BASE_ROTATION: f64 = 2.8;
+/// Force above which a finger counts as pressed, N.
+const MIN_HOLD_FORCE: f64 = 0.1;
+/// Largest difference, in every step, between finger positions of actions and of observations for the actions to count as
+/// measured, m.
+const MEASURED_TOLERANCE: f64 = 1e-4;
+/// Range of finger positions, m, with some slack.
+const FINGER_RANGE: [f64; 2] = [-0.001, 0.045];
+/// The two encodings of the gripper in actions.
+const FINGER_POSITION: GripperEncoding = GripperEncoding { open: 0.04, shut: 0.0, binary: false };
 const SIGN: GripperEncoding = GripperEncoding { open: 1.0, shut: -1.0, binary: true };
 
-/// An action: seven numbers, and whether both fingers are pressed, if that is there.
-struct Row {
+/// An action of 7 numbers.
+struct RecordedAction {
     numbers: [f64; 7],
-    pressed: bool,
+    /// True if forces are recorded and both fingers are pressed.
+    is_pressed: bool,
 }
 
-/// A demonstration of such a file.
-///
+impl RecordedAction {
+    fn position(&self) -> Vec3 {
+        Vec3::from_column_slice(&self.numbers[..3])
+    }
+
+    fn axis_angle(&self) -> Vec3 {
+        Vec3::from_column_slice(&self.numbers[3..6])
+    }
+
+    fn rotation(&self) -> Quat {
+        rotation::from_axis_angle(&self.axis_angle())
+    }
+
+    fn gripper(&self) -> f64 {
+        self.numbers[6]
+    }
+}
+
 /// # Errors
-/// Something is missing, or is not as expected.
-pub(super) fn demo(file: &TaskFile, header: &Header, demo: usize) -> Result<ForeignDemo, DatasetError> {
-    let actions = actions(file, demo)?;
-    let poses = poses(file, demo, &actions)?;
+/// A stream is missing or invalid.
+pub(super) fn demo(reader: DemoReader, header: &Header) -> Result<ForeignDemo, DatasetError> {
+    let actions = actions(reader)?;
+    let poses = poses(reader, &actions)?;
     let joints =
-        file.has(demo, JOINTS).then(|| tool_pose::joints(file, demo, JOINTS, actions.len())).transpose()?;
-    let at_t = joints.as_ref().map_or(Ok(Vec3::zeros()), |joints| offset(file, demo, &poses, joints))?;
-    check_lead(file, demo, &actions, &poses)?;
-    let grip = gripper(file, demo, &actions)?;
-    let measured = are_measured(file, demo, &actions)?;
-    let command = |row: &Row| {
-        let [x, y, z, a, b, c, finger] = row.numbers;
-        let axis_angle_b = Vec3::new(a, b, c);
-        let position_b = Vec3::new(x, y, z) - rotation::from_axis_angle(&axis_angle_b) * at_t;
-        ToolCommand::Pose(Action { position_b, axis_angle_b, closure: grip.closure(finger) })
+        reader.has(JOINTS).then(|| tool_pose::joint_angles(reader, JOINTS, actions.len())).transpose()?;
+    let offset_t = joints.as_ref().map_or(Ok(Vec3::zeros()), |joints| tool_offset(reader, &poses, joints))?;
+    check_lead(reader, &actions, &poses)?;
+    let gripper = gripper_encoding(reader, &actions)?;
+    let is_measured = fingers_are_measured(reader, &actions)?;
+    let command = |action: &RecordedAction| {
+        ToolCommand::Pose(Action {
+            position_b: action.position() - action.rotation() * offset_t,
+            axis_angle_b: action.axis_angle(),
+            closure: gripper.closure(action.gripper()),
+        })
     };
-    let start = start(file, demo)?;
+    let start = initial_joints(reader)?;
     Ok(ForeignDemo {
-        name: format!("demo_{demo}"),
-        task: header.task(file, demo),
-        shut: actions.iter().map(|row| row.pressed || grip.closure(row.numbers[6]) > 0.5).collect(),
-        held: actions.iter().map(|row| measured && row.pressed).collect(),
+        name: format!("demo_{}", reader.demo),
+        task: header.task(reader.file, reader.demo),
+        gripper_closed: actions
+            .iter()
+            .map(|action| action.is_pressed || gripper.closure(action.gripper()) > 0.5)
+            .collect(),
+        is_stopped_by_object: actions.iter().map(|action| is_measured && action.is_pressed).collect(),
         commands: actions.iter().map(command).collect(),
-        begins: InitialCondition::OtherSimulator {
-            joints: start.or(joints.map(|all| all[0])).map(tool_pose::within_limits),
-            things: things(file, demo)?,
+        initial_condition: InitialCondition::OtherSimulator {
+            joints: start.or(joints.map(|all| all[0])).map(tool_pose::clamp_to_limits),
+            objects: initial_objects(reader)?,
         },
-        said: "absolute poses and the fingers' positions",
+        command_source: "absolute poses and the fingers' positions",
     })
 }
 
-/// Joint angles of the arm at the start, if the file has them.
+/// Joint angles of the arm at the start, if they are recorded.
 ///
 /// # Errors
-/// They are none of a Panda: seven, with or without both fingers.
-fn start(file: &TaskFile, demo: usize) -> Result<Option<[f64; 7]>, DatasetError> {
+/// Not the joint vector of a Panda: 7 angles, or 9 with both fingers.
+fn initial_joints(reader: DemoReader) -> Result<Option<[f64; 7]>, DatasetError> {
     const KEY: &str = "initial_state/articulation/robot/joint_position";
-    if !file.has(demo, KEY) {
+    if !reader.has(KEY) {
         return Ok(None);
     }
-    let (all, shape) = numbers(file, demo, KEY)?;
-    let arm: Option<[f64; 7]> = all.get(..7).and_then(|seven| seven.try_into().ok());
+    let FloatArray { values, shape } = reader.array(KEY)?;
+    let arm: Option<[f64; 7]> = values.get(..7).and_then(|seven| seven.try_into().ok());
     match (arm, shape.last()) {
         (Some(arm), Some(7 | 9)) => {
-            tool_pose::by_joints(file, demo, KEY, &[arm])?;
+            tool_pose::forward_kinematics(reader, KEY, &[arm])?;
             Ok(Some(arm))
         }
         _ => {
             let what = format!(
                 "expected 7 joint angles of a Panda, or 9 with both fingers, got the shape {shape:?}: is it another robot?"
             );
-            Err(wrong(file, demo, KEY, what))
+            Err(reader.error(KEY, what))
         }
     }
 }
 
-fn actions(file: &TaskFile, demo: usize) -> Result<Vec<Row>, DatasetError> {
+fn actions(reader: DemoReader) -> Result<Vec<RecordedAction>, DatasetError> {
     const KEY: &str = "actions";
-    if file.shape(demo, KEY)?.get(1) == Some(&7) {
-        let all = rows::<7>(file, demo, KEY, None)?;
-        return Ok(all.into_iter().map(|numbers| Row { numbers, pressed: false }).collect());
+    if reader.shape(KEY)?.get(1) == Some(&7) {
+        let rows = reader.rows::<7>(KEY, None)?;
+        return Ok(rows.into_iter().map(|numbers| RecordedAction { numbers, is_pressed: false }).collect());
     }
-    let all = rows::<13>(file, demo, KEY, None)?;
-    let pressed = |force: &[f64]| Vec3::from_column_slice(force).norm() > PRESSED;
-    let row = |row: &[f64; 13]| Row {
+    let is_pressed = |force: &[f64]| Vec3::from_column_slice(force).norm() > MIN_HOLD_FORCE;
+    let action = |row: &[f64; 13]| RecordedAction {
         numbers: std::array::from_fn(|i| row[i]),
-        pressed: pressed(&row[7..10]) && pressed(&row[10..]),
+        is_pressed: is_pressed(&row[7..10]) && is_pressed(&row[10..]),
     };
-    Ok(all.iter().map(row).collect())
+    Ok(reader.rows::<13>(KEY, None)?.iter().map(action).collect())
 }
 
-/// The recorded poses of the tool.
+/// Recorded poses of the tool.
 ///
 /// # Errors
-/// The quaternions are none, or of another order.
-fn poses(file: &TaskFile, demo: usize, actions: &[Row]) -> Result<Vec<Pose>, DatasetError> {
-    let all = rows::<7>(file, demo, POSES, Some(actions.len()))?;
+/// Not unit quaternions, or in the order x y z w.
+fn poses(reader: DemoReader, actions: &[RecordedAction]) -> Result<Vec<Pose>, DatasetError> {
+    let rows = reader.rows::<7>(POSES, Some(actions.len()))?;
     let length = |row: &[f64; 7]| row[3..].iter().map(|x| x * x).sum::<f64>().sqrt();
-    if let Some(step) = all.iter().position(|row| (length(row) - 1.0).abs() > 1e-2) {
-        let what = format!("step {step}: no quaternion w x y z of length 1: {:?}", &all[step][3..]);
-        return Err(wrong(file, demo, POSES, what));
+    if let Some(step) = rows.iter().position(|row| (length(row) - 1.0).abs() > 1e-2) {
+        let what = format!("step {step}: not a unit quaternion w x y z: {:?}", &rows[step][3..]);
+        return Err(reader.error(POSES, what));
     }
-    let order = |[w, x, y, z]: [usize; 4]| -> Vec<Quat> {
+    let in_order = |[w, x, y, z]: [usize; 4]| -> Vec<Quat> {
         let q = |row: &[f64; 7]| nalgebra::Quaternion::new(row[3 + w], row[3 + x], row[3 + y], row[3 + z]);
-        all.iter().map(|row| Quat::new_normalize(q(row))).collect()
+        rows.iter().map(|row| Quat::new_normalize(q(row))).collect()
     };
-    let commanded = |row: &Row| {
-        let [_, _, _, a, b, c, _] = row.numbers;
-        rotation::from_axis_angle(&Vec3::new(a, b, c))
-    };
-    let commanded: Vec<Quat> = actions.iter().map(commanded).collect();
-    let apart = [[0, 1, 2, 3], [3, 0, 1, 2]].map(|places| tool_pose::mean_angle(&order(places), &commanded));
-    if apart[1] + TOLD_APART < apart[0] {
+    let commanded: Vec<Quat> = actions.iter().map(RecordedAction::rotation).collect();
+    let wxyz = in_order([0, 1, 2, 3]);
+    let angle_wxyz = tool_pose::mean_angle(&wxyz, &commanded);
+    let angle_xyzw = tool_pose::mean_angle(&in_order([3, 0, 1, 2]), &commanded);
+    if angle_xyzw + ORDER_MARGIN < angle_wxyz {
         let what = format!(
-            "its quaternions are of the order x y z w: {:.0}° from the actions' rotations as w x y z, {:.0}° as x y z w; expected w x \
+            "its quaternions are in the order x y z w: {:.0}° from the actions' rotations as w x y z, {:.0}° as x y z w; expected w x \
              y z",
-            apart[0].to_degrees(),
-            apart[1].to_degrees()
+            angle_wxyz.to_degrees(),
+            angle_xyzw.to_degrees()
         );
-        return Err(wrong(file, demo, POSES, what));
+        return Err(reader.error(POSES, what));
     }
     let pose = |(row, rotation): (&[f64; 7], Quat)| {
         Pose::from_parts(Vec3::new(row[0], row[1], row[2]).into(), rotation)
     };
-    Ok(all.iter().zip(order([0, 1, 2, 3])).map(pose).collect())
+    Ok(rows.iter().zip(wxyz).map(pose).collect())
 }
 
-/// Actions lead the tool, but not far.
+/// Checks that actions are near the recorded poses: they lead the tool, but not far.
 ///
 /// # Errors
-/// They are of another frame or unit, or no poses.
-fn check_lead(file: &TaskFile, demo: usize, actions: &[Row], poses: &[Pose]) -> Result<(), DatasetError> {
-    let apart = |(row, pose): (&Row, &Pose)| {
-        let [x, y, z, a, b, c, _] = row.numbers;
-        let turn = rotation::from_axis_angle(&Vec3::new(a, b, c));
-        [(Vec3::new(x, y, z) - pose.translation.vector).norm(), turn.angle_to(&pose.rotation)]
-    };
-    let sums =
-        actions.iter().zip(poses).map(apart).fold([0.0; 2], |sum, one| [sum[0] + one[0], sum[1] + one[1]]);
-    let [away, turned] = sums.map(|sum| sum / poses.len() as f64);
-    if away <= LEADING.0 && turned <= LEADING.1 {
+/// Not absolute poses in the base frame in m and rad.
+fn check_lead(reader: DemoReader, actions: &[RecordedAction], poses: &[Pose]) -> Result<(), DatasetError> {
+    let (mut distance, mut angle) = (0.0, 0.0);
+    for (action, pose) in actions.iter().zip(poses) {
+        distance += (action.position() - pose.translation.vector).norm();
+        angle += action.rotation().angle_to(&pose.rotation);
+    }
+    let (distance, angle) = (distance / poses.len() as f64, angle / poses.len() as f64);
+    if distance <= MAX_LEAD_M && angle <= MAX_LEAD_RAD {
         return Ok(());
     }
     let what = format!(
-        "{:.0} mm and {:.0}° from {POSES} in the middle over all steps: expected absolute poses in the frame of the robot's base, m and \
-         rad (axis-angle)",
-        1e3 * away,
-        turned.to_degrees()
+        "on average {:.0} mm and {:.0}° from {POSES}: expected absolute poses in the robot's base frame, m and rad (axis-angle)",
+        1e3 * distance,
+        angle.to_degrees()
     );
-    Err(wrong(file, demo, "actions", what))
+    Err(reader.error("actions", what))
 }
 
-/// Where the recorded tool is in ours, m.
+/// Position of the recorded tool point in our tool frame, m.
 ///
 /// # Errors
-/// Too far off, or not always the same: another robot or frame.
-fn offset(file: &TaskFile, demo: usize, poses: &[Pose], joints: &[[f64; 7]]) -> Result<Vec3, DatasetError> {
-    let by_joints = tool_pose::by_joints(file, demo, JOINTS, joints)?;
-    let at_t = tool_pose::compare(file, demo, (POSES, poses), &by_joints)?;
-    if at_t.norm() > NEAR {
+/// The offset is too large or not constant: another robot or frame.
+fn tool_offset(reader: DemoReader, poses: &[Pose], joints: &[[f64; 7]]) -> Result<Vec3, DatasetError> {
+    let from_joints = tool_pose::forward_kinematics(reader, JOINTS, joints)?;
+    let offset_t = tool_pose::tool_offset(reader, RecordedPoses { name: POSES, poses }, &from_joints)?;
+    if offset_t.norm() > MAX_TOOL_OFFSET {
         let what = format!(
-            "{:.0} mm from where {JOINTS} puts the tool: expected poses in the frame of the robot's base",
-            1e3 * at_t.norm()
+            "{:.0} mm from where {JOINTS} puts the tool: expected poses in the robot's base frame",
+            1e3 * offset_t.norm()
         );
-        return Err(wrong(file, demo, POSES, what));
+        return Err(reader.error(POSES, what));
     }
-    Ok(at_t)
+    Ok(offset_t)
 }
 
-/// How the gripper's number is coded: a finger's position, or 1 open and -1 shut.
+/// Encoding of the gripper: a finger position, or 1 open and -1 closed.
 ///
 /// # Errors
 /// Neither.
-fn gripper(file: &TaskFile, demo: usize, actions: &[Row]) -> Result<GripperEncoding, DatasetError> {
-    let number = |row: &Row| row.numbers[6];
-    let within = |low: f64, high: f64| actions.iter().map(number).all(|x| (low..=high).contains(&x));
-    if within(FINGER[0], FINGER[1]) {
-        return Ok(FINGERS);
-    }
-    if actions.iter().map(number).all(|x| x.abs() == 1.0) {
+fn gripper_encoding(reader: DemoReader, actions: &[RecordedAction]) -> Result<GripperEncoding, DatasetError> {
+    let is_position = |x: f64| (FINGER_RANGE[0]..=FINGER_RANGE[1]).contains(&x);
+    let Some(step) = actions.iter().position(|action| !is_position(action.gripper())) else {
+        return Ok(FINGER_POSITION);
+    };
+    if actions.iter().all(|action| action.gripper().abs() == 1.0) {
         return Ok(SIGN);
     }
-    let odd = |row: &Row| !(FINGER[0]..=FINGER[1]).contains(&number(row));
-    let step = actions.iter().position(odd).unwrap_or_default();
     let what = format!(
-        "step {step}, number 6: {}, expected a finger's position of 0 (shut) to 0.04 m, or 1 (open) and -1 (shut) alone",
-        number(&actions[step])
+        "step {step}, number 6: {}, expected a finger's position of 0 (closed) to 0.04 m, or only 1 (open) and -1 (closed)",
+        actions[step].gripper()
     );
-    Err(wrong(file, demo, "actions", what))
+    Err(reader.error("actions", what))
 }
 
-/// Whether the fingers of the actions are those that were measured.
-fn are_measured(file: &TaskFile, demo: usize, actions: &[Row]) -> Result<bool, DatasetError> {
-    let Some(fingers) = if_there::<2>(file, demo, "obs/gripper_pos", actions.len())? else {
+/// True if the finger positions in the actions are the measured ones.
+fn fingers_are_measured(reader: DemoReader, actions: &[RecordedAction]) -> Result<bool, DatasetError> {
+    let Some(fingers) = reader.rows_if_present::<2>("obs/gripper_pos", actions.len())? else {
         return Ok(false);
     };
-    Ok(actions.iter().zip(fingers).all(|(row, fingers)| (row.numbers[6] - fingers[0]).abs() < MEASURED))
+    Ok(actions
+        .iter()
+        .zip(fingers)
+        .all(|(action, fingers)| (action.gripper() - fingers[0]).abs() < MEASURED_TOLERANCE))
 }
 
-/// What stands around at the start: `initial_state`, or the first of `states`.
-fn things(file: &TaskFile, demo: usize) -> Result<Vec<ForeignObjectPose>, DatasetError> {
-    let first = |name: &str| file.has(demo, name).then(|| numbers(file, demo, name)).transpose();
-    let pose = |folder: &str, name: &str| -> Result<Option<Pose>, DatasetError> {
-        for last in ["root_pose", "root_pose_w"] {
-            let key = format!("{folder}/{name}/{last}");
-            let Some((all, shape)) = first(&key)? else { continue };
-            let length = all.get(3..7).map(|q| q.iter().map(|x| x * x).sum::<f64>().sqrt());
-            if shape.last() != Some(&7) || !length.is_some_and(|length| (length - 1.0).abs() < 1e-2) {
-                let what = format!(
-                    "expected a place (m) and a quaternion w x y z of length 1, got the shape {shape:?}"
-                );
-                return Err(wrong(file, demo, &key, what));
-            }
-            return Ok(all.get(..7).and_then(pose_of));
-        }
-        Ok(None)
-    };
+/// Poses of the objects at the start, from `initial_state` or the first row of `states`.
+fn initial_objects(reader: DemoReader) -> Result<Vec<ForeignObjectPose>, DatasetError> {
     for root in ["initial_state", "states"] {
-        let mut things = Vec::new();
-        let base = pose(&format!("{root}/articulation"), "robot")?;
-        if base.is_some_and(|base| base.rotation.angle() > BACKWARDS) {
-            let what = "the robot stands turned by half a turn or on its head: are its quaternions of another order than w x y z?";
-            return Err(wrong(file, demo, &format!("{root}/articulation/robot"), what.to_owned()));
-        }
-        let seen = |pose_w: Pose| base.map_or(pose_w, |base| base.inverse() * pose_w);
-        for kind in ["rigid_object", "articulation"] {
-            let folder = format!("{root}/{kind}");
-            for name in file.groups(demo, &folder).into_iter().filter(|name| name != "robot") {
-                let Some(pose_w) = pose(&folder, &name)? else { continue };
-                things.push(ForeignObjectPose {
-                    name,
-                    pose: seen(pose_w),
-                    in_base: base.is_some(),
-                    soft: false,
-                });
-            }
-        }
-        let folder = format!("{root}/deformable_object");
-        for name in file.groups(demo, &folder) {
-            let nodes =
-                ["nodal_position", "nodal_pos_w"].map(|last| first(&format!("{folder}/{name}/{last}")));
-            let Some((all, shape)) = nodes.into_iter().find_map(Result::transpose).transpose()? else {
-                continue;
-            };
-            // One step of them: all but the first axis.
-            let count = shape.iter().skip(usize::from(shape.len() > 2)).product::<usize>().min(all.len());
-            let nodes = all[..count].as_chunks::<3>().0;
-            let centre = nodes.iter().map(|x| Vec3::from(*x)).sum::<Vec3>() / nodes.len().max(1) as f64;
-            let pose = seen(Pose::translation(centre.x, centre.y, centre.z));
-            things.push(ForeignObjectPose { name, pose, in_base: base.is_some(), soft: true });
-        }
-        if !things.is_empty() {
-            return Ok(things);
+        let objects = objects_of(reader, root)?;
+        if !objects.is_empty() {
+            return Ok(objects);
         }
     }
     Ok(Vec::new())
+}
+
+fn objects_of(reader: DemoReader, root: &str) -> Result<Vec<ForeignObjectPose>, DatasetError> {
+    let base_w = root_pose(reader, &format!("{root}/articulation/robot"))?;
+    if base_w.is_some_and(|base| base.rotation.angle() > MAX_BASE_ROTATION) {
+        let what = "the robot's base is rotated by half a turn or upside down: are its quaternions in another order than w x y z?";
+        return Err(reader.error(&format!("{root}/articulation/robot"), what));
+    }
+    let object = |name: String, pose_w: Pose, is_soft: bool| ForeignObjectPose {
+        name,
+        pose: base_w.map_or(pose_w, |base| base.inverse() * pose_w),
+        in_base: base_w.is_some(),
+        is_soft,
+    };
+    let mut objects = Vec::new();
+    for kind in ["rigid_object", "articulation"] {
+        let group = format!("{root}/{kind}");
+        for name in reader.file.groups(reader.demo, &group).into_iter().filter(|name| name != "robot") {
+            if let Some(pose_w) = root_pose(reader, &format!("{group}/{name}"))? {
+                objects.push(object(name, pose_w, false));
+            }
+        }
+    }
+    let group = format!("{root}/deformable_object");
+    for name in reader.file.groups(reader.demo, &group) {
+        let key = ["nodal_position", "nodal_pos_w"].map(|last| format!("{group}/{name}/{last}"));
+        let Some(key) = key.iter().find(|key| reader.has(key)) else { continue };
+        let FloatArray { values, shape } = reader.array(key)?;
+        // The nodes of the first step: all axes but the first, if there are three.
+        let count = shape.iter().skip(usize::from(shape.len() > 2)).product::<usize>().min(values.len());
+        let nodes = values[..count].as_chunks::<3>().0;
+        let centre = nodes.iter().map(|x| Vec3::from(*x)).sum::<Vec3>() / nodes.len().max(1) as f64;
+        objects.push(object(name, Pose::translation(centre.x, centre.y, centre.z), true));
+    }
+    Ok(objects)
+}
+
+/// First pose of the object whose group is `group`, if one is recorded.
+fn root_pose(reader: DemoReader, group: &str) -> Result<Option<Pose>, DatasetError> {
+    let keys = ["root_pose", "root_pose_w"].map(|last| format!("{group}/{last}"));
+    let Some(key) = keys.iter().find(|key| reader.has(key)) else { return Ok(None) };
+    let FloatArray { values, shape } = reader.array(key)?;
+    let length = values.get(3..7).map(|q| q.iter().map(|x| x * x).sum::<f64>().sqrt());
+    if shape.last() != Some(&7) || !length.is_some_and(|length| (length - 1.0).abs() < 1e-2) {
+        let what = format!("expected a position (m) and a unit quaternion w x y z, got the shape {shape:?}");
+        return Err(reader.error(key, what));
+    }
+    Ok(values.get(..7).and_then(pose_from_row))
 }

@@ -1,4 +1,4 @@
-//! Small files in the layouts of others, and what becomes of them.
+//! Small files in foreign layouts, and the demonstrations read from them.
 
 use std::{fs, path::PathBuf};
 
@@ -7,9 +7,9 @@ use serde_json::{Value, json};
 use super::{libero::goals, mujoco::MujocoModel, *};
 use crate::{
     benchmark::control::CONTROL_DT,
-    dataset::hdf5::Hdf5Writer,
-    geometry::Quat,
-    policy::Action,
+    dataset::hdf5::{ChunkedSteps, Hdf5Writer},
+    geometry::{Pose, Quat, Vec3},
+    policy::{Action, ToolCommand},
     robot::{IkSpec, ik::DiffIk, rotation},
 };
 
@@ -25,32 +25,32 @@ fn tool(k: usize) -> Pose {
     DiffIk::new(&IkSpec::default(), START, CONTROL_DT).tool_pose(&joints(k))
 }
 
-/// Shares of a step at step k.
+/// Action at step k.
 fn share(k: usize) -> [f64; 7] {
     let x = k as f64;
     [0.5 * x.sin(), -0.3, 0.1 * x, 0.2, -0.4 * x.cos(), 0.1, if k < 3 { -1.0 } else { 1.0 }]
 }
 
-/// What makes a file wrong.
-type Spoil = fn(&mut Made);
+/// Damages a file.
+type Damage = fn(&mut FileBuilder);
 
-/// A file in the making.
-struct Made {
+/// A file to be written.
+struct FileBuilder {
     folder: tempfile::TempDir,
     environment: Value,
     about: Vec<(&'static str, String)>,
     demo: Vec<(&'static str, String)>,
-    /// Name, shape of a step, numbers.
+    /// Name, shape per step, values.
     data: Vec<(String, Vec<usize>, Vec<f64>)>,
 }
 
-impl Made {
+impl FileBuilder {
     fn new(environment: Value) -> Self {
         let folder = tempfile::tempdir().unwrap();
         Self { folder, environment, about: Vec::new(), demo: Vec::new(), data: Vec::new() }
     }
 
-    /// As LIBERO writes it: observations after each action, states before it.
+    /// LIBERO: observations after each action, states before it.
     fn libero() -> Self {
         let kwargs =
             json!({ "robots": ["Panda"], "control_freq": 20, "controller_configs": { "type": "OSC_POSE" } });
@@ -66,7 +66,7 @@ impl Made {
         made
     }
 
-    /// As SoftVTBench writes it, in whose tactile world the tool lies 3.6 mm further out.
+    /// SoftVTBench, whose tool point is 3.6 mm farther out.
     fn softvtbench() -> Self {
         let mut made = Self::new(json!({ "env_name": "Isaac", "type": 2 }));
         let seen = |k: usize| tool(k) * Pose::translation(0.0, 0.0, 0.0036);
@@ -113,7 +113,8 @@ impl Made {
         }
         for (name, row, numbers) in &self.data {
             let steps = numbers.len() / row.iter().product::<usize>();
-            let data = writer.dataset::<f64>(&format!("data/demo_0/{name}"), (steps, steps), row, 8).unwrap();
+            let length = ChunkedSteps { steps, per_chunk: steps };
+            let data = writer.create_dataset::<f64>(&format!("data/demo_0/{name}"), length, row, 8).unwrap();
             data.write_raw(numbers).unwrap();
         }
         writer.close(Ok(())).unwrap();
@@ -140,7 +141,7 @@ fn poses(demo: &ForeignDemo) -> Vec<Action> {
     demo.commands.iter().map(pose).collect()
 }
 
-/// How far a command is from the pose that robosuite's controller was given at step k, computed with matrices.
+/// Distance of a command from the goal of robosuite's controller at step k, computed with matrices.
 fn off(command: &Action, tool: &Pose, k: usize) -> f64 {
     let [x, y, z, a, b, c, _] = share(k);
     let at = tool.translation.vector + Vec3::new(x, y, z) * 0.05;
@@ -149,27 +150,30 @@ fn off(command: &Action, tool: &Pose, k: usize) -> f64 {
     let (angle, cross) = (spin.norm(), (spin / spin.norm()).cross_matrix());
     let turned =
         crate::geometry::Mat3::identity() + cross * angle.sin() + cross * cross * (1.0 - angle.cos());
-    let wanted = turned * tool.rotation.to_rotation_matrix().into_inner();
+    let expected = turned * tool.rotation.to_rotation_matrix().into_inner();
     let got = rotation::from_axis_angle(&command.axis_angle_b).to_rotation_matrix().into_inner();
-    (command.position_b - at).norm() + (wanted - got).norm()
+    (command.position_b - at).norm() + (expected - got).norm()
 }
 
 #[test]
-fn liberos_steps_become_the_poses_that_its_controller_was_given() {
-    let made = Made::libero();
+fn liberos_steps_become_the_goals_of_its_controller() {
+    let made = FileBuilder::libero();
     let (layout, demo) = made.read();
     assert_eq!(
         (layout, demo.task.prompts.clone()),
         (ForeignLayout::Libero, vec!["pick up the cup".to_owned()])
     );
-    // By the states, which are of before each action, though the observations are of after it.
+    // The states are from before each action, the observations from after it.
     for (k, action) in poses(&demo).iter().enumerate() {
         assert!(off(action, &tool(k), k) < 1e-9, "step {k}");
         assert_eq!(action.closure, f64::from(u8::from(k >= 3)));
     }
-    assert_eq!(demo.shut, [false, false, false, true, true, true]);
-    assert_eq!(demo.begins, InitialCondition::OtherSimulator { joints: Some(joints(0)), things: Vec::new() });
-    // Without the states the observations are taken for LIBERO's, of which the first is of after the first action.
+    assert_eq!(demo.gripper_closed, [false, false, false, true, true, true]);
+    assert_eq!(
+        demo.initial_condition,
+        InitialCondition::OtherSimulator { joints: Some(joints(0)), objects: Vec::new() }
+    );
+    // Without states, the observations are assumed to be LIBERO's: the first is from after the first action.
     let (_, demo) = made.without("states").read();
     for (k, action) in poses(&demo).iter().enumerate() {
         assert!(off(action, &tool(k.max(1)), k) < 1e-9, "step {k}");
@@ -177,35 +181,38 @@ fn liberos_steps_become_the_poses_that_its_controller_was_given() {
 }
 
 #[test]
-fn observations_of_before_each_action_are_told_by_the_states_too() {
-    let mut made = Made::libero().without("obs/ee");
+fn observations_from_before_each_action_are_recognised_by_the_states() {
+    let mut made = FileBuilder::libero().without("obs/ee");
     made.each("obs/joint_states", |k| joints(k).to_vec());
     let (_, demo) = made.read();
     poses(&demo).iter().enumerate().for_each(|(k, action)| assert!(off(action, &tool(k), k) < 1e-9));
 }
 
 #[test]
-fn without_joints_the_recorded_tool_is_brought_into_our_frames() {
-    let (_, demo) = Made::libero().without("obs/joint").without("states").read();
+fn without_joints_the_recorded_tool_is_transformed_to_our_frames() {
+    let (_, demo) = FileBuilder::libero().without("obs/joint").without("states").read();
     for (k, action) in poses(&demo).iter().enumerate() {
         assert!(off(action, &tool(k.max(1)), k) < 1e-9, "step {k}");
     }
-    let mut lost = Made::libero().without("obs/joint").without("states");
+    let mut lost = FileBuilder::libero().without("obs/joint").without("states");
     lost.each("obs/ee_pos", |_| vec![3.0, 0.0, 1.0]);
-    assert!(lost.refusal().contains("where the robot stands is not known"));
-    // Without poses either, steps stay steps, of which robosuite's spring makes way.
-    let (_, demo) = Made::libero().without("obs/").without("states").read();
+    assert!(lost.refusal().contains("the robot's position is not known"));
+    // Without poses, steps stay relative and follow robosuite's spring.
+    let (_, demo) = FileBuilder::libero().without("obs/").without("states").read();
     let ToolCommand::Step { whole: false, translation_b, rotation_b, .. } = demo.commands[1] else {
         panic!("no step")
     };
     let [x, _, _, _, b, _, _] = share(1);
     assert!((translation_b.x - 0.05 * x).abs() < 1e-15 && (rotation_b.y - 0.5 * b).abs() < 1e-15);
-    assert_eq!(demo.begins, InitialCondition::OtherSimulator { joints: None, things: Vec::new() });
+    assert_eq!(
+        demo.initial_condition,
+        InitialCondition::OtherSimulator { joints: None, objects: Vec::new() }
+    );
 }
 
 #[test]
-fn robomimics_quaternions_of_another_order_are_told_by_the_joints() {
-    let mut made = Made::libero().without("obs/ee").without("obs/joint");
+fn robomimics_quaternions_in_another_order_are_detected_by_the_joints() {
+    let mut made = FileBuilder::libero().without("obs/ee").without("obs/joint");
     made.each("obs/robot0_joint_pos", |k| joints(k).to_vec());
     made.each("obs/robot0_eef_pos", |k| tool(k).translation.vector.as_slice().to_vec());
     let quaternion = |k: usize| rotation::canonical(&tool(k).rotation).coords;
@@ -224,7 +231,7 @@ fn robomimics_quaternions_of_another_order_are_told_by_the_joints() {
 }
 
 #[test]
-fn a_goal_without_a_turn_keeps_the_last_goals_orientation() {
+fn a_goal_without_rotation_keeps_the_last_goals_orientation() {
     let tool = [tool(0), tool(1), tool(2)];
     let step = |turn: Vec3| ToolCommand::Step {
         whole: false,
@@ -251,24 +258,24 @@ const MODEL: &str = r#"<mujoco><default><joint type="free"/></default><!-- <body
 </worldbody></mujoco>"#;
 
 #[test]
-fn things_of_a_mujoco_state_are_found_by_the_model() {
+fn object_poses_are_read_from_a_mujoco_state_by_its_model() {
     let model = MujocoModel::read(MODEL).unwrap();
     let half = std::f64::consts::FRAC_1_SQRT_2;
     let positions = [0.1, 0.2, 0.4, -0.3, 0.5, half, 0.0, 0.0, half, 1.0, 0.0, 0.0, 0.0];
     let state = [&[0.0], &positions[..], &[0.0; 2 + 6 + 3]].concat();
-    let things = model.standing(&state).unwrap();
-    let named = |name: &str| things.iter().find(|thing| thing.name == name).unwrap();
+    let objects = model.object_poses(&state).unwrap();
+    let named = |name: &str| objects.iter().find(|object| object.name == name).unwrap();
     let cup = named("cup_1");
     assert!((cup.pose.translation.vector - Vec3::new(1.0, -0.3, 0.4)).norm() < 1e-12 && cup.in_base);
     assert!((cup.pose.rotation * Vec3::x() - Vec3::y()).norm() < 1e-12);
     assert!((named("stove_1").pose.rotation * Vec3::x() + Vec3::x()).norm() < 1e-12);
-    assert_eq!(model.standing(&state[1..]), None, "a state of another model");
+    assert_eq!(model.object_poses(&state[1..]), None, "a state of another model");
     assert_eq!(MujocoModel::read("<mujoco/>"), None);
 }
 
 #[test]
-fn softvtbenchs_poses_are_moved_from_its_tool_to_ours() {
-    let made = Made::softvtbench();
+fn softvtbenchs_poses_are_transformed_from_its_tool_to_ours() {
+    let made = FileBuilder::softvtbench();
     let (layout, mut demo) = made.read();
     assert_eq!(layout, ForeignLayout::SoftVtBench);
     assert_eq!(demo.task.prompts[0], "Pick up the  CUP.");
@@ -278,35 +285,38 @@ fn softvtbenchs_poses_are_moved_from_its_tool_to_ours() {
         assert!(away.norm() < 1e-9 && turned < 1e-7, "step {k}: {away}");
         assert!((action.closure - if k < 3 { 0.0 } else { 0.25 }).abs() < 1e-12);
     }
-    assert_eq!(demo.shut, [false, false, false, false, true, true]);
-    // Fingers that a thing has stopped say nothing of how hard they press on one that gives way to nothing.
-    demo.hold_rigid();
+    assert_eq!(demo.gripper_closed, [false, false, false, false, true, true]);
+    // The measured closure of fingers stopped by a rigid object implies no force.
+    demo.close_fully_on_rigid_object();
     let percent: Vec<f64> = poses(&demo).iter().map(|a| (100.0 * a.closure).round()).collect();
     assert_eq!(percent, [0.0, 0.0, 0.0, 25.0, 100.0, 100.0]);
 }
 
 #[test]
-fn softvtbenchs_things_are_those_of_the_initial_state() {
-    let mut made = Made::softvtbench();
+fn softvtbenchs_objects_are_those_of_the_initial_state() {
+    let mut made = FileBuilder::softvtbench();
     made.put("initial_state/articulation/robot/root_pose", &[7], vec![-0.66, 0.0, 0.912, 1.0, 0.0, 0.0, 0.0]);
     made.put("initial_state/articulation/robot/joint_position", &[9], [&START[..], &[0.04; 2]].concat());
     made.put("initial_state/rigid_object/plate_1/root_pose", &[7], vec![0.04, 0.1, 0.9, 1.0, 0.0, 0.0, 0.0]);
     let nodes = vec![0.0, 0.0, 0.9, 0.2, 0.0, 0.9, 0.1, 0.3, 0.93];
     made.put("initial_state/deformable_object/soft_bun/nodal_position", &[3, 3], nodes);
-    let InitialCondition::OtherSimulator { joints, things } = made.read().1.begins else {
+    let InitialCondition::OtherSimulator { joints, objects } = made.read().1.initial_condition else {
         panic!("an episode")
     };
     assert_eq!(joints, Some(START));
-    let at = |i: usize| things[i].pose.translation.vector;
-    assert_eq!((things[0].name.as_str(), things[1].name.as_str(), things.len()), ("plate_1", "soft_bun", 2));
-    assert!((at(0) - Vec3::new(0.7, 0.1, -0.012)).norm() < 1e-12 && !things[0].soft);
-    assert!((at(1) - Vec3::new(0.76, 0.1, -0.002)).norm() < 1e-12 && things[1].soft);
+    let at = |i: usize| objects[i].pose.translation.vector;
+    assert_eq!(
+        (objects[0].name.as_str(), objects[1].name.as_str(), objects.len()),
+        ("plate_1", "soft_bun", 2)
+    );
+    assert!((at(0) - Vec3::new(0.7, 0.1, -0.012)).norm() < 1e-12 && !objects[0].is_soft);
+    assert!((at(1) - Vec3::new(0.76, 0.1, -0.002)).norm() < 1e-12 && objects[1].is_soft);
 }
 
 #[test]
-fn what_is_wrong_with_a_file_of_liberos_is_told_with_its_key() {
-    let libero: [(Spoil, &str); 9] = [
-        (|m| m.demo.push(("model_file", "<mujoco/>".to_owned())), "model_file: no model of MuJoCo's"),
+fn errors_in_liberos_files_name_the_key() {
+    let libero: [(Damage, &str); 9] = [
+        (|m| m.demo.push(("model_file", "<mujoco/>".to_owned())), "model_file: not a MuJoCo model"),
         (|m| m.demo.push(("model_file", MODEL.to_owned())), "states: expected the shape (6, "),
         (
             |m| {
@@ -316,13 +326,13 @@ fn what_is_wrong_with_a_file_of_liberos_is_told_with_its_key() {
                     [&[0.0; 7 * (STEPS - 1)][..], &[0.0, 0.0, 1.4, 0.0, 0.0, 0.0, 0.0]].concat(),
                 )
             },
-            "actions: step 5, number 2: 1.4, expected shares of a step in -1..1",
+            "actions: step 5, number 2: 1.4, expected a fraction of a step in -1..1",
         ),
         (
             |m| m.put("actions", &[7], vec![f64::NAN; 7 * STEPS]),
             "actions: step 0, number 0: NaN is not finite",
         ),
-        (|m| m.each("obs/joint_states", |_| vec![0.0; 6]), "6 joints a step; a Panda has 7"),
+        (|m| m.each("obs/joint_states", |_| vec![0.0; 6]), "6 joints per step; a Panda has 7"),
         (|m| m.each("obs/joint_states", |_| vec![0.0; 7]), "joint 4 is at 0 rad, outside of a Panda's"),
         (
             |m| m.put("obs/joint_states", &[7], vec![0.0; 7]),
@@ -332,23 +342,23 @@ fn what_is_wrong_with_a_file_of_liberos_is_told_with_its_key() {
             |m| m.each("obs/ee_pos", |k| vec![0.1 * k as f64, 0.0, 0.0]),
             "not where the joint angles put the tool",
         ),
-        (|m| m.data.retain(|(name, ..)| name != "obs/ee_ori"), "obs/ee_ori: it is not there"),
+        (|m| m.data.retain(|(name, ..)| name != "obs/ee_ori"), "obs/ee_ori: it is missing"),
     ];
-    for (spoil, words) in libero {
-        let mut made = Made::libero();
-        spoil(&mut made);
+    for (damage, words) in libero {
+        let mut made = FileBuilder::libero();
+        damage(&mut made);
         let said = made.refusal();
         assert!(said.contains(words), "{words}: {said}");
     }
 }
 
 #[test]
-fn what_is_wrong_with_a_file_of_softvtbenchs_is_told_with_its_key() {
+fn errors_in_softvtbenchs_files_name_the_key() {
     const ROBOT: &str = "initial_state/articulation/robot";
-    let softvtbench: [(Spoil, &str); 10] = [
+    let softvtbench: [(Damage, &str); 10] = [
         (
             |m| m.each("actions", |k| [&[1e3 * tool(k).translation.x, 0.0, 0.0], &[0.0; 4][..]].concat()),
-            "from obs/eef_pose in the middle over all steps",
+            "° from obs/eef_pose: expected absolute poses",
         ),
         (|m| m.each("actions", |k| [tool(k).translation.vector.as_slice(), &[0.0; 4]].concat()), "and 1"),
         (|m| m.put(&format!("{ROBOT}/joint_position"), &[8], vec![0.0; 8]), "is it another robot?"),
@@ -370,7 +380,7 @@ fn what_is_wrong_with_a_file_of_softvtbenchs_is_told_with_its_key() {
                     .iter_mut()
                     .for_each(|row| row[3..].rotate_left(1))
             },
-            "obs/eef_pose: its quaternions are of the order x y z w",
+            "obs/eef_pose: its quaternions are in the order x y z w",
         ),
         (
             |m| {
@@ -384,7 +394,7 @@ fn what_is_wrong_with_a_file_of_softvtbenchs_is_told_with_its_key() {
                     .iter_mut()
                     .for_each(|row| row[0] -= 0.66)
             },
-            "mm from where obs/arm_joint_pos puts the tool: expected poses in the frame of the robot's base",
+            "mm from where obs/arm_joint_pos puts the tool: expected poses in the robot's base frame",
         ),
         (
             |m| m.data.iter_mut().find(|(name, ..)| name == "actions").unwrap().2[6] = 0.3,
@@ -392,12 +402,12 @@ fn what_is_wrong_with_a_file_of_softvtbenchs_is_told_with_its_key() {
         ),
         (
             |m| m.data.iter_mut().find(|(name, ..)| name == "obs/eef_pose").unwrap().2[3] = 2.0,
-            "no quaternion w x y z of length 1",
+            "not a unit quaternion w x y z",
         ),
     ];
-    for (spoil, words) in softvtbench {
-        let mut made = Made::softvtbench();
-        spoil(&mut made);
+    for (damage, words) in softvtbench {
+        let mut made = FileBuilder::softvtbench();
+        damage(&mut made);
         let said = made.refusal();
         assert!(said.contains(words), "{words}: {said}");
     }
@@ -408,37 +418,37 @@ fn another_robot_controller_or_rate_is_refused() {
     for (path, value, words) in [
         ("robots", json!(["Sawyer"]), "the robot is Sawyer"),
         ("robots", json!(["Panda", "Panda"]), "there are 2 robots"),
-        ("control_freq", json!(10), "10 control steps a second; expected 20"),
+        ("control_freq", json!(10), "10 control steps per second; expected 20"),
         ("controller_configs", json!({ "type": "JOINT_POSITION" }), "the controller is JOINT_POSITION"),
         ("controller_configs", json!({ "type": "OSC_POSE", "output_max": [1, 2, 3, 4, 5, 6] }), "output_max"),
     ] {
-        let mut made = Made::libero();
+        let mut made = FileBuilder::libero();
         made.environment["env_kwargs"][path] = value;
         let said = made.refusal();
         assert!(said.contains(words), "{words}: {said}");
     }
-    let mut made = Made::softvtbench();
+    let mut made = FileBuilder::softvtbench();
     made.about.push(("robot_type", "UR10e".to_owned()));
     assert!(made.refusal().contains("the robot is UR10e"));
-    let mut made = Made::softvtbench().without("obs/arm_joint_pos");
+    let mut made = FileBuilder::softvtbench().without("obs/arm_joint_pos");
     made.each("obs/arm_joint_pos", |k| joints(k)[..6].to_vec());
     let said = made.refusal();
     assert!(
-        said.ends_with("obs/arm_joint_pos: 6 joints a step; a Panda has 7: is it another robot?"),
+        said.ends_with("obs/arm_joint_pos: 6 joints per step; a Panda has 7: is it another robot?"),
         "{said}"
     );
 }
 
 #[test]
-fn what_is_no_file_of_demonstrations_is_told_in_a_sentence() {
-    let made = Made::libero();
+fn files_that_hold_no_demonstrations_are_reported() {
+    let made = FileBuilder::libero();
     let whole = fs::read(made.write()).unwrap();
     let path = made.folder.path().join("x.hdf5");
     let said = || read(&path).unwrap_err().to_string();
     fs::write(&path, &whole[..whole.len() / 2]).unwrap();
     assert!(
         said().ends_with(&format!(
-            "x.hdf5 is cut short: {} of {} bytes are there",
+            "x.hdf5 is cut short: it has {} of {} bytes",
             whole.len() / 2,
             whole.len()
         )),
@@ -446,24 +456,24 @@ fn what_is_no_file_of_demonstrations_is_told_in_a_sentence() {
         said()
     );
     fs::write(&path, &whole[..20]).unwrap();
-    assert!(said().ends_with("x.hdf5 is cut short: only 20 bytes are there"), "{}", said());
-    // Something else may stand in front, as HDF5 allows it.
+    assert!(said().ends_with("x.hdf5 is cut short: it has only 20 bytes"), "{}", said());
+    // HDF5 allows other data before the signature.
     for (before, read) in [(512, true), (1024, true), (700, false)] {
         fs::write(&path, [&vec![0; before], &whole[..]].concat()).unwrap();
         assert_eq!(super::read(&path).is_ok(), read, "{before}");
     }
     fs::write(&path, "PK").unwrap();
-    assert!(said().ends_with("x.hdf5 is no HDF5 file: it does not begin as one"), "{}", said());
-    assert!(read(made.folder.path()).unwrap_err().to_string().ends_with("is a folder, no HDF5 file"));
-    let mut other = Made::new(Value::Null);
+    assert!(said().ends_with("x.hdf5 is not an HDF5 file: it lacks the HDF5 signature"), "{}", said());
+    assert!(read(made.folder.path()).unwrap_err().to_string().ends_with("is a folder, not an HDF5 file"));
+    let mut other = FileBuilder::new(Value::Null);
     other.each("actions", |_| vec![0.0; 7]);
-    assert!(other.refusal().contains("of no layout that is known"));
+    assert!(other.refusal().contains("unknown layout"));
 }
 
 #[test]
-fn quaternions_in_another_order_are_noticed_with_joints_and_without() {
+fn quaternions_in_another_order_are_detected_with_and_without_joints() {
     let made = |order: fn(Quat) -> [f64; 4], joints: bool| {
-        let mut made = Made::libero().without("obs/ee").without("states");
+        let mut made = FileBuilder::libero().without("obs/ee").without("states");
         made.each("obs/robot0_joint_pos", |k| self::joints(k).to_vec());
         let site =
             |k: usize| Pose::translation(-0.6, 0.0, 0.0) * tool(k) * Pose::translation(0.0, 0.0, -0.0069);
@@ -480,10 +490,10 @@ fn quaternions_in_another_order_are_noticed_with_joints_and_without() {
 }
 
 #[test]
-fn a_model_may_nest_as_deep_as_it_likes() {
+fn a_deeply_nested_model_does_not_overflow_the_stack() {
     let deep = "<body>".repeat(200_000);
     let model = MujocoModel::read(&format!("<mujoco><worldbody>{deep}</worldbody></mujoco>")).unwrap();
-    assert_eq!(model.width(), 1);
+    assert_eq!(model.state_width(), 1);
     let deep = "<body pos='0 0 1'>".repeat(200_000);
     let text =
         format!("<mujoco><worldbody>{deep}<body name='robot0_base' pos='1 0 0'/></worldbody></mujoco>");
@@ -494,15 +504,15 @@ fn a_model_may_nest_as_deep_as_it_likes() {
 }
 
 #[test]
-fn demonstrations_have_plain_names() {
-    let made = Made::libero();
+fn names_of_demonstrations_have_no_leading_zeros() {
+    let made = FileBuilder::libero();
     let path = made.write();
     let file = rust_hdf5::H5File::open_rw(&path).unwrap();
     file.create_group("data/demo_00").unwrap();
     file.close().unwrap();
     let said = read(&path).unwrap_err().to_string();
     assert!(
-        said.ends_with("/data/demo_00: expected the names demo_0, demo_1, …, without zeros in front"),
+        said.ends_with("/data/demo_00: expected the names demo_0, demo_1, …, without leading zeros"),
         "{said}"
     );
 }

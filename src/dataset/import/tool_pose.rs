@@ -1,9 +1,6 @@
-//! Where the tool was: from joint angles by the arm's own kinematics, which need no frame of anybody's, and from recorded poses.
+//! Consistency of recorded tool poses with joint angles, whose forward kinematics need no agreed frame.
 
-use super::{
-    super::{DatasetError, TaskFile},
-    rows::{rows, wrong},
-};
+use super::{DatasetError, DemoReader};
 use crate::{
     benchmark::control::CONTROL_DT,
     geometry::{Pose, Quat, Vec3},
@@ -14,53 +11,60 @@ use crate::{
     },
 };
 
-/// How far a joint may be beyond its limit, rad: simulators let them.
-const BEYOND: f64 = 0.05;
-/// How far the spread of two records of the tool may be, m and rad, once what is constant between them is taken off.
-const APART: (f64, f64) = (0.02, 0.1);
-
-/// How far a recorded tool may point away from ours, rad.
-const ASIDE: f64 = 0.2;
-/// How far it may be turned about the line along which it points, rad: hands are drawn in frames a quarter turn apart, and a
-/// quaternion in another order is half a turn away where the hand points down.
-const SPUN: f64 = 2.5;
-/// Where an arm begins, rad: robosuite's Panda (robots/panda_robot.py), and how far its tool may point away from there, rad.
+/// Tolerance of the joint limits, rad: simulators exceed them slightly.
+const LIMIT_TOLERANCE: f64 = 0.05;
+/// Largest deviation of two records of the tool after their constant offset is removed, m and rad.
+const MAX_SPREAD_M: f64 = 0.02;
+const MAX_SPREAD_RAD: f64 = 0.1;
+/// Largest angle between the pointing directions of the recorded tool and of ours, rad.
+const MAX_TILT: f64 = 0.2;
+/// Largest rotation about the pointing direction, rad. Hand frames differ by a quarter turn; a quaternion in the wrong order
+/// is half a turn off where the hand points down.
+const MAX_SPIN: f64 = 2.5;
+/// Initial joint angles of robosuite's Panda, rad (robots/panda_robot.py), and the largest tilt of a first pose from there.
 const HOME: ArmAngles = [0.0, 0.196, 0.0, -2.618, 0.0, 2.942, 0.785];
-const FROM_HOME: f64 = 1.0;
+const MAX_TILT_FROM_HOME: f64 = 1.0;
 
-/// Joint angles of an arm in each of so many steps, rad.
+/// Poses recorded under a key, which error messages name.
+#[derive(Clone, Copy)]
+pub(super) struct RecordedPoses<'a> {
+    pub name: &'a str,
+    pub poses: &'a [Pose],
+}
+
+/// Joint angles of the arm per step, rad.
 ///
 /// # Errors
-/// They are not there, or not seven a step.
-pub(super) fn joints(
-    file: &TaskFile,
-    demo: usize,
+/// The array is missing, or its shape is not (`steps`, 7).
+pub(super) fn joint_angles(
+    reader: DemoReader,
     name: &str,
     steps: usize,
 ) -> Result<Vec<ArmAngles>, DatasetError> {
-    match file.shape(demo, name)?[..] {
+    match reader.shape(name)?[..] {
         [_, joints] if joints != 7 => {
-            let what = format!("{joints} joints a step; a Panda has 7: is it another robot?");
-            Err(wrong(file, demo, name, what))
+            let what = format!("{joints} joints per step; a Panda has 7: is it another robot?");
+            Err(reader.error(name, what))
         }
-        _ => rows::<7>(file, demo, name, Some(steps)),
+        _ => reader.rows::<7>(name, Some(steps)),
     }
 }
 
-/// Tool poses in the base frame by joint angles.
+/// Tool poses in the base frame for joint angles recorded under `name`.
 ///
 /// # Errors
-/// Angles that no Panda can have.
-pub(super) fn by_joints(
-    file: &TaskFile,
-    demo: usize,
+/// An angle is outside of a Panda's limits.
+pub(super) fn forward_kinematics(
+    reader: DemoReader,
     name: &str,
     joints: &[ArmAngles],
 ) -> Result<Vec<Pose>, DatasetError> {
     let links = panda::arm_chain().links;
     for (step, q) in joints.iter().enumerate() {
-        let beyond = |(i, q): (usize, &f64)| *q < links[i].lower - BEYOND || *q > links[i].upper + BEYOND;
-        if let Some(i) = q.iter().enumerate().position(beyond) {
+        let is_outside = |(i, q): (usize, &f64)| {
+            *q < links[i].lower - LIMIT_TOLERANCE || *q > links[i].upper + LIMIT_TOLERANCE
+        };
+        if let Some(i) = q.iter().enumerate().position(is_outside) {
             let what = format!(
                 "step {step}: joint {} is at {} rad, outside of a Panda's {}..{}; is it another robot?",
                 i + 1,
@@ -68,7 +72,7 @@ pub(super) fn by_joints(
                 links[i].lower,
                 links[i].upper
             );
-            return Err(wrong(file, demo, name, what));
+            return Err(reader.error(name, what));
         }
     }
     let start = joints.first().copied().unwrap_or_default();
@@ -76,83 +80,81 @@ pub(super) fn by_joints(
     Ok(joints.iter().map(|q| arm.tool_pose(q)).collect())
 }
 
-/// Joint angles moved into the limits that they may be a little beyond of.
-pub(super) fn within_limits(mut q: ArmAngles) -> ArmAngles {
+/// Clamps joint angles to the limits.
+pub(super) fn clamp_to_limits(mut q: ArmAngles) -> ArmAngles {
     for (q, link) in q.iter_mut().zip(panda::arm_chain().links) {
         *q = q.clamp(link.lower, link.upper);
     }
     q
 }
 
-/// Compares recorded poses with those of the joints, which may differ by a constant place of the base and of the tool; the place
-/// of what was recorded in the tool's frame, m, in the middle over all steps.
+/// Compares recorded poses with those of the joint angles, up to a constant offset of base and tool.
+///
+/// Returns the mean position of the recorded point in our tool frame, m.
 ///
 /// # Errors
-/// They differ by more: another robot, another order of the quaternion's numbers, or steps that do not belong together.
-pub(super) fn compare(
-    file: &TaskFile,
-    demo: usize,
-    (name, recorded): (&str, &[Pose]),
-    by_joints: &[Pose],
+/// The offset is not constant: another robot, another quaternion order, or steps that do not correspond.
+pub(super) fn tool_offset(
+    reader: DemoReader,
+    recorded: RecordedPoses,
+    from_joints: &[Pose],
 ) -> Result<Vec3, DatasetError> {
-    let pairs = || recorded.iter().zip(by_joints);
-    let count = recorded.len() as f64;
+    let pairs = || recorded.poses.iter().zip(from_joints);
+    let count = recorded.poses.len() as f64;
     let mean = |of: &dyn Fn(&Pose, &Pose) -> Vec3| pairs().map(|(r, j)| of(r, j)).sum::<Vec3>() / count;
     let shift = |r: &Pose, j: &Pose| r.translation.vector - j.translation.vector;
-    let turn = |r: &Pose, j: &Pose| j.rotation.inverse() * r.rotation;
-    let (middle, first) = (mean(&shift), turn(&recorded[0], &by_joints[0]));
-    if let Some(what) = of_another_hand(&first, ASIDE, "where the joint angles have the tool") {
-        return Err(wrong(file, demo, name, what));
+    let rotation = |r: &Pose, j: &Pose| j.rotation.inverse() * r.rotation;
+    let mean_shift = mean(&shift);
+    let first_rotation = rotation(&recorded.poses[0], &from_joints[0]);
+    if let Some(what) =
+        wrong_hand_orientation(&first_rotation, MAX_TILT, "where the joint angles have the tool")
+    {
+        return Err(reader.error(recorded.name, what));
     }
-    let worst = pairs().enumerate().find_map(|(step, (r, j))| {
-        let away = (shift(r, j) - middle).norm();
-        let turned = turn(r, j).angle_to(&first);
-        (away > APART.0 || turned > APART.1).then_some((step, away, turned))
-    });
-    if let Some((step, away, turned)) = worst {
-        let what = format!(
-            "step {step}: not where the joint angles put the tool, by {:.0} mm and {:.0}° beyond what is the same in all steps: \
-             another robot, or another order of the quaternion's numbers?",
-            1e3 * away,
-            turned.to_degrees()
-        );
-        return Err(wrong(file, demo, name, what));
+    for (step, (r, j)) in pairs().enumerate() {
+        let distance = (shift(r, j) - mean_shift).norm();
+        let angle = rotation(r, j).angle_to(&first_rotation);
+        if distance > MAX_SPREAD_M || angle > MAX_SPREAD_RAD {
+            let what = format!(
+                "step {step}: not where the joint angles put the tool: the offset differs from that of the other steps by {:.0} mm \
+                 and {:.0}°: another robot, or another order of the quaternion's numbers?",
+                1e3 * distance,
+                angle.to_degrees()
+            );
+            return Err(reader.error(recorded.name, what));
+        }
     }
     Ok(mean(&|r, j| j.rotation.inverse() * shift(r, j)))
 }
 
-/// What is wrong with a hand that is turned by `turn` from where it should be. Frames of one hand differ by a turn about the
-/// line along which it points, but not by half a turn.
-fn of_another_hand(turn: &Quat, aside: f64, from: &str) -> Option<String> {
-    let away = (turn * Vec3::z()).angle(&Vec3::z());
-    let spun = 2.0 * turn.k.atan2(turn.w).rem_euclid(std::f64::consts::PI);
-    let spun = spun.min(2.0 * std::f64::consts::PI - spun);
-    (away > aside || spun > SPUN).then(|| {
+/// Message about a hand that is rotated by `rotation` from `expected`, if that is more than two frames of one hand can differ:
+/// they differ by a rotation about the pointing direction, but not by half a turn.
+fn wrong_hand_orientation(rotation: &Quat, max_tilt: f64, expected: &str) -> Option<String> {
+    let tilt = (rotation * Vec3::z()).angle(&Vec3::z());
+    let spin = 2.0 * rotation.k.atan2(rotation.w).rem_euclid(std::f64::consts::PI);
+    let spin = spin.min(2.0 * std::f64::consts::PI - spin);
+    (tilt > max_tilt || spin > MAX_SPIN).then(|| {
         format!(
-            "step 0: it points {:.0}° away from {from} and is turned by {:.0}° about that line: another order of the quaternion's \
-             numbers, or another robot?",
-            away.to_degrees(),
-            spun.to_degrees()
+            "step 0: the hand points {:.0}° away from {expected} and is rotated by {:.0}° about that direction: another order of \
+             the quaternion's numbers, or another robot?",
+            tilt.to_degrees(),
+            spin.to_degrees()
         )
     })
 }
 
-/// Compares the first recorded pose with where arms begin, for want of joint angles.
+/// Compares the first recorded pose with a usual initial pose; used where there are no joint angles.
 ///
 /// # Errors
-/// The hand points elsewhere, or is turned by half a turn: another order of the quaternion's numbers.
-pub(super) fn check_start(
-    file: &TaskFile,
-    demo: usize,
-    (name, recorded): (&str, &Pose),
-) -> Result<(), DatasetError> {
+/// The hand points elsewhere, or is rotated by half a turn: another order of the quaternion's numbers.
+pub(super) fn check_first_pose(reader: DemoReader, recorded: RecordedPoses) -> Result<(), DatasetError> {
     let home = DiffIk::new(&IkSpec::default(), HOME, CONTROL_DT).tool_pose(&HOME);
-    let turn = home.rotation.inverse() * recorded.rotation;
-    of_another_hand(&turn, FROM_HOME, "where arms begin")
-        .map_or(Ok(()), |what| Err(wrong(file, demo, name, what)))
+    let rotation = home.rotation.inverse() * recorded.poses[0].rotation;
+    wrong_hand_orientation(&rotation, MAX_TILT_FROM_HOME, "the usual initial pose")
+        .map_or(Ok(()), |what| Err(reader.error(recorded.name, what)))
 }
 
-/// How far apart two rotations are, rad, in the middle over all steps.
+/// Mean angle between two sequences of rotations, rad.
 pub(super) fn mean_angle(a: &[Quat], b: &[Quat]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a.angle_to(b)).sum::<f64>() / a.len().max(1) as f64
 }

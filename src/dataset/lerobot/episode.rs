@@ -119,7 +119,7 @@ fn numbers(
     row: &[usize],
 ) -> Result<Vec<f32>, DatasetError> {
     shaped(file, demo, name, row)?;
-    let (numbers, width) = file.doubles(demo.0, name)?;
+    let crate::dataset::hdf5::FloatRows { values: numbers, width } = file.float_rows(demo.0, name)?;
     if let Some(at) = numbers.iter().position(|x| !x.is_finite()) {
         let what = format!("step {}: {} is not finite", at / width.max(1), numbers[at]);
         return Err(DatasetError::content(file.path(), format!("/data/demo_{}/{name}", demo.0), what));
@@ -140,7 +140,8 @@ fn seen(
         let finger = [PICTURE[1], PICTURE[0]];
         let [height, width] = [third, wrist, finger, finger][at];
         shaped(file, (demo, steps), &name, &[height, width, 3])?;
-        let (bytes, [height, width]) = file.pictures(demo, &name, block.clone())?;
+        let crate::dataset::hdf5::ImageBlock { bytes, height, width } =
+            file.images(demo, &name, block.clone())?;
         let each = bytes.chunks_exact((3 * height * width).max(1));
         *pictures =
             each.filter_map(|b| RgbImage::from_raw(width as u32, height as u32, b.to_vec())).collect();

@@ -48,7 +48,7 @@ pub(super) fn choose(root: &Path, words: &[String]) -> Result<Selection, Dataset
         return Err(DatasetError::content(root, DATASET, what));
     }
     let card = Card::read(root)?;
-    if !card.pictures {
+    if !card.has_images {
         let what = "its pictures are only videos, which have lost something; record it with --images hdf5";
         return Err(DatasetError::content(&card_path, "pictures", what));
     }
@@ -108,7 +108,8 @@ fn sizes(source: &SelectedDemo) -> Result<[[usize; 2]; 2], DatasetError> {
     let file = TaskFile::open(&source.path)?;
     let mut sizes = [[0; 2]; 2];
     for (size, name) in sizes.iter_mut().zip(IMAGE_STREAMS) {
-        *size = file.pictures(source.entry.demo_id, &format!("obs/{name}"), 0..1)?.1;
+        let block = file.images(source.entry.demo_id, &format!("obs/{name}"), 0..1)?;
+        *size = [block.height, block.width];
     }
     Ok(sizes)
 }

@@ -1,4 +1,4 @@
-//! RGB to Y'CbCr 4:2:0 and back: ITU-R BT.601, studio range, what players assume of small pictures and what the file says.
+//! RGB to Y'CbCr 4:2:0: ITU-R BT.601, studio range, as declared in the file and as players assume for small videos.
 
 use rusty_h264_common::YuvFrame;
 
@@ -14,7 +14,7 @@ fn weigh(weights: [i32; 3], [r, g, b]: [i32; 3], shift: i32) -> i32 {
     (weights[0] * r + weights[1] * g + weights[2] * b + (1 << (shift - 1))) >> shift
 }
 
-/// Fills `frame` from `rgb`; chroma is the mean of 2 × 2 pixels.
+/// Converts `rgb` into `frame`; chroma is the mean of 2 × 2 pixels.
 pub(super) fn to_yuv(rgb: &[u8], frame: &mut YuvFrame) {
     let width = frame.width;
     for (y, pixel) in frame.y.iter_mut().zip(rgb.as_chunks::<3>().0) {
@@ -35,7 +35,7 @@ pub(super) fn to_yuv(rgb: &[u8], frame: &mut YuvFrame) {
     }
 }
 
-/// The picture of a frame, chroma repeated.
+/// Converts a frame back to RGB, repeating chroma.
 #[cfg(test)]
 pub(super) fn to_rgb(frame: &YuvFrame) -> Vec<u8> {
     let half = frame.width / 2;

@@ -1,7 +1,6 @@
-//! H.264 in MP4: small files that ordinary players and browsers open, without an external program.
+//! Videos: H.264 in MP4, encoded without an external program and playable in browsers.
 
 mod colour;
-mod length;
 mod mp4;
 
 use std::path::Path;
@@ -10,44 +9,32 @@ use rusty_h264_common::YuvFrame;
 use rusty_h264_encoder::{EncodeError, Encoder, EncoderConfig, Preset};
 use thiserror::Error;
 
-pub use length::length;
+pub use mp4::VideoInfo;
 
 use crate::files::{self, FileError};
 
-/// Quantiser of the encoder, 0 (lossless) to 51: pictures of this benchmark come out at about 40 dB.
+/// Quantiser of the encoder, 0 (lossless) to 51. Images of this benchmark reach about 40 dB.
 const QUANTISER: u8 = 22;
-/// Pictures between two from which a player can start.
+/// Frames between two key frames, at which playback can start.
 const KEY_INTERVAL: u32 = 40;
 
-/// Why a video cannot be made.
+/// Error of encoding or writing a video.
 #[derive(Debug, Error)]
 pub enum VideoError {
-    /// Chroma is stored at half the resolution.
+    // Odd sizes are excluded since chroma is stored at half the resolution.
     #[error("a video of {0} × {1} pixels cannot be encoded: both must be even, from 16 to 4096")]
     Size(usize, usize),
-    /// A picture of another size.
-    #[error("a picture of {got} bytes in a video of {width} × {height}: expected {expected}")]
-    Picture {
-        /// Bytes given.
-        got: usize,
-        /// Bytes expected, three a pixel.
-        expected: usize,
-        /// Width of the video, pixels.
-        width: usize,
-        /// Height of the video, pixels.
-        height: usize,
-    },
-    /// The encoder refused.
+    #[error("an image of {got} bytes in a video of {width} × {height}: expected {expected}")]
+    ImageSize { got: usize, expected: usize, width: usize, height: usize },
     #[error("the encoder failed: {0:?}")]
     Encoder(EncodeError),
-    /// A video without pictures.
-    #[error("no picture was put into the video")]
+    #[error("the video has no frames")]
     Empty,
     #[error(transparent)]
     File(#[from] FileError),
 }
 
-/// Takes pictures one by one; the file appears whole, at [`VideoWriter::save`].
+/// Encodes a video frame by frame in memory; [`VideoWriter::save`] writes the file.
 pub struct VideoWriter {
     encoder: Encoder,
     track: mp4::Track,
@@ -55,7 +42,7 @@ pub struct VideoWriter {
 }
 
 impl VideoWriter {
-    /// A video of `width × height` pixels at `rate` pictures a second.
+    /// Starts a video of `width × height` pixels at `rate` frames per second.
     ///
     /// # Errors
     /// [`VideoError::Size`] for odd or extreme sizes.
@@ -79,15 +66,15 @@ impl VideoWriter {
         })
     }
 
-    /// Adds one picture: rows from the top, three bytes a pixel, sRGB.
+    /// Appends a frame: rows from the top, 3 bytes per pixel, sRGB.
     ///
     /// # Errors
-    /// A picture of another size, or the encoder's.
+    /// The image has another size, or the encoder fails.
     pub fn push(&mut self, rgb: &[u8]) -> Result<(), VideoError> {
         let (width, height) = (self.frame.width, self.frame.height);
         let expected = 3 * width * height;
         if rgb.len() != expected {
-            return Err(VideoError::Picture { got: rgb.len(), expected, width, height });
+            return Err(VideoError::ImageSize { got: rgb.len(), expected, width, height });
         }
         colour::to_yuv(rgb, &mut self.frame);
         let unit = self.encoder.try_encode(&self.frame).map_err(VideoError::Encoder)?;
@@ -95,42 +82,41 @@ impl VideoWriter {
         Ok(())
     }
 
-    /// Pictures so far.
     pub fn frames(&self) -> usize {
         self.track.len()
     }
 
-    /// The whole file.
+    /// The bytes of the file.
     ///
     /// # Errors
-    /// [`VideoError::Empty`] without a picture.
+    /// [`VideoError::Empty`] if there are no frames.
     pub fn finish(self) -> Result<Vec<u8>, VideoError> {
         if self.track.len() == 0 { Err(VideoError::Empty) } else { Ok(self.track.file()) }
     }
 
-    /// Writes the file under another name and renames it, so that a half-written video is never seen.
+    /// Writes the file atomically, creating missing folders.
     ///
     /// # Errors
-    /// No picture, or the file's.
+    /// There are no frames, or the file cannot be written.
     pub fn save(self, path: &Path) -> Result<(), VideoError> {
         Ok(files::replace(path, self.finish()?)?)
     }
 }
 
-/// Smallest level whose frame size admits this picture (ITU-T H.264, Table A-1, MaxFS in macroblocks).
+/// Smallest level that admits this frame size (ITU-T H.264, Table A-1, MaxFS in macroblocks).
 fn level(width: usize, height: usize) -> u8 {
     let blocks = width.div_ceil(16) * height.div_ceil(16);
     const LEVELS: [(usize, u8); 6] =
         [(1620, 30), (3600, 31), (5120, 32), (8192, 40), (22080, 50), (36864, 51)];
-    LEVELS.iter().find(|(most, _)| blocks <= *most).map_or(52, |(_, level)| *level)
+    LEVELS.iter().find(|(max_blocks, _)| blocks <= *max_blocks).map_or(52, |(_, level)| *level)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// A patterned picture whose pattern moves.
-    fn picture(width: usize, height: usize, at: usize) -> Vec<u8> {
+    /// An image with a moving pattern.
+    fn test_image(width: usize, height: usize, at: usize) -> Vec<u8> {
         let wave = |x: f64, y: f64, k: f64| (127.0 + 100.0 * (x * 0.05 * k).sin() * (y * 0.04).cos()) as u8;
         let pixels = (0..width * height).map(|i| ((i % width + at) as f64, (i / width) as f64));
         pixels.flat_map(|(x, y)| [wave(x, y, 1.0), wave(x, y, 0.7), wave(y, x, 1.3)]).collect()
@@ -142,33 +128,33 @@ mod tests {
     }
 
     #[test]
-    fn an_independent_decoder_gets_the_pictures_back_above_36_db() {
+    fn an_independent_decoder_recovers_the_frames_above_36_db() {
         let (width, height) = (224, 224);
         let mut encoder = VideoWriter::new(width, height, 20).unwrap();
         let mut stream = Vec::new();
         let mut frame = YuvFrame::black(width, height);
         for at in 0..5 {
-            colour::to_yuv(&picture(width, height, 2 * at), &mut frame);
+            colour::to_yuv(&test_image(width, height, 2 * at), &mut frame);
             stream.extend(encoder.encoder.try_encode(&frame).unwrap());
         }
         let decoded = rusty_h264_decoder::Decoder::new().decode_stream(&stream).unwrap();
         assert_eq!(decoded.len(), 5);
         for (at, frame) in decoded.iter().enumerate() {
-            let quality = psnr(&colour::to_rgb(frame), &picture(width, height, 2 * at));
-            assert!(quality > 36.0, "picture {at}: {quality} dB");
+            let quality = psnr(&colour::to_rgb(frame), &test_image(width, height, 2 * at));
+            assert!(quality > 36.0, "frame {at}: {quality} dB");
         }
     }
 
     #[test]
-    fn odd_sizes_and_wrong_pictures_are_refused() {
+    fn odd_sizes_and_images_of_another_size_are_refused() {
         assert!(matches!(VideoWriter::new(225, 224, 20), Err(VideoError::Size(..))));
         let mut video = VideoWriter::new(32, 32, 20).unwrap();
-        assert!(matches!(video.push(&[0; 7]), Err(VideoError::Picture { expected: 3072, .. })));
+        assert!(matches!(video.push(&[0; 7]), Err(VideoError::ImageSize { expected: 3072, .. })));
         assert!(matches!(video.finish(), Err(VideoError::Empty)));
     }
 
     #[test]
-    fn a_level_admits_the_picture() {
+    fn the_level_admits_the_frame_size() {
         assert_eq!(level(224, 224), 30);
         assert_eq!(level(1024, 1024), 32);
     }

@@ -1,12 +1,16 @@
-//! The container (ISO/IEC 14496-12, 14496-15): one H.264 track, the index before the pictures so that a browser can start at once.
+//! The MP4 container (ISO/IEC 14496-12, 14496-15): one H.264 track, with the index before the frames so that browsers can start
+//! playback at once.
+//!
+//! Written by hand: the crate `mp4` writes the index after the frames and no colour information (`colr`), and any other writer
+//! would change the bytes of recorded videos.
 
-/// Clock ticks of one picture.
+/// Clock ticks per frame.
 const TICKS: u32 = 1000;
 
-/// One picture as the container keeps it.
+/// An encoded frame.
 struct Sample {
     bytes: Vec<u8>,
-    key: bool,
+    is_key: bool,
 }
 
 /// A video track in memory.
@@ -25,20 +29,20 @@ impl Track {
         Self { width, height, rate, sps: Vec::new(), pps: Vec::new(), samples: Vec::new() }
     }
 
-    /// Pictures so far.
+    /// Number of frames.
     pub(super) fn len(&self) -> usize {
         self.samples.len()
     }
 
-    /// Adds one access unit in Annex B form: parameter sets go to the index, slices get their lengths before them.
+    /// Appends an access unit in Annex B format: parameter sets go to the index, slices are prefixed with their lengths.
     pub(super) fn push(&mut self, unit: &[u8]) {
-        let mut sample = Sample { bytes: Vec::with_capacity(unit.len()), key: false };
+        let mut sample = Sample { bytes: Vec::with_capacity(unit.len()), is_key: false };
         for nal in nal_units(unit) {
             match nal[0] & 31 {
                 7 => self.sps = nal.to_vec(),
                 8 => self.pps = nal.to_vec(),
                 kind => {
-                    sample.key |= kind == 5;
+                    sample.is_key |= kind == 5;
                     sample.bytes.extend((nal.len() as u32).to_be_bytes());
                     sample.bytes.extend(nal);
                 }
@@ -47,15 +51,15 @@ impl Track {
         self.samples.push(sample);
     }
 
-    /// The whole file.
+    /// The bytes of the file.
     pub(super) fn file(&self) -> Vec<u8> {
         let brands = b"isomiso2avc1mp41";
         let mut file = boxed(b"ftyp", &[b"isom".as_slice(), &512_u32.to_be_bytes(), brands].concat());
-        // The index holds the place of the first picture, which comes after the index: its length does not depend on it.
-        let before = file.len() + self.moov(0).len() + 8;
-        file.extend(self.moov(before as u32));
-        let pictures: Vec<u8> = self.samples.iter().flat_map(|s| s.bytes.iter().copied()).collect();
-        file.extend(boxed(b"mdat", &pictures));
+        // The index contains the offset of the first frame, which follows it. Its length does not depend on the value.
+        let first_frame = file.len() + self.moov(0).len() + 8;
+        file.extend(self.moov(first_frame as u32));
+        let frames: Vec<u8> = self.samples.iter().flat_map(|s| s.bytes.iter().copied()).collect();
+        file.extend(boxed(b"mdat", &frames));
         file
     }
 
@@ -87,7 +91,7 @@ impl Track {
         let count = self.samples.len() as u32;
         let stsd = Fields::full(0).u32s(&[1]).bytes(&self.sample_entry());
         let stts = Fields::full(0).u32s(&[1, count, TICKS]);
-        let keys = self.samples.iter().zip(1_u32..).filter(|(s, _)| s.key).map(|(_, number)| number);
+        let keys = self.samples.iter().zip(1_u32..).filter(|(s, _)| s.is_key).map(|(_, number)| number);
         let keys: Vec<u32> = keys.collect();
         let stss = Fields::full(0).u32s(&[keys.len() as u32]).u32s(&keys);
         let stsc = Fields::full(0).u32s(&[1, 1, count, 1]);
@@ -105,7 +109,7 @@ impl Track {
         boxes.iter().flat_map(|(name, fields)| boxed(name, &fields.0)).collect()
     }
 
-    /// The `avc1` entry: size, the decoder's configuration and the colour space (BT.601 primaries, transfer, matrix; studio range).
+    /// The `avc1` entry: size, decoder configuration and colour space (BT.601 primaries, transfer and matrix; studio range).
     fn sample_entry(&self) -> Vec<u8> {
         let (sps, pps) = (&self.sps, &self.pps);
         let profile = [1, sps[1], sps[2], sps[3], 0xff, 0xe1];
@@ -114,20 +118,20 @@ impl Track {
         let colr = Fields(b"nclx".to_vec()).u16s(&[6, 6, 6]).bytes(&[0]);
         let entry =
             Fields(vec![0; 6]).u16s(&[1]).u16s(&[0; 8]).u16s(&[self.width as u16, self.height as u16]);
-        // 72 dpi, one frame a sample, no name, 24 bits a pixel, no colour table.
+        // 72 dpi, one frame per sample, no name, 24 bits per pixel, no colour table.
         let entry = entry.u32s(&[0x0048_0000, 0x0048_0000, 0]).u16s(&[1]).bytes(&[0; 32]).u16s(&[24, 0xffff]);
         boxed(b"avc1", &entry.bytes(&boxed(b"avcC", &avcc.0)).bytes(&boxed(b"colr", &colr.0)).0)
     }
 }
 
-/// No rotation, as the container writes it (16.16 and 2.30 fixed point).
+/// The identity (16.16 and 2.30 fixed point).
 const MATRIX: [u32; 9] = [0x0001_0000, 0, 0, 0, 0x0001_0000, 0, 0, 0, 0x4000_0000];
 
 fn boxed(name: &[u8; 4], payload: &[u8]) -> Vec<u8> {
     [&(payload.len() as u32 + 8).to_be_bytes(), name.as_slice(), payload].concat()
 }
 
-/// Big-endian fields, one after the other.
+/// Big-endian fields.
 struct Fields(Vec<u8>);
 
 impl Fields {
@@ -152,22 +156,75 @@ impl Fields {
     }
 }
 
-/// Splits an Annex B stream (ITU-T H.264, B.1) at its start codes; the units come without them and are never empty.
+/// Splits an Annex B stream (ITU-T H.264, B.1) at its start codes into non-empty units without them.
 fn nal_units(stream: &[u8]) -> impl Iterator<Item = &[u8]> {
     let starts: Vec<usize> =
         (0..stream.len().saturating_sub(2)).filter(|&i| stream[i..i + 3] == [0, 0, 1]).collect();
     let ends = starts.iter().skip(1).copied().chain([stream.len()]).collect::<Vec<_>>();
     let units = starts.into_iter().zip(ends).map(|(start, end)| {
         let unit = &stream[start + 3..end];
-        // A four-byte start code leaves its first zero at the end of the unit before it; units never end in zero.
+        // The first zero of a four-byte start code ends up at the end of the previous unit; units never end in zero.
         &unit[..unit.iter().rposition(|b| *b != 0).map_or(0, |last| last + 1)]
     });
     units.filter(|unit| !unit.is_empty())
 }
 
+/// Length and frame rate of a video.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VideoInfo {
+    pub frames: usize,
+    /// Frames per second.
+    pub frame_rate: f64,
+}
+
+impl VideoInfo {
+    /// Reads the index of an MP4 file with one track; `None` if it is not such a file or truncated.
+    pub fn read(file: &[u8]) -> Option<Self> {
+        let media = find_box(find_box(find_box(file, b"moov")?, b"trak")?, b"mdia")?;
+        let table = find_box(find_box(media, b"minf")?, b"stbl")?;
+        let sizes = find_box(table, b"stsz")?;
+        let frames = read_u32(sizes, 8)? as usize;
+        let header = find_box(media, b"mdhd")?;
+        let (scale, duration) = (read_u32(header, 12)?, read_u32(header, 16)?);
+        let sizes = sizes.get(12..)?.as_chunks::<4>().0;
+        let expected: usize = sizes.iter().map(|size| u32::from_be_bytes(*size) as usize).sum();
+        let is_complete = sizes.len() == frames && expected == find_box(file, b"mdat")?.len() && duration > 0;
+        let frame_rate = f64::from(scale) * frames as f64 / f64::from(duration);
+        is_complete.then_some(Self { frames, frame_rate })
+    }
+}
+
+/// Payload of the first box of this name.
+fn find_box<'a>(mut boxes: &'a [u8], name: &[u8; 4]) -> Option<&'a [u8]> {
+    loop {
+        let size = read_u32(boxes, 0)? as usize;
+        let whole = boxes.get(..size).filter(|_| size >= 8)?;
+        if &whole[4..8] == name {
+            return whole.get(8..);
+        }
+        boxes = &boxes[size..];
+    }
+}
+
+fn read_u32(bytes: &[u8], at: usize) -> Option<u32> {
+    Some(u32::from_be_bytes(bytes.get(at..at + 4)?.try_into().ok()?))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dataset::video::VideoWriter;
+
+    #[test]
+    fn length_and_rate_are_read_from_the_index_and_a_truncated_file_has_none() {
+        let mut video = VideoWriter::new(32, 48, 20).unwrap();
+        (0..7).for_each(|shade| video.push(&vec![30 * shade; 32 * 48 * 3]).unwrap());
+        let file = video.finish().unwrap();
+        assert_eq!(VideoInfo::read(&file), Some(VideoInfo { frames: 7, frame_rate: 20.0 }));
+        for truncated in [&file[..file.len() - 1], &file[..100], b"hello"] {
+            assert_eq!(VideoInfo::read(truncated), None);
+        }
+    }
 
     #[test]
     fn units_are_split_at_three_and_four_byte_start_codes() {
@@ -177,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn the_index_points_at_the_pictures() {
+    fn the_index_points_at_the_frames() {
         let mut track = Track::new(32, 32, 20);
         track.push(&[0, 0, 0, 1, 0x67, 66, 192, 30, 0, 0, 0, 1, 0x68, 1, 0, 0, 0, 1, 0x65, 7, 8]);
         track.push(&[0, 0, 0, 1, 0x41, 9]);

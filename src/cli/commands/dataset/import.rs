@@ -115,7 +115,7 @@ fn sources(files: &[ForeignFile]) -> Result<Vec<Imported>, CliError> {
         sha256: file.sha256.clone(),
         layout: file.layout.name().to_owned(),
         demos: file.demos.len(),
-        commands: file.demos.first().map_or(String::new(), |demo| demo.said.to_owned()),
+        commands: file.demos.first().map_or(String::new(), |demo| demo.command_source.to_owned()),
     };
     Ok(files.iter().map(about).collect())
 }
@@ -136,7 +136,7 @@ fn fit(
     for one in own {
         let place = (one.task, one.attempt);
         let (start, demo) = begin(batch, one, layout)?;
-        elsewhere += usize::from(matches!(demo.begins, InitialCondition::OtherSimulator { .. }));
+        elsewhere += usize::from(matches!(demo.initial_condition, InitialCondition::OtherSimulator { .. }));
         placed += usize::from(!start.places.is_empty());
         let origin = Origin {
             file: base_name(one.file),
@@ -148,7 +148,7 @@ fn fit(
         batch.origins.insert(place, origin);
         commands.insert(place, demo.commands);
         if let Ok(mut all) = grips.lock() {
-            all.insert(place, demo.shut);
+            all.insert(place, demo.gripper_closed);
         }
     }
     batch.imported = sources.to_vec();
@@ -172,25 +172,25 @@ fn begin(
     layout: bool,
 ) -> Result<(InitialState, import::ForeignDemo), CliError> {
     let mut demo = one.demo.clone();
-    let (joints, things) = match &one.demo.begins {
+    let (joints, objects) = match &one.demo.initial_condition {
         InitialCondition::SoftvtEpisode { start, .. } => {
             let places = if layout { Vec::new() } else { start.places.clone() };
             return Ok((InitialState { places, ..*start }, demo));
         }
-        InitialCondition::OtherSimulator { joints, things } => {
-            (*joints, if layout { &[][..] } else { things })
+        InitialCondition::OtherSimulator { joints, objects } => {
+            (*joints, if layout { &[][..] } else { objects })
         }
     };
     let mut start = InitialState { joints, places: Vec::new() };
-    if things.is_empty() && !demo.held.contains(&true) {
+    if objects.is_empty() && !demo.is_stopped_by_object.contains(&true) {
         return Ok((start, demo));
     }
     let task: Option<&Task> = batch.suite.tasks.iter().find(|task| task.id == one.task);
     let task = task.ok_or_else(|| CliError::internal("a task that is none of the suite"))?;
     let opened = batch.open(&batch.request(task, one.attempt))?;
-    start.places = import::match_objects(&opened.scene, task.goal.object(), things);
+    start.places = import::match_objects(&opened.scene, task.goal.object(), objects);
     if target_asset(&opened.scene, task).is_some_and(|asset| matches!(asset.body, Body::Rigid { .. })) {
-        demo.hold_rigid();
+        demo.close_fully_on_rigid_object();
     }
     Ok((start, demo))
 }

@@ -41,12 +41,12 @@ pub(crate) fn check(path: &Path, replays: usize) -> Result<(), CliError> {
     finished(path)?;
     let findings = if path.is_dir() { check::folder(path) } else { check::file(path) };
     let findings = findings.map_err(CliError::input)?;
-    if !findings.wrong.is_empty() {
-        let count = match findings.wrong.len() {
+    if !findings.problems.is_empty() {
+        let count = match findings.problems.len() {
             1 => "one thing is".to_owned(),
             more => format!("{more} things are"),
         };
-        let told = findings.wrong.join("\n");
+        let told = findings.problems.join("\n");
         return Err(CliError::input(format!("{told}\n{}: {count} wrong", path.display())));
     }
     print(&format!(
@@ -104,7 +104,7 @@ pub(crate) fn stats(path: &Path, out: Option<&Path>, json: bool) -> Result<(), C
     finished(path)?;
     let mut paths: Vec<PathBuf> = all(path)?.into_iter().map(|(file, _)| file).collect();
     paths.dedup();
-    let spreads = stats::of(&paths).map_err(CliError::input)?;
+    let spreads = stats::column_statistics(&paths).map_err(CliError::input)?;
     match json {
         true => print(&format!("{:#}\n", serde_json::json!(spreads))),
         false => print(&stats::table(&spreads)),

@@ -109,7 +109,7 @@ fn number(found: &mut [(MatchedDemo, Option<u32>)]) -> Result<(), CliError> {
 
 /// The attempt that a demonstration of softvt's was.
 fn own_attempt(run: &RunConfig, file: &ForeignFile, demo: &ForeignDemo) -> Result<Option<u32>, CliError> {
-    match &demo.begins {
+    match &demo.initial_condition {
         InitialCondition::OtherSimulator { .. } => Ok(None),
         InitialCondition::SoftvtEpisode { seed, attempt, .. } if *seed == run.seed => Ok(Some(*attempt)),
         InitialCondition::SoftvtEpisode { seed, .. } => Err(CliError::input(format!(

@@ -13,7 +13,7 @@ use crate::{
         },
     },
     dataset::{
-        card::{Card, TaskCount, reasons},
+        card::{Card, TaskCount, rejection_counts},
         demonstration_writer::frame_rate,
         layout::{MANIFEST, PARTS},
         manifest::{self, ManifestEntry},
@@ -51,8 +51,8 @@ pub(crate) fn finish(
     let card = Card {
         softvt: env!("CARGO_PKG_VERSION").to_owned(),
         fps: frame_rate(),
-        pictures: output.pictures,
-        privileged: output.privileged,
+        has_images: output.pictures,
+        has_privileged: output.privileged,
         imported: sessions.first().map(|session| session.batch.imported.clone()).unwrap_or_default(),
         tasks,
     };
@@ -66,7 +66,7 @@ pub(crate) fn finish(
             task.attempts,
             task.samples,
             (task.hdf5_bytes + task.video_bytes) as f64 / 1e6,
-            reasons(&task.rejected)
+            rejection_counts(&task.rejected)
         ));
     }
     print(&format!("{}\n", root.join(MANIFEST).display()));
@@ -74,7 +74,8 @@ pub(crate) fn finish(
 }
 
 fn nothing_kept(tasks: &[TaskCount], root: &Path) -> CliError {
-    let told = |task: &TaskCount| format!("{} task {}: {}", task.suite, task.task, reasons(&task.rejected));
+    let told =
+        |task: &TaskCount| format!("{} task {}: {}", task.suite, task.task, rejection_counts(&task.rejected));
     let told: Vec<String> = tasks.iter().map(told).collect();
     CliError::input(format!(
         "no demonstration was kept: {}; all attempts are in {}/attempts",

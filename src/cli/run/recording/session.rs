@@ -23,7 +23,7 @@ use crate::{
     },
     dataset::{
         DatasetError, Demonstration,
-        card::reasons,
+        card::rejection_counts,
         demonstration_writer::DemonstrationWriter,
         layout::{self, TaskPaths, VIDEO_STREAMS},
         merge_parts,
@@ -258,7 +258,7 @@ impl<'a> SuiteRecording<'a> {
             hdf5: place.part(attempt, "hdf5"),
             videos: VIDEO_STREAMS.map(|video| place.part(attempt, &format!("{video}.mp4"))),
             preview: place.part(attempt, "preview.mp4"),
-            pictures: self.output.pictures,
+            store_images: self.output.pictures,
             environment: &self.environment,
         };
         recorder.write(&mut film, demonstration, cancel::requested).map_err(failure)?;
@@ -301,8 +301,8 @@ impl<'a> SuiteRecording<'a> {
         if !place.hdf5().is_file() {
             let kept = self.kept(task);
             for (demo, record) in kept.iter().enumerate() {
-                for (part, film) in place.films(record.identity.episode, demo) {
-                    self.take_over(&part, &film)?;
+                for file in place.video_moves(record.identity.episode, demo) {
+                    self.take_over(&file.part, &file.target)?;
                 }
             }
             let parts: Vec<PathBuf> = kept.iter().map(|r| place.part(r.identity.episode, "hdf5")).collect();
@@ -340,7 +340,7 @@ impl<'a> SuiteRecording<'a> {
                 task.id,
                 count.demos,
                 count.attempts,
-                reasons(&count.rejected)
+                rejection_counts(&count.rejected)
             )
         };
         let told: Vec<String> = self.tasks.iter().filter(short).map(told).collect();

@@ -1,0 +1,97 @@
+//! [`DemoReader`]: arrays of a foreign demonstration, checked for shape, type and finiteness.
+
+use rust_hdf5::DatatypeMessage;
+
+use super::super::{DatasetError, TaskFile, hdf5::NumberType};
+use crate::geometry::{Pose, Quat, Vec3};
+
+/// One demonstration of a foreign file. Errors of its methods name the file and the key.
+#[derive(Clone, Copy)]
+pub(super) struct DemoReader<'a> {
+    pub file: &'a TaskFile,
+    pub demo: usize,
+}
+
+/// Finite values in row-major order.
+pub(super) struct FloatArray {
+    pub values: Vec<f64>,
+    pub shape: Vec<usize>,
+}
+
+impl DemoReader<'_> {
+    fn key(&self, name: &str) -> String {
+        format!("/data/demo_{}/{name}", self.demo)
+    }
+
+    /// An error about the dataset `name`.
+    pub(super) fn error(&self, name: &str, what: impl Into<String>) -> DatasetError {
+        DatasetError::content(self.file.path(), self.key(name), what)
+    }
+
+    pub(super) fn has(&self, name: &str) -> bool {
+        self.file.has(self.demo, name)
+    }
+
+    pub(super) fn shape(&self, name: &str) -> Result<Vec<usize>, DatasetError> {
+        self.file.shape(self.demo, name)
+    }
+
+    /// Rows of an array of shape (`steps`, N), or (any number of steps, N).
+    ///
+    /// # Errors
+    /// The array is missing, of another shape or type, or holds a value that is not finite.
+    pub(super) fn rows<const N: usize>(
+        &self,
+        name: &str,
+        steps: Option<usize>,
+    ) -> Result<Vec<[f64; N]>, DatasetError> {
+        let shape = self.shape(name)?;
+        let is_expected = |rows: usize| rows > 0 && steps.is_none_or(|steps| steps == rows);
+        if !matches!(shape[..], [rows, width] if width == N && is_expected(rows)) {
+            let first = steps.map_or("steps".to_owned(), |steps| steps.to_string());
+            return Err(self.error(name, format!("expected the shape ({first}, {N}), got {shape:?}")));
+        }
+        Ok(self.array(name)?.values.as_chunks::<N>().0.to_vec())
+    }
+
+    /// As [`Self::rows`]; `None` if the array is missing.
+    pub(super) fn rows_if_present<const N: usize>(
+        &self,
+        name: &str,
+        steps: usize,
+    ) -> Result<Option<Vec<[f64; N]>>, DatasetError> {
+        self.has(name).then(|| self.rows(name, Some(steps))).transpose()
+    }
+
+    /// A floating-point array of any shape.
+    ///
+    /// # Errors
+    /// The array is missing, of another type, or holds a value that is not finite.
+    pub(super) fn array(&self, name: &str) -> Result<FloatArray, DatasetError> {
+        let data = self.file.dataset(self.demo, name)?;
+        let number_type = NumberType::of(self.file.path(), &self.key(name), &data)?;
+        if !matches!(number_type, NumberType::F64 | NumberType::F32) {
+            let got = match data.datatype() {
+                Ok(DatatypeMessage::FloatingPoint { size, .. }) => format!("float{}", 8 * size),
+                Ok(DatatypeMessage::FixedPoint { .. }) => "integers".to_owned(),
+                _ => "another type".to_owned(),
+            };
+            return Err(self.error(name, format!("expected numbers of type float32 or float64, got {got}")));
+        }
+        let rows = self.file.float_rows(self.demo, name)?;
+        if let Some(at) = rows.values.iter().position(|x| !x.is_finite()) {
+            let width = rows.width.max(1);
+            let (step, place, value) = (at / width, at % width, rows.values[at]);
+            return Err(self.error(name, format!("step {step}, number {place}: {value} is not finite")));
+        }
+        Ok(FloatArray { values: rows.values, shape: data.shape() })
+    }
+}
+
+/// Pose from position (m) and quaternion w x y z of any length but 0; `None` if a number is not finite.
+pub(super) fn pose_from_row(row: &[f64]) -> Option<Pose> {
+    let q = nalgebra::Quaternion::new(row[3], row[4], row[5], row[6]);
+    let position = Vec3::new(row[0], row[1], row[2]);
+    let is_valid = q.norm() > 1e-6 && row.iter().all(|x| x.is_finite());
+    is_valid.then(|| Pose::from_parts(position.into(), Quat::new_normalize(q)))
+}

@@ -1,0 +1,95 @@
+//! Demonstrations of other programs, as read from their files.
+
+use std::path::PathBuf;
+
+use super::header::ForeignLayout;
+use crate::{geometry::Pose, policy::ToolCommand, scene::InitialState};
+
+/// A file of demonstrations.
+#[derive(Clone, Debug)]
+pub struct ForeignFile {
+    pub path: PathBuf,
+    /// SHA-256 of the file, hexadecimal.
+    pub sha256: String,
+    pub layout: ForeignLayout,
+    /// Its demonstrations, by index.
+    pub demos: Vec<ForeignDemo>,
+}
+
+/// A demonstration converted to commands for softvt's robot.
+///
+/// `commands`, `gripper_closed` and `is_stopped_by_object` have one entry per control step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ForeignDemo {
+    /// Name of its group, such as `demo_3`.
+    pub name: String,
+    pub task: ForeignTask,
+    pub commands: Vec<ToolCommand>,
+    /// True while the gripper is commanded to hold.
+    pub gripper_closed: Vec<bool>,
+    /// True while the gripper holds an object and the recorded closure is the measured one, limited by that object.
+    pub is_stopped_by_object: Vec<bool>,
+    pub initial_condition: InitialCondition,
+    /// What the commands were computed from, for the dataset card.
+    pub command_source: &'static str,
+}
+
+/// Task named by a foreign demonstration.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ForeignTask {
+    pub suite: Option<String>,
+    /// Task index in the suite.
+    pub id: Option<usize>,
+    /// Spellings of the instruction, most reliable first.
+    pub prompts: Vec<String>,
+}
+
+/// State from which a demonstration starts.
+#[derive(Clone, Debug, PartialEq)]
+pub enum InitialCondition {
+    /// A scene of another simulator.
+    OtherSimulator {
+        /// Joint angles of the arm, rad, if they are recorded.
+        joints: Option<[f64; 7]>,
+        /// Recorded poses of the objects.
+        objects: Vec<ForeignObjectPose>,
+    },
+    /// An episode of a softvt suite.
+    SoftvtEpisode {
+        /// Base seed.
+        seed: u64,
+        /// Index in the split of demonstrations.
+        attempt: u32,
+        /// Overrides of the layout.
+        start: InitialState,
+    },
+}
+
+/// Pose of an object in the scene of another simulator.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ForeignObjectPose {
+    /// Its name there.
+    pub name: String,
+    pub pose: Pose,
+    /// True if `pose` is in the robot's base frame, else in that simulator's world frame, whose x and y are assumed to
+    /// coincide with softvt's.
+    pub in_base: bool,
+    /// True for a soft body, whose orientation is unknown.
+    pub is_soft: bool,
+}
+
+impl ForeignDemo {
+    /// Commands full closure in steps in which the recorded fingers were stopped by the object.
+    ///
+    /// Replaying the measured closure squeezes a soft object as far as it was squeezed, but exerts no force on a rigid one.
+    pub fn close_fully_on_rigid_object(&mut self) {
+        let stopped =
+            self.commands.iter_mut().zip(&self.is_stopped_by_object).filter(|(_, stopped)| **stopped);
+        for (command, _) in stopped {
+            match command {
+                ToolCommand::Pose(action) => action.closure = 1.0,
+                ToolCommand::Step { closure, .. } => *closure = 1.0,
+            }
+        }
+    }
+}
