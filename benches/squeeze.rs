@@ -115,9 +115,9 @@ impl Scene {
             let start = CpuClock::now();
             while self.world.time() + 0.5 * self.world.params.dt < end {
                 self.step();
-                out.newton += self.world.stats().newton;
-                out.factored += self.world.stats().factored;
-                out.newton_max = out.newton_max.max(self.world.stats().newton_max);
+                out.newton += self.world.stats().newton_steps;
+                out.factored += self.world.stats().factorizations;
+                out.newton_max = out.newton_max.max(self.world.stats().max_newton_steps);
             }
             out.cpu[phase] = start.elapsed();
             out.simulated[phase] = self.world.time() - begun;

@@ -374,7 +374,8 @@ impl Episode {
             self.physics_steps += 1;
             self.sim.step()?;
             let stats = self.sim.world.stats();
-            self.newton = (self.newton.0 + u64::from(stats.newton), self.newton.1.max(stats.newton_max));
+            self.newton =
+                (self.newton.0 + u64::from(stats.newton_steps), self.newton.1.max(stats.max_newton_steps));
             if let BodyId::Soft(index) = self.sim.objects[self.target].body {
                 self.min_det_f = self.min_det_f.min(self.sim.world.soft(index).min_det_f().det_f);
             }

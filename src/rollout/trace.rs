@@ -87,7 +87,7 @@ impl StepTrace {
             slip_mm: touch.map(|t| 1e3 * t.travel),
             dropped,
             energy_j: [energy.kinetic, energy.elastic, energy.potential],
-            newton: sim.world.stats().newton,
+            newton: sim.world.stats().newton_steps,
             objects: (0..sim.objects.len())
                 .filter(|&i| sim.objects[i].body != BodyId::World)
                 .map(|i| object(sim, evidence, i, nodes))

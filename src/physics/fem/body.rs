@@ -1,4 +1,4 @@
-//! A soft body: its rest data (shared, immutable) and its state.
+//! The finite-element model of a soft body (immutable, shared) and its state.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::geometry::{
     voxel::{OccupancyMask, SUBCELLS, SurfaceSample, VoxelMesh},
 };
 
-/// Isotropic linear elasticity.
+/// Isotropic, linearly elastic material.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ElasticMaterial {
     /// Young's modulus, Pa.
@@ -23,17 +23,17 @@ pub struct ElasticMaterial {
     pub density: f64,
 }
 
-/// Least mass of a node as a share of a full interior node's.
-const MASS_FLOOR: f64 = 1e-3;
-/// Voxels with less material than this are not watched for inversion.
-const WATCHED_FILL: f64 = 0.2;
+/// Smallest mass of a node relative to that of a full interior node.
+const MIN_MASS_RATIO: f64 = 1e-3;
+/// Fill fraction below which a voxel is not checked for inversion.
+const MIN_CHECKED_FILL: f64 = 0.2;
 
-/// Samples that share the same nodes.
+/// Contact samples carried by the same nodes: those of an element, or of one of its faces.
 #[derive(Clone, Debug)]
 pub struct SampleGroup {
-    /// The nodes that carry the samples; the first `count` are used.
+    /// The nodes, of which the first `count` are used.
     pub nodes: [u32; 8],
-    /// Number of carrying nodes.
+    /// Number of nodes.
     pub count: usize,
     /// First sample of the group.
     pub first: usize,
@@ -41,43 +41,45 @@ pub struct SampleGroup {
     pub last: usize,
 }
 
-/// A contact sample: where it sits, its weights in its group's node order, and what it stands for.
+/// A contact sample: a quadrature point of the surface, embedded in the mesh.
 #[derive(Clone, Debug)]
 pub struct ContactSample {
-    /// The geometric sample.
+    /// Position, normal and area at rest.
     pub surface: SurfaceSample,
-    /// Weights of the group's nodes.
+    /// Weights of the nodes of its group; they sum to 1.
     pub weights: [f64; 8],
 }
 
-/// What never changes about a soft body.
+/// The finite-element model of a soft body: mesh, material, masses, rest stiffness and contact samples.
+///
+/// It is immutable and can be shared by several bodies.
 #[derive(Debug)]
 pub struct FemModel {
-    /// The voxel mesh at rest, object frame.
+    /// The undeformed voxel mesh, object frame.
     pub mesh: VoxelMesh,
     /// ElasticMaterial.
     pub material: ElasticMaterial,
-    /// Node masses, kg; they sum to density × volume.
+    /// Lumped node masses, kg; they sum to density × volume.
     pub mass: Vec<f64>,
     /// Contact samples, ordered by group.
     pub samples: Vec<ContactSample>,
     /// ContactSample groups.
     pub groups: Vec<SampleGroup>,
-    /// Typical side of a sample's patch, m.
+    /// Square root of the mean sample area, m: the typical spacing.
     pub spacing: f64,
     pub(super) stiffness: Vec<Stiffness>,
     pub(super) stiffness_of: Vec<u32>,
     pub(super) corners: Corners,
     pub(super) mean: [Vec3; 8],
-    watched: Vec<bool>,
+    is_checked: Vec<bool>,
 }
 
-/// What the factor of a body of n nodes takes, bytes over n^(4/3): measured on cubes of 6 to 24 voxels an edge, whose fill
-/// grows as that of nested dissection does.
+/// Memory of the factor of a body of n nodes over n^(4/3), bytes: measured on cubes of 6 to 24 voxels per edge. The exponent
+/// is that of the fill of nested dissection.
 const FACTOR_BYTES: f64 = 2048.0;
 
 impl FemModel {
-    /// About what a body takes in memory once it has been stepped, bytes.
+    /// Estimated memory of a body after its first step, bytes.
     pub fn bytes(&self) -> usize {
         let (nodes, elements) = (self.mesh.nodes.len(), self.mesh.elements.len());
         let own = nodes * (size_of::<f64>() + 4 * size_of::<Vec3>())
@@ -87,7 +89,7 @@ impl FemModel {
         own + (FACTOR_BYTES * (nodes as f64).powf(4.0 / 3.0)) as usize
     }
 
-    /// Builds the rest data; `volume` (m³) is the body's true volume, which fixes its mass.
+    /// Builds the model; `volume` (m³) is the true volume of the body, which determines its mass.
     pub fn new(
         mesh: VoxelMesh,
         material: ElasticMaterial,
@@ -113,7 +115,7 @@ impl FemModel {
         let (samples, groups) = group_samples(&mesh, samples);
         Arc::new(Self {
             mass: node_masses(&mesh, material.density, volume),
-            watched: mesh.occupancy.iter().map(|f| f.fraction() >= WATCHED_FILL).collect(),
+            is_checked: mesh.occupancy.iter().map(|f| f.fraction() >= MIN_CHECKED_FILL).collect(),
             material,
             samples,
             groups,
@@ -131,13 +133,15 @@ impl FemModel {
         self.mass.iter().sum()
     }
 
-    /// Normal contact modulus of the surface per area, Pa/m: `min(1e9, 30 E/h)`, stiff enough that the voxels decide.
+    /// Normal contact stiffness of the surface per area, Pa/m: `min(1e9, 30 E/h)` with the voxel edge h, so stiff that the
+    /// deformation is that of the voxels.
     pub fn contact_modulus(&self) -> f64 {
         (30.0 * self.material.youngs_pa / self.mesh.edge).min(1e9)
     }
 }
 
-/// Masses lumped by the shape functions over the filled part, floored, then scaled to `density · volume` in all.
+/// Masses lumped by the shape functions over the filled part, limited from below, and scaled to a total of
+/// `density · volume`.
 fn node_masses(mesh: &VoxelMesh, density: f64, volume: f64) -> Vec<f64> {
     let cell = mesh.edge.powi(3) / (SUBCELLS * SUBCELLS * SUBCELLS) as f64;
     let mut mass = vec![0.0; mesh.nodes.len()];
@@ -149,14 +153,14 @@ fn node_masses(mesh: &VoxelMesh, density: f64, volume: f64) -> Vec<f64> {
             }
         }
     }
-    let floor = MASS_FLOOR * density * mesh.edge.powi(3);
+    let floor = MIN_MASS_RATIO * density * mesh.edge.powi(3);
     mass.iter_mut().for_each(|m| *m = m.max(floor));
     let scale = density * volume / mass.iter().sum::<f64>();
     mass.iter_mut().for_each(|m| *m *= scale);
     mass
 }
 
-/// Groups samples that are carried by the same nodes (an element, or one face of it) and orders them by group.
+/// Groups samples that are carried by the same nodes and sorts them by group.
 fn group_samples(mesh: &VoxelMesh, samples: Vec<SurfaceSample>) -> (Vec<ContactSample>, Vec<SampleGroup>) {
     let key = |s: &SurfaceSample| {
         let weights = s.at.weights();
@@ -197,7 +201,9 @@ pub struct MinDetF {
     pub element: usize,
 }
 
-/// A soft body in motion.
+/// State of a soft body: node positions and velocities, and the elastic forces and rotations computed from them.
+///
+/// After changing `x`, call [`FemState::update_elastic`].
 #[derive(Clone, Debug)]
 pub struct FemState {
     /// FemModel data.
@@ -206,11 +212,11 @@ pub struct FemState {
     pub x: Vec<Vec3>,
     /// Node velocities, m/s, world.
     pub v: Vec<Vec3>,
-    /// Elastic node forces at `x`, N, world; made by [`FemState::update_elastic`].
+    /// Elastic node forces at `x`, N, world.
     pub force: Vec<Vec3>,
-    /// Element rotations at `x`.
+    /// Element rotations at `x`, from the object frame to the world.
     pub rotation: Vec<Mat3>,
-    /// Rotation of the body as a whole.
+    /// Mean rotation of the body, from the object frame to the world.
     pub frame: Mat3,
     /// Stored elastic energy at `x`, J.
     pub elastic_energy: f64,
@@ -234,7 +240,7 @@ impl FemState {
         }
     }
 
-    /// Evaluates rotations, forces and energy at the present positions.
+    /// Updates rotations, forces and energy for the current positions.
     pub fn update_elastic(&mut self) {
         let rest = &*self.model;
         self.force.fill(Vec3::zeros());
@@ -257,15 +263,15 @@ impl FemState {
     /// Smallest det F over the Gauss points of all elements that hold enough material.
     pub fn min_det_f(&self) -> MinDetF {
         let rest = &*self.model;
-        let mut least = MinDetF { det_f: f64::INFINITY, element: 0 };
-        for (e, nodes) in rest.mesh.elements.iter().enumerate().filter(|(e, _)| rest.watched[*e]) {
+        let mut min = MinDetF { det_f: f64::INFINITY, element: 0 };
+        for (e, nodes) in rest.mesh.elements.iter().enumerate().filter(|(e, _)| rest.is_checked[*e]) {
             let x: Corners = std::array::from_fn(|c| self.x[nodes[c] as usize]);
             let det = force::min_det(&x, rest.mesh.edge);
-            if det < least.det_f {
-                least = MinDetF { det_f: det, element: e };
+            if det < min.det_f {
+                min = MinDetF { det_f: det, element: e };
             }
         }
-        least
+        min
     }
 
     /// Centre of mass, m.

@@ -6,7 +6,7 @@ use crate::geometry::{Mat3, Vec3};
 /// Corner positions or forces of an element.
 pub type Corners = [Vec3; 8];
 
-/// What one evaluation of an element gives.
+/// Elastic response of an element.
 pub struct Elastic {
     /// Rotation of the element.
     pub rotation: Mat3,
@@ -18,17 +18,17 @@ pub struct Elastic {
 
 /// Force and energy of an element at world corner positions `x`.
 ///
-/// `rest` are the corners at rest, `g` the mean shape gradients (1/m), `k0` the rest stiffness (N/m, column-major 24×24),
-/// `last` the rotation to start from. The force is `f_a = −R (p_a − q × g_a)` with `p = K₀ (y − X)`,
-/// `m = Σ y_a × p_a`, `S = Rᵀ F`, `q = (tr S I − S)⁻¹ m`: the second term is what the rotation's own change contributes;
-/// without it the force is not the derivative of the energy and has a spurious moment.
+/// `rest` are the undeformed corners (m), `g` the mean shape gradients (1/m), `k0` the rest stiffness (N/m, column-major
+/// 24×24), and `last` is an estimate of the rotation. The force is `f_a = −R (p_a − q × g_a)` with `p = K₀ (y − X)`,
+/// `m = Σ y_a × p_a`, `S = Rᵀ F`, `q = (tr S I − S)⁻¹ m`: the second term is due to the change of the rotation itself.
+/// Without it the force is not the derivative of the energy and has a spurious moment.
 pub fn elastic(x: &Corners, rest: &Corners, g: &[Vec3; 8], k0: &[f64; 576], last: Mat3) -> Elastic {
     let f = deformation_gradient(x, g);
     let r = polar(&f, last);
     let mut u = [0.0; 24];
     let mut y = [Vec3::zeros(); 8];
     for a in 0..8 {
-        // Differences to one corner keep the digits far from the origin; translations cost nothing in K₀.
+        // Differences to one corner keep precision far from the origin; K₀ is invariant to translations.
         y[a] = r.tr_mul(&(x[a] - x[0]));
         let d = y[a] - (rest[a] - rest[0]);
         u[3 * a..3 * a + 3].copy_from_slice(d.as_slice());
@@ -59,10 +59,10 @@ fn multiply(k: &[f64; 576], u: &[f64; 24]) -> [f64; 24] {
     p
 }
 
-/// Least det F over the 2×2×2 Gauss points of a voxel of edge `h` (m); ≤ 0 means inverted.
+/// Smallest det F over the 2×2×2 Gauss points of a voxel of edge `h` (m); ≤ 0 means inverted.
 ///
-/// A column of F is the slope along one axis: the mean of the four edges in that direction, weighted by where the point
-/// lies across them, so it takes only four values in the element.
+/// A column of F is the slope along one axis: the mean of the four edges in that direction, weighted by the position of the
+/// point across them. So it has only four values per element.
 pub fn min_det(x: &Corners, h: f64) -> f64 {
     let near = 0.5 + 0.5 / 3f64.sqrt();
     // Columns along axis 0, 1, 2, each at the four Gauss positions on the other two axes (the lower axis first).
@@ -120,7 +120,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn least_determinant_is_that_of_the_gradients(e in prop::collection::vec(-0.4f64..0.4, 24)) {
+        fn the_minimum_determinant_is_that_of_the_gradients(e in prop::collection::vec(-0.4f64..0.4, 24)) {
             let x = bent(&e);
             let det = |xi: &Vec3| deformation_gradient(&x, &hex8::gradients(xi, H)).determinant();
             let plain = gauss_points().iter().map(det).fold(f64::INFINITY, f64::min);

@@ -1,15 +1,15 @@
-//! The rotation of an element: the orthogonal factor of its mean deformation gradient.
+//! Rotation of an element: the orthogonal polar factor of its mean deformation gradient.
 
 use crate::geometry::{Mat3, Vec3};
 
 /// Newton steps before the singular value decomposition takes over.
 const MAX_NEWTON: usize = 8;
 
-/// Rotation part of `f`, starting from `r` (the last one).
+/// Rotation part of `f`, starting from an estimate `r`.
 ///
 /// Maximises `tr(Rᵀ F)` by Newton's method on SO(3): with `S = Rᵀ F` the step is `ω = (tr S I − sym S)⁻¹ axial(S − Sᵀ)`.
-/// Near the start it converges quadratically, and through an inversion it stays on its branch instead of flipping; where
-/// the Hessian is not positive definite the proper polar factor by SVD is taken.
+/// Near the estimate it converges quadratically, and through an inversion it stays on its branch instead of flipping. Where
+/// the Hessian is not positive definite, the proper polar factor is computed by SVD.
 pub fn polar(f: &Mat3, mut r: Mat3) -> Mat3 {
     for _ in 0..MAX_NEWTON {
         let s = r.tr_mul(f);
@@ -22,7 +22,7 @@ pub fn polar(f: &Mat3, mut r: Mat3) -> Mat3 {
             return polar_svd(f);
         }
         r *= small_rotation(&w);
-        // Quadratic convergence: what is left after a step of 1e-6 is of the order of 1e-12.
+        // Convergence is quadratic: the error after a step of 1e-6 is of the order of 1e-12.
         if size < 1e-12 {
             return r;
         }
@@ -35,15 +35,16 @@ pub fn stretch_hessian(s: &Mat3) -> Mat3 {
     Mat3::from_diagonal_element(s.trace()) - (s + s.transpose()) * 0.5
 }
 
-/// Inverse of a symmetric matrix if it is safely positive definite.
+/// Inverse of a symmetric matrix, if it is positive definite by a margin.
 pub fn positive_inverse(m: &Mat3) -> Option<Mat3> {
     let (a, b, c, d, e, f) = (m[(0, 0)], m[(1, 0)], m[(2, 0)], m[(1, 1)], m[(2, 1)], m[(2, 2)]);
     let (first, second, third) = (d * f - e * e, c * e - b * f, b * e - c * d);
     let minor = a * d - b * b;
     let det = a * first + b * second + c * third;
-    let sound = a > 1e-3 && minor > 1e-6 && det > 1e-6;
+    let is_definite = a > 1e-3 && minor > 1e-6 && det > 1e-6;
     let mixed = b * c - a * e;
-    sound.then(|| Mat3::new(first, second, third, second, a * f - c * c, mixed, third, mixed, minor) / det)
+    is_definite
+        .then(|| Mat3::new(first, second, third, second, a * f - c * c, mixed, third, mixed, minor) / det)
 }
 
 /// `exp([w]×)` by the Cayley map's second-order form with exact orthogonality.
@@ -54,7 +55,7 @@ fn small_rotation(w: &Vec3) -> Mat3 {
     Mat3::identity() + (w.cross_matrix() + half_square) * (4.0 / (4.0 + square))
 }
 
-/// Proper polar factor by singular values; the last axis is flipped where `det F < 0`.
+/// Proper polar factor by singular values; the axis of the smallest is flipped where `det F < 0`.
 pub fn polar_svd(f: &Mat3) -> Mat3 {
     let svd = f.svd(true, true);
     let (Some(mut u), Some(vt)) = (svd.u, svd.v_t) else {
@@ -87,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn half_a_turn_from_the_start_is_found() {
+    fn a_rotation_by_half_a_turn_is_found() {
         let half = *Quat::from_scaled_axis(Vec3::z() * std::f64::consts::PI).to_rotation_matrix().matrix();
         assert!((polar(&half, Mat3::identity()) - half).norm() < 1e-12);
     }

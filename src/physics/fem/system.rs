@@ -1,10 +1,10 @@
 //! The velocity system of a soft body, `A = (1 + α dt) M + dt (dt + β) K`, reduced to the nodes in contact.
 //!
-//! `K = Σ R K₀ Rᵀ` is assembled and factored in the body's own turning frame, so a body that is carried or rotates
-//! without changing shape keeps its factor; it is refilled when an element's rotation has moved by [`STALE_ROTATION`]
-//! against the body, or when a new node comes into contact. The turning frame itself follows in steps of [`STALE_TURN`], so
-//! that a body that is merely held needs not even be turned. A slightly old tangent changes no equilibrium: the force
-//! is always evaluated exactly, `A` only says how the step answers it.
+//! `K = Σ R K₀ Rᵀ` is assembled and factored in the body's co-rotating frame, so a body that is carried or rotates without
+//! changing shape keeps its factor. It is factored again when an element's rotation has changed by [`STALE_ROTATION`]
+//! relative to the body, or when a new node comes into contact. The frame itself follows the body in steps of
+//! [`STALE_FRAME`], so that the matrix of a body that is merely held is not even rotated. A slightly old tangent changes no
+//! equilibrium: the elastic force is always evaluated exactly, and `A` only affects the transient.
 
 use super::body::{FemModel, FemState};
 use crate::{
@@ -12,14 +12,14 @@ use crate::{
     physics::sparse::{BlockMatrix, CholeskyFactor, SymbolicFactor},
 };
 
-/// Change of an element's rotation (Frobenius norm, about √2 × radians) that makes the factor be refilled.
+/// Change of an element's rotation (Frobenius norm, about √2 × radians) beyond which the matrix is factored again.
 const STALE_ROTATION: f64 = 0.04;
-/// Change of the body's rotation (same norm) that makes the reduced matrix be turned again.
-const STALE_TURN: f64 = 2e-3;
-/// Steps for which a node stays kept after its last contact.
-const KEEP_STEPS: u64 = 10;
+/// Change of the body's rotation (same norm) beyond which the reduced matrix is rotated again.
+const STALE_FRAME: f64 = 2e-3;
+/// Steps for which a node stays retained after its last contact.
+const RETAIN_STEPS: u64 = 10;
 
-/// Coefficients of the step.
+/// Coefficients of `A`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepCoefficients {
     /// Time step, s.
@@ -36,24 +36,26 @@ pub struct VelocitySystem {
     blocks: Blocks,
     plan: Option<SymbolicFactor>,
     factor: CholeskyFactor,
+    /// Element rotations in that frame at the last factorization.
     factored: Vec<Mat3>,
-    turn: Mat3,
-    /// The Schur complement in the world, empty while it is lent out or has to be turned again.
-    turned: Vec<f64>,
+    /// Rotation of the frame in which the matrix is factored.
+    frame: Mat3,
+    /// Schur complement in the world frame; empty while it is taken out or out of date.
+    schur_w: Vec<f64>,
     coefficients: Option<StepCoefficients>,
     last_used: Vec<u64>,
     retained: Vec<u32>,
     retained_index: Vec<u32>,
     retained_version: u64,
     work: Vec<f64>,
-    /// Factorisations done so far (for profiles and tests).
+    /// Number of factorizations so far.
     pub factorizations: u64,
 }
 
-/// The matrix: diagonal blocks and, per node, blocks to its higher neighbours.
+/// The matrix `A`: diagonal blocks and, per pair of neighbours, one block.
 #[derive(Clone, Debug)]
 struct Blocks {
-    /// Places of the nodes in the voxel lattice.
+    /// Lattice coordinates of the nodes.
     places: Vec<[i32; 3]>,
     neighbours: Vec<Vec<u32>>,
     slot: Vec<Vec<u32>>,
@@ -63,6 +65,7 @@ struct Blocks {
     pairs: Vec<[u32; 36]>,
 }
 
+/// Flag of a block index.
 const TRANSPOSED: u32 = 1 << 31;
 
 impl BlockMatrix for Blocks {
@@ -162,7 +165,7 @@ fn corner_pairs() -> impl Iterator<Item = (usize, usize)> {
 }
 
 impl VelocitySystem {
-    /// An empty system for a body.
+    /// The system of a body, not factored yet.
     pub fn new(rest: &FemModel) -> Self {
         let nodes = rest.mesh.nodes.len();
         Self {
@@ -170,8 +173,8 @@ impl VelocitySystem {
             plan: None,
             factor: CholeskyFactor::default(),
             factored: Vec::new(),
-            turn: Mat3::identity(),
-            turned: Vec::new(),
+            frame: Mat3::identity(),
+            schur_w: Vec::new(),
             coefficients: None,
             last_used: vec![0; nodes],
             retained: Vec::new(),
@@ -182,49 +185,49 @@ impl VelocitySystem {
         }
     }
 
-    /// Marks a node as possibly in contact at `step` (counted from 1).
+    /// Marks a node as possibly in contact at `step` (counted from 1): it is retained for some steps.
     pub fn mark(&mut self, node: u32, step: u64) {
         self.last_used[node as usize] = step;
     }
 
-    /// Nodes kept in the reduced system, ascending.
+    /// Nodes of the reduced system, ascending.
     pub fn retained(&self) -> &[u32] {
         &self.retained
     }
 
-    /// Changes whenever the kept nodes do.
+    /// A number that changes whenever the retained nodes do.
     pub fn retained_version(&self) -> u64 {
         self.retained_version
     }
 
-    /// Index of a node among the kept ones.
+    /// Index of a node among the retained ones.
     pub fn retained_index(&self, node: u32) -> usize {
         self.retained_index[node as usize] as usize
     }
 
-    /// Brings plan and factor up to date with the body and the marks of `step`. `false` if `A` is not positive definite.
+    /// Updates retained nodes and factor for the body and the marks of `step`. False if `A` is not positive definite.
     pub fn prepare(&mut self, body: &FemState, c: &StepCoefficients, step: u64) -> bool {
         let new_plan = self.update_retained(step);
         if new_plan || self.plan.is_none() {
             self.plan =
                 Some(SymbolicFactor::new(&self.blocks.neighbours, &self.blocks.places, &self.retained));
         }
-        if new_plan || (body.frame - self.turn).norm_squared() > STALE_TURN * STALE_TURN {
-            self.turn = body.frame;
-            self.turned.clear();
+        if new_plan || (body.frame - self.frame).norm_squared() > STALE_FRAME * STALE_FRAME {
+            self.frame = body.frame;
+            self.schur_w.clear();
         }
-        let to_body = self.turn.transpose();
+        let to_frame = self.frame.transpose();
         let stale =
-            |(r, old): (&Mat3, &Mat3)| (to_body * r - old).norm_squared() > STALE_ROTATION * STALE_ROTATION;
+            |(r, old): (&Mat3, &Mat3)| (to_frame * r - old).norm_squared() > STALE_ROTATION * STALE_ROTATION;
         let fresh = !new_plan
             && self.coefficients == Some(*c)
             && !body.rotation.iter().zip(&self.factored).any(stale);
         if fresh {
             return true;
         }
-        self.turned.clear();
+        self.schur_w.clear();
         self.factored.clear();
-        self.factored.extend(body.rotation.iter().map(|r| to_body * r));
+        self.factored.extend(body.rotation.iter().map(|r| to_frame * r));
         self.blocks.assemble(&body.model, &self.factored, c);
         self.coefficients = Some(*c);
         self.factorizations += 1;
@@ -232,7 +235,7 @@ impl VelocitySystem {
         self.factor.refill(plan, &self.blocks)
     }
 
-    /// Updates the kept set; whether it changed.
+    /// Updates the retained nodes; true if they changed.
     fn update_retained(&mut self, step: u64) -> bool {
         let current = |used: &u64| *used == step;
         let missing = self
@@ -240,14 +243,14 @@ impl VelocitySystem {
             .iter()
             .zip(&self.retained_index)
             .any(|(used, at)| current(used) && *at == u32::MAX);
-        let live = self.last_used.iter().filter(|u| **u > 0 && **u + KEEP_STEPS >= step).count();
+        let live = self.last_used.iter().filter(|u| **u > 0 && **u + RETAIN_STEPS >= step).count();
         let bloated = self.retained.len() > live + live / 4 + 8;
         if !missing && !bloated {
             return false;
         }
         self.retained_version += 1;
         self.retained.clear();
-        let recent = |used: u64| used > 0 && used + KEEP_STEPS >= step;
+        let recent = |used: u64| used > 0 && used + RETAIN_STEPS >= step;
         self.retained
             .extend((0..self.last_used.len() as u32).filter(|&n| recent(self.last_used[n as usize])));
         self.retained_index.fill(u32::MAX);
@@ -255,52 +258,53 @@ impl VelocitySystem {
         true
     }
 
-    /// Lends the reduced matrix of the kept nodes (Schur complement, column-major lower, world); [`VelocitySystem::give_back`]
-    /// spares the next step from making it anew.
+    /// Takes the reduced matrix of the retained nodes: their Schur complement, column-major, lower triangle, world frame.
+    ///
+    /// Returning it by [`VelocitySystem::return_matrix`] saves its computation in the next step.
     pub fn take_matrix(&mut self) -> Vec<f64> {
-        let mut matrix = std::mem::take(&mut self.turned);
+        let mut matrix = std::mem::take(&mut self.schur_w);
         if let Some(plan) = self.plan.as_ref().filter(|_| matrix.is_empty()) {
-            let side = 3 * plan.kept;
+            let side = 3 * plan.retained;
             matrix.resize(side * side, 0.0);
-            turn_blocks(&self.turn, self.factor.schur(), plan.kept, &mut matrix);
+            rotate_blocks(&self.frame, self.factor.schur(), plan.retained, &mut matrix);
         }
         matrix
     }
 
-    /// Takes the matrix back, unchanged.
+    /// Returns the unchanged matrix of [`VelocitySystem::take_matrix`].
     pub fn return_matrix(&mut self, matrix: Vec<f64>) {
-        self.turned = matrix;
+        self.schur_w = matrix;
     }
 
-    /// Reduces momentum `b` (per node, N s, world) to the right-hand side of the kept nodes.
+    /// Reduces momenta `b` (per node, N s, world) to the right-hand side of the retained nodes (3 per node).
     pub fn reduce(&mut self, b: &[Vec3], rhs: &mut [f64]) {
         let Some(plan) = &self.plan else { return };
         for (chunk, &node) in self.work.chunks_exact_mut(3).zip(&plan.order) {
-            chunk.copy_from_slice(self.turn.tr_mul(&b[node as usize]).as_slice());
+            chunk.copy_from_slice(self.frame.tr_mul(&b[node as usize]).as_slice());
         }
         self.factor.forward(plan, &mut self.work);
-        let inner = 3 * (plan.order.len() - plan.kept);
+        let inner = 3 * (plan.order.len() - plan.retained);
         for (rhs, chunk) in rhs.chunks_exact_mut(3).zip(self.work[inner..].chunks_exact(3)) {
-            rhs.copy_from_slice((self.turn * Vec3::from_column_slice(chunk)).as_slice());
+            rhs.copy_from_slice((self.frame * Vec3::from_column_slice(chunk)).as_slice());
         }
     }
 
-    /// Completes the velocities of all nodes from those of the kept ones (world, 3 a node).
-    pub fn complete(&mut self, kept: &[f64], v: &mut [Vec3]) {
+    /// Computes the velocities of all nodes from those of the retained ones (m/s, world, 3 per node).
+    pub fn complete(&mut self, retained: &[f64], v: &mut [Vec3]) {
         let Some(plan) = &self.plan else { return };
-        let inner = 3 * (plan.order.len() - plan.kept);
-        for (chunk, kept) in self.work[inner..].chunks_exact_mut(3).zip(kept.chunks_exact(3)) {
-            chunk.copy_from_slice(self.turn.tr_mul(&Vec3::from_column_slice(kept)).as_slice());
+        let inner = 3 * (plan.order.len() - plan.retained);
+        for (chunk, v) in self.work[inner..].chunks_exact_mut(3).zip(retained.chunks_exact(3)) {
+            chunk.copy_from_slice(self.frame.tr_mul(&Vec3::from_column_slice(v)).as_slice());
         }
         self.factor.backward(plan, &mut self.work);
         for (chunk, &node) in self.work.chunks_exact(3).zip(&plan.order) {
-            v[node as usize] = self.turn * Vec3::from_column_slice(chunk);
+            v[node as usize] = self.frame * Vec3::from_column_slice(chunk);
         }
     }
 }
 
-/// `Q S Qᵀ` block by block, lower triangle.
-fn turn_blocks(q: &Mat3, s: &[f64], blocks: usize, out: &mut [f64]) {
+/// `Q S Qᵀ` for each 3×3 block of the lower triangle.
+fn rotate_blocks(q: &Mat3, s: &[f64], blocks: usize, out: &mut [f64]) {
     let n = 3 * blocks;
     for bc in 0..blocks {
         for br in bc..blocks {

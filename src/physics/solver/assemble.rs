@@ -1,12 +1,15 @@
-//! Velocities of points and the gather and scatter between points and blocks.
+//! Kinematics of contact points: maps between velocities of blocks, of endpoints and of points, and their transposes.
+//!
+//! An endpoint has *local coordinates*: three velocities per node, or linear and angular velocity of a frame. Points are
+//! linear in them, so gradient and Hessian of a cluster are summed in local coordinates first and scattered once.
 
 use super::problem::{ContactPoint, ContactProblem, Endpoint};
 use crate::geometry::{Mat3, Vec3};
 
-/// Rows of a cluster's local system: up to two endpoints of eight nodes.
+/// Largest number of local coordinates of a cluster: two endpoints of eight nodes.
 const MAX_LOCAL: usize = 48;
 
-/// ClusterHessian Hessian of a cluster: the endpoints' own coordinates (3 a node, 6 a frame), dense.
+/// Hessian of a cluster in local coordinates (3 per node, 6 per frame), dense.
 #[derive(Clone, Debug)]
 pub(super) struct ClusterHessian {
     size_a: usize,
@@ -21,7 +24,8 @@ impl Default for ClusterHessian {
     }
 }
 
-fn size_of(end: &Endpoint) -> usize {
+/// Number of local coordinates.
+fn local_size(end: &Endpoint) -> usize {
     match end {
         Endpoint::Known => 0,
         Endpoint::Nodes { count, .. } => 3 * count,
@@ -29,8 +33,13 @@ fn size_of(end: &Endpoint) -> usize {
     }
 }
 
-/// Velocities of an endpoint's own coordinates, gathered once a cluster.
-pub(super) fn gather(problem: &ContactProblem, offsets: &[usize], end: &Endpoint, v: &[f64]) -> [Vec3; 8] {
+/// Velocities of an endpoint's local coordinates.
+pub(super) fn endpoint_velocities(
+    problem: &ContactProblem,
+    offsets: &[usize],
+    end: &Endpoint,
+    v: &[f64],
+) -> [Vec3; 8] {
     let mut u = [Vec3::zeros(); 8];
     match end {
         Endpoint::Known => {}
@@ -54,7 +63,7 @@ pub(super) fn gather(problem: &ContactProblem, offsets: &[usize], end: &Endpoint
 
 /// Velocity of a point on an endpoint.
 #[inline]
-pub(super) fn velocity(
+pub(super) fn point_velocity(
     problem: &ContactProblem,
     end: &Endpoint,
     u: &[Vec3; 8],
@@ -63,7 +72,7 @@ pub(super) fn velocity(
 ) -> Vec3 {
     match end {
         Endpoint::Known => Vec3::zeros(),
-        // Faces have four nodes, voxels eight: with the number known, the sums are unrolled.
+        // Faces have four nodes, voxels eight: with constant counts, the sums are unrolled.
         Endpoint::Nodes { count: 4, .. } => mean::<4>(u, weights),
         Endpoint::Nodes { .. } => mean::<8>(u, weights),
         Endpoint::Frame(frame) => u[0] + u[1].cross(&(p - problem.frames[*frame].origin)),
@@ -75,38 +84,41 @@ fn mean<const N: usize>(u: &[Vec3; 8], weights: &[f64; 8]) -> Vec3 {
     (1..N).fold(u[0] * weights[0], |sum, i| sum + u[i] * weights[i])
 }
 
-/// Adds an impulse at a point to the forces on an endpoint's own coordinates (the transpose of [`velocity`]).
+/// Adds an impulse at a point to the impulses on an endpoint's local coordinates: the transpose of [`point_velocity`].
 #[inline]
-pub(super) fn pull(
+pub(super) fn add_point_impulse(
     problem: &ContactProblem,
     end: &Endpoint,
-    force: &mut [Vec3; 8],
+    local: &mut [Vec3; 8],
     weights: &[f64; 8],
-    (p, impulse): (&Vec3, &Vec3),
+    p: &Vec3,
+    impulse: &Vec3,
 ) {
     match end {
         Endpoint::Known => {}
-        Endpoint::Nodes { count: 4, .. } => (0..4).for_each(|i| force[i] += impulse * weights[i]),
-        Endpoint::Nodes { .. } => (0..8).for_each(|i| force[i] += impulse * weights[i]),
+        Endpoint::Nodes { count: 4, .. } => (0..4).for_each(|i| local[i] += impulse * weights[i]),
+        Endpoint::Nodes { .. } => (0..8).for_each(|i| local[i] += impulse * weights[i]),
         Endpoint::Frame(frame) => {
-            force[0] += impulse;
-            force[1] += (p - problem.frames[*frame].origin).cross(impulse);
+            local[0] += impulse;
+            local[1] += (p - problem.frames[*frame].origin).cross(impulse);
         }
     }
 }
 
-/// Adds `sign` times the forces on an endpoint's own coordinates to the gradient (the transpose of [`gather`]).
-pub(super) fn spread(
+/// Adds `sign` times the impulses on an endpoint's local coordinates to the gradient: the transpose of
+/// [`endpoint_velocities`].
+pub(super) fn scatter_impulses(
     problem: &ContactProblem,
     offsets: &[usize],
     end: &Endpoint,
-    (sign, force): (f64, &[Vec3; 8]),
+    sign: f64,
+    local: &[Vec3; 8],
     gradient: &mut [f64],
 ) {
     match end {
         Endpoint::Known => {}
         Endpoint::Nodes { block, at, count } => {
-            for (f, at) in force.iter().zip(&at[..*count]) {
+            for (f, at) in local.iter().zip(&at[..*count]) {
                 let start = offsets[*block] + *at as usize;
                 gradient[start..start + 3].iter_mut().zip(f.iter()).for_each(|(g, f)| *g += sign * f);
             }
@@ -115,42 +127,45 @@ pub(super) fn spread(
             let frame = &problem.frames[*frame];
             let start = offsets[frame.block];
             for (column, g) in frame.jacobian.chunks_exact(6).zip(&mut gradient[start..]) {
-                let along = Vec3::new(column[0], column[1], column[2]).dot(&force[0]);
-                *g += sign * (along + Vec3::new(column[3], column[4], column[5]).dot(&force[1]));
+                let along = Vec3::new(column[0], column[1], column[2]).dot(&local[0]);
+                *g += sign * (along + Vec3::new(column[3], column[4], column[5]).dot(&local[1]));
             }
         }
     }
 }
 
-/// The 3 × 3 pieces by which an endpoint's coordinates move a point: `w I` for nodes, `I` and `−[r]×` for a frame.
-fn pieces(
+/// Writes the 3×3 Jacobian blocks from an endpoint's local coordinates to a point, and returns their number.
+fn jacobian_blocks(
     problem: &ContactProblem,
     end: &Endpoint,
     weights: &[f64; 8],
     p: &Vec3,
-    out: &mut [Piece; 8],
+    out: &mut [JacobianBlock; 8],
 ) -> usize {
     match end {
         Endpoint::Known => 0,
         Endpoint::Nodes { count, .. } => {
-            (0..*count).for_each(|i| out[i] = Piece::Scale(weights[i]));
+            (0..*count).for_each(|i| out[i] = JacobianBlock::Scale(weights[i]));
             *count
         }
         Endpoint::Frame(frame) => {
-            out[0] = Piece::Scale(1.0);
-            out[1] = Piece::Arm(p - problem.frames[*frame].origin);
+            out[0] = JacobianBlock::Scale(1.0);
+            out[1] = JacobianBlock::Arm(p - problem.frames[*frame].origin);
             2
         }
     }
 }
 
+/// A 3×3 block of the Jacobian from local coordinates to a point.
 #[derive(Clone, Copy)]
-enum Piece {
+enum JacobianBlock {
+    /// `w I`: a node of weight `w`, or the origin of a frame.
     Scale(f64),
+    /// `−[r]×`: the angular velocity of a frame at the lever arm `r`, m.
     Arm(Vec3),
 }
 
-impl Piece {
+impl JacobianBlock {
     /// `G · L`.
     fn after(&self, g: &Mat3) -> Mat3 {
         match self {
@@ -169,16 +184,16 @@ impl Piece {
 }
 
 impl ClusterHessian {
-    /// Empties the local system for a cluster between `a` and `b`.
+    /// Empties the Hessian for a cluster between `a` and `b`.
     pub(super) fn start(&mut self, a: &Endpoint, b: &Endpoint) {
-        self.size_a = size_of(a);
-        self.size = self.size_a + size_of(b);
+        self.size_a = local_size(a);
+        self.size = self.size_a + local_size(b);
         for column in 0..self.size {
             self.hessian[column * MAX_LOCAL..column * MAX_LOCAL + self.size].fill(0.0);
         }
     }
 
-    /// Adds one point's curvature.
+    /// Adds the curvature of one point.
     pub(super) fn add(
         &mut self,
         problem: &ContactProblem,
@@ -187,10 +202,10 @@ impl ClusterHessian {
         point: &ContactPoint,
         curvature: &Mat3,
     ) {
-        let mut left = [Piece::Scale(0.0); 8];
-        let mut right = [Piece::Scale(0.0); 8];
-        let na = pieces(problem, a, &point.weights_a, &point.p, &mut left);
-        let nb = pieces(problem, b, &point.weights_b, &point.p, &mut right);
+        let mut left = [JacobianBlock::Scale(0.0); 8];
+        let mut right = [JacobianBlock::Scale(0.0); 8];
+        let na = jacobian_blocks(problem, a, &point.weights_a, &point.p, &mut left);
+        let nb = jacobian_blocks(problem, b, &point.weights_b, &point.p, &mut right);
         for j in 0..na {
             let column = left[j].after(curvature);
             (j..na).for_each(|i| self.add_block(3 * i, 3 * j, &left[i].before(&column)));
@@ -211,16 +226,16 @@ impl ClusterHessian {
         }
     }
 
-    /// Adds the local system to the island's Hessian (side `n`, lower triangle).
+    /// Adds the local Hessian to the island's (side `n`, lower triangle).
     pub(super) fn scatter(&self, map: &DofMap, hessian: &mut [f64], n: usize) {
         map.scatter_matrix(|r, c| self.hessian[r.min(c) * MAX_LOCAL + r.max(c)], hessian, n);
     }
 }
 
-/// How a cluster's local coordinates read the island's velocities: each coordinate is a sparse row.
+/// Jacobian from an island's velocities to the local coordinates of a cluster: one sparse row per coordinate.
 #[derive(Clone, Debug, Default)]
 pub(super) struct DofMap {
-    /// Per local coordinate: (island index, coefficient).
+    /// (Index in the island, coefficient) of the nonzero entries.
     rows: Vec<Vec<(u32, f64)>>,
     used: usize,
 }

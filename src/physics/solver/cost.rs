@@ -1,32 +1,41 @@
 //! The cost of a solve, `½ vᵀA v − rᵀv + Σ ℓ(J v)`, its gradient and its Hessian.
 
 use super::{
-    assemble::{gather, pull, spread, velocity},
+    assemble::{add_point_impulse, endpoint_velocities, point_velocity, scatter_impulses},
     island::Island,
-    law::{ConstraintResponse, Law},
+    law::{ConstraintResponse, ContactLaw},
     newton::Solver,
     problem::{ContactCluster, ContactPoint, ContactProblem},
 };
 use crate::{geometry::Vec3, physics::sparse::dense};
 
-/// Calls `visit` with every point of a cluster, its relative velocity and its answer at `v`.
+/// Calls `visit` with every point of a cluster, its relative velocity and its response at `v`.
 #[inline]
-fn answers(
+fn for_each_response(
     problem: &ContactProblem,
     offsets: &[usize],
     cluster: &ContactCluster,
     v: &[f64],
     mut visit: impl FnMut(&ContactPoint, Vec3, Option<ConstraintResponse>),
 ) {
-    let law = Law::new(problem.dt, problem.dissipation_time);
-    let ua = gather(problem, offsets, &cluster.a, v);
-    let ub = gather(problem, offsets, &cluster.b, v);
+    let law = ContactLaw::new(problem.dt, problem.dissipation_time);
+    let ua = endpoint_velocities(problem, offsets, &cluster.a, v);
+    let ub = endpoint_velocities(problem, offsets, &cluster.b, v);
     for point in &problem.points[cluster.first..cluster.last] {
-        let relative = velocity(problem, &cluster.a, &ua, &point.weights_a, &point.p)
-            - velocity(problem, &cluster.b, &ub, &point.weights_b, &point.p)
+        let relative = point_velocity(problem, &cluster.a, &ua, &point.weights_a, &point.p)
+            - point_velocity(problem, &cluster.b, &ub, &point.weights_b, &point.p)
             - point.drift;
         visit(point, relative, law.contact(point, &relative));
     }
+}
+
+/// Normal impulses of an island after a pass, N s.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct PassChange {
+    /// Sum of the absolute changes against the previous pass.
+    pub change: f64,
+    /// Sum.
+    pub total: f64,
 }
 
 impl Solver {
@@ -40,22 +49,36 @@ impl Solver {
     ) -> f64 {
         let mut cost = self.momentum_terms(problem, island, v, gradient);
         for cluster in island.clusters.iter().map(|&index| &problem.clusters[index]) {
-            let (mut on_a, mut on_b, mut touched) = ([Vec3::zeros(); 8], [Vec3::zeros(); 8], false);
-            answers(problem, &self.offsets, cluster, v, |point, _, answer| {
-                let Some(answer) = answer else { return };
-                touched = true;
-                cost += answer.cost;
-                pull(problem, &cluster.a, &mut on_a, &point.weights_a, (&point.p, &answer.impulse));
-                pull(problem, &cluster.b, &mut on_b, &point.weights_b, (&point.p, &answer.impulse));
+            let (mut on_a, mut on_b, mut is_touched) = ([Vec3::zeros(); 8], [Vec3::zeros(); 8], false);
+            for_each_response(problem, &self.offsets, cluster, v, |point, _, response| {
+                let Some(response) = response else { return };
+                is_touched = true;
+                cost += response.cost;
+                add_point_impulse(
+                    problem,
+                    &cluster.a,
+                    &mut on_a,
+                    &point.weights_a,
+                    &point.p,
+                    &response.impulse,
+                );
+                add_point_impulse(
+                    problem,
+                    &cluster.b,
+                    &mut on_b,
+                    &point.weights_b,
+                    &point.p,
+                    &response.impulse,
+                );
             });
-            if touched {
-                spread(problem, &self.offsets, &cluster.a, (-1.0, &on_a), gradient);
-                spread(problem, &self.offsets, &cluster.b, (1.0, &on_b), gradient);
+            if is_touched {
+                scatter_impulses(problem, &self.offsets, &cluster.a, -1.0, &on_a, gradient);
+                scatter_impulses(problem, &self.offsets, &cluster.b, 1.0, &on_b, gradient);
             }
         }
-        for scalar in island.constraints.iter().map(|&row| &problem.constraints[row]) {
-            let at = self.offsets[scalar.block] + scalar.index;
-            let (force, value) = scalar.answer(problem.dt, v[at]);
+        for constraint in island.constraints.iter().map(|&row| &problem.constraints[row]) {
+            let at = self.offsets[constraint.block] + constraint.index;
+            let (force, value) = constraint.force_and_cost(problem.dt, v[at]);
             cost += value;
             gradient[at] -= problem.dt * force;
         }
@@ -85,7 +108,7 @@ impl Solver {
         cost
     }
 
-    /// Hessian at `v` but for the scalar rows: column-major lower triangle of side `island.size`.
+    /// Hessian at `v` without the scalar constraints: `island.size` squared, column-major, lower triangle.
     pub(super) fn assemble_hessian(
         &mut self,
         problem: &ContactProblem,
@@ -103,41 +126,44 @@ impl Solver {
                 hessian[target..target + source.len()].copy_from_slice(source);
             }
         }
-        let law = Law::new(problem.dt, problem.dissipation_time);
+        let law = ContactLaw::new(problem.dt, problem.dissipation_time);
         for cluster in island.clusters.iter().map(|&index| &problem.clusters[index]) {
-            let (local, mut touched) = (&mut self.local, false);
+            let (local, mut is_touched) = (&mut self.local, false);
             local.start(&cluster.a, &cluster.b);
-            answers(problem, &self.offsets, cluster, v, |point, _, answer| {
-                let Some(answer) = answer else { return };
-                touched = true;
-                local.add(problem, &cluster.a, &cluster.b, point, &law.curvature(point, &answer));
+            for_each_response(problem, &self.offsets, cluster, v, |point, _, response| {
+                let Some(response) = response else { return };
+                is_touched = true;
+                local.add(problem, &cluster.a, &cluster.b, point, &law.curvature(point, &response));
             });
-            if touched {
+            if is_touched {
                 self.map.set(problem, &self.offsets, &cluster.a, &cluster.b);
                 self.local.scatter(&self.map, hessian, n);
             }
         }
     }
 
-    /// Writes impulses into the points; returns (change against the previous_normal_impulse ones, total) of the normal impulses.
-    pub(super) fn record(&mut self, problem: &mut ContactProblem, island: &Island) -> (f64, f64) {
-        let (mut change, mut total) = (0.0, 0.0);
+    /// Writes impulses and velocities into the points.
+    pub(super) fn record(&mut self, problem: &mut ContactProblem, island: &Island) -> PassChange {
+        let PassChange { mut change, mut total } = PassChange::default();
         let mut points = std::mem::take(&mut self.solved);
         for &index in &island.clusters {
             let cluster = problem.clusters[index];
             points.clear();
-            answers(problem, &self.offsets, &cluster, &self.v, |_, v, answer| points.push((v, answer)));
-            for (point, (v, answer)) in problem.points[cluster.first..cluster.last].iter_mut().zip(&points) {
-                let normal = answer.map_or(0.0, |answer| answer.normal);
+            for_each_response(problem, &self.offsets, &cluster, &self.v, |_, v, response| {
+                points.push((v, response))
+            });
+            for (point, (v, response)) in problem.points[cluster.first..cluster.last].iter_mut().zip(&points)
+            {
+                let normal = response.map_or(0.0, |response| response.normal);
                 change += (normal - point.previous_normal_impulse).abs();
                 total += normal;
                 point.normal_impulse = normal;
-                point.shear_impulse = answer.map_or(Vec3::zeros(), |a| a.impulse - point.normal * normal);
-                point.is_slipping = answer.is_some_and(|answer| answer.is_slipping);
+                point.shear_impulse = response.map_or(Vec3::zeros(), |a| a.impulse - point.normal * normal);
+                point.is_slipping = response.is_some_and(|response| response.is_slipping);
                 point.velocity = *v;
             }
         }
         self.solved = points;
-        (change, total)
+        PassChange { change, total }
     }
 }

@@ -1,81 +1,77 @@
-//! The step of one iteration: the minimum of a model in which everything but the scalar rows is quadratic.
+//! The step of one iteration: the minimum of a model in which everything but the scalar constraints is quadratic.
 //!
-//! Drives at their effort, stops and dry joint friction are so much stiffer than what they act on that a joint which
-//! begins to move changes the Hessian beyond use. They act on a few velocities only, which stand last, so they are
-//! left out of the kept factor and each step is solved with them as they will be at its end: a proximal Newton method
-//! (Lee, Sun, Saunders 2014) with the scalar rows as the part that is not smoothed.
+//! Drives at their effort limit, stops and dry joint friction are far stiffer than what they act on, so a joint that begins
+//! to move makes a kept factor of the whole Hessian useless. They act on a few velocities only, which are last in the island
+//! (the *constrained block*). So the factor excludes them, and each step is solved with the scalar constraints in the state
+//! that they will have at its end: a proximal Newton method (Lee, Sun & Saunders 2014) in which the scalar constraints are
+//! the part that is not linearised.
 
-use super::{island::Island, law::LinearSegment, newton::Solver, problem::ContactProblem};
-
-/// Guesses of the segments on which the scalar rows end before the present ones are taken.
-const MAX_GUESSES: usize = 8;
-
-/// Number of velocities from the first one with a scalar row to the end of the island.
-pub(super) fn tail(problem: &ContactProblem, offsets: &[usize], island: &Island) -> usize {
-    let rows = island.constraints.iter().map(|&row| &problem.constraints[row]);
-    let first = rows.map(|row| offsets[row.block] + row.index).min().unwrap_or(island.size);
-    island.size - first
-}
+use super::{
+    island::Island, law::LinearSegment, newton::Solver, options::MAX_SEGMENT_GUESSES,
+    problem::ContactProblem, secant::State,
+};
 
 impl Solver {
-    /// Writes the step from the present velocities into `step`; it always goes downhill.
+    /// Writes the step from the current velocities into `step`. It is always a descent direction.
     pub(super) fn find_step(&mut self, problem: &ContactProblem, island: &Island) {
         self.segments.clear();
-        self.segments.extend(island.constraints.iter().map(|&row| {
-            let row = &problem.constraints[row];
-            row.segment(problem.dt, self.v[self.offsets[row.block] + row.index])
+        self.segments.extend(island.constraints.iter().map(|&index| {
+            let constraint = &problem.constraints[index];
+            constraint.segment(problem.dt, self.v[self.offsets[constraint.block] + constraint.index])
         }));
-        let present = self.segments.clone();
-        for _ in 0..MAX_GUESSES {
-            self.step_on_pieces(problem, island);
-            if !self.guess_again(problem, island) {
+        let current = self.segments.clone();
+        for _ in 0..MAX_SEGMENT_GUESSES {
+            self.step_on_segments(problem, island);
+            if !self.update_segments(problem, island) {
                 return;
             }
         }
-        self.segments = present;
-        self.step_on_pieces(problem, island);
+        self.segments = current;
+        self.step_on_segments(problem, island);
     }
 
-    /// Solves the model with the scalar rows on the guessed segments.
-    fn step_on_pieces(&mut self, problem: &ContactProblem, island: &Island) {
+    /// Solves the model with the scalar constraints on the guessed segments.
+    fn step_on_segments(&mut self, problem: &ContactProblem, island: &Island) {
         self.step.iter_mut().zip(&self.gradient).for_each(|(s, g)| *s = -g);
         self.stiffness.clear();
-        self.stiffness.resize(tail(problem, &self.offsets, island), 0.0);
+        self.stiffness.resize(island.constrained_size(problem, &self.offsets), 0.0);
         let first = island.size - self.stiffness.len();
-        for (&row, segment) in island.constraints.iter().zip(&self.segments) {
-            let row = &problem.constraints[row];
-            let at = self.offsets[row.block] + row.index;
-            let (slope, curvature) = row.on(*segment, problem.dt, self.v[at]);
-            self.step[at] -= slope + problem.dt * row.answer(problem.dt, self.v[at]).0;
+        for (&index, segment) in island.constraints.iter().zip(&self.segments) {
+            let constraint = &problem.constraints[index];
+            let at = self.offsets[constraint.block] + constraint.index;
+            let (slope, curvature) = constraint.derivatives(*segment, problem.dt, self.v[at]);
+            self.step[at] -= slope + problem.dt * constraint.force_and_cost(problem.dt, self.v[at]).0;
             self.stiffness[at - first] += curvature;
         }
         self.cache.solve(island, &self.stiffness, &mut self.step);
     }
 
-    /// Moves each guess towards the segment on which its row has ended, by one segment; whether any moved.
-    fn guess_again(&mut self, problem: &ContactProblem, island: &Island) -> bool {
+    /// Moves each guess by one segment towards that on which its constraint ended; true if any moved.
+    fn update_segments(&mut self, problem: &ContactProblem, island: &Island) -> bool {
         let mut moved = false;
-        for (&row, segment) in island.constraints.iter().zip(&mut self.segments) {
-            let row = &problem.constraints[row];
-            let at = self.offsets[row.block] + row.index;
-            let ended = row.segment(problem.dt, self.v[at] + self.step[at]);
+        for (&index, segment) in island.constraints.iter().zip(&mut self.segments) {
+            let constraint = &problem.constraints[index];
+            let at = self.offsets[constraint.block] + constraint.index;
+            let ended = constraint.segment(problem.dt, self.v[at] + self.step[at]);
             if ended != *segment {
                 moved = true;
-                *segment = if *segment == LinearSegment::Inside { ended } else { LinearSegment::Inside };
+                *segment = if *segment == LinearSegment::Linear { ended } else { LinearSegment::Linear };
             }
         }
         moved
     }
 
-    /// Teaches the kept factor the last step, less what the scalar rows did.
-    pub(super) fn learn(&mut self, problem: &ContactProblem, island: &Island) {
+    /// Corrects the kept factor by the last step, without the contribution of the scalar constraints.
+    pub(super) fn correct_factor(&mut self, problem: &ContactProblem, island: &Island) {
         let (old, new) = (&self.trial, &self.v);
-        let by_rows = island.constraints.iter().map(|&row| {
-            let row = &problem.constraints[row];
-            let at = self.offsets[row.block] + row.index;
-            let force = |v: &[f64]| row.answer(problem.dt, v[at]).0;
+        let constraint_changes = island.constraints.iter().map(|&index| {
+            let constraint = &problem.constraints[index];
+            let at = self.offsets[constraint.block] + constraint.index;
+            let force = |v: &[f64]| constraint.force_and_cost(problem.dt, v[at]).0;
             (at, problem.dt * (force(old) - force(new)))
         });
-        self.cache.learn((old, &self.trial_gradient), (new, &self.gradient), by_rows);
+        let before = State { v: old, gradient: &self.trial_gradient };
+        let after = State { v: new, gradient: &self.gradient };
+        self.cache.correct(before, after, constraint_changes);
     }
 }

@@ -1,18 +1,31 @@
-//! Connected islands of a problem, and the factors that they keep between steps.
+//! Connected islands of a problem, and the factors kept for them between steps.
 
-use super::{newton::FACTOR_COST_IN_STEPS, problem::ContactProblem, secant::Secant};
+use super::{
+    options::{FACTOR_COST_IN_STEPS, MAX_CACHED_FACTORS, UNAVOIDABLE_STEPS},
+    problem::ContactProblem,
+    secant::{SecantPairs, State},
+};
 use crate::{geometry::union_find::UnionFind, physics::sparse::dense};
 
 /// The blocks, clusters and constraints of one connected island.
 pub(super) struct Island {
     /// Blocks, ascending.
     pub blocks: Vec<usize>,
-    /// Patches that touch them.
+    /// Contact clusters between them.
     pub clusters: Vec<usize>,
     /// ScalarConstraint rows on them.
     pub constraints: Vec<usize>,
-    /// Velocities in all.
+    /// Total number of velocities.
     pub size: usize,
+}
+
+impl Island {
+    /// Size of the constrained block: the number of velocities from the first one with a scalar constraint to the end.
+    pub(super) fn constrained_size(&self, problem: &ContactProblem, offsets: &[usize]) -> usize {
+        let constraints = self.constraints.iter().map(|&index| &problem.constraints[index]);
+        let first = constraints.map(|c| offsets[c.block] + c.index).min().unwrap_or(self.size);
+        self.size - first
+    }
 }
 
 /// Splits a problem into islands of blocks that clusters connect.
@@ -51,118 +64,114 @@ pub(super) fn islands(problem: &ContactProblem) -> Vec<Island> {
     islands
 }
 
-/// A factored Hessian and what it belongs to.
+/// A factored Hessian of an island.
 #[derive(Clone, Debug, Default)]
-struct Entry {
+struct CachedFactor {
     /// Identity and size of each block.
     key: Vec<(u64, usize)>,
+    /// Cholesky factor down to the constrained block, whose Schur complement it holds; column-major.
     factor: Vec<f64>,
-    sound: bool,
-    secant: Secant,
+    is_valid: bool,
+    secant: SecantPairs,
     /// Steps of the first pass that ended with this factor.
-    first: Option<u32>,
-    /// Steps beyond that many, or beyond [`GOOD_STEPS`], in later passes.
-    wasted: u32,
+    first_steps: Option<u32>,
+    /// Steps of later passes beyond that number, or beyond [`UNAVOIDABLE_STEPS`].
+    excess_steps: u32,
 }
 
-/// Factored Hessians by island, the most recently used first.
+/// Factored Hessians of islands, the most recently used first; the first one is *current*.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Cache {
-    entries: Vec<Entry>,
-    /// CholeskyFactor of the last velocities' complement.
-    tail: Vec<f64>,
+pub(super) struct FactorCache {
+    entries: Vec<CachedFactor>,
+    /// Factor of the constrained block.
+    constrained: Vec<f64>,
 }
 
-/// Steps of a pass that no new factor would spare.
-const GOOD_STEPS: u32 = 4;
-/// Islands whose factors are remembered.
-const REMEMBERED: usize = 6;
-
-impl Cache {
-    /// Whether there is a factor for the island that is worth its steps; it becomes the current one.
+impl FactorCache {
+    /// Selects the factor of an island as the current one. True if it is worth using.
     ///
-    /// A factor that has wasted as many steps as a new one costs is given up, so that altogether never more than twice
-    /// the least is spent, however long each single pass would rather go on with it.
-    pub(super) fn matches(&mut self, problem: &ContactProblem, island: &Island) -> bool {
-        let found = self.entries.iter().position(|entry| same(entry, problem, island));
+    /// A factor whose excess steps cost as much as a new one is discarded. So the total cost is never more than twice the
+    /// least possible, however slowly single passes converge with it.
+    pub(super) fn select(&mut self, problem: &ContactProblem, island: &Island) -> bool {
+        let found = self.entries.iter().position(|entry| entry.is_of(problem, island));
         if let Some(found) = found {
             self.entries[..=found].rotate_right(1);
             let entry = &self.entries[0];
-            return entry.sound && f64::from(entry.wasted) < FACTOR_COST_IN_STEPS;
+            return entry.is_valid && f64::from(entry.excess_steps) < FACTOR_COST_IN_STEPS;
         }
-        if self.entries.len() < REMEMBERED {
-            self.entries.push(Entry::default());
+        if self.entries.len() < MAX_CACHED_FACTORS {
+            self.entries.push(CachedFactor::default());
         }
         self.entries.rotate_right(1);
         let entry = &mut self.entries[0];
         entry.key.clear();
         entry.key.extend(island.blocks.iter().map(|&b| (problem.blocks[b].identity, problem.blocks[b].dim)));
-        entry.sound = false;
+        entry.is_valid = false;
         entry.secant.clear();
         false
     }
 
-    /// The buffer of the current factor, to be filled anew.
+    /// Takes the buffer of the current factor, to be filled with a new Hessian.
     pub(super) fn take(&mut self, island: &Island) -> Vec<f64> {
         let mut factor = std::mem::take(&mut self.entries[0].factor);
         factor.resize(island.size * island.size, 0.0);
         factor
     }
 
-    /// Puts the factored buffer back.
-    pub(super) fn give(&mut self, factor: Vec<f64>, sound: bool) {
+    /// Sets the current factor; `is_valid` if the factorization succeeded.
+    pub(super) fn set(&mut self, factor: Vec<f64>, is_valid: bool) {
         let entry = &mut self.entries[0];
-        (entry.factor, entry.sound) = (factor, sound);
-        (entry.first, entry.wasted) = (None, 0);
+        (entry.factor, entry.is_valid) = (factor, is_valid);
+        (entry.first_steps, entry.excess_steps) = (None, 0);
         entry.secant.clear();
     }
 
-    /// Tells that a pass ended after `steps` with the current factor.
-    pub(super) fn took(&mut self, steps: u32) {
+    /// Records that a pass converged after `steps` with the current factor.
+    pub(super) fn record_pass(&mut self, steps: u32) {
         let entry = &mut self.entries[0];
-        let first = *entry.first.get_or_insert(steps);
-        entry.wasted += steps.saturating_sub(first.min(GOOD_STEPS));
+        let first = *entry.first_steps.get_or_insert(steps);
+        entry.excess_steps += steps.saturating_sub(first.min(UNAVOIDABLE_STEPS));
     }
 
-    /// Solves in place with the current factor, what was learnt since it was made, and `stiffness` added to the diagonal
-    /// of the last velocities, for which the factor was left open.
+    /// Solves in place with the current factor, its corrections, and `stiffness` added to the diagonal of the constrained
+    /// block.
     pub(super) fn solve(&mut self, island: &Island, stiffness: &[f64], b: &mut [f64]) {
         let (n, t) = (island.size, stiffness.len());
-        let (head, tail) = (n - t, &mut self.tail);
+        let (head, constrained) = (n - t, &mut self.constrained);
         let entry = &self.entries[0];
-        tail.clear();
+        constrained.clear();
         for (c, stiffness) in stiffness.iter().enumerate() {
             let start = (head + c) * n + head;
-            tail.extend_from_slice(&entry.factor[start..start + t]);
-            tail[c * t + c] += stiffness;
+            constrained.extend_from_slice(&entry.factor[start..start + t]);
+            constrained[c * t + c] += stiffness;
         }
-        // The complement of a positive definite matrix, made stiffer: it has a factor.
-        dense::partial_cholesky(tail, t, t);
+        // The Schur complement of a positive definite matrix plus stiffness is positive definite: this cannot fail.
+        dense::partial_cholesky(constrained, t, t);
         entry.secant.solve(stiffness, b, |b| {
             dense::forward(&entry.factor, n, head, b);
-            dense::forward(tail, t, t, &mut b[head..]);
-            dense::backward(tail, t, t, &mut b[head..]);
+            dense::forward(constrained, t, t, &mut b[head..]);
+            dense::backward(constrained, t, t, &mut b[head..]);
             dense::backward(&entry.factor, n, head, b);
         });
     }
 
-    /// Corrects the current factor by a step from (`v0`, `g0`) to (`v`, `g`), of which the changes `others` (index,
-    /// amount) are no matter of the factor's.
-    pub(super) fn learn(
+    /// Corrects the current factor by a step, excluding the gradient changes `others` (index, amount), which come from
+    /// constraints not in the factor.
+    pub(super) fn correct(
         &mut self,
-        before: (&[f64], &[f64]),
-        after: (&[f64], &[f64]),
+        before: State,
+        after: State,
         others: impl Iterator<Item = (usize, f64)>,
     ) {
-        self.entries[0].secant.learn(before, after, others);
+        self.entries[0].secant.push(before, after, others);
     }
 }
 
-fn same(entry: &Entry, problem: &ContactProblem, island: &Island) -> bool {
-    entry.key.len() == island.blocks.len()
-        && entry
-            .key
-            .iter()
-            .zip(&island.blocks)
-            .all(|(key, &b)| *key == (problem.blocks[b].identity, problem.blocks[b].dim))
+impl CachedFactor {
+    /// True if the factor belongs to these blocks.
+    fn is_of(&self, problem: &ContactProblem, island: &Island) -> bool {
+        let is_same =
+            |(key, &b): (&(u64, usize), &usize)| *key == (problem.blocks[b].identity, problem.blocks[b].dim);
+        self.key.len() == island.blocks.len() && self.key.iter().zip(&island.blocks).all(is_same)
+    }
 }

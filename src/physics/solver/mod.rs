@@ -1,11 +1,14 @@
-//! One convex solve for everything that touches: blocks of generalised velocity and rows between them.
+//! One convex solve for everything that touches: blocks of generalised velocities, contact points between them, and scalar
+//! constraints.
 //!
 //! Minimises `½ vᵀA v − rᵀv + Σ ℓ(J v)` over the velocities of all blocks, after Castro, Permenter & Han, "An Unconstrained
-//! Convex Formulation of Compliant Contact" (2022), with two changes: the tangential rows are springs to a remembered
-//! stick anchor, so that a held object does not creep, and the friction bound is previous_normal_impulse (`|γ_t| ≤ μ γ_n` with `γ_n` of the
-//! pass before), so that a sliding surface is not pushed away and the problem stays convex. Drives, limits and joint
-//! friction are scalar rows of the same solve. The solver names no kind of body: a *block* is a symmetric positive definite
-//! matrix with a right-hand side, a *cluster* is a set of contact samples between two endpoints.
+//! Convex Formulation of Compliant Contact" (2022), with two changes. The tangential springs are attached to a stick anchor
+//! that persists between steps, so that a held object does not creep. And the friction bound is lagged (`|γ_t| ≤ μ γ_n` with
+//! `γ_n` of the previous pass), so that friction does not lift a sliding surface and the problem stays convex. Drives, limits
+//! and joint friction are scalar constraints of the same solve.
+//!
+//! The solver does not depend on the kinds of bodies: a [`VelocityBlock`] is a symmetric positive definite matrix with a
+//! right-hand side, a [`ContactCluster`] a set of contact points between two endpoints.
 
 mod assemble;
 mod cost;
@@ -13,6 +16,7 @@ mod direction;
 mod island;
 mod law;
 mod newton;
+mod options;
 mod problem;
 mod secant;
 

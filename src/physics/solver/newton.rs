@@ -1,116 +1,134 @@
-//! Newton's method with an exact line search on each island, and the previous_normal_impulse passes around it.
+//! Newton's method with an exact line search on each island, and the lagged passes around it.
 
 use super::{
     assemble::{ClusterHessian, DofMap},
-    direction::tail,
-    island::{Cache, Island, islands},
+    cost::PassChange,
+    island::{FactorCache, Island, islands},
     law::{ConstraintResponse, LinearSegment},
+    options::{
+        ABSOLUTE_TOLERANCE, FACTOR_COST_IN_STEPS, MAX_NEWTON, MAX_PASSES, PASS_TOLERANCE,
+        REFACTOR_EVERY_STEP_AFTER, RELATIVE_TOLERANCE, STALE_FACTOR_TRIAL,
+    },
     problem::ContactProblem,
 };
 use crate::{geometry::Vec3, physics::sparse::dense};
 
-/// Convergence of the gradient relative to the momenta in play (both scaled by `diag(A)^-1/2`).
-const RELATIVE: f64 = 1e-5;
-/// Convergence in absolute terms, √J.
-const ABSOLUTE: f64 = 1e-10;
-/// Most Newton steps a pass.
-const MAX_NEWTON: u32 = 240;
-/// Newton steps after which every one gets a factor of its own: with many stiff points that open and close, what old factors
-/// were taught may lead nowhere.
-const REFACTOR_EVERY_STEP_AFTER: u32 = 60;
-/// Most previous_normal_impulse passes.
-const MAX_PASSES: usize = 3;
-/// Change of the normal impulses that ends the passes.
-const PASS_CHANGE: f64 = 0.01;
-
-/// A new factor costs about as much as this many steps with the old one.
-pub(super) const FACTOR_COST_IN_STEPS: f64 = 8.0;
-/// Steps after which an old factor, corrected by what they taught, is judged.
-const STALE_FACTOR_TRIAL: u32 = 2;
-
-/// What a solve took.
+/// Iteration counts of a solve.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SolverStats {
-    /// Newton steps over all passes and islands.
-    pub newton: u32,
-    /// Most Newton steps of one island.
-    pub newton_max: u32,
-    /// Hessians factored; the other steps used an old factor.
-    pub factored: u32,
+    /// Newton steps of all passes and islands.
+    pub newton_steps: u32,
+    /// Newton steps of the island with most of them.
+    pub max_newton_steps: u32,
+    /// Factored Hessians; the other steps used an existing factor.
+    pub factorizations: u32,
 }
 
-/// The solve did not converge: which block, and how far it was.
-#[derive(Clone, Debug, PartialEq)]
+/// The solve did not converge.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("the island of block {block} did not converge: residual {residual_ratio:.1e} times the tolerance")]
 pub struct SolverFailure {
-    /// A block of the island that failed.
+    /// The first block of the island that failed.
     pub block: usize,
-    /// Scaled gradient over tolerance.
+    /// Norm of the scaled gradient over the tolerance.
     pub residual_ratio: f64,
 }
 
-/// Buffers of the solver.
+/// The solver: buffers, and factors kept from one problem to the next.
+///
+/// A clone continues identically. Results depend on the sequence of problems, since kept factors decide on the path of
+/// convergence within the tolerance.
 #[derive(Clone, Debug, Default)]
 pub struct Solver {
+    /// First index of each block in the vectors of its island.
     pub(super) offsets: Vec<usize>,
     pub(super) v: Vec<f64>,
     pub(super) trial: Vec<f64>,
     pub(super) step: Vec<f64>,
     pub(super) gradient: Vec<f64>,
     pub(super) trial_gradient: Vec<f64>,
+    /// `A v`.
     pub(super) product: Vec<f64>,
+    /// `diag(A)^-1/2`.
     scale: Vec<f64>,
-    pub(super) cache: Cache,
-    /// The segment on which each scalar row of the island is taken to end.
+    pub(super) cache: FactorCache,
+    /// Segment on which each scalar constraint of the island is assumed to end.
     pub(super) segments: Vec<LinearSegment>,
-    /// Curvature of the scalar rows at the island's last velocities.
+    /// Curvature of the scalar constraints on the velocities of the constrained block.
     pub(super) stiffness: Vec<f64>,
     pub(super) local: ClusterHessian,
     pub(super) map: DofMap,
-    /// Velocities and answers of one cluster.
+    /// Velocities and responses of one cluster.
     pub(super) solved: Vec<(Vec3, Option<ConstraintResponse>)>,
-    factored: u32,
+    factorizations: u32,
+}
+
+/// Convergence with the current factor.
+#[derive(Clone, Copy)]
+struct Progress {
+    steps: u32,
+    /// Residual over tolerance before the first of these steps.
+    initial_ratio: f64,
+}
+
+impl Progress {
+    /// Number of steps to convergence if they continue at the same rate.
+    fn remaining_steps(&self, ratio: f64) -> f64 {
+        if ratio <= 1.0 {
+            return 0.0;
+        }
+        let gained = (self.initial_ratio / ratio).ln();
+        if gained > 0.0 { f64::from(self.steps) * ratio.ln() / gained } else { f64::INFINITY }
+    }
 }
 
 impl Solver {
-    /// Solves the problem in place: velocities in the blocks, impulses in points and constraints.
+    /// Solves the problem in place: writes velocities into the blocks, impulses into points and forces into constraints.
+    ///
+    /// # Errors
+    /// An island did not converge, which happens if a block is not positive definite or a value is not finite. The results
+    /// are void then.
     pub fn solve(&mut self, problem: &mut ContactProblem) -> Result<SolverStats, SolverFailure> {
         let mut stats = SolverStats::default();
-        self.factored = 0;
+        self.factorizations = 0;
         for island in islands(problem) {
-            let taken = self.solve_island(problem, &island)?;
-            stats.newton += taken;
-            stats.newton_max = stats.newton_max.max(taken);
+            let steps = self.solve_island(problem, &island)?;
+            stats.newton_steps += steps;
+            stats.max_newton_steps = stats.max_newton_steps.max(steps);
         }
-        stats.factored = self.factored;
+        stats.factorizations = self.factorizations;
         Ok(stats)
     }
 
+    /// Solves one island; returns the number of Newton steps.
     fn solve_island(&mut self, problem: &mut ContactProblem, island: &Island) -> Result<u32, SolverFailure> {
         self.prepare(problem, island);
-        let mut taken = 0;
+        let mut steps = 0;
         for pass in 0..MAX_PASSES {
-            taken += self.newton(problem, island)?;
-            let (change, total) = self.record(problem, island);
-            if change <= PASS_CHANGE * total {
+            steps += self.newton(problem, island)?;
+            let PassChange { change, total } = self.record(problem, island);
+            if change <= PASS_TOLERANCE * total {
                 break;
             }
             if pass + 1 < MAX_PASSES {
-                island_points(problem, island).into_iter().for_each(|range| {
-                    problem.points[range]
-                        .iter_mut()
-                        .for_each(|p| p.previous_normal_impulse = p.normal_impulse);
-                });
+                for &cluster in &island.clusters {
+                    let cluster = problem.clusters[cluster];
+                    for point in &mut problem.points[cluster.first..cluster.last] {
+                        point.previous_normal_impulse = point.normal_impulse;
+                    }
+                }
             }
         }
         for &block in &island.blocks {
             let (start, dim) = (self.offsets[block], problem.blocks[block].dim);
             problem.blocks[block].v.copy_from_slice(&self.v[start..start + dim]);
         }
-        for &row in &island.constraints {
-            let scalar = &mut problem.constraints[row];
-            scalar.force = scalar.answer(problem.dt, self.v[self.offsets[scalar.block] + scalar.index]).0;
+        for &index in &island.constraints {
+            let constraint = &mut problem.constraints[index];
+            let v = self.v[self.offsets[constraint.block] + constraint.index];
+            constraint.force = constraint.force_and_cost(problem.dt, v).0;
         }
-        Ok(taken)
+        Ok(steps)
     }
 
     fn prepare(&mut self, problem: &ContactProblem, island: &Island) {
@@ -130,53 +148,53 @@ impl Solver {
         }
     }
 
-    /// Newton's method for one pass; the number of steps taken.
+    /// Newton's method for one pass; returns the number of steps.
     ///
-    /// The cost is piecewise quadratic and mostly the same from step to step, so an old factor of its Hessian is used
-    /// for as long as that is cheaper than a new one; the gradient itself is always exact.
+    /// The cost is piecewise quadratic and changes little from step to step, so an existing factor of its Hessian is used
+    /// for as long as that is cheaper than a new one. The gradient is always exact.
     fn newton(&mut self, problem: &ContactProblem, island: &Island) -> Result<u32, SolverFailure> {
-        let mut cost = self.gradient_at_v(problem, island);
-        let mut residual_ratio = self.residual_ratio(problem, island);
-        let mut usable = self.cache.matches(problem, island);
-        // Steps with this factor, and the residual_ratio before them.
-        let mut since = (0, residual_ratio);
-        for taken in 0..MAX_NEWTON {
-            if residual_ratio <= 1.0 {
-                self.cache.took(since.0);
-                return Ok(taken);
+        let mut cost = self.update_gradient(problem, island);
+        let mut ratio = self.residual_ratio(problem, island);
+        let mut has_factor = self.cache.select(problem, island);
+        let mut progress = Progress { steps: 0, initial_ratio: ratio };
+        for step in 0..MAX_NEWTON {
+            if ratio <= 1.0 {
+                self.cache.record_pass(progress.steps);
+                return Ok(step);
             }
-            let fresh = !usable;
-            if fresh && !(residual_ratio.is_finite() && self.refactor(problem, island)) {
+            let is_new = !has_factor;
+            if is_new && !(ratio.is_finite() && self.refactor(problem, island)) {
                 break;
             }
-            if fresh {
-                since = (0, residual_ratio);
+            if is_new {
+                progress = Progress { steps: 0, initial_ratio: ratio };
             }
             self.find_step(problem, island);
             let Some(lower) = self.line_search(problem, island, cost) else {
-                if !fresh {
-                    usable = false;
+                if !is_new {
+                    has_factor = false;
                     continue;
                 }
-                // No descent left in floating point: as converged as it can be if it is near.
-                return if residual_ratio < 1e3 {
-                    Ok(taken)
+                // No descent is left in floating point: converged to its precision if the residual is small already.
+                return if ratio < 1e3 {
+                    Ok(step)
                 } else {
-                    Err(SolverFailure { block: island.blocks[0], residual_ratio })
+                    Err(SolverFailure { block: island.blocks[0], residual_ratio: ratio })
                 };
             };
             cost = lower;
-            self.learn(problem, island);
-            residual_ratio = self.residual_ratio(problem, island);
-            since.0 += 1;
-            usable = taken + 1 < REFACTOR_EVERY_STEP_AFTER
-                && (since.0 < STALE_FACTOR_TRIAL || steps_left(since, residual_ratio) < FACTOR_COST_IN_STEPS);
+            self.correct_factor(problem, island);
+            ratio = self.residual_ratio(problem, island);
+            progress.steps += 1;
+            has_factor = step + 1 < REFACTOR_EVERY_STEP_AFTER
+                && (progress.steps < STALE_FACTOR_TRIAL
+                    || progress.remaining_steps(ratio) < FACTOR_COST_IN_STEPS);
         }
-        Err(SolverFailure { block: island.blocks[0], residual_ratio })
+        Err(SolverFailure { block: island.blocks[0], residual_ratio: ratio })
     }
 
-    /// Cost and gradient at the present velocities.
-    fn gradient_at_v(&mut self, problem: &ContactProblem, island: &Island) -> f64 {
+    /// Updates the gradient at the current velocities; returns the cost.
+    fn update_gradient(&mut self, problem: &ContactProblem, island: &Island) -> f64 {
         let v = std::mem::take(&mut self.v);
         let mut gradient = std::mem::take(&mut self.gradient);
         let cost = self.evaluate(problem, island, &v, &mut gradient);
@@ -184,21 +202,21 @@ impl Solver {
         cost
     }
 
-    /// Assembles the Hessian at the present velocities and factors it down to the velocities with scalar rows.
+    /// Factors the Hessian at the current velocities down to the constrained block. False if it is not positive definite.
     fn refactor(&mut self, problem: &ContactProblem, island: &Island) -> bool {
         let mut hessian = self.cache.take(island);
         let v = std::mem::take(&mut self.v);
         self.assemble_hessian(problem, island, &v, &mut hessian);
         self.v = v;
         let n = island.size;
-        let tail = tail(problem, &self.offsets, island);
-        let sound = dense::partial_cholesky(&mut hessian[..n * n], n, n - tail);
-        self.cache.give(hessian, sound);
-        self.factored += 1;
-        sound
+        let constrained = island.constrained_size(problem, &self.offsets);
+        let is_definite = dense::partial_cholesky(&mut hessian[..n * n], n, n - constrained);
+        self.cache.set(hessian, is_definite);
+        self.factorizations += 1;
+        is_definite
     }
 
-    /// Scaled gradient over tolerance.
+    /// Norm of the scaled gradient over the tolerance.
     fn residual_ratio(&self, problem: &ContactProblem, island: &Island) -> f64 {
         let norm =
             |values: &[f64]| values.iter().zip(&self.scale).map(|(g, s)| (g * s).powi(2)).sum::<f64>().sqrt();
@@ -209,11 +227,12 @@ impl Solver {
             rhs += b.rhs.iter().zip(&self.scale[start..]).map(|(r, s)| (r * s).powi(2)).sum::<f64>();
         }
         let momentum = rhs.sqrt().max(norm(&self.product));
-        norm(&self.gradient) / (RELATIVE * momentum + ABSOLUTE)
+        norm(&self.gradient) / (RELATIVE_TOLERANCE * momentum + ABSOLUTE_TOLERANCE)
     }
 
-    /// Moves along `step` to a lower cost, which it returns with the gradient there: the full step if it is good, else
-    /// the minimum on the line.
+    /// Moves along `step` to a lower cost: by the full step if that descends enough, else to the minimum on the line.
+    ///
+    /// Returns the new cost; the gradient there is in `gradient`. `None` if no descent was found.
     fn line_search(&mut self, problem: &ContactProblem, island: &Island, cost: f64) -> Option<f64> {
         let slope: f64 = self.gradient.iter().zip(&self.step).map(|(g, s)| g * s).sum();
         if slope.is_nan() || slope >= 0.0 {
@@ -224,9 +243,9 @@ impl Solver {
         for _ in 0..40 {
             let along;
             (value, along) = self.probe(problem, island, at);
-            let enough = value <= cost + 1e-4 * at * slope;
-            // Beyond the full step the model is exact enough: take it.
-            if enough && (along.abs() <= 0.3 * slope.abs() || along <= 0.0) {
+            let descends = value <= cost + 1e-4 * at * slope;
+            // At a slope this small, or still downhill, the model is accurate enough to take the step.
+            if descends && (along.abs() <= 0.3 * slope.abs() || along <= 0.0) {
                 break;
             }
             if along > 0.0 || !value.is_finite() {
@@ -247,7 +266,7 @@ impl Solver {
         Some(value)
     }
 
-    /// Cost and slope at `v + at · step`; leaves that point in `trial`.
+    /// Cost and slope at `v + at · step`, which is left in `trial`.
     fn probe(&mut self, problem: &ContactProblem, island: &Island, at: f64) -> (f64, f64) {
         self.trial.iter_mut().zip(&self.v).zip(&self.step).for_each(|((t, v), s)| *t = v + at * s);
         let trial = std::mem::take(&mut self.trial);
@@ -257,17 +276,4 @@ impl Solver {
         (self.trial, self.trial_gradient) = (trial, gradient);
         (value, along)
     }
-}
-
-/// Steps to convergence if they go on like the ones since then, which began at the residual_ratio `before`.
-fn steps_left((steps, before): (u32, f64), after: f64) -> f64 {
-    if after <= 1.0 {
-        return 0.0;
-    }
-    let gained = (before / after).ln();
-    if gained > 0.0 { f64::from(steps) * after.ln() / gained } else { f64::INFINITY }
-}
-
-fn island_points(problem: &ContactProblem, island: &Island) -> Vec<std::ops::Range<usize>> {
-    island.clusters.iter().map(|&i| problem.clusters[i].first..problem.clusters[i].last).collect()
 }

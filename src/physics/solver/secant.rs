@@ -1,16 +1,21 @@
-//! What the last steps say about the difference between a kept factor and the present Hessian.
+//! Quasi-Newton correction of a kept factor from the last steps.
 //!
-//! Contacts that have begun to slip since the factor was made change the Hessian by a matrix of low rank, which a few
+//! Contacts that have begun to slip since the factor was computed change the Hessian by a matrix of low rank, which a few
 //! secant pairs capture: limited-memory BFGS (Nocedal 1980) with the factor in the place of the initial matrix.
 
+use super::options::MAX_SECANT_PAIRS;
 use crate::physics::sparse::dense::dot;
 
-/// Pairs remembered.
-const PAIRS: usize = 8;
+/// Velocities and the gradient of the cost there.
+#[derive(Clone, Copy)]
+pub(super) struct State<'a> {
+    pub v: &'a [f64],
+    pub gradient: &'a [f64],
+}
 
 /// A step and the change of the gradient along it.
 #[derive(Clone, Debug)]
-struct Pair {
+struct SecantPair {
     step: Vec<f64>,
     change: Vec<f64>,
     curvature: f64,
@@ -18,51 +23,46 @@ struct Pair {
 
 /// The last pairs, oldest first.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Secant {
-    pairs: Vec<Pair>,
+pub(super) struct SecantPairs {
+    pairs: Vec<SecantPair>,
     used: usize,
 }
 
-impl Secant {
-    /// Forgets all pairs: the factor is new.
+impl SecantPairs {
+    /// Discards all pairs, after a new factorization.
     pub(super) fn clear(&mut self) {
         self.used = 0;
     }
 
-    /// Learns from a step from (`v0`, `g0`) to (`v`, `g`), of which the changes `others` (index, amount) of the gradient
-    /// are not to be learnt.
-    pub(super) fn learn(
-        &mut self,
-        (v0, g0): (&[f64], &[f64]),
-        (v, g): (&[f64], &[f64]),
-        others: impl Iterator<Item = (usize, f64)>,
-    ) {
-        if self.used == PAIRS {
+    /// Adds the pair of a step, excluding the gradient changes `others` (index, amount), which come from constraints that
+    /// are not in the factor.
+    pub(super) fn push(&mut self, before: State, after: State, others: impl Iterator<Item = (usize, f64)>) {
+        if self.used == MAX_SECANT_PAIRS {
             self.pairs.rotate_left(1);
             self.used -= 1;
         }
         if self.used == self.pairs.len() {
-            self.pairs.push(Pair { step: Vec::new(), change: Vec::new(), curvature: 0.0 });
+            self.pairs.push(SecantPair { step: Vec::new(), change: Vec::new(), curvature: 0.0 });
         }
         let pair = &mut self.pairs[self.used];
         pair.step.clear();
-        pair.step.extend(v.iter().zip(v0).map(|(v, v0)| v - v0));
+        pair.step.extend(after.v.iter().zip(before.v).map(|(v, v0)| v - v0));
         pair.change.clear();
-        pair.change.extend(g.iter().zip(g0).map(|(g, g0)| g - g0));
+        pair.change.extend(after.gradient.iter().zip(before.gradient).map(|(g, g0)| g - g0));
         others.for_each(|(at, amount)| pair.change[at] -= amount);
         pair.curvature = dot(&pair.step, &pair.change);
-        // The cost is convex: anything else is rounding.
+        // The cost is convex, so a curvature below this is rounding.
         let floor = 1e-12 * (dot(&pair.step, &pair.step) * dot(&pair.change, &pair.change)).sqrt();
         if pair.curvature > floor {
             self.used += 1;
         }
     }
 
-    /// Solves with the corrected factor in place; `solve` does so with the factor itself. The factor holds `stiffness`
-    /// on the diagonal of the last velocities, which the pairs do not know of.
+    /// Solves with the corrected factor in place (the two-loop recursion); `solve` solves with the factor itself, which
+    /// includes `stiffness` on the diagonal of the last velocities. The pairs do not include it.
     pub(super) fn solve(&self, stiffness: &[f64], b: &mut [f64], solve: impl FnOnce(&mut [f64])) {
         let head = b.len() - stiffness.len();
-        let (mut weights, mut curvatures) = ([0.0; PAIRS], [0.0; PAIRS]);
+        let (mut weights, mut curvatures) = ([0.0; MAX_SECANT_PAIRS], [0.0; MAX_SECANT_PAIRS]);
         let pairs = self.pairs[..self.used].iter();
         for ((pair, weight), curvature) in pairs.clone().zip(&mut weights).zip(&mut curvatures).rev() {
             let tail = || pair.step[head..].iter().zip(stiffness);
@@ -86,21 +86,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn with_exact_pairs_of_every_changed_direction_the_solve_is_exact() {
+    fn exact_pairs_of_every_changed_direction_make_the_solve_exact() {
         // The Hessian is diagonal, the factor is the identity: as many pairs as entries that differ.
         let hessian = [1.0, 5.0, 0.25, 1.0, 3.0];
-        let mut secant = Secant::default();
+        let mut pairs = SecantPairs::default();
         for i in [1, 2, 4] {
             let v: [f64; 5] = std::array::from_fn(|j| if i == j { 0.7 } else { 0.0 });
             let g: [f64; 5] = std::array::from_fn(|j| hessian[j] * v[j]);
-            // What a stiffness of 7 on the last entry adds is not to be learnt.
+            // The contribution of a stiffness of 7 on the last entry is excluded.
             let all: [f64; 5] = std::array::from_fn(|j| g[j] + if j == 4 { 7.0 * v[j] } else { 0.0 });
-            secant.learn((&[0.0; 5], &[0.0; 5]), (&v, &all), [(4, 7.0 * v[4])].into_iter());
+            let before = State { v: &[0.0; 5], gradient: &[0.0; 5] };
+            pairs.push(before, State { v: &v, gradient: &all }, [(4, 7.0 * v[4])].into_iter());
         }
         let mut b = [1.0, 2.0, 3.0, 4.0, 5.0];
         let full = [1.0, 5.0, 0.25, 1.0, 3.0 + 2.0];
         let exact: [f64; 5] = std::array::from_fn(|i| b[i] / full[i]);
-        secant.solve(&[2.0], &mut b, |b| b[4] /= 1.0 + 2.0);
+        pairs.solve(&[2.0], &mut b, |b| b[4] /= 1.0 + 2.0);
         assert!(b.iter().zip(exact).all(|(b, e)| (b - e).abs() < 1e-14), "{b:?}");
     }
 }

@@ -1,19 +1,25 @@
-//! Dense Cholesky on column-major storage: the kernels under the sparse factor and the contact solve.
+//! Dense Cholesky kernels on column-major storage, for the fronts of the sparse factor and for the contact solve.
 //!
-//! Products are added by `mul_add`, which is exactly rounded on every machine, so the bytes are the same everywhere.
+//! Products are added by `mul_add`, which is exactly rounded on every machine, and sums have a fixed order, so the results
+//! are the same bits everywhere.
 
-/// Columns factored between two updates of everything to their right.
+use std::ops::Range;
+
+/// Columns factored between two updates of all columns to their right.
 const PANEL: usize = 32;
 /// Columns factored between two updates of the rest of their panel.
 const STRIP: usize = 8;
-/// Rows and columns of the register tile of the update.
+/// Rows of the register tile of the update.
 const ROWS: usize = 12;
+/// Columns of the register tile of the update.
 const COLUMNS: usize = 4;
-/// Columns that the triangular sweeps and products take at once, so that the vector is read and written less often.
+/// Columns processed at once by triangular solves and products, so that the vector is loaded and stored less often.
 const WIDE: usize = 4;
 
-/// Factors the first `k` columns of the lower triangle of the `n × n` matrix `a` in place and updates the rest:
-/// afterwards those columns hold `L`, the trailing block its Schur complement. `false` if a pivot is not positive.
+/// Factors the first `k` columns of the `n × n` matrix `a` (column-major, lower triangle) in place.
+///
+/// Afterwards those columns hold `L` and the trailing block its Schur complement. Returns false if a pivot is not positive;
+/// `a` is void then. The upper triangle is neither read nor preserved.
 pub fn partial_cholesky(a: &mut [f64], n: usize, k: usize) -> bool {
     let mut packed = Vec::with_capacity(PANEL * n.next_multiple_of(ROWS));
     for start in (0..k).step_by(PANEL) {
@@ -23,9 +29,9 @@ pub fn partial_cholesky(a: &mut [f64], n: usize, k: usize) -> bool {
             if !factor_strip(a, n, strip, strip_end) {
                 return false;
             }
-            update(a, n, (strip, strip_end), end, &mut packed);
+            update(a, n, strip..strip_end, end, &mut packed);
         }
-        update(a, n, (start, end), n, &mut packed);
+        update(a, n, start..end, n, &mut packed);
     }
     true
 }
@@ -49,9 +55,10 @@ fn factor_strip(a: &mut [f64], n: usize, start: usize, end: usize) -> bool {
     true
 }
 
-/// Subtracts `L Lᵀ` of columns `start..end` from the lower triangle of columns `end..last`; may write above the diagonal,
-/// which nobody reads.
-fn update(a: &mut [f64], n: usize, (start, end): (usize, usize), last: usize, packed: &mut Vec<f64>) {
+/// Subtracts `L Lᵀ` of `columns` from the lower triangle of the columns up to `last`. It may write above the diagonal, which
+/// is never read.
+fn update(a: &mut [f64], n: usize, columns: Range<usize>, last: usize, packed: &mut Vec<f64>) {
+    let Range { start, end } = columns;
     if end >= last {
         return;
     }
@@ -59,7 +66,7 @@ fn update(a: &mut [f64], n: usize, (start, end): (usize, usize), last: usize, pa
     let (panel, rest) = a.split_at_mut(end * n);
     pack(&panel[start * n..], n, end, packed);
     for column in (end..last).step_by(COLUMNS) {
-        let columns = COLUMNS.min(last - column);
+        let width = COLUMNS.min(last - column);
         let (first, offset) = ((column - end) / ROWS, (column - end) % ROWS);
         let right = &packed[first * ROWS * depth..(first + 1) * ROWS * depth];
         for (index, left) in packed.chunks_exact(ROWS * depth).enumerate().skip(first) {
@@ -70,7 +77,7 @@ fn update(a: &mut [f64], n: usize, (start, end): (usize, usize), last: usize, pa
                 _ => tile::<{ 2 * COLUMNS }>(left, right),
             };
             let rows = ROWS.min(n - row);
-            for (c, sum) in sum.iter().enumerate().take(columns) {
+            for (c, sum) in sum.iter().enumerate().take(width) {
                 let at = (column - end + c) * n + row;
                 rest[at..at + rows].iter_mut().zip(sum).for_each(|(x, s)| *x -= s);
             }
@@ -78,7 +85,7 @@ fn update(a: &mut [f64], n: usize, (start, end): (usize, usize), last: usize, pa
     }
 }
 
-/// Copies rows `from..n` of a panel into stripes of [`ROWS`] rows, column after column, filled up with zeros.
+/// Copies rows `from..n` of a panel into stripes of [`ROWS`] rows, column by column, padded with zeros.
 fn pack(panel: &[f64], n: usize, from: usize, packed: &mut Vec<f64>) {
     packed.clear();
     for row in (from..n).step_by(ROWS) {
@@ -90,7 +97,7 @@ fn pack(panel: &[f64], n: usize, from: usize, packed: &mut Vec<f64>) {
     }
 }
 
-/// `A[12×k] B[4×k]ᵀ` in registers, where `B` is the rows from `OFFSET` on of the stripe `right`.
+/// `A[12×k] B[4×k]ᵀ` in registers, where `B` is the four rows from `OFFSET` of the stripe `right`.
 fn tile<const OFFSET: usize>(left: &[f64], right: &[f64]) -> [[f64; ROWS]; COLUMNS] {
     let mut sum = [[0.0; ROWS]; COLUMNS];
     for (a, b) in left.as_chunks::<ROWS>().0.iter().zip(right.as_chunks::<ROWS>().0) {
@@ -103,12 +110,12 @@ fn tile<const OFFSET: usize>(left: &[f64], right: &[f64]) -> [[f64; ROWS]; COLUM
     sum
 }
 
-/// [`WIDE`] neighbouring columns of a matrix from row `from` to its end.
-fn wide(a: &[f64], n: usize, column: usize, from: usize) -> [&[f64]; WIDE] {
+/// [`WIDE`] adjacent columns of a matrix, from row `from` to the end.
+fn wide_columns(a: &[f64], n: usize, column: usize, from: usize) -> [&[f64]; WIDE] {
     std::array::from_fn(|c| &a[(column + c) * n + from..(column + c + 1) * n])
 }
 
-/// Solves `L y = b` in place for the first `k` columns of `l` (`n` rows), then subtracts their part from `b[k..n]`.
+/// Solves `L y = b` in place for the first `k` columns of `l` (`n` rows), and subtracts their contribution from `b[k..n]`.
 pub fn forward(l: &[f64], n: usize, k: usize, b: &mut [f64]) {
     let mut j = 0;
     while j + WIDE <= k {
@@ -116,7 +123,7 @@ pub fn forward(l: &[f64], n: usize, k: usize, b: &mut [f64]) {
             b[c] /= l[c * n + c];
             (c + 1..j + WIDE).for_each(|r| b[r] -= b[c] * l[c * n + r]);
         }
-        let [l0, l1, l2, l3] = wide(l, n, j, j + WIDE);
+        let [l0, l1, l2, l3] = wide_columns(l, n, j, j + WIDE);
         let (y0, y1, y2, y3) = (b[j], b[j + 1], b[j + 2], b[j + 3]);
         let tail = b[j + WIDE..n].iter_mut().zip(l0).zip(l1).zip(l2).zip(l3);
         tail.for_each(|((((b, l0), l1), l2), l3)| {
@@ -140,7 +147,7 @@ pub fn backward(l: &[f64], n: usize, k: usize, x: &mut [f64]) {
         x[j] = (x[j] - dot(&l[j * n + j + 1..(j + 1) * n], &x[j + 1..n])) / l[j * n + j];
     }
     for j in (0..whole).step_by(WIDE).rev() {
-        let dot = dots(wide(l, n, j, j + WIDE), &x[j + WIDE..n]);
+        let dot = dot_columns(wide_columns(l, n, j, j + WIDE), &x[j + WIDE..n]);
         for c in (0..WIDE).rev() {
             let column = &l[(j + c) * n + j..(j + c) * n + j + WIDE];
             let mut rest = x[j + c] - dot[c];
@@ -152,7 +159,7 @@ pub fn backward(l: &[f64], n: usize, k: usize, x: &mut [f64]) {
     }
 }
 
-/// Dot product in four fixed lanes: one order on every machine, and fast.
+/// Dot product in four lanes: a fixed order of summation that vectorises.
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
     let mut lanes = [0.0; 4];
@@ -163,8 +170,8 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]) + rest
 }
 
-/// Dot products of [`WIDE`] columns with `x`, all at once.
-fn dots([a, b, c, d]: [&[f64]; WIDE], x: &[f64]) -> [f64; WIDE] {
+/// Dot products of [`WIDE`] columns with `x`.
+fn dot_columns([a, b, c, d]: [&[f64]; WIDE], x: &[f64]) -> [f64; WIDE] {
     let mut lanes = [[0.0; 4]; WIDE];
     let whole = x.len() - x.len() % 4;
     let chunks = |values| <[f64]>::as_chunks::<4>(values).0;
@@ -186,13 +193,13 @@ fn dots([a, b, c, d]: [&[f64]; WIDE], x: &[f64]) -> [f64; WIDE] {
     sums
 }
 
-/// `y = A x` for a symmetric matrix of which only the lower triangle is stored.
+/// `y = A x` for a symmetric matrix of which only the lower triangle is read.
 pub fn symmetric_multiply(a: &[f64], n: usize, x: &[f64], y: &mut [f64]) {
     y[..n].fill(0.0);
     let whole = n - n % WIDE;
     for j in (0..whole).step_by(WIDE) {
-        let columns = wide(a, n, j, j + WIDE);
-        let dot = dots(columns, &x[j + WIDE..n]);
+        let columns = wide_columns(a, n, j, j + WIDE);
+        let dot = dot_columns(columns, &x[j + WIDE..n]);
         for c in j..j + WIDE {
             y[c] += dot[c - j] + a[c * n + c] * x[c];
             for r in c + 1..j + WIDE {
@@ -275,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn an_indefinite_matrix_is_refused() {
+    fn an_indefinite_matrix_is_rejected() {
         assert!(!partial_cholesky(&mut [1.0, 2.0, 2.0, 1.0], 2, 2));
     }
 }

@@ -1,12 +1,12 @@
-//! Nested dissection of a voxel lattice (George 1973): planes of nodes split it in halves that do not touch.
+//! Nested dissection of a voxel lattice (George 1973): planes of nodes separate it into halves that are not coupled.
 //!
-//! On lattices of some hundred to some thousand nodes with few kept ones this needs half of the operations that
-//! approximate minimum degree does, since a plane is the smallest separator that there is.
+//! On lattices of hundreds to thousands of nodes, of which few are retained, this needs half of the operations of approximate
+//! minimum degree, since a plane is the smallest separator of a lattice.
 
 /// Parts with at most this many nodes are not split further.
 const LEAF: usize = 8;
 
-/// Puts `nodes` in an elimination order: both halves first, then the plane between them.
+/// Sorts `nodes` into elimination order: both halves first, then the plane between them. `places` are lattice coordinates.
 pub(super) fn order(nodes: &mut [u32], places: &[[i32; 3]]) {
     if nodes.len() <= LEAF {
         return;
@@ -14,20 +14,20 @@ pub(super) fn order(nodes: &mut [u32], places: &[[i32; 3]]) {
     let place = |node: u32, axis: usize| places[node as usize][axis];
     let range = |axis: usize| {
         let all = nodes.iter().map(|&node| place(node, axis));
-        all.fold((i32::MAX, i32::MIN), |(least, most), at| (least.min(at), most.max(at)))
+        all.fold((i32::MAX, i32::MIN), |(min, max), at| (min.min(at), max.max(at)))
     };
     let extents = [0, 1, 2].map(range);
     let width = |axis: usize| extents[axis].1 - extents[axis].0;
     let axis = (0..3).rev().max_by_key(|&axis| width(axis)).unwrap_or(0);
-    let (least, most) = extents[axis];
-    if most - least < 2 {
+    let (min, max) = extents[axis];
+    if max - min < 2 {
         return;
     }
     let mut along: Vec<i32> = nodes.iter().map(|&node| place(node, axis)).collect();
     along.sort_unstable();
-    // The plane through the median has about half of the nodes on either side, and both sides have some.
-    let plane = along[along.len() / 2].clamp(least + 1, most - 1);
-    // Stable, so that the order does not depend on how the sort is done.
+    // The plane through the median leaves about half of the nodes on either side, and at least one on each.
+    let plane = along[along.len() / 2].clamp(min + 1, max - 1);
+    // A stable sort, so that the order does not depend on the sorting algorithm.
     nodes.sort_by_key(|&node| match place(node, axis).cmp(&plane) {
         std::cmp::Ordering::Less => 0,
         std::cmp::Ordering::Greater => 1,
@@ -45,7 +45,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_first_split_leaves_two_halves_that_do_not_touch() {
+    fn the_first_split_leaves_two_uncoupled_halves() {
         let places: Vec<[i32; 3]> = (0..7 * 5 * 4).map(|i| [i % 7, i / 7 % 5, i / 35]).collect();
         let mut nodes: Vec<u32> = (0..places.len() as u32).collect();
         order(&mut nodes, &places);

@@ -1,8 +1,8 @@
-//! The numbers of a factor: assembly front by front, elimination, and the two triangular sweeps.
+//! Numeric factorization: assembly of the fronts, elimination, and the triangular solves.
 
 use super::{SymbolicFactor, dense};
 
-/// A refillable factor of one [`SymbolicFactor`] plan.
+/// Cholesky factor of a block matrix, for one [`SymbolicFactor`] at a time. Its buffers are reused.
 #[derive(Clone, Debug, Default)]
 pub struct CholeskyFactor {
     panels: Vec<f64>,
@@ -12,16 +12,16 @@ pub struct CholeskyFactor {
     gather: Vec<f64>,
 }
 
-/// A symmetric matrix of 3×3 blocks over the upper neighbour lists of its nodes.
+/// A symmetric matrix of 3×3 blocks over a graph of nodes.
 pub trait BlockMatrix {
-    /// Calls `visit(other, block)` for the diagonal block of `node` and for each neighbour; the block is
-    /// `A[other, node]`, column-major.
+    /// Calls `visit(other, block, is_transposed)` for the diagonal block of `node` and for each neighbour. The block is
+    /// `A[other, node]`, column-major, or its transpose.
     fn column(&self, node: u32, visit: &mut dyn FnMut(u32, &[f64; 9], bool));
 }
 
 impl CholeskyFactor {
-    /// Factors `matrix`; afterwards [`CholeskyFactor::schur`] holds the complement of the kept nodes. `false` if it is not
-    /// positive definite.
+    /// Factors `matrix`. Afterwards [`CholeskyFactor::schur`] is the Schur complement of the retained nodes. Returns false if
+    /// the matrix is not positive definite.
     pub fn refill(&mut self, plan: &SymbolicFactor, matrix: &dyn BlockMatrix) -> bool {
         self.panels.resize(plan.factor_len, 0.0);
         self.stack.resize(plan.stack_len, 0.0);
@@ -53,7 +53,7 @@ impl CholeskyFactor {
         true
     }
 
-    /// The matrix' own entries whose earlier position is eliminated in this front (or kept, in the root).
+    /// Adds the matrix entries whose earlier position is eliminated in this front (or retained, in the root).
     fn assemble(&mut self, plan: &SymbolicFactor, index: usize, matrix: &dyn BlockMatrix) {
         let front = &plan.fronts[index];
         let n = 3 * front.rows.len();
@@ -78,12 +78,13 @@ impl CholeskyFactor {
         }
     }
 
-    /// Schur complement of the kept nodes, column-major lower triangle, side `3·kept`.
+    /// Schur complement of the retained nodes: side `3 · retained`, column-major, lower triangle.
     pub fn schur(&self) -> &[f64] {
         &self.schur
     }
 
-    /// Forward sweep on `b` (in elimination order, 3 per position): the kept part becomes the reduced right-hand side.
+    /// Forward substitution on `b` (in elimination order, 3 per position). Its retained part becomes the reduced right-hand
+    /// side.
     pub fn forward(&mut self, plan: &SymbolicFactor, b: &mut [f64]) {
         for front in plan.fronts.iter().filter(|f| f.pivots > 0) {
             let (n, k) = (3 * front.rows.len(), 3 * front.pivots);
@@ -94,7 +95,7 @@ impl CholeskyFactor {
         }
     }
 
-    /// Backward sweep: given the kept part of `x`, completes the rest of a forward-swept vector to the solution.
+    /// Backward substitution: completes a forward-substituted vector to the solution, given the retained part of `x`.
     pub fn backward(&mut self, plan: &SymbolicFactor, x: &mut [f64]) {
         for front in plan.fronts.iter().rev().filter(|f| f.pivots > 0) {
             let (n, k) = (3 * front.rows.len(), 3 * front.pivots);
@@ -119,7 +120,7 @@ fn store(b: &mut [f64], work: &[f64], rows: &[u32]) {
     }
 }
 
-/// Moves the trailing block of a finished front onto the stack.
+/// Copies the trailing block of a finished front onto the stack.
 fn push_update(front: &[f64], n: usize, k: usize, stack: &mut [f64]) {
     let rest = n - k;
     for c in 0..rest {
@@ -127,7 +128,7 @@ fn push_update(front: &[f64], n: usize, k: usize, stack: &mut [f64]) {
     }
 }
 
-/// Adds a child's update to its parent's front.
+/// Adds a child's update matrix to its parent's front.
 fn extend_add(front: &mut [f64], n: usize, update: &[f64], rest: usize, into: &[u32]) {
     for (cb, &column) in into.iter().enumerate() {
         for c in 0..3 {
@@ -135,7 +136,7 @@ fn extend_add(front: &mut [f64], n: usize, update: &[f64], rest: usize, into: &[
             let target = &mut front[(3 * column as usize + c) * n..(3 * column as usize + c + 1) * n];
             for (rb, &row) in into.iter().enumerate().skip(cb) {
                 for r in 0..3 {
-                    // Above the diagonal of the diagonal block nothing was written and nothing is read.
+                    // Entries above the diagonal of a diagonal block are neither written nor read.
                     target[3 * row as usize + r] += source[3 * rb + r];
                 }
             }
@@ -191,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn the_factor_solves_with_any_kept_set() {
+    fn the_factor_solves_with_any_retained_set() {
         let grid = Grid::new(5);
         let nodes = 125usize;
         let x: Vec<f64> = (0..3 * nodes).map(|i| (i as f64 * 0.37).cos()).collect();

@@ -1,54 +1,54 @@
-//! Structure of a factor: which nodes go when, and where their fronts live.
+//! Symbolic factorization: elimination order, fronts, and their storage.
 
 use super::dissection;
 
-/// The plan of a factorisation for one pattern and one kept set.
+/// Structure of the factorization for one pattern and one retained set.
 #[derive(Clone, Debug)]
 pub struct SymbolicFactor {
-    /// Node at each position of the elimination order; the kept nodes are last, in ascending order.
+    /// Node at each position of the elimination order; the retained nodes are last, in ascending order.
     pub order: Vec<u32>,
     /// Position of each node.
     pub position: Vec<u32>,
     /// Fronts in elimination order; the last one is the root and is not eliminated.
     pub(super) fronts: Vec<Front>,
-    /// Number of kept nodes.
-    pub kept: usize,
-    /// Numbers stored by the factor.
+    /// Number of retained nodes.
+    pub retained: usize,
+    /// Length of the factor's storage.
     pub(super) factor_len: usize,
-    /// Most numbers that updates wait in at once.
+    /// Largest length of the stack of pending update matrices.
     pub(super) stack_len: usize,
     /// Side of the largest front.
     pub(super) largest: usize,
 }
 
-/// One dense piece of the elimination.
+/// A dense submatrix of the elimination.
 #[derive(Clone, Debug)]
 pub(super) struct Front {
     /// First position eliminated here.
     pub first: usize,
-    /// How many nodes are eliminated here.
+    /// Number of positions eliminated here.
     pub pivots: usize,
     /// Positions of the front's rows, ascending; the first `pivots` are eliminated.
     pub rows: Vec<u32>,
     /// Children in the order in which they were eliminated.
     pub children: Vec<usize>,
-    /// Where each row beyond the pivots lands in the parent's rows.
+    /// Index in the parent's rows of each row beyond the pivots.
     pub into_parent: Vec<u32>,
     /// Offset of the panel `L` (3·rows × 3·pivots, column-major) in the factor.
     pub offset: usize,
 }
 
-/// Widest share of zeros accepted when two fronts are merged.
+/// Largest share of explicit zeros accepted when two fronts are merged.
 const MERGE_ZEROS: f64 = 0.1;
-/// Fronts with at most this many pivots are merged whatever the zeros.
+/// Fronts with at most this many pivots are merged regardless of zeros.
 const MERGE_SMALL: usize = 3;
 
 impl SymbolicFactor {
-    /// Analyses the graph `neighbours` (symmetric, without self loops, ascending lists), keeping `keep` (ascending).
-    /// `places` are the nodes' places in a lattice in which neighbours are at most one apart along each axis.
-    pub fn new(neighbours: &[Vec<u32>], places: &[[i32; 3]], keep: &[u32]) -> Self {
-        let order = elimination_order(places, keep);
-        let inner = order.len() - keep.len();
+    /// Analyses the graph `neighbours` (symmetric, without self loops, ascending lists), retaining the nodes `retained`
+    /// (ascending). `places` are lattice coordinates, in which neighbours differ by at most one along each axis.
+    pub fn new(neighbours: &[Vec<u32>], places: &[[i32; 3]], retained: &[u32]) -> Self {
+        let order = elimination_order(places, retained);
+        let inner = order.len() - retained.len();
         let structure = column_structure(neighbours, &order, inner);
         let order = postorder(&order, &structure, inner);
         let structure = column_structure(neighbours, &order, inner);
@@ -58,17 +58,17 @@ impl SymbolicFactor {
         let factor_len = fronts.last().map_or(0, |f| f.offset);
         let stack_len = deepest_stack(&fronts);
         let largest = fronts.iter().map(|f| 3 * f.rows.len()).max().unwrap_or(0);
-        Self { order, position, fronts, kept: keep.len(), factor_len, stack_len, largest }
+        Self { order, position, fronts, retained: retained.len(), factor_len, stack_len, largest }
     }
 }
 
-/// The nodes that are not kept by nested dissection, then the kept ones.
-fn elimination_order(places: &[[i32; 3]], keep: &[u32]) -> Vec<u32> {
-    let mut kept = vec![false; places.len()];
-    keep.iter().for_each(|&node| kept[node as usize] = true);
-    let mut order: Vec<u32> = (0..places.len() as u32).filter(|&n| !kept[n as usize]).collect();
+/// The nodes to eliminate in nested dissection order, then the retained ones.
+fn elimination_order(places: &[[i32; 3]], retained: &[u32]) -> Vec<u32> {
+    let mut is_retained = vec![false; places.len()];
+    retained.iter().for_each(|&node| is_retained[node as usize] = true);
+    let mut order: Vec<u32> = (0..places.len() as u32).filter(|&n| !is_retained[n as usize]).collect();
     dissection::order(&mut order, places);
-    order.extend_from_slice(keep);
+    order.extend_from_slice(retained);
     order
 }
 
@@ -125,7 +125,7 @@ fn postorder(order: &[u32], structure: &[Vec<u32>], inner: usize) -> Vec<u32> {
     result
 }
 
-/// Groups columns into fronts, links them, and adds the root over the kept positions.
+/// Groups columns into fronts, links them, and adds the root over the retained positions.
 fn build_fronts(structure: &[Vec<u32>], inner: usize, total: usize) -> Vec<Front> {
     let mut groups: Vec<Group> = Vec::new();
     for (at, rows) in structure.iter().enumerate() {
@@ -144,11 +144,11 @@ fn build_fronts(structure: &[Vec<u32>], inner: usize, total: usize) -> Vec<Front
         fronts.push(Front { first, pivots, rows, children: Vec::new(), into_parent: Vec::new(), offset });
         offset += size;
     }
-    let kept = (inner as u32..total as u32).collect();
+    let retained = (inner as u32..total as u32).collect();
     fronts.push(Front {
         first: inner,
         pivots: 0,
-        rows: kept,
+        rows: retained,
         children: Vec::new(),
         into_parent: Vec::new(),
         offset,
@@ -157,19 +157,19 @@ fn build_fronts(structure: &[Vec<u32>], inner: usize, total: usize) -> Vec<Front
     fronts
 }
 
-/// Neighbouring columns that are eliminated in one front.
+/// Adjacent columns that are eliminated in one front (a relaxed supernode).
 struct Group {
     /// First position.
     first: usize,
-    /// How many positions.
+    /// Number of positions.
     pivots: usize,
     /// Rows below them, ascending.
     below: Vec<u32>,
-    /// Blocks stored although they are zero, because of merges.
+    /// Explicit zero blocks because of merges.
     zeros: usize,
 }
 
-/// Merges the last two groups if the former is a child of the latter and few zeros are stored in all.
+/// Merges the last two groups if the former is a child of the latter and few explicit zeros result.
 fn try_merge(groups: &mut Vec<Group>) -> bool {
     let [.., child, parent] = groups.as_slice() else { return false };
     if child.below.first() != Some(&(parent.first as u32)) {
@@ -205,14 +205,14 @@ fn link(fronts: &mut [Front], front_of: &[usize]) {
     }
 }
 
-/// Most numbers that finished updates occupy while they wait for their parents.
+/// Largest length of the update matrices that are pending at one time.
 fn deepest_stack(fronts: &[Front]) -> usize {
     let waiting = |f: &Front| (3 * (f.rows.len() - f.pivots)).pow(2);
-    let (mut now, mut most) = (0, 0);
+    let (mut now, mut max) = (0, 0);
     for front in fronts {
         now -= front.children.iter().map(|&c| waiting(&fronts[c])).sum::<usize>();
         now += waiting(front);
-        most = most.max(now);
+        max = max.max(now);
     }
-    most
+    max
 }

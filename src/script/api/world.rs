@@ -178,8 +178,8 @@ fn step(lua: &Lua, inner: &mut Inner) -> mlua::Result<MultiValue> {
         if let Err(failure) = timing.measure(dt, || world.step()) {
             inner.failed = Some(failure);
         }
-        inner.newton.0 += u64::from(inner.world.stats().newton);
-        inner.newton.1 = inner.newton.1.max(inner.world.stats().newton_max);
+        inner.newton.0 += u64::from(inner.world.stats().newton_steps);
+        inner.newton.1 = inner.newton.1.max(inner.world.stats().max_newton_steps);
     }
     let message = match &inner.failed {
         None => Value::Nil,
