@@ -1,4 +1,4 @@
-//! Every shipped recipe is what it says: size, mass, mesh, samples, rest on the table; and the suite on them.
+//! The shipped assets: size, material, mass, meshes, samples and stability; and the start states of the Spatial-Soft suite.
 
 use std::{collections::BTreeMap, path::Path, sync::Arc};
 
@@ -15,28 +15,48 @@ use softvt::{
     script::{self, Episode, EpisodeRequest, Loaded},
 };
 
-/// Length, width, height as it lies, mm; Young's modulus, kPa; Poisson's ratio; density, kg/m³.
-const SOFT: [(&str, [f64; 3], f64, f64, f64); 17] = [
-    ("spiral_roll", [58.0, 47.0, 40.0], 60.0, 0.35, 240.0),
-    ("steamed_bun", [66.0, 62.0, 44.0], 25.0, 0.30, 180.0),
-    ("twisted_stick", [120.0, 31.0, 28.0], 75.0, 0.36, 280.0),
-    ("long_roll", [120.0, 44.0, 38.0], 35.0, 0.32, 200.0),
-    ("small_ridged_roll", [62.0, 44.0, 34.0], 110.0, 0.38, 320.0),
-    ("sesame_bun", [64.0, 62.0, 42.0], 45.0, 0.34, 220.0),
-    ("croissant", [95.0, 46.0, 36.0], 160.0, 0.36, 260.0),
-    ("curved_layered", [88.0, 60.0, 36.0], 130.0, 0.38, 340.0),
-    ("braided_roll", [110.0, 48.0, 38.0], 90.0, 0.37, 300.0),
-    ("golden_bun", [60.0, 60.0, 42.0], 220.0, 0.36, 380.0),
-    ("oval_loaf", [84.0, 59.0, 44.0], 180.0, 0.37, 350.0),
-    ("yellow_roll", [70.0, 50.0, 46.0], 55.0, 0.34, 230.0),
-    ("cube", [56.0, 56.0, 56.0], 40.0, 0.40, 200.0),
-    ("cylinder", [53.0, 53.0, 60.0], 50.0, 0.40, 200.0),
-    ("wedge", [64.0, 50.0, 40.0], 50.0, 0.40, 220.0),
-    ("capsule", [78.0, 44.0, 44.0], 30.0, 0.40, 200.0),
-    ("sphere", [57.0, 57.0, 57.0], 60.0, 0.40, 200.0),
+/// Reference data of a soft asset.
+struct SoftReference {
+    name: &'static str,
+    /// Extents along x, y, z.
+    size_mm: [f64; 3],
+    youngs_kpa: f64,
+    poisson: f64,
+    /// kg/m³.
+    density: f64,
+}
+
+const fn soft(
+    name: &'static str,
+    size_mm: [f64; 3],
+    youngs_kpa: f64,
+    poisson: f64,
+    density: f64,
+) -> SoftReference {
+    SoftReference { name, size_mm, youngs_kpa, poisson, density }
+}
+
+const SOFT: [SoftReference; 17] = [
+    soft("spiral_roll", [58.0, 47.0, 40.0], 60.0, 0.35, 240.0),
+    soft("steamed_bun", [66.0, 62.0, 44.0], 25.0, 0.30, 180.0),
+    soft("twisted_stick", [120.0, 31.0, 28.0], 75.0, 0.36, 280.0),
+    soft("long_roll", [120.0, 44.0, 38.0], 35.0, 0.32, 200.0),
+    soft("small_ridged_roll", [62.0, 44.0, 34.0], 110.0, 0.38, 320.0),
+    soft("sesame_bun", [64.0, 62.0, 42.0], 45.0, 0.34, 220.0),
+    soft("croissant", [95.0, 46.0, 36.0], 160.0, 0.36, 260.0),
+    soft("curved_layered", [88.0, 60.0, 36.0], 130.0, 0.38, 340.0),
+    soft("braided_roll", [110.0, 48.0, 38.0], 90.0, 0.37, 300.0),
+    soft("golden_bun", [60.0, 60.0, 42.0], 220.0, 0.36, 380.0),
+    soft("oval_loaf", [84.0, 59.0, 44.0], 180.0, 0.37, 350.0),
+    soft("yellow_roll", [70.0, 50.0, 46.0], 55.0, 0.34, 230.0),
+    soft("cube", [56.0, 56.0, 56.0], 40.0, 0.40, 200.0),
+    soft("cylinder", [53.0, 53.0, 60.0], 50.0, 0.40, 200.0),
+    soft("wedge", [64.0, 50.0, 40.0], 50.0, 0.40, 220.0),
+    soft("capsule", [78.0, 44.0, 44.0], 30.0, 0.40, 200.0),
+    soft("sphere", [57.0, 57.0, 57.0], 60.0, 0.40, 200.0),
 ];
-/// A recipe may differ from its table by this, m.
-const NEAR: f64 = 0.5e-3;
+/// Largest difference between an extent of an asset and its reference, m.
+const SIZE_TOLERANCE: f64 = 0.5e-3;
 
 fn suite() -> Loaded {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("suites/spatial_soft.lua");
@@ -56,7 +76,7 @@ fn scene(loaded: &Loaded, task: usize, episode: u64) -> Scene {
     Episode::open(loaded, &request).unwrap_or_else(|e| panic!("{e}")).scene
 }
 
-/// Assets by name, and the table that each stands on.
+/// Assets by name, including the table.
 fn assets(names: &[&str]) -> BTreeMap<String, Arc<Asset>> {
     let alone: Vec<&[&str]> = names.iter().map(std::slice::from_ref).collect();
     let objects = stacks(&alone).into_iter().flat_map(|scene| scene.objects);
@@ -64,19 +84,19 @@ fn assets(names: &[&str]) -> BTreeMap<String, Arc<Asset>> {
 }
 
 fn soft_assets() -> BTreeMap<String, Arc<Asset>> {
-    assets(&SOFT.each_ref().map(|(name, ..)| *name))
+    assets(&SOFT.each_ref().map(|reference| reference.name))
 }
 
 #[test]
-fn every_recipe_has_the_size_and_material_of_the_table_and_stands_on_zero() {
+fn soft_assets_have_their_reference_size_and_material_and_rest_on_zero() {
     let assets = soft_assets();
-    for (name, size_mm, youngs_kpa, poisson, density) in SOFT {
+    for SoftReference { name, size_mm, youngs_kpa, poisson, density } in SOFT {
         let asset = &assets[name];
         let bounds = asset.shape.bounds();
         let off = bounds.size() - Vec3::from(size_mm) * 1e-3;
-        assert!(off.amax() < NEAR, "{name}: {:?} mm", bounds.size() * 1e3);
-        assert!(bounds.min.z.abs() < NEAR, "{name}: lowest at {} m", bounds.min.z);
-        assert!(bounds.centre().xy().amax() < NEAR, "{name}: centre at {:?}", bounds.centre());
+        assert!(off.amax() < SIZE_TOLERANCE, "{name}: {:?} mm", bounds.size() * 1e3);
+        assert!(bounds.min.z.abs() < SIZE_TOLERANCE, "{name}: lowest at {} m", bounds.min.z);
+        assert!(bounds.centre().xy().amax() < SIZE_TOLERANCE, "{name}: centre at {:?}", bounds.centre());
         let Body::Soft(soft) = &asset.body else { panic!("{name} is not soft") };
         assert_eq!(
             (soft.youngs_pa, soft.poisson, soft.density),
@@ -89,24 +109,24 @@ fn every_recipe_has_the_size_and_material_of_the_table_and_stands_on_zero() {
 }
 
 #[test]
-fn a_plate_is_as_high_as_its_hint_where_objects_rest() {
+fn the_surface_hint_of_the_plate_is_its_height() {
     let plate = &assets(&["plate"])["plate"];
     let hint = plate.hints["surface_m"];
     for r in [0.0, 0.02, 0.04, 0.055] {
-        let down = plate.shape.ray(&Vec3::new(r, 0.0, 0.1), &-Vec3::z(), 0.2).expect("a plate has no hole");
+        let down = plate.shape.ray(&Vec3::new(r, 0.0, 0.1), &-Vec3::z(), 0.2).expect("a plate without holes");
         assert!((0.1 - down - hint).abs() < 1e-4, "at {r} m: {}", 0.1 - down);
     }
 }
 
 #[test]
-fn every_recipe_has_a_voxel_mesh_and_samples_all_around() {
+fn soft_assets_have_voxel_meshes_and_closed_samplings() {
     let assets = soft_assets();
-    for (name, ..) in SOFT {
+    for SoftReference { name, .. } in SOFT {
         let asset = &assets[name];
         let Body::Soft(soft) = &asset.body else { panic!("{name} is not soft") };
         let mesh = voxel_mesh(&asset.shape, &VoxelSpec { resolution: soft.resolution }).expect(name);
         let samples = surface_samples(&asset.shape, &mesh, &SampleSpec::default());
-        // The surface of a body closes: its oriented area vanishes.
+        // The oriented area of a closed surface vanishes.
         let area: f64 = samples.iter().map(|s| s.area).sum();
         let sum: Vec3 = samples.iter().map(|s| s.n_o * s.area).sum();
         assert!(sum.norm() < 0.01 * area, "{name}: {sum:?} of {area}");
@@ -118,7 +138,7 @@ fn every_recipe_has_a_voxel_mesh_and_samples_all_around() {
     }
 }
 
-/// The nodes of all soft bodies at rest, bit by bit.
+/// Bits of the node positions of all soft bodies after settling.
 fn at_rest(scene: Scene, cache: &AssetCache) -> Vec<[u64; 3]> {
     let mut sim =
         Simulation::new(Arc::new(scene), &Default::default(), &Default::default(), cache).expect("builds");
@@ -128,17 +148,17 @@ fn at_rest(scene: Scene, cache: &AssetCache) -> Vec<[u64; 3]> {
 }
 
 #[test]
-fn what_is_only_seen_changes_no_bit_of_what_moves() {
+fn scenery_does_not_change_the_simulation() {
     let cache = AssetCache::default();
     let seen = scene(&suite(), 0, 0);
     let mut bare = seen.clone();
     bare.objects.retain(|object| object.asset.body != Body::Scenery);
-    assert!(bare.objects.len() + 5 < seen.objects.len(), "a room stands around the table");
+    assert!(bare.objects.len() + 5 < seen.objects.len(), "the scene has scenery around the table");
     assert!(at_rest(seen, &cache) == at_rest(bare, &cache));
 }
 
 #[test]
-fn every_layout_settles_and_both_tasks_of_a_pair_start_from_one_state() {
+fn layouts_settle_and_both_tasks_of_a_pair_share_their_start_state() {
     let loaded = suite();
     let cache = AssetCache::default();
     let settled = |task: usize| at_rest(scene(&loaded, task, 1), &cache);
@@ -148,7 +168,7 @@ fn every_layout_settles_and_both_tasks_of_a_pair_start_from_one_state() {
 }
 
 #[test]
-fn start_states_spread_as_far_as_the_benchmark_asks() {
+fn start_states_cover_the_ranges_of_the_benchmark() {
     let loaded = suite();
     let count = 60;
     for task in [0, 2, 4, 6, 8] {
@@ -162,7 +182,7 @@ fn start_states_spread_as_far_as_the_benchmark_asks() {
             ] {
                 let low = value.iter().copied().fold(f64::INFINITY, f64::min);
                 let high = value.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-                // 60 uniform draws miss a tenth of the range with a chance of about 1 %.
+                // 60 uniform draws cover less than 0.9 of the range with a probability of about 1 %.
                 let range = (high - low) / (2.0 * spread);
                 assert!((0.9..=1.0).contains(&range), "task {task} {side} {what}: {range} of the range");
             }
@@ -173,15 +193,15 @@ fn start_states_spread_as_far_as_the_benchmark_asks() {
     }
 }
 
-/// The nominal start pose.
+/// Nominal start configuration of the arm, rad.
 const START_Q: [f64; 7] = [-0.01988, -0.18734, 0.00767, -2.40340, 0.00496, 2.24534, 0.79485];
 
 fn pose(scene: &Scene, name: &str) -> Pose {
-    scene.objects.iter().find(|o| o.name == name).expect("is in the scene").pose_w
+    scene.objects.iter().find(|o| o.name == name).expect("an object of the scene").pose_w
 }
 
 #[test]
-fn left_and_right_are_those_of_the_image_and_prompts_name_the_goal() {
+fn left_and_right_are_as_in_the_image_and_prompts_name_the_goal() {
     let loaded = suite();
     let Plan::Suite(suite) = &loaded.plan else { panic!("{:?}", loaded.plan) };
     assert_eq!(suite.tasks.len(), 10);
@@ -196,25 +216,37 @@ fn left_and_right_are_those_of_the_image_and_prompts_name_the_goal() {
     }
 }
 
-/// Size as it stands, mm, and mass, g (100 kg/m³ of the box around it, as LIBERO has it).
-const RIGID: [(&str, [f64; 3], f64); 15] = [
-    ("alphabet_soup", [62.0, 62.0, 76.0], 29.2),
-    ("basket", [170.0, 157.0, 142.0], 379.0),
-    ("bbq_sauce", [47.0, 29.0, 107.0], 14.6),
-    ("black_bowl", [107.0, 107.0, 51.0], 58.4),
-    ("butter", [76.0, 40.0, 17.0], 5.2),
-    ("chocolate_pudding", [80.0, 46.0, 27.0], 9.9),
-    ("cookies", [62.0, 83.0, 19.0], 9.8),
-    ("cream_cheese", [81.0, 43.0, 18.0], 6.3),
-    ("ketchup", [56.0, 37.0, 146.0], 30.3),
-    ("milk", [53.0, 53.0, 131.0], 36.8),
-    ("orange_juice", [53.0, 53.0, 131.0], 36.8),
-    ("plate", [138.0, 138.0, 19.0], 36.2),
-    ("ramekin", [89.0, 89.0, 42.0], 33.3),
-    ("salad_dressing", [53.0, 36.0, 146.0], 27.9),
-    ("tomato_sauce", [62.0, 62.0, 76.0], 29.2),
+/// Reference data of a rigid asset.
+struct RigidReference {
+    name: &'static str,
+    /// Extents along x, y, z.
+    size_mm: [f64; 3],
+    /// 100 kg/m³ times the volume of the bounding box, as in LIBERO.
+    mass_g: f64,
+}
+
+const fn rigid(name: &'static str, size_mm: [f64; 3], mass_g: f64) -> RigidReference {
+    RigidReference { name, size_mm, mass_g }
+}
+
+const RIGID: [RigidReference; 15] = [
+    rigid("alphabet_soup", [62.0, 62.0, 76.0], 29.2),
+    rigid("basket", [170.0, 157.0, 142.0], 379.0),
+    rigid("bbq_sauce", [47.0, 29.0, 107.0], 14.6),
+    rigid("black_bowl", [107.0, 107.0, 51.0], 58.4),
+    rigid("butter", [76.0, 40.0, 17.0], 5.2),
+    rigid("chocolate_pudding", [80.0, 46.0, 27.0], 9.9),
+    rigid("cookies", [62.0, 83.0, 19.0], 9.8),
+    rigid("cream_cheese", [81.0, 43.0, 18.0], 6.3),
+    rigid("ketchup", [56.0, 37.0, 146.0], 30.3),
+    rigid("milk", [53.0, 53.0, 131.0], 36.8),
+    rigid("orange_juice", [53.0, 53.0, 131.0], 36.8),
+    rigid("plate", [138.0, 138.0, 19.0], 36.2),
+    rigid("ramekin", [89.0, 89.0, 42.0], 33.3),
+    rigid("salad_dressing", [53.0, 36.0, 146.0], 27.9),
+    rigid("tomato_sauce", [62.0, 62.0, 76.0], 29.2),
 ];
-/// What is printed on packages.
+/// Assets with their name printed on them.
 const PACKAGES: [&str; 11] = [
     "alphabet_soup",
     "bbq_sauce",
@@ -229,7 +261,7 @@ const PACKAGES: [&str; 11] = [
     "tomato_sauce",
 ];
 
-/// A task for each stack of assets: on the table one on the other, or on the floor if it is the lowest.
+/// One scene per stack of assets: each asset lies on the one before, the first on the table.
 fn stacks(stacks: &[&[&str]]) -> Vec<Scene> {
     let folder = tempfile::tempdir().expect("a folder");
     let list: Vec<String> =
@@ -249,7 +281,7 @@ fn stacks(stacks: &[&[&str]]) -> Vec<Scene> {
             end
             scene:add {{ name = \"mark\", asset = mark, at = {{ 0.35, -0.3 }} }}
           end)
-          -- Some of them never move, which a goal does not allow.
+          -- A marker, since the object of a goal must be movable and some of the assets are not.
           local goal = softvt.on {{ object = \"mark\", target = \"table\" }}
           tasks[#tasks + 1] = softvt.task {{ prompt = table.concat(names, \" under \"), layout = layout, goal = goal }}
         end
@@ -263,67 +295,71 @@ fn stacks(stacks: &[&[&str]]) -> Vec<Scene> {
 }
 
 fn rigid_assets() -> Vec<Arc<Asset>> {
-    let scenes = stacks(&RIGID.each_ref().map(|(name, ..)| std::slice::from_ref(name)));
+    let scenes = stacks(&RIGID.each_ref().map(|reference| std::slice::from_ref(&reference.name)));
     scenes.into_iter().map(|scene| scene.objects[1].asset.clone()).collect()
 }
 
 #[test]
-fn every_rigid_recipe_has_its_size_and_mass_and_stands_on_zero() {
-    for (asset, (name, size_mm, grams)) in rigid_assets().iter().zip(RIGID) {
+fn rigid_assets_have_their_reference_size_and_mass_and_rest_on_zero() {
+    for (asset, RigidReference { name, size_mm, mass_g }) in rigid_assets().iter().zip(RIGID) {
         let bounds = asset.shape.bounds();
-        assert!((bounds.size() - Vec3::from(size_mm) * 1e-3).amax() < NEAR, "{name}: {:?}", bounds.size());
-        assert!(bounds.min.z.abs() < NEAR, "{name}: lowest at {} m", bounds.min.z);
-        assert!(bounds.centre().xy().amax() < NEAR, "{name}: centre at {:?}", bounds.centre());
+        assert!(
+            (bounds.size() - Vec3::from(size_mm) * 1e-3).amax() < SIZE_TOLERANCE,
+            "{name}: {:?}",
+            bounds.size()
+        );
+        assert!(bounds.min.z.abs() < SIZE_TOLERANCE, "{name}: lowest at {} m", bounds.min.z);
+        assert!(bounds.centre().xy().amax() < SIZE_TOLERANCE, "{name}: centre at {:?}", bounds.centre());
         let Body::Rigid { density } = asset.body else { panic!("{name} is not rigid") };
         let mass = 1e3 * mass_properties(&asset.shape, density).mass;
-        assert!((mass / grams - 1.0).abs() < 0.03, "{name}: {mass} g for {grams} g");
+        assert!((mass / mass_g - 1.0).abs() < 0.03, "{name}: {mass} g for {mass_g} g");
         assert_eq!((asset.friction.static_mu, asset.friction.dynamic_mu), (0.6, 0.5), "{name}");
     }
 }
 
 #[test]
-fn packages_say_what_they_are() {
-    fn read(mask: &Mask, words: &mut Vec<String>) {
+fn packages_show_their_name() {
+    fn collect_text(mask: &Mask, words: &mut Vec<String>) {
         match mask {
             Mask::Text { decal } => words.push(decal.line.text.to_lowercase()),
-            Mask::Both { masks } => masks.iter().for_each(|mask| read(mask, words)),
-            Mask::Inverse { mask } => read(mask, words),
+            Mask::Both { masks } => masks.iter().for_each(|mask| collect_text(mask, words)),
+            Mask::Inverse { mask } => collect_text(mask, words),
             _ => {}
         }
     }
     for asset in rigid_assets().iter().filter(|asset| PACKAGES.contains(&asset.name.as_str())) {
         let mut words = Vec::new();
         let layers = asset.visuals.iter().flat_map(|visual| &visual.layers);
-        layers.for_each(|layer| read(&layer.mask, &mut words));
-        // A part of the name in large letters, or all of it on several lines.
-        let said = asset.name.split('_').filter(|part| words.iter().any(|word| word.contains(part))).count();
-        assert!(said > 0, "{}: {words:?}", asset.name);
+        layers.for_each(|layer| collect_text(&layer.mask, &mut words));
+        // Packages show a part of the name, or all of it on several lines.
+        let shown = asset.name.split('_').filter(|part| words.iter().any(|word| word.contains(part))).count();
+        assert!(shown > 0, "{}: {words:?}", asset.name);
     }
 }
 
 #[test]
-fn bowl_basket_and_ramekin_are_hollow_and_their_walls_thick_enough() {
+fn bowl_basket_and_ramekin_are_hollow_with_walls_of_4_mm() {
     let assets = rigid_assets();
-    let of = |name: &str| assets.iter().find(|asset| asset.name == name).expect("is there");
+    let of = |name: &str| assets.iter().find(|asset| asset.name == name).expect("an asset");
     for (name, at, inside) in [("black_bowl", 0.04, 0.04), ("basket", 0.05, 0.06), ("ramekin", 0.03, 0.036)] {
         let shape = &of(name).shape;
         assert!(shape.distance(&Vec3::new(0.0, 0.0, at)) > 0.01, "{name} is hollow");
         for turn in [0.0_f64, 0.4, 0.8, 1.3, 2.0, 4.0] {
-            let way = Vec3::new(turn.cos(), turn.sin(), 0.0);
+            let direction = Vec3::new(turn.cos(), turn.sin(), 0.0);
             let from = Vec3::z() * at;
-            // Small steps: a wall is thin, and away from it distances are of first order only.
+            // Small steps, since walls are thin and distances are of first order away from the surface.
             let wall = (0..2000).map(|step| 1e-4 * f64::from(step));
-            let wall: Vec<f64> = wall.filter(|r| shape.distance(&(from + way * *r)) < 0.0).collect();
+            let wall: Vec<f64> = wall.filter(|r| shape.distance(&(from + direction * *r)) < 0.0).collect();
             let (inner, outer) = (wall[0], wall[wall.len() - 1]);
-            assert!(inner > inside, "{name}: {inner} m from the middle");
+            assert!(inner > inside, "{name}: inner radius {inner} m");
             assert!(outer - inner > 4e-3 * 0.95, "{name}: a wall of {} m", outer - inner);
         }
     }
 }
 
 #[test]
-fn rigid_things_stand_still_alone_and_stacked() {
-    let alone = RIGID.each_ref().map(|(name, ..)| std::slice::from_ref(name));
+fn rigid_assets_stay_at_rest_alone_and_stacked() {
+    let alone = RIGID.each_ref().map(|reference| std::slice::from_ref(&reference.name));
     let mut all: Vec<&[&str]> = alone.to_vec();
     all.extend([["ramekin", "black_bowl"].as_slice(), &["cookies", "black_bowl"], &["plate", "black_bowl"]]);
     for (scene, names) in stacks(&all).into_iter().zip(all) {
@@ -349,17 +385,17 @@ fn rigid_things_stand_still_alone_and_stacked() {
                 "{names:?}: {} moved {moved} m, {turned} rad",
                 object.name
             );
-            // A bowl sinks into a ramekin and a plate's well; nothing else changes its height.
+            // A bowl sinks into a ramekin and into the well of a plate; all other heights stay.
             let sunk = start - after.translation.z;
             let limit = if ["ramekin", "plate"].contains(&names[0]) { 0.014 } else { 5e-4 };
             assert!((-1e-4..limit).contains(&sunk), "{names:?}: {} sank by {sunk} m", object.name);
-            assert!((after.rotation * Vec3::z()).z > 0.9999, "{names:?}: {} leans", object.name);
+            assert!((after.rotation * Vec3::z()).z > 0.9999, "{names:?}: {} tilts", object.name);
         }
     }
 }
 
 #[test]
-fn the_floor_never_moves_and_its_top_is_zero() {
+fn the_floor_is_static_with_its_top_at_zero() {
     let floor = stacks(&[&["floor"]]).remove(0).objects.remove(1).asset;
     assert!(floor.shape.bounds().max.z.abs() < 1e-12 && floor.body == Body::Static);
 }

@@ -3,53 +3,10 @@
 //! Three separate quantities: *closure* is commanded (0 open to 1 closed), *width* is measured (m between the gel
 //! apexes), *force* results from the contact solve.
 
-use serde::{Deserialize, Serialize};
-
 use super::spec::GripperSpec;
 
 /// Largest width between the gel apexes, m.
 pub const MAX_WIDTH: f64 = 0.08;
-
-/// Encoding of the gripper component of an action.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum GripperEncoding {
-    /// The value is the closure; it is clamped to 0..=1.
-    #[default]
-    Continuous,
-    /// The value is a closure of which only the side of 0.5 counts: closed above, open otherwise.
-    Binary,
-    /// The sign counts, as in SoftVTBench: positive opens, zero and negative close.
-    Sign,
-}
-
-impl GripperEncoding {
-    /// Decodes a closure, 0 (open) ..= 1 (closed).
-    ///
-    /// # Errors
-    /// If the value is not finite.
-    pub fn closure(self, value: f64) -> Result<f64, GripperError> {
-        if !value.is_finite() {
-            return Err(GripperError { value });
-        }
-        let closed = match self {
-            Self::Continuous => return Ok(value.clamp(0.0, 1.0)),
-            Self::Binary => value > 0.5,
-            Self::Sign => value <= 0.0,
-        };
-        Ok(if closed { 1.0 } else { 0.0 })
-    }
-}
-
-/// A gripper command that is not a finite number.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error(
-    "gripper command is {value}, expected a finite number: a closure of 0 (open) to 1 (closed), or a sign"
-)]
-pub struct GripperError {
-    /// Value given.
-    pub value: f64,
-}
 
 /// Target width (m) of a closure in 0..=1.
 pub fn target_width(closure: f64) -> f64 {
@@ -57,7 +14,7 @@ pub fn target_width(closure: f64) -> f64 {
 }
 
 /// Closure in 0..=1 whose target width is `width` (m), clamped; the inverse of [`target_width`].
-pub fn closure_of_width(width: f64) -> f64 {
+fn closure_of_width(width: f64) -> f64 {
     (1.0 - width / MAX_WIDTH).clamp(0.0, 1.0)
 }
 
@@ -115,25 +72,6 @@ mod tests {
         for (closure, width) in [(0.0, 0.08), (0.25, 0.06), (1.0, 0.0)] {
             assert!((target_width(closure) - width).abs() < 1e-15);
             assert!((closure_of_width(width) - closure).abs() < 1e-15);
-        }
-    }
-
-    #[test]
-    fn each_encoding_decodes_its_own_range() {
-        let read = |encoding: GripperEncoding, value| encoding.closure(value).expect("finite");
-        assert_eq!(
-            [-0.2, 0.0, 0.3, 1.0, 1.7].map(|v| read(GripperEncoding::Continuous, v)),
-            [0.0, 0.0, 0.3, 1.0, 1.0]
-        );
-        assert_eq!([0.0, 0.5, 0.51, 1.0].map(|v| read(GripperEncoding::Binary, v)), [0.0, 0.0, 1.0, 1.0]);
-        assert_eq!([-1.0, 0.0, 1e-9, 1.0].map(|v| read(GripperEncoding::Sign, v)), [1.0, 1.0, 0.0, 0.0]);
-    }
-
-    #[test]
-    fn a_command_that_is_not_finite_is_refused() {
-        for value in [f64::NAN, f64::INFINITY] {
-            let error = GripperEncoding::Continuous.closure(value).expect_err("refused");
-            assert!(error.to_string().contains("expected a finite number"));
         }
     }
 

@@ -14,7 +14,7 @@ pub mod rotation;
 pub mod spec;
 
 pub use clearance::{Clearance, Obstacle, clearance};
-pub use gripper::{GripperEncoding, GripperError, GripperSetpoint};
+pub use gripper::GripperSetpoint;
 pub use ik::{DiffIk, UnreachablePose};
 pub use pads::{CollisionBox, PadContact, PadSurface};
 pub use spec::{ArmSpec, GripperSpec, IkSpec, PadSpec, RobotSpec, Side, SpecError};

@@ -1,4 +1,4 @@
-//! Furniture in a suite: goals that name a part, experts that see joints, and what is refused.
+//! Articulated objects in a suite: goals that name a part, experts that see joints, and what is refused.
 
 use insta::assert_snapshot;
 

@@ -1,4 +1,4 @@
-//! The cabinet and the stove as the benchmark uses them.
+//! Articulated objects of the benchmark: the cabinet with its drawers, and the stove with its knob.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use softvt::{
     sensing::tactile::TactileSpec,
 };
 
-/// A cabinet with its top drawer open, a bowl of 107 mm in it, and a stove; its front looks to −y.
+/// A cabinet facing −y with its top drawer open, a bowl of 107 mm in the drawer, and a stove.
 const SUITE: &str = r#"
 local table_top, cabinet, stove = require "assets.table", require "assets.wooden_cabinet", require "assets.flat_stove"
 local bowl = softvt.asset {
@@ -48,7 +48,7 @@ fn scene() -> Scene {
     Episode::open(&loaded, &request).unwrap_or_else(|e| panic!("{e}")).scene
 }
 
-/// The scene at rest.
+/// The simulation of the scene, settled.
 fn settled() -> Simulation {
     let sim =
         Simulation::new(Arc::new(scene()), &Default::default(), &Default::default(), &AssetCache::default());
@@ -71,7 +71,7 @@ fn link(sim: &Simulation, name: &str) -> LinkId {
     link
 }
 
-/// Pushes a joint at a speed (m/s or rad/s) with at most `effort` (N or N m), as a finger would.
+/// Pushes a joint at a speed (m/s or rad/s) with at most `effort` (N or N m), like a finger.
 fn push(sim: &mut Simulation, link: LinkId, target_velocity: f64, effort: f64) {
     let articulation = sim.world.articulation_mut(link.articulation);
     articulation.drives_mut()[link.index] =
@@ -90,7 +90,7 @@ fn size(asset: &Asset) -> Vec3 {
 }
 
 #[test]
-fn furniture_has_the_size_of_liberos() {
+fn articulated_objects_have_the_sizes_of_libero() {
     let scene = scene();
     for (index, expected) in [(1, Vec3::new(0.255, 0.221, 0.218)), (2, Vec3::new(0.19, 0.19, 0.07))] {
         let asset = &scene.objects[index].asset;
@@ -99,7 +99,7 @@ fn furniture_has_the_size_of_liberos() {
 }
 
 #[test]
-fn a_bowl_rests_on_the_floor_of_an_open_drawer_and_all_of_it_falls_asleep() {
+fn a_bowl_rests_in_an_open_drawer_and_all_bodies_fall_asleep() {
     let mut sim = settled();
     run(&mut sim, 1.0);
     let drawer = object(&sim, "cabinet.top_drawer");
@@ -118,21 +118,21 @@ fn a_bowl_rests_on_the_floor_of_an_open_drawer_and_all_of_it_falls_asleep() {
 }
 
 #[test]
-fn a_drawer_that_is_pushed_takes_its_bowl_along_and_pictures_show_it() {
+fn a_pushed_drawer_carries_its_bowl_and_moves_in_images() {
     let mut sim = settled();
     let link = link(&sim, "cabinet.top_drawer");
     let mut senses = SensorSuite::new(&sim, &TactileSpec::default(), &SensorAssets::default());
     let camera = Camera { width: 160, height: 160, ..Camera::third_person_table() };
     let drawer = 1 + sim.objects.iter().position(|o| o.name == "cabinet.top_drawer").expect("a part") as u16;
     let mut column = |sim: &Simulation| {
-        let seen = senses.render(&SensorSuite::frame(sim), &camera).expect("a picture").segmentation;
+        let seen = senses.render(&SensorSuite::frame(sim), &camera).expect("an image").segmentation;
         let columns = seen.iter().enumerate().filter(|(_, id)| **id == drawer).map(|(i, _)| (i % 160) as f64);
         let count = columns.clone().count();
         assert!(count > 50, "{count} pixels of the drawer");
         columns.sum::<f64>() / count as f64
     };
     let (before, seen) = (sim.centre(object(&sim, "bowl")), column(&sim));
-    // A push shut that the bowl's friction can follow: 0.5 × 9.81 m/s² would be its limit.
+    // Push the drawer closed, slowly enough for the friction of the bowl, whose limit is 0.5 × 9.81 m/s².
     for step in 1..=36 {
         push(&mut sim, link, f64::max(-0.02 * f64::from(step), -0.15), 20.0);
         run(&mut sim, 1.0 / 60.0);
@@ -152,7 +152,7 @@ fn a_knob_turns_within_its_limits_and_stops() {
     let mut sim = settled();
     let link = link(&sim, "stove.knob");
     let set = sim.world.articulation(link.articulation).state.q[link.index];
-    assert!((set - 1.0).abs() < 1e-6, "friction holds it where it was set: {set}");
+    assert!((set - 1.0).abs() < 1e-6, "friction keeps the knob where it was set: {set}");
     push(&mut sim, link, 4.0, 1.0);
     run(&mut sim, 2.0);
     sim.world.articulation_mut(link.articulation).drives_mut()[link.index] = None;
@@ -163,13 +163,13 @@ fn a_knob_turns_within_its_limits_and_stops() {
 }
 
 #[test]
-fn the_same_scene_goes_the_same_way_to_the_bit() {
-    let end = || {
+fn repeated_simulations_are_bit_identical() {
+    let final_hash = || {
         let mut sim = settled();
         let link = link(&sim, "cabinet.top_drawer");
         sim.world.articulation_mut(link.articulation).state.v[link.index] = -0.3;
         run(&mut sim, 0.5);
         state_hash(&sim)
     };
-    assert_eq!(end(), end());
+    assert_eq!(final_hash(), final_hash());
 }
