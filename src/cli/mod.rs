@@ -1,92 +1,91 @@
-//! The command line: flags, exit codes, progress.
+//! The `softvt` command.
+//!
+//! `args` defines the arguments as plain data, `parse` fills them in, `commands` has one file per command, and `run` is
+//! the engine that the commands share.
 
 mod args;
 mod commands;
 mod error;
 mod output;
+mod parse;
 mod run;
 
 use std::{panic, process::ExitCode, thread, time::Duration};
 
 use args::Command;
 use error::{CliError, Exit};
+use output::notice;
 
 use crate::{rollout::cancel, text};
+
+/// Time after Ctrl-C in which a command must finish its current step. A C function of Lua may never return.
+const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(3);
 
 /// Runs the command line of this process and returns its exit code.
 pub fn main() -> ExitCode {
     panic::set_hook(Box::new(|info| {
-        text::eprint_line(&format!(
-            "softvt: internal error: {info}\nThis is a defect of softvt; please report it with the command that led here."
+        notice(format!(
+            "internal error: {info}\nThis is a bug of softvt; please report it with the command that caused it."
         ));
     }));
-    let outcome = panic::catch_unwind(run);
-    let code = match outcome {
+    let exit = match panic::catch_unwind(run_process) {
         Ok(Ok(())) => Exit::Success,
-        Ok(Err(failure)) => {
-            if !failure.message.is_empty() {
-                text::eprint_line(&format!("softvt: {}", text::escape_control(&failure.message)));
+        Ok(Err(error)) => {
+            if !error.message.is_empty() {
+                notice(text::escape_control(&error.message));
             }
-            failure.exit
+            error.exit
         }
         Err(_) => Exit::Internal,
     };
-    code.into()
+    exit.into()
 }
 
-fn run() -> Result<(), CliError> {
-    watch_interrupts();
+fn run_process() -> Result<(), CliError> {
+    handle_interrupts();
     let words: Vec<String> = std::env::args_os()
         .map(|word| {
             word.into_string().map_err(|w| CliError::input(format!("argument {w:?} is not valid UTF-8")))
         })
         .collect::<Result<_, _>>()?;
-    dispatch(&words)
-}
-
-fn dispatch(words: &[String]) -> Result<(), CliError> {
-    match args::parse(words)? {
-        Command::Run(run) => commands::run::run(&run),
-        Command::List { what, json } => commands::list::run(&what, json),
-        Command::Init { dir, task: false } => commands::init::run(&dir),
-        Command::Init { dir, task: true } => commands::init::task(&dir),
-        Command::Check(run) => commands::check::run(&run),
-        Command::Compare { first, second, json } => commands::compare::run(&first, &second, json),
-        Command::Merge { out, shards } => commands::merge::run(&out, &shards),
-        Command::Replay { dir, which } => commands::replay::run(&dir, which),
-        Command::Report { runs, out } => commands::report::run(&runs, &out),
-        Command::View(view) => commands::view::run(&view),
-        Command::Serve(serve) => commands::serve::run(&serve),
-        Command::Record(record) => commands::record::run(&record),
-        Command::DatasetCheck { path, replays } => commands::dataset::check(&path, replays),
-        Command::DatasetImport(import) => commands::dataset::import::run(&import),
-        Command::DatasetStats { path, out, json } => commands::dataset::stats(&path, out.as_deref(), json),
-        Command::DatasetExport(export) => commands::dataset::export::run(&export),
-        Command::Doctor => commands::doctor::run(),
-        Command::Shown => Ok(()),
+    match parse::parse(&words)? {
+        Some(command) => dispatch(&command),
+        None => Ok(()),
     }
 }
 
-/// How long what runs may take to end in order; a library function of Lua that never returns would take for ever.
-const PATIENCE: Duration = Duration::from_secs(3);
+fn dispatch(command: &Command) -> Result<(), CliError> {
+    match command {
+        Command::Run(args) => commands::run::run(args),
+        Command::Check(args) => commands::check::run(args),
+        Command::View(args) => commands::view::run(args),
+        Command::Record(args) => commands::record::run(args),
+        Command::Replay(args) => commands::replay::run(args),
+        Command::Report(args) => commands::report::run(args),
+        Command::Compare(args) => commands::compare::run(args),
+        Command::Merge(args) => commands::merge::run(args),
+        Command::Serve(args) => commands::serve::run(args),
+        Command::Dataset(command) => commands::dataset::run(command),
+        Command::List(args) => commands::list::run(args),
+        Command::Init(args) => commands::init::run(args),
+        Command::Doctor => commands::doctor::run(),
+    }
+}
 
-/// The first Ctrl-C ends the run in order, the second at once.
-fn watch_interrupts() {
-    let end = || std::process::exit(Exit::Interrupted as i32);
+/// Makes the first Ctrl-C finish the current step and keep its results, and the second end the process at once.
+fn handle_interrupts() {
+    let exit = || std::process::exit(Exit::Interrupted as i32);
     let handler = move || {
         if cancel::request() {
-            end();
+            exit();
         }
-        text::eprint_line("softvt: stopping; press again to stop at once");
+        notice("finishing the current step; press Ctrl-C again to quit");
         thread::spawn(move || {
-            thread::sleep(PATIENCE);
-            text::eprint_line(&format!(
-                "softvt: interrupted; something did not end within {} s",
-                PATIENCE.as_secs()
-            ));
-            end();
+            thread::sleep(SHUTDOWN_TIMEOUT);
+            notice(format!("interrupted; a step did not finish within {} s", SHUTDOWN_TIMEOUT.as_secs()));
+            exit();
         });
     };
-    // Without a handler Ctrl-C still ends the process; finished episodes are on disk either way.
+    // Without a handler Ctrl-C still ends the process. Finished episodes are on disk either way.
     let _ = ctrlc::set_handler(handler);
 }

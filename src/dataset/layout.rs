@@ -87,6 +87,12 @@ impl TaskPaths {
     }
 }
 
+/// True for an HDF5 file and for the folder of a recording, finished or not.
+pub fn is_dataset(path: &Path) -> bool {
+    let is_hdf5 = path.extension().is_some_and(|extension| extension == "hdf5" || extension == "h5");
+    is_hdf5 || path.join(DATASET).is_file() || path.join(RECORDING).is_file()
+}
+
 /// Run folder of the attempts at a suite.
 pub fn attempts(root: &Path, suite: &str) -> PathBuf {
     root.join(ATTEMPTS).join(suite)

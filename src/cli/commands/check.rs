@@ -1,4 +1,4 @@
-//! `softvt check`: whether a script is right, without running what it plans.
+//! `softvt check`: validation of a script without running its plan.
 
 use std::{
     path::PathBuf,
@@ -8,11 +8,16 @@ use std::{
 use crate::{
     benchmark::{Goal, Plan, Suite, Task},
     cli::{
+        args::CheckArgs,
         error::CliError,
-        output::print,
-        run::config::RunConfig,
-        run::selection::check_distinct_out_dirs,
-        run::{conditions, suite_run::SuiteRun},
+        output::{counted, print},
+        run::{
+            conditions,
+            config::{RunConfig, thread_count},
+            policy::PolicyConfig,
+            selection::check_distinct_out_dirs,
+            suite_run::SuiteRun,
+        },
     },
     parallel,
     rollout::{AssetCache, SensorAssets, cancel, target_asset},
@@ -21,79 +26,94 @@ use crate::{
     text,
 };
 
-/// Reads a script, makes its plan, and builds the first scene of every task; nothing is settled, run or drawn.
+/// Assets that the checks of several suites share.
+struct SharedAssets {
+    assets: AssetCache,
+    sensor_assets: SensorAssets,
+}
+
+/// Loads a script and builds the first scene of every task. Nothing is settled, run or rendered.
 ///
 /// # Errors
-/// The first thing that is wrong.
-pub(crate) fn run(run: &RunConfig) -> Result<(), CliError> {
-    let loaded = script::load(&run.file, &run.script_words).map_err(CliError::input)?;
-    let file = run.file.display();
-    // Suites have assets in common.
-    let made = (AssetCache::rough(), SensorAssets::default());
+/// The first thing that is not valid.
+pub(crate) fn run(args: &CheckArgs) -> Result<(), CliError> {
+    let config = RunConfig::of_script(&args.script)?;
+    let config = &RunConfig { policy: PolicyConfig::load(&args.policy)?, ..config };
+    let loaded = script::load(&config.file, &config.script_options).map_err(CliError::input)?;
+    let shared = SharedAssets { assets: AssetCache::rough(), sensor_assets: SensorAssets::default() };
     match &loaded.plan {
-        Plan::Suite(suite) => suite_is_right(run, &loaded, suite, &made)?,
-        Plan::Suites { suites } => {
-            check_distinct_out_dirs(run, suites)?;
-            suites.iter().try_for_each(|suite| suite_is_right(run, &loaded, suite, &made))?;
-        }
+        Plan::Suite(suite) => check_suite(config, &loaded, suite, &shared)?,
+        Plan::Suites { suites } => check_suites(config, &loaded, suites, &shared)?,
         Plan::Conditions { suites, conditions: list, .. } => {
-            check_distinct_out_dirs(run, suites)?;
-            suites.iter().try_for_each(|suite| suite_is_right(run, &loaded, suite, &made))?;
-            conditions::check(run, &loaded, (suites, list))?;
+            check_suites(config, &loaded, suites, &shared)?;
+            conditions::check(config, &loaded, suites, list)?;
         }
         Plan::Experiment { name, points, .. } => {
-            print(&format!("experiment {name}: {points} points; they are not run here\n"));
+            print(&format!("experiment {name}: {}, not run by this check\n", counted(*points, "point")));
         }
     }
-    print(&format!("{file}: nothing is wrong with it\n"));
+    print(&format!("{}: OK\n", config.file.display()));
     Ok(())
 }
 
-fn suite_is_right(
-    run: &RunConfig,
+fn check_suites(
+    config: &RunConfig,
+    loaded: &Loaded,
+    suites: &[Suite],
+    shared: &SharedAssets,
+) -> Result<(), CliError> {
+    check_distinct_out_dirs(config, suites)?;
+    suites.iter().try_for_each(|suite| check_suite(config, loaded, suite, shared))
+}
+
+fn check_suite(
+    config: &RunConfig,
     loaded: &Loaded,
     suite: &Suite,
-    (cache, looks): &(AssetCache, SensorAssets),
+    shared: &SharedAssets,
 ) -> Result<(), CliError> {
     let tasks: Vec<_> = suite.tasks.iter().collect();
-    let mut batch = SuiteRun::new(run, loaded, suite, (Vec::new(), PathBuf::new()))?.sharing(cache, looks);
-    let targets = first_targets(loaded, &batch, &tasks)?;
-    targets.into_iter().try_for_each(|target| batch.learn_limit(target))?;
-    let episodes = suite.episodes;
-    print(&format!("suite {}: {} tasks, {episodes} episodes each\n", suite.name, tasks.len()));
+    let mut run = SuiteRun::new(config, loaded, suite, Vec::new(), PathBuf::new())?
+        .with_assets(&shared.assets, &shared.sensor_assets);
+    let targets = check_first_scenes(loaded, &run, &tasks)?;
+    targets.into_iter().try_for_each(|target| run.read_limit(target))?;
+    print(&format!(
+        "suite {}: {}, {} each\n",
+        suite.name,
+        counted(tasks.len(), "task"),
+        counted(suite.episodes as usize, "episode")
+    ));
     for task in tasks {
         let expert = if task.expert { "" } else { ", no expert" };
-        let (way, object, target) = match &task.goal {
+        let (relation, object, target) = match &task.goal {
             Goal::On { object, target, .. } => ("on", object, target),
             Goal::In { object, target, .. } => ("in", object, target),
         };
-        let id = task.id;
-        print(&format!("{id:>4} {}: {object} {way} {target}{expert}\n", text::escape_control(&task.prompt)));
+        let (id, prompt) = (task.id, text::escape_control(&task.prompt));
+        print(&format!("{id:>4} {prompt}: {object} {relation} {target}{expert}\n"));
     }
     Ok(())
 }
 
-/// Builds and examines the first scene of every task, on all processors; the assets of their targets.
-fn first_targets(
+/// Builds and checks the first scene of every task on all processors. Returns the assets of their targets.
+fn check_first_scenes(
     loaded: &Loaded,
-    batch: &SuiteRun,
+    run: &SuiteRun,
     tasks: &[&Task],
 ) -> Result<Vec<Option<Arc<Asset>>>, CliError> {
-    // Opening a machine runs the whole script, so it is used for more than one task.
+    // Opening the scenes runs the whole script, so each thread takes idle ones before it opens others.
     let idle: Mutex<Vec<Scenes>> = Mutex::default();
-    let idle = || idle.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-    let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
     let mut targets = vec![None; tasks.len()];
-    let examine = |job: usize| {
+    let check = |job: usize| {
         let task = tasks[job];
-        let free = idle().pop();
-        let scenes = free.map_or_else(|| Scenes::open(loaded), Ok).map_err(CliError::input)?;
-        let (nominal, scene) = scenes.of(&batch.request(task, 0)).map_err(CliError::input)?;
-        idle().push(scenes);
-        batch.examine(task, scene)?;
+        let taken = parallel::lock(&idle).pop();
+        let scenes = taken.map_or_else(|| Scenes::open(loaded), Ok).map_err(CliError::input)?;
+        let (nominal, scene) = scenes.of(&run.request(task, 0)).map_err(CliError::input)?;
+        parallel::lock(&idle).push(scenes);
+        run.check_scene(task, scene)?;
         Ok(target_asset(&nominal, task).cloned())
     };
-    parallel::run(tasks.len(), threads, cancel::requested, examine, |job, target| {
+    parallel::run(tasks.len(), thread_count(None), cancel::requested, check, |job, target| {
         targets[job] = target;
         Ok(())
     })?;

@@ -1,23 +1,25 @@
-//! `softvt compare A B`: what two runs of the same episodes differ in.
-
-use std::path::Path;
+//! `softvt compare A B`: differences of two runs of the same episodes.
 
 use crate::{
-    cli::{error::CliError, output::print},
+    cli::{
+        args::CompareArgs,
+        error::CliError,
+        output::{print, print_json},
+    },
     report::{comparison, stored_run},
 };
 
-/// Prints the paired differences of the run or runs in `second` from those in `first`.
+/// Prints the paired differences of the runs in the second folder from those in the first.
 ///
 /// # Errors
-/// A folder holds no run or two of one suite, or they share no episode.
-pub(crate) fn run(first: &Path, second: &Path, json: bool) -> Result<(), CliError> {
-    let [a, b] = [first, second].map(stored_run::load);
-    let (a, b) = (a.map_err(CliError::input)?, b.map_err(CliError::input)?);
-    let compared = comparison::compare(&a, &b).map_err(CliError::input)?;
-    print(&match json {
-        true => format!("{:#}\n", serde_json::json!(compared)),
-        false => comparison::table(&compared),
-    });
+/// A folder without a run or with two of one suite, or no common episode.
+pub(crate) fn run(args: &CompareArgs) -> Result<(), CliError> {
+    let first = stored_run::load(&args.first).map_err(CliError::input)?;
+    let second = stored_run::load(&args.second).map_err(CliError::input)?;
+    let compared = comparison::compare(&first, &second).map_err(CliError::input)?;
+    match args.json {
+        true => print_json(&compared),
+        false => print(&comparison::table(&compared)),
+    }
     Ok(())
 }

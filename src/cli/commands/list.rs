@@ -1,68 +1,94 @@
-//! `softvt list`: what there is, in the working folder and in the binary.
+//! `softvt list`: suites, tasks, assets, policies and profiles, in the working folder and in the binary.
 
 use std::{collections::BTreeSet, path::Path};
 
 use serde_json::{Value, json};
 
 use crate::{
-    benchmark::Plan,
-    cli::{args::policy::POLICIES, error::CliError, output::print},
+    benchmark::{Plan, Task},
+    cli::{
+        args::{ListArgs, ListKind, POLICIES},
+        error::CliError,
+        output::{print, print_json},
+    },
     policy::profile::PROFILES,
     script,
 };
 
-/// Lists suites, tasks, assets, policies or profiles.
+/// Lists what the arguments ask for.
 ///
 /// # Errors
 /// A suite in the working folder cannot be loaded.
-pub(crate) fn run(what: &str, as_json: bool) -> Result<(), CliError> {
-    let rows = match what {
-        "policies" => named(&POLICIES, "scripts/policies"),
-        "profiles" => named(&PROFILES, "scripts/profiles"),
-        "assets" => {
+pub(crate) fn run(args: &ListArgs) -> Result<(), CliError> {
+    let rows = match args.what {
+        ListKind::Policies => named(&POLICIES, "scripts/policies"),
+        ListKind::Profiles => named(&PROFILES, "scripts/profiles"),
+        ListKind::Assets => {
             scripts("assets").iter().map(|path| json!({ "name": stem(path), "file": path })).collect()
         }
-        "suites" => plans()?.iter().filter_map(|(path, plan)| row(path, plan)).collect(),
-        _ => plans()?.iter().flat_map(|(path, plan)| tasks(path, plan)).collect::<Vec<_>>(),
+        ListKind::Suites => plans()?.iter().filter_map(|(path, plan)| suite_row(path, plan)).collect(),
+        ListKind::Tasks => plans()?.iter().flat_map(|(path, plan)| task_rows(path, plan)).collect::<Vec<_>>(),
     };
-    if as_json {
-        print(&format!("{:#}\n", Value::Array(rows)));
-        return Ok(());
-    }
-    for row in &rows {
-        let cells = row.as_object().map(|o| o.values().map(text).collect::<Vec<_>>()).unwrap_or_default();
-        print(&format!("{}\n", cells.join("  ")));
+    if args.json {
+        print_json(&rows);
+    } else {
+        print(&table(&rows));
     }
     Ok(())
 }
 
-/// What is known by a name, and what is in Lua, which is named by its file.
-fn named(list: &[(&str, &str)], tree: &str) -> Vec<Value> {
-    let own = list.iter().map(|(name, about)| json!({ "name": name, "about": about }));
-    let files = scripts(tree).into_iter();
-    own.chain(files.map(|path| json!({ "name": path, "about": first_comment(&path) }))).collect()
+/// Formats rows as a table with the keys of all rows as headings. Numbers are right-aligned.
+fn table(rows: &[Value]) -> String {
+    let mut headings: Vec<&str> = Vec::new();
+    for key in rows.iter().filter_map(Value::as_object).flat_map(|row| row.keys()) {
+        if !headings.contains(&key.as_str()) {
+            headings.push(key);
+        }
+    }
+    let cell = |row: &Value, key: &str| match &row[key] {
+        Value::Null => String::new(),
+        Value::String(text) => text.clone(),
+        Value::Array(items) => {
+            items.iter().map(|item| item.as_str().unwrap_or_default()).collect::<Vec<_>>().join(", ")
+        }
+        other => other.to_string(),
+    };
+    let mut lines = vec![String::new(); rows.len() + 1];
+    for (column, key) in headings.iter().enumerate() {
+        let cells = rows.iter().map(|row| cell(row, key));
+        let cells: Vec<String> = std::iter::once((*key).to_owned()).chain(cells).collect();
+        let width = cells.iter().map(|cell| cell.chars().count()).max().unwrap_or(0);
+        let is_number = rows.iter().all(|row| row[*key].is_number() || row[*key].is_null());
+        for (line, cell) in lines.iter_mut().zip(cells) {
+            if column > 0 {
+                line.push_str("  ");
+            }
+            *line += &if is_number { format!("{cell:>width$}") } else { format!("{cell:width$}") };
+        }
+    }
+    lines.iter().map(|line| format!("{}\n", line.trim_end())).collect()
 }
 
-/// The first sentence of a Lua file, if it begins with one.
-fn first_comment(path: &str) -> String {
+/// Built-in entries, and Lua files, which are named by their paths.
+fn named(built_in: &[(&str, &str)], folder: &str) -> Vec<Value> {
+    let built_in = built_in.iter().map(|(name, about)| json!({ "name": name, "about": about }));
+    let files = scripts(folder).into_iter();
+    built_in.chain(files.map(|path| json!({ "name": path, "about": first_sentence(&path) }))).collect()
+}
+
+/// The first sentence of the comment at the top of a Lua file; empty without a comment.
+fn first_sentence(path: &str) -> String {
     let text = std::fs::read_to_string(path).ok();
     let text = text.or_else(|| String::from_utf8(script::embedded(path)?.to_vec()).ok()).unwrap_or_default();
-    let lines = text.lines().map_while(|line| line.strip_prefix("--"));
-    let words: Vec<&str> = lines.map(str::trim).take_while(|line| !line.is_empty()).collect();
-    let words = words.join(" ");
-    words
-        .split_once(". ")
-        .map_or(words.clone(), |(first, _)| first.to_owned())
-        .trim_end_matches('.')
-        .to_owned()
+    let comment = text.lines().map_while(|line| line.strip_prefix("--")).map(str::trim);
+    let comment: Vec<&str> = comment.take_while(|line| !line.is_empty()).collect();
+    let comment = comment.join(" ");
+    let sentence = comment.split_once(". ").map_or(comment.as_str(), |(first, _)| first);
+    sentence.trim_end_matches('.').to_owned()
 }
 
-fn text(value: &Value) -> String {
-    value.as_str().map_or_else(|| value.to_string(), str::to_owned)
-}
-
-/// A suite, or a file of several; `suites` names those.
-fn row(path: &str, plan: &Plan) -> Option<Value> {
+/// A suite, or a file of several suites with their names.
+fn suite_row(path: &str, plan: &Plan) -> Option<Value> {
     let suites = plan.suites();
     let tasks: usize = suites.iter().map(|suite| suite.tasks.len()).sum();
     let names: Vec<&str> = suites.iter().map(|suite| suite.name.as_str()).collect();
@@ -77,31 +103,37 @@ fn row(path: &str, plan: &Plan) -> Option<Value> {
         row["suites"] = json!(names);
     }
     if let Plan::Conditions { conditions, .. } = plan {
+        // The reference counts too.
         row["conditions"] = json!(conditions.len() + 1);
     }
     Some(row)
 }
 
-/// The tasks of a suite; those of a file of several are its suites'.
-fn tasks(path: &str, plan: &Plan) -> Vec<Value> {
+/// The tasks of a suite. A file of several suites has none of its own.
+fn task_rows(path: &str, plan: &Plan) -> Vec<Value> {
     let Plan::Suite(suite) = plan else { return Vec::new() };
-    let row = |task: &crate::benchmark::Task| json!({ "suite": suite.name, "task": task.id, "file": path, "layout": task.layout, "prompt": task.prompt });
+    let row = |task: &Task| {
+        json!({
+            "suite": suite.name,
+            "task": task.id,
+            "file": path,
+            "layout": task.layout,
+            "prompt": task.prompt,
+        })
+    };
     suite.tasks.iter().map(row).collect()
 }
 
 fn stem(path: &str) -> String {
-    Path::new(path).file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default()
+    Path::new(path).file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
-/// Lua files directly under `tree`, on disk and embedded, by name.
-fn scripts(tree: &str) -> BTreeSet<String> {
-    let mut found: BTreeSet<String> = script::embedded_scripts(tree).into_iter().collect();
-    let entries = std::fs::read_dir(tree).into_iter().flatten().flatten();
-    found.extend(
-        entries
-            .map(|entry| format!("{tree}/{}", entry.file_name().to_string_lossy()))
-            .filter(|path| path.ends_with(".lua")),
-    );
+/// Lua files directly in a folder, on disk and embedded, in alphabetical order.
+fn scripts(folder: &str) -> BTreeSet<String> {
+    let mut found: BTreeSet<String> = script::embedded_scripts(folder).into_iter().collect();
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let paths = entries.map(|entry| format!("{folder}/{}", entry.file_name().to_string_lossy()));
+    found.extend(paths.filter(|path| path.ends_with(".lua")));
     found
 }
 

@@ -1,15 +1,15 @@
 //! One file per command. Commands do not use each other; what they share is in [`super::run`].
 
-pub(crate) mod check;
-pub(crate) mod compare;
-pub(crate) mod dataset;
-pub(crate) mod doctor;
-pub(crate) mod init;
-pub(crate) mod list;
-pub(crate) mod merge;
-pub(crate) mod record;
-pub(crate) mod replay;
-pub(crate) mod report;
-pub(crate) mod run;
-pub(crate) mod serve;
-pub(crate) mod view;
+pub(super) mod check;
+pub(super) mod compare;
+pub(super) mod dataset;
+pub(super) mod doctor;
+pub(super) mod init;
+pub(super) mod list;
+pub(super) mod merge;
+pub(super) mod record;
+pub(super) mod replay;
+pub(super) mod report;
+pub(super) mod run;
+pub(super) mod serve;
+pub(super) mod view;

@@ -1,60 +1,55 @@
-//! `softvt record`: demonstrations of the tasks of a suite, those kept that are safe and reach the goal.
+//! `softvt record`: demonstrations of the tasks of a suite that are safe and reach the goal.
 
 use serde_json::json;
 
 use crate::{
     cli::{
+        args::RecordArgs,
         error::CliError,
-        run::selection::select_tasks,
         run::{
-            grip_recorder::note_grips,
-            recording::{self, AttemptPlan, RecordingConfig, SuiteRecording, suites_of},
+            grip_recorder::record_grips,
+            policy::PolicyConfig,
+            recording::{self, AttemptPlan, RecordingConfig, SuiteRecording},
+            selection::{select_suites, select_tasks},
         },
     },
     script,
 };
 
-/// What to record.
-#[derive(Clone, Debug)]
-pub(crate) struct Record {
-    /// What is kept, and where.
-    pub output: RecordingConfig,
-    /// Demonstrations a task.
-    pub demos: u32,
-    /// Most attempts a task.
-    pub attempts: u32,
-}
+/// Attempts per demonstration, unless `--attempts` is given.
+const ATTEMPTS_PER_DEMO: u32 = 4;
+/// Least number of attempts per task, unless `--attempts` is given.
+const MIN_ATTEMPTS: u32 = 20;
 
-/// Records what the command line asks for.
+/// Records the demonstrations that the arguments ask for.
 ///
 /// # Errors
-/// The script is no suite, the folder holds something else, an attempt or a file fails, too few attempts are good.
-pub(crate) fn run(record: &Record) -> Result<(), CliError> {
-    let Record { output, demos, attempts } = record;
-    let run = &output.run;
-    let loaded = script::load(&run.file, &run.script_words).map_err(CliError::input)?;
-    let suites = suites_of("record", run, &loaded.plan)?;
-    let names: Vec<String> = suites.iter().map(|suite| run.name_of(suite)).collect();
-    let asked = json!({
+/// The script has no suite, the folder contains something else, an attempt or a file fails, or too few attempts are good.
+pub(crate) fn run(args: &RecordArgs) -> Result<(), CliError> {
+    let config = RecordingConfig::new(&args.script, &args.recording, &args.tasks)?
+        .with_policy(PolicyConfig::load(&args.policy)?);
+    let default_attempts = args.demos.saturating_mul(ATTEMPTS_PER_DEMO).max(MIN_ATTEMPTS);
+    let plan =
+        AttemptPlan::First { demos: args.demos, max_attempts: args.attempts.unwrap_or(default_attempts) };
+    let run = &config.run;
+    let loaded = script::load(&run.file, &run.script_options).map_err(CliError::input)?;
+    let suites = select_suites("record", run, &loaded.plan)?;
+    let names: Vec<String> = suites.iter().map(|suite| run.suite_name(suite)).collect();
+    let request = json!({
         "softvt": env!("CARGO_PKG_VERSION"),
-        "demos": demos,
-        "pictures": output.pictures,
-        "privileged": output.privileged,
+        "demos": args.demos,
+        "pictures": config.images_in_hdf5,
+        "privileged": config.with_privileged,
         "suites": names,
     });
-    recording::record_all(output, &asked, || {
-        let session = |suite| {
-            let wanted = AttemptPlan::First { demos: *demos, attempts: *attempts };
-            SuiteRecording::new(
-                output,
-                (&loaded, suite),
-                (select_tasks(run, suite)?, wanted),
-                |batch, grips| {
-                    note_grips(run, batch, grips);
-                    Ok(())
-                },
-            )
+    recording::record_all(&config, &request, || {
+        let prepare = |suite| {
+            let tasks = select_tasks(run, suite)?;
+            SuiteRecording::new(&config, &loaded, suite, tasks, plan.clone(), |suite_run, log| {
+                record_grips(run, suite_run, log);
+                Ok(())
+            })
         };
-        suites.iter().map(|suite| session(*suite)).collect()
+        suites.iter().copied().map(prepare).collect()
     })
 }

@@ -1,200 +1,112 @@
-//! `softvt replay RUN EPISODE`: simulates a recorded episode again and asks whether every byte comes out the same.
+//! `softvt replay RUN EPISODE`: simulation of a recorded episode, compared with its record byte by byte.
 
-use std::path::{Path, PathBuf};
-
-use serde_json::{Value, json};
+use std::path::Path;
 
 use crate::{
-    benchmark::{Plan, Suite, seed::Split},
     cli::{
-        commands::dataset,
+        args::{EpisodeSelector, ReplayArgs},
         error::CliError,
-        output::print,
-        run::config::RunConfig,
-        run::selection::select_tasks,
-        run::{policy::PolicyConfig, resimulate, suite_run::SuiteRun},
+        output::{counted, print},
+        run::{
+            demo_replay::{DemoRef, check_complete, demos_of, replay_demos},
+            resimulate,
+            selection::EpisodeIndex,
+            stored_episode,
+        },
+    },
+    dataset::{
+        layout::is_dataset,
+        manifest::{self, ManifestEntry},
     },
     evaluation::record::EpisodeRecord,
-    policy::Action,
     report::{
         actions,
         stored_run::{self, StoredRun},
     },
-    script,
 };
 
-/// Which episode of a run: `TASK/EPISODE`, or the number of its line from 0.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum EpisodeSelector {
-    /// A line.
-    Line(usize),
-    /// A task's episode.
-    Of(usize, u32),
-}
-
-/// Reads which episode is meant.
+/// Simulates an episode of a run or a demonstration of a dataset again, by its recorded actions.
 ///
 /// # Errors
-/// A fragment for people.
-pub(crate) fn which(word: &str) -> Result<EpisodeSelector, String> {
-    let pair = word
-        .split_once('/')
-        .and_then(|(task, e)| Some(EpisodeSelector::Of(task.parse().ok()?, e.parse().ok()?)));
-    let found = pair.or_else(|| word.parse().ok().map(EpisodeSelector::Line));
-    found.ok_or_else(|| {
-        "expected TASK/EPISODE such as 3/0, or the number of a line of episodes.jsonl from 0".to_owned()
-    })
-}
-
-/// Simulates the episode again by its recorded actions.
-///
-/// # Errors
-/// The run cannot be read, its scripts have changed since, or (exit code 1) something comes out different.
-pub(crate) fn run(dir: &Path, which: EpisodeSelector) -> Result<(), CliError> {
-    if dataset::is_dataset(dir) {
-        return dataset::replay(dir, which);
+/// The run cannot be read, its scripts have changed since, or (exit code 1) the result differs.
+pub(crate) fn run(args: &ReplayArgs) -> Result<(), CliError> {
+    let dir = &args.run;
+    if is_dataset(dir) {
+        check_complete(dir)?;
+        return replay_demos(&[find_demo(dir, args.episode)?]);
     }
     let stored = stored_run::load(dir).map_err(CliError::input)?;
     let [stored] = &stored[..] else {
         let names: Vec<String> = stored.iter().map(|run| run.dir.display().to_string()).collect();
         return Err(CliError::input(format!(
-            "{} holds several runs; name one of {}",
+            "{} contains several runs; select one of {}",
             dir.display(),
             names.join(", ")
         )));
     };
-    let record = find(stored, which)?;
-    let path = actions::path(&stored.dir, record.identity.task, record.identity.episode);
+    let record = find_episode(stored, args.episode)?;
+    let index = EpisodeIndex::of(record);
+    let path = actions::path(&stored.dir, index.task, index.episode);
     let recorded = actions::read(&path).map_err(CliError::input)?;
-    let state = again(stored, record, recorded)?;
-    let (task, episode) = (record.identity.task, record.identity.episode);
-    print(&format!("task {task} episode {episode}: the same to the byte, final state {state}\n"));
-    Ok(())
+    let simulated = stored_episode::simulate(stored, record, recorded)?;
+    match resimulate::difference(record, &simulated)? {
+        None => {
+            print(&format!("{index}: byte-identical, final state {}\n", simulated.stats.state_hash));
+            Ok(())
+        }
+        Some(difference) => Err(CliError::internal(format!(
+            "{index} differs: {difference}; softvt doctor checks whether this machine computes the published results"
+        ))),
+    }
 }
 
-/// Simulates an episode of a run again by its actions, and returns the hash of its final state.
-///
-/// # Errors
-/// The scripts have changed since, or (exit code 1) something comes out different.
-pub(crate) fn again(
-    stored: &StoredRun,
-    record: &EpisodeRecord,
-    recorded: Vec<Action>,
-) -> Result<String, CliError> {
-    let simulated = simulate(stored, record, recorded)?;
-    let (task, episode) = (record.identity.task, record.identity.episode);
-    let Some(what) = resimulate::difference(record, &simulated)? else {
-        return Ok(simulated.stats.state_hash);
-    };
-    Err(CliError::internal(format!(
-        "task {task} episode {episode} does not come out the same: {what}; softvt doctor says whether this machine computes as published"
-    )))
-}
-
-/// An episode of a run once more by its actions, with what is not simulated again.
-///
-/// # Errors
-/// The scripts have changed since, or the episode cannot be run.
-pub(crate) fn simulate(
-    stored: &StoredRun,
-    record: &EpisodeRecord,
-    recorded: Vec<Action>,
-) -> Result<EpisodeRecord, CliError> {
-    let run = run_of(stored)?;
-    let loaded = script::load(&run.file, &run.script_words).map_err(CliError::input)?;
-    let suite = suite_of(&loaded.plan, &run, stored)?;
-    let (task, episode) = (record.identity.task, record.identity.episode);
-    let run = RunConfig { tasks: vec![task.to_string()], ..run };
-    let tasks = select_tasks(&run, suite)?;
-    let mut batch = SuiteRun::new(&run, &loaded, suite, (vec![(tasks[0], episode)], PathBuf::new()))?;
-    batch.split = split_of(stored)?;
-    batch.drive = resimulate::drive(recorded, record);
-    batch.origins.extend(record.identity.origin.iter().map(|origin| ((task, episode), (**origin).clone())));
-    batch.prepare(&tasks)?;
-    same_sources(stored, &batch)?;
-    Ok(resimulate::known(batch.episode(0, false, &batch.drive)?.record, record))
-}
-
-fn find(stored: &StoredRun, which: EpisodeSelector) -> Result<&EpisodeRecord, CliError> {
-    let found = match which {
+fn find_episode(stored: &StoredRun, selector: EpisodeSelector) -> Result<&EpisodeRecord, CliError> {
+    let found = match selector {
         EpisodeSelector::Line(line) => stored.records.get(line),
-        EpisodeSelector::Of(task, episode) => {
-            stored.records.iter().find(|r| (r.identity.task, r.identity.episode) == (task, episode))
+        EpisodeSelector::Episode { task, episode } => {
+            let index = EpisodeIndex { task, episode };
+            stored.records.iter().find(|record| EpisodeIndex::of(record) == index)
         }
     };
     found.ok_or_else(|| {
         CliError::input(format!(
-            "{} has no such episode; it has {}",
+            "{} has no such episode; it has {}: select one by TASK/EPISODE, or by its line number from 0",
             stored.dir.display(),
-            stored.records.len()
+            counted(stored.records.len(), "episode")
         ))
     })
 }
 
-/// Which list the episodes of a run are of.
-fn split_of(stored: &StoredRun) -> Result<Split, CliError> {
-    let named = |split: &Split| split.name() == stored.text("split");
-    let found = [Split::Validation, Split::Demonstration, Split::Experiment].into_iter().find(named);
-    found.ok_or_else(|| {
-        let dir = stored.dir.display();
-        CliError::input(format!("{dir}: there is no list of episodes {:?}", stored.text("split")))
-    })
-}
-
-/// The command that made a run.
-fn run_of(stored: &StoredRun) -> Result<RunConfig, CliError> {
-    let info = &stored.info;
-    let wrong = |field: &str| {
+fn find_demo(path: &Path, selector: EpisodeSelector) -> Result<DemoRef, CliError> {
+    let demos = demos_of(path)?;
+    let count = demos.len();
+    let not_found = || {
         CliError::input(format!(
-            "{}/run.json: it has no {field}, as runs of this version have",
-            stored.dir.display()
+            "{} has no such demonstration; it has {count}: select one by TASK/DEMO, or by its number from 0",
+            path.display()
         ))
     };
-    let texts = |value: &Value| -> Option<Vec<String>> {
-        value.as_array()?.iter().map(|text| text.as_str().map(str::to_owned)).collect()
-    };
-    let set = info["set"].as_array().and_then(|all| {
-        all.iter().map(|pair| texts(pair)?.try_into().ok().map(|[a, b]: [String; 2]| (a, b))).collect()
-    });
-    let shifts = info["shifts"].as_array().and_then(|all| {
-        all.iter().map(|pair| Some((pair[0].as_str()?.to_owned(), pair[1].as_f64()?))).collect()
-    });
-    Ok(RunConfig {
-        script_words: texts(&info["arguments"]).ok_or_else(|| wrong("arguments"))?,
-        seed: info["seed"].as_u64().ok_or_else(|| wrong("seed"))?,
-        twin: info["twin"].is_string(),
-        set: set.ok_or_else(|| wrong("set"))?,
-        shifts: shifts.ok_or_else(|| wrong("shifts"))?,
-        ..RunConfig::of(PathBuf::from(stored.text("script")), PolicyConfig::replay())
-    })
-}
-
-fn suite_of<'a>(plan: &'a Plan, run: &RunConfig, stored: &StoredRun) -> Result<&'a Suite, CliError> {
-    let suites: Vec<&Suite> = match plan {
-        Plan::Suite(suite) => vec![suite],
-        Plan::Suites { suites } => suites.iter().collect(),
-        _ => Vec::new(),
-    };
-    let found = suites.into_iter().find(|suite| suite.name == stored.text("suite"));
-    found.ok_or_else(|| {
-        CliError::input(format!("{} has no suite {:?} any more", run.file.display(), stored.text("suite")))
-    })
-}
-
-/// Refuses scripts and thresholds that are not what the run was made with.
-fn same_sources(stored: &StoredRun, batch: &SuiteRun) -> Result<(), CliError> {
-    let now = json!(batch.sources);
-    let known = stored.info["sources"].as_object().into_iter().flatten();
-    let changed: Vec<&str> = known
-        .filter(|(name, hash)| now.get(name.as_str()).is_some_and(|own| own != *hash))
-        .map(|(n, _)| n.as_str())
-        .collect();
-    if changed.is_empty() {
-        return Ok(());
+    match selector {
+        EpisodeSelector::Line(line) => demos.into_iter().nth(line).ok_or_else(not_found),
+        EpisodeSelector::Episode { task, episode } if path.is_dir() => {
+            let entries = manifest::read(path).map_err(CliError::input)?;
+            let matches = |entry: &&ManifestEntry| entry.task_id == task && entry.demo_id == episode as usize;
+            let found: Vec<&ManifestEntry> = entries.iter().filter(matches).collect();
+            match found[..] {
+                [entry] => Ok(DemoRef { file: path.join(&entry.hdf5_path), demo: entry.demo_id }),
+                [] => Err(not_found()),
+                _ => {
+                    let files: Vec<&str> = found.iter().map(|entry| entry.hdf5_path.as_str()).collect();
+                    Err(CliError::input(format!(
+                        "{}: several suites have a task {task}; select one of the files {}",
+                        path.display(),
+                        files.join(", ")
+                    )))
+                }
+            }
+        }
+        EpisodeSelector::Episode { episode, .. } => {
+            Ok(DemoRef { file: path.to_owned(), demo: episode as usize })
+        }
     }
-    Err(CliError::input(format!(
-        "{}: {} changed since the run was made; go back to what it was, or run anew",
-        stored.dir.display(),
-        changed.join(", ")
-    )))
 }

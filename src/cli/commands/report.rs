@@ -1,9 +1,8 @@
-//! `softvt report RUN…`: one page about one or several runs, and its tables as markdown and LaTeX.
-
-use std::path::{Path, PathBuf};
+//! `softvt report RUN…`: an HTML page about runs, and its tables as Markdown and LaTeX.
 
 use crate::{
-    cli::{error::CliError, run::calibration::make_folder},
+    cli::{args::ReportArgs, error::CliError, output::notice},
+    files,
     report::{
         page,
         run_summary::summarize_runs,
@@ -12,33 +11,32 @@ use crate::{
     },
 };
 
-/// What the LaTeX file needs.
-const LATEX_HEAD: &str =
+/// Comment at the top of the LaTeX file: the packages and engines it needs.
+const LATEX_HEADER: &str =
     "% Needs \\usepackage{booktabs}; of names in other alphabets, LuaLaTeX or XeLaTeX.\n";
 
-/// Writes `report.html`, `report.md` and `report.tex` into `out`.
+/// Writes `report.html`, `report.md` and `report.tex`.
 ///
 /// # Errors
-/// A folder holds no run, or a file cannot be written.
-pub(crate) fn run(dirs: &[PathBuf], out: &Path) -> Result<(), CliError> {
+/// A folder without a run, or a file that cannot be written.
+pub(crate) fn run(args: &ReportArgs) -> Result<(), CliError> {
     let mut stored = Vec::new();
-    for dir in dirs {
+    for dir in &args.runs {
         stored.extend(stored_run::load(dir).map_err(CliError::input)?);
     }
-    let judged = summarize_runs(stored);
-    for remark in judged.iter().flat_map(|judged| judged.run.remarks()) {
-        crate::text::eprint_line(&format!("softvt: {remark}"));
+    let summaries = summarize_runs(stored);
+    for remark in summaries.iter().flat_map(|summary| summary.run.remarks()) {
+        notice(remark);
     }
-    let all = all_tables(&judged);
-    let joined = |text: fn(&Table) -> String| all.iter().map(text).collect::<Vec<_>>().join("\n");
-    make_folder(out)?;
+    let tables = all_tables(&summaries);
+    let joined = |format: fn(&Table) -> String| tables.iter().map(format).collect::<Vec<_>>().join("\n");
     for (name, text) in [
-        ("report.html", page::page(&judged, out)),
+        ("report.html", page::page(&summaries, &args.out)),
         ("report.md", joined(Table::markdown)),
-        ("report.tex", LATEX_HEAD.to_owned() + &joined(Table::latex)),
+        ("report.tex", LATEX_HEADER.to_owned() + &joined(Table::latex)),
     ] {
-        crate::files::replace(&out.join(name), text).map_err(CliError::input)?;
+        files::replace(&args.out.join(name), text).map_err(CliError::input)?;
     }
-    crate::text::eprint_line(&format!("softvt: {}", out.join("report.html").display()));
+    notice(args.out.join("report.html").display());
     Ok(())
 }

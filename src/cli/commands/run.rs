@@ -1,130 +1,140 @@
-//! Carrying out a plan: a policy on suites, or an experiment.
+//! `softvt FILE.lua`: the plan of a script.
 
-use crate::cli::run::config::RunConfig;
-use crate::cli::run::selection::check_distinct_out_dirs;
-use crate::cli::run::selection::path_component;
-use crate::cli::run::selection::select_episodes;
-use crate::cli::run::selection::select_tasks;
-use crate::cli::run::suite_run::run_suite;
 use std::path::PathBuf;
 
 use crate::{
     benchmark::{Plan, Suite},
     cli::{
-        args::VideoSelection,
+        args::{RunArgs, VideoSelection},
         error::CliError,
-        output::print,
-        run::{conditions, experiment, recorded_policy::recorded, requirements, suite_run::SuiteRun},
+        output::{print, print_json},
+        run::{
+            conditions,
+            config::RunConfig,
+            experiment,
+            recorded_policy::find_replay_source,
+            requirements,
+            selection::{check_distinct_out_dirs, path_component, select_episodes, select_tasks},
+            suite_run::{SuiteRun, run_suite},
+        },
     },
     evaluation::summary::SuiteSummary,
     report::terminal,
     script::{self, Loaded},
 };
 
-/// Carries out the plan of a script.
+/// Runs the plan of a script: suites, conditions or an experiment.
 ///
 /// # Errors
-/// Anything that is wrong with the script, the flags, the folder or the policy.
-pub(crate) fn run(run: &RunConfig) -> Result<(), CliError> {
-    let loaded = script::load(&run.file, &run.script_words).map_err(CliError::input)?;
-    check_video(run, &loaded.plan)?;
-    check_recorded(run, &loaded.plan)?;
+/// The script, a flag, the folder or the policy is not valid, or an episode fails.
+pub(crate) fn run(args: &RunArgs) -> Result<(), CliError> {
+    let config = &RunConfig::of_run(args)?;
+    let refuse = |message: String| Err(CliError::input(message).prefixed(config.file.display()));
+    let loaded = script::load(&config.file, &config.script_options).map_err(CliError::input)?;
+    check_video_episodes(config, &loaded.plan)?;
+    check_recorded_episodes(config, &loaded.plan)?;
     match &loaded.plan {
         Plan::Suite(suite) => {
-            let summary = evaluate(run, &loaded, suite, out_dir(run, &run.name_of(suite), None))?;
-            let summaries = [summary];
-            show(run, &summaries, false);
-            requirements::check(&run.require, &summaries)
+            let out = config.out.clone().unwrap_or_else(|| next_run_dir(config, &config.suite_name(suite)));
+            let summary = evaluate(config, &loaded, suite, out)?;
+            match config.json {
+                true => print_json(&summary),
+                false => print(&terminal::table(&summary)),
+            }
+            requirements::check(&config.requirements, &[summary])
         }
         Plan::Suites { suites } => {
-            check_distinct_out_dirs(run, suites)?;
+            check_distinct_out_dirs(config, suites)?;
             let mut summaries = Vec::new();
             for suite in suites {
-                let name = run.name_of(suite);
-                summaries.push(evaluate(run, &loaded, suite, out_dir(run, &name, Some(&name)))?);
+                let name = config.suite_name(suite);
+                let out = match &config.out {
+                    Some(dir) => dir.join(path_component(&name)),
+                    None => next_run_dir(config, &name),
+                };
+                summaries.push(evaluate(config, &loaded, suite, out)?);
             }
-            show(run, &summaries, true);
-            requirements::check(&run.require, &summaries)
+            match config.json {
+                true => print_json(&summaries),
+                false => summaries.iter().for_each(|summary| print(&terminal::table(summary))),
+            }
+            requirements::check(&config.requirements, &summaries)
         }
         Plan::Conditions { name, suites, conditions } => {
-            if !run.require.is_empty() {
-                let message =
-                    "--require: it is about suites, and this file compares conditions; read conditions.json";
-                return Err(CliError::input(format!("{}: {message}", run.file.display())));
+            if !config.requirements.is_empty() {
+                return refuse(
+                    "--require: applies to suites, and this file compares conditions; read conditions.json"
+                        .to_owned(),
+                );
             }
-            check_distinct_out_dirs(run, suites)?;
-            conditions::run(run, &loaded, (suites, conditions), &out_dir(run, name, None))
+            check_distinct_out_dirs(config, suites)?;
+            let out = config.out.clone().unwrap_or_else(|| next_run_dir(config, name));
+            conditions::run(config, &loaded, suites, conditions, &out)
         }
         Plan::Experiment { name, points, columns } => {
-            let about_suites = [
-                ("--require", !run.require.is_empty()),
-                ("--shard", run.shard.is_some()),
-                ("--resume", run.resume),
+            let suite_flags = [
+                ("--require", !config.requirements.is_empty()),
+                ("--shard", config.shard.is_some()),
+                ("--resume", config.resume),
             ];
-            if let Some((flag, _)) = about_suites.iter().find(|(_, given)| *given) {
-                let message =
-                    format!("{}: {flag}: it is about suites, and this is an experiment", run.file.display());
-                return Err(CliError::input(message));
+            if let Some((flag, _)) = suite_flags.iter().find(|(_, is_given)| *is_given) {
+                return refuse(format!("{flag}: applies to suites, and this file is an experiment"));
             }
-            experiment::run(run, &loaded, name, *points, columns)
+            experiment::run(config, &loaded, name, *points, columns)
         }
     }
 }
 
-/// Every episode that `--video` names must be one of every suite's: before any of them runs.
-fn check_video(run: &RunConfig, plan: &Plan) -> Result<(), CliError> {
-    let Some(VideoSelection::Episodes(chosen)) = &run.video else { return Ok(()) };
+/// Checks that every suite has the episodes that `--video` selects.
+fn check_video_episodes(config: &RunConfig, plan: &Plan) -> Result<(), CliError> {
+    let Some(VideoSelection::Episodes(selected)) = &config.video else { return Ok(()) };
     for suite in plan.suites() {
-        let episodes = run.episodes.unwrap_or(suite.episodes);
-        if let Some(beyond) = chosen.iter().find(|episode| **episode >= episodes) {
-            let last = episodes.saturating_sub(1);
-            let message = format!(
-                "{}: --video={beyond}: suite {} runs the episodes 0 to {last} of each task; name one of them, or raise --episodes",
-                run.file.display(),
+        let episodes = config.episodes.unwrap_or(suite.episodes);
+        if let Some(beyond) = selected.iter().find(|episode| **episode >= episodes) {
+            let available = match episodes {
+                1 => "only episode 0".to_owned(),
+                count => format!("episodes 0 to {}", count.saturating_sub(1)),
+            };
+            return Err(CliError::input(format!(
+                "{}: --video={beyond}: suite {} runs {available} of each task; select one of them, or raise --episodes",
+                config.file.display(),
                 suite.name
-            );
-            return Err(CliError::input(message));
+            )));
         }
     }
     Ok(())
 }
 
-/// What was recorded must hold every episode of every suite: before any of them runs.
-fn check_recorded(run: &RunConfig, plan: &Plan) -> Result<(), CliError> {
-    if run.policy.recorded().is_none() {
+/// Checks that the recorded actions cover every episode of every suite.
+fn check_recorded_episodes(config: &RunConfig, plan: &Plan) -> Result<(), CliError> {
+    if config.policy.recorded().is_none() {
         return Ok(());
     }
     for suite in plan.suites() {
-        recorded(run, suite, &select_episodes(run, suite, &select_tasks(run, suite)?))?;
+        let jobs = select_episodes(config, suite, &select_tasks(config, suite)?);
+        find_replay_source(config, suite, &jobs)?;
     }
     Ok(())
 }
 
-/// Tables, or one JSON document: an object for a suite, an array for a list of suites.
-fn show(run: &RunConfig, summaries: &[SuiteSummary], list: bool) {
-    match summaries {
-        _ if !run.json => summaries.iter().for_each(|summary| print(&terminal::table(summary))),
-        [summary] if !list => print(&format!("{:#}\n", serde_json::json!(summary))),
-        _ => print(&format!("{:#}\n", serde_json::json!(summaries))),
-    }
+/// The first folder `runs/<name>-<policy>-NNN` that does not exist.
+fn next_run_dir(config: &RunConfig, name: &str) -> PathBuf {
+    let (name, policy) = (path_component(name), path_component(config.policy.name()));
+    (1..)
+        .map(|number| PathBuf::from(format!("runs/{name}-{policy}-{number:03}")))
+        .find(|dir| !dir.exists())
+        .unwrap_or_default()
 }
 
-/// The folder that was asked for (with one more level for one of several suites), or the next free one under `runs/`.
-fn out_dir(run: &RunConfig, suite: &str, level: Option<&str>) -> PathBuf {
-    let suite = path_component(suite);
-    let level = level.map(path_component);
-    match &run.out {
-        Some(dir) => level.map_or(dir.clone(), |level| dir.join(level)),
-        None => (1..)
-            .map(|n| PathBuf::from(format!("runs/{suite}-{}-{n:03}", path_component(run.policy.name()))))
-            .find(|dir| !dir.exists())
-            .unwrap_or_default(),
-    }
-}
-
-fn evaluate(run: &RunConfig, loaded: &Loaded, suite: &Suite, out: PathBuf) -> Result<SuiteSummary, CliError> {
-    let tasks = select_tasks(run, suite)?;
-    let mut batch = SuiteRun::new(run, loaded, suite, (select_episodes(run, suite, &tasks), out))?;
-    batch.prepare(&tasks)?;
-    Ok(run_suite(&batch, &tasks)?.summary)
+fn evaluate(
+    config: &RunConfig,
+    loaded: &Loaded,
+    suite: &Suite,
+    out: PathBuf,
+) -> Result<SuiteSummary, CliError> {
+    let tasks = select_tasks(config, suite)?;
+    let jobs = select_episodes(config, suite, &tasks);
+    let mut run = SuiteRun::new(config, loaded, suite, jobs, out)?;
+    run.prepare(&tasks)?;
+    Ok(run_suite(&run, &tasks)?.summary)
 }

@@ -3,60 +3,65 @@
 use crate::{
     benchmark::Plan,
     cli::{
-        args::View,
+        args::ViewArgs,
         error::CliError,
         output::print,
-        run::selection::select_tasks,
-        run::{calibration::make_folder, episode_artifacts::film_failure, suite_run::SuiteRun},
+        run::{
+            config::RunConfig,
+            episode_artifacts::video_error,
+            policy::PolicyConfig,
+            selection::{EpisodeJob, select_tasks},
+            suite_run::SuiteRun,
+        },
     },
+    files,
     report::video::{Caption, worst_moment, write_panels, write_stills, write_video},
     rollout::cancel,
     script,
 };
 
-/// Runs one episode and writes into the folder: `episode.mp4`, one of its pictures as `episode.png`, and stills of its
-/// first, worst and last states. Files of the same name are replaced.
+/// Runs one episode and writes `episode.mp4`, a frame of it as `episode.png`, and stills of the first, worst and last
+/// state of every camera and tactile sensor. Existing files are replaced.
 ///
 /// # Errors
-/// The script is no suite, the task or episode fails, a stream cannot be made or a file not written.
-pub(crate) fn run(view: &View) -> Result<(), CliError> {
-    let run = &view.run;
-    let loaded = script::load(&run.file, &run.script_words).map_err(CliError::input)?;
+/// The script is not a suite, the task or episode fails, or a file cannot be rendered or written.
+pub(crate) fn run(args: &ViewArgs) -> Result<(), CliError> {
+    let config = RunConfig::of_script(&args.script)?.with_out(Some(args.out.clone()))?;
+    let tasks = vec![args.task.clone()];
+    let config = RunConfig { tasks, policy: PolicyConfig::load(&args.policy)?, ..config };
+    let refuse = |message: String| Err(CliError::input(message).prefixed(config.file.display()));
+    let loaded = script::load(&config.file, &config.script_options).map_err(CliError::input)?;
     let Plan::Suite(suite) = &loaded.plan else {
-        let message = format!(
-            "{}: softvt view draws an episode of a suite, and this is none; name a file that returns softvt.suite",
-            run.file.display()
-        );
-        return Err(CliError::input(message));
+        return refuse("softvt view needs a single suite; name a file that returns softvt.suite".to_owned());
     };
-    let tasks = select_tasks(run, suite)?;
+    let tasks = select_tasks(&config, suite)?;
     let [task] = tasks[..] else {
-        let fits: Vec<String> = tasks.iter().map(|task| task.id.to_string()).collect();
-        let message = format!(
-            "{}: --task {:?} fits the tasks {}; name one by its index",
-            run.file.display(),
-            run.tasks[0],
-            fits.join(", ")
-        );
-        return Err(CliError::input(message));
+        let matches: Vec<String> = tasks.iter().map(|task| task.id.to_string()).collect();
+        let matches = matches.join(", ");
+        return refuse(format!(
+            "--task {:?} matches the tasks {matches}; select one by its index",
+            args.task
+        ));
     };
-    let dir = run.out.clone().unwrap_or_default();
-    let mut batch = SuiteRun::new(run, &loaded, suite, (vec![(task, view.episode)], dir.clone()))?;
-    batch.films = true;
-    batch.prepare(&[task])?;
-    make_folder(&dir)?;
-    let finished = batch.episode(0, true, &batch.drive)?;
+    let dir = &args.out;
+    let job = EpisodeJob { task, episode: args.episode };
+    let mut run = SuiteRun::new(&config, &loaded, suite, vec![job], dir.clone())?;
+    run.renders_episodes = true;
+    run.prepare(&[task])?;
+    files::create_folder(dir).map_err(CliError::input)?;
+    let finished = run.run_episode(job, true, &run.controllers)?;
     let caption = Caption::of(&finished.record);
-    let Some(mut film) = finished.recording else { return Ok(()) };
-    let last = film.frames.len().saturating_sub(1);
-    let worst = worst_moment(&film);
+    let Some(mut states) = finished.recording else { return Ok(()) };
+    let last = states.frames.len().saturating_sub(1);
+    let worst = worst_moment(&states);
     let moments = [("start", 0), ("worst", worst), ("end", last)];
     let mut written =
-        write_stills(&mut film, &moments, view.native, &dir, cancel::requested).map_err(film_failure)?;
-    written.push(dir.join("episode.png"));
-    write_panels(&mut film, &caption, worst, &dir.join("episode.png")).map_err(film_failure)?;
+        write_stills(&mut states, &moments, args.native, dir, cancel::requested).map_err(video_error)?;
+    let still = dir.join("episode.png");
+    write_panels(&mut states, &caption, worst, &still).map_err(video_error)?;
+    written.push(still);
     let video = dir.join("episode.mp4");
-    write_video(&mut film, &caption, &video, cancel::requested).map_err(film_failure)?;
+    write_video(&mut states, &caption, &video, cancel::requested).map_err(video_error)?;
     written.push(video);
     written.iter().for_each(|path| print(&format!("{}\n", path.display())));
     Ok(())

@@ -1,77 +1,71 @@
-//! Files that belong to a script: beside it, in the working folder, or embedded in the binary; and folders to write to.
+//! Calibration files of assets: next to the script, in the working folder, or embedded in the binary.
 
 use std::path::{Path, PathBuf};
 
 use crate::{
     cli::error::CliError,
     evaluation::{safety::DeformationLimit, thresholds::ThresholdFile},
+    files,
     scene::Asset,
     script,
 };
 
-/// Makes a folder and those above it.
-///
-/// # Errors
-/// The system refuses.
-pub(crate) fn make_folder(dir: &Path) -> Result<(), CliError> {
-    std::fs::create_dir_all(dir)
-        .map_err(|e| CliError::input(format!("cannot make the folder {}: {e}", dir.display())))
-}
+/// Folders above a script in which its calibration files are searched, the script's own included.
+const MAX_PARENT_FOLDERS: usize = 3;
 
-/// The text of `relative` (such as `assets/calibration/x.json`) and how messages name it: from the folders above the
-/// script, the working folder, or the embedded library, in this order.
-///
-/// # Errors
-/// The file exists but cannot be read.
-pub(crate) fn find(script: &Path, relative: &str) -> Result<Option<(String, String)>, CliError> {
-    let mut roots: Vec<PathBuf> =
-        script.parent().into_iter().flat_map(Path::ancestors).take(3).map(Path::to_path_buf).collect();
-    roots.push(PathBuf::new());
-    for root in roots {
-        let path = root.join(relative);
-        if path.is_file() {
-            let text = std::fs::read_to_string(&path)
-                .map_err(|e| CliError::input(format!("cannot read {}: {e}", path.display())))?;
-            return Ok(Some((text, path.display().to_string())));
-        }
-    }
-    let embedded = script::embedded(relative).and_then(|bytes| std::str::from_utf8(bytes).ok());
-    Ok(embedded.map(|text| (text.to_owned(), format!("{relative} (embedded)"))))
-}
-
-/// What is known of an asset's limit.
-pub(crate) enum Calibrated {
-    /// Nothing.
-    Never,
-    /// The file (as messages name it) is about another object of that name.
-    Another(String),
-    /// The limit, its file, and the file's text.
-    Yes {
-        /// The limit; none if no squeeze of the sweep was stable.
-        limit: Option<DeformationLimit>,
-        /// All that the file says.
-        file: Box<ThresholdFile>,
-        /// Path from the project's root.
+/// The calibration of an asset.
+pub(crate) enum Calibration {
+    Missing,
+    /// The file was computed for an asset of this name with another shape, material or friction.
+    OtherVersion {
         path: String,
-        /// The file's text.
+    },
+    Found {
+        /// `None` if no squeeze of the sweep was stable.
+        limit: Option<DeformationLimit>,
+        file: Box<ThresholdFile>,
+        /// Path from the root of the project.
+        relative_path: String,
+        /// The file as it was read.
         text: String,
     },
 }
 
-/// The calibrated limit of an asset, if it was calibrated as it is now.
+/// Finds the calibration of an asset.
 ///
 /// # Errors
-/// Its file cannot be read or is not a threshold file.
-pub(crate) fn calibrated(script: &Path, asset: &Asset) -> Result<Calibrated, CliError> {
+/// Its file cannot be read, or is not a threshold file.
+pub(crate) fn find(script: &Path, asset: &Asset) -> Result<Calibration, CliError> {
     let name = &asset.name;
-    let relative = format!("assets/calibration/{name}.json");
-    let Some((text, path)) = find(script, &relative)? else {
-        return Ok(Calibrated::Never);
+    let relative_path = format!("assets/calibration/{name}.json");
+    let Some(ProjectFile { text, path }) = find_file(script, &relative_path)? else {
+        return Ok(Calibration::Missing);
     };
     let file = ThresholdFile::parse(&text, &path).map_err(CliError::input)?;
-    // Released files carry no fingerprint and are taken at their word.
-    if file.fingerprints.get(name).is_some_and(|known| *known != asset.fingerprint()) {
-        return Ok(Calibrated::Another(path));
+    // The published files of SoftVTBench have no fingerprint; they are assumed to fit.
+    if file.fingerprints.get(name).is_some_and(|calibrated| *calibrated != asset.fingerprint()) {
+        return Ok(Calibration::OtherVersion { path });
     }
-    Ok(Calibrated::Yes { limit: file.limit(name), file: Box::new(file), path: relative, text })
+    Ok(Calibration::Found { limit: file.limit(name), file: Box::new(file), relative_path, text })
+}
+
+/// A file of a project, with its path as messages show it.
+struct ProjectFile {
+    text: String,
+    path: String,
+}
+
+/// Reads a file from the folders above the script, the working folder or the embedded library, in this order.
+fn find_file(script: &Path, relative_path: &str) -> Result<Option<ProjectFile>, CliError> {
+    let parents = script.parent().into_iter().flat_map(Path::ancestors).take(MAX_PARENT_FOLDERS);
+    for root in parents.map(Path::to_path_buf).chain([PathBuf::new()]) {
+        let path = root.join(relative_path);
+        if path.is_file() {
+            let text = files::read_text(&path).map_err(CliError::input)?;
+            return Ok(Some(ProjectFile { text, path: path.display().to_string() }));
+        }
+    }
+    let embedded = script::embedded(relative_path).and_then(|bytes| std::str::from_utf8(bytes).ok());
+    Ok(embedded
+        .map(|text| ProjectFile { text: text.to_owned(), path: format!("{relative_path} (embedded)") }))
 }

@@ -1,4 +1,4 @@
-//! `softvt.conditions`: suites as they are, then under each condition, each in a run folder of its own; and the table.
+//! `softvt.conditions`: every suite unchanged and under each condition, one run folder each, and their comparison.
 
 use std::path::{Path, PathBuf};
 
@@ -8,13 +8,15 @@ use crate::{
     benchmark::{Condition, ObjectType, REFERENCE, Suite, Task},
     cli::{
         error::CliError,
-        output::print,
-        run::config::RunConfig,
-        run::selection::{path_component, select_episodes, select_tasks},
-        run::suite_run::{is_finished, run_suite},
-        run::{calibration::make_folder, suite_run::SuiteRun},
+        output::{notice, print},
+        run::{
+            config::RunConfig,
+            selection::{path_component, select_episodes, select_tasks},
+            suite_run::{SuiteRun, is_finished, run_suite},
+        },
     },
     evaluation::summary::method_label,
+    files::replace,
     report::{
         condition_table::{ConditionOutcome, ConditionRow, ConditionTable, table},
         run_folder::RunFolder,
@@ -23,10 +25,10 @@ use crate::{
     text,
 };
 
-/// The comparison of all suites, in the folder of all runs.
+/// Name of the file with the comparison of all suites, in the folder above all runs.
 const FILE: &str = "conditions.json";
 
-/// `conditions.json`.
+/// Content of `conditions.json`.
 #[derive(Serialize)]
 struct ConditionsFile<'a> {
     softvt: &'a str,
@@ -36,174 +38,177 @@ struct ConditionsFile<'a> {
     suites: &'a [ConditionTable],
 }
 
-/// A suite under one condition, or as it is.
+/// A suite under one condition, or the unchanged reference.
 struct ConditionCase {
     name: String,
     shift: Vec<(String, f64)>,
     set: Vec<(String, String)>,
-    /// Its folder, from that of all.
+    /// Folder of the run, relative to that of all runs.
     folder: String,
-    /// The command line with the condition's shifts and settings after its own.
-    run: RunConfig,
+    /// The configuration with the shifts and settings of the condition after those of the command line.
+    config: RunConfig,
+    /// The reason for which the condition does not apply to the suite.
     not_applicable: Option<String>,
 }
 
-/// Runs every suite as it is and under every condition, and prints a table a suite. All that can be wrong without running
-/// is found before anything runs.
+/// Runs every suite unchanged and under each condition, and prints one table per suite. All scenes and folders are checked
+/// before the first episode runs.
 ///
 /// # Errors
-/// A condition that a suite does not know, a folder that holds a run, or an episode that fails; finished runs are kept.
+/// A condition that does not fit a suite, a folder that contains a run, or an episode that fails. Finished runs are kept.
 pub(crate) fn run(
-    run: &RunConfig,
+    config: &RunConfig,
     loaded: &Loaded,
-    (suites, conditions): (&[Suite], &[Condition]),
+    suites: &[Suite],
+    conditions: &[Condition],
     out: &Path,
 ) -> Result<(), CliError> {
     let cases: Vec<Vec<ConditionCase>> = suites
         .iter()
-        .map(|suite| cases(run, suite, conditions, suites.len() > 1))
+        .map(|suite| condition_cases(config, suite, conditions, suites.len() > 1))
         .collect::<Result<_, _>>()?;
-    let mut ready = Vec::new();
+    let mut prepared = Vec::new();
     for (suite, cases) in suites.iter().zip(&cases) {
-        let tasks = select_tasks(run, suite)?;
-        ready.push((prepared(loaded, suite, (cases, &tasks), out)?, tasks));
+        let tasks = select_tasks(config, suite)?;
+        prepared.push((prepare_runs(loaded, suite, cases, &tasks, out)?, tasks));
     }
-    let mut compared = Vec::new();
-    for ((suite, cases), (batches, tasks)) in suites.iter().zip(&cases).zip(ready) {
-        let rows = compare(run, suite, (cases, batches), &tasks)?;
-        if !run.json {
-            print(&table(&rows));
+    let mut tables = Vec::new();
+    for ((suite, cases), (runs, tasks)) in suites.iter().zip(&cases).zip(prepared) {
+        let compared = compare_conditions(config, suite, cases, runs, &tasks)?;
+        if !config.json {
+            print(&table(&compared));
         }
-        compared.push(rows);
+        tables.push(compared);
     }
-    write(run, loaded, &compared, out)
+    write(config, loaded, &tables, out)
 }
 
-/// Whether every condition can be applied to every suite; the first task of each is built.
+/// Checks that every condition can be applied to every suite, on the first task of each.
 ///
 /// # Errors
-/// The first thing that is wrong.
+/// The first condition or scene that is not valid.
 pub(crate) fn check(
-    run: &RunConfig,
+    config: &RunConfig,
     loaded: &Loaded,
-    (suites, conditions): (&[Suite], &[Condition]),
+    suites: &[Suite],
+    conditions: &[Condition],
 ) -> Result<(), CliError> {
     for suite in suites {
         let first: Vec<&Task> = suite.tasks.iter().take(1).collect();
-        let cases = cases(run, suite, conditions, false)?;
-        prepared(loaded, suite, (&cases, &first), Path::new(""))?;
+        let cases = condition_cases(config, suite, conditions, false)?;
+        prepare_runs(loaded, suite, &cases, &first, Path::new(""))?;
     }
     let names: Vec<&str> = conditions.iter().map(|condition| condition.name.as_str()).collect();
     print(&format!("conditions: {REFERENCE}, {}\n", text::escape_control(&names.join(", "))));
     Ok(())
 }
 
-fn cases(
-    run: &RunConfig,
+/// The reference and all conditions of a suite, in folders below one of the suite if there are several suites.
+fn condition_cases(
+    config: &RunConfig,
     suite: &Suite,
     conditions: &[Condition],
-    level: bool,
+    has_suite_folder: bool,
 ) -> Result<Vec<ConditionCase>, CliError> {
-    let kind = if run.twin { ObjectType::Rigid } else { suite.object_type };
-    let above = if level { format!("{}/", path_component(&run.name_of(suite))) } else { String::new() };
-    let mut found = vec![ConditionCase {
+    let object_type = if config.is_rigid_twin { ObjectType::Rigid } else { suite.object_type };
+    let parent = match has_suite_folder {
+        true => format!("{}/", path_component(&config.suite_name(suite))),
+        false => String::new(),
+    };
+    let mut cases = vec![ConditionCase {
         name: REFERENCE.to_owned(),
         shift: Vec::new(),
         set: Vec::new(),
-        folder: format!("{above}{REFERENCE}"),
-        run: run.clone(),
+        folder: format!("{parent}{REFERENCE}"),
+        config: config.clone(),
         not_applicable: None,
     }];
     for condition in conditions {
-        let folder = format!("{above}{}", path_component(&condition.name));
-        if let Some(same) = found.iter().find(|case| case.folder == folder) {
-            let message = format!(
-                "{}: the conditions {:?} and {:?} would share the folder {folder}; rename one",
-                run.file.display(),
+        let folder = format!("{parent}{}", path_component(&condition.name));
+        if let Some(same) = cases.iter().find(|case| case.folder == folder) {
+            return Err(CliError::input(format!(
+                "{}: the conditions {:?} and {:?} share the folder {folder}; rename one",
+                config.file.display(),
                 same.name,
                 condition.name
-            );
-            return Err(CliError::input(message));
+            )));
         }
-        let mut changed = run.clone();
+        let mut changed = config.clone();
         changed.shifts.extend(condition.shift.iter().cloned());
-        changed.set.extend(condition.set.iter().cloned());
-        found.push(ConditionCase {
+        changed.settings.extend(condition.set.iter().cloned());
+        cases.push(ConditionCase {
             name: condition.name.clone(),
             shift: condition.shift.clone(),
             set: condition.set.clone(),
             folder,
-            run: changed,
-            not_applicable: not_applicable(condition.only, kind),
+            config: changed,
+            not_applicable: not_applicable(condition.only, object_type),
         });
     }
-    Ok(found)
+    Ok(cases)
 }
 
-fn not_applicable(only: Option<ObjectType>, kind: ObjectType) -> Option<String> {
+fn not_applicable(only: Option<ObjectType>, object_type: ObjectType) -> Option<String> {
     match only? {
-        only if only == kind => None,
+        only if only == object_type => None,
         ObjectType::Deformable => Some("nothing that is judged deforms".to_owned()),
         ObjectType::Rigid => Some("it is for rigid objects".to_owned()),
     }
 }
 
-/// A batch for every case that applies; nothing has run yet.
-fn prepared<'a>(
+/// Prepares a run of every case that applies, without running an episode.
+fn prepare_runs<'a>(
     loaded: &'a Loaded,
     suite: &'a Suite,
-    (cases, tasks): (&'a [ConditionCase], &[&'a Task]),
+    cases: &'a [ConditionCase],
+    tasks: &[&'a Task],
     out: &Path,
 ) -> Result<Vec<Option<SuiteRun<'a>>>, CliError> {
-    let mut batches: Vec<Option<SuiteRun>> = Vec::new();
+    let mut runs: Vec<Option<SuiteRun>> = Vec::new();
     for case in cases {
         if case.not_applicable.is_some() {
-            batches.push(None);
+            runs.push(None);
             continue;
         }
-        let named = |failure: CliError| match case.name == REFERENCE {
-            true => failure,
-            false => failure.within(&format!("suite {}, condition {:?}", suite.name, case.name)),
+        let in_case = |error: CliError| match case.name == REFERENCE {
+            true => error,
+            false => error.within(&format!("suite {}, condition {:?}", suite.name, case.name)),
         };
         let dir: PathBuf = out.join(&case.folder);
-        // One that is finished is left alone, one that was broken off goes on if that is asked for.
-        if !(case.run.resume || is_finished(&dir)) {
+        // A finished run is left unchanged, and an interrupted one is continued on request.
+        if !(case.config.resume || is_finished(&dir)) {
             RunFolder::check(&dir)
-                .map_err(|e| CliError::input(format!("{}: {e}", case.run.file.display())))?;
+                .map_err(|error| CliError::input(error).prefixed(case.config.file.display()))?;
         }
-        let jobs = select_episodes(&case.run, suite, tasks);
-        let mut batch = SuiteRun::new(&case.run, loaded, suite, (jobs, dir)).map_err(named)?;
-        if let Some(Some(reference)) = batches.first() {
-            batch.share_limits(reference);
+        let jobs = select_episodes(&case.config, suite, tasks);
+        let mut run = SuiteRun::new(&case.config, loaded, suite, jobs, dir).map_err(in_case)?;
+        if let Some(Some(reference)) = runs.first() {
+            run.copy_limits(reference);
         }
-        batch.prepare(tasks).map_err(named)?;
-        batches.push(Some(batch));
+        run.prepare(tasks).map_err(in_case)?;
+        runs.push(Some(run));
     }
-    Ok(batches)
+    Ok(runs)
 }
 
-fn compare(
-    run: &RunConfig,
+fn compare_conditions(
+    config: &RunConfig,
     suite: &Suite,
-    (cases, batches): (&[ConditionCase], Vec<Option<SuiteRun>>),
+    cases: &[ConditionCase],
+    runs: Vec<Option<SuiteRun>>,
     tasks: &[&Task],
 ) -> Result<ConditionTable, CliError> {
-    let (mut reference, mut forces) = (None, false);
+    let (mut reference, mut force_observed) = (None, false);
     let mut rows = Vec::new();
-    for (case, batch) in cases.iter().zip(batches) {
+    for (case, run) in cases.iter().zip(runs) {
         let mut outcome = None;
-        if let Some(batch) = batch {
-            let name = text::escape_control(&case.name);
-            text::eprint_line(&format!(
-                "softvt: {}, {name} ({} of {})",
-                suite.name,
-                rows.len() + 1,
-                cases.len()
-            ));
-            let done = run_suite(&batch, tasks)?;
-            outcome = Some(ConditionOutcome::new(case.folder.clone(), &done.records, reference.as_deref()));
-            reference.get_or_insert(done.records);
-            forces |= done.summary.force_observed;
+        if let Some(run) = run {
+            let (name, number) = (text::escape_control(&case.name), rows.len() + 1);
+            notice(format!("{}, {name} ({number} of {})", suite.name, cases.len()));
+            let result = run_suite(&run, tasks)?;
+            outcome = Some(ConditionOutcome::new(case.folder.clone(), &result.records, reference.as_deref()));
+            reference.get_or_insert(result.records);
+            force_observed |= result.summary.force_observed;
         }
         rows.push(ConditionRow {
             condition: case.name.clone(),
@@ -213,26 +218,25 @@ fn compare(
             not_applicable: case.not_applicable.clone(),
         });
     }
-    let deformable = suite.object_type == ObjectType::Deformable && !run.twin;
-    let policy = method_label(run.policy.name(), run.policy.is_privileged(), forces);
-    Ok(ConditionTable { suite: run.name_of(suite), policy, deformable, rows })
+    let deformable = suite.object_type == ObjectType::Deformable && !config.is_rigid_twin;
+    let policy = method_label(config.policy.name(), config.policy.is_privileged(), force_observed);
+    Ok(ConditionTable { suite: config.suite_name(suite), policy, deformable, rows })
 }
 
-fn write(run: &RunConfig, loaded: &Loaded, compared: &[ConditionTable], out: &Path) -> Result<(), CliError> {
+fn write(config: &RunConfig, loaded: &Loaded, tables: &[ConditionTable], out: &Path) -> Result<(), CliError> {
     let document = ConditionsFile {
         softvt: env!("CARGO_PKG_VERSION"),
         script: &loaded.main,
-        policy: run.policy.name(),
-        seed: run.seed,
-        suites: compared,
+        policy: config.policy.name(),
+        seed: config.seed,
+        suites: tables,
     };
     let text = format!("{:#}\n", serde_json::json!(document));
-    make_folder(out)?;
     let path = out.join(FILE);
-    crate::files::replace(&path, &text).map_err(CliError::input)?;
-    if run.json {
+    replace(&path, &text).map_err(CliError::input)?;
+    if config.json {
         print(&text);
     }
-    text::eprint_line(&format!("softvt: {}", path.display()));
+    notice(path.display());
     Ok(())
 }

@@ -1,32 +1,33 @@
-//! Attempts at demonstrations: which are due, which are good, and how they are told.
+//! Selection of demonstrations: the attempts that are due, and those that are kept.
 
 use std::collections::BTreeMap;
 
 use crate::evaluation::record::{EpisodeRecord, Outcome};
 
-/// What the error of an attempt begins with that could not start as its demonstration says.
-pub(crate) const NO_START: &str = "cannot start as the demonstration says: ";
+/// Prefix of the error of an attempt that could not start from the state of its demonstration.
+pub(crate) const START_FAILED: &str = "cannot start as the demonstration says: ";
 
-/// Attempts that must be run before anything can be said of more; `done` says of each that is done whether it is good.
-pub(crate) fn due(done: &BTreeMap<u32, bool>, demos: u32, most: u32) -> Vec<u32> {
+/// Attempts to run next, so that the first `demos` good ones are found whatever the order in which attempts finish.
+/// `finished` maps each finished attempt to true if it is good; at most `max` attempts are run.
+pub(crate) fn due(finished: &BTreeMap<u32, bool>, demos: u32, max: u32) -> Vec<u32> {
     let mut end = 0;
     loop {
-        let missing: Vec<u32> = (0..end).filter(|attempt| !done.contains_key(attempt)).collect();
-        let good = done.range(..end).filter(|(_, good)| **good).count() as u32;
-        if !missing.is_empty() || good >= demos || end == most {
+        let missing: Vec<u32> = (0..end).filter(|attempt| !finished.contains_key(attempt)).collect();
+        let good = finished.range(..end).filter(|(_, good)| **good).count() as u32;
+        if !missing.is_empty() || good >= demos || end == max {
             return missing;
         }
-        end = (end + demos - good).min(most);
+        end = (end + demos - good).min(max);
     }
 }
 
-/// Why an attempt is no demonstration; none if it is.
-pub(crate) fn rejected(record: &EpisodeRecord) -> Option<String> {
+/// The reason for which an attempt is not kept. `None` if it is.
+pub(crate) fn rejection(record: &EpisodeRecord) -> Option<String> {
     let verdict = &record.verdict;
     let reason = match &record.outcome {
         _ if verdict.safety => return None,
         Outcome::Invalid { reason, .. } => return Some(format!("invalid ({reason})")),
-        Outcome::Error { message } if message.starts_with(NO_START) => "could not start",
+        Outcome::Error { message } if message.starts_with(START_FAILED) => "could not start",
         Outcome::Error { .. } => "ended by an error",
         _ if record.stats.gave_up.is_some() => "given up",
         _ if !verdict.goal => "goal not reached",
@@ -38,15 +39,15 @@ pub(crate) fn rejected(record: &EpisodeRecord) -> Option<String> {
     Some(reason.to_owned())
 }
 
-/// One attempt in one line.
-pub(crate) fn line(record: &EpisodeRecord) -> String {
+/// Formats an attempt as one line of progress.
+pub(crate) fn attempt_line(record: &EpisodeRecord) -> String {
     let id = &record.identity;
-    let said = match (rejected(record), &record.outcome) {
+    let result = match (rejection(record), &record.outcome) {
         (None, _) => "kept".to_owned(),
         (Some(reason), Outcome::Error { message }) => format!("not kept: {reason} ({message})"),
         (Some(reason), _) => format!("not kept: {reason}"),
     };
-    format!("task {} attempt {}: {said}, {:.1} s", id.task, id.episode, record.stats.time_s)
+    format!("task {} attempt {}: {result}, {:.1} s", id.task, id.episode, record.stats.time_s)
 }
 
 #[cfg(test)]
@@ -55,17 +56,17 @@ mod tests {
 
     use super::*;
 
-    /// Runs attempts of which `good` says what becomes, in any order, and returns which were run.
-    fn record(good: impl Fn(u32) -> bool, demos: u32, most: u32, broken_off: bool) -> (BTreeSet<u32>, usize) {
+    /// Runs attempts that are kept if `good` is true of their number. Returns their numbers and how many were kept. If
+    /// `interrupted`, only the last attempt of each round finishes.
+    fn record(good: impl Fn(u32) -> bool, demos: u32, max: u32, interrupted: bool) -> (BTreeSet<u32>, usize) {
         let mut done = BTreeMap::new();
         loop {
-            let mut next = due(&done, demos, most);
+            let mut next = due(&done, demos, max);
             if next.is_empty() {
                 let kept = done.values().filter(|good| **good).count();
                 return (done.into_keys().collect(), kept);
             }
-            if broken_off {
-                // The last of a round is all that is finished.
+            if interrupted {
                 next = next.split_off(next.len() - 1);
             }
             done.extend(next.into_iter().map(|attempt| (attempt, good(attempt))));
@@ -73,7 +74,7 @@ mod tests {
     }
 
     #[test]
-    fn which_attempts_are_run_depends_on_nothing_but_what_becomes_of_them() {
+    fn attempts_depend_only_on_the_outcomes_of_earlier_ones() {
         let good = |attempt: u32| !attempt.is_multiple_of(3);
         let (run, kept) = record(good, 10, 100, false);
         assert_eq!(run, (0..15).collect(), "attempt 14 is the tenth good one");
@@ -83,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn attempts_end_at_their_limit() {
+    fn attempts_stop_at_their_maximum() {
         assert_eq!(record(|_| false, 5, 12, false), ((0..12).collect(), 0));
         assert_eq!(record(|attempt| attempt == 3, 2, 8, true), ((0..8).collect(), 1));
     }

@@ -1,15 +1,11 @@
-//! What an episode leaves beside its line: its actions, its log for other scorers, its trace, its video and still.
+//! Files of an episode other than its line: actions, the log for SoftVTBench's scorer, trace, video and still.
 
-use crate::cli::run::config::RunConfig;
 use std::path::{Path, PathBuf};
 
 use crate::{
-    cli::{
-        args::VideoSelection,
-        error::CliError,
-        run::{calibration::make_folder, suite_run::folder_failure},
-    },
+    cli::{args::VideoSelection, error::CliError, run::config::RunConfig},
     evaluation::record::{EpisodeRecord, Identity},
+    files,
     report::{
         actions,
         softvtbench_files::{self, DebugFrame, DebugShape},
@@ -18,7 +14,7 @@ use crate::{
     rollout::{FinishedEpisode, ScoreFrame, cancel},
 };
 
-/// Where they are, and which of them are wanted.
+/// Paths of the files in a run folder, and which of them are requested.
 pub(crate) struct EpisodeArtifacts<'a> {
     dir: &'a Path,
     trace: bool,
@@ -26,99 +22,91 @@ pub(crate) struct EpisodeArtifacts<'a> {
 }
 
 impl<'a> EpisodeArtifacts<'a> {
-    /// Those of a run in the folder `dir`.
-    pub(crate) fn of(run: &'a RunConfig, dir: &'a Path) -> Self {
-        Self { dir, trace: run.trace.is_some(), video: run.video.as_ref() }
+    pub(crate) fn new(config: &'a RunConfig, dir: &'a Path) -> Self {
+        Self { dir, trace: config.trace.is_some(), video: config.video.as_ref() }
     }
 
-    /// Whether an episode may have to be drawn.
-    pub(crate) fn may_show(&self, episode: u32) -> bool {
+    /// True if a video of the episode may be requested, before its outcome is known.
+    pub(crate) fn may_render(&self, episode: u32) -> bool {
         match self.video {
             None => false,
-            Some(VideoSelection::Episodes(chosen)) => chosen.contains(&episode),
+            Some(VideoSelection::Episodes(selected)) => selected.contains(&episode),
             Some(VideoSelection::All | VideoSelection::Failed) => true,
         }
     }
 
-    /// Whether a finished episode has to be drawn.
-    fn shows(&self, record: &EpisodeRecord) -> bool {
-        let safe = self.video == Some(&VideoSelection::Failed) && record.verdict.safety;
-        self.may_show(record.identity.episode) && !safe
+    /// True if a video of the finished episode is requested.
+    fn is_rendered(&self, record: &EpisodeRecord) -> bool {
+        let is_excluded = self.video == Some(&VideoSelection::Failed) && record.verdict.safety;
+        self.may_render(record.identity.episode) && !is_excluded
     }
 
-    /// Those of a finished episode that are wanted and not there.
-    pub(crate) fn lost(&self, record: &EpisodeRecord) -> Vec<PathBuf> {
+    /// The requested files of a finished episode that do not exist.
+    pub(crate) fn missing(&self, record: &EpisodeRecord) -> Vec<PathBuf> {
         let id = &record.identity;
-        let mut wanted = vec![
+        let mut requested = vec![
             actions::path(self.dir, id.task, id.episode),
             softvtbench_files::debug_log_path(self.dir, id.task, id.episode),
         ];
         if self.trace {
-            wanted.push(self.trace_path(id));
+            requested.push(self.trace_path(id));
         }
-        if self.shows(record) {
-            wanted.push(video::video_path(self.dir, id.task, id.episode));
+        if self.is_rendered(record) {
+            requested.push(video::video_path(self.dir, id.task, id.episode));
             if !record.verdict.safety {
-                wanted.push(video::still_path(self.dir, id.task, id.episode));
+                requested.push(video::still_path(self.dir, id.task, id.episode));
             }
         }
-        wanted.retain(|path| !path.is_file());
-        wanted
+        requested.retain(|path| !path.is_file());
+        requested
     }
 
-    /// Writes all but the pictures.
+    /// Writes all files except video and still.
     ///
     /// # Errors
     /// A file cannot be written.
     pub(crate) fn write(&self, finished: &FinishedEpisode) -> Result<(), CliError> {
         let id = &finished.record.identity;
-        self.write_trace(finished)?;
+        if self.trace {
+            let mut text = String::new();
+            for step in &finished.trace {
+                text += &serde_json::to_string(step).map_err(CliError::input)?;
+                text.push('\n');
+            }
+            files::replace(&self.trace_path(id), &text).map_err(CliError::input)?;
+        }
         let path = softvtbench_files::debug_log_path(self.dir, id.task, id.episode);
-        softvtbench_files::write_debug_log(&path, id, &debug_frames(finished)).map_err(folder_failure)?;
+        softvtbench_files::write_debug_log(&path, id, &debug_frames(finished)).map_err(CliError::input)?;
         let path = actions::path(self.dir, id.task, id.episode);
-        actions::write(&path, &finished.actions).map_err(folder_failure)
+        actions::write(&path, &finished.actions).map_err(CliError::input)
     }
 
-    /// Draws what is wanted of an episode: its video, and of one that is not safe a still of its worst moment.
+    /// Renders the requested video, and for an unsafe episode a still of its worst moment. Consumes the recorded states.
     ///
     /// # Errors
-    /// A picture cannot be made or written.
-    pub(crate) fn draw(&self, finished: &mut FinishedEpisode) -> Result<(), CliError> {
-        let (record, Some(mut film)) = (&finished.record, finished.recording.take()) else { return Ok(()) };
-        if !self.shows(record) {
+    /// An image cannot be rendered or written.
+    pub(crate) fn render(&self, finished: &mut FinishedEpisode) -> Result<(), CliError> {
+        let (record, Some(mut states)) = (&finished.record, finished.recording.take()) else { return Ok(()) };
+        if !self.is_rendered(record) {
             return Ok(());
         }
         let (id, caption) = (&record.identity, Caption::of(record));
         let path = video::video_path(self.dir, id.task, id.episode);
-        make_folder(path.parent().unwrap_or(self.dir))?;
+        files::create_folder(path.parent().unwrap_or(self.dir)).map_err(CliError::input)?;
         if !record.verdict.safety {
-            let (worst, still) =
-                (video::worst_moment(&film), video::still_path(self.dir, id.task, id.episode));
-            video::write_panels(&mut film, &caption, worst, &still).map_err(film_failure)?;
+            let worst = video::worst_moment(&states);
+            let still = video::still_path(self.dir, id.task, id.episode);
+            video::write_panels(&mut states, &caption, worst, &still).map_err(video_error)?;
         }
-        video::write_video(&mut film, &caption, &path, cancel::requested).map_err(film_failure)
+        video::write_video(&mut states, &caption, &path, cancel::requested).map_err(video_error)
     }
 
     fn trace_path(&self, id: &Identity) -> PathBuf {
         self.dir.join(format!("trace/task_{:03}/episode_{:05}.jsonl", id.task, id.episode))
     }
-
-    fn write_trace(&self, finished: &FinishedEpisode) -> Result<(), CliError> {
-        if !self.trace {
-            return Ok(());
-        }
-        let path = self.trace_path(&finished.record.identity);
-        make_folder(path.parent().unwrap_or(self.dir))?;
-        let mut text = String::new();
-        for step in &finished.trace {
-            text += &serde_json::to_string(step).map_err(CliError::input)?;
-            text.push('\n');
-        }
-        crate::files::replace(&path, &text).map_err(CliError::input)
-    }
 }
 
-/// SoftVTBench's log of every control step, which its own scorer reads.
+/// The log of every control step that the scorer of SoftVTBench reads.
 fn debug_frames(finished: &FinishedEpisode) -> Vec<DebugFrame> {
     let identity = &finished.record.identity;
     let frame = |(step, frame): (usize, &ScoreFrame)| {
@@ -128,14 +116,14 @@ fn debug_frames(finished: &FinishedEpisode) -> Vec<DebugFrame> {
     };
     let mut frames: Vec<DebugFrame> = finished.frames.iter().enumerate().map(frame).collect();
     if frames.len() < finished.record.stats.steps as usize {
-        frames.push(broken_off(finished, frames.len()));
+        frames.push(aborted_frame(finished, frames.len()));
     }
     frames
 }
 
-/// The row of a control step in which the physics failed: if the rollout's peak is above that of all steps before, it is of
-/// this one.
-fn broken_off(finished: &FinishedEpisode, step: usize) -> DebugFrame {
+/// The row of a control step in which the physics failed. A peak of the rollout above that of all complete steps belongs to
+/// this step.
+fn aborted_frame(finished: &FinishedEpisode, step: usize) -> DebugFrame {
     let (identity, verdict) = (&finished.record.identity, &finished.record.verdict);
     let before = finished.frames.iter().filter_map(|frame| Some(frame.deformation.as_ref()?.rms_pct));
     let before = before.fold(0.0, f64::max);
@@ -145,8 +133,8 @@ fn broken_off(finished: &FinishedEpisode, step: usize) -> DebugFrame {
     DebugFrame::new(identity, step as u32, false, shape)
 }
 
-/// A film that could not be made.
-pub(crate) fn film_failure(error: FilmError) -> CliError {
+/// Converts the error of a video or still.
+pub(crate) fn video_error(error: FilmError) -> CliError {
     match error {
         FilmError::Interrupted => CliError::interrupted("interrupted"),
         other => CliError::input(other),

@@ -1,4 +1,4 @@
-//! Running an experiment: points on threads, rows in the order of points, files at the end.
+//! Run of an experiment: its points on threads, its rows in the order of the points, its files at the end.
 
 use std::{
     collections::BTreeSet,
@@ -6,11 +6,12 @@ use std::{
     sync::Mutex,
 };
 
+use serde_json::Value;
+
 use crate::{
     cli::{
         error::CliError,
-        output::{Progress, print},
-        run::calibration::make_folder,
+        output::{Progress, counted, notice, print},
         run::config::RunConfig,
     },
     files::replace,
@@ -24,36 +25,36 @@ use crate::{
 /// # Errors
 /// The script fails, or a file cannot be written.
 pub(crate) fn run(
-    run: &RunConfig,
+    config: &RunConfig,
     loaded: &Loaded,
     name: &str,
     points: usize,
     columns: &[String],
 ) -> Result<(), CliError> {
-    // Machines are not shared between threads but used again: opening one runs the whole script.
+    // Opening an experiment runs the whole script, so each thread takes an idle one before it opens another.
     let idle: Mutex<Vec<Experiment>> = Mutex::default();
-    let take = || idle.lock().unwrap_or_else(|p| p.into_inner()).pop();
+    let take = || match parallel::lock(&idle).pop() {
+        Some(experiment) => Ok(experiment),
+        None => Experiment::open(loaded).map_err(CliError::input),
+    };
     let mut rows: Vec<Vec<Row>> = vec![Vec::new(); points];
     let mut progress = Progress::new(points, name);
     let outcome = parallel::run(
         points,
-        run.threads,
+        config.threads,
         cancel::requested,
         |point| {
-            let machine = match take() {
-                Some(machine) => machine,
-                None => Experiment::open(loaded).map_err(CliError::input)?,
-            };
-            let rows = machine.run(point).map_err(CliError::input)?;
-            // What was cut short may have caught its errors and gone on to a row that is not one.
+            let experiment = take()?;
+            let rows = experiment.run(point).map_err(CliError::input)?;
+            // A script can catch the error of an interrupt and return a row that is not valid.
             if cancel::requested() {
                 return Err(CliError::interrupted("interrupted"));
             }
-            idle.lock().unwrap_or_else(|p| p.into_inner()).push(machine);
+            parallel::lock(&idle).push(experiment);
             Ok(rows)
         },
         |point, found| {
-            progress.tick(&format!("point {point}: {} rows", found.len()));
+            progress.tick(&format!("point {point}: {}", counted(found.len(), "row")));
             rows[point] = found;
             Ok(())
         },
@@ -62,75 +63,68 @@ pub(crate) fn run(
     let done = rows.iter().filter(|rows| !rows.is_empty()).count();
     let rows: Vec<Row> = rows.into_iter().flatten().collect();
     if cancel::requested() {
-        show(run, &rows, columns);
-        let message =
-            format!("interrupted; the rows of {done} of {points} points are above, no file was written");
-        return Err(CliError::interrupted(message));
+        print_rows(config, &rows, columns);
+        return Err(CliError::interrupted(format!(
+            "interrupted; the rows of {done} of {points} points are above; no file was written"
+        )));
     }
     outcome?;
-    let machine = match take() {
-        Some(machine) => machine,
-        None => Experiment::open(loaded).map_err(CliError::input)?,
-    };
-    let finish = machine.finish(&rows).map_err(CliError::input)?;
-    show(run, &rows, columns);
-    if let Some(text) = finish.text.filter(|_| !run.json) {
+    let finish = take()?.finish(&rows).map_err(CliError::input)?;
+    print_rows(config, &rows, columns);
+    if let Some(text) = finish.text.filter(|_| !config.json) {
         print(&format!("{text}\n"));
     }
-    let base = run.out.clone().unwrap_or_default();
+    let base = config.out.clone().unwrap_or_default();
     finish.files.iter().try_for_each(|(relative, bytes)| write(&base, relative, bytes))
 }
 
-/// Writes a file of the script under `base`; a link on its way could lead anywhere, so none is followed.
+/// Writes a file of the script under `base`. Refuses to follow symbolic links, which could lead out of the folder.
 fn write(base: &Path, relative: &str, bytes: &[u8]) -> Result<(), CliError> {
-    let path = &base.join(relative);
+    let path = base.join(relative);
     let between = path.ancestors().skip(1).take_while(|folder| *folder != base);
     if let Some(link) = between.into_iter().find(|folder| folder.is_symlink()) {
-        let message = format!(
-            "{}: {} is a link; files are written into real folders only",
+        return Err(CliError::input(format!(
+            "{}: {} is a link; files of scripts are written into real folders only",
             path.display(),
-            link.display()
-        );
-        return Err(CliError::input(message));
+            PathBuf::from(link).display()
+        )));
     }
-    let folder = path.parent().map(PathBuf::from).unwrap_or_default();
-    if !folder.as_os_str().is_empty() {
-        make_folder(&folder)?;
-    }
-    replace(path, bytes).map_err(CliError::input)?;
-    crate::text::eprint_line(&format!("softvt: wrote {}", path.display()));
+    replace(&path, bytes).map_err(CliError::input)?;
+    notice(format!("wrote {}", path.display()));
     Ok(())
 }
 
-/// Rows as JSON lines or as a table.
-fn show(run: &RunConfig, rows: &[Row], columns: &[String]) {
-    if run.json {
+/// Prints rows as JSON lines or as a table.
+fn print_rows(config: &RunConfig, rows: &[Row], columns: &[String]) {
+    if config.json {
         rows.iter().for_each(|row| print(&format!("{}\n", serde_json::json!(row))));
+        return;
+    }
+    if rows.is_empty() {
         return;
     }
     let all: BTreeSet<&String> = rows.iter().flat_map(|row| row.keys()).collect();
     let columns: Vec<&String> =
         if columns.is_empty() { all.into_iter().collect() } else { columns.iter().collect() };
-    let cell = |row: &Row, column: &String| match row.get(column) {
-        None | Some(serde_json::Value::Null) => "-".to_owned(),
-        Some(serde_json::Value::String(text)) => text.clone(),
-        Some(serde_json::Value::Number(n)) => n.as_f64().map_or(n.to_string(), |x| {
+    let header: Vec<String> = columns.iter().map(|column| column.to_string()).collect();
+    let cells = rows.iter().map(|row| columns.iter().map(|column| format_cell(row.get(*column))).collect());
+    let lines: Vec<Vec<String>> = std::iter::once(header).chain(cells).collect();
+    let widths: Vec<usize> = (0..columns.len())
+        .map(|column| lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0))
+        .collect();
+    for line in &lines {
+        let padded = line.iter().zip(&widths).map(|(cell, width)| format!("{cell:>width$}"));
+        print(&format!("{}\n", padded.collect::<Vec<_>>().join("  ")));
+    }
+}
+
+fn format_cell(value: Option<&Value>) -> String {
+    match value {
+        None | Some(Value::Null) => "-".to_owned(),
+        Some(Value::String(text)) => text.clone(),
+        Some(Value::Number(number)) => number.as_f64().map_or(number.to_string(), |x| {
             format!("{x:.5}").trim_end_matches('0').trim_end_matches('.').to_owned()
         }),
         Some(other) => other.to_string(),
-    };
-    let width = |column: &String| {
-        rows.iter().map(|row| cell(row, column).chars().count()).chain([column.len()]).max().unwrap_or(0)
-    };
-    let line = |cells: Vec<String>| {
-        let padded: Vec<String> =
-            cells.iter().zip(&columns).map(|(text, column)| format!("{text:>0$}", width(column))).collect();
-        format!("{}\n", padded.join("  "))
-    };
-    if !rows.is_empty() {
-        print(&line(columns.iter().map(|c| c.to_string()).collect()));
-    }
-    for row in rows {
-        print(&line(columns.iter().map(|c| cell(row, c)).collect()));
     }
 }

@@ -1,5 +1,7 @@
-//! When an expert means its gripper to hold: the binary code of the gripper, which its closure does not tell, since what is
-//! wide is held by a hand that is hardly shut.
+//! Recording of when an expert intends its gripper to hold an object.
+//!
+//! The binary gripper code of a dataset needs this intent. The commanded closure does not show it: a hand around a wide
+//! object is nearly open while it holds.
 
 use std::{
     collections::BTreeMap,
@@ -7,58 +9,54 @@ use std::{
 };
 
 use crate::{
-    cli::{
-        run::config::RunConfig,
-        run::{policy::expert, suite_run::SuiteRun},
-    },
+    cli::run::{config::RunConfig, policy::expert_controller, selection::EpisodeIndex, suite_run::SuiteRun},
+    parallel,
     policy::{Action, Observation, SensorStreams},
     rollout::{ControlError, Controller, Simulation},
     script::ExpertController,
 };
 
-/// Whether the gripper was meant to hold in each control step, by task and attempt.
-pub(crate) type GripLog = Arc<Mutex<BTreeMap<(usize, u32), Vec<bool>>>>;
+/// Per attempt and control step: true if the gripper is intended to hold.
+pub(crate) type GripLog = Arc<Mutex<BTreeMap<EpisodeIndex, Vec<bool>>>>;
 
-/// Lets the experts of a batch say when the gripper is meant to hold; others have only their closure.
-pub(crate) fn note_grips(run: &RunConfig, batch: &mut SuiteRun, grips: &GripLog) {
-    let Some(hand) = run.policy.hand() else { return };
-    let grips = grips.clone();
-    batch.drive = Box::new(move |opened, brief| {
+/// Makes the experts of a run record their intent into `log`. Other policies are left unchanged.
+pub(crate) fn record_grips(config: &RunConfig, run: &mut SuiteRun, log: &GripLog) {
+    let Some(mode) = config.policy.grip_mode() else { return };
+    let log = log.clone();
+    run.controllers = Box::new(move |opened, brief| {
         Ok(Box::new(GripRecorder {
-            driver: expert(opened, hand)?,
-            shut: Vec::new(),
-            whose: (brief.task, brief.episode),
-            grips: grips.clone(),
+            expert: expert_controller(opened, mode)?,
+            is_holding: Vec::new(),
+            index: EpisodeIndex { task: brief.task, episode: brief.episode },
+            log: log.clone(),
         }))
     });
 }
 
-/// An expert whose grip is noted.
+/// An expert whose intent to hold is recorded.
 struct GripRecorder {
-    driver: ExpertController,
-    shut: Vec<bool>,
-    whose: (usize, u32),
-    grips: GripLog,
+    expert: ExpertController,
+    is_holding: Vec<bool>,
+    index: EpisodeIndex,
+    log: GripLog,
 }
 
 impl Controller for GripRecorder {
     fn streams(&self) -> SensorStreams {
-        self.driver.streams()
+        self.expert.streams()
     }
 
     fn gave_up(&self) -> Option<&str> {
-        self.driver.gave_up()
+        self.expert.gave_up()
     }
 
     fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, ControlError> {
-        let action = self.driver.act(sim, observation)?;
-        self.shut.push(self.driver.gripping());
+        let action = self.expert.act(sim, observation)?;
+        self.is_holding.push(self.expert.gripping());
         Ok(action)
     }
 
     fn finish(&mut self) {
-        if let Ok(mut all) = self.grips.lock() {
-            all.insert(self.whose, std::mem::take(&mut self.shut));
-        }
+        parallel::lock(&self.log).insert(self.index, std::mem::take(&mut self.is_holding));
     }
 }

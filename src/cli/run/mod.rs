@@ -3,6 +3,7 @@
 pub(crate) mod calibration;
 pub(crate) mod conditions;
 pub(crate) mod config;
+pub(crate) mod demo_replay;
 pub(crate) mod demo_selection;
 pub(crate) mod episode_artifacts;
 pub(crate) mod experiment;
@@ -15,4 +16,5 @@ pub(crate) mod requirements;
 pub(crate) mod resimulate;
 pub(crate) mod run_manifest;
 pub(crate) mod selection;
+pub(crate) mod stored_episode;
 pub(crate) mod suite_run;

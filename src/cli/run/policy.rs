@@ -1,10 +1,14 @@
-//! Who drives: a policy that was select_tasks, made ready for many episodes.
+//! Policies of a run: the arguments with their files read, and the controllers of the episodes.
 
-use std::{collections::BTreeMap, sync::Arc, time::Duration};
+use std::{collections::BTreeMap, path::Path, sync::Arc, time::Duration};
 
 use crate::{
     benchmark::seed::RandomStream,
-    cli::{error::CliError, run::recorded_policy::RecordedRuns},
+    cli::{
+        args::{DEFAULT_PROFILE, GripMode, GripperArg, PolicyArgs, PolicySpec, ProtocolArg},
+        error::CliError,
+        run::recorded_policy::RecordedRuns,
+    },
     policy::{
         ChunkedPolicy, Policy, PolicyError, SensorStreams, TaskBrief, builtin,
         profile::Profile,
@@ -12,272 +16,346 @@ use crate::{
         remote::{PolicyConnections, PolicyServer, Protocol, RemotePolicy},
     },
     rollout::{Controller, cancel},
-    script::{self, ExpertController, PolicyFile},
+    script::{self, ExpertController, PolicyFile, load_profile},
 };
 
-/// How an expert's hand closes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum GripMode {
-    /// As far as the expert says.
-    Told,
-    /// Only open or shut.
-    Binary,
-    /// Until it feels that it holds something.
-    Servo,
-}
+/// Environment variable with the key of a policy server. A flag would show it to other users of the machine.
+const API_KEY: &str = "SOFTVT_API_KEY";
+/// Actions executed from each chunk of a policy server, unless `--replan` is given.
+const DEFAULT_REPLAN: usize = 10;
+/// Timeout of a policy server, unless `--policy-timeout` is given.
+const DEFAULT_TIMEOUT: Duration = Duration::from_secs(60);
 
-impl GripMode {
-    /// What `--policy` calls it.
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Told => "expert",
-            Self::Binary => "expert-binary",
-            Self::Servo => "tactile-servo",
-        }
-    }
-}
+/// Makes the controller of an episode.
+pub(crate) type ControllerFactory =
+    Box<dyn Fn(script::Episode, TaskBrief) -> Result<Box<dyn Controller>, CliError> + Sync>;
 
-/// A policy's server and how it is spoken to.
+/// A policy server, and what it is sent.
 #[derive(Debug)]
 pub(crate) struct RemotePolicyConfig {
-    /// Its address.
     pub url: String,
-    /// How it talks.
     pub protocol: Protocol,
-    /// What it gets and what its numbers mean.
     pub profile: Profile,
-    /// What `--profile` said, or would have had to say.
-    pub profile_word: String,
-    /// SHA-256 of the files that the profile is made of.
+    /// The profile as `--profile` names it.
+    pub profile_name: String,
+    /// SHA-256 of the files of the profile, by name.
     pub sources: BTreeMap<String, String>,
-    /// Actions of each answer that are carried out.
+    /// Actions executed from each chunk.
     pub replan: usize,
-    /// Longest wait for it and for each answer.
-    pub patience: Duration,
+    pub timeout: Duration,
 }
 
-/// Who drives.
 #[derive(Clone, Debug)]
 pub(crate) enum PolicyKind {
-    /// The task's expert.
     Expert(GripMode),
-    /// Who holds still.
     Noop,
-    /// Who wanders.
     Random,
-    /// A policy in Lua, and how many actions of a list are carried out if that is said.
-    Lua(Arc<PolicyFile>, Option<usize>),
-    /// A server.
+    /// A policy in Lua, and the actions executed from each chunk if that is limited.
+    Lua {
+        file: Arc<PolicyFile>,
+        replan: Option<usize>,
+    },
     Server(Arc<RemotePolicyConfig>),
-    /// Whatever was commanded in a run.
+    /// Repeats the actions of recorded runs.
     Recorded(Arc<RecordedRuns>),
-    /// Actions that somebody else hands over.
-    Given,
+    /// The actions come from elsewhere: a client, a dataset or a single recorded episode.
+    External,
 }
 
-/// Who drives, and how results call it.
+/// A policy under the name that results show.
 #[derive(Clone, Debug)]
 pub(crate) struct PolicyConfig {
-    driver: PolicyKind,
+    kind: PolicyKind,
     name: String,
 }
 
 impl PolicyConfig {
-    /// A driver under a name.
-    pub(crate) fn new(driver: PolicyKind, name: String) -> Self {
-        Self { driver, name }
+    /// Loads the policy that the arguments select.
+    ///
+    /// # Errors
+    /// A file that is not valid, a folder without a run, or a flag that has no effect on this policy.
+    pub(crate) fn load(args: &PolicyArgs) -> Result<Self, CliError> {
+        refuse_flags_without_effect(args)?;
+        let (kind, name) = match &args.policy {
+            PolicySpec::Expert(mode) => (PolicyKind::Expert(*mode), args.policy.word()),
+            PolicySpec::Noop => (PolicyKind::Noop, args.policy.word()),
+            PolicySpec::Random => (PolicyKind::Random, args.policy.word()),
+            PolicySpec::Lua(path) => {
+                let file = PolicyFile::load(path).map_err(CliError::input)?;
+                let replan = args.replan.map(usize::from).or(file.replan);
+                let name = file.name.clone();
+                (PolicyKind::Lua { file: Arc::new(file), replan }, name)
+            }
+            PolicySpec::Server(url) => {
+                let (profile, sources) = load_profile_of(args)?;
+                let name = profile.name.clone();
+                let server = RemotePolicyConfig {
+                    url: url.clone(),
+                    protocol: match args.protocol {
+                        Some(ProtocolArg::VlaEval) => Protocol::VlaEval,
+                        Some(ProtocolArg::Openpi) | None => Protocol::Openpi,
+                    },
+                    profile,
+                    profile_name: args.profile.clone().unwrap_or_else(|| DEFAULT_PROFILE.to_owned()),
+                    sources,
+                    replan: args.replan.map_or(DEFAULT_REPLAN, usize::from),
+                    timeout: args.policy_timeout.unwrap_or(DEFAULT_TIMEOUT),
+                };
+                (PolicyKind::Server(Arc::new(server)), name)
+            }
+            PolicySpec::Run(dir) => {
+                (PolicyKind::Recorded(Arc::new(RecordedRuns::load(dir)?)), "replay".to_owned())
+            }
+        };
+        Ok(Self { kind, name: args.name.clone().unwrap_or(name) })
     }
 
-    /// The tasks' experts.
+    /// The scripted experts of the tasks.
     pub(crate) fn expert() -> Self {
-        Self::new(PolicyKind::Expert(GripMode::Told), GripMode::Told.name().to_owned())
+        let mode = GripMode::Commanded;
+        Self { kind: PolicyKind::Expert(mode), name: mode.policy_name().to_owned() }
     }
 
-    /// Recorded actions that somebody else hands over.
-    pub(crate) fn replay() -> Self {
-        Self::new(PolicyKind::Given, "replay".to_owned())
+    /// Actions that come from elsewhere, under a name such as `replay`.
+    pub(crate) fn external(name: &str) -> Self {
+        Self { kind: PolicyKind::External, name: name.to_owned() }
     }
 
-    /// Whoever drove in another world.
-    pub(crate) fn import() -> Self {
-        Self::new(PolicyKind::Given, "import".to_owned())
-    }
-
-    /// A client of `softvt serve`.
-    pub(crate) fn client() -> Self {
-        Self::new(PolicyKind::Given, "client".to_owned())
-    }
-
-    /// How results call it.
+    /// The name that results show.
     pub(crate) fn name(&self) -> &str {
         &self.name
     }
 
-    /// The hand of the tasks' experts, if they drive.
-    pub(crate) fn hand(&self) -> Option<GripMode> {
-        match self.driver {
-            PolicyKind::Expert(hand) => Some(hand),
+    /// Gripper control of the experts. `None` for other policies.
+    pub(crate) fn grip_mode(&self) -> Option<GripMode> {
+        match self.kind {
+            PolicyKind::Expert(mode) => Some(mode),
             _ => None,
         }
     }
 
-    /// Whether it sees the true state.
+    /// True if the policy has access to ground-truth state.
     pub(crate) fn is_privileged(&self) -> bool {
-        self.hand().is_some()
+        self.grip_mode().is_some()
     }
 
-    /// Whether it answers over a network.
     pub(crate) fn is_remote(&self) -> bool {
-        matches!(self.driver, PolicyKind::Server(_))
+        matches!(self.kind, PolicyKind::Server(_))
     }
 
-    /// The profile, if the policy has one.
+    /// Profile of a policy server.
     pub(crate) fn profile(&self) -> Option<&Profile> {
-        match &self.driver {
+        match &self.kind {
             PolicyKind::Server(server) => Some(&server.profile),
             _ => None,
         }
     }
 
-    /// What it looks at and where that is said, if it is known before it drives.
-    pub(crate) fn looks(&self) -> Option<(String, SensorStreams)> {
-        match &self.driver {
+    /// The sensors that a policy declares, and where it does so, as messages name the place.
+    pub(crate) fn declared_streams(&self) -> Option<(String, SensorStreams)> {
+        match &self.kind {
             PolicyKind::Server(server) => {
-                Some((format!("--profile {}: inputs", server.profile_word), server.profile.streams()))
+                Some((format!("--profile {}: inputs", server.profile_name), server.profile.streams()))
             }
-            PolicyKind::Lua(file, _) => {
+            PolicyKind::Lua { file, .. } => {
                 Some((format!("{}: policy.looks", file.looks_at), file.streams.clone()))
             }
             _ => None,
         }
     }
 
-    /// Actions of each answer that are carried out, if anybody has a say in that.
+    /// Actions executed from each chunk, for policies that predict chunks.
     pub(crate) fn replan(&self) -> Option<usize> {
-        match &self.driver {
+        match &self.kind {
             PolicyKind::Server(server) => Some(server.replan),
-            PolicyKind::Lua(_, replan) => *replan,
+            PolicyKind::Lua { replan, .. } => *replan,
             _ => None,
         }
     }
 
-    /// The file of a policy in Lua, as messages name it.
+    /// File of a policy in Lua, as messages name it.
     pub(crate) fn file(&self) -> Option<&str> {
-        match &self.driver {
-            PolicyKind::Lua(file, _) => Some(&file.main),
+        match &self.kind {
+            PolicyKind::Lua { file, .. } => Some(&file.main),
             _ => None,
         }
     }
 
-    /// SHA-256 of the files that the policy or its profile is made of, by name.
+    /// SHA-256 of the files of the policy or of its profile, by name.
     pub(crate) fn sources(&self) -> BTreeMap<String, String> {
-        match &self.driver {
-            PolicyKind::Lua(file, _) => file.hashes(),
+        match &self.kind {
+            PolicyKind::Lua { file, .. } => file.hashes(),
             PolicyKind::Server(server) => server.sources.clone(),
             _ => BTreeMap::new(),
         }
     }
 
-    /// The runs whose actions are carried out, if any are.
+    /// The recorded runs whose actions the policy repeats.
     pub(crate) fn recorded(&self) -> Option<&RecordedRuns> {
-        match &self.driver {
+        match &self.kind {
             PolicyKind::Recorded(runs) => Some(runs),
             _ => None,
         }
     }
-}
 
-/// Makes whoever drives an episode.
-pub(crate) struct ControllerSource {
-    choice: PolicyConfig,
-    connections: Option<Arc<PolicyConnections>>,
-    /// The script's name of the suite, and whether it is its twin.
-    of: (String, bool),
-}
-
-impl ControllerSource {
-    /// `suite` is the script's name of it, `twin` whether soft objects are rigid.
-    pub(crate) fn new(choice: &PolicyConfig, suite: &str, twin: bool) -> Self {
-        let connections = match &choice.driver {
-            PolicyKind::Server(server) => Some(Arc::new(PolicyConnections::new(PolicyServer {
-                url: server.url.clone(),
-                protocol: server.protocol,
-                profile: server.profile.clone(),
-                timeout: server.patience,
-                api_key: std::env::var(API_KEY).ok(),
-                cancel: &cancel::FLAG,
-            }))),
-            _ => None,
-        };
-        Self { choice: choice.clone(), connections, of: (suite.to_owned(), twin) }
+    /// Connections to the policy server, if there is one. Nothing is connected yet.
+    pub(crate) fn connections(&self) -> Option<Arc<PolicyConnections>> {
+        let PolicyKind::Server(server) = &self.kind else { return None };
+        Some(Arc::new(PolicyConnections::new(PolicyServer {
+            url: server.url.clone(),
+            protocol: server.protocol,
+            profile: server.profile.clone(),
+            timeout: server.timeout,
+            api_key: std::env::var(API_KEY).ok(),
+            cancel: &cancel::FLAG,
+        })))
     }
 
-    /// Connects, if there is anyone to connect to.
-    ///
-    /// # Errors
-    /// The server cannot be reached.
-    pub(crate) fn connect(&self) -> Result<(), CliError> {
-        self.connections.as_ref().map_or(Ok(()), |connections| connections.check().map_err(policy_failure))
-    }
-
-    /// Whoever drives the episode `brief`.
-    ///
-    /// # Errors
-    /// The task has no expert, or it does not start.
-    pub(crate) fn drive(
+    /// A factory of controllers for the episodes of a suite; `connections` are those of [`Self::connections`].
+    pub(crate) fn controller_factory(
         &self,
-        opened: script::Episode,
-        brief: TaskBrief,
-    ) -> Result<Box<dyn Controller>, CliError> {
-        let chunked = |policy: Box<dyn Policy>, replan| -> Box<dyn Controller> {
-            Box::new(ChunkedPolicy::new(policy, brief.clone(), replan))
-        };
-        Ok(match (&self.choice.driver, &self.connections) {
-            (PolicyKind::Server(server), Some(connections)) => {
-                chunked(Box::new(RemotePolicy::new(connections.clone())), server.replan)
-            }
-            (PolicyKind::Recorded(runs), _) => {
-                let actions = runs.actions(&self.of.0, self.of.1, &brief)?;
-                chunked(Box::new(RecordedPolicy::poses(&actions, None)), 1)
-            }
-            (PolicyKind::Lua(file, replan), _) => {
-                let policy = file.start(&opened.seed).map_err(CliError::input)?;
-                chunked(Box::new(policy), replan.unwrap_or(usize::MAX))
-            }
-            (PolicyKind::Noop, _) => chunked(Box::<builtin::NoopPolicy>::default(), 1),
-            (PolicyKind::Random, _) => {
-                let seed = rand::RngCore::next_u64(&mut opened.seed.stream(RandomStream::Script));
-                chunked(Box::new(builtin::RandomPolicy::new(seed)), 1)
-            }
-            (PolicyKind::Expert(hand), _) => Box::new(expert(opened, *hand)?),
-            // Nobody has handed any over yet.
-            (PolicyKind::Given | PolicyKind::Server(_), _) => {
-                chunked(Box::new(RecordedPolicy::new(Vec::new(), None)), 1)
-            }
+        connections: Option<Arc<PolicyConnections>>,
+        suite: &str,
+        is_rigid_twin: bool,
+    ) -> ControllerFactory {
+        let (kind, suite) = (self.kind.clone(), suite.to_owned());
+        Box::new(move |opened, brief| {
+            let chunked = |policy: Box<dyn Policy>, replan| -> Box<dyn Controller> {
+                Box::new(ChunkedPolicy::new(policy, brief.clone(), replan))
+            };
+            Ok(match (&kind, &connections) {
+                (PolicyKind::Server(server), Some(connections)) => {
+                    chunked(Box::new(RemotePolicy::new(connections.clone())), server.replan)
+                }
+                (PolicyKind::Recorded(runs), _) => {
+                    let actions = runs.actions(&suite, is_rigid_twin, &brief)?;
+                    chunked(Box::new(RecordedPolicy::poses(&actions, None)), 1)
+                }
+                (PolicyKind::Lua { file, replan }, _) => {
+                    let policy = file.start(&opened.seed).map_err(CliError::input)?;
+                    chunked(Box::new(policy), replan.unwrap_or(usize::MAX))
+                }
+                (PolicyKind::Noop, _) => chunked(Box::<builtin::NoopPolicy>::default(), 1),
+                (PolicyKind::Random, _) => {
+                    let seed = rand::RngCore::next_u64(&mut opened.seed.stream(RandomStream::Script));
+                    chunked(Box::new(builtin::RandomPolicy::new(seed)), 1)
+                }
+                (PolicyKind::Expert(mode), _) => Box::new(expert_controller(opened, *mode)?),
+                // Whoever provides the actions replaces this factory.
+                (PolicyKind::External | PolicyKind::Server(_), _) => {
+                    chunked(Box::new(RecordedPolicy::new(Vec::new(), None)), 1)
+                }
+            })
         })
     }
 }
 
-/// The task's expert with one of its hands.
+/// Starts the expert of a task.
 ///
 /// # Errors
-/// The task has none, or it does not start.
-pub(crate) fn expert(opened: script::Episode, hand: GripMode) -> Result<ExpertController, CliError> {
+/// The task has none, or its script fails.
+pub(crate) fn expert_controller(
+    opened: script::Episode,
+    mode: GripMode,
+) -> Result<ExpertController, CliError> {
     let expert = opened.expert().map_err(CliError::input)?;
     let expert = expert.ok_or_else(|| CliError::input("the task has no expert"))?;
-    Ok(match hand {
-        GripMode::Servo => ExpertController::servo(expert),
-        GripMode::Told | GripMode::Binary => ExpertController::new(expert, hand == GripMode::Binary),
+    Ok(match mode {
+        GripMode::TactileServo => ExpertController::servo(expert),
+        GripMode::Commanded | GripMode::Binary => ExpertController::new(expert, mode == GripMode::Binary),
     })
 }
 
-/// Where a server's key comes from: not from the command line, which others can read.
-const API_KEY: &str = "SOFTVT_API_KEY";
+/// Loads the profile that the arguments select, with SHA-256 of its files by name.
+///
+/// # Errors
+/// A file that is not a valid profile.
+pub(crate) fn load_profile_of(args: &PolicyArgs) -> Result<(Profile, BTreeMap<String, String>), CliError> {
+    let name = args.profile.as_deref().unwrap_or(DEFAULT_PROFILE);
+    let (mut profile, sources) = match Profile::named(name) {
+        Some(profile) => (profile, BTreeMap::new()),
+        None => load_profile(Path::new(name)).map_err(CliError::input)?,
+    };
+    if let Some(mode) = args.gripper {
+        profile.actions.gripper.binary = mode == GripperArg::Binary;
+    }
+    Ok((profile, sources))
+}
 
-fn policy_failure(error: PolicyError) -> CliError {
+/// Refuses flags that the selected policy would ignore.
+fn refuse_flags_without_effect(args: &PolicyArgs) -> Result<(), CliError> {
+    let is_server = matches!(args.policy, PolicySpec::Server(_));
+    let is_lua = matches!(args.policy, PolicySpec::Lua(_));
+    let flags = [
+        ("--profile", args.profile.is_some() && !is_server),
+        ("--protocol", args.protocol.is_some() && !is_server),
+        ("--gripper", args.gripper.is_some() && !is_server),
+        ("--policy-timeout", args.policy_timeout.is_some() && !is_server),
+        ("--replan", args.replan.is_some() && !is_server && !is_lua),
+    ];
+    let Some((flag, _)) = flags.into_iter().find(|(_, is_ignored)| *is_ignored) else { return Ok(()) };
+    let kinds = if flag == "--replan" { "policy servers and Lua policies" } else { "policy servers" };
+    let policy = args.policy.word();
+    Err(CliError::input(format!("{flag}: applies to {kinds} only; --policy {policy} ignores it")))
+}
+
+/// Converts the error of a policy server.
+pub(crate) fn policy_failure(error: PolicyError) -> CliError {
     match error {
         PolicyError::Interrupted => CliError::interrupted("interrupted"),
         PolicyError::Address(message) => CliError::input(message),
         other => CliError::policy(other),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::args::POLICIES;
+
+    fn args(policy: PolicySpec) -> PolicyArgs {
+        PolicyArgs {
+            policy,
+            name: None,
+            profile: None,
+            protocol: None,
+            replan: None,
+            gripper: None,
+            policy_timeout: None,
+        }
+    }
+
+    #[test]
+    fn built_in_policies_have_the_names_that_are_listed() {
+        use GripMode::{Binary, Commanded, TactileServo};
+        let experts = [Commanded, Binary, TactileServo].map(PolicySpec::Expert);
+        let specs = experts.into_iter().chain([PolicySpec::Noop, PolicySpec::Random]);
+        for ((name, _), spec) in POLICIES.into_iter().zip(specs) {
+            let policy = PolicyConfig::load(&args(spec)).unwrap();
+            assert_eq!(policy.name(), name);
+            assert_eq!(policy.is_privileged(), name.starts_with("expert") || name == "tactile-servo");
+        }
+    }
+
+    #[test]
+    fn flags_without_effect_are_refused() {
+        let message = |args: PolicyArgs| PolicyConfig::load(&args).unwrap_err().message;
+        let noop = || args(PolicySpec::Noop);
+        let servo = PolicySpec::Expert(GripMode::TactileServo);
+        assert_eq!(
+            message(PolicyArgs { replan: Some(3), ..noop() }),
+            "--replan: applies to policy servers and Lua policies only; --policy noop ignores it"
+        );
+        for (flag, args) in [
+            ("--profile", PolicyArgs { profile: Some("vision".into()), ..noop() }),
+            ("--protocol", PolicyArgs { protocol: Some(ProtocolArg::VlaEval), ..noop() }),
+            (
+                "--gripper",
+                PolicyArgs { gripper: Some(GripperArg::Binary), ..args(PolicySpec::Lua("x.lua".into())) },
+            ),
+            ("--policy-timeout", PolicyArgs { policy_timeout: Some(DEFAULT_TIMEOUT), ..args(servo) }),
+        ] {
+            assert!(message(args).starts_with(&format!("{flag}: applies to policy servers only")));
+        }
     }
 }

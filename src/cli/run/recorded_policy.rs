@@ -1,4 +1,4 @@
-//! `--policy RUN_DIR`: the actions of a run, carried out once more, and whether it has those that are wanted.
+//! `--policy RUN`: repetition of the actions of a recorded run.
 
 use std::path::{Path, PathBuf};
 
@@ -6,8 +6,15 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use crate::{
-    benchmark::{Suite, Task, seed::Split},
-    cli::{error::CliError, run::config::RunConfig},
+    benchmark::{Suite, seed::Split},
+    cli::{
+        error::CliError,
+        run::{
+            config::RunConfig,
+            selection::{EpisodeIndex, EpisodeJob},
+        },
+    },
+    files::FileError,
     policy::{Action, TaskBrief},
     report::{
         actions,
@@ -16,166 +23,141 @@ use crate::{
     },
 };
 
-/// The runs in a folder.
+/// Missing episodes that a message lists.
+const MAX_LISTED: usize = 3;
+
+/// The runs in a folder, at most one of each suite.
 #[derive(Debug)]
 pub(crate) struct RecordedRuns {
     dir: PathBuf,
     runs: Vec<StoredRun>,
 }
 
-/// Which episodes are wanted.
-pub(crate) struct RequestedEpisodes<'a> {
-    /// The script's name of the suite.
-    pub suite: &'a str,
-    /// Whether soft objects are made rigid.
-    pub twin: bool,
-    /// Base seed.
-    pub seed: u64,
-    /// Which list of episodes.
-    pub split: Split,
-    /// Tasks and episodes.
-    pub jobs: &'a [(usize, u32)],
-}
-
-/// Whose actions were carried out, as `run.json` says it.
+/// The run whose actions are repeated, as `run.json` names it.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct ReplaySource {
     /// The folder, as it was typed.
     pub run: String,
-    /// Who drove it.
+    /// Name of the recorded policy.
     pub policy: String,
-    /// Whether whoever drove it saw the true state.
+    /// True if the recorded policy had access to ground-truth state.
     pub privileged: bool,
-    /// Whether whoever drove it saw the true forces at the pads.
+    /// True if the recorded policy observed the true forces on the pads.
     pub force_observed: bool,
-    /// SHA-256 of its episodes and actions.
+    /// SHA-256 of the episodes and their actions.
     pub sha256: String,
 }
 
-/// Episodes that a message names.
-const TOLD: usize = 3;
-
-/// Whose actions are carried out once more, if any are: they must be those of this very suite, and all there.
+/// Returns the recorded run whose actions `--policy` repeats, if it names one.
 ///
 /// # Errors
-/// What differs or is missing.
-pub(crate) fn recorded(
-    run: &RunConfig,
+/// The run is of another suite, seed, split or twin, or lacks episodes.
+pub(crate) fn find_replay_source(
+    config: &RunConfig,
     suite: &Suite,
-    jobs: &[(&Task, u32)],
+    jobs: &[EpisodeJob],
 ) -> Result<Option<ReplaySource>, CliError> {
-    let Some(runs) = run.policy.recorded() else { return Ok(None) };
-    let jobs: Vec<(usize, u32)> = jobs.iter().map(|(task, episode)| (task.id, *episode)).collect();
-    let wanted = RequestedEpisodes {
-        suite: &suite.name,
-        twin: run.twin,
-        seed: run.seed,
-        split: Split::Validation,
-        jobs: &jobs,
-    };
-    runs.check(&wanted).map(Some)
+    let Some(recorded) = config.policy.recorded() else { return Ok(None) };
+    let is_twin = config.is_rigid_twin;
+    let run = recorded.run_of(&suite.name, is_twin).ok_or_else(|| {
+        let available: Vec<String> =
+            recorded.runs.iter().map(|run| suite_label(run.text("suite"), is_rigid_twin(run))).collect();
+        CliError::input(format!(
+            "--policy {}: no run of suite {}; available: {}",
+            recorded.dir.display(),
+            suite_label(&suite.name, is_twin),
+            available.join(", ")
+        ))
+    })?;
+    let refuse = |message: String| CliError::input(format!("--policy {}: {message}", run.dir.display()));
+    let seed = run.info["seed"].as_u64();
+    if seed != Some(config.seed) {
+        let seed = seed.map_or("unknown".to_owned(), |seed| seed.to_string());
+        return Err(refuse(format!("its seed is {seed}, that of this run {}", config.seed)));
+    }
+    let (split, own) = (run.text("split"), Split::Validation.name());
+    if split != own {
+        return Err(refuse(format!("its split is {split}, that of this run {own}")));
+    }
+    let missing: Vec<String> = jobs
+        .iter()
+        .map(EpisodeJob::index)
+        .filter(|index| !has_actions(run, *index))
+        .map(|i| i.to_string())
+        .collect();
+    if !missing.is_empty() {
+        let listed = missing.iter().take(MAX_LISTED).map(String::as_str).collect::<Vec<_>>().join(", ");
+        let more = match missing.len().saturating_sub(MAX_LISTED) {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        return Err(refuse(format!(
+            "it lacks {} of the {} requested episodes: {listed}{more}; select available ones with --task and --episodes",
+            missing.len(),
+            jobs.len()
+        )));
+    }
+    Ok(Some(ReplaySource {
+        run: run.dir.display().to_string(),
+        policy: run.text("policy").to_owned(),
+        privileged: run.is_privileged(),
+        force_observed: run.sees_forces(),
+        sha256: digest(run).map_err(CliError::input)?,
+    }))
 }
 
 impl RecordedRuns {
-    /// Reads the folder of a run, or of several.
+    /// Reads a run folder, or all run folders in a folder.
     ///
     /// # Errors
-    /// It holds none.
+    /// There is none, or one cannot be read.
     pub(crate) fn load(dir: &Path) -> Result<Self, CliError> {
-        let runs = stored_run::load(dir).map_err(|e| CliError::input(format!("--policy: {e}")))?;
+        let runs = stored_run::load(dir).map_err(|error| CliError::input(error).prefixed("--policy"))?;
         Ok(Self { dir: dir.to_owned(), runs })
     }
 
-    /// The run that episodes are taken from.
-    ///
-    /// # Errors
-    /// It is of another suite, seed, split or twin, or lacks episodes.
-    pub(crate) fn check(&self, wanted: &RequestedEpisodes<'_>) -> Result<ReplaySource, CliError> {
-        let run = self.of(wanted.suite, wanted.twin).ok_or_else(|| self.no_suite(wanted))?;
-        let wrong = |what: String| CliError::input(format!("--policy {}: {what}", run.dir.display()));
-        let seed = run.info["seed"].as_u64();
-        if seed != Some(wanted.seed) {
-            let of = seed.map_or("unknown".to_owned(), |seed| seed.to_string());
-            return Err(wrong(format!("it is of seed {of}, and this run of seed {}", wanted.seed)));
-        }
-        let (split, own) = (run.text("split"), wanted.split.name());
-        if split != own {
-            return Err(wrong(format!("it is of the split {split}, and this run of {own}")));
-        }
-        let missing: Vec<String> = wanted
-            .jobs
-            .iter()
-            .filter(|(task, episode)| !has(run, *task, *episode))
-            .map(|(task, episode)| format!("task {task} episode {episode}"))
-            .collect();
-        if !missing.is_empty() {
-            let more = missing.len().saturating_sub(TOLD);
-            let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-            let named = missing.iter().take(TOLD).map(String::as_str).collect::<Vec<_>>().join(", ");
-            let all = wanted.jobs.len();
-            return Err(wrong(format!(
-                "it lacks {} of the {all} episodes that are wanted: {named}{more}; name those that it has with --task and \
-                 --episodes",
-                missing.len()
-            )));
-        }
-        Ok(ReplaySource {
-            run: run.dir.display().to_string(),
-            policy: run.text("policy").to_owned(),
-            privileged: run.is_privileged(),
-            force_observed: run.sees_forces(),
-            sha256: digest(run).map_err(CliError::input)?,
-        })
+    fn run_of(&self, suite: &str, is_twin: bool) -> Option<&StoredRun> {
+        self.runs.iter().find(|run| run.text("suite") == suite && is_rigid_twin(run) == is_twin)
     }
 
-    fn of(&self, suite: &str, twin: bool) -> Option<&StoredRun> {
-        self.runs.iter().find(|run| run.text("suite") == suite && is_twin(run) == twin)
-    }
-
-    fn no_suite(&self, wanted: &RequestedEpisodes<'_>) -> CliError {
-        let called = |suite: &str, twin: bool| format!("{suite}{}", if twin { " as rigid twin" } else { "" });
-        let have: Vec<String> = self.runs.iter().map(|run| called(run.text("suite"), is_twin(run))).collect();
-        CliError::input(format!(
-            "--policy {}: it holds no run of suite {}; it has {}",
-            self.dir.display(),
-            called(wanted.suite, wanted.twin),
-            have.join(", ")
-        ))
-    }
-
-    /// What was commanded in an episode.
+    /// The recorded actions of an episode.
     ///
     /// # Errors
     /// The actions cannot be read.
     pub(crate) fn actions(
         &self,
         suite: &str,
-        twin: bool,
+        is_twin: bool,
         brief: &TaskBrief,
     ) -> Result<Vec<Action>, CliError> {
-        let dir = self.of(suite, twin).map_or(&self.dir, |run| &run.dir);
+        let dir = self.run_of(suite, is_twin).map_or(&self.dir, |run| &run.dir);
         actions::read(&actions::path(dir, brief.task, brief.episode)).map_err(CliError::input)
     }
 }
 
-fn is_twin(run: &StoredRun) -> bool {
+fn suite_label(suite: &str, is_twin: bool) -> String {
+    format!("{suite}{}", if is_twin { " (rigid twin)" } else { "" })
+}
+
+fn is_rigid_twin(run: &StoredRun) -> bool {
     run.info["twin"].is_string()
 }
 
-fn has(run: &StoredRun, task: usize, episode: u32) -> bool {
-    let listed = run.records.iter().any(|r| (r.identity.task, r.identity.episode) == (task, episode));
-    listed && actions::path(&run.dir, task, episode).is_file()
+fn has_actions(run: &StoredRun, index: EpisodeIndex) -> bool {
+    let is_listed = run.records.iter().any(|record| EpisodeIndex::of(record) == index);
+    is_listed && actions::path(&run.dir, index.task, index.episode).is_file()
 }
 
 /// SHA-256 of the list of episodes and of the actions of each, in the order of the list.
-fn digest(run: &StoredRun) -> Result<String, String> {
+fn digest(run: &StoredRun) -> Result<String, FileError> {
     let mut hash = Sha256::new();
     let list = run.dir.join(EPISODES);
-    let files = run.records.iter().map(|r| actions::path(&run.dir, r.identity.task, r.identity.episode));
-    for path in std::iter::once(list).chain(files) {
-        let bytes = std::fs::read(&path).map_err(|e| format!("cannot read {}: {e}", path.display()))?;
+    let actions = run.records.iter().map(|r| actions::path(&run.dir, r.identity.task, r.identity.episode));
+    for path in std::iter::once(list).chain(actions) {
+        let bytes = std::fs::read(&path).map_err(FileError::io("read", &path))?;
+        // Lengths separate the files, so that no two sequences of files have the same input.
         hash.update((bytes.len() as u64).to_le_bytes());
         hash.update(&bytes);
     }
-    Ok(hash.finalize().iter().map(|b| format!("{b:02x}")).collect())
+    Ok(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect())
 }

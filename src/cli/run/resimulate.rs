@@ -1,11 +1,15 @@
-//! Episodes that are simulated again by their recorded actions.
+//! Re-simulation of finished episodes: comparison with their records, and restoration of lost files.
 
 use crate::{
     cli::{
         error::CliError,
+        output::{counted, notice},
         run::{
             episode_artifacts::EpisodeArtifacts,
-            suite_run::{ControllerFactory, SuiteRun, line, tell_undrawn},
+            policy::ControllerFactory,
+            run_manifest,
+            selection::EpisodeIndex,
+            suite_run::{SuiteRun, report_unrendered},
         },
     },
     evaluation::record::{EpisodeRecord, Outcome},
@@ -15,113 +19,115 @@ use crate::{
     rollout::{FinishedEpisode, cancel},
 };
 
-/// Whoever drove the episode of `record`, as its actions say.
-pub(crate) fn drive(recorded: Vec<Action>, record: &EpisodeRecord) -> ControllerFactory {
+/// A controller factory that repeats the actions of a recorded episode, and its error if it ended with one.
+pub(crate) fn replay_factory(recorded: Vec<Action>, record: &EpisodeRecord) -> ControllerFactory {
     let ending = match &record.outcome {
         Outcome::Error { message } => Some(message.clone()),
         _ => None,
     };
     Box::new(move |_, brief| {
-        Ok(Box::new(ChunkedPolicy::new(Box::new(RecordedPolicy::poses(&recorded, ending.clone())), brief, 1)))
+        let policy = RecordedPolicy::poses(&recorded, ending.clone());
+        Ok(Box::new(ChunkedPolicy::new(Box::new(policy), brief, 1)))
     })
 }
 
-/// What came out when an episode was simulated again, with what is not simulated again: who drove, what it said, and what
-/// was looked at.
-pub(crate) fn known(mut again: EpisodeRecord, record: &EpisodeRecord) -> EpisodeRecord {
-    again.identity.policy.clone_from(&record.identity.policy);
-    again.identity.privileged = record.identity.privileged;
-    again.stats.force_observed = record.stats.force_observed;
-    again.stats.camera_inside = record.stats.camera_inside;
-    again.stats.gave_up.clone_from(&record.stats.gave_up);
-    again
+/// Copies from `record` what a re-simulation does not produce: the policy, what it observed, and why it gave up.
+pub(crate) fn with_policy_fields(mut simulated: EpisodeRecord, record: &EpisodeRecord) -> EpisodeRecord {
+    simulated.identity.policy.clone_from(&record.identity.policy);
+    simulated.identity.privileged = record.identity.privileged;
+    simulated.stats.force_observed = record.stats.force_observed;
+    simulated.stats.camera_inside = record.stats.camera_inside;
+    simulated.stats.gave_up.clone_from(&record.stats.gave_up);
+    simulated
 }
 
-/// In what they differ, if they do: the record of an episode is the same to the byte.
+/// Describes the first difference of two records. `None` if they are byte-identical.
 ///
 /// # Errors
-/// A record is no JSON.
-pub(crate) fn difference(known: &EpisodeRecord, again: &EpisodeRecord) -> Result<Option<String>, CliError> {
+/// A record cannot be written as JSON.
+pub(crate) fn difference(
+    recorded: &EpisodeRecord,
+    simulated: &EpisodeRecord,
+) -> Result<Option<String>, CliError> {
     let bytes = |record: &EpisodeRecord| serde_json::to_string(record).map_err(CliError::input);
-    if bytes(known)? == bytes(again)? {
+    if bytes(recorded)? == bytes(simulated)? {
         return Ok(None);
     }
     let json = |record: &EpisodeRecord| serde_json::json!(record);
-    Ok(Some(crate::cli::run::run_manifest::difference(&json(known), &json(again)).unwrap_or_default()))
+    Ok(Some(run_manifest::difference(&json(recorded), &json(simulated)).unwrap_or_default()))
 }
 
-/// Makes the files of finished episodes again that are wanted and not there: by their recorded actions, or by whoever drove
-/// them unless that is behind a network. What cannot be made again is told; its results stay.
+/// Restores requested files of finished episodes that are missing: by the recorded actions, or without these by the
+/// policy unless it is a server. Files that cannot be restored are reported; the results of their episodes stay.
 ///
 /// # Errors
-/// An episode cannot be run, or a file not written.
-pub(crate) fn make_lost_files(batch: &SuiteRun, done: &[EpisodeRecord]) -> Result<(), CliError> {
-    let files = batch.files();
-    let lost: Vec<&EpisodeRecord> = done.iter().filter(|record| !files.lost(record).is_empty()).collect();
+/// An episode cannot be run, or a file cannot be written.
+pub(crate) fn restore_artifacts(run: &SuiteRun, records: &[EpisodeRecord]) -> Result<(), CliError> {
+    let artifacts = run.artifacts();
+    let incomplete = records.iter().filter(|record| !artifacts.missing(record).is_empty());
     let has_actions = |record: &EpisodeRecord| {
-        actions::path(&batch.out, record.identity.task, record.identity.episode).is_file()
+        actions::path(&run.out, record.identity.task, record.identity.episode).is_file()
     };
-    let (can, cannot): (Vec<_>, Vec<_>) =
-        lost.into_iter().partition(|record| has_actions(record) || !batch.run.policy.is_remote());
-    if let Some(first) = cannot.first() {
-        crate::text::eprint_line(&format!(
-            "softvt: {} finished episodes lack their actions, so that their files cannot be made again, first: {}; their results stay",
-            cannot.len(),
-            line(first)
+    let (restorable, lost): (Vec<_>, Vec<_>) =
+        incomplete.partition(|record| has_actions(record) || !run.config.policy.is_remote());
+    if let Some(first) = lost.first() {
+        notice(format!(
+            "{} finished episodes lack their actions, so their files cannot be restored (first: {}); their results stay",
+            lost.len(),
+            EpisodeIndex::of(first)
         ));
     }
-    if let Some(path) = can.first().and_then(|record| files.lost(record).into_iter().next()) {
-        crate::text::eprint_line(&format!(
-            "softvt: {} finished episodes lack files, first {}: they are made again",
-            can.len(),
+    if let Some(path) = restorable.first().and_then(|record| artifacts.missing(record).into_iter().next()) {
+        notice(format!(
+            "restoring files of {} (first: {})",
+            counted(restorable.len(), "finished episode"),
             path.display()
         ));
     }
     parallel::run(
-        can.len(),
-        batch.run.threads,
+        restorable.len(),
+        run.config.threads,
         cancel::requested,
-        |index| simulate(batch, can[index], has_actions(can[index]), &files),
-        |_, made| {
-            let Some((finished, drawn)) = made else { return Ok(()) };
-            files.write(&finished)?;
-            tell_undrawn(&finished, drawn);
+        |index| {
+            let record = restorable[index];
+            simulate(run, record, has_actions(record), &artifacts)
+        },
+        |_, simulated| {
+            let Some((finished, rendered)) = simulated else { return Ok(()) };
+            artifacts.write(&finished)?;
+            report_unrendered(&finished, rendered);
             Ok(())
         },
     )
 }
 
-/// An episode, and whether it could be drawn.
-type Made = (FinishedEpisode, Result<(), CliError>);
+/// A simulated episode, and the result of rendering it.
+type SimulatedEpisode = (FinishedEpisode, Result<(), CliError>);
 
-/// A finished episode once more; nothing, and a word about it, if it does not come out as its record says.
+/// Simulates a finished episode again. Returns `None`, after a notice, if the result differs from its record.
 fn simulate(
-    batch: &SuiteRun,
+    run: &SuiteRun,
     record: &EpisodeRecord,
-    recorded: bool,
-    files: &EpisodeArtifacts,
-) -> Result<Option<Made>, CliError> {
-    let id = &record.identity;
-    let place = (id.task, id.episode);
-    let job = batch.jobs.iter().position(|(task, episode)| (task.id, *episode) == place);
-    let Some(job) = job else { return Ok(None) };
-    let film = files.may_show(id.episode);
-    let mut finished = match recorded {
-        true => {
-            let path = actions::path(&batch.out, id.task, id.episode);
-            let recorded = actions::read(&path).map_err(CliError::input)?;
-            batch.episode(job, film, &drive(recorded, record))?
-        }
-        false => batch.episode(job, film, &batch.drive)?,
+    has_actions: bool,
+    artifacts: &EpisodeArtifacts,
+) -> Result<Option<SimulatedEpisode>, CliError> {
+    let index = EpisodeIndex::of(record);
+    let Some(job) = run.jobs.iter().find(|job| job.index() == index).copied() else { return Ok(None) };
+    let keep_states = artifacts.may_render(index.episode);
+    let mut finished = if has_actions {
+        let path = actions::path(&run.out, index.task, index.episode);
+        let recorded = actions::read(&path).map_err(CliError::input)?;
+        run.run_episode(job, keep_states, &replay_factory(recorded, record))?
+    } else {
+        run.run_episode(job, keep_states, &run.controllers)?
     };
-    finished.record = known(finished.record, record);
-    if let Some(what) = difference(record, &finished.record)? {
-        crate::text::eprint_line(&format!(
-            "softvt: no files of {}: it does not come out as recorded ({what}); its results stay",
-            line(record)
+    finished.record = with_policy_fields(finished.record, record);
+    if let Some(difference) = difference(record, &finished.record)? {
+        notice(format!(
+            "files of {index} are not restored: the simulation differs from its record ({difference}); its results stay"
         ));
         return Ok(None);
     }
-    let drawn = files.draw(&mut finished);
-    Ok(Some((finished, drawn)))
+    let rendered = artifacts.render(&mut finished);
+    Ok(Some((finished, rendered)))
 }

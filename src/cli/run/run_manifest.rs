@@ -12,155 +12,163 @@ use crate::{
     benchmark::{Task, settings::Settings},
     cli::{
         error::CliError,
-        run::{
-            recorded_policy::ReplaySource,
-            suite_run::{SuiteRun, folder_failure},
-        },
+        run::{recorded_policy::ReplaySource, suite_run::SuiteRun},
     },
     dataset::card::Imported,
+    files,
     policy::profile::Profile,
     report::run_folder::{RUN, RunFolder},
 };
 
-/// Everything needed to repeat a run.
+/// Content of `run.json`.
 #[derive(Serialize)]
 pub(crate) struct RunManifest<'a> {
-    pub softvt: &'a str,
-    pub script: String,
-    pub suite: &'a str,
+    /// Version of softvt.
+    softvt: &'a str,
+    script: String,
+    suite: &'a str,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub twin: Option<&'a str>,
-    pub policy: &'a str,
-    /// What a policy behind a network gets, and what its numbers mean.
+    twin: Option<&'a str>,
+    policy: &'a str,
+    /// Profile of a policy server.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub profile: Option<&'a Profile>,
-    /// The file of a policy in Lua; its SHA-256 is among the sources.
+    profile: Option<&'a Profile>,
+    /// File of a policy in Lua. Its SHA-256 is among the sources.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub policy_file: Option<&'a str>,
-    /// Whose actions were carried out once more.
+    policy_file: Option<&'a str>,
+    /// The run whose actions were repeated.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub replayed: Option<&'a ReplaySource>,
-    /// The files of foreign demonstrations that are re-executed.
+    replayed: Option<&'a ReplaySource>,
+    /// Files of the demonstrations that were re-executed.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub imported: Option<&'a [Imported]>,
-    /// Actions of a chunk that are carried out.
+    imported: Option<&'a [Imported]>,
+    /// Actions executed from each chunk.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub replan: Option<usize>,
-    pub privileged: bool,
-    pub seed: u64,
-    pub split: &'a str,
-    pub tasks: Vec<usize>,
-    pub episodes: u32,
-    /// The part of the run that this is, such as 2/8.
+    replan: Option<usize>,
+    privileged: bool,
+    seed: u64,
+    split: &'a str,
+    tasks: Vec<usize>,
+    /// Episodes per task.
+    episodes: u32,
+    /// The part of the run, such as 2/8.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub shard: Option<String>,
-    pub shifts: &'a [(String, f64)],
-    pub options: BTreeMap<String, String>,
-    /// What was typed of the script's own options.
-    pub arguments: &'a [String],
-    /// What was typed behind --set.
-    pub set: &'a [(String, String)],
-    pub settings: &'a Settings,
-    pub sources: BTreeMap<String, String>,
-    pub thresholds: BTreeMap<String, Option<f64>>,
-    /// Whether the policy sees the true forces at the pads.
-    pub force_observed: bool,
+    shard: Option<String>,
+    shifts: &'a [(String, f64)],
+    /// Values of all options of the script.
+    options: BTreeMap<String, String>,
+    /// Options of the script as they were typed.
+    arguments: &'a [String],
+    /// Arguments of `--set`.
+    set: &'a [(String, String)],
+    settings: &'a Settings,
+    /// SHA-256 of files by name.
+    sources: BTreeMap<String, String>,
+    /// τ by asset, %.
+    thresholds: BTreeMap<String, Option<f64>>,
+    /// True if the policy observes the true forces on the pads.
+    force_observed: bool,
 }
 
 impl<'a> RunManifest<'a> {
-    /// That of a batch that is prepared.
-    pub(crate) fn of(batch: &'a SuiteRun, tasks: &[&Task], episodes: u32) -> Self {
-        let run = batch.run;
-        let options = batch.loaded.options.iter();
+    /// The manifest of a prepared run of `episodes` per task.
+    pub(crate) fn new(run: &'a SuiteRun, tasks: &[&Task], episodes: u32) -> Self {
+        let config = run.config;
+        let options = run.loaded.options.iter();
+        let limits = run.limits.iter();
         Self {
             softvt: env!("CARGO_PKG_VERSION"),
-            script: batch.loaded.main.clone(),
-            suite: &batch.suite.name,
-            twin: run.twin.then_some("rigid"),
-            policy: run.policy.name(),
-            profile: run.policy.profile(),
-            policy_file: run.policy.file(),
-            replayed: batch.replayed.as_ref(),
-            imported: Some(&batch.imported[..]).filter(|files| !files.is_empty()),
-            replan: run.policy.replan(),
-            privileged: batch.is_privileged(),
-            seed: run.seed,
-            split: batch.split.name(),
-            tasks: tasks.iter().map(|t| t.id).collect(),
+            script: run.loaded.main.clone(),
+            suite: &run.suite.name,
+            twin: config.is_rigid_twin.then_some("rigid"),
+            policy: config.policy.name(),
+            profile: config.policy.profile(),
+            policy_file: config.policy.file(),
+            replayed: run.replay_source.as_ref(),
+            imported: Some(&run.imported[..]).filter(|files| !files.is_empty()),
+            replan: config.policy.replan(),
+            privileged: run.is_privileged(),
+            seed: config.seed,
+            split: run.split.name(),
+            tasks: tasks.iter().map(|task| task.id).collect(),
             episodes,
-            shard: run.shard.map(|shard| shard.to_string()),
-            shifts: &run.shifts,
-            options: options.map(|o| (o.name.clone(), format!("{:?}", o.value))).collect(),
-            arguments: &run.script_words,
-            set: &run.set,
-            settings: &batch.settings,
-            sources: batch.sources.clone(),
-            thresholds: batch.limits.iter().map(|(a, l)| (a.clone(), l.map(|l| l.tau_pct()))).collect(),
-            force_observed: batch.force_observed,
+            shard: config.shard.map(|shard| shard.to_string()),
+            shifts: &config.shifts,
+            options: options.map(|option| (option.name.clone(), format!("{:?}", option.value))).collect(),
+            arguments: &config.script_options,
+            set: &config.settings,
+            settings: &run.settings,
+            sources: run.sources.clone(),
+            thresholds: limits
+                .map(|(asset, limit)| (asset.clone(), limit.map(|limit| limit.tau_pct())))
+                .collect(),
+            force_observed: run.force_observed,
         }
     }
 }
 
-/// Writes it down; if it stands there already, it must be the same.
+/// Writes the manifest into a run folder. A manifest that is there must be the same.
 ///
 /// # Errors
-/// The file cannot be written, or is that of another run.
-pub(crate) fn write(folder: &RunFolder, info: &impl Serialize) -> Result<(), CliError> {
-    let Some(known) = folder.read(RUN).map_err(folder_failure)? else {
-        return crate::files::write_json(&folder.path().join(RUN), info).map_err(CliError::input);
+/// The file cannot be written, or belongs to another run.
+pub(crate) fn write(folder: &RunFolder, manifest: &impl Serialize) -> Result<(), CliError> {
+    let path = folder.path().join(RUN);
+    let Some(stored) = folder.read(RUN).map_err(CliError::input)? else {
+        return files::write_json(&path, manifest).map_err(CliError::input);
     };
-    let path = folder.path().join(RUN).display().to_string();
-    let known: Value = serde_json::from_str(&known)
-        .map_err(|e| CliError::input(format!("{path}: not that of a run: {e}")))?;
-    match difference(&known, &json!(info)) {
+    let path = path.display();
+    let stored: Value = serde_json::from_str(&stored)
+        .map_err(|error| CliError::input(format!("{path} is not a valid run file: {error}")))?;
+    match difference(&stored, &json!(manifest)) {
         None => Ok(()),
         Some(what) => Err(CliError::input(format!(
-            "{path} is of another run: {what}; resume it with what it was started with, or give another folder with --out"
+            "{path} belongs to another run: {what}; resume it with its original arguments, or select another --out"
         ))),
     }
 }
 
-/// Whether it stands in a folder.
+/// True if the folder contains this very manifest.
 ///
 /// # Errors
-/// The file is there and cannot be read.
-pub(crate) fn is_of(dir: &Path, info: &RunManifest) -> Result<bool, CliError> {
-    let path = dir.join(RUN);
-    let text = std::fs::read_to_string(&path)
-        .map_err(|e| CliError::input(format!("cannot read {}: {e}", path.display())))?;
-    Ok(serde_json::from_str::<Value>(&text).is_ok_and(|known| known == json!(info)))
+/// The file cannot be read.
+pub(crate) fn is_in(dir: &Path, manifest: &RunManifest) -> Result<bool, CliError> {
+    let text = files::read_text(&dir.join(RUN)).map_err(CliError::input)?;
+    Ok(serde_json::from_str::<Value>(&text).is_ok_and(|stored| stored == json!(manifest)))
 }
 
-/// Letters of the longest value that is told whole: a hash is.
-const TOLD: usize = 80;
-/// Letters before the first difference of longer ones.
-const BEFORE: usize = 16;
+/// Longest value that a message shows in full, in characters. A SHA-256 fits.
+const MAX_SHOWN_CHARS: usize = 80;
+/// Characters shown before the first difference of longer values.
+const CONTEXT_CHARS: usize = 16;
 
-/// Two values that differ, each short, with that in which they differ.
-fn told(a: &Value, b: &Value) -> [String; 2] {
+/// Formats two different values, shortened around their first difference.
+fn shorten(a: &Value, b: &Value) -> [String; 2] {
     let [a, b] = [a, b].map(|value| value.to_string().chars().collect::<Vec<char>>());
-    let same = a.iter().zip(&b).take_while(|(a, b)| a == b).count();
-    let from = if a.len().max(b.len()) <= TOLD { 0 } else { same.saturating_sub(BEFORE) };
-    [a, b].map(|letters| {
-        let head = if from > 0 { "…" } else { "" };
-        let tail = if letters.len() > from + TOLD { "…" } else { "" };
-        let shown: String = letters.into_iter().skip(from).take(TOLD).collect();
+    let common = a.iter().zip(&b).take_while(|(a, b)| a == b).count();
+    let is_long = a.len().max(b.len()) > MAX_SHOWN_CHARS;
+    let start = if is_long { common.saturating_sub(CONTEXT_CHARS) } else { 0 };
+    [a, b].map(|chars| {
+        let head = if start > 0 { "…" } else { "" };
+        let tail = if chars.len() > start + MAX_SHOWN_CHARS { "…" } else { "" };
+        let shown: String = chars.into_iter().skip(start).take(MAX_SHOWN_CHARS).collect();
         format!("{head}{shown}{tail}")
     })
 }
 
-/// Where two documents differ first, with both values.
-pub(crate) fn difference(known: &Value, now: &Value) -> Option<String> {
-    let (Value::Object(a), Value::Object(b)) = (known, now) else {
-        return (known != now).then(|| told(known, now).join(" then, ") + " now");
+/// Describes the first difference of two documents: its path and both values.
+pub(crate) fn difference(before: &Value, now: &Value) -> Option<String> {
+    let (Value::Object(a), Value::Object(b)) = (before, now) else {
+        return (before != now).then(|| {
+            let [before, now] = shorten(before, now);
+            format!("{before} before, {now} now")
+        });
     };
-    let names: BTreeSet<&String> = a.keys().chain(b.keys()).collect();
-    names.into_iter().find_map(|name| {
-        let of = |map: &Map<String, Value>| map.get(name).cloned().unwrap_or(Value::Null);
-        let inner = difference(&of(a), &of(b))?;
-        // Below the first level the names make a path.
-        let is_path = of(a).is_object() && of(b).is_object();
-        Some(if is_path { format!("{name}.{inner}") } else { format!("{name}: {inner}") })
+    let keys: BTreeSet<&String> = a.keys().chain(b.keys()).collect();
+    keys.into_iter().find_map(|key| {
+        let value = |map: &Map<String, Value>| map.get(key).cloned().unwrap_or(Value::Null);
+        let inner = difference(&value(a), &value(b))?;
+        let is_path = value(a).is_object() && value(b).is_object();
+        Some(if is_path { format!("{key}.{inner}") } else { format!("{key}: {inner}") })
     })
 }
 
@@ -173,22 +181,22 @@ mod tests {
         let a = json!({ "seed": 0, "settings": { "physics": { "dt": 0.0166 } }, "shifts": [] });
         assert_eq!(difference(&a, &a.clone()), None);
         let b = json!({ "seed": 0, "settings": { "physics": { "dt": 0.01 } }, "shifts": [] });
-        assert_eq!(difference(&a, &b).unwrap(), "settings.physics.dt: 0.0166 then, 0.01 now");
+        assert_eq!(difference(&a, &b).unwrap(), "settings.physics.dt: 0.0166 before, 0.01 now");
         let c = json!({ "seed": 0, "settings": { "physics": { "dt": 0.0166 } } });
-        assert_eq!(difference(&a, &c).unwrap(), "shifts: [] then, null now");
+        assert_eq!(difference(&a, &c).unwrap(), "shifts: [] before, null now");
     }
 
     #[test]
-    fn what_differs_is_shown_however_late_it_comes() {
+    fn long_values_are_shortened_around_their_difference() {
         let hash = |last: char| "0123456789abcdef".repeat(4)[..63].to_owned() + &last.to_string();
         let (a, b) = (json!({ "x.lua": hash('1') }), json!({ "x.lua": hash('2') }));
-        let told = difference(&a, &b).unwrap();
-        assert!(told.contains(&hash('1')) && told.contains(&hash('2')), "{told}");
+        let text = difference(&a, &b).unwrap();
+        assert!(text.contains(&hash('1')) && text.contains(&hash('2')), "{text}");
         let list = |last: usize| json!({ "tasks": (0..100).chain([last]).collect::<Vec<_>>() });
-        let told = difference(&list(777), &list(888)).unwrap();
-        assert_eq!(told, "tasks: …,95,96,97,98,99,777] then, …,95,96,97,98,99,888] now");
+        let text = difference(&list(777), &list(888)).unwrap();
+        assert_eq!(text, "tasks: …,95,96,97,98,99,777] before, …,95,96,97,98,99,888] now");
         let long = |letter: &str| json!({ "a": "x".repeat(300) + letter + &"y".repeat(300) });
-        let told = difference(&long("1"), &long("2")).unwrap();
-        assert!(told.contains("x1y") && told.contains("x2y") && told.chars().count() < 200, "{told}");
+        let text = difference(&long("1"), &long("2")).unwrap();
+        assert!(text.contains("x1y") && text.contains("x2y") && text.chars().count() < 200, "{text}");
     }
 }

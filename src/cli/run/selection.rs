@@ -1,87 +1,138 @@
-//! Selection of suites, tasks and episodes by the command line.
+//! Selection of suites, tasks and episodes by the command line, and the folders they are written to.
 
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, fmt};
 
 use crate::{
-    benchmark::{Suite, Task},
+    benchmark::{Plan, Suite, Task},
     cli::{error::CliError, run::config::RunConfig},
+    evaluation::record::EpisodeRecord,
 };
 
-/// The tasks that `--task` names.
+/// An episode of a suite: the index of its task and its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct EpisodeIndex {
+    pub task: usize,
+    pub episode: u32,
+}
+
+impl EpisodeIndex {
+    pub(crate) fn of(record: &EpisodeRecord) -> Self {
+        Self { task: record.identity.task, episode: record.identity.episode }
+    }
+}
+
+impl fmt::Display for EpisodeIndex {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "task {} episode {}", self.task, self.episode)
+    }
+}
+
+/// An episode to run.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct EpisodeJob<'a> {
+    pub task: &'a Task,
+    pub episode: u32,
+}
+
+impl EpisodeJob<'_> {
+    pub(crate) fn index(&self) -> EpisodeIndex {
+        EpisodeIndex { task: self.task.id, episode: self.episode }
+    }
+}
+
+/// The suites of a plan, for commands that need at least one.
 ///
 /// # Errors
-/// A word that names none, or a task without the expert that is to drive it.
-pub(crate) fn select_tasks<'a>(run: &RunConfig, suite: &'a Suite) -> Result<Vec<&'a Task>, CliError> {
-    let mut found: Vec<&Task> = Vec::new();
-    for word in &run.tasks {
+/// The plan is neither a suite nor a list of suites with distinct folders.
+pub(crate) fn select_suites<'a>(
+    command: &str,
+    config: &RunConfig,
+    plan: &'a Plan,
+) -> Result<Vec<&'a Suite>, CliError> {
+    match plan {
+        Plan::Suite(suite) => Ok(vec![suite]),
+        Plan::Suites { suites } => {
+            check_distinct_out_dirs(config, suites)?;
+            Ok(suites.iter().collect())
+        }
+        Plan::Conditions { .. } | Plan::Experiment { .. } => Err(CliError::input(format!(
+            "{}: softvt {command} needs a suite or a list of suites; name a file that returns softvt.suite",
+            config.file.display()
+        ))),
+    }
+}
+
+/// The tasks that `--task` selects, in the order of their indices.
+///
+/// # Errors
+/// A word that matches no task, or a task without an expert where the expert is the policy.
+pub(crate) fn select_tasks<'a>(config: &RunConfig, suite: &'a Suite) -> Result<Vec<&'a Task>, CliError> {
+    let refuse = |message: String| Err(CliError::input(message).prefixed(config.file.display()));
+    let mut selected: Vec<&Task> = Vec::new();
+    for word in &config.tasks {
         if word.trim().is_empty() {
-            let message = format!(
-                "{}: --task: expected an index or part of a prompt, got {word:?}",
-                run.file.display()
-            );
-            return Err(CliError::input(message));
+            return refuse(format!("--task: expected an index or part of a prompt, got {word:?}"));
         }
         let index = word.parse::<usize>().ok();
-        let fits = |task: &&Task| match index {
+        let matches = |task: &&Task| match index {
             Some(index) => task.id == index,
             None => task.prompt.contains(word.as_str()),
         };
-        let before = found.len();
-        found.extend(suite.tasks.iter().filter(fits));
-        if found.len() == before {
-            let message = format!(
-                "{}: --task {word}: suite {} has no such task; it has 0 to {}: see softvt list tasks",
-                run.file.display(),
-                suite.name,
-                suite.tasks.len().saturating_sub(1)
-            );
-            return Err(CliError::input(message));
+        let before = selected.len();
+        selected.extend(suite.tasks.iter().filter(matches));
+        if selected.len() == before {
+            let available = match suite.tasks.len() {
+                1 => "it has only task 0".to_owned(),
+                count => format!("it has tasks 0 to {}", count.saturating_sub(1)),
+            };
+            let name = &suite.name;
+            return refuse(format!(
+                "--task {word}: suite {name} has no such task; {available} (softvt list tasks)"
+            ));
         }
     }
-    if run.tasks.is_empty() {
-        found.extend(&suite.tasks);
+    if config.tasks.is_empty() {
+        selected.extend(&suite.tasks);
     }
-    found.sort_by_key(|task| task.id);
-    found.dedup_by_key(|task| task.id);
-    if let Some(task) = found.iter().find(|t| !t.expert && run.policy.is_privileged()) {
-        let message =
-            format!("{}: task {} has no expert; give one, or another --policy", run.file.display(), task.id);
-        return Err(CliError::input(message));
+    selected.sort_by_key(|task| task.id);
+    selected.dedup_by_key(|task| task.id);
+    if let Some(task) = selected.iter().find(|task| !task.expert && config.policy.is_privileged()) {
+        return refuse(format!("task {} has no expert; add one, or select another --policy", task.id));
     }
-    Ok(found)
+    Ok(selected)
 }
 
-/// The episodes of the tasks that `--task` names, or a shard's part of them.
+/// All episodes of the tasks, or those of the shard.
 pub(crate) fn select_episodes<'a>(
-    run: &RunConfig,
+    config: &RunConfig,
     suite: &Suite,
     tasks: &[&'a Task],
-) -> Vec<(&'a Task, u32)> {
-    let episodes = run.episodes.unwrap_or(suite.episodes);
-    let all = tasks.iter().flat_map(|task| (0..episodes).map(move |e| (*task, e)));
-    let own = all.enumerate().filter(|(job, _)| run.shard.is_none_or(|shard| shard.has(*job)));
-    own.map(|(_, job)| job).collect()
+) -> Vec<EpisodeJob<'a>> {
+    let episodes = config.episodes.unwrap_or(suite.episodes);
+    let all = tasks.iter().flat_map(|task| (0..episodes).map(move |episode| EpisodeJob { task, episode }));
+    let selected =
+        all.enumerate().filter(|(number, _)| config.shard.is_none_or(|shard| shard.contains(*number)));
+    selected.map(|(_, job)| job).collect()
 }
 
-/// Every suite must have a folder of its own.
+/// Checks that every suite gets an output folder of its own.
 ///
 /// # Errors
-/// Two names that become one as part of a path.
-pub(crate) fn check_distinct_out_dirs(run: &RunConfig, suites: &[Suite]) -> Result<(), CliError> {
-    let mut names = BTreeSet::new();
-    let Some(twice) = suites.iter().find(|suite| !names.insert(path_component(&suite.name))) else {
-        return Ok(());
-    };
-    let message = format!(
-        "{}: suite {:?} would share its folder {:?} with another; rename one",
-        run.file.display(),
-        twice.name,
-        path_component(&twice.name)
-    );
-    Err(CliError::input(message))
+/// Two suites whose names become the same path component.
+pub(crate) fn check_distinct_out_dirs(config: &RunConfig, suites: &[Suite]) -> Result<(), CliError> {
+    let mut folders = BTreeSet::new();
+    let duplicate = suites.iter().find(|suite| !folders.insert(path_component(&suite.name)));
+    duplicate.map_or(Ok(()), |suite| {
+        Err(CliError::input(format!(
+            "{}: suite {:?} and another suite share the folder {:?}; rename one",
+            config.file.display(),
+            suite.name,
+            path_component(&suite.name)
+        )))
+    })
 }
 
-/// A name as part of a path: it is the script's, and must not lead out of the folder.
+/// Replaces characters of a name that a script could use to leave the output folder.
 pub(crate) fn path_component(name: &str) -> String {
     name.replace(|c: char| !(c.is_alphanumeric() || c == '_' || c == '-'), "_")
 }

@@ -1,139 +1,152 @@
-//! The episodes of one suite: their limits, their runs, their files.
+//! A run of one suite: its deformation limits, its episodes and their files.
 
-use crate::cli::run::run_manifest;
-use crate::cli::run::run_manifest::RunManifest;
-use std::path::Path;
 use std::{
     collections::{BTreeMap, BTreeSet},
-    path::PathBuf,
+    path::{Path, PathBuf},
     sync::Arc,
 };
 
 use crate::{
     benchmark::{Suite, Task, seed::Split, settings::Settings},
     cli::{
+        args::TraceDetail,
         error::{CliError, Exit},
-        output::Progress,
-        run::config::RunConfig,
+        output::{Progress, counted, notice},
         run::{
-            calibration::{self, Calibrated},
+            calibration::{self, Calibration},
+            config::RunConfig,
             episode_artifacts::EpisodeArtifacts,
-            policy::ControllerSource,
-            recorded_policy::{ReplaySource, recorded},
+            policy::ControllerFactory,
+            recorded_policy::{ReplaySource, find_replay_source},
             resimulate,
+            run_manifest::{self, RunManifest},
+            selection::{EpisodeIndex, EpisodeJob},
         },
     },
     dataset::card::Imported,
     evaluation::{
-        record::{EpisodeRecord, Origin},
+        record::{EpisodeRecord, Origin, Outcome},
         safety::{DeformationLimit, NOMINAL_KAPPA},
         summary::SuiteSummary,
         thresholds::ThresholdFile,
     },
-    parallel,
-    policy::TaskBrief,
+    files, parallel,
+    policy::{TaskBrief, remote::PolicyConnections},
     report::{
         run_folder::{EPISODES, RUN, RunFolder, SUMMARY},
         softvtbench_files,
     },
     rollout::{
-        AssetCache, BuildError, Cancellable, ControlError, Controller, Episode, EpisodeError, EpisodeRef,
-        EpisodeSpec, FinishedEpisode, SensorAssets, cancel, target_asset,
+        AssetCache, BuildError, Cancellable, ControlError, Episode, EpisodeError, EpisodeRef, EpisodeSpec,
+        FinishedEpisode, SensorAssets, cancel, target_asset,
     },
     scene::{Asset, Body},
     script::{self, Loaded},
 };
 
-/// One suite under way.
+/// A suite with everything that its episodes need.
+///
+/// [`SuiteRun::prepare`] checks the scenes and reads the limits. [`run_suite`] then runs all episodes into the folder;
+/// other commands run single episodes with [`SuiteRun::run_episode`].
 pub(crate) struct SuiteRun<'a> {
-    pub run: &'a RunConfig,
+    pub config: &'a RunConfig,
     pub loaded: &'a Loaded,
     pub suite: &'a Suite,
     /// Name in results.
     pub name: String,
     pub settings: Settings,
-    pub jobs: Vec<(&'a Task, u32)>,
+    pub jobs: Vec<EpisodeJob<'a>>,
+    /// Deformation limits by asset. `None` if no squeeze of the calibration was stable, or without a calibration.
     pub limits: BTreeMap<String, Option<DeformationLimit>>,
-    /// The thresholds in use as one file of SoftVTBench's form.
-    released: ThresholdFile,
-    /// SHA-256 of every file that the results depend on.
+    /// The calibrations in use, merged into a file in the format of SoftVTBench.
+    thresholds: ThresholdFile,
+    /// SHA-256 of every file that the results depend on, by name.
     pub sources: BTreeMap<String, String>,
-    /// Whose actions are carried out once more.
-    pub(crate) replayed: Option<ReplaySource>,
-    pub(crate) cache: AssetCache,
-    pub(crate) looks: SensorAssets,
+    /// The recorded run whose actions are repeated.
+    pub replay_source: Option<ReplaySource>,
+    pub assets: AssetCache,
+    pub sensor_assets: SensorAssets,
+    /// Folder of the run.
     pub out: PathBuf,
-    /// Whether rollouts are drawn.
-    pub films: bool,
-    /// Whether whoever drives sees the true forces at the pads.
+    /// True if any episode may be rendered.
+    pub renders_episodes: bool,
+    /// True if the policy observes the true forces on the pads.
     pub force_observed: bool,
-    /// Which list its episodes are of.
     pub split: Split,
-    pub(crate) drivers: Arc<ControllerSource>,
-    /// ForeignFile demonstrations that episodes re-execute, by task and episode.
-    pub origins: BTreeMap<(usize, u32), Origin>,
-    /// The files that those are from.
+    pub connections: Option<Arc<PolicyConnections>>,
+    /// Demonstrations of other simulators that the episodes re-execute.
+    pub origins: BTreeMap<EpisodeIndex, Origin>,
+    /// Files of those demonstrations.
     pub imported: Vec<Imported>,
-    pub drive: ControllerFactory,
+    pub controllers: ControllerFactory,
+}
+
+/// The episodes of a finished run, in order, with their summary.
+pub(crate) struct SuiteResult {
+    pub summary: SuiteSummary,
+    pub records: Vec<EpisodeRecord>,
 }
 
 impl<'a> SuiteRun<'a> {
-    /// `jobs` of a suite, to be kept in `out`.
+    /// A run of `jobs` into the folder `out`. Nothing is run or written yet.
     ///
     /// # Errors
-    /// A setting or shift that the suite does not have, or a value out of its range.
+    /// A setting or shift that does not exist, or whose value is out of range; recorded actions that do not fit.
     pub(crate) fn new(
-        run: &'a RunConfig,
+        config: &'a RunConfig,
         loaded: &'a Loaded,
         suite: &'a Suite,
-        (jobs, out): (Vec<(&'a Task, u32)>, PathBuf),
+        jobs: Vec<EpisodeJob<'a>>,
+        out: PathBuf,
     ) -> Result<Self, CliError> {
-        let wrong = |flag: &str, e: String| CliError::input(format!("{}: {flag}: {e}", run.file.display()));
-        let settings = suite.settings.with_all(&run.set).map_err(|e| wrong("--set", e))?;
-        for (name, value) in &run.shifts {
-            script::check_shift(&suite.shifts, name, *value).map_err(|e| wrong("--shift", e.to_string()))?;
+        let refuse =
+            |flag: &str, error: String| CliError::input(error).prefixed(flag).prefixed(config.file.display());
+        let settings = suite.settings.with_all(&config.settings).map_err(|e| refuse("--set", e))?;
+        for (name, value) in &config.shifts {
+            script::check_shift(&suite.shifts, name, *value).map_err(|e| refuse("--shift", e.to_string()))?;
         }
-        let replayed = recorded(run, suite, &jobs)?;
-        let force_observed = replayed.as_ref().is_some_and(|replayed| replayed.force_observed);
-        let drivers = Arc::new(ControllerSource::new(&run.policy, &suite.name, run.twin));
-        let driving = drivers.clone();
+        let replay_source = find_replay_source(config, suite, &jobs)?;
+        let connections = config.policy.connections();
         let mut sources = loaded.bundle.hashes();
-        sources.extend(run.policy.sources());
-        let made_by = format!("softvt {}", env!("CARGO_PKG_VERSION"));
+        sources.extend(config.policy.sources());
+        let generated_by = format!("softvt {}", env!("CARGO_PKG_VERSION"));
         Ok(Self {
-            run,
+            config,
             loaded,
             suite,
-            name: run.name_of(suite),
+            name: config.suite_name(suite),
             settings,
             jobs,
             limits: BTreeMap::new(),
-            released: ThresholdFile::new(NOMINAL_KAPPA, Vec::new(), made_by),
+            thresholds: ThresholdFile::new(NOMINAL_KAPPA, Vec::new(), generated_by),
             sources,
-            replayed,
-            cache: AssetCache::default(),
-            looks: SensorAssets::default(),
+            force_observed: replay_source.as_ref().is_some_and(|source| source.force_observed),
+            replay_source,
+            assets: AssetCache::default(),
+            sensor_assets: SensorAssets::default(),
             out,
-            films: run.video.is_some(),
-            force_observed,
+            renders_episodes: config.video.is_some(),
             split: Split::Validation,
+            controllers: config.policy.controller_factory(
+                connections.clone(),
+                &suite.name,
+                config.is_rigid_twin,
+            ),
+            connections,
             origins: BTreeMap::new(),
             imported: Vec::new(),
-            drivers,
-            drive: Box::new(move |opened, brief| driving.drive(opened, brief)),
         })
     }
 
-    /// The same with what was made of assets for other suites.
-    pub(crate) fn sharing(mut self, cache: &AssetCache, looks: &SensorAssets) -> Self {
-        (self.cache, self.looks) = (cache.clone(), looks.clone());
-        self
+    /// Shares prepared assets with runs of other suites.
+    pub(crate) fn with_assets(self, assets: &AssetCache, sensor_assets: &SensorAssets) -> Self {
+        Self { assets: assets.clone(), sensor_assets: sensor_assets.clone(), ..self }
     }
 
-    /// An episode as its layout, the shifts and the run make it.
-    pub(crate) fn open(&self, request: &script::EpisodeRequest) -> Result<script::Episode, CliError> {
+    /// Builds the scene of an episode: its layout, the shifts, and the rigid twin if requested.
+    pub(crate) fn open_episode(&self, request: &script::EpisodeRequest) -> Result<script::Episode, CliError> {
         let mut opened = script::Episode::open(self.loaded, request).map_err(CliError::input)?;
-        if self.run.twin {
+        if self.config.is_rigid_twin {
             (opened.scene, opened.nominal) = (opened.scene.rigid_twin(), opened.nominal.rigid_twin());
         }
         Ok(opened)
@@ -143,210 +156,208 @@ impl<'a> SuiteRun<'a> {
         TaskBrief { suite: self.name.clone(), task: task.id, prompt: task.prompt.clone(), episode }
     }
 
-    /// Whether whoever drives sees the true state, or saw it when the actions were recorded.
+    /// True if the policy has access to ground-truth state, or had it when its actions were recorded.
     pub(crate) fn is_privileged(&self) -> bool {
-        self.run.policy.is_privileged() || self.replayed.as_ref().is_some_and(|replayed| replayed.privileged)
+        self.config.policy.is_privileged()
+            || self.replay_source.as_ref().is_some_and(|source| source.privileged)
     }
 
-    /// Which episode of a task it is.
     pub(crate) fn request(&self, task: &Task, episode: u32) -> script::EpisodeRequest {
         script::EpisodeRequest {
             suite: self.suite.name.clone(),
             task: task.id,
             episode: u64::from(episode),
-            base_seed: self.run.seed,
+            base_seed: self.config.seed,
             split: self.split,
-            shifts: self.run.shifts.clone(),
+            shifts: self.config.shifts.clone(),
         }
     }
 
-    /// Reads the thresholds of the targets of tasks, and does nothing else to prepare them.
+    /// Reads the deformation limits of the targets of tasks, without any other preparation.
     ///
     /// # Errors
-    /// A layout or a threshold file that is wrong.
-    pub(crate) fn learn_limits(&mut self, tasks: &[Task]) -> Result<(), CliError> {
+    /// A layout or a calibration file that is not valid.
+    pub(crate) fn read_limits(&mut self, tasks: &[Task]) -> Result<(), CliError> {
         tasks.iter().try_for_each(|task| {
-            let opened = self.open(&self.request(task, 0))?;
-            self.learn_limit(target_asset(&opened.nominal, task).cloned())
+            let opened = self.open_episode(&self.request(task, 0))?;
+            self.read_limit(target_asset(&opened.nominal, task).cloned())
         })
     }
 
-    /// Reads the threshold of a task's target, if it is a soft one whose threshold is not known yet.
+    /// Reads the deformation limit of a target, if it is soft and its limit is not known yet.
     ///
     /// # Errors
-    /// A threshold file that is wrong.
-    pub(crate) fn learn_limit(&mut self, target: Option<Arc<Asset>>) -> Result<(), CliError> {
+    /// A calibration file that is not valid.
+    pub(crate) fn read_limit(&mut self, target: Option<Arc<Asset>>) -> Result<(), CliError> {
         let soft = target.filter(|asset| matches!(asset.body, Body::Soft(_)));
         if let Some(asset) = soft.filter(|asset| !self.limits.contains_key(&asset.name)) {
-            let limit = self.find_limit(&asset)?;
+            let limit = self.calibrated_limit(&asset)?;
             self.limits.insert(asset.name.clone(), limit);
         }
         Ok(())
     }
 
-    /// Takes over the limits of another batch of the same suite, whose layouts are the same.
-    pub(crate) fn share_limits(&mut self, other: &Self) {
+    /// Copies the limits of another run of the same suite, whose layouts are the same.
+    pub(crate) fn copy_limits(&mut self, other: &Self) {
         self.limits.clone_from(&other.limits);
-        self.released.clone_from(&other.released);
+        self.thresholds.clone_from(&other.thresholds);
         self.sources.clone_from(&other.sources);
     }
 
-    fn find_limit(&mut self, asset: &Asset) -> Result<Option<DeformationLimit>, CliError> {
+    fn calibrated_limit(&mut self, asset: &Asset) -> Result<Option<DeformationLimit>, CliError> {
         let name = &asset.name;
-        let cure = format!("its episodes cannot count as safe; softvt scripts/calibrate.lua --asset {name}");
-        match calibration::calibrated(&self.run.file, asset)? {
-            Calibrated::Never => crate::text::eprint_line(&format!(
-                "softvt: {name} is not calibrated (assets/calibration/{name}.json): {cure}"
-            )),
-            Calibrated::Another(path) => {
-                crate::text::eprint_line(&format!(
-                    "softvt: {path} is about another {name} (its shape, material or friction differ): {cure}"
-                ));
+        let fix =
+            format!("its episodes cannot be judged safe; run: softvt scripts/calibrate.lua --asset {name}");
+        match calibration::find(&self.config.file, asset)? {
+            Calibration::Missing => {
+                notice(format!("{name} is not calibrated (no assets/calibration/{name}.json): {fix}"));
+                Ok(None)
             }
-            Calibrated::Yes { limit, file, path, text } => {
-                self.sources.insert(path, script::sha256(text.as_bytes()));
-                self.released.merge(*file);
-                return Ok(limit);
+            Calibration::OtherVersion { path } => {
+                notice(format!(
+                    "{path} was computed for a different version of {name:?} (its shape, material or friction \
+                     differ): {fix}"
+                ));
+                Ok(None)
+            }
+            Calibration::Found { limit, file, relative_path, text } => {
+                self.sources.insert(relative_path, script::sha256(text.as_bytes()));
+                self.thresholds.merge(*file);
+                Ok(limit)
             }
         }
-        Ok(None)
     }
 
-    /// The limit of an object as its layout made it in this episode, whatever a shift makes of it then.
+    /// The limit of an object as the layout of this episode made it, before any shift.
     fn limit_of(&self, asset: &Asset) -> Option<DeformationLimit> {
         let limit = self.limits.get(&asset.name).copied().flatten()?;
-        let known = self.released.fingerprints.get(&asset.name);
-        known.is_none_or(|known| *known == asset.fingerprint()).then_some(limit)
+        // A layout may change the object in single episodes; the calibration is not about that one.
+        let calibrated = self.thresholds.fingerprints.get(&asset.name);
+        calibrated.is_none_or(|calibrated| *calibrated == asset.fingerprint()).then_some(limit)
     }
 
-    /// Runs the episodes that are not `done` and sums all up.
+    /// Runs the episodes that are not in `records`, writes all files and summarizes.
     ///
     /// # Errors
-    /// A script, policy or file that fails, or an interrupt; finished episodes are kept.
+    /// A script, policy or file that fails, or an interrupt. Finished episodes are kept.
     pub(crate) fn run_all(
         &self,
         mut folder: RunFolder,
-        done: Vec<EpisodeRecord>,
+        mut records: Vec<EpisodeRecord>,
     ) -> Result<SuiteResult, CliError> {
-        let mut records = done;
-        let left = self.left(&records);
-        let outcome = match resimulate::make_lost_files(self, &records) {
-            Ok(()) => self.run_episodes(&left, &mut folder, &mut records),
+        let remaining = self.remaining(&records);
+        let outcome = match resimulate::restore_artifacts(self, &records) {
+            Ok(()) => self.run_episodes(&remaining, &mut folder, &mut records),
             failed => failed,
         };
-        let kept = format!("{} of {} episodes are in {}", records.len(), self.jobs.len(), self.out.display());
-        let interrupted = || {
-            CliError::interrupted(format!(
-                "interrupted; {kept}; go on with --resume --out {}",
-                self.out.display()
-            ))
-        };
+        let out = self.out.display();
+        let kept = format!("{} of {} are in {out}", records.len(), counted(self.jobs.len(), "episode"));
+        let interrupted =
+            || CliError::interrupted(format!("interrupted; {kept}; continue with --resume --out {out}"));
         match outcome {
-            // What failed before the end was asked for is what went wrong, however long others took to end.
-            Err(failure) if failure.exit == Exit::Interrupted => return Err(interrupted()),
-            Err(failure) if records.is_empty() => {
-                // Nothing would be lost, and the same command must work once the mistake is mended.
-                folder.discard().map_err(folder_failure)?;
-                return Err(failure);
+            // An error from before the interrupt has its own exit code and is reported as it is.
+            Err(error) if error.exit == Exit::Interrupted => return Err(interrupted()),
+            Err(error) if records.is_empty() => {
+                // The same command must work once the error is fixed, and there is nothing to keep.
+                folder.discard().map_err(CliError::input)?;
+                return Err(error);
             }
-            Err(failure) => {
-                return Err(CliError { message: format!("{}\n{kept}", failure.message), ..failure });
-            }
+            Err(error) => return Err(error.with_line(&kept)),
             Ok(()) if cancel::requested() => return Err(interrupted()),
             Ok(()) => {}
         }
-        records.sort_by_key(|r| (r.identity.task, r.identity.episode));
-        folder.put_in_order(&records).map_err(folder_failure)?;
-        softvtbench_files::write_scores(&self.out, &records, &self.released).map_err(folder_failure)?;
-        let done = self.summed_up(records);
-        // The last of all: a folder with a summary is finished.
-        crate::files::write_json(&self.out.join(SUMMARY), &done.summary).map_err(CliError::input)?;
-        crate::text::eprint_line(&format!("softvt: {}", self.out.display()));
-        Ok(done)
+        records.sort_by_key(EpisodeIndex::of);
+        folder.put_in_order(&records).map_err(CliError::input)?;
+        softvtbench_files::write_scores(&self.out, &records, &self.thresholds).map_err(CliError::input)?;
+        let result = self.summarize(records);
+        // Last, since a folder with a summary counts as finished.
+        files::write_json(&self.out.join(SUMMARY), &result.summary).map_err(CliError::input)?;
+        notice(out);
+        Ok(result)
     }
 
-    /// Episodes with what they come to.
-    pub(crate) fn summed_up(&self, records: Vec<EpisodeRecord>) -> SuiteResult {
-        let policy = &self.run.policy;
-        let summary = SuiteSummary::of(&self.name, policy.name(), &records);
+    pub(crate) fn summarize(&self, records: Vec<EpisodeRecord>) -> SuiteResult {
+        let summary = SuiteSummary::of(&self.name, self.config.policy.name(), &records);
         SuiteResult { summary, records }
     }
 
-    /// Whether nothing of a finished run is missing: no episode, and no file of one.
-    pub(crate) fn is_whole(&self, done: &[EpisodeRecord]) -> bool {
-        let files = self.files();
-        self.left(done).is_empty()
+    /// True if a finished run lacks nothing: no episode, and no file of one.
+    fn is_complete(&self, records: &[EpisodeRecord]) -> bool {
+        let artifacts = self.artifacts();
+        self.remaining(records).is_empty()
             && softvtbench_files::has_scores(&self.out)
-            && done.iter().all(|record| files.lost(record).is_empty())
+            && records.iter().all(|record| artifacts.missing(record).is_empty())
     }
 
-    /// The files of its episodes beside their lines.
-    pub(crate) fn files(&self) -> EpisodeArtifacts<'_> {
-        EpisodeArtifacts::of(self.run, &self.out)
+    /// Files of the episodes, other than their lines in `episodes.jsonl`.
+    pub(crate) fn artifacts(&self) -> EpisodeArtifacts<'_> {
+        EpisodeArtifacts::new(self.config, &self.out)
     }
 
-    /// Refuses episodes of another run, or one that is there twice.
+    /// Checks that all records are episodes of this run, each at most once.
     ///
     /// # Errors
-    /// The first such line of the folder's `episodes.jsonl`.
-    pub(crate) fn check_done(&self, folder: &RunFolder, done: &[EpisodeRecord]) -> Result<(), CliError> {
+    /// The first line of `episodes.jsonl` that is not.
+    pub(crate) fn check_records(
+        &self,
+        folder: &RunFolder,
+        records: &[EpisodeRecord],
+    ) -> Result<(), CliError> {
         let path = folder.path().join(EPISODES).display().to_string();
-        if !done.is_empty() && folder.read(RUN).map_err(folder_failure)?.is_none() {
+        if !records.is_empty() && folder.read(RUN).map_err(CliError::input)?.is_none() {
             return Err(CliError::input(format!(
-                "{path}: there is no {RUN} beside it, so that nobody knows what it is of"
+                "{path}: there is no {RUN} next to it, so its run is not known"
             )));
         }
-        let wanted: BTreeSet<_> = self.jobs.iter().map(|(task, episode)| (task.id, *episode)).collect();
+        let requested: BTreeSet<_> = self.jobs.iter().map(EpisodeJob::index).collect();
         let mut seen = BTreeSet::new();
-        for (i, record) in done.iter().enumerate() {
+        for (number, record) in records.iter().enumerate() {
             let id = &record.identity;
-            let own =
-                id.suite == self.name && id.seed == self.run.seed && id.policy == self.run.policy.name();
-            let place = (id.task, id.episode);
-            let wrong = match () {
-                () if !own || !wanted.contains(&place) => "is of another run",
-                () if !seen.insert(place) => "is there twice",
-                () => continue,
+            let (config, index) = (self.config, EpisodeIndex::of(record));
+            let is_own = id.suite == self.name && id.seed == config.seed && id.policy == config.policy.name();
+            let problem = if !is_own || !requested.contains(&index) {
+                "belongs to another run"
+            } else if !seen.insert(index) {
+                "occurs twice"
+            } else {
+                continue;
             };
-            let line = i + 1;
-            return Err(CliError::input(format!(
-                "{path}:{line}: task {} episode {} {wrong}",
-                id.task, id.episode
-            )));
+            return Err(CliError::input(format!("{path}:{}: {index} {problem}", number + 1)));
         }
         Ok(())
     }
 
-    /// The jobs that are not done.
-    pub(crate) fn left(&self, done: &[EpisodeRecord]) -> Vec<usize> {
-        let done: BTreeSet<_> = done.iter().map(|r| (r.identity.task, r.identity.episode)).collect();
-        (0..self.jobs.len()).filter(|&job| !done.contains(&(self.jobs[job].0.id, self.jobs[job].1))).collect()
+    /// Positions in `jobs` of the episodes that are not in `records`.
+    fn remaining(&self, records: &[EpisodeRecord]) -> Vec<usize> {
+        let finished: BTreeSet<_> = records.iter().map(EpisodeIndex::of).collect();
+        (0..self.jobs.len()).filter(|&job| !finished.contains(&self.jobs[job].index())).collect()
     }
 
-    /// Runs jobs; an episode's line is written after all its other files, so that whoever is listed is whole.
     fn run_episodes(
         &self,
-        left: &[usize],
+        remaining: &[usize],
         folder: &mut RunFolder,
         records: &mut Vec<EpisodeRecord>,
     ) -> Result<(), CliError> {
-        let files = self.files();
-        let mut progress = Progress::new(left.len(), &self.name);
+        let artifacts = self.artifacts();
+        let mut progress = Progress::new(remaining.len(), &self.name);
         let outcome = parallel::run(
-            left.len(),
-            self.run.threads,
+            remaining.len(),
+            self.config.threads,
             cancel::requested,
             |index| {
-                let job = left[index];
-                let mut finished = self.episode(job, files.may_show(self.jobs[job].1), &self.drive)?;
-                let drawn = files.draw(&mut finished);
-                Ok((finished, drawn))
+                let job = self.jobs[remaining[index]];
+                let keep_states = artifacts.may_render(job.episode);
+                let mut finished = self.run_episode(job, keep_states, &self.controllers)?;
+                let rendered = artifacts.render(&mut finished);
+                Ok((finished, rendered))
             },
-            |_, (finished, drawn)| {
-                files.write(&finished)?;
-                folder.append(&finished.record).map_err(folder_failure)?;
-                progress.tick(&line(&finished.record));
-                tell_undrawn(&finished, drawn);
+            |_, (finished, rendered)| {
+                // The line comes after all other files, so that every listed episode is complete.
+                artifacts.write(&finished)?;
+                folder.append(&finished.record).map_err(CliError::input)?;
+                progress.tick(&episode_line(&finished.record));
+                report_unrendered(&finished, rendered);
                 records.push(finished.record);
                 Ok(())
             },
@@ -355,160 +366,149 @@ impl<'a> SuiteRun<'a> {
         outcome
     }
 
-    /// Runs one job by `drive`; with `film` what is needed to draw it is kept.
+    /// Runs one episode, from the start of its foreign demonstration if it has one. With `keep_states` the result can be
+    /// rendered.
     ///
     /// # Errors
-    /// A script, the scene or whoever drives fails.
-    pub(crate) fn episode(
+    /// The script, the scene or the controller fails.
+    pub(crate) fn run_episode(
         &self,
-        job: usize,
-        film: bool,
-        drive: &ControllerFactory,
+        job: EpisodeJob<'_>,
+        keep_states: bool,
+        controllers: &ControllerFactory,
     ) -> Result<FinishedEpisode, CliError> {
-        let (task, episode) = self.jobs[job];
-        let origin = self.origins.get(&(task.id, episode));
-        self.episode_from(job, origin, film, drive)?.map_err(|e| self.episode_failure(&e))
+        let origin = self.origins.get(&job.index());
+        self.run_episode_from(job, origin, keep_states, controllers)?.map_err(|e| self.episode_error(&e))
     }
 
-    /// The same from the start of a foreign demonstration, or from that of the layout.
+    /// Runs one episode from the start of a foreign demonstration, or from that of the layout.
     ///
     /// # Errors
-    /// A script or whoever drives does not begin; within, what is wrong with the scene or happens on the way.
-    pub(crate) fn episode_from(
+    /// The script or the controller does not start. The inner result: the scene is not valid, or the episode fails.
+    pub(crate) fn run_episode_from(
         &self,
-        job: usize,
+        job: EpisodeJob<'_>,
         origin: Option<&Origin>,
-        film: bool,
-        drive: &ControllerFactory,
+        keep_states: bool,
+        controllers: &ControllerFactory,
     ) -> Result<Result<FinishedEpisode, EpisodeError>, CliError> {
-        let (task, episode) = self.jobs[job];
-        let (spec, opened) = self.spec(task, &self.request(task, episode), origin)?;
-        let driver = drive(opened, self.brief(task, episode))?;
-        let mut driver = Cancellable(driver);
-        let started = Episode::start(EpisodeSpec { record_states: film, ..spec }, &self.cache, &self.looks);
-        Ok(started.and_then(|started| started.run(&mut driver)))
+        let (spec, opened) = self.spec(job.task, &self.request(job.task, job.episode), origin)?;
+        let mut controller = Cancellable(controllers(opened, self.brief(job.task, job.episode))?);
+        let spec = EpisodeSpec { record_states: keep_states, ..spec };
+        let started = Episode::start(spec, &self.assets, &self.sensor_assets);
+        Ok(started.and_then(|started| started.run(&mut controller)))
     }
 
-    /// The settled start of an episode, for somebody else to drive.
+    /// Starts an episode for an external client: settled, without a controller.
     ///
     /// # Errors
-    /// A script or the scene fails.
-    pub(crate) fn begin(&self, task: &Task, request: &script::EpisodeRequest) -> Result<Episode, CliError> {
+    /// The script or the scene fails.
+    pub(crate) fn start_episode(
+        &self,
+        task: &Task,
+        request: &script::EpisodeRequest,
+    ) -> Result<Episode, CliError> {
         let (spec, _) = self.spec(task, request, None)?;
-        Episode::start(spec, &self.cache, &self.looks).map_err(|e| self.episode_failure(&e))
+        Episode::start(spec, &self.assets, &self.sensor_assets).map_err(|e| self.episode_error(&e))
     }
 
-    /// All of an episode but who drives, and what its script made.
+    /// The specification of an episode, and the script's episode for the controller.
     fn spec(
         &self,
         task: &Task,
         request: &script::EpisodeRequest,
         origin: Option<&Origin>,
     ) -> Result<(EpisodeSpec, script::Episode), CliError> {
-        let mut opened = self.open(request)?;
+        let mut opened = self.open_episode(request)?;
         if let Some(origin) = origin {
             origin.start.apply(&mut opened.scene);
         }
         let limit = target_asset(&opened.nominal, task).and_then(|asset| self.limit_of(asset));
-        let which = EpisodeRef {
+        let episode = EpisodeRef {
             suite: &self.name,
             episode: request.episode as u32,
             seed: request.base_seed,
             split: request.split,
-            policy: self.run.policy.name(),
+            policy: self.config.policy.name(),
         };
         let scenes = (&opened.nominal, opened.scene.clone());
-        let mut spec = EpisodeSpec::new(&which, task, scenes, &self.settings);
+        let mut spec = EpisodeSpec::new(&episode, task, scenes, &self.settings);
         spec.identity.privileged = self.is_privileged();
         spec.identity.origin = origin.cloned().map(Box::new);
-        Ok((EpisodeSpec { limit, trace: self.run.trace, ..spec }, opened))
+        let trace = self.config.trace.map(|detail| detail == TraceDetail::Nodes);
+        Ok((EpisodeSpec { limit, trace, ..spec }, opened))
     }
 
-    pub(crate) fn episode_failure(&self, error: &EpisodeError) -> CliError {
+    /// Converts the error of an episode, with its place in the script.
+    pub(crate) fn episode_error(&self, error: &EpisodeError) -> CliError {
         let exit = match error {
-            // What fails after the end was asked for may fail because of that.
+            // An error after the interrupt may be its consequence.
             _ if cancel::requested() => Exit::Interrupted,
             EpisodeError::Control { source: ControlError::Policy(_), .. } => Exit::Policy,
             _ => Exit::Input,
         };
         let message = match (error, error.place()) {
-            // It says which file and line itself.
+            // The message of this one begins with file and line.
             (EpisodeError::Build(BuildError::At { .. }), _) => error.to_string(),
             (_, Some(place)) => format!("{place}: {error}"),
-            (_, None) => format!("{}: {error}", self.run.file.display()),
+            (_, None) => format!("{}: {error}", self.config.file.display()),
         };
         CliError { exit, message }
     }
 }
 
-/// Runs the jobs of a batch that is prepared, into its folder; those that are done there stay.
+/// Runs the episodes of a prepared suite into its folder. Episodes that are there already are kept.
 ///
 /// # Errors
-/// The folder holds another run, or one that is not to be resumed; an episode fails.
-pub(crate) fn run_suite(batch: &SuiteRun, tasks: &[&Task]) -> Result<SuiteResult, CliError> {
-    let run = batch.run;
-    // The same command again on a finished folder changes nothing.
-    let episodes = run.episodes.unwrap_or(batch.suite.episodes);
-    let info = RunManifest::of(batch, tasks, episodes);
-    let finished = is_finished(&batch.out) && run_manifest::is_of(&batch.out, &info)?;
-    let opened = match run.resume || finished {
-        true => RunFolder::resume(&batch.out),
-        false => RunFolder::create(&batch.out).map(|folder| (folder, Vec::new())),
+/// The folder contains another run, or one that may not be resumed; an episode fails.
+pub(crate) fn run_suite(run: &SuiteRun, tasks: &[&Task]) -> Result<SuiteResult, CliError> {
+    let config = run.config;
+    let manifest = RunManifest::new(run, tasks, config.episodes.unwrap_or(run.suite.episodes));
+    // The same command again on a finished folder changes nothing, even without --resume.
+    let finished = is_finished(&run.out) && run_manifest::is_in(&run.out, &manifest)?;
+    let opened = match config.resume || finished {
+        true => RunFolder::resume(&run.out),
+        false => RunFolder::create(&run.out).map(|folder| (folder, Vec::new())),
     };
-    let (folder, done) = opened.map_err(|e| CliError::input(format!("{}: {e}", run.file.display())))?;
-    batch.check_done(&folder, &done)?;
-    run_manifest::write(&folder, &info)?;
-    if finished && batch.is_whole(&done) {
-        crate::text::eprint_line(&format!("softvt: {} is finished already", batch.out.display()));
-        return Ok(batch.summed_up(done));
+    let (folder, records) = opened.map_err(|error| CliError::input(error).prefixed(config.file.display()))?;
+    run.check_records(&folder, &records)?;
+    run_manifest::write(&folder, &manifest)?;
+    if finished && run.is_complete(&records) {
+        notice(format!("{} is already complete", run.out.display()));
+        return Ok(run.summarize(records));
     }
-    batch.run_all(folder, done)
+    run.run_all(folder, records)
 }
 
-/// Whether a folder holds a run that came to its end.
+/// True if a folder contains a finished run.
 pub(crate) fn is_finished(dir: &Path) -> bool {
     dir.join(SUMMARY).is_file() && dir.join(RUN).is_file()
 }
 
-/// Makes whoever drives an episode.
-pub(crate) type ControllerFactory =
-    Box<dyn Fn(script::Episode, TaskBrief) -> Result<Box<dyn Controller>, CliError> + Sync>;
-
-/// The episodes of a run that came to its end, in order, and what they come to.
-pub(crate) struct SuiteResult {
-    /// What they come to.
-    pub summary: SuiteSummary,
-    /// The episodes.
-    pub records: Vec<EpisodeRecord>,
-}
-
-/// An episode counts whether or not it can be drawn.
-pub(crate) fn tell_undrawn(finished: &FinishedEpisode, drawn: Result<(), CliError>) {
-    if let Err(failure) = drawn {
-        let message = format!("softvt: no video of {}: {}", line(&finished.record), failure.message);
-        crate::text::eprint_line(&message);
+/// Reports an episode whose video could not be written. The episode counts nevertheless.
+pub(crate) fn report_unrendered(finished: &FinishedEpisode, rendered: Result<(), CliError>) {
+    if let Err(error) = rendered {
+        notice(format!("no video of {}: {error}", EpisodeIndex::of(&finished.record)));
     }
 }
 
-pub(crate) fn folder_failure(error: impl std::fmt::Display) -> CliError {
-    CliError::input(error)
-}
-
-/// One episode in one line.
-pub(crate) fn line(record: &EpisodeRecord) -> String {
-    let v = &record.verdict;
-    let d = v.d_peak.map_or(String::new(), |d| format!(", D {d:.2} %"));
-    let outcome = match (record.outcome.is_valid(), v.safety, v.goal) {
-        (false, _, _) => "invalid",
-        (_, true, _) => "safe",
-        (_, false, true) => "goal, not safe",
-        _ => "failed",
+/// Formats an episode as one line of progress.
+pub(crate) fn episode_line(record: &EpisodeRecord) -> String {
+    let verdict = &record.verdict;
+    let d = verdict.d_peak.map_or(String::new(), |d| format!(", D {d:.2} %"));
+    let outcome = match &record.outcome {
+        Outcome::Invalid { reason, .. } => format!("invalid ({reason}){d}"),
+        Outcome::Error { message } => format!("invalid ({message}){d}"),
+        _ if verdict.safety => format!("safe{d}"),
+        _ if verdict.goal => match (verdict.deformation_ok, verdict.d_peak, verdict.tau) {
+            (Some(false), Some(d), Some(tau)) => format!("goal reached, unsafe (D {d:.2} % > τ {tau:.2} %)"),
+            _ => format!("goal reached, unsafe{d}"),
+        },
+        _ => format!("failed{d}"),
     };
-    let reason = record.stats.gave_up.as_ref().map_or(String::new(), |reason| format!("; gave up: {reason}"));
-    format!(
-        "task {} episode {}: {outcome}{d}, {:.1} s{reason}",
-        record.identity.task, record.identity.episode, record.stats.time_s
-    )
+    let stats = &record.stats;
+    let reason = stats.gave_up.as_ref().map_or(String::new(), |reason| format!("; gave up: {reason}"));
+    format!("{}: {outcome}, {:.1} s{reason}", EpisodeIndex::of(record), stats.time_s)
 }
 
 #[cfg(test)]
@@ -516,20 +516,17 @@ mod tests {
     use super::*;
     use crate::{
         benchmark::Plan,
-        cli::{
-            args::{self, Command},
-            run::run_manifest::{self, RunManifest},
-        },
+        cli::run::policy::PolicyConfig,
         policy::{Action, ActionChunk, ChunkedPolicy, Observation, Policy, PolicyError, SensorStreams},
-        report::run_folder::{EPISODES, RUN},
+        rollout::Controller,
     };
 
-    /// Asks for the true forces, holds still, and complains if it does not get them.
-    struct Feeler;
+    /// Requests the true forces, holds still, and fails without them.
+    struct ForceObserver;
 
-    impl Policy for Feeler {
+    impl Policy for ForceObserver {
         fn name(&self) -> &str {
-            "feeler"
+            "force_observer"
         }
 
         fn streams(&self) -> SensorStreams {
@@ -543,36 +540,35 @@ mod tests {
         }
     }
 
-    fn feeler(_: script::Episode, brief: TaskBrief) -> Result<Box<dyn Controller>, CliError> {
-        Ok(Box::new(ChunkedPolicy::new(Box::new(Feeler), brief, 1)))
+    fn force_observer(_: script::Episode, brief: TaskBrief) -> Result<Box<dyn Controller>, CliError> {
+        Ok(Box::new(ChunkedPolicy::new(Box::new(ForceObserver), brief, 1)))
     }
 
     #[test]
-    fn every_file_of_a_run_says_whether_the_policy_saw_true_forces() {
-        let words = ["softvt", "suites/spatial_soft.lua", "--threads", "1"].map(str::to_owned);
-        let Ok(Command::Run(run)) = args::parse(&words) else { panic!("a run") };
-        let loaded = script::load(&run.file, &[]).expect("it loads");
+    fn every_file_of_a_run_records_whether_the_policy_observed_true_forces() {
+        let config = RunConfig::new("suites/spatial_soft.lua".into(), PolicyConfig::expert());
+        let loaded = script::load(&config.file, &[]).expect("it loads");
         let Plan::Suite(suite) = &loaded.plan else { panic!("a suite") };
         let mut suite = suite.clone();
         suite.tasks.truncate(1);
         suite.tasks[0].budget_steps = 3;
         let tasks: Vec<&Task> = suite.tasks.iter().collect();
         let root = tempfile::tempdir().expect("a folder");
-        for (out, felt) in [("blind", false), ("felt", true)] {
+        for (out, observed) in [("without", false), ("with", true)] {
             let dir = root.path().join(out);
-            let mut batch =
-                SuiteRun::new(&run, &loaded, &suite, (vec![(tasks[0], 0)], dir.clone())).expect("made");
-            if felt {
-                batch.drive = Box::new(feeler);
+            let jobs = vec![EpisodeJob { task: tasks[0], episode: 0 }];
+            let mut run = SuiteRun::new(&config, &loaded, &suite, jobs, dir.clone()).expect("valid");
+            if observed {
+                run.controllers = Box::new(force_observer);
             }
-            batch.prepare(&tasks).expect("nothing is wrong");
+            run.prepare(&tasks).expect("the scenes are valid");
             let folder = RunFolder::create(&dir).expect("a folder");
-            run_manifest::write(&folder, &RunManifest::of(&batch, &tasks, 1)).expect("written");
-            batch.run_all(folder, Vec::new()).expect("it runs");
+            run_manifest::write(&folder, &RunManifest::new(&run, &tasks, 1)).expect("written");
+            run.run_all(folder, Vec::new()).expect("it runs");
             for file in [RUN, EPISODES, SUMMARY] {
                 let text = std::fs::read_to_string(dir.join(file)).expect("written");
                 let value: serde_json::Value = serde_json::from_str(&text).expect("one document");
-                assert_eq!(value["force_observed"], felt, "{out}/{file}");
+                assert_eq!(value["force_observed"], observed, "{out}/{file}");
             }
         }
     }

@@ -1,0 +1,189 @@
+//! Parsing of the command line, with the options that the script declares.
+
+use std::path::Path;
+
+use clap::{
+    Arg, ArgMatches, CommandFactory, FromArgMatches, Subcommand, error::ErrorKind, parser::ValueSource,
+};
+
+use super::{
+    args::{Command, RunArgs},
+    error::CliError,
+    output::print,
+};
+use crate::{
+    script::{self, OptionSpec, OptionValue},
+    text,
+};
+
+/// Flags that select the policy. `softvt serve` refuses them: there the client is the policy.
+const POLICY_FLAGS: [&str; 5] = ["policy", "protocol", "replan", "policy_timeout", "name"];
+
+/// Parses the command line. Returns `None` if it asked for help or the version, which is then printed.
+///
+/// # Errors
+/// Usage errors, with suggestions for misspelled flags and values.
+pub(super) fn parse(words: &[String]) -> Result<Option<Command>, CliError> {
+    let file = script_file(words);
+    let in_file = |error: CliError| match file {
+        Some(file) => error.prefixed(file),
+        None => error,
+    };
+    let options = match file {
+        Some(file) => script::declared_options(Path::new(file)).map_err(CliError::input)?,
+        None => Vec::new(),
+    };
+    let command = with_script_options(clap_command(), &options).map_err(in_file)?;
+    if words.len() <= 1 {
+        text::eprint_line(short_help(command).trim_end());
+        return Err(CliError::input(""));
+    }
+    let matches = match command.try_get_matches_from(words) {
+        Ok(matches) => matches,
+        Err(error) if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
+            print(&error.to_string());
+            return Ok(None);
+        }
+        Err(error) => return Err(in_file(usage_error(&error.to_string()))),
+    };
+    let innermost = innermost(&matches);
+    if let Some(("serve", matches)) = matches.subcommand()
+        && let Some(flag) = POLICY_FLAGS.iter().find(|flag| is_given(matches, flag))
+    {
+        let flag = flag.replace('_', "-");
+        return Err(CliError::input(format!(
+            "--{flag}: the client of softvt serve is the policy; leave it out"
+        )));
+    }
+    let parsed = match matches.subcommand_name() {
+        Some(_) => Command::from_arg_matches(&matches),
+        None => RunArgs::from_arg_matches(&matches).map(|args| Command::Run(Box::new(args))),
+    };
+    let mut command = parsed.map_err(|error| in_file(usage_error(&error.to_string())))?;
+    if let Some(script) = command.script_mut() {
+        script.options = given_options(innermost, &options);
+    }
+    Ok(Some(command))
+}
+
+/// The whole command, without options of a script.
+fn clap_command() -> clap::Command {
+    Command::augment_subcommands(RunArgs::command()).mut_subcommand("serve", |serve| {
+        POLICY_FLAGS.iter().fold(serve, |serve, flag| serve.mut_arg(*flag, |arg| arg.hide(true)))
+    })
+}
+
+/// The help of `softvt` without arguments: the commands, and where to read on.
+fn short_help(command: clap::Command) -> String {
+    let template = "{name} {version}: {about}\n\n{usage-heading} {usage}\n\nCommands:\n{subcommands}\n\n\
+                    softvt suites/spatial_soft.lua runs a standard suite; softvt list suites lists them.\n\
+                    softvt --help lists all options, softvt COMMAND --help those of a command.";
+    command.help_template(template).render_help().to_string()
+}
+
+/// Adds the options of a script to every command that takes the script, in a section of their own.
+fn with_script_options(
+    mut command: clap::Command,
+    options: &[OptionSpec],
+) -> Result<clap::Command, CliError> {
+    let flags = command.get_arguments().filter_map(|arg| arg.get_long()).map(str::to_owned);
+    let reserved: Vec<String> = flags.chain(["help".into(), "version".into()]).collect();
+    for option in options {
+        let arg = script_arg(option);
+        if let Some(long) = arg.get_long().filter(|long| reserved.iter().any(|flag| flag == long)) {
+            return Err(CliError::input(format!(
+                "the script declares the option --{long}, which is a flag of softvt; rename it"
+            )));
+        }
+        for name in ["check", "serve", "view", "record"] {
+            command = command.mut_subcommand(name, |subcommand| subcommand.arg(&arg));
+        }
+        command = command
+            .mut_subcommand("dataset", |dataset| dataset.mut_subcommand("import", |import| import.arg(&arg)))
+            .arg(arg);
+    }
+    Ok(command)
+}
+
+/// Identifier of a script's option among the arguments; a colon cannot occur in those of the commands.
+fn script_arg_id(option: &OptionSpec) -> String {
+    format!("script:{}", option.name)
+}
+
+fn script_arg(option: &OptionSpec) -> Arg {
+    let default = match &option.default {
+        OptionValue::Number(n) => n.to_string(),
+        OptionValue::Integer(n) => n.to_string(),
+        OptionValue::Text(text) => format!("{text:?}"),
+        OptionValue::Flag(on) => if *on { "on" } else { "off" }.to_owned(),
+        OptionValue::Numbers(list) => list.iter().map(f64::to_string).collect::<Vec<_>>().join(","),
+        OptionValue::Texts(list) => list.join(","),
+    };
+    let arg = Arg::new(script_arg_id(option))
+        .long(option.flag().trim_start_matches("--").to_owned())
+        .help(format!("{} [{}; default {default}]", option.help, option.expects()))
+        .help_heading("Options of the script");
+    match option.default {
+        OptionValue::Flag(_) => {
+            arg.num_args(0..=1).require_equals(true).default_missing_value("on").value_name("on|off")
+        }
+        _ if option.unit.is_empty() => arg.num_args(1).allow_hyphen_values(true).value_name("VALUE"),
+        _ => arg.num_args(1).allow_hyphen_values(true).value_name("NUMBER"),
+    }
+}
+
+/// The options of the script that are given, as `--name=value`.
+fn given_options(matches: &ArgMatches, options: &[OptionSpec]) -> Vec<String> {
+    let given = options.iter().filter_map(|option| {
+        let id = script_arg_id(option);
+        let value = matches.try_get_one::<String>(&id).ok().flatten().filter(|_| is_given(matches, &id))?;
+        Some(format!("{}={value}", option.flag()))
+    });
+    given.collect()
+}
+
+fn is_given(matches: &ArgMatches, id: &str) -> bool {
+    matches.value_source(id) == Some(ValueSource::CommandLine)
+}
+
+/// Matches of the innermost subcommand.
+fn innermost(matches: &ArgMatches) -> &ArgMatches {
+    matches.subcommand().map_or(matches, |(_, matches)| innermost(matches))
+}
+
+/// Formats a message of clap: without `error:` and without pairs of empty lines.
+fn usage_error(text: &str) -> CliError {
+    let mut message = String::new();
+    let mut was_empty = false;
+    // The tip to put a value after `--` never helps: scripts take no positional words.
+    for line in text.lines().filter(|line| !line.contains("tip: to pass '")) {
+        let line = line.strip_prefix("error: ").unwrap_or(line);
+        if !(was_empty && line.is_empty()) {
+            message += line;
+            message.push('\n');
+        }
+        was_empty = line.is_empty();
+    }
+    CliError::input(message.trim_end())
+}
+
+/// Finds the script on the command line: the first word that ends in `.lua` and is not the value of another flag.
+fn script_file(words: &[String]) -> Option<&str> {
+    let pairs = words.iter().zip(words.iter().skip(1));
+    let mut scripts = pairs.filter(|(previous, word)| {
+        word.ends_with(".lua")
+            && !word.starts_with('-')
+            && !["--policy", "--profile"].contains(&previous.as_str())
+    });
+    scripts.next().map(|(_, word)| word.as_str())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_definition_of_the_command_line_is_consistent() {
+        clap_command().debug_assert();
+    }
+}
