@@ -99,7 +99,7 @@ fn wrong_conditions_are_told_before_anything_runs() {
         ("{ name = \"a\", shift = { mass = -1 } }", "shift mass: expected a number in 0.01..100"),
         ("{ name = \"a\" },\n{ name = \"a\" }", "is the name of another condition; give another"),
         ("{ name = \"reference\" }", "\"reference\" is the name of the unchanged run; give another"),
-        ("{ name = \"a b\" },\n{ name = \"a_b\" }", "would share the folder a_b; rename one"),
+        ("{ name = \"a b\" },\n{ name = \"a_b\" }", "share the folder a_b; rename one"),
         ("{ name = \"a\", mass = 2 }", "unknown key \"mass\""),
     ] {
         let message = refused(conditions);

@@ -49,7 +49,7 @@ fn init_writes_stubs_and_leaves_a_settings_file_of_ones_own_alone() {
     project.write("new/folder/.luarc.json", b"{\"mine\":1}");
     project.write("new/folder/library/softvt.d.lua", b"old");
     let again = project.succeeds("init new/folder").out;
-    assert!(again.contains("left new/folder/.luarc.json as it is"), "{again}");
+    assert!(again.contains("kept new/folder/.luarc.json"), "{again}");
     assert_eq!(project.text("new/folder/.luarc.json"), "{\"mine\":1}");
     assert!(project.text("new/folder/library/softvt.d.lua").starts_with("---@meta softvt"));
     project.write("file", b"");
@@ -181,7 +181,11 @@ fn impostor(fingerprint: &str) -> Project {
 #[test]
 fn the_limit_of_another_object_of_the_same_name_does_not_count() {
     let said = impostor("0123456789abcdef").succeeds("x.lua --policy noop --out run");
-    assert!(said.err.contains("assets/calibration/cube.json is about another cube"), "{}", said.err);
+    assert!(
+        said.err.contains("assets/calibration/cube.json was computed for a different version of \"cube\""),
+        "{}",
+        said.err
+    );
     let script = r#"return softvt.experiment { name = "who", grid = { x = { 1 } }, run = function()
   local cube = softvt.asset { name = "cube", shape = softvt.shape.box { size = { 0.04, 0.04, 0.04 } }:grounded(),
     body = softvt.soft { youngs_pa = 2e4, poisson = 0.3, density = 300 } }
@@ -236,7 +240,7 @@ fn init_task_says_what_to_run_from_where_it_was_called() {
         [("init task", "suites/my_suite.lua"), ("init task deep/mine", "deep/mine/suites/my_suite.lua")]
     {
         let out = project.succeeds(words).out;
-        assert!(out.contains(&format!("now: softvt check {suite}, softvt {suite};")), "{out}");
+        assert!(out.contains(&format!("now: softvt check {suite}, softvt {suite}; next:")), "{out}");
         project.succeeds(&format!("check {suite}"));
     }
 }
@@ -248,7 +252,7 @@ fn a_golden_episode_that_ends_otherwise_is_a_failure() {
     assert_eq!(said.code, 1, "{}", said.err);
     assert!(said.out.contains("DIFFERS from the published one"), "{}", said.out);
     assert!(
-        said.err.contains("files of this folder (suites) come before those of the release"),
+        said.err.contains("files of the working folder (suites) take precedence over those of the release"),
         "{}",
         said.err
     );

@@ -89,10 +89,10 @@ fn softvts_own_demonstrations_end_in_the_same_states() {
     assert_eq!((&origin["demo"], &origin["layout"]), (&"demo_1".into(), &"softvt".into()), "{origin}");
     assert!(project.text("again/README.md").contains(origin["sha256"].as_str().expect("a hash")));
     let checked = project.succeeds("dataset check again --replay all").out;
-    assert!(checked.contains("2 of 2 the same to the byte, 2 of 2 reach the goal"), "{checked}");
-    assert!(project.succeeds("replay again/attempts/one 0/1").out.contains("the same to the byte"));
+    assert!(checked.contains("2 of 2 byte-identical, 2 of 2 reach the goal"), "{checked}");
+    assert!(project.succeeds("replay again/attempts/one 0/1").out.contains("byte-identical"));
     let once_more = project.succeeds(&format!("dataset import x.lua {OWN} --out again --images video"));
-    assert!(once_more.err.contains("is finished already"), "{}", once_more.err);
+    assert!(once_more.err.contains("is already complete"), "{}", once_more.err);
 }
 
 #[test]
@@ -119,7 +119,7 @@ fn things_start_where_the_file_has_them_and_what_cannot_be_is_a_rejection() {
     // All attempts can be simulated again, those that did not start too.
     for attempt in 0..3 {
         let again = project.succeeds(&format!("replay made/attempts/one 0/{attempt}"));
-        assert!(again.out.contains("the same to the byte"), "{}", again.out);
+        assert!(again.out.contains("byte-identical"), "{}", again.out);
     }
     project.succeeds("dataset check made");
     project.succeeds("dataset import x.lua inside.hdf5 --out kept --images video --layout");
@@ -157,7 +157,7 @@ fn what_cannot_be_imported_is_refused_and_nothing_is_written() {
         ),
         ("two.lua OWN", "it is of \"wait\" of the suite one, and two.lua has no such task"),
         ("world.lua OWN", "softvt dataset import needs a suite"),
-        ("x.lua OWN OWN", "are the same to the byte"),
+        ("x.lua OWN OWN", "are byte-identical"),
     ] {
         let words = words.replace("OWN", OWN);
         let said = project.refusal(&format!("dataset import {words} --out new"));
@@ -165,11 +165,11 @@ fn what_cannot_be_imported_is_refused_and_nothing_is_written() {
         assert!(!project.path("new").exists(), "{words}");
     }
     let said = project.refusal(&format!("dataset import x.lua {OWN} --out mine"));
-    assert!(said.contains("it holds notes.txt and no recording of softvt"), "{said}");
+    assert!(said.contains("the folder contains notes.txt but no softvt recording"), "{said}");
     let said = project.refusal(&format!("dataset import x.lua {OWN} --out data"));
-    assert!(said.contains("--out data: it holds what softvt record made"), "{said}");
+    assert!(said.contains("--out data: the folder contains a dataset of softvt record"), "{said}");
     let said = project.refusal(&format!("dataset import x.lua {OWN} --out x.lua"));
-    assert!(said.contains("--out x.lua: it is no folder"), "{said}");
+    assert!(said.contains("--out x.lua: not a folder"), "{said}");
     for data in ["data", OWN] {
         let said = project.refusal(&format!("x.lua --policy {data} --out run"));
         assert!(said.contains("holds demonstrations") && said.contains("softvt dataset check"), "{said}");

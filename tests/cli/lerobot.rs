@@ -185,7 +185,7 @@ fn what_cannot_be_exported_is_told_and_nothing_is_left() {
         ("data --format lerobot-v2.1", "--out"),
         ("full --format lerobot-v2.1 --out x", "full: dataset.json: it is missing; expected the folder"),
         ("nowhere --format lerobot-v2.1 --out x", "nowhere: dataset.json: it is missing"),
-        ("broken --format lerobot-v2.1 --out x", "broken: the recording was broken off"),
+        ("broken --format lerobot-v2.1 --out x", "broken: the recording was interrupted"),
         ("plain --format lerobot-v2.1 --out x", "record it with --images hdf5"),
     ] {
         let told = project.refusal(&format!("dataset export {words}"));

@@ -47,10 +47,10 @@ fn a_lua_policys_results_do_not_depend_on_threads_or_on_being_broken_off() {
     assert_eq!((info["policy"].as_str(), info["privileged"].as_bool()), (Some("wanders"), Some(false)));
     assert_eq!((info["policy_file"].as_str(), info["replan"].as_u64()), (Some("p.lua"), Some(2)));
     assert!(info["sources"]["p.lua"].as_str().is_some_and(|hash| hash.len() == 64));
-    assert!(project.succeeds("replay one 0/2").out.contains("the same to the byte"));
+    assert!(project.succeeds("replay one 0/2").out.contains("byte-identical"));
     project.write("p.lua", WANDERS.replace("0.01", "0.02").as_bytes());
     let message = project.refusal(&format!("{line} --resume --out three"));
-    assert!(message.contains("is of another run: sources.p.lua"), "{message}");
+    assert!(message.contains("belongs to another run: sources.p.lua"), "{message}");
 }
 
 #[test]
@@ -140,17 +140,14 @@ fn recorded_actions_must_be_those_of_this_very_suite_and_all_there() {
         assert!(message.contains(said), "{words}: {message}");
         assert!(!project.path("no").exists());
     };
-    refused("--episodes 2 --seed 1", "--policy run: it is of seed 0, and this run of seed 1");
-    refused("--episodes 2 --twin rigid", "it holds no run of suite one as rigid twin; it has one");
-    refused(
-        "--episodes 4",
-        "it lacks 2 of the 4 episodes that are wanted: task 0 episode 2, task 0 episode 3",
-    );
+    refused("--episodes 2 --seed 1", "--policy run: its seed is 0, that of this run 1");
+    refused("--episodes 2 --twin rigid", "no run of suite one (rigid twin); available: one");
+    refused("--episodes 4", "it lacks 2 of the 4 requested episodes: task 0 episode 2, task 0 episode 3");
     std::fs::remove_file(project.path("run/actions/task_000/episode_00001.npy")).expect("removed");
-    refused("--episodes 2", "it lacks 1 of the 2 episodes that are wanted: task 0 episode 1");
+    refused("--episodes 2", "it lacks 1 of the 2 requested episodes: task 0 episode 1");
     let other = project.text("x.lua").replace("name = \"one\", object", "name = \"two\", object");
     project.write("x.lua", other.as_bytes());
-    refused("--episodes 1", "it holds no run of suite two; it has one");
+    refused("--episodes 1", "no run of suite two; available: one");
 }
 
 #[test]
@@ -163,17 +160,11 @@ fn flags_without_use_and_bad_files_are_refused_before_anything_runs() {
     for (words, said) in [
         (
             "--policy noop --replan 3",
-            "--replan: is for servers and Lua policies; --policy noop has no use for it",
+            "--replan: applies to policy servers and Lua policies only; --policy noop ignores it",
         ),
-        (
-            "--protocol vla-eval",
-            "--protocol: is for policies that answer over a network; --policy expert has no use",
-        ),
-        ("--policy random --profile vision", "--profile: is for policies that answer over a network"),
-        (
-            "--policy p.lua --gripper binary",
-            "--gripper: is for policies that answer over a network; --policy p.lua",
-        ),
+        ("--protocol vla-eval", "--protocol: applies to policy servers only; --policy expert ignores it"),
+        ("--policy random --profile vision", "--profile: applies to policy servers only"),
+        ("--policy p.lua --gripper binary", "--gripper: applies to policy servers only; --policy p.lua"),
         ("--policy q.lua", "q.lua: no such file"),
         ("--policy profile.lua", "profile.lua:"),
         (
@@ -240,7 +231,7 @@ fn the_tactile_servo_closes_until_it_feels_the_object_whatever_the_expert_says()
         d.push(episode["d_peak"].as_f64().expect("a number"));
     }
     assert!(d[1] < 0.2 * d[0], "told {} %, felt {} %", d[0], d[1]);
-    assert!(project.succeeds("replay tactile-servo 0/0").out.contains("the same to the byte"));
+    assert!(project.succeeds("replay tactile-servo 0/0").out.contains("byte-identical"));
 }
 
 #[test]

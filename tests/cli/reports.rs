@@ -157,7 +157,7 @@ fn a_report_says_how_to_see_an_episode_and_the_words_work() {
         let fits = |command: &&&str| command.starts_with(start) && command.contains(part);
         (*commands.iter().find(fits).unwrap_or_else(|| panic!("{start} {part} in {commands:?}"))).to_owned()
     };
-    assert!(project.succeeds(&of("replay", "runs/other 0/1")).out.contains("the same to the byte"));
+    assert!(project.succeeds(&of("replay", "runs/other 0/1")).out.contains("byte-identical"));
     let view = of("view", "--seed 7");
     assert_eq!(view, "view x.lua --task 0 --policy noop --seed 7 --out seen");
     project.succeeds(&view);
@@ -184,11 +184,10 @@ fn lost_files_of_finished_episodes_are_made_again_to_the_same_bytes() {
         .iter()
         .for_each(|file| fs::remove_file(project.path(&format!("run/{file}"))).expect("removed"));
     let said = project.succeeds(line);
-    let told =
-        "3 finished episodes lack files, first run/actions/task_000/episode_00000.npy: they are made again";
+    let told = "restoring files of 3 finished episodes (first: run/actions/task_000/episode_00000.npy)";
     assert!(said.err.contains(told), "{}", said.err);
     assert!(files.map(bytes) == before);
-    assert!(project.succeeds(line).err.contains("finished already"));
+    assert!(project.succeeds(line).err.contains("already complete"));
     // Without its summary the folder is unfinished, and goes on as such.
     fs::remove_file(project.path("run/summary.json")).expect("removed");
     project.succeeds(&format!("{line} --resume"));
@@ -204,7 +203,7 @@ fn lost_files_of_finished_episodes_are_made_again_to_the_same_bytes() {
     project.write("run/episodes.jsonl", lines.as_bytes());
     fs::remove_file(project.path("run/actions/task_000/episode_00000.npy")).expect("removed");
     let said = project.succeeds(line);
-    assert!(said.err.contains("it does not come out as recorded (state_hash:"), "{}", said.err);
+    assert!(said.err.contains("the simulation differs from its record (state_hash:"), "{}", said.err);
     assert!(!project.path("run/actions/task_000/episode_00000.npy").exists());
     assert_eq!(project.text("run/episodes.jsonl"), lines);
 }

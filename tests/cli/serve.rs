@@ -372,9 +372,9 @@ fn what_cannot_be_served_is_refused() {
     let taken = TcpListener::bind("127.0.0.1:0").expect("a port");
     let port = taken.local_addr().expect("an address").port();
     for (words, told) in [
-        (format!("serve x.lua --port {port}"), "somebody listens at 127.0.0.1 there already"),
-        ("serve e.lua".to_owned(), "serves suites, and this is none"),
-        ("serve x.lua --policy noop".to_owned(), "--policy: with softvt serve the client drives"),
+        (format!("serve x.lua --port {port}"), "already in use at 127.0.0.1"),
+        ("serve e.lua".to_owned(), "softvt serve needs a suite"),
+        ("serve x.lua --policy noop".to_owned(), "--policy: the client of softvt serve is the policy"),
         ("serve x.lua --port 70000".to_owned(), "70000"),
         ("serve x.lua --host 192.0.2.7 --port 0".to_owned(), "cannot listen there"),
         ("serve x.lua --split test".to_owned(), "expected validation"),

@@ -133,7 +133,7 @@ fn a_server_is_asked_once_a_chunk_and_its_actions_are_carried_out() {
     assert_eq!((info["policy"].as_str(), info["replan"].as_u64()), (Some("vision"), Some(5)));
     assert_eq!(info["profile"]["actions"]["gripper"]["binary"], true);
     let replayed = project.succeeds("replay run 0/1");
-    assert!(replayed.out.contains("task 0 episode 1: the same to the byte"), "{}", replayed.out);
+    assert!(replayed.out.contains("task 0 episode 1: byte-identical"), "{}", replayed.out);
 }
 
 #[test]
@@ -295,7 +295,7 @@ fn numbers_that_are_none_fail_their_episode_and_no_other() {
     );
     assert_eq!((lines[0]["steps"].as_u64(), lines[0]["safety"].as_bool()), (Some(5), Some(false)));
     assert_eq!(lines[1]["outcome"]["kind"], "timeout");
-    assert!(project.succeeds("replay run 0/0").out.contains("the same to the byte"));
+    assert!(project.succeeds("replay run 0/0").out.contains("byte-identical"));
 }
 
 #[test]
@@ -325,13 +325,13 @@ fn a_server_that_dies_loses_no_finished_episode_and_the_run_goes_on_to_the_same_
         assert_eq!(broken.text(&format!("run/{file}")), whole.text(&format!("run/{file}")), "{file}");
     }
     let again = run(&broken, &address, "--episodes 3");
-    assert!(again.code == 0 && again.err.contains("finished already"), "{}", again.err);
+    assert!(again.code == 0 && again.err.contains("already complete"), "{}", again.err);
     // Files of finished episodes come back from the actions, without the policy; without actions they are told to be lost.
     let log = "run/softvtbench/task_000/episode_00001/policy_action_debug.jsonl";
     let text = broken.text(log);
     std::fs::remove_file(broken.path(log)).expect("removed");
     let again = run(&broken, &address, "--episodes 3");
-    assert!(again.code == 0 && again.err.contains("1 finished episodes lack files"), "{}", again.err);
+    assert!(again.code == 0 && again.err.contains("restoring files of 1 finished episode"), "{}", again.err);
     assert_eq!(broken.text(log), text);
     std::fs::remove_dir_all(broken.path("run/actions")).expect("removed");
     let again = run(&broken, &address, "--episodes 3");
@@ -382,16 +382,16 @@ fn a_folder_with_lines_of_another_run_is_not_gone_on_with() {
         let message = project.refusal(&format!("{line} --resume"));
         assert!(message.contains(words), "{message}");
     };
-    refused(&format!("{lines}{lines}"), "run/episodes.jsonl:3: task 0 episode 0 is there twice");
+    refused(&format!("{lines}{lines}"), "run/episodes.jsonl:3: task 0 episode 0 occurs twice");
     refused(
         &lines.replace("\"noop\"", "\"other\""),
-        "run/episodes.jsonl:1: task 0 episode 0 is of another run",
+        "run/episodes.jsonl:1: task 0 episode 0 belongs to another run",
     );
     project.write("run/episodes.jsonl", lines.as_bytes());
     std::fs::remove_file(project.path("run/run.json")).expect("removed");
-    assert!(project.refusal(&format!("{line} --resume")).contains("there is no run.json beside it"));
+    assert!(project.refusal(&format!("{line} --resume")).contains("there is no run.json next to it"));
     project.write("run/run.json", info.as_bytes());
-    assert!(project.succeeds(&format!("{line} --resume")).err.contains("finished already"));
+    assert!(project.succeeds(&format!("{line} --resume")).err.contains("already complete"));
     let message = project.refusal("x.lua --policy noop --require safety>=90");
     assert!(message.contains("a share of 1"), "{message}");
 }

@@ -38,7 +38,8 @@ fn an_unknown_flag_is_told_with_the_one_that_was_meant() {
 
       tip: a similar argument exists: '--policy'
 
-    Usage: softvt --out <DIR> --policy <POLICY> <FILE.lua>
+    Usage: softvt [OPTIONS] <FILE.lua>
+           softvt <COMMAND>
 
     For more information, try '--help'.
     ");
@@ -47,7 +48,7 @@ fn an_unknown_flag_is_told_with_the_one_that_was_meant() {
 
 #[test]
 fn an_unknown_task_shift_or_setting_is_told_with_those_there_are() {
-    assert_snapshot!(small("--task 7"), @"x.lua: --task 7: suite one has no such task; it has 0 to 0: see softvt list tasks");
+    assert_snapshot!(small("--task 7"), @"x.lua: --task 7: suite one has no such task; it has only task 0 (softvt list tasks)");
     let words = ["x.lua", "--out", "run", "--task", ""];
     let project = Small::default().project();
     let mut command = project.command("");
@@ -79,7 +80,7 @@ fn the_options_of_a_script_are_checked() {
 #[test]
 fn a_script_may_not_take_a_flag_of_the_runner() {
     let project = Project::new(&[("x.lua", "softvt.options { seed = { default = 1 } }")]);
-    assert_snapshot!(project.refusal("x.lua"), @"x.lua: the script declares the option --seed, which is the runner's own; rename it");
+    assert_snapshot!(project.refusal("x.lua"), @"x.lua: the script declares the option --seed, which is a flag of softvt; rename it");
 }
 
 #[test]

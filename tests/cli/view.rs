@@ -222,10 +222,7 @@ fn tables_of_a_tactile_model_that_are_missing_are_told_before_anything_runs() {
 fn a_video_of_an_episode_that_is_not_run_is_an_error() {
     let project = short();
     let message = project.refusal("x.lua --episodes 2 --video=1,7 --out run");
-    assert!(
-        message.contains("x.lua: --video=7: suite one runs the episodes 0 to 1 of each task"),
-        "{message}"
-    );
+    assert!(message.contains("x.lua: --video=7: suite one runs episodes 0 to 1 of each task"), "{message}");
     assert!(!project.path("run").exists());
 }
 
