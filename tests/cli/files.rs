@@ -31,7 +31,11 @@ fn what_there_is_is_listed_as_text_and_as_json_in_any_folder() {
     assert_eq!(names("profiles")[..4], ["vision", "visuo_tactile", "softvtbench", "libero"]);
     assert!(names("profiles").contains(&"scripts/profiles/libero.lua".into()));
     for what in ["suites", "tasks", "assets", "policies", "profiles"] {
-        assert_eq!(project.succeeds(&format!("list {what}")).out.lines().count(), json(what).len());
+        assert_eq!(
+            project.succeeds(&format!("list {what}")).out.lines().count(),
+            json(what).len() + 1,
+            "a heading and one line each"
+        );
     }
     assert!(
         project

@@ -376,7 +376,7 @@ fn what_cannot_be_served_is_refused() {
         ("serve e.lua".to_owned(), "softvt serve needs a suite"),
         ("serve x.lua --policy noop".to_owned(), "--policy: the client of softvt serve is the policy"),
         ("serve x.lua --port 70000".to_owned(), "70000"),
-        ("serve x.lua --host 192.0.2.7 --port 0".to_owned(), "cannot listen there"),
+        ("serve x.lua --host 192.0.2.7 --port 0".to_owned(), "cannot listen on this address"),
         ("serve x.lua --split test".to_owned(), "expected validation"),
         ("serve x.lua --shift warp=1 --port 0".to_owned(), "unknown shift \"warp\""),
         ("serve x.lua --profile pi".to_owned(), "visuo_tactile"),
@@ -400,5 +400,5 @@ fn an_interrupt_ends_the_server_in_order() {
     let mut err = String::new();
     server.child.stderr.take().expect("messages").read_to_string(&mut err).expect("text");
     assert_eq!(code, Some(130), "{err}");
-    assert!(!err.contains("panicked") && !err.contains("did not end"), "{err}");
+    assert!(!err.contains("panicked") && !err.contains("did not finish"), "{err}");
 }

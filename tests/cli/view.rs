@@ -93,7 +93,7 @@ fn what_cannot_be_drawn_is_told() {
     let project = short();
     project.write("e.lua", b"return softvt.experiment { name = \"e\", grid = { a = { 1 } }, run = function() return { b = 1 } end }");
     let message = project.refusal("view e.lua --out seen");
-    assert!(message.contains("e.lua: softvt view draws an episode of a suite"), "{message}");
+    assert!(message.contains("e.lua: softvt view needs a single suite"), "{message}");
     let message = project.refusal("view x.lua --task 3 --out seen");
     assert!(message.contains("--task 3: suite one has no such task"), "{message}");
     let message = project.refusal("view x.lua");
