@@ -1,5 +1,5 @@
-//! Time of the tactile sensor, a finger: `cargo bench --bench tactile`. The least of many rounds, so that other load on the
-//! machine counts little.
+//! Time of the tactile sensor per finger: `cargo bench --bench tactile`. Reports the minimum of many rounds, which is hardly
+//! affected by other load on the machine.
 
 use std::{hint::black_box, time::Instant};
 
@@ -7,21 +7,29 @@ use softvt::{
     geometry::Vec3,
     robot::PadSurface,
     sensing::tactile::{
-        Gel, MarkerModel, Optics, PadInput, PadLoad, Scratch, Surface, TactileSpec, markers, sense,
+        Gel, GelField, GelScratch, MarkerModel, Markers, PadContact, PadWrench, PolynomialOptics, SkinMesh,
+        TactileSpec,
     },
 };
 
 const ROUNDS: usize = 300;
-/// Edge of a skin's cells, m: as fine as the skins of the shipped assets.
-const SKIN: f64 = 8e-4;
+/// Distance of the vertices of a skin, m: as in the skins of the standard assets.
+const SPACING: f64 = 8e-4;
 /// Half the width of the skin over the pad, m.
-const HALF: f64 = 0.02;
+const HALF_WIDTH: f64 = 0.02;
 
-/// A case: the lower side of what is pressed, and the load.
+/// An object pressed into the gel.
 struct Case {
     name: &'static str,
+    /// Lower side of the object as a function of x and y, m.
     height: fn(f64, f64) -> f64,
-    load: PadLoad,
+    wrench: PadWrench,
+}
+
+/// Graph of a function, facing the gel.
+struct Skin {
+    vertices: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
 }
 
 fn main() {
@@ -29,48 +37,48 @@ fn main() {
         Case {
             name: "ball of 4 mm, 1.5 N",
             height: |x, y| (x * x + y * y) / 8e-3,
-            load: PadLoad::new(1.5, [0.0; 2], 0.0, [0.0; 2]),
+            wrench: PadWrench::new(1.5, [0.0; 2], 0.0, [0.0; 2]),
         },
         Case {
             name: "ridges, 4 N, 1 N of shear",
             height: |x, y| 4e-4 * (1.0 - (1800.0 * x + 860.0 * y).cos()) + (x * x + y * y) / 0.08,
-            load: PadLoad::new(4.0, [-1.0, 0.0], 0.0, [0.0; 2]),
+            wrench: PadWrench::new(4.0, [-1.0, 0.0], 0.0, [0.0; 2]),
         },
         Case {
             name: "bun, 2 N, shear and twist",
             height: |x, y| (x * x + y * y) / 0.2,
-            load: PadLoad::new(2.0, [-0.5, 0.3], 2e-3, [0.0; 2]),
+            wrench: PadWrench::new(2.0, [-0.5, 0.3], 2e-3, [0.0; 2]),
         },
     ];
     let gel = Gel::new(&TactileSpec::default(), PadSurface::default()).expect("default numbers");
-    let optics = Optics::mini().expect("shipped optics");
+    let optics = PolynomialOptics::gelsight_mini().expect("shipped optics");
     println!(
-        "{:<28} {:>9} {:>9} {:>12} {:>11}   ms a finger",
-        "case", "field", "picture", "with shadows", "99 markers"
+        "{:<28} {:>9} {:>9} {:>12} {:>11}   ms per finger",
+        "case", "field", "image", "with shadows", "99 markers"
     );
     for case in cases {
         report(&case, &gel, &optics);
     }
 }
 
-fn report(case: &Case, gel: &Gel, optics: &Optics) {
-    let (vertices, triangles) = skin(case.height);
-    let surfaces = [Surface { vertices: &vertices, triangles: &triangles }];
-    let input = PadInput { load: case.load, surfaces: &surfaces, friction: 1.5, give: None };
-    let mut scratch = Scratch::default();
-    let field = sense(gel, &input, &mut scratch).expect("a good touch").expect("a force");
+fn report(case: &Case, gel: &Gel, optics: &PolynomialOptics) {
+    let Skin { vertices, triangles } = graph(case.height);
+    let skins = [SkinMesh { vertices: &vertices, triangles: &triangles }];
+    let contact = PadContact { wrench: case.wrench, skins: &skins, friction: 1.5, substrate: None };
+    let mut scratch = GelScratch::default();
+    let field = GelField::solve(gel, &contact, &mut scratch).expect("a good contact").expect("a force");
     let mut rgb = vec![0; 320 * 240 * 3];
-    let sensing = least(|| drop(black_box(sense(gel, &input, &mut scratch))));
-    let picture = least(|| optics.picture(gel, Some(&field), false, &mut rgb));
-    let shaded = least(|| optics.picture(gel, Some(&field), true, &mut rgb));
-    let moving = least(|| {
-        black_box(markers(gel, &MarkerModel::Elastic, Some(&field)));
+    let solve = min_ms(|| drop(black_box(GelField::solve(gel, &contact, &mut scratch))));
+    let image = min_ms(|| optics.render(gel, Some(&field), false, &mut rgb));
+    let with_shadows = min_ms(|| optics.render(gel, Some(&field), true, &mut rgb));
+    let markers = min_ms(|| {
+        black_box(Markers::of(gel, &MarkerModel::Elastic, Some(&field)));
     });
-    println!("{:<28} {sensing:>9.3} {picture:>9.3} {shaded:>12.3} {moving:>11.4}", case.name);
+    println!("{:<28} {solve:>9.3} {image:>9.3} {with_shadows:>12.3} {markers:>11.4}", case.name);
 }
 
-/// Least time of the rounds, ms.
-fn least(mut of: impl FnMut()) -> f64 {
+/// Minimum time over the rounds, ms.
+fn min_ms(mut of: impl FnMut()) -> f64 {
     let mut best = f64::INFINITY;
     for _ in 0..ROUNDS {
         let start = Instant::now();
@@ -80,17 +88,16 @@ fn least(mut of: impl FnMut()) -> f64 {
     1e3 * best
 }
 
-/// The graph of `height`, seen from below.
-fn skin(height: fn(f64, f64) -> f64) -> (Vec<Vec3>, Vec<[u32; 3]>) {
-    let n = (2.0 * HALF / SKIN) as u32;
-    let at = |i: u32| -HALF + f64::from(i) * SKIN;
-    let places = (0..=n).flat_map(|j| (0..=n).map(move |i| (at(i), at(j))));
-    let vertices = places.map(|(x, y)| Vec3::new(x, y, height(x, y))).collect();
+fn graph(height: fn(f64, f64) -> f64) -> Skin {
+    let n = (2.0 * HALF_WIDTH / SPACING) as u32;
+    let at = |i: u32| -HALF_WIDTH + f64::from(i) * SPACING;
+    let grid = (0..=n).flat_map(|j| (0..=n).map(move |i| (at(i), at(j))));
+    let vertices = grid.map(|(x, y)| Vec3::new(x, y, height(x, y))).collect();
     let corner = |i: u32, j: u32| j * (n + 1) + i;
     let squares = (0..n).flat_map(|j| (0..n).map(move |i| (i, j)));
     let triangles = squares.flat_map(|(i, j)| {
         let [a, b, c, d] = [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
         [[a, c, b], [a, d, c]]
     });
-    (vertices, triangles.collect())
+    Skin { vertices, triangles: triangles.collect() }
 }

@@ -21,6 +21,8 @@ pub mod files;
 #[warn(missing_docs)]
 pub mod geometry;
 #[warn(missing_docs)]
+pub mod npy;
+#[warn(missing_docs)]
 pub mod parallel;
 #[warn(missing_docs)]
 pub mod physics;

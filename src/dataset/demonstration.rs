@@ -9,7 +9,7 @@ use crate::{
         rotation,
     },
     rollout::{FinishedEpisode, StateRecording},
-    sensing::tactile::{MARKERS, Markers},
+    sensing::tactile::{MARKER_COUNT, Markers},
 };
 
 use super::{privileged, stream::DataStream};
@@ -62,8 +62,8 @@ impl Demonstration {
 
     /// Appends the stream of tactile marker positions, given per step and finger (left, right).
     pub fn set_markers(&mut self, markers: &[[Markers; 2]]) {
-        let positions = markers.iter().flatten().flatten().flatten().flatten().copied().collect();
-        let stream = DataStream::f32("obs/gripper_marker_motion", &[2, 2, MARKERS, 2], positions)
+        let positions = markers.iter().flatten().flat_map(Markers::to_array).flatten().flatten().collect();
+        let stream = DataStream::f32("obs/gripper_marker_motion", &[2, 2, MARKER_COUNT, 2], positions)
             .unit("px of the tactile picture", "")
             .attribute("axes", "step, finger (left, right), initial and present, marker, (x, y)");
         self.observed.push(stream);

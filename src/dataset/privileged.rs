@@ -27,7 +27,7 @@ fn forces(finished: &FinishedEpisode, recording: &StateRecording) -> Vec<DataStr
     let of = |pick: &dyn Fn(&PadForce) -> Vec3| -> Vec<f64> {
         loads.iter().flatten().flat_map(|pad| <[f64; 3]>::from(pick(pad))).collect()
     };
-    let force = of(&|pad| pad.load.force);
+    let force = of(&|pad| pad.wrench.force);
     let with_forces = finished.actions.iter().zip(force.as_chunks::<6>().0).flat_map(|(a, force)| {
         let (p, r) = (a.position_b, a.axis_angle_b);
         [p.x, p.y, p.z, r.x, r.y, r.z, a.closure].into_iter().chain(*force).collect::<Vec<f64>>()
@@ -37,7 +37,7 @@ fn forces(finished: &FinishedEpisode, recording: &StateRecording) -> Vec<DataStr
             .unit("m, rad, 1, N", "robot base; forces: pad")
             .attribute("meaning", "the actions, then the force on the left and on the right gel"),
         DataStream::f64("privileged/gripper_net_force", &[2, 3], force).unit("N", "pad"),
-        DataStream::f64("privileged/gripper_net_moment", &[2, 3], of(&|pad| pad.load.moment))
+        DataStream::f64("privileged/gripper_net_moment", &[2, 3], of(&|pad| pad.wrench.moment))
             .unit("N m", "pad, about its apex"),
     ]
 }

@@ -51,7 +51,7 @@ impl<'a> StepRenderer<'a> {
         let third_person = sensors.render(frame, &self.cameras[0])?.into_rgb_image();
         let wrist = sensors.render(frame, &self.cameras[1])?.into_rgb_image();
         let tactile = sensors.tactile_readings(frame)?;
-        let [left, right] = [0, 1].map(|side: usize| tactile[side].picture.clone());
+        let [left, right] = [0, 1].map(|side: usize| tactile[side].image.clone());
         let [left_markers, right_markers] =
             [0, 1].map(|side: usize| tactile[side].with_markers(MarkerStyle::Dots));
         Ok(Some(StepImages {

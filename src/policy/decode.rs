@@ -96,7 +96,10 @@ pub fn command(row: &[f64], code: &ActionEncoding) -> Result<ToolCommand, Policy
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::policy::{profile::Profile, wire::WireArray};
+    use crate::{
+        npy::NpyArray,
+        policy::{profile::Profile, wire::pack_array},
+    };
 
     fn read(value: Value) -> Result<ActionChunk, PolicyError> {
         chunk(&value, &Profile::named("visuo_tactile").unwrap().actions)
@@ -104,7 +107,7 @@ mod tests {
 
     fn reply(shape: Vec<usize>, fill: f32) -> Value {
         let count = shape.iter().product();
-        let actions = WireArray::floats(shape, vec![fill; count]).into_value(true);
+        let actions = pack_array(NpyArray::from_f32(shape, vec![fill; count]), true);
         Value::Map(vec![("actions".into(), actions)])
     }
 

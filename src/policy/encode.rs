@@ -6,27 +6,28 @@ use rmpv::Value;
 use super::{
     Observation,
     profile::{Finger, InputSource, Profile, StatePart},
-    wire::WireArray,
+    wire::pack_array,
 };
 use crate::{
+    npy::NpyArray,
     robot::rotation,
-    sensing::tactile::{HISTORY, MARKERS},
+    sensing::tactile::{HISTORY_LENGTH, MARKER_COUNT},
 };
 
 /// An entry of an observation before it is packed.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ObservationEntry {
     /// Numbers or pictures.
-    Array(WireArray),
+    Array(NpyArray),
     /// Text.
     Text(String),
 }
 
 impl ObservationEntry {
-    /// As msgpack; see [`WireArray::into_value`].
+    /// As msgpack; see [`pack_array`].
     pub fn into_value(self, bin_keys: bool) -> Value {
         match self {
-            Self::Array(array) => array.into_value(bin_keys),
+            Self::Array(array) => pack_array(array, bin_keys),
             Self::Text(text) => Value::from(text),
         }
     }
@@ -42,7 +43,7 @@ pub fn content(observation: &Observation, source: &InputSource) -> Option<Observ
         }
         InputSource::State { parts } => {
             let numbers: Vec<f32> = parts.iter().flat_map(|part| state(observation, *part)).collect();
-            WireArray::floats(vec![numbers.len()], numbers)
+            NpyArray::from_f32(vec![numbers.len()], numbers)
         }
         InputSource::TactileImage { layout } => bytes(observation.touch.as_ref()?.mosaic((*layout).into())),
         InputSource::Tactile { finger } => {
@@ -50,15 +51,15 @@ pub fn content(observation: &Observation, source: &InputSource) -> Option<Observ
         }
         InputSource::MarkerMotion => {
             let rows = observation.touch.as_ref()?.marker_motion();
-            WireArray::floats(vec![rows.len(), 2 * MARKERS, 2], rows.into_iter().flatten().flatten())
+            NpyArray::from_f32(vec![rows.len(), 2 * MARKER_COUNT, 2], rows.into_iter().flatten().flatten())
         }
         InputSource::Force => {
-            let rows = (0..HISTORY).map(|place| {
+            let rows = (0..HISTORY_LENGTH).map(|place| {
                 let past = &observation.force_history;
-                past.get((place + past.len()).saturating_sub(HISTORY))
+                past.get((place + past.len()).saturating_sub(HISTORY_LENGTH))
             });
             let rows: Option<Vec<&[f64; 6]>> = rows.collect();
-            WireArray::floats(vec![HISTORY, 6], rows?.into_iter().flatten().map(|x| *x as f32))
+            NpyArray::from_f32(vec![HISTORY_LENGTH, 6], rows?.into_iter().flatten().map(|x| *x as f32))
         }
     };
     Some(ObservationEntry::Array(array))
@@ -77,9 +78,9 @@ pub fn openpi(observation: &Observation, profile: &Profile) -> Value {
     Value::Map(entries)
 }
 
-fn bytes(picture: RgbImage) -> WireArray {
+fn bytes(picture: RgbImage) -> NpyArray {
     let shape = vec![picture.height() as usize, picture.width() as usize, 3];
-    WireArray::bytes(shape, picture.into_raw())
+    NpyArray::from_bytes(shape, picture.into_raw())
 }
 
 fn state(o: &Observation, part: StatePart) -> Vec<f32> {

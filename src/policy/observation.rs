@@ -7,7 +7,9 @@ use image::RgbImage;
 
 use crate::{
     geometry::Vec3,
-    sensing::tactile::{HISTORY, MARKERS, Markers, MosaicLayout, PadLoad, Taxels, mosaic, mosaic_cell},
+    sensing::tactile::{
+        HISTORY_LENGTH, MARKER_COUNT, Markers, MosaicLayout, PadWrench, Taxels, mosaic, mosaic_cell,
+    },
 };
 
 /// The streams that somebody looks at; others are never computed.
@@ -83,7 +85,7 @@ pub struct TactileHistory {
 #[derive(Clone, Debug, PartialEq)]
 pub struct PadForce {
     /// Force (N) and moment about the apex (N m) on the gel, pad frame.
-    pub load: PadLoad,
+    pub wrench: PadWrench,
     /// Pressure and shear maps, Pa.
     pub taxels: Taxels,
 }
@@ -126,13 +128,13 @@ impl TactileHistory {
 
     /// The shape (1 + 8, 198, 2) of SoftVTBench's policies: initial places of the left and right markers, then the
     /// present ones of the last 8 control steps, oldest first; a short history starts with its oldest frame.
-    pub fn marker_motion(&self) -> Vec<[[f32; 2]; 2 * MARKERS]> {
-        let row = |frame: &[TactileFrame; 2], when: usize| -> [[f32; 2]; 2 * MARKERS] {
-            std::array::from_fn(|m| frame[m / MARKERS].markers[when][m % MARKERS])
+    pub fn marker_motion(&self) -> Vec<[[f32; 2]; 2 * MARKER_COUNT]> {
+        let row = |frame: &[TactileFrame; 2], when: usize| -> [[f32; 2]; 2 * MARKER_COUNT] {
+            std::array::from_fn(|m| frame[m / MARKER_COUNT].markers.to_array()[when][m % MARKER_COUNT])
         };
         let Some(first) = self.frames.first() else { return Vec::new() };
-        let last = (0..HISTORY).filter_map(|place| {
-            let frame = self.frames.get((place + self.frames.len()).saturating_sub(HISTORY))?;
+        let last = (0..HISTORY_LENGTH).filter_map(|place| {
+            let frame = self.frames.get((place + self.frames.len()).saturating_sub(HISTORY_LENGTH))?;
             Some(row(frame, 1))
         });
         std::iter::once(row(first, 0)).chain(last).collect()

@@ -5,39 +5,18 @@
 
 use rmpv::Value;
 
-/// An array to be sent: C order, little endian.
-#[derive(Clone, Debug, PartialEq)]
-pub struct WireArray {
-    /// numpy's name of the type of its numbers.
-    pub dtype: &'static str,
-    /// Lengths of its axes.
-    pub shape: Vec<usize>,
-    /// Its bytes.
-    pub data: Vec<u8>,
-}
+use crate::npy::{NpyArray, element_size};
 
-impl WireArray {
-    /// Bytes, such as pictures.
-    pub fn bytes(shape: Vec<usize>, data: Vec<u8>) -> Self {
-        Self { dtype: "|u1", shape, data }
-    }
-
-    /// Single-precision numbers.
-    pub fn floats(shape: Vec<usize>, numbers: impl IntoIterator<Item = f32>) -> Self {
-        Self { dtype: "<f4", shape, data: numbers.into_iter().flat_map(f32::to_le_bytes).collect() }
-    }
-
-    /// As msgpack; keys are bin for openpi and str for vla-eval.
-    pub fn into_value(self, bin_keys: bool) -> Value {
-        let key = |name: &str| if bin_keys { Value::Binary(name.into()) } else { Value::from(name) };
-        let shape = self.shape.into_iter().map(Value::from).collect();
-        Value::Map(vec![
-            (key("__ndarray__"), Value::Boolean(true)),
-            (key("data"), Value::Binary(self.data)),
-            (key("dtype"), Value::from(self.dtype)),
-            (key("shape"), Value::Array(shape)),
-        ])
-    }
+/// An array as msgpack; keys are bin for openpi and str for vla-eval.
+pub fn pack_array(array: NpyArray, bin_keys: bool) -> Value {
+    let key = |name: &str| if bin_keys { Value::Binary(name.into()) } else { Value::from(name) };
+    let shape = array.shape.into_iter().map(Value::from).collect();
+    Value::Map(vec![
+        (key("__ndarray__"), Value::Boolean(true)),
+        (key("data"), Value::Binary(array.data)),
+        (key("dtype"), Value::from(array.dtype)),
+        (key("shape"), Value::Array(shape)),
+    ])
 }
 
 /// The entry of a map, whatever type its key has.
@@ -141,50 +120,14 @@ fn array(value: &Value) -> Result<(Vec<usize>, Vec<f64>), String> {
     let shape = entry(value, "shape").and_then(Value::as_array).ok_or("an array without shape")?;
     let shape: Option<Vec<usize>> = shape.iter().map(|n| n.as_u64()?.try_into().ok()).collect();
     let shape = shape.ok_or("an array whose shape is not made of whole numbers")?;
-    let width = width(dtype).ok_or_else(|| format!("an array of dtype {dtype:?}"))?;
+    let size = element_size(dtype).ok_or_else(|| format!("an array of dtype {dtype:?}"))?;
     let count = shape.iter().try_fold(1_usize, |all, n| all.checked_mul(*n));
-    if count.and_then(|count| count.checked_mul(width)) != Some(data.len()) {
+    if count.and_then(|count| count.checked_mul(size)) != Some(data.len()) {
         return Err(format!("an array of shape {shape:?} and dtype {dtype:?} with {} bytes", data.len()));
     }
-    Ok((shape, data.chunks_exact(width).map(|bytes| decode(dtype, bytes)).collect()))
-}
-
-/// Bytes of a number of a type, of those that can be read.
-fn width(dtype: &str) -> Option<usize> {
-    let known = ["f2", "f4", "f8", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8"];
-    let (order, kind) = dtype.split_at_checked(1)?;
-    let width: usize = kind.get(1..)?.parse().ok()?;
-    (matches!(order, "<" | ">" | "|" | "=") && known.contains(&kind)).then_some(width)
-}
-
-/// A number of a known type.
-fn decode(dtype: &str, bytes: &[u8]) -> f64 {
-    let mut word = [0; 8];
-    word[..bytes.len()].copy_from_slice(bytes);
-    if dtype.starts_with('>') {
-        word[..bytes.len()].reverse();
-    }
-    let unsigned = u64::from_le_bytes(word);
-    let unused = 64 - 8 * bytes.len() as u32;
-    match (&dtype[1..2], bytes.len()) {
-        ("f", 2) => half(unsigned as u16),
-        ("f", 4) => f64::from(f32::from_bits(unsigned as u32)),
-        ("f", _) => f64::from_bits(unsigned),
-        ("i", _) => ((unsigned << unused) as i64 >> unused) as f64,
-        _ => unsigned as f64,
-    }
-}
-
-/// IEEE 754 binary16.
-fn half(bits: u16) -> f64 {
-    let sign = if bits >> 15 == 1 { -1.0 } else { 1.0 };
-    let (exponent, fraction) = (i32::from(bits >> 10 & 31), f64::from(bits & 0x3FF));
-    sign * match exponent {
-        0 => fraction * 2.0_f64.powi(-24),
-        31 if fraction == 0.0 => f64::INFINITY,
-        31 => f64::NAN,
-        _ => (1.0 + fraction / 1024.0) * 2.0_f64.powi(exponent - 15),
-    }
+    let array = NpyArray { dtype: dtype.to_owned(), shape, data: data.to_vec() };
+    let values = array.values();
+    Ok((array.shape, values))
 }
 
 #[cfg(test)]
@@ -193,7 +136,7 @@ mod tests {
 
     #[test]
     fn an_array_packs_as_openpis_client_packs_it() {
-        let zeros = WireArray::floats(vec![2, 3], [0.0; 6]).into_value(true);
+        let zeros = pack_array(NpyArray::from_f32(vec![2, 3], [0.0; 6]), true);
         let mut packed = Vec::new();
         rmpv::encode::write_value(&mut packed, &Value::Map(vec![("a".into(), zeros)])).unwrap();
         let mut expected = b"\x81\xa1a\x84\xc4\x0b__ndarray__\xc3\xc4\x04data\xc4\x18".to_vec();
@@ -205,7 +148,7 @@ mod tests {
     #[test]
     fn arrays_come_back_with_both_kinds_of_keys() {
         for bin in [true, false] {
-            let value = WireArray::floats(vec![2, 2], [1.0, -2.5, 3.0, 1e-3]).into_value(bin);
+            let value = pack_array(NpyArray::from_f32(vec![2, 2], [1.0, -2.5, 3.0, 1e-3]), bin);
             let (shape, found) = numbers(&value).unwrap();
             assert_eq!((shape, found[1]), (vec![2, 2], -2.5));
         }
@@ -216,8 +159,8 @@ mod tests {
     #[test]
     fn every_type_of_number_is_read_at_its_width_sign_and_order() {
         let of = |dtype: &'static str, data: &[u8]| {
-            let array = WireArray { dtype, shape: vec![1], data: data.to_vec() };
-            numbers(&array.into_value(true)).map(|(_, found)| found[0])
+            let array = NpyArray { dtype: dtype.to_owned(), shape: vec![1], data: data.to_vec() };
+            numbers(&pack_array(array, true)).map(|(_, found)| found[0])
         };
         assert_eq!(of("<f2", &[0x00, 0xC1]), Ok(-2.5));
         assert_eq!(of("<f8", &2.25_f64.to_le_bytes()), Ok(2.25));

@@ -9,12 +9,11 @@ use std::{
 use crate::{
     files::{FileError, replace},
     geometry::Vec3,
+    npy::{NpyArray, NpyError},
     policy::Action,
 };
 
-const MAGIC: &[u8] = b"\x93NUMPY\x01\x00";
-/// The data begin at a multiple of this.
-const ALIGNED: usize = 64;
+/// Numbers per action.
 const WIDTH: usize = 7;
 
 /// Why recorded actions cannot be read.
@@ -43,18 +42,9 @@ pub fn path(dir: &Path, task: usize, episode: u32) -> PathBuf {
 /// # Errors
 /// The file cannot be written.
 pub fn write(path: &Path, actions: &[Action]) -> Result<(), FileError> {
-    let mut header =
-        format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({}, {WIDTH}), }}", actions.len());
-    let length = MAGIC.len() + 2 + header.len() + 1;
-    header.extend(std::iter::repeat_n(' ', length.next_multiple_of(ALIGNED) - length));
-    header.push('\n');
-    let mut bytes = MAGIC.to_vec();
-    bytes.extend((header.len() as u16).to_le_bytes());
-    bytes.extend(header.as_bytes());
     let numbers =
         actions.iter().flat_map(|a| a.position_b.iter().chain(a.axis_angle_b.iter()).chain([&a.closure]));
-    bytes.extend(numbers.flat_map(|x| x.to_le_bytes()));
-    replace(path, bytes)
+    replace(path, NpyArray::from_f64(vec![actions.len(), WIDTH], numbers.copied()).to_npy())
 }
 
 /// Reads the actions of an episode.
@@ -68,25 +58,24 @@ pub fn read(path: &Path) -> Result<Vec<Action>, ActionsError> {
 }
 
 fn parse(bytes: &[u8]) -> Result<Vec<Action>, &'static str> {
-    let rest = bytes.strip_prefix(MAGIC).ok_or("not an array of numpy's format 1.0")?;
-    let (length, rest) = rest.split_first_chunk::<2>().ok_or("its header is cut off")?;
-    let length = usize::from(u16::from_le_bytes(*length));
-    let (header, data) = rest.split_at_checked(length).ok_or("its header is cut off")?;
-    let header = std::str::from_utf8(header).map_err(|_| "its header is no text")?;
-    if !header.contains("'descr': '<f8'") || !header.contains("'fortran_order': False") {
+    let array = NpyArray::parse(bytes).map_err(|error| match error {
+        NpyError::Magic => "not an array of numpy's format 1.0",
+        NpyError::HeaderCutOff => "its header is cut off",
+        NpyError::HeaderNotText => "its header is not text",
+        NpyError::FortranOrder | NpyError::Dtype(_) => "its numbers are not float64 in rows",
+        NpyError::NoShape => "its shape is not of two axes",
+        NpyError::BadShape => "its shape is not of whole numbers",
+        NpyError::Length { .. } => "it is cut off",
+    })?;
+    if array.dtype != "<f8" {
         return Err("its numbers are not float64 in rows");
     }
-    let shape = header.split_once("'shape': (").and_then(|(_, rest)| rest.split_once(')'));
-    let (rows, width) =
-        shape.and_then(|(shape, _)| shape.split_once(',')).ok_or("its shape is not of two axes")?;
-    let rows: usize = rows.trim().parse().map_err(|_| "its shape is not of whole numbers")?;
-    if width.trim().trim_end_matches(',') != WIDTH.to_string() {
-        return Err("its rows are not of 7 numbers");
+    match array.shape[..] {
+        [_, WIDTH] => {}
+        [] => return Err("its shape is not of two axes"),
+        _ => return Err("its rows are not of 7 numbers"),
     }
-    let numbers: Vec<f64> = data.as_chunks::<8>().0.iter().map(|word| f64::from_le_bytes(*word)).collect();
-    if rows.checked_mul(8 * WIDTH) != Some(data.len()) {
-        return Err("it is cut off");
-    }
+    let numbers = array.values();
     if !numbers.iter().all(|x| x.is_finite()) {
         return Err("it holds a number that is not finite");
     }
@@ -120,7 +109,7 @@ mod tests {
         assert!(at.ends_with("actions/task_003/episode_00012.npy"));
         assert_eq!(read(&at).unwrap(), actions);
         let whole = fs::read(&at).unwrap();
-        assert_eq!((whole.len() - 5 * 56) % ALIGNED, 0);
+        assert_eq!((whole.len() - 5 * 56) % 64, 0);
         for (bytes, words) in [
             (&whole[..whole.len() - 1], "cut off"),
             (&whole[..9], "header is cut off"),

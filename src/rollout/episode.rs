@@ -344,7 +344,7 @@ impl Episode {
     /// # Errors
     /// As [`SensorSuite::tactile_reading`].
     pub fn render_tactile(&mut self, side: Side) -> Result<RgbImage, SensingError> {
-        Ok(self.sensors.tactile_reading(&SensorSuite::frame(&self.sim), side)?.picture)
+        Ok(self.sensors.tactile_reading(&SensorSuite::frame(&self.sim), side)?.image)
     }
 
     /// Keeps what may be looked at later: for the sensors and for the film.

@@ -6,7 +6,7 @@ use super::sensors::{SensingError, SensorSuite};
 use crate::{
     physics::world::Frame,
     policy::{CameraImage, Observation, SensorStreams, TactileFrame, TactileHistory},
-    sensing::tactile::HISTORY,
+    sensing::tactile::HISTORY_LENGTH,
 };
 
 /// States and, where somebody has looked, what was felt in them; oldest first.
@@ -20,7 +20,7 @@ pub(super) struct Recent {
 impl Recent {
     /// Takes the state after a control step.
     pub(super) fn push(&mut self, frame: Frame) {
-        if self.frames.len() == HISTORY {
+        if self.frames.len() == HISTORY_LENGTH {
             self.frames.pop_front();
         }
         self.frames.push_back((frame, None));
@@ -52,7 +52,7 @@ impl Recent {
     /// Resultants in the last states.
     fn forces(&self) -> Vec<[f64; 6]> {
         let both = |(frame, _): &(Frame, _)| {
-            let [left, right] = SensorSuite::pad_forces(frame).map(|pad| pad.load.force);
+            let [left, right] = SensorSuite::pad_forces(frame).map(|pad| pad.wrench.force);
             [left.x, left.y, left.z, right.x, right.y, right.z]
         };
         self.frames.iter().map(both).collect()
@@ -60,7 +60,7 @@ impl Recent {
 
     /// What was felt in the last states; each is worked out once.
     fn touch(&mut self, sensors: &mut SensorSuite) -> Result<TactileHistory, SensingError> {
-        let mut frames = Vec::with_capacity(HISTORY);
+        let mut frames = Vec::with_capacity(HISTORY_LENGTH);
         for (frame, felt) in &mut self.frames {
             let both = match felt.take() {
                 Some(both) => both,

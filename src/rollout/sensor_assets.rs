@@ -9,7 +9,7 @@ use crate::{
     sensing::{
         camera::{CameraError, RenderMesh},
         panda::RobotMeshes,
-        tactile::{Sensor, Skin, TactileSpec},
+        tactile::{TactileSensor, TactileSkin, TactileSpec},
     },
 };
 
@@ -17,8 +17,8 @@ use crate::{
 #[derive(Clone, Debug, Default)]
 pub struct SensorAssets {
     models: SharedCache<Arc<Asset>, Arc<RenderMesh>>,
-    skins: SharedCache<Arc<Asset>, Arc<Skin>>,
-    sensors: SharedCache<TactileSpec, Arc<Sensor>>,
+    skins: SharedCache<Arc<Asset>, Arc<TactileSkin>>,
+    sensors: SharedCache<TactileSpec, Arc<TactileSensor>>,
     robot: SharedCache<(), Arc<RobotMeshes>>,
 }
 
@@ -48,14 +48,14 @@ impl SensorAssets {
         name: &str,
         asset: &Arc<Asset>,
         mesh: Option<&VoxelMesh>,
-    ) -> Result<Arc<Skin>, SensingError> {
+    ) -> Result<Arc<TactileSkin>, SensingError> {
         self.skins.get(
             asset,
             |known| alike(known, asset),
             || {
                 let skin = match mesh {
-                    None => Skin::of_shape(&asset.shape),
-                    Some(mesh) => Skin::of_soft(&asset.shape, mesh)
+                    None => TactileSkin::of_shape(&asset.shape),
+                    Some(mesh) => TactileSkin::of_soft(&asset.shape, mesh)
                         .ok_or_else(|| SensingError::Skin(name.to_owned()))?,
                 };
                 Ok(Arc::new(skin))
@@ -69,8 +69,8 @@ impl SensorAssets {
     }
 
     /// The tactile sensor of these numbers.
-    pub(super) fn sensor(&self, spec: &TactileSpec) -> Result<Arc<Sensor>, SensingError> {
-        self.sensors.get(spec, |known| known == spec, || Ok(Arc::new(Sensor::new(spec)?)))
+    pub(super) fn sensor(&self, spec: &TactileSpec) -> Result<Arc<TactileSensor>, SensingError> {
+        self.sensors.get(spec, |known| known == spec, || Ok(Arc::new(TactileSensor::new(spec)?)))
     }
 }
 

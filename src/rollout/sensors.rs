@@ -20,8 +20,8 @@ use crate::{
     sensing::{
         camera::{self, Attachment, CameraError, FrameView, RenderObject, RenderScene, RenderedImage},
         tactile::{
-            self, FieldError, Give, PadInput, PadLoad, SensorError, Skin, Surface, TactileSpec, Taxels,
-            Touched,
+            ContactError, GelScratch, PadContact, PadWrench, SkinMesh, SubstrateCompliance, TactileReading,
+            TactileSensorError, TactileSkin, TactileSpec, Taxels, patch_friction,
         },
     },
 };
@@ -34,10 +34,10 @@ pub enum SensingError {
     Camera(#[from] CameraError),
     /// The tactile sensor cannot be made.
     #[error(transparent)]
-    Sensor(#[from] SensorError),
+    Sensor(#[from] TactileSensorError),
     /// A touch cannot be worked out.
     #[error(transparent)]
-    Field(#[from] FieldError),
+    Field(#[from] ContactError),
     /// What a script set is wrong.
     #[error("{at}: {source}")]
     Set {
@@ -105,7 +105,7 @@ pub struct SensorSuite {
     assets: SensorAssets,
     stage: Option<Arc<RenderScene>>,
     eye: camera::Renderer,
-    touch: tactile::Scratch,
+    touch: GelScratch,
 }
 
 /// A copy draws the same scene with a working memory of its own, which it fills when it first looks.
@@ -120,7 +120,7 @@ impl Clone for SensorSuite {
             assets: self.assets.clone(),
             stage: self.stage.clone(),
             eye: camera::Renderer::default(),
-            touch: tactile::Scratch::default(),
+            touch: GelScratch::default(),
         }
     }
 }
@@ -155,7 +155,7 @@ impl SensorSuite {
             assets: assets.clone(),
             stage: None,
             eye: camera::Renderer::default(),
-            touch: tactile::Scratch::default(),
+            touch: GelScratch::default(),
         }
     }
 
@@ -254,7 +254,7 @@ impl SensorSuite {
     ///
     /// # Errors
     /// The sensor cannot be made, or a number of the state is none.
-    pub fn tactile_readings(&mut self, frame: &Frame) -> Result<[Touched; 2], SensingError> {
+    pub fn tactile_readings(&mut self, frame: &Frame) -> Result<[TactileReading; 2], SensingError> {
         let left = self.tactile_reading(frame, Side::Left)?;
         Ok([left, self.tactile_reading(frame, Side::Right)?])
     }
@@ -265,18 +265,19 @@ impl SensorSuite {
     /// As [`SensorSuite::tactile_readings`].
     pub fn tactile_frames(&mut self, frame: &Frame) -> Result<[TactileFrame; 2], SensingError> {
         let both = self.tactile_readings(frame)?;
-        let untouched = self.assets.sensor(&self.spec)?.untouched.clone();
-        Ok(both.map(|touched| TactileFrame::new(touched.picture, untouched.clone(), touched.markers)))
+        let untouched = self.assets.sensor(&self.spec)?.untouched_image.clone();
+        Ok(both.map(|reading| TactileFrame::new(reading.image, untouched.clone(), reading.markers)))
     }
 
     /// True forces on the left and right gel.
     pub fn pad_forces(frame: &Frame) -> [PadForce; 2] {
         let pad = pads::PadSurface::default();
         [0, 1].map(|side| match frame.patches.get(side) {
-            Some(patch) => {
-                PadForce { load: PadLoad::of_patch(patch), taxels: Taxels::of_patch(patch, &pad, TAXELS) }
-            }
-            None => PadForce { load: PadLoad::default(), taxels: Taxels::over(&pad, TAXELS) },
+            Some(patch) => PadForce {
+                wrench: PadWrench::from_patch(patch),
+                taxels: Taxels::from_patch(patch, &pad, TAXELS),
+            },
+            None => PadForce { wrench: PadWrench::default(), taxels: Taxels::empty(&pad, TAXELS) },
         })
     }
 
@@ -284,7 +285,7 @@ impl SensorSuite {
     ///
     /// # Errors
     /// As [`SensorSuite::tactile_readings`].
-    pub fn tactile_reading(&mut self, frame: &Frame, side: Side) -> Result<Touched, SensingError> {
+    pub fn tactile_reading(&mut self, frame: &Frame, side: Side) -> Result<TactileReading, SensingError> {
         let sensor = self.assets.sensor(&self.spec)?;
         let index = usize::from(side == Side::Right);
         let none = ContactPatch { collider: ColliderId::new(0), points: Vec::new() };
@@ -294,31 +295,37 @@ impl SensorSuite {
         let patch = patch.unwrap_or(&none);
         let pad_w =
             frame.links[self.articulation.index()][panda::finger_link(side)] * pads::pad_pose_in_finger(side);
-        let mut placed: Vec<(Arc<Skin>, Vec<Vec3>)> = Vec::new();
-        let mut give = None;
+        let mut placed: Vec<(Arc<TactileSkin>, Vec<Vec3>)> = Vec::new();
+        let mut substrate = None;
         for part in self.parts.iter().filter(|part| part.presses(patch)) {
             let mesh = part.rest.as_ref().map(|rest| &rest.mesh);
             let skin = self.assets.skin(&part.name, &part.asset, mesh)?;
             let mut vertices = Vec::new();
             let w_p = pad_w.inverse();
             match part.body {
-                BodyId::Soft(body) => skin.soft(frame.soft(body), &w_p, &mut vertices),
-                BodyId::Rigid(body) => skin.rigid(&(w_p * frame.rigid(body)), &mut vertices),
-                BodyId::Link(link) => skin.rigid(&(w_p * frame.link(link) * part.offset), &mut vertices),
-                BodyId::World | BodyId::Kinematic(_) => skin.rigid(&(w_p * part.start_w), &mut vertices),
+                BodyId::Soft(body) => skin.place_soft(frame.soft(body), &w_p, &mut vertices),
+                BodyId::Rigid(body) => skin.place_rigid(&(w_p * frame.rigid(body)), &mut vertices),
+                BodyId::Link(link) => {
+                    skin.place_rigid(&(w_p * frame.link(link) * part.offset), &mut vertices)
+                }
+                BodyId::World | BodyId::Kinematic(_) => {
+                    skin.place_rigid(&(w_p * part.start_w), &mut vertices)
+                }
             }
             placed.push((skin, vertices));
-            give = part.give();
+            substrate = part.substrate();
         }
-        let surfaces: Vec<Surface> =
-            placed.iter().map(|(skin, vertices)| Surface { vertices, triangles: skin.triangles() }).collect();
-        let input = PadInput {
-            load: PadLoad::of_patch(patch),
-            surfaces: &surfaces,
-            friction: PadLoad::friction_of(patch).unwrap_or(self.robot.pads.static_mu),
-            give: if placed.len() == 1 { give } else { None },
+        let skins: Vec<SkinMesh> = placed
+            .iter()
+            .map(|(skin, vertices)| SkinMesh { vertices, triangles: skin.triangles() })
+            .collect();
+        let contact = PadContact {
+            wrench: PadWrench::from_patch(patch),
+            skins: &skins,
+            friction: patch_friction(patch).unwrap_or(self.robot.pads.static_mu),
+            substrate: if placed.len() == 1 { substrate } else { None },
         };
-        Ok(sensor.see(&input, &mut self.touch)?)
+        Ok(sensor.read(&contact, &mut self.touch)?)
     }
 
     /// Everything that is drawn.
@@ -359,11 +366,11 @@ impl Part {
         })
     }
 
-    /// How its surface gives way to a gel in ridges too fine for its elements.
-    fn give(&self) -> Option<Give> {
+    /// Compliance of a soft body to a gel in ridges too fine for its elements.
+    fn substrate(&self) -> Option<SubstrateCompliance> {
         let (Body::Soft(material), Some(rest)) = (&self.asset.body, &self.rest) else { return None };
         let modulus = material.youngs_pa / (1.0 - material.poisson * material.poisson);
-        Some(Give { modulus, resolved: 2.0 * rest.mesh.edge })
+        Some(SubstrateCompliance { modulus, resolved: 2.0 * rest.mesh.edge })
     }
 }
 

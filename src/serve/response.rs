@@ -8,11 +8,12 @@ use super::{catalog::ServerConfig, live_episode::LiveEpisode, space};
 use crate::{
     benchmark::control::CONTROL_DT,
     evaluation::record::Outcome,
+    npy::NpyArray,
     policy::{
         Observation,
         encode::content,
         profile::{Profile, ProfileInput},
-        wire::WireArray,
+        wire::pack_array,
     },
 };
 
@@ -92,7 +93,7 @@ pub(super) fn stands(
 /// A picture as an array, uint8 (height, width, 3).
 pub(super) fn picture(picture: RgbImage) -> Value {
     let shape = vec![picture.height() as usize, picture.width() as usize, 3];
-    WireArray::bytes(shape, picture.into_raw()).into_value(true)
+    pack_array(NpyArray::from_bytes(shape, picture.into_raw()), true)
 }
 
 /// The one key of an entry that a profile sends under several.

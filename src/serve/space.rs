@@ -30,7 +30,7 @@ pub(super) fn observation(offer: &ServerConfig, first: &Observation) -> Value {
             ObservationEntry::Text(_) => text(offer),
             ObservationEntry::Array(array) => {
                 let (low, high) = bounds(&input.source);
-                numbers(array.dtype, &array.shape, low, high)
+                numbers(&array.dtype, &array.shape, low, high)
             }
         };
         Some(pair(key(input), space))

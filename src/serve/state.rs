@@ -6,7 +6,10 @@ use super::{
     catalog::{EpisodeId, ServerConfig},
     request::Row,
 };
-use crate::policy::{profile::ACTION_LEN, wire::WireArray};
+use crate::{
+    npy::NpyArray,
+    policy::{profile::ACTION_LEN, wire::pack_array},
+};
 
 /// Where an episode stands.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,8 +33,8 @@ impl State {
     /// As msgpack.
     pub(super) fn to_value(&self, offer: &ServerConfig) -> Value {
         let EpisodeId { suite, task, episode, seed, split } = &self.wanted;
-        let data = self.actions.iter().flatten().flat_map(|number| number.to_le_bytes()).collect();
-        let actions = WireArray { dtype: "<f8", shape: vec![self.actions.len(), ACTION_LEN], data };
+        let shape = vec![self.actions.len(), ACTION_LEN];
+        let actions = NpyArray::from_f64(shape, self.actions.iter().flatten().copied());
         let pair = |name: &str, value: Value| (Value::from(name), value);
         Value::Map(vec![
             pair("suite", suite.as_str().into()),
@@ -39,7 +42,7 @@ impl State {
             pair("episode", (*episode).into()),
             pair("seed", (*seed).into()),
             pair("split", split.name().into()),
-            pair("actions", actions.into_value(true)),
+            pair("actions", pack_array(actions, true)),
             pair("code", offer.code().into()),
             pair("made_by", offer.made_by.as_str().into()),
         ])

@@ -100,7 +100,7 @@ fn a_policy_gets_the_streams_it_asks_for_and_no_others() {
             "both fingers start alike"
         );
         let forces = observation.forces.as_ref().expect("asked for");
-        assert_eq!((forces[0].load.normal(), forces[1].taxels.shape), (0.0, [25, 21]));
+        assert_eq!((forces[0].wrench.normal(), forces[1].taxels.shape), (0.0, [25, 21]));
         assert!((0.0..=0.0805).contains(&observation.gripper_width_m));
         assert_eq!(observation.prompt, "wait");
     }

@@ -9,7 +9,7 @@ use softvt::{
         contact::{Collider, Friction, SurfaceStiffness},
     },
     robot::{Side, pads::PadSurface},
-    sensing::tactile::PadLoad,
+    sensing::tactile::patch_friction,
 };
 
 use crate::scene::*;
@@ -136,14 +136,14 @@ fn what_the_pads_cannot_hold_slides_out_of_them() {
 }
 
 #[test]
-fn a_pads_patch_tells_the_friction_of_the_pair_held_and_sliding() {
+fn a_patch_has_the_friction_of_its_pair_held_and_sliding() {
     let shape = cuboid(0.04, 0.05, 0.04);
     // Pads have 1.5 and 1.2; each of the two is the larger one's.
     for (surface, held, sliding) in [((0.1, 0.05), 1.5, 1.2), ((2.0, 1.7), 2.0, 1.7), ((1.6, 1.1), 1.6, 1.2)]
     {
         let of = friction(surface.0, surface.1);
         let (mut world, _, hand, shut) = grasped_of(&shape, at(0.0, 0.0, 0.02), 0.05, 1.5e-5, of);
-        let mu = |world: &World| PadLoad::friction_of(&world.patch(hand.pads[0])).expect("a force");
+        let mu = |world: &World| patch_friction(&world.patch(hand.pads[0])).expect("a force");
         assert!((mu(&world) - held).abs() < 1e-12, "{surface:?}: held with {}", mu(&world));
         // Too weak a grip to lift the body: the pads slide up on it, at 60 mm/s.
         for step in 1..=10 {

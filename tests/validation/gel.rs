@@ -4,7 +4,7 @@
 use softvt::{
     geometry::Vec3,
     robot::PadSurface,
-    sensing::tactile::{Gel, GelField, PadInput, PadLoad, Scratch, Surface, TactileSpec, sense},
+    sensing::tactile::{Gel, GelField, GelScratch, PadContact, PadWrench, SkinMesh, TactileSpec},
 };
 
 /// Radius of the ball, m.
@@ -62,10 +62,10 @@ pub fn press(gel: &Gel, at: [f64; 2], force: f64) -> GelField {
             [[a, c, b], [a, d, c]]
         })
         .collect();
-    let surfaces = [Surface { vertices: &vertices, triangles: &triangles }];
-    let load = PadLoad::new(force, [0.0; 2], 0.0, [0.0; 2]);
-    let input = PadInput { load, surfaces: &surfaces, friction: 1.5, give: None };
-    sense(gel, &input, &mut Scratch::default()).expect("a good touch").expect("a force")
+    let skins = [SkinMesh { vertices: &vertices, triangles: &triangles }];
+    let wrench = PadWrench::new(force, [0.0; 2], 0.0, [0.0; 2]);
+    let contact = PadContact { wrench, skins: &skins, friction: 1.5, substrate: None };
+    GelField::solve(gel, &contact, &mut GelScratch::default()).expect("a good contact").expect("a force")
 }
 
 /// Mean radial motion of the surface on a circle about the middle, m.
@@ -73,7 +73,7 @@ pub fn outward(gel: &Gel, field: &GelField, radius: f64) -> f64 {
     let directions = 16;
     let at = |i: i32| {
         let phi = std::f64::consts::TAU * f64::from(i) / f64::from(directions);
-        let u = field.at(gel, radius * phi.cos(), radius * phi.sin());
+        let u = field.displacement_at(gel, radius * phi.cos(), radius * phi.sin());
         u[0] * phi.cos() + u[1] * phi.sin()
     };
     (0..directions).map(at).sum::<f64>() / f64::from(directions)

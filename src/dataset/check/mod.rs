@@ -14,7 +14,7 @@ use crate::{
     benchmark::control::CONTROL_DT,
     geometry::{Quat, Vec3},
     robot::rotation,
-    sensing::tactile::MARKERS,
+    sensing::tactile::MARKER_COUNT,
 };
 
 /// Result of a check.
@@ -44,7 +44,7 @@ const REQUIRED_STREAMS: [(&str, &[usize]); 13] = [
     ("obs/gripper_width", &[1]),
     ("obs/gripper_close_norm", &[1]),
     ("obs/gripper_closure", &[1]),
-    ("obs/gripper_marker_motion", &[2, 2, MARKERS, 2]),
+    ("obs/gripper_marker_motion", &[2, 2, MARKER_COUNT, 2]),
 ];
 /// Tolerance of rotations, quaternion lengths and timestamps.
 const TOLERANCE: f64 = 1e-6;

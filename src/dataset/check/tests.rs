@@ -9,6 +9,7 @@ use crate::{
     dataset::{DataStream, Demonstration, actions, hdf5::Hdf5Writer, merge_parts},
     evaluation::record::tests::sample,
     policy::Action,
+    sensing::tactile::Markers,
 };
 
 const STEPS: usize = 9;
@@ -52,7 +53,9 @@ fn demonstration(salt: f64) -> Demonstration {
             DataStream::u8("privileged/contact", &[2], vec![1; 2 * STEPS]).attribute("meaning", "touching"),
         ],
     };
-    made.set_markers(&[[[[[1.5; 2]; MARKERS]; 2]; 2]; STEPS]);
+    made.set_markers(
+        &[[Markers { initial: [[1.5; 2]; MARKER_COUNT], current: [[1.5; 2]; MARKER_COUNT] }; 2]; STEPS],
+    );
     made
 }
 

@@ -14,14 +14,14 @@ use super::{
 };
 use crate::{
     dataset::{DatasetError, TaskFile, layout::IMAGE_STREAMS},
-    sensing::tactile::{HISTORY, MARKERS, MosaicLayout, PICTURE, mosaic, mosaic_cell},
+    sensing::tactile::{HISTORY_LENGTH, IMAGE_SIZE, MARKER_COUNT, MosaicLayout, mosaic, mosaic_cell},
 };
 
 /// Pictures that are unpacked at once: whole chunks of the file.
 const BLOCK: usize = 32;
 /// Numbers of the markers in a row, and of one state of one finger.
 const MARKER_ROW: usize = MARKER_SHAPE[0] * MARKER_SHAPE[1] * MARKER_SHAPE[2];
-const PLACES: usize = 2 * MARKERS;
+const PLACES: usize = 2 * MARKER_COUNT;
 /// Quantiles of places of markers are taken to this, px, up to the second number.
 const MARKER_STEP: f64 = 0.01;
 const MARKER_RANGE: f64 = 400.0;
@@ -63,7 +63,12 @@ pub(super) fn read(
         pictures: Default::default(),
         state: numbers(file, (demo, steps), "obs/state", &[STATE])?,
         actions: numbers(file, (demo, steps), actions, &[STATE])?,
-        markers: markers(&numbers(file, (demo, steps), "obs/gripper_marker_motion", &[2, 2, MARKERS, 2])?),
+        markers: markers(&numbers(
+            file,
+            (demo, steps),
+            "obs/gripper_marker_motion",
+            &[2, 2, MARKER_COUNT, 2],
+        )?),
         tallies: std::array::from_fn(|_| std::array::from_fn(|_| ValueCounts::new(1.0 / 255.0, 256))),
     };
     let mut felt: [Vec<RgbImage>; 2] = Default::default();
@@ -77,7 +82,7 @@ pub(super) fn read(
             third.into_iter().zip(wrist).zip(left.iter().zip(&right)).enumerate()
         {
             for (cells, picture) in felt.iter_mut().zip([fingers.0, fingers.1]) {
-                if cells.len() == HISTORY {
+                if cells.len() == HISTORY_LENGTH {
                     cells.remove(0);
                 }
                 cells.push(mosaic_cell(picture));
@@ -137,7 +142,7 @@ fn seen(
     let mut all: [Vec<RgbImage>; 4] = Default::default();
     for (at, (pictures, name)) in all.iter_mut().zip(IMAGE_STREAMS).enumerate() {
         let name = format!("obs/{name}");
-        let finger = [PICTURE[1], PICTURE[0]];
+        let finger = [IMAGE_SIZE[1], IMAGE_SIZE[0]];
         let [height, width] = [third, wrist, finger, finger][at];
         shaped(file, (demo, steps), &name, &[height, width, 3])?;
         let crate::dataset::hdf5::ImageBlock { bytes, height, width } =
@@ -164,7 +169,7 @@ fn markers(stored: &[f32]) -> Vec<f32> {
     };
     for now in 0..steps.len() {
         // A policy's history reaches back so far, and begins with its oldest state.
-        push(steps[(now + 1).saturating_sub(HISTORY)], 0);
+        push(steps[(now + 1).saturating_sub(HISTORY_LENGTH)], 0);
         push(steps[now.saturating_sub(1)], 1);
         push(steps[now], 1);
     }

@@ -3,14 +3,14 @@
 use serde_json::{Map, Value, json};
 
 use super::parquet_table::{ColumnType, ParquetColumn};
-use crate::sensing::tactile::MARKERS;
+use crate::sensing::tactile::MARKER_COUNT;
 
 /// Pictures of a row, in order.
 pub(super) const PICTURES: [&str; 3] = ["image", "wrist_image", "tactile_image"];
 /// Numbers of the state, and of an action.
 pub(super) const STATE: usize = 7;
 /// Shape of the markers of a row: initial places, and those of the step before and of this one; both fingers; x and y.
-pub(super) const MARKER_SHAPE: [usize; 3] = [3, 2 * MARKERS, 2];
+pub(super) const MARKER_SHAPE: [usize; 3] = [3, 2 * MARKER_COUNT, 2];
 
 /// Names that a row's numbers have besides.
 const POSE: [&str; 6] = ["x", "y", "z", "axis_angle_x", "axis_angle_y", "axis_angle_z"];

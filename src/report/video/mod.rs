@@ -20,7 +20,7 @@ use crate::{
     scene::Camera,
     sensing::{
         camera::RenderedImage,
-        tactile::{MarkerStyle, Touched},
+        tactile::{MarkerStyle, TactileReading},
     },
     text::format_number,
 };
@@ -126,8 +126,8 @@ fn panels(film: &mut StateRecording, caption: &Caption, index: usize) -> Result<
         canvas.place(&picture, PANEL * side as u32, 0);
         label(&mut canvas, ["third person", "wrist"][side], PANEL * side as u32, 0);
     }
-    for (side, touched) in film.sensors.tactile_readings(frame)?.iter().enumerate() {
-        let picture = touched.with_markers(MarkerStyle::Dots);
+    for (side, reading) in film.sensors.tactile_readings(frame)?.iter().enumerate() {
+        let picture = reading.with_markers(MarkerStyle::Dots);
         let x = PANEL * side as u32;
         canvas.place_resized(&picture, (x, PANEL), (PANEL, FINGER));
         label(&mut canvas, ["left finger", "right finger"][side], x, PANEL);
@@ -270,8 +270,8 @@ pub fn write_stills(
                 put(&camera.name, kind, bytes)?;
             }
         }
-        for (name, touched) in TACTILE_IMAGES.into_iter().zip(&film.sensors.tactile_readings(frame)?) {
-            for (kind, picture) in TACTILE_IMAGE_SUFFIXES.into_iter().zip(tactile(touched)) {
+        for (name, reading) in TACTILE_IMAGES.into_iter().zip(&film.sensors.tactile_readings(frame)?) {
+            for (kind, picture) in TACTILE_IMAGE_SUFFIXES.into_iter().zip(tactile(reading)) {
                 put(name, kind, png(&picture)?)?;
             }
         }
@@ -292,9 +292,9 @@ fn camera_pictures(mut seen: RenderedImage) -> Result<[Vec<u8>; 3], FilmError> {
 }
 
 /// A finger's picture, plain, with dots and with arrows.
-fn tactile(touched: &Touched) -> [RgbImage; 3] {
-    let drawn = |style| touched.with_markers(style);
-    [touched.picture.clone(), drawn(MarkerStyle::Dots), drawn(MarkerStyle::Arrows)]
+fn tactile(reading: &TactileReading) -> [RgbImage; 3] {
+    let drawn = |style| reading.with_markers(style);
+    [reading.image.clone(), drawn(MarkerStyle::Dots), drawn(MarkerStyle::Arrows)]
 }
 
 /// A picture as a PNG file.

@@ -43,7 +43,7 @@ impl LuaObservation {
         let Some(pads) = &self.0.forces else { return Err(not_looked(lua, "force", "force = true")) };
         let table = lua.create_table()?;
         for (pad, name) in pads.iter().zip(["left", "right"]) {
-            table.set(name, lua.create_sequence_from(pad.load.force.iter().copied())?)?;
+            table.set(name, lua.create_sequence_from(pad.wrench.force.iter().copied())?)?;
         }
         strict(lua, "force", table, ["left", "right"].map(str::to_owned).to_vec())
     }

@@ -35,7 +35,7 @@ use crate::{
     physics::BodyId,
     robot::{Side, rotation},
     rollout::{AssetCache, SensingError, SensorAssets, SensorSuite, Simulation, cancel},
-    sensing::tactile::{MarkerStyle, PadLoad, Places},
+    sensing::tactile::{MarkerPositions, MarkerStyle, PadWrench},
 };
 
 /// Physics with the robot, and what was seen of it.
@@ -288,14 +288,14 @@ impl LuaSimulation {
         let frame = SensorSuite::frame(sim);
         let felt =
             senses.tactile_reading(&frame, side).map_err(|e| fail(lua, format!("simulation:feel: {e}")))?;
-        let places = |places: &Places| lua.create_sequence_from(places.iter().map(|p| p.to_vec()));
+        let places = |places: &MarkerPositions| lua.create_sequence_from(places.iter().map(|p| p.to_vec()));
         let table = lua.create_table()?;
-        table.set("picture", LuaImage::new(lua, felt.picture.clone())?)?;
+        table.set("picture", LuaImage::new(lua, felt.image.clone())?)?;
         table.set("dots", LuaImage::new(lua, felt.with_markers(MarkerStyle::Dots))?)?;
         table.set("arrows", LuaImage::new(lua, felt.with_markers(MarkerStyle::Arrows))?)?;
-        table.set("initial", places(&felt.markers[0])?)?;
-        table.set("present", places(&felt.markers[1])?)?;
-        let load = frame.patches.get(index).map_or(PadLoad::default(), PadLoad::of_patch);
+        table.set("initial", places(&felt.markers.initial)?)?;
+        table.set("present", places(&felt.markers.current)?)?;
+        let load = frame.patches.get(index).map_or(PadWrench::default(), PadWrench::from_patch);
         table.set("markers", LuaMarkers::new(felt.markers))?;
         table.set("force", lua.create_sequence_from(load.force.iter().copied())?)?;
         table.set("depth_mm", felt.field.as_ref().map_or(0.0, |field| 1e3 * field.depth()))?;

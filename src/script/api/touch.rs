@@ -1,4 +1,4 @@
-//! Touch in Lua: what a finger's sensor shows and what its markers say. The numbers come from [`Motion`].
+//! Touch in Lua: what a finger's sensor shows and what its markers say. The numbers come from [`MarkerFlow`].
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ use crate::script::{
 };
 use crate::{
     policy::TactileFrame,
-    sensing::tactile::{Markers, Motion, Places},
+    sensing::tactile::{MarkerFlow, MarkerPositions, Markers},
 };
 
 const FINISHED: &str = "it is measured";
@@ -30,13 +30,13 @@ struct LuaTouch {
 #[derive(Clone)]
 pub(crate) struct LuaMarkers {
     markers: Arc<Markers>,
-    motion: Arc<Motion>,
+    flow: Arc<MarkerFlow>,
 }
 
 impl LuaMarkers {
     /// The markers of one finger.
     pub(crate) fn new(markers: Markers) -> Self {
-        Self { motion: Arc::new(Motion::of(&markers)), markers: Arc::new(markers) }
+        Self { flow: Arc::new(MarkerFlow::of(&markers)), markers: Arc::new(markers) }
     }
 }
 
@@ -83,7 +83,7 @@ fn pairs(lua: &Lua, pairs: impl Iterator<Item = [f64; 2]>) -> mlua::Result<Read>
     Ok(Read::Fixed(lua.create_sequence_from(lists)?, FINISHED.to_owned()))
 }
 
-fn places(places: &Places) -> impl Iterator<Item = [f64; 2]> {
+fn places(places: &MarkerPositions) -> impl Iterator<Item = [f64; 2]> {
     places.iter().map(|place| place.map(f64::from))
 }
 
@@ -98,22 +98,22 @@ impl Hosted for LuaMarkers {
 
     fn read(&self, lua: &Lua, key: &str) -> mlua::Result<Read> {
         match key {
-            "initial" => pairs(lua, places(&self.markers[0])),
-            "present" => pairs(lua, places(&self.markers[1])),
-            _ => pairs(lua, self.motion.moves().iter().copied()),
+            "initial" => pairs(lua, places(&self.markers.initial)),
+            "present" => pairs(lua, places(&self.markers.current)),
+            _ => pairs(lua, self.flow.displacements().iter().copied()),
         }
     }
 
     fn methods<M: UserDataMethods<Self>>(methods: &mut M) {
-        method(methods, "mean", |lua, this: &Self, ()| lua.create_sequence_from(this.motion.mean()));
-        method(methods, "largest", |_, this: &Self, ()| Ok(this.motion.largest()));
-        method(methods, "press", |_, this: &Self, ()| Ok(this.motion.press()));
-        method(methods, "drag", |_, this: &Self, ()| Ok(this.motion.drag()));
-        method(methods, "divergence", |_, this: &Self, ()| Ok(this.motion.divergence()));
-        method(methods, "twist", |_, this: &Self, ()| Ok(this.motion.twist()));
-        method(methods, "shear", |lua, this: &Self, ()| lua.create_sequence_from(this.motion.shear()));
-        method(methods, "moved", |lua, this: &Self, px: f64| lua.create_sequence_from(this.motion.moved(px)));
-        method(methods, "area", |_, this: &Self, px: f64| Ok(this.motion.moved_share(px)));
+        method(methods, "mean", |lua, this: &Self, ()| lua.create_sequence_from(this.flow.mean()));
+        method(methods, "largest", |_, this: &Self, ()| Ok(this.flow.max_displacement()));
+        method(methods, "press", |_, this: &Self, ()| Ok(this.flow.press()));
+        method(methods, "drag", |_, this: &Self, ()| Ok(this.flow.drag()));
+        method(methods, "divergence", |_, this: &Self, ()| Ok(this.flow.divergence()));
+        method(methods, "twist", |_, this: &Self, ()| Ok(this.flow.twist()));
+        method(methods, "shear", |lua, this: &Self, ()| lua.create_sequence_from(this.flow.shear()));
+        method(methods, "moved", |lua, this: &Self, px: f64| lua.create_sequence_from(this.flow.moved(px)));
+        method(methods, "area", |_, this: &Self, px: f64| Ok(this.flow.moved_share(px)));
     }
 }
 

@@ -13,7 +13,7 @@ use crate::{
         TaskBrief, ToolCommand, profile::Profile,
     },
     script::{LuaPolicy, PolicyFile, load_profile},
-    sensing::tactile::untouched,
+    sensing::tactile::Markers,
 };
 
 fn seed(episode: u64) -> EpisodeSeed {
@@ -25,7 +25,8 @@ fn seed(episode: u64) -> EpisodeSeed {
 fn finger(by: [f32; 2], lit: u8) -> TactileFrame {
     let rest = RgbImage::from_pixel(320, 240, Rgb([100, 100, 100]));
     let picture = RgbImage::from_pixel(320, 240, Rgb([100 + lit, 100, 100 - lit]));
-    let markers = [untouched(), untouched().map(|[x, y]| [x + by[0], y + by[1]])];
+    let initial = Markers::at_rest().initial;
+    let markers = Markers { initial, current: initial.map(|[x, y]| [x + by[0], y + by[1]]) };
     TactileFrame::new(picture, Arc::new(rest), markers)
 }
 

@@ -1,48 +1,33 @@
-//! GelSight tactile sensing: what a touch does to the gel, the picture it gives, the markers it moves.
+//! GelSight tactile sensing: deformation of the gel by a contact, its colour image and the markers in it.
 //!
-//! [`Gel`] is made once; [`sense`] turns the solver's load and the touching skins into a [`GelField`]; pictures
-//! ([`Optics`]), [`markers()`] and [`Taxels`] follow from it. `docs/tactile.md` draws the frames and tells the method.
+//! [`TactileSensor`] is created once and shared by both fingers. [`TactileSensor::read`] maps the force on a pad and the
+//! surfaces of the touching bodies to a [`TactileReading`]. Every step is a pure function of its input, so images may be
+//! computed later and in any order.
+//!
+//! - [`elastic`]: the gel as an elastic layer; pressure, shear and displacement of its surface ([`GelField`]).
+//! - [`image`]: the colour image of a field, and the mosaic of the last images.
+//! - [`markers`]: positions of the printed markers, and measures of their motion ([`MarkerFlow`]).
+//!
+//! `docs/tactile.md` draws the frames and explains the method.
 
-mod field;
-mod fourier;
-mod gel;
-mod layer;
-mod load;
-mod markers;
-mod mosaic;
-mod motion;
-mod normal;
-pub mod npz;
-pub mod optics;
-mod relief;
+pub mod elastic;
+pub mod image;
+pub mod markers;
+mod pinhole;
 mod sensor;
-mod shadow;
-mod shear;
 mod skin;
 mod spec;
-mod surface;
-mod taxim;
-mod view;
+#[cfg(test)]
+mod tests;
 
-#[cfg(test)]
-mod field_tests;
-#[cfg(test)]
-mod golden_tests;
-#[cfg(test)]
-mod picture_tests;
-#[cfg(test)]
-mod taxim_tests;
-
-pub use field::{FieldError, GelField, Give, PadInput, sense};
-pub use gel::{Gel, Scratch};
-pub use load::{PadLoad, Taxels};
-pub use markers::{ARROW_GAIN, MARKERS, MarkerStyle, Markers, Places, draw_markers, markers, untouched};
-pub use mosaic::{CELLS as HISTORY, MosaicLayout, mosaic, mosaic_cell};
-pub use motion::Motion;
-pub use optics::{Optics, OpticsError};
-pub use relief::Surface;
-pub use sensor::{Sensor, SensorError, Touched};
-pub use shadow::Lamp;
-pub use skin::Skin;
-pub use spec::{FotsSpec, GelSpec, MarkerModel, OpticsModel, PICTURE, TactileSpec, TactileSpecError, View};
-pub use taxim::Taxim;
+pub use self::{
+    elastic::{
+        ContactError, Gel, GelField, GelScratch, PadContact, PadWrench, SkinMesh, SubstrateCompliance,
+        Taxels, patch_friction,
+    },
+    image::{HISTORY_LENGTH, MosaicLayout, OpticsError, PolynomialOptics, TaximOptics, mosaic, mosaic_cell},
+    markers::{MARKER_COUNT, MarkerFlow, MarkerPositions, MarkerStyle, Markers},
+    sensor::{TactileReading, TactileSensor, TactileSensorError},
+    skin::TactileSkin,
+    spec::{FotsSpec, GelSpec, IMAGE_SIZE, MarkerModel, OpticsModel, Pinhole, TactileSpec, TactileSpecError},
+};

@@ -1,104 +1,147 @@
-//! A sensor as one thing: its gel, its optics and its markers.
+//! A tactile sensor: gel, optics and markers together.
 
 use std::sync::Arc;
 
 use image::RgbImage;
 
 use super::{
-    FieldError, Gel, GelField, MarkerModel, MarkerStyle, Markers, Optics, OpticsError, OpticsModel, PICTURE,
-    PadInput, Scratch, TactileSpec, TactileSpecError, Taxim, draw_markers, markers, npz::NpzError, sense,
+    elastic::{ContactError, Gel, GelField, GelScratch, PadContact},
+    image::{OpticsError, PolynomialOptics, TaximOptics},
+    markers::{MarkerStyle, Markers},
+    spec::{IMAGE_SIZE, MarkerModel, OpticsModel, TactileSpec, TactileSpecError},
 };
-use crate::robot::PadSurface;
+use crate::{npy::NpzError, robot::PadSurface};
 
-/// Why a sensor cannot be made.
+/// Reasons why a sensor cannot be created.
 #[derive(Debug, thiserror::Error)]
-pub enum SensorError {
-    /// A number out of its range.
+#[allow(missing_docs)] // The messages say it.
+pub enum TactileSensorError {
     #[error(transparent)]
     Spec(#[from] TactileSpecError),
-    /// The shipped optics are broken.
     #[error(transparent)]
     Optics(#[from] OpticsError),
-    /// Taxim's tables cannot be read.
     #[error("tactile.optics.tables: {0}")]
     Tables(#[from] NpzError),
 }
 
-/// How a picture comes from a field.
+/// Renderer of the colour image.
 #[derive(Debug)]
-enum Eye {
-    Polynomial { optics: Box<Optics>, shadows: bool },
-    Taxim(Box<Taxim>),
+enum OpticsBackend {
+    Polynomial { optics: Box<PolynomialOptics>, shadows: bool },
+    Taxim(Box<TaximOptics>),
 }
 
-/// A sensor, the same for both fingers; made once and shared by all frames and threads.
+/// Tactile sensor, the same for both fingers; created once and shared by all frames and threads.
+///
+/// # Example
+///
+/// A ball of 4 mm radius is pressed into the gel with 1.5 N. Its lower side, a paraboloid to first order, is given in the pad
+/// frame: origin at the apex of the gel, z out of the gel.
+///
+/// ```
+/// use softvt::{
+///     geometry::Vec3,
+///     sensing::tactile::{GelScratch, PadContact, PadWrench, SkinMesh, TactileSensor, TactileSpec},
+/// };
+///
+/// let sensor = TactileSensor::new(&TactileSpec::default())?;
+/// // A grid of 21 × 21 vertices, 0.4 mm apart; the triangles face the gel.
+/// let at = |i: u32| 4e-4 * (f64::from(i) - 10.0);
+/// let height = |x: f64, y: f64| (x * x + y * y) / 8e-3;
+/// let grid = (0..21).flat_map(|j| (0..21).map(move |i| (at(i), at(j))));
+/// let vertices: Vec<Vec3> = grid.map(|(x, y)| Vec3::new(x, y, height(x, y))).collect();
+/// let squares = (0..20).flat_map(|j| (0..20).map(move |i| 21 * j + i));
+/// let triangles: Vec<[u32; 3]> = squares.flat_map(|a| [[a, a + 22, a + 1], [a, a + 21, a + 22]]).collect();
+/// let contact = PadContact {
+///     wrench: PadWrench::new(1.5, [0.0; 2], 0.0, [0.0; 2]),
+///     skins: &[SkinMesh { vertices: &vertices, triangles: &triangles }],
+///     friction: 1.5,
+///     substrate: None,
+/// };
+/// let reading = sensor.read(&contact, &mut GelScratch::default())?;
+///
+/// let field = reading.field.expect("the ball presses");
+/// assert!((field.wrench(&sensor.gel).normal() - 1.5).abs() < 1e-9);
+/// // The image changes around the contact, and a marker next to it moves outwards.
+/// assert_eq!(reading.image.dimensions(), (320, 240));
+/// assert_ne!(reading.image.get_pixel(185, 120), sensor.untouched_image.get_pixel(185, 120));
+/// assert_eq!(reading.image.get_pixel(5, 5), sensor.untouched_image.get_pixel(5, 5));
+/// let right_of_centre = 4 * 11 + 6;
+/// assert!(reading.markers.current[right_of_centre][0] > reading.markers.initial[right_of_centre][0]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
-pub struct Sensor {
-    /// Its gel.
+pub struct TactileSensor {
+    /// Gel with its grid and kernels.
     pub gel: Gel,
-    /// What it sees without a touch.
-    pub untouched: Arc<RgbImage>,
-    eye: Eye,
+    /// Image without a contact, 320 × 240.
+    pub untouched_image: Arc<RgbImage>,
+    optics: OpticsBackend,
     markers: MarkerModel,
 }
 
-/// A finger's sensor at one instant.
+/// Output of a tactile sensor at one instant.
 #[derive(Clone, Debug)]
-pub struct Touched {
-    /// The gel; `None` if nothing presses.
+pub struct TactileReading {
+    /// Field of the gel; `None` if nothing presses.
     pub field: Option<GelField>,
-    /// Initial and present places of the markers, px.
+    /// Markers in the image.
     pub markers: Markers,
-    /// The colour picture, 320 × 240, without markers.
-    pub picture: RgbImage,
+    /// Colour image without markers, 320 × 240; rows from the top, RGB.
+    pub image: RgbImage,
 }
 
-impl Eye {
-    fn picture(&self, gel: &Gel, field: Option<&GelField>) -> RgbImage {
-        let [wide, high] = PICTURE;
-        let mut picture = RgbImage::new(wide as u32, high as u32);
+impl OpticsBackend {
+    fn render(&self, gel: &Gel, field: Option<&GelField>) -> RgbImage {
+        let [width, height] = IMAGE_SIZE;
+        let mut image = RgbImage::new(width as u32, height as u32);
         match self {
-            Self::Polynomial { optics, shadows } => optics.picture(gel, field, *shadows, &mut picture),
-            Self::Taxim(taxim) => taxim.picture(gel, field, &mut picture),
+            Self::Polynomial { optics, shadows } => optics.render(gel, field, *shadows, &mut image),
+            Self::Taxim(taxim) => taxim.render(gel, field, &mut image),
         }
-        picture
+        image
     }
 }
 
-impl Sensor {
-    /// A sensor of these numbers with the gel pad of a GelSight Mini.
+impl TactileSensor {
+    /// Sensor with these parameters and the gel pad of a GelSight Mini.
     ///
     /// # Errors
-    /// A number out of its range, or tables that cannot be read.
-    pub fn new(spec: &TactileSpec) -> Result<Self, SensorError> {
+    /// A parameter is out of its range, or the tables of the optics cannot be read.
+    pub fn new(spec: &TactileSpec) -> Result<Self, TactileSensorError> {
         let gel = Gel::new(spec, PadSurface::default())?;
-        let eye = match &spec.optics {
-            OpticsModel::Polynomial => {
-                Eye::Polynomial { optics: Box::new(Optics::mini()?), shadows: spec.shadows }
-            }
-            OpticsModel::Taxim { tables } => Eye::Taxim(Box::new(Taxim::load(tables)?)),
+        let optics = match &spec.optics {
+            OpticsModel::Polynomial => OpticsBackend::Polynomial {
+                optics: Box::new(PolynomialOptics::gelsight_mini()?),
+                shadows: spec.shadows,
+            },
+            OpticsModel::Taxim { tables } => OpticsBackend::Taxim(Box::new(TaximOptics::load(tables)?)),
         };
-        let untouched = Arc::new(eye.picture(&gel, None));
-        Ok(Self { gel, untouched, eye, markers: spec.markers })
+        let untouched_image = Arc::new(optics.render(&gel, None));
+        Ok(Self { gel, untouched_image, optics, markers: spec.markers })
     }
 
-    /// What the sensor sees of a touch.
+    /// Reading of a contact. `scratch` saves allocations and does not influence the result.
     ///
     /// # Errors
-    /// A load or friction that is no number, or a load without a skin over the pad.
-    pub fn see(&self, input: &PadInput, scratch: &mut Scratch) -> Result<Touched, FieldError> {
-        let field = sense(&self.gel, input, scratch)?;
-        let picture = self.eye.picture(&self.gel, field.as_ref());
-        let markers = markers(&self.gel, &self.markers, field.as_ref());
-        Ok(Touched { field, markers, picture })
+    /// A number of the contact is not finite, or a force presses but no skin lies over the pad.
+    pub fn read(
+        &self,
+        contact: &PadContact,
+        scratch: &mut GelScratch,
+    ) -> Result<TactileReading, ContactError> {
+        let field = GelField::solve(&self.gel, contact, scratch)?;
+        let image = self.optics.render(&self.gel, field.as_ref());
+        let markers = Markers::of(&self.gel, &self.markers, field.as_ref());
+        Ok(TactileReading { field, markers, image })
     }
 }
 
-impl Touched {
-    /// The picture with its markers drawn.
+impl TactileReading {
+    /// Copy of the image with the markers drawn in.
     pub fn with_markers(&self, style: MarkerStyle) -> RgbImage {
-        let mut picture = self.picture.clone();
-        draw_markers(&mut picture, &self.markers, style);
-        picture
+        let mut image = self.image.clone();
+        self.markers.draw(&mut image, style);
+        image
     }
 }

@@ -1,29 +1,29 @@
-//! The numbers of a tactile sensor, in one place.
+//! Parameters of a tactile sensor (settings `tactile.*`).
 
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-/// Width and height of a tactile picture, px.
-pub const PICTURE: [usize; 2] = [320, 240];
+/// Width and height of a tactile image, px.
+pub const IMAGE_SIZE: [usize; 2] = [320, 240];
 
-/// A tactile sensor.
+/// Parameters of a tactile sensor; the default is the GelSight Mini of the benchmark.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TactileSpec {
-    /// The gel's material and the grid on which it is solved.
+    /// Material of the gel and the grid on which it is solved.
     pub gel: GelSpec,
-    /// Which part of the pad the camera sees.
-    pub view: View,
-    /// How the picture is made.
+    /// View of the camera.
+    pub view: Pinhole,
+    /// Model of the colour image.
     pub optics: OpticsModel,
-    /// Whether what is pressed into the gel casts shadows in the picture; with the `polynomial` optics alone.
+    /// True to draw cast shadows; with the `polynomial` optics only.
     pub shadows: bool,
-    /// How the markers move.
+    /// Model of the marker motion.
     pub markers: MarkerModel,
 }
 
-/// The gel's material and grid. Its shape is [`crate::robot::PadSurface`].
+/// Material and grid of the gel. Its shape is [`crate::robot::PadSurface`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GelSpec {
@@ -41,49 +41,49 @@ impl Default for GelSpec {
     }
 }
 
-/// The sensor's camera: a pinhole behind the gel's apex that looks out along the pad's +z; image x is the pad's x,
-/// image y (down) the pad's y. See `docs/tactile.md`.
+/// Camera of the sensor: a pinhole behind the apex of the gel that looks out along the pad's +z. Image x (right) is the pad's
+/// x, image y (down) the pad's y; `docs/tactile.md` draws the frames.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct View {
+pub struct Pinhole {
     /// Edge of a pixel on the plane of the apex, m. 0.0634 mm at 320×240 (GelSight's own figure).
     pub pitch: f64,
-    /// Distance of the pinhole behind the apex, m.
+    /// Distance of the pinhole from the apex, m.
     pub lens: f64,
 }
 
-impl Default for View {
+impl Default for Pinhole {
     fn default() -> Self {
         Self { pitch: 6.34e-5, lens: 2.6e-2 }
     }
 }
 
-/// How the tactile picture is made.
+/// Model of the colour image.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "model", rename_all = "snake_case", deny_unknown_fields)]
 pub enum OpticsModel {
-    /// A smooth polynomial of the surface's slope and place, fitted to a real GelSight Mini.
+    /// Polynomial of the surface's slope, fitted to a real GelSight Mini ([`super::PolynomialOptics`]).
     #[default]
     Polynomial,
-    /// The pipeline of Taxim (Si & Yuan, RA-L 2022) with the tables of a folder.
+    /// Pipeline of Taxim (Si & Yuan, RA-L 2022) with calibration tables of the user ([`super::TaximOptics`]).
     Taxim {
         /// Folder with `polycalib.npz` and `dataPack.npz`.
         tables: PathBuf,
     },
 }
 
-/// How the markers move.
+/// Model of the marker motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "model", rename_all = "snake_case", deny_unknown_fields)]
 pub enum MarkerModel {
-    /// With the gel's surface, seen through the sensor's pinhole.
+    /// Markers move with the surface of the gel and are seen through the pinhole.
     #[default]
     Elastic,
-    /// By the law of FOTS (Zhao et al., arXiv 2404.19217).
+    /// Markers move by the law of FOTS (Zhao et al., arXiv 2404.19217).
     Fots(FotsSpec),
 }
 
-/// The constants of FOTS's marker law.
+/// Constants of the marker law of FOTS.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FotsSpec {
@@ -93,9 +93,9 @@ pub struct FotsSpec {
     pub shear: f64,
     /// Decay of the twist, 1/px².
     pub twist: f64,
-    /// Pixels a millimetre.
+    /// Pixels per millimetre.
     pub scale: f64,
-    /// Factor on the heights, mm: 1 in FOTS, 0.1 in the port that SoftVTBench uses.
+    /// Factor on the depths in mm: 1 in FOTS, 0.1 in the port that SoftVTBench uses.
     pub height_factor: f64,
 }
 
@@ -105,23 +105,23 @@ impl Default for FotsSpec {
     }
 }
 
-/// A number of a tactile sensor out of its range.
+/// A parameter of a tactile sensor out of its range.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("tactile.{field}: expected {expected}, got {value}")]
 pub struct TactileSpecError {
-    /// Path of the field.
+    /// Path of the parameter below `tactile`.
     pub field: &'static str,
-    /// Its value.
+    /// Value given.
     pub value: String,
-    /// What it may be.
+    /// Description of the valid range.
     pub expected: &'static str,
 }
 
 impl TactileSpec {
-    /// Checks that every number is in its range.
+    /// Checks the range of every parameter.
     ///
     /// # Errors
-    /// Names the first field that is not, its value and the range.
+    /// Names the first parameter out of its range, its value and the range.
     pub fn validate(&self) -> Result<(), TactileSpecError> {
         let (gel, view) = (&self.gel, &self.view);
         let between = |field, value: f64, low: f64, high: f64, expected| {
@@ -137,7 +137,7 @@ impl TactileSpec {
         between("view.pitch", view.pitch, 1e-5, 2e-4, "m in 1e-5..2e-4")?;
         between("view.lens", view.lens, 5e-3, 1.0, "m in 0.005..1")?;
         if self.shadows && self.optics != OpticsModel::Polynomial {
-            let expected = "false with the model \"taxim\", whose pictures have no shadows";
+            let expected = "false with the model \"taxim\", whose images have no shadows";
             return Err(TactileSpecError { field: "shadows", value: "true".into(), expected });
         }
         if let MarkerModel::Fots(fots) = &self.markers {
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn models_are_chosen_by_name() {
+    fn models_are_selected_by_name() {
         let text = r#"{ "optics": { "model": "taxim", "tables": "x" }, "markers": { "model": "fots", "scale": 15.77 } }"#;
         let spec: TactileSpec = serde_json::from_str(text).expect("valid");
         assert_eq!(spec.optics, OpticsModel::Taxim { tables: "x".into() });

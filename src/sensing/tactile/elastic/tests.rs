@@ -1,14 +1,28 @@
-//! The gel field against an independent axisymmetric finite-element solution of the same layer (sphere of 4 mm on a flat
-//! 4 mm layer, ν 0.475, μ 0.145 MPa; shear and twist of a stuck disc of 1.5 mm), and against the rules it must keep. How deep
-//! the sphere goes and how far it moves the surface outwards is in `tests/validation/gel.rs`.
+//! Gel field against an independent axisymmetric finite-element solution of the same layer, and against its invariants.
+//!
+//! The reference is a sphere of 4 mm on a flat layer (4 mm, ν 0.475, μ 0.145 MPa), and shear and twist of a stuck disc of
+//! 1.5 mm. Depth and outward displacement of the sphere are checked in `tests/validation/gel.rs`.
 
 use super::{
-    FieldError, Gel, GelField, PadInput, PadLoad, Scratch, Surface, TactileSpec, Taxels,
-    gel::Kernels,
-    sense,
-    shear::{self, Dragged},
+    super::spec::TactileSpec,
+    ContactError, Gel, GelField, GelScratch, PadContact, PadWrench, SkinMesh, cubic_taps,
+    gel::LayerKernels,
+    gel_field::surface_displacement,
+    tangential_contact::{TangentialLoad, TangentialSolution, solve_tangential_contact},
 };
 use crate::{geometry::Vec3, robot::PadSurface};
+
+/// Vertices and triangles of a skin in the pad frame.
+pub(in super::super) struct TestSkin {
+    pub(in super::super) vertices: Vec<Vec3>,
+    pub(in super::super) triangles: Vec<[u32; 3]>,
+}
+
+impl TestSkin {
+    pub(in super::super) fn mesh(&self) -> SkinMesh<'_> {
+        SkinMesh { vertices: &self.vertices, triangles: &self.triangles }
+    }
+}
 
 /// Radius of the sphere, m.
 const SPHERE: f64 = 4e-3;
@@ -21,8 +35,8 @@ fn gel(pad: PadSurface) -> Gel {
     Gel::new(&TactileSpec::default(), pad).expect("default numbers")
 }
 
-/// The graph z = f(x, y), looking down at the pad, as triangles of edge `step` over a square of half width `half`.
-pub(super) fn graph(half: f64, step: f64, f: impl Fn(f64, f64) -> f64) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+/// Graph z = f(x, y), facing the pad, as triangles of edge `step` over a square of half width `half`.
+pub(in super::super) fn graph(half: f64, step: f64, f: impl Fn(f64, f64) -> f64) -> TestSkin {
     let n = (2.0 * half / step).ceil() as u32;
     let at = |i: u32| -half + 2.0 * half * f64::from(i) / f64::from(n);
     let vertices = (0..=n).flat_map(|j| (0..=n).map(move |i| (at(i), at(j))));
@@ -35,59 +49,60 @@ pub(super) fn graph(half: f64, step: f64, f: impl Fn(f64, f64) -> f64) -> (Vec<V
             [[a, c, b], [a, d, c]]
         })
         .collect();
-    (vertices, triangles)
+    TestSkin { vertices, triangles }
 }
 
-fn sphere(at: [f64; 2]) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+fn sphere(at: [f64; 2]) -> TestSkin {
     graph(12e-3, 1e-4, |x, y| {
         let r2 = (x - at[0]).powi(2) + (y - at[1]).powi(2);
         r2 / (2.0 * SPHERE)
     })
 }
 
-pub(super) fn touch(gel: &Gel, skin: &(Vec<Vec3>, Vec<[u32; 3]>), load: PadLoad) -> GelField {
-    let surfaces = [Surface { vertices: &skin.0, triangles: &skin.1 }];
-    let input = PadInput { load, surfaces: &surfaces, friction: 1.5, give: None };
-    sense(gel, &input, &mut Scratch::default()).expect("a good touch").expect("a force")
+/// Field of one skin pressed by `wrench`, with friction 1.5.
+pub(in super::super) fn touch(gel: &Gel, skin: &TestSkin, wrench: PadWrench) -> GelField {
+    let contact = PadContact { wrench, skins: &[skin.mesh()], friction: 1.5, substrate: None };
+    GelField::solve(gel, &contact, &mut GelScratch::default()).expect("a good contact").expect("a force")
 }
 
 #[test]
 fn the_surface_bulges_around_a_press_as_in_the_reference() {
     let gel = gel(flat());
-    let field = touch(&gel, &sphere([0.0; 2]), PadLoad::new(0.81625, [0.0; 2], 0.0, [0.0; 2]));
+    let field = touch(&gel, &sphere([0.0; 2]), PadWrench::new(0.81625, [0.0; 2], 0.0, [0.0; 2]));
     for (r, u) in
         [(0.0, -0.5e-3), (1e-3, -0.373e-3), (2e-3, -0.084e-3), (3e-3, -0.01244e-3), (5e-3, 0.01029e-3)]
     {
-        let found = field.at(&gel, r, 0.0)[2];
+        let found = field.displacement_at(&gel, r, 0.0)[2];
         assert!((found - u).abs() < 0.05 * 0.5e-3, "r {r}: {found:e}, reference {u:e}");
     }
 }
 
-/// A disc of radius 1.5 mm, stuck, moved by `load` (N, N, N m).
-fn disc(gel: &Gel, load: Vec3) -> (Dragged, impl Fn(f64, f64) -> [f64; 2]) {
-    let inside = |c: usize| {
+/// Stuck disc of radius 1.5 mm under a tangential load, and the tangential displacement at a point.
+fn disc(gel: &Gel, load: TangentialLoad) -> (TangentialSolution, impl Fn(f64, f64) -> [f64; 2]) {
+    let is_inside = |c: usize| {
         let [x, y] = gel.centre(c);
         x.hypot(y) < 1.5e-3
     };
-    let pressure: Vec<f32> = (0..gel.columns * gel.rows).map(|c| if inside(c) { 1e5 } else { 0.0 }).collect();
-    let mut scratch = Scratch::default();
+    let pressure: Vec<f32> =
+        (0..gel.columns * gel.rows).map(|c| if is_inside(c) { 1e5 } else { 0.0 }).collect();
+    let mut scratch = GelScratch::default();
     scratch.fit(gel);
-    let dragged = shear::drag(gel, &pressure, &load, 1e6, &mut scratch);
-    let none = vec![0.0; pressure.len()];
-    let u = super::field::displace(gel, &none, &dragged.traction, &mut scratch);
+    let solution = solve_tangential_contact(gel, &pressure, &load, 1e6, &mut scratch);
+    let zeros = vec![0.0; pressure.len()];
+    let u = surface_displacement(gel, &zeros, &solution.traction, &mut scratch);
     let (columns, rows, cell) = (gel.columns, gel.rows, gel.cell);
     let at = move |x: f64, y: f64| {
-        let (i, wx) = super::field::taps(x / cell + 0.5 * (columns - 1) as f64);
-        let (j, wy) = super::field::taps(y / cell + 0.5 * (rows - 1) as f64);
+        let tx = cubic_taps(x / cell + 0.5 * (columns - 1) as f64);
+        let ty = cubic_taps(y / cell + 0.5 * (rows - 1) as f64);
         [0, 1].map(|d| {
             let row = |b: usize| {
-                let from = (j + b as isize) as usize * columns + i as usize;
-                (0..4).map(|a| wx[a] * f64::from(u[d][from + a])).sum::<f64>()
+                let from = (ty.first + b as isize) as usize * columns + tx.first as usize;
+                (0..4).map(|a| tx.weights[a] * f64::from(u[d][from + a])).sum::<f64>()
             };
-            (0..4).map(|b| wy[b] * row(b)).sum()
+            (0..4).map(|b| ty.weights[b] * row(b)).sum()
         })
     };
-    (dragged, at)
+    (solution, at)
 }
 
 fn fine() -> Gel {
@@ -99,8 +114,8 @@ fn fine() -> Gel {
 #[test]
 fn a_sheared_disc_moves_its_surroundings_as_in_the_reference() {
     let gel = fine();
-    let (dragged, u) = disc(&gel, Vec3::new(1.3513814, 0.0, 0.0));
-    assert!((dragged.motion.x / 1e-3 - 1.0).abs() < 0.02, "stiffness: moved {:e}", dragged.motion.x);
+    let (solution, u) = disc(&gel, TangentialLoad { force: [1.3513814, 0.0], moment: 0.0 });
+    assert!((solution.motion.x / 1e-3 - 1.0).abs() < 0.02, "stiffness: moved {:e}", solution.motion.x);
     for (r, along, across) in
         [(2e-3, 0.585012, 0.34868), (4e-3, 0.225487, 0.059259), (6e-3, 0.123558, 0.013237)]
     {
@@ -112,8 +127,8 @@ fn a_sheared_disc_moves_its_surroundings_as_in_the_reference() {
 #[test]
 fn a_twisted_disc_moves_its_surroundings_as_in_the_reference_and_antisymmetrically() {
     let gel = fine();
-    let (dragged, u) = disc(&gel, Vec3::new(0.0, 0.0, 2.6354775e-3));
-    assert!((dragged.motion.z - 1.0).abs() < 0.02, "stiffness: turned {}", dragged.motion.z);
+    let (solution, u) = disc(&gel, TangentialLoad { force: [0.0; 2], moment: 2.6354775e-3 });
+    assert!((solution.motion.angle - 1.0).abs() < 0.02, "stiffness: turned {}", solution.motion.angle);
     for (r, turn) in [(2e-3, 0.444175), (3e-3, 0.16291), (4e-3, 0.080892), (6e-3, 0.026719)] {
         let found = u(r, 0.0)[1] / 1e-3;
         assert!((found - turn).abs() < 0.05 * 1.5, "r {r}: {found}, reference {turn}");
@@ -123,36 +138,36 @@ fn a_twisted_disc_moves_its_surroundings_as_in_the_reference_and_antisymmetrical
 }
 
 #[test]
-fn the_tractions_sum_up_to_the_solvers_load_within_friction() {
+fn the_tractions_integrate_to_the_solvers_wrench_within_friction() {
     let gel = gel(PadSurface::default());
     let ridges = graph(12e-3, 2e-4, |x, y| 3e-4 * (1.0 - (x * 2000.0).cos()) + 0.01 * x + y * y / 0.2);
     for (normal, shear, twist) in
         [(2.0, [0.0, 0.0], 0.0), (0.3, [0.3, -0.2], 4e-4), (12.0, [-3.0, 8.0], -2e-2)]
     {
-        let load = PadLoad::new(normal, shear, twist, [0.0; 2]);
-        let field = touch(&gel, &ridges, load);
-        let found = PadLoad::of_field(&gel, &field);
-        assert!((found.force - load.force).norm() < 1e-9 * normal, "{found:?} {load:?}");
-        assert!((found.moment.z - load.moment.z).abs() < 1e-12, "{found:?} {load:?}");
+        let wrench = PadWrench::new(normal, shear, twist, [0.0; 2]);
+        let field = touch(&gel, &ridges, wrench);
+        let found = field.wrench(&gel);
+        assert!((found.force - wrench.force).norm() < 1e-9 * normal, "{found:?} {wrench:?}");
+        assert!((found.moment.z - wrench.moment.z).abs() < 1e-12, "{found:?} {wrench:?}");
         for c in 0..field.pressure.len() {
             let size = field.shear[0][c].hypot(field.shear[1][c]);
             let bound = 1.5 * field.friction_excess * field.pressure[c];
             assert!(field.pressure[c] >= 0.0 && size <= 1.06 * bound + 1.0, "cell {c}: {size} {bound}");
         }
-        let taxels = Taxels::of_field(&gel, &field, [12, 10]);
+        let taxels = field.taxels(&gel, [12, 10]);
         assert!((taxels.normal_force() - normal).abs() < 1e-9 * normal);
     }
 }
 
 #[test]
-fn what_the_pair_holds_is_held_and_what_it_does_not_hold_slips() {
+fn a_load_within_friction_is_held_and_one_beyond_it_slips() {
     let gel = gel(PadSurface::default());
     let skin = graph(3e-3, 2e-4, |_, _| 0.0);
-    let surfaces = [Surface { vertices: &skin.0, triangles: &skin.1 }];
+    let skins = [skin.mesh()];
     let field = |shear: f64, friction: f64| {
-        let load = PadLoad::new(2.0, [-shear, 0.0], 0.0, [0.0; 2]);
-        let input = PadInput { load, surfaces: &surfaces, friction, give: None };
-        sense(&gel, &input, &mut Scratch::default()).expect("a good touch").expect("a force")
+        let wrench = PadWrench::new(2.0, [-shear, 0.0], 0.0, [0.0; 2]);
+        let contact = PadContact { wrench, skins: &skins, friction, substrate: None };
+        GelField::solve(&gel, &contact, &mut GelScratch::default()).expect("a good contact").expect("a force")
     };
     let slips = |field: &GelField, mu: f64| {
         let cells = (0..field.pressure.len()).filter(|&c| field.pressure[c] > 0.0);
@@ -169,7 +184,7 @@ fn what_the_pair_holds_is_held_and_what_it_does_not_hold_slips() {
     let (rough, pad) = (field(2.3, 2.0), field(2.3, 1.5));
     assert_eq!([rough.friction_excess, pad.friction_excess], [1.0, 1.0]);
     let (few, many) = (slips(&rough, 2.0), slips(&pad, 1.5));
-    assert!(many > few + 0.05 && pad.motion.x < rough.motion.x, "{few} {many}");
+    assert!(many > few + 0.05 && pad.stick_motion.x < rough.stick_motion.x, "{few} {many}");
     // Without friction there is no shear to hold.
     let smooth = field(0.0, 0.0);
     assert!(smooth.friction_excess == 1.0 && smooth.shear[0].iter().all(|&t| t.abs() < 1e-6));
@@ -179,47 +194,50 @@ fn what_the_pair_holds_is_held_and_what_it_does_not_hold_slips() {
 fn ridges_stand_out_in_the_touched_surface() {
     let gel = gel(PadSurface::default());
     let ridges = graph(12e-3, 1e-4, |x, _| 2e-4 * (1.0 - (x * std::f64::consts::TAU / 3e-3).cos()));
-    let field = touch(&gel, &ridges, PadLoad::new(3.0, [0.0; 2], 0.0, [0.0; 2]));
-    let (crest, valley) = (field.at(&gel, 0.0, 0.0)[2], field.at(&gel, 1.5e-3, 0.0)[2]);
+    let field = touch(&gel, &ridges, PadWrench::new(3.0, [0.0; 2], 0.0, [0.0; 2]));
+    let (crest, valley) =
+        (field.displacement_at(&gel, 0.0, 0.0)[2], field.displacement_at(&gel, 1.5e-3, 0.0)[2]);
     assert!(valley - crest > 5e-5, "crest {crest:e}, valley {valley:e}");
 }
 
 #[test]
-fn the_field_is_the_same_bytes_whatever_the_scratch_was_used_for() {
+fn the_field_does_not_depend_on_earlier_uses_of_the_scratch() {
     let gel = gel(PadSurface::default());
     let skin = sphere([1e-3, -5e-4]);
-    let surfaces = [Surface { vertices: &skin.0, triangles: &skin.1 }];
-    let input = |f| PadInput {
-        load: PadLoad::new(f, [0.1 * f, 0.0], 0.0, [0.0; 2]),
-        surfaces: &surfaces,
+    let skins = [skin.mesh()];
+    let contact = |f| PadContact {
+        wrench: PadWrench::new(f, [0.1 * f, 0.0], 0.0, [0.0; 2]),
+        skins: &skins,
         friction: 1.5,
-        give: None,
+        substrate: None,
     };
-    let mut used = Scratch::default();
-    sense(&gel, &input(3.0), &mut used).expect("good");
-    let again = sense(&gel, &input(1.0), &mut used).expect("good").expect("touch");
-    let fresh = sense(&gel, &input(1.0), &mut Scratch::default()).expect("good").expect("touch");
+    let mut used = GelScratch::default();
+    GelField::solve(&gel, &contact(3.0), &mut used).expect("good");
+    let again = GelField::solve(&gel, &contact(1.0), &mut used).expect("good").expect("touch");
+    let fresh = GelField::solve(&gel, &contact(1.0), &mut GelScratch::default());
+    let fresh = fresh.expect("good").expect("touch");
     assert_eq!((again.pressure, again.displacement), (fresh.pressure, fresh.displacement));
 }
 
 #[test]
-fn bad_touches_are_named_and_no_force_is_no_touch() {
+fn bad_contacts_are_named_and_no_force_is_no_contact() {
     let gel = gel(PadSurface::default());
-    let run = |load, friction| {
-        sense(&gel, &PadInput { load, surfaces: &[], friction, give: None }, &mut Scratch::default())
+    let run = |wrench, friction| {
+        let contact = PadContact { wrench, skins: &[], friction, substrate: None };
+        GelField::solve(&gel, &contact, &mut GelScratch::default())
     };
-    assert!(run(PadLoad::default(), 1.5).expect("no force").is_none());
-    let pressed = PadLoad::new(1.0, [0.0; 2], 0.0, [0.0; 2]);
+    assert!(run(PadWrench::default(), 1.5).expect("no force").is_none());
+    let pressed = PadWrench::new(1.0, [0.0; 2], 0.0, [0.0; 2]);
     let error = run(pressed, 1.5).expect_err("no skin");
-    assert_eq!(error, FieldError::NothingThere { force: 1.0, surfaces: 0 });
-    assert!(run(PadLoad::new(f64::NAN, [0.0; 2], 0.0, [0.0; 2]), 1.5).is_err());
+    assert_eq!(error, ContactError::NoSkin { force: 1.0, skins: 0 });
+    assert!(run(PadWrench::new(f64::NAN, [0.0; 2], 0.0, [0.0; 2]), 1.5).is_err());
     let message = run(pressed, -0.1).expect_err("no friction").to_string();
     assert_eq!(message, "the pad's friction is -0.1; expected a finite number of at least 0");
 }
 
 #[test]
 fn kernels_are_finite() {
-    let Kernels { normal, inline, coupling, .. } = &gel(PadSurface::default()).kernels;
-    let all = [normal].into_iter().chain(inline).chain(coupling);
+    let LayerKernels { normal, tangential, coupling, .. } = &gel(PadSurface::default()).kernels;
+    let all = [normal].into_iter().chain(tangential).chain(coupling);
     assert!(all.flatten().all(|value| value.is_finite()) && normal.iter().all(|&n| n > 0.0));
 }

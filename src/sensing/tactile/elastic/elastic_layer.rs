@@ -1,4 +1,4 @@
-//! An elastic layer bonded to a rigid base, in Fourier space.
+//! Elastic layer bonded to a rigid base, in Fourier space.
 //!
 //! For one wave number k the plane-strain problem of the layer has four unknowns and a closed form (Johnson, *Contact
 //! Mechanics*, 1985, §5.8, for the normal part; O'Sullivan & King, J. Tribology 110 (1988) 235, for the method). With
@@ -12,51 +12,51 @@
 //! m changes its sign near α = 2: long waves of pressure squeeze a nearly incompressible layer outwards, where a half
 //! space is drawn inwards.
 
-/// The layer's material and thickness.
+/// Material and thickness of the layer.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Layer {
+pub(super) struct ElasticLayer {
     /// Shear modulus μ, Pa.
-    pub shear_modulus: f64,
+    pub(super) shear_modulus: f64,
     /// Poisson's ratio ν.
-    pub poisson: f64,
+    pub(super) poisson: f64,
     /// Thickness h, m.
-    pub thickness: f64,
+    pub(super) thickness: f64,
 }
 
-/// Displacement of the surface a traction of wave number k, m/Pa.
+/// Displacement of the surface per unit of traction at one wave number k, m/Pa.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Response {
+pub(super) struct LayerResponse {
     /// Normal displacement by normal traction.
-    pub normal: f64,
-    /// Along k by shear along k.
-    pub along: f64,
-    /// Across k by shear across k.
-    pub across: f64,
-    /// m: along k by pressure is −i m, outwards by shear along k is −i m.
-    pub coupling: f64,
+    pub(super) normal: f64,
+    /// Displacement along k by shear along k.
+    pub(super) longitudinal: f64,
+    /// Displacement across k by shear across k.
+    pub(super) transverse: f64,
+    /// m of the module: displacement along k by pressure is −i m, outwards by shear along k is −i m.
+    pub(super) coupling: f64,
 }
 
-/// Beyond this α the base is not felt (e⁻⁴⁰) and the hyperbolic functions would overflow.
-const DEEP: f64 = 20.0;
+/// α beyond which the base has no influence (e⁻⁴⁰) and the hyperbolic functions would overflow.
+const MAX_ALPHA: f64 = 20.0;
 
-impl Layer {
-    /// The response to wave number `k`, 1/m.
-    pub(super) fn response(&self, k: f64) -> Response {
+impl ElasticLayer {
+    /// Response at wave number `k`, 1/m.
+    pub(super) fn response(&self, k: f64) -> LayerResponse {
         let (nu, mu, h) = (self.poisson, self.shear_modulus, self.thickness);
         if k * h < 1e-6 {
             let normal = h * (1.0 - 2.0 * nu) / (2.0 * mu * (1.0 - nu));
-            return Response { normal, along: h / mu, across: h / mu, coupling: 0.0 };
+            return LayerResponse { normal, longitudinal: h / mu, transverse: h / mu, coupling: 0.0 };
         }
-        let alpha = (k * h).min(DEEP);
+        let alpha = (k * h).min(MAX_ALPHA);
         let kappa = 3.0 - 4.0 * nu;
         let cosh = (2.0 * alpha).cosh();
         let sinh = (2.0 * alpha).sinh();
         let d = 2.0 * kappa * cosh + 4.0 * alpha * alpha + 1.0 + kappa * kappa;
         let scale = (1.0 - nu) / (mu * k);
-        Response {
+        LayerResponse {
             normal: scale * (2.0 * kappa * sinh - 4.0 * alpha) / d,
-            along: scale * (2.0 * kappa * sinh + 4.0 * alpha) / d,
-            across: alpha.tanh() / (mu * k),
+            longitudinal: scale * (2.0 * kappa * sinh + 4.0 * alpha) / d,
+            transverse: alpha.tanh() / (mu * k),
             coupling: (4.0 * alpha * alpha - 2.0 * kappa * (1.0 - 2.0 * nu) * (cosh - 1.0))
                 / (2.0 * mu * k * d),
         }
@@ -69,7 +69,7 @@ mod tests {
 
     use super::*;
 
-    /// Displacements (U, W) and their slopes (U', W') of one of the four solutions u_x = i U e^{ikx}, u_z = W e^{ikx}.
+    /// Displacements (U, W) and their derivatives (U', W') of one of the four solutions u_x = i U e^{ikx}, u_z = W e^{ikx}.
     fn solution(which: usize, k: f64, z: f64, kappa: f64) -> [f64; 4] {
         let (up, down) = ((k * z).exp(), (-k * z).exp());
         match which {
@@ -81,7 +81,7 @@ mod tests {
     }
 
     /// (U, W) at the surface by solving the boundary conditions numerically.
-    fn solved(layer: &Layer, k: f64, shear: f64, normal: f64) -> [f64; 2] {
+    fn solved(layer: &ElasticLayer, k: f64, shear: f64, normal: f64) -> [f64; 2] {
         let (nu, mu, h) = (layer.poisson, layer.shear_modulus, layer.thickness);
         let (kappa, lambda) = (3.0 - 4.0 * nu, 2.0 * mu * nu / (1.0 - 2.0 * nu));
         let mut matrix = Matrix4::zeros();
@@ -99,12 +99,12 @@ mod tests {
 
     #[test]
     fn the_closed_form_solves_the_layers_boundary_value_problem() {
-        let layer = Layer { shear_modulus: 0.145, poisson: 0.475, thickness: 4.0 };
+        let layer = ElasticLayer { shear_modulus: 0.145, poisson: 0.475, thickness: 4.0 };
         for k in [0.02, 0.1, 0.3, 0.7, 1.0, 2.0, 3.0] {
             let found = layer.response(k);
             let (shear, normal) = (solved(&layer, k, 1.0, 0.0), solved(&layer, k, 0.0, 1.0));
             for (a, b) in [
-                (found.along, shear[0]),
+                (found.longitudinal, shear[0]),
                 (found.coupling, shear[1]),
                 (found.coupling, normal[0]),
                 (found.normal, normal[1]),
@@ -115,11 +115,13 @@ mod tests {
     }
 
     #[test]
-    fn short_waves_see_a_half_space() {
-        let layer = Layer { shear_modulus: 1.0, poisson: 0.3, thickness: 1.0 };
+    fn the_response_to_short_waves_is_that_of_a_half_space() {
+        let layer = ElasticLayer { shear_modulus: 1.0, poisson: 0.3, thickness: 1.0 };
         let found = layer.response(200.0);
         let half_space = [0.7 / 200.0, 0.7 / 200.0, 1.0 / 200.0, -0.4 / 400.0];
-        for (a, b) in [found.normal, found.along, found.across, found.coupling].into_iter().zip(half_space) {
+        for (a, b) in
+            [found.normal, found.longitudinal, found.transverse, found.coupling].into_iter().zip(half_space)
+        {
             assert!((a / b - 1.0).abs() < 1e-9, "{a} {b}");
         }
     }

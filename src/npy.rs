@@ -1,0 +1,290 @@
+//! NumPy's array files: `.npy` (`numpy.lib.format`) and arrays of an `.npz` archive.
+//!
+//! Read are arrays of integers and floating-point numbers in C order and little endian; written is format 1.0. The crate
+//! `npyz` does the same and more, but brings a second version of `zip`, `pest` and `num-bigint` for what is little here.
+
+use std::{
+    fmt::Write,
+    fs::File,
+    io::{BufReader, Read},
+    path::{Path, PathBuf},
+};
+
+use zip::result::ZipError;
+
+const MAGIC: &[u8] = b"\x93NUMPY";
+/// NumPy starts the data at a multiple of this, bytes.
+const ALIGNMENT: usize = 64;
+
+/// An array in C order (last axis fastest).
+#[derive(Clone, Debug, PartialEq)]
+pub struct NpyArray {
+    /// Element type in NumPy's notation: byte order (`<`, `>`, `|`, `=`), kind and bytes per element, as in `<f4` or `|u1`.
+    pub dtype: String,
+    /// Lengths of the axes, slowest first.
+    pub shape: Vec<usize>,
+    /// Elements, as `dtype` says.
+    pub data: Vec<u8>,
+}
+
+/// Reasons why bytes are not an array that can be read.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs)] // The messages say it.
+pub enum NpyError {
+    #[error("not an .npy array")]
+    Magic,
+    #[error("its header is cut off")]
+    HeaderCutOff,
+    #[error("its header is not text")]
+    HeaderNotText,
+    #[error("is in Fortran order; save it with numpy.ascontiguousarray")]
+    FortranOrder,
+    #[error("of type '{0}'; expected numbers, little endian")]
+    Dtype(String),
+    #[error("its header has no shape")]
+    NoShape,
+    #[error("its shape is not readable")]
+    BadShape,
+    #[error("{bytes} bytes do not fill the shape {shape:?}")]
+    Length { bytes: usize, shape: Vec<usize> },
+}
+
+/// Reasons why an array of an `.npz` archive cannot be read; every message names the file.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs)] // The messages say it.
+pub enum NpzError {
+    #[error("{path}: {source}")]
+    Io { path: PathBuf, source: std::io::Error },
+    #[error("{path}: {what}")]
+    Content { path: PathBuf, what: String },
+}
+
+impl NpyArray {
+    /// Array of bytes, such as an image.
+    pub fn from_bytes(shape: Vec<usize>, data: Vec<u8>) -> Self {
+        Self { dtype: "|u1".to_owned(), shape, data }
+    }
+
+    /// Array of single-precision numbers.
+    pub fn from_f32(shape: Vec<usize>, values: impl IntoIterator<Item = f32>) -> Self {
+        let data = values.into_iter().flat_map(f32::to_le_bytes).collect();
+        Self { dtype: "<f4".to_owned(), shape, data }
+    }
+
+    /// Array of double-precision numbers.
+    pub fn from_f64(shape: Vec<usize>, values: impl IntoIterator<Item = f64>) -> Self {
+        let data = values.into_iter().flat_map(f64::to_le_bytes).collect();
+        Self { dtype: "<f8".to_owned(), shape, data }
+    }
+
+    /// Element type without the byte order: `f4`, `u1`.
+    pub fn kind(&self) -> &str {
+        self.dtype.trim_start_matches(['<', '|', '=', '>'])
+    }
+
+    /// Elements as double-precision numbers; empty if the type is not one that [`element_size`] knows.
+    pub fn values(&self) -> Vec<f64> {
+        let Some(size) = element_size(&self.dtype) else { return Vec::new() };
+        self.data.chunks_exact(size).map(|bytes| decode(&self.dtype, bytes)).collect()
+    }
+
+    /// Contents of an `.npy` file (format 1.0), byte for byte as NumPy writes them.
+    pub fn to_npy(&self) -> Vec<u8> {
+        let shape = match self.shape[..] {
+            [only] => format!("{only},"),
+            _ => self.shape.iter().map(usize::to_string).collect::<Vec<_>>().join(", "),
+        };
+        let mut header =
+            format!("{{'descr': '{}', 'fortran_order': False, 'shape': ({shape}), }}", self.dtype);
+        // Magic, version, length of the header, and the final newline.
+        let length = MAGIC.len() + 2 + 2 + header.len() + 1;
+        let padding = length.next_multiple_of(ALIGNMENT) - length;
+        // Writing into a string cannot fail.
+        let _ = writeln!(header, "{:padding$}", "");
+        let mut bytes = MAGIC.to_vec();
+        bytes.extend([1, 0]);
+        bytes.extend((header.len() as u16).to_le_bytes());
+        bytes.extend(header.as_bytes());
+        bytes.extend(&self.data);
+        bytes
+    }
+
+    /// Parses the contents of an `.npy` file.
+    ///
+    /// # Errors
+    /// The bytes are not an array, or one of another order, type or length than can be read.
+    pub fn parse(bytes: &[u8]) -> Result<Self, NpyError> {
+        let rest = bytes.strip_prefix(MAGIC).ok_or(NpyError::Magic)?;
+        let (version, rest) = rest.split_first_chunk::<2>().ok_or(NpyError::HeaderCutOff)?;
+        let (length, rest) = if version[0] == 1 {
+            let (length, rest) = rest.split_first_chunk::<2>().ok_or(NpyError::HeaderCutOff)?;
+            (usize::from(u16::from_le_bytes(*length)), rest)
+        } else {
+            let (length, rest) = rest.split_first_chunk::<4>().ok_or(NpyError::HeaderCutOff)?;
+            (u32::from_le_bytes(*length) as usize, rest)
+        };
+        let (header, data) = rest.split_at_checked(length).ok_or(NpyError::HeaderCutOff)?;
+        let header = std::str::from_utf8(header).map_err(|_| NpyError::HeaderNotText)?;
+        if header.contains("'fortran_order': True") {
+            return Err(NpyError::FortranOrder);
+        }
+        let dtype = between(header, "'descr': '", "'").unwrap_or_default();
+        let kind = dtype.trim_start_matches(['<', '|', '=']);
+        let size = match kind {
+            "u1" | "i1" => 1,
+            "u2" | "i2" => 2,
+            "i4" | "f4" => 4,
+            "i8" | "f8" => 8,
+            _ => return Err(NpyError::Dtype(kind.to_owned())),
+        };
+        let lengths = between(header, "'shape': (", ")").ok_or(NpyError::NoShape)?;
+        let lengths = lengths.split(',').map(str::trim).filter(|n| !n.is_empty());
+        let shape = lengths.map(|n| n.parse().ok()).collect::<Option<Vec<usize>>>();
+        let shape = shape.ok_or(NpyError::BadShape)?;
+        let expected = shape.iter().try_fold(size, |a: usize, &b| a.checked_mul(b));
+        if expected != Some(data.len()) {
+            return Err(NpyError::Length { bytes: data.len(), shape });
+        }
+        Ok(Self { dtype: dtype.to_owned(), shape, data: data.to_vec() })
+    }
+}
+
+/// Bytes per element of a type in NumPy's notation; `None` if its elements are not real numbers of up to 8 bytes.
+pub fn element_size(dtype: &str) -> Option<usize> {
+    let known = ["f2", "f4", "f8", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8"];
+    let (order, kind) = dtype.split_at_checked(1)?;
+    let size: usize = kind.get(1..)?.parse().ok()?;
+    (matches!(order, "<" | ">" | "|" | "=") && known.contains(&kind)).then_some(size)
+}
+
+/// One element of a type that [`element_size`] knows, from its bytes.
+fn decode(dtype: &str, bytes: &[u8]) -> f64 {
+    let mut word = [0; 8];
+    word[..bytes.len()].copy_from_slice(bytes);
+    if dtype.starts_with('>') {
+        word[..bytes.len()].reverse();
+    }
+    let unsigned = u64::from_le_bytes(word);
+    let unused = 64 - 8 * bytes.len() as u32;
+    match (&dtype[1..2], bytes.len()) {
+        ("f", 2) => half_to_f64(unsigned as u16),
+        ("f", 4) => f64::from(f32::from_bits(unsigned as u32)),
+        ("f", _) => f64::from_bits(unsigned),
+        ("i", _) => ((unsigned << unused) as i64 >> unused) as f64,
+        _ => unsigned as f64,
+    }
+}
+
+/// Value of an IEEE 754 binary16 number.
+fn half_to_f64(bits: u16) -> f64 {
+    let sign = if bits >> 15 == 1 { -1.0 } else { 1.0 };
+    let (exponent, fraction) = (i32::from(bits >> 10 & 31), f64::from(bits & 0x3FF));
+    sign * match exponent {
+        0 => fraction * 2.0_f64.powi(-24),
+        31 if fraction == 0.0 => f64::INFINITY,
+        31 => f64::NAN,
+        _ => (1.0 + fraction / 1024.0) * 2.0_f64.powi(exponent - 15),
+    }
+}
+
+/// Reads the array `key` of the archive at `path`.
+///
+/// # Errors
+/// Names the file and, if the file can be opened, the key.
+pub fn read_npz(path: &Path, key: &str) -> Result<NpyArray, NpzError> {
+    let content = |what: String| NpzError::Content { path: path.into(), what };
+    let file = File::open(path).map_err(|source| NpzError::Io { path: path.into(), source })?;
+    let mut archive = zip::ZipArchive::new(BufReader::new(file))
+        .map_err(|e| content(format!("not an .npz file, so there is no array \"{key}\": {e}")))?;
+    let keys: Vec<String> =
+        archive.file_names().map(|name| name.trim_end_matches(".npy").to_owned()).collect();
+    let mut entry = archive.by_name(&format!("{key}.npy")).map_err(|error| match error {
+        ZipError::FileNotFound => content(format!("no array \"{key}\"; the file has: {}", keys.join(", "))),
+        error => content(format!("array \"{key}\": {error}")),
+    })?;
+    let mut bytes = Vec::new();
+    entry
+        .read_to_end(&mut bytes)
+        .map_err(|e| content(format!("array \"{key}\": cannot be read to its end: {e}")))?;
+    NpyArray::parse(&bytes).map_err(|e| content(format!("array \"{key}\": {e}")))
+}
+
+/// Reads the array `key` of the archive at `path`, which must be of one of the types `kinds` (without byte order) and have
+/// finite elements.
+///
+/// # Errors
+/// As [`read_npz`], or names the type, or the first element that is not finite.
+pub fn read_npz_of(path: &Path, key: &str, kinds: &[&str]) -> Result<NpyArray, NpzError> {
+    let content = |what: String| NpzError::Content { path: path.into(), what };
+    let array = read_npz(path, key)?;
+    if !kinds.contains(&array.kind()) {
+        let expected = kinds.join(" or ");
+        return Err(content(format!("array \"{key}\": expected type {expected}, got {}", array.kind())));
+    }
+    if let Some((at, value)) = array.values().iter().enumerate().find(|(_, value)| !value.is_finite()) {
+        return Err(content(format!("array \"{key}\": entry {at} is {value}; expected a finite number")));
+    }
+    Ok(array)
+}
+
+/// Text between the first `before` and the next `after`.
+fn between<'a>(text: &'a str, before: &str, after: &str) -> Option<&'a str> {
+    let (_, rest) = text.split_once(before)?;
+    rest.split_once(after).map(|(found, _)| found)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use super::*;
+
+    #[test]
+    fn arrays_are_read_and_errors_name_file_and_key() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.npz");
+        let mut zip = zip::ZipWriter::new(File::create(&path).expect("a file"));
+        let options = zip::write::SimpleFileOptions::default();
+        let good = NpyArray { dtype: "<u2".into(), shape: vec![1, 2], data: vec![1, 0, 0, 1] };
+        let odd = NpyArray { dtype: "|O".into(), shape: vec![1], data: vec![0] };
+        for (name, array) in [("good.npy", &good), ("odd.npy", &odd)] {
+            zip.start_file(name, options).expect("an entry");
+            zip.write_all(&array.to_npy()).expect("written");
+        }
+        zip.finish().expect("finished");
+        let array = read_npz(&path, "good").expect("a good array");
+        assert_eq!((&array, array.values()), (&good, vec![1.0, 256.0]));
+        let missing = read_npz(&path, "grad_r").expect_err("no such key").to_string();
+        assert!(missing.contains("a.npz: no array \"grad_r\"; the file has: ") && missing.contains("good"));
+        let odd = read_npz(&path, "odd").expect_err("objects").to_string();
+        assert!(odd.contains("array \"odd\": of type 'O'"), "{odd}");
+        assert!(
+            read_npz(&folder.path().join("b.npz"), "x").expect_err("no file").to_string().contains("b.npz")
+        );
+    }
+
+    #[test]
+    fn arrays_are_written_as_numpy_writes_them() {
+        for (shape, tuple) in [(vec![], "()"), (vec![2], "(2,)"), (vec![2, 3], "(2, 3)")] {
+            let count = shape.iter().product();
+            let array = NpyArray::from_f64(shape, vec![0.5; count]);
+            let bytes = array.to_npy();
+            let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {tuple}, }}");
+            assert!(bytes.starts_with(b"\x93NUMPY\x01\x00v\x00"), "a header of 118 bytes");
+            assert_eq!(&bytes[10..10 + header.len()], header.as_bytes());
+            assert_eq!((bytes[127], bytes.len()), (b'\n', 128 + 8 * count));
+            assert_eq!(NpyArray::parse(&bytes), Ok(array));
+        }
+    }
+
+    #[test]
+    fn broken_arrays_are_named() {
+        let whole = NpyArray::from_f32(vec![2], [1.0, 2.0]).to_npy();
+        assert_eq!(NpyArray::parse(b"hello"), Err(NpyError::Magic));
+        assert_eq!(NpyArray::parse(&whole[..9]), Err(NpyError::HeaderCutOff));
+        let cut_off = NpyArray::parse(&whole[..whole.len() - 1]);
+        assert_eq!(cut_off, Err(NpyError::Length { bytes: 7, shape: vec![2] }));
+        let big_endian = NpyArray { dtype: ">f8".into(), ..NpyArray::from_f64(vec![1], [1.0]) };
+        assert_eq!(NpyArray::parse(&big_endian.to_npy()), Err(NpyError::Dtype(">f8".into())));
+    }
+}

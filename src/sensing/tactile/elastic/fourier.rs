@@ -1,0 +1,156 @@
+//! Convolution on a grid that is zero outside: real two-dimensional Fourier transforms with padding.
+
+use std::sync::Arc;
+
+use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+use rustfft::{Fft, FftPlanner, num_complex::Complex32};
+
+/// Transforms of fields of `columns` × `rows` cells, padded to `width` × `height`.
+///
+/// A spectrum is stored by x frequency: `half_width` = width/2 + 1 blocks of `height` numbers, one per y frequency.
+pub(super) struct PaddedFft {
+    pub(super) columns: usize,
+    pub(super) rows: usize,
+    pub(super) width: usize,
+    pub(super) height: usize,
+    pub(super) half_width: usize,
+    forward_x: Arc<dyn RealToComplex<f32>>,
+    inverse_x: Arc<dyn ComplexToReal<f32>>,
+    forward_y: Arc<dyn Fft<f32>>,
+    inverse_y: Arc<dyn Fft<f32>>,
+}
+
+/// Intermediate results of a transform.
+#[derive(Clone, Debug)]
+pub(super) struct FftBuffers {
+    row: Vec<f32>,
+    row_spectrum: Vec<Complex32>,
+    scratch: Vec<Complex32>,
+}
+
+/// Wave vector of one entry of a spectrum, 1/m.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct WaveVector {
+    /// Angular frequencies along x and y.
+    pub(super) k: [f64; 2],
+    /// The same with the Nyquist frequencies, whose sign is not defined, replaced by 0: for odd kernels.
+    pub(super) odd: [f64; 2],
+}
+
+/// Least multiple of 4 of at least `n` without prime factors above 5; FFTs of these lengths are fast.
+fn fast_length(n: usize) -> usize {
+    let is_smooth = |mut n: usize| {
+        for factor in [2, 3, 5] {
+            while n.is_multiple_of(factor) {
+                n /= factor;
+            }
+        }
+        n == 1
+    };
+    (n..).find(|&n| n % 4 == 0 && is_smooth(n)).unwrap_or(n)
+}
+
+impl PaddedFft {
+    /// Transforms whose periodic images of the field are at least `margin` cells apart.
+    pub(super) fn new(columns: usize, rows: usize, margin: usize) -> Self {
+        let (width, height) = (fast_length(columns + margin), fast_length(rows + margin));
+        let (mut real, mut complex) = (RealFftPlanner::new(), FftPlanner::new());
+        Self {
+            columns,
+            rows,
+            width,
+            height,
+            half_width: width / 2 + 1,
+            forward_x: real.plan_fft_forward(width),
+            inverse_x: real.plan_fft_inverse(width),
+            forward_y: complex.plan_fft_forward(height),
+            inverse_y: complex.plan_fft_inverse(height),
+        }
+    }
+
+    pub(super) fn buffers(&self) -> FftBuffers {
+        let lengths = [
+            self.forward_x.get_scratch_len(),
+            self.inverse_x.get_scratch_len(),
+            self.forward_y.get_inplace_scratch_len(),
+            self.inverse_y.get_inplace_scratch_len(),
+        ];
+        FftBuffers {
+            row: vec![0.0; self.width],
+            row_spectrum: vec![Complex32::default(); self.half_width],
+            scratch: vec![Complex32::default(); lengths.into_iter().max().unwrap_or(0)],
+        }
+    }
+
+    pub(super) fn spectrum(&self) -> Vec<Complex32> {
+        vec![Complex32::default(); self.half_width * self.height]
+    }
+
+    /// Wave vector of the entry at index `ix` along x and `iy` along y, for cells of edge `cell` (m).
+    pub(super) fn wave_vector(&self, ix: usize, iy: usize, cell: f64) -> WaveVector {
+        let step = |n: usize| std::f64::consts::TAU / (n as f64 * cell);
+        let signed = if iy > self.height / 2 { iy as f64 - self.height as f64 } else { iy as f64 };
+        let k = [ix as f64 * step(self.width), signed * step(self.height)];
+        let is_nyquist = [2 * ix == self.width, 2 * iy == self.height];
+        WaveVector { k, odd: [0, 1].map(|axis| if is_nyquist[axis] { 0.0 } else { k[axis] }) }
+    }
+
+    /// Writes the spectrum of `field`. Rows of zeros cost nothing.
+    pub(super) fn forward(&self, field: &[f32], spectrum: &mut [Complex32], buffers: &mut FftBuffers) {
+        let FftBuffers { row: padded, row_spectrum, scratch } = buffers;
+        spectrum.fill(Complex32::default());
+        for (j, row) in field.chunks_exact(self.columns).enumerate() {
+            if row.iter().all(|&value| value == 0.0) {
+                continue;
+            }
+            padded[..self.columns].copy_from_slice(row);
+            padded[self.columns..].fill(0.0);
+            // This fails only for lengths other than those of the plan.
+            let _ = self.forward_x.process_with_scratch(padded, row_spectrum, scratch);
+            for (i, value) in row_spectrum.iter().enumerate() {
+                spectrum[i * self.height + j] = *value;
+            }
+        }
+        self.forward_y.process_with_scratch(spectrum, scratch);
+    }
+
+    /// Writes the field of a spectrum, scaled by `width · height`. The spectrum is overwritten.
+    pub(super) fn inverse(&self, spectrum: &mut [Complex32], field: &mut [f32], buffers: &mut FftBuffers) {
+        let FftBuffers { row: padded, row_spectrum, scratch } = buffers;
+        self.inverse_y.process_with_scratch(spectrum, scratch);
+        for (j, row) in field.chunks_exact_mut(self.columns).enumerate() {
+            for (i, value) in row_spectrum.iter_mut().enumerate() {
+                *value = spectrum[i * self.height + j];
+            }
+            row_spectrum[0].im = 0.0;
+            row_spectrum[self.half_width - 1].im = 0.0;
+            let _ = self.inverse_x.process_with_scratch(row_spectrum, padded, scratch);
+            row.copy_from_slice(&padded[..self.columns]);
+        }
+    }
+}
+
+impl std::fmt::Debug for PaddedFft {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "PaddedFft({} × {} in {} × {})", self.columns, self.rows, self.width, self.height)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_inverse_of_a_transform_is_the_field() {
+        let fft = PaddedFft::new(10, 7, 5);
+        assert_eq!((fft.width, fft.height), (16, 12));
+        let field: Vec<f32> = (0..70).map(|i| (i as f32 * 0.7).sin()).collect();
+        let (mut spectrum, mut buffers) = (fft.spectrum(), fft.buffers());
+        fft.forward(&field, &mut spectrum, &mut buffers);
+        let mut back = vec![0.0; 70];
+        fft.inverse(&mut spectrum, &mut back, &mut buffers);
+        for (a, b) in field.iter().zip(&back) {
+            assert!((a - b / (16.0 * 12.0)).abs() < 1e-6);
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! The gel: grid over the pad and response of its surface to tractions, computed once for all fingers and frames.
+
+use rustfft::num_complex::Complex32;
+
+use super::{
+    super::spec::{Pinhole, TactileSpec, TactileSpecError},
+    elastic_layer::ElasticLayer,
+    fourier::{FftBuffers, PaddedFft, WaveVector},
+};
+use crate::robot::PadSurface;
+
+/// Grid over the pad, kernels of the bonded layer and view of the camera: everything that is computed once per sensor.
+///
+/// Cell (i, j) of the grid has its centre at `((i − (columns − 1)/2) cell, (j − (rows − 1)/2) cell)` in the pad frame; arrays
+/// are stored row by row (x fastest). For the elasticity the layer is infinite and flat, since the edges of the pad and its
+/// shallow dome change little under a contact. Contact itself is found on the dome and within the outline.
+#[derive(Debug)]
+pub struct Gel {
+    /// Shape of the pad.
+    pub pad: PadSurface,
+    /// View of the camera.
+    pub view: Pinhole,
+    /// Number of cells along x.
+    pub columns: usize,
+    /// Number of cells along y.
+    pub rows: usize,
+    /// Edge of a cell, m.
+    pub cell: f64,
+    /// Height of the undeformed surface at each cell, m, pad frame; NaN outside the outline.
+    pub(in super::super) dome: Vec<f32>,
+    pub(super) fft: PaddedFft,
+    pub(super) kernels: LayerKernels,
+}
+
+/// Spectra of the layer's response, m/Pa, divided by the size of the transform.
+#[derive(Debug)]
+pub(super) struct LayerKernels {
+    /// Normal displacement by pressure.
+    pub(super) normal: Vec<f32>,
+    /// Tangential displacement by shear: components xx, xy and yy.
+    pub(super) tangential: [Vec<f32>; 3],
+    /// Coupling of both: m k_x/k and m k_y/k ([`super::elastic_layer`]).
+    pub(super) coupling: [Vec<f32>; 2],
+    /// Wave number, 1/m.
+    pub(super) k: Vec<f32>,
+}
+
+/// Intermediate results of one thread; may serve any gel and finger in any order.
+#[derive(Clone, Debug, Default)]
+pub struct GelScratch {
+    pub(super) spectra: [Vec<Complex32>; 4],
+    pub(super) buffers: Option<FftBuffers>,
+    /// Spectrum of the compliance of gel and body in series.
+    pub(super) compliance: Vec<f32>,
+    /// Size of the transform for which the buffers are allocated.
+    pub(super) size: [usize; 2],
+}
+
+impl Gel {
+    /// Computes grid and kernels of the gel of `spec` in the shape of `pad`.
+    ///
+    /// # Errors
+    /// A number of the specification is out of its range.
+    pub fn new(spec: &TactileSpec, pad: PadSurface) -> Result<Self, TactileSpecError> {
+        spec.validate()?;
+        let cell = spec.gel.cell;
+        let count = |length: f64| 2 * (0.5 * length / cell).ceil() as usize;
+        let (columns, rows) = (count(pad.length), count(pad.width));
+        // Periodic images of a contact act on each other only across the full width of the pad: there, one and a half
+        // thicknesses away, a load moves the surface by less than 2 % of its displacement under the load.
+        let fft = PaddedFft::new(columns, rows, (1.5 * pad.thickness / cell).ceil() as usize);
+        let layer = ElasticLayer {
+            shear_modulus: spec.gel.shear_modulus,
+            poisson: spec.gel.poisson,
+            thickness: pad.thickness,
+        };
+        let kernels = LayerKernels::new(&fft, &layer, cell);
+        let mut gel = Self { pad, view: spec.view, columns, rows, cell, dome: Vec::new(), fft, kernels };
+        let is_inside = |at: [f64; 2]| pad.edge_distance(at[0], at[1]) <= 0.0;
+        let height = |at: [f64; 2]| if is_inside(at) { pad.height(at[0], at[1]) as f32 } else { f32::NAN };
+        gel.dome = (0..columns * rows).map(|c| height(gel.centre(c))).collect();
+        Ok(gel)
+    }
+
+    /// Centre (x, y) of the cell at index `c`, m, pad frame.
+    pub fn centre(&self, c: usize) -> [f64; 2] {
+        [self.x(c % self.columns), self.y(c / self.columns)]
+    }
+
+    /// x of the centres of column `i`, m.
+    pub fn x(&self, i: usize) -> f64 {
+        (i as f64 - 0.5 * (self.columns - 1) as f64) * self.cell
+    }
+
+    /// y of the centres of row `j`, m.
+    pub fn y(&self, j: usize) -> f64 {
+        (j as f64 - 0.5 * (self.rows - 1) as f64) * self.cell
+    }
+}
+
+impl LayerKernels {
+    fn new(fft: &PaddedFft, layer: &ElasticLayer, cell: f64) -> Self {
+        let size = fft.half_width * fft.height;
+        let empty = || Vec::with_capacity(size);
+        let mut kernels = Self {
+            normal: empty(),
+            tangential: [empty(), empty(), empty()],
+            coupling: [empty(), empty()],
+            k: empty(),
+        };
+        let scale = 1.0 / (fft.width * fft.height) as f64;
+        for ix in 0..fft.half_width {
+            for iy in 0..fft.height {
+                let WaveVector { k, odd } = fft.wave_vector(ix, iy, cell);
+                let magnitude = k[0].hypot(k[1]);
+                let response = layer.response(magnitude);
+                let unit = if magnitude > 0.0 { k.map(|k| k / magnitude) } else { [0.0; 2] };
+                let odd = if magnitude > 0.0 { odd.map(|k| k / magnitude) } else { [0.0; 2] };
+                let difference = response.longitudinal - response.transverse;
+                let push = |to: &mut Vec<f32>, value: f64| to.push((scale * value) as f32);
+                push(&mut kernels.normal, response.normal);
+                push(&mut kernels.tangential[0], response.transverse + difference * unit[0] * unit[0]);
+                push(&mut kernels.tangential[1], difference * odd[0] * odd[1]);
+                push(&mut kernels.tangential[2], response.transverse + difference * unit[1] * unit[1]);
+                push(&mut kernels.coupling[0], response.coupling * odd[0]);
+                push(&mut kernels.coupling[1], response.coupling * odd[1]);
+                kernels.k.push(magnitude as f32);
+            }
+        }
+        kernels
+    }
+}
+
+impl GelScratch {
+    /// Allocates the buffers for `gel`, unless they have its size already.
+    pub(super) fn fit(&mut self, gel: &Gel) {
+        let size = [gel.fft.width, gel.fft.height];
+        if self.buffers.is_none() || self.size != size {
+            self.spectra = std::array::from_fn(|_| gel.fft.spectrum());
+            self.buffers = Some(gel.fft.buffers());
+            self.size = size;
+        }
+    }
+}

@@ -1,0 +1,314 @@
+//! Gel field: pressure, shear and displacement of the gel's surface under a contact.
+
+use rustfft::num_complex::Complex32;
+
+use super::{
+    gel::{Gel, GelScratch},
+    height_map::{HeightMap, SUBCELLS, SkinMesh},
+    normal_contact::solve_normal_contact,
+    pad_wrench::{PadWrench, Taxels},
+    tangential_contact::{
+        PlanarMotion, TangentialLoad, apply_shear_kernel, solve_tangential_contact, spring_stiffness,
+    },
+};
+use crate::geometry::{Mat3, Vec3};
+
+/// Contact of bodies with a pad: the input of [`GelField::solve`].
+#[derive(Clone, Copy, Debug)]
+pub struct PadContact<'a> {
+    /// Force and moment on the gel, from the solver.
+    pub wrench: PadWrench,
+    /// Surfaces of the touching bodies.
+    pub skins: &'a [SkinMesh<'a>],
+    /// Coefficient of friction of gel and bodies, the bound of shear over pressure; see [`super::patch_friction`].
+    pub friction: f64,
+    /// Compliance of the touching body in series with the gel; `None` presses its surface in unchanged, like a rigid stamp.
+    pub substrate: Option<SubstrateCompliance>,
+}
+
+/// Compliance of a soft body in waves too short for its finite elements: an elastic half space for waves shorter than
+/// `resolved`. Longer waves are in the deformed surface already. (Johnson, *Contact Mechanics*, 1985, §4.2.)
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SubstrateCompliance {
+    /// Plane-strain modulus E/(1 − ν²) of the body, Pa.
+    pub modulus: f64,
+    /// Shortest wavelength that the body's mesh resolves, m.
+    pub resolved: f64,
+}
+
+/// Gel under a contact; arrays are over the cells of [`Gel`], row by row.
+#[derive(Clone, Debug)]
+pub struct GelField {
+    /// Pressure on the gel, Pa; integrates to the normal force of the wrench.
+    pub pressure: Vec<f64>,
+    /// Shear traction on the gel along x and y, Pa; integrates to the shear force and the moment about z of the wrench.
+    pub shear: [Vec<f64>; 2],
+    /// Displacement of the gel's surface along x, y, z, m, pad frame.
+    pub displacement: [Vec<f32>; 3],
+    /// Rigid approach of the skins from their given position, m; negative if they were pulled back.
+    pub approach: f64,
+    /// Rigid motion of the sticking part of the contact.
+    pub stick_motion: PlanarMotion,
+    /// Ratio of the friction that the shear needs to the friction given: 1, or more where friction could not hold the load.
+    pub friction_excess: f64,
+    /// True if the skins keep their shape also below the size of a cell.
+    pub(in super::super) has_rigid_skin: bool,
+    /// The skins in their final position.
+    pub(in super::super) height_map: HeightMap,
+}
+
+/// Reasons why a contact has no field.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs)] // The messages say it.
+pub enum ContactError {
+    #[error("the pad is pressed with {force} N, but no skin of the {skins} given lies over it")]
+    NoSkin { force: f64, skins: usize },
+    #[error("the pad's {field} is {value}; expected a finite number{condition}")]
+    BadNumber { field: &'static str, value: f64, condition: &'static str },
+}
+
+impl GelField {
+    /// Solves a contact; `None`, at no cost, if nothing presses.
+    ///
+    /// The skins are pressed in until the pressure carries the normal force of the wrench; then the shear is found that
+    /// carries its tangential force and twist. Nothing is kept from one call to the next: `scratch` only saves allocations.
+    ///
+    /// # Errors
+    /// A number is not finite, or there is a pressing force but no skin over the pad.
+    pub fn solve(
+        gel: &Gel,
+        contact: &PadContact,
+        scratch: &mut GelScratch,
+    ) -> Result<Option<Self>, ContactError> {
+        check(contact)?;
+        let PadContact { wrench, skins, friction, substrate } = contact;
+        if wrench.normal() <= 0.0 {
+            return Ok(None);
+        }
+        scratch.fit(gel);
+        set_compliance(gel, *substrate, scratch);
+        let mut height_map = HeightMap::of(gel, skins);
+        let normal = solve_normal_contact(gel, &gaps(gel, &height_map), wrench.normal(), scratch)
+            .ok_or_else(|| ContactError::NoSkin { force: wrench.normal(), skins: skins.len() })?;
+        let load = TangentialLoad { force: [wrench.force.x, wrench.force.y], moment: wrench.moment.z };
+        let tangential = solve_tangential_contact(gel, &normal.pressure, &load, *friction, scratch);
+        let displacement = surface_displacement(gel, &normal.pressure, &tangential.traction, scratch);
+        height_map.height.iter_mut().for_each(|z| *z -= normal.approach as f32);
+        let pressure = balanced_pressure(gel, &normal.pressure, wrench.normal());
+        let shear = balanced_shear(gel, &pressure, &tangential.traction, &load);
+        Ok(Some(Self {
+            pressure,
+            shear,
+            displacement,
+            approach: normal.approach,
+            stick_motion: tangential.motion,
+            friction_excess: tangential.friction_excess,
+            has_rigid_skin: substrate.is_none(),
+            height_map,
+        }))
+    }
+
+    /// Sum of the tractions, taken at the apex plane.
+    pub fn wrench(&self, gel: &Gel) -> PadWrench {
+        let area = gel.cell * gel.cell;
+        self.pressed_cells().fold(PadWrench::default(), |sum, (c, p)| {
+            let [x, y] = gel.centre(c);
+            let force = Vec3::new(self.shear[0][c], self.shear[1][c], -p) * area;
+            sum.plus(&Vec3::new(x, y, 0.0), force)
+        })
+    }
+
+    /// Tractions on a grid of `shape` taxels; each cell is distributed over the four taxels around it.
+    pub fn taxels(&self, gel: &Gel, shape: [usize; 2]) -> Taxels {
+        let mut taxels = Taxels::empty(&gel.pad, shape);
+        for (c, p) in self.pressed_cells() {
+            taxels.add(gel.centre(c), gel.cell * gel.cell, p, [self.shear[0][c], self.shear[1][c]]);
+        }
+        taxels
+    }
+
+    /// Indices and pressures of the cells with pressure.
+    fn pressed_cells(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        self.pressure.iter().copied().enumerate().filter(|(_, p)| *p > 0.0)
+    }
+
+    /// Greatest depth of the dent, m.
+    pub fn depth(&self) -> f64 {
+        -f64::from(self.displacement[2].iter().copied().fold(0.0, f32::min))
+    }
+
+    /// Centre of pressure (x, y), m.
+    pub fn centre(&self, gel: &Gel) -> [f64; 2] {
+        let mut sum = [0.0; 3];
+        for (c, p) in self.pressed_cells() {
+            let [x, y] = gel.centre(c);
+            sum = [sum[0] + p * x, sum[1] + p * y, sum[2] + p];
+        }
+        [sum[0] / sum[2], sum[1] / sum[2]]
+    }
+
+    /// True if there is pressure on the cell at (x, y), m.
+    pub fn touches(&self, gel: &Gel, x: f64, y: f64) -> bool {
+        let i = (x / gel.cell + 0.5 * (gel.columns - 1) as f64).round();
+        let j = (y / gel.cell + 0.5 * (gel.rows - 1) as f64).round();
+        let is_inside = i >= 0.0 && j >= 0.0 && i < gel.columns as f64 && j < gel.rows as f64;
+        is_inside && self.pressure[j as usize * gel.columns + i as usize] > 0.0
+    }
+
+    /// Displacement (x, y, z) of the surface at (x, y), m: cubic between cells, zero outside the grid.
+    pub fn displacement_at(&self, gel: &Gel, x: f64, y: f64) -> [f64; 3] {
+        let tx = cubic_taps(x / gel.cell + 0.5 * (gel.columns - 1) as f64);
+        let ty = cubic_taps(y / gel.cell + 0.5 * (gel.rows - 1) as f64);
+        let mut out = [0.0; 3];
+        for (b, wy) in ty.weights.iter().enumerate() {
+            for (a, wx) in tx.weights.iter().enumerate() {
+                let (i, j) = (tx.first + a as isize, ty.first + b as isize);
+                if (0..gel.columns as isize).contains(&i) && (0..gel.rows as isize).contains(&j) {
+                    let c = j as usize * gel.columns + i as usize;
+                    out = std::array::from_fn(|d| out[d] + wx * wy * f64::from(self.displacement[d][c]));
+                }
+            }
+        }
+        out
+    }
+}
+
+/// Taps of Keys' cubic interpolation along one axis (IEEE TASSP 29 (1981) 1153).
+#[derive(Clone, Copy, Debug)]
+pub(in super::super) struct CubicTaps {
+    /// Index of the first of four neighbours; may be outside the grid.
+    pub(in super::super) first: isize,
+    /// Weights of the four neighbours.
+    pub(in super::super) weights: [f64; 4],
+}
+
+/// Taps at a position in units of cells, with the first centre at 0.
+pub(in super::super) fn cubic_taps(position: f64) -> CubicTaps {
+    let base = position.floor();
+    let t = position - base;
+    let weights = [
+        ((-0.5 * t + 1.0) * t - 0.5) * t,
+        (1.5 * t - 2.5) * t * t + 1.0,
+        ((-1.5 * t + 2.0) * t + 0.5) * t,
+        (0.5 * t - 0.5) * t * t,
+    ];
+    CubicTaps { first: base as isize - 1, weights }
+}
+
+fn check(contact: &PadContact) -> Result<(), ContactError> {
+    let wrench = &contact.wrench;
+    let finite = [
+        ("force along x", wrench.force.x),
+        ("force along y", wrench.force.y),
+        ("force along z", wrench.force.z),
+        ("moment about z", wrench.moment.z),
+    ];
+    for (field, value) in finite {
+        if !value.is_finite() {
+            return Err(ContactError::BadNumber { field, value, condition: "" });
+        }
+    }
+    let value = contact.friction;
+    if !(value >= 0.0 && value.is_finite()) {
+        return Err(ContactError::BadNumber { field: "friction", value, condition: " of at least 0" });
+    }
+    let substrate = contact.substrate.iter();
+    let positive =
+        substrate.flat_map(|s| [("substrate.modulus", s.modulus), ("substrate.resolved", s.resolved)]);
+    for (field, value) in positive {
+        if !(value > 0.0 && value.is_finite()) {
+            return Err(ContactError::BadNumber { field, value, condition: " above 0" });
+        }
+    }
+    Ok(())
+}
+
+/// Sets the compliance of gel and body in series.
+fn set_compliance(gel: &Gel, substrate: Option<SubstrateCompliance>, scratch: &mut GelScratch) {
+    scratch.compliance.clone_from(&gel.kernels.normal);
+    let Some(substrate) = substrate else { return };
+    let size = (gel.fft.width * gel.fft.height) as f64;
+    let resolved_k = std::f64::consts::TAU / substrate.resolved;
+    for (total, &k) in scratch.compliance.iter_mut().zip(&gel.kernels.k) {
+        let k = f64::from(k).max(1e-3);
+        let unresolved = 1.0 - (-(k / resolved_k).powi(2)).exp();
+        *total += (2.0 * unresolved / (substrate.modulus * k) / size) as f32;
+    }
+}
+
+/// Height of the skins above the undeformed gel at each cell, m; infinite where there is none.
+fn gaps(gel: &Gel, map: &HeightMap) -> Vec<f32> {
+    let gap = |c: usize| {
+        let height = map.at_cell(c % gel.columns, c / gel.columns) - gel.dome[c];
+        if height.is_nan() { f32::INFINITY } else { height }
+    };
+    debug_assert_eq!(map.columns, SUBCELLS * gel.columns);
+    (0..gel.columns * gel.rows).map(gap).collect()
+}
+
+/// Displacement of the gel's surface by pressure and shear, m.
+pub(super) fn surface_displacement(
+    gel: &Gel,
+    pressure: &[f32],
+    shear: &[Vec<f32>; 2],
+    scratch: &mut GelScratch,
+) -> [Vec<f32>; 3] {
+    let mut out = std::array::from_fn(|_| vec![0.0; pressure.len()]);
+    let GelScratch { spectra: [sx, sy, sp, sz], buffers: Some(buffers), .. } = scratch else { return out };
+    gel.fft.forward(pressure, sp, buffers);
+    gel.fft.forward(&shear[0], sx, buffers);
+    gel.fft.forward(&shear[1], sy, buffers);
+    let [mx, my] = &gel.kernels.coupling;
+    for i in 0..sp.len() {
+        // −i m k/k · t − N p
+        let along = sx[i] * mx[i] + sy[i] * my[i];
+        sz[i] = Complex32::new(along.im, -along.re) - sp[i] * gel.kernels.normal[i];
+    }
+    apply_shear_kernel(gel, sx, sy);
+    for i in 0..sp.len() {
+        let outwards = Complex32::new(sp[i].im, -sp[i].re);
+        sx[i] += outwards * mx[i];
+        sy[i] += outwards * my[i];
+    }
+    for (spectrum, field) in [sx, sy, sz].into_iter().zip(&mut out) {
+        gel.fft.inverse(spectrum, field, buffers);
+    }
+    out
+}
+
+/// The pressure in double precision, scaled so that it integrates to `force` (N) exactly.
+fn balanced_pressure(gel: &Gel, pressure: &[f32], force: f64) -> Vec<f64> {
+    let area = gel.cell * gel.cell;
+    let mut pressure: Vec<f64> = pressure.iter().map(|&p| f64::from(p)).collect();
+    let scale = force / area / pressure.iter().sum::<f64>();
+    pressure.iter_mut().for_each(|p| *p *= scale);
+    pressure
+}
+
+/// The shear in double precision, with a correction of rounding size so that it integrates to `load` exactly.
+fn balanced_shear(
+    gel: &Gel,
+    pressure: &[f64],
+    traction: &[Vec<f32>; 2],
+    load: &TangentialLoad,
+) -> [Vec<f64>; 2] {
+    let mut shear = [0, 1].map(|a| traction[a].iter().map(|&t| f64::from(t)).collect::<Vec<f64>>());
+    let mut stiffness = Mat3::zeros();
+    let mut missing = load.over_area(gel.cell * gel.cell);
+    let touching: Vec<usize> = (0..pressure.len()).filter(|&c| pressure[c] > 0.0).collect();
+    for &c in &touching {
+        let [x, y] = gel.centre(c);
+        let (tx, ty) = (shear[0][c], shear[1][c]);
+        missing -= Vec3::new(tx, ty, x * ty - y * tx);
+        stiffness += spring_stiffness([x, y], pressure[c]);
+    }
+    if let Some(inverse) = stiffness.try_inverse() {
+        let motion = PlanarMotion::from(inverse * missing);
+        for &c in &touching {
+            let [dx, dy] = motion.at(gel.centre(c));
+            shear[0][c] += pressure[c] * dx;
+            shear[1][c] += pressure[c] * dy;
+        }
+    }
+    shear
+}

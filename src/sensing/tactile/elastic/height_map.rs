@@ -1,0 +1,117 @@
+//! Height map of the surfaces over a pad: the lower side of the touching bodies, rasterised from below.
+
+use std::ops::RangeInclusive;
+
+use super::gel::Gel;
+use crate::geometry::Vec3;
+
+/// Surface of a touching body in the pad frame.
+#[derive(Clone, Copy, Debug)]
+pub struct SkinMesh<'a> {
+    /// Vertices, m, pad frame.
+    pub vertices: &'a [Vec3],
+    /// Vertex indices of the triangles, counter-clockwise seen from outside the body.
+    pub triangles: &'a [[u32; 3]],
+}
+
+/// Points of the height map per cell of the gel's grid along each axis; odd, so that one is the cell's centre.
+pub(super) const SUBCELLS: usize = 3;
+/// Height above the apex beyond which triangles are skipped, m: no gripper pushes a pad in that far.
+const MAX_HEIGHT: f64 = 6e-3;
+
+/// Height of the lowest surface, m above the apex plane, on a grid [`SUBCELLS`] times finer than the gel's; infinite where
+/// there is none.
+#[derive(Clone, Debug, PartialEq)]
+pub(in super::super) struct HeightMap {
+    pub(in super::super) columns: usize,
+    pub(in super::super) rows: usize,
+    /// Distance of neighbouring points, m.
+    pub(in super::super) cell: f64,
+    /// Heights, row by row.
+    pub(in super::super) height: Vec<f32>,
+}
+
+impl HeightMap {
+    /// Height map of `skins` over the pad of `gel`.
+    pub(super) fn of(gel: &Gel, skins: &[SkinMesh]) -> Self {
+        let (columns, rows) = (SUBCELLS * gel.columns, SUBCELLS * gel.rows);
+        let cell = gel.cell / SUBCELLS as f64;
+        let mut map = Self { columns, rows, cell, height: vec![f32::INFINITY; columns * rows] };
+        let floor = -gel.pad.thickness;
+        for skin in skins {
+            let vertex = |v: u32| skin.vertices.get(v as usize).copied();
+            for triangle in skin.triangles {
+                if let [Some(a), Some(b), Some(c)] = triangle.map(vertex)
+                    && a.z.max(b.z).max(c.z) > floor
+                    && a.z.min(b.z).min(c.z) < MAX_HEIGHT
+                {
+                    map.draw([a, b, c]);
+                }
+            }
+        }
+        map
+    }
+
+    /// Height at the centre of the gel's cell (i, j).
+    pub(super) fn at_cell(&self, i: usize, j: usize) -> f32 {
+        self.height[(SUBCELLS * j + SUBCELLS / 2) * self.columns + SUBCELLS * i + SUBCELLS / 2]
+    }
+
+    /// Lowers the map to one triangle, unless its outer side faces away from the gel.
+    fn draw(&mut self, corners: [Vec3; 3]) {
+        // In units of cells, with the first centre at 0.
+        let half = [0.5 * (self.columns - 1) as f64, 0.5 * (self.rows - 1) as f64];
+        let [a, b, c] = corners.map(|p| [p.x / self.cell + half[0], p.y / self.cell + half[1], p.z]);
+        let area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
+        if area >= 0.0 || !area.is_finite() {
+            return;
+        }
+        let Some(columns) = index_range(self.columns, [a[0], b[0], c[0]]) else { return };
+        let Some(rows) = index_range(self.rows, [a[1], b[1], c[1]]) else { return };
+        let slope = [
+            ((b[2] - a[2]) * (c[1] - a[1]) - (c[2] - a[2]) * (b[1] - a[1])) / area,
+            ((c[2] - a[2]) * (b[0] - a[0]) - (b[2] - a[2]) * (c[0] - a[0])) / area,
+        ];
+        let edges = [(a, b), (b, c), (c, a)].map(|(p, q)| {
+            let x_per_row = (q[0] - p[0]) / (q[1] - p[1]);
+            Edge { x_at_row_0: p[0] - x_per_row * p[1], x_per_row, rise: q[1] - p[1] }
+        });
+        for j in rows {
+            let y = j as f64;
+            // A little beyond the edges, so that no point is missed between two neighbouring triangles.
+            let (mut from, mut to) = (*columns.start() as f64 - 1e-6, *columns.end() as f64 + 1e-6);
+            for edge in &edges {
+                let x = edge.x_at_row_0 + edge.x_per_row * y;
+                if edge.rise > 0.0 {
+                    from = from.max(x - 1e-6);
+                } else if edge.rise < 0.0 {
+                    to = to.min(x + 1e-6);
+                }
+            }
+            if from > to {
+                continue;
+            }
+            let (first, last) = (from.ceil() as usize, to.floor() as usize);
+            let start = a[2] + slope[0] * -a[0] + slope[1] * (y - a[1]);
+            let row = &mut self.height[j * self.columns..(j + 1) * self.columns];
+            for (i, height) in row.iter_mut().enumerate().take(last + 1).skip(first) {
+                *height = height.min((start + slope[0] * i as f64) as f32);
+            }
+        }
+    }
+}
+
+/// Edge of a triangle as a line over the rows of the map.
+struct Edge {
+    x_at_row_0: f64,
+    x_per_row: f64,
+    /// Rows from its start to its end; its sign says on which side the triangle is.
+    rise: f64,
+}
+
+/// Whole numbers below `count` within the interval of three values; `None` if there are none.
+fn index_range(count: usize, of: [f64; 3]) -> Option<RangeInclusive<usize>> {
+    let low = of[0].min(of[1]).min(of[2]).ceil().max(0.0);
+    let high = of[0].max(of[1]).max(of[2]).floor().min((count - 1) as f64);
+    (low <= high).then_some(low as usize..=high as usize)
+}

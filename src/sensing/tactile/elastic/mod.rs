@@ -1,0 +1,23 @@
+//! Elasticity of the gel: from force and shape of a contact to pressure, shear and displacement of the gel's surface.
+//!
+//! The gel is an elastic layer bonded to a rigid base. Its response is known in closed form for each wave number
+//! ([`elastic_layer`]) and applied by Fourier transforms ([`fourier`]). [`normal_contact`] finds the pressure under a pressed
+//! shape, [`tangential_contact`] the shear with stick and slip; [`GelField::solve`] joins them.
+
+mod elastic_layer;
+mod fourier;
+mod gel;
+mod gel_field;
+mod height_map;
+mod normal_contact;
+mod pad_wrench;
+mod tangential_contact;
+#[cfg(test)]
+pub(super) mod tests;
+
+pub use gel::{Gel, GelScratch};
+pub use gel_field::{ContactError, GelField, PadContact, SubstrateCompliance};
+pub(super) use gel_field::{CubicTaps, cubic_taps};
+pub use height_map::SkinMesh;
+pub use pad_wrench::{PadWrench, Taxels, patch_friction};
+pub use tangential_contact::PlanarMotion;

@@ -1,0 +1,289 @@
+//! Polynomial optics: a smooth function of the surface's slope, fitted to a real GelSight Mini.
+//!
+//! A slope multiplies the light that falls on its pixel, which the untouched image shows (Lambert's law for a light source of
+//! one elevation). So the same slope has the same sign of change everywhere, and a flat surface changes nothing. The
+//! factor of each channel is 1 plus a polynomial of degree 5 in the sines of the slope.
+
+use std::ops::Range;
+
+use serde::{Deserialize, Serialize};
+
+use super::{
+    super::{
+        elastic::{Gel, GelField},
+        spec::IMAGE_SIZE,
+    },
+    shadow::{Led, ShadowCaster},
+    visible_surface::{MIN_SLOPE, VisibleSurface},
+};
+
+/// Coefficients of the GelSight Mini, written by `examples/fit_gelsight.rs`.
+const GELSIGHT_MINI: &str = include_str!("../../../../assets/gelsight/mini.json");
+
+/// Number of monomials of the slope, of degree 1 to 5. There is no constant term, so a flat surface changes no colour.
+pub const SLOPE_MONOMIALS: usize = 20;
+const MAX_DEGREE: i32 = 5;
+
+/// Fitted coefficients of a sensor, as in `assets/gelsight/mini.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OpticsFile {
+    /// Data of the fit: name, licence, source, date.
+    pub source: String,
+    /// Assumptions of the fit.
+    pub note: String,
+    /// Radius of the calibration ball, mm.
+    pub ball_radius_mm: f64,
+    /// Mean absolute error in the contact circles of images left out of the fit, grey levels of 255.
+    pub held_out_l1: f64,
+    /// Greatest sine of slope in the fit; steeper surfaces are coloured like this one.
+    pub steepest: f64,
+    /// Cosine series of the untouched image by channel: the sum of `background[c][j][i]` · cos(π i u) cos(π j v), grey levels,
+    /// with (u, v) from 0 to 1 across the image.
+    pub background: [Vec<Vec<f64>>; 3],
+    /// Relative change of the light by channel and monomial of the slope; see [`slope_monomials`].
+    pub colour: [Vec<f64>; 3],
+}
+
+/// Optics of a sensor, ready for use; see the [module](self) for the model.
+#[derive(Clone, Debug)]
+pub struct PolynomialOptics {
+    /// Untouched image, 320 × 240 RGB.
+    untouched: Vec<u8>,
+    /// The same before rounding to grey levels.
+    background: Vec<f32>,
+    steepest: f32,
+    colour: [[f32; SLOPE_MONOMIALS]; 3],
+    leds: [Led; 3],
+}
+
+/// Reasons why coefficients cannot be used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs)] // The messages say it.
+pub enum OpticsError {
+    #[error("optics: {0}")]
+    Format(String),
+    #[error("optics: {field} has {found} entries per channel, expected {expected}")]
+    Count { field: &'static str, found: usize, expected: usize },
+}
+
+/// Monomials aⁱ bʲ, 1 ≤ i + j ≤ 5, of the sines (a, b) of the slope along x and y: by degree, then by increasing i.
+pub fn slope_monomials(a: f64, b: f64) -> [f64; SLOPE_MONOMIALS] {
+    let mut out = [0.0; SLOPE_MONOMIALS];
+    let powers = (1..=MAX_DEGREE).flat_map(|degree| (0..=degree).map(move |i| (i, degree - i)));
+    out.iter_mut().zip(powers).for_each(|(out, (i, j))| *out = a.powi(i) * b.powi(j));
+    out
+}
+
+impl PolynomialOptics {
+    /// Optics of the GelSight Mini.
+    ///
+    /// # Errors
+    /// The coefficients in the binary are invalid, which a test excludes.
+    pub fn gelsight_mini() -> Result<Self, OpticsError> {
+        Self::parse(GELSIGHT_MINI)
+    }
+
+    /// Optics of the coefficients in JSON ([`OpticsFile`]).
+    ///
+    /// # Errors
+    /// The text is not such JSON, or a list of coefficients has another length than it must have.
+    pub fn parse(text: &str) -> Result<Self, OpticsError> {
+        let file: OpticsFile = serde_json::from_str(text).map_err(|e| OpticsError::Format(e.to_string()))?;
+        let mut colour = [[0.0; SLOPE_MONOMIALS]; 3];
+        for (to, from) in colour.iter_mut().zip(&file.colour) {
+            if from.len() != SLOPE_MONOMIALS {
+                return Err(OpticsError::Count {
+                    field: "colour",
+                    found: from.len(),
+                    expected: SLOPE_MONOMIALS,
+                });
+            }
+            to.iter_mut().zip(from).for_each(|(to, &from)| *to = from as f32);
+        }
+        let background = cosine_series(&file.background);
+        Ok(Self {
+            untouched: background.iter().map(|&value| grey_level(value)).collect(),
+            background,
+            steepest: file.steepest as f32,
+            leds: colour.map(|c| Led::from_linear_fit(c[1], c[0])),
+            colour,
+        })
+    }
+
+    /// Image without a contact, 320 × 240 RGB.
+    pub fn untouched(&self) -> &[u8] {
+        &self.untouched
+    }
+
+    /// LEDs of the red, green and blue channel, as the fit implies them.
+    pub fn leds(&self) -> &[Led; 3] {
+        &self.leds
+    }
+
+    /// Writes the image of a field into `rgb` (320 × 240 RGB; a shorter buffer gets the start of the untouched image), with cast
+    /// shadows if `shadows`. Without a field the image is the untouched one exactly, as is every pixel without a slope.
+    pub fn render(&self, gel: &Gel, field: Option<&GelField>, shadows: bool, rgb: &mut [u8]) {
+        let n = rgb.len().min(self.untouched.len());
+        rgb[..n].copy_from_slice(&self.untouched[..n]);
+        let Some(field) = field else { return };
+        if n < self.untouched.len() {
+            return;
+        }
+        let surface = VisibleSurface::of(gel, field);
+        let pitch = gel.view.pitch as f32;
+        let shadow_caster = shadows.then(|| ShadowCaster::new(&surface, pitch));
+        let [width, height] = surface.size;
+        let mut line = LightRow::new(width);
+        for row in 0..height {
+            surface.slopes(row, pitch, &mut line.a, &mut line.b);
+            let steep = line.slopes_to_sines(self.steepest);
+            // A shadow may fall on flat ground.
+            let Some(range) = shadow_caster.as_ref().map(|_| 0..width).or(steep) else { continue };
+            for (channel, colour) in self.colour.iter().enumerate() {
+                line.compute_light(channel, colour, range.clone());
+                if let Some(shadow_caster) = &shadow_caster {
+                    let light = &mut line.light[channel][range.clone()];
+                    shadow_caster.cast(&self.leds[channel], row, range.start, light);
+                }
+            }
+            let at = 3 * ((surface.from[1] + row) * IMAGE_SIZE[0] + surface.from[0]);
+            let (from, to) = (at + 3 * range.start, at + 3 * range.end);
+            let [red, green, blue] = &line.light;
+            let light = red[range.clone()].iter().zip(&green[range.clone()]).zip(&blue[range]);
+            let pixels = rgb[from..to].chunks_exact_mut(3).zip(self.background[from..to].chunks_exact(3));
+            for ((out, base), ((r, g), b)) in pixels.zip(light) {
+                out[0] = grey_level(base[0] * r);
+                out[1] = grey_level(base[1] * g);
+                out[2] = grey_level(base[2] * b);
+            }
+        }
+    }
+
+    /// Change of the colour (R, G, B, grey levels of 255) at a pixel (x, y) by a surface whose slope has the sines (a, b). Pixels
+    /// outside the image are clamped to its border.
+    pub fn colour_change(&self, a: f64, b: f64, pixel: [usize; 2]) -> [f64; 3] {
+        let scale = (f64::from(self.steepest) / a.hypot(b).max(1e-12)).min(1.0);
+        let slopes = slope_monomials(a * scale, b * scale);
+        let at = 3 * (pixel[1].min(IMAGE_SIZE[1] - 1) * IMAGE_SIZE[0] + pixel[0].min(IMAGE_SIZE[0] - 1));
+        [0, 1, 2].map(|channel| {
+            let share: f64 = self.colour[channel].iter().zip(&slopes).map(|(c, s)| f64::from(*c) * s).sum();
+            f64::from(self.background[at + channel]) * share
+        })
+    }
+}
+
+/// Slopes and light of one row of pixels.
+struct LightRow {
+    /// Sines of the slope along x and y.
+    a: Vec<f32>,
+    b: Vec<f32>,
+    /// Light relative to the untouched image, by channel.
+    light: [Vec<f32>; 3],
+}
+
+impl LightRow {
+    fn new(width: usize) -> Self {
+        Self { a: vec![0.0; width], b: vec![0.0; width], light: std::array::from_fn(|_| vec![0.0; width]) }
+    }
+
+    /// Replaces slopes by their sines, limited to `steepest`. Returns the range of pixels from the first to the last that is
+    /// not flat.
+    fn slopes_to_sines(&mut self, steepest: f32) -> Option<Range<usize>> {
+        for (a, b) in self.a.iter_mut().zip(&mut self.b) {
+            let square = *a * *a + *b * *b;
+            let scale = (1.0 / (1.0 + square)).sqrt().min(steepest / square.max(1e-20).sqrt());
+            (*a, *b) = (*a * scale, *b * scale);
+        }
+        let steep = |(a, b): (&f32, &f32)| a.abs().max(b.abs()) > MIN_SLOPE;
+        let first = self.a.iter().zip(&self.b).position(steep)?;
+        let end = self.a.iter().zip(&self.b).rposition(steep)? + 1;
+        Some(first..end)
+    }
+
+    /// Computes the light of one channel in a range of the row.
+    fn compute_light(&mut self, channel: usize, c: &[f32; SLOPE_MONOMIALS], range: Range<usize>) {
+        let out = &mut self.light[channel][range.clone()];
+        let slopes = self.a[range.clone()].iter().zip(&self.b[range]);
+        for ((&a, &b), light) in slopes.zip(out) {
+            // By powers of a, Horner's rule in b within each.
+            let a0 = b * (c[0] + b * (c[2] + b * (c[5] + b * (c[9] + b * c[14]))));
+            let a1 = c[1] + b * (c[3] + b * (c[6] + b * (c[10] + b * c[15])));
+            let a2 = c[4] + b * (c[7] + b * (c[11] + b * c[16]));
+            let a3 = c[8] + b * (c[12] + b * c[17]);
+            let a4 = c[13] + b * c[18];
+            *light = 1.0 + a0 + a * (a1 + a * (a2 + a * (a3 + a * (a4 + a * c[19]))));
+        }
+    }
+}
+
+fn grey_level(value: f32) -> u8 {
+    // Converting to an integer first lets the compiler use vector instructions.
+    (value + 0.5).clamp(0.0, 255.0) as i32 as u8
+}
+
+/// Image of a cosine series per channel, 320 × 240 RGB.
+fn cosine_series(series: &[Vec<Vec<f64>>; 3]) -> Vec<f32> {
+    let [width, height] = IMAGE_SIZE;
+    let wave = |n: usize, p: usize, of: usize| {
+        (std::f64::consts::PI * n as f64 * (p as f64 + 0.5) / of as f64).cos()
+    };
+    let mut out = vec![0.0; 3 * width * height];
+    for (channel, rows) in series.iter().enumerate() {
+        for y in 0..height {
+            let most = rows.iter().map(Vec::len).max().unwrap_or(0);
+            let mut line = vec![0.0; most];
+            for (j, row) in rows.iter().enumerate() {
+                let w = wave(j, y, height);
+                line.iter_mut().zip(row).for_each(|(sum, c)| *sum += w * c);
+            }
+            for x in 0..width {
+                let value: f64 = line.iter().enumerate().map(|(i, c)| c * wave(i, x, width)).sum();
+                out[3 * (y * width + x) + channel] = value as f32;
+            }
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_row_of_pixels_follows_the_same_law_as_a_single_slope() {
+        let optics = PolynomialOptics::gelsight_mini().expect("shipped");
+        let slopes: Vec<[f32; 2]> = (0..200)
+            .map(|i| {
+                let turn = 0.37 * i as f32;
+                [turn.cos(), turn.sin()].map(|v| v * 0.005 * i as f32)
+            })
+            .collect();
+        let mut line = LightRow::new(slopes.len());
+        // As tangents, which the row turns into sines.
+        let tangent = |v: f32, s: &[f32; 2]| v / (1.0 - (s[0] * s[0] + s[1] * s[1])).max(1e-3).sqrt();
+        line.a = slopes.iter().map(|s| tangent(s[0], s)).collect();
+        line.b = slopes.iter().map(|s| tangent(s[1], s)).collect();
+        let range = line.slopes_to_sines(optics.steepest).expect("slopes");
+        assert_eq!(range, 1..200);
+        for (channel, colour) in optics.colour.iter().enumerate() {
+            line.compute_light(channel, colour, 0..200);
+            for (i, s) in slopes.iter().enumerate() {
+                let pixel = [i, 100];
+                let single = optics.colour_change(f64::from(s[0]), f64::from(s[1]), pixel)[channel];
+                let base = optics.background[3 * (100 * IMAGE_SIZE[0] + i) + channel];
+                let found = f64::from(base * line.light[channel][i] - base);
+                assert!((found - single).abs() < 0.05, "channel {channel}, {s:?}: {found} and {single}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_file_with_too_few_numbers_is_refused_by_name() {
+        let mut file: OpticsFile = serde_json::from_str(GELSIGHT_MINI).expect("shipped");
+        file.colour[1].pop();
+        let text = serde_json::to_string(&file).expect("plain data");
+        let message = PolynomialOptics::parse(&text).expect_err("19 numbers").to_string();
+        assert_eq!(message, "optics: colour has 19 entries per channel, expected 20");
+    }
+}

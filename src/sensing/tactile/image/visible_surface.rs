@@ -1,0 +1,215 @@
+//! Surface of the gel at the resolution of the image.
+//!
+//! Where the gel is free its surface is interpolated from the grid by a cubic. Where it touches a rigid skin it lies on the
+//! skin, whose height map is finer than the grid, so that the two never overlap. Details of a soft skin below the size of a
+//! cell are left out: the gel presses them flat.
+
+use super::super::{
+    elastic::{CubicTaps, Gel, GelField, cubic_taps},
+    spec::IMAGE_SIZE,
+};
+
+/// Displacement of the surface along z at each pixel of a window of the image, m; zero outside the window.
+#[derive(Clone, Debug, Default)]
+pub(super) struct VisibleSurface {
+    /// First column and row of the window, px.
+    pub(super) from: [usize; 2],
+    /// Columns and rows of the window, px.
+    pub(super) size: [usize; 2],
+    /// Displacement along z, m, row by row.
+    pub(super) u: Vec<f32>,
+}
+
+/// Slope above which a cell belongs to the window; smaller ones change no colour by half a grey level.
+pub(super) const MIN_SLOPE: f32 = 1e-3;
+
+/// Interpolation of a grid at the pixel centres along one axis: first neighbour and weights of the taps per pixel.
+struct AxisTaps {
+    first: Vec<isize>,
+    weights: Vec<[f32; 4]>,
+}
+
+/// Linear interpolation of the height map at one pixel along one axis.
+#[derive(Clone, Copy)]
+struct LinearTap {
+    /// Index of the first of two neighbours.
+    index: usize,
+    /// Weight of the second one.
+    share: f32,
+    /// Position of the pixel, m.
+    metres: f64,
+}
+
+impl VisibleSurface {
+    /// Surface of a field; the window covers all that changes and a little more.
+    pub(super) fn of(gel: &Gel, field: &GelField) -> Self {
+        let Some(Extent { from, size }) = extent(gel, &field.displacement[2]) else { return Self::default() };
+        let centre =
+            |axis: usize, p: usize| (p as f64 + 0.5 - 0.5 * IMAGE_SIZE[axis] as f64) * gel.view.pitch;
+        let count = [gel.columns, gel.rows];
+        let axis_taps = |axis: usize| {
+            let at = |p| centre(axis, p) / gel.cell + 0.5 * (count[axis] - 1) as f64;
+            let (first, weights) = (from[axis]..from[axis] + size[axis])
+                .map(|p| {
+                    let CubicTaps { first, weights } = cubic_taps(at(p));
+                    (first, weights.map(|w| w as f32))
+                })
+                .unzip();
+            AxisTaps { first, weights }
+        };
+        let (x, y) = (axis_taps(0), axis_taps(1));
+        let free = resample(&field.displacement[2], count, &x, &y);
+        let mut surface = Self { from, size, u: free };
+        if field.has_rigid_skin {
+            surface.lay_on_skin(gel, field, centre);
+        }
+        surface.soften();
+        surface
+    }
+
+    /// Lowers the surface to the skin where they touch.
+    fn lay_on_skin(&mut self, gel: &Gel, field: &GelField, centre: impl Fn(usize, usize) -> f64) {
+        let map = &field.height_map;
+        let half = [map.columns, map.rows].map(|n| 0.5 * (n - 1) as f64);
+        let interpolation = |axis: usize| -> Vec<LinearTap> {
+            let last = [map.columns, map.rows][axis] - 2;
+            (self.from[axis]..self.from[axis] + self.size[axis])
+                .map(|p| {
+                    let metres = centre(axis, p);
+                    let at = (metres / map.cell + half[axis]).clamp(0.0, last as f64);
+                    LinearTap { index: at as usize, share: at.fract() as f32, metres }
+                })
+                .collect()
+        };
+        let (xs, ys) = (interpolation(0), interpolation(1));
+        let (curve_x, curve_y) = (0.5 / gel.pad.radius_x, 0.5 / gel.pad.radius_y);
+        let bend: Vec<f32> = xs.iter().map(|x| (curve_x * x.metres * x.metres) as f32).collect();
+        let mut mixed = vec![0.0; map.columns];
+        for (row, &LinearTap { index: j, share: ty, metres: y }) in ys.iter().enumerate() {
+            let dome = (curve_y * y * y) as f32;
+            let line = row * self.size[0]..(row + 1) * self.size[0];
+            let upper = &map.height[j * map.columns..];
+            let lower = &map.height[(j + 1) * map.columns..];
+            for (mix, (a, b)) in mixed.iter_mut().zip(upper.iter().zip(lower)) {
+                *mix = (1.0 - ty) * a + ty * b + dome;
+            }
+            for ((u, &LinearTap { index: i, share: tx, .. }), bend) in
+                self.u[line].iter_mut().zip(&xs).zip(&bend)
+            {
+                let skin = (1.0 - tx) * mixed[i] + tx * mixed[i + 1] + bend;
+                // NaN at the edge of the skin, where 0 · ∞ is added: `min` ignores it.
+                *u = u.min(skin);
+            }
+        }
+    }
+
+    /// Blurs like the coating and lens of the sensor: twice a binomial filter of five pixels along each axis (σ = 1.4 px).
+    fn soften(&mut self) {
+        let n = self.size[0];
+        if n < 5 {
+            return;
+        }
+        let mut line = vec![0.0; n];
+        for row in self.u.chunks_exact_mut(n) {
+            for _ in 0..2 {
+                line.copy_from_slice(row);
+                blur([0, 1, 2, 3, 4].map(|k| &line[k..n - 4 + k]), &mut row[2..n - 2]);
+            }
+        }
+        let mut from = self.u.clone();
+        for _ in 0..2 {
+            for j in 2..self.size[1].saturating_sub(2) {
+                let rows = [0, 1, 2, 3, 4].map(|k| &from[(j + k - 2) * n..(j + k - 1) * n]);
+                blur(rows, &mut self.u[j * n..(j + 1) * n]);
+            }
+            from.copy_from_slice(&self.u);
+        }
+    }
+
+    /// Writes the slopes along x and y of a row of pixels, by central differences; 0 at the border of the window, where the
+    /// surface is flat. `pitch` is the edge of a pixel, m.
+    pub(super) fn slopes(&self, row: usize, pitch: f32, slope_x: &mut [f32], slope_y: &mut [f32]) {
+        let n = self.size[0];
+        slope_x.fill(0.0);
+        slope_y.fill(0.0);
+        if row == 0 || row + 1 >= self.size[1] || n < 3 {
+            return;
+        }
+        let half = 0.5 / pitch;
+        let here = &self.u[row * n..(row + 1) * n];
+        let above = &self.u[(row - 1) * n..row * n];
+        let below = &self.u[(row + 1) * n..(row + 2) * n];
+        for (slope, (left, right)) in slope_x[1..n - 1].iter_mut().zip(here.iter().zip(&here[2..])) {
+            *slope = half * (right - left);
+        }
+        let columns = slope_y.iter_mut().zip(above.iter().zip(below));
+        columns.take(n - 1).skip(1).for_each(|(slope, (up, down))| *slope = half * (down - up));
+    }
+}
+
+/// Binomial mean of five rows.
+fn blur([a, b, c, d, e]: [&[f32]; 5], out: &mut [f32]) {
+    let inner = b.iter().zip(c).zip(d);
+    for (((out, a), ((b, c), d)), e) in out.iter_mut().zip(a).zip(inner).zip(e) {
+        *out = 0.0625 * (a + e + 4.0 * (b + d) + 6.0 * c);
+    }
+}
+
+/// Part of the image, px.
+struct Extent {
+    from: [usize; 2],
+    size: [usize; 2],
+}
+
+/// Window around the cells of the grid that are steeper than [`MIN_SLOPE`].
+fn extent(gel: &Gel, u: &[f32]) -> Option<Extent> {
+    let (n, least) = (gel.columns, MIN_SLOPE * gel.cell as f32);
+    let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
+    for j in 1..gel.rows {
+        for i in 1..n {
+            let c = j * n + i;
+            if (u[c] - u[c - 1]).abs() > least || (u[c] - u[c - n]).abs() > least {
+                low = [low[0].min(i - 1), low[1].min(j - 1)];
+                high = [high[0].max(i), high[1].max(j)];
+            }
+        }
+    }
+    let place = [Gel::x, Gel::y];
+    let mut window = Extent { from: [0; 2], size: [0; 2] };
+    for axis in 0..2 {
+        let px = |at: f64| at / gel.view.pitch + 0.5 * IMAGE_SIZE[axis] as f64;
+        let from =
+            (px(place[axis](gel, low[axis].min(high[axis]))) - 2.0).clamp(0.0, IMAGE_SIZE[axis] as f64);
+        let to = (px(place[axis](gel, high[axis])) + 2.0).clamp(0.0, IMAGE_SIZE[axis] as f64);
+        window.from[axis] = from as usize;
+        window.size[axis] = to as usize - from as usize;
+    }
+    (low[0] <= high[0] && window.size[0] > 2 && window.size[1] > 2).then_some(window)
+}
+
+/// Interpolates a field of the grid at pixels, first along x, then along y; the field is 0 outside the grid.
+fn resample(field: &[f32], count: [usize; 2], x: &AxisTaps, y: &AxisTaps) -> Vec<f32> {
+    let (wide, n) = (x.first.len(), count[0]);
+    let mut lines = vec![0.0_f32; wide * count[1]];
+    for (line, row) in lines.chunks_exact_mut(wide).zip(field.chunks_exact(n)) {
+        for ((out, &first), weights) in line.iter_mut().zip(&x.first).zip(&x.weights) {
+            for (k, w) in weights.iter().enumerate() {
+                let i = first + k as isize;
+                if (0..n as isize).contains(&i) {
+                    *out += w * row[i as usize];
+                }
+            }
+        }
+    }
+    let mut out = vec![0.0; wide * y.first.len()];
+    for ((row, &first), weights) in out.chunks_exact_mut(wide).zip(&y.first).zip(&y.weights) {
+        for (k, &w) in weights.iter().enumerate() {
+            let j = first + k as isize;
+            if (0..count[1] as isize).contains(&j) {
+                let line = &lines[j as usize * wide..(j as usize + 1) * wide];
+                row.iter_mut().zip(line).for_each(|(out, value)| *out += w * value);
+            }
+        }
+    }
+    out
+}
