@@ -16,7 +16,7 @@ pub fn gel_under_a_ball(report: &mut Report) {
     let gel = gel::flat_gel();
     let (mut shallow, mut deep, mut outwards) = (Vec::new(), Vec::new(), Vec::new());
     for of in gel::PRESSES {
-        let depths = gel::OFFSETS.map(|at| gel::press(&gel, at, of.force).push);
+        let depths = gel::OFFSETS.map(|at| gel::press(&gel, at, of.force).approach);
         let (least, most) = depths.iter().fold((f64::MAX, f64::MIN), |(a, b), &d| (a.min(d), b.max(d)));
         let errors = [least, most].map(|d| d / of.depth - 1.0);
         let worst = if errors[0].abs() > errors[1].abs() { errors[0] } else { errors[1] };

@@ -93,7 +93,7 @@ mod tests {
         let gel = flat_gel();
         for at in OFFSETS {
             for Reference { force, depth, .. } in PRESSES {
-                let error = press(&gel, at, force).push / depth - 1.0;
+                let error = press(&gel, at, force).approach / depth - 1.0;
                 assert!(error.abs() < depth_bound(depth), "{force} N at {at:?}: {:+.1} %", 100.0 * error);
             }
         }
