@@ -1,7 +1,7 @@
 -- The asset page, docs/assets.md: image, tactile image, size, mass, material, τ and closures of every asset.
 --
 --   softvt scripts/asset_page.lua
---   softvt scripts/asset_page.lua --pictures=off          only the page
+--   softvt scripts/asset_page.lua --images=off          only the page
 --   softvt scripts/asset_page.lua --asset my_pastry --folder my_page
 local names = require "asset_names"
 local views = require "asset_views"
@@ -11,7 +11,7 @@ for _, group in ipairs { names.soft, names.rigid, names.articulated } do table.m
 
 local opt = softvt.options {
   asset = { default = STANDARD, help = "assets to show" },
-  pictures = { default = true, help = "also write the images" },
+  images = { default = true, help = "also write the images" },
   folder = { default = "docs", help = "folder of the page" },
   edge = { default = 128, unit = "pixels", integer = true, min = 32, max = 512, help = "edge of each image" },
 }
@@ -66,7 +66,7 @@ local function graspable(asset)
   return hints.grasp_rim_m ~= nil or (hints.grasp_width_m or math.min(size[1], size[2])) < 0.08
 end
 
-local function image(name, suffix) return ("![](pictures/assets/%s%s.png)"):format(name, suffix) end
+local function image(name, suffix) return ("![](images/assets/%s%s.png)"):format(name, suffix) end
 
 local function millimetres(asset)
   local size = views.size(asset)
@@ -134,8 +134,8 @@ return softvt.experiment {
     local made = {}
     for _, row in ipairs(rows) do made[row.asset] = row.text end
     local files = { [opt.folder .. "/assets.md"] = page(made) }
-    for _, name in ipairs(opt.pictures and opt.asset or {}) do
-      local at = ("%s/pictures/assets/%s"):format(opt.folder, name)
+    for _, name in ipairs(opt.images and opt.asset or {}) do
+      local at = ("%s/images/assets/%s"):format(opt.folder, name)
       files[at .. ".png"] = views.portrait(assets[name], opt.edge)
       if holds(assets[name]) then
         files[at .. "_felt.png"] = views.held(assets[name], 0.06):feel("left").picture:resize(opt.edge * 4 // 3, opt.edge)

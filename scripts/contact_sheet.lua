@@ -13,7 +13,7 @@ end
 
 local opt = softvt.options {
   asset = { default = STANDARD, help = "assets to draw" },
-  write = { default = "docs/pictures/assets.png", help = "image file to write" },
+  write = { default = "docs/images/assets.png", help = "image file to write" },
   columns = { default = 6, integer = true, min = 1, max = 12, help = "images per row" },
   edge = { default = 320, unit = "pixels", integer = true, min = 64, max = 1024, help = "edge of each image" },
 }

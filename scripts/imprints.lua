@@ -8,7 +8,7 @@ local views = require "asset_views"
 local opt = softvt.options {
   asset = { default = soft_assets, help = "soft assets to grasp" },
   lift_mm = { default = 60, unit = "mm", min = 0, max = 200, help = "height of the lift" },
-  write = { default = "docs/pictures/imprints.png", help = "image file to write" },
+  write = { default = "docs/images/imprints.png", help = "image file to write" },
   columns = { default = 2, integer = true, min = 1, max = 6, help = "assets per row" },
 }
 

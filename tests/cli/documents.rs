@@ -174,16 +174,16 @@ fn every_script_that_a_page_names_is_there_and_takes_the_flags_that_it_shows() {
 #[test]
 fn the_asset_page_says_what_the_binary_says() {
     let project = Project::new(&[]);
-    project.succeeds("scripts/asset_page.lua --pictures=off --out made");
+    project.succeeds("scripts/asset_page.lua --images=off --out made");
     let (kept, made) = (read("docs/assets.md"), project.text("made/docs/assets.md"));
     assert!(kept == made, "docs/assets.md is old: softvt scripts/asset_page.lua makes it anew");
     let mut bytes = 0;
-    for part in kept.split("](pictures/").skip(1) {
+    for part in kept.split("](images/").skip(1) {
         let path = part.split(')').next().unwrap_or_default();
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/pictures").join(path);
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/images").join(path);
         bytes += std::fs::metadata(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display())).len();
     }
-    assert!(bytes < 1_500_000, "the pictures of the page take {bytes} bytes");
+    assert!(bytes < 1_500_000, "the images of the page take {bytes} bytes");
     let rows = kept.lines().filter(|line| line.starts_with("| <a id=")).count();
     let assets = script::embedded_scripts("assets").len();
     assert_eq!(rows, assets - 2, "every asset but table and floor");
