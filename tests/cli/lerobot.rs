@@ -177,8 +177,8 @@ fn what_cannot_be_exported_is_told_and_nothing_is_left() {
     for (words, said) in [
         ("data --format lerobot-v3.0 --out full", "--out full: it holds mine; nothing was written"),
         ("data --format lerobot-v3.0 --out full/mine", "--out full/mine: it is no folder"),
-        ("data --format lerobot-v3.0 --out x --task 7", "no task fits --task \"7\""),
-        ("data --format lerobot-v3.0 --out x --task dance", "no task fits --task \"dance\""),
+        ("data --format lerobot-v3.0 --out x --task 7", "--task \"7\" matches no task"),
+        ("data --format lerobot-v3.0 --out x --task dance", "--task \"dance\" matches no task"),
         ("data --format lerobot-v3.0 --out x --gripper wide", "[possible values: binary, continuous]"),
         ("data --format lerobot-v2.0 --out x", "[possible values: lerobot-v2.1, lerobot-v3.0]"),
         ("data --out x", "--format"),

@@ -1,9 +1,10 @@
-//! Recorded demonstrations as data sets of LeRobot, in the versions that are trained from: v2.1 and v3.0.
+//! Export of recorded demonstrations as LeRobot datasets, in the versions used for training: v2.1 and v3.0.
 //!
-//! A row holds what a policy of the profile `visuo_tactile` is sent at that step, and what was commanded then; of the eight past
-//! states of the markers only the last two, as SoftVTBench has it. `docs/data.md` says what is in the folder. Demonstrations are
-//! read and their pictures packed on several threads, and written in order; each thread holds one of them.
+//! A row holds what a policy of the profile `visuo_tactile` observes at that step, and the action commanded then. Of the eight
+//! past marker states only the last two are stored, as in SoftVTBench. `docs/data.md` describes the files. Demonstrations are
+//! read and their images encoded on several threads, and written in order; each thread holds one demonstration.
 
+mod config;
 mod episode;
 mod features;
 mod meta;
@@ -14,199 +15,71 @@ mod statistics;
 mod v21;
 mod v30;
 
-use std::path::PathBuf;
-
 use self::{
-    episode::EpisodeRows,
+    episode::{Episode, EpisodeWriter},
     features::Feature,
-    parquet_table::ColumnValues,
-    selection::{SelectedDemo, Selection},
+    selection::Selection,
     staged_dir::StagedDir,
-    statistics::FeatureStatistics,
 };
-use super::{DatasetError, TaskFile, demonstration_writer::frame_rate};
+use super::DatasetError;
+use crate::parallel;
 
-/// A version of LeRobot's layout.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LeRobotVersion {
-    /// A table an episode: what openpi and SoftVTBench train from.
-    V21,
-    /// Many episodes a table: LeRobot's own since 0.4.
-    V30,
-}
+pub use config::{ExportConfig, ExportSummary, GripperCoding, LeRobotVersion};
 
-/// Which code of the gripper becomes the seventh number of the actions.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum GripperCoding {
-    /// Closure, 0 open to 1 shut.
-    Continuous,
-    /// 1 while the expert means to hold, else 0.
-    Binary,
-}
-
-/// What to export, and how.
-#[derive(Clone, Debug)]
-pub struct ExportConfig {
-    /// Folder of a finished recording.
-    pub data: PathBuf,
-    /// New folder.
-    pub out: PathBuf,
-    /// Layout.
-    pub version: LeRobotVersion,
-    /// Code of the gripper.
-    pub gripper: GripperCoding,
-    /// Only the tasks that fit one of these: indices, or parts of prompts; all if there are none.
-    pub tasks: Vec<String>,
-    /// Threads; the files do not depend on it.
-    pub threads: usize,
-}
-
-/// What was exported.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ExportSummary {
-    /// Episodes.
-    pub episodes: usize,
-    /// EpisodeRows of all.
-    pub frames: usize,
-    /// Different prompts.
-    pub tasks: usize,
-}
-
-impl LeRobotVersion {
-    /// As `info.json` has it.
-    fn code(self) -> &'static str {
-        match self {
-            Self::V21 => "v2.1",
-            Self::V30 => "v3.0",
-        }
-    }
-}
-
-/// An episode on its way into the files.
-struct ExportedEpisode<'a> {
-    /// Its number.
-    index: usize,
-    source: &'a SelectedDemo,
-    rows: EpisodeRows,
-    /// Every feature as a whole.
-    summaries: Vec<FeatureStatistics>,
-}
-
-/// Writes the files of a version, episode by episode.
-trait FormatWriter: Send {
-    /// Adds the next episode.
-    fn add(&mut self, episode: ExportedEpisode<'_>) -> Result<(), DatasetError>;
-    /// Ends all files.
-    fn finish(self: Box<Self>) -> Result<(), DatasetError>;
-}
-
-/// Exports a recording: `out` is there and whole afterwards, or not at all. `stop` ends it early; `told` hears of each episode
-/// that is written, with the number of all.
+/// Exports a recording. `config.out` is complete afterwards, or unchanged.
+///
+/// `is_cancelled` ends the export early. `on_episode` is called after each written episode, with the number of all episodes and a
+/// label.
 ///
 /// # Errors
-/// The recording is none, unfinished, without pictures or broken; a word fits no task; something is at `out`; a file cannot be
-/// written; or the end was asked for.
+/// The recording is missing, unfinished, without images or damaged; a word matches no task; `config.out` is not empty; a file
+/// cannot be written; or the export was cancelled.
 pub fn export(
-    export: &ExportConfig,
-    stop: impl Fn() -> bool + Sync,
-    mut told: impl FnMut(usize, &str) + Send,
+    config: &ExportConfig,
+    is_cancelled: impl Fn() -> bool + Sync,
+    on_episode: impl FnMut(usize, &str),
 ) -> Result<ExportSummary, DatasetError> {
-    staged_dir::free(&export.out)?;
-    let chosen = selection::choose(&export.data, &export.tasks)?;
-    let features = features::all(chosen.sizes);
-    let place = StagedDir::claim(&export.out)?;
-    let written = write(export, &chosen, &features, &place, &stop, &mut told);
-    match written {
-        Ok(exported) => place.settle().map(|()| exported),
+    staged_dir::check_empty(&config.out)?;
+    let selection = selection::select(&config.data, &config.tasks)?;
+    let features = features::all(selection.image_sizes);
+    let staged = StagedDir::create(&config.out)?;
+    match write(config, &selection, &features, &staged, is_cancelled, on_episode) {
+        Ok(summary) => staged.commit().map(|()| summary),
         Err(error) => {
-            place.give_up();
+            staged.abort();
             Err(error)
         }
     }
 }
 
 fn write(
-    export: &ExportConfig,
-    chosen: &Selection,
+    config: &ExportConfig,
+    selection: &Selection,
     features: &[Feature],
-    place: &StagedDir,
-    stop: &(impl Fn() -> bool + Sync),
-    told: &mut (impl FnMut(usize, &str) + Send),
+    staged: &StagedDir,
+    is_cancelled: impl Fn() -> bool + Sync,
+    mut on_episode: impl FnMut(usize, &str),
 ) -> Result<ExportSummary, DatasetError> {
-    let (sources, dir) = (&chosen.sources, place.dir());
-    let mut form: Box<dyn FormatWriter> = match export.version {
-        LeRobotVersion::V21 => Box::new(v21::Writer::begin(dir, features)?),
-        LeRobotVersion::V30 => Box::new(v30::Writer::begin(dir, features)?),
+    let (demos, dir) = (&selection.demos, staged.path());
+    let mut writer: Box<dyn EpisodeWriter> = match config.version {
+        LeRobotVersion::V21 => Box::new(v21::Writer21::create(dir, features)?),
+        LeRobotVersion::V30 => Box::new(v30::Writer30::create(dir, features)?),
     };
-    crate::parallel::run_in_order(
-        sources.len(),
-        export.threads,
+    parallel::run_in_order(
+        demos.len(),
+        config.threads,
         || false,
-        |index| read(export, chosen, index, stop),
+        |index| Episode::read(config, selection, index, &is_cancelled),
         |index, episode| {
-            form.add(episode)?;
-            let id = &sources[index].entry;
-            told(sources.len(), &format!("{} task {} demo {}", id.suite, id.task_id, id.demo_id));
+            writer.add(episode)?;
+            let id = &demos[index].entry;
+            on_episode(demos.len(), &format!("{} task {} demo {}", id.suite, id.task_id, id.demo_id));
             Ok(())
         },
     )?;
-    form.finish()?;
-    let frames = sources.iter().map(|source| source.entry.num_samples).sum();
-    let exported = ExportSummary { episodes: sources.len(), frames, tasks: chosen.prompts.len() };
-    meta::write(dir, export, chosen, features, exported)?;
-    Ok(exported)
-}
-
-/// One episode, ready to be written.
-fn read<'a>(
-    export: &ExportConfig,
-    chosen: &'a Selection,
-    index: usize,
-    stop: &(impl Fn() -> bool + Sync),
-) -> Result<ExportedEpisode<'a>, DatasetError> {
-    let source = &chosen.sources[index];
-    let file = TaskFile::open(&source.path)?;
-    let (demo, steps) = (source.entry.demo_id, source.entry.num_samples);
-    let rows = episode::read(&file, (demo, steps), chosen.sizes, export.gripper, stop)?;
-    let mut summaries = rows.summaries();
-    summaries.push(match export.version {
-        LeRobotVersion::V21 => rows.every_marker(),
-        LeRobotVersion::V30 => rows.markers_together(),
-    });
-    summaries.extend(meta::numbered(index, source));
-    Ok(ExportedEpisode { index, source, rows, summaries })
-}
-
-/// Time of a step, s.
-fn timestamp(step: usize) -> f32 {
-    (step as f64 / f64::from(frame_rate())) as f32
-}
-
-impl ExportedEpisode<'_> {
-    /// The columns of its table, in the order of the features; `name` is what the picture of a step is called.
-    fn columns(
-        rows: EpisodeRows,
-        (index, source): (usize, &SelectedDemo),
-        name: fn(usize) -> String,
-    ) -> Vec<ColumnValues> {
-        let steps = rows.steps;
-        let same = |number: usize| ColumnValues::I64(vec![number as i64; steps]);
-        let counted = |from: usize| ColumnValues::I64((from..from + steps).map(|i| i as i64).collect());
-        let pictures = rows.pictures.into_iter().map(|files| {
-            ColumnValues::Pictures(
-                files.into_iter().enumerate().map(|(step, file)| (file, name(step))).collect(),
-            )
-        });
-        let rest = [
-            ColumnValues::F32(rows.state),
-            ColumnValues::F32(rows.actions),
-            ColumnValues::F32(rows.markers),
-            ColumnValues::F32((0..steps).map(timestamp).collect()),
-            counted(0),
-            same(index),
-            counted(source.first),
-            same(source.task),
-        ];
-        pictures.chain(rest).collect()
-    }
+    writer.finish()?;
+    let frames = demos.iter().map(|demo| demo.entry.num_samples).sum();
+    let summary = ExportSummary { episodes: demos.len(), frames, tasks: selection.prompts.len() };
+    meta::write(dir, config, selection, features, summary)?;
+    Ok(summary)
 }

@@ -1,4 +1,4 @@
-//! Parquet files: columns of numbers, of nested lists of one shape, of text, and of PNG pictures as Hugging Face keeps them.
+//! Parquet files with columns of numbers, nested lists of fixed shape, text, and PNG images in Hugging Face's form.
 
 use std::{
     fmt::Write as _,
@@ -21,57 +21,65 @@ use parquet::{
 
 use crate::dataset::DatasetError;
 
-/// What a column is made of.
+/// Type of the values of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ColumnType {
     /// A PNG file and its name.
-    Picture,
-    /// Single precision.
+    Image,
     F32,
-    /// Double precision.
     F64,
-    /// Whole numbers.
     I64,
-    /// Text.
     Text,
 }
 
-/// A column: a value a row, or nested lists of one shape.
+/// A column with one value per row, or nested lists of fixed shape.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct ParquetColumn {
-    /// Name.
     pub name: String,
-    /// Of what.
-    pub kind: ColumnType,
-    /// Lengths of the lists, the outermost first; empty for a value.
+    pub column_type: ColumnType,
+    /// Lengths of the lists, outermost first; empty for single values.
     pub shape: Vec<usize>,
 }
 
-/// EpisodeRows of a column.
+/// An encoded image and its file name.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct EmbeddedImage {
+    pub png: Vec<u8>,
+    pub name: String,
+}
+
+/// Metadata of a file.
+pub(super) struct KeyValueNote {
+    pub key: &'static str,
+    pub value: String,
+}
+
+/// Values of a column.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum ColumnValues {
-    /// PNG files and their names.
-    Pictures(Vec<(Vec<u8>, String)>),
-    /// Of [`ColumnType::F32`].
+    Images(Vec<EmbeddedImage>),
     F32(Vec<f32>),
-    /// Of [`ColumnType::F64`].
     F64(Vec<f64>),
-    /// Of [`ColumnType::I64`].
     I64(Vec<i64>),
-    /// Of [`ColumnType::Text`].
     Text(Vec<String>),
 }
 
+/// Definition and repetition levels of the values of a column.
+#[derive(Debug, PartialEq)]
+struct Levels {
+    definitions: Vec<i16>,
+    repetitions: Option<Vec<i16>>,
+}
+
 impl ParquetColumn {
-    /// A column.
-    pub(super) fn new(name: impl Into<String>, kind: ColumnType, shape: &[usize]) -> Self {
-        Self { name: name.into(), kind, shape: shape.to_vec() }
+    pub(super) fn new(name: impl Into<String>, column_type: ColumnType, shape: &[usize]) -> Self {
+        Self { name: name.into(), column_type, shape: shape.to_vec() }
     }
 
-    /// The column in Parquet's language of schemas. Everything may be null, as Arrow's writers have it, and nothing is.
-    fn declared(&self) -> String {
-        let mut text = match self.kind {
-            ColumnType::Picture => {
+    /// Declaration in Parquet's schema language. All values are optional, as Arrow's writers declare them; none is null.
+    fn declaration(&self) -> String {
+        let mut text = match self.column_type {
+            ColumnType::Image => {
                 "optional group {} { optional binary bytes; optional binary path (STRING); }"
             }
             ColumnType::F32 => "optional float {};",
@@ -88,33 +96,33 @@ impl ParquetColumn {
     }
 
     /// Definition and repetition levels (Melnik et al. 2010) of `rows` rows.
-    fn levels(&self, rows: usize) -> (Vec<i16>, Option<Vec<i16>>) {
+    fn levels(&self, rows: usize) -> Levels {
         let depth = self.shape.len();
         let row: usize = self.shape.iter().product();
-        let definition = if self.kind == ColumnType::Picture { 2 } else { 2 * depth as i16 + 1 };
+        let definition = if self.column_type == ColumnType::Image { 2 } else { 2 * depth as i16 + 1 };
         let definitions = vec![definition; rows * row];
         if depth == 0 {
-            return (definitions, None);
+            return Levels { definitions, repetitions: None };
         }
-        // The outermost list that begins at a place of a row tells its level; the first place begins the row itself.
-        let level = |place: usize| {
-            let begins = |outer: usize| place.is_multiple_of(self.shape[outer + 1..].iter().product());
+        // The level of a value is that of the outermost list it begins; the first value begins the row itself.
+        let level = |position: usize| {
+            let begins = |outer: usize| position.is_multiple_of(self.shape[outer + 1..].iter().product());
             let outer = (0..depth).find(|outer| begins(*outer)).unwrap_or(depth - 1);
-            if place == 0 { 0 } else { outer as i16 + 1 }
+            if position == 0 { 0 } else { outer as i16 + 1 }
         };
         let one: Vec<i16> = (0..row).map(level).collect();
-        (definitions, Some(one.repeat(rows)))
+        Levels { definitions, repetitions: Some(one.repeat(rows)) }
     }
 }
 
-/// A file that is being written, one group of rows after the other.
+/// A file that is being written, one row group at a time.
 pub(super) struct ParquetTable {
     writer: SerializedFileWriter<File>,
     columns: Arc<[ParquetColumn]>,
     path: PathBuf,
 }
 
-/// What went wrong with a file.
+/// Converts an error about `path`, for `map_err`.
 fn failed(path: &Path) -> impl Fn(ParquetError) -> DatasetError {
     move |error| match error {
         ParquetError::External(inner) => match inner.downcast::<io::Error>() {
@@ -126,33 +134,33 @@ fn failed(path: &Path) -> impl Fn(ParquetError) -> DatasetError {
 }
 
 impl ParquetTable {
-    /// InitialCondition a file with what programs are to know of it: `notes`, by name.
+    /// Creates a file with `notes` as metadata.
     ///
     /// # Errors
-    /// The system refuses.
+    /// The file cannot be written.
     pub(super) fn create(
         path: PathBuf,
         columns: &Arc<[ParquetColumn]>,
-        notes: &[(&str, String)],
+        notes: &[KeyValueNote],
     ) -> Result<Self, DatasetError> {
         let mut schema = "message schema {".to_owned();
         for column in columns.iter() {
             // Writing into a string cannot fail.
-            let _ = write!(schema, " {}", column.declared());
+            let _ = write!(schema, " {}", column.declaration());
         }
         let schema = parse_message_type(&(schema + " }")).map_err(failed(&path))?;
-        let notes = notes.iter().map(|(name, text)| KeyValue::new((*name).to_owned(), text.clone()));
+        let notes = notes.iter().map(|note| KeyValue::new(note.key.to_owned(), note.value.clone()));
         let mut properties = WriterProperties::builder()
             .set_created_by(format!("softvt {}", env!("CARGO_PKG_VERSION")))
             .set_key_value_metadata(Some(notes.collect()))
-            // Pictures are compressed, and the numbers are few beside them.
+            // Images are compressed already and make up most of the file.
             .set_dictionary_enabled(false)
             .set_offset_index_disabled(true)
             .set_statistics_enabled(EnabledStatistics::None);
         for column in
-            columns.iter().filter(|column| column.kind == ColumnType::I64 && column.shape.is_empty())
+            columns.iter().filter(|column| column.column_type == ColumnType::I64 && column.shape.is_empty())
         {
-            // Readers skip episodes by them.
+            // Readers use these statistics to skip episodes.
             let place = ColumnPath::new(vec![column.name.clone()]);
             properties = properties.set_column_statistics_enabled(place, EnabledStatistics::Chunk);
         }
@@ -162,32 +170,32 @@ impl ParquetTable {
         Ok(Self { writer, columns: columns.clone(), path })
     }
 
-    /// Bytes of the file so far.
+    /// Bytes written so far.
     pub(super) fn bytes(&self) -> usize {
         self.writer.bytes_written()
     }
 
-    /// Adds a group of `rows` rows: the values of every column, in order.
+    /// Appends a row group of `rows` rows with the values of every column, in order.
     ///
     /// # Errors
-    /// The system refuses.
+    /// The file cannot be written.
     pub(super) fn append(&mut self, rows: usize, values: Vec<ColumnValues>) -> Result<(), DatasetError> {
         debug_assert_eq!(values.len(), self.columns.len());
-        let added = group(&mut self.writer, &self.columns, rows, values);
+        let added = append_row_group(&mut self.writer, &self.columns, rows, values);
         added.map_err(failed(&self.path))
     }
 
-    /// Ends the file; it is on disk then.
+    /// Completes and syncs the file.
     ///
     /// # Errors
-    /// The system refuses.
+    /// The file cannot be written.
     pub(super) fn finish(self) -> Result<(), DatasetError> {
         let file = self.writer.into_inner().map_err(failed(&self.path))?;
         file.sync_all().map_err(DatasetError::io("write", &self.path))
     }
 }
 
-fn group(
+fn append_row_group(
     writer: &mut SerializedFileWriter<File>,
     columns: &[ParquetColumn],
     rows: usize,
@@ -197,18 +205,20 @@ fn group(
     for (column, values) in columns.iter().zip(values) {
         let levels = column.levels(rows);
         match values {
-            ColumnValues::Pictures(pictures) => {
-                let (files, names): (Vec<ByteArray>, Vec<ByteArray>) =
-                    pictures.into_iter().map(|(file, name)| (file.into(), name.into_bytes().into())).unzip();
-                leaf::<ByteArrayType>(&mut group, &files, &levels)?;
-                leaf::<ByteArrayType>(&mut group, &names, &levels)?;
+            ColumnValues::Images(images) => {
+                let (files, names): (Vec<ByteArray>, Vec<ByteArray>) = images
+                    .into_iter()
+                    .map(|image| (image.png.into(), image.name.into_bytes().into()))
+                    .unzip();
+                write_leaf::<ByteArrayType>(&mut group, &files, &levels)?;
+                write_leaf::<ByteArrayType>(&mut group, &names, &levels)?;
             }
-            ColumnValues::F32(numbers) => leaf::<FloatType>(&mut group, &numbers, &levels)?,
-            ColumnValues::F64(numbers) => leaf::<DoubleType>(&mut group, &numbers, &levels)?,
-            ColumnValues::I64(numbers) => leaf::<Int64Type>(&mut group, &numbers, &levels)?,
+            ColumnValues::F32(numbers) => write_leaf::<FloatType>(&mut group, &numbers, &levels)?,
+            ColumnValues::F64(numbers) => write_leaf::<DoubleType>(&mut group, &numbers, &levels)?,
+            ColumnValues::I64(numbers) => write_leaf::<Int64Type>(&mut group, &numbers, &levels)?,
             ColumnValues::Text(texts) => {
                 let texts: Vec<ByteArray> = texts.into_iter().map(|text| text.into_bytes().into()).collect();
-                leaf::<ByteArrayType>(&mut group, &texts, &levels)?;
+                write_leaf::<ByteArrayType>(&mut group, &texts, &levels)?;
             }
         }
     }
@@ -216,14 +226,14 @@ fn group(
     Ok(())
 }
 
-fn leaf<T: DataType>(
+fn write_leaf<T: DataType>(
     group: &mut SerializedRowGroupWriter<'_, File>,
     values: &[T::T],
-    (definitions, repetitions): &(Vec<i16>, Option<Vec<i16>>),
+    levels: &Levels,
 ) -> Result<(), ParquetError> {
     let missing = || ParquetError::General("more columns than the schema has".to_owned());
     let mut column = group.next_column()?.ok_or_else(missing)?;
-    column.typed::<T>().write_batch(values, Some(definitions), repetitions.as_deref())?;
+    column.typed::<T>().write_batch(values, Some(&levels.definitions), levels.repetitions.as_deref())?;
     column.close()
 }
 
@@ -234,31 +244,38 @@ mod tests {
     use super::*;
 
     #[test]
-    fn levels_say_where_each_list_begins() {
+    fn levels_mark_the_beginnings_of_lists() {
         let cube = ParquetColumn::new("x", ColumnType::F32, &[2, 2, 3]);
-        let (definitions, repetitions) = cube.levels(2);
+        let Levels { definitions, repetitions } = cube.levels(2);
         assert_eq!(definitions, [7; 24]);
         let row = [0, 3, 3, 2, 3, 3, 1, 3, 3, 2, 3, 3];
         assert_eq!(repetitions, Some([row, row].concat()));
-        assert_eq!(ParquetColumn::new("x", ColumnType::I64, &[]).levels(2), (vec![1, 1], None));
+        assert_eq!(ParquetColumn::new("x", ColumnType::I64, &[]).levels(2).repetitions, None);
     }
 
     #[test]
-    fn every_kind_of_column_comes_back() {
+    fn every_type_of_column_is_read_back() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.parquet");
         let columns = [
-            ParquetColumn::new("picture", ColumnType::Picture, &[]),
+            ParquetColumn::new("image", ColumnType::Image, &[]),
             ParquetColumn::new("a/b", ColumnType::F32, &[2, 1]),
             ParquetColumn::new("count", ColumnType::I64, &[]),
             ParquetColumn::new("figure", ColumnType::F64, &[1]),
             ParquetColumn::new("tasks", ColumnType::Text, &[1]),
         ];
-        let mut table =
-            ParquetTable::create(path.clone(), &columns.into(), &[("note", "what".to_owned())]).unwrap();
+        let mut table = ParquetTable::create(
+            path.clone(),
+            &columns.into(),
+            &[KeyValueNote { key: "note", value: "what".to_owned() }],
+        )
+        .unwrap();
         for row in 0..2_i64 {
             let values = vec![
-                ColumnValues::Pictures(vec![(vec![137, row as u8], "x.png".to_owned())]),
+                ColumnValues::Images(vec![EmbeddedImage {
+                    png: vec![137, row as u8],
+                    name: "x.png".to_owned(),
+                }]),
                 ColumnValues::F32(vec![0.5, row as f32]),
                 ColumnValues::I64(vec![row]),
                 ColumnValues::F64(vec![0.1]),
@@ -281,8 +298,8 @@ mod tests {
     }
 
     #[test]
-    fn a_full_disk_is_told_with_the_file() {
-        // A device on which nothing ever fits; other systems have none.
+    fn the_error_of_a_full_disk_names_the_file() {
+        // A device that is always full; not available on all systems.
         let full = Path::new("/dev/full");
         if !full.exists() {
             return;

@@ -1,4 +1,4 @@
-//! Which demonstrations of a data set become episodes.
+//! Selection of the demonstrations that become episodes.
 
 use std::{
     collections::BTreeSet,
@@ -12,104 +12,107 @@ use crate::dataset::{
     manifest::{self, ManifestEntry},
 };
 
+/// Size of an image, pixels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct ImageSize {
+    pub height: usize,
+    pub width: usize,
+}
+
 /// A demonstration that becomes an episode.
 #[derive(Clone, Debug)]
 pub(super) struct SelectedDemo {
     /// Its HDF5 file.
     pub path: PathBuf,
-    /// Its line of the manifest.
     pub entry: ManifestEntry,
-    /// Index of its instruction among [`Selection::prompts`].
-    pub task: usize,
-    /// Steps of the episodes before it.
-    pub first: usize,
+    /// Index of its instruction in [`Selection::prompts`].
+    pub prompt: usize,
+    /// Number of steps in the episodes before it.
+    pub first_frame: usize,
 }
 
-/// What is exported.
+/// Demonstrations to export.
 #[derive(Clone, Debug)]
 pub(super) struct Selection {
-    /// The demonstrations, in the order of the manifest.
-    pub sources: Vec<SelectedDemo>,
-    /// Their instructions, each once, in the order in which they come.
+    /// In the order of the manifest.
+    pub demos: Vec<SelectedDemo>,
+    /// Distinct instructions in order of appearance.
     pub prompts: Vec<String>,
-    /// Height and width of the pictures of both cameras in the first of them.
-    pub sizes: [[usize; 2]; 2],
+    /// Image sizes of both cameras in the first demonstration.
+    pub image_sizes: [ImageSize; 2],
 }
 
-/// Chooses the demonstrations of a finished recording whose task fits one of the words: an index, or part of a prompt. All if
-/// there are no words.
+/// Selects the demonstrations whose task matches one of `words`, each an index or part of a prompt; all if `words` is empty.
 ///
 /// # Errors
-/// It is none, has no pictures, or a word fits no task.
-pub(super) fn choose(root: &Path, words: &[String]) -> Result<Selection, DatasetError> {
+/// The folder is not a finished recording, has no images, or a word matches no task.
+pub(super) fn select(root: &Path, words: &[String]) -> Result<Selection, DatasetError> {
     let card_path = root.join(DATASET);
     if !card_path.is_file() {
-        let what = "it is not there; expected the folder of a finished softvt record";
+        let what = "it is missing; expected the folder of a finished softvt record";
         return Err(DatasetError::content(root, DATASET, what));
     }
-    let card = Card::read(root)?;
-    if !card.has_images {
-        let what = "its pictures are only videos, which have lost something; record it with --images hdf5";
+    if !Card::read(root)?.has_images {
+        let what = "images are stored only as videos, whose compression is lossy; record with --images hdf5";
         return Err(DatasetError::content(&card_path, "pictures", what));
     }
-    let entries = fitting(root, manifest::read(root)?, words)?;
+    let entries = matching_entries(root, manifest::read(root)?, words)?;
     let mut seen = BTreeSet::new();
     if let Some(twice) = entries.iter().find(|entry| !seen.insert((&entry.hdf5_path, entry.demo_id))) {
-        let what = format!("{} demo_{} is there twice", twice.hdf5_path, twice.demo_id);
+        let what = format!("{} demo_{} is listed twice", twice.hdf5_path, twice.demo_id);
         return Err(DatasetError::content(&root.join(MANIFEST), "lines", what));
     }
     drop(seen);
-    let (mut sources, mut prompts, mut first) = (Vec::new(), Vec::<String>::new(), 0);
+    let (mut demos, mut prompts, mut first_frame) = (Vec::new(), Vec::<String>::new(), 0);
     for entry in entries {
         let known = prompts.iter().position(|prompt| *prompt == entry.language);
-        let task = known.unwrap_or(prompts.len());
+        let prompt = known.unwrap_or(prompts.len());
         if known.is_none() {
             prompts.push(entry.language.clone());
         }
         let steps = entry.num_samples;
-        sources.push(SelectedDemo { path: root.join(&entry.hdf5_path), entry, task, first });
-        first += steps;
+        demos.push(SelectedDemo { path: root.join(&entry.hdf5_path), entry, prompt, first_frame });
+        first_frame += steps;
     }
-    let Some(one) = sources.first() else {
-        return Err(DatasetError::content(&root.join(MANIFEST), "lines", "there are none"));
+    let Some(first) = demos.first() else {
+        return Err(DatasetError::content(&root.join(MANIFEST), "lines", "it is empty"));
     };
-    let sizes = sizes(one)?;
-    Ok(Selection { sources, prompts, sizes })
+    let image_sizes = image_sizes(first)?;
+    Ok(Selection { demos, prompts, image_sizes })
 }
 
-fn fitting(
+fn matching_entries(
     root: &Path,
     entries: Vec<ManifestEntry>,
     words: &[String],
 ) -> Result<Vec<ManifestEntry>, DatasetError> {
-    let fits = |entry: &ManifestEntry, word: &str| match word.parse::<usize>() {
+    let matches = |entry: &ManifestEntry, word: &str| match word.parse::<usize>() {
         Ok(index) => entry.task_id == index,
         Err(_) => entry.language.contains(word),
     };
     for word in words {
-        if word.trim().is_empty() || !entries.iter().any(|entry| fits(entry, word)) {
-            let mut known: Vec<usize> = entries.iter().map(|entry| entry.task_id).collect();
-            known.sort_unstable();
-            known.dedup();
+        if word.trim().is_empty() || !entries.iter().any(|entry| matches(entry, word)) {
+            let known: BTreeSet<usize> = entries.iter().map(|entry| entry.task_id).collect();
             let known: Vec<String> = known.iter().map(usize::to_string).collect();
             let what = format!(
-                "no task fits --task {word:?}: expected an index or part of a prompt; there are {}",
+                "--task {word:?} matches no task: expected an index or part of a prompt; there are {}",
                 known.join(", ")
             );
             return Err(DatasetError::content(root, MANIFEST, what));
         }
     }
-    let wanted = |entry: &ManifestEntry| words.is_empty() || words.iter().any(|word| fits(entry, word));
-    Ok(entries.into_iter().filter(wanted).collect())
+    let is_selected =
+        |entry: &ManifestEntry| words.is_empty() || words.iter().any(|word| matches(entry, word));
+    Ok(entries.into_iter().filter(is_selected).collect())
 }
 
-/// Height and width of the pictures of both cameras.
-fn sizes(source: &SelectedDemo) -> Result<[[usize; 2]; 2], DatasetError> {
-    let file = TaskFile::open(&source.path)?;
-    let mut sizes = [[0; 2]; 2];
+/// Image sizes of both cameras.
+fn image_sizes(demo: &SelectedDemo) -> Result<[ImageSize; 2], DatasetError> {
+    let file = TaskFile::open(&demo.path)?;
+    let mut sizes = [ImageSize::default(); 2];
     for (size, name) in sizes.iter_mut().zip(IMAGE_STREAMS) {
-        let block = file.images(source.entry.demo_id, &format!("obs/{name}"), 0..1)?;
-        *size = [block.height, block.width];
+        let block = file.images(demo.entry.demo_id, &format!("obs/{name}"), 0..1)?;
+        *size = ImageSize { height: block.height, width: block.width };
     }
     Ok(sizes)
 }

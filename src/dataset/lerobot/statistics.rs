@@ -1,32 +1,31 @@
-//! What numbers are like as a whole, in the ten figures that LeRobot keeps of each feature.
+//! The statistics that LeRobot stores per feature: count, extremes, mean, standard deviation and quantiles.
 
 use serde::Serialize;
 
 use crate::evaluation::statistics::{quantile, quantile_by};
 
-/// Names of the quantiles, and the quantiles.
-pub(super) const QUANTILES: [(&str, f64); 5] =
-    [("q01", 0.01), ("q10", 0.10), ("q50", 0.50), ("q90", 0.90), ("q99", 0.99)];
+/// The quantiles and their names.
+const QUANTILES: [f64; 5] = [0.01, 0.10, 0.50, 0.90, 0.99];
+const QUANTILE_NAMES: [&str; 5] = ["q01", "q10", "q50", "q90", "q99"];
 
-/// Extremes, mean and spread of numbers.
+/// Count, extremes, mean and sum of squared deviations of numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct RunningMoments {
+pub(super) struct ValueMoments {
     count: f64,
     min: f64,
     max: f64,
     mean: f64,
-    /// Sum of the squared distances from the mean.
-    squares: f64,
+    /// Sum of squared deviations from the mean.
+    squared_deviations: f64,
 }
 
-impl RunningMoments {
-    /// Of no numbers.
-    const NONE: Self =
-        Self { count: 0.0, min: f64::INFINITY, max: f64::NEG_INFINITY, mean: 0.0, squares: 0.0 };
+impl ValueMoments {
+    const EMPTY: Self =
+        Self { count: 0.0, min: f64::INFINITY, max: f64::NEG_INFINITY, mean: 0.0, squared_deviations: 0.0 };
 
-    /// Of numbers that each stand for as many as is said: in two passes, so that what never changes has no spread at all.
+    /// Moments of (number, multiplicity) pairs. Two passes, so that constant numbers have a deviation of exactly 0.
     fn weighted(numbers: impl Iterator<Item = (f64, f64)> + Clone) -> Self {
-        let mut all = Self::NONE;
+        let mut all = Self::EMPTY;
         let mut sum = 0.0;
         for (x, weight) in numbers.clone() {
             all.count += weight;
@@ -35,47 +34,46 @@ impl RunningMoments {
             sum += weight * x;
         }
         if all.count > 0.0 {
-            // Rounding must not push the mean of equal numbers beyond them.
+            // Rounding must not move the mean of equal numbers away from them.
             all.mean = (sum / all.count).clamp(all.min, all.max);
-            all.squares = numbers.map(|(x, weight)| weight * (x - all.mean).powi(2)).sum();
+            all.squared_deviations = numbers.map(|(x, weight)| weight * (x - all.mean).powi(2)).sum();
         }
         all
     }
 
-    /// Of numbers.
     pub(super) fn of(numbers: impl Iterator<Item = f64> + Clone) -> Self {
         Self::weighted(numbers.map(|x| (x, 1.0)))
     }
 
-    /// Of these and the others (Chan, Golub and LeVeque 1979).
+    /// Combines two sets (Chan, Golub and LeVeque 1979).
     pub(super) fn merge(&mut self, other: &Self) {
         let count = self.count + other.count;
         if other.count == 0.0 {
             return;
         }
-        let apart = other.mean - self.mean;
+        let difference = other.mean - self.mean;
         let share = other.count / count;
-        self.squares += other.squares + apart * apart * self.count * share;
-        self.mean += apart * share;
+        self.squared_deviations += other.squared_deviations + difference * difference * self.count * share;
+        self.mean += difference * share;
         self.min = self.min.min(other.min);
         self.max = self.max.max(other.max);
         self.count = count;
     }
 
-    fn deviation(&self) -> f64 {
-        (self.squares / self.count.max(1.0)).sqrt()
+    fn standard_deviation(&self) -> f64 {
+        (self.squared_deviations / self.count.max(1.0)).sqrt()
     }
 
-    /// Of all numbers of several.
-    pub(super) fn together<'a>(all: impl Iterator<Item = &'a Self>) -> Self {
-        all.fold(Self::NONE, |mut sum, one| {
+    /// Moments of the union of several sets.
+    pub(super) fn merged<'a>(all: impl Iterator<Item = &'a Self>) -> Self {
+        all.fold(Self::EMPTY, |mut sum, one| {
             sum.merge(one);
             sum
         })
     }
 }
 
-/// How often each of evenly spaced numbers from zero on occurs.
+/// Histogram of the numbers 0, `step`, 2 `step`, …
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct ValueCounts {
     step: f64,
@@ -83,19 +81,18 @@ pub(super) struct ValueCounts {
 }
 
 impl ValueCounts {
-    /// Empty, with `bins` numbers `step` apart.
     pub(super) fn new(step: f64, bins: usize) -> Self {
         Self { step, counts: vec![0; bins] }
     }
 
-    /// Counts the number with an index.
+    /// Counts the number `bin · step`.
     pub(super) fn count(&mut self, bin: usize) {
         self.counts[bin] += 1;
     }
 
-    /// Counts the number that is nearest.
+    /// Counts the nearest number.
     pub(super) fn count_nearest(&mut self, x: f64) {
-        // Casts saturate: what is below is counted as the first.
+        // The cast saturates at 0.
         let bin = (x / self.step).round() as usize;
         let last = self.counts.len() - 1;
         self.counts[bin.min(last)] += 1;
@@ -106,157 +103,163 @@ impl ValueCounts {
         seen.map(|(bin, count)| (bin as f64 * self.step, *count as f64))
     }
 
-    /// The number at a place in their order.
-    fn at(&self, place: u64) -> f64 {
+    /// The number at a rank in ascending order.
+    fn at_rank(&self, rank: u64) -> f64 {
         let mut before = 0;
         let bin = self.counts.iter().position(|count| {
             before += count;
-            before > place
+            before > rank
         });
         bin.unwrap_or(self.counts.len() - 1) as f64 * self.step
     }
 }
 
-/// What quantiles are taken from.
+/// Numbers from which quantiles are computed.
 #[derive(Clone, Debug, PartialEq)]
-enum ColumnStatistics {
-    /// None are.
+enum QuantileSource {
     None,
-    /// All the numbers.
     All(Vec<f64>),
-    /// How often each occurs.
-    ValueCounts(ValueCounts),
+    Counts(ValueCounts),
 }
 
-/// Numbers as a whole.
+/// Statistics of a set of numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct ValueStatistics {
-    moments: RunningMoments,
-    spread: ColumnStatistics,
+    moments: ValueMoments,
+    quantile_source: QuantileSource,
 }
 
 impl ValueStatistics {
-    /// Of numbers that are kept.
+    /// Exact statistics; keeps the numbers.
     pub(super) fn of(numbers: Vec<f64>) -> Self {
-        Self { moments: RunningMoments::of(numbers.iter().copied()), spread: ColumnStatistics::All(numbers) }
-    }
-
-    /// Of numbers that were counted, all of which are among those of the tally.
-    pub(super) fn counted(tally: ValueCounts) -> Self {
         Self {
-            moments: RunningMoments::weighted(tally.numbers()),
-            spread: ColumnStatistics::ValueCounts(tally),
+            moments: ValueMoments::of(numbers.iter().copied()),
+            quantile_source: QuantileSource::All(numbers),
         }
     }
 
-    /// Of numbers whose quantiles are taken from those nearest to them in a tally.
-    pub(super) fn near(moments: RunningMoments, tally: ValueCounts) -> Self {
-        Self { moments, spread: ColumnStatistics::ValueCounts(tally) }
+    /// Exact statistics of counted numbers.
+    pub(super) fn counted(counts: ValueCounts) -> Self {
+        Self {
+            moments: ValueMoments::weighted(counts.numbers()),
+            quantile_source: QuantileSource::Counts(counts),
+        }
     }
 
-    /// Without quantiles.
-    pub(super) fn bare(moments: RunningMoments) -> Self {
-        Self { moments, spread: ColumnStatistics::None }
+    /// Exact moments, with quantiles of rounded numbers.
+    pub(super) fn rounded(moments: ValueMoments, counts: ValueCounts) -> Self {
+        Self { moments, quantile_source: QuantileSource::Counts(counts) }
     }
 
-    /// Of these and the others, which are kept in the same way.
+    pub(super) fn without_quantiles(moments: ValueMoments) -> Self {
+        Self { moments, quantile_source: QuantileSource::None }
+    }
+
+    /// Combines two sets of the same kind.
     pub(super) fn merge(&mut self, other: &Self) {
         self.moments.merge(&other.moments);
-        match (&mut self.spread, &other.spread) {
-            (ColumnStatistics::All(numbers), ColumnStatistics::All(more)) => numbers.extend(more),
-            (ColumnStatistics::ValueCounts(tally), ColumnStatistics::ValueCounts(more)) => {
-                tally.counts.iter_mut().zip(&more.counts).for_each(|(count, more)| *count += more);
+        match (&mut self.quantile_source, &other.quantile_source) {
+            (QuantileSource::All(numbers), QuantileSource::All(more)) => numbers.extend(more),
+            (QuantileSource::Counts(counts), QuantileSource::Counts(more)) => {
+                counts.counts.iter_mut().zip(&more.counts).for_each(|(count, more)| *count += more);
             }
             _ => {}
         }
     }
 
-    /// Quantiles as [`QUANTILES`]: linear between neighbours, as numpy takes them. None if they are not kept.
+    /// [`QUANTILES`] with linear interpolation, as in numpy; `None` if they are not wanted.
     fn quantiles(&self) -> Option<[f64; 5]> {
-        match &self.spread {
-            ColumnStatistics::None => None,
-            ColumnStatistics::All(numbers) => {
+        match &self.quantile_source {
+            QuantileSource::None => None,
+            QuantileSource::All(numbers) => {
                 let mut sorted = numbers.clone();
                 sorted.sort_by(f64::total_cmp);
-                Some(QUANTILES.map(|(_, q)| quantile(&sorted, q).unwrap_or(f64::NAN)))
+                Some(QUANTILES.map(|q| quantile(&sorted, q).unwrap_or(f64::NAN)))
             }
-            ColumnStatistics::ValueCounts(tally) => {
+            QuantileSource::Counts(counts) => {
                 let count = self.moments.count as usize;
-                let at = |rank: usize| tally.at(rank as u64);
-                Some(QUANTILES.map(|(_, q)| quantile_by(count, at, q).unwrap_or(f64::NAN)))
+                let at = |rank: usize| counts.at_rank(rank as u64);
+                Some(QUANTILES.map(|q| quantile_by(count, at, q).unwrap_or(f64::NAN)))
             }
         }
     }
 }
 
-/// A feature as a whole: a summary of each of its numbers, in the order of `shape`.
+/// Statistics of a feature.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct FeatureStatistics {
-    /// Its name.
     pub name: &'static str,
     /// Shape of each figure.
     pub shape: Vec<usize>,
-    /// Steps it is of.
+    /// Number of steps.
     pub steps: u64,
-    /// The parts.
+    /// Statistics of each number, in the order of `shape`.
     pub parts: Vec<ValueStatistics>,
 }
 
-/// The figures of a feature.
+/// One statistic of a feature, with a value for each number of `shape`.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Figures {
-    /// Name of the feature.
+pub(super) struct Figure {
+    pub name: &'static str,
+    pub values: Vec<f64>,
+}
+
+/// Statistics of a feature, in LeRobot's form.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct FeatureFigures {
     pub name: &'static str,
     /// Shape of each figure.
     pub shape: Vec<usize>,
-    /// Steps it is of.
+    /// Number of steps.
     pub steps: u64,
-    /// `min`, `max`, `mean`, `std`, and, where they are kept, quantiles, each of `shape`.
-    pub figures: Vec<(&'static str, Vec<f64>)>,
+    /// `min`, `max`, `mean`, `std` and, if available, quantiles.
+    pub figures: Vec<Figure>,
 }
 
 impl FeatureStatistics {
-    /// Takes more steps in.
+    /// Adds the steps of another episode.
     pub(super) fn merge(&mut self, other: &Self) {
         self.steps += other.steps;
         self.parts.iter_mut().zip(&other.parts).for_each(|(part, more)| part.merge(more));
     }
 
-    /// The figures, with or without quantiles.
-    pub(super) fn figures(&self, quantiles: bool) -> Figures {
-        let each =
-            |pick: fn(&RunningMoments) -> f64| self.parts.iter().map(|part| pick(&part.moments)).collect();
+    pub(super) fn figures(&self, quantiles: bool) -> FeatureFigures {
+        let figure = |name, value: fn(&ValueMoments) -> f64| Figure {
+            name,
+            values: self.parts.iter().map(|part| value(&part.moments)).collect(),
+        };
         let mut figures = vec![
-            ("min", each(|m| m.min)),
-            ("max", each(|m| m.max)),
-            ("mean", each(|m| m.mean)),
-            ("std", each(RunningMoments::deviation)),
+            figure("min", |m| m.min),
+            figure("max", |m| m.max),
+            figure("mean", |m| m.mean),
+            figure("std", ValueMoments::standard_deviation),
         ];
-        let kept = self.parts.iter().map(ValueStatistics::quantiles).collect::<Option<Vec<[f64; 5]>>>();
-        if let Some(kept) = kept.filter(|_| quantiles) {
-            let named = QUANTILES.iter().enumerate();
-            figures.extend(named.map(|(at, (name, _))| (*name, kept.iter().map(|part| part[at]).collect())));
+        let available = self.parts.iter().map(ValueStatistics::quantiles).collect::<Option<Vec<[f64; 5]>>>();
+        if let Some(available) = available.filter(|_| quantiles) {
+            figures.extend(
+                QUANTILE_NAMES.iter().enumerate().map(|(at, name)| Figure {
+                    name,
+                    values: available.iter().map(|part| part[at]).collect(),
+                }),
+            );
         }
-        Figures { name: self.name, shape: self.shape.clone(), steps: self.steps, figures }
+        FeatureFigures { name: self.name, shape: self.shape.clone(), steps: self.steps, figures }
     }
 }
 
-/// Numbers as nested lists.
+/// Numbers in nested lists, as in JSON.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub(super) enum NestedList {
-    /// Whole.
     Whole(u64),
-    /// A number.
     Number(f64),
-    /// A number in as many digits as single precision needs.
+    /// Written with the digits of single precision.
     Single(f32),
-    /// A list.
     List(Vec<NestedList>),
 }
 
 impl NestedList {
-    /// Numbers in a shape.
+    /// Arranges numbers in row-major order into lists of `shape`.
     pub(super) fn new(numbers: &[f64], shape: &[usize], leaf: fn(f64) -> Self) -> Self {
         let Some((first, rest)) = shape.split_first() else {
             return leaf(numbers.first().copied().unwrap_or_default());
@@ -266,13 +269,13 @@ impl NestedList {
     }
 }
 
-impl Figures {
-    /// As JSON has them: figures by name, and `count`.
+impl FeatureFigures {
+    /// The figures by name, and `count`.
     pub(super) fn nested(&self, leaf: fn(f64) -> NestedList) -> Vec<(&'static str, NestedList)> {
         let count = ("count", NestedList::List(vec![NestedList::Whole(self.steps)]));
         let figures = self.figures.iter();
         figures
-            .map(|(name, numbers)| (*name, NestedList::new(numbers, &self.shape, leaf)))
+            .map(|figure| (figure.name, NestedList::new(&figure.values, &self.shape, leaf)))
             .chain([count])
             .collect()
     }
@@ -286,11 +289,11 @@ mod tests {
 
     fn figures(summary: ValueStatistics) -> Vec<f64> {
         let all = FeatureStatistics { name: "x", shape: vec![1], steps: 1, parts: vec![summary] };
-        all.figures(true).figures.into_iter().map(|(_, numbers)| numbers[0]).collect()
+        all.figures(true).figures.into_iter().map(|figure| figure.values[0]).collect()
     }
 
     #[test]
-    fn figures_are_those_that_numpy_gives() {
+    fn figures_agree_with_numpy() {
         // numpy.quantile([3, 1, 2, 10], [.01, .1, .5, .9, .99]), min, max, mean and std.
         let expected = [1.0, 10.0, 4.0, 3.535533905932738, 1.03, 1.3, 2.5, 7.9, 9.79];
         let found = figures(ValueStatistics::of(vec![3.0, 1.0, 2.0, 10.0]));
@@ -301,16 +304,16 @@ mod tests {
 
     proptest! {
         #[test]
-        fn counted_numbers_have_the_figures_of_numbers_that_are_kept(bytes in prop::collection::vec(0_u8.., 1..300)) {
-            let mut tally = ValueCounts::new(1.0 / 255.0, 256);
-            bytes.iter().for_each(|byte| tally.count(usize::from(*byte)));
+        fn counted_numbers_have_the_same_figures(bytes in prop::collection::vec(0_u8.., 1..300)) {
+            let mut counts = ValueCounts::new(1.0 / 255.0, 256);
+            bytes.iter().for_each(|byte| counts.count(usize::from(*byte)));
             let kept = figures(ValueStatistics::of(bytes.iter().map(|byte| f64::from(*byte) / 255.0).collect()));
-            let counted = figures(ValueStatistics::counted(tally));
+            let counted = figures(ValueStatistics::counted(counts));
             prop_assert!(kept.iter().zip(&counted).all(|(a, b)| (a - b).abs() < 1e-12), "{kept:?} {counted:?}");
         }
 
         #[test]
-        fn parts_together_have_the_figures_of_the_whole(
+        fn merged_parts_have_the_figures_of_the_whole(
             numbers in prop::collection::vec(-1e3..1e3_f64, 2..200), cut in 0.0..1.0,
         ) {
             let cut = (cut * numbers.len() as f64) as usize;
@@ -322,7 +325,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_nested_in_the_order_of_their_shape() {
+    fn numbers_are_nested_in_row_major_order() {
         let numbers: Vec<f64> = (0..6).map(f64::from).collect();
         let nested =
             serde_json::to_string(&NestedList::new(&numbers, &[3, 1, 2], NestedList::Number)).unwrap();

@@ -1,4 +1,4 @@
-//! LeRobotVersion 2.1: a table an episode, and lines of JSON about them.
+//! Version 2.1: one table per episode, and JSON lines about the episodes.
 
 use std::{
     collections::BTreeMap,
@@ -12,25 +12,22 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::{
-    ExportedEpisode, FeatureStatistics, FormatWriter,
+    config::CHUNK,
+    episode::{Episode, EpisodeWriter},
     features::{self, Feature},
-    meta::CHUNK,
-    parquet_table::{ParquetColumn, ParquetTable},
-    statistics::NestedList,
+    parquet_table::{KeyValueNote, ParquetColumn, ParquetTable},
+    statistics::{FeatureStatistics, NestedList},
 };
 use crate::{dataset::DatasetError, files};
 
-/// Where a table is, in Python's words.
-pub(super) const DATA_PATH: &str = "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet";
-
-/// A file of lines of JSON.
-struct Lines {
+/// Writes a file of JSON lines.
+struct JsonLinesWriter {
     file: BufWriter<File>,
     path: PathBuf,
 }
 
-impl Lines {
-    fn begin(path: PathBuf) -> Result<Self, DatasetError> {
+impl JsonLinesWriter {
+    fn create(path: PathBuf) -> Result<Self, DatasetError> {
         let file = File::create(&path).map_err(DatasetError::io("write", &path))?;
         Ok(Self { file: BufWriter::new(file), path })
     }
@@ -48,61 +45,58 @@ impl Lines {
     }
 }
 
-/// What is told of an episode's features.
+/// A line of `episodes_stats.jsonl`.
 #[derive(Serialize)]
-struct Line {
+struct StatisticsLine {
     episode_index: usize,
     stats: BTreeMap<&'static str, BTreeMap<&'static str, NestedList>>,
 }
 
-/// Writes it.
-pub(super) struct Writer {
+pub(super) struct Writer21 {
     dir: PathBuf,
     columns: Arc<[ParquetColumn]>,
-    note: (&'static str, String),
-    episodes: Lines,
-    stats: Lines,
+    note: KeyValueNote,
+    episodes: JsonLinesWriter,
+    stats: JsonLinesWriter,
 }
 
-impl Writer {
-    /// InitialCondition in a folder that is empty.
-    pub(super) fn begin(dir: &Path, features: &[Feature]) -> Result<Self, DatasetError> {
+impl Writer21 {
+    /// `dir` is empty.
+    pub(super) fn create(dir: &Path, features: &[Feature]) -> Result<Self, DatasetError> {
         files::create_folder(&dir.join("meta"))?;
         Ok(Self {
             dir: dir.to_owned(),
             columns: features.iter().map(Feature::column).collect(),
-            note: features::note(features),
-            episodes: Lines::begin(dir.join("meta/episodes.jsonl"))?,
-            stats: Lines::begin(dir.join("meta/episodes_stats.jsonl"))?,
+            note: features::hugging_face_note(features),
+            episodes: JsonLinesWriter::create(dir.join("meta/episodes.jsonl"))?,
+            stats: JsonLinesWriter::create(dir.join("meta/episodes_stats.jsonl"))?,
         })
     }
 }
 
-/// What LeRobot calls the picture of a step.
-fn picture(step: usize) -> String {
+/// LeRobot's name of the image of a step.
+fn image_name(step: usize) -> String {
     format!("frame_{step:06}.png")
 }
 
-impl FormatWriter for Writer {
-    fn add(&mut self, episode: ExportedEpisode<'_>) -> Result<(), DatasetError> {
-        let ExportedEpisode { index, source, rows, summaries } = episode;
-        let path = format!("data/chunk-{:03}/episode_{index:06}.parquet", index / CHUNK);
-        let path = self.dir.join(path);
+impl EpisodeWriter for Writer21 {
+    fn add(&mut self, episode: Episode<'_>) -> Result<(), DatasetError> {
+        let (index, steps) = (episode.index, episode.rows.steps);
+        let line = json!({ "episode_index": index, "tasks": [episode.demo.entry.language], "length": steps });
+        // The values were measured in single precision, and LeRobot reads this file completely.
+        let single = |x: f64| NestedList::Single(x as f32);
+        let named = |feature: &FeatureStatistics| {
+            let figures: BTreeMap<_, _> = feature.figures(false).nested(single).into_iter().collect();
+            (feature.name, figures)
+        };
+        let stats = episode.statistics.iter().map(named).collect();
+        let path = self.dir.join(format!("data/chunk-{:03}/episode_{index:06}.parquet", index / CHUNK));
         files::create_folder(path.parent().unwrap_or(&self.dir))?;
         let mut table = ParquetTable::create(path, &self.columns, std::slice::from_ref(&self.note))?;
-        let steps = rows.steps;
-        table.append(steps, ExportedEpisode::columns(rows, (index, source), picture))?;
+        table.append(steps, episode.into_columns(image_name))?;
         table.finish()?;
-        let told = json!({ "episode_index": index, "tasks": [source.entry.language], "length": steps });
-        self.episodes.add(&told)?;
-        // What was measured in single precision needs no more digits: this file is read whole.
-        let single = |x: f64| NestedList::Single(x as f32);
-        let named = |summary: &FeatureStatistics| {
-            let figures: BTreeMap<_, _> = summary.figures(false).nested(single).into_iter().collect();
-            (summary.name, figures)
-        };
-        let stats = summaries.iter().map(named).collect();
-        self.stats.add(&Line { episode_index: index, stats })
+        self.episodes.add(&line)?;
+        self.stats.add(&StatisticsLine { episode_index: index, stats })
     }
 
     fn finish(self: Box<Self>) -> Result<(), DatasetError> {

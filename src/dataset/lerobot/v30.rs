@@ -1,4 +1,4 @@
-//! LeRobotVersion 3.0: many episodes a table, a group of rows each, and tables about them.
+//! Version 3.0: many episodes per table, one row group each, and tables about the episodes.
 
 use std::{
     path::{Path, PathBuf},
@@ -8,76 +8,72 @@ use std::{
 use serde_json::{Map, Value, json};
 
 use super::{
-    ColumnValues, ExportedEpisode, FeatureStatistics, FormatWriter,
+    config::{CHUNK, MAX_TABLE_MB},
+    episode::{Episode, EpisodeWriter},
     features::{self, Feature},
-    meta::{self, CHUNK},
-    parquet_table::{ColumnType, ParquetColumn, ParquetTable},
-    statistics::{Figures, NestedList},
+    parquet_table::{ColumnType, ColumnValues, KeyValueNote, ParquetColumn, ParquetTable},
+    statistics::{FeatureFigures, FeatureStatistics, NestedList},
 };
 use crate::{dataset::DatasetError, files};
 
-/// Where a table is, in Python's words.
-pub(super) const DATA_PATH: &str = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet";
-/// A table ends before it is larger, MB of 2²⁰ bytes, unless one episode alone is.
-pub(super) const TABLE_MB: usize = 100;
-/// Episodes in a table about them: some 60 MB.
-const TOLD: usize = 10_000;
+/// Episodes per table about episodes: some 60 MB.
+const EPISODES_PER_TABLE: usize = 10_000;
 
-/// Makes the folder of the n-th file of a kind, and says where the file goes.
-fn place(dir: &Path, kind: &str, file: usize) -> Result<PathBuf, DatasetError> {
+/// Path of the n-th file of a kind; its folder is created.
+fn numbered_path(dir: &Path, kind: &str, file: usize) -> Result<PathBuf, DatasetError> {
     let folder = dir.join(format!("{kind}/chunk-{:03}", file / CHUNK));
     files::create_folder(&folder)?;
     Ok(folder.join(format!("file-{:03}.parquet", file % CHUNK)))
 }
 
-/// What is told of an episode.
-struct Told {
+/// Row of a table about episodes.
+struct EpisodeSummary {
     index: usize,
     prompt: String,
     steps: usize,
-    first: usize,
-    /// File of its rows.
+    first_frame: usize,
+    /// Number of the file that holds its rows.
     file: usize,
-    figures: Vec<Figures>,
+    figures: Vec<FeatureFigures>,
 }
 
-/// Writes it.
-pub(super) struct Writer {
+pub(super) struct Writer30 {
     dir: PathBuf,
     columns: Arc<[ParquetColumn]>,
-    note: (&'static str, String),
-    /// The table that is being written, and how many there were before it.
+    note: KeyValueNote,
+    /// The table that is being written, and its number.
     table: Option<ParquetTable>,
     file: usize,
-    told: Vec<Told>,
-    whole: Vec<FeatureStatistics>,
+    episodes: Vec<EpisodeSummary>,
+    /// Statistics of all episodes.
+    total: Vec<FeatureStatistics>,
 }
 
-impl Writer {
-    /// InitialCondition in a folder that is empty.
-    pub(super) fn begin(dir: &Path, features: &[Feature]) -> Result<Self, DatasetError> {
+impl Writer30 {
+    /// `dir` is empty.
+    pub(super) fn create(dir: &Path, features: &[Feature]) -> Result<Self, DatasetError> {
         files::create_folder(&dir.join("meta"))?;
         Ok(Self {
             dir: dir.to_owned(),
             columns: features.iter().map(Feature::column).collect(),
-            note: features::note(features),
+            note: features::hugging_face_note(features),
             table: None,
             file: 0,
-            told: Vec::new(),
-            whole: Vec::new(),
+            episodes: Vec::new(),
+            total: Vec::new(),
         })
     }
 
-    /// The table that takes `bytes` more.
+    /// A table with space for `bytes` more; a full one is finished first.
     fn table(&mut self, bytes: usize) -> Result<&mut ParquetTable, DatasetError> {
         let table = match self.table.take() {
-            Some(table) if table.bytes() + bytes <= TABLE_MB << 20 => table,
+            Some(table) if table.bytes() + bytes <= MAX_TABLE_MB << 20 => table,
             full => {
                 if let Some(full) = full {
                     full.finish()?;
                     self.file += 1;
                 }
-                let path = place(&self.dir, "data", self.file)?;
+                let path = numbered_path(&self.dir, "data", self.file)?;
                 ParquetTable::create(path, &self.columns, std::slice::from_ref(&self.note))?
             }
         };
@@ -85,86 +81,81 @@ impl Writer {
     }
 }
 
-/// What LeRobot calls the picture of a step.
-fn picture(step: usize) -> String {
+/// LeRobot's name of the image of a step.
+fn image_name(step: usize) -> String {
     format!("frame-{step:06}.png")
 }
 
-impl FormatWriter for Writer {
-    fn add(&mut self, episode: ExportedEpisode<'_>) -> Result<(), DatasetError> {
-        let ExportedEpisode { index, source, rows, summaries } = episode;
-        let steps = rows.steps;
-        let bytes = rows.pictures.iter().flatten().map(Vec::len).sum();
-        let values = ExportedEpisode::columns(rows, (index, source), picture);
-        self.table(bytes)?.append(steps, values)?;
-        self.told.push(Told {
+impl EpisodeWriter for Writer30 {
+    fn add(&mut self, mut episode: Episode<'_>) -> Result<(), DatasetError> {
+        let (index, demo, steps) = (episode.index, episode.demo, episode.rows.steps);
+        let statistics = std::mem::take(&mut episode.statistics);
+        let bytes = episode.rows.images.iter().flatten().map(Vec::len).sum();
+        self.table(bytes)?.append(steps, episode.into_columns(image_name))?;
+        self.episodes.push(EpisodeSummary {
             index,
-            prompt: source.entry.language.clone(),
+            prompt: demo.entry.language.clone(),
             steps,
-            first: source.first,
+            first_frame: demo.first_frame,
             file: self.file,
-            figures: summaries.iter().map(|s| s.figures(true)).collect(),
+            figures: statistics.iter().map(|feature| feature.figures(true)).collect(),
         });
-        if self.whole.is_empty() {
-            self.whole = summaries;
+        if self.total.is_empty() {
+            self.total = statistics;
         } else {
-            self.whole.iter_mut().zip(&summaries).for_each(|(whole, more)| whole.merge(more));
+            self.total.iter_mut().zip(&statistics).for_each(|(total, more)| total.merge(more));
         }
         Ok(())
     }
 
     fn finish(mut self: Box<Self>) -> Result<(), DatasetError> {
         self.table.take().map_or(Ok(()), ParquetTable::finish)?;
-        for (file, told) in self.told.chunks(TOLD).enumerate() {
-            episodes(&self.dir, file, told)?;
+        for (file, episodes) in self.episodes.chunks(EPISODES_PER_TABLE).enumerate() {
+            write_episode_table(&self.dir, file, episodes)?;
         }
-        let stats: Map<String, Value> = self.whole.iter().map(|s| stats(&s.figures(true))).collect();
-        meta::json(&self.dir.join("meta/stats.json"), &Value::Object(stats))
+        let stats: Map<String, Value> = self.total.iter().map(|f| json_entry(&f.figures(true))).collect();
+        Ok(files::write_json(&self.dir.join("meta/stats.json"), &stats)?)
     }
 }
 
-/// A feature in `stats.json`.
-fn stats(figures: &Figures) -> (String, Value) {
+/// Entry of a feature in `stats.json`.
+fn json_entry(figures: &FeatureFigures) -> (String, Value) {
     let named = figures.nested(NestedList::Number).into_iter();
-    let all: Map<String, Value> = named.map(|(name, nest)| (name.to_owned(), json!(nest))).collect();
+    let all: Map<String, Value> = named.map(|(name, list)| (name.to_owned(), json!(list))).collect();
     (figures.name.to_owned(), Value::Object(all))
 }
 
-/// Writes a table about episodes.
-fn episodes(dir: &Path, file: usize, told: &[Told]) -> Result<(), DatasetError> {
-    let whole = |name: &str, number: &dyn Fn(&Told) -> usize| {
-        let numbers = told.iter().map(|t| number(t) as i64).collect();
+fn write_episode_table(dir: &Path, file: usize, episodes: &[EpisodeSummary]) -> Result<(), DatasetError> {
+    let integers = |name: &str, number: &dyn Fn(&EpisodeSummary) -> usize| {
+        let numbers = episodes.iter().map(|episode| number(episode) as i64).collect();
         (ParquetColumn::new(name, ColumnType::I64, &[]), ColumnValues::I64(numbers))
     };
-    let prompts = told.iter().map(|t| t.prompt.clone()).collect();
+    let prompts = episodes.iter().map(|episode| episode.prompt.clone()).collect();
     let mut all = vec![
-        whole("episode_index", &|t| t.index),
+        integers("episode_index", &|e| e.index),
         (ParquetColumn::new("tasks", ColumnType::Text, &[1]), ColumnValues::Text(prompts)),
-        whole("length", &|t| t.steps),
-        whole("data/chunk_index", &|t| t.file / CHUNK),
-        whole("data/file_index", &|t| t.file % CHUNK),
-        whole("dataset_from_index", &|t| t.first),
-        whole("dataset_to_index", &|t| t.first + t.steps),
+        integers("length", &|e| e.steps),
+        integers("data/chunk_index", &|e| e.file / CHUNK),
+        integers("data/file_index", &|e| e.file % CHUNK),
+        integers("dataset_from_index", &|e| e.first_frame),
+        integers("dataset_to_index", &|e| e.first_frame + e.steps),
     ];
-    for (at, feature) in told.first().map_or(&[][..], |first| &first.figures).iter().enumerate() {
-        for (which, (figure, _)) in feature.figures.iter().enumerate() {
-            let column = ParquetColumn::new(
-                format!("stats/{}/{figure}", feature.name),
-                ColumnType::F64,
-                &feature.shape,
-            );
-            let numbers = told.iter().flat_map(|t| t.figures[at].figures[which].1.iter().copied());
+    for (at, feature) in episodes.first().map_or(&[][..], |first| &first.figures).iter().enumerate() {
+        for (which, figure) in feature.figures.iter().enumerate() {
+            let name = format!("stats/{}/{}", feature.name, figure.name);
+            let column = ParquetColumn::new(name, ColumnType::F64, &feature.shape);
+            let numbers = episodes.iter().flat_map(|e| e.figures[at].figures[which].values.iter().copied());
             all.push((column, ColumnValues::F64(numbers.collect())));
         }
-        let counts = told.iter().map(|t| t.figures[at].steps as i64).collect();
+        let counts = episodes.iter().map(|e| e.figures[at].steps as i64).collect();
         let name = format!("stats/{}/count", feature.name);
         all.push((ParquetColumn::new(name, ColumnType::I64, &[1]), ColumnValues::I64(counts)));
     }
-    all.push(whole("meta/episodes/chunk_index", &|_| file / CHUNK));
-    all.push(whole("meta/episodes/file_index", &|_| file % CHUNK));
+    all.push(integers("meta/episodes/chunk_index", &|_| file / CHUNK));
+    all.push(integers("meta/episodes/file_index", &|_| file % CHUNK));
     let (columns, values): (Vec<ParquetColumn>, Vec<ColumnValues>) = all.into_iter().unzip();
-    let path = place(dir, "meta/episodes", file)?;
+    let path = numbered_path(dir, "meta/episodes", file)?;
     let mut table = ParquetTable::create(path, &columns.into(), &[])?;
-    table.append(told.len(), values)?;
+    table.append(episodes.len(), values)?;
     table.finish()
 }

@@ -1,0 +1,79 @@
+//! Options of an export, and constants of the two layouts.
+
+use std::path::PathBuf;
+
+/// Version of LeRobot's dataset layout.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LeRobotVersion {
+    /// One table per episode; used by openpi and SoftVTBench.
+    V21,
+    /// Many episodes per table; LeRobot's own since 0.4.
+    V30,
+}
+
+/// Encoding of the gripper in the seventh number of an action.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GripperCoding {
+    /// Closure, 0 open to 1 closed.
+    Continuous,
+    /// 1 while the gripper is commanded to hold, else 0.
+    Binary,
+}
+
+/// Options of an export.
+#[derive(Clone, Debug)]
+pub struct ExportConfig {
+    /// Folder of a finished recording.
+    pub data: PathBuf,
+    /// Output folder; must not exist or be empty.
+    pub out: PathBuf,
+    pub version: LeRobotVersion,
+    pub gripper: GripperCoding,
+    /// Tasks to export, each an index or part of a prompt; empty for all.
+    pub tasks: Vec<String>,
+    /// Number of threads. The files do not depend on it.
+    pub threads: usize,
+}
+
+/// Size of an exported dataset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ExportSummary {
+    pub episodes: usize,
+    /// Rows of all episodes.
+    pub frames: usize,
+    /// Distinct prompts.
+    pub tasks: usize,
+}
+
+/// Files per folder.
+pub(super) const CHUNK: usize = 1000;
+/// Largest table of version 3.0, MB of 2²⁰ bytes, unless a single episode is larger.
+pub(super) const MAX_TABLE_MB: usize = 100;
+
+impl LeRobotVersion {
+    /// Version in `info.json`.
+    pub(super) fn code(self) -> &'static str {
+        match self {
+            Self::V21 => "v2.1",
+            Self::V30 => "v3.0",
+        }
+    }
+
+    /// Template of the paths of tables, as a Python format string.
+    pub(super) fn data_path(self) -> &'static str {
+        match self {
+            Self::V21 => "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet",
+            Self::V30 => "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet",
+        }
+    }
+}
+
+impl GripperCoding {
+    /// Name in `softvt.jsonl`.
+    pub(super) fn code(self) -> &'static str {
+        match self {
+            Self::Continuous => "continuous",
+            Self::Binary => "binary",
+        }
+    }
+}
