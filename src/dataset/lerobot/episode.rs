@@ -17,7 +17,7 @@ use crate::{
         DatasetError, FloatRows, ImageBlock, TaskFile, demonstration_writer::frame_rate,
         layout::IMAGE_STREAMS,
     },
-    sensing::tactile::{HISTORY_LENGTH, MARKER_COUNT, MosaicLayout, IMAGE_SIZE, mosaic, mosaic_cell},
+    sensing::tactile::{HISTORY_LENGTH, IMAGE_SIZE, MARKER_COUNT, MosaicLayout, mosaic, mosaic_cell},
 };
 
 /// Images decompressed at once: whole chunks of the file.
