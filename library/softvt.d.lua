@@ -304,10 +304,10 @@
 ---@field scale? number[] The first six numbers are multiplied by these first. Expects a list of 6 numbers.
 ---@field offset? number[] Then these are added. Expects a list of 6 numbers.
 ---@field length? integer How many numbers an action must have, padding included; any from 7 on if left out. Expects a whole number in 7..4096.
----@field gripper softvt.GripperEncoding The seventh number.
+---@field gripper softvt.GripperValues The seventh number.
 
 ---The seventh number of an action: one value opens, one shuts, those between in proportion.
----@class softvt.GripperEncoding
+---@class softvt.GripperValues
 ---@field open number The value that opens. Expects a number.
 ---@field shut number The value that shuts. Expects a number.
 ---@field binary? boolean Whether all beyond the middle shuts and all else opens. Default false.

@@ -76,8 +76,24 @@ pub enum Split {
     Experiment,
 }
 
+/// A name is not that of a split.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("expected {}", Split::ALL.map(Split::name).join(", "))]
+pub struct UnknownSplit;
+
+impl std::str::FromStr for Split {
+    type Err = UnknownSplit;
+
+    fn from_str(name: &str) -> Result<Self, UnknownSplit> {
+        Self::ALL.into_iter().find(|split| split.name() == name).ok_or(UnknownSplit)
+    }
+}
+
 impl Split {
-    /// Its name in seeds and results.
+    /// Every split.
+    pub const ALL: [Self; 3] = [Self::Validation, Self::Demonstration, Self::Experiment];
+
+    /// Name in seeds and results.
     pub fn name(self) -> &'static str {
         match self {
             Self::Validation => "validation",
@@ -108,12 +124,12 @@ impl EpisodeSeed {
         let split = self.split.name();
         let episode = self.episode.to_string();
         let base = self.base.to_string();
-        keyed(&["softvt episode", &self.suite, &self.layout, &episode, &base, split, stream.name()])
+        keyed_rng(&["softvt episode", &self.suite, &self.layout, &episode, &base, split, stream.name()])
     }
 }
 
 /// The generator named by `parts`; their lengths count, so that no two lists of parts run together.
-pub fn keyed(parts: &[&str]) -> ChaCha8Rng {
+pub fn keyed_rng(parts: &[&str]) -> ChaCha8Rng {
     let mut hash = Sha256::new();
     for part in parts {
         hash.update((part.len() as u64).to_le_bytes());
@@ -123,19 +139,19 @@ pub fn keyed(parts: &[&str]) -> ChaCha8Rng {
 }
 
 /// Uniform in [0, 1), 53 bits.
-pub fn unit(rng: &mut ChaCha8Rng) -> f64 {
+pub fn uniform(rng: &mut ChaCha8Rng) -> f64 {
     (rng.next_u64() >> 11) as f64 / (1u64 << 53) as f64
 }
 
 /// Standard normal (Box and Muller, 1958).
-pub fn normal(rng: &mut ChaCha8Rng) -> f64 {
+pub fn standard_normal(rng: &mut ChaCha8Rng) -> f64 {
     // 1 − u lies in (0, 1], where the logarithm is finite.
-    let radius = (-2.0 * (1.0 - unit(rng)).ln()).sqrt();
-    radius * (std::f64::consts::TAU * unit(rng)).cos()
+    let radius = (-2.0 * (1.0 - uniform(rng)).ln()).sqrt();
+    radius * (std::f64::consts::TAU * uniform(rng)).cos()
 }
 
 /// Uniform over the integers `low..=high`, without bias (rejection). `low` must not exceed `high`.
-pub fn integer(rng: &mut ChaCha8Rng, low: i64, high: i64) -> i64 {
+pub fn uniform_integer(rng: &mut ChaCha8Rng, low: i64, high: i64) -> i64 {
     let span = (high as u64).wrapping_sub(low as u64);
     if span == u64::MAX {
         return rng.next_u64() as i64;
@@ -175,8 +191,8 @@ mod tests {
 
     #[test]
     fn normal_draws_have_mean_zero_and_variance_one() {
-        let mut rng = keyed(&["test"]);
-        let draws: Vec<f64> = (0..20_000).map(|_| normal(&mut rng)).collect();
+        let mut rng = keyed_rng(&["test"]);
+        let draws: Vec<f64> = (0..20_000).map(|_| standard_normal(&mut rng)).collect();
         let mean = draws.iter().sum::<f64>() / draws.len() as f64;
         let variance = draws.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / draws.len() as f64;
         assert!(mean.abs() < 0.03 && (variance - 1.0).abs() < 0.04, "{mean} {variance}");
@@ -184,10 +200,10 @@ mod tests {
 
     #[test]
     fn integers_cover_their_range_evenly() {
-        let mut rng = keyed(&["integers"]);
+        let mut rng = keyed_rng(&["integers"]);
         let mut counts = [0; 5];
-        (0..50_000).for_each(|_| counts[(integer(&mut rng, -2, 2) + 2) as usize] += 1);
+        (0..50_000).for_each(|_| counts[(uniform_integer(&mut rng, -2, 2) + 2) as usize] += 1);
         assert!(counts.iter().all(|c| (9_600..10_400).contains(c)), "{counts:?}");
-        assert_eq!(integer(&mut rng, i64::MIN, i64::MIN), i64::MIN);
+        assert_eq!(uniform_integer(&mut rng, i64::MIN, i64::MIN), i64::MIN);
     }
 }

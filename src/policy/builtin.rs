@@ -1,15 +1,15 @@
-//! Policies that need no one: the two baselines that must fail.
+//! Policies without a model: two baselines that must fail, and the replay of recorded commands.
 
-use rand::{Rng, SeedableRng};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::{Action, ActionChunk, Observation, Policy, PolicyError};
-use crate::geometry::Vec3;
+use super::{Action, ActionChunk, Observation, Policy, PolicyError, ToolCommand};
+use crate::{benchmark::seed::uniform, geometry::Vec3};
 
-/// Stays where it is with the gripper open.
+/// Holds the initial tool pose with the gripper open.
 #[derive(Debug, Default)]
 pub struct NoopPolicy {
-    hold: Option<(Vec3, Vec3)>,
+    hold: Option<Action>,
 }
 
 impl Policy for NoopPolicy {
@@ -18,32 +18,27 @@ impl Policy for NoopPolicy {
     }
 
     fn act(&mut self, observation: &Observation) -> Result<ActionChunk, PolicyError> {
-        let (position_b, axis_angle_b) =
-            *self.hold.get_or_insert((observation.ee_position_b, observation.ee_axis_angle_b));
-        Ok(Action { position_b, axis_angle_b, closure: 0.0 }.into())
+        Ok((*self.hold.get_or_insert_with(|| tool_pose(observation))).into())
     }
 }
 
-/// Largest move of a control step along each axis, m.
-const STRIDE: f64 = 0.02;
+/// Largest displacement per control step along each axis, m.
+const MAX_STEP: f64 = 0.02;
+/// Probability per control step of a new random closure.
+const CLOSURE_CHANGE: f64 = 0.05;
 
-/// Wanders at random over the table, opening and closing.
+/// Random walk of the tool over the table, with random closures.
 #[derive(Debug)]
 pub struct RandomPolicy {
     rng: ChaCha8Rng,
     closure: f64,
-    hold: Option<Vec3>,
+    axis_angle_b: Option<Vec3>,
 }
 
 impl RandomPolicy {
-    /// A walk from `seed`.
+    /// The walk of a seed.
     pub fn new(seed: u64) -> Self {
-        Self { rng: ChaCha8Rng::seed_from_u64(seed), closure: 0.0, hold: None }
-    }
-
-    fn uniform(&mut self) -> f64 {
-        // 53 random bits, as a number in [0, 1).
-        (self.rng.random::<u64>() >> 11) as f64 / (1u64 << 53) as f64
+        Self { rng: ChaCha8Rng::seed_from_u64(seed), closure: 0.0, axis_angle_b: None }
     }
 }
 
@@ -53,14 +48,69 @@ impl Policy for RandomPolicy {
     }
 
     fn act(&mut self, observation: &Observation) -> Result<ActionChunk, PolicyError> {
-        let axis_angle_b = *self.hold.get_or_insert(observation.ee_axis_angle_b);
-        let stride = Vec3::from_fn(|_, _| STRIDE * (2.0 * self.uniform() - 1.0));
-        let mut position_b = observation.ee_position_b + stride;
-        // Above the table top and below the shoulder; elsewhere a wall of wood would stop the walk.
+        let axis_angle_b = *self.axis_angle_b.get_or_insert(observation.ee_axis_angle_b);
+        let step = Vec3::from_fn(|_, _| MAX_STEP * (2.0 * uniform(&mut self.rng) - 1.0));
+        let mut position_b = observation.ee_position_b + step;
+        // Above the table top and below the shoulder: the walk would get stuck at the table.
         position_b.z = position_b.z.clamp(0.03, 0.5);
-        if self.uniform() < 0.05 {
-            self.closure = self.uniform();
+        if uniform(&mut self.rng) < CLOSURE_CHANGE {
+            self.closure = uniform(&mut self.rng);
         }
         Ok(Action { position_b, axis_angle_b, closure: self.closure }.into())
     }
+}
+
+/// Replays recorded commands, one per control step.
+#[derive(Clone, Debug)]
+pub struct RecordedPolicy {
+    commands: std::vec::IntoIter<ToolCommand>,
+    last: Option<ToolCommand>,
+    ending: Option<String>,
+}
+
+impl RecordedPolicy {
+    /// Replays `commands`. After the last one the policy fails with the message `ending`, as the recorded episode did, or
+    /// holds the tool where it is if `ending` is `None`.
+    pub fn new(commands: Vec<ToolCommand>, ending: Option<String>) -> Self {
+        Self { commands: commands.into_iter(), last: None, ending }
+    }
+
+    /// Replays absolute poses; see [`new`](Self::new).
+    pub fn from_actions(actions: &[Action], ending: Option<String>) -> Self {
+        Self::new(actions.iter().copied().map(ToolCommand::Pose).collect(), ending)
+    }
+}
+
+impl Policy for RecordedPolicy {
+    fn name(&self) -> &str {
+        "replay"
+    }
+
+    fn act(&mut self, observation: &Observation) -> Result<ActionChunk, PolicyError> {
+        if let Some(command) = self.commands.next() {
+            self.last = Some(command);
+            return Ok(ActionChunk { commands: vec![command] });
+        }
+        if let Some(message) = &self.ending {
+            return Err(PolicyError::Action(message.clone()));
+        }
+        let still = ToolCommand::Pose(tool_pose(observation));
+        Ok(ActionChunk { commands: vec![self.last.map_or(still, held)] })
+    }
+}
+
+/// The command that keeps the tool where `command` has brought it.
+fn held(command: ToolCommand) -> ToolCommand {
+    match command {
+        ToolCommand::Pose(_) => command,
+        ToolCommand::Delta { full, closure, .. } => {
+            ToolCommand::Delta { full, translation_b: Vec3::zeros(), rotation_b: Vec3::zeros(), closure }
+        }
+    }
+}
+
+/// The measured tool pose with the gripper open.
+fn tool_pose(observation: &Observation) -> Action {
+    let (position_b, axis_angle_b) = (observation.ee_position_b, observation.ee_axis_angle_b);
+    Action { position_b, axis_angle_b, closure: 0.0 }
 }

@@ -1,90 +1,89 @@
-//! Chunks of actions carried out one by one: a policy is asked anew when enough of its last answer is spent.
+//! Execution of action chunks: a policy is queried again after `replan` commands of its last chunk.
 
 use std::collections::VecDeque;
 
 use super::{
-    Action, ActionChunk, Observation, Policy, PolicyError, SensorStreams, TaskBrief, ToolCommand, osc,
-    osc::OscController,
+    Action, ActionChunk, Observation, Policy, PolicyError, SensorStreams, TaskBrief, ToolCommand,
+    osc::{self, OscController},
 };
 
-/// A policy whose chunks are carried out.
+/// A policy together with the execution of its chunks, one command per control step.
 pub struct ChunkedPolicy<'a> {
     policy: Box<dyn Policy + 'a>,
-    /// Actions of a chunk that are carried out.
     replan: usize,
     brief: Option<TaskBrief>,
-    rest: VecDeque<ToolCommand>,
-    follower: CommandResolver,
+    remaining: VecDeque<ToolCommand>,
+    resolver: CommandResolver,
 }
 
-/// Commands become poses one after another: a step away from where the tool is remembers how fast the last one left it.
+/// Turns a sequence of commands into absolute poses. Stateful, because a displacement executed by robosuite's controller
+/// depends on the velocity after the previous one.
 #[derive(Clone, Debug, Default)]
 pub struct CommandResolver {
     osc: OscController,
 }
 
 impl CommandResolver {
-    /// The pose that a command means when its turn comes.
-    pub fn action(&mut self, now: &Observation, command: ToolCommand) -> Action {
+    /// The pose that `command` means in the control step of `observation`.
+    pub fn resolve(&mut self, observation: &Observation, command: ToolCommand) -> Action {
         match command {
             ToolCommand::Pose(action) => {
                 self.osc = OscController::default();
                 action
             }
-            ToolCommand::Step { whole: true, translation_b, rotation_b, closure } => {
+            ToolCommand::Delta { full: true, translation_b, rotation_b, closure } => {
                 self.osc = OscController::default();
-                osc::whole(now, translation_b, rotation_b, closure)
+                osc::displaced(observation, translation_b, rotation_b, closure)
             }
-            ToolCommand::Step { whole: false, translation_b, rotation_b, closure } => {
-                self.osc.step(now, translation_b, rotation_b, closure)
+            ToolCommand::Delta { full: false, translation_b, rotation_b, closure } => {
+                self.osc.step(observation, translation_b, rotation_b, closure)
             }
         }
     }
 }
 
 impl<'a> ChunkedPolicy<'a> {
-    /// `policy` in the episode `brief`; the first `replan` actions of each of its chunks are carried out, or all if they are
-    /// fewer.
+    /// Runs `policy` in the episode `brief`. At most the first `replan` commands of each chunk are executed.
     pub fn new(policy: Box<dyn Policy + 'a>, brief: TaskBrief, replan: usize) -> Self {
         Self {
             policy,
             replan: replan.max(1),
             brief: Some(brief),
-            rest: VecDeque::new(),
-            follower: CommandResolver::default(),
+            remaining: VecDeque::new(),
+            resolver: CommandResolver::default(),
         }
     }
 
-    /// What the policy looks at, when it looks.
+    /// Sensor streams of the policy.
     pub fn streams(&self) -> SensorStreams {
         self.policy.streams()
     }
 
-    /// Whether the policy is asked in this control step; in others nothing need be sensed for it.
+    /// True if the policy is queried in this control step. In other steps its sensor streams are not needed.
     pub fn wants_observation(&self) -> bool {
-        self.rest.is_empty()
+        self.remaining.is_empty()
     }
 
-    /// The action of this control step.
+    /// Action of this control step.
     ///
     /// # Errors
-    /// The policy's.
+    /// The errors of the policy, and [`PolicyError::Reply`] for an empty chunk.
     pub fn act(&mut self, observation: &Observation) -> Result<Action, PolicyError> {
         if let Some(brief) = self.brief.take() {
             self.policy.reset(&brief)?;
         }
-        if self.rest.is_empty() {
+        if self.remaining.is_empty() {
             let ActionChunk { mut commands } = self.policy.act(observation)?;
             commands.truncate(self.replan);
-            self.rest = commands.into();
+            self.remaining = commands.into();
         }
-        let command = self.rest.pop_front();
+        let command = self.remaining.pop_front();
         let command = command
             .ok_or_else(|| PolicyError::Reply("the policy's reply has no action at all".to_owned()))?;
-        Ok(self.follower.action(observation, command))
+        Ok(self.resolver.resolve(observation, command))
     }
 
-    /// The episode is over.
+    /// Ends the episode.
     pub fn finish(&mut self) {
         self.policy.finish();
     }

@@ -1,22 +1,22 @@
-//! Replies as profiles code them.
+//! Decoding of action chunks as profiles define them.
 
 use rmpv::Value;
 
 use super::{
     Action, ActionChunk, PolicyError, ToolCommand,
+    msgpack::{NumberArray, entry, kind, names, numbers},
     profile::{ACTION_LEN, ActionEncoding, ActionUnits, PoseEncoding},
-    wire::{entry, kind, names, numbers},
 };
 use crate::geometry::Vec3;
 
-/// The most actions of one reply; a longer one is a mistake.
-pub const LONGEST: usize = 10_000;
+/// Number of actions from which on a chunk is rejected as a mistake.
+pub const MAX_CHUNK_LEN: usize = 10_000;
 
-/// The chunk of a reply with the entry `actions` (or `action`): rows of at least seven numbers, or one row.
+/// Decodes a reply: a map whose entry `actions` (or `action`) has the shape (horizon, n), (1, horizon, n) or (n), n ≥ 7.
 ///
 /// # Errors
-/// The reply is no such thing: [`PolicyError::Reply`]; it holds a number that is not finite: [`PolicyError::Action`].
-pub fn chunk(reply: &Value, code: &ActionEncoding) -> Result<ActionChunk, PolicyError> {
+/// [`PolicyError::Reply`] if the reply has another form, [`PolicyError::Action`] if a number is not finite.
+pub fn chunk(reply: &Value, encoding: &ActionEncoding) -> Result<ActionChunk, PolicyError> {
     let wrong = |what: String| PolicyError::Reply(format!("the policy's reply {what}"));
     if reply.as_map().is_none() {
         return Err(wrong(format!("is {}; expected a map with the entry actions", kind(reply))));
@@ -24,46 +24,56 @@ pub fn chunk(reply: &Value, code: &ActionEncoding) -> Result<ActionChunk, Policy
     let actions = entry(reply, "actions")
         .or_else(|| entry(reply, "action"))
         .ok_or_else(|| wrong(format!("has no entry actions; it has {}", names(reply))))?;
-    let (shape, found) =
-        numbers(actions).map_err(|what| wrong(format!("has {what} as actions; expected numbers")))?;
-    rows(&shape, &found, code)
+    let actions =
+        numbers(actions).map_err(|error| wrong(format!("has {error} as actions; expected numbers")))?;
+    rows(&actions, encoding)
 }
 
-/// The chunk of an array of numbers.
-///
-/// # Errors
-/// As [`chunk`].
-pub fn rows(shape: &[usize], found: &[f64], code: &ActionEncoding) -> Result<ActionChunk, PolicyError> {
+/// Decodes the actions of a chunk; see [`chunk`] for shapes and errors.
+pub(crate) fn rows(
+    NumberArray { shape, values }: &NumberArray,
+    encoding: &ActionEncoding,
+) -> Result<ActionChunk, PolicyError> {
     let wrong = |what: &str| {
         PolicyError::Reply(format!(
             "the policy's reply has actions of shape {shape:?}: {what}; expected (horizon, {ACTION_LEN} or more)"
         ))
     };
-    let (horizon, width) = match *shape {
+    let (horizon, width) = match *shape.as_slice() {
         [width] => (1, width),
         [horizon, width] | [1, horizon, width] => (horizon, width),
         _ => return Err(wrong("not rows of actions")),
     };
     match (horizon, width) {
         (0, _) => return Err(wrong("no action at all")),
-        (LONGEST.., _) => return Err(wrong("too many")),
-        (_, ..ACTION_LEN) => return Err(wrong("too few numbers an action")),
-        _ if code.length.is_some_and(|length| length != width) => {
-            let length = code.length.unwrap_or_default();
-            return Err(wrong(&format!("the profile says {length} numbers an action")));
-        }
+        (MAX_CHUNK_LEN.., _) => return Err(wrong("too many")),
+        (_, ..ACTION_LEN) => return Err(wrong("too few numbers per action")),
         _ => {}
     }
+    if let Some(length) = encoding.length.filter(|length| *length != width) {
+        return Err(wrong(&format!("the profile requires {length} numbers per action")));
+    }
     let commands: Result<Vec<ToolCommand>, PolicyError> =
-        found.chunks_exact(width).map(|row| command(&row[..ACTION_LEN], code)).collect();
+        values.chunks_exact(width).map(|row| command(&row[..ACTION_LEN], encoding)).collect();
     Ok(ActionChunk { commands: commands? })
 }
 
-/// What seven numbers command.
+/// Decodes the seven numbers of an action.
+///
+/// ```
+/// use softvt::policy::{ToolCommand, decode, profile::Profile};
+///
+/// let libero = Profile::named("libero").expect("a built-in profile");
+/// // A step of +5 cm along x at most; the gripper's value 1 means closed.
+/// let command = decode::command(&[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], &libero.actions)?;
+/// let ToolCommand::Delta { translation_b, closure, .. } = command else { unreachable!() };
+/// assert_eq!((translation_b.x, closure), (0.05, 1.0));
+/// # Ok::<(), softvt::policy::PolicyError>(())
+/// ```
 ///
 /// # Errors
-/// One of them is not finite.
-pub fn command(row: &[f64], code: &ActionEncoding) -> Result<ToolCommand, PolicyError> {
+/// [`PolicyError::Action`] if a number is not finite, [`PolicyError::Reply`] if there are not seven of them.
+pub fn command(row: &[f64], encoding: &ActionEncoding) -> Result<ToolCommand, PolicyError> {
     let [_, _, _, _, _, _, gripper] = row else {
         return Err(PolicyError::Reply(format!(
             "an action has {} numbers; expected {ACTION_LEN}",
@@ -73,33 +83,30 @@ pub fn command(row: &[f64], code: &ActionEncoding) -> Result<ToolCommand, Policy
     if row.iter().any(|number| !number.is_finite()) {
         return Err(PolicyError::Action(format!("the action {row:?} holds a number that is not finite")));
     }
-    let ActionUnits { scale, offset } = code.units.unwrap_or(ActionUnits::SAME);
+    let ActionUnits { scale, offset } = encoding.units.unwrap_or(ActionUnits::IDENTITY);
     let [x, y, z, rx, ry, rz] = std::array::from_fn(|i| scale[i] * row[i] + offset[i]);
-    let (first, second) = (Vec3::new(x, y, z), Vec3::new(rx, ry, rz));
-    let closure = code.gripper.closure(*gripper);
-    // robosuite's controller cuts what is beyond −1..=1 off too.
-    let step = |whole, translation_m: f64, rotation_rad: f64| ToolCommand::Step {
-        whole,
-        translation_b: first.map(|x| x.clamp(-1.0, 1.0)) * translation_m,
-        rotation_b: second.map(|x| x.clamp(-1.0, 1.0)) * rotation_rad,
+    let (linear, angular) = (Vec3::new(x, y, z), Vec3::new(rx, ry, rz));
+    let closure = encoding.gripper.closure(*gripper);
+    // robosuite's controller clips to −1..=1 as well.
+    let delta = |full, translation_m: f64, rotation_rad: f64| ToolCommand::Delta {
+        full,
+        translation_b: linear.map(|x| x.clamp(-1.0, 1.0)) * translation_m,
+        rotation_b: angular.map(|x| x.clamp(-1.0, 1.0)) * rotation_rad,
         closure,
     };
-    Ok(match code.pose {
+    Ok(match encoding.pose {
         PoseEncoding::Absolute => {
-            ToolCommand::Pose(Action { position_b: first, axis_angle_b: second, closure })
+            ToolCommand::Pose(Action { position_b: linear, axis_angle_b: angular, closure })
         }
-        PoseEncoding::Delta { translation_m, rotation_rad } => step(true, translation_m, rotation_rad),
-        PoseEncoding::DeltaOsc { translation_m, rotation_rad } => step(false, translation_m, rotation_rad),
+        PoseEncoding::Delta { translation_m, rotation_rad } => delta(true, translation_m, rotation_rad),
+        PoseEncoding::DeltaOsc { translation_m, rotation_rad } => delta(false, translation_m, rotation_rad),
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{
-        npy::NpyArray,
-        policy::{profile::Profile, wire::pack_array},
-    };
+    use crate::{npy::NpyArray, policy::{msgpack::pack_array, profile::Profile}};
 
     fn read(value: Value) -> Result<ActionChunk, PolicyError> {
         chunk(&value, &Profile::named("visuo_tactile").unwrap().actions)
@@ -112,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn padded_replies_are_cut_to_seven_numbers_an_action() {
+    fn padded_actions_are_cut_to_seven_numbers() {
         let chunk = read(reply(vec![50, 32], 0.25)).unwrap();
         assert_eq!(chunk.commands.len(), 50);
         let quarter = Vec3::repeat(0.25);
@@ -123,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_chunk_is_told() {
+    fn replies_of_another_form_are_refused() {
         for (value, words) in [
             (reply(vec![0, 7], 0.0), "no action at all"),
             (reply(vec![10, 6], 0.0), "[10, 6]: too few numbers"),
@@ -143,22 +150,22 @@ mod tests {
     }
 
     #[test]
-    fn liberos_steps_are_scaled_and_cut_off() {
+    fn liberos_displacements_are_scaled_and_clipped() {
         let code = Profile::named("libero").unwrap().actions;
-        let step = command(&[1.0, -9.0, 0.5, 0.0, 0.0, 2.0, 1.0], &code).unwrap();
-        let expected = ToolCommand::Step {
-            whole: false,
+        let delta = command(&[1.0, -9.0, 0.5, 0.0, 0.0, 2.0, 1.0], &code).unwrap();
+        let expected = ToolCommand::Delta {
+            full: false,
             translation_b: Vec3::new(0.05, -0.05, 0.025),
             rotation_b: Vec3::new(0.0, 0.0, 0.5),
             closure: 1.0,
         };
-        assert_eq!(step, expected);
+        assert_eq!(delta, expected);
     }
 
     #[test]
-    fn other_units_are_scaled_and_moved_before_they_are_read() {
+    fn units_are_converted_before_decoding() {
         let mut code = Profile::named("visuo_tactile").unwrap().actions;
-        // Millimetres from a point half a metre in front of the base, degrees.
+        // Millimetres from a point half a metre in front of the base, and degrees.
         let (mm, degree) = (1e-3, 1.0_f64.to_radians());
         code.units = Some(ActionUnits {
             scale: [mm, mm, mm, degree, degree, degree],
@@ -173,10 +180,12 @@ mod tests {
     }
 
     #[test]
-    fn a_profile_that_says_how_long_actions_are_takes_no_others() {
+    fn a_profile_with_a_length_refuses_actions_of_another_length() {
         let code = ActionEncoding { length: Some(32), ..Profile::named("visuo_tactile").unwrap().actions };
-        assert_eq!(rows(&[2, 32], &[0.25; 64], &code).unwrap().commands.len(), 2);
-        match rows(&[2, 7], &[0.25; 14], &code) {
+        let array =
+            |rows, columns| NumberArray { shape: vec![rows, columns], values: vec![0.25; rows * columns] };
+        assert_eq!(rows(&array(2, 32), &code).unwrap().commands.len(), 2);
+        match rows(&array(2, 7), &code) {
             Err(PolicyError::Reply(message)) => assert!(message.contains("32 numbers"), "{message}"),
             other => panic!("{other:?}"),
         }

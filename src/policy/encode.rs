@@ -1,12 +1,12 @@
-//! Observations as profiles lay them out.
+//! Encoding of observations as profiles define them.
 
 use image::{RgbImage, imageops};
 use rmpv::Value;
 
 use super::{
     Observation,
-    profile::{Finger, InputSource, Profile, StatePart},
-    wire::pack_array,
+    msgpack::pack_array,
+    profile::{InputSource, Profile, StatePart},
 };
 use crate::{
     npy::NpyArray,
@@ -14,17 +14,17 @@ use crate::{
     sensing::tactile::{HISTORY_LENGTH, MARKER_COUNT},
 };
 
-/// An entry of an observation before it is packed.
+/// Content of an entry of an observation, before it is packed.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ObservationEntry {
-    /// Numbers or pictures.
+    /// Numbers or an image.
     Array(NpyArray),
-    /// Text.
+    /// The instruction.
     Text(String),
 }
 
 impl ObservationEntry {
-    /// As msgpack; see [`pack_array`].
+    /// Converts to msgpack; see [`pack_array`].
     pub fn into_value(self, bin_keys: bool) -> Value {
         match self {
             Self::Array(array) => pack_array(array, bin_keys),
@@ -33,31 +33,30 @@ impl ObservationEntry {
     }
 }
 
-/// What an entry holds; `None` if the observation lacks what it is made of.
+/// Content of an entry, in the type and shape given at [`InputSource`]. `None` if the observation lacks its stream.
 pub fn content(observation: &Observation, source: &InputSource) -> Option<ObservationEntry> {
     let array = match source {
         InputSource::Prompt => return Some(ObservationEntry::Text(observation.prompt.clone())),
         InputSource::Camera { camera, half_turn } => {
-            let picture = observation.camera(camera)?;
-            if *half_turn { bytes(imageops::rotate180(picture)) } else { bytes(picture.clone()) }
+            let image = observation.camera(camera)?;
+            image_array(if *half_turn { imageops::rotate180(image) } else { image.clone() })
         }
         InputSource::State { parts } => {
             let numbers: Vec<f32> = parts.iter().flat_map(|part| state(observation, *part)).collect();
             NpyArray::from_f32(vec![numbers.len()], numbers)
         }
-        InputSource::TactileImage { layout } => bytes(observation.touch.as_ref()?.mosaic((*layout).into())),
+        InputSource::TactileImage { layout } => image_array(observation.touch.as_ref()?.mosaic(*layout)),
         InputSource::Tactile { finger } => {
-            bytes(observation.touch.as_ref()?.now()?[usize::from(*finger == Finger::Right)].image.clone())
+            image_array(observation.touch.as_ref()?.now()?[finger.index()].image.clone())
         }
         InputSource::MarkerMotion => {
             let rows = observation.touch.as_ref()?.marker_motion();
             NpyArray::from_f32(vec![rows.len(), 2 * MARKER_COUNT, 2], rows.into_iter().flatten().flatten())
         }
         InputSource::Force => {
-            let rows = (0..HISTORY_LENGTH).map(|place| {
-                let past = &observation.force_history;
-                past.get((place + past.len()).saturating_sub(HISTORY_LENGTH))
-            });
+            let past = &observation.force_history;
+            // A short history starts with copies of its oldest entry.
+            let rows = (0..HISTORY_LENGTH).map(|place| past.get((place + past.len()).saturating_sub(HISTORY_LENGTH)));
             let rows: Option<Vec<&[f64; 6]>> = rows.collect();
             NpyArray::from_f32(vec![HISTORY_LENGTH, 6], rows?.into_iter().flatten().map(|x| *x as f32))
         }
@@ -65,7 +64,7 @@ pub fn content(observation: &Observation, source: &InputSource) -> Option<Observ
     Some(ObservationEntry::Array(array))
 }
 
-/// The whole observation as openpi's clients send it.
+/// The observation as a msgpack map in openpi's format.
 pub fn openpi(observation: &Observation, profile: &Profile) -> Value {
     let mut entries = Vec::new();
     for input in &profile.inputs {
@@ -78,9 +77,10 @@ pub fn openpi(observation: &Observation, profile: &Profile) -> Value {
     Value::Map(entries)
 }
 
-fn bytes(picture: RgbImage) -> NpyArray {
-    let shape = vec![picture.height() as usize, picture.width() as usize, 3];
-    NpyArray::from_bytes(shape, picture.into_raw())
+/// An image as an array, uint8 (height, width, 3).
+pub fn image_array(image: RgbImage) -> NpyArray {
+    let shape = vec![image.height() as usize, image.width() as usize, 3];
+    NpyArray::from_bytes(shape, image.into_raw())
 }
 
 fn state(o: &Observation, part: StatePart) -> Vec<f32> {

@@ -1,96 +1,76 @@
-//! What a policy gets and what its numbers mean: plain data that fixes the keys of an observation and the code of an action.
+//! Profiles: which data a policy receives under which keys, and how its actions are encoded.
 
 use serde::{Deserialize, Serialize};
 
 use super::SensorStreams;
-use crate::sensing::tactile::MosaicLayout;
+use crate::{robot::Side, sensing::tactile::MosaicLayout};
 
 /// Names of the cameras that every scene has.
 const CAMERAS: [&str; 2] = ["third_person", "wrist"];
 
-/// A policy's interface.
+/// Interface of a policy: the entries of its observations and the encoding of its actions.
+///
+/// Plain data: it comes from [`Profile::named`] or a Lua file and is written to the results of a run.
+/// [`encode`](super::encode) builds the observation of a profile, [`decode`](super::decode) reads its actions.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Profile {
     /// Name, as in results.
     pub name: String,
-    /// What is sent, in order.
+    /// Entries of an observation, in order.
     pub inputs: Vec<ProfileInput>,
-    /// How replies are read.
+    /// Encoding of the actions.
     pub actions: ActionEncoding,
 }
 
 /// One entry of an observation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ProfileInput {
-    /// Keys it is sent under.
+    /// Keys under which it is sent.
     pub keys: Vec<String>,
-    /// What it is.
+    /// Content of the entry.
     pub source: InputSource,
 }
 
-/// Where an entry comes from.
+impl ProfileInput {
+    /// The shortest of its keys.
+    pub fn shortest_key(&self) -> &str {
+        self.keys.iter().min_by_key(|key| key.len()).map_or("", String::as_str)
+    }
+}
+
+/// Content of an entry: its source, numpy type and shape.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum InputSource {
-    /// A camera's picture, uint8 (height, width, 3).
+    /// A camera image, uint8 (height, width, 3).
     Camera {
         /// Name of the camera.
         camera: String,
-        /// Turned by half a turn in the image, as LIBERO's pictures come.
+        /// True to rotate the image by 180°, as in LIBERO's data.
         half_turn: bool,
     },
-    /// Numbers of the robot, float32 (n).
+    /// State of the robot, float32 (n).
     State {
-        /// Its parts, in order.
+        /// Parts of the vector, in order.
         parts: Vec<StatePart>,
     },
     /// The instruction, text.
     Prompt,
-    /// The 4 × 4 mosaic of the last 8 tactile pictures of both fingers, uint8 (224, 224, 3).
+    /// The 4 × 4 mosaic of the last 8 tactile images of both fingers, uint8 (224, 224, 3).
     TactileImage {
-        /// Which cells are whose.
-        layout: Mosaic,
+        /// Assignment of cells to fingers.
+        layout: MosaicLayout,
     },
-    /// The last tactile picture of one finger, uint8 (240, 320, 3).
+    /// The last tactile image of one finger, uint8 (240, 320, 3).
     Tactile {
-        /// Which finger.
-        finger: Finger,
+        /// The finger.
+        finger: Side,
     },
-    /// Initial and last 8 places of the markers of both fingers, float32 (9, 198, 2), px.
+    /// Initial and last 8 positions of the markers of both fingers, float32 (9, 198, 2), px.
     MarkerMotion,
     /// True forces on the left and the right gel in the last 8 control steps, float32 (8, 6), N, pad frame. No real sensor
-    /// gives them.
+    /// measures them.
     Force,
-}
-
-/// A finger.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Finger {
-    /// panda_leftfinger.
-    Left,
-    /// panda_rightfinger.
-    Right,
-}
-
-/// [`MosaicLayout`] as data.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Mosaic {
-    /// Left finger above.
-    #[default]
-    Rows,
-    /// Left finger at the left.
-    Columns,
-}
-
-impl From<Mosaic> for MosaicLayout {
-    fn from(layout: Mosaic) -> Self {
-        match layout {
-            Mosaic::Rows => Self::Rows,
-            Mosaic::Columns => Self::Columns,
-        }
-    }
 }
 
 /// A part of a state vector.
@@ -101,24 +81,24 @@ pub enum StatePart {
     Position,
     /// Tool orientation in the base frame as axis-angle, rad (3).
     AxisAngle,
-    /// The same as a quaternion w, x, y, z with w ≥ 0 (4).
+    /// Tool orientation in the base frame as a quaternion w, x, y, z with w ≥ 0 (4).
     QuaternionWxyz,
-    /// The same as x, y, z, w with w ≥ 0 (4).
+    /// Tool orientation in the base frame as a quaternion x, y, z, w with w ≥ 0 (4).
     QuaternionXyzw,
     /// Arm joint angles, rad (7).
     Joints,
     /// Distance between the gels, m: 0 to 0.08 (1).
     GripperWidth,
-    /// Half of it, the position of one finger, m: 0 to 0.04 (1).
+    /// Position of one finger, half the gripper width, m: 0 to 0.04 (1).
     FingerPosition,
-    /// Positions of both fingers as robosuite gives them, m: half the width, and its negative (2).
+    /// Positions of both fingers in robosuite's convention, m: half the gripper width and its negative (2).
     FingerPair,
     /// Closure last commanded, 0 to 1 (1).
     Closure,
 }
 
 impl StatePart {
-    /// How many numbers it is.
+    /// Number of components.
     pub fn count(self) -> usize {
         match self {
             Self::Position | Self::AxisAngle => 3,
@@ -130,103 +110,106 @@ impl StatePart {
     }
 }
 
-/// How an action is coded: three numbers of position, three of orientation, one of the gripper; more are padding.
+/// Encoding of an action: three numbers for the position, three for the orientation, one for the gripper. Further numbers are
+/// padding.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ActionEncoding {
-    /// What the first six are.
+    /// Meaning of the first six numbers.
     pub pose: PoseEncoding,
-    /// What the seventh is.
-    pub gripper: GripperEncoding,
-    /// How an actor's own units become those of `pose`, if they differ.
+    /// Meaning of the seventh number.
+    pub gripper: GripperValues,
+    /// Conversion of the first six numbers to the units of `pose`, if they differ.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub units: Option<ActionUnits>,
-    /// How many numbers an action must have, padding included; any from seven on if none.
+    /// Required length of an action including padding. `None` accepts every length from seven.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub length: Option<usize>,
 }
 
-/// `scale · number + offset`, for each of the first six numbers of an action.
+/// Affine conversion `scale · number + offset` of the first six numbers of an action.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ActionUnits {
     /// Factors.
     pub scale: [f64; 6],
-    /// What is added then, m and rad.
+    /// Offsets, m and rad.
     pub offset: [f64; 6],
 }
 
 impl ActionUnits {
-    /// Numbers as they are.
-    pub const SAME: Self = Self { scale: [1.0; 6], offset: [0.0; 6] };
+    /// No conversion.
+    pub const IDENTITY: Self = Self { scale: [1.0; 6], offset: [0.0; 6] };
 }
 
 impl ActionEncoding {
-    /// A code without units and padding of its own.
-    pub fn plain(pose: PoseEncoding, gripper: GripperEncoding) -> Self {
+    /// An encoding in SI units without a fixed length.
+    pub fn new(pose: PoseEncoding, gripper: GripperValues) -> Self {
         Self { pose, gripper, units: None, length: None }
     }
 }
 
-/// Numbers of an action that are used.
+/// Numbers of an action that have a meaning; further ones are padding.
 pub const ACTION_LEN: usize = 7;
 
-/// What the first six numbers of an action are.
+/// Meaning of the first six numbers of an action.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum PoseEncoding {
-    /// Tool pose in the base frame: m, and axis-angle in rad.
+    /// Tool pose in the base frame: position, m, and axis-angle, rad.
     Absolute,
-    /// Shares −1..=1 of a step away from where the tool is when the action's turn comes, taken in full.
+    /// Displacement from the measured tool pose, each number −1..=1 times the limit of its axis, executed in full.
     Delta {
-        /// Longest step along each axis, m.
+        /// Largest translation along each axis, m.
         translation_m: f64,
-        /// Longest turn about each axis, rad.
+        /// Largest rotation about each axis, rad.
         rotation_rad: f64,
     },
-    /// What robosuite's operational-space controller gets: shares −1..=1 of a step away from where the tool is.
+    /// The same displacement, executed as robosuite's operational-space controller does; see [`osc`](super::osc).
     DeltaOsc {
-        /// Longest step along each axis, m.
+        /// Largest translation along each axis, m.
         translation_m: f64,
-        /// Longest turn about each axis, rad.
+        /// Largest rotation about each axis, rad.
         rotation_rad: f64,
     },
 }
 
-/// The gripper's number: one value opens, one shuts, those between do in proportion unless the code is binary.
+/// Meaning of the gripper's number: the values for open and closed. Values in between mean proportional closures, unless the
+/// encoding is binary.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct GripperEncoding {
-    /// The value that opens.
+pub struct GripperValues {
+    /// Value of the open gripper.
     pub open: f64,
-    /// The value that shuts.
-    pub shut: f64,
-    /// Whether anything beyond the middle shuts, and all else opens.
+    /// Value of the closed gripper.
+    #[serde(rename = "shut", alias = "closed")]
+    pub closed: f64,
+    /// True if every value beyond the middle means closed and every other one open.
     pub binary: bool,
 }
 
-impl GripperEncoding {
-    /// The closure that a number means.
-    pub fn closure(&self, number: f64) -> f64 {
-        // Never −0.
-        let share = ((number - self.open) / (self.shut - self.open)).clamp(0.0, 1.0) + 0.0;
+impl GripperValues {
+    /// Closure of a value, 0 (open) ..= 1 (closed).
+    pub fn closure(&self, value: f64) -> f64 {
+        // Adding 0.0 turns −0.0 into 0.0.
+        let share = ((value - self.open) / (self.closed - self.open)).clamp(0.0, 1.0) + 0.0;
         if self.binary { f64::from(u8::from(share > 0.5)) } else { share }
     }
 
-    /// The number that means a closure.
-    pub fn number(&self, closure: f64) -> f64 {
+    /// Value of a closure.
+    pub fn value(&self, closure: f64) -> f64 {
         let share = if self.binary { f64::from(u8::from(closure > 0.5)) } else { closure };
-        self.open + share * (self.shut - self.open)
+        self.open + share * (self.closed - self.open)
     }
 }
 
-/// The profiles that come with softvt, with what each is for.
+/// Built-in profiles and their descriptions.
 pub const PROFILES: [(&str, &str); 4] = [
-    ("vision", "both cameras, state, prompt; absolute pose; gripper open or shut"),
-    ("visuo_tactile", "the same with tactile pictures and markers of 8 frames; continuous gripper"),
-    ("softvtbench", "the released SoftVTBench client's keys and units, with true forces (force_observed)"),
-    ("libero", "LIBERO's: pictures turned by half a turn, 8 numbers of state, delta poses"),
+    ("vision", "both cameras, state, prompt; absolute pose; gripper open or closed"),
+    ("visuo_tactile", "vision plus tactile images and markers of 8 frames; continuous gripper"),
+    ("softvtbench", "keys and units of the released SoftVTBench client, with true forces (force_observed)"),
+    ("libero", "LIBERO's interface: images rotated by 180°, 8 state numbers, delta poses"),
 ];
 
 impl Profile {
-    /// A profile by name.
+    /// The built-in profile of a name.
     pub fn named(name: &str) -> Option<Self> {
         let both = |name: &str| vec![format!("observation/{name}"), name.to_owned()];
         let plain = |camera: &str| InputSource::Camera { camera: camera.to_owned(), half_turn: false };
@@ -239,13 +222,13 @@ impl Profile {
             input(vec!["prompt".to_owned()], InputSource::Prompt),
         ];
         let touch = [
-            input(both("tactile_image"), InputSource::TactileImage { layout: Mosaic::Rows }),
+            input(both("tactile_image"), InputSource::TactileImage { layout: MosaicLayout::Rows }),
             input(both("tactile_marker_motion"), InputSource::MarkerMotion),
         ];
-        let closure = GripperEncoding { open: 0.0, shut: 1.0, binary: false };
-        let absolute = |gripper| ActionEncoding::plain(PoseEncoding::Absolute, gripper);
+        let closure = GripperValues { open: 0.0, closed: 1.0, binary: false };
+        let absolute = |gripper| ActionEncoding::new(PoseEncoding::Absolute, gripper);
         let actions = match name {
-            "vision" => absolute(GripperEncoding { binary: true, ..closure }),
+            "vision" => absolute(GripperValues { binary: true, ..closure }),
             "visuo_tactile" => {
                 inputs.extend(touch);
                 absolute(closure)
@@ -254,8 +237,8 @@ impl Profile {
                 inputs.extend(touch);
                 inputs.push(input(both("tactile_gripper_force"), InputSource::Force));
                 inputs[3].keys.push("observation/prompt".to_owned());
-                // The commanded position of either finger.
-                absolute(GripperEncoding { open: 0.04, shut: 0.0, binary: false })
+                // Commanded position of each finger, m.
+                absolute(GripperValues { open: 0.04, closed: 0.0, binary: false })
             }
             "libero" => {
                 let turned =
@@ -265,9 +248,9 @@ impl Profile {
                 let parts = vec![StatePart::Position, StatePart::AxisAngle, StatePart::FingerPair];
                 inputs[2].source = InputSource::State { parts };
                 inputs[..3].iter_mut().for_each(|input| input.keys.truncate(1));
-                ActionEncoding::plain(
+                ActionEncoding::new(
                     PoseEncoding::DeltaOsc { translation_m: 0.05, rotation_rad: 0.5 },
-                    GripperEncoding { open: -1.0, shut: 1.0, binary: true },
+                    GripperValues { open: -1.0, closed: 1.0, binary: true },
                 )
             }
             _ => return None,
@@ -275,7 +258,7 @@ impl Profile {
         Some(Self { name: name.to_owned(), inputs, actions })
     }
 
-    /// What has to be sensed for it.
+    /// Sensor streams that its inputs need.
     pub fn streams(&self) -> SensorStreams {
         let mut streams = SensorStreams::default();
         for input in &self.inputs {
@@ -301,7 +284,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_profile_exists_under_its_name() {
+    fn every_built_in_profile_has_its_name() {
         for (name, _) in PROFILES {
             assert_eq!(Profile::named(name).map(|p| p.name), Some(name.to_owned()));
         }
@@ -309,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn only_what_a_profile_sends_is_sensed() {
+    fn streams_are_those_of_the_inputs() {
         let streams = |name| Profile::named(name).unwrap().streams();
         assert_eq!(streams("vision").cameras, CAMERAS);
         assert!(!streams("vision").touch && !streams("visuo_tactile").force);
@@ -317,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn grippers_open_and_shut_at_the_ends_of_their_codes() {
+    fn grippers_open_and_close_at_the_ends_of_their_ranges() {
         let fingers = Profile::named("softvtbench").unwrap().actions.gripper;
         assert_eq!((fingers.closure(0.04), fingers.closure(0.0), fingers.closure(0.02)), (0.0, 1.0, 0.5));
         assert!(fingers.closure(0.04).is_sign_positive());
@@ -327,7 +310,7 @@ mod tests {
         let closure = Profile::named("visuo_tactile").unwrap().actions.gripper;
         assert_eq!(closure.closure(0.37), 0.37);
         for code in [fingers, closure] {
-            assert!((code.closure(code.number(0.62)) - 0.62).abs() < 1e-12);
+            assert!((code.closure(code.value(0.62)) - 0.62).abs() < 1e-12);
         }
     }
 }

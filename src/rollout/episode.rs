@@ -331,11 +331,12 @@ impl Episode {
     pub fn render_camera(
         &mut self,
         camera: &str,
-        size: [Option<usize>; 2],
+        width: Option<usize>,
+        height: Option<usize>,
     ) -> Result<RgbImage, SensingError> {
         let mut camera = self.sensors.camera(camera)?.clone();
-        camera.width = size[0].unwrap_or(camera.width);
-        camera.height = size[1].unwrap_or(camera.height);
+        camera.width = width.unwrap_or(camera.width);
+        camera.height = height.unwrap_or(camera.height);
         Ok(self.sensors.render(&SensorSuite::frame(&self.sim), &camera)?.into_rgb_image())
     }
 

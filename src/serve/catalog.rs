@@ -1,4 +1,4 @@
-//! What is served.
+//! The suites and settings of a server.
 
 use crate::{
     benchmark::{Suite, Task, seed::Split},
@@ -6,88 +6,87 @@ use crate::{
     rollout::Episode,
 };
 
-/// Which episode a client wants.
+/// A request cannot be executed. The message is sent to the client.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct RequestError(pub String);
+
+impl From<String> for RequestError {
+    fn from(message: String) -> Self {
+        Self(message)
+    }
+}
+
+/// Identifies an episode among all episodes of a server.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EpisodeId {
     /// Name of the suite.
     pub suite: String,
-    /// Index of the task in it.
+    /// Index of the task in the suite.
     pub task: usize,
     /// Index of the episode in its split.
     pub episode: u32,
     /// Base seed.
     pub seed: u64,
-    /// Which list of episodes.
+    /// List of episodes that `episode` counts in.
     pub split: Split,
 }
 
-/// A suite that is served.
+/// A suite with the name under which it is served.
 #[derive(Clone, Debug)]
 pub struct ServedSuite<'a> {
-    /// Its name, as in results.
+    /// Name, as in results.
     pub name: String,
     /// The suite.
     pub suite: &'a Suite,
 }
 
-/// Makes the settled start of an episode.
-///
-/// # Errors
-/// Why it cannot be made; a message for people.
-pub(super) type Open<'a> = Box<dyn Fn(&EpisodeId) -> Result<Episode, String> + Sync + 'a>;
+/// Starts an episode: builds its scene and lets it settle.
+pub(super) type StartEpisode<'a> = Box<dyn Fn(&EpisodeId) -> Result<Episode, RequestError> + Sync + 'a>;
 
-/// All that a server offers.
+/// Suites and settings of a server.
 pub struct ServerConfig<'a> {
-    /// The suites, the first of which is meant where a client names none.
+    /// The suites. Requests without a suite mean the first one.
     pub suites: Vec<ServedSuite<'a>>,
-    /// What clients see and what their numbers mean.
+    /// Encoding of observations and actions.
     pub profile: Profile,
-    /// Whether clients are told the true state too.
+    /// True if clients receive the true state.
     pub privileged: bool,
-    /// Base seed where a client names none.
+    /// Base seed of requests without one.
     pub seed: u64,
-    /// Split where a client names none.
+    /// Split of requests without one.
     pub split: Split,
-    /// Tells this server's scripts, shifts and settings from those of another.
-    pub made_by: String,
-    /// Makes the start of an episode.
-    pub open: Open<'a>,
+    /// Hash of the scripts, shifts, settings and version. States of servers with another hash are refused.
+    pub fingerprint: String,
+    /// Starts an episode.
+    pub start_episode: StartEpisode<'a>,
 }
 
 impl ServerConfig<'_> {
-    /// A suite by name; the first if none is named.
-    ///
-    /// # Errors
-    /// There is none of that name; a fragment for people.
-    pub fn suite(&self, name: Option<&str>) -> Result<&ServedSuite<'_>, String> {
+    /// A suite by name, or the first suite.
+    pub(super) fn suite(&self, name: Option<&str>) -> Result<&ServedSuite<'_>, RequestError> {
         let found = match name {
             None => self.suites.first(),
             Some(name) => self.suites.iter().find(|suite| suite.name == name),
         };
         let names = || self.suites.iter().map(|suite| suite.name.as_str()).collect::<Vec<_>>().join(", ");
-        found.ok_or_else(|| format!("suite {:?}: there is none; served are {}", name.unwrap_or(""), names()))
-    }
-
-    /// A task of a suite.
-    ///
-    /// # Errors
-    /// There is none of that index; a fragment for people.
-    pub fn task(&self, wanted: &EpisodeId) -> Result<&Task, String> {
-        let ServedSuite { suite, name } = self.suite(Some(&wanted.suite))?;
-        let found = suite.tasks.iter().find(|task| task.id == wanted.task);
         found.ok_or_else(|| {
-            let last = suite.tasks.len().saturating_sub(1);
-            format!("task {}: suite {name} has the tasks 0 to {last}", wanted.task)
+            format!("suite {:?}: there is none; served are {}", name.unwrap_or(""), names()).into()
         })
     }
-}
 
-/// A split by its name in results.
-///
-/// # Errors
-/// There is none of that name; a fragment for people.
-pub fn split_named(name: &str) -> Result<Split, String> {
-    let all = [Split::Validation, Split::Demonstration, Split::Experiment];
-    let found = all.into_iter().find(|split| split.name() == name);
-    found.ok_or_else(|| format!("expected {}", all.map(Split::name).join(", ")))
+    /// The task of an episode.
+    pub(super) fn task(&self, id: &EpisodeId) -> Result<&Task, RequestError> {
+        let ServedSuite { suite, name } = self.suite(Some(&id.suite))?;
+        let found = suite.tasks.iter().find(|task| task.id == id.task);
+        found.ok_or_else(|| {
+            let last = suite.tasks.len().saturating_sub(1);
+            format!("task {}: suite {name} has the tasks 0 to {last}", id.task).into()
+        })
+    }
+
+    /// The encoding of actions as text. Equal texts mean equal encodings.
+    pub(super) fn action_code(&self) -> String {
+        serde_json::to_string(&self.profile.actions).unwrap_or_default()
+    }
 }

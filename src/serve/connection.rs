@@ -1,7 +1,7 @@
-//! The server's side of a websocket: waits that end when the run does, and clients that vanish.
+//! The server's end of a websocket. Every wait ends when the server is cancelled.
 
 use std::{
-    io::{self, ErrorKind, Read},
+    io::Read,
     net::TcpStream,
     sync::atomic::{AtomicBool, Ordering},
     time::{Duration, Instant},
@@ -9,111 +9,111 @@ use std::{
 
 use rmpv::Value;
 use tungstenite::{
-    Error, HandshakeError, Message, WebSocket, accept_hdr_with_config,
+    Message, WebSocket, accept_hdr_with_config,
     handshake::server::{ErrorResponse, Request, Response},
-    protocol::{CloseFrame, WebSocketConfig, frame::coding::CloseCode},
+    http::StatusCode,
+    protocol::{CloseFrame, frame::coding::CloseCode},
 };
 
-use crate::policy::wire::unpack;
+use crate::policy::{
+    msgpack::unpack,
+    transport::{self, TransportError, complete_handshake, is_wait, websocket_config},
+};
 
-/// The longest message that is taken: a state of 50,000 actions is 2.7 MiB.
-pub(super) const LARGEST: usize = 4 << 20;
-/// Between two looks at the clock and at the wish to end.
-pub(super) const POLL_INTERVAL: Duration = Duration::from_millis(50);
-/// How long a client may take to say what it wants when it comes.
+/// Longest message that is accepted; a state of 50,000 actions has 2.7 MiB.
+const MAX_MESSAGE_BYTES: usize = 4 << 20;
+/// Time limit for a client's handshake.
 pub(super) const HANDSHAKE_TIMEOUT: Duration = Duration::from_secs(10);
-/// How long it may take to take an answer: somebody may have stopped it for a while.
+/// Time limit for sending a response. Generous, since the client may be paused in a debugger.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(60);
-/// How long what a client still sends is listened to after the end, so that it hears what was said last.
+/// Time for which incoming data is discarded after the end, so that the client receives the last response.
 const CLOSE_DRAIN_TIMEOUT: Duration = Duration::from_secs(3);
-/// Silence after which a client is asked whether it is there: to a machine that is gone that fails in the end.
+/// Idle time before a ping is sent; pings to a dead host eventually fail the connection.
 const PING_INTERVAL: Duration = Duration::from_secs(60);
 
-/// What came from a client.
+/// Result of receiving a message.
 #[derive(Debug)]
 pub(super) enum Incoming {
     /// A message.
     Message(Value),
-    /// Something that is none; a message for people.
-    Nonsense(String),
-    /// Something after which nothing can be understood any more; a message for people.
-    Lost(String),
-    /// The end.
+    /// An invalid message, with an explanation. The connection remains usable.
+    Malformed(String),
+    /// An invalid message after which the connection cannot be used, with an explanation.
+    Disconnected(String),
+    /// The connection was closed, or the server is cancelled.
     Closed,
 }
+
+/// The server is cancelled, the client was refused, or a time limit has passed.
+#[derive(Debug)]
+pub(super) struct Aborted;
 
 /// A connection to a client.
 #[derive(Debug)]
 pub(super) struct Connection<'a> {
     socket: WebSocket<TcpStream>,
-    stop: &'a AtomicBool,
+    cancel: &'a AtomicBool,
 }
 
 impl<'a> Connection<'a> {
-    /// Shakes hands, unless `full` says why there is no room.
+    /// Accepts a websocket, unless `refusal` returns a reason: then the client receives HTTP status 503 with it.
     ///
     /// # Errors
-    /// The client speaks no websocket, is too slow, or there is no room for it.
+    /// The client does not complete the handshake, or is refused.
     pub(super) fn accept(
         stream: TcpStream,
-        stop: &'a AtomicBool,
-        full: impl FnOnce() -> Option<String>,
-    ) -> Result<Self, Error> {
-        let config = WebSocketConfig::default().max_message_size(Some(LARGEST)).max_frame_size(Some(LARGEST));
-        // The type of the refusal is tungstenite's.
+        cancel: &'a AtomicBool,
+        refusal: impl FnOnce() -> Option<String>,
+    ) -> Result<Self, TransportError<Aborted>> {
+        // The type of the error is tungstenite's.
         #[allow(clippy::result_large_err)]
-        let callback = |_: &Request, response: Response| match full() {
+        let callback = |_: &Request, response: Response| match refusal() {
             None => Ok(response),
-            Some(why) => {
-                let mut refusal = ErrorResponse::new(Some(why));
-                *refusal.status_mut() = tungstenite::http::StatusCode::SERVICE_UNAVAILABLE;
-                Err(refusal)
+            Some(reason) => {
+                let mut refused = ErrorResponse::new(Some(reason));
+                *refused.status_mut() = StatusCode::SERVICE_UNAVAILABLE;
+                Err(refused)
             }
         };
         let deadline = Instant::now() + HANDSHAKE_TIMEOUT;
-        let mut shake = accept_hdr_with_config(stream, callback, Some(config));
-        loop {
-            match shake {
-                Ok(socket) => return Ok(Self { socket, stop }),
-                Err(HandshakeError::Failure(error)) => return Err(error),
-                Err(HandshakeError::Interrupted(_)) if Instant::now() > deadline || is_set(stop) => {
-                    return Err(Error::ConnectionClosed);
-                }
-                Err(HandshakeError::Interrupted(middle)) => shake = middle.handshake(),
-            }
-        }
+        let config = websocket_config(MAX_MESSAGE_BYTES);
+        let handshake = accept_hdr_with_config(stream, callback, Some(config));
+        let socket = complete_handshake(handshake, || check(cancel, deadline))?;
+        Ok(Self { socket, cancel })
     }
 
-    /// The next message. An end of the run counts as the end of the connection.
-    pub(super) fn hear(&mut self) -> Incoming {
-        let mut quiet_since = Instant::now();
+    /// Waits for the next message. Sends pings meanwhile.
+    pub(super) fn recv(&mut self) -> Incoming {
+        let mut idle_since = Instant::now();
         loop {
-            match self.socket.read() {
+            let message = transport::receive(&mut self.socket, |socket| {
+                if self.cancel.load(Ordering::Relaxed) {
+                    return Err(Aborted);
+                }
+                if idle_since.elapsed() > PING_INTERVAL {
+                    idle_since = Instant::now();
+                    let _ = socket.send(Message::Ping(Vec::new().into()));
+                }
+                Ok(())
+            });
+            match message {
                 Ok(Message::Binary(bytes)) => {
                     return unpack(&bytes).map_or_else(
-                        |what| Incoming::Nonsense(format!("the message is {what}")),
+                        |error| Incoming::Malformed(format!("the message is {error}")),
                         Incoming::Message,
                     );
                 }
                 Ok(Message::Text(_)) => {
-                    return Incoming::Nonsense("the message is a text frame; expected msgpack".to_owned());
+                    return Incoming::Malformed("the message is a text frame; expected msgpack".to_owned());
                 }
                 Ok(Message::Close(_)) => {
                     let _ = self.socket.flush();
                     return Incoming::Closed;
                 }
-                Ok(_) => quiet_since = Instant::now(),
-                Err(Error::Io(error)) if is_wait(&error) => {
-                    if is_set(self.stop) {
-                        return Incoming::Closed;
-                    }
-                    if quiet_since.elapsed() > PING_INTERVAL {
-                        quiet_since = Instant::now();
-                        let _ = self.socket.send(Message::Ping(Vec::new().into()));
-                    }
-                }
-                Err(Error::Capacity(_)) => {
-                    return Incoming::Lost(format!("the message is longer than {} MiB", LARGEST >> 20));
+                Ok(_) => idle_since = Instant::now(),
+                Err(TransportError::Socket(tungstenite::Error::Capacity(_))) => {
+                    let limit = MAX_MESSAGE_BYTES >> 20;
+                    return Incoming::Disconnected(format!("the message is longer than {limit} MiB"));
                 }
                 Err(_) => return Incoming::Closed,
             }
@@ -123,31 +123,22 @@ impl<'a> Connection<'a> {
     /// Sends a message.
     ///
     /// # Errors
-    /// The client is gone or does not take it.
-    pub(super) fn say(&mut self, value: &Value) -> Result<(), Error> {
-        let mut bytes = Vec::new();
-        rmpv::encode::write_value(&mut bytes, value).map_err(io::Error::from)?;
+    /// The connection failed, or the client does not accept the message in time.
+    pub(super) fn send(&mut self, value: &Value) -> Result<(), TransportError<Aborted>> {
         let deadline = Instant::now() + WRITE_TIMEOUT;
-        let mut sent = self.socket.send(Message::binary(bytes));
-        while let Err(Error::Io(error)) = &sent
-            && is_wait(error)
-            && Instant::now() < deadline
-            && !is_set(self.stop)
-        {
-            sent = self.socket.flush();
-        }
-        sent
+        transport::send(&mut self.socket, value, || check(self.cancel, deadline))
     }
 
-    /// Ends the connection in order, as far as the client lets it.
+    /// Closes the connection after the client has received the last message.
     pub(super) fn close(mut self) {
-        let code = if is_set(self.stop) { CloseCode::Away } else { CloseCode::Normal };
+        let cancelled = || self.cancel.load(Ordering::Relaxed);
+        let code = if cancelled() { CloseCode::Away } else { CloseCode::Normal };
         let _ = self.socket.close(Some(CloseFrame { code, reason: "".into() }));
-        // What has not been read yet would make the system throw away what was said last.
+        // The system would discard the last message if data remained unread.
         let (deadline, stream) = (Instant::now() + CLOSE_DRAIN_TIMEOUT, self.socket.get_mut());
-        let mut rest = vec![0; 1 << 16];
-        while Instant::now() < deadline && !is_set(self.stop) {
-            match stream.read(&mut rest) {
+        let mut discarded = vec![0; 1 << 16];
+        while Instant::now() < deadline && !cancelled() {
+            match stream.read(&mut discarded) {
                 Ok(0) => return,
                 Err(error) if !is_wait(&error) => return,
                 _ => {}
@@ -156,11 +147,6 @@ impl<'a> Connection<'a> {
     }
 }
 
-fn is_set(stop: &AtomicBool) -> bool {
-    stop.load(Ordering::Relaxed)
-}
-
-/// Whether a wait ended without anything having happened.
-pub(super) fn is_wait(error: &io::Error) -> bool {
-    matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted)
+fn check(cancel: &AtomicBool, deadline: Instant) -> Result<(), Aborted> {
+    if cancel.load(Ordering::Relaxed) || Instant::now() > deadline { Err(Aborted) } else { Ok(()) }
 }

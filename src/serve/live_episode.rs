@@ -1,60 +1,66 @@
-//! An episode that a client drives.
+//! An episode that a client controls.
 
-use super::{catalog::ServerConfig, request::Row, state::State};
+use super::{
+    catalog::{RequestError, ServerConfig},
+    episode_state::{ActionRow, EpisodeState},
+};
 use crate::{
     evaluation::record::Outcome,
     policy::{CommandResolver, Observation, SensorStreams, decode},
     rollout::{Episode, EpisodeError},
 };
 
-/// An episode that a client drives. A copy of it goes on as it would itself.
+/// An episode in progress. A clone continues independently and gives byte-identical results.
 #[derive(Clone)]
 pub(super) struct LiveEpisode {
-    /// Where it stands.
-    pub state: State,
-    /// The episode.
+    /// Its identity and the actions so far.
+    pub state: EpisodeState,
+    /// The simulation.
     pub episode: Episode,
-    follower: CommandResolver,
+    resolver: CommandResolver,
 }
 
 impl LiveEpisode {
-    /// The settled start of an episode.
+    /// Starts the episode of `state`, without its actions.
     ///
     /// # Errors
-    /// It cannot be made; a message for people.
-    pub(super) fn start(offer: &ServerConfig, state: State) -> Result<Self, String> {
-        let mut episode = (offer.open)(&state.wanted)?;
-        episode.begin(offer.profile.streams());
-        Ok(Self { state, episode, follower: CommandResolver::default() })
+    /// The episode cannot be started.
+    pub(super) fn start(config: &ServerConfig, state: &EpisodeState) -> Result<Self, RequestError> {
+        let mut episode = (config.start_episode)(&state.id)?;
+        episode.begin(config.profile.streams());
+        let state = EpisodeState { id: state.id.clone(), actions: Vec::new() };
+        Ok(Self { state, episode, resolver: CommandResolver::default() })
     }
 
-    /// What the client sees now.
+    /// The observation of the profile in the current state.
     ///
     /// # Errors
-    /// It cannot be sensed.
-    pub(super) fn observe(&mut self, offer: &ServerConfig) -> Result<Observation, EpisodeError> {
-        self.episode.observe(&offer.profile.streams())
+    /// A sensor stream cannot be computed.
+    pub(super) fn observe(&mut self, config: &ServerConfig) -> Result<Observation, EpisodeError> {
+        self.episode.observe(&config.profile.streams())
     }
 
-    /// Carries out one action of finite numbers; nothing once the episode has ended.
+    /// Executes an action of finite numbers. Does nothing once the episode has ended.
     ///
     /// # Errors
-    /// The action is none; a message for people.
-    pub(super) fn advance(&mut self, offer: &ServerConfig, row: &Row) -> Result<(), String> {
+    /// The action cannot be decoded.
+    pub(super) fn advance(&mut self, config: &ServerConfig, row: &ActionRow) -> Result<(), RequestError> {
         if self.episode.outcome().is_some() {
             return Ok(());
         }
-        let command = decode::command(row, &offer.profile.actions).map_err(|e| e.to_string())?;
-        // A step away from where the tool is needs to know where that is, and no picture.
-        let now = self.episode.observe(&SensorStreams::default()).map_err(|e| e.to_string())?;
-        let action = self.follower.action(&now, command);
+        let command =
+            decode::command(row, &config.profile.actions).map_err(|e| RequestError(e.to_string()))?;
+        // A displacement starts at the measured tool pose, which needs no images.
+        let observation =
+            self.episode.observe(&SensorStreams::default()).map_err(|e| RequestError(e.to_string()))?;
+        let action = self.resolver.resolve(&observation, command);
         self.episode.step(&action);
         self.state.actions.push(*row);
         Ok(())
     }
 
-    /// Whether the goal was reached.
-    pub(super) fn succeeded(&self) -> bool {
+    /// True if the goal was reached.
+    pub(super) fn has_succeeded(&self) -> bool {
         self.episode.outcome() == Some(&Outcome::Completed)
     }
 }

@@ -1,17 +1,16 @@
-//! Episodes for somebody else to drive over a network: reset, step, render, get and set the state. `docs/serve.md` is the
-//! protocol.
+//! A server through which clients control episodes: reset, step, render, get and set the state. The protocol is described in
+//! `docs/serve.md`.
 
 mod catalog;
 mod connection;
-mod fields;
+mod episode_state;
 mod live_episode;
 mod request;
 mod response;
 mod server;
 mod session;
-mod space;
-mod state;
+mod spaces;
 
-pub use catalog::{EpisodeId, ServedSuite, ServerConfig, split_named};
+pub use catalog::{EpisodeId, RequestError, ServedSuite, ServerConfig};
 pub use response::hello;
 pub use server::{Server, serve};

@@ -1,152 +1,252 @@
-//! What a client may ask.
+//! Requests of clients and their validation.
 
 use rmpv::Value;
 
 use super::{
-    catalog::{EpisodeId, ServerConfig, split_named},
-    fields::{Fields, short, text},
-    state::State,
+    catalog::{EpisodeId, RequestError, ServerConfig},
+    episode_state::{ActionRow, EpisodeState},
 };
-use crate::policy::{
-    profile::ACTION_LEN,
-    wire::{entry, kind, names, numbers},
+use crate::{
+    benchmark::seed::Split,
+    policy::{
+        msgpack::{NumberArray, entry, kind, names, numbers},
+        profile::ACTION_LEN,
+    },
 };
 
-/// Seven numbers in the code of the profile.
-pub(super) type Row = [f64; ACTION_LEN];
+/// Most actions of one step, which bounds the time until its response.
+const MAX_STEP_ACTIONS: usize = 1000;
+/// Most actions of a state; longer than any episode.
+const MAX_STATE_ACTIONS: usize = 50_000;
+/// Most characters of a client's own text in an error message.
+const MAX_QUOTED_CHARS: usize = 80;
+/// 2^53: from here on not every whole number is a double.
+const MAX_EXACT: f64 = 9_007_199_254_740_992.0;
 
-/// The most actions of one request: a longer one would keep its client waiting for minutes without a word.
-const LONGEST: usize = 1000;
-/// The most actions of a state: longer than any episode.
-const LONGEST_STATE: usize = 50_000;
-
-/// A request.
+/// A valid request.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Request {
-    /// Begin an episode.
+    /// Start an episode.
     Reset(EpisodeId),
-    /// Carry out actions, at least one.
-    Step(Vec<Row>),
-    /// Draw what a camera or a finger sees.
+    /// Execute actions, at least one.
+    Step(Vec<ActionRow>),
+    /// Render the image of a camera or a finger.
     Render {
-        /// Name of a camera, or `left` or `right`; the scene's first camera if none.
+        /// Name of a camera, or `left` or `right`; `None` for the scene's first camera.
         camera: Option<String>,
-        /// Width and height, pixels; its own if none.
-        size: [Option<usize>; 2],
+        /// Width, pixels; `None` for the camera's own.
+        width: Option<usize>,
+        /// Height, pixels; `None` for the camera's own.
+        height: Option<usize>,
     },
-    /// Say where the episode stands.
+    /// Return the state of the episode.
     GetState,
-    /// Go back to where an episode stood.
-    SetState(Box<State>),
-    /// End the connection.
+    /// Restore a state.
+    SetState(Box<EpisodeState>),
+    /// Close the connection.
     Close,
 }
 
-/// Kinds of requests, for messages.
-const KINDS: &str = "reset, step, render, get_state, set_state, close";
+/// Types of requests, for messages.
+const TYPES: &str = "reset, step, render, get_state, set_state, close";
 
 impl Request {
-    /// Reads a message.
+    /// Validates a message.
     ///
     /// # Errors
-    /// It is no request; a message for people.
-    pub(super) fn read(message: &Value, offer: &ServerConfig) -> Result<Self, String> {
+    /// The message is not a request, or a field is unknown, missing or invalid.
+    pub(super) fn read(message: &Value, config: &ServerConfig) -> Result<Self, RequestError> {
         let Some(map) = message.as_map() else {
-            return Err(format!("the message is {}; expected a map with a type of {KINDS}", kind(message)));
+            let what = kind(message);
+            return Err(format!("the message is {what}; expected a map with a type of {TYPES}").into());
         };
         let Some(what) = entry(message, "type") else {
-            return Err(format!(
-                "the message has no type; expected one of {KINDS}; it has {}",
-                short(&names(message))
-            ));
+            let has = shortened(&names(message));
+            return Err(format!("the message has no type; expected one of {TYPES}; it has {has}").into());
         };
         let what =
-            text(what).ok_or_else(|| format!("the type is {}; expected one of {KINDS}", kind(what)))?;
+            text(what).ok_or_else(|| format!("the type is {}; expected one of {TYPES}", kind(what)))?;
         let fields = |known: &[&str]| {
             let all: Vec<&str> = ["type"].iter().chain(known).copied().collect();
             Fields::new(&what, map, &all)
         };
         match what.as_str() {
-            "reset" => Ok(Self::Reset(wanted(&fields(&WANTED)?, offer)?)),
+            "reset" => Ok(Self::Reset(episode_id(&fields(&EPISODE_FIELDS)?, config)?)),
             "step" => step(&fields(&["action", "actions"])?),
             "render" => {
                 let fields = fields(&["camera", "width", "height"])?;
-                let edge = |name| Ok::<_, String>(fields.whole(name, 1 << 16)?.map(|n| n as usize));
-                Ok(Self::Render { camera: fields.text("camera")?, size: [edge("width")?, edge("height")?] })
+                let edge = |name| Ok::<_, RequestError>(fields.integer(name, 1 << 16)?.map(|n| n as usize));
+                Ok(Self::Render {
+                    camera: fields.text("camera")?,
+                    width: edge("width")?,
+                    height: edge("height")?,
+                })
             }
             "get_state" => fields(&[]).map(|_| Self::GetState),
-            "set_state" => state(&fields(&["state"])?, offer),
+            "set_state" => state(&fields(&["state"])?, config),
             "close" => fields(&[]).map(|_| Self::Close),
-            other => Err(format!("type {:?}: there is none; expected one of {KINDS}", short(other))),
+            other => {
+                Err(format!("type {:?}: there is none; expected one of {TYPES}", shortened(other)).into())
+            }
         }
     }
 }
 
-/// The fields that name an episode.
-const WANTED: [&str; 5] = ["suite", "task", "episode", "seed", "split"];
+/// Fields that identify an episode.
+const EPISODE_FIELDS: [&str; 5] = ["suite", "task", "episode", "seed", "split"];
 
-fn wanted(fields: &Fields, offer: &ServerConfig) -> Result<EpisodeId, String> {
-    let told = |what: String| fields.wrong(&what);
+fn episode_id(fields: &Fields, config: &ServerConfig) -> Result<EpisodeId, RequestError> {
+    let prefixed = |error: RequestError| fields.error(&error.0);
     let suite = fields.text("suite")?;
-    let suite = offer.suite(suite.as_deref()).map_err(told)?.name.clone();
-    let task = fields.need("task", fields.whole("task", u64::from(u32::MAX))?)? as usize;
-    let episode = fields.need("episode", fields.whole("episode", u64::from(u32::MAX))?)? as u32;
-    let seed = fields.whole("seed", u64::MAX)?.unwrap_or(offer.seed);
+    let suite = config.suite(suite.as_deref()).map_err(prefixed)?.name.clone();
+    let task = fields.required("task", fields.integer("task", u64::from(u32::MAX))?)? as usize;
+    let episode = fields.required("episode", fields.integer("episode", u64::from(u32::MAX))?)? as u32;
+    let seed = fields.integer("seed", u64::MAX)?.unwrap_or(config.seed);
     let split = match fields.text("split")? {
-        None => offer.split,
-        Some(name) => split_named(&name).map_err(|e| told(format!("split is {:?}; {e}", short(&name))))?,
+        None => config.split,
+        Some(name) => name
+            .parse::<Split>()
+            .map_err(|error| fields.error(&format!("split is {:?}; {error}", shortened(&name))))?,
     };
-    let wanted = EpisodeId { suite, task, episode, seed, split };
-    offer.task(&wanted).map_err(told)?;
-    Ok(wanted)
+    let id = EpisodeId { suite, task, episode, seed, split };
+    config.task(&id).map_err(prefixed)?;
+    Ok(id)
 }
 
-fn step(fields: &Fields) -> Result<Request, String> {
+fn step(fields: &Fields) -> Result<Request, RequestError> {
     let value = match (fields.get("action"), fields.get("actions")) {
         (Some(one), None) | (None, Some(one)) => one,
-        (None, None) => return Err(fields.wrong("it has neither action nor actions")),
-        (Some(_), Some(_)) => return Err(fields.wrong("it has both action and actions; expected one")),
+        (None, None) => return Err(fields.error("it has neither action nor actions")),
+        (Some(_), Some(_)) => return Err(fields.error("it has both action and actions; expected one")),
     };
-    let rows = rows(value, LONGEST).map_err(|what| fields.wrong(&what))?;
+    let rows = action_rows(fields, value, MAX_STEP_ACTIONS)?;
     if rows.is_empty() {
-        return Err(fields.wrong("actions is empty; expected at least one action"));
+        return Err(fields.error("actions is empty; expected at least one action"));
     }
     Ok(Request::Step(rows))
 }
 
-/// Rows of seven numbers, or one.
-fn rows(value: &Value, most: usize) -> Result<Vec<Row>, String> {
+/// An array of shape (7) or (horizon, 7).
+fn action_rows(fields: &Fields, value: &Value, most: usize) -> Result<Vec<ActionRow>, RequestError> {
     let expected = format!("expected shape ({ACTION_LEN}) or (horizon, {ACTION_LEN}), horizon up to {most}");
-    let (shape, found) = numbers(value).map_err(|what| format!("the actions are {what}; {expected}"))?;
+    let NumberArray { shape, values } =
+        numbers(value).map_err(|error| fields.error(&format!("the actions are {error}; {expected}")))?;
     match *shape.as_slice() {
         [ACTION_LEN] => {}
         [0] | [0, ACTION_LEN] => return Ok(Vec::new()),
         [horizon, ACTION_LEN] if horizon <= most => {}
-        _ => return Err(format!("the actions have the shape {shape:?}; {expected}")),
+        _ => return Err(fields.error(&format!("the actions have the shape {shape:?}; {expected}"))),
     }
-    let rows: Vec<Row> = found.as_chunks::<ACTION_LEN>().0.to_vec();
+    let rows: Vec<ActionRow> = values.as_chunks::<ACTION_LEN>().0.to_vec();
     match rows.iter().position(|row| row.iter().any(|number| !number.is_finite())) {
         None => Ok(rows),
-        Some(at) => Err(format!("action {at} is {:?}: it holds a number that is not finite", rows[at])),
+        Some(at) => {
+            Err(fields.error(&format!("action {at} is {:?}: it holds a number that is not finite", rows[at])))
+        }
     }
 }
 
-fn state(fields: &Fields, offer: &ServerConfig) -> Result<Request, String> {
-    let value = fields.need("state", fields.get("state"))?;
+fn state(fields: &Fields, config: &ServerConfig) -> Result<Request, RequestError> {
+    let value = fields.required("state", fields.get("state"))?;
     let map = value.as_map().ok_or_else(|| {
-        fields.wrong(&format!("state is {}; expected what get_state answered", kind(value)))
+        fields.error(&format!("state is {}; expected the state of a get_state response", kind(value)))
     })?;
-    let known: Vec<&str> = WANTED.into_iter().chain(["actions", "code", "made_by"]).collect();
+    let known: Vec<&str> = EPISODE_FIELDS.into_iter().chain(["actions", "code", "made_by"]).collect();
     let inner = Fields::new("set_state: state", map, &known)?;
     for (name, own, what) in [
-        ("code", offer.code(), "an action means something else there: another profile or gripper"),
-        ("made_by", offer.made_by.clone(), "its scripts, shifts, settings or version differ"),
+        ("code", config.action_code(), "its actions are encoded differently: another profile or gripper"),
+        ("made_by", config.fingerprint.clone(), "its scripts, shifts, settings or version differ"),
     ] {
         if inner.text(name)?.is_some_and(|theirs| theirs != own) {
-            return Err(inner.wrong(&format!("it comes from a server that is not like this one: {what}")));
+            return Err(inner.error(&format!("it comes from another server: {what}")));
         }
     }
-    let actions = inner.need("actions", inner.get("actions"))?;
-    let actions = rows(actions, LONGEST_STATE).map_err(|what| inner.wrong(&what))?;
-    Ok(Request::SetState(Box::new(State { wanted: wanted(&inner, offer)?, actions })))
+    let actions = inner.required("actions", inner.get("actions"))?;
+    let actions = action_rows(&inner, actions, MAX_STATE_ACTIONS)?;
+    Ok(Request::SetState(Box::new(EpisodeState { id: episode_id(&inner, config)?, actions })))
+}
+
+/// The fields of a request.
+struct Fields<'a> {
+    /// Prefix of error messages.
+    context: &'a str,
+    map: &'a [(Value, Value)],
+}
+
+impl<'a> Fields<'a> {
+    /// Wraps the fields of a map.
+    ///
+    /// # Errors
+    /// A field is not in `known`.
+    fn new(context: &'a str, map: &'a [(Value, Value)], known: &[&str]) -> Result<Self, RequestError> {
+        let fields = Self { context, map };
+        for (key, _) in map {
+            let name = text(key).unwrap_or_else(|| "that is not text".to_owned());
+            if !known.contains(&name.as_str()) {
+                let name = shortened(&name);
+                let known = known.join(", ");
+                return Err(fields.error(&format!("there is no field {name:?}; expected one of {known}")));
+            }
+        }
+        Ok(fields)
+    }
+
+    fn error(&self, what: &str) -> RequestError {
+        RequestError(format!("{}: {what}", self.context))
+    }
+
+    /// Value of a field, `None` if it is absent or nil.
+    fn get(&self, name: &str) -> Option<&'a Value> {
+        let found = self.map.iter().find(|(key, _)| text(key).as_deref() == Some(name));
+        found.map(|(_, value)| value).filter(|value| !value.is_nil())
+    }
+
+    fn required<T>(&self, name: &str, value: Option<T>) -> Result<T, RequestError> {
+        value.ok_or_else(|| self.error(&format!("it has no field {name}")))
+    }
+
+    fn text(&self, name: &str) -> Result<Option<String>, RequestError> {
+        let Some(value) = self.get(name) else { return Ok(None) };
+        let found = text(value);
+        found.map(Some).ok_or_else(|| self.error(&format!("{name} is {}; expected text", kind(value))))
+    }
+
+    /// A whole number from 0 to `most`: an integer, or a number or numpy scalar without a fraction.
+    fn integer(&self, name: &str, most: u64) -> Result<Option<u64>, RequestError> {
+        let Some(value) = self.get(name) else { return Ok(None) };
+        let found = value.as_u64().or_else(|| {
+            let NumberArray { shape, values } = numbers(value).ok()?;
+            let number = *values.first()?;
+            let fits = shape.is_empty() && number.fract() == 0.0 && (0.0..MAX_EXACT).contains(&number);
+            fits.then_some(number as u64)
+        });
+        let fits = found.filter(|number| *number <= most);
+        let error =
+            || self.error(&format!("{name} is {}; expected a whole number in 0..{most}", shown(value)));
+        fits.map(Some).ok_or_else(error)
+    }
+}
+
+/// Text of msgpack's type str or bin.
+fn text(value: &Value) -> Option<String> {
+    match value {
+        Value::String(text) => text.as_str().map(str::to_owned),
+        Value::Binary(bytes) => String::from_utf8(bytes.clone()).ok(),
+        _ => None,
+    }
+}
+
+/// The beginning of a client's own text, for messages.
+fn shortened(text: &str) -> String {
+    let cut = text.char_indices().nth(MAX_QUOTED_CHARS);
+    cut.map_or_else(|| text.to_owned(), |(at, _)| format!("{}…", &text[..at]))
+}
+
+/// A value, for messages.
+fn shown(value: &Value) -> String {
+    match value {
+        Value::Integer(_) | Value::F32(_) | Value::F64(_) | Value::Boolean(_) => value.to_string(),
+        Value::String(_) | Value::Binary(_) => format!("{:?}", shortened(&text(value).unwrap_or_default())),
+        other => kind(other).to_owned(),
+    }
 }

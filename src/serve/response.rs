@@ -1,161 +1,152 @@
-//! What a client is told.
+//! Responses to clients.
 
-use image::RgbImage;
 use rmpv::Value;
 use serde_json::{Map, json};
 
-use super::{catalog::ServerConfig, live_episode::LiveEpisode, space};
+use super::{
+    catalog::{RequestError, ServerConfig},
+    live_episode::LiveEpisode,
+    spaces,
+};
 use crate::{
     benchmark::control::CONTROL_DT,
     evaluation::record::Outcome,
-    npy::NpyArray,
     policy::{
         Observation,
         encode::content,
+        msgpack::map,
         profile::{Profile, ProfileInput},
-        wire::pack_array,
     },
 };
 
-/// Number of the protocol: another one would not be understood.
+/// Version of the protocol.
 const PROTOCOL: u32 = 1;
-/// Of a record: it depends on how often the client looked, not on what it did.
-const UNSTEADY: &str = "camera_inside";
+/// Field of a record that depends on how often the client requested images, not on its actions.
+const OBSERVATION_DEPENDENT: &str = "camera_inside";
 
-/// An entry of a map.
-pub(super) fn pair(name: &str, value: Value) -> (Value, Value) {
-    (Value::from(name), value)
+/// A response of a type.
+pub(super) fn typed(kind: &str, entries: impl IntoIterator<Item = (&'static str, Value)>) -> Value {
+    map([("type", Value::from(kind))].into_iter().chain(entries))
 }
 
-/// An answer of a kind.
-pub(super) fn plain(kind: &str, entries: Vec<(Value, Value)>) -> Value {
-    Value::Map(std::iter::once(pair("type", kind.into())).chain(entries).collect())
-}
-
-/// What is said instead of an answer.
+/// The response to a request that cannot be executed.
 pub(super) fn error(message: &str) -> Value {
-    plain("error", vec![pair("error", message.into())])
+    typed("error", [("error", message.into())])
 }
 
-/// The first message: what there is, what is seen and what is done.
-///
-/// `first` is what the client will see at the start of the first episode.
-pub fn hello(offer: &ServerConfig, first: &Observation) -> Value {
-    let suites = offer.suites.iter().map(|one| {
+/// The first message to every client: suites, tasks, and the spaces of observations and actions. `first` is the first
+/// observation of the first episode; it gives the shapes.
+pub fn hello(config: &ServerConfig, first: &Observation) -> Value {
+    let suites = config.suites.iter().map(|served| {
         let tasks =
-            one.suite.tasks.iter().map(
+            served.suite.tasks.iter().map(
                 |task| json!({ "task": task.id, "prompt": task.prompt, "budget_steps": task.budget_steps }),
             );
-        json!({ "name": one.name, "episodes": one.suite.episodes, "tasks": tasks.collect::<Vec<_>>() })
+        json!({
+            "name": served.name,
+            "episodes": served.suite.episodes,
+            "tasks": tasks.collect::<Vec<_>>(),
+        })
     });
     let about = json!({
         "softvt": env!("CARGO_PKG_VERSION"),
         "protocol": PROTOCOL,
         "suites": suites.collect::<Vec<_>>(),
-        "profile": offer.profile.name,
-        "privileged": offer.privileged,
-        "seed": offer.seed,
-        "split": offer.split.name(),
+        "profile": config.profile.name,
+        "privileged": config.privileged,
+        "seed": config.seed,
+        "split": config.split.name(),
         "control_hz": 1.0 / CONTROL_DT,
     });
-    let Value::Map(mut entries) = of_json(&about) else { return plain("hello", Vec::new()) };
-    entries.push(pair("observation_space", space::observation(offer, first)));
-    entries.push(pair("action_space", space::action(&offer.profile.actions)));
-    plain("hello", entries)
+    let Value::Map(mut entries) = from_json(&about) else { return typed("hello", []) };
+    entries.push(("observation_space".into(), spaces::observation(config, first)));
+    entries.push(("action_space".into(), spaces::action(&config.profile.actions)));
+    let kind = (Value::from("type"), Value::from("hello"));
+    Value::Map(std::iter::once(kind).chain(entries).collect())
 }
 
-/// Where the episode stands: what is seen and what can be said of it. `carried_out` is how many actions a step was.
+/// The current observation, reward and info of an episode. `executed` is the number of actions that a step executed.
 ///
 /// # Errors
-/// Something cannot be sensed; a message for people.
-pub(super) fn stands(
+/// A sensor stream cannot be computed.
+pub(super) fn transition(
     kind: &str,
-    running: &mut LiveEpisode,
-    offer: &ServerConfig,
-    carried_out: Option<usize>,
-) -> Result<Value, String> {
-    let seen = running.observe(offer).map_err(|e| e.to_string())?;
-    let outcome = running.episode.outcome();
-    let reward = if carried_out.is_some() && running.succeeded() { 1.0 } else { 0.0 };
-    let truncated = outcome.is_some() && !running.succeeded();
-    Ok(plain(
+    live: &mut LiveEpisode,
+    config: &ServerConfig,
+    executed: Option<usize>,
+) -> Result<Value, RequestError> {
+    let observation = live.observe(config).map_err(|e| RequestError(e.to_string()))?;
+    let succeeded = live.has_succeeded();
+    let reward = if executed.is_some() && succeeded { 1.0 } else { 0.0 };
+    let truncated = live.episode.outcome().is_some() && !succeeded;
+    Ok(typed(
         kind,
-        vec![
-            pair("observation", observation(&seen, &offer.profile)),
-            pair("reward", Value::F64(reward)),
-            pair("terminated", running.succeeded().into()),
-            pair("truncated", truncated.into()),
-            pair("info", info(running, offer, &seen, carried_out)),
+        [
+            ("observation", encoded(&observation, &config.profile)),
+            ("reward", Value::F64(reward)),
+            ("terminated", succeeded.into()),
+            ("truncated", truncated.into()),
+            ("info", info(live, config, &observation, executed)),
         ],
     ))
 }
 
-/// A picture as an array, uint8 (height, width, 3).
-pub(super) fn picture(picture: RgbImage) -> Value {
-    let shape = vec![picture.height() as usize, picture.width() as usize, 3];
-    pack_array(NpyArray::from_bytes(shape, picture.into_raw()), true)
-}
-
-/// The one key of an entry that a profile sends under several.
-pub(super) fn key(input: &ProfileInput) -> &str {
-    input.keys.iter().min_by_key(|key| key.len()).map_or("", String::as_str)
-}
-
-fn observation(seen: &Observation, profile: &Profile) -> Value {
-    let entry = |input: &ProfileInput| Some(pair(key(input), content(seen, &input.source)?.into_value(true)));
+fn encoded(observation: &Observation, profile: &Profile) -> Value {
+    let entry = |input: &ProfileInput| {
+        Some((input.shortest_key().into(), content(observation, &input.source)?.into_value(true)))
+    };
     Value::Map(profile.inputs.iter().filter_map(entry).collect())
 }
 
-/// Without the right to the true state: what any policy could know, and whether the goal was reached.
+/// Unless clients are privileged: what any policy can know, and whether the goal was reached.
 fn info(
-    running: &LiveEpisode,
-    offer: &ServerConfig,
-    seen: &Observation,
-    carried_out: Option<usize>,
+    live: &LiveEpisode,
+    config: &ServerConfig,
+    observation: &Observation,
+    executed: Option<usize>,
 ) -> Value {
-    let outcome = running.episode.outcome();
     let mut info = Map::new();
     let mut put = |name: &str, value| info.insert(name.to_owned(), value);
-    put("task", json!(running.state.wanted.task));
-    put("episode", json!(running.state.wanted.episode));
-    put("step", json!(running.state.actions.len()));
-    put("time_s", json!(seen.time_s));
-    put("success", json!(running.succeeded()));
-    if let Some(count) = carried_out {
+    put("task", json!(live.state.id.task));
+    put("episode", json!(live.state.id.episode));
+    put("step", json!(live.state.actions.len()));
+    put("time_s", json!(observation.time_s));
+    put("success", json!(live.has_succeeded()));
+    if let Some(count) = executed {
         put("carried_out", json!(count));
     }
-    if offer.privileged {
-        put("state", json!(running.episode.trace()));
-        put("verdict", json!(running.episode.verdict()));
+    if config.privileged {
+        put("state", json!(live.episode.trace()));
+        put("verdict", json!(live.episode.verdict()));
     }
-    if let Some(outcome) = outcome {
-        put("record", record(running, offer, outcome));
+    if let Some(outcome) = live.episode.outcome() {
+        put("record", record(live, config, outcome));
     }
-    of_json(&serde_json::Value::Object(info))
+    from_json(&serde_json::Value::Object(info))
 }
 
-fn record(running: &LiveEpisode, offer: &ServerConfig, outcome: &Outcome) -> serde_json::Value {
-    if !offer.privileged {
+fn record(live: &LiveEpisode, config: &ServerConfig, outcome: &Outcome) -> serde_json::Value {
+    if !config.privileged {
         let kind = json!(outcome)["kind"].clone();
-        let steps = running.state.actions.len();
-        return json!({ "goal": running.succeeded(), "outcome": { "kind": kind }, "steps": steps });
+        let steps = live.state.actions.len();
+        return json!({ "goal": live.has_succeeded(), "outcome": { "kind": kind }, "steps": steps });
     }
-    let mut record = json!(running.episode.record(None));
+    let mut record = json!(live.episode.record(None));
     if let Some(record) = record.as_object_mut() {
-        record.remove(UNSTEADY);
+        record.remove(OBSERVATION_DEPENDENT);
     }
     record
 }
 
-/// JSON as msgpack: numbers keep their bits.
-fn of_json(json: &serde_json::Value) -> Value {
+/// Converts JSON to msgpack. Numbers keep their bits.
+fn from_json(json: &serde_json::Value) -> Value {
     use serde_json::Value as Json;
     match json {
         Json::Null => Value::Nil,
         Json::Bool(on) => Value::Boolean(*on),
         Json::String(text) => Value::from(text.as_str()),
-        Json::Array(items) => Value::Array(items.iter().map(of_json).collect()),
-        Json::Object(map) => Value::Map(map.iter().map(|(k, v)| pair(k, of_json(v))).collect()),
+        Json::Array(items) => Value::Array(items.iter().map(from_json).collect()),
+        Json::Object(object) => map(object.iter().map(|(key, value)| (key.as_str(), from_json(value)))),
         Json::Number(number) => match (number.as_u64(), number.as_i64()) {
             (Some(whole), _) => Value::from(whole),
             (None, Some(whole)) => Value::from(whole),

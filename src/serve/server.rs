@@ -1,4 +1,4 @@
-//! Where clients come in: an address, a bounded number of seats, a thread for each client.
+//! The server: its address, a bounded number of clients, and a thread per client.
 
 use std::{
     io::{self, Read, Write},
@@ -13,85 +13,89 @@ use rmpv::Value;
 
 use super::{
     catalog::ServerConfig,
-    connection::{Connection, HANDSHAKE_TIMEOUT, Incoming, POLL_INTERVAL, is_wait},
+    connection::{Connection, HANDSHAKE_TIMEOUT, Incoming},
     request::Request,
     response,
-    session::Session,
+    session::ClientSession,
 };
+use crate::policy::transport::{configure, is_wait};
 
-/// Between two looks whether somebody stands at the door.
+/// Accept-loop polling interval.
 const ACCEPT_POLL_INTERVAL: Duration = Duration::from_millis(10);
-/// Connections beyond the seats, of which nobody knows yet what they want.
+/// Connections accepted above `max_clients` while the type of their request is still unknown.
 const BACKLOG: usize = 16;
-/// What is asked to learn whether the server is there, and what it says.
-const HEALTH: &[u8] = b"GET /healthz";
-const HEALTHY: &[u8] =
+/// Beginning of a health check, and the response.
+const HEALTH_REQUEST: &[u8] = b"GET /healthz";
+const HEALTH_RESPONSE: &[u8] =
     b"HTTP/1.1 200 OK\r\nContent-Type: text/plain\r\nContent-Length: 3\r\nConnection: close\r\n\r\nOK\n";
+/// Time for which incoming data is discarded after a health check.
+const HEALTH_DRAIN_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// An address where clients are heard.
+/// A listening address.
 #[derive(Debug)]
 pub struct Server {
     listener: TcpListener,
 }
 
 impl Server {
-    /// Takes an address; port 0 is any that is free.
+    /// Listens at an address; port 0 means any free port.
     ///
     /// # Errors
-    /// It is none of this machine's, or somebody has it.
+    /// The address is not local, or the port is in use.
     pub fn open(host: &str, port: u16) -> io::Result<Self> {
         let listener = TcpListener::bind((host, port))?;
         listener.set_nonblocking(true)?;
         Ok(Self { listener })
     }
 
-    /// The address.
+    /// The address, with the port that was chosen.
     ///
     /// # Errors
-    /// The system does not say.
+    /// The operating system does not return it.
     pub fn address(&self) -> io::Result<SocketAddr> {
         self.listener.local_addr()
     }
 }
 
-/// What all visitors share.
+/// Data that the threads of all clients share.
 struct ServerState<'a> {
-    offer: &'a ServerConfig<'a>,
+    config: &'a ServerConfig<'a>,
     hello: Value,
-    seats: usize,
-    seated: AtomicUsize,
-    stop: &'a AtomicBool,
+    max_clients: usize,
+    clients: AtomicUsize,
+    cancel: &'a AtomicBool,
 }
 
-/// Serves `seats` clients at once until `stop` is set; `hello` is what each is told first.
-pub fn serve(door: &Server, offer: &ServerConfig, hello: Value, seats: usize, stop: &AtomicBool) {
-    let house = ServerState { offer, hello, seats, seated: AtomicUsize::new(0), stop };
-    let inside = AtomicUsize::new(0);
+/// Serves up to `max_clients` clients at a time until `cancel` is set. `hello` is the first message to each.
+pub fn serve(server: &Server, config: &ServerConfig, hello: Value, max_clients: usize, cancel: &AtomicBool) {
+    let state = ServerState { config, hello, max_clients, clients: AtomicUsize::new(0), cancel };
+    let connections = AtomicUsize::new(0);
     thread::scope(|scope| {
-        while !stop.load(Ordering::Relaxed) {
-            // Whoever was at the door may be gone again, and the system may be short of handles: both pass.
-            let Ok((stream, _)) = door.listener.accept() else {
+        while !cancel.load(Ordering::Relaxed) {
+            // Errors are transient: the client has gone, or the process has too many open files.
+            let Ok((stream, _)) = server.listener.accept() else {
                 thread::sleep(ACCEPT_POLL_INTERVAL);
                 continue;
             };
-            let Some(counted) = SlotGuard::one_of(&inside, seats + BACKLOG) else { continue };
-            let house = &house;
-            let visit = move || {
-                let _counted = counted;
-                let _ = catch_unwind(AssertUnwindSafe(|| visit(stream, house)));
+            let Some(slot) = SlotGuard::acquire(&connections, max_clients + BACKLOG) else { continue };
+            let state = &state;
+            let handle = move || {
+                let _slot = slot;
+                let _ = catch_unwind(AssertUnwindSafe(|| handle_connection(stream, state)));
             };
-            // Without a thread for it the connection closes.
-            let _ = thread::Builder::new().name("client".to_owned()).spawn_scoped(scope, visit);
+            // If no thread can be started, the connection closes.
+            let _ = thread::Builder::new().name("client".to_owned()).spawn_scoped(scope, handle);
         }
     });
 }
 
-/// One of those that are counted, until it goes.
+/// One of a limited number of slots, released on drop.
 struct SlotGuard<'a>(&'a AtomicUsize);
 
 impl<'a> SlotGuard<'a> {
-    fn one_of(count: &'a AtomicUsize, most: usize) -> Option<Self> {
-        let taken = count.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| (n < most).then_some(n + 1));
+    fn acquire(count: &'a AtomicUsize, limit: usize) -> Option<Self> {
+        let taken =
+            count.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| (n < limit).then_some(n + 1));
         taken.is_ok().then_some(Self(count))
     }
 }
@@ -102,44 +106,42 @@ impl Drop for SlotGuard<'_> {
     }
 }
 
-/// Everything between a connection's beginning and its end. What goes wrong with it is its own.
-fn visit(stream: TcpStream, house: &ServerState) {
-    let prepared = stream
-        .set_nonblocking(false)
-        .and_then(|()| stream.set_nodelay(true))
-        .and_then(|()| stream.set_read_timeout(Some(POLL_INTERVAL)))
-        .and_then(|()| stream.set_write_timeout(Some(POLL_INTERVAL)));
-    if prepared.is_err() {
+/// Handles a connection from its first byte to its end. Its failures affect no other connection.
+fn handle_connection(stream: TcpStream, state: &ServerState) {
+    if stream.set_nonblocking(false).and_then(|()| configure(&stream)).is_err() {
         return;
     }
-    match asks_for_health(&stream, house.stop) {
+    match is_health_check(&stream, state.cancel) {
         None => return,
-        Some(true) => return say_healthy(stream),
+        Some(true) => return answer_health_check(stream),
         Some(false) => {}
     }
-    let mut seat = None;
-    let full = || {
-        seat = SlotGuard::one_of(&house.seated, house.seats);
-        let why = || format!("the server has {} clients, and no seat is free (--threads)\n", house.seats);
-        seat.is_none().then(why)
+    let mut slot = None;
+    let refusal = || {
+        slot = SlotGuard::acquire(&state.clients, state.max_clients);
+        let reason = || format!("the server has {} clients, its limit (--threads)\n", state.max_clients);
+        slot.is_none().then(reason)
     };
-    if let Ok(link) = Connection::accept(stream, house.stop, full) {
-        converse(link, house);
+    if let Ok(connection) = Connection::accept(stream, state.cancel, refusal) {
+        run_session(connection, state);
     }
 }
 
-/// Whether a connection begins with a question after health; `None` if nothing comes.
-fn asks_for_health(stream: &TcpStream, stop: &AtomicBool) -> Option<bool> {
+/// True if the connection starts with a health-check request. `None` if nothing arrives.
+fn is_health_check(stream: &TcpStream, cancel: &AtomicBool) -> Option<bool> {
     let deadline = Instant::now() + HANDSHAKE_TIMEOUT;
-    let mut begun = [0; HEALTH.len() + 1];
-    while Instant::now() < deadline && !stop.load(Ordering::Relaxed) {
-        match stream.peek(&mut begun) {
+    let mut start = [0; HEALTH_REQUEST.len() + 1];
+    while Instant::now() < deadline && !cancel.load(Ordering::Relaxed) {
+        match stream.peek(&mut start) {
             Ok(0) => return None,
-            Ok(count) if count == begun.len() => {
-                return Some(begun.starts_with(HEALTH) && b" ?".contains(&begun[HEALTH.len()]));
+            Ok(count) if count == start.len() => {
+                return Some(
+                    start.starts_with(HEALTH_REQUEST) && b" ?".contains(&start[HEALTH_REQUEST.len()]),
+                );
             }
-            // Another beginning is no question after health however it goes on.
-            Ok(count) if !HEALTH.starts_with(&begun[..count.min(HEALTH.len())]) => return Some(false),
+            Ok(count) if !HEALTH_REQUEST.starts_with(&start[..count.min(HEALTH_REQUEST.len())]) => {
+                return Some(false);
+            }
             Ok(_) => thread::sleep(ACCEPT_POLL_INTERVAL),
             Err(error) if is_wait(&error) => {}
             Err(_) => return None,
@@ -148,48 +150,48 @@ fn asks_for_health(stream: &TcpStream, stop: &AtomicBool) -> Option<bool> {
     None
 }
 
-fn say_healthy(mut stream: TcpStream) {
-    let _ = stream.write_all(HEALTHY).and_then(|()| stream.shutdown(Shutdown::Write));
-    // What has not been read would make the system throw the answer away.
-    let deadline = Instant::now() + Duration::from_secs(1);
-    let mut rest = [0; 1024];
-    while Instant::now() < deadline && !matches!(stream.read(&mut rest), Ok(0)) {}
+fn answer_health_check(mut stream: TcpStream) {
+    let _ = stream.write_all(HEALTH_RESPONSE).and_then(|()| stream.shutdown(Shutdown::Write));
+    // The system would discard the response if data remained unread.
+    let deadline = Instant::now() + HEALTH_DRAIN_TIMEOUT;
+    let mut discarded = [0; 1024];
+    while Instant::now() < deadline && !matches!(stream.read(&mut discarded), Ok(0)) {}
 }
 
-/// Answers one message after another.
-fn converse(mut link: Connection, house: &ServerState) {
-    if link.say(&house.hello).is_err() {
+/// Responds to one message after another.
+fn run_session(mut connection: Connection, state: &ServerState) {
+    if connection.send(&state.hello).is_err() {
         return;
     }
-    let mut session = Session::new(house.offer, house.stop);
+    let mut session = ClientSession::new(state.config, state.cancel);
     loop {
-        let (answer, last) = match link.hear() {
-            Incoming::Closed => return link.close(),
-            Incoming::Lost(why) => (response::error(&why), true),
-            Incoming::Nonsense(why) => (response::error(&why), false),
-            Incoming::Message(message) => respond(&mut session, house.offer, &message),
+        let (response, is_last) = match connection.recv() {
+            Incoming::Closed => return connection.close(),
+            Incoming::Disconnected(reason) => (response::error(&reason), true),
+            Incoming::Malformed(reason) => (response::error(&reason), false),
+            Incoming::Message(message) => respond(&mut session, state.config, &message),
         };
-        if link.say(&answer).is_err() {
+        if connection.send(&response).is_err() {
             return;
         }
-        if last {
-            return link.close();
+        if is_last {
+            return connection.close();
         }
     }
 }
 
-/// The answer to a message, and whether it is the last.
-fn respond(session: &mut Session, offer: &ServerConfig, message: &Value) -> (Value, bool) {
-    let request = match Request::read(message, offer) {
+/// Response to a message. True if it is the last one.
+fn respond(session: &mut ClientSession, config: &ServerConfig, message: &Value) -> (Value, bool) {
+    let request = match Request::read(message, config) {
         Ok(request) => request,
-        Err(why) => return (response::error(&why), false),
+        Err(error) => return (response::error(&error.0), false),
     };
-    let last = request == Request::Close;
-    match catch_unwind(AssertUnwindSafe(|| session.answer(request))) {
-        Ok(Ok(answer)) => (answer, last),
-        Ok(Err(why)) => (response::error(&why), false),
+    let is_last = request == Request::Close;
+    match catch_unwind(AssertUnwindSafe(|| session.execute(request))) {
+        Ok(Ok(response)) => (response, is_last),
+        Ok(Err(error)) => (response::error(&error.0), false),
         Err(_) => {
-            session.forget();
+            session.discard_episode();
             (response::error("internal error of the server; the episode is lost: reset"), false)
         }
     }

@@ -1,4 +1,4 @@
-//! One client's episode, and what is kept so that it can go back.
+//! One client's episode, and copies of earlier states to return to.
 
 use std::{
     collections::VecDeque,
@@ -8,123 +8,126 @@ use std::{
 use rmpv::Value;
 
 use super::{
-    catalog::ServerConfig,
+    catalog::{RequestError, ServerConfig},
+    episode_state::{ActionRow, EpisodeState},
     live_episode::LiveEpisode,
-    request::{Request, Row},
+    request::Request,
     response,
-    state::State,
 };
-use crate::robot::Side;
+use crate::{policy::{encode::image_array, msgpack::pack_array}, robot::Side};
 
-/// Episodes that are kept for going back to, besides the one that runs.
-const KEPT: usize = 4;
+/// Copies of earlier states per client.
+const MAX_SNAPSHOTS: usize = 4;
 
-/// One client's episode.
-pub(super) struct Session<'a> {
-    offer: &'a ServerConfig<'a>,
-    stop: &'a AtomicBool,
-    running: Option<LiveEpisode>,
-    /// Copies of where episodes stood, the one used last at the end.
-    kept: VecDeque<LiveEpisode>,
+/// The session of one client.
+pub(super) struct ClientSession<'a> {
+    config: &'a ServerConfig<'a>,
+    cancel: &'a AtomicBool,
+    live: Option<LiveEpisode>,
+    /// Copies of earlier states, the most recently used one last.
+    snapshots: VecDeque<LiveEpisode>,
 }
 
-impl<'a> Session<'a> {
-    /// No episode yet; `stop` ends what takes long.
-    pub(super) fn new(offer: &'a ServerConfig<'a>, stop: &'a AtomicBool) -> Self {
-        Self { offer, stop, running: None, kept: VecDeque::new() }
+impl<'a> ClientSession<'a> {
+    /// A session without an episode. `cancel` interrupts long requests.
+    pub(super) fn new(config: &'a ServerConfig<'a>, cancel: &'a AtomicBool) -> Self {
+        Self { config, cancel, live: None, snapshots: VecDeque::new() }
     }
 
-    /// Gives up the episode: nobody knows in which state it is.
-    pub(super) fn forget(&mut self) {
-        self.running = None;
+    /// Discards the episode, whose state may be inconsistent after a panic.
+    pub(super) fn discard_episode(&mut self) {
+        self.live = None;
     }
 
-    /// Carries out a request; after an error the episode stands where it stood.
+    /// Executes a request and returns the response.
     ///
     /// # Errors
-    /// Why it cannot be carried out; a message for people.
-    pub(super) fn answer(&mut self, request: Request) -> Result<Value, String> {
+    /// The request cannot be executed. The episode is then unchanged, except for the actions of a step before the failing one.
+    pub(super) fn execute(&mut self, request: Request) -> Result<Value, RequestError> {
+        let config = self.config;
         match request {
-            Request::Reset(wanted) => {
-                self.go_to(&State { wanted, actions: Vec::new() })?;
-                self.stands("reset")
+            Request::Reset(id) => {
+                self.go_to(&EpisodeState { id, actions: Vec::new() })?;
+                response::transition("reset", self.live("reset")?, config, None)
             }
             Request::SetState(state) => {
                 self.go_to(&state)?;
-                self.stands("set_state")
+                response::transition("set_state", self.live("set_state")?, config, None)
             }
             Request::Step(rows) => self.step(&rows),
-            Request::Render { camera, size } => self.render(camera, size),
+            Request::Render { camera, width, height } => self.render(camera, width, height),
             Request::GetState => self.get_state(),
-            Request::Close => Ok(response::plain("close", Vec::new())),
+            Request::Close => Ok(response::typed("close", [])),
         }
     }
 
-    fn running(&mut self, kind: &str) -> Result<&mut LiveEpisode, String> {
-        self.running.as_mut().ok_or_else(|| format!("{kind}: there is no episode yet; reset first"))
+    fn live(&mut self, kind: &str) -> Result<&mut LiveEpisode, RequestError> {
+        let live = self.live.as_mut();
+        live.ok_or_else(|| format!("{kind}: there is no episode yet; reset first").into())
     }
 
-    /// What a client is told when it comes to a state other than by steps.
-    fn stands(&mut self, kind: &str) -> Result<Value, String> {
-        let offer = self.offer;
-        response::stands(kind, self.running(kind)?, offer, None)
-    }
-
-    /// Brings the episode to a state: from where one stood on the way to it, if there is such a one, or from its start.
-    fn go_to(&mut self, state: &State) -> Result<(), String> {
-        let all = self.kept.iter().chain(&self.running);
-        let near = all.filter_map(|one| Some((one.state.left_to(state)?, one)));
-        let mut running = match near.min_by_key(|(left, _)| *left) {
-            Some((_, one)) => one.clone(),
+    /// Brings the episode to a state: from the nearest copy that leads to it, or from the start of the episode.
+    fn go_to(&mut self, state: &EpisodeState) -> Result<(), RequestError> {
+        let copies = self.snapshots.iter().chain(&self.live);
+        let candidates = copies.filter_map(|copy| Some((copy.state.steps_to(state)?, copy)));
+        let mut live = match candidates.min_by_key(|(steps, _)| *steps) {
+            Some((_, copy)) => copy.clone(),
             None => {
-                let start = State { actions: Vec::new(), ..state.clone() };
-                let running = LiveEpisode::start(self.offer, start)?;
-                self.keep(running.clone());
-                running
+                let live = LiveEpisode::start(self.config, state)?;
+                self.keep(live.clone());
+                live
             }
         };
-        for row in &state.actions[running.state.actions.len()..] {
-            self.check_stop()?;
-            running.advance(self.offer, row)?;
+        for row in &state.actions[live.state.actions.len()..] {
+            self.check_cancel()?;
+            live.advance(self.config, row)?;
         }
-        let (done, all) = (running.state.actions.len(), state.actions.len());
-        if done < all {
-            return Err(format!("set_state: the episode ends after {done} of the state's {all} actions"));
+        let (executed, all) = (live.state.actions.len(), state.actions.len());
+        if executed < all {
+            let message =
+                format!("set_state: the episode ends after {executed} of the state's {all} actions");
+            return Err(message.into());
         }
-        self.running = Some(running);
+        self.live = Some(live);
         Ok(())
     }
 
-    /// Keeps a copy of where an episode stands, instead of one that was not used for long.
+    /// Keeps a copy in place of the least recently used one.
     fn keep(&mut self, copy: LiveEpisode) {
-        self.kept.retain(|one| one.state != copy.state);
-        if self.kept.len() == KEPT {
-            self.kept.pop_front();
+        self.snapshots.retain(|other| other.state != copy.state);
+        if self.snapshots.len() == MAX_SNAPSHOTS {
+            self.snapshots.pop_front();
         }
-        self.kept.push_back(copy);
+        self.snapshots.push_back(copy);
     }
 
-    fn step(&mut self, rows: &[Row]) -> Result<Value, String> {
-        let offer = self.offer;
-        if self.running("step")?.episode.outcome().is_some() {
-            return Err("step: the episode is over; reset first".to_owned());
+    fn step(&mut self, rows: &[ActionRow]) -> Result<Value, RequestError> {
+        if self.live("step")?.episode.outcome().is_some() {
+            return Err("step: the episode is over; reset first".to_owned().into());
         }
-        let mut carried_out = 0;
+        let mut executed = 0;
         for row in rows {
-            self.check_stop()?;
-            let running = self.running("step")?;
-            running.advance(offer, row)?;
-            carried_out += 1;
-            if running.episode.outcome().is_some() {
+            self.check_cancel()?;
+            let config = self.config;
+            let live = self.live("step")?;
+            live.advance(config, row)?;
+            executed += 1;
+            if live.episode.outcome().is_some() {
                 break;
             }
         }
-        response::stands("step", self.running("step")?, offer, Some(carried_out))
+        let config = self.config;
+        response::transition("step", self.live("step")?, config, Some(executed))
     }
 
-    fn render(&mut self, camera: Option<String>, size: [Option<usize>; 2]) -> Result<Value, String> {
-        let running = self.running("render")?;
-        let cameras = &running.episode.sim.scene.cameras;
+    fn render(
+        &mut self,
+        camera: Option<String>,
+        width: Option<usize>,
+        height: Option<usize>,
+    ) -> Result<Value, RequestError> {
+        let live = self.live("render")?;
+        let cameras = &live.episode.sim.scene.cameras;
         let camera = camera.or_else(|| cameras.first().map(|camera| camera.name.clone())).unwrap_or_default();
         let finger = match camera.as_str() {
             name if cameras.iter().any(|camera| camera.name == name) => None,
@@ -132,27 +135,29 @@ impl<'a> Session<'a> {
             "right" => Some(Side::Right),
             _ => None,
         };
-        let picture = match finger {
-            Some(_) if size != [None, None] => {
-                return Err(format!("render: {camera}: pictures of the fingers have one size; give none"));
+        let image = match finger {
+            Some(_) if width.is_some() || height.is_some() => {
+                let message =
+                    format!("render: {camera}: tactile images have one size; omit width and height");
+                return Err(message.into());
             }
-            Some(side) => running.episode.render_tactile(side),
-            None => running.episode.render_camera(&camera, size),
+            Some(side) => live.episode.render_tactile(side),
+            None => live.episode.render_camera(&camera, width, height),
         };
-        let picture = picture.map_err(|e| format!("render: {e}"))?;
-        Ok(response::plain("render", vec![response::pair("image", response::picture(picture))]))
+        let image = image.map_err(|e| format!("render: {e}"))?;
+        Ok(response::typed("render", [("image", pack_array(image_array(image), true))]))
     }
 
-    fn get_state(&mut self) -> Result<Value, String> {
-        let copy = self.running("get_state")?.clone();
-        let state = copy.state.to_value(self.offer);
+    fn get_state(&mut self) -> Result<Value, RequestError> {
+        let copy = self.live("get_state")?.clone();
+        let state = copy.state.to_value(self.config);
         self.keep(copy);
-        Ok(response::plain("get_state", vec![response::pair("state", state)]))
+        Ok(response::typed("get_state", [("state", state)]))
     }
 
-    fn check_stop(&self) -> Result<(), String> {
-        match self.stop.load(Ordering::Relaxed) {
-            true => Err("the server is ending".to_owned()),
+    fn check_cancel(&self) -> Result<(), RequestError> {
+        match self.cancel.load(Ordering::Relaxed) {
+            true => Err("the server is shutting down".to_owned().into()),
             false => Ok(()),
         }
     }

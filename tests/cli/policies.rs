@@ -171,8 +171,8 @@ fn flags_without_use_and_bad_files_are_refused_before_anything_runs() {
             "--policy ws://127.0.0.1:9 --profile profile.lua",
             "profile.lua:3: profile.actions.pose: expected one of",
         ),
-        ("--policy ws://127.0.0.1:99999", "\"99999\" is no port"),
-        ("--policy ws://127.0.0.1:0", "\"0\" is no port"),
+        ("--policy ws://127.0.0.1:99999", "\"99999\" is not a port"),
+        ("--policy ws://127.0.0.1:0", "\"0\" is not a port"),
         ("--policy ws://127.0.0.1:x", "--policy ws://127.0.0.1:x: "),
     ] {
         let message = project.refusal(&format!("x.lua {words} --out run"));

@@ -265,11 +265,11 @@ fn bytes_that_are_no_message_are_told() {
     behind.push(0);
     for (message, words) in [
         (Message::text("{\"type\": \"reset\"}"), "text frame"),
-        (Message::binary(vec![0xC1; 40]), "39 bytes stand behind"),
-        (Message::binary(vec![0xDD, 0xFF, 0xFF, 0xFF, 0xFF]), "no msgpack"),
-        (Message::binary(vec![0x91; 5000]), "no msgpack"),
-        (Message::binary(Vec::new()), "no msgpack"),
-        (Message::binary(behind), "1 bytes stand behind"),
+        (Message::binary(vec![0xC1; 40]), "39 bytes follow"),
+        (Message::binary(vec![0xDD, 0xFF, 0xFF, 0xFF, 0xFF]), "not msgpack"),
+        (Message::binary(vec![0x91; 5000]), "not msgpack"),
+        (Message::binary(Vec::new()), "not msgpack"),
+        (Message::binary(behind), "1 bytes follow"),
     ] {
         client.0.send(message).expect("sent");
         let answer = client.hear();

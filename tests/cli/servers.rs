@@ -137,7 +137,7 @@ fn a_server_is_asked_once_a_chunk_and_its_actions_are_carried_out() {
 }
 
 #[test]
-fn pings_are_answered_and_what_was_closed_while_nothing_was_asked_is_opened_again() {
+fn pings_are_answered_and_a_connection_closed_while_idle_is_reopened() {
     let pongs = std::sync::Arc::new(std::sync::atomic::AtomicUsize::new(0));
     let count = pongs.clone();
     let address = server(9, move |_, mut socket| {
@@ -255,7 +255,7 @@ fn a_reply_of_a_gigabyte_is_refused_before_it_is_read() {
 }
 
 #[test]
-fn a_server_that_speaks_otherwise_is_told() {
+fn a_server_of_another_protocol_is_reported() {
     let address = server(9, |_, mut socket| {
         let _ = socket.send(packed(&Value::from(7)));
     });
@@ -272,7 +272,7 @@ fn a_server_that_speaks_otherwise_is_told() {
             thread::sleep(std::time::Duration::from_millis(300));
         }
     });
-    assert!(fails(&address, "").contains("no websocket server"), "a web server");
+    assert!(fails(&address, "").contains("not a websocket server"), "a web server");
 }
 
 #[test]

@@ -8,7 +8,7 @@ use super::{
     policy::PolicyArgs,
     values::{Requirement, Shard, TraceDetail, VideoSelection, parse_count, parse_seed},
 };
-use crate::{benchmark::seed::Split, serve::split_named};
+use crate::benchmark::seed::Split;
 
 // The script, and changes of its scenes and their physics.
 #[derive(Args, Clone, Debug)]
@@ -136,7 +136,7 @@ pub(crate) struct ServeArgs {
     #[arg(long, value_name = "N", default_value = "8", value_parser = value_parser!(u16).range(1..=1024))]
     pub threads: u16,
     /// List of episodes for clients that do not name one
-    #[arg(long, value_name = "SPLIT", default_value = "validation", value_parser = split_named)]
+    #[arg(long, value_name = "SPLIT", default_value = "validation")]
     pub split: Split,
     /// Send clients the true state: poses, deformation, contact forces, limits, verdict
     #[arg(long)]

@@ -19,7 +19,7 @@ use crate::{
     policy::Observation,
     rollout::cancel,
     script::{self, EpisodeRequest, Loaded},
-    serve::{self, EpisodeId, ServedSuite, Server, ServerConfig},
+    serve::{self, EpisodeId, RequestError, ServedSuite, Server, ServerConfig},
 };
 
 /// Serves the suites of a script until the process is interrupted.
@@ -36,7 +36,7 @@ pub(crate) fn run(args: &ServeArgs) -> Result<(), CliError> {
     let runs = suite_runs(args, &config, &loaded, &suites)?;
     let served: Vec<ServedSuite> =
         suites.iter().map(|suite| ServedSuite { name: config.suite_name(suite), suite }).collect();
-    let open = |id: &EpisodeId| {
+    let start_episode = |id: &EpisodeId| {
         let found = runs.iter().find(|run| run.name == id.suite);
         let run = found.ok_or_else(|| format!("suite {:?}: there is none", id.suite))?;
         let task = run.suite.tasks.iter().find(|task| task.id == id.task);
@@ -49,7 +49,7 @@ pub(crate) fn run(args: &ServeArgs) -> Result<(), CliError> {
             split: id.split,
             shifts: config.shifts.clone(),
         };
-        run.start_episode(task, &request).map_err(|error| error.message)
+        run.start_episode(task, &request).map_err(|error| RequestError(error.message))
     };
     let server_config = ServerConfig {
         suites: served,
@@ -57,8 +57,8 @@ pub(crate) fn run(args: &ServeArgs) -> Result<(), CliError> {
         privileged: args.privileged,
         seed: config.seed,
         split: args.split,
-        made_by: provenance_hash(&config, &loaded),
-        open: Box::new(open),
+        fingerprint: provenance_hash(&config, &loaded),
+        start_episode: Box::new(start_episode),
     };
     let hello = serve::hello(&server_config, &first_observation(&config, &server_config)?);
     let address = server.address().map_err(|error| CliError::input(error).prefixed(&args.host))?;
@@ -136,7 +136,7 @@ fn first_observation(config: &RunConfig, server: &ServerConfig) -> Result<Observ
     let (served, task) = first.ok_or_else(|| CliError::input("there is no task to serve"))?;
     let (seed, split) = (server.seed, server.split);
     let id = EpisodeId { suite: served.name.clone(), task: task.id, episode: 0, seed, split };
-    let mut episode = (server.open)(&id).map_err(CliError::input)?;
+    let mut episode = (server.start_episode)(&id).map_err(CliError::input)?;
     let streams = server.profile.streams();
     episode.begin(streams.clone());
     episode.observe(&streams).map_err(|error| CliError::input(error).prefixed(config.file.display()))

@@ -12,7 +12,7 @@ use crate::{
     policy::{
         ChunkedPolicy, Policy, PolicyError, SensorStreams, TaskBrief, builtin,
         profile::Profile,
-        recorded::RecordedPolicy,
+        builtin::RecordedPolicy,
         remote::{PolicyConnections, PolicyServer, Protocol, RemotePolicy},
     },
     rollout::{Controller, cancel},
@@ -229,7 +229,7 @@ impl PolicyConfig {
                 }
                 (PolicyKind::Recorded(runs), _) => {
                     let actions = runs.actions(&suite, is_rigid_twin, &brief)?;
-                    chunked(Box::new(RecordedPolicy::poses(&actions, None)), 1)
+                    chunked(Box::new(RecordedPolicy::from_actions(&actions, None)), 1)
                 }
                 (PolicyKind::Lua { file, replan }, _) => {
                     let policy = file.start(&opened.seed).map_err(CliError::input)?;

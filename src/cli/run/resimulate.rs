@@ -14,7 +14,7 @@ use crate::{
     },
     evaluation::record::{EpisodeRecord, Outcome},
     parallel,
-    policy::{Action, ChunkedPolicy, recorded::RecordedPolicy},
+    policy::{Action, ChunkedPolicy, builtin::RecordedPolicy},
     report::actions,
     rollout::{FinishedEpisode, cancel},
 };
@@ -26,7 +26,7 @@ pub(crate) fn replay_factory(recorded: Vec<Action>, record: &EpisodeRecord) -> C
         _ => None,
     };
     Box::new(move |_, brief| {
-        let policy = RecordedPolicy::poses(&recorded, ending.clone());
+        let policy = RecordedPolicy::from_actions(&recorded, ending.clone());
         Ok(Box::new(ChunkedPolicy::new(Box::new(policy), brief, 1)))
     })
 }

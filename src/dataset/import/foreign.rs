@@ -88,7 +88,7 @@ impl ForeignDemo {
         for (command, _) in stopped {
             match command {
                 ToolCommand::Pose(action) => action.closure = 1.0,
-                ToolCommand::Step { closure, .. } => *closure = 1.0,
+                ToolCommand::Delta { closure, .. } => *closure = 1.0,
             }
         }
     }

@@ -69,7 +69,7 @@ pub(super) fn demo(reader: DemoReader, header: &Header) -> Result<ForeignDemo, D
         task: header.task(reader.file, reader.demo),
         gripper_closed: steps
             .iter()
-            .map(|step| matches!(step, ToolCommand::Step { closure, .. } if *closure > 0.5))
+            .map(|step| matches!(step, ToolCommand::Delta { closure, .. } if *closure > 0.5))
             .collect(),
         is_stopped_by_object: vec![false; commands.len()],
         commands,
@@ -136,7 +136,7 @@ fn relative_steps(reader: DemoReader, header: &Header) -> Result<Vec<ToolCommand
     let StepScale { translation_m, rotation_rad } = header.step_scale(reader.file)?;
     let gripper = Profile::named("libero").map(|profile| profile.actions.gripper);
     let gripper = gripper.ok_or_else(|| reader.error("actions", "there is no profile that reads it"))?;
-    let encoding = ActionEncoding::plain(PoseEncoding::DeltaOsc { translation_m, rotation_rad }, gripper);
+    let encoding = ActionEncoding::new(PoseEncoding::DeltaOsc { translation_m, rotation_rad }, gripper);
     let decode =
         |row: &[f64; 7]| decode::command(row, &encoding).map_err(|e| reader.error("actions", e.to_string()));
     actions.iter().map(decode).collect()
@@ -281,11 +281,11 @@ fn site_poses(reader: DemoReader, steps: usize) -> Result<Option<NamedPoses>, Da
 pub(super) fn goals(tool_b: &[Pose], steps: &[ToolCommand]) -> Vec<ToolCommand> {
     let mut goal_rotation = tool_b.first().map_or(Quat::identity(), |pose| pose.rotation);
     let goal = |(pose, step): (&Pose, &ToolCommand)| {
-        let ToolCommand::Step { translation_b, rotation_b, closure, .. } = *step else { return *step };
+        let ToolCommand::Delta { translation_b, rotation_b, closure, .. } = *step else { return *step };
         if rotation_b != Vec3::zeros() {
             goal_rotation = pose.rotation;
         }
-        let action = osc::goal((pose.translation.vector, goal_rotation), translation_b, rotation_b, closure);
+        let action = osc::goal(pose.translation.vector, goal_rotation, translation_b, rotation_b, closure);
         goal_rotation = rotation::from_axis_angle(&action.axis_angle_b);
         ToolCommand::Pose(action)
     };

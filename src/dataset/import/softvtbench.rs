@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     geometry::{Pose, Quat, Vec3},
-    policy::{Action, ToolCommand, profile::GripperEncoding},
+    policy::{Action, ToolCommand, profile::GripperValues},
     robot::rotation,
 };
 
@@ -34,8 +34,8 @@ const MEASURED_TOLERANCE: f64 = 1e-4;
 /// Range of finger positions, m, with some slack.
 const FINGER_RANGE: [f64; 2] = [-0.001, 0.045];
 /// The two encodings of the gripper in actions.
-const FINGER_POSITION: GripperEncoding = GripperEncoding { open: 0.04, shut: 0.0, binary: false };
-const SIGN: GripperEncoding = GripperEncoding { open: 1.0, shut: -1.0, binary: true };
+const FINGER_POSITION: GripperValues = GripperValues { open: 0.04, closed: 0.0, binary: false };
+const SIGN: GripperValues = GripperValues { open: 1.0, closed: -1.0, binary: true };
 
 /// An action of 7 numbers.
 struct RecordedAction {
@@ -214,7 +214,7 @@ fn tool_offset(reader: DemoReader, poses: &[Pose], joints: &[[f64; 7]]) -> Resul
 ///
 /// # Errors
 /// Neither.
-fn gripper_encoding(reader: DemoReader, actions: &[RecordedAction]) -> Result<GripperEncoding, DatasetError> {
+fn gripper_encoding(reader: DemoReader, actions: &[RecordedAction]) -> Result<GripperValues, DatasetError> {
     let is_position = |x: f64| (FINGER_RANGE[0]..=FINGER_RANGE[1]).contains(&x);
     let Some(step) = actions.iter().position(|action| !is_position(action.gripper())) else {
         return Ok(FINGER_POSITION);

@@ -1,26 +1,24 @@
-//! openpi's protocol: the server speaks first, with its metadata; then each observation is answered by a chunk.
+//! openpi's protocol: the server sends its metadata, then answers each observation with a chunk of actions.
 
-use super::socket::Socket;
-use crate::policy::{ActionChunk, Observation, PolicyError, decode, encode, profile::Profile, wire::kind};
+use super::connection::PolicyConnection;
+use crate::policy::{ActionChunk, Observation, PolicyError, decode, encode, msgpack::kind};
 
-/// Takes the server's metadata.
-pub(super) fn greet(socket: &mut Socket) -> Result<(), PolicyError> {
-    let metadata = socket.receive()?;
+/// Receives the server's metadata.
+pub(super) fn greet(connection: &mut PolicyConnection) -> Result<(), PolicyError> {
+    let metadata = connection.receive()?;
     if metadata.as_map().is_none() {
-        return Err(
-            socket.wrong(&format!("sent {} first; openpi servers send a map of metadata", kind(&metadata)))
-        );
+        let what = format!("sent {} first; openpi servers send a map of metadata", kind(&metadata));
+        return Err(connection.server.error(&what));
     }
     Ok(())
 }
 
-/// Asks for a chunk.
+/// Requests a chunk.
 pub(super) fn infer(
-    socket: &mut Socket,
+    connection: &mut PolicyConnection,
     observation: &Observation,
-    profile: &Profile,
 ) -> Result<ActionChunk, PolicyError> {
-    socket.send(&encode::openpi(observation, profile))?;
-    let reply = socket.receive()?;
-    decode::chunk(&reply, &profile.actions)
+    connection.send(&encode::openpi(observation, &connection.server.profile))?;
+    let reply = connection.receive()?;
+    decode::chunk(&reply, &connection.server.profile.actions)
 }

@@ -1,21 +1,21 @@
-//! The protocol of the harness vla-eval, version 1: maps of type, payload, seq and timestamp.
+//! Version 1 of the protocol of the harness vla-eval: maps with type, payload, seq and timestamp.
 //!
-//! Both sides say hello; an episode starts and ends with a message that is not answered; an observation is answered by an
-//! action of the same seq. An observation has pictures in `images`, numbers in `states`, the prompt in `task_description`.
+//! Both sides send `hello`. The messages that start and end an episode have no response; an observation is answered by an
+//! action of the same seq. An observation has images in `images`, numbers in `states`, and the prompt in `task_description`.
 
 use rmpv::Value;
 
-use super::PolicyConnection;
+use super::connection::PolicyConnection;
 use crate::policy::{
     ActionChunk, Observation, PolicyError, TaskBrief, decode,
     encode::content,
+    msgpack::{entry, map, names},
     profile::{InputSource, Profile},
-    wire::{entry, names},
 };
 
 const VERSION: u64 = 1;
 
-/// Says hello.
+/// Exchanges greetings.
 pub(super) fn greet(connection: &mut PolicyConnection) -> Result<(), PolicyError> {
     let version = concat!("softvt ", env!("CARGO_PKG_VERSION"));
     let hello = map([
@@ -24,15 +24,17 @@ pub(super) fn greet(connection: &mut PolicyConnection) -> Result<(), PolicyError
         ("benchmark", Value::from("softvt")),
     ]);
     send(connection, "hello", hello)?;
-    let (kind, payload) = receive(connection)?;
+    let value = connection.receive()?;
+    let (kind, payload) = parts(connection, &value)?;
     if kind != "hello" {
-        return Err(connection.socket.wrong(&format!("answered hello with {kind:?}")));
+        return Err(connection.server.error(&format!("answered hello with {kind:?}")));
     }
-    match entry(&payload, "protocol_version").and_then(Value::as_u64) {
+    match entry(payload, "protocol_version").and_then(Value::as_u64) {
         Some(VERSION) | None => Ok(()),
-        Some(other) => Err(connection
-            .socket
-            .wrong(&format!("speaks version {other} of vla-eval's protocol; expected {VERSION}"))),
+        Some(other) => {
+            let what = format!("uses version {other} of vla-eval's protocol; expected {VERSION}");
+            Err(connection.server.error(&what))
+        }
     }
 }
 
@@ -49,36 +51,39 @@ pub(super) fn start(connection: &mut PolicyConnection, brief: &TaskBrief) -> Res
 
 /// Ends an episode.
 pub(super) fn end(connection: &mut PolicyConnection) -> Result<(), PolicyError> {
-    send(connection, "episode_end", map([]))
+    send(connection, "episode_end", Value::Map(Vec::new()))
 }
 
-/// Asks for a chunk.
+/// Requests a chunk.
 pub(super) fn infer(
     connection: &mut PolicyConnection,
     observation: &Observation,
-    profile: &Profile,
 ) -> Result<ActionChunk, PolicyError> {
-    send(connection, "observation", observed(observation, profile))?;
-    let seq = connection.seq;
+    let payload = encoded(observation, &connection.server.profile);
+    send(connection, "observation", payload)?;
     loop {
-        let value = connection.socket.receive()?;
+        let value = connection.receive()?;
         let (kind, payload) = parts(connection, &value)?;
-        let answers = entry(&value, "seq").and_then(Value::as_u64);
+        let answered = entry(&value, "seq").and_then(Value::as_u64);
         match kind {
             "error" => {
                 let text = entry(payload, "error").and_then(Value::as_str).unwrap_or("no reason given");
-                return Err(connection.socket.wrong(&format!("failed; it says: {text}")));
+                return Err(connection.server.error(&format!("failed; it says: {text}")));
             }
-            "action" if answers == Some(seq) => return decode::chunk(payload, &profile.actions),
-            // What was said to an earlier message.
-            "action" if answers.is_some_and(|answered| answered < seq) => {}
-            other => return Err(connection.socket.wrong(&format!("answered an observation with {other:?}"))),
+            "action" if answered == Some(connection.seq) => {
+                return decode::chunk(payload, &connection.server.profile.actions);
+            }
+            // The response to an earlier message.
+            "action" if answered.is_some_and(|answered| answered < connection.seq) => {}
+            other => {
+                return Err(connection.server.error(&format!("answered an observation with {other:?}")));
+            }
         }
     }
 }
 
-/// An observation: pictures by their cameras, the rest under the first of their keys.
-fn observed(observation: &Observation, profile: &Profile) -> Value {
+/// Encodes an observation: images under the names of their cameras, other entries under the first of their keys.
+fn encoded(observation: &Observation, profile: &Profile) -> Value {
     let (mut images, mut rest) = (Vec::new(), Vec::new());
     for input in &profile.inputs {
         let Some(value) = content(observation, &input.source).map(|content| content.into_value(false)) else {
@@ -97,16 +102,8 @@ fn observed(observation: &Observation, profile: &Profile) -> Value {
             InputSource::MarkerMotion | InputSource::Force => rest.push((own, value)),
         }
     }
-    rest.insert(0, ("images".to_owned(), named(images)));
-    named(rest)
-}
-
-fn named(entries: Vec<(String, Value)>) -> Value {
-    Value::Map(entries.into_iter().map(|(key, value)| (Value::from(key), value)).collect())
-}
-
-fn map<const N: usize>(entries: [(&str, Value); N]) -> Value {
-    Value::Map(entries.into_iter().map(|(key, value)| (Value::from(key), value)).collect())
+    rest.insert(0, ("images".to_owned(), map(images)));
+    map(rest)
 }
 
 fn send(connection: &mut PolicyConnection, kind: &str, payload: Value) -> Result<(), PolicyError> {
@@ -115,24 +112,19 @@ fn send(connection: &mut PolicyConnection, kind: &str, payload: Value) -> Result
         ("type", Value::from(kind)),
         ("payload", payload),
         ("seq", Value::from(connection.seq)),
-        // The receiver wants the field and does not use it; no clock gets into what we send.
+        // The field is required but not used; the time of day would make messages differ between runs.
         ("timestamp", Value::F64(0.0)),
     ]);
-    connection.socket.send(&message)
+    connection.send(&message)
 }
 
-fn receive(connection: &mut PolicyConnection) -> Result<(String, Value), PolicyError> {
-    let value = connection.socket.receive()?;
-    let (kind, payload) = parts(connection, &value)?;
-    Ok((kind.to_owned(), payload.clone()))
-}
-
+/// Type and payload of a message.
 fn parts<'a>(connection: &PolicyConnection, value: &'a Value) -> Result<(&'a str, &'a Value), PolicyError> {
     let kind = entry(value, "type").and_then(Value::as_str);
     kind.zip(entry(value, "payload")).ok_or_else(|| {
         let has = names(value);
-        connection
-            .socket
-            .wrong(&format!("sent no message of vla-eval's protocol: it has {has}, not type and payload"))
+        connection.server.error(&format!(
+            "sent a message that is not of vla-eval's protocol: it has {has}, not type and payload"
+        ))
     })
 }

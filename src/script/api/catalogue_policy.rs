@@ -1,6 +1,6 @@
 //! The binding table of policies and profiles: what their files return, and what a policy sees.
 
-use crate::policy::decode::LONGEST;
+use crate::policy::decode::MAX_CHUNK_LEN;
 use crate::script::{
     api::catalogue_classes::{Class, method},
     schema::{Field, Presence, Range, Record, Type},
@@ -58,7 +58,7 @@ pub(crate) static POLICY: Record = Record {
         ),
         field(
             "replan",
-            Type::Integer(Range::closed(1.0, LONGEST as f64)),
+            Type::Integer(Range::closed(1.0, MAX_CHUNK_LEN as f64)),
             Optional,
             "How many actions of a list are carried out, unless --replan says otherwise; all of them if left out.",
         ),
@@ -139,8 +139,8 @@ pub(crate) static INPUT: Record = Record {
 /// The gripper's number of an action.
 pub(crate) static GRIPPER: Record = Record {
     label: "profile.actions.gripper",
-    class: "softvt.GripperEncoding",
-    kind: "softvt.GripperEncoding",
+    class: "softvt.GripperValues",
+    kind: "softvt.GripperValues",
     doc: "The seventh number of an action: one value opens, one shuts, those between in proportion.",
     fields: &[
         field("open", NUMBER, Required, "The value that opens."),

@@ -21,7 +21,7 @@ use crate::{
     geometry::Vec3,
     policy::{
         Action, ActionChunk, Observation, Policy, PolicyError, SensorStreams, TaskBrief, ToolCommand,
-        decode::LONGEST,
+        decode::MAX_CHUNK_LEN,
     },
     robot::rotation,
 };
@@ -208,8 +208,8 @@ fn commands(lua: &Lua, answer: &Value) -> Result<ActionChunk, Wrong> {
     if count == 0 && !table.is_empty() {
         return Ok(action(lua, table)?.into());
     }
-    if !(1..LONGEST).contains(&count) {
-        return Err(Fault::new(format!("expected 1 to {LONGEST} actions, got {count}")).into());
+    if !(1..MAX_CHUNK_LEN).contains(&count) {
+        return Err(Fault::new(format!("expected 1 to {MAX_CHUNK_LEN} actions, got {count}")).into());
     }
     let mut chunk = ActionChunk::default();
     for index in 1..=count {

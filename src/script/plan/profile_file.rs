@@ -8,9 +8,9 @@ use std::{
 use mlua::{Lua, MultiValue, Table, Value};
 
 use crate::policy::profile::{
-    ActionEncoding, ActionUnits, Finger, GripperEncoding, InputSource, PoseEncoding, Profile, ProfileInput,
-    StatePart,
+    ActionEncoding, ActionUnits, GripperValues, InputSource, PoseEncoding, Profile, ProfileInput, StatePart,
 };
+use crate::robot::Side;
 use crate::script::{
     ScriptError,
     api::catalogue_policy::PROFILE,
@@ -112,7 +112,7 @@ impl Whole<'_> {
             }
             "tactile" => {
                 let finger: Option<String> = entry.get("finger")?;
-                let finger = finger.and_then(|finger| word::<Finger>(&finger));
+                let finger = finger.and_then(|finger| word::<Side>(&finger));
                 InputSource::Tactile { finger: finger.ok_or_else(|| needed("finger"))? }
             }
             "marker_motion" => InputSource::MarkerMotion,
@@ -123,13 +123,14 @@ impl Whole<'_> {
 
     fn actions(&self, table: &Table) -> mlua::Result<ActionEncoding> {
         let gripper: Table = table.get("gripper")?;
-        let gripper = GripperEncoding {
+        let gripper = GripperValues {
             open: gripper.get("open")?,
-            shut: gripper.get("shut")?,
+            closed: gripper.get("shut")?,
             binary: gripper.get("binary")?,
         };
-        if gripper.open == gripper.shut {
-            let message = format!("actions.gripper.shut: is {} like open; nothing could shut", gripper.shut);
+        if gripper.open == gripper.closed {
+            let message =
+                format!("actions.gripper.shut: is {} like open; nothing could shut", gripper.closed);
             return Err(self.wrong("shut", message));
         }
         let pose: String = table.get("pose")?;
@@ -165,8 +166,8 @@ impl Whole<'_> {
             return Err(self.wrong("scale", message));
         }
         let units = (scale.is_some() || offset.is_some()).then(|| ActionUnits {
-            scale: scale.unwrap_or(ActionUnits::SAME.scale),
-            offset: offset.unwrap_or(ActionUnits::SAME.offset),
+            scale: scale.unwrap_or(ActionUnits::IDENTITY.scale),
+            offset: offset.unwrap_or(ActionUnits::IDENTITY.offset),
         });
         Ok(ActionEncoding { pose, gripper, units, length: table.get("length")? })
     }

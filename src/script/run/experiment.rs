@@ -78,7 +78,7 @@ impl Experiment {
     /// If the script fails, takes too long, or gives something that is no row.
     pub fn run(&self, index: usize) -> Result<Vec<Row>, ScriptError> {
         let vm = &self.machine.vm;
-        vm.random.reseed(crate::benchmark::seed::keyed(&["softvt point", &index.to_string()]));
+        vm.random.reseed(crate::benchmark::seed::keyed_rng(&["softvt point", &index.to_string()]));
         let fetch = || -> mlua::Result<_> {
             schema::still_sound(&vm.lua, &catalogue::EXPERIMENT, &self.table)?;
             Ok((self.table.get::<Function>("run")?, self.table.get::<Value>("options")?))

@@ -19,7 +19,7 @@ pub(crate) struct MathRandom(Arc<Mutex<ChaCha8Rng>>);
 impl MathRandom {
     /// Installs `math.random`, seeded alike in every machine so that loading a script twice gives the same plan.
     pub(crate) fn install(lua: &Lua) -> mlua::Result<Self> {
-        let shared = Self(Arc::new(Mutex::new(seed::keyed(&["softvt load"]))));
+        let shared = Self(Arc::new(Mutex::new(seed::keyed_rng(&["softvt load"]))));
         let rng = shared.clone();
         let random = lua.create_function(move |lua, args: MultiValue| {
             let mut rng = rng.0.lock().unwrap_or_else(PoisonError::into_inner);
@@ -42,7 +42,7 @@ fn draw(lua: &Lua, rng: &mut ChaCha8Rng, args: &MultiValue) -> mlua::Result<Valu
             .ok_or_else(|| fail(lua, "math.random: bounds are integers".to_string()))
     };
     let (low, high) = match (args.front(), args.get(1)) {
-        (None, _) => return Ok(Value::Number(seed::unit(rng))),
+        (None, _) => return Ok(Value::Number(seed::uniform(rng))),
         (Some(high), None) => (1, bound(high)?),
         (Some(low), Some(high)) => (bound(low)?, bound(high)?),
     };
@@ -52,7 +52,7 @@ fn draw(lua: &Lua, rng: &mut ChaCha8Rng, args: &MultiValue) -> mlua::Result<Valu
     if low > high {
         return Err(fail(lua, format!("math.random: the range {low}..{high} is empty")));
     }
-    Ok(Value::Integer(seed::integer(rng, low, high)))
+    Ok(Value::Integer(seed::uniform_integer(rng, low, high)))
 }
 
 /// A named stream of random numbers, `rng` in scripts.
@@ -93,23 +93,23 @@ impl Hosted for Rng {
             Ok(stream.map(|stream| Self::new(this.seed.clone(), stream)))
         });
         method(methods, "uniform", |lua, this: &Self, (low, high): (f64, f64)| {
-            finite(lua, "uniform", low + (high - low) * seed::unit(&mut locked(&this.draws)))
+            finite(lua, "uniform", low + (high - low) * seed::uniform(&mut locked(&this.draws)))
         });
         method(methods, "normal", |lua, this: &Self, (mean, deviation): (f64, f64)| {
-            finite(lua, "normal", mean + deviation * seed::normal(&mut locked(&this.draws)))
+            finite(lua, "normal", mean + deviation * seed::standard_normal(&mut locked(&this.draws)))
         });
         method(methods, "int", |lua, this: &Self, (low, high): (i64, i64)| match low <= high {
-            true => Ok(seed::integer(&mut locked(&this.draws), low, high)),
+            true => Ok(seed::uniform_integer(&mut locked(&this.draws), low, high)),
             false => Err(fail(lua, format!("rng:int: the range {low}..{high} is empty"))),
         });
         method(methods, "choice", |lua, this: &Self, list: Table| match list.raw_len() {
             0 => Err(fail(lua, "rng:choice: the list is empty".to_string())),
-            count => list.raw_get::<Value>(seed::integer(&mut locked(&this.draws), 1, count as i64)),
+            count => list.raw_get::<Value>(seed::uniform_integer(&mut locked(&this.draws), 1, count as i64)),
         });
         method(methods, "shuffle", |lua, this: &Self, list: Table| {
             let mut values: Vec<Value> = list.sequence_values().collect::<mlua::Result<_>>()?;
             for last in (1..values.len()).rev() {
-                values.swap(last, seed::integer(&mut locked(&this.draws), 0, last as i64) as usize);
+                values.swap(last, seed::uniform_integer(&mut locked(&this.draws), 0, last as i64) as usize);
             }
             lua.create_sequence_from(values)
         });

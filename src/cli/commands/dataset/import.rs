@@ -26,7 +26,7 @@ use crate::{
     },
     evaluation::record::Origin,
     parallel,
-    policy::{ChunkedPolicy, ToolCommand, recorded::RecordedPolicy},
+    policy::{ChunkedPolicy, ToolCommand, builtin::RecordedPolicy},
     rollout::target_asset,
     scene::{Body, InitialState},
     script,

@@ -32,7 +32,7 @@ use crate::{
     },
     evaluation::record::{EpisodeRecord, Origin},
     files, parallel,
-    policy::{ChunkedPolicy, recorded::RecordedPolicy},
+    policy::{ChunkedPolicy, builtin::RecordedPolicy},
     report::{
         actions,
         run_folder::{RunFolder, SUMMARY},

@@ -1,0 +1,242 @@
+//! Msgpack messages and the numpy arrays in them, in the conventions of openpi and vla-eval.
+//!
+//! openpi writes an array as `{b"__ndarray__": true, b"data": bytes, b"dtype": "<f4", b"shape": [H, A]}` with keys of type bin;
+//! vla-eval's keys are of type str. The reader accepts both, numpy scalars (`__npgeneric__`) and nested lists.
+
+use rmpv::Value;
+
+use crate::npy::{NpyArray, element_size};
+
+/// Encodes an array. Keys are of type bin (openpi) or str (vla-eval).
+pub fn pack_array(array: NpyArray, bin_keys: bool) -> Value {
+    let key = |name: &str| if bin_keys { Value::Binary(name.into()) } else { Value::from(name) };
+    let shape = array.shape.into_iter().map(Value::from).collect();
+    Value::Map(vec![
+        (key("__ndarray__"), Value::Boolean(true)),
+        (key("data"), Value::Binary(array.data)),
+        (key("dtype"), Value::from(array.dtype)),
+        (key("shape"), Value::Array(shape)),
+    ])
+}
+
+/// Entry of a map by name; its key may be of type str or bin.
+pub fn entry<'a>(map: &'a Value, name: &str) -> Option<&'a Value> {
+    let is = |key: &Value| match key {
+        Value::String(text) => text.as_str() == Some(name),
+        Value::Binary(bytes) => bytes == name.as_bytes(),
+        _ => false,
+    };
+    map.as_map()?.iter().find(|(key, _)| is(key)).map(|(_, value)| value)
+}
+
+/// Names of a map's entries, for error messages.
+pub fn names(map: &Value) -> String {
+    let name = |key: &Value| match key {
+        Value::String(text) => text.as_str().map(str::to_owned),
+        Value::Binary(bytes) => Some(String::from_utf8_lossy(bytes).into_owned()),
+        other => Some(other.to_string()),
+    };
+    let all: Vec<String> = map.as_map().into_iter().flatten().filter_map(|(key, _)| name(key)).collect();
+    if all.is_empty() { "nothing".to_owned() } else { all.join(", ") }
+}
+
+/// Description of the type of a value, for error messages.
+pub fn kind(value: &Value) -> &'static str {
+    match value {
+        Value::Nil => "nil",
+        Value::Boolean(_) => "a boolean",
+        Value::Integer(_) | Value::F32(_) | Value::F64(_) => "a number",
+        Value::String(_) => "text",
+        Value::Binary(_) => "bytes",
+        Value::Array(_) => "a list",
+        Value::Map(_) => "a map",
+        Value::Ext(..) => "an extension",
+    }
+}
+
+/// Deepest nesting that is read.
+const MAX_DEPTH: usize = 64;
+
+/// A message is not one msgpack value. The text completes "the message is …".
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs)]
+pub enum MsgpackError {
+    #[error("more than one msgpack value: {0} bytes follow the first")]
+    TrailingBytes(usize),
+    #[error("not msgpack: nested more than {MAX_DEPTH} times")]
+    TooDeep,
+    #[error("not msgpack: the end is missing")]
+    Truncated,
+}
+
+/// A value is not an array of numbers. The text says what it is instead.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs)]
+pub enum ArrayError {
+    #[error("{0}")]
+    NotAnArray(&'static str),
+    #[error("a numpy scalar that is not a number")]
+    Scalar,
+    #[error("a list with more than {MAX_AXES} axes")]
+    TooManyAxes,
+    #[error("a list whose rows differ in length")]
+    Ragged,
+    #[error("an array without {0}")]
+    Missing(&'static str),
+    #[error("an array whose shape is not made of whole numbers")]
+    Shape,
+    #[error("an array of dtype {0:?}")]
+    Dtype(String),
+    #[error("an array of shape {shape:?} and dtype {dtype:?} with {bytes} bytes")]
+    Size { shape: Vec<usize>, dtype: String, bytes: usize },
+}
+
+/// An array of numbers that was received.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NumberArray {
+    /// Lengths of the axes; empty for a scalar.
+    pub shape: Vec<usize>,
+    /// The elements in C order.
+    pub values: Vec<f64>,
+}
+
+/// A map with its entries in order.
+pub fn map<K: Into<Value>>(entries: impl IntoIterator<Item = (K, Value)>) -> Value {
+    Value::Map(entries.into_iter().map(|(key, value)| (key.into(), value)).collect())
+}
+
+/// Encodes a value.
+pub fn pack(value: &Value) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    // Writing to a vector does not fail.
+    let _ = rmpv::encode::write_value(&mut bytes, value);
+    bytes
+}
+
+/// Decodes a message, which must be exactly one value.
+///
+/// # Errors
+/// The bytes are not one valid value.
+pub fn unpack(mut bytes: &[u8]) -> Result<Value, MsgpackError> {
+    use rmpv::decode::{Error, read_value_with_max_depth};
+    match read_value_with_max_depth(&mut bytes, MAX_DEPTH) {
+        Ok(value) if bytes.is_empty() => Ok(value),
+        Ok(_) => Err(MsgpackError::TrailingBytes(bytes.len())),
+        Err(Error::DepthLimitExceeded) => Err(MsgpackError::TooDeep),
+        Err(Error::InvalidMarkerRead(_) | Error::InvalidDataRead(_)) => Err(MsgpackError::Truncated),
+    }
+}
+
+/// Reads a numpy array, a numpy scalar, a number or nested lists of numbers.
+///
+/// # Errors
+/// The value is something else, or its shape and data disagree.
+pub fn numbers(value: &Value) -> Result<NumberArray, ArrayError> {
+    if entry(value, "__ndarray__").is_some() {
+        return ndarray(value);
+    }
+    if entry(value, "__npgeneric__").is_some() {
+        let number = entry(value, "data").and_then(Value::as_f64).ok_or(ArrayError::Scalar)?;
+        return Ok(NumberArray { shape: Vec::new(), values: vec![number] });
+    }
+    let mut values = Vec::new();
+    let shape = nested(value, &mut values, 0)?;
+    Ok(NumberArray { shape, values })
+}
+
+/// Largest number of axes of nested lists.
+const MAX_AXES: usize = 4;
+
+fn nested(value: &Value, values: &mut Vec<f64>, depth: usize) -> Result<Vec<usize>, ArrayError> {
+    if let Some(number) = value.as_f64() {
+        values.push(number);
+        return Ok(Vec::new());
+    }
+    let Some(items) = value.as_array() else { return Err(ArrayError::NotAnArray(kind(value))) };
+    if depth == MAX_AXES {
+        return Err(ArrayError::TooManyAxes);
+    }
+    let mut inner: Option<Vec<usize>> = None;
+    for item in items {
+        let shape = nested(item, values, depth + 1)?;
+        if inner.as_ref().is_some_and(|known| *known != shape) {
+            return Err(ArrayError::Ragged);
+        }
+        inner = Some(shape);
+    }
+    Ok(std::iter::once(items.len()).chain(inner.unwrap_or_default()).collect())
+}
+
+fn ndarray(value: &Value) -> Result<NumberArray, ArrayError> {
+    let dtype = entry(value, "dtype").and_then(Value::as_str).ok_or(ArrayError::Missing("dtype"))?;
+    let data = entry(value, "data").and_then(Value::as_slice).ok_or(ArrayError::Missing("data"))?;
+    let shape = entry(value, "shape").and_then(Value::as_array).ok_or(ArrayError::Missing("shape"))?;
+    let shape: Option<Vec<usize>> = shape.iter().map(|n| n.as_u64()?.try_into().ok()).collect();
+    let shape = shape.ok_or(ArrayError::Shape)?;
+    let size = element_size(dtype).ok_or_else(|| ArrayError::Dtype(dtype.to_owned()))?;
+    let count = shape.iter().try_fold(1_usize, |all, n| all.checked_mul(*n));
+    if count.and_then(|count| count.checked_mul(size)) != Some(data.len()) {
+        return Err(ArrayError::Size { shape, dtype: dtype.to_owned(), bytes: data.len() });
+    }
+    let array = NpyArray { dtype: dtype.to_owned(), shape, data: data.to_vec() };
+    let values = array.values();
+    Ok(NumberArray { shape: array.shape, values })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn arrays_are_packed_as_by_openpis_client() {
+        let zeros = pack_array(NpyArray::from_f32(vec![2, 3], [0.0; 6]), true);
+        let mut packed = Vec::new();
+        rmpv::encode::write_value(&mut packed, &Value::Map(vec![("a".into(), zeros)])).unwrap();
+        let mut expected = b"\x81\xa1a\x84\xc4\x0b__ndarray__\xc3\xc4\x04data\xc4\x18".to_vec();
+        expected.extend([0; 24]);
+        expected.extend(b"\xc4\x05dtype\xa3<f4\xc4\x05shape\x92\x02\x03");
+        assert_eq!(packed, expected);
+    }
+
+    #[test]
+    fn arrays_are_read_with_both_types_of_keys() {
+        for bin in [true, false] {
+            let value = pack_array(NpyArray::from_f32(vec![2, 2], [1.0, -2.5, 3.0, 1e-3]), bin);
+            let found = numbers(&value).unwrap();
+            assert_eq!((found.shape, found.values[1]), (vec![2, 2], -2.5));
+        }
+        let list = Value::Array(vec![Value::Array(vec![1.into(), Value::F64(0.5)])]);
+        assert_eq!(numbers(&list).unwrap(), NumberArray { shape: vec![1, 2], values: vec![1.0, 0.5] });
+    }
+
+    #[test]
+    fn every_dtype_is_read_with_its_width_sign_and_byte_order() {
+        let of = |dtype: &'static str, data: &[u8]| {
+            let array = NpyArray { dtype: dtype.to_owned(), shape: vec![1], data: data.to_vec() };
+            numbers(&pack_array(array, true)).map(|found| found.values[0])
+        };
+        assert_eq!(of("<f2", &[0x00, 0xC1]), Ok(-2.5));
+        assert_eq!(of("<f8", &2.25_f64.to_le_bytes()), Ok(2.25));
+        assert_eq!(of(">f4", &(-7.5_f32).to_be_bytes()), Ok(-7.5));
+        assert_eq!(of("|i1", &[0xFF]), Ok(-1.0));
+        assert_eq!(of("|u1", &[0xFF]), Ok(255.0));
+        assert_eq!(of("<i8", &(-9_i64).to_le_bytes()), Ok(-9.0));
+        assert!(of("<c8", &[0; 8]).is_err_and(|e| e.to_string().contains("dtype \"<c8\"")));
+        assert!(of("<f4", &[0; 5]).is_err_and(|e| e.to_string().contains("5 bytes")));
+        assert!(of("é", &[0; 5]).is_err());
+    }
+
+    #[test]
+    fn values_that_are_not_arrays_are_described() {
+        let ragged = Value::Array(vec![Value::Array(vec![1.into()]), Value::Array(vec![])]);
+        assert!(numbers(&ragged).is_err_and(|e| e.to_string().contains("differ in length")));
+        assert_eq!(numbers(&"hello".into()), Err(ArrayError::NotAnArray("text")));
+        let huge = Value::Map(vec![
+            ("__ndarray__".into(), true.into()),
+            ("data".into(), Value::Binary(vec![0; 8])),
+            ("dtype".into(), "<f4".into()),
+            ("shape".into(), Value::Array(vec![u64::MAX.into(), 2.into()])),
+        ]);
+        assert!(numbers(&huge).is_err());
+    }
+}

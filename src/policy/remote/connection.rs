@@ -1,0 +1,295 @@
+//! A connection to a policy server. Every wait ends at a deadline or when the run is cancelled.
+
+use std::{
+    io::{self, ErrorKind},
+    net::{TcpStream, ToSocketAddrs},
+    sync::atomic::{AtomicBool, Ordering},
+    thread,
+    time::{Duration, Instant},
+};
+
+use rmpv::Value;
+use tungstenite::{ClientRequestBuilder, Error, Message, WebSocket, client, http::Uri};
+
+use crate::policy::{
+    PolicyError,
+    msgpack::unpack,
+    profile::Profile,
+    transport::{
+        self, POLL_INTERVAL, TransportError, complete_handshake, configure, is_wait, websocket_config,
+    },
+};
+
+/// Longest message that is accepted; a chunk of actions has some ten kilobytes.
+const MAX_MESSAGE_BYTES: usize = 64 << 20;
+/// Pause before the second attempt to connect; it doubles with every further attempt.
+const FIRST_PAUSE: Duration = Duration::from_millis(100);
+/// Longest pause between two attempts to connect.
+const MAX_PAUSE: Duration = Duration::from_secs(2);
+/// Most pings and pongs that an idle connection may have received.
+const MAX_IDLE_MESSAGES: usize = 1000;
+/// Length to which a server's error text is cut, characters.
+const MAX_ERROR_CHARS: usize = 2000;
+/// Port of an address without one: that of openpi's servers.
+const DEFAULT_PORT: u16 = 8000;
+
+/// Protocol of a policy server.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Protocol {
+    /// openpi: the server sends metadata first, then a chunk of actions per observation.
+    #[default]
+    Openpi,
+    /// The evaluation harness vla-eval: typed and numbered messages.
+    VlaEval,
+}
+
+/// Address and protocol of a policy server.
+#[derive(Clone, Debug)]
+pub struct PolicyServer {
+    /// `ws://host:port`, optionally with a path.
+    pub url: String,
+    /// Protocol.
+    pub protocol: Protocol,
+    /// Keys and units of observations and actions.
+    pub profile: Profile,
+    /// Time limit for connecting and for each response.
+    pub timeout: Duration,
+    /// Sent as `Authorization: Api-Key …`, if present.
+    pub api_key: Option<String>,
+    /// Flag that cancels the run.
+    pub cancel: &'static AtomicBool,
+}
+
+impl PolicyServer {
+    /// A failure of this server; `what` continues "the policy server URL …".
+    pub(super) fn error(&self, what: &str) -> PolicyError {
+        PolicyError::Transport(format!("the policy server {} {what}", self.url))
+    }
+
+    fn check_cancel(&self) -> Result<(), PolicyError> {
+        if self.cancel.load(Ordering::Relaxed) { Err(PolicyError::Interrupted) } else { Ok(()) }
+    }
+
+    fn check_deadline(&self, deadline: Instant, what: &str) -> Result<(), PolicyError> {
+        self.check_cancel()?;
+        if Instant::now() < deadline {
+            return Ok(());
+        }
+        let seconds = self.timeout.as_secs_f64();
+        Err(self.error(&format!("{what} within {seconds} s; raise --policy-timeout if it needs longer")))
+    }
+
+    fn socket_error(&self, error: &Error) -> PolicyError {
+        match error {
+            Error::ConnectionClosed | Error::AlreadyClosed => self.error("closed the connection"),
+            Error::Capacity(_) => self.error(&format!(
+                "sent more than {} MiB in one message: no chunk of actions is as long",
+                MAX_MESSAGE_BYTES >> 20
+            )),
+            Error::Io(error) => self.error(&format!("cannot be reached any more: {error}")),
+            Error::Protocol(_) => self.error(&format!("broke the websocket protocol: {error}")),
+            other => self.error(&format!("is not a websocket server: {other}")),
+        }
+    }
+
+    fn transport_error(&self, error: TransportError<PolicyError>) -> PolicyError {
+        match error {
+            TransportError::Socket(error) => self.socket_error(&error),
+            TransportError::Aborted(error) => error,
+        }
+    }
+}
+
+/// An open connection, before or after the greeting of the protocol.
+#[derive(Debug)]
+pub(super) struct PolicyConnection {
+    pub(super) server: PolicyServer,
+    socket: WebSocket<TcpStream>,
+    /// Number of the last message sent (vla-eval).
+    pub(super) seq: u64,
+}
+
+impl PolicyConnection {
+    /// Connects. Retries while the server cannot be reached, until the timeout.
+    ///
+    /// # Errors
+    /// The address is invalid, or no connection was made in time.
+    pub(super) fn open(server: &PolicyServer) -> Result<Self, PolicyError> {
+        let request = request(server)?;
+        let deadline = Instant::now() + server.timeout;
+        let mut pause = FIRST_PAUSE;
+        loop {
+            let reason = match connect(&request, server, deadline) {
+                Ok(socket) => return Ok(Self { server: server.clone(), socket, seq: 0 }),
+                Err(ConnectError::Final(error)) => return Err(error),
+                Err(ConnectError::Retry(reason)) => reason,
+            };
+            if Instant::now() + pause > deadline {
+                return Err(PolicyError::Transport(format!(
+                    "no policy server at {}: {reason}; tried for {} s: start it, or raise --policy-timeout",
+                    server.url,
+                    server.timeout.as_secs_f64()
+                )));
+            }
+            sleep(pause, server)?;
+            pause = (2 * pause).min(MAX_PAUSE);
+        }
+    }
+
+    /// Sends a message.
+    ///
+    /// # Errors
+    /// The connection fails, or the server does not accept the message in time.
+    pub(super) fn send(&mut self, value: &Value) -> Result<(), PolicyError> {
+        let server = &self.server;
+        let deadline = Instant::now() + server.timeout;
+        let on_wait = || server.check_deadline(deadline, "did not accept an observation");
+        transport::send(&mut self.socket, value, on_wait).map_err(|error| server.transport_error(error))
+    }
+
+    /// Receives the next message.
+    ///
+    /// # Errors
+    /// The connection fails, or the server sends text (its error message), an invalid message, or nothing in time.
+    pub(super) fn receive(&mut self) -> Result<Value, PolicyError> {
+        let server = &self.server;
+        let deadline = Instant::now() + server.timeout;
+        loop {
+            let message =
+                transport::receive(&mut self.socket, |_| server.check_deadline(deadline, "did not answer"));
+            match message.map_err(|error| server.transport_error(error))? {
+                Message::Binary(bytes) => {
+                    return unpack(&bytes).map_err(|error| server.error(&format!("sent {error}")));
+                }
+                Message::Text(text) => {
+                    return Err(PolicyError::Transport(format!(
+                        "the policy server {} failed; it says:\n{}",
+                        server.url,
+                        end_of(&text)
+                    )));
+                }
+                Message::Close(_) => return Err(server.socket_error(&Error::ConnectionClosed)),
+                Message::Ping(_) | Message::Pong(_) | Message::Frame(_) => {}
+            }
+        }
+    }
+
+    /// Answers the pings received while the connection was idle. Returns true if it can still be used.
+    pub(super) fn is_open(&mut self) -> bool {
+        let set_blocking = |socket: &WebSocket<TcpStream>, blocking: bool| {
+            socket.get_ref().set_nonblocking(!blocking).is_ok()
+        };
+        if !set_blocking(&self.socket, false) {
+            return false;
+        }
+        for _ in 0..MAX_IDLE_MESSAGES {
+            match self.socket.read() {
+                Ok(Message::Ping(_) | Message::Pong(_)) => {}
+                Err(Error::Io(error)) if is_wait(&error) => return set_blocking(&self.socket, true),
+                // Data without a request, or the end: a new connection is needed.
+                _ => return false,
+            }
+        }
+        false
+    }
+}
+
+enum ConnectError {
+    Retry(String),
+    Final(PolicyError),
+}
+
+impl From<io::Error> for ConnectError {
+    fn from(error: io::Error) -> Self {
+        Self::Retry(error.to_string())
+    }
+}
+
+fn connect(
+    request: &ClientRequestBuilder,
+    server: &PolicyServer,
+    deadline: Instant,
+) -> Result<WebSocket<TcpStream>, ConnectError> {
+    let stream = connect_tcp(&server.url, deadline)?;
+    configure(&stream)?;
+    let handshake =
+        client::client_with_config(request.clone(), stream, Some(websocket_config(MAX_MESSAGE_BYTES)));
+    let on_wait = || {
+        server.check_cancel().map_err(ConnectError::Final)?;
+        match Instant::now() > deadline {
+            true => Err(ConnectError::Retry("it accepts connections but says nothing".to_owned())),
+            false => Ok(()),
+        }
+    };
+    match complete_handshake(handshake, on_wait) {
+        Ok((socket, _)) => Ok(socket),
+        Err(TransportError::Aborted(error)) => Err(error),
+        // A server that is being started may close connections at first.
+        Err(TransportError::Socket(Error::Io(error))) => Err(error.into()),
+        Err(TransportError::Socket(Error::Http(response))) if response.status().as_u16() == 503 => {
+            Err(ConnectError::Retry("HTTP status 503".to_owned()))
+        }
+        Err(TransportError::Socket(error)) => {
+            let message = format!("{} is not a websocket server: {error}", server.url);
+            Err(ConnectError::Final(PolicyError::Transport(message)))
+        }
+    }
+}
+
+/// Connects to the first address of the host that accepts a connection.
+fn connect_tcp(url: &str, deadline: Instant) -> io::Result<TcpStream> {
+    let uri: Uri = url.parse().map_err(io::Error::other)?;
+    let host = uri.host().unwrap_or_default().trim_start_matches('[').trim_end_matches(']');
+    let mut refused = io::Error::new(ErrorKind::NotFound, "its name has no address");
+    for address in (host, uri.port_u16().unwrap_or(DEFAULT_PORT)).to_socket_addrs()? {
+        let left = deadline.saturating_duration_since(Instant::now()).max(POLL_INTERVAL);
+        match TcpStream::connect_timeout(&address, left) {
+            Ok(stream) => return Ok(stream),
+            Err(error) => refused = error,
+        }
+    }
+    Err(refused)
+}
+
+fn request(server: &PolicyServer) -> Result<ClientRequestBuilder, PolicyError> {
+    let wrong = |what: &str| {
+        PolicyError::Address(format!("--policy {}: {what}; expected ws://HOST:PORT", server.url))
+    };
+    let uri: Uri = server.url.parse().map_err(|_| wrong("not an address"))?;
+    match uri.scheme_str() {
+        Some("ws") => {}
+        Some("wss") => {
+            return Err(wrong("TLS is not supported: use a tunnel, such as ssh -L"));
+        }
+        _ => return Err(wrong("not a websocket address")),
+    }
+    if uri.host().is_none_or(str::is_empty) {
+        return Err(wrong("no host"));
+    }
+    let authority = uri.authority().map_or("", |authority| authority.as_str());
+    let port = authority.rsplit_once(':').map(|(_, port)| port).filter(|port| !port.ends_with(']'));
+    if let Some(port) = port.filter(|port| !port.parse::<u16>().is_ok_and(|port| port > 0)) {
+        return Err(wrong(&format!("{port:?} is not a port, a whole number in 1..65535")));
+    }
+    let request = ClientRequestBuilder::new(uri);
+    Ok(match &server.api_key {
+        Some(key) => request.with_header("Authorization", format!("Api-Key {key}")),
+        None => request,
+    })
+}
+
+fn sleep(pause: Duration, server: &PolicyServer) -> Result<(), PolicyError> {
+    let end = Instant::now() + pause;
+    while Instant::now() < end {
+        server.check_cancel()?;
+        thread::sleep(POLL_INTERVAL.min(end.saturating_duration_since(Instant::now())));
+    }
+    Ok(())
+}
+
+/// The last characters of a text. In a Python traceback they hold the error.
+fn end_of(text: &str) -> &str {
+    let text = text.trim_end();
+    let from = text.char_indices().rev().nth(MAX_ERROR_CHARS).map_or(0, |(at, _)| at);
+    &text[from..]
+}

@@ -1,0 +1,117 @@
+//! Spaces of observations and actions for clients: types, shapes and bounds. The bounds are those of possible values, not
+//! of likely ones.
+
+use std::f64::consts::PI;
+
+use rmpv::Value;
+
+use super::catalog::ServerConfig;
+use crate::policy::{
+    Observation,
+    encode::{ObservationEntry, content},
+    msgpack::map,
+    profile::{ACTION_LEN, ActionEncoding, ActionUnits, InputSource, PoseEncoding, StatePart},
+};
+
+/// Bound of positions along any axis of the base frame, m; larger than the reach of the arm.
+const MAX_POSITION_M: f64 = 2.0;
+/// Bound of rotation angles, rad: half a turn, and a margin for rounding.
+const MAX_ANGLE: f64 = PI + 1e-3;
+/// Bound of marker positions, px; larger than a tactile image.
+const MAX_MARKER_PX: f64 = 1e4;
+/// Bound of forces, N.
+const MAX_FORCE_N: f64 = 1e6;
+
+/// Space of the observations. `first` is an example, which gives the shapes.
+pub(super) fn observation(config: &ServerConfig, first: &Observation) -> Value {
+    let entries = config.profile.inputs.iter().filter_map(|input| {
+        let space = match content(first, &input.source)? {
+            ObservationEntry::Text(_) => text(config),
+            ObservationEntry::Array(array) => array_space(&array.dtype, &array.shape, bounds(&input.source)),
+        };
+        Some((input.shortest_key(), space))
+    });
+    map(entries)
+}
+
+/// Space of the actions.
+pub(super) fn action(encoding: &ActionEncoding) -> Value {
+    let most = match encoding.pose {
+        PoseEncoding::Absolute => {
+            [MAX_POSITION_M, MAX_POSITION_M, MAX_POSITION_M, MAX_ANGLE, MAX_ANGLE, MAX_ANGLE]
+        }
+        PoseEncoding::Delta { .. } | PoseEncoding::DeltaOsc { .. } => [1.0; ACTION_LEN - 1],
+    };
+    let ActionUnits { scale, offset } = encoding.units.unwrap_or(ActionUnits::IDENTITY);
+    // In the units of the action, whose factors may be negative.
+    let end = |i: usize, sign: f64| (sign * scale[i].signum() * most[i] - offset[i]) / scale[i];
+    let mut low: Vec<f64> = (0..most.len()).map(|i| end(i, -1.0)).collect();
+    let mut high: Vec<f64> = (0..most.len()).map(|i| end(i, 1.0)).collect();
+    low.push(encoding.gripper.open.min(encoding.gripper.closed));
+    high.push(encoding.gripper.open.max(encoding.gripper.closed));
+    array_space("<f8", &[ACTION_LEN], Bounds { low, high })
+}
+
+/// Space of the prompts: the length of the longest one and all characters in use.
+fn text(config: &ServerConfig) -> Value {
+    let prompts =
+        config.suites.iter().flat_map(|served| &served.suite.tasks).map(|task| task.prompt.as_str());
+    let longest = prompts.clone().map(|prompt| prompt.chars().count()).max().unwrap_or(0);
+    let mut characters: Vec<char> = prompts.flat_map(str::chars).collect();
+    characters.sort_unstable();
+    characters.dedup();
+    let characters: String = characters.into_iter().collect();
+    map([("max_length", longest.into()), ("charset", characters.into())])
+}
+
+/// Bounds of an array: one number for all elements, or one per element.
+struct Bounds {
+    low: Vec<f64>,
+    high: Vec<f64>,
+}
+
+impl Bounds {
+    fn symmetric(high: Vec<f64>) -> Self {
+        Self { low: high.iter().map(|x| -x).collect(), high }
+    }
+}
+
+fn array_space(dtype: &str, shape: &[usize], bounds: Bounds) -> Value {
+    let list = |all: Vec<f64>| match all[..] {
+        [one] => Value::F64(one),
+        _ => Value::Array(all.into_iter().map(Value::F64).collect()),
+    };
+    let shape = shape.iter().map(|n| Value::from(*n)).collect();
+    map([
+        ("dtype", dtype.into()),
+        ("shape", Value::Array(shape)),
+        ("low", list(bounds.low)),
+        ("high", list(bounds.high)),
+    ])
+}
+
+fn bounds(source: &InputSource) -> Bounds {
+    match source {
+        InputSource::Camera { .. } | InputSource::TactileImage { .. } | InputSource::Tactile { .. } => {
+            Bounds { low: vec![0.0], high: vec![255.0] }
+        }
+        InputSource::State { parts } => {
+            let of = |part: &StatePart| vec![max_magnitude(*part); part.count()];
+            Bounds::symmetric(parts.iter().flat_map(of).collect())
+        }
+        InputSource::MarkerMotion => Bounds::symmetric(vec![MAX_MARKER_PX]),
+        InputSource::Force => Bounds::symmetric(vec![MAX_FORCE_N]),
+        InputSource::Prompt => Bounds::symmetric(vec![f64::INFINITY]),
+    }
+}
+
+/// Largest magnitude of a number of the state.
+fn max_magnitude(part: StatePart) -> f64 {
+    match part {
+        StatePart::Position => MAX_POSITION_M,
+        StatePart::AxisAngle => MAX_ANGLE,
+        StatePart::Joints => 2.0 * PI,
+        // Quaternions, the closure, and widths in metres.
+        _ => 1.0 + 1e-3,
+    }
+}
