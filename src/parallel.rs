@@ -160,7 +160,7 @@ impl Queue {
         }
     }
 
-    /// Number of the next job, once it is below the limit; `None` if there is none left or no more may start.
+    /// Number of the next job, once it is below the limit; `None` if all jobs have started or the queue is closed.
     fn next(&self, cancelled: &impl Fn() -> bool) -> Option<usize> {
         let waits =
             |state: &mut QueueState| !state.closed && state.next < self.jobs && state.next >= state.limit;

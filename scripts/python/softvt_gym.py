@@ -7,8 +7,8 @@
     observation, reward, terminated, truncated, info = env.step(env.action_space.sample())
     env.close()
 
-Observations are a dict with the keys of the server's profile, actions seven numbers in its code. The reward is 1 in the step
-that reaches the goal, and 0 in all others. What else can be known, with --privileged the true state too, is in `info`.
+Observations are a dict with the keys of the server's profile; actions are seven numbers in its encoding. The reward is 1 in the
+step that reaches the goal and 0 otherwise. `info` has the step and the success, and with --privileged the true state.
 """
 
 import subprocess
@@ -21,16 +21,16 @@ from websocket import create_connection
 
 
 class SoftVTEnv(gymnasium.Env):
-    """One episode after another on a connection of its own. Several environments may share a server."""
+    """An environment with its own connection. Several environments may share a server."""
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 20}
 
     def __init__(self, url="ws://127.0.0.1:8765", render_mode=None, camera=None):
-        """`camera` is what `render` shows: a camera of the scene, its first if none, or "left" or "right" for a finger."""
+        """`camera` selects the image of `render`: a camera's name (default: the scene's first), or "left" or "right" for a finger."""
         self.url, self.render_mode, self.camera = url, render_mode, camera
         self._server = None
         self._socket = create_connection(url)
-        self.about = self._hear()
+        self.about = self._receive()
         self.observation_space = spaces.Dict(
             {key: _space(entry) for key, entry in self.about["observation_space"].items()}
         )
@@ -39,13 +39,13 @@ class SoftVTEnv(gymnasium.Env):
 
     @classmethod
     def launch(cls, script, *flags, softvt="softvt", **arguments):
-        """Starts a server of its own, which ends with the environment. `flags` are words for `softvt serve`."""
+        """Starts a server that ends with the environment. `flags` are arguments of `softvt serve`."""
         server = subprocess.Popen(
             [softvt, "serve", script, "--port", "0", *flags], stdout=subprocess.PIPE, text=True
         )
         url = server.stdout.readline().strip()
         if not url:
-            raise RuntimeError(f"softvt serve ended with exit code {server.wait()}; it says why above")
+            raise RuntimeError(f"softvt serve ended with exit code {server.wait()}; its message is above")
         try:
             env = cls(url, **arguments)
         except BaseException:
@@ -55,40 +55,40 @@ class SoftVTEnv(gymnasium.Env):
         return env
 
     def reset(self, *, seed=None, options=None):
-        """Begins an episode. `options` may name suite, task, episode and split, which stay until others are named.
+        """Starts an episode. `options` may give suite, task, episode and split, which also apply to later episodes.
 
-        The seed is that of a whole run: with a new one comes episode 0, without one the next episode.
+        The seed is that of a whole run: with a seed, the episode is 0 unless given; without one, it is the next episode.
         """
         super().reset(seed=seed)
-        wanted = dict(self._next)
+        requested = dict(self._next)
         if seed is not None:
-            wanted.update(seed=seed, episode=0)
-        wanted.update(options or {})
-        answer = self._ask("reset", **wanted)
-        self._next = dict(wanted, episode=wanted["episode"] + 1)
-        return answer["observation"], answer["info"]
+            requested.update(seed=seed, episode=0)
+        requested.update(options or {})
+        response = self._request("reset", **requested)
+        self._next = dict(requested, episode=requested["episode"] + 1)
+        return response["observation"], response["info"]
 
     def step(self, action):
-        """Carries out an action of shape (7), or several of shape (n, 7), the last of which is answered."""
-        answer = self._ask("step", action=np.asarray(action, dtype=np.float64))
-        ends = answer["terminated"], answer["truncated"]
-        return answer["observation"], answer["reward"], *ends, answer["info"]
+        """Executes an action of shape (7), or several of shape (n, 7), and returns the result of the last one."""
+        response = self._request("step", action=np.asarray(action, dtype=np.float64))
+        flags = response["terminated"], response["truncated"]
+        return response["observation"], response["reward"], *flags, response["info"]
 
     def render(self):
-        """What the camera sees, uint8 (height, width, 3)."""
-        return self._ask("render", camera=self.camera)["image"] if self.render_mode else None
+        """Image of the camera, uint8 (height, width, 3)."""
+        return self._request("render", camera=self.camera)["image"] if self.render_mode else None
 
     def get_state(self):
-        """Where the episode stands, as plain data: for `set_state`, here or with any other server of the same kind."""
-        return self._ask("get_state")["state"]
+        """State of the episode as plain data, for `set_state` of this or an equal server."""
+        return self._request("get_state")["state"]
 
     def set_state(self, state):
-        """Goes back to where an episode stood, to the bit; the answer is that of `reset`."""
-        answer = self._ask("set_state", state=state)
-        return answer["observation"], answer["info"]
+        """Restores a state bit for bit; returns what `reset` does."""
+        response = self._request("set_state", state=state)
+        return response["observation"], response["info"]
 
     def close(self):
-        """Ends the connection, and the server if it is its own."""
+        """Closes the connection, and ends the server if `launch` started it."""
         socket, self._socket = self._socket, None
         server, self._server = self._server, None
         if socket is not None:
@@ -96,17 +96,17 @@ class SoftVTEnv(gymnasium.Env):
         if server is not None:
             _end(server)
 
-    def _ask(self, kind, **fields):
+    def _request(self, kind, **fields):
         if self._socket is None:
             raise RuntimeError("the environment is closed")
         self._socket.send_binary(msgpack.packb({"type": kind, **fields}, default=_pack))
-        return self._hear()
+        return self._receive()
 
-    def _hear(self):
-        answer = msgpack.unpackb(self._socket.recv(), object_hook=_unpack)
-        if answer["type"] == "error":
-            raise RuntimeError(answer["error"])
-        return answer
+    def _receive(self):
+        response = msgpack.unpackb(self._socket.recv(), object_hook=_unpack)
+        if response["type"] == "error":
+            raise RuntimeError(response["error"])
+        return response
 
 
 def _end(server):
@@ -116,7 +116,7 @@ def _end(server):
 
 
 def _space(entry):
-    """A space as the server describes it: text, or an array with bounds for all its numbers or for each."""
+    """Gymnasium space of the server's description: text, or an array with common or individual bounds."""
     if "charset" in entry:
         return spaces.Text(entry["max_length"], charset=entry["charset"])
     dtype, shape = np.dtype(entry["dtype"]), tuple(entry["shape"])

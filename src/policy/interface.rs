@@ -1,4 +1,4 @@
-//! The interface of a policy: what it is told of an episode and what it commands.
+//! The interface of a policy: its trait, the description of an episode, and commands.
 
 use super::{Observation, SensorStreams};
 use crate::geometry::Vec3;

@@ -1,5 +1,5 @@
-//! What a policy may see: the only type that reaches it. Hidden state (poses and shapes of objects, deformation, drops,
-//! thresholds) has no field here.
+//! Observations: the only data that reach a policy. Hidden state (poses and shapes of objects, deformation, drops, limits) has
+//! no field here.
 
 use std::sync::Arc;
 
@@ -12,21 +12,24 @@ use crate::{
     },
 };
 
-/// The streams that somebody looks at; others are never computed.
+/// Sensor streams of an observation. Streams that are not requested are never computed.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SensorStreams {
-    /// Cameras of the scene, by name.
+    /// Names of the scene's cameras whose images are requested.
     pub cameras: Vec<String>,
-    /// The tactile sensors.
+    /// True to request images and markers of the tactile sensors.
     pub touch: bool,
-    /// True forces at the pads. No real sensor gives them: results of whoever asks are marked `force_observed`.
+    /// True to request the true forces at the pads. No real sensor measures them, so results are marked `force_observed`.
     pub force: bool,
 }
 
-/// What a policy sees at a control step.
+/// Observation of a control step.
+///
+/// Proprioception and the prompt are always present; images, touch and forces if [`SensorStreams`] requests them. Poses are in
+/// the robot base frame. All streams show the same instant, 20 times per second of simulated time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Observation {
-    /// Time since the policy took over, s.
+    /// Time since the start of the episode, s.
     pub time_s: f64,
     /// Tool position in the robot base frame, m.
     pub ee_position_b: Vec3,
@@ -36,48 +39,48 @@ pub struct Observation {
     pub joints: [f64; 7],
     /// Measured gripper width, m: 0 to 0.08 between the apexes of the gels.
     pub gripper_width_m: f64,
-    /// Closure last commanded, 0 (open) ..= 1 (shut).
+    /// Closure last commanded, 0 (open) ..= 1 (closed).
     pub closure: f64,
     /// The instruction.
     pub prompt: String,
-    /// Pictures of the cameras asked for, in the order of [`SensorStreams::cameras`].
+    /// Images of the requested cameras, in the order of [`SensorStreams::cameras`].
     pub cameras: Vec<CameraImage>,
-    /// What the fingers felt, if asked for.
+    /// Tactile images and markers of the last control steps, if requested.
     pub touch: Option<TactileHistory>,
-    /// True forces at the left and right pad, if asked for.
+    /// True forces at the left and right pad, if requested.
     pub forces: Option<[PadForce; 2]>,
-    /// Resultants of the last control steps, oldest first, 1 to 8, if asked for: force on the left and the right gel, N, in the
-    /// frame of the pad.
+    /// Forces on the left and the right gel in the last 1 to 8 control steps, oldest first, if requested: (x, y, z) of each,
+    /// N, in the frame of the pad.
     pub force_history: Vec<[f64; 6]>,
 }
 
-/// A camera's picture: rows from the top, RGB, 8 bits a channel, sRGB. A camera that gets inside of something during an
-/// episode, on the hand or in the world, sees what is beyond that thing; results count such steps as `camera_inside`.
+/// A camera image: rows from the top, sRGB, 8 bits per channel. A camera that enters an object during an episode sees the
+/// scene behind that object's surface; results count such steps as `camera_inside`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraImage {
     /// Name of the camera.
     pub name: String,
-    /// The picture; its size is the camera's, 224 × 224 unless the scene says otherwise.
+    /// The image in the camera's size, by default 224 × 224.
     pub image: RgbImage,
 }
 
 /// One finger's sensor at one control step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TactileFrame {
-    /// The colour picture, 320 × 240; `docs/tactile.md` draws its frame.
+    /// The colour image, 320 × 240; `docs/tactile.md` shows its frame.
     pub image: RgbImage,
-    /// The same as it stands in the mosaic, 56 × 56.
+    /// The image scaled to a cell of the mosaic, 56 × 56.
     pub cell: RgbImage,
-    /// The picture of the untouched gel.
+    /// The image without contact.
     pub untouched: Arc<RgbImage>,
-    /// Initial and present places of the 11 × 9 markers, row by row, (x, y) px: the shape (2, 99, 2).
+    /// Initial and current positions of the 11 × 9 markers, row by row, (x, y) px: the shape (2, 99, 2).
     pub markers: Markers,
 }
 
-/// The last control steps of both fingers.
+/// Tactile data of both fingers in the last control steps.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TactileHistory {
-    /// Left and right finger, oldest first; 1 to 8 frames.
+    /// Left and right finger; 1 to 8 frames, oldest first.
     pub frames: Vec<Arc<[TactileFrame; 2]>>,
 }
 
@@ -91,19 +94,19 @@ pub struct PadForce {
 }
 
 impl Observation {
-    /// A camera's picture by name.
+    /// Image of a camera by name, `None` if it was not requested.
     pub fn camera(&self, name: &str) -> Option<&RgbImage> {
         self.cameras.iter().find(|camera| camera.name == name).map(|camera| &camera.image)
     }
 }
 
 impl TactileFrame {
-    /// What a sensor gives. The cell is made here, while the picture is still in the processor's cache.
+    /// A frame from the output of a sensor. The cell is computed here, while the image is in the processor's cache.
     pub fn new(image: RgbImage, untouched: Arc<RgbImage>, markers: Markers) -> Self {
         Self { cell: mosaic_cell(&image), image, untouched, markers }
     }
 
-    /// How far each channel of each pixel is from the untouched picture, 0 to 255.
+    /// Absolute difference from the image without contact, per pixel and channel.
     pub fn change(&self) -> RgbImage {
         let mut change = self.image.clone();
         for (value, rest) in change.iter_mut().zip(self.untouched.iter()) {
@@ -114,20 +117,20 @@ impl TactileFrame {
 }
 
 impl TactileHistory {
-    /// Left and right finger now.
+    /// Current frames of the left and right finger.
     pub fn now(&self) -> Option<&[TactileFrame; 2]> {
         self.frames.last().map(AsRef::as_ref)
     }
 
-    /// The 4 × 4 mosaic of both fingers' pictures, 224 × 224.
+    /// The 4 × 4 mosaic of both fingers' images, 224 × 224.
     pub fn mosaic(&self, layout: MosaicLayout) -> RgbImage {
         let [left, right] =
             [0, 1].map(|side| self.frames.iter().map(|frame| &frame[side].cell).collect::<Vec<_>>());
         mosaic([&left, &right], layout)
     }
 
-    /// The shape (1 + 8, 198, 2) of SoftVTBench's policies: initial places of the left and right markers, then the
-    /// present ones of the last 8 control steps, oldest first; a short history starts with its oldest frame.
+    /// Marker positions in the shape (1 + 8, 198, 2) of SoftVTBench's policies, px: initial positions of the left and right
+    /// markers, then the positions in the last 8 control steps, oldest first. A short history repeats its oldest frame.
     pub fn marker_motion(&self) -> Vec<[[f32; 2]; 2 * MARKER_COUNT]> {
         let row = |frame: &[TactileFrame; 2], when: usize| -> [[f32; 2]; 2 * MARKER_COUNT] {
             std::array::from_fn(|m| frame[m / MARKER_COUNT].markers.to_array()[when][m % MARKER_COUNT])

@@ -1,4 +1,4 @@
-"""What must hold of scripts/python/softvt_gym.py and the server behind it. Arguments: the binary, the folder of an expert's run."""
+"""Tests of scripts/python/softvt_gym.py and its server. Arguments: the binary, the folder of an expert's run."""
 
 import json
 import sys
@@ -11,23 +11,23 @@ from softvt_gym import SoftVTEnv
 
 BINARY, RUN = sys.argv[1:]
 SUITE = "suites/object_soft.lua"
-# Poses in metres and radians are what policies of this field answer; scaled ones would be another code.
-KNOWN = "we recommend using a symmetric and normalized space"
+# Policies of this field return poses in metres and radians, so the action space is not normalized.
+EXPECTED_WARNING = "we recommend using a symmetric and normalized space"
 
 
 def same(a, b):
-    """Whether two observations are the same to the bit."""
+    """True if two observations are bitwise equal."""
     assert a.keys() == b.keys()
     return all(np.array_equal(a[key], b[key]) for key in a)
 
 
-def gymnasiums_own_checker_finds_nothing(env):
+def gymnasiums_checker_reports_nothing(env):
     spec = gymnasium.make("softvt/Suite-v0", url=env.url, render_mode="rgb_array")
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         check_env(spec.unwrapped)
-    told = [str(one.message) for one in caught if KNOWN not in str(one.message)]
-    assert not told, told
+    reported = [str(one.message) for one in caught if EXPECTED_WARNING not in str(one.message)]
+    assert not reported, reported
 
 
 def the_same_seed_and_actions_give_the_same_observations(env):
@@ -43,13 +43,13 @@ def the_same_seed_and_actions_give_the_same_observations(env):
     assert not same(once[0], once[-1]), "actions change nothing"
 
 
-def a_state_is_restored_to_the_bit_by_a_copy_and_by_simulating_again(env):
+def a_state_is_restored_bitwise_by_a_copy_and_by_simulating_again(env):
     actions = np.load(f"{RUN}/actions/task_000/episode_00000.npy")
     env.reset(seed=0, options={"task": 0, "episode": 0})
     env.step(actions[:8])
     state = env.get_state()
     assert np.array_equal(state["actions"], actions[:8])
-    straight, _, _, _, told = env.step(actions[8:12])
+    straight, _, _, _, expected = env.step(actions[8:12])
     copied, _ = env.set_state(state)
     assert same(env.step(actions[8:12])[0], straight), "by a copy"
     other = SoftVTEnv(env.url)
@@ -57,7 +57,7 @@ def a_state_is_restored_to_the_bit_by_a_copy_and_by_simulating_again(env):
     assert same(again, copied), "by simulating again"
     seen, _, _, _, info = other.step(actions[8:12])
     other.close()
-    assert same(seen, straight) and info == told, "what follows"
+    assert same(seen, straight) and info == expected, "after the restored state"
 
 
 def an_experts_actions_reach_the_goal_with_the_record_of_its_run(env):
@@ -81,21 +81,21 @@ def an_experts_actions_reach_the_goal_with_the_record_of_its_run(env):
     print(f"    state {expected['state_hash']} after {len(actions)} steps, D_peak {expected['d_peak']:.2f} %")
 
 
-def nothing_hidden_is_told_without_the_right_to_it(env):
+def unprivileged_clients_receive_no_true_state(env):
     _, info = env.reset(seed=0)
-    told = set(info)
+    received = set(info)
     _, _, _, _, info = env.step(env.action_space.sample())
-    told |= set(info)
-    assert told == {"task", "episode", "step", "time_s", "success", "carried_out"}, told
+    received |= set(info)
+    assert received == {"task", "episode", "step", "time_s", "success", "carried_out"}, received
 
 
 def main():
     env = SoftVTEnv.launch(SUITE, "--privileged", softvt=BINARY)
     try:
         for check in (
-            gymnasiums_own_checker_finds_nothing,
+            gymnasiums_checker_reports_nothing,
             the_same_seed_and_actions_give_the_same_observations,
-            a_state_is_restored_to_the_bit_by_a_copy_and_by_simulating_again,
+            a_state_is_restored_bitwise_by_a_copy_and_by_simulating_again,
             an_experts_actions_reach_the_goal_with_the_record_of_its_run,
         ):
             print(check.__name__.replace("_", " "), flush=True)
@@ -104,8 +104,8 @@ def main():
         env.close()
     env = SoftVTEnv.launch(SUITE, "--profile", "libero", softvt=BINARY)
     try:
-        print("nothing hidden is told without the right to it", flush=True)
-        nothing_hidden_is_told_without_the_right_to_it(env)
+        print("unprivileged clients receive no true state", flush=True)
+        unprivileged_clients_receive_no_true_state(env)
     finally:
         env.close()
 

@@ -1,4 +1,4 @@
-"""A third-party vla-eval model server (PyPI: vla-eval) that holds still and checks what it is shown.
+"""A third-party vla-eval model server (PyPI: vla-eval) that holds still and checks its observations.
 
 usage: python vla_eval_hold.py PORT PROFILE (visuo_tactile)
 """
