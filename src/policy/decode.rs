@@ -106,7 +106,10 @@ pub fn command(row: &[f64], encoding: &ActionEncoding) -> Result<ToolCommand, Po
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{npy::NpyArray, policy::{msgpack::pack_array, profile::Profile}};
+    use crate::{
+        npy::NpyArray,
+        policy::{msgpack::pack_array, profile::Profile},
+    };
 
     fn read(value: Value) -> Result<ActionChunk, PolicyError> {
         chunk(&value, &Profile::named("visuo_tactile").unwrap().actions)

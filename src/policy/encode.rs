@@ -56,7 +56,8 @@ pub fn content(observation: &Observation, source: &InputSource) -> Option<Observ
         InputSource::Force => {
             let past = &observation.force_history;
             // A short history starts with copies of its oldest entry.
-            let rows = (0..HISTORY_LENGTH).map(|place| past.get((place + past.len()).saturating_sub(HISTORY_LENGTH)));
+            let rows = (0..HISTORY_LENGTH)
+                .map(|place| past.get((place + past.len()).saturating_sub(HISTORY_LENGTH)));
             let rows: Option<Vec<&[f64; 6]>> = rows.collect();
             NpyArray::from_f32(vec![HISTORY_LENGTH, 6], rows?.into_iter().flatten().map(|x| *x as f32))
         }

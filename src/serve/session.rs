@@ -14,7 +14,10 @@ use super::{
     request::Request,
     response,
 };
-use crate::{policy::{encode::image_array, msgpack::pack_array}, robot::Side};
+use crate::{
+    policy::{encode::image_array, msgpack::pack_array},
+    robot::Side,
+};
 
 /// Copies of earlier states per client.
 const MAX_SNAPSHOTS: usize = 4;

@@ -11,8 +11,8 @@ use crate::{
     },
     policy::{
         ChunkedPolicy, Policy, PolicyError, SensorStreams, TaskBrief, builtin,
-        profile::Profile,
         builtin::RecordedPolicy,
+        profile::Profile,
         remote::{PolicyConnections, PolicyServer, Protocol, RemotePolicy},
     },
     rollout::{Controller, cancel},
