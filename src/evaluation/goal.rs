@@ -9,10 +9,7 @@
 //! The goal is reached when this held for ⌈hold time / control step⌉ control steps in a row, at least one. A
 //! target that rested at the goal and left it before that counts as dropped ([`super::drop::DropReason::LeftGoal`]).
 
-use crate::{
-    geometry::{Pose, Vec3},
-    scene::Region,
-};
+use crate::geometry::{Aabb, Pose, Vec3};
 
 use super::criteria::SuccessCriteria;
 
@@ -27,7 +24,7 @@ pub enum GoalRegion {
     /// In the object: centre inside its walls, carried by anything in there (its floor, other objects).
     In {
         /// Space between the walls, up to the rim, m.
-        inside: Region,
+        inside: Aabb,
     },
 }
 
@@ -159,7 +156,7 @@ mod tests {
 
     #[test]
     fn in_is_the_space_between_the_walls_of_a_turned_basket() {
-        let inside = Region { min: Vec3::new(-0.1, -0.05, 0.0), max: Vec3::new(0.1, 0.05, 0.08) };
+        let inside = Aabb { min: Vec3::new(-0.1, -0.05, 0.0), max: Vec3::new(0.1, 0.05, 0.08) };
         let basket = GoalRegion::In { inside };
         let turned = Pose::rotation(Vec3::z() * std::f64::consts::FRAC_PI_2);
         assert!(basket.contains(&Pose::identity(), &at(0.09, 0.03), 0.0));
@@ -174,7 +171,7 @@ mod tests {
         assert!(plate.contains_v1(&criteria, &pose, &at(0.099, 0.05)));
         assert!(!plate.contains_v1(&criteria, &pose, &at(0.101, 0.05)));
         assert!(!plate.contains_v1(&criteria, &pose, &at(0.0, 0.11)));
-        let basket = GoalRegion::In { inside: Region { min: Vec3::zeros(), max: Vec3::zeros() } };
+        let basket = GoalRegion::In { inside: Aabb { min: Vec3::zeros(), max: Vec3::zeros() } };
         assert!(basket.contains_v1(&criteria, &pose, &at(0.199, 0.19)));
     }
 

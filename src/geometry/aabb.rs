@@ -4,11 +4,12 @@ use parry3d_f64::{
     bounding_volume,
     partitioning::{Bvh, BvhBuildStrategy},
 };
+use serde::{Deserialize, Serialize};
 
 use super::{Pose, Vec3, parry::to_parry};
 
 /// An axis-aligned box, in whatever frame its corners are given in. Closed: its faces belong to it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Aabb {
     /// Lowest corner, m.
     pub min: Vec3,

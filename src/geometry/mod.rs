@@ -5,10 +5,10 @@
 //! phase use parry, whose vector types stay inside.
 
 mod aabb;
-mod basis;
 pub mod convex;
 pub mod hex8;
 pub mod import;
+mod linear_algebra;
 pub mod mass;
 pub mod mesh;
 mod parry;
@@ -19,16 +19,7 @@ pub mod union_find;
 pub mod voxel;
 
 pub use aabb::{Aabb, GroupedAabb, overlapping_pairs};
-pub use basis::{basis_from_reference, orthonormal_basis};
-
-/// A point or vector, m unless stated otherwise.
-pub type Vec3 = nalgebra::Vector3<f64>;
-/// A 3×3 matrix.
-pub type Mat3 = nalgebra::Matrix3<f64>;
-/// A unit quaternion.
-pub type Quat = nalgebra::UnitQuaternion<f64>;
-/// A rigid transform (rotation and translation) from one frame to another.
-pub type Pose = nalgebra::Isometry3<f64>;
+pub use linear_algebra::{Mat3, Pose, Quat, Vec3, basis_from_reference, orthonormal_basis};
 
 #[cfg(test)]
 mod tests;

@@ -11,9 +11,8 @@ use crate::{
         goal::GoalRegion,
         judge::{Judge, JudgeConfig},
     },
-    geometry::Vec3,
+    geometry::{Aabb, Vec3},
     physics::BodyId,
-    scene::Region,
 };
 
 /// The judge of an episode in its settled state.
@@ -48,9 +47,7 @@ fn place_of(goal: &Goal, place: &ObjectInstance) -> GoalRegion {
             let wall = place.asset.hints.get("wall_m").copied().unwrap_or(0.0);
             let inset = Vec3::new(wall, wall, 0.0);
             let foot = place.foot_o();
-            GoalRegion::In {
-                inside: Region { min: bounds.min + inset - foot, max: bounds.max - inset - foot },
-            }
+            GoalRegion::In { inside: Aabb { min: bounds.min + inset - foot, max: bounds.max - inset - foot } }
         }
     }
 }

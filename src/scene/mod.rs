@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use crate::geometry::{Pose, Quat, Vec3};
+use crate::geometry::{Aabb, Pose, Quat, Vec3};
 
 pub use asset::{Asset, Body, Joint, JointMotion, Part, SoftMaterial, part_poses};
 pub use camera::{Camera, CameraMount, POLICY_IMAGE_EDGE, fovy_from_lens};
@@ -36,15 +36,6 @@ pub struct Object {
     pub placed_at: String,
 }
 
-/// An axis-aligned box, world frame.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Region {
-    /// Lowest corner, m.
-    pub min: Vec3,
-    /// Highest corner, m.
-    pub max: Vec3,
-}
-
 /// The state from which an episode starts, before settling.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
@@ -56,8 +47,8 @@ pub struct Scene {
     pub start_q: [f64; 7],
     /// Gravitational acceleration, m/s², world frame.
     pub gravity: Vec3,
-    /// Box outside of which an object counts as having left the workspace.
-    pub workspace: Region,
+    /// Box outside of which an object counts as having left the workspace, world frame.
+    pub workspace: Aabb,
     /// Light sources and exposure.
     pub lighting: Lighting,
     /// Cameras with unique names, by which policies request images.

@@ -80,9 +80,9 @@ mod tests {
 
     use super::*;
     use crate::{
-        geometry::{Quat, shape::Shape},
+        geometry::{Aabb, Quat, shape::Shape},
         physics::contact::Friction,
-        scene::{Asset, Lighting, Region},
+        scene::{Asset, Lighting},
     };
 
     fn object(name: &str, asset: &str, size: f64) -> Object {
@@ -110,7 +110,7 @@ mod tests {
             base_w: Pose::translation(-0.6, 0.0, 0.0),
             start_q: [0.0; 7],
             gravity: Vec3::zeros(),
-            workspace: Region { min: Vec3::zeros(), max: Vec3::zeros() },
+            workspace: Aabb { min: Vec3::zeros(), max: Vec3::zeros() },
             lighting: Lighting::default(),
             cameras: Vec::new(),
         }

@@ -32,14 +32,13 @@
 //!         record::Outcome,
 //!         safety::DeformationLimit,
 //!     },
-//!     geometry::{Pose, Vec3},
-//!     scene::Region,
+//!     geometry::{Aabb, Pose, Vec3},
 //! };
 //!
 //! let (dt_s, weight_n) = (1.0 / 60.0, 0.3);
 //! let mut judge = Judge::new(JudgeConfig {
 //!     criteria: SuccessCriteria::default(),
-//!     workspace: Region { min: Vec3::new(-1.0, -1.0, -0.1), max: Vec3::new(1.0, 1.0, 1.0) },
+//!     workspace: Aabb { min: Vec3::new(-1.0, -1.0, -0.1), max: Vec3::new(1.0, 1.0, 1.0) },
 //!     goal: GoalRegion::On { radius_m: 0.08 },
 //!     hold_s: 0.4,
 //!     dt_s,
@@ -78,7 +77,7 @@
 //! # Ok::<(), softvt::evaluation::deformation::DeformationError>(())
 //! ```
 
-use crate::scene::Region;
+use crate::geometry::Aabb;
 
 use super::{
     criteria::SuccessCriteria,
@@ -96,7 +95,7 @@ pub struct JudgeConfig {
     /// Thresholds.
     pub criteria: SuccessCriteria,
     /// Workspace, world frame. A target whose centre is outside has left it.
-    pub workspace: Region,
+    pub workspace: Aabb,
     /// Region in which the target must come to rest.
     pub goal: GoalRegion,
     /// Time for which it must rest there, s.
@@ -211,7 +210,7 @@ impl Judge {
                 > self.config.criteria.touch_force_n,
             is_supported: self.is_supported(&evidence.target),
             is_released,
-            is_in_workspace: contains(&self.config.workspace, &evidence.target),
+            is_in_workspace: self.config.workspace.contains(&evidence.target.centre_w),
         };
         self.drops.update(&self.config.criteria, self.config.dt_s, &sample);
         self.observe_goal(evidence, sample.is_touched || sample.is_touched_by_body);
@@ -357,10 +356,6 @@ impl Judge {
     fn is_supported(&self, body: &BodyEvidence) -> bool {
         body.support_impulse_ns > self.config.criteria.touch_force_n * self.config.dt_s
     }
-}
-
-fn contains(region: &Region, body: &BodyEvidence) -> bool {
-    (0..3).all(|i| (region.min[i]..=region.max[i]).contains(&body.centre_w[i]))
 }
 
 #[cfg(test)]

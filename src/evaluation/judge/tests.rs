@@ -4,7 +4,7 @@ use crate::{
         deformation::Deformation,
         evidence::{GoalEvidence, GripperEvidence, PadEvidence},
     },
-    geometry::{Pose, Quat, Vec3},
+    geometry::{Aabb, Pose, Quat, Vec3},
 };
 
 const DT: f64 = 1.0 / 60.0;
@@ -13,7 +13,7 @@ const WEIGHT_N: f64 = 0.3;
 fn config() -> JudgeConfig {
     JudgeConfig {
         criteria: SuccessCriteria::default(),
-        workspace: Region { min: Vec3::new(-1.0, -1.0, -0.05), max: Vec3::new(1.0, 1.0, 1.0) },
+        workspace: Aabb { min: Vec3::new(-1.0, -1.0, -0.05), max: Vec3::new(1.0, 1.0, 1.0) },
         goal: GoalRegion::On { radius_m: 0.08 },
         hold_s: 0.4,
         dt_s: DT,
@@ -149,7 +149,7 @@ fn a_plate_that_carries_less_than_half_or_a_hand_that_touches_prevents_rest() {
 
 #[test]
 fn in_a_basket_others_may_carry_it() {
-    let inside = Region { min: Vec3::new(-0.1, -0.1, 0.0), max: Vec3::new(0.1, 0.1, 0.08) };
+    let inside = Aabb { min: Vec3::new(-0.1, -0.1, 0.0), max: Vec3::new(0.1, 0.1, 0.08) };
     let mut replay = Replay::new(JudgeConfig { goal: GoalRegion::In { inside }, ..config() });
     replay.steps(27, |e| e.target = lying(0.0, 0.2));
     assert!(replay.judge.is_goal_reached());

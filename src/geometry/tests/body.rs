@@ -11,7 +11,7 @@ use crate::geometry::{
     voxel::{VoxelMeshError, VoxelSpec, voxel_mesh},
 };
 
-fn cut(shape: &Shape, resolution: usize) -> VoxelMesh {
+fn voxelized(shape: &Shape, resolution: usize) -> VoxelMesh {
     voxel_mesh(shape, &VoxelSpec { resolution }).expect("a voxel mesh")
 }
 
@@ -21,7 +21,7 @@ fn filled_volume(mesh: &VoxelMesh) -> f64 {
 
 #[test]
 fn a_cube_at_resolution_six_has_343_nodes_and_full_voxels() {
-    let mesh = cut(&Shape::cuboid(Vec3::repeat(0.056)), 6);
+    let mesh = voxelized(&Shape::cuboid(Vec3::repeat(0.056)), 6);
     assert_eq!((mesh.nodes.len(), mesh.elements.len(), mesh.grid), (343, 216, [6; 3]));
     assert!(mesh.occupancy.iter().all(|fill| fill.fraction() == 1.0));
     assert!((mesh.nodes[0] - Vec3::repeat(-0.028)).norm() < 1e-15);
@@ -37,7 +37,7 @@ fn a_cube_at_resolution_six_has_343_nodes_and_full_voxels() {
 
 #[test]
 fn a_lying_box_gets_whole_voxels_on_its_longest_edge_and_is_covered() {
-    let mesh = cut(&Shape::cuboid(Vec3::new(0.120, 0.044, 0.038)), 6);
+    let mesh = voxelized(&Shape::cuboid(Vec3::new(0.120, 0.044, 0.038)), 6);
     assert_eq!(mesh.grid, [6, 3, 2]);
     assert!((mesh.edge - 0.02).abs() < 1e-15);
     // A face that cuts the sub-cells moves by up to half of one.
@@ -51,12 +51,12 @@ fn a_lying_box_gets_whole_voxels_on_its_longest_edge_and_is_covered() {
 fn filled_volume_converges_to_the_volume() {
     let ball = Shape::Sphere { radius: 0.0285 };
     let exact = 4.0 / 3.0 * PI * 0.0285_f64.powi(3);
-    let error = |resolution| (filled_volume(&cut(&ball, resolution)) / exact - 1.0).abs();
+    let error = |resolution| (filled_volume(&voxelized(&ball, resolution)) / exact - 1.0).abs();
     assert!(error(6) < 5e-3 && error(18) < 5e-4, "{} {}", error(6), error(18));
 }
 
 #[test]
-fn empty_and_impossible_bodies_are_refused() {
+fn empty_and_invalid_shapes_have_no_voxel_mesh() {
     let ball = Shape::Sphere { radius: 0.01 };
     let nothing = ball.clone().subtract(Shape::Sphere { radius: 0.02 });
     let refused =
@@ -69,20 +69,20 @@ fn empty_and_impossible_bodies_are_refused() {
 #[test]
 fn material_points_return_to_their_rest_position() {
     for (name, shape) in exact_shapes().into_iter().chain(composite_shapes()) {
-        let mesh = cut(&shape, 6);
-        let skin = SurfaceMesh::from_shape(&shape, 2e-3);
-        for (vertex, at) in skin.mesh.vertices.iter().zip(skin.embed(&mesh).expect("near voxels")) {
+        let mesh = voxelized(&shape, 6);
+        let surface = SurfaceMesh::from_shape(&shape, 2e-3);
+        for (vertex, at) in surface.mesh.vertices.iter().zip(surface.embed(&mesh).expect("near voxels")) {
             assert!((mesh.rest_position(&at) - vertex).norm() < 1e-12, "{name}: {vertex:?} {at:?}");
         }
     }
 }
 
 #[test]
-fn skins_are_watertight_and_of_the_right_genus() {
+fn surface_meshes_are_watertight_with_the_right_genus() {
     for (name, shape) in exact_shapes().into_iter().chain(composite_shapes()) {
         for cell in [1e-3, 1.7e-3] {
-            let skin = SurfaceMesh::from_shape(&shape, cell);
-            let mesh = &skin.mesh;
+            let surface = SurfaceMesh::from_shape(&shape, cell);
+            let mesh = &surface.mesh;
             assert_eq!(mesh.validate_closed(), Ok(()), "{name} at {cell}");
             assert!(mesh.volume() > 0.0, "{name}");
             let surfaces_less_holes = match name {
@@ -92,7 +92,7 @@ fn skins_are_watertight_and_of_the_right_genus() {
             };
             assert_eq!(euler(mesh), surfaces_less_holes, "{name} at {cell}");
             assert_eq!(
-                (skin.normals.len(), skin.materials.len()),
+                (surface.normals.len(), surface.materials.len()),
                 (mesh.vertices.len(), mesh.triangles.len())
             );
             let off = mesh.vertices.iter().map(|v| shape.distance(v).abs()).fold(0.0, f64::max);
@@ -108,7 +108,7 @@ fn skins_are_watertight_and_of_the_right_genus() {
 }
 
 #[test]
-fn skins_keep_sharp_edges() {
+fn surface_meshes_keep_sharp_edges() {
     let size = Vec3::new(0.05, 0.04, 0.03);
     let mesh = SurfaceMesh::from_shape(&Shape::cuboid(size), 1e-3).mesh;
     assert!((mesh.volume() / size.product() - 1.0).abs() < 1e-5, "{}", mesh.volume());
@@ -116,9 +116,9 @@ fn skins_keep_sharp_edges() {
     assert!((mesh.area() / area - 1.0).abs() < 1e-4, "{}", mesh.area() / area);
 }
 
-/// Checks that a surface sampling has the right area, spacing and voxels, and sums to a closed surface.
+/// Checks area, spacing, embedding and closedness of a surface sampling.
 fn check_samples(name: &str, shape: &Shape, exact_area: f64, tolerance: f64) {
-    let mesh = cut(shape, 6);
+    let mesh = voxelized(shape, 6);
     let spec = SampleSpec::default();
     let samples = surface_samples(shape, &mesh, &spec);
     let area: f64 = samples.iter().map(|s| s.area).sum();
@@ -159,7 +159,7 @@ fn samples_sum_to_the_exact_area() {
 }
 
 #[test]
-fn samples_of_composites_sum_to_the_area_of_a_fine_skin() {
+fn samples_of_composites_sum_to_the_area_of_a_fine_mesh() {
     for (name, shape) in composite_shapes() {
         check_samples(name, &shape, SurfaceMesh::from_shape(&shape, 0.5e-3).mesh.area(), 5e-3);
     }
@@ -168,7 +168,7 @@ fn samples_of_composites_sum_to_the_area_of_a_fine_skin() {
 #[test]
 fn samples_of_a_box_are_symmetric() {
     let shape = Shape::cuboid(Vec3::repeat(0.056));
-    let samples = surface_samples(&shape, &cut(&shape, 6), &SampleSpec::default());
+    let samples = surface_samples(&shape, &voxelized(&shape, 6), &SampleSpec::default());
     let moment: Vec3 = samples.iter().map(|s| s.p_o * s.area).sum();
     assert!(moment.norm() < 1e-15);
     let side = samples.iter().filter(|s| s.n_o.x == 1.0).count();
@@ -193,7 +193,7 @@ fn mass_properties_match_closed_forms_and_integration() {
 }
 
 #[test]
-fn mass_properties_turn_with_the_shape() {
+fn mass_properties_transform_with_the_shape() {
     let turn = Quat::from_euler_angles(0.3, 0.5, -0.9);
     let pose = Pose::from_parts(Vec3::new(0.1, -0.2, 0.3).into(), turn);
     let brick = Shape::cuboid(Vec3::new(0.06, 0.04, 0.02));

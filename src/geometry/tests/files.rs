@@ -12,7 +12,7 @@ use crate::geometry::{
 
 const METRES: ImportOptions = ImportOptions { scale: 1.0, z_up: true };
 
-/// A unit cube from the origin, four-cornered faces facing outwards.
+/// A unit cube from the origin, with outward-oriented quads.
 const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n\
     f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
 
@@ -34,7 +34,7 @@ fn stl(mesh: &Mesh) -> Vec<u8> {
     bytes
 }
 
-/// The bytes of a binary glTF file of one node that is moved by (1, 0, 0).
+/// The bytes of a binary glTF file with one node, translated by (1, 0, 0).
 fn glb(mesh: &Mesh) -> Vec<u8> {
     let mut blob = Vec::new();
     mesh.vertices.iter().flat_map(|v| v.iter()).for_each(|x| blob.extend((*x as f32).to_le_bytes()));
@@ -83,7 +83,7 @@ fn every_format_reads_the_same_cube() {
 }
 
 #[test]
-fn scale_and_the_upward_axis_are_honoured() {
+fn scale_and_up_axis_are_applied() {
     let tall = CUBE.replace(" 1 ", " 3 ").replace("v 0 3 3 ", "v 0 3 1");
     let tall = tall.lines().filter(|l| l.starts_with('f')).collect::<Vec<_>>().join("\n");
     let corners = "v 0 0 0\nv 1 0 0\nv 1 3 0\nv 0 3 0\nv 0 0 1\nv 1 0 1\nv 1 3 1\nv 0 3 1\n";
@@ -94,7 +94,7 @@ fn scale_and_the_upward_axis_are_honoured() {
 }
 
 #[test]
-fn open_empty_flat_and_broken_files_are_refused_with_their_reason() {
+fn open_empty_flat_and_malformed_files_are_refused_with_a_reason() {
     let open = CUBE.rsplit_once("f 4").expect("a last face").0;
     let refusal =
         |text: &str| read_obj(text).and_then(|mesh| Ok(Shape::from_mesh(mesh)?)).expect_err("refused");
@@ -124,7 +124,7 @@ fn open_empty_flat_and_broken_files_are_refused_with_their_reason() {
 }
 
 #[test]
-fn a_mesh_that_is_inside_out_is_turned() {
+fn a_mesh_that_is_inside_out_is_inverted() {
     let mut cube = read_obj(CUBE).expect("a cube");
     cube.triangles.iter_mut().for_each(|t| t.swap(0, 1));
     assert!(cube.volume() < 0.0);
@@ -133,7 +133,7 @@ fn a_mesh_that_is_inside_out_is_turned() {
 }
 
 #[test]
-fn the_distance_to_an_imported_mesh_is_that_to_the_shape_it_was_made_of() {
+fn distances_to_an_imported_mesh_match_its_source_shape() {
     let shape = Shape::Torus { major: 0.025, minor: 0.01 };
     let mesh =
         import(&stl(&SurfaceMesh::from_shape(&shape, 1e-3).mesh), MeshFormat::Stl, &METRES).expect("a mesh");
@@ -142,14 +142,14 @@ fn the_distance_to_an_imported_mesh_is_that_to_the_shape_it_was_made_of() {
     for _ in 0..500 {
         let p = Vec3::from_fn(|_, _| rng.random_range(-0.04..0.04));
         let (a, b) = (shape.distance_and_normal(&p).0, imported.distance_and_normal(&p).0);
-        // The chords of a 1 mm mesh sag by 12 µm on a radius of 10 mm.
+        // The sagitta of 1 mm chords on a radius of 10 mm is 12 µm.
         assert!((a - b).abs() < 2e-5, "{a} {b} at {p:?}");
     }
     assert!(matches!(imported, Shape::Mesh(_)));
 }
 
 #[test]
-fn candidate_pairs_are_those_of_brute_force() {
+fn overlapping_pairs_match_brute_force() {
     let mut rng = rng();
     for count in [0, 1, 2, 3, 40] {
         let candidates: Vec<GroupedAabb> = (0..count)
@@ -159,11 +159,10 @@ fn candidate_pairs_are_those_of_brute_force() {
                 GroupedAabb { bounds: Aabb { min, max: min + size }, group: rng.random_range(0..5) }
             })
             .collect();
-        let overlap = |a: &Aabb, b: &Aabb| (0..3).all(|k| a.min[k] <= b.max[k] && b.min[k] <= a.max[k]);
         let mut expected = Vec::new();
         for (j, b) in candidates.iter().enumerate() {
             for (i, a) in candidates[..j].iter().enumerate() {
-                if a.group != b.group && overlap(&a.bounds, &b.bounds) {
+                if a.group != b.group && a.bounds.intersects(&b.bounds) {
                     expected.push((i, j));
                 }
             }

@@ -8,16 +8,16 @@ use crate::geometry::{
     surface_mesh::SurfaceMesh,
 };
 
-/// Largest error of `distance_and_normal` against parry's exact distance to a fine skin, as a share of the distance
-/// (beyond the 40 µm that the chords of the skin may be off), over points up to 5 mm from the surface.
-fn worst_distance_error(shape: &Shape) -> (f64, Vec3) {
-    let skin = SurfaceMesh::from_shape(shape, 0.8e-3);
-    let truth =
-        Shape::from_mesh(exact_surface(shape).unwrap_or_else(|| skin.mesh.clone())).expect("a closed skin");
+/// Largest relative error of `distance_and_normal` against parry's exact distance to a fine mesh (beyond the 40 µm that
+/// the chords of the mesh may be off), over points up to 5 mm from the surface, and where it occurs.
+fn largest_distance_error(shape: &Shape) -> (f64, Vec3) {
+    let surface = SurfaceMesh::from_shape(shape, 0.8e-3);
+    let truth = Shape::from_mesh(exact_surface(shape).unwrap_or_else(|| surface.mesh.clone()))
+        .expect("a closed mesh");
     let mut rng = rng();
     let mut worst = (0.0, Vec3::zeros());
     for _ in 0..1500 {
-        let start = skin.mesh.vertices[rng.random_range(0..skin.mesh.vertices.len())];
+        let start = surface.mesh.vertices[rng.random_range(0..surface.mesh.vertices.len())];
         let p = start + random_unit(&mut rng) * rng.random_range(0.0..5e-3);
         let (distance, normal) = shape.distance_and_normal(&p);
         assert!((normal.norm() - 1.0).abs() < 1e-9, "normal of {normal:?}");
@@ -30,7 +30,7 @@ fn worst_distance_error(shape: &Shape) -> (f64, Vec3) {
     worst
 }
 
-/// A revolved polygon with 1000 sectors, whose chords sag by less than 0.5 µm.
+/// A revolved polygon with 1000 sectors; the sagitta of the chords is less than 0.5 µm.
 fn revolved(corners: &[[f64; 2]]) -> Mesh {
     let sectors = 1000;
     let n = corners.len() as u32;
@@ -49,7 +49,7 @@ fn revolved(corners: &[[f64; 2]]) -> Mesh {
     mesh
 }
 
-/// The hull of a convex polygon (x, z), drawn out along y.
+/// The surface of a convex polygon (x, z), extruded along y.
 fn hull(corners: &[[f64; 2]], half_length: f64) -> Mesh {
     let n = corners.len() as u32;
     let end = |y: f64| corners.iter().map(move |p| Vec3::new(p[0], y, p[1]));
@@ -63,7 +63,7 @@ fn hull(corners: &[[f64; 2]], half_length: f64) -> Mesh {
     Mesh { vertices: end(-half_length).chain(end(half_length)).collect(), triangles, uvs: vec![] }
 }
 
-/// The surface of polyhedra and lathes, made without their distance; a skin may chip their edges.
+/// The surface of polyhedra and lathes, computed without distances; a surface mesh may bevel their edges.
 fn exact_surface(shape: &Shape) -> Option<Mesh> {
     match shape {
         Shape::Box { half } => {
@@ -81,9 +81,9 @@ fn exact_surface(shape: &Shape) -> Option<Mesh> {
 }
 
 #[test]
-fn distances_of_exact_kinds_are_exact() {
+fn distances_to_primitives_are_exact() {
     for (name, shape) in exact_shapes() {
-        let (error, at) = worst_distance_error(&shape);
+        let (error, at) = largest_distance_error(&shape);
         println!("{name}: {:.4} %", 100.0 * error);
         assert!(error < 1e-3, "{name}: {error} at {at:?}");
     }
@@ -94,7 +94,7 @@ fn distances_of_combinations_and_warps_are_within_five_percent() {
     let mut failed = Vec::new();
     let nested = ("crate", crate_with_low_sides());
     for (name, shape) in composite_shapes().into_iter().chain([nested]) {
-        let (error, at) = worst_distance_error(&shape);
+        let (error, at) = largest_distance_error(&shape);
         println!("{name}: {:.2} % at {:?}", 100.0 * error, at.as_slice());
         if error > 0.05 {
             failed.push(name);
@@ -116,7 +116,7 @@ fn normals_are_gradients_of_the_distance() {
                 let e = Vec3::ith(axis, step);
                 (shape.distance_and_normal(&(p + e)).0 - shape.distance_and_normal(&(p - e)).0) / (2.0 * step)
             });
-            // At an edge of the shape there is no gradient to compare with.
+            // At an edge of the shape the gradient is undefined.
             let near_edge = [0, 1, 2].iter().any(|&axis| {
                 let e = Vec3::ith(axis, 1e-4);
                 let turned = |q: Vec3| shape.distance_and_normal(&q).1.dot(&normal) < 0.95;
@@ -135,7 +135,7 @@ fn bounds_of_turned_and_composite_shapes_are_tight() {
     for (name, shape) in exact_shapes().into_iter().chain(composite_shapes()) {
         let bounds = shape.bounds();
         let mesh = exact_surface(&shape).unwrap_or_else(|| SurfaceMesh::from_shape(&shape, 0.7e-3).mesh);
-        let found = Aabb::from_points(&mesh.vertices).expect("a skin");
+        let found = Aabb::from_points(&mesh.vertices).expect("a mesh");
         let off = (bounds.min - found.min).abs().max().max((bounds.max - found.max).abs().max());
         assert!(off < 5e-5, "{name}: {off}");
         let outside = mesh.vertices.iter().map(|v| (v - v.sup(&bounds.min).inf(&bounds.max)).norm());
@@ -157,7 +157,7 @@ fn bounds_of_a_bent_bar_match_the_arc() {
 }
 
 #[test]
-fn moving_a_sharp_edge_by_a_tenth_millimetre_never_jumps() {
+fn coverage_is_continuous_as_a_sharp_edge_moves() {
     // Samples of a soft face at z = 0.3 mm under the top of a pad that slides along x.
     let pad = Shape::cuboid(Vec3::new(0.022, 0.022, 0.022));
     let spacing = 0.75e-3;
@@ -180,7 +180,7 @@ fn moving_a_sharp_edge_by_a_tenth_millimetre_never_jumps() {
 }
 
 #[test]
-fn a_deep_sample_near_the_edge_keeps_the_face_that_it_faces() {
+fn a_deep_sample_near_an_edge_contacts_the_face_that_it_faces() {
     let pad = Shape::cuboid(Vec3::new(0.022, 0.022, 0.022));
     let p = Vec3::new(0.011 - 0.5e-3, 0.0, 0.011 - 2e-3);
     let contact = pad.contact(&p, &-Vec3::z(), 0.75e-3);
@@ -192,7 +192,7 @@ fn a_deep_sample_near_the_edge_keeps_the_face_that_it_faces() {
 }
 
 #[test]
-fn flush_parts_cover_a_sample_on_their_seam_together() {
+fn flush_parts_fully_cover_a_sample_on_their_seam() {
     let brick = Shape::cuboid(Vec3::new(0.02, 0.02, 0.02));
     let floor = brick
         .clone()
@@ -203,7 +203,7 @@ fn flush_parts_cover_a_sample_on_their_seam_together() {
 }
 
 #[test]
-fn material_follows_parts_and_regions() {
+fn materials_follow_parts_and_regions() {
     let cream = Shape::Sphere { radius: 0.01 }.painted(1, None).translated(Vec3::new(0.0, 0.0, 0.02));
     let bun = Shape::Sphere { radius: 0.02 }
         .painted(2, Some(Shape::cuboid(Vec3::new(0.1, 0.1, 0.02)).translated(Vec3::new(0.0, 0.0, -0.02))));
@@ -214,7 +214,7 @@ fn material_follows_parts_and_regions() {
 }
 
 #[test]
-fn rays_hit_where_the_line_meets_the_surface() {
+fn rays_hit_the_surface() {
     let ball = Shape::Sphere { radius: 0.03 }.translated(Vec3::new(0.1, 0.0, 0.0));
     let hit = ball.ray(&Vec3::zeros(), &Vec3::x(), 1.0).expect("a hit");
     assert!((hit - 0.07).abs() < 1e-6, "{hit}");
@@ -226,7 +226,7 @@ fn rays_hit_where_the_line_meets_the_surface() {
 }
 
 #[test]
-fn impossible_shapes_name_the_number_and_the_mend() {
+fn errors_name_the_invalid_number_and_a_hint() {
     let message = |shape: &Shape| shape.validate().expect_err("refused").to_string();
     assert_eq!(
         message(&Shape::Sphere { radius: -0.1 }),
@@ -251,7 +251,7 @@ fn impossible_shapes_name_the_number_and_the_mend() {
 }
 
 #[test]
-fn a_profile_may_be_given_in_either_direction() {
+fn polygons_may_be_given_in_either_direction() {
     let corners = vec![[0.0, 0.0], [0.05, 0.0], [0.05, 0.02], [0.0, 0.02]];
     let reversed = corners.iter().rev().copied().collect();
     let p = Vec3::new(0.04, 0.0, 0.019);

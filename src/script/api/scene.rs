@@ -16,10 +16,10 @@ use crate::script::{
     vm::{fail, here, locked},
 };
 use crate::{
-    geometry::{Pose, Quat, Vec3},
+    geometry::{Aabb, Pose, Quat, Vec3},
     physics::contact::Friction,
     robot::panda::{self, ARM_DOFS},
-    scene::{Asset, Body, Camera, Lighting, Object, Region, Scene, SoftMaterial},
+    scene::{Asset, Body, Camera, Lighting, Object, Scene, SoftMaterial},
     text::format_number,
 };
 
@@ -57,7 +57,7 @@ pub(crate) fn empty_scene() -> Scene {
         base_w: Pose::translation(-0.66, 0.0, 0.012),
         start_q: START_Q,
         gravity: Vec3::new(0.0, 0.0, -9.81),
-        workspace: Region { min: Vec3::new(-0.5, -0.6, -0.05), max: Vec3::new(0.5, 0.6, 1.0) },
+        workspace: Aabb { min: Vec3::new(-0.5, -0.6, -0.05), max: Vec3::new(0.5, 0.6, 1.0) },
         lighting: Lighting::default(),
         cameras: vec![Camera::third_person_table(), Camera::wrist()],
     }

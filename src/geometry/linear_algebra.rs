@@ -1,6 +1,15 @@
-//! Unit vectors that complete a given one to an orthonormal basis.
+//! Types of vectors, matrices and transforms, and orthonormal bases.
 
 use nalgebra::{RealField, Vector3};
+
+/// A point or vector, m unless stated otherwise.
+pub type Vec3 = nalgebra::Vector3<f64>;
+/// A 3×3 matrix.
+pub type Mat3 = nalgebra::Matrix3<f64>;
+/// A unit quaternion.
+pub type Quat = nalgebra::UnitQuaternion<f64>;
+/// A rigid transform (rotation and translation) from one frame to another.
+pub type Pose = nalgebra::Isometry3<f64>;
 
 /// Unit vectors `[u, v]` such that `u`, `v`, `n` is a right-handed orthonormal basis.
 ///
