@@ -1,59 +1,64 @@
-//! A collider as other rigid colliders meet it: convex primitives where its shape is made of them, samples of its skin and its
-//! distance field otherwise; or a compliant skin, which is felt where it is sampled.
+//! Collision geometry of a collider: how it meets other colliders.
+//!
+//! A hard shape is either composed of convex primitives, whose manifolds are exact, or general: then its surface features are
+//! tested in the other's distance field. A compliant skin (the gel of a tactile sensor) meets hard shapes at its samples.
 
 use std::sync::OnceLock;
 
 use super::manifold::{
-    ManifoldPoint, Primitive, SkinSamples, field::Skin, gel::gel_vs_shape, manifold, primitives, skin_samples,
+    ManifoldPoint, Primitive, SurfaceFeatures, field::SurfaceInField, manifold, primitives, surface_features,
 };
 use crate::geometry::{Aabb, Pose, Vec3, shape::Shape};
 
-/// What rigid solids need to find their contact points.
+/// Geometry of a collider for contact with other colliders, in the collider's frame.
 #[derive(Debug)]
 pub enum CollisionGeometry {
     /// A hard shape.
-    HardSolid(Box<HardSolid>),
-    /// A compliant skin: it meets hard shapes at its samples, and other skins not at all.
+    Hard(Box<HardShape>),
+    /// A compliant skin: it meets hard shapes at its samples, and no other skin.
     Gel(Vec<GelSample>),
 }
 
-/// A hard shape with what is derived from it.
+/// A hard shape and the data derived from it.
 #[derive(Debug)]
-pub struct HardSolid {
+pub struct HardShape {
     shape: Shape,
     primitives: Option<Vec<(Primitive, Pose)>>,
-    /// Chosen when first needed: it takes some milliseconds, and most colliders never meet a general shape.
-    samples: OnceLock<SkinSamples>,
-    /// The same: that of a displaced shape takes a search.
+    /// Computed on first use: it takes milliseconds, and most colliders never meet a general shape.
+    features: OnceLock<SurfaceFeatures>,
+    /// Computed on first use, since the bounds of a displaced shape take a search.
     bounds: OnceLock<Aabb>,
 }
 
 /// A material point of a compliant skin, in the collider's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GelSample {
-    /// Where it is, m.
+    /// Position, m.
     pub p: Vec3,
     /// Outward unit normal.
     pub normal: Vec3,
-    /// Area that it stands for, m².
+    /// Area that it represents, m².
     pub area: f64,
 }
 
-/// Says which primitives (or whose samples) a contact point belongs to, within a pair of solids.
+/// The pair of primitives that a contact point belongs to, or, for general shapes, the body whose surface feature it is.
 pub type PairId = u32;
 
+/// A skin sample with a larger cosine between its normal and the shape's has the shape behind it.
+const MAX_FACING_COSINE: f64 = 0.3;
+
 impl CollisionGeometry {
-    /// The solid of a shape.
+    /// The geometry of a hard shape.
     pub fn new(shape: &Shape) -> Self {
-        Self::HardSolid(Box::new(HardSolid {
+        Self::Hard(Box::new(HardShape {
             shape: shape.clone(),
             primitives: primitives(shape),
-            samples: OnceLock::new(),
+            features: OnceLock::new(),
             bounds: OnceLock::new(),
         }))
     }
 
-    /// Appends the contact points with `other` whose gap is below `margin` (m); normals point from this to the other.
+    /// Appends the contact points with `other` whose gap is below `margin` (m). Normals point from this to the other.
     pub fn meet(
         &self,
         pose: &Pose,
@@ -62,55 +67,49 @@ impl CollisionGeometry {
         margin: f64,
         out: &mut Vec<(PairId, ManifoldPoint)>,
     ) {
-        let mut found = Vec::new();
         match (self, other) {
-            (Self::HardSolid(mine), Self::HardSolid(theirs)) => {
-                mine.meet(pose, theirs, other_pose, margin, out)
+            (Self::Hard(own), Self::Hard(other)) => own.meet(pose, other, other_pose, margin, out),
+            (Self::Gel(gel), Self::Hard(hard)) => {
+                out.extend(hard.meet_gel(other_pose, gel, pose, margin).map(|point| (0, point)));
             }
-            (Self::Gel(gel), Self::HardSolid(hard)) => {
-                gel_vs_shape(gel, pose, hard.field(), other_pose, margin, &mut found);
-                out.extend(found.drain(..).map(|point| (0, point)));
-            }
-            (Self::HardSolid(hard), Self::Gel(gel)) => {
-                gel_vs_shape(gel, other_pose, hard.field(), pose, margin, &mut found);
-                out.extend(found.drain(..).map(|point| (0, ManifoldPoint { n_w: -point.n_w, ..point })));
+            (Self::Hard(hard), Self::Gel(gel)) => {
+                let points = hard.meet_gel(pose, gel, other_pose, margin);
+                out.extend(points.map(|point| (0, ManifoldPoint { n_w: -point.n_w, ..point })));
             }
             (Self::Gel(_), Self::Gel(_)) => {}
         }
     }
-}
 
-impl CollisionGeometry {
-    /// How far the deepest point of two hard solids is under the other's surface, m; 0 if they do not overlap. Compliant
-    /// skins are not looked at.
+    /// Depth of the deepest point of two hard shapes under the other's surface, m; 0 if they do not overlap. Compliant skins
+    /// are ignored.
     pub fn depth(&self, pose: &Pose, other: &Self, other_pose: &Pose) -> f64 {
-        let (Self::HardSolid(mine), Self::HardSolid(theirs)) = (self, other) else { return 0.0 };
+        let (Self::Hard(own), Self::Hard(other)) = (self, other) else { return 0.0 };
         let mut found = Vec::new();
-        mine.meet(pose, theirs, other_pose, 0.0, &mut found);
-        found.iter().map(|(_, point)| -point.phi).fold(mine.seed_depth(pose, theirs, other_pose), f64::max)
+        own.meet(pose, other, other_pose, 0.0, &mut found);
+        found.iter().map(|(_, point)| -point.phi).fold(own.seed_depth(pose, other, other_pose), f64::max)
     }
 }
 
-impl HardSolid {
-    /// Depth of the deepest place of either skin in the other's field, m. Pieces need none: their manifold is exact.
+impl HardShape {
+    /// Depth of the deepest surface seed of either shape in the other's field, m; 0 for primitives, whose manifold is exact.
     fn seed_depth(&self, pose: &Pose, other: &Self, other_pose: &Pose) -> f64 {
         if self.primitives.is_some() && other.primitives.is_some() {
             return 0.0;
         }
-        let deepest = |skin: &Self, from: &Pose, into: &Self, frame: &Pose| {
+        let deepest = |surface: &Self, from: &Pose, into: &Self, frame: &Pose| {
             let to = frame.inv_mul(from);
             let depth = |p: &Vec3| -into.shape.distance(&(to * nalgebra::Point3::from(*p)).coords);
-            skin.samples().seeds.iter().map(depth).fold(0.0, f64::max)
+            surface.features().seeds.iter().map(depth).fold(0.0, f64::max)
         };
         deepest(self, pose, other, other_pose).max(deepest(other, other_pose, self, pose))
     }
 
-    fn field(&self) -> (&Shape, &Aabb) {
-        (&self.shape, self.bounds.get_or_init(|| self.shape.bounds()))
+    fn bounds(&self) -> &Aabb {
+        self.bounds.get_or_init(|| self.shape.bounds())
     }
 
-    fn samples(&self) -> &SkinSamples {
-        self.samples.get_or_init(|| skin_samples(&self.shape))
+    fn features(&self) -> &SurfaceFeatures {
+        self.features.get_or_init(|| surface_features(&self.shape))
     }
 
     fn meet(
@@ -122,36 +121,77 @@ impl HardSolid {
         out: &mut Vec<(PairId, ManifoldPoint)>,
     ) {
         let mut found = Vec::new();
-        if let (Some(mine), Some(theirs)) = (&self.primitives, &other.primitives) {
-            for (i, (a, frame_a)) in mine.iter().enumerate() {
-                for (j, (b, frame_b)) in theirs.iter().enumerate() {
+        if let (Some(own), Some(others)) = (&self.primitives, &other.primitives) {
+            for (i, (a, frame_a)) in own.iter().enumerate() {
+                for (j, (b, frame_b)) in others.iter().enumerate() {
                     manifold(a, &(pose * frame_a), b, &(other_pose * frame_b), margin, &mut found);
-                    let part = (i * theirs.len() + j) as PairId;
-                    out.extend(found.drain(..).map(|point| (part, point)));
+                    let pair = (i * others.len() + j) as PairId;
+                    out.extend(found.drain(..).map(|point| (pair, point)));
                 }
             }
             return;
         }
-        let mine = Skin::new((self.samples(), &self.shape), pose, other.field(), other_pose);
-        let theirs = Skin::new((other.samples(), &other.shape), other_pose, self.field(), pose);
-        // What is smooth on one body carries only where neither has points that do.
-        mine.fixed(margin, &mut found);
+        let own = self.in_field_of(pose, other, other_pose);
+        let theirs = other.in_field_of(other_pose, self, pose);
+        // Smooth parts carry only where neither surface has features that do, so features of both come first. Normals are
+        // flipped in between, so that the points found so far agree with those being added.
+        own.fixed(margin, &mut found);
         let first = found.len();
-        flip(&mut found);
+        flip_normals(&mut found);
         theirs.fixed(margin, &mut found);
         let second = found.len();
-        flip(&mut found);
-        mine.lowest(margin, &mut found);
+        flip_normals(&mut found);
+        own.lowest(margin, &mut found);
         let third = found.len();
-        flip(&mut found);
+        flip_normals(&mut found);
         theirs.lowest(margin, &mut found);
-        flip(&mut found);
+        flip_normals(&mut found);
         let is_theirs = |i: usize| (first..second).contains(&i) || i >= third;
         out.extend(found.drain(..).enumerate().map(|(i, point)| (PairId::from(is_theirs(i)), point)));
     }
+
+    fn in_field_of<'a>(&'a self, pose: &Pose, other: &'a Self, other_pose: &'a Pose) -> SurfaceInField<'a> {
+        SurfaceInField::new(self.features(), &self.shape, pose, &other.shape, other.bounds(), other_pose)
+    }
+
+    /// Contact points of a compliant skin at `gel_pose` with this shape whose gap is below `margin` (m).
+    ///
+    /// A bed of springs, one at each sample, compressed by the depth of the sample in the shape (a Winkler foundation: Johnson,
+    /// Contact Mechanics, 1985, 4.3). A sample at a sharp edge of the shape counts with its covered share. Normals point from
+    /// the skin to the shape.
+    fn meet_gel(
+        &self,
+        pose: &Pose,
+        gel: &[GelSample],
+        gel_pose: &Pose,
+        margin: f64,
+    ) -> impl Iterator<Item = ManifoldPoint> {
+        let gel_in_shape = pose.inv_mul(gel_pose);
+        let bounds = self.bounds();
+        gel.iter().zip(0..).filter_map(move |(sample, feature)| {
+            let p = (gel_in_shape * nalgebra::Point3::from(sample.p)).coords;
+            // A sample beyond an edge may still cover it with half of its area.
+            let reach = margin + 0.5 * sample.area.sqrt();
+            if !bounds.loosened(reach).contains(&p) {
+                return None;
+            }
+            let facing = gel_in_shape.rotation * sample.normal;
+            let contact = self.shape.contact(&p, &facing, sample.area.sqrt());
+            let is_behind = facing.dot(&contact.normal) > MAX_FACING_COSINE;
+            if contact.phi >= margin || contact.coverage <= 0.0 || is_behind {
+                return None;
+            }
+            Some(ManifoldPoint {
+                p_w: (pose * nalgebra::Point3::from(p - contact.normal * (0.5 * contact.phi))).coords,
+                n_w: -(pose.rotation * contact.normal),
+                phi: contact.phi,
+                area: sample.area * contact.coverage,
+                feature,
+            })
+        })
+    }
 }
 
-/// Turns the normals around.
-fn flip(points: &mut [ManifoldPoint]) {
+fn flip_normals(points: &mut [ManifoldPoint]) {
     points.iter_mut().for_each(|point| point.n_w = -point.n_w);
 }

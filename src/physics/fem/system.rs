@@ -61,7 +61,8 @@ struct Blocks {
     slot: Vec<Vec<u32>>,
     diagonal: Vec<[f64; 9]>,
     off: Vec<[f64; 9]>,
-    /// ContactRecord of each of the 36 corner pairs of each element; the top bit says "transposed", diagonal pairs hold the node.
+    /// Block of each of the 36 corner pairs of each element: an index into `off`, with [`TRANSPOSED`] set if that stores the
+    /// transpose, or the node for a diagonal pair.
     pairs: Vec<[u32; 36]>,
 }
 

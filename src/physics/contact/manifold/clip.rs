@@ -1,21 +1,21 @@
-//! Penetration of convex polygons and lines in the plane, with names that survive small changes.
+//! Clipping of convex polygons and lines in the plane, with feature identifiers that survive small changes.
 
 /// A corner of a convex polygon, counter-clockwise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Corner {
-    /// Place in the plane, m.
+    /// Position in the plane, m.
     pub p: [f64; 2],
-    /// Name of the point.
-    pub name: u32,
-    /// Name of the edge from here to the next corner.
+    /// Identifier of the corner.
+    pub feature: u32,
+    /// Identifier of the edge to the next corner.
     pub edge: u32,
 }
 
-/// A corner this little outside of the other polygon counts as inside, m: boxes stacked flush keep the same corners
-/// whatever the rounding of their poses.
+/// Distance outside of the other polygon up to which a corner counts as inside, m: flush stacked boxes keep the same corners
+/// despite rounding of their poses.
 const SNAP_M: f64 = 1e-6;
 
-/// The name of the point where an edge of the first body crosses one of the second; unlike any corner's name.
+/// Identifier of the crossing of an edge of the first body with one of the second; distinct from those of corners.
 pub(super) fn crossing(edge_a: u32, edge_b: u32) -> u32 {
     const NON_MATERIAL: u32 = super::NON_MATERIAL;
     (edge_a | edge_b) & NON_MATERIAL | 2 << 28 | (edge_a & 0xfff) << 12 | edge_b & 0xfff
@@ -29,7 +29,7 @@ pub(super) fn turn(o: &[f64; 2], p: &[f64; 2], q: &[f64; 2]) -> f64 {
 /// The overlap of two convex counter-clockwise polygons (Sutherland & Hodgman, Comm. ACM 17, 1974); empty if they
 /// are apart.
 pub(super) fn overlap(a: &[Corner], b: &[Corner]) -> Vec<Corner> {
-    // Which polygon's edge leaves a corner (true: b's) and its index there: this decides what a new corner is.
+    // With each corner, whether its outgoing edge is one of b's, and the index of that edge: they identify new corners.
     let mut kept: Vec<(Corner, bool, usize)> = a.iter().enumerate().map(|(i, &c)| (c, false, i)).collect();
     for j in 0..b.len() {
         let (from, to) = (b[j].p, b[(j + 1) % b.len()].p);
@@ -48,11 +48,11 @@ pub(super) fn overlap(a: &[Corner], b: &[Corner]) -> Vec<Corner> {
                 continue;
             }
             let p = between(&here.p, &there.p, (h0 / (h0 - h1)).clamp(0.0, 1.0));
-            let name = if of_b { corner_of(b, index, j) } else { crossing(here.edge, b[j].edge) };
+            let feature = if of_b { corner_of(b, index, j) } else { crossing(here.edge, b[j].edge) };
             next.push(if in0 {
-                (Corner { p, name, edge: b[j].edge }, true, j)
+                (Corner { p, feature, edge: b[j].edge }, true, j)
             } else {
-                (Corner { p, name, edge: here.edge }, of_b, index)
+                (Corner { p, feature, edge: here.edge }, of_b, index)
             });
         }
         kept = next;
@@ -62,22 +62,27 @@ pub(super) fn overlap(a: &[Corner], b: &[Corner]) -> Vec<Corner> {
 
 /// The corner of `b` between its edges `i` and `j`.
 fn corner_of(b: &[Corner], i: usize, j: usize) -> u32 {
-    if (i + 1) % b.len() == j { b[j].name } else { b[i].name }
+    if (i + 1) % b.len() == j { b[j].feature } else { b[i].feature }
 }
 
 pub(super) fn between(p: &[f64; 2], q: &[f64; 2], t: f64) -> [f64; 2] {
     [p[0] + (q[0] - p[0]) * t, p[1] + (q[1] - p[1]) * t]
 }
 
-/// The part of the line `ends` inside of a convex counter-clockwise polygon: the two places along it (0..=1) and the
-/// index of the polygon's edge that cut there, if one did; `None` if it lies outside by more than `slack` (m).
-pub(super) fn inside(
-    ends: &[[f64; 2]; 2],
-    polygon: &[Corner],
-    slack: f64,
-) -> Option<[(f64, Option<usize>); 2]> {
+/// An end of a clipped line.
+#[derive(Clone, Copy)]
+pub(super) struct ClippedEnd {
+    /// Position along the line, 0..=1.
+    pub t: f64,
+    /// Index of the polygon's edge that clips here, if one does.
+    pub edge: Option<usize>,
+}
+
+/// The part of the line `ends` inside of a convex counter-clockwise polygon. `None` if the line is outside by more than
+/// `slack` (m).
+pub(super) fn clip_line(ends: &[[f64; 2]; 2], polygon: &[Corner], slack: f64) -> Option<[ClippedEnd; 2]> {
     let length = |p: &[f64; 2], q: &[f64; 2]| (q[0] - p[0]).hypot(q[1] - p[1]);
-    let (mut first, mut last) = ((0.0, None), (1.0, None));
+    let (mut first, mut last) = (ClippedEnd { t: 0.0, edge: None }, ClippedEnd { t: 1.0, edge: None });
     for j in 0..polygon.len() {
         let (from, to) = (polygon[j].p, polygon[(j + 1) % polygon.len()].p);
         let (h0, h1) = (turn(&from, &to, &ends[0]), turn(&from, &to, &ends[1]));
@@ -88,22 +93,22 @@ pub(super) fn inside(
         // An end within the slack counts as on the edge.
         if h0 < allowed {
             let cut = if h1 > 0.0 { h0 / (h0 - h1) } else { 1.0 };
-            first = if cut > first.0 { (cut, Some(j)) } else { first };
+            first = if cut > first.t { ClippedEnd { t: cut, edge: Some(j) } } else { first };
         } else if h1 < allowed {
             let cut = if h0 > 0.0 { h0 / (h0 - h1) } else { 0.0 };
-            last = if cut < last.0 { (cut, Some(j)) } else { last };
+            last = if cut < last.t { ClippedEnd { t: cut, edge: Some(j) } } else { last };
         }
     }
-    ((first.0 - last.0) * length(&ends[0], &ends[1]) <= slack).then_some([first, last])
+    ((first.t - last.t) * length(&ends[0], &ends[1]) <= slack).then_some([first, last])
 }
 
-/// Twice the signed area of a polygon, m²; positive if it turns counter-clockwise.
+/// Twice the signed area of a polygon, m²; positive if counter-clockwise.
 pub(super) fn area2(polygon: &[Corner]) -> f64 {
     (1..polygon.len().max(2) - 1).map(|i| turn(&polygon[0].p, &polygon[i].p, &polygon[i + 1].p)).sum()
 }
 
-/// Each corner's share of a polygon's outline: half of the two edges that meet there. A corner that splits in two
-/// splits its share.
+/// Share of each corner in the perimeter of a polygon: half of the two edges that meet there. If a corner splits in two, so
+/// does its share.
 pub(super) fn shares(polygon: &[Corner]) -> Vec<f64> {
     let count = polygon.len();
     let length = |i: usize| {

@@ -1,10 +1,11 @@
-//! Where a general shape can touch another: its sharp corners and edges, its rims, and starts on its smooth parts.
+//! Extraction of the surface features of a shape that can touch another: sharp corners and edges, rims, flat regions, and
+//! seeds on its smooth parts.
 
 use nalgebra::SymmetricEigen;
 
 use super::{
     POINT_AREA, Primitive,
-    flat_region::{FlatSample, spots},
+    flat_region::{FlatSample, flat_samples, project_to_surface},
 };
 use crate::geometry::{
     Mat3, Pose, Vec3, hex8, orthonormal_basis,
@@ -13,63 +14,64 @@ use crate::geometry::{
 
 /// Grid cells along the longest side of a shape in the search for its sharp edges.
 const EDGE_CELLS: f64 = 24.0;
-/// The same in the choice of starts on its smooth parts.
+/// Grid cells along the longest side in the choice of seeds on its smooth parts.
 const SEED_CELLS: f64 = 8.0;
-/// Two faces make an edge if their normals differ by more than about 30°: then the second eigenvalue of the sum of
-/// n nᵀ is above tan²(15°) of the first.
-const SHARP: f64 = 0.07;
-/// The convex turn (sine) at a profile's corner from which its ring is a rim: 20°.
+/// Two faces form an edge if their normals differ by more than about 30°: then the second eigenvalue of the sum of n nᵀ is
+/// above tan²(15°) times the first.
+const MIN_EIGENVALUE_RATIO: f64 = 0.07;
+/// Convex turn (sine) at the corner of a profile from which its circle is a rim: 20°.
 const RIM_TURN: f64 = 0.34;
-/// The same for a corner on which the solid stands, though it is part of a rounding.
+/// The same for a corner on which the solid can stand, though it is part of a rounding.
 const FOOT_TURN: f64 = 5e-3;
-/// An edge is truly sharp if the normals differ by more than `SHARP_TURN` (chord of the unit circle, 20°) this far aside of
-/// it, m: a rounding of less than 0.5 mm is an edge.
-const SHARP_ASIDE: f64 = 1e-4;
-/// See [`SHARP_ASIDE`].
+/// Distance from an edge at which its normals are compared, m: a rounding of less than 0.5 mm counts as an edge.
+const SHARP_DISTANCE: f64 = 1e-4;
+/// Difference of these normals (chord of the unit circle, 20°) beyond which the edge is sharp.
 const SHARP_TURN: f64 = 0.35;
-/// Area of a sample on a sharp edge, m²: several of them carry together what one point contact does.
+/// Area of a sample on a sharp edge, m²: several of them together carry as one point contact.
 pub(super) const SAMPLE_AREA: f64 = 0.25 * POINT_AREA;
 
-/// A convex circle about the z axis of `frame_o`, in its plane z = 0.
+/// A convex circle of the surface, about the z axis of `frame_o` in its plane z = 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ring {
+pub(in super::super) struct Rim {
     /// Frame of the circle in the object frame.
     pub frame_o: Pose,
     /// Radius, m.
     pub radius: f64,
-    /// Whether it is an edge, and not the lowest circle of a rounding.
-    pub sharp: bool,
+    /// True if it is an edge, false if it is the lowest circle of a rounding.
+    pub is_sharp: bool,
 }
 
-/// The places of a shape's skin that are watched for contact, object frame, m.
+/// Features of a surface that are tested for contact, object frame, m.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct SkinSamples {
-    /// On sharp convex corners and edges.
-    pub fixed: Vec<Vec3>,
+pub(in super::super) struct SurfaceFeatures {
+    /// Points on sharp convex corners and edges.
+    pub corners: Vec<Vec3>,
     /// Convex circles.
-    pub rings: Vec<Ring>,
-    /// On flat and nearly flat faces, and on edges that are finely rounded.
-    pub spots: Vec<FlatSample>,
-    /// Spread over the whole surface: where the search for the lowest point of a smooth part starts.
+    pub rims: Vec<Rim>,
+    /// Samples of flat and nearly flat regions, and of finely rounded edges.
+    pub flat_samples: Vec<FlatSample>,
+    /// Points spread over the whole surface, at which the search for the lowest point of a smooth part starts.
     pub seeds: Vec<Vec3>,
     /// Distance between neighbouring seeds, m.
     pub spacing: f64,
 }
 
-/// Chooses the samples of a shape. Boxes, cylinders and lathes are known exactly; of anything else the sharp edges and flat
-/// faces are found on a grid of 1/24 of its longest side.
-pub fn skin_samples(shape: &Shape) -> SkinSamples {
-    let mut samples = SkinSamples::default();
-    edges(shape, &Pose::identity(), &mut samples);
+/// Extracts the features of a shape. Those of boxes, cylinders and lathes are known exactly; the sharp edges and flat regions
+/// of other shapes are found on a grid of 1/24 of the longest side.
+pub(in super::super) fn surface_features(shape: &Shape) -> SurfaceFeatures {
+    let mut features = SurfaceFeatures::default();
+    add_features(shape, &Pose::identity(), &mut features);
     let size = shape.bounds().size().max();
-    samples.spacing = size / SEED_CELLS;
-    samples.seeds =
-        Grid::over(shape, samples.spacing).crossed().map(|cell| onto(shape, cell.mean())).collect();
-    samples
+    features.spacing = size / SEED_CELLS;
+    features.seeds = Grid::over(shape, features.spacing)
+        .crossed()
+        .map(|cell| project_to_surface(shape, cell.mean()))
+        .collect();
+    features
 }
 
-/// A shape as primitive primitives with their frames in the object frame, or `None` if it is not wholly made of them.
-pub fn primitives(shape: &Shape) -> Option<Vec<(Primitive, Pose)>> {
+/// The convex primitives that a shape is composed of, with their frames in the object frame. `None` if it has other parts.
+pub(in super::super) fn primitives(shape: &Shape) -> Option<Vec<(Primitive, Pose)>> {
     let one = |primitive| Some(vec![(primitive, Pose::identity())]);
     match shape {
         Shape::Box { half } => one(Primitive::Box { half: *half }),
@@ -92,42 +94,42 @@ pub fn primitives(shape: &Shape) -> Option<Vec<(Primitive, Pose)>> {
     }
 }
 
-/// Adds the sharp features of `shape`, which sits at `frame_o`.
-fn edges(shape: &Shape, frame_o: &Pose, samples: &mut SkinSamples) {
-    let ring = |z: f64, radius: f64, sharp: bool| Ring {
+/// Adds the features of `shape` at `frame_o`.
+fn add_features(shape: &Shape, frame_o: &Pose, features: &mut SurfaceFeatures) {
+    let rim = |z: f64, radius: f64, is_sharp: bool| Rim {
         frame_o: frame_o * nalgebra::Translation3::new(0.0, 0.0, z),
         radius,
-        sharp,
+        is_sharp,
     };
     match shape {
-        Shape::Box { half } => samples.fixed.extend((0..8).map(|corner| {
+        Shape::Box { half } => features.corners.extend((0..8).map(|corner| {
             let sign = hex8::corner_sign(corner);
             (frame_o * nalgebra::Point3::from(half.component_mul(&sign))).coords
         })),
         Shape::Cylinder { radius, half_height } => {
-            samples.rings.extend([ring(-half_height, *radius, true), ring(*half_height, *radius, true)]);
+            features.rims.extend([rim(-half_height, *radius, true), rim(*half_height, *radius, true)]);
         }
         Shape::Lathe(profile) => {
-            for ([r, z], sharp) in rims(profile) {
+            for ProfileCorner { r, z, is_sharp } in convex_corners(profile) {
                 if r > 1e-6 {
-                    samples.rings.push(ring(z, r, sharp));
-                } else if sharp {
-                    samples.fixed.push((frame_o * nalgebra::Point3::new(0.0, 0.0, z)).coords);
+                    features.rims.push(rim(z, r, is_sharp));
+                } else if is_sharp {
+                    features.corners.push((frame_o * nalgebra::Point3::new(0.0, 0.0, z)).coords);
                 }
             }
         }
-        Shape::Placed { shape, pose } => edges(shape, &(frame_o * pose), samples),
-        Shape::Paint { shape, .. } => edges(shape, frame_o, samples),
+        Shape::Placed { shape, pose } => add_features(shape, &(frame_o * pose), features),
+        Shape::Paint { shape, .. } => add_features(shape, frame_o, features),
         Shape::Torus { major, minor } => {
-            samples.rings.extend([ring(-minor, *major, false), ring(*minor, *major, false)]);
+            features.rims.extend([rim(-minor, *major, false), rim(*minor, *major, false)]);
         }
         Shape::Sphere { .. } | Shape::Capsule { .. } | Shape::Ellipsoid { .. } => {}
-        _ => general(shape, frame_o, samples),
+        _ => add_general_features(shape, frame_o, features),
     }
 }
 
-/// Adds what a grid finds on a shape of any kind.
-fn general(shape: &Shape, frame_o: &Pose, samples: &mut SkinSamples) {
+/// Adds the features of a general shape, found on a grid.
+fn add_general_features(shape: &Shape, frame_o: &Pose, features: &mut SurfaceFeatures) {
     let step = shape.bounds().size().max() / EDGE_CELLS;
     let cells: Vec<Cell> = Grid::over(shape, step).crossed().collect();
     let edges = cells.iter().filter_map(|cell| cell.sharp_point(shape, step));
@@ -135,25 +137,33 @@ fn general(shape: &Shape, frame_o: &Pose, samples: &mut SkinSamples) {
     let starts: Vec<Vec3> = cells.iter().map(Cell::mean).collect();
     let to_object = |p: &Vec3| (frame_o * nalgebra::Point3::from(*p)).coords;
     let blunt = blunt.into_iter().map(|p| FlatSample { p, area: SAMPLE_AREA });
-    let all = spots(shape, &starts, step, &sharp, SAMPLE_AREA).into_iter().chain(blunt);
-    samples.spots.extend(all.map(|spot| FlatSample { p: to_object(&spot.p), ..spot }));
-    samples.fixed.extend(sharp.iter().map(to_object));
+    let all = flat_samples(shape, &starts, step, &sharp, SAMPLE_AREA).into_iter().chain(blunt);
+    features.flat_samples.extend(all.map(|spot| FlatSample { p: to_object(&spot.p), ..spot }));
+    features.corners.extend(sharp.iter().map(to_object));
 }
 
-/// Whether the skin has an edge at `p`, and not a rounding.
+/// True if the surface has an edge at `p`, and not a rounding.
 fn is_sharp(shape: &Shape, p: &Vec3) -> bool {
     let normal = shape.distance_and_normal(p).1;
     let [u, v] = orthonormal_basis(&normal);
     let (s, d) = ((u + v).normalize(), (u - v).normalize());
-    // Inwards too: on an edge itself the normal is one face's, and what lies off the other leads back to the edge.
-    let ways = [u, -u, v, -v, s, -s, d, -d, -normal];
-    let normals = ways.map(|way| shape.distance_and_normal(&onto(shape, p + way * SHARP_ASIDE)).1);
-    (0..ways.len()).any(|i| normals[i + 1..].iter().any(|n| (n - normals[i]).norm() > SHARP_TURN))
+    // Inwards too: on the edge itself the normal is that of one face, and points off the other project back to the edge.
+    let directions = [u, -u, v, -v, s, -s, d, -d, -normal];
+    let normals = directions.map(|direction| {
+        shape.distance_and_normal(&project_to_surface(shape, p + direction * SHARP_DISTANCE)).1
+    });
+    (0..directions.len()).any(|i| normals[i + 1..].iter().any(|n| (n - normals[i]).norm() > SHARP_TURN))
 }
 
-/// The convex corners of a revolved profile, (r, z), and whether they are sharp; those on the axis only if they are tips,
-/// blunt ones only if the solid can stand on them.
-fn rims(profile: &Polygon) -> impl Iterator<Item = ([f64; 2], bool)> + '_ {
+/// A convex corner of a revolved profile.
+struct ProfileCorner {
+    r: f64,
+    z: f64,
+    is_sharp: bool,
+}
+
+/// The convex corners of a revolved profile: on the axis only tips, and blunt ones only if the solid can stand on them.
+fn convex_corners(profile: &Polygon) -> impl Iterator<Item = ProfileCorner> + '_ {
     let points = profile.points();
     let count = points.len();
     (0..count).filter_map(move |i| {
@@ -161,22 +171,13 @@ fn rims(profile: &Polygon) -> impl Iterator<Item = ([f64; 2], bool)> + '_ {
         let (ar, az) = (here[0] - before[0], here[1] - before[1]);
         let (br, bz) = (after[0] - here[0], after[1] - here[1]);
         let sine = (ar * bz - az * br) / (ar.hypot(az) * br.hypot(bz));
-        // A flat end's middle is a corner of the polygon with its axis, but no corner of the solid.
-        let tip =
+        // The centre of a flat end is a corner of the polygon, but not of the solid.
+        let is_tip =
             here[0] > 1e-6 || az.abs().max(bz.abs()) > RIM_TURN * ar.abs().max(br.abs()) && ar * br < 0.0;
-        let sharp = sine > RIM_TURN;
-        let foot = sine > FOOT_TURN && here[0] > 1e-6 && az * bz <= 1e-9 * ar.hypot(az) * br.hypot(bz);
-        (sharp && tip || foot).then_some((here, sharp))
+        let is_sharp = sine > RIM_TURN;
+        let is_foot = sine > FOOT_TURN && here[0] > 1e-6 && az * bz <= 1e-9 * ar.hypot(az) * br.hypot(bz);
+        (is_sharp && is_tip || is_foot).then_some(ProfileCorner { r: here[0], z: here[1], is_sharp })
     })
-}
-
-/// The point of the surface nearest to `p`, by a few steps along the normal.
-pub(super) fn onto(shape: &Shape, mut p: Vec3) -> Vec3 {
-    for _ in 0..3 {
-        let (phi, n) = shape.distance_and_normal(&p);
-        p -= n * phi;
-    }
-    p
 }
 
 /// Signed distances on a grid that covers a shape.
@@ -188,14 +189,20 @@ struct Grid<'a> {
     phi: Vec<f64>,
 }
 
-/// Where the surface crosses the edges of one grid cell, and its normals there.
-struct Cell(Vec<(Vec3, Vec3)>);
+/// Crossings of the surface with the edges of one grid cell.
+struct Cell(Vec<Crossing>);
+
+/// A point of the surface and its normal.
+struct Crossing {
+    p: Vec3,
+    normal: Vec3,
+}
 
 impl<'a> Grid<'a> {
     fn over(shape: &'a Shape, step: f64) -> Self {
         let bounds = shape.bounds();
         let cells = bounds.size().map(|size| (size / step).ceil() as usize + 2);
-        // A shift by an odd share of the step keeps flat faces off the grid's planes.
+        // Shifting by an odd share of the step keeps flat faces off the planes of the grid.
         let spare = cells.map(|n| n as f64) * step - bounds.size();
         let origin = bounds.min - spare * 0.43;
         let count = [cells.x + 1, cells.y + 1, cells.z + 1];
@@ -210,7 +217,7 @@ impl<'a> Grid<'a> {
         self.origin + at * self.step
     }
 
-    /// The cells that the surface passes through, x fastest.
+    /// The cells that the surface crosses, x fastest.
     fn crossed(&self) -> impl Iterator<Item = Cell> + '_ {
         let [nx, ny, _] = self.count;
         let inner = move |i: usize| i % nx + 1 < nx && i / nx % ny + 1 < ny && i + nx * ny < self.phi.len();
@@ -226,7 +233,7 @@ impl<'a> Grid<'a> {
         })
     }
 
-    fn crossing(&self, i: usize, j: usize) -> Option<(Vec3, Vec3)> {
+    fn crossing(&self, i: usize, j: usize) -> Option<Crossing> {
         let (mut p, mut q, mut phi_p) = (self.node(i), self.node(j), self.phi[i]);
         if (phi_p < 0.0) == (self.phi[j] < 0.0) {
             return None;
@@ -236,29 +243,29 @@ impl<'a> Grid<'a> {
             let phi = self.shape.distance_and_normal(&middle).0;
             if (phi < 0.0) == (phi_p < 0.0) { (p, phi_p) = (middle, phi) } else { q = middle }
         }
-        Some((p, self.shape.distance_and_normal(&p).1))
+        Some(Crossing { p, normal: self.shape.distance_and_normal(&p).1 })
     }
 }
 
 impl Cell {
     fn mean(&self) -> Vec3 {
-        self.0.iter().map(|(p, _)| p).sum::<Vec3>() / self.0.len() as f64
+        self.0.iter().map(|crossing| crossing.p).sum::<Vec3>() / self.0.len() as f64
     }
 
-    /// The point where the planes of the crossings meet best, if they belong to different faces that meet in a convex
+    /// The least-squares intersection of the planes of the crossings, if they belong to different faces that meet in a convex
     /// edge (the vertex of dual contouring: Ju, Losasso, Schaefer & Warren, SIGGRAPH 2002).
     fn sharp_point(&self, shape: &Shape, step: f64) -> Option<Vec3> {
         let mean = self.mean();
         let (mut normal, mut right) = (Mat3::zeros(), Vec3::zeros());
         let mut opening = 0.0;
-        for (p, n) in &self.0 {
+        for Crossing { p, normal: n } in &self.0 {
             normal += n * n.transpose();
             right += n * n.dot(&(p - mean));
             opening += n.dot(&(p - mean));
         }
         let eigen = SymmetricEigen::new(normal);
         let largest = eigen.eigenvalues.max();
-        let is_kept = |value: f64| value > SHARP * largest;
+        let is_kept = |value: f64| value > MIN_EIGENVALUE_RATIO * largest;
         if opening <= 0.0 || eigen.eigenvalues.iter().filter(|&&value| is_kept(value)).count() < 2 {
             return None;
         }
@@ -268,6 +275,6 @@ impl Cell {
             point += direction * (direction.dot(&right) / value);
         }
         let inside = (point - mean).norm() < step * 1.5;
-        inside.then(|| onto(shape, point))
+        inside.then(|| project_to_surface(shape, point))
     }
 }

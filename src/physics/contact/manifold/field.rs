@@ -1,164 +1,294 @@
-//! Contact points of a general shape against the distance field of another.
+//! Contact points of the surface features of a general shape in the distance field of another.
 
 use std::f64::consts::TAU;
 
 use super::{
     ManifoldPoint, NON_MATERIAL, POINT_AREA,
     closest_points::lowest_points,
-    feature::RIM,
-    feature_extraction::{Ring, SAMPLE_AREA, SkinSamples},
+    feature::RIM_POINTS,
+    feature_extraction::{Rim, SAMPLE_AREA, SurfaceFeatures},
+    field_probe::{FieldProbe, golden_minimum},
 };
-use crate::geometry::{Aabb, Pose, Vec3, shape::Shape};
+use crate::geometry::{Aabb, Pose, shape::Shape};
 
-/// Tilt (sine) of a ring up to which all of it carries, and from which only its lowest point does.
-const RING_FLAT: [f64; 2] = [0.05, 0.1];
-/// Tilt (sine) from which a ring's lowest point counts in full; on a flat ring it has no place.
-const RING_TILTED: f64 = 1e-3;
-/// First of the names of ring points (64 a ring) and of spots.
-const RINGS: u32 = 1 << 20;
-const SPOTS: u32 = 1 << 23;
+/// Tilt (sine) of a rim up to which all of it carries, and from which only its lowest point does.
+const FLAT_RIM_TILT: [f64; 2] = [0.05, 0.1];
+/// Tilt (sine) from which a rim's lowest point counts in full; on a flat rim its position is undefined.
+const MIN_RIM_TILT: f64 = 1e-3;
+/// First identifier of rim points, 64 per rim.
+const RIM_FEATURES: u32 = 1 << 20;
+/// First identifier of flat samples.
+const FLAT_FEATURES: u32 = 1 << 23;
 
-/// A point of the first body's skin in the field of the second.
-pub(super) struct Probe<'a> {
-    shape_b: &'a Shape,
-    bounds_b: &'a Aabb,
-    /// The first body's frame in the second's.
-    a_in_b: Pose,
-    pose_b: &'a Pose,
-}
-
-impl Probe<'_> {
-    /// Whether `p_a` is surely farther than `reach` (m) from the second body.
-    pub(super) fn is_beyond(&self, p_a: &Vec3, reach: f64) -> bool {
-        let p_b = self.a_in_b * nalgebra::Point3::from(*p_a);
-        !self.bounds_b.loosened(reach).contains(&p_b.coords)
-    }
-
-    /// Gap at `p_a` (first body's frame).
-    pub(super) fn gap(&self, p_a: &Vec3) -> f64 {
-        self.shape_b.distance_and_normal(&(self.a_in_b * nalgebra::Point3::from(*p_a)).coords).0
-    }
-
-    /// Gap at `p_a` and its gradient, in the first body's frame.
-    pub(super) fn slope(&self, p_a: &Vec3) -> (f64, Vec3) {
-        let (phi, n_b) =
-            self.shape_b.distance_and_normal(&(self.a_in_b * nalgebra::Point3::from(*p_a)).coords);
-        (phi, self.a_in_b.rotation.inverse_transform_vector(&n_b))
-    }
-
-    pub(super) fn contact(&self, p_a: &Vec3, area: f64, feature: u32) -> ManifoldPoint {
-        let p_b = self.a_in_b * nalgebra::Point3::from(*p_a);
-        let (phi, n_b) = self.shape_b.distance_and_normal(&p_b.coords);
-        let n_w = -(self.pose_b.rotation * n_b);
-        // The sample lies on the first body, the other surface a gap further along the normal.
-        let p_w = (self.pose_b * p_b).coords + n_w * (0.5 * phi);
-        ManifoldPoint { p_w, n_w, phi, area, feature }
-    }
-}
-
-/// Body a's skin over the field of body b.
-pub struct Skin<'a> {
-    samples: &'a SkinSamples,
+/// Surface of body a in the distance field of body b.
+pub(in super::super) struct SurfaceInField<'a> {
+    features: &'a SurfaceFeatures,
     shape: &'a Shape,
-    probe: Probe<'a>,
+    probe: FieldProbe<'a>,
 }
 
-impl<'a> Skin<'a> {
-    /// The skin of `shape_a`, whose samples are given, and shape b with its bounds.
+impl<'a> SurfaceInField<'a> {
+    /// The surface of `shape` with its features in the field of shape b.
     ///
-    /// The normals of its points are from a to b. Two general bodies meet both ways (flip the normals of one): first
-    /// [`Skin::fixed`] of both, then [`Skin::lowest`].
-    pub fn new(
-        (samples, shape): (&'a SkinSamples, &'a Shape),
+    /// Normals point from a to b. Two general bodies meet both ways, with the normals of one flipped: first
+    /// [`SurfaceInField::fixed`] of both, then [`SurfaceInField::lowest`].
+    pub(in super::super) fn new(
+        features: &'a SurfaceFeatures,
+        shape: &'a Shape,
         pose_a: &Pose,
-        (shape_b, bounds_b): (&'a Shape, &'a Aabb),
+        shape_b: &'a Shape,
+        bounds_b: &'a Aabb,
         pose_b: &'a Pose,
     ) -> Self {
-        let probe = Probe { shape_b, bounds_b, a_in_b: pose_b.inv_mul(pose_a), pose_b };
-        Self { samples, shape, probe }
+        let probe = FieldProbe { shape_b, bounds_b, a_in_b: pose_b.inv_mul(pose_a), pose_b };
+        Self { features, shape, probe }
     }
 
-    /// Appends the points whose gap is below `margin` (m) of corners and edges, flat faces, and rims with their moving lowest
-    /// point.
-    pub fn fixed(&self, margin: f64, out: &mut Vec<ManifoldPoint>) {
-        let fixed = self.samples.fixed.iter().map(|p| (p, SAMPLE_AREA)).zip(0..);
-        let spots = self.samples.spots.iter().map(|spot| (&spot.p, spot.area)).zip(SPOTS..);
-        for ((p_a, area), name) in fixed.chain(spots) {
+    /// Appends points on corners, edges, flat faces and rims, with the moving lowest point of each rim, whose gap is below
+    /// `margin` (m).
+    pub(in super::super) fn fixed(&self, margin: f64, out: &mut Vec<ManifoldPoint>) {
+        let fixed = self.features.corners.iter().map(|p| (p, SAMPLE_AREA)).zip(0..);
+        let spots = self.features.flat_samples.iter().map(|spot| (&spot.p, spot.area)).zip(FLAT_FEATURES..);
+        for ((p_a, area), feature) in fixed.chain(spots) {
             if self.probe.is_beyond(p_a, margin) {
                 continue;
             }
-            let point = self.probe.contact(p_a, area, name);
+            let point = self.probe.contact(p_a, area, feature);
             if point.phi < margin {
                 out.push(point);
             }
         }
-        for (index, ring) in self.samples.rings.iter().enumerate() {
-            ring_points(&self.probe, ring, RINGS + 64 * index as u32, margin, out);
+        for (index, rim) in self.features.rims.iter().enumerate() {
+            rim_points(&self.probe, rim, RIM_FEATURES + 64 * index as u32, margin, out);
         }
     }
 
-    /// Appends the lowest points and lines of smooth parts whose gap is below `margin` (m), as far as the points that are in
-    /// `out` already do not carry there.
-    pub fn lowest(&self, margin: f64, out: &mut Vec<ManifoldPoint>) {
-        lowest_points(&self.probe, self.samples, self.shape, margin, out);
+    /// Appends the lowest points and lines of smooth parts whose gap is below `margin` (m), as far as the points already in
+    /// `out` do not carry there.
+    pub(in super::super) fn lowest(&self, margin: f64, out: &mut Vec<ManifoldPoint>) {
+        lowest_points(&self.probe, self.features, self.shape, margin, out);
     }
 }
 
-/// The fixed points of a nearly flat ring and its moving lowest point.
-fn ring_points(probe: &Probe, ring: &Ring, name: u32, margin: f64, out: &mut Vec<ManifoldPoint>) {
+/// Appends the points of a nearly flat rim and its moving lowest point.
+fn rim_points(probe: &FieldProbe, rim: &Rim, feature: u32, margin: f64, out: &mut Vec<ManifoldPoint>) {
     let at = |angle: f64| {
         let (sin, cos) = angle.sin_cos();
-        (ring.frame_o * nalgebra::Point3::new(ring.radius * cos, ring.radius * sin, 0.0)).coords
+        (rim.frame_o * nalgebra::Point3::new(rim.radius * cos, rim.radius * sin, 0.0)).coords
     };
-    if probe.is_beyond(&ring.frame_o.translation.vector, margin + ring.radius) {
+    if probe.is_beyond(&rim.frame_o.translation.vector, margin + rim.radius) {
         return;
     }
-    let step = TAU / f64::from(RIM);
-    let gaps: Vec<f64> = (0..RIM).map(|k| probe.gap(&at(step * f64::from(k)))).collect();
+    let step = TAU / f64::from(RIM_POINTS);
+    let gaps: Vec<f64> = (0..RIM_POINTS).map(|k| probe.gap(&at(step * f64::from(k)))).collect();
     let (mut least, mut most) = (0, 0);
     for k in 0..gaps.len() {
         least = if gaps[k] < gaps[least] { k } else { least };
         most = if gaps[k] > gaps[most] { k } else { most };
     }
-    if gaps[least] > margin + ring.radius * step {
+    if gaps[least] > margin + rim.radius * step {
         return;
     }
-    let tilt = (gaps[most] - gaps[least]) / (2.0 * ring.radius);
-    let flat = ((RING_FLAT[1] - tilt) / (RING_FLAT[1] - RING_FLAT[0])).clamp(0.0, 1.0);
-    for k in 0..RIM {
+    let tilt = (gaps[most] - gaps[least]) / (2.0 * rim.radius);
+    let flat = ((FLAT_RIM_TILT[1] - tilt) / (FLAT_RIM_TILT[1] - FLAT_RIM_TILT[0])).clamp(0.0, 1.0);
+    for k in 0..RIM_POINTS {
         if flat > 0.0 && gaps[k as usize] < margin {
-            out.push(probe.contact(&at(step * f64::from(k)), SAMPLE_AREA * flat, name + k));
+            out.push(probe.contact(&at(step * f64::from(k)), SAMPLE_AREA * flat, feature + k));
         }
     }
     let angle = golden_minimum(|angle| probe.gap(&at(angle)), step * (least as f64 - 1.0), 2.0 * step);
-    let point =
-        probe.contact(&at(angle), POINT_AREA * (tilt / RING_TILTED).min(1.0), NON_MATERIAL | (name + RIM));
+    let point = probe.contact(
+        &at(angle),
+        POINT_AREA * (tilt / MIN_RIM_TILT).min(1.0),
+        NON_MATERIAL | (feature + RIM_POINTS),
+    );
     if point.phi < margin && point.area > 0.0 {
         out.push(point);
     }
 }
 
-/// The minimum of a function with one in `start..start + width`: golden sections, then the parabola through the last
-/// three points, whose error is far below their distance.
-pub(super) fn golden_minimum(f: impl Fn(f64) -> f64, start: f64, width: f64) -> f64 {
-    const SHARE: f64 = 0.381_966_011_250_105;
-    let (mut low, mut high) = (start, start + width);
-    let (mut x, mut y) = (low + SHARE * width, high - SHARE * width);
-    let (mut fx, mut fy) = (f(x), f(y));
-    for _ in 0..14 {
-        if fx < fy {
-            (high, y, fy) = (y, x, fx);
-            x = low + SHARE * (high - low);
-            fx = f(x);
-        } else {
-            (low, x, fx) = (x, y, fy);
-            y = high - SHARE * (high - low);
-            fy = f(y);
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::FRAC_PI_2;
+
+    use super::{
+        super::{Primitive, primitives, surface_features, tests::is_non_material},
+        *,
+    };
+    use crate::geometry::{Quat, Vec3};
+
+    fn touch(a: &Shape, pose_a: &Pose, b: &Shape, pose_b: &Pose, margin: f64) -> Vec<ManifoldPoint> {
+        let mut out = Vec::new();
+        let (features, bounds) = (surface_features(a), b.bounds());
+        let surface = SurfaceInField::new(&features, a, pose_a, b, &bounds, pose_b);
+        surface.fixed(margin, &mut out);
+        surface.lowest(margin, &mut out);
+        out
+    }
+
+    fn floor() -> (Shape, Pose) {
+        (Shape::cuboid(Vec3::new(1.0, 1.0, 0.04)), Pose::translation(0.0, 0.0, -0.02))
+    }
+
+    /// A bowl of 2 mm wall: foot ring of 25 mm, rim of 50 mm, 40 mm high; corners of the profile from the axis outwards.
+    fn bowl() -> Shape {
+        let corners = vec![
+            [0.0, 0.003],
+            [0.022, 0.003],
+            [0.022, 0.0],
+            [0.025, 0.0],
+            [0.025, 0.003],
+            [0.05, 0.04],
+            [0.047, 0.04],
+            [0.022, 0.006],
+            [0.0, 0.006],
+        ];
+        Shape::lathe(corners).expect("a bowl")
+    }
+
+    #[test]
+    fn the_lowest_point_of_a_smooth_body_is_found_to_a_micron() {
+        let (ground, ground_w) = floor();
+        let egg = Shape::Ellipsoid { radii: Vec3::new(0.02, 0.025, 0.035) };
+        let ball = Shape::Sphere { radius: 0.03 };
+        for (shape, radii) in [(ball, Vec3::repeat(0.03)), (egg, Vec3::new(0.02, 0.025, 0.035))] {
+            for k in 0..20 {
+                let turn = Quat::from_scaled_axis(Vec3::new(0.4, 0.3, -0.2) * f64::from(k));
+                // Support of an ellipsoid: its point R² d / |R d| for a direction d.
+                let d = turn.inverse() * -Vec3::z();
+                let lowest = radii.component_mul(&radii).component_mul(&d) / radii.component_mul(&d).norm();
+                let height = -(turn * lowest).z - 5e-5;
+                let pose = Pose::from_parts(nalgebra::Translation3::new(0.1, 0.2, height), turn);
+                let points = touch(&shape, &pose, &ground, &ground_w, 0.001);
+                let point = points.iter().min_by(|p, q| p.phi.total_cmp(&q.phi)).expect("a lowest point");
+                assert!((point.phi + 5e-5).abs() < 1e-9, "{shape:?}, turn {k}: gap {}", point.phi);
+                let aside = (point.p_w - (turn * lowest + pose.translation.vector)).xy().norm();
+                assert!(aside < 1e-6 && is_non_material(point), "{shape:?}, turn {k}: {aside} m aside");
+                assert!((point.n_w + Vec3::z()).norm() < 1e-12 && (point.area - POINT_AREA).abs() < 1e-12);
+                assert_eq!(points.len(), 1, "{points:?}");
+            }
         }
     }
-    let (middle, h) = (0.5 * (low + high), 0.1 * width);
-    let (before, here, after) = (f(middle - h), f(middle), f(middle + h));
-    let bend = before - 2.0 * here + after;
-    let shift = if bend > 0.0 { 0.5 * h * (before - after) / bend } else { 0.0 };
-    middle + if f(middle + shift) < here { shift } else { 0.0 }
+
+    #[test]
+    fn a_bowl_stands_on_its_foot_ring_and_tips_onto_its_exact_rims() {
+        let ((ground, ground_w), bowl) = (floor(), bowl());
+        let standing = touch(&bowl, &Pose::translation(0.0, 0.0, -1e-5), &ground, &ground_w, 0.001);
+        let rims = [0.022, 0.025];
+        assert_eq!(
+            standing.len(),
+            2 * RIM_POINTS as usize,
+            "only the foot's two edges, no seeds under its hollow"
+        );
+        for p in &standing {
+            assert!(
+                (p.phi + 1e-5).abs() < 1e-12 && rims.iter().any(|r| (p.p_w.xy().norm() - r).abs() < 1e-9)
+            );
+        }
+        for heading in [0.0f64, 0.13, 1.7] {
+            let tilt = 0.5f64;
+            let turn = Quat::from_scaled_axis(Vec3::new(-heading.sin(), heading.cos(), 0.0) * tilt);
+            let points =
+                touch(&bowl, &Pose::from_parts(Vec3::zeros().into(), turn), &ground, &ground_w, 0.02);
+            let least = points.iter().map(|p| p.phi).fold(f64::INFINITY, f64::min);
+            assert!((least + 0.025 * tilt.sin()).abs() < 1e-9, "{least}");
+        }
+    }
+
+    #[test]
+    fn a_lathe_can_on_its_side_rolls_on_the_moving_points_of_both_rims() {
+        let ((ground, ground_w), profile) =
+            (floor(), vec![[0.0, -0.05], [0.033, -0.05], [0.033, 0.05], [0.0, 0.05]]);
+        let can = Shape::lathe(profile).expect("a can");
+        for roll in [0.0, 0.05, 0.11] {
+            let turn =
+                Quat::from_scaled_axis(Vec3::y() * FRAC_PI_2) * Quat::from_scaled_axis(Vec3::z() * roll);
+            let pose = Pose::from_parts(nalgebra::Translation3::new(0.0, 0.0, 0.033 - 1e-5), turn);
+            let points = touch(&can, &pose, &ground, &ground_w, 5e-6);
+            for end in [-0.05, 0.05] {
+                let at_end = points.iter().filter(|p| (p.p_w.x - end).abs() < 1e-6);
+                let carried: Vec<_> = at_end.filter(|p| (p.phi + 1e-5).abs() < 1e-9).collect();
+                assert!(
+                    carried.iter().any(|p| p.p_w.y.abs() < 1e-6 && is_non_material(p)),
+                    "roll {roll}: {points:?}"
+                );
+            }
+            // Nothing but that line: what carries elsewhere on it is true contact too.
+            assert!(points.iter().all(|p| p.p_w.y.abs() < 1e-4 && p.phi >= -1e-5 - 1e-9), "{points:?}");
+        }
+    }
+
+    #[test]
+    fn sharp_edges_of_a_general_solid_are_found_where_they_are() {
+        // A block with a rectangular notch: 60 × 40 × 30 mm less 20 × 40+ × 10 mm from the top.
+        let notch = Shape::cuboid(Vec3::new(0.02, 0.1, 0.02)).translated(Vec3::new(0.0, 0.0, 0.015));
+        let block = Shape::cuboid(Vec3::new(0.06, 0.04, 0.03)).subtract(notch);
+        let turned = block.rotated(Quat::from_scaled_axis(Vec3::new(0.2, 0.3, 0.1)));
+        let Shape::Placed { shape, pose } = &turned else { panic!("a placed shape") };
+        let samples = surface_features(&turned).corners;
+        let own: Vec<Vec3> =
+            samples.iter().map(|p| pose.inverse_transform_point(&(*p).into()).coords).collect();
+        let (distance_to_faces, step) = (
+            |p: &Vec3| {
+                let mut off = [
+                    (p.x.abs() - 0.03).abs(),
+                    (p.y.abs() - 0.02).abs(),
+                    (p.z.abs() - 0.015).abs(),
+                    // The notch's walls and floor.
+                    (p.x.abs() - 0.01).abs(),
+                    (p.z - 0.005).abs(),
+                ];
+                off.sort_by(f64::total_cmp);
+                off[1]
+            },
+            0.06 / 24.0,
+        );
+        for p in &own {
+            assert!(shape.distance_and_normal(p).0.abs() < 1e-9, "{p} is off the surface");
+            assert!(distance_to_faces(p) < 1e-5, "{p} lies on no edge");
+        }
+        // Along the sharp upper edges next to the notch, no gap wider than two cells.
+        for k in 0..=20 {
+            let y = -0.018 + 0.036 * f64::from(k) / 20.0;
+            for x in [-0.03, -0.01, 0.01, 0.03] {
+                let edge = Vec3::new(x, y, 0.015);
+                let near = own.iter().map(|p| (p - edge).norm()).fold(f64::INFINITY, f64::min);
+                assert!(near < step, "nothing within {near} m of {edge}");
+            }
+        }
+        let inner =
+            own.iter().filter(|p| (p.z - 0.005).abs() < 1e-4 && p.x.abs() < 0.0101 && p.y.abs() < 0.019);
+        assert_eq!(inner.count(), 0, "samples in the notch's inner corners, which nothing can touch first");
+    }
+
+    #[test]
+    fn a_cube_in_a_bowl_is_stopped_by_the_inner_wall() {
+        // Its lower corners reach the sloping wall: (0.022, 0.006) to (0.047, 0.04) in (r, z).
+        let (bowl, cube) = (bowl(), Shape::cuboid(Vec3::repeat(0.036)));
+        let corner_r = 0.018 * 2f64.sqrt();
+        let wall_z = 0.006 + (corner_r - 0.022) * (0.034 / 0.025);
+        let pose = Pose::translation(0.0, 0.0, wall_z + 0.018 - 1e-5);
+        let points = touch(&cube, &pose, &bowl, &Pose::identity(), 0.0005);
+        assert_eq!(points.len(), 4, "{points:?}");
+        let slope = 0.025 / f64::hypot(0.034, 0.025);
+        for p in &points {
+            assert!((p.phi + 1e-5 * slope).abs() < 1e-9 && (p.p_w.xy().norm() - corner_r).abs() < 1e-5);
+            assert!((p.n_w.z + slope).abs() < 1e-9, "from the cube into the wall: {}", p.n_w);
+        }
+    }
+
+    #[test]
+    fn shapes_made_of_primitives_fall_into_pieces_and_others_do_not() {
+        let wall = Shape::cuboid(Vec3::new(0.2, 0.01, 0.1)).translated(Vec3::new(0.0, 0.1, 0.05));
+        let tray = Shape::cuboid(Vec3::new(0.2, 0.2, 0.01))
+            .union(wall)
+            .painted(2, None)
+            .rotated(Quat::from_scaled_axis(Vec3::z()));
+        let parts = primitives(&tray).expect("two boxes");
+        assert_eq!(parts.len(), 2);
+        let centre = Quat::from_scaled_axis(Vec3::z()) * Vec3::new(0.0, 0.1, 0.05);
+        assert!((parts[1].1.translation.vector - centre).norm() < 1e-15);
+        assert_eq!(parts[1].0, Primitive::Box { half: Vec3::new(0.1, 0.005, 0.05) });
+        assert_eq!(primitives(&bowl()), None);
+    }
 }

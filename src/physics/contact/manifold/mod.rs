@@ -1,10 +1,14 @@
-//! Contact points between rigid primitives, as pure functions of their poses.
+//! Contact manifolds: contact points of two rigid bodies as pure functions of their poses.
 //!
-//! Two *primitives* ([`Primitive`]) meet in [`manifold`]: a contact normal is found, the feature of each primitive that faces
-//! the other (a face, a side line) is projected along it, and the overlap's corners become the points. Every point's
-//! gap is exact at its place, so corners and rims carry a tipping body where its real edge is, and round bodies touch
-//! at the moving lowest point and roll. General shapes meet through [`field::Skin`],
-//! and compliant skins meet hard shapes through [`gel::gel_vs_shape`].
+//! Two convex [`Primitive`]s meet in [`manifold`]. A contact normal is found by separating axes, and the features of both that
+//! face each other (a face, a side line) are projected along it; the corners of their overlap become the points. The gap of
+//! each point is exact at its position, so that corners and rims support a tipping body where its real edge is, and round
+//! bodies touch at a moving lowest point and roll. General shapes meet through [`field::SurfaceInField`].
+//!
+//! # Why not parry's manifolds
+//! The contact forces here are pressures times areas, so every point needs the area that it represents, and a small change of
+//! pose must change the sum of forces little: points have to fade in and out. Parry's contact manifolds give neither areas nor
+//! continuous weights.
 
 use crate::geometry::{Pose, Vec3};
 
@@ -13,22 +17,18 @@ mod closest_points;
 mod feature;
 mod feature_extraction;
 mod feature_overlap;
-pub mod field;
+pub(super) mod field;
+mod field_probe;
 mod flat_region;
-pub mod gel;
-mod plane;
 mod separating_axis;
 mod sphere_capsule;
 
-#[cfg(test)]
-mod field_tests;
 #[cfg(test)]
 mod test_rig;
 #[cfg(test)]
 mod tests;
 
-pub use feature_extraction::{Ring, SkinSamples, primitives, skin_samples};
-pub use flat_region::FlatSample;
+pub(super) use feature_extraction::{SurfaceFeatures, primitives, surface_features};
 
 /// A convex primitive in its own frame, m.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,38 +64,32 @@ pub enum Primitive {
 /// One point where two bodies touch or nearly touch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ManifoldPoint {
-    /// Half-way between the two surfaces, world, m.
+    /// Position, half-way between the two surfaces, m, world.
     pub p_w: Vec3,
     /// Unit normal from the first body to the second, world.
     pub n_w: Vec3,
-    /// Gap along the normal, m; negative where they overlap.
+    /// Gap along the normal, m; negative is overlap.
     pub phi: f64,
-    /// Area that the point stands for, m². The points of a flat patch share its area; a line or point contact has
-    /// [`POINT_AREA`] a point. Areas fade in and out, so that a small change of pose changes forces a little.
+    /// Area that the point represents, m². The points of a flat patch share its area; a point or line contact has
+    /// [`POINT_AREA`] per point. Areas fade in and out, so that a small change of pose changes forces little.
     pub area: f64,
-    /// Names the features that meet; the same from step to step while they stay the same. See [`NON_MATERIAL`].
+    /// Identifies the two features that meet; constant from step to step while they stay the same. See [`NON_MATERIAL`].
     pub feature: u32,
 }
 
-impl ManifoldPoint {
-    /// Whether the point travels over the material as the bodies roll ([`NON_MATERIAL`]).
-    pub fn is_moving(&self) -> bool {
-        self.feature & NON_MATERIAL != 0
-    }
-}
-
-/// Set in the `feature` of a point that is no material point of either body (the lowest point of a sphere or rim).
-/// Its tangential spring must be stretched by the *velocity* of the touching material, since the way of the point
-/// itself is no slip: a rolling ball has none.
+/// Flag in `feature` for a point that is not a material point of either body, such as the lowest point of a sphere or rim.
+///
+/// Its tangential spring must be stretched by the *velocity* of the touching material, since the motion of the point itself is
+/// not slip: a rolling ball does not slip.
 pub const NON_MATERIAL: u32 = 1 << 31;
 
-/// Area of a point contact and of either end of a line contact, m²: with the contact modulus of stiff solids
-/// (1e9 Pa/m) 1e6 N/m, hence 10 µm under 10 N. A tenth of it makes a can of 0.3 kg tip 0.4° too early, because the
-/// rim that carries it gives way.
+/// Area of a point contact and of either end of a line contact, m². With the contact modulus of stiff solids (1e9 Pa/m) this
+/// is 1e6 N/m, hence 10 µm under 10 N. A tenth of it makes a can of 0.3 kg tip 0.4° too early, because the rim that carries it
+/// sinks in.
 pub const POINT_AREA: f64 = 1e-3;
 
 impl Primitive {
-    /// The order in which pairs are computed, so that each pair is written once.
+    /// Position in the order of types; the manifold of each pair of types is implemented for one order only.
     fn rank(&self) -> u8 {
         match self {
             Self::Plane => 0,
@@ -109,7 +103,7 @@ impl Primitive {
 
 /// Appends to `out` the contact points of `a` and `b` whose gap is below `margin` (m).
 ///
-/// Swapping the two flips the normals and nothing else, but for the names of the features of two primitives of a kind.
+/// Swapping the two flips the normals and changes nothing else, except the feature identifiers of two primitives of one type.
 pub fn manifold(
     a: &Primitive,
     pose_a: &Pose,
@@ -137,10 +131,12 @@ fn ordered(
 ) {
     match (*a, *b) {
         (Primitive::Plane, Primitive::Plane) => {}
-        (Primitive::Plane, Primitive::Box { half }) => plane::corners(pose_a, &half, pose_b, margin, out),
+        (Primitive::Plane, Primitive::Box { half }) => {
+            feature_overlap::plane_box(pose_a, &half, pose_b, margin, out);
+        }
         (_, Primitive::Sphere { radius }) => sphere_capsule::sphere(a, pose_a, radius, pose_b, margin, out),
         (Primitive::Capsule { .. }, Primitive::Capsule { .. }) => {
-            sphere_capsule::capsules(a, pose_a, b, pose_b, margin, out)
+            sphere_capsule::capsules(a, pose_a, b, pose_b, margin, out);
         }
         _ => feature_overlap::features(a, pose_a, b, pose_b, margin, out),
     }

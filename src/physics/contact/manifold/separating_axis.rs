@@ -6,10 +6,10 @@ use crate::geometry::{
     convex::{self, ClosestPoints, ConvexShape},
 };
 
-/// How much farther apart a refined direction must show the primitives before it displaces one along a face or an axis,
-/// m. Those are exact, the refined ones carry the rounding of an iteration.
+/// Gap by which a refined direction must exceed that of a face or axis to be preferred, m. Directions of faces are exact,
+/// refined ones have the rounding of an iteration.
 const PREFER_FACES_M: f64 = 1e-6;
-/// The same for edge against edge, as a share of the gap: nearly parallel edges repeat a face's direction.
+/// The same for edge against edge, relative to the gap: nearly parallel edges repeat the direction of a face.
 const PREFER_FACES_SHARE: f64 = 0.01;
 
 /// A contact normal.
@@ -19,9 +19,9 @@ pub(super) struct Axis {
     pub n_w: Vec3,
     /// Gap along it, m.
     pub gap: f64,
-    /// Whether some pair of points is really this far apart; two boxes corner to corner are farther.
-    pub true_gap: bool,
-    /// The touching points, where an iteration looked for them.
+    /// True if some pair of points is exactly this far apart; two boxes corner to corner are farther.
+    pub is_attained: bool,
+    /// The closest points, if an iteration computed them.
     pub closest: Option<ClosestPoints>,
 }
 
@@ -52,7 +52,7 @@ pub(super) fn contact_axis(
         return None;
     }
     if matches!(a, Primitive::Plane) {
-        return Some(Axis { n_w, gap, closest: None, true_gap: true });
+        return Some(Axis { n_w, gap, closest: None, is_attained: true });
     }
     let mut to_beat = gap + PREFER_FACES_M + PREFER_FACES_SHARE * gap.abs();
     for edge_a in edges(a, pose_a) {
@@ -69,7 +69,7 @@ pub(super) fn contact_axis(
         return None;
     }
     if matches!((a, b), (Primitive::Box { .. }, Primitive::Box { .. })) {
-        return Some(Axis { n_w, gap, closest: None, true_gap: gap <= 0.0 });
+        return Some(Axis { n_w, gap, closest: None, is_attained: gap <= 0.0 });
     }
     let closest = refine(a, pose_a, b, pose_b, margin);
     if let Some(found) = closest {
@@ -78,10 +78,10 @@ pub(super) fn contact_axis(
             (gap, n_w) = (refined, found.n_w);
         }
     }
-    (gap < margin).then_some(Axis { n_w, gap, closest, true_gap: true })
+    (gap < margin).then_some(Axis { n_w, gap, closest, is_attained: true })
 }
 
-/// The closest points of the primitives themselves, from those of their cores.
+/// The closest points of the primitives, from those of their cores.
 fn refine(a: &Primitive, pose_a: &Pose, b: &Primitive, pose_b: &Pose, margin: f64) -> Option<ClosestPoints> {
     let ((core_a, radius_a), (core_b, radius_b)) = (core(a)?, core(b)?);
     let found = convex::closest_points(&core_a, pose_a, &core_b, pose_b, margin + radius_a + radius_b)?;
@@ -89,7 +89,7 @@ fn refine(a: &Primitive, pose_a: &Pose, b: &Primitive, pose_b: &Pose, margin: f6
     Some(ClosestPoints { a_w, b_w, ..found })
 }
 
-/// A primitive as a convex core and the thickness of a skin around it, m.
+/// A primitive as a convex core and the thickness of a layer around it, m.
 fn core(primitive: &Primitive) -> Option<(ConvexShape, f64)> {
     match *primitive {
         Primitive::Box { half } => Some((ConvexShape::Box(half), 0.0)),

@@ -1,13 +1,13 @@
-//! Spheres against anything, capsules against capsules: distances to points and segments.
+//! Manifolds of a sphere with any primitive and of two capsules, by distances to points and segments.
 
 use super::{ManifoldPoint, NON_MATERIAL, POINT_AREA, Primitive};
 use crate::geometry::{Pose, Vec3};
 
-/// The middle witness of two capsules counts in full when it is this much closer than a straight line between the
-/// gaps at the segment's ends, m.
-const WITNESS_FADE_M: f64 = 1e-4;
+/// Distance by which the closest points of two capsules must be closer than the interpolated gaps at the ends to count in
+/// full, m.
+const CLOSEST_FADE_M: f64 = 1e-4;
 
-/// The one witness point of a sphere.
+/// The closest point of a sphere.
 pub(super) fn sphere(
     a: &Primitive,
     pose_a: &Pose,
@@ -68,8 +68,8 @@ fn outside_corner(excess: &Vec3) -> (f64, Vec3) {
 
 /// Two capsules: the four end spheres against the other's core, and the closest pair of the cores between the ends.
 ///
-/// Each is a true gap of the two bodies. The closest pair wanders where the cores are parallel, so it counts only as
-/// far as it is closer than the ends say.
+/// Each is a true gap of the two bodies. The closest pair is undefined where the cores are parallel, so it counts only as far
+/// as it is closer than the gaps at the ends, interpolated.
 pub(super) fn capsules(
     a: &Primitive,
     pose_a: &Pose,
@@ -108,7 +108,7 @@ pub(super) fn capsules(
     let straight = |ends: [f64; 2], t: f64| ends[0] + (ends[1] - ends[0]) * t;
     let (along_a, along_b) = (on_segment(&core_a, &on_a).1, on_segment(&core_b, &on_b).1);
     let closer = straight(ends_a, along_a).min(straight(ends_b, along_b)) - phi;
-    push(on_a, on_b, (closer / WITNESS_FADE_M).clamp(0.0, 1.0), 4);
+    push(on_a, on_b, (closer / CLOSEST_FADE_M).clamp(0.0, 1.0), 4);
 }
 
 fn core(pose: &Pose, half_height: f64) -> [Vec3; 2] {

@@ -138,7 +138,7 @@ fn boxes_and_cans_tip_within_three_tenths_of_a_degree_of_the_closed_form() {
     let can_angle = (0.033f64 / 0.05).atan();
     let margin = 0.3f64.to_radians();
     // For the can along a rim point and, the worst heading, half-way between two.
-    let worst = PI / f64::from(feature::RIM);
+    let worst = PI / f64::from(feature::RIM_POINTS);
     for (primitive, turn, angle) in [
         (BOX, Quat::identity(), box_angle),
         (CAN, Quat::identity(), can_angle),
