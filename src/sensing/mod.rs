@@ -1,6 +1,8 @@
-//! What the robot senses: pure functions of a state and a scene; made only when someone looks.
+//! Sensor models: pure functions of a physics [`Frame`](crate::physics::world::Frame) and a scene, evaluated on demand.
+//!
+//! [`camera`] renders colour, depth and segmentation images, [`tactile`] simulates the GelSight Mini of each finger, and
+//! [`panda`] holds the meshes of the robot that the cameras see.
 
 pub mod camera;
 pub mod panda;
-pub mod scaling;
 pub mod tactile;

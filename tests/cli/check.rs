@@ -34,7 +34,7 @@ fn scenes_that_cannot_be_are_found_without_settling() {
         at: "at = { 0, 0.1 } } scene:add_camera { name = \"in\", position = { 0, 0.1, 0.02 }, look_at = { 1, 0, 0 }",
         ..Small::default()
     });
-    assert_snapshot!(inside, @"x.lua: task 0, episode 0: x.lua:6: camera in: position: it stands inside of cube; move it out");
+    assert_snapshot!(inside, @"x.lua: task 0, episode 0: x.lua:6: camera in: position: it is inside cube; move it out");
     let beside = of(Small { at: "xyz = { 0, -1, 0 }", ..Small::default() });
     assert_snapshot!(beside, @"x.lua:6: object cube has nothing below it; put it above what it is to rest on");
     let below = of(Small { at: "xyz = { 0, 0.1, -0.3 }", ..Small::default() });

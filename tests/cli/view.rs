@@ -163,7 +163,7 @@ fn light_cameras_and_looks_are_checked_where_they_are_written() {
 
 #[test]
 fn a_camera_inside_of_something_is_told_before_anything_runs_and_leaves_no_picture() {
-    let told = "x.lua:7: camera mole: position: it stands inside of floor; move it out";
+    let told = "x.lua:7: camera mole: position: it is inside floor; move it out";
     let mole = "scene:add_camera { name = \"mole\", position = { 0, 0, -0.02 }, look_at = { 1, 0, -0.02 } }";
     let project = with(mole);
     for words in ["view x.lua --out seen", "x.lua --episodes 2 --video=all --out seen"] {
@@ -174,11 +174,11 @@ fn a_camera_inside_of_something_is_told_before_anything_runs_and_leaves_no_pictu
     project.succeeds("x.lua --episodes 2 --out blind");
     let project = with("scene:camera(\"third_person\").position = { 0, 0.1, 0.02 }");
     let message = project.refusal("x.lua --video --out run");
-    let told = "x.lua:7: camera third_person: position: it stands inside of cube; move it out";
+    let told = "x.lua:7: camera third_person: position: it is inside cube; move it out";
     assert!(message.contains(told), "{message}");
     let project = with("scene:camera(\"wrist\").position = { 0, 0, 0.03 }");
     let message = project.refusal("view x.lua --out seen");
-    assert!(message.contains("x.lua:7: camera wrist: position: it stands inside of"), "{message}");
+    assert!(message.contains("x.lua:7: camera wrist: position: it is inside"), "{message}");
 }
 
 #[test]
@@ -189,7 +189,7 @@ fn a_simulation_of_a_script_tells_of_a_camera_inside_of_something_where_it_was_p
     let run = "return softvt.experiment { name = \"e\", grid = { a = { 1 } }, run = function()\n\
                local sim = softvt.simulate { layout = layout }\nsim:see { camera = \"mole\" }\nreturn { b = 1 } end }";
     let message = Project::new(&[("x.lua", &format!("{layout}{run}"))]).refusal("x.lua");
-    let told = "simulation:see: x.lua:7: camera mole: position: it stands inside of floor; move it out";
+    let told = "simulation:see: x.lua:7: camera mole: position: it is inside floor; move it out";
     assert!(message.contains(told), "{message}");
 }
 

@@ -1,52 +1,22 @@
-//! What can be wrong with a picture's inputs.
+//! Errors of the camera renderer.
 
-/// A picture cannot be made.
+/// A camera image cannot be rendered.
+#[allow(missing_docs)] // The messages say what the fields are.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CameraError {
-    /// A number of the camera is out of range; fields are named as scripts name them.
+    /// A camera setting is out of range. Fields are named as in Lua.
     #[error("camera {camera}: {field}: expected {expected}, got {got}")]
-    Field {
-        /// Name of the camera.
-        camera: String,
-        /// The field.
-        field: &'static str,
-        /// What it should be, with the unit.
-        expected: String,
-        /// What it is.
-        got: String,
-    },
-    /// The camera stands inside of something, where none can be put.
-    #[error("camera {camera}: position: it stands inside of {object}; move it out")]
-    Inside {
-        /// Name of the camera.
-        camera: String,
-        /// What it is inside of.
-        object: String,
-    },
-    /// A number of the light is out of range; fields are named as scripts name them, where they have one.
+    Field { camera: String, field: &'static str, expected: String, got: String },
+    /// The camera was placed inside an object.
+    #[error("camera {camera}: position: it is inside {object}; move it out")]
+    Inside { camera: String, object: String },
+    /// A light setting is out of range. Fields are named as in Lua where Lua has them.
     #[error("light: {field}: expected {expected}, got {got}")]
-    Light {
-        /// The field.
-        field: &'static str,
-        /// What it should be.
-        expected: &'static str,
-        /// What it is.
-        got: String,
-    },
-    /// A thing to be drawn has no triangles or wrong ones.
+    Light { field: &'static str, expected: &'static str, got: String },
+    /// An object has no triangles or invalid ones.
     #[error("{name} cannot be drawn: {reason}")]
-    RenderMesh {
-        /// Name of the thing.
-        name: String,
-        /// What is wrong and what to do.
-        reason: String,
-    },
-    /// The state lacks a body that is to be drawn, or gives it another size.
+    Mesh { name: String, reason: String },
+    /// The state lacks the body of an object, or the body does not match its mesh.
     #[error("{name} cannot be drawn: the state has {reason}")]
-    State {
-        /// Name of the thing.
-        name: String,
-        /// What is missing.
-        reason: String,
-    },
+    State { name: String, reason: String },
 }

@@ -1,77 +1,85 @@
-//! Eight points at once. Only operations that every machine rounds alike are used: no fused multiply-add, no reciprocal
-//! estimates, no functions of the platform's library.
+//! Eight-lane vectors.
+//!
+//! Every operation here rounds alike on every processor: no fused multiply-add, no reciprocal estimates and no functions of
+//! the platform's math library. Images are therefore byte-identical across machines.
 
-use wide::{bytemuck::cast, f32x8, i32x8, u32x8};
+use wide::{bytemuck::cast, i32x8, u32x8};
 
-use crate::sensing::camera::V3;
+pub(crate) use wide::f32x8;
 
-/// Eight numbers.
-pub(crate) type F8 = f32x8;
+use super::math::V3;
 
-/// How many points are shaded at once.
+/// Number of points shaded at once.
 pub(crate) const LANES: usize = 8;
 
-/// 0, 1, … 7.
-pub(crate) const STEPS: F8 = F8::new([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
+/// The index of each lane: 0, 1, … 7.
+pub(crate) const LANE_INDEX: f32x8 = f32x8::new([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
 
 /// Eight vectors.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct V8 {
-    pub x: F8,
-    pub y: F8,
-    pub z: F8,
+pub(crate) struct Vec3x8 {
+    pub(crate) x: f32x8,
+    pub(crate) y: f32x8,
+    pub(crate) z: f32x8,
 }
 
-impl V8 {
+impl Vec3x8 {
     #[inline(always)]
     pub(crate) fn splat(v: &V3) -> Self {
-        Self { x: F8::splat(v.x), y: F8::splat(v.y), z: F8::splat(v.z) }
+        Self { x: f32x8::splat(v.x), y: f32x8::splat(v.y), z: f32x8::splat(v.z) }
     }
 
+    /// Builds eight vectors from one array per component.
     #[inline(always)]
-    pub(crate) fn from_arrays(of: &[[f32; LANES]; 3]) -> Self {
-        Self { x: F8::new(of[0]), y: F8::new(of[1]), z: F8::new(of[2]) }
+    pub(crate) fn from_arrays(components: &[[f32; LANES]; 3]) -> Self {
+        Self {
+            x: f32x8::new(components[0]),
+            y: f32x8::new(components[1]),
+            z: f32x8::new(components[2]),
+        }
     }
 
+    /// Returns one array per component.
     #[inline(always)]
     pub(crate) fn to_arrays(self) -> [[f32; LANES]; 3] {
         [self.x.to_array(), self.y.to_array(), self.z.to_array()]
     }
 
     #[inline(always)]
-    pub(crate) fn dot(self, o: Self) -> F8 {
+    pub(crate) fn dot(self, o: Self) -> f32x8 {
         self.x * o.x + self.y * o.y + self.z * o.z
     }
 
     #[inline(always)]
-    pub(crate) fn times(self, o: Self) -> Self {
+    pub(crate) fn component_mul(self, o: Self) -> Self {
         Self { x: self.x * o.x, y: self.y * o.y, z: self.z * o.z }
     }
 
-    /// Of unit length; zero stays zero.
+    /// Scales to unit length; zero stays zero.
     #[inline(always)]
-    pub(crate) fn unit(self) -> Self {
-        let squared = self.dot(self).fast_max(F8::splat(1e-30));
-        self * (F8::ONE / squared.sqrt())
+    pub(crate) fn normalized(self) -> Self {
+        let squared = self.dot(self).fast_max(f32x8::splat(1e-30));
+        self * (f32x8::ONE / squared.sqrt())
     }
 
+    /// Applies `f` to each component.
     #[inline(always)]
-    pub(crate) fn map(self, each: impl Fn(F8) -> F8) -> Self {
-        Self { x: each(self.x), y: each(self.y), z: each(self.z) }
+    pub(crate) fn map(self, f: impl Fn(f32x8) -> f32x8) -> Self {
+        Self { x: f(self.x), y: f(self.y), z: f(self.z) }
     }
 
-    /// `self` where the mask is set, else `other`.
+    /// Returns `if_set` in lanes whose mask is set, else `if_clear`.
     #[inline(always)]
-    pub(crate) fn or(self, mask: F8, other: Self) -> Self {
+    pub(crate) fn select(mask: f32x8, if_set: Self, if_clear: Self) -> Self {
         Self {
-            x: mask.select(self.x, other.x),
-            y: mask.select(self.y, other.y),
-            z: mask.select(self.z, other.z),
+            x: mask.select(if_set.x, if_clear.x),
+            y: mask.select(if_set.y, if_clear.y),
+            z: mask.select(if_set.z, if_clear.z),
         }
     }
 }
 
-impl std::ops::Add for V8 {
+impl std::ops::Add for Vec3x8 {
     type Output = Self;
     #[inline(always)]
     fn add(self, o: Self) -> Self {
@@ -79,7 +87,7 @@ impl std::ops::Add for V8 {
     }
 }
 
-impl std::ops::Sub for V8 {
+impl std::ops::Sub for Vec3x8 {
     type Output = Self;
     #[inline(always)]
     fn sub(self, o: Self) -> Self {
@@ -87,40 +95,48 @@ impl std::ops::Sub for V8 {
     }
 }
 
-impl std::ops::Mul<F8> for V8 {
+impl std::ops::Mul<f32x8> for Vec3x8 {
     type Output = Self;
     #[inline(always)]
-    fn mul(self, by: F8) -> Self {
+    fn mul(self, by: f32x8) -> Self {
         Self { x: self.x * by, y: self.y * by, z: self.z * by }
     }
 }
 
-/// Base-2 logarithm of positive numbers to about 0.01: enough to choose among copies of a texture.
+/// Base-2 logarithm of positive numbers, to about 0.01: accurate enough to choose a mip level.
 #[inline(always)]
-pub(crate) fn rough_log2(x: F8) -> F8 {
+pub(crate) fn approx_log2(x: f32x8) -> f32x8 {
     let bits: i32x8 = cast(x);
-    let exponent = F8::from_i32x8((bits >> 23) - i32x8::splat(127));
-    let mantissa: F8 = cast((bits & i32x8::splat(0x007F_FFFF)) | i32x8::splat(0x3F80_0000));
-    // Quadratic through the ends of 1..2 with the least error between them.
-    exponent + (mantissa - F8::ONE) * (F8::splat(1.344) - F8::splat(0.344) * (mantissa - F8::ONE))
+    let exponent = f32x8::from_i32x8((bits >> 23) - i32x8::splat(127));
+    let mantissa: f32x8 = cast((bits & i32x8::splat(0x007F_FFFF)) | i32x8::splat(0x3F80_0000));
+    let m = mantissa - f32x8::ONE;
+    // The quadratic through both ends of 1..2 with the smallest maximum error between them.
+    exponent + m * (f32x8::splat(1.344) - f32x8::splat(0.344) * m)
 }
 
-/// 2 to the power of numbers in −60..=0, to 1e-4 of the value.
+/// 2 to the power of numbers in −60..=0, to a relative error of 1e-4.
 #[inline(always)]
-pub(crate) fn exp2(x: F8) -> F8 {
-    let whole = (x + F8::splat(60.0)).fast_trunc_int() - i32x8::splat(60);
-    let f = x - F8::from_i32x8(whole);
-    let power: F8 = cast((whole + i32x8::splat(127)) << 23);
-    // Cubic with the right values at 0, 1/3, 2/3 and 1.
-    let curve = F8::ONE + f * (F8::splat(0.695_984) + f * (F8::splat(0.224_996) + f * F8::splat(0.079_020)));
+pub(crate) fn approx_exp2(x: f32x8) -> f32x8 {
+    let integer = (x + f32x8::splat(60.0)).fast_trunc_int() - i32x8::splat(60);
+    let f = x - f32x8::from_i32x8(integer);
+    let power: f32x8 = cast((integer + i32x8::splat(127)) << 23);
+    // The cubic that is exact at 0, 1/3, 2/3 and 1.
+    let curve = f32x8::ONE
+        + f * (f32x8::splat(0.695_984) + f * (f32x8::splat(0.224_996) + f * f32x8::splat(0.079_020)));
     power * curve
 }
 
-/// Whole numbers at or below numbers that are not negative.
+/// Rounds non-negative numbers down to integers.
 #[inline(always)]
-pub(crate) fn whole(x: F8) -> [u32; LANES] {
-    let whole: u32x8 = cast(x.fast_trunc_int());
-    whole.to_array()
+pub(crate) fn floor_to_u32(x: f32x8) -> [u32; LANES] {
+    let integers: u32x8 = cast(x.fast_trunc_int());
+    integers.to_array()
+}
+
+/// Sums the lanes in a fixed order, so that the result does not depend on the processor.
+pub(crate) fn sum_lanes(x: f32x8) -> f32 {
+    let [a, b, c, d, e, f, g, h] = x.to_array();
+    ((a + e) + (c + g)) + ((b + f) + (d + h))
 }
 
 #[cfg(test)]
@@ -128,13 +144,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn logarithms_and_powers_are_as_good_as_they_say() {
+    fn approximations_are_within_their_stated_errors() {
         for i in 0..2000_u16 {
             let x = 1.0 + f32::from(i) * 0.37;
-            let log = rough_log2(F8::splat(x)).to_array()[3];
+            let log = approx_log2(f32x8::splat(x)).to_array()[3];
             assert!((log - x.log2()).abs() < 0.01, "log2 {x}: {log}");
             let y = -f32::from(i) * 0.005;
-            let power = exp2(F8::splat(y)).to_array()[5];
+            let power = approx_exp2(f32x8::splat(y)).to_array()[5];
             assert!((power / y.exp2() - 1.0).abs() < 2e-4, "2^{y}: {power}");
         }
     }

@@ -1,180 +1,183 @@
-//! The triangles that a camera sees, sorted into the tiles of its image.
+//! Projects triangles and sorts them into the tiles of an image.
 
+use super::{
+    NO_TRIANGLE, ScreenCorners,
+    sample_buffer::min_w_if_covering,
+};
 use crate::sensing::camera::{
-    V3,
-    lens::Lens,
-    raster::sample_buffer::{NONE, cover},
-    render::tile::Triangles,
+    lens::{Lens, ScreenVertex},
+    math::V3,
 };
 
-/// Pixels along an edge of a tile: its samples stay in the processor's nearest cache.
-pub(crate) const TILE: usize = 32;
+/// Edge of a tile, pixels: the samples of a tile fit in the first-level cache.
+pub(crate) const TILE_EDGE: usize = 32;
 
-/// A triangle in the image.
+/// A front-facing triangle within the image.
 #[derive(Clone, Copy, Debug)]
-struct Shown {
-    /// Corners, clockwise: pixels from the top left, and reciprocal depth.
-    at: [[f32; 3]; 3],
+struct ScreenTriangle {
+    /// In clockwise order.
+    corners: ScreenCorners,
     id: u32,
     /// First and last tile along each axis.
     tiles: [[u16; 2]; 2],
 }
 
-/// A point of the image; in front of the near plane if not behind it.
+/// A triangle of a tile.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Seen {
-    /// Pixels from the top left.
-    pub x: f32,
-    pub y: f32,
-    /// Reciprocal depth.
-    pub w: f32,
-    /// In the camera frame.
-    pub view: V3,
+pub(crate) struct TileTriangle {
+    pub(crate) id: u32,
+    pub(crate) corners: ScreenCorners,
 }
 
-/// Triangles by tile.
+/// The triangles in view, by tile.
 #[derive(Debug, Default)]
 pub(crate) struct TileBins {
-    seen: Vec<Seen>,
-    shown: Vec<Shown>,
-    /// First of each tile's part of `sorted`, and the end of all.
+    /// Projected vertices of the current mesh.
+    vertices: Vec<ScreenVertex>,
+    triangles: Vec<ScreenTriangle>,
+    /// Start of each tile's range in `sorted`, followed by the end of the last one.
     starts: Vec<u32>,
+    /// Indices into `triangles`, grouped by tile.
     sorted: Vec<u32>,
-    tiles: [usize; 2],
+    /// Number of tiles along each axis.
+    tile_counts: [usize; 2],
 }
 
 impl TileBins {
-    /// Forgets all triangles.
+    /// Removes all triangles and adopts the image size of `lens`.
     pub(crate) fn clear(&mut self, lens: &Lens) {
-        self.shown.clear();
-        self.tiles = [lens.width.div_ceil(TILE), lens.height.div_ceil(TILE)];
+        self.triangles.clear();
+        self.tile_counts = [lens.width.div_ceil(TILE_EDGE), lens.height.div_ceil(TILE_EDGE)];
     }
 
-    /// Adds the triangles that face the camera; their numbers are `first_id` and on.
+    /// Adds the triangles of a mesh that face the camera. Their ids are `first_id` and the numbers that follow.
     pub(crate) fn add(&mut self, lens: &Lens, positions: &[V3], triangles: &[[u32; 3]], first_id: u32) {
-        let mut seen = std::mem::take(&mut self.seen);
-        seen.clear();
-        seen.extend(positions.iter().map(|p| lens.see(p)));
-        let ahead = |s: &Seen| -s.view.z >= lens.near;
-        let all_ahead = seen.iter().all(ahead);
+        let mut vertices = std::mem::take(&mut self.vertices);
+        vertices.clear();
+        vertices.extend(positions.iter().map(|p| lens.project(p)));
+        let is_ahead = |v: &ScreenVertex| -v.view.z >= lens.near;
+        let all_ahead = vertices.iter().all(is_ahead);
         for (id, t) in (first_id..).zip(triangles) {
-            let corners = t.map(|v| &seen[v as usize]);
-            if all_ahead || corners.iter().all(|s| ahead(s)) {
-                self.push(lens, corners.map(|s| [s.x, s.y, s.w]), id);
-            } else if corners.iter().any(|s| ahead(s)) {
-                self.push_cut(lens, &corners, id);
+            let corners = t.map(|v| &vertices[v as usize]);
+            if all_ahead || corners.iter().all(|v| is_ahead(v)) {
+                self.push(lens, corners.map(|v| [v.x, v.y, v.w]), id);
+            } else if corners.iter().any(|v| is_ahead(v)) {
+                self.push_clipped(lens, &corners, id);
             }
         }
-        self.seen = seen;
+        self.vertices = vertices;
     }
 
-    /// The part of a triangle that is ahead of the near plane (Sutherland & Hodgman 1974, one plane).
-    fn push_cut(&mut self, lens: &Lens, corners: &[&Seen; 3], id: u32) {
-        let ahead = |s: &Seen| -s.view.z >= lens.near;
-        let mut kept: Vec<Seen> = Vec::with_capacity(4);
+    /// Clips a triangle at the near plane (Sutherland & Hodgman 1974, for one plane) and adds the rest.
+    fn push_clipped(&mut self, lens: &Lens, corners: &[&ScreenVertex; 3], id: u32) {
+        let is_ahead = |v: &ScreenVertex| -v.view.z >= lens.near;
+        let mut polygon: Vec<ScreenVertex> = Vec::with_capacity(4);
         for i in 0..3 {
             let (a, b) = (corners[i], corners[(i + 1) % 3]);
-            if ahead(a) {
-                kept.push(*a);
+            if is_ahead(a) {
+                polygon.push(*a);
             }
-            if ahead(a) != ahead(b) {
+            if is_ahead(a) != is_ahead(b) {
                 let t = (-lens.near - a.view.z) / (b.view.z - a.view.z);
-                kept.push(lens.project(a.view + (b.view - a.view) * t));
+                polygon.push(lens.project_view(a.view + (b.view - a.view) * t));
             }
         }
-        for i in 2..kept.len() {
-            self.push(lens, [kept[0], kept[i - 1], kept[i]].map(|s| [s.x, s.y, s.w]), id);
+        for i in 2..polygon.len() {
+            self.push(lens, [polygon[0], polygon[i - 1], polygon[i]].map(|v| [v.x, v.y, v.w]), id);
         }
     }
 
-    fn push(&mut self, lens: &Lens, [a, b, c]: [[f32; 3]; 3], id: u32) {
-        // Counter-clockwise from outside is clockwise where y runs down, and the other way round.
+    fn push(&mut self, lens: &Lens, [a, b, c]: ScreenCorners, id: u32) {
+        // Triangles that are counter-clockwise from outside are clockwise in an image whose y axis points down.
         let area = (c[0] - a[0]) * (b[1] - a[1]) - (b[0] - a[0]) * (c[1] - a[1]);
         let high = |axis: usize| a[axis].max(b[axis]).max(c[axis]);
         let low = |axis: usize| a[axis].min(b[axis]).min(c[axis]);
-        let outside = high(0) < 0.0
+        let is_outside = high(0) < 0.0
             || high(1) < 0.0
             || low(0) > lens.width as f32
             || low(1) > lens.height as f32
             || high(2) < 1.0 / lens.far;
-        if area > 0.0 && !outside {
-            // Conversions saturate.
-            let tile =
-                |x: f32, axis: usize| ((x * (1.0 / TILE as f32)) as u16).min(self.tiles[axis] as u16 - 1);
+        if area > 0.0 && !is_outside {
+            // Conversions to integers saturate.
+            let tile = |x: f32, axis: usize| {
+                ((x * (1.0 / TILE_EDGE as f32)) as u16).min(self.tile_counts[axis] as u16 - 1)
+            };
             let tiles = [0, 1].map(|axis| [tile(low(axis), axis), tile(high(axis), axis)]);
-            self.shown.push(Shown { at: [a, c, b], id, tiles });
+            self.triangles.push(ScreenTriangle { corners: [a, c, b], id, tiles });
         }
     }
 
-    /// Sorts the triangles into tiles, each in the order in which they were added.
+    /// Groups the triangles by tile, each group in the order in which its triangles were added (counting sort).
     pub(crate) fn sort(&mut self) {
-        let [columns, rows] = self.tiles;
+        let [columns, rows] = self.tile_counts;
         let range = |[from, to]: [u16; 2]| usize::from(from)..usize::from(to) + 1;
         self.starts.clear();
         self.starts.resize(columns * rows + 2, 0);
-        for shown in &self.shown {
-            for y in range(shown.tiles[1]) {
-                range(shown.tiles[0]).for_each(|x| self.starts[y * columns + x + 2] += 1);
+        for triangle in &self.triangles {
+            for y in range(triangle.tiles[1]) {
+                range(triangle.tiles[0]).for_each(|x| self.starts[y * columns + x + 2] += 1);
             }
         }
         for i in 1..self.starts.len() {
             self.starts[i] += self.starts[i - 1];
         }
-        let all = self.starts[self.starts.len() - 1] as usize;
+        let len = self.starts[self.starts.len() - 1] as usize;
         self.sorted.clear();
-        self.sorted.resize(all, 0);
-        for (number, shown) in (0_u32..).zip(&self.shown) {
-            for y in range(shown.tiles[1]) {
-                for x in range(shown.tiles[0]) {
+        self.sorted.resize(len, 0);
+        for (index, triangle) in (0_u32..).zip(&self.triangles) {
+            for y in range(triangle.tiles[1]) {
+                for x in range(triangle.tiles[0]) {
                     let next = &mut self.starts[y * columns + x + 1];
-                    self.sorted[*next as usize] = number;
+                    self.sorted[*next as usize] = index;
                     *next += 1;
                 }
             }
         }
     }
 
-    /// Whether any triangle can touch a tile.
-    pub(crate) fn touches(&self, tile: usize) -> bool {
+    /// True if any triangle's bounding box overlaps a tile.
+    pub(crate) fn is_occupied(&self, tile: usize) -> bool {
         self.starts[tile] < self.starts[tile + 1]
     }
 
-    /// Tiles across and down.
-    pub(crate) fn tiles(&self) -> [usize; 2] {
-        self.tiles
+    /// Number of tiles along x and y.
+    pub(crate) fn tile_counts(&self) -> [usize; 2] {
+        self.tile_counts
     }
 
-    /// Corners and numbers of the triangles of a tile.
-    fn of_tile(&self, tile: usize) -> impl ExactSizeIterator<Item = (&[[f32; 3]; 3], u32)> {
-        let part = self.starts[tile] as usize..self.starts[tile + 1] as usize;
-        self.sorted[part].iter().map(|&number| {
-            let shown = &self.shown[number as usize];
-            (&shown.at, shown.id)
-        })
+    fn tile_triangles(&self, tile: usize) -> impl ExactSizeIterator<Item = &ScreenTriangle> {
+        let range = self.starts[tile] as usize..self.starts[tile + 1] as usize;
+        self.sorted[range].iter().map(|&index| &self.triangles[index as usize])
     }
 
-    /// What is left of a tile's triangles, in their order, without those behind one that covers all of it; and whether it
-    /// is that one alone.
-    pub(crate) fn visible(&self, tile: usize, origin: [f32; 2], left: &mut Triangles) -> bool {
-        let size = TILE as f32;
-        let around = |at: &[[f32; 3]; 3]| {
+    /// Collects a tile's triangles in their order, without those hidden by one that covers the whole tile. Returns true if
+    /// that one alone remains.
+    pub(crate) fn collect_visible(
+        &self,
+        tile: usize,
+        origin: [f32; 2],
+        visible: &mut Vec<TileTriangle>,
+    ) -> bool {
+        let size = TILE_EDGE as f32;
+        // Cheap test before the exact one: the bounding box contains the tile.
+        let box_contains_tile = |corners: &ScreenCorners| {
             [0, 1].into_iter().all(|axis| {
-                let [a, b, c] = at.map(|corner| corner[axis] - origin[axis]);
+                let [a, b, c] = corners.map(|corner| corner[axis] - origin[axis]);
                 a.min(b).min(c) <= 0.0 && a.max(b).max(c) >= size
             })
         };
-        let mut front: Option<(u32, f32)> = None;
-        for (at, id) in self.of_tile(tile).filter(|(at, _)| around(at)) {
-            let least = cover(at, origin, size);
-            if let Some(least) = least.filter(|least| front.is_none_or(|(_, nearest)| *least > nearest)) {
-                front = Some((id, least));
+        let (mut cover_id, mut cover_w) = (NO_TRIANGLE, None);
+        for triangle in self.tile_triangles(tile).filter(|t| box_contains_tile(&t.corners)) {
+            let Some(min_w) = min_w_if_covering(&triangle.corners, origin, size) else { continue };
+            if cover_w.is_none_or(|nearest| min_w > nearest) {
+                (cover_id, cover_w) = (triangle.id, Some(min_w));
             }
         }
-        let (first, nearest) = front.unwrap_or((NONE, 0.0));
-        left.clear();
-        let before = |at: &[[f32; 3]; 3]| at[0][2].max(at[1][2]).max(at[2][2]) >= nearest;
-        let kept = self.of_tile(tile).filter(|(at, id)| *id == first || before(at));
-        left.extend(kept.map(|(at, id)| (id, *at)));
-        front.is_some() && left.len() == 1
+        let threshold = cover_w.unwrap_or(0.0);
+        let max_w = |corners: &ScreenCorners| corners[0][2].max(corners[1][2]).max(corners[2][2]);
+        visible.clear();
+        let kept = self.tile_triangles(tile).filter(|t| t.id == cover_id || max_w(&t.corners) >= threshold);
+        visible.extend(kept.map(|t| TileTriangle { id: t.id, corners: t.corners }));
+        cover_w.is_some() && visible.len() == 1
     }
 }

@@ -1,71 +1,95 @@
-//! The look of a surface at a point: masks and layers evaluated, filtered to the spacing at which they are sampled.
+//! Procedural materials: evaluates the masks and layers of a [`Visual`] at a point, filtered to the sampling distance.
 
-use crate::scene::{Mask, Visual};
-use crate::sensing::camera::{V3, shade::noise, shade::text_decal};
+use super::{noise, text_decal};
+use crate::{
+    scene::{Mask, Visual},
+    sensing::camera::math::V3,
+};
 
-/// What shading needs to know of a point of a surface.
+/// Material parameters at a point of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct MaterialSample {
     /// Linear RGB.
-    pub albedo: V3,
-    pub roughness: f32,
-    pub metalness: f32,
-    /// Share of the sky that is not hidden by the object itself.
-    pub open: f32,
+    pub(crate) albedo: V3,
+    pub(crate) roughness: f32,
+    pub(crate) metalness: f32,
+    /// Fraction of the sky left visible by the object itself.
+    pub(crate) sky_visibility: f32,
 }
 
 impl MaterialSample {
-    /// What textures hold: albedo and roughness.
-    pub(crate) fn painted(&self) -> [f32; 4] {
+    /// Number of components of [`components`](Self::components).
+    pub(crate) const COMPONENTS: usize = 6;
+
+    /// Returns the components that textures store: albedo and roughness.
+    pub(crate) fn texel(&self) -> [f32; 4] {
         [self.albedo.x, self.albedo.y, self.albedo.z, self.roughness]
     }
 
-    /// Albedo, roughness, metalness, openness.
+    /// Returns albedo, roughness, metalness and sky visibility.
     #[inline(always)]
-    pub(crate) fn numbers(&self) -> [f32; 6] {
+    pub(crate) fn components(&self) -> [f32; Self::COMPONENTS] {
         let a = &self.albedo;
-        [a.x, a.y, a.z, self.roughness, self.metalness, self.open]
+        [a.x, a.y, a.z, self.roughness, self.metalness, self.sky_visibility]
+    }
+
+    /// True if both samples differ at most in their sky visibility.
+    pub(crate) fn is_same_material(&self, other: &Self) -> bool {
+        self.albedo == other.albedo
+            && self.roughness == other.roughness
+            && self.metalness == other.metalness
     }
 }
 
-/// A visual, its numbers in single precision, at `p` (object frame, m) of a surface of unit normal `n`; what is finer than
-/// `spacing` (m) along the surface is averaged out. The second number is the height of the drawn relief, m.
-pub(crate) fn look(visual: &Visual, p: &V3, n: &V3, spacing: f32) -> (MaterialSample, f32) {
-    // A little inside, so that a face that lies on a border of a pattern shows what is behind it.
-    let p = &(p - n * INSIDE);
-    let colour = |c: [f64; 3]| V3::from(c.map(|x| x as f32));
-    let mut look = MaterialSample {
-        albedo: colour(visual.albedo),
+/// A visual evaluated at a point.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct VisualSample {
+    pub(crate) material: MaterialSample,
+    /// Height of the drawn relief above the surface, m.
+    pub(crate) relief: f32,
+}
+
+/// Depth below the surface at which patterns are evaluated, m: a face on the border of a pattern shows the inner side.
+const SAMPLE_DEPTH: f32 = 2e-5;
+
+/// Evaluates `visual` at the point `p` (object frame, m) of a surface with unit normal `n`.
+///
+/// Details finer than `spacing` (m) along the surface are averaged.
+pub(crate) fn sample_visual(visual: &Visual, p: &V3, n: &V3, spacing: f32) -> VisualSample {
+    let p = &(p - n * SAMPLE_DEPTH);
+    let to_v3 = |c: [f64; 3]| V3::from(c.map(|x| x as f32));
+    let mut material = MaterialSample {
+        albedo: to_v3(visual.albedo),
         roughness: visual.roughness as f32,
         metalness: visual.metalness as f32,
-        open: 1.0,
+        sky_visibility: 1.0,
     };
-    let mut height = 0.0;
+    let mut relief = 0.0;
     for layer in &visual.layers {
-        let mask = mask(&layer.mask, p, n, spacing);
-        let share = mask * layer.opacity as f32;
-        look.albedo += (colour(layer.albedo) - look.albedo) * share;
-        look.roughness += (layer.roughness as f32 - look.roughness) * share;
-        height += mask * layer.relief_m as f32;
+        let mask = mask_value(&layer.mask, p, n, spacing);
+        let alpha = mask * layer.opacity as f32;
+        material.albedo += (to_v3(layer.albedo) - material.albedo) * alpha;
+        material.roughness += (layer.roughness as f32 - material.roughness) * alpha;
+        relief += mask * layer.relief_m as f32;
     }
-    (look, height)
+    VisualSample { material, relief }
 }
 
-/// Size of the smallest features of a visual, m; infinite if it has none.
-pub(crate) fn finest(visual: &Visual) -> f32 {
-    fn of(mask: &Mask) -> f64 {
+/// Size of the smallest feature of a visual, m; infinite if it has none.
+pub(crate) fn finest_feature(visual: &Visual) -> f32 {
+    fn mask_feature(mask: &Mask) -> f64 {
         match mask {
             Mask::Whole => f64::INFINITY,
             Mask::Gradient { from_m, to_m, .. } => (to_m - from_m).abs(),
             Mask::Noise { size_m, octaves, from, to, .. } => {
-                let least = size_m.iter().copied().fold(f64::INFINITY, f64::min);
-                // Narrow ranges cut the noise to sharp edges.
-                least * 0.5_f64.powi(*octaves as i32 - 1) * (to - from).abs().min(1.0)
+                let coarsest = size_m.iter().copied().fold(f64::INFINITY, f64::min);
+                // A narrow range turns the noise into sharp edges.
+                coarsest * 0.5_f64.powi(*octaves as i32 - 1) * (to - from).abs().min(1.0)
             }
-            Mask::Both { masks } => masks.iter().map(|mask| of(mask)).fold(f64::INFINITY, f64::min),
-            Mask::Inverse { mask } => of(mask),
+            Mask::Both { masks } => masks.iter().map(|mask| mask_feature(mask)).fold(f64::INFINITY, f64::min),
+            Mask::Inverse { mask } => mask_feature(mask),
             Mask::Inside { soft_m, .. } => *soft_m,
-            // As fine as the surface itself, whose own detail is told elsewhere.
+            // Varies with the normal only, whose detail is that of the mesh.
             Mask::Facing { .. } => f64::INFINITY,
             // Sharp edges.
             Mask::Text { .. }
@@ -78,50 +102,48 @@ pub(crate) fn finest(visual: &Visual) -> f32 {
             | Mask::Weave { .. } => 0.0,
         }
     }
-    visual.layers.iter().map(|layer| of(&layer.mask)).fold(f64::INFINITY, f64::min) as f32
+    visual.layers.iter().map(|layer| mask_feature(&layer.mask)).fold(f64::INFINITY, f64::min) as f32
 }
 
-/// Whether text is printed on a visual.
-pub(crate) fn printed(visual: &Visual) -> bool {
-    fn of(mask: &Mask) -> bool {
+/// True if a visual has printed text.
+pub(crate) fn has_text(visual: &Visual) -> bool {
+    fn mask_has_text(mask: &Mask) -> bool {
         match mask {
             Mask::Text { .. } => true,
-            Mask::Both { masks } => masks.iter().any(|mask| of(mask)),
-            Mask::Inverse { mask } => of(mask),
+            Mask::Both { masks } => masks.iter().any(|mask| mask_has_text(mask)),
+            Mask::Inverse { mask } => mask_has_text(mask),
             _ => false,
         }
     }
-    visual.layers.iter().any(|layer| of(&layer.mask))
+    visual.layers.iter().any(|layer| mask_has_text(&layer.mask))
 }
 
-/// How far under the surface patterns are looked up, m.
-const INSIDE: f32 = 2e-5;
-
-/// The value of a mask at `p`, averaged over about `spacing` along the surface.
-fn mask(mask: &Mask, p: &V3, n: &V3, spacing: f32) -> f32 {
-    // What a step along the surface can change along a direction.
-    let across = |cosine: f32| spacing * (1.0 - cosine * cosine).max(0.0).sqrt();
+/// Value of a mask at `p`, 0..=1, averaged over about `spacing` along the surface.
+fn mask_value(mask: &Mask, p: &V3, n: &V3, spacing: f32) -> f32 {
+    // Length by which a step of `spacing` along the surface can advance in a direction at this cosine to the normal.
+    let footprint = |cosine: f32| spacing * (1.0 - cosine * cosine).max(0.0).sqrt();
     match mask {
         Mask::Whole => 1.0,
         Mask::Checker { size_m } => {
             let size = *size_m as f32;
-            // The product of three square waves of values ±1, each averaged over the spacing.
-            let wave = |i: usize| 2.0 * pulse(p[i] / (2.0 * size), 0.5, across(n[i]) / (2.0 * size)) - 1.0;
+            // The product of three square waves of values ±1, each averaged over the footprint.
+            let wave =
+                |i: usize| 2.0 * pulse_wave(p[i] / (2.0 * size), 0.5, footprint(n[i]) / (2.0 * size)) - 1.0;
             0.5 + 0.5 * wave(0) * wave(1) * wave(2)
         }
         Mask::Stripes { axis, pitch_m, share } => {
             let pitch = *pitch_m as f32;
-            pulse(along(axis, p) / pitch, *share as f32, across(along(axis, n)) / pitch)
+            pulse_wave(along(axis, p) / pitch, *share as f32, footprint(along(axis, n)) / pitch)
         }
         Mask::Gradient { axis, from_m, to_m } => {
-            smooth((along(axis, p) - *from_m as f32) / (*to_m - *from_m) as f32)
+            smoothstep((along(axis, p) - *from_m as f32) / (*to_m - *from_m) as f32)
         }
         Mask::Noise { size_m, octaves, from, to, seed } => {
             let size = size_m.map(|s| s as f32);
-            let finest = spacing / size.iter().copied().fold(f32::INFINITY, f32::min).max(1e-6);
+            let filter_width = spacing / size.iter().copied().fold(f32::INFINITY, f32::min).max(1e-6);
             let scaled = std::array::from_fn(|i| p[i] / size[i]);
-            let value = noise::fractal(scaled, *octaves, finest, *seed);
-            smooth((value - *from as f32) / (*to - *from) as f32)
+            let value = noise::fractal_noise(scaled, *octaves, filter_width, *seed);
+            smoothstep((value - *from as f32) / (*to - *from) as f32)
         }
         Mask::Rings { centre_m, pitch_m, wobble_m, seed } => {
             let (pitch, wobble) = (*pitch_m as f32, *wobble_m as f32);
@@ -135,90 +157,102 @@ fn mask(mask: &Mask, p: &V3, n: &V3, spacing: f32) -> f32 {
             specks(p, *spacing_m as f32, *radius_m as f32, spacing, *seed)
         }
         Mask::Weave { pitch_m } => weave(p, *pitch_m as f32, spacing),
-        Mask::Facing { axis, from, to } => smooth((along(axis, n) - *from as f32) / (*to - *from) as f32),
+        Mask::Facing { axis, from, to } => {
+            smoothstep((along(axis, n) - *from as f32) / (*to - *from) as f32)
+        }
         Mask::Inside { shape, soft_m } => {
             let width = (*soft_m as f32).max(spacing).max(1e-6);
-            smooth(0.5 - shape.distance(&p.cast()) as f32 / width)
+            smoothstep(0.5 - shape.distance(&p.cast()) as f32 / width)
         }
-        Mask::Text { decal } => text_decal::share(decal, p, n, spacing),
-        Mask::Inverse { mask } => 1.0 - self::mask(mask, p, n, spacing),
-        Mask::Both { masks } => masks.iter().map(|m| self::mask(m, p, n, spacing)).product(),
+        Mask::Text { decal } => text_decal::coverage(decal, p, n, spacing),
+        Mask::Inverse { mask } => 1.0 - mask_value(mask, p, n, spacing),
+        Mask::Both { masks } => masks.iter().map(|m| mask_value(m, p, n, spacing)).product(),
     }
 }
 
+/// Component of `p` along `axis`, which may have any length.
 fn along(axis: &[f64; 3], p: &V3) -> f32 {
     let axis = V3::from(axis.map(|x| x as f32));
     p.dot(&axis) / axis.norm().max(1e-9)
 }
 
-fn smooth(t: f32) -> f32 {
+fn smoothstep(t: f32) -> f32 {
     let t = t.clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
 
-/// Mean over a box of `width` around `x` of the wave of period 1 that is 1 on the first `share` of it.
-fn pulse(x: f32, share: f32, width: f32) -> f32 {
+/// Mean over an interval of `width` around `x` of the wave of period 1 that is 1 on the first `duty` of each period.
+fn pulse_wave(x: f32, duty: f32, width: f32) -> f32 {
     if width < 1e-5 {
-        return if x - x.floor() < share { 1.0 } else { 0.0 };
+        return if x - x.floor() < duty { 1.0 } else { 0.0 };
     }
-    let integral = |x: f32| x.floor() * share + (x - x.floor()).min(share);
+    let integral = |x: f32| x.floor() * duty + (x - x.floor()).min(duty);
     ((integral(x + 0.5 * width) - integral(x - 0.5 * width)) / width).clamp(0.0, 1.0)
 }
 
+/// Wood rings about the z axis: brightness grows slowly across a ring and falls sharply at its edge.
 fn rings(p: &V3, pitch: f32, wobble: f32, spacing: f32, seed: u32) -> f32 {
-    let bend =
-        noise::fractal([p.x / (8.0 * wobble), p.y / (8.0 * wobble), p.z / (40.0 * wobble)], 2, 0.0, seed);
+    let scaled = [p.x / (8.0 * wobble), p.y / (8.0 * wobble), p.z / (40.0 * wobble)];
+    let bend = noise::fractal_noise(scaled, 2, 0.0, seed);
     let phase = ((p.x * p.x + p.y * p.y).sqrt() + 2.0 * wobble * (bend - 0.5)) / pitch;
     let t = phase - phase.floor();
-    // Slow growth from light to dark, then a sharp edge.
     let ring = if t < 0.85 { (t / 0.85).powi(3) } else { 1.0 - (t - 0.85) / 0.15 };
-    let kept = (2.0 - 2.0 * spacing / pitch).clamp(0.0, 1.0);
-    0.3 + (ring - 0.3) * kept
+    let fade = (2.0 - 2.0 * spacing / pitch).clamp(0.0, 1.0);
+    0.3 + (ring - 0.3) * fade
 }
 
-/// Board numbers along and across; every other row is shifted by a share of its length of its own.
-fn board_cell(p: &V3, length: f32, width: f32) -> ([i32; 2], [f32; 2]) {
-    let across = p.y / width;
-    let row = across.floor() as i32;
-    let shift = noise::of_cell([row, 17, 5], 1)[0];
-    let run = p.x / length + shift;
-    ([run.floor() as i32, row], [run - run.floor(), across - across.floor()])
+/// A board of a floor: its number along x and across y, and the position in it as fractions of its length and width.
+struct BoardPosition {
+    cell: [i32; 2],
+    fraction: [f32; 2],
 }
 
+/// Finds the board at `p`. Each row is shifted along x by a random fraction of the board length.
+fn locate_board(p: &V3, length: f32, width: f32) -> BoardPosition {
+    let y = p.y / width;
+    let row = y.floor() as i32;
+    let shift = noise::cell_random([row, 17, 5], 1)[0];
+    let x = p.x / length + shift;
+    BoardPosition { cell: [x.floor() as i32, row], fraction: [x - x.floor(), y - y.floor()] }
+}
+
+/// A random value per board.
 fn board(p: &V3, length: f32, width: f32, seed: u32) -> f32 {
-    let ([run, row], _) = board_cell(p, length, width);
-    noise::of_cell([run, row, 3], seed)[1]
+    let [column, row] = locate_board(p, length, width).cell;
+    noise::cell_random([column, row, 3], seed)[1]
 }
 
 fn seams(p: &V3, length: f32, width: f32, gap: f32, spacing: f32) -> f32 {
-    let (_, [run, across]) = board_cell(p, length, width);
-    let away = |t: f32, period: f32| {
+    let [x, y] = locate_board(p, length, width).fraction;
+    let seam = |t: f32, period: f32| {
         let d = t.min(1.0 - t) * period;
         ((0.5 * gap + 0.5 * spacing - d) / spacing.max(1e-6)).clamp(0.0, 1.0).min(gap / spacing.max(gap))
     };
-    away(run, length).max(away(across, width))
+    seam(x, length).max(seam(y, width))
 }
 
+/// Balls at jittered positions, one per cube of edge `cell`.
 fn specks(p: &V3, cell: f32, radius: f32, spacing: f32, seed: u32) -> f32 {
-    let at = p.map(|x| (x / cell).floor() as i32);
-    let mut most: f32 = 0.0;
+    let own = p.map(|x| (x / cell).floor() as i32);
+    let mut value: f32 = 0.0;
     for neighbour in 0..27 {
-        let of = [at.x + neighbour % 3 - 1, at.y + neighbour / 3 % 3 - 1, at.z + neighbour / 9 - 1];
-        let jitter = noise::of_cell(of, seed);
-        let centre = V3::from_fn(|i, _| (of[i] as f32 + jitter[i]) * cell);
+        let lattice = [own.x + neighbour % 3 - 1, own.y + neighbour / 3 % 3 - 1, own.z + neighbour / 9 - 1];
+        let jitter = noise::cell_random(lattice, seed);
+        let centre = V3::from_fn(|i, _| (lattice[i] as f32 + jitter[i]) * cell);
         let gap = (p - centre).norm() - radius;
-        most = most.max((0.5 - gap / spacing.max(0.15 * radius)).clamp(0.0, 1.0));
+        value = value.max((0.5 - gap / spacing.max(0.15 * radius)).clamp(0.0, 1.0));
     }
-    most
+    value
 }
 
+/// Plain weave in x and y: each thread is highest along its middle.
 fn weave(p: &V3, pitch: f32, spacing: f32) -> f32 {
     let (u, v) = (p.x / pitch, p.y / pitch);
-    let over = (u.floor() + v.floor()) as i32 & 1 == 0;
-    let across = if over { v - v.floor() } else { u - u.floor() };
+    let is_warp_on_top = (u.floor() + v.floor()) as i32 & 1 == 0;
+    let across = if is_warp_on_top { v - v.floor() } else { u - u.floor() };
     let thread = 4.0 * across * (1.0 - across);
-    let kept = (2.0 - 2.0 * spacing / pitch).clamp(0.0, 1.0);
-    2.0 / 3.0 + (thread - 2.0 / 3.0) * kept
+    let fade = (2.0 - 2.0 * spacing / pitch).clamp(0.0, 1.0);
+    2.0 / 3.0 + (thread - 2.0 / 3.0) * fade
 }
 
 #[cfg(test)]
@@ -229,11 +263,11 @@ mod tests {
     use crate::{geometry::shape::Shape, scene::Mask};
 
     fn value(of: &Mask, p: [f32; 3], n: [f32; 3], spacing: f32) -> f32 {
-        mask(of, &p.into(), &n.into(), spacing)
+        mask_value(of, &p.into(), &n.into(), spacing)
     }
 
     #[test]
-    fn a_surface_faces_up_by_the_cosine_of_its_normal() {
+    fn a_facing_mask_follows_the_cosine_of_the_normal() {
         let up = Mask::Facing { axis: [0.0, 0.0, 3.0], from: 0.0, to: 1.0 };
         for (n, expected) in [([0.0, 0.0, 1.0], 1.0), ([1.0, 0.0, 0.0], 0.0), ([0.0, 0.0, -1.0], 0.0)] {
             assert_eq!(value(&up, [0.0; 3], n, 1e-3), expected);
@@ -244,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn the_border_of_a_shape_is_as_wide_as_asked_or_as_the_spacing() {
+    fn the_edge_of_an_inside_mask_is_as_wide_as_requested_or_as_the_spacing() {
         let ball = |soft_m| Mask::Inside { shape: Arc::new(Shape::Sphere { radius: 0.01 }), soft_m };
         let at = |mask: &Mask, r: f32, spacing| value(mask, [r, 0.0, 0.0], [1.0, 0.0, 0.0], spacing);
         for (soft, spacing, half) in [(0.004, 1e-3, 0.002), (0.0, 1e-3, 0.0005)] {
@@ -252,7 +286,7 @@ mod tests {
             assert!((at(&mask, 0.01, spacing) - 0.5).abs() < 1e-5);
             assert_eq!(at(&mask, 0.01 - 1.01 * half, spacing), 1.0);
             assert_eq!(at(&mask, 0.01 + 1.01 * half, spacing), 0.0);
-            // Smoothstep at a quarter of the width: 3/4 of the way.
+            // Smoothstep at 3/4.
             assert!((at(&mask, 0.01 - 0.5 * half, spacing) - 0.84375).abs() < 1e-4);
         }
     }

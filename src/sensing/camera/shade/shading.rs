@@ -1,56 +1,58 @@
-//! Illumination on points of surfaces, eight at once.
+//! Reflected light at surface points, eight at a time.
 
-use crate::scene::Lighting;
-use crate::sensing::camera::{
-    V3,
-    shade::shadow::ShadowMap,
-    simd::{F8, V8, exp2},
+use super::shadow::ShadowMap;
+use crate::{
+    scene::Lighting,
+    sensing::camera::{
+        math::V3,
+        simd::{Vec3x8, approx_exp2, f32x8},
+    },
 };
 
-/// SurfaceSamples of surfaces that are looked at.
+/// Eight surface points to be shaded.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SurfaceSamples {
-    /// World, m.
-    pub p: V8,
+    /// Positions, world, m.
+    pub(crate) p: Vec3x8,
     /// Unit normals, world.
-    pub n: V8,
+    pub(crate) n: Vec3x8,
     /// Linear RGB.
-    pub albedo: V8,
-    pub roughness: F8,
-    pub metalness: F8,
-    /// Share of the sky that is not hidden by the object itself.
-    pub open: F8,
-    /// Numbers of the things.
-    pub thing: F8,
+    pub(crate) albedo: Vec3x8,
+    pub(crate) roughness: f32x8,
+    pub(crate) metalness: f32x8,
+    /// Fraction of the sky left visible by the object itself.
+    pub(crate) sky_visibility: f32x8,
+    /// Indices of the objects in the scene.
+    pub(crate) object: f32x8,
 }
 
-/// The light that reaches the eye from points, linear RGB: from the key light, and from everywhere else.
+/// Radiance towards the eye, linear RGB, by source: the key light and the sky.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct DirectAndAmbient {
-    pub direct: V8,
-    pub ambient: V8,
+    pub(crate) direct: Vec3x8,
+    pub(crate) ambient: Vec3x8,
 }
 
 impl DirectAndAmbient {
-    /// With shares of both reaching the points.
+    /// Adds both parts, scaled by the visible fractions of the key light and of the sky.
     #[inline(always)]
-    pub(crate) fn dimmed(&self, direct: F8, ambient: F8) -> V8 {
-        self.direct * direct + self.ambient * ambient
+    pub(crate) fn attenuated(&self, key_visibility: f32x8, sky_visibility: f32x8) -> Vec3x8 {
+        self.direct * key_visibility + self.ambient * sky_visibility
     }
 }
 
-/// The light of a stage, ready for use.
+/// The key light and the sky of a scene, converted for shading.
 #[derive(Clone, Debug)]
 pub(crate) struct Illumination {
-    /// Unit vector to the key light.
+    /// Unit vector towards the key light.
     to_key: V3,
     /// Colour times strength.
     key: V3,
     zenith: V3,
     horizon: V3,
     ground: V3,
-    /// Added to GGX's width for the size of the lamp.
-    widening: f32,
+    /// Added to the squared roughness, so that highlights show the size of the lamp.
+    roughness_offset: f32,
 }
 
 impl Illumination {
@@ -63,156 +65,120 @@ impl Illumination {
             zenith: scaled(sky.zenith, sky.strength),
             horizon: scaled(sky.horizon, sky.strength),
             ground: scaled(sky.ground, sky.strength),
-            widening: 0.5 * lighting.key.softness_rad as f32,
+            roughness_offset: 0.5 * lighting.key.softness_rad as f32,
         }
     }
 
-    /// From the horizon to the zenith or the ground.
+    /// Interpolates from the horizon to the zenith where `z` is positive, else to the ground.
     #[inline(always)]
-    fn towards(&self, up: F8, share: F8) -> V8 {
-        let horizon = V8::splat(&self.horizon);
-        let above = up.simd_gt(F8::ZERO);
-        let end = V8::splat(&self.zenith).or(above, V8::splat(&self.ground));
+    fn sky_gradient(&self, z: f32x8, share: f32x8) -> Vec3x8 {
+        let horizon = Vec3x8::splat(&self.horizon);
+        let is_above = z.simd_gt(f32x8::ZERO);
+        let end = Vec3x8::select(is_above, Vec3x8::splat(&self.zenith), Vec3x8::splat(&self.ground));
         horizon + (end - horizon) * share
     }
 
-    /// The sky in directions (unit z components `up`).
+    /// Radiance of the sky in unit directions with this z component.
     #[inline(always)]
-    pub(crate) fn sky(&self, up: F8) -> V8 {
-        self.towards(up, up.abs().fast_min(F8::ONE).sqrt())
+    pub(crate) fn sky_radiance(&self, z: f32x8) -> Vec3x8 {
+        self.sky_gradient(z, z.abs().fast_min(f32x8::ONE).sqrt())
     }
 
-    /// Irradiance from the sky over π on surfaces whose normals' z components are `up`.
+    /// Irradiance from the sky, divided by π, on surfaces whose unit normal has this z component.
     #[inline(always)]
-    fn fill(&self, up: F8) -> V8 {
-        self.towards(up, up.abs())
+    fn sky_irradiance(&self, z: f32x8) -> Vec3x8 {
+        self.sky_gradient(z, z.abs())
     }
 
-    /// Illumination from points towards `to_eye` (unit), before anything else shades it.
+    /// Radiance of surface points towards `to_eye` (unit vectors), before shadows and occlusion by other objects.
     ///
     /// Lambert and GGX with Smith's height-correlated masking (Walter et al., Microfacet Models for Refraction, 2007;
-    /// Heitz, Understanding the Masking-Shadowing Function, JCGT 2014) and Schlick's Fresnel term; the sky's reflection
-    /// by Karis's fit (Physically Based Shading on Mobile, 2014).
+    /// Heitz, Understanding the Masking-Shadowing Function, JCGT 2014) and Schlick's Fresnel term. The reflection of the sky
+    /// uses Karis's fit (Physically Based Shading on Mobile, 2014).
     #[inline(always)]
-    pub(crate) fn split(&self, s: &SurfaceSamples, to_eye: V8) -> DirectAndAmbient {
-        let one = F8::ONE;
-        let n_v = s.n.dot(to_eye).fast_max(F8::splat(0.02));
+    pub(crate) fn shade(&self, s: &SurfaceSamples, to_eye: Vec3x8) -> DirectAndAmbient {
+        let one = f32x8::ONE;
+        let n_v = s.n.dot(to_eye).fast_max(f32x8::splat(0.02));
         let diffuse = s.albedo * (one - s.metalness);
-        let f0 = (s.albedo * s.metalness).map(|c| c + F8::splat(0.04) * (one - s.metalness));
-        let mirror = s.n.z * (F8::splat(2.0) * s.n.dot(to_eye)) - to_eye.z;
-        let seen = self.sky(mirror) * (one - s.roughness) + self.fill(mirror) * s.roughness;
-        let (scale, bias) = reflected(s.roughness, n_v);
-        let ambient = diffuse.times(self.fill(s.n.z)) + f0.map(|c| c * scale + bias).times(seen);
-        DirectAndAmbient { direct: self.direct(s, to_eye, diffuse, f0), ambient: ambient * s.open }
+        let f0 = (s.albedo * s.metalness).map(|c| c + f32x8::splat(0.04) * (one - s.metalness));
+        let reflect_z = s.n.z * (f32x8::splat(2.0) * s.n.dot(to_eye)) - to_eye.z;
+        let reflected =
+            self.sky_radiance(reflect_z) * (one - s.roughness) + self.sky_irradiance(reflect_z) * s.roughness;
+        let (scale, bias) = environment_brdf(s.roughness, n_v);
+        let ambient = diffuse.component_mul(self.sky_irradiance(s.n.z))
+            + f0.map(|c| c * scale + bias).component_mul(reflected);
+        DirectAndAmbient {
+            direct: self.shade_direct(s, to_eye, diffuse, f0),
+            ambient: ambient * s.sky_visibility,
+        }
     }
 
-    /// The key light's part.
     #[inline(always)]
-    fn direct(&self, s: &SurfaceSamples, to_eye: V8, diffuse: V8, f0: V8) -> V8 {
-        let (one, half_one) = (F8::ONE, F8::splat(0.5));
-        let to_key = V8::splat(&self.to_key);
-        let n_v = s.n.dot(to_eye).fast_max(F8::splat(0.02));
-        let n_l = s.n.dot(to_key).fast_max(F8::ZERO);
-        // Both angles with the half vector h = eye + key from its square, 2 + 2 eye · key, without making it of unit length.
-        let half2 = (F8::splat(2.0) + F8::splat(2.0) * to_eye.dot(to_key)).fast_max(F8::splat(1e-6));
-        let n_h = (s.n.dot(to_eye) + s.n.dot(to_key)).fast_max(F8::ZERO);
-        let l_h = (half2 * F8::splat(0.25)).fast_min(one).sqrt();
-        let alpha = (s.roughness * s.roughness + F8::splat(self.widening)).fast_max(F8::splat(0.02));
+    fn shade_direct(&self, s: &SurfaceSamples, to_eye: Vec3x8, diffuse: Vec3x8, f0: Vec3x8) -> Vec3x8 {
+        let (one, one_half) = (f32x8::ONE, f32x8::splat(0.5));
+        let to_key = Vec3x8::splat(&self.to_key);
+        let n_v = s.n.dot(to_eye).fast_max(f32x8::splat(0.02));
+        let n_l = s.n.dot(to_key).fast_max(f32x8::ZERO);
+        // The half vector h = eye + key is not normalised: both angles follow from its squared length 2 + 2 eye · key.
+        let half2 = (f32x8::splat(2.0) + f32x8::splat(2.0) * to_eye.dot(to_key)).fast_max(f32x8::splat(1e-6));
+        let n_h = (s.n.dot(to_eye) + s.n.dot(to_key)).fast_max(f32x8::ZERO);
+        let l_h = (half2 * f32x8::splat(0.25)).fast_min(one).sqrt();
+        let alpha =
+            (s.roughness * s.roughness + f32x8::splat(self.roughness_offset)).fast_max(f32x8::splat(0.02));
         let alpha = alpha.fast_min(one);
         let a2 = alpha * alpha;
         let d = (n_h * n_h).fast_min(half2) * (a2 - one) + half2;
-        let masked = n_l * (n_v * n_v * (one - a2) + a2).sqrt() + n_v * (n_l * n_l * (one - a2) + a2).sqrt();
+        let masking =
+            n_l * (n_v * n_v * (one - a2) + a2).sqrt() + n_v * (n_l * n_l * (one - a2) + a2).sqrt();
         let grazing = (one - l_h) * (one - l_h);
         let grazing = grazing * grazing * (one - l_h);
-        // D V F with the light's irradiance π times its strength; D over the fourth power of the half vector's length.
-        let strength = a2 * half_one * half2 * half2 / (d * d * masked);
+        // D V F for a light of irradiance π times its strength; D carries the fourth power of the half vector's length.
+        let strength = a2 * one_half * half2 * half2 / (d * d * masking);
         let specular = f0.map(|c| (c + (one - c) * grazing) * strength);
-        (diffuse + specular).times(V8::splat(&self.key)) * n_l
+        (diffuse + specular).component_mul(Vec3x8::splat(&self.key)) * n_l
     }
 
-    /// What of the key light casters leave at points.
+    /// Visible fraction of the key light at points `p` of normals `n`, by one shadow map.
     #[inline(always)]
-    pub(crate) fn unshadowed(&self, p: V8, n: &V8, map: &ShadowMap) -> F8 {
-        map.light(&map.places(p), n, self.lit(n))
+    pub(crate) fn key_visibility(&self, p: Vec3x8, n: &Vec3x8, map: &ShadowMap) -> f32x8 {
+        map.visibility(&map.project(p), n, self.faces_key(n))
     }
 
-    /// The same by two maps: a fine one where it reaches, and a wide one, if there is any, elsewhere.
+    /// As [`key_visibility`](Self::key_visibility), by a fine map where it reaches and by a wide one, if any, elsewhere.
     #[inline(always)]
-    pub(crate) fn unshadowed_afar(&self, p: V8, n: &V8, fine: &ShadowMap, wide: Option<&ShadowMap>) -> F8 {
-        let (at, lit) = (fine.places(p), self.lit(n));
-        let near = fine.light(&at, n, lit);
-        let beyond = lit & !fine.inside(&at);
+    pub(crate) fn key_visibility_cascaded(
+        &self,
+        p: Vec3x8,
+        n: &Vec3x8,
+        fine: &ShadowMap,
+        wide: Option<&ShadowMap>,
+    ) -> f32x8 {
+        let (at, faces_key) = (fine.project(p), self.faces_key(n));
+        let visibility = fine.visibility(&at, n, faces_key);
+        let is_beyond = faces_key & !fine.contains(&at);
         match wide {
-            Some(wide) if beyond.any() => near * wide.light(&wide.places(p), n, beyond),
-            _ => near,
+            Some(wide) if is_beyond.any() => {
+                visibility * wide.visibility(&wide.project(p), n, is_beyond)
+            }
+            _ => visibility,
         }
     }
 
-    /// Which surfaces face the key light.
     #[inline(always)]
-    fn lit(&self, n: &V8) -> F8 {
-        n.dot(V8::splat(&self.to_key)).simd_gt(F8::ZERO)
+    fn faces_key(&self, n: &Vec3x8) -> f32x8 {
+        n.dot(Vec3x8::splat(&self.to_key)).simd_gt(f32x8::ZERO)
     }
 }
 
-/// Factor of the reflectance at normal incidence, and what is added to it.
+/// Karis's fit of the preintegrated environment BRDF: scale and bias of the reflectance at normal incidence.
 #[inline(always)]
-fn reflected(roughness: F8, n_v: F8) -> (F8, F8) {
-    let linear = |a: f32, b: f32| F8::splat(a) + F8::splat(b) * roughness;
+fn environment_brdf(roughness: f32x8, n_v: f32x8) -> (f32x8, f32x8) {
+    let linear = |a: f32, b: f32| f32x8::splat(a) + f32x8::splat(b) * roughness;
     let r = linear(1.0, -1.0);
-    // 0.001 to the power of 0.93 n_v.
-    let fall = exp2(n_v * F8::splat(-9.268_2)).fast_min(r * r);
+    // 0.001 to the power of 0.93 n·v: close to the 2^(−9.28 n·v) of the fit.
+    let fall = approx_exp2(n_v * f32x8::splat(-9.268_2)).fast_min(r * r);
     let a004 = fall * r + linear(0.0425, -0.0275);
-    let scale = linear(1.04, -0.572) - F8::splat(1.04) * a004;
-    let bias = linear(-0.04, 0.022) + F8::splat(1.04) * a004;
-    (scale, bias.fast_max(F8::ZERO))
-}
-
-/// Something that hides part of the sky from what is near: an ellipsoid.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct OcclusionEllipsoid {
-    /// RenderObject it stands for; it hides nothing from itself.
-    pub thing: usize,
-    centre: V3,
-    radii: V3,
-    /// Square of the distance at which it is forgotten.
-    reach2: f32,
-}
-
-impl OcclusionEllipsoid {
-    /// That of a box, world.
-    pub(crate) fn of_bounds(thing: usize, [low, high]: &[V3; 2]) -> Self {
-        let radii = ((high - low) * 0.5).add_scalar(1e-4);
-        let reach = 2.6 * radii.max();
-        Self { thing, centre: (low + high) * 0.5, radii, reach2: reach * reach }
-    }
-
-    /// Whether it hides sky from anything in a box.
-    pub(crate) fn reaches(&self, [low, high]: &[V3; 2]) -> bool {
-        let nearest = self.centre.sup(low).inf(high);
-        (nearest - self.centre).norm_squared() < self.reach2
-    }
-}
-
-/// Share of the sky that blobs leave open at `p` on surfaces of normals `n` (Quilez, Sphere Ambient Occlusion, 2006, in
-/// the space in which the ellipsoid is a ball). `own` is the thing each point belongs to.
-#[inline(always)]
-pub(crate) fn open_sky(blobs: &[OcclusionEllipsoid], p: V8, n: V8, own: F8) -> F8 {
-    let mut open = F8::ONE;
-    for blob in blobs {
-        let d = V8::splat(&blob.centre) - p;
-        let d2 = d.dot(d);
-        let near = d2.simd_lt(F8::splat(blob.reach2)) & own.simd_ne(F8::splat(blob.thing as f32));
-        if !near.any() {
-            continue;
-        }
-        let q = d.times(V8::splat(&blob.radii.map(|r| 1.0 / r)));
-        let normal = n.times(V8::splat(&blob.radii));
-        let (q2, n2) = (q.dot(q), normal.dot(normal));
-        let cosine = (normal.dot(q) / (q2 * n2).fast_max(F8::splat(1e-18)).sqrt()).fast_max(F8::ZERO);
-        let fade = F8::ONE - d2 * F8::splat(1.0 / blob.reach2);
-        let hidden = F8::splat(0.75) * cosine * fade / q2.fast_max(F8::ONE);
-        open *= F8::ONE - (near & hidden);
-    }
-    open
+    let scale = linear(1.04, -0.572) - f32x8::splat(1.04) * a004;
+    let bias = linear(-0.04, 0.022) + f32x8::splat(1.04) * a004;
+    (scale, bias.fast_max(f32x8::ZERO))
 }

@@ -1,408 +1,485 @@
-//! Soft shadows of the key light: a map of the heights nearest to it, and a filter as wide as the penumbra (Fernando,
-//! Percentage-Closer Soft Shadows, SIGGRAPH sketches 2005). Most points are known to be lit or dark from the greatest and
-//! least heights around them, and are not filtered at all.
+//! Soft shadows of the key light by shadow maps.
+//!
+//! A map stores the height of the nearest caster towards the light. Its filter is as wide as the penumbra (Fernando,
+//! Percentage-Closer Soft Shadows, SIGGRAPH sketches 2005). The range of heights around each point shows for most points
+//! that they are fully lit or fully dark, and these are not filtered at all.
 
 use wide::i32x8;
 
-use crate::sensing::camera::{
-    V3,
-    raster::sample_buffer::SampleBuffer,
-    simd::{F8, LANES, STEPS, V8},
+use crate::{
+    geometry::basis_from_reference,
+    scene::Lighting,
+    sensing::camera::{
+        math::V3,
+        raster::sample_buffer::SampleBuffer,
+        simd::{LANE_INDEX, LANES, Vec3x8, f32x8, sum_lanes},
+    },
 };
-use crate::{geometry::basis_from_reference, scene::Lighting};
 
-/// Texels along an edge of the part of the map in which shadows fall.
+/// Edge of the part of the map in which points can be shaded, texels.
 const INNER: usize = 768;
-/// Texels around it that the filter reaches into.
+/// Border around it, texels, which the filter reads.
 const MARGIN: usize = 16;
-/// Texels along an edge of the map.
+/// Edge of the whole map, texels.
 const EDGE: usize = INNER + 2 * MARGIN;
-/// Texels along an edge of the tiles that know the range of heights around them.
+/// Edge of the tiles that store ranges of heights, texels.
 const TILE: usize = 1 << TILE_BITS;
 const TILE_BITS: i32 = 3;
+/// Tiles along an edge of the map.
 const TILES: usize = EDGE / TILE;
-/// Tiles to each side that the range covers: as far as the filter reaches.
-const AROUND: usize = 1;
-/// A surface is in the shadow of what is farther off it than this, m: casters are drawn with fewer triangles than what they
-/// throw shadows on.
-const OFFSET: f32 = 2e-3;
-/// Normals are off by as much as this, rad: what rises above the surface no more than that explains is the surface itself.
-const BENT: f32 = 0.1;
-/// Illumination that falls in flatter than this (cosine) is treated as if it did not.
-const LEAST_COSINE: f32 = 0.02;
-/// Rise of a surface beyond which its tilt says nothing about what is above it.
-const STEEPEST: f32 = 1.5;
-/// Widest filter and reach of the search for what casts the shadow, texels to each side: two vectors across.
-const WIDEST: f32 = 7.4;
-/// Narrowest filter, texels to each side.
-const NARROWEST: f32 = 1.5;
-/// Widest filter of one vector across, texels to each side.
-const ONE_VECTOR: f32 = 3.4;
-/// Eight points on a line of so many texels are filtered at these places only: the filter is smooth between them.
-const RUN: f32 = 4.0;
-/// On a line of so many, these places tell whether all see the whole light, or none of it.
-const LONG_RUN: f32 = 7.0;
-const NODES: [usize; 4] = [0, 2, 5, 7];
-/// How far points of a run are beside their even places, texels, and how much their normals differ (cosine).
-const UNEVEN: f32 = 0.3;
-const FLAT: f32 = 0.998;
-/// Illumination that comes in flatter than this (sine) is treated as if it did not.
-const LEVELLEST: f32 = 0.15;
-/// Heights below all.
+/// Tiles on each side that a range includes: the reach of the filter.
+const RANGE_MARGIN: usize = 1;
+/// Depth bias, m: casters are drawn with coarser meshes than the receivers of their shadows.
+const DEPTH_BIAS: f32 = 2e-3;
+/// Maximum error of interpolated normals, rad. Heights above a surface that this error explains are the surface itself.
+const MAX_NORMAL_ERROR: f32 = 0.1;
+/// Minimum cosine between normals and the light; flatter incidence is clamped.
+const MIN_COSINE: f32 = 0.02;
+/// Maximum slope of a receiver plane; steeper ones say nothing about the height of occluders.
+const MAX_RECEIVER_SLOPE: f32 = 1.5;
+/// Maximum radius of the filter and of the search for occluders, texels: two vectors wide.
+const MAX_RADIUS: f32 = 7.4;
+/// Minimum radius of the filter, texels.
+const MIN_RADIUS: f32 = 1.5;
+/// Maximum radius of a filter one vector wide, texels.
+const MAX_RADIUS_ONE_VECTOR: f32 = 3.4;
+/// Maximum length of a run of eight points, texels, that is interpolated from [`RUN_NODES`]: the filter is smooth enough.
+const INTERPOLATED_RUN: f32 = 4.0;
+/// Maximum length of a run, texels, whose nodes decide whether all of it is fully lit or fully dark.
+const UNIFORM_RUN: f32 = 7.0;
+/// Points of a run that are always filtered.
+const RUN_NODES: [usize; 4] = [0, 2, 5, 7];
+/// Maximum deviation of the points of a run from equal spacing, texels.
+const MAX_RUN_DEVIATION: f32 = 0.3;
+/// Minimum cosine between the normals of a run.
+const MIN_RUN_COSINE: f32 = 0.998;
+/// Minimum sine of the light's elevation; flatter light is clamped.
+const MIN_ELEVATION_SINE: f32 = 0.15;
+/// Height of empty texels, m.
 const EMPTY: f32 = -1e9;
 
-/// Shadow map of a set of casters.
+/// A range of heights, m.
+#[derive(Clone, Copy, Debug)]
+struct HeightRange {
+    min: f32,
+    max: f32,
+}
+
+impl HeightRange {
+    const EMPTY: Self = Self { min: EMPTY, max: EMPTY };
+    /// The neutral element of [`union`](Self::union).
+    const NEUTRAL: Self = Self { min: f32::MAX, max: EMPTY };
+
+    fn union(self, other: &Self) -> Self {
+        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+}
+
+/// Shadow map of a set of casters for a directional light.
 #[derive(Clone, Debug)]
 pub(crate) struct ShadowMap {
+    /// Axes of the map's u and v, and the unit vector towards the light.
     axes: [V3; 3],
     centre: V3,
     texels_per_metre: f32,
+    /// Tangent of the lamp's angular radius.
     tangent: f32,
-    /// Rise of level ground a texel along each axis, m. Heights above it tell what can darken something: what is farther
-    /// along the light is always higher above it too, and level ground never stands above itself.
-    lean: [f32; 2],
+    /// Rise of level ground per texel along u and v, m.
+    ///
+    /// Ranges compare heights above level ground: an occluder is further along the light than its receiver and thus also
+    /// higher above level ground, whereas level ground never rises above itself.
+    ground_slope: [f32; 2],
     heights: SampleBuffer<1>,
-    /// Least and greatest height above level ground in and around each tile.
-    ranges: Vec<[f32; 2]>,
-    /// Working memory.
-    own: Vec<[f32; 2]>,
-    places: Vec<[f32; 3]>,
+    /// Heights above level ground in and around each tile.
+    ranges: Vec<HeightRange>,
+    /// Scratch memory: heights above level ground in each tile.
+    tile_ranges: Vec<HeightRange>,
+    /// Scratch memory: vertices in the frame of the map.
+    vertices: Vec<[f32; 3]>,
 }
 
-/// Places of eight points: texels, height towards the light, and that above level ground, m.
+/// Eight points in the frame of a shadow map.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Places {
-    pub u: F8,
-    pub v: F8,
-    pub height: F8,
-    pub level: F8,
+pub(crate) struct LightSpacePoints {
+    /// Texels.
+    pub(crate) u: f32x8,
+    /// Texels.
+    pub(crate) v: f32x8,
+    /// Height towards the light, m.
+    pub(crate) height: f32x8,
+    /// Height above level ground, m.
+    pub(crate) height_above_ground: f32x8,
+}
+
+/// The part of a shadow map that a set of points projects to.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LightSpaceBounds {
+    /// Smallest u and v, texels.
+    pub(crate) low: [f32; 2],
+    /// Greatest u and v, texels.
+    pub(crate) high: [f32; 2],
+    /// Smallest height above level ground, m.
+    pub(crate) min_height: f32,
 }
 
 impl ShadowMap {
-    /// An empty map for a light, of the ball in which shadows are fine.
+    /// An empty map that covers the ball in which a scene asks for fine shadows.
     pub(crate) fn new(lighting: &Lighting) -> Self {
-        Self::around(lighting, lighting.shadow_radius_m as f32)
+        Self::with_radius(lighting, lighting.shadow_radius_m as f32)
     }
 
-    /// An empty map of all around the middle of that ball up to `radius`, m.
-    pub(crate) fn around(lighting: &Lighting, radius: f32) -> Self {
-        let up: V3 = lighting.key.direction_w.normalize().cast();
-        let side = if up.z.abs() < 0.99 { V3::z() } else { V3::x() };
-        let [u, v] = basis_from_reference(&up, &side);
-        let axes = [u, v, up];
+    /// An empty map that covers a concentric ball of `radius`, m.
+    pub(crate) fn with_radius(lighting: &Lighting, radius: f32) -> Self {
+        let to_light: V3 = lighting.key.direction_w.normalize().cast();
+        let reference = if to_light.z.abs() < 0.99 { V3::z() } else { V3::x() };
+        let [u, v] = basis_from_reference(&to_light, &reference);
+        let axes = [u, v, to_light];
         let texels_per_metre = INNER as f32 / (2.0 * radius);
-        let steep = up.z.signum() * up.z.abs().max(LEVELLEST) * texels_per_metre;
+        let elevation = to_light.z.signum() * to_light.z.abs().max(MIN_ELEVATION_SINE) * texels_per_metre;
         Self {
             axes,
-            lean: [-axes[0].z / steep, -axes[1].z / steep],
+            ground_slope: [-axes[0].z / elevation, -axes[1].z / elevation],
             centre: lighting.shadow_centre_w.cast(),
             texels_per_metre,
             tangent: lighting.key.softness_rad.tan() as f32,
             heights: SampleBuffer::new(EDGE, EDGE, EMPTY, false),
-            ranges: vec![[EMPTY; 2]; TILES * TILES],
-            own: vec![[EMPTY; 2]; TILES * TILES],
-            places: Vec::new(),
+            ranges: vec![HeightRange::EMPTY; TILES * TILES],
+            tile_ranges: vec![HeightRange::EMPTY; TILES * TILES],
+            vertices: Vec::new(),
         }
     }
 
-    /// Takes all casters away.
+    /// Removes all casters.
     pub(crate) fn clear(&mut self) {
         self.heights.clear(EMPTY);
     }
 
-    fn place(&self, p_w: &V3) -> [f32; 3] {
+    fn project_vertex(&self, p_w: &V3) -> [f32; 3] {
         let d = p_w - self.centre;
-        let at = |axis: usize| d.dot(&self.axes[axis]) * self.texels_per_metre + 0.5 * EDGE as f32;
-        [at(0), at(1), d.dot(&self.axes[2])]
+        let texel = |axis: usize| d.dot(&self.axes[axis]) * self.texels_per_metre + 0.5 * EDGE as f32;
+        [texel(0), texel(1), d.dot(&self.axes[2])]
     }
 
-    /// Places of points, world.
+    /// Projects points of the world.
     #[inline(always)]
-    pub(crate) fn places(&self, p_w: V8) -> Places {
-        let d = p_w - V8::splat(&self.centre);
-        let [scale, middle] = [self.texels_per_metre, 0.5 * EDGE as f32].map(F8::splat);
-        let u = d.dot(V8::splat(&self.axes[0])) * scale + middle;
-        let v = d.dot(V8::splat(&self.axes[1])) * scale + middle;
-        let height = d.dot(V8::splat(&self.axes[2]));
-        let level = height - (u * F8::splat(self.lean[0]) + v * F8::splat(self.lean[1]));
-        Places { u, v, height, level }
+    pub(crate) fn project(&self, p_w: Vec3x8) -> LightSpacePoints {
+        let d = p_w - Vec3x8::splat(&self.centre);
+        let [scale, middle] = [self.texels_per_metre, 0.5 * EDGE as f32].map(f32x8::splat);
+        let u = d.dot(Vec3x8::splat(&self.axes[0])) * scale + middle;
+        let v = d.dot(Vec3x8::splat(&self.axes[1])) * scale + middle;
+        let height = d.dot(Vec3x8::splat(&self.axes[2]));
+        let ground = u * f32x8::splat(self.ground_slope[0]) + v * f32x8::splat(self.ground_slope[1]);
+        LightSpacePoints { u, v, height, height_above_ground: height - ground }
     }
 
-    /// Adds casters.
+    /// Draws the triangles of a caster that face the light.
     pub(crate) fn draw(&mut self, positions: &[V3], triangles: &[[u32; 3]]) {
-        let mut places = std::mem::take(&mut self.places);
-        places.clear();
-        places.extend(positions.iter().map(|p| self.place(p)));
+        let mut vertices = std::mem::take(&mut self.vertices);
+        vertices.clear();
+        vertices.extend(positions.iter().map(|p| self.project_vertex(p)));
         for t in triangles {
-            // Faces towards the light only: u × v points to it, so that they run the positive way.
-            let at @ [a, b, c] = t.map(|v| places[v as usize]);
+            let corners @ [a, b, c] = t.map(|v| vertices[v as usize]);
+            // u × v points to the light, so triangles that face it have positive area.
             if (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]) > 0.0 {
-                self.heights.draw::<false>(&at, [0.0; 2], 0);
+                self.heights.draw::<false>(&corners, [0.0; 2], 0);
             }
         }
-        self.places = places;
+        self.vertices = vertices;
     }
 
-    /// To be called when all casters are drawn.
+    /// Computes the ranges of heights. To be called after all casters are drawn.
     pub(crate) fn finish(&mut self) {
-        self.own.fill([EMPTY; 2]);
-        self.ranges.fill([EMPTY; 2]);
-        let [from, to] = self.heights.touched;
+        self.tile_ranges.fill(HeightRange::EMPTY);
+        self.ranges.fill(HeightRange::EMPTY);
+        let [from, to] = self.heights.drawn_rows;
         if from >= to {
             return;
         }
         let stride = self.heights.stride();
         for row in from / TILE..to.div_ceil(TILE) {
             for column in 0..TILES {
-                let (mut low, mut high) = (F8::splat(f32::MAX), F8::splat(EMPTY));
+                let (mut low, mut high) = (f32x8::splat(f32::MAX), f32x8::splat(EMPTY));
                 for y in row * TILE..(row + 1) * TILE {
                     let at = y * stride + column * TILE;
                     let Some(texels) = self.heights.w[at..].first_chunk::<TILE>() else { continue };
-                    let u = STEPS + F8::splat((column * TILE) as f32 + 0.5);
-                    let ground = u * F8::splat(self.lean[0]) + F8::splat(self.lean[1] * (y as f32 + 0.5));
-                    let level = F8::new(*texels) - ground;
-                    (low, high) = (low.fast_min(level), high.fast_max(level));
+                    let u = LANE_INDEX + f32x8::splat((column * TILE) as f32 + 0.5);
+                    let ground = u * f32x8::splat(self.ground_slope[0])
+                        + f32x8::splat(self.ground_slope[1] * (y as f32 + 0.5));
+                    let above_ground = f32x8::new(*texels) - ground;
+                    (low, high) = (low.fast_min(above_ground), high.fast_max(above_ground));
                 }
-                let least = low.to_array().into_iter().fold(f32::MAX, f32::min);
-                let most = high.to_array().into_iter().fold(EMPTY, f32::max);
-                self.own[row * TILES + column] = [least, most];
+                let min = low.to_array().into_iter().fold(f32::MAX, f32::min);
+                let max = high.to_array().into_iter().fold(EMPTY, f32::max);
+                self.tile_ranges[row * TILES + column] = HeightRange { min, max };
             }
         }
-        let span = |i: usize| i.saturating_sub(AROUND)..(i + AROUND + 1).min(TILES);
-        let join = |a: [f32; 2], b: &[f32; 2]| [a[0].min(b[0]), a[1].max(b[1])];
-        let rows = (from / TILE).saturating_sub(AROUND)..(to.div_ceil(TILE) + AROUND).min(TILES);
+        // Dilate by the reach of the filter: along v, then along u.
+        let around = |i: usize| i.saturating_sub(RANGE_MARGIN)..(i + RANGE_MARGIN + 1).min(TILES);
+        let rows =
+            (from / TILE).saturating_sub(RANGE_MARGIN)..(to.div_ceil(TILE) + RANGE_MARGIN).min(TILES);
         for y in rows {
-            let mut column_ranges = [[f32::MAX, EMPTY]; TILES];
-            for row in span(y) {
-                let line = &self.own[row * TILES..(row + 1) * TILES];
-                column_ranges.iter_mut().zip(line).for_each(|(all, own)| *all = join(*all, own));
+            let mut columns = [HeightRange::NEUTRAL; TILES];
+            for row in around(y) {
+                let line = &self.tile_ranges[row * TILES..(row + 1) * TILES];
+                columns.iter_mut().zip(line).for_each(|(all, own)| *all = all.union(own));
             }
             for x in 0..TILES {
-                self.ranges[y * TILES + x] = column_ranges[span(x)].iter().fold([f32::MAX, EMPTY], join);
+                let union = columns[around(x)].iter().fold(HeightRange::NEUTRAL, HeightRange::union);
+                self.ranges[y * TILES + x] = union;
             }
         }
     }
 
-    /// Whether a shadow can fall on anything at least as high as `least` above level ground between two corners, texels.
-    pub(crate) fn may_shade(&self, from: [f32; 2], to: [f32; 2], least: f32) -> bool {
+    /// True if a shadow may fall within `bounds`.
+    pub(crate) fn may_shade(&self, bounds: &LightSpaceBounds) -> bool {
         let tile = |x: f32| (x.max(0.0) as usize / TILE).min(TILES - 1);
-        let columns = tile(from[0])..tile(to[0]) + 1;
-        (tile(from[1])..tile(to[1]) + 1)
-            .any(|y| self.ranges[y * TILES..][columns.clone()].iter().any(|range| range[1] > least + OFFSET))
+        let columns = tile(bounds.low[0])..tile(bounds.high[0]) + 1;
+        (tile(bounds.low[1])..tile(bounds.high[1]) + 1).any(|y| {
+            let line = &self.ranges[y * TILES..][columns.clone()];
+            line.iter().any(|range| range.max > bounds.min_height + DEPTH_BIAS)
+        })
     }
 
-    /// Which points the map knows something about.
+    /// Mask of the points that lie within the map.
     #[inline(always)]
-    pub(crate) fn inside(&self, at: &Places) -> F8 {
-        let (low, high) = (F8::splat(MARGIN as f32), F8::splat((MARGIN + INNER) as f32));
+    pub(crate) fn contains(&self, at: &LightSpacePoints) -> f32x8 {
+        let (low, high) = (f32x8::splat(MARGIN as f32), f32x8::splat((MARGIN + INNER) as f32));
         at.u.simd_ge(low) & at.v.simd_ge(low) & at.u.simd_lt(high) & at.v.simd_lt(high)
     }
 
-    /// Shares of the light that reach eight points of normals `n`, of those in `wanted`; 1 for others.
+    /// Visible fraction of the light at points of normals `n`; 1 where `mask` is clear or the map does not reach.
     #[inline(always)]
-    pub(crate) fn light(&self, at: &Places, n: &V8, wanted: F8) -> F8 {
-        let inside = (self.inside(at) & wanted).to_bitmask();
-        let [first, last] = self.heights.touched;
+    pub(crate) fn visibility(&self, at: &LightSpacePoints, n: &Vec3x8, mask: f32x8) -> f32x8 {
+        let inside = (self.contains(at) & mask).to_bitmask();
+        let [first, last] = self.heights.drawn_rows;
         if inside == 0 || first >= last {
-            return F8::ONE;
+            return f32x8::ONE;
         }
-        let tile = |x: F8| {
-            (x.fast_max(F8::ZERO).fast_min(F8::splat((EDGE - 1) as f32))).fast_trunc_int() >> TILE_BITS
+        let tile = |x: f32x8| {
+            (x.fast_max(f32x8::ZERO).fast_min(f32x8::splat((EDGE - 1) as f32))).fast_trunc_int() >> TILE_BITS
         };
         let tiles = (tile(at.v) * i32x8::splat(TILES as i32) + tile(at.u)).to_array();
         let ranges = tiles.map(|i| self.ranges[i as usize % (TILES * TILES)]);
-        let most = F8::new(ranges.map(|[_, most]| most));
-        let near = most.simd_gt(at.level + F8::splat(OFFSET)).to_bitmask() & inside;
-        if near == 0 { F8::ONE } else { self.filtered(at, n, near, &ranges) }
+        let max = f32x8::new(ranges.map(|range| range.max));
+        let occluded = max.simd_gt(at.height_above_ground + f32x8::splat(DEPTH_BIAS)).to_bitmask() & inside;
+        if occluded == 0 { f32x8::ONE } else { self.filtered_visibility(at, n, occluded, &ranges) }
     }
 
-    /// The shares of the points `near` something higher, by the ranges of heights around them.
+    /// Visible fractions at the points of the bit mask `occluded`, which have something higher in their `ranges`.
     #[inline(never)]
-    fn filtered(&self, at: &Places, n: &V8, near: u32, ranges: &[[f32; 2]; LANES]) -> F8 {
-        let surfaces = Surfaces::new(self, at, n);
-        let level = at.level.to_array();
-        let one = |i: usize| surfaces.filter(self, i).share(ranges[i].map(|end| end - level[i]));
-        let length = if near == 0xFF { surfaces.run() } else { f32::MAX };
-        if length > LONG_RUN {
-            return F8::new(std::array::from_fn(|i| if near >> i & 1 == 1 { one(i) } else { 1.0 }));
+    fn filtered_visibility(
+        &self,
+        at: &LightSpacePoints,
+        n: &Vec3x8,
+        occluded: u32,
+        ranges: &[HeightRange; LANES],
+    ) -> f32x8 {
+        let receivers = ReceiverPlanes::new(self, at, n);
+        let own_height = at.height_above_ground.to_array();
+        let filter = |i: usize| {
+            let HeightRange { min, max } = ranges[i];
+            let above_point = HeightRange { min: min - own_height[i], max: max - own_height[i] };
+            receivers.filter(self, i).visibility(above_point)
+        };
+        let run_length = if occluded == 0xFF { receivers.run_length() } else { f32::MAX };
+        if run_length > UNIFORM_RUN {
+            let lane = |i: usize| if occluded >> i & 1 == 1 { filter(i) } else { 1.0 };
+            return f32x8::new(std::array::from_fn(lane));
         }
-        let known @ [a, b, c, d] = NODES.map(one);
-        // What is narrower than the gaps is still seen from beside it: no filter is narrower than they are.
-        if known == [0.0; 4] || known == [1.0; 4] {
-            return F8::splat(a);
+        let nodes @ [a, b, c, d] = RUN_NODES.map(filter);
+        // The filter is wider than the gaps between the nodes, so it would also find an occluder narrower than a gap.
+        if nodes == [0.0; 4] || nodes == [1.0; 4] {
+            return f32x8::splat(a);
         }
-        if length > RUN { F8::new([a, one(1), b, one(3), one(4), c, one(6), d]) } else { run_of(known) }
+        if run_length > INTERPOLATED_RUN {
+            f32x8::new([a, filter(1), b, filter(3), filter(4), c, filter(6), d])
+        } else {
+            interpolate_run(nodes)
+        }
     }
 }
 
-/// Values of a run of eight from those at [`NODES`]: the cubic through them.
-fn run_of(known: [f32; 4]) -> F8 {
-    let nodes = NODES.map(|node| F8::splat(node as f32));
-    let mut sum = F8::ZERO;
-    for (i, value) in known.into_iter().enumerate() {
-        let mut term = F8::splat(value);
-        for j in (0..NODES.len()).filter(|&j| j != i) {
-            term *= (STEPS - nodes[j]) * F8::splat(1.0 / (NODES[i] as f32 - NODES[j] as f32));
+/// Interpolates a run of eight values by the cubic through those at [`RUN_NODES`].
+fn interpolate_run(values: [f32; 4]) -> f32x8 {
+    let nodes = RUN_NODES.map(|node| f32x8::splat(node as f32));
+    let mut sum = f32x8::ZERO;
+    for (i, value) in values.into_iter().enumerate() {
+        let mut term = f32x8::splat(value);
+        for j in (0..RUN_NODES.len()).filter(|&j| j != i) {
+            term *= (LANE_INDEX - nodes[j]) * f32x8::splat(1.0 / (RUN_NODES[i] as f32 - RUN_NODES[j] as f32));
         }
         sum += term;
     }
-    sum.fast_max(F8::ZERO).fast_min(F8::ONE)
+    sum.fast_max(f32x8::ZERO).fast_min(f32x8::ONE)
 }
 
-/// What is around one point.
-///
-/// A thing hides light that comes to a point from within the lamp's cone only: what is farther away to the side than its
-/// height times the lamp's width does not count, so that a surface that rises beside the point does not darken it.
-struct Filter<'a> {
-    map: &'a ShadowMap,
-    place: [f32; 3],
-    /// Rise of the surface itself a texel along each axis, m.
-    slope: [f32; 2],
-    /// The same, but not steeper than heights can be told from.
-    tilt: [f32; 2],
-    /// What is not higher than this above the surface is the surface, m.
-    bias: f32,
-    /// Half the width of the lamp's cone a metre, texels.
-    cone: f32,
-}
-
-/// Eight points and what the surfaces around them are, as in [`Filter`].
-struct Surfaces {
-    place: [F8; 3],
-    normal: V8,
+/// Eight receivers: points with the planes of their surfaces in the frame of the map.
+struct ReceiverPlanes {
+    /// u and v, texels, and height, m.
+    position: [f32x8; 3],
+    normal: Vec3x8,
+    /// See [`PenumbraFilter`].
     slope: [[f32; LANES]; 2],
-    tilt: [[f32; LANES]; 2],
+    clamped_slope: [[f32; LANES]; 2],
     bias: [f32; LANES],
 }
 
-impl Surfaces {
-    fn new(map: &ShadowMap, at: &Places, n: &V8) -> Self {
-        let along = |axis: usize| n.dot(V8::splat(&map.axes[axis]));
-        let inverse = F8::ONE / along(2).fast_max(F8::splat(LEAST_COSINE));
-        let texel = F8::splat(1.0 / map.texels_per_metre);
-        let slope = [0, 1].map(|axis| -along(axis) * inverse * texel);
-        let most = F8::splat(STEEPEST) * texel;
-        let bent = F8::splat(NARROWEST * BENT) * texel * inverse * inverse;
+impl ReceiverPlanes {
+    fn new(map: &ShadowMap, at: &LightSpacePoints, n: &Vec3x8) -> Self {
+        let component = |axis: usize| n.dot(Vec3x8::splat(&map.axes[axis]));
+        let inverse_cosine = f32x8::ONE / component(2).fast_max(f32x8::splat(MIN_COSINE));
+        let texel = f32x8::splat(1.0 / map.texels_per_metre);
+        let slope = [0, 1].map(|axis| -component(axis) * inverse_cosine * texel);
+        let max_slope = f32x8::splat(MAX_RECEIVER_SLOPE) * texel;
+        let normal_bias =
+            f32x8::splat(MIN_RADIUS * MAX_NORMAL_ERROR) * texel * inverse_cosine * inverse_cosine;
         Self {
-            place: [at.u, at.v, at.height],
+            position: [at.u, at.v, at.height],
             normal: *n,
-            slope: slope.map(F8::to_array),
-            tilt: slope.map(|rise| rise.fast_max(-most).fast_min(most).to_array()),
-            bias: (F8::splat(OFFSET) * inverse + bent).to_array(),
+            slope: slope.map(f32x8::to_array),
+            clamped_slope: slope.map(|s| s.fast_max(-max_slope).fast_min(max_slope).to_array()),
+            bias: (f32x8::splat(DEPTH_BIAS) * inverse_cosine + normal_bias).to_array(),
         }
     }
 
-    fn filter<'a>(&self, map: &'a ShadowMap, i: usize) -> Filter<'a> {
-        Filter {
+    fn filter<'a>(&self, map: &'a ShadowMap, i: usize) -> PenumbraFilter<'a> {
+        PenumbraFilter {
             map,
-            place: self.place.map(|x| x.to_array()[i]),
-            slope: self.slope.map(|rise| rise[i]),
-            tilt: self.tilt.map(|rise| rise[i]),
+            position: self.position.map(|x| x.to_array()[i]),
+            slope: self.slope.map(|slope| slope[i]),
+            clamped_slope: self.clamped_slope.map(|slope| slope[i]),
             bias: self.bias[i],
             cone: map.tangent * map.texels_per_metre,
         }
     }
 
-    /// Length of the line along which the points lie evenly on a flat surface, texels; endless if they do not.
-    fn run(&self) -> f32 {
-        let [u, v, _] = self.place;
-        let spans = [u, v].map(|x| {
+    /// Length in texels of the line on which the points are equally spaced on one plane; `f32::MAX` if they are not.
+    fn run_length(&self) -> f32 {
+        let [u, v, _] = self.position;
+        let extents = [u, v].map(|x| {
             let [first, .., last] = x.to_array();
-            let line = F8::splat(first) + STEPS * F8::splat((last - first) / (LANES - 1) as f32);
-            let even = (x - line).abs().simd_lt(F8::splat(UNEVEN)).all();
-            if even { (last - first).abs() } else { f32::MAX }
+            let line = f32x8::splat(first) + LANE_INDEX * f32x8::splat((last - first) / (LANES - 1) as f32);
+            let is_even = (x - line).abs().simd_lt(f32x8::splat(MAX_RUN_DEVIATION)).all();
+            if is_even { (last - first).abs() } else { f32::MAX }
         });
-        let first = V3::from(self.normal.to_arrays().map(|axis| axis[0]));
-        // Heights follow the plane through the first point.
+        let first_normal = V3::from(self.normal.to_arrays().map(|axis| axis[0]));
         let rise = |axis: usize| {
-            let from = F8::splat(self.place[axis].to_array()[0]);
-            (self.place[axis] - from) * F8::splat(self.slope[axis][0])
+            let origin = f32x8::splat(self.position[axis].to_array()[0]);
+            (self.position[axis] - origin) * f32x8::splat(self.slope[axis][0])
         };
-        let plane = F8::splat(self.place[2].to_array()[0]) + rise(0) + rise(1);
-        let on_plane = (self.place[2] - plane).abs().simd_lt(F8::splat(OFFSET)).all();
-        let flat = self.normal.dot(V8::splat(&first)).simd_gt(F8::splat(FLAT)).all();
-        if flat && on_plane { spans[0].max(spans[1]) } else { f32::MAX }
+        let plane = f32x8::splat(self.position[2].to_array()[0]) + rise(0) + rise(1);
+        let on_plane = (self.position[2] - plane).abs().simd_lt(f32x8::splat(DEPTH_BIAS)).all();
+        let cosines = self.normal.dot(Vec3x8::splat(&first_normal));
+        let is_flat = cosines.simd_gt(f32x8::splat(MIN_RUN_COSINE)).all();
+        if is_flat && on_plane { extents[0].max(extents[1]) } else { f32::MAX }
     }
 }
 
-impl Filter<'_> {
-    /// Share of the light, 0..=1; what is around is higher above level ground than the point by numbers of a range, m.
-    fn share(&self, [least, most]: [f32; 2]) -> f32 {
-        let both = |of: fn(&Self, usize) -> f32| of(self, 0) + of(self, 1);
-        let steepest = both(|f, axis| f.slope[axis].abs() + f.map.lean[axis].abs());
-        if least > self.bias + steepest * WIDEST {
+/// Percentage-closer filter around one receiver.
+///
+/// Only occluders within the cone of the lamp count: an offset to the side larger than height × lamp width is ignored, so a
+/// surface that rises next to the point does not darken it.
+struct PenumbraFilter<'a> {
+    map: &'a ShadowMap,
+    /// u and v, texels, and height, m.
+    position: [f32; 3],
+    /// Rise of the receiver's plane per texel along u and v, m.
+    slope: [f32; 2],
+    /// The slope clamped to [`MAX_RECEIVER_SLOPE`], from which heights of occluders are measured.
+    clamped_slope: [f32; 2],
+    /// Heights above the plane up to this are the receiver itself, m.
+    bias: f32,
+    /// Radius of the lamp's cone per metre of height, texels.
+    cone: f32,
+}
+
+/// Weighted sums over the texels around a receiver.
+struct FilterSums {
+    lit: f32,
+    occluded: f32,
+    /// Of occluders: weight × height above the receiver, m.
+    occluder_height: f32,
+}
+
+impl PenumbraFilter<'_> {
+    /// Visible fraction of the light; `range` are the heights around the point, relative to it and to level ground.
+    fn visibility(&self, range: HeightRange) -> f32 {
+        let both_axes = |of: fn(&Self, usize) -> f32| of(self, 0) + of(self, 1);
+        let steepest = both_axes(|f, axis| f.slope[axis].abs() + f.map.ground_slope[axis].abs());
+        if range.min > self.bias + steepest * MAX_RADIUS {
             return 0.0;
         }
-        let uneven = both(|f, axis| (f.map.lean[axis] - f.tilt[axis]).abs());
-        let reach = (NARROWEST + (most + uneven * WIDEST) * self.cone).clamp(NARROWEST, WIDEST);
-        let [open, hidden, above] = match reach {
-            ..=ONE_VECTOR => self.sums::<1, 1, true>(reach),
-            _ => self.sums::<2, 2, true>(reach),
+        let deviation = both_axes(|f, axis| (f.map.ground_slope[axis] - f.clamped_slope[axis]).abs());
+        let search_radius = (MIN_RADIUS + (range.max + deviation * MAX_RADIUS) * self.cone)
+            .clamp(MIN_RADIUS, MAX_RADIUS);
+        let search = match search_radius {
+            ..=MAX_RADIUS_ONE_VECTOR => self.sums::<1, 1, true>(search_radius),
+            _ => self.sums::<2, 2, true>(search_radius),
         };
-        if hidden <= 0.0 {
+        if search.occluded <= 0.0 {
             return 1.0;
         }
-        if open <= 0.0 {
+        if search.lit <= 0.0 {
             return 0.0;
         }
-        let width = (above / hidden * self.cone).clamp(NARROWEST, reach);
-        let [open, hidden, _] = match width {
-            ..=ONE_VECTOR => self.sums::<1, 1, false>(width),
-            _ => self.sums::<2, 2, false>(width),
+        let mean_height = search.occluder_height / search.occluded;
+        let radius = (mean_height * self.cone).clamp(MIN_RADIUS, search_radius);
+        let filtered = match radius {
+            ..=MAX_RADIUS_ONE_VECTOR => self.sums::<1, 1, false>(radius),
+            _ => self.sums::<2, 2, false>(radius),
         };
-        if hidden <= 0.0 { 1.0 } else { open / (open + hidden) }
+        if filtered.occluded <= 0.0 { 1.0 } else { filtered.lit / (filtered.lit + filtered.occluded) }
     }
 
-    /// Weights of what lets light through and of what hides it within `radius` texels, and the latter's weighted height
-    /// above the surface; of every `STEP`th row, and as wide as `CHUNKS` vectors. A `SEARCH` weighs what hides light by the
-    /// cone alone, so that it does not matter how far it reaches.
+    /// Sums over a disc of `radius` texels, `CHUNKS` vectors wide, in every `STEP`th row.
+    ///
+    /// A `SEARCH` weighs occluders by the lamp's cone alone, so that the result does not depend on the search radius.
     #[inline(always)]
-    fn sums<const CHUNKS: usize, const STEP: usize, const SEARCH: bool>(&self, radius: f32) -> [f32; 3] {
-        let [u, v, height] = self.place;
+    fn sums<const CHUNKS: usize, const STEP: usize, const SEARCH: bool>(&self, radius: f32) -> FilterSums {
+        let [u, v, height] = self.position;
         let first = (u - radius) as usize;
         let (from, to) = ((v - radius) as usize, (v + radius) as usize + 1);
         let inverse2 = 1.0 / (radius * radius);
-        let across: [F8; CHUNKS] =
-            std::array::from_fn(|c| STEPS + F8::splat((first + c * LANES) as f32 + 0.5 - u));
-        let across2 = across.map(|d| d * d);
-        // A paraboloid's worth of weight: softer than a box, and still separable.
-        let weights = across2.map(|d2| (F8::ONE - d2 * F8::splat(inverse2)).fast_max(F8::ZERO));
-        let rise = across.map(|d| d * F8::splat(self.slope[0]));
-        let tilt = across.map(|d| d * F8::splat(self.tilt[0]) + F8::splat(height));
-        let limit = F8::splat(height + self.bias);
-        let [cone, narrowest] = [self.cone, NARROWEST].map(F8::splat);
-        let widest = F8::splat(if SEARCH { radius } else { f32::MAX });
-        let (mut open, mut hidden, mut above) = (F8::ZERO, F8::ZERO, F8::ZERO);
+        let du: [f32x8; CHUNKS] =
+            std::array::from_fn(|c| LANE_INDEX + f32x8::splat((first + c * LANES) as f32 + 0.5 - u));
+        let du2 = du.map(|d| d * d);
+        // The product of two parabolas: smoother than a box, and separable.
+        let weights = du2.map(|d2| (f32x8::ONE - d2 * f32x8::splat(inverse2)).fast_max(f32x8::ZERO));
+        let plane_rise = du.map(|d| d * f32x8::splat(self.slope[0]));
+        let plane_height = du.map(|d| d * f32x8::splat(self.clamped_slope[0]) + f32x8::splat(height));
+        let limit = f32x8::splat(height + self.bias);
+        let [cone, min_radius] = [self.cone, MIN_RADIUS].map(f32x8::splat);
+        let max_reach = f32x8::splat(if SEARCH { radius } else { f32::MAX });
+        let (mut lit, mut occluded, mut occluder_height) = (f32x8::ZERO, f32x8::ZERO, f32x8::ZERO);
         let stride = self.map.heights.stride();
         for row in (from.div_ceil(STEP) * STEP..to).step_by(STEP) {
-            let d = row as f32 + 0.5 - v;
-            let share = F8::splat((1.0 - d * d * inverse2).max(0.0));
-            let [row_rise, row_tilt, d2] = [self.slope[1] * d, self.tilt[1] * d, d * d].map(F8::splat);
+            let dv = row as f32 + 0.5 - v;
+            let row_weight = f32x8::splat((1.0 - dv * dv * inverse2).max(0.0));
+            let [row_rise, row_height, dv2] =
+                [self.slope[1] * dv, self.clamped_slope[1] * dv, dv * dv].map(f32x8::splat);
             let texels = self.map.heights.w.get(row * stride + first..).unwrap_or_default();
             for (c, texels) in texels.as_chunks::<LANES>().0.iter().take(CHUNKS).enumerate() {
-                let heights = F8::new(*texels);
-                let weight = weights[c] * share;
-                let higher = heights.simd_gt(limit + (rise[c] + row_rise).fast_max(F8::ZERO));
-                open += weight & !higher;
-                let rise = heights - tilt[c] - row_tilt;
-                let reach = (rise * cone + narrowest).fast_min(widest);
-                // Whole for all that is as high as what it was sought by, and fading to the cone's border.
-                let within = (reach * reach - across2[c] - d2) * F8::splat(1.0 / (NARROWEST * NARROWEST));
-                let within = higher & within.fast_max(F8::ZERO).fast_min(F8::ONE);
+                let heights = f32x8::new(*texels);
+                let weight = weights[c] * row_weight;
+                let is_higher = heights.simd_gt(limit + (plane_rise[c] + row_rise).fast_max(f32x8::ZERO));
+                lit += weight & !is_higher;
+                let rise = heights - plane_height[c] - row_height;
+                let reach = (rise * cone + min_radius).fast_min(max_reach);
+                // Full weight inside the cone, which fades out towards its border.
+                let within = (reach * reach - du2[c] - dv2) * f32x8::splat(1.0 / (MIN_RADIUS * MIN_RADIUS));
+                let within = is_higher & within.fast_max(f32x8::ZERO).fast_min(f32x8::ONE);
                 if SEARCH {
-                    hidden += within;
-                    above += within * rise;
+                    occluded += within;
+                    occluder_height += within * rise;
                 } else {
-                    hidden += weight * within;
+                    occluded += weight * within;
                 }
             }
         }
-        [open, hidden, above].map(sum)
+        FilterSums {
+            lit: sum_lanes(lit),
+            occluded: sum_lanes(occluded),
+            occluder_height: sum_lanes(occluder_height),
+        }
     }
-}
-
-/// In one order on every machine.
-fn sum(x: F8) -> f32 {
-    let [a, b, c, d, e, f, g, h] = x.to_array();
-    ((a + e) + (c + g)) + ((b + f) + (d + h))
 }

@@ -1,41 +1,43 @@
-//! Lines of text on surfaces.
+//! Evaluates text decals on surfaces.
 
-use crate::sensing::camera::V3;
-use crate::{geometry::Vec3, scene::TextDecal};
+use crate::{geometry::Vec3, scene::TextDecal, sensing::camera::math::V3};
 
-/// Surfaces that lean farther away from who reads a line have no letters on them: cosine.
-const GRAZING: f32 = 0.1;
-/// Surfaces nearer to the axis or farther from it than a wrapped line by more than this share of its radius have none.
-const ASIDE: f64 = 0.5;
+/// Minimum cosine between the normal of a printed surface and the direction of the text.
+const MIN_FACING_COSINE: f32 = 0.1;
+/// Maximum distance of a printed surface from the cylinder of a wrapped line, in radii of the cylinder.
+const MAX_RADIUS_DEVIATION: f64 = 0.5;
 
-/// Share of the letters of a line in a square of edge `spacing` (m) about `p` (object frame, m) on a surface of normal `n`.
-pub(crate) fn share(decal: &TextDecal, p: &V3, n: &V3, spacing: f32) -> f32 {
-    let Some([right, up]) = place(decal, &p.cast(), n) else { return 0.0 };
+/// Fraction of the square of edge `spacing` (m) about `p` (object frame, m) that letters cover, on a surface of normal `n`.
+pub(crate) fn coverage(decal: &TextDecal, p: &V3, n: &V3, spacing: f32) -> f32 {
+    let Some([right, up]) = text_position(decal, &p.cast(), n) else { return 0.0 };
     let (sin, cos) = decal.line.turn.sin_cos();
-    decal.coverage().share(right * cos + up * sin, up * cos - right * sin, f64::from(spacing)) as f32
+    let (x, y) = (right * cos + up * sin, up * cos - right * sin);
+    decal.coverage().share(x, y, f64::from(spacing)) as f32
 }
 
-/// Where a point of a surface lies for who reads the line, to the right and up from its middle, m; none if nothing of the
-/// line is there.
-fn place(decal: &TextDecal, p: &Vec3, n: &V3) -> Option<[f64; 2]> {
+/// Position of a surface point relative to the middle of the line, to the right and up as seen by the viewer, m; `None` if the
+/// point is outside the printed area.
+fn text_position(decal: &TextDecal, p: &Vec3, n: &V3) -> Option<[f64; 2]> {
     let line = &decal.line;
-    let at = Vec3::from(line.at);
+    let middle = Vec3::from(line.at);
     let facing = Vec3::from(line.facing).normalize();
     if let Some(radius) = line.wrap_m {
         let outwards = Vec3::new(p.x, p.y, 0.0);
-        let seen = f64::from(n.x) * p.x + f64::from(n.y) * p.y > f64::from(GRAZING) * outwards.norm();
-        if !seen || (outwards.norm() - radius).abs() > ASIDE * radius {
+        let faces_out =
+            f64::from(n.x) * p.x + f64::from(n.y) * p.y > f64::from(MIN_FACING_COSINE) * outwards.norm();
+        if !faces_out || (outwards.norm() - radius).abs() > MAX_RADIUS_DEVIATION * radius {
             return None;
         }
-        let turn = (facing.x * p.y - facing.y * p.x).atan2(facing.x * p.x + facing.y * p.y);
-        return Some([radius * turn, p.z - at.z]);
+        let angle = (facing.x * p.y - facing.y * p.x).atan2(facing.x * p.x + facing.y * p.y);
+        return Some([radius * angle, p.z - middle.z]);
     }
     let head = if facing.z.abs() > 0.999 { Vec3::y() } else { Vec3::z() };
     let up = (head - facing * facing.dot(&head)).normalize();
-    let from = p - at;
+    let offset = p - middle;
     let depth = 0.5 * decal.coverage().length_m() + line.height_m;
-    let seen = n.cast::<f64>().dot(&facing) > f64::from(GRAZING) && from.dot(&facing).abs() < depth;
-    seen.then(|| [from.dot(&up.cross(&facing)), from.dot(&up)])
+    let is_printed = n.cast::<f64>().dot(&facing) > f64::from(MIN_FACING_COSINE)
+        && offset.dot(&facing).abs() < depth;
+    is_printed.then(|| [offset.dot(&up.cross(&facing)), offset.dot(&up)])
 }
 
 #[cfg(test)]
@@ -45,10 +47,10 @@ mod tests {
 
     fn value(line: &TextLine, p: [f64; 3], n: [f32; 3]) -> f32 {
         let p = Vec3::from(p).cast();
-        share(&TextDecal::new(line.clone()), &p, &n.into(), 5e-4)
+        coverage(&TextDecal::new(line.clone()), &p, &n.into(), 5e-4)
     }
 
-    /// Ink to the left and to the right of the middle; an L has more on its left.
+    /// Coverage to the left and to the right of the middle; an L has more on its left.
     fn sides(line: &TextLine, n: [f32; 3], place: impl Fn(f64, f64) -> [f64; 3]) -> [f32; 2] {
         [-1.0, 1.0].map(|side| {
             let all = (1..=12).flat_map(|i| (-12..=12).map(move |j| (f64::from(i), f64::from(j))));
@@ -57,7 +59,7 @@ mod tests {
     }
 
     #[test]
-    fn text_reads_upright_from_where_it_faces_and_is_not_mirrored() {
+    fn text_is_upright_and_not_mirrored_seen_from_the_direction_it_faces() {
         let line = |facing: [f64; 3]| TextLine {
             text: "L".into(),
             height_m: 0.01,
@@ -66,7 +68,7 @@ mod tests {
             facing,
             ..TextLine::default()
         };
-        // The reader's right and up for each direction.
+        // The viewer's right and up for each direction.
         for (n, right, up) in [
             ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]),
             ([-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]),
@@ -81,13 +83,13 @@ mod tests {
             assert!(left > 1.5 * other && other > 0.5, "{n:?}: {left} {other}");
             let foot = value(&facing, place(0.0, -0.0044), n);
             let head = value(&facing, place(0.0, 0.0044), n);
-            assert!(foot > 0.5 && head == 0.0, "{n:?}: an L has its bar below: {foot} {head}");
-            assert_eq!(value(&facing, place(0.0, -0.0044), n.map(|x: f32| -x)), 0.0, "the back has none");
+            assert!(foot > 0.5 && head == 0.0, "{n:?}: the bar of an L is at the bottom: {foot} {head}");
+            assert_eq!(value(&facing, place(0.0, -0.0044), n.map(|x: f32| -x)), 0.0, "the back is blank");
         }
     }
 
     #[test]
-    fn a_wrapped_line_goes_round_and_a_turned_one_turns() {
+    fn a_wrapped_line_follows_the_cylinder_and_turn_rotates_a_line() {
         let line = TextLine {
             text: "L".into(),
             height_m: 0.01,
@@ -106,13 +108,13 @@ mod tests {
         let [left, right] =
             [-1.0, 1.0].map(|side| (1..=12).map(|i| ink(side * f64::from(i) * 5e-4)).sum::<f32>());
         assert!(left > 1.5 * right && right > 0.5, "{left} {right}");
-        assert_eq!(value(&line, [0.0, 0.01, 0.05], [0.0, 1.0, 0.0]), 0.0, "not behind");
+        assert_eq!(value(&line, [0.0, 0.01, 0.05], [0.0, 1.0, 0.0]), 0.0, "the far side is blank");
         let upright = TextLine { wrap_m: None, facing: [0.0, 0.0, 1.0], at: [0.0; 3], ..line };
         let turned = TextLine { turn: std::f64::consts::FRAC_PI_2, ..upright.clone() };
         for (r, u) in [(-0.002, 0.003), (0.001, -0.0044), (0.002, 0.002)] {
             let up = [0.0, 0.0, 1.0];
             let before = value(&upright, [r, u, 0.0], up);
-            assert!((before - value(&turned, [-u, r, 0.0], up)).abs() < 1e-5, "a quarter counter-clockwise");
+            assert!((before - value(&turned, [-u, r, 0.0], up)).abs() < 1e-5, "a quarter turn counter-clockwise");
         }
     }
 }

@@ -1,67 +1,71 @@
-//! From scene radiance to bytes.
+//! Conversion of scene radiance to display values: exposure, tone curve and sRGB encoding.
 
-use crate::sensing::camera::simd::{F8, V8, whole};
+use crate::sensing::camera::simd::{Vec3x8, f32x8, floor_to_u32};
 
-/// The Khronos PBR Neutral tone mapper (Khronos Group, 2024): leaves colours below 0.76 nearly as they are and rolls
-/// highlights off towards white. Linear RGB to linear RGB in 0..1.
+/// The Khronos PBR Neutral tone mapper (Khronos Group, 2024), linear RGB to linear RGB in 0..1.
+///
+/// It keeps colours below 0.76 nearly unchanged, so that albedos appear as specified, and compresses highlights to white.
 #[inline(always)]
-fn neutral(colour: V8) -> V8 {
+fn khronos_neutral(colour: Vec3x8) -> Vec3x8 {
     const START: f32 = 0.8 - 0.04;
     const DESATURATION: f32 = 0.15;
-    let one = F8::ONE;
-    let least = colour.x.fast_min(colour.y).fast_min(colour.z);
-    let toe = least - F8::splat(6.25) * least * least;
-    let offset = least.simd_lt(F8::splat(0.08)).select(toe, F8::splat(0.04));
+    let one = f32x8::ONE;
+    let min = colour.x.fast_min(colour.y).fast_min(colour.z);
+    let toe = min - f32x8::splat(6.25) * min * min;
+    let offset = min.simd_lt(f32x8::splat(0.08)).select(toe, f32x8::splat(0.04));
     let colour = colour.map(|c| c - offset);
     let peak = colour.x.fast_max(colour.y).fast_max(colour.z);
-    let bright = peak.simd_ge(F8::splat(START));
-    if !bright.any() {
+    let is_bright = peak.simd_ge(f32x8::splat(START));
+    if !is_bright.any() {
         return colour;
     }
-    let room = 1.0 - START;
-    let rolled = one - F8::splat(room * room) / (peak + F8::splat(room - START)).fast_max(F8::splat(room));
-    let kept = one / (F8::splat(DESATURATION) * (peak - rolled) + one);
-    let scale = rolled / peak.fast_max(F8::splat(1e-6)) * kept;
-    let grey = rolled * (one - kept);
-    colour.map(|c| c * scale + grey).or(bright, colour)
+    let headroom = 1.0 - START;
+    let compressed_peak = one
+        - f32x8::splat(headroom * headroom)
+            / (peak + f32x8::splat(headroom - START)).fast_max(f32x8::splat(headroom));
+    let saturation = one / (f32x8::splat(DESATURATION) * (peak - compressed_peak) + one);
+    let scale = compressed_peak / peak.fast_max(f32x8::splat(1e-6)) * saturation;
+    let grey = compressed_peak * (one - saturation);
+    Vec3x8::select(is_bright, colour.map(|c| c * scale + grey), colour)
 }
 
-/// Entries of the table of sRGB's curve: a step of it is less than a fifth of a byte's.
-const ENTRIES: usize = 2048;
+/// Entries of the table of the sRGB curve: its steps are less than a fifth of a byte.
+const TABLE_LEN: usize = 2048;
 
-/// The power 5/6 of a number in 0.01..=1 by Newton's method from above: the same bits on every machine.
-fn five_sixths(x: f64) -> f64 {
+/// Returns x^(5/6) for x in 0.01..=1 by Newton's method. Unlike `powf`, it gives the same bits on every machine.
+fn pow_five_sixths(x: f64) -> f64 {
     let target = x.powi(5);
     (0..40).fold(1.0, |y: f64, _| y - (y - target / y.powi(5)) / 6.0)
 }
 
-/// Radiance to display values: exposure, tone curve, sRGB (IEC 61966-2-1).
+/// Maps radiance to sRGB display values (IEC 61966-2-1).
 #[derive(Clone, Debug)]
 pub(crate) struct ToneMapper {
     exposure: f32,
-    /// TileDisplay value, 0..=255, at `i / (ENTRIES − 1)` of the square root of the linear value.
-    curve: Box<[f32; ENTRIES]>,
+    /// Display value, 0..=255, where the square root of the linear value is `i / (TABLE_LEN − 1)`.
+    table: Box<[f32; TABLE_LEN]>,
 }
 
 impl ToneMapper {
     pub(crate) fn new(exposure: f64) -> Self {
-        let mut curve = Box::new([0.0; ENTRIES]);
-        for (i, value) in curve.iter_mut().enumerate() {
-            let root = i as f64 / (ENTRIES - 1) as f64;
+        let mut table = Box::new([0.0; TABLE_LEN]);
+        for (i, value) in table.iter_mut().enumerate() {
+            let root = i as f64 / (TABLE_LEN - 1) as f64;
             let x = root * root;
-            let display = if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * five_sixths(root) - 0.055 };
+            let display = if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * pow_five_sixths(root) - 0.055 };
             *value = (255.0 * display) as f32;
         }
-        Self { exposure: exposure as f32, curve }
+        Self { exposure: exposure as f32, table }
     }
 
-    /// TileDisplay values, 0..=255, not yet rounded.
+    /// Returns display values, 0..=255, not yet rounded to bytes.
     #[inline(always)]
-    pub(crate) fn display(&self, radiance: V8) -> V8 {
-        let scale = F8::splat((ENTRIES - 1) as f32);
-        neutral(radiance * F8::splat(self.exposure)).map(|c| {
-            let at = whole(c.fast_max(F8::ZERO).fast_min(F8::ONE).sqrt() * scale + F8::splat(0.5));
-            F8::new(at.map(|i| self.curve[i as usize % ENTRIES]))
+    pub(crate) fn display(&self, radiance: Vec3x8) -> Vec3x8 {
+        let scale = f32x8::splat((TABLE_LEN - 1) as f32);
+        khronos_neutral(radiance * f32x8::splat(self.exposure)).map(|c| {
+            let clamped = c.fast_max(f32x8::ZERO).fast_min(f32x8::ONE);
+            let index = floor_to_u32(clamped.sqrt() * scale + f32x8::splat(0.5));
+            f32x8::new(index.map(|i| self.table[i as usize % TABLE_LEN]))
         })
     }
 }
@@ -71,13 +75,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_curve_is_srgbs() {
+    fn the_encoding_curve_is_that_of_srgb() {
         for x in [0.0032_f64, 0.02, 0.18, 0.5, 0.9, 1.0] {
-            assert!((five_sixths(x.sqrt()) - x.powf(1.0 / 2.4)).abs() < 1e-14, "{x}");
+            assert!((pow_five_sixths(x.sqrt()) - x.powf(1.0 / 2.4)).abs() < 1e-14, "{x}");
         }
-        // Neutral leaves middle colours alone but for 0.04.
-        let display =
-            ToneMapper::new(1.0).display(V8 { x: F8::splat(0.254), y: F8::splat(0.2), z: F8::splat(0.14) });
+        // The Neutral curve only subtracts 0.04 from mid-tones.
+        let display = ToneMapper::new(1.0).display(Vec3x8 {
+            x: f32x8::splat(0.254),
+            y: f32x8::splat(0.2),
+            z: f32x8::splat(0.14),
+        });
         let expected = 255.0 * (1.055 * 0.214_f64.powf(1.0 / 2.4) - 0.055);
         assert!((f64::from(display.x.to_array()[0]) - expected).abs() < 0.15);
     }
