@@ -108,7 +108,7 @@ fn materials_look_as_they_did() {
     let board =
         Visual::plain([0.42, 0.43, 0.45], 0.7, 0.0).with(layer(noise(3, 0.3, 0.8), [0.36, 0.37, 0.39], 0.0));
     let still = |name: String, object, shape: &Shape, visual: Visual, at: [f64; 3]| RenderObject {
-        mesh: Arc::new(RenderMesh::of_shape(&name, shape, &[visual]).expect("a surface")),
+        mesh: Arc::new(RenderMesh::from_shape(&name, shape, &[visual]).expect("a surface")),
         name,
         segmentation_id: object,
         attachment: Attachment::Fixed(Pose::from_parts(Vec3::from(at).into(), Quat::identity())),

@@ -33,10 +33,9 @@ impl SensorAssets {
         let same = |known: &Arc<Asset>| alike(known, asset) && known.visuals == asset.visuals;
         self.models.get(asset, same, || {
             let model = match mesh {
-                None => RenderMesh::of_shape(name, &asset.shape, &asset.visuals)?,
-                Some(mesh) => {
-                    RenderMesh::of_skin(name, &asset.shape, &asset.visuals)?.embedded(name, mesh)?
-                }
+                None => RenderMesh::from_shape(name, &asset.shape, &asset.visuals)?,
+                Some(mesh) => RenderMesh::from_deformable_shape(name, &asset.shape, &asset.visuals)?
+                    .embedded_in(name, mesh)?,
             };
             Ok(Arc::new(model))
         })

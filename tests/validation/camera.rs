@@ -14,7 +14,7 @@ use softvt::{
 const EDGE: usize = 224;
 
 fn thing(object: u16, shape: &Shape, visual: Visual, pose: Pose) -> RenderObject {
-    let model = RenderMesh::of_shape("thing", shape, &[visual]).expect("a surface");
+    let model = RenderMesh::from_shape("thing", shape, &[visual]).expect("a surface");
     RenderObject {
         name: format!("thing {object}"),
         segmentation_id: object,

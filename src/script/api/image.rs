@@ -1,11 +1,8 @@
 //! Pictures in Lua: to look at, to measure and to put together.
 
-use std::{
-    io::Cursor,
-    sync::{Arc, Mutex},
-};
+use std::sync::{Arc, Mutex};
 
-use image::{ImageFormat, Rgb, RgbImage, imageops};
+use image::{Rgb, RgbImage, imageops};
 use mlua::{Lua, Table, UserDataMethods, Value};
 
 use crate::script::{
@@ -17,7 +14,7 @@ use crate::script::{
     vm::memory_budget::{Held, hold},
     vm::{fail, locked},
 };
-use crate::{report::video::Canvas, sensing::scaling::scaled};
+use crate::{report::video::Canvas, sensing::camera::resize};
 
 /// Longest text that is written on a picture, bytes.
 const MOST_TEXT: usize = 1000;
@@ -73,13 +70,6 @@ pub(crate) fn picture(value: &Value) -> Option<RgbImage> {
     value.as_userdata()?.borrow::<LuaImage>().ok().map(|image| locked(&image.0).picture.clone())
 }
 
-/// A picture as a PNG file.
-pub(crate) fn png(picture: &RgbImage) -> Result<Vec<u8>, image::ImageError> {
-    let mut bytes = Cursor::new(Vec::new());
-    picture.write_to(&mut bytes, ImageFormat::Png)?;
-    Ok(bytes.into_inner())
-}
-
 /// A part of a picture: x, y, width, height; all of it if left out.
 fn part(lua: &Lua, method: &str, picture: &RgbImage, region: Option<[f64; 4]>) -> mlua::Result<[u32; 4]> {
     let (width, height) = picture.dimensions();
@@ -128,7 +118,7 @@ impl LuaImage {
         let picture = &locked(&self.0).picture;
         // The picture on the way is as wide as the new one and as tall as the old one.
         let between = 3 * width as usize * picture.height() as usize;
-        Self::made(lua, (width, height), between, || scaled(picture, width, height))
+        Self::made(lua, (width, height), between, || resize(picture, width, height))
     }
 
     fn paste(&self, other: &Self, x: f64, y: f64) {

@@ -6,12 +6,13 @@ use serde_json::{Map, Value as Json};
 use crate::script::{
     Loaded, ScriptError,
     api::catalogue,
-    api::image::{picture, png},
+    api::image::picture,
     plan::{Machine, reopen},
     schema::{self, sorted_pairs},
     vm::fail,
     vm::json::json,
 };
+use crate::sensing::camera::encode_png;
 
 /// One row of results; keys sorted.
 pub type Row = Map<String, Json>;
@@ -154,7 +155,7 @@ fn bytes(lua: &Lua, content: &Value) -> mlua::Result<Vec<u8>> {
         return Ok(text.to_string_lossy().into_bytes());
     }
     if let Some(picture) = picture(content) {
-        return png(&picture).map_err(mlua::Error::external);
+        return encode_png(&picture).map_err(mlua::Error::external);
     }
     let json = json(lua, content, "finish.files")?;
     let text = serde_json::to_string_pretty(&json).map_err(mlua::Error::external)?;

@@ -118,13 +118,12 @@ impl Lens {
     /// Places `camera` in the world; `hand_w` is the pose of the hand frame for cameras mounted on it.
     pub(crate) fn new(camera: &Camera, hand_w: Option<Pose>) -> Result<Self, CameraError> {
         check_camera(camera)?;
-        let mount_error =
-            |expected: &str, got: &str| field_error(camera, "mount", expected, got.to_owned());
+        let mount_error = |expected: &str, got: &str| field_error(camera, "mount", expected, got.to_owned());
         let pose: Pose = match camera.mount {
             CameraMount::World => camera.pose,
             CameraMount::Hand => {
-                let hand = hand_w
-                    .ok_or_else(|| mount_error("a hand in the state", "a state without a robot"))?;
+                let hand =
+                    hand_w.ok_or_else(|| mount_error("a hand in the state", "a state without a robot"))?;
                 hand * camera.pose
             }
         };
@@ -158,7 +157,12 @@ impl Lens {
         let w = -1.0 / view.z;
         let scale = self.focal * w;
         let middle = |edge: usize| 0.5 * edge as f32;
-        ScreenVertex { x: middle(self.width) + scale * view.x, y: middle(self.height) - scale * view.y, w, view }
+        ScreenVertex {
+            x: middle(self.width) + scale * view.x,
+            y: middle(self.height) - scale * view.y,
+            w,
+            view,
+        }
     }
 
     /// Returns the rays through the pixels.

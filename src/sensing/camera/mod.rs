@@ -1,16 +1,60 @@
-//! Pictures: a deterministic renderer for the processor, in single precision.
+//! Camera images: a deterministic software renderer in single precision.
 //!
-//! An image is made tile by tile. Triangles are rasterised at four samples a pixel into triangle numbers and reciprocal
-//! depths; then every surface that a pixel shows is lit once, eight points at a time: Lambert and GGX (Walter et al. 2007)
-//! under one key light with soft shadows and a sky. Looks are baked into vertices, or into textures on large flat faces and on
-//! all that is printed, when a [`RenderMesh`] is built, filtered to the spacing of its vertices; so that nothing is evaluated
-//! twice and small images do not alias. Triangles that the look of a rigid thing does not need are taken out of it once.
+//! The rasteriser is written by hand, since two requirements rule out the alternatives. The benchmark runs on machines without
+//! a GPU, and the same state must give byte-identical images on every machine and with every number of threads. Graphics
+//! drivers, ray-tracing libraries and the platform's math functions all round differently from one machine to the next.
 //!
-//! What does not move is drawn once for a camera that does not move either; see [`Renderer`].
+//! [`Renderer::render`] draws one image in these steps:
+//!
+//! 1. Objects are posed at the coarsest level of detail that looks like the finest one (`render::visibility`, `mesh`).
+//! 2. Triangles are projected, clipped and sorted into tiles of 32 × 32 pixels (`raster`).
+//! 3. Each tile is rasterised with four samples per pixel into triangle ids and depths (`raster`, `render::tile`).
+//! 4. Each surface that a pixel shows is shaded once, eight points at a time: Lambert and GGX under a key light with soft
+//!    shadows and a sky (`shade`).
+//!
+//! Materials are procedural functions of the object frame. [`RenderMesh`] bakes them into vertices or textures once, filtered
+//! to the spacing of the samples. Objects that do not move are drawn once for a camera that does not move either.
+//!
+//! # Example
+//!
+//! A red box on a floor, seen by the third-person camera:
+//!
+//! ```
+//! use std::sync::Arc;
+//! use softvt::{
+//!     geometry::{Pose, Vec3, shape::Shape},
+//!     scene::{Camera, Lighting, Visual},
+//!     sensing::camera::{Attachment, FrameView, RenderMesh, RenderObject, RenderScene, Renderer},
+//! };
+//!
+//! let object = |name: &str, id: u16, half: Vec3, colour: [f64; 3], z: f64| {
+//!     let mesh = RenderMesh::from_shape(name, &Shape::Box { half }, &[Visual::plain(colour, 0.6, 0.0)])?;
+//!     Ok::<_, softvt::sensing::camera::CameraError>(RenderObject {
+//!         name: name.to_owned(),
+//!         segmentation_id: id,
+//!         mesh: Arc::new(mesh),
+//!         attachment: Attachment::Fixed(Pose::translation(0.0, 0.0, z)),
+//!         casts_shadow: true,
+//!     })
+//! };
+//! let floor = object("floor", 1, Vec3::new(0.5, 0.5, 0.01), [0.5; 3], -0.01)?;
+//! let cube = object("cube", 2, Vec3::repeat(0.05), [0.7, 0.05, 0.05], 0.05)?;
+//! let scene = RenderScene::new(vec![floor, cube], Lighting::default())?;
+//!
+//! let camera = Camera::third_person_table().with_edge(64);
+//! let image = Renderer::default().render(&scene, &FrameView::empty(), &camera)?;
+//!
+//! let pixel = image.segmentation.iter().position(|&id| id == 2).expect("the cube is in view");
+//! let [red, green] = [image.rgb[3 * pixel], image.rgb[3 * pixel + 1]];
+//! assert!(red > green && image.depth[pixel] < camera.far_m as f32);
+//! # Ok::<(), softvt::sensing::camera::CameraError>(())
+//! ```
 
+// Each module uses only those before it: error, math, simd, image, lens, raster, shade, mesh, scene, render.
 mod error;
 mod image;
 mod lens;
+mod math;
 mod mesh;
 mod raster;
 mod render;
@@ -21,15 +65,13 @@ mod simd;
 #[cfg(test)]
 mod tests;
 
-pub use self::image::RenderedImage;
+pub use self::image::{RenderedImage, encode_png, resize};
 pub use error::CameraError;
 pub use lens::check_cameras;
 pub use mesh::{
-    render_mesh::{RenderMesh, box_mesh, flat_faces},
+    primitive_mesh::{box_mesh, flat_faces},
+    render_mesh::RenderMesh,
     solid::{RenderSolid, Tessellation},
 };
 pub use render::Renderer;
 pub use scene::render_scene::{Attachment, FrameView, RenderObject, RenderScene, check_light};
-
-/// A point, direction or colour of a picture.
-type V3 = nalgebra::Vector3<f32>;

@@ -32,11 +32,7 @@ impl Vec3x8 {
     /// Builds eight vectors from one array per component.
     #[inline(always)]
     pub(crate) fn from_arrays(components: &[[f32; LANES]; 3]) -> Self {
-        Self {
-            x: f32x8::new(components[0]),
-            y: f32x8::new(components[1]),
-            z: f32x8::new(components[2]),
-        }
+        Self { x: f32x8::new(components[0]), y: f32x8::new(components[1]), z: f32x8::new(components[2]) }
     }
 
     /// Returns one array per component.

@@ -1,10 +1,11 @@
-//! Rules that pictures keep. Those against the pinhole in closed form are in `tests/validation/camera.rs`.
+//! Properties of rendered images. `tests/validation/camera.rs` compares them with a pinhole camera in closed form.
 
 use std::sync::Arc;
 
 use super::{
+    math::V3,
     shade::shadow::ShadowMap,
-    simd::{F8, V8},
+    simd::{Vec3x8, f32x8},
     *,
 };
 use crate::{
@@ -12,20 +13,20 @@ use crate::{
     scene::{Camera, CameraMount, Lighting, Mask, Visual, VisualLayer},
 };
 
-fn thing(object: u16, model: RenderMesh, mount: Attachment) -> RenderObject {
+fn object(id: u16, mesh: RenderMesh, attachment: Attachment) -> RenderObject {
     RenderObject {
-        name: format!("thing {object}"),
-        segmentation_id: object,
-        mesh: Arc::new(model),
-        attachment: mount,
+        name: format!("object {id}"),
+        segmentation_id: id,
+        mesh: Arc::new(mesh),
+        attachment,
         casts_shadow: true,
     }
 }
 
-fn ball(object: u16, radius: f64, mount: Attachment) -> RenderObject {
-    let model =
-        RenderMesh::of_shape("ball", &Shape::Sphere { radius }, &[Visual::default()]).expect("a ball");
-    thing(object, model, mount)
+fn ball(id: u16, radius: f64, attachment: Attachment) -> RenderObject {
+    let mesh =
+        RenderMesh::from_shape("ball", &Shape::Sphere { radius }, &[Visual::default()]).expect("a ball");
+    object(id, mesh, attachment)
 }
 
 fn checker(size_m: f64) -> Visual {
@@ -39,11 +40,11 @@ fn checker(size_m: f64) -> Visual {
     })
 }
 
-/// A ground whose top is z = 0.
+/// A floor whose top is at z = 0.
 fn ground(visual: Visual) -> RenderObject {
     let half = Vec3::new(1.0, 1.0, 0.1);
-    let model = RenderMesh::of_shape("ground", &Shape::Box { half }, &[visual]).expect("a box");
-    let mut ground = thing(1, model, Attachment::Fixed(Pose::translation(0.0, 0.0, -0.1)));
+    let mesh = RenderMesh::from_shape("ground", &Shape::Box { half }, &[visual]).expect("a box");
+    let mut ground = object(1, mesh, Attachment::Fixed(Pose::translation(0.0, 0.0, -0.1)));
     ground.casts_shadow = false;
     ground
 }
@@ -58,12 +59,12 @@ fn above(height: f64) -> Camera {
     camera(Vec3::new(0.0, 0.0, height), Vec3::zeros(), Vec3::y())
 }
 
-fn stage(objects: Vec<RenderObject>) -> RenderScene {
+fn scene(objects: Vec<RenderObject>) -> RenderScene {
     RenderScene::new(objects, Lighting::default()).expect("the default light is good")
 }
 
-fn draw(stage: &RenderScene, camera: &Camera) -> RenderedImage {
-    Renderer::default().render(stage, &FrameView::empty(), camera).expect("a picture")
+fn draw(scene: &RenderScene, camera: &Camera) -> RenderedImage {
+    Renderer::default().render(scene, &FrameView::empty(), camera).expect("a image")
 }
 
 fn focal(camera: &Camera) -> f64 {
@@ -71,34 +72,34 @@ fn focal(camera: &Camera) -> f64 {
 }
 
 #[test]
-fn a_straight_outline_is_straight_in_the_objects() {
-    // A box whose right side is seen from straight above: one column, wherever it lies within a pixel.
+fn a_straight_outline_is_straight_in_the_segmentation() {
+    // The right side of a box seen from straight above is one column, wherever it lies within a pixel.
     for shift in [0.0, 0.3, 0.5, 0.8] {
         let camera = above(1.0);
         let half = Vec3::new(0.1, 0.1, 0.01);
-        let model = RenderMesh::of_shape("box", &Shape::Box { half }, &[Visual::default()]).expect("a box");
+        let mesh = RenderMesh::from_shape("box", &Shape::Box { half }, &[Visual::default()]).expect("a box");
         let x = shift / focal(&camera);
-        let stage = stage(vec![
+        let scene = scene(vec![
             ground(Visual::default()),
-            thing(2, model, Attachment::Fixed(Pose::translation(x, 0.0, 0.0))),
+            object(2, mesh, Attachment::Fixed(Pose::translation(x, 0.0, 0.0))),
         ]);
-        let picture = draw(&stage, &camera);
-        let rows = picture.segmentation.chunks(224).filter(|row| row.contains(&2));
+        let image = draw(&scene, &camera);
+        let rows = image.segmentation.chunks(224).filter(|row| row.contains(&2));
         let ends: Vec<_> = rows.map(|row| row.iter().rposition(|&s| s == 2)).collect();
         assert!(ends.len() > 50 && ends.iter().all(|end| *end == ends[0]), "{shift}: {ends:?}");
     }
 }
 
-/// A still scene with something of everything, and its camera.
+/// A scene with a floor, a ball and a cube, and its camera.
 fn still_life() -> (Vec<RenderObject>, Camera) {
     let cube =
-        RenderMesh::of_mesh("cube", &box_mesh(&Vec3::repeat(0.05)), &[], &[checker(0.02)]).expect("a cube");
-    let things = vec![
+        RenderMesh::from_mesh("cube", &box_mesh(&Vec3::repeat(0.05)), &[], &[checker(0.02)]).expect("a cube");
+    let objects = vec![
         ground(checker(0.13)),
         ball(2, 0.06, Attachment::Fixed(Pose::translation(0.15, 0.05, 0.06))),
-        thing(3, cube, Attachment::Rigid(0)),
+        object(3, cube, Attachment::Rigid(0)),
     ];
-    (things, camera(Vec3::new(0.7, 0.0, 0.6), Vec3::zeros(), Vec3::z()))
+    (objects, camera(Vec3::new(0.7, 0.0, 0.6), Vec3::zeros(), Vec3::z()))
 }
 
 fn cube_view(rigid: &[Pose]) -> FrameView<'_> {
@@ -111,15 +112,15 @@ fn difference(a: &[f64], b: &[u8]) -> f64 {
 }
 
 #[test]
-fn a_kept_background_gives_the_picture_that_is_drawn_from_nothing() {
-    let (things, camera) = still_life();
-    let stage = stage(things);
-    let (mut kept, mut fresh) = (Renderer::default(), Renderer::without_cache());
+fn a_cached_background_does_not_change_the_image() {
+    let (objects, camera) = still_life();
+    let scene = scene(objects);
+    let (mut cached, mut uncached) = (Renderer::default(), Renderer::without_cache());
     for height in [0.05, 0.2] {
         let rigid = [Pose::translation(-0.1, -0.1, height)];
         let view = cube_view(&rigid);
-        let a = kept.render(&stage, &view, &camera).expect("a picture");
-        let b = fresh.render(&stage, &view, &camera).expect("a picture");
+        let a = cached.render(&scene, &view, &camera).expect("a image");
+        let b = uncached.render(&scene, &view, &camera).expect("a image");
         assert_eq!(a.segmentation, b.segmentation);
         assert_eq!(a.depth, b.depth);
         let mean = difference(&a.rgb.iter().map(|v| f64::from(*v)).collect::<Vec<_>>(), &b.rgb);
@@ -150,26 +151,26 @@ fn box_resized(rgb: &[u8], from: usize, to: usize) -> Vec<f64> {
 }
 
 #[test]
-fn the_small_picture_is_the_large_one_made_small() {
-    let (things, camera) = still_life();
-    let stage = stage(things);
+fn a_small_image_is_a_large_one_scaled_down() {
+    let (objects, camera) = still_life();
+    let scene = scene(objects);
     let rigid = [Pose::translation(-0.1, -0.1, 0.05)];
-    let mut scratch = Renderer::without_cache();
-    let small = scratch.render(&stage, &cube_view(&rigid), &camera).expect("a picture");
+    let mut renderer = Renderer::without_cache();
+    let small = renderer.render(&scene, &cube_view(&rigid), &camera).expect("a image");
     for edge in [512, 1024] {
         let camera = camera.clone().with_edge(edge);
-        let large = scratch.render(&stage, &cube_view(&rigid), &camera).expect("a picture");
+        let large = renderer.render(&scene, &cube_view(&rigid), &camera).expect("a image");
         let mean = difference(&box_resized(&large.rgb, edge, 224), &small.rgb);
         assert!(mean < 2.0, "{edge}: mean difference {mean} of 255");
     }
 }
 
 #[test]
-fn pictures_are_the_same_bytes_on_any_thread() {
-    let (things, camera) = still_life();
-    let stage = stage(things);
+fn images_are_byte_identical_on_every_thread() {
+    let (objects, camera) = still_life();
+    let scene = scene(objects);
     let rigid = [Pose::translation(-0.1, -0.1, 0.05)];
-    let shoot = || Renderer::default().render(&stage, &cube_view(&rigid), &camera).expect("a picture");
+    let shoot = || Renderer::default().render(&scene, &cube_view(&rigid), &camera).expect("a image");
     let here = shoot();
     std::thread::scope(|scope| {
         let there: Vec<_> = (0..3).map(|_| scope.spawn(shoot)).collect();
@@ -178,22 +179,22 @@ fn pictures_are_the_same_bytes_on_any_thread() {
 }
 
 #[test]
-fn a_shadow_falls_where_the_light_throws_it() {
+fn a_shadow_lies_opposite_the_light() {
     let lighting = Lighting { shadow_centre_w: Vec3::zeros(), ..Lighting::default() };
     let camera = above(1.2);
     let with_ball = |height: Option<f64>| {
-        let mut things = vec![ground(Visual::default())];
-        things.extend(height.map(|h| ball(2, 0.04, Attachment::Fixed(Pose::translation(0.0, 0.0, h)))));
-        let stage = RenderScene::new(things, lighting.clone()).expect("a stage");
-        draw(&stage, &camera)
+        let mut objects = vec![ground(Visual::default())];
+        objects.extend(height.map(|h| ball(2, 0.04, Attachment::Fixed(Pose::translation(0.0, 0.0, h)))));
+        let scene = RenderScene::new(objects, lighting.clone()).expect("a scene");
+        draw(&scene, &camera)
     };
     let (bare, shaded) = (with_ball(None), with_ball(Some(0.25)));
     let direction = lighting.key.direction_w;
     let foot = -direction * (0.25 / direction.z);
     let (mut weight, mut centre) = (0.0, [0.0; 2]);
-    // The ball itself covers 12 pixels around the middle.
-    let beside = |i: &usize| (i % 224).abs_diff(112).max((i / 224).abs_diff(112)) > 16;
-    for i in (0..224 * 224).filter(beside) {
+    // The ball itself covers 12 pixels around the centre.
+    let is_outside_ball = |i: &usize| (i % 224).abs_diff(112).max((i / 224).abs_diff(112)) > 16;
+    for i in (0..224 * 224).filter(is_outside_ball) {
         let dark = f64::from(bare.rgb[3 * i]) - f64::from(shaded.rgb[3 * i]);
         let scale = 1.2 / focal(&camera);
         weight += dark;
@@ -202,46 +203,46 @@ fn a_shadow_falls_where_the_light_throws_it() {
     }
     assert!(weight > 1000.0, "no shadow");
     let error = (centre[0] / weight - foot.x).hypot(centre[1] / weight - foot.y);
-    assert!(error < 5e-3, "the shadow lies {error} m beside its place");
+    assert!(error < 5e-3, "the shadow is off by {error} m");
 }
 
-/// A thing as rigid body 0 whose shadows are thrown by its coarsest form.
-fn lone(model: RenderMesh, casts_shadow: bool) -> Vec<RenderObject> {
-    vec![RenderObject { casts_shadow, ..thing(1, model, Attachment::Rigid(0)) }]
+/// An object as rigid body 0, whose shadow is that of its coarsest level of detail.
+fn lone(mesh: RenderMesh, casts_shadow: bool) -> Vec<RenderObject> {
+    vec![RenderObject { casts_shadow, ..object(1, mesh, Attachment::Rigid(0)) }]
 }
 
 #[test]
-fn smooth_surfaces_throw_no_shadow_on_what_of_themselves_faces_the_light() {
+fn smooth_surfaces_do_not_shade_themselves_where_they_face_the_light() {
     let visuals = [Visual::plain([0.8; 3], 0.6, 0.0)];
     let solid = |shape: Shape| {
-        RenderMesh::of_solids("solid", &[RenderSolid::new(shape, 3e-3, 0)], &visuals).expect("a solid")
+        RenderMesh::from_solids("solid", &[RenderSolid::new(shape, 3e-3, 0)], &visuals).expect("a solid")
     };
-    let shape = |shape: &Shape| RenderMesh::of_shape("shape", shape, &visuals).expect("a shape");
+    let shape = |shape: &Shape| RenderMesh::from_shape("shape", shape, &visuals).expect("a shape");
     let tube = Shape::Cylinder { radius: 0.06, half_height: 0.15 };
     let ball = Shape::Sphere { radius: 0.1 };
     let slab = Shape::Box { half: Vec3::new(0.2, 0.2, 0.02) };
-    let models = [solid(tube.clone()), solid(ball.clone()), shape(&tube), shape(&ball), shape(&slab)];
+    let meshes = [solid(tube.clone()), solid(ball.clone()), shape(&tube), shape(&ball), shape(&slab)];
     let camera = camera(Vec3::new(0.8, 0.1, 0.5), Vec3::zeros(), Vec3::z());
     for direction in [[0.45, -0.55, 1.0], [0.1, -1.0, 0.06], [1.0, 0.02, 0.03], [0.0, 0.05, 1.0]] {
         let mut lighting = Lighting { shadow_centre_w: Vec3::zeros(), ..Lighting::default() };
         lighting.key.direction_w = direction.into();
-        for (i, model) in models.iter().enumerate() {
+        for (i, mesh) in meshes.iter().enumerate() {
             let draw = |casts_shadow: bool| {
-                let stage =
-                    RenderScene::new(lone(model.clone(), casts_shadow), lighting.clone()).expect("a stage");
+                let scene =
+                    RenderScene::new(lone(mesh.clone(), casts_shadow), lighting.clone()).expect("a scene");
                 let view = [Pose::identity()];
-                Renderer::without_cache().render(&stage, &cube_view(&view), &camera).expect("a picture")
+                Renderer::without_cache().render(&scene, &cube_view(&view), &camera).expect("a image")
             };
             let (with, without) = (draw(true), draw(false));
             let apart = with.rgb.iter().zip(&without.rgb).map(|(a, b)| a.abs_diff(*b));
             let worst = apart.max().expect("pixels");
-            assert!(worst <= 2, "model {i}, light {direction:?}: darker by {worst} of 255");
+            assert!(worst <= 2, "mesh {i}, light {direction:?}: darker by {worst} of 255");
         }
     }
 }
 
 #[test]
-fn the_border_of_a_shadow_gets_darker_all_the_way_and_lies_where_the_edge_throws_it() {
+fn a_penumbra_is_monotonic_and_centred_on_the_projected_edge() {
     let mut lighting = Lighting { shadow_centre_w: Vec3::zeros(), ..Lighting::default() };
     lighting.key.direction_w = Vec3::new(0.3, 0.4, 1.0);
     let mut map = ShadowMap::new(&lighting);
@@ -253,10 +254,10 @@ fn the_border_of_a_shadow_gets_darker_all_the_way_and_lies_where_the_edge_throws
     map.finish();
     let light = |p: [Vec3; 8]| {
         let at = std::array::from_fn(|axis| p.map(|p| p[axis] as f32));
-        let n = V8::splat(&V3::z());
-        map.light(&map.places(V8::from_arrays(&at)), &n, F8::ONE.simd_gt(F8::ZERO)).to_array()
+        let n = Vec3x8::splat(&V3::z());
+        map.visibility(&map.project(Vec3x8::from_arrays(&at)), &n, f32x8::ONE.simd_gt(f32x8::ZERO)).to_array()
     };
-    // Across the edge that the far side of the top throws, from its middle on: the ray through it falls by the light's slope.
+    // Across the shadow of the far upper edge, which is projected along the light.
     let across = turn * -Vec3::y();
     let edge = turn * Vec3::new(0.0, -half.y, 0.0) - lighting.key.direction_w * (2.0 * half.z);
     let edge = Vec3::new(edge.x, edge.y, 0.0);
@@ -272,38 +273,38 @@ fn the_border_of_a_shadow_gets_darker_all_the_way_and_lies_where_the_edge_throws
             let [dark, .., bright] = shares[..] else { panic!("many points") };
             assert!(dark == 0.0 && bright == 1.0, "{along} {step}: from {dark} to {bright}");
             let worst = shares.windows(2).map(|w| w[0] - w[1]).fold(0.0, f32::max);
-            assert!(worst < 0.02, "{along} {step}: gets darker by {worst} on the way out: {shares:?}");
+            assert!(worst < 0.02, "{along} {step}: darker by {worst} on the way out: {shares:?}");
             let middle = from + step * shares.iter().filter(|share| **share < 0.5).count() as f64;
-            assert!(middle.abs() < 2.5e-3, "{along} {step}: the border lies {middle} m beside the edge");
+            assert!(middle.abs() < 2.5e-3, "{along} {step}: the border is off by {middle} m");
         }
     }
 }
 
-/// Bytes of the red channel at a point of the world.
-fn red(picture: &RenderedImage, camera: &Camera, p: Vec3) -> i32 {
+/// The red channel at the pixel that shows a point of the world.
+fn red(image: &RenderedImage, camera: &Camera, p: Vec3) -> i32 {
     let view = camera.pose.inverse_transform_point(&p.into()).coords;
     let pixel = |along: f64| (112.0 + focal(camera) * along / -view.z) as usize;
-    i32::from(picture.rgb[3 * (224 * pixel(-view.y) + pixel(view.x))])
+    i32::from(image.rgb[3 * (224 * pixel(-view.y) + pixel(view.x))])
 }
 
 #[test]
-fn a_roof_and_a_wall_darken_what_lies_behind_them_also_far_from_where_shadows_are_fine() {
+fn fixed_objects_cast_shadows_outside_the_fine_shadow_map() {
     // Illumination along −x and down by as much; a wall of 1 m at x = 3 and a roof of 2 m a side over the origin.
     let mut lighting = Lighting { shadow_centre_w: Vec3::zeros(), ..Lighting::default() };
     (lighting.key.direction_w, lighting.key.softness_rad) = (Vec3::new(1.0, 0.0, 1.0), 0.01);
     let slab = |half: Vec3, at: Vec3| {
-        let model = RenderMesh::of_shape("slab", &Shape::Box { half }, &[Visual::default()]).expect("a box");
-        thing(1, model, Attachment::Fixed(Pose::from_parts(at.into(), Quat::identity())))
+        let mesh = RenderMesh::from_shape("slab", &Shape::Box { half }, &[Visual::default()]).expect("a box");
+        object(1, mesh, Attachment::Fixed(Pose::from_parts(at.into(), Quat::identity())))
     };
     let floor = slab(Vec3::new(6.0, 3.0, 0.05), Vec3::new(0.0, 0.0, -0.05));
     let wall = slab(Vec3::new(0.02, 1.5, 0.5), Vec3::new(3.02, 0.0, 0.5));
     let roof = slab(Vec3::new(1.0, 1.0, 0.02), Vec3::new(0.0, 0.0, 2.0));
-    let stage = RenderScene::new(vec![floor, wall, roof], lighting).expect("a stage");
-    // From the side, under the roof: its shadow lies 2 m towards −x.
+    let scene = RenderScene::new(vec![floor, wall, roof], lighting).expect("a scene");
+    // From the side, below the roof, whose shadow is shifted by 2 m towards −x.
     let camera = camera(Vec3::new(0.0, -6.0, 1.5), Vec3::new(0.0, 0.0, 0.5), Vec3::z());
     let camera = Camera { fovy_rad: 1.2, ..camera };
-    let picture = draw(&stage, &camera);
-    let at = |x: f64| red(&picture, &camera, Vec3::new(x, 0.0, 0.0));
+    let image = draw(&scene, &camera);
+    let at = |x: f64| red(&image, &camera, Vec3::new(x, 0.0, 0.0));
     let (open, behind_wall, under_roof) = (at(0.0), [at(2.9), at(2.3)], [at(-1.2), at(-2.0), at(-2.8)]);
     assert!(
         behind_wall.iter().chain(&under_roof).all(|dark| open - dark > 40),
@@ -315,18 +316,18 @@ fn a_roof_and_a_wall_darken_what_lies_behind_them_also_far_from_where_shadows_ar
 }
 
 #[test]
-fn the_right_of_the_third_person_image_is_the_worlds_positive_y() {
+fn image_right_of_the_third_person_camera_is_world_positive_y() {
     for camera in [Camera::third_person_table(), Camera::third_person_floor()] {
         let at = |object, y| ball(object, 0.03, Attachment::Fixed(Pose::translation(0.0, y, 0.03)));
-        let picture = draw(&stage(vec![at(1, -0.2), at(2, 0.2)]), &camera);
-        let column = |object| picture.segmentation.iter().position(|&s| s == object).expect("in sight") % 224;
+        let image = draw(&scene(vec![at(1, -0.2), at(2, 0.2)]), &camera);
+        let column = |object| image.segmentation.iter().position(|&s| s == object).expect("in sight") % 224;
         assert!(column(1) < 112 && column(2) > 112);
     }
 }
 
 #[test]
-fn bad_cameras_are_refused_with_the_name_of_the_field() {
-    let stage = stage(vec![ball(1, 0.1, Attachment::Fixed(Pose::identity()))]);
+fn invalid_cameras_are_rejected_with_the_name_of_the_field() {
+    let scene = scene(vec![ball(1, 0.1, Attachment::Fixed(Pose::identity()))]);
     let good = above(1.0);
     let nowhere = Pose::translation(f64::NAN, 0.0, 0.0);
     for (camera, words) in [
@@ -343,30 +344,30 @@ fn bad_cameras_are_refused_with_the_name_of_the_field() {
         (Camera { near_m: 0.0, ..good.clone() }, "near: expected at least 0.0001 m, got 0 m"),
         (Camera { far_m: 0.01, ..good.clone() }, "far: expected more than near (0.05 m), got 0.01 m"),
         (Camera { pose: nowhere, ..good.clone() }, "position: expected metres within ±1e6"),
-        (Camera { mount: CameraMount::Hand, ..good.clone() }, "mount: expected a hand in the state"),
+        (Camera { mount: CameraMount::Hand, ..good.clone() }, "attachment: expected a hand in the state"),
     ] {
-        let error = Renderer::default().render(&stage, &FrameView::empty(), &camera).expect_err(words);
+        let error = Renderer::default().render(&scene, &FrameView::empty(), &camera).expect_err(words);
         assert!(error.to_string().contains(words), "{error}");
     }
 }
 
 #[test]
-fn a_camera_inside_of_a_thing_says_so_and_sees_what_is_beyond_it() {
+fn a_camera_inside_an_object_reports_it_and_sees_through_it() {
     let marked = |ball: RenderObject| vec![ground(checker(0.1)), ball];
     let (here, away) = (
         Attachment::Fixed(Pose::translation(0.0, 0.0, 1.0)),
         Attachment::Fixed(Pose::translation(9.0, 0.0, 1.0)),
     );
-    let within = draw(&stage(marked(ball(2, 0.1, here))), &above(1.0));
-    assert_eq!(within.inside.as_deref(), Some("thing 2"));
-    let without = draw(&stage(marked(ball(2, 0.1, away))), &above(1.0));
+    let within = draw(&scene(marked(ball(2, 0.1, here))), &above(1.0));
+    assert_eq!(within.inside.as_deref(), Some("object 2"));
+    let without = draw(&scene(marked(ball(2, 0.1, away))), &above(1.0));
     assert_eq!(without.inside, None);
     assert_eq!((&within.depth, &within.segmentation), (&without.depth, &without.segmentation));
-    assert!(within.rgb.iter().any(|c| *c > 60), "no black picture");
+    assert!(within.rgb.iter().any(|c| *c > 60), "the image is black");
 }
 
 #[test]
-fn cameras_are_checked_without_a_picture_one_by_one_and_together() {
+fn cameras_are_validated_one_by_one_and_together() {
     let named = |name: &str, edge: usize| Camera { name: name.to_owned(), ..above(1.0).with_edge(edge) };
     assert!(check_cameras(&[named("a", 4096)]).is_ok());
     let (index, error) = check_cameras(&[named("a", 4096), named("b", 1)]).expect_err("too many pixels");
@@ -384,14 +385,14 @@ fn cameras_are_checked_without_a_picture_one_by_one_and_together() {
 }
 
 #[test]
-fn bad_meshes_states_and_lights_are_refused() {
+fn invalid_meshes_states_and_lights_are_rejected() {
     let visuals = [Visual::default()];
-    let empty = RenderMesh::of_mesh("egg", &Mesh::default(), &[], &visuals).expect_err("empty");
+    let empty = RenderMesh::from_mesh("egg", &Mesh::default(), &[], &visuals).expect_err("empty");
     assert!(empty.to_string().starts_with("egg cannot be drawn: the mesh is empty"), "{empty}");
     let cube = box_mesh(&Vec3::repeat(0.1));
-    let unknown = RenderMesh::of_mesh("egg", &cube, &[3; 12], &visuals).expect_err("no such visual");
+    let unknown = RenderMesh::from_mesh("egg", &cube, &[3; 12], &visuals).expect_err("no such visual");
     assert!(unknown.to_string().contains("material 3 has no visual; there are 1"), "{unknown}");
-    let lost = stage(vec![ball(1, 0.1, Attachment::Rigid(4))]);
+    let lost = scene(vec![ball(1, 0.1, Attachment::Rigid(4))]);
     let error = Renderer::default().render(&lost, &FrameView::empty(), &above(1.0)).expect_err("lost");
     assert!(error.to_string().contains("the state has no rigid body 4"), "{error}");
     let mut light = Lighting::default();

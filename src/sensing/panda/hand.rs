@@ -45,7 +45,7 @@ fn tapered(mut body: RenderSolid) -> RenderSolid {
     const FULL: f64 = 0.026;
     const END: f64 = 0.0655;
     const LEFT: f64 = 0.76;
-    if let Tessellation::Mesh(mesh) = &mut body.form {
+    if let Tessellation::Mesh(mesh) = &mut body.tessellation {
         for v in &mut mesh.vertices {
             v.x *= 1.0 - (1.0 - LEFT) * ((v.z - FULL) / (END - FULL)).clamp(0.0, 1.0);
         }

@@ -63,12 +63,13 @@ impl RobotMeshes {
         parts.extend(Side::BOTH.map(hand::finger));
         let mut made = Vec::new();
         for part in parts {
-            let model = RenderMesh::of_solids(part.name, &part.solids, &visuals)?;
+            let model = RenderMesh::from_solids(part.name, &part.solids, &visuals)?;
             made.push((part.link, part.name, Arc::new(model)));
         }
         for (side, name) in Side::BOTH.into_iter().zip(["left gel", "right gel"]) {
             let mesh = hand::gel(side);
-            let model = RenderMesh::of_mesh(name, &mesh, &vec![GEL as u16; mesh.triangles.len()], &visuals)?;
+            let model =
+                RenderMesh::from_mesh(name, &mesh, &vec![GEL as u16; mesh.triangles.len()], &visuals)?;
             made.push((Some(crate::robot::panda::finger_link(side)), name, Arc::new(model)));
         }
         Ok(Self { parts: made })
@@ -91,6 +92,6 @@ impl RobotMeshes {
 
     /// How many triangles it has at the finest.
     pub fn triangles(&self) -> usize {
-        self.parts.iter().map(|(_, _, model)| model.triangles()).sum()
+        self.parts.iter().map(|(_, _, model)| model.triangle_count()).sum()
     }
 }

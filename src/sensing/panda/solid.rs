@@ -43,7 +43,7 @@ pub(super) fn ring(from: [f64; 3], to: [f64; 3], radius: f64, edge: f64, visual:
     let (pose, half) = between(from, to);
     let turns = TURNS[usize::from(radius < SMALL)];
     let mesh = RoundedPlate { corners: vec![[0.0; 2]], round: radius, half, edge, turns }.mesh(&pose);
-    RenderSolid::of_mesh(drum(from, to, radius, edge), mesh, visual)
+    RenderSolid::with_mesh(drum(from, to, radius, edge), mesh, visual)
 }
 
 /// A box of these half extents about `centre` whose edges are rounded by `edge`, m.
@@ -58,7 +58,7 @@ pub(super) fn case(pose: &Pose, half: [f64; 3], corner: f64, edge: f64, visual: 
     let [x, y] = [half[0] - corner, half[1] - corner];
     let corners = vec![[-x, -y], [x, -y], [x, y], [-x, y]];
     let pillow = RoundedPlate { corners, round: corner, half: half[2], edge, turns: CORNER_TURNS };
-    RenderSolid::of_mesh(block([0.0; 3], half, edge).placed(*pose), pillow.mesh(pose), visual)
+    RenderSolid::with_mesh(block([0.0; 3], half, edge).placed(*pose), pillow.mesh(pose), visual)
 }
 
 /// A convex polygon (y, z) drawn out to `half` on either side of x = 0, outline and edges rounded by `edge`, m, in `pose`.
@@ -73,7 +73,7 @@ pub(super) fn slab(pose: &Pose, corners: &[[f64; 2]], half: f64, edge: f64, visu
     });
     let middle = [0.0, 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1])];
     let extent = [half, 0.5 * (high[0] - low[0]) + edge, 0.5 * (high[1] - low[1]) + edge];
-    RenderSolid::of_mesh(block(middle, extent, edge).placed(*pose), mesh, visual)
+    RenderSolid::with_mesh(block(middle, extent, edge).placed(*pose), mesh, visual)
 }
 
 /// Shapes grown together with fillets of `blend`, m.

@@ -1,29 +1,35 @@
-//! Fewer triangles for the same look: edges are collapsed in the order of what that changes, measured by quadrics in the
-//! space of places, normals and looks together (Garland & Heckbert, Simplifying Surfaces with Color and Texture using
-//! Quadric Error Metrics, IEEE Visualization 1998). A vertex is only ever moved onto one of its neighbours, so that no look
-//! or normal has to be invented; vertices at creases and open borders stay.
+//! Mesh simplification that preserves appearance.
+//!
+//! Edges are collapsed in the order of their cost, which quadrics measure in the space of positions, normals and materials
+//! together (Garland & Heckbert, Simplifying Surfaces with Color and Texture using Quadric Error Metrics, IEEE Visualization
+//! 1998). A vertex only ever moves onto a neighbour, so no normal or material has to be interpolated. Vertices at creases and
+//! open borders stay.
+//!
+//! The `meshopt` crate simplifies with attributes, too, but binds a C++ library whose rounding depends on its compiler.
+//! Images must be byte-identical on every machine, and hence the meshes: this is plain `f64` arithmetic in a fixed order.
 
 use std::{cmp::Reverse, collections::BinaryHeap};
 
-use crate::sensing::camera::{V3, mesh::render_mesh::Lod};
+use super::lod::Lod;
+use crate::sensing::camera::{math::V3, shade::pattern::MaterialSample};
 
-/// Place, normal, albedo, roughness, metalness and openness.
-const DIMENSIONS: usize = 12;
-/// A normal that is off by this much (rad), or a look by this much, counts as a place that is off by the tolerance.
-const NORMAL: f64 = 0.15;
-const LOOK: f64 = 0.005;
-/// A quadric adds up the squares of the distances from the planes of all triangles that it stands for, and those of a
-/// vertex that leaves are farther than the middles of its edges: so many squares of the tolerance are what a surface as far
-/// off as that has.
-const SQUARES: f64 = 64.0;
-/// No triangle turns by more than this (cosine) in one collapse.
-const TURN: f32 = 0.5;
-/// Nor becomes narrower than this: twice its area in squares of its longest edge.
-const NARROW: f32 = 0.02;
+/// Position, normal and material.
+const DIMENSIONS: usize = 6 + MaterialSample::COMPONENTS;
+/// Deviation of a normal that costs as much as a displacement by the tolerance, rad.
+const NORMAL_TOLERANCE: f64 = 0.15;
+/// Deviation of a material component that costs as much.
+const MATERIAL_TOLERANCE: f64 = 0.005;
+/// Cost, in squares of the tolerance, at which a surface is off by about the tolerance. A quadric sums squared distances over
+/// all triangles it represents, and removed vertices are farther off than the middles of edges.
+const MAX_COST: f64 = 64.0;
+/// Minimum cosine by which a collapse may turn a triangle.
+const MIN_TURN_COSINE: f32 = 0.5;
+/// Minimum ratio of twice the area of a triangle to the square of its longest edge after a collapse.
+const MIN_ASPECT: f32 = 0.02;
 
 type Point = [f64; DIMENSIONS];
 
-/// xᵀ A x + 2 b · x + c: the square of the distance from planes.
+/// xᵀ A x + 2 b · x + c: a weighted sum of squared distances from planes.
 #[derive(Clone)]
 struct Quadric {
     a: [Point; DIMENSIONS],
@@ -35,29 +41,29 @@ fn dot(a: &Point, b: &Point) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// `a − b · by`.
-fn less(a: &Point, b: &Point, by: f64) -> Point {
-    std::array::from_fn(|i| a[i] - b[i] * by)
+/// Returns `a − scale · b`.
+fn subtract_scaled(a: &Point, b: &Point, scale: f64) -> Point {
+    std::array::from_fn(|i| a[i] - b[i] * scale)
 }
 
 impl Quadric {
     const ZERO: Self = Self { a: [[0.0; DIMENSIONS]; DIMENSIONS], b: [0.0; DIMENSIONS], c: 0.0 };
 
-    /// That of the plane through three points; none if they lie on a line.
-    fn of([p, q, r]: [&Point; 3], weight: f64) -> Option<Self> {
-        let unit = |v: Point| {
+    /// The squared distance from the plane through three points; `None` if they are collinear.
+    fn from_triangle([p, q, r]: [&Point; 3], weight: f64) -> Option<Self> {
+        let normalized = |v: Point| {
             let length = dot(&v, &v).sqrt();
             (length > 1e-12).then(|| v.map(|x| x / length))
         };
-        let e = unit(less(q, p, 1.0))?;
-        let side = less(r, p, 1.0);
-        let f = unit(less(&side, &e, dot(&side, &e)))?;
-        let (along, across) = (dot(p, &e), dot(p, &f));
+        let e = normalized(subtract_scaled(q, p, 1.0))?;
+        let side = subtract_scaled(r, p, 1.0);
+        let f = normalized(subtract_scaled(&side, &e, dot(&side, &e)))?;
+        let (p_e, p_f) = (dot(p, &e), dot(p, &f));
         let a = |i: usize, j: usize| f64::from(i == j) - e[i] * e[j] - f[i] * f[j];
         Some(Self {
             a: std::array::from_fn(|i| std::array::from_fn(|j| weight * a(i, j))),
-            b: std::array::from_fn(|i| weight * (along * e[i] + across * f[i] - p[i])),
-            c: weight * (dot(p, p) - along * along - across * across),
+            b: std::array::from_fn(|i| weight * (p_e * e[i] + p_f * f[i] - p[i])),
+            c: weight * (dot(p, p) - p_e * p_e - p_f * p_f),
         })
     }
 
@@ -69,179 +75,195 @@ impl Quadric {
         self.c += other.c;
     }
 
-    fn at(&self, x: &Point) -> f64 {
+    fn cost(&self, x: &Point) -> f64 {
         let square: f64 = self.a.iter().zip(x).map(|(row, xi)| xi * dot(row, x)).sum();
         (square + 2.0 * dot(&self.b, x) + self.c).max(0.0)
     }
 }
 
-/// A mesh that is losing vertices.
-struct Work<'a> {
-    level: &'a Lod,
+/// A candidate collapse. The derived order sorts by cost, then by vertices, which makes the sequence unique.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Collapse {
+    /// Bits of the cost: those of non-negative numbers sort like the numbers.
+    cost_bits: u64,
+    from: u32,
+    to: u32,
+    /// Sum of the revisions of both vertices when the candidate was queued.
+    revision: u32,
+}
+
+/// A mesh while it loses vertices.
+struct Simplifier<'a> {
+    lod: &'a Lod,
     points: Vec<Point>,
     quadrics: Vec<Quadric>,
     triangles: Vec<[u32; 3]>,
-    alive: Vec<bool>,
-    /// Triangles around each vertex.
-    around: Vec<Vec<u32>>,
-    kept: Vec<bool>,
-    /// Grows whenever a vertex's quadric changes.
-    stamps: Vec<u32>,
-    /// Cost (its bits sort as it does), edge from and to, and their stamps.
-    queue: BinaryHeap<Reverse<(u64, u32, u32, u32)>>,
+    is_alive: Vec<bool>,
+    /// Triangles adjacent to each vertex.
+    adjacent: Vec<Vec<u32>>,
+    /// True for vertices that must stay.
+    is_pinned: Vec<bool>,
+    /// Number of changes of each vertex's quadric.
+    revisions: Vec<u32>,
+    queue: BinaryHeap<Reverse<Collapse>>,
 }
 
-/// A level with as few triangles as look the same but for `tolerance`, m.
-pub(crate) fn decimated(level: &Lod, tolerance: f32) -> Lod {
-    let mut work = Work::new(level, f64::from(tolerance));
-    let most = SQUARES * f64::from(tolerance).powi(2);
-    for v in 0..level.positions.len() as u32 {
-        work.offer(v);
+/// Returns a level of detail with as few triangles as look the same within `tolerance`, m.
+pub(crate) fn simplify(lod: &Lod, tolerance: f32) -> Lod {
+    let mut simplifier = Simplifier::new(lod, f64::from(tolerance));
+    let max_cost = MAX_COST * f64::from(tolerance).powi(2);
+    for v in 0..lod.positions.len() as u32 {
+        simplifier.queue_collapses(v);
     }
-    while let Some(Reverse((cost, from, to, stamp))) = work.queue.pop() {
-        if f64::from_bits(cost) > most {
+    while let Some(Reverse(Collapse { cost_bits, from, to, revision })) = simplifier.queue.pop() {
+        if f64::from_bits(cost_bits) > max_cost {
             break;
         }
-        if work.stamps[from as usize] + work.stamps[to as usize] == stamp && work.fits(from, to) {
-            work.collapse(from, to);
+        let current = simplifier.revisions[from as usize] + simplifier.revisions[to as usize];
+        if current == revision && simplifier.is_valid(from, to) {
+            simplifier.collapse(from, to);
         }
     }
-    work.finish(tolerance)
+    simplifier.finish(tolerance)
 }
 
-impl<'a> Work<'a> {
-    fn new(level: &'a Lod, tolerance: f64) -> Self {
+impl<'a> Simplifier<'a> {
+    fn new(lod: &'a Lod, tolerance: f64) -> Self {
         let point = |v: usize| {
-            let (p, n, look) = (level.positions[v], level.normals[v], level.looks[v].numbers());
+            let (p, n, material) = (lod.positions[v], lod.normals[v], lod.materials[v].components());
             let mut x = [0.0; DIMENSIONS];
             for axis in 0..3 {
                 x[axis] = f64::from(p[axis]);
-                x[3 + axis] = f64::from(n[axis]) * tolerance / NORMAL;
+                x[3 + axis] = f64::from(n[axis]) * tolerance / NORMAL_TOLERANCE;
             }
-            look.iter().enumerate().for_each(|(i, &value)| x[6 + i] = f64::from(value) * tolerance / LOOK);
+            for (x, &value) in x[6..].iter_mut().zip(&material) {
+                *x = f64::from(value) * tolerance / MATERIAL_TOLERANCE;
+            }
             x
         };
-        let count = level.positions.len();
-        let mut work = Self {
-            level,
+        let count = lod.positions.len();
+        let mut simplifier = Self {
+            lod,
             points: (0..count).map(point).collect(),
             quadrics: vec![Quadric::ZERO; count],
-            triangles: level.triangles.clone(),
-            alive: vec![true; level.triangles.len()],
-            around: vec![Vec::new(); count],
-            kept: vec![false; count],
-            stamps: vec![0; count],
+            triangles: lod.triangles.clone(),
+            is_alive: vec![true; lod.triangles.len()],
+            adjacent: vec![Vec::new(); count],
+            is_pinned: vec![false; count],
+            revisions: vec![0; count],
             queue: BinaryHeap::new(),
         };
-        let area = |t: &[u32; 3]| f64::from(work.area(t).norm());
-        let mean = level.triangles.iter().map(area).sum::<f64>() / level.triangles.len().max(1) as f64;
-        let weights: Vec<f64> = level.triangles.iter().map(|t| (area(t) / mean).min(1.0)).collect();
-        for (i, t) in level.triangles.iter().enumerate() {
-            t.iter().for_each(|&v| work.around[v as usize].push(i as u32));
-            let quadric = Quadric::of(t.map(|v| v as usize).map(|v| &work.points[v]), weights[i]);
-            if let Some(quadric) = quadric {
-                t.iter().for_each(|&v| work.quadrics[v as usize].add(&quadric));
+        let area = |t: &[u32; 3]| f64::from(simplifier.area_normal(t).norm());
+        let mean = lod.triangles.iter().map(area).sum::<f64>() / lod.triangles.len().max(1) as f64;
+        let weights: Vec<f64> = lod.triangles.iter().map(|t| (area(t) / mean).min(1.0)).collect();
+        for (i, t) in lod.triangles.iter().enumerate() {
+            t.iter().for_each(|&v| simplifier.adjacent[v as usize].push(i as u32));
+            let corners = t.map(|v| &simplifier.points[v as usize]);
+            if let Some(quadric) = Quadric::from_triangle(corners, weights[i]) {
+                t.iter().for_each(|&v| simplifier.quadrics[v as usize].add(&quadric));
             }
         }
         for v in 0..count {
-            work.kept[v] = work.at_border(v as u32);
+            simplifier.is_pinned[v] = simplifier.is_at_border(v as u32);
         }
-        work
+        simplifier
     }
 
-    fn area(&self, t: &[u32; 3]) -> V3 {
-        let [a, b, c] = t.map(|v| self.level.positions[v as usize]);
+    /// Normal of a triangle, twice as long as its area.
+    fn area_normal(&self, t: &[u32; 3]) -> V3 {
+        let [a, b, c] = t.map(|v| self.lod.positions[v as usize]);
         (b - a).cross(&(c - a))
     }
 
-    /// Neighbours of a vertex, each as often as triangles have it beside it, sorted.
-    fn beside(&self, v: u32) -> Vec<u32> {
-        let own = self.around[v as usize].iter().flat_map(|&t| self.triangles[t as usize]);
-        let mut all: Vec<u32> = own.filter(|&other| other != v).collect();
-        all.sort_unstable();
-        all
+    /// Neighbours of a vertex, sorted, once for each triangle that both share.
+    fn neighbours(&self, v: u32) -> Vec<u32> {
+        let corners = self.adjacent[v as usize].iter().flat_map(|&t| self.triangles[t as usize]);
+        let mut neighbours: Vec<u32> = corners.filter(|&other| other != v).collect();
+        neighbours.sort_unstable();
+        neighbours
     }
 
-    /// Whether the surface ends at a vertex, as it also does at creases.
-    fn at_border(&self, v: u32) -> bool {
-        self.beside(v).chunk_by(|a, b| a == b).any(|same| same.len() != 2)
+    /// True if the surface ends at a vertex, as it also does at creases.
+    fn is_at_border(&self, v: u32) -> bool {
+        self.neighbours(v).chunk_by(|a, b| a == b).any(|same| same.len() != 2)
     }
 
-    /// Puts the collapses of a vertex into the queue.
-    fn offer(&mut self, v: u32) {
-        let mut others = self.beside(v);
-        others.dedup();
-        for other in others {
+    /// Queues all collapses along the edges of a vertex.
+    fn queue_collapses(&mut self, v: u32) {
+        let mut neighbours = self.neighbours(v);
+        neighbours.dedup();
+        for other in neighbours {
             for (from, to) in [(v, other), (other, v)] {
-                if self.kept[from as usize] {
+                if self.is_pinned[from as usize] {
                     continue;
                 }
                 let x = &self.points[to as usize];
-                let cost = self.quadrics[from as usize].at(x) + self.quadrics[to as usize].at(x);
-                let stamp = self.stamps[from as usize] + self.stamps[to as usize];
-                self.queue.push(Reverse((cost.to_bits(), from, to, stamp)));
+                let cost = self.quadrics[from as usize].cost(x) + self.quadrics[to as usize].cost(x);
+                let revision = self.revisions[from as usize] + self.revisions[to as usize];
+                self.queue.push(Reverse(Collapse { cost_bits: cost.to_bits(), from, to, revision }));
             }
         }
     }
 
-    /// Whether the surface stays one, and faces where it faced, if `from` moves to `to`.
-    fn fits(&self, from: u32, to: u32) -> bool {
-        let (mut own, mut other) = (self.beside(from), self.beside(to));
+    /// True if the surface stays a manifold and no triangle flips or degenerates when `from` moves onto `to`.
+    fn is_valid(&self, from: u32, to: u32) -> bool {
+        let (mut own, mut other) = (self.neighbours(from), self.neighbours(to));
         own.dedup();
         other.dedup();
         if own.iter().filter(|v| other.binary_search(v).is_ok()).count() != 2 {
             return false;
         }
-        self.around[from as usize].iter().map(|&t| self.triangles[t as usize]).all(|t| {
+        self.adjacent[from as usize].iter().map(|&t| self.triangles[t as usize]).all(|t| {
             if t.contains(&to) {
                 return true;
             }
             let moved = t.map(|v| if v == from { to } else { v });
-            let (before, after) = (self.area(&t), self.area(&moved));
-            let [a, b, c] = moved.map(|v| self.level.positions[v as usize]);
-            let longest = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared());
-            before.dot(&after) > TURN * before.norm() * after.norm() && after.norm() > NARROW * longest
+            let (before, after) = (self.area_normal(&t), self.area_normal(&moved));
+            let [a, b, c] = moved.map(|v| self.lod.positions[v as usize]);
+            let longest2 = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared());
+            before.dot(&after) > MIN_TURN_COSINE * before.norm() * after.norm()
+                && after.norm() > MIN_ASPECT * longest2
         })
     }
 
     fn collapse(&mut self, from: u32, to: u32) {
-        for t in std::mem::take(&mut self.around[from as usize]) {
+        for t in std::mem::take(&mut self.adjacent[from as usize]) {
             let triangle = &mut self.triangles[t as usize];
             if triangle.contains(&to) {
-                self.alive[t as usize] = false;
+                self.is_alive[t as usize] = false;
                 for v in triangle.iter().filter(|&&v| v != from) {
-                    self.around[*v as usize].retain(|&other| other != t);
+                    self.adjacent[*v as usize].retain(|&other| other != t);
                 }
             } else {
                 triangle.iter_mut().filter(|v| **v == from).for_each(|v| *v = to);
-                self.around[to as usize].push(t);
+                self.adjacent[to as usize].push(t);
             }
         }
         let quadric = std::mem::replace(&mut self.quadrics[from as usize], Quadric::ZERO);
         self.quadrics[to as usize].add(&quadric);
-        self.stamps[from as usize] += 1;
-        self.stamps[to as usize] += 1;
-        self.offer(to);
+        self.revisions[from as usize] += 1;
+        self.revisions[to as usize] += 1;
+        self.queue_collapses(to);
     }
 
     fn finish(self, tolerance: f32) -> Lod {
-        let level = self.level;
-        let mut new = vec![u32::MAX; level.positions.len()];
-        let used: Vec<usize> = (0..new.len()).filter(|&v| !self.around[v].is_empty()).collect();
-        used.iter().enumerate().for_each(|(i, &v)| new[v] = i as u32);
-        let left = || (0..self.triangles.len()).filter(|&t| self.alive[t]);
+        let lod = self.lod;
+        let mut new_index = vec![u32::MAX; lod.positions.len()];
+        let used: Vec<usize> = (0..new_index.len()).filter(|&v| !self.adjacent[v].is_empty()).collect();
+        used.iter().enumerate().for_each(|(i, &v)| new_index[v] = i as u32);
+        let alive = || (0..self.triangles.len()).filter(|&t| self.is_alive[t]);
         Lod {
-            positions: used.iter().map(|&v| level.positions[v]).collect(),
-            normals: used.iter().map(|&v| level.normals[v]).collect(),
-            looks: used.iter().map(|&v| level.looks[v]).collect(),
-            triangles: left().map(|t| self.triangles[t].map(|v| new[v as usize])).collect(),
-            facets: Vec::new(),
-            places: Vec::new(),
-            patches: left().map(|t| level.patches[t]).collect(),
+            positions: used.iter().map(|&v| lod.positions[v]).collect(),
+            normals: used.iter().map(|&v| lod.normals[v]).collect(),
+            materials: used.iter().map(|&v| lod.materials[v]).collect(),
+            triangles: alive().map(|t| self.triangles[t].map(|v| new_index[v as usize])).collect(),
+            chart_ids: Vec::new(),
+            uvs: Vec::new(),
+            smoothing_groups: alive().map(|t| lod.smoothing_groups[t]).collect(),
             embedding: Vec::new(),
-            spacing: level.spacing,
-            plain: level.plain,
-            flaw: level.flaw + tolerance,
+            vertex_spacing: lod.vertex_spacing,
+            is_uniform: lod.is_uniform,
+            geometric_error: lod.geometric_error + tolerance,
         }
     }
 }
@@ -252,20 +274,20 @@ mod tests {
     use crate::{
         geometry::{shape::Shape, surface_mesh::SurfaceMesh},
         scene::{Mask, Visual, VisualLayer},
-        sensing::camera::mesh::render_mesh::bake,
+        sensing::camera::mesh::bake::bake_vertices,
     };
 
-    fn level(shape: &Shape, cell: f64, visual: Visual) -> Lod {
+    fn fine_level(shape: &Shape, cell: f64, visual: Visual) -> Lod {
         let mesh = SurfaceMesh::from_shape(shape, cell).mesh;
-        let materials = vec![0; mesh.triangles.len()];
-        bake(&mesh, &materials, &[visual], cell as f32, Some(shape))
+        let material_ids = vec![0; mesh.triangles.len()];
+        bake_vertices(&mesh, &material_ids, &[visual], cell as f32, Some(shape))
     }
 
     #[test]
-    fn a_ball_with_few_triangles_stays_closed_and_within_the_tolerance() {
+    fn a_simplified_ball_stays_closed_and_within_the_tolerance() {
         let (radius, tolerance) = (0.05, 2e-4);
-        let fine = level(&Shape::Sphere { radius }, 2e-3, Visual::default());
-        let coarse = decimated(&fine, tolerance as f32);
+        let fine = fine_level(&Shape::Sphere { radius }, 2e-3, Visual::default());
+        let coarse = simplify(&fine, tolerance as f32);
         assert!(5 * coarse.triangles.len() < fine.triangles.len(), "{}", coarse.triangles.len());
         let mut balance = std::collections::BTreeMap::new();
         for t in &coarse.triangles {
@@ -277,24 +299,23 @@ mod tests {
             let depth = radius - f64::from(middle.norm());
             assert!(depth.abs() < 3.0 * tolerance, "a triangle lies {depth} m inside");
         }
-        assert!(balance.values().all(|&sum| sum == 0), "every edge is passed once each way");
+        assert!(balance.values().all(|&sum| sum == 0), "each edge occurs once in each direction");
     }
 
     #[test]
-    fn a_pattern_keeps_its_triangles_and_what_is_plain_does_not() {
+    fn triangles_are_kept_at_the_border_of_a_pattern_and_removed_elsewhere() {
         let shape = Shape::Cylinder { radius: 0.08, half_height: 0.01 };
-        let spots = Mask::Inside { shape: Shape::Sphere { radius: 0.03 }.into(), soft_m: 0.004 };
-        let dark =
-            VisualLayer { mask: spots, albedo: [0.02; 3], roughness: 0.5, opacity: 1.0, relief_m: 0.0 };
-        let fine = level(&shape, 3e-3, Visual::plain([0.8; 3], 0.5, 0.0).with(dark));
-        let coarse = decimated(&fine, 2e-4);
-        let near = |of: &Lod, from: f32, to: f32| {
-            let ring = |p: &&V3| p.z > 0.009 && (from..to).contains(&p.xy().norm());
-            of.positions.iter().filter(ring).count()
+        let spot = Mask::Inside { shape: Shape::Sphere { radius: 0.03 }.into(), soft_m: 0.004 };
+        let dark = VisualLayer { mask: spot, albedo: [0.02; 3], roughness: 0.5, opacity: 1.0, relief_m: 0.0 };
+        let fine = fine_level(&shape, 3e-3, Visual::plain([0.8; 3], 0.5, 0.0).with(dark));
+        let coarse = simplify(&fine, 2e-4);
+        let count_in_ring = |lod: &Lod, from: f32, to: f32| {
+            let is_in_ring = |p: &&V3| p.z > 0.009 && (from..to).contains(&p.xy().norm());
+            lod.positions.iter().filter(is_in_ring).count()
         };
-        let [edge, plain] =
-            [[0.025, 0.033], [0.04, 0.07]].map(|[a, b]| (near(&coarse, a, b), near(&fine, a, b)));
-        assert!(2 * edge.0 > edge.1, "{edge:?} at the border of the pattern");
-        assert!(10 * plain.0 < plain.1, "{plain:?} where nothing is");
+        let [edge, plain] = [[0.025, 0.033], [0.04, 0.07]]
+            .map(|[a, b]| (count_in_ring(&coarse, a, b), count_in_ring(&fine, a, b)));
+        assert!(2 * edge.0 > edge.1, "{edge:?} vertices at the border of the pattern");
+        assert!(10 * plain.0 < plain.1, "{plain:?} vertices where the surface is plain");
     }
 }

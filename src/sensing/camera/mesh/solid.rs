@@ -1,117 +1,114 @@
-//! Models put together of plainly coloured solids, each with its own mesh, so that colours meet in clean lines.
+//! Meshes composed of solids of one material each, meshed separately so that materials meet along clean lines.
 
-use crate::sensing::camera::{
-    CameraError, RenderMesh,
-    mesh::render_mesh::{Lod, bake, check},
-    mesh::simplify::decimated,
+use super::{
+    bake::bake_vertices,
+    lod::Lod,
+    primitive_mesh::{append_visible, transform},
+    render_mesh::{RenderMesh, check_mesh},
+    simplify::simplify,
 };
 use crate::{
-    geometry::{Pose, mesh::Mesh, shape::Shape, surface_mesh::SurfaceMesh},
+    geometry::{Pose, Vec3, mesh::Mesh, shape::Shape, surface_mesh::SurfaceMesh},
     scene::Visual,
+    sensing::camera::CameraError,
 };
 
-/// How a solid becomes triangles.
+/// How a solid is triangulated.
 #[derive(Clone, Debug)]
 pub enum Tessellation {
-    /// As the skin of its shape.
-    Skin {
-        /// Edge of the cells, m.
+    /// By the surface mesher.
+    Cells {
+        /// Edge of its cells, m.
         cell_m: f64,
     },
-    /// As these, in the object frame; the shape only says where it is.
+    /// By a given mesh in the object frame; the shape is only used for distances.
     Mesh(Mesh),
 }
 
-/// A solid of one look.
+/// A solid of one material, in the object frame.
 #[derive(Clone, Debug)]
 pub struct RenderSolid {
-    /// Its shape, in the object frame.
+    /// Volume occupied by the solid.
     pub shape: Shape,
-    /// How it becomes triangles.
-    pub form: Tessellation,
-    /// Number of its look.
+    /// Triangulation of its surface.
+    pub tessellation: Tessellation,
+    /// Index of its visual.
     pub visual: usize,
 }
 
 impl RenderSolid {
-    /// A solid of look number `visual`, meshed with cells of edge `cell_m`, m.
+    /// A solid triangulated by the surface mesher with cells of edge `cell_m`, m.
     pub fn new(shape: Shape, cell_m: f64, visual: usize) -> Self {
-        Self { shape, form: Tessellation::Skin { cell_m }, visual }
+        Self { shape, tessellation: Tessellation::Cells { cell_m }, visual }
     }
 
-    /// A solid of look number `visual` with a mesh of its own.
-    pub fn of_mesh(shape: Shape, mesh: Mesh, visual: usize) -> Self {
-        Self { shape, form: Tessellation::Mesh(mesh), visual }
+    /// A solid with a given mesh.
+    pub fn with_mesh(shape: Shape, mesh: Mesh, visual: usize) -> Self {
+        Self { shape, tessellation: Tessellation::Mesh(mesh), visual }
     }
 
-    /// The solid moved.
+    /// Moves the solid by `pose`.
     #[must_use]
     pub fn placed(mut self, pose: &Pose) -> Self {
         self.shape = self.shape.placed(*pose);
-        if let Tessellation::Mesh(mesh) = &mut self.form {
-            mesh.vertices.iter_mut().for_each(|v| *v = pose.transform_point(&(*v).into()).coords);
+        if let Tessellation::Mesh(mesh) = &mut self.tessellation {
+            transform(mesh, pose);
         }
         self
     }
 
-    fn triangles(&self) -> Mesh {
-        match &self.form {
+    fn mesh(&self) -> Mesh {
+        match &self.tessellation {
             Tessellation::Mesh(mesh) => mesh.clone(),
-            Tessellation::Skin { cell_m } => SurfaceMesh::from_shape(&self.shape, *cell_m).mesh,
+            Tessellation::Cells { cell_m } => SurfaceMesh::from_shape(&self.shape, *cell_m).mesh,
         }
     }
 }
 
-/// How far the levels may be from what is meshed, m: for large pictures, for small ones, and for shadows and far views. What
-/// throws shadows must not stand out of what they fall on by as much as shadow maps leave between them.
-const FLAWS: [f32; 3] = [1e-4, 2.5e-4, 5e-4];
-/// Smooth one-coloured surfaces look right with edges of so many times what patterns need: this share of a cell counts
-/// as the level's spacing.
-const PLAIN: f64 = 0.16;
-/// What lies deeper than this inside of another solid is never seen, m.
-const HIDDEN: f64 = 1.5e-3;
+/// Geometric errors of the levels of detail, m: for large images, for small ones, and for distant views and shadows. The last
+/// is below the depth bias of shadow maps, so that casters do not shade their own surface.
+const LOD_ERRORS: [f32; 3] = [1e-4, 2.5e-4, 5e-4];
+/// Vertex spacing in cells that counts for the choice of a level: surfaces of one colour need fewer vertices than patterns.
+const UNIFORM_SPACING: f64 = 0.16;
+/// Minimum cell that counts for it, m: meshes given explicitly are fine enough for any view.
+const MIN_CELL: f64 = 2e-3;
+/// Vertices deeper than this inside another solid are invisible, m.
+const HIDDEN_DEPTH: f64 = 1.5e-3;
 
 impl RenderMesh {
-    /// The drawn form of solids that may reach into each other; `visuals` by their numbers.
+    /// Builds the mesh of solids that may overlap; `visuals` are those that the solids index.
     ///
     /// # Errors
-    /// If a solid has no surface or its look is not there.
-    pub fn of_solids(name: &str, solids: &[RenderSolid], visuals: &[Visual]) -> Result<Self, CameraError> {
-        let whole = Shape::Union(solids.iter().map(|solid| solid.shape.clone()).collect());
-        let mut finer = level(name, solids, visuals, &whole)?;
-        let levels = FLAWS.map(|flaw| {
-            finer = Lod { flaw, ..decimated(&finer, flaw) };
+    /// A solid has no surface, or its visual does not exist.
+    pub fn from_solids(name: &str, solids: &[RenderSolid], visuals: &[Visual]) -> Result<Self, CameraError> {
+        let mut finer = combined_level(name, solids, visuals)?;
+        let lods = LOD_ERRORS.map(|geometric_error| {
+            finer = Lod { geometric_error, ..simplify(&finer, geometric_error) };
             finer.clone()
         });
-        Ok(Self { levels: levels.into(), facets: Vec::new() })
+        Ok(Self { lods: lods.into(), charts: Vec::new() })
     }
 }
 
-fn level(name: &str, solids: &[RenderSolid], visuals: &[Visual], whole: &Shape) -> Result<Lod, CameraError> {
-    let mut all = Mesh { vertices: Vec::new(), triangles: Vec::new(), uvs: Vec::new() };
-    let mut materials = Vec::new();
-    // Of solids with meshes of their own alone: fine enough for any view.
-    let mut largest = 2e-3_f64;
+/// The finest level: all solids without the triangles that are inside others.
+fn combined_level(name: &str, solids: &[RenderSolid], visuals: &[Visual]) -> Result<Lod, CameraError> {
+    let union = Shape::Union(solids.iter().map(|solid| solid.shape.clone()).collect());
+    let mut combined = Mesh::default();
+    let mut material_ids = Vec::new();
+    let mut max_cell = MIN_CELL;
     for (i, solid) in solids.iter().enumerate() {
-        if let Tessellation::Skin { cell_m } = solid.form {
-            largest = largest.max(cell_m);
+        if let Tessellation::Cells { cell_m } = solid.tessellation {
+            max_cell = max_cell.max(cell_m);
         }
-        let mesh = solid.triangles();
-        check(name, &mesh, &vec![solid.visual as u16; mesh.triangles.len()], visuals)?;
-        let first = all.vertices.len() as u32;
-        let hidden: Vec<bool> = mesh
-            .vertices
-            .iter()
-            .map(|v| {
-                let others = solids.iter().enumerate().filter(|(j, _)| *j != i);
-                others.into_iter().any(|(_, other)| other.shape.distance(v) < -HIDDEN)
-            })
-            .collect();
-        let seen = mesh.triangles.iter().filter(|t| !t.iter().all(|&v| hidden[v as usize]));
-        all.triangles.extend(seen.map(|t| t.map(|v| v + first)));
-        materials.resize(all.triangles.len(), solid.visual as u16);
-        all.vertices.extend(mesh.vertices);
+        let mesh = solid.mesh();
+        check_mesh(name, &mesh, &vec![solid.visual as u16; mesh.triangles.len()], visuals)?;
+        append_visible(&mut combined, mesh, |v: &Vec3| {
+            let mut others = solids.iter().enumerate().filter(|(j, _)| *j != i);
+            others.any(|(_, other)| other.shape.distance(v) < -HIDDEN_DEPTH)
+        });
+        material_ids.resize(combined.triangles.len(), solid.visual as u16);
     }
-    // Each solid is of one look, and shares no vertex with another.
-    Ok(Lod { plain: true, ..bake(&all, &materials, visuals, (PLAIN * largest) as f32, Some(whole)) })
+    let spacing = (UNIFORM_SPACING * max_cell) as f32;
+    // Solids share no vertices and are uniform each, so their materials do not limit simplification.
+    Ok(Lod { is_uniform: true, ..bake_vertices(&combined, &material_ids, visuals, spacing, Some(&union)) })
 }

@@ -1,9 +1,6 @@
 //! Projects triangles and sorts them into the tiles of an image.
 
-use super::{
-    NO_TRIANGLE, ScreenCorners,
-    sample_buffer::min_w_if_covering,
-};
+use super::{NO_TRIANGLE, ScreenCorners, sample_buffer::min_w_if_covering};
 use crate::sensing::camera::{
     lens::{Lens, ScreenVertex},
     math::V3,

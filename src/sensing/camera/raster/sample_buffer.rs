@@ -139,9 +139,8 @@ impl<const PER_UNIT: usize> SampleBuffer<PER_UNIT> {
 pub(crate) fn min_w_if_covering(corners: &ScreenCorners, origin: [f32; 2], size: f32) -> Option<f32> {
     let setup = TriangleSetup::new(corners, origin)?;
     let square = [[0.0; 2], [size, 0.0], [0.0, size], [size; 2]];
-    let corner_w = square.map(|[x, y]| {
-        (setup.w + (setup.dw_dy * y + setup.dw_dx * x)).clamp(setup.min_w, setup.max_w)
-    });
+    let corner_w =
+        square.map(|[x, y]| (setup.w + (setup.dw_dy * y + setup.dw_dx * x)).clamp(setup.min_w, setup.max_w));
     let is_covered = setup.coverage([size; 2]) == Coverage::Full;
     is_covered.then(|| corner_w.into_iter().fold(f32::MAX, f32::min))
 }

@@ -1,146 +1,142 @@
-//! SurfaceSamples of triangles that pixels show, with everything that their light depends on.
+//! Interpolates the attributes of triangles at the surface points that pixels show.
 
-use crate::geometry::Vec3;
-use crate::sensing::camera::{
-    V3,
-    lens::Lens,
-    mesh::render_mesh::Lod,
-    mesh::texture_chart::TextureChart,
-    scene::pose::PosedMesh,
-    shade::shading::SurfaceSamples,
-    simd::{F8, LANES, STEPS, V8},
+use crate::{
+    geometry::Vec3,
+    sensing::camera::{
+        lens::{Lens, RayBasis},
+        math::V3,
+        mesh::{lod::Lod, texture_chart::TextureChart},
+        raster::{object_index, triangle_index},
+        scene::pose::PosedMesh,
+        shade::{pattern::MaterialSample, shading::SurfaceSamples},
+        simd::{LANE_INDEX, LANES, Vec3x8, f32x8},
+    },
 };
 
-/// Bits of a triangle's number that count triangles; those above count things.
-pub(crate) const TRIANGLE_BITS: u32 = 21;
-/// Set in the numbers of triangles of moving things.
-pub(crate) const MOVING: u32 = 1 << 31;
+/// Number of material components.
+const COMPONENTS: usize = MaterialSample::COMPONENTS;
 
-/// Number of the thing that a triangle belongs to.
-pub(crate) fn thing_of(id: u32) -> usize {
-    ((id & !MOVING) >> TRIANGLE_BITS) as usize
-}
-
-/// Index of a triangle in its level.
-pub(crate) fn triangle_of(id: u32) -> usize {
-    (id & ((1 << TRIANGLE_BITS) - 1)) as usize
-}
-
-/// A thing at the level and in the place that it is drawn.
+/// An object at the level of detail and pose at which it is drawn.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MeshInstance<'a> {
-    pub level: &'a Lod,
-    pub posed: &'a PosedMesh,
-    pub facets: &'a [TextureChart],
+    pub(crate) lod: &'a Lod,
+    pub(crate) posed: &'a PosedMesh,
+    pub(crate) charts: &'a [TextureChart],
 }
 
-/// PixelRays through pixels.
+/// Rays from the eye through pixels.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PixelRays {
-    pub eye: V3,
-    /// Through the top left of the image, and its change a pixel to the right and down.
-    pub rays: [V3; 3],
+    pub(crate) eye: V3,
+    basis: RayBasis,
     /// Width of a pixel at unit depth.
-    pixel: f32,
+    pixel_width: f32,
 }
 
 impl PixelRays {
     pub(crate) fn new(lens: &Lens) -> Self {
-        Self { eye: lens.eye, rays: lens.rays(), pixel: 1.0 / lens.focal }
+        Self { eye: lens.eye, basis: lens.rays(), pixel_width: 1.0 / lens.focal }
     }
 
     /// The ray through (x, y).
     #[inline(always)]
-    fn through(&self, x: f32, y: f32) -> Vec3 {
-        let [base, right, down] = self.rays.map(|ray| ray.cast::<f64>());
-        base + right * f64::from(x) + down * f64::from(y)
+    fn at(&self, x: f32, y: f32) -> Vec3 {
+        let RayBasis { corner, right, down } = self.basis;
+        corner.cast::<f64>() + right.cast() * f64::from(x) + down.cast() * f64::from(y)
     }
 
-    /// z components of unit vectors along the rays through eight pixels from (x, y) on.
-    pub(crate) fn up(&self, x: F8, y: F8) -> F8 {
-        let [base, right, down] = self.rays.each_ref().map(V8::splat);
-        (base + right * x + down * y).unit().z
+    /// z components of the unit vectors along the rays through eight points (x, y).
+    pub(crate) fn direction_z(&self, x: f32x8, y: f32x8) -> f32x8 {
+        let RayBasis { corner, right, down } = &self.basis;
+        (Vec3x8::splat(corner) + Vec3x8::splat(right) * x + Vec3x8::splat(down) * y).normalized().z
     }
 }
 
-/// A triangle ready to be met by rays.
+/// A triangle prepared for interpolation.
 #[derive(Clone, Copy)]
 pub(crate) struct TriangleInterpolator<'a> {
-    pub id: u32,
-    thing: f32,
-    /// For each corner the vector whose product with a ray tells how much that leans to the corner (to be divided by the
-    /// sum of all): the volumes that rays span with the opposite edges, which also hold for triangles that reach behind the
-    /// camera (Olano & Greer, Triangle Scan Conversion using 2D Homogeneous Coordinates, 1997).
-    lean: [Vec3; 3],
-    /// Corners from the eye, and their normals.
+    pub(crate) id: u32,
+    object: f32,
+    /// Products of a ray with these vectors are proportional to its barycentric coordinates: they are the volumes that the ray
+    /// spans with the opposite edges. This also holds for triangles that reach behind the camera (Olano & Greer, Triangle
+    /// Scan Conversion using 2D Homogeneous Coordinates, 1997).
+    barycentric: [Vec3; 3],
+    /// Corners relative to the eye.
     p: [V3; 3],
     n: [V3; 3],
-    /// Albedo, roughness, metalness, openness of the corners.
-    looks: [[f32; 6]; 3],
-    facet: Option<(&'a TextureChart, [[f32; 2]; 3])>,
+    materials: [[f32; COMPONENTS]; 3],
+    texture: Option<CornerUvs<'a>>,
+}
+
+/// The chart of a triangle, and its corners in it.
+#[derive(Clone, Copy)]
+struct CornerUvs<'a> {
+    chart: &'a TextureChart,
+    uvs: [[f32; 2]; 3],
 }
 
 impl<'a> TriangleInterpolator<'a> {
-    pub(crate) fn new(drawn: &MeshInstance<'a>, rays: &PixelRays, id: u32) -> Self {
-        let number = triangle_of(id);
-        let corners = drawn.level.triangles[number].map(|v| v as usize);
-        let p = corners.map(|v| drawn.posed.positions[v] - rays.eye);
-        let wide = p.map(|p| p.cast::<f64>());
-        let across = [wide[1].cross(&wide[2]), wide[2].cross(&wide[0]), wide[0].cross(&wide[1])];
-        let [i, j, k] = corners;
-        let (looks, normals) = (&drawn.level.looks, &drawn.posed.normals);
-        let facet = drawn.level.facets.get(number).map(|&facet| {
-            let place = drawn.level.places[number];
-            (&drawn.facets[facet as usize], place)
+    pub(crate) fn new(instance: &MeshInstance<'a>, rays: &PixelRays, id: u32) -> Self {
+        let triangle = triangle_index(id);
+        let corners = instance.lod.triangles[triangle].map(|v| v as usize);
+        let p = corners.map(|v| instance.posed.positions[v] - rays.eye);
+        let [a, b, c] = p.map(|p| p.cast::<f64>());
+        let texture = instance.lod.chart_ids.get(triangle).map(|&chart| CornerUvs {
+            chart: &instance.charts[chart as usize],
+            uvs: instance.lod.uvs[triangle],
         });
         Self {
             id,
-            thing: thing_of(id) as f32,
-            lean: across,
+            object: object_index(id) as f32,
+            barycentric: [b.cross(&c), c.cross(&a), a.cross(&b)],
             p,
-            n: [normals[i], normals[j], normals[k]],
-            looks: [looks[i].numbers(), looks[j].numbers(), looks[k].numbers()],
-            facet,
+            n: corners.map(|v| instance.posed.normals[v]),
+            materials: corners.map(|v| instance.lod.materials[v].components()),
+            texture,
         }
     }
 
-    /// Eight pixels from (x, y) (their middles) to the right, all of which this triangle covers.
+    /// Surface points at eight pixels in a row, all of which this triangle covers; (x, y) is the centre of the first.
     pub(crate) fn row(&self, rays: &PixelRays, x: f32, y: f32) -> SurfaceSamples {
-        let [first, right] = [rays.through(x, y), rays.rays[1].cast()];
-        let lean =
-            self.lean.map(|n| F8::splat(n.dot(&first) as f32) + F8::splat(n.dot(&right) as f32) * STEPS);
-        let scale = F8::ONE / (lean[0] + lean[1] + lean[2]);
-        let w = lean.map(|l| l * scale);
-        let mix3 =
-            |of: &[V3; 3]| V8::splat(&of[0]) * w[0] + V8::splat(&of[1]) * w[1] + V8::splat(&of[2]) * w[2];
-        let mix = |of: [f32; 3]| F8::splat(of[0]) * w[0] + F8::splat(of[1]) * w[1] + F8::splat(of[2]) * w[2];
+        let (first, right) = (rays.at(x, y), rays.basis.right.cast());
+        let weights = self
+            .barycentric
+            .map(|b| f32x8::splat(b.dot(&first) as f32) + f32x8::splat(b.dot(&right) as f32) * LANE_INDEX);
+        let scale = f32x8::ONE / (weights[0] + weights[1] + weights[2]);
+        let w = weights.map(|weight| weight * scale);
+        let mix3 = |of: &[V3; 3]| {
+            Vec3x8::splat(&of[0]) * w[0] + Vec3x8::splat(&of[1]) * w[1] + Vec3x8::splat(&of[2]) * w[2]
+        };
+        let mix = |of: [f32; 3]| {
+            f32x8::splat(of[0]) * w[0] + f32x8::splat(of[1]) * w[1] + f32x8::splat(of[2]) * w[2]
+        };
         let from_eye = mix3(&self.p);
-        let n = mix3(&self.n).unit();
-        let look = |i: usize| mix(self.looks.map(|look| look[i]));
-        let (albedo, roughness) = match &self.facet {
-            Some((facet, at)) => {
-                let place = [0, 1].map(|axis| mix(at.map(|a| a[axis])));
-                facet.sample(place, footprint(from_eye, n, rays))
+        let n = mix3(&self.n).normalized();
+        let component = |i: usize| mix(self.materials.map(|material| material[i]));
+        let (albedo, roughness) = match &self.texture {
+            Some(CornerUvs { chart, uvs }) => {
+                let uv = [0, 1].map(|axis| mix(uvs.map(|uv| uv[axis])));
+                chart.sample(uv, pixel_footprint(from_eye, n, rays))
             }
-            None => (V8 { x: look(0), y: look(1), z: look(2) }, look(3)),
+            None => (Vec3x8 { x: component(0), y: component(1), z: component(2) }, component(3)),
         };
         SurfaceSamples {
-            p: from_eye + V8::splat(&rays.eye),
+            p: from_eye + Vec3x8::splat(&rays.eye),
             n,
             albedo,
             roughness,
-            metalness: look(4),
-            open: look(5),
-            thing: F8::splat(self.thing),
+            metalness: component(4),
+            sky_visibility: component(5),
+            object: f32x8::splat(self.object),
         }
     }
 
-    /// Adds the point that the ray through (x, y) meets, or the nearest of the triangle.
-    pub(crate) fn put(&self, batch: &mut ShadingBatch<'a>, rays: &PixelRays, x: f32, y: f32) {
-        let ray = rays.through(x, y);
-        let lean = self.lean.map(|n| n.dot(&ray));
-        let sum = lean[0] + lean[1] + lean[2];
-        let w = if sum == 0.0 { [1.0 / 3.0; 3] } else { lean.map(|l| (l / sum).max(0.0) as f32) };
+    /// Appends the point where the ray through (x, y) meets the triangle, or the nearest point of the triangle.
+    pub(crate) fn push(&self, batch: &mut ShadingBatch<'a>, rays: &PixelRays, x: f32, y: f32) {
+        let ray = rays.at(x, y);
+        let weights = self.barycentric.map(|b| b.dot(&ray));
+        let sum = weights[0] + weights[1] + weights[2];
+        let w = if sum == 0.0 { [1.0 / 3.0; 3] } else { weights.map(|w| (w / sum).max(0.0) as f32) };
         let scale = 1.0 / (w[0] + w[1] + w[2]);
         let w = w.map(|w| w * scale);
         let lane = batch.count;
@@ -150,75 +146,78 @@ impl<'a> TriangleInterpolator<'a> {
             batch.p[axis][lane] = p[axis];
             batch.n[axis][lane] = n[axis];
         }
-        for i in 0..6 {
-            batch.looks[i][lane] =
-                self.looks[0][i] * w[0] + self.looks[1][i] * w[1] + self.looks[2][i] * w[2];
+        let [a, b, c] = &self.materials;
+        for i in 0..COMPONENTS {
+            batch.materials[i][lane] = a[i] * w[0] + b[i] * w[1] + c[i] * w[2];
         }
-        batch.thing[lane] = self.thing;
-        batch.facets[lane] = self.facet.as_ref().map(|(facet, at)| {
-            for (axis, lanes) in batch.place.iter_mut().enumerate() {
-                lanes[lane] = at[0][axis] * w[0] + at[1][axis] * w[1] + at[2][axis] * w[2];
+        batch.object[lane] = self.object;
+        batch.charts[lane] = self.texture.as_ref().map(|CornerUvs { chart, uvs }| {
+            for (axis, lanes) in batch.uv.iter_mut().enumerate() {
+                lanes[lane] = uvs[0][axis] * w[0] + uvs[1][axis] * w[1] + uvs[2][axis] * w[2];
             }
-            *facet
+            *chart
         });
     }
 }
 
-/// A pixel's width on surfaces at `from_eye`: the geometric mean of both directions.
+/// Width of a pixel projected onto surfaces at `from_eye`, m: the geometric mean over both directions.
 #[inline(always)]
-fn footprint(from_eye: V8, n: V8, rays: &PixelRays) -> F8 {
-    let distance2 = from_eye.dot(from_eye).fast_max(F8::splat(1e-12));
+fn pixel_footprint(from_eye: Vec3x8, n: Vec3x8, rays: &PixelRays) -> f32x8 {
+    let distance2 = from_eye.dot(from_eye).fast_max(f32x8::splat(1e-12));
     let distance = distance2.sqrt();
-    let cosine = (n.dot(from_eye).abs() / distance).fast_max(F8::splat(0.05));
-    distance * F8::splat(rays.pixel) / cosine.sqrt()
+    let cosine = (n.dot(from_eye).abs() / distance).fast_max(f32x8::splat(0.05));
+    distance * f32x8::splat(rays.pixel_width) / cosine.sqrt()
 }
 
-/// SurfaceSamples gathered one by one.
+/// Surface points of unrelated pixels, collected until eight can be shaded together.
 #[derive(Clone, Default)]
 pub(crate) struct ShadingBatch<'a> {
-    pub count: usize,
-    /// Pixel of the tile that each belongs to, and its share of it.
-    pub pixel: [u32; LANES],
-    pub share: [f32; LANES],
+    pub(crate) count: usize,
+    /// Pixel of the tile that each point contributes to.
+    pub(crate) pixel: [u32; LANES],
+    /// Fraction of the pixel that each point accounts for.
+    pub(crate) share: [f32; LANES],
+    /// Relative to the eye.
     p: [[f32; LANES]; 3],
     n: [[f32; LANES]; 3],
-    looks: [[f32; LANES]; 6],
-    thing: [f32; LANES],
-    place: [[f32; LANES]; 2],
-    facets: [Option<&'a TextureChart>; LANES],
+    materials: [[f32; LANES]; COMPONENTS],
+    object: [f32; LANES],
+    uv: [[f32; LANES]; 2],
+    charts: [Option<&'a TextureChart>; LANES],
 }
 
 impl ShadingBatch<'_> {
-    /// The points; those beyond `count` are old ones.
-    pub(crate) fn points(&self, rays: &PixelRays) -> SurfaceSamples {
-        let from_eye = V8::from_arrays(&self.p);
-        let n = V8::from_arrays(&self.n).unit();
-        let look = |i: usize| F8::new(self.looks[i]);
-        let mut points = SurfaceSamples {
-            p: from_eye + V8::splat(&rays.eye),
+    /// Returns the points; lanes from `count` on hold leftovers.
+    pub(crate) fn samples(&self, rays: &PixelRays) -> SurfaceSamples {
+        let from_eye = Vec3x8::from_arrays(&self.p);
+        let n = Vec3x8::from_arrays(&self.n).normalized();
+        let component = |i: usize| f32x8::new(self.materials[i]);
+        let mut samples = SurfaceSamples {
+            p: from_eye + Vec3x8::splat(&rays.eye),
             n,
-            albedo: V8 { x: look(0), y: look(1), z: look(2) },
-            roughness: look(3),
-            metalness: look(4),
-            open: look(5),
-            thing: F8::new(self.thing),
+            albedo: Vec3x8 { x: component(0), y: component(1), z: component(2) },
+            roughness: component(3),
+            metalness: component(4),
+            sky_visibility: component(5),
+            object: f32x8::new(self.object),
         };
-        let of_lane = |lane: usize| self.facets[lane].map_or(std::ptr::null(), |f| f as *const TextureChart);
+        let chart_of = |lane: usize| self.charts[lane].map_or(std::ptr::null(), |c| c as *const TextureChart);
         for lane in 0..self.count {
-            let Some(facet) = self.facets[lane] else { continue };
-            if (0..lane).any(|before| of_lane(before) == of_lane(lane)) {
+            let Some(chart) = self.charts[lane] else { continue };
+            if (0..lane).any(|before| chart_of(before) == chart_of(lane)) {
                 continue;
             }
-            let own = std::array::from_fn(|other| if of_lane(other) == of_lane(lane) { 1.0 } else { 0.0 });
-            let own = F8::new(own).simd_gt(F8::ZERO);
-            // Lanes of other things look where this one does.
-            let here = |values: &[f32; LANES]| own.select(F8::new(*values), F8::splat(values[lane]));
-            let width = footprint(from_eye, n, rays);
-            let width = own.select(width, F8::splat(width.to_array()[lane]));
-            let (albedo, roughness) = facet.sample([here(&self.place[0]), here(&self.place[1])], width);
-            points.albedo = albedo.or(own, points.albedo);
-            points.roughness = own.select(roughness, points.roughness);
+            let shares_chart =
+                std::array::from_fn(|other| if chart_of(other) == chart_of(lane) { 1.0 } else { 0.0 });
+            let mask = f32x8::new(shares_chart).simd_gt(f32x8::ZERO);
+            // Other lanes repeat this one, so that they read no other mip levels.
+            let here = |values: &[f32; LANES]| mask.select(f32x8::new(*values), f32x8::splat(values[lane]));
+            let footprint = pixel_footprint(from_eye, n, rays);
+            let footprint = mask.select(footprint, f32x8::splat(footprint.to_array()[lane]));
+            let (albedo, roughness) = chart.sample([here(&self.uv[0]), here(&self.uv[1])], footprint);
+            samples.albedo = Vec3x8::select(mask, albedo, samples.albedo);
+            samples.roughness = mask.select(roughness, samples.roughness);
         }
-        points
+        samples
     }
 }

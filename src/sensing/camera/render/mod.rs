@@ -1,124 +1,136 @@
-//! One picture: pose, shadows, samples, shading.
+//! Draws images: poses the objects, updates the shadows, then rasterises and shades tile by tile.
 
-mod background;
+pub(crate) mod background;
 pub(crate) mod interpolate;
 pub(crate) mod pass;
 pub(crate) mod tile;
 pub(crate) mod visibility;
 
-use crate::sensing::camera::{
-    CameraError, FrameView, RenderScene, RenderedImage,
-    lens::Lens,
-    raster::binning::{TILE, TileBins},
-    raster::sample_buffer::{ROWS, SampleBuffer},
-    render::background::{BackgroundTile, CachedBackground},
-    render::interpolate::PixelRays,
-    render::pass::RenderPass,
-    render::tile::{PIXELS, TileDisplay, TileRect, TileResolver, Triangles},
-    render::visibility::{blobs, choose_levels, draw_shadows, drawn, inside_of, pose_all},
-    scene::pose::PosedMesh,
-    shade::shadow::ShadowMap,
-};
+use background::{BackgroundTile, CachedBackground};
+use interpolate::PixelRays;
+use pass::RenderPass;
+use tile::{TileDisplay, TileRect, TileResolver, TileSamples};
+use visibility::{Occluders, choose_levels, draw_moving_shadows, enclosing_object, instances, pose_objects};
+
 use crate::{
     geometry::{Pose, Vec3},
     scene::{Camera, CameraMount},
+    sensing::camera::{
+        CameraError, FrameView, RenderScene, RenderedImage,
+        lens::Lens,
+        raster::binning::{TILE_EDGE, TileBins},
+        scene::{pose::PosedMesh, render_scene::SceneId},
+        shade::shadow::ShadowMap,
+    },
 };
 
-/// Working memory of a renderer, kept from picture to picture; also the backgrounds of cameras that do not move.
+/// Draws camera images.
+///
+/// A renderer keeps working memory between images. It also caches the moving shadows of the last state, which all cameras
+/// share, and the background (all fixed objects) of every camera that is fixed in the world. Neither changes depth or
+/// segmentation; with a cached background, colours of relit pixels differ from a full rendering by rounding.
+/// A renderer may be used with several scenes, but keeps the cache of one.
 #[derive(Debug, Default)]
 pub struct Renderer {
-    /// World forms of the levels of moving things.
+    /// World-space levels of detail of the moving objects.
     poses: Vec<Vec<PosedMesh>>,
-    screen: TileBins,
-    /// What throws the shadows of the state that was drawn last.
-    shadow: Option<(Shown, ShadowMap)>,
+    bins: TileBins,
+    moving_shadow: Option<MovingShadow>,
     backgrounds: Vec<CachedBackground>,
-    /// Whether backgrounds are not kept.
-    uncached: bool,
+    is_uncached: bool,
 }
 
-impl Renderer {
-    /// Working memory that keeps no backgrounds: each picture is drawn from nothing.
-    pub fn without_cache() -> Self {
-        Self { uncached: true, ..Self::default() }
-    }
-}
-
-/// What a state was: all that moves.
-#[derive(Clone, Debug, Default)]
-struct Shown {
-    stage: u64,
+/// The shadow map of the moving objects in one state.
+#[derive(Debug)]
+struct MovingShadow {
+    scene: SceneId,
     nodes: Vec<Vec<Vec3>>,
     rigid: Vec<Pose>,
     links: Vec<Vec<Pose>>,
+    map: ShadowMap,
 }
 
-impl Shown {
-    fn is(&self, view: &FrameView) -> bool {
+impl MovingShadow {
+    fn new(scene: &RenderScene) -> Self {
+        Self {
+            scene: scene.id.clone(),
+            nodes: Vec::new(),
+            rigid: Vec::new(),
+            links: Vec::new(),
+            map: ShadowMap::new(&scene.lighting),
+        }
+    }
+
+    fn shows(&self, view: &FrameView) -> bool {
         self.nodes == view.nodes && self.rigid == view.rigid && self.links == view.links
     }
 
-    fn keep(&mut self, stage: u64, view: &FrameView) {
-        self.stage = stage;
+    fn draw(&mut self, scene: &RenderScene, view: &FrameView, poses: &[Vec<PosedMesh>]) {
         view.nodes.clone_into(&mut self.nodes);
         view.rigid.clone_into(&mut self.rigid);
         view.links.clone_into(&mut self.links);
+        draw_moving_shadows(scene, poses, &mut self.map);
     }
 }
 
 impl Renderer {
-    /// Draws what `camera` sees of `stage` in the state `view`.
+    /// A renderer that caches no backgrounds: each image is drawn from scratch.
+    pub fn without_cache() -> Self {
+        Self { is_uncached: true, ..Self::default() }
+    }
+
+    /// Draws the image that `camera` sees of `scene` in the state `view`.
+    ///
+    /// The result depends on the arguments alone and is byte-identical on every machine.
     ///
     /// # Errors
-    /// A number of the camera out of range, a state without a body that is drawn. A camera inside of a thing is none: see
-    /// [`RenderedImage::inside`].
+    /// A setting of the camera is out of range, or the state lacks a body of the scene. A camera inside an object is not an
+    /// error; see [`RenderedImage::inside`].
     pub fn render(
         &mut self,
-        stage: &RenderScene,
+        scene: &RenderScene,
         view: &FrameView,
         camera: &Camera,
     ) -> Result<RenderedImage, CameraError> {
-        let lens = Lens::new(camera, view)?;
-        // Cameras that look at one state share its shadows.
-        let known = self.shadow.take().filter(|(shown, _)| shown.stage == stage.key);
-        let same = known.as_ref().is_some_and(|(shown, _)| shown.is(view));
-        let bounds = pose_all(stage, view, same, &mut self.poses)?;
-        let levels = choose_levels(stage, view, &lens, &bounds, &mut self.poses)?;
-        let inside = inside_of(stage, &lens, &bounds, &self.poses);
-        let (mut shown, mut shadow) =
-            known.unwrap_or_else(|| (Shown::default(), ShadowMap::new(&stage.lighting)));
-        if !same {
-            shown.keep(stage.key, view);
-            draw_shadows(stage, &self.poses, &mut shadow);
+        let lens = Lens::new(camera, view.hand_w)?;
+        // Taken out, so that an error below leaves no shadow whose poses are half updated.
+        let known = self.moving_shadow.take().filter(|shadow| shadow.scene == scene.id);
+        let is_same_state = known.as_ref().is_some_and(|shadow| shadow.shows(view));
+        let bounds = pose_objects(scene, view, is_same_state, &mut self.poses)?;
+        let levels = choose_levels(scene, view, &lens, &bounds, &mut self.poses)?;
+        let inside = enclosing_object(scene, &lens, &bounds, &self.poses);
+        let mut moving_shadow = known.unwrap_or_else(|| MovingShadow::new(scene));
+        if !is_same_state {
+            moving_shadow.draw(scene, view, &self.poses);
         }
-        let [fixed_blobs, moving_blobs] = blobs(stage, &bounds);
+        let occluders = Occluders::new(scene, &bounds);
         let pass = RenderPass {
-            stage,
+            scene,
             lens: &lens,
             rays: PixelRays::new(&lens),
-            drawn: &drawn(stage, &self.poses, &levels),
-            fixed_blobs: &fixed_blobs,
-            moving_blobs: &moving_blobs,
-            moving_shadow: &shadow,
+            instances: &instances(scene, &self.poses, &levels),
+            fixed_occluders: &occluders.fixed,
+            moving_occluders: &occluders.moving,
+            moving_shadow: &moving_shadow.map,
         };
-        let mut picture = if self.uncached || camera.mount != CameraMount::World {
-            all(&pass, &mut self.screen)
+        let mut image = if self.is_uncached || camera.mount != CameraMount::World {
+            draw_all(&pass, &mut self.bins)
         } else {
-            let known = self.backgrounds.iter().position(|b| b.stage == stage.key && b.camera == *camera);
+            let known = self.backgrounds.iter().position(|b| b.scene == scene.id && b.camera == *camera);
             let index = known.unwrap_or_else(|| {
-                self.backgrounds.retain(|b| b.stage == stage.key);
-                self.backgrounds.push(background(&pass, camera, &mut self.screen));
+                self.backgrounds.retain(|b| b.scene == scene.id);
+                self.backgrounds.push(draw_background(&pass, camera, &mut self.bins));
                 self.backgrounds.len() - 1
             });
-            over(&pass, &self.backgrounds[index], &mut self.screen)
+            draw_over_background(&pass, &self.backgrounds[index], &mut self.bins)
         };
-        self.shadow = Some((shown, shadow));
-        picture.inside = inside;
-        Ok(picture)
+        self.moving_shadow = Some(moving_shadow);
+        image.inside = inside;
+        Ok(image)
     }
 }
 
-fn empty_picture(lens: &Lens) -> RenderedImage {
+fn blank_image(lens: &Lens) -> RenderedImage {
     let (width, height) = (lens.width, lens.height);
     let pixels = width * height;
     RenderedImage {
@@ -131,84 +143,84 @@ fn empty_picture(lens: &Lens) -> RenderedImage {
     }
 }
 
-fn empty_display() -> TileDisplay {
-    TileDisplay(Box::new([[0.0; PIXELS]; 3]))
+fn blank_samples(lens: &Lens) -> TileSamples {
+    TileSamples::new(TILE_EDGE, TILE_EDGE, 1.0 / lens.far, true)
 }
 
-fn empty_samples(lens: &Lens) -> SampleBuffer<ROWS> {
-    SampleBuffer::new(TILE, TILE, 1.0 / lens.far, true)
-}
-
-/// Everything, drawn from nothing.
-fn all(pass: &RenderPass, screen: &mut TileBins) -> RenderedImage {
-    screen.clear(pass.lens);
-    pass.show(false, screen);
-    pass.show(true, screen);
-    screen.sort();
-    let (mut picture, mut display) = (empty_picture(pass.lens), empty_display());
-    let (mut samples, mut triangles) = (empty_samples(pass.lens), Triangles::new());
-    for tile in 0..screen.tiles().iter().product() {
-        let window = TileRect::of(tile, screen, pass);
+/// Draws all objects.
+fn draw_all(pass: &RenderPass, bins: &mut TileBins) -> RenderedImage {
+    bins.clear(pass.lens);
+    pass.bin_objects(false, bins);
+    pass.bin_objects(true, bins);
+    bins.sort();
+    let (mut image, mut display) = (blank_image(pass.lens), TileDisplay::new());
+    let (mut samples, mut triangles) = (blank_samples(pass.lens), Vec::new());
+    for tile in 0..bins.tile_counts().iter().product() {
+        let rect = TileRect::new(tile, bins, pass);
         samples.clear(1.0 / pass.lens.far);
-        if window.visible(screen, &mut triangles) {
-            window.draw_sole(&triangles[0], pass, &mut samples, (&mut display, &mut picture));
+        if rect.collect_visible(bins, &mut triangles) {
+            rect.draw_single(&triangles[0], pass, &mut samples, &mut display, &mut image);
         } else {
-            window.draw(&triangles, &mut samples);
-            TileResolver::new(pass, window, &samples).run(false, &mut display, &mut picture);
+            rect.rasterize(&triangles, &mut samples);
+            TileResolver::new(pass, rect, &samples).run(false, &mut display, &mut image);
         }
-        window.write(&display, &mut picture);
+        rect.write(&display, &mut image);
     }
-    picture
+    image
 }
 
-/// What is fixed.
-fn background(pass: &RenderPass, camera: &Camera, screen: &mut TileBins) -> CachedBackground {
-    screen.clear(pass.lens);
-    pass.show(false, screen);
-    screen.sort();
-    let (mut picture, mut display) = (empty_picture(pass.lens), empty_display());
-    let (mut samples, mut triangles) = (empty_samples(pass.lens), Triangles::new());
+/// Draws the fixed objects.
+fn draw_background(pass: &RenderPass, camera: &Camera, bins: &mut TileBins) -> CachedBackground {
+    bins.clear(pass.lens);
+    pass.bin_objects(false, bins);
+    bins.sort();
+    let (mut image, mut display) = (blank_image(pass.lens), TileDisplay::new());
+    let (mut samples, mut triangles) = (blank_samples(pass.lens), Vec::new());
     let mut tiles = Vec::new();
-    for tile in 0..screen.tiles().iter().product() {
-        let window = TileRect::of(tile, screen, pass);
+    for tile in 0..bins.tile_counts().iter().product() {
+        let rect = TileRect::new(tile, bins, pass);
         samples.clear(1.0 / pass.lens.far);
-        window.visible(screen, &mut triangles);
-        window.draw(&triangles, &mut samples);
-        let mut spots = BackgroundTile::new();
-        TileResolver::new(pass, window, &samples).run(false, &mut spots, &mut picture);
-        spots.finish(pass, &samples);
-        spots.relight(pass, &(false, Vec::new()), |_| false, &mut display);
-        window.write(&display, &mut picture);
-        tiles.push(spots);
+        rect.collect_visible(bins, &mut triangles);
+        rect.rasterize(&triangles, &mut samples);
+        let mut background = BackgroundTile::new();
+        TileResolver::new(pass, rect, &samples).run(false, &mut background, &mut image);
+        background.finish(pass, &samples);
+        background.copy_display(&mut display);
+        rect.write(&display, &mut image);
+        tiles.push(background);
     }
-    CachedBackground { stage: pass.stage.key, camera: camera.clone(), tiles, picture }
+    CachedBackground { scene: pass.scene.id.clone(), camera: camera.clone(), tiles, image }
 }
 
-/// What moves, over a background.
-fn over(pass: &RenderPass, background: &CachedBackground, screen: &mut TileBins) -> RenderedImage {
-    screen.clear(pass.lens);
-    pass.show(true, screen);
-    screen.sort();
-    let (mut picture, mut display) = (background.picture.clone(), empty_display());
-    let (mut samples, mut triangles) = (empty_samples(pass.lens), Triangles::new());
-    for (tile, spots) in background.tiles.iter().enumerate() {
-        let hidden = spots.hidden_by(pass);
-        let covered = screen.touches(tile);
-        if !covered && !hidden.0 && hidden.1.is_empty() {
+/// Draws the moving objects over a background.
+fn draw_over_background(
+    pass: &RenderPass,
+    background: &CachedBackground,
+    bins: &mut TileBins,
+) -> RenderedImage {
+    bins.clear(pass.lens);
+    pass.bin_objects(true, bins);
+    bins.sort();
+    let (mut image, mut display) = (background.image.clone(), TileDisplay::new());
+    let (mut samples, mut triangles) = (blank_samples(pass.lens), Vec::new());
+    for (tile, fixed) in background.tiles.iter().enumerate() {
+        let occlusion = fixed.moving_occlusion(pass);
+        let is_occupied = bins.is_occupied(tile);
+        if !is_occupied && occlusion.is_none() {
             continue;
         }
-        let window = TileRect::of(tile, screen, pass);
-        if covered {
-            samples.clone_from(&spots.samples);
-            window.visible(screen, &mut triangles);
-            window.draw(&triangles, &mut samples);
-            let mut resolver = TileResolver::new(pass, window, &samples);
-            spots.relight(pass, &hidden, |first| resolver.moves(first), &mut display);
-            resolver.run(true, &mut display, &mut picture);
+        let rect = TileRect::new(tile, bins, pass);
+        if is_occupied {
+            samples.clone_from(&fixed.samples);
+            rect.collect_visible(bins, &mut triangles);
+            rect.rasterize(&triangles, &mut samples);
+            let mut resolver = TileResolver::new(pass, rect, &samples);
+            fixed.relight(pass, &occlusion, |first| resolver.is_all_moving(first), &mut display);
+            resolver.run(true, &mut display, &mut image);
         } else {
-            spots.relight(pass, &hidden, |_| false, &mut display);
+            fixed.relight(pass, &occlusion, |_| false, &mut display);
         }
-        window.write(&display, &mut picture);
+        rect.write(&display, &mut image);
     }
-    picture
+    image
 }

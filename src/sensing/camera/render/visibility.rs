@@ -1,152 +1,166 @@
-//! Before a picture is drawn: everything in its place, at the level of detail that it is seen at.
+//! Prepares the objects of a scene for one image: poses, levels of detail, shadows and occluders.
 
+use super::interpolate::MeshInstance;
 use crate::sensing::camera::{
-    Attachment, CameraError, FrameView, RenderScene, V3, lens::Lens, mesh::render_mesh::Lod,
-    render::interpolate::MeshInstance, scene::pose::PosedMesh, shade::shading::OcclusionEllipsoid,
-    shade::shadow::ShadowMap,
+    CameraError,
+    lens::Lens,
+    math::V3,
+    scene::{
+        pose::PosedMesh,
+        render_scene::{Attachment, FrameView, RenderScene},
+    },
+    shade::{occlusion::OcclusionEllipsoid, shadow::ShadowMap},
 };
 
-/// A coarser level is used if its edges are at most this many pixels long, or if it is of one colour and at most this many
-/// pixels from the shape that it stands for.
-const COARSE_PIXELS: f32 = 1.7;
-pub(crate) const FLAW_PIXELS: f32 = 0.12;
-/// Things wider than this hide no sky from others, m: they are grounds and walls.
-const WIDEST_BLOB: f32 = 0.35;
+/// Maximum extent of objects that occlude the sky for others, m; larger ones are floors and walls.
+const MAX_OCCLUDER_EXTENT: f32 = 0.35;
+/// Factor on the bounding radius in the frustum test: finer levels may exceed the coarsest one a little.
+const BOUNDS_MARGIN: f32 = 1.1;
 
-fn bounds_of(points: &[V3]) -> [V3; 2] {
+/// Lowest and highest corner of the bounding box of an object, world, m.
+pub(crate) type Bounds = [V3; 2];
+
+fn bounds_of(points: &[V3]) -> Bounds {
     points.iter().fold([V3::repeat(f32::MAX), V3::repeat(f32::MIN)], |b, p| [b[0].inf(p), b[1].sup(p)])
 }
 
-/// Puts the coarsest level of every moving thing in its place, if it is not `placed` there; bounds of all things, world.
-pub(crate) fn pose_all(
-    stage: &RenderScene,
+/// Poses the coarsest level of every moving object, unless `poses` are up to date. Returns the bounds of all objects.
+pub(crate) fn pose_objects(
+    scene: &RenderScene,
     view: &FrameView,
-    placed: bool,
+    is_up_to_date: bool,
     poses: &mut Vec<Vec<PosedMesh>>,
-) -> Result<Vec<[V3; 2]>, CameraError> {
-    poses.resize_with(stage.objects.len(), Vec::new);
-    let mut bounds = Vec::with_capacity(stage.objects.len());
-    for ((thing, fixed), own) in stage.objects.iter().zip(&stage.fixed).zip(poses) {
-        let last = thing.mesh.levels.len() - 1;
-        if let Some(posed) = fixed.last() {
-            bounds.push(bounds_of(&posed.positions));
+) -> Result<Vec<Bounds>, CameraError> {
+    poses.resize_with(scene.objects.len(), Vec::new);
+    let mut bounds = Vec::with_capacity(scene.objects.len());
+    for ((object, fixed), posed) in scene.objects.iter().zip(&scene.fixed_meshes).zip(poses) {
+        if let Some(fixed) = fixed.last() {
+            bounds.push(bounds_of(&fixed.positions));
             continue;
         }
-        own.resize_with(thing.mesh.levels.len(), PosedMesh::default);
-        if !placed {
-            own[last].update(thing, &thing.mesh.levels[last], view)?;
+        let lods = &object.mesh.lods;
+        let coarsest = lods.len() - 1;
+        posed.resize_with(lods.len(), PosedMesh::default);
+        if !is_up_to_date {
+            posed[coarsest].update(object, &lods[coarsest], view)?;
         }
-        bounds.push(bounds_of(&own[last].positions));
+        bounds.push(bounds_of(&posed[coarsest].positions));
     }
     Ok(bounds)
 }
 
-/// The level that each thing is drawn at, put in its place.
+/// Chooses the level of detail of each object, `None` if it is out of view, and poses it.
 pub(crate) fn choose_levels(
-    stage: &RenderScene,
+    scene: &RenderScene,
     view: &FrameView,
     lens: &Lens,
-    bounds: &[[V3; 2]],
+    bounds: &[Bounds],
     poses: &mut [Vec<PosedMesh>],
 ) -> Result<Vec<Option<usize>>, CameraError> {
     let mut chosen = Vec::with_capacity(bounds.len());
-    for (i, thing) in stage.objects.iter().enumerate() {
+    for (i, object) in scene.objects.iter().enumerate() {
         let [low, high] = bounds[i];
         let (centre, radius) = ((low + high) * 0.5, 0.5 * (high - low).norm());
-        if !lens.may_see(&centre, 1.1 * radius) {
+        if !lens.may_see(&centre, BOUNDS_MARGIN * radius) {
             chosen.push(None);
             continue;
         }
         let nearest = (lens.depth(&centre) - radius).max(lens.near);
         let pixel = nearest / lens.focal;
-        let levels = &thing.mesh.levels;
-        let fine = |l: &Lod| l.spacing <= COARSE_PIXELS * pixel || l.plain && l.flaw <= FLAW_PIXELS * pixel;
-        let level = levels.iter().rposition(fine).unwrap_or(0);
-        if stage.fixed[i].is_empty() && level + 1 < levels.len() {
-            poses[i][level].update(thing, &levels[level], view)?;
+        let lods = &object.mesh.lods;
+        let level = lods.iter().rposition(|lod| lod.suffices(pixel)).unwrap_or(0);
+        // The coarsest level is posed already.
+        if scene.fixed_meshes[i].is_empty() && level + 1 < lods.len() {
+            poses[i][level].update(object, &lods[level], view)?;
         }
         chosen.push(Some(level));
     }
     Ok(chosen)
 }
 
-/// A thing's vertices in the world.
-fn posed<'a>(
-    stage: &'a RenderScene,
+fn posed_mesh<'a>(
+    scene: &'a RenderScene,
     poses: &'a [Vec<PosedMesh>],
-    thing: usize,
+    object: usize,
     level: usize,
 ) -> &'a PosedMesh {
-    stage.fixed[thing].get(level).unwrap_or_else(|| &poses[thing][level])
+    scene.fixed_meshes[object].get(level).unwrap_or_else(|| &poses[object][level])
 }
 
-/// What of each thing is drawn.
-pub(crate) fn drawn<'a>(
-    stage: &'a RenderScene,
+/// Returns the drawn form of each object at its level of detail.
+pub(crate) fn instances<'a>(
+    scene: &'a RenderScene,
     poses: &'a [Vec<PosedMesh>],
     levels: &[Option<usize>],
 ) -> Vec<Option<MeshInstance<'a>>> {
-    let one = |(i, level): (usize, &Option<usize>)| {
-        let model = &stage.objects[i].mesh;
+    let instance = |(i, level): (usize, &Option<usize>)| {
+        let mesh = &scene.objects[i].mesh;
         let level = (*level)?;
-        Some(MeshInstance {
-            level: &model.levels[level],
-            posed: posed(stage, poses, i, level),
-            facets: &model.facets,
-        })
+        let posed = posed_mesh(scene, poses, i, level);
+        Some(MeshInstance { lod: &mesh.lods[level], posed, charts: &mesh.charts })
     };
-    levels.iter().enumerate().map(one).collect()
+    levels.iter().enumerate().map(instance).collect()
 }
 
-/// The first thing that the camera is inside of: there the solid angles of the triangles around it (Van Oosterom & Strackee,
-/// 1983) add up to a whole turn.
-pub(crate) fn inside_of(
-    stage: &RenderScene,
+/// Returns the name of the first object that contains the camera: one whose triangles subtend a solid angle of 4π there (Van
+/// Oosterom & Strackee, 1983).
+pub(crate) fn enclosing_object(
+    scene: &RenderScene,
     lens: &Lens,
-    bounds: &[[V3; 2]],
+    bounds: &[Bounds],
     poses: &[Vec<PosedMesh>],
 ) -> Option<String> {
-    for (i, thing) in stage.objects.iter().enumerate() {
+    for (i, object) in scene.objects.iter().enumerate() {
         let [low, high] = bounds[i];
         if (0..3).any(|axis| lens.eye[axis] < low[axis] || lens.eye[axis] > high[axis]) {
             continue;
         }
-        let level = thing.mesh.levels.len() - 1;
-        let positions = &posed(stage, poses, i, level).positions;
+        let level = object.mesh.lods.len() - 1;
+        let positions = &posed_mesh(scene, poses, i, level).positions;
         let mut angle = 0.0_f64;
-        for t in &thing.mesh.levels[level].triangles {
+        for t in &object.mesh.lods[level].triangles {
             let [a, b, c] = t.map(|v| (positions[v as usize] - lens.eye).cast::<f64>());
             let (la, lb, lc) = (a.norm(), b.norm(), c.norm());
-            let below = la * lb * lc + a.dot(&b) * lc + b.dot(&c) * la + c.dot(&a) * lb;
-            angle += 2.0 * a.dot(&b.cross(&c)).atan2(below);
+            let denominator = la * lb * lc + a.dot(&b) * lc + b.dot(&c) * la + c.dot(&a) * lb;
+            angle += 2.0 * a.dot(&b.cross(&c)).atan2(denominator);
         }
+        // 4π inside and 0 outside, up to rounding.
         if angle.abs() > std::f64::consts::TAU {
-            return Some(thing.name.clone());
+            return Some(object.name.clone());
         }
     }
     None
 }
 
-/// The shadow map of what moves.
-pub(crate) fn draw_shadows(stage: &RenderScene, poses: &[Vec<PosedMesh>], map: &mut ShadowMap) {
+/// Draws the shadow map of the moving objects.
+pub(crate) fn draw_moving_shadows(scene: &RenderScene, poses: &[Vec<PosedMesh>], map: &mut ShadowMap) {
     map.clear();
-    for (thing, own) in stage.objects.iter().zip(poses) {
-        if let (true, Some(last), Some(level)) = (thing.casts_shadow, own.last(), thing.mesh.levels.last()) {
-            map.draw(&last.positions, &level.triangles);
+    for (object, posed) in scene.objects.iter().zip(poses) {
+        if let (true, Some(posed), Some(lod)) = (object.casts_shadow, posed.last(), object.mesh.lods.last()) {
+            map.draw(&posed.positions, &lod.triangles);
         }
     }
     map.finish();
 }
 
-/// What hides the sky: fixed, and moving.
-pub(crate) fn blobs(stage: &RenderScene, bounds: &[[V3; 2]]) -> [Vec<OcclusionEllipsoid>; 2] {
-    let mut all = [Vec::new(), Vec::new()];
-    for (i, (thing, bounds)) in stage.objects.iter().zip(bounds).enumerate() {
-        let link = matches!(thing.attachment, Attachment::Link { .. });
-        if thing.casts_shadow && !link && (bounds[1] - bounds[0]).max() < WIDEST_BLOB {
-            all[usize::from(!matches!(thing.attachment, Attachment::Fixed(_)))]
-                .push(OcclusionEllipsoid::of_bounds(i, bounds));
+/// Objects that occlude the sky for others.
+pub(crate) struct Occluders {
+    pub(crate) fixed: Vec<OcclusionEllipsoid>,
+    pub(crate) moving: Vec<OcclusionEllipsoid>,
+}
+
+impl Occluders {
+    /// Selects the small objects that cast shadows, except links of articulations.
+    pub(crate) fn new(scene: &RenderScene, bounds: &[Bounds]) -> Self {
+        let mut occluders = Self { fixed: Vec::new(), moving: Vec::new() };
+        for (i, (object, bounds)) in scene.objects.iter().zip(bounds).enumerate() {
+            let is_link = matches!(object.attachment, Attachment::Link { .. });
+            let is_small = (bounds[1] - bounds[0]).max() < MAX_OCCLUDER_EXTENT;
+            if object.casts_shadow && !is_link && is_small {
+                let list = if object.is_moving() { &mut occluders.moving } else { &mut occluders.fixed };
+                list.push(OcclusionEllipsoid::from_bounds(i, bounds));
+            }
         }
+        occluders
     }
-    all
 }

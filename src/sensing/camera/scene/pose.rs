@@ -1,106 +1,86 @@
-//! Things in the world: their vertices and normals where a state puts them.
+//! Places meshes in the world as a state dictates.
 
-use crate::geometry::Pose;
-use crate::sensing::camera::{
-    Attachment, CameraError, FrameView, RenderObject, V3,
-    mesh::render_mesh::{Lod, accumulate},
+use super::render_scene::{Attachment, FrameView, RenderObject};
+use crate::{
+    geometry::Pose,
+    sensing::camera::{
+        CameraError,
+        math::{RigidTransform, V3, is_finite},
+        mesh::lod::{Lod, compute_normals},
+    },
 };
 
-/// Vertices and normals of a level in the world.
+/// Vertices and normals of a level of detail in the world.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PosedMesh {
-    pub positions: Vec<V3>,
-    pub normals: Vec<V3>,
-}
-
-/// A rigid placement in single precision: rows of the rotation, and the translation.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Rigid {
-    rotation: nalgebra::Matrix3<f32>,
-    translation: V3,
-}
-
-impl Rigid {
-    pub(crate) fn of(pose: &Pose) -> Self {
-        Self {
-            rotation: pose.rotation.to_rotation_matrix().matrix().cast(),
-            translation: pose.translation.vector.cast(),
-        }
-    }
-
-    pub(crate) fn turn(&self, v: &V3) -> V3 {
-        self.rotation * v
-    }
-
-    pub(crate) fn point(&self, p: &V3) -> V3 {
-        self.rotation * p + self.translation
-    }
-}
-
-fn finite(pose: &Pose) -> bool {
-    pose.translation.vector.iter().chain(pose.rotation.coords.iter()).all(|x| x.is_finite())
+    pub(crate) positions: Vec<V3>,
+    pub(crate) normals: Vec<V3>,
 }
 
 impl PosedMesh {
-    /// A level of a rigid thing at `pose`.
-    pub(crate) fn rigid(level: &Lod, pose: &Pose, name: &str) -> Result<Self, CameraError> {
+    /// Places a level rigidly at `pose`; `name` appears in errors.
+    pub(crate) fn rigid(lod: &Lod, pose: &Pose, name: &str) -> Result<Self, CameraError> {
         let mut posed = Self::default();
-        posed.place(level, pose, name)?;
+        posed.update_rigid(lod, pose, name)?;
         Ok(posed)
     }
 
-    fn place(&mut self, level: &Lod, pose: &Pose, name: &str) -> Result<(), CameraError> {
-        if !finite(pose) {
+    fn update_rigid(&mut self, lod: &Lod, pose: &Pose, name: &str) -> Result<(), CameraError> {
+        if !is_finite(pose) {
             let reason = "a pose that is not a number".to_owned();
             return Err(CameraError::State { name: name.to_owned(), reason });
         }
-        let at = Rigid::of(pose);
+        let to_world = RigidTransform::from_pose(pose);
         self.positions.clear();
-        self.positions.extend(level.positions.iter().map(|p| at.point(p)));
+        self.positions.extend(lod.positions.iter().map(|p| to_world.transform_point(p)));
         self.normals.clear();
-        self.normals.extend(level.normals.iter().map(|n| at.turn(n)));
+        self.normals.extend(lod.normals.iter().map(|n| to_world.rotate(n)));
         Ok(())
     }
 
-    /// A level of any moving thing as `view` has it.
+    /// Places a level of a moving object as in the state `view`.
     pub(crate) fn update(
         &mut self,
-        thing: &RenderObject,
-        level: &Lod,
+        object: &RenderObject,
+        lod: &Lod,
         view: &FrameView,
     ) -> Result<(), CameraError> {
-        let Attachment::Soft(body) = thing.attachment else {
-            return self.place(level, &frame_of(thing, view)?, &thing.name);
+        let Attachment::Soft(body) = object.attachment else {
+            return self.update_rigid(lod, &rigid_pose(object, view)?, &object.name);
         };
-        let missing = |reason: String| CameraError::State { name: thing.name.clone(), reason };
+        let missing = |reason: String| state_error(object, reason);
         let nodes = view.nodes.get(body).ok_or_else(|| missing(format!("no soft body {body}")))?;
-        if level.embedding.len() != level.positions.len() {
-            return Err(missing("nodes for it, but its model is embedded in none".to_owned()));
+        if lod.embedding.len() != lod.positions.len() {
+            return Err(missing("nodes for it, but its mesh is not embedded in a soft body".to_owned()));
         }
-        if level.embedding.iter().any(|(of, _)| of.iter().any(|&n| n as usize >= nodes.len())) {
-            return Err(missing(format!("{} nodes, fewer than its model names", nodes.len())));
+        if lod.embedding.iter().any(|vertex| vertex.nodes.iter().any(|&n| n as usize >= nodes.len())) {
+            return Err(missing(format!("{} nodes, fewer than its mesh refers to", nodes.len())));
         }
         if nodes.iter().any(|p| !p.iter().all(|x| x.is_finite())) {
             return Err(missing("a node position that is not a number".to_owned()));
         }
         self.positions.clear();
-        self.positions.extend(level.embedding.iter().map(|(of, weights)| {
+        self.positions.extend(lod.embedding.iter().map(|vertex| {
             let mut p = V3::zeros();
-            for (&node, weight) in of.iter().zip(weights) {
+            for (&node, weight) in vertex.nodes.iter().zip(&vertex.weights) {
                 p += nodes[node as usize].cast::<f32>() * *weight;
             }
             p
         }));
         self.normals.resize(self.positions.len(), V3::zeros());
-        accumulate(&self.positions, &level.triangles, &mut self.normals);
+        compute_normals(&self.positions, &lod.triangles, &mut self.normals);
         Ok(())
     }
 }
 
-/// Frame of a rigid thing in the world.
-fn frame_of(thing: &RenderObject, view: &FrameView) -> Result<Pose, CameraError> {
-    let missing = |reason: String| CameraError::State { name: thing.name.clone(), reason };
-    match thing.attachment {
+fn state_error(object: &RenderObject, reason: String) -> CameraError {
+    CameraError::State { name: object.name.clone(), reason }
+}
+
+/// Pose of a rigid object in the world.
+fn rigid_pose(object: &RenderObject, view: &FrameView) -> Result<Pose, CameraError> {
+    let missing = |reason: String| state_error(object, reason);
+    match object.attachment {
         Attachment::Fixed(pose) => Ok(pose),
         Attachment::Rigid(body) => {
             view.rigid.get(body).copied().ok_or_else(|| missing(format!("no rigid body {body}")))

@@ -1,41 +1,44 @@
-//! What can be seen: things, how they move, and the light on them.
+//! Objects and light of a scene, prepared for drawing.
 
-use std::sync::{
-    Arc,
-    atomic::{AtomicU64, Ordering},
-};
+use std::sync::Arc;
 
-use crate::sensing::camera::{
-    CameraError, RenderMesh, scene::pose::PosedMesh, shade::shading::Illumination, shade::shadow::ShadowMap,
-    shade::tonemap::ToneMapper,
-};
+use super::pose::PosedMesh;
 use crate::{
     geometry::{Pose, Vec3},
     physics::world::Frame,
     scene::Lighting,
+    sensing::camera::{
+        CameraError, RenderMesh,
+        shade::{shading::Illumination, shadow::ShadowMap, tonemap::ToneMapper},
+    },
 };
 
-/// What moves a thing.
+/// Maximum number of objects of a scene; triangle ids have bits for about as many.
+const MAX_OBJECTS: usize = 1000;
+/// Maximum radius of the wide shadow map, in radii of the fine one: beyond, it would be too coarse.
+const MAX_WIDE_RADIUS: f32 = 8.0;
+
+/// What a drawn object moves with.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Attachment {
-    /// Nothing: it stands here in the world.
+    /// Fixed at this pose in the world.
     Fixed(Pose),
     /// A rigid body, by its index in the state.
     Rigid(usize),
-    /// A link of a tree of joints.
+    /// A link of an articulation.
     Link {
-        /// Index of the tree.
+        /// Index of the articulation.
         tree: usize,
         /// Index of the link in it.
         link: usize,
-        /// Frame of the thing in the link's.
+        /// Pose of the object in the frame of the link.
         offset: Pose,
     },
-    /// The nodes of a soft body, by its index; the model must be [`RenderMesh::embedded`].
+    /// The nodes of a soft body, by its index; the mesh must be [embedded](RenderMesh::embedded_in) in it.
     Soft(usize),
 }
 
-/// One thing to be drawn.
+/// An object to be drawn.
 #[derive(Clone, Debug)]
 pub struct RenderObject {
     /// Name for error messages.
@@ -50,123 +53,147 @@ pub struct RenderObject {
     pub casts_shadow: bool,
 }
 
-/// All things and the light: immutable, shared by all frames of an episode.
+impl RenderObject {
+    /// True unless the object is fixed in the world.
+    pub(crate) fn is_moving(&self) -> bool {
+        !matches!(self.attachment, Attachment::Fixed(_))
+    }
+}
+
+/// All objects and the light of a scene, with everything that does not change during an episode precomputed.
+///
+/// Immutable: one scene can be shared by several [`Renderer`](crate::sensing::camera::Renderer)s.
 #[derive(Debug)]
 pub struct RenderScene {
     pub(crate) objects: Vec<RenderObject>,
     pub(crate) lighting: Lighting,
-    /// World forms of the levels of fixed things (empty for others).
-    pub(crate) fixed: Vec<Vec<PosedMesh>>,
+    /// World-space levels of detail of each fixed object; empty for moving ones.
+    pub(crate) fixed_meshes: Vec<Vec<PosedMesh>>,
     pub(crate) fixed_shadow: ShadowMap,
-    /// Coarser, for what lies beyond.
+    /// Coarser shadows of fixed objects beyond the fine map, if there are any.
     pub(crate) wide_shadow: Option<ShadowMap>,
-    pub(crate) light: Illumination,
-    pub(crate) tone: ToneMapper,
-    /// Tells caches of one stage from those of another.
-    pub(crate) key: u64,
+    pub(crate) illumination: Illumination,
+    pub(crate) tone_mapper: ToneMapper,
+    pub(crate) id: SceneId,
 }
 
-/// The part of a state that pictures depend on.
+/// Identity of a scene. Caches hold a clone, so the address cannot be reused by another scene while they exist.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct SceneId(Arc<()>);
+
+impl PartialEq for SceneId {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+}
+
+/// The part of a physics state that images depend on.
 #[derive(Clone, Copy, Debug)]
 pub struct FrameView<'a> {
-    /// Node positions of each soft body, m, world.
+    /// Node positions of each soft body, world, m.
     pub nodes: &'a [Vec<Vec3>],
-    /// Frames of the rigid bodies, world.
+    /// Poses of the rigid bodies, world.
     pub rigid: &'a [Pose],
-    /// Link frames of each tree, world.
+    /// Link poses of each articulation, world.
     pub links: &'a [Vec<Pose>],
-    /// The hand frame, world, for cameras mounted there.
+    /// Pose of the robot's hand, world, for cameras mounted on it.
     pub hand_w: Option<Pose>,
 }
 
 impl<'a> FrameView<'a> {
-    /// What pictures need of `frame`, and the hand frame.
+    /// Borrows the poses of `frame`.
     pub fn new(frame: &'a Frame, hand_w: Option<Pose>) -> Self {
         Self { nodes: &frame.nodes, rigid: &frame.rigid, links: &frame.links, hand_w }
     }
 
-    /// Nothing that moves.
+    /// A state without moving bodies.
     pub fn empty() -> Self {
         Self { nodes: &[], rigid: &[], links: &[], hand_w: None }
     }
 }
 
-static NEXT_KEY: AtomicU64 = AtomicU64::new(0);
-
 impl RenderScene {
-    /// Gathers things and light, and works out what never changes.
+    /// Prepares a scene: poses its fixed objects and draws their shadow maps.
     ///
     /// # Errors
-    /// If a number of the light is out of range, a fixed thing's pose is not finite, or there are more than 1000 things.
+    /// A setting of the light is out of range, the pose of a fixed object is not finite, or there are more than 1000 objects.
     pub fn new(objects: Vec<RenderObject>, lighting: Lighting) -> Result<Self, CameraError> {
         check_light(&lighting)?;
-        if objects.len() > 1000 {
-            return Err(CameraError::RenderMesh {
-                name: "the stage".to_owned(),
-                reason: format!("{} things; at most 1000 can be drawn, join some", objects.len()),
+        if objects.len() > MAX_OBJECTS {
+            return Err(CameraError::Mesh {
+                name: "the scene".to_owned(),
+                reason: format!("{} objects; at most {MAX_OBJECTS} can be drawn, join some", objects.len()),
             });
         }
-        let mut fixed = Vec::new();
-        for thing in &objects {
-            let levels = match &thing.attachment {
+        let mut fixed_meshes = Vec::new();
+        for object in &objects {
+            let lods = match &object.attachment {
                 Attachment::Fixed(pose) => {
-                    let world = |level| PosedMesh::rigid(level, pose, &thing.name);
-                    thing.mesh.levels.iter().map(world).collect::<Result<Vec<_>, _>>()?
+                    let posed = |lod| PosedMesh::rigid(lod, pose, &object.name);
+                    object.mesh.lods.iter().map(posed).collect::<Result<Vec<_>, _>>()?
                 }
                 _ => Vec::new(),
             };
-            fixed.push(levels);
+            fixed_meshes.push(lods);
         }
-        let shadow = |map| fixed_shadow(&objects, &fixed, map);
-        let fine = shadow(ShadowMap::new(&lighting));
-        let wide = wide_radius(&fixed, &lighting).map(|radius| shadow(ShadowMap::around(&lighting, radius)));
-        let (light, tone) = (Illumination::new(&lighting), ToneMapper::new(lighting.exposure));
-        let key = NEXT_KEY.fetch_add(1, Ordering::Relaxed);
-        Ok(Self { objects, lighting, fixed, fixed_shadow: fine, wide_shadow: wide, light, tone, key })
+        let draw_shadows = |map| draw_fixed_shadows(&objects, &fixed_meshes, map);
+        let fixed_shadow = draw_shadows(ShadowMap::new(&lighting));
+        let wide_shadow = wide_shadow_radius(&fixed_meshes, &lighting)
+            .map(|radius| draw_shadows(ShadowMap::with_radius(&lighting, radius)));
+        Ok(Self {
+            illumination: Illumination::new(&lighting),
+            tone_mapper: ToneMapper::new(lighting.exposure),
+            objects,
+            lighting,
+            fixed_meshes,
+            fixed_shadow,
+            wide_shadow,
+            id: SceneId::default(),
+        })
     }
 
-    /// The things, in the order of their drawing.
+    /// The objects, in drawing order.
     pub fn objects(&self) -> &[RenderObject] {
         &self.objects
     }
 }
 
-/// The shadows of fixed things.
-fn fixed_shadow(things: &[RenderObject], fixed: &[Vec<PosedMesh>], mut map: ShadowMap) -> ShadowMap {
-    for (thing, posed) in things.iter().zip(fixed).filter(|(thing, _)| thing.casts_shadow) {
-        if let (Some(level), Some(posed)) = (thing.mesh.levels.first(), posed.first()) {
-            map.draw(&posed.positions, &level.triangles);
+fn draw_fixed_shadows(
+    objects: &[RenderObject],
+    fixed_meshes: &[Vec<PosedMesh>],
+    mut map: ShadowMap,
+) -> ShadowMap {
+    for (object, posed) in objects.iter().zip(fixed_meshes).filter(|(object, _)| object.casts_shadow) {
+        if let (Some(lod), Some(posed)) = (object.mesh.lods.first(), posed.first()) {
+            map.draw(&posed.positions, &lod.triangles);
         }
     }
     map.finish();
     map
 }
 
-/// The wide shadow map reaches no farther than this, in radii of the fine one: it would get too coarse.
-const WIDEST: f32 = 8.0;
-
-/// How far fixed things lie about the middle of the shadows, m, if that is farther than the fine map goes.
-fn wide_radius(fixed: &[Vec<PosedMesh>], lighting: &Lighting) -> Option<f32> {
-    let (middle, fine) = (lighting.shadow_centre_w.cast::<f32>(), lighting.shadow_radius_m as f32);
-    let all = fixed.iter().filter_map(|levels| levels.last()).flat_map(|posed| &posed.positions);
-    let farthest = all.map(|p| (p - middle).norm()).fold(0.0, f32::max);
-    (farthest > fine).then(|| farthest.min(WIDEST * fine))
+/// Radius that contains all fixed objects, m, if the fine shadow map does not.
+fn wide_shadow_radius(fixed_meshes: &[Vec<PosedMesh>], lighting: &Lighting) -> Option<f32> {
+    let (centre, fine_radius) = (lighting.shadow_centre_w.cast::<f32>(), lighting.shadow_radius_m as f32);
+    let positions = fixed_meshes.iter().filter_map(|lods| lods.last()).flat_map(|posed| &posed.positions);
+    let farthest = positions.map(|p| (p - centre).norm()).fold(0.0, f32::max);
+    (farthest > fine_radius).then(|| farthest.min(MAX_WIDE_RADIUS * fine_radius))
 }
 
-/// Checks the numbers of the light.
+/// Validates the settings of the light.
 ///
 /// # Errors
-/// The first that is out of its range.
+/// The first setting that is out of range.
 pub fn check_light(light: &Lighting) -> Result<(), CameraError> {
-    let wrong = |field, expected, got: String| Err(CameraError::Light { field, expected, got });
+    let fail = |field, expected, got: String| Err(CameraError::Light { field, expected, got });
     let direction = light.key.direction_w;
     if !(direction.norm() > 1e-9 && direction.norm().is_finite()) {
-        return wrong("direction", "a direction", format!("{:?}", direction.as_slice()));
+        return fail("direction", "a direction", format!("{:?}", direction.as_slice()));
     }
     if !(0.0..=0.5).contains(&light.key.softness_rad) {
-        return wrong("softness", "0 to 0.5 rad", light.key.softness_rad.to_string());
+        return fail("softness", "0 to 0.5 rad", light.key.softness_rad.to_string());
     }
-    let positive = |x: f64| x >= 0.0 && x.is_finite();
+    let is_valid = |x: f64| x >= 0.0 && x.is_finite();
     for (field, values) in [
         ("colour", light.key.colour),
         ("sky_zenith", light.sky.zenith),
@@ -175,18 +202,18 @@ pub fn check_light(light: &Lighting) -> Result<(), CameraError> {
         ("strength", [light.key.strength; 3]),
         ("sky_strength", [light.sky.strength; 3]),
     ] {
-        if !values.into_iter().all(positive) {
-            return wrong(field, "numbers from 0", format!("{values:?}"));
+        if !values.into_iter().all(is_valid) {
+            return fail(field, "numbers from 0", format!("{values:?}"));
         }
     }
     if !(light.exposure > 0.0 && light.exposure.is_finite()) {
-        return wrong("exposure", "a number above 0", light.exposure.to_string());
+        return fail("exposure", "a number above 0", light.exposure.to_string());
     }
     if !(light.shadow_radius_m > 0.0 && light.shadow_radius_m.is_finite()) {
-        return wrong("shadow_radius_m", "a length above 0 m", light.shadow_radius_m.to_string());
+        return fail("shadow_radius_m", "a length above 0 m", light.shadow_radius_m.to_string());
     }
     if !light.shadow_centre_w.iter().all(|x| x.is_finite()) {
-        return wrong("shadow_centre_w", "a point", format!("{:?}", light.shadow_centre_w.as_slice()));
+        return fail("shadow_centre_w", "a point", format!("{:?}", light.shadow_centre_w.as_slice()));
     }
     Ok(())
 }

@@ -45,11 +45,8 @@ pub(crate) fn fractal_noise(p: [f32; 3], octaves: u32, filter_width: f32, seed: 
         let scale = (1_u32 << octave) as f32;
         let weight = 1.0 / scale;
         let fade = (2.0 - 2.0 * filter_width * scale).clamp(0.0, 1.0);
-        let noise = if fade > 0.0 {
-            value_noise(p.map(|x| x * scale), seed.wrapping_add(octave)) - 0.5
-        } else {
-            0.0
-        };
+        let noise =
+            if fade > 0.0 { value_noise(p.map(|x| x * scale), seed.wrapping_add(octave)) - 0.5 } else { 0.0 };
         sum += weight * fade * noise;
         weights += weight;
     }

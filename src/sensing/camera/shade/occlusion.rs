@@ -59,12 +59,7 @@ impl OcclusionEllipsoid {
 ///
 /// Quilez, Sphere Ambient Occlusion, 2006, in the space in which each ellipsoid is a ball.
 #[inline(always)]
-pub(crate) fn sky_visibility(
-    occluders: &[OcclusionEllipsoid],
-    p: Vec3x8,
-    n: Vec3x8,
-    object: f32x8,
-) -> f32x8 {
+pub(crate) fn sky_visibility(occluders: &[OcclusionEllipsoid], p: Vec3x8, n: Vec3x8, object: f32x8) -> f32x8 {
     let mut visibility = f32x8::ONE;
     for occluder in occluders {
         let d = Vec3x8::splat(&occluder.centre) - p;
@@ -78,8 +73,7 @@ pub(crate) fn sky_visibility(
         // Normals transform by the inverse transpose, here the radii.
         let normal = n.component_mul(Vec3x8::splat(&occluder.radii));
         let (q2, n2) = (q.dot(q), normal.dot(normal));
-        let cosine =
-            (normal.dot(q) / (q2 * n2).fast_max(f32x8::splat(1e-18)).sqrt()).fast_max(f32x8::ZERO);
+        let cosine = (normal.dot(q) / (q2 * n2).fast_max(f32x8::splat(1e-18)).sqrt()).fast_max(f32x8::ZERO);
         let fade = f32x8::ONE - d2 * f32x8::splat(1.0 / occluder.influence2);
         let occlusion = f32x8::splat(0.75) * cosine * fade / q2.fast_max(f32x8::ONE);
         visibility *= f32x8::ONE - (is_near & occlusion);

@@ -35,9 +35,7 @@ impl MaterialSample {
 
     /// True if both samples differ at most in their sky visibility.
     pub(crate) fn is_same_material(&self, other: &Self) -> bool {
-        self.albedo == other.albedo
-            && self.roughness == other.roughness
-            && self.metalness == other.metalness
+        self.albedo == other.albedo && self.roughness == other.roughness && self.metalness == other.metalness
     }
 }
 
@@ -157,9 +155,7 @@ fn mask_value(mask: &Mask, p: &V3, n: &V3, spacing: f32) -> f32 {
             specks(p, *spacing_m as f32, *radius_m as f32, spacing, *seed)
         }
         Mask::Weave { pitch_m } => weave(p, *pitch_m as f32, spacing),
-        Mask::Facing { axis, from, to } => {
-            smoothstep((along(axis, n) - *from as f32) / (*to - *from) as f32)
-        }
+        Mask::Facing { axis, from, to } => smoothstep((along(axis, n) - *from as f32) / (*to - *from) as f32),
         Mask::Inside { shape, soft_m } => {
             let width = (*soft_m as f32).max(spacing).max(1e-6);
             smoothstep(0.5 - shape.distance(&p.cast()) as f32 / width)

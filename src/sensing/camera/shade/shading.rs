@@ -128,8 +128,7 @@ impl Illumination {
         let alpha = alpha.fast_min(one);
         let a2 = alpha * alpha;
         let d = (n_h * n_h).fast_min(half2) * (a2 - one) + half2;
-        let masking =
-            n_l * (n_v * n_v * (one - a2) + a2).sqrt() + n_v * (n_l * n_l * (one - a2) + a2).sqrt();
+        let masking = n_l * (n_v * n_v * (one - a2) + a2).sqrt() + n_v * (n_l * n_l * (one - a2) + a2).sqrt();
         let grazing = (one - l_h) * (one - l_h);
         let grazing = grazing * grazing * (one - l_h);
         // D V F for a light of irradiance π times its strength; D carries the fourth power of the half vector's length.
@@ -157,9 +156,7 @@ impl Illumination {
         let visibility = fine.visibility(&at, n, faces_key);
         let is_beyond = faces_key & !fine.contains(&at);
         match wide {
-            Some(wide) if is_beyond.any() => {
-                visibility * wide.visibility(&wide.project(p), n, is_beyond)
-            }
+            Some(wide) if is_beyond.any() => visibility * wide.visibility(&wide.project(p), n, is_beyond),
             _ => visibility,
         }
     }

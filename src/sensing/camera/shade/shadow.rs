@@ -215,8 +215,7 @@ impl ShadowMap {
         }
         // Dilate by the reach of the filter: along v, then along u.
         let around = |i: usize| i.saturating_sub(RANGE_MARGIN)..(i + RANGE_MARGIN + 1).min(TILES);
-        let rows =
-            (from / TILE).saturating_sub(RANGE_MARGIN)..(to.div_ceil(TILE) + RANGE_MARGIN).min(TILES);
+        let rows = (from / TILE).saturating_sub(RANGE_MARGIN)..(to.div_ceil(TILE) + RANGE_MARGIN).min(TILES);
         for y in rows {
             let mut columns = [HeightRange::NEUTRAL; TILES];
             for row in around(y) {
@@ -410,8 +409,8 @@ impl PenumbraFilter<'_> {
             return 0.0;
         }
         let deviation = both_axes(|f, axis| (f.map.ground_slope[axis] - f.clamped_slope[axis]).abs());
-        let search_radius = (MIN_RADIUS + (range.max + deviation * MAX_RADIUS) * self.cone)
-            .clamp(MIN_RADIUS, MAX_RADIUS);
+        let search_radius =
+            (MIN_RADIUS + (range.max + deviation * MAX_RADIUS) * self.cone).clamp(MIN_RADIUS, MAX_RADIUS);
         let search = match search_radius {
             ..=MAX_RADIUS_ONE_VECTOR => self.sums::<1, 1, true>(search_radius),
             _ => self.sums::<2, 2, true>(search_radius),

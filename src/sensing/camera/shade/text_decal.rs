@@ -35,8 +35,8 @@ fn text_position(decal: &TextDecal, p: &Vec3, n: &V3) -> Option<[f64; 2]> {
     let up = (head - facing * facing.dot(&head)).normalize();
     let offset = p - middle;
     let depth = 0.5 * decal.coverage().length_m() + line.height_m;
-    let is_printed = n.cast::<f64>().dot(&facing) > f64::from(MIN_FACING_COSINE)
-        && offset.dot(&facing).abs() < depth;
+    let is_printed =
+        n.cast::<f64>().dot(&facing) > f64::from(MIN_FACING_COSINE) && offset.dot(&facing).abs() < depth;
     is_printed.then(|| [offset.dot(&up.cross(&facing)), offset.dot(&up)])
 }
 
@@ -114,7 +114,10 @@ mod tests {
         for (r, u) in [(-0.002, 0.003), (0.001, -0.0044), (0.002, 0.002)] {
             let up = [0.0, 0.0, 1.0];
             let before = value(&upright, [r, u, 0.0], up);
-            assert!((before - value(&turned, [-u, r, 0.0], up)).abs() < 1e-5, "a quarter turn counter-clockwise");
+            assert!(
+                (before - value(&turned, [-u, r, 0.0], up)).abs() < 1e-5,
+                "a quarter turn counter-clockwise"
+            );
         }
     }
 }

@@ -5,7 +5,7 @@ use std::borrow::Borrow;
 use image::{RgbImage, imageops};
 use serde::{Deserialize, Serialize};
 
-use crate::sensing::scaling::scaled;
+use crate::sensing::camera::resize;
 
 /// Images of history per finger.
 pub const HISTORY_LENGTH: usize = 8;
@@ -27,7 +27,7 @@ pub enum MosaicLayout {
 
 /// Scales an image of a finger to a cell of the mosaic, 56 × 56.
 pub fn mosaic_cell(image: &RgbImage) -> RgbImage {
-    scaled(image, CELL_SIZE, CELL_SIZE)
+    resize(image, CELL_SIZE, CELL_SIZE)
 }
 
 /// Mosaic of 4 × 4 cells ([`mosaic_cell`]), 224 × 224: the last 8 of the left and of the right finger.
