@@ -1,9 +1,9 @@
-//! CPU time of a picture: the first task of a suite as the expert plays it, with the true robot, room and soft bodies.
+//! CPU time per image, in the first task of a suite as the expert solves it, with the complete robot, scene and soft bodies.
 //!
-//! `cargo bench --bench render` prints milliseconds of this thread a picture beside the goals: each of [`PICTURES`] states,
-//! spread evenly over the episode, is drawn [`ROUNDS`] times, its fastest time on the processor counts, and the mean over
-//! the states is printed; beside it the first picture's time, which fills the caches. Words after `--` choose lines that
-//! contain one of them. `cargo bench --bench render -- --png DIR` also writes pictures there, one scene a layout.
+//! `cargo bench --bench render` prints milliseconds of CPU time per image next to the goals. Each of [`IMAGES`] states, spread
+//! evenly over the episode, is drawn [`ROUNDS`] times; the result is the mean over the states of the fastest time. The last
+//! column is the time of the first image, which fills the caches. Words after `--` select the lines that contain one of them.
+//! `cargo bench --bench render -- --png DIR` also writes images to a folder, one scene per layout.
 
 mod episode;
 
@@ -18,43 +18,44 @@ use softvt::{
     sensing::camera::Renderer,
 };
 
-/// Runs of which the fastest counts, and pictures of a run: the states that are drawn in turn.
+/// Repetitions, of which the fastest counts.
 const ROUNDS: usize = 8;
-const PICTURES: usize = 16;
+/// States drawn in turn.
+const IMAGES: usize = 16;
 
-/// All states of an episode, and what draws them.
-fn film(loaded: &Loaded, task: usize) -> StateRecording {
+/// Records all states of an episode.
+fn record(loaded: &Loaded, task: usize) -> StateRecording {
     let (spec, mut expert) = episode::open(loaded, task, true);
     let started = Episode::start(spec, &AssetCache::default(), &SensorAssets::default()).expect("it starts");
     started.run(&mut expert as &mut dyn Controller).expect("it runs").recording.expect("it was asked for")
 }
 
 /// States spread evenly over an episode.
-fn chosen(film: &StateRecording) -> Vec<Frame> {
-    let last = film.frames.len() - 1;
-    (0..PICTURES).map(|i| film.frames[i * last / (PICTURES - 1)].clone()).collect()
+fn select_states(recording: &StateRecording) -> Vec<Frame> {
+    let last = recording.frames.len() - 1;
+    (0..IMAGES).map(|i| recording.frames[i * last / (IMAGES - 1)].clone()).collect()
 }
 
-fn report(film: &mut StateRecording, name: &str, goal_ms: f64, camera: &Camera, mut scratch: Renderer) {
-    let chosen_words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
+fn report(recording: &mut StateRecording, name: &str, goal_ms: f64, camera: &Camera, mut renderer: Renderer) {
+    let filters: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
     let png = std::env::args().any(|word| word == "--png");
-    if !(png || chosen_words.is_empty() || chosen_words.iter().any(|word| name.contains(word.as_str()))) {
+    if !(png || filters.is_empty() || filters.iter().any(|word| name.contains(word.as_str()))) {
         return;
     }
-    let frames = chosen(film);
-    let views: Vec<_> = frames.iter().map(|frame| film.sensors.view(frame)).collect();
-    let stage = film.sensors.render_scene().expect("everything can be drawn");
-    let mut shoot = |picture: usize| {
+    let frames = select_states(recording);
+    let views: Vec<_> = frames.iter().map(|frame| recording.sensors.view(frame)).collect();
+    let scene = recording.sensors.render_scene().expect("everything can be drawn");
+    let mut draw = |state: usize| {
         let start = ThreadTime::now();
-        scratch.render(stage, &views[picture], camera).expect("the camera is good");
+        renderer.render(scene, &views[state], camera).expect("the camera is good");
         1e3 * start.elapsed().as_secs_f64()
     };
-    let first = shoot(0);
-    let mut fastest = [f64::INFINITY; PICTURES];
+    let first = draw(0);
+    let mut fastest = [f64::INFINITY; IMAGES];
     for _ in 0..ROUNDS {
-        fastest.iter_mut().enumerate().for_each(|(i, least)| *least = least.min(shoot(i)));
+        fastest.iter_mut().enumerate().for_each(|(i, least)| *least = least.min(draw(i)));
     }
-    let least = fastest.iter().sum::<f64>() / PICTURES as f64;
+    let least = fastest.iter().sum::<f64>() / IMAGES as f64;
     let reached = if least <= goal_ms { "yes" } else { "no" };
     println!("{name:<28} {goal_ms:>6.0} {least:>9.2}   {reached:<5} {first:>8.1}");
 }
@@ -63,11 +64,11 @@ fn main() {
     let words: Vec<String> = std::env::args().collect();
     let folder = words.iter().position(|w| w == "--png").and_then(|i| words.get(i + 1)).map(PathBuf::from);
     let loaded = episode::load();
-    let mut set = film(&loaded, 0);
+    let mut set = record(&loaded, 0);
     let (third, wrist) = (Camera::third_person_table(), Camera::wrist());
     let large = third.clone().with_edge(1024);
-    println!("CPU milliseconds a picture, one thread");
-    println!("{:<28} {:>6} {:>9}   {:<5} {:>8}", "picture", "goal", "measured", "met", "first");
+    println!("CPU milliseconds per image, one thread");
+    println!("{:<28} {:>6} {:>9}   {:<5} {:>8}", "image", "goal", "measured", "met", "first");
     report(&mut set, "third person 224, cached", 3.0, &third, Renderer::default());
     report(&mut set, "third person 224, uncached", 4.0, &third, Renderer::without_cache());
     report(&mut set, "wrist 224", 4.0, &wrist, Renderer::default());
@@ -76,13 +77,13 @@ fn main() {
     report(&mut set, "wrist 512", 20.0, &wrist.clone().with_edge(512), Renderer::default());
     let Some(folder) = folder else { return };
     for task in [0, 2, 4, 6, 8] {
-        let mut set = film(&loaded, task);
+        let mut set = record(&loaded, task);
         let middle = set.frames[set.frames.len() / 2].clone();
         for (camera, edge) in [(&third, 1024), (&third, 224), (&wrist, 512), (&wrist, 224)] {
             let camera = camera.clone().with_edge(edge);
-            let picture = set.sensors.render(&middle, &camera).expect("a picture");
+            let image = set.sensors.render(&middle, &camera).expect("an image");
             let path = folder.join(format!("{task}_{}_{edge}.png", camera.name));
-            picture.into_rgb_image().save(&path).expect("the folder can be written");
+            image.into_rgb_image().save(&path).expect("the folder can be written");
         }
     }
 }

@@ -1,45 +1,46 @@
-//! Pictures that people have looked at, in `tests/golden/camera`: they must come out byte for byte.
+//! Compares rendered images byte by byte with reviewed references in `tests/golden/camera`.
 //!
-//! Whoever changes how things look writes them anew with `SOFTVT_WRITE_GOLDEN=1 cargo test --release --test images`, and
-//! looks at them before committing.
+//! After an intended change, regenerate the references with `SOFTVT_WRITE_GOLDEN=1 cargo test --release --test images` and look
+//! at them before committing.
 
 use std::{path::PathBuf, sync::Arc};
 
 use softvt::{
     benchmark::{Plan, seed::Split},
     geometry::{Pose, Quat, Vec3, shape::Shape},
-    physics::PhysicsParams,
+    physics::{BodyId, PhysicsParams},
     robot::RobotSpec,
     rollout::{AssetCache, SensorAssets, SensorSuite, Simulation},
     scene::{Camera, Lighting, Mask, Visual, VisualLayer},
     script::{self, EpisodeRequest},
     sensing::{
-        camera::{Attachment, FrameView, RenderMesh, RenderObject, RenderScene, RenderedImage, Renderer},
+        camera::{FrameView, RenderMesh, RenderObject, RenderScene, RenderedImage, Renderer},
         tactile::TactileSpec,
     },
 };
 
-/// Compares a picture with the one that is kept, or keeps it.
-fn check(name: &str, picture: RenderedImage) {
+/// Compares an image with its reference, or writes the reference.
+fn check(name: &str, rendered: RenderedImage) {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/golden/camera").join(name);
-    let image = picture.into_rgb_image();
+    let image = rendered.into_rgb_image();
     if std::env::var_os("SOFTVT_WRITE_GOLDEN").is_some() {
         image.save(&path).expect("the folder can be written");
         return;
     }
-    let kept = image::open(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display())).into_rgb8();
-    assert_eq!(kept.dimensions(), image.dimensions(), "{name}");
-    let apart = kept.as_raw().iter().zip(image.as_raw()).map(|(a, b)| a.abs_diff(*b));
-    let (count, most) = apart.fold((0, 0), |(n, most), d| (n + usize::from(d > 0), most.max(d)));
+    let reference =
+        image::open(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display())).into_rgb8();
+    assert_eq!(reference.dimensions(), image.dimensions(), "{name}");
+    let differences = reference.as_raw().iter().zip(image.as_raw()).map(|(a, b)| a.abs_diff(*b));
+    let (count, max) = differences.fold((0, 0), |(n, max), d| (n + usize::from(d > 0), max.max(d)));
     assert!(
         count == 0,
-        "{name}: {count} bytes differ, by up to {most}; if that is meant, write it anew with SOFTVT_WRITE_GOLDEN=1 and look at it"
+        "{name}: {count} bytes differ, by up to {max}; if intended, regenerate it with SOFTVT_WRITE_GOLDEN=1 and look at it"
     );
 }
 
-/// The first episode of the suite's first task before anything moves: no mechanics, only the layout.
+/// The first episode of the first task before anything moves: the layout alone, without mechanics.
 #[test]
-fn the_first_task_of_spatial_soft_looks_as_it_did() {
+fn the_first_task_of_spatial_soft_matches_its_reference() {
     let suite = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("suites/spatial_soft.lua");
     let loaded = script::load(&suite, &[]).expect("the suite loads");
     let Plan::Suite(suite) = &loaded.plan else { panic!("it is a suite") };
@@ -59,19 +60,19 @@ fn the_first_task_of_spatial_soft_looks_as_it_did() {
         &AssetCache::default(),
     )
     .expect("the scene builds");
-    let looks = SensorAssets::default();
-    let fresh = || SensorSuite::new(&sim, &TactileSpec::default(), &looks);
-    let mut senses = fresh();
+    let assets = SensorAssets::default();
+    let new_sensors = || SensorSuite::new(&sim, &TactileSpec::default(), &assets);
+    let mut sensors = new_sensors();
     let frame = SensorSuite::frame(&sim);
     for name in ["third_person", "wrist"] {
-        let camera = senses.camera(name).expect("the scene has it").clone().with_edge(224);
-        let picture = senses.render(&frame, &camera).expect("a picture");
+        let camera = sensors.camera(name).expect("the scene has it").clone().with_edge(224);
+        let image = sensors.render(&frame, &camera).expect("an image");
         assert_eq!(
-            picture,
-            fresh().render(&frame, &camera).expect("a picture"),
-            "{name}: what cameras share"
+            image,
+            new_sensors().render(&frame, &camera).expect("an image"),
+            "{name}: cameras of one renderer do not affect each other"
         );
-        check(&format!("spatial_soft_{name}.png"), picture);
+        check(&format!("spatial_soft_{name}.png"), image);
     }
 }
 
@@ -81,7 +82,7 @@ fn layer(mask: Mask, albedo: [f64; 3], relief_m: f64) -> VisualLayer {
 
 /// Eight balls: plastic and metal of two roughnesses each, and four patterns.
 #[test]
-fn materials_look_as_they_did() {
+fn materials_match_their_reference() {
     let noise = |octaves, from, to| Mask::Noise { size_m: [0.03; 3], octaves, from, to, seed: 5 };
     let visuals = [
         Visual::plain([0.72, 0.10, 0.08], 0.25, 0.0),
@@ -107,18 +108,19 @@ fn materials_look_as_they_did() {
     ];
     let board =
         Visual::plain([0.42, 0.43, 0.45], 0.7, 0.0).with(layer(noise(3, 0.3, 0.8), [0.36, 0.37, 0.39], 0.0));
-    let still = |name: String, object, shape: &Shape, visual: Visual, at: [f64; 3]| RenderObject {
+    let fixed = |name: String, segmentation_id, shape: &Shape, visual: Visual, at: [f64; 3]| RenderObject {
         mesh: Arc::new(RenderMesh::from_shape(&name, shape, &[visual]).expect("a surface")),
         name,
-        segmentation_id: object,
-        attachment: Attachment::Fixed(Pose::from_parts(Vec3::from(at).into(), Quat::identity())),
+        segmentation_id,
+        body: BodyId::World,
+        pose_in_body: Pose::from_parts(Vec3::from(at).into(), Quat::identity()),
         casts_shadow: true,
     };
     let slab = Shape::Box { half: Vec3::new(0.6, 0.6, 0.02) };
-    let mut things = vec![still("board".to_owned(), 1, &slab, board, [0.0, 0.0, -0.02])];
+    let mut objects = vec![fixed("board".to_owned(), 1, &slab, board, [0.0, 0.0, -0.02])];
     for (i, visual) in visuals.into_iter().enumerate() {
         let at = [if i < 4 { -0.08 } else { 0.08 }, 0.13 * (i % 4) as f64 - 0.195, 0.05];
-        things.push(still(format!("ball {i}"), i as u16 + 2, &Shape::Sphere { radius: 0.05 }, visual, at));
+        objects.push(fixed(format!("ball {i}"), i as u16 + 2, &Shape::Sphere { radius: 0.05 }, visual, at));
     }
     let eye = Vec3::new(0.75, 0.0, 0.55);
     let turn = Quat::face_towards(&(eye - Vec3::new(0.0, 0.0, 0.03)), &Vec3::z());
@@ -129,7 +131,7 @@ fn materials_look_as_they_did() {
         fovy_rad: 0.38,
         ..Camera::third_person_table()
     };
-    let stage = RenderScene::new(things, Lighting::default()).expect("good light");
-    let picture = Renderer::default().render(&stage, &FrameView::empty(), &camera).expect("a picture");
-    check("materials.png", picture);
+    let scene = RenderScene::new(objects, Lighting::default()).expect("good light");
+    let image = Renderer::default().render(&scene, &FrameView::empty(), &camera).expect("an image");
+    check("materials.png", image);
 }

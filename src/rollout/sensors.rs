@@ -18,7 +18,7 @@ use crate::{
     robot::{RobotSpec, Side, pads, panda},
     scene::{Asset, Body, Camera, Scene},
     sensing::{
-        camera::{self, Attachment, CameraError, FrameView, RenderObject, RenderScene, RenderedImage},
+        camera::{self, CameraError, FrameView, RenderObject, RenderScene, RenderedImage},
         tactile::{
             ContactError, GelScratch, PadContact, PadWrench, SkinMesh, SubstrateCompliance, TactileReading,
             TactileSensorError, TactileSkin, TactileSpec, Taxels, patch_friction,
@@ -213,7 +213,7 @@ impl SensorSuite {
 
     /// The robot with nothing around it.
     pub(super) fn robot_alone(&self) -> Result<RenderScene, CameraError> {
-        let things = self.assets.robot()?.objects(self.articulation.index(), self.scene.base_w, ROBOT);
+        let things = self.assets.robot()?.objects(self.articulation, self.scene.base_w, ROBOT);
         RenderScene::new(things.into_iter().collect(), self.scene.lighting.clone())
     }
 
@@ -332,27 +332,23 @@ impl SensorSuite {
     fn things(&self) -> Result<Vec<RenderObject>, CameraError> {
         let draw = |(index, part): (usize, &Part)| {
             let voxels = part.rest.as_ref().map(|rest| &rest.mesh);
-            let attachment = match part.body {
-                BodyId::Soft(body) => Attachment::Soft(body.index()),
-                BodyId::Rigid(body) => Attachment::Rigid(body.index()),
-                BodyId::Link(link) => Attachment::Link {
-                    tree: link.articulation.index(),
-                    link: link.index,
-                    offset: part.offset,
-                },
-                BodyId::World | BodyId::Kinematic(_) => Attachment::Fixed(part.start_w),
+            let (body, pose_in_body) = match part.body {
+                BodyId::Soft(_) | BodyId::Rigid(_) => (part.body, Pose::identity()),
+                BodyId::Link(_) => (part.body, part.offset),
+                BodyId::World | BodyId::Kinematic(_) => (BodyId::World, part.start_w),
             };
             Ok(RenderObject {
                 name: part.name.clone(),
                 segmentation_id: index as u16 + 1,
                 mesh: self.assets.model(&part.name, &part.asset, voxels)?,
-                attachment,
+                body,
+                pose_in_body,
                 casts_shadow: true,
             })
         };
         let mut things: Vec<RenderObject> =
             self.parts.iter().enumerate().map(draw).collect::<Result<_, _>>()?;
-        things.extend(self.assets.robot()?.objects(self.articulation.index(), self.scene.base_w, ROBOT));
+        things.extend(self.assets.robot()?.objects(self.articulation, self.scene.base_w, ROBOT));
         Ok(things)
     }
 }

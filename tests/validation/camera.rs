@@ -1,33 +1,33 @@
-//! Pictures against the pinhole in closed form.
+//! Compares images with a pinhole camera in closed form.
 
 use std::sync::Arc;
 
 use softvt::{
     geometry::{Pose, Quat, Vec3, shape::Shape},
+    physics::BodyId,
     scene::{Camera, Lighting, Mask, Visual, VisualLayer},
-    sensing::camera::{
-        Attachment, FrameView, RenderMesh, RenderObject, RenderScene, RenderedImage, Renderer,
-    },
+    sensing::camera::{FrameView, RenderMesh, RenderObject, RenderScene, RenderedImage, Renderer},
 };
 
-/// Edge of the pictures, pixels.
+/// Edge of the images, pixels.
 const EDGE: usize = 224;
 
-fn thing(object: u16, shape: &Shape, visual: Visual, pose: Pose) -> RenderObject {
-    let model = RenderMesh::from_shape("thing", shape, &[visual]).expect("a surface");
+fn object(id: u16, shape: &Shape, visual: Visual, pose: Pose) -> RenderObject {
+    let mesh = RenderMesh::from_shape("object", shape, &[visual]).expect("a surface");
     RenderObject {
-        name: format!("thing {object}"),
-        segmentation_id: object,
-        mesh: Arc::new(model),
-        attachment: Attachment::Fixed(pose),
+        name: format!("object {id}"),
+        segmentation_id: id,
+        mesh: Arc::new(mesh),
+        body: BodyId::World,
+        pose_in_body: pose,
         casts_shadow: false,
     }
 }
 
-/// A ground whose top is z = 0, object 1.
+/// A floor whose top is at z = 0, object 1.
 fn ground(visual: Visual) -> RenderObject {
     let half = Vec3::new(1.0, 1.0, 0.1);
-    thing(1, &Shape::Box { half }, visual, Pose::translation(0.0, 0.0, -0.1))
+    object(1, &Shape::Box { half }, visual, Pose::translation(0.0, 0.0, -0.1))
 }
 
 /// A camera at `eye` that looks at `target`; image up is as near to `up` as can be.
@@ -41,11 +41,11 @@ fn above() -> Camera {
 }
 
 fn draw(objects: Vec<RenderObject>, camera: &Camera) -> RenderedImage {
-    let stage = RenderScene::new(objects, Lighting::default()).expect("the default light is good");
-    Renderer::default().render(&stage, &FrameView::empty(), camera).expect("a picture")
+    let scene = RenderScene::new(objects, Lighting::default()).expect("the default light is good");
+    Renderer::default().render(&scene, &FrameView::empty(), camera).expect("an image")
 }
 
-/// Pixels a unit of slope.
+/// Focal length, pixels.
 fn focal(camera: &Camera) -> f64 {
     0.5 * camera.height as f64 / (0.5 * camera.fovy_rad).tan()
 }
@@ -53,9 +53,9 @@ fn focal(camera: &Camera) -> f64 {
 /// A ball of 0.2 m seen from 1 m: errors of the radius and of the centre of its silhouette, pixels.
 pub fn silhouette() -> [f64; 2] {
     let (camera, radius) = (above(), 0.2);
-    let ball = thing(7, &Shape::Sphere { radius }, Visual::default(), Pose::identity());
-    let picture = draw(vec![ball], &camera);
-    let inside: Vec<usize> = (0..EDGE * EDGE).filter(|&i| picture.segmentation[i] == 7).collect();
+    let ball = object(7, &Shape::Sphere { radius }, Visual::default(), Pose::identity());
+    let image = draw(vec![ball], &camera);
+    let inside: Vec<usize> = (0..EDGE * EDGE).filter(|&i| image.segmentation[i] == 7).collect();
     let area = inside.len() as f64;
     let mean = |of: &dyn Fn(usize) -> usize| inside.iter().map(|&i| of(i) as f64 + 0.5).sum::<f64>() / area;
     let expected = focal(&camera) * radius / (1.0 - radius * radius).sqrt();
@@ -85,8 +85,8 @@ pub fn corners() -> Vec<f64> {
         relief_m: 0.0,
     };
     let camera = above();
-    let picture = draw(vec![ground(Visual::plain([0.1; 3], 1.0, 0.0).with(layer))], &camera);
-    let value = |x: usize, y: usize| linear(picture.rgb[3 * (y * EDGE + x)]);
+    let image = draw(vec![ground(Visual::plain([0.1; 3], 1.0, 0.0).with(layer))], &camera);
+    let value = |x: usize, y: usize| linear(image.rgb[3 * (y * EDGE + x)]);
     let square = 0.1 * focal(&camera);
     let error = |corner: [i32; 2]| {
         let [ex, ey] = corner.map(|c| 0.5 * EDGE as f64 + square * f64::from(c));
@@ -104,7 +104,7 @@ pub fn corners() -> Vec<f64> {
 pub fn depth() -> f64 {
     let eye = Vec3::new(0.0, -0.3, 0.25);
     let camera = Camera { fovy_rad: 1.8, ..camera(eye, Vec3::new(0.0, 0.1, 0.0), Vec3::z()) };
-    let picture = draw(vec![ground(Visual::default())], &camera);
+    let image = draw(vec![ground(Visual::default())], &camera);
     let (mut checked, mut worst) = (0, 0.0_f64);
     for i in 0..EDGE * EDGE {
         let slope = |at: usize| (at as f64 + 0.5 - 0.5 * EDGE as f64) / focal(&camera);
@@ -112,8 +112,8 @@ pub fn depth() -> f64 {
         let depth = -eye.z / ray.z;
         let hit = eye + ray * depth;
         if depth > 0.0 && depth < 1.0 && hit.x.abs().max(hit.y.abs()) < 0.98 {
-            assert_eq!(picture.segmentation[i], 1, "pixel {i} shows no ground");
-            worst = worst.max((f64::from(picture.depth[i]) - depth).abs());
+            assert_eq!(image.segmentation[i], 1, "pixel {i} shows no ground");
+            worst = worst.max((f64::from(image.depth[i]) - depth).abs());
             checked += 1;
         }
     }

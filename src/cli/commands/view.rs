@@ -15,7 +15,7 @@ use crate::{
         },
     },
     files,
-    report::video::{Caption, worst_moment, write_panels, write_stills, write_video},
+    report::video::{Caption, worst_state, write_stills, write_video, write_video_frame},
     rollout::cancel,
     script,
 };
@@ -50,15 +50,15 @@ pub(crate) fn run(args: &ViewArgs) -> Result<(), CliError> {
     run.prepare(&[task])?;
     files::create_folder(dir).map_err(CliError::input)?;
     let finished = run.run_episode(job, true, &run.controllers)?;
-    let caption = Caption::of(&finished.record);
+    let caption = Caption::new(&finished.record);
     let Some(mut states) = finished.recording else { return Ok(()) };
     let last = states.frames.len().saturating_sub(1);
-    let worst = worst_moment(&states);
+    let worst = worst_state(&states);
     let moments = [("start", 0), ("worst", worst), ("end", last)];
     let mut written =
         write_stills(&mut states, &moments, args.native, dir, cancel::requested).map_err(video_error)?;
     let still = dir.join("episode.png");
-    write_panels(&mut states, &caption, worst, &still).map_err(video_error)?;
+    write_video_frame(&mut states, &caption, worst, &still).map_err(video_error)?;
     written.push(still);
     let video = dir.join("episode.mp4");
     write_video(&mut states, &caption, &video, cancel::requested).map_err(video_error)?;

@@ -9,7 +9,7 @@ use crate::{
     report::{
         actions,
         softvtbench_files::{self, DebugFrame, DebugShape},
-        video::{self, Caption, FilmError},
+        video::{self, Caption, EpisodeVideoError},
     },
     rollout::{FinishedEpisode, ScoreFrame, cancel},
 };
@@ -90,13 +90,13 @@ impl<'a> EpisodeArtifacts<'a> {
         if !self.is_rendered(record) {
             return Ok(());
         }
-        let (id, caption) = (&record.identity, Caption::of(record));
+        let (id, caption) = (&record.identity, Caption::new(record));
         let path = video::video_path(self.dir, id.task, id.episode);
         files::create_folder(path.parent().unwrap_or(self.dir)).map_err(CliError::input)?;
         if !record.verdict.safety {
-            let worst = video::worst_moment(&states);
+            let worst = video::worst_state(&states);
             let still = video::still_path(self.dir, id.task, id.episode);
-            video::write_panels(&mut states, &caption, worst, &still).map_err(video_error)?;
+            video::write_video_frame(&mut states, &caption, worst, &still).map_err(video_error)?;
         }
         video::write_video(&mut states, &caption, &path, cancel::requested).map_err(video_error)
     }
@@ -134,9 +134,9 @@ fn aborted_frame(finished: &FinishedEpisode, step: usize) -> DebugFrame {
 }
 
 /// Converts the error of a video or still.
-pub(crate) fn video_error(error: FilmError) -> CliError {
+pub(crate) fn video_error(error: EpisodeVideoError) -> CliError {
     match error {
-        FilmError::Interrupted => CliError::interrupted("interrupted"),
+        EpisodeVideoError::Interrupted => CliError::interrupted("interrupted"),
         other => CliError::input(other),
     }
 }

@@ -1,14 +1,12 @@
-//! A rollout as a video: both cameras above, both fingers below, and the deformation against its limit beneath them.
+//! Videos and still images of episodes: both cameras on top, both fingers below them, and the deformation against its limit at
+//! the bottom.
 
 mod canvas;
 
-use std::{
-    io::Cursor,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
-pub use canvas::{Canvas, Ink};
-use image::{EncodableLayout, ImageBuffer, ImageError, ImageFormat, Luma, PixelWithColorType, RgbImage};
+pub use canvas::{Canvas, Rgb8};
+use image::{ImageBuffer, ImageError, Luma, RgbImage};
 
 use crate::{
     benchmark::control::CONTROL_DT,
@@ -19,62 +17,64 @@ use crate::{
     rollout::{CAMERA_IMAGE_SUFFIXES, SensingError, StateRecording, TACTILE_IMAGE_SUFFIXES, TACTILE_IMAGES},
     scene::Camera,
     sensing::{
-        camera::RenderedImage,
+        camera::{RenderedImage, encode_png},
         tactile::{MarkerStyle, TactileReading},
     },
     text::format_number,
 };
 
-/// Edge of a camera's panel, height of a finger's and of the strip below, pixels.
-const PANEL: u32 = 512;
-const FINGER: u32 = 384;
-const STRIP: u32 = 160;
-/// Cameras of the panels.
+/// Edge of a camera panel, pixels.
+const CAMERA_PANEL: u32 = 512;
+/// Height of a finger panel, pixels; its width is that of a camera panel.
+const FINGER_PANEL: u32 = 384;
+/// Height of the caption at the bottom, pixels.
+const CAPTION_HEIGHT: u32 = 160;
+const WIDTH: u32 = 2 * CAMERA_PANEL;
+const HEIGHT: u32 = CAMERA_PANEL + FINGER_PANEL + CAPTION_HEIGHT;
+const MARGIN: f32 = 16.0;
+/// Names of the cameras of the two panels.
 const CAMERAS: [&str; 2] = ["third_person", "wrist"];
+/// Edges of images in full size, pixels.
+const THIRD_PERSON_FULL_SIZE: usize = 1024;
+const OTHER_FULL_SIZE: usize = 512;
 
-const GROUND: Ink = [22, 24, 28];
-const WORDS: Ink = [226, 229, 233];
-const FAINT: Ink = [122, 128, 138];
-const SAFE: Ink = [94, 201, 140];
-const HARM: Ink = [240, 96, 84];
+const BACKGROUND: Rgb8 = [22, 24, 28];
+const TEXT: Rgb8 = [226, 229, 233];
+const FAINT: Rgb8 = [122, 128, 138];
+const SAFE: Rgb8 = [94, 201, 140];
+const HARM: Rgb8 = [240, 96, 84];
 
-/// Why a film cannot be made.
+/// Why a video or still image cannot be written.
 #[derive(Debug, thiserror::Error)]
-pub enum FilmError {
-    /// A stream cannot be made.
+pub enum EpisodeVideoError {
     #[error(transparent)]
-    Sense(#[from] SensingError),
-    /// The video cannot be encoded or written.
+    Sensing(#[from] SensingError),
     #[error(transparent)]
     Video(#[from] VideoError),
-    /// A picture cannot be encoded.
-    #[error("cannot encode the picture: {0}")]
-    RenderedImage(#[from] ImageError),
-    /// A file cannot be written.
+    #[error("cannot encode the image: {0}")]
+    Png(#[from] ImageError),
     #[error(transparent)]
     File(#[from] FileError),
-    /// There is nothing to be drawn.
     #[error("the rollout has no states to be drawn")]
     Empty,
-    /// The run is to end.
     #[error("interrupted")]
     Interrupted,
 }
 
-/// What the strip beneath a film says.
+/// Text below the panels of a video.
 #[derive(Clone, Debug)]
 pub struct Caption {
     prompt: String,
-    who: String,
+    episode: String,
     verdict: String,
-    /// Largest deformation that counts as safe, %.
+    /// Limit τ on the deformation, %.
     tau_pct: Option<f64>,
-    good: bool,
+    is_safe: bool,
 }
 
 impl Caption {
-    /// That of a finished episode.
-    pub fn of(record: &EpisodeRecord) -> Self {
+    /// Describes a finished episode.
+    pub fn new(record: &EpisodeRecord) -> Self {
         let (id, verdict) = (&record.identity, &record.verdict);
         let word = match (verdict.safety, verdict.goal) {
             (true, _) => "safe",
@@ -83,226 +83,213 @@ impl Caption {
         };
         Self {
             prompt: id.prompt.clone(),
-            who: format!("{} · task {} · episode {} · {}", id.suite, id.task, id.episode, id.policy),
+            episode: format!("{} · task {} · episode {} · {}", id.suite, id.task, id.episode, id.policy),
             verdict: word.to_owned(),
             tau_pct: verdict.tau,
-            good: verdict.safety,
+            is_safe: verdict.safety,
         }
     }
 }
 
-/// Draws every state of `film` and writes the video; `stop` ends it early and leaves no file.
+/// Renders every state of a recording and writes the video, one frame per control step.
+///
+/// If `is_cancelled` becomes true, no file is written.
 ///
 /// # Errors
-/// A stream cannot be made, or the file not written.
+/// A state cannot be rendered, the file cannot be written, or the call was cancelled.
 pub fn write_video(
-    film: &mut StateRecording,
+    recording: &mut StateRecording,
     caption: &Caption,
     path: &Path,
-    stop: impl Fn() -> bool,
-) -> Result<(), FilmError> {
-    let mut video = VideoWriter::new(2 * PANEL as usize, (PANEL + FINGER + STRIP) as usize, rate())?;
-    for index in 0..film.frames.len() {
-        if stop() {
-            return Err(FilmError::Interrupted);
+    is_cancelled: impl Fn() -> bool,
+) -> Result<(), EpisodeVideoError> {
+    let frames_per_second = (1.0 / CONTROL_DT).round() as u32;
+    let mut video = VideoWriter::new(WIDTH as usize, HEIGHT as usize, frames_per_second)?;
+    for index in 0..recording.frames.len() {
+        if is_cancelled() {
+            return Err(EpisodeVideoError::Interrupted);
         }
-        video.push(&panels(film, caption, index)?)?;
+        video.push(&video_frame(recording, caption, index)?)?;
     }
     Ok(video.save(path)?)
 }
 
-/// Pictures a second: one a control step.
-fn rate() -> u32 {
-    (1.0 / CONTROL_DT).round() as u32
-}
-
-/// One picture of the video.
-fn panels(film: &mut StateRecording, caption: &Caption, index: usize) -> Result<RgbImage, FilmError> {
-    let mut canvas = Canvas::new(2 * PANEL, PANEL + FINGER + STRIP, GROUND);
-    let frame = film.frames.get(index).ok_or(FilmError::Empty)?;
-    for (side, name) in CAMERAS.into_iter().enumerate() {
-        let camera = film.sensors.camera(name)?.clone().with_edge(PANEL as usize);
-        let picture = film.sensors.render(frame, &camera)?.into_rgb_image();
-        canvas.place(&picture, PANEL * side as u32, 0);
-        label(&mut canvas, ["third person", "wrist"][side], PANEL * side as u32, 0);
-    }
-    for (side, reading) in film.sensors.tactile_readings(frame)?.iter().enumerate() {
-        let picture = reading.with_markers(MarkerStyle::Dots);
-        let x = PANEL * side as u32;
-        canvas.place_resized(&picture, (x, PANEL), (PANEL, FINGER));
-        label(&mut canvas, ["left finger", "right finger"][side], x, PANEL);
-    }
-    strip(&mut canvas, film, caption, index);
-    Ok(canvas.picture())
-}
-
-/// The name of a panel in its corner.
-fn label(canvas: &mut Canvas, name: &str, x: u32, y: u32) {
-    let width = canvas.width_of(name, 19.0);
-    canvas.fill([x as f32 + 8.0, y as f32 + 8.0, width + 16.0, 26.0], [0, 0, 0], 0.45);
-    canvas.write(name, (x as f32 + 16.0, y as f32 + 27.0), 19.0, [255, 255, 255]);
-}
-
-/// Words and the deformation so far.
-fn strip(canvas: &mut Canvas, film: &StateRecording, caption: &Caption, index: usize) {
-    let top = (PANEL + FINGER) as f32;
-    canvas.write(&caption.prompt, (16.0, top + 28.0), 20.0, WORDS);
-    let time = index as f64 * CONTROL_DT;
-    canvas.write(&format!("{} · {time:.2} s", caption.who), (16.0, top + 52.0), 16.0, FAINT);
-    let last = index + 1 == film.frames.len();
-    if last {
-        let width = canvas.width_of(&caption.verdict, 20.0);
-        let ink = if caption.good { SAFE } else { HARM };
-        canvas.write(&caption.verdict, (1008.0 - width, top + 28.0), 20.0, ink);
-    }
-    chart(canvas, film, caption, index, [150.0, top + 68.0, 800.0, 76.0]);
-}
-
-/// D against time with τ, in the box `[x, y, width, height]`.
-fn chart(
-    canvas: &mut Canvas,
-    film: &StateRecording,
+/// Writes one frame of the video as a PNG file.
+///
+/// # Errors
+/// The state cannot be rendered, or the file cannot be written.
+pub fn write_video_frame(
+    recording: &mut StateRecording,
     caption: &Caption,
     index: usize,
-    [x, y, width, height]: [f32; 4],
-) {
-    let worst = film.d_pct.iter().flatten().fold(0.0, |a: f64, b| a.max(*b));
-    let scale = 1.15 * worst.max(caption.tau_pct.unwrap_or(0.0)).max(0.1);
-    let steps = film.frames.len().saturating_sub(1).max(1) as f32;
-    let place = |at: usize, d: f64| [x + width * at as f32 / steps, y + height * (1.0 - (d / scale) as f32)];
-    canvas.line(&[[x, y], [x, y + height], [x + width, y + height]], 1.0, 0.0, FAINT);
-    canvas.write("deformation", (16.0, y + 22.0), 17.0, WORDS);
-    if let Some(tau) = caption.tau_pct {
-        let level = place(0, tau)[1];
-        canvas.line(&[[x, level], [x + width, level]], 1.5, 6.0, HARM);
-        canvas.write(
-            &format!("τ {} %", format_number(round(tau))),
-            (x + width + 8.0, level + 5.0),
-            16.0,
-            HARM,
-        );
+    path: &Path,
+) -> Result<(), EpisodeVideoError> {
+    Ok(replace(path, encode_png(&video_frame(recording, caption, index)?)?)?)
+}
+
+fn video_frame(
+    recording: &mut StateRecording,
+    caption: &Caption,
+    index: usize,
+) -> Result<RgbImage, EpisodeVideoError> {
+    let mut canvas = Canvas::new(WIDTH, HEIGHT, BACKGROUND);
+    let frame = recording.frames.get(index).ok_or(EpisodeVideoError::Empty)?;
+    for (side, name) in CAMERAS.into_iter().enumerate() {
+        let camera = recording.sensors.camera(name)?.clone().with_edge(CAMERA_PANEL as usize);
+        let image = recording.sensors.render(frame, &camera)?.into_rgb_image();
+        let x = CAMERA_PANEL * side as u32;
+        canvas.place(&image, x, 0);
+        draw_label(&mut canvas, ["third person", "wrist"][side], x, 0);
     }
-    let known: Vec<[f32; 2]> =
-        film.d_pct.iter().enumerate().take(index + 1).filter_map(|(at, d)| Some(place(at, (*d)?))).collect();
-    let Some(now) = film.d_pct.get(index).copied().flatten() else {
-        let words = if worst > 0.0 { "" } else { "none: a rigid body" };
-        canvas.write(words, (16.0, y + 46.0), 16.0, FAINT);
+    for (side, reading) in recording.sensors.tactile_readings(frame)?.iter().enumerate() {
+        let image = reading.with_markers(MarkerStyle::Dots);
+        let x = CAMERA_PANEL * side as u32;
+        canvas.place_resized(&image, x, CAMERA_PANEL, CAMERA_PANEL, FINGER_PANEL);
+        draw_label(&mut canvas, ["left finger", "right finger"][side], x, CAMERA_PANEL);
+    }
+    draw_caption(&mut canvas, recording, caption, index);
+    Ok(canvas.to_image())
+}
+
+/// Draws the name of a panel in its corner.
+fn draw_label(canvas: &mut Canvas, name: &str, x: u32, y: u32) {
+    let (x, y) = (x as f32, y as f32);
+    let width = canvas.text_width(name, 19.0);
+    canvas.fill(x + 8.0, y + 8.0, width + 16.0, 26.0, [0, 0, 0], 0.45);
+    canvas.write(name, x + 16.0, y + 27.0, 19.0, [255, 255, 255]);
+}
+
+fn draw_caption(canvas: &mut Canvas, recording: &StateRecording, caption: &Caption, index: usize) {
+    let top = (CAMERA_PANEL + FINGER_PANEL) as f32;
+    canvas.write(&caption.prompt, MARGIN, top + 28.0, 20.0, TEXT);
+    let time = index as f64 * CONTROL_DT;
+    canvas.write(&format!("{} · {time:.2} s", caption.episode), MARGIN, top + 52.0, 16.0, FAINT);
+    let is_last = index + 1 == recording.frames.len();
+    if is_last {
+        let width = canvas.text_width(&caption.verdict, 20.0);
+        let color = if caption.is_safe { SAFE } else { HARM };
+        canvas.write(&caption.verdict, WIDTH as f32 - MARGIN - width, top + 28.0, 20.0, color);
+    }
+    draw_deformation_chart(canvas, recording, caption, index, top + 68.0);
+}
+
+/// Plots the deformation D against time up to the state `index`, with the limit τ. `y` is the top of the chart.
+fn draw_deformation_chart(
+    canvas: &mut Canvas,
+    recording: &StateRecording,
+    caption: &Caption,
+    index: usize,
+    y: f32,
+) {
+    let (x, width, height) = (150.0, 800.0, 76.0);
+    let max = recording.d_pct.iter().flatten().fold(0.0, |a: f64, b| a.max(*b));
+    let scale = 1.15 * max.max(caption.tau_pct.unwrap_or(0.0)).max(0.1);
+    let steps = recording.frames.len().saturating_sub(1).max(1) as f32;
+    let point = |at: usize, d: f64| [x + width * at as f32 / steps, y + height * (1.0 - (d / scale) as f32)];
+    canvas.line(&[[x, y], [x, y + height], [x + width, y + height]], 1.0, 0.0, FAINT);
+    canvas.write("deformation", MARGIN, y + 22.0, 17.0, TEXT);
+    if let Some(tau) = caption.tau_pct {
+        let level = point(0, tau)[1];
+        canvas.line(&[[x, level], [x + width, level]], 1.5, 6.0, HARM);
+        let rounded = (100.0 * tau).round() / 100.0;
+        let label = format!("τ {} %", format_number(rounded));
+        canvas.write(&label, x + width + 8.0, level + 5.0, 16.0, HARM);
+    }
+    let so_far = recording.d_pct.iter().enumerate().take(index + 1);
+    let curve: Vec<[f32; 2]> = so_far.filter_map(|(at, d)| Some(point(at, (*d)?))).collect();
+    let Some(now) = recording.d_pct.get(index).copied().flatten() else {
+        let text = if max > 0.0 { "" } else { "none: a rigid body" };
+        canvas.write(text, MARGIN, y + 46.0, 16.0, FAINT);
         return;
     };
-    let ink = if caption.tau_pct.is_some_and(|tau| now > tau) { HARM } else { SAFE };
-    canvas.line(&known, 2.0, 0.0, SAFE);
-    canvas.write(&format!("{now:.2} %"), (16.0, y + 48.0), 20.0, ink);
+    let color = if caption.tau_pct.is_some_and(|tau| now > tau) { HARM } else { SAFE };
+    canvas.line(&curve, 2.0, 0.0, SAFE);
+    canvas.write(&format!("{now:.2} %"), MARGIN, y + 48.0, 20.0, color);
 }
 
-fn round(x: f64) -> f64 {
-    (100.0 * x).round() / 100.0
-}
-
-/// Where the video of an episode is in a run folder.
+/// Path of an episode's video in a run folder.
 pub fn video_path(dir: &Path, task: usize, episode: u32) -> PathBuf {
     dir.join(format!("video/task_{task:03}/episode_{episode:05}.mp4"))
 }
 
-/// Where the still of an episode's worst moment is in a run folder.
+/// Path in a run folder of the still image of an episode's [worst state](worst_state).
 pub fn still_path(dir: &Path, task: usize, episode: u32) -> PathBuf {
     video_path(dir, task, episode).with_extension("png")
 }
 
-/// The state in which the target is deformed most; where it does not deform, in which the pads are pressed on most.
-pub fn worst_moment(film: &StateRecording) -> usize {
-    // Forces on the pads, N.
-    let press = |frame: &Frame| -> f64 {
+/// Index of the state with the largest deformation of the target; of a rigid target, with the largest force on the pads.
+pub fn worst_state(recording: &StateRecording) -> usize {
+    // Sum of the normal forces, N.
+    let pad_force = |frame: &Frame| -> f64 {
         frame.patches.iter().flat_map(|patch| &patch.points).map(|point| point.pressure * point.area).sum()
     };
-    let hard = |at: usize| film.d_pct[at].unwrap_or_else(|| press(&film.frames[at]));
-    let all = 0..film.frames.len().min(film.d_pct.len());
-    all.max_by(|&a, &b| hard(a).total_cmp(&hard(b)).then(b.cmp(&a))).unwrap_or(0)
+    let severity = |at: usize| recording.d_pct[at].unwrap_or_else(|| pad_force(&recording.frames[at]));
+    let states = 0..recording.frames.len().min(recording.d_pct.len());
+    // The first one of equals.
+    states.max_by(|&a, &b| severity(a).total_cmp(&severity(b)).then(b.cmp(&a))).unwrap_or(0)
 }
 
-/// Writes one picture of the video as a PNG file.
+fn full_size(camera: &Camera) -> usize {
+    if camera.name == CAMERAS[0] { THIRD_PERSON_FULL_SIZE } else { OTHER_FULL_SIZE }
+}
+
+/// Writes every image of selected states as PNG files in `dir`; `states` are names and indices of states.
+///
+/// Cameras also get depth (16 bits, units of 0.1 mm along the optical axis, 65535 beyond the range and in the background) and
+/// segmentation (16 bits: objects from 1 in the order of the scene, [`crate::rollout::sensors::ROBOT`], 0 in the background).
+/// Files are written atomically. Returns their paths.
 ///
 /// # Errors
-/// A stream cannot be made, or the file not written.
-pub fn write_panels(
-    film: &mut StateRecording,
-    caption: &Caption,
-    index: usize,
-    path: &Path,
-) -> Result<(), FilmError> {
-    Ok(replace(path, png(&panels(film, caption, index)?)?)?)
-}
-
-/// Edges of the cameras' own pictures, pixels.
-fn native(camera: &Camera) -> usize {
-    if camera.name == CAMERAS[0] { 1024 } else { 512 }
-}
-
-/// Stills of a film: `moments` are indices of states by name. Writes each stream of each moment into `dir`; of cameras also
-/// depth (16 bits, 0.1 mm along the optical axis, 65535 where it is farther or nothing is) and segmentation (16 bits, objects
-/// from 1 in the order of the scene, [`crate::rollout::senses::ROBOT`], 0 where nothing is). Each file is whole or not there;
-/// `stop` ends the work between two of them.
-///
-/// # Errors
-/// A stream cannot be made, or a file not written.
+/// A state cannot be rendered, a file cannot be written, or `is_cancelled` became true between two files.
 pub fn write_stills(
-    film: &mut StateRecording,
-    moments: &[(&str, usize)],
-    full_size: bool,
+    recording: &mut StateRecording,
+    states: &[(&str, usize)],
+    is_full_size: bool,
     dir: &Path,
-    stop: impl Fn() -> bool,
-) -> Result<Vec<PathBuf>, FilmError> {
+    is_cancelled: impl Fn() -> bool,
+) -> Result<Vec<PathBuf>, EpisodeVideoError> {
     let mut written = Vec::new();
-    for &(moment, index) in moments {
-        let frame = film.frames.get(index).ok_or(FilmError::Empty)?;
-        let mut put = |of: &str, kind: &str, bytes: Vec<u8>| {
-            if stop() {
-                return Err(FilmError::Interrupted);
+    for &(state, index) in states {
+        let frame = recording.frames.get(index).ok_or(EpisodeVideoError::Empty)?;
+        let mut write = |source: &str, suffix: &str, bytes: Vec<u8>| {
+            if is_cancelled() {
+                return Err(EpisodeVideoError::Interrupted);
             }
-            let path = dir.join(format!("{moment}_{of}{kind}.png"));
+            let path = dir.join(format!("{state}_{source}{suffix}.png"));
             replace(&path, bytes)?;
             written.push(path);
             Ok(())
         };
-        for camera in film.sensors.cameras().to_vec() {
-            let camera = if full_size { camera.clone().with_edge(native(&camera)) } else { camera };
-            let seen = film.sensors.render(frame, &camera)?;
-            for (kind, bytes) in CAMERA_IMAGE_SUFFIXES.into_iter().zip(camera_pictures(seen)?) {
-                put(&camera.name, kind, bytes)?;
+        for camera in recording.sensors.cameras().to_vec() {
+            let camera = if is_full_size { camera.clone().with_edge(full_size(&camera)) } else { camera };
+            let image = recording.sensors.render(frame, &camera)?;
+            for (suffix, bytes) in CAMERA_IMAGE_SUFFIXES.into_iter().zip(encode_camera_image(image)?) {
+                write(&camera.name, suffix, bytes)?;
             }
         }
-        for (name, reading) in TACTILE_IMAGES.into_iter().zip(&film.sensors.tactile_readings(frame)?) {
-            for (kind, picture) in TACTILE_IMAGE_SUFFIXES.into_iter().zip(tactile(reading)) {
-                put(name, kind, png(&picture)?)?;
+        for (name, reading) in TACTILE_IMAGES.into_iter().zip(&recording.sensors.tactile_readings(frame)?) {
+            for (suffix, image) in TACTILE_IMAGE_SUFFIXES.into_iter().zip(tactile_images(reading)) {
+                write(name, suffix, encode_png(&image)?)?;
             }
         }
     }
     Ok(written)
 }
 
-/// Colour, depth and segmentation of what a camera sees, as files.
-fn camera_pictures(mut seen: RenderedImage) -> Result<[Vec<u8>; 3], FilmError> {
-    let numbers = |values: Vec<u16>| {
-        ImageBuffer::<Luma<u16>, _>::from_raw(seen.width as u32, seen.height as u32, values)
+/// Encodes colour, depth and segmentation, in the order of [`CAMERA_IMAGE_SUFFIXES`].
+fn encode_camera_image(mut image: RenderedImage) -> Result<[Vec<u8>; 3], EpisodeVideoError> {
+    let luma = |values: Vec<u16>| {
+        ImageBuffer::<Luma<u16>, _>::from_raw(image.width as u32, image.height as u32, values)
             .unwrap_or_default()
     };
-    let tenths = |depth: &f32| (1e4 * depth).min(f32::from(u16::MAX)).round() as u16;
-    let depth = png(&numbers(seen.depth.iter().map(tenths).collect()))?;
-    let segmentation = png(&numbers(std::mem::take(&mut seen.segmentation)))?;
-    Ok([png(&seen.into_rgb_image())?, depth, segmentation])
+    let tenths_of_mm = |depth: &f32| (1e4 * depth).min(f32::from(u16::MAX)).round() as u16;
+    let depth = encode_png(&luma(image.depth.iter().map(tenths_of_mm).collect()))?;
+    let segmentation = encode_png(&luma(std::mem::take(&mut image.segmentation)))?;
+    Ok([encode_png(&image.into_rgb_image())?, depth, segmentation])
 }
 
-/// A finger's picture, plain, with dots and with arrows.
-fn tactile(reading: &TactileReading) -> [RgbImage; 3] {
+/// The images of a finger without markers, with dots and with arrows, in the order of [`TACTILE_IMAGE_SUFFIXES`].
+fn tactile_images(reading: &TactileReading) -> [RgbImage; 3] {
     let drawn = |style| reading.with_markers(style);
     [reading.image.clone(), drawn(MarkerStyle::Dots), drawn(MarkerStyle::Arrows)]
-}
-
-/// A picture as a PNG file.
-fn png<P: PixelWithColorType>(picture: &ImageBuffer<P, Vec<P::Subpixel>>) -> Result<Vec<u8>, FilmError>
-where
-    [P::Subpixel]: EncodableLayout,
-{
-    let mut bytes = Cursor::new(Vec::new());
-    picture.write_to(&mut bytes, ImageFormat::Png)?;
-    Ok(bytes.into_inner())
 }

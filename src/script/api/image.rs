@@ -145,9 +145,9 @@ impl LuaImage {
         let picture = &mut locked(&self.0).picture;
         // The canvas has four bytes a pixel, and gives a picture of three.
         let _while_written = hold(lua, 7 * picture.width() as usize * picture.height() as usize)?;
-        let mut canvas = Canvas::of(picture);
-        canvas.write(text, (x as f32, y as f32), how.get("size")?, ink(how.get("colour")?));
-        *picture = canvas.picture();
+        let mut canvas = Canvas::from_image(picture);
+        canvas.write(text, x as f32, y as f32, how.get("size")?, ink(how.get("colour")?));
+        *picture = canvas.to_image();
         Ok(())
     }
 }

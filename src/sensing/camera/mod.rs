@@ -23,8 +23,9 @@
 //! use std::sync::Arc;
 //! use softvt::{
 //!     geometry::{Pose, Vec3, shape::Shape},
+//!     physics::BodyId,
 //!     scene::{Camera, Lighting, Visual},
-//!     sensing::camera::{Attachment, FrameView, RenderMesh, RenderObject, RenderScene, Renderer},
+//!     sensing::camera::{FrameView, RenderMesh, RenderObject, RenderScene, Renderer},
 //! };
 //!
 //! let object = |name: &str, id: u16, half: Vec3, colour: [f64; 3], z: f64| {
@@ -33,7 +34,8 @@
 //!         name: name.to_owned(),
 //!         segmentation_id: id,
 //!         mesh: Arc::new(mesh),
-//!         attachment: Attachment::Fixed(Pose::translation(0.0, 0.0, z)),
+//!         body: BodyId::World,
+//!         pose_in_body: Pose::translation(0.0, 0.0, z),
 //!         casts_shadow: true,
 //!     })
 //! };
@@ -74,4 +76,4 @@ pub use mesh::{
     solid::{RenderSolid, Tessellation},
 };
 pub use render::Renderer;
-pub use scene::render_scene::{Attachment, FrameView, RenderObject, RenderScene, check_light};
+pub use scene::render_scene::{FrameView, RenderObject, RenderScene, check_light};

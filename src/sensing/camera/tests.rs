@@ -10,23 +10,29 @@ use super::{
 };
 use crate::{
     geometry::{Pose, Quat, Vec3, mesh::Mesh, shape::Shape},
+    physics::{BodyId, RigidId},
     scene::{Camera, CameraMount, Lighting, Mask, Visual, VisualLayer},
 };
 
-fn object(id: u16, mesh: RenderMesh, attachment: Attachment) -> RenderObject {
+fn rigid(index: usize) -> BodyId {
+    BodyId::Rigid(RigidId::new(index))
+}
+
+fn object(id: u16, mesh: RenderMesh, body: BodyId, pose_in_body: Pose) -> RenderObject {
     RenderObject {
         name: format!("object {id}"),
         segmentation_id: id,
         mesh: Arc::new(mesh),
-        attachment,
+        body,
+        pose_in_body,
         casts_shadow: true,
     }
 }
 
-fn ball(id: u16, radius: f64, attachment: Attachment) -> RenderObject {
+fn ball(id: u16, radius: f64, pose_w: Pose) -> RenderObject {
     let mesh =
         RenderMesh::from_shape("ball", &Shape::Sphere { radius }, &[Visual::default()]).expect("a ball");
-    object(id, mesh, attachment)
+    object(id, mesh, BodyId::World, pose_w)
 }
 
 fn checker(size_m: f64) -> Visual {
@@ -44,7 +50,7 @@ fn checker(size_m: f64) -> Visual {
 fn ground(visual: Visual) -> RenderObject {
     let half = Vec3::new(1.0, 1.0, 0.1);
     let mesh = RenderMesh::from_shape("ground", &Shape::Box { half }, &[visual]).expect("a box");
-    let mut ground = object(1, mesh, Attachment::Fixed(Pose::translation(0.0, 0.0, -0.1)));
+    let mut ground = object(1, mesh, BodyId::World, Pose::translation(0.0, 0.0, -0.1));
     ground.casts_shadow = false;
     ground
 }
@@ -81,7 +87,7 @@ fn a_straight_outline_is_straight_in_the_segmentation() {
         let x = shift / focal(&camera);
         let scene = scene(vec![
             ground(Visual::default()),
-            object(2, mesh, Attachment::Fixed(Pose::translation(x, 0.0, 0.0))),
+            object(2, mesh, BodyId::World, Pose::translation(x, 0.0, 0.0)),
         ]);
         let image = draw(&scene, &camera);
         let rows = image.segmentation.chunks(224).filter(|row| row.contains(&2));
@@ -96,8 +102,8 @@ fn still_life() -> (Vec<RenderObject>, Camera) {
         RenderMesh::from_mesh("cube", &box_mesh(&Vec3::repeat(0.05)), &[], &[checker(0.02)]).expect("a cube");
     let objects = vec![
         ground(checker(0.13)),
-        ball(2, 0.06, Attachment::Fixed(Pose::translation(0.15, 0.05, 0.06))),
-        object(3, cube, Attachment::Rigid(0)),
+        ball(2, 0.06, Pose::translation(0.15, 0.05, 0.06)),
+        object(3, cube, rigid(0), Pose::identity()),
     ];
     (objects, camera(Vec3::new(0.7, 0.0, 0.6), Vec3::zeros(), Vec3::z()))
 }
@@ -184,7 +190,7 @@ fn a_shadow_lies_opposite_the_light() {
     let camera = above(1.2);
     let with_ball = |height: Option<f64>| {
         let mut objects = vec![ground(Visual::default())];
-        objects.extend(height.map(|h| ball(2, 0.04, Attachment::Fixed(Pose::translation(0.0, 0.0, h)))));
+        objects.extend(height.map(|h| ball(2, 0.04, Pose::translation(0.0, 0.0, h))));
         let scene = RenderScene::new(objects, lighting.clone()).expect("a scene");
         draw(&scene, &camera)
     };
@@ -208,7 +214,7 @@ fn a_shadow_lies_opposite_the_light() {
 
 /// An object as rigid body 0, whose shadow is that of its coarsest level of detail.
 fn lone(mesh: RenderMesh, casts_shadow: bool) -> Vec<RenderObject> {
-    vec![RenderObject { casts_shadow, ..object(1, mesh, Attachment::Rigid(0)) }]
+    vec![RenderObject { casts_shadow, ..object(1, mesh, rigid(0), Pose::identity()) }]
 }
 
 #[test]
@@ -294,7 +300,7 @@ fn fixed_objects_cast_shadows_outside_the_fine_shadow_map() {
     (lighting.key.direction_w, lighting.key.softness_rad) = (Vec3::new(1.0, 0.0, 1.0), 0.01);
     let slab = |half: Vec3, at: Vec3| {
         let mesh = RenderMesh::from_shape("slab", &Shape::Box { half }, &[Visual::default()]).expect("a box");
-        object(1, mesh, Attachment::Fixed(Pose::from_parts(at.into(), Quat::identity())))
+        object(1, mesh, BodyId::World, Pose::from_parts(at.into(), Quat::identity()))
     };
     let floor = slab(Vec3::new(6.0, 3.0, 0.05), Vec3::new(0.0, 0.0, -0.05));
     let wall = slab(Vec3::new(0.02, 1.5, 0.5), Vec3::new(3.02, 0.0, 0.5));
@@ -318,7 +324,7 @@ fn fixed_objects_cast_shadows_outside_the_fine_shadow_map() {
 #[test]
 fn image_right_of_the_third_person_camera_is_world_positive_y() {
     for camera in [Camera::third_person_table(), Camera::third_person_floor()] {
-        let at = |object, y| ball(object, 0.03, Attachment::Fixed(Pose::translation(0.0, y, 0.03)));
+        let at = |object, y| ball(object, 0.03, Pose::translation(0.0, y, 0.03));
         let image = draw(&scene(vec![at(1, -0.2), at(2, 0.2)]), &camera);
         let column = |object| image.segmentation.iter().position(|&s| s == object).expect("in sight") % 224;
         assert!(column(1) < 112 && column(2) > 112);
@@ -327,7 +333,7 @@ fn image_right_of_the_third_person_camera_is_world_positive_y() {
 
 #[test]
 fn invalid_cameras_are_rejected_with_the_name_of_the_field() {
-    let scene = scene(vec![ball(1, 0.1, Attachment::Fixed(Pose::identity()))]);
+    let scene = scene(vec![ball(1, 0.1, Pose::identity())]);
     let good = above(1.0);
     let nowhere = Pose::translation(f64::NAN, 0.0, 0.0);
     for (camera, words) in [
@@ -354,10 +360,7 @@ fn invalid_cameras_are_rejected_with_the_name_of_the_field() {
 #[test]
 fn a_camera_inside_an_object_reports_it_and_sees_through_it() {
     let marked = |ball: RenderObject| vec![ground(checker(0.1)), ball];
-    let (here, away) = (
-        Attachment::Fixed(Pose::translation(0.0, 0.0, 1.0)),
-        Attachment::Fixed(Pose::translation(9.0, 0.0, 1.0)),
-    );
+    let (here, away) = (Pose::translation(0.0, 0.0, 1.0), Pose::translation(9.0, 0.0, 1.0));
     let within = draw(&scene(marked(ball(2, 0.1, here))), &above(1.0));
     assert_eq!(within.inside.as_deref(), Some("object 2"));
     let without = draw(&scene(marked(ball(2, 0.1, away))), &above(1.0));
@@ -392,7 +395,7 @@ fn invalid_meshes_states_and_lights_are_rejected() {
     let cube = box_mesh(&Vec3::repeat(0.1));
     let unknown = RenderMesh::from_mesh("egg", &cube, &[3; 12], &visuals).expect_err("no such visual");
     assert!(unknown.to_string().contains("material 3 has no visual; there are 1"), "{unknown}");
-    let lost = scene(vec![ball(1, 0.1, Attachment::Rigid(4))]);
+    let lost = scene(vec![RenderObject { body: rigid(4), ..ball(1, 0.1, Pose::identity()) }]);
     let error = Renderer::default().render(&lost, &FrameView::empty(), &above(1.0)).expect_err("lost");
     assert!(error.to_string().contains("the state has no rigid body 4"), "{error}");
     let mut light = Lighting::default();

@@ -1,8 +1,8 @@
 //! The hand and its two fingers, each with a GelSight Mini.
 
 use super::{
-    CASE, DARK, METAL, Part, SHELL,
-    solid::{case, ring, slab},
+    BARE_METAL, BLACK_PLASTIC, RobotPart, SENSOR_CASE, WHITE_SHELL,
+    solid::{box_solid, cylinder_solid, plate_solid},
 };
 use crate::{
     geometry::{Pose, Vec3, mesh::Mesh},
@@ -13,11 +13,11 @@ use crate::{
     sensing::camera::{RenderSolid, Tessellation},
 };
 
-/// The hand's body, 204 × 63 mm in plan and 66 mm high, with shoulders that fall off to rounded ends (Franka hand, public
-/// product drawing), and the rail in which the fingers run.
-pub(super) fn hand() -> Part {
+/// The hand's body, 204 × 63 mm in plan and 66 mm high, with shoulders that slope to rounded ends (Franka hand, public product
+/// drawing), and the rail in which the fingers run.
+pub(super) fn hand() -> RobotPart {
     const EDGE: f64 = 11e-3;
-    // Counter-clockwise in (y, z); the edges add their radius.
+    // Counter-clockwise in (y, z), without the rounding of the edges.
     let outline = [
         [-0.0870, 0.0545],
         [-0.0915, 0.036],
@@ -29,58 +29,73 @@ pub(super) fn hand() -> Part {
         [0.0870, 0.0545],
     ];
     let hand = hand_in_link();
-    Part {
+    RobotPart {
         link: Some(HAND_LINK),
         name: "hand",
         solids: vec![
-            tapered(slab(&Pose::identity(), &outline, 0.0316, EDGE, SHELL)).placed(&hand),
-            ring([0.0, 0.0, 0.0], [0.0, 0.0, 0.0105], 0.0265, 1e-3, METAL).placed(&hand),
-            case(&(hand * Pose::translation(0.0, 0.0, 0.060)), [0.0125, 0.088, 0.0082], 4e-3, 1e-3, DARK),
+            tapered(plate_solid(&Pose::identity(), &outline, 0.0316, EDGE, WHITE_SHELL)).placed(&hand),
+            cylinder_solid([0.0, 0.0, 0.0], [0.0, 0.0, 0.0105], 0.0265, 1e-3, BARE_METAL).placed(&hand),
+            box_solid(
+                &(hand * Pose::translation(0.0, 0.0, 0.060)),
+                [0.0125, 0.088, 0.0082],
+                4e-3,
+                1e-3,
+                BLACK_PLASTIC,
+            ),
         ],
     }
 }
 
-/// The hand's body is as deep as the flange where it is bolted on, and shallower where the fingers come out.
+/// Tapers the hand's body: it is as deep as the flange where it is mounted, and shallower at the fingers.
 fn tapered(mut body: RenderSolid) -> RenderSolid {
-    const FULL: f64 = 0.026;
+    /// Heights at which the taper starts and ends, m.
+    const START: f64 = 0.026;
     const END: f64 = 0.0655;
-    const LEFT: f64 = 0.76;
+    /// Remaining fraction of the depth.
+    const TAPER: f64 = 0.76;
     if let Tessellation::Mesh(mesh) = &mut body.tessellation {
         for v in &mut mesh.vertices {
-            v.x *= 1.0 - (1.0 - LEFT) * ((v.z - FULL) / (END - FULL)).clamp(0.0, 1.0);
+            v.x *= 1.0 - (1.0 - TAPER) * ((v.z - START) / (END - START)).clamp(0.0, 1.0);
         }
     }
-    body.shape = body.shape.scaled(Vec3::new(LEFT, 1.0, 1.0));
+    body.shape = body.shape.scaled(Vec3::new(TAPER, 1.0, 1.0));
     body
 }
 
-/// A finger: the bracket, the sensor's case with its bezel, and what shows of its plug. Case and bracket are those that
-/// collide ([`pads::finger_boxes`]) with rounded edges.
-pub(super) fn finger(side: Side) -> Part {
+/// A finger: the bracket, the sensor's case with its bezel, and the visible part of its plug. Case and bracket are the collision
+/// boxes ([`pads::finger_boxes`]) with rounded edges.
+pub(super) fn finger(side: Side) -> RobotPart {
     let [body, bracket] = pads::finger_boxes(side);
     let out = body.pose.translation.vector.y.signum();
     let pad = pads::pad_pose_in_finger(side);
-    // The bezel stands out of the case by less than the gel, so that it never lies in front of what touches.
+    // The bezel protrudes less than the gel, so that it is never in front of the contact.
     let bezel = pad * Pose::translation(0.0, 0.0, -pads::PadSurface::default().thickness);
     let plug = Pose::translation(0.0, out * 0.0285, 0.050);
     // In the pad's frame the case is long along x, wide along y and deep along z.
     let behind = pad * Pose::translation(0.0, 0.0, -body.pose.translation.vector.y.abs());
-    Part {
+    RobotPart {
         link: Some(finger_link(side)),
         name: match side {
             Side::Left => "left finger",
             Side::Right => "right finger",
         },
         solids: vec![
-            case(&behind, [body.half.z, body.half.x, body.half.y], 3e-3, 1.5e-3, CASE),
-            case(&bracket.pose, [bracket.half.x, bracket.half.y, bracket.half.z], 2e-3, 0.5e-3, DARK),
-            case(&bezel, [0.0143, 0.0121, 0.0011], 2.4e-3, 0.6e-3, DARK),
-            case(&plug, [0.0050, 0.0022, 0.0018], 1e-3, 0.5e-3, METAL),
+            box_solid(&behind, [body.half.z, body.half.x, body.half.y], 3e-3, 1.5e-3, SENSOR_CASE),
+            box_solid(
+                &bracket.pose,
+                [bracket.half.x, bracket.half.y, bracket.half.z],
+                2e-3,
+                0.5e-3,
+                BLACK_PLASTIC,
+            ),
+            box_solid(&bezel, [0.0143, 0.0121, 0.0011], 2.4e-3, 0.6e-3, BLACK_PLASTIC),
+            box_solid(&plug, [0.0050, 0.0022, 0.0018], 1e-3, 0.5e-3, BARE_METAL),
         ],
     }
 }
 
-/// The gel's dome and its side walls, in the finger's frame: [`pads::PadSurface`] point by point.
+/// The gel's dome and side walls in the finger's frame: samples of [`pads::PadSurface`], so that the drawn gel is the one in
+/// contact.
 pub(super) fn gel(side: Side) -> Mesh {
     const ALONG: usize = 14;
     const ACROSS: usize = 12;
@@ -106,7 +121,7 @@ pub(super) fn gel(side: Side) -> Mesh {
             ]);
         }
     }
-    // Round the edge, counter-clockwise seen from the front, down to the case.
+    // The side walls: around the edge, counter-clockwise seen from the front, and down to the case.
     let mut edge: Vec<u32> = (0..ALONG).map(|i| at(i, 0)).collect();
     edge.extend((0..ACROSS).map(|j| at(ALONG, j)));
     edge.extend((1..=ALONG).rev().map(|i| at(i, ACROSS)));
@@ -125,11 +140,11 @@ pub(super) fn gel(side: Side) -> Mesh {
     Mesh { vertices, triangles, uvs: Vec::new() }
 }
 
-/// A point of a rectangle pulled in towards a rectangle with corners of this radius.
+/// Maps a point of a rectangle into the same rectangle with rounded corners.
 fn rounded_corner([x, y]: [f64; 2], [half_x, half_y]: [f64; 2], corner: f64) -> [f64; 2] {
     let beyond = [x.abs() - half_x + corner, y.abs() - half_y + corner].map(|d| d.max(0.0));
     let length = beyond[0].hypot(beyond[1]);
-    // The square cell of the corner onto its quarter disc, along rays from the disc's middle.
+    // Maps the square of a corner onto its quarter disc, along rays from the centre of the disc.
     let kept = if length > 0.0 { beyond[0].max(beyond[1]) / length } else { 1.0 };
     [
         x.signum() * (x.abs() - beyond[0] + beyond[0] * kept),

@@ -1,5 +1,7 @@
-//! The Franka Emika Panda with its hand and two GelSight Minis, to be drawn: shapes of our own making from public
-//! dimensions, moved by the links of the joint tree that physics moves.
+//! Meshes of the Franka Emika Panda with its hand and two GelSight Minis.
+//!
+//! The robot is modelled from primitives with public dimensions instead of loading the vendor's meshes: no licensed file is
+//! copied, the model takes a few kilobytes of source, and its meshes are generated deterministically.
 
 mod arm;
 mod hand;
@@ -11,28 +13,33 @@ mod tests;
 
 use std::sync::Arc;
 
-use super::camera::{Attachment, CameraError, RenderMesh, RenderObject, RenderSolid};
-use crate::{geometry::Pose, robot::Side, scene::Visual};
+use super::camera::{CameraError, RenderMesh, RenderObject, RenderSolid};
+use crate::{
+    geometry::Pose,
+    physics::{ArticulationId, BodyId, LinkId},
+    robot::{Side, panda},
+    scene::Visual,
+};
 
-/// Numbers of the looks in [`visuals`].
-const SHELL: usize = 0;
-const DARK: usize = 1;
-const GREY: usize = 2;
-const METAL: usize = 3;
-const CASE: usize = 4;
-const GEL: usize = 5;
+// Indices into `visuals`.
+const WHITE_SHELL: usize = 0;
+const BLACK_PLASTIC: usize = 1;
+const GREY_PLASTIC: usize = 2;
+const BARE_METAL: usize = 3;
+const SENSOR_CASE: usize = 4;
+const SENSOR_GEL: usize = 5;
 
-/// What moves as one.
+/// Solids that move together.
 #[derive(Clone, Debug)]
-struct Part {
-    /// Index of its link in the tree; the base has none.
+struct RobotPart {
+    /// Index of the link in the articulation; `None` for the base.
     link: Option<usize>,
     name: &'static str,
-    /// Its solids, in the frame of the link.
+    /// In the frame of the link.
     solids: Vec<RenderSolid>,
 }
 
-/// Painted shells, black plastic, grey rings, bare metal, the sensors' anodised cases, and their gels' silvered skins.
+/// Materials of the robot, by the indices above.
 fn visuals() -> Vec<Visual> {
     vec![
         Visual::plain([0.68, 0.69, 0.705], 0.34, 0.0),
@@ -44,54 +51,66 @@ fn visuals() -> Vec<Visual> {
     ]
 }
 
-/// The robot's drawn form, made once and shared by all episodes.
+/// The meshes of the robot. They take a few tenths of a second to build and can be shared by all episodes.
 #[derive(Clone, Debug)]
 pub struct RobotMeshes {
-    parts: Vec<(Option<usize>, &'static str, Arc<RenderMesh>)>,
+    parts: Vec<PartMesh>,
+}
+
+#[derive(Clone, Debug)]
+struct PartMesh {
+    /// Index of the link in the articulation; `None` for the base.
+    link: Option<usize>,
+    name: &'static str,
+    mesh: Arc<RenderMesh>,
 }
 
 impl RobotMeshes {
-    /// Makes all meshes, in a few tenths of a second.
+    /// Builds all meshes.
     ///
     /// # Errors
-    /// If a part has no surface, which would be a fault of this room.
+    /// A part has no surface. This is a bug in this module.
     pub fn new() -> Result<Self, CameraError> {
         let visuals = visuals();
         let mut parts = vec![arm::base()];
         parts.extend(arm::links());
         parts.push(hand::hand());
         parts.extend(Side::BOTH.map(hand::finger));
-        let mut made = Vec::new();
-        for part in parts {
-            let model = RenderMesh::from_solids(part.name, &part.solids, &visuals)?;
-            made.push((part.link, part.name, Arc::new(model)));
+        let mut meshes = Vec::new();
+        for RobotPart { link, name, solids } in parts {
+            let mesh = RenderMesh::from_solids(name, &solids, &visuals)?;
+            meshes.push(PartMesh { link, name, mesh: Arc::new(mesh) });
         }
         for (side, name) in Side::BOTH.into_iter().zip(["left gel", "right gel"]) {
-            let mesh = hand::gel(side);
-            let model =
-                RenderMesh::from_mesh(name, &mesh, &vec![GEL as u16; mesh.triangles.len()], &visuals)?;
-            made.push((Some(crate::robot::panda::finger_link(side)), name, Arc::new(model)));
+            let gel = hand::gel(side);
+            let material_ids = vec![SENSOR_GEL as u16; gel.triangles.len()];
+            let mesh = RenderMesh::from_mesh(name, &gel, &material_ids, &visuals)?;
+            meshes.push(PartMesh { link: Some(panda::finger_link(side)), name, mesh: Arc::new(mesh) });
         }
-        Ok(Self { parts: made })
+        Ok(Self { parts: meshes })
     }
 
-    /// The robot of joint tree number `tree`, its base at `base_w` (world), as object number `segmentation_id` of segmentations.
-    pub fn objects(&self, tree: usize, base_w: Pose, segmentation_id: u16) -> Vec<RenderObject> {
-        let thing = |(link, name, model): &(Option<usize>, &'static str, Arc<RenderMesh>)| RenderObject {
-            name: format!("panda {name}"),
+    /// The objects to draw for the articulation `articulation`, whose base is at `base_w` (world). All have the same
+    /// `segmentation_id`.
+    pub fn objects(
+        &self,
+        articulation: ArticulationId,
+        base_w: Pose,
+        segmentation_id: u16,
+    ) -> Vec<RenderObject> {
+        let object = |part: &PartMesh| RenderObject {
+            name: format!("panda {}", part.name),
             segmentation_id,
-            mesh: model.clone(),
-            attachment: match *link {
-                None => Attachment::Fixed(base_w),
-                Some(link) => Attachment::Link { tree, link, offset: Pose::identity() },
-            },
+            mesh: part.mesh.clone(),
+            body: part.link.map_or(BodyId::World, |index| BodyId::Link(LinkId { articulation, index })),
+            pose_in_body: if part.link.is_some() { Pose::identity() } else { base_w },
             casts_shadow: true,
         };
-        self.parts.iter().map(thing).collect()
+        self.parts.iter().map(object).collect()
     }
 
-    /// How many triangles it has at the finest.
-    pub fn triangles(&self) -> usize {
-        self.parts.iter().map(|(_, _, model)| model.triangle_count()).sum()
+    /// Number of triangles of the finest level of detail of all parts.
+    pub fn triangle_count(&self) -> usize {
+        self.parts.iter().map(|part| part.mesh.triangle_count()).sum()
     }
 }

@@ -1,53 +1,68 @@
-//! Plates with rounded outlines and rounded edges, as few triangles: rings, caps, cases.
+//! Plates with rounded outlines and edges, in few triangles: discs, caps and cases.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use crate::geometry::{Pose, Vec3, mesh::Mesh};
 
-/// Rings along each rounded edge, and along a wide one, m.
-const RINGS: [usize; 2] = [2, 4];
-const WIDE: f64 = 5e-3;
+/// Segments across a rounded edge, and across one at least [`WIDE_EDGE`] wide.
+const EDGE_SEGMENTS: usize = 2;
+const WIDE_EDGE_SEGMENTS: usize = 4;
+/// Width of a wide edge, m.
+const WIDE_EDGE: f64 = 5e-3;
 
-/// A convex polygon (counter-clockwise; one point makes a circle) grown by `round` and raised to `half` on either side of
-/// z = 0, its edges rounded by `edge`, all m.
+/// A convex polygon offset outwards, extruded along z and rounded at its edges. Lengths are in m.
 #[derive(Clone, Debug)]
 pub(super) struct RoundedPlate {
-    pub corners: Vec<[f64; 2]>,
-    pub round: f64,
-    pub half: f64,
-    pub edge: f64,
-    /// Pieces of a whole turn.
-    pub turns: usize,
+    /// Counter-clockwise; a single point makes a disc.
+    pub(super) corners: Vec<[f64; 2]>,
+    /// Offset of the outline from the polygon, which rounds its corners.
+    pub(super) outset: f64,
+    pub(super) half_height: f64,
+    /// Radius of the rounded edges.
+    pub(super) edge: f64,
+    /// Segments of a full turn.
+    pub(super) segments: usize,
+}
+
+/// A horizontal section of a plate.
+#[derive(Clone, Copy)]
+struct Ring {
+    outset: f64,
+    z: f64,
 }
 
 impl RoundedPlate {
-    /// Triangles, placed by `pose`.
+    /// Triangulates the plate at `pose`.
     pub(super) fn mesh(&self, pose: &Pose) -> Mesh {
-        let count = RINGS[usize::from(self.edge >= WIDE)];
-        let edge = |k: usize| {
-            let angle = FRAC_PI_2 * k as f64 / count as f64;
-            (self.round - self.edge * (1.0 - angle.sin()), self.half - self.edge * (1.0 - angle.cos()))
+        let edge_segments = if self.edge >= WIDE_EDGE { WIDE_EDGE_SEGMENTS } else { EDGE_SEGMENTS };
+        let upper_ring = |k: usize| {
+            let angle = FRAC_PI_2 * k as f64 / edge_segments as f64;
+            Ring {
+                outset: self.outset - self.edge * (1.0 - angle.sin()),
+                z: self.half_height - self.edge * (1.0 - angle.cos()),
+            }
         };
-        // From the lower cap up: (growth, z) of each ring.
-        let lower = (0..=count).map(|k| (edge(k).0, -edge(k).1));
-        let rings: Vec<(f64, f64)> = lower.chain((0..=count).rev().map(edge)).collect();
+        // From the bottom up.
+        let lower = (0..=edge_segments).map(upper_ring).map(|ring| Ring { z: -ring.z, ..ring });
+        let rings: Vec<Ring> = lower.chain((0..=edge_segments).rev().map(upper_ring)).collect();
         let mut points: Vec<Vec3> = Vec::new();
-        for (growth, z) in &rings {
-            points.extend(self.outline(*growth).into_iter().map(|[x, y]| Vec3::new(x, y, *z)));
+        for ring in &rings {
+            points.extend(self.outline(ring.outset).into_iter().map(|[x, y]| Vec3::new(x, y, ring.z)));
         }
         let count = points.len() / rings.len();
-        let at = |ring: usize, j: usize| (ring * count + j % count) as u32;
+        let vertex = |ring: usize, j: usize| (ring * count + j % count) as u32;
         let mut triangles = Vec::new();
         for ring in 0..rings.len() - 1 {
             for j in 0..count {
-                let [a, b, c, d] = [at(ring, j), at(ring, j + 1), at(ring + 1, j + 1), at(ring + 1, j)];
+                let [a, b] = [vertex(ring, j), vertex(ring, j + 1)];
+                let [c, d] = [vertex(ring + 1, j + 1), vertex(ring + 1, j)];
                 triangles.extend([[a, b, c], [a, c, d]]);
             }
         }
         let top = rings.len() - 1;
         for j in 1..count - 1 {
-            triangles.push([at(0, 0), at(0, j + 1), at(0, j)]);
-            triangles.push([at(top, 0), at(top, j), at(top, j + 1)]);
+            triangles.push([vertex(0, 0), vertex(0, j + 1), vertex(0, j)]);
+            triangles.push([vertex(top, 0), vertex(top, j), vertex(top, j + 1)]);
         }
         let area = |t: &[u32; 3]| {
             let [a, b, c] = t.map(|v| points[v as usize]);
@@ -58,27 +73,27 @@ impl RoundedPlate {
         Mesh { vertices, triangles, uvs: Vec::new() }
     }
 
-    /// The polygon grown by `growth`: an arc at each corner, from the normal of one side to that of the next.
-    fn outline(&self, growth: f64) -> Vec<[f64; 2]> {
+    /// The polygon offset by `outset`: an arc at each corner, from the normal of one side to that of the next.
+    fn outline(&self, outset: f64) -> Vec<[f64; 2]> {
         let n = self.corners.len();
-        let mut out = Vec::new();
+        let mut outline = Vec::new();
         for i in 0..n {
-            let [before, here, after] =
+            let [previous, corner, next] =
                 [self.corners[(i + n - 1) % n], self.corners[i], self.corners[(i + 1) % n]];
-            let normal = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).atan2(b[1] - a[1]);
-            let (from, turn) = if n == 1 {
-                (0.0, TAU * (1.0 - 1.0 / self.turns as f64))
+            let normal_angle = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).atan2(b[1] - a[1]);
+            let (start, turn) = if n == 1 {
+                (0.0, TAU * (1.0 - 1.0 / self.segments as f64))
             } else {
-                let (from, to) = (normal(before, here), normal(here, after));
+                let (from, to) = (normal_angle(previous, corner), normal_angle(corner, next));
                 (from, (to - from).rem_euclid(TAU))
             };
-            let steps = ((turn / TAU * self.turns as f64).ceil() as usize).max(1);
-            out.extend((0..=steps).map(|k| {
-                let (sin, cos) = (from + turn * k as f64 / steps as f64).sin_cos();
-                [here[0] + growth * cos, here[1] + growth * sin]
+            let steps = ((turn / TAU * self.segments as f64).ceil() as usize).max(1);
+            outline.extend((0..=steps).map(|k| {
+                let (sin, cos) = (start + turn * k as f64 / steps as f64).sin_cos();
+                [corner[0] + outset * cos, corner[1] + outset * sin]
             }));
         }
-        out
+        outline
     }
 }
 
@@ -86,26 +101,22 @@ impl RoundedPlate {
 mod tests {
     use super::*;
 
-    /// Volume by the divergence theorem; positive where the triangles face outwards.
-    fn volume(mesh: &Mesh) -> f64 {
-        mesh.triangles
-            .iter()
-            .map(|t| {
-                let [a, b, c] = t.map(|v| mesh.vertices[v as usize]);
-                a.dot(&b.cross(&c)) / 6.0
-            })
-            .sum()
-    }
-
     #[test]
-    fn a_round_pillow_is_a_cylinder_and_a_square_one_a_box_each_less_its_edges() {
+    fn plates_enclose_the_volumes_of_a_cylinder_and_a_box() {
         let placed = Pose::translation(0.1, -0.2, 0.3);
-        let round = RoundedPlate { corners: vec![[0.0; 2]], round: 0.05, half: 0.02, edge: 1e-6, turns: 256 }
-            .mesh(&placed);
+        let disc = RoundedPlate {
+            corners: vec![[0.0; 2]],
+            outset: 0.05,
+            half_height: 0.02,
+            edge: 1e-6,
+            segments: 256,
+        };
+        let volume = disc.mesh(&placed).volume();
         let expected = std::f64::consts::PI * 0.05 * 0.05 * 0.04;
-        assert!((volume(&round) / expected - 1.0).abs() < 1e-3, "{}", volume(&round));
+        assert!((volume / expected - 1.0).abs() < 1e-3, "{volume}");
         let corners = vec![[-0.03, -0.02], [0.03, -0.02], [0.03, 0.02], [-0.03, 0.02]];
-        let square = RoundedPlate { corners, round: 1e-6, half: 0.01, edge: 1e-6, turns: 8 }.mesh(&placed);
-        assert!((volume(&square) / (0.06 * 0.04 * 0.02) - 1.0).abs() < 1e-3, "{}", volume(&square));
+        let plate = RoundedPlate { corners, outset: 1e-6, half_height: 0.01, edge: 1e-6, segments: 8 };
+        let volume = plate.mesh(&placed).volume();
+        assert!((volume / (0.06 * 0.04 * 0.02) - 1.0).abs() < 1e-3, "{volume}");
     }
 }

@@ -1,4 +1,4 @@
-//! The drawn robot against the one that moves and touches.
+//! Compares the meshes of the robot with its kinematics and contact geometry.
 
 use std::sync::OnceLock;
 
@@ -11,43 +11,43 @@ use crate::{
     sensing::camera::{FrameView, RenderScene, Renderer},
 };
 
-fn model() -> &'static RobotMeshes {
-    static MODEL: OnceLock<RobotMeshes> = OnceLock::new();
-    MODEL.get_or_init(|| RobotMeshes::new().expect("every part has a surface"))
+fn meshes() -> &'static RobotMeshes {
+    static MESHES: OnceLock<RobotMeshes> = OnceLock::new();
+    MESHES.get_or_init(|| RobotMeshes::new().expect("every part has a surface"))
 }
 
-/// A pose in which no joint stands at zero: joints 1 to 7, then the fingers half open.
+/// Joint positions, none of them zero: joints 1 to 7, then the fingers half open.
 const POSE: [f64; panda::DOFS] = [0.3, -0.5, 0.2, -2.0, 0.4, 1.9, 0.7, 0.02, 0.02];
 
 #[test]
-fn it_is_modest_in_triangles() {
-    let triangles = model().triangles();
+fn the_robot_has_a_moderate_number_of_triangles() {
+    let triangles = meshes().triangle_count();
     assert!((5_000..=30_000).contains(&triangles), "{triangles}");
 }
 
 #[test]
-fn every_link_is_drawn_and_none_twice() {
-    let objects = model().objects(3, Pose::identity(), 9);
-    assert!(objects.iter().all(|thing| thing.segmentation_id == 9 && thing.casts_shadow));
+fn every_link_is_drawn_once() {
+    let objects = meshes().objects(ArticulationId::new(3), Pose::identity(), 9);
+    assert!(objects.iter().all(|object| object.segmentation_id == 9 && object.casts_shadow));
     let drawn = |link: usize| {
-        let own = |t: &&RenderObject| matches!(t.attachment, Attachment::Link { tree: 3, link: l, .. } if l == link);
-        objects.iter().filter(own).count()
+        let body = BodyId::Link(LinkId { articulation: ArticulationId::new(3), index: link });
+        objects.iter().filter(|object| object.body == body).count()
     };
     let mut expected = vec![1; panda::DOFS];
-    // The hand moves with the last link; a gel is drawn beside each finger.
+    // The hand moves with the last link, and each finger has a gel.
     expected[panda::HAND_LINK] = 2;
     Side::BOTH.iter().for_each(|&side| expected[panda::finger_link(side)] = 2);
     assert_eq!((0..panda::DOFS).map(drawn).collect::<Vec<_>>(), expected);
-    assert_eq!(objects.iter().filter(|t| matches!(t.attachment, Attachment::Fixed(_))).count(), 1);
+    assert_eq!(objects.iter().filter(|object| object.body == BodyId::World).count(), 1);
 }
 
-/// The shapes of the parts, posed: link (0 for the base, then one more each), solids.
+/// The solids of each part at joint positions `q`, with their link: 0 for the base, then counted from 1.
 fn posed(q: &[f64; panda::DOFS]) -> Vec<(usize, Vec<RenderSolid>)> {
     let poses = forward(&panda::tree(Pose::identity(), &GripperSpec::default()), q);
     let mut parts = vec![arm::base()];
     parts.extend(arm::links());
     parts.push(hand::hand());
-    let place = |part: Part| {
+    let place = |part: RobotPart| {
         let (index, pose) = part.link.map_or((0, Pose::identity()), |link| (link + 1, poses[link]));
         (index, part.solids.into_iter().map(|solid| solid.placed(&pose)).collect())
     };
@@ -55,12 +55,12 @@ fn posed(q: &[f64; panda::DOFS]) -> Vec<(usize, Vec<RenderSolid>)> {
 }
 
 #[test]
-fn the_links_hang_together_in_any_pose() {
+fn links_are_connected_in_any_pose() {
     for q in [POSE, [0.0; panda::DOFS], POSE.map(|q| -0.5 * q)] {
         let parts = posed(&q);
         let poses = forward(&panda::tree(Pose::identity(), &GripperSpec::default()), &q);
         for (link, pose) in poses.iter().enumerate().take(panda::ARM_DOFS) {
-            // Along its axis a joint has a point that belongs to both of its links.
+            // Some point on the axis of a joint belongs to both of its links.
             let shared = (-100..=100).any(|step| {
                 let p = pose.transform_point(&Vec3::new(0.0, 0.0, f64::from(step) * 4e-3).into()).coords;
                 let inside = |index: usize| {
@@ -75,7 +75,7 @@ fn the_links_hang_together_in_any_pose() {
 }
 
 #[test]
-fn the_gels_that_are_seen_are_those_that_touch() {
+fn drawn_gels_match_the_contact_surfaces() {
     let pad = pads::PadSurface::default();
     for side in Side::BOTH {
         let to_pad = pads::pad_pose_in_finger(side).inverse();
@@ -87,7 +87,7 @@ fn the_gels_that_are_seen_are_those_that_touch() {
         assert!(points.iter().all(|p| pad.edge_distance(p.x, p.y) < 1e-9 && p.z <= 1e-12));
         let reach = |axis: usize| points.iter().map(|p| p[axis]).fold(0.0, f64::max);
         assert!((reach(0) - 0.5 * pad.length).abs() < 1e-9 && (reach(1) - 0.5 * pad.width).abs() < 1e-9);
-        // The dome faces out of the pad.
+        // The dome faces away from the pad.
         for t in &mesh.triangles[..2 * 14 * 12] {
             let [a, b, c] = t.map(|v| points[v as usize]);
             assert!((b - a).cross(&(c - a)).z > 0.0);
@@ -96,22 +96,21 @@ fn the_gels_that_are_seen_are_those_that_touch() {
         let in_front = part.solids.iter().filter(|solid| {
             solid.shape.distance(&pads::pad_pose_in_finger(side).translation.vector) < pad.thickness * 0.5
         });
-        assert_eq!(in_front.count(), 0, "nothing stands before the apex");
+        assert_eq!(in_front.count(), 0, "nothing is in front of the apex");
     }
 }
 
 #[test]
-fn a_camera_sees_a_pale_arm_and_dark_sensors() {
-    let objects = model().objects(0, Pose::translation(-0.66, 0.0, 0.0), 200);
+fn the_arm_is_light_and_the_sensors_are_dark() {
+    let objects = meshes().objects(ArticulationId::new(0), Pose::translation(-0.66, 0.0, 0.0), 200);
     let stage = RenderScene::new(objects, Lighting::default()).expect("good light");
     let tree = panda::tree(Pose::translation(-0.66, 0.0, 0.0), &GripperSpec::default());
     let links = [forward(&tree, &[0.0, -0.19, 0.0, -2.4, 0.0, 2.245, 0.79, 0.04, 0.04])];
     let view = FrameView { nodes: &[], rigid: &[], links: &links, hand_w: None };
-    let picture =
-        Renderer::default().render(&stage, &view, &Camera::third_person_table()).expect("a picture");
+    let image = Renderer::default().render(&stage, &view, &Camera::third_person_table()).expect("a image");
     let mut tones: Vec<u32> = (0..224 * 224)
-        .filter(|&i| picture.segmentation[i] == 200)
-        .map(|i| picture.rgb[3 * i..3 * i + 3].iter().map(|&c| u32::from(c)).sum::<u32>() / 3)
+        .filter(|&i| image.segmentation[i] == 200)
+        .map(|i| image.rgb[3 * i..3 * i + 3].iter().map(|&c| u32::from(c)).sum::<u32>() / 3)
         .collect();
     tones.sort_unstable();
     assert!(tones.len() > 2000, "{} pixels", tones.len());

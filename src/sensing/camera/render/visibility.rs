@@ -1,13 +1,14 @@
 //! Prepares the objects of a scene for one image: poses, levels of detail, shadows and occluders.
 
 use super::interpolate::MeshInstance;
+use crate::physics::BodyId;
 use crate::sensing::camera::{
     CameraError,
     lens::Lens,
     math::V3,
     scene::{
         pose::PosedMesh,
-        render_scene::{Attachment, FrameView, RenderScene},
+        render_scene::{FrameView, RenderScene},
     },
     shade::{occlusion::OcclusionEllipsoid, shadow::ShadowMap},
 };
@@ -154,7 +155,7 @@ impl Occluders {
     pub(crate) fn new(scene: &RenderScene, bounds: &[Bounds]) -> Self {
         let mut occluders = Self { fixed: Vec::new(), moving: Vec::new() };
         for (i, (object, bounds)) in scene.objects.iter().zip(bounds).enumerate() {
-            let is_link = matches!(object.attachment, Attachment::Link { .. });
+            let is_link = matches!(object.body, BodyId::Link(_));
             let is_small = (bounds[1] - bounds[0]).max() < MAX_OCCLUDER_EXTENT;
             if object.casts_shadow && !is_link && is_small {
                 let list = if object.is_moving() { &mut occluders.moving } else { &mut occluders.fixed };

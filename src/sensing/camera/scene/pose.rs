@@ -1,8 +1,9 @@
 //! Places meshes in the world as a state dictates.
 
-use super::render_scene::{Attachment, FrameView, RenderObject};
+use super::render_scene::{FrameView, RenderObject};
 use crate::{
     geometry::Pose,
+    physics::BodyId,
     sensing::camera::{
         CameraError,
         math::{RigidTransform, V3, is_finite},
@@ -45,11 +46,12 @@ impl PosedMesh {
         lod: &Lod,
         view: &FrameView,
     ) -> Result<(), CameraError> {
-        let Attachment::Soft(body) = object.attachment else {
+        let BodyId::Soft(body) = object.body else {
             return self.update_rigid(lod, &rigid_pose(object, view)?, &object.name);
         };
         let missing = |reason: String| state_error(object, reason);
-        let nodes = view.nodes.get(body).ok_or_else(|| missing(format!("no soft body {body}")))?;
+        let nodes =
+            view.nodes.get(body.index()).ok_or_else(|| missing(format!("no soft body {}", body.index())))?;
         if lod.embedding.len() != lod.positions.len() {
             return Err(missing("nodes for it, but its mesh is not embedded in a soft body".to_owned()));
         }
@@ -80,15 +82,20 @@ fn state_error(object: &RenderObject, reason: String) -> CameraError {
 /// Pose of a rigid object in the world.
 fn rigid_pose(object: &RenderObject, view: &FrameView) -> Result<Pose, CameraError> {
     let missing = |reason: String| state_error(object, reason);
-    match object.attachment {
-        Attachment::Fixed(pose) => Ok(pose),
-        Attachment::Rigid(body) => {
-            view.rigid.get(body).copied().ok_or_else(|| missing(format!("no rigid body {body}")))
+    let body_w = match object.body {
+        BodyId::World => return Ok(object.pose_in_body),
+        BodyId::Rigid(id) => {
+            let pose = view.rigid.get(id.index()).copied();
+            pose.ok_or_else(|| missing(format!("no rigid body {}", id.index())))?
         }
-        Attachment::Link { tree, link, offset } => {
-            let frame = view.links.get(tree).and_then(|links| links.get(link));
-            Ok(frame.ok_or_else(|| missing(format!("no link {link} of tree {tree}")))? * offset)
+        BodyId::Link(id) => {
+            let articulation = id.articulation.index();
+            let pose = view.links.get(articulation).and_then(|links| links.get(id.index)).copied();
+            pose.ok_or_else(|| missing(format!("no link {} of articulation {articulation}", id.index)))?
         }
-        Attachment::Soft(body) => Err(missing(format!("soft body {body}, which has no frame"))),
-    }
+        BodyId::Soft(_) | BodyId::Kinematic(_) => {
+            return Err(missing("no pose for this kind of body".to_owned()));
+        }
+    };
+    Ok(body_w * object.pose_in_body)
 }

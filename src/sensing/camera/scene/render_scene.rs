@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::pose::PosedMesh;
 use crate::{
     geometry::{Pose, Vec3},
-    physics::world::Frame,
+    physics::{BodyId, world::Frame},
     scene::Lighting,
     sensing::camera::{
         CameraError, RenderMesh,
@@ -18,26 +18,6 @@ const MAX_OBJECTS: usize = 1000;
 /// Maximum radius of the wide shadow map, in radii of the fine one: beyond, it would be too coarse.
 const MAX_WIDE_RADIUS: f32 = 8.0;
 
-/// What a drawn object moves with.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Attachment {
-    /// Fixed at this pose in the world.
-    Fixed(Pose),
-    /// A rigid body, by its index in the state.
-    Rigid(usize),
-    /// A link of an articulation.
-    Link {
-        /// Index of the articulation.
-        tree: usize,
-        /// Index of the link in it.
-        link: usize,
-        /// Pose of the object in the frame of the link.
-        offset: Pose,
-    },
-    /// The nodes of a soft body, by its index; the mesh must be [embedded](RenderMesh::embedded_in) in it.
-    Soft(usize),
-}
-
 /// An object to be drawn.
 #[derive(Clone, Debug)]
 pub struct RenderObject {
@@ -47,8 +27,11 @@ pub struct RenderObject {
     pub segmentation_id: u16,
     /// Triangles and materials, shared by all instances.
     pub mesh: Arc<RenderMesh>,
-    /// What the object moves with.
-    pub attachment: Attachment,
+    /// The body that the object moves with. If it is a soft body, the mesh must be [embedded](RenderMesh::embedded_in) in it.
+    /// Kinematic bodies are not supported.
+    pub body: BodyId,
+    /// Pose of the object in the frame of the body, or in the world; ignored for soft bodies.
+    pub pose_in_body: Pose,
     /// True if the object casts shadows.
     pub casts_shadow: bool,
 }
@@ -56,7 +39,7 @@ pub struct RenderObject {
 impl RenderObject {
     /// True unless the object is fixed in the world.
     pub(crate) fn is_moving(&self) -> bool {
-        !matches!(self.attachment, Attachment::Fixed(_))
+        self.body != BodyId::World
     }
 }
 
@@ -127,14 +110,9 @@ impl RenderScene {
         }
         let mut fixed_meshes = Vec::new();
         for object in &objects {
-            let lods = match &object.attachment {
-                Attachment::Fixed(pose) => {
-                    let posed = |lod| PosedMesh::rigid(lod, pose, &object.name);
-                    object.mesh.lods.iter().map(posed).collect::<Result<Vec<_>, _>>()?
-                }
-                _ => Vec::new(),
-            };
-            fixed_meshes.push(lods);
+            let posed = |lod| PosedMesh::rigid(lod, &object.pose_in_body, &object.name);
+            let lods = if object.is_moving() { &[] } else { object.mesh.lods.as_slice() };
+            fixed_meshes.push(lods.iter().map(posed).collect::<Result<Vec<_>, _>>()?);
         }
         let draw_shadows = |map| draw_fixed_shadows(&objects, &fixed_meshes, map);
         let fixed_shadow = draw_shadows(ShadowMap::new(&lighting));
