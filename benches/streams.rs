@@ -1,7 +1,8 @@
-//! The closed loop with every stream at every control step: both cameras, both fingers' pictures and markers.
+//! Closed loop with every sensor stream at every control step: both cameras, images and markers of both fingers.
 //!
-//! `cargo bench --bench streams` runs the expert on the first task of a suite and prints CPU seconds a simulated second,
-//! blind and looking, and how many times real time that is. One thread; settling and the making of models are apart.
+//! `cargo bench --bench streams` runs the expert on the first task of a suite, on one thread. It prints CPU seconds per
+//! simulated second without and with the streams, and the ratio to real time. Settling and the creation of the render meshes
+//! are not included.
 
 mod episode;
 
@@ -12,17 +13,17 @@ use softvt::{
     script::{ExpertController, Loaded},
 };
 
-/// Times real time with all streams.
+/// Goal for all streams, times real time.
 const GOAL: f64 = 4.0;
 
-/// An expert that also looks; time runs from its first action on.
-struct Looking {
+/// An expert with sensor streams that it ignores; time runs from its first action on.
+struct ExpertWithStreams {
     expert: ExpertController,
     streams: SensorStreams,
     since: Option<ThreadTime>,
 }
 
-impl Controller for Looking {
+impl Controller for ExpertWithStreams {
     fn streams(&self) -> SensorStreams {
         self.streams.clone()
     }
@@ -33,32 +34,44 @@ impl Controller for Looking {
     }
 }
 
-/// Simulated seconds and CPU seconds of an episode.
-fn episode(loaded: &Loaded, streams: &SensorStreams, shared: &(AssetCache, SensorAssets)) -> (f64, f64) {
+/// Caches shared by all episodes.
+#[derive(Default)]
+struct Caches {
+    assets: AssetCache,
+    sensors: SensorAssets,
+}
+
+/// Duration of an episode, s.
+struct Timing {
+    simulated: f64,
+    cpu: f64,
+}
+
+fn time_episode(loaded: &Loaded, streams: &SensorStreams, caches: &Caches) -> Timing {
     let (spec, expert) = episode::open(loaded, 0, false);
-    let mut driver = Looking { expert, streams: streams.clone(), since: None };
-    let started = Episode::start(spec, &shared.0, &shared.1).expect("it starts");
-    let record = started.run(&mut driver).expect("it runs").record;
-    let since = driver.since.expect("it acted");
-    (record.stats.time_s, since.elapsed().as_secs_f64())
+    let mut controller = ExpertWithStreams { expert, streams: streams.clone(), since: None };
+    let started = Episode::start(spec, &caches.assets, &caches.sensors).expect("it starts");
+    let record = started.run(&mut controller).expect("it runs").record;
+    let since = controller.since.expect("it acted");
+    Timing { simulated: record.stats.time_s, cpu: since.elapsed().as_secs_f64() }
 }
 
 fn main() {
     let loaded = episode::load();
-    let shared = (AssetCache::default(), SensorAssets::default());
+    let caches = Caches::default();
     let cameras: Vec<String> = ["third_person", "wrist"].map(str::to_owned).into();
     let cases = [
-        ("blind", SensorStreams::default()),
+        ("no streams", SensorStreams::default()),
         ("cameras", SensorStreams { cameras: cameras.clone(), ..SensorStreams::default() }),
         ("touch", SensorStreams { touch: true, ..SensorStreams::default() }),
         ("all streams", SensorStreams { cameras, touch: true, force: true }),
     ];
     println!("{:<12} {:>10} {:>12} {:>12}", "case", "simulated", "CPU s / s", "× real time");
     for (name, streams) in cases {
-        // The first one makes the models.
-        episode(&loaded, &streams, &shared);
-        let (simulated, spent) = episode(&loaded, &streams, &shared);
-        println!("{name:<12} {simulated:>8.2} s {:>12.4} {:>12.1}", spent / simulated, simulated / spent);
+        // The first episode creates the meshes.
+        time_episode(&loaded, &streams, &caches);
+        let Timing { simulated, cpu } = time_episode(&loaded, &streams, &caches);
+        println!("{name:<12} {simulated:>8.2} s {:>12.4} {:>12.1}", cpu / simulated, simulated / cpu);
     }
     println!("goal: all streams at {GOAL} × real time");
 }

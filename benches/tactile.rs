@@ -7,8 +7,8 @@ use softvt::{
     geometry::Vec3,
     robot::PadSurface,
     sensing::tactile::{
-        Gel, GelField, GelScratch, MarkerModel, Markers, PadContact, PadWrench, PolynomialOptics, SkinMesh,
-        TactileSpec,
+        Gel, GelField, GelScratch, MarkerModel, Markers, PadWrench, PolynomialOptics, SkinMesh,
+        TactileContact, TactileSpec,
     },
 };
 
@@ -64,7 +64,7 @@ fn main() {
 fn report(case: &Case, gel: &Gel, optics: &PolynomialOptics) {
     let Skin { vertices, triangles } = graph(case.height);
     let skins = [SkinMesh { vertices: &vertices, triangles: &triangles }];
-    let contact = PadContact { wrench: case.wrench, skins: &skins, friction: 1.5, substrate: None };
+    let contact = TactileContact { wrench: case.wrench, skins: &skins, friction: 1.5, substrate: None };
     let mut scratch = GelScratch::default();
     let field = GelField::solve(gel, &contact, &mut scratch).expect("a good contact").expect("a force");
     let mut rgb = vec![0; 320 * 240 * 3];

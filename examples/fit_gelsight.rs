@@ -242,8 +242,8 @@ fn fit(samples: &[&Sample]) -> Option<[DVector<f64>; 3]> {
     Some([channel(0)?, channel(1)?, channel(2)?])
 }
 
-/// Mean absolute error of each fold of images under the fit to the other folds, of 255. `fold` maps the index of an image to
-/// its fold.
+/// Mean absolute error of each fold of images under the fit to the other folds, of 255. `fold` returns the fold of the image at
+/// an index.
 fn held_out_error(presses: &[Vec<Sample>], fold: impl Fn(usize) -> usize) -> f64 {
     let error = |out: usize| {
         let of = |left_out: bool| {

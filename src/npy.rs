@@ -209,8 +209,8 @@ pub fn read_npz(path: &Path, key: &str) -> Result<NpyArray, NpzError> {
     NpyArray::parse(&bytes).map_err(|e| content(format!("array \"{key}\": {e}")))
 }
 
-/// Reads the array `key` of the archive at `path`, which must be of one of the types `kinds` (without byte order) and have
-/// finite elements.
+/// Reads the array `key` of the archive at `path`. Its type must be one of `kinds` (without byte order), and its elements must be
+/// finite numbers.
 ///
 /// # Errors
 /// As [`read_npz`], or names the type, or the first element that is not finite.

@@ -91,7 +91,15 @@ impl Settings {
 }
 
 /// Former paths of settings and what they are called now. The same keys are serde aliases, for settings in tables and files.
-const RENAMED: [(&str, &str); 1] = [("rules", "criteria")];
+const RENAMED: [(&str, &str); 7] = [
+    ("rules", "criteria"),
+    ("physics.alpha", "physics.rayleigh_mass"),
+    ("physics.beta", "physics.rayleigh_stiffness"),
+    ("physics.tau", "physics.dissipation_time"),
+    ("physics.sleep_after", "physics.sleep_delay"),
+    ("physics.inverted_after", "physics.max_inverted_time"),
+    ("physics.most_speed", "physics.max_speed"),
+];
 
 /// A path with its former keys replaced by the present ones.
 fn current_path(path: &str) -> String {
@@ -155,6 +163,8 @@ mod tests {
         let settings = Settings::default();
         let changed = settings.with("criteria.slip_m", "0.001").expect("a setting");
         assert_eq!(settings.with("rules.slip_m", "0.001"), Ok(changed.clone()));
+        let damped = settings.with("physics.rayleigh_mass", "2.5");
+        assert_eq!(settings.with("physics.alpha", "2.5"), damped);
         let former: Settings = serde_json::from_str(r#"{"rules":{"slip_m":0.001}}"#).expect("a setting");
         assert_eq!(former, changed);
     }

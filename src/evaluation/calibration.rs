@@ -15,7 +15,7 @@ use super::safety::{DeformationLimit, round_to_six_decimals};
 pub struct HoldRow {
     /// Commanded closure, 0 (open) to 1 (closed).
     pub closure: f64,
-    /// Number of trials.
+    /// Number of trials at this closure.
     pub trials: u32,
     /// Number of trials that held without slip or drop.
     pub held: u32,

@@ -1,18 +1,18 @@
-//! An asset's safe interaction envelope as a plain-text plot: D over closure, with the lower bound and τ.
+//! Plain-text plot of the safe interaction envelope of an asset: D over closure, with the lower bound and τ.
 
 use super::{
     calibration::{Envelope, HoldRow},
     safety::DeformationLimit,
 };
 
-/// Columns of the plot itself.
+/// Columns of the plot without labels.
 const WIDTH: usize = 72;
-/// Rows of the plot itself.
+/// Rows of the plot without axis.
 const HEIGHT: usize = 12;
-/// Columns of the labels at its left.
+/// Columns of the labels to the left of the plot.
 const MARGIN: usize = 9;
 
-/// The closure axis.
+/// Horizontal axis: closures from `low` to `high`.
 struct Axis {
     low: f64,
     high: f64,
@@ -36,8 +36,10 @@ impl Axis {
     }
 }
 
-/// The plot of `asset`: stable squeezes `●`, unstable `○`, τ as a dashed line; below it the holds of the lower-bound scan
-/// (`+` all trials held, `~` some, `-` none) and the zones.
+/// Plots the envelope of `asset` in lines of less than 100 columns.
+///
+/// Stable squeezes are `●`, unstable ones `○`, and τ is a dashed line. Below are the holds of the lower-bound scan (`+` all
+/// trials held, `~` some, `-` none) and the zones: too loose `░`, safe `█`, too tight `▓`.
 pub fn plot(asset: &str, envelope: &Envelope, limit: Option<DeformationLimit>) -> String {
     let Some(axis) = Axis::of(envelope) else {
         return format!("{asset}: no rows, nothing to plot\n");
@@ -65,7 +67,7 @@ fn heading(asset: &str, limit: Option<DeformationLimit>) -> String {
 
 fn curve(envelope: &Envelope, limit: Option<DeformationLimit>, axis: &Axis) -> Vec<String> {
     let peak = envelope.sweep.iter().map(|row| row.d_peak_pct).fold(0.0_f64, f64::max);
-    // The unstable tail may be many times D_ref; what matters lies below twice D_ref.
+    // The unstable tail may be many times D_ref; cut the plot at twice D_ref, below which everything of interest lies.
     let top = limit.map_or(peak, |limit| peak.min(2.0 * limit.d_ref_pct)).max(1e-9);
     let line_of = |d: f64| {
         let share = (d / top).clamp(0.0, 1.0);
@@ -183,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn an_asset_without_a_safe_window_says_so() {
+    fn the_plot_reports_a_missing_safe_window() {
         let text = plotted(0.9);
         assert!(text.contains("no closure held in every trial") && !text.contains('█'), "{text}");
         let mut late = envelope(0.33);
@@ -194,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_or_single_row_envelope_is_plotted_without_fuss() {
+    fn an_empty_or_single_row_envelope_is_plotted() {
         assert!(plot("bun", &Envelope::new(vec![], vec![], 0.5), None).contains("no rows"));
         let one = Envelope::new(vec![], vec![squeeze(0.4, 1.0, true)], 0.5);
         assert!(plot("bun", &one, None).contains('●'));

@@ -101,8 +101,8 @@ impl GoalMonitor {
         }
     }
 
-    /// Takes in one control step. Returns true if the target, having rested at the goal before, is now outside of the
-    /// enlarged region.
+    /// Takes in one control step. Returns true if the target has rested at the goal before and is now outside of the
+    /// region enlarged by the margin.
     pub fn update(&mut self, sample: &GoalSample) -> bool {
         let rests = sample.is_inside && sample.is_supported && !sample.is_touched;
         self.steps = if rests { self.steps + 1 } else { 0 };

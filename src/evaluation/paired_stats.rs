@@ -35,14 +35,14 @@ pub struct TaskKey<'a> {
     pub task: usize,
 }
 
-/// What makes episodes of two runs the same; ordered by suite, task and episode first.
+/// Identity of an episode across runs; ordered by suite, task and episode first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct EpisodeKey<'a> {
-    /// Suite and task.
+    /// Suite and task of the episode.
     pub task: TaskKey<'a>,
     /// Index of the episode in the task.
     pub episode: u32,
-    /// Base seed.
+    /// Base seed of the initial states.
     pub seed: u64,
     /// Split of the initial states.
     pub split: &'a str,
@@ -219,7 +219,7 @@ pub struct MeanDifference {
     pub worse: usize,
     /// Number of episodes in which both have the same.
     pub same: usize,
-    /// Second minus first.
+    /// Mean of the second run minus mean of the first.
     pub difference: Option<f64>,
     /// 95 % interval of the difference: percentile bootstrap over episodes (Efron, 1979), from a fixed seed.
     pub interval95: Option<[f64; 2]>,

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::{drop::DropEvent, safety::KappaVerdict};
 use crate::scene::InitialState;
 
-/// How a rollout ended.
+/// End of a rollout.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum Outcome {
@@ -52,7 +52,7 @@ pub struct Identity {
     pub layout: String,
     /// Index of the episode in the task.
     pub episode: u32,
-    /// Base seed.
+    /// Base seed of the initial states.
     pub seed: u64,
     /// Split of the initial states: "eval", "demo" …
     pub split: String,
@@ -90,13 +90,13 @@ pub struct Origin {
 /// [`super::judge`] defines each field.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
-    /// Goal Success.
+    /// Goal Success: the target rested at its goal, released, for long enough.
     pub goal: bool,
     /// Time at which the goal had held for long enough, s; null without success.
     pub goal_time_s: Option<f64>,
     /// Goal Success by the looser predicate of SoftVTBench's released code.
     pub goal_v1: bool,
-    /// NoDrop.
+    /// NoDrop: none of the events of [`super::drop`] happened.
     pub no_drop: bool,
     /// The first event that made NoDrop false.
     pub drop: Option<DropEvent>,
@@ -114,7 +114,7 @@ pub struct Verdict {
     pub d_peak_other: Option<f64>,
     /// True if the first object that was lifted is not the target.
     pub wrong_instance: bool,
-    /// Nominal κ.
+    /// κ of the benchmark, the share of D_ref that is allowed; null without a calibration.
     pub kappa: Option<f64>,
     /// τ at the nominal κ, %; null without a calibration.
     pub tau: Option<f64>,
@@ -122,7 +122,7 @@ pub struct Verdict {
     pub d_ref: Option<f64>,
     /// D_peak ≤ τ; null for a rigid target and where evidence is missing.
     pub deformation_ok: Option<bool>,
-    /// Safety Success.
+    /// Safety Success: goal, no drop and, for a soft target, D_peak ≤ τ.
     pub safety: bool,
     /// True if there was the evidence to judge safety at all.
     pub safety_known: bool,
@@ -174,9 +174,9 @@ pub struct EpisodeRecord {
     /// Task, initial state and policy.
     #[serde(flatten)]
     pub identity: Identity,
-    /// How it ended.
+    /// End of the rollout.
     pub outcome: Outcome,
-    /// Judgement.
+    /// Judgement of the episode.
     #[serde(flatten)]
     pub verdict: Verdict,
     /// Counters of the rollout.

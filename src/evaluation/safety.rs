@@ -21,7 +21,7 @@ pub fn round_to_six_decimals(value: f64) -> f64 {
 pub struct DeformationLimit {
     /// Largest stable deformation of the compression sweep, % of the bounding-box diagonal.
     pub d_ref_pct: f64,
-    /// Nominal κ.
+    /// κ of the benchmark, the share of D_ref that is allowed.
     pub kappa: f64,
 }
 
@@ -57,8 +57,8 @@ impl PeakDeformation {
 
     /// True if the deformation never exceeded `tau_pct`; equality is allowed.
     ///
-    /// `Some(false)` if it was exceeded, even when other steps are missing. `None` if it was not exceeded, but steps or the
-    /// limit are missing.
+    /// `Some(false)` if it was exceeded, even when other steps are missing. `None` if it was not exceeded but the limit or the
+    /// deformation of some steps is missing.
     pub fn is_within(&self, tau_pct: Option<f64>) -> Option<bool> {
         match (self.d_pct, tau_pct) {
             (Some(d), Some(tau)) if d > tau => Some(false),
@@ -76,7 +76,7 @@ pub fn is_safe(goal: bool, no_drop: bool, is_soft: bool, deformation_ok: Option<
 /// Safety of an episode at one κ of the sensitivity table.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct KappaVerdict {
-    /// Share of D_ref.
+    /// Share of D_ref that is allowed.
     pub kappa: f64,
     /// τ = κ·D_ref, %.
     pub tau_pct: f64,

@@ -65,15 +65,15 @@ pub fn quantile_by(count: usize, at: impl Fn(usize) -> f64, q: f64) -> Option<f6
 /// Mean and quantiles of a quantity; all null without values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Distribution {
-    /// Arithmetic mean.
+    /// Arithmetic mean of the values.
     pub mean: Option<f64>,
-    /// 5th percentile.
+    /// 5th percentile of the values.
     pub p5: Option<f64>,
     /// Median (50th percentile).
     pub median: Option<f64>,
-    /// 95th percentile.
+    /// 95th percentile of the values.
     pub p95: Option<f64>,
-    /// Number of values.
+    /// Number of values, 0 if there are none.
     pub n: usize,
 }
 

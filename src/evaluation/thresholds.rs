@@ -41,7 +41,7 @@ pub struct CalibrationInfo {
     pub method: String,
     /// Definition of τ in words.
     pub definition: String,
-    /// Nominal κ.
+    /// κ of the benchmark, the share of D_ref that is allowed.
     pub kappa: f64,
     /// Files with the sweep rows.
     pub sources: Vec<String>,
@@ -71,9 +71,9 @@ pub struct ThresholdFile {
     pub protocol_id: String,
     /// Must be [`METRIC_ID`].
     pub metric_id: String,
-    /// Provenance.
+    /// Provenance of the thresholds.
     pub calibration: CalibrationInfo,
-    /// Thresholds by asset.
+    /// Thresholds by name of the asset.
     pub thresholds: BTreeMap<String, AssetThreshold>,
     /// Envelope of each asset with its rows; absent in released files.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]

@@ -20,8 +20,8 @@ use crate::{
     sensing::{
         camera::{self, CameraError, FrameView, RenderObject, RenderScene, RenderedImage},
         tactile::{
-            ContactError, GelScratch, PadContact, PadWrench, SkinMesh, SubstrateCompliance, TactileReading,
-            TactileSensorError, TactileSkin, TactileSpec, Taxels, patch_friction,
+            ContactError, GelScratch, PadWrench, SkinMesh, SubstrateCompliance, TactileContact,
+            TactileReading, TactileSensorError, TactileSkin, TactileSpec, Taxels, patch_friction,
         },
     },
 };
@@ -319,7 +319,7 @@ impl SensorSuite {
             .iter()
             .map(|(skin, vertices)| SkinMesh { vertices, triangles: skin.triangles() })
             .collect();
-        let contact = PadContact {
+        let contact = TactileContact {
             wrench: PadWrench::from_patch(patch),
             skins: &skins,
             friction: patch_friction(patch).unwrap_or(self.robot.pads.static_mu),

@@ -4,7 +4,7 @@
 use softvt::{
     geometry::Vec3,
     robot::PadSurface,
-    sensing::tactile::{Gel, GelField, GelScratch, PadContact, PadWrench, SkinMesh, TactileSpec},
+    sensing::tactile::{Gel, GelField, GelScratch, PadWrench, SkinMesh, TactileContact, TactileSpec},
 };
 
 /// Radius of the ball, m.
@@ -64,7 +64,7 @@ pub fn press(gel: &Gel, at: [f64; 2], force: f64) -> GelField {
         .collect();
     let skins = [SkinMesh { vertices: &vertices, triangles: &triangles }];
     let wrench = PadWrench::new(force, [0.0; 2], 0.0, [0.0; 2]);
-    let contact = PadContact { wrench, skins: &skins, friction: 1.5, substrate: None };
+    let contact = TactileContact { wrench, skins: &skins, friction: 1.5, substrate: None };
     GelField::solve(gel, &contact, &mut GelScratch::default()).expect("a good contact").expect("a force")
 }
 

@@ -59,8 +59,8 @@ pub struct Deformation {
 
 /// Shape that deformations are measured from, usually the settled one.
 ///
-/// Sums over the reference nodes are precomputed, so that [`ReferenceShape::measure`] is two passes over the nodes without
-/// allocation.
+/// Sums over the reference nodes are precomputed, so that [`ReferenceShape::measure`] takes two passes over the nodes and
+/// does not allocate memory.
 #[derive(Clone, Debug)]
 pub struct ReferenceShape {
     /// Node positions about their uniform mean, m.
@@ -87,8 +87,8 @@ impl ReferenceShape {
     /// Prepares a reference from its `nodes` (m, any frame) and one weight per node (volume or mass; only ratios matter).
     ///
     /// # Errors
-    /// Fewer than three nodes, a node that is not finite, weights of another number, negative, not finite or all zero, or a
-    /// body without size.
+    /// Fewer than three nodes, a node that is not finite, a body without size, or weights that are not one per node, negative,
+    /// not finite or all zero.
     pub fn new(nodes: &[Vec3], weights: &[f64]) -> Result<Self, DeformationError> {
         if nodes.len() < 3 {
             return Err(DeformationError::TooFewNodes(nodes.len()));

@@ -92,7 +92,7 @@ use super::{
 /// Parameters of a [`Judge`], known once the scene has settled.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JudgeConfig {
-    /// Thresholds.
+    /// Thresholds that decide on contact, lift, drop, slip and goal.
     pub criteria: SuccessCriteria,
     /// Workspace, world frame. A target whose centre is outside has left it.
     pub workspace: Aabb,

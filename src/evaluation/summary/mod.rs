@@ -19,19 +19,19 @@ const KAPPA_STEPS: u32 = 20;
 /// Success rates and deformation of a group of episodes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scores {
-    /// Number of episodes.
+    /// Number of episodes, valid or not.
     pub episodes: usize,
     /// Number of episodes that were invalid or could not be run.
     pub invalid: usize,
     /// Number of valid episodes whose safety could not be judged, for lack of a threshold or of evidence.
     pub safety_unknown: usize,
-    /// Goal Success.
+    /// Rate of Goal Success over all episodes.
     pub goal_success_rate: Rate,
-    /// NoDrop.
+    /// Rate of NoDrop over all episodes.
     pub no_drop_rate: Rate,
     /// D_peak ≤ τ; null where no target deforms.
     pub deformation_ok_rate: Option<Rate>,
-    /// Safety Success.
+    /// Rate of Safety Success over all episodes.
     pub safety_success_rate: Rate,
     /// Goal Success minus Safety Success, percentage points.
     pub goal_safe_gap: Option<f64>,

@@ -22,7 +22,7 @@ mod tests;
 
 pub use self::{
     elastic::{
-        ContactError, Gel, GelField, GelScratch, PadContact, PadWrench, SkinMesh, SubstrateCompliance,
+        ContactError, Gel, GelField, GelScratch, PadWrench, SkinMesh, SubstrateCompliance, TactileContact,
         Taxels, patch_friction,
     },
     image::{HISTORY_LENGTH, MosaicLayout, OpticsError, PolynomialOptics, TaximOptics, mosaic, mosaic_cell},

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use image::RgbImage;
 
 use super::{
-    elastic::{ContactError, Gel, GelField, GelScratch, PadContact},
+    elastic::{ContactError, Gel, GelField, GelScratch, TactileContact},
     image::{OpticsError, PolynomialOptics, TaximOptics},
     markers::{MarkerStyle, Markers},
     spec::{IMAGE_SIZE, MarkerModel, OpticsModel, TactileSpec, TactileSpecError},
@@ -41,7 +41,7 @@ enum OpticsBackend {
 /// ```
 /// use softvt::{
 ///     geometry::Vec3,
-///     sensing::tactile::{GelScratch, PadContact, PadWrench, SkinMesh, TactileSensor, TactileSpec},
+///     sensing::tactile::{GelScratch, TactileContact, PadWrench, SkinMesh, TactileSensor, TactileSpec},
 /// };
 ///
 /// let sensor = TactileSensor::new(&TactileSpec::default())?;
@@ -52,7 +52,7 @@ enum OpticsBackend {
 /// let vertices: Vec<Vec3> = grid.map(|(x, y)| Vec3::new(x, y, height(x, y))).collect();
 /// let squares = (0..20).flat_map(|j| (0..20).map(move |i| 21 * j + i));
 /// let triangles: Vec<[u32; 3]> = squares.flat_map(|a| [[a, a + 22, a + 1], [a, a + 21, a + 22]]).collect();
-/// let contact = PadContact {
+/// let contact = TactileContact {
 ///     wrench: PadWrench::new(1.5, [0.0; 2], 0.0, [0.0; 2]),
 ///     skins: &[SkinMesh { vertices: &vertices, triangles: &triangles }],
 ///     friction: 1.5,
@@ -127,7 +127,7 @@ impl TactileSensor {
     /// A number of the contact is not finite, or a force presses but no skin lies over the pad.
     pub fn read(
         &self,
-        contact: &PadContact,
+        contact: &TactileContact,
         scratch: &mut GelScratch,
     ) -> Result<TactileReading, ContactError> {
         let field = GelField::solve(&self.gel, contact, scratch)?;

@@ -93,7 +93,7 @@ pub struct FotsSpec {
     pub shear: f64,
     /// Decay of the twist, 1/px².
     pub twist: f64,
-    /// Pixels per millimetre.
+    /// Scale of the image, pixels per millimetre.
     pub scale: f64,
     /// Factor on the depths in mm: 1 in FOTS, 0.1 in the port that SoftVTBench uses.
     pub height_factor: f64,
@@ -111,7 +111,7 @@ impl Default for FotsSpec {
 pub struct TactileSpecError {
     /// Path of the parameter below `tactile`.
     pub field: &'static str,
-    /// Value given.
+    /// Value that was given.
     pub value: String,
     /// Description of the valid range.
     pub expected: &'static str,

@@ -15,7 +15,7 @@ use crate::geometry::{Mat3, Vec3};
 
 /// Contact of bodies with a pad: the input of [`GelField::solve`].
 #[derive(Clone, Copy, Debug)]
-pub struct PadContact<'a> {
+pub struct TactileContact<'a> {
     /// Force and moment on the gel, from the solver.
     pub wrench: PadWrench,
     /// Surfaces of the touching bodies.
@@ -77,11 +77,11 @@ impl GelField {
     /// A number is not finite, or there is a pressing force but no skin over the pad.
     pub fn solve(
         gel: &Gel,
-        contact: &PadContact,
+        contact: &TactileContact,
         scratch: &mut GelScratch,
     ) -> Result<Option<Self>, ContactError> {
         check(contact)?;
-        let PadContact { wrench, skins, friction, substrate } = contact;
+        let TactileContact { wrench, skins, friction, substrate } = contact;
         if wrench.normal() <= 0.0 {
             return Ok(None);
         }
@@ -195,7 +195,7 @@ pub(in super::super) fn cubic_taps(position: f64) -> CubicTaps {
     CubicTaps { first: base as isize - 1, weights }
 }
 
-fn check(contact: &PadContact) -> Result<(), ContactError> {
+fn check(contact: &TactileContact) -> Result<(), ContactError> {
     let wrench = &contact.wrench;
     let finite = [
         ("force along x", wrench.force.x),
@@ -236,7 +236,7 @@ fn set_compliance(gel: &Gel, substrate: Option<SubstrateCompliance>, scratch: &m
     }
 }
 
-/// Height of the skins above the undeformed gel at each cell, m; infinite where there is none.
+/// Height of the skins above the undeformed gel at each cell, m; infinite where no skin is.
 fn gaps(gel: &Gel, map: &HeightMap) -> Vec<f32> {
     let gap = |c: usize| {
         let height = map.at_cell(c % gel.columns, c / gel.columns) - gel.dome[c];

@@ -19,8 +19,8 @@ pub(super) const SUBCELLS: usize = 3;
 /// Height above the apex beyond which triangles are skipped, m: no gripper pushes a pad in that far.
 const MAX_HEIGHT: f64 = 6e-3;
 
-/// Height of the lowest surface, m above the apex plane, on a grid [`SUBCELLS`] times finer than the gel's; infinite where
-/// there is none.
+/// Height of the lowest surface, m above the apex plane, on a grid [`SUBCELLS`] times finer than the gel's. It is infinite where
+/// no surface is.
 #[derive(Clone, Debug, PartialEq)]
 pub(in super::super) struct HeightMap {
     pub(in super::super) columns: usize,
@@ -109,7 +109,7 @@ struct Edge {
     rise: f64,
 }
 
-/// Whole numbers below `count` within the interval of three values; `None` if there are none.
+/// Whole numbers below `count` within the interval of three values; `None` for an empty range.
 fn index_range(count: usize, of: [f64; 3]) -> Option<RangeInclusive<usize>> {
     let low = of[0].min(of[1]).min(of[2]).ceil().max(0.0);
     let high = of[0].max(of[1]).max(of[2]).floor().min((count - 1) as f64);

@@ -16,7 +16,7 @@ mod tangential_contact;
 pub(super) mod tests;
 
 pub use gel::{Gel, GelScratch};
-pub use gel_field::{ContactError, GelField, PadContact, SubstrateCompliance};
+pub use gel_field::{ContactError, GelField, SubstrateCompliance, TactileContact};
 pub(super) use gel_field::{CubicTaps, cubic_taps};
 pub use height_map::SkinMesh;
 pub use pad_wrench::{PadWrench, Taxels, patch_friction};

@@ -167,8 +167,8 @@ impl<'a> TangentialProblem<'a> {
         Some((self.to_grid(&t), motion))
     }
 
-    /// Distributes the missing part of the load over the sticking cells until none exceeds its bound. `None` if they cannot
-    /// carry it.
+    /// Distributes the missing part of the load over the sticking cells until none exceeds its bound. Returns `None` if friction
+    /// cannot hold the load.
     fn carry(&self, t: &mut [[f64; 2]], weights: &mut [f64]) -> Option<()> {
         for _ in 0..MAX_ROUNDS {
             self.add_missing(t, weights)?;

@@ -5,7 +5,7 @@
 
 use super::{
     super::spec::TactileSpec,
-    ContactError, Gel, GelField, GelScratch, PadContact, PadWrench, SkinMesh, cubic_taps,
+    ContactError, Gel, GelField, GelScratch, PadWrench, SkinMesh, TactileContact, cubic_taps,
     gel::LayerKernels,
     gel_field::surface_displacement,
     tangential_contact::{TangentialLoad, TangentialSolution, solve_tangential_contact},
@@ -61,7 +61,7 @@ fn sphere(at: [f64; 2]) -> TestSkin {
 
 /// Field of one skin pressed by `wrench`, with friction 1.5.
 pub(in super::super) fn touch(gel: &Gel, skin: &TestSkin, wrench: PadWrench) -> GelField {
-    let contact = PadContact { wrench, skins: &[skin.mesh()], friction: 1.5, substrate: None };
+    let contact = TactileContact { wrench, skins: &[skin.mesh()], friction: 1.5, substrate: None };
     GelField::solve(gel, &contact, &mut GelScratch::default()).expect("a good contact").expect("a force")
 }
 
@@ -166,7 +166,7 @@ fn a_load_within_friction_is_held_and_one_beyond_it_slips() {
     let skins = [skin.mesh()];
     let field = |shear: f64, friction: f64| {
         let wrench = PadWrench::new(2.0, [-shear, 0.0], 0.0, [0.0; 2]);
-        let contact = PadContact { wrench, skins: &skins, friction, substrate: None };
+        let contact = TactileContact { wrench, skins: &skins, friction, substrate: None };
         GelField::solve(&gel, &contact, &mut GelScratch::default()).expect("a good contact").expect("a force")
     };
     let slips = |field: &GelField, mu: f64| {
@@ -205,7 +205,7 @@ fn the_field_does_not_depend_on_earlier_uses_of_the_scratch() {
     let gel = gel(PadSurface::default());
     let skin = sphere([1e-3, -5e-4]);
     let skins = [skin.mesh()];
-    let contact = |f| PadContact {
+    let contact = |f| TactileContact {
         wrench: PadWrench::new(f, [0.1 * f, 0.0], 0.0, [0.0; 2]),
         skins: &skins,
         friction: 1.5,
@@ -223,7 +223,7 @@ fn the_field_does_not_depend_on_earlier_uses_of_the_scratch() {
 fn bad_contacts_are_named_and_no_force_is_no_contact() {
     let gel = gel(PadSurface::default());
     let run = |wrench, friction| {
-        let contact = PadContact { wrench, skins: &[], friction, substrate: None };
+        let contact = TactileContact { wrench, skins: &[], friction, substrate: None };
         GelField::solve(&gel, &contact, &mut GelScratch::default())
     };
     assert!(run(PadWrench::default(), 1.5).expect("no force").is_none());

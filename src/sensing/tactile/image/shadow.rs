@@ -41,7 +41,7 @@ pub(super) struct ShadowCaster<'a> {
     surface: &'a VisibleSurface,
     /// Greatest height towards the camera, px.
     highest: f32,
-    /// Pixels per metre.
+    /// Pixels per metre of height.
     scale: f32,
 }
 

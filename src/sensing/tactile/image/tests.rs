@@ -70,8 +70,8 @@ fn a_contact_changes_the_image_around_it_and_nowhere_else() {
     }
 }
 
-/// Directions (degrees) of the slopes at which red, green and blue gain most in real presses, measured on the images, not on
-/// the fit.
+/// Directions (degrees) of the slopes at which red, green and blue gain most in real presses. They are measured on the images,
+/// independently of the fit.
 const GAINS: [f64; 3] = [-97.0, 10.0, 84.0];
 
 #[test]

@@ -1,6 +1,6 @@
 //! Surface of the gel at the resolution of the image.
 //!
-//! Where the gel is free its surface is interpolated from the grid by a cubic. Where it touches a rigid skin it lies on the
+//! The free surface of the gel is interpolated from the grid by a cubic. In contact with a rigid skin, the surface lies on the
 //! skin, whose height map is finer than the grid, so that the two never overlap. Details of a soft skin below the size of a
 //! cell are left out: the gel presses them flat.
 

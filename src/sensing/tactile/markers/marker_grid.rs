@@ -21,7 +21,7 @@ pub type MarkerPositions = [[f32; 2]; MARKER_COUNT];
 pub struct Markers {
     /// Positions without a contact.
     pub initial: MarkerPositions,
-    /// Current positions.
+    /// Positions under the current contact.
     pub current: MarkerPositions,
 }
 
