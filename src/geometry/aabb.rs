@@ -102,6 +102,9 @@ pub fn overlapping_pairs(grouped: &[GroupedAabb]) -> Vec<(usize, usize)> {
 
 #[cfg(test)]
 mod tests {
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
     use super::*;
 
     #[test]
@@ -111,5 +114,29 @@ mod tests {
         assert!(!cube(0.0).intersects(&cube(1.5)) && cube(0.0).distance(&cube(1.5)) == 0.5);
         assert!(cube(0.0).loosened(0.5).intersects(&cube(1.5)));
         assert!(cube(0.0).contains(&Vec3::repeat(1.0)) && !cube(0.0).contains(&Vec3::repeat(1.1)));
+    }
+
+    #[test]
+    fn overlapping_pairs_match_brute_force() {
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        for count in [0, 1, 2, 3, 40] {
+            let boxes: Vec<GroupedAabb> = (0..count)
+                .map(|_| {
+                    let min = Vec3::from_fn(|_, _| rng.random_range(0.0..1.0));
+                    let size = Vec3::from_fn(|_, _| rng.random_range(0.0..0.3));
+                    GroupedAabb { bounds: Aabb { min, max: min + size }, group: rng.random_range(0..5) }
+                })
+                .collect();
+            let mut expected = Vec::new();
+            for (j, b) in boxes.iter().enumerate() {
+                for (i, a) in boxes[..j].iter().enumerate() {
+                    if a.group != b.group && a.bounds.intersects(&b.bounds) {
+                        expected.push((i, j));
+                    }
+                }
+            }
+            expected.sort_unstable();
+            assert_eq!(overlapping_pairs(&boxes), expected);
+        }
     }
 }

@@ -16,5 +16,5 @@ pub mod spec;
 pub use clearance::{Clearance, Obstacle, clearance};
 pub use gripper::GripperSetpoint;
 pub use ik::{DiffIk, UnreachablePose};
-pub use pads::{CollisionBox, PadContact, PadSurface};
+pub use pads::{CollisionBox, PadSurface};
 pub use spec::{ArmSpec, GripperSpec, IkSpec, PadSpec, RobotSpec, Side, SpecError};

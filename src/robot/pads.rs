@@ -54,17 +54,6 @@ impl Default for PadSurface {
     }
 }
 
-/// Contact query of a point against a gel pad.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PadContact {
-    /// Signed distance to the gel's surface, m; negative inside.
-    pub phi: f64,
-    /// Unit normal of the gel's surface there, pad frame.
-    pub normal_p: Vec3,
-    /// Share of the point's patch over the footprint, 0..=1.
-    pub coverage: f64,
-}
-
 impl PadSurface {
     /// Height of the dome at (x, y) (m, pad frame) relative to its apex, m; 0 at the apex, negative elsewhere. The
     /// paraboloid differs from a torus of the same radii by less than 3 µm over the pad.
@@ -79,11 +68,12 @@ impl PadSurface {
         beyond_x.max(0.0).hypot(beyond_y.max(0.0)) + beyond_x.max(beyond_y).min(0.0) - self.corner
     }
 
-    /// Contact of the point `p_p` (pad frame, m) with the gel; the point represents a patch about `spacing` (m) wide.
+    /// Contact of the point `p_p` (pad frame, m) with the gel, in the pad frame. The point represents a patch about `spacing`
+    /// (m) wide.
     ///
     /// The coverage falls from 1 to 0 over one spacing across the edge of the footprint, so that forces stay continuous
     /// as a pad moves. It is 0 below the gel's base, where a point belongs to the sensor's case.
-    pub fn contact(&self, p_p: &Vec3, spacing: f64) -> PadContact {
+    pub fn contact(&self, p_p: &Vec3, spacing: f64) -> Contact {
         let gradient = Vec3::new(p_p.x / self.radius_x, p_p.y / self.radius_y, 1.0);
         let steepness = gradient.norm();
         let coverage = if p_p.z < -self.thickness {
@@ -91,9 +81,9 @@ impl PadSurface {
         } else {
             (0.5 - self.edge_distance(p_p.x, p_p.y) / spacing).clamp(0.0, 1.0)
         };
-        PadContact {
+        Contact {
             phi: (p_p.z - self.height(p_p.x, p_p.y)) / steepness,
-            normal_p: gradient / steepness,
+            normal: gradient / steepness,
             coverage,
         }
     }
@@ -110,7 +100,7 @@ impl PadSurface {
             .map(|(x, y)| {
                 let p_p = Vec3::new(x, y, self.height(x, y));
                 let contact = self.contact(&p_p, dx.max(dy));
-                GelSample { p: p_p, normal: contact.normal_p, area: dx * dy * contact.coverage }
+                GelSample { p: p_p, normal: contact.normal, area: dx * dy * contact.coverage }
             })
             .filter(|sample| sample.area > 0.0)
             .collect()
@@ -122,8 +112,7 @@ const GEL_SPACING: f64 = 0.75e-3;
 
 impl ContactSurface for PadSurface {
     fn contact(&self, p: &Vec3, _facing: &Vec3, spacing: f64) -> Contact {
-        let contact = self.contact(p, spacing);
-        Contact { phi: contact.phi, normal: contact.normal_p, coverage: contact.coverage }
+        Self::contact(self, p, spacing)
     }
 
     fn bounds(&self) -> Aabb {
@@ -297,7 +286,7 @@ mod tests {
         assert!(mean.xy().norm() < 1e-12, "{mean}");
         for GelSample { p, normal, .. } in samples {
             let contact = pad.contact(&p, 1e-3);
-            assert!(contact.phi.abs() < 1e-15 && (contact.normal_p - normal).norm() < 1e-15);
+            assert!(contact.phi.abs() < 1e-15 && (contact.normal - normal).norm() < 1e-15);
         }
     }
 
@@ -311,10 +300,8 @@ mod tests {
     #[test]
     fn normals_tilt_outwards_from_the_apex() {
         let contact = PadSurface::default().contact(&Vec3::new(0.01, 0.0, 0.0), 1e-3);
-        assert!(
-            (contact.normal_p.x - 0.01 / 0.206 / (1.0 + (0.01_f64 / 0.206).powi(2)).sqrt()).abs() < 1e-15
-        );
-        assert_eq!(contact.normal_p.y, 0.0);
-        assert!((contact.normal_p.norm() - 1.0).abs() < 1e-15);
+        assert!((contact.normal.x - 0.01 / 0.206 / (1.0 + (0.01_f64 / 0.206).powi(2)).sqrt()).abs() < 1e-15);
+        assert_eq!(contact.normal.y, 0.0);
+        assert!((contact.normal.norm() - 1.0).abs() < 1e-15);
     }
 }

@@ -1,7 +1,7 @@
 //! Tests of shapes and meshes against closed forms and the exact mesh distance of parry.
 
-mod body;
-mod files;
+mod import;
+mod meshes;
 mod shapes;
 
 use rand::{Rng, SeedableRng};
@@ -43,7 +43,7 @@ fn seeds() -> Displacement {
     Displacement::Bumps(Bumps { height: 0.5e-3, radius: 3e-3, spacing: 8e-3, seed: 3, mask: None })
 }
 
-/// Primitives and what keeps them exact.
+/// Primitives, and placements and materials of them, which have exact distances.
 fn exact_shapes() -> Vec<(&'static str, Shape)> {
     let plate = vec![[0.0, 0.0], [0.05, 0.0], [0.08, 0.015], [0.078, 0.019], [0.049, 0.006], [0.0, 0.006]];
     let ball = Shape::Sphere { radius: 0.02 };

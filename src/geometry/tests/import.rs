@@ -2,10 +2,9 @@ use super::rng;
 use rand::Rng;
 
 use crate::geometry::{
-    Aabb, GroupedAabb, Vec3,
+    Aabb, Vec3,
     import::{ImportError, ImportOptions, MeshFormat, import},
     mesh::{Mesh, MeshError},
-    overlapping_pairs,
     shape::Shape,
     surface_mesh::SurfaceMesh,
 };
@@ -146,28 +145,4 @@ fn distances_to_an_imported_mesh_match_its_source_shape() {
         assert!((a - b).abs() < 2e-5, "{a} {b} at {p:?}");
     }
     assert!(matches!(imported, Shape::Mesh(_)));
-}
-
-#[test]
-fn overlapping_pairs_match_brute_force() {
-    let mut rng = rng();
-    for count in [0, 1, 2, 3, 40] {
-        let candidates: Vec<GroupedAabb> = (0..count)
-            .map(|_| {
-                let min = Vec3::from_fn(|_, _| rng.random_range(0.0..1.0));
-                let size = Vec3::from_fn(|_, _| rng.random_range(0.0..0.3));
-                GroupedAabb { bounds: Aabb { min, max: min + size }, group: rng.random_range(0..5) }
-            })
-            .collect();
-        let mut expected = Vec::new();
-        for (j, b) in candidates.iter().enumerate() {
-            for (i, a) in candidates[..j].iter().enumerate() {
-                if a.group != b.group && a.bounds.intersects(&b.bounds) {
-                    expected.push((i, j));
-                }
-            }
-        }
-        expected.sort_unstable();
-        assert_eq!(overlapping_pairs(&candidates), expected);
-    }
 }
