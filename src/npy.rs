@@ -17,6 +17,15 @@ const MAGIC: &[u8] = b"\x93NUMPY";
 const ALIGNMENT: usize = 64;
 
 /// An array in C order (last axis fastest).
+///
+/// ```
+/// use softvt::npy::NpyArray;
+///
+/// let array = NpyArray::from_f64(vec![2, 3], [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
+/// let back = NpyArray::parse(&array.to_npy())?;
+/// assert_eq!((back.dtype.as_str(), back.values()[4]), ("<f8", 4.0));
+/// # Ok::<(), softvt::npy::NpyError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct NpyArray {
     /// Element type in NumPy's notation: byte order (`<`, `>`, `|`, `=`), kind and bytes per element, as in `<f4` or `|u1`.
@@ -82,7 +91,7 @@ impl NpyArray {
         self.dtype.trim_start_matches(['<', '|', '=', '>'])
     }
 
-    /// Elements as double-precision numbers; empty if the type is not one that [`element_size`] knows.
+    /// Elements as double-precision numbers; empty if [`element_size`] does not support the type.
     pub fn values(&self) -> Vec<f64> {
         let Some(size) = element_size(&self.dtype) else { return Vec::new() };
         self.data.chunks_exact(size).map(|bytes| decode(&self.dtype, bytes)).collect()
@@ -157,7 +166,7 @@ pub fn element_size(dtype: &str) -> Option<usize> {
     (matches!(order, "<" | ">" | "|" | "=") && known.contains(&kind)).then_some(size)
 }
 
-/// One element of a type that [`element_size`] knows, from its bytes.
+/// One element of a type that [`element_size`] supports, from its bytes.
 fn decode(dtype: &str, bytes: &[u8]) -> f64 {
     let mut word = [0; 8];
     word[..bytes.len()].copy_from_slice(bytes);
@@ -209,8 +218,7 @@ pub fn read_npz(path: &Path, key: &str) -> Result<NpyArray, NpzError> {
     NpyArray::parse(&bytes).map_err(|e| content(format!("array \"{key}\": {e}")))
 }
 
-/// Reads the array `key` of the archive at `path`. Its type must be one of `kinds` (without byte order), and its elements must be
-/// finite numbers.
+/// Reads the array `key` of the archive at `path`. Its type must be one of `kinds` (without byte order), its elements finite.
 ///
 /// # Errors
 /// As [`read_npz`], or names the type, or the first element that is not finite.

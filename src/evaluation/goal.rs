@@ -6,8 +6,8 @@
 //!    object at the goal (`on`), or by anything but the robot (`in`),
 //! 3. no part of the robot pressed on it at any physics step of the control step.
 //!
-//! The goal is reached when this held for ⌈hold time / control step⌉ control steps in a row, at least one. A
-//! target that rested at the goal and left it before that counts as dropped ([`super::drop::DropReason::LeftGoal`]).
+//! The goal is reached when this held for ⌈hold time / control step⌉ control steps in a row, at least one. A target that has
+//! rested at the goal for one control step and leaves it later counts as dropped ([`super::drop::DropReason::LeftGoal`]).
 
 use crate::geometry::{Aabb, Pose, Vec3};
 

@@ -11,7 +11,7 @@
 //! | Was the object dropped, or released on purpose? | [`drop`] |
 //! | How far did it slide in the grasp? | [`slip`] |
 //! | Goal, NoDrop and deformation limit together | [`safety`] |
-//! | Where does the limit τ of an asset come from? | [`calibration`], [`thresholds`] |
+//! | Where does the limit τ of an asset come from? | [`calibration`], [`thresholds`], [`envelope_plot`] |
 //! | Every threshold of the judge | [`criteria`] |
 //! | Rates, intervals, paired tests | [`statistics`], [`paired_stats`], [`summary`] |
 //!

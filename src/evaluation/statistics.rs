@@ -73,7 +73,7 @@ pub struct Distribution {
     pub median: Option<f64>,
     /// 95th percentile of the values.
     pub p95: Option<f64>,
-    /// Number of values, 0 if there are none.
+    /// Number of values; 0 of an empty list.
     pub n: usize,
 }
 

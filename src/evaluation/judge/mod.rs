@@ -9,7 +9,7 @@
 //! 3. **Contact.** A pad touches if its normal force on the target exceeds `touch_force_n`; the rest of the robot likewise.
 //!    A body is supported if the upward force on it from everything but the robot exceeds `touch_force_n`.
 //! 4. **Lift.** A body is lifted if it is not supported and its lowest point is more than `lift_height_m` above its settled
-//!    height. The first body that is lifted decides `wrong_instance`.
+//!    height. The first body that is lifted decides `wrong_instance`; the target, if several are lifted in one step.
 //! 5. **Release** and **slip**: [`ReleaseMonitor`], [`SlipMonitor`]. The target is held while both pads touch it and no
 //!    release was commanded.
 //! 6. **Drop**: [`DropMonitor`].
@@ -224,16 +224,6 @@ impl Judge {
     /// The first drop so far.
     pub fn first_drop(&self) -> Option<DropEvent> {
         self.drops.first()
-    }
-
-    /// Peak D of the target so far, %.
-    pub fn d_peak(&self) -> Option<f64> {
-        self.peak.d_pct
-    }
-
-    /// Largest slip so far, m.
-    pub fn slip_m(&self) -> f64 {
-        self.slip.max_m()
     }
 
     /// Verdict on the episode. One that did not end validly has neither Goal Success nor NoDrop, and its safety is unknown.

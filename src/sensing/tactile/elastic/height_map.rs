@@ -19,8 +19,8 @@ pub(super) const SUBCELLS: usize = 3;
 /// Height above the apex beyond which triangles are skipped, m: no gripper pushes a pad in that far.
 const MAX_HEIGHT: f64 = 6e-3;
 
-/// Height of the lowest surface, m above the apex plane, on a grid [`SUBCELLS`] times finer than the gel's. It is infinite where
-/// no surface is.
+/// Height of the lowest surface (m above the apex plane; infinite without one) on a grid [`SUBCELLS`] times finer than the
+/// grid of the gel.
 #[derive(Clone, Debug, PartialEq)]
 pub(in super::super) struct HeightMap {
     pub(in super::super) columns: usize,
@@ -105,7 +105,7 @@ impl HeightMap {
 struct Edge {
     x_at_row_0: f64,
     x_per_row: f64,
-    /// Rows from its start to its end; its sign says on which side the triangle is.
+    /// Rows from its start to its end; its sign gives the side on which the triangle is.
     rise: f64,
 }
 

@@ -187,8 +187,7 @@ impl LightRow {
         Self { a: vec![0.0; width], b: vec![0.0; width], light: std::array::from_fn(|_| vec![0.0; width]) }
     }
 
-    /// Replaces slopes by their sines, limited to `steepest`. Returns the range from the first to the last pixel with a slope, if
-    /// there is one.
+    /// Replaces slopes by their sines, limited to `steepest`. Returns the range from the first to the last pixel with a slope.
     fn slopes_to_sines(&mut self, steepest: f32) -> Option<Range<usize>> {
         for (a, b) in self.a.iter_mut().zip(&mut self.b) {
             let square = *a * *a + *b * *b;

@@ -19,10 +19,10 @@ fn npy(dtype: &str, shape: &[usize], data: &[u8]) -> Vec<u8> {
     NpyArray { dtype: dtype.to_owned(), shape: shape.to_vec(), data: data.to_vec() }.to_npy()
 }
 
-/// An array's name and bytes.
-type Entry = (&'static str, Vec<u8>);
+/// Arrays of an archive: names and contents of their files.
+type Entries = Vec<(&'static str, Vec<u8>)>;
 
-fn write(path: &Path, entries: &[Entry]) {
+fn write(path: &Path, entries: &[(&'static str, Vec<u8>)]) {
     let mut zip = zip::ZipWriter::new(fs::File::create(path).expect("a file"));
     let stored = zip::write::SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
     for (name, bytes) in entries {
@@ -40,13 +40,13 @@ fn grad(constant: f64) -> Vec<u8> {
 }
 
 /// `polycalib.npz` as in the package: changes of 1, 2 and 3 grey levels.
-fn polycalib() -> Vec<Entry> {
+fn polycalib() -> Entries {
     let bins = npy("<i4", &[], &(BINS as i32).to_le_bytes());
     vec![("bins", bins), ("grad_r", grad(1.0)), ("grad_g", grad(2.0)), ("grad_b", grad(3.0))]
 }
 
 /// `dataPack.npz` as in the package, with one press: blue 10, green 20, red 30.
-fn data_pack() -> Vec<Entry> {
+fn data_pack() -> Entries {
     let pixels = [10, 20, 30].repeat(480 * 640);
     vec![
         ("f0", npy("|u1", &[480, 640, 3], &pixels)),
@@ -59,7 +59,7 @@ fn data_pack() -> Vec<Entry> {
 }
 
 /// Result of loading a folder with the file `name` replaced.
-fn loaded(name: &str, entries: &[Entry]) -> Result<TaximOptics, String> {
+fn loaded(name: &str, entries: &[(&'static str, Vec<u8>)]) -> Result<TaximOptics, String> {
     let folder = tempfile::tempdir().expect("a folder");
     write(&folder.path().join("polycalib.npz"), &polycalib());
     write(&folder.path().join("dataPack.npz"), &data_pack());
