@@ -84,6 +84,11 @@ fn rank_of_word(word: &str, candidate: &str) -> Option<Rank> {
     Some(Rank { difference, edits, length: candidate.len() })
 }
 
+/// Formats a count with its noun: "1 task", "3 tasks".
+pub fn counted(count: usize, noun: &str) -> String {
+    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

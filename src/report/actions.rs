@@ -1,5 +1,5 @@
-//! What was commanded in an episode, as an array of numpy's format 1.0 (numpy.lib.format): float64 (steps, 7), the tool's
-//! position (m) and axis-angle (rad) in the base frame, and the closure.
+//! Recorded actions of an episode as a `.npy` file: float64 of shape (steps, 7) with the tool's position (m) and axis-angle
+//! (rad) in the base frame, and the gripper closure.
 
 use std::{
     fs,
@@ -16,23 +16,16 @@ use crate::{
 /// Numbers per action.
 const WIDTH: usize = 7;
 
-/// Why recorded actions cannot be read.
+/// Error of reading recorded actions.
 #[derive(Debug, thiserror::Error)]
 pub enum ActionsError {
-    /// The system refused.
     #[error(transparent)]
     Io(#[from] FileError),
-    /// It is no such array.
     #[error("{path}: {what}; expected float64 numbers of shape (steps, 7), as softvt writes them")]
-    Format {
-        /// The file.
-        path: String,
-        /// What is wrong.
-        what: String,
-    },
+    Format { path: String, what: &'static str },
 }
 
-/// Where the actions of an episode are in a run folder.
+/// Path of the actions of an episode in the run folder `dir`.
 pub fn path(dir: &Path, task: usize, episode: u32) -> PathBuf {
     dir.join(format!("actions/task_{task:03}/episode_{episode:05}.npy"))
 }
@@ -50,11 +43,10 @@ pub fn write(path: &Path, actions: &[Action]) -> Result<(), FileError> {
 /// Reads the actions of an episode.
 ///
 /// # Errors
-/// The file cannot be read or is no such array.
+/// The file cannot be read or is not such an array.
 pub fn read(path: &Path) -> Result<Vec<Action>, ActionsError> {
     let bytes = fs::read(path).map_err(FileError::io("read", path))?;
-    parse(&bytes)
-        .map_err(|what| ActionsError::Format { path: path.display().to_string(), what: what.to_owned() })
+    parse(&bytes).map_err(|what| ActionsError::Format { path: path.display().to_string(), what })
 }
 
 fn parse(bytes: &[u8]) -> Result<Vec<Action>, &'static str> {
@@ -96,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn actions_come_back_to_the_bit_and_what_is_no_array_is_named() {
+    fn actions_are_read_back_exactly_and_damaged_files_are_named() {
         let root = tempfile::tempdir().unwrap();
         let at = path(root.path(), 3, 12);
         let one = |i: i32| Action {

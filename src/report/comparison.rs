@@ -1,4 +1,4 @@
-//! What two runs differ in: the same episodes, one by one.
+//! Paired comparison of two runs, episode by episode, and its plain-text table.
 
 use std::{collections::BTreeMap, fmt::Write};
 
@@ -8,102 +8,78 @@ use super::{
     stored_run::StoredRun,
     text_table::{WIDTH, shortened},
 };
-use crate::evaluation::{
-    paired_stats::{
-        EpisodeKey, EpisodePair, MeanDifference, PairedComparison, RateDifference, TaskKey, group_by_task,
-        pair_episodes,
+use crate::{
+    evaluation::{
+        paired_stats::{
+            EpisodeKey, EpisodePair, MeanDifference, PairedComparison, RateDifference, TaskKey,
+            group_by_task, pair_episodes,
+        },
+        record::EpisodeRecord,
+        summary::method_label,
     },
-    record::EpisodeRecord,
-    summary::method_label,
+    text::counted,
 };
 
-/// Columns of a policy's name at the head.
-const POLICY: usize = 40;
+/// Width of a policy's name in the header, columns.
+const POLICY_WIDTH: usize = 40;
 
-/// One task of a suite.
+/// Differences of one task.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TaskDifferences {
-    /// Suite.
     pub suite: String,
-    /// Task index.
     pub task: usize,
-    /// Instruction.
     pub prompt: String,
-    /// Its differences: the second run minus the first.
+    /// The second run minus the first.
     #[serde(flatten)]
     pub differences: PairedComparison,
 }
 
-/// Two runs compared.
+/// Comparison of two runs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Comparison {
-    /// What the first is called, with what its policy has that no robot has.
+    /// Policy of the first run, with its privileged inputs.
     pub first: String,
-    /// What the second is called.
+    /// Policy of the second run.
     pub second: String,
-    /// Whether something that is judged deforms.
+    /// True if any target deforms.
     pub deformable: bool,
-    /// Episodes that only one of them has.
+    /// Number of episodes present in only one run.
     pub unmatched: usize,
-    /// What the runs were not alike in besides their policies: paths of `run.json`.
+    /// Fields of `run.json`, other than the policy, in which the runs differ.
     pub unlike: Vec<String>,
-    /// Runs of which episodes are missing: a sentence each.
+    /// One sentence per run with missing episodes.
     pub partial: Vec<String>,
-    /// All episodes that both have.
+    /// Over all common episodes.
     pub all: PairedComparison,
-    /// By task, in order.
+    /// Per task, in order.
     pub by_task: Vec<TaskDifferences>,
 }
 
-/// Why two runs cannot be compared.
+/// Error of comparing two runs.
 #[derive(Debug, thiserror::Error)]
 pub enum CompareError {
-    /// A folder has an episode in two runs: nobody knows which one is meant.
     #[error(
-        "{first} and {second} both hold suite {suite} task {task} episode {episode}: compare one run of a suite at a time; name its folder"
+        "{first} and {second} both hold suite {suite} task {task} episode {episode}: compare one run per suite; give its folder"
     )]
-    Twice {
-        /// A run's folder.
-        first: String,
-        /// Another's.
-        second: String,
-        /// Of the episode.
-        suite: String,
-        /// Of the episode.
-        task: usize,
-        /// Index.
-        episode: u32,
-    },
-    /// A run has no episode yet.
+    DuplicateEpisode { first: String, second: String, suite: String, task: usize, episode: u32 },
     #[error("{dir} has no episode yet")]
-    Empty {
-        /// Its folder.
-        dir: String,
-    },
-    /// They have no episode in common.
-    #[error("{first} and {second} share no episode: {why}")]
-    Nothing {
-        /// The folder of one.
-        first: String,
-        /// The other's.
-        second: String,
-        /// In what their episodes differ.
-        why: String,
-    },
+    Empty { dir: String },
+    #[error("{first} and {second} share no episode: {reason}")]
+    NoCommonEpisode { first: String, second: String, reason: String },
 }
 
-/// Compares the episodes that both have: `first` and `second` are the runs of two folders, of several suites each or of one.
+/// Compares the episodes common to `first` and `second`, each the runs of one folder, one per suite.
 ///
 /// # Errors
-/// An episode is there twice on one side, or none is on both.
+/// An episode occurs twice on one side, or there is no common episode.
 pub fn compare(first: &[StoredRun], second: &[StoredRun]) -> Result<Comparison, CompareError> {
     for runs in [first, second] {
-        once(runs)?;
+        check_unique(runs)?;
     }
     let count = |runs: &[StoredRun]| -> usize { runs.iter().map(|run| run.records.len()).sum() };
     let pairs = pair_episodes(records(first), records(second));
     if pairs.is_empty() {
-        return Err(nothing(first, second));
+        return Err(no_common_episode(first, second));
     }
     let task = |(TaskKey { suite, task }, pairs): (TaskKey, Vec<EpisodePair>)| TaskDifferences {
         suite: suite.to_owned(),
@@ -117,7 +93,7 @@ pub fn compare(first: &[StoredRun], second: &[StoredRun]) -> Result<Comparison, 
         second: name(second),
         deformable: pairs.iter().any(|pair| pair.first.identity.soft),
         unmatched: count(first) + count(second) - 2 * pairs.len(),
-        unlike: unlike(first, second),
+        unlike: differing_fields(first, second),
         partial: all()
             .filter(|run| run.is_partial())
             .flat_map(|run| run.remarks().into_iter().take(1))
@@ -131,8 +107,8 @@ fn records(runs: &[StoredRun]) -> impl Iterator<Item = &EpisodeRecord> {
     runs.iter().flat_map(|run| &run.records)
 }
 
-/// No episode may be there twice: one of the two would be left out in silence.
-fn once(runs: &[StoredRun]) -> Result<(), CompareError> {
+/// Checks that no episode occurs twice, since one of the two would be ignored.
+fn check_unique(runs: &[StoredRun]) -> Result<(), CompareError> {
     let mut known = BTreeMap::new();
     for run in runs {
         let dir = || run.dir.display().to_string();
@@ -142,7 +118,7 @@ fn once(runs: &[StoredRun]) -> Result<(), CompareError> {
         for record in &run.records {
             if let Some(other) = known.insert(EpisodeKey::of(record), &run.dir) {
                 let id = &record.identity;
-                return Err(CompareError::Twice {
+                return Err(CompareError::DuplicateEpisode {
                     first: other.display().to_string(),
                     second: dir(),
                     suite: id.suite.clone(),
@@ -155,55 +131,59 @@ fn once(runs: &[StoredRun]) -> Result<(), CompareError> {
     Ok(())
 }
 
-/// What a run says of itself.
-type Said = fn(&StoredRun) -> String;
+/// A property of a run, as text.
+type RunProperty = fn(&StoredRun) -> String;
 
-/// Says in what the episodes of two runs differ that have none in common.
-fn nothing(first: &[StoredRun], second: &[StoredRun]) -> CompareError {
-    let of = |runs: &[StoredRun], what: Said| {
-        let mut values: Vec<String> = runs.iter().map(what).collect();
+/// The error about two runs without common episodes, with the property in which they differ.
+fn no_common_episode(first: &[StoredRun], second: &[StoredRun]) -> CompareError {
+    let of = |runs: &[StoredRun], property: RunProperty| {
+        let mut values: Vec<String> = runs.iter().map(property).collect();
         values.sort();
         values.dedup();
         values
     };
-    let fields: [(&str, Said); 4] = [
+    let fields: [(&str, RunProperty); 4] = [
         ("suite", |run| run.suite().to_owned()),
-        ("seed", |run| run.info["seed"].to_string()),
+        ("seed", |run| run.manifest["seed"].to_string()),
         ("split", |run| run.text("split").to_owned()),
-        ("tasks", |run| run.info["tasks"].to_string()),
+        ("tasks", |run| run.manifest["tasks"].to_string()),
     ];
     let differ = fields.iter().find_map(|(name, what)| {
         let (a, b) = (of(first, *what), of(second, *what));
         a.iter()
             .all(|value| !b.contains(value))
-            .then(|| format!("{name} {} there, {} here", a.join(", "), b.join(", ")))
+            .then(|| format!("{name} {} in the first, {} in the second", a.join(", "), b.join(", ")))
     });
     let dir = |runs: &[StoredRun]| runs.first().map_or_else(String::new, |run| run.dir.display().to_string());
-    CompareError::Nothing {
+    CompareError::NoCommonEpisode {
         first: dir(first),
         second: dir(second),
-        why: differ.unwrap_or_else(|| "what is finished of them does not overlap".to_owned()),
+        reason: differ.unwrap_or_else(|| "their finished episodes do not overlap".to_owned()),
     }
 }
 
 fn name(runs: &[StoredRun]) -> String {
     let mut names: Vec<String> = runs
         .iter()
-        .map(|run| method_label(run.text("policy"), run.is_privileged(), run.sees_forces()))
+        .map(|run| method_label(run.text("policy"), run.is_privileged(), run.observes_forces()))
         .collect();
     names.sort();
     names.dedup();
     names.join(", ")
 }
 
-/// Fields of `run.json` that say how a policy was judged, where two runs of one suite differ.
-fn unlike(first: &[StoredRun], second: &[StoredRun]) -> Vec<String> {
-    const JUDGED_BY: [&str; 7] = ["softvt", "twin", "shifts", "options", "settings", "sources", "thresholds"];
+/// Fields of `run.json` about the conditions of a run in which two runs of one suite differ.
+fn differing_fields(first: &[StoredRun], second: &[StoredRun]) -> Vec<String> {
+    const CONDITION_FIELDS: [&str; 7] =
+        ["softvt", "twin", "shifts", "options", "settings", "sources", "thresholds"];
     let mut found: Vec<String> = Vec::new();
     for a in first {
         let Some(b) = second.iter().find(|b| b.suite() == a.suite()) else { continue };
         found.extend(
-            JUDGED_BY.iter().filter(|field| a.info[**field] != b.info[**field]).map(|f| (*f).to_owned()),
+            CONDITION_FIELDS
+                .iter()
+                .filter(|field| a.manifest[**field] != b.manifest[**field])
+                .map(|f| (*f).to_owned()),
         );
     }
     found.sort();
@@ -211,7 +191,7 @@ fn unlike(first: &[StoredRun], second: &[StoredRun]) -> Vec<String> {
     found
 }
 
-/// The comparison as a table of at most 100 columns.
+/// The comparison as a plain-text table of at most 100 columns.
 pub fn table(comparison: &Comparison) -> String {
     let mut out = String::new();
     // Writing to a String cannot fail.
@@ -221,13 +201,13 @@ pub fn table(comparison: &Comparison) -> String {
     let rule = "─".repeat(WIDTH);
     let deformation = if comparison.deformable { Deformation::Peak } else { Deformation::None };
     line(&format!(
-        "{} → {} · {} paired episodes",
-        shortened(&comparison.first, POLICY),
-        shortened(&comparison.second, POLICY),
-        comparison.all.pairs
+        "{} → {} · {}",
+        shortened(&comparison.first, POLICY_WIDTH),
+        shortened(&comparison.second, POLICY_WIDTH),
+        counted(comparison.all.pairs, "paired episode")
     ));
     line(&rule);
-    line(&head("", ["first", "second"]));
+    line(&headings("", ["first", "second"]));
     let mut suite = "";
     for task in &comparison.by_task {
         if task.suite != suite {
@@ -236,14 +216,18 @@ pub fn table(comparison: &Comparison) -> String {
             line(&shortened(suite, WIDTH));
         }
         let name = format!("{:>3} {}", task.task, task.prompt);
-        rows(&name, &task.differences, deformation).iter().for_each(|row| line(row));
+        measure_rows(&name, &task.differences, deformation).iter().for_each(|row| line(row));
     }
     line(&rule);
-    rows("all", &comparison.all, deformation).iter().for_each(|row| line(row));
+    measure_rows("all", &comparison.all, deformation).iter().for_each(|row| line(row));
     line(&rule);
-    line(KEY);
+    line(LEGEND);
     if comparison.unmatched > 0 {
-        line(&format!("{} episodes that only one run has are left out", comparison.unmatched));
+        line(&format!(
+            "{} present in only one run {} skipped",
+            counted(comparison.unmatched, "episode"),
+            if comparison.unmatched == 1 { "was" } else { "were" }
+        ));
     }
     comparison.partial.iter().for_each(|remark| line(remark));
     if !comparison.unlike.is_empty() {
@@ -252,16 +236,16 @@ pub fn table(comparison: &Comparison) -> String {
     out
 }
 
-/// Columns of the name at the left.
-const NAME: usize = 29;
+/// Width of the name at the left, columns.
+const NAME_WIDTH: usize = 29;
 
-/// What the rows say, to be written once below them.
-pub(super) const KEY: &str = "difference: second minus first · 95 % intervals: Agresti and Min for rates, bootstrap for D\nbetter, worse: episodes; of D, less is better · p: McNemar's exact test";
+/// Legend of the rows.
+pub(super) const LEGEND: &str = "diff.: second minus first · 95 % intervals: Agresti and Min for rates, bootstrap for D\nbetter, worse: number of episodes; a lower D is better · p: McNemar's exact test";
 
-/// Which deformation is compared.
+/// Deformation measure of a comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Deformation {
-    /// Nothing deforms.
+    /// No target deforms.
     None,
     /// Peak D, % of the diagonal.
     Peak,
@@ -269,13 +253,13 @@ pub(super) enum Deformation {
     OverTau,
 }
 
-/// The heads of the columns.
-pub(super) fn head(name: &str, [first, second]: [&str; 2]) -> String {
-    cells(name, ["", first, second, "differ.", "95 % interval", "better", "worse", "p"].map(str::to_owned))
+/// The column headings.
+pub(super) fn headings(name: &str, [first, second]: [&str; 2]) -> String {
+    cells(name, ["", first, second, "diff.", "95 % interval", "better", "worse", "p"].map(str::to_owned))
 }
 
-/// A row a measure, the first with the name.
-pub(super) fn rows(name: &str, of: &PairedComparison, deformation: Deformation) -> Vec<String> {
+/// One row per measure, the first with the name.
+pub(super) fn measure_rows(name: &str, of: &PairedComparison, deformation: Deformation) -> Vec<String> {
     let mut all =
         vec![rate("Goal, %", &of.goal), rate("NoDrop, %", &of.no_drop), rate("Safety, %", &of.safety)];
     match deformation {
@@ -290,8 +274,8 @@ pub(super) fn rows(name: &str, of: &PairedComparison, deformation: Deformation) 
 fn rate(measure: &str, of: &RateDifference) -> [String; 8] {
     [
         measure.to_owned(),
-        plain(of.first, 1),
-        plain(of.second, 1),
+        unsigned(of.first, 1),
+        unsigned(of.second, 1),
         signed(of.difference, 1),
         interval(of.interval95, 1),
         of.better.to_string(),
@@ -303,8 +287,8 @@ fn rate(measure: &str, of: &RateDifference) -> [String; 8] {
 fn mean(measure: &str, of: &MeanDifference) -> [String; 8] {
     [
         measure.to_owned(),
-        plain(of.first, 2),
-        plain(of.second, 2),
+        unsigned(of.first, 2),
+        unsigned(of.second, 2),
         signed(of.difference, 2),
         interval(of.interval95, 2),
         of.better.to_string(),
@@ -313,7 +297,7 @@ fn mean(measure: &str, of: &MeanDifference) -> [String; 8] {
     ]
 }
 
-fn plain(value: Option<f64>, digits: usize) -> String {
+fn unsigned(value: Option<f64>, digits: usize) -> String {
     value.map_or_else(|| "–".to_owned(), |value| format!("{value:.digits$}"))
 }
 
@@ -326,7 +310,7 @@ fn interval(of: Option<[f64; 2]>, digits: usize) -> String {
 }
 
 fn cells(name: &str, cells: [String; 8]) -> String {
-    let mut text = format!("{:<NAME$}", shortened(name, NAME));
+    let mut text = format!("{:<NAME_WIDTH$}", shortened(name, NAME_WIDTH));
     let [measure, rest @ ..] = cells;
     // Writing to a String cannot fail.
     let _ = write!(text, " {measure:<9}");

@@ -1,46 +1,44 @@
-//! A suite under conditions: the rows of `conditions.json`, and the table of them against the reference.
+//! Results of a suite under several conditions: the rows of `conditions.json`, and their plain-text table.
 
 use std::fmt::Write;
 
 use serde::{Deserialize, Serialize};
 
 use super::{
-    comparison::{Deformation, KEY, head, rows},
+    comparison::{Deformation, LEGEND, headings, measure_rows},
     text_table::{WIDTH, push_line, push_rule, shortened},
 };
-use crate::evaluation::{
-    paired_stats::{PairedComparison, d_over_tau, pair_episodes},
-    record::EpisodeRecord,
-    statistics::{Distribution, Rate},
-    summary::Scores,
+use crate::{
+    evaluation::{
+        paired_stats::{PairedComparison, d_over_tau, pair_episodes},
+        record::EpisodeRecord,
+        statistics::{Distribution, Rate},
+        summary::Scores,
+    },
+    text::counted,
 };
 
-/// Columns of a condition's name.
-const NAME: usize = 40;
+/// Width of a condition's name, columns.
+const NAME_WIDTH: usize = 40;
 
-/// What a run of one condition came to.
+/// Results under one condition.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ConditionOutcome {
-    /// Its run folder, from the folder of all.
+    /// Its run folder, relative to that of all conditions.
     pub folder: String,
-    /// Episodes.
     pub episodes: usize,
-    /// Those that were invalid.
     pub invalid: usize,
-    /// Goal Success.
     pub goal_success_rate: Rate,
-    /// NoDrop.
     pub no_drop_rate: Rate,
-    /// Safety Success.
     pub safety_success_rate: Rate,
-    /// Peak D over τ of valid episodes that have both.
+    /// Peak D divided by τ, of valid episodes that have both.
     pub d_over_tau: Distribution,
-    /// Against the reference; null for the reference itself.
+    /// Paired comparison with the reference; null for the reference itself.
     pub paired: Option<PairedComparison>,
 }
 
 impl ConditionOutcome {
-    /// Of the episodes of a run, against those of its reference.
+    /// Results of `records`, compared with those of the reference.
     pub fn new(folder: String, records: &[EpisodeRecord], reference: Option<&[EpisodeRecord]>) -> Self {
         let scores = Scores::of(&records.iter().collect::<Vec<_>>());
         Self {
@@ -56,36 +54,30 @@ impl ConditionOutcome {
     }
 }
 
-/// One row: a condition of one suite.
+/// One condition of a suite.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ConditionRow {
-    /// Its name.
     pub condition: String,
-    /// Its shifts.
     pub shift: Vec<(String, f64)>,
-    /// Its settings.
     pub set: Vec<(String, String)>,
-    /// What came of it; null where it could change nothing and was not run.
+    /// Null if the condition could have no effect and was not run.
     pub outcome: Option<ConditionOutcome>,
-    /// Why it was not run; null where it was.
+    /// Reason for not running it; null if it was run.
     pub not_applicable: Option<String>,
 }
 
-/// One suite under all conditions, the reference first.
+/// A suite under all conditions, the reference first.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ConditionTable {
-    /// Suite name.
     pub suite: String,
-    /// Policy name, with what it has that no robot has.
+    /// Policy name with its privileged inputs.
     pub policy: String,
-    /// Whether targets deform, so that D/τ says something.
+    /// True if targets deform, so that D/τ is defined.
     pub deformable: bool,
-    /// The rows.
     pub rows: Vec<ConditionRow>,
 }
 
-/// The tables of a suite, in plain text of at most 100 columns: the rates of every condition, and how each differs from the
-/// reference, episode by episode.
+/// Plain-text tables of at most 100 columns: rates per condition, and paired change from the reference.
 pub fn table(suite: &ConditionTable) -> String {
     let mut out = String::new();
     let conditions = suite.rows.len().saturating_sub(1);
@@ -93,13 +85,16 @@ pub fn table(suite: &ConditionTable) -> String {
     push_line(
         &mut out,
         &format!(
-            "{} · policy {} · {conditions} conditions · {episodes} episodes each",
-            suite.suite, suite.policy
+            "{} · policy {} · {} · {} each",
+            suite.suite,
+            suite.policy,
+            counted(conditions, "condition"),
+            counted(episodes, "episode")
         ),
     );
     push_rule(&mut out, WIDTH);
-    let heading = ["Goal, %", "NoDrop, %", "Safety, %", "D peak/τ", "invalid"];
-    push_line(&mut out, &cells("condition", heading.map(str::to_owned)));
+    let columns = ["Goal, %", "NoDrop, %", "Safety, %", "D peak/τ", "invalid"];
+    push_line(&mut out, &cells("condition", columns.map(str::to_owned)));
     push_rule(&mut out, WIDTH);
     for row in &suite.rows {
         push_line(&mut out, &row_text(row, suite.deformable));
@@ -116,16 +111,17 @@ pub fn table(suite: &ConditionTable) -> String {
 
 fn against_reference(out: &mut String, suite: &ConditionTable) {
     let deformation = if suite.deformable { Deformation::OverTau } else { Deformation::None };
-    push_line(out, &head("against the reference", ["there", "here"]));
+    push_line(out, &headings("change from the reference", ["ref.", "cond."]));
     push_rule(out, WIDTH);
     for row in &suite.rows {
         let paired = row.outcome.as_ref().and_then(|outcome| outcome.paired.as_ref());
-        for text in paired.map(|paired| rows(&row.condition, paired, deformation)).unwrap_or_default() {
+        for text in paired.map(|paired| measure_rows(&row.condition, paired, deformation)).unwrap_or_default()
+        {
             push_line(out, &text);
         }
     }
     push_rule(out, WIDTH);
-    push_line(out, KEY);
+    push_line(out, LEGEND);
 }
 
 fn row_text(row: &ConditionRow, deformable: bool) -> String {
@@ -148,7 +144,7 @@ fn row_text(row: &ConditionRow, deformable: bool) -> String {
 }
 
 fn cells(name: &str, cells: [String; 5]) -> String {
-    let mut text = format!("{:<NAME$}", shortened(name, NAME));
+    let mut text = format!("{:<NAME_WIDTH$}", shortened(name, NAME_WIDTH));
     for cell in cells {
         // Writing to a String cannot fail.
         let _ = write!(text, "{cell:>11}");
@@ -173,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn a_table_has_a_row_a_condition_with_its_counts_and_fits_the_screen() {
+    fn the_table_has_one_row_per_condition_and_at_most_100_columns() {
         let reference = [sample()];
         let mut worse = sample();
         (worse.verdict.safety, worse.verdict.d_peak) = (false, Some(1.5));
@@ -194,7 +190,7 @@ mod tests {
         };
         assert_eq!(words("reference"), ["reference", "100.0", "100.0", "100.0", "0.333", "0"]);
         assert_eq!(words("heavy  "), ["heavy", "100.0", "100.0", "0.0", "1.500", "0"]);
-        let (_, against) = text.split_once("against the reference  ").unwrap();
+        let (_, against) = text.split_once("change from the reference").unwrap();
         let rows: Vec<&str> = against.lines().skip_while(|line| !line.starts_with("heavy")).take(4).collect();
         let cell = |row: usize, columns: &[&str]| {
             assert!(columns.iter().all(|cell| rows[row].contains(cell)), "{columns:?} in {}", rows[row]);

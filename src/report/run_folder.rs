@@ -1,8 +1,8 @@
-//! The folder of a run: `run.json`, `episodes.jsonl`, `summary.json` and what else belongs to it.
+//! The folder of a run: `run.json`, `episodes.jsonl`, `summary.json` and the files of the episodes.
 //!
-//! An episode's line is written and synced as soon as it is over, after its other files: whoever has a line has all. At the
-//! end of a run the lines are put into the order of the episodes, so that the file's bytes depend neither on the number of
-//! threads nor on how often the run was broken off.
+//! The line of an episode is written and synced when the episode ends, after its other files: an episode with a line is
+//! complete. At the end of a run the lines are sorted by episode, so that the file's bytes depend neither on the number of
+//! threads nor on interruptions.
 
 use std::{
     fs::{self, File, OpenOptions, TryLockError},
@@ -15,47 +15,38 @@ use crate::{
     files::{self, FileError},
 };
 
-/// One line an episode.
+/// One line per episode.
 pub const EPISODES: &str = "episodes.jsonl";
 /// Everything needed to repeat the run.
 pub const RUN: &str = "run.json";
-/// What the run says.
+/// Results of a finished run.
 pub const SUMMARY: &str = "summary.json";
 
-/// Why a run folder cannot be used.
+/// Error of using a run folder.
 #[derive(Debug, thiserror::Error)]
 pub enum RunFolderError {
-    /// It holds another run.
     #[error(
-        "{dir} already holds a run ({found}): go on with it by --resume, or give another folder with --out"
+        "{dir} already holds a run ({found}): resume it with --resume, or give another folder with --out"
     )]
     Occupied {
-        /// The folder.
         dir: String,
-        /// What was found in it.
+        /// The file that was found.
         found: &'static str,
     },
-    /// Another process writes to it.
-    #[error("another softvt is at work in {dir}; wait for it, or stop it")]
-    Busy {
-        /// The folder.
-        dir: String,
-    },
+    #[error("another softvt process is using {dir}; wait for it to finish, or stop it")]
+    Busy { dir: String },
     #[error(transparent)]
     File(#[from] FileError),
-    /// A line is not an episode.
     #[error("{path}:{line}: not an episode record: {source}")]
     BadLine {
-        /// The file.
         path: String,
-        /// Line number, from 1.
+        /// From 1.
         line: usize,
-        /// What is wrong.
         source: serde_json::Error,
     },
 }
 
-/// The folder of a run in progress: no other process gets it meanwhile.
+/// The folder of a run in progress, locked against other processes.
 #[derive(Debug)]
 pub struct RunFolder {
     dir: PathBuf,
@@ -63,26 +54,26 @@ pub struct RunFolder {
 }
 
 impl RunFolder {
-    /// Whether a run may be kept in `dir`.
+    /// Checks that `dir` holds no run.
     ///
     /// # Errors
-    /// It holds a run.
-    pub fn check(dir: &Path) -> Result<(), RunFolderError> {
+    /// It does.
+    pub fn check_vacant(dir: &Path) -> Result<(), RunFolderError> {
         match [RUN, EPISODES, SUMMARY].into_iter().find(|name| dir.join(name).exists()) {
             Some(found) => Err(RunFolderError::Occupied { dir: dir.display().to_string(), found }),
             None => Ok(()),
         }
     }
 
-    /// Makes `dir`, with the folders above it, and an empty `episodes.jsonl` in it.
+    /// Creates `dir` with an empty `episodes.jsonl`.
     ///
     /// # Errors
-    /// The folder holds a run, or cannot be made or written to.
+    /// The folder holds a run, or cannot be created or written to.
     pub fn create(dir: &Path) -> Result<Self, RunFolderError> {
         files::create_folder(dir)?;
-        Self::check(dir)?;
+        Self::check_vacant(dir)?;
         let path = dir.join(EPISODES);
-        // `create_new`: of two runs started at once on one folder, one must lose here.
+        // `create_new`: if two runs start in one folder at the same time, one must fail here.
         let episodes = OpenOptions::new().append(true).create_new(true).open(&path).map_err(|source| {
             match source.kind() {
                 io::ErrorKind::AlreadyExists => {
@@ -95,11 +86,11 @@ impl RunFolder {
         Ok(Self { dir: dir.into(), episodes })
     }
 
-    /// Goes on in `dir`, which may be empty or absent; the episodes that are finished. A last line that was torn by a crash is
-    /// taken off.
+    /// Opens `dir`, which may be empty or missing, and returns the finished episodes. A last line truncated by a crash is
+    /// removed.
     ///
     /// # Errors
-    /// Another process is at work there, a line is not an episode, the system refuses.
+    /// Another process is using the folder, a line is not an episode, or the system refuses.
     pub fn resume(dir: &Path) -> Result<(Self, Vec<EpisodeRecord>), RunFolderError> {
         files::create_folder(dir)?;
         let path = dir.join(EPISODES);
@@ -117,15 +108,14 @@ impl RunFolder {
         Ok((Self { dir: dir.into(), episodes }, records))
     }
 
-    /// Where it is.
     pub fn path(&self) -> &Path {
         &self.dir
     }
 
-    /// The text of a file of the folder, if it is there.
+    /// Text of a file of the folder, if it exists.
     ///
     /// # Errors
-    /// It cannot be read.
+    /// The file cannot be read.
     pub fn read(&self, name: &str) -> Result<Option<String>, RunFolderError> {
         let path = self.dir.join(name);
         match fs::read_to_string(&path) {
@@ -135,8 +125,7 @@ impl RunFolder {
         }
     }
 
-    /// Takes the record of an episode whose other files are written. It is on disk when this returns: after a crash the file
-    /// ends in at most one torn line.
+    /// Appends and syncs the record of an episode whose other files are written. A crash leaves at most one truncated line.
     ///
     /// # Errors
     /// The line cannot be written.
@@ -147,11 +136,11 @@ impl RunFolder {
         self.episodes.sync_data().map_err(io_error("sync", &path))
     }
 
-    /// Puts the lines into the order of `records`, which are all there are.
+    /// Rewrites the lines in the order of `records`, which must be all of them.
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn put_in_order(&mut self, records: &[EpisodeRecord]) -> Result<(), RunFolderError> {
+    pub fn write_in_order(&mut self, records: &[EpisodeRecord]) -> Result<(), RunFolderError> {
         let path = self.dir.join(EPISODES);
         let lines: Result<String, RunFolderError> =
             records.iter().map(|record| line(record, &path)).collect();
@@ -162,7 +151,7 @@ impl RunFolder {
         Ok(())
     }
 
-    /// Takes back what was written of a run that has no episode; the folder itself goes too if nothing else is in it.
+    /// Removes the files of a run without episodes, and the folder if it is empty then.
     ///
     /// # Errors
     /// A file cannot be removed.
@@ -170,17 +159,17 @@ impl RunFolder {
         for name in [RUN, EPISODES] {
             files::remove_if_present(&self.dir.join(name))?;
         }
-        // It may hold the user's own files; then it stays.
+        // Fails if the folder holds other files, which must stay.
         let _ = fs::remove_dir(&self.dir);
         Ok(())
     }
 }
 
-/// Keeps other processes out until the file is closed, which the system does for a process that dies.
+/// Locks the file until it is closed; the system closes it when the process dies.
 fn lock(episodes: &File, dir: &Path) -> Result<(), RunFolderError> {
     match episodes.try_lock() {
         Err(TryLockError::WouldBlock) => Err(RunFolderError::Busy { dir: dir.display().to_string() }),
-        // A file system without locks: as good as it gets.
+        // The file system does not support locks.
         Ok(()) | Err(TryLockError::Error(_)) => Ok(()),
     }
 }
@@ -189,7 +178,7 @@ pub(super) fn line(record: &EpisodeRecord, path: &Path) -> Result<String, RunFol
     Ok(serde_json::to_string(record).map_err(FileError::json(path))? + "\n")
 }
 
-/// Reads the episodes of a run folder. A last line that was torn by a crash is left out.
+/// Reads the episodes of a run folder. A last line truncated by a crash is skipped.
 ///
 /// # Errors
 /// The file cannot be read, or another line is not an episode.
@@ -198,13 +187,13 @@ pub fn read_episodes(dir: &Path) -> Result<Vec<EpisodeRecord>, RunFolderError> {
     parse(&fs::read(&path).map_err(io_error("read", &path))?, &path)
 }
 
-/// Whether the last line of its episodes was broken off while it was written.
-pub(super) fn is_torn(dir: &Path) -> bool {
+/// True if the last line of the episodes was truncated by a crash.
+pub(super) fn is_truncated(dir: &Path) -> bool {
     fs::read(dir.join(EPISODES)).is_ok_and(|bytes| bytes.last().is_some_and(|byte| *byte != b'\n'))
 }
 
 fn parse(bytes: &[u8], path: &Path) -> Result<Vec<EpisodeRecord>, RunFolderError> {
-    // What follows the last line break was torn.
+    // Text after the last line break was truncated.
     let lines: Vec<&[u8]> = bytes.split(|byte| *byte == b'\n').collect();
     let whole = lines[..lines.len() - 1].iter().enumerate().filter(|(_, line)| !line.is_empty());
     let read = whole.map(|(i, line)| {
@@ -240,23 +229,23 @@ mod tests {
     }
 
     #[test]
-    fn lines_are_put_in_order_at_the_end_whatever_finished_first() {
+    fn lines_are_sorted_at_the_end_of_a_run() {
         let root = tempfile::tempdir().unwrap();
         let dir = root.path().join("deep/run");
         let mut folder = RunFolder::create(&dir).unwrap();
         [2, 0, 1].into_iter().for_each(|i| folder.append(&episode(i)).unwrap());
         assert_eq!(indices(&dir), [2, 0, 1]);
-        folder.put_in_order(&[episode(0), episode(1), episode(2)]).unwrap();
+        folder.write_in_order(&[episode(0), episode(1), episode(2)]).unwrap();
         assert_eq!(indices(&dir), [0, 1, 2]);
         assert_eq!(read_episodes(&dir).unwrap()[1], episode(1));
     }
 
     #[test]
-    fn a_run_goes_on_behind_its_last_whole_line() {
+    fn a_run_is_resumed_after_its_last_complete_line() {
         let root = tempfile::tempdir().unwrap();
         let mut folder = RunFolder::create(root.path()).unwrap();
         (0..2).for_each(|i| folder.append(&episode(i)).unwrap());
-        assert!(RunFolder::resume(root.path()).is_err_and(|e| e.to_string().contains("at work")));
+        assert!(RunFolder::resume(root.path()).is_err_and(|e| e.to_string().contains("is using")));
         drop(folder);
         let path = root.path().join(EPISODES);
         let whole = fs::read_to_string(&path).unwrap();
@@ -270,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_with_a_run_is_refused_and_left_alone() {
+    fn a_folder_with_a_run_is_refused_and_not_modified() {
         let root = tempfile::tempdir().unwrap();
         let mut folder = RunFolder::create(root.path()).unwrap();
         folder.append(&episode(0)).unwrap();
@@ -283,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_that_cannot_be_made_is_named() {
+    fn the_error_names_a_folder_that_cannot_be_created() {
         let root = tempfile::tempdir().unwrap();
         let file = root.path().join("file");
         fs::write(&file, "x").unwrap();
@@ -292,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn a_torn_last_line_is_left_out_and_a_bad_line_before_it_is_not() {
+    fn a_truncated_last_line_is_skipped_and_an_invalid_line_is_an_error() {
         let root = tempfile::tempdir().unwrap();
         let mut folder = RunFolder::create(root.path()).unwrap();
         (0..2).for_each(|i| folder.append(&episode(i)).unwrap());

@@ -1,4 +1,4 @@
-//! Runs with their results, each with a name that tells it from the others.
+//! [`RunSummary`]: a run with its results and a distinct name.
 
 use std::collections::BTreeMap;
 
@@ -11,49 +11,54 @@ use crate::evaluation::{
 /// A run with its results.
 #[derive(Clone, Debug)]
 pub struct RunSummary {
-    /// What was run.
     pub run: StoredRun,
-    /// What came out.
     pub summary: SuiteSummary,
-    /// The policy, what of it no robot has, and what tells this run from the others of its suite.
+    /// Policy, its privileged inputs, and what distinguishes this run from others of its suite.
     pub method: String,
 }
 
-/// Sums runs up, in the order of their suites. A folder that is given twice counts once.
+/// An episode that is not safe.
+#[derive(Clone, Debug)]
+pub struct UnsafeEpisode<'a> {
+    pub record: &'a EpisodeRecord,
+    pub reason: String,
+}
+
+/// Summarises runs, sorted by suite. A folder given twice counts once.
 pub fn summarize_runs(mut runs: Vec<StoredRun>) -> Vec<RunSummary> {
-    let place = |run: &StoredRun| run.dir.canonicalize().unwrap_or_else(|_| run.dir.clone());
+    let canonical = |run: &StoredRun| run.dir.canonicalize().unwrap_or_else(|_| run.dir.clone());
     let mut seen = Vec::new();
     runs.retain(|run| {
-        let place = place(run);
-        let new = !seen.contains(&place);
-        seen.push(place);
-        new
+        let path = canonical(run);
+        let is_new = !seen.contains(&path);
+        seen.push(path);
+        is_new
     });
-    let mut all: Vec<RunSummary> = runs.into_iter().map(summed_up).collect();
+    let mut all: Vec<RunSummary> = runs.into_iter().map(summarize).collect();
     all.sort_by(|a, b| a.summary.suite.cmp(&b.summary.suite));
     let mut count: BTreeMap<(String, String), usize> = BTreeMap::new();
-    for judged in &all {
-        *count.entry((judged.summary.suite.clone(), judged.method.clone())).or_default() += 1;
+    for run in &all {
+        *count.entry((run.summary.suite.clone(), run.method.clone())).or_default() += 1;
     }
-    for judged in &mut all {
-        if count[&(judged.summary.suite.clone(), judged.method.clone())] > 1 {
-            judged.method += &format!(" · {}", judged.run.dir.display());
+    for run in &mut all {
+        if count[&(run.summary.suite.clone(), run.method.clone())] > 1 {
+            run.method += &format!(" · {}", run.run.dir.display());
         }
     }
     all
 }
 
-fn summed_up(run: StoredRun) -> RunSummary {
+fn summarize(run: StoredRun) -> RunSummary {
     let mut summary = SuiteSummary::of(run.suite(), run.text("policy"), &run.records);
-    summary.force_observed |= run.sees_forces();
+    summary.force_observed |= run.observes_forces();
     let method = [summary.method_label()].into_iter().chain(changes(&run)).collect::<Vec<_>>().join(" · ");
     RunSummary { run, summary, method }
 }
 
-/// What was changed of the suite, such as `mass=2`.
+/// Changes to the suite, such as `mass=2`.
 fn changes(run: &StoredRun) -> Option<String> {
     let pairs =
-        ["shifts", "set"].into_iter().flat_map(|field| run.info[field].as_array().into_iter().flatten());
+        ["shifts", "set"].into_iter().flat_map(|field| run.manifest[field].as_array().into_iter().flatten());
     let words: Vec<String> = pairs
         .map(|pair| {
             let value = pair[1].as_str().map_or_else(|| pair[1].to_string(), str::to_owned);
@@ -64,24 +69,28 @@ fn changes(run: &StoredRun) -> Option<String> {
 }
 
 impl RunSummary {
-    /// Whether its targets deform.
-    pub fn soft(&self) -> bool {
+    /// True if its targets deform.
+    pub fn is_soft(&self) -> bool {
         self.summary.scores.deformation_ok_rate.is_some()
     }
 
-    /// Its suite and method.
+    /// Suite and method.
     pub fn name(&self) -> String {
         format!("{}, {}", self.summary.suite, self.method)
     }
 
-    /// Its episodes that are not safe, with their reasons.
-    pub fn unsafe_episodes(&self) -> Vec<(&EpisodeRecord, String)> {
-        self.run.records.iter().filter_map(|record| Some((record, reason(record)?))).collect()
+    /// Unsafe episodes with their reasons.
+    pub fn unsafe_episodes(&self) -> Vec<UnsafeEpisode<'_>> {
+        self.run
+            .records
+            .iter()
+            .filter_map(|record| Some(UnsafeEpisode { record, reason: unsafe_reason(record)? }))
+            .collect()
     }
 }
 
-/// Why an episode is not safe; `None` if it is.
-pub fn reason(record: &EpisodeRecord) -> Option<String> {
+/// Reason for an episode to be unsafe; `None` if it is safe.
+pub fn unsafe_reason(record: &EpisodeRecord) -> Option<String> {
     let v = &record.verdict;
     if v.safety {
         return None;
@@ -99,9 +108,9 @@ pub fn reason(record: &EpisodeRecord) -> Option<String> {
         parts.push(format!("gave up: {why}"));
     }
     if let Some(drop) = &v.drop {
-        let what =
+        let reason =
             serde_json::to_value(drop.reason).ok().and_then(|v| v.as_str().map(|s| s.replace('_', " ")));
-        parts.push(format!("dropped at {:.1} s: {}", drop.time_s, what.unwrap_or_default()));
+        parts.push(format!("dropped at {:.1} s: {}", drop.time_s, reason.unwrap_or_default()));
     }
     if v.wrong_instance {
         parts.push("another object was lifted first".to_owned());
@@ -132,22 +141,22 @@ pub(super) mod tests {
             (record.identity.policy, record.identity.privileged) = (policy.into(), policy == "expert");
         }
         let suite = records.first().map_or("suite", |record| &record.identity.suite);
-        let info = json!({
+        let manifest = json!({
             "softvt": env!("CARGO_PKG_VERSION"), "script": "x.lua", "suite": suite, "policy": policy,
             "privileged": policy == "expert", "seed": 11, "split": "eval", "tasks": [0], "force_observed": false,
             "episodes": records.len(), "shifts": [], "set": [], "arguments": [],
         });
-        StoredRun { dir: Path::new(dir).into(), info, records, finished: true, torn: false }
+        StoredRun { dir: Path::new(dir).into(), manifest, records, is_finished: true, is_truncated: false }
     }
 
     #[test]
-    fn runs_of_one_suite_are_told_apart() {
+    fn runs_of_one_suite_have_distinct_names() {
         let plain = stored("runs/a", "expert", vec![sample()]);
         let mut heavy = stored("runs/b", "expert", vec![sample()]);
-        heavy.info["shifts"] = json!([["mass", 2.0]]);
-        heavy.info["set"] = json!([["robot.gripper.effort", "3"]]);
+        heavy.manifest["shifts"] = json!([["mass", 2.0]]);
+        heavy.manifest["set"] = json!([["robot.gripper.effort", "3"]]);
         let mut felt = stored("runs/c", "pi", vec![sample()]);
-        felt.info["force_observed"] = json!(true);
+        felt.manifest["force_observed"] = json!(true);
         let names = |runs: &[&StoredRun]| -> Vec<String> {
             summarize_runs(runs.iter().map(|run| (*run).clone()).collect())
                 .into_iter()
@@ -171,18 +180,18 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn an_unsafe_episode_says_why() {
+    fn an_unsafe_episode_has_a_reason() {
         let mut record = sample();
-        assert_eq!(reason(&record), None);
+        assert_eq!(unsafe_reason(&record), None);
         record.verdict.safety = false;
         record.verdict.d_peak = Some(2.5);
-        assert_eq!(reason(&record).unwrap(), "D 2.50 % is above τ 1.00 %");
+        assert_eq!(unsafe_reason(&record).unwrap(), "D 2.50 % is above τ 1.00 %");
         record.verdict.goal = false;
         record.outcome = Outcome::Timeout;
-        assert_eq!(reason(&record).unwrap(), "the budget ran out; D 2.50 % is above τ 1.00 %");
+        assert_eq!(unsafe_reason(&record).unwrap(), "the budget ran out; D 2.50 % is above τ 1.00 %");
         record.stats.gave_up = Some("it slipped".into());
-        assert!(reason(&record).unwrap().contains("; gave up: it slipped;"));
+        assert!(unsafe_reason(&record).unwrap().contains("; gave up: it slipped;"));
         record.outcome = Outcome::Error { message: "the action holds NaN".into() };
-        assert!(reason(&record).unwrap().starts_with("the action holds NaN"));
+        assert!(unsafe_reason(&record).unwrap().starts_with("the action holds NaN"));
     }
 }

@@ -1,4 +1,4 @@
-//! The shards of a run put together: the folder that one unbroken run would have left.
+//! Merges the shards of a run into the folder that a single run would have written.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -18,137 +18,145 @@ use crate::{
     files::{self, FileError},
 };
 
-/// Folders that hold files of single episodes.
-const PER_EPISODE: [&str; 4] = ["actions", "trace", "video", softvtbench_files::FOLDER];
+/// Folders with files of single episodes.
+const EPISODE_FOLDERS: [&str; 4] = ["actions", "trace", "video", softvtbench_files::FOLDER];
 
-/// Why shards cannot be merged.
+/// Error of merging shards.
 #[derive(Debug, thiserror::Error)]
 pub enum MergeError {
-    /// A run cannot be read.
     #[error(transparent)]
     Runs(#[from] StoredRunError),
-    /// A file cannot be written.
     #[error(transparent)]
     Folder(#[from] RunFolderError),
     #[error(transparent)]
     File(#[from] FileError),
-    /// They do not belong together.
     #[error("{0}")]
-    Unfit(String),
+    NotMergeable(String),
 }
 
-/// Merges the shards in `dirs` into the new folder `out`; the summaries of the runs that they make up, by suite.
+/// Merges the shards in `dirs` into the new folder `out`, and returns the summary of each merged run, sorted by suite.
 ///
 /// # Errors
-/// A shard is missing, unfinished, twice there or of another run; `out` exists; a file cannot be read or written.
+/// A shard is missing, unfinished, given twice or of another run; `out` exists; a file cannot be read or written.
 pub fn merge(out: &Path, dirs: &[PathBuf]) -> Result<Vec<SuiteSummary>, MergeError> {
     if out.exists() {
-        return Err(MergeError::Unfit(format!("{} exists already; name a new folder", out.display())));
+        return Err(MergeError::NotMergeable(format!("{} already exists; give a new folder", out.display())));
     }
     let mut suites: BTreeMap<String, Vec<StoredRun>> = BTreeMap::new();
-    let mut deep = false;
+    let mut in_subfolders = false;
     for dir in dirs {
         for run in load(dir)? {
-            deep |= run.dir != *dir;
+            in_subfolders |= run.dir != *dir;
             suites.entry(run.text("suite").to_owned()).or_default().push(run);
         }
     }
-    if suites.len() > 1 && !deep {
+    if suites.len() > 1 && !in_subfolders {
         let names: Vec<&str> = suites.keys().map(String::as_str).collect();
-        return Err(MergeError::Unfit(format!(
-            "these are shards of several suites ({}): merge each alone",
+        return Err(MergeError::NotMergeable(format!(
+            "these are shards of several suites ({}): merge each suite separately",
             names.join(", ")
         )));
     }
-    let parts: Result<Vec<_>, MergeError> = suites.values().map(|runs| whole(runs)).collect();
-    // All is checked before anything is written; it gets its name when it is whole.
-    let aside = out.with_file_name(format!("{}.part", out.file_name().unwrap_or_default().to_string_lossy()));
+    let parts: Result<Vec<_>, MergeError> = suites.values().map(|runs| compose(runs)).collect();
+    // Everything is checked before anything is written.
+    let temp = files::temp_path(out);
     let mut summaries = Vec::new();
-    for (runs, (info, records)) in suites.values().zip(parts?) {
-        let folder = match (deep, runs[0].dir.file_name()) {
-            (true, Some(name)) => aside.join(name),
-            _ => aside.clone(),
+    for (runs, run) in suites.values().zip(parts?) {
+        let folder = match (in_subfolders, runs[0].dir.file_name()) {
+            (true, Some(name)) => temp.join(name),
+            _ => temp.clone(),
         };
-        summaries.push(write(&folder, runs, &info, &records)?);
+        summaries.push(write(&folder, runs, &run)?);
     }
-    fs::rename(&aside, out).map_err(io_error("rename", &aside))?;
+    fs::rename(&temp, out).map_err(io_error("rename", &temp))?;
     Ok(summaries)
 }
 
-/// What the whole run was and its episodes, in order.
-fn whole(runs: &[StoredRun]) -> Result<(Value, Vec<EpisodeRecord>), MergeError> {
-    let unfit = |run: &StoredRun, what: String| MergeError::Unfit(format!("{}: {what}", run.dir.display()));
-    let without = |run: &StoredRun| {
-        let mut info = run.info.clone();
-        info.as_object_mut().map(|map| map.shift_remove("shard"));
-        info
+/// A run composed of shards.
+struct MergedRun {
+    manifest: Value,
+    /// Ordered by task and episode.
+    records: Vec<EpisodeRecord>,
+}
+
+/// Checks that the shards are complete and belong together.
+fn compose(runs: &[StoredRun]) -> Result<MergedRun, MergeError> {
+    let error =
+        |run: &StoredRun, what: String| MergeError::NotMergeable(format!("{}: {what}", run.dir.display()));
+    let manifest_without_shard = |run: &StoredRun| {
+        let mut manifest = run.manifest.clone();
+        manifest.as_object_mut().map(|map| map.shift_remove("shard"));
+        manifest
     };
-    let info = without(&runs[0]);
+    let manifest = manifest_without_shard(&runs[0]);
     let mut seen: BTreeMap<(usize, u32), &Path> = BTreeMap::new();
     for run in runs {
-        if run.info["shard"].is_null() {
-            return Err(unfit(run, "it is no shard: it was run without --shard".to_owned()));
+        if run.manifest["shard"].is_null() {
+            return Err(error(run, "it is not a shard: it was run without --shard".to_owned()));
         }
-        if without(run) != info {
-            return Err(unfit(run, format!("it is a shard of another run than {}", runs[0].dir.display())));
+        if manifest_without_shard(run) != manifest {
+            return Err(error(run, format!("it is a shard of another run than {}", runs[0].dir.display())));
         }
         for record in &run.records {
             let id = (record.identity.task, record.identity.episode);
             if let Some(other) = seen.insert(id, &run.dir) {
-                let what = format!("task {} episode {} is in {} too", id.0, id.1, other.display());
-                return Err(unfit(run, what));
+                let what = format!("task {} episode {} is also in {}", id.0, id.1, other.display());
+                return Err(error(run, what));
             }
         }
     }
-    let tasks: Vec<usize> =
-        info["tasks"].as_array().into_iter().flatten().filter_map(|n| Some(n.as_u64()? as usize)).collect();
-    let episodes = info["episodes"].as_u64().unwrap_or(0) as u32;
-    let wanted: BTreeSet<(usize, u32)> =
+    let tasks: Vec<usize> = manifest["tasks"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .filter_map(|n| Some(n.as_u64()? as usize))
+        .collect();
+    let episodes = manifest["episodes"].as_u64().unwrap_or(0) as u32;
+    let expected: BTreeSet<(usize, u32)> =
         tasks.iter().flat_map(|task| (0..episodes).map(|e| (*task, e))).collect();
-    let missing: Vec<_> = wanted.iter().filter(|id| !seen.contains_key(id)).collect();
+    let missing: Vec<_> = expected.iter().filter(|id| !seen.contains_key(id)).collect();
     if let Some((task, episode)) = missing.first() {
-        return Err(MergeError::Unfit(format!(
-            "suite {}: {} of {} episodes are in none of the shards, task {task} episode {episode} first: a shard is not given or not finished (--resume)",
+        return Err(MergeError::NotMergeable(format!(
+            "suite {}: {} of {} episodes are missing, the first of which is task {task} episode {episode}: a shard is not given or not finished (--resume)",
             runs[0].text("suite"),
             missing.len(),
-            wanted.len()
+            expected.len()
         )));
     }
     let mut records: Vec<EpisodeRecord> = runs.iter().flat_map(|run| run.records.clone()).collect();
     records.sort_by_key(|r| (r.identity.task, r.identity.episode));
-    Ok((info, records))
+    Ok(MergedRun { manifest, records })
 }
 
 fn write(
     folder: &Path,
     runs: &[StoredRun],
-    info: &Value,
-    records: &[EpisodeRecord],
+    MergedRun { manifest, records }: &MergedRun,
 ) -> Result<SuiteSummary, MergeError> {
     files::create_folder(folder)?;
     for run in runs {
-        for name in PER_EPISODE {
-            copy(&run.dir.join(name), &folder.join(name))?;
+        for name in EPISODE_FOLDERS {
+            copy_tree(&run.dir.join(name), &folder.join(name))?;
         }
     }
     let lines: Result<String, RunFolderError> =
         records.iter().map(|r| line(r, &folder.join(EPISODES))).collect();
     files::replace(&folder.join(EPISODES), lines?)?;
-    files::write_json(&folder.join(RUN), info)?;
+    files::write_json(&folder.join(RUN), manifest)?;
     let path = runs[0].dir.join(softvtbench_files::FOLDER).join(softvtbench_files::THRESHOLDS_JSON);
     let text = fs::read_to_string(&path).map_err(io_error("read", &path))?;
     let thresholds = ThresholdFile::parse(&text, &path.display().to_string())
-        .map_err(|error| MergeError::Unfit(error.to_string()))?;
+        .map_err(|error| MergeError::NotMergeable(error.to_string()))?;
     softvtbench_files::write_scores(folder, records, &thresholds)?;
-    // That of a twin is not the name of its suite.
+    // The records of a rigid twin carry its own suite name.
     let suite = records.first().map_or(runs[0].suite(), |record| &record.identity.suite);
     let summary = SuiteSummary::of(suite, runs[0].text("policy"), records);
     files::write_json(&folder.join(SUMMARY), &summary)?;
     Ok(summary)
 }
 
-/// Copies the folders of tasks in a folder; files beside them are of the whole run and are made anew.
-fn copy(from: &Path, to: &Path) -> Result<(), RunFolderError> {
+/// Copies the task folders in a folder. Files next to them describe the whole run and are written again.
+fn copy_tree(from: &Path, to: &Path) -> Result<(), RunFolderError> {
     let Ok(entries) = fs::read_dir(from) else { return Ok(()) };
     let mut folders: Vec<PathBuf> =
         entries.filter_map(Result::ok).map(|e| e.path()).filter(|p| p.is_dir()).collect();
@@ -156,11 +164,11 @@ fn copy(from: &Path, to: &Path) -> Result<(), RunFolderError> {
     for folder in folders {
         let inner = to.join(folder.file_name().unwrap_or_default());
         files::create_folder(&inner)?;
-        copy(&folder, &inner)?;
+        copy_tree(&folder, &inner)?;
         let files = fs::read_dir(&folder).map_err(io_error("read", &folder))?;
         for file in files.filter_map(Result::ok).map(|e| e.path()).filter(|p| p.is_file()) {
-            let goal = inner.join(file.file_name().unwrap_or_default());
-            fs::copy(&file, &goal).map_err(io_error("copy to", &goal))?;
+            let target = inner.join(file.file_name().unwrap_or_default());
+            fs::copy(&file, &target).map_err(io_error("copy to", &target))?;
         }
     }
     Ok(())

@@ -1,4 +1,4 @@
-//! Finished and unfinished runs as other commands read them.
+//! [`StoredRun`]: a finished or unfinished run, read from its folder.
 
 use std::{
     fs, io,
@@ -7,94 +7,70 @@ use std::{
 
 use serde_json::Value;
 
-use super::run_folder::{EPISODES, RUN, RunFolderError, SUMMARY, io_error, is_torn, read_episodes};
+use super::run_folder::{EPISODES, RUN, RunFolderError, SUMMARY, io_error, is_truncated, read_episodes};
 use crate::evaluation::record::EpisodeRecord;
 
-/// The version that made what this binary makes.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// What is in a run folder.
+/// Contents of a run folder.
 #[derive(Clone, Debug)]
 pub struct StoredRun {
-    /// The folder.
     pub dir: PathBuf,
-    /// `run.json`.
-    pub info: Value,
-    /// Its episodes, in the order of the tasks.
+    /// Contents of `run.json`.
+    pub manifest: Value,
+    /// Records of its episodes, ordered by task and episode.
     pub records: Vec<EpisodeRecord>,
-    /// Whether it came to its end.
-    pub finished: bool,
-    /// Whether its last episode was broken off while it was written.
-    pub torn: bool,
+    /// True if the run came to its end.
+    pub is_finished: bool,
+    /// True if the last line of its episodes was truncated by a crash.
+    pub is_truncated: bool,
 }
 
-/// Why runs cannot be read.
+/// Error of reading runs.
 #[derive(Debug, thiserror::Error)]
 pub enum StoredRunError {
-    /// The system refused, or a line is not an episode.
     #[error(transparent)]
     Folder(#[from] RunFolderError),
-    /// The same, of a run that another version made: which is the likely cause.
-    #[error("{error}; softvt {version} made this run, and this is softvt {VERSION}: read it with that one")]
-    Version {
-        /// What is wrong.
-        error: Box<Self>,
-        /// Who made it.
-        version: String,
-    },
-    /// There is nothing of that name.
+    /// An error whose likely cause is that the run was written by another version.
+    #[error(
+        "{error}; this run was written by softvt {version}, and this is softvt {VERSION}: read it with that version"
+    )]
+    Version { error: Box<Self>, version: String },
     #[error("there is no folder {dir}")]
-    Missing {
-        /// The folder.
-        dir: String,
-    },
-    /// A file is not a folder.
+    Missing { dir: String },
     #[error("{path} is a file; give the folder of a run")]
-    File {
-        /// The file.
-        path: String,
-    },
-    /// There is no run.
-    #[error("{dir} holds no run: neither it nor a folder in it has {RUN} and {EPISODES}")]
-    None {
-        /// The folder.
-        dir: String,
-    },
-    /// A file is not what its name says.
-    #[error("{path}: not that of a run: {what}")]
-    Info {
-        /// The file.
-        path: String,
-        /// What is wrong.
-        what: String,
-    },
+    File { path: String },
+    #[error("{dir} holds no run: neither the folder nor any of its subfolders has {RUN} and {EPISODES}")]
+    None { dir: String },
+    #[error("{path} is not a valid run file: {what}")]
+    Manifest { path: String, what: String },
 }
 
 impl StoredRun {
-    /// A text of `run.json`.
+    /// Text field of `run.json`; empty if missing.
     pub fn text(&self, field: &str) -> &str {
-        self.info[field].as_str().unwrap_or_default()
+        self.manifest[field].as_str().unwrap_or_default()
     }
 
-    /// The suite's name in results: that of a twin is its own.
+    /// Name of the suite in the results, which differs from that in `run.json` for a rigid twin.
     pub fn suite(&self) -> &str {
         self.records.first().map_or(self.text("suite"), |record| &record.identity.suite)
     }
 
-    /// Whether its policy sees the true state.
+    /// True if the policy has access to ground-truth state.
     pub fn is_privileged(&self) -> bool {
-        self.info["privileged"].as_bool() == Some(true)
+        self.manifest["privileged"].as_bool() == Some(true)
     }
 
-    /// Whether its policy sees the true forces at the pads.
-    pub fn sees_forces(&self) -> bool {
-        self.info["force_observed"].as_bool() == Some(true)
+    /// True if the policy observes ground-truth forces at the pads.
+    pub fn observes_forces(&self) -> bool {
+        self.manifest["force_observed"].as_bool() == Some(true)
     }
 
-    /// Episodes that it has when it is done: all, or a shard's part of them.
-    pub fn wanted(&self) -> usize {
-        let tasks = self.info["tasks"].as_array().map_or(0, Vec::len);
-        let all = tasks * self.info["episodes"].as_u64().unwrap_or(0) as usize;
+    /// Number of episodes of the complete run or shard.
+    pub fn requested_episodes(&self) -> usize {
+        let tasks = self.manifest["tasks"].as_array().map_or(0, Vec::len);
+        let all = tasks * self.manifest["episodes"].as_u64().unwrap_or(0) as usize;
         let shard = self.text("shard").split_once('/');
         match shard.and_then(|(i, n)| Some((i.parse::<usize>().ok()?, n.parse::<usize>().ok()?))) {
             Some((index, count)) if index > 0 && count > 0 => (all + count - index.min(all + count)) / count,
@@ -102,86 +78,93 @@ impl StoredRun {
         }
     }
 
-    /// Whether episodes are missing: it is at work, or was broken off.
+    /// True if episodes are missing: the run is in progress or was interrupted.
     pub fn is_partial(&self) -> bool {
-        !self.finished || self.records.len() < self.wanted()
+        !self.is_finished || self.records.len() < self.requested_episodes()
     }
 
-    /// What a reader of its results should know: a sentence each.
+    /// Notes for a reader of the results, one sentence each.
     pub fn remarks(&self) -> Vec<String> {
-        let mut found = Vec::new();
+        let mut remarks = Vec::new();
         let dir = self.dir.display();
         if self.is_partial() {
-            found.push(format!(
-                "{dir} is not finished: it has {} of {} episodes; it is at work, or goes on with --resume",
+            remarks.push(format!(
+                "{dir} is not finished: it has {} of {} episodes; it is still running, or can be resumed with --resume",
                 self.records.len(),
-                self.wanted()
+                self.requested_episodes()
             ));
         }
-        if self.torn {
-            found.push(format!(
-                "the last line of {dir}/{EPISODES} was broken off while it was written and counts for nothing; \
-                 --resume runs that episode again"
+        if self.is_truncated {
+            remarks.push(format!(
+                "the last line of {dir}/{EPISODES} is truncated and was skipped; --resume runs that episode again"
             ));
         }
         if self.text("softvt") != VERSION {
-            found.push(format!(
-                "softvt {} made {dir}, and this is softvt {VERSION}: numbers of two versions may differ",
+            remarks.push(format!(
+                "{dir} was written by softvt {}, and this is softvt {VERSION}: results of the two versions may differ",
                 self.text("softvt")
             ));
         }
-        found
+        remarks
     }
 }
 
-/// The run in a folder, or those in the folders in it, by name.
+/// Reads the run in a folder, or the runs in its subfolders, sorted by name.
 ///
 /// # Errors
-/// There is none; one cannot be read.
+/// There is no run, or one cannot be read.
 pub fn load(dir: &Path) -> Result<Vec<StoredRun>, StoredRunError> {
     if dir.join(RUN).is_file() {
-        return Ok(vec![one(dir)?]);
+        return Ok(vec![load_one(dir)?]);
     }
-    let shown = || dir.display().to_string();
+    let name = || dir.display().to_string();
     if dir.is_file() {
-        return Err(StoredRunError::File { path: shown() });
+        return Err(StoredRunError::File { path: name() });
     }
     let mut inner: Vec<PathBuf> = match fs::read_dir(dir) {
         Ok(entries) => entries.filter_map(Result::ok).map(|entry| entry.path()).collect(),
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
-            return Err(StoredRunError::Missing { dir: shown() });
+            return Err(StoredRunError::Missing { dir: name() });
         }
         Err(error) => return Err(io_error("read", dir)(error).into()),
     };
     inner.retain(|path| path.join(RUN).is_file());
     inner.sort();
     if inner.is_empty() {
-        return Err(StoredRunError::None { dir: shown() });
+        return Err(StoredRunError::None { dir: name() });
     }
-    inner.iter().map(|dir| one(dir)).collect()
+    inner.iter().map(|dir| load_one(dir)).collect()
 }
 
-fn one(dir: &Path) -> Result<StoredRun, StoredRunError> {
+fn load_one(dir: &Path) -> Result<StoredRun, StoredRunError> {
     let path = dir.join(RUN);
     let text = fs::read_to_string(&path).map_err(io_error("read", &path))?;
-    let wrong = |what: String| StoredRunError::Info { path: path.display().to_string(), what };
-    let info: Value = serde_json::from_str(&text).map_err(|e| wrong(e.to_string()))?;
-    let version = info["softvt"].as_str().unwrap_or_default().to_owned();
+    let invalid = |what: String| StoredRunError::Manifest { path: path.display().to_string(), what };
+    let manifest: Value = serde_json::from_str(&text).map_err(|e| invalid(e.to_string()))?;
+    let version = manifest["softvt"].as_str().unwrap_or_default().to_owned();
     let read = || -> Result<StoredRun, StoredRunError> {
         for field in ["softvt", "script", "suite", "policy"] {
-            if info[field].as_str().is_none() {
-                return Err(wrong(format!("it has no {field}")));
+            if manifest[field].as_str().is_none() {
+                return Err(invalid(format!("it has no {field}")));
             }
         }
-        for (field, fits) in [("tasks", info["tasks"].is_array()), ("episodes", info["episodes"].is_u64())] {
+        for (field, fits) in
+            [("tasks", manifest["tasks"].is_array()), ("episodes", manifest["episodes"].is_u64())]
+        {
             if !fits {
-                return Err(wrong(format!("it has no {field}")));
+                return Err(invalid(format!("it has no {field}")));
             }
         }
         let mut records = read_episodes(dir)?;
         records.sort_by_key(|r| (r.identity.task, r.identity.episode));
-        let finished = dir.join(SUMMARY).is_file();
-        Ok(StoredRun { dir: dir.to_owned(), info: info.clone(), records, finished, torn: is_torn(dir) })
+        let is_finished = dir.join(SUMMARY).is_file();
+        Ok(StoredRun {
+            dir: dir.to_owned(),
+            manifest: manifest.clone(),
+            records,
+            is_finished,
+            is_truncated: is_truncated(dir),
+        })
     };
     read().map_err(|error| match version == VERSION || version.is_empty() {
         true => error,

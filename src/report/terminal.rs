@@ -1,35 +1,43 @@
-//! The results table, in plain text of at most 100 columns.
+//! The results table of a run in the terminal, at most 100 columns wide.
 
 use super::text_table::{push_line, push_rule, shortened};
-use crate::evaluation::{
-    safety::KAPPAS,
-    statistics::{Distribution, Rate},
-    summary::{AbortedEpisode, Scores, SuiteSummary},
+use crate::{
+    evaluation::{
+        safety::KAPPAS,
+        statistics::{Distribution, Rate},
+        summary::{AbortedEpisode, Scores, SuiteSummary},
+    },
+    text::counted,
 };
 
-/// Columns of the task's name.
-const NAME: usize = 30;
-/// Columns of the whole table.
-const WIDTH: usize = 98;
+/// Width of a task's name, columns.
+const NAME_WIDTH: usize = 30;
+/// Width of the table, columns.
+const WIDTH: usize = 99;
 
-/// Episodes that were given up of which the table says why.
-const MOST_REASONS: usize = 10;
+/// Largest number of aborted episodes listed.
+const MAX_ABORTED_LISTED: usize = 10;
 
-/// The results of one suite: a row a task, all together, and the rates with their intervals.
+/// The results of one suite: one row per task, one for all, and the rates with their intervals.
 pub fn table(summary: &SuiteSummary) -> String {
     let mut out = String::new();
     let scores = &summary.scores;
     let soft = scores.deformation_ok_rate.is_some();
     push_line(
         &mut out,
-        &format!("{} · policy {} · {} episodes", summary.suite, summary.method_label(), scores.episodes),
+        &format!(
+            "{} · policy {} · {}",
+            summary.suite,
+            summary.method_label(),
+            counted(scores.episodes, "episode")
+        ),
     );
     push_rule(&mut out, WIDTH);
     push_line(
         &mut out,
         &format!(
-            "{:>3} {:<NAME$} {:>6} {:>6} {:>6} {:>7} {:>6} {:>6} {:>6} {:>6} {:>6}",
-            "#", "task", "Goal", "NoDrop", "Safety", "D mean", "P5", "median", "P95", "τ", "inval."
+            "{:>3} {:<NAME_WIDTH$} {:>6} {:>6} {:>6} {:>7} {:>6} {:>6} {:>6} {:>6} {:>7}",
+            "#", "task", "Goal", "NoDrop", "Safety", "D mean", "P5", "median", "P95", "τ", "invalid"
         ),
     );
     push_rule(&mut out, WIDTH);
@@ -53,8 +61,8 @@ fn row(number: &str, name: &str, scores: &Scores, tau: Option<f64>, soft: bool) 
         None => "N/A".into(),
     };
     format!(
-        "{number:>3} {:<NAME$} {:>6} {:>6} {:>6} {:>7} {:>6} {:>6} {:>6} {:>6} {:>6}",
-        shortened(name, NAME),
+        "{number:>3} {:<NAME_WIDTH$} {:>6} {:>6} {:>6} {:>7} {:>6} {:>6} {:>6} {:>6} {:>7}",
+        shortened(name, NAME_WIDTH),
         percent(&scores.goal_success_rate),
         percent(&scores.no_drop_rate),
         percent(&scores.safety_success_rate),
@@ -82,11 +90,11 @@ fn footer(out: &mut String, summary: &SuiteSummary) {
         );
     }
     let gap = scores.goal_safe_gap.map_or_else(|| "–".into(), |gap| format!("{gap:.1}"));
-    push_line(out, &format!("{:<22}{gap:>6} points", "Goal–safety gap"));
+    push_line(out, &format!("{:<22}{gap:>6} pp", "Goal–safety gap"));
     if !summary.kappa.is_empty() {
         let at = KAPPAS.iter().filter_map(|kappa| summary.kappa.iter().find(|row| row.kappa == *kappa));
         let text: Vec<String> =
-            at.map(|row| format!("κ {} {} %", row.kappa, percent(&row.safety_success_rate))).collect();
+            at.map(|row| format!("κ={}: {} %", row.kappa, percent(&row.safety_success_rate))).collect();
         push_line(out, &format!("{:<22}{}", "Safety Success at", text.join(" · ")));
         let (all, goal) = (scores.deformation.n, scores.deformation_goal);
         let of_goal = goal.mean.map_or_else(|| "–".into(), |mean| format!("{mean:.2} %"));
@@ -99,38 +107,44 @@ fn footer(out: &mut String, summary: &SuiteSummary) {
         );
     }
     if summary.privileged {
-        push_line(out, "the policy saw the true state (privileged): no robot has it");
+        push_line(out, "privileged policy: it had access to ground-truth state");
     }
     if summary.force_observed {
-        push_line(out, "the policy saw true forces at the pads (force_observed): no real sensor gives them");
+        push_line(
+            out,
+            "force_observed policy: it observed ground-truth forces at the pads, which no real sensor measures",
+        );
     }
     if scores.safety_unknown > 0 {
         push_line(
             out,
             &format!(
-                "{} valid episodes lack the evidence to judge safety (no threshold, or D not measured): not safe",
-                scores.safety_unknown
+                "safety could not be judged in {} (no threshold, or D not measured); counted as unsafe",
+                counted(scores.safety_unknown, "episode")
             ),
         );
     }
     if scores.invalid > 0 {
-        push_line(out, &format!("{} invalid episodes count as failures in every rate", scores.invalid));
+        push_line(
+            out,
+            &format!("{} counted as failed in every rate", counted(scores.invalid, "invalid episode")),
+        );
     }
     gave_up(out, summary);
 }
 
-/// Why whoever drove gave up, an episode a line.
+/// Reasons of aborted episodes, one per line.
 fn gave_up(out: &mut String, summary: &SuiteSummary) {
     let all = &summary.gave_up;
     if all.is_empty() {
         return;
     }
-    push_line(out, &format!("{} gave up in {} episodes:", summary.policy, all.len()));
-    for AbortedEpisode { task, episode, reason } in all.iter().take(MOST_REASONS) {
+    push_line(out, &format!("{} gave up in {}:", summary.policy, counted(all.len(), "episode")));
+    for AbortedEpisode { task, episode, reason } in all.iter().take(MAX_ABORTED_LISTED) {
         push_line(out, &shortened(&format!("  task {task} episode {episode}: {reason}"), WIDTH));
     }
-    if all.len() > MOST_REASONS {
-        push_line(out, &format!("  … and {} more, in summary.json", all.len() - MOST_REASONS));
+    if all.len() > MAX_ABORTED_LISTED {
+        push_line(out, &format!("  … and {} more, in summary.json", all.len() - MAX_ABORTED_LISTED));
     }
 }
 
@@ -143,7 +157,7 @@ fn interval(rate: &Rate) -> String {
     format!("{:>6} %{bounds}", percent(rate))
 }
 
-/// What distinguishes the prompts: whole words that all begin or end with are left out.
+/// The prompts without the whole words with which all of them begin or end.
 fn distinct_parts<'a>(prompts: &[&'a str]) -> Vec<&'a str> {
     let words: Vec<Vec<&str>> = prompts.iter().map(|p| p.split(' ').collect()).collect();
     let Some(shortest) = words.iter().map(Vec::len).min() else { return Vec::new() };
@@ -187,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn the_table_says_it_all_in_less_than_100_columns() {
+    fn the_table_has_fewer_than_100_columns_and_the_expected_numbers() {
         let text = table(&SuiteSummary::of("suite", "expert", &records()));
         assert!(text.lines().all(|line| line.chars().count() < 100), "{text}");
         let row = |start: &str| text.lines().find(|line| line.starts_with(start)).unwrap_or_default();
@@ -201,12 +215,12 @@ mod tests {
             ["1", "right", "0.0", "0.0", "0.0", "–", "–", "–", "–", "1.00", "1"]
         );
         assert_eq!(row("Safety Success  "), "Safety Success          33.3 %  [6.1, 79.2]");
-        assert_eq!(row("Goal–safety gap"), "Goal–safety gap         33.3 points");
+        assert_eq!(row("Goal–safety gap"), "Goal–safety gap         33.3 pp");
         assert_eq!(
             row("Safety Success at"),
-            "Safety Success at     κ 0.3 33.3 % · κ 0.5 33.3 % · κ 0.7 33.3 %"
+            "Safety Success at     κ=0.3: 33.3 % · κ=0.5: 33.3 % · κ=0.7: 33.3 %"
         );
-        assert!(text.contains("1 invalid episodes count as failures"));
+        assert!(text.contains("1 invalid episode counted as failed"));
     }
 
     #[test]
@@ -221,13 +235,13 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_run_has_a_table_too() {
+    fn an_empty_run_has_a_table() {
         let text = table(&SuiteSummary::of("suite", "expert", &[]));
         assert!(text.contains("0 episodes"), "{text}");
     }
 
     #[test]
-    fn prompts_are_cut_to_what_distinguishes_them() {
+    fn prompts_are_reduced_to_their_distinct_parts() {
         assert_eq!(distinct_parts(&["put a on it", "put b c on it"]), ["a", "b c"]);
         assert_eq!(distinct_parts(&["same", "same"]), ["same", "same"]);
         assert_eq!(distinct_parts(&["put it", "put it down"]), ["it", "it down"]);

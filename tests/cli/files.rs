@@ -138,7 +138,7 @@ fn a_folder_that_cannot_be_written_or_holds_a_run_is_refused_and_left_alone() {
     let before = (project.text("run/run.json"), project.text("run/episodes.jsonl"));
     assert_eq!(
         project.refusal("x.lua --out run --policy noop"),
-        "x.lua: run already holds a run (run.json): go on with it by --resume, or give another folder with --out"
+        "x.lua: run already holds a run (run.json): resume it with --resume, or give another folder with --out"
     );
     assert_eq!((project.text("run/run.json"), project.text("run/episodes.jsonl")), before);
 }

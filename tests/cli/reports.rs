@@ -86,8 +86,8 @@ fn what_is_no_run_is_named() {
         ("nowhere", "there is no folder nowhere"),
         ("x.lua", "x.lua is a file; give the folder of a run"),
         ("empty", "empty holds no run: neither it nor a folder in it has run.json and episodes.jsonl"),
-        ("bad/json", "bad/json/run.json: not that of a run: EOF while parsing"),
-        ("bad/fields", "bad/fields/run.json: not that of a run: it has no suite"),
+        ("bad/json", "bad/json/run.json is not a valid run file: EOF while parsing"),
+        ("bad/fields", "bad/fields/run.json is not a valid run file: it has no suite"),
         ("bad/line", "bad/line/episodes.jsonl:1: not an episode record"),
         ("bad/none", "cannot read bad/none/episodes.jsonl"),
     ] {
@@ -132,12 +132,12 @@ fn a_run_in_progress_shows_what_it_has() {
     let remark = "runs/a is not finished: it has 1 of 2 episodes";
     let said = project.succeeds("report runs/a runs/b --out page");
     assert!(said.err.contains(remark), "{}", said.err);
-    let torn = "the last line of runs/a/episodes.jsonl was broken off";
+    let torn = "the last line of runs/a/episodes.jsonl is truncated";
     assert!(said.err.contains(torn) && project.text("page/report.html").contains(torn), "{}", said.err);
     assert!(project.text("page/report.md").contains("| noop | 1 of 2 |"));
     let said = project.succeeds("compare runs/a runs/b");
-    assert!(said.out.contains("1 paired episodes") && said.out.contains(remark), "{}", said.out);
-    assert!(said.out.contains("1 episodes that only one run has are left out"), "{}", said.out);
+    assert!(said.out.contains("1 paired episode") && said.out.contains(remark), "{}", said.out);
+    assert!(said.out.contains("1 episode present in only one run was skipped"), "{}", said.out);
     project.write("runs/a/episodes.jsonl", b"");
     assert_eq!(project.refusal("compare runs/a runs/b"), "runs/a has no episode yet");
     project.succeeds("report runs/a --out page");

@@ -177,7 +177,7 @@ fn prepare_runs<'a>(
         let dir: PathBuf = out.join(&case.folder);
         // A finished run is left unchanged, and an interrupted one is continued on request.
         if !(case.config.resume || is_finished(&dir)) {
-            RunFolder::check(&dir)
+            RunFolder::check_vacant(&dir)
                 .map_err(|error| CliError::input(error).prefixed(case.config.file.display()))?;
         }
         let jobs = select_episodes(&case.config, suite, tasks);

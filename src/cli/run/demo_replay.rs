@@ -115,7 +115,13 @@ fn replay_demo(demo: &DemoRef) -> Result<DemoReplay, CliError> {
     let record = file.record(demo.demo).map_err(CliError::input)?;
     let info = file.environment().map_err(CliError::input)?["env_kwargs"].clone();
     let actions = file.actions(demo.demo).map_err(CliError::input)?;
-    let stored = StoredRun { dir: demo.file.clone(), info, records: Vec::new(), finished: true, torn: false };
+    let stored = StoredRun {
+        dir: demo.file.clone(),
+        manifest: info,
+        records: Vec::new(),
+        is_finished: true,
+        is_truncated: false,
+    };
     let simulated = stored_episode::simulate(&stored, &record, actions)?;
     Ok(DemoReplay {
         difference: resimulate::difference(&record, &simulated)?,

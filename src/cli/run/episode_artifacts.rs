@@ -129,7 +129,7 @@ fn aborted_frame(finished: &FinishedEpisode, step: usize) -> DebugFrame {
     let before = before.fold(0.0, f64::max);
     let peak = verdict.d_peak.filter(|peak| *peak > before);
     let shape =
-        DebugShape::broken_off(&identity.asset, finished.reference.as_ref(), peak, verdict.d_peak_max);
+        DebugShape::interrupted(&identity.asset, finished.reference.as_ref(), peak, verdict.d_peak_max);
     DebugFrame::new(identity, step as u32, false, shape)
 }
 

@@ -70,7 +70,7 @@ pub(crate) fn find_replay_source(
         ))
     })?;
     let refuse = |message: String| CliError::input(format!("--policy {}: {message}", run.dir.display()));
-    let seed = run.info["seed"].as_u64();
+    let seed = run.manifest["seed"].as_u64();
     if seed != Some(config.seed) {
         let seed = seed.map_or("unknown".to_owned(), |seed| seed.to_string());
         return Err(refuse(format!("its seed is {seed}, that of this run {}", config.seed)));
@@ -101,7 +101,7 @@ pub(crate) fn find_replay_source(
         run: run.dir.display().to_string(),
         policy: run.text("policy").to_owned(),
         privileged: run.is_privileged(),
-        force_observed: run.sees_forces(),
+        force_observed: run.observes_forces(),
         sha256: digest(run).map_err(CliError::input)?,
     }))
 }
@@ -140,7 +140,7 @@ fn suite_label(suite: &str, is_twin: bool) -> String {
 }
 
 fn is_rigid_twin(run: &StoredRun) -> bool {
-    run.info["twin"].is_string()
+    run.manifest["twin"].is_string()
 }
 
 fn has_actions(run: &StoredRun, index: EpisodeIndex) -> bool {

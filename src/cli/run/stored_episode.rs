@@ -55,7 +55,7 @@ fn stored_split(stored: &StoredRun) -> Result<Split, CliError> {
 
 /// The configuration of a stored run, with a policy whose actions come from elsewhere.
 fn stored_config(stored: &StoredRun) -> Result<RunConfig, CliError> {
-    let info = &stored.info;
+    let info = &stored.manifest;
     let missing = |field: &str| {
         let dir = stored.dir.display();
         CliError::input(format!("{dir}/run.json has no valid field {field:?}; it is of another version"))
@@ -93,7 +93,7 @@ fn stored_suite<'a>(plan: &'a Plan, config: &RunConfig, stored: &StoredRun) -> R
 /// Checks that scripts and thresholds are those of the stored run.
 fn check_sources(stored: &StoredRun, run: &SuiteRun) -> Result<(), CliError> {
     let now = json!(run.sources);
-    let before = stored.info["sources"].as_object().into_iter().flatten();
+    let before = stored.manifest["sources"].as_object().into_iter().flatten();
     let changed: Vec<&str> = before
         .filter(|(name, hash)| now.get(name.as_str()).is_some_and(|current| current != *hash))
         .map(|(name, _)| name.as_str())

@@ -267,7 +267,7 @@ impl<'a> SuiteRun<'a> {
             Ok(()) => {}
         }
         records.sort_by_key(EpisodeIndex::of);
-        folder.put_in_order(&records).map_err(CliError::input)?;
+        folder.write_in_order(&records).map_err(CliError::input)?;
         softvtbench_files::write_scores(&self.out, &records, &self.thresholds).map_err(CliError::input)?;
         let result = self.summarize(records);
         // Last, since a folder with a summary counts as finished.

@@ -1,130 +1,140 @@
-//! The episodes that are not safe: why, and how they looked or how to see them.
+//! Unsafe episodes of a run: reasons, stills, and commands that show the episode.
 
 use std::path::Path;
 
 use maud::{Markup, html};
 use serde_json::Value;
 
-use super::images::{Room, embedded, link};
+use super::images::{ByteBudget, DataImage, embed_image, relative_link};
 use crate::{
-    evaluation::record::{EpisodeRecord, Identity},
+    evaluation::record::Identity,
     report::{
-        run_summary::RunSummary,
+        run_summary::{RunSummary, UnsafeEpisode},
         video::{still_path, video_path},
     },
+    text::counted,
 };
 
-/// Episodes of a run that are listed.
-const LISTED: usize = 60;
-/// Bytes of stills that a page carries.
-const STILLS: usize = 12 << 20;
+/// Largest number of episodes listed per run.
+const MAX_LISTED: usize = 60;
+/// Largest size of all stills of a page, bytes.
+const MAX_STILL_BYTES: usize = 12 << 20;
 
-/// The episodes of all runs that are not safe, for a page in the folder `out`.
+/// Unsafe episodes of all runs, for a page in the folder `out`.
 pub(super) fn failures(runs: &[RunSummary], out: &Path) -> Markup {
-    // Each run gets its share, so that those of the first do not take it all.
-    let share = STILLS / runs.len().max(1);
-    html! { @for judged in runs { (of_run(judged, out, share)) } }
+    // The budget is divided among the runs, so that the first run cannot exhaust it.
+    let budget = MAX_STILL_BYTES / runs.len().max(1);
+    html! { @for run in runs { h3 { (run.name()) } (failures_of_run(run, out, budget)) } }
 }
 
-fn of_run(judged: &RunSummary, out: &Path, share: usize) -> Markup {
-    let all = judged.unsafe_episodes();
-    let count = judged.run.records.len();
-    let mut room = Room(share);
-    let stills: Vec<Markup> = all
-        .iter()
-        .take(LISTED)
-        .filter_map(|(record, why)| still(judged, record, why, out, &mut room))
-        .collect();
+fn failures_of_run(run: &RunSummary, out: &Path, budget: usize) -> Markup {
+    let all = run.unsafe_episodes();
+    let count = run.run.records.len();
+    if all.is_empty() {
+        let note = match count {
+            0 => "There is no episode yet.".to_owned(),
+            1 => "The episode is safe.".to_owned(),
+            _ => format!("All {count} episodes are safe."),
+        };
+        return html! { p.note { (note) } };
+    }
+    let listed = &all[..all.len().min(MAX_LISTED)];
+    let mut budget = ByteBudget(budget);
+    let stills: Vec<Markup> =
+        listed.iter().filter_map(|episode| still(run, episode, out, &mut budget)).collect();
+    let rest =
+        if all.len() > MAX_LISTED { format!("; the first {MAX_LISTED} are listed") } else { String::new() };
     html! {
-        h3 { (judged.name()) }
-        @if all.is_empty() {
-            p.note { @if count == 0 { "There is no episode yet." } @else { "All " (count) " episodes are safe." } }
-        } @else {
-            p.note {
-                (all.len()) " of " (count) " episodes"
-                @if all.len() > LISTED { "; the first " (LISTED) " are listed" }
-                "."
-            }
-            @if !stills.is_empty() { div.stills { @for still in &stills { (still) } } }
-            div.scroll tabindex="0" role="group" aria-label=(format!("Episodes of {} that are not safe", judged.name())) {
-                table.failures {
-                    thead { tr {
-                        th.number scope="col" { "Task" } th.number scope="col" { "Episode" }
-                        th.text scope="col" { "Object" } th.text scope="col" { "Why, and how to see it" }
-                    } }
-                    tbody { @for (record, why) in all.iter().take(LISTED) { (row(judged, record, why, out)) } }
-                }
+        p.note { (all.len()) " of " (counted(count, "episode")) (rest) "." }
+        @if !stills.is_empty() { div.stills { @for still in &stills { (still) } } }
+        (failure_table(run, listed, out))
+    }
+}
+
+fn failure_table(run: &RunSummary, episodes: &[UnsafeEpisode], out: &Path) -> Markup {
+    html! {
+        div.scroll tabindex="0" role="group" aria-label=(format!("Unsafe episodes of {}", run.name())) {
+            table.failures {
+                thead { (failure_header()) }
+                tbody { @for episode in episodes { (failure_row(run, episode, out)) } }
             }
         }
     }
 }
 
-fn row(judged: &RunSummary, record: &EpisodeRecord, why: &str, out: &Path) -> Markup {
-    let id = &record.identity;
-    let video = link(out, &video_path(&judged.run.dir, id.task, id.episode));
+fn failure_header() -> Markup {
+    html! {
+        tr {
+            th.number scope="col" { "Task" }
+            th.number scope="col" { "Episode" }
+            th.text scope="col" { "Object" }
+            th.text scope="col" { "Reason, and how to view it" }
+        }
+    }
+}
+
+fn failure_row(run: &RunSummary, episode: &UnsafeEpisode, out: &Path) -> Markup {
+    let id = &episode.record.identity;
+    let video = relative_link(out, &video_path(&run.run.dir, id.task, id.episode));
     html! {
         tr {
             th.number scope="row" { (id.task) }
             td.number { (id.episode) }
             td.text { (id.asset) }
             td.text {
-                (unbroken(why))
+                (with_unbreakable_units(&episode.reason))
                 @if let Some(video) = video { br; a href=(video) { "video" } }
-                @else { @for command in commands(judged, id) { br; code { (command) } } }
+                @else { @for command in view_commands(run, id) { br; code { (command) } } }
             }
         }
     }
 }
 
-/// The worst moment of an episode, if it was drawn.
-fn still(
-    judged: &RunSummary,
-    record: &EpisodeRecord,
-    why: &str,
-    out: &Path,
-    room: &mut Room,
-) -> Option<Markup> {
-    let id = &record.identity;
-    let place = format!("Task {} episode {}", id.task, id.episode);
-    let (address, [width, height]) = embedded(&still_path(&judged.run.dir, id.task, id.episode), room)?;
+/// Still of the worst moment of an episode, if it was rendered.
+fn still(run: &RunSummary, episode: &UnsafeEpisode, out: &Path, budget: &mut ByteBudget) -> Option<Markup> {
+    let id = &episode.record.identity;
+    let title = format!("Task {} episode {}", id.task, id.episode);
+    let DataImage { url, width, height } =
+        embed_image(&still_path(&run.run.dir, id.task, id.episode), budget)?;
     let alt = format!(
-        "{place}, {}, at its worst moment: third-person and wrist camera above, left and right finger below, deformation at the bottom",
+        "{title}, {}, at its worst moment: third-person and wrist camera above, left and right finger below, deformation at the bottom",
         id.asset
     );
-    let picture = html! { img src=(address) width=(width) height=(height) alt=(alt) loading="lazy"; };
-    let video = link(out, &video_path(&judged.run.dir, id.task, id.episode));
-    Some(html! {
-        figure.still {
-            @match video {
-                Some(video) => a href=(video) { (picture) },
-                None => (picture),
-            }
-            figcaption { b { (place) } ": " (unbroken(why)) }
-        }
-    })
+    let image = html! { img src=(url) width=(width) height=(height) alt=(alt) loading="lazy"; };
+    let image = match relative_link(out, &video_path(&run.run.dir, id.task, id.episode)) {
+        Some(video) => html! { a href=(video) { (image) } },
+        None => image,
+    };
+    let caption = with_unbreakable_units(&episode.reason);
+    Some(html! { figure.still { (image) figcaption { b { (title) } ": " (caption) } } })
 }
 
-/// A sentence in which no unit is parted from its number.
-fn unbroken(text: &str) -> String {
+/// Replaces spaces between numbers and units by no-break spaces.
+fn with_unbreakable_units(text: &str) -> String {
     text.replace(" %", "\u{a0}%").replace("τ ", "τ\u{a0}")
 }
 
-/// What to type to see an episode that was not drawn, and to see it come out the same again.
-fn commands(judged: &RunSummary, id: &Identity) -> [String; 2] {
-    let info = &judged.run.info;
-    let text = |field: &str| info[field].as_str().unwrap_or_default().to_owned();
-    let (script, own) = script_of(judged);
-    let mut view = vec!["softvt".to_owned(), "view".to_owned(), script];
-    if own {
+/// Commands that render an episode without a video, and that replay it.
+fn view_commands(run: &RunSummary, id: &Identity) -> [String; 2] {
+    let manifest = &run.run.manifest;
+    let text = |field: &str| manifest[field].as_str().unwrap_or_default().to_owned();
+    let SuiteScript { path, is_main } = suite_script(run);
+    let mut view = vec!["softvt".to_owned(), "view".to_owned(), path];
+    if is_main {
         view.extend(
-            info["arguments"].as_array().into_iter().flatten().filter_map(Value::as_str).map(str::to_owned),
+            manifest["arguments"]
+                .as_array()
+                .into_iter()
+                .flatten()
+                .filter_map(Value::as_str)
+                .map(str::to_owned),
         );
     }
-    // A policy behind a network has no word of its own in run.json.
-    let policy = if info["profile"].is_object() { "ws://HOST:PORT".to_owned() } else { text("policy") };
+    // The address of a remote policy is not stored in run.json.
+    let policy = if manifest["profile"].is_object() { "ws://HOST:PORT".to_owned() } else { text("policy") };
     let mut add = |flag: &str, value: String| view.extend([flag.to_owned(), value]);
     add("--task", id.task.to_string());
-    // What is so by default is left out, for a short line.
+    // Defaults are omitted.
     if id.episode > 0 {
         add("--episode", id.episode.to_string());
     }
@@ -132,11 +142,11 @@ fn commands(judged: &RunSummary, id: &Identity) -> [String; 2] {
     if id.seed > 0 {
         add("--seed", id.seed.to_string());
     }
-    if let Some(twin) = info["twin"].as_str() {
+    if let Some(twin) = manifest["twin"].as_str() {
         add("--twin", twin.to_owned());
     }
     for (flag, field) in [("--shift", "shifts"), ("--set", "set")] {
-        for pair in info[field].as_array().into_iter().flatten() {
+        for pair in manifest[field].as_array().into_iter().flatten() {
             let value = pair[1].as_str().map_or_else(|| pair[1].to_string(), str::to_owned);
             add(flag, format!("{}={value}", pair[0].as_str().unwrap_or_default()));
         }
@@ -145,22 +155,31 @@ fn commands(judged: &RunSummary, id: &Identity) -> [String; 2] {
     let replay = [
         "softvt".to_owned(),
         "replay".to_owned(),
-        judged.run.dir.display().to_string(),
+        run.run.dir.display().to_string(),
         format!("{}/{}", id.task, id.episode),
     ];
     [view, replay.to_vec()].map(|words| words.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" "))
 }
 
-/// The script that returns the suite itself, and whether it is the one that was run: a list of suites cannot be looked at.
-fn script_of(judged: &RunSummary) -> (String, bool) {
-    let main = judged.run.text("script");
-    let beside = Path::new(main).with_file_name(format!("{}.lua", judged.run.text("suite")));
-    let beside = beside.display().to_string();
-    let other = beside != main && judged.run.info["sources"].get(&beside).is_some();
-    if other { (beside, false) } else { (main.to_owned(), true) }
+/// Script of a suite.
+struct SuiteScript {
+    path: String,
+    /// True if it is the script that was run, to which `arguments` belong.
+    is_main: bool,
 }
 
-/// A word as a shell takes it for one.
+/// The script that returns the suite itself: `view` does not accept a list of suites, which may be what was run.
+fn suite_script(run: &RunSummary) -> SuiteScript {
+    let main = run.run.text("script");
+    let sibling = Path::new(main).with_file_name(format!("{}.lua", run.run.text("suite")));
+    let sibling = sibling.display().to_string();
+    if sibling != main && run.run.manifest["sources"].get(&sibling).is_some() {
+        return SuiteScript { path: sibling, is_main: false };
+    }
+    SuiteScript { path: main.to_owned(), is_main: true }
+}
+
+/// Quotes a word for a shell where necessary.
 fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+@%".contains(c);
     if !word.is_empty() && word.chars().all(plain) {

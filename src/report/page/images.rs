@@ -1,4 +1,4 @@
-//! Stills that the page carries, and links to files beside it.
+//! Images embedded in the page, and links to files next to it.
 
 use std::{
     fs,
@@ -13,59 +13,67 @@ use image::{
     imageops,
 };
 
-/// Width of a still in the page, pixels.
-const WIDTH: u32 = 480;
-/// Edges of the largest picture that is read, pixels.
-const LARGEST: u32 = 4096;
+/// Largest width of an embedded image, pixels.
+const MAX_WIDTH: u32 = 480;
+/// Largest width and height of an image that is read, pixels.
+const MAX_INPUT_EDGE: u32 = 4096;
 
-/// Bytes of pictures that a page may still carry.
+/// Bytes of images that may still be embedded.
 #[derive(Debug)]
-pub(super) struct Room(pub usize);
+pub(super) struct ByteBudget(pub usize);
 
-/// A PNG file as an address that holds it, made smaller if it is wide, with its width and height; `None` if there is none,
-/// if it is no picture, or if the page carries enough already.
-pub(super) fn embedded(path: &Path, room: &mut Room) -> Option<(String, [u32; 2])> {
+/// An image as a `data:` URL.
+#[derive(Debug)]
+pub(super) struct DataImage {
+    pub url: String,
+    pub width: u32,
+    pub height: u32,
+}
+
+/// Reads a PNG file, scaled down to the largest width; `None` if it is missing, not an image, or exceeds the budget.
+pub(super) fn embed_image(path: &Path, budget: &mut ByteBudget) -> Option<DataImage> {
     let bytes = fs::read(path).ok()?;
     let mut reader = ImageReader::with_format(Cursor::new(bytes), ImageFormat::Png);
     let mut limits = Limits::default();
-    (limits.max_image_width, limits.max_image_height) = (Some(LARGEST), Some(LARGEST));
+    (limits.max_image_width, limits.max_image_height) = (Some(MAX_INPUT_EDGE), Some(MAX_INPUT_EDGE));
     reader.limits(limits);
-    let picture = reader.decode().ok()?.into_rgb8();
-    let (width, height) = picture.dimensions();
-    let small = match width > WIDTH {
+    let image = reader.decode().ok()?.into_rgb8();
+    let (width, height) = image.dimensions();
+    let small = match width > MAX_WIDTH {
         true => imageops::resize(
-            &picture,
-            WIDTH,
-            (height * WIDTH / width).max(1),
+            &image,
+            MAX_WIDTH,
+            (height * MAX_WIDTH / width).max(1),
             imageops::FilterType::CatmullRom,
         ),
-        false => picture,
+        false => image,
     };
     let (width, height) = small.dimensions();
     let mut png = Vec::new();
     PngEncoder::new_with_quality(&mut png, CompressionType::Best, FilterType::Adaptive)
         .write_image(&small, width, height, ExtendedColorType::Rgb8)
         .ok()?;
-    room.0 = room.0.checked_sub(png.len())?;
-    Some((format!("data:image/png;base64,{}", BASE64.encode(&png)), [width, height]))
+    budget.0 = budget.0.checked_sub(png.len())?;
+    let url = format!("data:image/png;base64,{}", BASE64.encode(&png));
+    Some(DataImage { url, width, height })
 }
 
-/// The address of a file as a page in the folder `from` names it; both exist.
-pub(super) fn link(from: &Path, file: &Path) -> Option<String> {
+/// Relative URL of a file from a page in the folder `from`; `None` if either is missing.
+pub(super) fn relative_link(from: &Path, file: &Path) -> Option<String> {
     let (from, file) = (from.canonicalize().ok()?, file.canonicalize().ok()?);
     let (from, file): (Vec<Component>, Vec<Component>) =
         (from.components().collect(), file.components().collect());
     let same = from.iter().zip(&file).take_while(|(a, b)| a == b).count();
     let up = std::iter::repeat_n("..".to_owned(), from.len() - same);
-    let down = file[same..].iter().map(|part| escaped(&part.as_os_str().to_string_lossy()));
+    let down = file[same..].iter().map(|part| percent_encode(&part.as_os_str().to_string_lossy()));
     Some(up.chain(down).collect::<Vec<_>>().join("/"))
 }
 
-/// A part of an address (RFC 3986): what is not unreserved is escaped.
-fn escaped(part: &str) -> String {
-    let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.~".contains(&byte);
+/// Percent-encodes a path segment of a URL (RFC 3986).
+fn percent_encode(part: &str) -> String {
+    let is_unreserved = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.~".contains(&byte);
     part.bytes()
-        .map(|byte| if plain(byte) { char::from(byte).to_string() } else { format!("%{byte:02X}") })
+        .map(|byte| if is_unreserved(byte) { char::from(byte).to_string() } else { format!("%{byte:02X}") })
         .collect()
 }
 
@@ -76,32 +84,36 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_still_is_made_small_and_a_page_carries_only_so_many_bytes() {
+    fn images_are_scaled_down_and_limited_by_the_budget() {
         let root = tempfile::tempdir().unwrap();
         let path = root.path().join("still.png");
         RgbImage::from_fn(1024, 1056, |x, y| Rgb([x as u8, y as u8, 9])).save(&path).unwrap();
-        let mut room = Room(1 << 20);
-        let (address, size) = embedded(&path, &mut room).unwrap();
-        assert_eq!(size, [480, 495]);
+        let mut budget = ByteBudget(1 << 20);
+        let DataImage { url: address, width, height } = embed_image(&path, &mut budget).unwrap();
+        assert_eq!([width, height], [480, 495]);
         let bytes =
             BASE64.decode(address.strip_prefix("data:image/png;base64,").unwrap().as_bytes()).unwrap();
-        assert_eq!(room.0 + bytes.len(), 1 << 20);
-        assert!(embedded(&path, &mut Room(bytes.len() - 1)).is_none());
-        fs::write(&path, b"\x89PNG but no picture").unwrap();
+        assert_eq!(budget.0 + bytes.len(), 1 << 20);
+        assert!(embed_image(&path, &mut ByteBudget(bytes.len() - 1)).is_none());
+        fs::write(&path, b"\x89PNG but no image").unwrap();
         assert!(
-            embedded(&path, &mut room).is_none() && embedded(&root.path().join("none"), &mut room).is_none()
+            embed_image(&path, &mut budget).is_none()
+                && embed_image(&root.path().join("none"), &mut budget).is_none()
         );
     }
 
     #[test]
-    fn a_link_leads_from_the_page_to_the_file_whatever_its_name() {
+    fn links_lead_from_the_page_to_files_of_any_name() {
         let root = tempfile::tempdir().unwrap();
         let (page, run) = (root.path().join("out/page"), root.path().join("a \"run\" <1>"));
         fs::create_dir_all(&page).unwrap();
         fs::create_dir_all(&run).unwrap();
         fs::write(run.join("é.mp4"), b"").unwrap();
-        assert_eq!(link(&page, &run.join("é.mp4")).unwrap(), "../../a%20%22run%22%20%3C1%3E/%C3%A9.mp4");
-        assert_eq!(link(&run, &run.join("é.mp4")).unwrap(), "%C3%A9.mp4");
-        assert_eq!(link(&page, &run.join("none")), None);
+        assert_eq!(
+            relative_link(&page, &run.join("é.mp4")).unwrap(),
+            "../../a%20%22run%22%20%3C1%3E/%C3%A9.mp4"
+        );
+        assert_eq!(relative_link(&run, &run.join("é.mp4")).unwrap(), "%C3%A9.mp4");
+        assert_eq!(relative_link(&page, &run.join("none")), None);
     }
 }

@@ -1,35 +1,35 @@
-//! What a run was made with.
+//! Settings of a run.
 
 use maud::{Markup, html};
 use serde_json::Value;
 
 use crate::report::run_summary::RunSummary;
 
-/// The fields of `run.json` that one asks for first, and all of it below.
-pub(super) fn settings(judged: &RunSummary) -> Markup {
-    let info = &judged.run.info;
+/// The main fields of `run.json`, followed by the whole file.
+pub(super) fn settings(summary: &RunSummary) -> Markup {
+    let manifest = &summary.run.manifest;
     let fields = [
-        ("Folder", judged.run.dir.display().to_string()),
-        ("Script", words(&info["script"], &info["arguments"])),
-        ("Policy", judged.summary.method_label()),
-        ("softvt", plain(&info["softvt"])),
-        ("Seed, split", format!("{}, {}", plain(&info["seed"]), plain(&info["split"]))),
-        ("Episodes", format!("{} of {}", judged.run.records.len(), judged.run.wanted())),
-        ("Shifts", pairs(&info["shifts"])),
-        ("Settings changed", pairs(&info["set"])),
-        ("Options", map(&info["options"], "")),
-        ("Thresholds τ", map(&info["thresholds"], " %")),
+        ("Folder", summary.run.dir.display().to_string()),
+        ("Script", command_line(&manifest["script"], &manifest["arguments"])),
+        ("Policy", summary.summary.method_label()),
+        ("softvt", value_text(&manifest["softvt"])),
+        ("Seed, split", format!("{}, {}", value_text(&manifest["seed"]), value_text(&manifest["split"]))),
+        ("Episodes", format!("{} of {}", summary.run.records.len(), summary.run.requested_episodes())),
+        ("Shifts", pairs(&manifest["shifts"])),
+        ("Settings changed", pairs(&manifest["set"])),
+        ("Options", entries(&manifest["options"], "")),
+        ("Thresholds τ", entries(&manifest["thresholds"], " %")),
     ];
     html! {
         details {
-            summary { (judged.name()) }
+            summary { (summary.name()) }
             dl { @for (name, value) in fields { dt { (name) } dd { @if value.is_empty() { "none" } @else { (value) } } } }
-            details.inner { summary { "run.json" } pre { (format!("{info:#}")) } }
+            details.inner { summary { "run.json" } pre { (format!("{manifest:#}")) } }
         }
     }
 }
 
-fn plain(value: &Value) -> String {
+fn value_text(value: &Value) -> String {
     match value {
         Value::Null => "none".to_owned(),
         Value::String(text) => text.clone(),
@@ -41,21 +41,23 @@ fn plain(value: &Value) -> String {
     }
 }
 
-fn words(script: &Value, arguments: &Value) -> String {
+fn command_line(script: &Value, arguments: &Value) -> String {
     let all = [script].into_iter().chain(arguments.as_array().into_iter().flatten());
-    all.map(plain).collect::<Vec<_>>().join(" ")
+    all.map(value_text).collect::<Vec<_>>().join(" ")
 }
 
 fn pairs(list: &Value) -> String {
     let all = list.as_array().into_iter().flatten();
-    all.map(|pair| format!("{}={}", plain(&pair[0]), plain(&pair[1]))).collect::<Vec<_>>().join(", ")
+    all.map(|pair| format!("{}={}", value_text(&pair[0]), value_text(&pair[1])))
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
-fn map(object: &Value, unit: &str) -> String {
+fn entries(object: &Value, unit: &str) -> String {
     let all = object.as_object().into_iter().flatten();
     let shown = |(name, value): (&String, &Value)| match value {
         Value::Null => format!("{name} none"),
-        value => format!("{name} {}{unit}", plain(value)),
+        value => format!("{name} {}{unit}", value_text(value)),
     };
     all.map(shown).collect::<Vec<_>>().join(", ")
 }

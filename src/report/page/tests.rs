@@ -13,7 +13,7 @@ use crate::{
 
 const HOSTILE: &str = "<script>alert('x')</script>\"&lt; | \\input{x}";
 
-/// `count` soft episodes, every second of which is squeezed too much.
+/// `count` soft episodes, every second of which exceeds its threshold.
 fn episodes(suite: &str, count: u32) -> Vec<EpisodeRecord> {
     (0..count)
         .map(|i| {
@@ -28,12 +28,12 @@ fn episodes(suite: &str, count: u32) -> Vec<EpisodeRecord> {
         .collect()
 }
 
-fn made(runs: Vec<StoredRun>) -> String {
+fn render(runs: Vec<StoredRun>) -> String {
     page(&summarize_runs(runs), Path::new("."))
 }
 
 /// Elements that are opened must be closed in order; of attributes, none may come from a name.
-fn well_formed(page: &str) {
+fn assert_well_formed(page: &str) {
     const VOID: [&str; 4] = ["meta", "br", "img", "input"];
     let mut open: Vec<&str> = Vec::new();
     for part in page.split('<').skip(1) {
@@ -54,31 +54,31 @@ fn well_formed(page: &str) {
 }
 
 #[test]
-fn hostile_names_are_text_and_nothing_else() {
+fn hostile_names_are_escaped() {
     let mut records = episodes(HOSTILE, 4);
     for record in &mut records {
         (record.identity.prompt, record.identity.asset) = (HOSTILE.into(), HOSTILE.into());
         record.stats.gave_up = Some(HOSTILE.into());
     }
     let mut run = stored("/nowhere/it's <b>", HOSTILE, records);
-    run.info["arguments"] = json!([format!("--name={HOSTILE}")]);
-    run.info["shifts"] = json!([[HOSTILE, 2]]);
-    let page = made(vec![run]);
-    well_formed(&page);
+    run.manifest["arguments"] = json!([format!("--name={HOSTILE}")]);
+    run.manifest["shifts"] = json!([[HOSTILE, 2]]);
+    let page = render(vec![run]);
+    assert_well_formed(&page);
     assert!(!page.contains("<script") && !page.contains("<b>\""));
     assert!(page.contains("&lt;script&gt;alert('x')&lt;/script&gt;&quot;&amp;lt; | \\input{x}"));
-    assert!(page.contains("softvt replay '/nowhere/it'\\''s &lt;b&gt;' 0/1"), "words that a shell takes");
+    assert!(page.contains("softvt replay '/nowhere/it'\\''s &lt;b&gt;' 0/1"), "quoted for a shell");
 }
 
 #[test]
-fn a_page_needs_no_network_and_names_everything_for_those_who_do_not_see_it() {
+fn the_page_is_self_contained_and_accessible() {
     let mut rigid = episodes("rigid", 2);
     for record in &mut rigid {
         record.identity.soft = false;
         (record.verdict.d_peak, record.verdict.tau, record.verdict.deformation_ok) = (None, None, None);
     }
-    let page = made(vec![stored("a", "expert", episodes("soft", 9)), stored("b", "pi", rigid)]);
-    well_formed(&page);
+    let page = render(vec![stored("a", "expert", episodes("soft", 9)), stored("b", "pi", rigid)]);
+    assert_well_formed(&page);
     for word in ["http:", "https:", "src=\"/", "@import", "url("] {
         assert!(!page.contains(word), "{word}");
     }
@@ -100,7 +100,7 @@ fn a_page_needs_no_network_and_names_everything_for_those_who_do_not_see_it() {
 }
 
 #[test]
-fn stills_are_in_the_page_and_lead_to_their_videos() {
+fn stills_are_embedded_and_link_to_their_videos() {
     let root = tempfile::tempdir().unwrap();
     let dir = root.path().join("run");
     let folder = dir.join("video/task_000");
@@ -111,36 +111,36 @@ fn stills_are_in_the_page_and_lead_to_their_videos() {
     let out = root.path().join("page");
     fs::create_dir_all(&out).unwrap();
     let page = page(&summarize_runs(vec![run]), &out);
-    well_formed(&page);
+    assert_well_formed(&page);
     let link = "<a href=\"../run/video/task_000/episode_00001.mp4\">";
     assert!(page.contains(&format!("{link}<img src=\"data:image/png;base64,")), "{page}");
     assert!(page.contains("alt=\"Task 0 episode 1, bun, at its worst moment"));
     assert!(page.contains(&format!("{link}video</a>")));
-    assert!(page.contains("--episode 3 --policy noop"), "the other one was not drawn");
+    assert!(page.contains("--episode 3 --policy noop"), "the other one was not rendered");
 }
 
 #[test]
-fn forty_runs_and_none_fit_on_a_page() {
+fn pages_of_forty_runs_and_of_none_are_valid() {
     let runs = (0..40).map(|i| {
         let name = "a policy with a very long name ".repeat(6) + &i.to_string();
         stored(&format!("runs/{i}"), &name, episodes(&format!("suite{}", i % 4), 30))
     });
-    let page = made(runs.collect());
-    well_formed(&page);
+    let page = render(runs.collect());
+    assert_well_formed(&page);
     assert!(page.len() < 4 << 20, "{} bytes", page.len());
     let empty = stored("runs/empty", "noop", Vec::new());
-    let page = made(vec![empty]);
-    well_formed(&page);
+    let page = render(vec![empty]);
+    assert_well_formed(&page);
     assert!(page.contains("There is no episode yet."));
 }
 
 #[test]
-fn a_run_in_progress_or_of_another_version_is_told() {
+fn a_run_in_progress_or_of_another_version_is_reported() {
     let mut run = stored("runs/a", "noop", episodes("soft", 3));
-    (run.finished, run.info["episodes"], run.info["softvt"]) = (false, json!(20), json!("0.0.1"));
-    let page = made(vec![run]);
+    (run.is_finished, run.manifest["episodes"], run.manifest["softvt"]) = (false, json!(20), json!("0.0.1"));
+    let page = render(vec![run]);
     assert!(page.contains("runs/a is not finished: it has 3 of 20 episodes"), "{page}");
-    assert!(page.contains("softvt 0.0.1 made runs/a"));
+    assert!(page.contains("runs/a was written by softvt 0.0.1"));
 }
 
 /// Relative luminance and contrast as WCAG 2.1 defines them.
@@ -157,7 +157,7 @@ fn contrast(a: &str, b: &str) -> f64 {
 }
 
 #[test]
-fn words_and_marks_stand_out_in_light_in_dark_and_on_paper() {
+fn text_and_marks_have_contrast_in_all_colour_schemes() {
     let mut schemes = 0;
     for scheme in include_str!("page.css").split(":root {").skip(1) {
         let (block, _) = scheme.split_once('}').expect("it ends");

@@ -1,7 +1,7 @@
-//! SoftVTBench's files under its own names and units, so that its released scorer can score our runs.
+//! Files with SoftVTBench's names and units, for its released scorer.
 //!
-//! Its `safe_success` knows no NoDrop; ours is in `summary.json` of the run folder. Its scorer takes every
-//! `policy_action_debug.jsonl` for one episode, hence one folder an episode.
+//! Its `safe_success` ignores NoDrop; softvt's is in `summary.json` of the run folder. The scorer treats every
+//! `policy_action_debug.jsonl` as one episode, hence one folder per episode.
 
 use std::{
     collections::BTreeMap,
@@ -23,9 +23,9 @@ use crate::{
     files::{FileError, replace},
 };
 
-/// Name of the folder in a run folder.
+/// Folder within a run folder.
 pub const FOLDER: &str = "softvtbench";
-/// One row an episode.
+/// One row per episode.
 const EPISODES_CSV: &str = "episodes.csv";
 /// Rates, %.
 const SUMMARY_JSON: &str = "summary.json";
@@ -39,27 +39,22 @@ pub struct DebugFrame {
     pub frame: u32,
     /// Episode index in the task.
     pub exp_idx: u32,
-    /// Suite name.
     pub task_suite: String,
-    /// Task index in the suite.
     pub task_id: usize,
-    /// Whether the goal has been reached: held for long enough.
+    /// True once the goal has held for the required time.
     pub success_now: bool,
-    /// What is known of the target's shape.
     #[serde(flatten)]
     pub shape: DebugShape,
 }
 
-/// The target's deformation, in SoftVTBench's names. Percent of the bounding-box diagonal; lengths in m.
+/// Deformation of the target, with SoftVTBench's field names; % of the bounding-box diagonal, lengths in m.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DebugShape {
-    /// Whether D could be measured.
     pub fem_deformation_known: bool,
     /// [`METRIC_ID`]; null when not known.
     pub fem_deformation_metric_id: Option<String>,
     /// Asset of the target.
     pub fem_deformation_asset: String,
-    /// Number of nodes.
     pub fem_deformation_nodes: Option<usize>,
     /// Largest D over the physics steps of the control step, so that the peak of the frames is the peak of the rollout.
     pub fem_deformation_rms: Option<f64>,
@@ -67,15 +62,14 @@ pub struct DebugShape {
     pub fem_deformation_max: Option<f64>,
     /// Diagonal of the reference's bounding box.
     pub fem_bbox_diag: Option<f64>,
-    /// How far the bounding box's extents are from the reference's; null also where only the peak of D is known.
+    /// Distance of the bounding box's extents from the reference's; null if only the peak of D is known.
     pub fem_bbox_delta: Option<f64>,
-    /// Extents of the bounding box; null also where only the peak of D is known.
+    /// Extents of the bounding box; null if only the peak of D is known.
     pub fem_bbox_dims: Option<[f64; 3]>,
 }
 
 impl DebugShape {
-    /// From the worst `deformation` of a control step and the reference it was measured against; `None` where there is
-    /// none, as for a rigid target.
+    /// From the worst deformation in a control step and its reference; `None` for a rigid target.
     pub fn new(asset: &str, measured: Option<(&ReferenceShape, &Deformation)>) -> Self {
         let of = |f: fn(&ReferenceShape, &Deformation) -> f64| measured.map(|(r, d)| f(r, d));
         Self {
@@ -90,11 +84,9 @@ impl DebugShape {
             fem_bbox_dims: measured.map(|(_, d)| d.bbox_m.into()),
         }
     }
-}
 
-impl DebugShape {
-    /// Of a control step that broke off: its peaks (% of the diagonal) are known if they are those of the rollout.
-    pub fn broken_off(
+    /// For an interrupted control step, whose peaks (% of the diagonal) are known if they are those of the rollout.
+    pub fn interrupted(
         asset: &str,
         reference: Option<&ReferenceShape>,
         rms_pct: Option<f64>,
@@ -114,12 +106,11 @@ impl DebugShape {
 }
 
 impl DebugFrame {
-    /// The only row of an episode that ended before its first control step: the scorer counts no episode without one.
-    pub fn none(identity: &Identity) -> Self {
+    /// The only row of an episode that ended before its first control step; the scorer ignores episodes without rows.
+    pub fn placeholder(identity: &Identity) -> Self {
         Self::new(identity, 0, false, DebugShape::new(&identity.asset, None))
     }
 
-    /// The frame of control step `frame` of an episode.
     pub fn new(identity: &Identity, frame: u32, success_now: bool, shape: DebugShape) -> Self {
         Self {
             frame,
@@ -132,9 +123,9 @@ impl DebugFrame {
     }
 }
 
-/// Where an episode's `policy_action_debug.jsonl` is in the run folder `dir`.
+/// Path of an episode's `policy_action_debug.jsonl` in the run folder `dir`.
 pub fn debug_log_path(dir: &Path, task: usize, episode: u32) -> PathBuf {
-    // Zero-padded, so that the scorer, which sorts paths, meets the episodes in our order.
+    // Zero-padded, since the scorer sorts paths.
     dir.join(FOLDER).join(format!("task_{task:03}/episode_{episode:05}/policy_action_debug.jsonl"))
 }
 
@@ -143,7 +134,7 @@ pub fn debug_log_path(dir: &Path, task: usize, episode: u32) -> PathBuf {
 /// # Errors
 /// The file cannot be written.
 pub fn write_debug_log(path: &Path, identity: &Identity, frames: &[DebugFrame]) -> Result<(), FileError> {
-    let none = [DebugFrame::none(identity)];
+    let none = [DebugFrame::placeholder(identity)];
     let mut text = String::new();
     for frame in if frames.is_empty() { &none[..] } else { frames } {
         let line = serde_json::to_string(frame).map_err(FileError::json(path))?;
@@ -153,7 +144,7 @@ pub fn write_debug_log(path: &Path, identity: &Identity, frames: &[DebugFrame]) 
     replace(path, &text)
 }
 
-/// Whether all that [`write_scores`] writes is there.
+/// True if all files of [`write_scores`] exist.
 pub fn has_scores(dir: &Path) -> bool {
     [EPISODES_CSV, SUMMARY_JSON, THRESHOLDS_JSON].iter().all(|name| dir.join(FOLDER).join(name).is_file())
 }
@@ -174,7 +165,7 @@ pub fn write_scores(
     replace(&folder.join(THRESHOLDS_JSON), released.to_text())
 }
 
-/// `compression_sweep.jsonl`: the sweep rows of an asset. Their closure is the *opening*, 1 open … 0 shut.
+/// `compression_sweep.jsonl`: the sweep rows of an asset. Their closure is the *opening*: 1 open, 0 closed.
 pub fn sweep_jsonl(asset: &str, envelope: &Envelope) -> String {
     let rows = envelope.sweep.iter().enumerate().map(|(level, row)| {
         json!({
@@ -189,7 +180,7 @@ pub fn sweep_jsonl(asset: &str, envelope: &Envelope) -> String {
     rows.map(|row| format!("{row}\n")).collect()
 }
 
-/// SoftVTBench's Safe Success: Goal ∧ D_peak ≤ τ, without NoDrop; `None` where the evidence is missing.
+/// SoftVTBench's Safe Success: Goal ∧ D_peak ≤ τ, without NoDrop; `None` if evidence is missing.
 fn safe_success(record: &EpisodeRecord) -> Option<bool> {
     let verdict = &record.verdict;
     match (verdict.goal, record.identity.soft) {
@@ -203,8 +194,8 @@ fn deform_ok(record: &EpisodeRecord) -> Option<bool> {
     record.verdict.d_peak.zip(record.verdict.tau).map(|(d, tau)| d <= tau)
 }
 
-/// Why the scorer cannot judge an episode, in its words.
-fn reason(record: &EpisodeRecord) -> String {
+/// Reasons for which the scorer cannot judge an episode, in its terms.
+fn missing_evidence(record: &EpisodeRecord) -> String {
     let mut reasons = Vec::new();
     if record.verdict.d_peak.is_none() {
         reasons.push("missing_fem_deformation_rms".to_owned());
@@ -234,14 +225,14 @@ fn episodes_csv(records: &[EpisodeRecord]) -> String {
             "jsonl,{},{},{},{},{},{},{},{},{},{}\r\n",
             identity.task,
             identity.episode,
-            quoted(&identity.asset),
+            quote_csv(&identity.asset),
             truth(Some(verdict.goal)),
             number(verdict.d_peak),
             number(verdict.tau),
             truth(deform_ok(record)),
             truth(safe_success(record)),
             record.stats.steps.max(1),
-            quoted(&reason(record)),
+            quote_csv(&missing_evidence(record)),
         );
     }
     out
@@ -271,12 +262,12 @@ fn summary(records: &[EpisodeRecord]) -> Value {
         "n_safe_unknown": all.iter().filter(|r| safe_success(r).is_none()).count(),
         "goal_success_rate": goal_rate,
         "safe_success_rate": safe_rate,
-        "goal_safe_gap": goal_rate.zip(safe_rate).map(|(goal, safe)| decimals(goal - safe, 2)),
+        "goal_safe_gap": goal_rate.zip(safe_rate).map(|(goal, safe)| round_to(goal - safe, 2)),
         "rigid_mode": n > 0 && all.iter().all(|r| !r.identity.soft),
         "deformation_metric_id": METRIC_ID,
         "by_asset": by_asset,
     });
-    // Not among SoftVTBench's fields: a policy that may be compared with others leaves the file as it is there.
+    // Not a field of SoftVTBench, hence only written for privileged policies.
     if all.iter().any(|r| r.identity.privileged) {
         scores["privileged"] = json!(true);
     }
@@ -293,8 +284,8 @@ fn asset_summary(group: &[&EpisodeRecord]) -> Value {
         "goal": goal,
         "safe": safe,
         "tau": group.first().and_then(|r| r.verdict.tau),
-        "d_peak_p50": quantile(&peaks, 0.5).map(|d| decimals(d, 4)),
-        "d_peak_max": peaks.last().map(|d| decimals(*d, 4)),
+        "d_peak_p50": quantile(&peaks, 0.5).map(|d| round_to(d, 4)),
+        "d_peak_max": peaks.last().map(|d| round_to(*d, 4)),
         "goal_success_rate": rate(goal, group.len()),
         "safe_success_rate": rate(safe, group.len()),
     })
@@ -310,13 +301,13 @@ fn rate(count: usize, total: usize) -> Option<f64> {
     (total > 0).then(|| 100.0 * count as f64 / total as f64)
 }
 
-fn decimals(value: f64, digits: i32) -> f64 {
+fn round_to(value: f64, digits: i32) -> f64 {
     let scale = 10.0_f64.powi(digits);
     (value * scale).round() / scale
 }
 
-/// A CSV field, quoted where it must be (RFC 4180).
-fn quoted(field: &str) -> String {
+/// Quotes a CSV field where necessary (RFC 4180).
+fn quote_csv(field: &str) -> String {
     if field.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", field.replace('"', "\"\""))
     } else {

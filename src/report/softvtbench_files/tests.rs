@@ -20,7 +20,7 @@ fn records() -> Vec<EpisodeRecord> {
     vec![
         episode(1, "roll", |r| r.verdict.d_peak = Some(1.25)),
         episode(0, "bun", |r| {
-            // Dropped: not safe for us, safe for them.
+            // Dropped: unsafe for softvt, safe for SoftVTBench.
             (r.verdict.no_drop, r.verdict.safety, r.verdict.d_peak) = (false, false, Some(1.0));
         }),
         episode(2, "cake", |r| r.verdict.tau = None),
@@ -28,17 +28,17 @@ fn records() -> Vec<EpisodeRecord> {
 }
 
 #[test]
-fn episodes_csv_has_their_columns_values_and_line_ends() {
+fn episodes_csv_has_softvtbenchs_columns_and_line_ends() {
     let expected = "source,task,episode,asset,goal_success,d_peak,tau,deform_ok,safe_success,frames,reason\r\n\
         jsonl,0,0,bun,True,1.000000,1.000000,True,True,168,\r\n\
         jsonl,1,0,roll,True,1.250000,1.000000,False,False,168,\r\n\
         jsonl,2,0,cake,True,0.333333,,,,168,missing_tau:cake\r\n";
     assert_eq!(episodes_csv(&records()), expected);
-    assert_eq!(quoted("a,\"b\""), "\"a,\"\"b\"\"\"");
+    assert_eq!(quote_csv("a,\"b\""), "\"a,\"\"b\"\"\"");
 }
 
 #[test]
-fn summary_has_their_fields_and_no_nodrop() {
+fn the_summary_has_softvtbenchs_fields_and_ignores_nodrop() {
     let s = summary(&records());
     assert_eq!(s["n_episodes"], 3);
     assert_eq!(s["n_safe_unknown"], 1);
@@ -53,7 +53,7 @@ fn summary_has_their_fields_and_no_nodrop() {
 }
 
 #[test]
-fn a_rigid_episode_is_safe_when_its_goal_is_reached() {
+fn a_rigid_episode_is_safe_if_it_reaches_the_goal() {
     let rigid = episode(0, "box", |r| {
         r.identity.soft = false;
         (r.verdict.d_peak, r.verdict.tau) = (None, None);
@@ -63,7 +63,7 @@ fn a_rigid_episode_is_safe_when_its_goal_is_reached() {
 }
 
 #[test]
-fn a_debug_frame_says_how_the_target_is_shaped() {
+fn a_debug_frame_describes_the_shape_of_the_target() {
     let nodes = [Vec3::zeros(), Vec3::x() * 0.06, Vec3::y() * 0.03, Vec3::z() * 0.02];
     let reference = ReferenceShape::new(&nodes, &[1.0; 4]).unwrap();
     let now = nodes.map(|x| Vec3::new(0.5 * x.x, x.y, x.z));
@@ -76,14 +76,15 @@ fn a_debug_frame_says_how_the_target_is_shaped() {
     assert_eq!(frame["fem_deformation_rms"], d.rms_pct);
     assert!((frame["fem_bbox_diag"].as_f64().unwrap() - 0.07).abs() < 1e-12);
     assert!((frame["fem_bbox_delta"].as_f64().unwrap() - 0.03).abs() < 1e-12);
-    let broken = serde_json::to_value(DebugShape::broken_off("bun", Some(&reference), Some(9.5), Some(20.0)));
+    let broken =
+        serde_json::to_value(DebugShape::interrupted("bun", Some(&reference), Some(9.5), Some(20.0)));
     let broken = broken.unwrap();
     assert_eq!(
         (&broken["fem_deformation_known"], &broken["fem_deformation_rms"]),
         (&json!(true), &json!(9.5))
     );
     assert!(broken["fem_bbox_dims"].is_null() && broken["fem_bbox_diag"] == frame["fem_bbox_diag"]);
-    let unknown = DebugShape::broken_off("bun", Some(&reference), None, Some(20.0));
+    let unknown = DebugShape::interrupted("bun", Some(&reference), None, Some(20.0));
     assert_eq!(unknown, DebugShape::new("bun", None), "its peak was before");
     let unknown = serde_json::to_value(DebugShape::new("box", None)).unwrap();
     assert_eq!(unknown["fem_deformation_known"], false);
@@ -112,7 +113,7 @@ fn files_land_where_the_scorer_finds_them() {
 }
 
 #[test]
-fn their_closure_runs_the_other_way() {
+fn softvtbenchs_closure_is_inverted() {
     let envelope = Envelope::new(vec![], vec![squeeze(0.25, 2.0, true)], 0.5);
     let row: Value = serde_json::from_str(sweep_jsonl("bun", &envelope).trim()).unwrap();
     assert_eq!((&row["closure"], &row["stable"], &row["level"]), (&json!(0.75), &json!(true), &json!(0)));

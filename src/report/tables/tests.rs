@@ -5,7 +5,7 @@ use crate::{
 };
 
 #[test]
-fn rigid_suites_have_no_safety_and_privileged_ones_say_so_in_every_table() {
+fn rigid_suites_have_no_safety_and_privileged_policies_are_marked_in_every_table() {
     let mut rigid = sample();
     rigid.identity.suite = "rigid".into();
     rigid.identity.soft = false;
@@ -26,9 +26,9 @@ fn rigid_suites_have_no_safety_and_privileged_ones_say_so_in_every_table() {
 }
 
 #[test]
-fn a_run_in_progress_shows_how_far_it_is() {
+fn a_run_in_progress_shows_its_episode_count() {
     let mut run = stored("a", "noop", vec![sample()]);
-    run.info["episodes"] = serde_json::json!(20);
+    run.manifest["episodes"] = serde_json::json!(20);
     let table = main_table(&summarize_runs(vec![run]));
     assert_eq!(table.rows[0][2], "1 of 20");
 }
@@ -50,11 +50,10 @@ fn hostile() -> Table {
     let long = "x".repeat(400);
     let rows =
         HOSTILE.iter().chain([&&long[..]]).map(|name| strings([name, name, "1.0 [0.0, 2.0]"])).collect();
-    Table { caption: HOSTILE.join(" "), head: strings(["a_b", "%", "n"]), texts: 2, rows }
+    Table { caption: HOSTILE.join(" "), head: strings(["a_b", "%", "n"]), text_columns: 2, rows }
 }
 
-/// How a LaTeX engine would read a line: the depth of braces at its end, and the `&` that part cells. Anything that is
-/// special and not meant to be is an error.
+/// Depth of braces at the end of a LaTeX line, and its number of `&`. Panics at unescaped special characters.
 fn read_latex(line: &str) -> (i32, usize) {
     let (mut depth, mut parts, mut math) = (0, 0, false);
     let mut letters = line.chars().peekable();
@@ -88,7 +87,7 @@ fn read_latex(line: &str) -> (i32, usize) {
 }
 
 #[test]
-fn hostile_names_leave_a_latex_table_whole() {
+fn hostile_names_are_escaped_in_latex() {
     let text = hostile().latex();
     assert_eq!(text.matches("\\begin{").count(), 2);
     assert_eq!(text.matches("\\end{").count(), 2);
@@ -109,7 +108,7 @@ fn hostile_names_leave_a_latex_table_whole() {
 }
 
 #[test]
-fn hostile_names_leave_a_markdown_table_whole() {
+fn hostile_names_are_escaped_in_markdown() {
     let text = hostile().markdown();
     let rows: Vec<&str> = text.lines().filter(|line| line.starts_with("| ")).collect();
     assert_eq!(rows.len(), 2 + HOSTILE.len() + 1);

@@ -162,7 +162,7 @@ impl<'a> SuiteRecording<'a> {
             return outcome;
         }
         self.records.sort_by_key(EpisodeIndex::of);
-        folder.put_in_order(&self.records).map_err(CliError::input)?;
+        folder.write_in_order(&self.records).map_err(CliError::input)?;
         let kept = self.records.iter().filter(|record| rejection(record).is_none()).count();
         let kept =
             format!("{} in {}; continue with --resume", counted(kept, "demonstration"), self.root.display());
