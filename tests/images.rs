@@ -1,7 +1,6 @@
 //! Compares rendered images byte by byte with reviewed references in `tests/golden/camera`.
 //!
-//! After an intended change, regenerate the references with `SOFTVT_WRITE_GOLDEN=1 cargo test --release --test images` and look
-//! at them before committing.
+//! After an intended change, regenerate the references with `.ci/regenerate golden-images` and look at them before committing.
 
 use std::{path::PathBuf, sync::Arc};
 
@@ -34,7 +33,7 @@ fn check(name: &str, rendered: RenderedImage) {
     let (count, max) = differences.fold((0, 0), |(n, max), d| (n + usize::from(d > 0), max.max(d)));
     assert!(
         count == 0,
-        "{name}: {count} bytes differ, by up to {max}; if intended, regenerate it with SOFTVT_WRITE_GOLDEN=1 and look at it"
+        "{name}: {count} bytes differ, by up to {max}; if intended, run .ci/regenerate golden-images and look at it"
     );
 }
 

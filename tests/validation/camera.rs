@@ -69,7 +69,7 @@ fn linear(byte: u8) -> f64 {
     if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
 }
 
-/// Where a line of values passes from its first to its last, pixels: the place of an ideal step of the same sum.
+/// Position of the ideal step from the first to the last value that has the same sum, pixels.
 fn step(values: &[f64]) -> f64 {
     let (first, last) = (values[0], values[values.len() - 1]);
     values.iter().map(|v| (v - last) / (first - last)).sum()

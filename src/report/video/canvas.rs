@@ -53,24 +53,24 @@ impl Canvas {
     }
 
     /// Fills a rectangle whose top left corner is (x, y).
-    pub fn fill(&mut self, x: f32, y: f32, width: f32, height: f32, color: Rgb8, opacity: f32) {
+    pub fn fill(&mut self, x: f32, y: f32, width: f32, height: f32, colour: Rgb8, opacity: f32) {
         let Some(rect) = Rect::from_xywh(x, y, width, height) else { return };
-        let mut color = opaque(color);
-        color.set_alpha(opacity.clamp(0.0, 1.0));
+        let mut colour = opaque(colour);
+        colour.set_alpha(opacity.clamp(0.0, 1.0));
         let mut paint = Paint::default();
-        paint.set_color(color);
+        paint.set_color(colour);
         self.pixels.fill_rect(rect, &paint, Transform::identity(), None);
     }
 
     /// Draws a line through points; `dash` is the length of its strokes and gaps, 0 for a solid line.
-    pub fn line(&mut self, points: &[[f32; 2]], width: f32, dash: f32, color: Rgb8) {
+    pub fn line(&mut self, points: &[[f32; 2]], width: f32, dash: f32, colour: Rgb8) {
         let mut path = PathBuilder::new();
         for (i, &[x, y]) in points.iter().enumerate() {
             if i == 0 { path.move_to(x, y) } else { path.line_to(x, y) }
         }
         let Some(path) = path.finish() else { return };
         let mut paint = Paint::default();
-        paint.set_color(opaque(color));
+        paint.set_color(opaque(colour));
         paint.anti_alias = true;
         let dash = if dash > 0.0 { StrokeDash::new(vec![dash, dash], 0.0) } else { None };
         let stroke = Stroke { width, dash, ..Stroke::default() };
@@ -78,7 +78,7 @@ impl Canvas {
     }
 
     /// Writes a line of text that starts at x with its baseline at y. Returns the x coordinate of its end.
-    pub fn write(&mut self, text: &str, x: f32, y: f32, size: f32, color: Rgb8) -> f32 {
+    pub fn write(&mut self, text: &str, x: f32, y: f32, size: f32, colour: Rgb8) -> f32 {
         let Some(font) = self.font.clone() else { return x };
         let scaled = font.as_scaled(PxScale::from(size));
         let mut pen = x;
@@ -91,7 +91,7 @@ impl Canvas {
                 let bounds = outline.px_bounds();
                 outline.draw(|dx, dy, coverage| {
                     let (x, y) = (bounds.min.x as i64 + i64::from(dx), bounds.min.y as i64 + i64::from(dy));
-                    self.blend(x, y, coverage, color);
+                    self.blend(x, y, coverage, colour);
                 });
             }
             pen += scaled.h_advance(id);
@@ -107,19 +107,19 @@ impl Canvas {
         text.chars().map(|letter| scaled.h_advance(font.glyph_id(letter))).sum()
     }
 
-    fn blend(&mut self, x: i64, y: i64, coverage: f32, color: Rgb8) {
+    fn blend(&mut self, x: i64, y: i64, coverage: f32, colour: Rgb8) {
         let (width, height) = (i64::from(self.pixels.width()), i64::from(self.pixels.height()));
         if !(0..width).contains(&x) || !(0..height).contains(&y) {
             return;
         }
         let at = 4 * (y * width + x) as usize;
-        for (value, &color) in self.pixels.data_mut()[at..at + 3].iter_mut().zip(&color) {
+        for (value, &colour) in self.pixels.data_mut()[at..at + 3].iter_mut().zip(&colour) {
             let old = f32::from(*value);
-            *value = (old + coverage.clamp(0.0, 1.0) * (f32::from(color) - old)).round() as u8;
+            *value = (old + coverage.clamp(0.0, 1.0) * (f32::from(colour) - old)).round() as u8;
         }
     }
 
-    /// Returns the pixels.
+    /// Copies the pixels to an image.
     pub fn to_image(&self) -> RgbImage {
         let (width, height) = (self.pixels.width(), self.pixels.height());
         let rgb = |pixel: &[u8]| [pixel[0], pixel[1], pixel[2]];

@@ -167,8 +167,8 @@ fn draw_caption(canvas: &mut Canvas, recording: &StateRecording, caption: &Capti
     let is_last = index + 1 == recording.frames.len();
     if is_last {
         let width = canvas.text_width(&caption.verdict, 20.0);
-        let color = if caption.is_safe { SAFE } else { HARM };
-        canvas.write(&caption.verdict, WIDTH as f32 - MARGIN - width, top + 28.0, 20.0, color);
+        let colour = if caption.is_safe { SAFE } else { HARM };
+        canvas.write(&caption.verdict, WIDTH as f32 - MARGIN - width, top + 28.0, 20.0, colour);
     }
     draw_deformation_chart(canvas, recording, caption, index, top + 68.0);
 }
@@ -202,9 +202,9 @@ fn draw_deformation_chart(
         canvas.write(text, MARGIN, y + 46.0, 16.0, FAINT);
         return;
     };
-    let color = if caption.tau_pct.is_some_and(|tau| now > tau) { HARM } else { SAFE };
+    let colour = if caption.tau_pct.is_some_and(|tau| now > tau) { HARM } else { SAFE };
     canvas.line(&curve, 2.0, 0.0, SAFE);
-    canvas.write(&format!("{now:.2} %"), MARGIN, y + 48.0, 20.0, color);
+    canvas.write(&format!("{now:.2} %"), MARGIN, y + 48.0, 20.0, colour);
 }
 
 /// Path of an episode's video in a run folder.

@@ -22,7 +22,8 @@ pub struct RenderedImage {
     pub rgb: Vec<u8>,
     /// Depth along the optical axis, m, height × width; infinite in the background.
     pub depth: Vec<f32>,
-    /// [`segmentation_id`](super::RenderObject::segmentation_id) of the object at each pixel, height × width; 0 in the background.
+    /// The [`segmentation_id`](super::RenderObject::segmentation_id) of the object at each pixel, height × width; 0 in the
+    /// background.
     pub segmentation: Vec<u16>,
     /// Name of the object that contains the camera, if any. Surfaces are drawn from outside only, so the image shows the
     /// scene without that object.

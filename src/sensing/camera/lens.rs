@@ -33,7 +33,7 @@ pub(crate) struct Lens {
     to_world: RigidTransform,
 }
 
-/// A projected vertex.
+/// A vertex projected into the image.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ScreenVertex {
     /// Pixels from the left edge of the image.

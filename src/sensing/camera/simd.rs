@@ -15,7 +15,7 @@ pub(crate) const LANES: usize = 8;
 /// The index of each lane: 0, 1, … 7.
 pub(crate) const LANE_INDEX: f32x8 = f32x8::new([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
 
-/// Eight vectors.
+/// Eight three-component vectors.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Vec3x8 {
     pub(crate) x: f32x8,

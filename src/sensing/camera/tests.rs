@@ -295,7 +295,7 @@ fn red(image: &RenderedImage, camera: &Camera, p: Vec3) -> i32 {
 
 #[test]
 fn fixed_objects_cast_shadows_outside_the_fine_shadow_map() {
-    // Illumination along −x and down by as much; a wall of 1 m at x = 3 and a roof of 2 m a side over the origin.
+    // Light along −x, 45° downwards; a wall 1 m high at x = 3, and a roof 2 m wide above the origin.
     let mut lighting = Lighting { shadow_centre_w: Vec3::zeros(), ..Lighting::default() };
     (lighting.key.direction_w, lighting.key.softness_rad) = (Vec3::new(1.0, 0.0, 1.0), 0.01);
     let slab = |half: Vec3, at: Vec3| {

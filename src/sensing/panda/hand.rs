@@ -94,7 +94,7 @@ pub(super) fn finger(side: Side) -> RobotPart {
     }
 }
 
-/// The gel's dome and side walls in the finger's frame: samples of [`pads::PadSurface`], so that the drawn gel is the one in
+/// The gel's dome and side walls in the finger's frame, sampled from [`pads::PadSurface`]: the drawn gel is the one that makes
 /// contact.
 pub(super) fn gel(side: Side) -> Mesh {
     const ALONG: usize = 14;

@@ -66,7 +66,7 @@ struct PartMesh {
 }
 
 impl RobotMeshes {
-    /// Builds all meshes.
+    /// Builds the meshes of all parts.
     ///
     /// # Errors
     /// A part has no surface. This is a bug in this module.

@@ -13,7 +13,7 @@ use crate::{
     sensing::camera::CameraError,
 };
 
-/// How a solid is triangulated.
+/// Triangulation of a solid.
 #[derive(Clone, Debug)]
 pub enum Tessellation {
     /// By the surface mesher.

@@ -28,7 +28,7 @@ const TEXELS_PER_FEATURE: f32 = 8.0;
 /// Margin in texels painted around triangles: bilinear sampling reads neighbours.
 const PAINT_MARGIN: f32 = 1.5;
 
-/// Albedo and roughness.
+/// Albedo (linear RGB) and roughness.
 type Texel = [f32; 4];
 
 /// A projected part of a surface and its texture.
@@ -49,7 +49,7 @@ pub(crate) struct TextureChart {
     mips: OnceLock<Vec<MipLevel>>,
 }
 
-/// What a texture is painted from.
+/// Source of a texture.
 #[derive(Clone, Debug)]
 enum ChartSource {
     /// A flat face of one material.
@@ -185,8 +185,8 @@ struct SurfacePoint {
     inset: f32,
 }
 
-/// Enters the points of a triangle at the texels that it covers or nearly covers; each texel keeps the point with the greatest
-/// inset.
+/// Enters the points of a triangle at the texels that it covers or nearly covers. Of several points, a texel keeps the one with
+/// the greatest inset.
 fn project_triangle(
     corners: &[ChartVertex; 3],
     uvs: [[f32; 2]; 3],

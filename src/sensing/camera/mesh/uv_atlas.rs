@@ -101,7 +101,7 @@ pub(crate) fn parameterize(
         part.triangles.iter().for_each(|&t| chart_ids[t] = charts.len() as u32);
         let triangles = part.triangles.iter().map(|&t| lod.triangles[t].map(vertex)).collect();
         let curved = CurvedChart { material: material.clone(), triangles };
-        charts.push(TextureChart::curved(&part.side.direction(), texel, curved));
+        charts.push(TextureChart::curved(&part.direction.unit_vector(), texel, curved));
     }
     lod.uvs = texture_coordinates(&lod.positions, &lod.triangles, charts, &chart_ids);
     lod.chart_ids = chart_ids;
@@ -121,39 +121,39 @@ fn texture_coordinates(
 
 /// A direction along an axis.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Side {
+struct AxisDirection {
     axis: usize,
     is_negative: bool,
 }
 
-impl Side {
-    fn direction(self) -> V3 {
+impl AxisDirection {
+    fn unit_vector(self) -> V3 {
         V3::ith(self.axis, if self.is_negative { -1.0 } else { 1.0 })
     }
 }
 
-/// Connected triangles that face mostly to one side.
+/// Connected triangles that face mostly in one direction.
 struct Part {
-    side: Side,
+    direction: AxisDirection,
     triangles: Vec<usize>,
 }
 
 fn connected_parts(lod: &Lod) -> Vec<Part> {
-    let sides: Vec<Side> = lod
+    let directions: Vec<AxisDirection> = lod
         .triangles
         .iter()
         .map(|t| {
             let [a, b, c] = t.map(|v| lod.positions[v as usize]);
             let n = (b - a).cross(&(c - a));
             let axis = n.iamax();
-            Side { axis, is_negative: n[axis] < 0.0 }
+            AxisDirection { axis, is_negative: n[axis] < 0.0 }
         })
         .collect();
     let mut connected = UnionFind::new(lod.triangles.len());
-    let mut first_at: BTreeMap<(u32, Side), usize> = BTreeMap::new();
-    for (t, (corners, &side)) in lod.triangles.iter().zip(&sides).enumerate() {
+    let mut first_at: BTreeMap<(u32, AxisDirection), usize> = BTreeMap::new();
+    for (t, (corners, &direction)) in lod.triangles.iter().zip(&directions).enumerate() {
         for &v in corners {
-            let other = *first_at.entry((v, side)).or_insert(t);
+            let other = *first_at.entry((v, direction)).or_insert(t);
             connected.union(other, t);
         }
     }
@@ -161,7 +161,7 @@ fn connected_parts(lod: &Lod) -> Vec<Part> {
     for t in 0..lod.triangles.len() {
         parts.entry(connected.find(t)).or_default().push(t);
     }
-    parts.into_iter().map(|(first, triangles)| Part { side: sides[first], triangles }).collect()
+    parts.into_iter().map(|(first, triangles)| Part { direction: directions[first], triangles }).collect()
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ pub(crate) const TILE_EDGE: usize = 32;
 /// A front-facing triangle within the image.
 #[derive(Clone, Copy, Debug)]
 struct ScreenTriangle {
-    /// In clockwise order.
+    /// Clockwise in the image.
     corners: ScreenCorners,
     id: u32,
     /// First and last tile along each axis.

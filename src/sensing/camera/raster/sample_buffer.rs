@@ -24,8 +24,8 @@ pub(crate) const SAMPLE_OFFSETS: [[f32; 2]; ROWS_PER_PIXEL] =
 pub(crate) struct SampleBuffer<const PER_UNIT: usize> {
     columns: usize,
     rows: usize,
-    /// Reciprocal depth, or height towards the light. Rows are [`LANES`] longer than `columns`, since eight samples are
-    /// always written together.
+    /// Reciprocal depth, or height towards the light. Rows are [`LANES`] longer than `columns`, since samples are written eight
+    /// at a time.
     pub(crate) w: Vec<f32>,
     /// Triangle ids, or [`NO_TRIANGLE`]; empty in shadow maps.
     pub(crate) ids: Vec<u32>,
@@ -196,7 +196,7 @@ struct EdgeFunction {
     threshold: f32,
 }
 
-/// How much of a rectangle a triangle covers.
+/// Coverage of a rectangle by a triangle.
 #[derive(Clone, Copy, PartialEq)]
 enum Coverage {
     None,

@@ -41,11 +41,11 @@ pub(crate) struct BackgroundTile {
     direct: Channels,
     /// Mean radiance from the sky.
     ambient: Channels,
-    /// Position and unit normal of the surface with the greatest share of the pixel, world, m; the normal is zero in the
-    /// background.
+    /// Position of the surface with the greatest share of the pixel, world, m.
     p: Channels,
+    /// Unit normal of that surface; zero in the background.
     n: Channels,
-    /// That share; emptied by [`finish`](Self::finish).
+    /// Share of the pixel that this surface has; emptied by [`finish`](Self::finish).
     max_share: Vec<f32>,
     bounds: Option<TileBounds>,
     pub(crate) samples: TileSamples,

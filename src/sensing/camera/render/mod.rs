@@ -24,7 +24,7 @@ use crate::{
     },
 };
 
-/// Draws camera images.
+/// Draws images of a [`RenderScene`] as cameras see it.
 ///
 /// A renderer keeps working memory between images. It also caches the moving shadows of the last state, which all cameras
 /// share, and the background (all fixed objects) of every camera that is fixed in the world. Neither changes depth or
@@ -147,7 +147,7 @@ fn blank_samples(lens: &Lens) -> TileSamples {
     TileSamples::new(TILE_EDGE, TILE_EDGE, 1.0 / lens.far, true)
 }
 
-/// Draws all objects.
+/// Draws all objects, without a cached background.
 fn draw_all(pass: &RenderPass, bins: &mut TileBins) -> RenderedImage {
     bins.clear(pass.lens);
     pass.bin_objects(false, bins);

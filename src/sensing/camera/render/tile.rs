@@ -24,7 +24,7 @@ pub(crate) const TILE_PIXELS: usize = TILE_EDGE * TILE_EDGE;
 /// The samples of a tile.
 pub(crate) type TileSamples = SampleBuffer<ROWS_PER_PIXEL>;
 
-/// Where the values of eight lanes go: pixels of the tile, and their shares of them.
+/// Pixels of a tile that eight lanes contribute to, and the share of each.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PixelTargets {
     pixel: [u32; LANES],
@@ -143,7 +143,7 @@ impl TileRect {
         bins.collect_visible(self.tile, self.origin(), triangles)
     }
 
-    /// Rasterises triangles.
+    /// Rasterises the triangles of the tile.
     pub(crate) fn rasterize(&self, triangles: &[TileTriangle], samples: &mut TileSamples) {
         triangles.iter().for_each(|t| samples.draw::<true>(&t.corners, self.origin(), t.id));
     }

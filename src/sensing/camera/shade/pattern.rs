@@ -9,7 +9,7 @@ use crate::{
 /// Material parameters at a point of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct MaterialSample {
-    /// Linear RGB.
+    /// Diffuse or metallic colour, linear RGB.
     pub(crate) albedo: V3,
     pub(crate) roughness: f32,
     pub(crate) metalness: f32,

@@ -16,7 +16,7 @@ pub(crate) struct SurfaceSamples {
     pub(crate) p: Vec3x8,
     /// Unit normals, world.
     pub(crate) n: Vec3x8,
-    /// Linear RGB.
+    /// Diffuse or metallic colour, linear RGB.
     pub(crate) albedo: Vec3x8,
     pub(crate) roughness: f32x8,
     pub(crate) metalness: f32x8,
@@ -46,7 +46,7 @@ impl DirectAndAmbient {
 pub(crate) struct Illumination {
     /// Unit vector towards the key light.
     to_key: V3,
-    /// Colour times strength.
+    /// Colour of the key light times its strength.
     key: V3,
     zenith: V3,
     horizon: V3,

@@ -101,9 +101,9 @@ pub(crate) struct ShadowMap {
 /// Eight points in the frame of a shadow map.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LightSpacePoints {
-    /// Texels.
+    /// Column in the map, texels.
     pub(crate) u: f32x8,
-    /// Texels.
+    /// Row in the map, texels.
     pub(crate) v: f32x8,
     /// Height towards the light, m.
     pub(crate) height: f32x8,
@@ -149,7 +149,7 @@ impl ShadowMap {
         }
     }
 
-    /// Removes all casters.
+    /// Empties the map for the next set of casters.
     pub(crate) fn clear(&mut self) {
         self.heights.clear(EMPTY);
     }
