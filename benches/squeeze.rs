@@ -1,4 +1,4 @@
-//! CPU time of the squeeze of issue 2: a soft cube on a table is gripped by two flat pads, lifted and held.
+//! CPU time of a squeeze: a soft cube on a table is gripped by two flat pads, lifted and held.
 //!
 //! `cargo bench --bench squeeze` prints CPU seconds of this thread per simulated second, by phase, the best of
 //! [`ROUNDS`] runs: other load on the machine lengthens the wall clock, not this.
@@ -7,16 +7,10 @@
 use std::time::Instant;
 
 use softvt::{
-    geometry::{
-        Pose, Vec3,
-        samples::{SampleSpec, surface_samples},
-        shape::Shape,
-        voxel::{VoxelSpec, voxel_mesh},
-    },
+    geometry::{Pose, Vec3, shape::Shape},
     physics::{
-        BodyId, ColliderId, KinematicId, PhysicsParams, SoftId, World,
-        contact::Friction,
-        fem::{ElasticMaterial, FemModel},
+        BodyId, ColliderId, KinematicId, PhysicsParams, SoftId, World, contact::Friction,
+        fem::ElasticMaterial, world::SoftBodyBuilder,
     },
 };
 
@@ -33,7 +27,7 @@ const LIFT: f64 = 1.0;
 const HOLD: f64 = 0.5;
 const RISE: f64 = 0.1;
 
-/// What is squeezed, and how.
+/// One squeeze.
 struct Case {
     name: &'static str,
     gap: f64,
@@ -57,7 +51,7 @@ struct Outcome {
     newton: u32,
     newton_max: u32,
     factored: u32,
-    refills: u64,
+    factorizations: u64,
     force_grip: f64,
     force_hold: f64,
 }
@@ -65,16 +59,15 @@ struct Outcome {
 impl Scene {
     fn new(case: &Case, sleeping: bool) -> Self {
         let shape = Shape::Box { half: Vec3::repeat(0.5 * EDGE) };
-        let mesh = voxel_mesh(&shape, &VoxelSpec { resolution: case.resolution }).expect("a cube has a mesh");
-        let samples = surface_samples(&shape, &mesh, &SampleSpec::default());
         let material = ElasticMaterial { youngs_pa: 3e4, poisson: 0.4, density: 300.0 };
-        let rest = FemModel::new(mesh, material, EDGE.powi(3), samples);
+        let builder = SoftBodyBuilder::new("cube", &shape, material).resolution(case.resolution);
+        let model = builder.model().expect("a cube has a mesh");
         let params =
             PhysicsParams { rayleigh_stiffness: 2e-3, sleeping, dt: case.dt, ..PhysicsParams::default() };
         let mut world = World::new(params, Vec3::new(0.0, 0.0, -9.81));
         let grip = Friction { static_mu: 1.2, dynamic_mu: 1.2 };
         let body =
-            world.add_soft("cube", rest, None, &Pose::translation(0.0, 0.0, 0.5 * EDGE), Friction::NONE);
+            world.add_soft("cube", model, None, &Pose::translation(0.0, 0.0, 0.5 * EDGE), Friction::NONE);
         let table = Shape::Box { half: Vec3::new(0.5, 0.5, 0.05) };
         world.add_shape("table", BodyId::World, Pose::translation(0.0, 0.0, -0.05), &table, grip);
         let pads = [-1.0, 1.0].map(|side| {
@@ -127,7 +120,7 @@ impl Scene {
             }
         }
         out.force_hold = self.force();
-        out.refills = self.world.soft(self.body).factorizations();
+        out.factorizations = self.world.soft(self.body).factorizations();
         out
     }
 }
@@ -172,13 +165,13 @@ fn report(case: &Case) {
         o.newton,
         o.newton_max,
         o.factored,
-        o.refills,
+        o.factorizations,
         o.force_grip,
         o.force_hold,
     );
 }
 
-/// A body that has gone to sleep on the table, the pads at rest beside it.
+/// CPU time of a body asleep on the table, with the pads at rest next to it.
 fn report_asleep(case: &Case) {
     let mut scene = Scene::new(case, true);
     let seconds = |s: f64| (s / case.dt) as usize;
@@ -192,9 +185,9 @@ fn report_asleep(case: &Case) {
 }
 
 fn main() {
-    // Words on the command line choose cases by part of their name.
-    let wanted: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
-    let chosen = |name: &str| wanted.is_empty() || wanted.iter().any(|word| name.contains(word));
+    // Arguments select cases by part of their name.
+    let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
+    let is_selected = |name: &str| words.is_empty() || words.iter().any(|word| name.contains(word));
     println!("CPU seconds per simulated second");
     let cube = Case { name: "cube, gap 42", gap: 0.042, resolution: 6, dt: 1.0 / 60.0 };
     let cases = [
@@ -204,8 +197,8 @@ fn main() {
         Case { name: "cube, gap 42, 240 Hz", dt: 1.0 / 240.0, ..cube },
         Case { name: "cube, gap 42, resolution 12", resolution: 12, ..cube },
     ];
-    cases.iter().filter(|case| chosen(case.name)).for_each(report);
-    if chosen("asleep") {
+    cases.iter().filter(|case| is_selected(case.name)).for_each(report);
+    if is_selected("asleep") {
         report_asleep(&cube);
     }
 }

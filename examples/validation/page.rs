@@ -1,6 +1,6 @@
-//! The page: headings, tables, and what was claimed.
+//! Headings, tables and the summary of the page.
 
-/// What was to be reached, and what was.
+/// A result and its bound.
 struct Claim {
     what: String,
     worst: f64,
@@ -13,14 +13,14 @@ pub struct Report {
 }
 
 impl Report {
-    /// Notes the worst of `values` (by size) against a bound.
+    /// Records the worst of `values` (by magnitude) against a bound.
     pub fn claim(&mut self, what: &str, values: impl IntoIterator<Item = f64>, bound: f64) {
         let worst = values.into_iter().map(f64::abs).fold(0.0, f64::max);
         self.claims.push(Claim { what: what.to_owned(), worst, bound });
     }
 
     pub fn print(&self) {
-        heading("Summary", "What each section reached against what it had to; \"missed\" is a defect.");
+        heading("Summary", "The worst result of each section against its bound; \"missed\" is a defect.");
         header(&["claim", "worst", "bound", ""]);
         for c in &self.claims {
             let verdict = if c.worst <= c.bound { "reached" } else { "**missed**" };
@@ -41,7 +41,7 @@ pub fn row(cells: &[String]) {
     println!("| {} |", cells.join(" | "));
 }
 
-/// Three significant digits.
+/// Formats a value with three significant digits.
 pub fn short(value: f64) -> String {
     let size = value.abs();
     if value == 0.0 {

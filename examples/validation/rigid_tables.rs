@@ -6,7 +6,7 @@ use crate::{
     rigid,
 };
 
-/// Free rigid bodies.
+/// Prints the tables of free rigid bodies.
 pub fn rigid(report: &mut Report) {
     heading(
         "Rigid and articulated",
@@ -88,7 +88,7 @@ fn slopes(report: &mut Report) {
     println!();
 }
 
-/// Bodies on joints, and what stands on and in others.
+/// Prints the tables of bodies on joints, and of bodies on and in others.
 pub fn jointed(report: &mut Report) {
     println!();
     header(&["on a joint", "closed form", "found", "off by"]);

@@ -91,7 +91,7 @@ fn grasped_of(
 }
 
 #[test]
-fn a_flat_face_feels_the_dome_as_a_bed_of_springs() {
+fn a_flat_face_on_the_dome_is_carried_by_a_bed_of_springs() {
     // F = k π sqrt(Rx Ry) d² for a paraboloid pressed d deep, while the patch is inside of the footprint.
     let (pad, hard) = (PadSurface::default(), 1e9);
     let k = 1.0 / (1.0 / GEL.normal + 1.0 / hard);
@@ -124,7 +124,7 @@ fn a_rigid_box_is_grasped_lifted_and_held_without_creep() {
 }
 
 #[test]
-fn what_the_pads_cannot_hold_slides_out_of_them() {
+fn a_body_heavier_than_the_friction_capacity_slides_out_of_the_pads() {
     // 0.2 kg need 0.66 N a pad at μ 1.5; 20 µm give 0.6 N on the dome of a flat box.
     let (mut world, body, hand, shut) = grasped(&cuboid(0.04, 0.05, 0.04), at(0.0, 0.0, 0.02), 0.05, 1.5e-5);
     let force: f64 = hand.force(&world, body).iter().sum();
@@ -157,7 +157,7 @@ fn a_patch_has_the_friction_of_its_pair_held_and_sliding() {
 }
 
 #[test]
-fn a_box_that_covers_part_of_a_pad_is_felt_without_jumps_as_it_moves() {
+fn the_load_of_a_box_that_covers_part_of_a_pad_changes_without_jumps_as_it_moves() {
     let shape = cuboid(0.04, 0.05, 0.04);
     let force = |shift: f64| {
         let (world, body, hand, _) = grasped(&shape, at(0.02 + shift, 0.0, 0.02), 0.05, 2e-4);
@@ -171,7 +171,7 @@ fn a_box_that_covers_part_of_a_pad_is_felt_without_jumps_as_it_moves() {
 }
 
 #[test]
-fn bodies_are_told_alike_what_touches_them() {
+fn contacts_of_soft_and_rigid_bodies_are_recorded_alike() {
     let mut world = world();
     let ground = floor(&mut world, friction(0.6, 0.5));
     let shape = cuboid(0.05, 0.05, 0.05);

@@ -7,9 +7,9 @@ use softvt::{
 
 use crate::scene::*;
 
-/// What a body does on a support in a second.
+/// Motion of a body on a support in one second.
 struct Rest {
-    /// How far it has sunk, m, and turned, rad.
+    /// Distance by which it has sunk, m, and angle by which it has turned, rad.
     sunk: f64,
     turned: f64,
     /// Speed at the end as settling measures it, m/s.
@@ -30,7 +30,7 @@ fn rest(shape: &Shape, mass: f64, object_w: Pose, support: &dyn Fn(&mut World)) 
     }
 }
 
-/// Asserts that a body rests where it was put, as light and as heavy as things of the benchmark are.
+/// Asserts that a body rests in place, as light and as heavy as objects of the benchmark.
 fn rests(name: &str, shape: &Shape, object_w: Pose, support: &dyn Fn(&mut World)) {
     rest_with(&[0.01, 1.0], name, shape, object_w, support);
 }
@@ -74,7 +74,7 @@ fn standing(height: f64) -> Pose {
 }
 
 #[test]
-fn boxes_with_rounded_edges_of_any_size_rest_where_they_are_put() {
+fn boxes_with_rounded_edges_of_any_size_rest_in_place() {
     for size in [0.012, 0.024, 0.048, 0.2] {
         for share in [0.02, 0.1, 0.3, 0.45] {
             let shape = rounded_box(Vec3::repeat(size), share * size);
@@ -194,7 +194,7 @@ fn a_box_with_rounded_edges_sticks_below_its_angle_and_slides_above_it() {
         let mut world = world();
         floor(&mut world, friction(0.6, 0.4));
         let body = uniform(&mut world, &shape, 0.3, at(0.0, 0.0, 0.01), friction(0.0, 0.0));
-        lean(&mut world, angle, 0.5);
+        tilt(&mut world, angle, 0.5);
         (world, body)
     };
     let (mut held, body) = on_slope(0.6f64.atan() - 0.02);

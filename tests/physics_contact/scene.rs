@@ -1,4 +1,4 @@
-//! Short ways to put things into a world: hard ones of `solids`, and soft ones.
+//! Helpers that add soft bodies to a world, and those of `solids`.
 
 use std::sync::Arc;
 
@@ -17,13 +17,13 @@ pub use crate::solids::*;
 /// A soft material like bread.
 pub const SOFT: ElasticMaterial = ElasticMaterial { youngs_pa: 3e4, poisson: 0.4, density: 300.0 };
 
-/// The rest data of a soft block with samples every `spacing` m.
+/// The model of a soft block with samples every `spacing` m.
 pub fn fem_model(shape: &Shape, material: ElasticMaterial, resolution: usize, spacing: f64) -> Arc<FemModel> {
     let spec = SampleSpec { grasp_spacing: spacing, other_spacing: spacing };
     bodies::fem_model(shape, material, resolution, &spec)
 }
 
-/// Adds a soft block that other soft blocks feel; its index.
+/// Adds a soft block with a surface for other soft blocks.
 pub fn soft(world: &mut World, shape: &Shape, rest: &Arc<FemModel>, pose: Pose, mu: Friction) -> SoftId {
     world.add_soft("soft", rest.clone(), Some(Arc::new(shape.clone())), &pose, mu)
 }

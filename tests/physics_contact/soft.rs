@@ -46,7 +46,7 @@ fn two_cubes_face_to_face_are_as_stiff_as_one_of_double_length() {
     let right = soft(&mut two, &cube, &rest, at(0.025, 0.0, 0.0), bread());
     let (alone, pair) = (squeeze(&mut one, 0.1, 0.01), squeeze(&mut two, 0.1, 0.01));
     assert!((pair / alone - 1.0).abs() < 0.03, "{pair} N for two, {alone} N for one");
-    // What one does to the other is what the other does to it, and what the plates do.
+    // The forces on both are equal and opposite, and equal to those of the plates.
     let (on_left, on_right) = (two.contact(left, right).force_w, two.contact(right, left).force_w);
     assert!(
         (on_left + on_right).norm() < 1e-9 && (on_right.x / pair - 1.0).abs() < 0.01,
@@ -90,7 +90,7 @@ fn a_soft_block_sticks_below_the_static_angle_and_slides_above_it_with_dynamic_f
         let mut world = world();
         floor(&mut world, friction(mu_s, mu_d));
         soft(&mut world, &shape, &rest, at(0.0, 0.0, 0.01), friction(0.0, 0.0));
-        lean(&mut world, angle, 0.5);
+        tilt(&mut world, angle, 0.5);
         world
     };
     let mut held = scene(mu_s.atan() - 0.03);

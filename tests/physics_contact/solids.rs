@@ -1,4 +1,4 @@
-//! Short ways to put hard things into a world.
+//! Helpers that add rigid bodies and colliders to a world.
 
 use softvt::{
     geometry::{Mat3, Pose, Quat, Vec3, mass::mass_properties, shape::Shape},
@@ -17,7 +17,7 @@ pub fn world() -> World {
     tilted(0.0)
 }
 
-/// A world whose gravity leans by `angle` (rad) towards +x: a slope that stays flat.
+/// A world whose gravity is tilted by `angle` (rad) towards +x: a slope in its own frame.
 pub fn tilted(angle: f64) -> World {
     World::new(PhysicsParams { sleeping: false, ..PhysicsParams::default() }, gravity(angle))
 }
@@ -61,7 +61,7 @@ fn inertia(shape: &Shape, mass: f64) -> Mat3 {
     Mat3::from_diagonal(&(diagonal * mass))
 }
 
-/// A free rigid body with one collider; its index.
+/// Adds a free rigid body with one collider.
 pub fn rigid(world: &mut World, shape: &Shape, mass: f64, pose: Pose, mu: Friction) -> RigidId {
     let body = RigidState::new(&pose, Vec3::zeros(), mass, inertia(shape, mass)).expect("a real body");
     let index = world.add_rigid("body", body);
@@ -69,7 +69,7 @@ pub fn rigid(world: &mut World, shape: &Shape, mass: f64, pose: Pose, mu: Fricti
     index
 }
 
-/// A free uniform body of any shape; its index.
+/// Adds a free uniform body of any shape.
 pub fn uniform(world: &mut World, shape: &Shape, mass: f64, object_w: Pose, mu: Friction) -> RigidId {
     let one = mass_properties(shape, 1.0);
     let density = mass / one.mass;
@@ -89,8 +89,8 @@ pub fn rounded_can(radius: f64, height: f64, rounding: f64) -> Shape {
     Shape::Cylinder { radius: radius - rounding, half_height: 0.5 * height - rounding }.rounded(rounding)
 }
 
-/// Lets everything settle on the flat, then leans gravity to `angle` (rad) within `seconds` and waits as long again.
-pub fn lean(world: &mut World, angle: f64, seconds: f64) {
+/// Settles on the flat, then tilts gravity to `angle` (rad) within `seconds` and waits for as long again.
+pub fn tilt(world: &mut World, angle: f64, seconds: f64) {
     run(world, 0.3);
     let steps = (seconds / world.params.dt).round();
     for step in 0..2 * steps as usize {

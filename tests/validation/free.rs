@@ -7,7 +7,7 @@ use softvt::{
 
 use crate::support::{Body, Scene, Squeeze};
 
-/// How a free body's energy went.
+/// Energy and momentum of a free body over a flight.
 #[derive(Clone, Copy, Debug)]
 pub struct Flight {
     /// Largest gain of a step, of the initial energy.

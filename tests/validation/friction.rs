@@ -51,12 +51,12 @@ fn loaded(share: f64) -> Squeeze {
     Squeeze { friction: weight / (2.0 * HOLD_48 * share), ..Squeeze::default() }.gap_mm(48.0)
 }
 
-/// How a held cube crept.
+/// Creep of a held cube.
 #[derive(Clone, Copy, Debug)]
 pub struct Creep {
     /// Weight over friction capacity at the end.
     pub share: f64,
-    /// Over five seconds, mm.
+    /// Creep over five seconds, mm.
     pub creep_mm: f64,
 }
 
@@ -69,7 +69,7 @@ pub fn creep(share: f64) -> Creep {
     Creep { share: scene.weight() / to.capacity, creep_mm: 1e3 * (to.moved_h - from.moved_h).norm() }
 }
 
-/// How an overloaded cube fell.
+/// Fall of an overloaded cube.
 #[derive(Clone, Copy, Debug)]
 pub struct Fall {
     /// Acceleration between 0.2 and 0.3 s, m/s².
@@ -104,14 +104,14 @@ pub fn fall(load: f64) -> Fall {
     Fall { acceleration: (to - from) / 0.1, expected: GRAVITY * (1.0 - 1.0 / load) }
 }
 
-/// How a held cube took a motion of the hand.
+/// Slip of a held cube during a motion of the hand.
 #[derive(Clone, Copy, Debug)]
 pub struct Carried {
     /// Weight over friction capacity before.
     pub share: f64,
-    /// Its centre's place in the hand after the motion against before, mm.
+    /// Displacement of its centre in the hand by the motion, mm.
     pub shift_mm: f64,
-    /// Whether all samples of a pad slid at once.
+    /// True if all samples of a pad slid at once.
     pub slid: bool,
 }
 

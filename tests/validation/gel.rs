@@ -36,7 +36,7 @@ pub const PRESSES: [Reference; 4] = [
 /// Offsets of the ball from the middle of the grid, m: on a corner, on a middle and between.
 pub const OFFSETS: [[f64; 2]; 4] = [[0.0, 0.0], [2e-4, 2e-4], [1e-4, 0.5e-4], [2e-4, 0.0]];
 
-/// How much deeper than the reference a ball may go, or less deep.
+/// Tolerance of the depth of a ball against the reference.
 pub fn depth_bound(depth: f64) -> f64 {
     if depth < 2e-4 { 0.05 } else { 0.10 }
 }

@@ -1,4 +1,4 @@
-//! Bodies on joints against closed forms, and what stands on and in them.
+//! Bodies on joints against closed forms, and bodies on and in articulated objects.
 
 use nalgebra::Unit;
 use softvt::{
@@ -127,7 +127,7 @@ pub fn terminal() -> f64 {
     world.articulations()[0].state.v[0] / ((MASS * GRAVITY * slope.sin() - dry) / damping)
 }
 
-/// How far a drawer creeps in 10 s at 95 % of its friction, m.
+/// Creep of a drawer in 10 s at 95 % of its friction, m.
 pub fn creep() -> f64 {
     let slope = 0.3f64;
     let mut world = drawer(tilted(slope), 0.0, MASS * GRAVITY * slope.sin() / 0.95);
@@ -137,7 +137,7 @@ pub fn creep() -> f64 {
     (world.articulations()[0].state.q[0] - before).abs()
 }
 
-/// How far a drawer that runs into its end at 1 m/s goes beyond it at most, and where it rests from there, m.
+/// Largest overshoot of a drawer that runs into its end at 1 m/s, and the final distance from the end, m.
 pub fn stop() -> [f64; 2] {
     let mut world = drawer(world(), 0.0, 0.2);
     world.articulation_mut(ArticulationId::new(0)).state.v[0] = 1.0;
@@ -189,12 +189,12 @@ pub fn bowl_on_ramekin() -> [f64; 2] {
     drift(&mut world, 5.0)
 }
 
-/// What a bowl does in an open drawer.
+/// Motion of a bowl in an open drawer.
 #[derive(Debug)]
 pub struct Carried {
     /// Drift over 5 s at rest, m and rad.
     pub drift: [f64; 2],
-    /// How far it stays behind a drawer that is pushed by 30 mm, m.
+    /// Lag behind a drawer that is pushed by 30 mm, m.
     pub behind: f64,
 }
 

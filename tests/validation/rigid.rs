@@ -8,7 +8,7 @@ use softvt::{
 };
 
 use crate::solids::{
-    GRAVITY, at, cuboid, floor, friction, gravity, lean, rigid, rounded_box, rounded_can, run, tilted,
+    GRAVITY, at, cuboid, floor, friction, gravity, rigid, rounded_box, rounded_can, run, tilt, tilted,
     turned, uniform, world,
 };
 
@@ -65,7 +65,7 @@ pub fn slide(angle: f64) -> Slide {
         floor(&mut world, friction(SLIDING.0, SLIDING.1));
         let shape = cuboid(0.1, 0.1, 0.02);
         let body = rigid(&mut world, &shape, 0.3, at(0.0, 0.0, 0.01), friction(0.0, 0.0));
-        lean(&mut world, angle, 0.5);
+        tilt(&mut world, angle, 0.5);
         (world, body)
     };
     let (mut held, body) = slope();
@@ -90,7 +90,7 @@ pub fn rolls() -> [f64; 2] {
     })
 }
 
-/// A body that stands on a rough slope.
+/// A body on a rough slope.
 pub struct Standing {
     pub name: &'static str,
     shape: Shape,
@@ -136,12 +136,12 @@ pub fn standing() -> Vec<Standing> {
 }
 
 impl Standing {
-    /// Whether it tips over its lower edge when the slope grows slowly from nothing to `angle`, rad.
+    /// True if it tips over its lower edge when the slope grows slowly from zero to `angle`, rad.
     fn tips(&self, angle: f64) -> bool {
         let mut world = world();
         floor(&mut world, friction(5.0, 5.0));
         let body = uniform(&mut world, &self.shape, 0.3, self.pose, friction(0.0, 0.0));
-        lean(&mut world, angle, 1.5);
+        tilt(&mut world, angle, 1.5);
         world.rigid(body).state.pose_w.rotation.angle_to(&self.pose.rotation) > 0.05
     }
 
@@ -156,7 +156,7 @@ impl Standing {
     }
 }
 
-/// How far any body moves (m) and turns (rad) within `seconds`.
+/// Largest displacement (m) and rotation (rad) of any body within `seconds`.
 pub fn drift(world: &mut World, seconds: f64) -> [f64; 2] {
     let before: Vec<Pose> = world.rigid_bodies().iter().map(|r| r.state.pose_w).collect();
     run(world, seconds);
@@ -192,7 +192,7 @@ fn stack_of(shape: &Shape) -> [f64; 2] {
     drift(&mut world, 10.0)
 }
 
-/// What a collision of two free boxes changes.
+/// Change of momentum and energy by a collision of two free boxes.
 #[derive(Debug)]
 pub struct Collision {
     /// Momentum and angular momentum, relative.
@@ -286,7 +286,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_falling_body_has_the_speed_of_the_closed_form_and_its_way_to_first_order() {
+    fn a_falling_body_has_the_speed_of_the_closed_form_and_its_path_to_first_order() {
         let [speed, way] = fall();
         assert!(speed.abs() < 1e-6 && (way - 1.0 / 60.0).abs() < 1e-6, "{speed} {way}");
     }
@@ -315,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stack_of_five_boxes_stands_still_for_ten_seconds() {
+    fn a_stack_of_five_boxes_does_not_move_for_ten_seconds() {
         for [moved, turned] in [stack(), rounded_stack()] {
             assert!(moved < 1e-6 && turned < 1e-5, "moved {moved} m, turned {turned} rad");
         }

@@ -91,7 +91,7 @@ pub struct Squeeze {
     pub gap: f64,
     pub lift: f64,
     pub hold_s: f64,
-    /// Whether there are gravity and a table from the start.
+    /// True if there are gravity and a table from the start.
     pub grounded: bool,
 }
 
@@ -143,7 +143,7 @@ pub fn quintic(s: f64) -> f64 {
     s * s * s * (10.0 + s * (-15.0 + 6.0 * s))
 }
 
-/// What is seen after a step.
+/// Measurements after a step.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen {
     pub t: f64,
@@ -156,7 +156,7 @@ pub struct Seen {
     pub force: f64,
     pub capacity: f64,
     pub min_det_f: f64,
-    /// Whether all samples of a pad are at their friction bound.
+    /// True if all samples of a pad are at their friction bound.
     pub sliding: bool,
 }
 
@@ -247,7 +247,7 @@ fn pad_pose(options: &Squeeze, side: f64, t: f64, hand: &Pose) -> Pose {
     Pose::from(hand.translation) * pivot * Pose::from_parts(Vec3::zeros().into(), hand.rotation) * offset
 }
 
-/// What a squeeze showed.
+/// Results of a squeeze.
 #[derive(Clone, Debug, Default)]
 pub struct Outcome {
     pub holds: bool,

@@ -57,13 +57,13 @@ pub struct ContactSample {
 pub struct FemModel {
     /// The undeformed voxel mesh, object frame.
     pub mesh: VoxelMesh,
-    /// ElasticMaterial.
+    /// The material.
     pub material: ElasticMaterial,
     /// Lumped node masses, kg; they sum to density × volume.
     pub mass: Vec<f64>,
     /// Contact samples, ordered by group.
     pub samples: Vec<ContactSample>,
-    /// ContactSample groups.
+    /// Groups of samples.
     pub groups: Vec<SampleGroup>,
     /// Square root of the mean sample area, m: the typical spacing.
     pub spacing: f64,
@@ -206,7 +206,7 @@ pub struct MinDetF {
 /// After changing `x`, call [`FemState::update_elastic`].
 #[derive(Clone, Debug)]
 pub struct FemState {
-    /// FemModel data.
+    /// The model.
     pub model: Arc<FemModel>,
     /// Node positions, m, world.
     pub x: Vec<Vec3>,

@@ -1,43 +1,47 @@
 //! Inertia and bias forces of a joint tree, by the composite-rigid-body and recursive Newton–Euler algorithms
-//! (Featherstone, Rigid Body Dynamics Algorithms, 2008, chapters 5 and 6), with every spatial vector taken at the
-//! world origin: no transform between links is then needed.
+//! (Featherstone, Rigid Body Dynamics Algorithms, 2008, chapters 5 and 6). All spatial vectors are taken at the world origin,
+//! so that no transforms between links are needed.
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{JointTree, kinematics::joint_velocity, tree::point_inertia};
+use super::{
+    JointTree,
+    kinematics::{LinkVelocity, unit_joint_velocity},
+    tree::point_inertia,
+};
 use crate::geometry::{Mat3, Pose, Vec3};
 
 /// A spatial velocity, acceleration or (moment, force) pair at the world origin.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Spatial {
     /// Angular velocity, or moment about the world origin.
-    turn: Vec3,
+    angular: Vec3,
     /// Velocity of the point at the world origin, or force.
-    push: Vec3,
+    linear: Vec3,
 }
 
 impl Spatial {
     fn plus(&self, other: &Self, scale: f64) -> Self {
-        Self { turn: self.turn + other.turn * scale, push: self.push + other.push * scale }
+        Self { angular: self.angular + other.angular * scale, linear: self.linear + other.linear * scale }
     }
 
     fn dot(&self, other: &Self) -> f64 {
-        self.turn.dot(&other.turn) + self.push.dot(&other.push)
+        self.angular.dot(&other.angular) + self.linear.dot(&other.linear)
     }
 
     /// Rate of change of the motion `other` carried along by `self` (Featherstone's ×).
     fn cross_motion(&self, other: &Self) -> Self {
         Self {
-            turn: self.turn.cross(&other.turn),
-            push: self.turn.cross(&other.push) + self.push.cross(&other.turn),
+            angular: self.angular.cross(&other.angular),
+            linear: self.angular.cross(&other.linear) + self.linear.cross(&other.angular),
         }
     }
 
     /// Rate of change of the momentum or force `other` carried along by `self` (Featherstone's ×*).
     fn cross_force(&self, other: &Self) -> Self {
         Self {
-            turn: self.turn.cross(&other.turn) + self.push.cross(&other.push),
-            push: self.turn.cross(&other.push),
+            angular: self.angular.cross(&other.angular) + self.linear.cross(&other.linear),
+            linear: self.angular.cross(&other.linear),
         }
     }
 }
@@ -57,15 +61,15 @@ impl Inertia {
     fn of(tree: &JointTree, poses: &[Pose], index: usize) -> Self {
         let link = &tree.links[index];
         let com = poses[index].transform_point(&link.com.into()).coords;
-        let turn = poses[index].rotation.to_rotation_matrix();
-        let central = turn.matrix() * link.inertia * turn.matrix().transpose();
+        let rotation = poses[index].rotation.to_rotation_matrix();
+        let central = rotation.matrix() * link.inertia * rotation.matrix().transpose();
         Self { mass: link.mass, first: com * link.mass, second: central + point_inertia(link.mass, &com) }
     }
 
     fn momentum(&self, motion: &Spatial) -> Spatial {
         Spatial {
-            turn: self.second * motion.turn + self.first.cross(&motion.push),
-            push: motion.push * self.mass - self.first.cross(&motion.turn),
+            angular: self.second * motion.angular + self.first.cross(&motion.linear),
+            linear: motion.linear * self.mass - self.first.cross(&motion.angular),
         }
     }
 }
@@ -85,8 +89,8 @@ impl Scratch {
         self.axes.clear();
         self.inertias.clear();
         for index in 0..tree.dofs() {
-            let (push, turn) = joint_velocity(tree, poses, index, &Vec3::zeros());
-            self.axes.push(Spatial { turn, push });
+            let LinkVelocity { linear, angular } = unit_joint_velocity(tree, poses, index, &Vec3::zeros());
+            self.axes.push(Spatial { angular, linear });
             self.inertias.push(Inertia::of(tree, poses, index));
         }
     }
@@ -145,7 +149,7 @@ pub fn bias_into(
     accelerations.clear();
     forces.clear();
     // Weight enters as an upward acceleration of the base.
-    let base = (Spatial::default(), Spatial { turn: Vec3::zeros(), push: -gravity });
+    let base = (Spatial::default(), Spatial { angular: Vec3::zeros(), linear: -gravity });
     for (index, link) in tree.links.iter().enumerate() {
         let (velocity, acceleration) =
             link.parent.map_or(base, |parent| (velocities[parent], accelerations[parent]));

@@ -1,4 +1,4 @@
-//! Where the links are and how they move.
+//! Kinematics of a joint tree: link poses, velocities and Jacobians.
 
 use nalgebra::DMatrix;
 
@@ -21,7 +21,7 @@ impl LinkVelocity {
     }
 }
 
-/// Link frames in the world at joint coordinates `q` (one per link).
+/// Forward kinematics: link frames in the world at joint coordinates `q` (one per link).
 pub fn forward(tree: &JointTree, q: &[f64]) -> Vec<Pose> {
     let mut poses = Vec::with_capacity(tree.dofs());
     forward_into(tree, q, &mut poses);
@@ -34,7 +34,7 @@ pub fn forward_into(tree: &JointTree, q: &[f64], poses: &mut Vec<Pose>) {
     for (link, &q) in tree.links.iter().zip(q) {
         let parent = link.parent.map_or(tree.base_w, |parent| poses[parent]);
         let mut pose = parent * link.placement * link.kind.motion(q);
-        // A product of many unit quaternions drifts from unit length; a pose that did would scale what it moves.
+        // A product of many unit quaternions drifts from unit length, and the pose would then scale what it transforms.
         pose.rotation.renormalize();
         poses.push(pose);
     }
@@ -56,15 +56,15 @@ pub fn velocities_into(tree: &JointTree, poses: &[Pose], v: &[f64], out: &mut Ve
             Some(parent) => (out[parent].at(&poses[parent], &origin), out[parent].angular),
             None => (Vec3::zeros(), Vec3::zeros()),
         };
-        let (push, turn) = joint_velocity(tree, poses, index, &origin);
-        linear += push * v[index];
-        angular += turn * v[index];
+        let unit = unit_joint_velocity(tree, poses, index, &origin);
+        linear += unit.linear * v[index];
+        angular += unit.angular * v[index];
         out.push(LinkVelocity { linear, angular });
     }
 }
 
-/// The 6×n matrix from joint speeds to (velocity of the link's origin, angular velocity), world coordinates, linear
-/// rows first.
+/// The 6×n Jacobian from joint speeds to the velocity of a link: three rows of the linear velocity of its origin, three of the
+/// angular velocity, world.
 pub fn jacobian(tree: &JointTree, poses: &[Pose], link: usize) -> DMatrix<f64> {
     let mut out = DMatrix::zeros(6, tree.dofs());
     jacobian_into(tree, poses, link, &mut out);
@@ -94,20 +94,28 @@ pub fn point_jacobian_into(
     out.fill(0.0);
     let mut at = Some(link);
     while let Some(index) = at {
-        let (push, turn) = joint_velocity(tree, poses, index, p_w);
-        out.fixed_view_mut::<3, 1>(0, index).copy_from(&push);
-        out.fixed_view_mut::<3, 1>(3, index).copy_from(&turn);
+        let unit = unit_joint_velocity(tree, poses, index, p_w);
+        out.fixed_view_mut::<3, 1>(0, index).copy_from(&unit.linear);
+        out.fixed_view_mut::<3, 1>(3, index).copy_from(&unit.angular);
         at = tree.links[index].parent;
     }
 }
 
-/// What unit speed of joint `index` gives a point at `p_w` of its link: (velocity, angular velocity), world.
-pub(super) fn joint_velocity(tree: &JointTree, poses: &[Pose], index: usize, p_w: &Vec3) -> (Vec3, Vec3) {
+/// Velocity of the point at `p_w` (m, world) of link `index` for unit speed of its joint.
+pub(super) fn unit_joint_velocity(
+    tree: &JointTree,
+    poses: &[Pose],
+    index: usize,
+    p_w: &Vec3,
+) -> LinkVelocity {
     match tree.links[index].kind {
         JointKind::Revolute(axis) => {
             let axis = poses[index].rotation * axis.into_inner();
-            (axis.cross(&(p_w - poses[index].translation.vector)), axis)
+            let linear = axis.cross(&(p_w - poses[index].translation.vector));
+            LinkVelocity { linear, angular: axis }
         }
-        JointKind::Prismatic(axis) => (poses[index].rotation * axis.into_inner(), Vec3::zeros()),
+        JointKind::Prismatic(axis) => {
+            LinkVelocity { linear: poses[index].rotation * axis.into_inner(), angular: Vec3::zeros() }
+        }
     }
 }

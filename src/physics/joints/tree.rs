@@ -1,20 +1,20 @@
-//! What a joint tree is: plain data and its check.
+//! Data of a joint tree, and its validation.
 
 use nalgebra::{DVector, Unit};
 
 use crate::geometry::{Mat3, Pose, Vec3};
 
-/// How a link moves against its parent, about or along a unit axis given in the joint frame.
+/// Type of a joint: motion about or along a unit axis given in the joint frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum JointKind {
-    /// Turns about the axis; the coordinate is an angle, rad.
+    /// Rotation about the axis; the coordinate is an angle, rad.
     Revolute(Unit<Vec3>),
-    /// Slides along the axis; the coordinate is a length, m.
+    /// Translation along the axis; the coordinate is a length, m.
     Prismatic(Unit<Vec3>),
 }
 
 impl JointKind {
-    /// The motion of the link frame in the joint frame at coordinate `q` (rad or m).
+    /// Pose of the link frame in the joint frame at coordinate `q` (rad or m).
     pub fn motion(&self, q: f64) -> Pose {
         match self {
             Self::Revolute(axis) => {
@@ -25,16 +25,16 @@ impl JointKind {
     }
 }
 
-/// A rigid link and the joint that carries it. The link frame is the joint frame moved by the joint.
+/// A rigid link and the joint that connects it to its parent. The link frame is the joint frame moved by the joint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Link {
     /// Name, for messages.
     pub name: String,
-    /// Index of the link that carries it; `None` for one that hangs on the base. Always below the own index.
+    /// Index of the parent link, always below the own index; `None` for a link on the base.
     pub parent: Option<usize>,
     /// Joint frame in the parent's link frame (in the base frame if there is no parent).
     pub placement: Pose,
-    /// How it moves.
+    /// Type of the joint.
     pub kind: JointKind,
     /// Mass, kg.
     pub mass: f64,
@@ -42,24 +42,24 @@ pub struct Link {
     pub com: Vec3,
     /// Inertia tensor about the centre of mass, axes of the link frame, kg m².
     pub inertia: Mat3,
-    /// Lowest joint coordinate, rad or m.
+    /// Lower limit of the joint coordinate, rad or m.
     pub lower: f64,
-    /// Highest joint coordinate, rad or m.
+    /// Upper limit of the joint coordinate, rad or m.
     pub upper: f64,
-    /// Largest joint speed, rad/s or m/s.
+    /// Limit of the joint speed, rad/s or m/s; may be infinite.
     pub velocity_limit: f64,
-    /// Largest drive effort, N m or N.
+    /// Limit of the drive effort, N m or N.
     pub effort_limit: f64,
     /// Coulomb friction of the joint, N m or N.
     pub friction: f64,
-    /// Viscous damping of the joint, N m s/rad or N s/m.
+    /// Viscous damping coefficient of the joint, N m s/rad or N s/m.
     pub damping: f64,
 }
 
 impl Link {
-    /// Welds a further body to the link: `mass` in kg, `com` in m and `inertia` about it in kg m², both in `frame`,
-    /// which is given in the link frame. Parallel-axis theorem (any mechanics text, e.g. Goldstein, Classical
-    /// Mechanics, 1980, §5-3).
+    /// Adds a rigidly attached body of `mass` (kg), with the centre of mass `com` (m) and the inertia about it (kg m²) given in
+    /// `frame`, which is a pose in the link frame. By the parallel-axis theorem (e.g. Goldstein, Classical Mechanics, 1980,
+    /// §5-3).
     pub fn weld(&mut self, mass: f64, com: &Vec3, inertia: &Mat3, frame: &Pose) {
         let turn = frame.rotation.to_rotation_matrix();
         let com = frame.transform_point(&(*com).into()).coords;
@@ -78,25 +78,25 @@ pub(super) fn point_inertia(mass: f64, r: &Vec3) -> Mat3 {
     (Mat3::identity() * r.norm_squared() - r * r.transpose()) * mass
 }
 
-/// A fixed-base tree of links, one joint each; degree of freedom `i` is link `i`'s joint.
+/// A fixed-base tree of links with one joint each. Degree of freedom `i` is the joint of link `i`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointTree {
-    /// The links; a parent comes before its children.
+    /// The links; parents precede their children.
     pub links: Vec<Link>,
     /// Base frame in the world.
     pub base_w: Pose,
 }
 
 impl JointTree {
-    /// Degrees of freedom.
+    /// Number of degrees of freedom.
     pub fn dofs(&self) -> usize {
         self.links.len()
     }
 
-    /// Checks order, mass properties and limits.
+    /// Checks the order of the links, their mass properties and their limits.
     ///
     /// # Errors
-    /// Names the first link that no mechanism could have, and what is wrong with it.
+    /// The first invalid link.
     pub fn validate(&self) -> Result<(), JointTreeError> {
         for (index, link) in self.links.iter().enumerate() {
             let wrong = |what: String| Err(JointTreeError { link: link.name.clone(), what });
@@ -124,9 +124,8 @@ impl JointTree {
     }
 }
 
-/// Why no rigid body has this inertia tensor, if none has: its principal moments must be positive and none may
-/// exceed the sum of the other two (Traversaro et al., Identification of fully physical consistent inertial
-/// parameters, IROS 2016).
+/// The reason why an inertia tensor is not physical, if it is not. Its principal moments must be positive, and none may exceed
+/// the sum of the other two (Traversaro et al., Identification of fully physical consistent inertial parameters, IROS 2016).
 fn inertia_fault(inertia: &Mat3) -> Option<String> {
     if !(inertia - inertia.transpose()).iter().all(|gap| gap.abs() <= 1e-12 * inertia.norm()) {
         return Some("inertia tensor is not symmetric".into());
@@ -142,17 +141,17 @@ fn inertia_fault(inertia: &Mat3) -> Option<String> {
     })
 }
 
-/// A link that no mechanism could have.
+/// An invalid link of a joint tree.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("link {link}: {what}")]
 pub struct JointTreeError {
-    /// The link's name.
+    /// Name of the link.
     pub link: String,
-    /// What is wrong and what was expected.
+    /// The invalid value, and the expected one.
     pub what: String,
 }
 
-/// Joint coordinates and speeds of a tree.
+/// Joint coordinates and speeds of a joint tree.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointState {
     /// Joint coordinates, rad or m.
@@ -162,7 +161,7 @@ pub struct JointState {
 }
 
 impl JointState {
-    /// At rest with coordinates `q`.
+    /// A state at rest at the coordinates `q`.
     pub fn at_rest(q: &[f64]) -> Self {
         Self { q: DVector::from_column_slice(q), v: DVector::zeros(q.len()) }
     }

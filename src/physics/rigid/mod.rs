@@ -1,20 +1,20 @@
 //! Free rigid bodies: state, world inertia, torque-free motion, energy and momentum.
 //!
-//! A step of the world asks [`free_spin`] what the body would do without torque, lets the solver find the end-of-step
-//! velocities (its free angular velocity is [`FreeSpin::end_w`] plus what torques add), and then calls [`advance`].
-//! In free flight that conserves angular momentum (the vector) and kinetic energy to rounding, at any step.
+//! A step of the world computes the torque-free rotation by [`free_spin`], solves for the velocities at the end of the step
+//! (without torques, the angular velocity is [`FreeSpin::end_w`]), and then calls [`advance`]. In free flight this conserves the
+//! vector of angular momentum and the kinetic energy to rounding, at any step size.
 
 use crate::geometry::{Mat3, Pose, Quat, Vec3};
 
 #[cfg(test)]
 mod tests;
 
-/// The largest rotation of one sub-step of torque-free motion, rad: keeps Newton's method in its basin.
-const SPIN_SUBSTEP_RAD: f64 = 0.25;
-/// Newton iterations of one sub-step; it converges quadratically and needs 3 to 5.
-const SPIN_NEWTON: usize = 12;
+/// Largest rotation per sub-step of torque-free motion, rad: keeps Newton's method within its region of convergence.
+const MAX_SUBSTEP_ROTATION: f64 = 0.25;
+/// Newton iterations per sub-step; it converges quadratically and needs 3 to 5.
+const MAX_NEWTON: usize = 12;
 
-/// Why a body cannot move by Newton's laws.
+/// Invalid mass properties of a rigid body.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RigidError {
     /// The mass is not a positive number.
@@ -27,7 +27,7 @@ pub enum RigidError {
     Inertia([f64; 3]),
 }
 
-/// A free rigid body.
+/// State and mass properties of a free rigid body.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RigidState {
     /// The centre of mass in the world; the axes are the object's own (not the principal ones).
@@ -96,7 +96,7 @@ impl RigidState {
     }
 }
 
-/// Principal moments must be positive and none above the sum of the other two (equal for a flat lamina).
+/// Checks that the principal moments are positive and none exceeds the sum of the other two (equal for a flat lamina).
 fn check_inertia(inertia: &Mat3) -> Result<(), RigidError> {
     let scale = inertia.norm();
     let symmetric = (inertia - inertia.transpose()).norm() <= 1e-9 * scale;
@@ -109,25 +109,25 @@ fn check_inertia(inertia: &Mat3) -> Result<(), RigidError> {
     if real { Ok(()) } else { Err(RigidError::Inertia(moments)) }
 }
 
-/// What a body's rotation does in one step without torque.
+/// Torque-free rotation of a body over one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FreeSpin {
     /// Angular velocity at the end of the step, rad/s, world.
     pub end_w: Vec3,
-    /// The turn made meanwhile, applied from the left: rotation after = turn · rotation before.
+    /// Rotation over the step, applied from the left: rotation after = turn · rotation before.
     pub turn: Quat,
 }
 
 /// Torque-free rotation over `dt` seconds.
 ///
 /// The implicit midpoint rule on Euler's equations in the body frame, I(ω₁−ω₀) = −dt ω̄×Iω̄, with the attitude turned
-/// by the Cayley map of dt ω̄. The first keeps every quadratic invariant, hence energy; with the second the *vector*
-/// of angular momentum stays too, because L₁ = cay(−dt ω̄) L₀ (Austin, Krishnaprasad & Wang, "Almost Poisson
+/// by the Cayley map of dt ω̄. The first conserves every quadratic invariant, hence energy. With the second, the *vector*
+/// of angular momentum is conserved too, because L₁ = cay(−dt ω̄) L₀ (Austin, Krishnaprasad & Wang, "Almost Poisson
 /// integration of rigid body systems", J. Comput. Phys. 107, 1993).
 pub fn free_spin(body: &RigidState, dt: f64) -> FreeSpin {
     let start = body.pose_w.rotation;
     let mut omega = start.inverse() * body.w;
-    let substeps = (dt * omega.norm() / SPIN_SUBSTEP_RAD).ceil().max(1.0);
+    let substeps = (dt * omega.norm() / MAX_SUBSTEP_ROTATION).ceil().max(1.0);
     let h = dt / substeps;
     let mut rotation = start;
     for _ in 0..substeps as usize {
@@ -141,7 +141,7 @@ pub fn free_spin(body: &RigidState, dt: f64) -> FreeSpin {
 /// Solves I(ω₁−ω₀) + h ω̄×Iω̄ = 0 for ω₁ by Newton's method (body frame).
 fn midpoint_step(inertia: &Mat3, omega: &Vec3, h: f64) -> Vec3 {
     let mut next = *omega;
-    for _ in 0..SPIN_NEWTON {
+    for _ in 0..MAX_NEWTON {
         let mean = 0.5 * (omega + next);
         let momentum = inertia * mean;
         let residual = inertia * (next - omega) + h * mean.cross(&momentum);
@@ -162,8 +162,8 @@ fn cayley(x: &Vec3) -> Quat {
 
 /// Moves `body` to the end of a step of `dt` seconds, where its velocities are `v` and `w` (m/s, rad/s, world).
 ///
-/// What torques and contacts changed of the angular velocity (`w` less the free one) turns the body through the
-/// exponential map, on top of the torque-free turn. The quaternion is renormalised.
+/// The change of the angular velocity by torques and contacts (`w` minus the torque-free one) rotates the body by the
+/// exponential map, in addition to the torque-free rotation. The quaternion is renormalised.
 pub fn advance(body: &mut RigidState, v: Vec3, w: Vec3, spin: &FreeSpin, dt: f64) {
     let extra = Quat::from_scaled_axis((w - spin.end_w) * dt);
     body.pose_w.rotation = Quat::new_normalize((extra * spin.turn * body.pose_w.rotation).into_inner());

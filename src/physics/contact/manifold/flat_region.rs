@@ -55,7 +55,7 @@ struct PlaneFace<'a> {
 
 /// Flat samples of a shape, found from points `starts` on its surface that are about `step` (m) apart.
 ///
-/// Those of an outline are full point contacts: a softer edge would let a body tip too early. The others have at most `area`
+/// Samples of an outline are full point contacts: a softer edge would let a body tip too early. The others have at most `area`
 /// (m²). A face that ends at `sharp` edges needs none.
 pub(super) fn flat_samples(
     shape: &Shape,

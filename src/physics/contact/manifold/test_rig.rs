@@ -1,4 +1,4 @@
-//! The manifolds in motion: an explicit penalty integrator, slow and plain, that shares nothing with the real solver.
+//! Tests of the manifolds in motion, by an explicit penalty integrator that shares nothing with the real solver.
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
@@ -96,8 +96,8 @@ impl Incline {
     }
 }
 
-/// Whether a body put on the incline tips over its lower edge: gravity is turned from flat to `slope` over a quarter
-/// of a second, so that only statics decides.
+/// True if a body on the incline tips over its lower edge. Gravity turns from flat to `slope` over a quarter of a second, so
+/// that only statics decides.
 fn tips(primitive: Primitive, turn: Quat, slope: f64) -> bool {
     let mut scene = Incline::new(primitive, turn, 0.0, 5.0);
     let (ramp, start) = (12_500, scene.body.pose_w.rotation);
