@@ -54,7 +54,8 @@ pub fn open(loaded: &Loaded, task: usize, film: bool) -> (EpisodeSpec, ExpertCon
         robot: settings.robot,
         tactile: settings.tactile,
         record_states: film,
-        trace: None,
+        record_trace: false,
+        trace_nodes: false,
     };
     let expert = opened.expert().expect("a script").expect("an expert");
     (spec, ExpertController::new(expert, false))

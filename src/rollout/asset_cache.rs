@@ -1,15 +1,15 @@
-//! What follows from assets alone, made once and shared by all episodes.
+//! Data derived from assets, computed once and shared by all episodes.
 
 use std::{convert::Infallible, sync::Arc};
 
 use super::{
-    articulated,
-    build::{BuildError, check_soft, meshed, soft_rest},
+    build_error::BuildError,
     shared_cache::SharedCache,
+    soft_model::{check_soft, meshed, soft_model},
 };
 use crate::{
     geometry::{
-        Aabb, Pose,
+        Aabb, Pose, Vec3,
         mass::{MassProperties, approximate_mass_properties, mass_properties},
         shape::Shape,
     },
@@ -24,51 +24,56 @@ use crate::{
 /// Finite-element models of assets, and what takes a search over their shapes: bounds, masses, walls, where their skin can touch.
 #[derive(Clone, Debug, Default)]
 pub struct AssetCache {
-    rests: SharedCache<Arc<Asset>, Arc<FemModel>>,
+    models: SharedCache<Arc<Asset>, Arc<FemModel>>,
     bounds: SharedCache<Shape, Aabb>,
     masses: SharedCache<Shape, MassProperties>,
     solids: SharedCache<Shape, Arc<CollisionGeometry>>,
     walls: SharedCache<Shape, Option<f64>>,
-    /// Whether masses and contact samples need only be about right.
-    rough: bool,
+    /// True to compute masses and contact samples approximately.
+    approximate: bool,
 }
 
-/// Contact samples of a rough body are this many times farther apart.
-const ROUGH_SPACING: f64 = 4.0;
+/// Factor on the spacing of contact samples for approximate models.
+const APPROXIMATE_SPACING: f64 = 4.0;
 
-/// The value of a shape; making it cannot fail.
-fn of_shape<V: Clone>(made: &SharedCache<Shape, V>, shape: &Shape, make: impl FnOnce() -> V) -> V {
-    let value: Result<_, Infallible> = made.get(shape, |known| known == shape, || Ok(make()));
+/// The cached value of a shape.
+fn of_shape<V: Clone>(cache: &SharedCache<Shape, V>, shape: &Shape, compute: impl FnOnce() -> V) -> V {
+    let value: Result<_, Infallible> = cache.get(shape, |known| known == shape, || Ok(compute()));
     value.unwrap_or_else(|never| match never {})
 }
 
-fn rough_rest(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<Arc<FemModel>, BuildError> {
+fn approximate_model(
+    name: &str,
+    shape: &Shape,
+    material: &SoftMaterial,
+) -> Result<Arc<FemModel>, BuildError> {
     check_soft(name, shape, material)?;
-    let rough = SoftMaterial { grasp_spacing: ROUGH_SPACING * material.grasp_spacing, ..material.clone() };
-    meshed(name, shape, &rough, approximate_mass_properties(shape, 1.0).mass)
+    let material =
+        &SoftMaterial { grasp_spacing: APPROXIMATE_SPACING * material.grasp_spacing, ..material.clone() };
+    meshed(name, shape, material, approximate_mass_properties(shape, 1.0).mass)
 }
 
 impl AssetCache {
-    /// For scenes that are looked at before anything moves, and never run: what takes long is made roughly.
-    pub fn rough() -> Self {
-        Self { rough: true, ..Self::default() }
+    /// A cache for scenes that are checked but never simulated: expensive values are approximate.
+    pub fn approximate() -> Self {
+        Self { approximate: true, ..Self::default() }
     }
 
-    /// Bounds of a shape; finding those of a displaced one takes a search.
+    /// Bounds of a shape.
     pub(super) fn bounds(&self, shape: &Shape) -> Aabb {
         of_shape(&self.bounds, shape, || shape.bounds())
     }
 
     /// Mass properties of a shape at a uniform density, kg/m³.
     pub(super) fn mass(&self, shape: &Shape, density: f64) -> MassProperties {
-        let make = if self.rough { approximate_mass_properties } else { mass_properties };
-        let unit = of_shape(&self.masses, shape, || make(shape, 1.0));
+        let compute = if self.approximate { approximate_mass_properties } else { mass_properties };
+        let unit = of_shape(&self.masses, shape, || compute(shape, 1.0));
         MassProperties { mass: unit.mass * density, com: unit.com, inertia: unit.inertia * density }
     }
 
-    /// Thickness of walls that are thinner than a moving part's may be, m, if there are such.
+    /// Typical thickness of the thin walls of a shape, m; see [`thin_wall`].
     pub(super) fn wall(&self, shape: &Shape) -> Option<f64> {
-        of_shape(&self.walls, shape, || articulated::thin_wall(shape))
+        of_shape(&self.walls, shape, || thin_wall(shape))
     }
 
     /// A collider of a hard shape at `pose_in_parent` on `parent`.
@@ -94,19 +99,69 @@ impl AssetCache {
         }
     }
 
-    /// FemModel data of a soft asset.
-    pub(super) fn rest(
+    /// Finite-element model of a soft asset.
+    pub(super) fn model(
         &self,
         asset: &Arc<Asset>,
         material: &SoftMaterial,
     ) -> Result<Arc<FemModel>, BuildError> {
-        self.rests.get(
+        self.models.get(
             asset,
             |known| known.shape == asset.shape && known.body == asset.body,
-            || match self.rough {
-                true => rough_rest(&asset.name, &asset.shape, material),
-                false => soft_rest(&asset.name, &asset.shape, material),
+            || match self.approximate {
+                true => approximate_model(&asset.name, &asset.shape, material),
+                false => soft_model(&asset.name, &asset.shape, material),
             },
         )
     }
+}
+
+/// Least thickness of the walls of moving parts, m. Other bodies can pass through thinner ones between two steps.
+pub(super) const MIN_PART_WALL: f64 = 4e-3;
+/// Step of the search for the far side of a wall, m.
+const WALL_STEP: f64 = 2e-4;
+/// Share of the surface below which thin walls are ignored: rims and edges.
+const THIN_SHARE: f64 = 0.1;
+/// Rays along each edge of a side of the bounds, cast in search of walls.
+const RAYS: usize = 12;
+
+/// Typical thickness of the walls of a shape that are thinner than [`MIN_PART_WALL`], m. `None` if at most a tenth of the
+/// surface has such walls.
+fn thin_wall(shape: &Shape) -> Option<f64> {
+    let hits = outer_points(shape);
+    let steps = (MIN_PART_WALL / WALL_STEP).round() as usize;
+    let under = |p: &Vec3| {
+        let normal = shape.distance_and_normal(p).1;
+        let mut depths = (1..steps).map(|step| WALL_STEP * step as f64);
+        depths.find(|depth| shape.distance(&(p - normal * *depth)) > 0.0)
+    };
+    let mut thin: Vec<f64> = hits.iter().filter_map(under).collect();
+    if thin.len() as f64 <= THIN_SHARE * hits.len() as f64 {
+        return None;
+    }
+    thin.sort_by(f64::total_cmp);
+    Some(thin[thin.len() / 2])
+}
+
+/// First intersections of the surface with parallel rays along the six axis directions. Rays find walls of any thickness,
+/// unlike a grid of samples.
+fn outer_points(shape: &Shape) -> Vec<Vec3> {
+    let bounds = shape.bounds();
+    let size = bounds.size();
+    let mut hits = Vec::new();
+    for (axis, far) in (0..3).flat_map(|axis| [(axis, false), (axis, true)]) {
+        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+        let mut ahead = Vec3::zeros();
+        ahead[axis] = if far { -1.0 } else { 1.0 };
+        for cell in 0..RAYS * RAYS {
+            let share = |index: usize| (index as f64 + 0.5) / RAYS as f64;
+            let mut start = if far { bounds.max } else { bounds.min };
+            start[u] = bounds.min[u] + size[u] * share(cell % RAYS);
+            start[v] = bounds.min[v] + size[v] * share(cell / RAYS);
+            start -= ahead * MIN_PART_WALL;
+            let hit = shape.ray(&start, &ahead, size[axis] + 2.0 * MIN_PART_WALL);
+            hits.extend(hit.map(|length| start + ahead * length));
+        }
+    }
+    hits
 }

@@ -1,38 +1,41 @@
-//! One episode from the settled scene to the verdict.
+//! One episode: settle, then observe, act, step and judge until it ends.
 
 use image::RgbImage;
 
 use super::{
     asset_cache::AssetCache,
-    build::BuildError,
-    command::{check_action, is_far},
+    build_error::BuildError,
     controller::{ControlError, Controller},
-    evidence::EvidenceCollector,
-    judging::judge,
-    observation_history::Recent,
-    sensor_assets::SensorAssets,
+    evidence::{EvidenceCollector, lowest},
+    object::ObjectInstance,
+    observation_history::ObservationHistory,
+    sensor_assets::{SensingError, SensorAssets},
     sensor_check::check_sensors,
-    sensors::{SensingError, SensorSuite, StateRecording},
+    sensors::{SensorSuite, StateRecording},
     settle::SettleError,
-    simulation::Simulation,
+    simulation::{Simulation, state_hash},
     spec::EpisodeSpec,
-    state_hash::state_hash,
     trace::StepTrace,
 };
 use crate::{
     benchmark::{Goal, control::steps_per_control},
     evaluation::{
         deformation::{Deformation, ReferenceShape},
-        judge::Judge,
+        goal::GoalRegion,
+        judge::{Judge, JudgeConfig},
         record::{EpisodeRecord, Outcome, RolloutStats, Verdict},
     },
-    geometry::Pose,
+    geometry::{Aabb, Pose, Vec3},
     physics::{
         BodyId,
         world::{Frame, StepFailure},
     },
     policy::{Action, Observation, SensorStreams},
-    robot::{Side, rotation},
+    robot::{
+        Side,
+        ik::{LINEARISATION_RANGE, PoseError},
+        rotation,
+    },
 };
 
 /// A finished episode.
@@ -40,31 +43,31 @@ use crate::{
 pub struct FinishedEpisode {
     /// The record.
     pub record: EpisodeRecord,
-    /// One entry a control step, if asked for.
+    /// One entry per control step, if requested.
     pub trace: Vec<StepTrace>,
-    /// One entry a control step: what another scorer needs.
+    /// One entry per control step: the input of other scoring rules.
     pub frames: Vec<ScoreFrame>,
-    /// What was commanded in each control step.
+    /// Action of each control step.
     pub actions: Vec<Action>,
     /// Settled shape of a soft target.
     pub reference: Option<ReferenceShape>,
-    /// What is needed to draw the rollout, if asked for.
+    /// States of the episode, if requested.
     pub recording: Option<StateRecording>,
 }
 
-/// What another scorer needs to know of a control step.
+/// Success and deformation at a control step, as other scoring rules use them.
 #[derive(Clone, Debug)]
 pub struct ScoreFrame {
-    /// Whether the goal had been reached: held for long enough.
+    /// True if the goal had been reached and held for long enough.
     pub success_now: bool,
-    /// The target's worst deformation over the physics steps of the control step; `None` if it is not known.
+    /// The target's worst deformation over the physics steps of the control step; `None` if it is unknown.
     pub deformation: Option<Deformation>,
 }
 
-/// The scene cannot be run; the user's to mend.
+/// An episode cannot be run: an error in the user's input, or a failure of the controller.
 #[derive(Debug, thiserror::Error)]
 pub enum EpisodeError {
-    /// An object cannot be made.
+    /// The scene cannot be built.
     #[error(transparent)]
     Build(#[from] BuildError),
     /// The scene does not come to rest.
@@ -74,7 +77,7 @@ pub enum EpisodeError {
         layout: String,
         /// Episode index.
         episode: u32,
-        /// What happened.
+        /// The cause.
         source: SettleError,
     },
     /// The goal names an object that is not in the scene.
@@ -84,31 +87,31 @@ pub enum EpisodeError {
         task: usize,
         /// "object" or "target".
         role: &'static str,
-        /// The name.
+        /// Name in the goal.
         name: String,
         /// Layout name.
         layout: String,
         /// Names in the scene.
         have: String,
     },
-    /// Something cannot be sensed.
+    /// Data of a sensor cannot be computed.
     #[error("task {task}, episode {episode}: {source}")]
     Sense {
         /// Task index.
         task: usize,
         /// Episode index.
         episode: u32,
-        /// What happened.
+        /// The cause.
         source: SensingError,
     },
-    /// Whoever drives failed.
+    /// The controller failed.
     #[error("task {task}, episode {episode}: {source}")]
     Control {
         /// Task index.
         task: usize,
         /// Episode index.
         episode: u32,
-        /// What happened.
+        /// The cause.
         source: ControlError,
     },
 }
@@ -120,7 +123,7 @@ impl EpisodeSpec {
 }
 
 impl EpisodeError {
-    /// `file:line` of what is wrong, where that is known and the message does not name it itself.
+    /// `file:line` of the error, if it is known and the message does not contain it.
     pub fn place(&self) -> Option<&str> {
         match self {
             Self::Settle { source, .. } => source.place(),
@@ -129,13 +132,17 @@ impl EpisodeError {
     }
 }
 
-/// An episode in progress. A copy of it goes on as it would itself, to the same bytes.
+/// An episode in progress.
+///
+/// [`run`](Self::run) executes it with a [`Controller`]. A caller that drives it itself calls [`begin`](Self::begin) once, then
+/// [`observe`](Self::observe) and [`step`](Self::step) at 20 Hz until [`outcome`](Self::outcome) is present. A clone continues
+/// independently and gives byte-identical results.
 #[derive(Clone)]
 pub struct Episode {
     spec: EpisodeSpec,
-    /// How it ended, if it has.
+    /// Outcome, once the episode has ended.
     outcome: Option<Outcome>,
-    /// The running scene.
+    /// The simulation.
     pub sim: Simulation,
     evidence: EvidenceCollector,
     judge: Judge,
@@ -143,20 +150,28 @@ pub struct Episode {
     start_hold: Action,
     steps: u32,
     physics_steps: u64,
-    newton: (u64, u32),
+    newton: NewtonCount,
     min_det_f: f64,
     trace: Vec<StepTrace>,
     frames: Vec<ScoreFrame>,
     actions: Vec<Action>,
     sensors: SensorSuite,
-    recent: Recent,
+    history: ObservationHistory,
     recorded: Option<RecordedStates>,
-    /// What is looked at.
+    /// Streams that will be requested.
     streams: SensorStreams,
     far_commands: u32,
 }
 
-/// What a film keeps while it is being taken.
+/// Number of Newton steps so far.
+#[derive(Clone, Copy, Default)]
+struct NewtonCount {
+    total: u64,
+    /// Most in one physics step.
+    max: u32,
+}
+
+/// States recorded so far.
 #[derive(Clone, Default)]
 struct RecordedStates {
     frames: Vec<Frame>,
@@ -164,10 +179,10 @@ struct RecordedStates {
 }
 
 impl Episode {
-    /// Builds and settles the scene; the settled state is the deformation reference.
+    /// Builds the scene and lets it settle. The settled state is the reference of deformation.
     ///
     /// # Errors
-    /// The scene cannot be sensed or built or does not come to rest, or the goal names nothing in it.
+    /// The sensors or objects of the scene are invalid, it does not come to rest, or the goal names an unknown object.
     pub fn start(
         spec: EpisodeSpec,
         cache: &AssetCache,
@@ -176,7 +191,7 @@ impl Episode {
         check_sensors(&spec.scene, &spec.tactile, sensor_assets)
             .map_err(|source| spec.sense_error(source))?;
         let mut sim = Simulation::new(spec.scene.clone(), &spec.params, &spec.robot, cache)?;
-        let (object, place, hold_s) = match &spec.task.goal {
+        let (object, goal, hold_s) = match &spec.task.goal {
             Goal::On { object, target, hold_s } | Goal::In { object, target, hold_s } => {
                 (object, target, *hold_s)
             }
@@ -190,14 +205,14 @@ impl Episode {
                 have: sim.objects.iter().map(|o| o.name.as_str()).collect::<Vec<_>>().join(", "),
             })
         };
-        let (target, place) = (find("object", object)?, find("target", place)?);
+        let (target, goal) = (find("object", object)?, find("target", goal)?);
         sim.settle().map_err(|source| EpisodeError::Settle {
             layout: spec.task.layout.clone(),
             episode: spec.identity.episode,
             source,
         })?;
-        let evidence = EvidenceCollector::new(&sim, target, place);
-        let judge = judge(&spec, &sim, &evidence, (target, place), hold_s);
+        let evidence = EvidenceCollector::new(&sim, target, goal);
+        let judge = settled_judge(&spec, &sim, &evidence, target, goal, hold_s);
         let tool = sim.robot.tool_b(&sim.world);
         let start_hold = Action {
             position_b: tool.translation.vector,
@@ -215,13 +230,13 @@ impl Episode {
             start_hold,
             steps: 0,
             physics_steps: 0,
-            newton: (0, 0),
+            newton: NewtonCount::default(),
             min_det_f: f64::INFINITY,
             trace: Vec::new(),
             frames: Vec::new(),
             actions: Vec::new(),
             sensors,
-            recent: Recent::default(),
+            history: ObservationHistory::default(),
             recorded,
             streams: SensorStreams::default(),
             far_commands: 0,
@@ -229,19 +244,19 @@ impl Episode {
         })
     }
 
-    /// Runs to the goal, the end of the budget, or an invalid state.
+    /// Runs the episode with a controller until the goal is reached, the step budget is exhausted, or the state is invalid.
     ///
     /// # Errors
-    /// Whoever drives failed.
+    /// The controller fails with an error that is not confined to the episode, or a sensor stream cannot be computed.
     pub fn run(mut self, controller: &mut dyn Controller) -> Result<FinishedEpisode, EpisodeError> {
         let mut action = self.start_hold;
         let streams = controller.streams();
         self.begin(streams.clone());
         while self.outcome.is_none() {
-            let looked_at = if controller.wants_observation() { &streams } else { &SensorStreams::default() };
-            let observation = self.observe(looked_at)?;
+            let requested = if controller.wants_observation() { &streams } else { &SensorStreams::default() };
+            let observation = self.observe(requested)?;
             match controller.act(&self.sim, &observation) {
-                Ok(Some(wanted)) => action = wanted,
+                Ok(Some(next)) => action = next,
                 Ok(None) => {}
                 Err(ControlError::Action(message)) => {
                     self.outcome = Some(Outcome::Error { message });
@@ -255,14 +270,14 @@ impl Episode {
         Ok(self.finish(controller.gave_up().map(str::to_owned)))
     }
 
-    /// Says once, before the first step, what will be looked at: that much of the past is kept.
+    /// Starts the episode. `streams` are those that any later observation may request; their history is kept.
     pub fn begin(&mut self, streams: SensorStreams) {
         self.streams = streams;
-        self.remember(self.evidence.reference(self.target).map(|_| 0.0));
-        self.outcome = self.ending();
+        self.record_state(self.evidence.reference(self.target).map(|_| 0.0));
+        self.outcome = self.regular_outcome();
     }
 
-    /// Carries out one control step and says how the episode has ended, if it has. One that has ended moves no more.
+    /// Executes one control step. Returns the outcome once the episode has ended; further steps then have no effect.
     pub fn step(&mut self, action: &Action) -> Option<&Outcome> {
         if self.outcome.is_none() {
             self.outcome = self.advance(action);
@@ -270,7 +285,7 @@ impl Episode {
         self.outcome.as_ref()
     }
 
-    /// How it ended, if it has.
+    /// The outcome, once the episode has ended.
     pub fn outcome(&self) -> Option<&Outcome> {
         self.outcome.as_ref()
     }
@@ -284,12 +299,12 @@ impl Episode {
         if let Err(failure) = self.control_step(action) {
             return Some(self.invalid(&failure));
         }
-        self.remember(self.frames.last().and_then(|frame| frame.deformation.as_ref()).map(|d| d.rms_pct));
-        self.ending()
+        self.record_state(self.frames.last().and_then(|frame| frame.deformation.as_ref()).map(|d| d.rms_pct));
+        self.regular_outcome()
     }
 
-    /// How a state that can be trusted ends the episode, if it does.
-    fn ending(&self) -> Option<Outcome> {
+    /// The outcome of a valid state, if it ends the episode.
+    fn regular_outcome(&self) -> Option<Outcome> {
         if self.judge.is_goal_reached() {
             return Some(Outcome::Completed);
         }
@@ -300,13 +315,13 @@ impl Episode {
         EpisodeError::Control { task: self.spec.task.id, episode: self.spec.identity.episode, source }
     }
 
-    /// What a policy sees now, through those `streams` that are watched.
+    /// The current observation with the requested streams.
     ///
     /// # Errors
-    /// A stream cannot be made.
+    /// A sensor stream cannot be computed.
     pub fn observe(&mut self, streams: &SensorStreams) -> Result<Observation, EpisodeError> {
         let tool = self.sim.robot.tool_b(&self.sim.world);
-        let blind = Observation {
+        let proprioceptive = Observation {
             time_s: self.time(),
             ee_position_b: tool.translation.vector,
             ee_axis_angle_b: rotation::axis_angle(&tool.rotation),
@@ -319,15 +334,15 @@ impl Episode {
             forces: None,
             force_history: Vec::new(),
         };
-        let seen = self.recent.observe(&mut self.sensors, blind, streams);
-        seen.map_err(|source| self.spec.sense_error(source))
+        let observation = self.history.observe(&mut self.sensors, proprioceptive, streams);
+        observation.map_err(|source| self.spec.sense_error(source))
     }
 
-    /// What a camera of the scene sees now, in its own size or another (width and height, pixels). It is for onlookers: the
-    /// record does not count it as a look of the policy's.
+    /// Renders the current image of a camera, in its own or another size (pixels). It is not part of an observation and does not
+    /// change the record.
     ///
     /// # Errors
-    /// There is no such camera, or it has no picture of that size.
+    /// The scene has no camera of that name, or the size is invalid.
     pub fn render_camera(
         &mut self,
         camera: &str,
@@ -340,7 +355,7 @@ impl Episode {
         Ok(self.sensors.render(&SensorSuite::frame(&self.sim), &camera)?.into_rgb_image())
     }
 
-    /// What a finger's sensor sees now, for onlookers too.
+    /// Renders the current tactile image of a finger. It does not change the record.
     ///
     /// # Errors
     /// As [`SensorSuite::tactile_reading`].
@@ -348,8 +363,8 @@ impl Episode {
         Ok(self.sensors.tactile_reading(&SensorSuite::frame(&self.sim), side)?.image)
     }
 
-    /// Keeps what may be looked at later: for the sensors and for the film.
-    fn remember(&mut self, d_pct: Option<f64>) {
+    /// Keeps the state for later observations and for the recording.
+    fn record_state(&mut self, d_pct: Option<f64>) {
         if self.streams == SensorStreams::default() && self.recorded.is_none() {
             return;
         }
@@ -358,7 +373,7 @@ impl Episode {
             recorded.frames.push(frame.clone());
             recorded.d_pct.push(d_pct);
         }
-        self.recent.push(frame);
+        self.history.push(frame);
     }
 
     fn time(&self) -> f64 {
@@ -375,8 +390,8 @@ impl Episode {
             self.physics_steps += 1;
             self.sim.step()?;
             let stats = self.sim.world.stats();
-            self.newton =
-                (self.newton.0 + u64::from(stats.newton_steps), self.newton.1.max(stats.max_newton_steps));
+            self.newton.total += u64::from(stats.newton_steps);
+            self.newton.max = self.newton.max.max(stats.max_newton_steps);
             if let BodyId::Soft(index) = self.sim.objects[self.target].body {
                 self.min_det_f = self.min_det_f.min(self.sim.world.soft(index).min_det_f().det_f);
             }
@@ -387,7 +402,7 @@ impl Episode {
             worst = worst.into_iter().chain(now).max_by(|a, b| a.rms_pct.total_cmp(&b.rms_pct));
         }
         self.frames.push(ScoreFrame { success_now: self.judge.is_goal_reached(), deformation: worst });
-        if self.spec.trace.is_some() {
+        if self.spec.record_trace {
             self.trace.push(self.trace());
         }
         Ok(())
@@ -408,29 +423,36 @@ impl Episode {
         Outcome::Invalid { reason: reason.to_owned(), step: self.physics_steps, node }
     }
 
-    /// What is said of it up to now; one that has not ended is judged as if its time were up.
+    /// The verdict so far. An episode that has not ended is judged as a timeout.
     pub fn verdict(&self) -> Verdict {
         self.judge.clone().finish(self.outcome.as_ref().unwrap_or(&Outcome::Timeout))
     }
 
-    /// The present state, as a run would write it down.
+    /// The current state as an entry of a trace.
     pub fn trace(&self) -> StepTrace {
-        let at = (self.steps, self.time());
         let dropped = self.judge.first_drop().is_some();
-        StepTrace::new(&self.sim, &self.evidence, self.target, at, dropped, self.spec.trace == Some(true))
+        StepTrace::new(
+            &self.sim,
+            &self.evidence,
+            self.target,
+            self.steps,
+            self.time(),
+            dropped,
+            self.spec.trace_nodes,
+        )
     }
 
-    /// Its record, as far as it has come.
+    /// The record so far. `gave_up` is the reason why the controller aborted, if it did.
     pub fn record(&self, gave_up: Option<String>) -> EpisodeRecord {
         let soft = matches!(self.sim.objects[self.target].body, BodyId::Soft(_));
         let stats = RolloutStats {
             steps: self.steps,
             time_s: self.time(),
             min_det_f: (soft && self.min_det_f.is_finite()).then_some(self.min_det_f),
-            newton_mean: self.newton.0 as f64 / self.physics_steps.max(1) as f64,
-            newton_max: self.newton.1,
+            newton_mean: self.newton.total as f64 / self.physics_steps.max(1) as f64,
+            newton_max: self.newton.max,
             force_observed: self.streams.force,
-            camera_inside: self.recent.inside,
+            camera_inside: self.history.camera_inside,
             far_commands: self.far_commands,
             gave_up,
             state_hash: state_hash(&self.sim),
@@ -455,5 +477,93 @@ impl Episode {
             reference,
             recording,
         }
+    }
+}
+
+/// True if a command is farther from the tool than one step of the inverse kinematics reaches; both in the base frame.
+fn is_far(tool_b: &Pose, action: &Action) -> bool {
+    let turn = rotation::error(
+        &rotation::from_axis_angle(&rotation::axis_angle(&tool_b.rotation)),
+        &rotation::from_axis_angle(&action.axis_angle_b),
+    );
+    let error = PoseError { translation: action.position_b - tool_b.translation.vector, rotation: turn };
+    !LINEARISATION_RANGE.contains(&error)
+}
+
+/// Largest magnitude of the numbers of an action, m and rad. The squares of larger ones may overflow.
+const MAX_ACTION: f64 = 1e6;
+
+/// Checks that the numbers of an action are finite and plausible. The error is the message of the outcome.
+fn check_action(action: &Action) -> Result<(), String> {
+    let numbers = action.position_b.iter().chain(action.axis_angle_b.iter()).chain([&action.closure]);
+    let all: Vec<f64> = numbers.copied().collect();
+    if !all.iter().all(|x| x.is_finite()) {
+        return Err(format!("the action {all:?} holds a number that is not finite"));
+    }
+    match all.iter().find(|x| x.abs() > MAX_ACTION) {
+        Some(x) => Err(format!("the action {all:?} holds {x:e}, which is not a pose in m and rad")),
+        None => Ok(()),
+    }
+}
+
+/// The judge of an episode, for its settled state. `target` and `goal` are indices of objects.
+fn settled_judge(
+    spec: &EpisodeSpec,
+    sim: &Simulation,
+    evidence: &EvidenceCollector,
+    target: usize,
+    goal: usize,
+    hold_s: f64,
+) -> Judge {
+    Judge::new(JudgeConfig {
+        criteria: spec.criteria.clone(),
+        workspace: spec.scene.workspace,
+        goal: goal_region(&spec.task.goal, &sim.objects[goal]),
+        hold_s,
+        dt_s: spec.params.dt,
+        steps_per_control: steps_per_control(spec.params.dt),
+        target_weight_n: weight(sim, target),
+        is_target_soft: matches!(sim.objects[target].body, BodyId::Soft(_)),
+        limit: spec.limit,
+        target_lowest_z_w: lowest(sim, &sim.objects[target]),
+        others_lowest_z_w: evidence.others_lowest(sim),
+    })
+}
+
+/// Region in which the target must rest, in the goal object's frame at its foot.
+fn goal_region(goal: &Goal, object: &ObjectInstance) -> GoalRegion {
+    let bounds = object.bounds;
+    match goal {
+        Goal::On { .. } => GoalRegion::On { radius_m: 0.5 * bounds.size().xy().min() },
+        Goal::In { .. } => {
+            let wall = object.asset.hints.get("wall_m").copied().unwrap_or(0.0);
+            let inset = Vec3::new(wall, wall, 0.0);
+            let foot = object.foot_o();
+            GoalRegion::In { inside: Aabb { min: bounds.min + inset - foot, max: bounds.max - inset - foot } }
+        }
+    }
+}
+
+/// Weight of an object, N.
+fn weight(sim: &Simulation, object: usize) -> f64 {
+    let mass = match sim.objects[object].body {
+        BodyId::Soft(index) => sim.world.soft(index).state.model.total_mass(),
+        BodyId::Rigid(index) => sim.world.rigid(index).state.mass,
+        BodyId::Link(_) | BodyId::Kinematic(_) | BodyId::World => 0.0,
+    };
+    mass * sim.scene.gravity.norm()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn far_commands_are_accepted_and_implausible_ones_are_refused() {
+        let action =
+            |x| Action { position_b: Vec3::new(x, 0.0, 0.0), axis_angle_b: Vec3::zeros(), closure: 0.0 };
+        assert!(check_action(&action(-1e5)).is_ok());
+        assert!(check_action(&action(1e308)).is_err_and(|message| message.contains("not a pose")));
+        assert!(check_action(&action(f64::NAN)).is_err_and(|message| message.contains("not finite")));
     }
 }

@@ -1,6 +1,6 @@
-//! The hidden state as the judge wants it.
+//! The true state in the form in which the judge evaluates it.
 
-use super::simulation::{ObjectInstance, Simulation};
+use super::{object::ObjectInstance, simulation::Simulation};
 use crate::{
     evaluation::{
         deformation::{Deformation, ReferenceShape},
@@ -11,19 +11,19 @@ use crate::{
     robot::gripper::target_width,
 };
 
-/// Who is the target, where it must go, who else could move, and their settled shapes.
+/// Collects the evidence of an episode: the target, its goal, the other movable objects, and their settled shapes.
 #[derive(Clone, Debug)]
-pub struct EvidenceCollector {
+pub(super) struct EvidenceCollector {
     target: usize,
-    place: usize,
+    goal: usize,
     others: Vec<usize>,
     references: Vec<Option<ReferenceShape>>,
     bodies: Vec<BodyEvidence>,
 }
 
 impl EvidenceCollector {
-    /// Takes the settled state as the deformation reference.
-    pub fn new(sim: &Simulation, target: usize, place: usize) -> Self {
+    /// Takes the current, settled state as the reference of deformation. `target` and `goal` are indices of objects.
+    pub(super) fn new(sim: &Simulation, target: usize, goal: usize) -> Self {
         let movable = |i: &usize| *i != target && sim.objects[*i].body.is_free();
         let references = sim
             .objects
@@ -36,33 +36,33 @@ impl EvidenceCollector {
                 _ => None,
             })
             .collect();
-        let others = (0..sim.objects.len()).filter(movable).filter(|i| *i != place).collect();
-        Self { target, place, others, references, bodies: Vec::new() }
+        let others = (0..sim.objects.len()).filter(movable).filter(|i| *i != goal).collect();
+        Self { target, goal, others, references, bodies: Vec::new() }
     }
 
-    /// Lowest points of the other movable bodies, m.
-    pub fn others_lowest(&self, sim: &Simulation) -> Vec<f64> {
+    /// Heights of the lowest points of the other movable objects, m.
+    pub(super) fn others_lowest(&self, sim: &Simulation) -> Vec<f64> {
         self.others.iter().map(|&i| lowest(sim, &sim.objects[i])).collect()
     }
 
-    /// Deformation of an object now; `None` if it is rigid or cannot be measured.
-    pub fn deformation(&self, sim: &Simulation, object: usize) -> Option<Deformation> {
+    /// Current deformation of an object; `None` if it is rigid or cannot be measured.
+    pub(super) fn deformation(&self, sim: &Simulation, object: usize) -> Option<Deformation> {
         let BodyId::Soft(index) = sim.objects[object].body else { return None };
         self.references[object].as_ref()?.measure(&sim.world.soft(index).state.x).ok()
     }
 
-    /// The settled shape of an object.
-    pub fn reference(&self, object: usize) -> Option<&ReferenceShape> {
+    /// Settled shape of an object.
+    pub(super) fn reference(&self, object: usize) -> Option<&ReferenceShape> {
         self.references[object].as_ref()
     }
 
-    /// The evidence of the step that just ended.
-    pub fn collect<'a>(&'a mut self, sim: &Simulation, time_s: f64) -> Evidence<'a> {
+    /// The evidence of the last physics step.
+    pub(super) fn collect<'a>(&'a mut self, sim: &Simulation, time_s: f64) -> Evidence<'a> {
         let dt = sim.world.params.dt;
         self.bodies = self.others.iter().map(|&i| self.body(sim, i)).collect();
         let target = &sim.objects[self.target];
-        let place = &sim.objects[self.place];
-        let from_place = partners(place).map(|partner| upward(&sim.contact(target, partner))).sum::<f64>();
+        let goal = &sim.objects[self.goal];
+        let from_goal = partners(goal).map(|partner| upward(&sim.contact(target, partner))).sum::<f64>();
         let from_robot = sim
             .robot
             .body
@@ -76,15 +76,15 @@ impl EvidenceCollector {
                 width_m: sim.robot.width(&sim.world),
                 commanded_width_m: target_width(sim.robot.closure()),
             },
-            pads: sim.pad_contacts(target).map(|touch| PadEvidence {
-                normal_impulse_ns: touch.normal_force * dt,
-                travel_m: touch.travel,
+            pads: sim.pad_contacts(target).map(|contact| PadEvidence {
+                normal_impulse_ns: contact.normal_force * dt,
+                travel_m: contact.travel,
             }),
             robot_impulse_ns: from_robot * dt,
             target: self.body(sim, self.target),
             goal: GoalEvidence {
-                pose_w: sim.pose(place) * Pose::from(place.foot_o()),
-                support_impulse_ns: from_place * dt,
+                pose_w: sim.pose(goal) * Pose::from(goal.foot_o()),
+                support_impulse_ns: from_goal * dt,
             },
             others: &self.bodies,
         }
@@ -92,8 +92,8 @@ impl EvidenceCollector {
 
     fn body(&self, sim: &Simulation, index: usize) -> BodyEvidence {
         let object = &sim.objects[index];
-        let robot = |partner| matches!(partner, ContactPartner::Collider(c) if sim.robot.pads.contains(&c) || sim.robot.body.contains(&c));
-        let others = sim.world.contacts(object.body).iter().filter(|contact| !robot(contact.partner));
+        let is_robot = |partner| matches!(partner, ContactPartner::Collider(c) if sim.robot.pads.contains(&c) || sim.robot.body.contains(&c));
+        let others = sim.world.contacts(object.body).iter().filter(|contact| !is_robot(contact.partner));
         let support: f64 = others.map(|contact| upward(&contact.summary)).sum();
         BodyEvidence {
             centre_w: sim.centre(object),
@@ -104,7 +104,7 @@ impl EvidenceCollector {
     }
 }
 
-/// What an object is to those that it touches: its colliders, or a soft body.
+/// Contact partners that an object consists of: its colliders, or its soft body.
 fn partners(object: &ObjectInstance) -> impl Iterator<Item = ContactPartner> + '_ {
     let soft = match object.body {
         BodyId::Soft(index) => Some(ContactPartner::Soft(index)),
@@ -114,8 +114,8 @@ fn partners(object: &ObjectInstance) -> impl Iterator<Item = ContactPartner> + '
 }
 
 /// Upward part of a force, N.
-fn upward(touch: &ContactSummary) -> f64 {
-    touch.force_w.z.max(0.0)
+fn upward(contact: &ContactSummary) -> f64 {
+    contact.force_w.z.max(0.0)
 }
 
 /// Height of the lowest point of an object, m.

@@ -1,38 +1,40 @@
-//! One episode: settle → observe → act → step → judge; and the batch of them.
+//! Execution of episodes: building and settling a scene, observing, acting, stepping and judging.
+//!
+//! `build` turns a scene into a [`Simulation`]; an [`Episode`] runs it with a [`Controller`] and returns the record. Data derived
+//! from assets are shared between episodes in [`AssetCache`] and [`SensorAssets`].
 
 mod articulated;
 mod asset_cache;
 mod build;
+mod build_error;
 pub mod cancel;
-mod command;
 mod controller;
-pub mod episode;
+mod episode;
 mod evidence;
-mod judging;
+mod object;
 mod observation_history;
-mod proprioception;
 mod robot_instance;
 mod sensor_assets;
 mod sensor_check;
-pub mod sensors;
+mod sensors;
 mod settle;
 mod shared_cache;
-pub mod simulation;
+mod simulation;
+mod soft_model;
 mod spec;
-mod state_hash;
 mod trace;
 
 pub use asset_cache::AssetCache;
-pub use build::{BuildError, check_support, soft_rest};
+pub use build_error::BuildError;
 pub use controller::{Cancellable, ControlError, Controller};
 pub use episode::{Episode, EpisodeError, FinishedEpisode, ScoreFrame};
-pub use proprioception::{BodyConfiguration, Proprioception};
+pub use object::{ArticulatedPart, ObjectInstance};
 pub use robot_instance::RobotInstance;
-pub use sensor_assets::SensorAssets;
+pub use sensor_assets::{SensingError, SensorAssets};
 pub use sensor_check::{CAMERA_IMAGE_SUFFIXES, TACTILE_IMAGE_SUFFIXES, TACTILE_IMAGES, check_sensors};
-pub use sensors::{SensingError, SensorSuite, StateRecording};
+pub use sensors::{BodyConfiguration, Proprioception, ROBOT_SEGMENTATION_ID, SensorSuite, StateRecording};
 pub use settle::SettleError;
-pub use simulation::{ArticulatedPart, ObjectInstance, Simulation};
+pub use simulation::{Simulation, state_hash};
+pub use soft_model::soft_model;
 pub use spec::{EpisodeRef, EpisodeSpec, target_asset};
-pub use state_hash::state_hash;
 pub use trace::{ObjectTrace, StepTrace};

@@ -1,4 +1,4 @@
-//! The robot in a world: the Panda as a joint tree, its drives, its pads and its controller.
+//! The robot in the world: the Panda as an articulation, its drives, pads and inverse kinematics.
 
 use std::sync::Arc;
 
@@ -18,25 +18,26 @@ use crate::{
     },
 };
 
-/// The robot of a simulation.
+/// The robot of a simulation: an articulation with position drives, which follows commands of the tool pose by differential
+/// inverse kinematics.
 #[derive(Clone, Debug)]
 pub struct RobotInstance {
-    /// Its numbers.
+    /// Parameters.
     pub spec: RobotSpec,
-    /// Its articulation in the world.
+    /// Articulation in the world.
     pub articulation: ArticulationId,
     /// Colliders of the left and right gel pad.
     pub pads: [ColliderId; 2],
     /// All other colliders of the robot.
     pub body: Vec<ColliderId>,
-    /// Base in the world.
+    /// Pose of the base, world.
     pub base_w: Pose,
     ik: DiffIk,
     gripper: GripperSetpoint,
 }
 
 impl RobotInstance {
-    /// Puts the robot at `base_w` with joint angles `q`, gripper open.
+    /// Adds the robot to a world, with joint angles `q` (rad) and the gripper open.
     pub fn new(
         world: &mut World,
         spec: &RobotSpec,
@@ -85,7 +86,7 @@ impl RobotInstance {
         }
     }
 
-    /// Takes a command for the coming control step: the tool's pose in the base frame and the closure.
+    /// Sets the command of the next control step: tool pose in the base frame, and closure 0 (open) ..= 1 (closed).
     pub fn command(&mut self, world: &mut World, pose_b: &Pose, closure: f64) {
         let target = self.ik.step(&self.q(world), pose_b);
         let drives = world.articulation_mut(self.articulation).drives_mut();
@@ -93,7 +94,7 @@ impl RobotInstance {
         self.gripper.command(closure);
     }
 
-    /// Before each physics step: moves the finger targets on.
+    /// Advances the finger targets by one physics step; called before the step.
     pub fn advance(&mut self, world: &mut World) {
         self.gripper.advance(world.params.dt);
         let target = self.gripper.finger_target();
@@ -106,19 +107,19 @@ impl RobotInstance {
         std::array::from_fn(|i| world.articulation(self.articulation).state.q[i])
     }
 
-    /// Tool (TCP) pose in the base frame.
+    /// Pose of the tool (TCP) in the base frame.
     pub fn tool_b(&self, world: &World) -> Pose {
         self.ik.tool_pose(&self.q(world))
     }
 
-    /// Hand frame origin in the world, m.
+    /// Origin of the hand frame, m, world.
     pub fn hand_w(&self, world: &World) -> Vec3 {
         (world.articulation(self.articulation).poses()[panda::HAND_LINK] * panda::hand_in_link())
             .translation
             .vector
     }
 
-    /// Measured width, m.
+    /// Measured gripper width, m.
     pub fn width(&self, world: &World) -> f64 {
         let q = &world.articulation(self.articulation).state.q;
         gripper::width([q[ARM_DOFS], q[ARM_DOFS + 1]])
@@ -129,8 +130,11 @@ impl RobotInstance {
         self.gripper.closure()
     }
 
-    /// Arm angles that put the tool at `pose_b`, or by how much the nearest miss.
-    pub fn reach(
+    /// Arm joint angles, rad, for a tool pose.
+    ///
+    /// # Errors
+    /// The pose is out of reach; the error holds the distance to the nearest reachable pose.
+    pub fn solve_ik(
         &self,
         world: &World,
         pose_b: &Pose,
@@ -157,6 +161,6 @@ fn add_pad(world: &mut World, spec: &RobotSpec, articulation: ArticulationId, si
 }
 
 fn add_box(world: &mut World, link: LinkId, half: Vec3, pose: Pose) -> ColliderId {
-    // Steel and plastic: the friction of any rigid prop.
+    // Steel and plastic: the default friction of rigid objects.
     world.add_shape("gripper", link, pose, &Shape::Box { half }, Friction::default())
 }

@@ -1,37 +1,90 @@
-//! How things look and feel to the sensors: drawn models, fine skins, the tactile sensor. Made when somebody first looks.
+//! Render meshes and tactile skins per asset, and the models of robot and tactile sensor, built on first use.
 
 use std::sync::Arc;
 
-use super::{sensors::SensingError, shared_cache::SharedCache};
+use super::shared_cache::SharedCache;
 use crate::{
     geometry::voxel::VoxelMesh,
-    scene::Asset,
+    scene::{Asset, Camera},
     sensing::{
         camera::{CameraError, RenderMesh},
         panda::RobotMeshes,
-        tactile::{TactileSensor, TactileSkin, TactileSpec},
+        tactile::{ContactError, TactileSensor, TactileSensorError, TactileSkin, TactileSpec},
     },
 };
 
-/// Shared by all episodes of a run; what was not used for long is forgotten and made again when it is asked for.
+/// Data of a sensor cannot be computed.
+#[derive(Debug, thiserror::Error)]
+pub enum SensingError {
+    /// An image cannot be rendered.
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+    /// The tactile sensor cannot be built.
+    #[error(transparent)]
+    Sensor(#[from] TactileSensorError),
+    /// A tactile contact cannot be computed.
+    #[error(transparent)]
+    Field(#[from] ContactError),
+    /// An error about a camera that a script has set.
+    #[error("{at}: {source}")]
+    Set {
+        /// File and line.
+        at: String,
+        /// The cause.
+        source: Box<SensingError>,
+    },
+    /// Two images have the same name.
+    #[error("camera {camera}: name: {image:?} is an image of {owner} already; give the camera another name")]
+    Name {
+        /// Name of the camera.
+        camera: String,
+        /// Name of the image.
+        image: String,
+        /// Owner of the image with that name.
+        owner: String,
+    },
+    /// The scene has no camera of a name.
+    #[error("there is no camera {name:?}; the scene has {have}")]
+    NoCamera {
+        /// The requested name.
+        name: String,
+        /// Names of the scene's cameras.
+        have: String,
+    },
+    /// A soft body and its skin do not match.
+    #[error("{0}: its surface lies outside of its voxel mesh; build both from one shape")]
+    Skin(String),
+}
+
+impl SensingError {
+    /// Adds the place in the script that set the camera.
+    pub(super) fn set_by(self, camera: &Camera) -> Self {
+        match &camera.set_at {
+            Some(at) => Self::Set { at: at.clone(), source: Box::new(self) },
+            None => self,
+        }
+    }
+}
+
+/// Meshes and sensor models shared by all episodes of a run; a clone shares the caches.
 #[derive(Clone, Debug, Default)]
 pub struct SensorAssets {
-    models: SharedCache<Arc<Asset>, Arc<RenderMesh>>,
+    meshes: SharedCache<Arc<Asset>, Arc<RenderMesh>>,
     skins: SharedCache<Arc<Asset>, Arc<TactileSkin>>,
     sensors: SharedCache<TactileSpec, Arc<TactileSensor>>,
     robot: SharedCache<(), Arc<RobotMeshes>>,
 }
 
 impl SensorAssets {
-    /// The drawn form of an asset; `mesh` is that of its soft body.
-    pub(super) fn model(
+    /// Render mesh of an asset; `mesh` is the voxel mesh of a soft body.
+    pub(super) fn mesh(
         &self,
         name: &str,
         asset: &Arc<Asset>,
         mesh: Option<&VoxelMesh>,
     ) -> Result<Arc<RenderMesh>, CameraError> {
-        let same = |known: &Arc<Asset>| alike(known, asset) && known.visuals == asset.visuals;
-        self.models.get(asset, same, || {
+        let same = |known: &Arc<Asset>| have_same_surface(known, asset) && known.visuals == asset.visuals;
+        self.meshes.get(asset, same, || {
             let model = match mesh {
                 None => RenderMesh::from_shape(name, &asset.shape, &asset.visuals)?,
                 Some(mesh) => RenderMesh::from_deformable_shape(name, &asset.shape, &asset.visuals)?
@@ -41,7 +94,7 @@ impl SensorAssets {
         })
     }
 
-    /// The skin of an asset that presses on gels.
+    /// Tactile skin of an asset: the fine surface mesh that presses into gels.
     pub(super) fn skin(
         &self,
         name: &str,
@@ -50,7 +103,7 @@ impl SensorAssets {
     ) -> Result<Arc<TactileSkin>, SensingError> {
         self.skins.get(
             asset,
-            |known| alike(known, asset),
+            |known| have_same_surface(known, asset),
             || {
                 let skin = match mesh {
                     None => TactileSkin::of_shape(&asset.shape),
@@ -62,18 +115,18 @@ impl SensorAssets {
         )
     }
 
-    /// The drawn form of the robot.
+    /// Render meshes of the robot.
     pub(super) fn robot(&self) -> Result<Arc<RobotMeshes>, CameraError> {
         self.robot.get(&(), |()| true, || Ok(Arc::new(RobotMeshes::new()?)))
     }
 
-    /// The tactile sensor of these numbers.
+    /// Tactile sensor of a specification.
     pub(super) fn sensor(&self, spec: &TactileSpec) -> Result<Arc<TactileSensor>, SensingError> {
         self.sensors.get(spec, |known| known == spec, || Ok(Arc::new(TactileSensor::new(spec)?)))
     }
 }
 
-/// Whether two assets have one surface, at rest and moved.
-fn alike(a: &Asset, b: &Asset) -> bool {
+/// True if two assets have the same surface, at rest and deformed.
+fn have_same_surface(a: &Asset, b: &Asset) -> bool {
     a.shape == b.shape && a.body == b.body
 }

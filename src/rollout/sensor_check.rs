@@ -1,8 +1,8 @@
-//! What of the sensors can be told to be wrong before anything runs, and how their pictures are called.
+//! Checks of a scene's sensors before an episode runs, and the names of their images.
 
 use super::{
-    sensor_assets::SensorAssets,
-    sensors::{SensingError, SensorSuite},
+    sensor_assets::{SensingError, SensorAssets},
+    sensors::SensorSuite,
 };
 use crate::{
     geometry::Pose,
@@ -15,21 +15,21 @@ use crate::{
     },
 };
 
-/// What is added to a camera's name for its picture, its depth and its segmentation.
+/// Suffixes of a camera's name for its colour, depth and segmentation images.
 pub const CAMERA_IMAGE_SUFFIXES: [&str; 3] = ["", "_depth", "_segmentation"];
-/// What is added to a finger's name for its picture, and for the picture with its markers as dots and as arrows.
+/// Suffixes of a finger's name for its tactile image, and for those with the markers as dots and as arrows.
 pub const TACTILE_IMAGE_SUFFIXES: [&str; 3] = ["", "_markers", "_arrows"];
-/// Names of the left and right finger's pictures.
+/// Names of the left and right finger's tactile images.
 pub const TACTILE_IMAGES: [&str; 2] = ["tactile_left", "tactile_right"];
 
-/// Edge of the pictures that only try out whether there can be one, pixels.
+/// Edge of the images that are rendered as a check only, px.
 const TRIAL_EDGE: usize = 16;
 
-/// Checks the senses of a scene as far as no state is needed: the cameras' numbers, names and sizes, the light, and that a
-/// tactile sensor with tables of its own has them.
+/// Checks the sensors of a scene without a simulation: parameters, names and sizes of the cameras, the light, and the table
+/// files of the tactile sensor.
 ///
 /// # Errors
-/// What is wrong, with the place in the script that set it.
+/// The first invalid value, with the place in the script that set it.
 pub fn check_sensors(
     scene: &Scene,
     spec: &TactileSpec,
@@ -39,36 +39,36 @@ pub fn check_sensors(
         .map_err(|(index, error)| SensingError::from(error).set_by(&scene.cameras[index]))?;
     check_names(&scene.cameras)?;
     check_light(&scene.lighting)?;
-    // The others have no file that could be missing.
+    // Other optics models read no files.
     if let OpticsModel::Taxim { .. } = spec.optics {
         sensor_assets.sensor(spec)?;
     }
     Ok(())
 }
 
-/// No camera may be called as a picture of another or of a finger is: one file would replace the other.
+/// Checks that no two images of cameras and fingers have the same name; their files would overwrite each other.
 fn check_names(cameras: &[Camera]) -> Result<(), SensingError> {
-    let called = |owner: &str, kinds: [&str; 3]| kinds.map(|kind| format!("{owner}{kind}"));
+    let image_names = |owner: &str, kinds: [&str; 3]| kinds.map(|kind| format!("{owner}{kind}"));
     let mut taken: Vec<(String, String)> = Vec::new();
     for finger in TACTILE_IMAGES {
-        taken.extend(called(finger, TACTILE_IMAGE_SUFFIXES).map(|name| (name, "a finger".to_owned())));
+        taken.extend(image_names(finger, TACTILE_IMAGE_SUFFIXES).map(|name| (name, "a finger".to_owned())));
     }
     for camera in cameras {
-        for name in called(&camera.name, CAMERA_IMAGE_SUFFIXES) {
+        for name in image_names(&camera.name, CAMERA_IMAGE_SUFFIXES) {
             if let Some((_, owner)) = taken.iter().find(|(known, _)| *known == name) {
                 let (camera_name, owner) = (camera.name.clone(), owner.clone());
-                return Err(SensingError::Name { camera: camera_name, picture: name, owner }.set_by(camera));
+                return Err(SensingError::Name { camera: camera_name, image: name, owner }.set_by(camera));
             }
         }
         let owner = format!("camera {}", camera.name);
-        taken.extend(called(&camera.name, CAMERA_IMAGE_SUFFIXES).map(|name| (name, owner.clone())));
+        taken.extend(image_names(&camera.name, CAMERA_IMAGE_SUFFIXES).map(|name| (name, owner.clone())));
     }
     Ok(())
 }
 
 impl SensorSuite {
-    /// Looks once at `streams` in the state in which an episode starts: whatever would go wrong in its first control step
-    /// goes wrong here.
+    /// Computes the requested streams once in the initial state of an episode, so that errors appear before its first control
+    /// step.
     ///
     /// # Errors
     /// As [`SensorSuite::render_unobstructed`] and [`SensorSuite::tactile_readings`].
@@ -83,13 +83,13 @@ impl SensorSuite {
         Ok(())
     }
 
-    /// Whether a camera of the scene stands inside of something in the state in which an episode starts, by the shapes of
-    /// the objects: nothing of them is drawn, which would take a hundred times as long.
+    /// Checks that no camera of the scene is inside an object in the initial state. It evaluates the shapes of the objects, which
+    /// is a hundred times faster than rendering them; only the robot is rendered.
     ///
     /// # Errors
-    /// A camera inside of something, or a picture of the robot alone that cannot be drawn.
+    /// A camera is inside an object, or the robot cannot be rendered.
     pub fn check_camera_positions(&mut self, frame: &Frame) -> Result<(), SensingError> {
-        let robot = self.robot_alone()?;
+        let robot = self.robot_scene()?;
         let view = self.view(frame);
         for camera in self.cameras() {
             let mount_w = match (camera.mount, view.hand_w) {
@@ -97,12 +97,12 @@ impl SensorSuite {
                 _ => Pose::identity(),
             };
             let eye_w = mount_w * nalgebra::Point3::from(camera.pose.translation.vector);
-            let object = match self.around(&eye_w) {
+            let object = match self.object_around(&eye_w) {
                 Some(name) => Some(name.to_owned()),
                 None => {
-                    let picture =
+                    let image =
                         Renderer::default().render(&robot, &view, &camera.clone().with_edge(TRIAL_EDGE));
-                    picture.map_err(|error| SensingError::from(error).set_by(camera))?.inside
+                    image.map_err(|error| SensingError::from(error).set_by(camera))?.inside
                 }
             };
             if let Some(object) = object {
@@ -124,20 +124,20 @@ mod tests {
     }
 
     #[test]
-    fn no_two_pictures_have_one_name() {
+    fn names_of_images_are_unique() {
         assert!(check_names(&named(&["third_person", "wrist", "wrist_2", "depth"])).is_ok());
         for (names, words) in [
             (
                 ["wrist", "wrist_depth"],
-                "camera wrist_depth: name: \"wrist_depth\" is a picture of camera wrist",
+                "camera wrist_depth: name: \"wrist_depth\" is an image of camera wrist",
             ),
             (
                 ["wrist_depth", "wrist"],
-                "camera wrist: name: \"wrist_depth\" is a picture of camera wrist_depth",
+                "camera wrist: name: \"wrist_depth\" is an image of camera wrist_depth",
             ),
-            (["wrist", "tactile_left"], "\"tactile_left\" is a picture of a finger"),
-            (["wrist", "tactile_right_arrows"], "\"tactile_right_arrows\" is a picture of a finger"),
-            (["wrist", "wrist"], "camera wrist: name: \"wrist\" is a picture of camera wrist"),
+            (["wrist", "tactile_left"], "\"tactile_left\" is an image of a finger"),
+            (["wrist", "tactile_right_arrows"], "\"tactile_right_arrows\" is an image of a finger"),
+            (["wrist", "wrist"], "camera wrist: name: \"wrist\" is an image of camera wrist"),
         ] {
             let error = check_names(&named(&names)).expect_err(words);
             assert!(error.to_string().contains(words), "{error}");

@@ -1,13 +1,15 @@
-//! What the robot senses in a simulation: pictures, touch and forces, each a pure function of a [`Frame`], computed when
-//! somebody looks, then or later.
+//! Sensors of a simulation: images, tactile readings, forces and proprioception. Each is a pure function of a [`Frame`] (a
+//! state of the world), so that it can be computed on demand, also after the episode.
 
 use std::sync::Arc;
 
 use super::{
-    sensor_assets::SensorAssets,
-    simulation::{Simulation, joint_frame},
+    object::ObjectInstance,
+    sensor_assets::{SensingError, SensorAssets},
+    simulation::Simulation,
 };
 use crate::{
+    benchmark::control::CONTROL_DT,
     geometry::{Pose, Vec3},
     physics::{
         ArticulationId, BodyId, ColliderId, ContactPartner,
@@ -15,100 +17,52 @@ use crate::{
         world::{ContactPatch, Frame},
     },
     policy::{PadForce, TactileFrame},
-    robot::{RobotSpec, Side, pads, panda},
+    robot::{
+        RobotSpec, Side,
+        ik::DiffIk,
+        pads,
+        panda::{self, ARM_DOFS},
+    },
     scene::{Asset, Body, Camera, Scene},
     sensing::{
         camera::{self, CameraError, FrameView, RenderObject, RenderScene, RenderedImage},
         tactile::{
-            ContactError, GelScratch, PadWrench, SkinMesh, SubstrateCompliance, TactileContact,
-            TactileReading, TactileSensorError, TactileSkin, TactileSpec, Taxels, patch_friction,
+            GelScratch, PadWrench, SkinMesh, SubstrateCompliance, TactileContact, TactileReading,
+            TactileSkin, TactileSpec, Taxels, patch_friction,
         },
     },
 };
 
-/// Why something cannot be sensed.
-#[derive(Debug, thiserror::Error)]
-pub enum SensingError {
-    /// A picture cannot be drawn.
-    #[error(transparent)]
-    Camera(#[from] CameraError),
-    /// The tactile sensor cannot be made.
-    #[error(transparent)]
-    Sensor(#[from] TactileSensorError),
-    /// A touch cannot be worked out.
-    #[error(transparent)]
-    Field(#[from] ContactError),
-    /// What a script set is wrong.
-    #[error("{at}: {source}")]
-    Set {
-        /// File and line.
-        at: String,
-        /// What is wrong.
-        source: Box<SensingError>,
-    },
-    /// Two pictures have one name.
-    #[error(
-        "camera {camera}: name: {picture:?} is a picture of {owner} already; give the camera another name"
-    )]
-    Name {
-        /// The camera.
-        camera: String,
-        /// The name of the picture.
-        picture: String,
-        /// Whose picture it is.
-        owner: String,
-    },
-    /// There is no such camera.
-    #[error("there is no camera {name:?}; the scene has {have}")]
-    NoCamera {
-        /// The name.
-        name: String,
-        /// Names of those there are.
-        have: String,
-    },
-    /// A soft body and its skin do not belong together.
-    #[error("{0}: its surface lies outside of its voxel mesh; build both from one shape")]
-    Skin(String),
-}
-
-impl SensingError {
-    /// The same error with the place in the script that set the camera.
-    pub(super) fn set_by(self, camera: &Camera) -> Self {
-        match &camera.set_at {
-            Some(at) => Self::Set { at: at.clone(), source: Box::new(self) },
-            None => self,
-        }
-    }
-}
-
-/// An object of the scene as the sensors know it.
+/// An object of the scene with the data that sensors need.
 #[derive(Clone, Debug)]
-pub(super) struct Part {
-    pub(super) name: String,
+struct SensedObject {
+    name: String,
     asset: Arc<Asset>,
-    pub(super) body: BodyId,
+    body: BodyId,
     start_w: Pose,
-    /// Its frame in that of its link, if it has one.
-    pub(super) offset: Pose,
+    /// Object frame in the frame of the link; identity for other bodies.
+    offset: Pose,
     colliders: Vec<ColliderId>,
-    rest: Option<Arc<FemModel>>,
+    model: Option<Arc<FemModel>>,
 }
 
-/// The sensors of one simulation.
+/// The sensors of one simulation: the scene's cameras, two tactile sensors, and the true forces on the pads.
+///
+/// Nothing is computed until it is requested. Meshes and skins come from shared [`SensorAssets`].
 #[derive(Debug)]
 pub struct SensorSuite {
     scene: Arc<Scene>,
     spec: TactileSpec,
-    pub(super) robot: RobotSpec,
-    pub(super) articulation: ArticulationId,
-    pub(super) parts: Vec<Part>,
+    robot: RobotSpec,
+    articulation: ArticulationId,
+    objects: Vec<SensedObject>,
     assets: SensorAssets,
-    stage: Option<Arc<RenderScene>>,
-    eye: camera::Renderer,
-    touch: GelScratch,
+    render_scene: Option<Arc<RenderScene>>,
+    renderer: camera::Renderer,
+    gel_scratch: GelScratch,
 }
 
-/// A copy draws the same scene with a working memory of its own, which it fills when it first looks.
+/// A clone shares the meshes but has its own working memory.
 impl Clone for SensorSuite {
     fn clone(&self) -> Self {
         Self {
@@ -116,32 +70,31 @@ impl Clone for SensorSuite {
             spec: self.spec.clone(),
             robot: self.robot.clone(),
             articulation: self.articulation,
-            parts: self.parts.clone(),
+            objects: self.objects.clone(),
             assets: self.assets.clone(),
-            stage: self.stage.clone(),
-            eye: camera::Renderer::default(),
-            touch: GelScratch::default(),
+            render_scene: self.render_scene.clone(),
+            renderer: camera::Renderer::default(),
+            gel_scratch: GelScratch::default(),
         }
     }
 }
 
-/// Taxels along x and y of the force maps: squares of a millimetre.
+/// Taxels of the force maps along x and y, 1 mm each.
 const TAXELS: [usize; 2] = [25, 21];
-/// Number of the robot in segmentations; objects count from 1 in the order of the scene, the parts of each after
-/// it.
-pub const ROBOT: u16 = 1000;
+/// Segmentation id of the robot. Objects have ids from 1 in the order of the scene, each followed by its parts.
+pub const ROBOT_SEGMENTATION_ID: u16 = 1000;
 
 impl SensorSuite {
-    /// The sensors of `sim`; nothing is computed yet.
+    /// The sensors of a simulation.
     pub fn new(sim: &Simulation, spec: &TactileSpec, assets: &SensorAssets) -> Self {
-        let part = |object: &super::ObjectInstance| Part {
+        let sensed = |object: &ObjectInstance| SensedObject {
             name: object.name.clone(),
             asset: object.asset.clone(),
             body: object.body,
             start_w: object.start_w,
-            offset: joint_frame(object).inverse(),
+            offset: object.joint_frame_o().inverse(),
             colliders: object.colliders.clone(),
-            rest: match object.body {
+            model: match object.body {
                 BodyId::Soft(body) => Some(sim.world.soft(body).state.model.clone()),
                 _ => None,
             },
@@ -151,15 +104,15 @@ impl SensorSuite {
             spec: spec.clone(),
             robot: sim.robot.spec.clone(),
             articulation: sim.robot.articulation,
-            parts: sim.objects.iter().map(part).collect(),
+            objects: sim.objects.iter().map(sensed).collect(),
             assets: assets.clone(),
-            stage: None,
-            eye: camera::Renderer::default(),
-            touch: GelScratch::default(),
+            render_scene: None,
+            renderer: camera::Renderer::default(),
+            gel_scratch: GelScratch::default(),
         }
     }
 
-    /// All that the sensors need of the present state.
+    /// The current state, with all that sensors need of it.
     pub fn frame(sim: &Simulation) -> Frame {
         sim.world.snapshot(&sim.robot.pads)
     }
@@ -167,7 +120,7 @@ impl SensorSuite {
     /// The scene's camera of a name.
     ///
     /// # Errors
-    /// There is none.
+    /// The scene has no camera of that name.
     pub fn camera(&self, name: &str) -> Result<&Camera, SensingError> {
         self.scene.camera(name).ok_or_else(|| SensingError::NoCamera {
             name: name.to_owned(),
@@ -180,69 +133,69 @@ impl SensorSuite {
         &self.scene.cameras
     }
 
-    /// What `camera` sees. One that stands inside of something sees what is beyond it, and the picture says so: things may
-    /// get around a camera in the course of an episode, and that must not end it.
+    /// Renders the image of a camera in a state: colour, depth and segmentation. A camera inside an object sees the scene behind
+    /// its surface, and `inside` of the image names the object: an episode must not fail because an object encloses a camera.
     ///
     /// # Errors
-    /// A number of the camera or light out of range, a thing that cannot be drawn.
+    /// A parameter of the camera or the light is out of range, or an object cannot be rendered.
     pub fn render(&mut self, frame: &Frame, camera: &Camera) -> Result<RenderedImage, SensingError> {
-        let stage = match self.stage.take() {
-            Some(stage) => stage,
+        let render_scene = match self.render_scene.take() {
+            Some(built) => built,
             None => Arc::new(self.build()?),
         };
-        let picture = self.eye.render(&stage, &self.view(frame), camera);
-        self.stage = Some(stage);
-        picture.map_err(|error| SensingError::from(error).set_by(camera))
+        let image = self.renderer.render(&render_scene, &self.view(frame), camera);
+        self.render_scene = Some(render_scene);
+        image.map_err(|error| SensingError::from(error).set_by(camera))
     }
 
-    /// Everything that is drawn, for [`render`]; made when somebody first looks.
+    /// The meshes and the light that [`render`](Self::render) uses, built on first use.
     ///
     /// # Errors
-    /// A thing that cannot be drawn, a number of the light out of range.
+    /// An object cannot be rendered, or a parameter of the light is out of range.
     pub fn render_scene(&mut self) -> Result<&RenderScene, SensingError> {
-        let stage = match self.stage.take() {
-            Some(stage) => stage,
+        let render_scene = match self.render_scene.take() {
+            Some(built) => built,
             None => Arc::new(self.build()?),
         };
-        Ok(self.stage.insert(stage))
+        Ok(self.render_scene.insert(render_scene))
     }
 
     fn build(&self) -> Result<RenderScene, CameraError> {
-        RenderScene::new(self.things()?, self.scene.lighting.clone())
+        RenderScene::new(self.render_objects()?, self.scene.lighting.clone())
     }
 
-    /// The robot with nothing around it.
-    pub(super) fn robot_alone(&self) -> Result<RenderScene, CameraError> {
-        let things = self.assets.robot()?.objects(self.articulation, self.scene.base_w, ROBOT);
-        RenderScene::new(things.into_iter().collect(), self.scene.lighting.clone())
+    /// The robot without objects.
+    pub(super) fn robot_scene(&self) -> Result<RenderScene, CameraError> {
+        let robot = self.assets.robot()?.objects(self.articulation, self.scene.base_w, ROBOT_SEGMENTATION_ID);
+        RenderScene::new(robot.into_iter().collect(), self.scene.lighting.clone())
     }
 
-    /// The object that a point of the world is inside of where the objects start.
-    pub(super) fn around(&self, point_w: &nalgebra::Point3<f64>) -> Option<&str> {
-        let inside = |part: &&Part| {
-            part.asset.shape.distance(&part.start_w.inverse_transform_point(point_w).coords) < 0.0
+    /// The object that contains a point in the initial poses.
+    pub(super) fn object_around(&self, point_w: &nalgebra::Point3<f64>) -> Option<&str> {
+        let inside = |object: &&SensedObject| {
+            object.asset.shape.distance(&object.start_w.inverse_transform_point(point_w).coords) < 0.0
         };
-        self.parts.iter().find(inside).map(|part| part.name.as_str())
+        self.objects.iter().find(inside).map(|object| object.name.as_str())
     }
 
-    /// What pictures need of a state.
+    /// The parts of a state that images depend on.
     pub fn view<'a>(&self, frame: &'a Frame) -> FrameView<'a> {
         let hand_w = frame.links[self.articulation.index()][panda::HAND_LINK] * panda::hand_in_link();
         FrameView::new(frame, Some(hand_w))
     }
 
-    /// The same for a camera where somebody put it, before anything has moved.
+    /// Renders the image of a camera in an initial state, in which it must not be inside an object.
     ///
     /// # Errors
-    /// As [`SensorSuite::render`]; also if the camera stands inside of something.
+    /// As [`SensorSuite::render`]; also if the camera is inside an object.
     pub fn render_unobstructed(
         &mut self,
         frame: &Frame,
         camera: &Camera,
     ) -> Result<RenderedImage, SensingError> {
-        let picture = self.render(frame, camera)?;
-        match &picture.inside {
-            None => Ok(picture),
+        let image = self.render(frame, camera)?;
+        match &image.inside {
+            None => Ok(image),
             Some(object) => {
                 let inside = CameraError::Inside { camera: camera.name.clone(), object: object.clone() };
                 Err(SensingError::from(inside).set_by(camera))
@@ -250,16 +203,16 @@ impl SensorSuite {
         }
     }
 
-    /// What the left and right finger feel.
+    /// Readings of the left and right tactile sensor in a state.
     ///
     /// # Errors
-    /// The sensor cannot be made, or a number of the state is none.
+    /// The sensor cannot be built, or a number of the state is not finite.
     pub fn tactile_readings(&mut self, frame: &Frame) -> Result<[TactileReading; 2], SensingError> {
         let left = self.tactile_reading(frame, Side::Left)?;
         Ok([left, self.tactile_reading(frame, Side::Right)?])
     }
 
-    /// The same as a policy gets it.
+    /// Readings of both tactile sensors in the form of observations.
     ///
     /// # Errors
     /// As [`SensorSuite::tactile_readings`].
@@ -281,15 +234,15 @@ impl SensorSuite {
         })
     }
 
-    /// What one finger feels.
+    /// Reading of one tactile sensor in a state.
     ///
     /// # Errors
     /// As [`SensorSuite::tactile_readings`].
     pub fn tactile_reading(&mut self, frame: &Frame, side: Side) -> Result<TactileReading, SensingError> {
         let sensor = self.assets.sensor(&self.spec)?;
-        let index = usize::from(side == Side::Right);
+        let index = side.index();
         let none = ContactPatch { collider: ColliderId::new(0), points: Vec::new() };
-        // What touches the very rim alone, where no cell of the grid has its centre, cannot be seen.
+        // Contact at the very rim, beyond the centres of the outermost grid cells, is not visible.
         let inside = |p: &Vec3| sensor.gel.pad.edge_distance(p.x, p.y) < -sensor.gel.cell;
         let patch = frame.patches.get(index).filter(|patch| patch.points.iter().any(|p| inside(&p.p_p)));
         let patch = patch.unwrap_or(&none);
@@ -297,23 +250,23 @@ impl SensorSuite {
             frame.links[self.articulation.index()][panda::finger_link(side)] * pads::pad_pose_in_finger(side);
         let mut placed: Vec<(Arc<TactileSkin>, Vec<Vec3>)> = Vec::new();
         let mut substrate = None;
-        for part in self.parts.iter().filter(|part| part.presses(patch)) {
-            let mesh = part.rest.as_ref().map(|rest| &rest.mesh);
-            let skin = self.assets.skin(&part.name, &part.asset, mesh)?;
+        for object in self.objects.iter().filter(|object| object.presses(patch)) {
+            let mesh = object.model.as_ref().map(|model| &model.mesh);
+            let skin = self.assets.skin(&object.name, &object.asset, mesh)?;
             let mut vertices = Vec::new();
             let w_p = pad_w.inverse();
-            match part.body {
+            match object.body {
                 BodyId::Soft(body) => skin.place_soft(frame.soft(body), &w_p, &mut vertices),
                 BodyId::Rigid(body) => skin.place_rigid(&(w_p * frame.rigid(body)), &mut vertices),
                 BodyId::Link(link) => {
-                    skin.place_rigid(&(w_p * frame.link(link) * part.offset), &mut vertices)
+                    skin.place_rigid(&(w_p * frame.link(link) * object.offset), &mut vertices)
                 }
                 BodyId::World | BodyId::Kinematic(_) => {
-                    skin.place_rigid(&(w_p * part.start_w), &mut vertices)
+                    skin.place_rigid(&(w_p * object.start_w), &mut vertices)
                 }
             }
             placed.push((skin, vertices));
-            substrate = part.substrate();
+            substrate = object.substrate();
         }
         let skins: Vec<SkinMesh> = placed
             .iter()
@@ -325,36 +278,67 @@ impl SensorSuite {
             friction: patch_friction(patch).unwrap_or(self.robot.pads.static_mu),
             substrate: if placed.len() == 1 { substrate } else { None },
         };
-        Ok(sensor.read(&contact, &mut self.touch)?)
+        Ok(sensor.read(&contact, &mut self.gel_scratch)?)
     }
 
-    /// Everything that is drawn.
-    fn things(&self) -> Result<Vec<RenderObject>, CameraError> {
-        let draw = |(index, part): (usize, &Part)| {
-            let voxels = part.rest.as_ref().map(|rest| &rest.mesh);
-            let (body, pose_in_body) = match part.body {
-                BodyId::Soft(_) | BodyId::Rigid(_) => (part.body, Pose::identity()),
-                BodyId::Link(_) => (part.body, part.offset),
-                BodyId::World | BodyId::Kinematic(_) => (BodyId::World, part.start_w),
+    /// Proprioception in a state.
+    pub fn proprioception(&self, frame: &Frame) -> Proprioception {
+        let q = &frame.joints[self.articulation.index()];
+        let joints = std::array::from_fn(|i| q[i]);
+        Proprioception {
+            tool_b: DiffIk::new(&self.robot.ik, joints, CONTROL_DT).tool_pose(&joints),
+            joints,
+            fingers: [q[ARM_DOFS], q[ARM_DOFS + 1]],
+        }
+    }
+
+    /// Names and configurations of all movable objects, in the order of the scene.
+    pub fn body_configurations<'a>(
+        &'a self,
+        frame: &'a Frame,
+    ) -> impl Iterator<Item = (&'a str, BodyConfiguration<'a>)> {
+        self.objects.iter().filter_map(|object| {
+            let state = match object.body {
+                BodyId::Soft(body) => BodyConfiguration::Nodes(frame.soft(body)),
+                BodyId::Rigid(body) => BodyConfiguration::Pose(*frame.rigid(body)),
+                BodyId::Link(link) => BodyConfiguration::Pose(frame.link(link) * object.offset),
+                BodyId::World | BodyId::Kinematic(_) => return None,
+            };
+            Some((object.name.as_str(), state))
+        })
+    }
+
+    /// Render objects of the scene and the robot.
+    fn render_objects(&self) -> Result<Vec<RenderObject>, CameraError> {
+        let render_object = |(index, object): (usize, &SensedObject)| {
+            let voxels = object.model.as_ref().map(|model| &model.mesh);
+            let (body, pose_in_body) = match object.body {
+                BodyId::Soft(_) | BodyId::Rigid(_) => (object.body, Pose::identity()),
+                BodyId::Link(_) => (object.body, object.offset),
+                BodyId::World | BodyId::Kinematic(_) => (BodyId::World, object.start_w),
             };
             Ok(RenderObject {
-                name: part.name.clone(),
+                name: object.name.clone(),
                 segmentation_id: index as u16 + 1,
-                mesh: self.assets.model(&part.name, &part.asset, voxels)?,
+                mesh: self.assets.mesh(&object.name, &object.asset, voxels)?,
                 body,
                 pose_in_body,
                 casts_shadow: true,
             })
         };
-        let mut things: Vec<RenderObject> =
-            self.parts.iter().enumerate().map(draw).collect::<Result<_, _>>()?;
-        things.extend(self.assets.robot()?.objects(self.articulation, self.scene.base_w, ROBOT));
-        Ok(things)
+        let mut objects: Vec<RenderObject> =
+            self.objects.iter().enumerate().map(render_object).collect::<Result<_, _>>()?;
+        objects.extend(self.assets.robot()?.objects(
+            self.articulation,
+            self.scene.base_w,
+            ROBOT_SEGMENTATION_ID,
+        ));
+        Ok(objects)
     }
 }
 
-impl Part {
-    /// Whether any point of a patch is its own.
+impl SensedObject {
+    /// True if the object has a contact point in a patch.
     fn presses(&self, patch: &ContactPatch) -> bool {
         patch.points.iter().any(|point| match point.partner {
             ContactPartner::Soft(id) => self.body == BodyId::Soft(id),
@@ -364,19 +348,39 @@ impl Part {
 
     /// Compliance of a soft body to a gel in ridges too fine for its elements.
     fn substrate(&self) -> Option<SubstrateCompliance> {
-        let (Body::Soft(material), Some(rest)) = (&self.asset.body, &self.rest) else { return None };
+        let (Body::Soft(material), Some(model)) = (&self.asset.body, &self.model) else { return None };
         let modulus = material.youngs_pa / (1.0 - material.poisson * material.poisson);
-        Some(SubstrateCompliance { modulus, resolved: 2.0 * rest.mesh.edge })
+        Some(SubstrateCompliance { modulus, resolved: 2.0 * model.mesh.edge })
     }
 }
 
-/// All that was to be seen of a rollout, to be drawn later.
+/// Measurements of the robot's own sensors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Proprioception {
+    /// Tool pose in the base frame.
+    pub tool_b: Pose,
+    /// Arm joint angles, rad.
+    pub joints: [f64; ARM_DOFS],
+    /// Positions of the left and right finger, m: 0 (closed) to 0.04.
+    pub fingers: [f64; 2],
+}
+
+/// Configuration of a body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum BodyConfiguration<'a> {
+    /// Node positions of a soft body, m, world.
+    Nodes(&'a [Vec3]),
+    /// Pose of the object frame of a rigid body, world.
+    Pose(Pose),
+}
+
+/// States of an episode, from which images and tactile readings can be computed later.
 #[derive(Debug)]
 pub struct StateRecording {
-    /// The sensors.
+    /// Sensors of the simulation.
     pub sensors: SensorSuite,
     /// The settled state and the state after each control step.
     pub frames: Vec<Frame>,
-    /// The target's deformation in each frame, % of the diagonal; `None` for a rigid one.
+    /// The target's deformation in each frame, % of the settled diagonal; `None` for a rigid target.
     pub d_pct: Vec<Option<f64>>,
 }

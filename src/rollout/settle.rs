@@ -1,30 +1,27 @@
-//! Coming to rest before an episode begins.
+//! Settling: the objects of a scene come to rest before an episode begins.
 
-use super::{
-    cancel,
-    simulation::{ObjectInstance, Simulation},
-};
+use super::{cancel, object::ObjectInstance, simulation::Simulation};
 use crate::{
     geometry::Aabb,
     physics::{BodyId, world::StepFailure},
     scene::Scene,
 };
 
-/// Speed below which a node counts as settled, m/s.
+/// Speed below which an object counts as settled, m/s.
 const SETTLED_SPEED: f64 = 1e-3;
-/// How long all must be that slow, s.
-const SETTLED_FOR: f64 = 0.5;
-/// How long settling may take, s.
-const SETTLE_WITHIN: f64 = 3.0;
-/// What has sunk by more than this to below everything that is fixed has fallen out of the world, m.
-const FALLEN: f64 = 0.5;
+/// Time for which all objects must be settled, s.
+const SETTLED_TIME: f64 = 0.5;
+/// Time limit of settling, s.
+const SETTLE_TIMEOUT: f64 = 3.0;
+/// Drop below all fixed objects from which on an object counts as fallen out of the world, m.
+const MIN_FALL: f64 = 0.5;
 
 /// The scene did not come to rest.
 #[derive(Debug, thiserror::Error)]
 pub enum SettleError {
-    /// Something still moves.
+    /// An object still moves.
     #[error(
-        "object {object} still moves at {speed_mm:.1} mm/s after {SETTLE_WITHIN} s of settling; put it nearer to what \
+        "object {object} still moves at {speed_mm:.1} mm/s after {SETTLE_TIMEOUT} s of settling; put it nearer to what \
          it rests on, or make it lie stably"
     )]
     Moving {
@@ -32,12 +29,12 @@ pub enum SettleError {
         object: String,
         /// Its speed, mm/s.
         speed_mm: f64,
-        /// Where it was placed, `file:line`; empty if no script did.
+        /// `file:line` where the object was placed; empty if no script placed it.
         placed_at: String,
     },
-    /// Something is below all that could hold it.
+    /// An object fell below all fixed objects.
     #[error(
-        "object {object} fell out of the world: there was nothing below it, and after {SETTLE_WITHIN} s of settling it is \
+        "object {object} fell out of the world: there was nothing below it, and after {SETTLE_TIMEOUT} s of settling it is \
          {fallen:.1} m lower; put it above what it is to rest on"
     )]
     Fell {
@@ -45,24 +42,24 @@ pub enum SettleError {
         object: String,
         /// How far it has fallen, m.
         fallen: f64,
-        /// As above.
+        /// `file:line` where the object was placed; empty if no script placed it.
         placed_at: String,
     },
-    /// The run is to end.
+    /// The run was cancelled.
     #[error("interrupted")]
     Interrupted,
-    /// The physics failed.
+    /// A physics step failed.
     #[error("settling failed: {failure}")]
     Failed {
-        /// How.
+        /// The failure.
         failure: StepFailure,
-        /// Where the object that it failed for was placed; empty if it is not known.
+        /// `file:line` where the failing object was placed; empty if unknown.
         placed_at: String,
     },
 }
 
 impl SettleError {
-    /// `file:line` of the object that it is about, if a script placed it.
+    /// `file:line` where a script placed the object in question.
     pub fn place(&self) -> Option<&str> {
         match self {
             Self::Moving { placed_at, .. }
@@ -74,15 +71,15 @@ impl SettleError {
 }
 
 impl Simulation {
-    /// Lets everything come to rest, the arm holding its pose.
+    /// Steps until all objects have been at rest for 0.5 s, while the arm holds its pose.
     ///
     /// # Errors
-    /// Something does not come to rest in time or falls for ever, or the physics fails.
+    /// An object still moves after 3 s or has fallen out of the world, a physics step fails, or the run is cancelled.
     pub fn settle(&mut self) -> Result<(), SettleError> {
         let dt = self.world.params.dt;
-        let mut quiet = 0.0;
-        let mut waited = 0.0;
-        while quiet < SETTLED_FOR {
+        let mut settled_time = 0.0;
+        let mut elapsed = 0.0;
+        while settled_time < SETTLED_TIME {
             if cancel::requested() {
                 return Err(SettleError::Interrupted);
             }
@@ -90,18 +87,18 @@ impl Simulation {
                 placed_at: failure.body().map_or(String::new(), |body| placed_at(&self.scene, body)),
                 failure,
             })?;
-            waited += dt;
+            elapsed += dt;
             let fastest = self.fastest();
             let moving = fastest.filter(|(_, speed)| *speed >= SETTLED_SPEED);
-            quiet = if moving.is_none() { quiet + dt } else { 0.0 };
-            if let Some((object, speed)) = moving.filter(|_| waited > SETTLE_WITHIN) {
+            settled_time = if moving.is_none() { settled_time + dt } else { 0.0 };
+            if let Some((object, speed)) = moving.filter(|_| elapsed > SETTLE_TIMEOUT) {
                 return Err(self.unsettled(object, speed));
             }
         }
         Ok(())
     }
 
-    /// What there is to say of an object that moves at `speed` (m/s) when all should be at rest.
+    /// The error about an object that moves at `speed` (m/s) after the time limit.
     fn unsettled(&self, object: &ObjectInstance, speed: f64) -> SettleError {
         let (name, placed_at) = (object.name.clone(), placed_at(&self.scene, &object.name));
         let height = self.centre(object).z;
@@ -111,20 +108,20 @@ impl Simulation {
             .map(|other| Aabb::transformed(&other.bounds, &other.start_w).min.z)
             .fold(f64::INFINITY, f64::min);
         let fallen = object.start_w.translation.z - height;
-        match fallen > FALLEN && height < floor {
+        match fallen > MIN_FALL && height < floor {
             true => SettleError::Fell { object: name, fallen, placed_at },
             false => SettleError::Moving { object: name, speed_mm: 1e3 * speed, placed_at },
         }
     }
 
-    /// The fastest object and the speed of its fastest point, m/s; the first of them where several are.
+    /// The fastest object and its speed, m/s; the first one if several are equally fast.
     fn fastest(&self) -> Option<(&ObjectInstance, f64)> {
         let speeds = self.objects.iter().map(|object| (object, self.speed(object)));
         speeds.reduce(|best, next| if next.1 > best.1 { next } else { best })
     }
 }
 
-/// Where the object that `name` is, or is a part of, was placed.
+/// `file:line` where the object of a name, or the object of the part of that name, was placed.
 fn placed_at(scene: &Scene, name: &str) -> String {
     let whole = name.split('.').next().unwrap_or(name);
     let object = scene.objects.iter().find(|object| object.name == whole);

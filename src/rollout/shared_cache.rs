@@ -1,20 +1,25 @@
-//! Things made once and shared by all episodes and threads, as long as they are in use.
+//! A cache whose values are computed once and shared by all threads.
+//!
+//! Written here because the keys hold floating-point numbers: they can be compared but not hashed, which the cache crates
+//! require. The number of entries is small, so that a linear search is fast.
 
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Arc, Mutex};
 
-/// How many things are kept. A suite has a few dozen assets; a layout that draws its looks at random would otherwise keep
-/// those of every episode, megabytes each.
-const MOST: usize = 64;
+use crate::parallel::lock;
 
-/// The place of one value: empty until it is made.
+/// Most entries. A suite has a few dozen assets, but a layout with random appearance adds new ones of several megabytes in
+/// every episode.
+const MAX_ENTRIES: usize = 64;
+
+/// The slot of a value: empty until the value is computed.
 type Cell<V> = Arc<Mutex<Option<V>>>;
 
-/// Places by key, the ones used last at the end.
-type Kept<K, V> = Vec<(K, Cell<V>)>;
+/// Slots by key, the most recently used last.
+type Entries<K, V> = Vec<(K, Cell<V>)>;
 
-/// Values by key: the ones used last.
+/// Values by key. Least recently used entries are evicted. A clone shares the entries.
 #[derive(Debug)]
-pub(super) struct SharedCache<K, V>(Arc<Mutex<Kept<K, V>>>);
+pub(super) struct SharedCache<K, V>(Arc<Mutex<Entries<K, V>>>);
 
 impl<K, V> Clone for SharedCache<K, V> {
     fn clone(&self) -> Self {
@@ -28,45 +33,40 @@ impl<K, V> Default for SharedCache<K, V> {
     }
 }
 
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
-}
-
 impl<K: Clone, V: Clone> SharedCache<K, V> {
-    /// The value of a kept key that is the `same`, else what `make` makes, kept under `key`. Who wants the same meanwhile
-    /// waits, so that two workers never make it both; others go on. What was not used for longest gives way: a value is a
-    /// function of its key, so it can only have to be made again.
+    /// Returns the value whose key satisfies `is_same`, or computes and stores the value of `key`. Concurrent callers with an
+    /// equal key block until the first has computed it (single flight); callers with other keys proceed.
     ///
     /// # Errors
-    /// Those of `make`; the next one tries again.
+    /// Propagates the error of `compute`; nothing is cached, so the next call retries.
     pub(super) fn get<E>(
         &self,
         key: &K,
-        same: impl Fn(&K) -> bool,
-        make: impl FnOnce() -> Result<V, E>,
+        is_same: impl Fn(&K) -> bool,
+        compute: impl FnOnce() -> Result<V, E>,
     ) -> Result<V, E> {
-        let cell = self.cell(key, same);
-        let mut place = locked(&cell);
-        if let Some(value) = &*place {
+        let cell = self.cell(key, is_same);
+        let mut slot = lock(&cell);
+        if let Some(value) = &*slot {
             return Ok(value.clone());
         }
-        let value = make()?;
-        *place = Some(value.clone());
+        let value = compute()?;
+        *slot = Some(value.clone());
         Ok(value)
     }
 
-    /// The place of a key, moved to the end of those that were used last.
-    fn cell(&self, key: &K, same: impl Fn(&K) -> bool) -> Cell<V> {
-        let mut kept = locked(&self.0);
-        let entry = match kept.iter().position(|(known, _)| same(known)) {
-            Some(at) => kept.remove(at),
+    /// The slot of a key, which becomes the most recently used one.
+    fn cell(&self, key: &K, is_same: impl Fn(&K) -> bool) -> Cell<V> {
+        let mut entries = lock(&self.0);
+        let entry = match entries.iter().position(|(known, _)| is_same(known)) {
+            Some(at) => entries.remove(at),
             None => (key.clone(), Cell::default()),
         };
-        if kept.len() == MOST {
-            kept.remove(0);
+        if entries.len() == MAX_ENTRIES {
+            entries.remove(0);
         }
         let cell = entry.1.clone();
-        kept.push(entry);
+        entries.push(entry);
         cell
     }
 }
@@ -83,8 +83,8 @@ mod tests {
 
     use super::*;
 
-    fn double(made: &SharedCache<usize, usize>, key: usize, count: &AtomicUsize) -> usize {
-        let value: Result<_, Infallible> = made.get(
+    fn double(cache: &SharedCache<usize, usize>, key: usize, count: &AtomicUsize) -> usize {
+        let value: Result<_, Infallible> = cache.get(
             &key,
             |known| *known == key,
             || {
@@ -96,26 +96,26 @@ mod tests {
     }
 
     #[test]
-    fn what_was_used_last_is_kept_and_no_more_than_so_much() {
-        let (made, count) = (SharedCache::default(), AtomicUsize::new(0));
-        for key in 0..10 * MOST {
-            assert_eq!(double(&made, key, &count), 2 * key);
-            assert_eq!(double(&made, 0, &count), 0, "in use all the time");
+    fn recently_used_values_are_kept_up_to_the_limit() {
+        let (cache, count) = (SharedCache::default(), AtomicUsize::new(0));
+        for key in 0..10 * MAX_ENTRIES {
+            assert_eq!(double(&cache, key, &count), 2 * key);
+            assert_eq!(double(&cache, 0, &count), 0, "in use all the time");
         }
-        assert_eq!(count.load(Ordering::Relaxed), 10 * MOST);
-        assert_eq!(locked(&made.0).len(), MOST);
-        double(&made, 1, &count);
-        assert_eq!(count.load(Ordering::Relaxed), 10 * MOST + 1, "what gave way is made again");
+        assert_eq!(count.load(Ordering::Relaxed), 10 * MAX_ENTRIES);
+        assert_eq!(lock(&cache.0).len(), MAX_ENTRIES);
+        double(&cache, 1, &count);
+        assert_eq!(count.load(Ordering::Relaxed), 10 * MAX_ENTRIES + 1, "an evicted value is computed again");
     }
 
     #[test]
-    fn others_are_made_while_one_is_being_made_and_the_same_is_waited_for() {
-        let (made, count) = (SharedCache::<usize, usize>::default(), AtomicUsize::new(0));
+    fn other_values_are_computed_meanwhile_and_an_equal_key_waits() {
+        let (cache, count) = (SharedCache::<usize, usize>::default(), AtomicUsize::new(0));
         let (started, begun) = mpsc::channel();
         let (go, wait) = mpsc::channel::<()>();
         std::thread::scope(|scope| {
             let slow = scope.spawn(|| {
-                made.get(
+                cache.get(
                     &7,
                     |known| *known == 7,
                     move || {
@@ -125,19 +125,19 @@ mod tests {
                 )
             });
             begun.recv().expect("begun");
-            assert_eq!(double(&made, 1, &count), 2, "another is not held up");
-            let same = scope.spawn(|| double(&made, 7, &count));
+            assert_eq!(double(&cache, 1, &count), 2, "another key does not wait");
+            let same = scope.spawn(|| double(&cache, 7, &count));
             go.send(()).expect("heard");
             assert_eq!(slow.join().expect("no panic"), Ok(70));
             assert_eq!(same.join().expect("no panic"), 70);
         });
-        assert_eq!(count.load(Ordering::Relaxed), 1, "the slow one was made once");
+        assert_eq!(count.load(Ordering::Relaxed), 1, "the slow value was computed once");
     }
 
     #[test]
-    fn what_failed_is_tried_again() {
-        let made = SharedCache::<(), u8>::default();
-        assert_eq!(made.get(&(), |()| true, || Err("no")), Err("no"));
-        assert_eq!(made.get(&(), |()| true, || Ok::<_, &str>(3)), Ok(3));
+    fn a_failed_computation_is_repeated() {
+        let cache = SharedCache::<(), u8>::default();
+        assert_eq!(cache.get(&(), |()| true, || Err("no")), Err("no"));
+        assert_eq!(cache.get(&(), |()| true, || Ok::<_, &str>(3)), Ok(3));
     }
 }

@@ -1,82 +1,48 @@
-//! A scene that moves: the world, the robot in it, and the objects by name.
+//! A simulated scene: the physics world, the robot and the objects by name.
 
 use std::sync::Arc;
 
+use sha2::{Digest, Sha256};
+
 use super::{
     asset_cache::AssetCache,
-    build::{self, BuildError},
+    build,
+    build_error::BuildError,
+    object::{ArticulatedPart, ObjectInstance},
     robot_instance::RobotInstance,
 };
 use crate::{
     benchmark::control::CONTROL_DT,
-    geometry::{Aabb, Pose, Vec3},
+    geometry::{Aabb, Pose, Quat, Vec3},
     physics::{
-        BodyId, ColliderId, ContactPartner, PhysicsParams, World, joints,
+        BodyId, ContactPartner, PhysicsParams, World, joints,
         world::{ContactSummary, StepFailure},
     },
     robot::RobotSpec,
-    scene::{Asset, Joint, Scene},
+    scene::{Body, Scene},
 };
 
-/// What a part belongs to.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ArticulatedPart {
-    /// Index of the handle of the whole object.
-    pub object: usize,
-    /// Name within the object.
-    pub name: String,
-    /// What carries it.
-    pub joint: Joint,
-}
-
-/// An object of the scene in the world.
-#[derive(Clone, Debug)]
-pub struct ObjectInstance {
-    /// Name in the scene.
-    pub name: String,
-    /// What it is.
-    pub asset: Arc<Asset>,
-    /// Its body in the world.
-    pub body: BodyId,
-    /// Where it was put.
-    pub start_w: Pose,
-    /// Its colliders.
-    pub colliders: Vec<ColliderId>,
-    /// Bounds of its shape at rest, object frame (of a part: the whole object's with all joints at 0).
-    pub bounds: Aabb,
-    /// What it is a part of.
-    pub part: Option<ArticulatedPart>,
-}
-
-impl ObjectInstance {
-    /// Where things are put on it or in it: its lowest point on its centre line, object frame, m. An asset stands there by
-    /// itself; a part is where it is in its object.
-    pub fn foot_o(&self) -> Vec3 {
-        match self.part {
-            Some(_) => Vec3::new(self.bounds.centre().x, self.bounds.centre().y, self.bounds.min.z),
-            None => Vec3::zeros(),
-        }
-    }
-}
-
-/// A running scene.
+/// A scene with its robot, simulated at the physics rate (60 Hz by default).
+///
+/// The builder places every object and the robot; [`settle`](Self::settle) lets the objects come to rest. World frame: z up,
+/// z = 0 on the support surface. Stepping is deterministic: equal scenes and commands give bitwise equal states.
 #[derive(Clone, Debug)]
 pub struct Simulation {
-    /// The scene it was built from.
+    /// The scene from which it was built.
     pub scene: Arc<Scene>,
-    /// All bodies.
+    /// Bodies, joints and contacts.
     pub world: World,
-    /// The robot.
+    /// The robot and its controller.
     pub robot: RobotInstance,
-    /// The objects, in scene order, each followed by its parts.
+    /// Objects in the order of the scene, each followed by its parts.
     pub objects: Vec<ObjectInstance>,
 }
 
 impl Simulation {
-    /// Builds the world of `scene`.
+    /// Builds the world of a scene, with the robot in the joint configuration `scene.start_q`.
     ///
     /// # Errors
-    /// An object that cannot be made, two of one name, or one that starts inside of another or of the robot.
+    /// An object cannot be built, two objects have one name, or objects overlap each other or the robot.
     pub fn new(
         scene: Arc<Scene>,
         params: &PhysicsParams,
@@ -91,16 +57,17 @@ impl Simulation {
         Ok(Self { scene, world, robot, objects })
     }
 
-    /// One physics step.
+    /// Advances by one physics step.
     ///
     /// # Errors
-    /// The step failed; the run is invalid.
+    /// The solver failed; the state is no longer valid.
     pub fn step(&mut self) -> Result<(), StepFailure> {
         self.robot.advance(&mut self.world);
         self.world.step()
     }
 
-    /// Speed of the fastest point of an object, m/s (of its centre and 0.1 m of lever for a rigid one).
+    /// Speed of the fastest point of an object, m/s. For rigid bodies and parts: that of the centre plus 0.1 m times the angular
+    /// velocity.
     pub fn speed(&self, object: &ObjectInstance) -> f64 {
         match object.body {
             BodyId::Soft(index) => self.world.soft(index).state.max_speed(),
@@ -119,24 +86,24 @@ impl Simulation {
         }
     }
 
-    /// What a collider or soft body did to an object in the last step in which the object was awake; nothing to what
-    /// never moves.
+    /// Contact of an object with a collider or soft body, in the last step in which the object was awake. Zero for objects that
+    /// never move.
     pub fn contact(&self, object: &ObjectInstance, partner: ContactPartner) -> ContactSummary {
         self.world.contact(object.body, partner)
     }
 
-    /// What the left and right pad did to an object.
+    /// Contacts of an object with the left and right pad.
     pub fn pad_contacts(&self, object: &ObjectInstance) -> [ContactSummary; 2] {
         self.robot.pads.map(|pad| self.contact(object, ContactPartner::Collider(pad)))
     }
 
-    /// Object by name.
+    /// The object of a name.
     pub fn object(&self, name: &str) -> Option<&ObjectInstance> {
         self.objects.iter().find(|o| o.name == name)
     }
 
-    /// Centre of an object, m, world: the mean of a soft body's nodes, the centre of mass of a rigid one, the middle of a
-    /// part's bounds.
+    /// Centre of an object, m, world: mean of the nodes of a soft body, centre of mass of a rigid body, centre of the bounds of a
+    /// part.
     pub fn centre(&self, object: &ObjectInstance) -> Vec3 {
         match object.body {
             BodyId::Soft(index) => {
@@ -149,13 +116,13 @@ impl Simulation {
         }
     }
 
-    /// The parts of the object with handle `index`.
+    /// Parts of the object of an index.
     pub fn parts(&self, index: usize) -> impl Iterator<Item = (&ObjectInstance, &ArticulatedPart)> {
-        let parts = self.objects.iter().filter_map(|handle| Some((handle, handle.part.as_ref()?)));
+        let parts = self.objects.iter().filter_map(|object| Some((object, object.part.as_ref()?)));
         parts.filter(move |(_, part)| part.object == index)
     }
 
-    /// Joint value of a part, m or rad.
+    /// Joint position of a part, m or rad.
     pub fn joint(&self, object: &ObjectInstance) -> Option<f64> {
         match object.body {
             BodyId::Link(link) => Some(self.world.articulation(link.articulation).state.q[link.index]),
@@ -163,25 +130,62 @@ impl Simulation {
         }
     }
 
-    /// Object frame in the world; of a soft body its mean rotation about its centre.
+    /// Pose of the object frame in the world. For a soft body: its mean rotation and translation.
     pub fn pose(&self, object: &ObjectInstance) -> Pose {
         match object.body {
             BodyId::Soft(index) => {
                 let body = &self.world.soft(index).state;
-                let rotation = crate::geometry::Quat::from_matrix(&body.frame);
+                let rotation = Quat::from_matrix(&body.frame);
                 let nodes = &body.model.mesh.nodes;
                 let rest_centre = nodes.iter().sum::<Vec3>() / nodes.len() as f64;
-                let at = self.centre(object) - rotation * rest_centre;
-                Pose::from_parts(at.into(), rotation)
+                let translation = self.centre(object) - rotation * rest_centre;
+                Pose::from_parts(translation.into(), rotation)
             }
             BodyId::Rigid(index) => self.world.rigid(index).state.object_w(),
-            BodyId::Link(link) => self.world.link_pose(link) * joint_frame(object).inverse(),
+            BodyId::Link(link) => self.world.link_pose(link) * object.joint_frame_o().inverse(),
             BodyId::World | BodyId::Kinematic(_) => object.start_w,
         }
     }
+
+    /// Checks that every free body starts above another object.
+    ///
+    /// # Errors
+    /// The first body with nothing below it.
+    pub fn check_support(&self) -> Result<(), BuildError> {
+        let boxes: Vec<Aabb> = self.objects.iter().map(|o| o.bounds.transformed(&o.start_w)).collect();
+        for (object, own) in self.objects.iter().zip(&boxes) {
+            let supports = |(other, below): (&ObjectInstance, &Aabb)| {
+                let overlaps = (0..2).all(|i| below.min[i] < own.max[i] && own.min[i] < below.max[i]);
+                other.name != object.name
+                    && !matches!(other.asset.body, Body::Scenery)
+                    && overlaps
+                    && below.min.z < own.min.z
+            };
+            if object.body.is_free() && !self.objects.iter().zip(&boxes).any(supports) {
+                let error = BuildError::NothingBelow(object.name.clone());
+                let placed = self.scene.objects.iter().find(|placed| placed.name == object.name);
+                return Err(match placed {
+                    Some(placed) => error.of(placed),
+                    None => error,
+                });
+            }
+        }
+        Ok(())
+    }
 }
 
-/// Frame of a part's joint in its object frame; the link frame of the mechanics coincides with it.
-pub(super) fn joint_frame(object: &ObjectInstance) -> Pose {
-    object.part.as_ref().map_or(Pose::identity(), |part| Pose::from(part.joint.origin_o))
+/// Hash of all positions, 16 hexadecimal digits. Equal hashes mean bitwise equal states.
+pub fn state_hash(sim: &Simulation) -> String {
+    let mut hash = Sha256::new();
+    let mut put = |x: f64| hash.update(x.to_bits().to_le_bytes());
+    for soft in sim.world.soft_bodies() {
+        soft.state.x.iter().flat_map(|x| x.iter()).for_each(|x| put(*x));
+    }
+    for rigid in sim.world.rigid_bodies() {
+        rigid.state.pose_w.to_homogeneous().iter().for_each(|x| put(*x));
+    }
+    for articulation in sim.world.articulations() {
+        articulation.state.q.iter().for_each(|x| put(*x));
+    }
+    hash.finalize().iter().take(8).map(|b| format!("{b:02x}")).collect()
 }

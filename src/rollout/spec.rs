@@ -1,4 +1,4 @@
-//! Everything about an episode but who drives.
+//! The specification of an episode: everything except its controller.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use crate::{
     sensing::tactile::TactileSpec,
 };
 
-/// Which episode of a task, in which run.
+/// Identifies an episode of a task in a run.
 #[derive(Clone, Copy, Debug)]
 pub struct EpisodeRef<'a> {
     /// Suite name.
@@ -20,56 +20,59 @@ pub struct EpisodeRef<'a> {
     pub episode: u32,
     /// Seed of the run.
     pub seed: u64,
-    /// Which list of episodes.
+    /// List of episodes that `episode` counts in.
     pub split: Split,
     /// Policy name.
     pub policy: &'a str,
 }
 
-/// Everything about an episode but who drives.
+/// Specification of an episode: task, scene and parameters. The controller is passed to [`Episode::run`](super::Episode::run).
 #[derive(Clone, Debug)]
 pub struct EpisodeSpec {
-    /// Which one it is.
+    /// Identity, as in results.
     pub identity: Identity,
     /// The task.
     pub task: Task,
-    /// The scene before settling.
+    /// The scene, before settling.
     pub scene: Arc<Scene>,
-    /// Deformation limit by asset name; `None` if the target was never calibrated.
+    /// Deformation limit of the target; `None` if it was never calibrated.
     pub limit: Option<DeformationLimit>,
-    /// Judging thresholds.
+    /// Thresholds of the judge.
     pub criteria: SuccessCriteria,
-    /// Parameters of the mechanics.
+    /// Parameters of the physics.
     pub params: PhysicsParams,
     /// Parameters of the robot.
     pub robot: RobotSpec,
     /// Parameters of the tactile sensors.
     pub tactile: TactileSpec,
-    /// Whether to keep what is needed to draw the rollout later.
+    /// True to keep all states, from which images can be rendered after the episode.
     pub record_states: bool,
-    /// Whether to keep a trace, and whether with node positions.
-    pub trace: Option<bool>,
+    /// True to keep a trace.
+    pub record_trace: bool,
+    /// True if traces hold the node positions of soft bodies.
+    pub trace_nodes: bool,
 }
 
 impl EpisodeSpec {
-    /// An episode of `task` in `scene`, without limit, film and trace. `nominal` is the scene before any shift: an episode
-    /// is told by the asset that its layout made the target.
+    /// An episode of `task` in `scene`, without a limit, recording or trace. `nominal` is the scene before any shift; the
+    /// identity of the episode names the asset that is the target there.
     pub fn new(
-        which: &EpisodeRef,
+        episode: &EpisodeRef,
         task: &Task,
-        (nominal, scene): (&Scene, Scene),
+        nominal: &Scene,
+        scene: Scene,
         settings: &Settings,
     ) -> Self {
         let target = target_asset(nominal, task);
         let identity = Identity {
-            suite: which.suite.to_owned(),
+            suite: episode.suite.to_owned(),
             task: task.id,
             prompt: task.prompt.clone(),
             layout: task.layout.clone(),
-            episode: which.episode,
-            seed: which.seed,
-            split: which.split.name().to_owned(),
-            policy: which.policy.to_owned(),
+            episode: episode.episode,
+            seed: episode.seed,
+            split: episode.split.name().to_owned(),
+            policy: episode.policy.to_owned(),
             privileged: false,
             soft: target.is_some_and(|asset| matches!(asset.body, Body::Soft(_))),
             asset: target.map_or(String::new(), |asset| asset.name.clone()),
@@ -85,12 +88,13 @@ impl EpisodeSpec {
             robot: settings.robot.clone(),
             tactile: settings.tactile.clone(),
             record_states: false,
-            trace: None,
+            record_trace: false,
+            trace_nodes: false,
         }
     }
 }
 
-/// The asset of a task's target in a scene.
+/// Asset of a task's target in a scene.
 pub fn target_asset<'a>(scene: &'a Scene, task: &Task) -> Option<&'a Arc<Asset>> {
     let name = task.goal.object();
     scene.objects.iter().find(|object| object.name == name).map(|object| &object.asset)

@@ -1,4 +1,4 @@
-//! What a run can write down about every control step.
+//! The trace of an episode: its true state after every control step.
 
 use serde::Serialize;
 
@@ -6,12 +6,12 @@ use super::{evidence::EvidenceCollector, simulation::Simulation};
 use crate::physics::BodyId;
 use crate::robot::rotation;
 
-/// One control step.
+/// State after a control step; a line of a trace file.
 #[derive(Clone, Debug, Serialize)]
 pub struct StepTrace {
     /// Control step, from 1.
     pub step: u32,
-    /// Time since the policy took over, s.
+    /// Time since the start of the episode, s.
     pub time_s: f64,
     /// Tool position, base frame, m.
     pub ee_position_b: [f64; 3],
@@ -29,17 +29,17 @@ pub struct StepTrace {
     pub friction_utilisation: [f64; 2],
     /// Slip of the two pads along the target, mm.
     pub slip_mm: [f64; 2],
-    /// Whether the target was dropped so far.
+    /// True if the target was dropped so far.
     pub dropped: bool,
     /// Kinetic, elastic and potential energy, J.
     pub energy_j: [f64; 3],
     /// Newton iterations of the last physics step.
     pub newton: u32,
-    /// The objects that can move.
+    /// All movable objects.
     pub objects: Vec<ObjectTrace>,
 }
 
-/// One object at a control step.
+/// State of an object after a control step.
 #[derive(Clone, Debug, Serialize)]
 pub struct ObjectTrace {
     /// Scene name.
@@ -48,31 +48,32 @@ pub struct ObjectTrace {
     pub position_w: [f64; 3],
     /// Orientation of its frame, wxyz, w ≥ 0.
     pub quaternion_w: [f64; 4],
-    /// D, % of the settled bounding-box diagonal; null for a rigid one.
+    /// D, % of the settled bounding-box diagonal; null for a rigid object.
     pub d_pct: Option<f64>,
-    /// Least det F; null for a rigid one.
+    /// Least determinant of the deformation gradient; null for a rigid object.
     pub min_det_f: Option<f64>,
-    /// Whether it sleeps.
+    /// True if the body sleeps.
     pub asleep: bool,
-    /// Names of what touches it.
+    /// Names of the objects and colliders in contact with it.
     pub touches: Vec<String>,
-    /// Node positions, m, world, if asked for.
+    /// Node positions, m, world, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nodes: Option<Vec<[f64; 3]>>,
 }
 
 impl StepTrace {
-    /// What can be said of the state after control step `step`.
-    pub fn new(
+    /// The current state, after control step `step` at `time_s`. `with_nodes` adds the node positions of soft bodies.
+    pub(super) fn new(
         sim: &Simulation,
         evidence: &EvidenceCollector,
         target: usize,
-        (step, time_s): (u32, f64),
+        step: u32,
+        time_s: f64,
         dropped: bool,
-        nodes: bool,
+        with_nodes: bool,
     ) -> Self {
         let tool = sim.robot.tool_b(&sim.world);
-        let touch = sim.pad_contacts(&sim.objects[target]);
+        let contacts = sim.pad_contacts(&sim.objects[target]);
         let energy = sim.world.energy();
         Self {
             step,
@@ -82,39 +83,40 @@ impl StepTrace {
             joints: sim.robot.q(&sim.world),
             gripper_width_m: sim.robot.width(&sim.world),
             closure: sim.robot.closure(),
-            pad_force_n: touch.map(|t| t.normal_force),
-            friction_utilisation: touch.map(|t| if t.capacity > 0.0 { t.shear() / t.capacity } else { 0.0 }),
-            slip_mm: touch.map(|t| 1e3 * t.travel),
+            pad_force_n: contacts.map(|t| t.normal_force),
+            friction_utilisation: contacts
+                .map(|t| if t.capacity > 0.0 { t.shear() / t.capacity } else { 0.0 }),
+            slip_mm: contacts.map(|t| 1e3 * t.travel),
             dropped,
             energy_j: [energy.kinetic, energy.elastic, energy.potential],
             newton: sim.world.stats().newton_steps,
             objects: (0..sim.objects.len())
                 .filter(|&i| sim.objects[i].body != BodyId::World)
-                .map(|i| object(sim, evidence, i, nodes))
+                .map(|i| object(sim, evidence, i, with_nodes))
                 .collect(),
         }
     }
 }
 
-fn object(sim: &Simulation, evidence: &EvidenceCollector, index: usize, nodes: bool) -> ObjectTrace {
-    let handle = &sim.objects[index];
-    let pose = sim.pose(handle);
+fn object(sim: &Simulation, evidence: &EvidenceCollector, index: usize, with_nodes: bool) -> ObjectTrace {
+    let instance = &sim.objects[index];
+    let pose = sim.pose(instance);
     let q = rotation::canonical(&pose.rotation);
-    let (soft, asleep) = match handle.body {
+    let (soft, asleep) = match instance.body {
         BodyId::Soft(index) => (Some(sim.world.soft(index)), sim.world.soft(index).is_asleep()),
         BodyId::Rigid(index) => (None, sim.world.rigid(index).is_asleep()),
         BodyId::Link(link) => (None, sim.world.articulation(link.articulation).is_asleep()),
         BodyId::World | BodyId::Kinematic(_) => (None, false),
     };
-    let contacts = sim.world.contacts(handle.body).iter();
+    let contacts = sim.world.contacts(instance.body).iter();
     ObjectTrace {
-        name: handle.name.clone(),
+        name: instance.name.clone(),
         position_w: pose.translation.vector.into(),
         quaternion_w: [q.w, q.i, q.j, q.k],
         d_pct: evidence.deformation(sim, index).map(|d| d.rms_pct),
         min_det_f: soft.map(|s| s.min_det_f().det_f),
         asleep,
         touches: contacts.map(|contact| sim.world.partner_name(contact.partner).to_owned()).collect(),
-        nodes: soft.filter(|_| nodes).map(|s| s.state.x.iter().map(|x| (*x).into()).collect()),
+        nodes: soft.filter(|_| with_nodes).map(|s| s.state.x.iter().map(|x| (*x).into()).collect()),
     }
 }

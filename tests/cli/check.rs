@@ -60,7 +60,7 @@ fn hard_things_have_walls_that_nothing_passes() {
         text.replace("{ 0.04, 0.04, 0.04 } }", size)
     };
     let refused = |size: &str| Project::new(&[("x.lua", &text(size))]).refusal("check x.lua");
-    assert_snapshot!(refused("{ 0.04, 0.04, 0.0005 } }"), @"x.lua:6: asset cube: it is about 0.6 mm thick, or its walls are, expected at least 2 mm: what meets a thinner one may pass through it");
+    assert_snapshot!(refused("{ 0.04, 0.04, 0.0005 } }"), @"x.lua:6: asset cube: it is about 0.6 mm thick, or its walls are, expected at least 2 mm: other bodies may pass through thinner ones");
     assert!(refused("{ 0.06, 0.06, 0.04 } }:shell(0.001)").contains("its walls are, expected at least 2 mm"));
     Project::new(&[("x.lua", &text("{ 0.04, 0.04, 0.003 } }"))]).succeeds("check x.lua");
 }

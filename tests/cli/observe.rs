@@ -29,12 +29,12 @@ fn request(suite: &str, task: usize) -> EpisodeRequest {
 }
 
 /// Keeps what it was shown.
-struct EvidenceCollector {
+struct RecordingPolicy {
     streams: SensorStreams,
     seen: Vec<Observation>,
 }
 
-impl Policy for &mut EvidenceCollector {
+impl Policy for &mut RecordingPolicy {
     fn name(&self) -> &str {
         "witness"
     }
@@ -57,12 +57,12 @@ fn played(project: &Project, streams: SensorStreams) -> Result<(Vec<Observation>
     let opened = script::Episode::open(&loaded, &request("one", 0)).expect("it opens");
     let which =
         EpisodeRef { suite: &suite.name, episode: 0, seed: 0, split: Split::Validation, policy: "witness" };
-    let scenes = (&opened.nominal, opened.scene.clone());
-    let spec = EpisodeSpec::new(&which, &suite.tasks[0], scenes, &suite.settings);
+    let spec =
+        EpisodeSpec::new(&which, &suite.tasks[0], &opened.nominal, opened.scene.clone(), &suite.settings);
     assert_eq!((spec.identity.asset.as_str(), spec.identity.soft), ("cube", true));
     let episode =
         Episode::start(spec, &AssetCache::default(), &SensorAssets::default()).map_err(|e| e.to_string())?;
-    let mut witness = EvidenceCollector { streams, seen: Vec::new() };
+    let mut witness = RecordingPolicy { streams, seen: Vec::new() };
     let brief = TaskBrief { suite: "one".into(), task: 0, prompt: "wait".into(), episode: 0 };
     let mut driver = ChunkedPolicy::new(Box::new(&mut witness), brief, 1);
     let outcome = episode.run(&mut driver).map_err(|e| e.to_string());
@@ -162,7 +162,7 @@ fn senses_that_cannot_be_are_told_before_the_episode_with_the_line_that_set_them
         ),
         (
             "scene:add_camera { name = \"wrist_depth\", position = { 1, 0, 1 }, look_at = { 0, 0, 0 } }",
-            "x.lua:7: camera wrist_depth: name: \"wrist_depth\" is a picture of camera wrist",
+            "x.lua:7: camera wrist_depth: name: \"wrist_depth\" is an image of camera wrist",
         ),
     ] {
         let project = with(lines);

@@ -40,7 +40,7 @@ pub(crate) fn run(args: &CheckArgs) -> Result<(), CliError> {
     let config = RunConfig::of_script(&args.script)?;
     let config = &RunConfig { policy: PolicyConfig::load(&args.policy)?, ..config };
     let loaded = script::load(&config.file, &config.script_options).map_err(CliError::input)?;
-    let shared = SharedAssets { assets: AssetCache::rough(), sensor_assets: SensorAssets::default() };
+    let shared = SharedAssets { assets: AssetCache::approximate(), sensor_assets: SensorAssets::default() };
     match &loaded.plan {
         Plan::Suite(suite) => check_suite(config, &loaded, suite, &shared)?,
         Plan::Suites { suites } => check_suites(config, &loaded, suites, &shared)?,

@@ -9,10 +9,7 @@ use crate::{
         run::{policy::policy_failure, suite_run::SuiteRun},
     },
     policy::SensorStreams,
-    rollout::{
-        BuildError, EpisodeError, SensingError, SensorSuite, Simulation, check_sensors, check_support,
-        target_asset,
-    },
+    rollout::{BuildError, EpisodeError, SensingError, SensorSuite, Simulation, check_sensors, target_asset},
     scene::{Body, Scene},
     script::schema,
 };
@@ -60,7 +57,7 @@ impl SuiteRun<'_> {
         let check = || -> Result<(), PreflightError> {
             check_sensors(&scene, &settings.tactile, &self.sensor_assets)?;
             let sim = Simulation::new(scene.clone(), &settings.physics, &settings.robot, &self.assets)?;
-            check_support(&sim)?;
+            sim.check_support()?;
             let mut sensors = SensorSuite::new(&sim, &settings.tactile, &self.sensor_assets);
             Ok(sensors.check_camera_positions(&SensorSuite::frame(&sim))?)
         };

@@ -431,12 +431,13 @@ impl<'a> SuiteRun<'a> {
             split: request.split,
             policy: self.config.policy.name(),
         };
-        let scenes = (&opened.nominal, opened.scene.clone());
-        let mut spec = EpisodeSpec::new(&episode, task, scenes, &self.settings);
+        let mut spec =
+            EpisodeSpec::new(&episode, task, &opened.nominal, opened.scene.clone(), &self.settings);
         spec.identity.privileged = self.is_privileged();
         spec.identity.origin = origin.cloned().map(Box::new);
-        let trace = self.config.trace.map(|detail| detail == TraceDetail::Nodes);
-        Ok((EpisodeSpec { limit, trace, ..spec }, opened))
+        let record_trace = self.config.trace.is_some();
+        let trace_nodes = self.config.trace == Some(TraceDetail::Nodes);
+        Ok((EpisodeSpec { limit, record_trace, trace_nodes, ..spec }, opened))
     }
 
     /// Converts the error of an episode, with its place in the script.

@@ -25,7 +25,7 @@ use crate::{
         fem::FemModel,
         world::{ContactSummary, StepFailure},
     },
-    rollout::{cancel, soft_rest},
+    rollout::{cancel, soft_model},
     scene::SoftMaterial,
 };
 
@@ -103,7 +103,7 @@ impl LuaWorld {
         let mut inner = locked(&self.0);
         let rest: Arc<FemModel> = {
             let _honest_work = inner.clock.pause();
-            soft_rest(&name, shape.shape(), &material).map_err(|e| fail(lua, format!("world:soft: {e}")))?
+            soft_model(&name, shape.shape(), &material).map_err(|e| fail(lua, format!("world:soft: {e}")))?
         };
         let held = hold_in_world(lua, rest.bytes())?;
         let reference = ReferenceShape::new(&rest.mesh.nodes, &rest.mass)

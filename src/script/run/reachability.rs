@@ -35,7 +35,7 @@ impl Lag {
             return None;
         }
         self.steps = 0;
-        let miss = sim.robot.reach(&sim.world, &command_b).err()?;
+        let miss = sim.robot.solve_ik(&sim.world, &command_b).err()?;
         let is_away = miss.distance > TRACKING_LIMIT.distance || miss.angle > TRACKING_LIMIT.angle;
         is_away.then(|| message(&miss, &sim.robot.base_w))
     }

@@ -1,0 +1,122 @@
+//! Finite-element models of soft assets, and the checks of their shapes and materials.
+
+use std::sync::Arc;
+
+use super::build_error::BuildError;
+use crate::{
+    geometry::{
+        mass::mass_properties,
+        samples::{SampleSpec, surface_samples},
+        shape::Shape,
+        voxel::{VoxelSpec, voxel_mesh},
+    },
+    physics::fem::{ElasticMaterial, FemModel},
+    scene::SoftMaterial,
+    text::format_number,
+};
+
+/// Builds the finite-element model of a soft body. `name` identifies the asset in error messages.
+///
+/// # Errors
+/// The shape cannot be meshed, or a material parameter is out of range.
+pub fn soft_model(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<Arc<FemModel>, BuildError> {
+    check_soft(name, shape, material)?;
+    meshed(name, shape, material, mass_properties(shape, 1.0).mass)
+}
+
+/// Checks the material and the dimensions of a soft body.
+pub(super) fn check_soft(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<(), BuildError> {
+    check_material(name, material)?;
+    check_size(name, shape, material)?;
+    check_thickness(name, shape, material)
+}
+
+/// Meshes a checked soft body of a volume, m³.
+pub(super) fn meshed(
+    name: &str,
+    shape: &Shape,
+    material: &SoftMaterial,
+    volume: f64,
+) -> Result<Arc<FemModel>, BuildError> {
+    let spec = VoxelSpec { resolution: material.resolution };
+    let mesh =
+        voxel_mesh(shape, &spec).map_err(|source| BuildError::Geometry { asset: name.to_owned(), source })?;
+    let spacing = SampleSpec { grasp_spacing: material.grasp_spacing, ..SampleSpec::default() };
+    let samples = surface_samples(shape, &mesh, &spacing);
+    let law = ElasticMaterial {
+        youngs_pa: material.youngs_pa,
+        poisson: material.poisson,
+        density: material.density,
+    };
+    Ok(FemModel::new(mesh, law, volume, samples))
+}
+
+fn check_material(name: &str, m: &SoftMaterial) -> Result<(), BuildError> {
+    let wrong = |what: String| Err(BuildError::Material { asset: name.to_owned(), what });
+    if !(m.youngs_pa > 0.0 && m.youngs_pa.is_finite()) {
+        return wrong(format!(
+            "Young's modulus is {} Pa, expected a positive number",
+            format_number(m.youngs_pa)
+        ));
+    }
+    if !(0.0..0.5).contains(&m.poisson) {
+        return wrong(format!(
+            "Poisson's ratio is {}, expected 0 <= poisson < 0.5",
+            format_number(m.poisson)
+        ));
+    }
+    if !(m.density > 0.0 && m.density.is_finite()) {
+        return wrong(format!("density is {} kg/m³, expected a positive number", format_number(m.density)));
+    }
+    Ok(())
+}
+
+/// Most contact samples of one body. More take minutes to compute; nearly always the size was given in millimetres.
+const MAX_SAMPLES: f64 = 1e6;
+
+fn check_size(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<(), BuildError> {
+    let size = shape.bounds().size();
+    let samples =
+        2.0 * (size.x * size.y + size.y * size.z + size.z * size.x) / material.grasp_spacing.powi(2);
+    if samples <= MAX_SAMPLES {
+        return Ok(());
+    }
+    let what = format!(
+        "it is {} × {} × {} m, about {samples:.0e} contact samples {} mm apart, expected at most {MAX_SAMPLES:.0e}; \
+         sizes are in metres; a truly large body needs a larger grasp_spacing",
+        format_number(size.x),
+        format_number(size.y),
+        format_number(size.z),
+        1e3 * material.grasp_spacing
+    );
+    Err(BuildError::Material { asset: name.to_owned(), what })
+}
+
+/// Checks that a body is at least a voxel thick. A thinner one may have no elements at all.
+fn check_thickness(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<(), BuildError> {
+    let size = shape.bounds().size();
+    let (thin, long) = (size.min(), size.max());
+    let edge = long / material.resolution.max(1) as f64;
+    // The slack is for a size that is a whole number of voxels.
+    if !(thin > 0.0 && thin < edge * (1.0 - 1e-6)) {
+        return Ok(());
+    }
+    let mm = |metres: f64| format_number((1e5 * metres).round() / 100.0);
+    let needed = (long / thin * (1.0 - 1e-6)).ceil();
+    let fix = if needed <= SoftMaterial::MAX_RESOLUTION as f64 {
+        format!("resolution = {needed} would serve")
+    } else {
+        let least = mm(long / SoftMaterial::MAX_RESOLUTION as f64);
+        format!(
+            "no resolution up to {} would serve; make it at least {least} mm thick",
+            SoftMaterial::MAX_RESOLUTION
+        )
+    };
+    let what = format!(
+        "it is {} mm thick, thinner than a voxel: at resolution {} they are {} mm; {fix}",
+        mm(thin),
+        material.resolution,
+        mm(edge)
+    );
+    Err(BuildError::Material { asset: name.to_owned(), what })
+}
