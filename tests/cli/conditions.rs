@@ -35,7 +35,7 @@ fn each_condition_is_an_ordinary_run_of_the_same_episodes() {
     let starts: Vec<&str> = rows.iter().map(|row| row.split("  ").next().unwrap_or_default()).collect();
     assert_eq!(starts[1..7], ["condition", "reference", "heavy x2", "same", "hard", "weak"], "{}", said.out);
     assert!(said.out.lines().all(|line| line.chars().count() <= 100), "{}", said.out);
-    let (_, against) = said.out.split_once("against the reference ").expect("a second table");
+    let (_, against) = said.out.split_once("change from the reference").expect("a second table");
     assert!(against.contains("95 % interval") && against.contains("\nheavy x2"), "{}", said.out);
     let alone = project.succeeds("suites/one.lua --policy noop --shift mass=2 --out alone");
     assert!(!alone.out.is_empty());

@@ -176,7 +176,7 @@ fn what_cannot_be_exported_is_told_and_nothing_is_left() {
     let hdf5 = project.path("data/hdf5/one_task0_demo.hdf5");
     for (words, said) in [
         ("data --format lerobot-v3.0 --out full", "--out full: it holds mine; nothing was written"),
-        ("data --format lerobot-v3.0 --out full/mine", "--out full/mine: it is no folder"),
+        ("data --format lerobot-v3.0 --out full/mine", "--out full/mine: it is not a folder"),
         ("data --format lerobot-v3.0 --out x --task 7", "--task \"7\" matches no task"),
         ("data --format lerobot-v3.0 --out x --task dance", "--task \"dance\" matches no task"),
         ("data --format lerobot-v3.0 --out x --gripper wide", "[possible values: binary, continuous]"),

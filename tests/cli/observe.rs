@@ -121,7 +121,7 @@ fn results_say_whether_the_policy_saw_true_forces() {
         assert!(line.contains(&format!("\"force_observed\":{force},")), "{line}");
         let summary = SuiteSummary::of("one", "witness", &[record]);
         assert_eq!(summary.force_observed, force);
-        assert_eq!(terminal::table(&summary).contains("the policy saw true forces"), force);
+        assert_eq!(terminal::table(&summary).contains("force_observed policy"), force);
     }
 }
 

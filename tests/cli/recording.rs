@@ -87,9 +87,11 @@ fn a_data_set_is_checked_summed_up_and_repeated() {
     let whole = fs::read(&hdf5).expect("read");
     fs::write(&hdf5, &whole[..whole.len() / 2]).expect("written");
     let wrong = project.refusal("dataset check a");
-    for words in
-        ["demo_0_eye_in_hand_rgb.mp4: eye_in_hand_rgb: no MP4 file", "one_task0_demo.hdf5", "a: 2 problems"]
-    {
+    for words in [
+        "demo_0_eye_in_hand_rgb.mp4: eye_in_hand_rgb: not an MP4 file",
+        "one_task0_demo.hdf5",
+        "a: 2 problems",
+    ] {
         assert!(wrong.contains(words), "{wrong}");
     }
 }

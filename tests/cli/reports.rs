@@ -54,7 +54,7 @@ fn a_folder_with_two_runs_of_one_suite_is_not_compared_in_silence() {
     let message = project.refusal("compare runs runs/a");
     assert_eq!(
         message,
-        "runs/a and runs/b both hold suite one task 0 episode 0: compare one run of a suite at a time; name its folder"
+        "runs/a and runs/b both hold suite one task 0 episode 0: compare one run per suite; give its folder"
     );
     assert!(project.refusal("compare runs/a runs").contains("runs/a and runs/b both hold"));
 }
@@ -62,7 +62,7 @@ fn a_folder_with_two_runs_of_one_suite_is_not_compared_in_silence() {
 #[test]
 fn runs_of_different_seeds_share_no_episode() {
     let message = project().refusal("compare runs/a runs/other");
-    assert_eq!(message, "runs/a and runs/other share no episode: seed 0 there, 7 here");
+    assert_eq!(message, "runs/a and runs/other share no episode: seed 0 in the first, 7 in the second");
 }
 
 #[test]
@@ -85,7 +85,10 @@ fn what_is_no_run_is_named() {
     for (dir, words) in [
         ("nowhere", "there is no folder nowhere"),
         ("x.lua", "x.lua is a file; give the folder of a run"),
-        ("empty", "empty holds no run: neither it nor a folder in it has run.json and episodes.jsonl"),
+        (
+            "empty",
+            "empty holds no run: neither the folder nor any of its subfolders has run.json and episodes.jsonl",
+        ),
         ("bad/json", "bad/json/run.json is not a valid run file: EOF while parsing"),
         ("bad/fields", "bad/fields/run.json is not a valid run file: it has no suite"),
         ("bad/line", "bad/line/episodes.jsonl:1: not an episode record"),
@@ -105,8 +108,8 @@ fn a_run_of_another_version_is_read_with_a_word_or_refused_with_the_cause() {
     let project = project();
     edit(&project, "runs/a/run.json", |run| run["softvt"] = json!("0.0.1"));
     let said = project.succeeds("report runs/a --out page");
-    assert!(said.err.contains("softvt 0.0.1 made runs/a, and this is softvt"), "{}", said.err);
-    assert!(project.text("page/report.html").contains("softvt 0.0.1 made runs/a"));
+    assert!(said.err.contains("runs/a was written by softvt 0.0.1, and this is softvt"), "{}", said.err);
+    assert!(project.text("page/report.html").contains("runs/a was written by softvt 0.0.1"));
     assert!(
         project.succeeds("compare runs/a runs/b").out.contains("the runs also differ in softvt (run.json)")
     );
@@ -117,7 +120,8 @@ fn a_run_of_another_version_is_read_with_a_word_or_refused_with_the_cause() {
         message.starts_with("runs/a/episodes.jsonl:1: not an episode record: missing field"),
         "{message}"
     );
-    let cause = format!("; softvt 0.0.1 made this run, and this is softvt {}: ", env!("CARGO_PKG_VERSION"));
+    let cause =
+        format!("; this run was written by softvt 0.0.1, and this is softvt {}: ", env!("CARGO_PKG_VERSION"));
     assert!(message.contains(&cause), "{message}");
 }
 
