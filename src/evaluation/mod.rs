@@ -8,7 +8,7 @@
 //! |---|---|
 //! | How deformed is a soft body? | [`deformation`] |
 //! | Does the target rest at its goal, released? | [`goal`] |
-//! | Was the object dropped, or released on purpose? | [`drop`] |
+//! | Was the object dropped, or released on purpose? | [`drop`](mod@drop) |
 //! | How far did it slide in the grasp? | [`slip`] |
 //! | Goal, NoDrop and deformation limit together | [`safety`] |
 //! | Where does the limit τ of an asset come from? | [`calibration`], [`thresholds`], [`envelope_plot`] |

@@ -1,8 +1,4 @@
 //! Polynomial optics: a smooth function of the surface's slope, fitted to a real GelSight Mini.
-//!
-//! A slope multiplies the light that falls on its pixel, which the untouched image shows (Lambert's law for a light source of
-//! one elevation). So the same slope has the same sign of change everywhere, and a flat surface changes nothing. The
-//! factor of each channel is 1 plus a polynomial of degree 5 in the sines of the slope.
 
 use std::ops::Range;
 
@@ -45,7 +41,11 @@ pub struct OpticsFile {
     pub colour: [Vec<f64>; 3],
 }
 
-/// Optics of a sensor, ready for use; see the [module](self) for the model.
+/// Optics of a sensor as a polynomial of the surface's slope.
+///
+/// A slope multiplies the light that falls on its pixel, which the untouched image shows (Lambert's law for a light source of
+/// one elevation). So the same slope has the same sign of change everywhere, and a flat surface changes nothing. The factor of
+/// each channel is 1 plus a polynomial of degree 5 in the sines of the slope; see [`slope_monomials`].
 #[derive(Clone, Debug)]
 pub struct PolynomialOptics {
     /// Untouched image, 320 × 240 RGB.
