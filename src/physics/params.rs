@@ -112,3 +112,23 @@ impl PhysicsParams {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_earlier_versions_are_read() {
+        let old = r#"{"alpha": 1.0, "beta": 2.0, "tau": 3.0, "sleep_after": 4.0, "inverted_after": 5.0, "most_speed": 6.0}"#;
+        let params: PhysicsParams = serde_json::from_str(old).expect("aliases");
+        let read = [
+            params.rayleigh_mass,
+            params.rayleigh_stiffness,
+            params.dissipation_time,
+            params.sleep_delay,
+            params.max_inverted_time,
+            params.max_speed,
+        ];
+        assert_eq!(read, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+    }
+}

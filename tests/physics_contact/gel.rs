@@ -125,7 +125,7 @@ fn a_rigid_box_is_grasped_lifted_and_held_without_creep() {
 
 #[test]
 fn a_body_heavier_than_the_friction_capacity_slides_out_of_the_pads() {
-    // 0.2 kg need 0.66 N a pad at μ 1.5; 20 µm give 0.6 N on the dome of a flat box.
+    // 0.2 kg need 0.66 N per pad at μ 1.5; 20 µm give 0.6 N on the dome of a flat box.
     let (mut world, body, hand, shut) = grasped(&cuboid(0.04, 0.05, 0.04), at(0.0, 0.0, 0.02), 0.05, 1.5e-5);
     let force: f64 = hand.force(&world, body).iter().sum();
     assert!(force > 0.0 && 1.5 * force < 0.2 * GRAVITY, "{force} N");

@@ -40,7 +40,7 @@ impl Compared {
     }
 }
 
-/// The rows of `group` that `keep` chooses, with our squeezes beside them.
+/// The rows of `group` that `keep` chooses, with our squeezes next to them.
 pub fn compare(group: &str, keep: impl Fn(&Row) -> bool) -> Vec<Compared> {
     rows(group).into_iter().filter(|row| keep(row)).map(Compared::new).collect()
 }

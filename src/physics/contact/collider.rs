@@ -106,7 +106,7 @@ pub struct Collider {
     /// The articulation whose fixed base this is, such as the corpus of a chest of drawers. It never touches that
     /// articulation's links.
     pub base_of: Option<ArticulationId>,
-    /// Geometry for contact with other colliders; without it, there is none.
+    /// Geometry for contact with other colliders; without it, only soft bodies touch the collider.
     pub solid: Option<Arc<CollisionGeometry>>,
 }
 

@@ -162,7 +162,7 @@ struct ProfileCorner {
     is_sharp: bool,
 }
 
-/// The convex corners of a revolved profile: on the axis only tips, and blunt ones only if the solid can stand on them.
+/// The convex corners of a revolved profile: on the axis only tips, and blunt ones only if the solid can rest on them.
 fn convex_corners(profile: &Polygon) -> impl Iterator<Item = ProfileCorner> + '_ {
     let points = profile.points();
     let count = points.len();
