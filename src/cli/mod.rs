@@ -8,6 +8,8 @@ mod commands;
 mod error;
 mod output;
 mod parse;
+#[cfg(test)]
+mod reference_page;
 mod run;
 
 use std::{panic, process::ExitCode, thread, time::Duration};

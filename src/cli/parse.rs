@@ -67,7 +67,7 @@ pub(super) fn parse(words: &[String]) -> Result<Option<Command>, CliError> {
 }
 
 /// The whole command, without options of a script.
-fn clap_command() -> clap::Command {
+pub(super) fn clap_command() -> clap::Command {
     Command::augment_subcommands(RunArgs::command()).mut_subcommand("serve", |serve| {
         POLICY_FLAGS.iter().fold(serve, |serve, flag| serve.mut_arg(*flag, |arg| arg.hide(true)))
     })

@@ -1,4 +1,4 @@
-//! `softvt check`: what is wrong with a script is found without running it, with file and line.
+//! `softvt check` finds errors of scripts without running them, with file and line.
 
 use insta::assert_snapshot;
 
@@ -9,7 +9,7 @@ fn of(small: Small) -> String {
 }
 
 #[test]
-fn what_would_stop_a_run_stops_the_check() {
+fn errors_of_a_run_are_found_by_the_check() {
     let text = Small::default().text();
     let check = |from: &str, to: &str| {
         assert!(text.contains(from), "{from}");
@@ -23,7 +23,7 @@ fn what_would_stop_a_run_stops_the_check() {
 }
 
 #[test]
-fn scenes_that_cannot_be_are_found_without_settling() {
+fn invalid_scenes_are_found_without_settling() {
     assert_snapshot!(of(Small { at: "xyz = { 0, 0.1, -0.012 }", ..Small::default() }), @"x.lua:6: objects cube and floor (placed at x.lua:5) overlap by 12 mm at the start; move them apart");
     let thin = of(Small {
         shape: "softvt.shape.box { size = { 0.04, 0.04, 0.003 } }:grounded()",
@@ -51,7 +51,7 @@ fn scenes_that_cannot_be_are_found_without_settling() {
 }
 
 #[test]
-fn hard_things_have_walls_that_nothing_passes() {
+fn thin_rigid_walls_are_refused() {
     let text = |size: &str| {
         let text = Small::default().text().replace(
             "body = softvt.soft { youngs_pa = 2e4, poisson = 0.3, density",
@@ -66,7 +66,7 @@ fn hard_things_have_walls_that_nothing_passes() {
 }
 
 #[test]
-fn a_suite_without_deformation_has_no_soft_targets() {
+fn rigid_suites_refuse_soft_targets() {
     let text = Small::default().text().replace("\"deformable\"", "\"rigid\"");
     let project = Project::new(&[("x.lua", &text)]);
     let expected = "x.lua:6: the target of task 0, cube, is soft, but suite one has object_type = \"rigid\"; set \"deformable\"";
@@ -76,13 +76,13 @@ fn a_suite_without_deformation_has_no_soft_targets() {
 }
 
 #[test]
-fn a_suite_that_is_right_is_listed() {
+fn valid_suites_are_listed() {
     let said = Small::default().project().succeeds("check x.lua");
     assert_eq!(said.out, "suite one: 1 task, 1 episode each\n   0 wait: cube on post\nx.lua: OK\n");
 }
 
 #[test]
-fn all_suites_are_right() {
+fn standard_suites_are_valid() {
     let said = Project::new(&[]).succeeds("check suites/all.lua");
     assert_eq!(said.out.matches(" tasks, ").count(), 4);
 }

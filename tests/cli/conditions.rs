@@ -1,10 +1,10 @@
-//! Conditions: each suite as it is and under each of them, compared episode by episode.
+//! Conditions: each suite unchanged and under each condition, compared episode by episode.
 
 use serde_json::Value;
 
 use crate::support::{Project, Small};
 
-/// The small suite with shifts, under conditions of its own.
+/// The small suite with shifts, under the given conditions.
 fn project(conditions: &str, object_type: &str) -> Project {
     let small = Small { expert: "arm:close_to(1, { rate = 2 })", ..Small::default() };
     let shifts = "local shifts = require \"shifts\"\n";
@@ -28,7 +28,7 @@ const THREE: &str = "{ name = \"heavy x2\", shift = { mass = 2 } },
   { name = \"weak\", set = { [\"robot.gripper.effort\"] = 3 } },";
 
 #[test]
-fn each_condition_is_an_ordinary_run_of_the_same_episodes() {
+fn each_condition_is_a_run_of_the_same_episodes() {
     let project = project(THREE, "deformable");
     let said = project.succeeds("suites/trial.lua --policy noop --out run");
     let rows: Vec<&str> = said.out.lines().filter(|line| !line.starts_with('─')).collect();
@@ -66,7 +66,7 @@ fn the_comparison_is_written_and_light_alone_changes_no_result() {
 }
 
 #[test]
-fn what_can_change_nothing_is_told_and_not_run() {
+fn conditions_without_effect_are_reported_and_not_run() {
     let project = project(THREE, "rigid");
     let said = project.succeeds("suites/trial.lua --policy noop --out run");
     let row = said.out.lines().find(|line| line.starts_with("hard  ")).expect("a row");
@@ -79,7 +79,7 @@ fn what_can_change_nothing_is_told_and_not_run() {
 }
 
 #[test]
-fn wrong_conditions_are_told_before_anything_runs() {
+fn invalid_conditions_are_reported_before_anything_runs() {
     let refused = |conditions: &str| {
         let project = project(conditions, "deformable");
         let message = project.refusal("suites/trial.lua --policy noop --out run");
@@ -113,7 +113,7 @@ fn wrong_conditions_are_told_before_anything_runs() {
 }
 
 #[test]
-fn conditions_are_checked_and_listed_as_suites_are() {
+fn conditions_are_checked_and_listed() {
     let project = project(THREE, "deformable");
     let said = project.succeeds("check suites/trial.lua");
     assert!(said.out.contains("conditions: reference, heavy x2, same, hard, weak\n"), "{}", said.out);

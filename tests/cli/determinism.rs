@@ -1,9 +1,9 @@
-//! The same command gives the same bytes.
+//! Equal commands give byte-identical results.
 
 use crate::support::{Project, SPATIAL_SOFT};
 
 #[test]
-fn episodes_are_byte_identical_for_one_and_two_threads_and_for_two_runs() {
+fn episodes_are_byte_identical_for_any_threads() {
     let project = Project::new(&[]);
     for (out, threads) in [("one", 1), ("two", 2), ("again", 2)] {
         project.succeeds(&format!(
@@ -18,7 +18,7 @@ fn episodes_are_byte_identical_for_one_and_two_threads_and_for_two_runs() {
 }
 
 #[test]
-fn a_grasp_is_byte_identical_for_one_and_two_threads() {
+fn grasps_are_byte_identical_for_any_threads() {
     let project = Project::new(&[]);
     for threads in [1, 2] {
         project.succeeds(&format!(

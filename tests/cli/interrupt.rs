@@ -1,4 +1,4 @@
-//! Ctrl-C in the middle of a run.
+//! Ctrl-C during a command.
 #![cfg(unix)]
 
 use std::{
@@ -48,7 +48,7 @@ fn finished_episodes_survive_an_interrupt() {
     assert!(!project.path("run/summary.json").exists());
 }
 
-/// An experiment of 100 points: the first ends at once, the others go on for days.
+/// An experiment of 100 points. The first ends at once, the others would run for days.
 const SLOW: &str = r#"local points = {}
 for i = 1, 100 do points[i] = { i = i } end
 return softvt.experiment { name = "e", options = {}, points = function() return points end, run = function(point)
@@ -61,7 +61,7 @@ end }
 "#;
 
 #[test]
-fn an_experiment_ends_soon_and_shows_the_rows_that_it_has() {
+fn an_interrupted_experiment_prints_its_rows() {
     let project = Project::new(&[("x.lua", SLOW)]);
     let child = Command::new(cargo_bin!("softvt"))
         .current_dir(project.path(""))
@@ -83,8 +83,8 @@ fn an_experiment_ends_soon_and_shows_the_rows_that_it_has() {
 }
 
 #[test]
-fn what_was_wrong_before_an_interrupt_is_what_the_exit_code_tells() {
-    // The second task fails at once, the first goes on for long.
+fn errors_before_an_interrupt_keep_their_exit_code() {
+    // The second task fails at once, the first runs for long.
     let text = Small { task: "budget_steps = 100000", ..Small::default() }.text();
     let (suite, task) = text.trim_end().trim_end_matches("} }").split_once("  softvt.task").expect("a task");
     let failing = task.replace("arm:wait(1)", "arm:wait_for_ever()").replace("\"wait\"", "\"fail\"");
@@ -104,7 +104,7 @@ fn await_lines(project: &Project, count: usize) {
     }
 }
 
-/// Starts softvt, waits until it is at work, sends a signal, and gives its exit code, how long it took, and what it said.
+/// Starts softvt, waits until it runs, sends a signal, and returns exit code, duration and messages.
 fn interrupted(project: &Project, words: &[&str], work_s: f64) -> (Option<i32>, Duration, String) {
     let child = Command::new(cargo_bin!("softvt"))
         .current_dir(project.path(""))
@@ -121,7 +121,7 @@ fn interrupted(project: &Project, words: &[&str], work_s: f64) -> (Option<i32>, 
     (output.status.code(), start.elapsed(), String::from_utf8(output.stderr).expect("text"))
 }
 
-/// Defines `step_for_ever()`, which hardly ever leaves the physics.
+/// Defines `step_for_ever()`, which spends nearly all its time in the physics.
 const STEPS: &str = r#"local function step_for_ever()
   local world = softvt.world { sleeping = false, gravity = { 0, 0, 0 } }
   world:soft { name = "cube", shape = softvt.shape.box { size = { 0.05, 0.05, 0.05 } }, youngs_pa = 3e4, poisson = 0.4, density = 300, xyz = { 0, 0, 1 } }
@@ -130,8 +130,8 @@ end
 "#;
 
 #[test]
-fn whatever_a_script_is_at_ends_soon() {
-    // Loading for ever, a calibration, and a library function that never comes back.
+fn scripts_end_soon_after_an_interrupt() {
+    // Endless loading, a calibration, and a library function that never returns.
     let stuck = "return string.find(('a'):rep(40), ('.-'):rep(40) .. 'b')";
     let physics = format!("{STEPS}step_for_ever()");
     let laying_out =
@@ -151,7 +151,7 @@ fn whatever_a_script_is_at_ends_soon() {
         let project = Project::new(&[("x.lua", text)]);
         let (code, took, err) = interrupted(&project, &words, work_s);
         assert_eq!(code, Some(130), "{name}: {err}");
-        // The library function ends only with the process, three seconds after the wish; a busy machine takes longer.
+        // The library function ends only with the process, three seconds after the signal; a busy machine takes longer.
         assert!(took < Duration::from_secs(8), "{name}: {took:?}");
         assert!(!err.contains("panicked"), "{name}: {err}");
     }

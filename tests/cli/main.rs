@@ -1,31 +1,30 @@
-//! The binary as people use it: what it says of bad input, what it writes, that results repeat, and that the benchmark
-//! measures what it says.
+//! Black-box tests of the binary: messages for invalid input, output files, reproducibility, and validity of the benchmark.
 
-mod alike;
-mod bad_runs;
-mod bad_scripts;
+mod articulated_objects;
+mod benchmark_validity;
 mod check;
 mod conditions;
+mod crash_recovery;
+mod dataset_import;
+mod dataset_recording;
 mod determinism;
-mod documents;
-mod endless;
-mod files;
-mod given_up;
-mod importing;
+mod documentation;
+mod expert_failure;
+mod external_scorer;
+mod initial_state_coverage;
 mod interrupt;
-mod joints;
-mod killed;
-mod lerobot;
-mod measures;
-mod observe;
+mod invalid_scenes;
+mod invalid_scripts;
+mod judging;
+mod lerobot_export;
+mod observations;
+mod output_files;
 mod policies;
-mod recording;
+mod policy_servers;
 mod reports;
-mod scorer;
+mod script_timeouts;
 mod serve;
-mod servers;
-mod spread;
 mod support;
-mod touch;
+mod tactile_forces;
 mod usage;
 mod view;

@@ -11,7 +11,7 @@ fn project(policy: &str) -> Project {
     project
 }
 
-/// A policy that wanders by chance, from what it sees, in lists of three.
+/// A policy that moves at random, depending on its observation, in chunks of three.
 const WANDERS: &str = "local n = 0
 return softvt.policy { name = 'wanders', looks = { touch = true, cameras = { 'wrist' } }, replan = 2,
   reset = function(task) n = task.episode end,
@@ -27,12 +27,12 @@ return softvt.policy { name = 'wanders', looks = { touch = true, cameras = { 'wr
 ";
 
 #[test]
-fn a_lua_policys_results_do_not_depend_on_threads_or_on_being_broken_off() {
+fn results_do_not_depend_on_threads_or_interruptions() {
     let project = project(WANDERS);
     let line = "x.lua --policy p.lua --episodes 3";
     project.succeeds(&format!("{line} --threads 1 --out one"));
     project.succeeds(&format!("{line} --threads 2 --out two"));
-    // As a crash after the first episode would leave it.
+    // The state after a crash in the second episode.
     project.succeeds(&format!("{line} --threads 1 --out three"));
     let first = project.text("three/episodes.jsonl").lines().next().expect("a line").to_owned() + "\n";
     project.write("three/episodes.jsonl", first.as_bytes());
@@ -54,7 +54,7 @@ fn a_lua_policys_results_do_not_depend_on_threads_or_on_being_broken_off() {
 }
 
 #[test]
-fn a_policy_that_fails_ends_the_run_and_keeps_what_is_finished() {
+fn a_failing_policy_ends_the_run_and_keeps_finished_episodes() {
     let good = "return { position = obs.position, axis_angle = obs.axis_angle, closure = 0 }";
     for (bad, said) in [
         ("error 'lost'", "p.lua:3: lost"),
@@ -71,7 +71,7 @@ fn a_policy_that_fails_ends_the_run_and_keeps_what_is_finished() {
 }
 
 #[test]
-fn a_number_that_is_none_fails_its_episode_and_no_other() {
+fn nan_actions_fail_only_their_episode() {
     let project = project(
         "local episode\nreturn softvt.policy { name = 'p', reset = function(t) episode = t.episode end, act = function(obs)\n\
          return { position = obs.position, axis_angle = obs.axis_angle, closure = episode == 0 and 0/0 or 0 } end }",
@@ -91,7 +91,7 @@ fn a_number_that_is_none_fails_its_episode_and_no_other() {
 }
 
 #[test]
-fn a_camera_that_is_not_there_is_told_before_anything_runs() {
+fn missing_cameras_are_reported_before_anything_runs() {
     let policy =
         "return softvt.policy { name = 'p', looks = { cameras = { 'sied' } }, act = function() end }";
     let project = project(policy);
@@ -100,7 +100,7 @@ fn a_camera_that_is_not_there_is_told_before_anything_runs() {
         message,
         "p.lua:1: policy.looks: unknown camera \"sied\"; there are third_person, wrist (scene of task 0)"
     );
-    // Before anyone is asked for an answer: nobody listens there.
+    // Checked before any connection: there is no server at this address.
     let profile = "return softvt.profile { name = 'v', \
          inputs = { { keys = { 'a' }, source = 'camera', camera = 'wirst' } }, \
          actions = { pose = 'absolute', gripper = { open = 0, shut = 1 } } }";
@@ -114,7 +114,7 @@ fn a_camera_that_is_not_there_is_told_before_anything_runs() {
 }
 
 #[test]
-fn recorded_actions_must_be_those_of_this_very_suite_and_all_there() {
+fn recorded_actions_must_fit_the_run() {
     let project = project(WANDERS);
     project.succeeds("x.lua --policy p.lua --episodes 2 --out run");
     project.succeeds("x.lua --policy run --episodes 2 --out again");
@@ -123,7 +123,7 @@ fn recorded_actions_must_be_those_of_this_very_suite_and_all_there() {
     let info = project.json("again/run.json");
     assert_eq!((info["policy"].as_str(), info["replayed"]["run"].as_str()), (Some("replay"), Some("run")));
     assert!(info["replayed"]["sha256"].as_str().is_some_and(|hash| hash.len() == 64));
-    // Whoever repeats what was done with the true state in sight has had it in sight.
+    // Repeating the actions of a privileged policy is privileged too.
     project.succeeds("x.lua --out seen");
     project.succeeds("x.lua --policy seen --out echo");
     assert_eq!(project.json("echo/run.json")["replayed"]["policy"], "expert");
@@ -151,7 +151,7 @@ fn recorded_actions_must_be_those_of_this_very_suite_and_all_there() {
 }
 
 #[test]
-fn flags_without_use_and_bad_files_are_refused_before_anything_runs() {
+fn flags_without_effect_are_refused() {
     let project = project(WANDERS);
     project.write(
         "profile.lua",
@@ -184,8 +184,8 @@ fn flags_without_use_and_bad_files_are_refused_before_anything_runs() {
 }
 
 #[test]
-fn a_profile_in_lua_is_spoken_to_a_server_as_the_same_built_in() {
-    // Nobody listens there: the profile was read, and only the connection fails.
+fn profiles_in_lua_are_used_for_servers() {
+    // There is no server: the profile is read, and only the connection fails.
     let free = TcpListener::bind("127.0.0.1:0").expect("a port").local_addr().expect("an address");
     let project = project(WANDERS);
     let words =
@@ -211,7 +211,7 @@ fn policies_and_profiles_in_lua_are_listed() {
     }
 }
 
-/// An expert that takes the cube from above, shut as far as it goes if nobody feels anything, and holds it up.
+/// An expert that grasps the cube from above, closing fully without tactile feedback, and lifts it.
 const GREEDY: &str = "local c = scene:object('cube').xyz
     local at = softvt.pose { xyz = { c[1], c[2], 0.022 } }
     arm:move_to(at:moved { 0, 0, 0.05 }, { speed = 0.5 })
@@ -220,7 +220,7 @@ const GREEDY: &str = "local c = scene:object('cube').xyz
     if scene:object('cube').xyz[3] < 0.06 then arm:give_up('it did not come along') end";
 
 #[test]
-fn the_tactile_servo_closes_until_it_feels_the_object_whatever_the_expert_says() {
+fn the_tactile_servo_stops_at_contact() {
     let project = Small { task: "budget_steps = 120", expert: GREEDY, ..Small::default() }.project();
     let mut d = Vec::new();
     for policy in ["expert", "tactile-servo"] {
@@ -238,7 +238,7 @@ fn the_tactile_servo_closes_until_it_feels_the_object_whatever_the_expert_says()
 }
 
 #[test]
-fn an_expert_that_is_not_felt_for_is_told_where_feeling_is() {
+fn feel_is_refused_where_it_is_not_available() {
     let project = Small { expert: "arm:feel()", ..Small::default() }.project();
     let message = project.refusal("x.lua --out run");
     assert!(

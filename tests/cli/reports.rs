@@ -1,4 +1,4 @@
-//! What is made of finished runs: comparisons, pages, tables; and runs that cannot be read.
+//! Comparisons, pages and tables of finished runs, and runs that cannot be read.
 
 use std::fs;
 
@@ -15,7 +15,7 @@ fn project() -> Project {
     project
 }
 
-/// Changes a document of a project.
+/// Changes a JSON file of a project.
 fn edit(project: &Project, path: &str, change: impl Fn(&mut Value)) {
     let mut document = project.json(path);
     change(&mut document);
@@ -23,7 +23,7 @@ fn edit(project: &Project, path: &str, change: impl Fn(&mut Value)) {
 }
 
 #[test]
-fn two_runs_are_paired_episode_by_episode_and_by_task() {
+fn runs_are_paired_by_episode_and_task() {
     let project = project();
     let compared: Value =
         serde_json::from_str(&project.succeeds("compare runs/a runs/b --json").out).expect("JSON");
@@ -40,7 +40,7 @@ fn two_runs_are_paired_episode_by_episode_and_by_task() {
     assert!(text.starts_with("noop → random · 2 paired episodes\n"), "{text}");
     assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
     assert!(text.contains("95 % interval") && text.contains("better"), "{text}");
-    // An expert sees the true state, and every table says so.
+    // The expert is privileged, and every table marks it.
     project.succeeds("x.lua --episodes 2 --out runs/c");
     assert!(project.succeeds("compare runs/a runs/c").out.contains("noop → expert (privileged) · "));
     let said = project.succeeds("x.lua --episodes 2 --out runs/c");
@@ -49,7 +49,7 @@ fn two_runs_are_paired_episode_by_episode_and_by_task() {
 }
 
 #[test]
-fn a_folder_with_two_runs_of_one_suite_is_not_compared_in_silence() {
+fn two_runs_of_one_suite_are_not_compared() {
     let project = project();
     let message = project.refusal("compare runs runs/a");
     assert_eq!(
@@ -66,7 +66,7 @@ fn runs_of_different_seeds_share_no_episode() {
 }
 
 #[test]
-fn what_is_no_run_is_named() {
+fn folders_without_a_run_are_named() {
     let project = project();
     fs::create_dir(project.path("empty")).expect("made");
     let torn = project.text("runs/a/episodes.jsonl");
@@ -104,7 +104,7 @@ fn what_is_no_run_is_named() {
 }
 
 #[test]
-fn a_run_of_another_version_is_read_with_a_word_or_refused_with_the_cause() {
+fn runs_of_other_versions_are_reported() {
     let project = project();
     edit(&project, "runs/a/run.json", |run| run["softvt"] = json!("0.0.1"));
     let said = project.succeeds("report runs/a --out page");
@@ -126,10 +126,10 @@ fn a_run_of_another_version_is_read_with_a_word_or_refused_with_the_cause() {
 }
 
 #[test]
-fn a_run_in_progress_shows_what_it_has() {
+fn unfinished_runs_can_be_reported() {
     let project = project();
     let lines = project.text("runs/a/episodes.jsonl");
-    // The second line is torn, as by a crash; there is no summary yet.
+    // The second line is incomplete, as after a crash; there is no summary yet.
     let whole = lines.find('\n').expect("a line") + 1;
     project.write("runs/a/episodes.jsonl", &lines.as_bytes()[..whole + 40]);
     fs::remove_file(project.path("runs/a/summary.json")).expect("removed");
@@ -148,7 +148,7 @@ fn a_run_in_progress_shows_what_it_has() {
 }
 
 #[test]
-fn a_report_says_how_to_see_an_episode_and_the_words_work() {
+fn commands_in_the_report_are_valid() {
     let project = project();
     project.succeeds("report runs --out page");
     let page = project.text("page/report.html");
@@ -169,7 +169,7 @@ fn a_report_says_how_to_see_an_episode_and_the_words_work() {
 }
 
 #[test]
-fn lost_files_of_finished_episodes_are_made_again_to_the_same_bytes() {
+fn lost_files_are_restored_byte_identically() {
     let project = Small { task: "budget_steps = 8", expert: "arm:close_to(1)", ..Small::default() }.project();
     let line = "x.lua --episodes 3 --trace --out run";
     project.succeeds(line);
@@ -192,17 +192,17 @@ fn lost_files_of_finished_episodes_are_made_again_to_the_same_bytes() {
     assert!(said.err.contains(told), "{}", said.err);
     assert!(files.map(bytes) == before);
     assert!(project.succeeds(line).err.contains("already complete"));
-    // Without its summary the folder is unfinished, and goes on as such.
+    // Without its summary the folder is unfinished and can be resumed.
     fs::remove_file(project.path("run/summary.json")).expect("removed");
     project.succeeds(&format!("{line} --resume"));
     assert!(files.map(bytes) == before);
-    // Pictures can be had afterwards.
+    // Videos can be added later.
     project.succeeds(&format!("{line} --video=1"));
     let drawn =
         |e: u32, kind: &str| project.path(&format!("run/video/task_000/episode_0000{e}.{kind}")).exists();
     assert!(drawn(1, "mp4") && drawn(1, "png") && !drawn(0, "mp4"));
     assert!(files.map(bytes) == before);
-    // What does not come out as recorded is told, and nothing is put in its place.
+    // A simulation that differs from its record is reported, and its files are not restored.
     let lines = project.text("run/episodes.jsonl").replacen("\"state_hash\":\"", "\"state_hash\":\"f", 1);
     project.write("run/episodes.jsonl", lines.as_bytes());
     fs::remove_file(project.path("run/actions/task_000/episode_00000.npy")).expect("removed");
@@ -213,7 +213,7 @@ fn lost_files_of_finished_episodes_are_made_again_to_the_same_bytes() {
 }
 
 #[test]
-fn shards_are_merged_to_the_bytes_of_one_run_also_of_a_twin() {
+fn merged_shards_are_byte_identical_to_one_run() {
     let project = Small { task: "budget_steps = 8", ..Small::default() }.project();
     for (twin, name) in [("", "soft"), ("--twin rigid", "rigid")] {
         let line = format!("x.lua --episodes 3 {twin} --out {name}");

@@ -1,4 +1,4 @@
-//! `softvt serve` and clients of every temper: whatever one of them does, it is told, and the others are served.
+//! `softvt serve`: invalid or silent clients get an error or are dropped, and the others are served.
 
 use std::{
     io::{BufRead, BufReader, Read, Write},
@@ -48,7 +48,7 @@ impl Server {
         stream
     }
 
-    /// A client that has been greeted, and the greeting.
+    /// A connected client, and the hello message.
     pub fn client(&self) -> (Client, Value) {
         let (socket, _) =
             tungstenite::client(format!("ws://{}", self.address), self.stream()).expect("shaken hands");
@@ -88,7 +88,7 @@ impl Client {
         self.hear()
     }
 
-    /// What is said instead of an answer.
+    /// The error message of a response.
     fn refused(&mut self, value: &Value) -> String {
         let answer = self.ask(value);
         assert_eq!(text(&answer, "type"), "error", "{value} is answered");
@@ -114,7 +114,7 @@ fn reset(episode: u64) -> Value {
     map(&[("type", "reset".into()), ("task", 0.into()), ("episode", episode.into())])
 }
 
-/// An array as Python's clients pack it.
+/// An array as Python clients encode it.
 pub fn array(shape: &[usize], numbers: &[f64]) -> Value {
     let key = |name: &str| Value::Binary(name.as_bytes().to_vec());
     Value::Map(vec![
@@ -150,7 +150,7 @@ fn project() -> Project {
 }
 
 #[test]
-fn an_episode_is_driven_from_its_start_to_its_end() {
+fn a_client_runs_an_episode_to_its_end() {
     let project = project();
     let server = Server::start(&project, "--profile vision");
     let (mut client, hello) = server.client();
@@ -182,7 +182,7 @@ fn an_episode_is_driven_from_its_start_to_its_end() {
 }
 
 #[test]
-fn privileged_clients_are_told_the_true_state() {
+fn privileged_clients_receive_the_true_state() {
     let project = project();
     let server = Server::start(&project, "--profile vision --privileged --seed 3 --split demonstration");
     let (mut client, hello) = server.client();
@@ -199,7 +199,7 @@ fn privileged_clients_are_told_the_true_state() {
 }
 
 #[test]
-fn bad_requests_are_told_once_and_the_connection_goes_on() {
+fn invalid_requests_keep_the_connection_open() {
     let project = project();
     let server = Server::start(&project, "--profile vision");
     let (mut client, _) = server.client();
@@ -256,7 +256,7 @@ fn bad_requests_are_told_once_and_the_connection_goes_on() {
 }
 
 #[test]
-fn bytes_that_are_no_message_are_told() {
+fn malformed_messages_are_reported() {
     let project = project();
     let server = Server::start(&project, "--profile vision");
     let (mut client, _) = server.client();
@@ -276,7 +276,7 @@ fn bytes_that_are_no_message_are_told() {
         assert!(text(&answer, "error").contains(words), "{words}: {answer}");
     }
     client.reset();
-    // Ten megabytes: told before they are read, then the connection ends.
+    // Ten megabytes are refused before they are read, and the connection is closed.
     let _ = client.0.send(Message::binary(vec![0; 10 << 20]));
     let answer = client.hear();
     assert!(text(&answer, "error").contains("longer than 4 MiB"), "{answer}");
@@ -285,7 +285,7 @@ fn bytes_that_are_no_message_are_told() {
 }
 
 #[test]
-fn clients_that_vanish_or_never_speak_hold_nobody_up() {
+fn silent_clients_do_not_block_others() {
     let project = project();
     let server = Server::start(&project, "--profile vision --threads 2");
     let mut silent: Vec<TcpStream> = (0..3).map(|_| server.stream()).collect();
@@ -296,7 +296,7 @@ fn clients_that_vanish_or_never_speak_hold_nobody_up() {
         let (mut client, _) = server.client();
         client.send(&reset(1));
         client.0.get_ref().shutdown(Shutdown::Both).expect("gone");
-        // Seats of the dead come free when their last request has been carried out.
+        // The slot of a lost client is released when its last request is finished.
         std::thread::sleep(Duration::from_millis(1500));
     }
     let (mut first, _) = server.client();
@@ -317,7 +317,7 @@ fn clients_that_vanish_or_never_speak_hold_nobody_up() {
 }
 
 #[test]
-fn a_state_is_restored_to_the_byte_by_a_copy_and_by_simulating_again() {
+fn restored_states_are_byte_identical() {
     let project = project();
     let server = Server::start(&project, "--profile visuo_tactile --privileged");
     let (mut client, _) = server.client();
@@ -342,7 +342,7 @@ fn a_state_is_restored_to_the_byte_by_a_copy_and_by_simulating_again() {
 }
 
 #[test]
-fn pictures_are_drawn_in_the_size_that_is_asked_for() {
+fn images_have_the_requested_size() {
     let project = project();
     let server = Server::start(&project, "--profile vision");
     let (mut client, _) = server.client();
@@ -363,7 +363,7 @@ fn pictures_are_drawn_in_the_size_that_is_asked_for() {
 }
 
 #[test]
-fn what_cannot_be_served_is_refused() {
+fn invalid_servers_are_refused() {
     let project = project();
     project.write(
         "e.lua",
@@ -388,14 +388,14 @@ fn what_cannot_be_served_is_refused() {
 
 #[cfg(unix)]
 #[test]
-fn an_interrupt_ends_the_server_in_order() {
+fn an_interrupt_closes_the_server() {
     let project = project();
     let mut server = Server::start(&project, "--profile vision");
     let (mut client, _) = server.client();
     client.reset();
     let id = server.child.id().to_string();
     assert!(Command::new("kill").args(["-INT", &id]).status().expect("kill runs").success());
-    assert!(client.0.read().is_ok_and(|m| m.is_close()), "clients are told");
+    assert!(client.0.read().is_ok_and(|m| m.is_close()), "clients get a close frame");
     let code = server.child.wait().expect("ended").code();
     let mut err = String::new();
     server.child.stderr.take().expect("messages").read_to_string(&mut err).expect("text");

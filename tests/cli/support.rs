@@ -1,11 +1,11 @@
-//! A project folder, small scripts in it, and the binary run there.
+//! Project folders with small scripts, in which the binary runs.
 
 use std::{fs, path::PathBuf, time::Duration};
 
 use assert_cmd::{Command, cargo::cargo_bin_cmd};
 use serde_json::Value;
 
-/// `solids.lua` for small scenes: a floor, a slab, a cube that lies well on it, and what makes others.
+/// `solids.lua` for small scenes: a floor, a slab, a cube that rests stably on it, and a function for others.
 pub const SOLIDS: (&str, &str) = (
     "solids.lua",
     r#"
@@ -21,14 +21,14 @@ return {
 "#,
 );
 
-/// What a run said.
+/// Exit code and output of a command.
 pub struct Said {
     pub code: i32,
     pub out: String,
     pub err: String,
 }
 
-/// A folder that goes away with the test.
+/// A folder that is removed at the end of the test.
 pub struct Project(tempfile::TempDir);
 
 impl Project {
@@ -56,7 +56,7 @@ impl Project {
         serde_json::from_str(&self.text(path)).unwrap_or_else(|e| panic!("{path}: {e}"))
     }
 
-    /// Every line must be whole.
+    /// Parses JSON lines. Every line must be complete.
     pub fn lines(&self, path: &str) -> Vec<Value> {
         let text = self.text(path);
         assert!(text.is_empty() || text.ends_with('\n'), "{path} ends in a torn line");
@@ -73,14 +73,14 @@ impl Project {
         command
     }
 
-    /// Runs what must succeed.
+    /// Runs a command that must succeed.
     pub fn succeeds(&self, words: &str) -> Said {
         let said = self.softvt(words);
         assert_eq!(said.code, 0, "softvt {words}\n{}", said.err);
         said
     }
 
-    /// The message of bad input, without the program's name; nothing may be on the standard output.
+    /// The message for invalid input, without the name of the program. Standard output must be empty.
     pub fn refusal(&self, words: &str) -> String {
         refusal(self.softvt(words), words)
     }
@@ -92,7 +92,7 @@ pub fn said(mut command: Command) -> Said {
     Said { code: output.status.code().unwrap_or(-1), out: text(output.stdout), err: text(output.stderr) }
 }
 
-/// Of a run that must fail for its input: what comes after the last `softvt: `.
+/// The message of a command that must fail because of its input: the text after the last `softvt: `.
 pub fn refusal(said: Said, words: &str) -> String {
     let Said { code, out, err } = said;
     assert_eq!((code, out.as_str()), (2, ""), "softvt {words}\n{err}");
@@ -101,7 +101,7 @@ pub fn refusal(said: Said, words: &str) -> String {
     message.trim_end().to_owned()
 }
 
-/// A suite of one soft cube on a floor: its parts can be replaced by others.
+/// A suite of one soft cube on a floor, with replaceable parts.
 pub struct Small {
     pub shape: &'static str,
     pub material: &'static str,
@@ -149,5 +149,5 @@ return softvt.suite {{ name = "one", object_type = "deformable", variation = "sp
     }
 }
 
-/// The suite that comes with the binary.
+/// A suite that is embedded in the binary.
 pub const SPATIAL_SOFT: &str = "suites/spatial_soft.lua";

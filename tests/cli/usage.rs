@@ -1,4 +1,4 @@
-//! The command line itself: every wrong word is told with the file it was said about.
+//! Usage errors, options of scripts, and help.
 
 use insta::assert_snapshot;
 
@@ -23,16 +23,16 @@ fn with_options(words: &str) -> String {
 }
 
 #[test]
-fn an_unknown_policy_is_told_with_those_there_are() {
+fn unknown_policies_get_a_suggestion() {
     assert_snapshot!(small("--policy noob"), @r"
-    x.lua: invalid value 'noob' for '--policy <POLICY>': expected expert, expert-binary, tactile-servo, noop, random, a Lua file such as my_policy.lua, a server such as ws://host:8000, or the folder of a run; did you mean noop?
+    x.lua: invalid value 'noob' for '--policy <POLICY>': expected expert, expert-binary, tactile-servo, noop, random, a Lua file such as my_policy.lua, a server such as ws://host:8000, or a run folder; did you mean noop?
 
     For more information, try '--help'.
     ");
 }
 
 #[test]
-fn an_unknown_flag_is_told_with_the_one_that_was_meant() {
+fn unknown_flags_get_a_suggestion() {
     assert_snapshot!(small("--polcy noop"), @r"
     x.lua: unexpected argument '--polcy' found
 
@@ -47,7 +47,7 @@ fn an_unknown_flag_is_told_with_the_one_that_was_meant() {
 }
 
 #[test]
-fn an_unknown_task_shift_or_setting_is_told_with_those_there_are() {
+fn unknown_tasks_shifts_and_settings_are_reported() {
     assert_snapshot!(small("--task 7"), @"x.lua: --task 7: suite one has no such task; it has only task 0 (softvt list tasks)");
     let words = ["x.lua", "--out", "run", "--task", ""];
     let project = Small::default().project();
@@ -68,7 +68,7 @@ fn an_unknown_task_shift_or_setting_is_told_with_those_there_are() {
 }
 
 #[test]
-fn the_options_of_a_script_are_checked() {
+fn options_of_scripts_are_checked() {
     assert_snapshot!(with_options("--gap-mm=abc"), @r#"x.lua:1: option --gap-mm: expected numbers joined by commas in 1..60 (mm), got "abc""#);
     assert_snapshot!(with_options("--gap-mm 48,70"), @r#"x.lua:1: option --gap-mm: expected numbers joined by commas in 1..60 (mm), got "48,70""#);
     assert_snapshot!(with_options("--shape box"), @r#"x.lua:1: option --shape: expected one of cube, ball, got "box""#);
@@ -78,15 +78,15 @@ fn the_options_of_a_script_are_checked() {
 }
 
 #[test]
-fn a_script_may_not_take_a_flag_of_the_runner() {
+fn scripts_cannot_redefine_flags() {
     let project = Project::new(&[("x.lua", "softvt.options { seed = { default = 1 } }")]);
     assert_snapshot!(project.refusal("x.lua"), @"x.lua: the script declares the option --seed, which is a flag of softvt; rename it");
 }
 
 #[test]
-fn help_shows_the_options_of_the_script_with_unit_range_and_default() {
+fn help_lists_the_options_of_the_script() {
     let project = Project::new(&[("x.lua", WITH_OPTIONS)]);
-    // Where lines break depends on the terminal.
+    // Line breaks depend on the terminal.
     let help = project.succeeds("x.lua --help").out.split_whitespace().collect::<Vec<_>>().join(" ");
     for part in [
         "Options of the script:",
@@ -103,7 +103,7 @@ fn help_shows_the_options_of_the_script_with_unit_range_and_default() {
 }
 
 #[test]
-fn the_options_of_a_script_reach_its_rows_and_files() {
+fn options_reach_rows_and_files() {
     let project = Project::new(&[("x.lua", WITH_OPTIONS)]);
     let said = project.succeeds("x.lua --gap-mm 3,4 --json --out made");
     assert_eq!(said.out, "{\"gap\":3.0,\"square\":9.0}\n{\"gap\":4.0,\"square\":16.0}\n");

@@ -1,4 +1,4 @@
-//! Pictures and videos that a user asks for.
+//! Images and videos of episodes.
 
 use std::fs;
 
@@ -9,7 +9,7 @@ fn png_size(bytes: &[u8]) -> [u32; 2] {
     [16, 20].map(|at| u32::from_be_bytes(bytes[at..at + 4].try_into().expect("four bytes")))
 }
 
-/// Whether a picture is neither black nor one colour: it does not shrink to nothing.
+/// True if an image is neither black nor of one colour: its file does not compress to almost nothing.
 fn shows_something(bytes: &[u8], [width, height]: [u32; 2]) -> bool {
     bytes.len() as f64 > 0.02 * f64::from(width * height)
 }
@@ -19,7 +19,7 @@ fn short() -> Project {
 }
 
 #[test]
-fn view_writes_stills_of_every_stream_and_a_video_and_the_same_ones_again() {
+fn view_writes_identical_stills_and_video_each_time() {
     let project = short();
     let said = project.succeeds("view x.lua --out seen");
     assert_eq!(said.out.lines().last(), Some("seen/episode.mp4"));
@@ -56,7 +56,7 @@ fn view_writes_stills_of_every_stream_and_a_video_and_the_same_ones_again() {
 }
 
 #[test]
-fn native_stills_are_large() {
+fn native_stills_have_the_native_size() {
     let project = short();
     project.succeeds("view x.lua --native --policy noop --out seen");
     let size = |name: &str| png_size(&fs::read(project.path(name)).expect("written"));
@@ -64,7 +64,7 @@ fn native_stills_are_large() {
 }
 
 #[test]
-fn a_run_draws_the_episodes_that_were_asked_for() {
+fn a_run_renders_the_requested_episodes() {
     let project = short();
     let drawn = |flag: &str, out: &str| {
         project.succeeds(&format!("x.lua --episodes 2 {flag} --out {out}"));
@@ -74,7 +74,7 @@ fn a_run_draws_the_episodes_that_were_asked_for() {
     assert_eq!(drawn("--video=1", "chosen"), [false, true]);
     assert_eq!(drawn("--video", "failed"), [true, true], "waiting is not safe");
     assert_eq!(drawn("--video=all", "all"), [true, true]);
-    // Of what is not safe there is a still of the worst moment, as large as a picture of the video.
+    // Unsafe episodes have a still of the worst moment, as large as a frame of the video.
     let still = fs::read(project.path("failed/video/task_000/episode_00001.png")).expect("written");
     assert_eq!(png_size(&still), [1024, 1056]);
     assert!(shows_something(&still, [1024, 1056]));
@@ -89,7 +89,7 @@ fn a_run_draws_the_episodes_that_were_asked_for() {
 }
 
 #[test]
-fn what_cannot_be_drawn_is_told() {
+fn invalid_views_are_refused() {
     let project = short();
     project.write("e.lua", b"return softvt.experiment { name = \"e\", grid = { a = { 1 } }, run = function() return { b = 1 } end }");
     let message = project.refusal("view e.lua --out seen");
@@ -112,7 +112,7 @@ fn with(line: &str) -> Project {
 }
 
 #[test]
-fn light_cameras_and_looks_are_checked_where_they_are_written() {
+fn visuals_are_checked_with_their_line() {
     for (line, message) in [
         ("scene.light.strength = -1", "x.lua:7: scene.light.strength: expected a number in 0..1000, got -1"),
         ("scene.light.brightness = 1", "x.lua:7: scene.light: unknown key \"brightness\""),
@@ -162,7 +162,7 @@ fn light_cameras_and_looks_are_checked_where_they_are_written() {
 }
 
 #[test]
-fn a_camera_inside_of_something_is_told_before_anything_runs_and_leaves_no_picture() {
+fn cameras_inside_of_objects_are_refused() {
     let told = "x.lua:7: camera mole: position: it is inside floor; move it out";
     let mole = "scene:add_camera { name = \"mole\", position = { 0, 0, -0.02 }, look_at = { 1, 0, -0.02 } }";
     let project = with(mole);
@@ -182,7 +182,7 @@ fn a_camera_inside_of_something_is_told_before_anything_runs_and_leaves_no_pictu
 }
 
 #[test]
-fn a_simulation_of_a_script_tells_of_a_camera_inside_of_something_where_it_was_put() {
+fn simulations_report_cameras_inside_of_objects() {
     let mole = "scene:add_camera { name = \"mole\", position = { 0, 0, -0.02 }, look_at = { 1, 0, -0.02 } }";
     let text = with(mole).text("x.lua");
     let (layout, _) = text.split_once("return softvt.suite").expect("a suite");
@@ -194,8 +194,8 @@ fn a_simulation_of_a_script_tells_of_a_camera_inside_of_something_where_it_was_p
 }
 
 #[test]
-fn what_gets_around_a_camera_in_an_episode_does_not_end_its_film() {
-    // A block falls over it while the scene settles.
+fn an_enclosed_camera_does_not_end_the_video() {
+    // A block falls over the camera while the scene settles.
     let block = "local block = softvt.asset { name = \"block\", shape = softvt.shape.box { size = { 0.1, 0.1, 0.05 } }:grounded(), body = softvt.rigid { density = 300 } }";
     let lines = "scene:add { name = \"block\", asset = block, xyz = { 0.3, 0.1, 0.03 } } \
                  scene:add_camera { name = \"mole\", position = { 0.3, 0.1, 0.01 }, look_at = { -0.5, 0.1, 0.1 } }";
@@ -207,7 +207,7 @@ fn what_gets_around_a_camera_in_an_episode_does_not_end_its_film() {
 }
 
 #[test]
-fn tables_of_a_tactile_model_that_are_missing_are_told_before_anything_runs() {
+fn missing_tactile_tables_are_reported() {
     let text = Small { task: "budget_steps = 4", ..Small::default() }.text();
     let settings = "settings = { tactile = { optics = { model = \"taxim\", tables = \"nowhere\" } } },";
     let text = text.replace("episodes = 1,", &format!("episodes = 1, {settings}"));
@@ -219,7 +219,7 @@ fn tables_of_a_tactile_model_that_are_missing_are_told_before_anything_runs() {
 }
 
 #[test]
-fn a_video_of_an_episode_that_is_not_run_is_an_error() {
+fn videos_of_episodes_that_are_not_run_are_refused() {
     let project = short();
     let message = project.refusal("x.lua --episodes 2 --video=1,7 --out run");
     assert!(message.contains("x.lua: --video=7: suite one runs episodes 0 to 1 of each task"), "{message}");
@@ -227,7 +227,7 @@ fn a_video_of_an_episode_that_is_not_run_is_an_error() {
 }
 
 #[test]
-fn a_folder_without_a_name_is_an_error() {
+fn blank_folders_are_refused() {
     let project = short();
     for words in
         [["view", "x.lua", "--out", ""].as_slice(), &["x.lua", "--out", ""], &["x.lua", "--out", " "]]
@@ -241,7 +241,7 @@ fn a_folder_without_a_name_is_an_error() {
 }
 
 #[test]
-fn light_camera_and_looks_change_the_picture() {
+fn visuals_change_the_image() {
     let still = |line: &str| {
         let project = with(line);
         project.succeeds("view x.lua --out seen");

@@ -1,4 +1,4 @@
-//! Scripts that are wrong: exit code 2 and one message with file and line.
+//! Invalid scripts: exit code 2 and one message with file and line.
 
 use insta::assert_snapshot;
 
@@ -9,19 +9,19 @@ fn of(text: &str) -> String {
 }
 
 #[test]
-fn a_missing_file_is_named() {
+fn missing_files_are_named() {
     let project = Project::new(&[("suites/spatial_soft.lua", "")]);
     assert_snapshot!(project.refusal("none.lua"), @"none.lua: no such file; give the path of a Lua file; `softvt list suites` shows the standard ones");
     assert_snapshot!(project.refusal("suites/spatial_sof.lua"), @"suites/spatial_sof.lua: no such file; did you mean suites/spatial_soft.lua?");
 }
 
 #[test]
-fn a_syntax_error_has_its_line() {
+fn syntax_errors_have_their_line() {
     assert_snapshot!(of("return softvt.suite {\n  name = = 3\n}"), @"x.lua:2: syntax error: unexpected symbol near '='");
 }
 
 #[test]
-fn a_runtime_error_has_its_line() {
+fn runtime_errors_have_their_line() {
     assert_snapshot!(of("local x\nreturn x.y"), @"x.lua:2: attempt to index a nil value (local 'x')");
     assert_snapshot!(of("\n\nerror('my own words')"), @"x.lua:3: my own words");
 }
@@ -46,26 +46,26 @@ fn a_script_cannot_require_outside_of_its_project() {
 }
 
 #[test]
-fn a_memory_hog_is_stopped() {
+fn excessive_memory_use_is_stopped() {
     let said = "the script used more than its 256 MiB of memory; build smaller tables and strings, or keep fewer of them";
     assert_eq!(of("local s = 'x'\nwhile true do s = s .. s end"), format!("x.lua: {said}"));
     assert_eq!(of("return ('x'):rep(1 << 30)"), format!("x.lua: {said}"));
 }
 
 #[test]
-fn an_unknown_key_is_named_with_the_one_that_was_meant() {
+fn unknown_keys_get_a_suggestion() {
     let small = Small { material: "youngs_pa = 2e4, poisson = 0.3, densty = 300", ..Small::default() };
     assert_snapshot!(small.project().refusal("x.lua"), @r#"x.lua:3: asset.body: unknown key "densty"; did you mean "density"?"#);
 }
 
 #[test]
-fn a_wrong_type_is_named_with_what_was_expected() {
+fn wrong_types_are_reported_with_the_expected_one() {
     let small = Small { task: "budget_steps = '40'", ..Small::default() };
     assert_snapshot!(small.project().refusal("x.lua"), @r#"x.lua:11: task.budget_steps: expected a whole number in 1..100000, got "40""#);
 }
 
 #[test]
-fn a_material_that_cannot_be_is_refused() {
+fn impossible_materials_are_refused() {
     let with = |material| Small { material, ..Small::default() }.project().refusal("x.lua");
     assert_snapshot!(with("youngs_pa = -2e4, poisson = 0.3, density = 300"), @"x.lua:3: asset.body.youngs_pa: expected pascals above 0, got -20000");
     assert_snapshot!(with("youngs_pa = 2e4, poisson = 0.5, density = 300"), @"x.lua:3: asset.body.poisson: expected a number in 0..below 0.5, got 0.5");
@@ -73,7 +73,7 @@ fn a_material_that_cannot_be_is_refused() {
 }
 
 #[test]
-fn a_mesh_that_is_no_solid_is_refused() {
+fn open_meshes_are_refused() {
     let project = Small { shape: "softvt.mesh { file = 'm.obj' }", ..Small::default() }.project();
     project.write("m.obj", b"v 0 0 0\n");
     assert_snapshot!(project.refusal("x.lua"), @"x.lua:2: mesh: m.obj: the mesh is empty: it has no triangles; export a closed surface");

@@ -1,4 +1,4 @@
-//! Scenes and experts that cannot be run: found while running, told with the file.
+//! Errors of scenes and experts during a run are reported with their file.
 
 use insta::assert_snapshot;
 
@@ -9,14 +9,14 @@ fn expert(expert: &'static str) -> String {
 }
 
 #[test]
-fn an_empty_shape_is_named_with_its_asset() {
+fn empty_shapes_are_reported_with_their_asset() {
     let shape = "softvt.shape.sphere { radius = 0.02 }:subtract(softvt.shape.sphere { radius = 0.03 })";
     let project = Small { shape, ..Small::default() }.project();
     assert_snapshot!(project.refusal("x.lua --out run"), @"x.lua:6: asset cube: the shape is empty: nothing of it is left; check what is subtracted or intersected");
 }
 
 #[test]
-fn a_shape_too_thin_for_its_voxels_says_so() {
+fn shapes_thinner_than_a_voxel_are_refused() {
     let refusal = |shape| Small { shape, ..Small::default() }.project().refusal("x.lua --out run");
     assert_snapshot!(refusal("softvt.shape.box { size = { 0.04, 0.04, 0.0001 } }:grounded()"), @"x.lua:6: asset cube: it is 0.1 mm thick, thinner than a voxel: at resolution 6 they are 6.67 mm; no resolution up to 64 would serve; make it at least 0.63 mm thick");
     assert_snapshot!(refusal("softvt.shape.box { size = { 0.04, 0.04, 0.003 } }:grounded()"), @"x.lua:6: asset cube: it is 3 mm thick, thinner than a voxel: at resolution 6 they are 6.67 mm; resolution = 14 would serve");
@@ -31,7 +31,7 @@ fn a_shape_too_thin_for_its_voxels_says_so() {
     assert_snapshot!(project.refusal("x.lua --out run"), @"x.lua:6: asset cube: it is 4 mm thick, thinner than a voxel: at resolution 5 they are 10 mm; resolution = 13 would serve");
 }
 
-/// A small world of a floor and whatever `add` puts on it, from line 4 on.
+/// A small scene of a floor and the objects that `add` places on it, from line 4 on.
 fn placed(body: &str, add: &str) -> String {
     let text = format!(
         "local floor = softvt.asset {{ name = 'floor', shape = softvt.shape.box {{ size = {{ 1, 1, 0.05 }} }}:translate(0, 0, -0.025), body = softvt.static {{}} }}\n\
@@ -44,7 +44,7 @@ fn placed(body: &str, add: &str) -> String {
 }
 
 #[test]
-fn objects_that_overlap_at_the_start_are_named_with_depth_and_place() {
+fn overlaps_are_reported_with_depth_and_place() {
     let (rigid, soft) =
         ("softvt.rigid { density = 500 }", "softvt.soft { youngs_pa = 2e4, poisson = 0.3, density = 300 }");
     let floor = "scene:add { name = 'floor', asset = floor, xyz = { 0, 0, 0 } }\n";
@@ -70,7 +70,7 @@ fn objects_that_overlap_at_the_start_are_named_with_depth_and_place() {
 }
 
 #[test]
-fn a_size_in_millimetres_is_taken_for_what_it_is() {
+fn sizes_in_millimetres_are_recognized() {
     let shape = "softvt.shape.box { size = { 40, 40, 40 } }:grounded()";
     let message = Small { shape, ..Small::default() }.project().refusal("x.lua --out run");
     assert!(message.starts_with("x.lua:6: asset cube: it is 40 × 40 × 40 m, about"), "{message}");
@@ -78,7 +78,7 @@ fn a_size_in_millimetres_is_taken_for_what_it_is() {
 }
 
 #[test]
-fn an_object_that_never_settles_is_named() {
+fn unsettled_objects_are_reported() {
     let slope = "softvt.rigid { density = 500 }";
     let add = "local ramp = softvt.asset { name = 'ramp', shape = softvt.shape.box { size = { 9, 1, 0.05 } }:rotate { axis = 'y', angle = 0.1 }, body = softvt.static {} }\n\
                scene:add { name = 'floor', asset = ramp, xyz = { 0, 0, 0 } }\n\
@@ -95,14 +95,14 @@ fn an_object_that_never_settles_is_named() {
 }
 
 #[test]
-fn an_object_that_falls_out_of_the_world_is_told_so() {
+fn falling_objects_are_reported() {
     let project = Small { at: "xyz = { 0, 0.8, 0.1 }", ..Small::default() }.project();
     let message = project.refusal("x.lua --out run");
     assert_snapshot!(message, @"x.lua:6: layout one, episode 0: object cube fell out of the world: there was nothing below it, and after 3 s of settling it is 44.9 m lower; put it above what it is to rest on");
 }
 
 #[test]
-fn an_object_that_starts_inside_of_the_hand_is_told_so() {
+fn objects_inside_of_the_hand_are_reported() {
     let message =
         Small { at: "xyz = { -0.187, 0.03, 0.29 }", ..Small::default() }.project().refusal("x.lua --out run");
     assert!(message.starts_with("x.lua:6: object cube starts inside of the robot's hand ("), "{message}");
@@ -110,7 +110,7 @@ fn an_object_that_starts_inside_of_the_hand_is_told_so() {
 }
 
 #[test]
-fn a_run_whose_first_episode_cannot_be_made_leaves_nothing_in_the_way() {
+fn a_failed_first_episode_leaves_no_folder() {
     let project = Small { at: "xyz = { 0, 0.8, 0.1 }", ..Small::default() }.project();
     project.refusal("x.lua --out run");
     assert!(!project.path("run").exists());
@@ -119,11 +119,11 @@ fn a_run_whose_first_episode_cannot_be_made_leaves_nothing_in_the_way() {
 }
 
 #[test]
-fn an_expert_that_commands_a_pose_out_of_reach_is_told_where_and_by_how_much() {
+fn unreachable_poses_are_reported_with_their_distance() {
     let message = expert("\n  arm:move_to(softvt.pose { xyz = { 2, 0, 0.3 } }, { speed = 1 })");
     let (place, rest) = message.split_once("no nearer to (").expect("a pose");
     assert_eq!(place, "x.lua: task 0, episode 0: x.lua:13: unreachable pose: the tool gets ");
-    // The straight way to x = 2 m: the hand was sent farther than the arm's 0.855 m from the shoulder.
+    // On the straight path to x = 2 m the hand leaves the reach of the arm, 0.855 m from the shoulder.
     let (x, rest) = rest.split_once(',').expect("coordinates");
     let x: f64 = x.parse().expect("a number");
     let (_, miss) = rest.split_once("than ").expect("a distance");
@@ -133,7 +133,7 @@ fn an_expert_that_commands_a_pose_out_of_reach_is_told_where_and_by_how_much() {
 }
 
 #[test]
-fn a_pose_out_of_reach_is_noticed_after_the_expert_is_done_and_inside_of_pcall() {
+fn unreachable_poses_are_detected_inside_of_pcall() {
     let sent = expert("arm:command(softvt.pose { xyz = { 2, 0, 0.3 } }, 0)");
     assert!(sent.starts_with(
         "x.lua: task 0, episode 0: x.lua: unreachable pose: the tool gets no nearer to (2.000,"
@@ -143,7 +143,7 @@ fn a_pose_out_of_reach_is_noticed_after_the_expert_is_done_and_inside_of_pcall()
 }
 
 #[test]
-fn poses_within_reach_are_not_complained_about_however_fast() {
+fn fast_motions_within_reach_are_accepted() {
     let way = "for _, y in ipairs { -0.3, 0.3, -0.3 } do\n\
                arm:move_to(softvt.pose { xyz = { 0.05, y, 0.2 }, yaw = y }, { speed = 3, turn = 6 })\nend";
     let project = Small { expert: way, task: "budget_steps = 120", ..Small::default() }.project();
@@ -151,14 +151,14 @@ fn poses_within_reach_are_not_complained_about_however_fast() {
 }
 
 #[test]
-fn an_experts_mistakes_have_their_line() {
+fn errors_of_experts_have_their_line() {
     assert_snapshot!(expert("\n  arm:move_too()"), @r#"x.lua: task 0, episode 0: x.lua:13: arm: unknown key "move_too"; did you mean "move_to"?"#);
     assert_snapshot!(expert("\n  arm:close_to(2)"), @"x.lua: task 0, episode 0: x.lua:13: arm:close_to: closure: expected a number in 0..1, got 2");
     assert_snapshot!(expert("\n\n  scene:object 'cub'"), @r#"x.lua: task 0, episode 0: x.lua:14: scene: unknown object "cub"; did you mean "cube"?"#);
 }
 
 #[test]
-fn what_a_script_says_cannot_command_the_terminal() {
+fn control_characters_of_scripts_are_escaped() {
     let text = Small::default().text().replace("prompt = \"wait\"", "prompt = \"wait\\27[2Jfor it\"");
     let project = crate::support::Project::new(&[("x.lua", &format!("print('\\27]0;mine\\7')\n{text}"))]);
     let said = project.succeeds("x.lua --policy noop --out run");
@@ -173,7 +173,7 @@ fn what_a_script_says_cannot_command_the_terminal() {
 }
 
 #[test]
-fn huge_numbers_are_told_in_short() {
+fn huge_numbers_are_printed_briefly() {
     let message = Small { material: "youngs_pa = -1e300, poisson = 0.3, density = 300", ..Small::default() };
     assert!(message.project().refusal("x.lua --out run").ends_with("got -1e300"));
     let setting = Small::default().project().refusal("x.lua --out run --set physics.dt=1e300");

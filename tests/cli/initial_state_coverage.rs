@@ -1,5 +1,5 @@
-//! Start states: wide enough, and the same for both tasks of a mirrored pair. Seen through the library, as the settled
-//! scene itself is the claim.
+//! Initial states cover their ranges, and are equal for both tasks of a mirrored pair. Tested through the library, since
+//! the claim is about the settled scene.
 
 use std::{path::Path, sync::Arc};
 
@@ -13,7 +13,7 @@ use softvt::{
 use crate::support::SPATIAL_SOFT;
 
 const LAYOUTS: u64 = 40;
-/// Where the first layout puts the two instances, m, and the arm's start posture, rad (facts/ecosystem.md 0.6).
+/// Positions of the two instances in the first layout, m, and the initial posture of the arm, rad.
 const PLACES: [(&str, f64, f64); 2] = [("left", -0.05, -0.19), ("right", -0.05, 0.19)];
 
 fn loaded() -> Loaded {
@@ -32,7 +32,7 @@ fn scene(loaded: &Loaded, task: usize, episode: u64, base_seed: u64) -> Scene {
     Episode::open(loaded, &request).expect("the episode opens").scene
 }
 
-/// Offsets of position (m) and turns (rad) of both instances, and joint angles, over many layouts.
+/// Position offsets (m) and yaw angles (rad) of both instances, and joint angles, over many layouts.
 struct Spread {
     offsets: [Vec<f64>; 2],
     turns: Vec<f64>,
@@ -56,7 +56,7 @@ impl Spread {
         spread
     }
 
-    /// The standard deviation of the joints, each about its own mean, rad.
+    /// Standard deviation of the joint angles, each about its own mean, rad.
     fn sigma(&self) -> f64 {
         let n = self.joints.len() as f64;
         let variance = |joint: usize| {
@@ -66,7 +66,7 @@ impl Spread {
         ((0..7).map(variance).sum::<f64>() / 7.0).sqrt()
     }
 
-    /// As if everything had been spread `share` times as far.
+    /// The sample with all offsets scaled by `share`.
     fn scaled(&self, share: f64) -> Self {
         let all = |list: &Vec<f64>| list.iter().map(|x| x * share).collect();
         let mean =
@@ -88,7 +88,7 @@ impl Spread {
     }
 }
 
-/// Whether both ends come at least to `least`, and none goes beyond `most`.
+/// True if both extremes reach `least` and neither exceeds `most`.
 fn spans(values: &[f64], least: f64, most: f64) -> bool {
     let (low, high) = values.iter().fold((0f64, 0f64), |(low, high), v| (low.min(*v), high.max(*v)));
     low <= -least && high >= least && low >= -most - 1e-12 && high <= most + 1e-12
@@ -106,7 +106,7 @@ fn start_states_spread_over_20_mm_30_degrees_and_a_fiftieth_of_a_radian() {
         ends(&spread.turns),
         spread.sigma()
     );
-    // The rule must be able to say no.
+    // The criterion must reject other distributions.
     assert!(!spread.scaled(0.75).is_as_promised());
     assert!(!spread.scaled(1.25).is_as_promised());
 }

@@ -1,9 +1,9 @@
-//! Experts that give up say why, in the record and in the results.
+//! Experts that give up leave their reason in the record and in the results.
 
 use crate::support::Small;
 
 #[test]
-fn the_reason_for_giving_up_is_in_the_record_and_in_the_results() {
+fn the_reason_of_give_up_is_recorded() {
     let project = Small { expert: "arm:wait(0.1) arm:give_up('too slippery')", ..Small::default() }.project();
     let said = project.succeeds("x.lua --episodes 2 --out run");
     assert!(
@@ -22,7 +22,7 @@ fn the_reason_for_giving_up_is_in_the_record_and_in_the_results() {
 }
 
 #[test]
-fn who_does_not_give_up_has_no_reason() {
+fn without_give_up_there_is_no_reason() {
     let project = Small::default().project();
     let said = project.succeeds("x.lua --out run");
     assert!(!said.out.contains("gave up") && !said.err.contains("gave up"), "{}", said.out);

@@ -1,5 +1,5 @@
-//! Exports to LeRobot: each row is what a policy is sent at that step, nothing depends on threads, and what cannot be exported
-//! is told.
+//! `softvt dataset export`: rows are the inputs of a policy, results do not depend on threads, and invalid exports are
+//! reported.
 
 use std::{
     fs::{self, File},
@@ -18,7 +18,7 @@ use crate::{
     support::{Project, SOLIDS},
 };
 
-/// A cube rests on its slab while the fingers close on a block that stands on a pillar between them.
+/// A cube rests on its slab while the fingers close on a block on a pillar.
 const SUITE: &str = r#"
 local solids = require "solids"
 local pillar = solids.solid("pillar", { 0.03, 0.03, 0.26 }, softvt.static {})
@@ -54,7 +54,7 @@ fn field<'a>(row: &'a Row, name: &str) -> &'a Field {
     found.unwrap_or_else(|| panic!("no {name}")).1
 }
 
-/// Numbers of nested lists, in order.
+/// Flattens nested lists of numbers.
 fn numbers(field: &Field) -> Vec<f32> {
     match field {
         Field::Float(x) => vec![*x],
@@ -70,7 +70,7 @@ fn whole(field: &Field) -> i64 {
     }
 }
 
-/// Bytes of the pixels of a PNG file.
+/// Decodes the pixels of a PNG file.
 fn pixels(field: &Field) -> Vec<u8> {
     let Field::Group(group) = field else { panic!("no picture: {field:?}") };
     let bytes = group.get_column_iter().find(|(name, _)| *name == "bytes").map(|(_, bytes)| bytes.clone());
@@ -78,7 +78,7 @@ fn pixels(field: &Field) -> Vec<u8> {
     image::load_from_memory(bytes.data()).expect("a PNG file").to_rgb8().into_raw()
 }
 
-/// The bytes of an array as clients get it.
+/// The bytes of an array as clients receive it.
 fn sent(observation: &Value, name: &str) -> Vec<u8> {
     let entries = get(observation, name).as_map().expect("an array");
     let data =
@@ -91,7 +91,7 @@ fn floats(bytes: &[u8]) -> Vec<f32> {
 }
 
 #[test]
-fn a_row_is_what_a_policy_is_sent_at_its_step() {
+fn rows_are_the_inputs_of_a_policy() {
     let project = project();
     project.succeeds("record x.lua --task 0 --demos 1 --out data");
     project.succeeds("dataset export data --format lerobot-v2.1 --out out");
@@ -115,7 +115,7 @@ fn a_row_is_what_a_policy_is_sent_at_its_step() {
             assert!(pixels(field(row, name)) == sent(observation, name), "{name} at step {step}");
         }
         assert_eq!(numbers(field(row, "state")), floats(&sent(observation, "state")), "step {step}");
-        // Of nine states a row keeps the initial one and the last two.
+        // A row keeps the initial state and the last two of nine.
         let markers = floats(&sent(observation, "tactile_marker_motion"));
         let kept: Vec<f32> = [0, 7, 8].into_iter().flat_map(|i| markers[396 * i..][..396].to_vec()).collect();
         assert_eq!(numbers(field(row, "tactile_marker_motion")), kept, "step {step}");
@@ -130,7 +130,7 @@ fn a_row_is_what_a_policy_is_sent_at_its_step() {
 }
 
 #[test]
-fn both_versions_hold_the_same_rows_whatever_the_threads() {
+fn both_versions_have_the_same_rows() {
     let project = project();
     project.succeeds("record x.lua --demos 2 --out data --no-privileged");
     let said = project.succeeds("dataset export data --format lerobot-v2.1 --out a --threads 1").out;
@@ -167,7 +167,7 @@ fn both_versions_hold_the_same_rows_whatever_the_threads() {
 }
 
 #[test]
-fn what_cannot_be_exported_is_told_and_nothing_is_left() {
+fn invalid_exports_are_refused_and_leave_nothing() {
     let project = project();
     project.succeeds("record x.lua --task 0 --demos 1 --out data");
     project.succeeds("record x.lua --task 0 --demos 1 --images video --out plain");

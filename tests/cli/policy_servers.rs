@@ -1,4 +1,4 @@
-//! Policy servers of every temper: what a run does about them, and that nothing finished is lost.
+//! Policy servers that answer, fail, hang or die: errors are reported and finished episodes are kept.
 
 use std::{
     io::Write,
@@ -13,7 +13,7 @@ use crate::support::{Project, Said, Small};
 
 type Socket = WebSocket<TcpStream>;
 
-/// A server that serves each of `visits` connections by `serve`, which gets their number; its address.
+/// Starts a server that handles `visits` connections with `serve`, which gets their number. Returns its address.
 fn server(visits: usize, serve: impl Fn(usize, Socket) + Send + 'static) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     let address = format!("ws://{}", listener.local_addr().expect("an address"));
@@ -37,7 +37,7 @@ fn text(name: &str) -> Value {
     Value::from(name)
 }
 
-/// An array with keys of type bin, as openpi writes it.
+/// An array with keys of type bin, as openpi encodes it.
 fn array(dtype: &str, shape: &[usize], data: Vec<u8>) -> Value {
     let key = |name: &str| Value::Binary(name.as_bytes().to_vec());
     Value::Map(vec![
@@ -53,7 +53,7 @@ fn actions(rows: usize, row: [f32; 7]) -> Value {
     Value::Map(vec![(text("actions"), array("<f4", &[rows, 7], numbers))])
 }
 
-/// The state that an observation shows.
+/// The robot state of an observation.
 fn state(observation: &Value) -> Vec<f32> {
     let of = |map: &Value, key: &[u8]| -> Value {
         let found = map.as_map().expect("a map").iter().find(|(k, _)| match k {
@@ -74,7 +74,7 @@ fn observation(socket: &mut Socket) -> Option<Value> {
     }
 }
 
-/// Greets as openpi does and answers each observation by what `reply` makes of its number and it.
+/// Sends the metadata of openpi and replies to each observation with `reply` of its number and content.
 fn answering(mut socket: Socket, reply: impl Fn(usize, &Value) -> Option<Message>) {
     let _ = socket.send(packed(&Value::Map(Vec::new())));
     let mut count = 0;
@@ -104,7 +104,7 @@ fn run(project: &Project, address: &str, words: &str) -> Said {
     ))
 }
 
-/// A run that must fail for its server: what it says.
+/// The message of a run that must fail because of its server.
 fn fails(address: &str, words: &str) -> String {
     let project = project();
     let said = run(&project, address, words);
@@ -115,7 +115,7 @@ fn fails(address: &str, words: &str) -> String {
 }
 
 #[test]
-fn a_server_is_asked_once_a_chunk_and_its_actions_are_carried_out() {
+fn one_request_is_sent_per_chunk() {
     let asked = std::sync::Arc::new(std::sync::atomic::AtomicUsize::new(0));
     let count = asked.clone();
     let address = server(9, move |_, socket| {
@@ -127,7 +127,7 @@ fn a_server_is_asked_once_a_chunk_and_its_actions_are_carried_out() {
     let project = project();
     let said = run(&project, &address, "--episodes 2 --replan 5");
     assert_eq!(said.code, 0, "{}", said.err);
-    // Twelve steps in chunks of five are three questions; two episodes on one connection.
+    // Twelve steps in chunks of five are three requests; two episodes use one connection.
     assert_eq!(asked.load(std::sync::atomic::Ordering::Relaxed), 6);
     let info = project.json("run/run.json");
     assert_eq!((info["policy"].as_str(), info["replan"].as_u64()), (Some("vision"), Some(5)));
@@ -137,13 +137,13 @@ fn a_server_is_asked_once_a_chunk_and_its_actions_are_carried_out() {
 }
 
 #[test]
-fn pings_are_answered_and_a_connection_closed_while_idle_is_reopened() {
+fn closed_idle_connections_are_reopened() {
     let pongs = std::sync::Arc::new(std::sync::atomic::AtomicUsize::new(0));
     let count = pongs.clone();
     let address = server(9, move |_, mut socket| {
         let _ = socket.send(packed(&Value::Map(Vec::new())));
         let first = observation(&mut socket).expect("a question");
-        // What comes together is there when the next question is asked.
+        // Both frames are received before the next request.
         let _ = socket.write(hold(&first, 50));
         let _ = socket.write(Message::Ping("still there?".into()));
         let _ = socket.flush();
@@ -163,7 +163,7 @@ fn pings_are_answered_and_a_connection_closed_while_idle_is_reopened() {
 }
 
 #[test]
-fn a_server_that_is_not_there_is_told() {
+fn missing_servers_are_reported() {
     let free = TcpListener::bind("127.0.0.1:0").expect("a port").local_addr().expect("an address");
     let said = fails(&format!("ws://{free}"), "--policy-timeout 0.3");
     assert!(
@@ -173,7 +173,7 @@ fn a_server_that_is_not_there_is_told() {
 }
 
 #[test]
-fn addresses_that_are_none_are_the_users_input() {
+fn invalid_addresses_are_input_errors() {
     let project = project();
     for (address, words) in [
         ("wss://host:1", "use a tunnel"),
@@ -190,7 +190,7 @@ fn addresses_that_are_none_are_the_users_input() {
 }
 
 #[test]
-fn a_server_that_hangs_is_not_waited_for_for_ever() {
+fn hanging_servers_time_out() {
     let address = server(9, |_, mut socket| {
         let _ = socket.send(packed(&Value::Map(Vec::new())));
         let _ = observation(&mut socket);
@@ -198,7 +198,7 @@ fn a_server_that_hangs_is_not_waited_for_for_ever() {
     });
     let said = fails(&address, "--policy-timeout 0.5");
     assert!(said.contains("did not answer within 0.5 s"), "{said}");
-    // One that takes the connection and never says anything.
+    // A server that accepts the connection and never responds.
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     let silent = format!("ws://{}", listener.local_addr().expect("an address"));
     let said = fails(&silent, "--policy-timeout 0.5");
@@ -206,7 +206,7 @@ fn a_server_that_hangs_is_not_waited_for_for_ever() {
 }
 
 #[test]
-fn what_a_server_says_of_its_own_failure_is_shown() {
+fn error_messages_of_servers_are_shown() {
     let address = server(9, |_, socket| {
         answering(socket, |_, _| {
             Some(Message::text("Traceback (most recent call last):\nValueError: bad key"))
@@ -217,7 +217,7 @@ fn what_a_server_says_of_its_own_failure_is_shown() {
 }
 
 #[test]
-fn replies_that_are_no_chunks_are_told() {
+fn malformed_replies_are_reported() {
     let of = |value: Value| Value::Map(vec![(text("actions"), value)]);
     let floats = |n: usize| vec![0; 4 * n];
     for (reply, words) in [
@@ -240,7 +240,7 @@ fn replies_that_are_no_chunks_are_told() {
 }
 
 #[test]
-fn a_reply_of_a_gigabyte_is_refused_before_it_is_read() {
+fn huge_replies_are_refused_unread() {
     let address = server(9, |_, mut socket| {
         let _ = socket.send(packed(&Value::Map(Vec::new())));
         let _ = observation(&mut socket);
@@ -255,7 +255,7 @@ fn a_reply_of_a_gigabyte_is_refused_before_it_is_read() {
 }
 
 #[test]
-fn a_server_of_another_protocol_is_reported() {
+fn other_protocols_are_reported() {
     let address = server(9, |_, mut socket| {
         let _ = socket.send(packed(&Value::from(7)));
     });
@@ -276,7 +276,7 @@ fn a_server_of_another_protocol_is_reported() {
 }
 
 #[test]
-fn numbers_that_are_none_fail_their_episode_and_no_other() {
+fn nan_replies_fail_only_their_episode() {
     let address = server(9, |_, socket| {
         answering(socket, |count, seen| match count {
             1 => Some(packed(&actions(5, [f32::NAN; 7]))),
@@ -299,7 +299,7 @@ fn numbers_that_are_none_fail_their_episode_and_no_other() {
 }
 
 #[test]
-fn poses_out_of_reach_are_counted() {
+fn unreachable_poses_are_counted() {
     let address = server(9, |_, socket| {
         answering(socket, |_, _| Some(packed(&actions(9, [50.0, 0.0, -3.0, 0.0, 9.0, 0.0, 7.0]))))
     });
@@ -310,7 +310,7 @@ fn poses_out_of_reach_are_counted() {
 }
 
 #[test]
-fn a_server_that_dies_loses_no_finished_episode_and_the_run_goes_on_to_the_same_bytes() {
+fn a_dying_server_loses_no_finished_episode() {
     let whole = project();
     let address = server(9, |_, socket| answering(socket, |_, seen| Some(hold(seen, 50))));
     assert_eq!(run(&whole, &address, "--episodes 3").code, 0);
@@ -326,7 +326,7 @@ fn a_server_that_dies_loses_no_finished_episode_and_the_run_goes_on_to_the_same_
     }
     let again = run(&broken, &address, "--episodes 3");
     assert!(again.code == 0 && again.err.contains("already complete"), "{}", again.err);
-    // Files of finished episodes come back from the actions, without the policy; without actions they are told to be lost.
+    // Files of finished episodes are restored from the actions, without the policy; without actions they are reported as lost.
     let log = "run/softvtbench/task_000/episode_00001/policy_action_debug.jsonl";
     let text = broken.text(log);
     std::fs::remove_file(broken.path(log)).expect("removed");
@@ -340,7 +340,7 @@ fn a_server_that_dies_loses_no_finished_episode_and_the_run_goes_on_to_the_same_
 }
 
 #[test]
-fn profiles_show_what_they_say() {
+fn profiles_determine_the_inputs() {
     let entries = |profile: &str, words: &str| {
         let names = std::sync::Arc::new(std::sync::Mutex::new(Vec::new()));
         let kept = names.clone();
@@ -372,7 +372,7 @@ fn profiles_show_what_they_say() {
 }
 
 #[test]
-fn a_folder_with_lines_of_another_run_is_not_gone_on_with() {
+fn lines_of_another_run_are_refused() {
     let project = project();
     let line = "x.lua --policy noop --episodes 2 --threads 1 --out run";
     project.succeeds(line);

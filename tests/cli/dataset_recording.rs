@@ -1,10 +1,10 @@
-//! Demonstrations from the command line: what is kept, what is refused, and that nothing depends on threads or breaks.
+//! `softvt record`: kept demonstrations, refused folders, and independence of threads and interruptions.
 
 use std::{collections::BTreeMap, fs, path::Path};
 
 use crate::support::{Project, SOLIDS};
 
-/// A rigid cube that stands on a slab, or beside it in some attempts: the goal is reached by waiting, or not at all.
+/// A rigid cube on a slab, or next to it in some attempts. Waiting reaches the goal in the former.
 const SUITE: &str = r#"
 local solids = require "solids"
 local layout = softvt.layout("one", function(scene)
@@ -23,7 +23,7 @@ fn project() -> Project {
     Project::new(&[("x.lua", SUITE), SOLIDS])
 }
 
-/// Every file below a folder, by its path.
+/// All files below a folder by path.
 pub fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut found = BTreeMap::new();
     let mut folders = vec![folder.to_owned()];
@@ -42,7 +42,7 @@ pub fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 }
 
 #[test]
-fn the_first_good_attempts_are_kept_whatever_the_threads_and_wherever_it_was_broken_off() {
+fn the_first_good_attempts_are_kept() {
     let project = project();
     let said = project.succeeds("record x.lua --demos 3 --out a --threads 1").out;
     let card = project.json("a/dataset.json");
@@ -58,7 +58,7 @@ fn the_first_good_attempts_are_kept_whatever_the_threads_and_wherever_it_was_bro
         lines.iter().filter(|line| line["safety"] == true).map(|line| &line["episode"]).collect();
     let manifest = project.lines("a/manifest.jsonl");
     assert_eq!(manifest.iter().map(|line| &line["episode"]).collect::<Vec<_>>(), good);
-    // Too few attempts end it; more of them go on with what is there.
+    // With too few attempts the recording fails; with more it continues.
     let few = project.refusal("record x.lua --demos 3 --out b --threads 3 --attempts 2");
     assert!(few.contains("task 0:") && few.contains("of 3 demonstrations after 2 attempts"), "{few}");
     assert!(project.refusal("dataset check b").contains("was interrupted"));
@@ -70,7 +70,7 @@ fn the_first_good_attempts_are_kept_whatever_the_threads_and_wherever_it_was_bro
 }
 
 #[test]
-fn a_data_set_is_checked_summed_up_and_repeated() {
+fn datasets_are_checked_and_reproduced() {
     let project = project();
     project.succeeds("record x.lua --demos 2 --out a --images video --no-privileged");
     let checked = project.succeeds("dataset check a --replay 2").out;
@@ -82,7 +82,7 @@ fn a_data_set_is_checked_summed_up_and_repeated() {
     assert!(project.refusal("replay a 0/2").contains("no such demonstration"));
     assert!(project.succeeds("dataset stats a").out.contains("length (steps)"));
     assert!(project.text("a/stats.svg").starts_with("<svg"));
-    project.write("a/videos/one_task0/demo_0_eye_in_hand_rgb.mp4", b"no film");
+    project.write("a/videos/one_task0/demo_0_eye_in_hand_rgb.mp4", b"not a video");
     let hdf5 = project.path("a/hdf5/one_task0_demo.hdf5");
     let whole = fs::read(&hdf5).expect("read");
     fs::write(&hdf5, &whole[..whole.len() / 2]).expect("written");
@@ -97,7 +97,7 @@ fn a_data_set_is_checked_summed_up_and_repeated() {
 }
 
 #[test]
-fn a_folder_with_something_else_in_it_is_refused_and_left_alone() {
+fn folders_with_other_files_are_refused() {
     let project = project();
     project.write("mine/meta/info.json", b"{}");
     let said = project.refusal("record x.lua --demos 1 --out mine --resume");

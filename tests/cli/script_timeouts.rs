@@ -1,4 +1,4 @@
-//! Scripts that never end. They are run at once: each waits for the same time limit.
+//! Scripts that never end. They run in parallel, since each takes the whole time limit.
 
 use crate::support::{Project, refusal, said};
 
@@ -18,7 +18,7 @@ const CASES: [(&str, &str, &str); 4] = [
 ];
 
 #[test]
-fn scripts_that_never_end_are_stopped_with_a_message() {
+fn endless_scripts_are_stopped() {
     std::thread::scope(|scope| {
         for (what, text, expected) in CASES {
             scope.spawn(move || {

@@ -1,5 +1,5 @@
-//! What a policy is given when it asks, and that left and right of a prompt are left and right of the picture. Seen through
-//! the library, as the observation itself is the claim.
+//! Observations of policies, and left and right of prompts in the image. Tested through the library, since the claims are
+//! about the observations.
 
 use std::{path::Path, sync::Arc};
 
@@ -28,7 +28,7 @@ fn request(suite: &str, task: usize) -> EpisodeRequest {
     }
 }
 
-/// Keeps what it was shown.
+/// Stores its observations.
 struct RecordingPolicy {
     streams: SensorStreams,
     seen: Vec<Observation>,
@@ -50,7 +50,7 @@ impl Policy for &mut RecordingPolicy {
     }
 }
 
-/// What a policy that asks for `streams` sees in a short episode of a project, and the record; or why not.
+/// Observations of a policy with `streams` in a short episode of a project, and the record, or the error.
 fn played(project: &Project, streams: SensorStreams) -> Result<(Vec<Observation>, EpisodeRecord), String> {
     let loaded = script::load(&project.path("x.lua"), &[]).expect("it loads");
     let Plan::Suite(suite) = &loaded.plan else { panic!("a suite") };
@@ -74,13 +74,13 @@ fn short() -> Small {
     Small { task: "budget_steps = 10", ..Small::default() }
 }
 
-/// What a policy that asks for `streams` sees, or why not.
+/// Observations of a policy with `streams`, or the error.
 fn shown(streams: SensorStreams) -> Result<Vec<Observation>, String> {
     played(&short().project(), streams).map(|(seen, _)| seen)
 }
 
 #[test]
-fn a_policy_gets_the_streams_it_asks_for_and_no_others() {
+fn policies_get_the_requested_streams_only() {
     let all =
         SensorStreams { cameras: vec!["wrist".into(), "third_person".into()], touch: true, force: true };
     let seen = shown(all.clone()).expect("shown");
@@ -111,7 +111,7 @@ fn a_policy_gets_the_streams_it_asks_for_and_no_others() {
 }
 
 #[test]
-fn results_say_whether_the_policy_saw_true_forces() {
+fn results_record_whether_true_forces_were_observed() {
     for force in [false, true] {
         let streams = SensorStreams { force, ..SensorStreams::default() };
         let (seen, record) = played(&short().project(), streams).expect("played");
@@ -134,8 +134,8 @@ fn with(lines: &str) -> Project {
 }
 
 #[test]
-fn a_camera_that_something_is_around_shows_what_is_beyond_and_is_counted() {
-    // In the cube, on its way to the floor below and the robot behind; the batch would have refused it.
+fn steps_with_an_enclosed_camera_are_counted() {
+    // Inside of the cube, with the floor and the robot behind it. A run of `softvt` refuses such a scene.
     let camera =
         "scene:add_camera { name = \"mole\", position = { 0, 0.1, 0.02 }, look_at = { -1, 0.1, 0.2 } }";
     let streams = SensorStreams { cameras: vec!["mole".into(), "wrist".into()], ..SensorStreams::default() };
@@ -150,7 +150,7 @@ fn a_camera_that_something_is_around_shows_what_is_beyond_and_is_counted() {
 }
 
 #[test]
-fn senses_that_cannot_be_are_told_before_the_episode_with_the_line_that_set_them() {
+fn invalid_sensors_are_reported_with_their_line() {
     for (lines, words) in [
         (
             "scene:camera(\"wrist\").near = 30",
@@ -166,7 +166,7 @@ fn senses_that_cannot_be_are_told_before_the_episode_with_the_line_that_set_them
         ),
     ] {
         let project = with(lines);
-        // Nobody looks, and still it is wrong; the library tells it as the program does, which has run nothing then.
+        // The scene is not valid even if no policy uses the sensor. The library reports the same error as the program.
         let message = played(&project, SensorStreams::default()).expect_err(words);
         assert!(message.contains(words), "{message}");
         let message = project.refusal("x.lua --episodes 3 --out run");
@@ -177,7 +177,7 @@ fn senses_that_cannot_be_are_told_before_the_episode_with_the_line_that_set_them
 }
 
 #[test]
-fn an_unknown_stream_is_named() {
+fn unknown_streams_are_named() {
     let streams = SensorStreams { cameras: vec!["agentview".into()], ..SensorStreams::default() };
     let message = shown(streams).expect_err("no such camera");
     assert!(
@@ -191,7 +191,7 @@ fn loaded() -> Loaded {
 }
 
 #[test]
-fn left_and_right_of_all_ten_prompts_are_those_of_the_picture() {
+fn left_and_right_are_those_of_the_image() {
     let loaded = loaded();
     let Plan::Suite(suite) = &loaded.plan else { panic!("a suite") };
     let (settings, rests, looks) = (Settings::default(), AssetCache::default(), SensorAssets::default());
@@ -221,7 +221,7 @@ fn left_and_right_of_all_ten_prompts_are_those_of_the_picture() {
 #[test]
 fn an_observation_has_no_field_for_hidden_state() {
     let observation = shown(SensorStreams::default()).expect("shown").swap_remove(0);
-    // Every field by name: a new one must be added here, and be no secret.
+    // Every field by name, so that a new one must be added here; none may be hidden state.
     let Observation {
         time_s: _,
         ee_position_b: _,

@@ -1,10 +1,10 @@
-//! What the fingers feel in a grasp: nothing before it, gravity after it, and no drift in between.
+//! Tactile readings of a grasp: zero before it, gravity after lifting, and no drift in between.
 
 use serde_json::Value;
 
 use crate::support::Project;
 
-/// A block is gripped at a closure, lifted and held; rows of both fingers at each stage.
+/// Grips a block at a closure, lifts and holds it. Returns rows of both fingers at each stage.
 const HOLD: &str = r#"local block = softvt.asset {
   name = "block", shape = softvt.shape.box { size = { 0.06, 0.04, 0.05 } }:grounded(), body = BODY,
 }
@@ -72,7 +72,7 @@ fn check(rows: &[Value], weight_n: f64) {
         assert!(number(gripped[side], "depth_mm") > 0.01 && number(gripped[side], "most") > 0.1);
         let pull = |row: &Value| row["force"][0].as_f64().expect("a number");
         carried -= pull(held[side]);
-        // Gravity pulls along the fingers to their tips: to the left in both pictures.
+        // Gravity acts along the fingers towards their tips: to the left in both images.
         let moved = number(lifted[side], "x") - number(gripped[side], "x");
         let pulled = pull(lifted[side]) - pull(gripped[side]);
         assert!(pulled < -0.2 * weight_n && moved < 0.3 * pulled, "{moved} px for {pulled} N");
@@ -85,13 +85,13 @@ fn check(rows: &[Value], weight_n: f64) {
 }
 
 #[test]
-fn a_hard_block_presses_pulls_down_and_does_not_drift() {
+fn rigid_blocks_press_without_drift() {
     let rows = rows("softvt.rigid { density = 1700 }", "0.53", "nil");
     check(&rows, 0.06 * 0.04 * 0.05 * 1700.0 * 9.81);
 }
 
 #[test]
-fn a_soft_block_does_too() {
+fn soft_blocks_press_without_drift() {
     let rows = rows("softvt.soft { youngs_pa = 8e4, poisson = 0.35, density = 900 }", "0.58", "nil");
     check(&rows, 0.06 * 0.04 * 0.05 * 900.0 * 9.81);
 }

@@ -1,5 +1,5 @@
-//! Somebody else's scorer, written from the released one's rules: it reads what a run leaves under `softvtbench/` and must
-//! come to the same.
+//! An independent scorer, written from the rules of the released one. It reads `softvtbench/` of a run and must compute the
+//! same rates.
 
 use std::{collections::BTreeMap, fs, path::Path};
 
@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::support::{Project, SPATIAL_SOFT};
 
-/// An episode as its log says.
+/// An episode according to its log.
 struct Episode {
     task: u64,
     episode: u64,
@@ -32,7 +32,7 @@ impl Episode {
         self.d_peak.zip(self.tau).map(|(d, tau)| d <= tau)
     }
 
-    /// As a row of its table, without the reason.
+    /// The row of the table, without the reason.
     fn row(&self, rigid: bool) -> String {
         let number = |x: Option<f64>| x.map_or_else(String::new, |x| format!("{x:.6}"));
         let truth = |x: Option<bool>| x.map_or("", |x| if x { "True" } else { "False" });
@@ -43,7 +43,7 @@ impl Episode {
     }
 }
 
-/// Every log below a folder, by path.
+/// All logs below a folder by path.
 fn logs(dir: &Path, found: &mut Vec<String>) {
     let mut inner: Vec<_> =
         fs::read_dir(dir).expect("a folder").filter_map(|e| Some(e.ok()?.path())).collect();
@@ -59,7 +59,7 @@ fn logs(dir: &Path, found: &mut Vec<String>) {
 
 fn scored(text: &str, taus: &BTreeMap<String, f64>, metric: &str) -> Episode {
     let rows: Vec<Value> = text.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
-    let last = rows.last().expect("a row an episode at least");
+    let last = rows.last().expect("at least one row per episode");
     for (i, row) in rows.iter().enumerate() {
         assert_eq!(row["frame"], i);
         let known = row["fem_deformation_known"].as_bool().expect("a truth");
@@ -82,7 +82,7 @@ fn scored(text: &str, taus: &BTreeMap<String, f64>, metric: &str) -> Episode {
     }
 }
 
-/// Scores a run folder as strangers would, and compares with what stands there; Goal and Safe Success in %.
+/// Scores a run folder and compares with its files. Returns Goal and Safe Success in %.
 fn agrees(project: &Project, run: &str, rigid: bool) -> [f64; 2] {
     let file = |name: &str| format!("{run}/softvtbench/{name}");
     let thresholds = project.json(&file("thresholds.json"));
@@ -121,7 +121,7 @@ fn agrees(project: &Project, run: &str, rigid: bool) -> [f64; 2] {
 }
 
 #[test]
-fn a_strangers_scorer_comes_to_our_rates() {
+fn an_external_scorer_computes_the_same_rates() {
     let project = Project::new(&[]);
     for (policy, goal, safe) in [("expert", 100.0, 100.0), ("expert-binary", 100.0, 0.0), ("noop", 0.0, 0.0)]
     {

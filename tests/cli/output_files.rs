@@ -1,4 +1,4 @@
-//! What is listed and what is written.
+//! Lists, `init`, `doctor`, and the files of runs.
 
 use serde_json::Value;
 
@@ -11,7 +11,7 @@ fn has(value: &Value, keys: &[&str]) {
 }
 
 #[test]
-fn what_there_is_is_listed_as_text_and_as_json_in_any_folder() {
+fn lists_are_printed_as_text_and_as_json() {
     let project = Project::new(&[]);
     let json = |what: &str| -> Vec<Value> {
         serde_json::from_str(&project.succeeds(&format!("list {what} --json")).out).expect("JSON")
@@ -45,7 +45,7 @@ fn what_there_is_is_listed_as_text_and_as_json_in_any_folder() {
 }
 
 #[test]
-fn init_writes_stubs_and_leaves_a_settings_file_of_ones_own_alone() {
+fn init_keeps_an_existing_settings_file() {
     let project = Project::new(&[]);
     project.succeeds("init new/folder");
     assert!(project.text("new/folder/library/softvt.d.lua").starts_with("---@meta softvt"));
@@ -61,7 +61,7 @@ fn init_writes_stubs_and_leaves_a_settings_file_of_ones_own_alone() {
 }
 
 #[test]
-fn a_run_writes_all_that_is_needed_to_repeat_and_to_read_it() {
+fn a_run_writes_all_its_files() {
     let project = Small { expert: "arm:wait(5)", ..Small::default() }.project();
     let said = project.succeeds("x.lua --out run --episodes 2 --seed 7 --json");
     let run = project.json("run/run.json");
@@ -90,7 +90,7 @@ fn a_run_writes_all_that_is_needed_to_repeat_and_to_read_it() {
 }
 
 #[test]
-fn a_run_is_also_written_in_the_fields_of_softvtbench() {
+fn a_run_has_the_files_of_softvtbench() {
     let project = Small::default().project();
     project.succeeds("x.lua --out run --policy noop");
     let csv = project.text("run/softvtbench/episodes.csv");
@@ -104,7 +104,7 @@ fn a_run_is_also_written_in_the_fields_of_softvtbench() {
 }
 
 #[test]
-fn a_trace_has_a_line_for_every_control_step_and_nodes_if_asked_for() {
+fn a_trace_has_one_line_per_control_step() {
     let project = Small::default().project();
     project.succeeds("x.lua --out plain");
     assert!(!project.path("plain/trace").exists());
@@ -128,7 +128,7 @@ fn a_trace_has_a_line_for_every_control_step_and_nodes_if_asked_for() {
 }
 
 #[test]
-fn a_folder_that_cannot_be_written_or_holds_a_run_is_refused_and_left_alone() {
+fn unsuitable_output_folders_are_refused() {
     let project = Small::default().project();
     project.write("file", b"mine");
     assert!(project.refusal("x.lua --out file").starts_with("x.lua: cannot make the folder file: "));
@@ -153,7 +153,7 @@ fn without_out_runs_are_numbered() {
 }
 
 #[test]
-fn the_standard_suite_says_which_sources_and_thresholds_it_ran_with() {
+fn run_files_record_sources_and_thresholds() {
     let project = Project::new(&[]);
     project.succeeds(&format!("{SPATIAL_SOFT} --policy noop --task 8 --episodes 1 --out run"));
     let run = project.json("run/run.json");
@@ -169,7 +169,7 @@ fn the_standard_suite_says_which_sources_and_thresholds_it_ran_with() {
     assert!(run["thresholds"]["sesame_bun"].as_f64().is_some_and(|tau| tau > 0.0));
 }
 
-/// A suite whose cube is soft and has the name of a calibrated object, and that object's calibration.
+/// A suite with a soft cube that has the name of a calibrated object, and the calibration of that object.
 fn impostor(fingerprint: &str) -> Project {
     let project = Small::default().project();
     let file = format!(
@@ -183,7 +183,7 @@ fn impostor(fingerprint: &str) -> Project {
 }
 
 #[test]
-fn the_limit_of_another_object_of_the_same_name_does_not_count() {
+fn limits_of_other_versions_are_ignored() {
     let said = impostor("0123456789abcdef").succeeds("x.lua --policy noop --out run");
     assert!(
         said.err.contains("assets/calibration/cube.json was computed for a different version of \"cube\""),
@@ -209,7 +209,7 @@ end }
 }
 
 #[test]
-fn several_suites_are_one_document_and_must_differ_in_name() {
+fn several_suites_are_one_json_document() {
     let one = Small { task: "budget_steps = 1", ..Small::default() }.text();
     let two = |name: &str| {
         let other = one.replace("name = \"one\", object_type", &format!("name = \"{name}\", object_type"));
@@ -226,7 +226,7 @@ fn several_suites_are_one_document_and_must_differ_in_name() {
 
 #[cfg(unix)]
 #[test]
-fn a_scripts_files_do_not_follow_links_out_of_the_folder() {
+fn files_of_scripts_do_not_follow_links() {
     let script = r#"return softvt.experiment { name = "e", grid = { x = { 1 } }, run = function() return { x = 1 } end,
       finish = function() return { files = { ["deep/stolen.txt"] = "mine" } } end }"#;
     let project = Project::new(&[("x.lua", script), ("elsewhere/kept.txt", ""), ("run/kept.txt", "")]);
@@ -238,7 +238,7 @@ fn a_scripts_files_do_not_follow_links_out_of_the_folder() {
 }
 
 #[test]
-fn init_task_says_what_to_run_from_where_it_was_called() {
+fn init_task_prints_the_next_commands() {
     let project = Project::new(&[]);
     for (words, suite) in
         [("init task", "suites/my_suite.lua"), ("init task deep/mine", "deep/mine/suites/my_suite.lua")]
@@ -250,7 +250,7 @@ fn init_task_says_what_to_run_from_where_it_was_called() {
 }
 
 #[test]
-fn a_golden_episode_that_ends_otherwise_is_a_failure() {
+fn doctor_fails_on_another_golden_state() {
     let project = Project::new(&[("suites/spatial_soft.lua", &Small::default().text())]);
     let said = project.softvt("doctor");
     assert_eq!(said.code, 1, "{}", said.err);
@@ -263,7 +263,7 @@ fn a_golden_episode_that_ends_otherwise_is_a_failure() {
 }
 
 #[test]
-fn the_golden_episode_is_the_published_one() {
+fn the_golden_episode_matches_the_published_one() {
     let said = Project::new(&[]).succeeds("doctor");
     assert!(said.out.contains("matches"), "{}", said.out);
 }

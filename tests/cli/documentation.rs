@@ -1,5 +1,5 @@
-//! What the documents promise: their files are written into an empty folder and their commands run there, in the order in
-//! which they stand on the page; and pages that are made are what the binary makes.
+//! Validity of the documentation. Files of a page are written into an empty folder and its commands run there in order;
+//! generated pages must be current.
 
 use std::{path::Path, time::Duration};
 
@@ -7,7 +7,7 @@ use softvt::{evaluation::envelope_plot::plot, evaluation::thresholds::ThresholdF
 
 use crate::support::{Project, Said, said};
 
-/// A fenced block: the words after its backticks, and what is in it.
+/// A fenced block: its info string and its content.
 struct Fence {
     info: String,
     text: String,
@@ -34,7 +34,7 @@ fn fences(page: &str) -> Vec<Fence> {
 }
 
 impl Fence {
-    /// Where a complete file goes.
+    /// Path of a complete file.
     fn file(&self) -> Option<&str> {
         self.info.strip_prefix("lua file=")
     }
@@ -46,7 +46,7 @@ impl Fence {
     }
 }
 
-/// Fewer episodes and trials than a person would run.
+/// The command with fewer episodes and trials.
 fn shortened(command: &str) -> String {
     let (script, _) = command.split_once(' ').unwrap_or((command, ""));
     match script {
@@ -56,7 +56,7 @@ fn shortened(command: &str) -> String {
     }
 }
 
-/// Runs what must succeed; drawing a video may take long where others work too.
+/// Runs a command that must succeed. The timeout allows for rendering on a busy machine.
 fn runs(project: &Project, words: &str) -> Said {
     let mut command = project.command(words);
     command.timeout(Duration::from_secs(600));
@@ -73,7 +73,7 @@ fn safety(said: &str) -> f64 {
 }
 
 #[test]
-fn a_newcomer_gets_from_nothing_to_a_safe_suite_by_the_page() {
+fn the_tutorial_leads_to_a_safe_suite() {
     let project = Project::new(&[]);
     let (mut files, mut rates, mut commands) = (0, Vec::new(), 0);
     for fence in fences("docs/write-a-task.md") {
@@ -82,14 +82,14 @@ fn a_newcomer_gets_from_nothing_to_a_safe_suite_by_the_page() {
             files += 1;
             continue;
         }
-        assert!(fence.info == "sh", "a fence of {:?}: say which file it is", fence.info);
+        assert!(fence.info == "sh", "a fence of {:?}: name its file", fence.info);
         for command in fence.commands() {
             commands += 1;
             let said = runs(&project, &shortened(command));
             if command.starts_with("suites/bricks.lua") {
                 rates.push(safety(&said.out));
             }
-            // The next command writes one of that name.
+            // The next command writes a folder of the same name.
             let _ = std::fs::remove_dir_all(project.path("run"));
         }
     }
@@ -111,7 +111,7 @@ fn the_readmes_suite_and_object_work() {
     let said = project.succeeds("my_suite.lua --episodes 1 --json --out run");
     assert_eq!(safety(&said.out), 0.0);
     assert!(said.err.contains("jelly is not calibrated"), "{}", said.err);
-    // The message that the page shows.
+    // The page shows this message.
     let text = files[0].text.replace("hold_s", "holds");
     project.write("my_suite.lua", text.as_bytes());
     let shown = read("README.md");
@@ -143,9 +143,9 @@ fn the_policy_and_the_profile_of_the_page_work() {
     assert!(said("third.lua").contains("no policy server"), "the profile is read");
 }
 
-/// The commands of the README that run a suite or a script that is there.
+/// Commands that run an embedded suite or script.
 #[test]
-fn every_script_that_a_page_names_is_there_and_takes_the_flags_that_it_shows() {
+fn commands_on_the_pages_are_valid() {
     let pages = [
         "README.md",
         "CONTRIBUTING.md",
@@ -161,7 +161,7 @@ fn every_script_that_a_page_names_is_there_and_takes_the_flags_that_it_shows() {
             let words = line.split(" #").next().unwrap_or(line).trim();
             let file = words.split(' ').find(|word| word.ends_with(".lua"));
             let Some(file) = file.filter(|file| script::embedded(file).is_some()) else { continue };
-            // With --help last nothing runs, but every flag before it must be known.
+            // With --help at the end nothing runs, but every flag before it is checked.
             let project = Project::new(&[]);
             let said = project.succeeds(&format!("{words} --help"));
             assert!(said.out.contains("Usage:"), "{page}: {file}");
@@ -172,7 +172,7 @@ fn every_script_that_a_page_names_is_there_and_takes_the_flags_that_it_shows() {
 }
 
 #[test]
-fn the_asset_page_says_what_the_binary_says() {
+fn the_asset_page_is_current() {
     let project = Project::new(&[]);
     project.succeeds("scripts/asset_page.lua --images=off --out made");
     let (kept, made) = (read("docs/assets.md"), project.text("made/docs/assets.md"));
@@ -190,7 +190,7 @@ fn the_asset_page_says_what_the_binary_says() {
 }
 
 #[test]
-fn the_calibration_page_shows_the_envelope_of_every_soft_asset() {
+fn the_calibration_page_is_current() {
     let page = read("docs/calibration.md");
     let soft = fences("docs/calibration.md");
     assert_eq!(soft.len(), 17);

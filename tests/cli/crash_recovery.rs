@@ -1,4 +1,4 @@
-//! Runs that were cut off in the midst, by force or by a disk that is full, end as if nothing had happened.
+//! Runs that are killed or meet a full disk can be resumed; the result is that of an uninterrupted run.
 #![cfg(unix)]
 
 use std::{
@@ -16,7 +16,7 @@ use crate::support::{Project, Small};
 
 const LINE: &str = "x.lua --policy random --threads 2 --resume";
 
-/// All files of a folder, by their paths in it.
+/// All files of a folder by relative path.
 fn files(dir: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut found = BTreeMap::new();
     for entry in fs::read_dir(dir).expect("a folder") {
@@ -40,7 +40,7 @@ fn same(project: &Project, run: &str, whole: &BTreeMap<String, Vec<u8>>) {
 }
 
 #[test]
-fn a_run_killed_at_twenty_moments_goes_on_to_the_same_bytes_each_time() {
+fn a_killed_run_resumes_to_identical_bytes() {
     let project = Small { task: "budget_steps = 12", ..Default::default() }.project();
     let line = |run: &str| format!("{LINE} --episodes 8 --out {run}");
     let start = Instant::now();
@@ -57,7 +57,7 @@ fn a_run_killed_at_twenty_moments_goes_on_to_the_same_bytes_each_time() {
             .stderr(Stdio::null())
             .spawn()
             .expect("started");
-        // Spread over the run without a pattern: the golden ratio's multiples.
+        // Multiples of the golden ratio spread the moments over the run.
         sleep(time.mul_f64((0.618_034 * f64::from(k)).fract()));
         cut_off += i32::from(child.try_wait().expect("a child").is_none());
         child.kill().expect("killed");
@@ -70,7 +70,7 @@ fn a_run_killed_at_twenty_moments_goes_on_to_the_same_bytes_each_time() {
 }
 
 #[test]
-fn a_disk_that_fills_up_loses_nothing() {
+fn a_full_disk_loses_no_finished_episode() {
     let project = Small { task: "budget_steps = 4", ..Default::default() }.project();
     let line = |run: &str| format!("{LINE} --episodes 40 --out {run}");
     project.succeeds(&line("whole"));
@@ -79,7 +79,7 @@ fn a_disk_that_fills_up_loses_nothing() {
     let largest =
         whole.iter().filter(|(name, _)| *name != "episodes.jsonl").map(|(_, bytes)| bytes.len()).max();
     assert!(largest.expect("other files") < half_kib * 1024, "the limit would hit other files first");
-    // A limit on the size of files stands for a full disk: the list of episodes meets it first, after half of them.
+    // A limit on file sizes simulates a full disk. The list of episodes reaches it first, after half of the episodes.
     let script = format!("trap '' XFSZ; ulimit -f {half_kib}; exec \"$0\" {}", line("run"));
     let output = Command::new("bash")
         .current_dir(project.path(""))

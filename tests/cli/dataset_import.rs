@@ -1,4 +1,4 @@
-//! Foreign demonstrations from the command line: what becomes of them, and what is refused.
+//! `softvt dataset import`: re-execution of foreign demonstrations, and refused files.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use softvt::dataset::{StreamValues, TaskFile};
 
 use crate::support::{Project, SOLIDS};
 
-/// A rigid cube that stands on a slab: the goal is reached by waiting.
+/// A rigid cube on a slab. Waiting reaches the goal.
 const SUITE: &str = r#"
 local solids = require "solids"
 local layout = softvt.layout("one", function(scene)
@@ -25,7 +25,7 @@ return softvt.suite { name = "one", object_type = "rigid", variation = "spatial"
   tasks = { task "wait", task "wait longer" } }
 "#;
 
-/// A project with a data set of two demonstrations of task 0.
+/// A project with a dataset of two demonstrations of task 0.
 fn recorded() -> Project {
     let project = Project::new(&[("x.lua", SUITE), SOLIDS]);
     project.succeeds("record x.lua --task 0 --demos 2 --out data --images video --no-privileged");
@@ -34,16 +34,16 @@ fn recorded() -> Project {
 
 const OWN: &str = "data/hdf5/one_task0_demo.hdf5";
 
-/// What a file of SoftVTBench's says besides its poses.
+/// Content of a SoftVTBench file, apart from its poses.
 struct Said<'a> {
     language: &'a str,
-    /// Where the cube stands.
+    /// Position of the cube.
     cube: [f64; 2],
-    /// How many of its poses stand still where the tool was; those behind are zeros.
+    /// Number of poses at the initial tool position; the later ones are zeros.
     still: usize,
 }
 
-/// Writes such a file, of one demonstration that holds still where the recorded arm stood.
+/// Writes a file with one demonstration that holds the arm still.
 fn write(from: &Path, into: &Path, said: &Said) {
     let read = TaskFile::open(from).expect("a file");
     let numbers = |name: &str| match read.stream(0, name).expect("a stream").values {
@@ -76,7 +76,7 @@ fn write(from: &Path, into: &Path, said: &Said) {
 }
 
 #[test]
-fn softvts_own_demonstrations_end_in_the_same_states() {
+fn own_demonstrations_end_in_the_same_states() {
     let project = recorded();
     let said = project.succeeds(&format!("dataset import x.lua {OWN} --out again --images video"));
     assert!(said.err.contains("one_task0_demo.hdf5: softvt, 2 demonstrations"), "{}", said.err);
@@ -96,7 +96,7 @@ fn softvts_own_demonstrations_end_in_the_same_states() {
 }
 
 #[test]
-fn things_start_where_the_file_has_them_and_what_cannot_be_is_a_rejection() {
+fn objects_start_where_the_file_has_them() {
     let project = recorded();
     let make = |name: &str, cube: [f64; 2]| {
         write(&project.path(OWN), &project.path(name), &Said { language: "Wait.", cube, still: 12 });
@@ -116,7 +116,7 @@ fn things_start_where_the_file_has_them_and_what_cannot_be_is_a_rejection() {
     );
     let line = &project.lines("made/manifest.jsonl")[0];
     assert_eq!(line["origin"]["start"]["places"][0]["xy"], serde_json::json!([0.02, 0.21]), "{line}");
-    // All attempts can be simulated again, those that did not start too.
+    // All attempts can be replayed, including those that did not start.
     for attempt in 0..3 {
         let again = project.succeeds(&format!("replay made/attempts/one 0/{attempt}"));
         assert!(again.out.contains("byte-identical"), "{}", again.out);
@@ -126,7 +126,7 @@ fn things_start_where_the_file_has_them_and_what_cannot_be_is_a_rejection() {
 }
 
 #[test]
-fn what_cannot_be_imported_is_refused_and_nothing_is_written() {
+fn invalid_imports_are_refused_and_write_nothing() {
     let project = recorded();
     let make = |name: &str, language: &str, still: usize| {
         write(&project.path(OWN), &project.path(name), &Said { language, cube: [0.0, 0.2], still });

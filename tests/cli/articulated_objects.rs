@@ -1,4 +1,4 @@
-//! Articulated objects in a suite: goals that name a part, experts that see joints, and what is refused.
+//! Articulated objects in a suite: goals that name a part, experts that read joints, and refused definitions.
 
 use insta::assert_snapshot;
 
@@ -31,7 +31,7 @@ const TRAY: &str =
     "softvt.slider { axis = { 0, -1, 0 }, lower = 0, upper = 0.08, damping = 2, friction = 1 }";
 
 #[test]
-fn a_block_that_rests_on_a_part_is_at_the_goal_that_names_the_part_and_at_no_other() {
+fn goals_can_name_a_part() {
     let goal = |target: &str| {
         let project = suite(TRAY, target, "arm:wait(1)");
         project.succeeds("x.lua --policy noop --out run");
@@ -61,7 +61,7 @@ fn an_expert_sees_parts_and_joints() {
 }
 
 #[test]
-fn a_drawer_without_limits_and_a_goal_on_no_part_are_refused() {
+fn invalid_joints_and_parts_are_refused() {
     let refusal = |joint, target| suite(joint, target, "arm:wait(1)").refusal("x.lua --out run");
     assert_snapshot!(refusal("softvt.slider { axis = { 0, -1, 0 }, lower = 0 }", "chest"), @"x.lua:5: slider.upper: missing; every joint needs limits: give lower and upper");
     assert_snapshot!(refusal(TRAY, "chest.drawer"), @r#"x.lua:13: task.goal.target: unknown object "chest.drawer"; did you mean "chest.tray"?"#);

@@ -1,10 +1,10 @@
-//! Rigid and soft targets are judged alike, whatever they are put on.
+//! Judging of rigid and soft targets on rigid and soft supports.
 
 use serde_json::Value;
 
 use crate::support::Project;
 
-/// A rigid block in the mirrored layout of the standard suite, as a user would write it from the reference.
+/// A rigid block in the mirrored layout of the standard suite, written as a user would.
 const BLOCKS: &str = r#"
 local pick_place, layouts = require "experts.pick_place", require "layouts.spatial_soft"
 return softvt.suite {
@@ -28,7 +28,7 @@ return softvt.asset {
 "#;
 
 #[test]
-fn the_stock_expert_puts_a_rigid_block_on_the_plate_and_it_is_safe_without_a_limit() {
+fn rigid_targets_need_no_deformation_limit() {
     let project = Project::new(&[("blocks.lua", BLOCKS), ("assets/block.lua", BLOCK)]);
     let said = project.succeeds("blocks.lua --out run --json --trace");
     for e in project.lines("run/episodes.jsonl") {
@@ -48,7 +48,7 @@ fn the_stock_expert_puts_a_rigid_block_on_the_plate_and_it_is_safe_without_a_lim
     }
 }
 
-/// A suite in which `upper` lies on `lower` from the start.
+/// A suite in which `upper` rests on `lower` from the start.
 fn stack(upper: &str, lower: &str) -> String {
     format!(
         r#"
@@ -72,7 +72,7 @@ return softvt.suite {{ name = "stack", object_type = "deformable", variation = "
 }
 
 #[test]
-fn whatever_lies_on_whatever_is_carried_by_it_and_by_nothing_else() {
+fn objects_are_supported_by_what_they_rest_on() {
     for (upper, lower) in [
         ("soft", "soft"),
         ("soft", "rigid"),
@@ -100,7 +100,7 @@ fn calibration(fingerprint: &str) -> String {
     )
 }
 
-/// A suite whose cube is `stiffness` Pa stiff, with a shift of it and an experiment that tells its fingerprint.
+/// A suite with a cube of the given stiffness (Pa), a shift of it, and an experiment that returns its fingerprint.
 fn cubes(stiffness: &str) -> [(&'static str, String); 2] {
     let layout = format!(
         r#"
@@ -133,14 +133,14 @@ fn safe(project: &Project, words: &str) -> Vec<bool> {
 }
 
 #[test]
-fn a_limit_counts_for_the_calibrated_object_alone_in_every_episode_and_under_every_shift() {
+fn limits_apply_only_to_the_calibrated_object() {
     let project = Project::new(&cubes("2e4").each_ref().map(|(path, text)| (*path, text.as_str())));
     let row: Value = serde_json::from_str(&project.succeeds("who.lua --json").out).expect("a row");
     let fingerprint = row["fingerprint"].as_str().expect("a text");
     project.write("assets/calibration/cube.json", calibration(fingerprint).as_bytes());
     assert_eq!(safe(&project, ""), [true, true]);
     assert_eq!(safe(&project, "--shift soft=0.5"), [true, true], "limits stay nominal");
-    // One stiffness in the first episode and others later, all by one name.
+    // One stiffness in the first episode and others later, under one name.
     let vary = cubes("rng:uniform(0, 1) < 2 and 2e4 * (1 + episode)");
     project.write("x.lua", vary[1].1.as_bytes());
     assert_eq!(safe(&project, ""), [false, false]);
