@@ -2,12 +2,12 @@
 //!
 //! `.ci/regenerate cli` writes the page.
 
-use std::{collections::BTreeSet, fmt::Write, fs, path::Path};
+use std::{collections::BTreeMap, fmt::Write, fs, path::Path};
 
-use clap::{Arg, Args, Command};
+use clap::{Arg, Args, Command, Subcommand};
 
 use super::{
-    args::{PolicyArgs, ScriptArgs},
+    args::{self, PolicyArgs, ScriptArgs},
     parse::clap_command,
 };
 
@@ -18,19 +18,24 @@ const END: &str = "<!-- commands:end -->\n";
 /// Flags that several commands share, under the heading of their table.
 struct SharedFlags {
     heading: &'static str,
-    ids: BTreeSet<String>,
+    /// Help texts by identifier.
+    help: BTreeMap<String, String>,
 }
 
 impl SharedFlags {
     fn of<T: Args>(heading: &'static str) -> Self {
         let command = T::augment_args(Command::new("shared"));
         let flags = command.get_arguments().filter(|arg| arg.get_long().is_some());
-        Self { heading, ids: flags.map(|arg| arg.get_id().to_string()).collect() }
+        Self { heading, help: flags.map(|arg| (arg.get_id().to_string(), help_of(arg))).collect() }
     }
 
     fn has(&self, arg: &Arg) -> bool {
-        self.ids.contains(arg.get_id().as_str())
+        self.help.get(arg.get_id().as_str()).is_some_and(|help| *help == help_of(arg))
     }
+}
+
+fn help_of(arg: &Arg) -> String {
+    arg.get_help().map(ToString::to_string).unwrap_or_default()
 }
 
 /// A row of a table of flags.
@@ -48,7 +53,7 @@ fn row(arg: &Arg) -> String {
         Some(long) => format!("--{long}{value}"),
         None => values.join(" "),
     };
-    let mut help = arg.get_help().map(ToString::to_string).unwrap_or_default();
+    let mut help = help_of(arg);
     let defaults: Vec<String> =
         arg.get_default_values().iter().map(|value| value.to_string_lossy().into_owned()).collect();
     if takes_value && !defaults.is_empty() {
@@ -96,7 +101,7 @@ fn section(path: &str, command: &mut Command, shared: &[SharedFlags]) -> String 
                     listed.filter_map(|arg| Some(format!("`--{}`", arg.get_long()?))).collect();
                 let heading = flags.heading;
                 let anchor = heading.to_lowercase().replace(' ', "-");
-                if listed.len() == flags.ids.len() {
+                if listed.len() == flags.help.len() {
                     format!("[{heading}](#{anchor})")
                 } else {
                     format!("{} of [{heading}](#{anchor})", listed.join(" and "))
@@ -124,11 +129,9 @@ fn generated() -> String {
         SharedFlags::of::<PolicyArgs>("Flags of policies"),
     ];
     let mut text = section("softvt", &mut command, &shared);
-    let subcommands: Vec<String> = command
-        .get_subcommands()
-        .map(|sub| sub.get_name().to_owned())
-        .filter(|name| name != "help")
-        .collect();
+    // Commands that were changed after their definition are at the end of the list of `command`.
+    let defined = args::Command::augment_subcommands(Command::new("defined"));
+    let subcommands: Vec<String> = defined.get_subcommands().map(|sub| sub.get_name().to_owned()).collect();
     for name in subcommands {
         if let Some(subcommand) = command.find_subcommand_mut(&name) {
             text += &section(&format!("softvt {name}"), subcommand, &shared);

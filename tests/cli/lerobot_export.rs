@@ -13,7 +13,7 @@ use parquet::{
 use rmpv::Value;
 
 use crate::{
-    recording::files,
+    dataset_recording::files,
     serve::{Server, array, get, map},
     support::{Project, SOLIDS},
 };

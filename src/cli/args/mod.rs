@@ -24,7 +24,7 @@ pub(crate) use values::{
     EpisodeSelector, RequiredMetric, Requirement, RequirementOperator, Shard, TraceDetail, VideoSelection,
 };
 
-/// What the command line asks for.
+// A doc comment would replace the description of the program.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Without the name of a command: `softvt FILE.lua`.
