@@ -8,7 +8,7 @@ use fast_surface_nets::{SurfaceNetsBuffer, ndshape::RuntimeShape, surface_nets};
 use super::{
     Aabb, Mat3, Vec3, hex8,
     mesh::Mesh,
-    shape::Shape,
+    shape::{Shape, SignedDistance},
     voxel::{Embedding, VoxelMesh},
 };
 
@@ -27,6 +27,16 @@ pub struct SurfaceMesh {
 const MAX_POINTS: f64 = 2e7;
 /// Edge, in cells, of the blocks that are skipped as a whole where they are far from the surface.
 const BLOCK: usize = 4;
+/// Largest number of passes that make the lattice well composed; a repair may invalidate neighbouring cells.
+const MAX_PASSES: usize = 16;
+/// Largest distance from the surface, in cells, of the linearly interpolated crossings of a smooth cell.
+const LINEARITY_TOLERANCE: f64 = 0.03;
+/// Smallest cosine between the normals in a smooth cell.
+const SMOOTH_COSINE: f64 = 0.9;
+/// Cosine between the normals in a cell below which they meet at a sharp edge.
+const SHARP_COSINE: f64 = 0.8;
+/// Largest distance of a fitted vertex from the surface, in cells.
+const FIT_TOLERANCE: f64 = 0.1;
 
 /// The triangles of [`SurfaceMesh::from_shape`] and the normals at their vertices, without materials and texture
 /// coordinates.
@@ -84,7 +94,7 @@ fn with_materials(shape: &Shape, mut mesh: Mesh, normals: Vec<Vec3>) -> SurfaceM
 fn split(shape: &Shape, vertices: &[Vec3], normals: &[Vec3], quad: &[u32]) -> [[u32; 3]; 2] {
     let (first, second) = ([quad[0], quad[1], quad[2]], [quad[3], quad[4], quad[5]]);
     let at = |v: u32| &normals[v as usize];
-    let flat = first.iter().chain(&second).all(|&v| at(v).dot(at(first[0])) >= BEND);
+    let flat = first.iter().chain(&second).all(|&v| at(v).dot(at(first[0])) >= SMOOTH_COSINE);
     let lone = |of: [u32; 3], other: [u32; 3]| (0..3).find(|&i| !other.contains(&of[i]));
     let (false, Some(i), Some(j)) = (flat, lone(first, second), lone(second, first)) else {
         return [first, second];
@@ -192,57 +202,57 @@ impl Grid {
     /// edges, projected on the surface; at a sharp edge, the point that best fits the tangent planes of the crossings.
     fn vertex(&self, shape: &Shape, values: &[f32], at: [usize; 3]) -> Vec3 {
         let [nx, ny, _] = self.count;
-        let corners: [([usize; 3], f64); 8] = std::array::from_fn(|c| {
+        let corners: [GridPoint; 8] = std::array::from_fn(|c| {
             let [x, y, z] = std::array::from_fn(|axis| at[axis] + hex8::corner_index(c)[axis]);
-            ([x, y, z], f64::from(values[x + nx * (y + ny * z)]))
+            GridPoint { p: self.point([x, y, z]), value: f64::from(values[x + nx * (y + ny * z)]) }
         });
-        let crossed: Vec<[(Vec3, f64); 2]> = (0..8)
+        let crossed: Vec<[GridPoint; 2]> = (0..8)
             .flat_map(|a: usize| [1, 2, 4].map(|bit| (a, a | bit)))
-            .filter(|&(a, b)| a != b && (corners[a].1 < 0.0) != (corners[b].1 < 0.0))
-            .map(|(a, b)| [a, b].map(|c| (self.point(corners[c].0), corners[c].1)))
+            .filter(|&(a, b)| a != b && (corners[a].value < 0.0) != (corners[b].value < 0.0))
+            .map(|(a, b)| [a, b].map(|c| corners[c]))
             .collect();
-        let linear = |[a, b]: &[(Vec3, f64); 2]| a.0 + (b.0 - a.0) * (a.1 / (a.1 - b.1));
+        let linear = |[a, b]: &[GridPoint; 2]| a.p + (b.p - a.p) * (a.value / (a.value - b.value));
         let mean = crossed.iter().map(linear).sum::<Vec3>() / crossed.len() as f64;
         let smooth = || shape.project(&mean, self.cell).unwrap_or(mean);
-        let guesses = crossed.iter().map(|edge| {
-            let guess = shape.first_order(&linear(edge));
-            (guess.distance, guess.normal)
-        });
-        if alike(guesses, BEND, STRAY * self.cell) {
+        let at_crossings: Vec<SignedDistance> =
+            crossed.iter().map(|edge| shape.first_order(&linear(edge))).collect();
+        let is_linear = at_crossings.iter().all(|at| at.distance.abs() <= LINEARITY_TOLERANCE * self.cell);
+        if is_linear && are_parallel(at_crossings.iter().map(|at| at.normal), SMOOTH_COSINE) {
             return smooth();
         }
         // The field is not linear in this cell, so the crossings are found by bisection.
-        let planes: Vec<(Vec3, Vec3)> = crossed
+        let planes: Vec<TangentPlane> = crossed
             .iter()
-            .map(|[a, b]| crossing(shape, a.0, b.0))
-            .map(|p| (p, shape.first_order(&p).normal))
+            .map(|[a, b]| crossing(shape, a.p, b.p))
+            .map(|p| TangentPlane { p, normal: shape.first_order(&p).normal })
             .collect();
-        if alike(planes.iter().map(|plane| (0.0, plane.1)), SHARP, 0.0) {
+        if are_parallel(planes.iter().map(|plane| plane.normal), SHARP_COSINE) {
             return smooth();
         }
-        let fit = best_fit(&planes, mean).sup(&self.point(corners[0].0)).inf(&self.point(corners[7].0));
+        let fit = best_fit(&planes, mean).sup(&corners[0].p).inf(&corners[7].p);
         // Reject fits off the surface, as between the two sides of a wall thinner than a cell.
-        if shape.distance(&fit).abs() < LOOSE * self.cell { fit } else { smooth() }
+        if shape.distance(&fit).abs() < FIT_TOLERANCE * self.cell { fit } else { smooth() }
     }
 }
 
-/// True if all fields (distance, normal) have distances of at most `stray`, and normals within `cosine` of the first.
-fn alike(mut fields: impl Iterator<Item = (f64, Vec3)>, cosine: f64, stray: f64) -> bool {
-    let Some(first) = fields.next() else { return true };
-    first.0.abs() <= stray && fields.all(|field| field.0.abs() <= stray && field.1.dot(&first.1) >= cosine)
+/// A corner of a cell with its signed distance, in cells.
+#[derive(Clone, Copy)]
+struct GridPoint {
+    p: Vec3,
+    value: f64,
 }
 
-/// A cell is smooth if its linear crossings are off the surface by at most this, in cells, and their normals differ by at
-/// most [`BEND`] (cosine).
-const STRAY: f64 = 0.03;
-/// See [`STRAY`].
-const BEND: f64 = 0.9;
+/// Tangent plane of the surface at a point.
+struct TangentPlane {
+    p: Vec3,
+    normal: Vec3,
+}
 
-/// Largest distance of a fitted vertex from the surface, in cells.
-const LOOSE: f64 = 0.1;
-
-/// Largest number of passes over the lattice; a repair may invalidate neighbouring cells.
-const MAX_PASSES: usize = 16;
+/// True if the cosine between the first normal and every other is at least `cosine`.
+fn are_parallel(mut normals: impl Iterator<Item = Vec3>, cosine: f64) -> bool {
+    let Some(first) = normals.next() else { return true };
+    normals.all(|normal| normal.dot(&first) >= cosine)
+}
 
 /// Repairs the first checkerboard face or pair of opposite corners of a cell; returns true if there was one.
 fn repair_cell(corners: &[usize; 8], inside: usize, values: &mut [f32]) -> bool {
@@ -273,9 +283,6 @@ fn repair_cell(corners: &[usize; 8], inside: usize, values: &mut [f32]) -> bool 
     true
 }
 
-/// Normals in a cell that differ by more than this (cosine) meet at a sharp edge.
-const SHARP: f64 = 0.8;
-
 /// Crossing of the surface with the line between two points, by bisection; the midpoint if there is no crossing.
 fn crossing(shape: &Shape, a: Vec3, b: Vec3) -> Vec3 {
     let inside_a = shape.distance(&a) < 0.0;
@@ -295,11 +302,14 @@ fn crossing(shape: &Shape, a: Vec3, b: Vec3) -> Vec3 {
     if inside_a { low } else { high }
 }
 
-/// Least squares of the distances to planes (point, normal), regularised towards `mean`. Repetition removes the bias of
+/// Least squares of the distances to the planes, regularised towards `mean`. Repetition removes the bias of
 /// the regularisation.
-fn best_fit(planes: &[(Vec3, Vec3)], mean: Vec3) -> Vec3 {
-    let hold = 0.01 * planes.len() as f64;
-    let matrix = planes.iter().map(|(_, n)| n * n.transpose()).sum::<Mat3>() + Mat3::identity() * hold;
+fn best_fit(planes: &[TangentPlane], mean: Vec3) -> Vec3 {
+    let regularisation = 0.01 * planes.len() as f64;
+    let matrix = planes.iter().map(|plane| plane.normal * plane.normal.transpose()).sum::<Mat3>()
+        + Mat3::identity() * regularisation;
     let Some(inverse) = matrix.try_inverse() else { return mean };
-    (0..8).fold(mean, |x, _| x + inverse * planes.iter().map(|(p, n)| n * n.dot(&(p - x))).sum::<Vec3>())
+    let residual =
+        |x: Vec3| planes.iter().map(|plane| plane.normal * plane.normal.dot(&(plane.p - x))).sum::<Vec3>();
+    (0..8).fold(mean, |x, _| x + inverse * residual(x))
 }

@@ -18,6 +18,7 @@ mod tree;
 mod validate;
 mod warp;
 
+pub(in crate::geometry) use combine::SignedDistance;
 pub use contact::Contact;
 pub use displacement::{Bumps, Displacement, Ramp, Ridges};
 pub use error::ShapeError;
