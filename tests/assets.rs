@@ -399,3 +399,16 @@ fn the_floor_is_static_with_its_top_at_zero() {
     let floor = stacks(&[&["floor"]]).remove(0).objects.remove(1).asset;
     assert!(floor.shape.bounds().max.z.abs() < 1e-12 && floor.body == Body::Static);
 }
+
+#[test]
+fn calibrations_belong_to_the_shipped_soft_assets() {
+    let assets = soft_assets();
+    for SoftReference { name, .. } in SOFT {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("assets/calibration/{name}.json"));
+        let text = std::fs::read_to_string(path).expect("a calibration");
+        assert!(
+            text.contains(&format!("\"{}\"", assets[name].fingerprint())),
+            "the calibration of {name} is of another asset"
+        );
+    }
+}
