@@ -1,9 +1,9 @@
-//! The way to a policy server and back, on the loopback interface.
+//! Round trips to a policy server on the loopback interface.
 //!
-//! `cargo bench --bench policy` prints, for each profile, how long an answer takes beyond the server's own time: encoding,
-//! sending, receiving, decoding and cutting into commands, over the replans of an episode in which the server holds the robot
-//! still. Then it judges a slow server (200 ms an answer, one at a time) with two workers, and prints which share of the time
-//! that server was busy.
+//! `cargo bench --bench policy` prints, for each profile, the latency of a response beyond the server's own time: encoding,
+//! sending, receiving and decoding, over the replans of an episode in which the server holds the robot still. It also
+//! evaluates a slow server (200 ms per response, one at a time) with two workers, and prints the share of time in which that
+//! server was busy.
 
 mod episode;
 
@@ -26,17 +26,17 @@ use softvt::{
 };
 use tungstenite::{Message, accept};
 
-/// Longest time of an answer beyond the server's own, ms.
+/// Largest latency beyond the server's own time, ms.
 const GOAL_MS: f64 = 2.0;
-/// Least share of the time that a slow server is busy.
+/// Least share of time in which a slow server is busy.
 const GOAL_BUSY: f64 = 0.9;
 const SLOW: Duration = Duration::from_millis(200);
 
-/// When each answer was begun and sent.
+/// Start and end of the computation of each response.
 type Answers = Arc<Mutex<Vec<(Instant, Instant)>>>;
 
-/// A server that thinks for so long, about one observation at a time; its address.
-fn serve(thinks: Duration) -> (String, Answers) {
+/// Starts a server that computes each response for a time, one at a time. Returns its address.
+fn serve(delay: Duration) -> (String, Answers) {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     let url = format!("ws://{}", listener.local_addr().expect("an address"));
     let (answers, model) = (Answers::default(), Arc::new(Mutex::new(())));
@@ -44,13 +44,13 @@ fn serve(thinks: Duration) -> (String, Answers) {
     thread::spawn(move || {
         for stream in listener.incoming().flatten() {
             let (answers, model) = (answers.clone(), model.clone());
-            thread::spawn(move || answer(stream, thinks, &answers, &model));
+            thread::spawn(move || answer(stream, delay, &answers, &model));
         }
     });
     (url, kept)
 }
 
-fn answer(stream: TcpStream, thinks: Duration, answers: &Answers, model: &Mutex<()>) {
+fn answer(stream: TcpStream, delay: Duration, answers: &Answers, model: &Mutex<()>) {
     stream.set_nodelay(true).expect("a socket");
     let Ok(mut socket) = accept(stream) else { return };
     let _ = socket.send(packed(&Value::Map(Vec::new())));
@@ -58,7 +58,7 @@ fn answer(stream: TcpStream, thinks: Duration, answers: &Answers, model: &Mutex<
         let turn = model.lock().expect("the model");
         let begun = Instant::now();
         let seen = rmpv::decode::read_value(&mut &bytes[..]).expect("msgpack");
-        thread::sleep(thinks);
+        thread::sleep(delay);
         let message = packed(&hold(&seen));
         answers.lock().expect("answers").push((begun, Instant::now()));
         drop(turn);
@@ -79,7 +79,7 @@ fn entry<'a>(map: &'a Value, wanted: &str) -> &'a Value {
     &map.as_map().expect("a map").iter().find(|(key, _)| is(key)).expect("an entry").1
 }
 
-/// Fifty actions that leave the tool where it is.
+/// Fifty actions that hold the tool.
 fn hold(seen: &Value) -> Value {
     let state = entry(entry(seen, "observation/state"), "data").as_slice().expect("bytes");
     let row: Vec<u8> = state[..24].iter().copied().chain([0; 4]).collect();
@@ -93,7 +93,7 @@ fn hold(seen: &Value) -> Value {
     Value::Map(vec![(Value::from("actions"), actions)])
 }
 
-/// A policy, and how long each of its answers took.
+/// A policy that measures the time of each response.
 struct Timed<'a> {
     inner: RemotePolicy,
     took: &'a mut Vec<Duration>,
@@ -120,7 +120,7 @@ impl Policy for Timed<'_> {
     }
 }
 
-/// Times of the answers of an episode beyond the server's own, sorted, ms.
+/// Latencies of an episode's responses beyond the server's own time, sorted, ms.
 fn overheads(profile: &str) -> Vec<f64> {
     static STOP: AtomicBool = AtomicBool::new(false);
     let (url, answers) = serve(Duration::ZERO);
@@ -149,7 +149,7 @@ fn overheads(profile: &str) -> Vec<f64> {
     beyond
 }
 
-/// The share of the time between its first and its last answer that a slow server thought, with two workers.
+/// Share of the time between its first and last response in which a slow server was busy, with two workers.
 fn busy() -> f64 {
     let (url, answers) = serve(SLOW);
     let out = std::env::temp_dir().join(format!("softvt-bench-{}", std::process::id()));
@@ -178,7 +178,7 @@ fn main() {
     }
     println!("goal: {GOAL_MS} ms");
     println!(
-        "a server of {} ms an answer, two workers: busy {:.1} % of the time (goal {:.0} %)",
+        "a server of {} ms per response, two workers: busy {:.1} % of the time (goal {:.0} %)",
         SLOW.as_millis(),
         1e2 * busy(),
         1e2 * GOAL_BUSY

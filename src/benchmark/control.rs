@@ -1,19 +1,19 @@
-//! The rate of control.
+//! The control rate.
 
 use crate::text::format_number;
 
-/// Time between two commands, s: policies act, and records are written, at 20 Hz.
+/// Control period, s: policies act, and results are recorded, at 20 Hz.
 pub const CONTROL_DT: f64 = 0.05;
 
-/// Physics steps of `dt` seconds a control step, 3 at 60 Hz; settings let only a `dt` pass that divides [`CONTROL_DT`].
+/// Number of physics steps of `dt` seconds per control step, 3 at 60 Hz. `dt` must divide [`CONTROL_DT`].
 pub fn steps_per_control(dt: f64) -> u32 {
     (CONTROL_DT / dt).round().max(1.0) as u32
 }
 
-/// Whether `dt` divides [`CONTROL_DT`].
+/// Checks that `dt` divides [`CONTROL_DT`].
 ///
 /// # Errors
-/// A fragment for people.
+/// It does not. The message proposes the nearest values.
 pub fn check_dt(dt: f64) -> Result<(), String> {
     let steps = f64::from(steps_per_control(dt));
     if (steps * dt - CONTROL_DT).abs() <= 1e-9 {

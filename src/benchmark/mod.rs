@@ -1,4 +1,4 @@
-//! What a script returns: suites, tasks, experiments and plans as plain data.
+//! The benchmark as plain data, as scripts return it: suites, tasks, experiments and plans.
 
 pub mod control;
 pub mod seed;
@@ -6,7 +6,7 @@ pub mod settings;
 
 use serde::{Deserialize, Serialize};
 
-/// What the objects of a suite are.
+/// Kind of the objects of a suite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ObjectType {
@@ -16,17 +16,17 @@ pub enum ObjectType {
     Rigid,
 }
 
-/// What varies between the tasks of a suite.
+/// The factor that varies between the tasks of a suite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Variation {
-    /// The object.
+    /// Tasks differ in the object.
     Object,
-    /// The layout.
+    /// Tasks differ in the layout.
     Spatial,
 }
 
-/// When a task is done.
+/// Success condition of a task.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum Goal {
@@ -34,9 +34,9 @@ pub enum Goal {
     On {
         /// Scene name of the object.
         object: String,
-        /// Scene name of what it must rest on.
+        /// Scene name of the supporting object.
         target: String,
-        /// How long it must stay, s.
+        /// Time for which it must stay, s.
         hold_s: f64,
     },
     /// `object` rests inside `target`'s walls, released, for `hold_s`.
@@ -45,13 +45,13 @@ pub enum Goal {
         object: String,
         /// Scene name of the container.
         target: String,
-        /// How long it must stay, s.
+        /// Time for which it must stay, s.
         hold_s: f64,
     },
 }
 
 impl Goal {
-    /// Scene name of the object that must get somewhere.
+    /// Scene name of the object to be moved.
     pub fn object(&self) -> &str {
         match self {
             Self::On { object, .. } | Self::In { object, .. } => object,
@@ -64,30 +64,30 @@ impl Goal {
 pub struct Task {
     /// Index in the suite.
     pub id: usize,
-    /// What the policy is told.
+    /// The instruction to the policy.
     pub prompt: String,
     /// Name of the layout; tasks that share it share initial states.
     pub layout: String,
-    /// When it is done.
+    /// Success condition.
     pub goal: Goal,
-    /// Control steps the policy has.
+    /// Maximum number of control steps.
     pub budget_steps: u32,
-    /// Whether a scripted expert comes with it.
+    /// True if the suite has a scripted expert for it.
     pub expert: bool,
 }
 
-/// A change of the scene that a run may ask for by name.
+/// A named change of the scene, for runs under shifted conditions (`--shift`).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Shift {
     /// Name on the command line.
     pub name: String,
     /// Unit of its value, "1" for none.
     pub unit: String,
-    /// The value that changes nothing.
+    /// Value without effect.
     pub default: f64,
-    /// Lowest value.
+    /// Least allowed value.
     pub min: Option<f64>,
-    /// Highest value.
+    /// Largest allowed value.
     pub max: Option<f64>,
 }
 
@@ -96,24 +96,24 @@ pub struct Shift {
 pub struct Suite {
     /// Name, as in results.
     pub name: String,
-    /// What its objects are.
+    /// Kind of its objects.
     pub object_type: ObjectType,
-    /// What varies between its tasks.
+    /// Factor that varies between its tasks.
     pub variation: Variation,
-    /// Episodes a task by default.
+    /// Default number of episodes per task.
     pub episodes: u32,
     /// The tasks, in order.
     pub tasks: Vec<Task>,
-    /// The shifts that the suite declares.
+    /// Shifts that the suite supports.
     pub shifts: Vec<Shift>,
-    /// What the suite changes of the mechanics, the robot and the judge.
+    /// Settings of physics, robot, sensors and judge.
     pub settings: settings::Settings,
 }
 
-/// What the unchanged run is called beside conditions.
+/// Name of the run without changes, next to those under conditions.
 pub const REFERENCE: &str = "reference";
 
-/// Named changes under which suites are run beside their unchanged reference.
+/// A named set of changes under which suites are run in addition to the unchanged reference.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Condition {
     /// Name, as in results.
@@ -122,11 +122,11 @@ pub struct Condition {
     pub shift: Vec<(String, f64)>,
     /// Settings by dotted path and value, as `--set` takes them.
     pub set: Vec<(String, String)>,
-    /// The kind of suites that it can change anything of; all if none.
+    /// Kind of suites to which the condition applies; `None` for all.
     pub only: Option<ObjectType>,
 }
 
-/// What `softvt FILE.lua` does.
+/// The task of `softvt FILE.lua`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]
 pub enum Plan {
@@ -137,7 +137,7 @@ pub enum Plan {
         /// In order.
         suites: Vec<Suite>,
     },
-    /// Evaluate a policy on suites as they are and under each of several conditions.
+    /// Evaluate a policy on suites without changes and under each of several conditions.
     Conditions {
         /// Name, as in results.
         name: String,
@@ -158,7 +158,7 @@ pub enum Plan {
 }
 
 impl Plan {
-    /// The suites that it evaluates; none of an experiment.
+    /// Suites to evaluate; empty for an experiment.
     pub fn suites(&self) -> &[Suite] {
         match self {
             Self::Suite(suite) => std::slice::from_ref(suite),

@@ -1,7 +1,7 @@
 //! Seeds: every random number of an episode comes from a named stream of its own.
 //!
-//! A stream is ChaCha8 keyed with the SHA-256 of everything that names it, so that one more draw in one stream moves
-//! nothing in another, and an episode does not depend on which others were run.
+//! A stream is ChaCha8 keyed with the SHA-256 of its identifiers, so that an additional draw in one stream does
+//! not change another, and an episode does not depend on other episodes.
 
 use rand_chacha::{
     ChaCha8Rng,
@@ -10,12 +10,12 @@ use rand_chacha::{
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-/// What a stream of random numbers is for.
+/// Purpose of a stream of random numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RandomStream {
-    /// Where objects stand.
+    /// Initial poses of objects.
     Layout,
-    /// Joint angles of the arm at the start.
+    /// Initial joint angles of the arm.
     Arm,
     /// Variation of materials.
     Material,
@@ -63,14 +63,14 @@ impl RandomStream {
     }
 }
 
-/// Which endless list of episodes an episode belongs to.
+/// Unlimited list of episodes; the lists of two splits have no episode in common.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Split {
-    /// Episodes that a policy is judged on.
+    /// Episodes for evaluating policies.
     #[default]
     Validation,
-    /// Episodes that demonstrations are recorded on.
+    /// Episodes for recording demonstrations.
     Demonstration,
     /// Trials of calibrations and other experiments.
     Experiment,
@@ -103,7 +103,7 @@ impl Split {
     }
 }
 
-/// What the initial state of an episode depends on, and nothing else.
+/// Seed of an episode: all values on which its initial state depends.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EpisodeSeed {
     /// Name of the suite.
@@ -114,12 +114,12 @@ pub struct EpisodeSeed {
     pub episode: u64,
     /// Seed of the run.
     pub base: u64,
-    /// Which list of episodes.
+    /// List of episodes that `episode` counts in.
     pub split: Split,
 }
 
 impl EpisodeSeed {
-    /// The generator of one stream, at its start.
+    /// Random generator of a stream, at its start.
     pub fn stream(&self, stream: RandomStream) -> ChaCha8Rng {
         let split = self.split.name();
         let episode = self.episode.to_string();
@@ -128,7 +128,7 @@ impl EpisodeSeed {
     }
 }
 
-/// The generator named by `parts`; their lengths count, so that no two lists of parts run together.
+/// Random generator keyed by the hash of `parts`. The hash includes their lengths, so that different lists never collide.
 pub fn keyed_rng(parts: &[&str]) -> ChaCha8Rng {
     let mut hash = Sha256::new();
     for part in parts {

@@ -1,4 +1,4 @@
-//! The numbers of the mechanics, the robot, the judge and the sensors that a suite or a run may change.
+//! Parameters of physics, robot, judge and sensors that a suite or a run can change.
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -9,7 +9,7 @@ use crate::{
     sensing::tactile::TactileSpec,
 };
 
-/// All settings of a run. The default is the benchmark.
+/// All settings of a run. The defaults are those of the benchmark.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
@@ -28,7 +28,7 @@ impl Settings {
     /// The same with the field at a dotted path set: `robot.pads.static_mu`, `0`.
     ///
     /// # Errors
-    /// There is no such field, or the value is not of its type or range; a fragment for people.
+    /// The field does not exist, or the value has a wrong type or is out of range.
     pub fn with(&self, path: &str, value: &str) -> Result<Self, String> {
         self.with_all(&[(path.to_owned(), value.to_owned())])
     }
@@ -60,7 +60,7 @@ impl Settings {
         let parsed = serde_json::from_str::<Value>(value);
         *at = match (&at, parsed) {
             (Value::Object(_), Ok(group @ Value::Object(_))) => group,
-            // What can be of several models is chosen by the name of one.
+            // A setting with several models can be given by the name of a model alone.
             (Value::Object(known), Err(_)) if known.contains_key(MODEL) => json!({ MODEL: value }),
             (Value::Object(_), _) => {
                 let known = fields(at);
@@ -77,10 +77,10 @@ impl Settings {
         serde_json::from_value(tree).map_err(|e| refusal(path, value, &e.to_string()))
     }
 
-    /// Checks every number.
+    /// Checks the ranges of all parameters.
     ///
     /// # Errors
-    /// The first number out of its range; a fragment for people.
+    /// The first parameter out of range.
     pub fn check(&self) -> Result<(), String> {
         self.robot.validate().map_err(|e| e.to_string())?;
         self.criteria.check().map_err(|e| e.to_string())?;
