@@ -39,7 +39,7 @@ pub struct Imported {
     pub sha256: String,
     pub layout: String,
     pub demos: usize,
-    /// What the executed commands were computed from.
+    /// Source of the executed commands.
     pub commands: String,
 }
 

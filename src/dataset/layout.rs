@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 pub const MANIFEST: &str = "manifest.jsonl";
 /// Human-readable description.
 pub const CARD: &str = "README.md";
-/// What was requested, written at the start of a recording.
+/// The requested recording, written at its start.
 pub const RECORDING: &str = "recording.json";
 /// Contents, written last: its presence marks a complete dataset.
 pub const DATASET: &str = "dataset.json";

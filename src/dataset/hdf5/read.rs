@@ -42,7 +42,7 @@ pub struct ImageBlock {
 /// Reads the actions of a demonstration; see [`TaskFile::actions`].
 ///
 /// # Errors
-/// Those of [`TaskFile::open`] and [`TaskFile::actions`].
+/// As [`TaskFile::open`] and [`TaskFile::actions`].
 pub fn actions(path: &Path, demo: usize) -> Result<Vec<Action>, DatasetError> {
     TaskFile::open(path)?.actions(demo)
 }

@@ -30,7 +30,7 @@ pub struct ForeignDemo {
     /// True while the gripper holds an object and the recorded closure is the measured one, limited by that object.
     pub is_stopped_by_object: Vec<bool>,
     pub initial_condition: InitialCondition,
-    /// What the commands were computed from, for the dataset card.
+    /// Data the commands were computed from, for the dataset card.
     pub command_source: &'static str,
 }
 

@@ -49,7 +49,7 @@ impl MujocoJoint {
     }
 }
 
-/// MujocoBody that robosuite's robot stands on.
+/// Name of the base of robosuite's robots.
 const BASE: &str = "robot0_base";
 
 impl MujocoModel {
