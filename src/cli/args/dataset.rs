@@ -9,7 +9,7 @@ use super::{
     run::ScriptArgs,
 };
 
-// What the commands that create datasets have in common.
+// Flags of all commands that create datasets.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct RecordingArgs {
     /// Output folder: a new one, or with --resume that of an interrupted recording

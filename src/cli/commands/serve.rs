@@ -38,9 +38,9 @@ pub(crate) fn run(args: &ServeArgs) -> Result<(), CliError> {
         suites.iter().map(|suite| ServedSuite { name: config.suite_name(suite), suite }).collect();
     let start_episode = |id: &EpisodeId| {
         let found = runs.iter().find(|run| run.name == id.suite);
-        let run = found.ok_or_else(|| format!("suite {:?}: there is none", id.suite))?;
+        let run = found.ok_or_else(|| format!("unknown suite {:?}", id.suite))?;
         let task = run.suite.tasks.iter().find(|task| task.id == id.task);
-        let task = task.ok_or_else(|| format!("task {}: there is none", id.task))?;
+        let task = task.ok_or_else(|| format!("unknown task {}", id.task))?;
         let request = EpisodeRequest {
             suite: run.suite.name.clone(),
             task: id.task,

@@ -110,7 +110,7 @@ impl RecordedRuns {
     /// Reads a run folder, or all run folders in a folder.
     ///
     /// # Errors
-    /// There is none, or one cannot be read.
+    /// The folder contains no run, or one cannot be read.
     pub(crate) fn load(dir: &Path) -> Result<Self, CliError> {
         let runs = stored_run::load(dir).map_err(|error| CliError::input(error).prefixed("--policy"))?;
         Ok(Self { dir: dir.to_owned(), runs })

@@ -93,7 +93,7 @@ pub(crate) fn restore_artifacts(run: &SuiteRun, records: &[EpisodeRecord]) -> Re
             simulate(run, record, has_actions(record), &artifacts)
         },
         |_, simulated| {
-            let Some((finished, rendered)) = simulated else { return Ok(()) };
+            let Some(SimulatedEpisode { finished, rendered }) = simulated else { return Ok(()) };
             artifacts.write(&finished)?;
             report_unrendered(&finished, rendered);
             Ok(())
@@ -102,7 +102,10 @@ pub(crate) fn restore_artifacts(run: &SuiteRun, records: &[EpisodeRecord]) -> Re
 }
 
 /// A simulated episode, and the result of rendering it.
-type SimulatedEpisode = (FinishedEpisode, Result<(), CliError>);
+struct SimulatedEpisode {
+    finished: FinishedEpisode,
+    rendered: Result<(), CliError>,
+}
 
 /// Simulates a finished episode again. Returns `None`, after a notice, if the result differs from its record.
 fn simulate(
@@ -129,5 +132,5 @@ fn simulate(
         return Ok(None);
     }
     let rendered = artifacts.render(&mut finished);
-    Ok(Some((finished, rendered)))
+    Ok(Some(SimulatedEpisode { finished, rendered }))
 }
