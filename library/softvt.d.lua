@@ -1,43 +1,68 @@
 ---@meta softvt
--- Generated from the binding table; do not edit.
+-- Generated from the declarations in src/script; do not edit.
 
 ---A set of tasks that are reported together.
 ---@class softvt.Suite
----@field name string Name, as in results; part of the seed.
----@field object_type "deformable"|"rigid" What the objects are.
----@field variation "object"|"spatial" What varies between tasks.
----@field episodes? integer Episodes a task by default. Expects a whole number in 1..1000000. Default 5.
+---@field name string Name in results; part of the seed.
+---@field object_type "deformable"|"rigid" Mechanics of the objects.
+---@field variation "object"|"spatial" Difference between the tasks.
+---@field episodes? integer Default number of episodes per task. Expects a whole number in 1..1000000. Default 5.
 ---@field tasks softvt.Task[] The tasks, in order.
----@field shifts? softvt.Shift[] Changes that a run may ask for.
----@field settings? table<string, table<string, any>> What it changes of the mechanics, the robot and the judge: { physics = {…}, robot = {…}, criteria = {…} }.
+---@field shifts? softvt.Shift[] Changes of the scene that a run can request.
+---@field settings? table<string, table<string, any>> Changed settings of physics, robot and judge: { physics = {…}, robot = {…}, criteria = {…} }.
 
----One task of a suite.
+---A task of a suite.
 ---@class softvt.Task
----@field prompt string What the policy is told.
----@field layout softvt.Layout Where things stand at the start.
----@field goal softvt.On|softvt.Inside When it is done.
----@field expert? fun(arm: softvt.Arm, scene: softvt.View) A coroutine that does the task, with privileged state.
----@field budget_steps? integer Control steps (20 Hz) that the policy has; 500 where a suite varies layouts, 700 where it varies objects. Expects a whole number in 1..100000.
+---@field prompt string Instruction for the policy.
+---@field layout softvt.Layout Initial scene.
+---@field goal softvt.On|softvt.Inside Success criterion.
+---@field expert? fun(arm: softvt.Arm, scene: softvt.View) A coroutine that solves the task with privileged state.
+---@field budget_steps? integer Control steps (20 Hz) that the policy has; by default 500 in suites that vary layouts, 700 in those that vary objects. Expects a whole number in 1..100000.
 
 ---The object rests on the target, released, for a time.
 ---@class softvt.On
 ---@field object string Scene name of the object.
----@field target string Scene name of what it must reach, or of a part of it (cabinet.top_drawer).
----@field hold_s? number How long it must stay. Expects seconds in 0..10. Default 0.4.
+---@field target string Scene name of the target, or of a part of it (cabinet.top_drawer).
+---@field hold_s? number Time that it must stay there. Expects seconds in 0..10. Default 0.4.
 
 ---The object rests inside the target's walls, released, for a time.
 ---@class softvt.Inside
 ---@field object string Scene name of the object.
----@field target string Scene name of what it must reach, or of a part of it (cabinet.top_drawer).
----@field hold_s? number How long it must stay. Expects seconds in 0..10. Default 0.4.
+---@field target string Scene name of the target, or of a part of it (cabinet.top_drawer).
+---@field hold_s? number Time that it must stay there. Expects seconds in 0..10. Default 0.4.
 
----A kind of object: its shape at rest with its lowest point at z = 0 and its centre on the z axis.
+---A change of the scene that a run can request with --shift name=value. Deformation limits stay nominal.
+---@class softvt.Shift
+---@field name string Name on the command line.
+---@field unit? string Unit of the value. Default "1".
+---@field default number Value that changes nothing. Expects a number.
+---@field min? number Lowest value. Expects a number.
+---@field max? number Highest value. Expects a number.
+---@field apply fun(scene: softvt.Scene, value: number): softvt.Scene? Changes the scene; may return another one.
+
+---Runs suites as they are, then under each condition, and compares them episode by episode.
+---@class softvt.Conditions
+---@field name string Name in results.
+---@field suites softvt.Suite[] The suites, in order.
+---@field conditions softvt.Condition[] The conditions, in order.
+
+---A function that is evaluated at points and returns rows of results. Give either grid or points.
+---@class softvt.Experiment
+---@field name string Name in results.
+---@field options? any Result of softvt.options, passed to the functions below as opt.
+---@field grid? table<string, any[]> Values of each parameter. Every combination is run, names in alphabetical order, the last one fastest.
+---@field points? fun(opt: table): table[] Returns the points instead of a grid.
+---@field run fun(point: table, opt: table): table|table[] Returns a row, or a list of rows, for one point. Points run in any order and on several threads.
+---@field finish? fun(rows: table[], opt: table): softvt.Finish? Summarizes all rows.
+---@field columns? string[] Columns of the table, in order; by default all, sorted.
+
+---A kind of object. Its shape at rest has its lowest point at z = 0 and its centre on the z axis (see softvt.Shape:grounded).
 ---@class softvt.Asset
----@field name string Name, as in results and calibration files.
----@field shape softvt.Shape Its shape, in metres.
----@field body softvt.Soft|softvt.Rigid|softvt.Articulated|softvt.Static|softvt.Scenery How it moves.
+---@field name string Name in results and calibration files.
+---@field shape softvt.Shape Shape, in metres.
+---@field body softvt.Soft|softvt.Rigid|softvt.Articulated|softvt.Static|softvt.Scenery Mechanics.
 ---@field friction? softvt.Friction Friction of its surface.
----@field visuals? softvt.Visual[] Appearances by material id of the shape; the first is id 0.
+---@field visuals? softvt.Visual[] Visuals by material id of the shape, from 0; plain grey by default.
 ---@field hints? table<string, number> Numbers for experts (grasp height, closure …).
 
 ---A finite-element soft body of linear-elastic, isotropic material.
@@ -52,11 +77,17 @@
 ---@class softvt.Rigid
 ---@field density number Density. Expects a number (kg/m³) above 0.
 
----Parts on joints; the asset's own shape is their base, which never moves.
+---A fixed body, which never moves.
+---@class softvt.Static
+
+---Scenery: it is drawn and casts shadows, but has no contact.
+---@class softvt.Scenery
+
+---Parts on joints. The asset's own shape is their base, which never moves.
 ---@class softvt.Articulated
 ---@field parts softvt.Part[] The parts, in any order.
 
----A joint along which a part slides, as a drawer does.
+---A joint along which a part slides, such as that of a drawer. Values are in m.
 ---@class softvt.Slider
 ---@field axis number[] Direction in which its value grows. Expects a list of 3 numbers (object frame).
 ---@field lower number Lowest value. Expects metres.
@@ -64,253 +95,183 @@
 ---@field damping? number Viscous damping. Expects a number (N s/m) of 0 or more. Default 0.
 ---@field friction? number Dry friction. Expects a number (N) of 0 or more. Default 0.
 
----A joint about which a part turns, as a door or a knob does.
+---A joint about which a part turns, such as that of a door or a knob. Values are in rad.
 ---@class softvt.Hinge
----@field axis number[] Axis about which its value grows, by the right hand. Expects a list of 3 numbers (object frame).
+---@field axis number[] Axis about which its value grows, right-handed. Expects a list of 3 numbers (object frame).
 ---@field origin number[] A point of the axis, with all joints at 0. Expects a list of 3 numbers (m, object frame).
 ---@field lower number Lowest value. Expects radians.
 ---@field upper number Highest value, above the lowest. Expects radians.
 ---@field damping? number Viscous damping. Expects a number (N m s/rad) of 0 or more. Default 0.
 ---@field friction? number Dry friction. Expects a number (N m) of 0 or more. Default 0.
 
----A part of the world that never moves.
----@class softvt.Static
-
----Part of the picture only: it is drawn, casts shadows, and nothing touches it.
----@class softvt.Scenery
-
----A change of the scene that a run may ask for with --shift name=value. Thresholds stay nominal.
----@class softvt.Shift
----@field name string Name on the command line.
----@field unit? string Unit of the value. Default "1".
----@field default number The value that changes nothing. Expects a number.
----@field min? number Lowest value. Expects a number.
----@field max? number Highest value. Expects a number.
----@field apply fun(scene: softvt.Scene, value: number): softvt.Scene? Changes the scene.
-
----Runs suites as they are, then under each condition, and compares episode by episode.
----@class softvt.Conditions
----@field name string Name, as in results.
----@field suites softvt.Suite[] The suites, in order.
----@field conditions softvt.Condition[] The conditions, in order.
-
----A function of a grid of parameters that yields rows. Give grid or points.
----@class softvt.Experiment
----@field name string Name, as in results.
----@field options? any What softvt.options gave; handed to the functions below as opt.
----@field grid? table<string, any[]> Values of each parameter; every combination is run, names in alphabetical order, the last one fastest.
----@field points? fun(opt: table): table[] Gives the points instead of a grid.
----@field run fun(point: table, opt: table): table|table[] Gives a row or a list of rows for one point; points run in any order and on several threads.
----@field finish? fun(rows: table[], opt: table): softvt.Finish? Sums up all rows.
----@field columns? string[] Columns of the table, in order; by default all, sorted.
-
----A policy, which the file behind --policy returns. Every episode has a machine of its own, in which the file is run anew; math.random is seeded by the episode.
+---A policy, as the file given to --policy returns it. Every episode has a virtual machine of its own, in which the file runs again; math.random is seeded by the episode.
 ---@class softvt.Policy
----@field name string Its name in results, unless --name says otherwise.
----@field looks? softvt.Looks What it looks at.
+---@field name string Name in results, unless --name gives another.
+---@field observes? softvt.Observes Observations of the policy.
 ---@field reset? fun(task: softvt.Brief) Called when the episode begins.
----@field act fun(obs: softvt.Observation): softvt.Action|softvt.Action[] Gives the action of this control step, or a list of them for the next ones.
----@field replan? integer How many actions of a list are carried out, unless --replan says otherwise; all of them if left out. Expects a whole number in 1..10000.
+---@field act fun(obs: softvt.Observation): softvt.Action|softvt.Action[] Returns the action of this control step, or a list of actions for the next ones.
+---@field replan? integer Number of actions of a list that are executed before act is called again, unless --replan gives another; all by default. Expects a whole number in 1..10000.
 
----What a policy's server gets and what its numbers mean; the file behind --profile returns one.
+---The messages of a policy server: the observations it gets and the meaning of its actions. The file given to --profile returns one.
 ---@class softvt.Profile
----@field name string Its name in results, unless --name says otherwise.
----@field inputs softvt.Input[] What is sent, in order.
----@field actions softvt.ActionEncoding How replies are read.
+---@field name string Name in results, unless --name gives another.
+---@field inputs softvt.Input[] Observations that are sent, in order.
+---@field actions softvt.ActionEncoding Meaning of the actions.
 
----How a scene is laid out. Tasks with the same layout name share their initial states.
----@class softvt.Layout
----@field name string Name; part of the seed.
----@field build fun(scene: softvt.Scene, rng: softvt.Rng) Puts the objects into the scene.
-
----Coulomb friction of a surface; a pair of surfaces takes the larger of each coefficient.
+---Coulomb friction of a surface. A pair of surfaces has the larger of each coefficient.
 ---@class softvt.Friction
 ---@field static_mu? number Static coefficient. Expects a number in 0..10. Default 0.6.
----@field dynamic_mu? number Dynamic coefficient, not above the static one. Expects a number in 0..10. Default 0.5.
+---@field dynamic_mu? number Dynamic coefficient, at most the static one. Expects a number in 0..10. Default 0.5.
 
 ---A part of an articulated object. Parts of one object never touch each other or its base.
 ---@class softvt.Part
----@field name string Name, unique in the object: cabinet.top_drawer in a scene.
----@field shape softvt.Shape Its shape where it is with all joints at 0, in the frame of the whole object; walls of 4 mm or more.
+---@field name string Name, unique in the object. A scene names the part cabinet.top_drawer.
+---@field shape softvt.Shape Shape with all joints at 0, in the frame of the whole object. Walls must be at least 4 mm thick.
 ---@field density number Density. Expects a number (kg/m³) above 0.
----@field joint softvt.Slider|softvt.Hinge What carries it; axes and origins are in the frame of the whole object.
----@field parent? string The part that carries it; the fixed base by default.
----@field visuals? softvt.Visual[] Appearances by material id of its shape; the first is id 0. Those of the asset by default.
+---@field joint softvt.Slider|softvt.Hinge Joint that carries it; axes and origins are in the frame of the whole object.
+---@field parent? string Name of the part that carries it; the fixed base by default.
+---@field visuals? softvt.Visual[] Visuals by material id of its shape, from 0; those of the asset by default.
 ---@field hints? table<string, number> Numbers for experts (handle height …).
 
----What a surface looks like: a base, and layers painted over it one after the other.
+---The appearance of a surface: a base material, and layers painted over it in order.
 ---@class softvt.Visual
 ---@field albedo number[] Base colour. Expects a list of 3 numbers in 0..1 (linear RGB).
 ---@field roughness? number Roughness: 0 is a mirror, 1 is chalk. Expects a number in 0..1. Default 0.6.
 ---@field metalness? number Metalness: 1 is bare metal. Expects a number in 0..1. Default 0.
----@field layers? softvt.Layer[] Painted over the base, in this order.
+---@field layers? softvt.Layer[] Layers painted over the base, in this order.
 
----A colour laid over what is below where a mask says so.
+---A colour laid over the layers below where a mask is not 0.
 ---@class softvt.Layer
----@field mask? softvt.Mask Where; everywhere if left out.
+---@field mask? softvt.Mask Weight of the layer; 1 everywhere by default.
 ---@field albedo number[] Colour. Expects a list of 3 numbers in 0..1 (linear RGB).
----@field roughness? number Roughness. Expects a number in 0..1. Default 0.6.
----@field opacity? number Share of this layer where the mask is 1; 0 leaves the relief alone. Expects a number in 0..1. Default 1.
----@field relief_m? number Height of the drawn surface where the mask is 1; it is drawn only, nothing touches it. Expects metres in -0.005..0.005. Default 0.
+---@field roughness? number Roughness: 0 is a mirror, 1 is chalk. Expects a number in 0..1. Default 0.6.
+---@field opacity? number Share of this layer where the mask is 1; with 0 only the relief shows. Expects a number in 0..1. Default 1.
+---@field relief_m? number Height of the drawn surface where the mask is 1. It is drawn only: contact does not see it. Expects metres in -0.005..0.005. Default 0.
 
----One way in which a run differs from its reference: same tasks, initial states and seeds, other shifts or settings.
+---A weight that rises smoothly from 0 to 1 along an axis.
+---@class softvt.MaskSpec
+---@field axis "x"|"y"|"z" The axis.
+---@field from number Coordinate at which the weight is 0. Expects metres.
+---@field to number Coordinate at which the weight is 1. Expects metres.
+
+---The layout of a scene. Tasks with the same layout name share their initial states.
+---@class softvt.Layout
+---@field name string Name; part of the seed.
+---@field build fun(scene: softvt.Scene, rng: softvt.Rng) Adds the objects to the scene.
+
+---A difference between a run and its reference: other shifts or settings with the same tasks, initial states and seeds.
 ---@class softvt.Condition
----@field name string Name, as in the table; its run is in a folder of that name.
----@field shift? table<string, number> Shifts by name, as --shift takes them: { mass = 1.25 }.
----@field set? table<string, number|boolean|string> Settings by path, as --set takes them: { ["robot.gripper.effort"] = 20 }.
----@field only? "deformable"|"rigid" The object_type of the suites of which it can change anything; in others it is not run, and its row says N/A.
+---@field name string Name in the table of results and of the run folder.
+---@field shift? table<string, number> Shifts by name, as for --shift: { mass = 1.25 }.
+---@field set? table<string, number|boolean|string> Settings by path, as for --set: { ["robot.gripper.effort"] = 20 }.
+---@field only? "deformable"|"rigid" object_type of the suites that it applies to; others are not run, and their row says N/A.
 
----What an experiment leaves behind besides its rows.
+---Summary of an experiment.
 ---@class softvt.Finish
 ---@field text? string Printed after the rows.
----@field files? table<string, string|softvt.Image|table<string, any>|any[]> Files to write, by relative path: text as it is, pictures as PNG, tables as JSON with sorted keys.
+---@field files? table<string, string|softvt.Image|table<string, any>|any[]> Files to write, by relative path: text as it is, images as PNG, tables as JSON with sorted keys.
 
----An option of the script: key gap_mm is --gap-mm on the command line. The default gives the type.
----@class softvt.Option
----@field default any A number, string, boolean, or list of numbers or strings.
----@field integer? boolean Whether only whole numbers are taken. Default false.
----@field unit? string Unit of a number. Default "".
----@field min? number Lowest number. Expects a number.
----@field max? number Highest number. Expects a number.
----@field choices? string[] The only strings allowed.
----@field help? string What it does, for --help. Default "".
-
----An asset put somewhere. Give at or xyz.
----@class softvt.Place
----@field name string Name in the scene, unique.
----@field asset softvt.Asset What it is.
----@field at? number[] x, y; it stands on the table, or on what `on` names. Expects a list of 2 numbers (m, world).
----@field xyz? number[] Its origin: lowest point, on the centre line. Expects a list of 3 numbers (m, world).
----@field yaw? number Turn about the vertical. Expects radians. Default 0.
----@field on? string Scene name of an object or part (cabinet.top_drawer) that it stands on (with at).
----@field joints? table<string, number> Start values of an articulated object's joints by part; 0, or the nearest limit, by default.
-
----A pose in the world frame. Without a quaternion the hand points straight down.
----@class softvt.PoseSpec
----@field xyz number[] Position. Expects a list of 3 numbers (m, world).
----@field yaw? number Turn of the downward hand about the vertical. Expects radians. Default 0.
----@field quat? number[] Orientation instead of yaw. Expects a list of 4 numbers (w, x, y, z).
-
----How a hand would be held, and what it may touch.
+---The hand of a clearance query, and the objects it may touch.
 ---@class softvt.Clearance
----@field width? number Distance of the pads. Expects metres in 0..0.08. Default 0.08.
----@field ignore? string[] Scene names of what it may touch.
+---@field width? number Distance of the gels. Expects metres in 0..0.08. Default 0.08.
+---@field ignore? string[] Scene names of objects that it may touch.
 
----A camera. Give look_at or quat.
----@class softvt.NewCamera
----@field name string Its name, unique; the stream's.
----@field mount? "world"|"hand" What it is fixed to; hand is panda_hand. Default "world".
----@field position number[] Where it is. Expects a list of 3 numbers (m, frame of the mount).
----@field look_at? number[] A point in the middle of the picture. Expects a list of 3 numbers (m, frame of the mount).
----@field up? number[] Upwards in the picture (with look_at); z if left out. Expects a list of 3 numbers (frame of the mount).
----@field quat? number[] How it is turned: it looks along its −z, +y is up. Expects a list of 4 numbers (w, x, y, z, frame of the mount).
----@field fovy? number Vertical field of view. Expects radians in 0.01..2.8. Default 0.8.
----@field near? number Nothing nearer is seen. Expects metres in 0.0001..100. Default 0.01.
----@field far? number Nothing farther is seen. Expects metres in 0.001..10000. Default 20.
----@field width? integer Width of the picture, pixels. Expects a whole number in 1..4096. Default 224.
----@field height? integer Height of the picture, pixels. Expects a whole number in 1..4096. Default 224.
-
----An empty picture.
----@class softvt.NewImage
----@field width integer Width, pixels. Expects a whole number in 1..8192.
----@field height integer Height, pixels. Expects a whole number in 1..8192.
----@field colour number[] Colour all over. Expects a list of 3 numbers (sRGB of 0 to 255).
-
----Where and how a line of text is written.
+---Position and style of a line of text.
 ---@class softvt.Text
 ---@field at number[] Left end of its baseline, from the top left. Expects a list of 2 numbers (pixels).
----@field size? number Height. Expects a number (pixels) in 4..200. Default 18.
+---@field size? number Height of the letters. Expects a number (pixels) in 4..200. Default 18.
 ---@field colour number[] Colour. Expects a list of 3 numbers (sRGB of 0 to 255).
 
----What is drawn.
----@class softvt.See
----@field camera? string A camera of the scene. Default "third_person".
----@field width? integer Width, pixels; the camera's own. Expects a whole number in 1..4096.
----@field height? integer Height, pixels; the camera's own. Expects a whole number in 1..4096.
+---The observations of a policy; nothing else is computed.
+---@class softvt.Observes
+---@field cameras? string[] Names of cameras of the scene.
+---@field touch? boolean True to get the tactile images and markers of the fingers. Default false.
+---@field force? boolean True to get the true forces on the gels, which no real sensor gives; results then say force_observed. Default false.
 
----A world of soft bodies and prescribed or fixed solids, without a robot.
----@class softvt.WorldSpec
----@field dt? number Time step. Expects seconds in 0.00001..0.05. Default 0.016666666666666666.
----@field alpha? number Mass-proportional damping. Expects a number (1/s) in 0..1000. Default 0.
----@field beta_s? number Stiffness-proportional damping. Expects seconds in 0..1. Default 0.005.
----@field gravity? number[] Gravity; {0, 0, -9.81} by default. Expects a list of 3 numbers (m/s²).
----@field sleeping? boolean Whether bodies at rest fall asleep. Default true.
-
----A finite-element soft body in a world.
----@class softvt.WorldSoft
----@field name? string Name, for messages. Default "body".
----@field shape softvt.Shape Its shape.
----@field youngs_pa number Young's modulus. Expects pascals above 0.
----@field poisson number Poisson's ratio. Expects a number in 0..below 0.5.
----@field density number Density. Expects a number (kg/m³) above 0.
----@field resolution? integer Voxels along the longest edge. Expects a whole number in 1..64. Default 6.
----@field grasp_spacing? number Spacing of contact samples on steep surfaces. Expects metres in 0.0001..0.02. Default 0.00075.
----@field friction? softvt.Friction Friction of its surface.
----@field xyz number[] Where its frame is. Expects a list of 3 numbers (m).
----@field turn? number[] Its orientation as axis-angle. Expects a list of 3 numbers (rad).
-
----A solid whose motion is prescribed (kinematic) or that never moves (static).
----@class softvt.WorldSolid
----@field name? string Name, for messages. Default "solid".
----@field shape softvt.Shape Its shape.
----@field friction? softvt.Friction Friction of its surface.
----@field xyz number[] Where its frame is. Expects a list of 3 numbers (m).
----@field turn? number[] Its orientation as axis-angle. Expects a list of 3 numbers (rad).
-
----A scene with the robot, built and settled. The settled shapes are the reference of deformation.
----@class softvt.SimulateSpec
----@field layout softvt.Layout Where things stand.
----@field suite? string Part of the seed. Default "experiment".
----@field episode? integer Part of the seed. Expects a whole number in 0..1000000000. Default 0.
----@field seed? integer Part of the seed. Expects a whole number in 0..1000000000. Default 0.
----@field settings? table<string, table<string, any>> Changes of the mechanics, the robot and the judge: { physics = {…}, robot = {…}, criteria = {…} }.
-
----The rows of a calibration.
----@class softvt.EnvelopeSpec
----@field asset string Asset name.
----@field kappa? number τ = κ D_ref. Expects a number in 0..1. Default 0.5.
----@field fingerprint? string What was calibrated, as simulation:watch tells it; another object of that name is then not taken for it.
----@field holds table<string, any>[] Rows closure, trials, held, slip_mm, d_peak_pct of the lower-bound scan.
----@field sweep table<string, any>[] Rows closure, gripper_width_mm, d_peak_pct, force_n, min_det_f, node_speed_m_s, both_pads, slip_mm, stable of the compression sweep.
-
----What a policy looks at; nothing else is computed.
----@class softvt.Looks
----@field cameras? string[] Cameras of the scene, by name.
----@field touch? boolean Whether it feels what the fingers feel. Default false.
----@field force? boolean Whether it gets the true forces on the gels, which no real sensor gives: results say force_observed. Default false.
-
----A command for one control step (0.05 s): a pose of the tool centre point in the robot's base frame and a closure. Give axis_angle or rotation.
+---A command for one control step (0.05 s): a pose of the tool centre point in the robot's base frame, and a closure. Give either axis_angle or rotation.
 ---@class softvt.Action
 ---@field position number[] Position. Expects a list of 3 numbers (m, base frame).
 ---@field axis_angle? number[] Orientation as axis-angle. Expects a list of 3 numbers (rad, base frame).
 ---@field rotation? number[] Orientation as quaternion. Expects a list of 4 numbers (w, x, y, z, base frame).
----@field closure number Gripper, 0 open to 1 shut. Expects a number in 0..1.
+---@field closure number Gripper closure: 0 is open, 1 is closed. Expects a number in 0..1.
 
----One entry of the observations that a server gets.
+---One entry of the observations that are sent to a policy server.
 ---@class softvt.Input
----@field keys string[] Keys it is sent under.
----@field source "camera"|"state"|"prompt"|"tactile_image"|"tactile"|"marker_motion"|"force" What it is: a camera's picture; numbers of the robot; the instruction; the mosaic of 8 tactile pictures of both fingers; the last picture of one finger; the markers' first and last 8 places; the last 8 true forces on the gels.
----@field camera? string With camera: its name in the scene.
----@field half_turn? boolean With camera: whether the picture is turned by half a turn.
----@field parts? ("position"|"axis_angle"|"quaternion_wxyz"|"quaternion_xyzw"|"joints"|"gripper_width"|"finger_position"|"finger_pair"|"closure")[] With state: its parts in order, of 3, 3, 4, 4, 7, 1, 1, 2 and 1 numbers, in m and rad in the base frame.
----@field layout? "rows"|"columns" With tactile_image: the left finger above (rows, if left out) or at the left.
----@field finger? "left"|"right" With tactile: which.
+---@field keys string[] Keys under which it is sent.
+---@field source "camera"|"state"|"prompt"|"tactile_image"|"tactile"|"marker_motion"|"force" Content: the image of a camera; numbers of the robot's state; the prompt; the mosaic of 8 tactile images of both fingers; the latest image of one finger; the first and the last 8 marker positions; the last 8 true forces on the gels.
+---@field camera? string For camera: its name in the scene.
+---@field half_turn? boolean For camera: true to rotate the image by 180°.
+---@field parts? ("position"|"axis_angle"|"quaternion_wxyz"|"quaternion_xyzw"|"joints"|"gripper_width"|"finger_position"|"finger_pair"|"closure")[] For state: its parts in order, of 3, 3, 4, 4, 7, 1, 1, 2 and 1 numbers, in m and rad in the base frame.
+---@field layout? "rows"|"columns" For tactile_image: the left finger above the right one (rows, the default) or left of it.
+---@field finger? "left"|"right" For tactile: the finger.
 
----How the numbers of an action are read: three of position, three of orientation (axis-angle), one of the gripper; more are padding.
+---The meaning of the numbers of an action: three of position, three of orientation (axis-angle), one of the gripper; further ones are padding.
 ---@class softvt.ActionEncoding
----@field pose "absolute"|"delta"|"delta_osc" absolute: a pose in the base frame. delta: shares -1 to 1 of a step away from where the tool is. delta_osc: the same, as far as robosuite's controller gets within a control step.
----@field translation_m? number With delta and delta_osc: the step that 1 means, m. Expects a number in above 0..10.
----@field rotation_rad? number With delta and delta_osc: the turn that 1 means, rad. Expects a number in above 0..10.
----@field scale? number[] The first six numbers are multiplied by these first. Expects a list of 6 numbers.
----@field offset? number[] Then these are added. Expects a list of 6 numbers.
----@field length? integer How many numbers an action must have, padding included; any from 7 on if left out. Expects a whole number in 7..4096.
+---@field pose "absolute"|"delta"|"delta_osc" absolute: a pose in the base frame. delta: shares -1 to 1 of a step away from the tool's pose. delta_osc: the same, reduced to what robosuite's controller reaches within a control step.
+---@field translation_m? number For delta and delta_osc: the step of a share of 1, m. Expects a number in above 0..10.
+---@field rotation_rad? number For delta and delta_osc: the rotation of a share of 1, rad. Expects a number in above 0..10.
+---@field scale? number[] Factors on the first six numbers, applied first. Expects a list of 6 numbers.
+---@field offset? number[] Offsets added after that. Expects a list of 6 numbers.
+---@field length? integer Length that an action must have, padding included; any from 7 by default. Expects a whole number in 7..4096.
 ---@field gripper softvt.GripperValues The seventh number.
 
----The seventh number of an action: one value opens, one shuts, those between in proportion.
+---The seventh number of an action. Values between open and closed close in proportion.
 ---@class softvt.GripperValues
----@field open number The value that opens. Expects a number.
----@field shut number The value that shuts. Expects a number.
----@field binary? boolean Whether all beyond the middle shuts and all else opens. Default false.
+---@field open number Value that opens the gripper. Expects a number.
+---@field closed number Value that closes it. Expects a number.
+---@field binary? boolean True if every value beyond the middle closes, and any other opens. Default false.
+
+---An option of the script: key gap_mm is --gap-mm on the command line. The default determines the type.
+---@class softvt.Option
+---@field default any A number, string, boolean, or list of numbers or strings.
+---@field integer? boolean True if only whole numbers are allowed. Default false.
+---@field unit? string Unit of a number. Default "".
+---@field min? number Lowest number. Expects a number.
+---@field max? number Highest number. Expects a number.
+---@field choices? string[] The allowed strings; any by default.
+---@field help? string Description for --help. Default "".
+
+---A world of soft bodies among fixed or prescribed solids, without a robot.
+---@class softvt.WorldSpec
+---@field dt? number Time step. Expects seconds in 0.00001..0.05. Default 0.016666666666666666.
+---@field rayleigh_mass? number Mass-proportional Rayleigh damping. Expects a number (1/s) in 0..1000. Default 0.
+---@field rayleigh_stiffness? number Stiffness-proportional Rayleigh damping. Expects seconds in 0..1. Default 0.005.
+---@field gravity? number[] Gravity; {0, 0, -9.81} by default. Expects a list of 3 numbers (m/s²).
+---@field sleeping? boolean True if bodies at rest fall asleep. Default true.
+
+---A scene with the robot, which is built and settled. Deformation refers to the settled shapes.
+---@class softvt.SimulateSpec
+---@field layout softvt.Layout Initial scene.
+---@field suite? string Part of the seed. Default "experiment".
+---@field episode? integer Part of the seed. Expects a whole number in 0..1000000000. Default 0.
+---@field seed? integer Part of the seed. Expects a whole number in 0..1000000000. Default 0.
+---@field settings? table<string, table<string, any>> Changed settings of physics, robot and judge: { physics = {…}, robot = {…}, criteria = {…} }.
+
+---The rows of a calibration.
+---@class softvt.EnvelopeSpec
+---@field asset string Name of the asset.
+---@field kappa? number Safety factor κ of the deformation limit τ = κ D_ref. Expects a number in 0..1. Default 0.5.
+---@field fingerprint? string Fingerprint of the calibrated asset, as simulation:measure returns it. Results for another object of that name then do not use the calibration.
+---@field holds table<string, any>[] Rows closure, trials, held, slip_mm, d_peak_pct of the scan for the lower bound.
+---@field sweep table<string, any>[] Rows closure, gripper_width_mm, d_peak_pct, force_n, min_det_f, node_speed_m_s, both_pads, slip_mm, stable of the compression sweep.
+
+---An image of one colour.
+---@class softvt.NewImage
+---@field width integer Width, pixels. Expects a whole number in 1..8192.
+---@field height integer Height, pixels. Expects a whole number in 1..8192.
+---@field colour number[] Colour. Expects a list of 3 numbers (sRGB of 0 to 255).
+
+---A pose in the world frame. Without a quaternion the hand points straight down.
+---@class softvt.PoseSpec
+---@field xyz number[] Position. Expects a list of 3 numbers (m, world).
+---@field yaw? number Rotation of the downward hand about the vertical. Expects radians. Default 0.
+---@field quat? number[] Orientation instead of yaw, of any length but 0. Expects a list of 4 numbers (w, x, y, z).
+
+---A closed surface from an OBJ, STL or GLB file.
+---@class softvt.MeshSpec
+---@field file string Path inside of the project, next to the Lua file or from a root folder.
+---@field scale? number Metres per unit of the file: 0.001 for millimetres. Expects metres above 0. Default 1.
+---@field z_up? boolean True if z is up in the file; otherwise y is. Default true.
 
 ---A box centred on the origin.
 ---@class softvt.BoxSpec
@@ -322,90 +283,38 @@
 
 ---An ellipsoid centred on the origin.
 ---@class softvt.EllipsoidSpec
----@field size number[] Lengths of the axes (diameters). Expects a list of 3 numbers (m).
+---@field size number[] Diameters along x, y and z. Expects a list of 3 numbers (m).
 
----A capsule about the z axis, centred on the origin.
+---A capsule along the z axis, centred on the origin.
 ---@class softvt.CapsuleSpec
 ---@field radius number Radius. Expects metres above 0.
----@field length number Total length, caps included; at least twice the radius. Expects metres above 0.
+---@field length number Total length including the caps; at least twice the radius. Expects metres above 0.
 
----A cylinder about the z axis, centred on the origin.
+---A cylinder along the z axis, centred on the origin.
 ---@class softvt.CylinderSpec
 ---@field radius number Radius. Expects metres above 0.
 ---@field height number Height. Expects metres above 0.
 
 ---A torus about the z axis, centred on the origin.
 ---@class softvt.TorusSpec
----@field major number Radius of the middle of the tube. Expects metres above 0.
+---@field major number Radius of the centre line of the tube. Expects metres above 0.
 ---@field minor number Radius of the tube, less than major. Expects metres above 0.
 
 ---A triangular prism along y in a box centred on the origin.
 ---@class softvt.WedgeSpec
 ---@field size number[] Edge lengths of the box. Expects a list of 3 numbers (m).
----@field apex? number Where the top edge lies across the width: -1 and 1 are the sides, 0 the middle. Expects a number in -1..1. Default 0.
+---@field apex? number Position of the top edge across the width: -1 and 1 are the sides, 0 the middle. Expects a number in -1..1. Default 0.
 
----A polygon in (x, z), drawn out along y, centred on y = 0.
+---A polygon in (x, z), extruded along y and centred on y = 0.
 ---@class softvt.PrismSpec
 ---@field corners number[][] Corners (x, z) in order.
 ---@field length number Length along y. Expects metres above 0.
 
 ---A profile revolved about the z axis.
 ---@class softvt.LatheSpec
----@field corners number[][] Corners (r, z) in order, r of 0 or more.
+---@field corners number[][] Corners (r, z) in order, with r ≥ 0.
 
----A turn about an axis through the origin.
----@class softvt.RotateSpec
----@field axis "x"|"y"|"z" The axis.
----@field angle number Angle, right-handed. Expects radians.
-
----A twist about an axis through the origin.
----@class softvt.TwistSpec
----@field axis "x"|"y"|"z" The axis.
----@field rate number Turn along the axis. Expects a number (rad/m).
-
----A bend into an arc; the origin stays.
----@class softvt.BendSpec
----@field along "x"|"y"|"z" The axis that becomes an arc.
----@field towards "x"|"y"|"z" The axis on which the centre of the arc lies.
----@field curvature number Curvature of the arc. Expects a number (1/m).
-
----Regular ridges: rings, flutes, screws or spirals.
----@class softvt.RidgesSpec
----@field axis? "x"|"y"|"z" The axis they go around or along. Default "z".
----@field height number From valley to crest; negative for grooves. Expects metres.
----@field count? integer Ridges around the axis. Expects a whole number in -1000..1000. Default 0.
----@field pitch? number Distance of ridges along the axis. Expects metres above 0.
----@field radial_pitch? number Distance of ridges away from the axis. Expects metres above 0.
----@field phase? number Phase. Expects radians. Default 0.
----@field sharpness? number 1 is a sine; larger is narrower. Expects a number in 1..8. Default 1.
----@field mask? softvt.MaskSpec Where they are.
-
----Scattered bumps (seeds, raisins).
----@class softvt.BumpsSpec
----@field height number Height; negative for pits. Expects metres.
----@field radius number Radius of a bump, at most half the spacing. Expects metres above 0.
----@field spacing number Mean distance of bumps. Expects metres above 0.
----@field seed? integer Selects where they are. Expects a whole number of 0 or more. Default 0.
----@field mask? softvt.MaskSpec Where they are.
-
----Another material on all or part of the surface.
----@class softvt.PaintSpec
----@field material integer Material id: index into visuals, from 0. Expects a whole number in 0..65535.
----@field region? softvt.Shape Where; everywhere if left out.
-
----A weight that rises smoothly from 0 to 1 along an axis.
----@class softvt.MaskSpec
----@field axis "x"|"y"|"z" The axis.
----@field from number Where it is 0. Expects metres.
----@field to number Where it is 1. Expects metres.
-
----A closed surface from an OBJ, STL or GLB file.
----@class softvt.MeshSpec
----@field file string Path inside of the project.
----@field scale? number Metres in a unit of the file: 0.001 for millimetres. Expects metres above 0. Default 1.
----@field z_up? boolean Whether z is up in the file; otherwise y is. Default true.
-
----Cubes, every other one 1; a corner lies at the origin.
+---Cubes, every other one 1; one corner is at the origin.
 ---@class softvt.CheckerMask
 ---@field size_m number Edge of a cube. Expects metres above 0.
 
@@ -413,30 +322,30 @@
 ---@class softvt.StripesMask
 ---@field axis "x"|"y"|"z"|number[] Direction in which they follow each other.
 ---@field pitch_m number Distance from one to the next. Expects metres above 0.
----@field share? number Share of it that is 1. Expects a number in 0..1. Default 0.5.
+---@field share? number Share of the pitch that is 1. Expects a number in 0..1. Default 0.5.
 
 ---Rises smoothly from 0 to 1 along an axis.
 ---@class softvt.GradientMask
 ---@field axis? "x"|"y"|"z"|number[] Direction. Default "z".
----@field from_m number Where it is 0. Expects metres.
----@field to_m number Where it is 1; may lie below from_m. Expects metres.
+---@field from_m number Coordinate at which it is 0. Expects metres.
+---@field to_m number Coordinate at which it is 1; may be below from_m. Expects metres.
 
----Cloudy noise; its values lie about 0.5, few below 0.2 or above 0.8.
+---Cloudy noise with values around 0.5, few below 0.2 or above 0.8.
 ---@class softvt.NoiseMask
----@field size_m number|number[] Size of the coarsest features, one for all or one for each of x, y and z.
+---@field size_m number|number[] Size of the coarsest features: one number for all axes, or one for each of x, y and z.
 ---@field octaves? integer Octaves, each half the size and half the weight of the one before. Expects a whole number in 1..8. Default 3.
 ---@field from? number Value of the noise that becomes 0. Expects a number in -1..2. Default 0.35.
----@field to? number Value that becomes 1; may lie below from. Expects a number in -1..2. Default 0.65.
+---@field to? number Value of the noise that becomes 1; may be below from. Expects a number in -1..2. Default 0.65.
 ---@field seed? integer Selects the pattern. Expects a whole number in 0..4294967295. Default 0.
 
----Year rings of a trunk: cylinders about a line along z, bent by noise.
+---Annual rings of a trunk: cylinders about a line along z, distorted by noise.
 ---@class softvt.RingsMask
 ---@field centre_m number[] A point of the line. Expects a list of 3 numbers (m).
 ---@field pitch_m number Distance from one ring to the next. Expects metres above 0.
----@field wobble_m? number How far noise bends them. Expects metres above 0. Default 0.01.
+---@field wobble_m? number Amplitude of the distortion. Expects metres above 0. Default 0.01.
 ---@field seed? integer Selects the pattern. Expects a whole number in 0..4294967295. Default 0.
 
----Boards that lie along x, side by side in y: one value a board.
+---Boards along x, side by side in y, with one value per board.
 ---@class softvt.BoardsMask
 ---@field length_m number Length of a board. Expects metres above 0.
 ---@field width_m number Width of a board. Expects metres above 0.
@@ -448,7 +357,7 @@
 ---@field width_m number Width of a board. Expects metres above 0.
 ---@field gap_m number Width of a gap. Expects metres above 0.
 
----Round specks, strewn about.
+---Scattered round specks.
 ---@class softvt.SpecksMask
 ---@field spacing_m number Mean distance. Expects metres above 0.
 ---@field radius_m number Radius, at most half the spacing. Expects metres above 0.
@@ -458,92 +367,183 @@
 ---@class softvt.WeaveMask
 ---@field pitch_m number Width of a thread. Expects metres above 0.
 
----Where the surface faces a direction, by the cosine between its normal and that.
+---Surfaces that face a direction, by the cosine between their normal and that direction.
 ---@class softvt.FacingMask
 ---@field axis? "x"|"y"|"z"|number[] Direction. Default "z".
 ---@field from? number Cosine at which it is 0. Expects a number in -1..1. Default 0.
----@field to? number Cosine at which it is 1; may lie below from. Expects a number in -1..1. Default 1.
+---@field to? number Cosine at which it is 1; may be below from. Expects a number in -1..1. Default 1.
 
----Where a shape is: a painted rim, the grooves between ridges.
+---The inside of a shape: a painted rim, the grooves between ridges.
 ---@class softvt.InsideMask
 ---@field shape softvt.Shape The shape.
 ---@field soft_m? number Width of the border, half of it on either side of the shape's surface. Expects metres of 0 or more. Default 0.
 
----The letters of a line of text, printed on what faces who reads it. Surfaces with text are drawn with finer detail than others.
+---The letters of a line of text, printed on surfaces that face the reader. Surfaces with text are drawn in finer detail.
 ---@class softvt.TextMask
----@field text string What it says: at most 64 letters.
+---@field text string At most 64 letters.
 ---@field height_m number Height of a capital letter. Expects metres in 0.0005..1.
----@field at number[] Where the middle of the line is; of a line that is wrapped, only its height counts. Expects a list of 3 numbers (m).
----@field facing "+x"|"-x"|"+y"|"-y"|"+z"|"-z"|number[] Where the printed surface looks. Lines on top have their head towards +y, others towards +z.
----@field turn? number Turn of the line on its surface, counter-clockwise to who reads it. Expects radians. Default 0.
----@field wrap_m? number Radius of the upright cylinder about the z axis that the line is laid round; flat if left out. Expects metres above 0.
----@field weight? number How much strokes are thickened, in heights of a capital letter. Expects a number in 0..0.25. Default 0.08.
+---@field at number[] Middle of the line; of a wrapped line, only the height counts. Expects a list of 3 numbers (m).
+---@field facing "+x"|"-x"|"+y"|"-y"|"+z"|"-z"|number[] Direction that the printed surface faces. The top of the letters points to +y on top faces, else to +z.
+---@field turn? number Rotation of the line on its surface, counter-clockwise for the reader. Expects radians. Default 0.
+---@field wrap_m? number Radius of the upright cylinder about the z axis that the line is wrapped around; flat by default. Expects metres above 0.
+---@field weight? number Thickening of the strokes, in heights of a capital letter. Expects a number in 0..0.25. Default 0.08.
 ---@field font? "sans"|"mono" Typeface. Default "sans".
 
----A solid. Methods give a new shape and leave this one as it is.
+---A rotation about an axis through the origin.
+---@class softvt.RotateSpec
+---@field axis "x"|"y"|"z" The axis.
+---@field angle number Right-handed angle. Expects radians.
+
+---A twist about an axis through the origin.
+---@class softvt.TwistSpec
+---@field axis "x"|"y"|"z" The axis.
+---@field rate number Angle per length along the axis. Expects a number (rad/m).
+
+---A bend into an arc; the origin stays in place.
+---@class softvt.BendSpec
+---@field along "x"|"y"|"z" The axis that becomes an arc.
+---@field towards "x"|"y"|"z" The axis with the centre of the arc.
+---@field curvature number Curvature of the arc. Expects a number (1/m).
+
+---Adds regular ridges to a shape: rings, flutes, screws or spirals.
+---@class softvt.RidgesSpec
+---@field axis? "x"|"y"|"z" The axis that the ridges run around or along. Default "z".
+---@field height number Height from valley to crest; negative for grooves. Expects metres.
+---@field count? integer Number of ridges around the axis. Expects a whole number in -1000..1000. Default 0.
+---@field pitch? number Distance of ridges along the axis. Expects metres above 0.
+---@field radial_pitch? number Distance of ridges away from the axis. Expects metres above 0.
+---@field phase? number Phase. Expects radians. Default 0.
+---@field sharpness? number 1 is a sine; larger values give narrower ridges. Expects a number in 1..8. Default 1.
+---@field mask? softvt.MaskSpec Weight of their height; 1 everywhere by default.
+
+---Adds scattered bumps to a shape (seeds, raisins).
+---@class softvt.BumpsSpec
+---@field height number Height; negative for pits. Expects metres.
+---@field radius number Radius of a bump, at most half the spacing. Expects metres above 0.
+---@field spacing number Mean distance of bumps. Expects metres above 0.
+---@field seed? integer Selects their positions. Expects a whole number of 0 or more. Default 0.
+---@field mask? softvt.MaskSpec Weight of their height; 1 everywhere by default.
+
+---Gives all or part of the surface another material.
+---@class softvt.PaintSpec
+---@field material integer Material id: index into the asset's visuals, from 0. Expects a whole number in 0..65535.
+---@field region? softvt.Shape Part of the surface inside of this shape; the whole surface by default.
+
+---A finite-element soft body of a world.
+---@class softvt.WorldSoft
+---@field name? string Name in messages. Default "body".
+---@field shape softvt.Shape Shape.
+---@field youngs_pa number Young's modulus. Expects pascals above 0.
+---@field poisson number Poisson's ratio. Expects a number in 0..below 0.5.
+---@field density number Density. Expects a number (kg/m³) above 0.
+---@field resolution? integer Voxels along the longest edge. Expects a whole number in 1..64. Default 6.
+---@field grasp_spacing? number Spacing of contact samples on steep surfaces. Expects metres in 0.0001..0.02. Default 0.00075.
+---@field friction? softvt.Friction Friction of its surface.
+---@field xyz number[] Position of its frame. Expects a list of 3 numbers (m).
+---@field turn? number[] Orientation as axis-angle; none by default. Expects a list of 3 numbers (rad).
+
+---A solid that moves as prescribed (kinematic) or never (static).
+---@class softvt.WorldSolid
+---@field name? string Name in messages. Default "solid".
+---@field shape softvt.Shape Shape.
+---@field friction? softvt.Friction Friction of its surface.
+---@field xyz number[] Position of its frame. Expects a list of 3 numbers (m).
+---@field turn? number[] Orientation as axis-angle; none by default. Expects a list of 3 numbers (rad).
+
+---The camera of an image and its size.
+---@class softvt.Render
+---@field camera? string A camera of the scene. Default "third_person".
+---@field width? integer Width, pixels; the camera's by default. Expects a whole number in 1..4096.
+---@field height? integer Height, pixels; the camera's by default. Expects a whole number in 1..4096.
+
+---Placement of an asset. Give either at or xyz.
+---@class softvt.Place
+---@field name string Name in the scene, unique.
+---@field asset softvt.Asset Asset of the object.
+---@field at? number[] Position x, y; the object rests on the table, or on the object that `on` names. Expects a list of 2 numbers (m, world).
+---@field xyz? number[] Position of its origin: its lowest point, on the centre line. Expects a list of 3 numbers (m, world).
+---@field yaw? number Rotation about the vertical. Expects radians. Default 0.
+---@field on? string Scene name of the object or part (cabinet.top_drawer) that it rests on (with at).
+---@field joints? table<string, number> Start values of an articulated object's joints by part; 0, or the nearest limit, by default.
+
+---A camera. Give either look_at or quat.
+---@class softvt.NewCamera
+---@field name string Name, unique; also that of its image stream.
+---@field mount? "world"|"hand" Frame that the camera is fixed to; hand is panda_hand. Default "world".
+---@field position number[] Position. Expects a list of 3 numbers (m, frame of the mount).
+---@field look_at? number[] A point in the middle of the image. Expects a list of 3 numbers (m, frame of the mount).
+---@field up? number[] Upward direction in the image (with look_at); z by default. Expects a list of 3 numbers (frame of the mount).
+---@field quat? number[] Orientation: the camera looks along its −z axis, and +y is up in the image. Expects a list of 4 numbers (w, x, y, z, frame of the mount).
+---@field fovy? number Vertical field of view. Expects radians in 0.01..2.8. Default 0.8.
+---@field near? number Nearest visible distance. Expects metres in 0.0001..100. Default 0.01.
+---@field far? number Farthest visible distance. Expects metres in 0.001..10000. Default 20.
+---@field width? integer Width of the image, pixels. Expects a whole number in 1..4096. Default 224.
+---@field height? integer Height of the image, pixels. Expects a whole number in 1..4096. Default 224.
+
+---A solid. Methods return a new shape and leave this one as it is.
 ---@class softvt.Shape
 local Shape = {}
 
----Moved by an offset, m.
+---Moves the shape by an offset, m.
 ---@param x number
 ---@param y number
 ---@param z number
 ---@return softvt.Shape
 function Shape:translate(x, y, z) end
 
----Stretched by factors; one factor counts for all axes.
+---Stretches the shape by factors along x, y and z; a single factor holds for all axes.
 ---@param x number
 ---@param y? number
 ---@param z? number
 ---@return softvt.Shape
 function Shape:scale(x, y, z) end
 
----Grown by a radius (m), which rounds convex edges.
+---Grows the shape by a radius (m), which rounds convex edges.
 ---@param radius number
 ---@return softvt.Shape
 function Shape:round(radius) end
 
----The wall of this thickness (m) under the surface.
+---Keeps the wall of this thickness (m) below the surface.
 ---@param wall number
 ---@return softvt.Shape
 function Shape:shell(wall) end
 
----This or the other.
+---Joins two shapes.
 ---@param other softvt.Shape
 ---@return softvt.Shape
 function Shape:union(other) end
 
----This and the other.
+---Keeps the part that lies in both shapes.
 ---@param other softvt.Shape
 ---@return softvt.Shape
 function Shape:intersect(other) end
 
----This without the other; blend (m) rounds the edge.
+---Cuts another shape out of this one; blend (m) rounds the edge.
 ---@param cut softvt.Shape
 ---@param blend? number
 ---@return softvt.Shape
 function Shape:subtract(cut, blend) end
 
----This or the other, with a fillet of width blend (m).
+---Joins two shapes with a fillet of width blend (m).
 ---@param other softvt.Shape
 ---@param blend number
 ---@return softvt.Shape
 function Shape:smooth_union(other, blend) end
 
----Lowest and highest corner of the bounding box, m.
+---Returns the lowest and the highest corner of the bounding box, m.
 ---@return number[]
 ---@return number[]
 function Shape:bounds() end
 
----Its volume, m³.
+---Returns the volume, m³.
 ---@return number
 function Shape:volume() end
 
----Moved so that its lowest point is at z = 0 and its centre on the z axis.
+---Moves the shape so that its lowest point is at z = 0 and its centre on the z axis, as assets require.
 ---@return softvt.Shape
 function Shape:grounded() end
 
----A turn about an axis through the origin.
+---A rotation about an axis through the origin.
 ---@param spec softvt.RotateSpec
 ---@return softvt.Shape
 function Shape:rotate(spec) end
@@ -553,40 +553,40 @@ function Shape:rotate(spec) end
 ---@return softvt.Shape
 function Shape:twist(spec) end
 
----A bend into an arc; the origin stays.
+---A bend into an arc; the origin stays in place.
 ---@param spec softvt.BendSpec
 ---@return softvt.Shape
 function Shape:bend(spec) end
 
----Regular ridges: rings, flutes, screws or spirals.
+---Adds regular ridges to a shape: rings, flutes, screws or spirals.
 ---@param spec softvt.RidgesSpec
 ---@return softvt.Shape
 function Shape:ridges(spec) end
 
----Scattered bumps (seeds, raisins).
+---Adds scattered bumps to a shape (seeds, raisins).
 ---@param spec softvt.BumpsSpec
 ---@return softvt.Shape
 function Shape:bumps(spec) end
 
----Another material on all or part of the surface.
+---Gives all or part of the surface another material.
 ---@param spec softvt.PaintSpec
 ---@return softvt.Shape
 function Shape:paint(spec) end
 
----A number between 0 and 1 at every point of a surface: where a layer is. It never changes; methods give new masks.
+---A weight between 0 and 1 at every point of a surface, for the layers of a visual. A mask never changes; methods return new masks.
 ---@class softvt.Mask
 local Mask = {}
 
----Where this and the other are: their product.
+---Returns the product of two masks: 1 where both are.
 ---@param other softvt.Mask
 ---@return softvt.Mask
 function Mask:both(other) end
 
----Where this is not.
+---Returns 1 minus the mask.
 ---@return softvt.Mask
 function Mask:inverted() end
 
----The mechanics alone: soft bodies among solids that stand still or move as prescribed.
+---The mechanics alone: soft bodies among solids that are fixed or move as prescribed.
 ---@class softvt.World
 local World = {}
 
@@ -595,7 +595,7 @@ local World = {}
 ---@return softvt.Body
 function World:soft(spec) end
 
----Adds a solid that move_to moves.
+---Adds a solid that solid:move_to moves.
 ---@param spec softvt.WorldSolid
 ---@return softvt.Solid
 function World:kinematic(spec) end
@@ -605,87 +605,87 @@ function World:kinematic(spec) end
 ---@return softvt.Solid
 function World:static(spec) end
 
----One time step; false and why once the state is void.
+---Makes one time step. Returns false and the reason once the state is invalid.
 ---@return boolean
 ---@return string?
 function World:step() end
 
----Time, s.
+---Returns the simulated time, s.
 ---@return number
 function World:time() end
 
----Mean and largest number of Newton iterations a step.
+---Returns the mean and the largest number of Newton iterations per step.
 ---@return number
 ---@return integer
 function World:newton() end
 
----Kinetic, elastic and potential energy, J.
+---Returns the sum of kinetic, elastic and potential energy, J.
 ---@return number
 function World:energy() end
 
----From now on, CPU time goes to this phase.
+---Starts a phase: CPU time of later steps counts for it.
 ---@param name string
 function World:phase(name) end
 
----Prints CPU time per simulated time, by phase, to the standard error.
+---Prints CPU time per simulated time, by phase, to standard error.
 function World:report_timing() end
 
 ---A soft body of a world.
 ---@class softvt.Body
 local Body = {}
 
----Centre of mass, m.
+---Returns the centre of mass, m.
 ---@return number[]
 function Body:centre() end
 
----Velocity of the centre of mass, m/s.
+---Returns the velocity of the centre of mass, m/s.
 ---@return number[]
 function Body:velocity() end
 
----Speed of the fastest node, m/s.
+---Returns the speed of the fastest node, m/s.
 ---@return number
 function Body:speed() end
 
----Mass, kg.
+---Returns the mass, kg.
 ---@return number
 function Body:mass() end
 
----Least det F of a filled element; 0 or less is inverted, nil where no element is filled.
+---Returns the least det F of a filled element: 0 or less is inverted, nil if no element is filled.
 ---@return number?
 function Body:min_det_f() end
 
----Whether it sleeps.
+---Returns true if the body sleeps.
 ---@return boolean
 function Body:asleep() end
 
----rms_pct, weighted_pct and max_pct against the reference shape.
----@return table
+---Returns the deformation against the reference shape.
+---@return softvt.Deformation
 function Body:deformation() end
 
----Size of the bounding box of the nodes, m.
+---Returns the size of the bounding box of the nodes, m.
 ---@return number[]
 function Body:extent() end
 
----Measures deformation from the rest shape (default) or from now.
+---Sets the reference shape of deformation: the rest shape (at the start) or the present one.
 ---@param which "rest"|"now"
 function Body:set_reference(which) end
 
----Normal force of a solid on the body, N.
+---Returns the normal force of a solid on the body, N.
 ---@param solid softvt.Solid
 ---@return number
 function Body:force(solid) end
 
----Tangential force of a solid on the body, N.
+---Returns the tangential force of a solid on the body, N.
 ---@param solid softvt.Solid
 ---@return number
 function Body:shear(solid) end
 
----How far the patch has slid on the solid, mm.
+---Returns the distance that the contact patch has slid on a solid, mm.
 ---@param solid softvt.Solid
 ---@return number
 function Body:travel(solid) end
 
----Share of the patch's samples that slip, 0..1.
+---Returns the share of the contact patch's samples that slip, 0..1.
 ---@param solid softvt.Solid
 ---@return number
 function Body:slipping(solid) end
@@ -694,171 +694,208 @@ function Body:slipping(solid) end
 ---@class softvt.Solid
 local Solid = {}
 
----Where it will be after the next step: position, m, and axis-angle, rad.
+---Prescribes the pose after the next step: position, m, and orientation as axis-angle, rad (none by default).
 ---@param xyz number[]
 ---@param turn? number[]
 function Solid:move_to(xyz, turn) end
+
+---Deformation of a body against its reference shape, in percent of the diagonal of its bounding box.
+---@class softvt.Deformation
+---@field rms_pct number Root mean square over the nodes.
+---@field weighted_pct number The same, weighted by mass.
+---@field max_pct number Largest displacement.
+local Deformation = {}
 
 ---A settled scene with the robot.
 ---@class softvt.Simulation
 local Simulation = {}
 
----Runs an expert to its end; false and why once it has given up or the physics has failed.
+---Runs an expert to its end. Returns false and the reason if it gave up or the physics failed.
 ---@param expert fun(arm: softvt.Arm, scene: softvt.View)
 ---@return boolean
 ---@return string?
 function Simulation:drive(expert) end
 
----Holds the last command for a time.
+---Holds the last command for a time. Returns false and the reason if the physics failed.
 ---@param seconds number
 ---@return boolean
 ---@return string?
 function Simulation:wait(seconds) end
 
----width_m, height_m (rise of the centre), speed, asset; of a part joint, of what has parts joints by name; of a movable object also pad_force (N) and slip_mm of the left and right pad, and of a soft one d_pct, d_peak_pct, min_det_f, asleep.
+---Returns measurements of an object.
 ---@param object string
----@return table
-function Simulation:watch(object) end
+---@return softvt.Measurements
+function Simulation:measure(object) end
 
----What a camera sees now; third_person if nothing else is said.
----@param see? softvt.See
+---Renders the image of a camera, by default third_person.
+---@param spec? softvt.Render
 ---@return softvt.Image
-function Simulation:see(see) end
+function Simulation:render(spec) end
 
----What a finger's tactile sensor sees now, and the true force on its gel.
+---Returns the reading of a finger's tactile sensor, with the true force on its gel.
 ---@param side "left"|"right"
----@return softvt.Felt
-function Simulation:feel(side) end
+---@return softvt.TactileReading
+function Simulation:tactile(side) end
 
----Time since settling, s.
+---Returns the time since settling, s.
 ---@return number
 function Simulation:time() end
 
----Tool position, m, and axis-angle, rad, world.
+---Returns the pose of the tool centre point in the world frame: position, m, and orientation as axis-angle, rad.
 ---@return number[]
 ---@return number[]
 function Simulation:tool() end
 
----A finger's tactile sensor at one moment; docs/tactile.md draws its frames.
----@class softvt.Felt
----@field picture softvt.Image The colour picture, 320 × 240.
----@field dots softvt.Image The same with its markers as dots.
----@field arrows softvt.Image The same with the motion of its markers as arrows, lengthened.
----@field initial number[][] Places of the 99 markers without a touch, px, row by row.
----@field present number[][] Their places now, px.
----@field markers softvt.Markers The markers, with what their motion says.
----@field force number[] True force on the gel, N, pad frame; a pressing body makes z negative.
----@field depth_mm number Greatest depth of the dent, mm.
-local Felt = {}
+---Measurements of an object. Fields that do not apply to it are nil.
+---@class softvt.Measurements
+---@field width_m number? Measured distance of the gels, m.
+---@field height_m number? Rise of the object's centre since settling, m.
+---@field speed number? Speed; of a soft body that of its fastest node, m/s.
+---@field asset string Name of its asset.
+---@field fingerprint string Fingerprint of its asset.
+---@field joint number? Joint value of a part, m or rad.
+---@field joints table<string, number> Joint values of an articulated object by part, m or rad.
+---@field pad_force number[]? Normal force of the left and the right pad on a movable object, N.
+---@field slip_mm number[]? Distance that a movable object has slid on the left and the right pad, mm.
+---@field d_pct number? Deformation D of a soft body, %.
+---@field d_peak_pct number? Largest D since settling, %.
+---@field min_det_f number? Least det F of a filled element of a soft body.
+---@field asleep boolean? True if a soft body sleeps.
+local Measurements = {}
 
----A picture of 8-bit sRGB pixels. Regions are x, y, width, height in pixels from the top left.
+---The tactile sensor of a finger, with the true force on its gel; docs/tactile.md draws its frames.
+---@class softvt.TactileReading
+---@field image softvt.Image Colour image, 320 × 240.
+---@field dots softvt.Image The image with its markers as dots.
+---@field arrows softvt.Image The image with the displacements of its markers as lengthened arrows.
+---@field initial number[][] Positions of the 99 markers on the untouched gel, px, row by row.
+---@field present number[][] Their present positions, px.
+---@field markers softvt.Markers The markers with the measures of their displacements.
+---@field force number[] True force on the gel, N, pad frame; a pressing body makes z negative.
+---@field depth_mm number Largest depth of the indentation, mm.
+local TactileReading = {}
+
+---Results of a calibration.
+---@class softvt.Envelope
+---@field lower number? Smallest closure that holds the object.
+---@field closure_at_tau number? Closure at which the deformation reaches τ.
+---@field safe_window boolean True if the lower bound is below closure_at_tau.
+---@field tau number? Deformation limit τ, %.
+---@field d_ref number? Largest stable deformation D_ref, %.
+---@field text string A plot of deformation over closure as text.
+---@field sweep string The rows of the sweep as JSON lines.
+---@field json string The calibration file as JSON text.
+---@field table table The same as a table.
+local Envelope = {}
+
+---An image of 8-bit sRGB pixels. Regions are x, y, width, height in pixels from the top left.
 ---@class softvt.Image
 ---@field width integer Width, pixels.
 ---@field height integer Height, pixels.
 local Image = {}
 
----Mean red, green and blue, 0..255.
+---Returns the mean red, green and blue of a region, or of the whole image, 0..255.
 ---@param region? number[]
 ---@return number[]
 function Image:mean(region) end
 
----Red, green and blue of a pixel, 0..255; the first is 0, 0.
+---Returns red, green and blue of a pixel, 0..255; the top left pixel is 0, 0.
 ---@param x integer
 ---@param y integer
 ---@return number[]
 function Image:pixel(x, y) end
 
----A part as a picture of its own.
+---Returns a region as an image of its own.
 ---@param region number[]
 ---@return softvt.Image
 function Image:crop(region) end
 
----The same in another size.
+---Returns the image in another size.
 ---@param width integer
 ---@param height integer
 ---@return softvt.Image
 function Image:resize(width, height) end
 
----Puts another picture on this one.
+---Copies another image onto this one, with its top left pixel at x, y.
 ---@param other softvt.Image
 ---@param x number
 ---@param y number
 function Image:paste(other, x, y) end
 
----Writes a line of text on it.
+---Writes a line of text on the image.
 ---@param text string
----@param how softvt.Text
-function Image:text(text, how) end
+---@param style softvt.Text
+function Image:text(text, style) end
 
 ---An immutable pose in the world frame.
 ---@class softvt.Pose
----@field x number Position, m.
----@field y number Position, m.
----@field z number Position, m.
----@field xyz number[] Position, m.
----@field quat number[] Orientation w, x, y, z with w of 0 or more.
+---@field x number Position along x, m.
+---@field y number Position along y, m.
+---@field z number Position along z, m.
+---@field xyz number[] Position x, y, z, m.
+---@field quat number[] Orientation as quaternion w, x, y, z with w ≥ 0.
 local Pose = {}
 
----Moved by an offset in the world frame, m.
+---Returns the pose moved by an offset in the world frame, m.
 ---@param by number[]
 ---@return softvt.Pose
 function Pose:moved(by) end
 
----The same orientation at another place, m.
+---Returns the same orientation at another position, m.
 ---@param xyz number[]
 ---@return softvt.Pose
 function Pose:at(xyz) end
 
----Turned where it is about the world's vertical, rad.
+---Returns the same position, rotated by an angle about the world's vertical, rad.
 ---@param angle number
 ---@return softvt.Pose
 function Pose:turned(angle) end
 
----Part of the way to another pose: 0 is here, 1 there.
+---Interpolates towards another pose: a share of 0 returns this pose, 1 the other.
 ---@param other softvt.Pose
 ---@param share number
 ---@return softvt.Pose
 function Pose:towards(other, share) end
 
----Metres and radians to another pose.
+---Returns the distance to another pose, m, and the angle between the orientations, rad.
 ---@param other softvt.Pose
 ---@return number
 ---@return number
 function Pose:distance(other) end
 
----A named stream of random numbers, a function of suite, layout, episode, seed and split alone.
+---A named stream of random numbers, determined by suite, layout, episode, seed and split.
 ---@class softvt.Rng
 local Rng = {}
 
----Another stream, from its start.
+---Returns another stream, from its start. Draws from one stream do not change those from another.
 ---@param name "layout"|"arm"|"material"|"light"|"camera"|"sensor"|"expert"|"script"|"policy"
 ---@return softvt.Rng
 function Rng:stream(name) end
 
----Uniform from a to below b.
----@param a number
----@param b number
+---Returns a number uniformly distributed from low (included) to high (excluded).
+---@param low number
+---@param high number
 ---@return number
-function Rng:uniform(a, b) end
+function Rng:uniform(low, high) end
 
----Normally distributed.
+---Returns a normally distributed number; sigma is the standard deviation.
 ---@param mean number
 ---@param sigma number
 ---@return number
 function Rng:normal(mean, sigma) end
 
----Whole number, both ends included.
+---Returns a whole number from low to high, both included.
 ---@param low integer
 ---@param high integer
 ---@return integer
 function Rng:int(low, high) end
 
----One of a list.
+---Returns one entry of a list.
 ---@param list any[]
 ---@return any
 function Rng:choice(list) end
 
----A copy in random order.
+---Returns a copy of a list in random order.
 ---@param list any[]
 ---@return any[]
 function Rng:shuffle(list) end
@@ -866,172 +903,172 @@ function Rng:shuffle(list) end
 ---The scene that a layout or a shift builds.
 ---@class softvt.Scene
 ---@field objects softvt.Object[] The placed objects, in order.
----@field light softvt.Light The light on them.
----@field base number[] Place of the robot base. Expects a list of 3 numbers (m, world).
----@field start_q number[] Joint angles of the arm at the start. Expects a list of 7 numbers (rad).
+---@field light softvt.Light The light.
+---@field base number[] Position of the robot base. Expects a list of 3 numbers (m, world).
+---@field start_q number[] Joint angles of the arm at the start, within its limits. Expects a list of 7 numbers (rad).
 ---@field gravity number[] Gravity. Expects a list of 3 numbers (m/s², world).
 ---@field workspace_min number[] Lowest corner of the workspace. Expects a list of 3 numbers (m, world).
 ---@field workspace_max number[] Highest corner of the workspace. Expects a list of 3 numbers (m, world).
 local Scene = {}
 
----Puts an asset somewhere.
----@param place softvt.Place
-function Scene:add(place) end
+---Adds an object: `scene:add { name = "left", asset = bun, at = { 0.1, -0.2 }, yaw = 0.5 }`.
+---@param spec softvt.Place
+function Scene:add(spec) end
 
----A placed object.
+---Returns a placed object by name.
 ---@param name string
 ---@return softvt.Object
 function Scene:object(name) end
 
----A camera; every scene has third_person and wrist.
+---Returns a camera by name; every scene has third_person and wrist.
 ---@param name string
 ---@return softvt.Camera
 function Scene:camera(name) end
 
----One more camera.
----@param camera softvt.NewCamera
+---Adds a camera and returns it.
+---@param spec softvt.NewCamera
 ---@return softvt.Camera
-function Scene:add_camera(camera) end
+function Scene:add_camera(spec) end
 
----The light of a scene: one key light and a sky. Its numbers may be read and written.
+---The light of a scene: a key light and a sky.
 ---@class softvt.Light
 ---@field direction number[] Direction to the key light. Expects a list of 3 numbers (world, any length).
 ---@field colour number[] Colour of the key light. Expects a list of 3 numbers (linear RGB).
----@field strength number Strength of the key light; 1 shows white at full value. Expects a number in 0..1000.
----@field softness number Half the angle under which it is seen. Expects radians in 0..0.5.
+---@field strength number Strength of the key light; 1 shows a white surface at full value. Expects a number in 0..1000.
+---@field softness number Half of the angle under which the key light is seen; larger values give softer shadows. Expects radians in 0..0.5.
 ---@field sky_zenith number[] Light from straight above. Expects a list of 3 numbers (linear RGB).
----@field sky_horizon number[] Light from the horizon, and the backdrop. Expects a list of 3 numbers (linear RGB).
+---@field sky_horizon number[] Light from the horizon, and the background. Expects a list of 3 numbers (linear RGB).
 ---@field sky_ground number[] Light from straight below. Expects a list of 3 numbers (linear RGB).
 ---@field sky_strength number Factor on the sky. Expects a number in 0..1000.
----@field exposure number Factor on the picture. Expects a number in above 0..1000.
+---@field exposure number Factor on the whole image. Expects a number in above 0..1000.
 local Light = {}
 
----A pinhole camera; its numbers may be read and written.
+---A pinhole camera of a scene.
 ---@class softvt.Camera
----@field name string Its name.
----@field mount "world"|"hand" What it is fixed to.
----@field position number[] Where it is. Expects a list of 3 numbers (m, frame of the mount).
----@field quat number[] How it is turned: it looks along its −z, +y is up. Expects a list of 4 numbers (w, x, y, z, frame of the mount).
+---@field name string Name.
+---@field mount "world"|"hand" Frame that the camera is fixed to.
+---@field position number[] Position. Expects a list of 3 numbers (m, frame of the mount).
+---@field quat number[] Orientation: the camera looks along its −z axis, and +y is up in the image. Expects a list of 4 numbers (w, x, y, z, frame of the mount).
 ---@field fovy number Vertical field of view. Expects radians in 0.01..2.8.
----@field near number Nothing nearer is seen. Expects metres in 0.0001..100.
----@field far number Nothing farther is seen. Expects metres in 0.001..10000.
----@field width integer Width of the picture, pixels. Expects a whole number in 1..4096.
----@field height integer Height of the picture, pixels. Expects a whole number in 1..4096.
+---@field near number Nearest visible distance. Expects metres in 0.0001..100.
+---@field far number Farthest visible distance. Expects metres in 0.001..10000.
+---@field width integer Width of the image, pixels. Expects a whole number in 1..4096.
+---@field height integer Height of the image, pixels. Expects a whole number in 1..4096.
 local Camera = {}
 
----Turns it to a point (m, frame of the mount); up, z if left out, is upwards in the picture.
+---Turns the camera to a point; up (z by default) is the upward direction in the image. Both are in the frame of the mount.
 ---@param point number[]
 ---@param up? number[]
 function Camera:look_at(point, up) end
 
----A material of a placed object; its numbers may be read and written, the layers over it stay.
----@class softvt.Look
+---The base material of a visual of a placed object. Its layers stay as they are.
+---@class softvt.Material
 ---@field albedo number[] Base colour. Expects a list of 3 numbers (linear RGB in 0..1).
----@field roughness number Roughness, 0 a mirror. Expects a number in 0..1.
----@field metalness number Metalness. Expects a number in 0..1.
-local Look = {}
+---@field roughness number Roughness: 0 is a mirror, 1 is chalk. Expects a number in 0..1.
+---@field metalness number Metalness: 1 is bare metal. Expects a number in 0..1.
+local Material = {}
 
----A placed object; its numbers may be read and written.
+---A placed object. Numbers of its material are nil where the body has none: youngs_pa and poisson belong to soft bodies, density to soft and rigid ones.
 ---@class softvt.Object
 ---@field name string Name in the scene.
 ---@field asset string Name of its asset.
----@field looks softvt.Look[] Its materials, in the order of the asset's visuals.
+---@field materials softvt.Material[] The base materials of its visuals, by material id.
 ---@field joints table<string, number> Start values of its joints by part, m or rad.
----@field xyz number[] Its origin: lowest point, on the centre line. Expects a list of 3 numbers (m, world).
----@field yaw number Turn about the vertical. Expects radians.
+---@field xyz number[] Position of its origin: its lowest point, on the centre line. Expects a list of 3 numbers (m, world).
+---@field yaw number Rotation about the vertical. Expects radians.
 ---@field density number Density of a soft or rigid body. Expects a number (kg/m³) above 0.
 ---@field youngs_pa number Young's modulus of a soft body. Expects pascals above 0.
 ---@field poisson number Poisson's ratio of a soft body. Expects a number in 0..below 0.5.
----@field static_mu number Static friction coefficient. Expects a number in 0..10.
----@field dynamic_mu number Dynamic friction coefficient. Expects a number in 0..10.
+---@field static_mu number Static coefficient of friction. Expects a number in 0..10.
+---@field dynamic_mu number Dynamic coefficient of friction. Expects a number in 0..10.
 local Object = {}
 
----Mass of a soft or rigid body, of one moving part of an articulated object, or of all of them, kg; nil for what never moves.
+---Returns the mass of a soft or rigid body, of one moving part of an articulated object, or of all its moving parts, kg; nil for what never moves.
 ---@param part? string
 ---@return number?
 function Object:mass(part) end
 
----Multiplies the density of a soft or rigid body, or of every moving part; what never moves stays as it is.
+---Multiplies the density of a soft or rigid body, or of every moving part. What never moves is unchanged.
 ---@param factor number
 function Object:scale_mass(factor) end
 
----The true scene at this control step, as an expert sees it.
+---The true state of the scene at this control step, as an expert gets it.
 ---@class softvt.View
 local View = {}
 
----An object.
+---Returns the state of an object.
 ---@param name string
----@return softvt.Seen
+---@return softvt.ObjectState
 function View:object(name) end
 
----A part of an articulated object.
+---Returns the state of a part of an articulated object.
 ---@param object string
 ---@param part string
----@return softvt.Seen
+---@return softvt.ObjectState
 function View:part(object, part) end
 
----All objects, in the order of the scene.
----@return softvt.Seen[]
+---Returns the states of all objects, in the order of the scene.
+---@return softvt.ObjectState[]
 function View:objects() end
 
----Metres (at most 0.2) between a hand at pose and the nearest object, and the name of that; negative inside.
+---Returns the distance between a hand at a pose and the nearest object, m, and the name of that object. The distance is at most 0.2 and negative inside.
 ---@param pose softvt.Pose
 ---@param options? softvt.Clearance
 ---@return number
 ---@return string?
 function View:clearance(pose, options) end
 
----An object as an expert sees it, at one moment.
----@class softvt.Seen
+---The true state of an object at one moment.
+---@class softvt.ObjectState
 ---@field name string Name in the scene.
 ---@field asset string Name of its asset.
----@field xyz number[] Middle of its bounding box, world, m.
+---@field xyz number[] Centre of its bounding box, world frame, m.
 ---@field size number[] Edge lengths of its bounding box at rest, m.
----@field yaw number Turn about the vertical, rad.
----@field hints table<string, number> Numbers that its asset gives to experts.
+---@field yaw number Rotation about the vertical, rad.
+---@field hints table<string, number> Numbers of its asset for experts.
 ---@field joint number? Joint value of a part, m or rad.
 ---@field joints table<string, number> Joint values of an articulated object by part, m or rad.
----@field parts table<string, softvt.Seen> The parts of an articulated object by name.
-local Seen = {}
+---@field parts table<string, softvt.ObjectState> Parts of an articulated object by name.
+local ObjectState = {}
 
----What an expert drives. Each motion lasts as many control steps as it needs.
+---The robot arm as an expert controls it. Each motion takes as many control steps as it needs.
 ---@class softvt.Arm
 ---@field pose softvt.Pose Measured pose of the tool centre point.
----@field target softvt.Pose Pose commanded last.
----@field closure number Closure commanded last, 0 open to 1 shut.
----@field gripping boolean Whether grasp was called last, not release or open.
----@field width number Measured distance of the pads, m.
----@field force number[] Normal force on the left and right pad, N.
+---@field target softvt.Pose Last commanded pose.
+---@field closure number Last commanded closure: 0 is open, 1 is closed.
+---@field gripping boolean True from a call of grasp to the next call of release or open.
+---@field width number Measured distance of the gels, m.
+---@field force number[] Normal force on the left and the right pad, N.
 ---@field time number Time since the start, s.
 ---@field dt number Length of a control step, s.
 local Arm = {}
 
----Sends one command and comes back at the next control step.
+---Sends one command and returns at the next control step.
 ---@param pose softvt.Pose
 ---@param closure number
 function Arm:command(pose, closure) end
 
----Moves straight and smoothly, at most at speed (m/s, 0.25) and turn (rad/s, 1.5).
+---Moves along a straight line with a smooth speed profile. Options: speed (at most, m/s, default 0.25), turn (at most, rad/s, default 1.5), closure (reached at the end; by default it stays).
 ---@param pose softvt.Pose
 ---@param options? {speed: number?, turn: number?, closure: number?}
 function Arm:move_to(pose, options) end
 
----Moves by an offset in the world frame, m.
+---Moves by an offset in the world frame, m, with the options of move_to.
 ---@param offset number[]
 ---@param options? {speed: number?, turn: number?, closure: number?}
 function Arm:move_by(offset, options) end
 
----Closes or opens at a rate (1/s, 0.5; 1 is the whole stroke in a second).
+---Closes or opens to a closure. Option: rate (1/s, default 0.5; 1 is the whole stroke in a second).
 ---@param closure number
 ---@param options? {rate: number?}
 function Arm:close_to(closure, options) end
 
----Closes on an object; a binary gripper, which knows only open and shut, shuts here and not in close_to, and a tactile servo closes until both fingers feel that they hold something, whatever closure says.
+---Closes on an object. A binary gripper, which is either open or closed, closes here and not in close_to. A tactile servo closes until both fingers show a firm grasp, whatever closure is given.
 ---@param closure number
 ---@param options? {rate: number?}
 function Arm:grasp(closure, options) end
 
----Lets go of an object, opening to a closure or wide.
+---Releases an object by opening to options.closure, by default wide.
 ---@param options? {rate: number?, closure: number?}
 function Arm:release(options) end
 
@@ -1039,23 +1076,23 @@ function Arm:release(options) end
 ---@param options? {rate: number?}
 function Arm:open(options) end
 
----What the fingers feel now; the first time it waits for a control step. In simulation:drive and under --policy tactile-servo.
----@return {left: softvt.Touch, right: softvt.Touch}
-function Arm:feel() end
+---Returns the present readings of the tactile sensors; the first call waits for a control step. Available in simulation:drive and under --policy tactile-servo.
+---@return softvt.Fingers
+function Arm:tactile() end
 
----Holds still.
+---Holds the last command for a time.
 ---@param seconds number
 function Arm:wait(seconds) end
 
----Ends the expert: the last command stays, and the episode's record and the results say why.
+---Ends the expert. The last command stays, and the episode's record and the results contain the reason.
 ---@param reason string
 function Arm:give_up(reason) end
 
----A list that belongs to an object: scene.base, look.albedo, scene.objects. #, [i], ipairs, pairs, table.unpack and table.concat work on it, and it may be given wherever a list is expected. Numbers that may be written one by one go to the object at once: scene.base[1] = 0.1 is as good as scene.base = { 0.1, 0, 0 }. Any other list refuses to be written.
+---A list that belongs to an object: scene.base, material.albedo, scene.objects. #, [i], ipairs, pairs, table.unpack and table.concat work on it, and it is accepted wherever a list is expected. Numbers of a writable field can be written one by one: scene.base[1] = 0.1 has the effect of scene.base = { 0.1, 0, 0 }. Any other list is read-only.
 ---@class softvt.List
 local List = {}
 
----Which episode begins: what a policy is told of it.
+---The episode that begins.
 ---@class softvt.Brief
 ---@field suite string Name of the suite.
 ---@field task integer Index of the task, from 0.
@@ -1063,77 +1100,89 @@ local List = {}
 ---@field episode integer Index of the episode, from 0.
 local Brief = {}
 
----What a policy sees at a control step. Poses are of the tool centre point in the robot's base frame; hidden state has no field here.
+---The observation of a policy at a control step. Poses are of the tool centre point in the robot's base frame. The true state of the scene is not part of it.
 ---@class softvt.Observation
 ---@field time number Time since the policy took over, s.
 ---@field position number[] Tool position, m.
 ---@field axis_angle number[] Tool orientation as axis-angle, rad.
----@field rotation number[] The same as quaternion w, x, y, z with w of 0 or more.
+---@field rotation number[] Tool orientation as quaternion w, x, y, z with w ≥ 0.
 ---@field joints number[] The seven joint angles of the arm, rad.
 ---@field width number Measured distance of the gels, 0 to 0.08 m.
----@field closure number Closure commanded last, 0 open to 1 shut.
+---@field closure number Last commanded closure: 0 is open, 1 is closed.
 ---@field prompt string The instruction.
----@field touch {left: softvt.Touch, right: softvt.Touch} What the fingers feel; with looks.touch.
----@field touch_history {left: softvt.Touch, right: softvt.Touch}[] The same of the last 1 to 8 control steps, oldest first; with looks.touch.
----@field force {left: number[], right: number[]} True forces on the gels, N, pad frame: a pressing body makes z negative; with looks.force.
+---@field touch softvt.Fingers Tactile sensors; requires observes.touch.
+---@field touch_history softvt.Fingers[] Tactile sensors in the last 1 to 8 control steps, oldest first; requires observes.touch.
+---@field force softvt.Forces True forces on the gels; requires observes.force.
 local Observation = {}
 
----What a camera of looks.cameras sees, 224 × 224 unless the scene says otherwise.
+---Returns the image of a camera in observes.cameras, 224 × 224 unless the scene defines another size.
 ---@param name string
 ---@return softvt.Image
 function Observation:camera(name) end
 
----A finger's tactile sensor at one control step; docs/tactile.md draws its frames.
+---The tactile sensors of both fingers at one control step.
+---@class softvt.Fingers
+---@field left softvt.Touch The left finger.
+---@field right softvt.Touch The right finger.
+local Fingers = {}
+
+---The tactile sensor of a finger at one control step; docs/tactile.md draws its frames.
 ---@class softvt.Touch
----@field picture softvt.Image The colour picture, 320 × 240.
----@field change softvt.Image How far each channel of each pixel is from the untouched gel's picture.
+---@field image softvt.Image Colour image, 320 × 240.
+---@field difference softvt.Image Absolute difference of every channel from the image of the untouched gel.
 ---@field markers softvt.Markers The 11 × 9 markers.
 local Touch = {}
 
----The 99 markers of a finger, row by row, in px of its picture: x to the right (to the hand), y down. 1 px is 0.063 mm.
+---The 99 markers of a finger, row by row, in px of its image: x to the right (towards the hand), y down. 1 px is 0.063 mm.
 ---@class softvt.Markers
----@field initial number[][] Their places without a touch.
----@field present number[][] Their places now.
----@field motion number[][] How far each has moved.
+---@field initial number[][] Positions on the untouched gel.
+---@field present number[][] Present positions.
+---@field motion number[][] Displacements.
 local Markers = {}
 
----Mean motion along x and y: the gel is dragged along its surface.
+---Returns the mean displacement along x and y, which grows with shear along the gel's surface.
 ---@return number[]
 function Markers:mean() end
 
----The longest motion.
+---Returns the length of the longest displacement.
 ---@return number
 function Markers:largest() end
 
----How hard the gel is pressed: root mean square of the motion that is neither mean nor twist. It grows with the normal force, about 0.3 px a newton on round dough and rigid things and less on what is flat and soft.
+---Returns the root mean square of the displacements without their mean and twist. It grows with the normal force: about 0.3 px per newton on round dough and rigid objects, less on flat and soft ones.
 ---@return number
 function Markers:press() end
 
----How hard something is on its way out of the grasp: mean motion to the fingertip or across, 0 if it is pushed in.
+---Returns the mean displacement towards the fingertip or across, as of an object that slips out of the grasp; 0 if it is pushed in.
 ---@return number
 function Markers:drag() end
 
----Trace of the motion's gradient: positive where a dent pushes the markers outwards.
+---Returns the trace of the displacement gradient; positive where an indentation pushes the markers outwards.
 ---@return number
 function Markers:divergence() end
 
----Turn of the markers, rad: positive is clockwise in the picture.
+---Returns the rotation of the markers, rad; positive is clockwise in the image.
 ---@return number
 function Markers:twist() end
 
----Pure shear of the markers: stretch along x against y, and along the diagonal x = y.
+---Returns the pure shear of the markers: stretch along x against y, and along the diagonal x = y.
 ---@return number[]
 function Markers:shear() end
 
----Contact mask: which markers moved by more than px.
+---Returns the contact mask: true for markers displaced by more than px.
 ---@param px number
 ---@return boolean[]
 function Markers:moved(px) end
 
----Share of the markers that moved by more than px; all of the picture is 20.3 × 15.2 mm.
+---Returns the share of markers displaced by more than px; the whole image is 20.3 × 15.2 mm.
 ---@param px number
 ---@return number
 function Markers:area(px) end
+
+---True forces on the gels, N, pad frame: a pressing body makes z negative.
+---@class softvt.Forces
+---@field left number[] Force on the left gel.
+---@field right number[] Force on the right gel.
+local Forces = {}
 
 ---The softvt library.
 softvt = {}
@@ -1147,7 +1196,7 @@ softvt.version = ""
 ---@return softvt.Suite
 function softvt.suite(spec) end
 
----One task of a suite.
+---A task of a suite.
 ---@param spec softvt.Task
 ---@return softvt.Task
 function softvt.task(spec) end
@@ -1162,7 +1211,22 @@ function softvt.on(spec) end
 ---@return softvt.Inside
 function softvt.inside(spec) end
 
----A kind of object: its shape at rest with its lowest point at z = 0 and its centre on the z axis.
+---A change of the scene that a run can request with --shift name=value. Deformation limits stay nominal.
+---@param spec softvt.Shift
+---@return softvt.Shift
+function softvt.shift(spec) end
+
+---Runs suites as they are, then under each condition, and compares them episode by episode.
+---@param spec softvt.Conditions
+---@return softvt.Conditions
+function softvt.conditions(spec) end
+
+---A function that is evaluated at points and returns rows of results. Give either grid or points.
+---@param spec softvt.Experiment
+---@return softvt.Experiment
+function softvt.experiment(spec) end
+
+---A kind of object. Its shape at rest has its lowest point at z = 0 and its centre on the z axis (see softvt.Shape:grounded).
 ---@param spec softvt.Asset
 ---@return softvt.Asset
 function softvt.asset(spec) end
@@ -1177,106 +1241,91 @@ function softvt.soft(spec) end
 ---@return softvt.Rigid
 function softvt.rigid(spec) end
 
----Parts on joints; the asset's own shape is their base, which never moves.
----@param spec softvt.Articulated
----@return softvt.Articulated
-function softvt.articulated(spec) end
-
----A joint along which a part slides, as a drawer does.
----@param spec softvt.Slider
----@return softvt.Slider
-function softvt.slider(spec) end
-
----A joint about which a part turns, as a door or a knob does.
----@param spec softvt.Hinge
----@return softvt.Hinge
-function softvt.hinge(spec) end
-
----A part of the world that never moves.
+---A fixed body, which never moves.
 ---@param spec softvt.Static
 ---@return softvt.Static
 function softvt.static(spec) end
 
----Part of the picture only: it is drawn, casts shadows, and nothing touches it.
+---Scenery: it is drawn and casts shadows, but has no contact.
 ---@param spec softvt.Scenery
 ---@return softvt.Scenery
 function softvt.scenery(spec) end
 
----A change of the scene that a run may ask for with --shift name=value. Thresholds stay nominal.
----@param spec softvt.Shift
----@return softvt.Shift
-function softvt.shift(spec) end
+---Parts on joints. The asset's own shape is their base, which never moves.
+---@param spec softvt.Articulated
+---@return softvt.Articulated
+function softvt.articulated(spec) end
 
----Runs suites as they are, then under each condition, and compares episode by episode.
----@param spec softvt.Conditions
----@return softvt.Conditions
-function softvt.conditions(spec) end
+---A joint along which a part slides, such as that of a drawer. Values are in m.
+---@param spec softvt.Slider
+---@return softvt.Slider
+function softvt.slider(spec) end
 
----A function of a grid of parameters that yields rows. Give grid or points.
----@param spec softvt.Experiment
----@return softvt.Experiment
-function softvt.experiment(spec) end
+---A joint about which a part turns, such as that of a door or a knob. Values are in rad.
+---@param spec softvt.Hinge
+---@return softvt.Hinge
+function softvt.hinge(spec) end
 
----A policy, which the file behind --policy returns. Every episode has a machine of its own, in which the file is run anew; math.random is seeded by the episode.
+---A policy, as the file given to --policy returns it. Every episode has a virtual machine of its own, in which the file runs again; math.random is seeded by the episode.
 ---@param spec softvt.Policy
 ---@return softvt.Policy
 function softvt.policy(spec) end
 
----What a policy's server gets and what its numbers mean; the file behind --profile returns one.
+---The messages of a policy server: the observations it gets and the meaning of its actions. The file given to --profile returns one.
 ---@param spec softvt.Profile
 ---@return softvt.Profile
 function softvt.profile(spec) end
 
----A layout by name and function, or by a table of name and build.
+---Returns a layout, given by name and function or by a table of name and build: `softvt.layout("table", function(scene, rng) … end)`.
 ---@param name string|softvt.Layout
----@param build? fun(scene: softvt.Scene, rng: softvt.Rng)
+---@param build fun(scene: softvt.Scene, rng: softvt.Rng)
 ---@return softvt.Layout
 function softvt.layout(name, build) end
 
----Declares the script's options; gives their values, from the command line or by default.
----@param options table<string, softvt.Option>
----@return table<string, any>
-function softvt.options(options) end
-
----An empty world without a robot.
----@param world? softvt.WorldSpec
+---Returns an empty world without a robot.
+---@param spec? softvt.WorldSpec
 ---@return softvt.World
-function softvt.world(world) end
+function softvt.world(spec) end
 
----A settled scene with the robot.
----@param simulate softvt.SimulateSpec
+---Builds a scene with the robot and lets it settle.
+---@param spec softvt.SimulateSpec
 ---@return softvt.Simulation
-function softvt.simulate(simulate) end
+function softvt.simulate(spec) end
 
----What a calibration found: lower, closure_at_tau, safe_window, tau, d_ref, and as text: text (a plot), sweep (JSON lines), json (a threshold file).
----@param envelope softvt.EnvelopeSpec
----@return table
-function softvt.envelope(envelope) end
+---Returns the results of a calibration: the lower bound of closure, the deformation limit τ, and the files to write.
+---@param spec softvt.EnvelopeSpec
+---@return softvt.Envelope
+function softvt.envelope(spec) end
 
----What assets/calibration/<asset>.json says, as softvt.envelope gives it; nil if there is no such file.
+---Returns the content of assets/calibration/<asset>.json as softvt.envelope does; nil if there is no such file.
 ---@param asset string
----@return table?
+---@return softvt.Envelope?
 function softvt.calibration(asset) end
 
----Whether a row of a compression sweep is a stable squeeze.
+---Returns true if a row of a compression sweep is a stable squeeze.
 ---@param row table
 ---@return boolean
 function softvt.stable(row) end
 
----An empty picture.
----@param image softvt.NewImage
+---Returns an image of one colour: `softvt.image { width = 640, height = 480, colour = { 255, 255, 255 } }`.
+---@param spec softvt.NewImage
 ---@return softvt.Image
-function softvt.image(image) end
+function softvt.image(spec) end
 
----A pose in the world frame.
----@param pose softvt.PoseSpec
+---Returns a pose in the world frame: `softvt.pose { xyz = { 0.4, 0, 0.2 }, yaw = math.pi / 2 }`.
+---@param spec softvt.PoseSpec
 ---@return softvt.Pose
-function softvt.pose(pose) end
+function softvt.pose(spec) end
 
----A shape from a mesh file.
----@param mesh softvt.MeshSpec
+---Reads a shape from a mesh file: `softvt.mesh { file = "mug.obj", scale = 0.001 }`. The surface must be closed.
+---@param spec softvt.MeshSpec
 ---@return softvt.Shape
-function softvt.mesh(mesh) end
+function softvt.mesh(spec) end
+
+---Declares the script's options and returns their values, from the command line or by default: `local opt = softvt.options { gap_mm = { default = 40, unit = "mm", min = 1 } }`.
+---@param options table<string, softvt.Option>
+---@return table<string, any>
+function softvt.options(options) end
 
 ---Iterates over keys and values in an order that does not depend on hashes: numbers, strings, booleans. In a script, pairs does the same.
 ---@param t table
@@ -1301,12 +1350,12 @@ function softvt.shape.sphere(spec) end
 ---@return softvt.Shape
 function softvt.shape.ellipsoid(spec) end
 
----A capsule about the z axis, centred on the origin.
+---A capsule along the z axis, centred on the origin.
 ---@param spec softvt.CapsuleSpec
 ---@return softvt.Shape
 function softvt.shape.capsule(spec) end
 
----A cylinder about the z axis, centred on the origin.
+---A cylinder along the z axis, centred on the origin.
 ---@param spec softvt.CylinderSpec
 ---@return softvt.Shape
 function softvt.shape.cylinder(spec) end
@@ -1321,7 +1370,7 @@ function softvt.shape.torus(spec) end
 ---@return softvt.Shape
 function softvt.shape.wedge(spec) end
 
----A polygon in (x, z), drawn out along y, centred on y = 0.
+---A polygon in (x, z), extruded along y and centred on y = 0.
 ---@param spec softvt.PrismSpec
 ---@return softvt.Shape
 function softvt.shape.prism(spec) end
@@ -1331,10 +1380,10 @@ function softvt.shape.prism(spec) end
 ---@return softvt.Shape
 function softvt.shape.lathe(spec) end
 
----Masks: where a layer of a visual is.
+---Masks: weights of the layers of a visual.
 softvt.mask = {}
 
----Cubes, every other one 1; a corner lies at the origin.
+---Cubes, every other one 1; one corner is at the origin.
 ---@param spec softvt.CheckerMask
 ---@return softvt.Mask
 function softvt.mask.checker(spec) end
@@ -1349,17 +1398,17 @@ function softvt.mask.stripes(spec) end
 ---@return softvt.Mask
 function softvt.mask.gradient(spec) end
 
----Cloudy noise; its values lie about 0.5, few below 0.2 or above 0.8.
+---Cloudy noise with values around 0.5, few below 0.2 or above 0.8.
 ---@param spec softvt.NoiseMask
 ---@return softvt.Mask
 function softvt.mask.noise(spec) end
 
----Year rings of a trunk: cylinders about a line along z, bent by noise.
+---Annual rings of a trunk: cylinders about a line along z, distorted by noise.
 ---@param spec softvt.RingsMask
 ---@return softvt.Mask
 function softvt.mask.rings(spec) end
 
----Boards that lie along x, side by side in y: one value a board.
+---Boards along x, side by side in y, with one value per board.
 ---@param spec softvt.BoardsMask
 ---@return softvt.Mask
 function softvt.mask.boards(spec) end
@@ -1369,7 +1418,7 @@ function softvt.mask.boards(spec) end
 ---@return softvt.Mask
 function softvt.mask.seams(spec) end
 
----Round specks, strewn about.
+---Scattered round specks.
 ---@param spec softvt.SpecksMask
 ---@return softvt.Mask
 function softvt.mask.specks(spec) end
@@ -1379,17 +1428,17 @@ function softvt.mask.specks(spec) end
 ---@return softvt.Mask
 function softvt.mask.weave(spec) end
 
----Where the surface faces a direction, by the cosine between its normal and that.
----@param spec softvt.FacingMask
+---Surfaces that face a direction, by the cosine between their normal and that direction.
+---@param spec? softvt.FacingMask
 ---@return softvt.Mask
 function softvt.mask.facing(spec) end
 
----Where a shape is: a painted rim, the grooves between ridges.
+---The inside of a shape: a painted rim, the grooves between ridges.
 ---@param spec softvt.InsideMask
 ---@return softvt.Mask
 function softvt.mask.inside(spec) end
 
----The letters of a line of text, printed on what faces who reads it. Surfaces with text are drawn with finer detail than others.
+---The letters of a line of text, printed on surfaces that face the reader. Surfaces with text are drawn in finer detail.
 ---@param spec softvt.TextMask
 ---@return softvt.Mask
 function softvt.mask.text(spec) end

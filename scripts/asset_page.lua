@@ -138,7 +138,7 @@ return softvt.experiment {
       local at = ("%s/images/assets/%s"):format(opt.folder, name)
       files[at .. ".png"] = views.portrait(assets[name], opt.edge)
       if holds(assets[name]) then
-        files[at .. "_felt.png"] = views.held(assets[name], 0.06):feel("left").picture:resize(opt.edge * 4 // 3, opt.edge)
+        files[at .. "_felt.png"] = views.held(assets[name], 0.06):tactile("left").image:resize(opt.edge * 4 // 3, opt.edge)
       end
     end
     return { files = files }

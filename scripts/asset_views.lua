@@ -27,7 +27,7 @@ function views.portrait(asset, edge)
       fovy = FOVY, width = edge, height = edge,
     }
   end)
-  return softvt.simulate { layout = layout }:see { camera = "portrait" }
+  return softvt.simulate { layout = layout }:render { camera = "portrait" }
 end
 
 -- A simulation of the asset in the expert's grasp, lifted by `lift` (m).

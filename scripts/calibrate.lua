@@ -76,11 +76,11 @@ end
 
 -- Distance by which the object has fallen behind the tool since `before`, mm.
 local function lag_mm(sim, before)
-  local tool, seen = sim:tool(), sim:watch "object"
+  local tool, seen = sim:tool(), sim:measure "object"
   return 1e3 * ((tool[3] - before.tool) - (seen.height_m - before.height))
 end
 
-local function heights(sim) return { tool = (sim:tool())[3], height = sim:watch "object".height_m } end
+local function heights(sim) return { tool = (sim:tool())[3], height = sim:measure "object".height_m } end
 
 -- Grasp–lift–hold trial `k`. Returns whether it held, the slip (mm) and the peak D (%).
 local function hold_trial(name, closure, k, hold_s)
@@ -92,7 +92,7 @@ local function hold_trial(name, closure, k, hold_s)
   -- An object that was not lifted by now is not held.
   if ok and lag_mm(sim, before) < 0.5e3 * LIFT then ok = sim:wait(hold_s) end
   local slip = math.abs(lag_mm(sim, before))
-  local seen = sim:watch "object"
+  local seen = sim:measure "object"
   return { held = ok and slip <= SLIP_MM, slip_mm = slip, d_peak_pct = seen.d_peak_pct }
 end
 
@@ -123,7 +123,7 @@ local function squeeze(sim, name, closure)
   while ok and resting_s < REST_S and elapsed_s < REST_TIMEOUT_S do
     ok, problem = sim:wait(0.05)
     elapsed_s = elapsed_s + 0.05
-    local seen = sim:watch "object"
+    local seen = sim:measure "object"
     local touching = math.min(table.unpack(seen.pad_force)) > CONTACT_N
     if resting_s == 0 then row.min_det_f, row.node_speed_m_s, row.both_pads = math.huge, 0, true end
     row.min_det_f = math.min(row.min_det_f, seen.min_det_f or 1)
@@ -132,7 +132,7 @@ local function squeeze(sim, name, closure)
     resting_s = seen.speed < REST_SPEED and resting_s + 0.05 or 0
   end
   if not ok then return nil, problem end
-  local seen = sim:watch "object"
+  local seen = sim:measure "object"
   row.gripper_width_mm = 1e3 * seen.width_m
   row.fingerprint = seen.fingerprint
   row.d_peak_pct = seen.d_peak_pct

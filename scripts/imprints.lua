@@ -22,12 +22,12 @@ local WIDTH, HEIGHT = 240, 180
 local function held(name) return views.held(assets[name], opt.lift_mm * 1e-3) end
 
 -- Mean motion of the markers, px.
-local function drift(felt)
+local function drift(reading)
   local x, y = 0, 0
-  for i, from in ipairs(felt.initial) do
-    x, y = x + felt.present[i][1] - from[1], y + felt.present[i][2] - from[2]
+  for i, from in ipairs(reading.initial) do
+    x, y = x + reading.present[i][1] - from[1], y + reading.present[i][2] - from[2]
   end
-  return x / #felt.initial, y / #felt.initial
+  return x / #reading.initial, y / #reading.initial
 end
 
 return softvt.experiment {
@@ -38,11 +38,11 @@ return softvt.experiment {
     local name = point.asset
     local sim, rows = held(name), {}
     for _, side in ipairs { "left", "right" } do
-      local felt = sim:feel(side)
-      local x, y = drift(felt)
+      local reading = sim:tactile(side)
+      local x, y = drift(reading)
       rows[#rows + 1] = {
-        asset = name, side = side, force_n = -felt.force[3], shear_n = math.sqrt(felt.force[1] ^ 2 + felt.force[2] ^ 2),
-        depth_mm = felt.depth_mm, markers_x_px = x, markers_y_px = y,
+        asset = name, side = side, force_n = -reading.force[3], shear_n = math.sqrt(reading.force[1] ^ 2 + reading.force[2] ^ 2),
+        depth_mm = reading.depth_mm, markers_x_px = x, markers_y_px = y,
       }
     end
     return rows
@@ -55,9 +55,9 @@ return softvt.experiment {
     for index, name in ipairs(opt.asset) do
       local sim = held(name)
       local x, y = (index - 1) % columns * group, (index - 1) // columns * row
-      local left, right = sim:feel "left", sim:feel "right"
-      for column, picture in ipairs { left.picture, left.dots, left.arrows, right.arrows } do
-        panel:paste(picture:resize(WIDTH, HEIGHT), x + (column - 1) * (WIDTH + GAP), y)
+      local left, right = sim:tactile "left", sim:tactile "right"
+      for column, image in ipairs { left.image, left.dots, left.arrows, right.arrows } do
+        panel:paste(image:resize(WIDTH, HEIGHT), x + (column - 1) * (WIDTH + GAP), y)
       end
       local words = ("%s: left, its markers, their motion; right, its motion. %.2f N"):format(name:gsub("_", " "), -left.force[3])
       panel:text(words, { at = { x + 8, y + HEIGHT + 19 }, size = 16, colour = WORDS })

@@ -44,7 +44,7 @@ return softvt.experiment {
     local before = state(sim)
     local ok, why = sim:wait(opt.wait_s)
     if not ok then error(point.asset .. ": " .. why) end
-    local after, seen = state(sim), sim:watch "object"
+    local after, seen = state(sim), sim:measure "object"
     local moved = 1e3 * math.sqrt((after.xyz[1] - before.xyz[1]) ^ 2 + (after.xyz[2] - before.xyz[2]) ^ 2)
     local sunk = 1e3 * (before.xyz[3] - after.xyz[3])
     -- Relative to the initial yaw, because settling may rotate the object too.

@@ -41,7 +41,7 @@ end
 
 local function build(o)
   local shape, width = shape_of(o)
-  local world = softvt.world { dt = o.dt, beta_s = o.beta_s, sleeping = false }
+  local world = softvt.world { dt = o.dt, rayleigh_stiffness = o.beta_s, sleeping = false }
   local grip = { static_mu = o.friction, dynamic_mu = o.friction }
   local body = world:soft {
     name = o.shape, shape = shape, youngs_pa = o.youngs_pa, poisson = o.poisson, density = o.density,

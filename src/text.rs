@@ -35,6 +35,19 @@ pub fn suggest<'a>(word: &str, candidates: impl Iterator<Item = &'a str>) -> Opt
     ranked.min_by_key(|(rank, _)| *rank).map(|(_, candidate)| candidate)
 }
 
+/// A message about an unknown name: `unknown key "promt"; did you mean "prompt"?`.
+pub fn unknown_name<'a>(
+    what: &str,
+    word: &str,
+    known: impl IntoIterator<Item = &'a str, IntoIter: Clone>,
+) -> String {
+    let known = known.into_iter();
+    match suggest(word, known.clone()) {
+        Some(close) => format!("unknown {what} {word:?}; did you mean {close:?}?"),
+        None => format!("unknown {what} {word:?}; there are {}", known.collect::<Vec<_>>().join(", ")),
+    }
+}
+
 /// Rank of a candidate; the best candidate has the smallest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Rank {

@@ -57,6 +57,6 @@ pub fn open(loaded: &Loaded, task: usize, film: bool) -> (EpisodeSpec, ExpertCon
         record_trace: false,
         trace_nodes: false,
     };
-    let expert = opened.expert().expect("a script").expect("an expert");
+    let expert = opened.expert().expect("an expert");
     (spec, ExpertController::new(expert, false))
 }

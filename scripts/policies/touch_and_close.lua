@@ -35,7 +35,7 @@ end
 
 return softvt.policy {
   name = "touch_and_close",
-  looks = { touch = true },
+  observes = { touch = true },
   reset = function() phase, start, closure = "down", nil, 0 end,
   act = function(obs)
     if not start then

@@ -14,5 +14,5 @@ return softvt.profile {
     { keys = both "tactile_image", source = "tactile_image" },
     { keys = both "tactile_marker_motion", source = "marker_motion" },
   },
-  actions = { pose = "absolute", gripper = { open = 0, shut = 1 } },
+  actions = { pose = "absolute", gripper = { open = 0, closed = 1 } },
 }

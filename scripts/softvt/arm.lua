@@ -12,30 +12,30 @@ local PEAK = 1.875
 local function smooth(u) return u * u * u * (10 + u * (6 * u - 15)) end
 
 -- Ends the tactile servo and its readings.
-local function end_servo(self) self.holds, self.feeling = nil, false end
+local function end_servo(self) self.holds, self.wants_readings = nil, false end
 
 -- Sends one command and returns at the next control step, or raises the error that the host reports. While the servo holds an
 -- object it may close further than commanded.
 function Arm:command(pose, closure)
   if self.holds then
-    self.holds = servo.keep(max(self.holds, closure), fingers.felt())
+    self.holds = servo.keep(max(self.holds, closure), fingers.readings())
     closure = self.holds
   end
   self.target, self.closure = pose, closure
-  local refusal = yield(self.target, self.closure, self.gripping, nil, self.feeling)
+  local refusal = yield(self.target, self.closure, self.gripping, nil, self.wants_readings)
   if refusal then check.refuse(refusal) end
 end
 
 -- Returns the readings of the fingers in this control step. They are computed on request only, from the next step on.
-function Arm:feel()
-  if not fingers.feel then check.refuse("arm:feel: finger readings are available in simulation:drive and under --policy tactile-servo") end
-  local felt = fingers.felt()
-  if felt then return felt end
-  local before = self.feeling
-  self.feeling = true
+function Arm:tactile()
+  if not fingers.available then check.refuse("arm:tactile: finger readings are available in simulation:drive and under --policy tactile-servo") end
+  local readings = fingers.readings()
+  if readings then return readings end
+  local before = self.wants_readings
+  self.wants_readings = true
   self:command(self.target, self.closure)
-  self.feeling = before
-  return fingers.felt()
+  self.wants_readings = before
+  return fingers.readings()
 end
 
 local function travel(self, pose, options, closure)
@@ -76,10 +76,10 @@ function Arm:grasp(closure, options)
   if not fingers.servo then return self:close_to(closure, options) end
   options = check.options("arm:grasp", options, { rate = 0.5 })
   end_servo(self)
-  self.feeling = true
+  self.wants_readings = true
   self.holds = servo.close(self.closure, options.rate * host.dt, function(next)
     self:command(self.target, next)
-    return fingers.felt()
+    return fingers.readings()
   end)
 end
 
@@ -108,7 +108,7 @@ function Arm:give_up(reason) yield(self.target, self.closure, self.gripping, rea
 
 local measured = { pose = true, width = true, force = true, time = true, dt = true }
 local own = { target = true, closure = true, gripping = true }
-local state, methods, arm = { target = host.pose, closure = host.closure, gripping = false, feeling = false }, {}, nil
+local state, methods, arm = { target = host.target, closure = host.closure, gripping = host.gripping, wants_readings = false }, {}, nil
 
 -- Methods work on the state of the arm; scripts get wrappers that check their arguments.
 for name, method in pairs(Arm) do

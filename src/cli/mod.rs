@@ -12,7 +12,7 @@ mod parse;
 mod reference_page;
 mod run;
 
-use std::{panic, process::ExitCode, thread, time::Duration};
+use std::{panic, process::ExitCode, sync::Arc, thread, time::Duration};
 
 use args::Command;
 use error::{CliError, Exit};
@@ -44,6 +44,11 @@ pub fn main() -> ExitCode {
 }
 
 fn run_process() -> Result<(), CliError> {
+    // Finished episodes are already on disk, and nothing can interrupt a C function of Lua that does not return.
+    crate::script::set_stuck_handler(Arc::new(|message| {
+        text::eprint_line(&format!("softvt: {message}"));
+        std::process::exit(2);
+    }));
     handle_interrupts();
     let words: Vec<String> = std::env::args_os()
         .map(|word| {

@@ -1,15 +1,20 @@
 //! Lua: the only module that knows it.
 //!
-//! Layers, each of which uses those before it: `vm` (the sandboxed virtual machine), `schema` (checked tables and objects),
-//! `api` (everything a script reaches as `softvt.…`), `plan` (loading a file), `run` (episodes, experts, experiments).
+//! Layers, each of which uses those before it: `vm` (the sandboxed virtual machine), `schema` (declarations of records,
+//! classes and functions, and checks by them), `api` (everything a script can reach as `softvt.…`), `plan` (loading a file),
+//! `run` (episodes, experts, experiments). [`stubs`] writes the declarations for language servers and readers.
 
 mod api;
 mod plan;
 mod run;
-pub mod schema;
+mod schema;
 pub mod stubs;
 mod vm;
 
+pub use api::{
+    expert_input::{ExpertCommand, ExpertView, ObjectView},
+    touch::FingerReadings,
+};
 pub use plan::{
     Loaded, declared_options, load, load_with,
     options::{OptionSpec, OptionValue},
@@ -17,16 +22,17 @@ pub use plan::{
     profile_file::load_profile,
 };
 pub use run::{
-    controller::ExpertController,
     episode::{Episode, EpisodeRequest, Scenes, check_shift},
     experiment::{Experiment, Finish, Row},
-    expert::{Expert, ExpertCommand, ExpertView, Felt, Grip, ObjectView},
+    expert::{Expert, ExpertController},
 };
+pub use schema::Range;
 pub use vm::{
     Limits, Print,
     error::ScriptError,
     library::{Bundle, Source, embedded, embedded_scripts, sha256},
-    watchdog::{Clock, Deadline, OnStuck, Pause, end_process},
+    set_stuck_handler,
+    watchdog::{Clock, Deadline, OnStuck, Pause},
 };
 
 #[cfg(test)]

@@ -1,40 +1,47 @@
-//! LuaCATS stubs and the Lua reference, made from the binding table.
+//! LuaCATS stubs and the Lua reference, generated from the declarations of the Lua interface.
 
 use std::fmt::Write;
 
-use crate::script::{
-    api::catalogue::{CONSTRUCTORS, LAYOUT, PLAIN},
-    api::catalogue_classes::{CLASSES, Class, FUNCTIONS, SHAPE, Signature},
-    api::catalogue_shapes::{MASK, MESH, METHODS, SHAPES},
-    api::catalogue_visuals::{MASK_CLASS, MASKS},
-    schema::{Field, Presence, Record, Type},
+use super::{
+    api::{self, shapes::SHAPES, visuals::MASKS},
+    plan::options,
+    schema::{
+        Class, Field, Function, Presence, Record, RecordType, Signature, Type,
+        object::{Access, ClassField, Param},
+    },
 };
 
 /// Name of the stub file that `softvt init` writes.
 pub const STUB_FILE: &str = "library/softvt.d.lua";
 
-/// Settings for Lua language servers: where the stubs are.
+/// Settings for Lua language servers: the folder of the stubs.
 pub const LUARC: &str = "{\n  \"runtime.version\": \"Lua 5.4\",\n  \"workspace.library\": [\"library\"]\n}\n";
 
-/// Every constructor that takes one table.
-fn constructors() -> impl Iterator<Item = (&'static str, &'static Record)> {
-    CONSTRUCTORS.iter().chain(crate::script::api::catalogue_policy::CONSTRUCTORS).copied()
+/// Functions of the table `softvt` that are not constructors.
+fn functions() -> impl Iterator<Item = &'static Signature> {
+    let declared = api::functions().chain(options::FUNCTIONS).map(|function| &function.signature);
+    declared.chain([&api::SORTED])
 }
 
-/// Every table that a script may write, in order.
-fn records() -> impl Iterator<Item = &'static Record> {
-    let made = constructors().map(|(_, record)| record);
-    let shapes = SHAPES.iter().chain(METHODS).map(|(_, record)| *record);
-    made.chain([&LAYOUT])
-        .chain(PLAIN.iter().copied())
-        .chain(crate::script::api::catalogue_world::RECORDS.iter().copied())
-        .chain(crate::script::api::catalogue_policy::PLAIN.iter().copied())
-        .chain(shapes)
-        .chain([&MASK, &MESH])
-        .chain(MASKS.iter().map(|(_, record)| *record))
+/// Every table that a script may write: those of constructors, those nested in others, and those that functions and
+/// methods take.
+fn records() -> Vec<&'static Record> {
+    let arguments = functions()
+        .chain(SHAPES.iter().chain(MASKS).map(|function| &function.signature))
+        .chain(api::CLASSES.iter().flat_map(|class| class.methods))
+        .filter_map(Signature::record);
+    let made = api::constructors().map(|constructor| constructor.record);
+    let nested = api::NESTED_RECORDS.iter().copied().chain([options::OptionRecord::RECORD]);
+    let mut records: Vec<&Record> = Vec::new();
+    for record in made.chain(nested).chain(arguments) {
+        if !records.iter().any(|known| known.class == record.class) {
+            records.push(record);
+        }
+    }
+    records
 }
 
-/// The type as LuaCATS writes it.
+/// The LuaCATS type.
 fn lua_type(ty: &Type) -> String {
     match ty {
         Type::Number(..) => "number".into(),
@@ -57,78 +64,78 @@ fn lua_type(ty: &Type) -> String {
     }
 }
 
-/// What is taken and what holds by default, for people.
-fn details(field: &Field) -> String {
-    let taken = match field.ty {
+/// The documentation of a value, with its range and default.
+fn details(doc: &str, ty: &Type, presence: Presence) -> String {
+    let expected = match ty {
         Type::Number(..) | Type::Integer(_) | Type::Vector(..) | Type::Colour => {
-            format!(" Expects {}.", field.ty.words())
+            format!(" Expects {}.", ty.words())
         }
         _ => String::new(),
     };
-    let default = match field.presence {
+    let default = match presence {
         Presence::Number(n) => format!(" Default {n}."),
         Presence::Integer(n) => format!(" Default {n}."),
         Presence::Text(text) => format!(" Default {text:?}."),
         Presence::Boolean(flag) => format!(" Default {flag}."),
         Presence::Required | Presence::Optional | Presence::Empty => String::new(),
     };
-    format!("{}{taken}{default}", field.doc)
+    format!("{}{expected}{default}", doc.trim())
+}
+
+fn field_details(field: &Field) -> String {
+    details(field.doc, &field.ty, field.presence)
+}
+
+/// LuaCATS type and documentation of a class's field.
+fn class_field(field: &ClassField) -> (String, String) {
+    match &field.access {
+        Access::Read(lua_type, _) => ((*lua_type).to_owned(), field.doc.trim().to_owned()),
+        Access::Write(ty) => (lua_type(ty), details(field.doc, ty, Presence::Required)),
+    }
 }
 
 /// The stub file for language servers.
 pub fn stubs() -> String {
-    let mut out = String::from("---@meta softvt\n-- Generated from the binding table; do not edit.\n\n");
+    let mut out =
+        String::from("---@meta softvt\n-- Generated from the declarations in src/script; do not edit.\n\n");
     for record in records() {
         // Writing to a String cannot fail, here and below.
-        let _ = writeln!(out, "---{}\n---@class {}", record.doc, record.class);
+        let _ = writeln!(out, "---{}\n---@class {}", record.doc.trim(), record.class);
         for field in record.fields {
             let mark = if field.presence == Presence::Required { "" } else { "?" };
-            let _ =
-                writeln!(out, "---@field {}{mark} {} {}", field.name, lua_type(&field.ty), details(field));
+            let (ty, details) = (lua_type(&field.ty), field_details(field));
+            let _ = writeln!(out, "---@field {}{mark} {ty} {details}", field.name);
         }
         out.push('\n');
     }
-    stub_class(&mut out, &SHAPE);
-    for (name, record) in METHODS {
-        let _ = writeln!(out, "---{}\n---@param spec {}\n---@return softvt.Shape", record.doc, record.class);
-        let _ = writeln!(out, "function Shape:{name}(spec) end\n");
-    }
-    for class in [&MASK_CLASS].into_iter().chain(CLASSES.iter().copied()) {
+    for class in api::CLASSES {
         stub_class(&mut out, class);
     }
     out.push_str("---The softvt library.\nsoftvt = {}\n\n---Version of softvt.\n---@type string\nsoftvt.version = \"\"\n\n");
-    for (name, record) in constructors() {
-        let _ =
-            writeln!(out, "---{}\n---@param spec {}\n---@return {}", record.doc, record.class, record.class);
-        let _ = writeln!(out, "function softvt.{name}(spec) end\n");
+    for constructor in api::constructors() {
+        let Record { doc, class, .. } = constructor.record;
+        let _ = writeln!(out, "---{}\n---@param spec {class}\n---@return {class}", doc.trim());
+        let _ = writeln!(out, "function softvt.{}(spec) end\n", constructor.name());
     }
-    for function in FUNCTIONS {
-        stub_function(&mut out, "softvt.", function);
-    }
-    out.push_str("---Shapes, in metres.\nsoftvt.shape = {}\n\n");
-    for (name, record) in SHAPES {
-        let _ = writeln!(out, "---{}\n---@param spec {}\n---@return softvt.Shape", record.doc, record.class);
-        let _ = writeln!(out, "function softvt.shape.{name}(spec) end\n");
-    }
-    out.push_str("---Masks: where a layer of a visual is.\nsoftvt.mask = {}\n\n");
-    for (name, record) in MASKS {
-        let _ = writeln!(out, "---{}\n---@param spec {}\n---@return softvt.Mask", record.doc, record.class);
-        let _ = writeln!(out, "function softvt.mask.{name}(spec) end\n");
-    }
+    functions().for_each(|function| stub_function(&mut out, "softvt.", function));
+    let mut group = |doc: &str, prefix: &str, functions: &'static [Function]| {
+        let _ = writeln!(out, "---{doc}\n{} = {{}}\n", prefix.trim_end_matches('.'));
+        functions.iter().for_each(|function| stub_function(&mut out, prefix, &function.signature));
+    };
+    group("Shapes, in metres.", "softvt.shape.", SHAPES);
+    group("Masks: weights of the layers of a visual.", "softvt.mask.", MASKS);
     out.truncate(out.trim_end().len());
     out.push('\n');
     out
 }
 
 fn stub_class(out: &mut String, class: &Class) {
-    let _ = writeln!(out, "---{}\n---@class {}", class.doc, class.name);
-    for (name, ty, doc) in class.fields {
-        let _ = writeln!(out, "---@field {name} {ty} {doc}");
+    let _ = writeln!(out, "---{}\n---@class {}", class.doc.trim(), class.name);
+    for field in class.fields {
+        let (ty, doc) = class_field(field);
+        let _ = writeln!(out, "---@field {} {ty} {doc}", field.name);
     }
-    for field in class.written {
-        let _ = writeln!(out, "---@field {} {} {}", field.name, lua_type(&field.ty), details(field));
-    }
-    let short = class.name.rsplit('.').next().unwrap_or(class.name);
+    let short = class.short_name();
     let _ = writeln!(out, "local {short} = {{}}\n");
     for method in class.methods {
         stub_function(out, &format!("{short}:"), method);
@@ -136,14 +143,15 @@ fn stub_class(out: &mut String, class: &Class) {
 }
 
 fn stub_function(out: &mut String, prefix: &str, function: &Signature) {
-    let _ = writeln!(out, "---{}", function.doc);
-    for (name, ty) in function.params {
-        let _ = writeln!(out, "---@param {name} {}", lua_type(ty));
+    let _ = writeln!(out, "---{}", function.doc());
+    for param in function.params {
+        let mark = if param.is_optional() { "?" } else { "" };
+        let _ = writeln!(out, "---@param {}{mark} {}", param.name, lua_type(&param.ty));
     }
     for ty in function.returns {
         let _ = writeln!(out, "---@return {ty}");
     }
-    let names: Vec<_> = function.params.iter().map(|(name, _)| name.trim_end_matches('?')).collect();
+    let names: Vec<_> = function.params.iter().map(|param| param.name).collect();
     let _ = writeln!(out, "function {prefix}{}({}) end\n", function.name, names.join(", "));
 }
 
@@ -151,91 +159,84 @@ fn stub_function(out: &mut String, prefix: &str, function: &Signature) {
 pub fn reference() -> String {
     let mut out = String::from(INTRODUCTION);
     out.push_str("\n## Functions\n\n");
-    for (name, record) in constructors() {
-        let _ = writeln!(out, "- `softvt.{name}{{…}}`: {} See `{}`.", record.doc, record.class);
+    for constructor in api::constructors() {
+        let Record { doc, class, .. } = constructor.record;
+        let _ = writeln!(out, "- `softvt.{}{{…}}`: {} See `{class}`.", constructor.name(), doc.trim());
     }
-    functions(&mut out, "softvt.", FUNCTIONS);
-    for (name, record) in SHAPES {
-        let _ = writeln!(out, "- `softvt.shape.{name}{{…}}`: {} See `{}`.", record.doc, record.class);
-    }
-    for (name, record) in MASKS {
-        let _ = writeln!(out, "- `softvt.mask.{name}{{…}}`: {} See `{}`.", record.doc, record.class);
-    }
+    functions().for_each(|function| reference_function(&mut out, "softvt.", function));
+    SHAPES.iter().for_each(|function| reference_function(&mut out, "softvt.shape.", &function.signature));
+    MASKS.iter().for_each(|function| reference_function(&mut out, "softvt.mask.", &function.signature));
     out.push_str("- `softvt.version`: version of softvt, a string.\n\n## Objects\n");
-    for class in [&SHAPE, &MASK_CLASS].into_iter().chain(CLASSES.iter().copied()) {
-        let _ = writeln!(out, "\n### {}\n\n{}\n", class.name, class.doc);
-        for (name, ty, doc) in class.fields {
-            let _ = writeln!(out, "- `{name}` ({}): {doc}", cell(ty));
+    for class in api::CLASSES {
+        let _ = writeln!(out, "\n### {}\n\n{}\n", class.name, class.doc.trim());
+        for field in class.fields {
+            let (ty, doc) = class_field(field);
+            let writable = if matches!(field.access, Access::Write(_)) { ", writable" } else { "" };
+            let _ = writeln!(out, "- `{}` ({}{writable}): {doc}", field.name, cell(&ty));
         }
-        for field in class.written {
-            let _ = writeln!(
-                out,
-                "- `{}` ({}, writable): {}",
-                field.name,
-                cell(&lua_type(&field.ty)),
-                details(field)
-            );
-        }
-        functions(&mut out, ":", class.methods);
-        if class.name == SHAPE.name {
-            for (name, record) in METHODS {
-                let _ = writeln!(out, "- `:{name}{{…}}`: {} See `{}`.", record.doc, record.class);
-            }
-        }
+        class.methods.iter().for_each(|method| reference_function(&mut out, ":", method));
     }
     out.push_str("\n## Tables\n");
     for record in records() {
-        let _ = writeln!(out, "\n### {}\n\n{}\n", record.class, record.doc);
+        let _ = writeln!(out, "\n### {}\n\n{}\n", record.class, record.doc.trim());
         if record.fields.is_empty() {
             out.push_str("It has no fields.\n");
             continue;
         }
-        out.push_str("| field | type | needed | meaning |\n|---|---|---|---|\n");
+        out.push_str("| field | type | required | meaning |\n|---|---|---|---|\n");
         for field in record.fields {
-            let needed = if field.presence == Presence::Required { "yes" } else { "no" };
-            let ty = cell(&lua_type(&field.ty));
-            let _ = writeln!(out, "| `{}` | {ty} | {needed} | {} |", field.name, details(field));
+            let required = if field.presence == Presence::Required { "yes" } else { "no" };
+            let (ty, details) = (cell(&lua_type(&field.ty)), field_details(field));
+            let _ = writeln!(out, "| `{}` | {ty} | {required} | {details} |", field.name);
         }
     }
     out
 }
 
-fn functions(out: &mut String, prefix: &str, list: &[Signature]) {
-    for function in list {
-        let names: Vec<_> = function.params.iter().map(|(name, _)| *name).collect();
-        let gives = match function.returns {
-            [] => String::new(),
-            types => format!(" → {}", cell(&types.join(", "))),
-        };
-        let _ = writeln!(out, "- `{prefix}{}({})`{gives}: {}", function.name, names.join(", "), function.doc);
-    }
+fn reference_function(out: &mut String, prefix: &str, function: &Signature) {
+    let returns = match function.returns {
+        [] => String::new(),
+        types => format!(" → {}", cell(&types.join(", "))),
+    };
+    let name = function.name;
+    let _ = match function.record() {
+        Some(record) => {
+            writeln!(out, "- `{prefix}{name}{{…}}`{returns}: {} See `{}`.", function.doc(), record.class)
+        }
+        None => {
+            let mark =
+                |param: &Param| format!("{}{}", param.name, if param.is_optional() { "?" } else { "" });
+            let names: Vec<_> = function.params.iter().map(mark).collect();
+            writeln!(out, "- `{prefix}{name}({})`{returns}: {}", names.join(", "), function.doc())
+        }
+    };
 }
 
-/// A type inside of a Markdown table or line: the bar would end the cell.
+/// A type in a Markdown table or line, where a bar would end the cell.
 fn cell(ty: &str) -> String {
     format!("`{}`", ty.replace('|', " or "))
 }
 
-const INTRODUCTION: &str = "# The Lua surface
+const INTRODUCTION: &str = "# The Lua interface
 
-<!-- Generated from the binding table; to write it anew: SOFTVT_WRITE_DOCS=1 cargo test --release --lib script::stubs -->
+<!-- Generated from the declarations in src/script; regenerate with .ci/regenerate lua -->
 
-A Lua file returns a plan: a suite, a list of suites, or an experiment; `softvt FILE.lua` does what it says. A file behind
-`--policy` returns a policy, one behind `--profile` a profile (docs/policies.md). Every table
-is checked when it is built: a wrong type, a value out of range or an unknown key is an error with file and line.
-Everything is in SI units, in the world frame (z up) unless it says otherwise.
+A Lua file returns a plan: a suite, a list of suites, conditions or an experiment; `softvt FILE.lua` runs it. A file given to
+`--policy` returns a policy, one given to `--profile` a profile (docs/policies.md). Every table is checked when it is built: a
+wrong type, a value out of range or an unknown key is an error with file and line. All quantities are in SI units, and in the
+world frame (z up) unless stated otherwise.
 
-Scripts are Lua 5.4 in a sandbox: `coroutine`, `math`, `string`, `table` and `utf8`, without `io`, `os`, `debug`,
-`package` and byte code. `require \"a.b\"` looks for `scripts/a/b.lua`, `suites/a/b.lua` and `a/b.lua` in the script's
-folder, the folder above and the current one, then in the library inside the binary. `math.random` is seeded by the run.
-`pairs` goes through numbers, strings and booleans in order; other keys, and `next`, have no promised order. `tostring`
-gives the kind of a table or function, never an address. `print` writes to standard error, up to 1 MiB. Memory and time
-are limited: 256 MiB of Lua values, 512 MiB of pictures, shapes and masks, shapes of at most 2000 parts, masks of 200.
+Scripts are Lua 5.4 in a sandbox, with `coroutine`, `math`, `string`, `table` and `utf8`, without `io`, `os`, `debug`,
+`package` and byte code. `require \"a.b\"` searches for `scripts/a/b.lua`, `suites/a/b.lua` and `a/b.lua` in the script's
+folder, its parent folder and the current folder, then in the library inside the binary. `math.random` is seeded by the run.
+`pairs` iterates over numbers, strings and booleans in order; the order of other keys, and of `next`, is not defined.
+`tostring` returns the type of a table or function, never an address. `print` writes to standard error, up to 1 MiB. Memory
+and time are limited: 256 MiB of Lua values, 512 MiB of images, shapes and masks, shapes of at most 2000 parts, masks of at
+most 200.
 
-A list that belongs to an object (`scene.base`, `look.albedo`, `scene.objects`) is the object's own and no copy: what is
-written to it is checked and holds at once, and a list that cannot be written says what to do instead. What a method
-gives, and a table that a script made, are the script's. Unknown fields are errors everywhere. `pcall` gives messages as
-strings.
+A list that belongs to an object (`scene.base`, `material.albedo`, `scene.objects`) is not a copy: a number written to it is
+checked and takes effect at once, and the error of a read-only list says what to do instead. Results of methods, and tables
+that a script made, are the script's own. Unknown fields are errors everywhere. `pcall` returns messages as strings.
 ";
 
 #[cfg(test)]
@@ -244,38 +245,35 @@ mod tests {
 
     use super::*;
 
-    /// Compares a committed file with what the table gives, or writes it where the environment asks for that.
-    fn same(path: &str, generated: &str) {
+    /// Compares a committed file with the generated text, or writes it if SOFTVT_WRITE_DOCS is set.
+    fn check_file(path: &str, generated: &str) {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
         if std::env::var_os("SOFTVT_WRITE_DOCS").is_some() {
             fs::create_dir_all(file.parent().unwrap()).unwrap();
             fs::write(&file, generated).unwrap();
         }
         let committed = fs::read_to_string(&file).unwrap_or_default();
-        assert!(
-            committed == generated,
-            "{path} differs from the binding table; run SOFTVT_WRITE_DOCS=1 cargo test --lib script::stubs"
-        );
+        assert!(committed == generated, "{path} differs from the declarations; run .ci/regenerate lua");
     }
 
     #[test]
-    fn the_committed_stubs_and_reference_come_from_the_binding_table() {
-        same(STUB_FILE, &stubs());
-        same("docs/lua.md", &reference());
-        same(".luarc.json", LUARC);
+    fn stubs_and_reference_are_up_to_date() {
+        check_file(STUB_FILE, &stubs());
+        check_file("docs/lua.md", &reference());
+        check_file(".luarc.json", LUARC);
     }
 
     #[test]
-    fn the_stubs_are_lua() {
+    fn stubs_are_valid_lua() {
         let lua = mlua::Lua::new();
         lua.load(stubs()).exec().unwrap();
         let has = "local names = {} for name in pairs(softvt) do names[#names + 1] = name end return #names";
         let count: usize = lua.load(has).eval().unwrap();
-        assert_eq!(count, constructors().count() + FUNCTIONS.len() + 3);
+        assert_eq!(count, api::constructors().count() + functions().count() + 3);
     }
 
     #[test]
-    fn the_machine_offers_just_what_the_table_says() {
+    fn declared_functions_exist_and_no_others() {
         let text = "local names = {} for name in pairs(softvt) do names[#names + 1] = name end\n\
                     for name in pairs(softvt.mask) do names[#names + 1] = 'mask.' .. name end\n\
                     for name in pairs(softvt.shape) do names[#names + 1] = 'shape.' .. name end\n\
@@ -285,12 +283,33 @@ mod tests {
         let error = crate::script::load(&folder.path().join("x.lua"), &[]).unwrap_err();
         let mut names: Vec<String> = error.message.split(' ').map(str::to_string).collect();
         let mut table: Vec<String> = ["version".to_string(), "shape".into(), "mask".into()].into();
-        table.extend(constructors().map(|(name, _)| name.to_string()));
-        table.extend(FUNCTIONS.iter().map(|function| function.name.to_string()));
-        table.extend(SHAPES.iter().map(|(name, _)| format!("shape.{name}")));
-        table.extend(MASKS.iter().map(|(name, _)| format!("mask.{name}")));
+        table.extend(api::constructors().map(|constructor| constructor.name().to_string()));
+        table.extend(functions().map(|function| function.name.to_string()));
+        table.extend(SHAPES.iter().map(|function| format!("shape.{}", function.signature.name)));
+        table.extend(MASKS.iter().map(|function| format!("mask.{}", function.signature.name)));
         names.sort();
         table.sort();
         assert_eq!(names, table);
+    }
+
+    #[test]
+    fn every_record_in_a_type_is_documented() {
+        fn nested(ty: &Type, found: &mut Vec<&'static Record>) {
+            match ty {
+                Type::List(of) | Type::Map(of) => nested(of, found),
+                Type::OneOf(types) => types.iter().for_each(|ty| nested(ty, found)),
+                Type::Nested(record) => found.push(record),
+                Type::Made(records) => found.extend(*records),
+                _ => {}
+            }
+        }
+        let mut used = Vec::new();
+        let documented = records();
+        documented.iter().flat_map(|record| record.fields).for_each(|field| nested(&field.ty, &mut used));
+        let signatures = functions().chain(api::CLASSES.iter().flat_map(|class| class.methods));
+        signatures.flat_map(|signature| signature.params).for_each(|param| nested(&param.ty, &mut used));
+        for record in used {
+            assert!(documented.iter().any(|known| known.class == record.class), "{}", record.class);
+        }
     }
 }

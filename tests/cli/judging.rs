@@ -115,7 +115,7 @@ end)
 "#
     );
     let who = r#"return softvt.experiment { name = "who", grid = { x = { 1 } }, run = function()
-  return { fingerprint = softvt.simulate { layout = layout }:watch "cube".fingerprint }
+  return { fingerprint = softvt.simulate { layout = layout }:measure "cube".fingerprint }
 end }"#;
     let suite = r#"return softvt.suite { name = "one", object_type = "deformable", variation = "spatial", episodes = 2, tasks = {
   softvt.task { prompt = "lie", layout = layout, goal = softvt.on { object = "cube", target = "floor" }, budget_steps = 12 },

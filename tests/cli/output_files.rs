@@ -197,7 +197,7 @@ fn limits_of_other_versions_are_ignored() {
   local sim = softvt.simulate { layout = softvt.layout("one", function(scene)
     scene:add { name = "floor", asset = floor, xyz = { 0, 0, 0 } }
     scene:add { name = "cube", asset = cube, at = { 0, 0.1 } } end) }
-  return { fingerprint = sim:watch "cube".fingerprint }
+  return { fingerprint = sim:measure "cube".fingerprint }
 end }
 "#;
     let project = Project::new(&[("who.lua", script)]);

@@ -13,7 +13,7 @@ fn project(policy: &str) -> Project {
 
 /// A policy that moves at random, depending on its observation, in chunks of three.
 const WANDERS: &str = "local n = 0
-return softvt.policy { name = 'wanders', looks = { touch = true, cameras = { 'wrist' } }, replan = 2,
+return softvt.policy { name = 'wanders', observes = { touch = true, cameras = { 'wrist' } }, replan = 2,
   reset = function(task) n = task.episode end,
   act = function(obs)
     n = n + 1
@@ -93,17 +93,17 @@ fn nan_actions_fail_only_their_episode() {
 #[test]
 fn missing_cameras_are_reported_before_anything_runs() {
     let policy =
-        "return softvt.policy { name = 'p', looks = { cameras = { 'sied' } }, act = function() end }";
+        "return softvt.policy { name = 'p', observes = { cameras = { 'sied' } }, act = function() end }";
     let project = project(policy);
     let message = project.refusal("x.lua --policy p.lua --out run");
     assert_eq!(
         message,
-        "p.lua:1: policy.looks: unknown camera \"sied\"; there are third_person, wrist (scene of task 0)"
+        "p.lua:1: policy.observes: unknown camera \"sied\"; there are third_person, wrist (scene of task 0)"
     );
     // Checked before any connection: there is no server at this address.
     let profile = "return softvt.profile { name = 'v', \
          inputs = { { keys = { 'a' }, source = 'camera', camera = 'wirst' } }, \
-         actions = { pose = 'absolute', gripper = { open = 0, shut = 1 } } }";
+         actions = { pose = 'absolute', gripper = { open = 0, closed = 1 } } }";
     project.write("v.lua", profile.as_bytes());
     let message = project.refusal("x.lua --policy ws://127.0.0.1:1 --profile v.lua --out run");
     assert_eq!(
@@ -238,12 +238,12 @@ fn the_tactile_servo_stops_at_contact() {
 }
 
 #[test]
-fn feel_is_refused_where_it_is_not_available() {
-    let project = Small { expert: "arm:feel()", ..Small::default() }.project();
+fn arm_tactile_is_refused_where_it_is_not_available() {
+    let project = Small { expert: "arm:tactile()", ..Small::default() }.project();
     let message = project.refusal("x.lua --out run");
     assert!(
         message.contains(
-            "x.lua:12: arm:feel: fingers are felt in simulation:drive and under --policy tactile-servo"
+            "x.lua:12: arm:tactile: finger readings are available in simulation:drive and under --policy tactile-servo"
         ),
         "{message}"
     );

@@ -20,12 +20,12 @@ return softvt.experiment {
     local sim, rows = softvt.simulate { layout = layout, settings = SETTINGS }, {}
     local function note(when)
       for _, side in ipairs { "left", "right" } do
-        local felt, x, y, most = sim:feel(side), 0, 0, 0
+        local felt, x, y, most = sim:tactile(side), 0, 0, 0
         for i, from in ipairs(felt.initial) do
           local dx, dy = felt.present[i][1] - from[1], felt.present[i][2] - from[2]
           x, y, most = x + dx / 99, y + dy / 99, math.max(most, math.abs(dx), math.abs(dy))
         end
-        rows[#rows + 1] = { when = when, side = side, x = x, y = y, most = most, force = felt.force, mean = felt.picture:mean(), depth_mm = felt.depth_mm }
+        rows[#rows + 1] = { when = when, side = side, x = x, y = y, most = most, force = felt.force, mean = felt.image:mean(), depth_mm = felt.depth_mm }
       end
     end
     note "open"

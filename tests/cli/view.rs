@@ -153,8 +153,11 @@ fn visuals_are_checked_with_their_line() {
         ),
         ("scene.light = 3", "x.lua:7: scene.light: cannot be replaced; its numbers are written one by one"),
         ("scene:camera(\"wrist\"):look_at({ 0, 0, 1 }, { 0, 0, 0 })", "give another up"),
-        ("scene:object(\"cube\").looks[1].albedo = { 2, 0, 0 }", "look.albedo: expected linear RGB in 0..1"),
-        ("scene:object(\"cube\").looks[1].shine = 2", "look: unknown key \"shine\""),
+        (
+            "scene:object(\"cube\").materials[1].albedo = { 2, 0, 0 }",
+            "material.albedo: expected linear RGB in 0..1",
+        ),
+        ("scene:object(\"cube\").materials[1].shine = 2", "material: unknown key \"shine\""),
     ] {
         let said = with(line).refusal("view x.lua --out seen");
         assert!(said.contains(message), "{line}\n{said}");
@@ -187,9 +190,9 @@ fn simulations_report_cameras_inside_of_objects() {
     let text = with(mole).text("x.lua");
     let (layout, _) = text.split_once("return softvt.suite").expect("a suite");
     let run = "return softvt.experiment { name = \"e\", grid = { a = { 1 } }, run = function()\n\
-               local sim = softvt.simulate { layout = layout }\nsim:see { camera = \"mole\" }\nreturn { b = 1 } end }";
+               local sim = softvt.simulate { layout = layout }\nsim:render { camera = \"mole\" }\nreturn { b = 1 } end }";
     let message = Project::new(&[("x.lua", &format!("{layout}{run}"))]).refusal("x.lua");
-    let told = "simulation:see: x.lua:7: camera mole: position: it is inside floor; move it out";
+    let told = "simulation:render: x.lua:7: camera mole: position: it is inside floor; move it out";
     assert!(message.contains(told), "{message}");
 }
 
@@ -253,7 +256,7 @@ fn visuals_change_the_image() {
         "scene.light.strength = 0.1 * scene.light.strength",
         "scene:camera(\"third_person\").fovy = 0.4",
         "scene:camera(\"third_person\"):look_at({ 0.1, 0.1, 0 })",
-        "scene:object(\"cube\").looks[1].albedo = { 0.9, 0.1, 0.1 }",
+        "scene:object(\"cube\").materials[1].albedo = { 0.9, 0.1, 0.1 }",
     ] {
         assert!(plain != still(line), "{line}");
     }

@@ -158,7 +158,7 @@ impl PolicyConfig {
                 Some((format!("--profile {}: inputs", server.profile_name), server.profile.streams()))
             }
             PolicyKind::Lua { file, .. } => {
-                Some((format!("{}: policy.looks", file.looks_at), file.streams.clone()))
+                Some((format!("{}: policy.observes", file.observes_at), file.streams.clone()))
             }
             _ => None,
         }
@@ -258,7 +258,7 @@ pub(crate) fn expert_controller(
     opened: script::Episode,
     mode: GripMode,
 ) -> Result<ExpertController, CliError> {
-    let expert = opened.expert().map_err(CliError::input)?;
+    let expert = opened.expert();
     let expert = expert.ok_or_else(|| CliError::input("the task has no expert"))?;
     Ok(match mode {
         GripMode::TactileServo => ExpertController::servo(expert),

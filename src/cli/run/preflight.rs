@@ -11,7 +11,7 @@ use crate::{
     policy::SensorStreams,
     rollout::{BuildError, EpisodeError, SensingError, SensorSuite, Simulation, check_sensors, target_asset},
     scene::{Body, Scene},
-    script::schema,
+    text::unknown_name,
 };
 
 #[derive(Debug, thiserror::Error)]
@@ -70,7 +70,7 @@ impl SuiteRun<'_> {
         let missing = streams.cameras.iter().find(|name| scene.camera(name).is_none());
         missing.map_or(Ok(()), |name| {
             let known = scene.cameras.iter().map(|camera| camera.name.as_str());
-            let unknown = schema::unknown("camera", name, known);
+            let unknown = unknown_name("camera", name, known);
             Err(CliError::input(format!("{place}: {unknown} (scene of task {})", task.id)))
         })
     }

@@ -1,83 +1,114 @@
-//! The safe interaction envelope in Lua: what a calibration makes of its rows.
+//! The safe interaction envelope: results of a calibration from its rows.
 
-use mlua::{Lua, LuaSerdeExt, Table, Value};
+use mlua::{LuaSerdeExt, Value};
 
-use crate::script::{
-    api::catalogue_world::ENVELOPE,
-    api::sim::read,
-    schema::{self, Type},
-    vm::{fail, locked, shared},
-};
 use crate::{
     evaluation::{
         calibration::{self, Envelope, HoldRow, StabilityCriteria, SweepRow},
         envelope_plot::plot,
+        safety::DeformationLimit,
         thresholds::ThresholdFile,
     },
+    parallel::lock,
     report::softvtbench_files::sweep_jsonl,
+    script::{
+        schema::{Range, Type, Unchecked, functions, output, record},
+        vm::{error::fail, json::deserialize, library},
+    },
 };
 
-/// Installs `softvt.envelope`, `softvt.calibration` and `softvt.stable`.
-pub(crate) fn install(lua: &Lua, api: &Table) -> mlua::Result<()> {
-    api.set("envelope", lua.create_function(|lua, value: Value| envelope(lua, &value))?)?;
-    api.set("calibration", lua.create_function(|lua, asset: Value| calibration(lua, &asset))?)?;
-    let stable = |lua: &Lua, row: Value| {
-        let row: SweepRow = read(lua, "softvt.stable", &row)?;
-        Ok(StabilityCriteria::default().accepts(&row))
-    };
-    api.set("stable", lua.create_function(stable)?)
-}
+/// Type of a list of rows.
+const ROWS: Type = Type::List(&Type::Map(&Type::Any));
 
-fn envelope(lua: &Lua, value: &Value) -> mlua::Result<Table> {
-    let spec = schema::checked(lua, &ENVELOPE, value)?;
-    let asset: String = spec.get("asset")?;
-    let kappa: f64 = spec.get("kappa")?;
-    let holds: Vec<HoldRow> = read(lua, "softvt.envelope: holds", &spec.get("holds")?)?;
-    let sweep: Vec<SweepRow> = read(lua, "softvt.envelope: sweep", &spec.get("sweep")?)?;
-    let envelope = Envelope::new(holds, sweep, kappa);
-    let made_by = format!("softvt {}", env!("CARGO_PKG_VERSION"));
-    let mut file = ThresholdFile::new(kappa, vec![format!("{asset}.sweep.jsonl")], made_by);
-    file.insert(&asset, envelope.clone());
-    if let Some(fingerprint) = spec.get::<Option<String>>("fingerprint")? {
-        file.fingerprints.insert(asset.clone(), fingerprint);
-    }
-    told(lua, &asset, &envelope, &file)
-}
-
-/// What the calibration file of an asset says; nil if there is none.
-fn calibration(lua: &Lua, asset: &Value) -> mlua::Result<Option<Table>> {
-    let label = "softvt.calibration";
-    let asset =
-        Type::Name.check(lua, asset).map_err(|fault| fail(lua, fault.words(&format!("{label}: asset"))))?;
-    let asset: String = lua.unpack(asset)?;
-    let bytes = {
-        let shared = shared(lua)?;
-        let mut library = locked(&shared.library);
-        let path = format!("assets/calibration/{asset}.json");
-        let found = library.data_if_there(&path).map_err(|e| fail(lua, format!("{label}: {e}")))?;
-        found.and_then(|file| Some((library.bytes(&file)?, file)))
-    };
-    let Some((bytes, path)) = bytes else { return Ok(None) };
-    let file = ThresholdFile::parse(&String::from_utf8_lossy(&bytes), &path)
-        .map_err(|e| fail(lua, format!("{label}: {e}")))?;
-    match file.envelopes.get(&asset) {
-        Some(envelope) => told(lua, &asset, envelope, &file).map(Some),
-        None => Err(fail(lua, format!("{label}: {path} has no rows of {asset}; calibrate it again"))),
+record! {
+    /// The rows of a calibration.
+    EnvelopeSpec: "softvt.EnvelopeSpec" as "softvt.envelope" {
+        /// Name of the asset.
+        asset: String = Type::Name;
+        /// Safety factor κ of the deformation limit τ = κ D_ref.
+        kappa: f64 = Type::Number("", Range::closed(0.0, 1.0)) => Number(0.5);
+        /// Fingerprint of the calibrated asset, as simulation:measure returns it. Results for another object of that name
+        /// then do not use the calibration.
+        fingerprint: Option<String>;
+        /// Rows closure, trials, held, slip_mm, d_peak_pct of the scan for the lower bound.
+        holds: Value = ROWS;
+        /// Rows closure, gripper_width_mm, d_peak_pct, force_n, min_det_f, node_speed_m_s, both_pads, slip_mm, stable of
+        /// the compression sweep.
+        sweep: Value = ROWS;
     }
 }
 
-/// An envelope as scripts see it.
-fn told(lua: &Lua, asset: &str, envelope: &Envelope, file: &ThresholdFile) -> mlua::Result<Table> {
-    let limit = calibration::deformation_limit(&envelope.sweep, file.calibration.kappa);
-    let result = lua.create_table()?;
-    result.set("lower", envelope.closure_lower)?;
-    result.set("closure_at_tau", envelope.closure_at_tau)?;
-    result.set("safe_window", envelope.has_safe_window())?;
-    result.set("tau", limit.map(|l| l.tau_pct()))?;
-    result.set("d_ref", limit.map(|l| l.d_ref_pct))?;
-    result.set("text", plot(asset, envelope, limit))?;
-    result.set("sweep", sweep_jsonl(asset, envelope))?;
-    result.set("json", file.to_text())?;
-    result.set("table", lua.to_value(file)?)?;
-    Ok(result)
+output! {
+    /// Results of a calibration.
+    fn envelope_table(lua, asset: &str, envelope: &Envelope, file: &ThresholdFile) -> "softvt.Envelope" as "envelope" {
+        /// Smallest closure that holds the object.
+        lower: "number?" = envelope.closure_lower;
+        /// Closure at which the deformation reaches τ.
+        closure_at_tau: "number?" = envelope.closure_at_tau;
+        /// True if the lower bound is below closure_at_tau.
+        safe_window: "boolean" = envelope.has_safe_window();
+        /// Deformation limit τ, %.
+        tau: "number?" = limit(envelope, file).map(|limit| limit.tau_pct());
+        /// Largest stable deformation D_ref, %.
+        d_ref: "number?" = limit(envelope, file).map(|limit| limit.d_ref_pct);
+        /// A plot of deformation over closure as text.
+        text: "string" = plot(asset, envelope, limit(envelope, file));
+        /// The rows of the sweep as JSON lines.
+        sweep: "string" = sweep_jsonl(asset, envelope);
+        /// The calibration file as JSON text.
+        json: "string" = file.to_text();
+        /// The same as a table.
+        table: "table" = lua.to_value(file)?;
+    }
+}
+
+fn limit(envelope: &Envelope, file: &ThresholdFile) -> Option<DeformationLimit> {
+    calibration::deformation_limit(&envelope.sweep, file.calibration.kappa)
+}
+
+functions! {
+    FUNCTIONS {
+        /// Returns the results of a calibration: the lower bound of closure, the deformation limit τ, and the files to write.
+        fn envelope(lua, spec: EnvelopeSpec) -> ["softvt.Envelope"] {
+            let EnvelopeSpec { asset, kappa, .. } = spec;
+            let holds: Vec<HoldRow> = deserialize(lua, "softvt.envelope: holds", &spec.holds)?;
+            let sweep: Vec<SweepRow> = deserialize(lua, "softvt.envelope: sweep", &spec.sweep)?;
+            let envelope = Envelope::new(holds, sweep, kappa);
+            let made_by = format!("softvt {}", env!("CARGO_PKG_VERSION"));
+            let mut file = ThresholdFile::new(kappa, vec![format!("{asset}.sweep.jsonl")], made_by);
+            file.insert(&asset, envelope.clone());
+            if let Some(fingerprint) = spec.fingerprint {
+                file.fingerprints.insert(asset.clone(), fingerprint);
+            }
+            envelope_table(lua, &asset, &envelope, &file)?
+        }
+        /// Returns the content of assets/calibration/<asset>.json as softvt.envelope does; nil if there is no such file.
+        fn calibration(lua, asset: String = Type::Name) -> ["softvt.Envelope?"] {
+            let label = "softvt.calibration";
+            let file = {
+                let library = library::of(lua)?;
+                let mut library = lock(&library);
+                let path = format!("assets/calibration/{asset}.json");
+                let found = library.data_if_there(&path).map_err(|e| fail(lua, format!("{label}: {e}")))?;
+                found.and_then(|file| Some((library.bytes(&file)?, file)))
+            };
+            match file {
+                None => None,
+                Some((bytes, path)) => {
+                    let file = ThresholdFile::parse(&String::from_utf8_lossy(&bytes), &path)
+                        .map_err(|e| fail(lua, format!("{label}: {e}")))?;
+                    let Some(envelope) = file.envelopes.get(&asset) else {
+                        let message = format!("{label}: {path} has no rows of {asset}; calibrate it again");
+                        return Err(fail(lua, message));
+                    };
+                    Some(envelope_table(lua, &asset, envelope, &file)?)
+                }
+            }
+        }
+        /// Returns true if a row of a compression sweep is a stable squeeze.
+        fn stable(lua, row: Unchecked = Type::Table("table")) -> ["boolean"] {
+            let row: SweepRow = deserialize(lua, "softvt.stable", &row.0)?;
+            StabilityCriteria::default().accepts(&row)
+        }
+    }
 }

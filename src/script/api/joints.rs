@@ -1,87 +1,146 @@
-//! Articulated objects in Lua: joints with limits, parts, and the values that joints start from.
+//! Articulated objects: joints with limits, parts, and the start values of joints.
 
-use std::sync::Arc;
+use std::{collections::BTreeMap, sync::Arc};
 
 use mlua::{Lua, Table, Value};
 
-use crate::script::{
-    api::catalogue_joints::{ARTICULATED, HINGE, SLIDER},
-    api::shapes::LuaShape,
-    api::visuals,
-    schema::{self, Fault, Record, unknown},
-    vm::fail,
+use super::{
+    shapes::LuaShape,
+    visuals::{VisualSpec, visuals_of},
 };
 use crate::{
-    geometry::Vec3,
+    geometry::{Pose, Vec3},
     physics::contact::Friction,
     scene::{Asset, Body, Joint, JointMotion, Part, part_poses},
-    text::format_number,
+    script::{
+        schema::{
+            Made, Range, Record, RecordType, Type, ValidationError, error_at_key, invalid, make,
+            object::Constructor, one_of, record,
+        },
+        vm::error::fail,
+    },
+    text::{format_number, unknown_name},
 };
 
-/// Installs `softvt.slider`, `softvt.hinge` and `softvt.articulated`, which check what no single field can say.
-pub(crate) fn install(lua: &Lua, api: &Table) -> mlua::Result<()> {
-    for (name, record) in [("slider", &SLIDER), ("hinge", &HINGE)] {
-        api.set(name, lua.create_function(move |lua, value: Value| joint_table(lua, record, &value))?)?;
+record! {
+    /// A joint along which a part slides, such as that of a drawer. Values are in m.
+    SliderSpec: "softvt.Slider" as "slider", constructor "softvt.slider" {
+        /// Direction in which its value grows.
+        axis: [f64; 3] = Type::Vector(3, "object frame");
+        /// Lowest value.
+        lower: f64 = Type::Number("m", Range::ANY);
+        /// Highest value, above the lowest.
+        upper: f64 = Type::Number("m", Range::ANY);
+        /// Viscous damping.
+        damping: f64 = Type::Number("N s/m", Range::NOT_NEGATIVE) => Number(0.0);
+        /// Dry friction.
+        friction: f64 = Type::Number("N", Range::NOT_NEGATIVE) => Number(0.0);
     }
-    api.set("articulated", lua.create_function(articulated_table)?)
+    /// A joint about which a part turns, such as that of a door or a knob. Values are in rad.
+    HingeSpec: "softvt.Hinge" as "hinge", constructor "softvt.hinge" {
+        /// Axis about which its value grows, right-handed.
+        axis: [f64; 3] = Type::Vector(3, "object frame");
+        /// A point of the axis, with all joints at 0.
+        origin: [f64; 3] = Type::Vector(3, "m, object frame");
+        /// Lowest value.
+        lower: f64 = Type::Number("rad", Range::ANY);
+        /// Highest value, above the lowest.
+        upper: f64 = Type::Number("rad", Range::ANY);
+        /// Viscous damping.
+        damping: f64 = Type::Number("N m s/rad", Range::NOT_NEGATIVE) => Number(0.0);
+        /// Dry friction.
+        friction: f64 = Type::Number("N m", Range::NOT_NEGATIVE) => Number(0.0);
+    }
+    /// A part of an articulated object. Parts of one object never touch each other or its base.
+    PartSpec: "softvt.Part" as "part" {
+        /// Name, unique in the object. A scene names the part cabinet.top_drawer.
+        name: String = Type::Name;
+        /// Shape with all joints at 0, in the frame of the whole object. Walls must be at least 4 mm thick.
+        shape: LuaShape;
+        /// Density.
+        density: f64 = Type::Number("kg/m³", Range::POSITIVE);
+        /// Joint that carries it; axes and origins are in the frame of the whole object.
+        joint: JointSpec;
+        /// Name of the part that carries it; the fixed base by default.
+        parent: Option<String> = Type::Name;
+        /// Visuals by material id of its shape, from 0; those of the asset by default.
+        visuals: Option<Vec<VisualSpec>>;
+        /// Numbers for experts (handle height …).
+        hints: Option<BTreeMap<String, f64>>;
+    }
+    /// Parts on joints. The asset's own shape is their base, which never moves.
+    ArticulatedSpec: "softvt.Articulated" as "articulated", constructor "softvt.articulated" {
+        /// The parts, in any order.
+        parts: Vec<PartSpec>;
+    }
 }
 
-fn at_key(lua: &Lua, record: &Record, key: &str, message: String) -> mlua::Error {
-    schema::fault_here(lua, record.label, &Fault { path: vec![key.to_owned()], message })
+one_of! {
+    /// A joint of a part.
+    JointSpec { Slider(SliderSpec), Hinge(HingeSpec) }
 }
 
-fn joint_table(lua: &Lua, record: &'static Record, value: &Value) -> mlua::Result<Table> {
+/// Constructors that check more than single fields.
+pub(crate) static CONSTRUCTORS: &[Constructor] = &[
+    Constructor::with(ArticulatedSpec::RECORD, make_articulated),
+    Constructor::with(SliderSpec::RECORD, make_joint),
+    Constructor::with(HingeSpec::RECORD, make_joint),
+];
+
+fn make_joint(lua: &Lua, record: &'static Record, value: &Value) -> mlua::Result<Table> {
     if let Value::Table(table) = value {
         for key in ["lower", "upper"] {
             if table.raw_get::<Value>(key)?.is_nil() {
-                let message = "missing; every joint needs limits: give lower and upper".to_owned();
-                return Err(at_key(lua, record, key, message));
+                let message = "missing; every joint needs limits: give lower and upper";
+                return Err(invalid(lua, record, key, message));
             }
         }
     }
-    let made = schema::make(lua, record, value)?;
-    if Vec3::from(made.get::<[f64; 3]>("axis")?).norm() < 1e-9 {
-        return Err(at_key(lua, record, "axis", "expected a direction, got one of length 0".into()));
+    let made = make(lua, record, value)?;
+    if Vec3::from(made.raw_get::<[f64; 3]>("axis")?).norm() < 1e-9 {
+        return Err(invalid(lua, record, "axis", "expected a direction, got one of length 0"));
     }
-    let (lower, upper): (f64, f64) = (made.get("lower")?, made.get("upper")?);
+    let (lower, upper): (f64, f64) = (made.raw_get("lower")?, made.raw_get("upper")?);
     match lower < upper {
         true => Ok(made),
         false => {
-            let message =
-                format!("expected more than lower, {}, got {}", format_number(lower), format_number(upper));
-            Err(at_key(lua, record, "upper", message))
+            let (lower, upper) = (format_number(lower), format_number(upper));
+            Err(invalid(lua, record, "upper", format!("expected more than lower, {lower}, got {upper}")))
         }
     }
 }
 
-fn articulated_table(lua: &Lua, value: Value) -> mlua::Result<Table> {
-    let made = schema::make(lua, &ARTICULATED, &value)?;
-    let parts: Vec<Table> = made.get("parts")?;
-    order(&parts)?.map(|_| made).map_err(|message| at_key(lua, &ARTICULATED, "parts", message))
+fn make_articulated(lua: &Lua, record: &'static Record, value: &Value) -> mlua::Result<Table> {
+    let made = make(lua, record, value)?;
+    let parts: Vec<PartSpec> = made.raw_get("parts")?;
+    match order(&parts) {
+        Ok(_) => Ok(made),
+        Err(message) => Err(invalid(lua, record, "parts", message)),
+    }
 }
 
-/// The parts so that each comes after the one that carries it, as indices; or why there is no such order.
-fn order(parts: &[Table]) -> mlua::Result<Result<Vec<usize>, String>> {
+/// Sorts the parts so that each comes after the one that carries it, and returns their indices; or the reason why there is
+/// no such order.
+fn order(parts: &[PartSpec]) -> Result<Vec<usize>, String> {
     if parts.is_empty() {
-        return Ok(Err("expected at least one part; without any it is softvt.static {}".into()));
+        return Err("expected at least one part; without any it is softvt.static {}".into());
     }
-    let names: Vec<String> = parts.iter().map(|part| part.get("name")).collect::<mlua::Result<_>>()?;
-    if let Some(twice) = (1..names.len()).find(|&i| names[..i].contains(&names[i])) {
-        return Ok(Err(format!("there are two parts named {:?}; names must be unique", names[twice])));
+    let names: Vec<&str> = parts.iter().map(|part| part.name.as_str()).collect();
+    if let Some(duplicate) = (1..names.len()).find(|&i| names[..i].contains(&names[i])) {
+        return Err(format!("there are two parts named {:?}; names must be unique", names[duplicate]));
     }
     let mut parents = Vec::new();
-    for (part, name) in parts.iter().zip(&names) {
-        let parent: Option<String> = part.get("parent")?;
-        parents.push(match parent {
-            None => None,
-            Some(parent) => match names.iter().position(|known| *known == parent) {
-                Some(index) => Some(index),
-                None => {
-                    let known = names.iter().map(String::as_str);
-                    return Ok(Err(format!("part {name:?}: parent: {}", unknown("part", &parent, known))));
-                }
-            },
+    for part in parts {
+        let parent = part.parent.as_deref().map(|parent| {
+            names.iter().position(|known| *known == parent).ok_or_else(|| {
+                format!(
+                    "part {:?}: parent: {}",
+                    part.name,
+                    unknown_name("part", parent, names.iter().copied())
+                )
+            })
         });
+        parents.push(parent.transpose()?);
     }
     let mut sorted: Vec<usize> = Vec::new();
     while sorted.len() < parts.len() {
@@ -89,103 +148,119 @@ fn order(parts: &[Table]) -> mlua::Result<Result<Vec<usize>, String>> {
         match (0..parts.len()).find(ready) {
             Some(next) => sorted.push(next),
             None => {
-                let stuck: Vec<_> =
-                    (0..parts.len()).filter(|i| !sorted.contains(i)).map(|i| names[i].as_str()).collect();
-                let who = stuck.join(", ");
-                return Ok(Err(format!(
-                    "parts {who} carry each other in a circle; one must hang on the base"
-                )));
+                let stuck = (0..parts.len()).filter(|i| !sorted.contains(i)).map(|i| names[i]);
+                let stuck = stuck.collect::<Vec<_>>().join(", ");
+                return Err(format!(
+                    "parts {stuck} carry each other in a circle; one must be carried by the base"
+                ));
             }
         }
     }
-    Ok(Ok(sorted))
+    Ok(sorted)
 }
 
-/// The parts of a checked articulated body; `asset` gives friction and, where a part has none, looks.
-pub(crate) fn read(lua: &Lua, asset: &Table, body: &Table, friction: Friction) -> mlua::Result<Vec<Part>> {
-    let tables: Vec<Table> = body.get("parts")?;
-    let sorted = order(&tables)?.map_err(|message| fail(lua, message))?;
+/// The parts of an articulated body. The asset gives their friction and, where a part has none, the visuals.
+pub(crate) fn parts(
+    lua: &Lua,
+    body: &ArticulatedSpec,
+    asset_visuals: Option<&[VisualSpec]>,
+    friction: Friction,
+) -> mlua::Result<Vec<Part>> {
     let mut parts: Vec<Part> = Vec::new();
-    for index in sorted {
-        let table = &tables[index];
-        let shape = table.get::<LuaShape>("shape")?.shape().clone();
-        let (name, density): (String, f64) = (table.get("name")?, table.get("density")?);
-        let own = !table.get::<Value>("visuals")?.is_nil();
-        let parent: Option<String> = table.get("parent")?;
+    for index in order(&body.parts).map_err(|message| fail(lua, message))? {
+        let PartSpec { name, shape, density, joint, parent, visuals, hints } = &body.parts[index];
+        let shape = shape.copy();
         let asset = Asset {
             name: name.clone(),
-            visuals: visuals::read(lua, if own { table } else { asset }, &shape)?,
+            visuals: visuals_of(lua, name, visuals.as_deref().or(asset_visuals), &shape)?,
             shape,
-            body: Body::Rigid { density },
+            body: Body::Rigid { density: *density },
             friction,
-            hints: table.get::<Option<_>>("hints")?.unwrap_or_default(),
+            hints: hints.clone().unwrap_or_default(),
         };
         parts.push(Part {
-            name,
+            name: name.clone(),
             asset: Arc::new(asset),
-            density,
-            parent: parent.and_then(|parent| parts.iter().position(|part| part.name == parent)),
-            joint: joint(lua, &table.get("joint")?)?,
+            density: *density,
+            parent: parent.as_ref().and_then(|parent| parts.iter().position(|part| part.name == *parent)),
+            joint: joint.joint(),
         });
     }
     Ok(parts)
 }
 
-fn joint(lua: &Lua, table: &Table) -> mlua::Result<Joint> {
-    let turns = schema::is_made(lua, &HINGE, table);
-    let origin: [f64; 3] = if turns { table.get("origin")? } else { [0.0; 3] };
-    Ok(Joint {
-        motion: if turns { JointMotion::Turn } else { JointMotion::Slide },
-        axis_o: Vec3::from(table.get::<[f64; 3]>("axis")?).normalize(),
-        origin_o: Vec3::from(origin),
-        lower: table.get("lower")?,
-        upper: table.get("upper")?,
-        damping: table.get("damping")?,
-        friction: table.get("friction")?,
-    })
+impl JointSpec {
+    fn joint(&self) -> Joint {
+        match self {
+            Self::Slider(Made { spec, .. }) => Joint {
+                motion: JointMotion::Slide,
+                axis_o: Vec3::from(spec.axis).normalize(),
+                origin_o: Vec3::zeros(),
+                lower: spec.lower,
+                upper: spec.upper,
+                damping: spec.damping,
+                friction: spec.friction,
+            },
+            Self::Hinge(Made { spec, .. }) => Joint {
+                motion: JointMotion::Turn,
+                axis_o: Vec3::from(spec.axis).normalize(),
+                origin_o: Vec3::from(spec.origin),
+                lower: spec.lower,
+                upper: spec.upper,
+                damping: spec.damping,
+                friction: spec.friction,
+            },
+        }
+    }
 }
 
-/// Start values of the joints of `asset` as `scene:add` was given them, in the order of its parts.
-pub(crate) fn start(lua: &Lua, asset: &Asset, given: Option<Table>) -> mlua::Result<Vec<f64>> {
+/// Start values of the joints of `asset` as given to `scene:add`, in the order of its parts.
+pub(crate) fn start_values(
+    lua: &Lua,
+    asset: &Asset,
+    given: Option<&BTreeMap<String, f64>>,
+) -> mlua::Result<Vec<f64>> {
     let parts = asset.parts();
     let mut values: Vec<f64> = parts.iter().map(|part| part.joint.rest()).collect();
     let Some(given) = given else { return Ok(values) };
     let wrong = |path: &[&str], message: String| {
         let path = path.iter().map(|key| (*key).to_owned()).collect();
-        schema::fault_here(lua, "scene:add", &Fault { path, message })
+        error_at_key(lua, "scene:add", &ValidationError { path, message })
     };
     if parts.is_empty() {
         return Err(wrong(&["joints"], format!("asset {} has no joints", asset.name)));
     }
-    for (key, value) in schema::sorted_pairs(&given) {
-        let (name, value) = (key.to_string()?, schema::number(&value).unwrap_or(f64::NAN));
-        let Some(index) = parts.iter().position(|part| part.name == name) else {
+    for (name, value) in given {
+        let Some(index) = parts.iter().position(|part| part.name == *name) else {
             let names = parts.iter().map(|part| part.name.as_str());
-            return Err(wrong(&["joints"], unknown("part", &name, names)));
+            return Err(wrong(&["joints"], unknown_name("part", name, names)));
         };
         let joint = &parts[index].joint;
-        if !(joint.lower..=joint.upper).contains(&value) {
+        if !(joint.lower..=joint.upper).contains(value) {
             let (low, high) = (format_number(joint.lower), format_number(joint.upper));
-            let message =
-                format!("expected a value in {low}..{high} ({}), got {}", joint.unit(), format_number(value));
-            return Err(wrong(&["joints", &name], message));
+            let message = format!(
+                "expected a value in {low}..{high} ({}), got {}",
+                joint.unit(),
+                format_number(*value)
+            );
+            return Err(wrong(&["joints", name], message));
         }
-        values[index] = value;
+        values[index] = *value;
     }
     Ok(values)
 }
 
-/// Where a downward ray meets an articulated object, or the part of it that `part` names: the least of what `ray` gives
-/// for a shape and its frame in that of the object.
+/// Where a ray meets an articulated object, or only its part `part`: the least of the results of `ray`, which gets each shape
+/// and its frame in that of the object.
 pub(crate) fn first_hit(
     asset: &Asset,
     joints: &[f64],
     part: Option<&str>,
-    ray: impl Fn(&Asset, &crate::geometry::Pose) -> Option<f64>,
+    ray: impl Fn(&Asset, &Pose) -> Option<f64>,
 ) -> Option<f64> {
     let parts = asset.parts();
     let poses = part_poses(parts, joints);
-    let base = part.is_none().then(|| ray(asset, &crate::geometry::Pose::identity())).flatten();
-    let wanted = parts.iter().zip(&poses).filter(|(p, _)| part.is_none_or(|part| p.name == part));
-    wanted.filter_map(|(p, pose)| ray(&p.asset, pose)).chain(base).min_by(f64::total_cmp)
+    let base = part.is_none().then(|| ray(asset, &Pose::identity())).flatten();
+    let named = parts.iter().zip(&poses).filter(|(p, _)| part.is_none_or(|part| p.name == part));
+    named.filter_map(|(p, pose)| ray(&p.asset, pose)).chain(base).min_by(f64::total_cmp)
 }

@@ -1,25 +1,23 @@
-//! What a policy in Lua sees: an observation as an object that is only read.
+//! The observation of a policy, as a read-only object.
 
 use std::sync::Arc;
 
-use mlua::{Lua, Table, UserDataMethods, Value};
+use mlua::{Lua, Table, Value};
 
-use crate::script::{
-    api::catalogue_classes::Class,
-    api::catalogue_policy::OBSERVATION,
-    api::image::LuaImage,
-    api::touch::fingers,
-    plan::options::strict,
-    schema::unknown,
-    schema::userdata::{Hosted, Read, hosted, method},
-    vm::fail,
-};
+use super::{image::LuaImage, pose::wxyz, touch::fingers};
 use crate::{
-    policy::{Observation, TaskBrief},
+    policy::{Observation, TactileHistory, TaskBrief},
     robot::rotation,
+    script::{
+        schema::{
+            class,
+            object::{MEASURED, fixed_list},
+            output,
+        },
+        vm::error::fail,
+    },
+    text::unknown_name,
 };
-
-const FINISHED: &str = "it is measured";
 
 /// `softvt.Observation`.
 #[derive(Clone)]
@@ -30,82 +28,109 @@ impl LuaObservation {
         Self(Arc::new(observation.clone()))
     }
 
-    fn camera(&self, lua: &Lua, name: &str) -> mlua::Result<LuaImage> {
-        let names = || self.0.cameras.iter().map(|camera| camera.name.as_str());
-        match self.0.camera(name) {
-            Some(picture) => LuaImage::new(lua, picture.clone()),
-            None if self.0.cameras.is_empty() => Err(not_looked(lua, "camera", "cameras = { … }")),
-            None => Err(fail(lua, format!("obs:camera: {}", unknown("camera", name, names())))),
-        }
-    }
-
-    fn force(&self, lua: &Lua) -> mlua::Result<Table> {
-        let Some(pads) = &self.0.forces else { return Err(not_looked(lua, "force", "force = true")) };
-        let table = lua.create_table()?;
-        for (pad, name) in pads.iter().zip(["left", "right"]) {
-            table.set(name, lua.create_sequence_from(pad.wrench.force.iter().copied())?)?;
-        }
-        strict(lua, "force", table, ["left", "right"].map(str::to_owned).to_vec())
+    fn touch(&self, lua: &Lua, key: &str) -> mlua::Result<&TactileHistory> {
+        self.0.touch.as_ref().ok_or_else(|| not_observed(lua, key, "touch = true"))
     }
 }
 
-/// What was never computed, since the policy does not say that it looks at it.
-fn not_looked(lua: &Lua, key: &str, mend: &str) -> mlua::Error {
-    let message = format!("obs.{key}: the policy does not look at it; say looks = {{ {mend} }}");
+/// The error for data that was not computed, since the policy does not declare it.
+fn not_observed(lua: &Lua, key: &str, declaration: &str) -> mlua::Error {
+    let message =
+        format!("obs.{key}: the policy does not observe it; declare observes = {{ {declaration} }}");
     fail(lua, message)
 }
 
-impl Hosted for LuaObservation {
-    fn class() -> &'static Class {
-        &OBSERVATION
-    }
-
-    fn label(&self) -> String {
-        "obs".into()
-    }
-
-    fn read(&self, lua: &Lua, key: &str) -> mlua::Result<Read> {
-        let o = &self.0;
-        let felt = || o.touch.as_ref().ok_or_else(|| not_looked(lua, key, "touch = true"));
-        let numbers = |numbers: &[f64]| Read::together(lua, numbers, FINISHED);
-        match key {
-            "time" => Ok(Read::number(o.time_s)),
-            "position" => numbers(o.ee_position_b.as_slice()),
-            "axis_angle" => numbers(o.ee_axis_angle_b.as_slice()),
-            "rotation" => {
-                let q = rotation::canonical(&rotation::from_axis_angle(&o.ee_axis_angle_b));
-                numbers(&[q.w, q.i, q.j, q.k])
-            }
-            "joints" => numbers(&o.joints),
-            "width" => Ok(Read::number(o.gripper_width_m)),
-            "closure" => Ok(Read::number(o.closure)),
-            "prompt" => Read::text(lua, &o.prompt),
-            "force" => self.force(lua).map(|table| Read::Value(Value::Table(table))),
-            "touch" => match felt()?.frames.last() {
-                Some(now) => fingers(lua, now).map(|table| Read::Value(Value::Table(table))),
-                None => Ok(Read::Value(Value::Nil)),
-            },
-            _ => {
-                let frames = felt()?.frames.iter().map(|frame| fingers(lua, frame));
-                let list = lua.create_sequence_from(frames.collect::<mlua::Result<Vec<_>>>()?)?;
-                Ok(Read::Fixed(list, FINISHED.to_owned()))
-            }
-        }
-    }
-
-    fn methods<M: UserDataMethods<Self>>(methods: &mut M) {
-        method(methods, "camera", |lua, this: &Self, name: String| this.camera(lua, &name));
+output! {
+    /// True forces on the gels, N, pad frame: a pressing body makes z negative.
+    fn forces(lua, left: Table, right: Table) -> "softvt.Forces" as "force" {
+        /// Force on the left gel.
+        left: "number[]" = left;
+        /// Force on the right gel.
+        right: "number[]" = right;
     }
 }
 
-hosted!(LuaObservation);
+output! {
+    /// The episode that begins.
+    fn task_brief(lua, brief: &TaskBrief) -> "softvt.Brief" as "task" {
+        /// Name of the suite.
+        suite: "string" = brief.suite.as_str();
+        /// Index of the task, from 0.
+        task: "integer" = brief.task;
+        /// The instruction.
+        prompt: "string" = brief.prompt.as_str();
+        /// Index of the episode, from 0.
+        episode: "integer" = brief.episode;
+    }
+}
 
-/// What a policy is told of an episode.
-pub(crate) fn brief(lua: &Lua, brief: &TaskBrief) -> mlua::Result<Table> {
-    let table = lua.create_table()?;
-    table.set("suite", brief.suite.as_str())?;
-    table.set("task", brief.task)?;
-    table.set("prompt", brief.prompt.as_str())?;
-    table.set("episode", brief.episode)?;
-    strict(lua, "task", table, ["suite", "task", "prompt", "episode"].map(str::to_owned).to_vec())
+class! {
+    /// The observation of a policy at a control step. Poses are of the tool centre point in the robot's base frame. The true
+    /// state of the scene is not part of it.
+    LuaObservation: "softvt.Observation" {
+        label(_) { "obs".to_owned() }
+        fields {
+            /// Time since the policy took over, s.
+            time: "number" { get(_, this) { this.0.time_s } }
+            /// Tool position, m.
+            position: "number[]" {
+                get(lua, this) { fixed_list(lua, this.0.ee_position_b.iter().copied(), MEASURED)? }
+            }
+            /// Tool orientation as axis-angle, rad.
+            axis_angle: "number[]" {
+                get(lua, this) { fixed_list(lua, this.0.ee_axis_angle_b.iter().copied(), MEASURED)? }
+            }
+            /// Tool orientation as quaternion w, x, y, z with w ≥ 0.
+            rotation: "number[]" {
+                get(lua, this) {
+                    let rotation = rotation::from_axis_angle(&this.0.ee_axis_angle_b);
+                    fixed_list(lua, wxyz(&rotation), MEASURED)?
+                }
+            }
+            /// The seven joint angles of the arm, rad.
+            joints: "number[]" { get(lua, this) { fixed_list(lua, this.0.joints, MEASURED)? } }
+            /// Measured distance of the gels, 0 to 0.08 m.
+            width: "number" { get(_, this) { this.0.gripper_width_m } }
+            /// Last commanded closure: 0 is open, 1 is closed.
+            closure: "number" { get(_, this) { this.0.closure } }
+            /// The instruction.
+            prompt: "string" { get(_, this) { this.0.prompt.clone() } }
+            /// Tactile sensors; requires observes.touch.
+            touch: "softvt.Fingers" {
+                get(lua, this) {
+                    let now = this.touch(lua, "touch")?.frames.last();
+                    now.map(|now| fingers(lua, now)).transpose()?.map_or(Value::Nil, Value::Table)
+                }
+            }
+            /// Tactile sensors in the last 1 to 8 control steps, oldest first; requires observes.touch.
+            touch_history: "softvt.Fingers[]" {
+                get(lua, this) {
+                    let frames = this.touch(lua, "touch_history")?.frames.iter().map(|frame| fingers(lua, frame));
+                    fixed_list(lua, frames.collect::<mlua::Result<Vec<_>>>()?, MEASURED)?
+                }
+            }
+            /// True forces on the gels; requires observes.force.
+            force: "softvt.Forces" {
+                get(lua, this) {
+                    let pads = this.0.forces.as_ref().ok_or_else(|| not_observed(lua, "force", "force = true"))?;
+                    let [left, right] = [&pads[0], &pads[1]].map(|pad| pad.wrench.force);
+                    let list = |force: crate::geometry::Vec3| lua.create_sequence_from(force.iter().copied());
+                    forces(lua, list(left)?, list(right)?)?
+                }
+            }
+        }
+        methods {
+            /// Returns the image of a camera in observes.cameras, 224 × 224 unless the scene defines another size.
+            fn camera(lua, this, name: String) -> ["softvt.Image"] {
+                let names = this.0.cameras.iter().map(|camera| camera.name.as_str());
+                match this.0.camera(&name) {
+                    Some(image) => LuaImage::new(lua, image.clone())?,
+                    None if this.0.cameras.is_empty() => {
+                        return Err(not_observed(lua, "camera", "cameras = { … }"));
+                    }
+                    None => return Err(fail(lua, format!("obs:camera: {}", unknown_name("camera", &name, names)))),
+                }
+            }
+        }
+    }
 }

@@ -1,105 +1,176 @@
-//! Poses in Lua: immutable, in the world frame.
+//! Poses, and orientations and directions from numbers of any size.
 
-use mlua::{Lua, Table, UserDataMethods, Value};
+use mlua::{FromLua, Lua, Value};
+use nalgebra::Quaternion;
 
-use crate::geometry::{Pose, Quat, Vec3};
-use crate::script::{
-    api::catalogue,
-    api::catalogue_classes::{self as classes, Class},
-    api::orientation as turn,
-    schema,
-    schema::userdata::{Hosted, Read, hosted, method},
-    vm::fail,
+use crate::{
+    geometry::{Pose, Quat, Vec3},
+    robot::rotation,
+    script::{
+        schema::{LuaType, Type, class, functions, object::fixed_list, record},
+        vm::{error::fail, value::got},
+    },
 };
+
+/// Vectors with a smaller largest component have no direction.
+const MIN_LENGTH: f64 = 1e-9;
+
+/// Divides the numbers by the largest magnitude, so that no square over- or underflows. `None` if that is too small or not
+/// finite.
+fn normalized_to_max<const N: usize>(numbers: [f64; N]) -> Option<[f64; N]> {
+    let largest =
+        numbers.iter().fold(0.0, |max: f64, x| if x.is_nan() { f64::NAN } else { max.max(x.abs()) });
+    (largest.is_finite() && largest >= MIN_LENGTH).then(|| numbers.map(|x| x / largest))
+}
+
+/// The unit vector along a vector of any length.
+pub(crate) fn unit_direction(numbers: [f64; 3]) -> Option<Vec3> {
+    normalized_to_max(numbers).map(|numbers| Vec3::from(numbers).normalize())
+}
+
+/// A direction of any length. The length is kept where it can be computed with, so that scripts can write the components
+/// one by one; else it is 1.
+pub(crate) fn direction(numbers: [f64; 3]) -> Option<Vec3> {
+    let unit = unit_direction(numbers)?;
+    let largest = numbers.iter().fold(0.0, |max: f64, x| max.max(x.abs()));
+    Some(if (1e-6..1e6).contains(&largest) { Vec3::from(numbers) } else { unit })
+}
+
+/// The rotation of a quaternion w, x, y, z of any length.
+pub(crate) fn rotation_from_wxyz(numbers: [f64; 4]) -> Option<Quat> {
+    normalized_to_max(numbers).map(|[w, x, y, z]| Quat::new_normalize(Quaternion::new(w, x, y, z)))
+}
+
+/// A quaternion as w, x, y, z with w ≥ 0.
+pub(crate) fn wxyz(rotation: &Quat) -> [f64; 4] {
+    let q = rotation::canonical(rotation);
+    [q.w, q.i, q.j, q.k]
+}
+
+/// The rotation of the hand pointing straight down, turned by `yaw` (rad) about the vertical: its x axis is along
+/// (cos yaw, sin yaw).
+fn downward(yaw: f64) -> Quat {
+    Quat::from_axis_angle(&Vec3::z_axis(), yaw) * Quat::from_axis_angle(&Vec3::x_axis(), std::f64::consts::PI)
+}
+
+record! {
+    /// A pose in the world frame. Without a quaternion the hand points straight down.
+    PoseSpec: "softvt.PoseSpec" as "pose" {
+        /// Position.
+        xyz: [f64; 3] = Type::Vector(3, "m, world");
+        /// Rotation of the downward hand about the vertical.
+        yaw: f64 = Type::Number("rad", crate::script::schema::Range::ANY) => Number(0.0);
+        /// Orientation instead of yaw, of any length but 0.
+        quat: Option<[f64; 4]> = Type::Vector(4, "w, x, y, z");
+    }
+}
+
+functions! {
+    FUNCTIONS {
+        /// Returns a pose in the world frame: `softvt.pose { xyz = { 0.4, 0, 0.2 }, yaw = math.pi / 2 }`.
+        fn pose(lua, spec: PoseSpec) -> ["softvt.Pose"] {
+            let rotation = match spec.quat {
+                None => downward(spec.yaw),
+                Some(quat) => rotation_from_wxyz(quat)
+                    .ok_or_else(|| fail(lua, "pose.quat: expected a quaternion other than 0"))?,
+            };
+            LuaPose(Pose::from_parts(Vec3::from(spec.xyz).into(), rotation))
+        }
+    }
+}
 
 /// `softvt.Pose`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LuaPose(pub Pose);
 
-impl mlua::FromLua for LuaPose {
+impl FromLua for LuaPose {
     fn from_lua(value: Value, lua: &Lua) -> mlua::Result<Self> {
-        match value.as_userdata().and_then(|data| data.borrow::<Self>().ok()) {
-            Some(pose) => Ok(*pose),
-            None => {
-                Err(fail(lua, format!("expected a pose (softvt.pose{{…}}), got {}", schema::got(&value))))
+        let pose = value.as_userdata().and_then(|data| data.borrow::<Self>().ok().map(|pose| *pose));
+        pose.ok_or_else(|| fail(lua, format!("expected a pose (softvt.pose{{…}}), got {}", got(&value))))
+    }
+}
+
+impl LuaType for LuaPose {
+    const TYPE: Type = Type::Object("softvt.Pose");
+}
+
+/// Hint for lists of a pose.
+const IMMUTABLE: &str = "a pose never changes: make another with softvt.pose{…}, or with moved";
+
+class! {
+    /// An immutable pose in the world frame.
+    LuaPose: "softvt.Pose" {
+        label(_) { "pose".to_owned() }
+        text(this) {
+            let at = this.0.translation.vector;
+            format!("pose({:.4}, {:.4}, {:.4})", at.x, at.y, at.z)
+        }
+        fields {
+            /// Position along x, m.
+            x: "number" { get(_, this) { this.0.translation.x } }
+            /// Position along y, m.
+            y: "number" { get(_, this) { this.0.translation.y } }
+            /// Position along z, m.
+            z: "number" { get(_, this) { this.0.translation.z } }
+            /// Position x, y, z, m.
+            xyz: "number[]" {
+                get(lua, this) { fixed_list(lua, this.0.translation.vector.iter().copied(), IMMUTABLE)? }
+            }
+            /// Orientation as quaternion w, x, y, z with w ≥ 0.
+            quat: "number[]" { get(lua, this) { fixed_list(lua, wxyz(&this.0.rotation), IMMUTABLE)? } }
+        }
+        methods {
+            /// Returns the pose moved by an offset in the world frame, m.
+            fn moved(_, this, by: [f64; 3] = Type::Vector(3, "m")) -> ["softvt.Pose"] {
+                let mut pose = this.0;
+                pose.translation.vector += Vec3::from(by);
+                LuaPose(pose)
+            }
+            /// Returns the same orientation at another position, m.
+            fn at(_, this, xyz: [f64; 3] = Type::Vector(3, "m")) -> ["softvt.Pose"] {
+                LuaPose(Pose::from_parts(Vec3::from(xyz).into(), this.0.rotation))
+            }
+            /// Returns the same position, rotated by an angle about the world's vertical, rad.
+            fn turned(_, this, angle: f64) -> ["softvt.Pose"] {
+                let rotation = Quat::from_axis_angle(&Vec3::z_axis(), angle);
+                LuaPose(Pose::from_parts(this.0.translation, rotation * this.0.rotation))
+            }
+            /// Interpolates towards another pose: a share of 0 returns this pose, 1 the other.
+            fn towards(_, this, other: LuaPose, share: f64) -> ["softvt.Pose"] {
+                let at = this.0.translation.vector.lerp(&other.0.translation.vector, share);
+                // Between opposite orientations the shortest rotation is not unique, and slerp undefined.
+                let rotation = this.0.rotation.try_slerp(&other.0.rotation, share, 1e-12);
+                LuaPose(Pose::from_parts(at.into(), rotation.unwrap_or(other.0.rotation)))
+            }
+            /// Returns the distance to another pose, m, and the angle between the orientations, rad.
+            fn distance(_, this, other: LuaPose) -> ["number", "number"] {
+                let metres = (this.0.translation.vector - other.0.translation.vector).norm();
+                (metres, this.0.rotation.angle_to(&other.0.rotation))
             }
         }
     }
 }
 
-/// The hand pointing straight down, turned by `yaw` (rad) about the vertical: its x axis lies along (cos yaw, sin yaw).
-fn downward(yaw: f64) -> Quat {
-    let turn = Quat::from_axis_angle(&Vec3::z_axis(), yaw);
-    turn * Quat::from_axis_angle(&Vec3::x_axis(), std::f64::consts::PI)
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// Installs `softvt.pose`.
-pub(crate) fn install(lua: &Lua, api: &Table) -> mlua::Result<()> {
-    let make = lua.create_function(|lua, value: Value| {
-        let checked = schema::checked(lua, &catalogue::POSE, &value)?;
-        let xyz: [f64; 3] = checked.get("xyz")?;
-        let turn = match checked.get::<Option<[f64; 4]>>("quat")? {
-            None => downward(checked.get("yaw")?),
-            Some(quat) => turn::turn(quat)
-                .ok_or_else(|| fail(lua, "pose.quat: expected a quaternion other than 0".to_owned()))?,
-        };
-        Ok(LuaPose(Pose::from_parts(Vec3::from(xyz).into(), turn)))
-    })?;
-    api.set("pose", make)
-}
-
-impl Hosted for LuaPose {
-    fn class() -> &'static Class {
-        &classes::POSE
-    }
-
-    fn label(&self) -> String {
-        "pose".into()
-    }
-
-    fn text(&self) -> String {
-        let at = self.0.translation.vector;
-        format!("pose({:.4}, {:.4}, {:.4})", at.x, at.y, at.z)
-    }
-
-    fn read(&self, lua: &Lua, key: &str) -> mlua::Result<Read> {
-        const MEND: &str = "a pose never changes: make another with softvt.pose{…}, or with moved";
-        let at = self.0.translation.vector;
-        let q = self.0.rotation.quaternion();
-        let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
-        Ok(match key {
-            "x" => Read::number(at.x),
-            "y" => Read::number(at.y),
-            "z" => Read::number(at.z),
-            "xyz" => Read::together(lua, at.as_slice(), MEND)?,
-            _ => Read::together(lua, &[sign * q.w, sign * q.i, sign * q.j, sign * q.k], MEND)?,
-        })
-    }
-
-    fn methods<M: UserDataMethods<Self>>(methods: &mut M) {
-        method(methods, "moved", |_, this: &Self, by: [f64; 3]| {
-            let mut pose = this.0;
-            pose.translation.vector += Vec3::from(by);
-            Ok(Self(pose))
-        });
-        method(methods, "at", |_, this: &Self, xyz: [f64; 3]| {
-            Ok(Self(Pose::from_parts(Vec3::from(xyz).into(), this.0.rotation)))
-        });
-        method(methods, "turned", |_, this: &Self, angle: f64| {
-            let turn = Quat::from_axis_angle(&Vec3::z_axis(), angle);
-            Ok(Self(Pose::from_parts(this.0.translation, turn * this.0.rotation)))
-        });
-        method(methods, "towards", |_, this: &Self, (other, share): (Self, f64)| {
-            let at = this.0.translation.vector.lerp(&other.0.translation.vector, share);
-            // The spherical mean of opposite orientations is not defined; any shortest way will do.
-            let turn = this.0.rotation.try_slerp(&other.0.rotation, share, 1e-12);
-            Ok(Self(Pose::from_parts(at.into(), turn.unwrap_or(other.0.rotation))))
-        });
-        method(methods, "distance", |_, this: &Self, other: Self| {
-            let metres = (this.0.translation.vector - other.0.translation.vector).norm();
-            Ok((metres, this.0.rotation.angle_to(&other.0.rotation)))
-        });
+    #[test]
+    fn vectors_of_any_representable_length_are_normalized() {
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        for size in [1e-8, 1.0, 1e200, f64::MAX] {
+            let rotation = rotation_from_wxyz([size, 0.0, 0.0, -size]).expect("a rotation");
+            assert!(
+                (rotation.w - half).abs() < 1e-15 && (rotation.k + half).abs() < 1e-15,
+                "{size}: {rotation:?}"
+            );
+            let direction = unit_direction([size, -size, 0.0]).expect("a direction");
+            assert!((direction - Vec3::new(half, -half, 0.0)).norm() < 1e-15, "{size}: {direction:?}");
+        }
+        for nothing in [0.0, 1e-300, f64::NAN, f64::INFINITY] {
+            assert!(rotation_from_wxyz([nothing, 0.0, 0.0, 0.0]).is_none());
+            assert!(unit_direction([0.0, nothing, 0.0]).is_none());
+        }
+        assert!(rotation_from_wxyz([1.0, f64::NAN, 0.0, 0.0]).is_none(), "a NaN next to a number");
     }
 }
-
-hosted!(LuaPose);

@@ -1,314 +1,414 @@
-//! Worlds in Lua: the mechanics alone, for experiments that squeeze, drop and push by hand.
+//! Worlds: the mechanics alone, for experiments that squeeze, drop and push without a robot.
 
-use std::sync::{Arc, Mutex};
+use std::{
+    fmt,
+    sync::{Arc, Mutex},
+    time::Duration,
+};
 
-use mlua::{Lua, MultiValue, Table, UserDataMethods, UserDataRef, Value};
+use cpu_time::ThreadTime;
+use mlua::{FromLua, Lua, Value};
 
-use crate::script::{
-    api::catalogue_classes::Class,
-    api::catalogue_world as records,
-    api::classes_world as classes,
-    api::shapes::LuaShape,
-    run::timing::Timing,
-    schema::userdata::{Hosted, hosted, method},
-    schema::{self, finite},
-    vm::memory_budget::{Held, hold_in_world},
-    vm::watchdog::Clock,
-    vm::{fail, locked},
+use super::{
+    assets::{DENSITY, FrictionSpec, PASCALS, POISSON},
+    shapes::LuaShape,
 };
 use crate::{
     evaluation::deformation::{Deformation, ReferenceShape},
     geometry::{Pose, Quat, Vec3},
+    parallel::lock,
     physics::{
         BodyId, ColliderId, KinematicId, PhysicsParams, SoftId, World,
         contact::Friction,
         fem::FemModel,
-        world::{ContactSummary, StepFailure},
+        world::{ContactSummary, SoftBody, StepFailure},
     },
     rollout::{cancel, soft_model},
     scene::SoftMaterial,
+    script::{
+        schema::{LuaType, Range, Type, class, functions, output, record},
+        vm::{
+            clock,
+            error::fail,
+            memory_budget::{Reservation, reserve_in_world},
+            value::{finite, got},
+            watchdog::Clock,
+        },
+    },
 };
 
-/// A world, its references and its timing.
+/// Approximate memory of a world and of one of its solids.
+const BYTES_PER_WORLD: usize = 16 << 10;
+const BYTES_PER_SOLID: usize = 4 << 10;
+
+const POSITION: Type = Type::Vector(3, "m");
+const ROTATION: Type = Type::Vector(3, "rad");
+
+record! {
+    /// A world of soft bodies among fixed or prescribed solids, without a robot.
+    WorldSpec: "softvt.WorldSpec" as "softvt.world" {
+        /// Time step.
+        dt: f64 = Type::Number("s", Range::closed(1e-5, 0.05)) => Number(1.0 / 60.0);
+        /// Mass-proportional Rayleigh damping.
+        rayleigh_mass: f64 = Type::Number("1/s", Range::closed(0.0, 1e3)) => Number(0.0);
+        /// Stiffness-proportional Rayleigh damping.
+        rayleigh_stiffness: f64 = Type::Number("s", Range::closed(0.0, 1.0)) => Number(5e-3);
+        /// Gravity; {0, 0, -9.81} by default.
+        gravity: Option<[f64; 3]> = Type::Vector(3, "m/s²");
+        /// True if bodies at rest fall asleep.
+        sleeping: bool => Boolean(true);
+    }
+    /// A finite-element soft body of a world.
+    WorldSoftSpec: "softvt.WorldSoft" as "world:soft" {
+        /// Name in messages.
+        name: String => Text("body");
+        /// Shape.
+        shape: LuaShape;
+        /// Young's modulus.
+        youngs_pa: f64 = PASCALS;
+        /// Poisson's ratio.
+        poisson: f64 = POISSON;
+        /// Density.
+        density: f64 = DENSITY;
+        /// Voxels along the longest edge.
+        resolution: usize = Type::Integer(Range::closed(1.0, SoftMaterial::MAX_RESOLUTION as f64)) => Integer(6);
+        /// Spacing of contact samples on steep surfaces.
+        grasp_spacing: f64 = Type::Number("m", Range::closed(1e-4, 0.02)) => Number(7.5e-4);
+        /// Friction of its surface.
+        friction: FrictionSpec;
+        /// Position of its frame.
+        xyz: [f64; 3] = POSITION;
+        /// Orientation as axis-angle; none by default.
+        turn: Option<[f64; 3]> = ROTATION;
+    }
+    /// A solid that moves as prescribed (kinematic) or never (static).
+    WorldSolidSpec: "softvt.WorldSolid" as "world:solid" {
+        /// Name in messages.
+        name: String => Text("solid");
+        /// Shape.
+        shape: LuaShape;
+        /// Friction of its surface.
+        friction: FrictionSpec;
+        /// Position of its frame.
+        xyz: [f64; 3] = POSITION;
+        /// Orientation as axis-angle; none by default.
+        turn: Option<[f64; 3]> = ROTATION;
+    }
+}
+
+output! {
+    /// Deformation of a body against its reference shape, in percent of the diagonal of its bounding box.
+    fn deformation_table(lua, deformation: &Deformation) -> "softvt.Deformation" as "deformation" {
+        /// Root mean square over the nodes.
+        rms_pct: "number" = deformation.rms_pct;
+        /// The same, weighted by mass.
+        weighted_pct: "number" = deformation.weighted_pct;
+        /// Largest displacement.
+        max_pct: "number" = deformation.max_pct;
+    }
+}
+
+/// CPU and simulated time of a named phase of an experiment.
+#[derive(Debug)]
+struct Phase {
+    name: String,
+    cpu: Duration,
+    simulated_s: f64,
+}
+
+/// CPU time by phase, for standard error; never part of a result.
+#[derive(Debug, Default)]
+struct Timing {
+    phases: Vec<Phase>,
+}
+
+impl Timing {
+    fn start(&mut self, name: &str) {
+        self.phases.push(Phase { name: name.to_owned(), cpu: Duration::ZERO, simulated_s: 0.0 });
+    }
+
+    /// Runs a step of `dt` (s) and adds its time to the present phase.
+    fn measure<R>(&mut self, dt: f64, work: impl FnOnce() -> R) -> R {
+        let start = ThreadTime::now();
+        let result = work();
+        if self.phases.is_empty() {
+            self.start("run");
+        }
+        if let Some(phase) = self.phases.last_mut() {
+            phase.cpu += start.elapsed();
+            phase.simulated_s += dt;
+        }
+        result
+    }
+}
+
+impl fmt::Display for Timing {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let rate = |cpu: Duration, simulated_s: f64| cpu.as_secs_f64() / simulated_s.max(f64::MIN_POSITIVE);
+        let cpu = self.phases.iter().map(|phase| phase.cpu).sum();
+        let simulated_s = self.phases.iter().map(|phase| phase.simulated_s).sum();
+        let parts = self.phases.iter();
+        let parts = parts.map(|phase| format!("{} {:.3}", phase.name, rate(phase.cpu, phase.simulated_s)));
+        let parts = parts.collect::<Vec<_>>().join(", ");
+        write!(f, "cpu_s_per_sim_s: {:.3} ({parts})", rate(cpu, simulated_s))
+    }
+}
+
+/// A world with its reference shapes and its timing.
 struct Inner {
     world: World,
     references: Vec<ReferenceShape>,
     failed: Option<StepFailure>,
-    newton: (u64, u32),
+    newton_total: u64,
+    newton_max: u32,
     timing: Timing,
     clock: Clock,
-    /// What it takes of the machine's budget.
-    held: Vec<Held>,
+    reserved: Vec<Reservation>,
 }
 
-/// About what a world and one of its solids take themselves, bytes.
-const BYTES_A_WORLD: usize = 16 << 10;
-const BYTES_A_SOLID: usize = 4 << 10;
-
-type Shared = Arc<Mutex<Inner>>;
-
-/// Installs `softvt.world`.
-pub(crate) fn install(lua: &Lua, api: &Table, clock: &Clock) -> mlua::Result<()> {
-    let clock = clock.clone();
-    let make = lua.create_function(move |lua, value: Value| {
-        let given = if value.is_nil() { Value::Table(lua.create_table()?) } else { value };
-        let spec = schema::checked(lua, &records::WORLD, &given)?;
-        let gravity: Option<[f64; 3]> = spec.get("gravity")?;
-        let params = PhysicsParams {
-            dt: spec.get("dt")?,
-            rayleigh_mass: spec.get("alpha")?,
-            rayleigh_stiffness: spec.get("beta_s")?,
-            sleeping: spec.get("sleeping")?,
-            ..PhysicsParams::default()
-        };
-        let gravity = gravity.map_or(Vec3::new(0.0, 0.0, -9.81), Vec3::from);
-        Ok(LuaWorld(Arc::new(Mutex::new(Inner {
-            world: World::new(params, gravity),
-            references: Vec::new(),
-            failed: None,
-            newton: (0, 0),
-            timing: Timing::default(),
-            clock: clock.clone(),
-            held: vec![hold_in_world(lua, BYTES_A_WORLD)?],
-        }))))
-    })?;
-    api.set("world", make)
-}
-
-fn friction(spec: &Table) -> mlua::Result<Friction> {
-    let table: Table = spec.get("friction")?;
-    Ok(Friction { static_mu: table.get("static_mu")?, dynamic_mu: table.get("dynamic_mu")? })
-}
+type SharedWorld = Arc<Mutex<Inner>>;
 
 fn pose(xyz: [f64; 3], turn: Option<[f64; 3]>) -> Pose {
-    let turn = turn.map_or(Quat::identity(), |turn| Quat::from_scaled_axis(Vec3::from(turn)));
-    Pose::from_parts(Vec3::from(xyz).into(), turn)
+    let rotation = turn.map_or(Quat::identity(), |turn| Quat::from_scaled_axis(Vec3::from(turn)));
+    Pose::from_parts(Vec3::from(xyz).into(), rotation)
+}
+
+functions! {
+    FUNCTIONS {
+        /// Returns an empty world without a robot.
+        fn world(lua, spec: WorldSpec) -> ["softvt.World"] {
+            let params = PhysicsParams {
+                dt: spec.dt,
+                rayleigh_mass: spec.rayleigh_mass,
+                rayleigh_stiffness: spec.rayleigh_stiffness,
+                sleeping: spec.sleeping,
+                ..PhysicsParams::default()
+            };
+            let gravity = spec.gravity.map_or(Vec3::new(0.0, 0.0, -9.81), Vec3::from);
+            LuaWorld(Arc::new(Mutex::new(Inner {
+                world: World::new(params, gravity),
+                references: Vec::new(),
+                failed: None,
+                newton_total: 0,
+                newton_max: 0,
+                timing: Timing::default(),
+                clock: clock(lua),
+                reserved: vec![reserve_in_world(lua, BYTES_PER_WORLD)?],
+            })))
+        }
+    }
 }
 
 /// `softvt.World`.
 #[derive(Clone)]
-struct LuaWorld(Shared);
+pub(crate) struct LuaWorld(SharedWorld);
 
 impl LuaWorld {
-    fn soft(&self, lua: &Lua, spec: &Table) -> mlua::Result<LuaBody> {
-        let shape: LuaShape = spec.get("shape")?;
+    fn add_soft(&self, lua: &Lua, spec: &WorldSoftSpec) -> mlua::Result<LuaBody> {
         let material = SoftMaterial {
-            youngs_pa: spec.get("youngs_pa")?,
-            poisson: spec.get("poisson")?,
-            density: spec.get("density")?,
-            resolution: spec.get("resolution")?,
-            grasp_spacing: spec.get("grasp_spacing")?,
+            youngs_pa: spec.youngs_pa,
+            poisson: spec.poisson,
+            density: spec.density,
+            resolution: spec.resolution,
+            grasp_spacing: spec.grasp_spacing,
         };
-        let name: String = spec.get("name")?;
-        let mut inner = locked(&self.0);
-        let rest: Arc<FemModel> = {
-            let _honest_work = inner.clock.pause();
-            soft_model(&name, shape.shape(), &material).map_err(|e| fail(lua, format!("world:soft: {e}")))?
+        let (name, shape) = (&spec.name, spec.shape.shape());
+        let wrong = |error: String| fail(lua, format!("world:soft: {error}"));
+        let mut inner = lock(&self.0);
+        let model: Arc<FemModel> = {
+            let _pause = inner.clock.pause();
+            soft_model(name, shape, &material).map_err(|e| wrong(e.to_string()))?
         };
-        let held = hold_in_world(lua, rest.bytes())?;
-        let reference = ReferenceShape::new(&rest.mesh.nodes, &rest.mass)
-            .map_err(|e| fail(lua, format!("world:soft: {e}")))?;
-        let friction = friction(spec)?;
-        let at = pose(spec.get("xyz")?, spec.get("turn")?);
-        let id = inner.world.add_soft(&name, rest, Some(Arc::new(shape.shape().clone())), &at, friction);
+        let reserved = reserve_in_world(lua, model.bytes())?;
+        let reference =
+            ReferenceShape::new(&model.mesh.nodes, &model.mass).map_err(|e| wrong(e.to_string()))?;
+        let at = pose(spec.xyz, spec.turn);
+        let id = inner.world.add_soft(
+            name,
+            model,
+            Some(Arc::new(shape.clone())),
+            &at,
+            Friction::from(&spec.friction),
+        );
         inner.references.push(reference);
-        inner.held.push(held);
+        inner.reserved.push(reserved);
         Ok(LuaBody { world: self.0.clone(), id })
     }
 
-    fn solid(&self, lua: &Lua, spec: &Table, moves: bool) -> mlua::Result<LuaSolid> {
-        let shape: LuaShape = spec.get("shape")?;
-        let at = pose(spec.get("xyz")?, spec.get("turn")?);
-        let friction = friction(spec)?;
-        let name: String = spec.get("name")?;
-        let held = hold_in_world(lua, BYTES_A_SOLID + shape.bytes())?;
-        let mut inner = locked(&self.0);
-        inner.held.push(held);
+    fn add_solid(&self, lua: &Lua, spec: &WorldSolidSpec, is_kinematic: bool) -> mlua::Result<LuaSolid> {
+        let at = pose(spec.xyz, spec.turn);
+        let reserved = reserve_in_world(lua, BYTES_PER_SOLID + spec.shape.bytes())?;
+        let mut inner = lock(&self.0);
+        inner.reserved.push(reserved);
         let world = &mut inner.world;
-        let kinematic = moves.then(|| world.add_kinematic(at));
+        let kinematic = is_kinematic.then(|| world.add_kinematic(at));
         let (parent, pose) = match kinematic {
             Some(id) => (BodyId::Kinematic(id), Pose::identity()),
             None => (BodyId::World, at),
         };
-        let collider = world.add_shape(&name, parent, pose, shape.shape(), friction);
+        let friction = Friction::from(&spec.friction);
+        let collider = world.add_shape(&spec.name, parent, pose, spec.shape.shape(), friction);
         Ok(LuaSolid { world: self.0.clone(), kinematic, collider })
     }
-}
 
-impl Hosted for LuaWorld {
-    fn class() -> &'static Class {
-        &classes::WORLD
-    }
-
-    fn label(&self) -> String {
-        "world".into()
-    }
-
-    fn methods<M: UserDataMethods<Self>>(methods: &mut M) {
-        method(methods, "soft", |lua, this: &Self, spec: Table| this.soft(lua, &spec));
-        method(methods, "kinematic", |lua, this: &Self, spec: Table| this.solid(lua, &spec, true));
-        method(methods, "static", |lua, this: &Self, spec: Table| this.solid(lua, &spec, false));
-        method(methods, "step", |lua, this: &Self, ()| step(lua, &mut locked(&this.0)));
-        method(methods, "time", |_, this: &Self, ()| Ok(locked(&this.0).world.time()));
-        method(methods, "newton", |_, this: &Self, ()| {
-            let inner = locked(&this.0);
-            Ok((inner.newton.0 as f64 / inner.world.step_count().max(1) as f64, inner.newton.1))
-        });
-        method(methods, "energy", |_, this: &Self, ()| Ok(locked(&this.0).world.energy().total()));
-        method(methods, "phase", |_, this: &Self, name: String| {
-            locked(&this.0).timing.phase(&name);
-            Ok(())
-        });
-        method(methods, "report_timing", |_, this: &Self, ()| {
-            crate::text::eprint_line(&locked(&this.0).timing.to_string());
-            Ok(())
-        });
-    }
-}
-
-/// One step; true, or false and why the world is void from now on.
-fn step(lua: &Lua, inner: &mut Inner) -> mlua::Result<MultiValue> {
-    if cancel::requested() {
-        return Err(fail(lua, "interrupted"));
-    }
-    if inner.failed.is_none() {
-        let _honest_work = inner.clock.pause();
-        let dt = inner.world.params.dt;
-        let Inner { world, timing, .. } = inner;
-        if let Err(failure) = timing.measure(dt, || world.step()) {
-            inner.failed = Some(failure);
+    /// Makes one step; returns true, or false and the reason why the state of the world is invalid.
+    fn step(&self, lua: &Lua) -> mlua::Result<(bool, Option<String>)> {
+        if cancel::requested() {
+            return Err(fail(lua, "interrupted"));
         }
-        inner.newton.0 += u64::from(inner.world.stats().newton_steps);
-        inner.newton.1 = inner.newton.1.max(inner.world.stats().max_newton_steps);
+        let inner = &mut *lock(&self.0);
+        if inner.failed.is_none() {
+            let _pause = inner.clock.pause();
+            let Inner { world, timing, .. } = inner;
+            let dt = world.params.dt;
+            inner.failed = timing.measure(dt, || world.step()).err();
+            let stats = inner.world.stats();
+            inner.newton_total += u64::from(stats.newton_steps);
+            inner.newton_max = inner.newton_max.max(stats.max_newton_steps);
+        }
+        Ok((inner.failed.is_none(), inner.failed.as_ref().map(StepFailure::to_string)))
     }
-    let message = match &inner.failed {
-        None => Value::Nil,
-        Some(failure) => Value::String(lua.create_string(failure.to_string())?),
-    };
-    Ok(MultiValue::from_vec(vec![Value::Boolean(inner.failed.is_none()), message]))
+}
+
+class! {
+    /// The mechanics alone: soft bodies among solids that are fixed or move as prescribed.
+    LuaWorld: "softvt.World" {
+        label(_) { "world".to_owned() }
+        methods {
+            /// Adds a soft body.
+            fn soft(lua, this, spec: WorldSoftSpec) -> ["softvt.Body"] { this.add_soft(lua, &spec)? }
+            /// Adds a solid that solid:move_to moves.
+            fn kinematic(lua, this, spec: WorldSolidSpec) -> ["softvt.Solid"] { this.add_solid(lua, &spec, true)? }
+            /// Adds a solid that never moves.
+            fn static(lua, this, spec: WorldSolidSpec) -> ["softvt.Solid"] { this.add_solid(lua, &spec, false)? }
+            /// Makes one time step. Returns false and the reason once the state is invalid.
+            fn step(lua, this) -> ["boolean", "string?"] { this.step(lua)? }
+            /// Returns the simulated time, s.
+            fn time(_, this) -> ["number"] { lock(&this.0).world.time() }
+            /// Returns the mean and the largest number of Newton iterations per step.
+            fn newton(_, this) -> ["number", "integer"] {
+                let inner = lock(&this.0);
+                (inner.newton_total as f64 / inner.world.step_count().max(1) as f64, inner.newton_max)
+            }
+            /// Returns the sum of kinetic, elastic and potential energy, J.
+            fn energy(_, this) -> ["number"] { lock(&this.0).world.energy().total() }
+            /// Starts a phase: CPU time of later steps counts for it.
+            fn phase(_, this, name: String) -> [] { lock(&this.0).timing.start(&name) }
+            /// Prints CPU time per simulated time, by phase, to standard error.
+            fn report_timing(_, this) -> [] { crate::text::eprint_line(&lock(&this.0).timing.to_string()) }
+        }
+    }
 }
 
 /// `softvt.Body`.
 #[derive(Clone)]
-struct LuaBody {
-    world: Shared,
+pub(crate) struct LuaBody {
+    world: SharedWorld,
     id: SoftId,
 }
 
 impl LuaBody {
-    fn touch(&self, lua: &Lua, method: &str, solid: &LuaSolid) -> mlua::Result<ContactSummary> {
+    fn read<T>(&self, read: impl FnOnce(&SoftBody) -> T) -> T {
+        read(lock(&self.world).world.soft(self.id))
+    }
+
+    fn contact(&self, lua: &Lua, method: &str, solid: &LuaSolid) -> mlua::Result<ContactSummary> {
         if !Arc::ptr_eq(&solid.world, &self.world) {
             return Err(fail(lua, format!("body:{method}: solid: expected a solid of the body's own world")));
         }
-        Ok(locked(&self.world).world.contact(self.id, solid.collider))
+        Ok(lock(&self.world).world.contact(self.id, solid.collider))
     }
 
     fn deformation(&self, lua: &Lua) -> mlua::Result<Deformation> {
-        let inner = locked(&self.world);
+        let inner = lock(&self.world);
         let nodes = &inner.world.soft(self.id).state.x;
-        inner.references[self.id.index()]
-            .measure(nodes)
-            .map_err(|e| fail(lua, format!("body:deformation: {e}")))
-    }
-
-    fn set_reference(&self, lua: &Lua, which: &str) -> mlua::Result<()> {
-        let mut inner = locked(&self.world);
-        let body = &inner.world.soft(self.id).state;
-        let nodes = if which == "rest" { &body.model.mesh.nodes } else { &body.x };
-        let reference = ReferenceShape::new(nodes, &body.model.mass).map_err(|e| fail(lua, e.to_string()))?;
-        inner.references[self.id.index()] = reference;
-        Ok(())
+        let deformation = inner.references[self.id.index()].measure(nodes);
+        deformation.map_err(|e| fail(lua, format!("body:deformation: {e}")))
     }
 }
 
-impl Hosted for LuaBody {
-    fn class() -> &'static Class {
-        &classes::BODY
-    }
-
-    fn label(&self) -> String {
-        "body".into()
-    }
-
-    fn methods<M: UserDataMethods<Self>>(methods: &mut M) {
-        let list = |lua: &Lua, v: &Vec3| lua.create_sequence_from(v.iter().copied());
-        method(methods, "centre", move |lua, this: &Self, ()| {
-            list(lua, &locked(&this.world).world.soft(this.id).state.centre())
-        });
-        method(methods, "velocity", move |lua, this: &Self, ()| {
-            list(lua, &locked(&this.world).world.soft(this.id).state.velocity())
-        });
-        method(methods, "speed", |_, this: &Self, ()| {
-            Ok(locked(&this.world).world.soft(this.id).state.max_speed())
-        });
-        method(methods, "mass", |_, this: &Self, ()| {
-            Ok(locked(&this.world).world.soft(this.id).state.model.total_mass())
-        });
-        method(methods, "min_det_f", |_, this: &Self, ()| {
-            Ok(finite(locked(&this.world).world.soft(this.id).min_det_f().det_f))
-        });
-        method(methods, "asleep", |_, this: &Self, ()| {
-            Ok(locked(&this.world).world.soft(this.id).is_asleep())
-        });
-        method(methods, "deformation", |lua, this: &Self, ()| {
-            let d = this.deformation(lua)?;
-            lua.create_table_from([
-                ("rms_pct", d.rms_pct),
-                ("weighted_pct", d.weighted_pct),
-                ("max_pct", d.max_pct),
-            ])
-        });
-        method(methods, "extent", move |lua, this: &Self, ()| list(lua, &this.deformation(lua)?.bbox_m));
-        method(methods, "set_reference", |lua, this: &Self, which: String| this.set_reference(lua, &which));
-        touches(methods);
-    }
+/// A vector as a plain list.
+fn list(lua: &Lua, vector: &Vec3) -> mlua::Result<mlua::Table> {
+    lua.create_sequence_from(vector.iter().copied())
 }
 
-/// Methods of a body that say how a solid touches it.
-fn touches<M: UserDataMethods<LuaBody>>(methods: &mut M) {
-    type Of = UserDataRef<LuaSolid>;
-    method(methods, "force", |lua, this: &LuaBody, solid: Of| {
-        Ok(this.touch(lua, "force", &solid)?.normal_force)
-    });
-    method(methods, "shear", |lua, this: &LuaBody, solid: Of| Ok(this.touch(lua, "shear", &solid)?.shear()));
-    method(methods, "travel", |lua, this: &LuaBody, solid: Of| {
-        Ok(1e3 * this.touch(lua, "travel", &solid)?.travel)
-    });
-    method(methods, "slipping", |lua, this: &LuaBody, solid: Of| {
-        let touch = this.touch(lua, "slipping", &solid)?;
-        Ok(touch.slipping_points as f64 / touch.points.max(1) as f64)
-    });
+class! {
+    /// A soft body of a world.
+    LuaBody: "softvt.Body" {
+        label(_) { "body".to_owned() }
+        methods {
+            /// Returns the centre of mass, m.
+            fn centre(lua, this) -> ["number[]"] { list(lua, &this.read(|body| body.state.centre()))? }
+            /// Returns the velocity of the centre of mass, m/s.
+            fn velocity(lua, this) -> ["number[]"] { list(lua, &this.read(|body| body.state.velocity()))? }
+            /// Returns the speed of the fastest node, m/s.
+            fn speed(_, this) -> ["number"] { this.read(|body| body.state.max_speed()) }
+            /// Returns the mass, kg.
+            fn mass(_, this) -> ["number"] { this.read(|body| body.state.model.total_mass()) }
+            /// Returns the least det F of a filled element: 0 or less is inverted, nil if no element is filled.
+            fn min_det_f(_, this) -> ["number?"] { finite(this.read(|body| body.min_det_f().det_f)) }
+            /// Returns true if the body sleeps.
+            fn asleep(_, this) -> ["boolean"] { this.read(SoftBody::is_asleep) }
+            /// Returns the deformation against the reference shape.
+            fn deformation(lua, this) -> ["softvt.Deformation"] { deformation_table(lua, &this.deformation(lua)?)? }
+            /// Returns the size of the bounding box of the nodes, m.
+            fn extent(lua, this) -> ["number[]"] { list(lua, &this.deformation(lua)?.bbox_m)? }
+            /// Sets the reference shape of deformation: the rest shape (at the start) or the present one.
+            fn set_reference(lua, this, which: String = Type::Choice(&["rest", "now"])) -> [] {
+                let mut inner = lock(&this.world);
+                let body = &inner.world.soft(this.id).state;
+                let nodes = if which == "rest" { &body.model.mesh.nodes } else { &body.x };
+                let reference = ReferenceShape::new(nodes, &body.model.mass);
+                inner.references[this.id.index()] = reference.map_err(|e| fail(lua, e.to_string()))?;
+            }
+            /// Returns the normal force of a solid on the body, N.
+            fn force(lua, this, solid: LuaSolid) -> ["number"] { this.contact(lua, "force", &solid)?.normal_force }
+            /// Returns the tangential force of a solid on the body, N.
+            fn shear(lua, this, solid: LuaSolid) -> ["number"] { this.contact(lua, "shear", &solid)?.shear() }
+            /// Returns the distance that the contact patch has slid on a solid, mm.
+            fn travel(lua, this, solid: LuaSolid) -> ["number"] { 1e3 * this.contact(lua, "travel", &solid)?.travel }
+            /// Returns the share of the contact patch's samples that slip, 0..1.
+            fn slipping(lua, this, solid: LuaSolid) -> ["number"] {
+                let contact = this.contact(lua, "slipping", &solid)?;
+                contact.slipping_points as f64 / contact.points.max(1) as f64
+            }
+        }
+    }
 }
 
 /// `softvt.Solid`.
 #[derive(Clone)]
-struct LuaSolid {
-    world: Shared,
+pub(crate) struct LuaSolid {
+    world: SharedWorld,
     kinematic: Option<KinematicId>,
     collider: ColliderId,
 }
 
-impl Hosted for LuaSolid {
-    fn class() -> &'static Class {
-        &classes::SOLID
-    }
-
-    fn label(&self) -> String {
-        "solid".into()
-    }
-
-    fn methods<M: UserDataMethods<Self>>(methods: &mut M) {
-        method(methods, "move_to", |lua, this: &Self, (xyz, turn): ([f64; 3], Option<[f64; 3]>)| {
-            let Some(id) = this.kinematic else {
-                return Err(fail(
-                    lua,
-                    "solid:move_to: a static solid cannot move; make it with world:kinematic",
-                ));
-            };
-            locked(&this.world).world.move_kinematic(id, pose(xyz, turn));
-            Ok(())
-        });
+impl FromLua for LuaSolid {
+    fn from_lua(value: Value, lua: &Lua) -> mlua::Result<Self> {
+        let solid =
+            value.as_userdata().and_then(|data| data.borrow::<Self>().ok().map(|solid| solid.clone()));
+        solid.ok_or_else(|| fail(lua, format!("expected a solid of a world, got {}", got(&value))))
     }
 }
 
-hosted!(LuaWorld, LuaBody, LuaSolid);
+impl LuaType for LuaSolid {
+    const TYPE: Type = Type::Object("softvt.Solid");
+}
+
+class! {
+    /// A solid of a world.
+    LuaSolid: "softvt.Solid" {
+        label(_) { "solid".to_owned() }
+        methods {
+            /// Prescribes the pose after the next step: position, m, and orientation as axis-angle, rad (none by default).
+            fn move_to(lua, this, xyz: [f64; 3] = POSITION, turn: Option<[f64; 3]> = ROTATION) -> [] {
+                let Some(id) = this.kinematic else {
+                    let message = "solid:move_to: a static solid cannot move; make it with world:kinematic";
+                    return Err(fail(lua, message));
+                };
+                lock(&this.world).world.move_kinematic(id, pose(xyz, turn));
+            }
+        }
+    }
+}

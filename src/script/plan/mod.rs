@@ -1,46 +1,51 @@
-//! Loading a script: what it returns becomes a [`Plan`] of plain data.
+//! Loading a script: the value that it returns becomes a [`Plan`] of plain data.
 
-pub(crate) mod conditions;
 pub(crate) mod options;
 pub(crate) mod policy_file;
 pub(crate) mod profile_file;
 
-use std::{
-    path::Path,
-    sync::{Arc, Mutex},
+use std::{path::Path, sync::Arc};
+
+use mlua::{Lua, MultiValue, Table, Value};
+
+use crate::{
+    benchmark::{Condition, Goal, Plan, Shift, Suite, Task, Variation},
+    parallel::lock,
+    script::{
+        api::{
+            self,
+            policy::{PolicySpec, ProfileSpec},
+            simulation::settings,
+            tasks::{
+                ConditionSpec, ConditionsSpec, ExperimentSpec, GoalSpec, ShiftSpec, SuiteSpec, TaskSpec,
+            },
+        },
+        schema::{HasTable, Made, RecordType, is_made, strict_table},
+        vm::{
+            Limits, Vm,
+            error::{ScriptError, fail},
+            json::to_json,
+            library::{Bundle, Library},
+            source_map::fail_at_key,
+            value::{got, got_made, sorted_pairs},
+        },
+    },
+    text::unknown_name,
 };
+use options::{OptionSpec, Session, SharedSession};
 
-use mlua::{Function, Lua, MultiValue, Table, Value};
-
-use crate::benchmark::{Goal, ObjectType, Plan, Shift, Suite, Task, Variation};
-use crate::script::{
-    Bundle, OptionSpec, ScriptError,
-    api::catalogue,
-    api::catalogue_conditions::CONDITIONS,
-    api::catalogue_policy::{self, POLICY, PROFILE},
-    api::pose,
-    api::shapes,
-    plan::options::Session,
-    run::experiment::points,
-    schema::{self, unknown},
-    vm::library::Library,
-    vm::origin::fail_at,
-    vm::{Limits, Vm, fail, locked},
-};
-
-/// A script that was read and understood.
+/// A loaded script.
 #[derive(Clone)]
 pub struct Loaded {
     /// The main file, as messages name it.
     pub main: String,
-    /// What it asks for.
     pub plan: Plan,
-    /// The options that it declares, with their values.
+    /// The declared options, with their values.
     pub options: Vec<OptionSpec>,
-    /// Everything that was read; episodes run on this.
+    /// Every file that was read; episodes run on these.
     pub bundle: Arc<Bundle>,
-    pub(crate) argv: Vec<String>,
-    pub(crate) limits: Limits,
+    argv: Vec<String>,
+    limits: Limits,
 }
 
 impl std::fmt::Debug for Loaded {
@@ -49,10 +54,10 @@ impl std::fmt::Debug for Loaded {
     }
 }
 
-/// Reads the script at `path` with the words of the command line that are its own, and makes its plan.
+/// Loads the script at `path` with its own words of the command line, and makes its plan.
 ///
 /// # Errors
-/// Anything that is wrong with the file, what it requires, its options or its plan; the message names file and line.
+/// If a file cannot be read, the script fails, or its options or its plan are invalid; the message names file and line.
 pub fn load(path: &Path, argv: &[String]) -> Result<Loaded, ScriptError> {
     load_with(path, argv, &Limits::default())
 }
@@ -64,13 +69,13 @@ pub fn load(path: &Path, argv: &[String]) -> Result<Loaded, ScriptError> {
 pub fn load_with(path: &Path, argv: &[String], limits: &Limits) -> Result<Loaded, ScriptError> {
     let (library, main) = Library::open(path)?;
     let (machine, values) = open(&main, library, argv, limits)?;
-    let options = locked(&machine.session).options.clone();
+    let options = lock(&machine.session).options.clone();
     let plan = machine.plan(&values).map_err(|e| machine.vm.explain(&e))?;
-    let bundle = Arc::new(locked(&machine.vm.shared.library).bundle().clone());
+    let bundle = Arc::new(lock(machine.vm.library()).bundle().clone());
     Ok(Loaded { main, plan, options, bundle, argv: argv.to_vec(), limits: limits.clone() })
 }
 
-/// The options that the script at `path` declares, for `--help`; those that it declares before an error, if any.
+/// The options that the script at `path` declares, for `--help`. If the script fails, those declared before.
 ///
 /// # Errors
 /// If the file cannot be read or is not Lua.
@@ -78,17 +83,17 @@ pub fn declared_options(path: &Path) -> Result<Vec<OptionSpec>, ScriptError> {
     let (library, main) = Library::open(path)?;
     let machine = Machine::new(&main, library, &[], &Limits::default())?;
     let outcome = machine.vm.run_main();
-    let declared = locked(&machine.session).options.clone();
+    let declared = lock(&machine.session).options.clone();
     if declared.is_empty() { outcome.map(|_| declared) } else { Ok(declared) }
 }
 
-/// A virtual machine with the whole Lua surface.
+/// A virtual machine with the whole Lua interface.
 pub(crate) struct Machine {
     pub vm: Vm,
-    session: Arc<Mutex<Session>>,
+    session: SharedSession,
 }
 
-/// A machine that has run the main file, and what the file returned.
+/// Runs the main file in a new virtual machine, and returns both with the results of the file.
 pub(crate) fn open(
     main: &str,
     library: Library,
@@ -97,13 +102,26 @@ pub(crate) fn open(
 ) -> Result<(Machine, MultiValue), ScriptError> {
     let machine = Machine::new(main, library, argv, limits)?;
     let values = machine.vm.run_main()?;
-    locked(&machine.session).leftover(main)?;
+    lock(&machine.session).leftover(main)?;
     Ok((machine, values))
 }
 
-/// A fresh machine on the very sources of `loaded`, and what the main file returned in it.
+/// Runs the sources of `loaded` in a new virtual machine.
 pub(crate) fn reopen(loaded: &Loaded) -> Result<(Machine, MultiValue), ScriptError> {
     open(&loaded.main, Library::frozen((*loaded.bundle).clone()), &loaded.argv, &loaded.limits)
+}
+
+/// The table of the constructor of `T` that a file returned; `file` names the file in messages.
+fn made<T: RecordType>(lua: &Lua, values: &MultiValue, file: &str) -> mlua::Result<Made<T>> {
+    match values.front() {
+        Some(Value::Table(table)) if is_made(lua, T::RECORD, table) => {
+            lua.unpack(Value::Table(table.clone()))
+        }
+        other => {
+            let got = other.map_or("nothing".to_owned(), got_made);
+            Err(fail(lua, format!("{file} returns {}{{…}}, got {got}", T::RECORD.kind)))
+        }
+    }
 }
 
 impl Machine {
@@ -119,46 +137,48 @@ impl Machine {
         let Some(Value::Table(table)) = values.front() else {
             return Err(no_plan(lua, values));
         };
-        for (record, flag) in [(&POLICY, "--policy"), (&PROFILE, "--profile")] {
-            if schema::is_made(lua, record, table) {
+        for (record, flag) in [(PolicySpec::RECORD, "--policy"), (ProfileSpec::RECORD, "--profile")] {
+            if is_made(lua, record, table) {
                 let message = format!(
-                    "is no plan but what {flag} takes: softvt SUITE.lua {flag} {}",
-                    self.vm.shared.main
+                    "returns {}{{…}}, which is not a plan; run softvt SUITE.lua {flag} {}",
+                    record.kind,
+                    self.vm.main()
                 );
                 return Err(fail(lua, message));
             }
         }
-        if schema::is_made(lua, &catalogue::SUITE, table) {
-            return Ok(Plan::Suite(Box::new(suite(lua, table)?)));
-        }
-        if schema::is_made(lua, &catalogue::EXPERIMENT, table) {
-            schema::still_sound(lua, &catalogue::EXPERIMENT, table)?;
+        if is_made(lua, ExperimentSpec::RECORD, table) {
+            let spec: Made<ExperimentSpec> = lua.unpack(Value::Table(table.clone()))?;
             let _deadline = self.vm.call_deadline();
             return Ok(Plan::Experiment {
-                name: table.get("name")?,
-                points: points(lua, table)?.len(),
-                columns: table.get::<Option<Vec<String>>>("columns")?.unwrap_or_default(),
+                name: spec.name.clone(),
+                points: points(lua, &spec)?.len(),
+                columns: spec.columns.clone().unwrap_or_default(),
             });
         }
-        if schema::is_made(lua, &CONDITIONS, table) {
-            let conditions = conditions::read(lua, table)?;
-            let suites: Vec<Table> = table.get("suites")?;
-            let suites = suites.iter().map(|table| suite(lua, table)).collect::<mlua::Result<_>>()?;
-            return Ok(Plan::Conditions { name: table.get("name")?, suites, conditions });
-        }
-        let mut suites = Vec::new();
-        for entry in table.clone().sequence_values::<Value>() {
-            match entry? {
-                Value::Table(table) if schema::is_made(lua, &catalogue::SUITE, &table) => {
-                    let suite = suite(lua, &table)?;
-                    if suites.iter().any(|known: &Suite| known.name == suite.name) {
-                        let message = format!("two suites are named {:?}; rename one", suite.name);
-                        return Err(fail_at(lua, &table, "name", message));
-                    }
-                    suites.push(suite);
-                }
-                _ => return Err(no_plan(lua, values)),
+        let Some(specs) = suites(lua, table)? else { return Err(no_plan(lua, values)) };
+        let mut suites: Vec<Suite> = Vec::new();
+        for spec in &specs {
+            let suite = suite(lua, spec)?;
+            if suites.iter().any(|known| known.name == suite.name)
+                && !is_made(lua, ConditionsSpec::RECORD, table)
+            {
+                let message = format!("two suites are named {:?}; rename one", suite.name);
+                return Err(fail_at_key(lua, &spec.table, "name", message));
             }
+            suites.push(suite);
+        }
+        if is_made(lua, ConditionsSpec::RECORD, table) {
+            let spec: Made<ConditionsSpec> = lua.unpack(Value::Table(table.clone()))?;
+            let conditions = spec.conditions.iter().map(|condition| self::condition(lua, condition));
+            let conditions = conditions.collect::<mlua::Result<_>>()?;
+            return Ok(Plan::Conditions { name: spec.name.clone(), suites, conditions });
+        }
+        if is_made(lua, SuiteSpec::RECORD, table) {
+            return match suites.pop() {
+                Some(suite) => Ok(Plan::Suite(Box::new(suite))),
+                None => Err(no_plan(lua, values)),
+            };
         }
         match suites.is_empty() {
             true => Err(no_plan(lua, values)),
@@ -167,190 +187,183 @@ impl Machine {
     }
 }
 
-fn no_plan(lua: &Lua, values: &MultiValue) -> mlua::Error {
-    let value = values.front().map_or("nothing".to_string(), schema::got);
-    fail(
-        lua,
-        format!(
-            "a script returns a plan (softvt.suite{{…}}, softvt.experiment{{…}} or a list of suites), got {value}"
-        ),
-    )
+/// The suites of a plan's table: one suite, conditions, or a list of suites. `None` if it is something else.
+fn suites(lua: &Lua, table: &Table) -> mlua::Result<Option<Vec<Made<SuiteSpec>>>> {
+    if is_made(lua, SuiteSpec::RECORD, table) {
+        return Ok(Some(vec![lua.unpack(Value::Table(table.clone()))?]));
+    }
+    if is_made(lua, ConditionsSpec::RECORD, table) {
+        let spec: Made<ConditionsSpec> = lua.unpack(Value::Table(table.clone()))?;
+        return Ok(Some(spec.spec.suites));
+    }
+    let mut suites = Vec::new();
+    for entry in table.clone().sequence_values::<Value>() {
+        match entry? {
+            Value::Table(table) if is_made(lua, SuiteSpec::RECORD, &table) => {
+                suites.push(lua.unpack(Value::Table(table))?);
+            }
+            _ => return Ok(None),
+        }
+    }
+    Ok(Some(suites))
 }
 
-/// Puts the Lua surface into a new machine. A further binding is one more line here.
-fn install(vm: &Vm, session: &Arc<Mutex<Session>>) -> mlua::Result<()> {
+fn no_plan(lua: &Lua, values: &MultiValue) -> mlua::Error {
+    let got = values.front().map_or("nothing".to_string(), got);
+    let plans = "softvt.suite{…}, softvt.experiment{…} or a list of suites";
+    fail(lua, format!("a script returns a plan ({plans}), got {got}"))
+}
+
+/// Adds the Lua interface to a new virtual machine.
+fn install(vm: &Vm, session: &SharedSession) -> mlua::Result<()> {
     let lua = &vm.lua;
+    lua.set_app_data(session.clone());
     vm.api.set("version", env!("CARGO_PKG_VERSION"))?;
-    for (name, record) in catalogue::CONSTRUCTORS.iter().chain(catalogue_policy::CONSTRUCTORS) {
-        let make = lua.create_function(move |lua, value: Value| schema::make(lua, record, &value))?;
-        vm.api.set(*name, make)?;
-    }
-    vm.api.set("asset", lua.create_function(asset)?)?;
-    vm.api.set("layout", lua.create_function(layout)?)?;
-    crate::script::api::joints::install(lua, &vm.api)?;
-    conditions::install(lua, &vm.api)?;
-    options::install(lua, &vm.api, session)?;
-    shapes::install(lua, &vm.api)?;
-    crate::script::api::visuals::install(lua, &vm.api)?;
-    pose::install(lua, &vm.api)?;
-    crate::script::api::world::install(lua, &vm.api, &vm.clock)?;
-    crate::script::api::sim::install(lua, &vm.api, &vm.clock)?;
-    crate::script::api::envelope::install(lua, &vm.api)?;
-    crate::script::api::image::install(lua, &vm.api)?;
-    let names = schema::sorted_pairs(&vm.api).iter().filter_map(|(key, _)| key.to_string().ok()).collect();
-    options::strict(lua, "softvt", vm.api.clone(), names)?;
+    api::install(lua, &vm.api)?;
+    options::FUNCTIONS.iter().try_for_each(|function| function.install(lua, &vm.api, "softvt."))?;
+    let names = sorted_pairs(&vm.api).iter().filter_map(|(key, _)| key.to_string().ok()).collect();
+    strict_table(lua, "softvt", vm.api.clone(), names)?;
     Ok(())
 }
 
-/// `softvt.asset{…}`, with what no single field can say.
-fn asset(lua: &Lua, value: Value) -> mlua::Result<Table> {
-    let made = schema::make(lua, &catalogue::ASSET, &value)?;
-    let friction: Table = made.get("friction")?;
-    let (most, least): (f64, f64) = (friction.get("static_mu")?, friction.get("dynamic_mu")?);
-    match least <= most {
-        true => Ok(made),
-        false => Err(fail(
-            lua,
-            format!(
-                "asset.friction: dynamic_mu {least} is above static_mu {most}; give the larger one to static_mu"
-            ),
-        )),
-    }
-}
-
-/// `softvt.layout(name, build)` or `softvt.layout{ name = …, build = … }`.
-fn layout(lua: &Lua, (first, build): (Value, Value)) -> mlua::Result<Table> {
-    match (&first, build) {
-        (Value::String(name), build) => {
-            let table = lua.create_table()?;
-            table.set("name", name)?;
-            table.set("build", build)?;
-            schema::make(lua, &catalogue::LAYOUT, &Value::Table(table))
-        }
-        (_, Value::Nil) => schema::make(lua, &catalogue::LAYOUT, &first),
-        _ => Err(fail(lua, format!("layout: expected a name and a function, got {}", schema::got(&first)))),
-    }
-}
-
-fn suite(lua: &Lua, table: &Table) -> mlua::Result<Suite> {
-    schema::still_sound(lua, &catalogue::SUITE, table)?;
-    let variation = match table.get::<String>("variation")?.as_str() {
-        "object" => Variation::Object,
-        _ => Variation::Spatial,
-    };
-    let object_type = match table.get::<String>("object_type")?.as_str() {
-        "rigid" => ObjectType::Rigid,
-        _ => ObjectType::Deformable,
-    };
-    let name: String = table.get("name")?;
-    let tables: Vec<Table> = table.get("tasks")?;
-    if tables.is_empty() {
+fn suite(lua: &Lua, spec: &Made<SuiteSpec>) -> mlua::Result<Suite> {
+    let name = spec.name.clone();
+    if spec.tasks.is_empty() {
         let message = format!("suite.tasks: suite {name:?} has no tasks; give at least one");
-        return Err(fail_at(lua, table, "tasks", message));
+        return Err(fail_at_key(lua, &spec.table, "tasks", message));
     }
-    let budget = if variation == Variation::Object { 700 } else { 500 };
+    let budget = match spec.variation {
+        Variation::Object => 700,
+        Variation::Spatial => 500,
+    };
     let mut tasks: Vec<Task> = Vec::new();
-    for (id, table) in tables.iter().enumerate() {
-        let task = task(lua, id, table, budget)?;
+    for (id, task) in spec.tasks.iter().enumerate() {
+        let table = &task.table;
+        let task = self::task(lua, id, task, budget)?;
         let words = |task: &Task| task.prompt.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
-        let same = |known: &&Task| words(known) == words(&task) && known.layout == task.layout;
-        if let Some(twin) = tasks.iter().find(same) {
+        let is_same = |known: &&Task| words(known) == words(&task) && known.layout == task.layout;
+        if let Some(twin) = tasks.iter().find(is_same) {
             let message = format!(
-                "task.prompt: tasks {} and {id} of suite {name:?} are both {:?} in the layout {:?}; nobody could tell them \
-                 apart",
+                "task.prompt: tasks {} and {id} of suite {name:?} are both {:?} in the layout {:?}; a policy could not \
+                 distinguish them",
                 twin.id, task.prompt, task.layout
             );
-            return Err(fail_at(lua, table, "prompt", message));
+            return Err(fail_at_key(lua, table, "prompt", message));
         }
         tasks.push(task);
     }
-    let shifts: Option<Vec<Table>> = table.get("shifts")?;
-    let shifts =
-        shifts.unwrap_or_default().iter().map(|table| shift(lua, table)).collect::<mlua::Result<_>>()?;
-    let settings = crate::script::api::sim::settings(lua, "suite.settings", table.get("settings")?)?;
-    Ok(Suite { name, object_type, variation, episodes: table.get("episodes")?, tasks, shifts, settings })
+    Ok(Suite {
+        name,
+        object_type: spec.object_type,
+        variation: spec.variation,
+        episodes: spec.episodes,
+        tasks,
+        shifts: spec.shifts.iter().flatten().map(|shift| self::shift(shift)).collect(),
+        settings: settings(lua, "suite.settings", spec.settings.as_ref())?,
+    })
 }
 
-fn task(lua: &Lua, id: usize, table: &Table, budget: u32) -> mlua::Result<Task> {
-    sound_task(lua, table)?;
-    let goal: Table = table.get("goal")?;
-    let (object, target): (String, String) = (goal.get("object")?, goal.get("target")?);
-    let hold_s = goal.get("hold_s")?;
+fn task(lua: &Lua, id: usize, spec: &TaskSpec, budget: u32) -> mlua::Result<Task> {
+    let (object, target) = (spec.goal.object().to_owned(), spec.goal.target().to_owned());
     if object == target {
         let message =
             format!("task.goal.target: is {target:?}, which is the object itself; name what it must reach");
-        return Err(fail_at(lua, &goal, "target", message));
+        return Err(fail_at_key(lua, spec.goal.table(), "target", message));
     }
-    let kind: Value = goal.metatable().map_or(Ok(Value::Nil), |meta| meta.get("__name"))?;
-    let inside = kind.as_string().is_some_and(|kind| kind.to_string_lossy() == catalogue::INSIDE.kind);
     Ok(Task {
         id,
-        prompt: table.get("prompt")?,
-        layout: table.get::<Table>("layout")?.get("name")?,
-        goal: match inside {
-            true => Goal::In { object, target, hold_s },
-            false => Goal::On { object, target, hold_s },
+        prompt: spec.prompt.clone(),
+        layout: spec.layout.name.clone(),
+        goal: match &spec.goal {
+            GoalSpec::On(goal) => Goal::On { object, target, hold_s: goal.hold_s },
+            GoalSpec::Inside(goal) => Goal::In { object, target, hold_s: goal.hold_s },
         },
-        budget_steps: table.get::<Option<u32>>("budget_steps")?.unwrap_or(budget),
-        expert: table.get::<Option<Function>>("expert")?.is_some(),
+        budget_steps: spec.budget_steps.unwrap_or(budget),
+        expert: spec.expert.is_some(),
     })
 }
 
-/// A task and what it is made of are still what their constructors made.
-pub(crate) fn sound_task(lua: &Lua, task: &Table) -> mlua::Result<()> {
-    schema::still_sound(lua, &catalogue::TASK, task)?;
-    schema::still_sound(lua, &catalogue::LAYOUT, &task.get("layout")?)?;
-    schema::still_sound(lua, &catalogue::ON, &task.get("goal")?)
+fn shift(spec: &ShiftSpec) -> Shift {
+    Shift {
+        name: spec.name.clone(),
+        unit: spec.unit.clone(),
+        default: spec.default,
+        min: spec.min,
+        max: spec.max,
+    }
 }
 
-fn shift(lua: &Lua, table: &Table) -> mlua::Result<Shift> {
-    schema::still_sound(lua, &catalogue::SHIFT, table)?;
-    Ok(Shift {
-        name: table.get("name")?,
-        unit: table.get("unit")?,
-        default: table.get("default")?,
-        min: table.get("min")?,
-        max: table.get("max")?,
-    })
+fn condition(lua: &Lua, spec: &ConditionSpec) -> mlua::Result<Condition> {
+    let shift = spec.shift.iter().flatten().map(|(name, value)| (name.clone(), *value)).collect();
+    let mut set = Vec::new();
+    for (key, value) in spec.set.iter().flat_map(sorted_pairs) {
+        let text = match &value {
+            Value::String(text) => text.to_string_lossy(),
+            other => to_json(lua, other, "conditions.set")?.to_string(),
+        };
+        set.push((key.to_string()?, text));
+    }
+    Ok(Condition { name: spec.name.clone(), shift, set, only: spec.only })
 }
 
-/// The tables of the suite and the task that an episode is of.
+/// The declarations of a suite and a task.
 pub(crate) fn find_task(
     machine: &Machine,
     values: &MultiValue,
-    suite: &str,
+    name: &str,
     id: usize,
-) -> Result<(Table, Table), ScriptError> {
-    let main = &machine.vm.shared.main;
-    let explain = |e: mlua::Error| machine.vm.explain(&e);
-    let Some(Value::Table(table)) = values.front() else {
-        return Err(ScriptError::new(main, "the script returned no suite"));
+) -> Result<(Made<SuiteSpec>, Made<TaskSpec>), ScriptError> {
+    let (vm, main) = (&machine.vm, machine.vm.main());
+    let suites = match values.front() {
+        Some(Value::Table(table)) => suites(&vm.lua, table).map_err(|e| vm.explain(&e))?,
+        _ => None,
     };
-    let suites = suite_tables(&machine.vm.lua, table).map_err(explain)?;
-    let mut names = Vec::new();
-    for table in suites {
-        let name: String = table.get("name").map_err(explain)?;
-        if name == suite {
-            let tasks: Vec<Table> = table.get("tasks").map_err(explain)?;
-            let count = tasks.len();
-            let task = tasks.into_iter().nth(id);
-            return task.map(|task| (table, task)).ok_or_else(|| {
-                ScriptError::new(main, format!("suite {suite:?} has no task {id}"))
-                    .hint(format!("its tasks are 0 to {}", count.saturating_sub(1)))
-            });
-        }
-        names.push(name);
+    let Some(suites) = suites else {
+        return Err(ScriptError::new(main, "the script did not return a suite"));
+    };
+    let Some(suite) = suites.iter().find(|suite| suite.name == name) else {
+        let names = suites.iter().map(|suite| suite.name.as_str());
+        return Err(ScriptError::new(main, unknown_name("suite", name, names)));
+    };
+    match suite.tasks.get(id) {
+        Some(task) => Ok((suite.clone(), task.clone())),
+        None => Err(ScriptError::new(main, format!("suite {name:?} has no task {id}"))
+            .hint(format!("its tasks are 0 to {}", suite.tasks.len().saturating_sub(1)))),
     }
-    Err(ScriptError::new(main, unknown("suite", suite, names.iter().map(String::as_str))))
 }
 
-/// The suites of a plan's table.
-fn suite_tables(lua: &Lua, table: &Table) -> mlua::Result<Vec<Table>> {
-    if schema::is_made(lua, &catalogue::SUITE, table) {
-        return Ok(vec![table.clone()]);
-    }
-    match schema::is_made(lua, &CONDITIONS, table) {
-        true => table.get("suites"),
-        false => table.clone().sequence_values().collect(),
+/// The points of an experiment: those of its function, or every combination of its grid.
+pub(crate) fn points(lua: &Lua, spec: &ExperimentSpec) -> mlua::Result<Vec<Value>> {
+    match (&spec.points, &spec.grid) {
+        (Some(points), None) => {
+            let list: Value = points.call(spec.options.clone())?;
+            let Value::Table(list) = &list else {
+                let message = format!("experiment.points: expected a list of tables, got {}", got(&list));
+                return Err(fail(lua, message));
+            };
+            let points: Vec<Value> = list.clone().sequence_values().collect::<mlua::Result<_>>()?;
+            match points.iter().all(Value::is_table) {
+                true => Ok(points),
+                false => Err(fail(lua, "experiment.points: every point is a table")),
+            }
+        }
+        (None, Some(grid)) => {
+            let mut points: Vec<Vec<(&str, &Value)>> = vec![Vec::new()];
+            for (name, values) in grid {
+                if points.len().saturating_mul(values.len()) > 1_000_000 {
+                    let message = "experiment.grid: has more than a million points; give fewer values";
+                    return Err(fail(lua, message));
+                }
+                let mut extended = Vec::new();
+                for point in &points {
+                    let with = |value| point.iter().copied().chain([(name.as_str(), value)]).collect();
+                    extended.extend(values.iter().map(with));
+                }
+                points = extended;
+            }
+            let tables = points.into_iter().map(|point| lua.create_table_from(point).map(Value::Table));
+            tables.collect()
+        }
+        _ => Err(fail(lua, "experiment: give either grid or points")),
     }
 }

@@ -1,16 +1,42 @@
-//! Options that a script declares for itself and the command line that sets them.
+//! Options that a script declares, and the command line that sets them.
 
 use std::sync::{Arc, Mutex};
 
-use mlua::{Lua, Table, Value};
+use mlua::{Lua, Value};
 
-use crate::script::{
-    ScriptError,
-    api::catalogue::OPTION,
-    schema::{self, Range, Type},
-    vm::{fail, locked},
+use crate::{
+    parallel::lock,
+    script::{
+        schema::{
+            LuaType, Range, RecordType, Type, Unchecked, error_at_key, functions, record, strict_table,
+        },
+        vm::{
+            error::{ScriptError, fail},
+            value::{got, number, sorted_pairs},
+        },
+    },
+    text::suggest,
 };
-use crate::text::suggest;
+
+record! {
+    /// An option of the script: key gap_mm is --gap-mm on the command line. The default determines the type.
+    OptionRecord: "softvt.Option" as "option" {
+        /// A number, string, boolean, or list of numbers or strings.
+        default: Value;
+        /// True if only whole numbers are allowed.
+        integer: bool => Boolean(false);
+        /// Unit of a number.
+        unit: String => Text("");
+        /// Lowest number.
+        min: Option<f64>;
+        /// Highest number.
+        max: Option<f64>;
+        /// The allowed strings; any by default.
+        choices: Option<Vec<String>>;
+        /// Description for --help.
+        help: String => Text("");
+    }
+}
 
 /// The value of an option.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,11 +62,9 @@ pub struct OptionSpec {
     pub name: String,
     /// Unit of a number, "" for none.
     pub unit: String,
-    /// What it does.
+    /// Description for --help.
     pub help: String,
-    /// What it is unless set.
     pub default: OptionValue,
-    /// What it is now.
     pub value: OptionValue,
     /// Allowed numbers.
     pub range: Range,
@@ -54,7 +78,7 @@ impl OptionSpec {
         format!("--{}", self.name.replace('_', "-"))
     }
 
-    /// What may be given, for help and messages.
+    /// The allowed values, for help and messages.
     pub fn expects(&self) -> String {
         let unit = if self.unit.is_empty() { String::new() } else { format!(" ({})", self.unit) };
         match &self.default {
@@ -70,7 +94,7 @@ impl OptionSpec {
         }
     }
 
-    /// Reads a value as the command line gives it.
+    /// Parses a value of the command line.
     fn parse(&self, text: &str) -> Option<OptionValue> {
         let number = |text: &str| text.trim().parse::<f64>().ok().filter(|n| self.range.holds(*n));
         let allowed = |text: &str| self.choices.is_empty() || self.choices.iter().any(|c| c == text);
@@ -98,20 +122,22 @@ impl OptionSpec {
     }
 }
 
-/// The command line of a script and what the script has declared so far.
+pub(crate) type SharedSession = Arc<Mutex<Session>>;
+
+/// The command line of a script, and the options declared so far.
 #[derive(Debug, Default)]
 pub(crate) struct Session {
-    /// Words of the command line; none where an option has taken them.
+    /// Words of the command line; `None` for those that an option has taken.
     words: Vec<Option<String>>,
     pub options: Vec<OptionSpec>,
 }
 
 impl Session {
-    pub(crate) fn new(argv: &[String]) -> Arc<Mutex<Self>> {
+    pub(crate) fn new(argv: &[String]) -> SharedSession {
         Arc::new(Mutex::new(Self { words: argv.iter().cloned().map(Some).collect(), options: Vec::new() }))
     }
 
-    /// An error for the first word that no option took.
+    /// Fails if there is a word that no option has taken.
     pub(crate) fn leftover(&self, main: &str) -> Result<(), ScriptError> {
         let Some(word) = self.words.iter().flatten().next() else { return Ok(()) };
         let name = word.split('=').next().unwrap_or(word);
@@ -128,7 +154,7 @@ impl Session {
         })
     }
 
-    /// Takes the words that set `spec`; the text of its value, if any.
+    /// Takes the words that set `spec` and returns its value, if any.
     fn take(&mut self, spec: &OptionSpec) -> Result<Option<OptionValue>, String> {
         let flag = spec.flag();
         let underscored = format!("--{}", spec.name);
@@ -171,35 +197,34 @@ impl Session {
     }
 }
 
-/// Installs `softvt.options`.
-pub(crate) fn install(lua: &Lua, api: &Table, session: &Arc<Mutex<Session>>) -> mlua::Result<()> {
-    let session = session.clone();
-    let declare = lua.create_function(move |lua, table: Value| {
-        let Value::Table(table) = table else {
-            let message = format!("options: expected a table of options, got {}", schema::got(&table));
-            return Err(fail(lua, message));
-        };
-        let values = lua.create_table()?;
-        let mut names = Vec::new();
-        for (key, value) in schema::sorted_pairs(&table) {
-            let spec = declare_one(lua, &session, &key, &value)?;
-            values.raw_set(spec.name.as_str(), to_lua(lua, &spec.value)?)?;
-            names.push(spec.name.clone());
-            locked(&session).options.push(spec);
+functions! {
+    FUNCTIONS {
+        /// Declares the script's options and returns their values, from the command line or by default:
+        /// `local opt = softvt.options { gap_mm = { default = 40, unit = "mm", min = 1 } }`.
+        fn options(lua, options: Unchecked = Type::Map(&Type::Nested(OptionRecord::RECORD))) -> ["table<string, any>"] {
+            let Value::Table(table) = &options.0 else {
+                let message = format!("options: expected a table of options, got {}", got(&options.0));
+                return Err(fail(lua, message));
+            };
+            let session = lua.app_data_ref::<SharedSession>().map(|session| session.clone());
+            let session = session.ok_or_else(|| mlua::Error::runtime("there is no command line"))?;
+            let values = lua.create_table()?;
+            let mut names = Vec::new();
+            for (key, value) in sorted_pairs(table) {
+                let spec = declare(lua, &session, &key, &value)?;
+                values.raw_set(spec.name.as_str(), to_lua(lua, &spec.value)?)?;
+                names.push(spec.name.clone());
+                lock(&session).options.push(spec);
+            }
+            strict_table(lua, "options", values, names)?
         }
-        strict(lua, "options", values, names)
-    })?;
-    api.set("options", declare)
+    }
 }
 
-fn declare_one(
-    lua: &Lua,
-    session: &Arc<Mutex<Session>>,
-    key: &Value,
-    value: &Value,
-) -> mlua::Result<OptionSpec> {
+/// Reads the declaration of an option and its value on the command line.
+fn declare(lua: &Lua, session: &SharedSession, key: &Value, value: &Value) -> mlua::Result<OptionSpec> {
     let mut spec = read_spec(lua, key, value)?;
-    let mut session = locked(session);
+    let mut session = lock(session);
     if session.options.iter().any(|known| known.name == spec.name) {
         return Err(fail(lua, format!("options.{}: the option is declared twice", spec.name)));
     }
@@ -210,50 +235,32 @@ fn declare_one(
 }
 
 fn read_spec(lua: &Lua, key: &Value, value: &Value) -> mlua::Result<OptionSpec> {
-    let name = match key {
-        Value::String(name) => name.to_string_lossy().to_string(),
-        other => {
-            return Err(fail(lua, format!("options: expected names as keys, got {}", schema::got(other))));
-        }
+    let Value::String(name) = key else {
+        return Err(fail(lua, format!("options: expected names as keys, got {}", got(key))));
     };
+    let name = name.to_string_lossy();
     let fits = |b: u8| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_';
     if !name.starts_with(|c: char| c.is_ascii_lowercase()) || !name.bytes().all(fits) {
         let message = format!(
             "options: {}: a name begins with a letter and has lower-case letters, digits and underscores",
-            schema::got(key)
+            got(key)
         );
         return Err(fail(lua, message));
     }
-    let fault = |fault: schema::Fault| {
-        let mut fault = fault;
-        fault.path.insert(0, name.clone());
-        schema::fault_here(lua, "options", &fault)
-    };
-    let Value::Table(table) = Type::Nested(&OPTION).check(lua, value).map_err(fault)? else {
-        return Err(fail(lua, format!("options.{name}: expected a table")));
-    };
-    let choices: Option<Vec<String>> = table.get("choices")?;
-    let default =
-        read_default(&table.get::<Value>("default")?, table.get::<bool>("integer")?).ok_or_else(|| {
-            fail(
-                lua,
-                format!(
-                    "options.{name}.default: expected a number, string, boolean or list of numbers or strings"
-                ),
-            )
-        })?;
-    let range = Range {
-        min: table.get::<Option<f64>>("min")?.unwrap_or(f64::NEG_INFINITY),
-        max: table.get::<Option<f64>>("max")?.unwrap_or(f64::INFINITY),
-        ..Range::ANY
-    };
+    let checked = OptionRecord::TYPE.check(lua, value);
+    let checked = checked.map_err(|error| error_at_key(lua, "options", &error.inside(name.clone())))?;
+    let record: OptionRecord = lua.unpack(checked)?;
+    let default = read_default(&record.default, record.integer).ok_or_else(|| {
+        let expected = "a number, string, boolean or list of numbers or strings";
+        fail(lua, format!("options.{name}.default: expected {expected}"))
+    })?;
     let spec = OptionSpec {
-        unit: table.get("unit")?,
-        help: table.get("help")?,
+        unit: record.unit,
+        help: record.help,
         value: default.clone(),
         default,
-        range,
-        choices: choices.unwrap_or_default(),
+        range: Range::between(record.min, record.max),
+        choices: record.choices.unwrap_or_default(),
         name,
     };
     match spec.parse(&spec.default.to_string()) {
@@ -267,7 +274,7 @@ fn read_default(value: &Value, integer: bool) -> Option<OptionValue> {
         Value::Boolean(flag) => OptionValue::Flag(*flag),
         Value::String(text) => OptionValue::Text(text.to_string_lossy().to_string()),
         Value::Integer(n) if integer => OptionValue::Integer(*n),
-        Value::Integer(_) | Value::Number(_) if !integer => OptionValue::Number(schema::number(value)?),
+        Value::Integer(_) | Value::Number(_) if !integer => OptionValue::Number(number(value)?),
         Value::Table(list) => {
             let items: Vec<Value> = list.clone().sequence_values().collect::<mlua::Result<_>>().ok()?;
             match items.first()? {
@@ -278,7 +285,7 @@ fn read_default(value: &Value, integer: bool) -> Option<OptionValue> {
                     });
                     OptionValue::Texts(texts.collect::<Option<_>>()?)
                 }
-                _ => OptionValue::Numbers(items.iter().map(schema::number).collect::<Option<_>>()?),
+                _ => OptionValue::Numbers(items.iter().map(number).collect::<Option<_>>()?),
             }
         }
         _ => return None,
@@ -309,27 +316,4 @@ fn to_lua(lua: &Lua, value: &OptionValue) -> mlua::Result<Value> {
         OptionValue::Numbers(list) => Value::Table(lua.create_sequence_from(list.iter().copied())?),
         OptionValue::Texts(list) => Value::Table(lua.create_sequence_from(list.iter().map(String::as_str))?),
     })
-}
-
-/// `table`, made to refuse reading and writing of keys other than `names`.
-pub(crate) fn strict(lua: &Lua, label: &str, table: Table, names: Vec<String>) -> mlua::Result<Table> {
-    let meta = lua.create_table()?;
-    let name = label.to_owned();
-    let refuse = lua.create_function(move |lua, (table, key, value): (Table, Value, Value)| match &key {
-        Value::String(key) if names.iter().any(|name| *name == key.to_string_lossy()) => {
-            table.raw_set(key, value)?;
-            Ok(Value::Nil)
-        }
-        Value::String(key) => {
-            let known = names.iter().map(String::as_str);
-            Err(fail(lua, format!("{name}: {}", schema::unknown("key", &key.to_string_lossy(), known))))
-        }
-        key => Err(fail(lua, format!("{name}: expected a name as key, got {}", schema::got(key)))),
-    })?;
-    // Only keys without a value come here; reading one that is known gives nil, and stores that.
-    meta.set("__index", &refuse)?;
-    meta.set("__newindex", refuse)?;
-    meta.set("__metatable", label)?;
-    table.set_metatable(Some(meta))?;
-    Ok(table)
 }

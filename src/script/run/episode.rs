@@ -1,86 +1,87 @@
-//! One episode's own machine: the scene that its layout builds, and its expert.
+//! Episodes: the scene that a task's layout builds, and the task's expert.
 
-use mlua::{Function, Lua, MultiValue, Table, Value};
+use mlua::{Function, Lua, MultiValue, Value};
 
-use crate::script::{
-    Loaded, ScriptError,
-    api::scene::{LuaScene, empty_scene},
-    plan::{Machine, find_task, reopen, sound_task},
-    run::expert,
-    schema::unknown,
-    vm::origin::fail_at,
-    vm::random::Rng,
-    vm::{fail, locked},
-};
 use crate::{
     benchmark::{
         Shift,
         seed::{EpisodeSeed, RandomStream, Split},
     },
+    parallel::lock,
     scene::{Body, Scene},
-    text::format_number,
+    script::{
+        api::{
+            random::LuaRng,
+            scene::{LuaScene, empty_scene},
+            tasks::{GoalSpec, SuiteSpec},
+        },
+        plan::{Loaded, Machine, find_task, reopen},
+        run::expert::Expert,
+        schema::{HasTable, Made, Range},
+        vm::{
+            error::{ScriptError, fail},
+            source_map::fail_at_key,
+        },
+    },
+    text::{format_number, unknown_name},
 };
 
-/// Which episode.
+/// Identifies an episode of a suite, with the shifts of the run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EpisodeRequest {
     /// Name of the suite.
     pub suite: String,
-    /// Index of the task in it.
+    /// Index of the task in the suite.
     pub task: usize,
     /// Index of the episode in its split.
     pub episode: u64,
     /// Seed of the run.
     pub base_seed: u64,
-    /// Which list of episodes.
     pub split: Split,
-    /// Shifts to apply, in order, by name and value.
+    /// Names and values of the shifts to apply, in order.
     pub shifts: Vec<(String, f64)>,
 }
 
 /// An episode that is ready to be simulated.
 pub struct Episode {
-    /// What it starts from.
+    /// Initial scene.
     pub scene: Scene,
-    /// The same before the shifts: limits are those of its objects.
+    /// Initial scene before the shifts; deformation limits are those of its objects.
     pub nominal: Scene,
-    /// What its random streams come from.
+    /// Source of its random streams.
     pub seed: EpisodeSeed,
     machine: Machine,
     expert: Option<Function>,
 }
 
 impl Episode {
-    /// Runs the sources of `loaded` in a fresh machine, builds the scene and applies the shifts.
+    /// Runs the sources of `loaded` in a new virtual machine, builds the scene and applies the shifts.
     ///
     /// # Errors
-    /// If the suite, task or a shift is unknown, or the script fails.
+    /// If the suite, the task or a shift is unknown, or the script fails.
     pub fn open(loaded: &Loaded, request: &EpisodeRequest) -> Result<Self, ScriptError> {
         let (machine, values) = reopen(loaded)?;
         let Start { scene, nominal, seed, expert } = start(&machine, &values, request)?;
         Ok(Self { scene, nominal, seed, machine, expert })
     }
 
-    /// The expert of the task, ready to start; none if the task has none.
-    ///
-    /// # Errors
-    /// If the machine cannot make a coroutine.
-    pub fn expert(self) -> Result<Option<expert::Expert>, ScriptError> {
-        let Some(function) = self.expert else { return Ok(None) };
+    /// The expert of the task, ready to start; `None` if the task has no expert.
+    pub fn expert(self) -> Option<Expert> {
+        let function = self.expert?;
         self.machine.vm.random.reseed(self.seed.stream(RandomStream::Expert));
-        expert::Expert::start(self.machine, &function).map(Some)
+        Some(Expert::start(self.machine, &function))
     }
 }
 
-/// A machine that lays out one scene after another, of which none will be run: what a layout leaves behind in the machine
-/// is seen by the next.
+/// Builds many scenes in one virtual machine, for checks without a simulation. Global state that one layout changes is
+/// seen by the next.
 pub struct Scenes {
     machine: Machine,
     values: MultiValue,
 }
 
 impl Scenes {
-    /// Runs the sources of `loaded` in a fresh machine.
+    /// Runs the sources of `loaded` in a new virtual machine.
     ///
     /// # Errors
     /// If the script fails.
@@ -89,7 +90,7 @@ impl Scenes {
         Ok(Self { machine, values })
     }
 
-    /// The scene that an episode starts from, before and after the shifts.
+    /// The initial scene of an episode, before and after the shifts.
     ///
     /// # Errors
     /// As [`Episode::open`].
@@ -99,7 +100,7 @@ impl Scenes {
     }
 }
 
-/// What an episode starts from.
+/// Initial state of an episode.
 struct Start {
     scene: Scene,
     nominal: Scene,
@@ -108,81 +109,59 @@ struct Start {
 }
 
 fn start(machine: &Machine, values: &MultiValue, request: &EpisodeRequest) -> Result<Start, ScriptError> {
+    let vm = &machine.vm;
     let (suite, task) = find_task(machine, values, &request.suite, request.task)?;
-    let parts = read(machine, &task).map_err(|e| machine.vm.explain(&e))?;
     let seed = EpisodeSeed {
         suite: request.suite.clone(),
-        layout: parts.layout,
+        layout: task.layout.name.clone(),
         episode: request.episode,
         base: request.base_seed,
         split: request.split,
     };
-    machine.vm.random.reseed(seed.stream(RandomStream::Script));
+    vm.random.reseed(seed.stream(RandomStream::Script));
     let scene = LuaScene::new(empty_scene());
-    let userdata = machine.vm.lua.create_userdata(scene.clone()).map_err(|e| machine.vm.explain(&e))?;
-    machine.vm.call::<()>(&parts.build, (&userdata, Rng::new(seed.clone(), RandomStream::Layout)))?;
-    let nominal = locked(&scene.scene).clone();
+    let userdata = vm.lua.create_userdata(scene.clone()).map_err(|e| vm.explain(&e))?;
+    vm.call::<()>(&task.layout.build, (&userdata, LuaRng::new(seed.clone(), RandomStream::Layout)))?;
+    let nominal = lock(&scene.scene).clone();
     let mut current = scene;
     for (name, value) in &request.shifts {
-        let (apply, value) = find_shift(machine, &suite, name, *value)?;
-        current = shifted(machine, &apply, current, value)?;
+        let apply = find_shift(machine, &suite, name)?;
+        current = apply_shift(machine, &apply, current, *value)?;
     }
-    let scene = locked(&current.scene).clone();
-    check_goal(&machine.vm.lua, &task, &scene).map_err(|e| machine.vm.explain(&e))?;
-    Ok(Start { scene, nominal, seed, expert: parts.expert })
+    let scene = lock(&current.scene).clone();
+    check_goal(&vm.lua, &task.goal, &scene).map_err(|e| vm.explain(&e))?;
+    Ok(Start { scene, nominal, seed, expert: task.expert.clone() })
 }
 
-struct Parts {
-    layout: String,
-    build: Function,
-    expert: Option<Function>,
+/// Message about a shift that a suite does not declare.
+fn unknown_shift<'a>(name: &str, known: impl Iterator<Item = &'a str> + Clone) -> String {
+    match known.clone().next() {
+        None => format!("unknown shift {name:?}; the suite declares none"),
+        Some(_) => unknown_name("shift", name, known),
+    }
 }
 
-fn read(machine: &Machine, task: &Table) -> mlua::Result<Parts> {
-    sound_task(&machine.vm.lua, task)?;
-    let layout: Table = task.get("layout")?;
-    Ok(Parts { layout: layout.get("name")?, build: layout.get("build")?, expert: task.get("expert")? })
-}
-
-fn find_shift(
-    machine: &Machine,
-    suite: &Table,
-    name: &str,
-    value: f64,
-) -> Result<(Function, f64), ScriptError> {
-    let explain = |e: mlua::Error| machine.vm.explain(&e);
-    let shifts: Option<Vec<Table>> = suite.get("shifts").map_err(explain)?;
-    let mut names = Vec::new();
-    for shift in shifts.unwrap_or_default() {
-        let known: String = shift.get("name").map_err(explain)?;
-        if known == name {
-            return Ok((shift.get("apply").map_err(explain)?, value));
+/// The function of a shift.
+fn find_shift(machine: &Machine, suite: &Made<SuiteSpec>, name: &str) -> Result<Function, ScriptError> {
+    let shifts = suite.shifts.as_deref().unwrap_or_default();
+    match shifts.iter().find(|shift| shift.name == name) {
+        Some(shift) => Ok(shift.apply.clone()),
+        None => {
+            let names = shifts.iter().map(|shift| shift.name.as_str());
+            Err(ScriptError::new(machine.vm.main(), unknown_shift(name, names)))
         }
-        names.push(known);
     }
-    let main = &machine.vm.shared.main;
-    Err(match names.is_empty() {
-        true => ScriptError::new(main, format!("unknown shift {name:?}; the suite declares none")),
-        false => ScriptError::new(main, unknown("shift", name, names.iter().map(String::as_str))),
-    })
 }
 
-/// The value of `--shift name=value`, checked against what the suite declares.
+/// Checks the value of `--shift name=value` against the declared shifts of a suite.
 ///
 /// # Errors
-/// If the shift is unknown or the value is out of its range; a fragment for people.
+/// If the shift is unknown or the value is out of its range; the message is a fragment.
 pub fn check_shift(shifts: &[Shift], name: &str, value: f64) -> Result<(), String> {
     let Some(shift) = shifts.iter().find(|shift| shift.name == name) else {
-        return Err(match shifts.is_empty() {
-            true => format!("unknown shift {name:?}; the suite declares none"),
-            false => unknown("shift", name, shifts.iter().map(|shift| shift.name.as_str())),
-        });
+        return Err(unknown_shift(name, shifts.iter().map(|shift| shift.name.as_str())));
     };
-    let range = crate::script::schema::Range {
-        min: shift.min.unwrap_or(f64::NEG_INFINITY),
-        max: shift.max.unwrap_or(f64::INFINITY),
-        ..crate::script::schema::Range::ANY
-    };
+    let range = Range::between(shift.min, shift.max);
     match range.holds(value) {
         true => Ok(()),
         false => Err(format!(
@@ -194,7 +173,7 @@ pub fn check_shift(shifts: &[Shift], name: &str, value: f64) -> Result<(), Strin
     }
 }
 
-fn shifted(
+fn apply_shift(
     machine: &Machine,
     apply: &Function,
     scene: LuaScene,
@@ -212,19 +191,18 @@ fn shifted(
     }
 }
 
-/// A goal that names what is not there, or what cannot get anywhere, would never be reached.
-fn check_goal(lua: &Lua, task: &Table, scene: &Scene) -> mlua::Result<()> {
-    let goal: Table = task.get("goal")?;
-    for key in ["object", "target"] {
-        let name: String = goal.get(key)?;
-        let wrong = |what: String| Err(fail_at(lua, &goal, key, format!("task.goal.{key}: {what}")));
+/// Checks that the object and the target of a goal exist, and that the object can move.
+fn check_goal(lua: &Lua, goal: &GoalSpec, scene: &Scene) -> mlua::Result<()> {
+    for (key, name) in [("object", goal.object()), ("target", goal.target())] {
+        let wrong =
+            |what: String| Err(fail_at_key(lua, goal.table(), key, format!("task.goal.{key}: {what}")));
         let mut known = scene.names();
         if key == "object" {
-            // What is to be carried is no part of anything.
+            // Parts of objects cannot be carried.
             known.retain(|name| !name.contains('.'));
         }
-        if !known.contains(&name) {
-            return wrong(unknown("object", &name, known.iter().map(String::as_str)));
+        if !known.iter().any(|known| known == name) {
+            return wrong(unknown_name("object", name, known.iter().map(String::as_str)));
         }
         let object = scene.objects.iter().find(|object| object.name == name);
         match (key, object.map(|object| &object.asset.body)) {
@@ -235,7 +213,7 @@ fn check_goal(lua: &Lua, task: &Table, scene: &Scene) -> mlua::Result<()> {
             }
             ("target", Some(Body::Scenery)) => {
                 return wrong(format!(
-                    "{name:?} is softvt.scenery, which nothing touches; name what can be reached"
+                    "{name:?} is softvt.scenery, which has no contact; name an object that has"
                 ));
             }
             _ => {}

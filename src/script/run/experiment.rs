@@ -1,23 +1,27 @@
-//! Running an experiment: points in, rows out.
+//! Experiments: points in, rows out.
 
-use mlua::{Function, Lua, LuaSerdeExt, Table, Value};
+use mlua::{Lua, LuaSerdeExt, Value};
 use serde_json::{Map, Value as Json};
 
 use crate::script::{
-    Loaded, ScriptError,
-    api::catalogue,
-    api::image::picture,
-    plan::{Machine, reopen},
-    schema::{self, sorted_pairs},
-    vm::fail,
-    vm::json::json,
+    api::{
+        image::image_of,
+        tasks::{ExperimentSpec, FinishSpec},
+    },
+    plan::{Loaded, Machine, points, reopen},
+    schema::{Made, RecordType, is_made, validate},
+    vm::{
+        error::{ScriptError, fail},
+        json::to_json,
+        value::got,
+    },
 };
 use crate::sensing::camera::encode_png;
 
-/// One row of results; keys sorted.
+/// A row of results, with sorted keys.
 pub type Row = Map<String, Json>;
 
-/// What an experiment leaves behind besides its rows.
+/// Summary of an experiment.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Finish {
     /// Printed after the rows.
@@ -26,39 +30,40 @@ pub struct Finish {
     pub files: Vec<(String, Vec<u8>)>,
 }
 
-/// A machine that runs points of an experiment; open one a thread.
+/// A virtual machine that runs points of an experiment; every thread needs its own.
 pub struct Experiment {
     machine: Machine,
-    table: Table,
+    table: Value,
     points: Vec<Value>,
 }
 
 impl Experiment {
-    /// A fresh machine on the sources of `loaded`.
+    /// Runs the sources of `loaded` in a new virtual machine.
     ///
     /// # Errors
-    /// If the script fails now, or is no experiment.
+    /// If the script fails or does not return an experiment.
     pub fn open(loaded: &Loaded) -> Result<Self, ScriptError> {
         let (machine, values) = reopen(loaded)?;
-        let Some(Value::Table(table)) = values.front().cloned() else {
-            return Err(ScriptError::new(&loaded.main, "the script returned no experiment"));
+        let lua = &machine.vm.lua;
+        let table = match values.front() {
+            Some(Value::Table(table)) if is_made(lua, ExperimentSpec::RECORD, table) => table,
+            _ => return Err(ScriptError::new(&loaded.main, "the script did not return an experiment")),
         };
-        if !schema::is_made(&machine.vm.lua, &catalogue::EXPERIMENT, &table) {
-            return Err(ScriptError::new(&loaded.main, "the script returned no experiment"));
-        }
         let points = {
             let _deadline = machine.vm.call_deadline();
-            points(&machine.vm.lua, &table).map_err(|e| machine.vm.explain(&e))?
+            let spec = lua.unpack::<Made<ExperimentSpec>>(Value::Table(table.clone()));
+            spec.and_then(|spec| points(lua, &spec)).map_err(|e| machine.vm.explain(&e))?
         };
+        let table = Value::Table(table.clone());
         Ok(Self { machine, table, points })
     }
 
-    /// How many points there are.
+    /// Number of points.
     pub fn len(&self) -> usize {
         self.points.len()
     }
 
-    /// Whether there are none.
+    /// True if the experiment has no points.
     pub fn is_empty(&self) -> bool {
         self.points.is_empty()
     }
@@ -66,158 +71,91 @@ impl Experiment {
     /// A point as data.
     ///
     /// # Errors
-    /// If it holds something that is not data.
+    /// If it contains something other than data.
     pub fn point(&self, index: usize) -> Result<Json, ScriptError> {
-        let lua = &self.machine.vm.lua;
         let point = self.points.get(index).cloned().unwrap_or(Value::Nil);
-        json(lua, &point, "point").map_err(|e| self.machine.vm.explain(&e))
+        to_json(&self.machine.vm.lua, &point, "point").map_err(|e| self.machine.vm.explain(&e))
     }
 
-    /// The rows of point `index`. `math.random` starts afresh for each point, so that the order does not matter.
+    /// The declaration, checked again: the script may have changed its table.
+    fn spec(&self) -> Result<Made<ExperimentSpec>, ScriptError> {
+        let vm = &self.machine.vm;
+        vm.lua.unpack(self.table.clone()).map_err(|e| vm.explain(&e))
+    }
+
+    /// The rows of point `index`. `math.random` is seeded by the index, so that the order of points does not matter.
     ///
     /// # Errors
-    /// If the script fails, takes too long, or gives something that is no row.
+    /// If the script fails, takes too long, or returns something other than rows.
     pub fn run(&self, index: usize) -> Result<Vec<Row>, ScriptError> {
         let vm = &self.machine.vm;
         vm.random.reseed(crate::benchmark::seed::keyed_rng(&["softvt point", &index.to_string()]));
-        let fetch = || -> mlua::Result<_> {
-            schema::still_sound(&vm.lua, &catalogue::EXPERIMENT, &self.table)?;
-            Ok((self.table.get::<Function>("run")?, self.table.get::<Value>("options")?))
-        };
-        let (run, options) = fetch().map_err(|e| vm.explain(&e))?;
+        let spec = self.spec()?;
         let point = self.points.get(index).cloned().unwrap_or(Value::Nil);
-        let result: Value = vm.call_point(&run, (point, options))?;
+        let result: Value = vm.call_point(&spec.run, (point, spec.options.clone()))?;
         rows(&vm.lua, &result).map_err(|e| vm.explain(&e))
     }
 
-    /// Hands all rows, in the order of points, to the experiment's `finish`.
+    /// Passes all rows, in the order of points, to the experiment's `finish`.
     ///
     /// # Errors
-    /// If the script fails or gives something else than it may.
+    /// If the script fails or returns something other than a summary.
     pub fn finish(&self, rows: &[Row]) -> Result<Finish, ScriptError> {
         let vm = &self.machine.vm;
-        self.call_finish(rows).unwrap_or_else(|e| Err(vm.explain(&e)))
-    }
-
-    fn call_finish(&self, rows: &[Row]) -> mlua::Result<Result<Finish, ScriptError>> {
-        let vm = &self.machine.vm;
-        schema::still_sound(&vm.lua, &catalogue::EXPERIMENT, &self.table)?;
-        let Some(finish) = self.table.get::<Option<Function>>("finish")? else {
-            return Ok(Ok(Finish::default()));
+        let spec = self.spec()?;
+        let Some(finish) = &spec.finish else { return Ok(Finish::default()) };
+        let list = || {
+            let list = vm.lua.create_table()?;
+            for row in rows {
+                list.push(vm.lua.to_value(row)?)?;
+            }
+            Ok(list)
         };
-        let options: Value = self.table.get("options")?;
-        let list = vm.lua.create_table()?;
-        for row in rows {
-            list.push(vm.lua.to_value(row)?)?;
-        }
-        match vm.call::<Value>(&finish, (list, options)) {
-            Ok(value) => read_finish(&vm.lua, &value).map(Ok),
-            Err(error) => Ok(Err(error)),
-        }
+        let list = list().map_err(|e| vm.explain(&e))?;
+        let value: Value = vm.call(finish, (list, spec.options.clone()))?;
+        read_finish(&vm.lua, &value).map_err(|e| vm.explain(&e))
     }
 }
 
 fn read_finish(lua: &Lua, value: &Value) -> mlua::Result<Finish> {
-    let table = match value {
-        Value::Nil => return Ok(Finish::default()),
-        Value::Table(table) => table,
-        other => {
-            return Err(fail(
-                lua,
-                format!("finish: expected a table of text, files, got {}", schema::got(other)),
-            ));
-        }
-    };
-    let checked = schema::check(lua, &catalogue::FINISH, table)
-        .map_err(|fault| schema::fault_here(lua, "finish", &fault))?;
-    let mut files = Vec::new();
-    if let Some(map) = checked.get::<Option<Table>>("files")? {
-        for (path, content) in sorted_pairs(&map) {
-            let path = path.to_string()?;
-            let inside = |part: &str| {
-                !part.is_empty() && part != "." && part != ".." && !part.contains(['\\', ':', '\0'])
-            };
-            if !path.split('/').all(inside) {
-                return Err(fail(
-                    lua,
-                    format!("finish.files: {path:?} leads out of the folder; give a path without \"..\""),
-                ));
-            }
-            files.push((path, bytes(lua, &content)?));
-        }
+    if value.is_nil() {
+        return Ok(Finish::default());
     }
-    Ok(Finish { text: checked.get("text")?, files })
+    let spec: FinishSpec = lua.unpack(Value::Table(validate(lua, FinishSpec::RECORD, value)?))?;
+    let mut files = Vec::new();
+    for (path, content) in spec.files.unwrap_or_default() {
+        let is_inside =
+            |part: &str| !part.is_empty() && part != "." && part != ".." && !part.contains(['\\', ':', '\0']);
+        if !path.split('/').all(is_inside) {
+            let message =
+                format!("finish.files: {path:?} leads out of the folder; give a path without \"..\"");
+            return Err(fail(lua, message));
+        }
+        files.push((path, file_content(lua, &content)?));
+    }
+    Ok(Finish { text: spec.text, files })
 }
 
-/// A file's content: text as it is, a picture as PNG, other data as JSON.
-fn bytes(lua: &Lua, content: &Value) -> mlua::Result<Vec<u8>> {
+/// The bytes of a file: text as it is, images as PNG, other data as JSON.
+fn file_content(lua: &Lua, content: &Value) -> mlua::Result<Vec<u8>> {
     if let Value::String(text) = content {
         return Ok(text.to_string_lossy().into_bytes());
     }
-    if let Some(picture) = picture(content) {
-        return encode_png(&picture).map_err(mlua::Error::external);
+    if let Some(image) = image_of(content) {
+        return encode_png(&image).map_err(mlua::Error::external);
     }
-    let json = json(lua, content, "finish.files")?;
+    let json = to_json(lua, content, "finish.files")?;
     let text = serde_json::to_string_pretty(&json).map_err(mlua::Error::external)?;
     Ok((text + "\n").into_bytes())
 }
 
-/// The points of an experiment: those it gives, or every combination of its grid.
-pub(crate) fn points(lua: &Lua, table: &Table) -> mlua::Result<Vec<Value>> {
-    let options: Value = table.get("options")?;
-    let given: Option<Function> = table.get("points")?;
-    let grid: Option<Table> = table.get("grid")?;
-    match (given, grid) {
-        (Some(given), None) => {
-            let list: Value = given.call(options)?;
-            let Value::Table(list) = &list else {
-                return Err(fail(
-                    lua,
-                    format!("experiment.points: expected a list of tables, got {}", schema::got(&list)),
-                ));
-            };
-            let points: Vec<Value> = list.clone().sequence_values().collect::<mlua::Result<_>>()?;
-            match points.iter().all(Value::is_table) {
-                true => Ok(points),
-                false => Err(fail(lua, "experiment.points: every point is a table")),
-            }
-        }
-        (None, Some(grid)) => product(lua, &grid),
-        _ => Err(fail(lua, "experiment: give either grid or points")),
-    }
-}
-
-fn product(lua: &Lua, grid: &Table) -> mlua::Result<Vec<Value>> {
-    let mut points: Vec<Vec<(Value, Value)>> = vec![Vec::new()];
-    for (name, values) in sorted_pairs(grid) {
-        let values: Vec<Value> = match values {
-            Value::Table(list) => list.sequence_values().collect::<mlua::Result<_>>()?,
-            _ => Vec::new(),
-        };
-        if points.len().saturating_mul(values.len()) > 1_000_000 {
-            return Err(fail(lua, "experiment.grid: has more than a million points; give fewer values"));
-        }
-        points = points
-            .iter()
-            .flat_map(|point| {
-                values.iter().map(|value| {
-                    let mut longer = point.clone();
-                    longer.push((name.clone(), value.clone()));
-                    longer
-                })
-            })
-            .collect();
-    }
-    points.into_iter().map(|point| lua.create_table_from(point).map(Value::Table)).collect()
-}
-
 fn rows(lua: &Lua, result: &Value) -> mlua::Result<Vec<Row>> {
-    let row = |value: &Value| match json(lua, value, "experiment.run: row")? {
+    let row = |value: &Value| match to_json(lua, value, "experiment.run: row")? {
         Json::Object(map) => Ok(map),
-        _ => Err(fail(
-            lua,
-            format!("experiment.run: expected a row or a list of rows, got {}", schema::got(value)),
-        )),
+        _ => {
+            let message = format!("experiment.run: expected a row or a list of rows, got {}", got(value));
+            Err(fail(lua, message))
+        }
     };
     match result {
         Value::Table(table) if table.raw_len() > 0 => {

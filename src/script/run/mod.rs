@@ -1,8 +1,5 @@
-//! Running what a script asks for: episodes, experts and experiments.
+//! Running plans: episodes, experts and experiments, each in virtual machines of their own.
 
-pub(crate) mod controller;
 pub(crate) mod episode;
 pub(crate) mod experiment;
 pub(crate) mod expert;
-pub(crate) mod reachability;
-pub(crate) mod timing;

@@ -244,9 +244,9 @@ fn a_mesh_that_is_no_solid_is_refused_with_its_file() {
         "{}",
         error("empty.obj")
     );
-    assert!(error("mesh.doc").contains("\"doc\" is no known mesh format"));
+    assert!(error("mesh.doc").contains("\"doc\" is not a supported mesh format"));
     assert!(error("../a.obj").contains("leads out of the project"));
-    assert!(error("none.obj").starts_with("x.lua:1: mesh.file: no file \"none.obj\" beside x.lua, nor in "));
+    assert!(error("none.obj").starts_with("x.lua:1: mesh.file: no file \"none.obj\" next to x.lua, nor in "));
     assert_eq!(error("good.obj"), "x.lua:1: softvt.Shape");
 }
 
@@ -305,7 +305,7 @@ fn a_plan_that_makes_no_sense_is_told_at_the_line_that_made_it() {
     assert_eq!(suite("{}"), "x.lua:7: suite.tasks: suite \"s\" has no tasks; give at least one");
     assert_eq!(
         suite(&format!("{{ task('p', {to}), task('q', {to}),\n task('p', {to}) }}")),
-        "x.lua:3: task.prompt: tasks 0 and 2 of suite \"s\" are both \"p\" in the layout \"l\"; nobody could tell them apart"
+        "x.lua:3: task.prompt: tasks 0 and 2 of suite \"s\" are both \"p\" in the layout \"l\"; a policy could not distinguish them"
     );
     assert_eq!(
         suite(&format!(

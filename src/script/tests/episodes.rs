@@ -60,7 +60,7 @@ fn view() -> ExpertView {
 fn expert(body: &str) -> (Project, Expert) {
     let project = project(&format!("return suite(function(arm, scene) {body} end)"));
     let loaded = project.load("x.lua", &[]).unwrap();
-    let expert = Episode::open(&loaded, &request(0, 1)).unwrap().expert().unwrap().unwrap();
+    let expert = Episode::open(&loaded, &request(0, 1)).unwrap().expert().unwrap();
     (project, expert)
 }
 
@@ -219,7 +219,7 @@ fn a_goal_that_cannot_be_reached_is_told_at_its_line() {
     assert_eq!(
         wrong("ball", "sky"),
         format!(
-            "x.lua:{}: task.goal.target: \"sky\" is softvt.scenery, which nothing touches; name what can be reached",
+            "x.lua:{}: task.goal.target: \"sky\" is softvt.scenery, which has no contact; name an object that has",
             line + 1
         )
     );

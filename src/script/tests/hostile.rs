@@ -47,11 +47,11 @@ fn doubling_is_stopped_before_memory_is() {
     }
     refused(
         &format!("local x = {shape}\nfor i = 1, 200 do x = x:round(0.1) end"),
-        "x.lua:3: shape: is made of 101 shapes, 101 deep; at most 2000 and 100 can be computed with",
+        "x.lua:3: shape: is made of 101 shapes, 101 deep; at most 2000 and 100 can be evaluated",
     );
     refused(
         &format!("local x = {shape}\nfor i = 1, 20 do x = x:subtract({shape}) end"),
-        "x.lua:3: shape: too many cuts or unions stand in one another",
+        "x.lua:3: shape: cuts or unions are nested too deeply",
     );
     let row = "local x = softvt.shape.sphere { radius = 1 } for i = 1, 300 do x = x:union(x.sphere) end";
     refused(row, "shape: unknown key \"sphere\"");
@@ -67,7 +67,7 @@ fn doubling_is_stopped_before_memory_is() {
 #[test]
 fn what_the_host_keeps_for_a_script_is_counted_for_each_machine() {
     let hoard = |make: &str| format!("local kept = {{}}\nfor i = 1, 1e9 do kept[i] = {make} end");
-    let full = "the script holds more than 512 MiB of pictures, shapes and masks; keep fewer or smaller ones";
+    let full = "the script holds more than 512 MiB of images, shapes and masks; keep fewer or smaller ones";
     let picture = "softvt.image { width = 4096, height = 4096, colour = { 0, 0, 0 } }";
     refused(&hoard(picture), full);
     refused(&format!("local big = {picture}\n{}", hoard("big:crop { 0, 0, 4096, 4096 }")), full);
@@ -158,7 +158,7 @@ fn tables_that_were_changed_after_they_were_made_are_checked_again() {
     for (change, said) in [
         (
             "s.tasks = nil",
-            "suite.tasks: missing; expected a list of what softvt.task{…} gives (changed after it was made)",
+            "suite.tasks: missing; expected a list of results of softvt.task{…} (changed after it was made)",
         ),
         (
             "s.tasks[1].prompt = 3",
@@ -174,7 +174,7 @@ fn tables_that_were_changed_after_they_were_made_are_checked_again() {
         ),
         (
             "s.tasks[1] = setmetatable({}, { __index = function() while true do end end })",
-            "suite.tasks[1]: expected what softvt.task{…} gives, got a table (changed after it was made)",
+            "suite.tasks[1]: expected the result of softvt.task{…}, got a table (changed after it was made)",
         ),
     ] {
         assert_eq!(suite(change), format!("x.lua: {said}"), "{change}");

@@ -75,7 +75,8 @@ fn a_joint_without_limits_or_with_wrong_ones_is_refused_at_its_line() {
         "suites/x.lua:4: slider.damping: expected a number (N s/m) of 0 or more, got -1"
     );
     assert!(
-        joint("{ axis = { 0, 1, 0 } }").contains("expected what softvt.slider{…} or softvt.hinge{…} gives")
+        joint("{ axis = { 0, 1, 0 } }")
+            .contains("expected the result of softvt.slider{…} or softvt.hinge{…}")
     );
 }
 
@@ -98,7 +99,7 @@ fn parts_of_one_name_of_no_parent_and_in_a_circle_are_refused() {
     );
     assert_eq!(
         more("flap", "parent = 'lid',"),
-        "suites/x.lua:2: articulated.parts: parts flap, lid carry each other in a circle; one must hang on the base"
+        "suites/x.lua:2: articulated.parts: parts flap, lid carry each other in a circle; one must be carried by the base"
     );
     assert_eq!(
         error_of("softvt.articulated { parts = {} }"),

@@ -54,12 +54,12 @@ fn brief() -> TaskBrief {
     TaskBrief { suite: "one".into(), task: 3, prompt: "take it".into(), episode: 7 }
 }
 
-const LOOKS: &str = "looks = { cameras = { 'wrist' }, touch = true }";
+const OBSERVES: &str = "observes = { cameras = { 'wrist' }, touch = true }";
 const POSE: &str = "position = { 0.5, 0, 0.25 }, axis_angle = { 3, 0, 0 }";
 
 /// A policy whose `act` is `body`, in an episode.
 fn policy(body: &str) -> (Project, LuaPolicy) {
-    let text = format!("return softvt.policy {{ name = 'p', {LOOKS}, act = function(obs)\n{body}\nend }}");
+    let text = format!("return softvt.policy {{ name = 'p', {OBSERVES}, act = function(obs)\n{body}\nend }}");
     start(&text)
 }
 
@@ -99,7 +99,7 @@ fn an_observation_is_what_the_host_saw() {
         "local mask = obs.touch.left.markers:moved(0.5) assert(#mask == 99 and mask[1] and mask[99])",
         "assert(obs.touch.left.markers:area(0.5) == 1 and obs.touch.left.markers:area(0.6) == 0)",
         "local m = obs.touch.left.markers assert(m.motion[99][2] == 0.25 and m.initial[1][1] == 15 and m.present[1][1] == 14.5)",
-        "local c = obs.touch.left.change:mean() assert(c[1] == 40 and c[2] == 0 and c[3] == 40)",
+        "local c = obs.touch.left.difference:mean() assert(c[1] == 40 and c[2] == 0 and c[3] == 40)",
         "assert(#obs.touch_history == 2 and obs.touch_history[1].left.markers:largest() == 0)",
     ];
     for check in checks {
@@ -162,9 +162,9 @@ fn nonsense_ends_the_run_with_the_line_of_act() {
         ),
         (
             "return obs.force",
-            "p.lua:2: obs.force: the policy does not look at it; say looks = { force = true }".into(),
+            "p.lua:2: obs.force: the policy does not observe it; declare observes = { force = true }".into(),
         ),
-        ("obs.time = 3", "p.lua:2: obs.time: is only read".into()),
+        ("obs.time = 3", "p.lua:2: obs.time: is read-only".into()),
         ("while true do end", "p.lua:2: the script ran for more than 0.3 s".into()),
         (
             "local t = {} for i = 1, 1e9 do t[i] = { i } end",
@@ -219,8 +219,8 @@ fn files_that_hold_no_policy_are_told() {
         ("return 3", "p.lua: a policy's file returns softvt.policy{…}, got 3"),
         ("return softvt.policy { name = 'p' }", "p.lua:1: policy.act: missing"),
         (
-            "return softvt.policy { name = 'p', act = print, looks = { touhc = true } }",
-            "p.lua:1: policy.looks: unknown key \"touhc\"; did you mean \"touch\"?",
+            "return softvt.policy { name = 'p', act = print, observes = { touhc = true } }",
+            "p.lua:1: policy.observes: unknown key \"touhc\"; did you mean \"touch\"?",
         ),
         (
             "return softvt.policy { name = 'p', act = print,\nreplan = 0 }",
@@ -269,14 +269,14 @@ fn the_built_in_profiles_can_be_said_in_lua() {
     let vision = [
         ("name = \"visuo_tactile\"", "name = \"vision\""),
         (tactile, ""),
-        ("shut = 1 }", "shut = 1, binary = true }"),
+        ("closed = 1 }", "closed = 1, binary = true }"),
     ];
     let force = format!("{tactile}\n{{ keys = both \"tactile_gripper_force\", source = \"force\" }},");
     let released = [
         ("name = \"visuo_tactile\"", "name = \"softvtbench\""),
         ("{ \"prompt\" }", "{ \"prompt\", \"observation/prompt\" }"),
         (tactile, force.as_str()),
-        ("open = 0, shut = 1", "open = 0.04, shut = 0"),
+        ("open = 0, closed = 1", "open = 0.04, closed = 0"),
     ];
     for (name, text) in [
         ("libero", changed("libero", &[])),
@@ -332,7 +332,7 @@ fn what_is_wrong_with_a_profile_is_told_with_its_line() {
             "profile.actions.translation_m: missing; pose = \"delta_osc\" needs it",
         ),
         ("\"delta_osc\"", "\"absolute\"", "profile.actions.translation_m: pose = \"absolute\" has no steps"),
-        ("open = -1", "open = 1", "profile.actions.gripper.shut: is 1 like open"),
+        ("open = -1", "open = 1", "profile.actions.gripper.closed: is 1 like open"),
         ("rotation_rad = 0.5", "rotation_rad = 0/0", "profile.actions.rotation_rad: expected a number"),
         (
             "return softvt.profile",

@@ -1,4 +1,4 @@
--- Makes one of each class, calls everything with everything, and gives what was said; surface.rs puts names before it.
+-- Makes an object of each class, calls everything with everything, and returns the messages. surface.rs prepends the names.
 local said = {}
 local function note(what, ok, message)
   if not ok then said[#said + 1] = { what = what, said = tostring(message), kind = type(message) } end
@@ -21,7 +21,7 @@ local function all(class, object)
     local method = object[name]
     local function with(...) return method(object, ...) end
     call(class .. ":" .. name, with)
-    -- Without an object, or with another one.
+    -- Without an object, or with one of another class.
     note(class .. "." .. name, pcall(method))
     for i, w in ipairs(wrong) do if not (class == "softvt.Image" or class == "softvt.Pose") then note(class .. "." .. name .. i, pcall(method, w)) end end
   end
@@ -69,7 +69,7 @@ local function run()
   ATTACK = function(scene, rng)
     all("softvt.Rng", rng)
     all("softvt.Light", scene.light)
-    all("softvt.Look", scene.objects[2].looks[1])
+    all("softvt.Material", scene.objects[2].materials[1])
     all("softvt.Camera", scene:camera "wrist")
     all("softvt.Object", scene:object "cube")
     all("softvt.Scene", scene)
@@ -77,14 +77,14 @@ local function run()
   end
   note("enough", pcall(softvt.simulate, { layout = layout }))
   ATTACK = function() end
-  -- Who gives up is not resumed: that has a test of its own.
+  -- An expert that gave up is not resumed: that has a test of its own.
   local methods = NAMES["softvt.Arm"].methods
   for i = #methods, 1, -1 do if methods[i] == "give_up" then table.remove(methods, i) end end
   simulation:drive(function(arm, view)
     all("softvt.Arm", arm)
     all("softvt.View", view)
-    all("softvt.Seen", view:object "cube")
-    local touch = arm:feel().left
+    all("softvt.ObjectState", view:object "cube")
+    local touch = arm:tactile().left
     all("softvt.Touch", touch)
     all("softvt.Markers", touch.markers)
   end)

@@ -1,46 +1,47 @@
-//! The whole Lua surface, called wrongly: every method, field and function of the binding table, by every kind of value.
+//! The whole Lua interface, called wrongly: every declared method, field and function, with every kind of value.
 
 use std::{collections::BTreeSet, fmt::Write, time::Duration};
 
 use super::{Project, limits};
 use crate::script::{
     Experiment,
-    api::catalogue::CONSTRUCTORS,
-    api::catalogue_classes::{CLASSES, FUNCTIONS, SHAPE},
-    api::catalogue_policy,
-    api::catalogue_shapes::{METHODS, SHAPES},
-    api::catalogue_visuals::{MASK_CLASS, MASKS},
+    api::{self, shapes::SHAPES, visuals::MASKS},
+    plan::options,
+    schema::Function,
 };
 
-/// Makes one of each class, calls everything with everything, and gives what was said.
+/// Makes an object of each class, calls everything with everything, and returns the messages.
 const SCRIPT: &str = include_str!("surface.lua");
 
 fn quoted<'a>(names: impl Iterator<Item = &'a str>) -> String {
     names.map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", ")
 }
 
+fn names(functions: &'static [Function]) -> impl Iterator<Item = &'static str> {
+    functions.iter().map(|function| function.signature.name)
+}
+
 fn script() -> String {
     let mut text = String::from("NAMES = {\n");
-    for class in CLASSES.iter().copied().chain([&SHAPE, &MASK_CLASS]) {
-        let more = METHODS.iter().map(|(name, _)| *name).filter(|_| class.name == SHAPE.name);
-        let methods = quoted(class.methods.iter().map(|method| method.name).chain(more));
-        let fields = class.fields.iter().map(|(name, ..)| *name);
-        let fields = quoted(fields.chain(class.written.iter().map(|field| field.name)));
+    for class in api::CLASSES {
+        let methods = quoted(class.methods.iter().map(|method| method.name));
+        let fields = quoted(class.fields.iter().map(|field| field.name));
         let _ = writeln!(
             text,
             "  [{:?}] = {{ methods = {{ {methods} }}, fields = {{ {fields} }} }},",
             class.name
         );
     }
-    let constructors = CONSTRUCTORS.iter().chain(catalogue_policy::CONSTRUCTORS).map(|(name, _)| *name);
-    let functions = FUNCTIONS.iter().map(|f| f.name).chain(constructors);
-    let _ = writeln!(text, "}}\nFUNCTIONS = {{ {} }}", quoted(functions));
-    let _ = writeln!(text, "SHAPES = {{ {} }}", quoted(SHAPES.iter().map(|(name, _)| *name)));
-    let _ = writeln!(text, "MASKS = {{ {} }}", quoted(MASKS.iter().map(|(name, _)| *name)));
+    let constructors = api::constructors().map(|constructor| constructor.name());
+    let functions = api::functions().map(|function| function.signature.name).chain(names(options::FUNCTIONS));
+    let _ =
+        writeln!(text, "}}\nFUNCTIONS = {{ {} }}", quoted(functions.chain(["sorted"]).chain(constructors)));
+    let _ = writeln!(text, "SHAPES = {{ {} }}", quoted(names(SHAPES)));
+    let _ = writeln!(text, "MASKS = {{ {} }}", quoted(names(MASKS)));
     text + SCRIPT
 }
 
-/// What only an implementer would want to read.
+/// Text that belongs to the implementation.
 fn leak(message: &str) -> Option<&'static str> {
     let words = [
         "::",
@@ -67,7 +68,7 @@ fn leak(message: &str) -> Option<&'static str> {
         "LuaScene",
         "LuaObject",
         "LuaLight",
-        "LuaLook",
+        "LuaMaterial",
         "LuaList",
         "LuaTouch",
         "LuaMarkers",
@@ -77,7 +78,7 @@ fn leak(message: &str) -> Option<&'static str> {
 }
 
 #[test]
-fn whatever_is_called_wrongly_is_answered_in_the_words_of_the_surface() {
+fn wrong_calls_get_messages_in_terms_of_the_lua_interface() {
     let project = Project::new(&[("x.lua", &script())]);
     let minute = Duration::from_secs(60);
     let limits = crate::script::Limits {
@@ -106,16 +107,26 @@ fn whatever_is_called_wrongly_is_answered_in_the_words_of_the_surface() {
     assert!(wrong.is_empty(), "{} of {} are wrong:\n{}", wrong.len(), rows.len(), wrong.join("\n"));
     assert!(rows.len() > 2000, "{}", rows.len());
     let seen: BTreeSet<&str> = rows.last().unwrap()["said"].as_str().unwrap().split(' ').collect();
-    let listed = CLASSES.iter().map(|class| class.name).chain([SHAPE.name, MASK_CLASS.name]);
+    let listed = api::CLASSES.iter().map(|class| class.name);
     let missing: Vec<&str> = listed.filter(|name| !seen.contains(name)).collect();
     assert_eq!(
         missing,
-        ["softvt.Felt", "softvt.List", "softvt.Brief", "softvt.Observation"],
-        "plain tables, and what has a test of its own"
+        [
+            "softvt.Deformation",
+            "softvt.Measurements",
+            "softvt.TactileReading",
+            "softvt.Envelope",
+            "softvt.List",
+            "softvt.Brief",
+            "softvt.Observation",
+            "softvt.Fingers",
+            "softvt.Forces"
+        ],
+        "plain tables, and classes with tests of their own"
     );
 }
 
-/// Runs a layout over a scene with one ball and gives what it fails with.
+/// Runs a layout for a scene with one ball and returns its error.
 fn in_layout(text: &str) -> String {
     let whole = super::SUITE.replace("scene:add { name", &format!("{text} scene:add {{ name"));
     let project = Project::new(&[("x.lua", &(whole + "return suite()"))]);
@@ -136,7 +147,7 @@ fn in_layout(text: &str) -> String {
 }
 
 #[test]
-fn a_list_of_an_object_is_the_objects_own() {
+fn lists_of_objects_are_live() {
     for text in [
         "scene.base[1] = 0.25 assert(scene.base[1] == 0.25)",
         "local b = scene.base b[1] = 0.5 scene.base = b assert(scene.base[1] == 0.5)",
@@ -157,7 +168,7 @@ fn a_list_of_an_object_is_the_objects_own() {
 }
 
 #[test]
-fn a_list_that_cannot_be_written_says_how_its_object_is_changed() {
+fn read_only_lists_say_how_to_change_the_object() {
     let line = super::SUITE.lines().position(|line| line.contains("scene:add")).unwrap() + 1;
     for (text, said) in [
         ("scene.base[1] = 'a'", "scene.base[1]: expected a number, got \"a\""),
@@ -170,7 +181,7 @@ fn a_list_that_cannot_be_written_says_how_its_object_is_changed() {
             "scene.light.colour = { 1, 0.5, 0.25 } scene.light.colour[1] = -1",
             "scene.light.colour: expected linear RGB in 0..1000, got {-1, 0.5, 0.25}",
         ),
-        ("scene.objects[1] = 3", "scene.objects: cannot be written; scene:add{…} puts one more there"),
+        ("scene.objects[1] = 3", "scene.objects: cannot be written; scene:add{…} adds an object"),
         (
             "scene:camera('wrist').quat[1] = 0",
             "scene:camera(\"wrist\").quat: cannot be written; its numbers belong together: write camera.quat = { w, x, y, z }",
@@ -183,7 +194,7 @@ fn a_list_that_cannot_be_written_says_how_its_object_is_changed() {
             "scene.light = 'x'",
             "scene.light: cannot be replaced; its numbers are written one by one, as in scene.light.strength = …",
         ),
-        ("scene.objects = {}", "scene.objects: is only read"),
+        ("scene.objects = {}", "scene.objects: is read-only"),
         ("scene.add = 1", "scene.add: is a method and cannot be written; call it as scene:add(…)"),
         (
             "scene.add {}",
@@ -215,7 +226,7 @@ fn a_list_that_cannot_be_written_says_how_its_object_is_changed() {
 }
 
 #[test]
-fn a_turn_and_a_light_of_any_length_are_taken() {
+fn quaternions_and_directions_of_any_length_are_accepted() {
     for text in [
         "local c = scene:camera 'wrist' c.quat = { 1e200, 0, 0, 1e200 } assert(math.abs(c.quat[1] - 0.5 ^ 0.5) < 1e-12)",
         "assert(math.abs(softvt.pose { xyz = { 0, 0, 0 }, quat = { 0, 1e308, -1e308, 0 } }.quat[2]) > 0.7)",

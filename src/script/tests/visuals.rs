@@ -81,7 +81,7 @@ fn every_mask_can_be_made_from_lua() {
         "inside { shape = softvt.shape.sphere { radius = 0.01 }, soft_m = 1e-3 }",
         "text { text = 'Ünder', height_m = 5e-3, at = { 0, 0, 0.03 }, facing = '-y', wrap_m = 0.03, weight = 0.1, font = 'mono' }",
     ];
-    assert_eq!(masks.len(), crate::script::api::catalogue_visuals::MASKS.len());
+    assert_eq!(masks.len(), crate::script::api::visuals::MASKS.len());
     let layers: Vec<_> =
         masks.iter().map(|m| format!("{{ albedo = {{ 0, 0, 0 }}, mask = mask.{m} }}")).collect();
     let visuals = read(&format!("{{ {{ albedo = {{ 1, 1, 1 }}, layers = {{ {} }} }} }}", layers.join(", ")));
@@ -157,7 +157,7 @@ fn a_wrong_look_is_named_with_its_line_and_the_mend() {
             "mask = mask.text { text = 'x', height_m = 0.01, at = { 0, 0, 0 }, facing = '+z', wrap_m = 0.1 },",
             at(
                 8,
-                "mask.text.facing: expected a direction to a side, since the line is laid round the z axis",
+                "mask.text.facing: expected a sideways direction, since the line is wrapped around the z axis",
             ),
         ),
         (
@@ -191,7 +191,7 @@ fn a_painted_shape_needs_a_look_for_each_material_or_none_at_all() {
     let looks = |count: usize| format!("visuals = {{ {} }},", "{ albedo = { 1, 1, 1 } },".repeat(count));
     assert_eq!(painted(&looks(3)).unwrap(), 3);
     let message = painted(&looks(2)).unwrap_err().to_string();
-    let expected = "asset bun: visuals: the shape is painted with material 2, expected 3 looks, got 2; the first is that of \
+    let expected = "asset bun: visuals: the shape is painted with material 2, expected 3 visuals, got 2; the first is that of \
                     material 0";
     assert!(message.ends_with(expected) && message.contains("x.lua:"), "{message}");
 }

@@ -1,17 +1,19 @@
-//! What went wrong in a script, said for the person who wrote it.
+//! Errors of scripts: raised by the host at the script's line, and translated from what the virtual machine reports.
 
 use std::fmt;
 
-/// A failure caused by a script or by what was asked of it; always names the file.
+use mlua::Lua;
+
+/// An error in a script or in its use; always names the file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ScriptError {
-    /// What is wrong, a lower-case fragment.
+    /// A lower-case fragment.
     pub message: String,
     /// The file, as the user names it.
     pub file: String,
     /// Line in the file, from 1, where known.
     pub line: Option<usize>,
-    /// How to mend it.
+    /// How to fix it.
     pub hint: Option<String>,
 }
 
@@ -37,13 +39,13 @@ impl ScriptError {
         Self { message: message.into(), file: file.into(), line: None, hint: None }
     }
 
-    /// The same error with advice on how to mend it.
+    /// The same error with advice on how to fix it.
     pub fn hint(mut self, hint: impl Into<String>) -> Self {
         self.hint = Some(hint.into());
         self
     }
 
-    /// The same error in the file and on the line where it was found, if they are known.
+    /// The same error at another file and line, if they are known.
     pub(crate) fn found_at(mut self, place: Option<(String, usize)>) -> Self {
         if let Some((file, line)) = place {
             (self.file, self.line) = (file, Some(line));
@@ -58,27 +60,26 @@ impl ScriptError {
     }
 }
 
-/// The last error object that a script raised which is not a string: Lua itself would only print its address.
+/// The last error object other than a string that a script raised. Lua itself would only print its address.
 #[derive(Clone, Debug)]
 pub(crate) struct RaisedObject {
     pub description: String,
     pub file: Option<(String, usize)>,
 }
 
-/// What is needed to turn an error of the virtual machine into one for people.
+/// Translates errors of the virtual machine.
 pub(crate) struct Context<'a> {
-    /// The script that was started.
+    /// The main file.
     pub main: &'a str,
     /// Every loaded file.
     pub files: &'a [String],
-    /// See [`RaisedObject`].
     pub raised: Option<RaisedObject>,
     /// Memory limit, bytes.
     pub memory_bytes: usize,
 }
 
 impl Context<'_> {
-    /// Strips what only an implementer of the virtual machine would want to read.
+    /// The error as a script author should read it: file, line and message, without the machine's internals.
     pub(crate) fn explain(&self, error: &mlua::Error) -> ScriptError {
         if let Some(own) = own(error) {
             return own;
@@ -119,20 +120,20 @@ impl Context<'_> {
         let rest = without_own_position(rest);
         let (message, inner_trace) = rest.split_once("\nstack traceback:").unwrap_or((rest, ""));
         match self.position(message) {
-            Some((file, line, mut said)) => {
-                // A coroutine in a coroutine puts its place before that of the inner one.
+            Some((file, line, mut text)) => {
+                // Every nested coroutine prepends its position.
                 while let Some((_, _, inner)) =
-                    self.position(said.trim()).filter(|(f, l, _)| *f == file && *l == line)
+                    self.position(text.trim()).filter(|(f, l, _)| *f == file && *l == line)
                 {
-                    said = inner;
+                    text = inner;
                 }
-                ScriptError::new(file, format!("{prefix}{}", said.trim())).at(Some(line))
+                ScriptError::new(file, format!("{prefix}{}", text.trim())).at(Some(line))
             }
             None => self.traced(format!("{prefix}{}", message.trim()), &format!("{inner_trace}\n{trace}")),
         }
     }
 
-    /// An error without a position of its own is put where the innermost loaded file of the trace stands.
+    /// An error without a position of its own gets that of the innermost loaded file in the traceback.
     fn traced(&self, message: String, trace: &str) -> ScriptError {
         let place = trace.lines().find_map(|frame| self.position(frame.trim()));
         match place {
@@ -150,7 +151,7 @@ impl Context<'_> {
         Some((self.file(&text[..at])?, line.parse().ok()?, said))
     }
 
-    /// Lua shortens long names to `...tail`; the loaded file is the one that ends so.
+    /// The loaded file of a name, which Lua shortens to `...tail` if it is long.
     fn file(&self, name: &str) -> Option<String> {
         let tail = name.strip_prefix("...");
         let known = self.files.iter().find(|file| match tail {
@@ -161,14 +162,14 @@ impl Context<'_> {
     }
 }
 
-/// The message without the line of this room's own Lua, where that failed for what a script gave it.
+/// The message without the position in this module's own Lua code.
 fn without_own_position(message: &str) -> &str {
     let inner = ["softvt:", "softvt.arm:"].iter().find_map(|name| message.strip_prefix(name));
     let said = inner.and_then(|rest| rest.split_once(": ")).filter(|(line, _)| line.parse::<usize>().is_ok());
     said.map_or(message, |(_, said)| said)
 }
 
-/// Whether Lua could only print an address for the error value.
+/// True if Lua could only print an address for the error value.
 fn is_address(message: &str) -> bool {
     let first = message.lines().next().unwrap_or("");
     first == "<unprintable error>"
@@ -177,7 +178,7 @@ fn is_address(message: &str) -> bool {
         })
 }
 
-/// An error that this room raised itself, however deep it is wrapped.
+/// An error raised by the host, however deeply it is wrapped.
 fn own(error: &mlua::Error) -> Option<ScriptError> {
     match root(error) {
         mlua::Error::ExternalError(inner) => inner.downcast_ref::<ScriptError>().cloned(),
@@ -202,6 +203,41 @@ fn traceback(error: &mlua::Error) -> String {
     }
 }
 
+/// Main file of a virtual machine: the place of errors that no script line raised.
+pub(crate) struct MainFile(pub String);
+
+/// File and line of the innermost script function on the stack.
+pub(crate) fn here(lua: &Lua) -> Option<(String, usize)> {
+    let mut level = 0;
+    loop {
+        let frame = lua.inspect_stack(level, |frame| {
+            let source = frame.source().source?.strip_prefix('@')?.to_string();
+            Some((source, frame.current_line()?))
+        })?;
+        if frame.is_some() {
+            return frame;
+        }
+        level += 1;
+    }
+}
+
+/// [`here`] as messages name it: `file:line`.
+pub(crate) fn here_text(lua: &Lua) -> Option<String> {
+    here(lua).map(|(file, line)| format!("{file}:{line}"))
+}
+
+/// An error at the line of the script that is running.
+pub(crate) fn fail(lua: &Lua, message: impl Into<String>) -> mlua::Error {
+    let error = match here(lua) {
+        Some((file, line)) => ScriptError::new(file, message).at(Some(line)),
+        None => {
+            let main = lua.app_data_ref::<MainFile>().map(|main| main.0.clone());
+            ScriptError::new(main.unwrap_or_else(|| "script".into()), message)
+        }
+    };
+    mlua::Error::external(error)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -213,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn a_runtime_error_keeps_its_position_and_loses_its_traceback() {
+    fn runtime_errors_keep_their_position_and_lose_their_traceback() {
         let raw = "suites/x.lua:3: attempt to index a nil value\nstack traceback:\n\t[C]: in ?";
         assert_eq!(
             explain(mlua::Error::RuntimeError(raw.into())),
@@ -222,13 +258,13 @@ mod tests {
     }
 
     #[test]
-    fn a_shortened_name_is_restored() {
+    fn shortened_file_names_are_restored() {
         let raw = "...way/down/lib.lua:7: oh";
         assert_eq!(explain(mlua::Error::RuntimeError(raw.into())), "/a/very/long/way/down/lib.lua:7: oh");
     }
 
     #[test]
-    fn a_place_that_is_said_again_is_said_once() {
+    fn repeated_positions_are_shown_once() {
         let raw = "suites/x.lua:3: suites/x.lua:3: suites/x.lua:3: oh";
         assert_eq!(explain(mlua::Error::RuntimeError(raw.into())), "suites/x.lua:3: oh");
         let raw = "suites/x.lua:3: suites/x.lua:5: oh";
@@ -236,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn an_error_without_position_is_placed_by_the_traceback() {
+    fn errors_without_position_are_placed_by_the_traceback() {
         let raw = "oh\nstack traceback:\n\t[C]: in ?\n\tsuites/x.lua:9: in main chunk";
         assert_eq!(explain(mlua::Error::RuntimeError(raw.into())), "suites/x.lua:9: oh");
     }

@@ -1,26 +1,50 @@
 //! Lua values as plain data.
 
 use mlua::{Lua, Table, Value};
+use serde::de::DeserializeOwned;
 use serde_json::{Map, Number, Value as Json};
 
-use crate::script::{
-    schema::{got, sorted_pairs},
-    vm::fail,
-    vm::list as lists,
+use super::{
+    error::fail,
+    list::plain,
+    value::{got, sorted_pairs},
 };
 
-/// Tables in one another.
-const MOST_DEEP: usize = 32;
-/// Values in a piece of data. A table that stands in many places counts as often: as data it is copied.
-const MOST_VALUES: usize = 1_000_000;
+/// Nesting depth of tables.
+const MAX_DEPTH: usize = 32;
+/// Values in one piece of data. A table that occurs several times counts each time, since it is copied.
+const MAX_VALUES: usize = 1_000_000;
 
-/// A Lua value as JSON, keys sorted; `place` is how messages name it.
+/// Converts a Lua value to JSON with sorted keys. Messages name the value as `label`.
 ///
 /// # Errors
-/// For what is no data: functions, objects, numbers that are not finite, keys that are no names, tables without end.
-pub(crate) fn json(lua: &Lua, value: &Value, place: &str) -> mlua::Result<Json> {
-    let mut left = MOST_VALUES;
-    Reader { lua, left: &mut left }.read(value, place, 0)
+/// For values that are not data: functions, objects, non-finite numbers, keys that are not strings, endless tables.
+pub(crate) fn to_json(lua: &Lua, value: &Value, label: &str) -> mlua::Result<Json> {
+    let mut left = MAX_VALUES;
+    Reader { lua, left: &mut left }.read(value, label, 0)
+}
+
+/// Converts a Lua value to a Rust type by way of JSON; messages speak of Lua's types.
+pub(crate) fn deserialize<T: DeserializeOwned>(lua: &Lua, label: &str, value: &Value) -> mlua::Result<T> {
+    serde_json::from_value(to_json(lua, value, label)?).map_err(|error| {
+        let replacements = [
+            ("floating point ", ""),
+            ("expected f64", "expected a number"),
+            ("expected u32", "expected a whole number"),
+            ("expected u64", "expected a whole number"),
+            ("expected usize", "expected a whole number"),
+            ("expected a sequence", "expected a list"),
+            ("expected a map", "expected a table"),
+            ("invalid type: map", "invalid type: a table"),
+            ("invalid type: sequence", "invalid type: a list"),
+        ];
+        let text = replacements.iter().fold(error.to_string(), |text, (from, to)| text.replace(from, to));
+        let text = match text.split_once("expected struct ") {
+            Some((before, _)) => format!("{before}expected a table"),
+            None => text,
+        };
+        fail(lua, format!("{label}: {text}"))
+    })
 }
 
 struct Reader<'a> {
@@ -29,45 +53,45 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn wrong<T>(&self, place: &str, what: &str) -> mlua::Result<T> {
-        Err(fail(self.lua, format!("{place}: {what}")))
+    fn wrong<T>(&self, label: &str, what: &str) -> mlua::Result<T> {
+        Err(fail(self.lua, format!("{label}: {what}")))
     }
 
-    fn read(&mut self, value: &Value, place: &str, depth: usize) -> mlua::Result<Json> {
+    fn read(&mut self, value: &Value, label: &str, depth: usize) -> mlua::Result<Json> {
         if *self.left == 0 {
-            return self.wrong(place, &format!("the data has more than {MOST_VALUES} values; give less"));
+            return self.wrong(label, &format!("the data has more than {MAX_VALUES} values; give less"));
         }
         *self.left -= 1;
-        let value = &lists::plain(self.lua, value)?;
+        let value = &plain(self.lua, value)?;
         Ok(match value {
             Value::Nil => Json::Null,
             Value::Boolean(flag) => Json::Bool(*flag),
             Value::Integer(n) => Json::Number((*n).into()),
             Value::Number(n) => match Number::from_f64(*n) {
                 Some(number) => Json::Number(number),
-                None => return self.wrong(place, &format!("expected a finite number, got {}", got(value))),
+                None => return self.wrong(label, &format!("expected a finite number, got {}", got(value))),
             },
-            Value::String(text) => Json::String(text.to_string_lossy().to_string()),
-            Value::Table(table) if depth < MOST_DEEP => return self.table(table, place, depth),
-            Value::Table(_) => return self.wrong(place, "tables are nested too deeply"),
-            other => return self.wrong(place, &format!("expected data, got {}", got(other))),
+            Value::String(text) => Json::String(text.to_string_lossy()),
+            Value::Table(table) if depth < MAX_DEPTH => return self.table(table, label, depth),
+            Value::Table(_) => return self.wrong(label, "tables are nested too deeply"),
+            other => return self.wrong(label, &format!("expected data, got {}", got(other))),
         })
     }
 
-    fn table(&mut self, table: &Table, place: &str, depth: usize) -> mlua::Result<Json> {
+    fn table(&mut self, table: &Table, label: &str, depth: usize) -> mlua::Result<Json> {
         let count = table.raw_len();
         if count > 0 && table.pairs::<Value, Value>().count() == count {
             let items = (1..=count)
-                .map(|index| self.read(&table.raw_get(index)?, &format!("{place}[{index}]"), depth + 1));
+                .map(|index| self.read(&table.raw_get(index)?, &format!("{label}[{index}]"), depth + 1));
             return items.collect::<mlua::Result<_>>().map(Json::Array);
         }
         let mut map = Map::new();
         for (key, value) in sorted_pairs(table) {
             let Value::String(name) = &key else {
-                return self.wrong(place, &format!("expected names as keys, got {}", got(&key)));
+                return self.wrong(label, &format!("expected names as keys, got {}", got(&key)));
             };
-            let name = name.to_string_lossy().to_string();
-            let inner = self.read(&value, &format!("{place}.{name}"), depth + 1)?;
+            let name = name.to_string_lossy();
+            let inner = self.read(&value, &format!("{label}.{name}"), depth + 1)?;
             map.insert(name, inner);
         }
         Ok(Json::Object(map))

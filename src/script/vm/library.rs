@@ -1,14 +1,15 @@
-//! Where Lua text comes from: the project's folders first, then the library embedded in the binary.
+//! Lua source files and data files: from the project's folders first, then from the library embedded in the binary.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
     fs,
     io::Read,
     path::{Path, PathBuf},
-    sync::Arc,
+    sync::{Arc, Mutex},
 };
 
 use include_dir::{Dir, include_dir};
+use mlua::Lua;
 use sha2::{Digest, Sha256};
 
 use crate::script::vm::error::ScriptError;
@@ -18,13 +19,12 @@ static SCRIPTS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/scripts");
 static SUITES: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/suites");
 static ASSETS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/assets");
 
-/// A larger file is not a script that someone wrote.
+/// Largest file that is read, bytes.
 const MAX_BYTES: u64 = 64 << 20;
 
-/// A file as it was read, once.
+/// The content of a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Source {
-    /// What was in it.
     pub bytes: Arc<[u8]>,
     /// Lower-case hexadecimal SHA-256 of the bytes.
     pub sha256: String,
@@ -37,18 +37,18 @@ impl Source {
     }
 }
 
-/// Everything that a script has read; an episode runs on exactly this and never looks at the disk again.
+/// Every file that a script has read. Episodes run on a bundle and never read the disk again.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Bundle {
-    /// Files by the name that messages use.
+    /// Files by their name in messages.
     pub files: BTreeMap<String, Source>,
-    /// For each module or data file asked for, the file that served it.
+    /// The file found for each module or data file that was requested.
     pub served: BTreeMap<String, String>,
-    /// Data files that were asked for and not there.
+    /// Data files that were requested and not found.
     pub absent: BTreeSet<String>,
 }
 
-/// SHA-256 of some bytes, in hexadecimal.
+/// SHA-256 in lower-case hexadecimal.
 pub fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect()
 }
@@ -60,18 +60,24 @@ impl Bundle {
     }
 }
 
-/// Looks files up and remembers them.
+/// Finds files and keeps what it read.
 #[derive(Debug)]
 pub(crate) struct Library {
     roots: Vec<PathBuf>,
-    /// The main file, which is no module.
+    /// The main file, which cannot be required as a module.
     main: PathBuf,
     bundle: Bundle,
     frozen: bool,
 }
 
+/// The library of a virtual machine.
+pub(crate) fn of(lua: &Lua) -> mlua::Result<Arc<Mutex<Library>>> {
+    let library = lua.app_data_ref::<Arc<Mutex<Library>>>().map(|library| library.clone());
+    library.ok_or_else(|| mlua::Error::runtime("the virtual machine has no library"))
+}
+
 impl Library {
-    /// The library of the script at `main`, which is read; gives the name of its file too.
+    /// Opens the library of the script at `main` and reads that file; also returns its name in messages.
     pub(crate) fn open(main: &Path) -> Result<(Self, String), ScriptError> {
         let name = display(main);
         let folder = match main.parent() {
@@ -100,12 +106,11 @@ impl Library {
         Ok((Self { roots, main: main.into(), bundle, frozen: false }, name))
     }
 
-    /// A library that serves what `bundle` holds and nothing else.
+    /// A library of the files in `bundle` alone.
     pub(crate) fn frozen(bundle: Bundle) -> Self {
         Self { roots: Vec::new(), main: PathBuf::new(), bundle, frozen: true }
     }
 
-    /// What has been read so far.
     pub(crate) fn bundle(&self) -> &Bundle {
         &self.bundle
     }
@@ -126,7 +131,7 @@ impl Library {
         self.bundle.files.get(file).map(|source| source.bytes.clone())
     }
 
-    /// The file of module `module` (`experts.pick_place`); messages are fragments without a position.
+    /// Finds the file of a module (`experts.pick_place`). The message of an error is a fragment without a position.
     pub(crate) fn module(&mut self, module: &str) -> Result<String, String> {
         let plain = |part: &str| {
             !part.is_empty() && part.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_' || b == b'-')
@@ -154,8 +159,8 @@ impl Library {
         )
     }
 
-    /// A data file (a mesh) inside of the roots, by relative path: beside the Lua file that asks for it first.
-    pub(crate) fn data(&mut self, path: &str, asker: Option<&str>) -> Result<String, String> {
+    /// Finds a data file (a mesh) by its relative path: next to the Lua file `requester` first, then below the roots.
+    pub(crate) fn data(&mut self, path: &str, requester: Option<&str>) -> Result<String, String> {
         let inside =
             |part: &str| !part.is_empty() && part != "." && part != ".." && !part.contains(['\\', '\0', ':']);
         if !path.split('/').all(inside) {
@@ -163,24 +168,24 @@ impl Library {
                 "{path:?} leads out of the project; give a path inside of it without \"..\""
             ));
         }
-        let folder = asker.map(|file| file.rsplit_once('/').map_or("", |(folder, _)| folder));
-        let beside =
+        let folder = requester.map(|file| file.rsplit_once('/').map_or("", |(folder, _)| folder));
+        let sibling =
             folder.map(|folder| if folder.is_empty() { path.to_owned() } else { format!("{folder}/{path}") });
         // No path holds a colon, so one folder's file is never taken for another's.
         let key = format!("{}:{path}", folder.unwrap_or_default());
-        self.find(&key, beside, &[path.to_string()]).map_err(|problem| match problem {
+        self.find(&key, sibling, &[path.to_string()]).map_err(|problem| match problem {
             Problem::Frozen => {
                 format!("{path:?} was not read when the plan was made; build the shape in the file itself")
             }
-            Problem::Missing => match asker {
-                Some(asker) => format!("no file {path:?} beside {asker}, nor in {}", self.places()),
+            Problem::Missing => match requester {
+                Some(requester) => format!("no file {path:?} next to {requester}, nor in {}", self.places()),
                 None => format!("no file {path:?} in {}", self.places()),
             },
             Problem::Other(text) => text,
         })
     }
 
-    /// A data file by its path from the project's root, or none if there is no such file; `path` must lead inside.
+    /// Finds a data file by its path from the project's root; `None` if there is no such file.
     pub(crate) fn data_if_there(&mut self, path: &str) -> Result<Option<String>, String> {
         if self.bundle.absent.contains(path) {
             return Ok(None);
@@ -191,14 +196,14 @@ impl Library {
                 self.bundle.absent.insert(path.to_string());
                 Ok(None)
             }
-            Err(Problem::Frozen) => {
-                Err(format!("{path:?} was not read when the plan was made; ask for it outside of functions"))
-            }
+            Err(Problem::Frozen) => Err(format!(
+                "{path:?} was not read when the plan was made; request it at the top of the file"
+            )),
             Err(Problem::Other(text)) => Err(text),
         }
     }
 
-    /// The file of `key`: at the path `first`, else at the first of `candidates` below the roots, on disk or embedded.
+    /// Finds the file of `key`: at the path `first`, else at the first of `candidates` below the roots, on disk or embedded.
     fn find(&mut self, key: &str, first: Option<String>, candidates: &[String]) -> Result<String, Problem> {
         if let Some(file) = self.bundle.served.get(key) {
             return Ok(file.clone());
@@ -206,8 +211,8 @@ impl Library {
         if self.frozen {
             return Err(Problem::Frozen);
         }
-        // By kind of place first: require "shifts" means scripts/shifts.lua, though suites/shifts.lua may lie nearer. And a
-        // main file of a module's name needs that module.
+        // The order of candidates counts more than that of roots: require "shifts" means scripts/shifts.lua, though
+        // suites/shifts.lua may be nearer. A main file is never taken for the module of its name, which it may require.
         let on_disk = candidates.iter().flat_map(|c| self.roots.iter().map(move |root| root.join(c)));
         let main = self.main.canonicalize().ok();
         let other = |path: &PathBuf| main.is_none() || path.canonicalize().ok() != main;
@@ -225,7 +230,7 @@ impl Library {
         Ok(found.0)
     }
 
-    /// A link may not lead out of the roots either.
+    /// Reads a file unless it is a link that leads out of the roots.
     fn read_inside(&self, path: &Path) -> Result<Vec<u8>, Problem> {
         let real = path.canonicalize().map_err(|e| Problem::Other(format!("{}: {e}", display(path))))?;
         let inside =
@@ -299,7 +304,7 @@ pub fn embedded_scripts(tree: &str) -> Vec<String> {
 
 fn read(path: &Path) -> std::io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    // What a pipe or a device holds is only known once it is read.
+    // The size of a pipe or a device is only known once it is read.
     fs::File::open(path)?.take(MAX_BYTES + 1).read_to_end(&mut bytes)?;
     match bytes.len() as u64 > MAX_BYTES {
         true => Err(std::io::Error::other(format!("is larger than {} MiB", MAX_BYTES >> 20))),
@@ -334,7 +339,7 @@ fn missing(main: &Path, name: &str) -> ScriptError {
     }
 }
 
-/// The text that the virtual machine gets: UTF-8, not byte code, a `#!` line made a comment.
+/// The source text of a file: UTF-8, not byte code, with a `#!` line turned into a comment.
 pub(crate) fn lua_text(file: &str, bytes: &[u8]) -> Result<String, ScriptError> {
     if bytes.first() == Some(&0x1b) {
         return Err(ScriptError::new(file, "is compiled byte code; only Lua source text is run")
@@ -348,7 +353,7 @@ pub(crate) fn lua_text(file: &str, bytes: &[u8]) -> Result<String, ScriptError> 
     Ok(if text.starts_with("#!") { format!("--{text}") } else { text.to_string() })
 }
 
-/// A path as messages show it: as given, with forward slashes and no leading `./`.
+/// A path in messages: as given, with forward slashes and no leading `./`.
 fn display(path: &Path) -> String {
     let text = path.to_string_lossy().replace('\\', "/");
     match text.strip_prefix("./") {

@@ -1,40 +1,42 @@
-//! Lists that belong to an object of the host: reading gives no copy whose changes would be lost in silence.
+//! Lists that belong to an object of the host. Reading `scene.base` gives such a list and no copy, whose changes would be
+//! lost without an error.
 
 use mlua::{Lua, MetaMethod, MultiValue, Table, UserData, UserDataFields, UserDataMethods, Value};
 
-use crate::script::{
-    api::catalogue_classes::LIST,
-    schema::numbers,
-    schema::{self, number},
-    vm::{describe, fail},
+use super::{
+    error::fail,
+    value::{describe, got, number},
 };
 
 type Get = Box<dyn Fn(&Lua) -> mlua::Result<Vec<f64>> + Send + Sync>;
 type Set = Box<dyn Fn(&Lua, &Value) -> mlua::Result<()> + Send + Sync>;
 
 enum Content {
-    /// Numbers of the object, written through, and checked there.
+    /// Numbers of the object, which checks them when they are written.
     Live { get: Get, set: Set },
-    /// What was there when it was read, and how it is changed instead.
-    Fixed { entries: Table, mend: String },
+    /// The entries at the time of reading, and how to change them instead.
+    Fixed { entries: Table, hint: &'static str },
 }
 
 /// `softvt.List`.
 pub(crate) struct LuaList {
-    /// How messages name it: `scene.base`.
+    /// Name in messages: `scene.base`.
     label: String,
     content: Content,
 }
 
 impl LuaList {
-    /// Numbers that are read by `get` and, all of them, written by `set`.
+    /// Class name in Lua.
+    pub(crate) const CLASS: &'static str = "softvt.List";
+
+    /// Numbers read by `get`; `set` writes all of them.
     pub(crate) fn live(label: String, get: Get, set: Set) -> Self {
         Self { label, content: Content::Live { get, set } }
     }
 
-    /// A list that refuses to be written; `mend` says what to do instead.
-    pub(crate) fn fixed(label: String, entries: Table, mend: &str) -> Self {
-        Self { label, content: Content::Fixed { entries, mend: mend.to_owned() } }
+    /// A list that cannot be written; `hint` says how to change it instead.
+    pub(crate) fn fixed(label: String, entries: Table, hint: &'static str) -> Self {
+        Self { label, content: Content::Fixed { entries, hint } }
     }
 
     /// Its entries as a plain list.
@@ -50,14 +52,11 @@ impl LuaList {
     fn read(&self, lua: &Lua, key: &Value) -> mlua::Result<Value> {
         match key {
             Value::Integer(_) | Value::Number(_) => self.entries(lua)?.raw_get(key),
-            other => Err(fail(
-                lua,
-                format!(
-                    "{}: expected a place in the list, 1 or more, got {}",
-                    self.label,
-                    schema::got(other)
-                ),
-            )),
+            other => {
+                let message =
+                    format!("{}: expected a place in the list, 1 or more, got {}", self.label, got(other));
+                Err(fail(lua, message))
+            }
         }
     }
 
@@ -65,24 +64,25 @@ impl LuaList {
         let label = &self.label;
         let (get, set) = match &self.content {
             Content::Live { get, set } => (get, set),
-            Content::Fixed { mend, .. } => {
-                return Err(fail(lua, format!("{label}: cannot be written; {mend}")));
+            Content::Fixed { hint, .. } => {
+                return Err(fail(lua, format!("{label}: cannot be written; {hint}")));
             }
         };
         let mut numbers = get(lua)?;
         let count = numbers.len();
         let place = number(key).filter(|n| n.fract() == 0.0 && (1.0..=count as f64).contains(n));
         let Some(place) = place else {
-            return Err(fail(lua, format!("{label}: has places 1 to {count}, got {}", schema::got(key))));
+            return Err(fail(lua, format!("{label}: has places 1 to {count}, got {}", got(key))));
         };
-        let entry = numbers::entry(value, schema::Range::ANY);
-        let entry = entry.map_err(|message| fail(lua, format!("{label}[{place}]: {message}")))?;
+        let Some(entry) = number(value).filter(|number| number.is_finite()) else {
+            return Err(fail(lua, format!("{label}[{place}]: expected a number, got {}", got(value))));
+        };
         numbers[place as usize - 1] = entry;
         set(lua, &Value::Table(lua.create_sequence_from(numbers)?))
     }
 }
 
-/// The value itself; of a [`LuaList`] its entries now, as a plain list.
+/// The value itself; for a [`LuaList`] a plain list of its present entries.
 pub(crate) fn plain(lua: &Lua, value: &Value) -> mlua::Result<Value> {
     match value.as_userdata().and_then(|data| data.borrow::<LuaList>().ok()) {
         Some(list) => list.entries(lua).map(Value::Table),
@@ -92,7 +92,7 @@ pub(crate) fn plain(lua: &Lua, value: &Value) -> mlua::Result<Value> {
 
 impl UserData for LuaList {
     fn add_fields<F: UserDataFields<Self>>(fields: &mut F) {
-        fields.add_meta_field(MetaMethod::Type, LIST.name);
+        fields.add_meta_field(MetaMethod::Type, Self::CLASS);
     }
 
     fn add_methods<M: UserDataMethods<Self>>(methods: &mut M) {

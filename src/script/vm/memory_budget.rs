@@ -1,4 +1,4 @@
-//! Memory of host objects (pictures, shapes, masks, worlds), which the machine's own limit does not see.
+//! Memory of host objects (images, shapes, masks, worlds), which Lua's own limit does not count.
 
 use std::sync::{
     Arc,
@@ -7,22 +7,23 @@ use std::sync::{
 
 use mlua::Lua;
 
-use crate::script::vm::{fail, shared};
+use super::error::fail;
 
-/// Bytes that the pictures, shapes and masks of one machine may take together.
-const MOST_OBJECTS: usize = 512 << 20;
-/// The same of its worlds and simulations: one body of 32 voxels along its edge takes half of it.
-const MOST_WORLDS: usize = 4 << 30;
+/// Bytes that the images, shapes and masks of one virtual machine may take together.
+const MAX_OBJECT_BYTES: usize = 512 << 20;
+/// The same for its worlds and simulations: one soft body of 32 voxels along its edge takes half of it.
+const MAX_WORLD_BYTES: usize = 4 << 30;
 
-/// What the host objects of one kind take in one machine, bytes.
+/// Bytes used by the host objects of one kind.
 #[derive(Clone, Debug)]
-pub(crate) struct Budget {
+struct Budget {
     used: Arc<AtomicUsize>,
-    most: usize,
-    of: &'static str,
+    limit: usize,
+    /// What it counts and how to use less, for messages.
+    what: &'static str,
 }
 
-/// The budgets of one machine.
+/// The budgets of one virtual machine.
 #[derive(Clone, Debug)]
 pub(crate) struct Budgets {
     objects: Budget,
@@ -31,57 +32,62 @@ pub(crate) struct Budgets {
 
 impl Default for Budgets {
     fn default() -> Self {
-        let budget = |most, of| Budget { used: Arc::default(), most, of };
+        let budget = |limit, what| Budget { used: Arc::default(), limit, what };
         Self {
-            objects: budget(MOST_OBJECTS, "pictures, shapes and masks; keep fewer or smaller ones"),
+            objects: budget(MAX_OBJECT_BYTES, "images, shapes and masks; keep fewer or smaller ones"),
             worlds: budget(
-                MOST_WORLDS,
+                MAX_WORLD_BYTES,
                 "worlds and simulations; keep fewer, or give bodies a lower resolution",
             ),
         }
     }
 }
 
-/// A share of a budget, given back when it is dropped.
+/// A share of a budget, released on drop.
 #[derive(Debug)]
-pub(crate) struct Held {
+pub(crate) struct Reservation {
     used: Arc<AtomicUsize>,
     bytes: usize,
 }
 
-impl Drop for Held {
+impl Drop for Reservation {
     fn drop(&mut self) {
         self.used.fetch_sub(self.bytes, Ordering::Relaxed);
     }
 }
 
 impl Budget {
-    fn hold(&self, lua: &Lua, bytes: usize) -> mlua::Result<Held> {
-        let fits = || self.used.load(Ordering::Relaxed).saturating_add(bytes) <= self.most;
+    fn reserve(&self, lua: &Lua, bytes: usize) -> mlua::Result<Reservation> {
+        let fits = || self.used.load(Ordering::Relaxed).saturating_add(bytes) <= self.limit;
         if !fits() {
             lua.gc_collect()?;
         }
         if !fits() {
-            let Self { most, of, .. } = self;
-            return Err(fail(lua, format!("the script holds more than {} MiB of {of}", most >> 20)));
+            let Self { limit, what, .. } = self;
+            return Err(fail(lua, format!("the script holds more than {} MiB of {what}", limit >> 20)));
         }
         self.used.fetch_add(bytes, Ordering::Relaxed);
-        Ok(Held { used: self.used.clone(), bytes })
+        Ok(Reservation { used: self.used.clone(), bytes })
     }
 }
 
-/// Takes `bytes` for a picture, shape or mask; what the script has dropped is collected first where they do not fit.
-///
-/// # Errors
-/// If there are not so many left, at the script's line.
-pub(crate) fn hold(lua: &Lua, bytes: usize) -> mlua::Result<Held> {
-    shared(lua)?.budgets.objects.hold(lua, bytes)
+fn budgets(lua: &Lua) -> mlua::Result<Budgets> {
+    let budgets = lua.app_data_ref::<Budgets>().map(|budgets| budgets.clone());
+    budgets.ok_or_else(|| mlua::Error::runtime("the virtual machine has no budgets"))
 }
 
-/// The same for what is in a world.
+/// Reserves `bytes` for an image, shape or mask. If they do not fit, garbage is collected first.
 ///
 /// # Errors
-/// As [`hold`].
-pub(crate) fn hold_in_world(lua: &Lua, bytes: usize) -> mlua::Result<Held> {
-    shared(lua)?.budgets.worlds.hold(lua, bytes)
+/// If the budget is used up, at the script's line.
+pub(crate) fn reserve(lua: &Lua, bytes: usize) -> mlua::Result<Reservation> {
+    budgets(lua)?.objects.reserve(lua, bytes)
+}
+
+/// Reserves `bytes` for the content of a world, as [`reserve`] does.
+///
+/// # Errors
+/// As [`reserve`].
+pub(crate) fn reserve_in_world(lua: &Lua, bytes: usize) -> mlua::Result<Reservation> {
+    budgets(lua)?.worlds.reserve(lua, bytes)
 }

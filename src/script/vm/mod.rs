@@ -1,19 +1,18 @@
-//! One virtual machine: what a script may reach, how much memory and time it may use.
+//! A sandboxed virtual machine: what a script may reach, and how much memory and time it may use.
 
 pub(crate) mod error;
 pub(crate) mod json;
 pub(crate) mod library;
 pub(crate) mod list;
 pub(crate) mod memory_budget;
-pub(crate) mod origin;
-pub(crate) mod position;
 pub(crate) mod random;
+pub(crate) mod source_map;
+pub(crate) mod value;
 pub(crate) mod watchdog;
 
 use std::{
-    collections::BTreeSet,
     sync::{
-        Arc, Mutex, MutexGuard, PoisonError,
+        Arc, Mutex, OnceLock,
         atomic::{AtomicUsize, Ordering},
     },
     time::Duration,
@@ -23,46 +22,53 @@ use mlua::{
     FromLuaMulti, Function, IntoLuaMulti, Lua, LuaOptions, MultiValue, StdLib, Table, Value, chunk::ChunkMode,
 };
 
-use crate::script::{
-    schema,
-    vm::error::{Context, RaisedObject, ScriptError},
-    vm::library::Library,
-    vm::list as lists,
-    vm::memory_budget::Budgets,
-    vm::random::MathRandom,
-    vm::watchdog::{Clock, Deadline, OnStuck, end_process},
-};
+use error::{Context, MainFile, RaisedObject, ScriptError, fail, here};
+use library::Library;
+use memory_budget::Budgets;
+use random::MathRandom;
+use value::{describe, got};
+use watchdog::{Clock, Deadline, OnStuck};
 
-/// Bytes that a machine may print; the rest of a flood is left out.
-const MOST_PRINTED: usize = 1 << 20;
+use crate::parallel::lock;
 
-/// Registry key of the base library as it was before a script could change it.
-const BASE: &str = "softvt base library";
+/// Bytes that a virtual machine may print; later output is dropped.
+const MAX_PRINTED_BYTES: usize = 1 << 20;
 
-/// Where `print` goes; not the standard output, which belongs to results.
+/// Registry key of the base library as it was before scripts could change it.
+const BASE_LIBRARY: &str = "softvt base library";
+
+/// Destination of `print`: not standard output, which belongs to results.
 pub type Print = Arc<dyn Fn(&str) + Send + Sync>;
 
-/// What one virtual machine may use.
+/// Resources of one virtual machine.
 #[derive(Clone)]
 pub struct Limits {
     /// Memory of Lua values, bytes.
     pub memory_bytes: usize,
-    /// Time to load a script and make its plan.
+    /// Lua time to load a script and make its plan.
     pub load: Duration,
-    /// Lua time of one call: a layout, a shift, a control step of an expert (physics that a binding runs is not counted).
+    /// Lua time of one call: a layout, a shift, a control step of an expert. Physics that a binding runs is not counted.
     pub call: Duration,
     /// Lua time of one point of an experiment, likewise.
     pub point: Duration,
-    /// How long after a limit the script may still stop by itself before it counts as stuck.
+    /// Time after a limit during which the script may still stop by itself before it counts as stuck.
     pub grace: Duration,
-    /// What happens when a library function does not return.
+    /// Called if a library function does not return.
     pub on_stuck: OnStuck,
-    /// Where `print` goes.
     pub print: Print,
 }
 
+static STUCK_HANDLER: OnceLock<OnStuck> = OnceLock::new();
+
+/// Sets what happens if a library function of Lua (such as `string.find` with a hostile pattern) never returns. Nothing can
+/// interrupt it, so a program should end. Without a handler a message is printed and the thread stays busy.
+pub fn set_stuck_handler(handler: OnStuck) {
+    // The first handler stays: there is one program per process.
+    let _ = STUCK_HANDLER.set(handler);
+}
+
 impl Default for Limits {
-    /// 256 MiB, 10 s to load, 5 s a call, 60 s a point; a stuck function ends the process with code 2; `print` to standard error.
+    /// 256 MiB; 10 s to load, 5 s per call, 60 s per point; `print` to standard error.
     fn default() -> Self {
         Self {
             memory_bytes: 256 << 20,
@@ -70,46 +76,43 @@ impl Default for Limits {
             call: Duration::from_secs(5),
             point: Duration::from_secs(60),
             grace: Duration::from_millis(1500),
-            on_stuck: end_process(),
+            on_stuck: Arc::new(|message| match STUCK_HANDLER.get() {
+                Some(handler) => handler(message),
+                None => crate::text::eprint_line(message),
+            }),
             print: Arc::new(|text| crate::text::eprint_line(&crate::text::escape_control(text))),
         }
     }
 }
 
-/// What callbacks of a machine share.
-pub(crate) struct Shared {
-    pub main: String,
-    pub library: Mutex<Library>,
-    pub budgets: Budgets,
+/// State that callbacks of a virtual machine share.
+struct Shared {
+    main: String,
+    library: Arc<Mutex<Library>>,
     raised: Mutex<Option<RaisedObject>>,
     /// Bytes that `print` may still write.
     printable: AtomicUsize,
     limits: Limits,
 }
 
-pub(crate) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
 /// A sandboxed virtual machine.
 pub(crate) struct Vm {
     pub lua: Lua,
-    pub clock: Clock,
     pub random: MathRandom,
-    pub shared: Arc<Shared>,
-    /// The table that becomes the global `softvt`.
+    /// The global table `softvt`.
     pub api: Table,
+    clock: Clock,
+    shared: Arc<Shared>,
 }
 
 impl Vm {
-    /// A machine that reads from `library`; `main` is the file that messages fall back to.
+    /// A virtual machine that reads from `library`; errors without a position name the file `main`.
     pub(crate) fn new(main: &str, library: Library, limits: &Limits) -> Result<Self, ScriptError> {
         let shared = Arc::new(Shared {
             main: main.into(),
-            library: Mutex::new(library),
-            budgets: Budgets::default(),
+            library: Arc::new(Mutex::new(library)),
             raised: Mutex::new(None),
-            printable: AtomicUsize::new(MOST_PRINTED),
+            printable: AtomicUsize::new(MAX_PRINTED_BYTES),
             limits: limits.clone(),
         });
         Self::build(&shared).map_err(|e| explain(&shared, &e))
@@ -118,13 +121,18 @@ impl Vm {
     fn build(shared: &Arc<Shared>) -> mlua::Result<Self> {
         let libs = StdLib::COROUTINE | StdLib::TABLE | StdLib::STRING | StdLib::UTF8 | StdLib::MATH;
         let lua = Lua::new_with(libs, LuaOptions::default())?;
+        let clock = Clock::default();
         lua.set_memory_limit(shared.limits.memory_bytes)?;
         lua.set_app_data(shared.clone());
+        lua.set_app_data(MainFile(shared.main.clone()));
+        lua.set_app_data(shared.library.clone());
+        lua.set_app_data(Budgets::default());
+        lua.set_app_data(clock.clone());
         let api = lua.create_table()?;
         let host = lua.create_table()?;
         host.set("raised", lua.create_function(note_raised)?)?;
-        host.set("words", lua.create_function(words)?)?;
-        host.set("list", lua.create_function(to_go_through)?)?;
+        host.set("words", lua.create_function(error_text)?)?;
+        host.set("list", lua.create_function(iterable)?)?;
         lua.load(include_str!("prelude.lua"))
             .set_name("=softvt")
             .set_mode(ChunkMode::Text)
@@ -134,22 +142,30 @@ impl Vm {
         let tostring: Function = lua.globals().get("tostring")?;
         let print = lua.create_function(move |lua, values: MultiValue| print(lua, &tostring, values))?;
         lua.globals().set("print", print)?;
-        keep_base(&lua)?;
+        keep_base_library(&lua)?;
         lua.globals().set("load", lua.create_function(load)?)?;
         let loaded = lua.create_table()?;
         let require = lua.create_function(move |lua, name: Value| require(lua, &loaded, &name))?;
         lua.globals().set("require", require)?;
         let random = MathRandom::install(&lua)?;
         lua.globals().set("softvt", &api)?;
-        let clock = Clock::default();
         clock.install(&lua)?;
         Ok(Self { lua, clock, random, shared: shared.clone(), api })
     }
 
-    /// Runs the main file and gives what it returns.
+    /// The main file, as messages name it.
+    pub(crate) fn main(&self) -> &str {
+        &self.shared.main
+    }
+
+    pub(crate) fn library(&self) -> &Mutex<Library> {
+        &self.shared.library
+    }
+
+    /// Runs the main file and returns its results.
     pub(crate) fn run_main(&self) -> Result<MultiValue, ScriptError> {
-        let main = &self.shared.main;
-        let text = locked(&self.shared.library).text(main)?;
+        let main = self.main();
+        let text = lock(self.library()).text(main)?;
         let _deadline = self.deadline(self.shared.limits.load);
         let chunk = self.lua.load(text).set_name(format!("@{main}")).set_mode(ChunkMode::Text);
         // Not `eval`, which would first try the text as an expression and lose the frame of `error(…)` in a tail call.
@@ -162,7 +178,7 @@ impl Vm {
         function: &Function,
         args: impl IntoLuaMulti,
     ) -> Result<R, ScriptError> {
-        let _deadline = self.deadline(self.shared.limits.call);
+        let _deadline = self.call_deadline();
         function.call(args).map_err(|e| self.explain(&e))
     }
 
@@ -186,27 +202,31 @@ impl Vm {
         self.clock.start(limit, limits.grace, &self.shared.main, limits.on_stuck.clone())
     }
 
-    /// An error of the machine for people.
+    /// The error of a script author for an error of the virtual machine.
     pub(crate) fn explain(&self, error: &mlua::Error) -> ScriptError {
         explain(&self.shared, error)
     }
 }
 
 fn explain(shared: &Shared, error: &mlua::Error) -> ScriptError {
-    let files = locked(&shared.library).names();
-    let raised = locked(&shared.raised).clone();
+    let files = lock(&shared.library).names();
+    let raised = lock(&shared.raised).clone();
     let context =
         Context { main: &shared.main, files: &files, raised, memory_bytes: shared.limits.memory_bytes };
     context.explain(error)
 }
 
-/// What callbacks of `lua` share; an error only in a machine that this room did not make.
-pub(crate) fn shared(lua: &Lua) -> mlua::Result<Arc<Shared>> {
-    let shared = lua.app_data_ref::<Arc<Shared>>().map(|s| Arc::clone(&s));
-    shared.ok_or_else(|| mlua::Error::runtime("the machine has no library"))
+fn shared(lua: &Lua) -> mlua::Result<Arc<Shared>> {
+    let shared = lua.app_data_ref::<Arc<Shared>>().map(|shared| Arc::clone(&shared));
+    shared.ok_or_else(|| mlua::Error::runtime("the virtual machine has no shared state"))
 }
 
-/// Takes away what reaches the outside or the machine's own state.
+/// The clock of a virtual machine, which bindings pause while they work in Rust.
+pub(crate) fn clock(lua: &Lua) -> Clock {
+    lua.app_data_ref::<Clock>().map(|clock| clock.clone()).unwrap_or_default()
+}
+
+/// Removes functions that reach the outside or the machine's own state.
 fn withhold(lua: &Lua) -> mlua::Result<()> {
     for name in ["dofile", "loadfile", "collectgarbage", "warn", "io", "os", "debug", "package", "loadstring"]
     {
@@ -215,35 +235,8 @@ fn withhold(lua: &Lua) -> mlua::Result<()> {
     lua.globals().get::<Table>("string")?.set("dump", Value::Nil)
 }
 
-/// File and line of the innermost script on the stack: the call that a message is about.
-pub(crate) fn here(lua: &Lua) -> Option<(String, usize)> {
-    let mut level = 0;
-    loop {
-        let frame = lua.inspect_stack(level, |frame| {
-            let source = frame.source().source?.strip_prefix('@')?.to_string();
-            Some((source, frame.current_line()?))
-        })?;
-        if frame.is_some() {
-            return frame;
-        }
-        level += 1;
-    }
-}
-
-/// An error at the script's call that is running now.
-pub(crate) fn fail(lua: &Lua, message: impl Into<String>) -> mlua::Error {
-    let error = match here(lua) {
-        Some((file, line)) => ScriptError::new(file, message).at(Some(line)),
-        None => {
-            let main = shared(lua).map(|s| s.main.clone()).unwrap_or_else(|_| "script".into());
-            ScriptError::new(main, message)
-        }
-    };
-    mlua::Error::external(error)
-}
-
-/// Puts a copy of the base library where scripts do not reach it: the library's own Lua runs on that.
-fn keep_base(lua: &Lua) -> mlua::Result<()> {
+/// Stores a copy of the base library out of the reach of scripts, for the library's own Lua code.
+fn keep_base_library(lua: &Lua) -> mlua::Result<()> {
     let base = lua.create_table()?;
     for entry in lua.globals().pairs::<Value, Value>() {
         let (name, value) = entry?;
@@ -255,12 +248,12 @@ fn keep_base(lua: &Lua) -> mlua::Result<()> {
         };
         base.set(name, value)?;
     }
-    lua.set_named_registry_value(BASE, base)
+    lua.set_named_registry_value(BASE_LIBRARY, base)
 }
 
-/// The base library as it was before a script could change it.
-pub(crate) fn base(lua: &Lua) -> mlua::Result<Table> {
-    lua.named_registry_value(BASE)
+/// The base library as it was before scripts could change it.
+pub(crate) fn base_library(lua: &Lua) -> mlua::Result<Table> {
+    lua.named_registry_value(BASE_LIBRARY)
 }
 
 fn print(lua: &Lua, tostring: &Function, values: MultiValue) -> mlua::Result<()> {
@@ -279,7 +272,7 @@ fn print(lua: &Lua, tostring: &Function, values: MultiValue) -> mlua::Result<()>
     } else if shared.printable.swap(0, Ordering::Relaxed) > 0 {
         (shared.limits.print)(&format!(
             "… the script prints more than {} MiB; the rest is left out",
-            MOST_PRINTED >> 20
+            MAX_PRINTED_BYTES >> 20
         ));
     }
     Ok(())
@@ -291,14 +284,14 @@ fn load(lua: &Lua, (chunk, name, _mode, env): (Value, Value, Value, Value)) -> m
         Value::Nil => "=(load)".to_owned(),
         Value::String(name) => name.to_string_lossy(),
         other => {
-            return Err(fail(lua, format!("load: expected a string as name, got {}", schema::got(&other))));
+            return Err(fail(lua, format!("load: expected a string as name, got {}", got(&other))));
         }
     };
     let env = match env {
         Value::Nil => None,
         Value::Table(env) => Some(env),
         other => {
-            return Err(fail(lua, format!("load: expected a table as env, got {}", schema::got(&other))));
+            return Err(fail(lua, format!("load: expected a table as env, got {}", got(&other))));
         }
     };
     let mut bytes = Vec::new();
@@ -313,10 +306,7 @@ fn load(lua: &Lua, (chunk, name, _mode, env): (Value, Value, Value, Value)) -> m
             }
         },
         other => {
-            return Err(fail(
-                lua,
-                format!("load: expected a string or function, got {}", schema::got(&other)),
-            ));
+            return Err(fail(lua, format!("load: expected a string or function, got {}", got(&other))));
         }
     }
     let refusal = |text: String| Ok((Value::Nil, Value::String(lua.create_string(text)?)));
@@ -338,10 +328,10 @@ fn require(lua: &Lua, loaded: &Table, name: &Value) -> mlua::Result<Value> {
     let Value::String(name) = name else {
         return Err(fail(lua, format!("require: expected a module name, got a {}", name.type_name())));
     };
-    let name = name.to_string_lossy().to_string();
-    let shared = shared(lua)?;
+    let name = name.to_string_lossy();
     let (file, text) = {
-        let mut library = locked(&shared.library);
+        let library = library::of(lua)?;
+        let mut library = lock(&library);
         let file = library.module(&name).map_err(|message| fail(lua, message))?;
         let text = library.text(&file).map_err(mlua::Error::external)?;
         (file, text)
@@ -359,7 +349,7 @@ fn require(lua: &Lua, loaded: &Table, name: &Value) -> mlua::Result<Value> {
         Ok(Value::Nil | Value::Boolean(false)) => Value::Boolean(true),
         Ok(value) => value,
         Err(error) => {
-            // Tried again (inside a pcall) it must fail the same way, not as a circle.
+            // A second attempt (inside a pcall) must fail in the same way, not as a circle.
             loaded.set(file.as_str(), Value::Nil)?;
             return Err(error);
         }
@@ -368,57 +358,24 @@ fn require(lua: &Lua, loaded: &Table, name: &Value) -> mlua::Result<Value> {
     Ok(value)
 }
 
-/// What `pairs` and its like go through: a table, or the entries of a list of the host.
-fn to_go_through(lua: &Lua, (place, value): (String, Value)) -> mlua::Result<Value> {
-    match lists::plain(lua, &value)? {
+/// The table that `pairs` and `softvt.sorted` iterate over: the value itself, or the entries of a list of the host.
+fn iterable(lua: &Lua, (label, value): (String, Value)) -> mlua::Result<Value> {
+    match list::plain(lua, &value)? {
         Value::Table(table) => Ok(Value::Table(table)),
-        other => Err(fail(lua, format!("{place}: expected a table, got {}", schema::got(&other)))),
+        other => Err(fail(lua, format!("{label}: expected a table, got {}", got(&other)))),
     }
 }
 
-/// An error of the host as the text that people would read; any other value as it is.
-fn words(lua: &Lua, value: Value) -> mlua::Result<Value> {
+/// The text of an error of the host; any other value as it is.
+fn error_text(lua: &Lua, value: Value) -> mlua::Result<Value> {
     let Value::Error(error) = &value else { return Ok(value) };
-    let shared = shared(lua)?;
-    let text = explain(&shared, error).to_string();
+    let text = explain(&*shared(lua)?, error).to_string();
     lua.create_string(text).map(Value::String)
 }
 
-/// Keeps a description of an error object, since its address is all that would be left of it later.
+/// Keeps a description of an error object, of which Lua would only keep the address.
 fn note_raised(lua: &Lua, object: Value) -> mlua::Result<()> {
     let description = describe(&object, 0);
-    *locked(&shared(lua)?.raised) = Some(RaisedObject { description, file: here(lua) });
+    *lock(&shared(lua)?.raised) = Some(RaisedObject { description, file: here(lua) });
     Ok(())
-}
-
-/// A short text of a value as a Lua constant, keys sorted, without addresses.
-pub(crate) fn describe(value: &Value, depth: usize) -> String {
-    match value {
-        Value::String(text) => format!("{:?}", text.to_string_lossy()),
-        Value::Integer(number) => number.to_string(),
-        Value::Number(number) => number.to_string(),
-        Value::Boolean(flag) => flag.to_string(),
-        Value::Table(table) if depth < 2 => {
-            let mut entries = BTreeSet::new();
-            let mut list = Vec::new();
-            for (key, value) in table.pairs::<Value, Value>().flatten().take(64) {
-                match key {
-                    Value::Integer(index) if index >= 1 => list.push((index, describe(&value, depth + 1))),
-                    Value::String(key) => {
-                        entries.insert(format!(
-                            "{} = {}",
-                            key.to_string_lossy(),
-                            describe(&value, depth + 1)
-                        ));
-                    }
-                    _ => {}
-                }
-            }
-            list.sort();
-            let parts = list.into_iter().map(|(_, text)| text).chain(entries).take(8);
-            format!("{{{}}}", parts.collect::<Vec<_>>().join(", "))
-        }
-        Value::Nil => "nil".into(),
-        other => schema::kind(other),
-    }
 }

@@ -1,15 +1,16 @@
-//! Time limits: a hook that Lua cannot swallow, and a watchdog for C functions that never come back.
+//! Time limits: a hook that `pcall` cannot swallow, and a watchdog for C functions that never return.
 //!
-//! Limits are of the processor time of the script's own thread, so that a busy machine makes no honest script late. The
-//! hook is called every few thousand instructions of Lua. Once the time is up it asks to be called at *every*
-//! instruction and raises an error each time, so that a `pcall` that catches the error only gains one instruction. A C
-//! function (`string.find` with a hostile pattern) never reaches the hook; nothing can stop it but the end of the
-//! process, which the [`Watchdog`] brings about with a message: it spares a script whose hook has been called since it last
-//! looked, and waits on while the whole process has not had as much processor time as the script may take.
+//! Limits count the processor time of the script's own thread, so that a busy machine does not time out a harmless script.
+//! The hook runs every few thousand Lua instructions. Once the time is up it runs at *every* instruction and raises an error
+//! each time, so that a `pcall` that catches the error gains only one instruction.
+//!
+//! A C function (`string.find` with a hostile pattern) never reaches the hook, and nothing can interrupt it. The
+//! [`Watchdog`] then calls [`OnStuck`], which ends the process. It does so only if the hook has not run since the last
+//! check, and if the process has had at least as much processor time as the script may take.
 
 use std::{
     collections::BTreeMap,
-    sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError, Weak},
+    sync::{Arc, Condvar, Mutex, OnceLock, PoisonError, Weak},
     thread,
     time::{Duration, Instant},
 };
@@ -17,51 +18,43 @@ use std::{
 use cpu_time::{ProcessTime, ThreadTime};
 use mlua::{HookTriggers, Lua, VmState, debug::Debug};
 
-use crate::rollout::cancel;
-use crate::script::{vm::error::ScriptError, vm::here};
+use super::error::{ScriptError, here};
+use crate::{parallel::lock, rollout::cancel};
 
-/// Instructions between two looks at the clock; about 0.3 ms.
-const STRIDE: u32 = 20_000;
+/// Instructions between two checks of the clock; about 0.3 ms.
+const HOOK_INTERVAL: u32 = 20_000;
 
-/// What the watchdog does with its message; ends the process unless a test says otherwise.
+/// Called with a message when a library function does not return; ends the process by default.
 pub type OnStuck = Arc<dyn Fn(&str) + Send + Sync>;
-
-/// Prints the message and ends the process with the exit code of bad input; finished episodes are already on disk.
-pub fn end_process() -> OnStuck {
-    Arc::new(|message| {
-        crate::text::eprint_line(&format!("softvt: {message}"));
-        std::process::exit(2);
-    })
-}
 
 type Slot = (Instant, u64);
 
-/// What the watchdog does when a time has come.
+/// A check that the watchdog makes at a set time.
 #[derive(Clone)]
 struct Alarm {
     clock: Weak<Mutex<State>>,
     /// The clock's beat when the alarm was set.
     beat: u64,
-    /// Processor time of the process before which it does not sound: a script that hangs takes all that its thread gets.
+    /// Processor time of the process before which the script cannot have used up its own.
     not_before: Duration,
     message: String,
     on_stuck: OnStuck,
 }
 
 impl Alarm {
-    /// The same for a script that may take `wait` more.
+    /// The same alarm, `wait` later.
     fn set(self, beat: u64, wait: Duration) -> (Instant, Self) {
-        (Instant::now() + wait, Self { beat, not_before: used_by_all() + wait, ..self })
+        (Instant::now() + wait, Self { beat, not_before: process_time() + wait, ..self })
     }
 
-    /// Sounds, unless the script has shown life since, or others had the processor; then it is set anew.
+    /// Calls `on_stuck`, unless the hook has run since or other threads had the processor; then sets the alarm again.
     fn ring(self) {
         let Some(clock) = self.clock.upgrade() else { return };
         let mut state = lock(&clock);
         if state.until.is_none() {
             return;
         }
-        let owed = self.not_before.saturating_sub(used_by_all());
+        let owed = self.not_before.saturating_sub(process_time());
         let (at, alarm) = match state.beat == self.beat {
             true if owed.is_zero() => {
                 drop(state);
@@ -80,14 +73,10 @@ struct Queue {
     next: u64,
 }
 
-/// One thread for the process that knows every running deadline.
+/// A thread that watches every running deadline of the process.
 struct Watchdog {
     queue: Mutex<Queue>,
     changed: Condvar,
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn watchdog() -> &'static Watchdog {
@@ -132,7 +121,7 @@ impl Watchdog {
         let earliest = queue.waiting.keys().next().is_none_or(|first| at < first.0);
         queue.waiting.insert(slot, alarm);
         drop(queue);
-        // Every new deadline that is not the first is found when the first comes up: no need to wake anyone.
+        // Only a new earliest deadline has to wake the thread; the others are found when it wakes anyway.
         if earliest {
             self.changed.notify_one();
         }
@@ -146,32 +135,32 @@ impl Watchdog {
 
 #[derive(Default)]
 struct State {
-    /// Processor time of the thread at which the running call must be over; none while nothing runs or the clock is
-    /// stopped.
+    /// Processor time of the thread at which the running call must be over; `None` while nothing runs or the clock is
+    /// paused.
     until: Option<Duration>,
     limit: Duration,
     grace: Duration,
     file: String,
     slot: Option<Slot>,
-    /// How often the hook has looked.
+    /// Number of calls of the hook.
     beat: u64,
-    /// Time left when the clock was stopped, and the watchdog's entry.
-    stopped: Option<(Duration, Option<Alarm>)>,
+    /// Time left when the clock was paused, and the watchdog's alarm.
+    paused: Option<(Duration, Option<Alarm>)>,
 }
 
-/// File and line of what is running, if it is a script's.
+/// File and line of the running function, if it is a script's.
 fn place(running: &Debug<'_>) -> Option<(String, usize)> {
     let file = running.source().source?.strip_prefix('@')?.to_owned();
     Some((file, running.current_line()?))
 }
 
-/// Processor time that this thread has used.
-fn used() -> Duration {
+/// Processor time of this thread.
+fn thread_time() -> Duration {
     ThreadTime::now().as_duration()
 }
 
-/// Processor time that the process has used.
-fn used_by_all() -> Duration {
+/// Processor time of the process.
+fn process_time() -> Duration {
     ProcessTime::now().as_duration()
 }
 
@@ -185,7 +174,7 @@ impl Clock {
     /// Installs the hook in `lua`.
     pub(crate) fn install(&self, lua: &Lua) -> mlua::Result<()> {
         let clock = self.clone();
-        lua.set_global_hook(HookTriggers::new().every_nth_instruction(STRIDE), move |lua, running| {
+        lua.set_global_hook(HookTriggers::new().every_nth_instruction(HOOK_INTERVAL), move |lua, running| {
             let Some(error) = clock.expired() else { return Ok(VmState::Continue) };
             let error = error.found_at(place(running).or_else(|| here(lua)));
             let again = error.clone();
@@ -196,14 +185,14 @@ impl Clock {
         })
     }
 
-    /// What is wrong once the time is up or the run is to end.
+    /// The error to raise if the time is up or the run is cancelled.
     fn expired(&self) -> Option<ScriptError> {
         let mut state = lock(&self.state);
         state.beat += 1;
         if cancel::requested() {
             return Some(ScriptError::new(state.file.clone(), "interrupted"));
         }
-        state.until.is_some_and(|until| used() > until).then(|| {
+        state.until.is_some_and(|until| thread_time() > until).then(|| {
             ScriptError::new(
                 state.file.clone(),
                 format!("the script ran for more than {}", seconds(state.limit)),
@@ -212,15 +201,14 @@ impl Clock {
         })
     }
 
-    /// Gives the machine `limit` of this thread's processor time from now on, until the guard is dropped; the watchdog
-    /// acts when `grace` more has passed without a sign of life. `file` is named in messages. A call inside of
-    /// a call keeps the outer limit.
+    /// Limits the virtual machine to `limit` of this thread's processor time until the guard is dropped. The watchdog acts
+    /// when the hook has not run for `grace` beyond that. Messages name `file`. A nested call keeps the outer limit.
     pub fn start(&self, limit: Duration, grace: Duration, file: &str, on_stuck: OnStuck) -> Deadline {
         let mut state = lock(&self.state);
-        if state.until.is_some() || state.stopped.is_some() {
+        if state.until.is_some() || state.paused.is_some() {
             return Deadline { clock: None };
         }
-        state.until = Some(used() + limit);
+        state.until = Some(thread_time() + limit);
         state.limit = limit;
         state.grace = grace;
         state.file = file.into();
@@ -236,12 +224,12 @@ impl Clock {
         Deadline { clock: Some(self.clone()) }
     }
 
-    /// Stops the clock while a binding does honest work in Rust (physics), until the guard is dropped.
+    /// Pauses the clock while a binding works in Rust (physics), until the guard is dropped.
     pub fn pause(&self) -> Pause {
         let mut state = lock(&self.state);
         if let Some(until) = state.until.take() {
             let entry = state.slot.take().and_then(|slot| watchdog().remove(slot));
-            state.stopped = Some((until.saturating_sub(used()), entry));
+            state.paused = Some((until.saturating_sub(thread_time()), entry));
             return Pause { clock: Some(self.clone()) };
         }
         Pause { clock: None }
@@ -263,14 +251,14 @@ impl Drop for Deadline {
         let Some(clock) = &self.clock else { return };
         let mut state = lock(&clock.state);
         state.until = None;
-        state.stopped = None;
+        state.paused = None;
         if let Some(slot) = state.slot.take() {
             watchdog().remove(slot);
         }
     }
 }
 
-/// A stopped clock; see [`Clock::pause`].
+/// A paused clock; see [`Clock::pause`].
 #[must_use]
 pub struct Pause {
     clock: Option<Clock>,
@@ -280,8 +268,8 @@ impl Drop for Pause {
     fn drop(&mut self) {
         let Some(clock) = &self.clock else { return };
         let mut state = lock(&clock.state);
-        let Some((left, entry)) = state.stopped.take() else { return };
-        state.until = Some(used() + left);
+        let Some((left, entry)) = state.paused.take() else { return };
+        state.until = Some(thread_time() + left);
         let (beat, wait) = (state.beat, left + state.grace);
         state.slot = entry.map(|alarm| {
             let (at, alarm) = alarm.set(beat, wait);
@@ -296,10 +284,10 @@ mod tests {
 
     const LIMIT: Duration = Duration::from_millis(60);
 
-    /// Keeps this thread's processor busy for so long.
-    fn toil(time: Duration) {
-        let start = used();
-        while used() - start < time {
+    /// Keeps this thread's processor busy for a time.
+    fn busy(time: Duration) {
+        let start = thread_time();
+        while thread_time() - start < time {
             std::hint::spin_loop();
         }
     }
@@ -314,38 +302,38 @@ mod tests {
     }
 
     #[test]
-    fn only_the_scripts_own_processor_time_counts() {
-        assert!(outcome(|_| toil(2 * LIMIT)).is_err());
+    fn only_processor_time_of_the_script_counts() {
+        assert!(outcome(|_| busy(2 * LIMIT)).is_err());
         let paused = |clock: &Clock| {
             let _pause = clock.pause();
-            toil(2 * LIMIT);
+            busy(2 * LIMIT);
         };
-        assert!(outcome(paused).is_ok(), "a binding's work with the clock stopped");
+        assert!(outcome(paused).is_ok(), "a binding's work with the clock paused");
         assert!(outcome(|_| thread::sleep(2 * LIMIT)).is_ok(), "others had the processor");
     }
 
     #[test]
-    fn the_watchdog_spares_who_shows_life_and_barks_at_who_does_not() {
+    fn the_watchdog_acts_only_if_the_hook_does_not_run() {
         let stuck = Arc::new(Mutex::new(false));
         let (clock, seen) = (Clock::default(), stuck.clone());
         let _deadline = clock.start(LIMIT, LIMIT, "x.lua", Arc::new(move |_| *lock(&seen) = true));
-        // What the hook of a slow script does on a busy machine, for five times as long as the watchdog waits.
+        // As the hook of a slow script does on a busy machine, for five times as long as the watchdog waits.
         for _ in 0..100 {
             let _ = clock.expired();
-            toil(LIMIT / 10);
+            busy(LIMIT / 10);
         }
         assert!(!*lock(&stuck));
-        toil(4 * LIMIT);
+        busy(4 * LIMIT);
         // It may have to wait for the processor itself.
-        let patience = Instant::now() + 100 * LIMIT;
-        while !*lock(&stuck) && Instant::now() < patience {
-            toil(LIMIT);
+        let timeout = Instant::now() + 100 * LIMIT;
+        while !*lock(&stuck) && Instant::now() < timeout {
+            busy(LIMIT);
         }
         assert!(*lock(&stuck));
     }
 
     #[test]
-    fn the_watchdog_waits_while_others_have_the_processor() {
+    fn the_watchdog_waits_while_other_threads_have_the_processor() {
         // Other tests of this process use the processor too: an hour is more than they do.
         let hour = Duration::from_secs(3600);
         let (clock, woken) = (Clock::default(), Arc::new(Mutex::new(false)));
@@ -353,12 +341,12 @@ mod tests {
         let _deadline = clock.start(LIMIT, LIMIT, "x.lua", Arc::new(move |_| *lock(&seen) = true));
         let slot = lock(&clock.state).slot.expect("an alarm");
         let alarm = watchdog().remove(slot).expect("not rung yet");
-        Alarm { not_before: used_by_all() + hour, ..alarm }.ring();
+        Alarm { not_before: process_time() + hour, ..alarm }.ring();
         assert!(!*lock(&woken) && lock(&clock.state).slot.is_some_and(|slot| slot.0 > Instant::now()));
     }
 
     #[test]
-    fn a_deadline_that_was_met_never_wakes_the_watchdog() {
+    fn met_deadlines_never_trigger_the_watchdog() {
         let woken = Arc::new(Mutex::new(false));
         let seen = woken.clone();
         drop(Clock::default().start(LIMIT, LIMIT, "x.lua", Arc::new(move |_| *lock(&seen) = true)));

@@ -1,0 +1,190 @@
+//! Input and output of experts at a control step: the true state of the simulation, and a command.
+
+use std::sync::Arc;
+
+use crate::{
+    benchmark::control::CONTROL_DT,
+    geometry::{Aabb, Pose, Vec3},
+    robot::ik::{PoseError, PoseTolerance, UnreachablePose},
+    rollout::{ObjectInstance, Simulation},
+    scene::Asset,
+};
+
+/// True state of an object.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ObjectView {
+    /// Name in the scene.
+    pub name: String,
+    pub asset: Arc<Asset>,
+    /// Object frame in the world.
+    pub pose_w: Pose,
+    /// Bounds of its shape at rest, object frame.
+    pub bounds: Aabb,
+    /// Centre of its bounding box, world frame, m.
+    pub centre_w: Vec3,
+    /// Rotation about the vertical, rad.
+    pub yaw: f64,
+    /// Joint value of a part, m or rad.
+    pub joint: Option<f64>,
+    pub parts: Vec<ObjectView>,
+}
+
+/// True state of the scene at a control step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExpertView {
+    /// Time since the start, s.
+    pub time_s: f64,
+    /// Length of a control step, s.
+    pub dt_s: f64,
+    /// Robot base in the world.
+    pub base_w: Pose,
+    /// Tool centre point in the robot base frame.
+    pub tcp_b: Pose,
+    /// Distance of the gels, m.
+    pub width_m: f64,
+    /// Last commanded closure: 0 is open, 1 is closed.
+    pub closure: f64,
+    /// Normal force on the left and the right pad, N.
+    pub pad_force_n: [f64; 2],
+    /// The objects, in the order of the scene.
+    pub objects: Vec<ObjectView>,
+}
+
+/// Command of an expert for one control step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ExpertCommand {
+    /// Tool centre point in the robot base frame.
+    pub pose_b: Pose,
+    /// Closure: 0 is open, 1 is closed.
+    pub closure: f64,
+    /// True while the gripper should hold an object: the command of a binary gripper.
+    pub gripping: bool,
+}
+
+/// A source of one command per control step.
+pub(crate) trait Planner {
+    type Error;
+    /// The next command; `None` at the end.
+    fn step(&mut self, view: &ExpertView) -> Result<Option<ExpertCommand>, Self::Error>;
+    /// Ends the planner with an error that says `complaint`.
+    fn refuse(&mut self, complaint: &str) -> Self::Error;
+}
+
+/// Input of a planner at a control step, with a complaint about its last command if the arm cannot reach it.
+pub(crate) struct ExpertInput {
+    view: ExpertView,
+    complaint: Option<String>,
+}
+
+impl ExpertInput {
+    /// Copies the true state of a simulation.
+    pub(crate) fn new(sim: &Simulation, time_s: f64, monitor: &mut TrackingErrorMonitor) -> Self {
+        Self { view: expert_view(sim, time_s), complaint: monitor.complaint(sim) }
+    }
+}
+
+/// Returns the next command of a planner, or an error if the arm could not follow the last one.
+pub(crate) fn next_command<P: Planner>(
+    planner: &mut P,
+    input: ExpertInput,
+    monitor: &mut TrackingErrorMonitor,
+) -> Result<Option<ExpertCommand>, P::Error> {
+    if let Some(complaint) = input.complaint {
+        return Err(planner.refuse(&complaint));
+    }
+    let command = planner.step(&input.view)?;
+    if let Some(command) = &command {
+        monitor.command_b = Some(command.pose_b);
+    }
+    Ok(command)
+}
+
+fn expert_view(sim: &Simulation, time_s: f64) -> ExpertView {
+    ExpertView {
+        time_s,
+        dt_s: CONTROL_DT,
+        base_w: sim.robot.base_w,
+        tcp_b: sim.robot.tool_b(&sim.world),
+        width_m: sim.robot.width(&sim.world),
+        closure: sim.robot.closure(),
+        pad_force_n: sim
+            .objects
+            .iter()
+            .map(|object| sim.pad_contacts(object))
+            .fold([0.0; 2], |sum, pads| [sum[0] + pads[0].normal_force, sum[1] + pads[1].normal_force]),
+        objects: (0..sim.objects.len())
+            .filter(|&index| sim.objects[index].part.is_none())
+            .map(|index| ObjectView {
+                parts: sim.parts(index).map(|(part, spec)| object_view(sim, part, &spec.name)).collect(),
+                ..object_view(sim, &sim.objects[index], &sim.objects[index].name)
+            })
+            .collect(),
+    }
+}
+
+fn object_view(sim: &Simulation, object: &ObjectInstance, name: &str) -> ObjectView {
+    let pose = sim.pose(object);
+    let bounds = object.bounds;
+    let centre_w = (pose * nalgebra::Point3::from(bounds.centre())).coords;
+    let x = pose.rotation * Vec3::x();
+    ObjectView {
+        name: name.to_owned(),
+        asset: object.asset.clone(),
+        pose_w: pose,
+        bounds,
+        centre_w,
+        yaw: x.y.atan2(x.x),
+        joint: sim.joint(object),
+        parts: Vec::new(),
+    }
+}
+
+/// Tracking error beyond which the tool counts as away from its command.
+const TRACKING_LIMIT: PoseTolerance = PoseTolerance { distance: 0.02, angle: 0.2 };
+
+/// Control steps beyond [`TRACKING_LIMIT`] before the command's reachability is searched, which takes tens of milliseconds.
+/// A fast motion lags for fewer steps, and its command is found to be reachable otherwise.
+const MAX_LAG_STEPS: u32 = 20;
+
+/// Detects commands that the arm cannot reach. A policy may command anything; in a script it is a mistake.
+#[derive(Debug, Default)]
+pub(crate) struct TrackingErrorMonitor {
+    /// Last command, robot base frame.
+    command_b: Option<Pose>,
+    /// Control steps for which the tool has been away from its commands.
+    steps: u32,
+}
+
+impl TrackingErrorMonitor {
+    /// A complaint for the script once the tool has been away for a second from a pose that it cannot reach.
+    fn complaint(&mut self, sim: &Simulation) -> Option<String> {
+        let command_b = self.command_b?;
+        let error = PoseError::between(&sim.robot.tool_b(&sim.world), &command_b);
+        self.steps = if TRACKING_LIMIT.contains(&error) { 0 } else { self.steps + 1 };
+        if self.steps < MAX_LAG_STEPS {
+            return None;
+        }
+        self.steps = 0;
+        let miss = sim.robot.solve_ik(&sim.world, &command_b).err()?;
+        let is_away = miss.distance > TRACKING_LIMIT.distance || miss.angle > TRACKING_LIMIT.angle;
+        is_away.then(|| unreachable_message(&miss, &sim.robot.base_w))
+    }
+}
+
+/// Positions are in the world frame, as in scripts.
+fn unreachable_message(miss: &UnreachablePose, base_w: &Pose) -> String {
+    let target = base_w.transform_point(&miss.target_b.into());
+    let base = base_w.translation.vector;
+    format!(
+        "unreachable pose: the tool gets no nearer to ({:.3}, {:.3}, {:.3}) m than {:.0} mm and {:.0}°; bring it nearer to \
+         the robot's base at ({:.3}, {:.3}, {:.3}) m or turn it towards straight down",
+        target.x,
+        target.y,
+        target.z,
+        miss.distance * 1e3,
+        miss.angle.to_degrees(),
+        base.x,
+        base.y,
+        base.z
+    )
+}

@@ -1,0 +1,164 @@
+//! Policies and profiles: the tables that their files return.
+
+use mlua::Function;
+
+use crate::{
+    policy::{decode::MAX_CHUNK_LEN, profile::StatePart},
+    robot::Side,
+    script::schema::{Range, RecordType, Type, choice, object::Constructor, record},
+    sensing::tactile::MosaicLayout,
+};
+
+const STEP: Type = Type::Number("", Range { max: 10.0, ..Range::POSITIVE });
+
+record! {
+    /// The observations of a policy; nothing else is computed.
+    ObservesSpec: "softvt.Observes" as "policy.observes" {
+        /// Names of cameras of the scene.
+        cameras: Option<Vec<String>> = Type::List(&Type::Name);
+        /// True to get the tactile images and markers of the fingers.
+        touch: bool => Boolean(false);
+        /// True to get the true forces on the gels, which no real sensor gives; results then say force_observed.
+        force: bool => Boolean(false);
+    }
+    /// A policy, as the file given to --policy returns it. Every episode has a virtual machine of its own, in which the
+    /// file runs again; math.random is seeded by the episode.
+    PolicySpec: "softvt.Policy" as "policy", constructor "softvt.policy" {
+        /// Name in results, unless --name gives another.
+        name: String = Type::Name;
+        /// Observations of the policy.
+        observes: ObservesSpec;
+        /// Called when the episode begins.
+        reset: Option<Function> = Type::Function("fun(task: softvt.Brief)");
+        /// Returns the action of this control step, or a list of actions for the next ones.
+        act: Function = Type::Function("fun(obs: softvt.Observation): softvt.Action|softvt.Action[]");
+        /// Number of actions of a list that are executed before act is called again, unless --replan gives another; all
+        /// by default.
+        replan: Option<usize> = Type::Integer(Range::closed(1.0, MAX_CHUNK_LEN as f64));
+    }
+    /// A command for one control step (0.05 s): a pose of the tool centre point in the robot's base frame, and a closure.
+    /// Give either axis_angle or rotation.
+    ActionSpec: "softvt.Action" as "action" {
+        /// Position.
+        position: [f64; 3] = Type::Vector(3, "m, base frame");
+        /// Orientation as axis-angle.
+        axis_angle: Option<[f64; 3]> = Type::Vector(3, "rad, base frame");
+        /// Orientation as quaternion.
+        rotation: Option<[f64; 4]> = Type::Vector(4, "w, x, y, z, base frame");
+        /// Gripper closure: 0 is open, 1 is closed.
+        closure: f64 = Type::Number("", Range::closed(0.0, 1.0));
+    }
+    /// One entry of the observations that are sent to a policy server.
+    InputSpec: "softvt.Input" as "profile.inputs" {
+        /// Keys under which it is sent.
+        keys: Vec<String>;
+        /// Content: the image of a camera; numbers of the robot's state; the prompt; the mosaic of 8 tactile images of both
+        /// fingers; the latest image of one finger; the first and the last 8 marker positions; the last 8 true forces on
+        /// the gels.
+        source: InputKind;
+        /// For camera: its name in the scene.
+        camera: Option<String> = Type::Name;
+        /// For camera: true to rotate the image by 180°.
+        half_turn: Option<bool>;
+        /// For state: its parts in order, of 3, 3, 4, 4, 7, 1, 1, 2 and 1 numbers, in m and rad in the base frame.
+        parts: Option<Vec<StatePart>>;
+        /// For tactile_image: the left finger above the right one (rows, the default) or left of it.
+        layout: Option<MosaicLayout>;
+        /// For tactile: the finger.
+        finger: Option<Side>;
+    }
+    /// The seventh number of an action. Values between open and closed close in proportion.
+    GripperValuesSpec: "softvt.GripperValues" as "profile.actions.gripper" {
+        /// Value that opens the gripper.
+        open: f64;
+        /// Value that closes it.
+        closed: f64;
+        /// True if every value beyond the middle closes, and any other opens.
+        binary: bool => Boolean(false);
+    }
+    /// The meaning of the numbers of an action: three of position, three of orientation (axis-angle), one of the gripper;
+    /// further ones are padding.
+    ActionEncodingSpec: "softvt.ActionEncoding" as "profile.actions" {
+        /// absolute: a pose in the base frame. delta: shares -1 to 1 of a step away from the tool's pose. delta_osc: the
+        /// same, reduced to what robosuite's controller reaches within a control step.
+        pose: PoseKind;
+        /// For delta and delta_osc: the step of a share of 1, m.
+        translation_m: Option<f64> = STEP;
+        /// For delta and delta_osc: the rotation of a share of 1, rad.
+        rotation_rad: Option<f64> = STEP;
+        /// Factors on the first six numbers, applied first.
+        scale: Option<[f64; 6]>;
+        /// Offsets added after that.
+        offset: Option<[f64; 6]>;
+        /// Length that an action must have, padding included; any from 7 by default.
+        length: Option<usize> = Type::Integer(Range::closed(7.0, 4096.0));
+        /// The seventh number.
+        gripper: GripperValuesSpec;
+    }
+    /// The messages of a policy server: the observations it gets and the meaning of its actions. The file given to --profile
+    /// returns one.
+    ProfileSpec: "softvt.Profile" as "profile", constructor "softvt.profile" {
+        /// Name in results, unless --name gives another.
+        name: String = Type::Name;
+        /// Observations that are sent, in order.
+        inputs: Vec<InputSpec>;
+        /// Meaning of the actions.
+        actions: ActionEncodingSpec;
+    }
+}
+
+/// The content of an input.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum InputKind {
+    Camera,
+    State,
+    Prompt,
+    TactileImage,
+    Tactile,
+    MarkerMotion,
+    Force,
+}
+
+choice! {
+    InputKind {
+        "camera" => InputKind::Camera,
+        "state" => InputKind::State,
+        "prompt" => InputKind::Prompt,
+        "tactile_image" => InputKind::TactileImage,
+        "tactile" => InputKind::Tactile,
+        "marker_motion" => InputKind::MarkerMotion,
+        "force" => InputKind::Force,
+    }
+}
+
+choice! { MosaicLayout { "rows" => MosaicLayout::Rows, "columns" => MosaicLayout::Columns } }
+choice! {
+    StatePart {
+        "position" => StatePart::Position,
+        "axis_angle" => StatePart::AxisAngle,
+        "quaternion_wxyz" => StatePart::QuaternionWxyz,
+        "quaternion_xyzw" => StatePart::QuaternionXyzw,
+        "joints" => StatePart::Joints,
+        "gripper_width" => StatePart::GripperWidth,
+        "finger_position" => StatePart::FingerPosition,
+        "finger_pair" => StatePart::FingerPair,
+        "closure" => StatePart::Closure,
+    }
+}
+
+/// The reference of an action's pose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum PoseKind {
+    Absolute,
+    Delta,
+    DeltaOsc,
+}
+
+choice! {
+    PoseKind {
+        "absolute" => PoseKind::Absolute, "delta" => PoseKind::Delta, "delta_osc" => PoseKind::DeltaOsc,
+    }
+}
+
+pub(crate) static CONSTRUCTORS: &[Constructor] =
+    &[Constructor::of(PolicySpec::RECORD), Constructor::of(ProfileSpec::RECORD)];

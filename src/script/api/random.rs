@@ -1,0 +1,84 @@
+//! Named streams of random numbers: the `rng` that layouts get.
+
+use std::sync::{Arc, Mutex};
+
+use mlua::{Lua, Table, Value};
+use rand_chacha::ChaCha8Rng;
+
+use crate::{
+    benchmark::seed::{self, EpisodeSeed, RandomStream},
+    parallel::lock,
+    script::{
+        schema::{Type, class},
+        vm::error::fail,
+    },
+};
+
+/// `softvt.Rng`.
+#[derive(Clone)]
+pub(crate) struct LuaRng {
+    seed: EpisodeSeed,
+    draws: Arc<Mutex<ChaCha8Rng>>,
+}
+
+impl LuaRng {
+    pub(crate) fn new(seed: EpisodeSeed, stream: RandomStream) -> Self {
+        Self { draws: Arc::new(Mutex::new(seed.stream(stream))), seed }
+    }
+}
+
+/// A draw that did not overflow.
+fn finite(lua: &Lua, method: &str, value: f64) -> mlua::Result<f64> {
+    match value.is_finite() {
+        true => Ok(value),
+        false => {
+            Err(fail(lua, format!("rng:{method}: the range is too wide for a number; give smaller bounds")))
+        }
+    }
+}
+
+class! {
+    /// A named stream of random numbers, determined by suite, layout, episode, seed and split.
+    LuaRng: "softvt.Rng" {
+        label(_) { "rng".to_owned() }
+        methods {
+            /// Returns another stream, from its start. Draws from one stream do not change those from another.
+            fn stream(_, this, name: String = Type::Choice(&[
+                "layout", "arm", "material", "light", "camera", "sensor", "expert", "script", "policy",
+            ])) -> ["softvt.Rng"] {
+                let stream = RandomStream::ALL.into_iter().find(|stream| stream.name() == name);
+                stream.map(|stream| LuaRng::new(this.seed.clone(), stream))
+            }
+            /// Returns a number uniformly distributed from low (included) to high (excluded).
+            fn uniform(lua, this, low: f64, high: f64) -> ["number"] {
+                finite(lua, "uniform", low + (high - low) * seed::uniform(&mut lock(&this.draws)))?
+            }
+            /// Returns a normally distributed number; sigma is the standard deviation.
+            fn normal(lua, this, mean: f64, sigma: f64) -> ["number"] {
+                finite(lua, "normal", mean + sigma * seed::standard_normal(&mut lock(&this.draws)))?
+            }
+            /// Returns a whole number from low to high, both included.
+            fn int(lua, this, low: i64, high: i64) -> ["integer"] {
+                if low > high {
+                    return Err(fail(lua, format!("rng:int: the range {low}..{high} is empty")));
+                }
+                seed::uniform_integer(&mut lock(&this.draws), low, high)
+            }
+            /// Returns one entry of a list.
+            fn choice(lua, this, list: Table = Type::List(&Type::Any)) -> ["any"] {
+                if list.raw_len() == 0 {
+                    return Err(fail(lua, "rng:choice: the list is empty"));
+                }
+                list.raw_get::<Value>(seed::uniform_integer(&mut lock(&this.draws), 1, list.raw_len() as i64))?
+            }
+            /// Returns a copy of a list in random order.
+            fn shuffle(lua, this, list: Table = Type::List(&Type::Any)) -> ["any[]"] {
+                let mut values: Vec<Value> = list.sequence_values().collect::<mlua::Result<_>>()?;
+                for last in (1..values.len()).rev() {
+                    values.swap(last, seed::uniform_integer(&mut lock(&this.draws), 0, last as i64) as usize);
+                }
+                lua.create_sequence_from(values)?
+            }
+        }
+    }
+}

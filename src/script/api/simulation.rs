@@ -1,0 +1,417 @@
+//! Simulations: a settled scene with the robot, for calibrations and other experiments.
+
+use std::sync::{Arc, Mutex};
+
+use mlua::{Function, Lua, Table, Value};
+
+use super::{
+    cameras::IMAGE_EDGE,
+    expert::{Coroutine, FingerAccess},
+    expert_input::{ExpertCommand, ExpertInput, ExpertView, Planner, TrackingErrorMonitor, next_command},
+    image::LuaImage,
+    random::LuaRng,
+    scene::{LuaScene, empty_scene},
+    tasks::{EXPERT, LayoutSpec, SETTINGS},
+    touch::{FingerReadings, LuaMarkers, positions},
+};
+use crate::{
+    benchmark::{
+        control::steps_per_control,
+        seed::{EpisodeSeed, RandomStream, Split},
+        settings::Settings,
+    },
+    evaluation::deformation::ReferenceShape,
+    geometry::{Pose, Vec3},
+    parallel::lock,
+    physics::BodyId,
+    robot::{Side, rotation},
+    rollout::{AssetCache, SensingError, SensorAssets, SensorSuite, Simulation, cancel},
+    script::{
+        schema::{Made, Range, Type, choice, class, functions, output, record},
+        vm::{
+            clock,
+            error::fail,
+            json::deserialize,
+            memory_budget::{Reservation, reserve_in_world},
+            value::finite,
+            watchdog::Clock,
+        },
+    },
+    sensing::tactile::{MarkerStyle, PadWrench, TactileReading},
+    text::unknown_name,
+};
+
+const EPISODE: Type = Type::Integer(Range::closed(0.0, 1e9));
+
+/// Approximate memory of a simulation without its soft bodies: the robot, its sensors, fixed objects.
+const BYTES_PER_SIMULATION: usize = 4 << 20;
+
+choice! { Side { "left" => Side::Left, "right" => Side::Right } }
+
+record! {
+    /// A scene with the robot, which is built and settled. Deformation refers to the settled shapes.
+    SimulateSpec: "softvt.SimulateSpec" as "softvt.simulate" {
+        /// Initial scene.
+        layout: Made<LayoutSpec>;
+        /// Part of the seed.
+        suite: String => Text("experiment");
+        /// Part of the seed.
+        episode: u64 = EPISODE => Integer(0);
+        /// Part of the seed.
+        seed: u64 = EPISODE => Integer(0);
+        /// Changed settings of physics, robot and judge: { physics = {…}, robot = {…}, criteria = {…} }.
+        settings: Option<Table> = SETTINGS;
+    }
+    /// The camera of an image and its size.
+    RenderSpec: "softvt.Render" as "simulation:render" {
+        /// A camera of the scene.
+        camera: String = Type::Name => Text("third_person");
+        /// Width, pixels; the camera's by default.
+        width: Option<usize> = IMAGE_EDGE;
+        /// Height, pixels; the camera's by default.
+        height: Option<usize> = IMAGE_EDGE;
+    }
+}
+
+/// Reads a table of settings; `label` names it in messages.
+pub(crate) fn settings(lua: &Lua, label: &str, table: Option<&Table>) -> mlua::Result<Settings> {
+    let Some(table) = table else { return Ok(Settings::default()) };
+    let settings: Settings = deserialize(lua, label, &Value::Table(table.clone()))?;
+    settings.check().map_err(|e| fail(lua, format!("{label}: {e}")))?;
+    Ok(settings)
+}
+
+/// Measurements of an object since the simulation has settled.
+struct Record {
+    settled: Option<ReferenceShape>,
+    d_peak_pct: f64,
+    start_z: f64,
+}
+
+/// A simulation with the measurements of its objects.
+pub(crate) struct SimulationState {
+    sim: Simulation,
+    records: Vec<Record>,
+    physics_steps: u64,
+    failed: Option<String>,
+    clock: Clock,
+    sensors: SensorSuite,
+    _reserved: Reservation,
+}
+
+/// Results that the simulations of one virtual machine share.
+#[derive(Default)]
+struct Caches {
+    assets: AssetCache,
+    sensors: SensorAssets,
+}
+
+fn simulate(lua: &Lua, spec: SimulateSpec) -> mlua::Result<LuaSimulation> {
+    let settings = settings(lua, "softvt.simulate: settings", spec.settings.as_ref())?;
+    let seed = EpisodeSeed {
+        suite: spec.suite,
+        layout: spec.layout.name.clone(),
+        episode: spec.episode,
+        base: spec.seed,
+        split: Split::Experiment,
+    };
+    let scene = LuaScene::new(empty_scene());
+    spec.layout.build.call::<()>((scene.clone(), LuaRng::new(seed, RandomStream::Layout)))?;
+    let scene = Arc::new(lock(&scene.scene).clone());
+    let clock = clock(lua);
+    let _pause = clock.pause();
+    if lua.app_data_ref::<Caches>().is_none() {
+        lua.set_app_data(Caches::default());
+    }
+    let caches = lua.app_data_ref::<Caches>().ok_or_else(|| mlua::Error::runtime("no caches"))?;
+    let mut sim = Simulation::new(scene, &settings.physics, &settings.robot, &caches.assets)
+        .map_err(|e| fail(lua, format!("softvt.simulate: {e}")))?;
+    let soft_bytes: usize = sim.world.soft_bodies().iter().map(|soft| soft.state.model.bytes()).sum();
+    let reserved = reserve_in_world(lua, BYTES_PER_SIMULATION + soft_bytes)?;
+    sim.settle().map_err(|e| {
+        let place = e.place().map_or(String::new(), |place| format!("{place}: "));
+        fail(lua, format!("softvt.simulate: {place}{e}"))
+    })?;
+    let records = sim.objects.iter().map(|object| Record {
+        settled: match object.body {
+            BodyId::Soft(id) => {
+                let body = &sim.world.soft(id).state;
+                ReferenceShape::new(&body.x, &body.model.mass).ok()
+            }
+            _ => None,
+        },
+        d_peak_pct: 0.0,
+        start_z: sim.centre(object).z,
+    });
+    let records = records.collect();
+    let sensors = SensorSuite::new(&sim, &settings.tactile, &caches.sensors);
+    let inner = SimulationState {
+        sim,
+        records,
+        physics_steps: 0,
+        failed: None,
+        clock: clock.clone(),
+        sensors,
+        _reserved: reserved,
+    };
+    Ok(LuaSimulation(Arc::new(Mutex::new(inner))))
+}
+
+functions! {
+    FUNCTIONS {
+        /// Builds a scene with the robot and lets it settle.
+        fn simulate(lua, spec: SimulateSpec) -> ["softvt.Simulation"] { simulate(lua, spec)? }
+    }
+}
+
+impl SimulationState {
+    fn time(&self) -> f64 {
+        self.physics_steps as f64 * self.sim.world.params.dt
+    }
+
+    /// Makes one control step; returns false once the physics has failed.
+    fn control_step(&mut self, command: Option<&ExpertCommand>) -> bool {
+        if cancel::requested() {
+            self.failed = Some("interrupted".into());
+        }
+        if let Some(ExpertCommand { pose_b, closure, .. }) = command {
+            self.sim.robot.command(&mut self.sim.world, pose_b, *closure);
+        }
+        let _pause = self.clock.pause();
+        for _ in 0..steps_per_control(self.sim.world.params.dt) {
+            if self.failed.is_some() {
+                return false;
+            }
+            self.physics_steps += 1;
+            if let Err(failure) = self.sim.step() {
+                self.failed = Some(failure.to_string());
+                return false;
+            }
+            for index in 0..self.records.len() {
+                if let Some(d) = self.deformation_pct(index) {
+                    let record = &mut self.records[index];
+                    record.d_peak_pct = record.d_peak_pct.max(d);
+                }
+            }
+        }
+        true
+    }
+
+    fn deformation_pct(&self, object: usize) -> Option<f64> {
+        let BodyId::Soft(id) = self.sim.objects[object].body else { return None };
+        let settled = self.records[object].settled.as_ref()?;
+        settled.measure(&self.sim.world.soft(id).state.x).ok().map(|d| d.rms_pct)
+    }
+
+    fn finger_readings(&mut self, lua: &Lua) -> mlua::Result<FingerReadings> {
+        let frame = SensorSuite::frame(&self.sim);
+        let readings = self.sensors.tactile_frames(&frame);
+        readings.map(Arc::new).map_err(|e| fail(lua, format!("arm:tactile: {e}")))
+    }
+
+    /// True, or false and the reason of a failure.
+    fn outcome(&self) -> (bool, Option<String>) {
+        (self.failed.is_none(), self.failed.clone())
+    }
+}
+
+/// An expert that runs in the virtual machine of its simulation.
+struct InPlace<'a> {
+    run: Coroutine,
+    lua: &'a Lua,
+}
+
+impl Planner for InPlace<'_> {
+    type Error = mlua::Error;
+
+    fn step(&mut self, view: &ExpertView) -> mlua::Result<Option<ExpertCommand>> {
+        self.run.step(self.lua, view)
+    }
+
+    fn refuse(&mut self, complaint: &str) -> mlua::Error {
+        self.run.refuse(self.lua, complaint)
+    }
+}
+
+/// `softvt.Simulation`.
+#[derive(Clone)]
+pub(crate) struct LuaSimulation(Arc<Mutex<SimulationState>>);
+
+impl LuaSimulation {
+    /// Runs an expert to its end.
+    fn drive(&self, lua: &Lua, expert: Function) -> mlua::Result<(bool, Option<String>)> {
+        let mut expert = InPlace { run: Coroutine::new(expert, FingerAccess::Readings), lua };
+        let mut monitor = TrackingErrorMonitor::default();
+        loop {
+            // The expert may call the simulation itself, so it must not be locked while the expert runs.
+            let input = {
+                let mut inner = lock(&self.0);
+                let clock = inner.clock.clone();
+                let _pause = clock.pause();
+                let readings = expert.run.wants_readings.then(|| inner.finger_readings(lua)).transpose()?;
+                expert.run.set_readings(readings);
+                ExpertInput::new(&inner.sim, inner.time(), &mut monitor)
+            };
+            let Some(command) = next_command(&mut expert, input, &mut monitor)? else { break };
+            if !lock(&self.0).control_step(Some(&command)) {
+                break;
+            }
+        }
+        match &expert.run.gave_up {
+            Some(reason) => Ok((false, Some(format!("the expert gave up: {reason}")))),
+            None => Ok(lock(&self.0).outcome()),
+        }
+    }
+
+    fn render(&self, lua: &Lua, spec: &RenderSpec) -> mlua::Result<LuaImage> {
+        let wrong = |e: SensingError| fail(lua, format!("simulation:render: {e}"));
+        let mut inner = lock(&self.0);
+        let SimulationState { sim, sensors, clock, physics_steps, .. } = &mut *inner;
+        let _pause = clock.pause();
+        let mut camera = sensors.camera(&spec.camera).map_err(wrong)?.clone();
+        camera.width = spec.width.unwrap_or(camera.width);
+        camera.height = spec.height.unwrap_or(camera.height);
+        let frame = SensorSuite::frame(sim);
+        // A camera inside of an object is a mistake of the layout, unless something has moved since.
+        let image = if *physics_steps == 0 {
+            sensors.render_unobstructed(&frame, &camera)
+        } else {
+            sensors.render(&frame, &camera)
+        };
+        LuaImage::new(lua, image.map_err(wrong)?.into_rgb_image())
+    }
+
+    fn tactile(&self, lua: &Lua, side: Side) -> mlua::Result<Table> {
+        let mut inner = lock(&self.0);
+        let SimulationState { sim, sensors, clock, .. } = &mut *inner;
+        let _pause = clock.pause();
+        let frame = SensorSuite::frame(sim);
+        let reading = sensors
+            .tactile_reading(&frame, side)
+            .map_err(|e| fail(lua, format!("simulation:tactile: {e}")))?;
+        let wrench = frame.patches.get(side as usize).map_or(PadWrench::default(), PadWrench::from_patch);
+        tactile_table(lua, reading, wrench.force)
+    }
+
+    fn measure(&self, lua: &Lua, name: &str) -> mlua::Result<Table> {
+        let inner = lock(&self.0);
+        let _pause = inner.clock.pause();
+        let names = inner.sim.objects.iter().map(|object| object.name.as_str());
+        match inner.sim.objects.iter().position(|object| object.name == name) {
+            Some(index) => measurements(lua, &inner, index),
+            None => Err(fail(lua, format!("simulation:measure: {}", unknown_name("object", name, names)))),
+        }
+    }
+}
+
+output! {
+    /// The tactile sensor of a finger, with the true force on its gel; docs/tactile.md draws its frames.
+    fn tactile_table(lua, reading: TactileReading, force: Vec3) -> "softvt.TactileReading" as "reading" {
+        /// Colour image, 320 × 240.
+        image: "softvt.Image" = LuaImage::new(lua, reading.image.clone())?;
+        /// The image with its markers as dots.
+        dots: "softvt.Image" = LuaImage::new(lua, reading.with_markers(MarkerStyle::Dots))?;
+        /// The image with the displacements of its markers as lengthened arrows.
+        arrows: "softvt.Image" = LuaImage::new(lua, reading.with_markers(MarkerStyle::Arrows))?;
+        /// Positions of the 99 markers on the untouched gel, px, row by row.
+        initial: "number[][]" = positions(lua, &reading.markers.initial)?;
+        /// Their present positions, px.
+        present: "number[][]" = positions(lua, &reading.markers.current)?;
+        /// The markers with the measures of their displacements.
+        markers: "softvt.Markers" = LuaMarkers::new(reading.markers);
+        /// True force on the gel, N, pad frame; a pressing body makes z negative.
+        force: "number[]" = lua.create_sequence_from(force.iter().copied())?;
+        /// Largest depth of the indentation, mm.
+        depth_mm: "number" = reading.field.as_ref().map_or(0.0, |field| 1e3 * field.depth());
+    }
+}
+
+output! {
+    /// Measurements of an object. Fields that do not apply to it are nil.
+    fn measurements(lua, inner: &SimulationState, index: usize) -> "softvt.Measurements" as "measurements" {
+        /// Measured distance of the gels, m.
+        width_m: "number?" = finite(inner.sim.robot.width(&inner.sim.world));
+        /// Rise of the object's centre since settling, m.
+        height_m: "number?" = finite(inner.sim.centre(inner.object(index)).z - inner.records[index].start_z);
+        /// Speed; of a soft body that of its fastest node, m/s.
+        speed: "number?" = finite(inner.sim.speed(inner.object(index)));
+        /// Name of its asset.
+        asset: "string" = inner.object(index).asset.name.as_str();
+        /// Fingerprint of its asset.
+        fingerprint: "string" = inner.object(index).asset.fingerprint();
+        /// Joint value of a part, m or rad.
+        joint: "number?" = inner.sim.joint(inner.object(index));
+        /// Joint values of an articulated object by part, m or rad.
+        joints: "table<string, number>" = lua.create_table_from(
+            inner.sim.parts(index).map(|(instance, part)| (part.name.as_str(), inner.sim.joint(instance)))
+        )?;
+        /// Normal force of the left and the right pad on a movable object, N.
+        pad_force: "number[]?" = inner.pad_contacts(index).map(|pads| pads.map(|pad| pad.normal_force).to_vec());
+        /// Distance that a movable object has slid on the left and the right pad, mm.
+        slip_mm: "number[]?" = inner.pad_contacts(index).map(|pads| pads.map(|pad| 1e3 * pad.travel).to_vec());
+        /// Deformation D of a soft body, %.
+        d_pct: "number?" = inner.deformation_pct(index);
+        /// Largest D since settling, %.
+        d_peak_pct: "number?" = inner.soft_body(index).map(|_| inner.records[index].d_peak_pct);
+        /// Least det F of a filled element of a soft body.
+        min_det_f: "number?" = inner.soft_body(index).and_then(|body| finite(body.min_det_f().det_f));
+        /// True if a soft body sleeps.
+        asleep: "boolean?" = inner.soft_body(index).map(|body| body.is_asleep());
+    }
+}
+
+impl SimulationState {
+    fn object(&self, index: usize) -> &crate::rollout::ObjectInstance {
+        &self.sim.objects[index]
+    }
+
+    fn soft_body(&self, index: usize) -> Option<&crate::physics::world::SoftBody> {
+        match self.object(index).body {
+            BodyId::Soft(id) => Some(self.sim.world.soft(id)),
+            _ => None,
+        }
+    }
+
+    /// Contacts of the left and the right pad with a movable object.
+    fn pad_contacts(&self, index: usize) -> Option<[crate::physics::world::ContactSummary; 2]> {
+        let object = self.object(index);
+        object.body.is_free().then(|| self.sim.pad_contacts(object))
+    }
+
+    fn tool_pose(&self) -> Pose {
+        self.sim.robot.base_w * self.sim.robot.tool_b(&self.sim.world)
+    }
+}
+
+class! {
+    /// A settled scene with the robot.
+    LuaSimulation: "softvt.Simulation" {
+        label(_) { "simulation".to_owned() }
+        methods {
+            /// Runs an expert to its end. Returns false and the reason if it gave up or the physics failed.
+            fn drive(lua, this, expert: Function = EXPERT) -> ["boolean", "string?"] { this.drive(lua, expert)? }
+            /// Holds the last command for a time. Returns false and the reason if the physics failed.
+            fn wait(_, this, seconds: f64 = Type::Number("s", Range::closed(0.0, 600.0))) -> ["boolean", "string?"] {
+                let mut inner = lock(&this.0);
+                let until = inner.time() + seconds - 1e-9;
+                while inner.time() < until && inner.control_step(None) {}
+                inner.outcome()
+            }
+            /// Returns measurements of an object.
+            fn measure(lua, this, object: String) -> ["softvt.Measurements"] { this.measure(lua, &object)? }
+            /// Renders the image of a camera, by default third_person.
+            fn render(lua, this, spec: RenderSpec) -> ["softvt.Image"] { this.render(lua, &spec)? }
+            /// Returns the reading of a finger's tactile sensor, with the true force on its gel.
+            fn tactile(lua, this, side: Side) -> ["softvt.TactileReading"] { this.tactile(lua, side)? }
+            /// Returns the time since settling, s.
+            fn time(_, this) -> ["number"] { lock(&this.0).time() }
+            /// Returns the pose of the tool centre point in the world frame: position, m, and orientation as axis-angle,
+            /// rad.
+            fn tool(lua, this) -> ["number[]", "number[]"] {
+                let tool = lock(&this.0).tool_pose();
+                let list = |vector: Vec3| lua.create_sequence_from(vector.iter().copied());
+                (list(tool.translation.vector)?, list(rotation::axis_angle(&tool.rotation))?)
+            }
+        }
+    }
+}

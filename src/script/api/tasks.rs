@@ -1,0 +1,230 @@
+//! Plans: layouts, goals, tasks, shifts, suites, conditions and experiments.
+
+use std::collections::BTreeMap;
+
+use mlua::{Function, Lua, Table, Value};
+
+use crate::{
+    benchmark::{ObjectType, REFERENCE, Variation},
+    script::{
+        schema::{
+            Made, Range, Record, RecordType, Type, Unchecked, ValidationError, choice, error_at_key,
+            functions, make, object::Constructor, one_of, record,
+        },
+        vm::{error::fail, value::got},
+    },
+};
+
+/// Type of a layout's function.
+const BUILD: Type = Type::Function("fun(scene: softvt.Scene, rng: softvt.Rng)");
+/// Type of a task's expert.
+pub(crate) const EXPERT: Type = Type::Function("fun(arm: softvt.Arm, scene: softvt.View)");
+const HOLD: Type = Type::Number("s", Range::closed(0.0, 10.0));
+/// Type of a table of settings.
+pub(crate) const SETTINGS: Type = Type::Map(&Type::Map(&Type::Any));
+
+choice! { ObjectType { "deformable" => ObjectType::Deformable, "rigid" => ObjectType::Rigid } }
+choice! { Variation { "object" => Variation::Object, "spatial" => Variation::Spatial } }
+
+record! {
+    /// The layout of a scene. Tasks with the same layout name share their initial states.
+    LayoutSpec: "softvt.Layout" as "layout", constructor "softvt.layout" {
+        /// Name; part of the seed.
+        name: String;
+        /// Adds the objects to the scene.
+        build: Function = BUILD;
+    }
+    /// The object rests on the target, released, for a time.
+    OnSpec: "softvt.On" as "task.goal", constructor "softvt.on" {
+        /// Scene name of the object.
+        object: String;
+        /// Scene name of the target, or of a part of it (cabinet.top_drawer).
+        target: String;
+        /// Time that it must stay there.
+        hold_s: f64 = HOLD => Number(0.4);
+    }
+    /// The object rests inside the target's walls, released, for a time.
+    InsideSpec: "softvt.Inside" as "task.goal", constructor "softvt.inside" {
+        /// Scene name of the object.
+        object: String;
+        /// Scene name of the target, or of a part of it (cabinet.top_drawer).
+        target: String;
+        /// Time that it must stay there.
+        hold_s: f64 = HOLD => Number(0.4);
+    }
+    /// A task of a suite.
+    TaskSpec: "softvt.Task" as "task", constructor "softvt.task" {
+        /// Instruction for the policy.
+        prompt: String;
+        /// Initial scene.
+        layout: Made<LayoutSpec>;
+        /// Success criterion.
+        goal: GoalSpec;
+        /// A coroutine that solves the task with privileged state.
+        expert: Option<Function> = EXPERT;
+        /// Control steps (20 Hz) that the policy has; by default 500 in suites that vary layouts, 700 in those that vary
+        /// objects.
+        budget_steps: Option<u32> = Type::Integer(Range::closed(1.0, 100_000.0));
+    }
+    /// A change of the scene that a run can request with --shift name=value. Deformation limits stay nominal.
+    ShiftSpec: "softvt.Shift" as "shift", constructor "softvt.shift" {
+        /// Name on the command line.
+        name: String;
+        /// Unit of the value.
+        unit: String => Text("1");
+        /// Value that changes nothing.
+        default: f64;
+        /// Lowest value.
+        min: Option<f64>;
+        /// Highest value.
+        max: Option<f64>;
+        /// Changes the scene; may return another one.
+        apply: Function = Type::Function("fun(scene: softvt.Scene, value: number): softvt.Scene?");
+    }
+    /// A set of tasks that are reported together.
+    SuiteSpec: "softvt.Suite" as "suite", constructor "softvt.suite" {
+        /// Name in results; part of the seed.
+        name: String = Type::Name;
+        /// Mechanics of the objects.
+        object_type: ObjectType;
+        /// Difference between the tasks.
+        variation: Variation;
+        /// Default number of episodes per task.
+        episodes: u32 = Type::Integer(Range::closed(1.0, 1e6)) => Integer(5);
+        /// The tasks, in order.
+        tasks: Vec<Made<TaskSpec>>;
+        /// Changes of the scene that a run can request.
+        shifts: Option<Vec<Made<ShiftSpec>>>;
+        /// Changed settings of physics, robot and judge: { physics = {…}, robot = {…}, criteria = {…} }.
+        settings: Option<Table> = SETTINGS;
+    }
+    /// A difference between a run and its reference: other shifts or settings with the same tasks, initial states and
+    /// seeds.
+    ConditionSpec: "softvt.Condition" as "conditions.conditions" {
+        /// Name in the table of results and of the run folder.
+        name: String;
+        /// Shifts by name, as for --shift: { mass = 1.25 }.
+        shift: Option<BTreeMap<String, f64>>;
+        /// Settings by path, as for --set: { ["robot.gripper.effort"] = 20 }.
+        set: Option<Table> = Type::Map(&Type::OneOf(&[Type::Number("", Range::ANY), Type::Boolean, Type::Text]));
+        /// object_type of the suites that it applies to; others are not run, and their row says N/A.
+        only: Option<ObjectType>;
+    }
+    /// Runs suites as they are, then under each condition, and compares them episode by episode.
+    ConditionsSpec: "softvt.Conditions" as "conditions", constructor "softvt.conditions" {
+        /// Name in results.
+        name: String = Type::Name;
+        /// The suites, in order.
+        suites: Vec<Made<SuiteSpec>>;
+        /// The conditions, in order.
+        conditions: Vec<ConditionSpec>;
+    }
+    /// A function that is evaluated at points and returns rows of results. Give either grid or points.
+    ExperimentSpec: "softvt.Experiment" as "experiment", constructor "softvt.experiment" {
+        /// Name in results.
+        name: String = Type::Name;
+        /// Result of softvt.options, passed to the functions below as opt.
+        options: Option<Value>;
+        /// Values of each parameter. Every combination is run, names in alphabetical order, the last one fastest.
+        grid: Option<BTreeMap<String, Vec<Value>>>;
+        /// Returns the points instead of a grid.
+        points: Option<Function> = Type::Function("fun(opt: table): table[]");
+        /// Returns a row, or a list of rows, for one point. Points run in any order and on several threads.
+        run: Function = Type::Function("fun(point: table, opt: table): table|table[]");
+        /// Summarizes all rows.
+        finish: Option<Function> = Type::Function("fun(rows: table[], opt: table): softvt.Finish?");
+        /// Columns of the table, in order; by default all, sorted.
+        columns: Option<Vec<String>>;
+    }
+    /// Summary of an experiment.
+    FinishSpec: "softvt.Finish" as "finish" {
+        /// Printed after the rows.
+        text: Option<String>;
+        /// Files to write, by relative path: text as it is, images as PNG, tables as JSON with sorted keys.
+        files: Option<BTreeMap<String, Value>> = Type::Map(&Type::OneOf(&[
+            Type::Text,
+            Type::Object("softvt.Image"),
+            Type::Map(&Type::Any),
+            Type::List(&Type::Any),
+        ]));
+    }
+}
+
+one_of! {
+    /// The goal of a task.
+    GoalSpec { On(OnSpec), Inside(InsideSpec) }
+}
+
+impl GoalSpec {
+    pub(crate) fn object(&self) -> &str {
+        match self {
+            Self::On(goal) => &goal.object,
+            Self::Inside(goal) => &goal.object,
+        }
+    }
+
+    pub(crate) fn target(&self) -> &str {
+        match self {
+            Self::On(goal) => &goal.target,
+            Self::Inside(goal) => &goal.target,
+        }
+    }
+}
+
+/// Constructors of plans and their parts; that of layouts is a function.
+pub(crate) static CONSTRUCTORS: &[Constructor] = &[
+    Constructor::of(SuiteSpec::RECORD),
+    Constructor::of(TaskSpec::RECORD),
+    Constructor::of(OnSpec::RECORD),
+    Constructor::of(InsideSpec::RECORD),
+    Constructor::of(ShiftSpec::RECORD),
+    Constructor::with(ConditionsSpec::RECORD, make_conditions),
+    Constructor::of(ExperimentSpec::RECORD),
+];
+
+functions! {
+    FUNCTIONS {
+        /// Returns a layout, given by name and function or by a table of name and build:
+        /// `softvt.layout("table", function(scene, rng) … end)`.
+        fn layout(
+            lua,
+            name: Unchecked = Type::OneOf(&[Type::Text, Type::Nested(LayoutSpec::RECORD)]),
+            build: Unchecked = BUILD
+        ) -> ["softvt.Layout"] {
+            match (&name.0, build.0) {
+                (Value::String(name), build) => {
+                    let table = lua.create_table()?;
+                    table.set("name", name)?;
+                    table.set("build", build)?;
+                    make(lua, LayoutSpec::RECORD, &Value::Table(table))?
+                }
+                (_, Value::Nil) => make(lua, LayoutSpec::RECORD, &name.0)?,
+                (name, _) => {
+                    let message = format!("layout: expected a name and a function, got {}", got(name));
+                    return Err(fail(lua, message));
+                }
+            }
+        }
+    }
+}
+
+fn make_conditions(lua: &Lua, record: &'static Record, value: &Value) -> mlua::Result<Table> {
+    let made = make(lua, record, value)?;
+    for key in ["suites", "conditions"] {
+        if made.raw_get::<Table>(key)?.raw_len() == 0 {
+            return Err(fail(lua, format!("conditions.{key}: expected at least one, got an empty list")));
+        }
+    }
+    let conditions: Vec<ConditionSpec> = made.raw_get("conditions")?;
+    let mut names = vec![REFERENCE.to_owned()];
+    for (index, ConditionSpec { name, .. }) in conditions.into_iter().enumerate() {
+        if names.contains(&name) {
+            let of = if name == REFERENCE { "the unchanged run" } else { "another condition" };
+            let message = format!("{name:?} is the name of {of}; give another");
+            let path = vec!["conditions".into(), format!("[{}]", index + 1), "name".into()];
+            return Err(error_at_key(lua, record.label, &ValidationError { path, message }));
+        }
+        names.push(name);
+    }
+    Ok(made)
+}

@@ -1,0 +1,281 @@
+//! Checks values against their declared types, and reports the line of the offending key.
+
+use mlua::{Lua, Table, Value};
+
+use super::{Field, Presence, Range, Record, Type, ValidationError, joined};
+use crate::{
+    script::vm::{
+        error::{ScriptError, fail, here},
+        list::plain,
+        source_map,
+        value::{got, number, sorted_pairs},
+    },
+    text::{suggest, unknown_name},
+};
+
+impl Type {
+    /// Checks `value` and returns it as it is stored: numbers converted, lists of the host as plain tables, nested tables
+    /// as copies with their defaults.
+    pub(crate) fn check(&self, lua: &Lua, value: &Value) -> Result<Value, ValidationError> {
+        let value = &plain(lua, value)?;
+        let wrong = || ValidationError::new(format!("expected {}, got {}", self.words(), got(value)));
+        if let Value::String(text) = value
+            && text.to_str().is_err()
+        {
+            return Err(ValidationError::new(format!("expected UTF-8 text, got {}", got(value))));
+        }
+        let kept = |accepted: bool| if accepted { Ok(value.clone()) } else { Err(wrong()) };
+        match (self, value) {
+            (Self::Number(_, range), _) => {
+                number(value).filter(|n| range.holds(*n)).map(Value::Number).ok_or_else(wrong)
+            }
+            (Self::Integer(range), _) => {
+                whole(value).filter(|n| range.holds(*n as f64)).map(Value::Integer).ok_or_else(wrong)
+            }
+            (Self::Text, Value::String(text)) => kept(!text.as_bytes().is_empty()),
+            (Self::Name, Value::String(text)) => kept(is_name(&text.to_string_lossy())),
+            (Self::Line, Value::String(_)) | (Self::Table(_), Value::Table(_)) => kept(true),
+            (Self::Boolean, Value::Boolean(_)) | (Self::Function(_), Value::Function(_)) => kept(true),
+            (Self::Any, value) => kept(!value.is_nil()),
+            (Self::Choice(names), Value::String(text)) => {
+                let text = text.to_string_lossy();
+                match suggest(&text, names.iter().copied()) {
+                    _ if names.contains(&text.as_str()) => kept(true),
+                    Some(close) => {
+                        Err(ValidationError::new(format!("{}; did you mean {close:?}?", wrong().message)))
+                    }
+                    None => Err(wrong()),
+                }
+            }
+            (Self::Colour, Value::Table(list)) => {
+                check_numbers(lua, list, 3, Range::closed(0.0, 1.0), &wrong)
+            }
+            (Self::Vector(count, _), Value::Table(list)) => {
+                check_numbers(lua, list, *count, Range::ANY, &wrong)
+            }
+            (Self::List(of), Value::Table(list)) => check_list(lua, of, list, &wrong),
+            (Self::Map(of), Value::Table(map)) => check_map(lua, of, map),
+            (Self::Nested(record), Value::Table(table)) => check(lua, record, table).map(Value::Table),
+            (Self::Made(records), Value::Table(table)) => {
+                kept(records.iter().any(|record| is_made(lua, record, table)))
+            }
+            (Self::Object(class), Value::UserData(object)) => {
+                kept(object.type_name().is_ok_and(|name| name.to_string_lossy() == *class))
+            }
+            (Self::OneOf(types), _) => check_one_of(lua, types, value, &wrong),
+            _ => Err(wrong()),
+        }
+    }
+}
+
+/// True if a text can be part of a path and of a line without harm.
+fn is_name(text: &str) -> bool {
+    let fits = |c: char| c.is_alphanumeric() || c == '_' || c == '-';
+    (1..=100).contains(&text.len()) && text.chars().all(fits)
+}
+
+fn whole(value: &Value) -> Option<i64> {
+    match value {
+        Value::Integer(n) => Some(*n),
+        Value::Number(n) if n.fract() == 0.0 && n.abs() < 9e15 => Some(*n as i64),
+        _ => None,
+    }
+}
+
+/// Returns the result of the first type that accepts the value. An error inside of the value is more helpful than one
+/// about the whole value.
+fn check_one_of(
+    lua: &Lua,
+    types: &[Type],
+    value: &Value,
+    wrong: &dyn Fn() -> ValidationError,
+) -> Result<Value, ValidationError> {
+    let mut inner = None;
+    for ty in types {
+        match ty.check(lua, value) {
+            Ok(value) => return Ok(value),
+            Err(error) if !error.path.is_empty() => inner = inner.or(Some(error)),
+            Err(_) => {}
+        }
+    }
+    Err(inner.unwrap_or_else(wrong))
+}
+
+/// Checks a list of exactly `count` finite numbers in `range`. The error is at the wrong entry, or at the list itself if its
+/// length is wrong.
+fn check_numbers(
+    lua: &Lua,
+    list: &Table,
+    count: usize,
+    range: Range,
+    wrong: &dyn Fn() -> ValidationError,
+) -> Result<Value, ValidationError> {
+    let entries = list.pairs::<Value, Value>().take(count + 1).count();
+    let values = (1..=count).map(|place| list.raw_get::<Value>(place));
+    let values: Vec<Value> = values.collect::<mlua::Result<_>>()?;
+    if entries != count || values.iter().any(Value::is_nil) {
+        return Err(with_length(list, wrong()));
+    }
+    let checked = values.iter().enumerate().map(|(index, value)| {
+        let number = number(value).filter(|number| range.holds(*number));
+        number.ok_or_else(|| {
+            let message = format!("expected a number{}, got {}", range.words(), got(value));
+            ValidationError::new(message).inside(format!("[{}]", index + 1))
+        })
+    });
+    let numbers: Vec<f64> = checked.collect::<Result<_, _>>()?;
+    Ok(Value::Table(lua.create_sequence_from(numbers)?))
+}
+
+/// Replaces `a table` by `a list of 2` in a message about a list.
+fn with_length(list: &Table, error: ValidationError) -> ValidationError {
+    let length = list.raw_len();
+    let is_list = length > 0 && list.pairs::<Value, Value>().count() == length;
+    match error.message.strip_suffix(&got(&Value::Table(list.clone()))).filter(|_| is_list) {
+        Some(before) => ValidationError { message: format!("{before}a list of {length}"), ..error },
+        None => error,
+    }
+}
+
+fn check_list(
+    lua: &Lua,
+    of: &Type,
+    list: &Table,
+    wrong: &dyn Fn() -> ValidationError,
+) -> Result<Value, ValidationError> {
+    let out = lua.create_table()?;
+    let count = list.raw_len();
+    if list.pairs::<Value, Value>().count() != count {
+        return Err(wrong());
+    }
+    for index in 1..=count {
+        let value: Value = list.raw_get(index)?;
+        let value = of.check(lua, &value).map_err(|error| error.inside(format!("[{index}]")))?;
+        out.raw_set(index, value)?;
+    }
+    Ok(Value::Table(out))
+}
+
+fn check_map(lua: &Lua, of: &Type, map: &Table) -> Result<Value, ValidationError> {
+    let out = lua.create_table()?;
+    for (key, value) in sorted_pairs(map) {
+        let Value::String(name) = &key else {
+            return Err(ValidationError::new(format!("expected names as keys, got {}", got(&key))));
+        };
+        let name = name.to_string_lossy();
+        let value = of.check(lua, &value).map_err(|error| error.inside(name.clone()))?;
+        out.raw_set(name, value)?;
+    }
+    Ok(Value::Table(out))
+}
+
+/// Returns a copy of `table` with every field checked and every default filled in.
+pub(crate) fn check(lua: &Lua, record: &Record, table: &Table) -> Result<Table, ValidationError> {
+    for (key, _) in sorted_pairs(table) {
+        match &key {
+            Value::String(name) if record.names().any(|field| field == name.to_string_lossy()) => {}
+            Value::String(name) => {
+                return Err(ValidationError::new(unknown_name(
+                    "key",
+                    &name.to_string_lossy(),
+                    record.names(),
+                )));
+            }
+            other => {
+                let message = format!("unexpected entry [{}]; the keys are {}", got(other), joined(record));
+                return Err(ValidationError::new(message));
+            }
+        }
+    }
+    let out = lua.create_table()?;
+    for field in record.fields {
+        let value = match table.raw_get(field.name)? {
+            Value::Nil => absent(lua, field),
+            value => field.ty.check(lua, &value),
+        };
+        out.raw_set(field.name, value.map_err(|error| error.inside(field.name))?)?;
+    }
+    Ok(out)
+}
+
+/// The value of a field that is not given.
+fn absent(lua: &Lua, field: &Field) -> Result<Value, ValidationError> {
+    Ok(match field.presence {
+        Presence::Required => {
+            return Err(ValidationError::new(format!("missing; expected {}", field.ty.words())));
+        }
+        Presence::Optional => Value::Nil,
+        Presence::Number(n) => Value::Number(n),
+        Presence::Integer(n) => Value::Integer(n),
+        Presence::Boolean(flag) => Value::Boolean(flag),
+        Presence::Text(text) => Value::String(lua.create_string(text)?),
+        Presence::Empty => field.ty.check(lua, &Value::Table(lua.create_table()?))?,
+    })
+}
+
+/// Checks a table that a script gave for `record`; the error is at the line of the wrong key.
+pub(crate) fn validate(lua: &Lua, record: &Record, value: &Value) -> mlua::Result<Table> {
+    match plain(lua, value)? {
+        Value::Table(table) => {
+            check(lua, record, &table).map_err(|error| error_at_key(lua, record.label, &error))
+        }
+        other => {
+            let message =
+                format!("{}: expected a table of {}, got {}", record.label, joined(record), got(&other));
+            Err(fail(lua, message))
+        }
+    }
+}
+
+/// The constructor of `record`: checks a table and marks it, so that it also refuses to be read by unknown keys.
+pub(crate) fn make(lua: &Lua, record: &'static Record, value: &Value) -> mlua::Result<Table> {
+    let made = validate(lua, record, value)?;
+    made.set_metatable(Some(metatable(lua, record)?))?;
+    source_map::record_origin(lua, &made)?;
+    Ok(made)
+}
+
+/// Checks a made table again, since a script may have written to it, and returns the checked copy.
+pub(crate) fn recheck(lua: &Lua, record: &Record, table: &Table) -> mlua::Result<Table> {
+    check(lua, record, table)
+        .map_err(|error| fail(lua, format!("{} (changed after it was made)", error.words(record.label))))
+}
+
+/// True if the constructor of `record` made `table`.
+pub(crate) fn is_made(lua: &Lua, record: &Record, table: &Table) -> bool {
+    let own = lua.named_registry_value::<Table>(record.kind);
+    own.is_ok_and(|own| table.metatable().is_some_and(|meta| meta.to_pointer() == own.to_pointer()))
+}
+
+fn metatable(lua: &Lua, record: &'static Record) -> mlua::Result<Table> {
+    if let Ok(existing) = lua.named_registry_value::<Table>(record.kind) {
+        return Ok(existing);
+    }
+    let meta = lua.create_table()?;
+    meta.set("__name", record.kind)?;
+    meta.set("__metatable", record.kind)?;
+    meta.set("__tostring", lua.create_function(|_, _: Value| Ok(record.kind))?)?;
+    let read = lua.create_function(|lua, (_, key): (Value, Value)| match &key {
+        Value::String(name) if !record.names().any(|field| field == name.to_string_lossy()) => {
+            let message = unknown_name("key", &name.to_string_lossy(), record.names());
+            Err(fail(lua, format!("{}: {message}", record.label)))
+        }
+        _ => Ok(Value::Nil),
+    })?;
+    meta.set("__index", read)?;
+    lua.set_named_registry_value(record.kind, &meta)?;
+    Ok(meta)
+}
+
+/// The error of a script at the line of the offending key, as far as the source text shows it.
+pub(crate) fn error_at_key(lua: &Lua, label: &str, error: &ValidationError) -> mlua::Error {
+    let message = error.words(label);
+    let Some((file, line)) = here(lua) else { return fail(lua, message) };
+    let line = source_map::line_of_key(lua, &file, line, &error.path);
+    mlua::Error::external(ScriptError::new(file, message).at(Some(line)))
+}
+
+/// The error of a script about the field `key` of a table, for what a single field's type does not express.
+pub(crate) fn invalid(lua: &Lua, record: &Record, key: &str, message: impl Into<String>) -> mlua::Error {
+    error_at_key(lua, record.label, &ValidationError::new(message).inside(key))
+}

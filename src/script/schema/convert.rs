@@ -1,0 +1,253 @@
+//! Conversion of checked Lua values to Rust types, and the declaration of records.
+
+use std::{collections::BTreeMap, ops::Deref};
+
+use mlua::{FromLua, Function, Lua, Table, Value};
+
+use super::{Presence, Range, Record, Type, is_made, recheck};
+use crate::script::vm::{error::fail, value::got};
+
+/// A Rust type that checked Lua values convert to.
+pub(crate) trait LuaType: FromLua {
+    /// The Lua type, where a declaration gives no narrower one.
+    const TYPE: Type;
+    /// The same, for lists and maps of it.
+    const REFERENCE: &'static Type = &Self::TYPE;
+    /// The value where none is given.
+    const PRESENCE: Presence = Presence::Required;
+    /// False if a parameter of this type reaches the function as the script gave it.
+    const CHECKED: bool = true;
+}
+
+macro_rules! lua_types {
+    ($($rust:ty => $ty:expr),+ $(,)?) => { $(impl LuaType for $rust { const TYPE: Type = $ty; })+ };
+}
+
+lua_types! {
+    f32 => Type::Number("", Range::ANY),
+    f64 => Type::Number("", Range::ANY),
+    i64 => Type::Integer(Range::ANY),
+    i32 => Type::Integer(Range::closed(i32::MIN as f64, i32::MAX as f64)),
+    u16 => Type::Integer(Range::closed(0.0, u16::MAX as f64)),
+    u32 => Type::Integer(Range::closed(0.0, u32::MAX as f64)),
+    u64 => Type::Integer(Range::NOT_NEGATIVE),
+    usize => Type::Integer(Range::NOT_NEGATIVE),
+    bool => Type::Boolean,
+    String => Type::Text,
+    mlua::LuaString => Type::Line,
+    Function => Type::Function("fun()"),
+    Table => Type::Table("table"),
+    Value => Type::Any,
+}
+
+impl<const N: usize> LuaType for [f64; N] {
+    const TYPE: Type = Type::Vector(N, "");
+}
+
+impl<T: LuaType> LuaType for Option<T> {
+    const TYPE: Type = T::TYPE;
+    const PRESENCE: Presence = Presence::Optional;
+}
+
+impl<T: LuaType> LuaType for Vec<T> {
+    const TYPE: Type = Type::List(T::REFERENCE);
+}
+
+impl<T: LuaType> LuaType for BTreeMap<String, T> {
+    const TYPE: Type = Type::Map(T::REFERENCE);
+}
+
+/// An argument that the function checks itself.
+pub(crate) struct Unchecked(pub Value);
+
+impl FromLua for Unchecked {
+    fn from_lua(value: Value, _: &Lua) -> mlua::Result<Self> {
+        Ok(Self(value))
+    }
+}
+
+impl LuaType for Unchecked {
+    const TYPE: Type = Type::Any;
+    const CHECKED: bool = false;
+}
+
+/// A struct declared by [`record!`].
+pub(crate) trait RecordType: FromLua {
+    const RECORD: &'static Record;
+    const RECORDS: &'static [&'static Record] = &[Self::RECORD];
+}
+
+/// A table that the constructor of `T` made. Reading one checks it again, since a script may have written to it.
+#[derive(Clone, Debug)]
+pub(crate) struct Made<T> {
+    pub spec: T,
+    /// The table itself, for messages about the place where it was made and for its identity.
+    pub table: Table,
+}
+
+impl<T> Deref for Made<T> {
+    type Target = T;
+
+    fn deref(&self) -> &T {
+        &self.spec
+    }
+}
+
+impl<T: RecordType> FromLua for Made<T> {
+    fn from_lua(value: Value, lua: &Lua) -> mlua::Result<Self> {
+        match value {
+            Value::Table(table) if is_made(lua, T::RECORD, &table) => {
+                let spec = lua.unpack(Value::Table(recheck(lua, T::RECORD, &table)?))?;
+                Ok(Self { spec, table })
+            }
+            other => Err(fail(lua, format!("expected {}{{…}}, got {}", T::RECORD.kind, got(&other)))),
+        }
+    }
+}
+
+impl<T: RecordType> LuaType for Made<T> {
+    const TYPE: Type = Type::Made(T::RECORDS);
+}
+
+/// The first of the given expressions: what a declaration says, else a default.
+macro_rules! first {
+    ($first:expr $(, $rest:expr)* $(,)?) => {
+        $first
+    };
+}
+pub(crate) use first;
+
+/// Declares records.
+///
+/// ```text
+/// record! {
+///     /// Documentation of the record, for Rust, stubs and reference alike.
+///     Name: "softvt.Class" as "label in messages", constructor "softvt.name" {
+///         /// Documentation of the field.
+///         field: RustType = Type::Number("m", Range::POSITIVE) => Number(1.0);
+///     }
+/// }
+/// ```
+///
+/// The Lua type may be left out where [`LuaType`] of the Rust type says enough, and so may the default: an `Option` may then
+/// be absent, and a nested record of which every field has a default. Gives the struct with its conversion from a checked
+/// table ([`FromLua`]) and the [`Record`] by which tables are checked.
+macro_rules! record {
+    ($(
+        $(#[doc = $doc:literal])+
+        $name:ident : $class:literal as $label:literal $(, constructor $kind:literal)? {
+            $(
+                $(#[doc = $field_doc:literal])+
+                $field:ident : $rust:ty $(= $ty:expr)? $(=> $presence:ident($default:expr))? ;
+            )*
+        }
+    )+) => {$(
+        $(#[doc = $doc])+
+        #[derive(Clone, Debug)]
+        pub(crate) struct $name {
+            $( $(#[doc = $field_doc])+ pub(crate) $field: $rust, )*
+        }
+
+        impl $crate::script::schema::RecordType for $name {
+            const RECORD: &'static $crate::script::schema::Record = &$crate::script::schema::Record {
+                label: $label,
+                class: $class,
+                kind: $crate::script::schema::convert::first!($($kind,)? $class),
+                doc: concat!($($doc),+),
+                fields: &[$($crate::script::schema::Field {
+                    name: stringify!($field),
+                    ty: $crate::script::schema::convert::first!(
+                        $($ty,)? <$rust as $crate::script::schema::LuaType>::TYPE
+                    ),
+                    presence: $crate::script::schema::convert::first!(
+                        $($crate::script::schema::Presence::$presence($default),)?
+                        <$rust as $crate::script::schema::LuaType>::PRESENCE
+                    ),
+                    doc: concat!($($field_doc),+),
+                }),*],
+            };
+        }
+
+        impl mlua::FromLua for $name {
+            fn from_lua(value: mlua::Value, lua: &mlua::Lua) -> mlua::Result<Self> {
+                let _table = mlua::Table::from_lua(value, lua)?;
+                Ok(Self { $( $field: _table.raw_get(stringify!($field))?, )* })
+            }
+        }
+
+        impl $crate::script::schema::LuaType for $name {
+            const TYPE: $crate::script::schema::Type = $crate::script::schema::Type::Nested(
+                <Self as $crate::script::schema::RecordType>::RECORD
+            );
+            const PRESENCE: $crate::script::schema::Presence =
+                <Self as $crate::script::schema::RecordType>::RECORD.presence();
+        }
+    )+};
+}
+pub(crate) use record;
+
+/// Declares the strings that stand for the values of an enum: `choice! { Axis { "x" => Axis::X, … } }`.
+macro_rules! choice {
+    ($name:ty { $($text:literal => $value:expr),+ $(,)? }) => {
+        impl mlua::FromLua for $name {
+            fn from_lua(value: mlua::Value, lua: &mlua::Lua) -> mlua::Result<Self> {
+                let text: String = lua.unpack(value)?;
+                match text.as_str() {
+                    $($text => Ok($value),)+
+                    other => Err($crate::script::vm::error::fail(lua, format!("unexpected {other:?}"))),
+                }
+            }
+        }
+
+        impl $crate::script::schema::LuaType for $name {
+            const TYPE: $crate::script::schema::Type =
+                $crate::script::schema::Type::Choice(&[$($text),+]);
+        }
+    };
+}
+pub(crate) use choice;
+
+/// A value that a constructor made.
+pub(crate) trait HasTable {
+    /// The table itself, for messages about the place where it was made.
+    fn table(&self) -> &Table;
+}
+
+/// Declares an enum of tables that different constructors make: `one_of! { Goal { On(OnSpec), Inside(InsideSpec) } }`.
+macro_rules! one_of {
+    ($(#[doc = $doc:literal])* $name:ident { $($variant:ident($spec:ty)),+ $(,)? }) => {
+        $(#[doc = $doc])*
+        #[derive(Clone, Debug)]
+        pub(crate) enum $name {
+            $($variant($crate::script::schema::Made<$spec>)),+
+        }
+
+        impl mlua::FromLua for $name {
+            fn from_lua(value: mlua::Value, lua: &mlua::Lua) -> mlua::Result<Self> {
+                let table: mlua::Table = lua.unpack(value)?;
+                $(
+                    if $crate::script::schema::is_made(
+                        lua, <$spec as $crate::script::schema::RecordType>::RECORD, &table
+                    ) {
+                        return lua.unpack(mlua::Value::Table(table)).map(Self::$variant);
+                    }
+                )+
+                let expected = <Self as $crate::script::schema::LuaType>::TYPE.words();
+                Err($crate::script::vm::error::fail(lua, format!("expected {expected}, got a table")))
+            }
+        }
+
+        impl $crate::script::schema::convert::HasTable for $name {
+            fn table(&self) -> &mlua::Table {
+                match self { $(Self::$variant(made) => &made.table,)+ }
+            }
+        }
+
+        impl $crate::script::schema::LuaType for $name {
+            const TYPE: $crate::script::schema::Type = $crate::script::schema::Type::Made(&[
+                $(<$spec as $crate::script::schema::RecordType>::RECORD),+
+            ]);
+        }
+    };
+}
+pub(crate) use one_of;
