@@ -250,8 +250,8 @@ pub(crate) fn start_values(
     Ok(values)
 }
 
-/// Where a ray meets an articulated object, or only its part `part`: the least of the results of `ray`, which gets each shape
-/// and its frame in that of the object.
+/// Smallest distance at which a ray meets an articulated object, or only its part `part`. `ray` gets each shape and its
+/// frame in that of the object.
 pub(crate) fn first_hit(
     asset: &Asset,
     joints: &[f64],

@@ -223,7 +223,7 @@ fn a_material_that_cannot_be_is_refused() {
 }
 
 #[test]
-fn a_mesh_that_is_no_solid_is_refused_with_its_file() {
+fn invalid_meshes_are_refused_with_their_file() {
     let tetrahedron = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\n";
     let project = Project::new(&[
         ("open.obj", tetrahedron),
@@ -251,7 +251,7 @@ fn a_mesh_that_is_no_solid_is_refused_with_its_file() {
 }
 
 #[test]
-fn a_mesh_is_looked_for_beside_the_file_that_names_it() {
+fn meshes_are_searched_next_to_the_requesting_file() {
     let closed = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
     let own = "return { shape = softvt.mesh { file = 'm.obj' } }";
     let project = Project::new(&[

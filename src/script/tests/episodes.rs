@@ -176,7 +176,7 @@ fn the_library_scales_stiffness_and_mass() {
 }
 
 #[test]
-fn a_goal_that_cannot_be_reached_is_told_at_its_line() {
+fn unreachable_goals_are_reported_at_their_line() {
     let open = |object: &str, target: &str| {
         let text = format!(
             "local chest = softvt.asset {{ name = 'chest', shape = mat.shape, body = softvt.articulated {{ parts = {{ {{ name = 'top_drawer',\n\

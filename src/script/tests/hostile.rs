@@ -1,4 +1,4 @@
-//! Scripts that mean harm: each ends in one message, in bounded time and memory.
+//! Hostile scripts: each ends in one message, in bounded time and memory.
 
 use std::sync::{
     Arc,
@@ -8,7 +8,7 @@ use std::sync::{
 use super::*;
 use crate::script::Experiment;
 
-/// What the rows of an experiment that runs `text` end with.
+/// Runs `text` in an experiment; returns its rows as JSON, or the message.
 fn run(text: &str) -> Result<String, String> {
     let project = Project::new(&[(
         "x.lua",
@@ -65,7 +65,7 @@ fn doubling_is_stopped_before_memory_is() {
 }
 
 #[test]
-fn what_the_host_keeps_for_a_script_is_counted_for_each_machine() {
+fn memory_of_host_objects_is_limited_per_virtual_machine() {
     let hoard = |make: &str| format!("local kept = {{}}\nfor i = 1, 1e9 do kept[i] = {make} end");
     let full = "the script holds more than 512 MiB of images, shapes and masks; keep fewer or smaller ones";
     let picture = "softvt.image { width = 4096, height = 4096, colour = { 0, 0, 0 } }";
@@ -79,7 +79,7 @@ fn what_the_host_keeps_for_a_script_is_counted_for_each_machine() {
         "softvt.image { width = 8192, height = 8192, colour = { 0, 0, 0 } }:text('a', { at = { 0, 9 }, colour = { 0, 0, 0 } })",
         full,
     );
-    // What is dropped makes room, and other machines are not in the way.
+    // Dropped objects release their memory, and virtual machines do not share a budget.
     let churn = format!("for i = 1, 40 do local p = {picture} end return {{ a = 1 }}");
     std::thread::scope(|scope| {
         (0..2).for_each(|_| drop(scope.spawn(|| assert_eq!(run(&churn), Ok("[{\"a\":1}]".into())))));
@@ -87,7 +87,7 @@ fn what_the_host_keeps_for_a_script_is_counted_for_each_machine() {
 }
 
 #[test]
-fn worlds_are_counted_as_what_they_take_once_they_are_stepped() {
+fn memory_of_worlds_is_limited() {
     let full = "x.lua:3: the script holds more than 4096 MiB of worlds and simulations; keep fewer, or give bodies a lower resolution";
     let body = |resolution: u32| {
         format!(
@@ -100,7 +100,7 @@ fn worlds_are_counted_as_what_they_take_once_they_are_stepped() {
         "local ball, world, kept = softvt.shape.sphere {{ radius = 1 }}, nil, {{}}\nfor i = 1, 20 do kept[i] = {solids} end return {{ a = 1 }}"
     );
     assert_eq!(run(&hoard), Ok("[{\"a\":1}]".into()));
-    // What is dropped makes room.
+    // Dropped worlds release their memory.
     let churn = format!("for i = 1, 12 do local body = {} end return {{ a = 1 }}", body(28));
     assert_eq!(run(&churn), Ok("[{\"a\":1}]".into()));
 }
@@ -150,7 +150,7 @@ fn a_flood_of_text_is_cut_off() {
 }
 
 #[test]
-fn tables_that_were_changed_after_they_were_made_are_checked_again() {
+fn changed_tables_are_checked_again() {
     let suite = |change: &str| {
         let project = Project::new(&[("x.lua", &format!("{SUITE}\nlocal s = suite() {change}\nreturn s"))]);
         project.error("x.lua", &[])
@@ -182,7 +182,7 @@ fn tables_that_were_changed_after_they_were_made_are_checked_again() {
 }
 
 #[test]
-fn what_a_script_does_to_the_base_library_harms_itself_alone() {
+fn changes_of_the_base_library_affect_only_the_script() {
     for text in [
         "tostring = nil print(1) return { a = 1 }",
         "string.format, table.unpack, pcall, error, setmetatable, pairs = nil for _ in ipairs {} do end return { a = 1 }",
@@ -240,7 +240,7 @@ fn errors_of_every_kind_end_in_a_line_of_text() {
         };
         let plain =
             !["::", "userdata", "traceback", "softvt:", "0x", "\n"].iter().any(|word| message.contains(word));
-        // Which of two limits is met first is the machine's affair.
+        // Either of two limits may be reached first.
         let told = said.split('|').any(|said| message.contains(said));
         assert!(message.starts_with("x.lua") && told && plain, "{text}\n{message}");
     }

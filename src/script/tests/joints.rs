@@ -8,7 +8,7 @@ use crate::{
     script::{Episode, EpisodeRequest},
 };
 
-/// A chest of one drawer; what carries it and what more it has are put in.
+/// A chest with one drawer on the given joint, and further parts.
 fn chest(joint: &str, more: &str) -> String {
     format!(
         "local box = softvt.shape.box {{ size = {{ 0.1, 0.1, 0.03 }} }}\n\
@@ -131,14 +131,14 @@ fn start_values_are_those_given_and_must_lie_within_the_limits() {
 }
 
 #[test]
-fn a_thing_can_stand_on_a_part_where_that_is() {
+fn objects_can_rest_on_a_moved_part() {
     let place = "scene:add { name = 'chest', asset = chest, at = { 0.1, 0 }, yaw = math.pi, joints = { drawer = 0.08 } }\n\
                  scene:add { name = 'ball', asset = ball, at = { 0.1, 0.1 }, on = 'chest.drawer' }\n\
                  scene:add { name = 'low', asset = ball, at = { 0.1, -0.03 }, on = 'chest' }";
     let scene = open(&suite(&chest(SLIDER, ""), place)).unwrap();
     let height = |index: usize| scene.objects[index].pose_w.translation.z;
     assert!((height(1) - 0.065).abs() < 1e-6, "on the drawer: {}", height(1));
-    assert!((height(2) - 0.03).abs() < 1e-6, "beside it, on the base: {}", height(2));
+    assert!((height(2) - 0.03).abs() < 1e-6, "next to it, on the base: {}", height(2));
     let wrong = place.replace("chest.drawer", "chest.drawr");
     assert_eq!(
         open(&suite(&chest(SLIDER, ""), &wrong)).unwrap_err(),
@@ -147,7 +147,7 @@ fn a_thing_can_stand_on_a_part_where_that_is() {
 }
 
 #[test]
-fn walls_that_others_could_pass_through_are_refused_where_the_object_is_placed() {
+fn thin_walls_are_refused_at_the_placement() {
     let thin = chest(SLIDER, "")
         .replace("shape = box:translate(0, 0, 0.05)", "shape = box:shell(0.0015):translate(0, 0, 0.05)");
     let scene = open(&suite(&thin, "scene:add { name = 'chest', asset = chest, at = { 0, 0 } }")).unwrap();
@@ -159,7 +159,7 @@ fn walls_that_others_could_pass_through_are_refused_where_the_object_is_placed()
 }
 
 #[test]
-fn where_the_parts_of_a_scene_are_is_where_the_mechanics_has_them() {
+fn scene_and_physics_agree_on_part_poses() {
     let more = "{ name = 'door', parent = 'drawer', shape = box:translate(0, 0, 0.1), density = 300,\n\
                 joint = softvt.hinge { axis = { 1, 0, 2 }, origin = { 0.05, 0.02, 0.1 }, lower = -1, upper = 1 } },\n\
                 { name = 'knob', parent = 'door', shape = box:translate(0, 0, 0.15), density = 300,\n\

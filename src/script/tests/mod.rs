@@ -1,20 +1,20 @@
-//! What a script may and may not do, seen from outside.
+//! The Lua interface as scripts use it, and the messages of its errors.
 
 mod bad_input;
 mod episodes;
 mod hostile;
 mod joints;
+mod mass_and_calibration;
 mod options;
 mod policies;
 mod surface;
 mod visuals;
-mod weigh;
 
 use std::{fs, path::PathBuf, sync::Arc, time::Duration};
 
 use super::{Limits, Loaded, ScriptError, load_with};
 
-/// A project folder that goes away with the test.
+/// A temporary project folder.
 pub(super) struct Project(tempfile::TempDir);
 
 impl Project {
@@ -48,14 +48,14 @@ impl Project {
         load_with(&self.path(path), &argv, limits)
     }
 
-    /// The message, with the folder's name taken off.
+    /// The message of a script that must fail, without the folder's name.
     pub(super) fn error(&self, path: &str, argv: &[&str]) -> String {
         let folder = format!("{}/", self.0.path().display());
         self.load(path, argv).expect_err("the script must fail").to_string().replace(&folder, "")
     }
 }
 
-/// Short limits, and a watchdog that only stays silent.
+/// Short limits, and a watchdog without effect.
 pub(super) fn limits() -> Limits {
     Limits {
         memory_bytes: 16 << 20,
@@ -73,7 +73,7 @@ pub(super) fn error_of(text: &str) -> String {
     Project::new(&[("suites/x.lua", text)]).error("suites/x.lua", &[])
 }
 
-/// The rest of a suite, in which a test puts what it is about.
+/// The common part of a suite, to which a test adds its own.
 pub(super) const SUITE: &str = r#"local mat = softvt.asset { name = "mat", shape = softvt.shape.box { size = { 0.1, 0.1, 0.01 } }:grounded(), body = softvt.static {} }
 local ball = softvt.asset {
   name = "ball", shape = softvt.shape.sphere { radius = 0.03 }:grounded(),

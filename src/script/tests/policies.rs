@@ -1,4 +1,4 @@
-//! Policies and profiles in Lua: what they are read as, what they see, and what becomes of nonsense.
+//! Policies and profiles in Lua: loading, observations, actions and malformed results.
 
 use std::sync::Arc;
 
@@ -86,7 +86,7 @@ fn refusal(body: &str) -> String {
 }
 
 #[test]
-fn an_observation_is_what_the_host_saw() {
+fn observations_have_the_values_of_the_host() {
     let checks = [
         "assert(obs.time == 1.5 and obs.width == 0.0625 and obs.closure == 0.25 and obs.prompt == 'take it')",
         "assert(obs.position[2] == -0.125 and #obs.position == 3 and #obs.joints == 7 and obs.joints[4] == -2)",
@@ -127,7 +127,7 @@ fn actions_come_alone_or_as_lists_with_either_way_to_say_a_turn() {
 }
 
 #[test]
-fn nonsense_ends_the_run_with_the_line_of_act() {
+fn malformed_actions_end_the_run_at_the_line_of_act() {
     let at = "p.lua:1: policy.act";
     for (body, said) in [
         ("return", format!("{at}: expected an action or a list of actions, got nil")),
@@ -177,7 +177,7 @@ fn nonsense_ends_the_run_with_the_line_of_act() {
 }
 
 #[test]
-fn a_number_that_is_none_fails_the_episode_alone() {
+fn non_finite_actions_fail_only_the_episode() {
     for body in [
         "return { position = { 0/0, 0, 0 }, axis_angle = { 0, 0, 0 }, closure = 0 }",
         "return { position = { 0, 0, 0 }, axis_angle = { 0, 0, 0 }, closure = 1/0 }",
@@ -209,7 +209,7 @@ fn an_episode_is_a_function_of_its_seed_and_no_other_episode() {
 }
 
 #[test]
-fn files_that_hold_no_policy_are_told() {
+fn files_without_a_policy_are_reported() {
     let message = |text: &str| {
         let project = Project::new(&[("p.lua", text)]);
         let error = PolicyFile::load_with(&project.path("p.lua"), &limits()).unwrap_err();
@@ -301,7 +301,7 @@ fn a_profile_may_name_other_cameras_units_and_paddings() {
 }
 
 #[test]
-fn what_is_wrong_with_a_profile_is_told_with_its_line() {
+fn errors_in_profiles_are_reported_with_their_line() {
     for (from, to, said) in [
         (
             "name = \"libero\"",

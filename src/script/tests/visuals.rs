@@ -89,7 +89,7 @@ fn every_mask_can_be_made_from_lua() {
 }
 
 #[test]
-fn a_wrong_look_is_named_with_its_line_and_the_mend() {
+fn wrong_visuals_are_reported_with_line_and_hint() {
     let layer = |inner: &str| {
         error_of(&with_visuals(&format!(
             "{{ {{ albedo = {{ 1, 1, 1 }},\n    layers = {{ {{\n      {inner}\n    }} }} }} }}"
@@ -174,7 +174,7 @@ fn a_wrong_look_is_named_with_its_line_and_the_mend() {
 }
 
 #[test]
-fn a_painted_shape_needs_a_look_for_each_material_or_none_at_all() {
+fn painted_shapes_need_a_visual_per_material_or_none_at_all() {
     let painted = |visuals: &str| {
         let asset = format!(
             "local asset = softvt.asset {{ name = \"bun\", body = softvt.scenery {{}}, {visuals}\n  shape = softvt.shape.sphere \
@@ -197,7 +197,7 @@ fn a_painted_shape_needs_a_look_for_each_material_or_none_at_all() {
 }
 
 #[test]
-fn every_material_of_the_library_gives_a_look() {
+fn every_material_of_the_library_is_a_visual() {
     let names = [
         "crust",
         "dough",

@@ -19,7 +19,7 @@ const MAX_WORLD_BYTES: usize = 4 << 30;
 struct Budget {
     used: Arc<AtomicUsize>,
     limit: usize,
-    /// What it counts and how to use less, for messages.
+    /// The counted objects and how to use less memory, for messages.
     what: &'static str,
 }
 

@@ -1,9 +1,9 @@
-//! Volumes, masses, and what calibration files say.
+//! Volumes, masses and calibration files.
 
 use super::*;
 use crate::script::Experiment;
 
-/// What a script says by raising it.
+/// The message of a script that raises its result.
 fn said(text: &str) -> String {
     Project::new(&[("suites/x.lua", text)]).load("suites/x.lua", &[]).expect_err("it raises").message
 }
@@ -53,7 +53,7 @@ fn a_calibration_is_read_when_the_plan_is_made_and_no_later() {
         return { none = tostring(none), late = pcall(softvt.calibration, 'sphere') and 'given' or 'told' } end }";
     let project = Project::new(&[("x.lua", late)]);
     let loaded = project.load("x.lua", &[]).expect("loads");
-    // What was not there is not there on a fresh machine either, whatever has come since.
+    // A file that was absent stays absent in later virtual machines, even if it exists by then.
     project.write("assets/calibration/absent.json", b"{}");
     let rows = Experiment::open(&loaded).expect("opens").run(0).expect("a row");
     assert_eq!(rows[0]["none"], "nil");
