@@ -76,7 +76,7 @@ pub(super) fn clap_command() -> clap::Command {
 /// The help of `softvt` without arguments: the commands, and where to read on.
 fn short_help(command: clap::Command) -> String {
     let template = "{name} {version}: {about}\n\n{usage-heading} {usage}\n\nCommands:\n{subcommands}\n\n\
-                    softvt suites/spatial_soft.lua runs a standard suite; softvt list suites lists them.\n\
+                    softvt list suites lists the standard suites; softvt FILE.lua runs one.\n\
                     softvt --help lists all options, softvt COMMAND --help those of a command.";
     command.help_template(template).render_help().to_string()
 }

@@ -1,6 +1,6 @@
 //! Voxel meshes of soft bodies: hexahedral elements on a regular grid, cut from a shape, and points embedded in them.
 //!
-//! Corners and shape functions of an element are those of [`hex8`](super::hex8).
+//! Corners and shape functions of an element are those of [`hex8`].
 
 use super::{
     Vec3, hex8,

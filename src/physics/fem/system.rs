@@ -1,9 +1,9 @@
 //! The velocity system of a soft body, `A = (1 + α dt) M + dt (dt + β) K`, reduced to the nodes in contact.
 //!
 //! `K = Σ R K₀ Rᵀ` is assembled and factored in the body's co-rotating frame, so a body that is carried or rotates without
-//! changing shape keeps its factor. It is factored again when an element's rotation has changed by [`STALE_ROTATION`]
+//! changing shape keeps its factor. It is factored again when an element's rotation has changed by `STALE_ROTATION`
 //! relative to the body, or when a new node comes into contact. The frame itself follows the body in steps of
-//! [`STALE_FRAME`], so that the matrix of a body that is merely held is not even rotated. A slightly old tangent changes no
+//! `STALE_FRAME`, so that the matrix of a body that is merely held is not even rotated. A slightly old tangent changes no
 //! equilibrium: the elastic force is always evaluated exactly, and `A` only affects the transient.
 
 use super::body::{FemModel, FemState};

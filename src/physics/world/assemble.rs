@@ -315,12 +315,12 @@ fn joint_constraints(
     let is_near = |distance: f64| {
         drive.is_none() || distance < 2.0 * v.abs() * dt + 0.02 * (link.upper - link.lower).min(1.0)
     };
-    let lower = is_near(q - link.lower).then(|| ScalarConstraint {
+    let lower = is_near(q - link.lower).then_some(ScalarConstraint {
         stiffness: k,
         error: link.lower - q,
         ..pushes_up
     });
-    let upper = is_near(link.upper - q).then(|| ScalarConstraint {
+    let upper = is_near(link.upper - q).then_some(ScalarConstraint {
         stiffness: k,
         error: link.upper - q,
         ..pushes_down
@@ -328,9 +328,9 @@ fn joint_constraints(
     let limit = link.velocity_limit;
     let is_fast = v.abs() > 0.5 * limit && limit.is_finite();
     let brake_up =
-        is_fast.then(|| ScalarConstraint { damping: 10.0 * c, target_velocity: limit, ..pushes_down });
+        is_fast.then_some(ScalarConstraint { damping: 10.0 * c, target_velocity: limit, ..pushes_down });
     let brake_down =
-        is_fast.then(|| ScalarConstraint { damping: 10.0 * c, target_velocity: -limit, ..pushes_up });
+        is_fast.then_some(ScalarConstraint { damping: 10.0 * c, target_velocity: -limit, ..pushes_up });
     let friction = articulation.friction[joint];
     let dry = (link.friction > 0.0).then(|| ScalarConstraint {
         stiffness: friction.stiffness,

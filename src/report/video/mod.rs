@@ -236,7 +236,7 @@ fn full_size(camera: &Camera) -> usize {
 /// Writes every image of selected states as PNG files in `dir`; `states` are names and indices of states.
 ///
 /// Cameras also get depth (16 bits, units of 0.1 mm along the optical axis, 65535 beyond the range and in the background) and
-/// segmentation (16 bits: objects from 1 in the order of the scene, [`crate::rollout::sensors::ROBOT`], 0 in the background).
+/// segmentation (16 bits: objects from 1 in the order of the scene, [`crate::rollout::ROBOT_SEGMENTATION_ID`], 0 in the background).
 /// Files are written atomically. Returns their paths.
 ///
 /// # Errors

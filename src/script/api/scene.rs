@@ -99,8 +99,14 @@ fn check_joint_limits(lua: &Lua, q: &[f64; ARM_DOFS]) -> mlua::Result<()> {
 #[derive(Clone)]
 pub(crate) struct LuaScene {
     pub scene: Arc<Mutex<Scene>>,
-    /// The assets read so far with their Lua tables: two objects of one table share an asset.
-    assets: Arc<Mutex<Vec<(Table, Arc<Asset>)>>>,
+    /// The assets read so far: two objects of one table share an asset.
+    assets: Arc<Mutex<Vec<ReadAsset>>>,
+}
+
+/// An asset with the Lua table that it was read from.
+struct ReadAsset {
+    table: Table,
+    asset: Arc<Asset>,
 }
 
 impl LuaScene {
@@ -111,11 +117,12 @@ impl LuaScene {
     fn asset(&self, lua: &Lua, made: &Made<AssetSpec>) -> mlua::Result<Arc<Asset>> {
         let mut assets = lock(&self.assets);
         let pointer = made.table.to_pointer();
-        if let Some((_, asset)) = assets.iter().find(|(known, _)| known.to_pointer() == pointer) {
+        if let Some(ReadAsset { asset, .. }) = assets.iter().find(|known| known.table.to_pointer() == pointer)
+        {
             return Ok(asset.clone());
         }
         let asset = Arc::new(made.asset(lua)?);
-        assets.push((made.table.clone(), asset.clone()));
+        assets.push(ReadAsset { table: made.table.clone(), asset: asset.clone() });
         Ok(asset)
     }
 

@@ -3,7 +3,7 @@
 //! Two convex [`Primitive`]s meet in [`manifold`]. A contact normal is found by separating axes, and the features of both that
 //! face each other (a face, a side line) are projected along it; the corners of their overlap become the points. The gap of
 //! each point is exact at its position, so that corners and rims support a tipping body where its real edge is, and round
-//! bodies touch at a moving lowest point and roll. General shapes meet through [`field::SurfaceInField`].
+//! bodies touch at a moving lowest point and roll. General shapes meet through `field::SurfaceInField`.
 //!
 //! # Why not parry's manifolds
 //! The contact forces here are pressures times areas, so every point needs the area that it represents, and a small change of
