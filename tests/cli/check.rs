@@ -19,7 +19,7 @@ fn errors_of_a_run_are_found_by_the_check() {
     assert_snapshot!(check("object = \"cube\"", "object = \"floor\""), @r#"x.lua:10: task.goal.object: "floor" never moves; name an object whose body is softvt.soft or softvt.rigid"#);
     assert_snapshot!(check("object = \"cube\"", "object = \"cub\""), @r#"x.lua:10: task.goal.object: unknown object "cub"; did you mean "cube"?"#);
     assert_snapshot!(check("(scene)\n", "(scene) scene.start_q[4] = 0\n"), @"x.lua:4: scene.start_q[4]: expected radians in -3.0718..-0.0698, the limits of panda_link4, got 0");
-    assert_snapshot!(check("tasks = {", "tasks = {}, shifts = {"), @r#"x.lua:9: suite.shifts[1]: expected what softvt.shift{…} gives, got a table"#);
+    assert_snapshot!(check("tasks = {", "tasks = {}, shifts = {"), @r#"x.lua:9: suite.shifts[1]: expected the result of softvt.shift{…}, got a table"#);
 }
 
 #[test]

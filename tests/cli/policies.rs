@@ -180,7 +180,7 @@ fn flags_without_effect_are_refused() {
         assert!(!project.path("run").exists(), "{words}");
     }
     let message = project.refusal("p.lua");
-    assert!(message.contains("is no plan but what --policy takes"), "{message}");
+    assert!(message.contains("which is not a plan; run softvt SUITE.lua --policy"), "{message}");
 }
 
 #[test]
