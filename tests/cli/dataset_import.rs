@@ -145,10 +145,7 @@ fn invalid_imports_are_refused_and_write_nothing() {
         ("x.lua none.hdf5", "cannot read none.hdf5"),
         ("x.lua x.lua", "x.lua is not an HDF5 file"),
         ("x.lua odd.hdf5", "odd.hdf5: demo_0: it is of \"sing\", and x.lua has no such task"),
-        (
-            "x.lua torn.hdf5",
-            "torn.hdf5: /data/demo_0/obs/eef_pose: step 9: no quaternion w x y z of length 1",
-        ),
+        ("x.lua torn.hdf5", "torn.hdf5: /data/demo_0/obs/eef_pose: step 9: not a unit quaternion w x y z"),
         ("x.lua odd.hdf5 --task 7", "--task 7: suite one has no such task"),
         ("x.lua odd.hdf5 --task wait", "--task wait: that is 2 tasks; name the one"),
         (

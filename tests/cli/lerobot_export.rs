@@ -186,7 +186,7 @@ fn invalid_exports_are_refused_and_leave_nothing() {
         ("full --format lerobot-v2.1 --out x", "full: dataset.json: it is missing; expected the folder"),
         ("nowhere --format lerobot-v2.1 --out x", "nowhere: dataset.json: it is missing"),
         ("broken --format lerobot-v2.1 --out x", "broken: the recording was interrupted"),
-        ("plain --format lerobot-v2.1 --out x", "record it with --images hdf5"),
+        ("plain --format lerobot-v2.1 --out x", "record with --images hdf5"),
     ] {
         let told = project.refusal(&format!("dataset export {words}"));
         assert!(told.contains(said), "{words}: {told}");

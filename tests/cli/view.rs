@@ -238,7 +238,7 @@ fn blank_folders_are_refused() {
         let mut command = project.command("");
         command.args(words);
         let message = refusal(said(command), "--out");
-        assert!(message.contains("--out: expected a folder"), "{message}");
+        assert!(message.contains("for '--out <DIR>': expected a folder"), "{message}");
     }
     assert_eq!(fs::read_dir(project.path("")).expect("a folder").count(), 1, "x.lua alone");
 }

@@ -7,13 +7,14 @@ use clap::{Args, Subcommand, ValueEnum, value_parser};
 use super::{
     policy::{GripperArg, PolicyArgs},
     run::ScriptArgs,
+    values::parse_folder,
 };
 
 // Flags of all commands that create datasets.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct RecordingArgs {
     /// Output folder: a new one, or with --resume that of an interrupted recording
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_parser = parse_folder)]
     pub out: PathBuf,
     /// Where images are stored: in the HDF5 files and as videos, or only as videos
     #[arg(long, value_name = "WHERE", default_value = "hdf5")]
@@ -85,7 +86,7 @@ pub(crate) struct ExportArgs {
     #[arg(long, value_name = "FORMAT")]
     pub format: ExportFormat,
     /// Output folder; must be new
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_parser = parse_folder)]
     pub out: PathBuf,
     /// Seventh number of an action: continuous closure, or binary: 1 to hold, 0 otherwise
     #[arg(long, value_name = "MODE", default_value = "continuous")]

@@ -20,6 +20,7 @@ pub(crate) use policy::{
     DEFAULT_PROFILE, GripMode, GripperArg, POLICIES, PolicyArgs, PolicySpec, ProtocolArg,
 };
 pub(crate) use run::{CheckArgs, RunArgs, ScriptArgs, ServeArgs, ViewArgs};
+use values::parse_folder;
 pub(crate) use values::{
     EpisodeSelector, RequiredMetric, Requirement, RequirementOperator, Shard, TraceDetail, VideoSelection,
 };
@@ -83,7 +84,7 @@ pub(crate) struct ReportArgs {
     #[arg(value_name = "RUN", required = true)]
     pub runs: Vec<PathBuf>,
     /// Output folder
-    #[arg(long, value_name = "DIR", default_value = "report")]
+    #[arg(long, value_name = "DIR", default_value = "report", value_parser = parse_folder)]
     pub out: PathBuf,
 }
 
@@ -91,6 +92,7 @@ pub(crate) struct ReportArgs {
 #[derive(Args, Debug)]
 pub(crate) struct MergeArgs {
     /// New folder
+    #[arg(value_parser = parse_folder)]
     pub out: PathBuf,
     /// Folders of all shards
     #[arg(value_name = "SHARD", required = true)]

@@ -6,7 +6,7 @@ use clap::{Args, Parser, ValueEnum, value_parser};
 
 use super::{
     policy::PolicyArgs,
-    values::{Requirement, Shard, TraceDetail, VideoSelection, parse_count, parse_seed},
+    values::{Requirement, Shard, TraceDetail, VideoSelection, parse_count, parse_folder, parse_seed},
 };
 use crate::benchmark::seed::Split;
 
@@ -72,7 +72,7 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "WHICH", num_args = 0..=1, require_equals = true, default_missing_value = "failed")]
     pub video: Option<VideoSelection>,
     /// Output folder; must not already contain a run [default: the next runs/<suite>-<policy>-NNN]
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_parser = parse_folder)]
     pub out: Option<PathBuf>,
     /// Continue the interrupted run in --out, if there is one
     #[arg(long, requires = "out")]
@@ -116,7 +116,7 @@ pub(crate) struct ViewArgs {
     #[arg(long)]
     pub native: bool,
     /// Output folder
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_parser = parse_folder)]
     pub out: PathBuf,
 }
 

@@ -1,6 +1,6 @@
 //! Types of single values, with their parsers.
 
-use std::{fmt, str::FromStr};
+use std::{fmt, path::PathBuf, str::FromStr};
 
 use clap::ValueEnum;
 
@@ -8,6 +8,14 @@ use clap::ValueEnum;
 pub(super) fn parse_count(word: &str) -> Result<u32, String> {
     let count = word.parse().ok().filter(|count| *count > 0);
     count.ok_or_else(|| format!("expected a whole number of at least 1 and at most {}", u32::MAX))
+}
+
+/// Parses the path of an output folder.
+pub(super) fn parse_folder(word: &str) -> Result<PathBuf, String> {
+    if word.trim().is_empty() {
+        return Err("expected a folder; \".\" is the working folder".to_owned());
+    }
+    Ok(word.into())
 }
 
 pub(super) fn parse_seed(word: &str) -> Result<u64, String> {

@@ -26,7 +26,7 @@ use crate::{
 /// # Errors
 /// The script is not a suite, the task or episode fails, or a file cannot be rendered or written.
 pub(crate) fn run(args: &ViewArgs) -> Result<(), CliError> {
-    let config = RunConfig::of_script(&args.script)?.with_out(Some(args.out.clone()))?;
+    let config = RunConfig::of_script(&args.script)?.with_out(Some(args.out.clone()));
     let tasks = vec![args.task.clone()];
     let config = RunConfig { tasks, policy: PolicyConfig::load(&args.policy)?, ..config };
     let refuse = |message: String| Err(CliError::input(message).prefixed(config.file.display()));

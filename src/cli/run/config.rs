@@ -104,20 +104,13 @@ impl RunConfig {
             json: args.json,
             ..Self::of_script(&args.script)?
         };
-        let config = config.with_out(args.out.clone())?;
+        let config = config.with_out(args.out.clone());
         Ok(Self { policy: PolicyConfig::load(&args.policy)?, ..config })
     }
 
     /// Sets the output folder.
-    ///
-    /// # Errors
-    /// Its path is blank.
-    pub(crate) fn with_out(self, out: Option<PathBuf>) -> Result<Self, CliError> {
-        if out.as_ref().is_some_and(|dir| dir.to_string_lossy().trim().is_empty()) {
-            let message = "--out: expected a folder, got \"\"; \".\" is the working folder";
-            return Err(CliError::input(message).prefixed(self.file.display()));
-        }
-        Ok(Self { out, ..self })
+    pub(crate) fn with_out(self, out: Option<PathBuf>) -> Self {
+        Self { out, ..self }
     }
 
     /// Name of a suite in results. A rigid twin has a name of its own, though its initial states are those of the suite.

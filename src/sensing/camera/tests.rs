@@ -350,7 +350,7 @@ fn invalid_cameras_are_rejected_with_the_name_of_the_field() {
         (Camera { near_m: 0.0, ..good.clone() }, "near: expected at least 0.0001 m, got 0 m"),
         (Camera { far_m: 0.01, ..good.clone() }, "far: expected more than near (0.05 m), got 0.01 m"),
         (Camera { pose: nowhere, ..good.clone() }, "position: expected metres within ±1e6"),
-        (Camera { mount: CameraMount::Hand, ..good.clone() }, "attachment: expected a hand in the state"),
+        (Camera { mount: CameraMount::Hand, ..good.clone() }, "mount: expected a hand in the state"),
     ] {
         let error = Renderer::default().render(&scene, &FrameView::empty(), &camera).expect_err(words);
         assert!(error.to_string().contains(words), "{error}");

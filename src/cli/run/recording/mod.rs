@@ -56,7 +56,7 @@ impl RecordingConfig {
         recording: &RecordingArgs,
         tasks: &[String],
     ) -> Result<Self, CliError> {
-        let run = RunConfig::of_script(script)?.with_out(Some(recording.out.clone()))?;
+        let run = RunConfig::of_script(script)?.with_out(Some(recording.out.clone()));
         Ok(Self {
             run: RunConfig {
                 tasks: tasks.to_vec(),
