@@ -988,7 +988,7 @@ local Object = {}
 ---@return number?
 function Object:mass(part) end
 
----Multiplies the density of a soft or rigid body, or of every moving part. What never moves is unchanged.
+---Multiplies the density of a soft or rigid body, or of every moving part. Static objects are unchanged.
 ---@param factor number
 function Object:scale_mass(factor) end
 

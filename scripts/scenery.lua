@@ -63,13 +63,13 @@ local function walls(scene, floor_z)
   scene:add { name = "side_skirting", asset = skirting, xyz = { 0.75, 2.5, floor_z }, yaw = -math.pi / 2 }
 end
 
--- A room for scenes supported by the floor, z = 0: walls behind the robot and on the side away from the light. The floor
+-- Walls for scenes supported by the floor, z = 0: walls behind the robot and on the side away from the light. The floor
 -- itself is an asset, assets/floor.lua.
 function scenery.floor_room(scene)
   walls(scene, 0)
 end
 
--- A room for scenes supported by a table with its top at z = 0, with the robot on a stand next to it.
+-- Walls for scenes supported by a table with its top at z = 0, with the robot on a stand next to it.
 function scenery.table_room(scene)
   local floor_z = -HIGH - 0.05
   scene:add { name = "floor", asset = shaded_floor, xyz = { 0.75, 0, floor_z } }

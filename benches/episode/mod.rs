@@ -18,7 +18,7 @@ pub fn load() -> Loaded {
     script::load(&path, &[]).expect("the suite loads")
 }
 
-/// The first episode of a task, and who drives it.
+/// The first episode of a task and its controller.
 pub fn open(loaded: &Loaded, task: usize, film: bool) -> (EpisodeSpec, ExpertController) {
     let Plan::Suite(suite) = &loaded.plan else { panic!("{SUITE} is a suite") };
     let request = EpisodeRequest {

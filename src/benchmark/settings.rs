@@ -118,7 +118,7 @@ fn fields(group: &Value) -> Vec<String> {
     group.as_object().map_or(Vec::new(), |o| o.keys().cloned().collect())
 }
 
-/// Why a setting cannot have a value; a model that cannot be without a field of its own is told how to be given with it.
+/// Error message of a setting that cannot take a value. For a model with a required field it says how to set both.
 fn refusal(path: &str, value: &str, error: &str) -> String {
     let missing = error.strip_prefix("missing field `").and_then(|rest| rest.split('`').next());
     let group = path.strip_suffix(".model").unwrap_or(path);

@@ -22,11 +22,6 @@ pub(crate) fn notice(message: impl std::fmt::Display) {
     text::eprint_line(&format!("softvt: {message}"));
 }
 
-/// Formats a count with its noun: "1 task", "3 tasks".
-pub(crate) fn counted(count: usize, noun: &str) -> String {
-    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
-}
-
 /// Progress of a list of jobs on standard error: a bar on a terminal, one line per job elsewhere.
 pub(crate) struct Progress {
     bar: Option<ProgressBar>,

@@ -221,7 +221,7 @@ fn number_nodes(mesh: &mut VoxelMesh) {
 
 impl VoxelMesh {
     /// Embeds a rest point `p_o` (object frame, m) in the element that contains it, or in the nearest element up to two
-    /// edges away; `None` if there is none.
+    /// edges away; `None` without such a voxel.
     ///
     /// Points slightly outside of all elements (in slivers that are less than 1 % of a voxel) are extrapolated: local
     /// coordinates may leave [0, 1] by 0.3, which keeps the rest position exact. Farther away they are clamped.

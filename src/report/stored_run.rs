@@ -36,7 +36,7 @@ pub enum StoredRunError {
         "{error}; this run was written by softvt {version}, and this is softvt {VERSION}: read it with that version"
     )]
     Version { error: Box<Self>, version: String },
-    #[error("there is no folder {dir}")]
+    #[error("folder {dir} does not exist")]
     Missing { dir: String },
     #[error("{path} is a file; give the folder of a run")]
     File { path: String },
@@ -112,7 +112,7 @@ impl StoredRun {
 /// Reads the run in a folder, or the runs in its subfolders, sorted by name.
 ///
 /// # Errors
-/// There is no run, or one cannot be read.
+/// The folder contains no run, or a run cannot be read.
 pub fn load(dir: &Path) -> Result<Vec<StoredRun>, StoredRunError> {
     if dir.join(RUN).is_file() {
         return Ok(vec![load_one(dir)?]);

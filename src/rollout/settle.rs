@@ -40,7 +40,7 @@ pub enum SettleError {
     Fell {
         /// The object.
         object: String,
-        /// How far it has fallen, m.
+        /// Distance that it has fallen, m.
         fallen: f64,
         /// `file:line` where the object was placed; empty if no script placed it.
         placed_at: String,

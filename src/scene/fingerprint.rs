@@ -54,7 +54,7 @@ fn rounded(text: &str) -> String {
     out
 }
 
-/// Length of the number at the beginning of `text`, in bytes; 0 if there is no number.
+/// Length of the number at the beginning of `text`, in bytes; 0 if it does not begin with a number.
 fn number_length(text: &str) -> usize {
     let digits = text.strip_prefix('-').unwrap_or(text);
     if !digits.starts_with(|c: char| c.is_ascii_digit()) {

@@ -71,7 +71,7 @@ impl ServerConfig<'_> {
         };
         let names = || self.suites.iter().map(|suite| suite.name.as_str()).collect::<Vec<_>>().join(", ");
         found.ok_or_else(|| {
-            format!("suite {:?}: there is none; served are {}", name.unwrap_or(""), names()).into()
+            format!("suite {:?} is not served; available: {}", name.unwrap_or(""), names()).into()
         })
     }
 

@@ -85,9 +85,7 @@ impl Request {
             "get_state" => fields(&[]).map(|_| Self::GetState),
             "set_state" => state(&fields(&["state"])?, config),
             "close" => fields(&[]).map(|_| Self::Close),
-            other => {
-                Err(format!("type {:?}: there is none; expected one of {TYPES}", shortened(other)).into())
-            }
+            other => Err(format!("type {:?} is unknown; expected one of {TYPES}", shortened(other)).into()),
         }
     }
 }

@@ -48,7 +48,7 @@ fn the_first_good_attempts_are_kept() {
     let card = project.json("a/dataset.json");
     let task = &card["tasks"][0];
     let attempts = task["attempts"].as_u64().expect("a count");
-    let rejected = task["rejected"]["goal not reached"].as_u64().expect("some start beside the slab");
+    let rejected = task["rejected"]["goal not reached"].as_u64().expect("some start next to the slab");
     assert_eq!((task["demos"].as_u64(), attempts), (Some(3), 3 + rejected), "{task}");
     assert!(said.contains(&format!("3 demonstrations from {attempts} attempts")), "{said}");
     let lines = project.lines("a/attempts/one/episodes.jsonl");

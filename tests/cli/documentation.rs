@@ -176,7 +176,7 @@ fn the_asset_page_is_current() {
     let project = Project::new(&[]);
     project.succeeds("scripts/asset_page.lua --images=off --out made");
     let (kept, made) = (read("docs/assets.md"), project.text("made/docs/assets.md"));
-    assert!(kept == made, "docs/assets.md is old: softvt scripts/asset_page.lua makes it anew");
+    assert!(kept == made, "docs/assets.md is out of date: run softvt scripts/asset_page.lua");
     let mut bytes = 0;
     for part in kept.split("](images/").skip(1) {
         let path = part.split(')').next().unwrap_or_default();
@@ -199,7 +199,7 @@ fn the_calibration_page_is_current() {
         let path = format!("assets/calibration/{asset}.json");
         let file = ThresholdFile::parse(&read(&path), &path).expect("a threshold file");
         let text = plot(&asset, &file.envelopes[&asset], file.limit(&asset));
-        assert_eq!(fence.text, text, "{asset}: softvt scripts/calibrate.lua makes it anew");
+        assert_eq!(fence.text, text, "{asset} is out of date: run softvt scripts/calibrate.lua");
         assert_eq!(read(&format!("assets/calibration/{asset}.txt")), text, "{asset}");
         assert!(page.contains(&format!("| [{asset}](#{asset}) | ")), "{asset}");
         assert!(text.contains("█ safe window ≤"), "{asset} has a safe window");

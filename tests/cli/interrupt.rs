@@ -40,7 +40,7 @@ fn finished_episodes_survive_an_interrupt() {
     let episodes = project.lines("run/episodes.jsonl");
     let indices: BTreeSet<_> = episodes.iter().map(|e| e["episode"].as_u64().expect("an index")).collect();
     assert!(indices.len() >= 3 && indices.len() < 100_000);
-    assert_eq!(indices.len(), episodes.len(), "no episode stands there twice");
+    assert_eq!(indices.len(), episodes.len(), "no episode is listed twice");
     let kept = format!("interrupted; {} of 100000 episodes are in run", episodes.len());
     assert!(err.contains(&kept) && err.contains("--resume --out run"), "{err}");
     assert!(!err.contains("panicked"), "{err}");

@@ -259,7 +259,7 @@ fn other_protocols_are_reported() {
     let address = server(9, |_, mut socket| {
         let _ = socket.send(packed(&Value::from(7)));
     });
-    assert!(fails(&address, "").contains("sent a number first"), "a greeting that is none");
+    assert!(fails(&address, "").contains("sent a number first"), "a greeting that is not a map");
     let address = server(9, |_, socket| answering(socket, |_, seen| Some(packed(seen))));
     let said = fails(&address, "--protocol vla-eval --policy-timeout 1");
     assert!(said.contains("vla-eval"), "{said}");

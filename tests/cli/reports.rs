@@ -83,7 +83,7 @@ fn folders_without_a_run_are_named() {
     }
     fs::remove_file(project.path("bad/none/episodes.jsonl")).expect("removed");
     for (dir, words) in [
-        ("nowhere", "there is no folder nowhere"),
+        ("nowhere", "folder nowhere does not exist"),
         ("x.lua", "x.lua is a file; give the folder of a run"),
         (
             "empty",

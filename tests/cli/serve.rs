@@ -174,7 +174,7 @@ fn a_client_runs_an_episode_to_its_end() {
     );
     assert_eq!(get(&end, "reward").as_f64(), Some(0.0));
     let record = get(get(&end, "info"), "record");
-    assert_eq!(keys(record), ["goal", "outcome", "steps"], "nothing hidden is told");
+    assert_eq!(keys(record), ["goal", "outcome", "steps"], "no hidden state is sent");
     assert!(client.refused(&step(1)).contains("the episode is over"));
     assert_eq!(client.reset(), start, "the same start again");
     assert_eq!(text(&client.ask(&of("close")), "type"), "close");
@@ -222,8 +222,8 @@ fn invalid_requests_keep_the_connection_open() {
         (Value::from(7), "is a number; expected a map"),
         (map(&[]), "has no type"),
         (map(&[("type", 5.into())]), "the type is a number"),
-        (of("fly"), "type \"fly\": there is none"),
-        (of(&long), "there is none"),
+        (of("fly"), "type \"fly\" is unknown"),
+        (of(&long), "is unknown"),
         (stepping(array(&[6], &ACTION[..6])), "shape [6]"),
         (stepping(array(&[2, 3, 7], &ACTION.repeat(6))), "shape [2, 3, 7]"),
         (stepping(array(&[0, 7], &[])), "empty"),
@@ -238,7 +238,7 @@ fn invalid_requests_keep_the_connection_open() {
         (resetting("task", Value::Nil), "no field task"),
         (resetting("episode", (-1).into()), "episode is -1"),
         (resetting("episode", 1.5.into()), "episode is 1.5"),
-        (resetting("suite", "two".into()), "suite \"two\": there is none; served are one"),
+        (resetting("suite", "two".into()), "suite \"two\" is not served; available: one"),
         (resetting("split", "test".into()), "expected validation, demonstration, experiment"),
         (resetting("epsiode", 1.into()), "no field \"epsiode\""),
         (map(&[("type", "render".into()), ("camera", "nose".into())]), "there is no camera \"nose\""),

@@ -16,7 +16,7 @@ pub fn rows(group: &str) -> Vec<Row> {
 }
 
 impl Row {
-    /// A number; NaN where there is none.
+    /// A number; NaN in empty cells.
     pub fn number(&self, key: &str) -> f64 {
         self.0[key].as_f64().unwrap_or(f64::NAN)
     }

@@ -5,7 +5,7 @@ use crate::{
     support::{Outcome, run},
 };
 
-/// A squeeze beside its reference row.
+/// A squeeze and its reference row.
 pub struct Compared {
     pub row: Row,
     pub ours: Outcome,

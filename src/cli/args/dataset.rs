@@ -16,7 +16,7 @@ pub(crate) struct RecordingArgs {
     /// Output folder: a new one, or with --resume that of an interrupted recording
     #[arg(long, value_name = "DIR", value_parser = parse_folder)]
     pub out: PathBuf,
-    /// Where images are stored: in the HDF5 files and as videos, or only as videos
+    /// Storage of images: in the HDF5 files and as videos, or only as videos
     #[arg(long, value_name = "WHERE", default_value = "hdf5")]
     pub images: ImageStorage,
     /// Leave out the true state: node positions, deformation, contacts, forces

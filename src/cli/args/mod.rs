@@ -51,7 +51,7 @@ pub(crate) enum Command {
 /// List suites, tasks, assets, policies or profiles
 #[derive(Args, Debug)]
 pub(crate) struct ListArgs {
-    /// What to list
+    /// Kind of items to list
     #[arg(value_name = "suites|tasks|assets|policies|profiles")]
     pub what: ListKind,
     /// Print JSON

@@ -10,7 +10,7 @@ use crate::{
     cli::{
         args::CheckArgs,
         error::CliError,
-        output::{counted, print},
+        output::print,
         run::{
             conditions,
             config::{RunConfig, thread_count},
@@ -23,7 +23,7 @@ use crate::{
     rollout::{AssetCache, SensorAssets, cancel, target_asset},
     scene::Asset,
     script::{self, Loaded, Scenes},
-    text,
+    text::{self, counted},
 };
 
 /// Assets that the checks of several suites share.

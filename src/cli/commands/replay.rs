@@ -6,7 +6,7 @@ use crate::{
     cli::{
         args::{EpisodeSelector, ReplayArgs},
         error::CliError,
-        output::{counted, print},
+        output::print,
         run::{
             demo_replay::{DemoRef, check_complete, demos_of, replay_demos},
             resimulate,
@@ -23,6 +23,7 @@ use crate::{
         actions,
         stored_run::{self, StoredRun},
     },
+    text::counted,
 };
 
 /// Simulates an episode of a run or a demonstration of a dataset again, by its recorded actions.

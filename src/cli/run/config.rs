@@ -11,7 +11,7 @@ use crate::{
     },
 };
 
-/// What to run, and how.
+/// Configuration of a run: script, suites, policy, settings and output.
 #[derive(Clone, Debug)]
 pub(crate) struct RunConfig {
     /// The script.

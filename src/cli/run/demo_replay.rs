@@ -8,7 +8,7 @@ use std::{
 use crate::{
     cli::{
         error::CliError,
-        output::{counted, print},
+        output::print,
         run::{config::thread_count, resimulate, stored_episode},
     },
     dataset::{
@@ -19,6 +19,7 @@ use crate::{
     parallel,
     report::stored_run::StoredRun,
     rollout::cancel,
+    text::counted,
 };
 
 /// A demonstration: its file, and its number in the file.

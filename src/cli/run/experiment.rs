@@ -11,13 +11,14 @@ use serde_json::Value;
 use crate::{
     cli::{
         error::CliError,
-        output::{Progress, counted, notice, print},
+        output::{Progress, notice, print},
         run::config::RunConfig,
     },
     files::replace,
     parallel,
     rollout::cancel,
     script::{Experiment, Loaded, Row},
+    text::counted,
 };
 
 /// Runs all points of an experiment and prints its rows.

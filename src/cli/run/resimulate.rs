@@ -3,7 +3,7 @@
 use crate::{
     cli::{
         error::CliError,
-        output::{counted, notice},
+        output::notice,
         run::{
             episode_artifacts::EpisodeArtifacts,
             policy::ControllerFactory,
@@ -17,6 +17,7 @@ use crate::{
     policy::{Action, ChunkedPolicy, builtin::RecordedPolicy},
     report::actions,
     rollout::{FinishedEpisode, cancel},
+    text::counted,
 };
 
 /// A controller factory that repeats the actions of a recorded episode, and its error if it ended with one.

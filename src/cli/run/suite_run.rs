@@ -11,7 +11,7 @@ use crate::{
     cli::{
         args::TraceDetail,
         error::{CliError, Exit},
-        output::{Progress, counted, notice},
+        output::{Progress, notice},
         run::{
             calibration::{self, Calibration},
             config::RunConfig,
@@ -42,6 +42,7 @@ use crate::{
     },
     scene::{Asset, Body},
     script::{self, Loaded},
+    text::counted,
 };
 
 /// A suite with everything that its episodes need.

@@ -119,7 +119,7 @@ struct Part {
     height: u32,
 }
 
-/// Checks a region x, y, width, height of an image; all of it if there is none.
+/// Checks a region x, y, width, height of an image; the whole image by default.
 fn part(lua: &Lua, method: &str, image: &RgbImage, region: Option<[f64; 4]>) -> mlua::Result<Part> {
     let (width, height) = image.dimensions();
     let Some(region) = region else { return Ok(Part { x: 0, y: 0, width, height }) };

@@ -414,7 +414,7 @@ class! {
                     },
                 }
             }
-            /// Multiplies the density of a soft or rigid body, or of every moving part. What never moves is unchanged.
+            /// Multiplies the density of a soft or rigid body, or of every moving part. Static objects are unchanged.
             fn scale_mass(_, this, factor: f64 = Type::Number("", Range::closed(1e-6, 1e6))) -> [] {
                 this.change_asset(|asset| asset.scale_mass(factor))
             }

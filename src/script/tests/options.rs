@@ -91,7 +91,7 @@ proptest::proptest! {
         let words: Vec<&str> = words.iter().map(String::as_str).collect();
         let said = Project::new(&[("x.lua", SCRIPT)]).load("x.lua", &words).map_err(|e| e.file);
         proptest::prop_assert!(said.is_ok() || said.is_err_and(|file| file.ends_with("x.lua")));
-        let said = Project::new(&[("x.lua", &text)]).load("x.lua", &[]).expect_err("gibberish is no plan");
+        let said = Project::new(&[("x.lua", &text)]).load("x.lua", &[]).expect_err("gibberish is not a plan");
         proptest::prop_assert!(said.file.ends_with("x.lua"), "{}", said);
     }
 }

@@ -13,7 +13,7 @@ pub struct ScriptError {
     pub file: String,
     /// Line in the file, from 1, where known.
     pub line: Option<usize>,
-    /// How to fix it.
+    /// Suggestion for a fix.
     pub hint: Option<String>,
 }
 

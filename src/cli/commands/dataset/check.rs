@@ -4,10 +4,11 @@ use crate::{
     cli::{
         args::DatasetCheckArgs,
         error::CliError,
-        output::{counted, print},
+        output::print,
         run::demo_replay::{DemoRef, check_complete, demos_of, replay_demos},
     },
     dataset::check,
+    text::counted,
 };
 
 /// Validates a dataset folder or one HDF5 file.

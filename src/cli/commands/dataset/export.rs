@@ -4,7 +4,7 @@ use crate::{
     cli::{
         args::{ExportArgs, ExportFormat, GripperArg},
         error::CliError,
-        output::{Progress, counted, print},
+        output::{Progress, print},
         run::{config::thread_count, demo_replay::check_complete},
     },
     dataset::{
@@ -12,6 +12,7 @@ use crate::{
         lerobot::{self, ExportConfig, GripperCoding, LeRobotVersion},
     },
     rollout::cancel,
+    text::counted,
 };
 
 /// Exports a recording.

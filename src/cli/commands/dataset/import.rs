@@ -11,7 +11,7 @@ use crate::{
     cli::{
         args::ImportArgs,
         error::CliError,
-        output::{counted, notice},
+        output::notice,
         run::{
             grip_recorder::GripLog,
             policy::PolicyConfig,
@@ -30,6 +30,7 @@ use crate::{
     rollout::target_asset,
     scene::{Body, InitialState},
     script,
+    text::counted,
 };
 
 /// Imports the demonstrations that the arguments name.

@@ -13,7 +13,7 @@ use crate::{
     benchmark::{Suite, Task, seed::Split},
     cli::{
         error::{CliError, Exit},
-        output::{Progress, counted},
+        output::Progress,
         run::{
             demo_selection::{START_FAILED, attempt_line, due, rejection},
             grip_recorder::GripLog,
@@ -40,6 +40,7 @@ use crate::{
     rollout::{EpisodeError, FinishedEpisode, SettleError, cancel},
     scene::InitialState,
     script::Loaded,
+    text::counted,
 };
 
 /// The attempts at each task, and which of them become demonstrations.

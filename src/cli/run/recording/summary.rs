@@ -5,17 +5,14 @@ use std::{collections::BTreeMap, fs, path::Path};
 use super::{RecordingConfig, SuiteRecording, dataset_error};
 use crate::{
     benchmark::Task,
-    cli::{
-        error::CliError,
-        output::{counted, print},
-        run::demo_selection::rejection,
-    },
+    cli::{error::CliError, output::print, run::demo_selection::rejection},
     dataset::{
         card::{Card, TaskCount, rejection_counts},
         demonstration_writer::frame_rate,
         layout::{MANIFEST, PARTS},
         manifest::{self, ManifestEntry},
     },
+    text::counted,
 };
 
 /// Writes manifest and card, and prints what the dataset contains.
