@@ -10,21 +10,30 @@ pub fn steps_per_control(dt: f64) -> u32 {
     (CONTROL_DT / dt).round().max(1.0) as u32
 }
 
+/// Error of a physics step that does not divide the control period.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "physics.dt: control runs at 20 Hz, so dt must divide {CONTROL_DT} s; got {}, near are {below:.6} and {above:.6}",
+    format_number(*dt)
+)]
+pub struct TimeStepError {
+    dt: f64,
+    below: f64,
+    above: f64,
+}
+
 /// Checks that `dt` divides [`CONTROL_DT`].
 ///
 /// # Errors
 /// It does not. The message proposes the nearest values.
-pub fn check_dt(dt: f64) -> Result<(), String> {
+pub fn check_dt(dt: f64) -> Result<(), TimeStepError> {
     let steps = f64::from(steps_per_control(dt));
     if (steps * dt - CONTROL_DT).abs() <= 1e-9 {
         return Ok(());
     }
     let (below, above) =
         (CONTROL_DT / (CONTROL_DT / dt).ceil(), CONTROL_DT / (CONTROL_DT / dt).floor().max(1.0));
-    Err(format!(
-        "physics.dt: control runs at 20 Hz, so dt must divide {CONTROL_DT} s; got {}, near are {below:.6} and {above:.6}",
-        format_number(dt)
-    ))
+    Err(TimeStepError { dt, below, above })
 }
 
 #[cfg(test)]
@@ -37,6 +46,9 @@ mod tests {
             assert_eq!(steps_per_control(dt), steps);
             assert!(check_dt(dt).is_ok());
         }
-        assert!(check_dt(1.0 / 50.0).is_err_and(|e| e.contains("0.016667") && e.contains("0.025")));
+        assert!(
+            check_dt(1.0 / 50.0)
+                .is_err_and(|e| e.to_string().contains("0.016667") && e.to_string().contains("0.025"))
+        );
     }
 }

@@ -3,11 +3,43 @@
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::control::check_dt;
+use super::control::{TimeStepError, check_dt};
 use crate::{
-    evaluation::criteria::SuccessCriteria, physics::PhysicsParams, robot::RobotSpec,
-    sensing::tactile::TactileSpec,
+    evaluation::criteria::{CriteriaError, SuccessCriteria},
+    physics::{PhysicsParams, params::ParamError},
+    robot::{RobotSpec, RobotSpecError},
+    sensing::tactile::{TactileSpec, TactileSpecError},
 };
+
+/// Error of a setting's path or value.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages describe the variants")]
+pub enum SettingsError {
+    #[error("no setting {path:?}; {group} has: {}", known.join(", "))]
+    UnknownField { path: String, group: String, known: Vec<String> },
+    #[error("no setting {path:?}; {parent} is a single value")]
+    NotAGroup { path: String, parent: String },
+    #[error("{path} is a group of settings; its fields are {}, as in {path}.{}=…", fields.join(", "), fields[0])]
+    Group { path: String, fields: Vec<String> },
+    #[error("{path}: expected {expected}, got {value:?}")]
+    Type { path: String, expected: &'static str, value: String },
+    #[error(
+        "{path}: {model} requires {field}; give both: '{group}={{\"{MODEL}\":\"{model}\",\"{field}\":…}}'"
+    )]
+    IncompleteModel { path: String, model: String, field: String, group: String },
+    #[error("{path}: {message}")]
+    Value { path: String, message: String },
+    #[error(transparent)]
+    Physics(#[from] ParamError),
+    #[error(transparent)]
+    Robot(#[from] RobotSpecError),
+    #[error(transparent)]
+    Criteria(#[from] CriteriaError),
+    #[error(transparent)]
+    Tactile(#[from] TactileSpecError),
+    #[error(transparent)]
+    TimeStep(#[from] TimeStepError),
+}
 
 /// All settings of a run. The defaults are those of the benchmark.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -29,7 +61,7 @@ impl Settings {
     ///
     /// # Errors
     /// The field does not exist, or the value has a wrong type or is out of range.
-    pub fn with(&self, path: &str, value: &str) -> Result<Self, String> {
+    pub fn with(&self, path: &str, value: &str) -> Result<Self, SettingsError> {
         self.with_all(&[(path.to_owned(), value.to_owned())])
     }
 
@@ -37,7 +69,7 @@ impl Settings {
     ///
     /// # Errors
     /// As [`Settings::with`].
-    pub fn with_all(&self, fields: &[(String, String)]) -> Result<Self, String> {
+    pub fn with_all(&self, fields: &[(String, String)]) -> Result<Self, SettingsError> {
         let mut changed = self.clone();
         for (path, value) in fields {
             changed = changed.replaced(path, value)?;
@@ -46,16 +78,25 @@ impl Settings {
         Ok(changed)
     }
 
-    fn replaced(&self, path: &str, value: &str) -> Result<Self, String> {
+    fn replaced(&self, path: &str, value: &str) -> Result<Self, SettingsError> {
         let path = &current_path(path);
-        let mut tree = serde_json::to_value(self).map_err(|e| e.to_string())?;
+        let refused = |e: serde_json::Error| refusal(path, value, &e.to_string());
+        let mut tree = serde_json::to_value(self).map_err(refused)?;
         let mut at = &mut tree;
+        let mut parents = Vec::new();
         for key in path.split('.') {
             let known = fields(at);
-            at = at.get_mut(key).ok_or_else(|| match known.is_empty() {
-                true => format!("there is no setting {path}; what stands before {key} is no group"),
-                false => format!("there is no setting {path}; {key} could be one of {}", known.join(", ")),
+            at = at.get_mut(key).ok_or_else(|| {
+                let group = parents.join(".");
+                match known.is_empty() {
+                    true => SettingsError::NotAGroup { path: path.clone(), parent: group },
+                    false => {
+                        let group = if group.is_empty() { "the root".to_owned() } else { group };
+                        SettingsError::UnknownField { path: path.clone(), group, known }
+                    }
+                }
             })?;
+            parents.push(key);
         }
         let parsed = serde_json::from_str::<Value>(value);
         *at = match (&at, parsed) {
@@ -63,30 +104,28 @@ impl Settings {
             // A setting with several models can be given by the name of a model alone.
             (Value::Object(known), Err(_)) if known.contains_key(MODEL) => json!({ MODEL: value }),
             (Value::Object(_), _) => {
-                let known = fields(at);
-                return Err(format!(
-                    "{path} is a group of settings, not one; its fields are {}, as in {path}.{}=…",
-                    known.join(", "),
-                    known[0]
-                ));
+                return Err(SettingsError::Group { path: path.clone(), fields: fields(at) });
             }
             (_, Ok(value)) => value,
             (Value::String(_), Err(_)) => Value::String(value.to_owned()),
-            _ => return Err(format!("{path}: expected a number, true or false, got {value:?}")),
+            (present, Err(_)) => {
+                let expected = if present.is_boolean() { "true or false" } else { "a number" };
+                return Err(SettingsError::Type { path: path.clone(), expected, value: value.to_owned() });
+            }
         };
-        serde_json::from_value(tree).map_err(|e| refusal(path, value, &e.to_string()))
+        serde_json::from_value(tree).map_err(refused)
     }
 
     /// Checks the ranges of all parameters.
     ///
     /// # Errors
     /// The first parameter out of range.
-    pub fn check(&self) -> Result<(), String> {
-        self.robot.validate().map_err(|e| e.to_string())?;
-        self.criteria.check().map_err(|e| e.to_string())?;
-        self.tactile.validate().map_err(|e| e.to_string())?;
-        self.physics.check().map_err(|e| e.to_string())?;
-        check_dt(self.physics.dt)
+    pub fn check(&self) -> Result<(), SettingsError> {
+        self.robot.validate()?;
+        self.criteria.check()?;
+        self.tactile.validate()?;
+        self.physics.check()?;
+        Ok(check_dt(self.physics.dt)?)
     }
 }
 
@@ -118,15 +157,17 @@ fn fields(group: &Value) -> Vec<String> {
     group.as_object().map_or(Vec::new(), |o| o.keys().cloned().collect())
 }
 
-/// Error message of a setting that cannot take a value. For a model with a required field it says how to set both.
-fn refusal(path: &str, value: &str, error: &str) -> String {
+/// Error of a setting that cannot take a value. For a model with a required field it says how to set both.
+fn refusal(path: &str, value: &str, error: &str) -> SettingsError {
     let missing = error.strip_prefix("missing field `").and_then(|rest| rest.split('`').next());
-    let group = path.strip_suffix(".model").unwrap_or(path);
     match missing {
-        Some(field) if !value.contains('{') => format!(
-            "{path}: {value} cannot be without {field}; give both: '{group}={{\"{MODEL}\":\"{value}\",\"{field}\":…}}'"
-        ),
-        _ => format!("{path}: {error}"),
+        Some(field) if !value.contains('{') => SettingsError::IncompleteModel {
+            path: path.to_owned(),
+            model: value.to_owned(),
+            field: field.to_owned(),
+            group: path.strip_suffix(".model").unwrap_or(path).to_owned(),
+        },
+        _ => SettingsError::Value { path: path.to_owned(), message: error.to_owned() },
     }
 }
 
@@ -136,26 +177,28 @@ mod tests {
     use crate::sensing::tactile::{FotsSpec, MarkerModel, OpticsModel};
 
     #[test]
-    fn one_setting_changes_and_a_wrong_one_says_what_there_is() {
+    fn one_setting_changes_and_an_unknown_one_lists_the_known_ones() {
         let settings = Settings::default();
         let changed = settings.with("robot.gripper.effort", "0.2").expect("a setting");
         assert_eq!(changed.robot.gripper.effort, 0.2);
-        assert!(settings.with("robot.gripper.efort", "0.2").is_err_and(|e| e.contains("effort")));
+        assert!(settings.with("robot.gripper.efort", "0.2").is_err_and(|e| e.to_string().contains("effort")));
         assert_eq!(
-            settings.with("tactile", "1").expect_err("a group"),
-            "tactile is a group of settings, not one; its fields are gel, view, optics, shadows, markers, as in \
+            settings.with("tactile", "1").expect_err("a group").to_string(),
+            "tactile is a group of settings; its fields are gel, view, optics, shadows, markers, as in \
              tactile.gel=…"
         );
         assert_eq!(
-            settings.with("physics.dt.x", "1").expect_err("no group"),
-            "there is no setting physics.dt.x; what stands before x is no group"
+            settings.with("physics.dt.x", "1").expect_err("a field of a number").to_string(),
+            "no setting \"physics.dt.x\"; physics.dt is a single value"
         );
-        assert!(settings.with("physics.dt", "-1").is_err_and(|e| e.contains("physics.dt")));
+        assert!(settings.with("physics.dt", "-1").is_err_and(|e| e.to_string().contains("physics.dt")));
         let pads =
             |mu: &str| ["static_mu", "dynamic_mu"].map(|key| (format!("robot.pads.{key}"), mu.to_owned()));
         assert!(settings.with("robot.pads.static_mu", "0").is_err(), "the dynamic one would be above it");
         assert_eq!(settings.with_all(&pads("0")).expect("both at once").robot.pads.dynamic_mu, 0.0);
-        assert!(settings.with("physics.dt", "fast").is_err_and(|e| e.contains("number")));
+        assert!(
+            settings.with("physics.dt", "fast").is_err_and(|e| e.to_string().contains("expected a number"))
+        );
     }
 
     #[test]
@@ -170,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn a_model_is_chosen_by_its_name_and_told_what_it_needs() {
+    fn a_model_is_chosen_by_name_and_reports_its_required_fields() {
         let settings = Settings::default();
         for path in ["tactile.markers", "tactile.markers.model"] {
             let changed = settings.with(path, "fots").expect("a model");
@@ -181,14 +224,17 @@ mod tests {
         assert_eq!(taxim.tactile.optics, OpticsModel::Taxim { tables: "calib".into() });
         for path in ["tactile.optics", "tactile.optics.model"] {
             assert_eq!(
-                settings.with(path, "taxim").expect_err("no tables"),
+                settings.with(path, "taxim").expect_err("no tables").to_string(),
                 format!(
-                    "{path}: taxim cannot be without tables; give both: \
+                    "{path}: taxim requires tables; give both: \
                      'tactile.optics={{\"model\":\"taxim\",\"tables\":…}}'"
                 )
             );
         }
         let unknown = settings.with("tactile.optics", "tracim").expect_err("no such model");
-        assert_eq!(unknown, "tactile.optics: unknown variant `tracim`, expected `polynomial` or `taxim`");
+        assert_eq!(
+            unknown.to_string(),
+            "tactile.optics: unknown variant `tracim`, expected `polynomial` or `taxim`"
+        );
     }
 }

@@ -28,7 +28,7 @@ impl RobotSpec {
     ///
     /// # Errors
     /// The first field out of its range.
-    pub fn validate(&self) -> Result<(), SpecError> {
+    pub fn validate(&self) -> Result<(), RobotSpecError> {
         let (arm, gripper, pads, ik) = (&self.arm, &self.gripper, &self.pads, &self.ik);
         positive("arm.kp", arm.kp, "N m/rad")?;
         positive("arm.kd", arm.kd, "N m s/rad")?;
@@ -46,25 +46,25 @@ impl RobotSpec {
     }
 }
 
-fn within(field: &'static str, value: f64, highest: f64) -> Result<(), SpecError> {
+fn within(field: &'static str, value: f64, highest: f64) -> Result<(), RobotSpecError> {
     if (0.0..=highest).contains(&value) {
         return Ok(());
     }
     let expected = if highest == f64::MAX { "0 or more".into() } else { format!("0 to {highest}") };
-    Err(SpecError { field, value, expected })
+    Err(RobotSpecError { field, value, expected })
 }
 
-fn positive(field: &'static str, value: f64, unit: &str) -> Result<(), SpecError> {
+fn positive(field: &'static str, value: f64, unit: &str) -> Result<(), RobotSpecError> {
     if value > 0.0 && value.is_finite() {
         return Ok(());
     }
-    Err(SpecError { field, value, expected: format!("a positive number ({unit})") })
+    Err(RobotSpecError { field, value, expected: format!("a positive number ({unit})") })
 }
 
 /// A robot parameter out of its range.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("robot.{field}: expected {expected}, got {}", crate::text::format_number(*.value))]
-pub struct SpecError {
+pub struct RobotSpecError {
     /// Path of the field below `robot`, for example `arm.kp`.
     pub field: &'static str,
     /// Value given.

@@ -94,7 +94,7 @@ fn invalid_conditions_are_reported_before_anything_runs() {
         ),
         (
             "{ name = \"a\", set = { [\"robot.gripper.efort\"] = 2 } }",
-            "suites/trial.lua: --set: there is no setting robot.gripper.efort",
+            "suites/trial.lua: --set: no setting \"robot.gripper.efort\"",
         ),
         ("{ name = \"a\", shift = { mass = -1 } }", "shift mass: expected a number in 0.01..100"),
         ("{ name = \"a\" },\n{ name = \"a\" }", "is the name of another condition; give another"),

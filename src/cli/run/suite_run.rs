@@ -102,7 +102,8 @@ impl<'a> SuiteRun<'a> {
     ) -> Result<Self, CliError> {
         let refuse =
             |flag: &str, error: String| CliError::input(error).prefixed(flag).prefixed(config.file.display());
-        let settings = suite.settings.with_all(&config.settings).map_err(|e| refuse("--set", e))?;
+        let settings =
+            suite.settings.with_all(&config.settings).map_err(|e| refuse("--set", e.to_string()))?;
         for (name, value) in &config.shifts {
             script::check_shift(&suite.shifts, name, *value).map_err(|e| refuse("--shift", e.to_string()))?;
         }
