@@ -42,7 +42,7 @@ impl FileError {
 /// # Errors
 /// A path component is not a folder, or the system refuses.
 pub fn create_folder(dir: &Path) -> Result<(), FileError> {
-    fs::create_dir_all(dir).map_err(FileError::io("make the folder", dir))
+    fs::create_dir_all(dir).map_err(FileError::io("create the folder", dir))
 }
 
 /// Creates a folder and its missing parents, and checks that files can be created in it.
@@ -53,7 +53,7 @@ pub fn create_writable_folder(dir: &Path) -> Result<(), FileError> {
     create_folder(dir)?;
     let probe = dir.join(".softvt");
     let created = File::create(&probe).and_then(|_| fs::remove_file(&probe));
-    created.map_err(FileError::io("write into", dir))
+    created.map_err(FileError::io("write to", dir))
 }
 
 /// The folders that [`create_folder`] would create for `dir`, deepest first.

@@ -1,7 +1,7 @@
 //! NumPy's array files: `.npy` (`numpy.lib.format`) and arrays of an `.npz` archive.
 //!
-//! Read are arrays of integers and floating-point numbers in C order and little endian; written is format 1.0. The crate
-//! `npyz` does the same and more, but brings a second version of `zip`, `pest` and `num-bigint` for what is little here.
+//! Reads arrays of integers and floating-point numbers in C order and little endian; writes format 1.0. The crate
+//! `npyz` does the same and more, but brings a second version of `zip`, `pest` and `num-bigint` for little code here.
 
 use std::{
     fmt::Write,
@@ -32,13 +32,13 @@ pub struct NpyArray {
     pub dtype: String,
     /// Lengths of the axes, slowest first.
     pub shape: Vec<usize>,
-    /// Elements, as `dtype` says.
+    /// Raw elements of type `dtype`.
     pub data: Vec<u8>,
 }
 
 /// Reasons why bytes are not an array that can be read.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[allow(missing_docs)] // The messages say it.
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum NpyError {
     #[error("not an .npy array")]
     Magic,
@@ -60,7 +60,7 @@ pub enum NpyError {
 
 /// Reasons why an array of an `.npz` archive cannot be read; every message names the file.
 #[derive(Debug, thiserror::Error)]
-#[allow(missing_docs)] // The messages say it.
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum NpzError {
     #[error("{path}: {source}")]
     Io { path: PathBuf, source: std::io::Error },

@@ -85,7 +85,7 @@ pub struct Shift {
     pub unit: String,
     /// Value without effect.
     pub default: f64,
-    /// Least allowed value.
+    /// Minimum allowed value.
     pub min: Option<f64>,
     /// Largest allowed value.
     pub max: Option<f64>,

@@ -9,9 +9,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SuccessCriteria {
-    /// Least force that counts as contact, of a pad, another part of the robot or a support, N.
+    /// Minimum force that counts as contact, of a pad, another part of the robot or a support, N.
     pub touch_force_n: f64,
-    /// Least rise of a body's lowest point above its settled height that counts as lifted, m.
+    /// Minimum rise of a body's lowest point above its settled height that counts as lifted, m.
     pub lift_height_m: f64,
     /// Time without pad contact after which a grasp may count as lost, s (0.15 s: three control steps).
     pub lost_contact_s: f64,
@@ -23,7 +23,7 @@ pub struct SuccessCriteria {
     pub release_margin_m: f64,
     /// Largest allowed travel of a held contact patch along a pad, m. Reported as NoSlip, not part of NoDrop.
     pub slip_m: f64,
-    /// Least share of the target's weight that the goal must carry, 0 to 1.
+    /// Minimum share of the target's weight that the goal must carry, 0 to 1.
     pub support_share: f64,
     /// Distance of the centre beyond the goal's edge at which a placed object has left the goal, m.
     pub leave_margin_m: f64,

@@ -32,7 +32,7 @@ impl GoalRegion {
     /// True if a centre at `centre_w` is over (`On`) or inside (`In`) the region of an object at `object_w`, enlarged by
     /// `margin_m` on every side.
     ///
-    /// `On` is a horizontal distance in the world frame, whatever the tilt of the object and the height of the centre. `In`
+    /// `On` is a horizontal distance in the world frame, independent of the object's tilt and height. `In`
     /// is a box in the frame of the object.
     pub fn contains(&self, object_w: &Pose, centre_w: &Vec3, margin_m: f64) -> bool {
         match self {

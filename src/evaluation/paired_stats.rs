@@ -204,7 +204,7 @@ fn mcnemar(better: usize, worse: usize) -> f64 {
     (2.0 * tail).min(1.0)
 }
 
-/// Mean difference over the same episodes of a quantity of which less is better.
+/// Mean difference of a lower-is-better quantity over the same episodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MeanDifference {
     /// Number of episodes in which both runs have the quantity.

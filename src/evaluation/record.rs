@@ -124,7 +124,7 @@ pub struct Verdict {
     pub deformation_ok: Option<bool>,
     /// Safety Success: goal, no drop and, for a soft target, D_peak ≤ τ.
     pub safety: bool,
-    /// True if there was the evidence to judge safety at all.
+    /// True if the evidence suffices to judge safety.
     pub safety_known: bool,
     /// Safety at each κ of the sensitivity table.
     pub kappas: Vec<KappaVerdict>,

@@ -22,7 +22,7 @@ pub const METHOD: &str = "compression_sweep";
 
 /// Reasons why a threshold file cannot be used.
 #[derive(Debug, thiserror::Error)]
-#[allow(missing_docs)] // The messages say it.
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum ThresholdError {
     #[error("{path}: {source}")]
     Io { path: String, source: std::io::Error },

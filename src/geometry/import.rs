@@ -28,7 +28,7 @@ pub enum MeshFormat {
 }
 
 /// Failure to import a mesh. The caller adds the name of the file.
-#[allow(missing_docs)] // The messages say it.
+#[allow(missing_docs, reason = "the messages describe the variants")]
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ImportError {
     #[error("\"{0}\" is not a supported mesh format; give an .obj, .stl or .glb file")]

@@ -16,7 +16,7 @@ pub struct Mesh {
 }
 
 /// Reason why a mesh does not bound a solid.
-#[allow(missing_docs)] // The messages say it.
+#[allow(missing_docs, reason = "the messages describe the variants")]
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MeshError {
     #[error("the mesh is empty: it has no triangles; export a closed surface")]

@@ -101,14 +101,14 @@ pub struct VoxelSpec {
 }
 
 /// Failure to build a voxel mesh.
-#[allow(missing_docs)] // The messages say it.
+#[allow(missing_docs, reason = "the messages describe the variants")]
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum VoxelMeshError {
     #[error(transparent)]
     Shape(#[from] ShapeError),
     #[error("resolution is {0}; give 1 to {MAX_RESOLUTION} voxels along the longest edge")]
     Resolution(usize),
-    #[error("the shape is empty: nothing of it is left; check what is subtracted or intersected")]
+    #[error("the shape is empty; check its subtractions and intersections")]
     Empty,
     #[error(
         "no point of a grid of {:.3} mm lies inside: the shape is empty (check what is subtracted or intersected) or \

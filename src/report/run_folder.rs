@@ -277,7 +277,7 @@ mod tests {
         let file = root.path().join("file");
         fs::write(&file, "x").unwrap();
         let error = RunFolder::create(&file.join("run")).unwrap_err().to_string();
-        assert!(error.starts_with("cannot make the folder") && error.contains("file/run"), "{error}");
+        assert!(error.starts_with("cannot create the folder") && error.contains("file/run"), "{error}");
     }
 
     #[test]

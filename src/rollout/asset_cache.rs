@@ -21,7 +21,7 @@ use crate::{
     scene::{Asset, SoftMaterial},
 };
 
-/// Finite-element models of assets, and what takes a search over their shapes: bounds, masses, walls, where their skin can touch.
+/// Finite-element models of assets, and expensive queries of their shapes: bounds, mass, wall thickness, contact samples.
 #[derive(Clone, Debug, Default)]
 pub struct AssetCache {
     models: SharedCache<Arc<Asset>, Arc<FemModel>>,
@@ -116,7 +116,7 @@ impl AssetCache {
     }
 }
 
-/// Least thickness of the walls of moving parts, m. Other bodies can pass through thinner ones between two steps.
+/// Minimum thickness of the walls of moving parts, m. Other bodies can pass through thinner ones between two steps.
 pub(super) const MIN_PART_WALL: f64 = 4e-3;
 /// Step of the search for the far side of a wall, m.
 const WALL_STEP: f64 = 2e-4;

@@ -10,9 +10,9 @@ use crate::{
     text::format_number,
 };
 
-/// Least thickness of rigid walls, m. Other bodies can pass through thinner ones between two steps.
+/// Minimum thickness of rigid walls, m. Other bodies can pass through thinner ones between two steps.
 const MIN_WALL: f64 = 2e-3;
-/// Least length of the longest side of an object, m. Less is nearly always a wrong scale.
+/// Minimum length of the longest side of an object, m. Less is nearly always a wrong scale.
 const MIN_SIZE: f64 = 1e-3;
 
 fn check_scale(object: &Object, cache: &AssetCache) -> Result<(), BuildError> {

@@ -75,7 +75,7 @@ pub enum BuildError {
         depth: f64,
     },
     /// An object would fall out of the world.
-    #[error("object {0} has nothing below it; put it above what it is to rest on")]
+    #[error("object {0} has nothing below it; place it above a support")]
     NothingBelow(String),
     /// An error about an object that a script placed.
     #[error("{place}: {source}")]

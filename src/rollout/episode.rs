@@ -167,7 +167,7 @@ pub struct Episode {
 #[derive(Clone, Copy, Default)]
 struct NewtonCount {
     total: u64,
-    /// Most in one physics step.
+    /// Maximum in one physics step.
     max: u32,
 }
 

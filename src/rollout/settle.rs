@@ -35,7 +35,7 @@ pub enum SettleError {
     /// An object fell below all fixed objects.
     #[error(
         "object {object} fell out of the world: there was nothing below it, and after {SETTLE_TIMEOUT} s of settling it is \
-         {fallen:.1} m lower; put it above what it is to rest on"
+         {fallen:.1} m lower; place it above a support"
     )]
     Fell {
         /// The object.

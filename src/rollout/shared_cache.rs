@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex};
 
 use crate::parallel::lock;
 
-/// Most entries. A suite has a few dozen assets, but a layout with random appearance adds new ones of several megabytes in
+/// Maximum number of entries. A suite has a few dozen assets, but a layout with random appearance adds new ones of several megabytes in
 /// every episode.
 const MAX_ENTRIES: usize = 64;
 

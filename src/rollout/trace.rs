@@ -50,7 +50,7 @@ pub struct ObjectTrace {
     pub quaternion_w: [f64; 4],
     /// D, % of the settled bounding-box diagonal; null for a rigid object.
     pub d_pct: Option<f64>,
-    /// Least determinant of the deformation gradient; null for a rigid object.
+    /// Minimum determinant of the deformation gradient; null for a rigid object.
     pub min_det_f: Option<f64>,
     /// True if the body sleeps.
     pub asleep: bool,

@@ -14,11 +14,11 @@ use crate::{
     },
 };
 
-/// Most actions of one step, which bounds the time until its response.
+/// Maximum number of actions of one step, which bounds the time until its response.
 const MAX_STEP_ACTIONS: usize = 1000;
-/// Most actions of a state; longer than any episode.
+/// Maximum number of actions of a state; longer than any episode.
 const MAX_STATE_ACTIONS: usize = 50_000;
-/// Most characters of a client's own text in an error message.
+/// Maximum number of characters of a client's own text in an error message.
 const MAX_QUOTED_CHARS: usize = 80;
 /// 2^53: from here on not every whole number is a double.
 const MAX_EXACT: f64 = 9_007_199_254_740_992.0;
@@ -200,7 +200,7 @@ impl<'a> Fields<'a> {
     }
 
     fn required<T>(&self, name: &str, value: Option<T>) -> Result<T, RequestError> {
-        value.ok_or_else(|| self.error(&format!("it has no field {name}")))
+        value.ok_or_else(|| self.error(&format!("missing field {name}")))
     }
 
     fn text(&self, name: &str) -> Result<Option<String>, RequestError> {

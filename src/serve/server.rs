@@ -192,7 +192,7 @@ fn respond(session: &mut ClientSession, config: &ServerConfig, message: &Value) 
         Ok(Err(error)) => (response::error(&error.0), false),
         Err(_) => {
             session.discard_episode();
-            (response::error("internal error of the server; the episode is lost: reset"), false)
+            (response::error("internal error of the server; the episode was discarded; send reset"), false)
         }
     }
 }

@@ -66,7 +66,7 @@ impl<'a> ClientSession<'a> {
 
     fn live(&mut self, kind: &str) -> Result<&mut LiveEpisode, RequestError> {
         let live = self.live.as_mut();
-        live.ok_or_else(|| format!("{kind}: there is no episode yet; reset first").into())
+        live.ok_or_else(|| format!("{kind}: no episode yet; send reset first").into())
     }
 
     /// Brings the episode to a state: from the nearest copy that leads to it, or from the start of the episode.

@@ -36,9 +36,9 @@ fn invalid_scenes_are_found_without_settling() {
     });
     assert_snapshot!(inside, @"x.lua: task 0, episode 0: x.lua:6: camera in: position: it is inside cube; move it out");
     let beside = of(Small { at: "xyz = { 0, -1, 0 }", ..Small::default() });
-    assert_snapshot!(beside, @"x.lua:6: object cube has nothing below it; put it above what it is to rest on");
+    assert_snapshot!(beside, @"x.lua:6: object cube has nothing below it; place it above a support");
     let below = of(Small { at: "xyz = { 0, 0.1, -0.3 }", ..Small::default() });
-    assert_snapshot!(below, @"x.lua:6: object cube has nothing below it; put it above what it is to rest on");
+    assert_snapshot!(below, @"x.lua:6: object cube has nothing below it; place it above a support");
     let base = of(Small { at: "xyz = { -0.6, 0, 0.05 }", ..Small::default() });
     assert_snapshot!(base, @"x.lua:6: object cube starts inside of the robot's base; move it away");
     let dust = of(Small {

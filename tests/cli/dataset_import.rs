@@ -147,10 +147,10 @@ fn invalid_imports_are_refused_and_write_nothing() {
         ("x.lua odd.hdf5", "odd.hdf5: demo_0: it is of \"sing\", and x.lua has no such task"),
         ("x.lua torn.hdf5", "torn.hdf5: /data/demo_0/obs/eef_pose: step 9: not a unit quaternion w x y z"),
         ("x.lua odd.hdf5 --task 7", "--task 7: suite one has no such task"),
-        ("x.lua odd.hdf5 --task wait", "--task wait: that is 2 tasks; name the one"),
+        ("x.lua odd.hdf5 --task wait", "--task wait: matches 2 tasks; select the one of the demonstrations"),
         (
             "x.lua OWN --seed 3",
-            "it was recorded with the seed 0, and this import is of the seed 3; give --seed 0",
+            "it was recorded with the seed 0, and this import uses the seed 3; add --seed 0",
         ),
         ("two.lua OWN", "it is of \"wait\" of the suite one, and two.lua has no such task"),
         ("world.lua OWN", "softvt dataset import needs a suite"),
@@ -169,6 +169,9 @@ fn invalid_imports_are_refused_and_write_nothing() {
     assert!(said.contains("--out x.lua: not a folder"), "{said}");
     for data in ["data", OWN] {
         let said = project.refusal(&format!("x.lua --policy {data} --out run"));
-        assert!(said.contains("holds demonstrations") && said.contains("softvt dataset check"), "{said}");
+        assert!(
+            said.contains("is a dataset, not a policy") && said.contains("softvt dataset check"),
+            "{said}"
+        );
     }
 }

@@ -12,7 +12,7 @@ fn expert(expert: &'static str) -> String {
 fn empty_shapes_are_reported_with_their_asset() {
     let shape = "softvt.shape.sphere { radius = 0.02 }:subtract(softvt.shape.sphere { radius = 0.03 })";
     let project = Small { shape, ..Small::default() }.project();
-    assert_snapshot!(project.refusal("x.lua --out run"), @"x.lua:6: asset cube: the shape is empty: nothing of it is left; check what is subtracted or intersected");
+    assert_snapshot!(project.refusal("x.lua --out run"), @"x.lua:6: asset cube: the shape is empty; check its subtractions and intersections");
 }
 
 #[test]
@@ -98,7 +98,7 @@ fn unsettled_objects_are_reported() {
 fn falling_objects_are_reported() {
     let project = Small { at: "xyz = { 0, 0.8, 0.1 }", ..Small::default() }.project();
     let message = project.refusal("x.lua --out run");
-    assert_snapshot!(message, @"x.lua:6: layout one, episode 0: object cube fell out of the world: there was nothing below it, and after 3 s of settling it is 44.9 m lower; put it above what it is to rest on");
+    assert_snapshot!(message, @"x.lua:6: layout one, episode 0: object cube fell out of the world: there was nothing below it, and after 3 s of settling it is 44.9 m lower; place it above a support");
 }
 
 #[test]

@@ -213,7 +213,7 @@ fn error_messages_of_servers_are_shown() {
         });
     });
     let said = fails(&address, "");
-    assert!(said.contains("failed; it says:") && said.contains("ValueError: bad key"), "{said}");
+    assert!(said.contains("reported an error:") && said.contains("ValueError: bad key"), "{said}");
 }
 
 #[test]

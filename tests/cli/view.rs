@@ -100,7 +100,7 @@ fn invalid_views_are_refused() {
     assert!(message.contains("--out <DIR>"), "{message}");
     project.write("file", b"");
     let message = project.refusal("view x.lua --out file");
-    assert!(message.contains("cannot make the folder file"), "{message}");
+    assert!(message.contains("cannot create the folder file"), "{message}");
 }
 
 /// The layout with a line added to its function.

@@ -18,7 +18,7 @@ use crate::{
 
 /// Attempts per demonstration, unless `--attempts` is given.
 const ATTEMPTS_PER_DEMO: u32 = 4;
-/// Least number of attempts per task, unless `--attempts` is given.
+/// Minimum number of attempts per task, unless `--attempts` is given.
 const MIN_ATTEMPTS: u32 = 20;
 
 /// Records the demonstrations that the arguments ask for.

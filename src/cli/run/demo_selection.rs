@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::evaluation::record::{EpisodeRecord, Outcome};
 
 /// Prefix of the error of an attempt that could not start from the state of its demonstration.
-pub(crate) const START_FAILED: &str = "cannot start as the demonstration says: ";
+pub(crate) const START_FAILED: &str = "cannot reproduce the initial state: ";
 
 /// Attempts to run next, so that the first `demos` good ones are found whatever the order in which attempts finish.
 /// `finished` maps each finished attempt to true if it is good; at most `max` attempts are run.

@@ -30,7 +30,7 @@ const DEFAULT_TIMEOUT: Duration = Duration::from_secs(60);
 pub(crate) type ControllerFactory =
     Box<dyn Fn(script::Episode, TaskBrief) -> Result<Box<dyn Controller>, CliError> + Sync>;
 
-/// A policy server, and what it is sent.
+/// Configuration of a policy server.
 #[derive(Debug)]
 pub(crate) struct RemotePolicyConfig {
     pub url: String,
@@ -151,7 +151,7 @@ impl PolicyConfig {
         }
     }
 
-    /// The sensors that a policy declares, and where it does so, as messages name the place.
+    /// The sensors that a policy declares, and the source location of the declaration.
     pub(crate) fn declared_streams(&self) -> Option<(String, SensorStreams)> {
         match &self.kind {
             PolicyKind::Server(server) => {

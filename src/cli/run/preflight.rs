@@ -99,7 +99,7 @@ impl SuiteRun<'_> {
         })
     }
 
-    /// Renders once what the policy observes, and what a video shows, of a scene in which nothing has moved yet.
+    /// Renders each stream of the policy and of videos once, in the initial scene.
     fn check_streams(&self, scene: Arc<Scene>, mut streams: SensorStreams) -> Result<(), PreflightError> {
         let settings = &self.settings;
         check_sensors(&scene, &settings.tactile, &self.sensor_assets)?;

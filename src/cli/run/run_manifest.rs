@@ -107,7 +107,7 @@ impl<'a> RunManifest<'a> {
     }
 }
 
-/// Writes the manifest into a run folder. A manifest that is there must be the same.
+/// Writes the manifest into a run folder. An existing manifest must be equal.
 ///
 /// # Errors
 /// The file cannot be written, or belongs to another run.

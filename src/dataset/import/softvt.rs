@@ -9,7 +9,7 @@ pub(super) fn demo(reader: DemoReader) -> Result<ForeignDemo, DatasetError> {
     let record = reader.file.record(reader.demo)?;
     let id = &record.identity;
     if id.split != Split::Demonstration.name() {
-        let what = format!("its split is {}, not that of recorded demonstrations", id.split);
+        let what = format!("its split is {}; expected demonstration", id.split);
         return Err(reader.error("metadata_json", what));
     }
     let commands: Vec<ToolCommand> =

@@ -40,7 +40,7 @@ impl StagedDir {
         let created_parents = files::missing_folders(parent);
         let make = || {
             files::create_folder(parent)?;
-            fs::create_dir(&temp).map_err(DatasetError::io("make the folder", &temp))?;
+            fs::create_dir(&temp).map_err(DatasetError::io("create the folder", &temp))?;
             let path = temp.join(MARKER_FILE);
             File::create(&path).map_err(DatasetError::io("write", &path))
         };

@@ -24,7 +24,7 @@ const SMALLEST_DIAGONAL_M: f64 = 1e-12;
 
 /// Reasons why a deformation cannot be measured.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[allow(missing_docs)] // The messages say it.
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum DeformationError {
     #[error("a deformation needs at least 3 nodes, got {0}: use a finer voxel mesh")]
     TooFewNodes(usize),

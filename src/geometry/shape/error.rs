@@ -1,7 +1,7 @@
 //! Errors of shape construction and validation.
 
 /// Invalid number or profile of a shape.
-#[allow(missing_docs)] // The messages say it.
+#[allow(missing_docs, reason = "the messages describe the variants")]
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ShapeError {
     #[error("{kind}: {field} is {value} m; give a finite length above 0")]

@@ -2,7 +2,7 @@
 //! between steps.
 //!
 //! Soft bodies touch with the samples of their surface: colliders by [`detect`], other soft bodies by [`detect_soft`].
-//! Colliders touch each other by [`CollisionGeometry::meet`]. What is found becomes contact points of the
+//! Colliders touch each other by [`CollisionGeometry::meet`]. The contacts become contact points of the
 //! [solver](super::solver) in [`World`](super::World).
 
 mod collider;

@@ -251,7 +251,7 @@ fn impossible_mechanisms_are_named() {
         tree.validate().expect_err("must be refused").to_string()
     };
     assert!(spoilt(|link| link.mass = -1.0).starts_with("link link2: mass is -1 kg"));
-    assert!(spoilt(|link| link.parent = Some(2)).contains("parents come before link 2"));
+    assert!(spoilt(|link| link.parent = Some(2)).contains("parents must precede link 2"));
     assert!(spoilt(|link| link.lower = 4.0).contains("lower limit 4 lies above"));
     assert!(spoilt(|link| link.damping = f64::NAN).contains("negative"));
     let thin = |link: &mut Link| link.inertia = Mat3::from_diagonal(&Vec3::new(0.01, 0.01, 0.03));

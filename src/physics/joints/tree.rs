@@ -101,7 +101,9 @@ impl JointTree {
         for (index, link) in self.links.iter().enumerate() {
             let wrong = |what: String| Err(JointTreeError { link: link.name.clone(), what });
             if let Some(parent) = link.parent.filter(|&parent| parent >= index) {
-                return wrong(format!("its parent has index {parent}, but parents come before link {index}"));
+                return wrong(format!(
+                    "its parent has index {parent}, but parents must precede link {index}"
+                ));
             }
             if !(link.mass > 0.0 && link.mass.is_finite()) {
                 return wrong(format!("mass is {} kg, expected a positive number", link.mass));

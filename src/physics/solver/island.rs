@@ -13,7 +13,7 @@ pub(super) struct Island {
     pub blocks: Vec<usize>,
     /// Contact clusters between them.
     pub clusters: Vec<usize>,
-    /// ScalarConstraint rows on them.
+    /// Scalar constraints on these blocks.
     pub constraints: Vec<usize>,
     /// Total number of velocities.
     pub size: usize,

@@ -36,7 +36,7 @@ pub struct SolverFailure {
 
 /// The solver: buffers, and factors kept from one problem to the next.
 ///
-/// A clone continues identically. Results depend on the sequence of problems, since kept factors decide on the path of
+/// A clone continues identically. Results depend on the sequence of problems, because kept factors influence the path of
 /// convergence within the tolerance.
 #[derive(Clone, Debug, Default)]
 pub struct Solver {

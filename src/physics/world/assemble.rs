@@ -19,7 +19,7 @@ use crate::{
 pub(super) const RETAIN_DISTANCE: f64 = 2.5e-3;
 /// Stiffness and damping of joint stops, relative to the joint's inertia over a step.
 const STOP_RATE: f64 = 0.5;
-/// The same for the stops and the dry friction of joints without a drive, which nothing else holds.
+/// The same for the stops and the dry friction of joints without a drive, which have no other resistance.
 const FIRM_RATE: f64 = 50.0;
 
 /// Velocity block of each body in the current problem; `None` for one that sleeps.

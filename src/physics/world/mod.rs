@@ -97,7 +97,7 @@ pub use penetration::Penetration;
 pub use snapshot::{ContactPatch, ContactSummary, Energy, Frame, PatchPoint, SampleFace};
 pub use state::{Articulation, BodyContact, JointDrive, KinematicFrame, RigidBody, SoftBody};
 
-/// Why a step is invalid. The state of the world is void afterwards; nothing is repaired silently.
+/// Why a step is invalid. The world must not be used afterwards; nothing is repaired silently.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum StepFailure {
     /// The contact solve did not converge.
@@ -129,7 +129,7 @@ pub enum StepFailure {
         body: String,
     },
     /// A body is faster than [`PhysicsParams::max_speed`].
-    #[error("{body} moves at {speed:.1} m/s at step {step}, beyond the {limit} m/s of a valid state")]
+    #[error("{body} moves at {speed:.1} m/s at step {step}, above the limit of {limit} m/s")]
     SpeedLimitExceeded {
         /// Step, counted from 1.
         step: u64,

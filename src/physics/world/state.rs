@@ -29,7 +29,7 @@ pub struct BodyContact {
 pub struct SoftBody {
     /// Name, for messages and logs.
     pub name: String,
-    /// Node positions and velocities. They may be set between steps; their number is fixed.
+    /// Node positions and velocities. Writable between steps; their number must not change.
     pub state: FemState,
     /// Friction of its surface.
     pub friction: Friction,
@@ -47,7 +47,7 @@ pub struct SoftBody {
 }
 
 impl SoftBody {
-    /// True while it sleeps: it neither moves nor costs anything until something moves near it.
+    /// True while it sleeps: it is skipped until a nearby body moves.
     pub fn is_asleep(&self) -> bool {
         self.sleep.is_asleep
     }
@@ -133,7 +133,7 @@ pub(super) struct JointFriction {
 pub struct Articulation {
     /// Name, for messages and logs.
     pub name: String,
-    /// Joint coordinates and velocities. They may be set between steps; their number is fixed.
+    /// Joint coordinates and velocities. Writable between steps; their number must not change.
     pub state: JointState,
     pub(super) tree: JointTree,
     pub(super) drives: Vec<Option<JointDrive>>,

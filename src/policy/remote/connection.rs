@@ -20,13 +20,13 @@ use crate::policy::{
     },
 };
 
-/// Longest message that is accepted; a chunk of actions has some ten kilobytes.
+/// Longest message that is accepted; an action chunk is about 10 kB.
 const MAX_MESSAGE_BYTES: usize = 64 << 20;
 /// Pause before the second attempt to connect; it doubles with every further attempt.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
 /// Longest pause between two attempts to connect.
 const MAX_PAUSE: Duration = Duration::from_secs(2);
-/// Most pings and pongs that an idle connection may have received.
+/// Maximum number of pings and pongs that an idle connection may have received.
 const MAX_IDLE_MESSAGES: usize = 1000;
 /// Length to which a server's error text is cut, characters.
 const MAX_ERROR_CHARS: usize = 2000;
@@ -163,7 +163,7 @@ impl PolicyConnection {
                 }
                 Message::Text(text) => {
                     return Err(PolicyError::Transport(format!(
-                        "the policy server {} failed; it says:\n{}",
+                        "the policy server {} reported an error:\n{}",
                         server.url,
                         end_of(&text)
                     )));
@@ -240,7 +240,7 @@ fn connect(
 fn connect_tcp(url: &str, deadline: Instant) -> io::Result<TcpStream> {
     let uri: Uri = url.parse().map_err(io::Error::other)?;
     let host = uri.host().unwrap_or_default().trim_start_matches('[').trim_end_matches(']');
-    let mut refused = io::Error::new(ErrorKind::NotFound, "its name has no address");
+    let mut refused = io::Error::new(ErrorKind::NotFound, "the host name does not resolve");
     for address in (host, uri.port_u16().unwrap_or(DEFAULT_PORT)).to_socket_addrs()? {
         let left = deadline.saturating_duration_since(Instant::now()).max(POLL_INTERVAL);
         match TcpStream::connect_timeout(&address, left) {

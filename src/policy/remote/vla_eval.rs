@@ -68,7 +68,7 @@ pub(super) fn infer(
         match kind {
             "error" => {
                 let text = entry(payload, "error").and_then(Value::as_str).unwrap_or("no reason given");
-                return Err(connection.server.error(&format!("failed; it says: {text}")));
+                return Err(connection.server.error(&format!("reported an error: {text}")));
             }
             "action" if answered == Some(connection.seq) => {
                 return decode::chunk(payload, &connection.server.profile.actions);

@@ -353,7 +353,7 @@ output! {
         d_pct: "number?" = inner.deformation_pct(index);
         /// Largest D since settling, %.
         d_peak_pct: "number?" = inner.soft_body(index).map(|_| inner.records[index].d_peak_pct);
-        /// Least det F of a filled element of a soft body.
+        /// Minimum det F of a filled element of a soft body.
         min_det_f: "number?" = inner.soft_body(index).and_then(|body| finite(body.min_det_f().det_f));
         /// True if a soft body sleeps.
         asleep: "boolean?" = inner.soft_body(index).map(|body| body.is_asleep());

@@ -202,7 +202,7 @@ impl Vm {
         self.clock.start(limit, limits.grace, &self.shared.main, limits.on_stuck.clone())
     }
 
-    /// The error of a script author for an error of the virtual machine.
+    /// Translates an error of the virtual machine for the author of the script.
     pub(crate) fn explain(&self, error: &mlua::Error) -> ScriptError {
         explain(&self.shared, error)
     }

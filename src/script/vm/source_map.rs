@@ -11,7 +11,7 @@ use super::{
 };
 use crate::parallel::lock;
 
-/// Registry key of the table from made tables, which it does not keep alive, to `file:line`.
+/// Registry key of the weak table from constructed tables to `file:line`.
 const ORIGINS: &str = "softvt origins";
 
 /// Notes that the running call of the script makes `table`.

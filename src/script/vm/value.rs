@@ -59,7 +59,7 @@ pub(crate) fn number(value: &Value) -> Option<f64> {
     }
 }
 
-/// A measured number for scripts; nil if it is not finite, since there is nothing to measure then.
+/// A measured number for scripts; nil if it is not finite.
 pub(crate) fn finite(number: f64) -> Option<f64> {
     number.is_finite().then_some(number)
 }

@@ -24,7 +24,7 @@ use crate::{parallel::lock, rollout::cancel};
 /// Instructions between two checks of the clock; about 0.3 ms.
 const HOOK_INTERVAL: u32 = 20_000;
 
-/// Called with a message when a library function does not return; ends the process by default.
+/// Called with a message when a library function does not return.
 pub type OnStuck = Arc<dyn Fn(&str) + Send + Sync>;
 
 type Slot = (Instant, u64);

@@ -14,7 +14,7 @@ use crate::{npy::NpzError, robot::PadSurface};
 
 /// Reasons why a sensor cannot be created.
 #[derive(Debug, thiserror::Error)]
-#[allow(missing_docs)] // The messages say it.
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum TactileSensorError {
     #[error(transparent)]
     Spec(#[from] TactileSpecError),

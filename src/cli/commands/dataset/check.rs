@@ -14,7 +14,7 @@ use crate::{
 /// Validates a dataset folder or one HDF5 file.
 ///
 /// # Errors
-/// All problems that are found, or (exit code 1) a demonstration that is not reproduced.
+/// Any problem of the dataset, or (exit code 1) a demonstration that is not reproduced.
 pub(super) fn run(args: &DatasetCheckArgs) -> Result<(), CliError> {
     let path = &args.path;
     check_complete(path)?;

@@ -15,9 +15,9 @@ const MIN_CROSSING_SINE: f64 = 0.05;
 /// Height over the deepest point of a pair up to which a point counts as deepest in full, and from which it does not, m. If
 /// the deepest points have less than the area of a point contact, the closest points get the difference.
 const DEEPEST_M: [f64; 2] = [1e-5, 5e-5];
-/// Length below which a line of contact counts less than two points, down to one for length zero, m.
+/// Length of a line contact below which its weight fades from two points to one (at length zero), m.
 const SHORT_LINE_M: f64 = 1e-3;
-/// Overlap of two faces from which it counts as at least a point contact, m²: a body on a sliver of its edge is no softer
+/// Overlap area above which two faces carry at least one point contact, m²: a body on a sliver of its edge is no softer
 /// than one on a corner.
 const SLIVER_M2: f64 = 1e-6;
 /// Flag in the identifier of a feature of the second primitive.

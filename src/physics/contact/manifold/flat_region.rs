@@ -75,7 +75,7 @@ pub(super) fn flat_samples(
         .collect();
     for face in plane_faces(shape, &seeds) {
         let first = samples.len();
-        // A fine rounding that counts as an edge lies off the face and does not carry it.
+        // Seeds on a small fillet are skipped: the fillet is treated as an edge and lies off the face.
         let edges: Vec<&Vec3> = sharp.iter().filter(|q| face.height(q).abs() < PLANE_HEIGHT).collect();
         for p in face.outline(step) {
             if is_free(&p, &samples[first..], MERGE_DISTANCE * step)

@@ -59,7 +59,7 @@ pub struct GelField {
 
 /// Reasons why a contact has no field.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[allow(missing_docs)] // The messages say it.
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum ContactError {
     #[error("the pad is pressed with {force} N, but no skin of the {skins} given lies over it")]
     NoSkin { force: f64, skins: usize },

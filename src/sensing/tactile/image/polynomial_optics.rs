@@ -59,7 +59,7 @@ pub struct PolynomialOptics {
 
 /// Reasons why coefficients cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[allow(missing_docs)] // The messages say it.
+#[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum OpticsError {
     #[error("optics: {0}")]
     Format(String),
