@@ -759,7 +759,7 @@ function Simulation:tool() end
 ---@field slip_mm number[]? Distance that a movable object has slid on the left and the right pad, mm.
 ---@field d_pct number? Deformation D of a soft body, %.
 ---@field d_peak_pct number? Largest D since settling, %.
----@field min_det_f number? Least det F of a filled element of a soft body.
+---@field min_det_f number? Minimum det F of a filled element of a soft body.
 ---@field asleep boolean? True if a soft body sleeps.
 local Measurements = {}
 
