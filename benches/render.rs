@@ -14,7 +14,7 @@ use softvt::{
     physics::world::Frame,
     rollout::{AssetCache, Controller, Episode, SensorAssets, StateRecording},
     scene::Camera,
-    script::Loaded,
+    script::LoadedScript,
     sensing::camera::Renderer,
 };
 
@@ -24,7 +24,7 @@ const ROUNDS: usize = 8;
 const IMAGES: usize = 16;
 
 /// Records all states of an episode.
-fn record(loaded: &Loaded, task: usize) -> StateRecording {
+fn record(loaded: &LoadedScript, task: usize) -> StateRecording {
     let (spec, mut expert) = episode::open(loaded, task, true);
     let started = Episode::start(spec, &AssetCache::default(), &SensorAssets::default()).expect("it starts");
     started.run(&mut expert as &mut dyn Controller).expect("it runs").recording.expect("it was asked for")

@@ -10,7 +10,7 @@ use cpu_time::ThreadTime;
 use softvt::{
     policy::{Action, Observation, SensorStreams},
     rollout::{AssetCache, ControlError, Controller, Episode, SensorAssets, Simulation},
-    script::{ExpertController, Loaded},
+    script::{ExpertController, LoadedScript},
 };
 
 /// Goal for all streams, times real time.
@@ -47,7 +47,7 @@ struct Timing {
     cpu: f64,
 }
 
-fn time_episode(loaded: &Loaded, streams: &SensorStreams, caches: &Caches) -> Timing {
+fn time_episode(loaded: &LoadedScript, streams: &SensorStreams, caches: &Caches) -> Timing {
     let (spec, expert) = episode::open(loaded, 0, false);
     let mut controller = ExpertWithStreams { expert, streams: streams.clone(), since: None };
     let started = Episode::start(spec, &caches.assets, &caches.sensors).expect("it starts");

@@ -35,7 +35,7 @@ pub fn run<T: Send, E: Send>(
     mut sink: impl FnMut(usize, T) -> Result<(), E>,
 ) -> Result<(), E> {
     let mut failures: Vec<((bool, usize), E)> = Vec::new();
-    let queue = Queue::new(jobs, jobs);
+    let queue = JobQueue::new(jobs, jobs);
     let timed = |job| {
         let result = work(job);
         (result, cancelled())
@@ -63,7 +63,7 @@ pub fn run_in_order<T: Send, E: Send>(
     work: impl Fn(usize) -> Result<T, E> + Sync,
     mut sink: impl FnMut(usize, T) -> Result<(), E>,
 ) -> Result<(), E> {
-    let queue = Queue::new(jobs, threads.max(1));
+    let queue = JobQueue::new(jobs, threads.max(1));
     let (mut waiting, mut next) = (BTreeMap::new(), 0);
     let mut outcome = Ok(());
     drain(&queue, threads, &cancelled, work, |job, result| {
@@ -84,7 +84,7 @@ pub fn run_in_order<T: Send, E: Send>(
 
 /// Runs the jobs of `queue` and passes their results to `take`, on the calling thread.
 fn drain<T: Send>(
-    queue: &Queue,
+    queue: &JobQueue,
     threads: usize,
     cancelled: &(impl Fn() -> bool + Sync),
     work: impl Fn(usize) -> T + Sync,
@@ -138,7 +138,7 @@ fn pool(threads: usize) -> Option<ThreadPool> {
 }
 
 /// Hands out job numbers in increasing order.
-struct Queue {
+struct JobQueue {
     jobs: usize,
     state: Mutex<QueueState>,
     changed: Condvar,
@@ -151,7 +151,7 @@ struct QueueState {
     closed: bool,
 }
 
-impl Queue {
+impl JobQueue {
     fn new(jobs: usize, limit: usize) -> Self {
         Self {
             jobs,
@@ -186,7 +186,7 @@ impl Queue {
     }
 }
 
-struct CloseOnDrop<'a>(&'a Queue);
+struct CloseOnDrop<'a>(&'a JobQueue);
 
 impl Drop for CloseOnDrop<'_> {
     fn drop(&mut self) {

@@ -12,7 +12,7 @@ use softvt::{
     },
     rollout::{AssetCache, Simulation},
     scene::{Asset, Body, Mask, Scene},
-    script::{self, Episode, EpisodeRequest, Loaded},
+    script::{self, Episode, EpisodeRequest, LoadedScript},
 };
 
 /// Reference data of a soft asset.
@@ -58,12 +58,12 @@ const SOFT: [SoftReference; 17] = [
 /// Largest difference between an extent of an asset and its reference, m.
 const SIZE_TOLERANCE: f64 = 0.5e-3;
 
-fn suite() -> Loaded {
+fn suite() -> LoadedScript {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("suites/spatial_soft.lua");
     script::load(&path, &[]).unwrap_or_else(|e| panic!("{e}"))
 }
 
-fn scene(loaded: &Loaded, task: usize, episode: u64) -> Scene {
+fn scene(loaded: &LoadedScript, task: usize, episode: u64) -> Scene {
     let Plan::Suite(suite) = &loaded.plan else { panic!("{:?}", loaded.plan) };
     let request = EpisodeRequest {
         suite: suite.name.clone(),

@@ -7,7 +7,7 @@ use softvt::{
     benchmark::{Goal, Plan, Suite, Task, seed::Split},
     geometry::{Pose, Vec3, shape::Shape},
     scene::{Body, Object, Scene, part_poses},
-    script::{self, Episode, EpisodeRequest, Loaded},
+    script::{self, Episode, EpisodeRequest, LoadedScript},
 };
 
 /// Episodes per task at the scale of the paper.
@@ -68,17 +68,17 @@ const RELATIONS: [&str; 10] = [
     "on the wooden cabinet",
 ];
 
-fn load(name: &str) -> Loaded {
+fn load(name: &str) -> LoadedScript {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("suites/{name}.lua"));
     script::load(&path, &[]).unwrap_or_else(|e| panic!("{e}"))
 }
 
-fn suite(loaded: &Loaded) -> &Suite {
+fn suite(loaded: &LoadedScript) -> &Suite {
     let Plan::Suite(suite) = &loaded.plan else { panic!("{:?}", loaded.plan) };
     suite
 }
 
-fn open(loaded: &Loaded, task: usize, episode: u64, split: Split) -> Scene {
+fn open(loaded: &LoadedScript, task: usize, episode: u64, split: Split) -> Scene {
     let suite = suite(loaded).name.clone();
     let request = EpisodeRequest { suite, task, episode, base_seed: 0, split, shifts: Vec::new() };
     Episode::open(loaded, &request).unwrap_or_else(|e| panic!("{e}")).scene
@@ -230,7 +230,7 @@ const STANDARD: usize = 5;
 
 #[test]
 fn rigid_objects_start_in_the_regions_of_libero() {
-    let standard = |loaded: &Loaded, task: usize| -> Vec<Scene> {
+    let standard = |loaded: &LoadedScript, task: usize| -> Vec<Scene> {
         (0..STANDARD as u64).map(|episode| open(loaded, task, episode, Split::Validation)).collect()
     };
     let loaded = load("object_rigid");

@@ -6,20 +6,20 @@ use softvt::{
     benchmark::{Plan, seed::Split},
     evaluation::record::Identity,
     rollout::EpisodeSpec,
-    script::{self, EpisodeRequest, ExpertController, Loaded},
+    script::{self, EpisodeRequest, ExpertController, LoadedScript},
 };
 
 /// The suite.
 pub const SUITE: &str = "suites/spatial_soft.lua";
 
 /// The suite, read.
-pub fn load() -> Loaded {
+pub fn load() -> LoadedScript {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(SUITE);
     script::load(&path, &[]).expect("the suite loads")
 }
 
 /// The first episode of a task and its controller.
-pub fn open(loaded: &Loaded, task: usize, film: bool) -> (EpisodeSpec, ExpertController) {
+pub fn open(loaded: &LoadedScript, task: usize, film: bool) -> (EpisodeSpec, ExpertController) {
     let Plan::Suite(suite) = &loaded.plan else { panic!("{SUITE} is a suite") };
     let request = EpisodeRequest {
         suite: suite.name.clone(),

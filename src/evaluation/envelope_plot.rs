@@ -13,12 +13,12 @@ const HEIGHT: usize = 12;
 const MARGIN: usize = 9;
 
 /// Horizontal axis: closures from `low` to `high`.
-struct Axis {
+struct PlotAxis {
     low: f64,
     high: f64,
 }
 
-impl Axis {
+impl PlotAxis {
     fn of(envelope: &Envelope) -> Option<Self> {
         let sweep = envelope.sweep.iter().map(|row| row.closure);
         let all = || sweep.clone().chain(envelope.holds.iter().map(|row| row.closure));
@@ -41,7 +41,7 @@ impl Axis {
 /// Stable squeezes are `●`, unstable ones `○`, and τ is a dashed line. Below are the holds of the lower-bound scan (`+` all
 /// trials held, `~` some, `-` none) and the zones: too loose `░`, safe `█`, too tight `▓`.
 pub fn plot(asset: &str, envelope: &Envelope, limit: Option<DeformationLimit>) -> String {
-    let Some(axis) = Axis::of(envelope) else {
+    let Some(axis) = PlotAxis::of(envelope) else {
         return format!("{asset}: no rows, nothing to plot\n");
     };
     let mut lines = vec![heading(asset, limit)];
@@ -65,7 +65,7 @@ fn heading(asset: &str, limit: Option<DeformationLimit>) -> String {
     }
 }
 
-fn curve(envelope: &Envelope, limit: Option<DeformationLimit>, axis: &Axis) -> Vec<String> {
+fn curve(envelope: &Envelope, limit: Option<DeformationLimit>, axis: &PlotAxis) -> Vec<String> {
     let peak = envelope.sweep.iter().map(|row| row.d_peak_pct).fold(0.0_f64, f64::max);
     // The unstable tail may be many times D_ref; cut the plot at twice D_ref, below which everything of interest lies.
     let top = limit.map_or(peak, |limit| peak.min(2.0 * limit.d_ref_pct)).max(1e-9);
@@ -91,7 +91,7 @@ fn curve(envelope: &Envelope, limit: Option<DeformationLimit>, axis: &Axis) -> V
     grid.iter().enumerate().map(|(i, row)| labelled(&label(i), &row.iter().collect::<String>())).collect()
 }
 
-fn holds(rows: &[HoldRow], axis: &Axis) -> String {
+fn holds(rows: &[HoldRow], axis: &PlotAxis) -> String {
     let mut line = vec![' '; WIDTH];
     for row in rows {
         line[axis.column(row.closure)] = match row.held {
@@ -103,7 +103,7 @@ fn holds(rows: &[HoldRow], axis: &Axis) -> String {
     line.into_iter().collect()
 }
 
-fn zones(envelope: &Envelope, axis: &Axis) -> String {
+fn zones(envelope: &Envelope, axis: &PlotAxis) -> String {
     let loose = |closure: f64| envelope.closure_lower.is_none_or(|lower| closure < lower);
     let tight = |closure: f64| envelope.closure_at_tau.is_some_and(|upper| closure > upper);
     (0..WIDTH)
@@ -116,7 +116,7 @@ fn zones(envelope: &Envelope, axis: &Axis) -> String {
         .collect()
 }
 
-fn ticks(axis: &Axis) -> String {
+fn ticks(axis: &PlotAxis) -> String {
     let mut line = String::new();
     for column in (0..WIDTH).step_by((WIDTH - 1) / 5) {
         let text = format!("{:.2}", axis.closure(column));

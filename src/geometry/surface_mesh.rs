@@ -46,7 +46,7 @@ pub(super) fn surface_triangles(shape: &Shape, cell: f64) -> (Mesh, Vec<Vec3>) {
         let normals = mesh.vertices.iter().map(|v| shape.first_order(v).normal).collect();
         return (mesh, normals);
     }
-    let grid = Grid::over(&shape.loose_bounds(), cell);
+    let grid = SamplingGrid::over(&shape.loose_bounds(), cell);
     let mut values = grid.sample(shape);
     grid.compose_well(&mut values);
     let mut buffer = SurfaceNetsBuffer::default();
@@ -124,13 +124,13 @@ fn unwrap(bounds: &Aabb, corners: &[Vec3; 3]) -> [[f64; 2]; 3] {
 }
 
 /// A regular lattice of points around a shape.
-struct Grid {
+struct SamplingGrid {
     origin: Vec3,
     cell: f64,
     count: [usize; 3],
 }
 
-impl Grid {
+impl SamplingGrid {
     fn over(reach: &Aabb, cell: f64) -> Self {
         let size = reach.size().add_scalar(4.0 * cell);
         let cell = cell.max((size.product() / MAX_POINTS).cbrt());

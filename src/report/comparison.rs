@@ -199,7 +199,8 @@ pub fn table(comparison: &Comparison) -> String {
         let _ = writeln!(out, "{}", text.trim_end());
     };
     let rule = "─".repeat(WIDTH);
-    let deformation = if comparison.deformable { Deformation::Peak } else { Deformation::None };
+    let deformation =
+        if comparison.deformable { DeformationComparison::Peak } else { DeformationComparison::None };
     line(&format!(
         "{} → {} · {}",
         shortened(&comparison.first, POLICY_WIDTH),
@@ -244,7 +245,7 @@ pub(super) const LEGEND: &str = "diff.: second minus first · 95 % intervals: Ag
 
 /// Deformation measure of a comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Deformation {
+pub(super) enum DeformationComparison {
     /// No target deforms.
     None,
     /// Peak D, % of the diagonal.
@@ -259,13 +260,17 @@ pub(super) fn headings(name: &str, [first, second]: [&str; 2]) -> String {
 }
 
 /// One row per measure, the first with the name.
-pub(super) fn measure_rows(name: &str, of: &PairedComparison, deformation: Deformation) -> Vec<String> {
+pub(super) fn measure_rows(
+    name: &str,
+    of: &PairedComparison,
+    deformation: DeformationComparison,
+) -> Vec<String> {
     let mut all =
         vec![rate("Goal, %", &of.goal), rate("NoDrop, %", &of.no_drop), rate("Safety, %", &of.safety)];
     match deformation {
-        Deformation::None => {}
-        Deformation::Peak => all.push(mean("D peak, %", &of.d_peak)),
-        Deformation::OverTau => all.push(mean("D peak/τ", &of.d_over_tau)),
+        DeformationComparison::None => {}
+        DeformationComparison::Peak => all.push(mean("D peak, %", &of.d_peak)),
+        DeformationComparison::OverTau => all.push(mean("D peak/τ", &of.d_over_tau)),
     }
     let names = [name].into_iter().chain(std::iter::repeat(""));
     all.into_iter().zip(names).map(|(row, name)| cells(name, row)).collect()

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    comparison::{Deformation, LEGEND, headings, measure_rows},
+    comparison::{DeformationComparison, LEGEND, headings, measure_rows},
     text_table::{WIDTH, push_line, push_rule, shortened},
 };
 use crate::{
@@ -110,7 +110,8 @@ pub fn table(suite: &ConditionTable) -> String {
 }
 
 fn against_reference(out: &mut String, suite: &ConditionTable) {
-    let deformation = if suite.deformable { Deformation::OverTau } else { Deformation::None };
+    let deformation =
+        if suite.deformable { DeformationComparison::OverTau } else { DeformationComparison::None };
     push_line(out, &headings("change from the reference", ["ref.", "cond."]));
     push_rule(out, WIDTH);
     for row in &suite.rows {

@@ -36,21 +36,21 @@ pub struct PoseTolerance {
 
 impl PoseTolerance {
     /// True if neither bound is exceeded.
-    pub fn contains(&self, error: &PoseError) -> bool {
+    pub fn contains(&self, error: &PoseDifference) -> bool {
         error.distance() <= self.distance && error.angle() <= self.angle
     }
 }
 
 /// Difference of two poses, in the frame that both are given in.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PoseError {
+pub struct PoseDifference {
     /// From the first position to the second, m.
     pub translation: Vec3,
     /// Rotation vector from the first orientation to the second, rad.
     pub rotation: Vec3,
 }
 
-impl PoseError {
+impl PoseDifference {
     /// The error that leads from pose `now` to pose `target`.
     pub fn between(now: &Pose, target: &Pose) -> Self {
         Self {
@@ -90,7 +90,7 @@ const RESTARTS: u32 = 48;
 /// ```
 /// use softvt::{
 ///     geometry::Vec3,
-///     robot::{DiffIk, IkSpec, ik::PoseError},
+///     robot::{DiffIk, IkSpec, ik::PoseDifference},
 /// };
 ///
 /// let start = [0.0, -0.2, 0.0, -2.4, 0.0, 2.2, 0.8];
@@ -102,7 +102,7 @@ const RESTARTS: u32 = 48;
 ///     // Ideal drives: the joints reach their targets.
 ///     q = ik.step(&q, &target_b);
 /// }
-/// assert!(PoseError::between(&ik.tool_pose(&q), &target_b).distance() < 1e-5);
+/// assert!(PoseDifference::between(&ik.tool_pose(&q), &target_b).distance() < 1e-5);
 /// ```
 #[derive(Clone, Debug)]
 pub struct DiffIk {
@@ -264,7 +264,7 @@ impl DiffIk {
         let tool = poses[ARM_DOFS - 1] * self.tool;
         let mut jacobian = DMatrix::zeros(6, ARM_DOFS);
         point_jacobian_into(&self.chain, &poses, ARM_DOFS - 1, &tool.translation.vector, &mut jacobian);
-        let error = PoseError::between(&tool, target_b);
+        let error = PoseDifference::between(&tool, target_b);
         let range = LINEARISATION_RANGE;
         let share = (range.distance / error.distance()).min(range.angle / error.angle()).min(1.0);
         let (linear, angular) = (error.translation, error.rotation);
@@ -272,8 +272,8 @@ impl DiffIk {
         (error, Jacobian::from_column_slice(jacobian.as_slice()))
     }
 
-    fn residual(&self, q: &Joints, target_b: &Pose) -> PoseError {
-        PoseError::between(&self.tool_pose(&(*q).into()), target_b)
+    fn residual(&self, q: &Joints, target_b: &Pose) -> PoseDifference {
+        PoseDifference::between(&self.tool_pose(&(*q).into()), target_b)
     }
 
     fn clamp_to_limits(&self, q: &Joints) -> Joints {
@@ -298,7 +298,7 @@ pub struct UnreachablePose {
 }
 
 impl UnreachablePose {
-    fn new(target_b: &Pose, miss: &PoseError) -> Self {
+    fn new(target_b: &Pose, miss: &PoseDifference) -> Self {
         Self { target_b: target_b.translation.vector, distance: miss.distance(), angle: miss.angle() }
     }
 
@@ -345,7 +345,7 @@ mod tests {
             let target = down(0.55, 0.2, 0.05, 0.6);
             let mut ik = ik();
             let q = follow(&mut ik, START, &target, 60, lag);
-            let error = PoseError::between(&ik.tool_pose(&q), &target);
+            let error = PoseDifference::between(&ik.tool_pose(&q), &target);
             assert!(NEAR.contains(&error), "{error:?}");
         }
     }
@@ -380,7 +380,7 @@ mod tests {
             q = stopped.step(&q, &target);
             assert!(q[0] <= START[0]);
         }
-        let error = PoseError::between(&stopped.tool_pose(&q), &target);
+        let error = PoseDifference::between(&stopped.tool_pose(&q), &target);
         assert!(NEAR.contains(&error), "{error:?}");
     }
 
@@ -396,7 +396,7 @@ mod tests {
         let mut drifting = DiffIk::new(&spec, START, DT);
         let back = follow(&mut drifting, away, &target, 100, 1.0);
         assert!(distance(&back) < 0.01 * distance(&away), "{}", distance(&back));
-        let error = PoseError::between(&drifting.tool_pose(&back), &target);
+        let error = PoseDifference::between(&drifting.tool_pose(&back), &target);
         assert!(error.distance() < 1e-5 && error.angle() < 1e-4);
     }
 

@@ -33,7 +33,7 @@ use crate::{
     policy::{Action, Observation, SensorStreams},
     robot::{
         Side,
-        ik::{LINEARISATION_RANGE, PoseError},
+        ik::{LINEARISATION_RANGE, PoseDifference},
         rotation,
     },
 };
@@ -486,7 +486,7 @@ fn is_far(tool_b: &Pose, action: &Action) -> bool {
         &rotation::from_axis_angle(&rotation::axis_angle(&tool_b.rotation)),
         &rotation::from_axis_angle(&action.axis_angle_b),
     );
-    let error = PoseError { translation: action.position_b - tool_b.translation.vector, rotation: turn };
+    let error = PoseDifference { translation: action.position_b - tool_b.translation.vector, rotation: turn };
     !LINEARISATION_RANGE.contains(&error)
 }
 

@@ -12,10 +12,10 @@ use crate::parallel::lock;
 const MAX_ENTRIES: usize = 64;
 
 /// The slot of a value: empty until the value is computed.
-type Cell<V> = Arc<Mutex<Option<V>>>;
+type CacheSlot<V> = Arc<Mutex<Option<V>>>;
 
 /// Slots by key, the most recently used last.
-type Entries<K, V> = Vec<(K, Cell<V>)>;
+type Entries<K, V> = Vec<(K, CacheSlot<V>)>;
 
 /// Values by key. Least recently used entries are evicted. A clone shares the entries.
 #[derive(Debug)]
@@ -56,11 +56,11 @@ impl<K: Clone, V: Clone> SharedCache<K, V> {
     }
 
     /// The slot of a key, which becomes the most recently used one.
-    fn cell(&self, key: &K, is_same: impl Fn(&K) -> bool) -> Cell<V> {
+    fn cell(&self, key: &K, is_same: impl Fn(&K) -> bool) -> CacheSlot<V> {
         let mut entries = lock(&self.0);
         let entry = match entries.iter().position(|(known, _)| is_same(known)) {
             Some(at) => entries.remove(at),
-            None => (key.clone(), Cell::default()),
+            None => (key.clone(), CacheSlot::default()),
         };
         if entries.len() == MAX_ENTRIES {
             entries.remove(0);

@@ -16,7 +16,7 @@ pub enum Typeface {
 
 /// A line of text with its place and style, in the object frame at rest.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct TextLine {
+pub struct LabelLine {
     /// Text, at most [`MAX_LETTERS`] characters.
     pub text: String,
     /// Typeface.
@@ -47,7 +47,7 @@ const MARGIN: usize = 2;
 #[derive(Debug, Default)]
 pub struct TextDecal {
     /// Text, place and style.
-    pub line: TextLine,
+    pub line: LabelLine,
     coverage: OnceLock<GlyphCoverage>,
 }
 
@@ -59,7 +59,7 @@ impl PartialEq for TextDecal {
 
 impl TextDecal {
     /// Creates a decal; the glyphs are rasterised later.
-    pub fn new(line: TextLine) -> Self {
+    pub fn new(line: LabelLine) -> Self {
         Self { line, coverage: OnceLock::new() }
     }
 
@@ -76,7 +76,7 @@ impl TextDecal {
     }
 }
 
-impl TextLine {
+impl LabelLine {
     /// The first character that the typeface cannot show.
     pub fn missing(&self) -> Option<char> {
         let font = font(self.typeface)?;
@@ -106,7 +106,7 @@ pub struct GlyphCoverage {
 }
 
 impl GlyphCoverage {
-    fn of(line: &TextLine) -> Self {
+    fn of(line: &LabelLine) -> Self {
         let Some(font) = font(line.typeface) else { return Self::default() };
         let em = CAPITAL / capital(&font);
         let thick = line.weight as f32 * CAPITAL;
@@ -233,7 +233,7 @@ mod tests {
     use super::*;
 
     fn letters(text: &str, weight: f64) -> TextDecal {
-        TextDecal::new(TextLine { text: text.into(), height_m: 0.01, weight, ..TextLine::default() })
+        TextDecal::new(LabelLine { text: text.into(), height_m: 0.01, weight, ..LabelLine::default() })
     }
 
     #[test]
@@ -274,7 +274,7 @@ mod tests {
 
     #[test]
     fn a_character_missing_from_the_typeface_is_found() {
-        let line = |text: &str| TextLine { text: text.into(), ..TextLine::default() };
+        let line = |text: &str| LabelLine { text: text.into(), ..LabelLine::default() };
         assert_eq!(line("Käse & Öl").missing(), None);
         assert_eq!(line("ab漢").missing(), Some('漢'));
         assert_eq!(line("a\nb").missing(), Some('\n'));

@@ -17,7 +17,7 @@ use crate::geometry::{Aabb, Pose, Quat, Vec3};
 
 pub use asset::{Asset, Body, Joint, JointMotion, Part, SoftMaterial, part_poses};
 pub use camera::{Camera, CameraMount, POLICY_IMAGE_EDGE, fovy_from_lens};
-pub use decal::{GlyphCoverage, MAX_LETTERS, TextDecal, TextLine, Typeface};
+pub use decal::{GlyphCoverage, LabelLine, MAX_LETTERS, TextDecal, Typeface};
 pub use light::{KeyLight, Lighting, Sky};
 pub use visual::{Mask, Visual, VisualLayer};
 

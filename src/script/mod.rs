@@ -16,7 +16,7 @@ pub use api::{
     touch::FingerReadings,
 };
 pub use plan::{
-    Loaded, declared_options, load, load_with,
+    LoadedScript, declared_options, load, load_with,
     options::{OptionSpec, OptionValue},
     policy_file::{LuaPolicy, PolicyFile},
     profile_file::load_profile,

@@ -6,8 +6,8 @@ use super::{
     api::{self, shapes::SHAPES, visuals::MASKS},
     plan::options,
     schema::{
-        Class, Field, Function, Presence, Record, RecordType, Signature, Type,
-        object::{Access, ClassField, Param},
+        Class, Field, FieldDefault, Function, Record, RecordType, Signature, Type,
+        object::{Access, LuaField, Param},
     },
 };
 
@@ -65,7 +65,7 @@ fn lua_type(ty: &Type) -> String {
 }
 
 /// The documentation of a value, with its range and default.
-fn details(doc: &str, ty: &Type, presence: Presence) -> String {
+fn details(doc: &str, ty: &Type, presence: FieldDefault) -> String {
     let expected = match ty {
         Type::Number(..) | Type::Integer(_) | Type::Vector(..) | Type::Colour => {
             format!(" Expects {}.", ty.words())
@@ -73,11 +73,11 @@ fn details(doc: &str, ty: &Type, presence: Presence) -> String {
         _ => String::new(),
     };
     let default = match presence {
-        Presence::Number(n) => format!(" Default {n}."),
-        Presence::Integer(n) => format!(" Default {n}."),
-        Presence::Text(text) => format!(" Default {text:?}."),
-        Presence::Boolean(flag) => format!(" Default {flag}."),
-        Presence::Required | Presence::Optional | Presence::Empty => String::new(),
+        FieldDefault::Number(n) => format!(" Default {n}."),
+        FieldDefault::Integer(n) => format!(" Default {n}."),
+        FieldDefault::Text(text) => format!(" Default {text:?}."),
+        FieldDefault::Boolean(flag) => format!(" Default {flag}."),
+        FieldDefault::Required | FieldDefault::Optional | FieldDefault::Empty => String::new(),
     };
     format!("{}{expected}{default}", doc.trim())
 }
@@ -87,10 +87,10 @@ fn field_details(field: &Field) -> String {
 }
 
 /// LuaCATS type and documentation of a class's field.
-fn class_field(field: &ClassField) -> (String, String) {
+fn class_field(field: &LuaField) -> (String, String) {
     match &field.access {
         Access::Read(lua_type, _) => ((*lua_type).to_owned(), field.doc.trim().to_owned()),
-        Access::Write(ty) => (lua_type(ty), details(field.doc, ty, Presence::Required)),
+        Access::Write(ty) => (lua_type(ty), details(field.doc, ty, FieldDefault::Required)),
     }
 }
 
@@ -102,7 +102,7 @@ pub fn stubs() -> String {
         // Writing to a String cannot fail, here and below.
         let _ = writeln!(out, "---{}\n---@class {}", record.doc.trim(), record.class);
         for field in record.fields {
-            let mark = if field.presence == Presence::Required { "" } else { "?" };
+            let mark = if field.presence == FieldDefault::Required { "" } else { "?" };
             let (ty, details) = (lua_type(&field.ty), field_details(field));
             let _ = writeln!(out, "---@field {}{mark} {ty} {details}", field.name);
         }
@@ -185,7 +185,7 @@ pub fn reference() -> String {
         }
         out.push_str("| field | type | required | meaning |\n|---|---|---|---|\n");
         for field in record.fields {
-            let required = if field.presence == Presence::Required { "yes" } else { "no" };
+            let required = if field.presence == FieldDefault::Required { "yes" } else { "no" };
             let (ty, details) = (cell(&lua_type(&field.ty)), field_details(field));
             let _ = writeln!(out, "| `{}` | {ty} | {required} | {details} |", field.name);
         }

@@ -68,7 +68,7 @@ impl Request {
             text(what).ok_or_else(|| format!("the type is {}; expected one of {TYPES}", kind(what)))?;
         let fields = |known: &[&str]| {
             let all: Vec<&str> = ["type"].iter().chain(known).copied().collect();
-            Fields::new(&what, map, &all)
+            RequestFields::new(&what, map, &all)
         };
         match what.as_str() {
             "reset" => Ok(Self::Reset(episode_id(&fields(&EPISODE_FIELDS)?, config)?)),
@@ -93,7 +93,7 @@ impl Request {
 /// Fields that identify an episode.
 const EPISODE_FIELDS: [&str; 5] = ["suite", "task", "episode", "seed", "split"];
 
-fn episode_id(fields: &Fields, config: &ServerConfig) -> Result<EpisodeId, RequestError> {
+fn episode_id(fields: &RequestFields, config: &ServerConfig) -> Result<EpisodeId, RequestError> {
     let prefixed = |error: RequestError| fields.error(&error.0);
     let suite = fields.text("suite")?;
     let suite = config.suite(suite.as_deref()).map_err(prefixed)?.name.clone();
@@ -111,7 +111,7 @@ fn episode_id(fields: &Fields, config: &ServerConfig) -> Result<EpisodeId, Reque
     Ok(id)
 }
 
-fn step(fields: &Fields) -> Result<Request, RequestError> {
+fn step(fields: &RequestFields) -> Result<Request, RequestError> {
     let value = match (fields.get("action"), fields.get("actions")) {
         (Some(one), None) | (None, Some(one)) => one,
         (None, None) => return Err(fields.error("it has neither action nor actions")),
@@ -125,7 +125,7 @@ fn step(fields: &Fields) -> Result<Request, RequestError> {
 }
 
 /// An array of shape (7) or (horizon, 7).
-fn action_rows(fields: &Fields, value: &Value, most: usize) -> Result<Vec<ActionRow>, RequestError> {
+fn action_rows(fields: &RequestFields, value: &Value, most: usize) -> Result<Vec<ActionRow>, RequestError> {
     let expected = format!("expected shape ({ACTION_LEN}) or (horizon, {ACTION_LEN}), horizon up to {most}");
     let NumberArray { shape, values } =
         numbers(value).map_err(|error| fields.error(&format!("the actions are {error}; {expected}")))?;
@@ -144,13 +144,13 @@ fn action_rows(fields: &Fields, value: &Value, most: usize) -> Result<Vec<Action
     }
 }
 
-fn state(fields: &Fields, config: &ServerConfig) -> Result<Request, RequestError> {
+fn state(fields: &RequestFields, config: &ServerConfig) -> Result<Request, RequestError> {
     let value = fields.required("state", fields.get("state"))?;
     let map = value.as_map().ok_or_else(|| {
         fields.error(&format!("state is {}; expected the state of a get_state response", kind(value)))
     })?;
     let known: Vec<&str> = EPISODE_FIELDS.into_iter().chain(["actions", "code", "made_by"]).collect();
-    let inner = Fields::new("set_state: state", map, &known)?;
+    let inner = RequestFields::new("set_state: state", map, &known)?;
     for (name, own, what) in [
         ("code", config.action_code(), "its actions are encoded differently: another profile or gripper"),
         ("made_by", config.fingerprint.clone(), "its scripts, shifts, settings or version differ"),
@@ -165,13 +165,13 @@ fn state(fields: &Fields, config: &ServerConfig) -> Result<Request, RequestError
 }
 
 /// The fields of a request.
-struct Fields<'a> {
+struct RequestFields<'a> {
     /// Prefix of error messages.
     context: &'a str,
     map: &'a [(Value, Value)],
 }
 
-impl<'a> Fields<'a> {
+impl<'a> RequestFields<'a> {
     /// Wraps the fields of a map.
     ///
     /// # Errors

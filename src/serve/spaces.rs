@@ -49,7 +49,7 @@ pub(super) fn action(encoding: &ActionEncoding) -> Value {
     let mut high: Vec<f64> = (0..most.len()).map(|i| end(i, 1.0)).collect();
     low.push(encoding.gripper.open.min(encoding.gripper.closed));
     high.push(encoding.gripper.open.max(encoding.gripper.closed));
-    array_space("<f8", &[ACTION_LEN], Bounds { low, high })
+    array_space("<f8", &[ACTION_LEN], BoxBounds { low, high })
 }
 
 /// Space of the prompts: the length of the longest one and all characters in use.
@@ -65,18 +65,18 @@ fn text(config: &ServerConfig) -> Value {
 }
 
 /// Bounds of an array: one number for all elements, or one per element.
-struct Bounds {
+struct BoxBounds {
     low: Vec<f64>,
     high: Vec<f64>,
 }
 
-impl Bounds {
+impl BoxBounds {
     fn symmetric(high: Vec<f64>) -> Self {
         Self { low: high.iter().map(|x| -x).collect(), high }
     }
 }
 
-fn array_space(dtype: &str, shape: &[usize], bounds: Bounds) -> Value {
+fn array_space(dtype: &str, shape: &[usize], bounds: BoxBounds) -> Value {
     let list = |all: Vec<f64>| match all[..] {
         [one] => Value::F64(one),
         _ => Value::Array(all.into_iter().map(Value::F64).collect()),
@@ -90,18 +90,18 @@ fn array_space(dtype: &str, shape: &[usize], bounds: Bounds) -> Value {
     ])
 }
 
-fn bounds(source: &InputSource) -> Bounds {
+fn bounds(source: &InputSource) -> BoxBounds {
     match source {
         InputSource::Camera { .. } | InputSource::TactileImage { .. } | InputSource::Tactile { .. } => {
-            Bounds { low: vec![0.0], high: vec![255.0] }
+            BoxBounds { low: vec![0.0], high: vec![255.0] }
         }
         InputSource::State { parts } => {
             let of = |part: &StatePart| vec![max_magnitude(*part); part.count()];
-            Bounds::symmetric(parts.iter().flat_map(of).collect())
+            BoxBounds::symmetric(parts.iter().flat_map(of).collect())
         }
-        InputSource::MarkerMotion => Bounds::symmetric(vec![MAX_MARKER_PX]),
-        InputSource::Force => Bounds::symmetric(vec![MAX_FORCE_N]),
-        InputSource::Prompt => Bounds::symmetric(vec![f64::INFINITY]),
+        InputSource::MarkerMotion => BoxBounds::symmetric(vec![MAX_MARKER_PX]),
+        InputSource::Force => BoxBounds::symmetric(vec![MAX_FORCE_N]),
+        InputSource::Prompt => BoxBounds::symmetric(vec![f64::INFINITY]),
     }
 }
 

@@ -7,7 +7,7 @@ use softvt::{
     benchmark::{Plan, seed::Split, settings::Settings},
     rollout::{AssetCache, Simulation, state_hash},
     scene::Scene,
-    script::{self, Episode, EpisodeRequest, Loaded},
+    script::{self, Episode, EpisodeRequest, LoadedScript},
 };
 
 use crate::support::SPATIAL_SOFT;
@@ -16,11 +16,11 @@ const LAYOUTS: u64 = 40;
 /// Positions of the two instances in the first layout, m, and the initial posture of the arm, rad.
 const PLACES: [(&str, f64, f64); 2] = [("left", -0.05, -0.19), ("right", -0.05, 0.19)];
 
-fn loaded() -> Loaded {
+fn loaded() -> LoadedScript {
     script::load(Path::new(SPATIAL_SOFT), &[]).expect("the suite loads")
 }
 
-fn scene(loaded: &Loaded, task: usize, episode: u64, base_seed: u64) -> Scene {
+fn scene(loaded: &LoadedScript, task: usize, episode: u64, base_seed: u64) -> Scene {
     let request = EpisodeRequest {
         suite: "spatial_soft".to_owned(),
         task,

@@ -11,7 +11,7 @@ use softvt::{
     },
     report::terminal,
     rollout::{AssetCache, Episode, EpisodeRef, EpisodeSpec, SensorAssets, SensorSuite, Simulation},
-    script::{self, EpisodeRequest, Loaded},
+    script::{self, EpisodeRequest, LoadedScript},
     sensing::tactile::MosaicLayout,
 };
 
@@ -186,7 +186,7 @@ fn unknown_streams_are_named() {
     );
 }
 
-fn loaded() -> Loaded {
+fn loaded() -> LoadedScript {
     script::load(Path::new(SPATIAL_SOFT), &[]).expect("the suite loads")
 }
 

@@ -17,7 +17,7 @@ pub(crate) use dataset::{
     RecordArgs, RecordingArgs,
 };
 pub(crate) use policy::{
-    DEFAULT_PROFILE, GripMode, GripperArg, POLICIES, PolicyArgs, PolicySpec, ProtocolArg,
+    DEFAULT_PROFILE, GripMode, GripperArg, POLICIES, PolicyArg, PolicyArgs, ProtocolArg,
 };
 pub(crate) use run::{CheckArgs, RunArgs, ScriptArgs, ServeArgs, ViewArgs};
 use values::parse_folder;

@@ -26,7 +26,7 @@ pub(crate) const POLICIES: [(&str, &str); 5] = [
 pub(crate) struct PolicyArgs {
     /// Policy that controls the robot: a name (softvt list policies), a Lua file, a server such as ws://host:8000, or a run folder whose actions are repeated
     #[arg(long, value_name = "POLICY", default_value = "expert", value_parser = parse_policy)]
-    pub policy: PolicySpec,
+    pub policy: PolicyArg,
     /// Observations and action encoding of a policy server: a name (softvt list profiles) or a Lua file [default: visuo_tactile]
     #[arg(long, value_name = "PROFILE", value_parser = parse_profile)]
     pub profile: Option<String>,
@@ -49,7 +49,7 @@ pub(crate) struct PolicyArgs {
 
 /// Value of `--policy`.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum PolicySpec {
+pub(crate) enum PolicyArg {
     Expert(GripMode),
     Noop,
     Random,
@@ -95,7 +95,7 @@ pub(crate) enum GripperArg {
     Continuous,
 }
 
-impl PolicySpec {
+impl PolicyArg {
     /// As it was typed.
     pub(crate) fn word(&self) -> String {
         match self {
@@ -108,15 +108,15 @@ impl PolicySpec {
     }
 }
 
-fn parse_policy(word: &str) -> Result<PolicySpec, String> {
+fn parse_policy(word: &str) -> Result<PolicyArg, String> {
     Ok(match word {
-        "expert" => PolicySpec::Expert(GripMode::Commanded),
-        "expert-binary" => PolicySpec::Expert(GripMode::Binary),
-        "tactile-servo" => PolicySpec::Expert(GripMode::TactileServo),
-        "noop" => PolicySpec::Noop,
-        "random" => PolicySpec::Random,
-        address if address.contains("://") => PolicySpec::Server(address.to_owned()),
-        file if file.ends_with(".lua") => PolicySpec::Lua(file.into()),
+        "expert" => PolicyArg::Expert(GripMode::Commanded),
+        "expert-binary" => PolicyArg::Expert(GripMode::Binary),
+        "tactile-servo" => PolicyArg::Expert(GripMode::TactileServo),
+        "noop" => PolicyArg::Noop,
+        "random" => PolicyArg::Random,
+        address if address.contains("://") => PolicyArg::Server(address.to_owned()),
+        file if file.ends_with(".lua") => PolicyArg::Lua(file.into()),
         data if is_dataset(Path::new(data)) => {
             return Err(format!(
                 "{data} is a dataset, not a policy; to simulate its demonstrations again: softvt replay {data} 0/0 for \
@@ -124,7 +124,7 @@ fn parse_policy(word: &str) -> Result<PolicySpec, String> {
                  dataset import SUITE.lua FILE.hdf5 --out DIR"
             ));
         }
-        folder if Path::new(folder).is_dir() => PolicySpec::Run(folder.into()),
+        folder if Path::new(folder).is_dir() => PolicyArg::Run(folder.into()),
         other => {
             let known = POLICIES.map(|(name, _)| name).join(", ");
             let hint = suggestion(other, &POLICIES);
@@ -166,9 +166,9 @@ mod tests {
 
     #[test]
     fn the_form_of_a_word_decides_what_kind_of_policy_it_is() {
-        assert_eq!(parse_policy("ws://x:1"), Ok(PolicySpec::Server("ws://x:1".into())));
-        assert_eq!(parse_policy("a/b.lua"), Ok(PolicySpec::Lua("a/b.lua".into())));
-        assert_eq!(parse_policy("."), Ok(PolicySpec::Run(".".into())));
+        assert_eq!(parse_policy("ws://x:1"), Ok(PolicyArg::Server("ws://x:1".into())));
+        assert_eq!(parse_policy("a/b.lua"), Ok(PolicyArg::Lua("a/b.lua".into())));
+        assert_eq!(parse_policy("."), Ok(PolicyArg::Run(".".into())));
         assert!(parse_policy("exprt").unwrap_err().ends_with("did you mean expert?"));
         assert!(parse_profile("visoin").unwrap_err().ends_with("did you mean vision?"));
         for (name, _) in POLICIES {

@@ -22,7 +22,7 @@ use crate::{
     parallel,
     rollout::{AssetCache, SensorAssets, cancel, target_asset},
     scene::Asset,
-    script::{self, Loaded, Scenes},
+    script::{self, LoadedScript, Scenes},
     text::{self, counted},
 };
 
@@ -58,7 +58,7 @@ pub(crate) fn run(args: &CheckArgs) -> Result<(), CliError> {
 
 fn check_suites(
     config: &RunConfig,
-    loaded: &Loaded,
+    loaded: &LoadedScript,
     suites: &[Suite],
     shared: &SharedAssets,
 ) -> Result<(), CliError> {
@@ -68,7 +68,7 @@ fn check_suites(
 
 fn check_suite(
     config: &RunConfig,
-    loaded: &Loaded,
+    loaded: &LoadedScript,
     suite: &Suite,
     shared: &SharedAssets,
 ) -> Result<(), CliError> {
@@ -97,7 +97,7 @@ fn check_suite(
 
 /// Builds and checks the first scene of every task on all processors. Returns the assets of their targets.
 fn check_first_scenes(
-    loaded: &Loaded,
+    loaded: &LoadedScript,
     run: &SuiteRun,
     tasks: &[&Task],
 ) -> Result<Vec<Option<Arc<Asset>>>, CliError> {

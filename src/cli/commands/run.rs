@@ -20,7 +20,7 @@ use crate::{
     },
     evaluation::summary::SuiteSummary,
     report::terminal,
-    script::{self, Loaded},
+    script::{self, LoadedScript},
 };
 
 /// Runs the plan of a script: suites, conditions or an experiment.
@@ -128,7 +128,7 @@ fn next_run_dir(config: &RunConfig, name: &str) -> PathBuf {
 
 fn evaluate(
     config: &RunConfig,
-    loaded: &Loaded,
+    loaded: &LoadedScript,
     suite: &Suite,
     out: PathBuf,
 ) -> Result<SuiteSummary, CliError> {

@@ -18,7 +18,7 @@ use crate::{
     },
     policy::Observation,
     rollout::cancel,
-    script::{self, EpisodeRequest, Loaded},
+    script::{self, EpisodeRequest, LoadedScript},
     serve::{self, EpisodeId, RequestError, ServedSuite, Server, ServerConfig},
 };
 
@@ -67,7 +67,7 @@ pub(crate) fn run(args: &ServeArgs) -> Result<(), CliError> {
     Err(CliError::interrupted("interrupted"))
 }
 
-fn served_suites<'a>(config: &RunConfig, loaded: &'a Loaded) -> Result<Vec<&'a Suite>, CliError> {
+fn served_suites<'a>(config: &RunConfig, loaded: &'a LoadedScript) -> Result<Vec<&'a Suite>, CliError> {
     let suites: Vec<&Suite> = match &loaded.plan {
         Plan::Suite(suite) => vec![suite],
         Plan::Suites { suites } => suites.iter().collect(),
@@ -102,7 +102,7 @@ fn open_server(args: &ServeArgs) -> Result<Server, CliError> {
 fn suite_runs<'a>(
     args: &ServeArgs,
     config: &'a RunConfig,
-    loaded: &'a Loaded,
+    loaded: &'a LoadedScript,
     suites: &[&'a Suite],
 ) -> Result<Vec<SuiteRun<'a>>, CliError> {
     let mut runs = Vec::new();
@@ -118,7 +118,7 @@ fn suite_runs<'a>(
 }
 
 /// Hash of all that determines an episode, except its index and the actions of the client.
-fn provenance_hash(config: &RunConfig, loaded: &Loaded) -> String {
+fn provenance_hash(config: &RunConfig, loaded: &LoadedScript) -> String {
     let all = json!([
         env!("CARGO_PKG_VERSION"),
         loaded.bundle.hashes(),

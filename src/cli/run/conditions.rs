@@ -21,7 +21,7 @@ use crate::{
         condition_table::{ConditionOutcome, ConditionRow, ConditionTable, table},
         run_folder::RunFolder,
     },
-    script::Loaded,
+    script::LoadedScript,
     text,
 };
 
@@ -58,7 +58,7 @@ struct ConditionCase {
 /// A condition that does not fit a suite, a folder that contains a run, or an episode that fails. Finished runs are kept.
 pub(crate) fn run(
     config: &RunConfig,
-    loaded: &Loaded,
+    loaded: &LoadedScript,
     suites: &[Suite],
     conditions: &[Condition],
     out: &Path,
@@ -89,7 +89,7 @@ pub(crate) fn run(
 /// The first condition or scene that is not valid.
 pub(crate) fn check(
     config: &RunConfig,
-    loaded: &Loaded,
+    loaded: &LoadedScript,
     suites: &[Suite],
     conditions: &[Condition],
 ) -> Result<(), CliError> {
@@ -158,7 +158,7 @@ fn not_applicable(only: Option<ObjectType>, object_type: ObjectType) -> Option<S
 
 /// Prepares a run of every case that applies, without running an episode.
 fn prepare_runs<'a>(
-    loaded: &'a Loaded,
+    loaded: &'a LoadedScript,
     suite: &'a Suite,
     cases: &'a [ConditionCase],
     tasks: &[&'a Task],
@@ -223,7 +223,12 @@ fn compare_conditions(
     Ok(ConditionTable { suite: config.suite_name(suite), policy, deformable, rows })
 }
 
-fn write(config: &RunConfig, loaded: &Loaded, tables: &[ConditionTable], out: &Path) -> Result<(), CliError> {
+fn write(
+    config: &RunConfig,
+    loaded: &LoadedScript,
+    tables: &[ConditionTable],
+    out: &Path,
+) -> Result<(), CliError> {
     let document = ConditionsFile {
         softvt: env!("CARGO_PKG_VERSION"),
         script: &loaded.main,

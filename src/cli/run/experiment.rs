@@ -17,7 +17,7 @@ use crate::{
     files::replace,
     parallel,
     rollout::cancel,
-    script::{Experiment, Loaded, Row},
+    script::{Experiment, LoadedScript, Row},
     text::counted,
 };
 
@@ -27,7 +27,7 @@ use crate::{
 /// The script fails, or a file cannot be written.
 pub(crate) fn run(
     config: &RunConfig,
-    loaded: &Loaded,
+    loaded: &LoadedScript,
     name: &str,
     points: usize,
     columns: &[String],

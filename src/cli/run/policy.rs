@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, path::Path, sync::Arc, time::Duration};
 use crate::{
     benchmark::seed::RandomStream,
     cli::{
-        args::{DEFAULT_PROFILE, GripMode, GripperArg, PolicyArgs, PolicySpec, ProtocolArg},
+        args::{DEFAULT_PROFILE, GripMode, GripperArg, PolicyArg, PolicyArgs, ProtocolArg},
         error::CliError,
         run::recorded_policy::RecordedRuns,
     },
@@ -77,16 +77,16 @@ impl PolicyConfig {
     pub(crate) fn load(args: &PolicyArgs) -> Result<Self, CliError> {
         refuse_flags_without_effect(args)?;
         let (kind, name) = match &args.policy {
-            PolicySpec::Expert(mode) => (PolicyKind::Expert(*mode), args.policy.word()),
-            PolicySpec::Noop => (PolicyKind::Noop, args.policy.word()),
-            PolicySpec::Random => (PolicyKind::Random, args.policy.word()),
-            PolicySpec::Lua(path) => {
+            PolicyArg::Expert(mode) => (PolicyKind::Expert(*mode), args.policy.word()),
+            PolicyArg::Noop => (PolicyKind::Noop, args.policy.word()),
+            PolicyArg::Random => (PolicyKind::Random, args.policy.word()),
+            PolicyArg::Lua(path) => {
                 let file = PolicyFile::load(path).map_err(CliError::input)?;
                 let replan = args.replan.map(usize::from).or(file.replan);
                 let name = file.name.clone();
                 (PolicyKind::Lua { file: Arc::new(file), replan }, name)
             }
-            PolicySpec::Server(url) => {
+            PolicyArg::Server(url) => {
                 let (profile, sources) = load_profile_of(args)?;
                 let name = profile.name.clone();
                 let server = RemotePolicyConfig {
@@ -103,7 +103,7 @@ impl PolicyConfig {
                 };
                 (PolicyKind::Server(Arc::new(server)), name)
             }
-            PolicySpec::Run(dir) => {
+            PolicyArg::Run(dir) => {
                 (PolicyKind::Recorded(Arc::new(RecordedRuns::load(dir)?)), "replay".to_owned())
             }
         };
@@ -284,8 +284,8 @@ pub(crate) fn load_profile_of(args: &PolicyArgs) -> Result<(Profile, BTreeMap<St
 
 /// Refuses flags that the selected policy would ignore.
 fn refuse_flags_without_effect(args: &PolicyArgs) -> Result<(), CliError> {
-    let is_server = matches!(args.policy, PolicySpec::Server(_));
-    let is_lua = matches!(args.policy, PolicySpec::Lua(_));
+    let is_server = matches!(args.policy, PolicyArg::Server(_));
+    let is_lua = matches!(args.policy, PolicyArg::Lua(_));
     let flags = [
         ("--profile", args.profile.is_some() && !is_server),
         ("--protocol", args.protocol.is_some() && !is_server),
@@ -313,7 +313,7 @@ mod tests {
     use super::*;
     use crate::cli::args::POLICIES;
 
-    fn args(policy: PolicySpec) -> PolicyArgs {
+    fn args(policy: PolicyArg) -> PolicyArgs {
         PolicyArgs {
             policy,
             name: None,
@@ -328,8 +328,8 @@ mod tests {
     #[test]
     fn built_in_policies_have_the_names_that_are_listed() {
         use GripMode::{Binary, Commanded, TactileServo};
-        let experts = [Commanded, Binary, TactileServo].map(PolicySpec::Expert);
-        let specs = experts.into_iter().chain([PolicySpec::Noop, PolicySpec::Random]);
+        let experts = [Commanded, Binary, TactileServo].map(PolicyArg::Expert);
+        let specs = experts.into_iter().chain([PolicyArg::Noop, PolicyArg::Random]);
         for ((name, _), spec) in POLICIES.into_iter().zip(specs) {
             let policy = PolicyConfig::load(&args(spec)).unwrap();
             assert_eq!(policy.name(), name);
@@ -340,8 +340,8 @@ mod tests {
     #[test]
     fn flags_without_effect_are_refused() {
         let message = |args: PolicyArgs| PolicyConfig::load(&args).unwrap_err().message;
-        let noop = || args(PolicySpec::Noop);
-        let servo = PolicySpec::Expert(GripMode::TactileServo);
+        let noop = || args(PolicyArg::Noop);
+        let servo = PolicyArg::Expert(GripMode::TactileServo);
         assert_eq!(
             message(PolicyArgs { replan: Some(3), ..noop() }),
             "--replan: applies to policy servers and Lua policies only; --policy noop ignores it"
@@ -351,7 +351,7 @@ mod tests {
             ("--protocol", PolicyArgs { protocol: Some(ProtocolArg::VlaEval), ..noop() }),
             (
                 "--gripper",
-                PolicyArgs { gripper: Some(GripperArg::Binary), ..args(PolicySpec::Lua("x.lua".into())) },
+                PolicyArgs { gripper: Some(GripperArg::Binary), ..args(PolicyArg::Lua("x.lua".into())) },
             ),
             ("--policy-timeout", PolicyArgs { policy_timeout: Some(DEFAULT_TIMEOUT), ..args(servo) }),
         ] {

@@ -41,7 +41,7 @@ use crate::{
         FinishedEpisode, SensorAssets, cancel, target_asset,
     },
     scene::{Asset, Body},
-    script::{self, Loaded},
+    script::{self, LoadedScript},
     text::counted,
 };
 
@@ -51,7 +51,7 @@ use crate::{
 /// other commands run single episodes with [`SuiteRun::run_episode`].
 pub(crate) struct SuiteRun<'a> {
     pub config: &'a RunConfig,
-    pub loaded: &'a Loaded,
+    pub loaded: &'a LoadedScript,
     pub suite: &'a Suite,
     /// Name in results.
     pub name: String,
@@ -95,7 +95,7 @@ impl<'a> SuiteRun<'a> {
     /// A setting or shift that does not exist, or whose value is out of range; recorded actions that do not fit.
     pub(crate) fn new(
         config: &'a RunConfig,
-        loaded: &'a Loaded,
+        loaded: &'a LoadedScript,
         suite: &'a Suite,
         jobs: Vec<EpisodeJob<'a>>,
         out: PathBuf,

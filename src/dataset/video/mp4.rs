@@ -67,16 +67,16 @@ impl Track {
         let scale = self.rate * TICKS;
         let duration = self.samples.len() as u32 * TICKS;
         let mvhd =
-            Fields::full(0).u32s(&[0, 0, scale, duration, 0x0001_0000]).u16s(&[0x0100, 0]).u32s(&[0, 0]);
+            BoxFields::full(0).u32s(&[0, 0, scale, duration, 0x0001_0000]).u16s(&[0x0100, 0]).u32s(&[0, 0]);
         let mvhd = mvhd.u32s(&MATRIX).u32s(&[0; 6]).u32s(&[2]);
         // Flags 3: the track is enabled and part of the presentation.
-        let tkhd = Fields::full(3).u32s(&[0, 0, 1, 0, duration, 0, 0]).u16s(&[0, 0, 0, 0]).u32s(&MATRIX);
+        let tkhd = BoxFields::full(3).u32s(&[0, 0, 1, 0, duration, 0, 0]).u16s(&[0, 0, 0, 0]).u32s(&MATRIX);
         let tkhd = tkhd.u32s(&[(self.width as u32) << 16, (self.height as u32) << 16]);
         // 0x55c4: language undetermined.
-        let mdhd = Fields::full(0).u32s(&[0, 0, scale, duration]).u16s(&[0x55c4, 0]);
-        let hdlr = Fields::full(0).u32s(&[0]).bytes(b"vide").u32s(&[0; 3]).bytes(b"softvt\0");
-        let vmhd = Fields::full(1).u16s(&[0; 4]);
-        let dref = Fields::full(0).u32s(&[1]).bytes(&boxed(b"url ", &Fields::full(1).0));
+        let mdhd = BoxFields::full(0).u32s(&[0, 0, scale, duration]).u16s(&[0x55c4, 0]);
+        let hdlr = BoxFields::full(0).u32s(&[0]).bytes(b"vide").u32s(&[0; 3]).bytes(b"softvt\0");
+        let vmhd = BoxFields::full(1).u16s(&[0; 4]);
+        let dref = BoxFields::full(0).u32s(&[1]).bytes(&boxed(b"url ", &BoxFields::full(1).0));
         let minf = [
             boxed(b"vmhd", &vmhd.0),
             boxed(b"dinf", &boxed(b"dref", &dref.0)),
@@ -89,15 +89,15 @@ impl Track {
 
     fn sample_table(&self, first: u32) -> Vec<u8> {
         let count = self.samples.len() as u32;
-        let stsd = Fields::full(0).u32s(&[1]).bytes(&self.sample_entry());
-        let stts = Fields::full(0).u32s(&[1, count, TICKS]);
+        let stsd = BoxFields::full(0).u32s(&[1]).bytes(&self.sample_entry());
+        let stts = BoxFields::full(0).u32s(&[1, count, TICKS]);
         let keys = self.samples.iter().zip(1_u32..).filter(|(s, _)| s.is_key).map(|(_, number)| number);
         let keys: Vec<u32> = keys.collect();
-        let stss = Fields::full(0).u32s(&[keys.len() as u32]).u32s(&keys);
-        let stsc = Fields::full(0).u32s(&[1, 1, count, 1]);
+        let stss = BoxFields::full(0).u32s(&[keys.len() as u32]).u32s(&keys);
+        let stsc = BoxFields::full(0).u32s(&[1, 1, count, 1]);
         let sizes: Vec<u32> = self.samples.iter().map(|s| s.bytes.len() as u32).collect();
-        let stsz = Fields::full(0).u32s(&[0, count]).u32s(&sizes);
-        let stco = Fields::full(0).u32s(&[1, first]);
+        let stsz = BoxFields::full(0).u32s(&[0, count]).u32s(&sizes);
+        let stco = BoxFields::full(0).u32s(&[1, first]);
         let boxes = [
             (b"stsd", stsd),
             (b"stts", stts),
@@ -113,11 +113,11 @@ impl Track {
     fn sample_entry(&self) -> Vec<u8> {
         let (sps, pps) = (&self.sps, &self.pps);
         let profile = [1, sps[1], sps[2], sps[3], 0xff, 0xe1];
-        let avcc = Fields(profile.to_vec()).u16s(&[sps.len() as u16]).bytes(sps).bytes(&[1]);
+        let avcc = BoxFields(profile.to_vec()).u16s(&[sps.len() as u16]).bytes(sps).bytes(&[1]);
         let avcc = avcc.u16s(&[pps.len() as u16]).bytes(pps);
-        let colr = Fields(b"nclx".to_vec()).u16s(&[6, 6, 6]).bytes(&[0]);
+        let colr = BoxFields(b"nclx".to_vec()).u16s(&[6, 6, 6]).bytes(&[0]);
         let entry =
-            Fields(vec![0; 6]).u16s(&[1]).u16s(&[0; 8]).u16s(&[self.width as u16, self.height as u16]);
+            BoxFields(vec![0; 6]).u16s(&[1]).u16s(&[0; 8]).u16s(&[self.width as u16, self.height as u16]);
         // 72 dpi, one frame per sample, no name, 24 bits per pixel, no colour table.
         let entry = entry.u32s(&[0x0048_0000, 0x0048_0000, 0]).u16s(&[1]).bytes(&[0; 32]).u16s(&[24, 0xffff]);
         boxed(b"avc1", &entry.bytes(&boxed(b"avcC", &avcc.0)).bytes(&boxed(b"colr", &colr.0)).0)
@@ -132,9 +132,9 @@ fn boxed(name: &[u8; 4], payload: &[u8]) -> Vec<u8> {
 }
 
 /// Big-endian fields.
-struct Fields(Vec<u8>);
+struct BoxFields(Vec<u8>);
 
-impl Fields {
+impl BoxFields {
     /// Version 0 and flags.
     fn full(flags: u32) -> Self {
         Self(flags.to_be_bytes().to_vec())

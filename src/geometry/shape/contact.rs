@@ -27,7 +27,7 @@ const MAX_DEPTH: f64 = 4e-3;
 const MAX_DEPTH_RATIO: f64 = 3.0;
 
 /// One flat or round face of a sharp-edged shape, relative to a query point.
-struct Face {
+struct SupportFace {
     phi: f64,
     normal: Vec3,
     /// Distance of the point inside of the edges of the face, in each direction, m.
@@ -69,7 +69,7 @@ fn full(SignedDistance { distance: phi, normal }: SignedDistance) -> Contact {
 }
 
 /// Contact with the face that the sample faces most directly, among those that it covers; `None` if it covers none.
-fn sharp<const N: usize>(faces: [Face; N], facing: &Vec3, spacing: f64) -> Option<Contact> {
+fn sharp<const N: usize>(faces: [SupportFace; N], facing: &Vec3, spacing: f64) -> Option<Contact> {
     let nearest = -faces.iter().fold(f64::NEG_INFINITY, |least, face| least.max(face.phi));
     let deepest = MAX_DEPTH.max(MAX_DEPTH_RATIO * nearest);
     let (mut most, mut best) = (FACING, None);
@@ -92,11 +92,11 @@ fn covered(inside: f64, spacing: f64) -> f64 {
     (inside / spacing + 0.5).clamp(0.0, 1.0)
 }
 
-fn box_faces(p: &Vec3, half: &Vec3) -> [Face; 3] {
+fn box_faces(p: &Vec3, half: &Vec3) -> [SupportFace; 3] {
     let inside = half - p.abs();
     std::array::from_fn(|axis| {
         let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
-        Face {
+        SupportFace {
             phi: -inside[axis],
             normal: Vec3::ith(axis, if p[axis] < 0.0 { -1.0 } else { 1.0 }),
             inside: [inside[i], inside[j]],
@@ -105,15 +105,15 @@ fn box_faces(p: &Vec3, half: &Vec3) -> [Face; 3] {
     })
 }
 
-fn cylinder_faces(p: &Vec3, radius: f64, half_height: f64) -> [Face; 2] {
+fn cylinder_faces(p: &Vec3, radius: f64, half_height: f64) -> [SupportFace; 2] {
     let r = primitive::length(p.x, p.y);
-    let cap = Face {
+    let cap = SupportFace {
         phi: p.z.abs() - half_height,
         normal: Vec3::z() * if p.z < 0.0 { -1.0 } else { 1.0 },
         inside: [radius - r, f64::INFINITY],
         depth: half_height,
     };
-    let side = Face {
+    let side = SupportFace {
         phi: r - radius,
         normal: if r > 1e-12 { Vec3::new(p.x / r, p.y / r, 0.0) } else { Vec3::x() },
         inside: [half_height - p.z.abs(), f64::INFINITY],

@@ -8,7 +8,7 @@
 
 use super::{
     island::Island, law::LinearSegment, newton::Solver, options::MAX_SEGMENT_GUESSES,
-    problem::ContactProblem, secant::State,
+    problem::ContactProblem, secant::SecantState,
 };
 
 impl Solver {
@@ -70,8 +70,8 @@ impl Solver {
             let force = |v: &[f64]| constraint.force_and_cost(problem.dt, v[at]).0;
             (at, problem.dt * (force(old) - force(new)))
         });
-        let before = State { v: old, gradient: &self.trial_gradient };
-        let after = State { v: new, gradient: &self.gradient };
+        let before = SecantState { v: old, gradient: &self.trial_gradient };
+        let after = SecantState { v: new, gradient: &self.gradient };
         self.cache.correct(before, after, constraint_changes);
     }
 }

@@ -3,7 +3,7 @@
 use super::{
     options::{FACTOR_COST_IN_STEPS, MAX_CACHED_FACTORS, UNAVOIDABLE_STEPS},
     problem::ContactProblem,
-    secant::{SecantPairs, State},
+    secant::{SecantPairs, SecantState},
 };
 use crate::{geometry::union_find::UnionFind, physics::sparse::dense};
 
@@ -159,8 +159,8 @@ impl FactorCache {
     /// constraints not in the factor.
     pub(super) fn correct(
         &mut self,
-        before: State,
-        after: State,
+        before: SecantState,
+        after: SecantState,
         others: impl Iterator<Item = (usize, f64)>,
     ) {
         self.entries[0].secant.push(before, after, others);

@@ -65,13 +65,13 @@ pub struct Solver {
 
 /// Convergence with the current factor.
 #[derive(Clone, Copy)]
-struct Progress {
+struct NewtonProgress {
     steps: u32,
     /// Residual over tolerance before the first of these steps.
     initial_ratio: f64,
 }
 
-impl Progress {
+impl NewtonProgress {
     /// Number of steps to convergence if they continue at the same rate.
     fn remaining_steps(&self, ratio: f64) -> f64 {
         if ratio <= 1.0 {
@@ -156,7 +156,7 @@ impl Solver {
         let mut cost = self.update_gradient(problem, island);
         let mut ratio = self.residual_ratio(problem, island);
         let mut has_factor = self.cache.select(problem, island);
-        let mut progress = Progress { steps: 0, initial_ratio: ratio };
+        let mut progress = NewtonProgress { steps: 0, initial_ratio: ratio };
         for step in 0..MAX_NEWTON {
             if ratio <= 1.0 {
                 self.cache.record_pass(progress.steps);
@@ -167,7 +167,7 @@ impl Solver {
                 break;
             }
             if is_new {
-                progress = Progress { steps: 0, initial_ratio: ratio };
+                progress = NewtonProgress { steps: 0, initial_ratio: ratio };
             }
             self.find_step(problem, island);
             let Some(lower) = self.line_search(problem, island, cost) else {

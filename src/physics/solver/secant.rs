@@ -8,7 +8,7 @@ use crate::physics::sparse::dense::dot;
 
 /// Velocities and the gradient of the cost there.
 #[derive(Clone, Copy)]
-pub(super) struct State<'a> {
+pub(super) struct SecantState<'a> {
     pub v: &'a [f64],
     pub gradient: &'a [f64],
 }
@@ -36,7 +36,12 @@ impl SecantPairs {
 
     /// Adds the pair of a step, excluding the gradient changes `others` (index, amount), which come from constraints that
     /// are not in the factor.
-    pub(super) fn push(&mut self, before: State, after: State, others: impl Iterator<Item = (usize, f64)>) {
+    pub(super) fn push(
+        &mut self,
+        before: SecantState,
+        after: SecantState,
+        others: impl Iterator<Item = (usize, f64)>,
+    ) {
         if self.used == MAX_SECANT_PAIRS {
             self.pairs.rotate_left(1);
             self.used -= 1;
@@ -95,8 +100,8 @@ mod tests {
             let g: [f64; 5] = std::array::from_fn(|j| hessian[j] * v[j]);
             // The contribution of a stiffness of 7 on the last entry is excluded.
             let all: [f64; 5] = std::array::from_fn(|j| g[j] + if j == 4 { 7.0 * v[j] } else { 0.0 });
-            let before = State { v: &[0.0; 5], gradient: &[0.0; 5] };
-            pairs.push(before, State { v: &v, gradient: &all }, [(4, 7.0 * v[4])].into_iter());
+            let before = SecantState { v: &[0.0; 5], gradient: &[0.0; 5] };
+            pairs.push(before, SecantState { v: &v, gradient: &all }, [(4, 7.0 * v[4])].into_iter());
         }
         let mut b = [1.0, 2.0, 3.0, 4.0, 5.0];
         let full = [1.0, 5.0, 0.25, 1.0, 3.0 + 2.0];

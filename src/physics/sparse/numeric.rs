@@ -148,11 +148,11 @@ fn extend_add(front: &mut [f64], n: usize, update: &[f64], rest: usize, into: &[
 mod tests {
     use super::*;
 
-    struct Grid {
+    struct PatternGrid {
         neighbours: Vec<Vec<u32>>,
     }
 
-    impl Grid {
+    impl PatternGrid {
         fn new(n: usize) -> Self {
             let at = |i: usize, j: usize, k: usize| (i + n * (j + n * k)) as u32;
             let mut neighbours = vec![Vec::new(); n * n * n];
@@ -182,7 +182,7 @@ mod tests {
         }
     }
 
-    impl BlockMatrix for Grid {
+    impl BlockMatrix for PatternGrid {
         fn column(&self, node: u32, visit: &mut dyn FnMut(u32, &[f64; 9], bool)) {
             visit(node, &self.block(node, node), false);
             for &other in &self.neighbours[node as usize] {
@@ -193,7 +193,7 @@ mod tests {
 
     #[test]
     fn the_factor_solves_with_any_retained_set() {
-        let grid = Grid::new(5);
+        let grid = PatternGrid::new(5);
         let nodes = 125usize;
         let x: Vec<f64> = (0..3 * nodes).map(|i| (i as f64 * 0.37).cos()).collect();
         let mut b = vec![0.0; 3 * nodes];

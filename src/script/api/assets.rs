@@ -13,7 +13,7 @@ use crate::{
     physics::contact::Friction,
     scene::{Asset, Body, SoftMaterial},
     script::{
-        schema::{Range, Record, RecordType, Type, make, object::Constructor, one_of, record},
+        schema::{Range, Record, RecordType, Type, make, object::LuaConstructor, one_of, record},
         vm::error::fail,
     },
 };
@@ -86,12 +86,12 @@ impl From<&FrictionSpec> for Friction {
 }
 
 /// The constructor of assets, and those of bodies without parts.
-pub(crate) static CONSTRUCTORS: &[Constructor] = &[
-    Constructor::with(AssetSpec::RECORD, make_asset),
-    Constructor::of(SoftSpec::RECORD),
-    Constructor::of(RigidSpec::RECORD),
-    Constructor::of(StaticSpec::RECORD),
-    Constructor::of(ScenerySpec::RECORD),
+pub(crate) static CONSTRUCTORS: &[LuaConstructor] = &[
+    LuaConstructor::with(AssetSpec::RECORD, make_asset),
+    LuaConstructor::of(SoftSpec::RECORD),
+    LuaConstructor::of(RigidSpec::RECORD),
+    LuaConstructor::of(StaticSpec::RECORD),
+    LuaConstructor::of(ScenerySpec::RECORD),
 ];
 
 fn make_asset(lua: &Lua, record: &'static Record, value: &Value) -> mlua::Result<Table> {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::{
     benchmark::control::CONTROL_DT,
     geometry::{Aabb, Pose, Vec3},
-    robot::ik::{PoseError, PoseTolerance, UnreachablePose},
+    robot::ik::{PoseDifference, PoseTolerance, UnreachablePose},
     rollout::{ObjectInstance, Simulation},
     scene::Asset,
 };
@@ -159,7 +159,7 @@ impl TrackingErrorMonitor {
     /// A complaint for the script once the tool has been away for a second from a pose that it cannot reach.
     fn complaint(&mut self, sim: &Simulation) -> Option<String> {
         let command_b = self.command_b?;
-        let error = PoseError::between(&sim.robot.tool_b(&sim.world), &command_b);
+        let error = PoseDifference::between(&sim.robot.tool_b(&sim.world), &command_b);
         self.steps = if TRACKING_LIMIT.contains(&error) { 0 } else { self.steps + 1 };
         if self.steps < MAX_LAG_STEPS {
             return None;

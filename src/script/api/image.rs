@@ -53,10 +53,10 @@ record! {
 
 /// `softvt.Image`.
 #[derive(Clone, Debug)]
-pub(crate) struct LuaImage(Arc<Mutex<Content>>);
+pub(crate) struct LuaImage(Arc<Mutex<ImageContent>>);
 
 #[derive(Debug)]
-struct Content {
+struct ImageContent {
     image: RgbImage,
     _reserved: Reservation,
 }
@@ -65,7 +65,7 @@ impl LuaImage {
     /// Takes an image into the virtual machine.
     pub(crate) fn new(lua: &Lua, image: RgbImage) -> mlua::Result<Self> {
         let reserved = reserve(lua, image.as_raw().len())?;
-        Ok(Self(Arc::new(Mutex::new(Content { image, _reserved: reserved }))))
+        Ok(Self(Arc::new(Mutex::new(ImageContent { image, _reserved: reserved }))))
     }
 
     /// Makes an image after reserving its memory, and `scratch_bytes` while it is made.
@@ -78,7 +78,7 @@ impl LuaImage {
     ) -> mlua::Result<Self> {
         let reserved = reserve(lua, 3 * width as usize * height as usize)?;
         let _scratch = reserve(lua, scratch_bytes)?;
-        Ok(Self(Arc::new(Mutex::new(Content { image: make(), _reserved: reserved }))))
+        Ok(Self(Arc::new(Mutex::new(ImageContent { image: make(), _reserved: reserved }))))
     }
 
     fn paste(&self, other: &Self, x: f64, y: f64) {
@@ -112,7 +112,7 @@ fn srgb(colour: [f64; 3]) -> [u8; 3] {
 
 /// A part of an image, pixels.
 #[derive(Clone, Copy)]
-struct Part {
+struct ImageRegion {
     x: u32,
     y: u32,
     width: u32,
@@ -120,13 +120,13 @@ struct Part {
 }
 
 /// Checks a region x, y, width, height of an image; the whole image by default.
-fn part(lua: &Lua, method: &str, image: &RgbImage, region: Option<[f64; 4]>) -> mlua::Result<Part> {
+fn part(lua: &Lua, method: &str, image: &RgbImage, region: Option<[f64; 4]>) -> mlua::Result<ImageRegion> {
     let (width, height) = image.dimensions();
-    let Some(region) = region else { return Ok(Part { x: 0, y: 0, width, height }) };
+    let Some(region) = region else { return Ok(ImageRegion { x: 0, y: 0, width, height }) };
     let [x, y, w, h] = region.map(|n| n as u32);
     let is_whole = region.iter().all(|n| n.fract() == 0.0 && (0.0..=MAX_EDGE).contains(n));
     if is_whole && w > 0 && h > 0 && x + w <= width && y + h <= height {
-        return Ok(Part { x, y, width: w, height: h });
+        return Ok(ImageRegion { x, y, width: w, height: h });
     }
     let got = super::visuals::braced(&region);
     let message = format!("expected x, y, width, height within {width} × {height} pixels, got {got}");
@@ -185,7 +185,7 @@ class! {
             /// Returns a region as an image of its own.
             fn crop(lua, this, region: [f64; 4] = REGION) -> ["softvt.Image"] {
                 let image = &lock(&this.0).image;
-                let Part { x, y, width, height } = part(lua, "crop", image, Some(region))?;
+                let ImageRegion { x, y, width, height } = part(lua, "crop", image, Some(region))?;
                 LuaImage::make(lua, width, height, 0, || imageops::crop_imm(image, x, y, width, height).to_image())?
             }
             /// Returns the image in another size.

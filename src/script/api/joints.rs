@@ -15,7 +15,7 @@ use crate::{
     script::{
         schema::{
             Made, Range, Record, RecordType, Type, ValidationError, error_at_key, invalid, make,
-            object::Constructor, one_of, record,
+            object::LuaConstructor, one_of, record,
         },
         vm::error::fail,
     },
@@ -81,10 +81,10 @@ one_of! {
 }
 
 /// Constructors that check more than single fields.
-pub(crate) static CONSTRUCTORS: &[Constructor] = &[
-    Constructor::with(ArticulatedSpec::RECORD, make_articulated),
-    Constructor::with(SliderSpec::RECORD, make_joint),
-    Constructor::with(HingeSpec::RECORD, make_joint),
+pub(crate) static CONSTRUCTORS: &[LuaConstructor] = &[
+    LuaConstructor::with(ArticulatedSpec::RECORD, make_articulated),
+    LuaConstructor::with(SliderSpec::RECORD, make_joint),
+    LuaConstructor::with(HingeSpec::RECORD, make_joint),
 ];
 
 fn make_joint(lua: &Lua, record: &'static Record, value: &Value) -> mlua::Result<Table> {

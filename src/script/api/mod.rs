@@ -25,7 +25,7 @@ use mlua::{Lua, Table};
 use super::{
     schema::{
         ApiObject, Class, Function, Record, RecordType, Signature,
-        object::{Constructor, signature},
+        object::{LuaConstructor, signature},
     },
     vm::list::LuaList,
 };
@@ -48,7 +48,7 @@ pub(crate) static SORTED: Signature = signature!(
 );
 
 /// Constructors `softvt.name{…}`.
-pub(crate) fn constructors() -> impl Iterator<Item = &'static Constructor> {
+pub(crate) fn constructors() -> impl Iterator<Item = &'static LuaConstructor> {
     [tasks::CONSTRUCTORS, assets::CONSTRUCTORS, joints::CONSTRUCTORS, policy::CONSTRUCTORS]
         .into_iter()
         .flatten()

@@ -5,7 +5,7 @@ use mlua::Function;
 use crate::{
     policy::{decode::MAX_CHUNK_LEN, profile::StatePart},
     robot::Side,
-    script::schema::{Range, RecordType, Type, choice, object::Constructor, record},
+    script::schema::{Range, RecordType, Type, choice, object::LuaConstructor, record},
     sensing::tactile::MosaicLayout,
 };
 
@@ -160,5 +160,5 @@ choice! {
     }
 }
 
-pub(crate) static CONSTRUCTORS: &[Constructor] =
-    &[Constructor::of(PolicySpec::RECORD), Constructor::of(ProfileSpec::RECORD)];
+pub(crate) static CONSTRUCTORS: &[LuaConstructor] =
+    &[LuaConstructor::of(PolicySpec::RECORD), LuaConstructor::of(ProfileSpec::RECORD)];

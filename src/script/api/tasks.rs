@@ -9,7 +9,7 @@ use crate::{
     script::{
         schema::{
             Made, Range, Record, RecordType, Type, Unchecked, ValidationError, choice, error_at_key,
-            functions, make, object::Constructor, one_of, record,
+            functions, make, object::LuaConstructor, one_of, record,
         },
         vm::{error::fail, value::got},
     },
@@ -172,14 +172,14 @@ impl GoalSpec {
 }
 
 /// Constructors of plans and their parts; that of layouts is a function.
-pub(crate) static CONSTRUCTORS: &[Constructor] = &[
-    Constructor::of(SuiteSpec::RECORD),
-    Constructor::of(TaskSpec::RECORD),
-    Constructor::of(OnSpec::RECORD),
-    Constructor::of(InsideSpec::RECORD),
-    Constructor::of(ShiftSpec::RECORD),
-    Constructor::with(ConditionsSpec::RECORD, make_conditions),
-    Constructor::of(ExperimentSpec::RECORD),
+pub(crate) static CONSTRUCTORS: &[LuaConstructor] = &[
+    LuaConstructor::of(SuiteSpec::RECORD),
+    LuaConstructor::of(TaskSpec::RECORD),
+    LuaConstructor::of(OnSpec::RECORD),
+    LuaConstructor::of(InsideSpec::RECORD),
+    LuaConstructor::of(ShiftSpec::RECORD),
+    LuaConstructor::with(ConditionsSpec::RECORD, make_conditions),
+    LuaConstructor::of(ExperimentSpec::RECORD),
 ];
 
 functions! {

@@ -9,7 +9,7 @@ use super::{pose::direction, shapes::LuaShape};
 use crate::{
     geometry::shape::Shape,
     parallel::lock,
-    scene::{MAX_LETTERS, Mask, Scene, TextDecal, TextLine, Typeface, Visual, VisualLayer},
+    scene::{LabelLine, MAX_LETTERS, Mask, Scene, TextDecal, Typeface, Visual, VisualLayer},
     script::{
         schema::{LuaType, Range, RecordType, Type, choice, class, functions, invalid, record},
         vm::{
@@ -381,7 +381,7 @@ functions! {
 }
 
 /// A line of text that can be printed.
-fn text_line(lua: &Lua, spec: TextMaskSpec) -> mlua::Result<TextLine> {
+fn text_line(lua: &Lua, spec: TextMaskSpec) -> mlua::Result<LabelLine> {
     let wrong = |key: &str, message: &str| Err(wrong::<TextMaskSpec>(lua, key, message));
     let count = spec.text.chars().count();
     if count > MAX_LETTERS {
@@ -395,7 +395,7 @@ fn text_line(lua: &Lua, spec: TextMaskSpec) -> mlua::Result<TextLine> {
     if spec.wrap_m.is_some() && facing[0].hypot(facing[1]) < 1e-3 * length {
         return wrong("facing", "expected a sideways direction, since the line is wrapped around the z axis");
     }
-    let line = TextLine {
+    let line = LabelLine {
         text: spec.text,
         typeface: spec.font,
         height_m: spec.height_m,

@@ -36,7 +36,7 @@ use options::{OptionSpec, Session, SharedSession};
 
 /// A loaded script.
 #[derive(Clone)]
-pub struct Loaded {
+pub struct LoadedScript {
     /// The main file, as messages name it.
     pub main: String,
     pub plan: Plan,
@@ -48,9 +48,12 @@ pub struct Loaded {
     limits: Limits,
 }
 
-impl std::fmt::Debug for Loaded {
+impl std::fmt::Debug for LoadedScript {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Loaded").field("main", &self.main).field("plan", &self.plan).finish_non_exhaustive()
+        f.debug_struct("LoadedScript")
+            .field("main", &self.main)
+            .field("plan", &self.plan)
+            .finish_non_exhaustive()
     }
 }
 
@@ -58,7 +61,7 @@ impl std::fmt::Debug for Loaded {
 ///
 /// # Errors
 /// If a file cannot be read, the script fails, or its options or its plan are invalid; the message names file and line.
-pub fn load(path: &Path, argv: &[String]) -> Result<Loaded, ScriptError> {
+pub fn load(path: &Path, argv: &[String]) -> Result<LoadedScript, ScriptError> {
     load_with(path, argv, &Limits::default())
 }
 
@@ -66,13 +69,13 @@ pub fn load(path: &Path, argv: &[String]) -> Result<Loaded, ScriptError> {
 ///
 /// # Errors
 /// As [`load`].
-pub fn load_with(path: &Path, argv: &[String], limits: &Limits) -> Result<Loaded, ScriptError> {
+pub fn load_with(path: &Path, argv: &[String], limits: &Limits) -> Result<LoadedScript, ScriptError> {
     let (library, main) = Library::open(path)?;
     let (machine, values) = open(&main, library, argv, limits)?;
     let options = lock(&machine.session).options.clone();
     let plan = machine.plan(&values).map_err(|e| machine.vm.explain(&e))?;
     let bundle = Arc::new(lock(machine.vm.library()).bundle().clone());
-    Ok(Loaded { main, plan, options, bundle, argv: argv.to_vec(), limits: limits.clone() })
+    Ok(LoadedScript { main, plan, options, bundle, argv: argv.to_vec(), limits: limits.clone() })
 }
 
 /// The options that the script at `path` declares, for `--help`. If the script fails, those declared before.
@@ -107,7 +110,7 @@ pub(crate) fn open(
 }
 
 /// Runs the sources of `loaded` in a new virtual machine.
-pub(crate) fn reopen(loaded: &Loaded) -> Result<(Machine, MultiValue), ScriptError> {
+pub(crate) fn reopen(loaded: &LoadedScript) -> Result<(Machine, MultiValue), ScriptError> {
     open(&loaded.main, Library::frozen((*loaded.bundle).clone()), &loaded.argv, &loaded.limits)
 }
 

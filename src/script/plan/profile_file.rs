@@ -34,7 +34,7 @@ pub fn load_profile(path: &Path) -> Result<(Profile, BTreeMap<String, String>), 
 
 fn read(lua: &Lua, values: &MultiValue) -> mlua::Result<Profile> {
     let spec: Made<ProfileSpec> = made(lua, values, "a profile's file")?;
-    let reader = Reader { lua, spec: &spec };
+    let reader = ProfileReader { lua, spec: &spec };
     let (mut keys, mut inputs) = (BTreeSet::new(), Vec::new());
     for (index, entry) in spec.inputs.iter().enumerate() {
         let place = format!("inputs[{}]", index + 1);
@@ -51,12 +51,12 @@ fn read(lua: &Lua, values: &MultiValue) -> mlua::Result<Profile> {
 }
 
 /// Reads a profile and checks the relations between its fields.
-struct Reader<'a> {
+struct ProfileReader<'a> {
     lua: &'a Lua,
     spec: &'a Made<ProfileSpec>,
 }
 
-impl Reader<'_> {
+impl ProfileReader<'_> {
     fn wrong(&self, key: &str, message: String) -> mlua::Error {
         fail_at_key(self.lua, &self.spec.table, key, format!("profile.{message}"))
     }

@@ -15,7 +15,7 @@ use crate::{
             scene::{LuaScene, empty_scene},
             tasks::{GoalSpec, SuiteSpec},
         },
-        plan::{Loaded, Machine, find_task, reopen},
+        plan::{LoadedScript, Machine, find_task, reopen},
         run::expert::Expert,
         schema::{HasTable, Made, Range},
         vm::{
@@ -59,7 +59,7 @@ impl Episode {
     ///
     /// # Errors
     /// If the suite, the task or a shift is unknown, or the script fails.
-    pub fn open(loaded: &Loaded, request: &EpisodeRequest) -> Result<Self, ScriptError> {
+    pub fn open(loaded: &LoadedScript, request: &EpisodeRequest) -> Result<Self, ScriptError> {
         let (machine, values) = reopen(loaded)?;
         let Start { scene, nominal, seed, expert } = start(&machine, &values, request)?;
         Ok(Self { scene, nominal, seed, machine, expert })
@@ -85,7 +85,7 @@ impl Scenes {
     ///
     /// # Errors
     /// If the script fails.
-    pub fn open(loaded: &Loaded) -> Result<Self, ScriptError> {
+    pub fn open(loaded: &LoadedScript) -> Result<Self, ScriptError> {
         let (machine, values) = reopen(loaded)?;
         Ok(Self { machine, values })
     }

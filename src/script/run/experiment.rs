@@ -8,7 +8,7 @@ use crate::script::{
         image::image_of,
         tasks::{ExperimentSpec, FinishSpec},
     },
-    plan::{Loaded, Machine, points, reopen},
+    plan::{LoadedScript, Machine, points, reopen},
     schema::{Made, RecordType, is_made, validate},
     vm::{
         error::{ScriptError, fail},
@@ -42,7 +42,7 @@ impl Experiment {
     ///
     /// # Errors
     /// If the script fails or does not return an experiment.
-    pub fn open(loaded: &Loaded) -> Result<Self, ScriptError> {
+    pub fn open(loaded: &LoadedScript) -> Result<Self, ScriptError> {
         let (machine, values) = reopen(loaded)?;
         let lua = &machine.vm.lua;
         let table = match values.front() {

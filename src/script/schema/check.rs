@@ -2,7 +2,7 @@
 
 use mlua::{Lua, Table, Value};
 
-use super::{Field, Presence, Range, Record, Type, ValidationError, joined};
+use super::{Field, FieldDefault, Range, Record, Type, ValidationError, joined};
 use crate::{
     script::vm::{
         error::{ScriptError, fail, here},
@@ -201,15 +201,15 @@ pub(crate) fn check(lua: &Lua, record: &Record, table: &Table) -> Result<Table, 
 /// The value of a field that is not given.
 fn absent(lua: &Lua, field: &Field) -> Result<Value, ValidationError> {
     Ok(match field.presence {
-        Presence::Required => {
+        FieldDefault::Required => {
             return Err(ValidationError::new(format!("missing; expected {}", field.ty.words())));
         }
-        Presence::Optional => Value::Nil,
-        Presence::Number(n) => Value::Number(n),
-        Presence::Integer(n) => Value::Integer(n),
-        Presence::Boolean(flag) => Value::Boolean(flag),
-        Presence::Text(text) => Value::String(lua.create_string(text)?),
-        Presence::Empty => field.ty.check(lua, &Value::Table(lua.create_table()?))?,
+        FieldDefault::Optional => Value::Nil,
+        FieldDefault::Number(n) => Value::Number(n),
+        FieldDefault::Integer(n) => Value::Integer(n),
+        FieldDefault::Boolean(flag) => Value::Boolean(flag),
+        FieldDefault::Text(text) => Value::String(lua.create_string(text)?),
+        FieldDefault::Empty => field.ty.check(lua, &Value::Table(lua.create_table()?))?,
     })
 }
 

@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, ops::Deref};
 
 use mlua::{FromLua, Function, Lua, Table, Value};
 
-use super::{Presence, Range, Record, Type, is_made, recheck};
+use super::{FieldDefault, Range, Record, Type, is_made, recheck};
 use crate::script::vm::{error::fail, value::got};
 
 /// A Rust type that checked Lua values convert to.
@@ -14,7 +14,7 @@ pub(crate) trait LuaType: FromLua {
     /// The same, for lists and maps of it.
     const REFERENCE: &'static Type = &Self::TYPE;
     /// The value where none is given.
-    const PRESENCE: Presence = Presence::Required;
+    const PRESENCE: FieldDefault = FieldDefault::Required;
     /// False if a parameter of this type reaches the function as the script gave it.
     const CHECKED: bool = true;
 }
@@ -46,7 +46,7 @@ impl<const N: usize> LuaType for [f64; N] {
 
 impl<T: LuaType> LuaType for Option<T> {
     const TYPE: Type = T::TYPE;
-    const PRESENCE: Presence = Presence::Optional;
+    const PRESENCE: FieldDefault = FieldDefault::Optional;
 }
 
 impl<T: LuaType> LuaType for Vec<T> {
@@ -160,7 +160,7 @@ macro_rules! record {
                         $($ty,)? <$rust as $crate::script::schema::LuaType>::TYPE
                     ),
                     presence: $crate::script::schema::convert::first!(
-                        $($crate::script::schema::Presence::$presence($default),)?
+                        $($crate::script::schema::FieldDefault::$presence($default),)?
                         <$rust as $crate::script::schema::LuaType>::PRESENCE
                     ),
                     doc: concat!($($field_doc),+),
@@ -179,7 +179,7 @@ macro_rules! record {
             const TYPE: $crate::script::schema::Type = $crate::script::schema::Type::Nested(
                 <Self as $crate::script::schema::RecordType>::RECORD
             );
-            const PRESENCE: $crate::script::schema::Presence =
+            const PRESENCE: $crate::script::schema::FieldDefault =
                 <Self as $crate::script::schema::RecordType>::RECORD.presence();
         }
     )+};

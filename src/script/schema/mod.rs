@@ -58,7 +58,7 @@ pub(crate) enum Type {
 
 /// The value of a field that is absent.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Presence {
+pub(crate) enum FieldDefault {
     /// The field must be given.
     Required,
     /// nil.
@@ -80,7 +80,7 @@ pub(crate) enum Presence {
 pub(crate) struct Field {
     pub name: &'static str,
     pub ty: Type,
-    pub presence: Presence,
+    pub presence: FieldDefault,
     pub doc: &'static str,
 }
 
@@ -98,16 +98,16 @@ pub(crate) struct Record {
 }
 
 impl Record {
-    /// [`Presence::Empty`] if every field may be left out, else [`Presence::Required`].
-    pub(crate) const fn presence(&self) -> Presence {
+    /// [`FieldDefault::Empty`] if every field may be left out, else [`FieldDefault::Required`].
+    pub(crate) const fn presence(&self) -> FieldDefault {
         let mut index = 0;
         while index < self.fields.len() {
-            if matches!(self.fields[index].presence, Presence::Required) {
-                return Presence::Required;
+            if matches!(self.fields[index].presence, FieldDefault::Required) {
+                return FieldDefault::Required;
             }
             index += 1;
         }
-        Presence::Empty
+        FieldDefault::Empty
     }
 
     fn names(&self) -> impl Iterator<Item = &'static str> + Clone + use<> {

@@ -3,7 +3,7 @@
 
 use mlua::{IntoLua, Lua, MetaMethod, MultiValue, Table, UserData, UserDataFields, UserDataMethods, Value};
 
-use super::{Presence, Type, error_at_key, make};
+use super::{FieldDefault, Type, error_at_key, make};
 use crate::{
     geometry::Vec3,
     script::vm::{error::fail, list::LuaList, value::got},
@@ -16,13 +16,13 @@ pub(crate) struct Class {
     /// `softvt.Rng`.
     pub name: &'static str,
     pub doc: &'static str,
-    pub fields: &'static [ClassField],
+    pub fields: &'static [LuaField],
     pub methods: &'static [Signature],
 }
 
 /// A field of a class.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct ClassField {
+pub(crate) struct LuaField {
     pub name: &'static str,
     pub access: Access,
     pub doc: &'static str,
@@ -51,13 +51,13 @@ pub(crate) struct Signature {
 pub(crate) struct Param {
     pub name: &'static str,
     pub ty: Type,
-    pub presence: Presence,
+    pub presence: FieldDefault,
     pub checked: bool,
 }
 
 impl Param {
     pub(crate) fn is_optional(&self) -> bool {
-        self.presence != Presence::Required
+        self.presence != FieldDefault::Required
     }
 }
 
@@ -238,7 +238,7 @@ macro_rules! class {
                 name: $class,
                 doc: concat!($($doc),+),
                 fields: &[
-                    $($($crate::script::schema::object::ClassField {
+                    $($($crate::script::schema::object::LuaField {
                         name: stringify!($read),
                         access: $crate::script::schema::object::Access::Read(
                             $read_type,
@@ -246,7 +246,7 @@ macro_rules! class {
                         ),
                         doc: concat!($($read_doc),+),
                     },)*)?
-                    $($($crate::script::schema::object::ClassField {
+                    $($($crate::script::schema::object::LuaField {
                         name: stringify!($write),
                         access: $crate::script::schema::object::Access::Write($write_type),
                         doc: concat!($($write_doc),+),
@@ -403,12 +403,12 @@ pub(crate) use functions;
 
 /// A function `softvt.name{…}` that checks and marks a table.
 #[derive(Clone, Copy)]
-pub(crate) struct Constructor {
+pub(crate) struct LuaConstructor {
     pub record: &'static super::Record,
     make: fn(&Lua, &'static super::Record, &Value) -> mlua::Result<Table>,
 }
 
-impl Constructor {
+impl LuaConstructor {
     /// A constructor that only checks the fields of its record.
     pub(crate) const fn of(record: &'static super::Record) -> Self {
         Self { record, make }
@@ -465,7 +465,7 @@ macro_rules! output {
             pub(crate) static CLASS: $crate::script::schema::Class = $crate::script::schema::Class {
                 name: $class,
                 doc: concat!($($doc),+),
-                fields: &[$($crate::script::schema::object::ClassField {
+                fields: &[$($crate::script::schema::object::LuaField {
                     name: stringify!($field),
                     access: $crate::script::schema::object::Access::Read($field_type, None),
                     doc: concat!($($field_doc),+),
@@ -536,8 +536,8 @@ pub(crate) fn arguments(
     let checked = signature.params.iter().map(|param| {
         let value = match (values.next().unwrap_or(Value::Nil), param.presence) {
             (value, _) if !param.checked => return Ok(value),
-            (Value::Nil, Presence::Optional) => return Ok(Value::Nil),
-            (Value::Nil, Presence::Empty) => Value::Table(lua.create_table()?),
+            (Value::Nil, FieldDefault::Optional) => return Ok(Value::Nil),
+            (Value::Nil, FieldDefault::Empty) => Value::Table(lua.create_table()?),
             (value, _) => value,
         };
         param.ty.check(lua, &value).map_err(|error| match param.ty {

@@ -12,7 +12,7 @@ mod visuals;
 
 use std::{fs, path::PathBuf, sync::Arc, time::Duration};
 
-use super::{Limits, Loaded, ScriptError, load_with};
+use super::{Limits, LoadedScript, ScriptError, load_with};
 
 /// A temporary project folder.
 pub(super) struct Project(tempfile::TempDir);
@@ -34,7 +34,7 @@ impl Project {
         self.0.path().join(path)
     }
 
-    pub(super) fn load(&self, path: &str, argv: &[&str]) -> Result<Loaded, ScriptError> {
+    pub(super) fn load(&self, path: &str, argv: &[&str]) -> Result<LoadedScript, ScriptError> {
         self.load_with(path, argv, &limits())
     }
 
@@ -43,7 +43,7 @@ impl Project {
         path: &str,
         argv: &[&str],
         limits: &Limits,
-    ) -> Result<Loaded, ScriptError> {
+    ) -> Result<LoadedScript, ScriptError> {
         let argv: Vec<String> = argv.iter().map(|word| word.to_string()).collect();
         load_with(&self.path(path), &argv, limits)
     }

@@ -21,7 +21,7 @@ const MAX_VALUES: usize = 1_000_000;
 /// For values that are not data: functions, objects, non-finite numbers, keys that are not strings, endless tables.
 pub(crate) fn to_json(lua: &Lua, value: &Value, label: &str) -> mlua::Result<Json> {
     let mut left = MAX_VALUES;
-    Reader { lua, left: &mut left }.read(value, label, 0)
+    JsonReader { lua, left: &mut left }.read(value, label, 0)
 }
 
 /// Converts a Lua value to a Rust type by way of JSON; messages speak of Lua's types.
@@ -47,12 +47,12 @@ pub(crate) fn deserialize<T: DeserializeOwned>(lua: &Lua, label: &str, value: &V
     })
 }
 
-struct Reader<'a> {
+struct JsonReader<'a> {
     lua: &'a Lua,
     left: &'a mut usize,
 }
 
-impl Reader<'_> {
+impl JsonReader<'_> {
     fn wrong<T>(&self, label: &str, what: &str) -> mlua::Result<T> {
         Err(fail(self.lua, format!("{label}: {what}")))
     }

@@ -11,7 +11,7 @@ use super::{
 type Get = Box<dyn Fn(&Lua) -> mlua::Result<Vec<f64>> + Send + Sync>;
 type Set = Box<dyn Fn(&Lua, &Value) -> mlua::Result<()> + Send + Sync>;
 
-enum Content {
+enum ListContent {
     /// Numbers of the object, which checks them when they are written.
     Live { get: Get, set: Set },
     /// The entries at the time of reading, and how to change them instead.
@@ -22,7 +22,7 @@ enum Content {
 pub(crate) struct LuaList {
     /// Name in messages: `scene.base`.
     label: String,
-    content: Content,
+    content: ListContent,
 }
 
 impl LuaList {
@@ -31,19 +31,19 @@ impl LuaList {
 
     /// Numbers read by `get`; `set` writes all of them.
     pub(crate) fn live(label: String, get: Get, set: Set) -> Self {
-        Self { label, content: Content::Live { get, set } }
+        Self { label, content: ListContent::Live { get, set } }
     }
 
     /// A list that cannot be written; `hint` says how to change it instead.
     pub(crate) fn fixed(label: String, entries: Table, hint: &'static str) -> Self {
-        Self { label, content: Content::Fixed { entries, hint } }
+        Self { label, content: ListContent::Fixed { entries, hint } }
     }
 
     /// Its entries as a plain list.
     fn entries(&self, lua: &Lua) -> mlua::Result<Table> {
         match &self.content {
-            Content::Live { get, .. } => lua.create_sequence_from(get(lua)?),
-            Content::Fixed { entries, .. } => {
+            ListContent::Live { get, .. } => lua.create_sequence_from(get(lua)?),
+            ListContent::Fixed { entries, .. } => {
                 lua.create_sequence_from(entries.sequence_values::<Value>().flatten())
             }
         }
@@ -63,8 +63,8 @@ impl LuaList {
     fn write(&self, lua: &Lua, key: &Value, value: &Value) -> mlua::Result<()> {
         let label = &self.label;
         let (get, set) = match &self.content {
-            Content::Live { get, set } => (get, set),
-            Content::Fixed { hint, .. } => {
+            ListContent::Live { get, set } => (get, set),
+            ListContent::Fixed { hint, .. } => {
                 return Err(fail(lua, format!("{label}: cannot be written; {hint}")));
             }
         };

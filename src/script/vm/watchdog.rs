@@ -32,7 +32,7 @@ type Slot = (Instant, u64);
 /// A check that the watchdog makes at a set time.
 #[derive(Clone)]
 struct Alarm {
-    clock: Weak<Mutex<State>>,
+    clock: Weak<Mutex<HookState>>,
     /// The clock's beat when the alarm was set.
     beat: u64,
     /// Processor time of the process before which the script cannot have used up its own.
@@ -68,14 +68,14 @@ impl Alarm {
 }
 
 #[derive(Default)]
-struct Queue {
+struct AlarmQueue {
     waiting: BTreeMap<Slot, Alarm>,
     next: u64,
 }
 
 /// A thread that watches every running deadline of the process.
 struct Watchdog {
-    queue: Mutex<Queue>,
+    queue: Mutex<AlarmQueue>,
     changed: Condvar,
 }
 
@@ -134,7 +134,7 @@ impl Watchdog {
 }
 
 #[derive(Default)]
-struct State {
+struct HookState {
     /// Processor time of the thread at which the running call must be over; `None` while nothing runs or the clock is
     /// paused.
     until: Option<Duration>,
@@ -167,7 +167,7 @@ fn process_time() -> Duration {
 /// The clock of one virtual machine.
 #[derive(Clone, Default)]
 pub struct Clock {
-    state: Arc<Mutex<State>>,
+    state: Arc<Mutex<HookState>>,
 }
 
 impl Clock {

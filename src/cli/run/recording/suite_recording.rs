@@ -39,7 +39,7 @@ use crate::{
     },
     rollout::{EpisodeError, FinishedEpisode, SettleError, cancel},
     scene::InitialState,
-    script::Loaded,
+    script::LoadedScript,
     text::counted,
 };
 
@@ -111,7 +111,7 @@ impl<'a> SuiteRecording<'a> {
     /// A setting or scene that is not valid.
     pub(crate) fn new(
         config: &'a RecordingConfig,
-        loaded: &'a Loaded,
+        loaded: &'a LoadedScript,
         suite: &'a Suite,
         tasks: Vec<&'a Task>,
         plan: AttemptPlan,

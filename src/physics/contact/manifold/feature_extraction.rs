@@ -63,7 +63,7 @@ pub(in super::super) fn surface_features(shape: &Shape) -> SurfaceFeatures {
     add_features(shape, &Pose::identity(), &mut features);
     let size = shape.bounds().size().max();
     features.spacing = size / SEED_CELLS;
-    features.seeds = Grid::over(shape, features.spacing)
+    features.seeds = FeatureGrid::over(shape, features.spacing)
         .crossed()
         .map(|cell| project_to_surface(shape, cell.mean()))
         .collect();
@@ -131,7 +131,7 @@ fn add_features(shape: &Shape, frame_o: &Pose, features: &mut SurfaceFeatures) {
 /// Adds the features of a general shape, found on a grid.
 fn add_general_features(shape: &Shape, frame_o: &Pose, features: &mut SurfaceFeatures) {
     let step = shape.bounds().size().max() / EDGE_CELLS;
-    let cells: Vec<Cell> = Grid::over(shape, step).crossed().collect();
+    let cells: Vec<Cell> = FeatureGrid::over(shape, step).crossed().collect();
     let edges = cells.iter().filter_map(|cell| cell.sharp_point(shape, step));
     let (sharp, blunt): (Vec<Vec3>, Vec<Vec3>) = edges.partition(|p| is_sharp(shape, p));
     let starts: Vec<Vec3> = cells.iter().map(Cell::mean).collect();
@@ -181,7 +181,7 @@ fn convex_corners(profile: &Polygon) -> impl Iterator<Item = ProfileCorner> + '_
 }
 
 /// Signed distances on a grid that covers a shape.
-struct Grid<'a> {
+struct FeatureGrid<'a> {
     shape: &'a Shape,
     origin: Vec3,
     step: f64,
@@ -198,7 +198,7 @@ struct Crossing {
     normal: Vec3,
 }
 
-impl<'a> Grid<'a> {
+impl<'a> FeatureGrid<'a> {
     fn over(shape: &'a Shape, step: f64) -> Self {
         let bounds = shape.bounds();
         let cells = bounds.size().map(|size| (size / step).ceil() as usize + 2);

@@ -64,7 +64,7 @@ pub(crate) struct CreasedMesh {
 /// Duplicates vertices at creases: one vertex for each smooth group of triangles around each original vertex.
 pub(crate) fn split_at_creases(points: &[V3], triangles: &[[u32; 3]]) -> CreasedMesh {
     /// A triangle at a vertex, and which of its corners the vertex is.
-    struct Corner {
+    struct MeshCorner {
         triangle: u32,
         corner: u8,
     }
@@ -75,10 +75,10 @@ pub(crate) fn split_at_creases(points: &[V3], triangles: &[[u32; 3]]) -> Creased
             (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_else(V3::z)
         })
         .collect();
-    let mut corners: Vec<Vec<Corner>> = points.iter().map(|_| Vec::new()).collect();
+    let mut corners: Vec<Vec<MeshCorner>> = points.iter().map(|_| Vec::new()).collect();
     for (t, triangle) in triangles.iter().enumerate() {
         for (i, &v) in triangle.iter().enumerate() {
-            corners[v as usize].push(Corner { triangle: t as u32, corner: i as u8 });
+            corners[v as usize].push(MeshCorner { triangle: t as u32, corner: i as u8 });
         }
     }
     let (mut sources, mut split) = (Vec::new(), triangles.to_vec());

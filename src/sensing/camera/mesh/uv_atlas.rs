@@ -133,12 +133,12 @@ impl AxisDirection {
 }
 
 /// Connected triangles that face mostly in one direction.
-struct Part {
+struct ChartPart {
     direction: AxisDirection,
     triangles: Vec<usize>,
 }
 
-fn connected_parts(lod: &Lod) -> Vec<Part> {
+fn connected_parts(lod: &Lod) -> Vec<ChartPart> {
     let directions: Vec<AxisDirection> = lod
         .triangles
         .iter()
@@ -161,7 +161,10 @@ fn connected_parts(lod: &Lod) -> Vec<Part> {
     for t in 0..lod.triangles.len() {
         parts.entry(connected.find(t)).or_default().push(t);
     }
-    parts.into_iter().map(|(first, triangles)| Part { direction: directions[first], triangles }).collect()
+    parts
+        .into_iter()
+        .map(|(first, triangles)| ChartPart { direction: directions[first], triangles })
+        .collect()
 }
 
 #[cfg(test)]
@@ -169,19 +172,19 @@ mod tests {
     use super::*;
     use crate::{
         geometry::shape::Shape,
-        scene::{Mask, TextDecal, TextLine, VisualLayer},
+        scene::{LabelLine, Mask, TextDecal, VisualLayer},
         sensing::camera::{RenderMesh, shade::pattern::sample_visual, simd::f32x8},
     };
 
     /// A word facing +x, white on black.
     fn printed() -> Visual {
-        let line = TextLine {
+        let line = LabelLine {
             text: "soft".into(),
             height_m: 0.012,
             weight: 0.15,
             at: [0.03, 0.0, 0.0],
             facing: [1.0, 0.0, 0.0],
-            ..TextLine::default()
+            ..LabelLine::default()
         };
         let mask = Mask::Text { decal: Arc::new(TextDecal::new(line)) };
         let layer = VisualLayer { mask, albedo: [1.0; 3], roughness: 0.5, opacity: 1.0, relief_m: 0.0 };

@@ -43,15 +43,15 @@ fn text_position(decal: &TextDecal, p: &Vec3, n: &V3) -> Option<[f64; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::TextLine;
+    use crate::scene::LabelLine;
 
-    fn value(line: &TextLine, p: [f64; 3], n: [f32; 3]) -> f32 {
+    fn value(line: &LabelLine, p: [f64; 3], n: [f32; 3]) -> f32 {
         let p = Vec3::from(p).cast();
         coverage(&TextDecal::new(line.clone()), &p, &n.into(), 5e-4)
     }
 
     /// Coverage to the left and to the right of the middle; an L has more on its left.
-    fn sides(line: &TextLine, n: [f32; 3], place: impl Fn(f64, f64) -> [f64; 3]) -> [f32; 2] {
+    fn sides(line: &LabelLine, n: [f32; 3], place: impl Fn(f64, f64) -> [f64; 3]) -> [f32; 2] {
         [-1.0, 1.0].map(|side| {
             let all = (1..=12).flat_map(|i| (-12..=12).map(move |j| (f64::from(i), f64::from(j))));
             all.map(|(i, j)| value(line, place(side * i * 5e-4, j * 5e-4), n)).sum()
@@ -60,13 +60,13 @@ mod tests {
 
     #[test]
     fn text_is_upright_and_not_mirrored_seen_from_the_direction_it_faces() {
-        let line = |facing: [f64; 3]| TextLine {
+        let line = |facing: [f64; 3]| LabelLine {
             text: "L".into(),
             height_m: 0.01,
             weight: 0.1,
             at: [0.001, 0.002, 0.003],
             facing,
-            ..TextLine::default()
+            ..LabelLine::default()
         };
         // The viewer's right and up for each direction.
         for (n, right, up) in [
@@ -90,14 +90,14 @@ mod tests {
 
     #[test]
     fn a_wrapped_line_follows_the_cylinder_and_turn_rotates_a_line() {
-        let line = TextLine {
+        let line = LabelLine {
             text: "L".into(),
             height_m: 0.01,
             weight: 0.1,
             at: [0.0, 0.0, 0.05],
             facing: [0.0, -2.0, 0.0],
             wrap_m: Some(0.01),
-            ..TextLine::default()
+            ..LabelLine::default()
         };
         let n = |turn: f64| [turn.sin() as f32, -turn.cos() as f32, 0.0];
         let place = |r: f64, u: f64| [0.01 * (r / 0.01).sin(), -0.01 * (r / 0.01).cos(), 0.05 + u];
@@ -109,8 +109,8 @@ mod tests {
             [-1.0, 1.0].map(|side| (1..=12).map(|i| ink(side * f64::from(i) * 5e-4)).sum::<f32>());
         assert!(left > 1.5 * right && right > 0.5, "{left} {right}");
         assert_eq!(value(&line, [0.0, 0.01, 0.05], [0.0, 1.0, 0.0]), 0.0, "the far side is blank");
-        let upright = TextLine { wrap_m: None, facing: [0.0, 0.0, 1.0], at: [0.0; 3], ..line };
-        let turned = TextLine { turn: std::f64::consts::FRAC_PI_2, ..upright.clone() };
+        let upright = LabelLine { wrap_m: None, facing: [0.0, 0.0, 1.0], at: [0.0; 3], ..line };
+        let turned = LabelLine { turn: std::f64::consts::FRAC_PI_2, ..upright.clone() };
         for (r, u) in [(-0.002, 0.003), (0.001, -0.0044), (0.002, 0.002)] {
             let up = [0.0, 0.0, 1.0];
             let before = value(&upright, [r, u, 0.0], up);
