@@ -57,7 +57,7 @@ fn init_keeps_an_existing_settings_file() {
     assert_eq!(project.text("new/folder/.luarc.json"), "{\"mine\":1}");
     assert!(project.text("new/folder/library/softvt.d.lua").starts_with("---@meta softvt"));
     project.write("file", b"");
-    assert!(project.refusal("init file").starts_with("cannot make the folder file/library"));
+    assert!(project.refusal("init file").starts_with("cannot create the folder file/library"));
 }
 
 #[test]
@@ -131,8 +131,8 @@ fn a_trace_has_one_line_per_control_step() {
 fn unsuitable_output_folders_are_refused() {
     let project = Small::default().project();
     project.write("file", b"mine");
-    assert!(project.refusal("x.lua --out file").starts_with("x.lua: cannot make the folder file: "));
-    assert!(project.refusal("x.lua --out file/run").starts_with("x.lua: cannot make the folder file/run: "));
+    assert!(project.refusal("x.lua --out file").starts_with("x.lua: cannot create the folder file: "));
+    assert!(project.refusal("x.lua --out file/run").starts_with("x.lua: cannot create the folder file/run: "));
     assert_eq!(project.text("file"), "mine");
     project.succeeds("x.lua --out run");
     let before = (project.text("run/run.json"), project.text("run/episodes.jsonl"));
