@@ -1,8 +1,8 @@
 //! Files that appear complete or not at all, and the folders they are written to.
 //!
-//! A file is written to a sibling with the suffix `.part`, synced, and renamed. The name of the sibling is fixed, so that
-//! the next attempt replaces what a killed process left; `tempfile` would leave one file with a random name per kill, and
-//! gives its files mode 0600.
+//! A file is written to a sibling with the suffix `.part`, synced, and renamed. The name of the sibling is fixed, so
+//! that the next attempt replaces what a killed process left; `tempfile` would leave one file with a random name per
+//! kill, and gives its files mode 0600.
 
 use std::{
     ffi::OsString,

@@ -1,14 +1,14 @@
 //! softvt: a safety-aware visuo-tactile manipulation benchmark for soft objects that runs on an ordinary CPU.
 //!
-//! The modules form layers. Each may import those before it and none after it:
-//! [`geometry`] → [`physics`] → [`scene`], [`robot`] → [`sensing`], [`evaluation`] → [`benchmark`] → [`policy`] → [`rollout`]
-//! → [`dataset`] → [`report`] → [`script`] → [`serve`] → [`cli`]. `docs/architecture.md` draws them and follows one episode.
-//! All of them may use [`text`] (numbers and text in messages), [`files`] (atomic files), [`npy`] (numpy files) and
+//! The modules form layers. Each may import those before it and none after it: [`geometry`] → [`physics`] →
+//! [`scene`], [`robot`] → [`sensing`], [`evaluation`] → [`benchmark`] → [`policy`] → [`rollout`] → [`dataset`] →
+//! [`report`] → [`script`] → [`serve`] → [`cli`]. `docs/architecture.md` draws them and follows one episode. All of
+//! them may use [`text`] (numbers and text in messages), [`files`] (atomic files), [`npy`] (numpy files) and
 //! [`parallel`] (jobs on threads).
 //!
-//! Examples: a dropped cube and a squeezed cube in [`physics::world`], distances in [`geometry::shape`], kinematics in
-//! [`robot`], a rendered image in [`sensing::camera`], a tactile image in [`sensing::tactile`], the verdict on an episode
-//! in [`evaluation::judge`].
+//! Examples: a dropped cube and a squeezed cube in [`physics::world`], distances in [`geometry::shape`], kinematics
+//! in [`robot`], a rendered image in [`sensing::camera`], a tactile image in [`sensing::tactile`], the verdict on an
+//! episode in [`evaluation::judge`].
 //!
 //! Units are SI throughout; a name carries its unit where it is not SI or not obvious. Frames are suffixes:
 //! `_w` world, `_b` robot base, `_h` hand, `_p` pad, `_o` object.

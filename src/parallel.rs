@@ -1,9 +1,9 @@
 //! Numbered jobs on a pool of threads: episodes, points of an experiment, rows of a dataset.
 //!
 //! The threads are those of a rayon pool. Rayon's parallel iterators are not used, because results must reach their
-//! consumer while later jobs still run, an error must keep the rank of its job, and the number of results in memory must
-//! be bounded. Each thread of the pool runs one loop over the queue of jobs, so a job that itself uses rayon never starts
-//! another job while it waits.
+//! consumer while later jobs still run, an error must keep the rank of its job, and the number of results in memory
+//! must be bounded. Each thread of the pool runs one loop over the queue of jobs, so a job that itself uses rayon
+//! never starts another job while it waits.
 
 use std::{
     collections::BTreeMap,
@@ -49,8 +49,8 @@ pub fn run<T: Send, E: Send>(
     failures.into_iter().min_by_key(|(rank, _)| *rank).map_or(Ok(()), |(_, error)| Err(error))
 }
 
-/// Runs the jobs `0..jobs` on up to `threads` threads and passes their results to `sink` in the order of the jobs. `sink`
-/// runs on the calling thread. At most `threads` results exist at a time, counting those in progress.
+/// Runs the jobs `0..jobs` on up to `threads` threads and passes their results to `sink` in the order of the jobs.
+/// `sink` runs on the calling thread. At most `threads` results exist at a time, counting those in progress.
 ///
 /// Stops as [`run`] does, but no result after the first error is passed on.
 ///
@@ -129,7 +129,8 @@ fn drain<T: Send>(
     }
 }
 
-/// A pool of more than one thread. `None` for fewer, or if the system refuses them: then the calling thread does the work.
+/// A pool of more than one thread. `None` for fewer, or if the system refuses them: then the calling thread does the
+/// work.
 fn pool(threads: usize) -> Option<ThreadPool> {
     if threads < 2 {
         return None;

@@ -27,9 +27,9 @@ pub fn eprint_line(line: &str) {
 
 /// The candidate that `word` most likely misspells or abbreviates, if any is close.
 ///
-/// A candidate is close if it differs by at most one edit per three letters (Damerau–Levenshtein distance), or if one word
-/// starts with the other. The two parts of a dotted name (`chest.top_drawer`) are compared separately. A word without a
-/// dot is also compared with the part after the dot.
+/// A candidate is close if it differs by at most one edit per three letters (Damerau–Levenshtein distance), or if one
+/// word starts with the other. The two parts of a dotted name (`chest.top_drawer`) are compared separately. A word
+/// without a dot is also compared with the part after the dot.
 pub fn suggest<'a>(word: &str, candidates: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     let ranked = candidates.filter_map(|candidate| Some((rank_of_name(word, candidate)?, candidate)));
     ranked.min_by_key(|(rank, _)| *rank).map(|(_, candidate)| candidate)

@@ -35,8 +35,8 @@ pub fn frame_rate() -> u32 {
 }
 
 impl DemonstrationWriter<'_> {
-    /// Renders the state before each action and writes all files. The HDF5 file is written last: its presence marks a complete
-    /// demonstration.
+    /// Renders the state before each action and writes all files. The HDF5 file is written last: its presence marks a
+    /// complete demonstration.
     ///
     /// # Errors
     /// A sensor cannot be simulated, a file not written, or `is_cancelled` returned true. There is no HDF5 file then.
@@ -97,8 +97,8 @@ impl DemonstrationWriter<'_> {
     }
 }
 
-/// Images per chunk, in the order of [`IMAGE_STREAMS`]. Images of the static camera and of the fingers hardly change within four
-/// steps and compress better together; those of the wrist camera change in every step.
+/// Images per chunk, in the order of [`IMAGE_STREAMS`]. Images of the static camera and of the fingers hardly change
+/// within four steps and compress better together; those of the wrist camera change in every step.
 const IMAGES_PER_CHUNK: [usize; 4] = [4, 1, 4, 4];
 
 /// Writes an image stream to HDF5, chunk by chunk.

@@ -1,10 +1,12 @@
 //! Safe interaction envelope of an asset: from the closure that just holds it to the closure that deforms it by τ.
 //!
 //! - Lower bound: the smallest closure at which every grasp–lift–hold trial held.
-//! - Upper bound: the closure at which D reaches τ = κ·D_ref in the compression sweep. D_ref is the largest deformation of a
+//! - Upper bound: the closure at which D reaches τ = κ·D_ref in the compression sweep. D_ref is the largest
+//!   deformation of a
 //!   *stable* squeeze ([`StabilityCriteria`]; SoftVTBench, appendix C.3).
 //!
-//! Closure is 0 with the gripper open (80 mm) and 1 with the gels in contact. `softvt scripts/calibrate.lua` runs both scans.
+//! Closure is 0 with the gripper open (80 mm) and 1 with the gels in contact. `softvt scripts/calibrate.lua` runs
+//! both scans.
 
 use serde::{Deserialize, Serialize};
 
@@ -67,8 +69,8 @@ impl Default for StabilityCriteria {
 }
 
 impl StabilityCriteria {
-    /// True if `row` is a stable squeeze: both pads touch and every number is within its bound. `row.stable` is not read.
-    /// Numbers that are not finite are not stable.
+    /// True if `row` is a stable squeeze: both pads touch and every number is within its bound. `row.stable` is not
+    /// read. Numbers that are not finite are not stable.
     pub fn accepts(&self, row: &SweepRow) -> bool {
         row.both_pads
             && row.d_peak_pct.is_finite()
@@ -120,8 +122,8 @@ impl Envelope {
     }
 }
 
-/// Deformation limit of a sweep: D_ref is the largest D of a stable row, rounded to six decimals. `None` if no stable row
-/// has a deformation above zero.
+/// Deformation limit of a sweep: D_ref is the largest D of a stable row, rounded to six decimals. `None` if no stable
+/// row has a deformation above zero.
 pub fn deformation_limit(sweep: &[SweepRow], kappa: f64) -> Option<DeformationLimit> {
     let stable = sweep.iter().filter(|row| row.stable && row.d_peak_pct.is_finite());
     let largest = stable.map(|row| row.d_peak_pct).fold(0.0_f64, f64::max);
@@ -133,8 +135,8 @@ pub fn lower_bound(holds: &[HoldRow]) -> Option<f64> {
     holds.iter().find(|row| row.trials > 0 && row.held == row.trials).map(|row| row.closure)
 }
 
-/// Closure at which D first reaches `d_pct`, linear between the rows; `sweep` by increasing closure. `None` if the first row
-/// is above it or no row reaches it.
+/// Closure at which D first reaches `d_pct`, linear between the rows; `sweep` by increasing closure. `None` if the
+/// first row is above it or no row reaches it.
 pub fn closure_at(sweep: &[SweepRow], d_pct: f64) -> Option<f64> {
     sweep.windows(2).find(|pair| pair[0].d_peak_pct <= d_pct && pair[1].d_peak_pct >= d_pct).map(|pair| {
         let rise = pair[1].d_peak_pct - pair[0].d_peak_pct;

@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 
 /// Thresholds that decide when an object counts as lifted, lost, dropped, slipped, released or placed.
 ///
-/// The default is the benchmark; a suite or `--set criteria.slip_m=…` may change each of them. The definitions that use them are
-/// in [`super::drop`], [`super::slip`], [`super::goal`] and [`super::judge`].
+/// The default is the benchmark; a suite or `--set criteria.slip_m=…` may change each of them. The definitions that
+/// use them are in [`super::drop`], [`super::slip`], [`super::goal`] and [`super::judge`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SuccessCriteria {

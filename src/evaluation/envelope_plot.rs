@@ -38,8 +38,8 @@ impl PlotAxis {
 
 /// Plots the envelope of `asset` in lines of less than 100 columns.
 ///
-/// Stable squeezes are `●`, unstable ones `○`, and τ is a dashed line. Below are the holds of the lower-bound scan (`+` all
-/// trials held, `~` some, `-` none) and the zones: too loose `░`, safe `█`, too tight `▓`.
+/// Stable squeezes are `●`, unstable ones `○`, and τ is a dashed line. Below are the holds of the lower-bound scan
+/// (`+` all trials held, `~` some, `-` none) and the zones: too loose `░`, safe `█`, too tight `▓`.
 pub fn plot(asset: &str, envelope: &Envelope, limit: Option<DeformationLimit>) -> String {
     let Some(axis) = PlotAxis::of(envelope) else {
         return format!("{asset}: no rows, nothing to plot\n");

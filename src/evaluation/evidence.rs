@@ -1,6 +1,7 @@
 //! Input of the judge after every physics step: plain numbers in the world frame, hidden from policies.
 //!
-//! Forces enter as impulses (force times the length of the physics step), so that they may be summed over a control step.
+//! Forces enter as impulses (force times the length of the physics step), so that they may be summed over a control
+//! step.
 
 use crate::geometry::{Pose, Vec3};
 
@@ -31,8 +32,8 @@ pub struct BodyEvidence {
     pub centre_w: Vec3,
     /// Height of the lowest point, m.
     pub lowest_z_w: f64,
-    /// Sum of the upward impulses on the body in this step from everything but the robot, N s. A sleeping body keeps the
-    /// value with which it fell asleep.
+    /// Sum of the upward impulses on the body in this step from everything but the robot, N s. A sleeping body keeps
+    /// the value with which it fell asleep.
     pub support_impulse_ns: f64,
     /// Present deformation; `None` for a rigid body, and for a soft one when it could not be measured.
     pub deformation: Option<Deformation>,
@@ -77,7 +78,8 @@ impl BodyEvidence {
 }
 
 impl Evidence<'_> {
-    /// True if every number that the criteria read is finite. Deformations are not included: a missing one is counted apart.
+    /// True if every number that the criteria read is finite. Deformations are not included: a missing one is counted
+    /// apart.
     pub fn is_finite(&self) -> bool {
         let pose = self.goal.pose_w.to_homogeneous();
         self.time_s.is_finite()

@@ -2,12 +2,14 @@
 //!
 //! Once per control step the target *rests at the goal* if
 //! 1. its centre is over (`on`) or inside (`in`) the [`GoalRegion`],
-//! 2. at least [`support_share`](SuccessCriteria::support_share) of its weight, mean over the control step, is carried by the
+//! 2. at least [`support_share`](SuccessCriteria::support_share) of its weight, mean over the control step, is
+//!    carried by the
 //!    object at the goal (`on`), or by anything but the robot (`in`),
 //! 3. no part of the robot pressed on it at any physics step of the control step.
 //!
-//! The goal is reached when this held for ⌈hold time / control step⌉ control steps in a row, at least one. A target that has
-//! rested at the goal for one control step and leaves it later counts as dropped ([`super::drop::DropReason::LeftGoal`]).
+//! The goal is reached when this held for ⌈hold time / control step⌉ control steps in a row, at least one. A target
+//! that has rested at the goal for one control step and leaves it later counts as dropped
+//! ([`super::drop::DropReason::LeftGoal`]).
 
 use crate::geometry::{Aabb, Pose, Vec3};
 
@@ -29,8 +31,8 @@ pub enum GoalRegion {
 }
 
 impl GoalRegion {
-    /// True if a centre at `centre_w` is over (`On`) or inside (`In`) the region of an object at `object_w`, enlarged by
-    /// `margin_m` on every side.
+    /// True if a centre at `centre_w` is over (`On`) or inside (`In`) the region of an object at `object_w`, enlarged
+    /// by `margin_m` on every side.
     ///
     /// `On` is a horizontal distance in the world frame, independent of the object's tilt and height. `In`
     /// is a box in the frame of the object.
@@ -47,8 +49,9 @@ impl GoalRegion {
         }
     }
 
-    /// The looser predicate of SoftVTBench's released code: true if both centres are closer than a distance, horizontally
-    /// and vertically ([`goal_v1_on_m`](SuccessCriteria::goal_v1_on_m), [`goal_v1_in_m`](SuccessCriteria::goal_v1_in_m)).
+    /// The looser predicate of SoftVTBench's released code: true if both centres are closer than a distance,
+    /// horizontally and vertically ([`goal_v1_on_m`](SuccessCriteria::goal_v1_on_m),
+    /// [`goal_v1_in_m`](SuccessCriteria::goal_v1_in_m)).
     pub fn contains_v1(&self, criteria: &SuccessCriteria, object_w: &Pose, centre_w: &Vec3) -> bool {
         let reach = match self {
             Self::On { .. } => criteria.goal_v1_on_m,

@@ -1,8 +1,8 @@
 //! Paired statistics: the same episodes in two runs, compared one by one.
 //!
-//! The runs are of two policies, or of a condition and its reference. Pairs share suite, task, initial state and seed, so
-//! that nothing else differs between them. Rates are compared by McNemar's exact test with the interval of Agresti and Min;
-//! deformations by the bootstrap of the mean difference.
+//! The runs are of two policies, or of a condition and its reference. Pairs share suite, task, initial state and
+//! seed, so that nothing else differs between them. Rates are compared by McNemar's exact test with the interval of
+//! Agresti and Min; deformations by the bootstrap of the mean difference.
 
 use std::collections::BTreeMap;
 
@@ -59,8 +59,8 @@ impl<'a> EpisodeKey<'a> {
     }
 }
 
-/// Pairs of the episodes that both runs have, in the order of their keys, whatever the order of the records. Episodes that
-/// only one run has are left out. An episode must not occur twice in a run.
+/// Pairs of the episodes that both runs have, in the order of their keys, whatever the order of the records. Episodes
+/// that only one run has are left out. An episode must not occur twice in a run.
 pub fn pair_episodes<'a>(
     first: impl IntoIterator<Item = &'a EpisodeRecord>,
     second: impl IntoIterator<Item = &'a EpisodeRecord>,
@@ -185,8 +185,8 @@ impl RateDifference {
     }
 }
 
-/// 95 % interval of a difference of matched proportions (Agresti & Min, Statistics in Medicine 24, 2005): Wald's interval
-/// with half an episode added to each cell of the 2 × 2 table.
+/// 95 % interval of a difference of matched proportions (Agresti & Min, Statistics in Medicine 24, 2005): Wald's
+/// interval with half an episode added to each cell of the 2 × 2 table.
 fn agresti_min(n: usize, better: usize, worse: usize) -> [f64; 2] {
     let (n, b, c) = (n as f64 + 2.0, better as f64 + 0.5, worse as f64 + 0.5);
     let centre = (b - c) / n;
@@ -245,8 +245,8 @@ impl MeanDifference {
     }
 }
 
-/// 95 % interval of a mean by the percentile bootstrap; `None` of fewer than two values. The seed is the number of values,
-/// so equal runs give equal intervals.
+/// 95 % interval of a mean by the percentile bootstrap; `None` of fewer than two values. The seed is the number of
+/// values, so equal runs give equal intervals.
 fn bootstrap(values: &[f64]) -> Option<[f64; 2]> {
     let n = values.len();
     if n < 2 {

@@ -154,11 +154,12 @@ pub struct RolloutStats {
     /// True if the policy saw the true forces at the pads, which no real sensor gives.
     #[serde(default)]
     pub force_observed: bool,
-    /// Number of observations with an image of a camera that was inside an object; it shows the scene beyond that object.
+    /// Number of observations with an image of a camera that was inside an object; it shows the scene beyond that
+    /// object.
     #[serde(default)]
     pub camera_inside: u32,
-    /// Number of control steps whose command was farther from the tool than one step of the inverse kinematics reaches (0.2 m,
-    /// 0.6 rad): out of reach, or in the wrong frame or unit.
+    /// Number of control steps whose command was farther from the tool than one step of the inverse kinematics
+    /// reaches (0.2 m, 0.6 rad): out of reach, or in the wrong frame or unit.
     #[serde(default)]
     pub far_commands: u32,
     /// Reason given by the controller for aborting the episode, if it did.

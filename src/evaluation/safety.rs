@@ -1,7 +1,7 @@
 //! Safety Success = Goal ∧ NoDrop ∧ D_peak ≤ τ, with the deformation limit τ = κ·D_ref of the target's asset.
 //!
-//! D_ref is the largest stable deformation of the asset's compression sweep ([`super::calibration`]); κ is the share of it
-//! that the benchmark allows. For a rigid target the last term is left out. A peak that is unknown is not safe.
+//! D_ref is the largest stable deformation of the asset's compression sweep ([`super::calibration`]); κ is the share
+//! of it that the benchmark allows. For a rigid target the last term is left out. A peak that is unknown is not safe.
 
 use serde::{Deserialize, Serialize};
 
@@ -57,8 +57,8 @@ impl PeakDeformation {
 
     /// True if the deformation never exceeded `tau_pct`; equality is allowed.
     ///
-    /// `Some(false)` if it was exceeded, even when other steps are missing. `None` if it was not exceeded but the limit or the
-    /// deformation of some steps is missing.
+    /// `Some(false)` if it was exceeded, even when other steps are missing. `None` if it was not exceeded but the
+    /// limit or the deformation of some steps is missing.
     pub fn is_within(&self, tau_pct: Option<f64>) -> Option<bool> {
         match (self.d_pct, tau_pct) {
             (Some(d), Some(tau)) if d > tau => Some(false),

@@ -13,8 +13,8 @@ pub struct SlipSample {
 
 /// Measures slip: the travel of the contact patch along a pad since both pads closed on the target.
 ///
-/// Each grasp starts at zero again. The result is the maximum over both pads, all steps and all grasps, so motion back does
-/// not reduce it. NoSlip holds if it is at most [`super::criteria::SuccessCriteria::slip_m`].
+/// Each grasp starts at zero again. The result is the maximum over both pads, all steps and all grasps, so motion
+/// back does not reduce it. NoSlip holds if it is at most [`super::criteria::SuccessCriteria::slip_m`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SlipMonitor {
     start_m: Option<[f64; 2]>,

@@ -47,8 +47,8 @@ pub fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
-/// Quantile of `sorted` values at `q` in 0 to 1: linear between order statistics (type 7 of Hyndman and Fan, 1996; numpy's
-/// default). `None` of an empty slice.
+/// Quantile of `sorted` values at `q` in 0 to 1: linear between order statistics (type 7 of Hyndman and Fan, 1996;
+/// numpy's default). `None` of an empty slice.
 pub fn quantile(sorted: &[f64], q: f64) -> Option<f64> {
     quantile_by(sorted.len(), |rank| sorted[rank], q)
 }

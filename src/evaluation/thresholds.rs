@@ -1,7 +1,7 @@
 //! Threshold files: τ and D_ref per asset, as JSON with the fields of SoftVTBench and two of our own.
 //!
-//! A file holds one asset (`assets/calibration/*.json`) or many (`softvtbench/` of a run). Released SoftVTBench files are read
-//! as well; they lack `envelopes` and `fingerprints`.
+//! A file holds one asset (`assets/calibration/*.json`) or many (`softvtbench/` of a run). Released SoftVTBench files
+//! are read as well; they lack `envelopes` and `fingerprints`.
 
 use std::{collections::BTreeMap, path::Path};
 

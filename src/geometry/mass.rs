@@ -25,8 +25,8 @@ const COARSE_CELLS: f64 = 24.0;
 
 /// Mass properties of `shape` with uniform `density`, kg/m³.
 ///
-/// Exact for boxes, spheres, ellipsoids, capsules, cylinders, tori, prisms, lathes, imported meshes and their placements;
-/// otherwise integrated over a fine closed surface mesh.
+/// Exact for boxes, spheres, ellipsoids, capsules, cylinders, tori, prisms, lathes, imported meshes and their
+/// placements; otherwise integrated over a fine closed surface mesh.
 pub fn mass_properties(shape: &Shape, density: f64) -> MassProperties {
     unit_density(shape, CELLS).scaled(density)
 }

@@ -1,8 +1,8 @@
 //! Signed-distance shapes, triangle and voxel meshes, surface samples, mass properties, and shared helpers.
 //!
-//! Lengths are in metres and points in the *object frame* (`_o`) unless stated otherwise. Shapes carry material ids, but
-//! neither materials nor motion are part of this module. Closest points of convex shapes, mesh queries and the broad
-//! phase use parry, whose vector types stay inside.
+//! Lengths are in metres and points in the *object frame* (`_o`) unless stated otherwise. Shapes carry material ids,
+//! but neither materials nor motion are part of this module. Closest points of convex shapes, mesh queries and the
+//! broad phase use parry, whose vector types stay inside.
 
 mod aabb;
 pub mod convex;

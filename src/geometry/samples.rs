@@ -1,7 +1,7 @@
 //! Quadrature points of the surface of a soft body, embedded in its voxel mesh.
 //!
-//! Boxes and prisms are sampled by regular grids per face and solids of revolution by rings, with exact areas; other shapes
-//! by clustering the triangles of a fine surface mesh.
+//! Boxes and prisms are sampled by regular grids per face and solids of revolution by rings, with exact areas; other
+//! shapes by clustering the triangles of a fine surface mesh.
 
 use std::collections::BTreeMap;
 
@@ -100,8 +100,8 @@ fn exact_patches(shape: &Shape, turn: &Quat, spec: &SampleSpec) -> Option<Vec<Pa
     }
 }
 
-/// Clusters the triangles of a surface mesh by cells of the required spacing and by the axis direction that they face, so
-/// that the sides of an edge are not mixed. The area of the mesh is preserved exactly.
+/// Clusters the triangles of a surface mesh by cells of the required spacing and by the axis direction that they
+/// face, so that the sides of an edge are not mixed. The area of the mesh is preserved exactly.
 fn clustered_patches(shape: &Shape, spec: &SampleSpec) -> Vec<Patch> {
     let (mesh, _) = surface_triangles(shape, spec.grasp_spacing.min(spec.other_spacing));
     let mut cells: BTreeMap<(usize, [i64; 3]), Cluster> = BTreeMap::new();

@@ -1,7 +1,7 @@
 //! Watertight triangle meshes of the surfaces of shapes.
 //!
-//! Connectivity comes from naive surface nets (Gibson 1998). Vertices are placed by the quadric error of dual contouring
-//! (Ju et al. 2002), which preserves sharp edges and corners, and projected on the surface.
+//! Connectivity comes from naive surface nets (Gibson 1998). Vertices are placed by the quadric error of dual
+//! contouring (Ju et al. 2002), which preserves sharp edges and corners, and projected on the surface.
 
 use fast_surface_nets::{SurfaceNetsBuffer, ndshape::RuntimeShape, surface_nets};
 
@@ -89,8 +89,8 @@ fn with_materials(shape: &Shape, mut mesh: Mesh, normals: Vec<Vec3>) -> SurfaceM
     SurfaceMesh { mesh, normals, materials }
 }
 
-/// Splits a quad into two triangles. Surface nets split along the shorter diagonal, which may bridge a sharp edge. Where
-/// the normals differ, the diagonal with its midpoint nearer to the surface is used.
+/// Splits a quad into two triangles. Surface nets split along the shorter diagonal, which may bridge a sharp edge.
+/// Where the normals differ, the diagonal with its midpoint nearer to the surface is used.
 fn split(shape: &Shape, vertices: &[Vec3], normals: &[Vec3], quad: &[u32]) -> [[u32; 3]; 2] {
     let (first, second) = ([quad[0], quad[1], quad[2]], [quad[3], quad[4], quad[5]]);
     let at = |v: u32| &normals[v as usize];
@@ -105,8 +105,8 @@ fn split(shape: &Shape, vertices: &[Vec3], normals: &[Vec3], quad: &[u32]) -> [[
     if off(r, s) < off(p, q) { [[s, q, r], [s, r, p]] } else { [first, second] }
 }
 
-/// Spherical texture coordinates about the longest axis (z if the extents are similar), after scaling the bounding box to
-/// a cube. `u` may exceed 1, so that no triangle spans the seam.
+/// Spherical texture coordinates about the longest axis (z if the extents are similar), after scaling the bounding
+/// box to a cube. `u` may exceed 1, so that no triangle spans the seam.
 fn unwrap(bounds: &Aabb, corners: &[Vec3; 3]) -> [[f64; 2]; 3] {
     let size = bounds.size();
     let pole = if size.max() > 1.25 * size.z { size.imax() } else { 2 };
@@ -172,9 +172,10 @@ impl SamplingGrid {
         values
     }
 
-    /// Removes features finer than the lattice that would make the surface touch itself. A set of lattice points is *well
-    /// composed* (Latecki 1997) if no cell face is a checkerboard and no cell has only two opposite corners on one side;
-    /// only then is the surface a manifold. Wherever this is violated, the point with the smallest distance changes sides.
+    /// Removes features finer than the lattice that would make the surface touch itself. A set of lattice points is
+    /// *well composed* (Latecki 1997) if no cell face is a checkerboard and no cell has only two opposite corners on
+    /// one side; only then is the surface a manifold. Wherever this is violated, the point with the smallest distance
+    /// changes sides.
     fn compose_well(&self, values: &mut [f32]) {
         let [nx, ny, nz] = self.count;
         let strides = [1, nx, nx * ny];
@@ -198,8 +199,9 @@ impl SamplingGrid {
         }
     }
 
-    /// The vertex of the cell with lowest corner `at`. On a smooth surface it is the mean of the crossings with the cell's
-    /// edges, projected on the surface; at a sharp edge, the point that best fits the tangent planes of the crossings.
+    /// The vertex of the cell with lowest corner `at`. On a smooth surface it is the mean of the crossings with the
+    /// cell's edges, projected on the surface; at a sharp edge, the point that best fits the tangent planes of the
+    /// crossings.
     fn vertex(&self, shape: &Shape, values: &[f32], at: [usize; 3]) -> Vec3 {
         let [nx, ny, _] = self.count;
         let corners: [GridPoint; 8] = std::array::from_fn(|c| {

@@ -125,8 +125,8 @@ const MIN_FILL: f64 = 0.01;
 /// Distance outside of a voxel, in edges, up to which points are extrapolated instead of clamped.
 const MAX_EXTRAPOLATION: f64 = 0.3;
 
-/// Builds the voxel mesh of a shape. The grid is centred on the bounding box and covers it; its edge is the longest extent
-/// divided by the resolution. Cells that are less than 1 % filled are left out.
+/// Builds the voxel mesh of a shape. The grid is centred on the bounding box and covers it; its edge is the longest
+/// extent divided by the resolution. Cells that are less than 1 % filled are left out.
 ///
 /// # Errors
 /// If the shape or the resolution is invalid, or the shape is empty or thinner than the sub-cells.

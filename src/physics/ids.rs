@@ -1,8 +1,8 @@
 //! Typed identifiers of the objects in a [`World`](super::World).
 //!
-//! Every `World::add_*` returns the identifier of what it added. Identifiers are dense indices in order of insertion and
-//! objects are never removed, so one stays valid for the life of its world and of every clone of it. They index the lists of
-//! a [`Frame`](super::world::Frame) as well ([`SoftId::index`]).
+//! Every `World::add_*` returns the identifier of what it added. Identifiers are dense indices in order of insertion
+//! and objects are never removed, so one stays valid for the life of its world and of every clone of it. They index
+//! the lists of a [`Frame`](super::world::Frame) as well ([`SoftId::index`]).
 
 macro_rules! typed_id {
     ($(#[$doc:meta])* $name:ident) => {
@@ -54,7 +54,8 @@ pub struct LinkId {
     pub index: usize,
 }
 
-/// Any body, or the world itself: the parent of a collider, of a camera or of a render mesh, and the body of a scene object.
+/// Any body, or the world itself: the parent of a collider, of a camera or of a render mesh, and the body of a scene
+/// object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum BodyId {
     /// The world: it never moves.

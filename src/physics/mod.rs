@@ -1,9 +1,9 @@
 //! Mechanics: soft bodies, rigid bodies, articulations, contact, and the one convex solve that moves them all.
 //!
-//! [`World`] owns the state, and [`World::step`] is the algorithm: its documentation has examples. The modules below it can be
-//! used on their own: [`fem`] (corotational finite elements), [`rigid`], [`joints`] (articulated dynamics), [`contact`]
-//! (detection), [`solver`] (the convex problem of a step) and [`sparse`] (multifrontal Cholesky). No module here depends on
-//! scripts, files or images.
+//! [`World`] owns the state, and [`World::step`] is the algorithm: its documentation has examples. The modules below
+//! it can be used on their own: [`fem`] (corotational finite elements), [`rigid`], [`joints`] (articulated dynamics),
+//! [`contact`] (detection), [`solver`] (the convex problem of a step) and [`sparse`] (multifrontal Cholesky). No
+//! module here depends on scripts, files or images.
 
 pub mod contact;
 pub mod fem;

@@ -69,8 +69,8 @@ pub struct RecordedPolicy {
 }
 
 impl RecordedPolicy {
-    /// Replays `commands`. After the last one the policy fails with the message `ending`, as the recorded episode did, or
-    /// holds the tool where it is if `ending` is `None`.
+    /// Replays `commands`. After the last one the policy fails with the message `ending`, as the recorded episode
+    /// did, or holds the tool where it is if `ending` is `None`.
     pub fn new(commands: Vec<ToolCommand>, ending: Option<String>) -> Self {
         Self { commands: commands.into_iter(), last: None, ending }
     }

@@ -16,8 +16,8 @@ pub struct ChunkedPolicy<'a> {
     resolver: CommandResolver,
 }
 
-/// Turns a sequence of commands into absolute poses. Stateful, because a displacement executed by robosuite's controller
-/// depends on the velocity after the previous one.
+/// Turns a sequence of commands into absolute poses. Stateful, because a displacement executed by robosuite's
+/// controller depends on the velocity after the previous one.
 #[derive(Clone, Debug, Default)]
 pub struct CommandResolver {
     osc: OscController,

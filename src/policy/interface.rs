@@ -14,8 +14,8 @@ pub struct Action {
     pub closure: f64,
 }
 
-/// One entry of an action chunk. [`CommandResolver`](super::CommandResolver) turns it into an [`Action`] in the control step in
-/// which it is executed.
+/// One entry of an action chunk. [`CommandResolver`](super::CommandResolver) turns it into an [`Action`] in the
+/// control step in which it is executed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ToolCommand {
     /// An absolute pose.

@@ -1,5 +1,5 @@
-//! Observations: the only data that reach a policy. Hidden state (poses and shapes of objects, deformation, drops, limits) has
-//! no field here.
+//! Observations: the only data that reach a policy. Hidden state (poses and shapes of objects, deformation, drops,
+//! limits) has no field here.
 
 use std::sync::Arc;
 
@@ -19,14 +19,15 @@ pub struct SensorStreams {
     pub cameras: Vec<String>,
     /// True to request images and markers of the tactile sensors.
     pub touch: bool,
-    /// True to request the true forces at the pads. No real sensor measures them, so results are marked `force_observed`.
+    /// True to request the true forces at the pads. No real sensor measures them, so results are marked
+    /// `force_observed`.
     pub force: bool,
 }
 
 /// Observation of a control step.
 ///
-/// Proprioception and the prompt are always present; images, touch and forces if [`SensorStreams`] requests them. Poses are in
-/// the robot base frame. All streams show the same instant, 20 times per second of simulated time.
+/// Proprioception and the prompt are always present; images, touch and forces if [`SensorStreams`] requests them.
+/// Poses are in the robot base frame. All streams show the same instant, 20 times per second of simulated time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Observation {
     /// Time since the start of the episode, s.
@@ -49,13 +50,13 @@ pub struct Observation {
     pub touch: Option<TactileHistory>,
     /// True forces at the left and right pad, if requested.
     pub forces: Option<[PadForce; 2]>,
-    /// Forces on the left and the right gel in the last 1 to 8 control steps, oldest first, if requested: (x, y, z) of each,
-    /// N, in the frame of the pad.
+    /// Forces on the left and the right gel in the last 1 to 8 control steps, oldest first, if requested: (x, y, z)
+    /// of each, N, in the frame of the pad.
     pub force_history: Vec<[f64; 6]>,
 }
 
-/// A camera image: rows from the top, sRGB, 8 bits per channel. A camera that enters an object during an episode sees the
-/// scene behind that object's surface; results count such steps as `camera_inside`.
+/// A camera image: rows from the top, sRGB, 8 bits per channel. A camera that enters an object during an episode sees
+/// the scene behind that object's surface; results count such steps as `camera_inside`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraImage {
     /// Name of the camera.
@@ -129,8 +130,9 @@ impl TactileHistory {
         mosaic([&left, &right], layout)
     }
 
-    /// Marker positions in the shape (1 + 8, 198, 2) of SoftVTBench's policies, px: initial positions of the left and right
-    /// markers, then the positions in the last 8 control steps, oldest first. A short history repeats its oldest frame.
+    /// Marker positions in the shape (1 + 8, 198, 2) of SoftVTBench's policies, px: initial positions of the left and
+    /// right markers, then the positions in the last 8 control steps, oldest first. A short history repeats its
+    /// oldest frame.
     pub fn marker_motion(&self) -> Vec<[[f32; 2]; 2 * MARKER_COUNT]> {
         let row = |frame: &[TactileFrame; 2], when: usize| -> [[f32; 2]; 2 * MARKER_COUNT] {
             std::array::from_fn(|m| frame[m / MARKER_COUNT].markers.to_array()[when][m % MARKER_COUNT])

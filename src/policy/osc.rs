@@ -1,10 +1,10 @@
 //! Displacements of the tool as robosuite's operational-space controller executes them.
 //!
-//! That controller sets its goal at a displacement δ from the measured pose in every control step and pulls the tool towards it
-//! with a critically damped spring (kp 150 1/s², kd 2√kp; robosuite, controllers/osc.py, as LIBERO configures it). The tool
-//! does not reach the goal within the 50 ms, and policies trained on such data expect the distance that it does cover.
-//! The equation x'' = kp (g − x) − kd x' has the solution x(t) = g + e^{−ωt} ((x₀ − g) + (v₀ + ω (x₀ − g)) t) with ω = √kp.
-//! Position and rotation vector both follow it.
+//! That controller sets its goal at a displacement δ from the measured pose in every control step and pulls the tool
+//! towards it with a critically damped spring (kp 150 1/s², kd 2√kp; robosuite, controllers/osc.py, as LIBERO
+//! configures it). The tool does not reach the goal within the 50 ms, and policies trained on such data expect the
+//! distance that it does cover. The equation x'' = kp (g − x) − kd x' has the solution x(t) = g + e^{−ωt} ((x₀ − g) +
+//! (v₀ + ω (x₀ − g)) t) with ω = √kp. Position and rotation vector both follow it.
 
 use super::{Action, Observation};
 use crate::{

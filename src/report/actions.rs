@@ -1,5 +1,5 @@
-//! Recorded actions of an episode as a `.npy` file: float64 of shape (steps, 7) with the tool's position (m) and axis-angle
-//! (rad) in the base frame, and the gripper closure.
+//! Recorded actions of an episode as a `.npy` file: float64 of shape (steps, 7) with the tool's position (m) and
+//! axis-angle (rad) in the base frame, and the gripper closure.
 
 use std::{
     fs,

@@ -1,8 +1,8 @@
 //! The folder of a run: `run.json`, `episodes.jsonl`, `summary.json` and the files of the episodes.
 //!
-//! The line of an episode is written and synced when the episode ends, after its other files: an episode with a line is
-//! complete. At the end of a run the lines are sorted by episode, so that the file's bytes depend neither on the number of
-//! threads nor on interruptions.
+//! The line of an episode is written and synced when the episode ends, after its other files: an episode with a line
+//! is complete. At the end of a run the lines are sorted by episode, so that the file's bytes depend neither on the
+//! number of threads nor on interruptions.
 
 use std::{
     fs::{self, File, OpenOptions, TryLockError},
@@ -86,8 +86,8 @@ impl RunFolder {
         Ok(Self { dir: dir.into(), episodes })
     }
 
-    /// Opens `dir`, which may be empty or missing, and returns the finished episodes. A last line truncated by a crash is
-    /// removed.
+    /// Opens `dir`, which may be empty or missing, and returns the finished episodes. A last line truncated by a
+    /// crash is removed.
     ///
     /// # Errors
     /// Another process is using the folder, a line is not an episode, or the system refuses.
@@ -125,7 +125,8 @@ impl RunFolder {
         }
     }
 
-    /// Appends and syncs the record of an episode whose other files are written. A crash leaves at most one truncated line.
+    /// Appends and syncs the record of an episode whose other files are written. A crash leaves at most one truncated
+    /// line.
     ///
     /// # Errors
     /// The line cannot be written.

@@ -25,8 +25,8 @@ pub fn width(fingers: [f64; 2]) -> f64 {
 
 /// Setpoint of the finger drives, which moves towards the commanded closure at the finger speed.
 ///
-/// Both fingers receive the same setpoint: a light object off centre is pushed to the middle, and a fixed one is held by
-/// unequal drive forces.
+/// Both fingers receive the same setpoint: a light object off centre is pushed to the middle, and a fixed one is held
+/// by unequal drive forces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GripperSetpoint {
     speed: f64,

@@ -115,8 +115,8 @@ pub struct DiffIk {
 }
 
 impl DiffIk {
-    /// Creates an instance for control steps of `dt` (s). `posture` is the rest posture to which the null space drifts if
-    /// [`IkSpec::posture_gain`] is not 0.
+    /// Creates an instance for control steps of `dt` (s). `posture` is the rest posture to which the null space
+    /// drifts if [`IkSpec::posture_gain`] is not 0.
     pub fn new(spec: &IkSpec, posture: ArmAngles, dt: f64) -> Self {
         Self {
             chain: panda::arm_chain(),

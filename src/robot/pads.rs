@@ -68,8 +68,8 @@ impl PadSurface {
         beyond_x.max(0.0).hypot(beyond_y.max(0.0)) + beyond_x.max(beyond_y).min(0.0) - self.corner
     }
 
-    /// Contact of the point `p_p` (pad frame, m) with the gel, in the pad frame. The point represents a patch about `spacing`
-    /// (m) wide.
+    /// Contact of the point `p_p` (pad frame, m) with the gel, in the pad frame. The point represents a patch about
+    /// `spacing` (m) wide.
     ///
     /// The coverage falls from 1 to 0 over one spacing across the edge of the footprint, so that forces stay continuous
     /// as a pad moves. It is 0 below the gel's base, where a point belongs to the sensor's case.
@@ -88,8 +88,8 @@ impl PadSurface {
         }
     }
 
-    /// Samples of the dome: centres and normals (pad frame) of square patches about `spacing` (m) wide, with the area of
-    /// each patch (m²) that lies over the footprint.
+    /// Samples of the dome: centres and normals (pad frame) of square patches about `spacing` (m) wide, with the area
+    /// of each patch (m²) that lies over the footprint.
     pub fn samples(&self, spacing: f64) -> Vec<GelSample> {
         let count = |extent: f64| (extent / spacing).ceil().max(1.0) as usize;
         let (nx, ny) = (count(self.length), count(self.width));
@@ -143,7 +143,8 @@ pub struct CollisionBox {
     pub pose: Pose,
 }
 
-/// Collision boxes of a finger besides its gel, in its link frame: the case of the sensor, and the bracket that carries it.
+/// Collision boxes of a finger besides its gel, in its link frame: the case of the sensor, and the bracket that
+/// carries it.
 pub fn finger_boxes(side: Side) -> [CollisionBox; 2] {
     let out = outward(side);
     let depth = PadSurface::default().thickness + CASE_HALF.y;
@@ -163,8 +164,8 @@ pub(super) fn gel_centre_in_finger(side: Side) -> Pose {
     Pose::translation(0.0, outward(side) * gel_half().y, APEX_Z)
 }
 
-/// Centre of mass (finger frame, m) and inertia about it (kg m²) of a finger with mass `mass` (kg), modelled as a uniform
-/// box of the size of the sensor's case, which is nearly all of the mass.
+/// Centre of mass (finger frame, m) and inertia about it (kg m²) of a finger with mass `mass` (kg), modelled as a
+/// uniform box of the size of the sensor's case, which is nearly all of the mass.
 pub(super) fn finger_mass(side: Side, mass: f64) -> (Vec3, Mat3) {
     let case = finger_boxes(side)[0];
     let square = case.half.component_mul(&case.half);

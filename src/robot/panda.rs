@@ -96,8 +96,8 @@ impl LinkInertia {
 
 /// Links 1 to 7 as identified by Gaz, Cognetti, Oliva, Robuffo Giordano and De Luca, Dynamic Identification of the
 /// Franka Emika Panda Robot With Retrieval of Feasible Parameters Using Penalty-Based Optimization, IEEE RA-L 4(4),
-/// 2019, rounded and unadjusted as in Franka's own description (`franka_description`, `inertial.yaml`). Torques determine
-/// only combinations of these parameters: the split of mass between links is one feasible choice of many.
+/// 2019, rounded and unadjusted as in Franka's own description (`franka_description`, `inertial.yaml`). Torques
+/// determine only combinations of these parameters: the split of mass between links is one feasible choice of many.
 const LINK_INERTIAS: [LinkInertia; ARM_DOFS] = [
     LinkInertia {
         mass: 4.970684,

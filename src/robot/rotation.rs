@@ -2,16 +2,16 @@
 
 use crate::geometry::{Quat, Vec3};
 
-/// Canonical quaternion of a rotation: w ≥ 0, and at w = 0 a positive first non-zero component, so that equal half turns
-/// have equal components.
+/// Canonical quaternion of a rotation: w ≥ 0, and at w = 0 a positive first non-zero component, so that equal half
+/// turns have equal components.
 pub fn canonical(rotation: &Quat) -> Quat {
     let q = rotation.quaternion();
     let first = [q.w, q.i, q.j, q.k].into_iter().find(|part| *part != 0.0);
     if first.is_some_and(|part| part < 0.0) { Quat::new_unchecked(-q) } else { *rotation }
 }
 
-/// Rotation vector of a rotation: unit axis times angle (rad), 0 ≤ angle ≤ π. The angle is computed with atan2, which is
-/// accurate near 0 and π, where acos is not.
+/// Rotation vector of a rotation: unit axis times angle (rad), 0 ≤ angle ≤ π. The angle is computed with atan2, which
+/// is accurate near 0 and π, where acos is not.
 pub fn axis_angle(rotation: &Quat) -> Vec3 {
     let q = canonical(rotation);
     let axis = q.imag();

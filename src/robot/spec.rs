@@ -73,8 +73,9 @@ pub struct RobotSpecError {
     pub expected: String,
 }
 
-/// Joint drives of the arm: `τ = kp (q_target − q) − kd q̇`, limited to the torques of the real arm (the effort limits of
-/// [`panda::tree`](super::panda::tree)), in addition to exact gravity compensation. The same gains apply to all joints.
+/// Joint drives of the arm: `τ = kp (q_target − q) − kd q̇`, limited to the torques of the real arm (the effort
+/// limits of [`panda::tree`](super::panda::tree)), in addition to exact gravity compensation. The same gains apply to
+/// all joints.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ArmSpec {
@@ -90,8 +91,8 @@ impl Default for ArmSpec {
     }
 }
 
-/// Drive of each finger: `f = kp (q_target − q) − kd q̇`, limited to `effort`. The opening range is fixed by the hardware
-/// ([`MAX_WIDTH`](super::gripper::MAX_WIDTH)).
+/// Drive of each finger: `f = kp (q_target − q) − kd q̇`, limited to `effort`. The opening range is fixed by the
+/// hardware ([`MAX_WIDTH`](super::gripper::MAX_WIDTH)).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GripperSpec {
@@ -113,8 +114,8 @@ impl Default for GripperSpec {
     }
 }
 
-/// Contact of the gel pads: friction, and the compliance of gel and sensor per contact area (a model of the 4 mm gel for
-/// wide patches). It determines force and slip; tactile images are computed from a model of their own.
+/// Contact of the gel pads: friction, and the compliance of gel and sensor per contact area (a model of the 4 mm gel
+/// for wide patches). It determines force and slip; tactile images are computed from a model of their own.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PadSpec {
@@ -138,8 +139,8 @@ impl Default for PadSpec {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct IkSpec {
-    /// Damping λ of the least squares, in the mixed unit (m and rad per rad) of the Jacobian's singular values; positive.
-    /// Larger values are slower and more robust near singularities.
+    /// Damping λ of the least squares, in the mixed unit (m and rad per rad) of the Jacobian's singular values;
+    /// positive. Larger values are slower and more robust near singularities.
     pub lambda: f64,
     /// Share of the way to the rest posture that the null space covers per control step, 0..=1.
     pub posture_gain: f64,

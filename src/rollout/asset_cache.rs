@@ -21,7 +21,8 @@ use crate::{
     scene::{Asset, SoftMaterial},
 };
 
-/// Finite-element models of assets, and expensive queries of their shapes: bounds, mass, wall thickness, contact samples.
+/// Finite-element models of assets, and expensive queries of their shapes: bounds, mass, wall thickness, contact
+/// samples.
 #[derive(Clone, Debug, Default)]
 pub struct AssetCache {
     models: SharedCache<Arc<Asset>, Arc<FemModel>>,
@@ -125,8 +126,8 @@ const THIN_SHARE: f64 = 0.1;
 /// Rays along each edge of a side of the bounds, cast in search of walls.
 const RAYS: usize = 12;
 
-/// Typical thickness of the walls of a shape that are thinner than [`MIN_PART_WALL`], m. `None` if at most a tenth of the
-/// surface has such walls.
+/// Typical thickness of the walls of a shape that are thinner than [`MIN_PART_WALL`], m. `None` if at most a tenth of
+/// the surface has such walls.
 fn thin_wall(shape: &Shape) -> Option<f64> {
     let hits = outer_points(shape);
     let steps = (MIN_PART_WALL / WALL_STEP).round() as usize;
@@ -143,8 +144,8 @@ fn thin_wall(shape: &Shape) -> Option<f64> {
     Some(thin[thin.len() / 2])
 }
 
-/// First intersections of the surface with parallel rays along the six axis directions. Rays find walls of any thickness,
-/// unlike a grid of samples.
+/// First intersections of the surface with parallel rays along the six axis directions. Rays find walls of any
+/// thickness, unlike a grid of samples.
 fn outer_points(shape: &Shape) -> Vec<Vec3> {
     let bounds = shape.bounds();
     let size = bounds.size();

@@ -94,8 +94,8 @@ pub(super) fn check_overlap(world: &mut World, scene: &Scene) -> Result<(), Buil
     })
 }
 
-/// Radius of the robot's first two links, m, which have no colliders, and their extent along the axis of the base (from the
-/// collision meshes of the public `franka_description`, rounded inwards).
+/// Radius of the robot's first two links, m, which have no colliders, and their extent along the axis of the base
+/// (from the collision meshes of the public `franka_description`, rounded inwards).
 const BASE_RADIUS: f64 = 0.05;
 const BASE_LOW: f64 = 0.03;
 const BASE_HIGH: f64 = 0.33;

@@ -134,9 +134,9 @@ impl EpisodeError {
 
 /// An episode in progress.
 ///
-/// [`run`](Self::run) executes it with a [`Controller`]. A caller that drives it itself calls [`begin`](Self::begin) once, then
-/// [`observe`](Self::observe) and [`step`](Self::step) at 20 Hz until [`outcome`](Self::outcome) is present. A clone continues
-/// independently and gives byte-identical results.
+/// [`run`](Self::run) executes it with a [`Controller`]. A caller that drives it itself calls [`begin`](Self::begin)
+/// once, then [`observe`](Self::observe) and [`step`](Self::step) at 20 Hz until [`outcome`](Self::outcome) is
+/// present. A clone continues independently and gives byte-identical results.
 #[derive(Clone)]
 pub struct Episode {
     spec: EpisodeSpec,
@@ -244,7 +244,8 @@ impl Episode {
         })
     }
 
-    /// Runs the episode with a controller until the goal is reached, the step budget is exhausted, or the state is invalid.
+    /// Runs the episode with a controller until the goal is reached, the step budget is exhausted, or the state is
+    /// invalid.
     ///
     /// # Errors
     /// The controller fails with an error that is not confined to the episode, or a sensor stream cannot be computed.
@@ -338,8 +339,8 @@ impl Episode {
         observation.map_err(|source| self.spec.sense_error(source))
     }
 
-    /// Renders the current image of a camera, in its own or another size (pixels). It is not part of an observation and does not
-    /// change the record.
+    /// Renders the current image of a camera, in its own or another size (pixels). It is not part of an observation
+    /// and does not change the record.
     ///
     /// # Errors
     /// The scene has no camera of that name, or the size is invalid.

@@ -1,7 +1,7 @@
 //! Execution of episodes: building and settling a scene, observing, acting, stepping and judging.
 //!
-//! `build` turns a scene into a [`Simulation`]; an [`Episode`] runs it with a [`Controller`] and returns the record. Data derived
-//! from assets are shared between episodes in [`AssetCache`] and [`SensorAssets`].
+//! `build` turns a scene into a [`Simulation`]; an [`Episode`] runs it with a [`Controller`] and returns the record.
+//! Data derived from assets are shared between episodes in [`AssetCache`] and [`SensorAssets`].
 
 mod articulated;
 mod asset_cache;

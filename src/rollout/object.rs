@@ -39,8 +39,8 @@ pub struct ObjectInstance {
 }
 
 impl ObjectInstance {
-    /// Reference point for placing other objects on or in this one, object frame, m: the lowest point on the vertical centre
-    /// line. It is the origin for whole objects.
+    /// Reference point for placing other objects on or in this one, object frame, m: the lowest point on the vertical
+    /// centre line. It is the origin for whole objects.
     pub fn foot_o(&self) -> Vec3 {
         match self.part {
             Some(_) => Vec3::new(self.bounds.centre().x, self.bounds.centre().y, self.bounds.min.z),

@@ -25,8 +25,8 @@ pub const TACTILE_IMAGES: [&str; 2] = ["tactile_left", "tactile_right"];
 /// Edge of the images that are rendered as a check only, px.
 const TRIAL_EDGE: usize = 16;
 
-/// Checks the sensors of a scene without a simulation: parameters, names and sizes of the cameras, the light, and the table
-/// files of the tactile sensor.
+/// Checks the sensors of a scene without a simulation: parameters, names and sizes of the cameras, the light, and the
+/// table files of the tactile sensor.
 ///
 /// # Errors
 /// The first invalid value, with the place in the script that set it.
@@ -67,8 +67,8 @@ fn check_names(cameras: &[Camera]) -> Result<(), SensingError> {
 }
 
 impl SensorSuite {
-    /// Computes the requested streams once in the initial state of an episode, so that errors appear before its first control
-    /// step.
+    /// Computes the requested streams once in the initial state of an episode, so that errors appear before its first
+    /// control step.
     ///
     /// # Errors
     /// As [`SensorSuite::render_unobstructed`] and [`SensorSuite::tactile_readings`].
@@ -83,8 +83,8 @@ impl SensorSuite {
         Ok(())
     }
 
-    /// Checks that no camera of the scene is inside an object in the initial state. It evaluates the shapes of the objects, which
-    /// is a hundred times faster than rendering them; only the robot is rendered.
+    /// Checks that no camera of the scene is inside an object in the initial state. It evaluates the shapes of the
+    /// objects, which is a hundred times faster than rendering them; only the robot is rendered.
     ///
     /// # Errors
     /// A camera is inside an object, or the robot cannot be rendered.

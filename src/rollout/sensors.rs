@@ -1,5 +1,5 @@
-//! Sensors of a simulation: images, tactile readings, forces and proprioception. Each is a pure function of a [`Frame`] (a
-//! state of the world), so that it can be computed on demand, also after the episode.
+//! Sensors of a simulation: images, tactile readings, forces and proprioception. Each is a pure function of a
+//! [`Frame`] (a state of the world), so that it can be computed on demand, also after the episode.
 
 use std::sync::Arc;
 
@@ -133,8 +133,9 @@ impl SensorSuite {
         &self.scene.cameras
     }
 
-    /// Renders the image of a camera in a state: colour, depth and segmentation. A camera inside an object sees the scene behind
-    /// its surface, and `inside` of the image names the object: an episode must not fail because an object encloses a camera.
+    /// Renders the image of a camera in a state: colour, depth and segmentation. A camera inside an object sees the
+    /// scene behind its surface, and `inside` of the image names the object: an episode must not fail because an
+    /// object encloses a camera.
     ///
     /// # Errors
     /// A parameter of the camera or the light is out of range, or an object cannot be rendered.

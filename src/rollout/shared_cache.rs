@@ -1,14 +1,14 @@
 //! A cache whose values are computed once and shared by all threads.
 //!
-//! Written here because the keys hold floating-point numbers: they can be compared but not hashed, which the cache crates
-//! require. The number of entries is small, so that a linear search is fast.
+//! Written here because the keys hold floating-point numbers: they can be compared but not hashed, which the cache
+//! crates require. The number of entries is small, so that a linear search is fast.
 
 use std::sync::{Arc, Mutex};
 
 use crate::parallel::lock;
 
-/// Maximum number of entries. A suite has a few dozen assets, but a layout with random appearance adds new ones of several megabytes in
-/// every episode.
+/// Maximum number of entries. A suite has a few dozen assets, but a layout with random appearance adds new ones of
+/// several megabytes in every episode.
 const MAX_ENTRIES: usize = 64;
 
 /// The slot of a value: empty until the value is computed.
@@ -34,8 +34,8 @@ impl<K, V> Default for SharedCache<K, V> {
 }
 
 impl<K: Clone, V: Clone> SharedCache<K, V> {
-    /// Returns the value whose key satisfies `is_same`, or computes and stores the value of `key`. Concurrent callers with an
-    /// equal key block until the first has computed it (single flight); callers with other keys proceed.
+    /// Returns the value whose key satisfies `is_same`, or computes and stores the value of `key`. Concurrent callers
+    /// with an equal key block until the first has computed it (single flight); callers with other keys proceed.
     ///
     /// # Errors
     /// Propagates the error of `compute`; nothing is cached, so the next call retries.

@@ -24,8 +24,9 @@ use crate::{
 
 /// A scene with its robot, simulated at the physics rate (60 Hz by default).
 ///
-/// The builder places every object and the robot; [`settle`](Self::settle) lets the objects come to rest. World frame: z up,
-/// z = 0 on the support surface. Stepping is deterministic: equal scenes and commands give bitwise equal states.
+/// The builder places every object and the robot; [`settle`](Self::settle) lets the objects come to rest. World
+/// frame: z up, z = 0 on the support surface. Stepping is deterministic: equal scenes and commands give bitwise equal
+/// states.
 #[derive(Clone, Debug)]
 pub struct Simulation {
     /// The scene from which it was built.
@@ -66,8 +67,8 @@ impl Simulation {
         self.world.step()
     }
 
-    /// Speed of the fastest point of an object, m/s. For rigid bodies and parts: that of the centre plus 0.1 m times the angular
-    /// velocity.
+    /// Speed of the fastest point of an object, m/s. For rigid bodies and parts: that of the centre plus 0.1 m times
+    /// the angular velocity.
     pub fn speed(&self, object: &ObjectInstance) -> f64 {
         match object.body {
             BodyId::Soft(index) => self.world.soft(index).state.max_speed(),
@@ -86,8 +87,8 @@ impl Simulation {
         }
     }
 
-    /// Contact of an object with a collider or soft body, in the last step in which the object was awake. Zero for objects that
-    /// never move.
+    /// Contact of an object with a collider or soft body, in the last step in which the object was awake. Zero for
+    /// objects that never move.
     pub fn contact(&self, object: &ObjectInstance, partner: ContactPartner) -> ContactSummary {
         self.world.contact(object.body, partner)
     }
@@ -102,8 +103,8 @@ impl Simulation {
         self.objects.iter().find(|o| o.name == name)
     }
 
-    /// Centre of an object, m, world: mean of the nodes of a soft body, centre of mass of a rigid body, centre of the bounds of a
-    /// part.
+    /// Centre of an object, m, world: mean of the nodes of a soft body, centre of mass of a rigid body, centre of the
+    /// bounds of a part.
     pub fn centre(&self, object: &ObjectInstance) -> Vec3 {
         match object.body {
             BodyId::Soft(index) => {

@@ -26,7 +26,8 @@ pub struct EpisodeRef<'a> {
     pub policy: &'a str,
 }
 
-/// Specification of an episode: task, scene and parameters. The controller is passed to [`Episode::run`](super::Episode::run).
+/// Specification of an episode: task, scene and parameters. The controller is passed to
+/// [`Episode::run`](super::Episode::run).
 #[derive(Clone, Debug)]
 pub struct EpisodeSpec {
     /// Identity, as in results.
@@ -54,8 +55,8 @@ pub struct EpisodeSpec {
 }
 
 impl EpisodeSpec {
-    /// An episode of `task` in `scene`, without a limit, recording or trace. `nominal` is the scene before any shift; the
-    /// identity of the episode names the asset that is the target there.
+    /// An episode of `task` in `scene`, without a limit, recording or trace. `nominal` is the scene before any shift;
+    /// the identity of the episode names the asset that is the target there.
     pub fn new(
         episode: &EpisodeRef,
         task: &Task,

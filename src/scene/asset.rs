@@ -146,8 +146,8 @@ impl Joint {
 pub struct Part {
     /// Name, unique in the object, for example "top_drawer".
     pub name: String,
-    /// Shape and appearance in the frame of the whole object with all joints at 0. The asset has the name of the part and
-    /// a rigid body.
+    /// Shape and appearance in the frame of the whole object with all joints at 0. The asset has the name of the part
+    /// and a rigid body.
     pub asset: Arc<Asset>,
     /// Density, kg/m³.
     pub density: f64,

@@ -92,8 +92,8 @@ fn font(typeface: Typeface) -> Option<FontRef<'static>> {
     FontRef::try_from_slice(bytes).ok()
 }
 
-/// Coverage of a line's area by glyphs, as a summed-area table (Crow, Summed-Area Tables for Texture Mapping, 1984): the
-/// mean over any rectangle takes four lookups.
+/// Coverage of a line's area by glyphs, as a summed-area table (Crow, Summed-Area Tables for Texture Mapping, 1984):
+/// the mean over any rectangle takes four lookups.
 #[derive(Debug, Default)]
 pub struct GlyphCoverage {
     size: [usize; 2],
@@ -145,8 +145,8 @@ impl GlyphCoverage {
         }
     }
 
-    /// Share of a square covered by glyphs, 0..=1. The square has edge `width` (m); its centre is `right` and `up` (m) from the
-    /// centre of the line.
+    /// Share of a square covered by glyphs, 0..=1. The square has edge `width` (m); its centre is `right` and `up`
+    /// (m) from the centre of the line.
     pub fn share(&self, right: f64, up: f64, width: f64) -> f64 {
         if self.sums.is_empty() {
             return 0.0;

@@ -9,8 +9,8 @@ use super::asset::{Asset, Body, Part};
 impl Asset {
     /// Hash of everything that a calibration depends on: shape, body with its material and resolution, and friction.
     ///
-    /// 16 hexadecimal digits of a SHA-256. Appearance, hints and name do not enter. Numbers enter with seven significant
-    /// digits, since trigonometric functions differ between platforms in the last bits.
+    /// 16 hexadecimal digits of a SHA-256. Appearance, hints and name do not enter. Numbers enter with seven
+    /// significant digits, since trigonometric functions differ between platforms in the last bits.
     pub fn fingerprint(&self) -> String {
         let body = match &self.body {
             Body::Articulated(parts) => {

@@ -1,4 +1,5 @@
-//! A scene as plain data: assets, placed objects and their appearance, the robot's base, lighting, cameras, the workspace.
+//! A scene as plain data: assets, placed objects and their appearance, the robot's base, lighting, cameras, the
+//! workspace.
 //!
 //! Lengths are metres, angles radians, colours linear RGB. The world frame has z up and z = 0 on the support surface.
 
@@ -39,7 +40,8 @@ pub struct Object {
 /// The state from which an episode starts, before settling.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
-    /// Placed objects. Their order determines the order of bodies in the simulation, and with it the last bits of results.
+    /// Placed objects. Their order determines the order of bodies in the simulation, and with it the last bits of
+    /// results.
     pub objects: Vec<Object>,
     /// Robot base frame in the world frame.
     pub base_w: Pose,
@@ -65,8 +67,8 @@ impl Scene {
         self.objects.iter().flat_map(of).collect()
     }
 
-    /// The rigid twin: the same scene with all soft bodies made rigid. Shapes, poses, densities, friction and appearance
-    /// stay the same.
+    /// The rigid twin: the same scene with all soft bodies made rigid. Shapes, poses, densities, friction and
+    /// appearance stay the same.
     pub fn rigid_twin(mut self) -> Self {
         for object in &mut self.objects {
             if let Body::Soft(material) = &object.asset.body {

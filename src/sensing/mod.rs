@@ -1,7 +1,7 @@
 //! Sensor models: pure functions of a physics [`Frame`](crate::physics::world::Frame) and a scene, evaluated on demand.
 //!
-//! [`camera`] renders colour, depth and segmentation images, [`tactile`] simulates the GelSight Mini of each finger, and
-//! [`panda`] holds the meshes of the robot that the cameras see.
+//! [`camera`] renders colour, depth and segmentation images, [`tactile`] simulates the GelSight Mini of each finger,
+//! and [`panda`] holds the meshes of the robot that the cameras see.
 
 pub mod camera;
 pub mod panda;

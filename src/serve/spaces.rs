@@ -1,5 +1,5 @@
-//! Spaces of observations and actions for clients: types, shapes and bounds. The bounds are those of possible values, not
-//! of likely ones.
+//! Spaces of observations and actions for clients: types, shapes and bounds. The bounds are those of possible values,
+//! not of likely ones.
 
 use std::f64::consts::PI;
 

@@ -132,7 +132,9 @@ fn unsuitable_output_folders_are_refused() {
     let project = Small::default().project();
     project.write("file", b"mine");
     assert!(project.refusal("x.lua --out file").starts_with("x.lua: cannot create the folder file: "));
-    assert!(project.refusal("x.lua --out file/run").starts_with("x.lua: cannot create the folder file/run: "));
+    assert!(
+        project.refusal("x.lua --out file/run").starts_with("x.lua: cannot create the folder file/run: ")
+    );
     assert_eq!(project.text("file"), "mine");
     project.succeeds("x.lua --out run");
     let before = (project.text("run/run.json"), project.text("run/episodes.jsonl"));

@@ -51,11 +51,12 @@ struct ConditionCase {
     not_applicable: Option<String>,
 }
 
-/// Runs every suite unchanged and under each condition, and prints one table per suite. All scenes and folders are checked
-/// before the first episode runs.
+/// Runs every suite unchanged and under each condition, and prints one table per suite. All scenes and folders are
+/// checked before the first episode runs.
 ///
 /// # Errors
-/// A condition that does not fit a suite, a folder that contains a run, or an episode that fails. Finished runs are kept.
+/// A condition that does not fit a suite, a folder that contains a run, or an episode that fails. Finished runs are
+/// kept.
 pub(crate) fn run(
     config: &RunConfig,
     loaded: &LoadedScript,

@@ -81,7 +81,8 @@ impl<'a> EpisodeArtifacts<'a> {
         actions::write(&path, &finished.actions).map_err(CliError::input)
     }
 
-    /// Renders the requested video, and for an unsafe episode a still of its worst moment. Consumes the recorded states.
+    /// Renders the requested video, and for an unsafe episode a still of its worst moment. Consumes the recorded
+    /// states.
     ///
     /// # Errors
     /// An image cannot be rendered or written.
@@ -121,8 +122,8 @@ fn debug_frames(finished: &FinishedEpisode) -> Vec<DebugFrame> {
     frames
 }
 
-/// The row of a control step in which the physics failed. A peak of the rollout above that of all complete steps belongs to
-/// this step.
+/// The row of a control step in which the physics failed. A peak of the rollout above that of all complete steps
+/// belongs to this step.
 fn aborted_frame(finished: &FinishedEpisode, step: usize) -> DebugFrame {
     let (identity, verdict) = (&finished.record.identity, &finished.record.verdict);
     let before = finished.frames.iter().filter_map(|frame| Some(frame.deformation.as_ref()?.rms_pct));

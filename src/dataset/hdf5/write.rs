@@ -130,8 +130,8 @@ impl<'a> Hdf5Writer<'a> {
         write_text_attributes(&data, &stream.attributes).map_err(failed)
     }
 
-    /// Creates a dataset. Before compression, HDF5's shuffle filter groups the bytes of a chunk that are `shuffle_stride`
-    /// bytes apart; 1 disables it.
+    /// Creates a dataset. Before compression, HDF5's shuffle filter groups the bytes of a chunk that are
+    /// `shuffle_stride` bytes apart; 1 disables it.
     pub(in crate::dataset) fn create_dataset<T: H5Type>(
         &mut self,
         key: &str,
@@ -150,8 +150,8 @@ impl<'a> Hdf5Writer<'a> {
         builder.filter_pipeline(filters).create(name).map_err(|e| DatasetError::hdf5(self.path, key)(e))
     }
 
-    /// Creates the dataset of an image stream. Within a chunk the values of one pixel in successive images are stored next to
-    /// each other, so that static parts of the image compress well.
+    /// Creates the dataset of an image stream. Within a chunk the values of one pixel in successive images are stored
+    /// next to each other, so that static parts of the image compress well.
     pub(in crate::dataset) fn create_image_dataset(
         &mut self,
         demo: usize,

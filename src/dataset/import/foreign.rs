@@ -81,7 +81,8 @@ pub struct ForeignObjectPose {
 impl ForeignDemo {
     /// Commands full closure in steps in which the recorded fingers were stopped by the object.
     ///
-    /// Replaying the measured closure squeezes a soft object as far as it was squeezed, but exerts no force on a rigid one.
+    /// Replaying the measured closure squeezes a soft object as far as it was squeezed, but exerts no force on a
+    /// rigid one.
     pub fn close_fully_on_rigid_object(&mut self) {
         let stopped =
             self.commands.iter_mut().zip(&self.is_stopped_by_object).filter(|(_, stopped)| **stopped);

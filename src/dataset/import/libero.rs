@@ -1,10 +1,10 @@
 //! Files of robomimic and LIBERO: relative steps for robosuite's operational-space controller.
 //!
-//! robosuite sets the controller's goal relative to the tool: `goal = tool + 0.05 m · action`; the rotation is applied before
-//! the tool's orientation, about the axes of the base; without a rotation the last goal's orientation stays
-//! (controllers/osc.py). Together with the recorded tool poses this gives the goals the controller tracked. LIBERO stores
-//! observations *after* each action (scripts/create_dataset.py), robomimic before it; `states`, which both store before it,
-//! tell them apart.
+//! robosuite sets the controller's goal relative to the tool: `goal = tool + 0.05 m · action`; the rotation is
+//! applied before the tool's orientation, about the axes of the base; without a rotation the last goal's orientation
+//! stays (controllers/osc.py). Together with the recorded tool poses this gives the goals the controller tracked.
+//! LIBERO stores observations *after* each action (scripts/create_dataset.py), robomimic before it; `states`, which
+//! both store before it, tell them apart.
 
 use super::{
     DatasetError, DemoReader, ForeignDemo, InitialCondition,
@@ -95,8 +95,8 @@ struct States {
     width: usize,
 }
 
-/// MuJoCo states before each action. Empty if they are missing, or if their shape is unexpected and there is no model to
-/// check it against: other programs store something else under this key.
+/// MuJoCo states before each action. Empty if they are missing, or if their shape is unexpected and there is no model
+/// to check it against: other programs store something else under this key.
 ///
 /// # Errors
 /// The states do not fit the model.
@@ -168,8 +168,8 @@ fn arm_angles(
     Ok(Some(RecordedArm { name, observed, before }))
 }
 
-/// True if observations are from after each action, judged by the joints in robosuite's states (time, then positions, the
-/// arm's first), which are from before it. `None` if the states are something else.
+/// True if observations are from after each action, judged by the joints in robosuite's states (time, then positions,
+/// the arm's first), which are from before it. `None` if the states are something else.
 fn observed_after_action(states: &[&[f64]], observed: &[ArmAngles]) -> Option<bool> {
     if states.len() != observed.len() || states.first()?.len() < 8 {
         return None;
@@ -213,7 +213,8 @@ fn tool_poses(
     };
     let stated = model.and_then(|model| model.base_w);
     if is_near_start(&Pose::identity()) && stated.is_none() {
-        // Already in the base frame, which robosuite never writes: these are poses of the tool itself, as softvt records.
+        // Already in the base frame, which robosuite never writes: these are poses of the tool itself, as softvt
+        // records.
         return Ok(Some(NamedPoses { name, poses: site }));
     }
     let known = BASES.map(|at| Pose::translation(at[0], at[1], at[2]));

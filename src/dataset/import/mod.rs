@@ -1,7 +1,7 @@
 //! Import of demonstrations recorded by other programs, as commands and an initial state for softvt's simulation.
 //!
-//! `docs/data.md`, "Importing", lists what is read of each layout. A file is read and checked completely before anything is
-//! simulated; errors name the file, the key and the step.
+//! `docs/data.md`, "Importing", lists what is read of each layout. A file is read and checked completely before
+//! anything is simulated; errors name the file, the key and the step.
 
 mod demo_reader;
 mod foreign;

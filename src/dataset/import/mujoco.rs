@@ -1,8 +1,8 @@
 //! Object poses in a flat MuJoCo state, by the model stored with it.
 //!
-//! A state holds the time, the positions of all joints and their velocities. Joints are in the order of their bodies, parents
-//! before children (MuJoCo, XML reference, "body"): a free joint has seven positions (position, quaternion w x y z) and six
-//! velocities, a ball joint four and three, any other joint one and one.
+//! A state holds the time, the positions of all joints and their velocities. Joints are in the order of their bodies,
+//! parents before children (MuJoCo, XML reference, "body"): a free joint has seven positions (position, quaternion w
+//! x y z) and six velocities, a ball joint four and three, any other joint one and one.
 
 use super::{ForeignObjectPose, demo_reader::pose_from_row};
 use crate::geometry::Pose;
@@ -104,8 +104,8 @@ impl MujocoModel {
         1 + joints.map(|joint| joint.positions() + joint.velocities()).sum::<usize>()
     }
 
-    /// Object poses in a state: free bodies at their positions in the state, bodies fixed to the world at theirs in the model.
-    /// `None` if the state does not fit the model.
+    /// Object poses in a state: free bodies at their positions in the state, bodies fixed to the world at theirs in
+    /// the model. `None` if the state does not fit the model.
     pub(super) fn object_poses(&self, state: &[f64]) -> Option<Vec<ForeignObjectPose>> {
         if state.len() != self.state_width() {
             return None;

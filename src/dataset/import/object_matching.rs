@@ -13,9 +13,9 @@ const MIN_UPRIGHT_COSINE: f64 = 0.99;
 
 /// Placements of the objects of `scene` according to `recorded` poses; empty if `target` is not among them.
 ///
-/// Names are compared without a trailing number, which tells objects of one kind apart: the lowest number belongs to the first
-/// such object of the scene. A recorded object matches if its name is the object's, or ends in the name of the object or of its
-/// asset. A soft body that matches nothing is taken to be the target.
+/// Names are compared without a trailing number, which tells objects of one kind apart: the lowest number belongs to
+/// the first such object of the scene. A recorded object matches if its name is the object's, or ends in the name of
+/// the object or of its asset. A soft body that matches nothing is taken to be the target.
 pub fn match_objects(scene: &Scene, target: &str, recorded: &[ForeignObjectPose]) -> Vec<ObjectPlacement> {
     let mut candidates: Vec<(&str, u32, &ForeignObjectPose)> = recorded.iter().map(numbered).collect();
     candidates.sort_by_key(|(_, number, _)| *number);

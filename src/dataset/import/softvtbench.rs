@@ -1,7 +1,7 @@
 //! SoftVTBench's files: absolute poses in the robot's base frame.
 //!
-//! An action is the pose *measured* when the action was taken, the finger position and, in the longer form, the forces on both
-//! fingers (core/recorders/recorders.py). Quaternions are w x y z.
+//! An action is the pose *measured* when the action was taken, the finger position and, in the longer form, the
+//! forces on both fingers (core/recorders/recorders.py). Quaternions are w x y z.
 
 use super::{
     DatasetError, DemoReader, ForeignDemo, ForeignObjectPose, InitialCondition,
@@ -28,8 +28,8 @@ const MAX_LEAD_RAD: f64 = 0.6;
 const MAX_BASE_ROTATION: f64 = 2.8;
 /// Force above which a finger counts as pressed, N.
 const MIN_HOLD_FORCE: f64 = 0.1;
-/// Largest difference, in every step, between finger positions of actions and of observations for the actions to count as
-/// measured, m.
+/// Largest difference, in every step, between finger positions of actions and of observations for the actions to
+/// count as measured, m.
 const MEASURED_TOLERANCE: f64 = 1e-4;
 /// Range of finger positions, m, with some slack.
 const FINGER_RANGE: [f64; 2] = [-0.001, 0.045];

@@ -18,10 +18,11 @@ const MAX_SPREAD_M: f64 = 0.02;
 const MAX_SPREAD_RAD: f64 = 0.1;
 /// Largest angle between the pointing directions of the recorded tool and of ours, rad.
 const MAX_TILT: f64 = 0.2;
-/// Largest rotation about the pointing direction, rad. Hand frames differ by a quarter turn; a quaternion in the wrong order
-/// is half a turn off where the hand points down.
+/// Largest rotation about the pointing direction, rad. Hand frames differ by a quarter turn; a quaternion in the
+/// wrong order is half a turn off where the hand points down.
 const MAX_SPIN: f64 = 2.5;
-/// Initial joint angles of robosuite's Panda, rad (robots/panda_robot.py), and the largest tilt of a first pose from there.
+/// Initial joint angles of robosuite's Panda, rad (robots/panda_robot.py), and the largest tilt of a first pose from
+/// there.
 const HOME: ArmAngles = [0.0, 0.196, 0.0, -2.618, 0.0, 2.942, 0.785];
 const MAX_TILT_FROM_HOME: f64 = 1.0;
 
@@ -127,8 +128,8 @@ pub(super) fn tool_offset(
     Ok(mean(&|r, j| j.rotation.inverse() * shift(r, j)))
 }
 
-/// Message about a hand that is rotated by `rotation` from `expected`, if that is more than two frames of one hand can differ:
-/// they differ by a rotation about the pointing direction, but not by half a turn.
+/// Message about a hand that is rotated by `rotation` from `expected`, if that is more than two frames of one hand
+/// can differ: they differ by a rotation about the pointing direction, but not by half a turn.
 fn wrong_hand_orientation(rotation: &Quat, max_tilt: f64, expected: &str) -> Option<String> {
     let tilt = (rotation * Vec3::z()).angle(&Vec3::z());
     let spin = 2.0 * rotation.k.atan2(rotation.w).rem_euclid(std::f64::consts::PI);

@@ -1,8 +1,9 @@
 //! Export of recorded demonstrations as LeRobot datasets, in the versions used for training: v2.1 and v3.0.
 //!
-//! A row holds what a policy of the profile `visuo_tactile` observes at that step, and the action commanded then. Of the eight
-//! past marker states only the last two are stored, as in SoftVTBench. `docs/data.md` describes the files. Demonstrations are
-//! read and their images encoded on several threads, and written in order; each thread holds one demonstration.
+//! A row holds what a policy of the profile `visuo_tactile` observes at that step, and the action commanded then. Of
+//! the eight past marker states only the last two are stored, as in SoftVTBench. `docs/data.md` describes the files.
+//! Demonstrations are read and their images encoded on several threads, and written in order; each thread holds one
+//! demonstration.
 
 mod config;
 mod episode;
@@ -28,12 +29,12 @@ pub use config::{ExportConfig, ExportSummary, GripperCoding, LeRobotVersion};
 
 /// Exports a recording. `config.out` is complete afterwards, or unchanged.
 ///
-/// `is_cancelled` ends the export early. `on_episode` is called after each written episode, with the number of all episodes and a
-/// label.
+/// `is_cancelled` ends the export early. `on_episode` is called after each written episode, with the number of all
+/// episodes and a label.
 ///
 /// # Errors
-/// The recording is missing, unfinished, without images or damaged; a word matches no task; `config.out` is not empty; a file
-/// cannot be written; or the export was cancelled.
+/// The recording is missing, unfinished, without images or damaged; a word matches no task; `config.out` is not
+/// empty; a file cannot be written; or the export was cancelled.
 pub fn export(
     config: &ExportConfig,
     is_cancelled: impl Fn() -> bool + Sync,

@@ -1,8 +1,8 @@
-//! The MP4 container (ISO/IEC 14496-12, 14496-15): one H.264 track, with the index before the frames so that browsers can start
-//! playback at once.
+//! The MP4 container (ISO/IEC 14496-12, 14496-15): one H.264 track, with the index before the frames so that browsers
+//! can start playback at once.
 //!
-//! Written by hand: the crate `mp4` writes the index after the frames and no colour information (`colr`), and any other writer
-//! would change the bytes of recorded videos.
+//! Written by hand: the crate `mp4` writes the index after the frames and no colour information (`colr`), and any
+//! other writer would change the bytes of recorded videos.
 
 /// Clock ticks per frame.
 const TICKS: u32 = 1000;
@@ -34,7 +34,8 @@ impl Track {
         self.samples.len()
     }
 
-    /// Appends an access unit in Annex B format: parameter sets go to the index, slices are prefixed with their lengths.
+    /// Appends an access unit in Annex B format: parameter sets go to the index, slices are prefixed with their
+    /// lengths.
     pub(super) fn push(&mut self, unit: &[u8]) {
         let mut sample = Sample { bytes: Vec::with_capacity(unit.len()), is_key: false };
         for nal in nal_units(unit) {
@@ -109,7 +110,8 @@ impl Track {
         boxes.iter().flat_map(|(name, fields)| boxed(name, &fields.0)).collect()
     }
 
-    /// The `avc1` entry: size, decoder configuration and colour space (BT.601 primaries, transfer and matrix; studio range).
+    /// The `avc1` entry: size, decoder configuration and colour space (BT.601 primaries, transfer and matrix; studio
+    /// range).
     fn sample_entry(&self) -> Vec<u8> {
         let (sps, pps) = (&self.sps, &self.pps);
         let profile = [1, sps[1], sps[2], sps[3], 0xff, 0xe1];

@@ -1,16 +1,17 @@
 //! FEM-RMS deformation D: distance of a soft body from its reference shape after removal of the rigid motion.
 //!
-//! With nodes `xᵢ` now and `Xᵢ` in the reference shape, weights `wᵢ`, weighted means `c` and `C`, and the diagonal `d` of the
-//! reference's axis-aligned bounding box in the frame in which its nodes were given:
+//! With nodes `xᵢ` now and `Xᵢ` in the reference shape, weights `wᵢ`, weighted means `c` and `C`, and the diagonal
+//! `d` of the reference's axis-aligned bounding box in the frame in which its nodes were given:
 //!
 //! `D = 100 % · sqrt( Σ wᵢ |xᵢ − c − R (Xᵢ − C)|² / Σ wᵢ ) / d`
 //!
-//! `R` is the proper rotation that minimises the sum (Kabsch, 1976), found as the leading eigenvector of Horn's 4×4 matrix
-//! (Horn, "Closed-form solution of absolute orientation using unit quaternions", 1987). That is the same optimum as the SVD
-//! with a flipped last singular vector, but it is a proper rotation by construction, also for flat and collapsed bodies.
+//! `R` is the proper rotation that minimises the sum (Kabsch, 1976), found as the leading eigenvector of Horn's 4×4
+//! matrix (Horn, "Closed-form solution of absolute orientation using unit quaternions", 1987). That is the same
+//! optimum as the SVD with a flipped last singular vector, but it is a proper rotation by construction, also for flat
+//! and collapsed bodies.
 //!
-//! The score uses uniform weights ([`METRIC_ID`], as SoftVTBench); the mass-weighted value and the largest node displacement
-//! are reported next to it. The reference is the settled shape, so sagging under gravity does not count.
+//! The score uses uniform weights ([`METRIC_ID`], as SoftVTBench); the mass-weighted value and the largest node
+//! displacement are reported next to it. The reference is the settled shape, so sagging under gravity does not count.
 
 use nalgebra::{Matrix4, Quaternion, SymmetricEigen};
 
@@ -59,8 +60,8 @@ pub struct Deformation {
 
 /// Shape that deformations are measured from, usually the settled one.
 ///
-/// Sums over the reference nodes are precomputed, so that [`ReferenceShape::measure`] takes two passes over the nodes and
-/// does not allocate memory.
+/// Sums over the reference nodes are precomputed, so that [`ReferenceShape::measure`] takes two passes over the nodes
+/// and does not allocate memory.
 #[derive(Clone, Debug)]
 pub struct ReferenceShape {
     /// Node positions about their uniform mean, m.
@@ -84,11 +85,12 @@ struct AlignmentSums {
 }
 
 impl ReferenceShape {
-    /// Prepares a reference from its `nodes` (m, any frame) and one weight per node (volume or mass; only ratios matter).
+    /// Prepares a reference from its `nodes` (m, any frame) and one weight per node (volume or mass; only ratios
+    /// matter).
     ///
     /// # Errors
-    /// Fewer than three nodes, a node that is not finite, a body without size, or weights that are not one per node, negative,
-    /// not finite or all zero.
+    /// Fewer than three nodes, a node that is not finite, a body without size, or weights that are not one per node,
+    /// negative, not finite or all zero.
     pub fn new(nodes: &[Vec3], weights: &[f64]) -> Result<Self, DeformationError> {
         if nodes.len() < 3 {
             return Err(DeformationError::TooFewNodes(nodes.len()));

@@ -1,12 +1,15 @@
 //! NoDrop: when an object counts as dropped, and when a release was commanded.
 //!
 //! NoDrop is false from the first of these events on, also when the object is caught again:
-//! - **lost grasp**: the object was lifted at its last pad contact. Since then at least `lost_contact_s` have passed without
+//! - **lost grasp**: the object was lifted at its last pad contact. Since then at least `lost_contact_s` have passed
+//!   without
 //!   pad contact and without a release command, and its centre has fallen by more than `lost_fall_m` relative to the hand. It
 //!   does not matter whether it has landed meanwhile.
-//! - **free fall**: neither the robot nor a support touches the object, and its centre is more than `free_fall_m` below its
+//! - **free fall**: neither the robot nor a support touches the object, and its centre is more than `free_fall_m`
+//!   below its
 //!   highest point since the last contact, released or not.
-//! - **left goal**: the object has rested at the goal for a control step, and at the end of a later one its centre is outside
+//! - **left goal**: the object has rested at the goal for a control step, and at the end of a later one its centre is
+//!   outside
 //!   the goal region by more than `leave_margin_m` ([`super::goal`]).
 //! - **left workspace**: the centre is outside the workspace of the scene.
 //! - **no evidence**: the rollout was invalid or a number was not finite.
@@ -53,14 +56,14 @@ pub struct ReleaseSample {
 
 /// Detects that the gripper was commanded to release the object.
 ///
-/// A gripper that holds something is commanded narrower than it is. A grasp begins when both pads press on the object while
-/// the command is below the measured width. It is released when the commanded width reaches either
+/// A gripper that holds something is commanded narrower than it is. A grasp begins when both pads press on the object
+/// while the command is below the measured width. It is released when the commanded width reaches either
 /// - the measured width plus [`SuccessCriteria::release_margin_m`], or
 /// - the largest width measured in this grasp with both pads on the object.
 ///
-/// The second rule makes opening in many small steps a release as well. A hold that is loosened until it barely holds is
-/// not a release. The width at the *first* touch would not do as the bound: it is detected when a fast gripper has closed
-/// some millimetres further, and an object that turns in the hand may become wider.
+/// The second rule makes opening in many small steps a release as well. A hold that is loosened until it barely holds
+/// is not a release. The width at the *first* touch would not do as the bound: it is detected when a fast gripper has
+/// closed some millimetres further, and an object that turns in the hand may become wider.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ReleaseMonitor {
     is_released: bool,
@@ -69,8 +72,8 @@ pub struct ReleaseMonitor {
 }
 
 impl ReleaseMonitor {
-    /// Takes in one physics step. Returns true if a release of the last held object has been commanded, now or before; a
-    /// new grasp resets it to false.
+    /// Takes in one physics step. Returns true if a release of the last held object has been commanded, now or
+    /// before; a new grasp resets it to false.
     pub fn update(&mut self, criteria: &SuccessCriteria, sample: &ReleaseSample) -> bool {
         if sample.both_pads_touch && (self.grasp_width_m.is_none() || self.is_released) {
             let is_squeezing = sample.commanded_width_m < sample.width_m;

@@ -155,8 +155,8 @@ fn loosening_the_grip_is_not_a_release_but_opening_in_small_steps_is() {
     assert_eq!(released(&opened), [false, false, false, true]);
 }
 
-/// The gripper opens by `step` per physics step from 40 mm around an object that is 50 mm wide and lies on something: its
-/// pads stay on the object while they are pressed, a little wider than commanded.
+/// The gripper opens by `step` per physics step from 40 mm around an object that is 50 mm wide and lies on something:
+/// its pads stay on the object while they are pressed, a little wider than commanded.
 fn opened_by(step: f64, noticed_at: f64) -> Vec<(bool, f64, f64)> {
     let mut grips = vec![(false, 0.08, 0.08), (true, noticed_at, 0.04), (true, 0.0425, 0.04)];
     let mut commanded: f64 = 0.04;

@@ -153,8 +153,8 @@ impl Scores {
 }
 
 impl SuiteSummary {
-    /// Summary of the episodes of one suite under one policy; records of other suites are left out. It does not depend on
-    /// the order of `records`.
+    /// Summary of the episodes of one suite under one policy; records of other suites are left out. It does not
+    /// depend on the order of `records`.
     pub fn of(suite: &str, policy: &str, records: &[EpisodeRecord]) -> Self {
         let mut records: Vec<_> = records.iter().filter(|r| r.identity.suite == suite).collect();
         records.sort_by_key(|r| (r.identity.task, r.identity.episode));

@@ -76,8 +76,8 @@ const SWEEPS: usize = 24;
 const TOLERANCE: f64 = 2e-5;
 
 /// The intersection of `parts` shapes, whose distances at a point `field` gives: finds the nearest point of the
-/// intersection by sequential quadratic programming, each round with Hildreth's (1957) coordinate ascent over the tangent
-/// planes.
+/// intersection by sequential quadratic programming, each round with Hildreth's (1957) coordinate ascent over the
+/// tangent planes.
 pub(super) fn intersect_exactly(
     parts: usize,
     p: &Vec3,

@@ -20,8 +20,8 @@ pub struct Contact {
 
 /// Smallest cosine between a face normal and the opposite of the sample's normal at which the sample contacts the face.
 const FACING: f64 = 0.3;
-/// Depth (m) down to which a sample contacts a face, or [`MAX_DEPTH_RATIO`] times the depth under the nearest face if that
-/// is more. A sample on an edge that slides along a wall faces the far end of the wall without being near it.
+/// Depth (m) down to which a sample contacts a face, or [`MAX_DEPTH_RATIO`] times the depth under the nearest face if
+/// that is more. A sample on an edge that slides along a wall faces the far end of the wall without being near it.
 const MAX_DEPTH: f64 = 4e-3;
 /// See [`MAX_DEPTH`].
 const MAX_DEPTH_RATIO: f64 = 3.0;
@@ -37,8 +37,8 @@ struct SupportFace {
 }
 
 impl Shape {
-    /// Contact of a square sample of edge `spacing` (m) at `p_o`. `facing_o` is the outward normal of the body that carries
-    /// the sample, in this shape's frame; zero if unknown.
+    /// Contact of a square sample of edge `spacing` (m) at `p_o`. `facing_o` is the outward normal of the body that
+    /// carries the sample, in this shape's frame; zero if unknown.
     ///
     /// Boxes and cylinders have sharp edges. A sample contacts the face that it faces, up to half a spacing beyond the
     /// edge, with the covered share of its patch. The total over a field of samples is therefore continuous as an edge

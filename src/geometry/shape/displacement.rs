@@ -14,8 +14,8 @@ pub enum Displacement {
     Bumps(Bumps),
 }
 
-/// Ridges of height `height · w((1 + cos ψ)/2)` with phase `ψ = count·θ + 2π (along/pitch + r/radial_pitch) + phase`: rings
-/// along the axis (`pitch`), flutes around it (`count`), screws (both) or a spiral (`count`, `radial_pitch`).
+/// Ridges of height `height · w((1 + cos ψ)/2)` with phase `ψ = count·θ + 2π (along/pitch + r/radial_pitch) + phase`:
+/// rings along the axis (`pitch`), flutes around it (`count`), screws (both) or a spiral (`count`, `radial_pitch`).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ridges {
     /// Axis of the pattern.
@@ -154,7 +154,8 @@ impl Bumps {
         (self.height * best.0, best.1 * self.height)
     }
 
-    /// Position of a bump in its lattice cell, [0, 1)³, from the bits of a SplitMix64 hash (Steele et al. 2014) of the cell.
+    /// Position of a bump in its lattice cell, [0, 1)³, from the bits of a SplitMix64 hash (Steele et al. 2014) of
+    /// the cell.
     fn jitter(&self, corner: &Vec3) -> Vec3 {
         let mut state = self.seed;
         for axis in 0..3 {

@@ -24,8 +24,8 @@ const MAX_RAY_STEPS: usize = 512;
 impl Shape {
     /// First-order signed distance at `p_o`, m; negative inside.
     ///
-    /// Its sign is right and it vanishes exactly on the surface. Away from the surface it is cheaper and less accurate than
-    /// [`Shape::distance_and_normal`].
+    /// Its sign is right and it vanishes exactly on the surface. Away from the surface it is cheaper and less
+    /// accurate than [`Shape::distance_and_normal`].
     pub fn distance(&self, p_o: &Vec3) -> f64 {
         self.first_order(p_o).distance
     }
@@ -51,8 +51,8 @@ impl Shape {
         (distance, normal)
     }
 
-    /// Distance (m) along the unit vector `direction_o` from `origin_o` to the first surface point, if it is at most `max`
-    /// m. A ray that starts inside hits at 0.
+    /// Distance (m) along the unit vector `direction_o` from `origin_o` to the first surface point, if it is at most
+    /// `max` m. A ray that starts inside hits at 0.
     ///
     /// Sphere tracing (Hart, Sphere tracing, 1996); exact for meshes.
     pub fn ray(&self, origin_o: &Vec3, direction_o: &Vec3, max: f64) -> Option<f64> {

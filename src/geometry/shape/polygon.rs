@@ -32,8 +32,8 @@ impl Polygon {
     /// A profile of revolution from its corners (r, z), m, in either direction. The last corner is joined to the first.
     ///
     /// # Errors
-    /// If there are fewer than three corners, a coordinate is not finite, r < 0, neighbouring corners coincide, edges cross,
-    /// or the area is 0.
+    /// If there are fewer than three corners, a coordinate is not finite, r < 0, neighbouring corners coincide, edges
+    /// cross, or the area is 0.
     pub fn revolved(points: Vec<[f64; 2]>) -> Result<Self, ShapeError> {
         if let Some(index) =
             points.iter().position(|p| !(p[0] >= 0.0 && p[0].is_finite() && p[1].is_finite()))

@@ -12,10 +12,11 @@ use crate::geometry::{
 
 /// A solid, defined by its signed distance in the object frame (m; negative inside).
 ///
-/// Shapes are built by chaining (`Shape::cuboid(size).rounded(r).translated(v)`) and share their parts. The constructors
-/// accept any numbers; [`Shape::validate`] checks the tree.
+/// Shapes are built by chaining (`Shape::cuboid(size).rounded(r).translated(v)`) and share their parts. The
+/// constructors accept any numbers; [`Shape::validate`] checks the tree.
 ///
-/// Fingerprints of assets hash the `Debug` text of shapes, so the names of variants and fields are part of file formats.
+/// Fingerprints of assets hash the `Debug` text of shapes, so the names of variants and fields are part of file
+/// formats.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
     /// A box centred on the origin.
@@ -164,8 +165,8 @@ impl Shape {
         Self::Box { half: 0.5 * size }
     }
 
-    /// A wedge inscribed in a box with edge lengths `size` (m): a triangular prism along y with its apex at x = `apex` (in
-    /// half widths, −1..=1).
+    /// A wedge inscribed in a box with edge lengths `size` (m): a triangular prism along y with its apex at x =
+    /// `apex` (in half widths, −1..=1).
     ///
     /// # Errors
     /// If the triangle has no area or a number is not finite.
@@ -295,15 +296,16 @@ pub(super) fn to_local(pose: &Pose, p_o: &Vec3) -> Vec3 {
     pose.rotation.inverse_transform_vector(&(p_o - pose.translation.vector))
 }
 
-/// Size of the tree of a shape, which bounds the cost of traversals and queries. Shared parts count every time they occur.
+/// Size of the tree of a shape, which bounds the cost of traversals and queries. Shared parts count every time they
+/// occur.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TreeSize {
     /// Number of nodes, including the root.
     pub nodes: usize,
     /// Depth, including the root.
     pub depth: usize,
-    /// Approximate number of primitives evaluated per exact distance. Nested combinations multiply: each step of the outer
-    /// search repeats the inner one.
+    /// Approximate number of primitives evaluated per exact distance. Nested combinations multiply: each step of the
+    /// outer search repeats the inner one.
     pub work: f64,
 }
 

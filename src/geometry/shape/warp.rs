@@ -1,5 +1,5 @@
-//! Coordinate axes, and the inverse maps of warps along them: from a point of the warped shape to the point of the straight
-//! one, with the Jacobian that transforms gradients.
+//! Coordinate axes, and the inverse maps of warps along them: from a point of the warped shape to the point of the
+//! straight one, with the Jacobian that transforms gradients.
 
 use crate::geometry::{Mat3, Vec3};
 
@@ -41,8 +41,8 @@ pub(super) fn untwist(p: &Vec3, axis: Axis, rate: f64) -> (Vec3, Mat3) {
     (straight, jacobian)
 }
 
-/// Point of the straight shape, and the Jacobian ∂(straight)/∂(bent), of a bend. The coordinate `along` becomes the angle
-/// about the centre of the arc times its radius, `towards` the remaining distance to the arc.
+/// Point of the straight shape, and the Jacobian ∂(straight)/∂(bent), of a bend. The coordinate `along` becomes the
+/// angle about the centre of the arc times its radius, `towards` the remaining distance to the arc.
 pub(super) fn unbend(p: &Vec3, along: Axis, towards: Axis, curvature: f64) -> (Vec3, Mat3) {
     if curvature.abs() < 1e-9 {
         return (*p, Mat3::identity());

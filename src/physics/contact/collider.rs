@@ -15,8 +15,8 @@ use crate::{
 
 /// The surface of a solid in its own frame, m. [`Shape`] implements it.
 pub trait ContactSurface: Debug + Send + Sync {
-    /// Signed distance, outward normal and coverage for a square sample of edge `spacing` (m) at `p` with outward normal
-    /// `facing`.
+    /// Signed distance, outward normal and coverage for a square sample of edge `spacing` (m) at `p` with outward
+    /// normal `facing`.
     fn contact(&self, p: &Vec3, facing: &Vec3, spacing: f64) -> Contact;
     /// A box around the solid.
     fn bounds(&self) -> Aabb;

@@ -1,9 +1,10 @@
 //! Contact of a soft body's samples with another soft body: the signed distance field of a deformed surface.
 //!
-//! The field is known at rest only. So a point of space is mapped back into the undeformed voxel grid (the inverse of the
-//! trilinear map, by Newton's method, walking from voxel to voxel), the field is evaluated at that rest position, and gap
-//! and normal are pushed forward with the deformation gradient F there: n ∝ F⁻ᵀ n₀ and φ = φ₀ / |F⁻ᵀ n₀| (normals and level sets under a map: Bonet & Wood,
-//! Nonlinear Continuum Mechanics for Finite Element Analysis, 2008, §4.10).
+//! The field is known at rest only. So a point of space is mapped back into the undeformed voxel grid (the inverse of
+//! the trilinear map, by Newton's method, walking from voxel to voxel), the field is evaluated at that rest position,
+//! and gap and normal are pushed forward with the deformation gradient F there: n ∝ F⁻ᵀ n₀ and φ = φ₀ / |F⁻ᵀ n₀|
+//! (normals and level sets under a map: Bonet & Wood, Nonlinear Continuum Mechanics for Finite Element Analysis,
+//! 2008, §4.10).
 
 use super::{collider::ContactSurface, detect::DetectionLimits};
 use crate::{
@@ -60,8 +61,8 @@ impl<'a> SoftField<'a> {
         Self { body, surface, centre_w: mean(&body.x), centre_o: mean(&mesh.nodes) }
     }
 
-    /// Contact of a square sample of edge `spacing` (m) at `p` with outward normal `facing` (world). `None` if the surface
-    /// faces the same way, or does not cover the sample.
+    /// Contact of a square sample of edge `spacing` (m) at `p` with outward normal `facing` (world). `None` if the
+    /// surface faces the same way, or does not cover the sample.
     pub fn contact(&self, p: &Vec3, facing: &Vec3, spacing: f64) -> Option<FieldContact> {
         let point = self.map_to_rest(p)?;
         let facing_o = point.inverse_gradient.try_inverse()?.tr_mul(facing).try_normalize(0.0)?;
@@ -80,8 +81,8 @@ impl<'a> SoftField<'a> {
         })
     }
 
-    /// The element and local coordinates (within [`MAX_EXTRAPOLATION`]) of a world point, and its rest position, which is
-    /// continued linearly beyond.
+    /// The element and local coordinates (within [`MAX_EXTRAPOLATION`]) of a world point, and its rest position,
+    /// which is continued linearly beyond.
     fn map_to_rest(&self, p: &Vec3) -> Option<RestPoint> {
         let mesh = &self.body.model.mesh;
         let guess = self.body.frame.tr_mul(&(p - self.centre_w)) + self.centre_o;
@@ -101,7 +102,8 @@ impl<'a> SoftField<'a> {
         None
     }
 
-    /// Local coordinates of `p` in an element, clamped to [`MAX_EXTRAPOLATION`]; the linear step that remains; and ∂x/∂ξ.
+    /// Local coordinates of `p` in an element, clamped to [`MAX_EXTRAPOLATION`]; the linear step that remains; and
+    /// ∂x/∂ξ.
     fn invert(&self, element: u32, p: &Vec3) -> Option<(Vec3, Vec3, Mat3)> {
         let nodes = &self.body.model.mesh.elements[element as usize];
         let corners: [Vec3; 8] = nodes.map(|node| self.body.x[node as usize]);
@@ -190,8 +192,8 @@ pub fn may_touch(a: &FemState, b: &FemState, limits: DetectionLimits) -> bool {
 
 /// Collects the samples of `body` that press on `field`, or will within the step, into `out`.
 ///
-/// Calls `near` with the group and element of every sample within reach of the field, so that their nodes are retained before
-/// the contact begins.
+/// Calls `near` with the group and element of every sample within reach of the field, so that their nodes are
+/// retained before the contact begins.
 pub fn detect_soft(
     body: &FemState,
     field: &SoftField,

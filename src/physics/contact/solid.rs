@@ -1,7 +1,8 @@
 //! Collision geometry of a collider: how it meets other colliders.
 //!
-//! A hard shape is either composed of convex primitives, whose manifolds are exact, or general: then its surface features are
-//! tested in the other's distance field. A compliant skin (the gel of a tactile sensor) meets hard shapes at its samples.
+//! A hard shape is either composed of convex primitives, whose manifolds are exact, or general: then its surface
+//! features are tested in the other's distance field. A compliant skin (the gel of a tactile sensor) meets hard
+//! shapes at its samples.
 
 use std::sync::OnceLock;
 
@@ -41,7 +42,8 @@ pub struct GelSample {
     pub area: f64,
 }
 
-/// The pair of primitives that a contact point belongs to, or, for general shapes, the body whose surface feature it is.
+/// The pair of primitives that a contact point belongs to, or, for general shapes, the body whose surface feature it
+/// is.
 pub type PairId = u32;
 
 /// A skin sample with a larger cosine between its normal and the shape's has the shape behind it.
@@ -80,8 +82,8 @@ impl CollisionGeometry {
         }
     }
 
-    /// Depth of the deepest point of two hard shapes under the other's surface, m; 0 if they do not overlap. Compliant skins
-    /// are ignored.
+    /// Depth of the deepest point of two hard shapes under the other's surface, m; 0 if they do not overlap.
+    /// Compliant skins are ignored.
     pub fn depth(&self, pose: &Pose, other: &Self, other_pose: &Pose) -> f64 {
         let (Self::Hard(own), Self::Hard(other)) = (self, other) else { return 0.0 };
         let mut found = Vec::new();
@@ -91,7 +93,8 @@ impl CollisionGeometry {
 }
 
 impl HardShape {
-    /// Depth of the deepest surface seed of either shape in the other's field, m; 0 for primitives, whose manifold is exact.
+    /// Depth of the deepest surface seed of either shape in the other's field, m; 0 for primitives, whose manifold is
+    /// exact.
     fn seed_depth(&self, pose: &Pose, other: &Self, other_pose: &Pose) -> f64 {
         if self.primitives.is_some() && other.primitives.is_some() {
             return 0.0;
@@ -133,8 +136,8 @@ impl HardShape {
         }
         let own = self.in_field_of(pose, other, other_pose);
         let theirs = other.in_field_of(other_pose, self, pose);
-        // Smooth parts carry only where neither surface has features that do, so features of both come first. Normals are
-        // flipped in between, so that the points found so far agree with those being added.
+        // Smooth parts carry only where neither surface has features that do, so features of both come first. Normals
+        // are flipped in between, so that the points found so far agree with those being added.
         own.fixed(margin, &mut found);
         let first = found.len();
         flip_normals(&mut found);
@@ -156,9 +159,9 @@ impl HardShape {
 
     /// Contact points of a compliant skin at `gel_pose` with this shape whose gap is below `margin` (m).
     ///
-    /// A bed of springs, one at each sample, compressed by the depth of the sample in the shape (a Winkler foundation: Johnson,
-    /// Contact Mechanics, 1985, 4.3). A sample at a sharp edge of the shape counts with its covered share. Normals point from
-    /// the skin to the shape.
+    /// A bed of springs, one at each sample, compressed by the depth of the sample in the shape (a Winkler
+    /// foundation: Johnson, Contact Mechanics, 1985, 4.3). A sample at a sharp edge of the shape counts with its
+    /// covered share. Normals point from the skin to the shape.
     fn meet_gel(
         &self,
         pose: &Pose,

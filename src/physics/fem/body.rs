@@ -74,8 +74,8 @@ pub struct FemModel {
     is_checked: Vec<bool>,
 }
 
-/// Memory of the factor of a body of n nodes over n^(4/3), bytes: measured on cubes of 6 to 24 voxels per edge. The exponent
-/// is that of the fill of nested dissection.
+/// Memory of the factor of a body of n nodes over n^(4/3), bytes: measured on cubes of 6 to 24 voxels per edge. The
+/// exponent is that of the fill of nested dissection.
 const FACTOR_BYTES: f64 = 2048.0;
 
 impl FemModel {
@@ -133,8 +133,8 @@ impl FemModel {
         self.mass.iter().sum()
     }
 
-    /// Normal contact stiffness of the surface per area, Pa/m: `min(1e9, 30 E/h)` with the voxel edge h, so stiff that the
-    /// deformation is that of the voxels.
+    /// Normal contact stiffness of the surface per area, Pa/m: `min(1e9, 30 E/h)` with the voxel edge h, so stiff
+    /// that the deformation is that of the voxels.
     pub fn contact_modulus(&self) -> f64 {
         (30.0 * self.material.youngs_pa / self.mesh.edge).min(1e9)
     }

@@ -1,9 +1,9 @@
 //! Rest stiffness of one voxel: a trilinear hexahedron with mean dilatation (B-bar).
 //!
-//! B-bar: Hughes, *The Finite Element Method* (1987), §4.5: the volumetric part of the strain operator is replaced by its
-//! mean over the element, which removes volumetric locking. A full voxel is integrated with 2×2×2 Gauss points; a
-//! partly filled one at the centres of its filled sub-cells, plus [`GHOST`] of the full stiffness, so that an almost empty
-//! voxel stays regular.
+//! B-bar: Hughes, *The Finite Element Method* (1987), §4.5: the volumetric part of the strain operator is replaced by
+//! its mean over the element, which removes volumetric locking. A full voxel is integrated with 2×2×2 Gauss points; a
+//! partly filled one at the centres of its filled sub-cells, plus [`GHOST`] of the full stiffness, so that an almost
+//! empty voxel stays regular.
 
 use crate::geometry::{
     Vec3, hex8,

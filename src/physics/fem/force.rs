@@ -18,10 +18,10 @@ pub struct Elastic {
 
 /// Force and energy of an element at world corner positions `x`.
 ///
-/// `rest` are the undeformed corners (m), `g` the mean shape gradients (1/m), `k0` the rest stiffness (N/m, column-major
-/// 24×24), and `last` is an estimate of the rotation. The force is `f_a = −R (p_a − q × g_a)` with `p = K₀ (y − X)`,
-/// `m = Σ y_a × p_a`, `S = Rᵀ F`, `q = (tr S I − S)⁻¹ m`: the second term is due to the change of the rotation itself.
-/// Without it the force is not the derivative of the energy and has a spurious moment.
+/// `rest` are the undeformed corners (m), `g` the mean shape gradients (1/m), `k0` the rest stiffness (N/m,
+/// column-major 24×24), and `last` is an estimate of the rotation. The force is `f_a = −R (p_a − q × g_a)` with `p =
+/// K₀ (y − X)`, `m = Σ y_a × p_a`, `S = Rᵀ F`, `q = (tr S I − S)⁻¹ m`: the second term is due to the change of the
+/// rotation itself. Without it the force is not the derivative of the energy and has a spurious moment.
 pub fn elastic(x: &Corners, rest: &Corners, g: &[Vec3; 8], k0: &[f64; 576], last: Mat3) -> Elastic {
     let f = deformation_gradient(x, g);
     let r = polar(&f, last);
@@ -61,8 +61,8 @@ fn multiply(k: &[f64; 576], u: &[f64; 24]) -> [f64; 24] {
 
 /// Smallest det F over the 2×2×2 Gauss points of a voxel of edge `h` (m); ≤ 0 means inverted.
 ///
-/// A column of F is the slope along one axis: the mean of the four edges in that direction, weighted by the position of the
-/// point across them. So it has only four values per element.
+/// A column of F is the slope along one axis: the mean of the four edges in that direction, weighted by the position
+/// of the point across them. So it has only four values per element.
 pub fn min_det(x: &Corners, h: f64) -> f64 {
     let near = 0.5 + 0.5 / 3f64.sqrt();
     // Columns along axis 0, 1, 2, each at the four Gauss positions on the other two axes (the lower axis first).

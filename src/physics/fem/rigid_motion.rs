@@ -1,10 +1,11 @@
 //! Time integration of a soft body, with the rigid part of its motion taken along the arc.
 //!
-//! Moving every node along a straight line stretches a body that turns by θ per step by θ²/2, which costs far more energy than
-//! the rotation has: a fifth of it already at 4 rad/s and 60 Hz. So the velocities are split into those of a rigid body
-//! (Goldstein, *Classical Mechanics*, 1980, ch. 5: the angular velocity with the body's angular momentum) and the rest, and
-//! the rigid part is integrated as for free rigid bodies. Linear and angular momentum are conserved exactly. Within a step the
-//! body is not strained by its own rotation (centrifugal strain ρω²r²/E: 5e-5 at 3 rad/s and 10 kPa).
+//! Moving every node along a straight line stretches a body that turns by θ per step by θ²/2, which costs far more
+//! energy than the rotation has: a fifth of it already at 4 rad/s and 60 Hz. So the velocities are split into those
+//! of a rigid body (Goldstein, *Classical Mechanics*, 1980, ch. 5: the angular velocity with the body's angular
+//! momentum) and the rest, and the rigid part is integrated as for free rigid bodies. Linear and angular momentum are
+//! conserved exactly. Within a step the body is not strained by its own rotation (centrifugal strain ρω²r²/E: 5e-5 at
+//! 3 rad/s and 10 kPa).
 
 use super::FemState;
 use crate::{
@@ -15,7 +16,8 @@ use crate::{
 /// Rotation per step below which nodes move straight, rad: the stretch is then below the rounding of positions.
 const MIN_ROTATION: f64 = 1e-7;
 
-/// Advances positions and velocities by `dt` (s); the velocities are those at the end of the step, at the old positions.
+/// Advances positions and velocities by `dt` (s); the velocities are those at the end of the step, at the old
+/// positions.
 pub fn advance(body: &mut FemState, dt: f64) {
     let (centre, drift) = (body.centre(), body.velocity());
     let Spin { momentum, inertia } = Spin::new(body, &centre, &drift);

@@ -7,9 +7,9 @@ const MAX_NEWTON: usize = 8;
 
 /// Rotation part of `f`, starting from an estimate `r`.
 ///
-/// Maximises `tr(Rᵀ F)` by Newton's method on SO(3): with `S = Rᵀ F` the step is `ω = (tr S I − sym S)⁻¹ axial(S − Sᵀ)`.
-/// Near the estimate it converges quadratically, and through an inversion it stays on its branch instead of flipping. Where
-/// the Hessian is not positive definite, the proper polar factor is computed by SVD.
+/// Maximises `tr(Rᵀ F)` by Newton's method on SO(3): with `S = Rᵀ F` the step is `ω = (tr S I − sym S)⁻¹ axial(S −
+/// Sᵀ)`. Near the estimate it converges quadratically, and through an inversion it stays on its branch instead of
+/// flipping. Where the Hessian is not positive definite, the proper polar factor is computed by SVD.
 pub fn polar(f: &Mat3, mut r: Mat3) -> Mat3 {
     for _ in 0..MAX_NEWTON {
         let s = r.tr_mul(f);

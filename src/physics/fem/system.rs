@@ -1,10 +1,10 @@
 //! The velocity system of a soft body, `A = (1 + α dt) M + dt (dt + β) K`, reduced to the nodes in contact.
 //!
-//! `K = Σ R K₀ Rᵀ` is assembled and factored in the body's co-rotating frame, so a body that is carried or rotates without
-//! changing shape keeps its factor. It is factored again when an element's rotation has changed by `STALE_ROTATION`
-//! relative to the body, or when a new node comes into contact. The frame itself follows the body in steps of
-//! `STALE_FRAME`, so that the matrix of a body that is merely held is not even rotated. A slightly old tangent changes no
-//! equilibrium: the elastic force is always evaluated exactly, and `A` only affects the transient.
+//! `K = Σ R K₀ Rᵀ` is assembled and factored in the body's co-rotating frame, so a body that is carried or rotates
+//! without changing shape keeps its factor. It is factored again when an element's rotation has changed by
+//! `STALE_ROTATION` relative to the body, or when a new node comes into contact. The frame itself follows the body in
+//! steps of `STALE_FRAME`, so that the matrix of a body that is merely held is not even rotated. A slightly old
+//! tangent changes no equilibrium: the elastic force is always evaluated exactly, and `A` only affects the transient.
 
 use super::body::{FemModel, FemState};
 use crate::{
@@ -61,8 +61,8 @@ struct Blocks {
     slot: Vec<Vec<u32>>,
     diagonal: Vec<[f64; 9]>,
     off: Vec<[f64; 9]>,
-    /// Block of each of the 36 corner pairs of each element: an index into `off`, with [`TRANSPOSED`] set if that stores the
-    /// transpose, or the node for a diagonal pair.
+    /// Block of each of the 36 corner pairs of each element: an index into `off`, with [`TRANSPOSED`] set if that
+    /// stores the transpose, or the node for a diagonal pair.
     pairs: Vec<[u32; 36]>,
 }
 
@@ -259,7 +259,8 @@ impl VelocitySystem {
         true
     }
 
-    /// Takes the reduced matrix of the retained nodes: their Schur complement, column-major, lower triangle, world frame.
+    /// Takes the reduced matrix of the retained nodes: their Schur complement, column-major, lower triangle, world
+    /// frame.
     ///
     /// Returning it by [`VelocitySystem::return_matrix`] saves its computation in the next step.
     pub fn take_matrix(&mut self) -> Vec<f64> {

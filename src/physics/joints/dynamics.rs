@@ -1,6 +1,6 @@
 //! Inertia and bias forces of a joint tree, by the composite-rigid-body and recursive Newton–Euler algorithms
-//! (Featherstone, Rigid Body Dynamics Algorithms, 2008, chapters 5 and 6). All spatial vectors are taken at the world origin,
-//! so that no transforms between links are needed.
+//! (Featherstone, Rigid Body Dynamics Algorithms, 2008, chapters 5 and 6). All spatial vectors are taken at the world
+//! origin, so that no transforms between links are needed.
 
 use nalgebra::{DMatrix, DVector};
 

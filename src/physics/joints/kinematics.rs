@@ -63,8 +63,8 @@ pub fn velocities_into(tree: &JointTree, poses: &[Pose], v: &[f64], out: &mut Ve
     }
 }
 
-/// The 6×n Jacobian from joint speeds to the velocity of a link: three rows of the linear velocity of its origin, three of the
-/// angular velocity, world.
+/// The 6×n Jacobian from joint speeds to the velocity of a link: three rows of the linear velocity of its origin,
+/// three of the angular velocity, world.
 pub fn jacobian(tree: &JointTree, poses: &[Pose], link: usize) -> DMatrix<f64> {
     let mut out = DMatrix::zeros(6, tree.dofs());
     jacobian_into(tree, poses, link, &mut out);

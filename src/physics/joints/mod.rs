@@ -1,9 +1,9 @@
 //! Articulated dynamics: trees of rigid links connected by joints of one degree of freedom.
 //!
-//! The equation of motion is `M(q) v̇ + bias(q, v) = τ + Σ Jᵀ f`: [`mass_matrix`] gives `M`, [`bias`] the
-//! Coriolis, centrifugal and gravity terms, [`jacobian`] and [`point_jacobian`] the `J` of forces on a link.
-//! Everything is computed in world coordinates from the link poses of [`forward`], so that a step needs the kinematics only
-//! once. Each function has an `_into` variant that writes to a buffer of the caller.
+//! The equation of motion is `M(q) v̇ + bias(q, v) = τ + Σ Jᵀ f`: [`mass_matrix`] gives `M`, [`bias`] the Coriolis,
+//! centrifugal and gravity terms, [`jacobian`] and [`point_jacobian`] the `J` of forces on a link. Everything is
+//! computed in world coordinates from the link poses of [`forward`], so that a step needs the kinematics only once.
+//! Each function has an `_into` variant that writes to a buffer of the caller.
 
 mod dynamics;
 mod kinematics;

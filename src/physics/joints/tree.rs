@@ -57,9 +57,9 @@ pub struct Link {
 }
 
 impl Link {
-    /// Adds a rigidly attached body of `mass` (kg), with the centre of mass `com` (m) and the inertia about it (kg m²) given in
-    /// `frame`, which is a pose in the link frame. By the parallel-axis theorem (e.g. Goldstein, Classical Mechanics, 1980,
-    /// §5-3).
+    /// Adds a rigidly attached body of `mass` (kg), with the centre of mass `com` (m) and the inertia about it (kg
+    /// m²) given in `frame`, which is a pose in the link frame. By the parallel-axis theorem (e.g. Goldstein,
+    /// Classical Mechanics, 1980, §5-3).
     pub fn weld(&mut self, mass: f64, com: &Vec3, inertia: &Mat3, frame: &Pose) {
         let turn = frame.rotation.to_rotation_matrix();
         let com = frame.transform_point(&(*com).into()).coords;
@@ -126,8 +126,9 @@ impl JointTree {
     }
 }
 
-/// The reason why an inertia tensor is not physical, if it is not. Its principal moments must be positive, and none may exceed
-/// the sum of the other two (Traversaro et al., Identification of fully physical consistent inertial parameters, IROS 2016).
+/// The reason why an inertia tensor is not physical, if it is not. Its principal moments must be positive, and none
+/// may exceed the sum of the other two (Traversaro et al., Identification of fully physical consistent inertial
+/// parameters, IROS 2016).
 fn inertia_fault(inertia: &Mat3) -> Option<String> {
     if !(inertia - inertia.transpose()).iter().all(|gap| gap.abs() <= 1e-12 * inertia.norm()) {
         return Some("inertia tensor is not symmetric".into());

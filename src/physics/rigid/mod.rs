@@ -1,8 +1,8 @@
 //! Free rigid bodies: state, world inertia, torque-free motion, energy and momentum.
 //!
-//! A step of the world computes the torque-free rotation by [`free_spin`], solves for the velocities at the end of the step
-//! (without torques, the angular velocity is [`FreeSpin::end_w`]), and then calls [`advance`]. In free flight this conserves the
-//! vector of angular momentum and the kinetic energy to rounding, at any step size.
+//! A step of the world computes the torque-free rotation by [`free_spin`], solves for the velocities at the end of
+//! the step (without torques, the angular velocity is [`FreeSpin::end_w`]), and then calls [`advance`]. In free
+//! flight this conserves the vector of angular momentum and the kinetic energy to rounding, at any step size.
 
 use crate::geometry::{Mat3, Pose, Quat, Vec3};
 
@@ -121,9 +121,9 @@ pub struct FreeSpin {
 /// Torque-free rotation over `dt` seconds.
 ///
 /// The implicit midpoint rule on Euler's equations in the body frame, I(ω₁−ω₀) = −dt ω̄×Iω̄, with the attitude turned
-/// by the Cayley map of dt ω̄. The first conserves every quadratic invariant, hence energy. With the second, the *vector*
-/// of angular momentum is conserved too, because L₁ = cay(−dt ω̄) L₀ (Austin, Krishnaprasad & Wang, "Almost Poisson
-/// integration of rigid body systems", J. Comput. Phys. 107, 1993).
+/// by the Cayley map of dt ω̄. The first conserves every quadratic invariant, hence energy. With the second, the
+/// *vector* of angular momentum is conserved too, because L₁ = cay(−dt ω̄) L₀ (Austin, Krishnaprasad & Wang, "Almost
+/// Poisson integration of rigid body systems", J. Comput. Phys. 107, 1993).
 pub fn free_spin(body: &RigidState, dt: f64) -> FreeSpin {
     let start = body.pose_w.rotation;
     let mut omega = start.inverse() * body.w;

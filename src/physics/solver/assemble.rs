@@ -1,7 +1,7 @@
 //! Kinematics of contact points: maps between velocities of blocks, of endpoints and of points, and their transposes.
 //!
-//! An endpoint has *local coordinates*: three velocities per node, or linear and angular velocity of a frame. Points are
-//! linear in them, so gradient and Hessian of a cluster are summed in local coordinates first and scattered once.
+//! An endpoint has *local coordinates*: three velocities per node, or linear and angular velocity of a frame. Points
+//! are linear in them, so gradient and Hessian of a cluster are summed in local coordinates first and scattered once.
 
 use super::problem::{ContactPoint, ContactProblem, Endpoint};
 use crate::geometry::{Mat3, Vec3};

@@ -1,10 +1,10 @@
 //! The step of one iteration: the minimum of a model in which everything but the scalar constraints is quadratic.
 //!
-//! Drives at their effort limit, stops and dry joint friction are far stiffer than what they act on, so a joint that begins
-//! to move makes a kept factor of the whole Hessian useless. They act on a few velocities only, which are last in the island
-//! (the *constrained block*). So the factor excludes them, and each step is solved with the scalar constraints in the state
-//! that they will have at its end: a proximal Newton method (Lee, Sun & Saunders 2014) in which the scalar constraints are
-//! the part that is not linearised.
+//! Drives at their effort limit, stops and dry joint friction are far stiffer than what they act on, so a joint that
+//! begins to move makes a kept factor of the whole Hessian useless. They act on a few velocities only, which are last
+//! in the island (the *constrained block*). So the factor excludes them, and each step is solved with the scalar
+//! constraints in the state that they will have at its end: a proximal Newton method (Lee, Sun & Saunders 2014) in
+//! which the scalar constraints are the part that is not linearised.
 
 use super::{
     island::Island, law::LinearSegment, newton::Solver, options::MAX_SEGMENT_GUESSES,

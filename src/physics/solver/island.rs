@@ -90,8 +90,8 @@ pub(super) struct FactorCache {
 impl FactorCache {
     /// Selects the factor of an island as the current one. True if it is worth using.
     ///
-    /// A factor whose excess steps cost as much as a new one is discarded. So the total cost is never more than twice the
-    /// least possible, however slowly single passes converge with it.
+    /// A factor whose excess steps cost as much as a new one is discarded. So the total cost is never more than twice
+    /// the least possible, however slowly single passes converge with it.
     pub(super) fn select(&mut self, problem: &ContactProblem, island: &Island) -> bool {
         let found = self.entries.iter().position(|entry| entry.is_of(problem, island));
         if let Some(found) = found {
@@ -133,8 +133,8 @@ impl FactorCache {
         entry.excess_steps += steps.saturating_sub(first.min(UNAVOIDABLE_STEPS));
     }
 
-    /// Solves in place with the current factor, its corrections, and `stiffness` added to the diagonal of the constrained
-    /// block.
+    /// Solves in place with the current factor, its corrections, and `stiffness` added to the diagonal of the
+    /// constrained block.
     pub(super) fn solve(&mut self, island: &Island, stiffness: &[f64], b: &mut [f64]) {
         let (n, t) = (island.size, stiffness.len());
         let (head, constrained) = (n - t, &mut self.constrained);

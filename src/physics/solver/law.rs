@@ -1,4 +1,5 @@
-//! Constitutive laws: impulse, cost and curvature of contact points and scalar constraints as functions of their velocity.
+//! Constitutive laws: impulse, cost and curvature of contact points and scalar constraints as functions of their
+//! velocity.
 
 use super::problem::ContactPoint;
 use crate::geometry::{Mat3, Vec3};
@@ -34,8 +35,8 @@ impl ContactLaw {
         Self { dt, dt_plus_tau: dt + dissipation_time, inverse: 1.0 / (dt + dissipation_time) }
     }
 
-    /// Response of a point at relative velocity `v`; `None` if the point is separated and carried no normal impulse in the
-    /// previous pass.
+    /// Response of a point at relative velocity `v`; `None` if the point is separated and carried no normal impulse
+    /// in the previous pass.
     ///
     /// Normal: the spring at the end of the step with dissipation, `γ = dt k (−φ − (dt + τ) v_n)₊`. Tangent: with
     /// `z = s + (dt + τ) v_t` the spring `−dt k_t z`, cut off at the lagged bound `μ γ_n` (a Huber cost in `z`).

@@ -36,8 +36,8 @@ pub struct SolverFailure {
 
 /// The solver: buffers, and factors kept from one problem to the next.
 ///
-/// A clone continues identically. Results depend on the sequence of problems, because kept factors influence the path of
-/// convergence within the tolerance.
+/// A clone continues identically. Results depend on the sequence of problems, because kept factors influence the path
+/// of convergence within the tolerance.
 #[derive(Clone, Debug, Default)]
 pub struct Solver {
     /// First index of each block in the vectors of its island.
@@ -83,11 +83,12 @@ impl NewtonProgress {
 }
 
 impl Solver {
-    /// Solves the problem in place: writes velocities into the blocks, impulses into points and forces into constraints.
+    /// Solves the problem in place: writes velocities into the blocks, impulses into points and forces into
+    /// constraints.
     ///
     /// # Errors
-    /// An island did not converge, which happens if a block is not positive definite or a value is not finite. The results
-    /// are void then.
+    /// An island did not converge, which happens if a block is not positive definite or a value is not finite. The
+    /// results are void then.
     pub fn solve(&mut self, problem: &mut ContactProblem) -> Result<SolverStats, SolverFailure> {
         let mut stats = SolverStats::default();
         self.factorizations = 0;
@@ -150,8 +151,8 @@ impl Solver {
 
     /// Newton's method for one pass; returns the number of steps.
     ///
-    /// The cost is piecewise quadratic and changes little from step to step, so an existing factor of its Hessian is used
-    /// for as long as that is cheaper than a new one. The gradient is always exact.
+    /// The cost is piecewise quadratic and changes little from step to step, so an existing factor of its Hessian is
+    /// used for as long as that is cheaper than a new one. The gradient is always exact.
     fn newton(&mut self, problem: &ContactProblem, island: &Island) -> Result<u32, SolverFailure> {
         let mut cost = self.update_gradient(problem, island);
         let mut ratio = self.residual_ratio(problem, island);
@@ -202,7 +203,8 @@ impl Solver {
         cost
     }
 
-    /// Factors the Hessian at the current velocities down to the constrained block. False if it is not positive definite.
+    /// Factors the Hessian at the current velocities down to the constrained block. False if it is not positive
+    /// definite.
     fn refactor(&mut self, problem: &ContactProblem, island: &Island) -> bool {
         let mut hessian = self.cache.take(island);
         let v = std::mem::take(&mut self.v);

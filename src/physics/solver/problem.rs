@@ -5,9 +5,9 @@ use crate::geometry::Vec3;
 
 /// A block of generalised velocities with its own momentum equation `A v = r` (a *clique* of Drake's SAP).
 ///
-/// `A` is the velocity system of one body: for a soft body the Schur complement on its retained nodes, for a rigid body its
-/// 6×6 inertia, for an articulation its mass matrix. It must be symmetric positive definite; the solver does not check this,
-/// but fails to converge otherwise.
+/// `A` is the velocity system of one body: for a soft body the Schur complement on its retained nodes, for a rigid
+/// body its 6×6 inertia, for an articulation its mass matrix. It must be symmetric positive definite; the solver does
+/// not check this, but fails to converge otherwise.
 #[derive(Clone, Debug, Default)]
 pub struct VelocityBlock {
     /// Number of velocities.
@@ -18,8 +18,8 @@ pub struct VelocityBlock {
     pub rhs: Vec<f64>,
     /// Initial guess, and the solution afterwards; `dim` velocities.
     pub v: Vec<f64>,
-    /// Meaning of the velocities: blocks of equal identity and size in two problems describe the same coordinates, and a
-    /// factored Hessian is kept from one to the other.
+    /// Meaning of the velocities: blocks of equal identity and size in two problems describe the same coordinates,
+    /// and a factored Hessian is kept from one to the other.
     pub identity: u64,
 }
 
@@ -88,8 +88,8 @@ pub struct ContactPoint {
     pub offset: Vec3,
     /// Friction coefficient of this step.
     pub mu: f64,
-    /// Normal impulse of the previous pass, N s; the friction bound is `mu` times it. At the start of a solve that of the
-    /// last step.
+    /// Normal impulse of the previous pass, N s; the friction bound is `mu` times it. At the start of a solve that of
+    /// the last step.
     pub previous_normal_impulse: f64,
     /// Result: normal impulse, N s.
     pub normal_impulse: f64,

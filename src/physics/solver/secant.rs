@@ -1,7 +1,7 @@
 //! Quasi-Newton correction of a kept factor from the last steps.
 //!
-//! Contacts that have begun to slip since the factor was computed change the Hessian by a matrix of low rank, which a few
-//! secant pairs capture: limited-memory BFGS (Nocedal 1980) with the factor in the place of the initial matrix.
+//! Contacts that have begun to slip since the factor was computed change the Hessian by a matrix of low rank, which a
+//! few secant pairs capture: limited-memory BFGS (Nocedal 1980) with the factor in the place of the initial matrix.
 
 use super::options::MAX_SECANT_PAIRS;
 use crate::physics::sparse::dense::dot;
@@ -34,8 +34,8 @@ impl SecantPairs {
         self.used = 0;
     }
 
-    /// Adds the pair of a step, excluding the gradient changes `others` (index, amount), which come from constraints that
-    /// are not in the factor.
+    /// Adds the pair of a step, excluding the gradient changes `others` (index, amount), which come from constraints
+    /// that are not in the factor.
     pub(super) fn push(
         &mut self,
         before: SecantState,

@@ -1,7 +1,7 @@
 //! Dense Cholesky kernels on column-major storage, for the fronts of the sparse factor and for the contact solve.
 //!
-//! Products are added by `mul_add`, which is exactly rounded on every machine, and sums have a fixed order, so the results
-//! are the same bits everywhere.
+//! Products are added by `mul_add`, which is exactly rounded on every machine, and sums have a fixed order, so the
+//! results are the same bits everywhere.
 
 use std::ops::Range;
 
@@ -18,8 +18,8 @@ const WIDE: usize = 4;
 
 /// Factors the first `k` columns of the `n × n` matrix `a` (column-major, lower triangle) in place.
 ///
-/// Afterwards those columns hold `L` and the trailing block its Schur complement. Returns false if a pivot is not positive;
-/// `a` is void then. The upper triangle is neither read nor preserved.
+/// Afterwards those columns hold `L` and the trailing block its Schur complement. Returns false if a pivot is not
+/// positive; `a` is void then. The upper triangle is neither read nor preserved.
 pub fn partial_cholesky(a: &mut [f64], n: usize, k: usize) -> bool {
     let mut packed = Vec::with_capacity(PANEL * n.next_multiple_of(ROWS));
     for start in (0..k).step_by(PANEL) {
@@ -55,8 +55,8 @@ fn factor_strip(a: &mut [f64], n: usize, start: usize, end: usize) -> bool {
     true
 }
 
-/// Subtracts `L Lᵀ` of `columns` from the lower triangle of the columns up to `last`. It may write above the diagonal, which
-/// is never read.
+/// Subtracts `L Lᵀ` of `columns` from the lower triangle of the columns up to `last`. It may write above the
+/// diagonal, which is never read.
 fn update(a: &mut [f64], n: usize, columns: Range<usize>, last: usize, packed: &mut Vec<f64>) {
     let Range { start, end } = columns;
     if end >= last {
@@ -115,7 +115,8 @@ fn wide_columns(a: &[f64], n: usize, column: usize, from: usize) -> [&[f64]; WID
     std::array::from_fn(|c| &a[(column + c) * n + from..(column + c + 1) * n])
 }
 
-/// Solves `L y = b` in place for the first `k` columns of `l` (`n` rows), and subtracts their contribution from `b[k..n]`.
+/// Solves `L y = b` in place for the first `k` columns of `l` (`n` rows), and subtracts their contribution from
+/// `b[k..n]`.
 pub fn forward(l: &[f64], n: usize, k: usize, b: &mut [f64]) {
     let mut j = 0;
     while j + WIDE <= k {

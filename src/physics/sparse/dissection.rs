@@ -1,12 +1,13 @@
 //! Nested dissection of a voxel lattice (George 1973): planes of nodes separate it into halves that are not coupled.
 //!
-//! On lattices of hundreds to thousands of nodes, of which few are retained, this needs half of the operations of approximate
-//! minimum degree, since a plane is the smallest separator of a lattice.
+//! On lattices of hundreds to thousands of nodes, of which few are retained, this needs half of the operations of
+//! approximate minimum degree, since a plane is the smallest separator of a lattice.
 
 /// Parts with at most this many nodes are not split further.
 const LEAF: usize = 8;
 
-/// Sorts `nodes` into elimination order: both halves first, then the plane between them. `places` are lattice coordinates.
+/// Sorts `nodes` into elimination order: both halves first, then the plane between them. `places` are lattice
+/// coordinates.
 pub(super) fn order(nodes: &mut [u32], places: &[[i32; 3]]) {
     if nodes.len() <= LEAF {
         return;

@@ -20,8 +20,8 @@ pub trait BlockMatrix {
 }
 
 impl CholeskyFactor {
-    /// Factors `matrix`. Afterwards [`CholeskyFactor::schur`] is the Schur complement of the retained nodes. Returns false if
-    /// the matrix is not positive definite.
+    /// Factors `matrix`. Afterwards [`CholeskyFactor::schur`] is the Schur complement of the retained nodes. Returns
+    /// false if the matrix is not positive definite.
     pub fn refill(&mut self, plan: &SymbolicFactor, matrix: &dyn BlockMatrix) -> bool {
         self.panels.resize(plan.factor_len, 0.0);
         self.stack.resize(plan.stack_len, 0.0);
@@ -83,8 +83,8 @@ impl CholeskyFactor {
         &self.schur
     }
 
-    /// Forward substitution on `b` (in elimination order, 3 per position). Its retained part becomes the reduced right-hand
-    /// side.
+    /// Forward substitution on `b` (in elimination order, 3 per position). Its retained part becomes the reduced
+    /// right-hand side.
     pub fn forward(&mut self, plan: &SymbolicFactor, b: &mut [f64]) {
         for front in plan.fronts.iter().filter(|f| f.pivots > 0) {
             let (n, k) = (3 * front.rows.len(), 3 * front.pivots);

@@ -14,8 +14,8 @@ use crate::{
     },
 };
 
-/// Distance to a surface within which a group's nodes are retained in the reduced system, m. The factor then does not change
-/// when a contact begins.
+/// Distance to a surface within which a group's nodes are retained in the reduced system, m. The factor then does not
+/// change when a contact begins.
 pub(super) const RETAIN_DISTANCE: f64 = 2.5e-3;
 /// Stiffness and damping of joint stops, relative to the joint's inertia over a step.
 const STOP_RATE: f64 = 0.5;
@@ -221,8 +221,8 @@ impl World {
         Endpoint::Nodes { block, at, count: 8 }
     }
 
-    /// The endpoint of a rigid body or link; its Jacobian is added to the problem on first use. `Known` for what sleeps or
-    /// has a prescribed motion.
+    /// The endpoint of a rigid body or link; its Jacobian is added to the problem on first use. `Known` for what
+    /// sleeps or has a prescribed motion.
     pub(super) fn body_endpoint(&mut self, body: BodyId) -> Endpoint {
         let (block, jacobian, origin) = match body {
             BodyId::World | BodyId::Kinematic(_) | BodyId::Soft(_) => return Endpoint::Known,

@@ -26,8 +26,8 @@ use crate::{
 impl World {
     /// Adds a soft body in its rest configuration at `pose`. See [`SoftBodyBuilder`] for the way from a shape.
     ///
-    /// `surface` is the body's surface at rest (object frame), on which the samples of other soft bodies press. Without one,
-    /// two soft bodies touch only where the samples of this one meet the surface of the other.
+    /// `surface` is the body's surface at rest (object frame), on which the samples of other soft bodies press.
+    /// Without one, two soft bodies touch only where the samples of this one meet the surface of the other.
     pub fn add_soft(
         &mut self,
         name: &str,
@@ -170,8 +170,8 @@ pub enum BodyError {
 
 /// A soft body made from a shape: voxel mesh, contact samples, finite-element model.
 ///
-/// Defaults: resolution 6 (voxels along the longest edge), benchmark friction, sample spacing of [`SampleSpec::default`],
-/// at the origin.
+/// Defaults: resolution 6 (voxels along the longest edge), benchmark friction, sample spacing of
+/// [`SampleSpec::default`], at the origin.
 #[derive(Clone, Debug)]
 pub struct SoftBodyBuilder {
     name: String,

@@ -1,5 +1,5 @@
-//! Conversion of a contact between two surfaces, of whatever bodies, to a contact point of the solver, and the evolution of
-//! its tangential spring.
+//! Conversion of a contact between two surfaces, of whatever bodies, to a contact point of the solver, and the
+//! evolution of its tangential spring.
 
 use crate::{
     geometry::Vec3,
@@ -76,10 +76,11 @@ const SLIDING_SHARE: f64 = 0.97;
 
 /// Pairs of surfaces that slide as a whole.
 ///
-/// The points of a patch share a load by their stiffness, not by their pressure, so lightly loaded ones reach the static
-/// bound before the patch does. If each of them then dropped to dynamic friction alone, its share would overload the next,
-/// and a block would start to slide far below μ_s N. So dynamic friction begins for a pair when (nearly) all of its force is
-/// at the bound, that is when the surfaces slide on each other, and ends when a step leaves part of it inside the bound.
+/// The points of a patch share a load by their stiffness, not by their pressure, so lightly loaded ones reach the
+/// static bound before the patch does. If each of them then dropped to dynamic friction alone, its share would
+/// overload the next, and a block would start to slide far below μ_s N. So dynamic friction begins for a pair when
+/// (nearly) all of its force is at the bound, that is when the surfaces slide on each other, and ends when a step
+/// leaves part of it inside the bound.
 #[derive(Debug, Default)]
 pub(super) struct SlidingPairs<K>(Vec<PairImpulse<K>>);
 

@@ -25,8 +25,8 @@ impl World {
 
     /// Checks speeds and contact forces of everything awake.
     ///
-    /// Forces on rigid bodies are not bounded, since kinematic frames can squeeze one with any force. Nor are joint speeds,
-    /// which are rad/s or m/s; they must be finite.
+    /// Forces on rigid bodies are not bounded, since kinematic frames can squeeze one with any force. Nor are joint
+    /// speeds, which are rad/s or m/s; they must be finite.
     fn check_bounds(&self) -> Result<(), StepFailure> {
         let (step, limit) = (self.step, self.params.max_speed);
         // `<=` is false for NaN, so NaN counts as too fast.
@@ -68,11 +68,11 @@ fn total_normal_force(soft: &SoftBody) -> f64 {
 
 /// Largest possible sum of normal forces on a soft body, N.
 ///
-/// Contact forces either change the body's momentum or are balanced by its stress. The first part is at most the force that
-/// reverses all of its mass at the largest speed within one step, 2 m v / dt. The second is at most a pressure over its whole
-/// surface: an upright element is compressed by less than its length, which the constrained modulus
-/// M = E (1 − ν) / ((1 + ν)(1 − 2ν)) turns into less than M, and the damping within one step into less than M β / dt. Twice
-/// that allows for shear.
+/// Contact forces either change the body's momentum or are balanced by its stress. The first part is at most the
+/// force that reverses all of its mass at the largest speed within one step, 2 m v / dt. The second is at most a
+/// pressure over its whole surface: an upright element is compressed by less than its length, which the constrained
+/// modulus M = E (1 − ν) / ((1 + ν)(1 − 2ν)) turns into less than M, and the damping within one step into less than M
+/// β / dt. Twice that allows for shear.
 fn force_limit(model: &FemModel, params: &PhysicsParams) -> f64 {
     let (youngs, nu) = (model.material.youngs_pa, model.material.poisson);
     let constrained = youngs * (1.0 - nu) / ((1.0 + nu) * (1.0 - 2.0 * nu));

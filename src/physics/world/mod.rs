@@ -1,9 +1,9 @@
 //! The world: all bodies and colliders, and the step that moves them.
 //!
-//! A [`World`] owns soft bodies, free rigid bodies, articulations, kinematic frames and colliders. `add_*` puts an object in
-//! and returns its [identifier](super::ids); [`SoftBodyBuilder`] and [`RigidBodyBuilder`] do so from a shape.
-//! [`World::step`] advances everything by [`PhysicsParams::dt`]. Units are SI; positions, velocities and forces are in the
-//! world frame unless a name says otherwise.
+//! A [`World`] owns soft bodies, free rigid bodies, articulations, kinematic frames and colliders. `add_*` puts an
+//! object in and returns its [identifier](super::ids); [`SoftBodyBuilder`] and [`RigidBodyBuilder`] do so from a
+//! shape. [`World::step`] advances everything by [`PhysicsParams::dt`]. Units are SI; positions, velocities and
+//! forces are in the world frame unless a name says otherwise.
 //!
 //! A soft cube falls on a table and comes to rest:
 //!

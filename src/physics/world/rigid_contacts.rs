@@ -1,9 +1,9 @@
 //! Contacts between colliders: of rigid bodies, links, kinematic frames and the world.
 //!
-//! A contact point of two solids is seldom a material point of either (a corner of the lower one, the crossing of two edges,
-//! the lowest point of a ball). So its tangential spring has no anchor, but stores how far the touching *material* has moved:
-//! the stretch, which grows with the relative velocity and turns with the second body. At rest it holds as an anchor does,
-//! and rolling does not stretch it.
+//! A contact point of two solids is seldom a material point of either (a corner of the lower one, the crossing of two
+//! edges, the lowest point of a ball). So its tangential spring has no anchor, but stores how far the touching
+//! *material* has moved: the stretch, which grows with the relative velocity and turns with the second body. At rest
+//! it holds as an anchor does, and rolling does not stretch it.
 
 use super::{
     World,
@@ -121,8 +121,8 @@ impl World {
         self.rigid_contacts = contacts;
     }
 
-    /// Finds the pairs of colliders on different bodies, of which at least one is free to move, that may touch within the
-    /// step.
+    /// Finds the pairs of colliders on different bodies, of which at least one is free to move, that may touch within
+    /// the step.
     pub(super) fn near_pairs(&self, pairs: &mut Vec<ColliderPair>) {
         pairs.clear();
         let ids: Vec<ColliderId> = (0..self.colliders.len())

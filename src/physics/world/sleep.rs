@@ -105,8 +105,8 @@ impl World {
 
     /// True if a body that touches a collider must stay awake.
     ///
-    /// A driven link keeps a body awake even while both are still: the link needs the body's force in every step, and so does
-    /// the sensor on it.
+    /// A driven link keeps a body awake even while both are still: the link needs the body's force in every step, and
+    /// so does the sensor on it.
     fn keeps_awake(&self, id: ColliderId) -> bool {
         let is_driven = match self.collider(id).parent {
             BodyId::Link(link) => self.articulation(link.articulation).is_driven(),

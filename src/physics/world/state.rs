@@ -119,7 +119,8 @@ pub struct JointDrive {
     pub force: f64,
 }
 
-/// Dry friction of a joint as a stiff spring whose force is limited to the friction: a joint that sticks does not creep.
+/// Dry friction of a joint as a stiff spring whose force is limited to the friction: a joint that sticks does not
+/// creep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct JointFriction {
     /// Joint coordinate at which the spring is free, rad or m.

@@ -1,5 +1,5 @@
-//! HTML report of one or several runs in one file without scripts or external resources: tables, figures, unsafe episodes with
-//! stills, and settings.
+//! HTML report of one or several runs in one file without scripts or external resources: tables, figures, unsafe
+//! episodes with stills, and settings.
 
 mod failures;
 mod figures;

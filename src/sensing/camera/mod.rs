@@ -1,19 +1,22 @@
 //! Camera images: a deterministic software renderer in single precision.
 //!
-//! The rasteriser is written by hand, since two requirements rule out the alternatives. The benchmark runs on machines without
-//! a GPU, and the same state must give byte-identical images on every machine and with every number of threads. Graphics
-//! drivers, ray-tracing libraries and the platform's math functions all round differently from one machine to the next.
+//! The rasteriser is written by hand, since two requirements rule out the alternatives. The benchmark runs on
+//! machines without a GPU, and the same state must give byte-identical images on every machine and with every number
+//! of threads. Graphics drivers, ray-tracing libraries and the platform's math functions all round differently from
+//! one machine to the next.
 //!
 //! [`Renderer::render`] draws one image in these steps:
 //!
 //! 1. Objects are posed at the coarsest level of detail that looks like the finest one (`render::visibility`, `mesh`).
 //! 2. Triangles are projected, clipped and sorted into tiles of 32 × 32 pixels (`raster`).
 //! 3. Each tile is rasterised with four samples per pixel into triangle ids and depths (`raster`, `render::tile`).
-//! 4. Each surface that a pixel shows is shaded once, eight points at a time: Lambert and GGX under a key light with soft
+//! 4. Each surface that a pixel shows is shaded once, eight points at a time: Lambert and GGX under a key light with
+//!    soft
 //!    shadows and a sky (`shade`).
 //!
-//! Materials are procedural functions of the object frame. [`RenderMesh`] bakes them into vertices or textures once, filtered
-//! to the spacing of the samples. Objects that do not move are drawn once for a camera that does not move either.
+//! Materials are procedural functions of the object frame. [`RenderMesh`] bakes them into vertices or textures once,
+//! filtered to the spacing of the samples. Objects that do not move are drawn once for a camera that does not move
+//! either.
 //!
 //! # Example
 //!

@@ -1,7 +1,7 @@
 //! Eight-lane vectors.
 //!
-//! Every operation here rounds alike on every processor: no fused multiply-add, no reciprocal estimates and no functions of
-//! the platform's math library. Images are therefore byte-identical across machines.
+//! Every operation here rounds alike on every processor: no fused multiply-add, no reciprocal estimates and no
+//! functions of the platform's math library. Images are therefore byte-identical across machines.
 
 use wide::{bytemuck::cast, i32x8, u32x8};
 

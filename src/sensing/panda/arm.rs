@@ -1,8 +1,8 @@
 //! Base and arm.
 //!
-//! Shapes are in the frames of their links (modified Denavit–Hartenberg, as [`crate::robot::panda`]). Radii, centres and lengths
-//! follow the capsules of Franka's public self-collision model (`franka_description`, Apache-2.0). The seams between links
-//! follow its drawings (Panda datasheet: 333, 316, 82.5, 384, 88 and 107 mm between the axes).
+//! Shapes are in the frames of their links (modified Denavit–Hartenberg, as [`crate::robot::panda`]). Radii, centres
+//! and lengths follow the capsules of Franka's public self-collision model (`franka_description`, Apache-2.0). The
+//! seams between links follow its drawings (Panda datasheet: 333, 316, 82.5, 384, 88 and 107 mm between the axes).
 
 use super::{
     BARE_METAL, BLACK_PLASTIC, GREY_PLASTIC, RobotPart, WHITE_SHELL,

@@ -13,8 +13,8 @@ use crate::{
     sensing::camera::{RenderSolid, Tessellation},
 };
 
-/// The hand's body, 204 × 63 mm in plan and 66 mm high, with shoulders that slope to rounded ends (Franka hand, public product
-/// drawing), and the rail in which the fingers run.
+/// The hand's body, 204 × 63 mm in plan and 66 mm high, with shoulders that slope to rounded ends (Franka hand,
+/// public product drawing), and the rail in which the fingers run.
 pub(super) fn hand() -> RobotPart {
     const EDGE: f64 = 11e-3;
     // Counter-clockwise in (y, z), without the rounding of the edges.
@@ -62,8 +62,8 @@ fn tapered(mut body: RenderSolid) -> RenderSolid {
     body
 }
 
-/// A finger: the bracket, the sensor's case with its bezel, and the visible part of its plug. Case and bracket are the collision
-/// boxes ([`pads::finger_boxes`]) with rounded edges.
+/// A finger: the bracket, the sensor's case with its bezel, and the visible part of its plug. Case and bracket are
+/// the collision boxes ([`pads::finger_boxes`]) with rounded edges.
 pub(super) fn finger(side: Side) -> RobotPart {
     let [body, bracket] = pads::finger_boxes(side);
     let out = body.pose.translation.vector.y.signum();
@@ -94,8 +94,8 @@ pub(super) fn finger(side: Side) -> RobotPart {
     }
 }
 
-/// The gel's dome and side walls in the finger's frame, sampled from [`pads::PadSurface`]: the drawn gel is the one that makes
-/// contact.
+/// The gel's dome and side walls in the finger's frame, sampled from [`pads::PadSurface`]: the drawn gel is the one
+/// that makes contact.
 pub(super) fn gel(side: Side) -> Mesh {
     const ALONG: usize = 14;
     const ACROSS: usize = 12;

@@ -1,7 +1,7 @@
 //! Meshes of the Franka Emika Panda with its hand and two GelSight Minis.
 //!
-//! The robot is modelled from primitives with public dimensions instead of loading the vendor's meshes: no licensed file is
-//! copied, the model takes a few kilobytes of source, and its meshes are generated deterministically.
+//! The robot is modelled from primitives with public dimensions instead of loading the vendor's meshes: no licensed
+//! file is copied, the model takes a few kilobytes of source, and its meshes are generated deterministically.
 
 mod arm;
 mod hand;

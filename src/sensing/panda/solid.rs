@@ -1,4 +1,5 @@
-//! Building blocks of the robot's meshes. Plain ones get exact meshes; blended ones are meshed from their distance field.
+//! Building blocks of the robot's meshes. Plain ones get exact meshes; blended ones are meshed from their distance
+//! field.
 
 use std::sync::Arc;
 
@@ -60,8 +61,8 @@ pub(super) fn rounded_box(centre: [f64; 3], half: [f64; 3], edge: f64) -> Shape 
     inner.rounded(edge).translated(Vec3::from(centre))
 }
 
-/// A box solid with these half extents in the frame `pose`; its outline in x and y is rounded by `corner`, its edges in z by
-/// `edge`, m.
+/// A box solid with these half extents in the frame `pose`; its outline in x and y is rounded by `corner`, its edges
+/// in z by `edge`, m.
 pub(super) fn box_solid(pose: &Pose, half: [f64; 3], corner: f64, edge: f64, visual: usize) -> RenderSolid {
     let [x, y] = [half[0] - corner, half[1] - corner];
     let corners = vec![[-x, -y], [x, -y], [x, y], [-x, y]];
@@ -70,7 +71,8 @@ pub(super) fn box_solid(pose: &Pose, half: [f64; 3], corner: f64, edge: f64, vis
     RenderSolid::with_mesh(rounded_box([0.0; 3], half, edge).placed(*pose), plate.mesh(pose), visual)
 }
 
-/// A convex polygon (y, z) extruded to `half` on both sides of x = 0, with outline and edges rounded by `edge`, m, in `pose`.
+/// A convex polygon (y, z) extruded to `half` on both sides of x = 0, with outline and edges rounded by `edge`, m, in
+/// `pose`.
 pub(super) fn plate_solid(
     pose: &Pose,
     corners: &[[f64; 2]],

@@ -1,8 +1,8 @@
 //! GelSight tactile sensing: deformation of the gel by a contact, its colour image and the markers in it.
 //!
-//! [`TactileSensor`] is created once and shared by both fingers. [`TactileSensor::read`] maps the force on a pad and the
-//! surfaces of the touching bodies to a [`TactileReading`]. Every step is a pure function of its input, so images may be
-//! computed later and in any order.
+//! [`TactileSensor`] is created once and shared by both fingers. [`TactileSensor::read`] maps the force on a pad and
+//! the surfaces of the touching bodies to a [`TactileReading`]. Every step is a pure function of its input, so images
+//! may be computed later and in any order.
 //!
 //! - [`elastic`]: the gel as an elastic layer; pressure, shear and displacement of its surface ([`GelField`]).
 //! - [`image`]: the colour image of a field, and the mosaic of the last images.

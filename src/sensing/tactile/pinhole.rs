@@ -7,11 +7,11 @@ use crate::{
 };
 
 impl Pinhole {
-    /// Pixel (x, y) of a point in the pad frame (m), the same for both fingers: x right, along the pad's x (towards the hand); y
-    /// down, along the pad's y. The image spans 0..320 × 0..240; the apex is at (160, 120).
+    /// Pixel (x, y) of a point in the pad frame (m), the same for both fingers: x right, along the pad's x (towards
+    /// the hand); y down, along the pad's y. The image spans 0..320 × 0..240; the apex is at (160, 120).
     ///
-    /// This is the view of a real camera behind the gel; nothing is mirrored. Since the pads face each other, the images of one
-    /// object held between them are mirrored top to bottom.
+    /// This is the view of a real camera behind the gel; nothing is mirrored. Since the pads face each other, the
+    /// images of one object held between them are mirrored top to bottom.
     pub fn pad_to_image(&self, p_p: &Vec3) -> [f64; 2] {
         let scale = self.lens / (self.lens + p_p.z) / self.pitch;
         [0.5 * IMAGE_SIZE[0] as f64 + scale * p_p.x, 0.5 * IMAGE_SIZE[1] as f64 + scale * p_p.y]

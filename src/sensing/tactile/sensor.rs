@@ -35,8 +35,8 @@ enum OpticsBackend {
 ///
 /// # Example
 ///
-/// A ball of 4 mm radius is pressed into the gel with 1.5 N. Its lower side, a paraboloid to first order, is given in the pad
-/// frame: origin at the apex of the gel, z out of the gel.
+/// A ball of 4 mm radius is pressed into the gel with 1.5 N. Its lower side, a paraboloid to first order, is given in
+/// the pad frame: origin at the apex of the gel, z out of the gel.
 ///
 /// ```
 /// use softvt::{

@@ -1,5 +1,5 @@
-//! Surfaces of bodies as they press on a gel: finer than the collision geometry, created once per asset and placed over the
-//! pad at every frame.
+//! Surfaces of bodies as they press on a gel: finer than the collision geometry, created once per asset and placed
+//! over the pad at every frame.
 
 use std::collections::BTreeMap;
 
@@ -8,8 +8,8 @@ use crate::{
     sensing::camera,
 };
 
-/// Edge of the cells from which a skin is extracted, m: fine enough for seeds and ridges of a millimetre, with the field of
-/// the gel solved on 0.4 mm.
+/// Edge of the cells from which a skin is extracted, m: fine enough for seeds and ridges of a millimetre, with the
+/// field of the gel solved on 0.4 mm.
 const CELL: f64 = 8e-4;
 /// Largest number of cells along the longest edge, for large objects such as tables.
 const MAX_CELLS: f64 = 160.0;
@@ -27,11 +27,11 @@ pub struct TactileSkin {
     embedding: Option<SplineEmbedding>,
 }
 
-/// Motion of a skin with the nodes of a soft body: quadratic B-splines over the voxel grid (de Boor, *A Practical Guide to
-/// Splines*, 1978), whose slope runs linearly from the mean slope of one voxel to that of the next.
+/// Motion of a skin with the nodes of a soft body: quadratic B-splines over the voxel grid (de Boor, *A Practical
+/// Guide to Splines*, 1978), whose slope runs linearly from the mean slope of one voxel to that of the next.
 ///
-/// Trilinear weights would break the slope at every face, and a tactile image shows nothing but slopes. Linear motions are
-/// exact; waves of four voxels keep three quarters of their height.
+/// Trilinear weights would break the slope at every face, and a tactile image shows nothing but slopes. Linear
+/// motions are exact; waves of four voxels keep three quarters of their height.
 #[derive(Clone, Debug)]
 struct SplineEmbedding {
     elements: Vec<[u32; 8]>,
@@ -72,8 +72,8 @@ impl TactileSkin {
         }
     }
 
-    /// Skin of a soft body with the voxel mesh `mesh`, with small triangles on flat faces too. `None` if part of the shape lies
-    /// more than two voxels outside the mesh.
+    /// Skin of a soft body with the voxel mesh `mesh`, with small triangles on flat faces too. `None` if part of the
+    /// shape lies more than two voxels outside the mesh.
     pub fn of_soft(shape: &Shape, mesh: &VoxelMesh) -> Option<Self> {
         let mut skin = Self::sampled(shape);
         skin.embedding = Some(SplineEmbedding::of(&skin.vertices, mesh)?);
@@ -96,8 +96,8 @@ impl TactileSkin {
         out.extend(self.vertices.iter().map(|v| (pose * nalgebra::Point3::from(*v)).coords));
     }
 
-    /// Writes the vertices of an embedded skin in the pad frame, with the body's nodes at `nodes` (world) and the pose `w_p` of
-    /// the world in the pad frame. Vertices too far from the pad to matter are put far above it.
+    /// Writes the vertices of an embedded skin in the pad frame, with the body's nodes at `nodes` (world) and the
+    /// pose `w_p` of the world in the pad frame. Vertices too far from the pad to matter are put far above it.
     pub fn place_soft(&self, nodes: &[Vec3], w_p: &Pose, out: &mut Vec<Vec3>) {
         out.clear();
         out.resize(self.vertices.len(), FAR_AWAY);

@@ -41,8 +41,8 @@ impl Default for GelSpec {
     }
 }
 
-/// Camera of the sensor: a pinhole behind the apex of the gel that looks out along the pad's +z. Image x (right) is the pad's
-/// x, image y (down) the pad's y; `docs/tactile.md` draws the frames.
+/// Camera of the sensor: a pinhole behind the apex of the gel that looks out along the pad's +z. Image x (right) is
+/// the pad's x, image y (down) the pad's y; `docs/tactile.md` draws the frames.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Pinhole {

@@ -1,5 +1,5 @@
-//! `softvt dataset import`: demonstrations of other simulators, re-executed in a suite. Those that are safe and reach the
-//! goal are recorded.
+//! `softvt dataset import`: demonstrations of other simulators, re-executed in a suite. Those that are safe and reach
+//! the goal are recorded.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -123,8 +123,8 @@ fn file_name(file: &ForeignFile) -> String {
     file.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Makes the episodes of a run re-execute the demonstrations, each from its own initial state. With `use_layout` objects
-/// start where the layout puts them.
+/// Makes the episodes of a run re-execute the demonstrations, each from its own initial state. With `use_layout`
+/// objects start where the layout puts them.
 fn replay_demos(
     run: &mut SuiteRun,
     grip_log: &GripLog,

@@ -43,8 +43,8 @@ impl MatchedDemo<'_> {
     }
 }
 
-/// Finds the tasks of all demonstrations, at most `max` of each task, and numbers the attempts. Demonstrations of softvt
-/// keep their attempt numbers; the others get the free ones in order.
+/// Finds the tasks of all demonstrations, at most `max` of each task, and numbers the attempts. Demonstrations of
+/// softvt keep their attempt numbers; the others get the free ones in order.
 ///
 /// # Errors
 /// A demonstration matches no task or several, or has another seed; or two are the same attempt.

@@ -1,8 +1,8 @@
 //! Recording of datasets: attempts at demonstrations, of which the good ones are kept.
 //!
-//! Attempts are numbered. The dataset depends only on their numbers and outcomes, not on the order in which they finish.
-//! All files of an attempt are complete before its line is in `attempts/<suite>/episodes.jsonl`, and the file of a task
-//! is merged from them, so an interrupted recording can be continued.
+//! Attempts are numbered. The dataset depends only on their numbers and outcomes, not on the order in which they
+//! finish. All files of an attempt are complete before its line is in `attempts/<suite>/episodes.jsonl`, and the file
+//! of a task is merged from them, so an interrupted recording can be continued.
 
 mod suite_recording;
 mod summary;

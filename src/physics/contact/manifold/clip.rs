@@ -11,8 +11,8 @@ pub(super) struct Corner {
     pub edge: u32,
 }
 
-/// Distance outside of the other polygon up to which a corner counts as inside, m: flush stacked boxes keep the same corners
-/// despite rounding of their poses.
+/// Distance outside of the other polygon up to which a corner counts as inside, m: flush stacked boxes keep the same
+/// corners despite rounding of their poses.
 const SNAP_M: f64 = 1e-6;
 
 /// Identifier of the crossing of an edge of the first body with one of the second; distinct from those of corners.
@@ -107,8 +107,8 @@ pub(super) fn area2(polygon: &[Corner]) -> f64 {
     (1..polygon.len().max(2) - 1).map(|i| turn(&polygon[0].p, &polygon[i].p, &polygon[i + 1].p)).sum()
 }
 
-/// Share of each corner in the perimeter of a polygon: half of the two edges that meet there. If a corner splits in two, so
-/// does its share.
+/// Share of each corner in the perimeter of a polygon: half of the two edges that meet there. If a corner splits in
+/// two, so does its share.
 pub(super) fn shares(polygon: &[Corner]) -> Vec<f64> {
     let count = polygon.len();
     let length = |i: usize| {

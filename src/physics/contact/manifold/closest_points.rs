@@ -1,9 +1,10 @@
-//! Lowest points of the smooth parts of a body in the distance field of another, and the lines in which such parts touch.
+//! Lowest points of the smooth parts of a body in the distance field of another, and the lines in which such parts
+//! touch.
 //!
-//! A part that is curved in one direction only (the side of a can, the rounded edge of a box) touches along a line, on which
-//! the lowest point is undefined: the ends of the line carry instead. Where corners, rims or flat samples touch as deep as a
-//! lowest point, they carry alone. A second support next to them, on the side to which a body happens to lean, would make it
-//! rock indefinitely.
+//! A part that is curved in one direction only (the side of a can, the rounded edge of a box) touches along a line,
+//! on which the lowest point is undefined: the ends of the line carry instead. Where corners, rims or flat samples
+//! touch as deep as a lowest point, they carry alone. A second support next to them, on the side to which a body
+//! happens to lean, would make it rock indefinitely.
 
 use std::f64::consts::{FRAC_PI_4, TAU};
 
@@ -23,8 +24,8 @@ const PROBE_DISTANCE_RATIO: f64 = 1.0 / 6.0;
 const MAX_LOWEST: usize = 6;
 /// First identifier of lowest points, four for each: the point and the ends of its line.
 const LOWEST_FEATURES: u32 = 1 << 24;
-/// Other points that are higher than a lowest point by up to the first value, m, carry instead of it; from the second value
-/// on they do not.
+/// Other points that are higher than a lowest point by up to the first value, m, carry instead of it; from the second
+/// value on they do not.
 const SAME_DEPTH_M: [f64; 2] = [2e-6, 1e-5];
 /// Smallest cosine between their normals for which they do so.
 const SAME_SIDE: f64 = 0.9;
@@ -90,7 +91,8 @@ struct LineDirection {
 }
 
 impl Smooth<'_> {
-    /// Appends the point `p` as far as it is well defined, and the ends of its line as far as it is not. Returns the line.
+    /// Appends the point `p` as far as it is well defined, and the ends of its line as far as it is not. Returns the
+    /// line.
     fn add_points(
         &self,
         p: &Vec3,
@@ -150,7 +152,8 @@ impl Smooth<'_> {
         LineDirection { direction, point_share: (rise / self.rise).clamp(0.0, 1.0) }
     }
 
-    /// End of the straight line along `direction` from the lowest point `p`, where it leaves the surface or the other body.
+    /// End of the straight line along `direction` from the lowest point `p`, where it leaves the surface or the other
+    /// body.
     fn line_end(&self, p: &Vec3, direction: Vec3) -> Vec3 {
         let (gap, normal) = (self.probe.gap(p), self.shape.distance_and_normal(p).1);
         let is_on_line = |length: f64| {
@@ -201,8 +204,8 @@ fn distance_to_segment(p: &Vec3, [from, to]: &[Vec3; 2]) -> f64 {
     (p - from - span * share).norm()
 }
 
-/// Minimises b's field over the surface of a: steepest descent with the steps of Barzilai & Borwein (IMA J. Numer. Anal. 8,
-/// 1988), halved where they do not descend.
+/// Minimises b's field over the surface of a: steepest descent with the steps of Barzilai & Borwein (IMA J. Numer.
+/// Anal. 8, 1988), halved where they do not descend.
 fn descend(probe: &FieldProbe, shape_a: &Shape, start: Vec3, spacing: f64) -> Vec3 {
     let downhill = |p: &Vec3| {
         let ((gap, gradient), normal) = (probe.gap_and_gradient(p), shape_a.distance_and_normal(p).1);

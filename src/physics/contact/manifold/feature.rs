@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use super::{NON_MATERIAL, Primitive};
 use crate::geometry::{Pose, Vec3};
 
-/// Number of points that represent a rim in flat contact. The circle is at most 0.9 % outside of their polygon, which changes
-/// a tipping angle by less than 0.25°.
+/// Number of points that represent a rim in flat contact. The circle is at most 0.9 % outside of their polygon, which
+/// changes a tipping angle by less than 0.25°.
 pub(super) const RIM_POINTS: u32 = 24;
 /// Tilt (sine) up to which a cap carries in full as a face.
 const CAP_FULL_TILT: f64 = 0.05;
@@ -109,7 +109,8 @@ fn box_face(half: &Vec3, pose: &Pose, direction: &Vec3) -> Face {
     Face { corners, normal, origin, weight: 1.0 }
 }
 
-/// The cap of a cylinder whose axis is nearly along the direction, and the line through the foremost points of both rims.
+/// The cap of a cylinder whose axis is nearly along the direction, and the line through the foremost points of both
+/// rims.
 fn cylinder_features(radius: f64, half_height: f64, pose: &Pose, direction: &Vec3) -> FacingFeatures {
     let d = pose.rotation.inverse() * direction;
     let sine = d.x.hypot(d.y);
@@ -137,8 +138,8 @@ fn cap(radius: f64, z: f64, pose: &Pose, weight: f64) -> Face {
     Face { corners, normal, origin: pose.translation.vector + pose.rotation * Vec3::z() * z, weight }
 }
 
-/// The line along a primitive's axis, translated by `offset`. It is not material: it moves over the surface as the primitive
-/// rolls.
+/// The line along a primitive's axis, translated by `offset`. It is not material: it moves over the surface as the
+/// primitive rolls.
 fn side_line(pose: &Pose, offset: &Vec3, half_height: f64, weight: f64) -> Line {
     let half = pose.rotation * Vec3::z() * half_height;
     let centre = pose.translation.vector + offset;

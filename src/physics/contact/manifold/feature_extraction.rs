@@ -1,5 +1,5 @@
-//! Extraction of the surface features of a shape that can touch another: sharp corners and edges, rims, flat regions, and
-//! seeds on its smooth parts.
+//! Extraction of the surface features of a shape that can touch another: sharp corners and edges, rims, flat regions,
+//! and seeds on its smooth parts.
 
 use nalgebra::SymmetricEigen;
 
@@ -16,8 +16,8 @@ use crate::geometry::{
 const EDGE_CELLS: f64 = 24.0;
 /// Grid cells along the longest side in the choice of seeds on its smooth parts.
 const SEED_CELLS: f64 = 8.0;
-/// Two faces form an edge if their normals differ by more than about 30°: then the second eigenvalue of the sum of n nᵀ is
-/// above tan²(15°) times the first.
+/// Two faces form an edge if their normals differ by more than about 30°: then the second eigenvalue of the sum of n
+/// nᵀ is above tan²(15°) times the first.
 const MIN_EIGENVALUE_RATIO: f64 = 0.07;
 /// Convex turn (sine) at the corner of a profile from which its circle is a rim: 20°.
 const RIM_TURN: f64 = 0.34;
@@ -56,8 +56,8 @@ pub(in super::super) struct SurfaceFeatures {
     pub spacing: f64,
 }
 
-/// Extracts the features of a shape. Those of boxes, cylinders and lathes are known exactly; the sharp edges and flat regions
-/// of other shapes are found on a grid of 1/24 of the longest side.
+/// Extracts the features of a shape. Those of boxes, cylinders and lathes are known exactly; the sharp edges and flat
+/// regions of other shapes are found on a grid of 1/24 of the longest side.
 pub(in super::super) fn surface_features(shape: &Shape) -> SurfaceFeatures {
     let mut features = SurfaceFeatures::default();
     add_features(shape, &Pose::identity(), &mut features);
@@ -70,7 +70,8 @@ pub(in super::super) fn surface_features(shape: &Shape) -> SurfaceFeatures {
     features
 }
 
-/// The convex primitives that a shape is composed of, with their frames in the object frame. `None` if it has other parts.
+/// The convex primitives that a shape is composed of, with their frames in the object frame. `None` if it has other
+/// parts.
 pub(in super::super) fn primitives(shape: &Shape) -> Option<Vec<(Primitive, Pose)>> {
     let one = |primitive| Some(vec![(primitive, Pose::identity())]);
     match shape {
@@ -147,7 +148,8 @@ fn is_sharp(shape: &Shape, p: &Vec3) -> bool {
     let normal = shape.distance_and_normal(p).1;
     let [u, v] = orthonormal_basis(&normal);
     let (s, d) = ((u + v).normalize(), (u - v).normalize());
-    // Inwards too: on the edge itself the normal is that of one face, and points off the other project back to the edge.
+    // Inwards too: on the edge itself the normal is that of one face, and points off the other project back to the
+    // edge.
     let directions = [u, -u, v, -v, s, -s, d, -d, -normal];
     let normals = directions.map(|direction| {
         shape.distance_and_normal(&project_to_surface(shape, p + direction * SHARP_DISTANCE)).1
@@ -252,8 +254,8 @@ impl Cell {
         self.0.iter().map(|crossing| crossing.p).sum::<Vec3>() / self.0.len() as f64
     }
 
-    /// The least-squares intersection of the planes of the crossings, if they belong to different faces that meet in a convex
-    /// edge (the vertex of dual contouring: Ju, Losasso, Schaefer & Warren, SIGGRAPH 2002).
+    /// The least-squares intersection of the planes of the crossings, if they belong to different faces that meet in
+    /// a convex edge (the vertex of dual contouring: Ju, Losasso, Schaefer & Warren, SIGGRAPH 2002).
     fn sharp_point(&self, shape: &Shape, step: f64) -> Option<Vec3> {
         let mean = self.mean();
         let (mut normal, mut right) = (Mat3::zeros(), Vec3::zeros());

@@ -12,8 +12,8 @@ use crate::geometry::{Pose, Vec3, hex8, orthonormal_basis};
 const SLACK_M: f64 = 1e-6;
 /// Angle (sine) from which two lines touch at their crossing; more nearly parallel ones touch along their overlap.
 const MIN_CROSSING_SINE: f64 = 0.05;
-/// Height over the deepest point of a pair up to which a point counts as deepest in full, and from which it does not, m. If
-/// the deepest points have less than the area of a point contact, the closest points get the difference.
+/// Height over the deepest point of a pair up to which a point counts as deepest in full, and from which it does not,
+/// m. If the deepest points have less than the area of a point contact, the closest points get the difference.
 const DEEPEST_M: [f64; 2] = [1e-5, 5e-5];
 /// Length of a line contact below which its weight fades from two points to one (at length zero), m.
 const SHORT_LINE_M: f64 = 1e-3;
@@ -191,8 +191,8 @@ fn line_face(
     }
 }
 
-/// Two side lines: their crossing, or the ends of their overlap if they are nearly parallel; in between, one fades into the
-/// other.
+/// Two side lines: their crossing, or the ends of their overlap if they are nearly parallel; in between, one fades
+/// into the other.
 fn line_line(plane: &ProjectionPlane, a: &Line, b: &Line, found: &mut Vec<FeatureOverlap>) {
     let (flat_a, flat_b) = (a.ends.map(|p| plane.project(&p)), b.ends.map(|p| plane.project(&p)));
     let (height_a, height_b) = (a.ends.map(|p| plane.height(&p)), b.ends.map(|p| plane.height(&p)));
@@ -238,8 +238,8 @@ fn line_line(plane: &ProjectionPlane, a: &Line, b: &Line, found: &mut Vec<Featur
 
 /// Appends the corners of a box of half extents `half` within `margin` (m) of the plane of a half-space.
 ///
-/// The area of a corner is a quarter of each of its faces, projected onto the half-space: for a box on a face they add up to
-/// the face, for one on an edge they change smoothly from one face to the next.
+/// The area of a corner is a quarter of each of its faces, projected onto the half-space: for a box on a face they
+/// add up to the face, for one on an edge they change smoothly from one face to the next.
 pub(super) fn plane_box(
     plane_w: &Pose,
     half: &Vec3,

@@ -42,8 +42,8 @@ impl FieldProbe<'_> {
     }
 }
 
-/// The minimum of a unimodal function in `start..start + width`: golden sections, then the parabola through three points
-/// around the best.
+/// The minimum of a unimodal function in `start..start + width`: golden sections, then the parabola through three
+/// points around the best.
 pub(super) fn golden_minimum(f: impl Fn(f64) -> f64, start: f64, width: f64) -> f64 {
     const SHARE: f64 = 0.381_966_011_250_105;
     let (mut low, mut high) = (start, start + width);

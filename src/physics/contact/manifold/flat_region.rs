@@ -1,8 +1,8 @@
 //! Samples of the flat and nearly flat regions of a general shape.
 //!
-//! A face that ends in rounded edges has no sharp edges to carry it, so it needs points of its own. A flat face carries at
-//! its outline, where it passes into a rounding. A nearly flat region has a moving lowest point, which counts less the flatter
-//! the region is (see [`super::field`]); samples spread over it count for the rest.
+//! A face that ends in rounded edges has no sharp edges to carry it, so it needs points of its own. A flat face
+//! carries at its outline, where it passes into a rounding. A nearly flat region has a moving lowest point, which
+//! counts less the flatter the region is (see [`super::field`]); samples spread over it count for the rest.
 
 use super::POINT_AREA;
 use crate::geometry::{Vec3, orthonormal_basis, shape::Shape};
@@ -55,8 +55,8 @@ struct PlaneFace<'a> {
 
 /// Flat samples of a shape, found from points `starts` on its surface that are about `step` (m) apart.
 ///
-/// Samples of an outline are full point contacts: a softer edge would let a body tip too early. The others have at most `area`
-/// (m²). A face that ends at `sharp` edges needs none.
+/// Samples of an outline are full point contacts: a softer edge would let a body tip too early. The others have at
+/// most `area` (m²). A face that ends at `sharp` edges needs none.
 pub(super) fn flat_samples(
     shape: &Shape,
     starts: &[Vec3],

@@ -6,8 +6,8 @@ use crate::geometry::{
     convex::{self, ClosestPoints, ConvexShape},
 };
 
-/// Gap by which a refined direction must exceed that of a face or axis to be preferred, m. Directions of faces are exact,
-/// refined ones have the rounding of an iteration.
+/// Gap by which a refined direction must exceed that of a face or axis to be preferred, m. Directions of faces are
+/// exact, refined ones have the rounding of an iteration.
 const PREFER_FACES_M: f64 = 1e-6;
 /// The same for edge against edge, relative to the gap: nearly parallel edges repeat the direction of a face.
 const PREFER_FACES_SHARE: f64 = 0.01;

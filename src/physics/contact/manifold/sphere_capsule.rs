@@ -3,8 +3,8 @@
 use super::{ManifoldPoint, NON_MATERIAL, POINT_AREA, Primitive};
 use crate::geometry::{Pose, Vec3};
 
-/// Distance by which the closest points of two capsules must be closer than the interpolated gaps at the ends to count in
-/// full, m.
+/// Distance by which the closest points of two capsules must be closer than the interpolated gaps at the ends to
+/// count in full, m.
 const CLOSEST_FADE_M: f64 = 1e-4;
 
 /// The closest point of a sphere.
@@ -68,8 +68,8 @@ fn outside_corner(excess: &Vec3) -> (f64, Vec3) {
 
 /// Two capsules: the four end spheres against the other's core, and the closest pair of the cores between the ends.
 ///
-/// Each is a true gap of the two bodies. The closest pair is undefined where the cores are parallel, so it counts only as far
-/// as it is closer than the gaps at the ends, interpolated.
+/// Each is a true gap of the two bodies. The closest pair is undefined where the cores are parallel, so it counts
+/// only as far as it is closer than the gaps at the ends, interpolated.
 pub(super) fn capsules(
     a: &Primitive,
     pose_a: &Pose,

@@ -96,8 +96,8 @@ impl Incline {
     }
 }
 
-/// True if a body on the incline tips over its lower edge. Gravity turns from flat to `slope` over a quarter of a second, so
-/// that only statics decides.
+/// True if a body on the incline tips over its lower edge. Gravity turns from flat to `slope` over a quarter of a
+/// second, so that only statics decides.
 fn tips(primitive: Primitive, turn: Quat, slope: f64) -> bool {
     let mut scene = Incline::new(primitive, turn, 0.0, 5.0);
     let (ramp, start) = (12_500, scene.body.pose_w.rotation);

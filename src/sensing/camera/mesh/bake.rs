@@ -82,8 +82,8 @@ pub(crate) fn extent(mesh: &Mesh) -> f64 {
     Aabb::from_points(&mesh.vertices).map_or(0.0, |bounds| bounds.size().max())
 }
 
-/// Material ids at points spread evenly over the surface around `p`, to a little more than half the distance to adjacent
-/// vertices. Their proportions change smoothly across a border, however the triangles there are shaped.
+/// Material ids at points spread evenly over the surface around `p`, to a little more than half the distance to
+/// adjacent vertices. Their proportions change smoothly across a border, however the triangles there are shaped.
 fn material_ids_near(shape: &Shape, p: &V3, n: &V3, spacing: f32) -> Vec<u16> {
     const STEPS: i32 = 2;
     let reference = if n.z.abs() < 0.9 { V3::z() } else { V3::x() };

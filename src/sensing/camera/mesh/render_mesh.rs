@@ -34,9 +34,9 @@ const MAX_SUBDIVIDED_TRIANGLES: usize = 120_000;
 
 /// Triangles and materials of one kind of object, shared by all its instances.
 ///
-/// Materials are functions of the object frame. They are evaluated once, into vertices, or into textures for large flat faces
-/// and for surfaces with text, and filtered to the spacing of the samples; small images therefore do not alias. Coarser levels
-/// of detail are drawn where they look the same.
+/// Materials are functions of the object frame. They are evaluated once, into vertices, or into textures for large
+/// flat faces and for surfaces with text, and filtered to the spacing of the samples; small images therefore do not
+/// alias. Coarser levels of detail are drawn where they look the same.
 #[derive(Clone, Debug)]
 pub struct RenderMesh {
     /// From fine to coarse; at least one.
@@ -263,8 +263,8 @@ fn subdivide(mut mesh: Mesh, mut material_ids: Vec<u16>, max_edge: f64) -> Subdi
     }
 }
 
-/// Root mean square distance of the centroids of triangles from the surface of `shape`, m. Centroids deeper than `cell` are
-/// ignored: they are hidden by another part of the shape.
+/// Root mean square distance of the centroids of triangles from the surface of `shape`, m. Centroids deeper than
+/// `cell` are ignored: they are hidden by another part of the shape.
 fn rms_error(mesh: &Mesh, shape: &Shape, cell: f64) -> f32 {
     let distances = mesh.triangles.iter().map(|t| shape.distance(&centroid(mesh, t)));
     let squares: f64 = distances.filter(|d| d.abs() < cell).map(|d| d * d).sum();

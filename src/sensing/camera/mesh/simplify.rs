@@ -1,12 +1,13 @@
 //! Mesh simplification that preserves appearance.
 //!
-//! Edges are collapsed in the order of their cost, which quadrics measure in the space of positions, normals and materials
-//! together (Garland & Heckbert, Simplifying Surfaces with Color and Texture using Quadric Error Metrics, IEEE Visualization
-//! 1998). A vertex only ever moves onto a neighbour, so no normal or material has to be interpolated. Vertices at creases and
-//! open borders stay.
+//! Edges are collapsed in the order of their cost, which quadrics measure in the space of positions, normals and
+//! materials together (Garland & Heckbert, Simplifying Surfaces with Color and Texture using Quadric Error Metrics,
+//! IEEE Visualization 1998). A vertex only ever moves onto a neighbour, so no normal or material has to be
+//! interpolated. Vertices at creases and open borders stay.
 //!
-//! The `meshopt` crate simplifies with attributes, too, but binds a C++ library whose rounding depends on its compiler.
-//! Images must be byte-identical on every machine, and hence the meshes: this is plain `f64` arithmetic in a fixed order.
+//! The `meshopt` crate simplifies with attributes, too, but binds a C++ library whose rounding depends on its
+//! compiler. Images must be byte-identical on every machine, and hence the meshes: this is plain `f64` arithmetic in
+//! a fixed order.
 
 use std::{cmp::Reverse, collections::BinaryHeap};
 
@@ -19,8 +20,8 @@ const DIMENSIONS: usize = 6 + MaterialSample::COMPONENTS;
 const NORMAL_TOLERANCE: f64 = 0.15;
 /// Deviation of a material component that costs as much.
 const MATERIAL_TOLERANCE: f64 = 0.005;
-/// Cost, in squares of the tolerance, at which a surface is off by about the tolerance. A quadric sums squared distances over
-/// all triangles it represents, and removed vertices are farther off than the middles of edges.
+/// Cost, in squares of the tolerance, at which a surface is off by about the tolerance. A quadric sums squared
+/// distances over all triangles it represents, and removed vertices are farther off than the middles of edges.
 const MAX_COST: f64 = 64.0;
 /// Minimum cosine by which a collapse may turn a triangle.
 const MIN_TURN_COSINE: f32 = 0.5;

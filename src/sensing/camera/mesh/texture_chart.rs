@@ -1,7 +1,7 @@
 //! Textures of flat faces and of parts of curved surfaces.
 //!
-//! A chart maps surface points to texels by projection along one direction. Its texture is painted on first use from the
-//! materials of the surface and filtered by a mip map (Williams, Pyramidal Parametrics, 1983).
+//! A chart maps surface points to texels by projection along one direction. Its texture is painted on first use from
+//! the materials of the surface and filtered by a mip map (Williams, Pyramidal Parametrics, 1983).
 
 use std::sync::{Arc, OnceLock};
 
@@ -185,8 +185,8 @@ struct SurfacePoint {
     inset: f32,
 }
 
-/// Enters the points of a triangle at the texels that it covers or nearly covers. Of several points, a texel keeps the one with
-/// the greatest inset.
+/// Enters the points of a triangle at the texels that it covers or nearly covers. Of several points, a texel keeps
+/// the one with the greatest inset.
 fn project_triangle(
     corners: &[ChartVertex; 3],
     uvs: [[f32; 2]; 3],
@@ -230,8 +230,8 @@ fn project_triangle(
     }
 }
 
-/// Fills unpainted texels with the mean of their surroundings from coarser copies (pull-push; Gortler et al., The Lumigraph,
-/// 1996), so that coarse mip levels are clean at the border of the chart.
+/// Fills unpainted texels with the mean of their surroundings from coarser copies (pull-push; Gortler et al., The
+/// Lumigraph, 1996), so that coarse mip levels are clean at the border of the chart.
 fn fill_gaps(texels: Vec<Option<Texel>>, size: [usize; 2]) -> Vec<Texel> {
     if texels.iter().all(Option::is_some) || size == [1, 1] {
         return texels.into_iter().map(Option::unwrap_or_default).collect();

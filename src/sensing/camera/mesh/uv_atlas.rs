@@ -1,7 +1,7 @@
 //! Divides surfaces into texture charts.
 //!
-//! Flat meshes get one chart per plane and material. A curved surface with text is divided into connected parts that face
-//! mostly along one axis; projection along that axis stretches them by less than √3.
+//! Flat meshes get one chart per plane and material. A curved surface with text is divided into connected parts that
+//! face mostly along one axis; projection along that axis stretches them by less than √3.
 
 use std::{collections::BTreeMap, sync::Arc};
 

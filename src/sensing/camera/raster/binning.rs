@@ -147,8 +147,8 @@ impl TileBins {
         self.sorted[range].iter().map(|&index| &self.triangles[index as usize])
     }
 
-    /// Collects a tile's triangles in their order, without those hidden by one that covers the whole tile. Returns true if
-    /// that one alone remains.
+    /// Collects a tile's triangles in their order, without those hidden by one that covers the whole tile. Returns
+    /// true if that one alone remains.
     pub(crate) fn collect_visible(
         &self,
         tile: usize,

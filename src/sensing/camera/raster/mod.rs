@@ -6,8 +6,8 @@ pub(crate) mod sample_buffer;
 /// Corners of a projected triangle, each x, y (pixels from the top left of the image) and reciprocal depth.
 pub(crate) type ScreenCorners = [[f32; 3]; 3];
 
-// Sample buffers store one `u32` per sample: a flag for moving objects, the index of the object in the scene and the index
-// of the triangle in the object's mesh.
+// Sample buffers store one `u32` per sample: a flag for moving objects, the index of the object in the scene and the
+// index of the triangle in the object's mesh.
 
 /// Number of bits of a triangle id that hold the index of the triangle in its mesh.
 pub(crate) const TRIANGLE_BITS: u32 = 21;

@@ -12,20 +12,21 @@ use crate::sensing::camera::simd::{LANE_INDEX, LANES, f32x8};
 pub(crate) const ROWS_PER_PIXEL: usize = 5;
 /// Index of the centre's row.
 pub(crate) const CENTRE_ROW: usize = 2;
-/// Position of each row's sample within the pixel. No two share a row or column, so edges of every slope are antialiased.
+/// Position of each row's sample within the pixel. No two share a row or column, so edges of every slope are
+/// antialiased.
 pub(crate) const SAMPLE_OFFSETS: [[f32; 2]; ROWS_PER_PIXEL] =
     [[0.375, 0.125], [0.875, 0.375], [0.5, 0.5], [0.125, 0.625], [0.625, 0.875]];
 
 /// A rectangle of samples that keeps, per sample, the greatest `w` drawn there and the id of its triangle.
 ///
-/// Each unit square has `PER_UNIT` rows of one sample: a unit is a pixel of a camera ([`ROWS_PER_PIXEL`]) or a texel of a
-/// shadow map (1).
+/// Each unit square has `PER_UNIT` rows of one sample: a unit is a pixel of a camera ([`ROWS_PER_PIXEL`]) or a texel
+/// of a shadow map (1).
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SampleBuffer<const PER_UNIT: usize> {
     columns: usize,
     rows: usize,
-    /// Reciprocal depth, or height towards the light. Rows are [`LANES`] longer than `columns`, since samples are written eight
-    /// at a time.
+    /// Reciprocal depth, or height towards the light. Rows are [`LANES`] longer than `columns`, since samples are
+    /// written eight at a time.
     pub(crate) w: Vec<f32>,
     /// Triangle ids, or [`NO_TRIANGLE`]; empty in shadow maps.
     pub(crate) ids: Vec<u32>,
@@ -71,8 +72,8 @@ impl<const PER_UNIT: usize> SampleBuffer<PER_UNIT> {
 
     /// Draws a triangle where no nearer one was drawn before.
     ///
-    /// Its corners run clockwise in an image whose y axis points down; other triangles face away and are skipped. `origin`
-    /// is the position of the buffer's first unit.
+    /// Its corners run clockwise in an image whose y axis points down; other triangles face away and are skipped.
+    /// `origin` is the position of the buffer's first unit.
     #[inline(always)]
     pub(crate) fn draw<const WITH_IDS: bool>(&mut self, corners: &ScreenCorners, origin: [f32; 2], id: u32) {
         self.draw_rows::<WITH_IDS, 0, 1>(corners, origin, id);
@@ -104,7 +105,8 @@ impl<const PER_UNIT: usize> SampleBuffer<PER_UNIT> {
             let [x, y] = first_sample::<PER_UNIT>(row);
             let row_edges = setup.edges.map(|e| f32x8::splat(e.c + (e.b * y + e.a * x)));
             let row_w = f32x8::splat(setup.w + (setup.dw_dy * y + setup.dw_dx * x));
-            // Chunks start at multiples of eight, so that a load never spans two recent stores (no store forwarding stall).
+            // Chunks start at multiples of eight, so that a load never spans two recent stores (no store forwarding
+            // stall).
             let mut column = span.columns[0] / LANES * LANES;
             while column < span.columns[1] {
                 let step = f32x8::splat(column as f32) + LANE_INDEX;
@@ -113,7 +115,8 @@ impl<const PER_UNIT: usize> SampleBuffer<PER_UNIT> {
                 let Some(old) = self.w.get_mut(at..).and_then(|w| w.first_chunk_mut::<LANES>()) else {
                     break;
                 };
-                // The plane of w, extrapolated to samples outside the triangle's edges, is clamped to the corners' range.
+                // The plane of w, extrapolated to samples outside the triangle's edges, is clamped to the corners'
+                // range.
                 let w = (row_w + dw_dx * step).fast_max(min_w).fast_min(max_w);
                 let mut is_visible = w.simd_gt(f32x8::new(*old));
                 if coverage == Coverage::Partial {

@@ -57,9 +57,9 @@ impl PixelRays {
 pub(crate) struct TriangleInterpolator<'a> {
     pub(crate) id: u32,
     object: f32,
-    /// Products of a ray with these vectors are proportional to its barycentric coordinates: they are the volumes that the ray
-    /// spans with the opposite edges. This also holds for triangles that reach behind the camera (Olano & Greer, Triangle
-    /// Scan Conversion using 2D Homogeneous Coordinates, 1997).
+    /// Products of a ray with these vectors are proportional to its barycentric coordinates: they are the volumes
+    /// that the ray spans with the opposite edges. This also holds for triangles that reach behind the camera (Olano
+    /// & Greer, Triangle Scan Conversion using 2D Homogeneous Coordinates, 1997).
     barycentric: [Vec3; 3],
     /// Corners relative to the eye.
     p: [V3; 3],

@@ -26,9 +26,9 @@ use crate::{
 
 /// Draws images of a [`RenderScene`] as cameras see it.
 ///
-/// A renderer keeps working memory between images. It also caches the moving shadows of the last state, which all cameras
-/// share, and the background (all fixed objects) of every camera that is fixed in the world. Neither changes depth or
-/// segmentation; with a cached background, colours of relit pixels differ from a full rendering by rounding.
+/// A renderer keeps working memory between images. It also caches the moving shadows of the last state, which all
+/// cameras share, and the background (all fixed objects) of every camera that is fixed in the world. Neither changes
+/// depth or segmentation; with a cached background, colours of relit pixels differ from a full rendering by rounding.
 /// A renderer may be used with several scenes, but keeps the cache of one.
 #[derive(Debug, Default)]
 pub struct Renderer {
@@ -84,8 +84,8 @@ impl Renderer {
     /// The result depends on the arguments alone and is byte-identical on every machine.
     ///
     /// # Errors
-    /// A setting of the camera is out of range, or the state lacks a body of the scene. A camera inside an object is not an
-    /// error; see [`RenderedImage::inside`].
+    /// A setting of the camera is out of range, or the state lacks a body of the scene. A camera inside an object is
+    /// not an error; see [`RenderedImage::inside`].
     pub fn render(
         &mut self,
         scene: &RenderScene,

@@ -103,8 +103,8 @@ pub(crate) fn instances<'a>(
     levels.iter().enumerate().map(instance).collect()
 }
 
-/// Returns the name of the first object that contains the camera: one whose triangles subtend a solid angle of 4π there (Van
-/// Oosterom & Strackee, 1983).
+/// Returns the name of the first object that contains the camera: one whose triangles subtend a solid angle of 4π
+/// there (Van Oosterom & Strackee, 1983).
 pub(crate) fn enclosing_object(
     scene: &RenderScene,
     lens: &Lens,

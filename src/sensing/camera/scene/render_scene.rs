@@ -27,8 +27,8 @@ pub struct RenderObject {
     pub segmentation_id: u16,
     /// Triangles and materials, shared by all instances.
     pub mesh: Arc<RenderMesh>,
-    /// The body that the object moves with. If it is a soft body, the mesh must be [embedded](RenderMesh::embedded_in) in it.
-    /// Kinematic bodies are not supported.
+    /// The body that the object moves with. If it is a soft body, the mesh must be
+    /// [embedded](RenderMesh::embedded_in) in it. Kinematic bodies are not supported.
     pub body: BodyId,
     /// Pose of the object in the frame of the body, or in the world; ignored for soft bodies.
     pub pose_in_body: Pose,
@@ -99,7 +99,8 @@ impl RenderScene {
     /// Prepares a scene: poses its fixed objects and draws their shadow maps.
     ///
     /// # Errors
-    /// A setting of the light is out of range, the pose of a fixed object is not finite, or there are more than 1000 objects.
+    /// A setting of the light is out of range, the pose of a fixed object is not finite, or there are more than 1000
+    /// objects.
     pub fn new(objects: Vec<RenderObject>, lighting: Lighting) -> Result<Self, CameraError> {
         check_light(&lighting)?;
         if objects.len() > MAX_OBJECTS {

@@ -1,7 +1,7 @@
 //! Ambient occlusion: the fraction of the sky visible from a surface point.
 //!
-//! An object's own occlusion is evaluated once per vertex from its distance field. Occlusion by other objects, which may
-//! move, is approximated per point by one ellipsoid per object.
+//! An object's own occlusion is evaluated once per vertex from its distance field. Occlusion by other objects, which
+//! may move, is approximated per point by one ellipsoid per object.
 
 use crate::{
     geometry::{Vec3, shape::Shape},

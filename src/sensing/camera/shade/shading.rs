@@ -93,8 +93,8 @@ impl Illumination {
     /// Radiance of surface points towards `to_eye` (unit vectors), before shadows and occlusion by other objects.
     ///
     /// Lambert and GGX with Smith's height-correlated masking (Walter et al., Microfacet Models for Refraction, 2007;
-    /// Heitz, Understanding the Masking-Shadowing Function, JCGT 2014) and Schlick's Fresnel term. The reflection of the sky
-    /// uses Karis's fit (Physically Based Shading on Mobile, 2014).
+    /// Heitz, Understanding the Masking-Shadowing Function, JCGT 2014) and Schlick's Fresnel term. The reflection of
+    /// the sky uses Karis's fit (Physically Based Shading on Mobile, 2014).
     #[inline(always)]
     pub(crate) fn shade(&self, s: &SurfaceSamples, to_eye: Vec3x8) -> DirectAndAmbient {
         let one = f32x8::ONE;
@@ -143,7 +143,8 @@ impl Illumination {
         map.visibility(&map.project(p), n, self.faces_key(n))
     }
 
-    /// As [`key_visibility`](Self::key_visibility), by a fine map where it reaches and by a wide one, if any, elsewhere.
+    /// As [`key_visibility`](Self::key_visibility), by a fine map where it reaches and by a wide one, if any,
+    /// elsewhere.
     #[inline(always)]
     pub(crate) fn key_visibility_cascaded(
         &self,

@@ -1,8 +1,8 @@
 //! Soft shadows of the key light by shadow maps.
 //!
 //! A map stores the height of the nearest caster towards the light. Its filter is as wide as the penumbra (Fernando,
-//! Percentage-Closer Soft Shadows, SIGGRAPH sketches 2005). The range of heights around each point shows for most points
-//! that they are fully lit or fully dark, and these are not filtered at all.
+//! Percentage-Closer Soft Shadows, SIGGRAPH sketches 2005). The range of heights around each point shows for most
+//! points that they are fully lit or fully dark, and these are not filtered at all.
 
 use wide::i32x8;
 
@@ -43,7 +43,8 @@ const MAX_RADIUS: f32 = 7.4;
 const MIN_RADIUS: f32 = 1.5;
 /// Maximum radius of a filter one vector wide, texels.
 const MAX_RADIUS_ONE_VECTOR: f32 = 3.4;
-/// Maximum length of a run of eight points, texels, that is interpolated from [`RUN_NODES`]: the filter is smooth enough.
+/// Maximum length of a run of eight points, texels, that is interpolated from [`RUN_NODES`]: the filter is smooth
+/// enough.
 const INTERPOLATED_RUN: f32 = 4.0;
 /// Maximum length of a run, texels, whose nodes decide whether all of it is fully lit or fully dark.
 const UNIFORM_RUN: f32 = 7.0;
@@ -86,8 +87,8 @@ pub(crate) struct ShadowMap {
     tangent: f32,
     /// Rise of level ground per texel along u and v, m.
     ///
-    /// Ranges compare heights above level ground: an occluder is further along the light than its receiver and thus also
-    /// higher above level ground, whereas level ground never rises above itself.
+    /// Ranges compare heights above level ground: an occluder is further along the light than its receiver and thus
+    /// also higher above level ground, whereas level ground never rises above itself.
     ground_slope: [f32; 2],
     heights: SampleBuffer<1>,
     /// Heights above level ground in and around each tile.
@@ -376,8 +377,8 @@ impl ReceiverPlanes {
 
 /// Percentage-closer filter around one receiver.
 ///
-/// Only occluders within the cone of the lamp count: an offset to the side larger than height × lamp width is ignored, so a
-/// surface that rises next to the point does not darken it.
+/// Only occluders within the cone of the lamp count: an offset to the side larger than height × lamp width is
+/// ignored, so a surface that rises next to the point does not darken it.
 struct PenumbraFilter<'a> {
     map: &'a ShadowMap,
     /// u and v, texels, and height, m.

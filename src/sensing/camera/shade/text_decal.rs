@@ -7,7 +7,8 @@ const MIN_FACING_COSINE: f32 = 0.1;
 /// Maximum distance of a printed surface from the cylinder of a wrapped line, in radii of the cylinder.
 const MAX_RADIUS_DEVIATION: f64 = 0.5;
 
-/// Fraction of the square of edge `spacing` (m) about `p` (object frame, m) that letters cover, on a surface of normal `n`.
+/// Fraction of the square of edge `spacing` (m) about `p` (object frame, m) that letters cover, on a surface of
+/// normal `n`.
 pub(crate) fn coverage(decal: &TextDecal, p: &V3, n: &V3, spacing: f32) -> f32 {
     let Some([right, up]) = text_position(decal, &p.cast(), n) else { return 0.0 };
     let (sin, cos) = decal.line.turn.sin_cos();
@@ -15,8 +16,8 @@ pub(crate) fn coverage(decal: &TextDecal, p: &V3, n: &V3, spacing: f32) -> f32 {
     decal.coverage().share(x, y, f64::from(spacing)) as f32
 }
 
-/// Position of a surface point relative to the middle of the line, to the right and up as seen by the viewer, m; `None` if the
-/// point is outside the printed area.
+/// Position of a surface point relative to the middle of the line, to the right and up as seen by the viewer, m;
+/// `None` if the point is outside the printed area.
 fn text_position(decal: &TextDecal, p: &Vec3, n: &V3) -> Option<[f64; 2]> {
     let line = &decal.line;
     let middle = Vec3::from(line.at);

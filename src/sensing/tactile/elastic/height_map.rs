@@ -19,8 +19,8 @@ pub(super) const SUBCELLS: usize = 3;
 /// Height above the apex beyond which triangles are skipped, m: no gripper pushes a pad in that far.
 const MAX_HEIGHT: f64 = 6e-3;
 
-/// Height of the lowest surface (m above the apex plane; infinite without one) on a grid [`SUBCELLS`] times finer than the
-/// grid of the gel.
+/// Height of the lowest surface (m above the apex plane; infinite without one) on a grid [`SUBCELLS`] times finer
+/// than the grid of the gel.
 #[derive(Clone, Debug, PartialEq)]
 pub(in super::super) struct HeightMap {
     pub(in super::super) columns: usize,

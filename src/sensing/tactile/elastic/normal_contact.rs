@@ -1,5 +1,5 @@
-//! Pressure under a pressed shape: conjugate gradients on the touching cells (Polonsky & Keer, Wear 231 (1999) 206), with the
-//! total force given and the indentation found.
+//! Pressure under a pressed shape: conjugate gradients on the touching cells (Polonsky & Keer, Wear 231 (1999) 206),
+//! with the total force given and the indentation found.
 
 use super::gel::{Gel, GelScratch};
 
@@ -19,8 +19,8 @@ pub(super) struct NormalSolution {
 
 /// Presses a shape into the gel until the pressure sums up to `force` (N).
 ///
-/// `gap` is the height of the shape above the undeformed gel at each cell, m; infinite where there is no shape. `None` if
-/// there is no shape at all.
+/// `gap` is the height of the shape above the undeformed gel at each cell, m; infinite where there is no shape.
+/// `None` if there is no shape at all.
 pub(super) fn solve_normal_contact(
     gel: &Gel,
     gap: &[f32],
@@ -34,7 +34,8 @@ pub(super) fn solve_normal_contact(
     let (mut residual, mut direction, mut moved) = (vec![0.0_f32; n], vec![0.0_f32; n], vec![0.0_f32; n]);
     let mut sunk = vec![0.0_f32; n];
     apply_compliance(gel, &p, &mut sunk, scratch);
-    // `conjugate` is 1 if the next direction may be conjugate to the last one, and 0 if the touching cells have changed.
+    // `conjugate` is 1 if the next direction may be conjugate to the last one, and 0 if the touching cells have
+    // changed.
     let (mut before, mut conjugate, mut approach) = (1.0_f64, 0.0_f32, 0.0);
     for _ in 0..MAX_ITERATIONS {
         let depth = mean_of_touching(&p, sunk.iter().zip(gap).map(|(u, g)| u + g));

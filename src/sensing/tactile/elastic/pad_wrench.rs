@@ -12,8 +12,8 @@ pub struct PadWrench {
 }
 
 impl PadWrench {
-    /// Wrench of a normal force and a shear force (N) at (x, y) (m) on the apex plane, and a twist about the normal there
-    /// (N m). A positive `normal` presses.
+    /// Wrench of a normal force and a shear force (N) at (x, y) (m) on the apex plane, and a twist about the normal
+    /// there (N m). A positive `normal` presses.
     pub fn new(normal: f64, shear: [f64; 2], twist: f64, at: [f64; 2]) -> Self {
         let force = Vec3::new(shear[0], shear[1], -normal);
         let arm = Vec3::new(at[0], at[1], 0.0);
@@ -38,9 +38,11 @@ impl PadWrench {
     }
 }
 
-/// Coefficient of friction of a contact patch: the mean over its points, weighted by normal force. `None` without a force.
+/// Coefficient of friction of a contact patch: the mean over its points, weighted by normal force. `None` without a
+/// force.
 ///
-/// The coefficient of a point is that of the pair of pad and body (the larger of both), static or, while they slide, dynamic.
+/// The coefficient of a point is that of the pair of pad and body (the larger of both), static or, while they slide,
+/// dynamic.
 pub fn patch_friction(patch: &ContactPatch) -> Option<f64> {
     let sum = patch.points.iter().fold([0.0; 2], |[bound, force], point| {
         let normal = point.pressure * point.area;

@@ -1,7 +1,7 @@
 //! Gel field against an independent axisymmetric finite-element solution of the same layer, and against its invariants.
 //!
-//! The reference is a sphere of 4 mm on a flat layer (4 mm, ν 0.475, μ 0.145 MPa), and shear and twist of a stuck disc of
-//! 1.5 mm. Depth and outward displacement of the sphere are checked in `tests/validation/gel.rs`.
+//! The reference is a sphere of 4 mm on a flat layer (4 mm, ν 0.475, μ 0.145 MPa), and shear and twist of a stuck
+//! disc of 1.5 mm. Depth and outward displacement of the sphere are checked in `tests/validation/gel.rs`.
 
 use super::{
     super::spec::TactileSpec,

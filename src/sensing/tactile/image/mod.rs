@@ -1,7 +1,7 @@
 //! Colour image of a gel field, and the mosaic of the last images of both fingers.
 //!
-//! [`PolynomialOptics`] is the default; [`TaximOptics`] runs Taxim's pipeline with tables of the user. Both write 320 × 240
-//! pixels of 8-bit RGB, row by row from the top.
+//! [`PolynomialOptics`] is the default; [`TaximOptics`] runs Taxim's pipeline with tables of the user. Both write 320
+//! × 240 pixels of 8-bit RGB, row by row from the top.
 
 mod mosaic;
 mod polynomial_optics;

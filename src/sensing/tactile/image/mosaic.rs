@@ -32,8 +32,8 @@ pub fn mosaic_cell(image: &RgbImage) -> RgbImage {
 
 /// Mosaic of 4 × 4 cells ([`mosaic_cell`]), 224 × 224: the last 8 of the left and of the right finger.
 ///
-/// `history` holds the cells of the left and the right finger, oldest first. A shorter history is extended at its start with
-/// its oldest cell; an empty one leaves its cells black.
+/// `history` holds the cells of the left and the right finger, oldest first. A shorter history is extended at its
+/// start with its oldest cell; an empty one leaves its cells black.
 pub fn mosaic<T: Borrow<RgbImage>>(history: [&[T]; 2], layout: MosaicLayout) -> RgbImage {
     let mut image = RgbImage::new(CELLS_PER_EDGE as u32 * CELL_SIZE, CELLS_PER_EDGE as u32 * CELL_SIZE);
     for (finger, cells) in history.into_iter().enumerate() {

@@ -34,8 +34,8 @@ pub struct OpticsFile {
     pub held_out_l1: f64,
     /// Greatest sine of slope in the fit; steeper surfaces are coloured like this one.
     pub steepest: f64,
-    /// Cosine series of the untouched image by channel: the sum of `background[c][j][i]` · cos(π i u) cos(π j v), grey levels,
-    /// with (u, v) from 0 to 1 across the image.
+    /// Cosine series of the untouched image by channel: the sum of `background[c][j][i]` · cos(π i u) cos(π j v),
+    /// grey levels, with (u, v) from 0 to 1 across the image.
     pub background: [Vec<Vec<f64>>; 3],
     /// Relative change of the light by channel and monomial of the slope; see [`slope_monomials`].
     pub colour: [Vec<f64>; 3],
@@ -43,9 +43,10 @@ pub struct OpticsFile {
 
 /// Optics of a sensor as a polynomial of the surface's slope.
 ///
-/// A slope multiplies the light that falls on its pixel, which the untouched image shows (Lambert's law for a light source of
-/// one elevation). So the same slope has the same sign of change everywhere, and a flat surface changes nothing. The factor of
-/// each channel is 1 plus a polynomial of degree 5 in the sines of the slope; see [`slope_monomials`].
+/// A slope multiplies the light that falls on its pixel, which the untouched image shows (Lambert's law for a light
+/// source of one elevation). So the same slope has the same sign of change everywhere, and a flat surface changes
+/// nothing. The factor of each channel is 1 plus a polynomial of degree 5 in the sines of the slope; see
+/// [`slope_monomials`].
 #[derive(Clone, Debug)]
 pub struct PolynomialOptics {
     /// Untouched image, 320 × 240 RGB.
@@ -121,8 +122,9 @@ impl PolynomialOptics {
         &self.leds
     }
 
-    /// Writes the image of a field into `rgb` (320 × 240 RGB; a shorter buffer gets the start of the untouched image), with cast
-    /// shadows if `shadows`. Without a field the image is the untouched one exactly, as is every pixel without a slope.
+    /// Writes the image of a field into `rgb` (320 × 240 RGB; a shorter buffer gets the start of the untouched
+    /// image), with cast shadows if `shadows`. Without a field the image is the untouched one exactly, as is every
+    /// pixel without a slope.
     pub fn render(&self, gel: &Gel, field: Option<&GelField>, shadows: bool, rgb: &mut [u8]) {
         let n = rgb.len().min(self.untouched.len());
         rgb[..n].copy_from_slice(&self.untouched[..n]);
@@ -160,8 +162,8 @@ impl PolynomialOptics {
         }
     }
 
-    /// Change of the colour (R, G, B, grey levels of 255) at a pixel (x, y) by a surface whose slope has the sines (a, b). Pixels
-    /// outside the image are clamped to its border.
+    /// Change of the colour (R, G, B, grey levels of 255) at a pixel (x, y) by a surface whose slope has the sines
+    /// (a, b). Pixels outside the image are clamped to its border.
     pub fn colour_change(&self, a: f64, b: f64, pixel: [usize; 2]) -> [f64; 3] {
         let scale = (f64::from(self.steepest) / a.hypot(b).max(1e-12)).min(1.0);
         let slopes = slope_monomials(a * scale, b * scale);
@@ -187,7 +189,8 @@ impl LightRow {
         Self { a: vec![0.0; width], b: vec![0.0; width], light: std::array::from_fn(|_| vec![0.0; width]) }
     }
 
-    /// Replaces slopes by their sines, limited to `steepest`. Returns the range from the first to the last pixel with a slope.
+    /// Replaces slopes by their sines, limited to `steepest`. Returns the range from the first to the last pixel with
+    /// a slope.
     fn slopes_to_sines(&mut self, steepest: f32) -> Option<Range<usize>> {
         for (a, b) in self.a.iter_mut().zip(&mut self.b) {
             let square = *a * *a + *b * *b;

@@ -1,8 +1,9 @@
 //! Cast shadows in the tactile image.
 //!
-//! Pressed gel rises towards the camera. For each pixel the horizon towards an LED is the greatest rise over distance along the
-//! surface; where it is higher than the LED, the light is dimmed. The shading by the pixel's own slope is in the fitted
-//! colours already, so only a horizon above that slope counts: a ball shades the ground next to it, not its own far side.
+//! Pressed gel rises towards the camera. For each pixel the horizon towards an LED is the greatest rise over distance
+//! along the surface; where it is higher than the LED, the light is dimmed. The shading by the pixel's own slope is
+//! in the fitted colours already, so only a horizon above that slope counts: a ball shades the ground next to it, not
+//! its own far side.
 
 use super::visible_surface::VisibleSurface;
 
@@ -17,9 +18,9 @@ const MIN_RISE: f32 = 0.5;
 
 /// Direction of the LED of one channel, derived from the fit to real presses.
 ///
-/// By Lambert's law a small slope s towards a light source of elevation e changes its light by the share s cot e, so the
-/// linear part of the fit gives direction and elevation. Scattered light dilutes the share, so that the derived elevation is
-/// rather too high than too low.
+/// By Lambert's law a small slope s towards a light source of elevation e changes its light by the share s cot e, so
+/// the linear part of the fit gives direction and elevation. Scattered light dilutes the share, so that the derived
+/// elevation is rather too high than too low.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Led {
     /// Unit vector along the surface towards the LED, image axes (x right, y down).

@@ -1,8 +1,8 @@
 //! Surface of the gel at the resolution of the image.
 //!
-//! The free surface of the gel is interpolated from the grid by a cubic. In contact with a rigid skin, the surface lies on the
-//! skin, whose height map is finer than the grid, so that the two never overlap. Details of a soft skin below the size of a
-//! cell are left out: the gel presses them flat.
+//! The free surface of the gel is interpolated from the grid by a cubic. In contact with a rigid skin, the surface
+//! lies on the skin, whose height map is finer than the grid, so that the two never overlap. Details of a soft skin
+//! below the size of a cell are left out: the gel presses them flat.
 
 use super::super::{
     elastic::{CubicTaps, Gel, GelField, cubic_taps},
@@ -103,7 +103,8 @@ impl VisibleSurface {
         }
     }
 
-    /// Blurs like the coating and lens of the sensor: twice a binomial filter of five pixels along each axis (σ = 1.4 px).
+    /// Blurs like the coating and lens of the sensor: twice a binomial filter of five pixels along each axis (σ = 1.4
+    /// px).
     fn soften(&mut self) {
         let n = self.size[0];
         if n < 5 {
@@ -126,8 +127,8 @@ impl VisibleSurface {
         }
     }
 
-    /// Writes the slopes along x and y of a row of pixels, by central differences; 0 at the border of the window, where the
-    /// surface is flat. `pitch` is the edge of a pixel, m.
+    /// Writes the slopes along x and y of a row of pixels, by central differences; 0 at the border of the window,
+    /// where the surface is flat. `pitch` is the edge of a pixel, m.
     pub(super) fn slopes(&self, row: usize, pitch: f32, slope_x: &mut [f32], slope_y: &mut [f32]) {
         let n = self.size[0];
         slope_x.fill(0.0);

@@ -1,9 +1,9 @@
 //! Marker flow: the motion of the markers of one finger as a few numbers.
 //!
-//! The displacement u of the markers at x is split as in the theory of small strains: u = ū + G (x − x̄) + residual, with the
-//! mean ū and the gradient G of the least-squares plane. The trace of G is the divergence (a dent pushes markers outwards), its
-//! antisymmetric part the twist, and its trace-free symmetric part the shear. All lengths are in px of the image (x right,
-//! y down).
+//! The displacement u of the markers at x is split as in the theory of small strains: u = ū + G (x − x̄) + residual,
+//! with the mean ū and the gradient G of the least-squares plane. The trace of G is the divergence (a dent pushes
+//! markers outwards), its antisymmetric part the twist, and its trace-free symmetric part the shear. All lengths are
+//! in px of the image (x right, y down).
 
 use super::marker_grid::{MARKER_COUNT, Markers};
 
@@ -90,8 +90,8 @@ impl MarkerFlow {
 
     /// Measure of the pressing force, px: root mean square of the displacement without its mean and twist.
     ///
-    /// It grows with the normal force, steeply for round or hard objects and less for flat and soft ones, and is unaffected by
-    /// shear along the surface. Converting it to N requires knowing the object.
+    /// It grows with the normal force, steeply for round or hard objects and less for flat and soft ones, and is
+    /// unaffected by shear along the surface. Converting it to N requires knowing the object.
     pub fn press(&self) -> f64 {
         let ([x, y], twist) = (self.mean(), self.twist());
         let square = |([ax, ay], [u, v]): (&[f64; 2], &[f64; 2])| {
@@ -101,8 +101,8 @@ impl MarkerFlow {
         (sum / MARKER_COUNT as f64).sqrt()
     }
 
-    /// Measure of the force that pulls the object out of the grasp, px: length of the mean displacement, without its part
-    /// towards the hand (+x), which pushes the object further in.
+    /// Measure of the force that pulls the object out of the grasp, px: length of the mean displacement, without its
+    /// part towards the hand (+x), which pushes the object further in.
     pub fn drag(&self) -> f64 {
         let [x, y] = self.mean();
         x.min(0.0).hypot(y)

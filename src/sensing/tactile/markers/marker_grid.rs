@@ -62,17 +62,18 @@ impl Markers {
     }
 }
 
-/// Position of a marker that moves with the surface of the gel, seen through the pinhole. A dent brings the surface closer to
-/// the pinhole, which moves its markers outwards in addition to their displacement along the surface.
+/// Position of a marker that moves with the surface of the gel, seen through the pinhole. A dent brings the surface
+/// closer to the pinhole, which moves its markers outwards in addition to their displacement along the surface.
 fn elastic(gel: &Gel, field: &GelField, px: [f32; 2]) -> [f32; 2] {
     let rest = gel.view.image_to_pad(&gel.pad, px.map(f64::from));
     let moved = gel.view.pad_to_image(&(rest + Vec3::from(field.displacement_at(gel, rest.x, rest.y))));
     moved.map(|x| x as f32)
 }
 
-/// Positions by the law of FOTS (Zhao et al., arXiv 2404.19217), with all three parts evaluated at the initial positions:
-/// dilation away from each touched marker by the depth of the dent there, and shear and twist with the motion of the contact,
-/// decaying from its centre. The twist is (R(θ) − I)(M − G); the released codes write cos(θ − 1) for cos θ − 1.
+/// Positions by the law of FOTS (Zhao et al., arXiv 2404.19217), with all three parts evaluated at the initial
+/// positions: dilation away from each touched marker by the depth of the dent there, and shear and twist with the
+/// motion of the contact, decaying from its centre. The twist is (R(θ) − I)(M − G); the released codes write cos(θ −
+/// 1) for cos θ − 1.
 fn fots(gel: &Gel, law: &FotsSpec, field: &GelField, initial: &MarkerPositions) -> MarkerPositions {
     let scale = law.scale * 1e3;
     let to_px = |at: [f64; 2]| [160.0 + scale * at[0], 120.0 + scale * at[1]];

@@ -1,9 +1,10 @@
-//! Taxim's image (Si & Yuan, *Taxim: An Example-based Simulation Model for GelSight Tactile Sensors*, RA-L 2022): the model of
-//! the paper, with calibration tables of the user, without shadows, as SoftVTBench runs it.
+//! Taxim's image (Si & Yuan, *Taxim: An Example-based Simulation Model for GelSight Tactile Sensors*, RA-L 2022): the
+//! model of the paper, with calibration tables of the user, without shadows, as SoftVTBench runs it.
 //!
-//! Here the shape of the gel is not elastic: the dent is a pyramid of Gaussian blurs. Colours come from a table over magnitude
-//! and direction of the slope; each entry is a quadratic polynomial of the pixel position at 640 × 480. The Mini's gel map is
-//! flat, adds no slope, and is not read. The files are those of the PyPI package `taxim`, with red and blue exchanged as there.
+//! Here the shape of the gel is not elastic: the dent is a pyramid of Gaussian blurs. Colours come from a table over
+//! magnitude and direction of the slope; each entry is a quadratic polynomial of the pixel position at 640 × 480. The
+//! Mini's gel map is flat, adds no slope, and is not read. The files are those of the PyPI package `taxim`, with red
+//! and blue exchanged as there.
 
 use std::{f64::consts::PI, path::Path};
 
@@ -78,8 +79,8 @@ impl TaximOptics {
         Ok(Self { bins, table, background: background(&f0.values()) })
     }
 
-    /// Writes the image of a field into `rgb` (320 × 240 RGB; nothing is written if it is shorter). The image without a field
-    /// also differs from the untouched one, by the table's entry for a flat surface, as in Taxim.
+    /// Writes the image of a field into `rgb` (320 × 240 RGB; nothing is written if it is shorter). The image without
+    /// a field also differs from the untouched one, by the table's entry for a flat surface, as in Taxim.
     pub fn render(&self, gel: &Gel, field: Option<&GelField>, rgb: &mut [u8]) {
         let [width, height] = IMAGE_SIZE;
         if rgb.len() < 3 * width * height {
