@@ -7,8 +7,8 @@
 //! [`parallel`] (jobs on threads).
 //!
 //! Examples: a dropped cube and a squeezed cube in [`physics::world`], distances in [`geometry::shape`], kinematics
-//! in [`robot`], a rendered image in [`sensing::camera`], a tactile image in [`sensing::tactile`], the verdict on an
-//! episode in [`evaluation::judge`].
+//! in [`robot`], a rendered image in [`sensing::camera`], a tactile image in [`sensing::tactile`], the verdict on
+//! an episode in [`evaluation::judge`].
 //!
 //! Units are SI throughout; a name carries its unit where it is not SI or not obvious. Frames are suffixes:
 //! `_w` world, `_b` robot base, `_h` hand, `_p` pad, `_o` object.

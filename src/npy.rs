@@ -28,8 +28,8 @@ const ALIGNMENT: usize = 64;
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct NpyArray {
-    /// Element type in NumPy's notation: byte order (`<`, `>`, `|`, `=`), kind and bytes per element, as in `<f4` or
-    /// `|u1`.
+    /// Element type in NumPy's notation: byte order (`<`, `>`, `|`, `=`), kind and bytes per element, as
+    /// in `<f4` or `|u1`.
     pub dtype: String,
     /// Lengths of the axes, slowest first.
     pub shape: Vec<usize>,
@@ -219,8 +219,8 @@ pub fn read_npz(path: &Path, key: &str) -> Result<NpyArray, NpzError> {
     NpyArray::parse(&bytes).map_err(|e| content(format!("array \"{key}\": {e}")))
 }
 
-/// Reads the array `key` of the archive at `path`. Its type must be one of `kinds` (without byte order), its elements
-/// finite.
+/// Reads the array `key` of the archive at `path`. Its type must be one of `kinds` (without byte
+/// order), its elements finite.
 ///
 /// # Errors
 /// As [`read_npz`], or names the type, or the first element that is not finite.

@@ -129,8 +129,8 @@ fn drain<T: Send>(
     }
 }
 
-/// A pool of more than one thread. `None` for fewer, or if the system refuses them: then the calling thread does the
-/// work.
+/// A pool of more than one thread. `None` for fewer, or if the system refuses them: then the calling
+/// thread does the work.
 fn pool(threads: usize) -> Option<ThreadPool> {
     if threads < 2 {
         return None;

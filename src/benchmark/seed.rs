@@ -128,8 +128,8 @@ impl EpisodeSeed {
     }
 }
 
-/// Random generator keyed by the hash of `parts`. The hash includes their lengths, so that different lists never
-/// collide.
+/// Random generator keyed by the hash of `parts`. The hash includes their lengths, so that
+/// different lists never collide.
 pub fn keyed_rng(parts: &[&str]) -> ChaCha8Rng {
     let mut hash = Sha256::new();
     for part in parts {

@@ -129,8 +129,8 @@ impl Settings {
     }
 }
 
-/// Former paths of settings and what they are called now. The same keys are serde aliases, for settings in tables and
-/// files.
+/// Former paths of settings and what they are called now. The same keys are serde aliases, for settings
+/// in tables and files.
 const RENAMED: [(&str, &str); 7] = [
     ("rules", "criteria"),
     ("physics.alpha", "physics.rayleigh_mass"),

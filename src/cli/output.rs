@@ -6,8 +6,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::text;
 
-/// Prints to standard output with control characters escaped. Ignores write errors: a closed pipe does not end a
-/// command.
+/// Prints to standard output with control characters escaped. Ignores write errors: a closed pipe does
+/// not end a command.
 pub(crate) fn print(text: &str) {
     let mut out = std::io::stdout().lock();
     let _ = out.write_all(text::escape_control(text).as_bytes()).and_then(|()| out.flush());

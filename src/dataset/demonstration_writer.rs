@@ -35,8 +35,8 @@ pub fn frame_rate() -> u32 {
 }
 
 impl DemonstrationWriter<'_> {
-    /// Renders the state before each action and writes all files. The HDF5 file is written last: its presence marks a
-    /// complete demonstration.
+    /// Renders the state before each action and writes all files. The HDF5 file is written last: its presence
+    /// marks a complete demonstration.
     ///
     /// # Errors
     /// A sensor cannot be simulated, a file not written, or `is_cancelled` returned true. There is no HDF5 file then.

@@ -65,8 +65,8 @@ impl TaskPaths {
         self.root.join(format!("previews/{}/demo_{demo}.mp4", self.name()))
     }
 
-    /// A file of an attempt while the task is being recorded. `kind` is `hdf5`, one of [`VIDEO_STREAMS`] with `.mp4`,
-    /// or `preview.mp4`.
+    /// A file of an attempt while the task is being recorded. `kind` is `hdf5`, one of [`VIDEO_STREAMS`]
+    /// with `.mp4`, or `preview.mp4`.
     pub fn part(&self, attempt: u32, kind: &str) -> PathBuf {
         self.parts().join(format!("attempt_{attempt:05}.{kind}"))
     }

@@ -1,5 +1,5 @@
-//! Datasets of demonstrations: recording to HDF5 and video, reading, checking, statistics, and conversion from and to
-//! other formats.
+//! Datasets of demonstrations: recording to HDF5 and video, reading, checking, statistics, and conversion from
+//! and to other formats.
 //!
 //! A [`Demonstration`] holds the numbers of a rollout in memory, one [`DataStream`] per quantity. Images are rendered
 //! one step at a time ([`step_images::StepRenderer`]) and go straight into files

@@ -5,8 +5,8 @@
 //!   deformation of a
 //!   *stable* squeeze ([`StabilityCriteria`]; SoftVTBench, appendix C.3).
 //!
-//! Closure is 0 with the gripper open (80 mm) and 1 with the gels in contact. `softvt scripts/calibrate.lua` runs
-//! both scans.
+//! Closure is 0 with the gripper open (80 mm) and 1 with the gels in contact. `softvt
+//! scripts/calibrate.lua` runs both scans.
 
 use serde::{Deserialize, Serialize};
 

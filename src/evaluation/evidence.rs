@@ -1,7 +1,7 @@
 //! Input of the judge after every physics step: plain numbers in the world frame, hidden from policies.
 //!
-//! Forces enter as impulses (force times the length of the physics step), so that they may be summed over a control
-//! step.
+//! Forces enter as impulses (force times the length of the physics step), so that they may be summed
+//! over a control step.
 
 use crate::geometry::{Pose, Vec3};
 
@@ -78,8 +78,8 @@ impl BodyEvidence {
 }
 
 impl Evidence<'_> {
-    /// True if every number that the criteria read is finite. Deformations are not included: a missing one is counted
-    /// apart.
+    /// True if every number that the criteria read is finite. Deformations are not included: a missing
+    /// one is counted apart.
     pub fn is_finite(&self) -> bool {
         let pose = self.goal.pose_w.to_homogeneous();
         self.time_s.is_finite()

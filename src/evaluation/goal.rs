@@ -7,9 +7,9 @@
 //!    object at the goal (`on`), or by anything but the robot (`in`),
 //! 3. no part of the robot pressed on it at any physics step of the control step.
 //!
-//! The goal is reached when this held for ⌈hold time / control step⌉ control steps in a row, at least one. A target
-//! that has rested at the goal for one control step and leaves it later counts as dropped
-//! ([`super::drop::DropReason::LeftGoal`]).
+//! The goal is reached when this held for ⌈hold time / control step⌉ control steps in a row, at
+//! least one. A target that has rested at the goal for one control step and leaves it later
+//! counts as dropped ([`super::drop::DropReason::LeftGoal`]).
 
 use crate::geometry::{Aabb, Pose, Vec3};
 
@@ -49,8 +49,8 @@ impl GoalRegion {
         }
     }
 
-    /// The looser predicate of SoftVTBench's released code: true if both centres are closer than a distance,
-    /// horizontally and vertically ([`goal_v1_on_m`](SuccessCriteria::goal_v1_on_m),
+    /// The looser predicate of SoftVTBench's released code: true if both centres are closer than
+    /// a distance, horizontally and vertically ([`goal_v1_on_m`](SuccessCriteria::goal_v1_on_m),
     /// [`goal_v1_in_m`](SuccessCriteria::goal_v1_in_m)).
     pub fn contains_v1(&self, criteria: &SuccessCriteria, object_w: &Pose, centre_w: &Vec3) -> bool {
         let reach = match self {

@@ -1,9 +1,9 @@
 //! Scores of an episode: deformation, drop, slip, goal, safety, calibration and statistics.
 //!
-//! Everything here is a small pure function or state machine on plain numbers; the simulator is one source of them, a
-//! motion-capture system could be another. [`judge::Judge`] takes one [`evidence::Evidence`] per physics step and
-//! returns a [`record::Verdict`] at the end. Verdicts go into [`record::EpisodeRecord`]s, and those into a
-//! [`summary::SuiteSummary`].
+//! Everything here is a small pure function or state machine on plain numbers; the simulator is one source of
+//! them, a motion-capture system could be another. [`judge::Judge`] takes one [`evidence::Evidence`] per
+//! physics step and returns a [`record::Verdict`] at the end. Verdicts go into [`record::EpisodeRecord`]s, and
+//! those into a [`summary::SuiteSummary`].
 //!
 //! | question | module |
 //! |---|---|

@@ -154,8 +154,8 @@ pub struct RolloutStats {
     /// True if the policy saw the true forces at the pads, which no real sensor gives.
     #[serde(default)]
     pub force_observed: bool,
-    /// Number of observations with an image of a camera that was inside an object; it shows the scene beyond that
-    /// object.
+    /// Number of observations with an image of a camera that was inside an object; it shows the
+    /// scene beyond that object.
     #[serde(default)]
     pub camera_inside: u32,
     /// Number of control steps whose command was farther from the tool than one step of the inverse kinematics

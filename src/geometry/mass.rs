@@ -103,8 +103,8 @@ fn capsule(radius: f64, half_length: f64) -> MassProperties {
     MassProperties::centred(mass, Vec3::new(across, across, axial) / mass)
 }
 
-/// The surface of a prism. The triangle fans of its ends may overlap outside of a concave polygon, where their signed
-/// integrals cancel.
+/// The surface of a prism. The triangle fans of its ends may overlap outside of a concave polygon, where
+/// their signed integrals cancel.
 fn prism_mesh(section: &Polygon, half_length: f64) -> Mesh {
     let corners = section.points();
     let n = corners.len() as u32;

@@ -38,8 +38,8 @@ const SHARP_COSINE: f64 = 0.8;
 /// Largest distance of a fitted vertex from the surface, in cells.
 const FIT_TOLERANCE: f64 = 0.1;
 
-/// The triangles of [`SurfaceMesh::from_shape`] and the normals at their vertices, without materials and texture
-/// coordinates.
+/// The triangles of [`SurfaceMesh::from_shape`] and the normals at their vertices, without
+/// materials and texture coordinates.
 pub(super) fn surface_triangles(shape: &Shape, cell: f64) -> (Mesh, Vec<Vec3>) {
     if let Shape::Mesh(solid) = shape {
         let mesh = solid.mesh().clone();
@@ -172,10 +172,10 @@ impl SamplingGrid {
         values
     }
 
-    /// Removes features finer than the lattice that would make the surface touch itself. A set of lattice points is
-    /// *well composed* (Latecki 1997) if no cell face is a checkerboard and no cell has only two opposite corners on
-    /// one side; only then is the surface a manifold. Wherever this is violated, the point with the smallest distance
-    /// changes sides.
+    /// Removes features finer than the lattice that would make the surface touch itself. A set of lattice points
+    /// is *well composed* (Latecki 1997) if no cell face is a checkerboard and no cell has only two opposite
+    /// corners on one side; only then is the surface a manifold. Wherever this is violated, the point with the
+    /// smallest distance changes sides.
     fn compose_well(&self, values: &mut [f32]) {
         let [nx, ny, nz] = self.count;
         let strides = [1, nx, nx * ny];
@@ -199,9 +199,9 @@ impl SamplingGrid {
         }
     }
 
-    /// The vertex of the cell with lowest corner `at`. On a smooth surface it is the mean of the crossings with the
-    /// cell's edges, projected on the surface; at a sharp edge, the point that best fits the tangent planes of the
-    /// crossings.
+    /// The vertex of the cell with lowest corner `at`. On a smooth surface it is the mean of the crossings
+    /// with the cell's edges, projected on the surface; at a sharp edge, the point that best fits the tangent
+    /// planes of the crossings.
     fn vertex(&self, shape: &Shape, values: &[f32], at: [usize; 3]) -> Vec3 {
         let [nx, ny, _] = self.count;
         let corners: [GridPoint; 8] = std::array::from_fn(|c| {
@@ -304,8 +304,8 @@ fn crossing(shape: &Shape, a: Vec3, b: Vec3) -> Vec3 {
     if inside_a { low } else { high }
 }
 
-/// Least squares of the distances to the planes, regularised towards `mean`. Repetition removes the bias of
-/// the regularisation.
+/// Least squares of the distances to the planes, regularised towards `mean`. Repetition removes the
+/// bias of the regularisation.
 fn best_fit(planes: &[TangentPlane], mean: Vec3) -> Vec3 {
     let regularisation = 0.01 * planes.len() as f64;
     let matrix = planes.iter().map(|plane| plane.normal * plane.normal.transpose()).sum::<Mat3>()

@@ -1,7 +1,7 @@
 //! Disjoint sets (union–find) with path halving.
 //!
-//! The representative of a set is its least element, whatever the order of the unions, so that numberings derived from
-//! representatives are deterministic.
+//! The representative of a set is its least element, whatever the order of the unions, so that numberings derived
+//! from representatives are deterministic.
 
 /// A partition of `0..len` into disjoint sets.
 #[derive(Clone, Debug)]

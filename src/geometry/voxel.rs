@@ -10,8 +10,8 @@ use super::{
 /// Sub-cells of a voxel along each axis, on which its filled part is known.
 pub const SUBCELLS: usize = 6;
 
-/// Filled sub-cells of a voxel: bit `i + SUBCELLS (j + SUBCELLS k)` is set if the centre of the sub-cell is inside the
-/// body.
+/// Filled sub-cells of a voxel: bit `i + SUBCELLS (j + SUBCELLS k)` is set if the centre of the sub-cell
+/// is inside the body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct OccupancyMask(pub [u64; 4]);
 

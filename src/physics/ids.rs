@@ -54,8 +54,8 @@ pub struct LinkId {
     pub index: usize,
 }
 
-/// Any body, or the world itself: the parent of a collider, of a camera or of a render mesh, and the body of a scene
-/// object.
+/// Any body, or the world itself: the parent of a collider, of a camera or of a render mesh, and the body
+/// of a scene object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum BodyId {
     /// The world: it never moves.

@@ -18,15 +18,15 @@ pub struct PhysicsParams {
     /// Stiffness-proportional Rayleigh damping of soft bodies (β), s. 5 ms settles a grasped body in under 0.3 s.
     #[serde(alias = "beta")]
     pub rayleigh_stiffness: f64,
-    /// Dissipation time scale τ_d of contact springs, s (Castro et al. 2022). A surface that recedes faster than the
-    /// springs relax is released; the value is small compared with `dt`, so that friction does not lift a sliding
-    /// surface.
+    /// Dissipation time scale τ_d of contact springs, s (Castro et al. 2022). A surface that recedes faster
+    /// than the springs relax is released; the value is small compared with `dt`, so that friction does not
+    /// lift a sliding surface.
     #[serde(alias = "tau")]
     pub dissipation_time: f64,
     /// Normal contact stiffness per area of nearly rigid colliders, Pa/m: near rigid for Young's moduli up to 1 MPa.
     pub rigid_modulus: f64,
-    /// Tangential over normal contact stiffness. Mindlin (1949) gives 0.5 to 0.8 for solids; creep does not depend on
-    /// it.
+    /// Tangential over normal contact stiffness. Mindlin (1949) gives 0.5 to 0.8 for solids; creep does
+    /// not depend on it.
     pub shear_ratio: f64,
     /// Gap below which a sample becomes a contact point, m; fast samples do so within 1.5 steps of approach.
     pub margin: f64,

@@ -12,8 +12,8 @@ use crate::geometry::Vec3;
 /// Number of actions from which on a chunk is rejected as a mistake.
 pub const MAX_CHUNK_LEN: usize = 10_000;
 
-/// Decodes a reply: a map whose entry `actions` (or `action`) has the shape (horizon, n), (1, horizon, n) or (n), n ≥
-/// 7.
+/// Decodes a reply: a map whose entry `actions` (or `action`) has the shape (horizon, n), (1, horizon, n) or
+/// (n), n ≥ 7.
 ///
 /// # Errors
 /// [`PolicyError::Reply`] if the reply has another form, [`PolicyError::Action`] if a number is not finite.

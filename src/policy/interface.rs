@@ -22,8 +22,8 @@ pub enum ToolCommand {
     Pose(Action),
     /// A displacement from the measured tool pose.
     Delta {
-        /// True to command the displaced pose itself; false to command what robosuite's controller reaches, see
-        /// [`osc`](super::osc).
+        /// True to command the displaced pose itself; false to command what robosuite's
+        /// controller reaches, see [`osc`](super::osc).
         full: bool,
         /// Translation in the base frame, m.
         translation_b: Vec3,

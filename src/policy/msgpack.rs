@@ -1,8 +1,8 @@
 //! Msgpack messages and the numpy arrays in them, in the conventions of openpi and vla-eval.
 //!
-//! openpi writes an array as `{b"__ndarray__": true, b"data": bytes, b"dtype": "<f4", b"shape": [H, A]}` with keys of
-//! type bin; vla-eval's keys are of type str. The reader accepts both, numpy scalars (`__npgeneric__`) and nested
-//! lists.
+//! openpi writes an array as `{b"__ndarray__": true, b"data": bytes, b"dtype": "<f4", b"shape": [H, A]}` with
+//! keys of type bin; vla-eval's keys are of type str. The reader accepts both, numpy scalars
+//! (`__npgeneric__`) and nested lists.
 
 use rmpv::Value;
 

@@ -19,8 +19,8 @@ pub struct SensorStreams {
     pub cameras: Vec<String>,
     /// True to request images and markers of the tactile sensors.
     pub touch: bool,
-    /// True to request the true forces at the pads. No real sensor measures them, so results are marked
-    /// `force_observed`.
+    /// True to request the true forces at the pads. No real sensor measures them, so
+    /// results are marked `force_observed`.
     pub force: bool,
 }
 
@@ -130,9 +130,9 @@ impl TactileHistory {
         mosaic([&left, &right], layout)
     }
 
-    /// Marker positions in the shape (1 + 8, 198, 2) of SoftVTBench's policies, px: initial positions of the left and
-    /// right markers, then the positions in the last 8 control steps, oldest first. A short history repeats its
-    /// oldest frame.
+    /// Marker positions in the shape (1 + 8, 198, 2) of SoftVTBench's policies, px: initial positions of the
+    /// left and right markers, then the positions in the last 8 control steps, oldest first. A short history
+    /// repeats its oldest frame.
     pub fn marker_motion(&self) -> Vec<[[f32; 2]; 2 * MARKER_COUNT]> {
         let row = |frame: &[TactileFrame; 2], when: usize| -> [[f32; 2]; 2 * MARKER_COUNT] {
             std::array::from_fn(|m| frame[m / MARKER_COUNT].markers.to_array()[when][m % MARKER_COUNT])

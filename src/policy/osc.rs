@@ -44,8 +44,8 @@ pub fn displaced(observation: &Observation, translation_b: Vec3, rotation_b: Vec
     goal(observation.ee_position_b, orientation_b, translation_b, rotation_b, closure)
 }
 
-/// A tool pose displaced by a translation (m) and a rotation vector (rad) in the base frame: the goal of robosuite's
-/// controller.
+/// A tool pose displaced by a translation (m) and a rotation vector (rad) in the base frame: the
+/// goal of robosuite's controller.
 pub fn goal(
     position_b: Vec3,
     orientation_b: Quat,

@@ -68,8 +68,8 @@ pub enum InputSource {
     },
     /// Initial and last 8 positions of the markers of both fingers, float32 (9, 198, 2), px.
     MarkerMotion,
-    /// True forces on the left and the right gel in the last 8 control steps, float32 (8, 6), N, pad frame. No real
-    /// sensor measures them.
+    /// True forces on the left and the right gel in the last 8 control steps, float32 (8, 6), N, pad frame. No
+    /// real sensor measures them.
     Force,
 }
 
@@ -110,8 +110,8 @@ impl StatePart {
     }
 }
 
-/// Encoding of an action: three numbers for the position, three for the orientation, one for the gripper. Further
-/// numbers are padding.
+/// Encoding of an action: three numbers for the position, three for the orientation, one for the gripper.
+/// Further numbers are padding.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ActionEncoding {
     /// Meaning of the first six numbers.

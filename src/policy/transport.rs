@@ -1,8 +1,8 @@
 //! Websocket messages over connections with short time slices, for both sides.
 //!
-//! Reads and writes of the underlying stream time out after [`POLL_INTERVAL`], so that every wait can check a
-//! deadline or a cancellation. The functions here repeat an interrupted operation as long as the caller's `on_wait`
-//! returns `Ok`.
+//! Reads and writes of the underlying stream time out after [`POLL_INTERVAL`], so that every wait can
+//! check a deadline or a cancellation. The functions here repeat an interrupted operation as long as the
+//! caller's `on_wait` returns `Ok`.
 
 use std::{
     io::{self, ErrorKind},

@@ -86,8 +86,8 @@ impl RunFolder {
         Ok(Self { dir: dir.into(), episodes })
     }
 
-    /// Opens `dir`, which may be empty or missing, and returns the finished episodes. A last line truncated by a
-    /// crash is removed.
+    /// Opens `dir`, which may be empty or missing, and returns the finished episodes. A last line truncated by
+    /// a crash is removed.
     ///
     /// # Errors
     /// Another process is using the folder, a line is not an episode, or the system refuses.
@@ -125,8 +125,8 @@ impl RunFolder {
         }
     }
 
-    /// Appends and syncs the record of an episode whose other files are written. A crash leaves at most one truncated
-    /// line.
+    /// Appends and syncs the record of an episode whose other files are written. A crash leaves at
+    /// most one truncated line.
     ///
     /// # Errors
     /// The line cannot be written.

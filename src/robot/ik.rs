@@ -2,10 +2,9 @@
 //!
 //! Poses are absolute, in the robot base frame. Every control step takes one damped least-squares step (Wampler,
 //! Manipulator inverse kinematic solutions based on vector formulations and damped least-squares methods, IEEE SMC
-//! 1986; Nakamura and Hanafusa, Inverse kinematic solutions with singularity robustness, ASME JDSMC 1986):
-//! `Δq = Jᵀ (J Jᵀ + λ² I)⁻¹ e`, with `e` the position error and the rotation vector of the orientation error. A
-//! joint that the step would drive past its limit is set to the limit, and the step of the other joints is solved
-//! again.
+//! 1986; Nakamura and Hanafusa, Inverse kinematic solutions with singularity robustness, ASME JDSMC 1986): `Δq = Jᵀ
+//! (J Jᵀ + λ² I)⁻¹ e`, with `e` the position error and the rotation vector of the orientation error. A joint that the
+//! step would drive past its limit is set to the limit, and the step of the other joints is solved again.
 
 use nalgebra::{DMatrix, SMatrix, SVector, Vector6};
 
@@ -138,8 +137,8 @@ impl DiffIk {
         forward(&self.chain, q)[ARM_DOFS - 1] * self.tool
     }
 
-    /// Joint targets (rad) for the next control step, which move the tool from measured joint angles `q_now` towards
-    /// `target_b` (base frame).
+    /// Joint targets (rad) for the next control step, which move the tool from measured joint angles `q_now`
+    /// towards `target_b` (base frame).
     ///
     /// The command continues from the last one (at first from `q_now`). If a joint would exceed its speed limit, the
     /// change of all joints is scaled down by one factor, which keeps the direction. The speed of the command is

@@ -68,8 +68,8 @@ impl PadSurface {
         beyond_x.max(0.0).hypot(beyond_y.max(0.0)) + beyond_x.max(beyond_y).min(0.0) - self.corner
     }
 
-    /// Contact of the point `p_p` (pad frame, m) with the gel, in the pad frame. The point represents a patch about
-    /// `spacing` (m) wide.
+    /// Contact of the point `p_p` (pad frame, m) with the gel, in the pad frame. The point represents a patch
+    /// about `spacing` (m) wide.
     ///
     /// The coverage falls from 1 to 0 over one spacing across the edge of the footprint, so that forces stay continuous
     /// as a pad moves. It is 0 below the gel's base, where a point belongs to the sensor's case.
@@ -143,8 +143,8 @@ pub struct CollisionBox {
     pub pose: Pose,
 }
 
-/// Collision boxes of a finger besides its gel, in its link frame: the case of the sensor, and the bracket that
-/// carries it.
+/// Collision boxes of a finger besides its gel, in its link frame: the case of the sensor, and the
+/// bracket that carries it.
 pub fn finger_boxes(side: Side) -> [CollisionBox; 2] {
     let out = outward(side);
     let depth = PadSurface::default().thickness + CASE_HALF.y;

@@ -174,8 +174,8 @@ pub fn hand_boxes() -> [CollisionBox; 1] {
     [CollisionBox { half: HAND_HALF, pose: hand_in_link() * Pose::translation(0.0, 0.0, HAND_HALF.z) }]
 }
 
-/// The joint tree of arm, hand and fingers, with its base at `base_w` (world): joints 1 to 7 (rad), left finger, right
-/// finger (m).
+/// The joint tree of arm, hand and fingers, with its base at `base_w` (world): joints 1 to 7 (rad), left
+/// finger, right finger (m).
 ///
 /// The coordinate of a finger is the distance of its gel apex from the middle plane of the hand; the width between the
 /// apexes is the sum of both. The model has no joint friction, since the torque control of the real arm compensates it.

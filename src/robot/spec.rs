@@ -74,8 +74,8 @@ pub struct RobotSpecError {
 }
 
 /// Joint drives of the arm: `τ = kp (q_target − q) − kd q̇`, limited to the torques of the real arm (the effort
-/// limits of [`panda::tree`](super::panda::tree)), in addition to exact gravity compensation. The same gains apply to
-/// all joints.
+/// limits of [`panda::tree`](super::panda::tree)), in addition to exact gravity compensation. The same gains
+/// apply to all joints.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ArmSpec {
@@ -91,8 +91,8 @@ impl Default for ArmSpec {
     }
 }
 
-/// Drive of each finger: `f = kp (q_target − q) − kd q̇`, limited to `effort`. The opening range is fixed by the
-/// hardware ([`MAX_WIDTH`](super::gripper::MAX_WIDTH)).
+/// Drive of each finger: `f = kp (q_target − q) − kd q̇`, limited to `effort`. The opening range is fixed
+/// by the hardware ([`MAX_WIDTH`](super::gripper::MAX_WIDTH)).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GripperSpec {

@@ -21,8 +21,8 @@ use crate::{
     scene::{Asset, SoftMaterial},
 };
 
-/// Finite-element models of assets, and expensive queries of their shapes: bounds, mass, wall thickness, contact
-/// samples.
+/// Finite-element models of assets, and expensive queries of their shapes: bounds, mass,
+/// wall thickness, contact samples.
 #[derive(Clone, Debug, Default)]
 pub struct AssetCache {
     models: SharedCache<Arc<Asset>, Arc<FemModel>>,

@@ -22,10 +22,10 @@ pub enum ControlError {
 
 /// Controls the robot during an episode. Implemented by observation-only policies and by privileged experts.
 ///
-/// [`Episode::run`](super::Episode::run) calls [`act`](Self::act) once per control step (20 Hz) with the simulation
-/// and an [`Observation`]. A policy uses the observation alone; an expert may read the true state from the
-/// simulation. The sensors in [`streams`](Self::streams) are computed only in steps for which
-/// [`wants_observation`](Self::wants_observation) is true.
+/// [`Episode::run`](super::Episode::run) calls [`act`](Self::act) once per control step (20 Hz) with the
+/// simulation and an [`Observation`]. A policy uses the observation alone; an expert may read the true
+/// state from the simulation. The sensors in [`streams`](Self::streams) are computed only in steps for
+/// which [`wants_observation`](Self::wants_observation) is true.
 pub trait Controller {
     /// Sensor streams of its observations, the same for the whole episode.
     fn streams(&self) -> SensorStreams {

@@ -244,8 +244,8 @@ impl Episode {
         })
     }
 
-    /// Runs the episode with a controller until the goal is reached, the step budget is exhausted, or the state is
-    /// invalid.
+    /// Runs the episode with a controller until the goal is reached, the step budget is exhausted, or
+    /// the state is invalid.
     ///
     /// # Errors
     /// The controller fails with an error that is not confined to the episode, or a sensor stream cannot be computed.

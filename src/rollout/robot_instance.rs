@@ -18,8 +18,8 @@ use crate::{
     },
 };
 
-/// The robot of a simulation: an articulation with position drives, which follows commands of the tool pose by
-/// differential inverse kinematics.
+/// The robot of a simulation: an articulation with position drives, which follows commands of the tool pose
+/// by differential inverse kinematics.
 #[derive(Clone, Debug)]
 pub struct RobotInstance {
     /// Parameters.

@@ -67,8 +67,8 @@ fn check_names(cameras: &[Camera]) -> Result<(), SensingError> {
 }
 
 impl SensorSuite {
-    /// Computes the requested streams once in the initial state of an episode, so that errors appear before its first
-    /// control step.
+    /// Computes the requested streams once in the initial state of an episode, so that errors appear before
+    /// its first control step.
     ///
     /// # Errors
     /// As [`SensorSuite::render_unobstructed`] and [`SensorSuite::tactile_readings`].

@@ -24,9 +24,9 @@ use crate::{
 
 /// A scene with its robot, simulated at the physics rate (60 Hz by default).
 ///
-/// The builder places every object and the robot; [`settle`](Self::settle) lets the objects come to rest. World
-/// frame: z up, z = 0 on the support surface. Stepping is deterministic: equal scenes and commands give bitwise equal
-/// states.
+/// The builder places every object and the robot; [`settle`](Self::settle) lets the objects come to rest.
+/// World frame: z up, z = 0 on the support surface. Stepping is deterministic: equal scenes and commands
+/// give bitwise equal states.
 #[derive(Clone, Debug)]
 pub struct Simulation {
     /// The scene from which it was built.
@@ -67,8 +67,8 @@ impl Simulation {
         self.world.step()
     }
 
-    /// Speed of the fastest point of an object, m/s. For rigid bodies and parts: that of the centre plus 0.1 m times
-    /// the angular velocity.
+    /// Speed of the fastest point of an object, m/s. For rigid bodies and parts: that of the centre plus 0.1 m
+    /// times the angular velocity.
     pub fn speed(&self, object: &ObjectInstance) -> f64 {
         match object.body {
             BodyId::Soft(index) => self.world.soft(index).state.max_speed(),

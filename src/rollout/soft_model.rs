@@ -71,8 +71,8 @@ fn check_material(name: &str, m: &SoftMaterial) -> Result<(), BuildError> {
     Ok(())
 }
 
-/// Maximum number of contact samples of one body. More take minutes to compute; nearly always the size was given in
-/// millimetres.
+/// Maximum number of contact samples of one body. More take minutes to compute; nearly always the size
+/// was given in millimetres.
 const MAX_SAMPLES: f64 = 1e6;
 
 fn check_size(name: &str, shape: &Shape, material: &SoftMaterial) -> Result<(), BuildError> {

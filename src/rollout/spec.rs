@@ -26,8 +26,8 @@ pub struct EpisodeRef<'a> {
     pub policy: &'a str,
 }
 
-/// Specification of an episode: task, scene and parameters. The controller is passed to
-/// [`Episode::run`](super::Episode::run).
+/// Specification of an episode: task, scene and parameters. The controller
+/// is passed to [`Episode::run`](super::Episode::run).
 #[derive(Clone, Debug)]
 pub struct EpisodeSpec {
     /// Identity, as in results.

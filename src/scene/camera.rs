@@ -58,14 +58,14 @@ impl Camera {
         Self::third_person(Vec3::new(0.6586, 0.0, 0.7104), [0.6380, 0.3048, 0.3048, 0.6380])
     }
 
-    /// The third-person camera of floor scenes, in which the robot is mounted on the floor. Image right is +y of the
-    /// world.
+    /// The third-person camera of floor scenes, in which the robot is mounted on the floor. Image right is
+    /// +y of the world.
     pub fn third_person_floor() -> Self {
         Self::third_person(Vec3::new(0.8966, 0.0, 0.65), [0.6182, 0.3432, 0.3432, 0.6182])
     }
 
-    /// The wrist camera on the hand (SoftVTBench's environment: focal length 9.77, aperture 15). Image right is the
-    /// hand's +y.
+    /// The wrist camera on the hand (SoftVTBench's environment: focal length 9.77, aperture 15). Image right
+    /// is the hand's +y.
     pub fn wrist() -> Self {
         Self {
             name: "wrist".to_owned(),

@@ -11,8 +11,8 @@ pub struct KeyLight {
     pub direction_w: Vec3,
     /// Colour, linear RGB.
     pub colour: [f64; 3],
-    /// Irradiance on a surface that faces the light, relative to π: at 1 and exposure 1 a white diffuse surface has
-    /// radiance 1.
+    /// Irradiance on a surface that faces the light, relative to π: at 1 and exposure 1 a white diffuse
+    /// surface has radiance 1.
     pub strength: f64,
     /// Angular radius of the light source, rad; determines how fast shadows soften with distance.
     pub softness_rad: f64,

@@ -1,5 +1,5 @@
-//! A scene as plain data: assets, placed objects and their appearance, the robot's base, lighting, cameras, the
-//! workspace.
+//! A scene as plain data: assets, placed objects and their appearance, the robot's base,
+//! lighting, cameras, the workspace.
 //!
 //! Lengths are metres, angles radians, colours linear RGB. The world frame has z up and z = 0 on the support surface.
 
@@ -40,8 +40,8 @@ pub struct Object {
 /// The state from which an episode starts, before settling.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
-    /// Placed objects. Their order determines the order of bodies in the simulation, and with it the last bits of
-    /// results.
+    /// Placed objects. Their order determines the order of bodies in the simulation, and with it the
+    /// last bits of results.
     pub objects: Vec<Object>,
     /// Robot base frame in the world frame.
     pub base_w: Pose,

@@ -1,5 +1,5 @@
-//! State of an episode as data: its identity and all actions so far. The simulation is deterministic, so they define
-//! it.
+//! State of an episode as data: its identity and all actions so far. The simulation is deterministic,
+//! so they define it.
 
 use rmpv::Value;
 

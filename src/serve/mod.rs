@@ -1,5 +1,5 @@
-//! A server through which clients control episodes: reset, step, render, get and set the state. The protocol is
-//! described in `docs/serve.md`.
+//! A server through which clients control episodes: reset, step, render, get and set the state. The protocol
+//! is described in `docs/serve.md`.
 
 mod catalog;
 mod connection;

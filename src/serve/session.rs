@@ -45,8 +45,8 @@ impl<'a> ClientSession<'a> {
     /// Executes a request and returns the response.
     ///
     /// # Errors
-    /// The request cannot be executed. The episode is then unchanged, except for the actions of a step before the
-    /// failing one.
+    /// The request cannot be executed. The episode is then unchanged, except for the actions of a step
+    /// before the failing one.
     pub(super) fn execute(&mut self, request: Request) -> Result<Value, RequestError> {
         let config = self.config;
         match request {

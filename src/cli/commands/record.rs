@@ -24,8 +24,8 @@ const MIN_ATTEMPTS: u32 = 20;
 /// Records the demonstrations that the arguments ask for.
 ///
 /// # Errors
-/// The script has no suite, the folder contains something else, an attempt or a file fails, or too few attempts are
-/// good.
+/// The script has no suite, the folder contains something else, an attempt or a file fails, or too
+/// few attempts are good.
 pub(crate) fn run(args: &RecordArgs) -> Result<(), CliError> {
     let config = RecordingConfig::new(&args.script, &args.recording, &args.tasks)?
         .with_policy(PolicyConfig::load(&args.policy)?);

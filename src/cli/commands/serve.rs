@@ -25,8 +25,8 @@ use crate::{
 /// Serves the suites of a script until the process is interrupted.
 ///
 /// # Errors
-/// The script has no suite, its first episode cannot be rendered, or the address is not available; in the end, the
-/// interrupt.
+/// The script has no suite, its first episode cannot be rendered, or the address is not available; in
+/// the end, the interrupt.
 pub(crate) fn run(args: &ServeArgs) -> Result<(), CliError> {
     let config =
         RunConfig { policy: PolicyConfig::external("client"), ..RunConfig::of_script(&args.script)? };

@@ -55,8 +55,8 @@ struct ConditionCase {
 /// checked before the first episode runs.
 ///
 /// # Errors
-/// A condition that does not fit a suite, a folder that contains a run, or an episode that fails. Finished runs are
-/// kept.
+/// A condition that does not fit a suite, a folder that contains a run, or an episode that fails.
+/// Finished runs are kept.
 pub(crate) fn run(
     config: &RunConfig,
     loaded: &LoadedScript,

@@ -113,8 +113,8 @@ impl RunConfig {
         Self { out, ..self }
     }
 
-    /// Name of a suite in results. A rigid twin has a name of its own, though its initial states are those of the
-    /// suite.
+    /// Name of a suite in results. A rigid twin has a name of its own, though its initial states are
+    /// those of the suite.
     pub(crate) fn suite_name(&self, suite: &Suite) -> String {
         let twin = if self.is_rigid_twin { "_rigid_twin" } else { "" };
         format!("{}{twin}", suite.name)

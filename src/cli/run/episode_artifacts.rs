@@ -81,8 +81,8 @@ impl<'a> EpisodeArtifacts<'a> {
         actions::write(&path, &finished.actions).map_err(CliError::input)
     }
 
-    /// Renders the requested video, and for an unsafe episode a still of its worst moment. Consumes the recorded
-    /// states.
+    /// Renders the requested video, and for an unsafe episode a still of its worst moment.
+    /// Consumes the recorded states.
     ///
     /// # Errors
     /// An image cannot be rendered or written.

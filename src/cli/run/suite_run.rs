@@ -368,8 +368,8 @@ impl<'a> SuiteRun<'a> {
         outcome
     }
 
-    /// Runs one episode, from the start of its foreign demonstration if it has one. With `keep_states` the result can
-    /// be rendered.
+    /// Runs one episode, from the start of its foreign demonstration if it has one. With `keep_states` the
+    /// result can be rendered.
     ///
     /// # Errors
     /// The script, the scene or the controller fails.

@@ -1,5 +1,5 @@
-//! Merges files of single demonstrations into the file of a task. Compressed chunks are copied without decompressing
-//! them.
+//! Merges files of single demonstrations into the file of a task. Compressed chunks are
+//! copied without decompressing them.
 
 use std::path::{Path, PathBuf};
 

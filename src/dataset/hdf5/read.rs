@@ -307,8 +307,8 @@ impl TaskFile {
 const SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
 
 /// End of the file according to its superblock; 0 if that is unknown, `u64::MAX` if the superblock itself is
-/// truncated, `None` if there is no HDF5 signature. Other data may precede the signature, 512 · 2ⁿ bytes long (HDF5
-/// file format, II.A).
+/// truncated, `None` if there is no HDF5 signature. Other data may precede the signature, 512 · 2ⁿ bytes long
+/// (HDF5 file format, II.A).
 fn end_of_file(path: &Path) -> Option<u64> {
     let mut file = File::open(path).ok()?;
     let mut head = |from: u64| -> Option<Vec<u8>> {
@@ -327,8 +327,8 @@ fn end_of_file(path: &Path) -> Option<u64> {
 
 /// End of the file in a superblock; 0 if its addresses are not 8 bytes wide, `None` if it is truncated.
 fn superblock_end(head: &[u8]) -> Option<u64> {
-    // Signature, versions, sizes and flags are followed by base address, extension or free-space address, and end
-    // address.
+    // Signature, versions, sizes and flags are followed by base address, extension or free-space
+    // address, and end address.
     let (width, at) = match head.get(8)? {
         0 => (13, 40),
         1 => (13, 44),

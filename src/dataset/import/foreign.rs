@@ -71,8 +71,8 @@ pub struct ForeignObjectPose {
     /// Its name there.
     pub name: String,
     pub pose: Pose,
-    /// True if `pose` is in the robot's base frame, else in that simulator's world frame, whose x and y are assumed to
-    /// coincide with softvt's.
+    /// True if `pose` is in the robot's base frame, else in that simulator's world frame, whose x and y are assumed
+    /// to coincide with softvt's.
     pub in_base: bool,
     /// True for a soft body, whose orientation is unknown.
     pub is_soft: bool,
@@ -81,8 +81,8 @@ pub struct ForeignObjectPose {
 impl ForeignDemo {
     /// Commands full closure in steps in which the recorded fingers were stopped by the object.
     ///
-    /// Replaying the measured closure squeezes a soft object as far as it was squeezed, but exerts no force on a
-    /// rigid one.
+    /// Replaying the measured closure squeezes a soft object as far as it was squeezed, but exerts no force
+    /// on a rigid one.
     pub fn close_fully_on_rigid_object(&mut self) {
         let stopped =
             self.commands.iter_mut().zip(&self.is_stopped_by_object).filter(|(_, stopped)| **stopped);

@@ -213,8 +213,8 @@ fn tool_poses(
     };
     let stated = model.and_then(|model| model.base_w);
     if is_near_start(&Pose::identity()) && stated.is_none() {
-        // Already in the base frame, which robosuite never writes: these are poses of the tool itself, as softvt
-        // records.
+        // Already in the base frame, which robosuite never writes: these are poses of the tool
+        // itself, as softvt records.
         return Ok(Some(NamedPoses { name, poses: site }));
     }
     let known = BASES.map(|at| Pose::translation(at[0], at[1], at[2]));

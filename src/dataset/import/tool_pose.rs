@@ -21,8 +21,8 @@ const MAX_TILT: f64 = 0.2;
 /// Largest rotation about the pointing direction, rad. Hand frames differ by a quarter turn; a quaternion in the
 /// wrong order is half a turn off where the hand points down.
 const MAX_SPIN: f64 = 2.5;
-/// Initial joint angles of robosuite's Panda, rad (robots/panda_robot.py), and the largest tilt of a first pose from
-/// there.
+/// Initial joint angles of robosuite's Panda, rad (robots/panda_robot.py), and the largest tilt of a
+/// first pose from there.
 const HOME: ArmAngles = [0.0, 0.196, 0.0, -2.618, 0.0, 2.942, 0.785];
 const MAX_TILT_FROM_HOME: f64 = 1.0;
 

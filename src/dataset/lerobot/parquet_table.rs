@@ -76,8 +76,8 @@ impl ParquetColumn {
         Self { name: name.into(), column_type, shape: shape.to_vec() }
     }
 
-    /// Declaration in Parquet's schema language. All values are optional, as Arrow's writers declare them; none is
-    /// null.
+    /// Declaration in Parquet's schema language. All values are optional, as Arrow's writers declare
+    /// them; none is null.
     fn declaration(&self) -> String {
         let mut text = match self.column_type {
             ColumnType::Image => {

@@ -42,8 +42,8 @@ pub(super) struct Selection {
     pub image_sizes: [ImageSize; 2],
 }
 
-/// Selects the demonstrations whose task matches one of `words`, each an index or part of a prompt; all if `words` is
-/// empty.
+/// Selects the demonstrations whose task matches one of `words`, each an index or part of a prompt; all
+/// if `words` is empty.
 ///
 /// # Errors
 /// The folder is not a finished recording, has no images, or a word matches no task.

@@ -34,8 +34,8 @@ impl Track {
         self.samples.len()
     }
 
-    /// Appends an access unit in Annex B format: parameter sets go to the index, slices are prefixed with their
-    /// lengths.
+    /// Appends an access unit in Annex B format: parameter sets go to the index, slices are
+    /// prefixed with their lengths.
     pub(super) fn push(&mut self, unit: &[u8]) {
         let mut sample = Sample { bytes: Vec::with_capacity(unit.len()), is_key: false };
         for nal in nal_units(unit) {
@@ -110,8 +110,8 @@ impl Track {
         boxes.iter().flat_map(|(name, fields)| boxed(name, &fields.0)).collect()
     }
 
-    /// The `avc1` entry: size, decoder configuration and colour space (BT.601 primaries, transfer and matrix; studio
-    /// range).
+    /// The `avc1` entry: size, decoder configuration and colour space (BT.601 primaries, transfer
+    /// and matrix; studio range).
     fn sample_entry(&self) -> Vec<u8> {
         let (sps, pps) = (&self.sps, &self.pps);
         let profile = [1, sps[1], sps[2], sps[3], 0xff, 0xe1];

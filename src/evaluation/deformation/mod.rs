@@ -7,8 +7,8 @@
 //!
 //! `R` is the proper rotation that minimises the sum (Kabsch, 1976), found as the leading eigenvector of Horn's 4×4
 //! matrix (Horn, "Closed-form solution of absolute orientation using unit quaternions", 1987). That is the same
-//! optimum as the SVD with a flipped last singular vector, but it is a proper rotation by construction, also for flat
-//! and collapsed bodies.
+//! optimum as the SVD with a flipped last singular vector, but it is a proper rotation by construction, also for
+//! flat and collapsed bodies.
 //!
 //! The score uses uniform weights ([`METRIC_ID`], as SoftVTBench); the mass-weighted value and the largest node
 //! displacement are reported next to it. The reference is the settled shape, so sagging under gravity does not count.
@@ -85,8 +85,8 @@ struct AlignmentSums {
 }
 
 impl ReferenceShape {
-    /// Prepares a reference from its `nodes` (m, any frame) and one weight per node (volume or mass; only ratios
-    /// matter).
+    /// Prepares a reference from its `nodes` (m, any frame) and one weight per node (volume or
+    /// mass; only ratios matter).
     ///
     /// # Errors
     /// Fewer than three nodes, a node that is not finite, a body without size, or weights that are not one per node,

@@ -230,8 +230,8 @@ impl Judge {
         self.drops.first()
     }
 
-    /// Verdict on the episode. One that did not end validly has neither Goal Success nor NoDrop, and its safety is
-    /// unknown.
+    /// Verdict on the episode. One that did not end validly has neither Goal Success nor NoDrop, and
+    /// its safety is unknown.
     pub fn finish(mut self, outcome: &Outcome) -> Verdict {
         let valid = outcome.is_valid();
         if !valid {

@@ -203,8 +203,8 @@ fn twisted(inner: &Aabb, axis: Axis) -> Aabb {
     outer
 }
 
-/// Bounds of a bent box: of the images of sample points on its inner and outer face, with a margin for the bulge
-/// between them.
+/// Bounds of a bent box: of the images of sample points on its inner and outer face, with a margin for
+/// the bulge between them.
 fn bent(inner: &Aabb, along: Axis, towards: Axis, curvature: f64) -> Aabb {
     if curvature.abs() < 1e-9 {
         return *inner;

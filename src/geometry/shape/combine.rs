@@ -75,9 +75,9 @@ const SWEEPS: usize = 24;
 /// Points up to this far outside of a part count as inside, m.
 const TOLERANCE: f64 = 2e-5;
 
-/// The intersection of `parts` shapes, whose distances at a point `field` gives: finds the nearest point of the
-/// intersection by sequential quadratic programming, each round with Hildreth's (1957) coordinate ascent over the
-/// tangent planes.
+/// The intersection of `parts` shapes, whose distances at a point `field` gives: finds the nearest point of
+/// the intersection by sequential quadratic programming, each round with Hildreth's (1957) coordinate ascent
+/// over the tangent planes.
 pub(super) fn intersect_exactly(
     parts: usize,
     p: &Vec3,

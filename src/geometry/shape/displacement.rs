@@ -154,8 +154,8 @@ impl Bumps {
         (self.height * best.0, best.1 * self.height)
     }
 
-    /// Position of a bump in its lattice cell, [0, 1)³, from the bits of a SplitMix64 hash (Steele et al. 2014) of
-    /// the cell.
+    /// Position of a bump in its lattice cell, [0, 1)³, from the bits of a SplitMix64 hash (Steele et al.
+    /// 2014) of the cell.
     fn jitter(&self, corner: &Vec3) -> Vec3 {
         let mut state = self.seed;
         for axis in 0..3 {

@@ -24,8 +24,8 @@ const MAX_RAY_STEPS: usize = 512;
 impl Shape {
     /// First-order signed distance at `p_o`, m; negative inside.
     ///
-    /// Its sign is right and it vanishes exactly on the surface. Away from the surface it is cheaper and less
-    /// accurate than [`Shape::distance_and_normal`].
+    /// Its sign is right and it vanishes exactly on the surface. Away from the surface it is cheaper and
+    /// less accurate than [`Shape::distance_and_normal`].
     pub fn distance(&self, p_o: &Vec3) -> f64 {
         self.first_order(p_o).distance
     }

@@ -15,8 +15,8 @@ use crate::geometry::{
 /// Shapes are built by chaining (`Shape::cuboid(size).rounded(r).translated(v)`) and share their parts. The
 /// constructors accept any numbers; [`Shape::validate`] checks the tree.
 ///
-/// Fingerprints of assets hash the `Debug` text of shapes, so the names of variants and fields are part of file
-/// formats.
+/// Fingerprints of assets hash the `Debug` text of shapes, so the names of variants and fields are
+/// part of file formats.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
     /// A box centred on the origin.
@@ -296,8 +296,8 @@ pub(super) fn to_local(pose: &Pose, p_o: &Vec3) -> Vec3 {
     pose.rotation.inverse_transform_vector(&(p_o - pose.translation.vector))
 }
 
-/// Size of the tree of a shape, which bounds the cost of traversals and queries. Shared parts count every time they
-/// occur.
+/// Size of the tree of a shape, which bounds the cost of traversals and queries. Shared parts count
+/// every time they occur.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TreeSize {
     /// Number of nodes, including the root.

@@ -15,8 +15,8 @@ use crate::{
 
 /// The surface of a solid in its own frame, m. [`Shape`] implements it.
 pub trait ContactSurface: Debug + Send + Sync {
-    /// Signed distance, outward normal and coverage for a square sample of edge `spacing` (m) at `p` with outward
-    /// normal `facing`.
+    /// Signed distance, outward normal and coverage for a square sample of edge `spacing` (m) at `p`
+    /// with outward normal `facing`.
     fn contact(&self, p: &Vec3, facing: &Vec3, spacing: f64) -> Contact;
     /// A box around the solid.
     fn bounds(&self) -> Aabb;
@@ -103,8 +103,8 @@ pub struct Collider {
     pub stiffness: SurfaceStiffness,
     /// Bounds in the collider's frame.
     pub bounds: Aabb,
-    /// The articulation whose fixed base this is, such as the corpus of a chest of drawers. It never touches that
-    /// articulation's links.
+    /// The articulation whose fixed base this is, such as the corpus of a chest of drawers. It never
+    /// touches that articulation's links.
     pub base_of: Option<ArticulationId>,
     /// Geometry for contact with other colliders; without it, only soft bodies touch the collider.
     pub solid: Option<Arc<CollisionGeometry>>,

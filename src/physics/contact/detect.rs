@@ -91,8 +91,8 @@ impl BodyBounds {
 
 /// Collects the candidates of `body` against `collider` into `out`, in sample order.
 ///
-/// Calls `near` with every sample group within [`DetectionLimits::reach`], so that its nodes are retained before the
-/// contact begins.
+/// Calls `near` with every sample group within [`DetectionLimits::reach`], so that its nodes are retained
+/// before the contact begins.
 pub fn detect(
     body: &FemState,
     body_bounds: &BodyBounds,

@@ -1,9 +1,9 @@
 //! Contact detection: colliders, contact samples of soft bodies, manifolds of rigid bodies, and the state that
 //! contacts keep between steps.
 //!
-//! Soft bodies touch with the samples of their surface: colliders by [`detect`], other soft bodies by [`detect_soft`].
-//! Colliders touch each other by [`CollisionGeometry::meet`]. The contacts become contact points of the
-//! [solver](super::solver) in [`World`](super::World).
+//! Soft bodies touch with the samples of their surface: colliders by [`detect`], other soft bodies by
+//! [`detect_soft`]. Colliders touch each other by [`CollisionGeometry::meet`]. The contacts become contact points of
+//! the [solver](super::solver) in [`World`](super::World).
 
 mod collider;
 mod contact_history;

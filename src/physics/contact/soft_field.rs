@@ -1,10 +1,10 @@
 //! Contact of a soft body's samples with another soft body: the signed distance field of a deformed surface.
 //!
-//! The field is known at rest only. So a point of space is mapped back into the undeformed voxel grid (the inverse of
-//! the trilinear map, by Newton's method, walking from voxel to voxel), the field is evaluated at that rest position,
-//! and gap and normal are pushed forward with the deformation gradient F there: n ∝ F⁻ᵀ n₀ and φ = φ₀ / |F⁻ᵀ n₀|
-//! (normals and level sets under a map: Bonet & Wood, Nonlinear Continuum Mechanics for Finite Element Analysis,
-//! 2008, §4.10).
+//! The field is known at rest only. So a point of space is mapped back into the undeformed voxel grid (the
+//! inverse of the trilinear map, by Newton's method, walking from voxel to voxel), the field is evaluated at that
+//! rest position, and gap and normal are pushed forward with the deformation gradient F there: n ∝ F⁻ᵀ n₀ and φ =
+//! φ₀ / |F⁻ᵀ n₀| (normals and level sets under a map: Bonet & Wood, Nonlinear Continuum Mechanics for Finite
+//! Element Analysis, 2008, §4.10).
 
 use super::{collider::ContactSurface, detect::DetectionLimits};
 use crate::{
@@ -102,8 +102,8 @@ impl<'a> SoftField<'a> {
         None
     }
 
-    /// Local coordinates of `p` in an element, clamped to [`MAX_EXTRAPOLATION`]; the linear step that remains; and
-    /// ∂x/∂ξ.
+    /// Local coordinates of `p` in an element, clamped to [`MAX_EXTRAPOLATION`]; the linear step
+    /// that remains; and ∂x/∂ξ.
     fn invert(&self, element: u32, p: &Vec3) -> Option<(Vec3, Vec3, Mat3)> {
         let nodes = &self.body.model.mesh.elements[element as usize];
         let corners: [Vec3; 8] = nodes.map(|node| self.body.x[node as usize]);

@@ -42,8 +42,8 @@ pub struct GelSample {
     pub area: f64,
 }
 
-/// The pair of primitives that a contact point belongs to, or, for general shapes, the body whose surface feature it
-/// is.
+/// The pair of primitives that a contact point belongs to, or, for general shapes, the body whose
+/// surface feature it is.
 pub type PairId = u32;
 
 /// A skin sample with a larger cosine between its normal and the shape's has the shape behind it.
@@ -93,8 +93,8 @@ impl CollisionGeometry {
 }
 
 impl HardShape {
-    /// Depth of the deepest surface seed of either shape in the other's field, m; 0 for primitives, whose manifold is
-    /// exact.
+    /// Depth of the deepest surface seed of either shape in the other's field, m; 0 for primitives,
+    /// whose manifold is exact.
     fn seed_depth(&self, pose: &Pose, other: &Self, other_pose: &Pose) -> f64 {
         if self.primitives.is_some() && other.primitives.is_some() {
             return 0.0;

@@ -140,8 +140,8 @@ impl FemModel {
     }
 }
 
-/// Masses lumped by the shape functions over the filled part, limited from below, and scaled to a total of
-/// `density · volume`.
+/// Masses lumped by the shape functions over the filled part, limited from below, and scaled to a total
+/// of `density · volume`.
 fn node_masses(mesh: &VoxelMesh, density: f64, volume: f64) -> Vec<f64> {
     let cell = mesh.edge.powi(3) / (SUBCELLS * SUBCELLS * SUBCELLS) as f64;
     let mut mass = vec![0.0; mesh.nodes.len()];

@@ -16,8 +16,8 @@ use crate::{
 /// Rotation per step below which nodes move straight, rad: the stretch is then below the rounding of positions.
 const MIN_ROTATION: f64 = 1e-7;
 
-/// Advances positions and velocities by `dt` (s); the velocities are those at the end of the step, at the old
-/// positions.
+/// Advances positions and velocities by `dt` (s); the velocities are those at the end of the step,
+/// at the old positions.
 pub fn advance(body: &mut FemState, dt: f64) {
     let (centre, drift) = (body.centre(), body.velocity());
     let Spin { momentum, inertia } = Spin::new(body, &centre, &drift);

@@ -259,8 +259,8 @@ impl VelocitySystem {
         true
     }
 
-    /// Takes the reduced matrix of the retained nodes: their Schur complement, column-major, lower triangle, world
-    /// frame.
+    /// Takes the reduced matrix of the retained nodes: their Schur complement, column-major,
+    /// lower triangle, world frame.
     ///
     /// Returning it by [`VelocitySystem::return_matrix`] saves its computation in the next step.
     pub fn take_matrix(&mut self) -> Vec<f64> {

@@ -126,9 +126,9 @@ impl JointTree {
     }
 }
 
-/// The reason why an inertia tensor is not physical, if it is not. Its principal moments must be positive, and none
-/// may exceed the sum of the other two (Traversaro et al., Identification of fully physical consistent inertial
-/// parameters, IROS 2016).
+/// The reason why an inertia tensor is not physical, if it is not. Its principal moments must be positive, and
+/// none may exceed the sum of the other two (Traversaro et al., Identification of fully physical consistent
+/// inertial parameters, IROS 2016).
 fn inertia_fault(inertia: &Mat3) -> Option<String> {
     if !(inertia - inertia.transpose()).iter().all(|gap| gap.abs() <= 1e-12 * inertia.norm()) {
         return Some("inertia tensor is not symmetric".into());

@@ -105,8 +105,8 @@ pub(super) fn add_point_impulse(
     }
 }
 
-/// Adds `sign` times the impulses on an endpoint's local coordinates to the gradient: the transpose of
-/// [`endpoint_velocities`].
+/// Adds `sign` times the impulses on an endpoint's local coordinates to the gradient:
+/// the transpose of [`endpoint_velocities`].
 pub(super) fn scatter_impulses(
     problem: &ContactProblem,
     offsets: &[usize],

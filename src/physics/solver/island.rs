@@ -133,8 +133,8 @@ impl FactorCache {
         entry.excess_steps += steps.saturating_sub(first.min(UNAVOIDABLE_STEPS));
     }
 
-    /// Solves in place with the current factor, its corrections, and `stiffness` added to the diagonal of the
-    /// constrained block.
+    /// Solves in place with the current factor, its corrections, and `stiffness` added to the diagonal
+    /// of the constrained block.
     pub(super) fn solve(&mut self, island: &Island, stiffness: &[f64], b: &mut [f64]) {
         let (n, t) = (island.size, stiffness.len());
         let (head, constrained) = (n - t, &mut self.constrained);

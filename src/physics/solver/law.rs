@@ -1,5 +1,5 @@
-//! Constitutive laws: impulse, cost and curvature of contact points and scalar constraints as functions of their
-//! velocity.
+//! Constitutive laws: impulse, cost and curvature of contact points and scalar constraints as
+//! functions of their velocity.
 
 use super::problem::ContactPoint;
 use crate::geometry::{Mat3, Vec3};

@@ -1,5 +1,5 @@
-//! One convex solve for everything that touches: blocks of generalised velocities, contact points between them, and
-//! scalar constraints.
+//! One convex solve for everything that touches: blocks of generalised velocities, contact points between
+//! them, and scalar constraints.
 //!
 //! Minimises `½ vᵀA v − rᵀv + Σ ℓ(J v)` over the velocities of all blocks, after Castro, Permenter & Han, "An
 //! Unconstrained Convex Formulation of Compliant Contact" (2022), with two changes. The tangential springs are

@@ -83,8 +83,8 @@ impl NewtonProgress {
 }
 
 impl Solver {
-    /// Solves the problem in place: writes velocities into the blocks, impulses into points and forces into
-    /// constraints.
+    /// Solves the problem in place: writes velocities into the blocks, impulses into points
+    /// and forces into constraints.
     ///
     /// # Errors
     /// An island did not converge, which happens if a block is not positive definite or a value is not finite. The
@@ -203,8 +203,8 @@ impl Solver {
         cost
     }
 
-    /// Factors the Hessian at the current velocities down to the constrained block. False if it is not positive
-    /// definite.
+    /// Factors the Hessian at the current velocities down to the constrained block. False if it
+    /// is not positive definite.
     fn refactor(&mut self, problem: &ContactProblem, island: &Island) -> bool {
         let mut hessian = self.cache.take(island);
         let v = std::mem::take(&mut self.v);

@@ -88,8 +88,8 @@ pub struct ContactPoint {
     pub offset: Vec3,
     /// Friction coefficient of this step.
     pub mu: f64,
-    /// Normal impulse of the previous pass, N s; the friction bound is `mu` times it. At the start of a solve that of
-    /// the last step.
+    /// Normal impulse of the previous pass, N s; the friction bound is `mu` times it. At the start of a solve that
+    /// of the last step.
     pub previous_normal_impulse: f64,
     /// Result: normal impulse, N s.
     pub normal_impulse: f64,

@@ -115,8 +115,8 @@ fn wide_columns(a: &[f64], n: usize, column: usize, from: usize) -> [&[f64]; WID
     std::array::from_fn(|c| &a[(column + c) * n + from..(column + c + 1) * n])
 }
 
-/// Solves `L y = b` in place for the first `k` columns of `l` (`n` rows), and subtracts their contribution from
-/// `b[k..n]`.
+/// Solves `L y = b` in place for the first `k` columns of `l` (`n` rows), and subtracts
+/// their contribution from `b[k..n]`.
 pub fn forward(l: &[f64], n: usize, k: usize, b: &mut [f64]) {
     let mut j = 0;
     while j + WIDE <= k {

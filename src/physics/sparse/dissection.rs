@@ -6,8 +6,8 @@
 /// Parts with at most this many nodes are not split further.
 const LEAF: usize = 8;
 
-/// Sorts `nodes` into elimination order: both halves first, then the plane between them. `places` are lattice
-/// coordinates.
+/// Sorts `nodes` into elimination order: both halves first, then the plane between them.
+/// `places` are lattice coordinates.
 pub(super) fn order(nodes: &mut [u32], places: &[[i32; 3]]) {
     if nodes.len() <= LEAF {
         return;

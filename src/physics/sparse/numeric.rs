@@ -83,8 +83,8 @@ impl CholeskyFactor {
         &self.schur
     }
 
-    /// Forward substitution on `b` (in elimination order, 3 per position). Its retained part becomes the reduced
-    /// right-hand side.
+    /// Forward substitution on `b` (in elimination order, 3 per position). Its retained part becomes
+    /// the reduced right-hand side.
     pub fn forward(&mut self, plan: &SymbolicFactor, b: &mut [f64]) {
         for front in plan.fronts.iter().filter(|f| f.pivots > 0) {
             let (n, k) = (3 * front.rows.len(), 3 * front.pivots);

@@ -1,5 +1,5 @@
-//! Assembly of the convex problem of a step from the state of the world: velocity blocks, frame Jacobians, contacts and
-//! joint constraints.
+//! Assembly of the convex problem of a step from the state of the world: velocity blocks, frame Jacobians,
+//! contacts and joint constraints.
 
 use super::{Articulation, StepFailure, World};
 use crate::{

@@ -121,8 +121,8 @@ impl World {
         self.rigid_contacts = contacts;
     }
 
-    /// Finds the pairs of colliders on different bodies, of which at least one is free to move, that may touch within
-    /// the step.
+    /// Finds the pairs of colliders on different bodies, of which at least one is free to move, that may
+    /// touch within the step.
     pub(super) fn near_pairs(&self, pairs: &mut Vec<ColliderPair>) {
         pairs.clear();
         let ids: Vec<ColliderId> = (0..self.colliders.len())

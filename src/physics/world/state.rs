@@ -119,8 +119,8 @@ pub struct JointDrive {
     pub force: f64,
 }
 
-/// Dry friction of a joint as a stiff spring whose force is limited to the friction: a joint that sticks does not
-/// creep.
+/// Dry friction of a joint as a stiff spring whose force is limited to the friction: a joint that
+/// sticks does not creep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct JointFriction {
     /// Joint coordinate at which the spring is free, rad or m.
@@ -171,8 +171,8 @@ impl Articulation {
         self.drives.iter().any(Option::is_some)
     }
 
-    /// True while it sleeps: its links are then treated as part of the world until something moves near them. A driven
-    /// articulation never sleeps.
+    /// True while it sleeps: its links are then treated as part of the world until something moves near them. A
+    /// driven articulation never sleeps.
     pub fn is_asleep(&self) -> bool {
         self.sleep.is_asleep
     }

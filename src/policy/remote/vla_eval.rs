@@ -1,8 +1,8 @@
 //! Version 1 of the protocol of the harness vla-eval: maps with type, payload, seq and timestamp.
 //!
-//! Both sides send `hello`. The messages that start and end an episode have no response; an observation is answered
-//! by an action of the same seq. An observation has images in `images`, numbers in `states`, and the prompt in
-//! `task_description`.
+//! Both sides send `hello`. The messages that start and end an episode have no response; an observation is
+//! answered by an action of the same seq. An observation has images in `images`, numbers in `states`, and
+//! the prompt in `task_description`.
 
 use rmpv::Value;
 

@@ -1,6 +1,6 @@
-//! Figures of the report. Names and numbers are text, which wraps; the marks next to them are SVG with coordinates in
-//! percent of the width, so that text does not shrink on narrow screens. Colours come from the style sheet, for light
-//! and dark schemes.
+//! Figures of the report. Names and numbers are text, which wraps; the marks next to them are SVG with coordinates
+//! in percent of the width, so that text does not shrink on narrow screens. Colours come from the style sheet, for
+//! light and dark schemes.
 
 use std::collections::BTreeMap;
 

@@ -217,8 +217,8 @@ pub fn still_path(dir: &Path, task: usize, episode: u32) -> PathBuf {
     video_path(dir, task, episode).with_extension("png")
 }
 
-/// Index of the state with the largest deformation of the target; of a rigid target, with the largest force on the
-/// pads.
+/// Index of the state with the largest deformation of the target; of a rigid target, with the largest
+/// force on the pads.
 pub fn worst_state(recording: &StateRecording) -> usize {
     // Sum of the normal forces, N.
     let pad_force = |frame: &Frame| -> f64 {
@@ -236,10 +236,10 @@ fn full_size(camera: &Camera) -> usize {
 
 /// Writes every image of selected states as PNG files in `dir`; `states` are names and indices of states.
 ///
-/// Cameras also get depth (16 bits, units of 0.1 mm along the optical axis, 65535 beyond the range and in the
-/// background) and segmentation (16 bits: objects from 1 in the order of the scene,
-/// [`crate::rollout::ROBOT_SEGMENTATION_ID`], 0 in the background). Files are written atomically. Returns their
-/// paths.
+/// Cameras also get depth (16 bits, units of 0.1 mm along the optical axis, 65535 beyond the
+/// range and in the background) and segmentation (16 bits: objects from 1 in the order of the
+/// scene, [`crate::rollout::ROBOT_SEGMENTATION_ID`], 0 in the background). Files are written
+/// atomically. Returns their paths.
 ///
 /// # Errors
 /// A state cannot be rendered, a file cannot be written, or `is_cancelled` became true between two files.

@@ -22,8 +22,8 @@ pub struct RenderedImage {
     pub rgb: Vec<u8>,
     /// Depth along the optical axis, m, height × width; infinite in the background.
     pub depth: Vec<f32>,
-    /// The [`segmentation_id`](super::RenderObject::segmentation_id) of the object at each pixel, height × width; 0
-    /// in the background.
+    /// The [`segmentation_id`](super::RenderObject::segmentation_id) of the object at each pixel, height × width;
+    /// 0 in the background.
     pub segmentation: Vec<u16>,
     /// Name of the object that contains the camera, if any. Surfaces are drawn from outside only, so the image shows
     /// the scene without that object.
@@ -55,8 +55,8 @@ where
 
 /// Resizes `image` to `width` × `height` pixels with a triangle filter two pixels wide, in pixels of the coarser image.
 ///
-/// The filter runs in integers, so the bytes are the same on every processor. An image without pixels gives a black
-/// one.
+/// The filter runs in integers, so the bytes are the same on every processor. An image without pixels
+/// gives a black one.
 pub fn resize(image: &RgbImage, width: u32, height: u32) -> RgbImage {
     let mut resized = RgbImage::new(width, height);
     let source = TypedImageRef::<U8x3>::from_buffer(image.width(), image.height(), image);

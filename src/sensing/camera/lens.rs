@@ -15,8 +15,8 @@ const MAX_EDGE: usize = 4096;
 const MAX_TOTAL_PIXELS: usize = MAX_EDGE * MAX_EDGE;
 /// Maximum number of cameras of a scene.
 const MAX_CAMERAS: usize = 64;
-/// Maximum distance of a camera from the origin along each axis, m. Farther out, single precision does not resolve a
-/// pixel.
+/// Maximum distance of a camera from the origin along each axis, m. Farther out, single precision does
+/// not resolve a pixel.
 const MAX_COORDINATE: f64 = 1e6;
 
 /// A camera at its pose in the world.

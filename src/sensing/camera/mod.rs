@@ -14,9 +14,9 @@
 //!    soft
 //!    shadows and a sky (`shade`).
 //!
-//! Materials are procedural functions of the object frame. [`RenderMesh`] bakes them into vertices or textures once,
-//! filtered to the spacing of the samples. Objects that do not move are drawn once for a camera that does not move
-//! either.
+//! Materials are procedural functions of the object frame. [`RenderMesh`] bakes them into vertices or
+//! textures once, filtered to the spacing of the samples. Objects that do not move are drawn once for a
+//! camera that does not move either.
 //!
 //! # Example
 //!

@@ -94,8 +94,8 @@ pub(super) fn finger(side: Side) -> RobotPart {
     }
 }
 
-/// The gel's dome and side walls in the finger's frame, sampled from [`pads::PadSurface`]: the drawn gel is the one
-/// that makes contact.
+/// The gel's dome and side walls in the finger's frame, sampled from [`pads::PadSurface`]: the drawn gel is the
+/// one that makes contact.
 pub(super) fn gel(side: Side) -> Mesh {
     const ALONG: usize = 14;
     const ACROSS: usize = 12;

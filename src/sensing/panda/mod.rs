@@ -90,8 +90,8 @@ impl RobotMeshes {
         Ok(Self { parts: meshes })
     }
 
-    /// The objects to draw for the articulation `articulation`, whose base is at `base_w` (world). All have the same
-    /// `segmentation_id`.
+    /// The objects to draw for the articulation `articulation`, whose base is at `base_w` (world). All
+    /// have the same `segmentation_id`.
     pub fn objects(
         &self,
         articulation: ArticulationId,

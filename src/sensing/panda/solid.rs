@@ -1,5 +1,5 @@
-//! Building blocks of the robot's meshes. Plain ones get exact meshes; blended ones are meshed from their distance
-//! field.
+//! Building blocks of the robot's meshes. Plain ones get exact meshes; blended ones are meshed
+//! from their distance field.
 
 use std::sync::Arc;
 
@@ -71,8 +71,8 @@ pub(super) fn box_solid(pose: &Pose, half: [f64; 3], corner: f64, edge: f64, vis
     RenderSolid::with_mesh(rounded_box([0.0; 3], half, edge).placed(*pose), plate.mesh(pose), visual)
 }
 
-/// A convex polygon (y, z) extruded to `half` on both sides of x = 0, with outline and edges rounded by `edge`, m, in
-/// `pose`.
+/// A convex polygon (y, z) extruded to `half` on both sides of x = 0, with outline and edges rounded by
+/// `edge`, m, in `pose`.
 pub(super) fn plate_solid(
     pose: &Pose,
     corners: &[[f64; 2]],

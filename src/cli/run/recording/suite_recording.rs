@@ -149,8 +149,8 @@ impl<'a> SuiteRecording<'a> {
     /// Records all tasks of the suite.
     ///
     /// # Errors
-    /// The folder contains other attempts, an attempt or a file fails, or too few attempts are good. Finished attempts
-    /// are kept.
+    /// The folder contains other attempts, an attempt or a file fails, or too few attempts are good.
+    /// Finished attempts are kept.
     pub(super) fn record(&mut self) -> Result<(), CliError> {
         let (mut folder, records) = RunFolder::resume(&self.run.out).map_err(CliError::input)?;
         self.run.check_records(&folder, &records)?;

@@ -26,8 +26,8 @@ pub(super) fn turn(o: &[f64; 2], p: &[f64; 2], q: &[f64; 2]) -> f64 {
     (p[0] - o[0]) * (q[1] - o[1]) - (p[1] - o[1]) * (q[0] - o[0])
 }
 
-/// The overlap of two convex counter-clockwise polygons (Sutherland & Hodgman, Comm. ACM 17, 1974); empty if they
-/// are apart.
+/// The overlap of two convex counter-clockwise polygons (Sutherland & Hodgman, Comm. ACM 17, 1974); empty
+/// if they are apart.
 pub(super) fn overlap(a: &[Corner], b: &[Corner]) -> Vec<Corner> {
     // With each corner, whether its outgoing edge is one of b's, and the index of that edge: they identify new corners.
     let mut kept: Vec<(Corner, bool, usize)> = a.iter().enumerate().map(|(i, &c)| (c, false, i)).collect();
@@ -78,8 +78,8 @@ pub(super) struct ClippedEnd {
     pub edge: Option<usize>,
 }
 
-/// The part of the line `ends` inside of a convex counter-clockwise polygon. `None` if the line is outside by more than
-/// `slack` (m).
+/// The part of the line `ends` inside of a convex counter-clockwise polygon. `None` if the line is outside by
+/// more than `slack` (m).
 pub(super) fn clip_line(ends: &[[f64; 2]; 2], polygon: &[Corner], slack: f64) -> Option<[ClippedEnd; 2]> {
     let length = |p: &[f64; 2], q: &[f64; 2]| (q[0] - p[0]).hypot(q[1] - p[1]);
     let (mut first, mut last) = (ClippedEnd { t: 0.0, edge: None }, ClippedEnd { t: 1.0, edge: None });

@@ -1,5 +1,5 @@
-//! Lowest points of the smooth parts of a body in the distance field of another, and the lines in which such parts
-//! touch.
+//! Lowest points of the smooth parts of a body in the distance field of another, and the lines in
+//! which such parts touch.
 //!
 //! A part that is curved in one direction only (the side of a can, the rounded edge of a box) touches along a line,
 //! on which the lowest point is undefined: the ends of the line carry instead. Where corners, rims or flat samples
@@ -91,8 +91,8 @@ struct LineDirection {
 }
 
 impl Smooth<'_> {
-    /// Appends the point `p` as far as it is well defined, and the ends of its line as far as it is not. Returns the
-    /// line.
+    /// Appends the point `p` as far as it is well defined, and the ends of its line as far as it is
+    /// not. Returns the line.
     fn add_points(
         &self,
         p: &Vec3,
@@ -152,8 +152,8 @@ impl Smooth<'_> {
         LineDirection { direction, point_share: (rise / self.rise).clamp(0.0, 1.0) }
     }
 
-    /// End of the straight line along `direction` from the lowest point `p`, where it leaves the surface or the other
-    /// body.
+    /// End of the straight line along `direction` from the lowest point `p`, where it leaves the surface
+    /// or the other body.
     fn line_end(&self, p: &Vec3, direction: Vec3) -> Vec3 {
         let (gap, normal) = (self.probe.gap(p), self.shape.distance_and_normal(p).1);
         let is_on_line = |length: f64| {

@@ -109,8 +109,8 @@ fn box_face(half: &Vec3, pose: &Pose, direction: &Vec3) -> Face {
     Face { corners, normal, origin, weight: 1.0 }
 }
 
-/// The cap of a cylinder whose axis is nearly along the direction, and the line through the foremost points of both
-/// rims.
+/// The cap of a cylinder whose axis is nearly along the direction, and the line through the foremost
+/// points of both rims.
 fn cylinder_features(radius: f64, half_height: f64, pose: &Pose, direction: &Vec3) -> FacingFeatures {
     let d = pose.rotation.inverse() * direction;
     let sine = d.x.hypot(d.y);
@@ -138,8 +138,8 @@ fn cap(radius: f64, z: f64, pose: &Pose, weight: f64) -> Face {
     Face { corners, normal, origin: pose.translation.vector + pose.rotation * Vec3::z() * z, weight }
 }
 
-/// The line along a primitive's axis, translated by `offset`. It is not material: it moves over the surface as the
-/// primitive rolls.
+/// The line along a primitive's axis, translated by `offset`. It is not material: it moves over the surface
+/// as the primitive rolls.
 fn side_line(pose: &Pose, offset: &Vec3, half_height: f64, weight: f64) -> Line {
     let half = pose.rotation * Vec3::z() * half_height;
     let centre = pose.translation.vector + offset;

@@ -70,8 +70,8 @@ pub(in super::super) fn surface_features(shape: &Shape) -> SurfaceFeatures {
     features
 }
 
-/// The convex primitives that a shape is composed of, with their frames in the object frame. `None` if it has other
-/// parts.
+/// The convex primitives that a shape is composed of, with their frames in the object frame. `None` if
+/// it has other parts.
 pub(in super::super) fn primitives(shape: &Shape) -> Option<Vec<(Primitive, Pose)>> {
     let one = |primitive| Some(vec![(primitive, Pose::identity())]);
     match shape {
@@ -148,8 +148,8 @@ fn is_sharp(shape: &Shape, p: &Vec3) -> bool {
     let normal = shape.distance_and_normal(p).1;
     let [u, v] = orthonormal_basis(&normal);
     let (s, d) = ((u + v).normalize(), (u - v).normalize());
-    // Inwards too: on the edge itself the normal is that of one face, and points off the other project back to the
-    // edge.
+    // Inwards too: on the edge itself the normal is that of one face, and points off the other project
+    // back to the edge.
     let directions = [u, -u, v, -v, s, -s, d, -d, -normal];
     let normals = directions.map(|direction| {
         shape.distance_and_normal(&project_to_surface(shape, p + direction * SHARP_DISTANCE)).1

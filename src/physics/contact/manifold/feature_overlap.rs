@@ -191,8 +191,8 @@ fn line_face(
     }
 }
 
-/// Two side lines: their crossing, or the ends of their overlap if they are nearly parallel; in between, one fades
-/// into the other.
+/// Two side lines: their crossing, or the ends of their overlap if they are nearly parallel; in between, one
+/// fades into the other.
 fn line_line(plane: &ProjectionPlane, a: &Line, b: &Line, found: &mut Vec<FeatureOverlap>) {
     let (flat_a, flat_b) = (a.ends.map(|p| plane.project(&p)), b.ends.map(|p| plane.project(&p)));
     let (height_a, height_b) = (a.ends.map(|p| plane.height(&p)), b.ends.map(|p| plane.height(&p)));

@@ -44,8 +44,8 @@ impl<'a> SurfaceInField<'a> {
         Self { features, shape, probe }
     }
 
-    /// Appends points on corners, edges, flat faces and rims, with the moving lowest point of each rim, whose gap is
-    /// below `margin` (m).
+    /// Appends points on corners, edges, flat faces and rims, with the moving lowest point of each rim, whose gap
+    /// is below `margin` (m).
     pub(in super::super) fn fixed(&self, margin: f64, out: &mut Vec<ManifoldPoint>) {
         let fixed = self.features.corners.iter().map(|p| (p, SAMPLE_AREA)).zip(0..);
         let spots = self.features.flat_samples.iter().map(|spot| (&spot.p, spot.area)).zip(FLAT_FEATURES..);
@@ -130,8 +130,8 @@ mod tests {
         (Shape::cuboid(Vec3::new(1.0, 1.0, 0.04)), Pose::translation(0.0, 0.0, -0.02))
     }
 
-    /// A bowl of 2 mm wall: foot ring of 25 mm, rim of 50 mm, 40 mm high; corners of the profile from the axis
-    /// outwards.
+    /// A bowl of 2 mm wall: foot ring of 25 mm, rim of 50 mm, 40 mm high; corners of the profile
+    /// from the axis outwards.
     fn bowl() -> Shape {
         let corners = vec![
             [0.0, 0.003],

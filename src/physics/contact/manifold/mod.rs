@@ -1,10 +1,10 @@
 //! Contact manifolds: contact points of two rigid bodies as pure functions of their poses.
 //!
-//! Two convex [`Primitive`]s meet in [`manifold`]. A contact normal is found by separating axes, and the features of
-//! both that face each other (a face, a side line) are projected along it; the corners of their overlap become the
-//! points. The gap of each point is exact at its position, so that corners and rims support a tipping body where its
-//! real edge is, and round bodies touch at a moving lowest point and roll. General shapes meet through
-//! `field::SurfaceInField`.
+//! Two convex [`Primitive`]s meet in [`manifold`]. A contact normal is found by separating axes, and the
+//! features of both that face each other (a face, a side line) are projected along it; the corners of their
+//! overlap become the points. The gap of each point is exact at its position, so that corners and rims support
+//! a tipping body where its real edge is, and round bodies touch at a moving lowest point and roll. General
+//! shapes meet through `field::SurfaceInField`.
 //!
 //! # Why not parry's manifolds
 //! The contact forces here are pressures times areas, so every point needs the area that it represents, and a small
@@ -74,13 +74,13 @@ pub struct ManifoldPoint {
     /// Area that the point represents, m². The points of a flat patch share its area; a point or line contact has
     /// [`POINT_AREA`] per point. Areas fade in and out, so that a small change of pose changes forces little.
     pub area: f64,
-    /// Identifies the two features that meet; constant from step to step while they stay the same. See
-    /// [`NON_MATERIAL`].
+    /// Identifies the two features that meet; constant from step to step while they stay
+    /// the same. See [`NON_MATERIAL`].
     pub feature: u32,
 }
 
-/// Flag in `feature` for a point that is not a material point of either body, such as the lowest point of a sphere or
-/// rim.
+/// Flag in `feature` for a point that is not a material point of either body, such as the lowest point of
+/// a sphere or rim.
 ///
 /// Its tangential spring must be stretched by the *velocity* of the touching material, since the motion of the point
 /// itself is not slip: a rolling ball does not slip.
@@ -106,8 +106,8 @@ impl Primitive {
 
 /// Appends to `out` the contact points of `a` and `b` whose gap is below `margin` (m).
 ///
-/// Swapping the two flips the normals and changes nothing else, except the feature identifiers of two primitives of
-/// one type.
+/// Swapping the two flips the normals and changes nothing else, except the feature identifiers of two
+/// primitives of one type.
 pub fn manifold(
     a: &Primitive,
     pose_a: &Pose,

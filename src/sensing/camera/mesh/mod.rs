@@ -1,5 +1,5 @@
-//! Preparation of meshes for drawing: triangulation of shapes, materials baked into vertices or textures, and levels of
-//! detail.
+//! Preparation of meshes for drawing: triangulation of shapes, materials baked into vertices or textures,
+//! and levels of detail.
 
 pub(crate) mod bake;
 pub(crate) mod lathe_mesh;

@@ -6,8 +6,8 @@
 //! interpolated. Vertices at creases and open borders stay.
 //!
 //! The `meshopt` crate simplifies with attributes, too, but binds a C++ library whose rounding depends on its
-//! compiler. Images must be byte-identical on every machine, and hence the meshes: this is plain `f64` arithmetic in
-//! a fixed order.
+//! compiler. Images must be byte-identical on every machine, and hence the meshes: this is plain `f64` arithmetic
+//! in a fixed order.
 
 use std::{cmp::Reverse, collections::BinaryHeap};
 

@@ -68,8 +68,8 @@ impl RenderSolid {
 /// Geometric errors of the levels of detail, m: for large images, for small ones, and for distant views and shadows.
 /// The last is below the depth bias of shadow maps, so that casters do not shade their own surface.
 const LOD_ERRORS: [f32; 3] = [1e-4, 2.5e-4, 5e-4];
-/// Vertex spacing in cells that counts for the choice of a level: surfaces of one colour need fewer vertices than
-/// patterns.
+/// Vertex spacing in cells that counts for the choice of a level: surfaces of one colour need
+/// fewer vertices than patterns.
 const UNIFORM_SPACING: f64 = 0.16;
 /// Minimum cell that counts for it, m: meshes given explicitly are fine enough for any view.
 const MIN_CELL: f64 = 2e-3;

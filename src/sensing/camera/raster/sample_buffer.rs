@@ -12,8 +12,8 @@ use crate::sensing::camera::simd::{LANE_INDEX, LANES, f32x8};
 pub(crate) const ROWS_PER_PIXEL: usize = 5;
 /// Index of the centre's row.
 pub(crate) const CENTRE_ROW: usize = 2;
-/// Position of each row's sample within the pixel. No two share a row or column, so edges of every slope are
-/// antialiased.
+/// Position of each row's sample within the pixel. No two share a row or column, so edges of
+/// every slope are antialiased.
 pub(crate) const SAMPLE_OFFSETS: [[f32; 2]; ROWS_PER_PIXEL] =
     [[0.375, 0.125], [0.875, 0.375], [0.5, 0.5], [0.125, 0.625], [0.625, 0.875]];
 
@@ -105,8 +105,8 @@ impl<const PER_UNIT: usize> SampleBuffer<PER_UNIT> {
             let [x, y] = first_sample::<PER_UNIT>(row);
             let row_edges = setup.edges.map(|e| f32x8::splat(e.c + (e.b * y + e.a * x)));
             let row_w = f32x8::splat(setup.w + (setup.dw_dy * y + setup.dw_dx * x));
-            // Chunks start at multiples of eight, so that a load never spans two recent stores (no store forwarding
-            // stall).
+            // Chunks start at multiples of eight, so that a load never spans two recent stores
+            // (no store forwarding stall).
             let mut column = span.columns[0] / LANES * LANES;
             while column < span.columns[1] {
                 let step = f32x8::splat(column as f32) + LANE_INDEX;
@@ -115,8 +115,8 @@ impl<const PER_UNIT: usize> SampleBuffer<PER_UNIT> {
                 let Some(old) = self.w.get_mut(at..).and_then(|w| w.first_chunk_mut::<LANES>()) else {
                     break;
                 };
-                // The plane of w, extrapolated to samples outside the triangle's edges, is clamped to the corners'
-                // range.
+                // The plane of w, extrapolated to samples outside the triangle's edges, is clamped
+                // to the corners' range.
                 let w = (row_w + dw_dx * step).fast_max(min_w).fast_min(max_w);
                 let mut is_visible = w.simd_gt(f32x8::new(*old));
                 if coverage == Coverage::Partial {

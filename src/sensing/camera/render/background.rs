@@ -1,5 +1,5 @@
-//! Cached images of the fixed objects for cameras that do not move. Only pixels that moving objects shadow or occlude
-//! are relit.
+//! Cached images of the fixed objects for cameras that do not move. Only pixels that moving objects shadow
+//! or occlude are relit.
 
 use super::{
     pass::RenderPass,

@@ -99,8 +99,8 @@ impl RenderScene {
     /// Prepares a scene: poses its fixed objects and draws their shadow maps.
     ///
     /// # Errors
-    /// A setting of the light is out of range, the pose of a fixed object is not finite, or there are more than 1000
-    /// objects.
+    /// A setting of the light is out of range, the pose of a fixed object is not finite, or there are
+    /// more than 1000 objects.
     pub fn new(objects: Vec<RenderObject>, lighting: Lighting) -> Result<Self, CameraError> {
         check_light(&lighting)?;
         if objects.len() > MAX_OBJECTS {

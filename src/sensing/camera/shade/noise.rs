@@ -21,8 +21,8 @@ pub(crate) fn cell_random(cell: [i32; 3], seed: u32) -> [f32; 3] {
     words.map(|w| (w >> 8) as f32 * (1.0 / 16_777_216.0))
 }
 
-/// Value noise with features of unit size, 0..=1, mean 0.5: lattice values blended by quintics (Perlin, Improving
-/// Noise, 2002).
+/// Value noise with features of unit size, 0..=1, mean 0.5: lattice values blended by quintics
+/// (Perlin, Improving Noise, 2002).
 fn value_noise(p: [f32; 3], seed: u32) -> f32 {
     let cell = p.map(|x| x.floor() as i32);
     let f: [f32; 3] = std::array::from_fn(|i| p[i] - cell[i] as f32);

@@ -143,8 +143,8 @@ impl Illumination {
         map.visibility(&map.project(p), n, self.faces_key(n))
     }
 
-    /// As [`key_visibility`](Self::key_visibility), by a fine map where it reaches and by a wide one, if any,
-    /// elsewhere.
+    /// As [`key_visibility`](Self::key_visibility), by a fine map where it reaches and by a wide
+    /// one, if any, elsewhere.
     #[inline(always)]
     pub(crate) fn key_visibility_cascaded(
         &self,

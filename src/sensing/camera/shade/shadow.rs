@@ -43,8 +43,8 @@ const MAX_RADIUS: f32 = 7.4;
 const MIN_RADIUS: f32 = 1.5;
 /// Maximum radius of a filter one vector wide, texels.
 const MAX_RADIUS_ONE_VECTOR: f32 = 3.4;
-/// Maximum length of a run of eight points, texels, that is interpolated from [`RUN_NODES`]: the filter is smooth
-/// enough.
+/// Maximum length of a run of eight points, texels, that is interpolated from [`RUN_NODES`]: the
+/// filter is smooth enough.
 const INTERPOLATED_RUN: f32 = 4.0;
 /// Maximum length of a run, texels, whose nodes decide whether all of it is fully lit or fully dark.
 const UNIFORM_RUN: f32 = 7.0;

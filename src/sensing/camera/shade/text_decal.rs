@@ -7,8 +7,8 @@ const MIN_FACING_COSINE: f32 = 0.1;
 /// Maximum distance of a printed surface from the cylinder of a wrapped line, in radii of the cylinder.
 const MAX_RADIUS_DEVIATION: f64 = 0.5;
 
-/// Fraction of the square of edge `spacing` (m) about `p` (object frame, m) that letters cover, on a surface of
-/// normal `n`.
+/// Fraction of the square of edge `spacing` (m) about `p` (object frame, m) that letters cover, on a
+/// surface of normal `n`.
 pub(crate) fn coverage(decal: &TextDecal, p: &V3, n: &V3, spacing: f32) -> f32 {
     let Some([right, up]) = text_position(decal, &p.cast(), n) else { return 0.0 };
     let (sin, cos) = decal.line.turn.sin_cos();

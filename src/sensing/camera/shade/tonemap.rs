@@ -4,8 +4,8 @@ use crate::sensing::camera::simd::{Vec3x8, f32x8, floor_to_u32};
 
 /// The Khronos PBR Neutral tone mapper (Khronos Group, 2024), linear RGB to linear RGB in 0..1.
 ///
-/// It keeps colours below 0.76 nearly unchanged, so that albedos appear as specified, and compresses highlights to
-/// white.
+/// It keeps colours below 0.76 nearly unchanged, so that albedos appear as specified, and
+/// compresses highlights to white.
 #[inline(always)]
 fn khronos_neutral(colour: Vec3x8) -> Vec3x8 {
     const START: f32 = 0.8 - 0.04;

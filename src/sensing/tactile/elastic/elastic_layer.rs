@@ -69,8 +69,8 @@ mod tests {
 
     use super::*;
 
-    /// Displacements (U, W) and their derivatives (U', W') of one of the four solutions u_x = i U e^{ikx}, u_z = W
-    /// e^{ikx}.
+    /// Displacements (U, W) and their derivatives (U', W') of one of the four solutions u_x = i U e^{ikx},
+    /// u_z = W e^{ikx}.
     fn solution(which: usize, k: f64, z: f64, kappa: f64) -> [f64; 4] {
         let (up, down) = ((k * z).exp(), (-k * z).exp());
         match which {

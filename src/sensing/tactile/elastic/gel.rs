@@ -12,9 +12,9 @@ use crate::robot::PadSurface;
 /// Grid over the pad, kernels of the bonded layer and view of the camera: everything that is computed once per sensor.
 ///
 /// Cell (i, j) of the grid has its centre at `((i − (columns − 1)/2) cell, (j − (rows − 1)/2) cell)` in the pad
-/// frame; arrays are stored row by row (x fastest). For the elasticity the layer is infinite and flat, since the
-/// edges of the pad and its shallow dome change little under a contact. Contact itself is found on the dome and
-/// within the outline.
+/// frame; arrays are stored row by row (x fastest). For the elasticity the layer is infinite and flat, since
+/// the edges of the pad and its shallow dome change little under a contact. Contact itself is found on the dome
+/// and within the outline.
 #[derive(Debug)]
 pub struct Gel {
     /// Shape of the pad.

@@ -22,8 +22,8 @@ pub struct TactileContact<'a> {
     pub skins: &'a [SkinMesh<'a>],
     /// Coefficient of friction of gel and bodies, the bound of shear over pressure; see [`super::patch_friction`].
     pub friction: f64,
-    /// Compliance of the touching body in series with the gel; `None` presses its surface in unchanged, like a rigid
-    /// stamp.
+    /// Compliance of the touching body in series with the gel; `None` presses its surface in unchanged,
+    /// like a rigid stamp.
     pub substrate: Option<SubstrateCompliance>,
 }
 
@@ -50,8 +50,8 @@ pub struct GelField {
     pub approach: f64,
     /// Rigid motion of the sticking part of the contact.
     pub stick_motion: PlanarMotion,
-    /// Ratio of the friction that the shear needs to the friction given: 1, or more where friction could not hold the
-    /// load.
+    /// Ratio of the friction that the shear needs to the friction given: 1, or more where friction could
+    /// not hold the load.
     pub friction_excess: f64,
     /// True if the skins keep their shape also below the size of a cell.
     pub(in super::super) has_rigid_skin: bool,
@@ -72,9 +72,9 @@ pub enum ContactError {
 impl GelField {
     /// Solves a contact; `None`, at no cost, if nothing presses.
     ///
-    /// The skins are pressed in until the pressure carries the normal force of the wrench; then the shear is found
-    /// that carries its tangential force and twist. Nothing is kept from one call to the next: `scratch` only saves
-    /// allocations.
+    /// The skins are pressed in until the pressure carries the normal force of the wrench; then the shear is
+    /// found that carries its tangential force and twist. Nothing is kept from one call to the next:
+    /// `scratch` only saves allocations.
     ///
     /// # Errors
     /// A number is not finite, or there is a pressing force but no skin over the pad.

@@ -34,8 +34,8 @@ pub(super) fn solve_normal_contact(
     let (mut residual, mut direction, mut moved) = (vec![0.0_f32; n], vec![0.0_f32; n], vec![0.0_f32; n]);
     let mut sunk = vec![0.0_f32; n];
     apply_compliance(gel, &p, &mut sunk, scratch);
-    // `conjugate` is 1 if the next direction may be conjugate to the last one, and 0 if the touching cells have
-    // changed.
+    // `conjugate` is 1 if the next direction may be conjugate to the last one, and 0 if the
+    // touching cells have changed.
     let (mut before, mut conjugate, mut approach) = (1.0_f64, 0.0_f32, 0.0);
     for _ in 0..MAX_ITERATIONS {
         let depth = mean_of_touching(&p, sunk.iter().zip(gap).map(|(u, g)| u + g));

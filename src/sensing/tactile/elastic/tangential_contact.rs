@@ -1,10 +1,10 @@
-//! Shear under a contact that is dragged and twisted: sticking cells move as one rigid patch, the others slip at the
-//! bound of friction.
+//! Shear under a contact that is dragged and twisted: sticking cells move as one rigid patch, the others slip at
+//! the bound of friction.
 //!
 //! The tractions minimise the elastic energy among those that carry the given force and moment, by conjugate
-//! gradients preconditioned with the pressure. Each direction is then a traction in proportion to the bound of
-//! friction, so that few steps give the smooth interior of a contact, and its edge, where slip begins, reaches the
-//! bound first.
+//! gradients preconditioned with the pressure. Each direction is then a traction in proportion to the bound
+//! of friction, so that few steps give the smooth interior of a contact, and its edge, where slip begins,
+//! reaches the bound first.
 
 use rustfft::num_complex::Complex32;
 
@@ -178,8 +178,8 @@ impl<'a> TangentialProblem<'a> {
             }
         }
         self.add_missing(t, weights)?;
-        // The last round may leave a few cells slightly over their bound. Further over it, friction cannot hold the
-        // load.
+        // The last round may leave a few cells slightly over their bound. Further over it, friction
+        // cannot hold the load.
         let is_held = (0..t.len()).all(|i| dot(t[i], t[i]) <= (1.05 * self.bounds[i]).powi(2));
         is_held.then_some(())
     }

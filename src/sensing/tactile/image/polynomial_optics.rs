@@ -43,10 +43,10 @@ pub struct OpticsFile {
 
 /// Optics of a sensor as a polynomial of the surface's slope.
 ///
-/// A slope multiplies the light that falls on its pixel, which the untouched image shows (Lambert's law for a light
-/// source of one elevation). So the same slope has the same sign of change everywhere, and a flat surface changes
-/// nothing. The factor of each channel is 1 plus a polynomial of degree 5 in the sines of the slope; see
-/// [`slope_monomials`].
+/// A slope multiplies the light that falls on its pixel, which the untouched image shows (Lambert's law for
+/// a light source of one elevation). So the same slope has the same sign of change everywhere, and a flat
+/// surface changes nothing. The factor of each channel is 1 plus a polynomial of degree 5 in the sines of
+/// the slope; see [`slope_monomials`].
 #[derive(Clone, Debug)]
 pub struct PolynomialOptics {
     /// Untouched image, 320 × 240 RGB.
@@ -189,8 +189,8 @@ impl LightRow {
         Self { a: vec![0.0; width], b: vec![0.0; width], light: std::array::from_fn(|_| vec![0.0; width]) }
     }
 
-    /// Replaces slopes by their sines, limited to `steepest`. Returns the range from the first to the last pixel with
-    /// a slope.
+    /// Replaces slopes by their sines, limited to `steepest`. Returns the range from the first to the last
+    /// pixel with a slope.
     fn slopes_to_sines(&mut self, steepest: f32) -> Option<Range<usize>> {
         for (a, b) in self.a.iter_mut().zip(&mut self.b) {
             let square = *a * *a + *b * *b;

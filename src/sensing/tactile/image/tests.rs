@@ -42,8 +42,8 @@ fn shadows_darken_the_ground_next_to_a_press_and_not_the_untouched_image() {
     optics.render(&gel, Some(&field), true, &mut shaded);
     let darker = rgb.iter().zip(&shaded).filter(|(lit, shaded)| **shaded + 3 < **lit).count();
     assert!(darker > 300, "{darker} values darker");
-    // From the corner of the stamp, no shadow is longer than the depth of the dent over the elevation of the lowest
-    // LED.
+    // From the corner of the stamp, no shadow is longer than the depth of the dent over the elevation
+    // of the lowest LED.
     let elevation = optics.leds().iter().map(|led| f64::from(led.elevation_tangent)).fold(1.0, f64::min);
     let reach = (2.0_f64.sqrt() * 2e-3 + field.depth() / elevation) / gel.view.pitch;
     for (p, (lit, shaded)) in rgb.iter().zip(&shaded).enumerate() {

@@ -103,8 +103,8 @@ impl VisibleSurface {
         }
     }
 
-    /// Blurs like the coating and lens of the sensor: twice a binomial filter of five pixels along each axis (σ = 1.4
-    /// px).
+    /// Blurs like the coating and lens of the sensor: twice a binomial filter of five pixels along each axis
+    /// (σ = 1.4 px).
     fn soften(&mut self) {
         let n = self.size[0];
         if n < 5 {
