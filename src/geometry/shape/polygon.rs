@@ -8,7 +8,7 @@ use super::error::ShapeError;
 #[derive(Clone, PartialEq)]
 pub struct Polygon {
     points: Vec<[f64; 2]>,
-    edges: Vec<PolygonEdge>,
+    edges: Vec<Edge>,
 }
 
 // Fingerprints of assets hash the `Debug` text of shapes: the name printed here is part of them.
@@ -20,7 +20,7 @@ impl fmt::Debug for Polygon {
 
 /// Edge from `start` to `start + span`.
 #[derive(Clone, Debug, PartialEq)]
-struct PolygonEdge {
+struct Edge {
     start: [f64; 2],
     span: [f64; 2],
     inverse_square: f64,
@@ -65,8 +65,8 @@ impl Polygon {
         if area < 0.0 {
             points.reverse();
         }
-        let edges: Vec<PolygonEdge> = (0..points.len())
-            .map(|i| PolygonEdge::new(points[i], points[(i + 1) % points.len()], revolved))
+        let edges: Vec<Edge> = (0..points.len())
+            .map(|i| Edge::new(points[i], points[(i + 1) % points.len()], revolved))
             .collect();
         if let Some(index) = edges.iter().position(|edge| !edge.inverse_square.is_finite()) {
             return Err(ShapeError::ProfileRepeat { r: points[index][0], z: points[index][1] });
@@ -145,7 +145,7 @@ impl Polygon {
     }
 }
 
-impl PolygonEdge {
+impl Edge {
     fn new(a: [f64; 2], b: [f64; 2], revolved: bool) -> Self {
         let span = [b[0] - a[0], b[1] - a[1]];
         let on_axis = revolved && a[0] < 1e-9 && b[0] < 1e-9;
@@ -199,8 +199,8 @@ fn centroid(points: &[[f64; 2]]) -> Option<([f64; 2], f64)> {
 }
 
 /// True if two edges that are not neighbours cross.
-fn crosses_itself(edges: &[PolygonEdge]) -> bool {
-    let end = |e: &PolygonEdge| [e.start[0] + e.span[0], e.start[1] + e.span[1]];
+fn crosses_itself(edges: &[Edge]) -> bool {
+    let end = |e: &Edge| [e.start[0] + e.span[0], e.start[1] + e.span[1]];
     (0..edges.len()).any(|i| {
         (i + 1..edges.len()).any(|j| {
             let (a, b) = (&edges[i], &edges[j]);
