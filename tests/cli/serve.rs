@@ -235,7 +235,7 @@ fn invalid_requests_keep_the_connection_open() {
         (of("step"), "neither action nor actions"),
         (resetting("task", 5.into()), "has the tasks 0 to 0"),
         (resetting("task", "x".into()), "task is \"x\"; expected a whole number"),
-        (resetting("task", Value::Nil), "no field task"),
+        (resetting("task", Value::Nil), "missing field task"),
         (resetting("episode", (-1).into()), "episode is -1"),
         (resetting("episode", 1.5.into()), "episode is 1.5"),
         (resetting("suite", "two".into()), "suite \"two\" is not served; available: one"),
@@ -244,8 +244,8 @@ fn invalid_requests_keep_the_connection_open() {
         (map(&[("type", "render".into()), ("camera", "nose".into())]), "there is no camera \"nose\""),
         (map(&[("type", "render".into()), ("width", 60_000.into())]), "width"),
         (map(&[("type", "render".into()), ("camera", "left".into()), ("width", 5.into())]), "one size"),
-        (map(&[("type", "set_state".into()), ("state", Value::Nil)]), "no field state"),
-        (map(&[("type", "set_state".into()), ("state", map(&[("task", 0.into())]))]), "no field actions"),
+        (map(&[("type", "set_state".into()), ("state", Value::Nil)]), "missing field state"),
+        (map(&[("type", "set_state".into()), ("state", map(&[("task", 0.into())]))]), "missing field actions"),
     ] {
         let said = client.refused(&request);
         assert!(said.contains(words) && said.len() < 500, "{words}: {said}");
