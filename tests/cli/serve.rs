@@ -245,7 +245,10 @@ fn invalid_requests_keep_the_connection_open() {
         (map(&[("type", "render".into()), ("width", 60_000.into())]), "width"),
         (map(&[("type", "render".into()), ("camera", "left".into()), ("width", 5.into())]), "one size"),
         (map(&[("type", "set_state".into()), ("state", Value::Nil)]), "missing field state"),
-        (map(&[("type", "set_state".into()), ("state", map(&[("task", 0.into())]))]), "missing field actions"),
+        (
+            map(&[("type", "set_state".into()), ("state", map(&[("task", 0.into())]))]),
+            "missing field actions",
+        ),
     ] {
         let said = client.refused(&request);
         assert!(said.contains(words) && said.len() < 500, "{words}: {said}");
