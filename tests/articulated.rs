@@ -8,7 +8,7 @@ use softvt::{
     physics::{BodyId, ContactPartner, LinkId, world::JointDrive},
     rollout::{AssetCache, ObjectInstance, SensorAssets, SensorSuite, Simulation, state_hash},
     scene::{Asset, Camera, Scene},
-    script::{self, Episode, EpisodeRequest},
+    script::{self, EpisodeSetup, EpisodeRequest},
     sensing::tactile::TactileSpec,
 };
 
@@ -45,7 +45,7 @@ fn scene() -> Scene {
         split: Split::Validation,
         shifts: Vec::new(),
     };
-    Episode::open(&loaded, &request).unwrap_or_else(|e| panic!("{e}")).scene
+    EpisodeSetup::open(&loaded, &request).unwrap_or_else(|e| panic!("{e}")).scene
 }
 
 /// The simulation of the scene, settled.

@@ -12,7 +12,7 @@ use softvt::{
     },
     rollout::{AssetCache, Simulation},
     scene::{Asset, Body, Mask, Scene},
-    script::{self, Episode, EpisodeRequest, LoadedScript},
+    script::{self, EpisodeSetup, EpisodeRequest, LoadedScript},
 };
 
 /// Reference data of a soft asset.
@@ -73,7 +73,7 @@ fn scene(loaded: &LoadedScript, task: usize, episode: u64) -> Scene {
         split: Split::Validation,
         shifts: Vec::new(),
     };
-    Episode::open(loaded, &request).unwrap_or_else(|e| panic!("{e}")).scene
+    EpisodeSetup::open(loaded, &request).unwrap_or_else(|e| panic!("{e}")).scene
 }
 
 /// Assets by name, including the table.

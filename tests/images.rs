@@ -51,7 +51,7 @@ fn the_first_task_of_spatial_soft_matches_its_reference() {
         split: Split::Validation,
         shifts: Vec::new(),
     };
-    let scene = script::Episode::open(&loaded, &request).expect("the suite opens").scene;
+    let scene = script::EpisodeSetup::open(&loaded, &request).expect("the suite opens").scene;
     let sim = Simulation::new(
         Arc::new(scene),
         &PhysicsParams::default(),

@@ -7,7 +7,7 @@ use softvt::{
     benchmark::{Goal, Plan, Suite, Task, seed::Split},
     geometry::{Pose, Vec3, shape::Shape},
     scene::{Body, Object, Scene, part_poses},
-    script::{self, Episode, EpisodeRequest, LoadedScript},
+    script::{self, EpisodeSetup, EpisodeRequest, LoadedScript},
 };
 
 /// Episodes per task at the scale of the paper.
@@ -81,7 +81,7 @@ fn suite(loaded: &LoadedScript) -> &Suite {
 fn open(loaded: &LoadedScript, task: usize, episode: u64, split: Split) -> Scene {
     let suite = suite(loaded).name.clone();
     let request = EpisodeRequest { suite, task, episode, base_seed: 0, split, shifts: Vec::new() };
-    Episode::open(loaded, &request).unwrap_or_else(|e| panic!("{e}")).scene
+    EpisodeSetup::open(loaded, &request).unwrap_or_else(|e| panic!("{e}")).scene
 }
 
 fn object<'a>(scene: &'a Scene, name: &str) -> &'a Object {
@@ -401,9 +401,9 @@ fn a_mass_shift_scales_the_mass_of_all_moving_bodies_and_nothing_else() {
             let suite = suite(&loaded).name.clone();
             let split = Split::Validation;
             let request = EpisodeRequest { suite, task, episode: 0, base_seed: 0, split, shifts };
-            Episode::open(&loaded, &request).unwrap_or_else(|e| panic!("{e}"))
+            EpisodeSetup::open(&loaded, &request).unwrap_or_else(|e| panic!("{e}"))
         };
-        let Episode { scene: heavy, nominal, .. } = shifted(&[("mass", 2.5)]);
+        let EpisodeSetup { scene: heavy, nominal, .. } = shifted(&[("mass", 2.5)]);
         let mut moving = 0;
         for (before, after) in nominal.objects.iter().zip(&heavy.objects) {
             let parts = before.asset.parts().iter().zip(after.asset.parts());
@@ -418,7 +418,7 @@ fn a_mass_shift_scales_the_mass_of_all_moving_bodies_and_nothing_else() {
             assert_eq!(before.asset.shape, after.asset.shape);
         }
         assert!(moving >= 7, "{name}: {moving}");
-        let Episode { scene: same, nominal, .. } = shifted(&[("mass", 1.0), ("light", 1.0)]);
+        let EpisodeSetup { scene: same, nominal, .. } = shifted(&[("mass", 1.0), ("light", 1.0)]);
         assert_eq!(same, nominal);
     }
 }

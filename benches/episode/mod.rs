@@ -29,7 +29,7 @@ pub fn open(loaded: &LoadedScript, task: usize, film: bool) -> (EpisodeSpec, Exp
         split: Split::Validation,
         shifts: Vec::new(),
     };
-    let opened = script::Episode::open(loaded, &request).expect("it opens");
+    let opened = script::EpisodeSetup::open(loaded, &request).expect("it opens");
     let (task, settings) = (suite.tasks[task].clone(), suite.settings.clone());
     let spec = EpisodeSpec {
         identity: Identity {

@@ -113,7 +113,7 @@ local state, methods, arm = { target = host.target, closure = host.closure, grip
 -- Methods work on the state of the arm; scripts get wrappers that check their arguments.
 for name, method in pairs(Arm) do
   methods[name] = function(self, ...)
-    if self ~= arm then check.no_self(name, self) end
+    if self ~= arm then check.missing_self_error(name, self) end
     return method(state, check.arguments(name, ...))
   end
 end

@@ -22,13 +22,13 @@ pub use plan::{
     profile_file::load_profile,
 };
 pub use run::{
-    episode::{Episode, EpisodeRequest, Scenes, check_shift},
-    experiment::{Experiment, Finish, Row},
+    episode::{EpisodeSetup, EpisodeRequest, Scenes, check_shift},
+    experiment::{Experiment, ExperimentSummary, ExperimentRow},
     expert::{Expert, ExpertController},
 };
 pub use schema::Range;
 pub use vm::{
-    Limits, Print,
+    Limits, PrintSink,
     error::ScriptError,
     library::{Bundle, Source, embedded, embedded_scripts, sha256},
     set_stuck_handler,

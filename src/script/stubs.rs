@@ -57,7 +57,7 @@ fn lua_type(ty: &Type) -> String {
         },
         Type::Map(of) => format!("table<string, {}>", lua_type(of)),
         Type::Nested(record) => record.class.into(),
-        Type::Made(records) => records.iter().map(|record| record.class).collect::<Vec<_>>().join("|"),
+        Type::Constructed(records) => records.iter().map(|record| record.class).collect::<Vec<_>>().join("|"),
         Type::Object(class) => (*class).into(),
         Type::OneOf(types) => types.iter().map(lua_type).collect::<Vec<_>>().join("|"),
         Type::Any => "any".into(),
@@ -68,7 +68,7 @@ fn lua_type(ty: &Type) -> String {
 fn details(doc: &str, ty: &Type, presence: FieldDefault) -> String {
     let expected = match ty {
         Type::Number(..) | Type::Integer(_) | Type::Vector(..) | Type::Colour => {
-            format!(" Expects {}.", ty.words())
+            format!(" Expects {}.", ty.describe())
         }
         _ => String::new(),
     };
@@ -299,7 +299,7 @@ mod tests {
                 Type::List(of) | Type::Map(of) => nested(of, found),
                 Type::OneOf(types) => types.iter().for_each(|ty| nested(ty, found)),
                 Type::Nested(record) => found.push(record),
-                Type::Made(records) => found.extend(*records),
+                Type::Constructed(records) => found.extend(*records),
                 _ => {}
             }
         }

@@ -7,7 +7,7 @@ use softvt::{
     benchmark::{Plan, seed::Split, settings::Settings},
     rollout::{AssetCache, Simulation, state_hash},
     scene::Scene,
-    script::{self, Episode, EpisodeRequest, LoadedScript},
+    script::{self, EpisodeSetup, EpisodeRequest, LoadedScript},
 };
 
 use crate::support::SPATIAL_SOFT;
@@ -29,7 +29,7 @@ fn scene(loaded: &LoadedScript, task: usize, episode: u64, base_seed: u64) -> Sc
         split: Split::Validation,
         shifts: Vec::new(),
     };
-    Episode::open(loaded, &request).expect("the episode opens").scene
+    EpisodeSetup::open(loaded, &request).expect("the episode opens").scene
 }
 
 /// Position offsets (m) and yaw angles (rad) of both instances, and joint angles, over many layouts.

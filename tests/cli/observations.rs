@@ -54,7 +54,7 @@ impl Policy for &mut RecordingPolicy {
 fn played(project: &Project, streams: SensorStreams) -> Result<(Vec<Observation>, EpisodeRecord), String> {
     let loaded = script::load(&project.path("x.lua"), &[]).expect("it loads");
     let Plan::Suite(suite) = &loaded.plan else { panic!("a suite") };
-    let opened = script::Episode::open(&loaded, &request("one", 0)).expect("it opens");
+    let opened = script::EpisodeSetup::open(&loaded, &request("one", 0)).expect("it opens");
     let which =
         EpisodeRef { suite: &suite.name, episode: 0, seed: 0, split: Split::Validation, policy: "witness" };
     let spec =
@@ -197,7 +197,7 @@ fn left_and_right_are_those_of_the_image() {
     let (settings, rests, looks) = (Settings::default(), AssetCache::default(), SensorAssets::default());
     for task in &suite.tasks {
         let scene =
-            script::Episode::open(&loaded, &request("spatial_soft", task.id)).expect("it opens").scene;
+            script::EpisodeSetup::open(&loaded, &request("spatial_soft", task.id)).expect("it opens").scene;
         let sim =
             Simulation::new(Arc::new(scene), &settings.physics, &settings.robot, &rests).expect("it builds");
         let mut senses = SensorSuite::new(&sim, &settings.tactile, &looks);

@@ -17,7 +17,7 @@ use crate::{
     files::replace,
     parallel,
     rollout::cancel,
-    script::{Experiment, LoadedScript, Row},
+    script::{Experiment, LoadedScript, ExperimentRow},
     text::counted,
 };
 
@@ -38,7 +38,7 @@ pub(crate) fn run(
         Some(experiment) => Ok(experiment),
         None => Experiment::open(loaded).map_err(CliError::input),
     };
-    let mut rows: Vec<Vec<Row>> = vec![Vec::new(); points];
+    let mut rows: Vec<Vec<ExperimentRow>> = vec![Vec::new(); points];
     let mut progress = Progress::new(points, name);
     let outcome = parallel::run(
         points,
@@ -62,7 +62,7 @@ pub(crate) fn run(
     );
     progress.finish();
     let done = rows.iter().filter(|rows| !rows.is_empty()).count();
-    let rows: Vec<Row> = rows.into_iter().flatten().collect();
+    let rows: Vec<ExperimentRow> = rows.into_iter().flatten().collect();
     if cancel::requested() {
         print_rows(config, &rows, columns);
         return Err(CliError::interrupted(format!(
@@ -96,7 +96,7 @@ fn write(base: &Path, relative: &str, bytes: &[u8]) -> Result<(), CliError> {
 }
 
 /// Prints rows as JSON lines or as a table.
-fn print_rows(config: &RunConfig, rows: &[Row], columns: &[String]) {
+fn print_rows(config: &RunConfig, rows: &[ExperimentRow], columns: &[String]) {
     if config.json {
         rows.iter().for_each(|row| print(&format!("{}\n", serde_json::json!(row))));
         return;

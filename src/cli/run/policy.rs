@@ -28,7 +28,7 @@ const DEFAULT_TIMEOUT: Duration = Duration::from_secs(60);
 
 /// Makes the controller of an episode.
 pub(crate) type ControllerFactory =
-    Box<dyn Fn(script::Episode, TaskBrief) -> Result<Box<dyn Controller>, CliError> + Sync>;
+    Box<dyn Fn(script::EpisodeSetup, TaskBrief) -> Result<Box<dyn Controller>, CliError> + Sync>;
 
 /// Configuration of a policy server.
 #[derive(Debug)]
@@ -255,7 +255,7 @@ impl PolicyConfig {
 /// # Errors
 /// The task has none, or its script fails.
 pub(crate) fn expert_controller(
-    opened: script::Episode,
+    opened: script::EpisodeSetup,
     mode: GripMode,
 ) -> Result<ExpertController, CliError> {
     let expert = opened.expert();

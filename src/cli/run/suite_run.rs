@@ -146,8 +146,8 @@ impl<'a> SuiteRun<'a> {
     }
 
     /// Builds the scene of an episode: its layout, the shifts, and the rigid twin if requested.
-    pub(crate) fn open_episode(&self, request: &script::EpisodeRequest) -> Result<script::Episode, CliError> {
-        let mut opened = script::Episode::open(self.loaded, request).map_err(CliError::input)?;
+    pub(crate) fn open_episode(&self, request: &script::EpisodeRequest) -> Result<script::EpisodeSetup, CliError> {
+        let mut opened = script::EpisodeSetup::open(self.loaded, request).map_err(CliError::input)?;
         if self.config.is_rigid_twin {
             (opened.scene, opened.nominal) = (opened.scene.rigid_twin(), opened.nominal.rigid_twin());
         }
@@ -420,7 +420,7 @@ impl<'a> SuiteRun<'a> {
         task: &Task,
         request: &script::EpisodeRequest,
         origin: Option<&Origin>,
-    ) -> Result<(EpisodeSpec, script::Episode), CliError> {
+    ) -> Result<(EpisodeSpec, script::EpisodeSetup), CliError> {
         let mut opened = self.open_episode(request)?;
         if let Some(origin) = origin {
             origin.start.apply(&mut opened.scene);
@@ -543,7 +543,7 @@ mod tests {
         }
     }
 
-    fn force_observer(_: script::Episode, brief: TaskBrief) -> Result<Box<dyn Controller>, CliError> {
+    fn force_observer(_: script::EpisodeSetup, brief: TaskBrief) -> Result<Box<dyn Controller>, CliError> {
         Ok(Box::new(ChunkedPolicy::new(Box::new(ForceObserver), brief, 1)))
     }
 

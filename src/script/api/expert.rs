@@ -23,7 +23,7 @@ use crate::{
             base_library,
             error::fail,
             library::embedded,
-            value::{got, number, sorted_pairs},
+            value::{describe, number, sorted_pairs},
         },
     },
     text::unknown_name,
@@ -168,16 +168,16 @@ fn checks(lua: &Lua) -> mlua::Result<Table> {
         None => Err(fail(lua, format!("arm: the method {name:?} is not declared"))),
     };
     checks.set("arguments", lua.create_function(check_arguments)?)?;
-    let no_self = move |lua: &Lua, (name, first): (String, Value)| -> mlua::Result<()> {
-        Err(class.no_self(lua, &name, &first))
+    let missing_self_error = move |lua: &Lua, (name, first): (String, Value)| -> mlua::Result<()> {
+        Err(class.missing_self_error(lua, &name, &first))
     };
-    checks.set("no_self", lua.create_function(no_self)?)?;
+    checks.set("missing_self_error", lua.create_function(missing_self_error)?)?;
     checks.set("options", lua.create_function(options)?)?;
     let unknown_key = move |lua: &Lua, key: Value| -> mlua::Result<()> {
         match &key {
-            Value::String(key) => Err(class.no_key(lua, "arm", &key.to_string_lossy())),
+            Value::String(key) => Err(class.unknown_key_error(lua, "arm", &key.to_string_lossy())),
             other => {
-                let got = got(other);
+                let got = describe(other);
                 Err(fail(lua, format!("arm: expected the name of a field or method, got {got}")))
             }
         }
@@ -194,14 +194,14 @@ fn options(lua: &Lua, (label, given, defaults): (String, Value, Table)) -> mlua:
         Value::Nil => return Ok(defaults),
         Value::Table(given) => given,
         other => {
-            return Err(fail(lua, format!("{label}: expected a table of options, got {}", got(&other))));
+            return Err(fail(lua, format!("{label}: expected a table of options, got {}", describe(&other))));
         }
     };
     let known: Vec<String> =
         sorted_pairs(&defaults).iter().filter_map(|(key, _)| key.to_string().ok()).collect();
     for (key, value) in sorted_pairs(&given) {
         let Value::String(key) = &key else {
-            return Err(fail(lua, format!("{label}: expected names of options, got {}", got(&key))));
+            return Err(fail(lua, format!("{label}: expected names of options, got {}", describe(&key))));
         };
         let key = key.to_string_lossy();
         if !known.contains(&key) {
@@ -212,7 +212,7 @@ fn options(lua: &Lua, (label, given, defaults): (String, Value, Table)) -> mlua:
         match number(&value).filter(|n| range.holds(*n)) {
             Some(n) => defaults.set(key, n)?,
             None => {
-                let (words, got) = (range.words(), got(&value));
+                let (words, got) = (range.describe(), describe(&value));
                 return Err(fail(lua, format!("{label}: {key}: expected a number{words}, got {got}")));
             }
         }

@@ -13,7 +13,7 @@ use crate::{
         vm::{
             error::fail,
             memory_budget::{Reservation, reserve},
-            value::got,
+            value::describe,
         },
     },
     sensing::camera::resize,
@@ -92,7 +92,7 @@ impl FromLua for LuaImage {
     fn from_lua(value: Value, lua: &Lua) -> mlua::Result<Self> {
         let image =
             value.as_userdata().and_then(|data| data.borrow::<Self>().ok().map(|image| image.clone()));
-        image.ok_or_else(|| fail(lua, format!("expected an image, got {}", got(&value))))
+        image.ok_or_else(|| fail(lua, format!("expected an image, got {}", describe(&value))))
     }
 }
 

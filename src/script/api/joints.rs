@@ -14,7 +14,7 @@ use crate::{
     scene::{Asset, Body, Joint, JointMotion, Part, part_poses},
     script::{
         schema::{
-            Made, Range, Record, RecordType, Type, ValidationError, error_at_key, invalid, make,
+            Constructed, Range, Record, RecordType, Type, ValidationError, error_at_key, invalid, make,
             object::LuaConstructor, one_of, record,
         },
         vm::error::fail,
@@ -192,7 +192,7 @@ pub(crate) fn parts(
 impl JointSpec {
     fn joint(&self) -> Joint {
         match self {
-            Self::Slider(Made { spec, .. }) => Joint {
+            Self::Slider(Constructed { spec, .. }) => Joint {
                 motion: JointMotion::Slide,
                 axis_o: Vec3::from(spec.axis).normalize(),
                 origin_o: Vec3::zeros(),
@@ -201,7 +201,7 @@ impl JointSpec {
                 damping: spec.damping,
                 friction: spec.friction,
             },
-            Self::Hinge(Made { spec, .. }) => Joint {
+            Self::Hinge(Constructed { spec, .. }) => Joint {
                 motion: JointMotion::Turn,
                 axis_o: Vec3::from(spec.axis).normalize(),
                 origin_o: Vec3::from(spec.origin),

@@ -8,7 +8,7 @@ use crate::{
     robot::rotation,
     script::{
         schema::{LuaType, Type, class, functions, object::fixed_list, record},
-        vm::{error::fail, value::got},
+        vm::{error::fail, value::describe},
     },
 };
 
@@ -86,7 +86,7 @@ pub(crate) struct LuaPose(pub Pose);
 impl FromLua for LuaPose {
     fn from_lua(value: Value, lua: &Lua) -> mlua::Result<Self> {
         let pose = value.as_userdata().and_then(|data| data.borrow::<Self>().ok().map(|pose| *pose));
-        pose.ok_or_else(|| fail(lua, format!("expected a pose (softvt.pose{{…}}), got {}", got(&value))))
+        pose.ok_or_else(|| fail(lua, format!("expected a pose (softvt.pose{{…}}), got {}", describe(&value))))
     }
 }
 

@@ -19,7 +19,7 @@ use crate::{
     robot::panda::{self, ARM_DOFS},
     scene::{Asset, Body, Camera, Lighting, Object, Scene, SoftMaterial},
     script::{
-        schema::{Made, Range, Type, class, object::fixed_list, record},
+        schema::{Constructed, Range, Type, class, object::fixed_list, record},
         vm::error::{fail, here_text},
     },
     text::{format_number, unknown_name},
@@ -55,7 +55,7 @@ record! {
         /// Name in the scene, unique.
         name: String = Type::Name;
         /// Asset of the object.
-        asset: Made<AssetSpec>;
+        asset: Constructed<AssetSpec>;
         /// Position x, y; the object rests on the table, or on the object that `on` names.
         at: Option<[f64; 2]> = Type::Vector(2, "m, world");
         /// Position of its origin: its lowest point, on the centre line.
@@ -114,7 +114,7 @@ impl LuaScene {
         Self { scene: Arc::new(Mutex::new(scene)), assets: Arc::default() }
     }
 
-    fn asset(&self, lua: &Lua, made: &Made<AssetSpec>) -> mlua::Result<Arc<Asset>> {
+    fn asset(&self, lua: &Lua, made: &Constructed<AssetSpec>) -> mlua::Result<Arc<Asset>> {
         let mut assets = lock(&self.assets);
         let pointer = made.table.to_pointer();
         if let Some(ReadAsset { asset, .. }) = assets.iter().find(|known| known.table.to_pointer() == pointer)

@@ -27,7 +27,7 @@ use crate::{
     robot::{Side, rotation},
     rollout::{AssetCache, SensingError, SensorAssets, SensorSuite, Simulation, cancel},
     script::{
-        schema::{Made, Range, Type, choice, class, functions, output, record},
+        schema::{Constructed, Range, Type, choice, class, functions, output, record},
         vm::{
             clock,
             error::fail,
@@ -52,7 +52,7 @@ record! {
     /// A scene with the robot, which is built and settled. Deformation refers to the settled shapes.
     SimulateSpec: "softvt.SimulateSpec" as "softvt.simulate" {
         /// Initial scene.
-        layout: Made<LayoutSpec>;
+        layout: Constructed<LayoutSpec>;
         /// Part of the seed.
         suite: String => Text("experiment");
         /// Part of the seed.

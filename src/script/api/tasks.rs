@@ -8,10 +8,10 @@ use crate::{
     benchmark::{ObjectType, REFERENCE, Variation},
     script::{
         schema::{
-            Made, Range, Record, RecordType, Type, Unchecked, ValidationError, choice, error_at_key,
+            Constructed, Range, Record, RecordType, Type, Unchecked, ValidationError, choice, error_at_key,
             functions, make, object::LuaConstructor, one_of, record,
         },
-        vm::{error::fail, value::got},
+        vm::{error::fail, value::describe},
     },
 };
 
@@ -57,7 +57,7 @@ record! {
         /// Instruction for the policy.
         prompt: String;
         /// Initial scene.
-        layout: Made<LayoutSpec>;
+        layout: Constructed<LayoutSpec>;
         /// Success criterion.
         goal: GoalSpec;
         /// A coroutine that solves the task with privileged state.
@@ -92,9 +92,9 @@ record! {
         /// Default number of episodes per task.
         episodes: u32 = Type::Integer(Range::closed(1.0, 1e6)) => Integer(5);
         /// The tasks, in order.
-        tasks: Vec<Made<TaskSpec>>;
+        tasks: Vec<Constructed<TaskSpec>>;
         /// Changes of the scene that a run can request.
-        shifts: Option<Vec<Made<ShiftSpec>>>;
+        shifts: Option<Vec<Constructed<ShiftSpec>>>;
         /// Changed settings of physics, robot and judge: { physics = {…}, robot = {…}, criteria = {…} }.
         settings: Option<Table> = SETTINGS;
     }
@@ -115,7 +115,7 @@ record! {
         /// Name in results.
         name: String = Type::Name;
         /// The suites, in order.
-        suites: Vec<Made<SuiteSpec>>;
+        suites: Vec<Constructed<SuiteSpec>>;
         /// The conditions, in order.
         conditions: Vec<ConditionSpec>;
     }
@@ -200,7 +200,7 @@ functions! {
                 }
                 (_, Value::Nil) => make(lua, LayoutSpec::RECORD, &name.0)?,
                 (name, _) => {
-                    let message = format!("layout: expected a name and a function, got {}", got(name));
+                    let message = format!("layout: expected a name and a function, got {}", describe(name));
                     return Err(fail(lua, message));
                 }
             }

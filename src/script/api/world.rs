@@ -31,7 +31,7 @@ use crate::{
             clock,
             error::fail,
             memory_budget::{Reservation, reserve_in_world},
-            value::{finite, got},
+            value::{describe, finite},
             watchdog::Clock,
         },
     },
@@ -388,7 +388,7 @@ impl FromLua for LuaSolid {
     fn from_lua(value: Value, lua: &Lua) -> mlua::Result<Self> {
         let solid =
             value.as_userdata().and_then(|data| data.borrow::<Self>().ok().map(|solid| solid.clone()));
-        solid.ok_or_else(|| fail(lua, format!("expected a solid of a world, got {}", got(&value))))
+        solid.ok_or_else(|| fail(lua, format!("expected a solid of a world, got {}", describe(&value))))
     }
 }
 

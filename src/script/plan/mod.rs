@@ -20,19 +20,19 @@ use crate::{
                 ConditionSpec, ConditionsSpec, ExperimentSpec, GoalSpec, ShiftSpec, SuiteSpec, TaskSpec,
             },
         },
-        schema::{HasTable, Made, RecordType, is_made, strict_table},
+        schema::{HasTable, Constructed, RecordType, is_constructed, strict_table},
         vm::{
             Limits, Vm,
             error::{ScriptError, fail},
             json::to_json,
             library::{Bundle, Library},
             source_map::fail_at_key,
-            value::{got, got_made, sorted_pairs},
+            value::{describe, describe_constructed, sorted_pairs},
         },
     },
     text::unknown_name,
 };
-use options::{OptionSpec, Session, SharedSession};
+use options::{OptionSpec, OptionSession, SharedOptions};
 
 /// A loaded script.
 #[derive(Clone)]
@@ -71,10 +71,10 @@ pub fn load(path: &Path, argv: &[String]) -> Result<LoadedScript, ScriptError> {
 /// As [`load`].
 pub fn load_with(path: &Path, argv: &[String], limits: &Limits) -> Result<LoadedScript, ScriptError> {
     let (library, main) = Library::open(path)?;
-    let (machine, values) = open(&main, library, argv, limits)?;
-    let options = lock(&machine.session).options.clone();
-    let plan = machine.plan(&values).map_err(|e| machine.vm.explain(&e))?;
-    let bundle = Arc::new(lock(machine.vm.library()).bundle().clone());
+    let (instance, values) = open(&main, library, argv, limits)?;
+    let options = lock(&instance.session).options.clone();
+    let plan = instance.plan(&values).map_err(|e| instance.vm.explain(&e))?;
+    let bundle = Arc::new(lock(instance.vm.library()).bundle().clone());
     Ok(LoadedScript { main, plan, options, bundle, argv: argv.to_vec(), limits: limits.clone() })
 }
 
@@ -84,16 +84,16 @@ pub fn load_with(path: &Path, argv: &[String], limits: &Limits) -> Result<Loaded
 /// If the file cannot be read or is not Lua.
 pub fn declared_options(path: &Path) -> Result<Vec<OptionSpec>, ScriptError> {
     let (library, main) = Library::open(path)?;
-    let machine = Machine::new(&main, library, &[], &Limits::default())?;
-    let outcome = machine.vm.run_main();
-    let declared = lock(&machine.session).options.clone();
+    let instance = ScriptInstance::new(&main, library, &[], &Limits::default())?;
+    let outcome = instance.vm.run_main();
+    let declared = lock(&instance.session).options.clone();
     if declared.is_empty() { outcome.map(|_| declared) } else { Ok(declared) }
 }
 
 /// A virtual machine with the whole Lua interface.
-pub(crate) struct Machine {
+pub(crate) struct ScriptInstance {
     pub vm: Vm,
-    session: SharedSession,
+    session: SharedOptions,
 }
 
 /// Runs the main file in a new virtual machine, and returns both with the results of the file.
@@ -102,35 +102,35 @@ pub(crate) fn open(
     library: Library,
     argv: &[String],
     limits: &Limits,
-) -> Result<(Machine, MultiValue), ScriptError> {
-    let machine = Machine::new(main, library, argv, limits)?;
-    let values = machine.vm.run_main()?;
-    lock(&machine.session).leftover(main)?;
-    Ok((machine, values))
+) -> Result<(ScriptInstance, MultiValue), ScriptError> {
+    let instance = ScriptInstance::new(main, library, argv, limits)?;
+    let values = instance.vm.run_main()?;
+    lock(&instance.session).check_all_consumed(main)?;
+    Ok((instance, values))
 }
 
 /// Runs the sources of `loaded` in a new virtual machine.
-pub(crate) fn reopen(loaded: &LoadedScript) -> Result<(Machine, MultiValue), ScriptError> {
+pub(crate) fn reopen(loaded: &LoadedScript) -> Result<(ScriptInstance, MultiValue), ScriptError> {
     open(&loaded.main, Library::frozen((*loaded.bundle).clone()), &loaded.argv, &loaded.limits)
 }
 
 /// The table of the constructor of `T` that a file returned; `file` names the file in messages.
-fn made<T: RecordType>(lua: &Lua, values: &MultiValue, file: &str) -> mlua::Result<Made<T>> {
+fn made<T: RecordType>(lua: &Lua, values: &MultiValue, file: &str) -> mlua::Result<Constructed<T>> {
     match values.front() {
-        Some(Value::Table(table)) if is_made(lua, T::RECORD, table) => {
+        Some(Value::Table(table)) if is_constructed(lua, T::RECORD, table) => {
             lua.unpack(Value::Table(table.clone()))
         }
         other => {
-            let got = other.map_or("nothing".to_owned(), got_made);
+            let got = other.map_or("nothing".to_owned(), describe_constructed);
             Err(fail(lua, format!("{file} returns {}{{…}}, got {got}", T::RECORD.kind)))
         }
     }
 }
 
-impl Machine {
+impl ScriptInstance {
     fn new(main: &str, library: Library, argv: &[String], limits: &Limits) -> Result<Self, ScriptError> {
         let vm = Vm::new(main, library, limits)?;
-        let session = Session::new(argv);
+        let session = OptionSession::new(argv);
         install(&vm, &session).map_err(|e| vm.explain(&e))?;
         Ok(Self { vm, session })
     }
@@ -141,7 +141,7 @@ impl Machine {
             return Err(no_plan(lua, values));
         };
         for (record, flag) in [(PolicySpec::RECORD, "--policy"), (ProfileSpec::RECORD, "--profile")] {
-            if is_made(lua, record, table) {
+            if is_constructed(lua, record, table) {
                 let message = format!(
                     "returns {}{{…}}, which is not a plan; run softvt SUITE.lua {flag} {}",
                     record.kind,
@@ -150,8 +150,8 @@ impl Machine {
                 return Err(fail(lua, message));
             }
         }
-        if is_made(lua, ExperimentSpec::RECORD, table) {
-            let spec: Made<ExperimentSpec> = lua.unpack(Value::Table(table.clone()))?;
+        if is_constructed(lua, ExperimentSpec::RECORD, table) {
+            let spec: Constructed<ExperimentSpec> = lua.unpack(Value::Table(table.clone()))?;
             let _deadline = self.vm.call_deadline();
             return Ok(Plan::Experiment {
                 name: spec.name.clone(),
@@ -164,20 +164,20 @@ impl Machine {
         for spec in &specs {
             let suite = suite(lua, spec)?;
             if suites.iter().any(|known| known.name == suite.name)
-                && !is_made(lua, ConditionsSpec::RECORD, table)
+                && !is_constructed(lua, ConditionsSpec::RECORD, table)
             {
                 let message = format!("two suites are named {:?}; rename one", suite.name);
                 return Err(fail_at_key(lua, &spec.table, "name", message));
             }
             suites.push(suite);
         }
-        if is_made(lua, ConditionsSpec::RECORD, table) {
-            let spec: Made<ConditionsSpec> = lua.unpack(Value::Table(table.clone()))?;
+        if is_constructed(lua, ConditionsSpec::RECORD, table) {
+            let spec: Constructed<ConditionsSpec> = lua.unpack(Value::Table(table.clone()))?;
             let conditions = spec.conditions.iter().map(|condition| self::condition(lua, condition));
             let conditions = conditions.collect::<mlua::Result<_>>()?;
             return Ok(Plan::Conditions { name: spec.name.clone(), suites, conditions });
         }
-        if is_made(lua, SuiteSpec::RECORD, table) {
+        if is_constructed(lua, SuiteSpec::RECORD, table) {
             return match suites.pop() {
                 Some(suite) => Ok(Plan::Suite(Box::new(suite))),
                 None => Err(no_plan(lua, values)),
@@ -191,18 +191,18 @@ impl Machine {
 }
 
 /// The suites of a plan's table: one suite, conditions, or a list of suites. `None` if it is something else.
-fn suites(lua: &Lua, table: &Table) -> mlua::Result<Option<Vec<Made<SuiteSpec>>>> {
-    if is_made(lua, SuiteSpec::RECORD, table) {
+fn suites(lua: &Lua, table: &Table) -> mlua::Result<Option<Vec<Constructed<SuiteSpec>>>> {
+    if is_constructed(lua, SuiteSpec::RECORD, table) {
         return Ok(Some(vec![lua.unpack(Value::Table(table.clone()))?]));
     }
-    if is_made(lua, ConditionsSpec::RECORD, table) {
-        let spec: Made<ConditionsSpec> = lua.unpack(Value::Table(table.clone()))?;
+    if is_constructed(lua, ConditionsSpec::RECORD, table) {
+        let spec: Constructed<ConditionsSpec> = lua.unpack(Value::Table(table.clone()))?;
         return Ok(Some(spec.spec.suites));
     }
     let mut suites = Vec::new();
     for entry in table.clone().sequence_values::<Value>() {
         match entry? {
-            Value::Table(table) if is_made(lua, SuiteSpec::RECORD, &table) => {
+            Value::Table(table) if is_constructed(lua, SuiteSpec::RECORD, &table) => {
                 suites.push(lua.unpack(Value::Table(table))?);
             }
             _ => return Ok(None),
@@ -212,13 +212,13 @@ fn suites(lua: &Lua, table: &Table) -> mlua::Result<Option<Vec<Made<SuiteSpec>>>
 }
 
 fn no_plan(lua: &Lua, values: &MultiValue) -> mlua::Error {
-    let got = values.front().map_or("nothing".to_string(), got);
+    let got = values.front().map_or("nothing".to_string(), describe);
     let plans = "softvt.suite{…}, softvt.experiment{…} or a list of suites";
     fail(lua, format!("a script returns a plan ({plans}), got {got}"))
 }
 
 /// Adds the Lua interface to a new virtual machine.
-fn install(vm: &Vm, session: &SharedSession) -> mlua::Result<()> {
+fn install(vm: &Vm, session: &SharedOptions) -> mlua::Result<()> {
     let lua = &vm.lua;
     lua.set_app_data(session.clone());
     vm.api.set("version", env!("CARGO_PKG_VERSION"))?;
@@ -229,7 +229,7 @@ fn install(vm: &Vm, session: &SharedSession) -> mlua::Result<()> {
     Ok(())
 }
 
-fn suite(lua: &Lua, spec: &Made<SuiteSpec>) -> mlua::Result<Suite> {
+fn suite(lua: &Lua, spec: &Constructed<SuiteSpec>) -> mlua::Result<Suite> {
     let name = spec.name.clone();
     if spec.tasks.is_empty() {
         let message = format!("suite.tasks: suite {name:?} has no tasks; give at least one");
@@ -311,12 +311,12 @@ fn condition(lua: &Lua, spec: &ConditionSpec) -> mlua::Result<Condition> {
 
 /// The declarations of a suite and a task.
 pub(crate) fn find_task(
-    machine: &Machine,
+    instance: &ScriptInstance,
     values: &MultiValue,
     name: &str,
     id: usize,
-) -> Result<(Made<SuiteSpec>, Made<TaskSpec>), ScriptError> {
-    let (vm, main) = (&machine.vm, machine.vm.main());
+) -> Result<(Constructed<SuiteSpec>, Constructed<TaskSpec>), ScriptError> {
+    let (vm, main) = (&instance.vm, instance.vm.main());
     let suites = match values.front() {
         Some(Value::Table(table)) => suites(&vm.lua, table).map_err(|e| vm.explain(&e))?,
         _ => None,
@@ -341,7 +341,7 @@ pub(crate) fn points(lua: &Lua, spec: &ExperimentSpec) -> mlua::Result<Vec<Value
         (Some(points), None) => {
             let list: Value = points.call(spec.options.clone())?;
             let Value::Table(list) = &list else {
-                let message = format!("experiment.points: expected a list of tables, got {}", got(&list));
+                let message = format!("experiment.points: expected a list of tables, got {}", describe(&list));
                 return Err(fail(lua, message));
             };
             let points: Vec<Value> = list.clone().sequence_values().collect::<mlua::Result<_>>()?;

@@ -12,7 +12,7 @@ use crate::{
         },
         vm::{
             error::{ScriptError, fail},
-            value::{got, number, sorted_pairs},
+            value::{describe, number, sorted_pairs},
         },
     },
     text::suggest,
@@ -82,14 +82,14 @@ impl OptionSpec {
     pub fn expects(&self) -> String {
         let unit = if self.unit.is_empty() { String::new() } else { format!(" ({})", self.unit) };
         match &self.default {
-            OptionValue::Number(_) => format!("a number{}{unit}", self.range.words()),
-            OptionValue::Integer(_) => format!("a whole number{}{unit}", self.range.words()),
+            OptionValue::Number(_) => format!("a number{}{unit}", self.range.describe()),
+            OptionValue::Integer(_) => format!("a whole number{}{unit}", self.range.describe()),
             OptionValue::Text(_) | OptionValue::Texts(_) if !self.choices.is_empty() => {
                 format!("one of {}", self.choices.join(", "))
             }
             OptionValue::Text(_) => "a string".into(),
             OptionValue::Flag(_) => "on or off".into(),
-            OptionValue::Numbers(_) => format!("numbers joined by commas{}{unit}", self.range.words()),
+            OptionValue::Numbers(_) => format!("numbers joined by commas{}{unit}", self.range.describe()),
             OptionValue::Texts(_) => "strings joined by commas".into(),
         }
     }
@@ -122,23 +122,23 @@ impl OptionSpec {
     }
 }
 
-pub(crate) type SharedSession = Arc<Mutex<Session>>;
+pub(crate) type SharedOptions = Arc<Mutex<OptionSession>>;
 
 /// The command line of a script, and the options declared so far.
 #[derive(Debug, Default)]
-pub(crate) struct Session {
+pub(crate) struct OptionSession {
     /// Words of the command line; `None` for those that an option has taken.
     words: Vec<Option<String>>,
     pub options: Vec<OptionSpec>,
 }
 
-impl Session {
-    pub(crate) fn new(argv: &[String]) -> SharedSession {
+impl OptionSession {
+    pub(crate) fn new(argv: &[String]) -> SharedOptions {
         Arc::new(Mutex::new(Self { words: argv.iter().cloned().map(Some).collect(), options: Vec::new() }))
     }
 
     /// Fails if there is a word that no option has taken.
-    pub(crate) fn leftover(&self, main: &str) -> Result<(), ScriptError> {
+    pub(crate) fn check_all_consumed(&self, main: &str) -> Result<(), ScriptError> {
         let Some(word) = self.words.iter().flatten().next() else { return Ok(()) };
         let name = word.split('=').next().unwrap_or(word);
         if !name.starts_with('-') {
@@ -203,10 +203,10 @@ functions! {
         /// `local opt = softvt.options { gap_mm = { default = 40, unit = "mm", min = 1 } }`.
         fn options(lua, options: Unchecked = Type::Map(&Type::Nested(OptionRecord::RECORD))) -> ["table<string, any>"] {
             let Value::Table(table) = &options.0 else {
-                let message = format!("options: expected a table of options, got {}", got(&options.0));
+                let message = format!("options: expected a table of options, got {}", describe(&options.0));
                 return Err(fail(lua, message));
             };
-            let session = lua.app_data_ref::<SharedSession>().map(|session| session.clone());
+            let session = lua.app_data_ref::<SharedOptions>().map(|session| session.clone());
             let session = session.ok_or_else(|| mlua::Error::runtime("there is no command line"))?;
             let values = lua.create_table()?;
             let mut names = Vec::new();
@@ -222,7 +222,7 @@ functions! {
 }
 
 /// Reads the declaration of an option and its value on the command line.
-fn declare(lua: &Lua, session: &SharedSession, key: &Value, value: &Value) -> mlua::Result<OptionSpec> {
+fn declare(lua: &Lua, session: &SharedOptions, key: &Value, value: &Value) -> mlua::Result<OptionSpec> {
     let mut spec = read_spec(lua, key, value)?;
     let mut session = lock(session);
     if session.options.iter().any(|known| known.name == spec.name) {
@@ -236,14 +236,14 @@ fn declare(lua: &Lua, session: &SharedSession, key: &Value, value: &Value) -> ml
 
 fn read_spec(lua: &Lua, key: &Value, value: &Value) -> mlua::Result<OptionSpec> {
     let Value::String(name) = key else {
-        return Err(fail(lua, format!("options: expected names as keys, got {}", got(key))));
+        return Err(fail(lua, format!("options: expected names as keys, got {}", describe(key))));
     };
     let name = name.to_string_lossy();
     let fits = |b: u8| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_';
     if !name.starts_with(|c: char| c.is_ascii_lowercase()) || !name.bytes().all(fits) {
         let message = format!(
             "options: {}: a name begins with a letter and has lower-case letters, digits and underscores",
-            got(key)
+            describe(key)
         );
         return Err(fail(lua, message));
     }

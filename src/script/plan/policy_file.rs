@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, path::Path, sync::Arc};
 
 use mlua::{FromLua, Function, Lua, Table, Value};
 
-use super::{Machine, made, open};
+use super::{ScriptInstance, made, open};
 use crate::{
     benchmark::seed::{EpisodeSeed, RandomStream},
     geometry::Vec3,
@@ -20,14 +20,14 @@ use crate::{
             policy::{ActionSpec, PolicySpec},
             pose::rotation_from_wxyz,
         },
-        schema::{Made, RecordType, ValidationError, check::check},
+        schema::{Constructed, RecordType, ValidationError, check::check},
         vm::{
             Limits,
             error::ScriptError,
             library::{Bundle, Library},
             list::plain,
             source_map::place_of_key,
-            value::{describe, got},
+            value::{describe, literal},
         },
     },
 };
@@ -72,26 +72,26 @@ impl PolicyFile {
     /// As [`PolicyFile::load`].
     pub fn load_with(path: &Path, limits: &Limits) -> Result<Self, ScriptError> {
         let (library, main) = Library::open(path)?;
-        let (machine, values) = open(&main, library, &[], limits)?;
+        let (instance, values) = open(&main, library, &[], limits)?;
         let read = || -> mlua::Result<Self> {
-            let policy: Made<PolicySpec> = made(&machine.vm.lua, &values, "a policy's file")?;
+            let policy: Constructed<PolicySpec> = made(&instance.vm.lua, &values, "a policy's file")?;
             let streams = SensorStreams {
                 cameras: policy.observes.cameras.clone().unwrap_or_default(),
                 touch: policy.observes.touch,
                 force: policy.observes.force,
             };
-            let observes_at = place_of_key(&machine.vm.lua, &policy.table, &["observes", "cameras"]);
+            let observes_at = place_of_key(&instance.vm.lua, &policy.table, &["observes", "cameras"]);
             Ok(Self {
                 name: policy.name.clone(),
                 replan: policy.replan,
                 streams,
                 observes_at: observes_at.unwrap_or_else(|| main.clone()),
                 main: main.clone(),
-                bundle: Arc::new(lock(machine.vm.library()).bundle().clone()),
+                bundle: Arc::new(lock(instance.vm.library()).bundle().clone()),
                 limits: limits.clone(),
             })
         };
-        read().map_err(|e| machine.vm.explain(&e))
+        read().map_err(|e| instance.vm.explain(&e))
     }
 
     /// SHA-256 of every file that it is made of, by name.
@@ -105,12 +105,12 @@ impl PolicyFile {
     /// If the file fails.
     pub fn start(&self, seed: &EpisodeSeed) -> Result<LuaPolicy, ScriptError> {
         let library = Library::frozen((*self.bundle).clone());
-        let (machine, values) = open(&self.main, library, &[], &self.limits)?;
-        let policy: Made<PolicySpec> =
-            made(&machine.vm.lua, &values, "a policy's file").map_err(|e| machine.vm.explain(&e))?;
+        let (instance, values) = open(&self.main, library, &[], &self.limits)?;
+        let policy: Constructed<PolicySpec> =
+            made(&instance.vm.lua, &values, "a policy's file").map_err(|e| instance.vm.explain(&e))?;
         let PolicySpec { act, reset, .. } = policy.spec;
-        machine.vm.random.reseed(seed.stream(RandomStream::Policy));
-        Ok(LuaPolicy { name: self.name.clone(), streams: self.streams.clone(), machine, act, reset })
+        instance.vm.random.reseed(seed.stream(RandomStream::Policy));
+        Ok(LuaPolicy { name: self.name.clone(), streams: self.streams.clone(), instance, act, reset })
     }
 }
 
@@ -118,7 +118,7 @@ impl PolicyFile {
 pub struct LuaPolicy {
     name: String,
     streams: SensorStreams,
-    machine: Machine,
+    instance: ScriptInstance,
     act: Function,
     reset: Option<Function>,
 }
@@ -134,19 +134,19 @@ impl Policy for LuaPolicy {
 
     fn reset(&mut self, brief: &TaskBrief) -> Result<(), PolicyError> {
         let Some(reset) = &self.reset else { return Ok(()) };
-        let vm = &self.machine.vm;
+        let vm = &self.instance.vm;
         let brief = task_brief(&vm.lua, brief).map_err(|e| script(vm.explain(&e)))?;
         vm.call(reset, brief).map_err(script)
     }
 
     fn act(&mut self, observation: &Observation) -> Result<ActionChunk, PolicyError> {
-        let vm = &self.machine.vm;
+        let vm = &self.instance.vm;
         let response: Value = vm.call(&self.act, LuaObservation::new(observation)).map_err(script)?;
         commands(&vm.lua, &response).map_err(|error| match error {
             InvalidResponse::NotFinite(text) => {
                 PolicyError::Action(format!("the action {text} holds a number that is not finite"))
             }
-            InvalidResponse::Malformed(error) => script(self.at_act(&error.words("policy.act"))),
+            InvalidResponse::Malformed(error) => script(self.at_act(&error.describe("policy.act"))),
         })
     }
 }
@@ -156,7 +156,7 @@ impl LuaPolicy {
     fn at_act(&self, message: &str) -> ScriptError {
         let info = self.act.info();
         let file = info.source.as_deref().and_then(|source| source.strip_prefix('@'));
-        let file = file.unwrap_or(self.machine.vm.main());
+        let file = file.unwrap_or(self.instance.vm.main());
         ScriptError::new(file, message).at(info.line_defined)
     }
 }
@@ -189,7 +189,7 @@ impl From<mlua::Error> for InvalidResponse {
 fn commands(lua: &Lua, response: &Value) -> Result<ActionChunk, InvalidResponse> {
     let response = plain(lua, response)?;
     let Value::Table(table) = &response else {
-        let got = got(&response);
+        let got = describe(&response);
         return Err(
             ValidationError::new(format!("expected an action or a list of actions, got {got}")).into()
         );
@@ -207,7 +207,7 @@ fn commands(lua: &Lua, response: &Value) -> Result<ActionChunk, InvalidResponse>
     for index in 1..=count {
         let place = |error: ValidationError| error.inside(format!("[{index}]"));
         let Value::Table(entry) = table.raw_get(index)? else {
-            let got = got(&table.raw_get(index)?);
+            let got = describe(&table.raw_get(index)?);
             return Err(place(ValidationError::new(format!("expected an action, got {got}"))).into());
         };
         let action = action(lua, &entry).map_err(|error| match error {
@@ -221,7 +221,7 @@ fn commands(lua: &Lua, response: &Value) -> Result<ActionChunk, InvalidResponse>
 
 fn action(lua: &Lua, table: &Table) -> Result<Action, InvalidResponse> {
     if has_non_finite(lua, table)? {
-        return Err(InvalidResponse::NotFinite(describe(&Value::Table(table.clone()), 0)));
+        return Err(InvalidResponse::NotFinite(literal(&Value::Table(table.clone()), 0)));
     }
     let spec = ActionSpec::from_lua(Value::Table(check(lua, ActionSpec::RECORD, table)?), lua)?;
     let axis_angle_b = match (spec.axis_angle, spec.rotation) {

@@ -15,7 +15,7 @@ use crate::{
     },
     script::{
         api::policy::{ActionEncodingSpec, InputKind, InputSpec, PoseKind, ProfileSpec},
-        schema::Made,
+        schema::Constructed,
         vm::{Limits, error::ScriptError, library::Library, source_map::fail_at_key},
     },
 };
@@ -26,14 +26,14 @@ use crate::{
 /// If the file cannot be read or does not return a valid profile; the message names file and line.
 pub fn load_profile(path: &Path) -> Result<(Profile, BTreeMap<String, String>), ScriptError> {
     let (library, main) = Library::open(path)?;
-    let (machine, values) = open(&main, library, &[], &Limits::default())?;
-    let profile = read(&machine.vm.lua, &values).map_err(|e| machine.vm.explain(&e))?;
-    let hashes = lock(machine.vm.library()).bundle().hashes();
+    let (instance, values) = open(&main, library, &[], &Limits::default())?;
+    let profile = read(&instance.vm.lua, &values).map_err(|e| instance.vm.explain(&e))?;
+    let hashes = lock(instance.vm.library()).bundle().hashes();
     Ok((profile, hashes))
 }
 
 fn read(lua: &Lua, values: &MultiValue) -> mlua::Result<Profile> {
-    let spec: Made<ProfileSpec> = made(lua, values, "a profile's file")?;
+    let spec: Constructed<ProfileSpec> = made(lua, values, "a profile's file")?;
     let reader = ProfileReader { lua, spec: &spec };
     let (mut keys, mut inputs) = (BTreeSet::new(), Vec::new());
     for (index, entry) in spec.inputs.iter().enumerate() {
@@ -53,7 +53,7 @@ fn read(lua: &Lua, values: &MultiValue) -> mlua::Result<Profile> {
 /// Reads a profile and checks the relations between its fields.
 struct ProfileReader<'a> {
     lua: &'a Lua,
-    spec: &'a Made<ProfileSpec>,
+    spec: &'a Constructed<ProfileSpec>,
 }
 
 impl ProfileReader<'_> {

@@ -15,9 +15,9 @@ use crate::{
             scene::{LuaScene, empty_scene},
             tasks::{GoalSpec, SuiteSpec},
         },
-        plan::{LoadedScript, Machine, find_task, reopen},
+        plan::{LoadedScript, ScriptInstance, find_task, reopen},
         run::expert::Expert,
-        schema::{HasTable, Made, Range},
+        schema::{HasTable, Constructed, Range},
         vm::{
             error::{ScriptError, fail},
             source_map::fail_at_key,
@@ -43,40 +43,40 @@ pub struct EpisodeRequest {
 }
 
 /// An episode that is ready to be simulated.
-pub struct Episode {
+pub struct EpisodeSetup {
     /// Initial scene.
     pub scene: Scene,
     /// Initial scene before the shifts; deformation limits are those of its objects.
     pub nominal: Scene,
     /// Source of its random streams.
     pub seed: EpisodeSeed,
-    machine: Machine,
+    instance: ScriptInstance,
     expert: Option<Function>,
 }
 
-impl Episode {
+impl EpisodeSetup {
     /// Runs the sources of `loaded` in a new virtual machine, builds the scene and applies the shifts.
     ///
     /// # Errors
     /// If the suite, the task or a shift is unknown, or the script fails.
     pub fn open(loaded: &LoadedScript, request: &EpisodeRequest) -> Result<Self, ScriptError> {
-        let (machine, values) = reopen(loaded)?;
-        let Start { scene, nominal, seed, expert } = start(&machine, &values, request)?;
-        Ok(Self { scene, nominal, seed, machine, expert })
+        let (instance, values) = reopen(loaded)?;
+        let Start { scene, nominal, seed, expert } = start(&instance, &values, request)?;
+        Ok(Self { scene, nominal, seed, instance, expert })
     }
 
     /// The expert of the task, ready to start; `None` if the task has no expert.
     pub fn expert(self) -> Option<Expert> {
         let function = self.expert?;
-        self.machine.vm.random.reseed(self.seed.stream(RandomStream::Expert));
-        Some(Expert::start(self.machine, &function))
+        self.instance.vm.random.reseed(self.seed.stream(RandomStream::Expert));
+        Some(Expert::start(self.instance, &function))
     }
 }
 
 /// Builds many scenes in one virtual machine, for checks without a simulation. Global state that one layout changes is
 /// seen by the next.
 pub struct Scenes {
-    machine: Machine,
+    instance: ScriptInstance,
     values: MultiValue,
 }
 
@@ -86,8 +86,8 @@ impl Scenes {
     /// # Errors
     /// If the script fails.
     pub fn open(loaded: &LoadedScript) -> Result<Self, ScriptError> {
-        let (machine, values) = reopen(loaded)?;
-        Ok(Self { machine, values })
+        let (instance, values) = reopen(loaded)?;
+        Ok(Self { instance, values })
     }
 
     /// The initial scene of an episode, before and after the shifts.
@@ -95,7 +95,7 @@ impl Scenes {
     /// # Errors
     /// As [`Episode::open`].
     pub fn of(&self, request: &EpisodeRequest) -> Result<(Scene, Scene), ScriptError> {
-        let Start { scene, nominal, .. } = start(&self.machine, &self.values, request)?;
+        let Start { scene, nominal, .. } = start(&self.instance, &self.values, request)?;
         Ok((nominal, scene))
     }
 }
@@ -108,9 +108,9 @@ struct Start {
     expert: Option<Function>,
 }
 
-fn start(machine: &Machine, values: &MultiValue, request: &EpisodeRequest) -> Result<Start, ScriptError> {
-    let vm = &machine.vm;
-    let (suite, task) = find_task(machine, values, &request.suite, request.task)?;
+fn start(instance: &ScriptInstance, values: &MultiValue, request: &EpisodeRequest) -> Result<Start, ScriptError> {
+    let vm = &instance.vm;
+    let (suite, task) = find_task(instance, values, &request.suite, request.task)?;
     let seed = EpisodeSeed {
         suite: request.suite.clone(),
         layout: task.layout.name.clone(),
@@ -125,8 +125,8 @@ fn start(machine: &Machine, values: &MultiValue, request: &EpisodeRequest) -> Re
     let nominal = lock(&scene.scene).clone();
     let mut current = scene;
     for (name, value) in &request.shifts {
-        let apply = find_shift(machine, &suite, name)?;
-        current = apply_shift(machine, &apply, current, *value)?;
+        let apply = find_shift(instance, &suite, name)?;
+        current = apply_shift(instance, &apply, current, *value)?;
     }
     let scene = lock(&current.scene).clone();
     check_goal(&vm.lua, &task.goal, &scene).map_err(|e| vm.explain(&e))?;
@@ -142,13 +142,13 @@ fn unknown_shift<'a>(name: &str, known: impl Iterator<Item = &'a str> + Clone) -
 }
 
 /// The function of a shift.
-fn find_shift(machine: &Machine, suite: &Made<SuiteSpec>, name: &str) -> Result<Function, ScriptError> {
+fn find_shift(instance: &ScriptInstance, suite: &Constructed<SuiteSpec>, name: &str) -> Result<Function, ScriptError> {
     let shifts = suite.shifts.as_deref().unwrap_or_default();
     match shifts.iter().find(|shift| shift.name == name) {
         Some(shift) => Ok(shift.apply.clone()),
         None => {
             let names = shifts.iter().map(|shift| shift.name.as_str());
-            Err(ScriptError::new(machine.vm.main(), unknown_shift(name, names)))
+            Err(ScriptError::new(instance.vm.main(), unknown_shift(name, names)))
         }
     }
 }
@@ -166,7 +166,7 @@ pub fn check_shift(shifts: &[Shift], name: &str, value: f64) -> Result<(), Strin
         true => Ok(()),
         false => Err(format!(
             "shift {name}: expected a number{} ({}), got {}",
-            range.words(),
+            range.describe(),
             shift.unit,
             format_number(value)
         )),
@@ -174,12 +174,12 @@ pub fn check_shift(shifts: &[Shift], name: &str, value: f64) -> Result<(), Strin
 }
 
 fn apply_shift(
-    machine: &Machine,
+    instance: &ScriptInstance,
     apply: &Function,
     scene: LuaScene,
     value: f64,
 ) -> Result<LuaScene, ScriptError> {
-    let vm = &machine.vm;
+    let vm = &instance.vm;
     let result: Value = vm.call(apply, (scene.clone(), value))?;
     match &result {
         Value::Nil => Ok(scene),

@@ -8,22 +8,22 @@ use crate::script::{
         image::image_of,
         tasks::{ExperimentSpec, FinishSpec},
     },
-    plan::{LoadedScript, Machine, points, reopen},
-    schema::{Made, RecordType, is_made, validate},
+    plan::{LoadedScript, ScriptInstance, points, reopen},
+    schema::{Constructed, RecordType, is_constructed, validate},
     vm::{
         error::{ScriptError, fail},
         json::to_json,
-        value::got,
+        value::describe,
     },
 };
 use crate::sensing::camera::encode_png;
 
 /// A row of results, with sorted keys.
-pub type Row = Map<String, Json>;
+pub type ExperimentRow = Map<String, Json>;
 
 /// Summary of an experiment.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Finish {
+pub struct ExperimentSummary {
     /// Printed after the rows.
     pub text: Option<String>,
     /// Files to write: relative path without `..`, and bytes.
@@ -32,7 +32,7 @@ pub struct Finish {
 
 /// A virtual machine that runs points of an experiment; every thread needs its own.
 pub struct Experiment {
-    machine: Machine,
+    instance: ScriptInstance,
     table: Value,
     points: Vec<Value>,
 }
@@ -43,19 +43,19 @@ impl Experiment {
     /// # Errors
     /// If the script fails or does not return an experiment.
     pub fn open(loaded: &LoadedScript) -> Result<Self, ScriptError> {
-        let (machine, values) = reopen(loaded)?;
-        let lua = &machine.vm.lua;
+        let (instance, values) = reopen(loaded)?;
+        let lua = &instance.vm.lua;
         let table = match values.front() {
-            Some(Value::Table(table)) if is_made(lua, ExperimentSpec::RECORD, table) => table,
+            Some(Value::Table(table)) if is_constructed(lua, ExperimentSpec::RECORD, table) => table,
             _ => return Err(ScriptError::new(&loaded.main, "the script did not return an experiment")),
         };
         let points = {
-            let _deadline = machine.vm.call_deadline();
-            let spec = lua.unpack::<Made<ExperimentSpec>>(Value::Table(table.clone()));
-            spec.and_then(|spec| points(lua, &spec)).map_err(|e| machine.vm.explain(&e))?
+            let _deadline = instance.vm.call_deadline();
+            let spec = lua.unpack::<Constructed<ExperimentSpec>>(Value::Table(table.clone()));
+            spec.and_then(|spec| points(lua, &spec)).map_err(|e| instance.vm.explain(&e))?
         };
         let table = Value::Table(table.clone());
-        Ok(Self { machine, table, points })
+        Ok(Self { instance, table, points })
     }
 
     /// Number of points.
@@ -74,12 +74,12 @@ impl Experiment {
     /// If it contains something other than data.
     pub fn point(&self, index: usize) -> Result<Json, ScriptError> {
         let point = self.points.get(index).cloned().unwrap_or(Value::Nil);
-        to_json(&self.machine.vm.lua, &point, "point").map_err(|e| self.machine.vm.explain(&e))
+        to_json(&self.instance.vm.lua, &point, "point").map_err(|e| self.instance.vm.explain(&e))
     }
 
     /// The declaration, checked again: the script may have changed its table.
-    fn spec(&self) -> Result<Made<ExperimentSpec>, ScriptError> {
-        let vm = &self.machine.vm;
+    fn spec(&self) -> Result<Constructed<ExperimentSpec>, ScriptError> {
+        let vm = &self.instance.vm;
         vm.lua.unpack(self.table.clone()).map_err(|e| vm.explain(&e))
     }
 
@@ -87,8 +87,8 @@ impl Experiment {
     ///
     /// # Errors
     /// If the script fails, takes too long, or returns something other than rows.
-    pub fn run(&self, index: usize) -> Result<Vec<Row>, ScriptError> {
-        let vm = &self.machine.vm;
+    pub fn run(&self, index: usize) -> Result<Vec<ExperimentRow>, ScriptError> {
+        let vm = &self.instance.vm;
         vm.random.reseed(crate::benchmark::seed::keyed_rng(&["softvt point", &index.to_string()]));
         let spec = self.spec()?;
         let point = self.points.get(index).cloned().unwrap_or(Value::Nil);
@@ -100,10 +100,10 @@ impl Experiment {
     ///
     /// # Errors
     /// If the script fails or returns something other than a summary.
-    pub fn finish(&self, rows: &[Row]) -> Result<Finish, ScriptError> {
-        let vm = &self.machine.vm;
+    pub fn finish(&self, rows: &[ExperimentRow]) -> Result<ExperimentSummary, ScriptError> {
+        let vm = &self.instance.vm;
         let spec = self.spec()?;
-        let Some(finish) = &spec.finish else { return Ok(Finish::default()) };
+        let Some(finish) = &spec.finish else { return Ok(ExperimentSummary::default()) };
         let list = || {
             let list = vm.lua.create_table()?;
             for row in rows {
@@ -117,9 +117,9 @@ impl Experiment {
     }
 }
 
-fn read_finish(lua: &Lua, value: &Value) -> mlua::Result<Finish> {
+fn read_finish(lua: &Lua, value: &Value) -> mlua::Result<ExperimentSummary> {
     if value.is_nil() {
-        return Ok(Finish::default());
+        return Ok(ExperimentSummary::default());
     }
     let spec: FinishSpec = lua.unpack(Value::Table(validate(lua, FinishSpec::RECORD, value)?))?;
     let mut files = Vec::new();
@@ -133,7 +133,7 @@ fn read_finish(lua: &Lua, value: &Value) -> mlua::Result<Finish> {
         }
         files.push((path, file_content(lua, &content)?));
     }
-    Ok(Finish { text: spec.text, files })
+    Ok(ExperimentSummary { text: spec.text, files })
 }
 
 /// The bytes of a file: text as it is, images as PNG, other data as JSON.
@@ -149,11 +149,11 @@ fn file_content(lua: &Lua, content: &Value) -> mlua::Result<Vec<u8>> {
     Ok((text + "\n").into_bytes())
 }
 
-fn rows(lua: &Lua, result: &Value) -> mlua::Result<Vec<Row>> {
+fn rows(lua: &Lua, result: &Value) -> mlua::Result<Vec<ExperimentRow>> {
     let row = |value: &Value| match to_json(lua, value, "experiment.run: row")? {
         Json::Object(map) => Ok(map),
         _ => {
-            let message = format!("experiment.run: expected a row or a list of rows, got {}", got(value));
+            let message = format!("experiment.run: expected a row or a list of rows, got {}", describe(value));
             Err(fail(lua, message))
         }
     };

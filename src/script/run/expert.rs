@@ -14,20 +14,20 @@ use crate::{
             },
             touch::FingerReadings,
         },
-        plan::Machine,
+        plan::ScriptInstance,
         vm::error::ScriptError,
     },
 };
 
 /// A running expert with a virtual machine of its own.
 pub struct Expert {
-    machine: Machine,
+    instance: ScriptInstance,
     run: Coroutine,
 }
 
 impl Expert {
-    pub(crate) fn start(machine: Machine, function: &Function) -> Self {
-        Self { machine, run: Coroutine::new(function.clone(), FingerAccess::None) }
+    pub(crate) fn start(instance: ScriptInstance, function: &Function) -> Self {
+        Self { instance, run: Coroutine::new(function.clone(), FingerAccess::None) }
     }
 
     /// True if the expert needs finger readings at the next control step.
@@ -45,7 +45,7 @@ impl Expert {
     /// # Errors
     /// If the expert fails, takes too long, or yields something other than a command.
     pub fn step(&mut self, view: &ExpertView) -> Result<Option<ExpertCommand>, ScriptError> {
-        let vm = &self.machine.vm;
+        let vm = &self.instance.vm;
         let _deadline = vm.call_deadline();
         self.run.step(&vm.lua, view).map_err(|e| vm.explain(&e))
     }
@@ -57,7 +57,7 @@ impl Expert {
 
     /// Ends the expert with an error that says `complaint` at the line of its last command.
     pub fn refuse(&mut self, complaint: &str) -> ScriptError {
-        let vm = &self.machine.vm;
+        let vm = &self.instance.vm;
         let _deadline = vm.call_deadline();
         vm.explain(&self.run.refuse(&vm.lua, complaint))
     }

@@ -8,7 +8,7 @@ use crate::{
         error::{ScriptError, fail, here},
         list::plain,
         source_map,
-        value::{got, number, sorted_pairs},
+        value::{describe, number, sorted_pairs},
     },
     text::{suggest, unknown_name},
 };
@@ -18,11 +18,11 @@ impl Type {
     /// as copies with their defaults.
     pub(crate) fn check(&self, lua: &Lua, value: &Value) -> Result<Value, ValidationError> {
         let value = &plain(lua, value)?;
-        let wrong = || ValidationError::new(format!("expected {}, got {}", self.words(), got(value)));
+        let wrong = || ValidationError::new(format!("expected {}, got {}", self.describe(), describe(value)));
         if let Value::String(text) = value
             && text.to_str().is_err()
         {
-            return Err(ValidationError::new(format!("expected UTF-8 text, got {}", got(value))));
+            return Err(ValidationError::new(format!("expected UTF-8 text, got {}", describe(value))));
         }
         let kept = |accepted: bool| if accepted { Ok(value.clone()) } else { Err(wrong()) };
         match (self, value) {
@@ -56,8 +56,8 @@ impl Type {
             (Self::List(of), Value::Table(list)) => check_list(lua, of, list, &wrong),
             (Self::Map(of), Value::Table(map)) => check_map(lua, of, map),
             (Self::Nested(record), Value::Table(table)) => check(lua, record, table).map(Value::Table),
-            (Self::Made(records), Value::Table(table)) => {
-                kept(records.iter().any(|record| is_made(lua, record, table)))
+            (Self::Constructed(records), Value::Table(table)) => {
+                kept(records.iter().any(|record| is_constructed(lua, record, table)))
             }
             (Self::Object(class), Value::UserData(object)) => {
                 kept(object.type_name().is_ok_and(|name| name.to_string_lossy() == *class))
@@ -119,7 +119,7 @@ fn check_numbers(
     let checked = values.iter().enumerate().map(|(index, value)| {
         let number = number(value).filter(|number| range.holds(*number));
         number.ok_or_else(|| {
-            let message = format!("expected a number{}, got {}", range.words(), got(value));
+            let message = format!("expected a number{}, got {}", range.describe(), describe(value));
             ValidationError::new(message).inside(format!("[{}]", index + 1))
         })
     });
@@ -131,7 +131,7 @@ fn check_numbers(
 fn with_length(list: &Table, error: ValidationError) -> ValidationError {
     let length = list.raw_len();
     let is_list = length > 0 && list.pairs::<Value, Value>().count() == length;
-    match error.message.strip_suffix(&got(&Value::Table(list.clone()))).filter(|_| is_list) {
+    match error.message.strip_suffix(&describe(&Value::Table(list.clone()))).filter(|_| is_list) {
         Some(before) => ValidationError { message: format!("{before}a list of {length}"), ..error },
         None => error,
     }
@@ -160,7 +160,7 @@ fn check_map(lua: &Lua, of: &Type, map: &Table) -> Result<Value, ValidationError
     let out = lua.create_table()?;
     for (key, value) in sorted_pairs(map) {
         let Value::String(name) = &key else {
-            return Err(ValidationError::new(format!("expected names as keys, got {}", got(&key))));
+            return Err(ValidationError::new(format!("expected names as keys, got {}", describe(&key))));
         };
         let name = name.to_string_lossy();
         let value = of.check(lua, &value).map_err(|error| error.inside(name.clone()))?;
@@ -182,7 +182,7 @@ pub(crate) fn check(lua: &Lua, record: &Record, table: &Table) -> Result<Table, 
                 )));
             }
             other => {
-                let message = format!("unexpected entry [{}]; the keys are {}", got(other), joined(record));
+                let message = format!("unexpected entry [{}]; the keys are {}", describe(other), joined(record));
                 return Err(ValidationError::new(message));
             }
         }
@@ -202,7 +202,7 @@ pub(crate) fn check(lua: &Lua, record: &Record, table: &Table) -> Result<Table, 
 fn absent(lua: &Lua, field: &Field) -> Result<Value, ValidationError> {
     Ok(match field.presence {
         FieldDefault::Required => {
-            return Err(ValidationError::new(format!("missing; expected {}", field.ty.words())));
+            return Err(ValidationError::new(format!("missing; expected {}", field.ty.describe())));
         }
         FieldDefault::Optional => Value::Nil,
         FieldDefault::Number(n) => Value::Number(n),
@@ -221,7 +221,7 @@ pub(crate) fn validate(lua: &Lua, record: &Record, value: &Value) -> mlua::Resul
         }
         other => {
             let message =
-                format!("{}: expected a table of {}, got {}", record.label, joined(record), got(&other));
+                format!("{}: expected a table of {}, got {}", record.label, joined(record), describe(&other));
             Err(fail(lua, message))
         }
     }
@@ -238,11 +238,11 @@ pub(crate) fn make(lua: &Lua, record: &'static Record, value: &Value) -> mlua::R
 /// Checks a made table again, since a script may have written to it, and returns the checked copy.
 pub(crate) fn recheck(lua: &Lua, record: &Record, table: &Table) -> mlua::Result<Table> {
     check(lua, record, table)
-        .map_err(|error| fail(lua, format!("{} (changed after it was made)", error.words(record.label))))
+        .map_err(|error| fail(lua, format!("{} (changed after it was made)", error.describe(record.label))))
 }
 
 /// True if the constructor of `record` made `table`.
-pub(crate) fn is_made(lua: &Lua, record: &Record, table: &Table) -> bool {
+pub(crate) fn is_constructed(lua: &Lua, record: &Record, table: &Table) -> bool {
     let own = lua.named_registry_value::<Table>(record.kind);
     own.is_ok_and(|own| table.metatable().is_some_and(|meta| meta.to_pointer() == own.to_pointer()))
 }
@@ -269,7 +269,7 @@ fn metatable(lua: &Lua, record: &'static Record) -> mlua::Result<Table> {
 
 /// The error of a script at the line of the offending key, as far as the source text shows it.
 pub(crate) fn error_at_key(lua: &Lua, label: &str, error: &ValidationError) -> mlua::Error {
-    let message = error.words(label);
+    let message = error.describe(label);
     let Some((file, line)) = here(lua) else { return fail(lua, message) };
     let line = source_map::line_of_key(lua, &file, line, &error.path);
     mlua::Error::external(ScriptError::new(file, message).at(Some(line)))

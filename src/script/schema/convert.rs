@@ -4,8 +4,8 @@ use std::{collections::BTreeMap, ops::Deref};
 
 use mlua::{FromLua, Function, Lua, Table, Value};
 
-use super::{FieldDefault, Range, Record, Type, is_made, recheck};
-use crate::script::vm::{error::fail, value::got};
+use super::{FieldDefault, Range, Record, Type, is_constructed, recheck};
+use crate::script::vm::{error::fail, value::describe};
 
 /// A Rust type that checked Lua values convert to.
 pub(crate) trait LuaType: FromLua {
@@ -79,13 +79,13 @@ pub(crate) trait RecordType: FromLua {
 
 /// A table that the constructor of `T` made. Reading one checks it again, since a script may have written to it.
 #[derive(Clone, Debug)]
-pub(crate) struct Made<T> {
+pub(crate) struct Constructed<T> {
     pub spec: T,
     /// The table itself, for messages about the place where it was made and for its identity.
     pub table: Table,
 }
 
-impl<T> Deref for Made<T> {
+impl<T> Deref for Constructed<T> {
     type Target = T;
 
     fn deref(&self) -> &T {
@@ -93,20 +93,20 @@ impl<T> Deref for Made<T> {
     }
 }
 
-impl<T: RecordType> FromLua for Made<T> {
+impl<T: RecordType> FromLua for Constructed<T> {
     fn from_lua(value: Value, lua: &Lua) -> mlua::Result<Self> {
         match value {
-            Value::Table(table) if is_made(lua, T::RECORD, &table) => {
+            Value::Table(table) if is_constructed(lua, T::RECORD, &table) => {
                 let spec = lua.unpack(Value::Table(recheck(lua, T::RECORD, &table)?))?;
                 Ok(Self { spec, table })
             }
-            other => Err(fail(lua, format!("expected {}{{…}}, got {}", T::RECORD.kind, got(&other)))),
+            other => Err(fail(lua, format!("expected {}{{…}}, got {}", T::RECORD.kind, describe(&other)))),
         }
     }
 }
 
-impl<T: RecordType> LuaType for Made<T> {
-    const TYPE: Type = Type::Made(T::RECORDS);
+impl<T: RecordType> LuaType for Constructed<T> {
+    const TYPE: Type = Type::Constructed(T::RECORDS);
 }
 
 /// The first of the given expressions: what a declaration says, else a default.
@@ -219,20 +219,20 @@ macro_rules! one_of {
         $(#[doc = $doc])*
         #[derive(Clone, Debug)]
         pub(crate) enum $name {
-            $($variant($crate::script::schema::Made<$spec>)),+
+            $($variant($crate::script::schema::Constructed<$spec>)),+
         }
 
         impl mlua::FromLua for $name {
             fn from_lua(value: mlua::Value, lua: &mlua::Lua) -> mlua::Result<Self> {
                 let table: mlua::Table = lua.unpack(value)?;
                 $(
-                    if $crate::script::schema::is_made(
+                    if $crate::script::schema::is_constructed(
                         lua, <$spec as $crate::script::schema::RecordType>::RECORD, &table
                     ) {
                         return lua.unpack(mlua::Value::Table(table)).map(Self::$variant);
                     }
                 )+
-                let expected = <Self as $crate::script::schema::LuaType>::TYPE.words();
+                let expected = <Self as $crate::script::schema::LuaType>::TYPE.describe();
                 Err($crate::script::vm::error::fail(lua, format!("expected {expected}, got a table")))
             }
         }
@@ -244,7 +244,7 @@ macro_rules! one_of {
         }
 
         impl $crate::script::schema::LuaType for $name {
-            const TYPE: $crate::script::schema::Type = $crate::script::schema::Type::Made(&[
+            const TYPE: $crate::script::schema::Type = $crate::script::schema::Type::Constructed(&[
                 $(<$spec as $crate::script::schema::RecordType>::RECORD),+
             ]);
         }

@@ -9,8 +9,8 @@ pub(crate) mod check;
 pub(crate) mod convert;
 pub(crate) mod object;
 
-pub(crate) use check::{error_at_key, invalid, is_made, make, recheck, validate};
-pub(crate) use convert::{HasTable, LuaType, Made, RecordType, Unchecked, choice, one_of, record};
+pub(crate) use check::{error_at_key, invalid, is_constructed, make, recheck, validate};
+pub(crate) use convert::{HasTable, LuaType, Constructed, RecordType, Unchecked, choice, one_of, record};
 pub(crate) use object::{
     ApiObject, Class, FieldValue, Function, Signature, class, functions, output, strict_table,
 };
@@ -45,7 +45,7 @@ pub(crate) enum Type {
     /// A plain table, checked where it is written.
     Nested(&'static Record),
     /// A table made by the constructor of one of these records.
-    Made(&'static [&'static Record]),
+    Constructed(&'static [&'static Record]),
     /// A table that is checked elsewhere, with its LuaCATS type.
     Table(&'static str),
     /// An object of this class.
@@ -158,7 +158,7 @@ impl Range {
     }
 
     /// The bounds for a message: ` in 0..10`, ` above 0`, …; empty for any number.
-    pub fn words(&self) -> String {
+    pub fn describe(&self) -> String {
         match (self.min.is_finite(), self.max.is_finite()) {
             (false, false) => String::new(),
             (true, false) if self.above_min => format!(" above {}", self.min),
@@ -175,10 +175,10 @@ impl Range {
 
 impl Type {
     /// The expected value for a message: `seconds in 0..10`.
-    pub(crate) fn words(&self) -> String {
+    pub(crate) fn describe(&self) -> String {
         match self {
-            Self::Number(unit, range) => format!("{}{}", unit_words(unit), range.words()),
-            Self::Integer(range) => format!("a whole number{}", range.words()),
+            Self::Number(unit, range) => format!("{}{}", unit_words(unit), range.describe()),
+            Self::Integer(range) => format!("a whole number{}", range.describe()),
             Self::Text => "a string that is not empty".into(),
             Self::Line => "a string".into(),
             Self::Table(_) => "a table".into(),
@@ -193,18 +193,18 @@ impl Type {
             }
             Self::Function(signature) => format!("a function, {signature}"),
             Self::List(Self::Any) => "a list".into(),
-            Self::List(of @ Self::Made(_)) => {
-                format!("a list of {}", of.words().replacen("the result", "results", 1))
+            Self::List(of @ Self::Constructed(_)) => {
+                format!("a list of {}", of.describe().replacen("the result", "results", 1))
             }
-            Self::List(of) => format!("a list of {}", of.words()),
-            Self::Map(of) => format!("a table from names to {}", of.words()),
+            Self::List(of) => format!("a list of {}", of.describe()),
+            Self::Map(of) => format!("a table from names to {}", of.describe()),
             Self::Nested(record) => format!("a table of {}", joined(record)),
-            Self::Made(records) => {
+            Self::Constructed(records) => {
                 let made: Vec<_> = records.iter().map(|record| format!("{}{{…}}", record.kind)).collect();
                 format!("the result of {}", made.join(" or "))
             }
             Self::Object(class) => format!("a {class}"),
-            Self::OneOf(types) => types.iter().map(Self::words).collect::<Vec<_>>().join(" or "),
+            Self::OneOf(types) => types.iter().map(Self::describe).collect::<Vec<_>>().join(" or "),
             Self::Any => "a value".into(),
         }
     }
@@ -247,7 +247,7 @@ impl ValidationError {
     }
 
     /// The full message: `task.goal.hold_s: expected …`.
-    pub(crate) fn words(&self, label: &str) -> String {
+    pub(crate) fn describe(&self, label: &str) -> String {
         let mut text = label.to_string();
         for key in &self.path {
             if !key.starts_with('[') {

@@ -6,7 +6,7 @@ use mlua::{IntoLua, Lua, MetaMethod, MultiValue, Table, UserData, UserDataFields
 use super::{FieldDefault, Type, error_at_key, make};
 use crate::{
     geometry::Vec3,
-    script::vm::{error::fail, list::LuaList, value::got},
+    script::vm::{error::fail, list::LuaList, value::describe},
     text::unknown_name,
 };
 
@@ -76,7 +76,7 @@ impl Class {
     }
 
     /// The error for a name that is neither a field nor a method.
-    pub(crate) fn no_key(&self, lua: &Lua, label: &str, key: &str) -> mlua::Error {
+    pub(crate) fn unknown_key_error(&self, lua: &Lua, label: &str, key: &str) -> mlua::Error {
         match self.keys().next() {
             Some(_) => fail(lua, format!("{label}: {}", unknown_name("key", key, self.keys()))),
             None => fail(lua, format!("{label}: has no key {key:?}")),
@@ -84,8 +84,8 @@ impl Class {
     }
 
     /// The error for a method called without its object: most often a point was written for a colon.
-    pub(crate) fn no_self(&self, lua: &Lua, method: &str, first: &Value) -> mlua::Error {
-        let (short, got) = (self.short_name().to_lowercase(), got(first));
+    pub(crate) fn missing_self_error(&self, lua: &Lua, method: &str, first: &Value) -> mlua::Error {
+        let (short, got) = (self.short_name().to_lowercase(), describe(first));
         let message = format!(
             "{short}:{method}: expected a {} before the colon, got {got}; call it as {short}:{method}(…)",
             self.name
@@ -490,7 +490,7 @@ pub(crate) fn strict_table(lua: &Lua, label: &str, table: Table, names: Vec<Stri
             let known = names.iter().map(String::as_str);
             Err(fail(lua, format!("{name}: {}", unknown_name("key", &key.to_string_lossy(), known))))
         }
-        key => Err(fail(lua, format!("{name}: expected a name as key, got {}", got(key)))),
+        key => Err(fail(lua, format!("{name}: expected a name as key, got {}", describe(key)))),
     })?;
     // Lua asks the metatable only for keys without a value; reading a known one stores and returns nil.
     meta.set("__index", &refuse)?;
@@ -517,7 +517,7 @@ pub(crate) fn add_methods<T: ApiObject, M: UserDataMethods<T>>(methods: &mut M) 
             let mut values = values.into_iter();
             let first = values.next().unwrap_or(Value::Nil);
             let Some(this) = first.as_userdata().and_then(|data| data.borrow::<T>().ok()) else {
-                return Err(T::CLASS.no_self(lua, signature.name, &first));
+                return Err(T::CLASS.missing_self_error(lua, signature.name, &first));
             };
             let label = format!("{}:{}", this.label(), signature.name);
             body(lua, &this, arguments(lua, &label, signature, values)?)
@@ -543,7 +543,7 @@ pub(crate) fn arguments(
         param.ty.check(lua, &value).map_err(|error| match param.ty {
             // The keys of a table say enough.
             Type::Nested(_) => error_at_key(lua, label, &error),
-            _ => fail(lua, error.words(&format!("{label}: {}", param.name))),
+            _ => fail(lua, error.describe(&format!("{label}: {}", param.name))),
         })
     });
     checked.collect()
@@ -555,7 +555,7 @@ fn name_of<T: ApiObject>(lua: &Lua, this: &T, key: &Value) -> mlua::Result<Strin
         Value::String(name) => Ok(name.to_string_lossy()),
         other => {
             let message =
-                format!("{}: expected the name of a field or method, got {}", this.label(), got(other));
+                format!("{}: expected the name of a field or method, got {}", this.label(), describe(other));
             Err(fail(lua, message))
         }
     }
@@ -564,7 +564,7 @@ fn name_of<T: ApiObject>(lua: &Lua, this: &T, key: &Value) -> mlua::Result<Strin
 fn read<T: ApiObject>(lua: &Lua, this: &T, key: &Value) -> mlua::Result<Value> {
     let name = name_of(lua, this, key)?;
     let Some(index) = T::CLASS.field(&name) else {
-        return Err(T::CLASS.no_key(lua, &this.label(), &name));
+        return Err(T::CLASS.unknown_key_error(lua, &this.label(), &name));
     };
     let get = T::GETTERS[index];
     let label = || format!("{}.{name}", this.label());
@@ -609,7 +609,7 @@ fn write_field<T: ApiObject>(lua: &Lua, this: &T, index: usize, value: &Value) -
     let label = format!("{}.{}", this.label(), field.name);
     match (&field.access, T::SETTERS[index]) {
         (Access::Write(ty), Some(set)) => {
-            let value = ty.check(lua, value).map_err(|error| fail(lua, error.words(&label)))?;
+            let value = ty.check(lua, value).map_err(|error| fail(lua, error.describe(&label)))?;
             set(lua, this, value)
         }
         (Access::Read(_, Some(hint)), _) => Err(fail(lua, format!("{label}: cannot be replaced; {hint}"))),

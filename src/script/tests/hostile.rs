@@ -263,7 +263,7 @@ fn a_scene_holds_no_more_than_can_be_computed() {
         split: crate::benchmark::seed::Split::Validation,
         shifts: Vec::new(),
     };
-    let error = crate::script::Episode::open(&loaded, &request).map(|_| ()).unwrap_err();
+    let error = crate::script::EpisodeSetup::open(&loaded, &request).map(|_| ()).unwrap_err();
     assert_eq!(error.message, "scene:add: a scene holds at most 1000 objects");
 }
 

@@ -5,7 +5,7 @@ use crate::{
     physics::joints,
     rollout::{AssetCache, Simulation},
     scene::{JointMotion, Scene},
-    script::{Episode, EpisodeRequest},
+    script::{EpisodeSetup, EpisodeRequest},
 };
 
 /// A chest with one drawer on the given joint, and further parts.
@@ -43,7 +43,7 @@ fn open(text: &str) -> Result<Scene, String> {
         shifts: Vec::new(),
     };
     let folder = format!("{}/", project.path("").display()).replace("//", "/");
-    Episode::open(&loaded, &request).map(|e| e.scene).map_err(|e| e.to_string().replace(&folder, ""))
+    EpisodeSetup::open(&loaded, &request).map(|e| e.scene).map_err(|e| e.to_string().replace(&folder, ""))
 }
 
 #[test]

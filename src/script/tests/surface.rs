@@ -140,7 +140,7 @@ fn in_layout(text: &str) -> String {
         shifts: Vec::new(),
     };
     let folder = format!("{}/", project.path("").display()).replace("//", "/");
-    match crate::script::Episode::open(&loaded, &request) {
+    match crate::script::EpisodeSetup::open(&loaded, &request) {
         Ok(_) => String::new(),
         Err(error) => error.to_string().replace(&folder, ""),
     }

@@ -6,7 +6,7 @@ use super::{Project, SUITE, error_of};
 use crate::{
     benchmark::seed::Split,
     scene::{Body, Mask, Visual},
-    script::{Episode, EpisodeRequest},
+    script::{EpisodeSetup, EpisodeRequest},
 };
 
 fn with_visuals(visuals: &str) -> String {
@@ -34,7 +34,7 @@ fn read(visuals: &str) -> Vec<Visual> {
     );
     let project = Project::new(&[("suites/x.lua", &(with_visuals(visuals) + &text + "\nreturn suite()"))]);
     let loaded = project.load("suites/x.lua", &[]).unwrap();
-    let scene = Episode::open(&loaded, &first()).unwrap().scene;
+    let scene = EpisodeSetup::open(&loaded, &first()).unwrap().scene;
     assert_eq!(scene.objects[0].asset.body, Body::Scenery);
     scene.objects[0].asset.visuals.clone()
 }
@@ -185,7 +185,7 @@ fn painted_shapes_need_a_visual_per_material_or_none_at_all() {
         let text = asset + &SUITE.replace("scene:add { name = \"ball\",", add) + "\nreturn suite()";
         let project = Project::new(&[("suites/x.lua", &text)]);
         let loaded = project.load("suites/x.lua", &[]).unwrap();
-        Episode::open(&loaded, &first()).map(|episode| episode.scene.objects[0].asset.visuals.len())
+        EpisodeSetup::open(&loaded, &first()).map(|episode| episode.scene.objects[0].asset.visuals.len())
     };
     assert_eq!(painted("").unwrap(), 3);
     let looks = |count: usize| format!("visuals = {{ {} }},", "{ albedo = { 1, 1, 1 } },".repeat(count));

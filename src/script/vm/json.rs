@@ -7,7 +7,7 @@ use serde_json::{Map, Number, Value as Json};
 use super::{
     error::fail,
     list::plain,
-    value::{got, sorted_pairs},
+    value::{describe, sorted_pairs},
 };
 
 /// Nesting depth of tables.
@@ -69,12 +69,12 @@ impl JsonReader<'_> {
             Value::Integer(n) => Json::Number((*n).into()),
             Value::Number(n) => match Number::from_f64(*n) {
                 Some(number) => Json::Number(number),
-                None => return self.wrong(label, &format!("expected a finite number, got {}", got(value))),
+                None => return self.wrong(label, &format!("expected a finite number, got {}", describe(value))),
             },
             Value::String(text) => Json::String(text.to_string_lossy()),
             Value::Table(table) if depth < MAX_DEPTH => return self.table(table, label, depth),
             Value::Table(_) => return self.wrong(label, "tables are nested too deeply"),
-            other => return self.wrong(label, &format!("expected data, got {}", got(other))),
+            other => return self.wrong(label, &format!("expected data, got {}", describe(other))),
         })
     }
 
@@ -88,7 +88,7 @@ impl JsonReader<'_> {
         let mut map = Map::new();
         for (key, value) in sorted_pairs(table) {
             let Value::String(name) = &key else {
-                return self.wrong(label, &format!("expected names as keys, got {}", got(&key)));
+                return self.wrong(label, &format!("expected names as keys, got {}", describe(&key)));
             };
             let name = name.to_string_lossy();
             let inner = self.read(&value, &format!("{label}.{name}"), depth + 1)?;

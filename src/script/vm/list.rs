@@ -5,7 +5,7 @@ use mlua::{Lua, MetaMethod, MultiValue, Table, UserData, UserDataFields, UserDat
 
 use super::{
     error::fail,
-    value::{describe, got, number},
+    value::{describe, literal, number},
 };
 
 type Get = Box<dyn Fn(&Lua) -> mlua::Result<Vec<f64>> + Send + Sync>;
@@ -54,7 +54,7 @@ impl LuaList {
             Value::Integer(_) | Value::Number(_) => self.entries(lua)?.raw_get(key),
             other => {
                 let message =
-                    format!("{}: expected a place in the list, 1 or more, got {}", self.label, got(other));
+                    format!("{}: expected a place in the list, 1 or more, got {}", self.label, describe(other));
                 Err(fail(lua, message))
             }
         }
@@ -72,10 +72,10 @@ impl LuaList {
         let count = numbers.len();
         let place = number(key).filter(|n| n.fract() == 0.0 && (1.0..=count as f64).contains(n));
         let Some(place) = place else {
-            return Err(fail(lua, format!("{label}: has places 1 to {count}, got {}", got(key))));
+            return Err(fail(lua, format!("{label}: has places 1 to {count}, got {}", describe(key))));
         };
         let Some(entry) = number(value).filter(|number| number.is_finite()) else {
-            return Err(fail(lua, format!("{label}[{place}]: expected a number, got {}", got(value))));
+            return Err(fail(lua, format!("{label}[{place}]: expected a number, got {}", describe(value))));
         };
         numbers[place as usize - 1] = entry;
         set(lua, &Value::Table(lua.create_sequence_from(numbers)?))
@@ -97,7 +97,7 @@ impl UserData for LuaList {
 
     fn add_methods<M: UserDataMethods<Self>>(methods: &mut M) {
         methods.add_meta_method(MetaMethod::ToString, |lua, this, ()| {
-            Ok(describe(&Value::Table(this.entries(lua)?), 0))
+            Ok(literal(&Value::Table(this.entries(lua)?), 0))
         });
         methods.add_meta_method(MetaMethod::Len, |lua, this, _: MultiValue| Ok(this.entries(lua)?.raw_len()));
         methods.add_meta_method(MetaMethod::Index, |lua, this, key: Value| this.read(lua, &key));

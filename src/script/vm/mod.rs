@@ -26,7 +26,7 @@ use error::{Context, MainFile, RaisedObject, ScriptError, fail, here};
 use library::Library;
 use memory_budget::Budgets;
 use random::MathRandom;
-use value::{describe, got};
+use value::{describe, literal};
 use watchdog::{Clock, Deadline, OnStuck};
 
 use crate::parallel::lock;
@@ -38,7 +38,7 @@ const MAX_PRINTED_BYTES: usize = 1 << 20;
 const BASE_LIBRARY: &str = "softvt base library";
 
 /// Destination of `print`: not standard output, which belongs to results.
-pub type Print = Arc<dyn Fn(&str) + Send + Sync>;
+pub type PrintSink = Arc<dyn Fn(&str) + Send + Sync>;
 
 /// Resources of one virtual machine.
 #[derive(Clone)]
@@ -55,7 +55,7 @@ pub struct Limits {
     pub grace: Duration,
     /// Called if a library function does not return.
     pub on_stuck: OnStuck,
-    pub print: Print,
+    pub print: PrintSink,
 }
 
 static STUCK_HANDLER: OnceLock<OnStuck> = OnceLock::new();
@@ -86,7 +86,7 @@ impl Default for Limits {
 }
 
 /// State that callbacks of a virtual machine share.
-struct Shared {
+struct VmState {
     main: String,
     library: Arc<Mutex<Library>>,
     raised: Mutex<Option<RaisedObject>>,
@@ -102,13 +102,13 @@ pub(crate) struct Vm {
     /// The global table `softvt`.
     pub api: Table,
     clock: Clock,
-    shared: Arc<Shared>,
+    shared: Arc<VmState>,
 }
 
 impl Vm {
     /// A virtual machine that reads from `library`; errors without a position name the file `main`.
     pub(crate) fn new(main: &str, library: Library, limits: &Limits) -> Result<Self, ScriptError> {
-        let shared = Arc::new(Shared {
+        let shared = Arc::new(VmState {
             main: main.into(),
             library: Arc::new(Mutex::new(library)),
             raised: Mutex::new(None),
@@ -118,7 +118,7 @@ impl Vm {
         Self::build(&shared).map_err(|e| explain(&shared, &e))
     }
 
-    fn build(shared: &Arc<Shared>) -> mlua::Result<Self> {
+    fn build(shared: &Arc<VmState>) -> mlua::Result<Self> {
         let libs = StdLib::COROUTINE | StdLib::TABLE | StdLib::STRING | StdLib::UTF8 | StdLib::MATH;
         let lua = Lua::new_with(libs, LuaOptions::default())?;
         let clock = Clock::default();
@@ -208,7 +208,7 @@ impl Vm {
     }
 }
 
-fn explain(shared: &Shared, error: &mlua::Error) -> ScriptError {
+fn explain(shared: &VmState, error: &mlua::Error) -> ScriptError {
     let files = lock(&shared.library).names();
     let raised = lock(&shared.raised).clone();
     let context =
@@ -216,8 +216,8 @@ fn explain(shared: &Shared, error: &mlua::Error) -> ScriptError {
     context.explain(error)
 }
 
-fn shared(lua: &Lua) -> mlua::Result<Arc<Shared>> {
-    let shared = lua.app_data_ref::<Arc<Shared>>().map(|shared| Arc::clone(&shared));
+fn shared(lua: &Lua) -> mlua::Result<Arc<VmState>> {
+    let shared = lua.app_data_ref::<Arc<VmState>>().map(|shared| Arc::clone(&shared));
     shared.ok_or_else(|| mlua::Error::runtime("the virtual machine has no shared state"))
 }
 
@@ -284,14 +284,14 @@ fn load(lua: &Lua, (chunk, name, _mode, env): (Value, Value, Value, Value)) -> m
         Value::Nil => "=(load)".to_owned(),
         Value::String(name) => name.to_string_lossy(),
         other => {
-            return Err(fail(lua, format!("load: expected a string as name, got {}", got(&other))));
+            return Err(fail(lua, format!("load: expected a string as name, got {}", describe(&other))));
         }
     };
     let env = match env {
         Value::Nil => None,
         Value::Table(env) => Some(env),
         other => {
-            return Err(fail(lua, format!("load: expected a table as env, got {}", got(&other))));
+            return Err(fail(lua, format!("load: expected a table as env, got {}", describe(&other))));
         }
     };
     let mut bytes = Vec::new();
@@ -306,7 +306,7 @@ fn load(lua: &Lua, (chunk, name, _mode, env): (Value, Value, Value, Value)) -> m
             }
         },
         other => {
-            return Err(fail(lua, format!("load: expected a string or function, got {}", got(&other))));
+            return Err(fail(lua, format!("load: expected a string or function, got {}", describe(&other))));
         }
     }
     let refusal = |text: String| Ok((Value::Nil, Value::String(lua.create_string(text)?)));
@@ -362,7 +362,7 @@ fn require(lua: &Lua, loaded: &Table, name: &Value) -> mlua::Result<Value> {
 fn iterable(lua: &Lua, (label, value): (String, Value)) -> mlua::Result<Value> {
     match list::plain(lua, &value)? {
         Value::Table(table) => Ok(Value::Table(table)),
-        other => Err(fail(lua, format!("{label}: expected a table, got {}", got(&other)))),
+        other => Err(fail(lua, format!("{label}: expected a table, got {}", describe(&other)))),
     }
 }
 
@@ -375,7 +375,7 @@ fn error_text(lua: &Lua, value: Value) -> mlua::Result<Value> {
 
 /// Keeps a description of an error object, of which Lua would only keep the address.
 fn note_raised(lua: &Lua, object: Value) -> mlua::Result<()> {
-    let description = describe(&object, 0);
+    let description = literal(&object, 0);
     *lock(&shared(lua)?.raised) = Some(RaisedObject { description, file: here(lua) });
     Ok(())
 }

@@ -17,7 +17,7 @@ fn quoted(text: &str) -> String {
 }
 
 /// An offending value in a message.
-pub(crate) fn got(value: &Value) -> String {
+pub(crate) fn describe(value: &Value) -> String {
     match value {
         Value::String(text) => quoted(&text.to_string_lossy()),
         Value::Integer(number) => number.to_string(),
@@ -32,11 +32,11 @@ pub(crate) fn got(value: &Value) -> String {
 }
 
 /// The same, with the constructor of a table that a constructor made.
-pub(crate) fn got_made(value: &Value) -> String {
+pub(crate) fn describe_constructed(value: &Value) -> String {
     let made = value.as_table().and_then(|table| table.metatable());
     match made.and_then(|meta| meta.get::<Option<String>>("__name").ok().flatten()) {
         Some(name) => format!("{name}{{…}}"),
-        None => got(value),
+        None => describe(value),
     }
 }
 
@@ -70,13 +70,13 @@ pub(crate) fn sorted_pairs(table: &Table) -> Vec<(Value, Value)> {
     entries.sort_by_key(|(key, _)| match key {
         Value::Integer(n) => (0, *n, String::new()),
         Value::String(text) => (1, 0, text.to_string_lossy()),
-        other => (2, 0, got(other)),
+        other => (2, 0, describe(other)),
     });
     entries
 }
 
 /// A short text of a value as a Lua constant, with sorted keys and without addresses.
-pub(crate) fn describe(value: &Value, depth: usize) -> String {
+pub(crate) fn literal(value: &Value, depth: usize) -> String {
     match value {
         Value::String(text) => format!("{:?}", text.to_string_lossy()),
         Value::Integer(number) => number.to_string(),
@@ -86,7 +86,7 @@ pub(crate) fn describe(value: &Value, depth: usize) -> String {
             let mut entries = BTreeSet::new();
             let mut list = Vec::new();
             for (key, value) in table.pairs::<Value, Value>().flatten().take(64) {
-                let value = describe(&value, depth + 1);
+                let value = literal(&value, depth + 1);
                 match key {
                     Value::Integer(index) if index >= 1 => list.push((index, value)),
                     Value::String(key) => {
