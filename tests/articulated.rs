@@ -8,7 +8,7 @@ use softvt::{
     physics::{BodyId, ContactPartner, LinkId, world::JointDrive},
     rollout::{AssetCache, ObjectInstance, SensorAssets, SensorSuite, Simulation, state_hash},
     scene::{Asset, Camera, Scene},
-    script::{self, EpisodeSetup, EpisodeRequest},
+    script::{self, EpisodeRequest, EpisodeSetup},
     sensing::tactile::TactileSpec,
 };
 

@@ -12,7 +12,7 @@ use softvt::{
     },
     rollout::{AssetCache, Simulation},
     scene::{Asset, Body, Mask, Scene},
-    script::{self, EpisodeSetup, EpisodeRequest, LoadedScript},
+    script::{self, EpisodeRequest, EpisodeSetup, LoadedScript},
 };
 
 /// Reference data of a soft asset.

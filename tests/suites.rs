@@ -7,7 +7,7 @@ use softvt::{
     benchmark::{Goal, Plan, Suite, Task, seed::Split},
     geometry::{Pose, Vec3, shape::Shape},
     scene::{Body, Object, Scene, part_poses},
-    script::{self, EpisodeSetup, EpisodeRequest, LoadedScript},
+    script::{self, EpisodeRequest, EpisodeSetup, LoadedScript},
 };
 
 /// Episodes per task at the scale of the paper.

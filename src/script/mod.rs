@@ -22,8 +22,8 @@ pub use plan::{
     profile_file::load_profile,
 };
 pub use run::{
-    episode::{EpisodeSetup, EpisodeRequest, Scenes, check_shift},
-    experiment::{Experiment, ExperimentSummary, ExperimentRow},
+    episode::{EpisodeRequest, EpisodeSetup, Scenes, check_shift},
+    experiment::{Experiment, ExperimentRow, ExperimentSummary},
     expert::{Expert, ExpertController},
 };
 pub use schema::Range;

@@ -7,7 +7,7 @@ use softvt::{
     benchmark::{Plan, seed::Split, settings::Settings},
     rollout::{AssetCache, Simulation, state_hash},
     scene::Scene,
-    script::{self, EpisodeSetup, EpisodeRequest, LoadedScript},
+    script::{self, EpisodeRequest, EpisodeSetup, LoadedScript},
 };
 
 use crate::support::SPATIAL_SOFT;

@@ -17,7 +17,7 @@ use crate::{
     files::replace,
     parallel,
     rollout::cancel,
-    script::{Experiment, LoadedScript, ExperimentRow},
+    script::{Experiment, ExperimentRow, LoadedScript},
     text::counted,
 };
 

@@ -146,7 +146,10 @@ impl<'a> SuiteRun<'a> {
     }
 
     /// Builds the scene of an episode: its layout, the shifts, and the rigid twin if requested.
-    pub(crate) fn open_episode(&self, request: &script::EpisodeRequest) -> Result<script::EpisodeSetup, CliError> {
+    pub(crate) fn open_episode(
+        &self,
+        request: &script::EpisodeRequest,
+    ) -> Result<script::EpisodeSetup, CliError> {
         let mut opened = script::EpisodeSetup::open(self.loaded, request).map_err(CliError::input)?;
         if self.config.is_rigid_twin {
             (opened.scene, opened.nominal) = (opened.scene.rigid_twin(), opened.nominal.rigid_twin());

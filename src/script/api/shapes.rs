@@ -237,7 +237,9 @@ impl FromLua for LuaShape {
     fn from_lua(value: Value, lua: &Lua) -> mlua::Result<Self> {
         match value.as_userdata().and_then(|data| data.borrow::<Self>().ok()) {
             Some(shape) => Ok(shape.clone()),
-            None => Err(fail(lua, format!("expected a shape (softvt.shape.…{{…}}), got {}", describe(&value)))),
+            None => {
+                Err(fail(lua, format!("expected a shape (softvt.shape.…{{…}}), got {}", describe(&value))))
+            }
         }
     }
 }

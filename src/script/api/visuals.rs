@@ -260,7 +260,9 @@ impl LuaMask {
 impl FromLua for LuaMask {
     fn from_lua(value: Value, lua: &Lua) -> mlua::Result<Self> {
         let mask = value.as_userdata().and_then(|data| data.borrow::<Self>().ok().map(|mask| mask.clone()));
-        mask.ok_or_else(|| fail(lua, format!("expected a mask (softvt.mask.…{{…}}), got {}", describe(&value))))
+        mask.ok_or_else(|| {
+            fail(lua, format!("expected a mask (softvt.mask.…{{…}}), got {}", describe(&value)))
+        })
     }
 }
 

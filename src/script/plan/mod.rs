@@ -20,7 +20,7 @@ use crate::{
                 ConditionSpec, ConditionsSpec, ExperimentSpec, GoalSpec, ShiftSpec, SuiteSpec, TaskSpec,
             },
         },
-        schema::{HasTable, Constructed, RecordType, is_constructed, strict_table},
+        schema::{Constructed, HasTable, RecordType, is_constructed, strict_table},
         vm::{
             Limits, Vm,
             error::{ScriptError, fail},
@@ -32,7 +32,7 @@ use crate::{
     },
     text::unknown_name,
 };
-use options::{OptionSpec, OptionSession, SharedOptions};
+use options::{OptionSession, OptionSpec, SharedOptions};
 
 /// A loaded script.
 #[derive(Clone)]
@@ -341,7 +341,8 @@ pub(crate) fn points(lua: &Lua, spec: &ExperimentSpec) -> mlua::Result<Vec<Value
         (Some(points), None) => {
             let list: Value = points.call(spec.options.clone())?;
             let Value::Table(list) = &list else {
-                let message = format!("experiment.points: expected a list of tables, got {}", describe(&list));
+                let message =
+                    format!("experiment.points: expected a list of tables, got {}", describe(&list));
                 return Err(fail(lua, message));
             };
             let points: Vec<Value> = list.clone().sequence_values().collect::<mlua::Result<_>>()?;

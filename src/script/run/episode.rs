@@ -17,7 +17,7 @@ use crate::{
         },
         plan::{LoadedScript, ScriptInstance, find_task, reopen},
         run::expert::Expert,
-        schema::{HasTable, Constructed, Range},
+        schema::{Constructed, HasTable, Range},
         vm::{
             error::{ScriptError, fail},
             source_map::fail_at_key,
@@ -108,7 +108,11 @@ struct Start {
     expert: Option<Function>,
 }
 
-fn start(instance: &ScriptInstance, values: &MultiValue, request: &EpisodeRequest) -> Result<Start, ScriptError> {
+fn start(
+    instance: &ScriptInstance,
+    values: &MultiValue,
+    request: &EpisodeRequest,
+) -> Result<Start, ScriptError> {
     let vm = &instance.vm;
     let (suite, task) = find_task(instance, values, &request.suite, request.task)?;
     let seed = EpisodeSeed {
@@ -142,7 +146,11 @@ fn unknown_shift<'a>(name: &str, known: impl Iterator<Item = &'a str> + Clone) -
 }
 
 /// The function of a shift.
-fn find_shift(instance: &ScriptInstance, suite: &Constructed<SuiteSpec>, name: &str) -> Result<Function, ScriptError> {
+fn find_shift(
+    instance: &ScriptInstance,
+    suite: &Constructed<SuiteSpec>,
+    name: &str,
+) -> Result<Function, ScriptError> {
     let shifts = suite.shifts.as_deref().unwrap_or_default();
     match shifts.iter().find(|shift| shift.name == name) {
         Some(shift) => Ok(shift.apply.clone()),

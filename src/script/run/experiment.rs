@@ -153,7 +153,8 @@ fn rows(lua: &Lua, result: &Value) -> mlua::Result<Vec<ExperimentRow>> {
     let row = |value: &Value| match to_json(lua, value, "experiment.run: row")? {
         Json::Object(map) => Ok(map),
         _ => {
-            let message = format!("experiment.run: expected a row or a list of rows, got {}", describe(value));
+            let message =
+                format!("experiment.run: expected a row or a list of rows, got {}", describe(value));
             Err(fail(lua, message))
         }
     };

@@ -182,7 +182,8 @@ pub(crate) fn check(lua: &Lua, record: &Record, table: &Table) -> Result<Table, 
                 )));
             }
             other => {
-                let message = format!("unexpected entry [{}]; the keys are {}", describe(other), joined(record));
+                let message =
+                    format!("unexpected entry [{}]; the keys are {}", describe(other), joined(record));
                 return Err(ValidationError::new(message));
             }
         }

@@ -10,7 +10,7 @@ pub(crate) mod convert;
 pub(crate) mod object;
 
 pub(crate) use check::{error_at_key, invalid, is_constructed, make, recheck, validate};
-pub(crate) use convert::{HasTable, LuaType, Constructed, RecordType, Unchecked, choice, one_of, record};
+pub(crate) use convert::{Constructed, HasTable, LuaType, RecordType, Unchecked, choice, one_of, record};
 pub(crate) use object::{
     ApiObject, Class, FieldValue, Function, Signature, class, functions, output, strict_table,
 };

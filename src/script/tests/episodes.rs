@@ -5,7 +5,7 @@ use crate::{
     benchmark::{Plan, seed::Split},
     geometry::{Pose, Vec3, shape::Shape},
     scene::{Asset, Body},
-    script::{EpisodeSetup, EpisodeRequest, Expert, ExpertCommand, ExpertView, ObjectView, check_shift},
+    script::{EpisodeRequest, EpisodeSetup, Expert, ExpertCommand, ExpertView, ObjectView, check_shift},
 };
 
 fn request(episode: u64, base_seed: u64) -> EpisodeRequest {

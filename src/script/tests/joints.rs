@@ -5,7 +5,7 @@ use crate::{
     physics::joints,
     rollout::{AssetCache, Simulation},
     scene::{JointMotion, Scene},
-    script::{EpisodeSetup, EpisodeRequest},
+    script::{EpisodeRequest, EpisodeSetup},
 };
 
 /// A chest with one drawer on the given joint, and further parts.

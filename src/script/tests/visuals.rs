@@ -6,7 +6,7 @@ use super::{Project, SUITE, error_of};
 use crate::{
     benchmark::seed::Split,
     scene::{Body, Mask, Visual},
-    script::{EpisodeSetup, EpisodeRequest},
+    script::{EpisodeRequest, EpisodeSetup},
 };
 
 fn with_visuals(visuals: &str) -> String {

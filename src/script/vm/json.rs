@@ -69,7 +69,9 @@ impl JsonReader<'_> {
             Value::Integer(n) => Json::Number((*n).into()),
             Value::Number(n) => match Number::from_f64(*n) {
                 Some(number) => Json::Number(number),
-                None => return self.wrong(label, &format!("expected a finite number, got {}", describe(value))),
+                None => {
+                    return self.wrong(label, &format!("expected a finite number, got {}", describe(value)));
+                }
             },
             Value::String(text) => Json::String(text.to_string_lossy()),
             Value::Table(table) if depth < MAX_DEPTH => return self.table(table, label, depth),

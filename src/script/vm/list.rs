@@ -53,8 +53,11 @@ impl LuaList {
         match key {
             Value::Integer(_) | Value::Number(_) => self.entries(lua)?.raw_get(key),
             other => {
-                let message =
-                    format!("{}: expected a place in the list, 1 or more, got {}", self.label, describe(other));
+                let message = format!(
+                    "{}: expected a place in the list, 1 or more, got {}",
+                    self.label,
+                    describe(other)
+                );
                 Err(fail(lua, message))
             }
         }
