@@ -45,6 +45,14 @@ pub fn create_folder(dir: &Path) -> Result<(), FileError> {
     fs::create_dir_all(dir).map_err(FileError::io("create the folder", dir))
 }
 
+/// Creates the folder of a file and its missing parents.
+///
+/// # Errors
+/// As [`create_folder`].
+pub fn create_parent(path: &Path) -> Result<(), FileError> {
+    create_folder(path.parent().unwrap_or(path))
+}
+
 /// Creates a folder and its missing parents, and checks that files can be created in it.
 ///
 /// # Errors
@@ -80,9 +88,17 @@ pub fn temp_path(path: &Path) -> PathBuf {
 /// The system refuses to sync or rename.
 pub fn persist(temp: &Path, path: &Path) -> Result<(), FileError> {
     File::open(temp).and_then(|file| file.sync_all()).map_err(FileError::io("sync", temp))?;
-    fs::rename(temp, path).map_err(FileError::io("replace", path))?;
+    rename(temp, path)
+}
+
+/// Renames a file or folder. The new name is durable afterwards.
+///
+/// # Errors
+/// The system refuses.
+pub fn rename(from: &Path, to: &Path) -> Result<(), FileError> {
+    fs::rename(from, to).map_err(FileError::io("create", to))?;
     // The new name must survive a power failure as well. Systems that cannot sync folders have other means.
-    let _ = path.parent().map(File::open).transpose().map(|folder| folder.map(|folder| folder.sync_all()));
+    let _ = to.parent().map(File::open).transpose().map(|folder| folder.map(|folder| folder.sync_all()));
     Ok(())
 }
 
@@ -91,7 +107,7 @@ pub fn persist(temp: &Path, path: &Path) -> Result<(), FileError> {
 /// # Errors
 /// The system refuses; the temporary file is removed.
 pub fn replace(path: &Path, content: impl AsRef<[u8]>) -> Result<(), FileError> {
-    create_folder(path.parent().unwrap_or(path))?;
+    create_parent(path)?;
     let temp = temp_path(path);
     // Created, not truncated: if the name is a symbolic link, its target must not be overwritten.
     remove_if_present(&temp)?;
@@ -109,6 +125,29 @@ pub fn replace(path: &Path, content: impl AsRef<[u8]>) -> Result<(), FileError> 
 pub fn write_json<T: Serialize + ?Sized>(path: &Path, value: &T) -> Result<(), FileError> {
     let text = serde_json::to_string_pretty(value).map_err(FileError::json(path))?;
     replace(path, text + "\n")
+}
+
+/// One line of JSON per item, for a file at `path`.
+///
+/// # Errors
+/// An item cannot be represented in JSON.
+pub fn json_lines<T: Serialize>(
+    path: &Path,
+    items: impl IntoIterator<Item = T>,
+) -> Result<String, FileError> {
+    let line = |item| Ok(serde_json::to_string(&item).map_err(FileError::json(path))? + "\n");
+    items.into_iter().map(line).collect()
+}
+
+/// Replaces `path` by one line of JSON per item; see [`replace`].
+///
+/// # Errors
+/// As [`json_lines`], or the file cannot be written.
+pub fn write_json_lines<T: Serialize>(
+    path: &Path,
+    items: impl IntoIterator<Item = T>,
+) -> Result<(), FileError> {
+    replace(path, json_lines(path, items)?)
 }
 
 /// Removes a file if it exists.

@@ -1,4 +1,4 @@
-//! Text in messages: numbers, control characters, and suggestions for misspelt names.
+//! Text in messages and tables: numbers, control characters, suggestions for misspelt names, and columns.
 
 use std::borrow::Cow;
 
@@ -100,6 +100,76 @@ fn rank_of_word(word: &str, candidate: &str) -> Option<Rank> {
 /// Formats a count with its noun: "1 task", "3 tasks".
 pub fn counted(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
+}
+
+/// Formats a number with a fixed number of decimals; a dash if there is none.
+pub fn decimal(value: Option<f64>, digits: usize) -> String {
+    value.map_or_else(|| "–".to_owned(), |value| format!("{value:.digits$}"))
+}
+
+/// Puts `text` on one line of at most `width` characters. An ellipsis marks what is cut off.
+pub fn shortened(text: &str, width: usize) -> String {
+    let text = text.replace('\n', " ");
+    if text.chars().count() <= width {
+        return text;
+    }
+    text.chars().take(width.saturating_sub(1)).chain(['…']).collect()
+}
+
+/// Alignment and width, in characters, of a column of a [`TextTable`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TextColumn {
+    /// Words, [shortened] to the width.
+    Left(usize),
+    /// Numbers; a number wider than its column shifts the cells after it.
+    Right(usize),
+}
+
+/// A plain-text table: rows of cells in columns one space apart, lines of other text, and rules.
+///
+/// ```
+/// use softvt::text::{TextColumn, TextTable};
+///
+/// let mut table = TextTable::new([TextColumn::Left(6), TextColumn::Right(5)]);
+/// table.row(["task", "D, %"]);
+/// table.row(["cup", "1.25"]);
+/// assert_eq!(table.text, "task    D, %\ncup     1.25\n");
+/// ```
+#[derive(Clone, Debug)]
+pub struct TextTable {
+    columns: Vec<TextColumn>,
+    /// The table so far; every line ends in a line break and has no trailing spaces.
+    pub text: String,
+}
+
+impl TextTable {
+    /// Width of a rule, and the largest width of a table.
+    pub const WIDTH: usize = 99;
+
+    /// An empty table.
+    pub fn new(columns: impl Into<Vec<TextColumn>>) -> Self {
+        Self { columns: columns.into(), text: String::new() }
+    }
+
+    /// Appends a row.
+    pub fn row<T: AsRef<str>>(&mut self, cells: impl IntoIterator<Item = T>) {
+        let cell = |(column, cell): (&TextColumn, T)| match *column {
+            TextColumn::Left(width) => format!("{:<width$}", shortened(cell.as_ref(), width)),
+            TextColumn::Right(width) => format!("{:>width$}", cell.as_ref()),
+        };
+        self.line(self.columns.iter().zip(cells).map(cell).collect::<Vec<_>>().join(" "));
+    }
+
+    /// Appends a line of text.
+    pub fn line(&mut self, text: impl AsRef<str>) {
+        self.text.push_str(text.as_ref().trim_end());
+        self.text.push('\n');
+    }
+
+    /// Appends a horizontal rule.
+    pub fn rule(&mut self) {
+        self.line("─".repeat(Self::WIDTH));
+    }
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ use std::{fmt::Write, path::Path};
 use serde::Serialize;
 
 use super::{DatasetError, TaskFile};
+use crate::text::{TextColumn, TextTable, decimal};
 
 /// Columns of an action.
 pub const ACTION_NAMES: [&str; 7] =
@@ -75,19 +76,18 @@ pub fn column_statistics(paths: &[impl AsRef<Path>]) -> Result<Vec<ColumnStatist
 
 /// The statistics as a plain-text table.
 pub fn table(columns: &[ColumnStatistics]) -> String {
-    let mut text = format!(
-        "{:<16}{:>9}{:>10}{:>10}{:>10}{:>10}{:>10}\n",
-        "", "count", "min", "median", "mean", "sd", "max"
-    );
+    const COLUMNS: [TextColumn; 7] = {
+        use TextColumn::{Left, Right};
+        [Left(16), Right(8), Right(9), Right(9), Right(9), Right(9), Right(9)]
+    };
+    let mut table = TextTable::new(COLUMNS);
+    table.row(["", "count", "min", "median", "mean", "sd", "max"]);
     for s in columns {
-        // Writing into a string cannot fail.
-        let _ = writeln!(
-            text,
-            "{:<16}{:>9}{:>10.3}{:>10.3}{:>10.3}{:>10.3}{:>10.3}",
-            s.name, s.count, s.min, s.median, s.mean, s.sd, s.max
-        );
+        let [min, median, mean, sd, max] =
+            [s.min, s.median, s.mean, s.sd, s.max].map(|x| decimal(Some(x), 3));
+        table.row([s.name.clone(), s.count.to_string(), min, median, mean, sd, max]);
     }
-    text
+    table.text
 }
 
 /// Width and height of a histogram with its labels, and histograms per row.

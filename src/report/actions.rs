@@ -21,8 +21,14 @@ const WIDTH: usize = 7;
 pub enum ActionsError {
     #[error(transparent)]
     Io(#[from] FileError),
-    #[error("{path}: {what}; expected float64 numbers of shape (steps, 7), as softvt writes them")]
-    Format { path: String, what: &'static str },
+    #[error("{path}: {source}; expected float64 numbers of shape (steps, 7), as softvt writes them")]
+    Npy { path: String, source: NpyError },
+    #[error(
+        "{path}: an array of type {dtype} and shape {shape:?}; expected float64 numbers of shape (steps, 7)"
+    )]
+    Shape { path: String, dtype: String, shape: Vec<usize> },
+    #[error("{path}: it holds a number that is not finite")]
+    NotFinite { path: String },
 }
 
 /// Path of the actions of an episode in the run folder `dir`.
@@ -46,30 +52,17 @@ pub fn write(path: &Path, actions: &[Action]) -> Result<(), FileError> {
 /// The file cannot be read or is not such an array.
 pub fn read(path: &Path) -> Result<Vec<Action>, ActionsError> {
     let bytes = fs::read(path).map_err(FileError::io("read", path))?;
-    parse(&bytes).map_err(|what| ActionsError::Format { path: path.display().to_string(), what })
-}
-
-fn parse(bytes: &[u8]) -> Result<Vec<Action>, &'static str> {
-    let array = NpyArray::parse(bytes).map_err(|error| match error {
-        NpyError::Magic => "not an array of numpy's format 1.0",
-        NpyError::HeaderCutOff => "its header is cut off",
-        NpyError::HeaderNotText => "its header is not text",
-        NpyError::FortranOrder | NpyError::Dtype(_) => "its numbers are not float64 in rows",
-        NpyError::NoShape => "its shape is not of two axes",
-        NpyError::BadShape => "its shape is not of whole numbers",
-        NpyError::Length { .. } => "it is cut off",
-    })?;
-    if array.dtype != "<f8" {
-        return Err("its numbers are not float64 in rows");
-    }
-    match array.shape[..] {
-        [_, WIDTH] => {}
-        [] => return Err("its shape is not of two axes"),
-        _ => return Err("its rows are not of 7 numbers"),
+    let path = path.display().to_string();
+    let array = match NpyArray::parse(&bytes) {
+        Ok(array) => array,
+        Err(source) => return Err(ActionsError::Npy { path, source }),
+    };
+    if array.dtype != "<f8" || !matches!(array.shape[..], [_, WIDTH]) {
+        return Err(ActionsError::Shape { path, dtype: array.dtype, shape: array.shape });
     }
     let numbers = array.values();
     if !numbers.iter().all(|x| x.is_finite()) {
-        return Err("it holds a number that is not finite");
+        return Err(ActionsError::NotFinite { path });
     }
     Ok(numbers
         .as_chunks::<WIDTH>()
@@ -103,9 +96,9 @@ mod tests {
         let whole = fs::read(&at).unwrap();
         assert_eq!((whole.len() - 5 * 56) % 64, 0);
         for (bytes, words) in [
-            (&whole[..whole.len() - 1], "cut off"),
+            (&whole[..whole.len() - 1], "279 bytes do not fill the shape [5, 7]"),
             (&whole[..9], "header is cut off"),
-            (b"hello", "not an array"),
+            (b"hello", "not an .npy array"),
         ] {
             fs::write(&at, bytes).unwrap();
             let error = read(&at).unwrap_err().to_string();

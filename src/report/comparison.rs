@@ -1,13 +1,10 @@
 //! Paired comparison of two runs, episode by episode, and its plain-text table.
 
-use std::{collections::BTreeMap, fmt::Write};
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
-use super::{
-    stored_run::StoredRun,
-    text_table::{WIDTH, shortened},
-};
+use super::stored_run::StoredRun;
 use crate::{
     evaluation::{
         paired_stats::{
@@ -17,7 +14,7 @@ use crate::{
         record::EpisodeRecord,
         summary::method_label,
     },
-    text::counted,
+    text::{TextColumn, TextTable, counted, decimal, shortened},
 };
 
 /// Width of a policy's name in the header, columns.
@@ -89,14 +86,14 @@ pub fn compare(first: &[StoredRun], second: &[StoredRun]) -> Result<Comparison, 
     };
     let all = || first.iter().chain(second);
     Ok(Comparison {
-        first: name(first),
-        second: name(second),
+        first: policies(first),
+        second: policies(second),
         deformable: pairs.iter().any(|pair| pair.first.identity.soft),
         unmatched: count(first) + count(second) - 2 * pairs.len(),
         unlike: differing_fields(first, second),
         partial: all()
             .filter(|run| run.is_partial())
-            .flat_map(|run| run.remarks().into_iter().take(1))
+            .flat_map(|run| run.warnings().into_iter().take(1))
             .collect(),
         all: PairedComparison::of(&pairs),
         by_task: group_by_task(&pairs).into_iter().map(task).collect(),
@@ -131,196 +128,143 @@ fn check_unique(runs: &[StoredRun]) -> Result<(), CompareError> {
     Ok(())
 }
 
-/// A property of a run, as text.
-type RunProperty = fn(&StoredRun) -> String;
-
 /// The error about two runs without common episodes, with the property in which they differ.
 fn no_common_episode(first: &[StoredRun], second: &[StoredRun]) -> CompareError {
-    let of = |runs: &[StoredRun], property: RunProperty| {
-        let mut values: Vec<String> = runs.iter().map(property).collect();
-        values.sort();
-        values.dedup();
-        values
-    };
-    let fields: [(&str, RunProperty); 4] = [
+    let properties: [(&str, fn(&StoredRun) -> String); 4] = [
         ("suite", |run| run.suite().to_owned()),
         ("seed", |run| run.manifest["seed"].to_string()),
         ("split", |run| run.text("split").to_owned()),
         ("tasks", |run| run.manifest["tasks"].to_string()),
     ];
-    let differ = fields.iter().find_map(|(name, what)| {
-        let (a, b) = (of(first, *what), of(second, *what));
-        a.iter()
-            .all(|value| !b.contains(value))
-            .then(|| format!("{name} {} in the first, {} in the second", a.join(", "), b.join(", ")))
+    let differing = properties.iter().find_map(|(name, property)| {
+        let [a, b] = [first, second].map(|runs| runs.iter().map(property).collect::<BTreeSet<_>>());
+        let describe = || format!("{name} {} in the first, {} in the second", joined(&a), joined(&b));
+        a.is_disjoint(&b).then(describe)
     });
     let dir = |runs: &[StoredRun]| runs.first().map_or_else(String::new, |run| run.dir.display().to_string());
     CompareError::NoCommonEpisode {
         first: dir(first),
         second: dir(second),
-        reason: differ.unwrap_or_else(|| "their finished episodes do not overlap".to_owned()),
+        reason: differing.unwrap_or_else(|| "their finished episodes do not overlap".to_owned()),
     }
 }
 
-fn name(runs: &[StoredRun]) -> String {
-    let mut names: Vec<String> = runs
-        .iter()
-        .map(|run| method_label(run.text("policy"), run.is_privileged(), run.observes_forces()))
-        .collect();
-    names.sort();
-    names.dedup();
-    names.join(", ")
+fn joined(names: &BTreeSet<String>) -> String {
+    names.iter().map(String::as_str).collect::<Vec<_>>().join(", ")
+}
+
+/// Policies of the runs, with their privileged inputs.
+fn policies(runs: &[StoredRun]) -> String {
+    let label =
+        |run: &StoredRun| method_label(run.text("policy"), run.is_privileged(), run.observes_forces());
+    joined(&runs.iter().map(label).collect())
 }
 
 /// Fields of `run.json` about the conditions of a run in which two runs of one suite differ.
 fn differing_fields(first: &[StoredRun], second: &[StoredRun]) -> Vec<String> {
     const CONDITION_FIELDS: [&str; 7] =
         ["softvt", "twin", "shifts", "options", "settings", "sources", "thresholds"];
-    let mut found: Vec<String> = Vec::new();
+    let mut found = BTreeSet::new();
     for a in first {
         let Some(b) = second.iter().find(|b| b.suite() == a.suite()) else { continue };
-        found.extend(
-            CONDITION_FIELDS
-                .iter()
-                .filter(|field| a.manifest[**field] != b.manifest[**field])
-                .map(|f| (*f).to_owned()),
-        );
+        found.extend(CONDITION_FIELDS.into_iter().filter(|field| a.manifest[*field] != b.manifest[*field]));
     }
-    found.sort();
-    found.dedup();
-    found
+    found.into_iter().map(str::to_owned).collect()
 }
 
 /// The comparison as a plain-text table of at most 100 columns.
 pub fn table(comparison: &Comparison) -> String {
-    let mut out = String::new();
-    // Writing to a String cannot fail.
-    let mut line = |text: &str| {
-        let _ = writeln!(out, "{}", text.trim_end());
-    };
-    let rule = "─".repeat(WIDTH);
-    let deformation =
-        if comparison.deformable { DeformationComparison::Peak } else { DeformationComparison::None };
-    line(&format!(
+    let mut table = TextTable::new(COLUMNS);
+    table.line(format!(
         "{} → {} · {}",
         shortened(&comparison.first, POLICY_WIDTH),
         shortened(&comparison.second, POLICY_WIDTH),
         counted(comparison.all.pairs, "paired episode")
     ));
-    line(&rule);
-    line(&headings("", ["first", "second"]));
+    table.rule();
+    push_headings(&mut table, "", "first", "second");
+    let push = |table: &mut TextTable, name: &str, differences: &PairedComparison| {
+        push_rates(table, name, differences);
+        if comparison.deformable {
+            push_mean(table, "D peak, %", &differences.d_peak);
+        }
+    };
     let mut suite = "";
     for task in &comparison.by_task {
         if task.suite != suite {
             suite = &task.suite;
-            line(&rule);
-            line(&shortened(suite, WIDTH));
+            table.rule();
+            table.line(shortened(suite, TextTable::WIDTH));
         }
-        let name = format!("{:>3} {}", task.task, task.prompt);
-        measure_rows(&name, &task.differences, deformation).iter().for_each(|row| line(row));
+        push(&mut table, &format!("{:>3} {}", task.task, task.prompt), &task.differences);
     }
-    line(&rule);
-    measure_rows("all", &comparison.all, deformation).iter().for_each(|row| line(row));
-    line(&rule);
-    line(LEGEND);
+    table.rule();
+    push(&mut table, "all", &comparison.all);
+    table.rule();
+    table.line(LEGEND);
     if comparison.unmatched > 0 {
-        line(&format!(
-            "{} present in only one run {} skipped",
-            counted(comparison.unmatched, "episode"),
-            if comparison.unmatched == 1 { "was" } else { "were" }
-        ));
+        let verb = if comparison.unmatched == 1 { "was" } else { "were" };
+        let episodes = counted(comparison.unmatched, "episode");
+        table.line(format!("{episodes} present in only one run {verb} skipped"));
     }
-    comparison.partial.iter().for_each(|remark| line(remark));
+    comparison.partial.iter().for_each(|warning| table.line(warning));
     if !comparison.unlike.is_empty() {
-        line(&format!("the runs also differ in {} (run.json)", comparison.unlike.join(", ")));
+        table.line(format!("the runs also differ in {} (run.json)", comparison.unlike.join(", ")));
     }
-    out
+    table.text
 }
 
-/// Width of the name at the left, columns.
-const NAME_WIDTH: usize = 29;
+/// Columns of a table of differences: name, measure, both values, difference, interval, better, worse and p.
+pub(super) const COLUMNS: [TextColumn; 9] = {
+    use TextColumn::{Left, Right};
+    [Left(29), Left(9), Right(6), Right(7), Right(7), Right(17), Right(6), Right(5), Right(5)]
+};
 
 /// Legend of the rows.
 pub(super) const LEGEND: &str = "diff.: second minus first · 95 % intervals: Agresti and Min for rates, bootstrap for D\nbetter, worse: number of episodes; a lower D is better · p: McNemar's exact test";
 
-/// Deformation measure of a comparison.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum DeformationComparison {
-    /// No target deforms.
-    None,
-    /// Peak D, % of the diagonal.
-    Peak,
-    /// Peak D over τ.
-    OverTau,
+/// Appends the column headings, with `name` above the names of the rows.
+pub(super) fn push_headings(table: &mut TextTable, name: &str, first: &str, second: &str) {
+    table.row([name, "", first, second, "diff.", "95 % interval", "better", "worse", "p"]);
 }
 
-/// The column headings.
-pub(super) fn headings(name: &str, [first, second]: [&str; 2]) -> String {
-    cells(name, ["", first, second, "diff.", "95 % interval", "better", "worse", "p"].map(str::to_owned))
-}
-
-/// One row per measure, the first with the name.
-pub(super) fn measure_rows(
-    name: &str,
-    of: &PairedComparison,
-    deformation: DeformationComparison,
-) -> Vec<String> {
-    let mut all =
-        vec![rate("Goal, %", &of.goal), rate("NoDrop, %", &of.no_drop), rate("Safety, %", &of.safety)];
-    match deformation {
-        DeformationComparison::None => {}
-        DeformationComparison::Peak => all.push(mean("D peak, %", &of.d_peak)),
-        DeformationComparison::OverTau => all.push(mean("D peak/τ", &of.d_over_tau)),
+/// Appends one row per rate, the first with the name.
+pub(super) fn push_rates(table: &mut TextTable, name: &str, paired: &PairedComparison) {
+    let rates = [("Goal, %", paired.goal), ("NoDrop, %", paired.no_drop), ("Safety, %", paired.safety)];
+    for ((measure, rate), name) in rates.into_iter().zip([name, "", ""]) {
+        let RateDifference { first, second, difference, interval95, better, worse, p, .. } = rate;
+        table.row([
+            name.to_owned(),
+            measure.to_owned(),
+            decimal(first, 1),
+            decimal(second, 1),
+            signed(difference, 1),
+            interval(interval95, 1),
+            better.to_string(),
+            worse.to_string(),
+            format!("{p:.3}"),
+        ]);
     }
-    let names = [name].into_iter().chain(std::iter::repeat(""));
-    all.into_iter().zip(names).map(|(row, name)| cells(name, row)).collect()
 }
 
-fn rate(measure: &str, of: &RateDifference) -> [String; 8] {
-    [
-        measure.to_owned(),
-        unsigned(of.first, 1),
-        unsigned(of.second, 1),
-        signed(of.difference, 1),
-        interval(of.interval95, 1),
-        of.better.to_string(),
-        of.worse.to_string(),
-        format!("{:.3}", of.p),
-    ]
-}
-
-fn mean(measure: &str, of: &MeanDifference) -> [String; 8] {
-    [
-        measure.to_owned(),
-        unsigned(of.first, 2),
-        unsigned(of.second, 2),
-        signed(of.difference, 2),
-        interval(of.interval95, 2),
-        of.better.to_string(),
-        of.worse.to_string(),
+/// Appends a row without a name.
+pub(super) fn push_mean(table: &mut TextTable, measure: &str, mean: &MeanDifference) {
+    table.row([
         String::new(),
-    ]
-}
-
-fn unsigned(value: Option<f64>, digits: usize) -> String {
-    value.map_or_else(|| "–".to_owned(), |value| format!("{value:.digits$}"))
+        measure.to_owned(),
+        decimal(mean.first, 2),
+        decimal(mean.second, 2),
+        signed(mean.difference, 2),
+        interval(mean.interval95, 2),
+        mean.better.to_string(),
+        mean.worse.to_string(),
+    ]);
 }
 
 fn signed(value: Option<f64>, digits: usize) -> String {
     value.map_or_else(|| "–".to_owned(), |value| format!("{value:+.digits$}"))
 }
 
-fn interval(of: Option<[f64; 2]>, digits: usize) -> String {
-    of.map_or_else(|| "–".to_owned(), |[low, high]| format!("[{low:+.digits$}, {high:+.digits$}]"))
-}
-
-fn cells(name: &str, cells: [String; 8]) -> String {
-    let mut text = format!("{:<NAME_WIDTH$}", shortened(name, NAME_WIDTH));
-    let [measure, rest @ ..] = cells;
-    // Writing to a String cannot fail.
-    let _ = write!(text, " {measure:<9}");
-    for (cell, width) in rest.iter().zip([7, 8, 8, 18, 7, 6, 6]) {
-        let _ = write!(text, "{cell:>width$}");
-    }
-    text.trim_end().to_owned()
+fn interval(bounds: Option<[f64; 2]>, digits: usize) -> String {
+    bounds.map_or_else(|| "–".to_owned(), |[low, high]| format!("[{low:+.digits$}, {high:+.digits$}]"))
 }

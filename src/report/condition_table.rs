@@ -1,13 +1,8 @@
 //! Results of a suite under several conditions: the rows of `conditions.json`, and their plain-text table.
 
-use std::fmt::Write;
-
 use serde::{Deserialize, Serialize};
 
-use super::{
-    comparison::{DeformationComparison, LEGEND, headings, measure_rows},
-    text_table::{WIDTH, push_line, push_rule, shortened},
-};
+use super::comparison;
 use crate::{
     evaluation::{
         paired_stats::{PairedComparison, d_over_tau, pair_episodes},
@@ -15,11 +10,8 @@ use crate::{
         statistics::{Distribution, Rate},
         summary::Scores,
     },
-    text::counted,
+    text::{TextColumn, TextTable, counted, decimal},
 };
-
-/// Width of a condition's name, columns.
-const NAME_WIDTH: usize = 40;
 
 /// Results under one condition.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -79,78 +71,58 @@ pub struct ConditionTable {
 
 /// Plain-text tables of at most 100 columns: rates per condition, and paired change from the reference.
 pub fn table(suite: &ConditionTable) -> String {
-    let mut out = String::new();
-    let conditions = suite.rows.len().saturating_sub(1);
+    const COLUMNS: [TextColumn; 6] = {
+        use TextColumn::{Left, Right};
+        [Left(40), Right(10), Right(10), Right(10), Right(10), Right(10)]
+    };
+    let mut table = TextTable::new(COLUMNS);
+    let conditions = counted(suite.rows.len().saturating_sub(1), "condition");
     let episodes = suite.rows.iter().find_map(|row| row.outcome.as_ref()).map_or(0, |o| o.episodes);
-    push_line(
-        &mut out,
-        &format!(
-            "{} · policy {} · {} · {} each",
-            suite.suite,
-            suite.policy,
-            counted(conditions, "condition"),
-            counted(episodes, "episode")
-        ),
-    );
-    push_rule(&mut out, WIDTH);
-    let columns = ["Goal, %", "NoDrop, %", "Safety, %", "D peak/τ", "invalid"];
-    push_line(&mut out, &cells("condition", columns.map(str::to_owned)));
-    push_rule(&mut out, WIDTH);
+    let episodes = counted(episodes, "episode");
+    table.line(format!("{} · policy {} · {conditions} · {episodes} each", suite.suite, suite.policy));
+    table.rule();
+    table.row(["condition", "Goal, %", "NoDrop, %", "Safety, %", "D peak/τ", "invalid"]);
+    table.rule();
     for row in &suite.rows {
-        push_line(&mut out, &row_text(row, suite.deformable));
+        table.row(cells(row, suite.deformable));
     }
-    push_rule(&mut out, WIDTH);
+    table.rule();
     for row in &suite.rows {
         if let Some(why) = &row.not_applicable {
-            push_line(&mut out, &format!("{}: N/A, {why}", row.condition));
+            table.line(format!("{}: N/A, {why}", row.condition));
         }
     }
-    against_reference(&mut out, suite);
-    out
-}
-
-fn against_reference(out: &mut String, suite: &ConditionTable) {
-    let deformation =
-        if suite.deformable { DeformationComparison::OverTau } else { DeformationComparison::None };
-    push_line(out, &headings("change from the reference", ["ref.", "cond."]));
-    push_rule(out, WIDTH);
+    let mut changes = TextTable::new(comparison::COLUMNS);
+    comparison::push_headings(&mut changes, "change from the reference", "ref.", "cond.");
+    changes.rule();
     for row in &suite.rows {
-        let paired = row.outcome.as_ref().and_then(|outcome| outcome.paired.as_ref());
-        for text in paired.map(|paired| measure_rows(&row.condition, paired, deformation)).unwrap_or_default()
-        {
-            push_line(out, &text);
+        if let Some(paired) = row.outcome.as_ref().and_then(|outcome| outcome.paired.as_ref()) {
+            comparison::push_rates(&mut changes, &row.condition, paired);
+            if suite.deformable {
+                comparison::push_mean(&mut changes, "D peak/τ", &paired.d_over_tau);
+            }
         }
     }
-    push_rule(out, WIDTH);
-    push_line(out, LEGEND);
+    changes.rule();
+    changes.line(comparison::LEGEND);
+    table.text + &changes.text
 }
 
-fn row_text(row: &ConditionRow, deformable: bool) -> String {
+fn cells(row: &ConditionRow, deformable: bool) -> [String; 6] {
     let Some(outcome) = &row.outcome else {
-        return cells(&row.condition, std::array::from_fn(|_| "N/A".to_owned()));
+        return [&row.condition, "N/A", "N/A", "N/A", "N/A", "N/A"].map(str::to_owned);
     };
-    let percent = |rate: &Rate| rate.rate.map_or_else(|| "–".to_owned(), |rate| format!("{rate:.1}"));
-    let absent = if deformable { "–" } else { "N/A" };
-    let ratio = outcome.d_over_tau.mean.map_or_else(|| absent.to_owned(), |mean| format!("{mean:.3}"));
-    cells(
-        &row.condition,
-        [
-            percent(&outcome.goal_success_rate),
-            percent(&outcome.no_drop_rate),
-            percent(&outcome.safety_success_rate),
-            ratio,
-            outcome.invalid.to_string(),
-        ],
-    )
-}
-
-fn cells(name: &str, cells: [String; 5]) -> String {
-    let mut text = format!("{:<NAME_WIDTH$}", shortened(name, NAME_WIDTH));
-    for cell in cells {
-        // Writing to a String cannot fail.
-        let _ = write!(text, "{cell:>11}");
-    }
-    text
+    [
+        row.condition.clone(),
+        decimal(outcome.goal_success_rate.rate, 1),
+        decimal(outcome.no_drop_rate.rate, 1),
+        decimal(outcome.safety_success_rate.rate, 1),
+        match outcome.d_over_tau.mean {
+            None if !deformable => "N/A".to_owned(),
+            mean => decimal(mean, 3),
+        },
+        outcome.invalid.to_string(),
+    ]
 }
 
 #[cfg(test)]

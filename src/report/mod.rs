@@ -11,5 +11,4 @@ pub mod softvtbench_files;
 pub mod stored_run;
 pub mod tables;
 pub mod terminal;
-mod text_table;
 pub mod video;

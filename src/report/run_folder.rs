@@ -25,25 +25,18 @@ pub const SUMMARY: &str = "summary.json";
 /// Error of using a run folder.
 #[derive(Debug, thiserror::Error)]
 pub enum RunFolderError {
+    /// `found` is a file of that run.
     #[error(
         "{dir} already holds a run ({found}): resume it with --resume, or give another folder with --out"
     )]
-    Occupied {
-        dir: String,
-        /// The file that was found.
-        found: &'static str,
-    },
+    Occupied { dir: String, found: &'static str },
     #[error("another softvt process is using {dir}; wait for it to finish, or stop it")]
     Busy { dir: String },
     #[error(transparent)]
     File(#[from] FileError),
+    /// `line` counts from 1.
     #[error("{path}:{line}: not an episode record: {source}")]
-    BadLine {
-        path: String,
-        /// From 1.
-        line: usize,
-        source: serde_json::Error,
-    },
+    BadLine { path: String, line: usize, source: serde_json::Error },
 }
 
 /// The folder of a run in progress, locked against other processes.
@@ -79,7 +72,7 @@ impl RunFolder {
                 io::ErrorKind::AlreadyExists => {
                     RunFolderError::Occupied { dir: dir.display().to_string(), found: EPISODES }
                 }
-                _ => io_error("make", &path)(source),
+                _ => FileError::io("create", &path)(source).into(),
             }
         })?;
         lock(&episodes, dir)?;
@@ -94,16 +87,15 @@ impl RunFolder {
     pub fn resume(dir: &Path) -> Result<(Self, Vec<EpisodeRecord>), RunFolderError> {
         files::create_folder(dir)?;
         let path = dir.join(EPISODES);
-        let mut options = OpenOptions::new();
-        let mut episodes =
-            options.read(true).append(true).create(true).open(&path).map_err(io_error("open", &path))?;
+        let episodes = OpenOptions::new().read(true).append(true).create(true).open(&path);
+        let mut episodes = episodes.map_err(FileError::io("open", &path))?;
         lock(&episodes, dir)?;
         let mut bytes = Vec::new();
-        episodes.read_to_end(&mut bytes).map_err(io_error("read", &path))?;
+        episodes.read_to_end(&mut bytes).map_err(FileError::io("read", &path))?;
         let records = parse(&bytes, &path)?;
         let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1);
         if whole < bytes.len() {
-            episodes.set_len(whole as u64).map_err(io_error("shorten", &path))?;
+            episodes.set_len(whole as u64).map_err(FileError::io("shorten", &path))?;
         }
         Ok((Self { dir: dir.into(), episodes }, records))
     }
@@ -121,7 +113,7 @@ impl RunFolder {
         match fs::read_to_string(&path) {
             Ok(text) => Ok(Some(text)),
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
-            Err(source) => Err(io_error("read", &path)(source)),
+            Err(source) => Err(FileError::io("read", &path)(source).into()),
         }
     }
 
@@ -132,9 +124,9 @@ impl RunFolder {
     /// The line cannot be written.
     pub fn append(&mut self, record: &EpisodeRecord) -> Result<(), RunFolderError> {
         let path = self.dir.join(EPISODES);
-        let line = line(record, &path)?;
-        self.episodes.write_all(line.as_bytes()).map_err(io_error("write to", &path))?;
-        self.episodes.sync_data().map_err(io_error("sync", &path))
+        let line = files::json_lines(&path, [record])?;
+        self.episodes.write_all(line.as_bytes()).map_err(FileError::io("write to", &path))?;
+        Ok(self.episodes.sync_data().map_err(FileError::io("sync", &path))?)
     }
 
     /// Rewrites the lines in the order of `records`, which must be all of them.
@@ -143,10 +135,8 @@ impl RunFolder {
     /// The file cannot be written.
     pub fn write_in_order(&mut self, records: &[EpisodeRecord]) -> Result<(), RunFolderError> {
         let path = self.dir.join(EPISODES);
-        let lines: Result<String, RunFolderError> =
-            records.iter().map(|record| line(record, &path)).collect();
-        let lines = lines?;
-        if fs::read(&path).map_err(io_error("read", &path))? != lines.as_bytes() {
+        let lines = files::json_lines(&path, records)?;
+        if fs::read(&path).map_err(FileError::io("read", &path))? != lines.as_bytes() {
             files::replace(&path, &lines)?;
         }
         Ok(())
@@ -175,17 +165,13 @@ fn lock(episodes: &File, dir: &Path) -> Result<(), RunFolderError> {
     }
 }
 
-pub(super) fn line(record: &EpisodeRecord, path: &Path) -> Result<String, RunFolderError> {
-    Ok(serde_json::to_string(record).map_err(FileError::json(path))? + "\n")
-}
-
 /// Reads the episodes of a run folder. A last line truncated by a crash is skipped.
 ///
 /// # Errors
 /// The file cannot be read, or another line is not an episode.
 pub fn read_episodes(dir: &Path) -> Result<Vec<EpisodeRecord>, RunFolderError> {
     let path = dir.join(EPISODES);
-    parse(&fs::read(&path).map_err(io_error("read", &path))?, &path)
+    parse(&fs::read(&path).map_err(FileError::io("read", &path))?, &path)
 }
 
 /// True if the last line of the episodes was truncated by a crash.
@@ -197,21 +183,9 @@ fn parse(bytes: &[u8], path: &Path) -> Result<Vec<EpisodeRecord>, RunFolderError
     // Text after the last line break was truncated.
     let lines: Vec<&[u8]> = bytes.split(|byte| *byte == b'\n').collect();
     let whole = lines[..lines.len() - 1].iter().enumerate().filter(|(_, line)| !line.is_empty());
-    let read = whole.map(|(i, line)| {
-        serde_json::from_slice(line).map_err(|source| {
-            let path = path.display().to_string();
-            RunFolderError::BadLine { path, line: i + 1, source }
-        })
-    });
-    read.collect()
-}
-
-pub(super) fn io_error(
-    action: &'static str,
-    path: &Path,
-) -> impl FnOnce(io::Error) -> RunFolderError + use<> {
-    let convert = FileError::io(action, path);
-    move |source| RunFolderError::File(convert(source))
+    let bad_line =
+        |i: usize, source| RunFolderError::BadLine { path: path.display().to_string(), line: i + 1, source };
+    whole.map(|(i, line)| serde_json::from_slice(line).map_err(|source| bad_line(i, source))).collect()
 }
 
 #[cfg(test)]

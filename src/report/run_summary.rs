@@ -51,21 +51,13 @@ pub fn summarize_runs(mut runs: Vec<StoredRun>) -> Vec<RunSummary> {
 fn summarize(run: StoredRun) -> RunSummary {
     let mut summary = SuiteSummary::of(run.suite(), run.text("policy"), &run.records);
     summary.force_observed |= run.observes_forces();
-    let method = [summary.method_label()].into_iter().chain(changes(&run)).collect::<Vec<_>>().join(" · ");
+    let mut method = summary.method_label();
+    // Changes to the suite, such as `mass=2`.
+    let changes: Vec<String> = run.changes("shifts").chain(run.changes("set")).collect();
+    if !changes.is_empty() {
+        method += &format!(" · {}", changes.join(", "));
+    }
     RunSummary { run, summary, method }
-}
-
-/// Changes to the suite, such as `mass=2`.
-fn changes(run: &StoredRun) -> Option<String> {
-    let pairs =
-        ["shifts", "set"].into_iter().flat_map(|field| run.manifest[field].as_array().into_iter().flatten());
-    let words: Vec<String> = pairs
-        .map(|pair| {
-            let value = pair[1].as_str().map_or_else(|| pair[1].to_string(), str::to_owned);
-            format!("{}={value}", pair[0].as_str().unwrap_or_default())
-        })
-        .collect();
-    (!words.is_empty()).then(|| words.join(", "))
 }
 
 impl RunSummary {

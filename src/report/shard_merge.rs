@@ -9,12 +9,16 @@ use std::{
 use serde_json::Value;
 
 use super::{
-    run_folder::{EPISODES, RUN, RunFolderError, SUMMARY, io_error, line},
+    run_folder::{EPISODES, RUN, SUMMARY},
     softvtbench_files,
     stored_run::{StoredRun, StoredRunError, load},
 };
 use crate::{
-    evaluation::{record::EpisodeRecord, summary::SuiteSummary, thresholds::ThresholdFile},
+    evaluation::{
+        record::EpisodeRecord,
+        summary::SuiteSummary,
+        thresholds::{ThresholdError, ThresholdFile},
+    },
     files::{self, FileError},
 };
 
@@ -27,11 +31,23 @@ pub enum MergeError {
     #[error(transparent)]
     Runs(#[from] StoredRunError),
     #[error(transparent)]
-    Folder(#[from] RunFolderError),
-    #[error(transparent)]
     File(#[from] FileError),
-    #[error("{0}")]
-    NotMergeable(String),
+    #[error(transparent)]
+    Thresholds(#[from] ThresholdError),
+    #[error("{out} already exists; give a new folder")]
+    OutputExists { out: String },
+    #[error("these are shards of several suites ({suites}): merge each suite separately")]
+    SeveralSuites { suites: String },
+    #[error("{dir}: it is not a shard: it was run without --shard")]
+    NotShard { dir: String },
+    #[error("{dir}: it is a shard of another run than {first}")]
+    OtherRun { dir: String, first: String },
+    #[error("{dir}: task {task} episode {episode} is also in {other}")]
+    DuplicateEpisode { dir: String, task: usize, episode: u32, other: String },
+    #[error(
+        "suite {suite}: {missing} of {expected} episodes are missing, the first of which is task {task} episode {episode}: a shard is not given or not finished (--resume)"
+    )]
+    Missing { suite: String, missing: usize, expected: usize, task: usize, episode: u32 },
 }
 
 /// Merges the shards in `dirs` into the new folder `out`, and returns the summary of each merged run, sorted by suite.
@@ -40,7 +56,7 @@ pub enum MergeError {
 /// A shard is missing, unfinished, given twice or of another run; `out` exists; a file cannot be read or written.
 pub fn merge(out: &Path, dirs: &[PathBuf]) -> Result<Vec<SuiteSummary>, MergeError> {
     if out.exists() {
-        return Err(MergeError::NotMergeable(format!("{} already exists; give a new folder", out.display())));
+        return Err(MergeError::OutputExists { out: out.display().to_string() });
     }
     let mut suites: BTreeMap<String, Vec<StoredRun>> = BTreeMap::new();
     let mut in_subfolders = false;
@@ -52,111 +68,101 @@ pub fn merge(out: &Path, dirs: &[PathBuf]) -> Result<Vec<SuiteSummary>, MergeErr
     }
     if suites.len() > 1 && !in_subfolders {
         let names: Vec<&str> = suites.keys().map(String::as_str).collect();
-        return Err(MergeError::NotMergeable(format!(
-            "these are shards of several suites ({}): merge each suite separately",
-            names.join(", ")
-        )));
+        return Err(MergeError::SeveralSuites { suites: names.join(", ") });
     }
-    let parts: Result<Vec<_>, MergeError> = suites.values().map(|runs| compose(runs)).collect();
     // Everything is checked before anything is written.
+    let merged: Vec<MergedRun> =
+        suites.values().map(|shards| MergedRun::new(shards)).collect::<Result<_, _>>()?;
     let temp = files::temp_path(out);
     let mut summaries = Vec::new();
-    for (runs, run) in suites.values().zip(parts?) {
-        let folder = match (in_subfolders, runs[0].dir.file_name()) {
+    for run in &merged {
+        let folder = match (in_subfolders, run.shards[0].dir.file_name()) {
             (true, Some(name)) => temp.join(name),
             _ => temp.clone(),
         };
-        summaries.push(write(&folder, runs, &run)?);
+        summaries.push(run.write(&folder)?);
     }
-    fs::rename(&temp, out).map_err(io_error("rename", &temp))?;
+    files::rename(&temp, out)?;
     Ok(summaries)
 }
 
 /// A run composed of shards.
-struct MergedRun {
+struct MergedRun<'a> {
+    shards: &'a [StoredRun],
     manifest: Value,
     /// Ordered by task and episode.
     records: Vec<EpisodeRecord>,
 }
 
-/// Checks that the shards are complete and belong together.
-fn compose(runs: &[StoredRun]) -> Result<MergedRun, MergeError> {
-    let error =
-        |run: &StoredRun, what: String| MergeError::NotMergeable(format!("{}: {what}", run.dir.display()));
-    let manifest_without_shard = |run: &StoredRun| {
-        let mut manifest = run.manifest.clone();
-        manifest.as_object_mut().map(|map| map.shift_remove("shard"));
-        manifest
-    };
-    let manifest = manifest_without_shard(&runs[0]);
-    let mut seen: BTreeMap<(usize, u32), &Path> = BTreeMap::new();
-    for run in runs {
-        if run.manifest["shard"].is_null() {
-            return Err(error(run, "it is not a shard: it was run without --shard".to_owned()));
-        }
-        if manifest_without_shard(run) != manifest {
-            return Err(error(run, format!("it is a shard of another run than {}", runs[0].dir.display())));
-        }
-        for record in &run.records {
-            let id = (record.identity.task, record.identity.episode);
-            if let Some(other) = seen.insert(id, &run.dir) {
-                let what = format!("task {} episode {} is also in {}", id.0, id.1, other.display());
-                return Err(error(run, what));
+impl<'a> MergedRun<'a> {
+    /// Checks that the shards are complete and belong together.
+    fn new(shards: &'a [StoredRun]) -> Result<Self, MergeError> {
+        let manifest_without_shard = |run: &StoredRun| {
+            let mut manifest = run.manifest.clone();
+            manifest.as_object_mut().map(|map| map.shift_remove("shard"));
+            manifest
+        };
+        let manifest = manifest_without_shard(&shards[0]);
+        let mut seen: BTreeMap<(usize, u32), &StoredRun> = BTreeMap::new();
+        for run in shards {
+            let dir = || run.dir.display().to_string();
+            if run.manifest["shard"].is_null() {
+                return Err(MergeError::NotShard { dir: dir() });
+            }
+            if manifest_without_shard(run) != manifest {
+                return Err(MergeError::OtherRun { dir: dir(), first: shards[0].dir.display().to_string() });
+            }
+            for record in &run.records {
+                let (task, episode) = (record.identity.task, record.identity.episode);
+                if let Some(other) = seen.insert((task, episode), run) {
+                    let other = other.dir.display().to_string();
+                    return Err(MergeError::DuplicateEpisode { dir: dir(), task, episode, other });
+                }
             }
         }
-    }
-    let tasks: Vec<usize> = manifest["tasks"]
-        .as_array()
-        .into_iter()
-        .flatten()
-        .filter_map(|n| Some(n.as_u64()? as usize))
-        .collect();
-    let episodes = manifest["episodes"].as_u64().unwrap_or(0) as u32;
-    let expected: BTreeSet<(usize, u32)> =
-        tasks.iter().flat_map(|task| (0..episodes).map(|e| (*task, e))).collect();
-    let missing: Vec<_> = expected.iter().filter(|id| !seen.contains_key(id)).collect();
-    if let Some((task, episode)) = missing.first() {
-        return Err(MergeError::NotMergeable(format!(
-            "suite {}: {} of {} episodes are missing, the first of which is task {task} episode {episode}: a shard is not given or not finished (--resume)",
-            runs[0].text("suite"),
-            missing.len(),
-            expected.len()
-        )));
-    }
-    let mut records: Vec<EpisodeRecord> = runs.iter().flat_map(|run| run.records.clone()).collect();
-    records.sort_by_key(|r| (r.identity.task, r.identity.episode));
-    Ok(MergedRun { manifest, records })
-}
-
-fn write(
-    folder: &Path,
-    runs: &[StoredRun],
-    MergedRun { manifest, records }: &MergedRun,
-) -> Result<SuiteSummary, MergeError> {
-    files::create_folder(folder)?;
-    for run in runs {
-        for name in EPISODE_FOLDERS {
-            copy_tree(&run.dir.join(name), &folder.join(name))?;
+        let tasks = manifest["tasks"].as_array().into_iter().flatten();
+        let tasks = tasks.filter_map(|task| Some(task.as_u64()? as usize));
+        let episodes = manifest["episodes"].as_u64().unwrap_or(0) as u32;
+        let expected: BTreeSet<(usize, u32)> =
+            tasks.flat_map(|task| (0..episodes).map(move |episode| (task, episode))).collect();
+        let missing: Vec<_> = expected.iter().filter(|id| !seen.contains_key(id)).collect();
+        if let Some(&&(task, episode)) = missing.first() {
+            return Err(MergeError::Missing {
+                suite: shards[0].text("suite").to_owned(),
+                missing: missing.len(),
+                expected: expected.len(),
+                task,
+                episode,
+            });
         }
+        let mut records: Vec<EpisodeRecord> = shards.iter().flat_map(|run| run.records.clone()).collect();
+        records.sort_by_key(|r| (r.identity.task, r.identity.episode));
+        Ok(Self { shards, manifest, records })
     }
-    let lines: Result<String, RunFolderError> =
-        records.iter().map(|r| line(r, &folder.join(EPISODES))).collect();
-    files::replace(&folder.join(EPISODES), lines?)?;
-    files::write_json(&folder.join(RUN), manifest)?;
-    let path = runs[0].dir.join(softvtbench_files::FOLDER).join(softvtbench_files::THRESHOLDS_JSON);
-    let text = fs::read_to_string(&path).map_err(io_error("read", &path))?;
-    let thresholds = ThresholdFile::parse(&text, &path.display().to_string())
-        .map_err(|error| MergeError::NotMergeable(error.to_string()))?;
-    softvtbench_files::write_scores(folder, records, &thresholds)?;
-    // The records of a rigid twin carry its own suite name.
-    let suite = records.first().map_or(runs[0].suite(), |record| &record.identity.suite);
-    let summary = SuiteSummary::of(suite, runs[0].text("policy"), records);
-    files::write_json(&folder.join(SUMMARY), &summary)?;
-    Ok(summary)
+
+    /// Writes the files of the run and returns its summary.
+    fn write(&self, folder: &Path) -> Result<SuiteSummary, MergeError> {
+        let Self { shards, manifest, records } = self;
+        files::create_folder(folder)?;
+        for run in *shards {
+            for name in EPISODE_FOLDERS {
+                copy_tree(&run.dir.join(name), &folder.join(name))?;
+            }
+        }
+        files::write_json_lines(&folder.join(EPISODES), records)?;
+        files::write_json(&folder.join(RUN), manifest)?;
+        let path = shards[0].dir.join(softvtbench_files::FOLDER).join(softvtbench_files::THRESHOLDS_JSON);
+        softvtbench_files::write_scores(folder, records, &ThresholdFile::read(&path)?)?;
+        // The records of a rigid twin carry its own suite name.
+        let suite = records.first().map_or(shards[0].suite(), |record| &record.identity.suite);
+        let summary = SuiteSummary::of(suite, shards[0].text("policy"), records);
+        files::write_json(&folder.join(SUMMARY), &summary)?;
+        Ok(summary)
+    }
 }
 
 /// Copies the task folders in a folder. Files next to them describe the whole run and are written again.
-fn copy_tree(from: &Path, to: &Path) -> Result<(), RunFolderError> {
+fn copy_tree(from: &Path, to: &Path) -> Result<(), FileError> {
     let Ok(entries) = fs::read_dir(from) else { return Ok(()) };
     let mut folders: Vec<PathBuf> =
         entries.filter_map(Result::ok).map(|e| e.path()).filter(|p| p.is_dir()).collect();
@@ -165,10 +171,10 @@ fn copy_tree(from: &Path, to: &Path) -> Result<(), RunFolderError> {
         let inner = to.join(folder.file_name().unwrap_or_default());
         files::create_folder(&inner)?;
         copy_tree(&folder, &inner)?;
-        let files = fs::read_dir(&folder).map_err(io_error("read", &folder))?;
+        let files = fs::read_dir(&folder).map_err(FileError::io("read", &folder))?;
         for file in files.filter_map(Result::ok).map(|e| e.path()).filter(|p| p.is_file()) {
             let target = inner.join(file.file_name().unwrap_or_default());
-            fs::copy(&file, &target).map_err(io_error("copy to", &target))?;
+            fs::copy(&file, &target).map_err(FileError::io("copy to", &target))?;
         }
     }
     Ok(())

@@ -7,8 +7,11 @@ use std::{
 
 use serde_json::Value;
 
-use super::run_folder::{EPISODES, RUN, RunFolderError, SUMMARY, io_error, is_truncated, read_episodes};
-use crate::evaluation::record::EpisodeRecord;
+use super::run_folder::{EPISODES, RUN, RunFolderError, SUMMARY, is_truncated, read_episodes};
+use crate::{
+    evaluation::record::EpisodeRecord,
+    files::{self, FileError},
+};
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
@@ -31,6 +34,8 @@ pub struct StoredRun {
 pub enum StoredRunError {
     #[error(transparent)]
     Folder(#[from] RunFolderError),
+    #[error(transparent)]
+    Read(#[from] FileError),
     /// An error whose likely cause is that the run was written by another version.
     #[error(
         "{error}; this run was written by softvt {version}, and this is softvt {VERSION}: read it with that version"
@@ -83,29 +88,37 @@ impl StoredRun {
         !self.is_finished || self.records.len() < self.requested_episodes()
     }
 
-    /// Notes for a reader of the results, one sentence each.
-    pub fn remarks(&self) -> Vec<String> {
-        let mut remarks = Vec::new();
+    /// Entries of a list of changes in `run.json` (`shifts` or `set`), as `name=value`.
+    pub(super) fn changes(&self, field: &str) -> impl Iterator<Item = String> {
+        self.manifest[field].as_array().into_iter().flatten().map(|pair| {
+            let value = pair[1].as_str().map_or_else(|| pair[1].to_string(), str::to_owned);
+            format!("{}={value}", pair[0].as_str().unwrap_or_default())
+        })
+    }
+
+    /// Warnings for a reader of the results, one sentence each.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut warnings = Vec::new();
         let dir = self.dir.display();
         if self.is_partial() {
-            remarks.push(format!(
+            warnings.push(format!(
                 "{dir} is not finished: it has {} of {} episodes; it is still running, or can be resumed with --resume",
                 self.records.len(),
                 self.requested_episodes()
             ));
         }
         if self.is_truncated {
-            remarks.push(format!(
+            warnings.push(format!(
                 "the last line of {dir}/{EPISODES} is truncated and was skipped; --resume runs that episode again"
             ));
         }
         if self.text("softvt") != VERSION {
-            remarks.push(format!(
+            warnings.push(format!(
                 "{dir} was written by softvt {}, and this is softvt {VERSION}: results of the two versions may differ",
                 self.text("softvt")
             ));
         }
-        remarks
+        warnings
     }
 }
 
@@ -126,7 +139,7 @@ pub fn load(dir: &Path) -> Result<Vec<StoredRun>, StoredRunError> {
         Err(error) if error.kind() == io::ErrorKind::NotFound => {
             return Err(StoredRunError::Missing { dir: name() });
         }
-        Err(error) => return Err(io_error("read", dir)(error).into()),
+        Err(error) => return Err(FileError::io("read", dir)(error).into()),
     };
     inner.retain(|path| path.join(RUN).is_file());
     inner.sort();
@@ -138,33 +151,21 @@ pub fn load(dir: &Path) -> Result<Vec<StoredRun>, StoredRunError> {
 
 fn load_one(dir: &Path) -> Result<StoredRun, StoredRunError> {
     let path = dir.join(RUN);
-    let text = fs::read_to_string(&path).map_err(io_error("read", &path))?;
     let invalid = |what: String| StoredRunError::Manifest { path: path.display().to_string(), what };
-    let manifest: Value = serde_json::from_str(&text).map_err(|e| invalid(e.to_string()))?;
+    let manifest: Value =
+        serde_json::from_str(&files::read_text(&path)?).map_err(|e| invalid(e.to_string()))?;
     let version = manifest["softvt"].as_str().unwrap_or_default().to_owned();
-    let read = || -> Result<StoredRun, StoredRunError> {
-        for field in ["softvt", "script", "suite", "policy"] {
-            if manifest[field].as_str().is_none() {
-                return Err(invalid(format!("it has no {field}")));
-            }
-        }
-        for (field, fits) in
-            [("tasks", manifest["tasks"].is_array()), ("episodes", manifest["episodes"].is_u64())]
-        {
-            if !fits {
-                return Err(invalid(format!("it has no {field}")));
-            }
-        }
+    let read = || {
+        let has = |field: &str, is_type: fn(&Value) -> bool| {
+            is_type(&manifest[field]).then_some(()).ok_or_else(|| invalid(format!("it has no {field}")))
+        };
+        ["softvt", "script", "suite", "policy"].iter().try_for_each(|field| has(field, Value::is_string))?;
+        has("tasks", Value::is_array)?;
+        has("episodes", Value::is_u64)?;
         let mut records = read_episodes(dir)?;
         records.sort_by_key(|r| (r.identity.task, r.identity.episode));
-        let is_finished = dir.join(SUMMARY).is_file();
-        Ok(StoredRun {
-            dir: dir.to_owned(),
-            manifest: manifest.clone(),
-            records,
-            is_finished,
-            is_truncated: is_truncated(dir),
-        })
+        let (is_finished, is_truncated) = (dir.join(SUMMARY).is_file(), is_truncated(dir));
+        Ok(StoredRun { dir: dir.to_owned(), manifest: manifest.clone(), records, is_finished, is_truncated })
     };
     read().map_err(|error| match version == VERSION || version.is_empty() {
         true => error,

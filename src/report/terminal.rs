@@ -1,160 +1,139 @@
-//! The results table of a run in the terminal, at most 100 columns wide.
+//! The results table of a run in the terminal.
 
-use super::text_table::{push_line, push_rule, shortened};
 use crate::{
     evaluation::{
         safety::KAPPAS,
         statistics::{Distribution, Rate},
         summary::{AbortedEpisode, Scores, SuiteSummary},
     },
-    text::counted,
+    text::{TextColumn, TextTable, counted, decimal, shortened},
 };
 
-/// Width of a task's name, columns.
-const NAME_WIDTH: usize = 30;
-/// Width of the table, columns.
-const WIDTH: usize = 99;
+/// Columns: index and prompt of the task, three rates, four figures of D, τ and the number of invalid episodes.
+const COLUMNS: [TextColumn; 11] = {
+    use TextColumn::{Left, Right};
+    [
+        Right(3),
+        Left(30),
+        Right(6),
+        Right(6),
+        Right(6),
+        Right(7),
+        Right(6),
+        Right(6),
+        Right(6),
+        Right(6),
+        Right(7),
+    ]
+};
 
 /// Largest number of aborted episodes listed.
 const MAX_ABORTED_LISTED: usize = 10;
 
 /// The results of one suite: one row per task, one for all, and the rates with their intervals.
 pub fn table(summary: &SuiteSummary) -> String {
-    let mut out = String::new();
+    let mut table = TextTable::new(COLUMNS);
     let scores = &summary.scores;
-    let soft = scores.deformation_ok_rate.is_some();
-    push_line(
-        &mut out,
-        &format!(
-            "{} · policy {} · {}",
-            summary.suite,
-            summary.method_label(),
-            counted(scores.episodes, "episode")
-        ),
-    );
-    push_rule(&mut out, WIDTH);
-    push_line(
-        &mut out,
-        &format!(
-            "{:>3} {:<NAME_WIDTH$} {:>6} {:>6} {:>6} {:>7} {:>6} {:>6} {:>6} {:>6} {:>7}",
-            "#", "task", "Goal", "NoDrop", "Safety", "D mean", "P5", "median", "P95", "τ", "invalid"
-        ),
-    );
-    push_rule(&mut out, WIDTH);
+    let is_soft = scores.deformation_ok_rate.is_some();
+    let episodes = counted(scores.episodes, "episode");
+    table.line(format!("{} · policy {} · {episodes}", summary.suite, summary.method_label()));
+    table.rule();
+    table.row(["#", "task", "Goal", "NoDrop", "Safety", "D mean", "P5", "median", "P95", "τ", "invalid"]);
+    table.rule();
     let prompts: Vec<&str> = summary.by_task.iter().map(|t| t.prompt.as_str()).collect();
     for (task, name) in summary.by_task.iter().zip(distinct_parts(&prompts)) {
         let tau = summary.by_asset.get(&task.asset).and_then(|asset| asset.tau);
-        push_line(&mut out, &row(&task.task.to_string(), name, &task.scores, tau, soft));
+        table.row(cells(&task.task.to_string(), name, &task.scores, tau, is_soft));
     }
-    push_rule(&mut out, WIDTH);
-    push_line(&mut out, &row("", "all", scores, None, soft));
-    push_rule(&mut out, WIDTH);
-    footer(&mut out, summary);
-    out
+    table.rule();
+    table.row(cells("", "all", scores, None, is_soft));
+    table.rule();
+    push_rates(&mut table, summary);
+    push_notes(&mut table, summary);
+    table.text
 }
 
-fn row(number: &str, name: &str, scores: &Scores, tau: Option<f64>, soft: bool) -> String {
-    let d: Distribution = scores.deformation;
+fn cells(number: &str, name: &str, scores: &Scores, tau: Option<f64>, is_soft: bool) -> [String; 11] {
+    let Distribution { mean, p5, median, p95, .. } = scores.deformation;
     let deformation = |value: Option<f64>| match value {
-        Some(value) => format!("{value:.2}"),
-        None if soft => "–".into(),
-        None => "N/A".into(),
+        None if !is_soft => "N/A".to_owned(),
+        value => decimal(value, 2),
     };
-    format!(
-        "{number:>3} {:<NAME_WIDTH$} {:>6} {:>6} {:>6} {:>7} {:>6} {:>6} {:>6} {:>6} {:>7}",
-        shortened(name, NAME_WIDTH),
-        percent(&scores.goal_success_rate),
-        percent(&scores.no_drop_rate),
-        percent(&scores.safety_success_rate),
-        deformation(d.mean),
-        deformation(d.p5),
-        deformation(d.median),
-        deformation(d.p95),
+    [
+        number.to_owned(),
+        name.to_owned(),
+        decimal(scores.goal_success_rate.rate, 1),
+        decimal(scores.no_drop_rate.rate, 1),
+        decimal(scores.safety_success_rate.rate, 1),
+        deformation(mean),
+        deformation(p5),
+        deformation(median),
+        deformation(p95),
         tau.map_or_else(String::new, |tau| format!("{tau:.2}")),
-        scores.invalid,
-    )
+        scores.invalid.to_string(),
+    ]
 }
 
-fn footer(out: &mut String, summary: &SuiteSummary) {
+fn push_rates(table: &mut TextTable, summary: &SuiteSummary) {
     let scores = &summary.scores;
-    let deformation_ok = scores.deformation_ok_rate;
     for (name, rate) in [
         ("Goal Success", Some(scores.goal_success_rate)),
         ("NoDrop", Some(scores.no_drop_rate)),
-        ("Deformation within τ", deformation_ok),
+        ("Deformation within τ", scores.deformation_ok_rate),
         ("Safety Success", Some(scores.safety_success_rate)),
     ] {
-        push_line(
-            out,
-            &format!("{name:<22}{}", rate.map_or_else(|| "   N/A".into(), |rate| interval(&rate))),
-        );
+        table.line(format!("{name:<22}{}", rate.map_or_else(|| "   N/A".to_owned(), interval)));
     }
-    let gap = scores.goal_safe_gap.map_or_else(|| "–".into(), |gap| format!("{gap:.1}"));
-    push_line(out, &format!("{:<22}{gap:>6} pp", "Goal–safety gap"));
-    if !summary.kappa.is_empty() {
-        let at = KAPPAS.iter().filter_map(|kappa| summary.kappa.iter().find(|row| row.kappa == *kappa));
-        let text: Vec<String> =
-            at.map(|row| format!("κ={}: {} %", row.kappa, percent(&row.safety_success_rate))).collect();
-        push_line(out, &format!("{:<22}{}", "Safety Success at", text.join(" · ")));
-        let (all, goal) = (scores.deformation.n, scores.deformation_goal);
-        let of_goal = goal.mean.map_or_else(|| "–".into(), |mean| format!("{mean:.2} %"));
-        push_line(
-            out,
-            &format!(
-                "D is the peak in % of the bounding-box diagonal; n {all}; mean {of_goal} over the {} at the goal",
-                goal.n
-            ),
-        );
+    table.line(format!("{:<22}{:>6} pp", "Goal–safety gap", decimal(scores.goal_safe_gap, 1)));
+    if summary.kappa.is_empty() {
+        return;
     }
+    let at = KAPPAS.iter().filter_map(|kappa| summary.kappa.iter().find(|row| row.kappa == *kappa));
+    let rates = at.map(|row| format!("κ={}: {} %", row.kappa, decimal(row.safety_success_rate.rate, 1)));
+    table.line(format!("{:<22}{}", "Safety Success at", rates.collect::<Vec<_>>().join(" · ")));
+    let (all, goal) = (scores.deformation.n, scores.deformation_goal);
+    let of_goal = goal.mean.map_or_else(|| "–".to_owned(), |mean| format!("{mean:.2} %"));
+    table.line(format!(
+        "D is the peak in % of the bounding-box diagonal; n {all}; mean {of_goal} over the {} at the goal",
+        goal.n
+    ));
+}
+
+fn push_notes(table: &mut TextTable, summary: &SuiteSummary) {
+    let scores = &summary.scores;
     if summary.privileged {
-        push_line(out, "privileged policy: it had access to ground-truth state");
+        table.line("privileged policy: it had access to ground-truth state");
     }
     if summary.force_observed {
-        push_line(
-            out,
+        table.line(
             "force_observed policy: it observed ground-truth forces at the pads, which no real sensor measures",
         );
     }
     if scores.safety_unknown > 0 {
-        push_line(
-            out,
-            &format!(
-                "safety could not be judged in {} (no threshold, or D not measured); counted as unsafe",
-                counted(scores.safety_unknown, "episode")
-            ),
-        );
+        table.line(format!(
+            "safety could not be judged in {} (no threshold, or D not measured); counted as unsafe",
+            counted(scores.safety_unknown, "episode")
+        ));
     }
     if scores.invalid > 0 {
-        push_line(
-            out,
-            &format!("{} counted as failed in every rate", counted(scores.invalid, "invalid episode")),
-        );
+        table.line(format!("{} counted as failed in every rate", counted(scores.invalid, "invalid episode")));
     }
-    gave_up(out, summary);
-}
-
-/// Reasons of aborted episodes, one per line.
-fn gave_up(out: &mut String, summary: &SuiteSummary) {
-    let all = &summary.gave_up;
-    if all.is_empty() {
+    let aborted = &summary.gave_up;
+    if aborted.is_empty() {
         return;
     }
-    push_line(out, &format!("{} gave up in {}:", summary.policy, counted(all.len(), "episode")));
-    for AbortedEpisode { task, episode, reason } in all.iter().take(MAX_ABORTED_LISTED) {
-        push_line(out, &shortened(&format!("  task {task} episode {episode}: {reason}"), WIDTH));
+    table.line(format!("{} gave up in {}:", summary.policy, counted(aborted.len(), "episode")));
+    for AbortedEpisode { task, episode, reason } in aborted.iter().take(MAX_ABORTED_LISTED) {
+        table.line(shortened(&format!("  task {task} episode {episode}: {reason}"), TextTable::WIDTH));
     }
-    if all.len() > MAX_ABORTED_LISTED {
-        push_line(out, &format!("  … and {} more, in summary.json", all.len() - MAX_ABORTED_LISTED));
+    if aborted.len() > MAX_ABORTED_LISTED {
+        table.line(format!("  … and {} more, in summary.json", aborted.len() - MAX_ABORTED_LISTED));
     }
 }
 
-fn percent(rate: &Rate) -> String {
-    rate.rate.map_or_else(|| "–".into(), |rate| format!("{rate:.1}"))
-}
-
-fn interval(rate: &Rate) -> String {
+fn interval(rate: Rate) -> String {
     let bounds = rate.wilson95.map(|[low, high]| format!("  [{low:.1}, {high:.1}]")).unwrap_or_default();
-    format!("{:>6} %{bounds}", percent(rate))
+    format!("{:>6} %{bounds}", decimal(rate.rate, 1))
 }
 
 /// The prompts without the whole words with which all of them begin or end.

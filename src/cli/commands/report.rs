@@ -7,7 +7,7 @@ use crate::{
         page,
         run_summary::summarize_runs,
         stored_run,
-        tables::{Table, all_tables},
+        tables::{ResultTable, all_tables},
     },
 };
 
@@ -25,15 +25,16 @@ pub(crate) fn run(args: &ReportArgs) -> Result<(), CliError> {
         stored.extend(stored_run::load(dir).map_err(CliError::input)?);
     }
     let summaries = summarize_runs(stored);
-    for remark in summaries.iter().flat_map(|summary| summary.run.remarks()) {
-        notice(remark);
+    for warning in summaries.iter().flat_map(|summary| summary.run.warnings()) {
+        notice(warning);
     }
     let tables = all_tables(&summaries);
-    let joined = |format: fn(&Table) -> String| tables.iter().map(format).collect::<Vec<_>>().join("\n");
+    let joined =
+        |format: fn(&ResultTable) -> String| tables.iter().map(format).collect::<Vec<_>>().join("\n");
     for (name, text) in [
         ("report.html", page::page(&summaries, &args.out)),
-        ("report.md", joined(Table::markdown)),
-        ("report.tex", LATEX_HEADER.to_owned() + &joined(Table::latex)),
+        ("report.md", joined(ResultTable::markdown)),
+        ("report.tex", LATEX_HEADER.to_owned() + &joined(ResultTable::latex)),
     ] {
         files::replace(&args.out.join(name), text).map_err(CliError::input)?;
     }

@@ -68,12 +68,7 @@ impl<'a> EpisodeArtifacts<'a> {
     pub(crate) fn write(&self, finished: &FinishedEpisode) -> Result<(), CliError> {
         let id = &finished.record.identity;
         if self.trace {
-            let mut text = String::new();
-            for step in &finished.trace {
-                text += &serde_json::to_string(step).map_err(CliError::input)?;
-                text.push('\n');
-            }
-            files::replace(&self.trace_path(id), &text).map_err(CliError::input)?;
+            files::write_json_lines(&self.trace_path(id), &finished.trace).map_err(CliError::input)?;
         }
         let path = softvtbench_files::debug_log_path(self.dir, id.task, id.episode);
         softvtbench_files::write_debug_log(&path, id, &debug_frames(finished)).map_err(CliError::input)?;
@@ -111,8 +106,9 @@ impl<'a> EpisodeArtifacts<'a> {
 fn debug_frames(finished: &FinishedEpisode) -> Vec<DebugFrame> {
     let identity = &finished.record.identity;
     let frame = |(step, frame): (usize, &ScoreFrame)| {
-        let measured = finished.reference.as_ref().zip(frame.deformation.as_ref());
-        let shape = DebugShape::new(&identity.asset, measured);
+        let (d, reference) = (frame.deformation.as_ref(), finished.reference.as_ref());
+        let (rms, max, bbox) = (d.map(|d| d.rms_pct), d.map(|d| d.max_pct), d.map(|d| d.bbox_m));
+        let shape = DebugShape::new(&identity.asset, reference, rms, max, bbox);
         DebugFrame::new(identity, step as u32, frame.success_now, shape)
     };
     let mut frames: Vec<DebugFrame> = finished.frames.iter().enumerate().map(frame).collect();
@@ -129,8 +125,8 @@ fn aborted_frame(finished: &FinishedEpisode, step: usize) -> DebugFrame {
     let before = finished.frames.iter().filter_map(|frame| Some(frame.deformation.as_ref()?.rms_pct));
     let before = before.fold(0.0, f64::max);
     let peak = verdict.d_peak.filter(|peak| *peak > before);
-    let shape =
-        DebugShape::interrupted(&identity.asset, finished.reference.as_ref(), peak, verdict.d_peak_max);
+    let reference = finished.reference.as_ref();
+    let shape = DebugShape::new(&identity.asset, reference, peak, verdict.d_peak_max, None);
     DebugFrame::new(identity, step as u32, false, shape)
 }
 

@@ -146,10 +146,7 @@ fn view_commands(run: &RunSummary, id: &Identity) -> [String; 2] {
         add("--twin", twin.to_owned());
     }
     for (flag, field) in [("--shift", "shifts"), ("--set", "set")] {
-        for pair in manifest[field].as_array().into_iter().flatten() {
-            let value = pair[1].as_str().map_or_else(|| pair[1].to_string(), str::to_owned);
-            add(flag, format!("{}={value}", pair[0].as_str().unwrap_or_default()));
-        }
+        run.run.changes(field).for_each(|change| add(flag, change));
     }
     add("--out", "seen".to_owned());
     let replay = [

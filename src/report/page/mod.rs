@@ -14,7 +14,7 @@ use crate::text::counted;
 
 use super::{
     run_summary::RunSummary,
-    tables::{Table, deformation_table, kappa_table, main_table, task_table},
+    tables::{ResultTable, TEXT_COLUMNS, deformation_table, kappa_table, main_table, task_table},
 };
 
 /// Largest number of runs whose details are expanded initially.
@@ -105,7 +105,7 @@ fn results(runs: &[RunSummary]) -> Markup {
         @if any(|run| run.summary.force_observed) {
             p.note { b { "force_observed" } ": the policy observes ground-truth forces at the pads, which no real sensor measures." }
         }
-        @for remark in runs.iter().flat_map(|run| run.run.remarks()) { p.warning { (remark) } }
+        @for warning in runs.iter().flat_map(|run| run.run.warnings()) { p.warning { (warning) } }
         figure {
             (figures::goal_and_safety(runs))
             figcaption { "Goal Success and Safety Success. The gap between them is invisible in success rates alone. Whiskers are 95 % Wilson intervals." }
@@ -141,11 +141,11 @@ fn deformation(runs: &[RunSummary]) -> Markup {
 }
 
 /// A table that scrolls horizontally where it is too wide.
-fn table(table: &Table) -> Markup {
+fn table(table: &ResultTable) -> Markup {
     let has_index = table.rows.iter().all(|row| row[0].chars().all(|c| c.is_ascii_digit()));
     let class = |column: usize| match column {
         0 if has_index => "index",
-        column if column < table.text_columns => "text",
+        column if column < TEXT_COLUMNS => "text",
         _ => "number",
     };
     let head = html! {
@@ -155,7 +155,7 @@ fn table(table: &Table) -> Markup {
         html! {
             th scope="row" class=(class(0)) { (row[0]) }
             @for (i, text) in row.iter().enumerate().skip(1) {
-                td class=(class(i)) { (cell(text, i < table.text_columns)) }
+                td class=(class(i)) { (cell(text, i < TEXT_COLUMNS)) }
             }
         }
     };

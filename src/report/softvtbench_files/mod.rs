@@ -15,12 +15,13 @@ use serde_json::{Value, json};
 use crate::{
     evaluation::{
         calibration::Envelope,
-        deformation::{Deformation, METRIC_ID, ReferenceShape},
+        deformation::{METRIC_ID, ReferenceShape},
         record::{EpisodeRecord, Identity},
-        statistics::quantile,
+        statistics::{Rate, quantile},
         thresholds::ThresholdFile,
     },
-    files::{FileError, replace},
+    files::{self, FileError, replace},
+    geometry::Vec3,
 };
 
 /// Folder within a run folder.
@@ -69,48 +70,31 @@ pub struct DebugShape {
 }
 
 impl DebugShape {
-    /// From the worst deformation in a control step and its reference; `None` for a rigid target.
-    pub fn new(asset: &str, measured: Option<(&ReferenceShape, &Deformation)>) -> Self {
-        let of = |f: fn(&ReferenceShape, &Deformation) -> f64| measured.map(|(r, d)| f(r, d));
-        Self {
-            fem_deformation_known: measured.is_some(),
-            fem_deformation_metric_id: measured.map(|_| METRIC_ID.into()),
-            fem_deformation_asset: asset.into(),
-            fem_deformation_nodes: measured.map(|(r, _)| r.len()),
-            fem_deformation_rms: of(|_, d| d.rms_pct),
-            fem_deformation_max: of(|_, d| d.max_pct),
-            fem_bbox_diag: of(|r, _| r.diagonal_m()),
-            fem_bbox_delta: of(|r, d| (d.bbox_m - r.bbox_m()).norm()),
-            fem_bbox_dims: measured.map(|(_, d)| d.bbox_m.into()),
-        }
-    }
-
-    /// For an interrupted control step, whose peaks (% of the diagonal) are known if they are those of the rollout.
-    pub fn interrupted(
+    /// From the reference, the largest D and node displacement of the control step, and the bounding box at that
+    /// time. D is unknown without a reference or a measurement, as for a rigid target.
+    pub fn new(
         asset: &str,
         reference: Option<&ReferenceShape>,
         rms_pct: Option<f64>,
         max_pct: Option<f64>,
+        bbox_m: Option<Vec3>,
     ) -> Self {
-        let known = reference.zip(rms_pct);
+        let known = reference.filter(|_| rms_pct.is_some());
         Self {
             fem_deformation_known: known.is_some(),
             fem_deformation_metric_id: known.map(|_| METRIC_ID.into()),
-            fem_deformation_nodes: known.map(|(reference, _)| reference.len()),
-            fem_deformation_rms: known.map(|(_, rms_pct)| rms_pct),
+            fem_deformation_asset: asset.into(),
+            fem_deformation_nodes: known.map(ReferenceShape::len),
+            fem_deformation_rms: known.and(rms_pct),
             fem_deformation_max: known.and(max_pct),
-            fem_bbox_diag: known.map(|(reference, _)| reference.diagonal_m()),
-            ..Self::new(asset, None)
+            fem_bbox_diag: known.map(ReferenceShape::diagonal_m),
+            fem_bbox_delta: known.zip(bbox_m).map(|(reference, bbox)| (bbox - reference.bbox_m()).norm()),
+            fem_bbox_dims: known.and(bbox_m).map(Into::into),
         }
     }
 }
 
 impl DebugFrame {
-    /// The only row of an episode that ended before its first control step; the scorer ignores episodes without rows.
-    pub fn placeholder(identity: &Identity) -> Self {
-        Self::new(identity, 0, false, DebugShape::new(&identity.asset, None))
-    }
-
     pub fn new(identity: &Identity, frame: u32, success_now: bool, shape: DebugShape) -> Self {
         Self {
             frame,
@@ -134,14 +118,10 @@ pub fn debug_log_path(dir: &Path, task: usize, episode: u32) -> PathBuf {
 /// # Errors
 /// The file cannot be written.
 pub fn write_debug_log(path: &Path, identity: &Identity, frames: &[DebugFrame]) -> Result<(), FileError> {
-    let none = [DebugFrame::placeholder(identity)];
-    let mut text = String::new();
-    for frame in if frames.is_empty() { &none[..] } else { frames } {
-        let line = serde_json::to_string(frame).map_err(FileError::json(path))?;
-        text.push_str(&line);
-        text.push('\n');
-    }
-    replace(path, &text)
+    // The row of an episode that ended before its first control step: the scorer ignores episodes without rows.
+    let unknown = || DebugShape::new(&identity.asset, None, None, None, None);
+    let placeholder = frames.is_empty().then(|| DebugFrame::new(identity, 0, false, unknown()));
+    files::write_json_lines(path, frames.iter().chain(&placeholder))
 }
 
 /// True if all files of [`write_scores`] exist.
@@ -239,10 +219,10 @@ fn episodes_csv(records: &[EpisodeRecord]) -> String {
 }
 
 fn summary(records: &[EpisodeRecord]) -> Value {
-    let safe = |r: &&EpisodeRecord| safe_success(r) == Some(true);
+    let is_safe = |r: &&EpisodeRecord| safe_success(r) == Some(true);
     let (all, n) = (in_order(records), records.len());
-    let goal_rate = rate(all.iter().filter(|r| r.verdict.goal).count(), n);
-    let safe_rate = rate(all.iter().copied().filter(|r| safe(r)).count(), n);
+    let goal_rate = Rate::of(&all, |r| r.verdict.goal).rate;
+    let safe_rate = Rate::of(&all, is_safe).rate;
     let mut assets: Vec<&str> = Vec::new();
     for record in &all {
         if !assets.contains(&record.identity.asset.as_str()) {
@@ -286,8 +266,8 @@ fn asset_summary(group: &[&EpisodeRecord]) -> Value {
         "tau": group.first().and_then(|r| r.verdict.tau),
         "d_peak_p50": quantile(&peaks, 0.5).map(|d| round_to(d, 4)),
         "d_peak_max": peaks.last().map(|d| round_to(*d, 4)),
-        "goal_success_rate": rate(goal, group.len()),
-        "safe_success_rate": rate(safe, group.len()),
+        "goal_success_rate": Rate::new(goal, group.len()).rate,
+        "safe_success_rate": Rate::new(safe, group.len()).rate,
     })
 }
 
@@ -295,10 +275,6 @@ fn in_order(records: &[EpisodeRecord]) -> Vec<&EpisodeRecord> {
     let mut sorted: Vec<_> = records.iter().collect();
     sorted.sort_by_key(|r| (r.identity.task, r.identity.episode));
     sorted
-}
-
-fn rate(count: usize, total: usize) -> Option<f64> {
-    (total > 0).then(|| 100.0 * count as f64 / total as f64)
 }
 
 fn round_to(value: f64, digits: i32) -> f64 {

@@ -68,7 +68,7 @@ fn a_debug_frame_describes_the_shape_of_the_target() {
     let reference = ReferenceShape::new(&nodes, &[1.0; 4]).unwrap();
     let now = nodes.map(|x| Vec3::new(0.5 * x.x, x.y, x.z));
     let d = reference.measure(&now).unwrap();
-    let shape = DebugShape::new("bun", Some((&reference, &d)));
+    let shape = DebugShape::new("bun", Some(&reference), Some(d.rms_pct), Some(d.max_pct), Some(d.bbox_m));
     let frame = serde_json::to_value(DebugFrame::new(&sample().identity, 7, false, shape)).unwrap();
     assert_eq!((&frame["frame"], &frame["exp_idx"], &frame["task_id"]), (&json!(7), &json!(0), &json!(0)));
     assert_eq!(frame["fem_deformation_metric_id"], METRIC_ID);
@@ -76,17 +76,16 @@ fn a_debug_frame_describes_the_shape_of_the_target() {
     assert_eq!(frame["fem_deformation_rms"], d.rms_pct);
     assert!((frame["fem_bbox_diag"].as_f64().unwrap() - 0.07).abs() < 1e-12);
     assert!((frame["fem_bbox_delta"].as_f64().unwrap() - 0.03).abs() < 1e-12);
-    let broken =
-        serde_json::to_value(DebugShape::interrupted("bun", Some(&reference), Some(9.5), Some(20.0)));
+    let broken = serde_json::to_value(DebugShape::new("bun", Some(&reference), Some(9.5), Some(20.0), None));
     let broken = broken.unwrap();
     assert_eq!(
         (&broken["fem_deformation_known"], &broken["fem_deformation_rms"]),
         (&json!(true), &json!(9.5))
     );
     assert!(broken["fem_bbox_dims"].is_null() && broken["fem_bbox_diag"] == frame["fem_bbox_diag"]);
-    let unknown = DebugShape::interrupted("bun", Some(&reference), None, Some(20.0));
-    assert_eq!(unknown, DebugShape::new("bun", None), "its peak was before");
-    let unknown = serde_json::to_value(DebugShape::new("box", None)).unwrap();
+    let unknown = DebugShape::new("bun", Some(&reference), None, Some(20.0), None);
+    assert_eq!(unknown, DebugShape::new("bun", None, None, None, None), "its peak was before");
+    let unknown = serde_json::to_value(DebugShape::new("box", None, None, None, None)).unwrap();
     assert_eq!(unknown["fem_deformation_known"], false);
     assert!(unknown["fem_deformation_rms"].is_null());
 }
@@ -98,7 +97,7 @@ fn files_land_where_the_scorer_finds_them() {
     thresholds.insert("bun", Envelope::new(vec![hold(0.3, 5)], vec![squeeze(0.3, 2.0, true)], 0.5));
     write_scores(root.path(), &records(), &thresholds).unwrap();
     let identity = sample().identity;
-    let frame = DebugFrame::new(&identity, 0, true, DebugShape::new("bun", None));
+    let frame = DebugFrame::new(&identity, 0, true, DebugShape::new("bun", None, None, None, None));
     let path = debug_log_path(root.path(), identity.task, identity.episode);
     assert!(path.ends_with("softvtbench/task_000/episode_00000/policy_action_debug.jsonl"));
     for (frames, rows) in [(vec![frame.clone(), frame], 2), (vec![], 1)] {

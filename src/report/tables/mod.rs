@@ -1,22 +1,24 @@
 //! Result tables of runs, as markdown and as LaTeX with booktabs. Names come from scripts and are escaped.
 
-use std::fmt::Write;
-
 use super::run_summary::RunSummary;
-use crate::evaluation::{
-    safety::KAPPAS,
-    statistics::{Distribution, Rate},
-    summary::TaskScores,
+use crate::{
+    evaluation::{
+        safety::KAPPAS,
+        statistics::{Distribution, Rate},
+        summary::TaskScores,
+    },
+    text::decimal,
 };
 
-/// A table of text cells.
+/// Number of columns, from the left, that hold text; the others hold numbers.
+pub(super) const TEXT_COLUMNS: usize = 2;
+
+/// A table of results, as text cells.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Table {
+pub struct ResultTable {
     pub caption: String,
     /// Column headings.
     pub head: Vec<String>,
-    /// Number of columns, from the left, that hold text; the others hold numbers.
-    pub text_columns: usize,
     /// Rows, each as long as `head`.
     pub rows: Vec<Vec<String>>,
 }
@@ -47,10 +49,9 @@ fn episodes(run: &RunSummary) -> String {
 }
 
 /// The paper's main table: Goal and Safety Success by suite and method.
-pub fn main_table(runs: &[RunSummary]) -> Table {
+pub fn main_table(runs: &[RunSummary]) -> ResultTable {
     let row = |run: &RunSummary| {
         let s = &run.summary.scores;
-        let gap = s.goal_safe_gap.map_or_else(|| "–".to_owned(), |gap| format!("{gap:.1}"));
         vec![
             run.summary.suite.clone(),
             run.method.clone(),
@@ -58,27 +59,24 @@ pub fn main_table(runs: &[RunSummary]) -> Table {
             rate(&s.goal_success_rate),
             rate(&s.no_drop_rate),
             soft_rate(run, &s.safety_success_rate),
-            if run.is_soft() { gap } else { "N/A".to_owned() },
+            if run.is_soft() { decimal(s.goal_safe_gap, 1) } else { "N/A".to_owned() },
             s.invalid.to_string(),
         ]
     };
-    Table {
+    ResultTable {
         caption: "Success by suite and method, % of episodes with 95 % Wilson intervals. Safety Success requires the goal, no drop, and a peak deformation within the object's threshold; it does not apply to rigid objects.".to_owned(),
         head: strings(["Suite", "Method", "Episodes", "Goal Success", "NoDrop", "Safety Success", "Gap, pp", "Invalid"]),
-        text_columns: 2,
         rows: runs.iter().map(row).collect(),
     }
 }
 
 /// The paper's deformation table; `None` if all suites are rigid.
-pub fn deformation_table(runs: &[RunSummary]) -> Option<Table> {
-    let numbers = |d: &Distribution| {
-        let one = |x: Option<f64>| x.map_or_else(|| "–".to_owned(), |x| format!("{x:.2}"));
-        [one(d.mean), one(d.p5), one(d.median), one(d.p95), d.n.to_string()]
-    };
+pub fn deformation_table(runs: &[RunSummary]) -> Option<ResultTable> {
     let row = |run: &RunSummary| {
+        let Distribution { mean, p5, median, p95, n } = run.summary.scores.deformation;
         let head = [run.summary.suite.clone(), run.method.clone()];
-        head.into_iter().chain(numbers(&run.summary.scores.deformation)).collect()
+        let figures = [mean, p5, median, p95].map(|x| decimal(x, 2));
+        head.into_iter().chain(figures).chain([n.to_string()]).collect()
     };
     soft_table(
         runs,
@@ -89,7 +87,7 @@ pub fn deformation_table(runs: &[RunSummary]) -> Option<Table> {
 }
 
 /// Safety Success at several κ; `None` if all suites are rigid.
-pub fn kappa_table(runs: &[RunSummary]) -> Option<Table> {
+pub fn kappa_table(runs: &[RunSummary]) -> Option<ResultTable> {
     let row = |run: &RunSummary| {
         let known = &run.summary.kappa;
         let at = KAPPAS.map(|kappa| known.iter().find(|row| row.kappa == kappa));
@@ -110,18 +108,20 @@ fn soft_table(
     caption: &str,
     head: Vec<String>,
     row: impl Fn(&RunSummary) -> Vec<String>,
-) -> Option<Table> {
+) -> Option<ResultTable> {
     let rows: Vec<Vec<String>> = runs.iter().filter(|run| run.is_soft()).map(row).collect();
-    (!rows.is_empty()).then(|| Table { caption: caption.to_owned(), head, text_columns: 2, rows })
+    (!rows.is_empty()).then(|| ResultTable { caption: caption.to_owned(), head, rows })
 }
 
 /// Results per task of a run.
-pub fn task_table(run: &RunSummary) -> Table {
+pub fn task_table(run: &RunSummary) -> ResultTable {
     let row = |task: &TaskScores| {
         let s = &task.scores;
         let tau = run.summary.by_asset.get(&task.asset).and_then(|asset| asset.tau);
-        let absent = if run.is_soft() { "–" } else { "N/A" };
-        let number = |x: Option<f64>| x.map_or_else(|| absent.to_owned(), |x| format!("{x:.2}"));
+        let number = |x: Option<f64>| match x {
+            None if !run.is_soft() => "N/A".to_owned(),
+            x => decimal(x, 2),
+        };
         vec![
             task.task.to_string(),
             task.prompt.clone(),
@@ -133,16 +133,15 @@ pub fn task_table(run: &RunSummary) -> Table {
             number(tau),
         ]
     };
-    Table {
+    ResultTable {
         caption: format!("{}: per task, % of episodes with 95 % Wilson intervals.", run.name()),
         head: strings(["Task", "Prompt", "Episodes", "Goal", "NoDrop", "Safety", "D median, %", "τ, %"]),
-        text_columns: 2,
         rows: run.summary.by_task.iter().map(row).collect(),
     }
 }
 
 /// All tables of some runs, in reading order.
-pub fn all_tables(runs: &[RunSummary]) -> Vec<Table> {
+pub fn all_tables(runs: &[RunSummary]) -> Vec<ResultTable> {
     let mut all = vec![main_table(runs)];
     all.extend(deformation_table(runs));
     all.extend(kappa_table(runs));
@@ -153,54 +152,43 @@ pub fn all_tables(runs: &[RunSummary]) -> Vec<Table> {
 /// Longest cell, in characters, that stays on one line in LaTeX.
 const MAX_ONE_LINE: usize = 44;
 
-impl Table {
+impl ResultTable {
     /// The table as markdown.
     pub fn markdown(&self) -> String {
-        let row = |cells: &[String]| {
-            format!(
-                "| {} |\n",
-                cells.iter().map(|cell| escape_markdown(cell)).collect::<Vec<_>>().join(" | ")
-            )
-        };
-        let rule: Vec<&str> =
-            (0..self.head.len()).map(|i| if i < self.text_columns { "---" } else { "---:" }).collect();
-        let body: String = self.rows.iter().map(|cells| row(cells)).collect();
-        format!("{}\n\n{}| {} |\n{body}\n", escape_markdown(&self.caption), row(&self.head), rule.join(" | "))
+        let row = |cells: &Vec<String>| format!("| {} |\n", join(cells, escape_markdown, " | "));
+        let rule = |i: usize| if i < TEXT_COLUMNS { " --- |" } else { " ---: |" };
+        let rule: String = (0..self.head.len()).map(rule).collect();
+        let body: String = self.rows.iter().map(row).collect();
+        format!("{}\n\n{}|{rule}\n{body}\n", escape_markdown(&self.caption), row(&self.head))
     }
 
     /// The table as LaTeX with booktabs.
     pub fn latex(&self) -> String {
-        let row = |cells: &[String]| {
-            format!(
-                "    {} \\\\\n",
-                cells.iter().map(|cell| escape_latex(cell)).collect::<Vec<_>>().join(" & ")
-            )
-        };
+        let row = |cells: &Vec<String>| format!("    {} \\\\\n", join(cells, escape_latex, " & "));
         let columns: String = (0..self.head.len()).map(|column| self.latex_column(column)).collect();
-        let mut out = String::new();
-        // Writing to a String cannot fail.
-        let _ = writeln!(
-            out,
-            "\\begin{{table*}}\n  \\centering\n  \\footnotesize\n  \\caption{{{}}}",
-            escape_latex(&self.caption)
-        );
-        let _ = writeln!(out, "  \\begin{{tabular}}{{{columns}}}\n    \\toprule");
-        out += &row(&self.head);
-        out += "    \\midrule\n";
-        out.extend(self.rows.iter().map(|cells| row(cells)));
-        out += "    \\bottomrule\n  \\end{tabular}\n\\end{table*}\n";
-        out
+        let (caption, head) = (escape_latex(&self.caption), row(&self.head));
+        let body: String = self.rows.iter().map(row).collect();
+        format!(
+            "\\begin{{table*}}\n  \\centering\n  \\footnotesize\n  \\caption{{{caption}}}\n  \
+             \\begin{{tabular}}{{{columns}}}\n    \\toprule\n{head}    \\midrule\n{body}    \\bottomrule\n  \
+             \\end{{tabular}}\n\\end{{table*}}\n"
+        )
     }
 
     /// Column type; columns of long texts wrap.
     fn latex_column(&self, column: usize) -> &'static str {
         let long = self.rows.iter().any(|row| row[column].chars().count() > MAX_ONE_LINE);
-        match (column < self.text_columns, long) {
+        match (column < TEXT_COLUMNS, long) {
             (true, true) => "p{0.28\\textwidth}",
             (true, false) => "l",
             _ => "r",
         }
     }
+}
+
+/// Joins escaped cells.
+fn join(cells: &[String], escape: fn(&str) -> String, separator: &str) -> String {
+    cells.iter().map(|cell| escape(cell)).collect::<Vec<_>>().join(separator)
 }
 
 /// Escapes text for markdown.

@@ -46,11 +46,11 @@ const HOSTILE: [&str; 9] = [
     "τ ≤ κ · D – … „ü“",
 ];
 
-fn hostile() -> Table {
+fn hostile() -> ResultTable {
     let long = "x".repeat(400);
     let rows =
         HOSTILE.iter().chain([&&long[..]]).map(|name| strings([name, name, "1.0 [0.0, 2.0]"])).collect();
-    Table { caption: HOSTILE.join(" "), head: strings(["a_b", "%", "n"]), text_columns: 2, rows }
+    ResultTable { caption: HOSTILE.join(" "), head: strings(["a_b", "%", "n"]), rows }
 }
 
 /// Depth of braces at the end of a LaTeX line, and its number of `&`. Panics at unescaped special characters.
