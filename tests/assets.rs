@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, path::Path, sync::Arc};
 
 use softvt::{
-    benchmark::{Plan, seed::Split},
+    benchmark::{Goal, GoalKind, Plan, seed::Split},
     geometry::{
         Pose, Vec3,
         mass::mass_properties,
@@ -208,9 +208,7 @@ fn left_and_right_are_as_in_the_image_and_prompts_name_the_goal() {
     for task in &suite.tasks {
         let scene = scene(&loaded, task.id, 0);
         assert!(pose(&scene, "left").translation.y < pose(&scene, "right").translation.y, "task {}", task.id);
-        let softvt::benchmark::Goal::On { object, target, .. } = &task.goal else {
-            panic!("task {}", task.id)
-        };
+        let Goal { kind: GoalKind::On, object, target, .. } = &task.goal else { panic!("task {}", task.id) };
         assert!(task.prompt.starts_with(&format!("pick up the {object} ")), "{}", task.prompt);
         assert_eq!(target, "plate");
     }

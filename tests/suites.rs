@@ -4,7 +4,7 @@
 use std::{collections::BTreeSet, path::Path};
 
 use softvt::{
-    benchmark::{Goal, Plan, Suite, Task, seed::Split},
+    benchmark::{Goal, GoalKind, Plan, Suite, Task, seed::Split},
     geometry::{Pose, Vec3, shape::Shape},
     scene::{Body, Object, Scene, part_poses},
     script::{self, EpisodeRequest, EpisodeSetup, LoadedScript},
@@ -102,9 +102,12 @@ fn prompts_are_those_of_the_paper_and_match_the_goals() {
         assert_eq!(tasks.len(), 10, "{name}");
         for (k, task) in tasks.iter().enumerate() {
             assert_eq!(task.prompt, expected(k), "{name}");
-            let (Goal::On { object: what, target, .. } | Goal::In { object: what, target, .. }) = &task.goal;
-            let inside = matches!(task.goal, Goal::In { .. });
-            let place = if inside { format!("in the {target}") } else { format!("on the {target}") };
+            let Goal { kind, object: what, target, .. } = &task.goal;
+            let place = if *kind == GoalKind::Inside {
+                format!("in the {target}")
+            } else {
+                format!("on the {target}")
+            };
             assert!(task.prompt.ends_with(&place), "{name} {k}: {target}");
             let scene = open(&loaded, k, 0, Split::Validation);
             let soft = matches!(object(&scene, what).asset.body, Body::Soft(_));
@@ -397,7 +400,7 @@ fn a_mass_shift_scales_the_mass_of_all_moving_bodies_and_nothing_else() {
     for (name, task) in [("spatial_rigid", 4), ("object_soft", 0)] {
         let loaded = load(name);
         let shifted = |shifts: &[(&str, f64)]| {
-            let shifts = shifts.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect();
+            let shifts = shifts.iter().map(|(name, value)| ((*name).to_owned(), *value).into()).collect();
             let suite = suite(&loaded).name.clone();
             let split = Split::Validation;
             let request = EpisodeRequest { suite, task, episode: 0, base_seed: 0, split, shifts };

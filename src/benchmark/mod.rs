@@ -1,10 +1,17 @@
 //! The benchmark as plain data, as scripts return it: suites, tasks, experiments and plans.
 
-pub mod control;
 pub mod seed;
 pub mod settings;
 
 use serde::{Deserialize, Serialize};
+
+/// Control period, s: policies act, and results are recorded, at 20 Hz.
+pub const CONTROL_DT: f64 = 0.05;
+
+/// Number of physics steps of `dt` seconds per control step, 3 at 60 Hz. `dt` must divide [`CONTROL_DT`].
+pub fn steps_per_control(dt: f64) -> u32 {
+    (CONTROL_DT / dt).round().max(1.0) as u32
+}
 
 /// Kind of the objects of a suite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -26,37 +33,28 @@ pub enum Variation {
     Spatial,
 }
 
-/// Success condition of a task.
+/// Success condition of a task: `object` rests at `target`, released, for `hold_s`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", tag = "kind")]
-pub enum Goal {
-    /// `object` rests on `target`, released, for `hold_s`.
-    On {
-        /// Scene name of the object.
-        object: String,
-        /// Scene name of the supporting object.
-        target: String,
-        /// Time for which it must stay, s.
-        hold_s: f64,
-    },
-    /// `object` rests inside `target`'s walls, released, for `hold_s`.
-    In {
-        /// Scene name of the object.
-        object: String,
-        /// Scene name of the container.
-        target: String,
-        /// Time for which it must stay, s.
-        hold_s: f64,
-    },
+pub struct Goal {
+    /// Place at the target.
+    pub kind: GoalKind,
+    /// Scene name of the object to be moved.
+    pub object: String,
+    /// Scene name of the supporting object or container.
+    pub target: String,
+    /// Time for which the object must stay, s.
+    pub hold_s: f64,
 }
 
-impl Goal {
-    /// Scene name of the object to be moved.
-    pub fn object(&self) -> &str {
-        match self {
-            Self::On { object, .. } | Self::In { object, .. } => object,
-        }
-    }
+/// Place at the target of a [`Goal`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum GoalKind {
+    /// On top of the target, carried by it.
+    On,
+    /// Between the walls of the target; "in" in files.
+    #[serde(rename = "in")]
+    Inside,
 }
 
 /// One task of a suite.
@@ -110,6 +108,28 @@ pub struct Suite {
     pub settings: settings::Settings,
 }
 
+/// Value of a [`Shift`] in a run; `[name, value]` in files.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(from = "(String, f64)", into = "(String, f64)")]
+pub struct ShiftValue {
+    /// Name of the shift.
+    pub name: String,
+    /// Value, in the unit of the shift.
+    pub value: f64,
+}
+
+impl From<(String, f64)> for ShiftValue {
+    fn from((name, value): (String, f64)) -> Self {
+        Self { name, value }
+    }
+}
+
+impl From<ShiftValue> for (String, f64) {
+    fn from(shift: ShiftValue) -> Self {
+        (shift.name, shift.value)
+    }
+}
+
 /// Name of the run without changes, next to those under conditions.
 pub const REFERENCE: &str = "reference";
 
@@ -118,8 +138,8 @@ pub const REFERENCE: &str = "reference";
 pub struct Condition {
     /// Name, as in results.
     pub name: String,
-    /// Shifts by name and value, as `--shift` takes them.
-    pub shift: Vec<(String, f64)>,
+    /// Shifts, as `--shift` takes them.
+    pub shift: Vec<ShiftValue>,
     /// Settings by dotted path and value, as `--set` takes them.
     pub set: Vec<(String, String)>,
     /// Kind of suites to which the condition applies; `None` for all.

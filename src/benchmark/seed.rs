@@ -34,32 +34,26 @@ pub enum RandomStream {
 }
 
 impl RandomStream {
-    /// Every stream, in order.
-    pub const ALL: [Self; 9] = [
-        Self::Layout,
-        Self::Arm,
-        Self::Material,
-        Self::Light,
-        Self::Camera,
-        Self::Sensor,
-        Self::Expert,
-        Self::Script,
-        Self::Policy,
+    /// Every stream with the name that scripts use.
+    const NAMES: [(Self, &str); 9] = [
+        (Self::Layout, "layout"),
+        (Self::Arm, "arm"),
+        (Self::Material, "material"),
+        (Self::Light, "light"),
+        (Self::Camera, "camera"),
+        (Self::Sensor, "sensor"),
+        (Self::Expert, "expert"),
+        (Self::Script, "script"),
+        (Self::Policy, "policy"),
     ];
 
-    /// The name that scripts use.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Layout => "layout",
-            Self::Arm => "arm",
-            Self::Material => "material",
-            Self::Light => "light",
-            Self::Camera => "camera",
-            Self::Sensor => "sensor",
-            Self::Expert => "expert",
-            Self::Script => "script",
-            Self::Policy => "policy",
-        }
+    /// The stream of this name in scripts.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::NAMES.iter().find(|(_, known)| *known == name).map(|(stream, _)| *stream)
+    }
+
+    fn name(self) -> &'static str {
+        Self::NAMES[self as usize].1
     }
 }
 
@@ -112,7 +106,7 @@ pub struct EpisodeSeed {
     pub layout: String,
     /// Index of the episode in its split.
     pub episode: u64,
-    /// Seed of the run.
+    /// Base seed of the run.
     pub base: u64,
     /// List of episodes that `episode` counts in.
     pub split: Split,

@@ -3,12 +3,13 @@
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::control::{TimeStepError, check_dt};
+use super::{CONTROL_DT, steps_per_control};
 use crate::{
-    evaluation::criteria::{CriteriaError, SuccessCriteria},
-    physics::{PhysicsParams, params::ParamError},
-    robot::{RobotSpec, RobotSpecError},
-    sensing::tactile::{TactileSpec, TactileSpecError},
+    evaluation::criteria::SuccessCriteria,
+    physics::PhysicsParams,
+    robot::RobotSpec,
+    sensing::tactile::TactileSpec,
+    text::{RangeError, format_number},
 };
 
 /// Error of a setting's path or value.
@@ -30,15 +31,12 @@ pub enum SettingsError {
     #[error("{path}: {message}")]
     Value { path: String, message: String },
     #[error(transparent)]
-    Physics(#[from] ParamError),
-    #[error(transparent)]
-    Robot(#[from] RobotSpecError),
-    #[error(transparent)]
-    Criteria(#[from] CriteriaError),
-    #[error(transparent)]
-    Tactile(#[from] TactileSpecError),
-    #[error(transparent)]
-    TimeStep(#[from] TimeStepError),
+    Range(#[from] RangeError),
+    #[error(
+        "physics.dt: control runs at 20 Hz, so dt must divide {CONTROL_DT} s; got {}, near are {below:.6} and {above:.6}",
+        format_number(*.dt)
+    )]
+    TimeStep { dt: f64, below: f64, above: f64 },
 }
 
 /// All settings of a run. The defaults are those of the benchmark.
@@ -74,7 +72,7 @@ impl Settings {
         for (path, value) in fields {
             changed = changed.replaced(path, value)?;
         }
-        changed.check()?;
+        changed.validate()?;
         Ok(changed)
     }
 
@@ -116,16 +114,22 @@ impl Settings {
         serde_json::from_value(tree).map_err(refused)
     }
 
-    /// Checks the ranges of all parameters.
+    /// Checks the ranges of all parameters, and that the physics step divides [`CONTROL_DT`].
     ///
     /// # Errors
     /// The first parameter out of range.
-    pub fn check(&self) -> Result<(), SettingsError> {
+    pub fn validate(&self) -> Result<(), SettingsError> {
         self.robot.validate()?;
-        self.criteria.check()?;
+        self.criteria.validate()?;
         self.tactile.validate()?;
-        self.physics.check()?;
-        Ok(check_dt(self.physics.dt)?)
+        self.physics.validate()?;
+        let dt = self.physics.dt;
+        if (f64::from(steps_per_control(dt)) * dt - CONTROL_DT).abs() <= 1e-9 {
+            return Ok(());
+        }
+        let (below, above) =
+            (CONTROL_DT / (CONTROL_DT / dt).ceil(), CONTROL_DT / (CONTROL_DT / dt).floor().max(1.0));
+        Err(SettingsError::TimeStep { dt, below, above })
     }
 }
 
@@ -199,6 +203,19 @@ mod tests {
         assert_eq!(settings.with_all(&pads("0")).expect("both at once").robot.pads.dynamic_mu, 0.0);
         assert!(
             settings.with("physics.dt", "fast").is_err_and(|e| e.to_string().contains("expected a number"))
+        );
+    }
+
+    #[test]
+    fn the_control_rate_does_not_depend_on_the_physics_step() {
+        let with_dt = |dt: f64| Settings::default().with("physics.dt", &dt.to_string());
+        for (dt, steps) in [(1.0 / 60.0, 3), (1.0 / 120.0, 6), (1.0 / 240.0, 12), (0.05, 1), (1e-4, 500)] {
+            assert_eq!(steps_per_control(dt), steps);
+            assert!(with_dt(dt).is_ok());
+        }
+        assert!(
+            with_dt(1.0 / 50.0)
+                .is_err_and(|e| e.to_string().contains("0.016667") && e.to_string().contains("0.025"))
         );
     }
 

@@ -1,7 +1,7 @@
 //! [`Demonstration`]: a rollout as training data, without its images.
 
 use crate::{
-    benchmark::control::CONTROL_DT,
+    benchmark::CONTROL_DT,
     evaluation::record::EpisodeRecord,
     policy::Action,
     robot::{

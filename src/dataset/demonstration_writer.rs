@@ -13,7 +13,7 @@ use super::{
     step_images::{StepImages, StepRenderer},
     video::VideoWriter,
 };
-use crate::{benchmark::control::CONTROL_DT, files, rollout::StateRecording};
+use crate::{benchmark::CONTROL_DT, files, rollout::StateRecording};
 
 /// Output files of a demonstration. Each appears complete or not at all.
 pub struct DemonstrationWriter<'a> {

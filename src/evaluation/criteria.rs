@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::text::{NOT_NEGATIVE, RangeError, check_range};
+
 /// Thresholds that decide when an object counts as lifted, lost, dropped, slipped, released or placed.
 ///
 /// The default is the benchmark; a suite or `--set criteria.slip_m=…` may change each of them. The definitions that
@@ -51,21 +53,12 @@ impl Default for SuccessCriteria {
     }
 }
 
-/// A criterion out of its range.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("criteria.{name}: expected {expected}, got {}", crate::text::format_number(*.value))]
-pub struct CriteriaError {
-    name: &'static str,
-    expected: &'static str,
-    value: f64,
-}
-
 impl SuccessCriteria {
     /// Checks that every threshold is finite and not negative, and that the share is at most 1.
     ///
     /// # Errors
     /// Names the first one that is not.
-    pub fn check(&self) -> Result<(), CriteriaError> {
+    pub fn validate(&self) -> Result<(), RangeError> {
         let criteria = [
             ("touch_force_n", self.touch_force_n),
             ("lift_height_m", self.lift_height_m),
@@ -80,18 +73,9 @@ impl SuccessCriteria {
             ("goal_v1_in_m", self.goal_v1_in_m),
         ];
         for (name, value) in criteria {
-            if !(value.is_finite() && value >= 0.0) {
-                return Err(CriteriaError { name, expected: "a finite number, at least 0", value });
-            }
+            check_range(&format!("criteria.{name}"), value, NOT_NEGATIVE, "a finite number, at least 0")?;
         }
-        if self.support_share > 1.0 {
-            return Err(CriteriaError {
-                name: "support_share",
-                expected: "a share in 0..1",
-                value: self.support_share,
-            });
-        }
-        Ok(())
+        check_range("criteria.support_share", self.support_share, 0.0..=1.0, "a share in 0..1")
     }
 }
 
@@ -101,11 +85,11 @@ mod tests {
 
     #[test]
     fn defaults_are_in_range_and_a_bad_criterion_is_named() {
-        assert_eq!(SuccessCriteria::default().check(), Ok(()));
-        let slip = SuccessCriteria { slip_m: -0.001, ..SuccessCriteria::default() }.check().unwrap_err();
+        assert_eq!(SuccessCriteria::default().validate(), Ok(()));
+        let slip = SuccessCriteria { slip_m: -0.001, ..SuccessCriteria::default() }.validate().unwrap_err();
         assert_eq!(slip.to_string(), "criteria.slip_m: expected a finite number, at least 0, got -0.001");
-        assert!(SuccessCriteria { lost_fall_m: f64::NAN, ..SuccessCriteria::default() }.check().is_err());
-        assert!(SuccessCriteria { support_share: 1.5, ..SuccessCriteria::default() }.check().is_err());
+        assert!(SuccessCriteria { lost_fall_m: f64::NAN, ..SuccessCriteria::default() }.validate().is_err());
+        assert!(SuccessCriteria { support_share: 1.5, ..SuccessCriteria::default() }.validate().is_err());
     }
 
     #[test]

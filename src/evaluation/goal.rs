@@ -23,18 +23,18 @@ pub enum GoalRegion {
         /// Radius of the cylinder, m.
         radius_m: f64,
     },
-    /// In the object: centre inside its walls, carried by anything in there (its floor, other objects).
-    In {
+    /// Inside the object: centre between its walls, carried by anything in there (its floor, other objects).
+    Inside {
         /// Space between the walls, up to the rim, m.
-        inside: Aabb,
+        space: Aabb,
     },
 }
 
 impl GoalRegion {
-    /// True if a centre at `centre_w` is over (`On`) or inside (`In`) the region of an object at `object_w`, enlarged
+    /// True if a centre at `centre_w` is over (`On`) or inside (`Inside`) the region of an object at `object_w`, enlarged
     /// by `margin_m` on every side.
     ///
-    /// `On` is a horizontal distance in the world frame, independent of the object's tilt and height. `In`
+    /// `On` is a horizontal distance in the world frame, independent of the object's tilt and height. `Inside`
     /// is a box in the frame of the object.
     pub fn contains(&self, object_w: &Pose, centre_w: &Vec3, margin_m: f64) -> bool {
         match self {
@@ -42,9 +42,9 @@ impl GoalRegion {
                 let offset = centre_w - object_w.translation.vector;
                 offset.xy().norm() <= radius_m + margin_m
             }
-            Self::In { inside } => {
+            Self::Inside { space } => {
                 let p = object_w.inverse_transform_point(&(*centre_w).into());
-                (0..3).all(|i| p[i] >= inside.min[i] - margin_m && p[i] <= inside.max[i] + margin_m)
+                (0..3).all(|i| p[i] >= space.min[i] - margin_m && p[i] <= space.max[i] + margin_m)
             }
         }
     }
@@ -55,7 +55,7 @@ impl GoalRegion {
     pub fn contains_v1(&self, criteria: &SuccessCriteria, object_w: &Pose, centre_w: &Vec3) -> bool {
         let reach = match self {
             Self::On { .. } => criteria.goal_v1_on_m,
-            Self::In { .. } => criteria.goal_v1_in_m,
+            Self::Inside { .. } => criteria.goal_v1_in_m,
         };
         let offset = centre_w - object_w.translation.vector;
         offset.xy().norm() < reach && offset.z.abs() < reach
@@ -159,8 +159,8 @@ mod tests {
 
     #[test]
     fn in_is_the_space_between_the_walls_of_a_turned_basket() {
-        let inside = Aabb { min: Vec3::new(-0.1, -0.05, 0.0), max: Vec3::new(0.1, 0.05, 0.08) };
-        let basket = GoalRegion::In { inside };
+        let space = Aabb { min: Vec3::new(-0.1, -0.05, 0.0), max: Vec3::new(0.1, 0.05, 0.08) };
+        let basket = GoalRegion::Inside { space };
         let turned = Pose::rotation(Vec3::z() * std::f64::consts::FRAC_PI_2);
         assert!(basket.contains(&Pose::identity(), &at(0.09, 0.03), 0.0));
         assert!(!basket.contains(&turned, &at(0.09, 0.03), 0.0));
@@ -174,7 +174,7 @@ mod tests {
         assert!(plate.contains_v1(&criteria, &pose, &at(0.099, 0.05)));
         assert!(!plate.contains_v1(&criteria, &pose, &at(0.101, 0.05)));
         assert!(!plate.contains_v1(&criteria, &pose, &at(0.0, 0.11)));
-        let basket = GoalRegion::In { inside: Aabb { min: Vec3::zeros(), max: Vec3::zeros() } };
+        let basket = GoalRegion::Inside { space: Aabb { min: Vec3::zeros(), max: Vec3::zeros() } };
         assert!(basket.contains_v1(&criteria, &pose, &at(0.199, 0.19)));
     }
 

@@ -100,16 +100,16 @@ pub fn d_over_tau(record: &EpisodeRecord) -> Option<f64> {
 pub struct PairedComparison {
     /// Number of episodes that both runs have.
     pub pairs: usize,
-    /// Goal Success, percentage points.
-    pub goal: RateDifference,
-    /// NoDrop, percentage points.
-    pub no_drop: RateDifference,
-    /// Safety Success, percentage points.
-    pub safety: RateDifference,
+    /// Goal Success, %.
+    pub goal: PairedDifference,
+    /// NoDrop, %.
+    pub no_drop: PairedDifference,
+    /// Safety Success, %.
+    pub safety: PairedDifference,
     /// Peak D where both runs have one, % of the diagonal.
-    pub d_peak: MeanDifference,
+    pub d_peak: PairedDifference,
     /// Peak D over τ where both runs have both.
-    pub d_over_tau: MeanDifference,
+    pub d_over_tau: PairedDifference,
 }
 
 impl PairedComparison {
@@ -117,10 +117,11 @@ impl PairedComparison {
     pub fn of(pairs: &[EpisodePair]) -> Self {
         let rate = |test: fn(&EpisodeRecord) -> bool| {
             let holds = |r: &EpisodeRecord| r.outcome.is_valid() && test(r);
-            RateDifference::of(pairs.iter().map(|pair| (holds(pair.first), holds(pair.second))))
+            PairedDifference::of_rates(pairs.iter().map(|pair| [holds(pair.first), holds(pair.second)]))
         };
         let mean = |value: fn(&EpisodeRecord) -> Option<f64>| {
-            MeanDifference::of(pairs.iter().filter_map(|pair| value(pair.first).zip(value(pair.second))))
+            let both = |pair: &EpisodePair| Some([value(pair.first)?, value(pair.second)?]);
+            PairedDifference::of_means(pairs.iter().filter_map(both))
         };
         Self {
             pairs: pairs.len(),
@@ -136,34 +137,51 @@ impl PairedComparison {
 /// Number of resamples of the bootstrap.
 const RESAMPLES: usize = 4000;
 
-/// Difference of two success rates over the same episodes, in percentage points.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct RateDifference {
-    /// Number of episodes that both runs have.
+/// Difference of a success rate (%) or of the mean of a lower-is-better quantity over the same episodes of two runs.
+///
+/// # Example
+///
+/// Of 100 episodes, 4 succeed in the first run only, 12 in the second only and 50 in both.
+///
+/// ```
+/// use softvt::evaluation::paired_stats::PairedDifference;
+///
+/// let pairs = (0..100).map(|i| [i < 4 || i >= 50, i >= 4 && i < 16 || i >= 50]);
+/// let safety = PairedDifference::of_rates(pairs);
+/// assert_eq!((safety.first, safety.second), (Some(54.0), Some(62.0)));
+/// assert_eq!((safety.better, safety.worse, safety.same), (12, 4, 84));
+/// let [low, high] = safety.interval95.expect("episodes");
+/// assert!(low > 0.0 && high < 16.0 && safety.p.is_some_and(|p| p < 0.08));
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PairedDifference {
+    /// Number of episodes in which both runs have the quantity.
     pub n: usize,
-    /// Rate of the first run, %; null without episodes.
+    /// Rate (%) or mean of the first run; null without episodes.
     pub first: Option<f64>,
-    /// Rate of the second run, %.
+    /// Rate (%) or mean of the second run.
     pub second: Option<f64>,
-    /// Number of episodes in which only the second run succeeds.
+    /// Number of episodes in which the second run alone succeeds, or has less.
     pub better: usize,
-    /// Number of episodes in which only the first run succeeds.
+    /// Number of episodes in which the first run alone succeeds, or has less.
     pub worse: usize,
     /// Number of the other episodes.
     pub same: usize,
-    /// Second minus first, percentage points; null without episodes.
+    /// Second minus first; percentage points for a rate, null without episodes.
     pub difference: Option<f64>,
-    /// 95 % interval of the difference (Agresti & Min, 2005), percentage points.
+    /// 95 % interval of the difference: of a rate by Agresti & Min (2005); of a mean by the percentile bootstrap over
+    /// episodes (Efron, 1979), from a fixed seed, null for fewer than two episodes.
     pub interval95: Option<[f64; 2]>,
-    /// Exact two-sided p-value of McNemar's test (binomial on the episodes that differ).
-    pub p: f64,
+    /// Exact two-sided p-value of McNemar's test of a rate (binomial on the episodes that differ); absent for a mean.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub p: Option<f64>,
 }
 
-impl RateDifference {
+impl PairedDifference {
     /// Compares the success of each episode in the first and in the second run.
-    pub fn of(pairs: impl IntoIterator<Item = (bool, bool)>) -> Self {
+    pub fn of_rates(pairs: impl IntoIterator<Item = [bool; 2]>) -> Self {
         let (mut n, mut in_first, mut better, mut worse) = (0, 0, 0, 0);
-        for (first, second) in pairs {
+        for [first, second] in pairs {
             n += 1;
             in_first += usize::from(first);
             better += usize::from(second && !first);
@@ -180,7 +198,26 @@ impl RateDifference {
             same: n - better - worse,
             difference: (n > 0).then(|| points((better as f64 - worse as f64) / n as f64)),
             interval95: (n > 0).then(|| agresti_min(n, better, worse).map(points)),
-            p: mcnemar(better, worse),
+            p: Some(mcnemar(better, worse)),
+        }
+    }
+
+    /// Compares a lower-is-better quantity of each episode in the first and in the second run.
+    pub fn of_means(pairs: impl IntoIterator<Item = [f64; 2]>) -> Self {
+        let (first, second): (Vec<f64>, Vec<f64>) = pairs.into_iter().map(Into::into).unzip();
+        let differences: Vec<f64> = first.iter().zip(&second).map(|(first, second)| second - first).collect();
+        let better = differences.iter().filter(|d| **d < 0.0).count();
+        let worse = differences.iter().filter(|d| **d > 0.0).count();
+        Self {
+            n: differences.len(),
+            first: mean(&first),
+            second: mean(&second),
+            better,
+            worse,
+            same: differences.len() - better - worse,
+            difference: mean(&differences),
+            interval95: bootstrap(&differences),
+            p: None,
         }
     }
 }
@@ -202,47 +239,6 @@ fn mcnemar(better: usize, worse: usize) -> f64 {
     let ln_choose = |k: usize| (1..=k).map(|i| ((n - k + i) as f64 / i as f64).ln()).sum::<f64>();
     let tail: f64 = (0..=fewer).map(|k| (ln_choose(k) - n as f64 * std::f64::consts::LN_2).exp()).sum();
     (2.0 * tail).min(1.0)
-}
-
-/// Mean difference of a lower-is-better quantity over the same episodes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct MeanDifference {
-    /// Number of episodes in which both runs have the quantity.
-    pub n: usize,
-    /// Mean of the first run; null without episodes.
-    pub first: Option<f64>,
-    /// Mean of the second run.
-    pub second: Option<f64>,
-    /// Number of episodes in which the second run has less.
-    pub better: usize,
-    /// Number of episodes in which the second run has more.
-    pub worse: usize,
-    /// Number of episodes in which both have the same.
-    pub same: usize,
-    /// Mean of the second run minus mean of the first.
-    pub difference: Option<f64>,
-    /// 95 % interval of the difference: percentile bootstrap over episodes (Efron, 1979), from a fixed seed.
-    pub interval95: Option<[f64; 2]>,
-}
-
-impl MeanDifference {
-    /// Compares the quantity of each episode in the first and in the second run.
-    pub fn of(pairs: impl IntoIterator<Item = (f64, f64)>) -> Self {
-        let (first, second): (Vec<f64>, Vec<f64>) = pairs.into_iter().unzip();
-        let differences: Vec<f64> = first.iter().zip(&second).map(|(first, second)| second - first).collect();
-        let count = |test: fn(&f64) -> bool| differences.iter().filter(|d| test(d)).count();
-        let (better, worse) = (count(|d| *d < 0.0), count(|d| *d > 0.0));
-        Self {
-            n: differences.len(),
-            first: mean(&first),
-            second: mean(&second),
-            better,
-            worse,
-            same: differences.len() - better - worse,
-            difference: mean(&differences),
-            interval95: bootstrap(&differences),
-        }
-    }
 }
 
 /// 95 % interval of a mean by the percentile bootstrap; `None` of fewer than two values. The seed is the number of
@@ -279,7 +275,7 @@ mod tests {
         episodes.iter().enumerate().map(record).collect()
     }
 
-    fn counts(of: RateDifference) -> [usize; 3] {
+    fn counts(of: PairedDifference) -> [usize; 3] {
         [of.better, of.worse, of.same]
     }
 
@@ -334,35 +330,35 @@ mod tests {
     #[test]
     fn an_interval_agrees_with_one_computed_by_hand() {
         // 100 pairs, 12 gained, 4 lost: centre 8/102, half 1.96 √(17 − 64/102)/102.
-        let pairs = (0..100).map(|i| (i < 4, (4..16).contains(&i)));
-        let of = RateDifference::of(pairs);
+        let pairs = (0..100).map(|i| [i < 4, (4..16).contains(&i)]);
+        let of = PairedDifference::of_rates(pairs);
         assert_eq!((of.n, of.better, of.worse, of.same), (100, 12, 4, 84));
         assert_eq!((of.first, of.second), (Some(4.0), Some(12.0)));
         assert!((of.difference.unwrap() - 8.0).abs() < 1e-12);
         let [low, high] = of.interval95.unwrap();
         assert!((low - 0.067_3).abs() < 2e-3 && (high - 15.619).abs() < 2e-3, "{low} {high}");
         // 2 (1 + 16 + 120 + 560 + 1820) / 2¹⁶.
-        assert!((of.p - 2.0 * 2517.0 / 65536.0).abs() < 1e-12, "{}", of.p);
+        assert!((of.p.unwrap() - 2.0 * 2517.0 / 65536.0).abs() < 1e-12, "{:?}", of.p);
     }
 
     #[test]
     fn equal_runs_differ_in_nothing() {
-        let of = RateDifference::of((0..50).map(|i| (i % 2 == 0, i % 2 == 0)));
-        assert_eq!((of.difference, of.p), (Some(0.0), 1.0));
+        let of = PairedDifference::of_rates((0..50).map(|i| [i % 2 == 0; 2]));
+        assert_eq!((of.difference, of.p), (Some(0.0), Some(1.0)));
         assert!(of.interval95.unwrap()[0] < 0.0, "50 episodes do not prove equality");
-        let none = RateDifference::of([]);
-        assert_eq!((none.difference, none.interval95, none.p), (None, None, 1.0));
+        let none = PairedDifference::of_rates([]);
+        assert_eq!((none.difference, none.interval95, none.p), (None, None, Some(1.0)));
     }
 
     #[test]
     fn a_bootstrap_is_near_the_normal_interval_and_the_same_every_time() {
-        let pairs: Vec<(f64, f64)> = (0..400).map(|i| (0.0, 1.0 + f64::from(i % 20) / 20.0)).collect();
-        let of = MeanDifference::of(pairs.clone());
+        let pairs: Vec<[f64; 2]> = (0..400).map(|i| [0.0, 1.0 + f64::from(i % 20) / 20.0]).collect();
+        let of = PairedDifference::of_means(pairs.clone());
         let [low, high] = of.interval95.unwrap();
         // Standard deviation 0.2884, so ± 1.96 × 0.2884 / 20.
         assert!((high - low - 0.0565).abs() < 0.005, "{low} {high}");
-        assert_eq!(of, MeanDifference::of(pairs));
+        assert_eq!(of, PairedDifference::of_means(pairs));
         assert_eq!((of.n, of.better, of.worse, of.same, of.first), (400, 0, 400, 0, Some(0.0)));
-        assert_eq!(MeanDifference::of([(1.0, 3.0)]).interval95, None);
+        assert_eq!(PairedDifference::of_means([[1.0, 3.0]]).interval95, None);
     }
 }

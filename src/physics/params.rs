@@ -2,11 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::text::format_number;
+use crate::text::{NOT_NEGATIVE, POSITIVE, RangeError, check_range};
 
 /// Parameters of the mechanics. The defaults are those of the benchmark.
 ///
-/// [`PhysicsParams::check`] rejects values outside of the valid ranges; a [`World`](super::World) assumes valid ones.
+/// [`PhysicsParams::validate`] rejects values outside of the valid ranges; a [`World`](super::World) assumes valid ones.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PhysicsParams {
@@ -64,24 +64,12 @@ impl Default for PhysicsParams {
     }
 }
 
-/// A parameter outside of its range.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("physics.{name}: expected {expected}, got {}", format_number(*value))]
-pub struct ParamError {
-    /// Name of the field.
-    pub name: &'static str,
-    /// The valid range.
-    pub expected: &'static str,
-    /// The value.
-    pub value: f64,
-}
-
 impl PhysicsParams {
     /// Checks the range of every parameter.
     ///
     /// # Errors
     /// The first parameter out of range.
-    pub fn check(&self) -> Result<(), ParamError> {
+    pub fn validate(&self) -> Result<(), RangeError> {
         let positive = [
             ("dt", self.dt),
             ("rigid_modulus", self.rigid_modulus),
@@ -98,20 +86,13 @@ impl PhysicsParams {
             ("max_inverted_time", self.max_inverted_time),
         ];
         for (name, value) in positive {
-            if !(value > 0.0 && value.is_finite()) {
-                return Err(ParamError { name, expected: "a positive number", value });
-            }
+            check_range(&format!("physics.{name}"), value, POSITIVE, "a positive number")?;
         }
         for (name, value) in not_negative {
-            if !(value >= 0.0 && value.is_finite()) {
-                return Err(ParamError { name, expected: "0 or more", value });
-            }
+            check_range(&format!("physics.{name}"), value, NOT_NEGATIVE, "0 or more")?;
         }
         // With a smaller step, settling alone would take minutes.
-        if !(1e-4..=0.05).contains(&self.dt) {
-            return Err(ParamError { name: "dt", expected: "seconds in 0.0001..0.05", value: self.dt });
-        }
-        Ok(())
+        check_range("physics.dt", self.dt, 1e-4..=0.05, "seconds in 0.0001..0.05")
     }
 }
 

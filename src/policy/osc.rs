@@ -8,7 +8,7 @@
 
 use super::{Action, Observation};
 use crate::{
-    benchmark::control::CONTROL_DT,
+    benchmark::CONTROL_DT,
     geometry::{Quat, Vec3},
     robot::rotation,
 };

@@ -8,8 +8,8 @@ use super::stored_run::StoredRun;
 use crate::{
     evaluation::{
         paired_stats::{
-            EpisodeKey, EpisodePair, MeanDifference, PairedComparison, RateDifference, TaskKey,
-            group_by_task, pair_episodes,
+            EpisodeKey, EpisodePair, PairedComparison, PairedDifference, TaskKey, group_by_task,
+            pair_episodes,
         },
         record::EpisodeRecord,
         summary::method_label,
@@ -186,7 +186,7 @@ pub fn table(comparison: &Comparison) -> String {
     let push = |table: &mut TextTable, name: &str, differences: &PairedComparison| {
         push_rates(table, name, differences);
         if comparison.deformable {
-            push_mean(table, "D peak, %", &differences.d_peak);
+            push_difference(table, "", "D peak, %", &differences.d_peak, 2);
         }
     };
     let mut suite = "";
@@ -232,33 +232,29 @@ pub(super) fn push_headings(table: &mut TextTable, name: &str, first: &str, seco
 pub(super) fn push_rates(table: &mut TextTable, name: &str, paired: &PairedComparison) {
     let rates = [("Goal, %", paired.goal), ("NoDrop, %", paired.no_drop), ("Safety, %", paired.safety)];
     for ((measure, rate), name) in rates.into_iter().zip([name, "", ""]) {
-        let RateDifference { first, second, difference, interval95, better, worse, p, .. } = rate;
-        table.row([
-            name.to_owned(),
-            measure.to_owned(),
-            decimal(first, 1),
-            decimal(second, 1),
-            signed(difference, 1),
-            interval(interval95, 1),
-            better.to_string(),
-            worse.to_string(),
-            format!("{p:.3}"),
-        ]);
+        push_difference(table, name, measure, &rate, 1);
     }
 }
 
-/// Appends a row without a name.
-pub(super) fn push_mean(table: &mut TextTable, measure: &str, mean: &MeanDifference) {
-    table.row([
-        String::new(),
+/// Appends a row with `digits` decimals.
+pub(super) fn push_difference(
+    table: &mut TextTable,
+    name: &str,
+    measure: &str,
+    paired: &PairedDifference,
+    digits: usize,
+) {
+    let cells = [
+        name.to_owned(),
         measure.to_owned(),
-        decimal(mean.first, 2),
-        decimal(mean.second, 2),
-        signed(mean.difference, 2),
-        interval(mean.interval95, 2),
-        mean.better.to_string(),
-        mean.worse.to_string(),
-    ]);
+        decimal(paired.first, digits),
+        decimal(paired.second, digits),
+        signed(paired.difference, digits),
+        interval(paired.interval95, digits),
+        paired.better.to_string(),
+        paired.worse.to_string(),
+    ];
+    table.row(cells.into_iter().chain(paired.p.map(|p| format!("{p:.3}"))));
 }
 
 fn signed(value: Option<f64>, digits: usize) -> String {

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::comparison;
 use crate::{
+    benchmark::ShiftValue,
     evaluation::{
         paired_stats::{PairedComparison, d_over_tau, pair_episodes},
         record::EpisodeRecord,
@@ -50,7 +51,7 @@ impl ConditionOutcome {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ConditionRow {
     pub condition: String,
-    pub shift: Vec<(String, f64)>,
+    pub shift: Vec<ShiftValue>,
     pub set: Vec<(String, String)>,
     /// Null if the condition could have no effect and was not run.
     pub outcome: Option<ConditionOutcome>,
@@ -99,7 +100,7 @@ pub fn table(suite: &ConditionTable) -> String {
         if let Some(paired) = row.outcome.as_ref().and_then(|outcome| outcome.paired.as_ref()) {
             comparison::push_rates(&mut changes, &row.condition, paired);
             if suite.deformable {
-                comparison::push_mean(&mut changes, "D peak/τ", &paired.d_over_tau);
+                comparison::push_difference(&mut changes, "", "D peak/τ", &paired.d_over_tau, 2);
             }
         }
     }

@@ -17,4 +17,4 @@ pub use clearance::{Clearance, Obstacle, clearance};
 pub use gripper::GripperSetpoint;
 pub use ik::{DiffIk, UnreachablePose};
 pub use pads::{CollisionBox, PadSurface};
-pub use spec::{ArmSpec, GripperSpec, IkSpec, PadSpec, RobotSpec, RobotSpecError, Side};
+pub use spec::{ArmSpec, GripperSpec, IkSpec, PadSpec, RobotSpec, Side};

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::text::{POSITIVE, RangeError, check_range};
+
 /// Parameters of arm, gripper, pads and inverse kinematics; the settings `robot.*` of an experiment.
 ///
 /// Missing fields take their defaults, unknown fields are errors. [`Self::validate`] checks the ranges.
@@ -28,7 +30,7 @@ impl RobotSpec {
     ///
     /// # Errors
     /// The first field out of its range.
-    pub fn validate(&self) -> Result<(), RobotSpecError> {
+    pub fn validate(&self) -> Result<(), RangeError> {
         let (arm, gripper, pads, ik) = (&self.arm, &self.gripper, &self.pads, &self.ik);
         positive("arm.kp", arm.kp, "N m/rad")?;
         positive("arm.kd", arm.kd, "N m s/rad")?;
@@ -46,31 +48,13 @@ impl RobotSpec {
     }
 }
 
-fn within(field: &'static str, value: f64, highest: f64) -> Result<(), RobotSpecError> {
-    if (0.0..=highest).contains(&value) {
-        return Ok(());
-    }
+fn within(field: &str, value: f64, highest: f64) -> Result<(), RangeError> {
     let expected = if highest == f64::MAX { "0 or more".into() } else { format!("0 to {highest}") };
-    Err(RobotSpecError { field, value, expected })
+    check_range(&format!("robot.{field}"), value, 0.0..=highest, &expected)
 }
 
-fn positive(field: &'static str, value: f64, unit: &str) -> Result<(), RobotSpecError> {
-    if value > 0.0 && value.is_finite() {
-        return Ok(());
-    }
-    Err(RobotSpecError { field, value, expected: format!("a positive number ({unit})") })
-}
-
-/// A robot parameter out of its range.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("robot.{field}: expected {expected}, got {}", crate::text::format_number(*.value))]
-pub struct RobotSpecError {
-    /// Path of the field below `robot`, for example `arm.kp`.
-    pub field: &'static str,
-    /// Value given.
-    pub value: f64,
-    /// Range and unit.
-    pub expected: String,
+fn positive(field: &str, value: f64, unit: &str) -> Result<(), RangeError> {
+    check_range(&format!("robot.{field}"), value, POSITIVE, &format!("a positive number ({unit})"))
 }
 
 /// Joint drives of the arm: `τ = kp (q_target − q) − kd q̇`, limited to the torques of the real arm (the effort

@@ -18,7 +18,7 @@ use super::{
     trace::StepTrace,
 };
 use crate::{
-    benchmark::{Goal, control::steps_per_control},
+    benchmark::{GoalKind, steps_per_control},
     evaluation::{
         deformation::{Deformation, ReferenceShape},
         goal::GoalRegion,
@@ -191,11 +191,6 @@ impl Episode {
         check_sensors(&spec.scene, &spec.tactile, sensor_assets)
             .map_err(|source| spec.sense_error(source))?;
         let mut sim = Simulation::new(spec.scene.clone(), &spec.params, &spec.robot, cache)?;
-        let (object, goal, hold_s) = match &spec.task.goal {
-            Goal::On { object, target, hold_s } | Goal::In { object, target, hold_s } => {
-                (object, target, *hold_s)
-            }
-        };
         let find = |role, name: &str| {
             sim.objects.iter().position(|o| o.name == name).ok_or_else(|| EpisodeError::NoObject {
                 task: spec.task.id,
@@ -205,14 +200,15 @@ impl Episode {
                 have: sim.objects.iter().map(|o| o.name.as_str()).collect::<Vec<_>>().join(", "),
             })
         };
-        let (target, goal) = (find("object", object)?, find("target", goal)?);
+        let (target, goal) =
+            (find("object", &spec.task.goal.object)?, find("target", &spec.task.goal.target)?);
         sim.settle().map_err(|source| EpisodeError::Settle {
             layout: spec.task.layout.clone(),
             episode: spec.identity.episode,
             source,
         })?;
         let evidence = EvidenceCollector::new(&sim, target, goal);
-        let judge = settled_judge(&spec, &sim, &evidence, target, goal, hold_s);
+        let judge = settled_judge(&spec, &sim, &evidence, target, goal);
         let tool = sim.robot.tool_b(&sim.world);
         let start_hold = Action {
             position_b: tool.translation.vector,
@@ -514,13 +510,12 @@ fn settled_judge(
     evidence: &EvidenceCollector,
     target: usize,
     goal: usize,
-    hold_s: f64,
 ) -> Judge {
     Judge::new(JudgeConfig {
         criteria: spec.criteria.clone(),
         workspace: spec.scene.workspace,
-        goal: goal_region(&spec.task.goal, &sim.objects[goal]),
-        hold_s,
+        goal: goal_region(spec.task.goal.kind, &sim.objects[goal]),
+        hold_s: spec.task.goal.hold_s,
         dt_s: spec.params.dt,
         steps_per_control: steps_per_control(spec.params.dt),
         target_weight_n: weight(sim, target),
@@ -532,15 +527,16 @@ fn settled_judge(
 }
 
 /// Region in which the target must rest, in the goal object's frame at its foot.
-fn goal_region(goal: &Goal, object: &ObjectInstance) -> GoalRegion {
+fn goal_region(kind: GoalKind, object: &ObjectInstance) -> GoalRegion {
     let bounds = object.bounds;
-    match goal {
-        Goal::On { .. } => GoalRegion::On { radius_m: 0.5 * bounds.size().xy().min() },
-        Goal::In { .. } => {
+    match kind {
+        GoalKind::On => GoalRegion::On { radius_m: 0.5 * bounds.size().xy().min() },
+        GoalKind::Inside => {
             let wall = object.asset.hints.get("wall_m").copied().unwrap_or(0.0);
             let inset = Vec3::new(wall, wall, 0.0);
             let foot = object.foot_o();
-            GoalRegion::In { inside: Aabb { min: bounds.min + inset - foot, max: bounds.max - inset - foot } }
+            let (min, max) = (bounds.min + inset - foot, bounds.max - inset - foot);
+            GoalRegion::Inside { space: Aabb { min, max } }
         }
     }
 }

@@ -9,7 +9,7 @@ use super::{
     simulation::Simulation,
 };
 use crate::{
-    benchmark::control::CONTROL_DT,
+    benchmark::CONTROL_DT,
     geometry::{Pose, Vec3},
     physics::{
         ArticulationId, BodyId, ColliderId, ContactPartner,

@@ -12,7 +12,7 @@ use super::{
     robot_instance::RobotInstance,
 };
 use crate::{
-    benchmark::control::CONTROL_DT,
+    benchmark::CONTROL_DT,
     geometry::{Aabb, Pose, Quat, Vec3},
     physics::{
         BodyId, ContactPartner, PhysicsParams, World, joints,

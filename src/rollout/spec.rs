@@ -97,6 +97,6 @@ impl EpisodeSpec {
 
 /// Asset of a task's target in a scene.
 pub fn target_asset<'a>(scene: &'a Scene, task: &Task) -> Option<&'a Arc<Asset>> {
-    let name = task.goal.object();
-    scene.objects.iter().find(|object| object.name == name).map(|object| &object.asset)
+    let name = &task.goal.object;
+    scene.objects.iter().find(|object| object.name == *name).map(|object| &object.asset)
 }

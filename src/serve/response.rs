@@ -9,7 +9,7 @@ use super::{
     spaces,
 };
 use crate::{
-    benchmark::control::CONTROL_DT,
+    benchmark::CONTROL_DT,
     evaluation::record::Outcome,
     policy::{
         Observation,

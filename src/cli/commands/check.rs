@@ -6,7 +6,7 @@ use std::{
 };
 
 use crate::{
-    benchmark::{Goal, Plan, Suite, Task},
+    benchmark::{Goal, GoalKind, Plan, Suite, Task},
     cli::{
         args::CheckArgs,
         error::CliError,
@@ -85,9 +85,10 @@ fn check_suite(
     ));
     for task in tasks {
         let expert = if task.expert { "" } else { ", no expert" };
-        let (relation, object, target) = match &task.goal {
-            Goal::On { object, target, .. } => ("on", object, target),
-            Goal::In { object, target, .. } => ("in", object, target),
+        let Goal { kind, object, target, .. } = &task.goal;
+        let relation = match kind {
+            GoalKind::On => "on",
+            GoalKind::Inside => "in",
         };
         let (id, prompt) = (task.id, text::escape_control(&task.prompt));
         print(&format!("{id:>4} {prompt}: {object} {relation} {target}{expert}\n"));

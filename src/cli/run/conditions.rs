@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use crate::{
-    benchmark::{Condition, ObjectType, REFERENCE, Suite, Task},
+    benchmark::{Condition, ObjectType, REFERENCE, ShiftValue, Suite, Task},
     cli::{
         error::CliError,
         output::{notice, print},
@@ -41,7 +41,7 @@ struct ConditionsFile<'a> {
 /// A suite under one condition, or the unchanged reference.
 struct ConditionCase {
     name: String,
-    shift: Vec<(String, f64)>,
+    shift: Vec<ShiftValue>,
     set: Vec<(String, String)>,
     /// Folder of the run, relative to that of all runs.
     folder: String,

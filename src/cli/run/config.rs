@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::{
-    benchmark::Suite,
+    benchmark::{ShiftValue, Suite},
     cli::{
         args::{Requirement, RunArgs, ScriptArgs, Shard, TraceDetail, VideoSelection},
         error::CliError,
@@ -27,7 +27,7 @@ pub(crate) struct RunConfig {
     pub seed: u64,
     pub threads: usize,
     /// Shifts by name and value.
-    pub shifts: Vec<(String, f64)>,
+    pub shifts: Vec<ShiftValue>,
     /// True if soft objects are made rigid.
     pub is_rigid_twin: bool,
     /// Changed settings by path and value.
@@ -134,10 +134,10 @@ fn parse_pair(flag: &str, word: &str) -> Result<(String, String), CliError> {
     Ok((name.to_owned(), value.to_owned()))
 }
 
-fn parse_shift(word: &str) -> Result<(String, f64), CliError> {
+fn parse_shift(word: &str) -> Result<ShiftValue, CliError> {
     let (name, value) = parse_pair("--shift", word)?;
     let number = value.parse::<f64>().ok().filter(|n| n.is_finite());
     let number =
         number.ok_or_else(|| CliError::input(format!("--shift {name}: expected a number, got {value:?}")))?;
-    Ok((name, number))
+    Ok(ShiftValue { name, value: number })
 }

@@ -80,7 +80,7 @@ impl SuiteRun<'_> {
         if self.suite.object_type != ObjectType::Rigid || self.config.is_rigid_twin {
             return Ok(());
         }
-        let name = task.goal.object();
+        let name = &task.goal.object;
         let target = scene.objects.iter().find(|object| object.name == *name);
         match target.filter(|object| matches!(object.asset.body, Body::Soft(_))) {
             None => Ok(()),

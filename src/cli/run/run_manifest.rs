@@ -9,7 +9,7 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use crate::{
-    benchmark::{Task, settings::Settings},
+    benchmark::{ShiftValue, Task, settings::Settings},
     cli::{
         error::CliError,
         run::{recorded_policy::ReplaySource, suite_run::SuiteRun},
@@ -54,7 +54,7 @@ pub(crate) struct RunManifest<'a> {
     /// The part of the run, such as 2/8.
     #[serde(skip_serializing_if = "Option::is_none")]
     shard: Option<String>,
-    shifts: &'a [(String, f64)],
+    shifts: &'a [ShiftValue],
     /// Values of all options of the script.
     options: BTreeMap<String, String>,
     /// Options of the script as they were typed.

@@ -66,9 +66,7 @@ fn stored_config(stored: &StoredRun) -> Result<RunConfig, CliError> {
     let settings = info["set"].as_array().and_then(|pairs| {
         pairs.iter().map(|pair| texts(pair)?.try_into().ok().map(|[a, b]: [String; 2]| (a, b))).collect()
     });
-    let shifts = info["shifts"].as_array().and_then(|pairs| {
-        pairs.iter().map(|pair| Some((pair[0].as_str()?.to_owned(), pair[1].as_f64()?))).collect()
-    });
+    let shifts = serde_json::from_value(info["shifts"].clone()).ok();
     Ok(RunConfig {
         script_options: texts(&info["arguments"]).ok_or_else(|| missing("arguments"))?,
         seed: info["seed"].as_u64().ok_or_else(|| missing("seed"))?,

@@ -7,7 +7,7 @@ use std::{
 };
 
 use crate::{
-    benchmark::{Suite, Task, seed::Split, settings::Settings},
+    benchmark::{ShiftValue, Suite, Task, seed::Split, settings::Settings},
     cli::{
         args::TraceDetail,
         error::{CliError, Exit},
@@ -104,7 +104,7 @@ impl<'a> SuiteRun<'a> {
             |flag: &str, error: String| CliError::input(error).prefixed(flag).prefixed(config.file.display());
         let settings =
             suite.settings.with_all(&config.settings).map_err(|e| refuse("--set", e.to_string()))?;
-        for (name, value) in &config.shifts {
+        for ShiftValue { name, value } in &config.shifts {
             script::check_shift(&suite.shifts, name, *value).map_err(|e| refuse("--shift", e.to_string()))?;
         }
         let replay_source = find_replay_source(config, suite, &jobs)?;

@@ -11,7 +11,7 @@ use super::{
     video,
 };
 use crate::{
-    benchmark::control::CONTROL_DT,
+    benchmark::CONTROL_DT,
     geometry::{Quat, Vec3},
     robot::rotation,
     sensing::tactile::MARKER_COUNT,

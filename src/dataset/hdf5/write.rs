@@ -6,7 +6,7 @@ use rust_hdf5::{FilterPipeline, H5Dataset, H5File, H5Group, H5Type};
 use serde_json::{Value, json};
 
 use super::super::{DataStream, DatasetError, Demonstration, StreamValues};
-use crate::{benchmark::control::CONTROL_DT, evaluation::record::EpisodeRecord};
+use crate::{benchmark::CONTROL_DT, evaluation::record::EpisodeRecord};
 
 /// Largest chunk of numbers, bytes. Readers of one step decompress a whole chunk.
 const MAX_CHUNK_BYTES: usize = 1 << 18;

@@ -6,7 +6,7 @@ use super::{
     super::{DatasetError, TaskFile},
     ForeignTask,
 };
-use crate::benchmark::control::CONTROL_DT;
+use crate::benchmark::CONTROL_DT;
 
 /// Layouts that can be imported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

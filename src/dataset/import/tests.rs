@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::{libero::goals, mujoco::MujocoModel, *};
 use crate::{
-    benchmark::control::CONTROL_DT,
+    benchmark::CONTROL_DT,
     dataset::hdf5::{ChunkedSteps, Hdf5Writer},
     geometry::{Pose, Quat, Vec3},
     policy::{Action, ToolCommand},

@@ -2,7 +2,7 @@
 
 use super::{DatasetError, DemoReader};
 use crate::{
-    benchmark::control::CONTROL_DT,
+    benchmark::CONTROL_DT,
     geometry::{Pose, Quat, Vec3},
     robot::{
         IkSpec,

@@ -326,7 +326,7 @@ impl Judge {
         self.control_step.is_touched |= is_touched;
         self.control_step.support_ns += match self.config.goal {
             GoalRegion::On { .. } => evidence.goal.support_impulse_ns,
-            GoalRegion::In { .. } => evidence.target.support_impulse_ns,
+            GoalRegion::Inside { .. } => evidence.target.support_impulse_ns,
         };
         if self.control_step.steps < self.config.steps_per_control {
             return;

@@ -149,8 +149,8 @@ fn a_plate_that_carries_less_than_half_or_a_hand_that_touches_prevents_rest() {
 
 #[test]
 fn in_a_basket_others_may_carry_it() {
-    let inside = Aabb { min: Vec3::new(-0.1, -0.1, 0.0), max: Vec3::new(0.1, 0.1, 0.08) };
-    let mut replay = Replay::new(JudgeConfig { goal: GoalRegion::In { inside }, ..config() });
+    let space = Aabb { min: Vec3::new(-0.1, -0.1, 0.0), max: Vec3::new(0.1, 0.1, 0.08) };
+    let mut replay = Replay::new(JudgeConfig { goal: GoalRegion::Inside { space }, ..config() });
     replay.steps(27, |e| e.target = lying(0.0, 0.2));
     assert!(replay.judge.is_goal_reached());
 }

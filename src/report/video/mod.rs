@@ -9,7 +9,7 @@ pub use canvas::{Canvas, Rgb8};
 use image::{ImageBuffer, ImageError, Luma, RgbImage};
 
 use crate::{
-    benchmark::control::CONTROL_DT,
+    benchmark::CONTROL_DT,
     dataset::video::{VideoError, VideoWriter},
     evaluation::record::EpisodeRecord,
     files::{FileError, replace},

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::{
-    benchmark::control::CONTROL_DT,
+    benchmark::CONTROL_DT,
     geometry::{Aabb, Pose, Vec3},
     robot::ik::{PoseDifference, PoseTolerance, UnreachablePose},
     rollout::{ObjectInstance, Simulation},

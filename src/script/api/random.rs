@@ -46,8 +46,7 @@ class! {
             fn stream(_, this, name: String = Type::Choice(&[
                 "layout", "arm", "material", "light", "camera", "sensor", "expert", "script", "policy",
             ])) -> ["softvt.Rng"] {
-                let stream = RandomStream::ALL.into_iter().find(|stream| stream.name() == name);
-                stream.map(|stream| LuaRng::new(this.seed.clone(), stream))
+                RandomStream::from_name(&name).map(|stream| LuaRng::new(this.seed.clone(), stream))
             }
             /// Returns a number uniformly distributed from low (included) to high (excluded).
             fn uniform(lua, this, low: f64, high: f64) -> ["number"] {

@@ -16,9 +16,9 @@ use super::{
 };
 use crate::{
     benchmark::{
-        control::steps_per_control,
         seed::{EpisodeSeed, RandomStream, Split},
         settings::Settings,
+        steps_per_control,
     },
     evaluation::deformation::ReferenceShape,
     geometry::{Pose, Vec3},
@@ -77,7 +77,7 @@ record! {
 pub(crate) fn settings(lua: &Lua, label: &str, table: Option<&Table>) -> mlua::Result<Settings> {
     let Some(table) = table else { return Ok(Settings::default()) };
     let settings: Settings = deserialize(lua, label, &Value::Table(table.clone()))?;
-    settings.check().map_err(|e| fail(lua, format!("{label}: {e}")))?;
+    settings.validate().map_err(|e| fail(lua, format!("{label}: {e}")))?;
     Ok(settings)
 }
 

@@ -9,7 +9,7 @@ use std::{path::Path, sync::Arc};
 use mlua::{Lua, MultiValue, Table, Value};
 
 use crate::{
-    benchmark::{Condition, Goal, Plan, Shift, Suite, Task, Variation},
+    benchmark::{Condition, Goal, GoalKind, Plan, Shift, ShiftValue, Suite, Task, Variation},
     parallel::lock,
     script::{
         api::{
@@ -278,8 +278,8 @@ fn task(lua: &Lua, id: usize, spec: &TaskSpec, budget: u32) -> mlua::Result<Task
         prompt: spec.prompt.clone(),
         layout: spec.layout.name.clone(),
         goal: match &spec.goal {
-            GoalSpec::On(goal) => Goal::On { object, target, hold_s: goal.hold_s },
-            GoalSpec::Inside(goal) => Goal::In { object, target, hold_s: goal.hold_s },
+            GoalSpec::On(goal) => Goal { kind: GoalKind::On, object, target, hold_s: goal.hold_s },
+            GoalSpec::Inside(goal) => Goal { kind: GoalKind::Inside, object, target, hold_s: goal.hold_s },
         },
         budget_steps: spec.budget_steps.unwrap_or(budget),
         expert: spec.expert.is_some(),
@@ -297,7 +297,12 @@ fn shift(spec: &ShiftSpec) -> Shift {
 }
 
 fn condition(lua: &Lua, spec: &ConditionSpec) -> mlua::Result<Condition> {
-    let shift = spec.shift.iter().flatten().map(|(name, value)| (name.clone(), *value)).collect();
+    let shift = spec
+        .shift
+        .iter()
+        .flatten()
+        .map(|(name, value)| ShiftValue { name: name.clone(), value: *value })
+        .collect();
     let mut set = Vec::new();
     for (key, value) in spec.set.iter().flat_map(sorted_pairs) {
         let text = match &value {

@@ -4,7 +4,7 @@ use mlua::{Function, Lua, MultiValue, Value};
 
 use crate::{
     benchmark::{
-        Shift,
+        Shift, ShiftValue,
         seed::{EpisodeSeed, RandomStream, Split},
     },
     parallel::lock,
@@ -38,8 +38,8 @@ pub struct EpisodeRequest {
     /// Seed of the run.
     pub base_seed: u64,
     pub split: Split,
-    /// Names and values of the shifts to apply, in order.
-    pub shifts: Vec<(String, f64)>,
+    /// Shifts to apply, in order.
+    pub shifts: Vec<ShiftValue>,
 }
 
 /// An episode that is ready to be simulated.
@@ -128,7 +128,7 @@ fn start(
     vm.call::<()>(&task.layout.build, (&userdata, LuaRng::new(seed.clone(), RandomStream::Layout)))?;
     let nominal = lock(&scene.scene).clone();
     let mut current = scene;
-    for (name, value) in &request.shifts {
+    for ShiftValue { name, value } in &request.shifts {
         let apply = find_shift(instance, &suite, name)?;
         current = apply_shift(instance, &apply, current, *value)?;
     }

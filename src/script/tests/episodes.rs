@@ -2,7 +2,7 @@ use std::sync::Arc;
 
 use super::*;
 use crate::{
-    benchmark::{Plan, seed::Split},
+    benchmark::{Plan, ShiftValue, seed::Split},
     geometry::{Pose, Vec3, shape::Shape},
     scene::{Asset, Body},
     script::{EpisodeRequest, EpisodeSetup, Expert, ExpertCommand, ExpertView, ObjectView, check_shift},
@@ -132,7 +132,8 @@ fn shifts_change_the_scene_and_are_strict() {
     let open = |body: &str, name: &str| {
         let project = shift(body);
         let loaded = project.load("x.lua", &[]).unwrap();
-        let request = EpisodeRequest { shifts: vec![(name.into(), 0.5)], ..request(0, 1) };
+        let request =
+            EpisodeRequest { shifts: vec![ShiftValue { name: name.into(), value: 0.5 }], ..request(0, 1) };
         EpisodeSetup::open(&loaded, &request).map(|e| e.scene).map_err(|e| e.message)
     };
     let soften = "local o = scene:object 'ball' o.youngs_pa = o.youngs_pa * value return scene";
@@ -163,7 +164,8 @@ fn the_library_scales_stiffness_and_mass() {
         project("local shifts = require 'shifts'\nreturn suite(nil, { shifts.stiffness, shifts.mass })");
     let loaded = project.load("x.lua", &[]).unwrap();
     assert!(loaded.bundle.files.contains_key("scripts/shifts.lua"));
-    let shifts = vec![("stiffness".into(), 0.5), ("mass".into(), 2.0)];
+    let shifts =
+        [("stiffness", 0.5), ("mass", 2.0)].map(|(name, value)| (name.to_owned(), value).into()).into();
     let scene = EpisodeSetup::open(&loaded, &EpisodeRequest { shifts, ..request(0, 1) }).unwrap().scene;
     let Body::Soft(soft) = &scene.objects[0].asset.body else { panic!("the ball is soft") };
     assert_eq!((soft.youngs_pa, soft.density), (20e3, 400.0));

@@ -8,16 +8,16 @@ use super::{
     elastic::{ContactError, Gel, GelField, GelScratch, TactileContact},
     image::{OpticsError, PolynomialOptics, TaximOptics},
     markers::{MarkerStyle, Markers},
-    spec::{IMAGE_SIZE, MarkerModel, OpticsModel, TactileSpec, TactileSpecError},
+    spec::{IMAGE_SIZE, MarkerModel, OpticsModel, TactileSpec},
 };
-use crate::{npy::NpzError, robot::PadSurface};
+use crate::{npy::NpzError, robot::PadSurface, text::RangeError};
 
 /// Reasons why a sensor cannot be created.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "the messages describe the variants")]
 pub enum TactileSensorError {
     #[error(transparent)]
-    Spec(#[from] TactileSpecError),
+    Spec(#[from] RangeError),
     #[error(transparent)]
     Optics(#[from] OpticsError),
     #[error("tactile.optics.tables: {0}")]

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
+use crate::text::{RangeError, check_range};
+
 /// Width and height of a tactile image, px.
 pub const IMAGE_SIZE: [usize; 2] = [320, 240];
 
@@ -105,31 +107,15 @@ impl Default for FotsSpec {
     }
 }
 
-/// A parameter of a tactile sensor out of its range.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("tactile.{field}: expected {expected}, got {value}")]
-pub struct TactileSpecError {
-    /// Path of the parameter below `tactile`.
-    pub field: &'static str,
-    /// Value that was given.
-    pub value: String,
-    /// Description of the valid range.
-    pub expected: &'static str,
-}
-
 impl TactileSpec {
     /// Checks the range of every parameter.
     ///
     /// # Errors
     /// Names the first parameter out of its range, its value and the range.
-    pub fn validate(&self) -> Result<(), TactileSpecError> {
+    pub fn validate(&self) -> Result<(), RangeError> {
         let (gel, view) = (&self.gel, &self.view);
-        let between = |field, value: f64, low: f64, high: f64, expected| {
-            if (low..=high).contains(&value) {
-                Ok(())
-            } else {
-                Err(TactileSpecError { field, value: value.to_string(), expected })
-            }
+        let between = |field, value, low: f64, high: f64, expected| {
+            check_range(&format!("tactile.{field}"), value, low..=high, expected)
         };
         between("gel.shear_modulus", gel.shear_modulus, 1e2, 1e9, "Pa in 1e2..1e9")?;
         between("gel.poisson", gel.poisson, 0.0, 0.499, "0..0.499")?;
@@ -138,7 +124,8 @@ impl TactileSpec {
         between("view.lens", view.lens, 5e-3, 1.0, "m in 0.005..1")?;
         if self.shadows && self.optics != OpticsModel::Polynomial {
             let expected = "false with the model \"taxim\", whose images have no shadows";
-            return Err(TactileSpecError { field: "shadows", value: "true".into(), expected });
+            let (path, value) = ("tactile.shadows".into(), "true".into());
+            return Err(RangeError { path, expected: expected.into(), value });
         }
         if let MarkerModel::Fots(fots) = &self.markers {
             between("markers.dilate", fots.dilate, 0.0, 1.0, "1/px² in 0..1")?;

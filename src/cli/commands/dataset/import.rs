@@ -187,7 +187,7 @@ fn initial_state(
     let task: Option<&Task> = run.suite.tasks.iter().find(|task| task.id == matched.task);
     let task = task.ok_or_else(|| CliError::internal("matched a task that is not in the suite"))?;
     let opened = run.open_episode(&run.request(task, matched.attempt))?;
-    start.places = import::match_objects(&opened.scene, task.goal.object(), poses);
+    start.places = import::match_objects(&opened.scene, &task.goal.object, poses);
     if target_asset(&opened.scene, task).is_some_and(|asset| matches!(asset.body, Body::Rigid { .. })) {
         demo.close_fully_on_rigid_object();
     }

@@ -3,11 +3,11 @@
 use rustfft::num_complex::Complex32;
 
 use super::{
-    super::spec::{Pinhole, TactileSpec, TactileSpecError},
+    super::spec::{Pinhole, TactileSpec},
     elastic_layer::ElasticLayer,
     fourier::{FftBuffers, PaddedFft, WaveVector},
 };
-use crate::robot::PadSurface;
+use crate::{robot::PadSurface, text::RangeError};
 
 /// Grid over the pad, kernels of the bonded layer and view of the camera: everything that is computed once per sensor.
 ///
@@ -62,7 +62,7 @@ impl Gel {
     ///
     /// # Errors
     /// A number of the specification is out of its range.
-    pub fn new(spec: &TactileSpec, pad: PadSurface) -> Result<Self, TactileSpecError> {
+    pub fn new(spec: &TactileSpec, pad: PadSurface) -> Result<Self, RangeError> {
         spec.validate()?;
         let cell = spec.gel.cell;
         let count = |length: f64| 2 * (0.5 * length / cell).ceil() as usize;
