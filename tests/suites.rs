@@ -142,7 +142,7 @@ fn prompts_are_those_of_the_paper_and_match_the_goals() {
 fn object_suites_have_the_distractors_of_libero() {
     let (rigid, soft) = (load("object_rigid"), load("object_soft"));
     for (k, [target, distractors @ ..]) in GROCERIES.iter().enumerate() {
-        for (loaded, target) in [(&rigid, *target), (&soft, suite(&soft).tasks[k].goal.object())] {
+        for (loaded, target) in [(&rigid, *target), (&soft, &suite(&soft).tasks[k].goal.object)] {
             let scene = open(loaded, k, 0, Split::Validation);
             let found: BTreeSet<&str> = colliding_objects(&scene).map(|o| o.asset.name.as_str()).collect();
             let expected: BTreeSet<&str> = distractors.iter().copied().chain([target, "basket"]).collect();
@@ -216,7 +216,7 @@ fn soft_targets_on_the_floor_start_within_20_mm_and_30_degrees() {
     for (k, task) in suite(&loaded).tasks.iter().enumerate() {
         let scenes: Vec<Scene> =
             (0..STANDARD as u64).map(|episode| open(&loaded, k, episode, Split::Validation)).collect();
-        all.push(poses(&scenes, task.goal.object()));
+        all.push(poses(&scenes, &task.goal.object));
         middles.push(if FAR.contains(&k) { [-0.12, -0.24] } else { [0.05, -0.10] });
         arms.extend(scenes);
     }
