@@ -133,7 +133,7 @@ fn overheads(profile: &str) -> Vec<f64> {
         cancel: &STOP,
     })));
     let (spec, _) = episode::open(&episode::load(), 0, false);
-    let (suite, prompt) = (spec.identity.suite.clone(), spec.task.prompt.clone());
+    let (suite, prompt) = (spec.header.id.suite.clone(), spec.task.prompt.clone());
     let mut took = Vec::new();
     let policy = Timed { inner: remote, took: &mut took };
     let mut driver =

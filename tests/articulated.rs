@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use softvt::{
-    benchmark::seed::Split,
+    evaluation::episode_id::{EpisodeId, Split},
     geometry::Vec3,
     physics::{BodyId, ContactPartner, LinkId, world::JointDrive},
     rollout::{AssetCache, ObjectInstance, SensorAssets, SensorSuite, Simulation, state_hash},
     scene::{Asset, Camera, Scene},
-    script::{self, EpisodeRequest, EpisodeSetup},
+    script::{self, EpisodeSetup},
     sensing::tactile::TactileSpec,
 };
 
@@ -37,15 +37,9 @@ fn scene() -> Scene {
     let path = folder.path().join("kitchen.lua");
     std::fs::write(&path, SUITE).expect("written");
     let loaded = script::load(&path, &[]).unwrap_or_else(|e| panic!("{e}"));
-    let request = EpisodeRequest {
-        suite: "kitchen".into(),
-        task: 0,
-        episode: 0,
-        base_seed: 0,
-        split: Split::Validation,
-        shifts: Vec::new(),
-    };
-    EpisodeSetup::open(&loaded, &request).unwrap_or_else(|e| panic!("{e}")).scene
+    let id =
+        EpisodeId { suite: "kitchen".into(), task: 0, episode: 0, base_seed: 0, split: Split::Validation };
+    EpisodeSetup::open(&loaded, &id, &[]).unwrap_or_else(|e| panic!("{e}")).scene
 }
 
 /// The simulation of the scene, settled.

@@ -3,7 +3,8 @@
 use std::{collections::BTreeMap, path::Path, sync::Arc};
 
 use softvt::{
-    benchmark::{Goal, GoalKind, Plan, seed::Split},
+    benchmark::{Goal, GoalKind, Plan},
+    evaluation::episode_id::{EpisodeId, Split},
     geometry::{
         Pose, Vec3,
         mass::mass_properties,
@@ -12,7 +13,7 @@ use softvt::{
     },
     rollout::{AssetCache, Simulation},
     scene::{Asset, Body, Mask, Scene},
-    script::{self, EpisodeRequest, EpisodeSetup, LoadedScript},
+    script::{self, EpisodeSetup, LoadedScript},
 };
 
 /// Reference data of a soft asset.
@@ -63,17 +64,10 @@ fn suite() -> LoadedScript {
     script::load(&path, &[]).unwrap_or_else(|e| panic!("{e}"))
 }
 
-fn scene(loaded: &LoadedScript, task: usize, episode: u64) -> Scene {
+fn scene(loaded: &LoadedScript, task: usize, episode: u32) -> Scene {
     let Plan::Suite(suite) = &loaded.plan else { panic!("{:?}", loaded.plan) };
-    let request = EpisodeRequest {
-        suite: suite.name.clone(),
-        task,
-        episode,
-        base_seed: 0,
-        split: Split::Validation,
-        shifts: Vec::new(),
-    };
-    EpisodeSetup::open(loaded, &request).unwrap_or_else(|e| panic!("{e}")).scene
+    let id = EpisodeId { suite: suite.name.clone(), task, episode, base_seed: 0, split: Split::Validation };
+    EpisodeSetup::open(loaded, &id, &[]).unwrap_or_else(|e| panic!("{e}")).scene
 }
 
 /// Assets by name, including the table.

@@ -5,13 +5,14 @@
 use std::{path::PathBuf, sync::Arc};
 
 use softvt::{
-    benchmark::{Plan, seed::Split},
+    benchmark::Plan,
+    evaluation::episode_id::{EpisodeId, Split},
     geometry::{Pose, Quat, Vec3, shape::Shape},
     physics::{BodyId, PhysicsParams},
     robot::RobotSpec,
     rollout::{AssetCache, SensorAssets, SensorSuite, Simulation},
     scene::{Camera, Lighting, Mask, Visual, VisualLayer},
-    script::{self, EpisodeRequest},
+    script,
     sensing::{
         camera::{FrameView, RenderMesh, RenderObject, RenderScene, RenderedImage, Renderer},
         tactile::TactileSpec,
@@ -43,15 +44,9 @@ fn the_first_task_of_spatial_soft_matches_its_reference() {
     let suite = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("suites/spatial_soft.lua");
     let loaded = script::load(&suite, &[]).expect("the suite loads");
     let Plan::Suite(suite) = &loaded.plan else { panic!("it is a suite") };
-    let request = EpisodeRequest {
-        suite: suite.name.clone(),
-        task: 0,
-        episode: 0,
-        base_seed: 0,
-        split: Split::Validation,
-        shifts: Vec::new(),
-    };
-    let scene = script::EpisodeSetup::open(&loaded, &request).expect("the suite opens").scene;
+    let id =
+        EpisodeId { suite: suite.name.clone(), task: 0, episode: 0, base_seed: 0, split: Split::Validation };
+    let scene = script::EpisodeSetup::open(&loaded, &id, &[]).expect("the suite opens").scene;
     let sim = Simulation::new(
         Arc::new(scene),
         &PhysicsParams::default(),

@@ -4,14 +4,15 @@
 use std::{collections::BTreeSet, path::Path};
 
 use softvt::{
-    benchmark::{Goal, GoalKind, Plan, Suite, Task, seed::Split},
+    benchmark::{Goal, GoalKind, Plan, ShiftValue, Suite, Task},
+    evaluation::episode_id::{EpisodeId, Split},
     geometry::{Pose, Vec3, shape::Shape},
     scene::{Body, Object, Scene, part_poses},
-    script::{self, EpisodeRequest, EpisodeSetup, LoadedScript},
+    script::{self, EpisodeSetup, LoadedScript},
 };
 
 /// Episodes per task at the scale of the paper.
-const EPISODES: u64 = 50;
+const EPISODES: u32 = 50;
 /// Nominal start configuration of the arm, rad (from the released code of SoftVTBench).
 const START_Q: [f64; 7] = [-0.01988, -0.18734, 0.00767, -2.40340, 0.00496, 2.24534, 0.79485];
 
@@ -78,10 +79,10 @@ fn suite(loaded: &LoadedScript) -> &Suite {
     suite
 }
 
-fn open(loaded: &LoadedScript, task: usize, episode: u64, split: Split) -> Scene {
+fn open(loaded: &LoadedScript, task: usize, episode: u32, split: Split) -> Scene {
     let suite = suite(loaded).name.clone();
-    let request = EpisodeRequest { suite, task, episode, base_seed: 0, split, shifts: Vec::new() };
-    EpisodeSetup::open(loaded, &request).unwrap_or_else(|e| panic!("{e}")).scene
+    let id = EpisodeId { suite, task, episode, base_seed: 0, split };
+    EpisodeSetup::open(loaded, &id, &[]).unwrap_or_else(|e| panic!("{e}")).scene
 }
 
 fn object<'a>(scene: &'a Scene, name: &str) -> &'a Object {
@@ -215,7 +216,7 @@ fn soft_targets_on_the_floor_start_within_20_mm_and_30_degrees() {
     let (mut all, mut middles, mut arms) = (Vec::new(), Vec::new(), Vec::new());
     for (k, task) in suite(&loaded).tasks.iter().enumerate() {
         let scenes: Vec<Scene> =
-            (0..STANDARD as u64).map(|episode| open(&loaded, k, episode, Split::Validation)).collect();
+            (0..STANDARD as u32).map(|episode| open(&loaded, k, episode, Split::Validation)).collect();
         all.push(poses(&scenes, &task.goal.object));
         middles.push(if FAR.contains(&k) { [-0.12, -0.24] } else { [0.05, -0.10] });
         arms.extend(scenes);
@@ -234,7 +235,7 @@ const STANDARD: usize = 5;
 #[test]
 fn rigid_objects_start_in_the_regions_of_libero() {
     let standard = |loaded: &LoadedScript, task: usize| -> Vec<Scene> {
-        (0..STANDARD as u64).map(|episode| open(loaded, task, episode, Split::Validation)).collect()
+        (0..STANDARD as u32).map(|episode| open(loaded, task, episode, Split::Validation)).collect()
     };
     let loaded = load("object_rigid");
     let others = [[-0.15, 0.06], [0.10, -0.20], [0.15, 0.03], [-0.20, -0.08]];
@@ -328,7 +329,7 @@ fn splits_have_disjoint_start_states() {
         };
         let (validation, demonstration) = (states(Split::Validation), states(Split::Demonstration));
         assert_eq!(
-            (validation.len() as u64, demonstration.len() as u64),
+            (validation.len() as u32, demonstration.len() as u32),
             (EPISODES / 2, EPISODES / 2),
             "{name}"
         );
@@ -400,11 +401,12 @@ fn a_mass_shift_scales_the_mass_of_all_moving_bodies_and_nothing_else() {
     for (name, task) in [("spatial_rigid", 4), ("object_soft", 0)] {
         let loaded = load(name);
         let shifted = |shifts: &[(&str, f64)]| {
-            let shifts = shifts.iter().map(|(name, value)| ((*name).to_owned(), *value).into()).collect();
+            let shifts: Vec<ShiftValue> =
+                shifts.iter().map(|(name, value)| ((*name).to_owned(), *value).into()).collect();
             let suite = suite(&loaded).name.clone();
             let split = Split::Validation;
-            let request = EpisodeRequest { suite, task, episode: 0, base_seed: 0, split, shifts };
-            EpisodeSetup::open(&loaded, &request).unwrap_or_else(|e| panic!("{e}"))
+            let id = EpisodeId { suite, task, episode: 0, base_seed: 0, split };
+            EpisodeSetup::open(&loaded, &id, &shifts).unwrap_or_else(|e| panic!("{e}"))
         };
         let EpisodeSetup { scene: heavy, nominal, .. } = shifted(&[("mass", 2.5)]);
         let mut moving = 0;

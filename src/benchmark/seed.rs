@@ -7,8 +7,9 @@ use rand_chacha::{
     ChaCha8Rng,
     rand_core::{RngCore, SeedableRng},
 };
-use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
+
+use crate::evaluation::episode_id::{EpisodeId, Split};
 
 /// Purpose of a stream of random numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,47 +58,8 @@ impl RandomStream {
     }
 }
 
-/// Unlimited list of episodes; the lists of two splits have no episode in common.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Split {
-    /// Episodes for evaluating policies.
-    #[default]
-    Validation,
-    /// Episodes for recording demonstrations.
-    Demonstration,
-    /// Trials of calibrations and other experiments.
-    Experiment,
-}
-
-/// A name is not that of a split.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("expected {}", Split::ALL.map(Split::name).join(", "))]
-pub struct UnknownSplit;
-
-impl std::str::FromStr for Split {
-    type Err = UnknownSplit;
-
-    fn from_str(name: &str) -> Result<Self, UnknownSplit> {
-        Self::ALL.into_iter().find(|split| split.name() == name).ok_or(UnknownSplit)
-    }
-}
-
-impl Split {
-    /// Every split.
-    pub const ALL: [Self; 3] = [Self::Validation, Self::Demonstration, Self::Experiment];
-
-    /// Name in seeds and results.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Validation => "validation",
-            Self::Demonstration => "demonstration",
-            Self::Experiment => "experiment",
-        }
-    }
-}
-
-/// Seed of an episode: all values on which its initial state depends.
+/// Source of the random streams of an episode: all values on which its initial state depends. Unlike an [`EpisodeId`]
+/// it has a layout in place of the task, because tasks that share a layout share their initial states.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EpisodeSeed {
     /// Name of the suite.
@@ -105,20 +67,31 @@ pub struct EpisodeSeed {
     /// Name of the layout; the tasks of a mirrored pair share it.
     pub layout: String,
     /// Index of the episode in its split.
-    pub episode: u64,
-    /// Base seed of the run.
-    pub base: u64,
+    pub episode: u32,
+    /// Seed of the run.
+    pub base_seed: u64,
     /// List of episodes that `episode` counts in.
     pub split: Split,
 }
 
 impl EpisodeSeed {
+    /// Seed of an episode whose task has this layout.
+    pub fn new(id: &EpisodeId, layout: &str) -> Self {
+        Self {
+            suite: id.suite.clone(),
+            layout: layout.to_owned(),
+            episode: id.episode,
+            base_seed: id.base_seed,
+            split: id.split,
+        }
+    }
+
     /// Random generator of a stream, at its start.
     pub fn stream(&self, stream: RandomStream) -> ChaCha8Rng {
         let split = self.split.name();
         let episode = self.episode.to_string();
-        let base = self.base.to_string();
-        keyed_rng(&["softvt episode", &self.suite, &self.layout, &episode, &base, split, stream.name()])
+        let base_seed = self.base_seed.to_string();
+        keyed_rng(&["softvt episode", &self.suite, &self.layout, &episode, &base_seed, split, stream.name()])
     }
 }
 
@@ -166,7 +139,13 @@ mod tests {
     use super::*;
 
     fn seed() -> EpisodeSeed {
-        EpisodeSeed { suite: "s".into(), layout: "l".into(), episode: 3, base: 7, split: Split::Validation }
+        EpisodeSeed {
+            suite: "s".into(),
+            layout: "l".into(),
+            episode: 3,
+            base_seed: 7,
+            split: Split::Validation,
+        }
     }
 
     #[test]
@@ -176,7 +155,7 @@ mod tests {
         let others = [
             EpisodeSeed { suite: "sl".into(), layout: "".into(), ..seed() },
             EpisodeSeed { episode: 4, ..seed() },
-            EpisodeSeed { base: 8, ..seed() },
+            EpisodeSeed { base_seed: 8, ..seed() },
             EpisodeSeed { split: Split::Demonstration, ..seed() },
         ];
         assert!(others.iter().all(|other| first(other, RandomStream::Layout) != base));

@@ -19,7 +19,7 @@ use super::{privileged, stream::DataStream};
 /// Images are not part of it; [`super::demonstration_writer`] renders them into the files.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Demonstration {
-    /// Identity and verdict of the episode.
+    /// Header and verdict of the episode.
     pub record: EpisodeRecord,
     /// Commanded action per control step.
     pub actions: Vec<Action>,

@@ -54,7 +54,8 @@ pub struct ManifestEntry {
 impl ManifestEntry {
     /// The line of demonstration `demo` of a task.
     pub fn new(paths: &TaskPaths, demo: usize, record: &EpisodeRecord) -> Self {
-        let id = &record.identity;
+        let header = &record.header;
+        let id = &header.id;
         let videos = VIDEO_STREAMS.iter().enumerate();
         Self {
             schema_version: SCHEMA_VERSION,
@@ -65,13 +66,13 @@ impl ManifestEntry {
             demo_id: demo,
             hdf5_path: paths.hdf5_relative(),
             num_samples: record.stats.steps as usize,
-            language: id.prompt.clone(),
-            asset_name: id.asset.clone(),
+            language: header.prompt.clone(),
+            asset_name: header.asset.clone(),
             success: record.verdict.safety,
             d_peak: record.verdict.d_peak,
-            seed: id.seed,
+            seed: id.base_seed,
             state_hash: record.stats.state_hash.clone(),
-            origin: id.origin.clone(),
+            origin: header.origin.clone(),
             video_files: videos
                 .map(|(i, name)| ((*name).to_owned(), paths.video_relative(demo, i)))
                 .collect(),

@@ -13,6 +13,7 @@ use rand_chacha::{
 use serde::{Deserialize, Serialize};
 
 use super::{
+    episode_id::EpisodeId,
     record::EpisodeRecord,
     statistics::{Z95, mean, quantile},
 };
@@ -35,17 +36,12 @@ pub struct TaskKey<'a> {
     pub task: usize,
 }
 
-/// Identity of an episode across runs; ordered by suite, task and episode first.
+/// Key by which the episodes of two runs are paired. In addition to the id it has the layout: two versions of a suite
+/// may give a task another layout, so that initial states of the same id differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct EpisodeKey<'a> {
-    /// Suite and task of the episode.
-    pub task: TaskKey<'a>,
-    /// Index of the episode in the task.
-    pub episode: u32,
-    /// Base seed of the initial states.
-    pub seed: u64,
-    /// Split of the initial states.
-    pub split: &'a str,
+    /// Id of the episode.
+    pub id: &'a EpisodeId,
     /// Name of the layout.
     pub layout: &'a str,
 }
@@ -53,9 +49,7 @@ pub struct EpisodeKey<'a> {
 impl<'a> EpisodeKey<'a> {
     /// Key of a record.
     pub fn of(record: &'a EpisodeRecord) -> Self {
-        let id = &record.identity;
-        let task = TaskKey { suite: &id.suite, task: id.task };
-        Self { task, episode: id.episode, seed: id.seed, split: &id.split, layout: &id.layout }
+        Self { id: &record.header.id, layout: &record.header.layout }
     }
 }
 
@@ -79,7 +73,8 @@ pub fn pair_episodes<'a>(
 pub fn group_by_task<'a>(pairs: &[EpisodePair<'a>]) -> BTreeMap<TaskKey<'a>, Vec<EpisodePair<'a>>> {
     let mut tasks: BTreeMap<TaskKey, Vec<EpisodePair>> = BTreeMap::new();
     for pair in pairs {
-        tasks.entry(EpisodeKey::of(pair.first).task).or_default().push(*pair);
+        let id = &pair.first.header.id;
+        tasks.entry(TaskKey { suite: &id.suite, task: id.task }).or_default().push(*pair);
     }
     tasks
 }
@@ -268,7 +263,7 @@ mod tests {
     fn run(episodes: &[(bool, bool, f64)]) -> Vec<EpisodeRecord> {
         let record = |(i, &(goal, safety, d)): (usize, &(bool, bool, f64))| {
             let mut record = sample();
-            record.identity.episode = i as u32;
+            record.header.id.episode = i as u32;
             (record.verdict.goal, record.verdict.safety, record.verdict.d_peak) = (goal, safety, Some(d));
             record
         };
@@ -311,15 +306,15 @@ mod tests {
         after[0].verdict.tau = None;
         let paired = PairedComparison::of(&pair_episodes(&before, &after));
         assert_eq!((paired.d_over_tau.difference, paired.d_peak.n), (None, 1));
-        after.iter_mut().for_each(|record| record.identity.seed = 5);
+        after.iter_mut().for_each(|record| record.header.id.base_seed = 5);
         assert!(pair_episodes(&before, &after).is_empty(), "other initial states");
     }
 
     #[test]
     fn tasks_of_the_same_number_in_two_suites_stay_apart() {
         let mut records = run(&[(true, true, 0.5), (true, true, 0.6), (true, true, 0.7)]);
-        records[1].identity.suite = "other".into();
-        (records[2].identity.task, records[2].identity.episode) = (1, 0);
+        records[1].header.id.suite = "other".into();
+        (records[2].header.id.task, records[2].header.id.episode) = (1, 0);
         let all = pair_episodes(&records, &records);
         let tasks: Vec<_> =
             group_by_task(&all).into_iter().map(|(task, pairs)| (task, pairs.len())).collect();

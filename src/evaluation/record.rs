@@ -1,11 +1,11 @@
 //! Record of one episode: one line of `episodes.jsonl`.
 //!
-//! [`EpisodeRecord`] flattens four parts into one JSON object: the [`Identity`] of the episode, its [`Outcome`], the
+//! [`EpisodeRecord`] flattens four parts into one JSON object: the [`EpisodeHeader`] with its id, its [`Outcome`], the
 //! [`Verdict`] of the judge and the [`RolloutStats`].
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer, ser::SerializeMap};
 
-use super::{drop::DropEvent, safety::KappaVerdict};
+use super::{drop::DropEvent, episode_id::EpisodeId, safety::KappaVerdict};
 use crate::scene::InitialState;
 
 /// End of a rollout.
@@ -39,35 +39,53 @@ impl Outcome {
     }
 }
 
-/// Task, initial state and policy of an episode.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Identity {
-    /// Name of the suite.
-    pub suite: String,
-    /// Index of the task in the suite.
-    pub task: usize,
+/// Id, task, target and policy of an episode: the first columns of its record.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+pub struct EpisodeHeader {
+    /// Id of the episode.
+    #[serde(flatten)]
+    pub id: EpisodeId,
     /// Instruction given to the policy.
     pub prompt: String,
     /// Name of the layout.
     pub layout: String,
-    /// Index of the episode in the task.
-    pub episode: u32,
-    /// Base seed of the initial states.
-    pub seed: u64,
-    /// Split of the initial states: "eval", "demo" …
-    pub split: String,
     /// Name of the policy.
     pub policy: String,
     /// True if the policy sees the true state, as experts do.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    #[serde(default)]
     pub privileged: bool,
     /// Asset of the target.
     pub asset: String,
     /// True if the target is a soft body.
     pub soft: bool,
     /// Foreign demonstration that the episode re-executes, if any.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default)]
     pub origin: Option<Box<Origin>>,
+}
+
+impl Serialize for EpisodeHeader {
+    /// Writes the keys in the order of the result files, in which those of the id are not adjacent.
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let EpisodeId { suite, task, episode, base_seed, split } = &self.id;
+        let mut map = serializer.serialize_map(None)?;
+        map.serialize_entry("suite", suite)?;
+        map.serialize_entry("task", task)?;
+        map.serialize_entry("prompt", &self.prompt)?;
+        map.serialize_entry("layout", &self.layout)?;
+        map.serialize_entry("episode", episode)?;
+        map.serialize_entry("seed", base_seed)?;
+        map.serialize_entry("split", split)?;
+        map.serialize_entry("policy", &self.policy)?;
+        if self.privileged {
+            map.serialize_entry("privileged", &true)?;
+        }
+        map.serialize_entry("asset", &self.asset)?;
+        map.serialize_entry("soft", &self.soft)?;
+        if let Some(origin) = &self.origin {
+            map.serialize_entry("origin", origin)?;
+        }
+        map.end()
+    }
 }
 
 /// Demonstration of another simulator or robot, of which an episode takes the initial state and the actions.
@@ -172,9 +190,9 @@ pub struct RolloutStats {
 /// One episode. Fields keep their order, and numbers every bit, through JSON.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EpisodeRecord {
-    /// Task, initial state and policy.
+    /// Id, task, target and policy.
     #[serde(flatten)]
-    pub identity: Identity,
+    pub header: EpisodeHeader,
     /// End of the rollout.
     pub outcome: Outcome,
     /// Judgement of the episode.
@@ -188,17 +206,20 @@ pub struct EpisodeRecord {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use crate::evaluation::episode_id::Split;
 
     /// A successful, safe soft episode.
     pub(crate) fn sample() -> EpisodeRecord {
-        let identity = Identity {
-            suite: "suite".into(),
-            task: 0,
+        let header = EpisodeHeader {
+            id: EpisodeId {
+                suite: "suite".into(),
+                task: 0,
+                episode: 0,
+                base_seed: 11,
+                split: Split::Validation,
+            },
             prompt: "put it there".into(),
             layout: "layout".into(),
-            episode: 0,
-            seed: 11,
-            split: "eval".into(),
             policy: "expert".into(),
             privileged: false,
             asset: "bun".into(),
@@ -242,7 +263,7 @@ pub(crate) mod tests {
             gave_up: None,
             state_hash: "00ff".into(),
         };
-        EpisodeRecord { identity, outcome: Outcome::Completed, verdict, stats }
+        EpisodeRecord { header, outcome: Outcome::Completed, verdict, stats }
     }
 
     #[test]

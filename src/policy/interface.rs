@@ -1,7 +1,7 @@
 //! The interface of a policy: its trait, the description of an episode, and commands.
 
 use super::{Observation, SensorStreams};
-use crate::geometry::Vec3;
+use crate::{evaluation::episode_id::EpisodeIndex, geometry::Vec3};
 
 /// Command of one control step: where the tool and the gripper should be at its end.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,7 +47,8 @@ impl From<Action> for ActionChunk {
     }
 }
 
-/// Description of an episode, passed to a policy when the episode begins.
+/// Description of an episode, passed to a policy when the episode begins: its id without base seed and split, which
+/// must not influence a policy, and its instruction.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TaskBrief {
     /// Name of the suite.
@@ -58,6 +59,13 @@ pub struct TaskBrief {
     pub prompt: String,
     /// Index of the episode in its split.
     pub episode: u32,
+}
+
+impl TaskBrief {
+    /// Position of the episode in its run.
+    pub fn index(&self) -> EpisodeIndex {
+        EpisodeIndex { task: self.task, episode: self.episode }
+    }
 }
 
 /// Failure of a policy. Only [`Action`](Self::Action) is confined to its episode; every other failure ends the run.

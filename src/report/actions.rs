@@ -7,6 +7,7 @@ use std::{
 };
 
 use crate::{
+    evaluation::episode_id::EpisodeIndex,
     files::{FileError, replace},
     geometry::Vec3,
     npy::{NpyArray, NpyError},
@@ -32,7 +33,8 @@ pub enum ActionsError {
 }
 
 /// Path of the actions of an episode in the run folder `dir`.
-pub fn path(dir: &Path, task: usize, episode: u32) -> PathBuf {
+pub fn path(dir: &Path, index: EpisodeIndex) -> PathBuf {
+    let EpisodeIndex { task, episode } = index;
     dir.join(format!("actions/task_{task:03}/episode_{episode:05}.npy"))
 }
 
@@ -83,7 +85,7 @@ mod tests {
     #[test]
     fn actions_are_read_back_exactly_and_damaged_files_are_named() {
         let root = tempfile::tempdir().unwrap();
-        let at = path(root.path(), 3, 12);
+        let at = path(root.path(), EpisodeIndex { task: 3, episode: 12 });
         let one = |i: i32| Action {
             position_b: Vec3::new(0.1 * f64::from(i), -0.3, 1e-17),
             axis_angle_b: Vec3::new(3.1, 0.0, 1.0 / 3.0),

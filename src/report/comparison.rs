@@ -81,14 +81,14 @@ pub fn compare(first: &[StoredRun], second: &[StoredRun]) -> Result<Comparison, 
     let task = |(TaskKey { suite, task }, pairs): (TaskKey, Vec<EpisodePair>)| TaskDifferences {
         suite: suite.to_owned(),
         task,
-        prompt: pairs[0].first.identity.prompt.clone(),
+        prompt: pairs[0].first.header.prompt.clone(),
         differences: PairedComparison::of(&pairs),
     };
     let all = || first.iter().chain(second);
     Ok(Comparison {
         first: policies(first),
         second: policies(second),
-        deformable: pairs.iter().any(|pair| pair.first.identity.soft),
+        deformable: pairs.iter().any(|pair| pair.first.header.soft),
         unmatched: count(first) + count(second) - 2 * pairs.len(),
         unlike: differing_fields(first, second),
         partial: all()
@@ -114,7 +114,7 @@ fn check_unique(runs: &[StoredRun]) -> Result<(), CompareError> {
         }
         for record in &run.records {
             if let Some(other) = known.insert(EpisodeKey::of(record), &run.dir) {
-                let id = &record.identity;
+                let id = &record.header.id;
                 return Err(CompareError::DuplicateEpisode {
                     first: other.display().to_string(),
                     second: dir(),

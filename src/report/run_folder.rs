@@ -195,12 +195,12 @@ mod tests {
 
     fn episode(index: u32) -> EpisodeRecord {
         let mut record = sample();
-        record.identity.episode = index;
+        record.header.id.episode = index;
         record
     }
 
     fn indices(dir: &Path) -> Vec<u32> {
-        read_episodes(dir).unwrap().iter().map(|r| r.identity.episode).collect()
+        read_episodes(dir).unwrap().iter().map(|r| r.header.id.episode).collect()
     }
 
     #[test]

@@ -109,7 +109,7 @@ pub fn unsafe_reason(record: &EpisodeRecord) -> Option<String> {
     }
     match (v.d_peak, v.tau) {
         (Some(d), Some(tau)) if d > tau => parts.push(format!("D {d:.2} % is above τ {tau:.2} %")),
-        (_, None) if record.identity.soft => parts.push("the object has no threshold".to_owned()),
+        (_, None) if record.header.soft => parts.push("the object has no threshold".to_owned()),
         _ => {}
     }
     if parts.is_empty() && !v.safety_known {
@@ -130,9 +130,9 @@ pub(super) mod tests {
     /// A finished run of `records` in the folder `dir`.
     pub(in crate::report) fn stored(dir: &str, policy: &str, mut records: Vec<EpisodeRecord>) -> StoredRun {
         for record in &mut records {
-            (record.identity.policy, record.identity.privileged) = (policy.into(), policy == "expert");
+            (record.header.policy, record.header.privileged) = (policy.into(), policy == "expert");
         }
-        let suite = records.first().map_or("suite", |record| &record.identity.suite);
+        let suite = records.first().map_or("suite", |record| &record.header.id.suite);
         let manifest = json!({
             "softvt": env!("CARGO_PKG_VERSION"), "script": "x.lua", "suite": suite, "policy": policy,
             "privileged": policy == "expert", "seed": 11, "split": "eval", "tasks": [0], "force_observed": false,

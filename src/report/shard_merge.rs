@@ -15,6 +15,7 @@ use super::{
 };
 use crate::{
     evaluation::{
+        episode_id::EpisodeIndex,
         record::EpisodeRecord,
         summary::SuiteSummary,
         thresholds::{ThresholdError, ThresholdFile},
@@ -42,12 +43,12 @@ pub enum MergeError {
     NotShard { dir: String },
     #[error("{dir}: it is a shard of another run than {first}")]
     OtherRun { dir: String, first: String },
-    #[error("{dir}: task {task} episode {episode} is also in {other}")]
-    DuplicateEpisode { dir: String, task: usize, episode: u32, other: String },
+    #[error("{dir}: {episode} is also in {other}")]
+    DuplicateEpisode { dir: String, episode: EpisodeIndex, other: String },
     #[error(
-        "suite {suite}: {missing} of {expected} episodes are missing, the first of which is task {task} episode {episode}: a shard is not given or not finished (--resume)"
+        "suite {suite}: {missing} of {expected} episodes are missing, the first of which is {first}: a shard is not given or not finished (--resume)"
     )]
-    Missing { suite: String, missing: usize, expected: usize, task: usize, episode: u32 },
+    Missing { suite: String, missing: usize, expected: usize, first: EpisodeIndex },
 }
 
 /// Merges the shards in `dirs` into the new folder `out`, and returns the summary of each merged run, sorted by suite.
@@ -103,7 +104,7 @@ impl<'a> MergedRun<'a> {
             manifest
         };
         let manifest = manifest_without_shard(&shards[0]);
-        let mut seen: BTreeMap<(usize, u32), &StoredRun> = BTreeMap::new();
+        let mut seen: BTreeMap<EpisodeIndex, &StoredRun> = BTreeMap::new();
         for run in shards {
             let dir = || run.dir.display().to_string();
             if run.manifest["shard"].is_null() {
@@ -113,30 +114,29 @@ impl<'a> MergedRun<'a> {
                 return Err(MergeError::OtherRun { dir: dir(), first: shards[0].dir.display().to_string() });
             }
             for record in &run.records {
-                let (task, episode) = (record.identity.task, record.identity.episode);
-                if let Some(other) = seen.insert((task, episode), run) {
+                let episode = record.header.id.index();
+                if let Some(other) = seen.insert(episode, run) {
                     let other = other.dir.display().to_string();
-                    return Err(MergeError::DuplicateEpisode { dir: dir(), task, episode, other });
+                    return Err(MergeError::DuplicateEpisode { dir: dir(), episode, other });
                 }
             }
         }
         let tasks = manifest["tasks"].as_array().into_iter().flatten();
         let tasks = tasks.filter_map(|task| Some(task.as_u64()? as usize));
         let episodes = manifest["episodes"].as_u64().unwrap_or(0) as u32;
-        let expected: BTreeSet<(usize, u32)> =
-            tasks.flat_map(|task| (0..episodes).map(move |episode| (task, episode))).collect();
-        let missing: Vec<_> = expected.iter().filter(|id| !seen.contains_key(id)).collect();
-        if let Some(&&(task, episode)) = missing.first() {
+        let expected: BTreeSet<EpisodeIndex> =
+            tasks.flat_map(|task| (0..episodes).map(move |episode| EpisodeIndex { task, episode })).collect();
+        let missing: Vec<_> = expected.iter().filter(|index| !seen.contains_key(index)).collect();
+        if let Some(&&first) = missing.first() {
             return Err(MergeError::Missing {
                 suite: shards[0].text("suite").to_owned(),
                 missing: missing.len(),
                 expected: expected.len(),
-                task,
-                episode,
+                first,
             });
         }
         let mut records: Vec<EpisodeRecord> = shards.iter().flat_map(|run| run.records.clone()).collect();
-        records.sort_by_key(|r| (r.identity.task, r.identity.episode));
+        records.sort_by_key(|r| r.header.id.index());
         Ok(Self { shards, manifest, records })
     }
 
@@ -154,7 +154,7 @@ impl<'a> MergedRun<'a> {
         let path = shards[0].dir.join(softvtbench_files::FOLDER).join(softvtbench_files::THRESHOLDS_JSON);
         softvtbench_files::write_scores(folder, records, &ThresholdFile::read(&path)?)?;
         // The records of a rigid twin carry its own suite name.
-        let suite = records.first().map_or(shards[0].suite(), |record| &record.identity.suite);
+        let suite = records.first().map_or(shards[0].suite(), |record| &record.header.id.suite);
         let summary = SuiteSummary::of(suite, shards[0].text("policy"), records);
         files::write_json(&folder.join(SUMMARY), &summary)?;
         Ok(summary)

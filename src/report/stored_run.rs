@@ -59,7 +59,7 @@ impl StoredRun {
 
     /// Name of the suite in the results, which differs from that in `run.json` for a rigid twin.
     pub fn suite(&self) -> &str {
-        self.records.first().map_or(self.text("suite"), |record| &record.identity.suite)
+        self.records.first().map_or(self.text("suite"), |record| &record.header.id.suite)
     }
 
     /// True if the policy has access to ground-truth state.
@@ -163,7 +163,7 @@ fn load_one(dir: &Path) -> Result<StoredRun, StoredRunError> {
         has("tasks", Value::is_array)?;
         has("episodes", Value::is_u64)?;
         let mut records = read_episodes(dir)?;
-        records.sort_by_key(|r| (r.identity.task, r.identity.episode));
+        records.sort_by_key(|r| r.header.id.index());
         let (is_finished, is_truncated) = (dir.join(SUMMARY).is_file(), is_truncated(dir));
         Ok(StoredRun { dir: dir.to_owned(), manifest: manifest.clone(), records, is_finished, is_truncated })
     };

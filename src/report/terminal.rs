@@ -160,8 +160,8 @@ mod tests {
 
     fn episode(task: usize, prompt: &str, edit: impl Fn(&mut EpisodeRecord)) -> EpisodeRecord {
         let mut record = sample();
-        record.identity.task = task;
-        record.identity.prompt = prompt.into();
+        record.header.id.task = task;
+        record.header.prompt = prompt.into();
         edit(&mut record);
         record
     }
@@ -205,7 +205,7 @@ mod tests {
     #[test]
     fn a_rigid_suite_shows_not_applicable() {
         let rigid = episode(0, "lift it", |r| {
-            r.identity.soft = false;
+            r.header.soft = false;
             (r.verdict.d_peak, r.verdict.deformation_ok, r.verdict.tau) = (None, None, None);
         });
         let text = table(&SuiteSummary::of("suite", "expert", &[rigid]));

@@ -118,7 +118,7 @@ pub enum EpisodeError {
 
 impl EpisodeSpec {
     fn sense_error(&self, source: SensingError) -> EpisodeError {
-        EpisodeError::Sense { task: self.task.id, episode: self.identity.episode, source }
+        EpisodeError::Sense { task: self.task.id, episode: self.header.id.episode, source }
     }
 }
 
@@ -204,7 +204,7 @@ impl Episode {
             (find("object", &spec.task.goal.object)?, find("target", &spec.task.goal.target)?);
         sim.settle().map_err(|source| EpisodeError::Settle {
             layout: spec.task.layout.clone(),
-            episode: spec.identity.episode,
+            episode: spec.header.id.episode,
             source,
         })?;
         let evidence = EvidenceCollector::new(&sim, target, goal);
@@ -309,7 +309,7 @@ impl Episode {
     }
 
     fn control_error(&self, source: ControlError) -> EpisodeError {
-        EpisodeError::Control { task: self.spec.task.id, episode: self.spec.identity.episode, source }
+        EpisodeError::Control { task: self.spec.task.id, episode: self.spec.header.id.episode, source }
     }
 
     /// The current observation with the requested streams.
@@ -455,7 +455,7 @@ impl Episode {
             state_hash: state_hash(&self.sim),
         };
         let outcome = self.outcome.clone().unwrap_or(Outcome::Timeout);
-        EpisodeRecord { identity: self.spec.identity.clone(), outcome, verdict: self.verdict(), stats }
+        EpisodeRecord { header: self.spec.header.clone(), outcome, verdict: self.verdict(), stats }
     }
 
     fn finish(self, gave_up: Option<String>) -> FinishedEpisode {

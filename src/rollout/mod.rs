@@ -36,5 +36,5 @@ pub use sensors::{BodyConfiguration, Proprioception, ROBOT_SEGMENTATION_ID, Sens
 pub use settle::SettleError;
 pub use simulation::{Simulation, state_hash};
 pub use soft_model::soft_model;
-pub use spec::{EpisodeRef, EpisodeSpec, target_asset};
+pub use spec::{EpisodeSpec, target_asset};
 pub use trace::{ObjectTrace, StepTrace};

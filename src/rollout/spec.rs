@@ -3,35 +3,22 @@
 use std::sync::Arc;
 
 use crate::{
-    benchmark::{Task, seed::Split, settings::Settings},
-    evaluation::{criteria::SuccessCriteria, record::Identity, safety::DeformationLimit},
+    benchmark::{Task, settings::Settings},
+    evaluation::{
+        criteria::SuccessCriteria, episode_id::EpisodeId, record::EpisodeHeader, safety::DeformationLimit,
+    },
     physics::PhysicsParams,
     robot::RobotSpec,
     scene::{Asset, Body, Scene},
     sensing::tactile::TactileSpec,
 };
 
-/// Identifies an episode of a task in a run.
-#[derive(Clone, Copy, Debug)]
-pub struct EpisodeRef<'a> {
-    /// Suite name.
-    pub suite: &'a str,
-    /// Index of the episode in its split.
-    pub episode: u32,
-    /// Seed of the run.
-    pub seed: u64,
-    /// List of episodes that `episode` counts in.
-    pub split: Split,
-    /// Policy name.
-    pub policy: &'a str,
-}
-
 /// Specification of an episode: task, scene and parameters. The controller
 /// is passed to [`Episode::run`](super::Episode::run).
 #[derive(Clone, Debug)]
 pub struct EpisodeSpec {
-    /// Identity, as in results.
-    pub identity: Identity,
+    /// First columns of its record.
+    pub header: EpisodeHeader,
     /// The task.
     pub task: Task,
     /// The scene, before settling.
@@ -56,31 +43,28 @@ pub struct EpisodeSpec {
 
 impl EpisodeSpec {
     /// An episode of `task` in `scene`, without a limit, recording or trace. `nominal` is the scene before any shift;
-    /// the identity of the episode names the asset that is the target there.
+    /// the header names the asset that is the target there.
     pub fn new(
-        episode: &EpisodeRef,
+        id: EpisodeId,
+        policy: &str,
         task: &Task,
         nominal: &Scene,
         scene: Scene,
         settings: &Settings,
     ) -> Self {
         let target = target_asset(nominal, task);
-        let identity = Identity {
-            suite: episode.suite.to_owned(),
-            task: task.id,
+        let header = EpisodeHeader {
+            id,
             prompt: task.prompt.clone(),
             layout: task.layout.clone(),
-            episode: episode.episode,
-            seed: episode.seed,
-            split: episode.split.name().to_owned(),
-            policy: episode.policy.to_owned(),
+            policy: policy.to_owned(),
             privileged: false,
             soft: target.is_some_and(|asset| matches!(asset.body, Body::Soft(_))),
             asset: target.map_or(String::new(), |asset| asset.name.clone()),
             origin: None,
         };
         Self {
-            identity,
+            header,
             task: task.clone(),
             scene: Arc::new(scene),
             limit: None,

@@ -22,7 +22,7 @@ pub use plan::{
     profile_file::load_profile,
 };
 pub use run::{
-    episode::{EpisodeRequest, EpisodeSetup, Scenes, check_shift},
+    episode::{EpisodeSetup, Scenes, check_shift},
     experiment::{Experiment, ExperimentRow, ExperimentSummary},
     expert::{Expert, ExpertController},
 };

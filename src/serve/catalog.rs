@@ -1,7 +1,8 @@
 //! The suites and settings of a server.
 
 use crate::{
-    benchmark::{Suite, Task, seed::Split},
+    benchmark::{Suite, Task},
+    evaluation::episode_id::{EpisodeId, Split},
     policy::profile::Profile,
     rollout::Episode,
 };
@@ -15,21 +16,6 @@ impl From<String> for RequestError {
     fn from(message: String) -> Self {
         Self(message)
     }
-}
-
-/// Identifies an episode among all episodes of a server.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct EpisodeId {
-    /// Name of the suite.
-    pub suite: String,
-    /// Index of the task in the suite.
-    pub task: usize,
-    /// Index of the episode in its split.
-    pub episode: u32,
-    /// Base seed.
-    pub seed: u64,
-    /// List of episodes that `episode` counts in.
-    pub split: Split,
 }
 
 /// A suite with the name under which it is served.

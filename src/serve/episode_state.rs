@@ -1,9 +1,10 @@
-//! State of an episode as data: its identity and all actions so far. The simulation is deterministic,
+//! State of an episode as data: its id and all actions so far. The simulation is deterministic,
 //! so they define it.
 
 use rmpv::Value;
 
-use super::catalog::{EpisodeId, ServerConfig};
+use super::catalog::ServerConfig;
+use crate::evaluation::episode_id::EpisodeId;
 use crate::npy::NpyArray;
 use crate::policy::{
     msgpack::{map, pack_array},
@@ -34,14 +35,14 @@ impl EpisodeState {
 
     /// Converts to msgpack.
     pub(super) fn to_value(&self, config: &ServerConfig) -> Value {
-        let EpisodeId { suite, task, episode, seed, split } = &self.id;
+        let EpisodeId { suite, task, episode, base_seed, split } = &self.id;
         let data = self.actions.iter().flatten().flat_map(|number| number.to_le_bytes()).collect();
         let actions = NpyArray { dtype: "<f8".to_owned(), shape: vec![self.actions.len(), ACTION_LEN], data };
         map([
             ("suite", suite.as_str().into()),
             ("task", (*task).into()),
             ("episode", (*episode).into()),
-            ("seed", (*seed).into()),
+            ("seed", (*base_seed).into()),
             ("split", split.name().into()),
             ("actions", pack_array(actions, true)),
             ("code", config.action_code().into()),
@@ -53,10 +54,11 @@ impl EpisodeState {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::benchmark::seed::Split;
+    use crate::evaluation::episode_id::Split;
 
     fn state(episode: u32, actions: &[f64]) -> EpisodeState {
-        let id = EpisodeId { suite: "one".to_owned(), task: 0, episode, seed: 0, split: Split::Validation };
+        let (suite, split) = ("one".to_owned(), Split::Validation);
+        let id = EpisodeId { suite, task: 0, episode, base_seed: 0, split };
         EpisodeState { id, actions: actions.iter().map(|x| [*x; ACTION_LEN]).collect() }
     }
 

@@ -13,7 +13,7 @@ use crate::{
 /// An episode in progress. A clone continues independently and gives byte-identical results.
 #[derive(Clone)]
 pub(super) struct LiveEpisode {
-    /// Its identity and the actions so far.
+    /// Its id and the actions so far.
     pub state: EpisodeState,
     /// The simulation.
     pub episode: Episode,

@@ -11,6 +11,6 @@ mod server;
 mod session;
 mod spaces;
 
-pub use catalog::{EpisodeId, RequestError, ServedSuite, ServerConfig};
+pub use catalog::{RequestError, ServedSuite, ServerConfig};
 pub use response::hello;
 pub use server::{Server, serve};

@@ -3,11 +3,11 @@
 use rmpv::Value;
 
 use super::{
-    catalog::{EpisodeId, RequestError, ServerConfig},
+    catalog::{RequestError, ServerConfig},
     episode_state::{ActionRow, EpisodeState},
 };
 use crate::{
-    benchmark::seed::Split,
+    evaluation::episode_id::{EpisodeId, Split},
     policy::{
         msgpack::{NumberArray, entry, kind, names, numbers},
         profile::ACTION_LEN,
@@ -99,14 +99,14 @@ fn episode_id(fields: &RequestFields, config: &ServerConfig) -> Result<EpisodeId
     let suite = config.suite(suite.as_deref()).map_err(prefixed)?.name.clone();
     let task = fields.required("task", fields.integer("task", u64::from(u32::MAX))?)? as usize;
     let episode = fields.required("episode", fields.integer("episode", u64::from(u32::MAX))?)? as u32;
-    let seed = fields.integer("seed", u64::MAX)?.unwrap_or(config.seed);
+    let base_seed = fields.integer("seed", u64::MAX)?.unwrap_or(config.seed);
     let split = match fields.text("split")? {
         None => config.split,
         Some(name) => name
             .parse::<Split>()
             .map_err(|error| fields.error(&format!("split is {:?}; {error}", shortened(&name))))?,
     };
-    let id = EpisodeId { suite, task, episode, seed, split };
+    let id = EpisodeId { suite, task, episode, base_seed, split };
     config.task(&id).map_err(prefixed)?;
     Ok(id)
 }

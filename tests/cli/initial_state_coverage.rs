@@ -4,10 +4,11 @@
 use std::{path::Path, sync::Arc};
 
 use softvt::{
-    benchmark::{Plan, seed::Split, settings::Settings},
+    benchmark::{Plan, settings::Settings},
+    evaluation::episode_id::{EpisodeId, Split},
     rollout::{AssetCache, Simulation, state_hash},
     scene::Scene,
-    script::{self, EpisodeRequest, EpisodeSetup, LoadedScript},
+    script::{self, EpisodeSetup, LoadedScript},
 };
 
 use crate::support::SPATIAL_SOFT;
@@ -20,16 +21,10 @@ fn loaded() -> LoadedScript {
     script::load(Path::new(SPATIAL_SOFT), &[]).expect("the suite loads")
 }
 
-fn scene(loaded: &LoadedScript, task: usize, episode: u64, base_seed: u64) -> Scene {
-    let request = EpisodeRequest {
-        suite: "spatial_soft".to_owned(),
-        task,
-        episode,
-        base_seed,
-        split: Split::Validation,
-        shifts: Vec::new(),
-    };
-    EpisodeSetup::open(loaded, &request).expect("the episode opens").scene
+fn scene(loaded: &LoadedScript, task: usize, episode: u32, base_seed: u64) -> Scene {
+    let id =
+        EpisodeId { suite: "spatial_soft".to_owned(), task, episode, base_seed, split: Split::Validation };
+    EpisodeSetup::open(loaded, &id, &[]).expect("the episode opens").scene
 }
 
 /// Position offsets (m) and yaw angles (rad) of both instances, and joint angles, over many layouts.

@@ -4,28 +4,25 @@
 use std::{path::Path, sync::Arc};
 
 use softvt::{
-    benchmark::{Plan, seed::Split, settings::Settings},
-    evaluation::{record::EpisodeRecord, summary::SuiteSummary},
+    benchmark::{Plan, settings::Settings},
+    evaluation::{
+        episode_id::{EpisodeId, Split},
+        record::EpisodeRecord,
+        summary::SuiteSummary,
+    },
     policy::{
         Action, ActionChunk, ChunkedPolicy, Observation, Policy, PolicyError, SensorStreams, TaskBrief,
     },
     report::terminal,
-    rollout::{AssetCache, Episode, EpisodeRef, EpisodeSpec, SensorAssets, SensorSuite, Simulation},
-    script::{self, EpisodeRequest, LoadedScript},
+    rollout::{AssetCache, Episode, EpisodeSpec, SensorAssets, SensorSuite, Simulation},
+    script::{self, LoadedScript},
     sensing::tactile::MosaicLayout,
 };
 
 use crate::support::{Project, SPATIAL_SOFT, Small};
 
-fn request(suite: &str, task: usize) -> EpisodeRequest {
-    EpisodeRequest {
-        suite: suite.to_owned(),
-        task,
-        episode: 0,
-        base_seed: 0,
-        split: Split::Validation,
-        shifts: Vec::new(),
-    }
+fn episode_id(suite: &str, task: usize) -> EpisodeId {
+    EpisodeId { suite: suite.to_owned(), task, episode: 0, base_seed: 0, split: Split::Validation }
 }
 
 /// Stores its observations.
@@ -54,12 +51,10 @@ impl Policy for &mut RecordingPolicy {
 fn played(project: &Project, streams: SensorStreams) -> Result<(Vec<Observation>, EpisodeRecord), String> {
     let loaded = script::load(&project.path("x.lua"), &[]).expect("it loads");
     let Plan::Suite(suite) = &loaded.plan else { panic!("a suite") };
-    let opened = script::EpisodeSetup::open(&loaded, &request("one", 0)).expect("it opens");
-    let which =
-        EpisodeRef { suite: &suite.name, episode: 0, seed: 0, split: Split::Validation, policy: "witness" };
-    let spec =
-        EpisodeSpec::new(&which, &suite.tasks[0], &opened.nominal, opened.scene.clone(), &suite.settings);
-    assert_eq!((spec.identity.asset.as_str(), spec.identity.soft), ("cube", true));
+    let opened = script::EpisodeSetup::open(&loaded, &episode_id("one", 0), &[]).expect("it opens");
+    let (id, scene) = (episode_id(&suite.name, 0), opened.scene.clone());
+    let spec = EpisodeSpec::new(id, "witness", &suite.tasks[0], &opened.nominal, scene, &suite.settings);
+    assert_eq!((spec.header.asset.as_str(), spec.header.soft), ("cube", true));
     let episode =
         Episode::start(spec, &AssetCache::default(), &SensorAssets::default()).map_err(|e| e.to_string())?;
     let mut witness = RecordingPolicy { streams, seen: Vec::new() };
@@ -196,8 +191,9 @@ fn left_and_right_are_those_of_the_image() {
     let Plan::Suite(suite) = &loaded.plan else { panic!("a suite") };
     let (settings, rests, looks) = (Settings::default(), AssetCache::default(), SensorAssets::default());
     for task in &suite.tasks {
-        let scene =
-            script::EpisodeSetup::open(&loaded, &request("spatial_soft", task.id)).expect("it opens").scene;
+        let scene = script::EpisodeSetup::open(&loaded, &episode_id("spatial_soft", task.id), &[])
+            .expect("it opens")
+            .scene;
         let sim =
             Simulation::new(Arc::new(scene), &settings.physics, &settings.robot, &rests).expect("it builds");
         let mut senses = SensorSuite::new(&sim, &settings.tactile, &looks);

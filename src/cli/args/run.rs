@@ -8,7 +8,7 @@ use super::{
     policy::PolicyArgs,
     values::{Requirement, Shard, TraceDetail, VideoSelection, parse_count, parse_folder, parse_seed},
 };
-use crate::benchmark::seed::Split;
+use crate::evaluation::episode_id::Split;
 
 // The script, and changes of its scenes and their physics.
 #[derive(Args, Clone, Debug)]

@@ -109,7 +109,8 @@ fn check_first_scenes(
         let task = tasks[job];
         let taken = parallel::lock(&idle).pop();
         let scenes = taken.map_or_else(|| Scenes::open(loaded), Ok).map_err(CliError::input)?;
-        let (nominal, scene) = scenes.of(&run.request(task, 0)).map_err(CliError::input)?;
+        let (nominal, scene) =
+            scenes.of(&run.episode_id(task, 0), &run.config.shifts).map_err(CliError::input)?;
         parallel::lock(&idle).push(scenes);
         run.check_scene(task, scene)?;
         Ok(target_asset(&nominal, task).cloned())

@@ -9,16 +9,14 @@ use crate::{
         output::print,
         run::{
             demo_replay::{DemoRef, check_complete, demos_of, replay_demos},
-            resimulate,
-            selection::EpisodeIndex,
-            stored_episode,
+            resimulate, stored_episode,
         },
     },
     dataset::{
         layout::is_dataset,
         manifest::{self, ManifestEntry},
     },
-    evaluation::record::EpisodeRecord,
+    evaluation::{episode_id::EpisodeIndex, record::EpisodeRecord},
     report::{
         actions,
         stored_run::{self, StoredRun},
@@ -46,8 +44,8 @@ pub(crate) fn run(args: &ReplayArgs) -> Result<(), CliError> {
         )));
     };
     let record = find_episode(stored, args.episode)?;
-    let index = EpisodeIndex::of(record);
-    let path = actions::path(&stored.dir, index.task, index.episode);
+    let index = record.header.id.index();
+    let path = actions::path(&stored.dir, index);
     let recorded = actions::read(&path).map_err(CliError::input)?;
     let simulated = stored_episode::simulate(stored, record, recorded)?;
     match resimulate::difference(record, &simulated)? {
@@ -66,7 +64,7 @@ fn find_episode(stored: &StoredRun, selector: EpisodeSelector) -> Result<&Episod
         EpisodeSelector::Line(line) => stored.records.get(line),
         EpisodeSelector::Episode { task, episode } => {
             let index = EpisodeIndex { task, episode };
-            stored.records.iter().find(|record| EpisodeIndex::of(record) == index)
+            stored.records.iter().find(|record| record.header.id.index() == index)
         }
     };
     found.ok_or_else(|| {

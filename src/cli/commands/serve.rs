@@ -16,10 +16,11 @@ use crate::{
             suite_run::SuiteRun,
         },
     },
+    evaluation::episode_id::EpisodeId,
     policy::Observation,
     rollout::cancel,
-    script::{self, EpisodeRequest, LoadedScript},
-    serve::{self, EpisodeId, RequestError, ServedSuite, Server, ServerConfig},
+    script::{self, LoadedScript},
+    serve::{self, RequestError, ServedSuite, Server, ServerConfig},
 };
 
 /// Serves the suites of a script until the process is interrupted.
@@ -42,15 +43,8 @@ pub(crate) fn run(args: &ServeArgs) -> Result<(), CliError> {
         let run = found.ok_or_else(|| format!("unknown suite {:?}", id.suite))?;
         let task = run.suite.tasks.iter().find(|task| task.id == id.task);
         let task = task.ok_or_else(|| format!("unknown task {}", id.task))?;
-        let request = EpisodeRequest {
-            suite: run.suite.name.clone(),
-            task: id.task,
-            episode: u64::from(id.episode),
-            base_seed: id.seed,
-            split: id.split,
-            shifts: config.shifts.clone(),
-        };
-        run.start_episode(task, &request).map_err(|error| RequestError(error.message))
+        let id = EpisodeId { suite: run.suite.name.clone(), ..id.clone() };
+        run.start_episode(task, &id).map_err(|error| RequestError(error.message))
     };
     let server_config = ServerConfig {
         suites: served,
@@ -135,8 +129,13 @@ fn provenance_hash(config: &RunConfig, loaded: &LoadedScript) -> String {
 fn first_observation(config: &RunConfig, server: &ServerConfig) -> Result<Observation, CliError> {
     let first = server.suites.iter().find_map(|served| Some((served, served.suite.tasks.first()?)));
     let (served, task) = first.ok_or_else(|| CliError::input("there is no task to serve"))?;
-    let (seed, split) = (server.seed, server.split);
-    let id = EpisodeId { suite: served.name.clone(), task: task.id, episode: 0, seed, split };
+    let id = EpisodeId {
+        suite: served.name.clone(),
+        task: task.id,
+        episode: 0,
+        base_seed: server.seed,
+        split: server.split,
+    };
     let mut episode = (server.start_episode)(&id).map_err(CliError::input)?;
     let streams = server.profile.streams();
     episode.begin(streams.clone());

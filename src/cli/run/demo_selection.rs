@@ -33,7 +33,7 @@ pub(crate) fn rejection(record: &EpisodeRecord) -> Option<String> {
         _ if !verdict.goal => "goal not reached",
         _ if !verdict.no_drop => "dropped",
         _ if verdict.deformation_ok == Some(false) => "deformed too much",
-        _ if record.identity.soft && verdict.tau.is_none() => "without a known limit of deformation",
+        _ if record.header.soft && verdict.tau.is_none() => "without a known limit of deformation",
         _ => "not safe",
     };
     Some(reason.to_owned())
@@ -41,7 +41,7 @@ pub(crate) fn rejection(record: &EpisodeRecord) -> Option<String> {
 
 /// Formats an attempt as one line of progress.
 pub(crate) fn attempt_line(record: &EpisodeRecord) -> String {
-    let id = &record.identity;
+    let id = &record.header.id;
     let result = match (rejection(record), &record.outcome) {
         (None, _) => "kept".to_owned(),
         (Some(reason), Outcome::Error { message }) => format!("not kept: {reason} ({message})"),

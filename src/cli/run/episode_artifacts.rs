@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::{
     cli::{args::VideoSelection, error::CliError, run::config::RunConfig},
-    evaluation::record::{EpisodeRecord, Identity},
+    evaluation::{episode_id::EpisodeIndex, record::EpisodeRecord},
     files,
     report::{
         actions,
@@ -38,23 +38,21 @@ impl<'a> EpisodeArtifacts<'a> {
     /// True if a video of the finished episode is requested.
     fn is_rendered(&self, record: &EpisodeRecord) -> bool {
         let is_excluded = self.video == Some(&VideoSelection::Failed) && record.verdict.safety;
-        self.may_render(record.identity.episode) && !is_excluded
+        self.may_render(record.header.id.episode) && !is_excluded
     }
 
     /// The requested files of a finished episode that do not exist.
     pub(crate) fn missing(&self, record: &EpisodeRecord) -> Vec<PathBuf> {
-        let id = &record.identity;
-        let mut requested = vec![
-            actions::path(self.dir, id.task, id.episode),
-            softvtbench_files::debug_log_path(self.dir, id.task, id.episode),
-        ];
+        let index = record.header.id.index();
+        let mut requested =
+            vec![actions::path(self.dir, index), softvtbench_files::debug_log_path(self.dir, index)];
         if self.trace {
-            requested.push(self.trace_path(id));
+            requested.push(self.trace_path(index));
         }
         if self.is_rendered(record) {
-            requested.push(video::video_path(self.dir, id.task, id.episode));
+            requested.push(video::video_path(self.dir, index));
             if !record.verdict.safety {
-                requested.push(video::still_path(self.dir, id.task, id.episode));
+                requested.push(video::still_path(self.dir, index));
             }
         }
         requested.retain(|path| !path.is_file());
@@ -66,13 +64,15 @@ impl<'a> EpisodeArtifacts<'a> {
     /// # Errors
     /// A file cannot be written.
     pub(crate) fn write(&self, finished: &FinishedEpisode) -> Result<(), CliError> {
-        let id = &finished.record.identity;
+        let header = &finished.record.header;
+        let index = header.id.index();
         if self.trace {
-            files::write_json_lines(&self.trace_path(id), &finished.trace).map_err(CliError::input)?;
+            files::write_json_lines(&self.trace_path(index), &finished.trace).map_err(CliError::input)?;
         }
-        let path = softvtbench_files::debug_log_path(self.dir, id.task, id.episode);
-        softvtbench_files::write_debug_log(&path, id, &debug_frames(finished)).map_err(CliError::input)?;
-        let path = actions::path(self.dir, id.task, id.episode);
+        let path = softvtbench_files::debug_log_path(self.dir, index);
+        softvtbench_files::write_debug_log(&path, header, &debug_frames(finished))
+            .map_err(CliError::input)?;
+        let path = actions::path(self.dir, index);
         actions::write(&path, &finished.actions).map_err(CliError::input)
     }
 
@@ -86,30 +86,31 @@ impl<'a> EpisodeArtifacts<'a> {
         if !self.is_rendered(record) {
             return Ok(());
         }
-        let (id, caption) = (&record.identity, Caption::new(record));
-        let path = video::video_path(self.dir, id.task, id.episode);
+        let (index, caption) = (record.header.id.index(), Caption::new(record));
+        let path = video::video_path(self.dir, index);
         files::create_folder(path.parent().unwrap_or(self.dir)).map_err(CliError::input)?;
         if !record.verdict.safety {
             let worst = video::worst_state(&states);
-            let still = video::still_path(self.dir, id.task, id.episode);
+            let still = video::still_path(self.dir, index);
             video::write_video_frame(&mut states, &caption, worst, &still).map_err(video_error)?;
         }
         video::write_video(&mut states, &caption, &path, cancel::requested).map_err(video_error)
     }
 
-    fn trace_path(&self, id: &Identity) -> PathBuf {
-        self.dir.join(format!("trace/task_{:03}/episode_{:05}.jsonl", id.task, id.episode))
+    fn trace_path(&self, index: EpisodeIndex) -> PathBuf {
+        let EpisodeIndex { task, episode } = index;
+        self.dir.join(format!("trace/task_{task:03}/episode_{episode:05}.jsonl"))
     }
 }
 
 /// The log of every control step that the scorer of SoftVTBench reads.
 fn debug_frames(finished: &FinishedEpisode) -> Vec<DebugFrame> {
-    let identity = &finished.record.identity;
+    let header = &finished.record.header;
     let frame = |(step, frame): (usize, &ScoreFrame)| {
         let (d, reference) = (frame.deformation.as_ref(), finished.reference.as_ref());
         let (rms, max, bbox) = (d.map(|d| d.rms_pct), d.map(|d| d.max_pct), d.map(|d| d.bbox_m));
-        let shape = DebugShape::new(&identity.asset, reference, rms, max, bbox);
-        DebugFrame::new(identity, step as u32, frame.success_now, shape)
+        let shape = DebugShape::new(&header.asset, reference, rms, max, bbox);
+        DebugFrame::new(&header.id, step as u32, frame.success_now, shape)
     };
     let mut frames: Vec<DebugFrame> = finished.frames.iter().enumerate().map(frame).collect();
     if frames.len() < finished.record.stats.steps as usize {
@@ -121,13 +122,13 @@ fn debug_frames(finished: &FinishedEpisode) -> Vec<DebugFrame> {
 /// The row of a control step in which the physics failed. A peak of the rollout above that of all complete steps
 /// belongs to this step.
 fn aborted_frame(finished: &FinishedEpisode, step: usize) -> DebugFrame {
-    let (identity, verdict) = (&finished.record.identity, &finished.record.verdict);
+    let (header, verdict) = (&finished.record.header, &finished.record.verdict);
     let before = finished.frames.iter().filter_map(|frame| Some(frame.deformation.as_ref()?.rms_pct));
     let before = before.fold(0.0, f64::max);
     let peak = verdict.d_peak.filter(|peak| *peak > before);
     let reference = finished.reference.as_ref();
-    let shape = DebugShape::new(&identity.asset, reference, peak, verdict.d_peak_max, None);
-    DebugFrame::new(identity, step as u32, false, shape)
+    let shape = DebugShape::new(&header.asset, reference, peak, verdict.d_peak_max, None);
+    DebugFrame::new(&header.id, step as u32, false, shape)
 }
 
 /// Converts the error of a video or still.

@@ -9,7 +9,8 @@ use std::{
 };
 
 use crate::{
-    cli::run::{config::RunConfig, policy::expert_controller, selection::EpisodeIndex, suite_run::SuiteRun},
+    cli::run::{config::RunConfig, policy::expert_controller, suite_run::SuiteRun},
+    evaluation::episode_id::EpisodeIndex,
     parallel,
     policy::{Action, Observation, SensorStreams},
     rollout::{ControlError, Controller, Simulation},
@@ -27,7 +28,7 @@ pub(crate) fn record_grips(config: &RunConfig, run: &mut SuiteRun, log: &GripLog
         Ok(Box::new(GripRecorder {
             expert: expert_controller(opened, mode)?,
             is_holding: Vec::new(),
-            index: EpisodeIndex { task: brief.task, episode: brief.episode },
+            index: brief.index(),
             log: log.clone(),
         }))
     });

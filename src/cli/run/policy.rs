@@ -16,7 +16,7 @@ use crate::{
         remote::{PolicyConnections, PolicyServer, Protocol, RemotePolicy},
     },
     rollout::{Controller, cancel},
-    script::{self, ExpertController, PolicyFile, load_profile},
+    script::{EpisodeSetup, ExpertController, PolicyFile, load_profile},
 };
 
 /// Environment variable with the key of a policy server. A flag would show it to other users of the machine.
@@ -28,7 +28,7 @@ const DEFAULT_TIMEOUT: Duration = Duration::from_secs(60);
 
 /// Makes the controller of an episode.
 pub(crate) type ControllerFactory =
-    Box<dyn Fn(script::EpisodeSetup, TaskBrief) -> Result<Box<dyn Controller>, CliError> + Sync>;
+    Box<dyn Fn(EpisodeSetup, TaskBrief) -> Result<Box<dyn Controller>, CliError> + Sync>;
 
 /// Configuration of a policy server.
 #[derive(Debug)]
@@ -254,10 +254,7 @@ impl PolicyConfig {
 ///
 /// # Errors
 /// The task has none, or its script fails.
-pub(crate) fn expert_controller(
-    opened: script::EpisodeSetup,
-    mode: GripMode,
-) -> Result<ExpertController, CliError> {
+pub(crate) fn expert_controller(opened: EpisodeSetup, mode: GripMode) -> Result<ExpertController, CliError> {
     let expert = opened.expert();
     let expert = expert.ok_or_else(|| CliError::input("the task has no expert"))?;
     Ok(match mode {

@@ -31,7 +31,7 @@ impl SuiteRun<'_> {
     pub(crate) fn prepare(&mut self, tasks: &[&Task]) -> Result<(), CliError> {
         for task in tasks {
             let first = self.jobs.iter().find(|job| job.task.id == task.id).map_or(0, |job| job.episode);
-            let opened = self.open_episode(&self.request(task, first))?;
+            let opened = self.open_episode(&self.episode_id(task, first))?;
             self.check_object_type(task, &opened.nominal)?;
             self.read_limit(target_asset(&opened.nominal, task).cloned())?;
             let scene = Arc::new(opened.scene.clone());

@@ -6,14 +6,12 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use crate::{
-    benchmark::{Suite, seed::Split},
+    benchmark::Suite,
     cli::{
         error::CliError,
-        run::{
-            config::RunConfig,
-            selection::{EpisodeIndex, EpisodeJob},
-        },
+        run::{config::RunConfig, selection::EpisodeJob},
     },
+    evaluation::episode_id::{EpisodeIndex, Split},
     files::FileError,
     policy::{Action, TaskBrief},
     report::{
@@ -131,7 +129,7 @@ impl RecordedRuns {
         brief: &TaskBrief,
     ) -> Result<Vec<Action>, CliError> {
         let dir = self.run_of(suite, is_twin).map_or(&self.dir, |run| &run.dir);
-        actions::read(&actions::path(dir, brief.task, brief.episode)).map_err(CliError::input)
+        actions::read(&actions::path(dir, brief.index())).map_err(CliError::input)
     }
 }
 
@@ -144,15 +142,15 @@ fn is_rigid_twin(run: &StoredRun) -> bool {
 }
 
 fn has_actions(run: &StoredRun, index: EpisodeIndex) -> bool {
-    let is_listed = run.records.iter().any(|record| EpisodeIndex::of(record) == index);
-    is_listed && actions::path(&run.dir, index.task, index.episode).is_file()
+    let is_listed = run.records.iter().any(|record| record.header.id.index() == index);
+    is_listed && actions::path(&run.dir, index).is_file()
 }
 
 /// SHA-256 of the list of episodes and of the actions of each, in the order of the list.
 fn digest(run: &StoredRun) -> Result<String, FileError> {
     let mut hash = Sha256::new();
     let list = run.dir.join(EPISODES);
-    let actions = run.records.iter().map(|r| actions::path(&run.dir, r.identity.task, r.identity.episode));
+    let actions = run.records.iter().map(|r| actions::path(&run.dir, r.header.id.index()));
     for path in std::iter::once(list).chain(actions) {
         let bytes = std::fs::read(&path).map_err(FileError::io("read", &path))?;
         // Lengths separate the files, so that no two sequences of files have the same input.

@@ -64,7 +64,7 @@ mod tests {
         let records: Vec<_> = (0..of)
             .map(|i| {
                 let mut record = sample();
-                record.identity.episode = i as u32;
+                record.header.id.episode = i as u32;
                 record.verdict.safety = i < safe;
                 record
             })

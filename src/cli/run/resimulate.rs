@@ -8,7 +8,6 @@ use crate::{
             episode_artifacts::EpisodeArtifacts,
             policy::ControllerFactory,
             run_manifest,
-            selection::EpisodeIndex,
             suite_run::{SuiteRun, report_unrendered},
         },
     },
@@ -34,8 +33,8 @@ pub(crate) fn replay_factory(recorded: Vec<Action>, record: &EpisodeRecord) -> C
 
 /// Copies from `record` what a re-simulation does not produce: the policy, what it observed, and why it gave up.
 pub(crate) fn with_policy_fields(mut simulated: EpisodeRecord, record: &EpisodeRecord) -> EpisodeRecord {
-    simulated.identity.policy.clone_from(&record.identity.policy);
-    simulated.identity.privileged = record.identity.privileged;
+    simulated.header.policy.clone_from(&record.header.policy);
+    simulated.header.privileged = record.header.privileged;
     simulated.stats.force_observed = record.stats.force_observed;
     simulated.stats.camera_inside = record.stats.camera_inside;
     simulated.stats.gave_up.clone_from(&record.stats.gave_up);
@@ -66,16 +65,14 @@ pub(crate) fn difference(
 pub(crate) fn restore_artifacts(run: &SuiteRun, records: &[EpisodeRecord]) -> Result<(), CliError> {
     let artifacts = run.artifacts();
     let incomplete = records.iter().filter(|record| !artifacts.missing(record).is_empty());
-    let has_actions = |record: &EpisodeRecord| {
-        actions::path(&run.out, record.identity.task, record.identity.episode).is_file()
-    };
+    let has_actions = |record: &EpisodeRecord| actions::path(&run.out, record.header.id.index()).is_file();
     let (restorable, lost): (Vec<_>, Vec<_>) =
         incomplete.partition(|record| has_actions(record) || !run.config.policy.is_remote());
     if let Some(first) = lost.first() {
         notice(format!(
             "{} finished episodes lack their actions, so their files cannot be restored (first: {}); their results stay",
             lost.len(),
-            EpisodeIndex::of(first)
+            first.header.id.index()
         ));
     }
     if let Some(path) = restorable.first().and_then(|record| artifacts.missing(record).into_iter().next()) {
@@ -115,11 +112,11 @@ fn simulate(
     has_actions: bool,
     artifacts: &EpisodeArtifacts,
 ) -> Result<Option<SimulatedEpisode>, CliError> {
-    let index = EpisodeIndex::of(record);
+    let index = record.header.id.index();
     let Some(job) = run.jobs.iter().find(|job| job.index() == index).copied() else { return Ok(None) };
     let keep_states = artifacts.may_render(index.episode);
     let mut finished = if has_actions {
-        let path = actions::path(&run.out, index.task, index.episode);
+        let path = actions::path(&run.out, index);
         let recorded = actions::read(&path).map_err(CliError::input)?;
         run.run_episode(job, keep_states, &replay_factory(recorded, record))?
     } else {

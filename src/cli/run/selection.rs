@@ -1,31 +1,12 @@
 //! Selection of suites, tasks and episodes by the command line, and the folders they are written to.
 
-use std::{collections::BTreeSet, fmt};
+use std::collections::BTreeSet;
 
 use crate::{
     benchmark::{Plan, Suite, Task},
     cli::{error::CliError, run::config::RunConfig},
-    evaluation::record::EpisodeRecord,
+    evaluation::episode_id::EpisodeIndex,
 };
-
-/// An episode of a suite: the index of its task and its own.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct EpisodeIndex {
-    pub task: usize,
-    pub episode: u32,
-}
-
-impl EpisodeIndex {
-    pub(crate) fn of(record: &EpisodeRecord) -> Self {
-        Self { task: record.identity.task, episode: record.identity.episode }
-    }
-}
-
-impl fmt::Display for EpisodeIndex {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "task {} episode {}", self.task, self.episode)
-    }
-}
 
 /// An episode to run.
 #[derive(Clone, Copy, Debug)]

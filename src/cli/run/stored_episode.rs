@@ -5,18 +5,18 @@ use std::path::PathBuf;
 use serde_json::{Value, json};
 
 use crate::{
-    benchmark::{Plan, Suite, seed::Split},
+    benchmark::{Plan, Suite},
     cli::{
         error::CliError,
         run::{
             config::RunConfig,
             policy::PolicyConfig,
             resimulate::{replay_factory, with_policy_fields},
-            selection::{EpisodeIndex, EpisodeJob, select_tasks},
+            selection::{EpisodeJob, select_tasks},
             suite_run::SuiteRun,
         },
     },
-    evaluation::record::EpisodeRecord,
+    evaluation::{episode_id::Split, record::EpisodeRecord},
     policy::Action,
     report::stored_run::StoredRun,
     script,
@@ -31,7 +31,7 @@ pub(crate) fn simulate(
     record: &EpisodeRecord,
     recorded: Vec<Action>,
 ) -> Result<EpisodeRecord, CliError> {
-    let index = EpisodeIndex::of(record);
+    let index = record.header.id.index();
     let config = RunConfig { tasks: vec![index.task.to_string()], ..stored_config(stored)? };
     let loaded = script::load(&config.file, &config.script_options).map_err(CliError::input)?;
     let suite = stored_suite(&loaded.plan, &config, stored)?;
@@ -40,7 +40,7 @@ pub(crate) fn simulate(
     let mut run = SuiteRun::new(&config, &loaded, suite, vec![job], PathBuf::new())?;
     run.split = stored_split(stored)?;
     run.controllers = replay_factory(recorded, record);
-    run.origins.extend(record.identity.origin.iter().map(|origin| (index, (**origin).clone())));
+    run.origins.extend(record.header.origin.iter().map(|origin| (index, (**origin).clone())));
     run.prepare(&tasks)?;
     check_sources(stored, &run)?;
     Ok(with_policy_fields(run.run_episode(job, false, &run.controllers)?.record, record))
@@ -48,9 +48,7 @@ pub(crate) fn simulate(
 
 fn stored_split(stored: &StoredRun) -> Result<Split, CliError> {
     let name = stored.text("split");
-    let known = [Split::Validation, Split::Demonstration, Split::Experiment];
-    let split = known.into_iter().find(|split| split.name() == name);
-    split.ok_or_else(|| CliError::input(format!("{}: unknown split {name:?}", stored.dir.display())))
+    name.parse().map_err(|_| CliError::input(format!("{}: unknown split {name:?}", stored.dir.display())))
 }
 
 /// The configuration of a stored run, with a policy whose actions come from elsewhere.

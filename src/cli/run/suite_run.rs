@@ -7,7 +7,7 @@ use std::{
 };
 
 use crate::{
-    benchmark::{ShiftValue, Suite, Task, seed::Split, settings::Settings},
+    benchmark::{ShiftValue, Suite, Task, settings::Settings},
     cli::{
         args::TraceDetail,
         error::{CliError, Exit},
@@ -20,11 +20,12 @@ use crate::{
             recorded_policy::{ReplaySource, find_replay_source},
             resimulate,
             run_manifest::{self, RunManifest},
-            selection::{EpisodeIndex, EpisodeJob},
+            selection::EpisodeJob,
         },
     },
     dataset::card::Imported,
     evaluation::{
+        episode_id::{EpisodeId, EpisodeIndex, Split},
         record::{EpisodeRecord, Origin, Outcome},
         safety::{DeformationLimit, NOMINAL_KAPPA},
         summary::SuiteSummary,
@@ -37,11 +38,11 @@ use crate::{
         softvtbench_files,
     },
     rollout::{
-        AssetCache, BuildError, Cancellable, ControlError, Episode, EpisodeError, EpisodeRef, EpisodeSpec,
+        AssetCache, BuildError, Cancellable, ControlError, Episode, EpisodeError, EpisodeSpec,
         FinishedEpisode, SensorAssets, cancel, target_asset,
     },
     scene::{Asset, Body},
-    script::{self, LoadedScript},
+    script::{self, EpisodeSetup, LoadedScript},
     text::counted,
 };
 
@@ -146,11 +147,9 @@ impl<'a> SuiteRun<'a> {
     }
 
     /// Builds the scene of an episode: its layout, the shifts, and the rigid twin if requested.
-    pub(crate) fn open_episode(
-        &self,
-        request: &script::EpisodeRequest,
-    ) -> Result<script::EpisodeSetup, CliError> {
-        let mut opened = script::EpisodeSetup::open(self.loaded, request).map_err(CliError::input)?;
+    pub(crate) fn open_episode(&self, id: &EpisodeId) -> Result<EpisodeSetup, CliError> {
+        let opened = EpisodeSetup::open(self.loaded, id, &self.config.shifts);
+        let mut opened = opened.map_err(CliError::input)?;
         if self.config.is_rigid_twin {
             (opened.scene, opened.nominal) = (opened.scene.rigid_twin(), opened.nominal.rigid_twin());
         }
@@ -167,14 +166,14 @@ impl<'a> SuiteRun<'a> {
             || self.replay_source.as_ref().is_some_and(|source| source.privileged)
     }
 
-    pub(crate) fn request(&self, task: &Task, episode: u32) -> script::EpisodeRequest {
-        script::EpisodeRequest {
+    /// Id of an episode of the run. The suite has its name in the script, which may differ from that in results.
+    pub(crate) fn episode_id(&self, task: &Task, episode: u32) -> EpisodeId {
+        EpisodeId {
             suite: self.suite.name.clone(),
             task: task.id,
-            episode: u64::from(episode),
+            episode,
             base_seed: self.config.seed,
             split: self.split,
-            shifts: self.config.shifts.clone(),
         }
     }
 
@@ -184,7 +183,7 @@ impl<'a> SuiteRun<'a> {
     /// A layout or a calibration file that is not valid.
     pub(crate) fn read_limits(&mut self, tasks: &[Task]) -> Result<(), CliError> {
         tasks.iter().try_for_each(|task| {
-            let opened = self.open_episode(&self.request(task, 0))?;
+            let opened = self.open_episode(&self.episode_id(task, 0))?;
             self.read_limit(target_asset(&opened.nominal, task).cloned())
         })
     }
@@ -271,7 +270,7 @@ impl<'a> SuiteRun<'a> {
             Ok(()) if cancel::requested() => return Err(interrupted()),
             Ok(()) => {}
         }
-        records.sort_by_key(EpisodeIndex::of);
+        records.sort_by_key(|record| record.header.id.index());
         folder.write_in_order(&records).map_err(CliError::input)?;
         softvtbench_files::write_scores(&self.out, &records, &self.thresholds).map_err(CliError::input)?;
         let result = self.summarize(records);
@@ -317,9 +316,10 @@ impl<'a> SuiteRun<'a> {
         let requested: BTreeSet<_> = self.jobs.iter().map(EpisodeJob::index).collect();
         let mut seen = BTreeSet::new();
         for (number, record) in records.iter().enumerate() {
-            let id = &record.identity;
-            let (config, index) = (self.config, EpisodeIndex::of(record));
-            let is_own = id.suite == self.name && id.seed == config.seed && id.policy == config.policy.name();
+            let (config, header) = (self.config, &record.header);
+            let (id, index) = (&header.id, header.id.index());
+            let is_own =
+                id.suite == self.name && id.base_seed == config.seed && header.policy == config.policy.name();
             let problem = if !is_own || !requested.contains(&index) {
                 "belongs to another run"
             } else if !seen.insert(index) {
@@ -334,7 +334,7 @@ impl<'a> SuiteRun<'a> {
 
     /// Positions in `jobs` of the episodes that are not in `records`.
     fn remaining(&self, records: &[EpisodeRecord]) -> Vec<usize> {
-        let finished: BTreeSet<_> = records.iter().map(EpisodeIndex::of).collect();
+        let finished: BTreeSet<_> = records.iter().map(|record| record.header.id.index()).collect();
         (0..self.jobs.len()).filter(|&job| !finished.contains(&self.jobs[job].index())).collect()
     }
 
@@ -397,7 +397,7 @@ impl<'a> SuiteRun<'a> {
         keep_states: bool,
         controllers: &ControllerFactory,
     ) -> Result<Result<FinishedEpisode, EpisodeError>, CliError> {
-        let (spec, opened) = self.spec(job.task, &self.request(job.task, job.episode), origin)?;
+        let (spec, opened) = self.spec(job.task, &self.episode_id(job.task, job.episode), origin)?;
         let mut controller = Cancellable(controllers(opened, self.brief(job.task, job.episode))?);
         let spec = EpisodeSpec { record_states: keep_states, ..spec };
         let started = Episode::start(spec, &self.assets, &self.sensor_assets);
@@ -408,12 +408,8 @@ impl<'a> SuiteRun<'a> {
     ///
     /// # Errors
     /// The script or the scene fails.
-    pub(crate) fn start_episode(
-        &self,
-        task: &Task,
-        request: &script::EpisodeRequest,
-    ) -> Result<Episode, CliError> {
-        let (spec, _) = self.spec(task, request, None)?;
+    pub(crate) fn start_episode(&self, task: &Task, id: &EpisodeId) -> Result<Episode, CliError> {
+        let (spec, _) = self.spec(task, id, None)?;
         Episode::start(spec, &self.assets, &self.sensor_assets).map_err(|e| self.episode_error(&e))
     }
 
@@ -421,25 +417,19 @@ impl<'a> SuiteRun<'a> {
     fn spec(
         &self,
         task: &Task,
-        request: &script::EpisodeRequest,
+        id: &EpisodeId,
         origin: Option<&Origin>,
-    ) -> Result<(EpisodeSpec, script::EpisodeSetup), CliError> {
-        let mut opened = self.open_episode(request)?;
+    ) -> Result<(EpisodeSpec, EpisodeSetup), CliError> {
+        let mut opened = self.open_episode(id)?;
         if let Some(origin) = origin {
             origin.start.apply(&mut opened.scene);
         }
         let limit = target_asset(&opened.nominal, task).and_then(|asset| self.limit_of(asset));
-        let episode = EpisodeRef {
-            suite: &self.name,
-            episode: request.episode as u32,
-            seed: request.base_seed,
-            split: request.split,
-            policy: self.config.policy.name(),
-        };
-        let mut spec =
-            EpisodeSpec::new(&episode, task, &opened.nominal, opened.scene.clone(), &self.settings);
-        spec.identity.privileged = self.is_privileged();
-        spec.identity.origin = origin.cloned().map(Box::new);
+        let id = EpisodeId { suite: self.name.clone(), ..id.clone() };
+        let (policy, scene) = (self.config.policy.name(), opened.scene.clone());
+        let mut spec = EpisodeSpec::new(id, policy, task, &opened.nominal, scene, &self.settings);
+        spec.header.privileged = self.is_privileged();
+        spec.header.origin = origin.cloned().map(Box::new);
         let record_trace = self.config.trace.is_some();
         let trace_nodes = self.config.trace == Some(TraceDetail::Nodes);
         Ok((EpisodeSpec { limit, record_trace, trace_nodes, ..spec }, opened))
@@ -494,7 +484,7 @@ pub(crate) fn is_finished(dir: &Path) -> bool {
 /// Reports an episode whose video could not be written. The episode counts nevertheless.
 pub(crate) fn report_unrendered(finished: &FinishedEpisode, rendered: Result<(), CliError>) {
     if let Err(error) = rendered {
-        notice(format!("no video of {}: {error}", EpisodeIndex::of(&finished.record)));
+        notice(format!("no video of {}: {error}", finished.record.header.id.index()));
     }
 }
 
@@ -514,7 +504,7 @@ pub(crate) fn episode_line(record: &EpisodeRecord) -> String {
     };
     let stats = &record.stats;
     let reason = stats.gave_up.as_ref().map_or(String::new(), |reason| format!("; gave up: {reason}"));
-    format!("{}: {outcome}, {:.1} s{reason}", EpisodeIndex::of(record), stats.time_s)
+    format!("{}: {outcome}, {:.1} s{reason}", record.header.id.index(), stats.time_s)
 }
 
 #[cfg(test)]
@@ -546,7 +536,7 @@ mod tests {
         }
     }
 
-    fn force_observer(_: script::EpisodeSetup, brief: TaskBrief) -> Result<Box<dyn Controller>, CliError> {
+    fn force_observer(_: EpisodeSetup, brief: TaskBrief) -> Result<Box<dyn Controller>, CliError> {
         Ok(Box::new(ChunkedPolicy::new(Box::new(ForceObserver), brief, 1)))
     }
 

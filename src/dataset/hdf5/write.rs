@@ -73,7 +73,8 @@ impl<'a> Hdf5Writer<'a> {
         let key = format!("data/demo_{demo}");
         let group = self.group(&key)?;
         let failed = |error| DatasetError::hdf5(self.path, &key)(error);
-        let id = &record.identity;
+        let header = &record.header;
+        let id = &header.id;
         for (name, number) in [
             ("num_samples", steps as i64),
             ("task_id", id.task as i64),
@@ -86,8 +87,8 @@ impl<'a> Hdf5Writer<'a> {
         let metadata = json!(record).to_string();
         for (name, text) in [
             ("task_suite", id.suite.as_str()),
-            ("language", &id.prompt),
-            ("asset_name", &id.asset),
+            ("language", &header.prompt),
+            ("asset_name", &header.asset),
             ("state_hash", &record.stats.state_hash),
             ("metadata_json", &metadata),
         ] {

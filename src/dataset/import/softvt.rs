@@ -1,15 +1,16 @@
 //! softvt's own files: the recorded commands, from the initial state of the same episode.
 
 use super::{DatasetError, DemoReader, ForeignDemo, ForeignTask, InitialCondition};
-use crate::{benchmark::seed::Split, policy::ToolCommand};
+use crate::{evaluation::episode_id::Split, policy::ToolCommand};
 
 /// # Errors
 /// A stream is missing, or the file is not of the split of demonstrations.
 pub(super) fn demo(reader: DemoReader) -> Result<ForeignDemo, DatasetError> {
     let record = reader.file.record(reader.demo)?;
-    let id = &record.identity;
-    if id.split != Split::Demonstration.name() {
-        let what = format!("its split is {}; expected demonstration", id.split);
+    let header = &record.header;
+    let id = &header.id;
+    if id.split != Split::Demonstration {
+        let what = format!("its split is {}; expected demonstration", id.split.name());
         return Err(reader.error("metadata_json", what));
     }
     let commands: Vec<ToolCommand> =
@@ -20,15 +21,15 @@ pub(super) fn demo(reader: DemoReader) -> Result<ForeignDemo, DatasetError> {
         task: ForeignTask {
             suite: Some(id.suite.clone()),
             id: Some(id.task),
-            prompts: vec![id.prompt.clone()],
+            prompts: vec![header.prompt.clone()],
         },
         is_stopped_by_object: vec![false; commands.len()],
         gripper_closed: binary.iter().map(|row| row[6] > 0.5).collect(),
         commands,
         initial_condition: InitialCondition::SoftvtEpisode {
-            seed: id.seed,
+            seed: id.base_seed,
             attempt: id.episode,
-            start: id.origin.as_ref().map(|origin| origin.start.clone()).unwrap_or_default(),
+            start: header.origin.as_ref().map(|origin| origin.start.clone()).unwrap_or_default(),
         },
         command_source: "its actions, from the start of its own episode",
     })

@@ -1,4 +1,4 @@
-//! [`Episode`]: the rows of an episode with their statistics, ready to be written.
+//! [`EpisodeData`]: the rows of an episode with their statistics, ready to be written.
 
 use image::{
     ExtendedColorType, ImageEncoder, ImageError, RgbImage,
@@ -31,12 +31,12 @@ const MARKER_RANGE: f64 = 400.0;
 
 /// Writes the files of a layout, episode by episode.
 pub(super) trait EpisodeWriter: Send {
-    fn add(&mut self, episode: Episode<'_>) -> Result<(), DatasetError>;
+    fn add(&mut self, episode: EpisodeData<'_>) -> Result<(), DatasetError>;
     fn finish(self: Box<Self>) -> Result<(), DatasetError>;
 }
 
 /// An episode ready to be written.
-pub(super) struct Episode<'a> {
+pub(super) struct EpisodeData<'a> {
     pub index: usize,
     pub demo: &'a SelectedDemo,
     pub rows: EpisodeRows,
@@ -59,7 +59,7 @@ pub(super) struct EpisodeRows {
     image_counts: [[ValueCounts; 3]; 3],
 }
 
-impl<'a> Episode<'a> {
+impl<'a> EpisodeData<'a> {
     /// Reads episode `index`.
     ///
     /// # Errors

@@ -17,7 +17,7 @@ mod v21;
 mod v30;
 
 use self::{
-    episode::{Episode, EpisodeWriter},
+    episode::{EpisodeData, EpisodeWriter},
     features::Feature,
     selection::Selection,
     staged_dir::StagedDir,
@@ -70,7 +70,7 @@ fn write(
         demos.len(),
         config.threads,
         || false,
-        |index| Episode::read(config, selection, index, &is_cancelled),
+        |index| EpisodeData::read(config, selection, index, &is_cancelled),
         |index, episode| {
             writer.add(episode)?;
             let id = &demos[index].entry;

@@ -13,7 +13,7 @@ use serde_json::json;
 
 use super::{
     config::CHUNK,
-    episode::{Episode, EpisodeWriter},
+    episode::{EpisodeData, EpisodeWriter},
     features::{self, Feature},
     parquet_table::{KeyValueNote, ParquetColumn, ParquetTable},
     statistics::{FeatureStatistics, NestedList},
@@ -80,7 +80,7 @@ fn image_name(step: usize) -> String {
 }
 
 impl EpisodeWriter for Writer21 {
-    fn add(&mut self, episode: Episode<'_>) -> Result<(), DatasetError> {
+    fn add(&mut self, episode: EpisodeData<'_>) -> Result<(), DatasetError> {
         let (index, steps) = (episode.index, episode.rows.steps);
         let line = json!({ "episode_index": index, "tasks": [episode.demo.entry.language], "length": steps });
         // The values were measured in single precision, and LeRobot reads this file completely.

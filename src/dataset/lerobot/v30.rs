@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 
 use super::{
     config::{CHUNK, MAX_TABLE_MB},
-    episode::{Episode, EpisodeWriter},
+    episode::{EpisodeData, EpisodeWriter},
     features::{self, Feature},
     parquet_table::{ColumnType, ColumnValues, KeyValueNote, ParquetColumn, ParquetTable},
     statistics::{FeatureFigures, FeatureStatistics, NestedList},
@@ -87,7 +87,7 @@ fn image_name(step: usize) -> String {
 }
 
 impl EpisodeWriter for Writer30 {
-    fn add(&mut self, mut episode: Episode<'_>) -> Result<(), DatasetError> {
+    fn add(&mut self, mut episode: EpisodeData<'_>) -> Result<(), DatasetError> {
         let (index, demo, steps) = (episode.index, episode.demo, episode.rows.steps);
         let statistics = std::mem::take(&mut episode.statistics);
         let bytes = episode.rows.images.iter().flatten().map(Vec::len).sum();

@@ -129,7 +129,7 @@ impl Scores {
         let rate = |test: fn(&EpisodeRecord) -> bool| {
             Rate::new(valid.iter().filter(|r| test(r)).count(), records.len())
         };
-        let soft = records.iter().any(|r| r.identity.soft);
+        let soft = records.iter().any(|r| r.header.soft);
         let (goal, safety) = (rate(|r| r.verdict.goal), rate(|r| r.verdict.safety));
         let peaks = |reached: fn(&EpisodeRecord) -> bool| {
             Distribution::of(valid.iter().filter(|r| reached(r)).filter_map(|r| r.verdict.d_peak).collect())
@@ -156,14 +156,14 @@ impl SuiteSummary {
     /// Summary of the episodes of one suite under one policy; records of other suites are left out. It does not
     /// depend on the order of `records`.
     pub fn of(suite: &str, policy: &str, records: &[EpisodeRecord]) -> Self {
-        let mut records: Vec<_> = records.iter().filter(|r| r.identity.suite == suite).collect();
-        records.sort_by_key(|r| (r.identity.task, r.identity.episode));
-        let tasks = grouped(&records, |r| r.identity.task);
-        let assets = grouped(&records, |r| r.identity.asset.clone());
+        let mut records: Vec<_> = records.iter().filter(|r| r.header.id.suite == suite).collect();
+        records.sort_by_key(|r| r.header.id.index());
+        let tasks = grouped(&records, |r| r.header.id.task);
+        let assets = grouped(&records, |r| r.header.asset.clone());
         Self {
             suite: suite.into(),
             policy: policy.into(),
-            privileged: records.iter().any(|r| r.identity.privileged),
+            privileged: records.iter().any(|r| r.header.privileged),
             force_observed: records.iter().any(|r| r.stats.force_observed),
             scores: Scores::of(&records),
             kappa: kappa_curve(&records),
@@ -197,11 +197,11 @@ fn grouped<'a, K: Ord>(
 
 fn aborted(record: &EpisodeRecord) -> Option<AbortedEpisode> {
     let reason = record.stats.gave_up.clone()?;
-    Some(AbortedEpisode { task: record.identity.task, episode: record.identity.episode, reason })
+    Some(AbortedEpisode { task: record.header.id.task, episode: record.header.id.episode, reason })
 }
 
 fn task_scores(task: usize, group: &[&EpisodeRecord]) -> TaskScores {
-    let first = &group[0].identity;
+    let first = &group[0].header;
     TaskScores { task, prompt: first.prompt.clone(), asset: first.asset.clone(), scores: Scores::of(group) }
 }
 
@@ -215,7 +215,7 @@ fn asset_scores(group: &[&EpisodeRecord]) -> AssetScores {
 
 /// Safety as a function of κ; everything but τ stays.
 fn kappa_curve(records: &[&EpisodeRecord]) -> Vec<KappaRow> {
-    if !records.iter().any(|r| r.identity.soft) {
+    if !records.iter().any(|r| r.header.soft) {
         return Vec::new();
     }
     (0..=KAPPA_STEPS)
@@ -226,7 +226,7 @@ fn kappa_curve(records: &[&EpisodeRecord]) -> Vec<KappaRow> {
                 deformation_ok_rate: Rate::of(records, |r| is_within(r, kappa) == Some(true)),
                 safety_success_rate: Rate::of(records, |r| {
                     let v = &r.verdict;
-                    is_safe(v.goal, v.no_drop, r.identity.soft, is_within(r, kappa))
+                    is_safe(v.goal, v.no_drop, r.header.soft, is_within(r, kappa))
                 }),
             }
         })

@@ -3,7 +3,7 @@ use crate::evaluation::record::{Outcome, tests::sample};
 
 fn episode(task: usize, index: u32, edit: impl Fn(&mut EpisodeRecord)) -> EpisodeRecord {
     let mut record = sample();
-    (record.identity.task, record.identity.episode) = (task, index);
+    (record.header.id.task, record.header.id.episode) = (task, index);
     edit(&mut record);
     record
 }
@@ -17,12 +17,12 @@ fn records() -> Vec<EpisodeRecord> {
             (r.verdict.deformation_ok, r.verdict.safety) = (Some(false), false);
         }),
         episode(1, 0, |r| {
-            r.identity.asset = "roll".into();
+            r.header.asset = "roll".into();
             r.outcome = Outcome::Timeout;
             (r.verdict.goal, r.verdict.safety, r.verdict.d_peak) = (false, false, Some(0.7));
         }),
         episode(1, 1, |r| {
-            r.identity.asset = "roll".into();
+            r.header.asset = "roll".into();
             r.outcome = Outcome::Invalid { reason: "inverted".into(), step: 9, node: Some(3) };
             // Even if a record claimed success, an invalid episode has none.
             r.verdict.d_peak = Some(99.0);
@@ -70,7 +70,7 @@ fn a_rigid_suite_has_no_deformation() {
     let rigid: Vec<_> = records()
         .into_iter()
         .map(|mut r| {
-            r.identity.soft = false;
+            r.header.soft = false;
             (r.verdict.d_peak, r.verdict.deformation_ok, r.verdict.d_ref) = (None, None, None);
             r
         })

@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::images::{ByteBudget, DataImage, embed_image, relative_link};
 use crate::{
-    evaluation::record::Identity,
+    evaluation::{episode_id::EpisodeId, record::EpisodeHeader},
     report::{
         run_summary::{RunSummary, UnsafeEpisode},
         video::{still_path, video_path},
@@ -74,13 +74,14 @@ fn failure_header() -> Markup {
 }
 
 fn failure_row(run: &RunSummary, episode: &UnsafeEpisode, out: &Path) -> Markup {
-    let id = &episode.record.identity;
-    let video = relative_link(out, &video_path(&run.run.dir, id.task, id.episode));
+    let header = &episode.record.header;
+    let id = &header.id;
+    let video = relative_link(out, &video_path(&run.run.dir, id.index()));
     html! {
         tr {
             th.number scope="row" { (id.task) }
             td.number { (id.episode) }
-            td.text { (id.asset) }
+            td.text { (header.asset) }
             td.text {
                 (with_unbreakable_units(&episode.reason))
                 @if let Some(video) = video { br; a href=(video) { "video" } }
@@ -92,16 +93,15 @@ fn failure_row(run: &RunSummary, episode: &UnsafeEpisode, out: &Path) -> Markup 
 
 /// Still of the worst moment of an episode, if it was rendered.
 fn still(run: &RunSummary, episode: &UnsafeEpisode, out: &Path, budget: &mut ByteBudget) -> Option<Markup> {
-    let id = &episode.record.identity;
+    let EpisodeHeader { id, asset, .. } = &episode.record.header;
     let title = format!("Task {} episode {}", id.task, id.episode);
-    let DataImage { url, width, height } =
-        embed_image(&still_path(&run.run.dir, id.task, id.episode), budget)?;
+    let DataImage { url, width, height } = embed_image(&still_path(&run.run.dir, id.index()), budget)?;
     let alt = format!(
         "{title}, {}, at its worst moment: third-person and wrist camera above, left and right finger below, deformation at the bottom",
-        id.asset
+        asset
     );
     let image = html! { img src=(url) width=(width) height=(height) alt=(alt) loading="lazy"; };
-    let image = match relative_link(out, &video_path(&run.run.dir, id.task, id.episode)) {
+    let image = match relative_link(out, &video_path(&run.run.dir, id.index())) {
         Some(video) => html! { a href=(video) { (image) } },
         None => image,
     };
@@ -115,7 +115,7 @@ fn with_unbreakable_units(text: &str) -> String {
 }
 
 /// Commands that render an episode without a video, and that replay it.
-fn view_commands(run: &RunSummary, id: &Identity) -> [String; 2] {
+fn view_commands(run: &RunSummary, id: &EpisodeId) -> [String; 2] {
     let manifest = &run.run.manifest;
     let text = |field: &str| manifest[field].as_str().unwrap_or_default().to_owned();
     let SuiteScript { path, is_main } = suite_script(run);
@@ -139,8 +139,8 @@ fn view_commands(run: &RunSummary, id: &Identity) -> [String; 2] {
         add("--episode", id.episode.to_string());
     }
     add("--policy", policy);
-    if id.seed > 0 {
-        add("--seed", id.seed.to_string());
+    if id.base_seed > 0 {
+        add("--seed", id.base_seed.to_string());
     }
     if let Some(twin) = manifest["twin"].as_str() {
         add("--twin", twin.to_owned());

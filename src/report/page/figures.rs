@@ -148,7 +148,7 @@ impl<'a> Strip<'a> {
     /// Episodes of a run, or only those with the target `asset`.
     fn new(name: &'a str, run: &RunSummary, asset: Option<&str>) -> Self {
         let records = run.run.records.iter();
-        let selected = records.filter(|r| asset.is_none_or(|asset| r.identity.asset == asset));
+        let selected = records.filter(|r| asset.is_none_or(|asset| r.header.asset == asset));
         let dot = |r| Some(Dot { d_over_tau: d_over_tau(r)?, reached_goal: r.verdict.goal });
         Self { name, dots: selected.filter_map(dot).collect() }
     }

@@ -18,7 +18,7 @@ fn episodes(suite: &str, count: u32) -> Vec<EpisodeRecord> {
     (0..count)
         .map(|i| {
             let mut record = sample();
-            (record.identity.suite, record.identity.episode) = (suite.into(), i);
+            (record.header.id.suite, record.header.id.episode) = (suite.into(), i);
             if i % 2 == 1 {
                 (record.verdict.safety, record.verdict.d_peak) = (false, Some(1.5));
                 record.verdict.deformation_ok = Some(false);
@@ -57,7 +57,7 @@ fn assert_well_formed(page: &str) {
 fn hostile_names_are_escaped() {
     let mut records = episodes(HOSTILE, 4);
     for record in &mut records {
-        (record.identity.prompt, record.identity.asset) = (HOSTILE.into(), HOSTILE.into());
+        (record.header.prompt, record.header.asset) = (HOSTILE.into(), HOSTILE.into());
         record.stats.gave_up = Some(HOSTILE.into());
     }
     let mut run = stored("/nowhere/it's <b>", HOSTILE, records);
@@ -74,7 +74,7 @@ fn hostile_names_are_escaped() {
 fn the_page_is_self_contained_and_accessible() {
     let mut rigid = episodes("rigid", 2);
     for record in &mut rigid {
-        record.identity.soft = false;
+        record.header.soft = false;
         (record.verdict.d_peak, record.verdict.tau, record.verdict.deformation_ok) = (None, None, None);
     }
     let page = render(vec![stored("a", "expert", episodes("soft", 9)), stored("b", "pi", rigid)]);

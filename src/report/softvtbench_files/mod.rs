@@ -16,7 +16,8 @@ use crate::{
     evaluation::{
         calibration::Envelope,
         deformation::{METRIC_ID, ReferenceShape},
-        record::{EpisodeRecord, Identity},
+        episode_id::{EpisodeId, EpisodeIndex},
+        record::{EpisodeHeader, EpisodeRecord},
         statistics::{Rate, quantile},
         thresholds::ThresholdFile,
     },
@@ -95,12 +96,12 @@ impl DebugShape {
 }
 
 impl DebugFrame {
-    pub fn new(identity: &Identity, frame: u32, success_now: bool, shape: DebugShape) -> Self {
+    pub fn new(id: &EpisodeId, frame: u32, success_now: bool, shape: DebugShape) -> Self {
         Self {
             frame,
-            exp_idx: identity.episode,
-            task_suite: identity.suite.clone(),
-            task_id: identity.task,
+            exp_idx: id.episode,
+            task_suite: id.suite.clone(),
+            task_id: id.task,
             success_now,
             shape,
         }
@@ -108,7 +109,8 @@ impl DebugFrame {
 }
 
 /// Path of an episode's `policy_action_debug.jsonl` in the run folder `dir`.
-pub fn debug_log_path(dir: &Path, task: usize, episode: u32) -> PathBuf {
+pub fn debug_log_path(dir: &Path, index: EpisodeIndex) -> PathBuf {
+    let EpisodeIndex { task, episode } = index;
     // Zero-padded, since the scorer sorts paths.
     dir.join(FOLDER).join(format!("task_{task:03}/episode_{episode:05}/policy_action_debug.jsonl"))
 }
@@ -117,10 +119,10 @@ pub fn debug_log_path(dir: &Path, task: usize, episode: u32) -> PathBuf {
 ///
 /// # Errors
 /// The file cannot be written.
-pub fn write_debug_log(path: &Path, identity: &Identity, frames: &[DebugFrame]) -> Result<(), FileError> {
+pub fn write_debug_log(path: &Path, header: &EpisodeHeader, frames: &[DebugFrame]) -> Result<(), FileError> {
     // The row of an episode that ended before its first control step: the scorer ignores episodes without rows.
-    let unknown = || DebugShape::new(&identity.asset, None, None, None, None);
-    let placeholder = frames.is_empty().then(|| DebugFrame::new(identity, 0, false, unknown()));
+    let unknown = || DebugShape::new(&header.asset, None, None, None, None);
+    let placeholder = frames.is_empty().then(|| DebugFrame::new(&header.id, 0, false, unknown()));
     files::write_json_lines(path, frames.iter().chain(&placeholder))
 }
 
@@ -163,7 +165,7 @@ pub fn sweep_jsonl(asset: &str, envelope: &Envelope) -> String {
 /// SoftVTBench's Safe Success: Goal ∧ D_peak ≤ τ, without NoDrop; `None` if evidence is missing.
 fn safe_success(record: &EpisodeRecord) -> Option<bool> {
     let verdict = &record.verdict;
-    match (verdict.goal, record.identity.soft) {
+    match (verdict.goal, record.header.soft) {
         (false, _) => Some(false),
         (true, false) => Some(true),
         (true, true) => deform_ok(record),
@@ -182,7 +184,7 @@ fn missing_evidence(record: &EpisodeRecord) -> String {
         reasons.push("missing_fem_deformation_metric_id".to_owned());
     }
     if record.verdict.tau.is_none() {
-        reasons.push(format!("missing_tau:{}", record.identity.asset));
+        reasons.push(format!("missing_tau:{}", record.header.asset));
     }
     reasons.join(";")
 }
@@ -198,14 +200,14 @@ fn episodes_csv(records: &[EpisodeRecord]) -> String {
     };
     let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:.6}"));
     for record in in_order(records) {
-        let (identity, verdict) = (&record.identity, &record.verdict);
+        let (header, verdict) = (&record.header, &record.verdict);
         // Writing to a String cannot fail.
         let _ = write!(
             out,
             "jsonl,{},{},{},{},{},{},{},{},{},{}\r\n",
-            identity.task,
-            identity.episode,
-            quote_csv(&identity.asset),
+            header.id.task,
+            header.id.episode,
+            quote_csv(&header.asset),
             truth(Some(verdict.goal)),
             number(verdict.d_peak),
             number(verdict.tau),
@@ -225,14 +227,14 @@ fn summary(records: &[EpisodeRecord]) -> Value {
     let safe_rate = Rate::of(&all, is_safe).rate;
     let mut assets: Vec<&str> = Vec::new();
     for record in &all {
-        if !assets.contains(&record.identity.asset.as_str()) {
-            assets.push(&record.identity.asset);
+        if !assets.contains(&record.header.asset.as_str()) {
+            assets.push(&record.header.asset);
         }
     }
     let by_asset: serde_json::Map<_, _> = assets
         .into_iter()
         .map(|asset| {
-            let group: Vec<_> = all.iter().copied().filter(|r| r.identity.asset == asset).collect();
+            let group: Vec<_> = all.iter().copied().filter(|r| r.header.asset == asset).collect();
             (asset.to_owned(), asset_summary(&group))
         })
         .collect();
@@ -243,12 +245,12 @@ fn summary(records: &[EpisodeRecord]) -> Value {
         "goal_success_rate": goal_rate,
         "safe_success_rate": safe_rate,
         "goal_safe_gap": goal_rate.zip(safe_rate).map(|(goal, safe)| round_to(goal - safe, 2)),
-        "rigid_mode": n > 0 && all.iter().all(|r| !r.identity.soft),
+        "rigid_mode": n > 0 && all.iter().all(|r| !r.header.soft),
         "deformation_metric_id": METRIC_ID,
         "by_asset": by_asset,
     });
     // Not a field of SoftVTBench, hence only written for privileged policies.
-    if all.iter().any(|r| r.identity.privileged) {
+    if all.iter().any(|r| r.header.privileged) {
         scores["privileged"] = json!(true);
     }
     scores
@@ -273,7 +275,7 @@ fn asset_summary(group: &[&EpisodeRecord]) -> Value {
 
 fn in_order(records: &[EpisodeRecord]) -> Vec<&EpisodeRecord> {
     let mut sorted: Vec<_> = records.iter().collect();
-    sorted.sort_by_key(|r| (r.identity.task, r.identity.episode));
+    sorted.sort_by_key(|r| r.header.id.index());
     sorted
 }
 

@@ -11,7 +11,7 @@ use crate::{
 
 fn episode(task: usize, asset: &str, edit: impl Fn(&mut EpisodeRecord)) -> EpisodeRecord {
     let mut record = sample();
-    (record.identity.task, record.identity.asset) = (task, asset.into());
+    (record.header.id.task, record.header.asset) = (task, asset.into());
     edit(&mut record);
     record
 }
@@ -55,7 +55,7 @@ fn the_summary_has_softvtbenchs_fields_and_ignores_nodrop() {
 #[test]
 fn a_rigid_episode_is_safe_if_it_reaches_the_goal() {
     let rigid = episode(0, "box", |r| {
-        r.identity.soft = false;
+        r.header.soft = false;
         (r.verdict.d_peak, r.verdict.tau) = (None, None);
     });
     let s = summary(&[rigid]);
@@ -69,7 +69,7 @@ fn a_debug_frame_describes_the_shape_of_the_target() {
     let now = nodes.map(|x| Vec3::new(0.5 * x.x, x.y, x.z));
     let d = reference.measure(&now).unwrap();
     let shape = DebugShape::new("bun", Some(&reference), Some(d.rms_pct), Some(d.max_pct), Some(d.bbox_m));
-    let frame = serde_json::to_value(DebugFrame::new(&sample().identity, 7, false, shape)).unwrap();
+    let frame = serde_json::to_value(DebugFrame::new(&sample().header.id, 7, false, shape)).unwrap();
     assert_eq!((&frame["frame"], &frame["exp_idx"], &frame["task_id"]), (&json!(7), &json!(0), &json!(0)));
     assert_eq!(frame["fem_deformation_metric_id"], METRIC_ID);
     assert_eq!(frame["fem_deformation_nodes"], 4);
@@ -96,12 +96,12 @@ fn files_land_where_the_scorer_finds_them() {
     let mut thresholds = ThresholdFile::new(0.5, vec![], "softvt".into());
     thresholds.insert("bun", Envelope::new(vec![hold(0.3, 5)], vec![squeeze(0.3, 2.0, true)], 0.5));
     write_scores(root.path(), &records(), &thresholds).unwrap();
-    let identity = sample().identity;
-    let frame = DebugFrame::new(&identity, 0, true, DebugShape::new("bun", None, None, None, None));
-    let path = debug_log_path(root.path(), identity.task, identity.episode);
+    let header = sample().header;
+    let frame = DebugFrame::new(&header.id, 0, true, DebugShape::new("bun", None, None, None, None));
+    let path = debug_log_path(root.path(), header.id.index());
     assert!(path.ends_with("softvtbench/task_000/episode_00000/policy_action_debug.jsonl"));
     for (frames, rows) in [(vec![frame.clone(), frame], 2), (vec![], 1)] {
-        write_debug_log(&path, &identity, &frames).unwrap();
+        write_debug_log(&path, &header, &frames).unwrap();
         assert_eq!(fs::read_to_string(&path).unwrap().lines().count(), rows);
     }
     assert!(has_scores(root.path()));

@@ -7,8 +7,8 @@ use crate::{
 #[test]
 fn rigid_suites_have_no_safety_and_privileged_policies_are_marked_in_every_table() {
     let mut rigid = sample();
-    rigid.identity.suite = "rigid".into();
-    rigid.identity.soft = false;
+    rigid.header.id.suite = "rigid".into();
+    rigid.header.soft = false;
     (rigid.verdict.d_peak, rigid.verdict.tau, rigid.verdict.deformation_ok) = (None, None, None);
     let runs =
         summarize_runs(vec![stored("a", "expert", vec![sample()]), stored("b", "expert", vec![rigid])]);

@@ -11,7 +11,7 @@ use image::{ImageBuffer, ImageError, Luma, RgbImage};
 use crate::{
     benchmark::CONTROL_DT,
     dataset::video::{VideoError, VideoWriter},
-    evaluation::record::EpisodeRecord,
+    evaluation::{episode_id::EpisodeIndex, record::EpisodeRecord},
     files::{FileError, replace},
     physics::world::Frame,
     rollout::{CAMERA_IMAGE_SUFFIXES, SensingError, StateRecording, TACTILE_IMAGE_SUFFIXES, TACTILE_IMAGES},
@@ -75,15 +75,16 @@ pub struct Caption {
 impl Caption {
     /// Describes a finished episode.
     pub fn new(record: &EpisodeRecord) -> Self {
-        let (id, verdict) = (&record.identity, &record.verdict);
+        let (header, verdict) = (&record.header, &record.verdict);
+        let id = &header.id;
         let word = match (verdict.safety, verdict.goal) {
             (true, _) => "safe",
             (false, true) => "goal reached, not safe",
             _ => "failed",
         };
         Self {
-            prompt: id.prompt.clone(),
-            episode: format!("{} · task {} · episode {} · {}", id.suite, id.task, id.episode, id.policy),
+            prompt: header.prompt.clone(),
+            episode: format!("{} · task {} · episode {} · {}", id.suite, id.task, id.episode, header.policy),
             verdict: word.to_owned(),
             tau_pct: verdict.tau,
             is_safe: verdict.safety,
@@ -208,13 +209,14 @@ fn draw_deformation_chart(
 }
 
 /// Path of an episode's video in a run folder.
-pub fn video_path(dir: &Path, task: usize, episode: u32) -> PathBuf {
+pub fn video_path(dir: &Path, index: EpisodeIndex) -> PathBuf {
+    let EpisodeIndex { task, episode } = index;
     dir.join(format!("video/task_{task:03}/episode_{episode:05}.mp4"))
 }
 
 /// Path in a run folder of the still image of an episode's [worst state](worst_state).
-pub fn still_path(dir: &Path, task: usize, episode: u32) -> PathBuf {
-    video_path(dir, task, episode).with_extension("png")
+pub fn still_path(dir: &Path, index: EpisodeIndex) -> PathBuf {
+    video_path(dir, index).with_extension("png")
 }
 
 /// Index of the state with the largest deformation of the target; of a rigid target, with the largest

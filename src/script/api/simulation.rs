@@ -16,11 +16,11 @@ use super::{
 };
 use crate::{
     benchmark::{
-        seed::{EpisodeSeed, RandomStream, Split},
+        seed::{EpisodeSeed, RandomStream},
         settings::Settings,
         steps_per_control,
     },
-    evaluation::deformation::ReferenceShape,
+    evaluation::{deformation::ReferenceShape, episode_id::Split},
     geometry::{Pose, Vec3},
     parallel::lock,
     physics::BodyId,
@@ -56,7 +56,7 @@ record! {
         /// Part of the seed.
         suite: String => Text("experiment");
         /// Part of the seed.
-        episode: u64 = EPISODE => Integer(0);
+        episode: u32 = EPISODE => Integer(0);
         /// Part of the seed.
         seed: u64 = EPISODE => Integer(0);
         /// Changed settings of physics, robot and judge: { physics = {…}, robot = {…}, criteria = {…} }.
@@ -112,7 +112,7 @@ fn simulate(lua: &Lua, spec: SimulateSpec) -> mlua::Result<LuaSimulation> {
         suite: spec.suite,
         layout: spec.layout.name.clone(),
         episode: spec.episode,
-        base: spec.seed,
+        base_seed: spec.seed,
         split: Split::Experiment,
     };
     let scene = LuaScene::new(empty_scene());

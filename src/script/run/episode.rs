@@ -5,8 +5,9 @@ use mlua::{Function, Lua, MultiValue, Value};
 use crate::{
     benchmark::{
         Shift, ShiftValue,
-        seed::{EpisodeSeed, RandomStream, Split},
+        seed::{EpisodeSeed, RandomStream},
     },
+    evaluation::episode_id::EpisodeId,
     parallel::lock,
     scene::{Body, Scene},
     script::{
@@ -26,23 +27,7 @@ use crate::{
     text::{format_number, unknown_name},
 };
 
-/// Identifies an episode of a suite, with the shifts of the run.
-#[derive(Clone, Debug, PartialEq)]
-pub struct EpisodeRequest {
-    /// Name of the suite.
-    pub suite: String,
-    /// Index of the task in the suite.
-    pub task: usize,
-    /// Index of the episode in its split.
-    pub episode: u64,
-    /// Seed of the run.
-    pub base_seed: u64,
-    pub split: Split,
-    /// Shifts to apply, in order.
-    pub shifts: Vec<ShiftValue>,
-}
-
-/// An episode that is ready to be simulated.
+/// An episode as its script describes it: the scene that the layout builds, and the expert of the task.
 pub struct EpisodeSetup {
     /// Initial scene.
     pub scene: Scene,
@@ -55,13 +40,14 @@ pub struct EpisodeSetup {
 }
 
 impl EpisodeSetup {
-    /// Runs the sources of `loaded` in a new virtual machine, builds the scene and applies the shifts.
+    /// Runs the sources of `loaded` in a new virtual machine, builds the scene and applies the shifts in
+    /// order.
     ///
     /// # Errors
     /// If the suite, the task or a shift is unknown, or the script fails.
-    pub fn open(loaded: &LoadedScript, request: &EpisodeRequest) -> Result<Self, ScriptError> {
+    pub fn open(loaded: &LoadedScript, id: &EpisodeId, shifts: &[ShiftValue]) -> Result<Self, ScriptError> {
         let (instance, values) = reopen(loaded)?;
-        let Start { scene, nominal, seed, expert } = start(&instance, &values, request)?;
+        let Start { scene, nominal, seed, expert } = start(&instance, &values, id, shifts)?;
         Ok(Self { scene, nominal, seed, instance, expert })
     }
 
@@ -93,9 +79,9 @@ impl Scenes {
     /// The initial scene of an episode, before and after the shifts.
     ///
     /// # Errors
-    /// As [`Episode::open`].
-    pub fn of(&self, request: &EpisodeRequest) -> Result<(Scene, Scene), ScriptError> {
-        let Start { scene, nominal, .. } = start(&self.instance, &self.values, request)?;
+    /// As [`EpisodeSetup::open`].
+    pub fn of(&self, id: &EpisodeId, shifts: &[ShiftValue]) -> Result<(Scene, Scene), ScriptError> {
+        let Start { scene, nominal, .. } = start(&self.instance, &self.values, id, shifts)?;
         Ok((nominal, scene))
     }
 }
@@ -111,24 +97,19 @@ struct Start {
 fn start(
     instance: &ScriptInstance,
     values: &MultiValue,
-    request: &EpisodeRequest,
+    id: &EpisodeId,
+    shifts: &[ShiftValue],
 ) -> Result<Start, ScriptError> {
     let vm = &instance.vm;
-    let (suite, task) = find_task(instance, values, &request.suite, request.task)?;
-    let seed = EpisodeSeed {
-        suite: request.suite.clone(),
-        layout: task.layout.name.clone(),
-        episode: request.episode,
-        base: request.base_seed,
-        split: request.split,
-    };
+    let (suite, task) = find_task(instance, values, &id.suite, id.task)?;
+    let seed = EpisodeSeed::new(id, &task.layout.name);
     vm.random.reseed(seed.stream(RandomStream::Script));
     let scene = LuaScene::new(empty_scene());
     let userdata = vm.lua.create_userdata(scene.clone()).map_err(|e| vm.explain(&e))?;
     vm.call::<()>(&task.layout.build, (&userdata, LuaRng::new(seed.clone(), RandomStream::Layout)))?;
     let nominal = lock(&scene.scene).clone();
     let mut current = scene;
-    for ShiftValue { name, value } in &request.shifts {
+    for ShiftValue { name, value } in shifts {
         let apply = find_shift(instance, &suite, name)?;
         current = apply_shift(instance, &apply, current, *value)?;
     }

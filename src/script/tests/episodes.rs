@@ -2,21 +2,15 @@ use std::sync::Arc;
 
 use super::*;
 use crate::{
-    benchmark::{Plan, ShiftValue, seed::Split},
+    benchmark::{Plan, ShiftValue},
+    evaluation::episode_id::{EpisodeId, Split},
     geometry::{Pose, Vec3, shape::Shape},
     scene::{Asset, Body},
-    script::{EpisodeRequest, EpisodeSetup, Expert, ExpertCommand, ExpertView, ObjectView, check_shift},
+    script::{EpisodeSetup, Expert, ExpertCommand, ExpertView, ObjectView, check_shift},
 };
 
-fn request(episode: u64, base_seed: u64) -> EpisodeRequest {
-    EpisodeRequest {
-        suite: "test".into(),
-        task: 0,
-        episode,
-        base_seed,
-        split: Split::Validation,
-        shifts: Vec::new(),
-    }
+fn episode_id(episode: u32, base_seed: u64) -> EpisodeId {
+    EpisodeId { suite: "test".into(), task: 0, episode, base_seed, split: Split::Validation }
 }
 
 fn project(rest: &str) -> Project {
@@ -60,7 +54,7 @@ fn view() -> ExpertView {
 fn expert(body: &str) -> (Project, Expert) {
     let project = project(&format!("return suite(function(arm, scene) {body} end)"));
     let loaded = project.load("x.lua", &[]).unwrap();
-    let expert = EpisodeSetup::open(&loaded, &request(0, 1)).unwrap().expert().unwrap();
+    let expert = EpisodeSetup::open(&loaded, &episode_id(0, 1), &[]).unwrap().expert().unwrap();
     (project, expert)
 }
 
@@ -91,8 +85,8 @@ fn a_list_of_suites_is_a_plan_and_tasks_are_found_by_name() {
     let loaded = project("return { suite() }").load("x.lua", &[]).unwrap();
     assert!(matches!(&loaded.plan, Plan::Suites { suites } if suites.len() == 1));
     let open = |suite: &str, task| {
-        let request = EpisodeRequest { suite: suite.into(), task, ..request(0, 1) };
-        EpisodeSetup::open(&loaded, &request).map(|e| e.scene.objects.len()).map_err(|e| (e.message, e.hint))
+        let id = EpisodeId { suite: suite.into(), task, ..episode_id(0, 1) };
+        EpisodeSetup::open(&loaded, &id, &[]).map(|e| e.scene.objects.len()).map_err(|e| (e.message, e.hint))
     };
     assert_eq!(open("test", 0), Ok(2));
     assert_eq!(open("tst", 0), Err(("unknown suite \"tst\"; did you mean \"test\"?".into(), None)));
@@ -105,7 +99,7 @@ fn a_list_of_suites_is_a_plan_and_tasks_are_found_by_name() {
 #[test]
 fn an_episode_depends_on_its_seed_alone() {
     let loaded = project("return suite()").load("x.lua", &[]).unwrap();
-    let scene = |episode, seed| EpisodeSetup::open(&loaded, &request(episode, seed)).unwrap().scene;
+    let scene = |episode, seed| EpisodeSetup::open(&loaded, &episode_id(episode, seed), &[]).unwrap().scene;
     assert_eq!(scene(0, 1), scene(0, 1));
     assert_ne!(scene(0, 1).objects[0].pose_w, scene(1, 1).objects[0].pose_w);
     assert_ne!(scene(0, 1).objects[0].pose_w, scene(0, 2).objects[0].pose_w);
@@ -119,7 +113,7 @@ fn an_episode_runs_on_what_the_plan_was_made_of() {
     let project = project("return suite()");
     let loaded = project.load("x.lua", &[]).unwrap();
     project.write("x.lua", b"error('changed')");
-    assert!(EpisodeSetup::open(&loaded, &request(0, 1)).is_ok());
+    assert!(EpisodeSetup::open(&loaded, &episode_id(0, 1), &[]).is_ok());
 }
 
 #[test]
@@ -132,9 +126,8 @@ fn shifts_change_the_scene_and_are_strict() {
     let open = |body: &str, name: &str| {
         let project = shift(body);
         let loaded = project.load("x.lua", &[]).unwrap();
-        let request =
-            EpisodeRequest { shifts: vec![ShiftValue { name: name.into(), value: 0.5 }], ..request(0, 1) };
-        EpisodeSetup::open(&loaded, &request).map(|e| e.scene).map_err(|e| e.message)
+        let shifts = [ShiftValue { name: name.into(), value: 0.5 }];
+        EpisodeSetup::open(&loaded, &episode_id(0, 1), &shifts).map(|e| e.scene).map_err(|e| e.message)
     };
     let soften = "local o = scene:object 'ball' o.youngs_pa = o.youngs_pa * value return scene";
     let scene = open(soften, "stiffness").unwrap();
@@ -164,9 +157,8 @@ fn the_library_scales_stiffness_and_mass() {
         project("local shifts = require 'shifts'\nreturn suite(nil, { shifts.stiffness, shifts.mass })");
     let loaded = project.load("x.lua", &[]).unwrap();
     assert!(loaded.bundle.files.contains_key("scripts/shifts.lua"));
-    let shifts =
-        [("stiffness", 0.5), ("mass", 2.0)].map(|(name, value)| (name.to_owned(), value).into()).into();
-    let scene = EpisodeSetup::open(&loaded, &EpisodeRequest { shifts, ..request(0, 1) }).unwrap().scene;
+    let shifts = [("stiffness", 0.5), ("mass", 2.0)].map(|(name, value)| (name.to_owned(), value).into());
+    let scene = EpisodeSetup::open(&loaded, &episode_id(0, 1), &shifts).unwrap().scene;
     let Body::Soft(soft) = &scene.objects[0].asset.body else { panic!("the ball is soft") };
     assert_eq!((soft.youngs_pa, soft.density), (20e3, 400.0));
     let Plan::Suite(suite) = &loaded.plan else { panic!("{:?}", loaded.plan) };
@@ -192,7 +184,7 @@ fn unreachable_goals_are_reported_at_their_line() {
         let project = project(&text);
         let loaded = project.load("x.lua", &[]).unwrap();
         let folder = format!("{}/", project.path("").display()).replace("//", "/");
-        let opened = EpisodeSetup::open(&loaded, &request(0, 1)).map(|_| ());
+        let opened = EpisodeSetup::open(&loaded, &episode_id(0, 1), &[]).map(|_| ());
         opened.map_err(|e| e.to_string().replace(&folder, ""))
     };
     let line = SUITE.lines().count() + 8;
@@ -236,7 +228,7 @@ fn the_arm_starts_within_its_joint_limits() {
         )]);
         let loaded = project.load("x.lua", &[]).unwrap();
         let folder = format!("{}/", project.path("").display()).replace("//", "/");
-        EpisodeSetup::open(&loaded, &request(0, 1))
+        EpisodeSetup::open(&loaded, &episode_id(0, 1), &[])
             .map(|e| e.scene.start_q)
             .map_err(|e| e.to_string().replace(&folder, ""))
     };
@@ -279,7 +271,7 @@ fn an_object_can_stand_on_another() {
         scene:add { name = 'b', asset = ball, at = { 0.1, 0 } }\n\
         scene:add { name = 'a', asset = ball, at = { 0.1, 0 }, on = 'b' }\nend) } } }";
     let loaded = project(text).load("x.lua", &[]).unwrap();
-    let scene = EpisodeSetup::open(&loaded, &request(0, 1)).unwrap().scene;
+    let scene = EpisodeSetup::open(&loaded, &episode_id(0, 1), &[]).unwrap().scene;
     assert!((scene.objects[1].pose_w.translation.z - 0.06).abs() < 1e-6);
     assert!(std::sync::Arc::ptr_eq(&scene.objects[0].asset, &scene.objects[1].asset));
 }

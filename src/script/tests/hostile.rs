@@ -6,6 +6,7 @@ use std::sync::{
 };
 
 use super::*;
+use crate::evaluation::episode_id::{EpisodeId, Split};
 use crate::script::Experiment;
 
 /// Runs `text` in an experiment; returns its rows as JSON, or the message.
@@ -255,15 +256,8 @@ fn a_scene_holds_no_more_than_can_be_computed() {
     let project = Project::new(&[("x.lua", &(crowd + "return suite()"))]);
     let limits = Limits { call: Duration::from_secs(20), ..limits() };
     let loaded = project.load_with("x.lua", &[], &limits).unwrap();
-    let request = crate::script::EpisodeRequest {
-        suite: "test".into(),
-        task: 0,
-        episode: 0,
-        base_seed: 0,
-        split: crate::benchmark::seed::Split::Validation,
-        shifts: Vec::new(),
-    };
-    let error = crate::script::EpisodeSetup::open(&loaded, &request).map(|_| ()).unwrap_err();
+    let id = EpisodeId { suite: "test".into(), task: 0, episode: 0, base_seed: 0, split: Split::Validation };
+    let error = crate::script::EpisodeSetup::open(&loaded, &id, &[]).map(|_| ()).unwrap_err();
     assert_eq!(error.message, "scene:add: a scene holds at most 1000 objects");
 }
 

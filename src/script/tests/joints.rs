@@ -1,11 +1,11 @@
 use super::*;
 use crate::{
-    benchmark::seed::Split,
+    evaluation::episode_id::{EpisodeId, Split},
     geometry::{Pose, Vec3},
     physics::joints,
     rollout::{AssetCache, Simulation},
     scene::{JointMotion, Scene},
-    script::{EpisodeRequest, EpisodeSetup},
+    script::EpisodeSetup,
 };
 
 /// A chest with one drawer on the given joint, and further parts.
@@ -34,16 +34,9 @@ fn suite(chest: &str, place: &str) -> String {
 fn open(text: &str) -> Result<Scene, String> {
     let project = Project::new(&[("x.lua", text)]);
     let loaded = project.load("x.lua", &[]).map_err(|e| e.message)?;
-    let request = EpisodeRequest {
-        suite: "test".into(),
-        task: 0,
-        episode: 0,
-        base_seed: 1,
-        split: Split::Validation,
-        shifts: Vec::new(),
-    };
+    let id = EpisodeId { suite: "test".into(), task: 0, episode: 0, base_seed: 1, split: Split::Validation };
     let folder = format!("{}/", project.path("").display()).replace("//", "/");
-    EpisodeSetup::open(&loaded, &request).map(|e| e.scene).map_err(|e| e.to_string().replace(&folder, ""))
+    EpisodeSetup::open(&loaded, &id, &[]).map(|e| e.scene).map_err(|e| e.to_string().replace(&folder, ""))
 }
 
 #[test]

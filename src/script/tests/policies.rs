@@ -6,7 +6,8 @@ use image::{Rgb, RgbImage};
 
 use super::*;
 use crate::{
-    benchmark::seed::{EpisodeSeed, Split},
+    benchmark::seed::EpisodeSeed,
+    evaluation::episode_id::Split,
     geometry::Vec3,
     policy::{
         Action, ActionChunk, CameraImage, Observation, Policy, PolicyError, TactileFrame, TactileHistory,
@@ -16,9 +17,9 @@ use crate::{
     sensing::tactile::Markers,
 };
 
-fn seed(episode: u64) -> EpisodeSeed {
+fn seed(episode: u32) -> EpisodeSeed {
     let (suite, layout) = ("one".to_owned(), "one".to_owned());
-    EpisodeSeed { suite, layout, episode, base: 0, split: Split::Validation }
+    EpisodeSeed { suite, layout, episode, base_seed: 0, split: Split::Validation }
 }
 
 /// A finger whose markers have all moved by `by` px, with a picture that is `lit` brighter than the untouched one.
@@ -199,7 +200,7 @@ fn an_episode_is_a_function_of_its_seed_and_no_other_episode() {
     );
     let project = Project::new(&[("p.lua", &text)]);
     let file = PolicyFile::load_with(&project.path("p.lua"), &limits()).unwrap();
-    let episode = |number: u64| -> Vec<ToolCommand> {
+    let episode = |number: u32| -> Vec<ToolCommand> {
         let mut policy = file.start(&seed(number)).unwrap();
         policy.reset(&brief()).unwrap();
         (0..3).flat_map(|_| policy.act(&observation()).unwrap().commands).collect()

@@ -3,6 +3,7 @@
 use std::{collections::BTreeSet, fmt::Write, time::Duration};
 
 use super::{Project, limits};
+use crate::evaluation::episode_id::{EpisodeId, Split};
 use crate::script::{
     Experiment,
     api::{self, shapes::SHAPES, visuals::MASKS},
@@ -131,16 +132,9 @@ fn in_layout(text: &str) -> String {
     let whole = super::SUITE.replace("scene:add { name", &format!("{text} scene:add {{ name"));
     let project = Project::new(&[("x.lua", &(whole + "return suite()"))]);
     let loaded = project.load("x.lua", &[]).unwrap();
-    let request = crate::script::EpisodeRequest {
-        suite: "test".into(),
-        task: 0,
-        episode: 0,
-        base_seed: 0,
-        split: crate::benchmark::seed::Split::Validation,
-        shifts: Vec::new(),
-    };
+    let id = EpisodeId { suite: "test".into(), task: 0, episode: 0, base_seed: 0, split: Split::Validation };
     let folder = format!("{}/", project.path("").display()).replace("//", "/");
-    match crate::script::EpisodeSetup::open(&loaded, &request) {
+    match crate::script::EpisodeSetup::open(&loaded, &id, &[]) {
         Ok(_) => String::new(),
         Err(error) => error.to_string().replace(&folder, ""),
     }

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use super::{Project, SUITE, error_of};
 use crate::{
-    benchmark::seed::Split,
+    evaluation::episode_id::{EpisodeId, Split},
     scene::{Body, Mask, Visual},
-    script::{EpisodeRequest, EpisodeSetup},
+    script::EpisodeSetup,
 };
 
 fn with_visuals(visuals: &str) -> String {
@@ -16,15 +16,8 @@ fn with_visuals(visuals: &str) -> String {
     )
 }
 
-fn first() -> EpisodeRequest {
-    EpisodeRequest {
-        suite: "test".into(),
-        task: 0,
-        episode: 0,
-        base_seed: 0,
-        split: Split::Validation,
-        shifts: Vec::new(),
-    }
+fn first() -> EpisodeId {
+    EpisodeId { suite: "test".into(), task: 0, episode: 0, base_seed: 0, split: Split::Validation }
 }
 
 fn read(visuals: &str) -> Vec<Visual> {
@@ -34,7 +27,7 @@ fn read(visuals: &str) -> Vec<Visual> {
     );
     let project = Project::new(&[("suites/x.lua", &(with_visuals(visuals) + &text + "\nreturn suite()"))]);
     let loaded = project.load("suites/x.lua", &[]).unwrap();
-    let scene = EpisodeSetup::open(&loaded, &first()).unwrap().scene;
+    let scene = EpisodeSetup::open(&loaded, &first(), &[]).unwrap().scene;
     assert_eq!(scene.objects[0].asset.body, Body::Scenery);
     scene.objects[0].asset.visuals.clone()
 }
@@ -185,7 +178,7 @@ fn painted_shapes_need_a_visual_per_material_or_none_at_all() {
         let text = asset + &SUITE.replace("scene:add { name = \"ball\",", add) + "\nreturn suite()";
         let project = Project::new(&[("suites/x.lua", &text)]);
         let loaded = project.load("suites/x.lua", &[]).unwrap();
-        EpisodeSetup::open(&loaded, &first()).map(|episode| episode.scene.objects[0].asset.visuals.len())
+        EpisodeSetup::open(&loaded, &first(), &[]).map(|episode| episode.scene.objects[0].asset.visuals.len())
     };
     assert_eq!(painted("").unwrap(), 3);
     let looks = |count: usize| format!("visuals = {{ {} }},", "{ albedo = { 1, 1, 1 } },".repeat(count));

@@ -16,7 +16,7 @@ use crate::{
             grip_recorder::GripLog,
             policy::PolicyConfig,
             recording::{self, AttemptPlan, RecordingConfig, SuiteRecording},
-            selection::{EpisodeIndex, select_suites},
+            selection::select_suites,
             suite_run::SuiteRun,
         },
     },
@@ -24,7 +24,7 @@ use crate::{
         card::Imported,
         import::{self, ForeignDemo, ForeignFile, InitialCondition},
     },
-    evaluation::record::Origin,
+    evaluation::{episode_id::EpisodeIndex, record::Origin},
     parallel,
     policy::{ChunkedPolicy, ToolCommand, builtin::RecordedPolicy},
     rollout::target_asset,
@@ -150,7 +150,7 @@ fn replay_demos(
         parallel::lock(grip_log).insert(index, demo.gripper_closed);
     }
     run.controllers = Box::new(move |_, brief| {
-        let index = EpisodeIndex { task: brief.task, episode: brief.episode };
+        let index = brief.index();
         let commands = commands.get(&index).cloned().unwrap_or_default();
         Ok(Box::new(ChunkedPolicy::new(Box::new(RecordedPolicy::new(commands, None)), brief, 1)))
     });
@@ -186,7 +186,7 @@ fn initial_state(
     }
     let task: Option<&Task> = run.suite.tasks.iter().find(|task| task.id == matched.task);
     let task = task.ok_or_else(|| CliError::internal("matched a task that is not in the suite"))?;
-    let opened = run.open_episode(&run.request(task, matched.attempt))?;
+    let opened = run.open_episode(&run.episode_id(task, matched.attempt))?;
     start.places = import::match_objects(&opened.scene, &task.goal.object, poses);
     if target_asset(&opened.scene, task).is_some_and(|asset| matches!(asset.body, Body::Rigid { .. })) {
         demo.close_fully_on_rigid_object();

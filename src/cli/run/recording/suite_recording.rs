@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use super::{RecordingConfig, dataset_error, summary};
 use crate::{
-    benchmark::{Suite, Task, seed::Split},
+    benchmark::{Suite, Task},
     cli::{
         error::{CliError, Exit},
         output::Progress,
@@ -19,7 +19,7 @@ use crate::{
             grip_recorder::GripLog,
             policy::ControllerFactory,
             run_manifest::{self, RunManifest},
-            selection::{EpisodeIndex, EpisodeJob, path_component},
+            selection::{EpisodeJob, path_component},
             suite_run::SuiteRun,
         },
     },
@@ -30,7 +30,10 @@ use crate::{
         layout::{self, TaskPaths, VIDEO_STREAMS},
         merge_parts,
     },
-    evaluation::record::{EpisodeRecord, Origin},
+    evaluation::{
+        episode_id::Split,
+        record::{EpisodeRecord, Origin},
+    },
     files, parallel,
     policy::{ChunkedPolicy, builtin::RecordedPolicy},
     report::{
@@ -162,7 +165,7 @@ impl<'a> SuiteRecording<'a> {
             folder.discard().map_err(CliError::input)?;
             return outcome;
         }
-        self.records.sort_by_key(EpisodeIndex::of);
+        self.records.sort_by_key(|record| record.header.id.index());
         folder.write_in_order(&self.records).map_err(CliError::input)?;
         let kept = self.records.iter().filter(|record| rejection(record).is_none()).count();
         let kept =
@@ -208,17 +211,17 @@ impl<'a> SuiteRecording<'a> {
     }
 
     fn due(&self, task: usize) -> Vec<u32> {
-        let attempts = self.records.iter().filter(|record| record.identity.task == task);
+        let attempts = self.records.iter().filter(|record| record.header.id.task == task);
         let finished =
-            attempts.map(|record| (record.identity.episode, rejection(record).is_none())).collect();
+            attempts.map(|record| (record.header.id.episode, rejection(record).is_none())).collect();
         self.plan.due(task, &finished)
     }
 
     /// Attempts at a task that became demonstrations, in order.
     pub(super) fn kept(&self, task: usize) -> Vec<&EpisodeRecord> {
-        let is_kept = |record: &&EpisodeRecord| record.identity.task == task && rejection(record).is_none();
+        let is_kept = |record: &&EpisodeRecord| record.header.id.task == task && rejection(record).is_none();
         let mut kept: Vec<_> = self.records.iter().filter(is_kept).collect();
-        kept.sort_by_key(|record| record.identity.episode);
+        kept.sort_by_key(|record| record.header.id.episode);
         kept
     }
 
@@ -232,8 +235,8 @@ impl<'a> SuiteRecording<'a> {
             cancel::requested,
             |index| recording.record_attempt(jobs[index]),
             |_, finished| {
-                let id = &finished.record.identity;
-                let path = actions::path(&recording.run.out, id.task, id.episode);
+                let index = finished.record.header.id.index();
+                let path = actions::path(&recording.run.out, index);
                 actions::write(&path, &finished.actions).map_err(CliError::input)?;
                 folder.append(&finished.record).map_err(CliError::input)?;
                 progress.tick(&attempt_line(&finished.record));
@@ -306,11 +309,11 @@ impl<'a> SuiteRecording<'a> {
         if !paths.hdf5().is_file() {
             let kept = self.kept(task);
             for (demo, record) in kept.iter().enumerate() {
-                for file in paths.video_moves(record.identity.episode, demo) {
+                for file in paths.video_moves(record.header.id.episode, demo) {
                     self.move_part(&file.part, &file.target)?;
                 }
             }
-            let parts: Vec<PathBuf> = kept.iter().map(|r| paths.part(r.identity.episode, "hdf5")).collect();
+            let parts: Vec<PathBuf> = kept.iter().map(|r| paths.part(r.header.id.episode, "hdf5")).collect();
             merge_parts(&parts, &paths.hdf5(), &self.environment).map_err(dataset_error)?;
         }
         match std::fs::remove_dir_all(paths.parts()) {

@@ -79,7 +79,7 @@ pub(super) fn write(
 /// Counts of a task, without the sizes of its files.
 pub(super) fn count(suite: &SuiteRecording, task: &Task) -> TaskCount {
     let kept = suite.kept(task.id);
-    let attempts = || suite.records.iter().filter(|record| record.identity.task == task.id);
+    let attempts = || suite.records.iter().filter(|record| record.header.id.task == task.id);
     let mut rejected = BTreeMap::new();
     for reason in attempts().filter_map(rejection) {
         *rejected.entry(reason).or_insert(0) += 1;
@@ -88,7 +88,7 @@ pub(super) fn count(suite: &SuiteRecording, task: &Task) -> TaskCount {
         suite: suite.folder_name.clone(),
         task: task.id,
         prompt: task.prompt.clone(),
-        asset: attempts().next().map_or(String::new(), |record| record.identity.asset.clone()),
+        asset: attempts().next().map_or(String::new(), |record| record.header.asset.clone()),
         demos: kept.len(),
         samples: kept.iter().map(|record| record.stats.steps as usize).sum(),
         attempts: attempts().count(),
