@@ -3,6 +3,7 @@
 use crate::{
     benchmark::CONTROL_DT,
     evaluation::record::EpisodeRecord,
+    geometry::Pose,
     policy::Action,
     robot::{
         gripper::{self, MAX_WIDTH},
@@ -72,34 +73,34 @@ impl Demonstration {
     /// The streams outside `obs` and `privileged`: actions in both gripper codes, rewards, episode ends and timestamps.
     pub fn top_level_streams(&self) -> Vec<DataStream> {
         let steps = self.steps();
-        let coded = |closure: &dyn Fn(usize) -> f64| -> Vec<f64> {
-            let row = |(step, a): (usize, &Action)| {
-                let [p, r] = [a.position_b, a.axis_angle_b];
-                [p.x, p.y, p.z, r.x, r.y, r.z, closure(step)]
-            };
-            self.actions.iter().enumerate().flat_map(row).collect()
-        };
+        let actions = self.actions.iter();
+        let continuous = actions.clone().flat_map(|action| action.to_array()).collect();
+        let binary = actions.zip(&self.gripper_closed).flat_map(|(action, &is_closed)| {
+            Action { closure: f64::from(u8::from(is_closed)), ..*action }.to_array()
+        });
         let meaning = "absolute tool position (m) and axis-angle (rad), gripper 0 open to 1 shut";
         let last = |step: usize| step + 1 == steps;
         vec![
-            DataStream::f64("actions", &[7], coded(&|step| self.actions[step].closure))
+            DataStream::f64("actions", &[7], continuous)
                 .unit("m, rad, 1", BASE)
                 .attribute("meaning", meaning)
                 .attribute("gripper", "continuous closure: 1 - commanded width / 0.08 m"),
-            DataStream::f64(
-                "actions_binary",
-                &[7],
-                coded(&|step| f64::from(u8::from(self.gripper_closed[step]))),
-            )
-            .unit("m, rad, 1", BASE)
-            .attribute("meaning", meaning)
-            .attribute("gripper", "binary: 1 while the gripper is meant to hold, else 0"),
+            DataStream::f64("actions_binary", &[7], binary.collect())
+                .unit("m, rad, 1", BASE)
+                .attribute("meaning", meaning)
+                .attribute("gripper", "binary: 1 while the gripper is meant to hold, else 0"),
             DataStream::f64("rewards", &[], (0..steps).map(|step| f64::from(u8::from(last(step)))).collect()),
             DataStream::u8("dones", &[], (0..steps).map(|step| u8::from(last(step))).collect()),
             DataStream::f64("timestamps", &[], (0..steps).map(|step| step as f64 * CONTROL_DT).collect())
                 .unit("s", ""),
         ]
     }
+}
+
+/// Position, and quaternion w x y z with w ≥ 0.
+pub(super) fn pose_row(pose: &Pose) -> [f64; 7] {
+    let (p, q) = (pose.translation.vector, rotation::canonical(&pose.rotation));
+    [p.x, p.y, p.z, q.w, q.i, q.j, q.k]
 }
 
 /// Proprioception before each action.
@@ -110,11 +111,7 @@ fn observed(recording: &StateRecording, actions: &[Action]) -> Vec<DataStream> {
         |numbers: &dyn Fn(usize) -> Vec<f64>| (0..states.len()).flat_map(numbers).collect::<Vec<f64>>();
     let width = |i: usize| gripper::width(states[i].fingers);
     let commanded = |i: usize| i.checked_sub(1).map_or(0.0, |before| actions[before].closure.clamp(0.0, 1.0));
-    let pose = each(&|i| {
-        let tool = states[i].tool_b;
-        let q = rotation::canonical(&tool.rotation);
-        tool.translation.vector.iter().copied().chain([q.w, q.i, q.j, q.k]).collect()
-    });
+    let pose = each(&|i| pose_row(&states[i].tool_b).to_vec());
     let state = each(&|i| {
         let tool = states[i].tool_b;
         let turn = rotation::axis_angle(&tool.rotation);

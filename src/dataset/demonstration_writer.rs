@@ -8,12 +8,12 @@ use serde_json::Value;
 
 use super::{
     DatasetError, Demonstration,
-    hdf5::{ChunkedSteps, Hdf5Writer},
+    hdf5::{ChunkedSteps, Hdf5Writer, write_file},
     layout::IMAGE_STREAMS,
     step_images::{StepImages, StepRenderer},
     video::VideoWriter,
 };
-use crate::{benchmark::CONTROL_DT, files, rollout::StateRecording};
+use crate::{benchmark::CONTROL_HZ, rollout::StateRecording};
 
 /// Output files of a demonstration. Each appears complete or not at all.
 pub struct DemonstrationWriter<'a> {
@@ -29,11 +29,6 @@ pub struct DemonstrationWriter<'a> {
     pub environment: &'a Value,
 }
 
-/// Frames per second of the videos: one frame per control step.
-pub fn frame_rate() -> u32 {
-    (1.0 / CONTROL_DT).round() as u32
-}
-
 impl DemonstrationWriter<'_> {
     /// Renders the state before each action and writes all files. The HDF5 file is written last: its presence
     /// marks a complete demonstration.
@@ -46,24 +41,9 @@ impl DemonstrationWriter<'_> {
         mut demonstration: Demonstration,
         is_cancelled: impl Fn() -> bool,
     ) -> Result<(), DatasetError> {
-        files::create_folder(self.hdf5.parent().unwrap_or(&self.hdf5))?;
-        let temp = files::temp_path(&self.hdf5);
-        // On failure the space is freed, since the disk may be full.
-        self.write_to(&temp, recording, &mut demonstration, is_cancelled)
-            .inspect_err(|_| drop(files::remove_if_present(&temp)))?;
-        Ok(files::persist(&temp, &self.hdf5)?)
-    }
-
-    fn write_to(
-        &self,
-        temp: &Path,
-        recording: &mut StateRecording,
-        demonstration: &mut Demonstration,
-        is_cancelled: impl Fn() -> bool,
-    ) -> Result<(), DatasetError> {
-        let mut writer = Hdf5Writer::create(temp, self.environment, demonstration.steps(), 1)?;
-        let written = self.write_contents(&mut writer, recording, demonstration, is_cancelled);
-        writer.close(written)
+        write_file(&self.hdf5, self.environment, demonstration.steps(), 1, |writer| {
+            self.write_contents(writer, recording, &mut demonstration, is_cancelled)
+        })
     }
 
     fn write_contents(
@@ -122,7 +102,7 @@ impl ImageStreamWriter {
 
     fn write_chunk(&mut self, path: &Path) -> Result<(), DatasetError> {
         let written = self.dataset.write_chunk(self.chunks_written, &self.bytes);
-        written.map_err(|e| DatasetError::hdf5(path, self.name)(e))?;
+        written.map_err(DatasetError::hdf5(path, self.name))?;
         self.chunks_written += 1;
         self.bytes.clear();
         Ok(())
@@ -152,9 +132,8 @@ impl ImageOutputs {
         steps: usize,
         store_images: bool,
     ) -> Result<Self, DatasetError> {
-        let video = |image: &RgbImage| {
-            VideoWriter::new(image.width() as usize, image.height() as usize, frame_rate())
-        };
+        let video =
+            |image: &RgbImage| VideoWriter::new(image.width() as usize, image.height() as usize, CONTROL_HZ);
         let mut streams = Vec::new();
         let named = IMAGE_STREAMS.into_iter().zip(&first.images).zip(IMAGES_PER_CHUNK);
         for ((name, image), images_per_chunk) in named.filter(|_| store_images) {

@@ -1,6 +1,6 @@
 //! [`DatasetError`].
 
-use std::{fmt::Display, io, path::Path};
+use std::{fmt::Display, path::Path};
 
 use rust_hdf5::Hdf5Error;
 
@@ -28,30 +28,29 @@ pub enum DatasetError {
 }
 
 impl DatasetError {
-    /// Converts the `io::Error` of `action` on `path`, for `map_err`.
-    pub(crate) fn io(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self + use<> {
-        let convert = FileError::io(action, path);
-        move |source| Self::File(convert(source))
-    }
-
-    /// Converts an error of the HDF5 library about `key`, for `map_err`.
-    pub(super) fn hdf5(path: &Path, key: impl Display) -> impl FnOnce(Hdf5Error) -> Self {
+    /// Converts errors of the HDF5 library about `key`, for `map_err`.
+    pub(super) fn hdf5(path: &Path, key: impl Display) -> impl Fn(Hdf5Error) -> Self {
         let (path, key) = (path.display().to_string(), key.to_string());
-        move |error| match error {
-            Hdf5Error::Io(source) => Self::File(FileError::Io { action: "read or write", path, source }),
-            Hdf5Error::NotFound(_) => Self::Content { path, key, what: "it is missing".to_owned() },
-            // Each layer of the library prefixes its name; only the innermost message is useful.
-            other => {
-                let text = other.to_string();
-                let what = match text.rsplit_once("I/O error: ") {
-                    Some((_, system_message)) => system_message.to_owned(),
-                    None => {
-                        let (_, cause) = text.rsplit_once("error: ").unwrap_or(("", &text));
-                        format!("it cannot be read; is the file damaged? ({cause})")
+        move |error| {
+            let (path, key) = (path.clone(), key.clone());
+            let what = match error {
+                Hdf5Error::Io(source) => {
+                    return Self::File(FileError::Io { action: "read or write", path, source });
+                }
+                Hdf5Error::NotFound(_) => "it is missing".to_owned(),
+                // Each layer of the library prefixes its name; only the innermost message is useful.
+                other => {
+                    let text = other.to_string();
+                    match text.rsplit_once("I/O error: ") {
+                        Some((_, system_message)) => system_message.to_owned(),
+                        None => {
+                            let (_, cause) = text.rsplit_once("error: ").unwrap_or(("", &text));
+                            format!("it cannot be read; is the file damaged? ({cause})")
+                        }
                     }
-                };
-                Self::Content { path, key, what }
-            }
+                }
+            };
+            Self::Content { path, key, what }
         }
     }
 

@@ -85,14 +85,7 @@ impl ManifestEntry {
 /// # Errors
 /// The file cannot be written.
 pub fn write(root: &Path, entries: &[ManifestEntry]) -> Result<(), DatasetError> {
-    let path = root.join(MANIFEST);
-    let mut text = String::new();
-    for entry in entries {
-        let line = serde_json::to_string(entry);
-        text += &line.map_err(|e| DatasetError::content(&path, "line", e.to_string()))?;
-        text.push('\n');
-    }
-    Ok(files::replace(&path, text.as_bytes())?)
+    Ok(files::write_json_lines(&root.join(MANIFEST), entries)?)
 }
 
 /// Reads the manifest.

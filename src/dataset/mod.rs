@@ -24,5 +24,5 @@ pub mod video;
 
 pub use demonstration::Demonstration;
 pub use error::DatasetError;
-pub use hdf5::{FloatRows, ImageBlock, TaskFile, actions, merge_parts};
+pub use hdf5::{FloatArray, ImageBlock, TaskFile, merge_parts};
 pub use stream::{DataStream, StreamValues};

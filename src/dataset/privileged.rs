@@ -2,13 +2,15 @@
 
 use crate::{
     evaluation::deformation::METRIC_ID,
-    geometry::{Pose, Vec3},
+    geometry::Vec3,
     policy::PadForce,
-    robot::rotation,
     rollout::{BodyConfiguration, FinishedEpisode, ScoreFrame, SensorSuite, StateRecording, StepTrace},
 };
 
-use super::stream::{DataStream, StreamValues};
+use super::{
+    demonstration::pose_row,
+    stream::{DataStream, StreamValues},
+};
 
 /// All privileged streams. Row i is the state before action i, as in every stream of a demonstration.
 pub(super) fn streams(finished: &FinishedEpisode, recording: &StateRecording) -> Vec<DataStream> {
@@ -28,10 +30,11 @@ fn forces(finished: &FinishedEpisode, recording: &StateRecording) -> Vec<DataStr
         loads.iter().flatten().flat_map(|pad| <[f64; 3]>::from(pick(pad))).collect()
     };
     let force = of(&|pad| pad.wrench.force);
-    let with_forces = finished.actions.iter().zip(force.as_chunks::<6>().0).flat_map(|(a, force)| {
-        let (p, r) = (a.position_b, a.axis_angle_b);
-        [p.x, p.y, p.z, r.x, r.y, r.z, a.closure].into_iter().chain(*force).collect::<Vec<f64>>()
-    });
+    let with_forces = finished
+        .actions
+        .iter()
+        .zip(force.as_chunks::<6>().0)
+        .flat_map(|(a, force)| a.to_array().into_iter().chain(*force).collect::<Vec<f64>>());
     vec![
         DataStream::f64("privileged/actions_with_force", &[13], with_forces.collect())
             .unit("m, rad, 1, N", "robot base; forces: pad")
@@ -131,9 +134,4 @@ fn empty(name: &str, state: &BodyConfiguration) -> DataStream {
             DataStream::f64(path, &[7], Vec::new()).unit("m, 1", "world").attribute("meaning", meaning)
         }
     }
-}
-
-fn pose_row(pose: &Pose) -> [f64; 7] {
-    let (p, q) = (pose.translation.vector, rotation::canonical(&pose.rotation));
-    [p.x, p.y, p.z, q.w, q.i, q.j, q.k]
 }

@@ -8,7 +8,7 @@ use super::{DatasetError, TaskFile};
 use crate::text::{TextColumn, TextTable, decimal};
 
 /// Columns of an action.
-pub const ACTION_NAMES: [&str; 7] =
+const ACTION_NAMES: [&str; 7] =
     ["x (m)", "y (m)", "z (m)", "turn x (rad)", "turn y (rad)", "turn z (rad)", "closure"];
 /// Bins of a histogram.
 const BINS: usize = 24;
@@ -55,16 +55,15 @@ pub fn column_statistics(paths: &[impl AsRef<Path>]) -> Result<Vec<ColumnStatist
     let (mut lengths, mut peaks, mut soft) = (Vec::new(), Vec::new(), Vec::new());
     for path in paths {
         let file = TaskFile::open(path.as_ref())?;
-        for &demo in file.demos() {
+        for &demo in &file.demos {
             let actions = file.actions(demo)?;
             lengths.push(actions.len() as f64);
-            for a in &actions {
-                let row = a.position_b.iter().chain(a.axis_angle_b.iter()).chain([&a.closure]);
-                columns.iter_mut().zip(row).for_each(|(column, x)| column.push(*x));
+            for action in &actions {
+                columns.iter_mut().zip(action.to_array()).for_each(|(column, x)| column.push(x));
             }
             peaks.extend(file.record(demo).ok().and_then(|record| record.verdict.d_peak));
             // Missing for rigid targets and without privileged streams.
-            if let Ok(d) = file.float_rows(demo, "privileged/soft_extras/fem_deformation_rms") {
+            if let Ok(d) = file.array(demo, "privileged/soft_extras/fem_deformation_rms") {
                 soft.extend(d.values);
             }
         }

@@ -14,6 +14,19 @@ pub struct Action {
     pub closure: f64,
 }
 
+impl Action {
+    /// Position, axis-angle and closure: the row of an action in recorded files.
+    pub fn to_array(self) -> [f64; 7] {
+        let (p, r) = (self.position_b, self.axis_angle_b);
+        [p.x, p.y, p.z, r.x, r.y, r.z, self.closure]
+    }
+
+    /// Inverse of [`Self::to_array`].
+    pub fn from_array([x, y, z, rx, ry, rz, closure]: [f64; 7]) -> Self {
+        Self { position_b: Vec3::new(x, y, z), axis_angle_b: Vec3::new(rx, ry, rz), closure }
+    }
+}
+
 /// One entry of an action chunk. [`CommandResolver`](super::CommandResolver) turns it into an [`Action`] in the
 /// control step in which it is executed.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -9,7 +9,6 @@ use std::{
 use crate::{
     evaluation::episode_id::EpisodeIndex,
     files::{FileError, replace},
-    geometry::Vec3,
     npy::{NpyArray, NpyError},
     policy::Action,
 };
@@ -43,9 +42,8 @@ pub fn path(dir: &Path, index: EpisodeIndex) -> PathBuf {
 /// # Errors
 /// The file cannot be written.
 pub fn write(path: &Path, actions: &[Action]) -> Result<(), FileError> {
-    let numbers =
-        actions.iter().flat_map(|a| a.position_b.iter().chain(a.axis_angle_b.iter()).chain([&a.closure]));
-    replace(path, NpyArray::from_f64(vec![actions.len(), WIDTH], numbers.copied()).to_npy())
+    let numbers = actions.iter().copied().flat_map(Action::to_array);
+    replace(path, NpyArray::from_f64(vec![actions.len(), WIDTH], numbers).to_npy())
 }
 
 /// Reads the actions of an episode.
@@ -66,21 +64,13 @@ pub fn read(path: &Path) -> Result<Vec<Action>, ActionsError> {
     if !numbers.iter().all(|x| x.is_finite()) {
         return Err(ActionsError::NotFinite { path });
     }
-    Ok(numbers
-        .as_chunks::<WIDTH>()
-        .0
-        .iter()
-        .map(|&[x, y, z, rx, ry, rz, closure]| Action {
-            position_b: Vec3::new(x, y, z),
-            axis_angle_b: Vec3::new(rx, ry, rz),
-            closure,
-        })
-        .collect())
+    Ok(numbers.as_chunks::<WIDTH>().0.iter().copied().map(Action::from_array).collect())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Vec3;
 
     #[test]
     fn actions_are_read_back_exactly_and_damaged_files_are_named() {

@@ -11,6 +11,7 @@ use parquet::{
     record::{Field, Row},
 };
 use rmpv::Value;
+use softvt::dataset::TaskFile;
 
 use crate::{
     dataset_recording::files,
@@ -96,8 +97,9 @@ fn rows_are_the_inputs_of_a_policy() {
     project.succeeds("record x.lua --task 0 --demos 1 --out data");
     project.succeeds("dataset export data --format lerobot-v2.1 --out out");
     let rows = rows(&project.path("out/data/chunk-000/episode_000000.parquet"));
-    let actions =
-        softvt::dataset::actions(&project.path("data/hdf5/one_task0_demo.hdf5"), 0).expect("actions");
+    let actions = TaskFile::open(&project.path("data/hdf5/one_task0_demo.hdf5"))
+        .and_then(|file| file.actions(0))
+        .expect("actions");
     assert!(
         rows.len() >= 12 && rows.len() == actions.len(),
         "longer than a policy's history: {}",

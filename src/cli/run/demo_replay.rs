@@ -64,7 +64,7 @@ pub(crate) fn demos_of(path: &Path) -> Result<Vec<DemoRef>, CliError> {
         return Ok(demos.collect());
     }
     let file = TaskFile::open(path).map_err(CliError::input)?;
-    Ok(file.demos().iter().map(|demo| DemoRef { file: path.to_owned(), demo: *demo }).collect())
+    Ok(file.demos.iter().map(|demo| DemoRef { file: path.to_owned(), demo: *demo }).collect())
 }
 
 /// Simulates demonstrations again by their actions alone. Prints for each whether the result is byte-identical, and how

@@ -5,13 +5,13 @@ use std::{collections::BTreeMap, path::Path};
 use super::{
     DatasetError, StreamValues, TaskFile,
     card::Card,
-    demonstration_writer::frame_rate,
     layout::{IMAGE_STREAMS, MANIFEST},
     manifest::{self, ManifestEntry},
     video,
 };
 use crate::{
-    benchmark::CONTROL_DT,
+    benchmark::{CONTROL_DT, CONTROL_HZ},
+    files::FileError,
     geometry::{Quat, Vec3},
     robot::rotation,
     sensing::tactile::MARKER_COUNT,
@@ -55,7 +55,7 @@ impl Findings {
     }
 
     /// The value of `result`; an error is added to the problems.
-    fn take<T>(&mut self, result: Result<T, DatasetError>) -> Option<T> {
+    fn take<T, E: ToString>(&mut self, result: Result<T, E>) -> Option<T> {
         result.map_err(|error| self.problems.push(error.to_string())).ok()
     }
 }
@@ -86,8 +86,8 @@ pub fn folder(root: &Path) -> Result<Findings, DatasetError> {
     for (path, entries) in files {
         let path = root.join(path);
         let Some(file) = findings.take(TaskFile::open(&path)) else { continue };
-        if file.demos().len() != entries.len() {
-            let what = format!("{} demonstrations, the manifest has {}", file.demos().len(), entries.len());
+        if file.demos.len() != entries.len() {
+            let what = format!("{} demonstrations, the manifest has {}", file.demos.len(), entries.len());
             findings.add(&path, "/data", what);
         }
         for entry in entries {
@@ -123,7 +123,7 @@ pub fn file(path: &Path) -> Result<Findings, DatasetError> {
 fn check_videos(findings: &mut Findings, root: &Path, entry: &ManifestEntry) {
     for (stream, file) in &entry.video_files {
         let path = root.join(file);
-        let bytes = std::fs::read(&path).map_err(DatasetError::io("read", &path));
+        let bytes = std::fs::read(&path).map_err(FileError::io("read", &path));
         let Some(bytes) = findings.take(bytes) else { continue };
         findings.videos += 1;
         let Some(video) = video::VideoInfo::read(&bytes) else {
@@ -134,8 +134,8 @@ fn check_videos(findings: &mut Findings, root: &Path, entry: &ManifestEntry) {
             let what = format!("{} frames, the demonstration has {} steps", video.frames, entry.num_samples);
             findings.add(&path, stream, what);
         }
-        if (video.frame_rate - f64::from(frame_rate())).abs() > 1e-9 {
-            let what = format!("{} frames per second, expected {}", video.frame_rate, frame_rate());
+        if (video.frame_rate - f64::from(CONTROL_HZ)).abs() > 1e-9 {
+            let what = format!("{} frames per second, expected {}", video.frame_rate, CONTROL_HZ);
             findings.add(&path, stream, what);
         }
     }
@@ -143,7 +143,7 @@ fn check_videos(findings: &mut Findings, root: &Path, entry: &ManifestEntry) {
 
 fn check_demonstrations(findings: &mut Findings, file: &TaskFile) {
     findings.take(file.environment());
-    for &demo in file.demos() {
+    for &demo in &file.demos {
         findings.demos += 1;
         let (names, steps) = (file.names(demo), file.steps(demo));
         let (Some(names), Some(steps)) = (findings.take(names), findings.take(steps)) else { continue };
@@ -160,7 +160,7 @@ fn check_demonstrations(findings: &mut Findings, file: &TaskFile) {
                     .chain(row_shape.iter().map(usize::to_string))
                     .collect();
                 let what = format!("expected the shape ({}), got {shape:?}", expected.join(", "));
-                findings.add(file.path(), &format!("/data/demo_{demo}/{name}"), what);
+                findings.add(&file.path, &format!("/data/demo_{demo}/{name}"), what);
             }
         }
         for name in &names {
@@ -179,7 +179,7 @@ fn check_stream(findings: &mut Findings, file: &TaskFile, demo: usize, steps: us
     let width: usize = stream.row_shape.iter().product();
     let count = stream.values.len();
     if count != steps * width {
-        findings.add(file.path(), &key, format!("{} steps, the actions have {steps}", count / width.max(1)));
+        findings.add(&file.path, &key, format!("{} steps, the actions have {steps}", count / width.max(1)));
     }
     let not_finite = match &stream.values {
         StreamValues::F64(values) => values.iter().position(|x| !x.is_finite()),
@@ -187,18 +187,18 @@ fn check_stream(findings: &mut Findings, file: &TaskFile, demo: usize, steps: us
         StreamValues::U8(_) => None,
     };
     if let Some(at) = not_finite {
-        findings.add(file.path(), &key, format!("step {}: a number that is not finite", at / width.max(1)));
+        findings.add(&file.path, &key, format!("step {}: a number that is not finite", at / width.max(1)));
     }
     let is_image = IMAGE_STREAMS.iter().any(|image| name == format!("obs/{image}"));
     if is_image && !matches!(stream.row_shape[..], [_, _, 3]) {
         let what =
             format!("expected the shape (steps, height, width, 3), got {:?} per step", stream.row_shape);
-        findings.add(file.path(), &key, what);
+        findings.add(&file.path, &key, what);
     }
     if name.ends_with("/root_pose_w") && width == 7 {
         match &stream.values {
             StreamValues::F64(poses) => check_quaternions(findings, file, &key, poses),
-            _ => findings.add(file.path(), &key, "expected float64"),
+            _ => findings.add(&file.path, &key, "expected float64"),
         }
     }
 }
@@ -212,7 +212,7 @@ fn check_quaternions(findings: &mut Findings, file: &TaskFile, key: &str, poses:
     if let Some(step) = bad {
         let q = &poses[7 * step + 3..7 * step + 7];
         findings.add(
-            file.path(),
+            &file.path,
             key,
             format!("step {step}: not a unit quaternion w x y z with w >= 0: {q:?}"),
         );
@@ -221,8 +221,7 @@ fn check_quaternions(findings: &mut Findings, file: &TaskFile, key: &str, poses:
 
 /// Checks relations between streams.
 fn check_relations(findings: &mut Findings, file: &TaskFile, demo: usize) {
-    let mut get =
-        |name: &str| findings.take(file.float_rows(demo, name)).map_or(Vec::new(), |rows| rows.values);
+    let mut get = |name: &str| findings.take(file.array(demo, name)).map_or(Vec::new(), |array| array.values);
     let (poses, states, times) = (get("obs/eef_pose"), get("obs/state"), get("timestamps"));
     let (actions, binary) = (get("actions"), get("actions_binary"));
     let key = |name: &str| format!("/data/demo_{demo}/{name}");
@@ -235,20 +234,20 @@ fn check_relations(findings: &mut Findings, file: &TaskFile, demo: usize) {
     if let Some(step) = differs {
         let what =
             format!("step {step}: the quaternion is not the rotation of obs/state: is its order w x y z?");
-        findings.add(file.path(), &key("obs/eef_pose"), what);
+        findings.add(&file.path, &key("obs/eef_pose"), what);
     }
     let expected = |step: usize| step as f64 * CONTROL_DT;
     if let Some(step) = times.iter().enumerate().position(|(step, t)| (t - expected(step)).abs() > TOLERANCE)
     {
         let what =
-            format!("step {step}: {} s, expected {} at {} Hz", times[step], expected(step), frame_rate());
-        findings.add(file.path(), &key("timestamps"), what);
+            format!("step {step}: {} s, expected {} at {} Hz", times[step], expected(step), CONTROL_HZ);
+        findings.add(&file.path, &key("timestamps"), what);
     }
     let is_binary_of = |(a, b): (&[f64], &[f64])| a[..6] == b[..6] && [0.0, 1.0].contains(&b[6]);
     let mut both = actions.chunks_exact(7).zip(binary.chunks_exact(7));
     if let Some(step) = both.position(|pair| !is_binary_of(pair)) {
         let what = format!("step {step}: not the actions with a gripper of 0 or 1");
-        findings.add(file.path(), &key("actions_binary"), what);
+        findings.add(&file.path, &key("actions_binary"), what);
     }
 }
 

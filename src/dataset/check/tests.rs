@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::*;
 use crate::{
-    dataset::{DataStream, Demonstration, actions, hdf5::Hdf5Writer, merge_parts},
+    dataset::{DataStream, Demonstration, hdf5::write_file, merge_parts},
     evaluation::record::tests::sample,
     policy::Action,
     sensing::tactile::Markers,
@@ -62,10 +62,11 @@ fn demonstration(salt: f64) -> Demonstration {
 fn write(demonstration: &Demonstration, name: &str) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
-    let mut writer = Hdf5Writer::create(&path, &json!({ "env_name": "softvt" }), STEPS, 1).unwrap();
-    writer.write_attributes(0, &demonstration.record, STEPS).unwrap();
-    writer.write_streams(0, demonstration).unwrap();
-    writer.close(Ok(())).unwrap();
+    write_file(&path, &json!({ "env_name": "softvt" }), STEPS, 1, |writer| {
+        writer.write_attributes(0, &demonstration.record, STEPS)?;
+        writer.write_streams(0, demonstration)
+    })
+    .unwrap();
     (folder, path)
 }
 
@@ -93,7 +94,7 @@ fn demonstrations_read_from_a_merged_file_are_identical() {
     let environment = json!({ "env_name": "softvt", "env_kwargs": { "seed": 7 } });
     merge_parts(&parts.each_ref().map(|(_, path)| path.clone()), &path, &environment).unwrap();
     let read = TaskFile::open(&path).unwrap();
-    assert_eq!((read.demos(), read.environment().unwrap()), (&[0, 1][..], environment));
+    assert_eq!((&read.demos[..], read.environment().unwrap()), (&[0, 1][..], environment));
     for (demo, made) in both.iter().enumerate() {
         let mut back = read.read(demo).unwrap();
         let order = |streams: &mut Vec<DataStream>| {
@@ -105,9 +106,9 @@ fn demonstrations_read_from_a_merged_file_are_identical() {
             order(streams);
         }
         assert_eq!(back, made);
-        assert_eq!(actions(&path, demo).unwrap(), made.actions);
+        assert_eq!(read.actions(demo).unwrap(), made.actions);
     }
-    assert!(actions(&path, 2).unwrap_err().to_string().contains("there is no demo_2; there are 2"));
+    assert!(read.actions(2).unwrap_err().to_string().contains("there is no demo_2; there are 2"));
     let findings = file(&path).unwrap();
     assert_eq!(findings.problems, [""; 0]);
     assert_eq!((findings.demos, findings.steps), (2, 2 * STEPS));
@@ -155,5 +156,6 @@ fn a_file_truncated_anywhere_is_reported_by_name() {
         assert!(said.contains("cut.hdf5"), "{share}: {said:?}");
     }
     let none = folder.path().join("none.hdf5");
-    assert!(actions(&none, 0).unwrap_err().to_string().starts_with("cannot read"), "it is missing");
+    let missing = TaskFile::open(&none).err().unwrap().to_string();
+    assert!(missing.starts_with("cannot read"), "it is missing");
 }

@@ -7,28 +7,42 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use rust_hdf5::{H5Dataset, H5File, H5Group, Hdf5Error};
+use rust_hdf5::{DatatypeMessage, H5Dataset, H5File, H5Group, Hdf5Error};
 use serde_json::Value;
 
-use super::{
-    super::{DataStream, DatasetError, Demonstration, StreamValues},
-    NumberType,
-};
-use crate::{evaluation::record::EpisodeRecord, geometry::Vec3, policy::Action};
+use super::super::{DataStream, DatasetError, Demonstration, StreamValues};
+use crate::{evaluation::record::EpisodeRecord, files::FileError, policy::Action};
 
 /// The HDF5 file of a task, with the demonstrations `/data/demo_0`, `/data/demo_1`, …
 pub struct TaskFile {
-    pub(super) file: H5File,
-    path: PathBuf,
+    pub path: PathBuf,
+    /// Indices of the demonstrations, ascending.
+    pub demos: Vec<usize>,
+    file: H5File,
     data: H5Group,
-    demos: Vec<usize>,
 }
 
-/// Values of a stream as `f64`, `width` per step.
+/// Number types of the datasets that softvt reads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::dataset) enum NumberType {
+    F64,
+    F32,
+    U8,
+    Other,
+}
+
+/// Values of a stream as `f64`, in row-major order. The first axis is the step.
 #[derive(Clone, Debug, PartialEq)]
-pub struct FloatRows {
+pub struct FloatArray {
     pub values: Vec<f64>,
-    pub width: usize,
+    pub shape: Vec<usize>,
+}
+
+impl FloatArray {
+    /// Number of values per step.
+    pub fn width(&self) -> usize {
+        self.shape.iter().skip(1).product()
+    }
 }
 
 /// RGB images of equal size, 8 bits per channel, one after the other.
@@ -39,21 +53,13 @@ pub struct ImageBlock {
     pub width: usize,
 }
 
-/// Reads the actions of a demonstration; see [`TaskFile::actions`].
-///
-/// # Errors
-/// As [`TaskFile::open`] and [`TaskFile::actions`].
-pub fn actions(path: &Path, demo: usize) -> Result<Vec<Action>, DatasetError> {
-    TaskFile::open(path)?.actions(demo)
-}
-
 impl TaskFile {
     /// Opens a file and lists its demonstrations.
     ///
     /// # Errors
     /// The file is unreadable, not HDF5, truncated, or has no group `/data/demo_0`.
     pub fn open(path: &Path) -> Result<Self, DatasetError> {
-        let metadata = std::fs::metadata(path).map_err(DatasetError::io("read", path))?;
+        let metadata = std::fs::metadata(path).map_err(FileError::io("read", path))?;
         let not_hdf5 = |what: String| Err(DatasetError::NotHdf5 { path: path.display().to_string(), what });
         if metadata.is_dir() {
             return not_hdf5("is a folder, not an HDF5 file".to_owned());
@@ -67,9 +73,9 @@ impl TaskFile {
             }
             Some(_) => {}
         }
-        let file = H5File::open(path).map_err(|e| DatasetError::hdf5(path, "/")(e))?;
-        let data = file.root_group().group("data").map_err(|e| DatasetError::hdf5(path, "/data")(e))?;
-        let names = data.group_names().map_err(|e| DatasetError::hdf5(path, "/data")(e))?;
+        let file = H5File::open(path).map_err(DatasetError::hdf5(path, "/"))?;
+        let data = file.root_group().group("data").map_err(DatasetError::hdf5(path, "/data"))?;
+        let names = data.group_names().map_err(DatasetError::hdf5(path, "/data"))?;
         let mut demos = Vec::new();
         for name in names.iter().filter(|name| name.starts_with("demo_")) {
             match name["demo_".len()..].parse::<usize>() {
@@ -85,16 +91,17 @@ impl TaskFile {
             let what = "it has no demonstrations; expected groups demo_0, demo_1, …";
             return Err(DatasetError::content(path, "/data", what));
         }
-        Ok(Self { file, path: path.to_owned(), data, demos })
+        Ok(Self { path: path.to_owned(), demos, file, data })
     }
 
-    pub fn path(&self) -> &Path {
-        &self.path
+    /// An error about the dataset or group `name` of a demonstration.
+    pub(in crate::dataset) fn error(&self, demo: usize, name: &str, what: impl Into<String>) -> DatasetError {
+        DatasetError::content(&self.path, format!("/data/demo_{demo}/{name}"), what)
     }
 
-    /// Indices of the demonstrations, ascending.
-    pub fn demos(&self) -> &[usize] {
-        &self.demos
+    /// Converts errors of the HDF5 library about the dataset `name` of a demonstration, for `map_err`.
+    pub(super) fn failed(&self, demo: usize, name: &str) -> impl Fn(Hdf5Error) -> DatasetError {
+        DatasetError::hdf5(&self.path, format!("/data/demo_{demo}/{name}"))
     }
 
     /// `env_args`: the environment in which the demonstrations were recorded.
@@ -103,7 +110,7 @@ impl TaskFile {
     /// The attribute is missing or not JSON.
     pub fn environment(&self) -> Result<Value, DatasetError> {
         let key = "/data, attribute env_args";
-        let text = self.data.attr_string("env_args").map_err(|e| DatasetError::hdf5(&self.path, key)(e))?;
+        let text = self.data.attr_string("env_args").map_err(DatasetError::hdf5(&self.path, key))?;
         serde_json::from_str(&text)
             .map_err(|e| DatasetError::content(&self.path, key, format!("not JSON: {e}")))
     }
@@ -114,7 +121,7 @@ impl TaskFile {
             return Err(DatasetError::content(&self.path, "/data", what));
         }
         let name = format!("demo_{demo}");
-        self.data.group(&name).map_err(|e| DatasetError::hdf5(&self.path, format!("/data/{name}"))(e))
+        self.data.group(&name).map_err(DatasetError::hdf5(&self.path, format!("/data/{name}")))
     }
 
     /// Text attribute of a demonstration.
@@ -123,7 +130,7 @@ impl TaskFile {
     /// The attribute is missing or not text.
     pub fn text(&self, demo: usize, attribute: &str) -> Result<String, DatasetError> {
         let key = format!("/data/demo_{demo}, attribute {attribute}");
-        self.group(demo)?.attr_string(attribute).map_err(|e| DatasetError::hdf5(&self.path, key)(e))
+        self.group(demo)?.attr_string(attribute).map_err(DatasetError::hdf5(&self.path, key))
     }
 
     /// Episode record of a demonstration.
@@ -183,7 +190,7 @@ impl TaskFile {
         self.file.dataset(&key).map_err(|error| {
             // The library's error for a missing name depends on the program that wrote the group.
             let error = if self.is_listed(demo, name) { error } else { Hdf5Error::NotFound(key.clone()) };
-            DatasetError::hdf5(&self.path, format!("/{key}"))(error)
+            self.failed(demo, name)(error)
         })
     }
 
@@ -202,7 +209,7 @@ impl TaskFile {
     pub fn names(&self, demo: usize) -> Result<Vec<String>, DatasetError> {
         let mut names = Vec::new();
         collect_names(&self.group(demo)?, "", &mut names)
-            .map_err(|e| DatasetError::hdf5(&self.path, format!("/data/demo_{demo}"))(e))?;
+            .map_err(DatasetError::hdf5(&self.path, format!("/data/demo_{demo}")))?;
         Ok(names)
     }
 
@@ -212,15 +219,14 @@ impl TaskFile {
     /// The stream is missing or unreadable.
     pub fn stream(&self, demo: usize, name: &str) -> Result<DataStream, DatasetError> {
         let data = self.dataset(demo, name)?;
-        let key = format!("/data/demo_{demo}/{name}");
-        let failed = |error| DatasetError::hdf5(&self.path, &key)(error);
-        let values = match NumberType::of(&self.path, &key, &data)? {
+        let failed = self.failed(demo, name);
+        let values = match self.number_type(demo, name, &data)? {
             NumberType::F32 => data.read_raw().map(StreamValues::F32),
             NumberType::U8 => data.read_raw().map(StreamValues::U8),
             _ => data.read_numeric_as().map(StreamValues::F64),
         };
         let mut attributes = Vec::new();
-        for name in data.attr_names().map_err(failed)? {
+        for name in data.attr_names().map_err(&failed)? {
             // Other programs may store numbers here.
             if let Ok(text) = data.attr(&name).and_then(|attr| attr.read_string()) {
                 attributes.push((name, text));
@@ -230,15 +236,44 @@ impl TaskFile {
         Ok(DataStream { name: name.to_owned(), row_shape, values: values.map_err(failed)?, attributes })
     }
 
+    /// Type of the numbers of a dataset.
+    pub(in crate::dataset) fn number_type(
+        &self,
+        demo: usize,
+        name: &str,
+        data: &H5Dataset,
+    ) -> Result<NumberType, DatasetError> {
+        Ok(match data.datatype().map_err(self.failed(demo, name))? {
+            DatatypeMessage::FloatingPoint { size: 8, .. } => NumberType::F64,
+            DatatypeMessage::FloatingPoint { size: 4, .. } => NumberType::F32,
+            DatatypeMessage::FixedPoint { size: 1, signed: false, .. } => NumberType::U8,
+            _ => NumberType::Other,
+        })
+    }
+
     /// Reads a stream as `f64`.
     ///
     /// # Errors
     /// As [`TaskFile::stream`].
-    pub fn float_rows(&self, demo: usize, name: &str) -> Result<FloatRows, DatasetError> {
+    pub fn array(&self, demo: usize, name: &str) -> Result<FloatArray, DatasetError> {
         let data = self.dataset(demo, name)?;
-        let key = format!("/data/demo_{demo}/{name}");
-        let values = data.read_numeric_as().map_err(|e| DatasetError::hdf5(&self.path, &key)(e))?;
-        Ok(FloatRows { values, width: data.shape().iter().skip(1).product() })
+        let values = data.read_numeric_as().map_err(self.failed(demo, name))?;
+        Ok(FloatArray { values, shape: data.shape() })
+    }
+
+    /// As [`Self::array`], of finite values.
+    ///
+    /// # Errors
+    /// As [`TaskFile::stream`], or a value is not finite.
+    pub fn finite_array(&self, demo: usize, name: &str) -> Result<FloatArray, DatasetError> {
+        let array = self.array(demo, name)?;
+        if let Some(at) = array.values.iter().position(|x| !x.is_finite()) {
+            let width = array.width().max(1);
+            let (step, number, value) = (at / width, at % width, array.values[at]);
+            let what = format!("step {step}, number {number}: {value} is not finite");
+            return Err(self.error(demo, name, what));
+        }
+        Ok(array)
     }
 
     /// Reads the images of some steps.
@@ -247,13 +282,12 @@ impl TaskFile {
     /// A step is missing, or the stream does not hold 8-bit RGB images.
     pub fn images(&self, demo: usize, name: &str, steps: Range<usize>) -> Result<ImageBlock, DatasetError> {
         let data = self.dataset(demo, name)?;
-        let key = format!("/data/demo_{demo}/{name}");
         let &[_, height, width, 3] = &data.shape()[..] else {
             let what = format!("expected the shape (steps, height, width, 3), got {:?}", data.shape());
-            return Err(DatasetError::content(&self.path, key, what));
+            return Err(self.error(demo, name, what));
         };
         let bytes = data.read_slice(&[steps.start, 0, 0, 0], &[steps.len(), height, width, 3]);
-        Ok(ImageBlock { bytes: bytes.map_err(|e| DatasetError::hdf5(&self.path, key)(e))?, height, width })
+        Ok(ImageBlock { bytes: bytes.map_err(self.failed(demo, name))?, height, width })
     }
 
     /// Reads the actions of a demonstration: absolute tool poses in the base frame, continuous gripper closure.
@@ -262,22 +296,13 @@ impl TaskFile {
     /// The demonstration is missing, or its actions are not finite numbers of shape (steps, 7 or more).
     pub fn actions(&self, demo: usize) -> Result<Vec<Action>, DatasetError> {
         let shape = self.shape(demo, "actions")?;
-        let error =
-            |what: String| DatasetError::content(&self.path, format!("/data/demo_{demo}/actions"), what);
         if shape.len() != 2 || shape[1] < 7 {
-            return Err(error(format!("expected the shape (steps, 7), got {shape:?}")));
+            let what = format!("expected the shape (steps, 7), got {shape:?}");
+            return Err(self.error(demo, "actions", what));
         }
-        let FloatRows { values, width } = self.float_rows(demo, "actions")?;
-        if let Some(at) = values.iter().position(|x| !x.is_finite()) {
-            let (step, number, value) = (at / width, at % width, values[at]);
-            return Err(error(format!("step {step}, number {number}: {value} is not finite")));
-        }
-        let action = |row: &[f64]| Action {
-            position_b: Vec3::new(row[0], row[1], row[2]),
-            axis_angle_b: Vec3::new(row[3], row[4], row[5]),
-            closure: row[6],
-        };
-        Ok(values.chunks_exact(width).map(action).collect())
+        let rows = self.finite_array(demo, "actions")?.values;
+        let action = |row: &[f64]| Action::from_array(std::array::from_fn(|i| row[i]));
+        Ok(rows.chunks_exact(shape[1]).map(action).collect())
     }
 
     /// Reads a demonstration without its images.
@@ -285,7 +310,7 @@ impl TaskFile {
     /// # Errors
     /// The demonstration was not recorded by softvt, or the file is damaged.
     pub fn read(&self, demo: usize) -> Result<Demonstration, DatasetError> {
-        let binary = self.float_rows(demo, "actions_binary")?.values;
+        let binary = self.array(demo, "actions_binary")?.values;
         let mut read = Demonstration {
             record: self.record(demo)?,
             actions: self.actions(demo)?,

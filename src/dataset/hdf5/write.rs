@@ -6,7 +6,7 @@ use rust_hdf5::{FilterPipeline, H5Dataset, H5File, H5Group, H5Type};
 use serde_json::{Value, json};
 
 use super::super::{DataStream, DatasetError, Demonstration, StreamValues};
-use crate::{benchmark::CONTROL_DT, evaluation::record::EpisodeRecord};
+use crate::{benchmark::CONTROL_HZ, evaluation::record::EpisodeRecord, files};
 
 /// Largest chunk of numbers, bytes. Readers of one step decompress a whole chunk.
 const MAX_CHUNK_BYTES: usize = 1 << 18;
@@ -20,6 +20,28 @@ pub(in crate::dataset) struct ChunkedSteps {
     pub per_chunk: usize,
 }
 
+/// Writes a file that appears complete or not at all. `total` is the number of steps in all `demos` demonstrations.
+///
+/// # Errors
+/// The file cannot be written, or `write` fails.
+pub(in crate::dataset) fn write_file(
+    path: &Path,
+    environment: &Value,
+    total: usize,
+    demos: usize,
+    write: impl FnOnce(&mut Hdf5Writer) -> Result<(), DatasetError>,
+) -> Result<(), DatasetError> {
+    files::create_parent(path)?;
+    let temp = files::temp_path(path);
+    let written = Hdf5Writer::create(&temp, environment, total, demos).and_then(|mut writer| {
+        let written = write(&mut writer);
+        writer.close(written)
+    });
+    // On failure the space is freed, since the disk may be full.
+    written.inspect_err(|_| drop(files::remove_if_present(&temp)))?;
+    Ok(files::persist(&temp, path)?)
+}
+
 /// A file that is being written.
 pub(in crate::dataset) struct Hdf5Writer<'a> {
     file: H5File,
@@ -29,36 +51,29 @@ pub(in crate::dataset) struct Hdf5Writer<'a> {
 }
 
 impl<'a> Hdf5Writer<'a> {
-    /// Creates a file with the group `/data` and its attributes. `total` is the number of steps in all demonstrations.
-    pub(in crate::dataset) fn create(
-        path: &'a Path,
-        environment: &Value,
-        total: usize,
-        demos: usize,
-    ) -> Result<Self, DatasetError> {
-        let failed = |error| DatasetError::hdf5(path, "/data")(error);
-        let file = H5File::create(path).map_err(|e| DatasetError::hdf5(path, "/")(e))?;
-        let data = file.create_group("data").map_err(failed)?;
-        let put = |name: &str, number: i64| data.set_attr_numeric(name, &number).map_err(failed);
-        put("total", total as i64)?;
-        put("num_demos", demos as i64)?;
-        put("fps", (1.0 / CONTROL_DT).round() as i64)?;
-        data.set_attr_string("env_args", &environment.to_string()).map_err(failed)?;
-        data.set_attr_string("quaternions", "w x y z, w >= 0").map_err(failed)?;
+    /// Creates a file with the group `/data` and its attributes.
+    fn create(path: &'a Path, environment: &Value, total: usize, demos: usize) -> Result<Self, DatasetError> {
+        let failed = DatasetError::hdf5(path, "/data");
+        let file = H5File::create(path).map_err(DatasetError::hdf5(path, "/"))?;
+        let data = file.create_group("data").map_err(&failed)?;
+        for (name, number) in [("total", total), ("num_demos", demos), ("fps", CONTROL_HZ as usize)] {
+            data.set_attr_numeric(name, &(number as i64)).map_err(&failed)?;
+        }
+        data.set_attr_string("env_args", &environment.to_string()).map_err(&failed)?;
+        data.set_attr_string("quaternions", "w x y z, w >= 0").map_err(&failed)?;
         Ok(Self { file, path, groups: ["data".to_owned()].into() })
     }
 
     /// The group at `path`, created with its parents if necessary.
     pub(in crate::dataset) fn group(&mut self, path: &str) -> Result<H5Group, DatasetError> {
-        let failed = |error| DatasetError::hdf5(self.path, path)(error);
         let mut group = self.file.root_group();
-        let mut so_far = String::new();
+        let mut end = 0;
         for name in path.split('/') {
-            so_far = if so_far.is_empty() { name.to_owned() } else { format!("{so_far}/{name}") };
-            group = match self.groups.insert(so_far.clone()) {
-                true => group.create_group(name).map_err(failed)?,
-                false => group.group(name).map_err(failed)?,
-            };
+            end += name.len();
+            let is_new = self.groups.insert(path[..end].to_owned());
+            let next = if is_new { group.create_group(name) } else { group.group(name) };
+            group = next.map_err(DatasetError::hdf5(self.path, path))?;
+            end += 1;
         }
         Ok(group)
     }
@@ -72,7 +87,7 @@ impl<'a> Hdf5Writer<'a> {
     ) -> Result<(), DatasetError> {
         let key = format!("data/demo_{demo}");
         let group = self.group(&key)?;
-        let failed = |error| DatasetError::hdf5(self.path, &key)(error);
+        let failed = DatasetError::hdf5(self.path, &key);
         let header = &record.header;
         let id = &header.id;
         for (name, number) in [
@@ -82,7 +97,7 @@ impl<'a> Hdf5Writer<'a> {
             ("attempt", i64::from(id.episode)),
             ("success", i64::from(record.verdict.safety)),
         ] {
-            group.set_attr_numeric(name, &number).map_err(failed)?;
+            group.set_attr_numeric(name, &number).map_err(&failed)?;
         }
         let metadata = json!(record).to_string();
         for (name, text) in [
@@ -92,7 +107,7 @@ impl<'a> Hdf5Writer<'a> {
             ("state_hash", &record.stats.state_hash),
             ("metadata_json", &metadata),
         ] {
-            group.set_attr_string(name, text).map_err(failed)?;
+            group.set_attr_string(name, text).map_err(&failed)?;
         }
         Ok(())
     }
@@ -126,9 +141,8 @@ impl<'a> Hdf5Writer<'a> {
         let per_chunk = (MAX_CHUNK_BYTES / width.max(1)).clamp(1, steps.max(1));
         let length = ChunkedSteps { steps, per_chunk };
         let data = self.create_dataset::<T>(key, length, &stream.row_shape, size_of::<T>())?;
-        let failed = |error| DatasetError::hdf5(self.path, key)(error);
-        data.write_raw(values).map_err(failed)?;
-        write_text_attributes(&data, &stream.attributes).map_err(failed)
+        data.write_raw(values).map_err(DatasetError::hdf5(self.path, key))?;
+        self.write_text_attributes(key, &data, &stream.attributes)
     }
 
     /// Creates a dataset. Before compression, HDF5's shuffle filter groups the bytes of a chunk that are
@@ -148,7 +162,7 @@ impl<'a> Hdf5Writer<'a> {
             1 => FilterPipeline::deflate(COMPRESSION_LEVEL),
             _ => FilterPipeline::shuffle_deflate(shuffle_stride as u32, COMPRESSION_LEVEL),
         };
-        builder.filter_pipeline(filters).create(name).map_err(|e| DatasetError::hdf5(self.path, key)(e))
+        builder.filter_pipeline(filters).create(name).map_err(DatasetError::hdf5(self.path, key))
     }
 
     /// Creates the dataset of an image stream. Within a chunk the values of one pixel in successive images are stored
@@ -166,29 +180,33 @@ impl<'a> Hdf5Writer<'a> {
         let shuffle_stride = if length.per_chunk > 1 { row_shape.iter().product() } else { 1 };
         let data = self.create_dataset::<u8>(&key, length, &row_shape, shuffle_stride)?;
         let axes = [("axes".to_owned(), "step, row from the top, column, RGB (sRGB)".to_owned())];
-        write_text_attributes(&data, &axes).map_err(|e| DatasetError::hdf5(self.path, &key)(e))?;
+        self.write_text_attributes(&key, &data, &axes)?;
         Ok(data)
     }
 
     /// Closes the file. If `written` is an error, the file is closed without syncing and the error returned.
-    pub(in crate::dataset) fn close(self, written: Result<(), DatasetError>) -> Result<(), DatasetError> {
+    fn close(self, written: Result<(), DatasetError>) -> Result<(), DatasetError> {
         if written.is_err() {
             // The first error is the one to report.
             let _ = self.file.close_no_sync();
             return written;
         }
         let path = self.path;
-        self.file.close().map_err(|e| DatasetError::hdf5(path, "/")(e))
+        self.file.close().map_err(DatasetError::hdf5(path, "/"))
     }
-}
 
-/// Writes text attributes of a dataset.
-pub(super) fn write_text_attributes(
-    data: &H5Dataset,
-    attributes: &[(String, String)],
-) -> rust_hdf5::Result<()> {
-    for (name, text) in attributes {
-        data.new_attr::<rust_hdf5::VarLenUnicode>().shape(()).create(name)?.write_string(text)?;
+    /// Writes text attributes of the dataset `key`.
+    pub(super) fn write_text_attributes(
+        &self,
+        key: &str,
+        data: &H5Dataset,
+        attributes: &[(String, String)],
+    ) -> Result<(), DatasetError> {
+        for (name, text) in attributes {
+            let attribute = data.new_attr::<rust_hdf5::VarLenUnicode>().shape(()).create(name);
+            let written = attribute.and_then(|attribute| attribute.write_string(text));
+            written.map_err(DatasetError::hdf5(self.path, key))?;
+        }
+        Ok(())
     }
-    Ok(())
 }

@@ -2,7 +2,7 @@
 
 use rust_hdf5::DatatypeMessage;
 
-use super::super::{DatasetError, TaskFile, hdf5::NumberType};
+use super::super::{DatasetError, FloatArray, TaskFile, hdf5::NumberType};
 use crate::geometry::{Pose, Quat, Vec3};
 
 /// One demonstration of a foreign file. Errors of its methods name the file and the key.
@@ -12,20 +12,10 @@ pub(super) struct DemoReader<'a> {
     pub demo: usize,
 }
 
-/// Finite values in row-major order.
-pub(super) struct FloatArray {
-    pub values: Vec<f64>,
-    pub shape: Vec<usize>,
-}
-
 impl DemoReader<'_> {
-    fn key(&self, name: &str) -> String {
-        format!("/data/demo_{}/{name}", self.demo)
-    }
-
     /// An error about the dataset `name`.
     pub(super) fn error(&self, name: &str, what: impl Into<String>) -> DatasetError {
-        DatasetError::content(self.file.path(), self.key(name), what)
+        self.file.error(self.demo, name, what)
     }
 
     pub(super) fn has(&self, name: &str) -> bool {
@@ -69,7 +59,7 @@ impl DemoReader<'_> {
     /// The array is missing, of another type, or holds a value that is not finite.
     pub(super) fn array(&self, name: &str) -> Result<FloatArray, DatasetError> {
         let data = self.file.dataset(self.demo, name)?;
-        let number_type = NumberType::of(self.file.path(), &self.key(name), &data)?;
+        let number_type = self.file.number_type(self.demo, name, &data)?;
         if !matches!(number_type, NumberType::F64 | NumberType::F32) {
             let got = match data.datatype() {
                 Ok(DatatypeMessage::FloatingPoint { size, .. }) => format!("float{}", 8 * size),
@@ -78,13 +68,7 @@ impl DemoReader<'_> {
             };
             return Err(self.error(name, format!("expected numbers of type float32 or float64, got {got}")));
         }
-        let rows = self.file.float_rows(self.demo, name)?;
-        if let Some(at) = rows.values.iter().position(|x| !x.is_finite()) {
-            let width = rows.width.max(1);
-            let (step, place, value) = (at / width, at % width, rows.values[at]);
-            return Err(self.error(name, format!("step {step}, number {place}: {value} is not finite")));
-        }
-        Ok(FloatArray { values: rows.values, shape: data.shape() })
+        self.file.finite_array(self.demo, name)
     }
 }
 
@@ -94,4 +78,9 @@ pub(super) fn pose_from_row(row: &[f64]) -> Option<Pose> {
     let position = Vec3::new(row[0], row[1], row[2]);
     let is_valid = q.norm() > 1e-6 && row.iter().all(|x| x.is_finite());
     is_valid.then(|| Pose::from_parts(position.into(), Quat::new_normalize(q)))
+}
+
+/// True if a quaternion has length 1 within 1 %.
+pub(super) fn is_unit(quaternion: &[f64]) -> bool {
+    (quaternion.iter().map(|x| x * x).sum::<f64>().sqrt() - 1.0).abs() <= 1e-2
 }

@@ -2,8 +2,28 @@
 
 use std::path::PathBuf;
 
-use super::header::ForeignLayout;
 use crate::{geometry::Pose, policy::ToolCommand, scene::InitialState};
+
+/// Layouts that can be imported.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ForeignLayout {
+    /// Relative steps for robosuite's controller, as stored by robomimic and LIBERO.
+    Libero,
+    /// Absolute poses, as stored by SoftVTBench.
+    SoftVtBench,
+    Softvt,
+}
+
+impl ForeignLayout {
+    /// Name in messages and records.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Libero => "robomimic/LIBERO",
+            Self::SoftVtBench => "SoftVTBench",
+            Self::Softvt => "softvt",
+        }
+    }
+}
 
 /// A file of demonstrations.
 #[derive(Clone, Debug)]

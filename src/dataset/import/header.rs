@@ -4,30 +4,9 @@ use serde_json::Value;
 
 use super::{
     super::{DatasetError, TaskFile},
-    ForeignTask,
+    foreign::{ForeignLayout, ForeignTask},
 };
-use crate::benchmark::CONTROL_DT;
-
-/// Layouts that can be imported.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ForeignLayout {
-    /// Relative steps for robosuite's controller, as stored by robomimic and LIBERO.
-    Libero,
-    /// Absolute poses, as stored by SoftVTBench.
-    SoftVtBench,
-    Softvt,
-}
-
-impl ForeignLayout {
-    /// Name in messages and records.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Libero => "robomimic/LIBERO",
-            Self::SoftVtBench => "SoftVTBench",
-            Self::Softvt => "softvt",
-        }
-    }
-}
+use crate::benchmark::CONTROL_HZ;
 
 /// Metadata of a file.
 pub(super) struct Header {
@@ -72,7 +51,7 @@ impl Header {
         let problem = attribute("problem_info").and_then(|text| serde_json::from_str::<Value>(&text).ok());
         let stated = problem.and_then(|problem| Some(problem["language_instruction"].as_str()?.to_owned()));
         let bddl = attribute("bddl_file_name").and_then(|name| sentence(&name, ".bddl"));
-        let file_name = file.path().file_name().and_then(|name| sentence(name.to_str()?, "_demo.hdf5"));
+        let file_name = file.path.file_name().and_then(|name| sentence(name.to_str()?, "_demo.hdf5"));
         let stated = [attribute("language"), attribute("prompt"), stated].into_iter().flatten();
         ForeignTask {
             suite: attribute("task_suite"),
@@ -81,11 +60,8 @@ impl Header {
         }
     }
 
-    fn error(file: &TaskFile, key: &str, what: String) -> DatasetError {
-        DatasetError::content(file.path(), key, what)
-    }
-
     fn check_robot(&self, file: &TaskFile) -> Result<(), DatasetError> {
+        let refuse = |key: &str, what: String| Err(DatasetError::content(&file.path, key, what));
         let kwargs = &self.environment["env_kwargs"];
         let listed = match &kwargs["robots"] {
             Value::String(name) => vec![name.clone()],
@@ -94,33 +70,31 @@ impl Header {
         };
         let count = listed.len();
         let attributes = ["robot_type", "robot"].into_iter().filter_map(|name| file.file_attribute(name));
-        let named: Vec<String> =
-            listed.into_iter().chain(attributes).filter(|name| !name.is_empty()).collect();
-        let known = |name: &&String| PANDA.iter().any(|panda| name.to_lowercase().contains(panda));
-        if let Some(other) = named.iter().find(|name| !known(name)) {
+        let mut named = listed.into_iter().chain(attributes).filter(|name| !name.is_empty());
+        let is_panda = |name: &String| PANDA.iter().any(|panda| name.to_lowercase().contains(panda));
+        if let Some(other) = named.find(|name| !is_panda(name)) {
             let what =
                 format!("the robot is {other}; only demonstrations of a Franka Panda can be re-executed");
-            return Err(Self::error(file, "/data, robot", what));
+            return refuse("/data, robot", what);
         }
         if count > 1 {
             let what = format!("there are {count} robots; expected one");
-            return Err(Self::error(file, "/data, attribute env_args, robots", what));
+            return refuse("/data, attribute env_args, robots", what);
         }
-        let kind = kwargs["controller_configs"]["type"].as_str();
-        if let Some(kind) = kind.filter(|kind| *kind != "OSC_POSE") {
+        let controller = &kwargs["controller_configs"];
+        let key = "/data, attribute env_args, controller_configs";
+        if let Some(kind) = controller["type"].as_str().filter(|kind| *kind != "OSC_POSE") {
             let what =
                 format!("the controller is {kind}; expected OSC_POSE with relative steps (control_delta)");
-            return Err(Self::error(file, "/data, attribute env_args, controller_configs", what));
+            return refuse(key, what);
         }
-        if kwargs["controller_configs"]["control_delta"] == Value::Bool(false) {
-            let what = "control_delta is false; expected steps relative to the tool".to_owned();
-            return Err(Self::error(file, "/data, attribute env_args, controller_configs", what));
+        if controller["control_delta"] == Value::Bool(false) {
+            return refuse(key, "control_delta is false; expected steps relative to the tool".to_owned());
         }
         Ok(())
     }
 
     fn check_rate(&self, file: &TaskFile) -> Result<(), DatasetError> {
-        let expected = (1.0 / CONTROL_DT).round();
         let stated = self.environment["env_kwargs"]["control_freq"].as_f64();
         let (key, rate) = match stated {
             Some(rate) => ("/data, attribute env_args, control_freq", rate),
@@ -129,10 +103,11 @@ impl Header {
                 None => return Ok(()),
             },
         };
-        if rate == expected {
+        if rate == f64::from(CONTROL_HZ) {
             return Ok(());
         }
-        Err(Self::error(file, key, format!("{rate} control steps per second; expected {expected}")))
+        let what = format!("{rate} control steps per second; expected {CONTROL_HZ}");
+        Err(DatasetError::content(&file.path, key, what))
     }
 
     /// Translation and rotation of an action of 1.
@@ -154,7 +129,7 @@ impl Header {
                 let what = format!(
                     "expected one length (m) three times and one angle (rad) three times, got {stated}"
                 );
-                Err(Self::error(file, "/data, attribute env_args, output_max", what))
+                Err(DatasetError::content(&file.path, "/data, attribute env_args, output_max", what))
             }
         }
     }
@@ -172,44 +147,38 @@ impl StepScale {
 }
 
 fn layout(file: &TaskFile, environment: &Value) -> Result<ForeignLayout, DatasetError> {
-    let first = file.demos()[0];
+    let first = file.demos[0];
     if environment["env_name"] == "softvt" {
         return Ok(ForeignLayout::Softvt);
     }
     let shape = file.shape(first, "actions")?;
-    let width = match shape[..] {
-        [_, width] => width,
-        _ => 0,
-    };
-    let robosuite = ROBOSUITE.iter().any(|name| file.has(first, name));
-    match width {
-        7 | 13 if file.has(first, "obs/eef_pose") => Ok(ForeignLayout::SoftVtBench),
-        7 if robosuite || environment["type"] == 1 => Ok(ForeignLayout::Libero),
+    let is_robosuite = || environment["type"] == 1 || ROBOSUITE.iter().any(|name| file.has(first, name));
+    match shape[..] {
+        [_, 7 | 13] if file.has(first, "obs/eef_pose") => Ok(ForeignLayout::SoftVtBench),
+        [_, 7] if is_robosuite() => Ok(ForeignLayout::Libero),
         _ => {
             let what = format!(
                 "unknown layout: actions of shape {shape:?} and neither obs/eef_pose (SoftVTBench: 7 or 13 numbers per action) nor \
                  env_args of type 1, obs/ee_states, ee_pos or joint_states (robomimic, LIBERO: 7 numbers per action)"
             );
-            Err(DatasetError::content(file.path(), format!("/data/demo_{first}"), what))
+            Err(DatasetError::content(&file.path, format!("/data/demo_{first}"), what))
         }
     }
 }
 
 /// An integer attribute of a group. rust-hdf5 returns such attributes as text only: an integer as its first byte.
 fn whole_number(text: &str) -> Option<usize> {
-    let mut letters = text.chars();
-    match (letters.next(), letters.next()) {
-        (None, _) => Some(0),
-        (Some(byte), None) if byte < ' ' => Some(byte as usize),
+    match text.as_bytes() {
+        [] => Some(0),
+        [byte] if *byte < b' ' => Some(usize::from(*byte)),
         _ => text.trim().parse().ok(),
     }
 }
 
 /// A rate attribute of a group: text, or an integer as its first byte. Floating-point rates cannot be read.
 fn rate(text: &str) -> Option<f64> {
-    let mut letters = text.chars();
-    match (letters.next(), letters.next()) {
-        (Some(byte), None) if byte.is_ascii() => Some(f64::from(u32::from(byte))),
+    match text.as_bytes() {
+        [byte] => Some(f64::from(*byte)),
         _ => text.trim().parse().ok(),
     }
 }

@@ -7,8 +7,9 @@
 //! both store before it, tell them apart.
 
 use super::{
-    DatasetError, DemoReader, ForeignDemo, InitialCondition,
-    demo_reader::FloatArray,
+    super::DatasetError,
+    demo_reader::{DemoReader, is_unit},
+    foreign::{ForeignDemo, InitialCondition},
     header::{Header, StepScale},
     mujoco::MujocoModel,
     tool_pose::{self, RecordedPoses},
@@ -43,20 +44,19 @@ pub(super) fn demo(reader: DemoReader, header: &Header) -> Result<ForeignDemo, D
     let steps = relative_steps(reader, header)?;
     let model = model(reader)?;
     let states = states(reader, steps.len(), model.as_ref())?;
-    let states: Vec<&[f64]> = states.values.chunks_exact(states.width).collect();
     let arm = arm_angles(reader, &states, steps.len())?;
     let recorded = tool_poses(reader, steps.len(), model.as_ref())?;
     let (commands, command_source) = match (&arm, &recorded) {
         (Some(arm), recorded) => {
             let observed = tool_pose::forward_kinematics(reader, arm.name, &arm.observed)?;
             if let Some(recorded) = recorded {
-                tool_pose::tool_offset(reader, recorded.borrowed(), &observed)?;
+                tool_pose::tool_offset(reader, recorded, &observed)?;
             }
             let before = tool_pose::forward_kinematics(reader, arm.name, &arm.before)?;
             (goals(&before, &steps), "steps away from where the recorded joint angles put the tool")
         }
         (None, Some(recorded)) => {
-            tool_pose::check_first_pose(reader, recorded.borrowed())?;
+            tool_pose::check_first_pose(reader, recorded)?;
             (goals(&delayed(&recorded.poses), &steps), "steps away from the recorded poses of the tool")
         }
         (None, None) => {
@@ -89,38 +89,33 @@ fn model(reader: DemoReader) -> Result<Option<MujocoModel>, DatasetError> {
     MujocoModel::read(&xml).map(Some).ok_or_else(|| reader.error("attribute model_file", what))
 }
 
-/// Rows of `width` numbers.
-struct States {
-    values: Vec<f64>,
-    width: usize,
-}
-
 /// MuJoCo states before each action. Empty if they are missing, or if their shape is unexpected and there is no model
 /// to check it against: other programs store something else under this key.
 ///
 /// # Errors
 /// The states do not fit the model.
-fn states(reader: DemoReader, steps: usize, model: Option<&MujocoModel>) -> Result<States, DatasetError> {
+fn states(
+    reader: DemoReader,
+    steps: usize,
+    model: Option<&MujocoModel>,
+) -> Result<Vec<Vec<f64>>, DatasetError> {
     const KEY: &str = "states";
-    let none = States { values: Vec::new(), width: 1 };
     if !reader.has(KEY) {
-        return Ok(none);
+        return Ok(Vec::new());
     }
-    let FloatArray { values, shape } = reader.array(KEY)?;
-    let is_per_step = shape[..] == [steps, shape.last().copied().unwrap_or(0)];
-    match model {
-        None if is_per_step => Ok(States { values, width: shape[1].max(1) }),
-        None => Ok(none),
-        Some(model) if is_per_step && shape[1] == model.state_width() => {
-            Ok(States { values, width: shape[1] })
-        }
-        Some(model) => {
+    let array = reader.array(KEY)?;
+    let width = array.width();
+    let is_per_step = array.shape[..] == [steps, width];
+    match model.map(MujocoModel::state_width) {
+        Some(expected) if !is_per_step || width != expected => {
             let what = format!(
-                "expected the shape ({steps}, {}), a state of model_file before each action, got {shape:?}",
-                model.state_width()
+                "expected the shape ({steps}, {expected}), a state of model_file before each action, got {:?}",
+                array.shape
             );
             Err(reader.error(KEY, what))
         }
+        None if !is_per_step || width == 0 => Ok(Vec::new()),
+        _ => Ok(array.values.chunks_exact(width).map(<[f64]>::to_vec).collect()),
     }
 }
 
@@ -154,7 +149,7 @@ struct RecordedArm {
 
 fn arm_angles(
     reader: DemoReader,
-    states: &[&[f64]],
+    states: &[Vec<f64>],
     steps: usize,
 ) -> Result<Option<RecordedArm>, DatasetError> {
     let Some(name) = JOINT_KEYS.into_iter().find(|name| reader.has(name)) else { return Ok(None) };
@@ -170,11 +165,11 @@ fn arm_angles(
 
 /// True if observations are from after each action, judged by the joints in robosuite's states (time, then positions,
 /// the arm's first), which are from before it. `None` if the states are something else.
-fn observed_after_action(states: &[&[f64]], observed: &[ArmAngles]) -> Option<bool> {
+fn observed_after_action(states: &[Vec<f64>], observed: &[ArmAngles]) -> Option<bool> {
     if states.len() != observed.len() || states.first()?.len() < 8 {
         return None;
     }
-    let difference = |(state, q): (&&[f64], &ArmAngles)| -> f64 {
+    let difference = |(state, q): (&Vec<f64>, &ArmAngles)| -> f64 {
         state[1..8].iter().zip(q).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
     };
     let pairs = observed.len().saturating_sub(1).max(1) as f64;
@@ -188,25 +183,13 @@ fn delayed<T: Copy>(observed: &[T]) -> Vec<T> {
     observed[..1].iter().chain(observed).take(observed.len()).copied().collect()
 }
 
-/// Poses recorded under a key.
-struct NamedPoses {
-    name: &'static str,
-    poses: Vec<Pose>,
-}
-
-impl NamedPoses {
-    fn borrowed(&self) -> RecordedPoses<'_> {
-        RecordedPoses { name: self.name, poses: &self.poses }
-    }
-}
-
 /// Recorded poses of our tool point in the base frame.
 fn tool_poses(
     reader: DemoReader,
     steps: usize,
     model: Option<&MujocoModel>,
-) -> Result<Option<NamedPoses>, DatasetError> {
-    let Some(NamedPoses { name, poses: site }) = site_poses(reader, steps)? else { return Ok(None) };
+) -> Result<Option<RecordedPoses>, DatasetError> {
+    let Some(RecordedPoses { name, poses: site }) = site_poses(reader, steps)? else { return Ok(None) };
     let is_near_start = |base: &Pose| {
         let tool_b = base.inverse_transform_point(&site[0].translation.vector.into()).coords;
         (tool_b - Vec3::from(INITIAL_TOOL)).norm() < MAX_INITIAL_DISTANCE
@@ -215,13 +198,13 @@ fn tool_poses(
     if is_near_start(&Pose::identity()) && stated.is_none() {
         // Already in the base frame, which robosuite never writes: these are poses of the tool
         // itself, as softvt records.
-        return Ok(Some(NamedPoses { name, poses: site }));
+        return Ok(Some(RecordedPoses { name, poses: site }));
     }
     let known = BASES.map(|at| Pose::translation(at[0], at[1], at[2]));
     let Some(base) = stated.into_iter().chain(known).find(is_near_start) else {
         // Joint angles, if present, determine the poses; without them the base is unknown.
         if JOINT_KEYS.iter().any(|name| reader.has(name)) {
-            return Ok(Some(NamedPoses { name, poses: site }));
+            return Ok(Some(RecordedPoses { name, poses: site }));
         }
         let at = site[0].translation.vector;
         let what = format!(
@@ -233,49 +216,44 @@ fn tool_poses(
     };
     let to_tool = Pose::translation(0.0, 0.0, SITE_TO_TOOL);
     let poses = site.iter().map(|site| base.inverse() * site * to_tool).collect();
-    Ok(Some(NamedPoses { name, poses }))
+    Ok(Some(RecordedPoses { name, poses }))
 }
 
 /// robosuite's record of the tool: position of the grip site and orientation of the hand, world.
-fn site_poses(reader: DemoReader, steps: usize) -> Result<Option<NamedPoses>, DatasetError> {
-    let pose = |at: &[f64], axis_angle: &[f64]| {
-        Pose::from_parts(
-            Vec3::from_column_slice(at).into(),
-            rotation::from_axis_angle(&Vec3::from_column_slice(axis_angle)),
-        )
-    };
+fn site_poses(reader: DemoReader, steps: usize) -> Result<Option<RecordedPoses>, DatasetError> {
+    let pose = |at: &[f64], rotation: Quat| Pose::from_parts(Vec3::from_column_slice(at).into(), rotation);
+    let from_axis_angle = |v: &[f64]| rotation::from_axis_angle(&Vec3::from_column_slice(v));
     if let Some(rows) = reader.rows_if_present::<6>("obs/ee_states", steps)? {
-        let poses = rows.iter().map(|row| pose(&row[..3], &row[3..])).collect();
-        return Ok(Some(NamedPoses { name: "obs/ee_states", poses }));
+        let poses = rows.iter().map(|row| pose(&row[..3], from_axis_angle(&row[3..]))).collect();
+        return Ok(Some(RecordedPoses { name: "obs/ee_states", poses }));
     }
     if let Some(positions) = reader.rows_if_present::<3>("obs/ee_pos", steps)? {
         let rotations = reader.rows::<3>("obs/ee_ori", Some(steps))?;
-        let poses = positions.iter().zip(&rotations).map(|(at, v)| pose(at, v)).collect();
-        return Ok(Some(NamedPoses { name: "obs/ee_pos", poses }));
+        let poses = positions.iter().zip(&rotations).map(|(at, v)| pose(at, from_axis_angle(v))).collect();
+        return Ok(Some(RecordedPoses { name: "obs/ee_pos", poses }));
     }
-    let with_quaternion = |name: &'static str, rows: &[[f64; 7]]| {
-        let poses = rows.iter().enumerate().map(|(step, row)| {
-            let q = nalgebra::Quaternion::new(row[6], row[3], row[4], row[5]);
-            if (q.norm() - 1.0).abs() > 1e-2 {
-                let what =
-                    format!("step {step}: not a unit quaternion x y z w: its length is {:.3}", q.norm());
-                return Err(reader.error(name, what));
-            }
-            Ok(Pose::from_parts(Vec3::new(row[0], row[1], row[2]).into(), Quat::new_normalize(q)))
-        });
-        Ok(Some(NamedPoses { name, poses: poses.collect::<Result<_, _>>()? }))
-    };
-    if let Some(positions) = reader.rows_if_present::<3>("obs/robot0_eef_pos", steps)? {
-        let name = "obs/robot0_eef_quat";
-        let quaternions = reader.rows::<4>(name, Some(steps))?;
-        let row = |(p, q): (&[f64; 3], &[f64; 4])| [p[0], p[1], p[2], q[0], q[1], q[2], q[3]];
-        let rows: Vec<[f64; 7]> = positions.iter().zip(&quaternions).map(row).collect();
-        return with_quaternion(name, &rows);
-    }
-    let Some(states) = reader.rows_if_present::<9>("robot_states", steps)? else { return Ok(None) };
-    // Two fingers come first.
-    let rows: Vec<[f64; 7]> = states.iter().map(|row| std::array::from_fn(|i| row[2 + i])).collect();
-    with_quaternion("robot_states", &rows)
+    // Position and quaternion x y z w.
+    let (name, rows): (_, Vec<[f64; 7]>) =
+        if let Some(positions) = reader.rows_if_present::<3>("obs/robot0_eef_pos", steps)? {
+            let name = "obs/robot0_eef_quat";
+            let quaternions = reader.rows::<4>(name, Some(steps))?;
+            let row = |(p, q): (&[f64; 3], &[f64; 4])| [p[0], p[1], p[2], q[0], q[1], q[2], q[3]];
+            (name, positions.iter().zip(&quaternions).map(row).collect())
+        } else if let Some(states) = reader.rows_if_present::<9>("robot_states", steps)? {
+            // Two fingers come first.
+            ("robot_states", states.iter().map(|row| std::array::from_fn(|i| row[2 + i])).collect())
+        } else {
+            return Ok(None);
+        };
+    let poses = rows.iter().enumerate().map(|(step, row)| {
+        let q = nalgebra::Quaternion::new(row[6], row[3], row[4], row[5]);
+        if !is_unit(&row[3..]) {
+            let what = format!("step {step}: not a unit quaternion x y z w: its length is {:.3}", q.norm());
+            return Err(reader.error(name, what));
+        }
+        Ok(pose(&row[..3], Quat::new_normalize(q)))
+    });
+    Ok(Some(RecordedPoses { name, poses: poses.collect::<Result<_, _>>()? }))
 }
 
 /// The goals that robosuite's controller tracked, each relative to the tool.

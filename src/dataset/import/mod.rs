@@ -9,7 +9,6 @@ mod header;
 mod libero;
 mod mujoco;
 mod object_matching;
-mod softvt;
 mod softvtbench;
 mod tool_pose;
 
@@ -17,11 +16,13 @@ use std::path::Path;
 
 use sha2::{Digest, Sha256};
 
+use self::demo_reader::DemoReader;
 use super::{DatasetError, TaskFile};
-use demo_reader::DemoReader;
+use crate::{evaluation::episode_id::Split, files::FileError, policy::ToolCommand};
 
-pub use foreign::{ForeignDemo, ForeignFile, ForeignObjectPose, ForeignTask, InitialCondition};
-pub use header::ForeignLayout;
+pub use foreign::{
+    ForeignDemo, ForeignFile, ForeignLayout, ForeignObjectPose, ForeignTask, InitialCondition,
+};
 pub use object_matching::match_objects;
 
 /// Reads all demonstrations of a file.
@@ -34,20 +35,54 @@ pub fn read(path: &Path) -> Result<ForeignFile, DatasetError> {
     let demo = |&demo: &usize| {
         let reader = DemoReader { file: &file, demo };
         match header.layout {
-            ForeignLayout::Softvt => softvt::demo(reader),
+            ForeignLayout::Softvt => softvt_demo(reader),
             ForeignLayout::SoftVtBench => softvtbench::demo(reader, &header),
             ForeignLayout::Libero => libero::demo(reader, &header),
         }
     };
-    let demos = file.demos().iter().map(demo).collect::<Result<_, _>>()?;
+    let demos = file.demos.iter().map(demo).collect::<Result<_, _>>()?;
     Ok(ForeignFile { path: path.to_owned(), sha256: sha256(path)?, layout: header.layout, demos })
+}
+
+/// A demonstration of softvt itself: the recorded commands, from the initial state of the same episode.
+///
+/// # Errors
+/// A stream is missing, or the file is not of the split of demonstrations.
+fn softvt_demo(reader: DemoReader) -> Result<ForeignDemo, DatasetError> {
+    let record = reader.file.record(reader.demo)?;
+    let header = &record.header;
+    let id = &header.id;
+    if id.split != Split::Demonstration {
+        let what = format!("its split is {}; expected demonstration", id.split.name());
+        return Err(reader.error("metadata_json", what));
+    }
+    let commands: Vec<ToolCommand> =
+        reader.file.actions(reader.demo)?.into_iter().map(ToolCommand::Pose).collect();
+    let binary = reader.rows::<7>("actions_binary", Some(commands.len()))?;
+    Ok(ForeignDemo {
+        name: format!("demo_{}", reader.demo),
+        task: ForeignTask {
+            suite: Some(id.suite.clone()),
+            id: Some(id.task),
+            prompts: vec![header.prompt.clone()],
+        },
+        is_stopped_by_object: vec![false; commands.len()],
+        gripper_closed: binary.iter().map(|row| row[6] > 0.5).collect(),
+        commands,
+        initial_condition: InitialCondition::SoftvtEpisode {
+            seed: id.base_seed,
+            attempt: id.episode,
+            start: header.origin.as_ref().map(|origin| origin.start.clone()).unwrap_or_default(),
+        },
+        command_source: "its actions, from the start of its own episode",
+    })
 }
 
 /// SHA-256 of a file, hexadecimal.
 fn sha256(path: &Path) -> Result<String, DatasetError> {
-    let mut file = std::fs::File::open(path).map_err(DatasetError::io("read", path))?;
+    let mut file = std::fs::File::open(path).map_err(FileError::io("read", path))?;
     let mut hash = Sha256::new();
-    std::io::copy(&mut file, &mut hash).map_err(DatasetError::io("read", path))?;
+    std::io::copy(&mut file, &mut hash).map_err(FileError::io("read", path))?;
     Ok(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect())
 }
 

@@ -4,7 +4,7 @@
 //! parents before children (MuJoCo, XML reference, "body"): a free joint has seven positions (position, quaternion w
 //! x y z) and six velocities, a ball joint four and three, any other joint one and one.
 
-use super::{ForeignObjectPose, demo_reader::pose_from_row};
+use super::{demo_reader::pose_from_row, foreign::ForeignObjectPose};
 use crate::geometry::Pose;
 
 /// Kinematic tree of a model.

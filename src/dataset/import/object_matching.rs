@@ -1,6 +1,6 @@
 //! Assignment of recorded object poses to the objects of a softvt scene.
 
-use super::ForeignObjectPose;
+use super::foreign::ForeignObjectPose;
 use crate::{
     geometry::{Pose, Vec3},
     scene::{Body, Object, ObjectPlacement, Scene},

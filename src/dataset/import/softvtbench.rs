@@ -4,8 +4,9 @@
 //! forces on both fingers (core/recorders/recorders.py). Quaternions are w x y z.
 
 use super::{
-    DatasetError, DemoReader, ForeignDemo, ForeignObjectPose, InitialCondition,
-    demo_reader::{FloatArray, pose_from_row},
+    super::{DatasetError, FloatArray},
+    demo_reader::{DemoReader, is_unit, pose_from_row},
+    foreign::{ForeignDemo, ForeignObjectPose, InitialCondition},
     header::Header,
     tool_pose::{self, RecordedPoses},
 };
@@ -70,7 +71,7 @@ pub(super) fn demo(reader: DemoReader, header: &Header) -> Result<ForeignDemo, D
     let joints =
         reader.has(JOINTS).then(|| tool_pose::joint_angles(reader, JOINTS, actions.len())).transpose()?;
     let offset_t = joints.as_ref().map_or(Ok(Vec3::zeros()), |joints| tool_offset(reader, &poses, joints))?;
-    check_lead(reader, &actions, &poses)?;
+    check_lead(reader, &actions, &poses.poses)?;
     let gripper = gripper_encoding(reader, &actions)?;
     let is_measured = fingers_are_measured(reader, &actions)?;
     let command = |action: &RecordedAction| {
@@ -92,7 +93,10 @@ pub(super) fn demo(reader: DemoReader, header: &Header) -> Result<ForeignDemo, D
         commands: actions.iter().map(command).collect(),
         initial_condition: InitialCondition::OtherSimulator {
             joints: start.or(joints.map(|all| all[0])).map(tool_pose::clamp_to_limits),
-            objects: initial_objects(reader)?,
+            objects: match objects_of(reader, "initial_state")? {
+                none if none.is_empty() => objects_of(reader, "states")?,
+                objects => objects,
+            },
         },
         command_source: "absolute poses and the fingers' positions",
     })
@@ -141,10 +145,9 @@ fn actions(reader: DemoReader) -> Result<Vec<RecordedAction>, DatasetError> {
 ///
 /// # Errors
 /// Not unit quaternions, or in the order x y z w.
-fn poses(reader: DemoReader, actions: &[RecordedAction]) -> Result<Vec<Pose>, DatasetError> {
+fn poses(reader: DemoReader, actions: &[RecordedAction]) -> Result<RecordedPoses, DatasetError> {
     let rows = reader.rows::<7>(POSES, Some(actions.len()))?;
-    let length = |row: &[f64; 7]| row[3..].iter().map(|x| x * x).sum::<f64>().sqrt();
-    if let Some(step) = rows.iter().position(|row| (length(row) - 1.0).abs() > 1e-2) {
+    if let Some(step) = rows.iter().position(|row| !is_unit(&row[3..])) {
         let what = format!("step {step}: not a unit quaternion w x y z: {:?}", &rows[step][3..]);
         return Err(reader.error(POSES, what));
     }
@@ -168,7 +171,7 @@ fn poses(reader: DemoReader, actions: &[RecordedAction]) -> Result<Vec<Pose>, Da
     let pose = |(row, rotation): (&[f64; 7], Quat)| {
         Pose::from_parts(Vec3::new(row[0], row[1], row[2]).into(), rotation)
     };
-    Ok(rows.iter().zip(wxyz).map(pose).collect())
+    Ok(RecordedPoses { name: POSES, poses: rows.iter().zip(wxyz).map(pose).collect() })
 }
 
 /// Checks that actions are near the recorded poses: they lead the tool, but not far.
@@ -197,9 +200,9 @@ fn check_lead(reader: DemoReader, actions: &[RecordedAction], poses: &[Pose]) ->
 ///
 /// # Errors
 /// The offset is too large or not constant: another robot or frame.
-fn tool_offset(reader: DemoReader, poses: &[Pose], joints: &[[f64; 7]]) -> Result<Vec3, DatasetError> {
+fn tool_offset(reader: DemoReader, poses: &RecordedPoses, joints: &[[f64; 7]]) -> Result<Vec3, DatasetError> {
     let from_joints = tool_pose::forward_kinematics(reader, JOINTS, joints)?;
-    let offset_t = tool_pose::tool_offset(reader, RecordedPoses { name: POSES, poses }, &from_joints)?;
+    let offset_t = tool_pose::tool_offset(reader, poses, &from_joints)?;
     if offset_t.norm() > MAX_TOOL_OFFSET {
         let what = format!(
             "{:.0} mm from where {JOINTS} puts the tool: expected poses in the robot's base frame",
@@ -231,26 +234,14 @@ fn gripper_encoding(reader: DemoReader, actions: &[RecordedAction]) -> Result<Gr
 
 /// True if the finger positions in the actions are the measured ones.
 fn fingers_are_measured(reader: DemoReader, actions: &[RecordedAction]) -> Result<bool, DatasetError> {
-    let Some(fingers) = reader.rows_if_present::<2>("obs/gripper_pos", actions.len())? else {
-        return Ok(false);
-    };
-    Ok(actions
-        .iter()
-        .zip(fingers)
-        .all(|(action, fingers)| (action.gripper() - fingers[0]).abs() < MEASURED_TOLERANCE))
+    let fingers = reader.rows_if_present::<2>("obs/gripper_pos", actions.len())?;
+    let is_measured =
+        |action: &RecordedAction, finger: f64| (action.gripper() - finger).abs() < MEASURED_TOLERANCE;
+    Ok(fingers
+        .is_some_and(|fingers| actions.iter().zip(fingers).all(|(a, finger)| is_measured(a, finger[0]))))
 }
 
-/// Poses of the objects at the start, from `initial_state` or the first row of `states`.
-fn initial_objects(reader: DemoReader) -> Result<Vec<ForeignObjectPose>, DatasetError> {
-    for root in ["initial_state", "states"] {
-        let objects = objects_of(reader, root)?;
-        if !objects.is_empty() {
-            return Ok(objects);
-        }
-    }
-    Ok(Vec::new())
-}
-
+/// First recorded poses of the objects below a group.
 fn objects_of(reader: DemoReader, root: &str) -> Result<Vec<ForeignObjectPose>, DatasetError> {
     let base_w = root_pose(reader, &format!("{root}/articulation/robot"))?;
     if base_w.is_some_and(|base| base.rotation.angle() > MAX_BASE_ROTATION) {
@@ -291,8 +282,7 @@ fn root_pose(reader: DemoReader, group: &str) -> Result<Option<Pose>, DatasetErr
     let keys = ["root_pose", "root_pose_w"].map(|last| format!("{group}/{last}"));
     let Some(key) = keys.iter().find(|key| reader.has(key)) else { return Ok(None) };
     let FloatArray { values, shape } = reader.array(key)?;
-    let length = values.get(3..7).map(|q| q.iter().map(|x| x * x).sum::<f64>().sqrt());
-    if shape.last() != Some(&7) || !length.is_some_and(|length| (length - 1.0).abs() < 1e-2) {
+    if shape.last() != Some(&7) || !values.get(3..7).is_some_and(is_unit) {
         let what = format!("expected a position (m) and a unit quaternion w x y z, got the shape {shape:?}");
         return Err(reader.error(key, what));
     }

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::{libero::goals, mujoco::MujocoModel, *};
 use crate::{
     benchmark::CONTROL_DT,
-    dataset::hdf5::{ChunkedSteps, Hdf5Writer},
+    dataset::hdf5::{ChunkedSteps, write_file},
     geometry::{Pose, Quat, Vec3},
     policy::{Action, ToolCommand},
     robot::{IkSpec, ik::DiffIk, rotation},
@@ -104,20 +104,22 @@ impl FileBuilder {
 
     fn write(&self) -> PathBuf {
         let path = self.folder.path().join("pick_up_the_cup_demo.hdf5");
-        let mut writer = Hdf5Writer::create(&path, &self.environment, STEPS, 1).unwrap();
-        for (name, text) in &self.about {
-            writer.group("data").unwrap().set_attr_string(name, text).unwrap();
-        }
-        for (name, text) in &self.demo {
-            writer.group("data/demo_0").unwrap().set_attr_string(name, text).unwrap();
-        }
-        for (name, row, numbers) in &self.data {
-            let steps = numbers.len() / row.iter().product::<usize>();
-            let length = ChunkedSteps { steps, per_chunk: steps };
-            let data = writer.create_dataset::<f64>(&format!("data/demo_0/{name}"), length, row, 8).unwrap();
-            data.write_raw(numbers).unwrap();
-        }
-        writer.close(Ok(())).unwrap();
+        write_file(&path, &self.environment, STEPS, 1, |writer| {
+            for (name, text) in &self.about {
+                writer.group("data").unwrap().set_attr_string(name, text).unwrap();
+            }
+            for (name, text) in &self.demo {
+                writer.group("data/demo_0").unwrap().set_attr_string(name, text).unwrap();
+            }
+            for (name, row, numbers) in &self.data {
+                let steps = numbers.len() / row.iter().product::<usize>();
+                let length = ChunkedSteps { steps, per_chunk: steps };
+                let data = writer.create_dataset::<f64>(&format!("data/demo_0/{name}"), length, row, 8)?;
+                data.write_raw(numbers).unwrap();
+            }
+            Ok(())
+        })
+        .unwrap();
         path
     }
 

@@ -1,6 +1,6 @@
 //! Consistency of recorded tool poses with joint angles, whose forward kinematics need no agreed frame.
 
-use super::{DatasetError, DemoReader};
+use super::{super::DatasetError, demo_reader::DemoReader};
 use crate::{
     benchmark::CONTROL_DT,
     geometry::{Pose, Quat, Vec3},
@@ -27,10 +27,9 @@ const HOME: ArmAngles = [0.0, 0.196, 0.0, -2.618, 0.0, 2.942, 0.785];
 const MAX_TILT_FROM_HOME: f64 = 1.0;
 
 /// Poses recorded under a key, which error messages name.
-#[derive(Clone, Copy)]
-pub(super) struct RecordedPoses<'a> {
-    pub name: &'a str,
-    pub poses: &'a [Pose],
+pub(super) struct RecordedPoses {
+    pub name: &'static str,
+    pub poses: Vec<Pose>,
 }
 
 /// Joint angles of the arm per step, rad.
@@ -97,7 +96,7 @@ pub(super) fn clamp_to_limits(mut q: ArmAngles) -> ArmAngles {
 /// The offset is not constant: another robot, another quaternion order, or steps that do not correspond.
 pub(super) fn tool_offset(
     reader: DemoReader,
-    recorded: RecordedPoses,
+    recorded: &RecordedPoses,
     from_joints: &[Pose],
 ) -> Result<Vec3, DatasetError> {
     let pairs = || recorded.poses.iter().zip(from_joints);
@@ -148,7 +147,7 @@ fn wrong_hand_orientation(rotation: &Quat, max_tilt: f64, expected: &str) -> Opt
 ///
 /// # Errors
 /// The hand points elsewhere, or is rotated by half a turn: another order of the quaternion's numbers.
-pub(super) fn check_first_pose(reader: DemoReader, recorded: RecordedPoses) -> Result<(), DatasetError> {
+pub(super) fn check_first_pose(reader: DemoReader, recorded: &RecordedPoses) -> Result<(), DatasetError> {
     let home = DiffIk::new(&IkSpec::default(), HOME, CONTROL_DT).tool_pose(&HOME);
     let rotation = home.rotation.inverse() * recorded.poses[0].rotation;
     wrong_hand_orientation(&rotation, MAX_TILT_FROM_HOME, "the usual initial pose")

@@ -1,23 +1,21 @@
 //! [`EpisodeData`]: the rows of an episode with their statistics, ready to be written.
 
-use image::{
-    ExtendedColorType, ImageEncoder, ImageError, RgbImage,
-    codecs::png::{CompressionType, FilterType, PngEncoder},
-};
+use image::{ImageError, RgbImage};
 
 use super::{
     ExportConfig, GripperCoding, LeRobotVersion,
-    features::{IMAGE_FEATURES, MARKER_SHAPE, VECTOR_LENGTH},
+    features::{IMAGE_FEATURES, INDEX_FEATURES, MARKER_SHAPE, VECTOR_LENGTH},
     parquet_table::{ColumnValues, EmbeddedImage},
     selection::{ImageSize, SelectedDemo, Selection},
-    statistics::{FeatureStatistics, ValueCounts, ValueMoments, ValueStatistics},
+    statistics::{FeatureStatistics, QuantileSource, ValueCounts, ValueMoments, ValueStatistics},
 };
 use crate::{
-    dataset::{
-        DatasetError, FloatRows, ImageBlock, TaskFile, demonstration_writer::frame_rate,
-        layout::IMAGE_STREAMS,
+    benchmark::CONTROL_HZ,
+    dataset::{DatasetError, ImageBlock, TaskFile, layout::IMAGE_STREAMS},
+    sensing::{
+        camera::encode_png,
+        tactile::{HISTORY_LENGTH, IMAGE_SIZE, MARKER_COUNT, MosaicLayout, mosaic, mosaic_cell},
     },
-    sensing::tactile::{HISTORY_LENGTH, IMAGE_SIZE, MARKER_COUNT, MosaicLayout, mosaic, mosaic_cell},
 };
 
 /// Images decompressed at once: whole chunks of the file.
@@ -82,16 +80,18 @@ impl<'a> EpisodeData<'a> {
             LeRobotVersion::V21 => rows.statistics_per_marker(),
             LeRobotVersion::V30 => rows.statistics_of_all_markers(),
         });
-        statistics.extend(index_statistics(index, demo));
+        let timestamps = (0..rows.steps).map(|step| f64::from(timestamp(step))).collect();
+        statistics.push(rows.feature("timestamp", &[1], vec![ValueStatistics::of(timestamps)]));
+        for (name, numbers) in INDEX_FEATURES.into_iter().zip(index_columns(index, demo)) {
+            let numbers = numbers.into_iter().map(|number| number as f64).collect();
+            statistics.push(rows.feature(name, &[1], vec![ValueStatistics::of(numbers)]));
+        }
         Ok(Self { index, demo, rows, statistics })
     }
 
     /// The columns of its table, in the order of the features. `image_name` names the image of a step.
     pub(super) fn into_columns(self, image_name: fn(usize) -> String) -> Vec<ColumnValues> {
         let Self { index, demo, rows, .. } = self;
-        let steps = rows.steps;
-        let constant = |number: usize| ColumnValues::I64(vec![number as i64; steps]);
-        let counted = |from: usize| ColumnValues::I64((from..from + steps).map(|i| i as i64).collect());
         let images = rows.images.into_iter().map(|files| {
             let image = |(step, png)| EmbeddedImage { png, name: image_name(step) };
             ColumnValues::Images(files.into_iter().enumerate().map(image).collect())
@@ -100,39 +100,23 @@ impl<'a> EpisodeData<'a> {
             ColumnValues::F32(rows.state),
             ColumnValues::F32(rows.actions),
             ColumnValues::F32(rows.markers),
-            ColumnValues::F32((0..steps).map(timestamp).collect()),
-            counted(0),
-            constant(index),
-            counted(demo.first_frame),
-            constant(demo.prompt),
+            ColumnValues::F32((0..rows.steps).map(timestamp).collect()),
         ];
-        images.chain(rest).collect()
+        images.chain(rest).chain(index_columns(index, demo).map(ColumnValues::I64)).collect()
     }
 }
 
 /// Time of a step, s.
 fn timestamp(step: usize) -> f32 {
-    (step as f64 / f64::from(frame_rate())) as f32
+    (step as f64 / f64::from(CONTROL_HZ)) as f32
 }
 
-/// Statistics of the time and index columns that LeRobot adds to every row.
-fn index_statistics(index: usize, demo: &SelectedDemo) -> Vec<FeatureStatistics> {
+/// Values of [`INDEX_FEATURES`] in every row of an episode.
+fn index_columns(index: usize, demo: &SelectedDemo) -> [Vec<i64>; 4] {
     let steps = demo.entry.num_samples;
-    let feature = |name, numbers: Vec<f64>| FeatureStatistics {
-        name,
-        shape: vec![1],
-        steps: steps as u64,
-        parts: vec![ValueStatistics::of(numbers)],
-    };
-    let counted = |from: usize| (from..from + steps).map(|i| i as f64).collect();
-    let constant = |number: usize| vec![number as f64; steps];
-    vec![
-        feature("timestamp", (0..steps).map(|step| f64::from(timestamp(step))).collect()),
-        feature("frame_index", counted(0)),
-        feature("episode_index", constant(index)),
-        feature("index", counted(demo.first_frame)),
-        feature("task_index", constant(demo.prompt)),
-    ]
+    let constant = |number: usize| vec![number as i64; steps];
+    let counted = |from: usize| (from..from + steps).map(|i| i as i64).collect();
+    [counted(0), constant(index), counted(demo.first_frame), constant(demo.prompt)]
 }
 
 /// Streams of a demonstration of known length.
@@ -144,7 +128,7 @@ struct DemoStreams<'a> {
 
 impl DemoStreams<'_> {
     fn error(&self, name: &str, what: String) -> DatasetError {
-        DatasetError::content(self.file.path(), format!("/data/demo_{}/{name}", self.demo), what)
+        self.file.error(self.demo, name, what)
     }
 
     fn rows(
@@ -188,7 +172,7 @@ impl DemoStreams<'_> {
                 for (feature, image) in [third, wrist, mosaic].iter().enumerate() {
                     rows.push_image(feature, image).map_err(|error| {
                         let key = format!("/data/demo_{}, step {step}", self.demo);
-                        DatasetError::content(self.file.path(), key, error.to_string())
+                        DatasetError::content(&self.file.path, key, error.to_string())
                     })?;
                 }
             }
@@ -206,10 +190,7 @@ impl DemoStreams<'_> {
 
     fn floats(&self, name: &str, row_shape: &[usize]) -> Result<Vec<f32>, DatasetError> {
         self.check_shape(name, row_shape)?;
-        let FloatRows { values, width } = self.file.float_rows(self.demo, name)?;
-        if let Some(at) = values.iter().position(|x| !x.is_finite()) {
-            return Err(self.error(name, format!("step {}: {} is not finite", at / width.max(1), values[at])));
-        }
+        let values = self.file.finite_array(self.demo, name)?.values;
         Ok(values.into_iter().map(|x| x as f32).collect())
     }
 
@@ -256,14 +237,6 @@ fn marker_rows(stored: &[f32]) -> Vec<f32> {
     rows
 }
 
-fn encode_png(image: &RgbImage) -> Result<Vec<u8>, ImageError> {
-    let mut file = Vec::new();
-    let encoder = PngEncoder::new_with_quality(&mut file, CompressionType::Fast, FilterType::Adaptive);
-    let (width, height) = image.dimensions();
-    encoder.write_image(image, width, height, ExtendedColorType::Rgb8)?;
-    Ok(file)
-}
-
 impl EpisodeRows {
     fn push_image(&mut self, feature: usize, image: &RgbImage) -> Result<(), ImageError> {
         for pixel in image.pixels() {
@@ -295,7 +268,8 @@ impl EpisodeRows {
 
     /// Statistics of each marker coordinate, without quantiles.
     fn statistics_per_marker(&self) -> FeatureStatistics {
-        let parts = self.marker_moments().into_iter().map(ValueStatistics::without_quantiles).collect();
+        let part = |moments| ValueStatistics { moments, quantile_source: QuantileSource::None };
+        let parts = self.marker_moments().into_iter().map(part).collect();
         self.feature("tactile_marker_motion", &MARKER_SHAPE, parts)
     }
 
@@ -305,7 +279,8 @@ impl EpisodeRows {
         let parts = (0..2).map(|axis| {
             let mut counts = ValueCounts::new(MARKER_STEP, (MARKER_RANGE / MARKER_STEP) as usize + 1);
             self.markers.iter().skip(axis).step_by(2).for_each(|x| counts.count_nearest(f64::from(*x)));
-            ValueStatistics::rounded(ValueMoments::merged(moments.iter().skip(axis).step_by(2)), counts)
+            let moments = ValueMoments::merged(moments.iter().skip(axis).step_by(2));
+            ValueStatistics { moments, quantile_source: QuantileSource::Counts(counts) }
         });
         self.feature("tactile_marker_motion", &[2], parts.collect())
     }

@@ -1,15 +1,18 @@
 //! Features of a row: for LeRobot's `info.json`, for Hugging Face's `datasets`, and as table columns.
 
+use parquet::file::metadata::KeyValue;
 use serde_json::{Map, Value, json};
 
 use super::{
-    parquet_table::{ColumnType, KeyValueNote, ParquetColumn},
+    parquet_table::{ColumnType, ParquetColumn, TableSchema},
     selection::ImageSize,
 };
 use crate::sensing::tactile::MARKER_COUNT;
 
 /// Image features of a row, in order.
 pub(super) const IMAGE_FEATURES: [&str; 3] = ["image", "wrist_image", "tactile_image"];
+/// Index features of a row, in order: the last ones.
+pub(super) const INDEX_FEATURES: [&str; 4] = ["frame_index", "episode_index", "index", "task_index"];
 /// Length of the state and of an action.
 pub(super) const VECTOR_LENGTH: usize = 7;
 /// Shape of the markers of a row: initial positions, those of the previous step and of this one; both fingers; x and y.
@@ -45,8 +48,7 @@ pub(super) fn all([third_person, wrist]: [ImageSize; 2]) -> Vec<Feature> {
         feature("tactile_marker_motion", "float32", &MARKER_SHAPE, json!(["time", "marker", "xy"])),
         feature("timestamp", "float32", &[1], Value::Null),
     ];
-    let numbered = ["frame_index", "episode_index", "index", "task_index"]
-        .map(|name| feature(name, "int64", &[1], Value::Null));
+    let numbered = INDEX_FEATURES.map(|name| feature(name, "int64", &[1], Value::Null));
     images.chain(own).chain(numbered).collect()
 }
 
@@ -55,7 +57,7 @@ impl Feature {
         self.dtype == "image"
     }
 
-    pub(super) fn column(&self) -> ParquetColumn {
+    fn column(&self) -> ParquetColumn {
         let kind = match self.dtype {
             "image" => ColumnType::Image,
             "int64" => ColumnType::I64,
@@ -86,8 +88,13 @@ pub(super) fn info(features: &[Feature]) -> Value {
     Value::Object(features.iter().map(entry).collect())
 }
 
-/// Metadata that `datasets` expects in a table; without it, images are read as bytes.
-pub(super) fn hugging_face_note(features: &[Feature]) -> KeyValueNote {
+/// Schema of the tables of rows. Their metadata are those that `datasets` expects: without them, images are read as
+/// bytes.
+pub(super) fn schema(features: &[Feature]) -> TableSchema {
     let known: Map<String, Value> = features.iter().map(|f| (f.name.to_owned(), f.hugging_face())).collect();
-    KeyValueNote { key: "huggingface", value: json!({ "info": { "features": known } }).to_string() }
+    let text = json!({ "info": { "features": known } }).to_string();
+    TableSchema {
+        columns: features.iter().map(Feature::column).collect(),
+        metadata: vec![KeyValue::new("huggingface".to_owned(), text)],
+    }
 }

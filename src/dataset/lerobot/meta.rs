@@ -2,19 +2,17 @@
 
 use std::path::Path;
 
+use parquet::file::metadata::KeyValue;
 use serde_json::{Value, json};
 
 use super::{
     ExportConfig, ExportSummary, GripperCoding, LeRobotVersion,
     config::{CHUNK, MAX_TABLE_MB},
     features::{self, Feature},
-    parquet_table::{ColumnType, ColumnValues, KeyValueNote, ParquetColumn, ParquetTable},
+    parquet_table::{ColumnType, ColumnValues, ParquetColumn, ParquetTable},
     selection::{SelectedDemo, Selection},
 };
-use crate::{
-    dataset::{DatasetError, demonstration_writer::frame_rate},
-    files,
-};
+use crate::{benchmark::CONTROL_HZ, dataset::DatasetError, files};
 
 /// Writes all files that do not describe single episodes. `info.json` is last: LeRobot opens nothing without it.
 pub(super) fn write(
@@ -54,7 +52,7 @@ fn info(version: LeRobotVersion, features: &[Feature], summary: ExportSummary) -
             info["video_files_size_in_mb"] = json!(200);
         }
     }
-    info["fps"] = json!(frame_rate());
+    info["fps"] = json!(CONTROL_HZ);
     info["splits"] = json!({ "train": format!("0:{episodes}") });
     info["data_path"] = json!(version.data_path());
     info["video_path"] = Value::Null;
@@ -63,10 +61,8 @@ fn info(version: LeRobotVersion, features: &[Feature], summary: ExportSummary) -
 }
 
 fn write_task_lines(dir: &Path, prompts: &[String]) -> Result<(), DatasetError> {
-    let line =
-        |(index, prompt): (usize, &String)| format!("{}\n", json!({ "task_index": index, "task": prompt }));
-    let text: String = prompts.iter().enumerate().map(line).collect();
-    Ok(files::replace(&dir.join("meta/tasks.jsonl"), text.as_bytes())?)
+    let lines = prompts.iter().enumerate().map(|(i, prompt)| json!({ "task_index": i, "task": prompt }));
+    Ok(files::write_json_lines(&dir.join("meta/tasks.jsonl"), lines)?)
 }
 
 /// The table that pandas writes for a data frame indexed by the prompts; its metadata declare the index.
@@ -83,26 +79,19 @@ fn write_task_table(dir: &Path, prompts: &[String]) -> Result<(), DatasetError> 
         "creator": { "library": "softvt", "version": env!("CARGO_PKG_VERSION") },
         "pandas_version": "2.2.0",
     });
-    let columns = [
-        ParquetColumn::new("task_index", ColumnType::I64, &[]),
-        ParquetColumn::new(INDEX, ColumnType::Text, &[]),
-    ];
-    let path = dir.join("meta/tasks.parquet");
-    let mut table = ParquetTable::create(
-        path,
-        &columns.into(),
-        &[KeyValueNote { key: "pandas", value: note.to_string() }],
-    )?;
     let indices = (0..prompts.len()).map(|i| i as i64).collect();
-    table.append(prompts.len(), vec![ColumnValues::I64(indices), ColumnValues::Text(prompts.to_vec())])?;
-    table.finish()
+    let columns = vec![
+        (ParquetColumn::new("task_index", ColumnType::I64, &[]), ColumnValues::I64(indices)),
+        (ParquetColumn::new(INDEX, ColumnType::Text, &[]), ColumnValues::Text(prompts.to_vec())),
+    ];
+    let metadata = vec![KeyValue::new("pandas".to_owned(), note.to_string())];
+    ParquetTable::write(dir.join("meta/tasks.parquet"), prompts.len(), columns, metadata)
 }
 
 /// `softvt.jsonl`: the demonstration that each episode comes from.
 fn write_origins(dir: &Path, config: &ExportConfig, selection: &Selection) -> Result<(), DatasetError> {
-    let line = |(index, demo): (usize, &SelectedDemo)| {
-        let entry = &demo.entry;
-        let line = json!({
+    let line = |(index, SelectedDemo { entry, .. }): (usize, &SelectedDemo)| {
+        json!({
             "episode_index": index,
             "suite": entry.suite,
             "task_id": entry.task_id,
@@ -113,11 +102,10 @@ fn write_origins(dir: &Path, config: &ExportConfig, selection: &Selection) -> Re
             "episode": entry.episode,
             "state_hash": entry.state_hash,
             "gripper": config.gripper.code(),
-        });
-        format!("{line}\n")
+        })
     };
-    let text: String = selection.demos.iter().enumerate().map(line).collect();
-    Ok(files::replace(&dir.join("meta/softvt.jsonl"), text.as_bytes())?)
+    let lines = selection.demos.iter().enumerate().map(line);
+    Ok(files::write_json_lines(&dir.join("meta/softvt.jsonl"), lines)?)
 }
 
 /// The human-readable description, with the metadata that Hugging Face's hub reads.
@@ -143,7 +131,7 @@ fn readme(config: &ExportConfig, selection: &Selection, summary: ExportSummary) 
          | `actions` | absolute tool position and axis-angle; {gripper} |\n\n\
          `meta/softvt.jsonl` names the demonstration of each episode.\n\n{prompts}",
         config.version.code(),
-        frame_rate(),
+        CONTROL_HZ,
         env!("CARGO_PKG_VERSION"),
     )
 }

@@ -21,6 +21,8 @@ use self::{
     features::Feature,
     selection::Selection,
     staged_dir::StagedDir,
+    v21::EpisodeTableWriter,
+    v30::SharedTableWriter,
 };
 use super::DatasetError;
 use crate::parallel;
@@ -63,8 +65,8 @@ fn write(
 ) -> Result<ExportSummary, DatasetError> {
     let (demos, dir) = (&selection.demos, staged.path());
     let mut writer: Box<dyn EpisodeWriter> = match config.version {
-        LeRobotVersion::V21 => Box::new(v21::Writer21::create(dir, features)?),
-        LeRobotVersion::V30 => Box::new(v30::Writer30::create(dir, features)?),
+        LeRobotVersion::V21 => Box::new(EpisodeTableWriter::create(dir, features::schema(features))?),
+        LeRobotVersion::V30 => Box::new(SharedTableWriter::create(dir, features::schema(features))?),
     };
     parallel::run_in_order(
         demos.len(),

@@ -1,7 +1,6 @@
 //! Parquet files with columns of numbers, nested lists of fixed shape, text, and PNG images in Hugging Face's form.
 
 use std::{
-    fmt::Write as _,
     fs::File,
     io,
     path::{Path, PathBuf},
@@ -19,7 +18,7 @@ use parquet::{
     schema::{parser::parse_message_type, types::ColumnPath},
 };
 
-use crate::dataset::DatasetError;
+use crate::{dataset::DatasetError, files::FileError};
 
 /// Type of the values of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,10 +47,11 @@ pub(super) struct EmbeddedImage {
     pub name: String,
 }
 
-/// Metadata of a file.
-pub(super) struct KeyValueNote {
-    pub key: &'static str,
-    pub value: String,
+/// Columns and metadata of a table.
+#[derive(Clone)]
+pub(super) struct TableSchema {
+    pub columns: Arc<[ParquetColumn]>,
+    pub metadata: Vec<KeyValue>,
 }
 
 /// Values of a column.
@@ -66,7 +66,7 @@ pub(super) enum ColumnValues {
 
 /// Definition and repetition levels of the values of a column.
 #[derive(Debug, PartialEq)]
-struct Levels {
+struct DremelLevels {
     definitions: Vec<i16>,
     repetitions: Option<Vec<i16>>,
 }
@@ -97,13 +97,13 @@ impl ParquetColumn {
     }
 
     /// Definition and repetition levels (Melnik et al. 2010) of `rows` rows.
-    fn levels(&self, rows: usize) -> Levels {
+    fn levels(&self, rows: usize) -> DremelLevels {
         let depth = self.shape.len();
         let row: usize = self.shape.iter().product();
         let definition = if self.column_type == ColumnType::Image { 2 } else { 2 * depth as i16 + 1 };
         let definitions = vec![definition; rows * row];
         if depth == 0 {
-            return Levels { definitions, repetitions: None };
+            return DremelLevels { definitions, repetitions: None };
         }
         // The level of a value is that of the outermost list it begins; the first value begins the row itself.
         let level = |position: usize| {
@@ -112,7 +112,7 @@ impl ParquetColumn {
             if position == 0 { 0 } else { outer as i16 + 1 }
         };
         let one: Vec<i16> = (0..row).map(level).collect();
-        Levels { definitions, repetitions: Some(one.repeat(rows)) }
+        DremelLevels { definitions, repetitions: Some(one.repeat(rows)) }
     }
 }
 
@@ -127,7 +127,7 @@ pub(super) struct ParquetTable {
 fn failed(path: &Path) -> impl Fn(ParquetError) -> DatasetError {
     move |error| match error {
         ParquetError::External(inner) => match inner.downcast::<io::Error>() {
-            Ok(source) => DatasetError::io("write", path)(*source),
+            Ok(source) => FileError::io("write", path)(*source).into(),
             Err(other) => DatasetError::content(path, "Parquet", other.to_string()),
         },
         other => DatasetError::content(path, "Parquet", other.to_string()),
@@ -135,37 +135,46 @@ fn failed(path: &Path) -> impl Fn(ParquetError) -> DatasetError {
 }
 
 impl ParquetTable {
-    /// Creates a file with `notes` as metadata.
+    /// Writes a complete file of `rows` rows with the given columns.
     ///
     /// # Errors
     /// The file cannot be written.
-    pub(super) fn create(
+    pub(super) fn write(
         path: PathBuf,
-        columns: &Arc<[ParquetColumn]>,
-        notes: &[KeyValueNote],
-    ) -> Result<Self, DatasetError> {
-        let mut schema = "message schema {".to_owned();
-        for column in columns.iter() {
-            // Writing into a string cannot fail.
-            let _ = write!(schema, " {}", column.declaration());
-        }
-        let schema = parse_message_type(&(schema + " }")).map_err(failed(&path))?;
-        let notes = notes.iter().map(|note| KeyValue::new(note.key.to_owned(), note.value.clone()));
+        rows: usize,
+        columns: Vec<(ParquetColumn, ColumnValues)>,
+        metadata: Vec<KeyValue>,
+    ) -> Result<(), DatasetError> {
+        let (columns, values): (Vec<ParquetColumn>, Vec<ColumnValues>) = columns.into_iter().unzip();
+        let mut table = Self::create(path, &TableSchema { columns: columns.into(), metadata })?;
+        table.append(rows, values)?;
+        table.finish()
+    }
+
+    /// Creates a file without rows.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub(super) fn create(path: PathBuf, schema: &TableSchema) -> Result<Self, DatasetError> {
+        let TableSchema { columns, metadata } = schema;
+        let declarations: Vec<String> = columns.iter().map(ParquetColumn::declaration).collect();
+        let message = format!("message schema {{ {} }}", declarations.join(" "));
+        let schema = parse_message_type(&message).map_err(failed(&path))?;
         let mut properties = WriterProperties::builder()
             .set_created_by(format!("softvt {}", env!("CARGO_PKG_VERSION")))
-            .set_key_value_metadata(Some(notes.collect()))
+            .set_key_value_metadata(Some(metadata.clone()))
             // Images are compressed already and make up most of the file.
             .set_dictionary_enabled(false)
             .set_offset_index_disabled(true)
             .set_statistics_enabled(EnabledStatistics::None);
-        for column in
-            columns.iter().filter(|column| column.column_type == ColumnType::I64 && column.shape.is_empty())
-        {
+        let is_index =
+            |column: &&ParquetColumn| column.column_type == ColumnType::I64 && column.shape.is_empty();
+        for column in columns.iter().filter(is_index) {
             // Readers use these statistics to skip episodes.
             let place = ColumnPath::new(vec![column.name.clone()]);
             properties = properties.set_column_statistics_enabled(place, EnabledStatistics::Chunk);
         }
-        let file = File::create(&path).map_err(DatasetError::io("write", &path))?;
+        let file = File::create(&path).map_err(FileError::io("write", &path))?;
         let writer = SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties.build()))
             .map_err(failed(&path))?;
         Ok(Self { writer, columns: columns.clone(), path })
@@ -192,7 +201,7 @@ impl ParquetTable {
     /// The file cannot be written.
     pub(super) fn finish(self) -> Result<(), DatasetError> {
         let file = self.writer.into_inner().map_err(failed(&self.path))?;
-        file.sync_all().map_err(DatasetError::io("write", &self.path))
+        Ok(file.sync_all().map_err(FileError::io("write", &self.path))?)
     }
 }
 
@@ -230,7 +239,7 @@ fn append_row_group(
 fn write_leaf<T: DataType>(
     group: &mut SerializedRowGroupWriter<'_, File>,
     values: &[T::T],
-    levels: &Levels,
+    levels: &DremelLevels,
 ) -> Result<(), ParquetError> {
     let missing = || ParquetError::General("more columns than the schema has".to_owned());
     let mut column = group.next_column()?.ok_or_else(missing)?;
@@ -247,7 +256,7 @@ mod tests {
     #[test]
     fn levels_mark_the_beginnings_of_lists() {
         let cube = ParquetColumn::new("x", ColumnType::F32, &[2, 2, 3]);
-        let Levels { definitions, repetitions } = cube.levels(2);
+        let DremelLevels { definitions, repetitions } = cube.levels(2);
         assert_eq!(definitions, [7; 24]);
         let row = [0, 3, 3, 2, 3, 3, 1, 3, 3, 2, 3, 3];
         assert_eq!(repetitions, Some([row, row].concat()));
@@ -265,12 +274,9 @@ mod tests {
             ParquetColumn::new("figure", ColumnType::F64, &[1]),
             ParquetColumn::new("tasks", ColumnType::Text, &[1]),
         ];
-        let mut table = ParquetTable::create(
-            path.clone(),
-            &columns.into(),
-            &[KeyValueNote { key: "note", value: "what".to_owned() }],
-        )
-        .unwrap();
+        let metadata = vec![KeyValue::new("note".to_owned(), "what".to_owned())];
+        let schema = TableSchema { columns: columns.into(), metadata };
+        let mut table = ParquetTable::create(path.clone(), &schema).unwrap();
         for row in 0..2_i64 {
             let values = vec![
                 ColumnValues::Images(vec![EmbeddedImage {
@@ -306,7 +312,8 @@ mod tests {
             return;
         }
         let columns = [ParquetColumn::new("x", ColumnType::F64, &[1000])];
-        let mut table = ParquetTable::create(full.to_owned(), &columns.into(), &[]).unwrap();
+        let schema = TableSchema { columns: columns.into(), metadata: Vec::new() };
+        let mut table = ParquetTable::create(full.to_owned(), &schema).unwrap();
         let added = table.append(100, vec![ColumnValues::F64(vec![0.0; 100_000])]);
         let error = added.and_then(|()| table.finish()).unwrap_err().to_string();
         assert!(error.contains("cannot write /dev/full: No space left"), "{error}");

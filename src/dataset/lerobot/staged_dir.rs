@@ -5,7 +5,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::{dataset::DatasetError, files};
+use crate::{
+    dataset::DatasetError,
+    files::{self, FileError},
+};
 
 /// Marker file of an export in progress or interrupted; locked by the writing process.
 const MARKER_FILE: &str = ".softvt-export";
@@ -38,11 +41,11 @@ impl StagedDir {
         }
         let parent = temp.parent().unwrap_or(&temp);
         let created_parents = files::missing_folders(parent);
-        let make = || {
+        let make = || -> Result<File, FileError> {
             files::create_folder(parent)?;
-            fs::create_dir(&temp).map_err(DatasetError::io("create the folder", &temp))?;
+            fs::create_dir(&temp).map_err(FileError::io("create the folder", &temp))?;
             let path = temp.join(MARKER_FILE);
-            File::create(&path).map_err(DatasetError::io("write", &path))
+            File::create(&path).map_err(FileError::io("write", &path))
         };
         let marker = make().inspect_err(|_| files::remove_empty_folders(&created_parents))?;
         // A file system without locks has no protection from a second export to the same folder, which is rare.
@@ -60,16 +63,8 @@ impl StagedDir {
     /// # Errors
     /// The system refuses; the temporary folder is removed.
     pub(super) fn commit(self) -> Result<(), DatasetError> {
-        if let Err(error) = fs::rename(&self.temp, &self.out) {
-            self.abort();
-            return Err(DatasetError::io("rename", &self.out)(error));
-        }
-        files::remove_if_present(&self.out.join(MARKER_FILE))?;
-        // The new name must survive a power failure as well. Systems that cannot sync folders have other means.
-        for folder in [Some(self.out.as_path()), self.out.parent()].into_iter().flatten() {
-            let _ = File::open(folder).map(|folder| folder.sync_all());
-        }
-        Ok(())
+        files::rename(&self.temp, &self.out).inspect_err(|_| self.abort())?;
+        Ok(files::remove_if_present(&self.out.join(MARKER_FILE))?)
     }
 
     /// Removes the folder and the parents created for it.
@@ -91,10 +86,10 @@ pub(super) fn check_empty(out: &Path) -> Result<(), DatasetError> {
     match fs::read_dir(out) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(()),
         Err(error) if error.kind() == std::io::ErrorKind::NotADirectory => refuse("it is not a folder"),
-        Err(error) => Err(DatasetError::io("read", out)(error)),
+        Err(error) => Err(FileError::io("read", out)(error).into()),
         Ok(mut entries) => match entries.next() {
             None => Ok(()),
-            Some(Err(error)) => Err(DatasetError::io("read", out)(error)),
+            Some(Err(error)) => Err(FileError::io("read", out)(error).into()),
             Some(Ok(entry)) => refuse(&format!("it holds {}", entry.file_name().to_string_lossy())),
         },
     }
@@ -103,10 +98,8 @@ pub(super) fn check_empty(out: &Path) -> Result<(), DatasetError> {
 /// Removes the remains of an interrupted export.
 fn remove_remains(temp: &Path) -> Result<(), DatasetError> {
     let in_the_way = |what: &str| {
-        Err(DatasetError::OutputNotEmpty {
-            out: temp.display().to_string(),
-            what: format!("{what}; nothing was written; give another --out"),
-        })
+        let what = format!("{what}; nothing was written; give another --out");
+        Err(DatasetError::OutputNotEmpty { out: temp.display().to_string(), what })
     };
     let Ok(marker) = File::open(temp.join(MARKER_FILE)) else {
         return in_the_way("it is in the way and not left by an interrupted export");
@@ -114,7 +107,7 @@ fn remove_remains(temp: &Path) -> Result<(), DatasetError> {
     if let Err(TryLockError::WouldBlock) = marker.try_lock() {
         return in_the_way("another export is writing it");
     }
-    fs::remove_dir_all(temp).map_err(DatasetError::io("remove", temp))
+    Ok(fs::remove_dir_all(temp).map_err(FileError::io("remove", temp))?)
 }
 
 #[cfg(test)]

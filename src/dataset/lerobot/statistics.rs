@@ -66,10 +66,9 @@ impl ValueMoments {
 
     /// Moments of the union of several sets.
     pub(super) fn merged<'a>(all: impl Iterator<Item = &'a Self>) -> Self {
-        all.fold(Self::EMPTY, |mut sum, one| {
-            sum.merge(one);
-            sum
-        })
+        let mut sum = Self::EMPTY;
+        all.for_each(|one| sum.merge(one));
+        sum
     }
 }
 
@@ -116,43 +115,31 @@ impl ValueCounts {
 
 /// Numbers from which quantiles are computed.
 #[derive(Clone, Debug, PartialEq)]
-enum QuantileSource {
+pub(super) enum QuantileSource {
+    /// No quantiles are requested.
     None,
     All(Vec<f64>),
     Counts(ValueCounts),
 }
 
-/// Statistics of a set of numbers.
+/// Statistics of a set of numbers. The quantiles may be those of rounded numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct ValueStatistics {
-    moments: ValueMoments,
-    quantile_source: QuantileSource,
+    pub moments: ValueMoments,
+    pub quantile_source: QuantileSource,
 }
 
 impl ValueStatistics {
     /// Exact statistics; keeps the numbers.
     pub(super) fn of(numbers: Vec<f64>) -> Self {
-        Self {
-            moments: ValueMoments::of(numbers.iter().copied()),
-            quantile_source: QuantileSource::All(numbers),
-        }
+        let moments = ValueMoments::of(numbers.iter().copied());
+        Self { moments, quantile_source: QuantileSource::All(numbers) }
     }
 
     /// Exact statistics of counted numbers.
     pub(super) fn counted(counts: ValueCounts) -> Self {
-        Self {
-            moments: ValueMoments::weighted(counts.numbers()),
-            quantile_source: QuantileSource::Counts(counts),
-        }
-    }
-
-    /// Exact moments, with quantiles of rounded numbers.
-    pub(super) fn rounded(moments: ValueMoments, counts: ValueCounts) -> Self {
+        let moments = ValueMoments::weighted(counts.numbers());
         Self { moments, quantile_source: QuantileSource::Counts(counts) }
-    }
-
-    pub(super) fn without_quantiles(moments: ValueMoments) -> Self {
-        Self { moments, quantile_source: QuantileSource::None }
     }
 
     /// Combines two sets of the same kind.
@@ -167,7 +154,7 @@ impl ValueStatistics {
         }
     }
 
-    /// [`QUANTILES`] with linear interpolation, as in numpy; `None` if they are not wanted.
+    /// [`QUANTILES`] with linear interpolation, as in numpy; `None` if they are not requested.
     fn quantiles(&self) -> Option<[f64; 5]> {
         match &self.quantile_source {
             QuantileSource::None => None,
@@ -197,23 +184,11 @@ pub(super) struct FeatureStatistics {
     pub parts: Vec<ValueStatistics>,
 }
 
-/// One statistic of a feature, with a value for each number of `shape`.
+/// One statistic of a feature, with a value for each number of its shape.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Figure {
     pub name: &'static str,
     pub values: Vec<f64>,
-}
-
-/// Statistics of a feature, in LeRobot's form.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct FeatureFigures {
-    pub name: &'static str,
-    /// Shape of each figure.
-    pub shape: Vec<usize>,
-    /// Number of steps.
-    pub steps: u64,
-    /// `min`, `max`, `mean`, `std` and, if available, quantiles.
-    pub figures: Vec<Figure>,
 }
 
 impl FeatureStatistics {
@@ -223,7 +198,8 @@ impl FeatureStatistics {
         self.parts.iter_mut().zip(&other.parts).for_each(|(part, more)| part.merge(more));
     }
 
-    pub(super) fn figures(&self, quantiles: bool) -> FeatureFigures {
+    /// `min`, `max`, `mean`, `std` and, if requested and available, quantiles.
+    pub(super) fn figures(&self, with_quantiles: bool) -> Vec<Figure> {
         let figure = |name, value: fn(&ValueMoments) -> f64| Figure {
             name,
             values: self.parts.iter().map(|part| value(&part.moments)).collect(),
@@ -234,16 +210,24 @@ impl FeatureStatistics {
             figure("mean", |m| m.mean),
             figure("std", ValueMoments::standard_deviation),
         ];
-        let available = self.parts.iter().map(ValueStatistics::quantiles).collect::<Option<Vec<[f64; 5]>>>();
-        if let Some(available) = available.filter(|_| quantiles) {
-            figures.extend(
-                QUANTILE_NAMES.iter().enumerate().map(|(at, name)| Figure {
-                    name,
-                    values: available.iter().map(|part| part[at]).collect(),
-                }),
-            );
+        let quantiles = self.parts.iter().map(ValueStatistics::quantiles).collect::<Option<Vec<[f64; 5]>>>();
+        if let Some(quantiles) = quantiles.filter(|_| with_quantiles) {
+            let column = |at: usize| quantiles.iter().map(|part| part[at]).collect();
+            let names = QUANTILE_NAMES.into_iter().enumerate();
+            figures.extend(names.map(|(at, name)| Figure { name, values: column(at) }));
         }
-        FeatureFigures { name: self.name, shape: self.shape.clone(), steps: self.steps, figures }
+        figures
+    }
+
+    /// The figures by name in LeRobot's form, nested lists, and `count`.
+    pub(super) fn nested(
+        &self,
+        with_quantiles: bool,
+        leaf: fn(f64) -> NestedList,
+    ) -> Vec<(&'static str, NestedList)> {
+        let nest = |figure: Figure| (figure.name, NestedList::new(&figure.values, &self.shape, leaf));
+        let count = ("count", NestedList::List(vec![NestedList::Whole(self.steps)]));
+        self.figures(with_quantiles).into_iter().map(nest).chain([count]).collect()
     }
 }
 
@@ -269,18 +253,6 @@ impl NestedList {
     }
 }
 
-impl FeatureFigures {
-    /// The figures by name, and `count`.
-    pub(super) fn nested(&self, leaf: fn(f64) -> NestedList) -> Vec<(&'static str, NestedList)> {
-        let count = ("count", NestedList::List(vec![NestedList::Whole(self.steps)]));
-        let figures = self.figures.iter();
-        figures
-            .map(|figure| (figure.name, NestedList::new(&figure.values, &self.shape, leaf)))
-            .chain([count])
-            .collect()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
@@ -289,7 +261,7 @@ mod tests {
 
     fn figures(summary: ValueStatistics) -> Vec<f64> {
         let all = FeatureStatistics { name: "x", shape: vec![1], steps: 1, parts: vec![summary] };
-        all.figures(true).figures.into_iter().map(|figure| figure.values[0]).collect()
+        all.figures(true).into_iter().map(|figure| figure.values[0]).collect()
     }
 
     #[test]

@@ -3,9 +3,8 @@
 use std::{
     collections::BTreeMap,
     fs::File,
-    io::{BufWriter, Write},
+    io::{self, BufWriter, Write},
     path::{Path, PathBuf},
-    sync::Arc,
 };
 
 use serde::Serialize;
@@ -14,11 +13,13 @@ use serde_json::json;
 use super::{
     config::CHUNK,
     episode::{EpisodeData, EpisodeWriter},
-    features::{self, Feature},
-    parquet_table::{KeyValueNote, ParquetColumn, ParquetTable},
+    parquet_table::{ParquetTable, TableSchema},
     statistics::{FeatureStatistics, NestedList},
 };
-use crate::{dataset::DatasetError, files};
+use crate::{
+    dataset::DatasetError,
+    files::{self, FileError},
+};
 
 /// Writes a file of JSON lines.
 struct JsonLinesWriter {
@@ -27,21 +28,19 @@ struct JsonLinesWriter {
 }
 
 impl JsonLinesWriter {
-    fn create(path: PathBuf) -> Result<Self, DatasetError> {
-        let file = File::create(&path).map_err(DatasetError::io("write", &path))?;
+    fn create(path: PathBuf) -> Result<Self, FileError> {
+        let file = File::create(&path).map_err(FileError::io("write", &path))?;
         Ok(Self { file: BufWriter::new(file), path })
     }
 
-    fn add(&mut self, line: &impl Serialize) -> Result<(), DatasetError> {
-        let text = serde_json::to_string(line)
-            .map_err(|e| DatasetError::content(&self.path, "line", e.to_string()))?;
-        writeln!(self.file, "{text}").map_err(DatasetError::io("write", &self.path))
+    fn add(&mut self, line: &impl Serialize) -> Result<(), FileError> {
+        let written = serde_json::to_writer(&mut self.file, line).map_err(io::Error::from);
+        written.and_then(|()| writeln!(self.file)).map_err(FileError::io("write", &self.path))
     }
 
-    fn finish(self) -> Result<(), DatasetError> {
-        let failed = DatasetError::io("write", &self.path);
-        let file = self.file.into_inner().map_err(std::io::IntoInnerError::into_error);
-        file.and_then(|file| file.sync_all()).map_err(failed)
+    fn finish(self) -> Result<(), FileError> {
+        let file = self.file.into_inner().map_err(io::IntoInnerError::into_error);
+        file.and_then(|file| file.sync_all()).map_err(FileError::io("write", &self.path))
     }
 }
 
@@ -52,22 +51,21 @@ struct StatisticsLine {
     stats: BTreeMap<&'static str, BTreeMap<&'static str, NestedList>>,
 }
 
-pub(super) struct Writer21 {
+/// Writes one table per episode.
+pub(super) struct EpisodeTableWriter {
     dir: PathBuf,
-    columns: Arc<[ParquetColumn]>,
-    note: KeyValueNote,
+    schema: TableSchema,
     episodes: JsonLinesWriter,
     stats: JsonLinesWriter,
 }
 
-impl Writer21 {
+impl EpisodeTableWriter {
     /// `dir` is empty.
-    pub(super) fn create(dir: &Path, features: &[Feature]) -> Result<Self, DatasetError> {
+    pub(super) fn create(dir: &Path, schema: TableSchema) -> Result<Self, DatasetError> {
         files::create_folder(&dir.join("meta"))?;
         Ok(Self {
             dir: dir.to_owned(),
-            columns: features.iter().map(Feature::column).collect(),
-            note: features::hugging_face_note(features),
+            schema,
             episodes: JsonLinesWriter::create(dir.join("meta/episodes.jsonl"))?,
             stats: JsonLinesWriter::create(dir.join("meta/episodes_stats.jsonl"))?,
         })
@@ -79,28 +77,25 @@ fn image_name(step: usize) -> String {
     format!("frame_{step:06}.png")
 }
 
-impl EpisodeWriter for Writer21 {
+impl EpisodeWriter for EpisodeTableWriter {
     fn add(&mut self, episode: EpisodeData<'_>) -> Result<(), DatasetError> {
         let (index, steps) = (episode.index, episode.rows.steps);
         let line = json!({ "episode_index": index, "tasks": [episode.demo.entry.language], "length": steps });
         // The values were measured in single precision, and LeRobot reads this file completely.
         let single = |x: f64| NestedList::Single(x as f32);
-        let named = |feature: &FeatureStatistics| {
-            let figures: BTreeMap<_, _> = feature.figures(false).nested(single).into_iter().collect();
-            (feature.name, figures)
-        };
+        let named = |f: &FeatureStatistics| (f.name, f.nested(false, single).into_iter().collect());
         let stats = episode.statistics.iter().map(named).collect();
         let path = self.dir.join(format!("data/chunk-{:03}/episode_{index:06}.parquet", index / CHUNK));
-        files::create_folder(path.parent().unwrap_or(&self.dir))?;
-        let mut table = ParquetTable::create(path, &self.columns, std::slice::from_ref(&self.note))?;
+        files::create_parent(&path)?;
+        let mut table = ParquetTable::create(path, &self.schema)?;
         table.append(steps, episode.into_columns(image_name))?;
         table.finish()?;
         self.episodes.add(&line)?;
-        self.stats.add(&StatisticsLine { episode_index: index, stats })
+        Ok(self.stats.add(&StatisticsLine { episode_index: index, stats })?)
     }
 
     fn finish(self: Box<Self>) -> Result<(), DatasetError> {
         self.episodes.finish()?;
-        self.stats.finish()
+        Ok(self.stats.finish()?)
     }
 }

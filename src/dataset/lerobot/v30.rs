@@ -1,18 +1,14 @@
 //! Version 3.0: many episodes per table, one row group each, and tables about the episodes.
 
-use std::{
-    path::{Path, PathBuf},
-    sync::Arc,
-};
+use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value, json};
 
 use super::{
     config::{CHUNK, MAX_TABLE_MB},
     episode::{EpisodeData, EpisodeWriter},
-    features::{self, Feature},
-    parquet_table::{ColumnType, ColumnValues, KeyValueNote, ParquetColumn, ParquetTable},
-    statistics::{FeatureFigures, FeatureStatistics, NestedList},
+    parquet_table::{ColumnType, ColumnValues, ParquetColumn, ParquetTable, TableSchema},
+    statistics::{FeatureStatistics, Figure, NestedList},
 };
 use crate::{dataset::DatasetError, files};
 
@@ -21,9 +17,9 @@ const EPISODES_PER_TABLE: usize = 10_000;
 
 /// Path of the n-th file of a kind; its folder is created.
 fn numbered_path(dir: &Path, kind: &str, file: usize) -> Result<PathBuf, DatasetError> {
-    let folder = dir.join(format!("{kind}/chunk-{:03}", file / CHUNK));
-    files::create_folder(&folder)?;
-    Ok(folder.join(format!("file-{:03}.parquet", file % CHUNK)))
+    let path = dir.join(format!("{kind}/chunk-{:03}/file-{:03}.parquet", file / CHUNK, file % CHUNK));
+    files::create_parent(&path)?;
+    Ok(path)
 }
 
 /// Row of a table about episodes.
@@ -34,13 +30,14 @@ struct EpisodeSummary {
     first_frame: usize,
     /// Number of the file that holds its rows.
     file: usize,
-    figures: Vec<FeatureFigures>,
+    /// Figures of every feature.
+    figures: Vec<Vec<Figure>>,
 }
 
-pub(super) struct Writer30 {
+/// Writes many episodes per table.
+pub(super) struct SharedTableWriter {
     dir: PathBuf,
-    columns: Arc<[ParquetColumn]>,
-    note: KeyValueNote,
+    schema: TableSchema,
     /// The table that is being written, and its number.
     table: Option<ParquetTable>,
     file: usize,
@@ -49,19 +46,12 @@ pub(super) struct Writer30 {
     total: Vec<FeatureStatistics>,
 }
 
-impl Writer30 {
+impl SharedTableWriter {
     /// `dir` is empty.
-    pub(super) fn create(dir: &Path, features: &[Feature]) -> Result<Self, DatasetError> {
+    pub(super) fn create(dir: &Path, schema: TableSchema) -> Result<Self, DatasetError> {
         files::create_folder(&dir.join("meta"))?;
-        Ok(Self {
-            dir: dir.to_owned(),
-            columns: features.iter().map(Feature::column).collect(),
-            note: features::hugging_face_note(features),
-            table: None,
-            file: 0,
-            episodes: Vec::new(),
-            total: Vec::new(),
-        })
+        let dir = dir.to_owned();
+        Ok(Self { dir, schema, table: None, file: 0, episodes: Vec::new(), total: Vec::new() })
     }
 
     /// A table with space for `bytes` more; a full one is finished first.
@@ -73,11 +63,41 @@ impl Writer30 {
                     full.finish()?;
                     self.file += 1;
                 }
-                let path = numbered_path(&self.dir, "data", self.file)?;
-                ParquetTable::create(path, &self.columns, std::slice::from_ref(&self.note))?
+                ParquetTable::create(numbered_path(&self.dir, "data", self.file)?, &self.schema)?
             }
         };
         Ok(self.table.insert(table))
+    }
+
+    /// Writes the table about `episodes`, which is the `file`-th.
+    fn write_episode_table(&self, file: usize, episodes: &[EpisodeSummary]) -> Result<(), DatasetError> {
+        let integers = |name: &str, shape: &[usize], number: &dyn Fn(&EpisodeSummary) -> usize| {
+            let numbers = episodes.iter().map(|episode| number(episode) as i64).collect();
+            (ParquetColumn::new(name, ColumnType::I64, shape), ColumnValues::I64(numbers))
+        };
+        let prompts = episodes.iter().map(|episode| episode.prompt.clone()).collect();
+        let mut columns = vec![
+            integers("episode_index", &[], &|e| e.index),
+            (ParquetColumn::new("tasks", ColumnType::Text, &[1]), ColumnValues::Text(prompts)),
+            integers("length", &[], &|e| e.steps),
+            integers("data/chunk_index", &[], &|e| e.file / CHUNK),
+            integers("data/file_index", &[], &|e| e.file % CHUNK),
+            integers("dataset_from_index", &[], &|e| e.first_frame),
+            integers("dataset_to_index", &[], &|e| e.first_frame + e.steps),
+        ];
+        for (at, FeatureStatistics { name, shape, .. }) in self.total.iter().enumerate() {
+            for (which, figure) in episodes[0].figures[at].iter().enumerate() {
+                let name = format!("stats/{name}/{}", figure.name);
+                let values = episodes.iter().flat_map(|e| e.figures[at][which].values.iter().copied());
+                let column = ParquetColumn::new(name, ColumnType::F64, shape);
+                columns.push((column, ColumnValues::F64(values.collect())));
+            }
+            columns.push(integers(&format!("stats/{name}/count"), &[1], &|e| e.steps));
+        }
+        columns.push(integers("meta/episodes/chunk_index", &[], &|_| file / CHUNK));
+        columns.push(integers("meta/episodes/file_index", &[], &|_| file % CHUNK));
+        let path = numbered_path(&self.dir, "meta/episodes", file)?;
+        ParquetTable::write(path, episodes.len(), columns, Vec::new())
     }
 }
 
@@ -86,7 +106,7 @@ fn image_name(step: usize) -> String {
     format!("frame-{step:06}.png")
 }
 
-impl EpisodeWriter for Writer30 {
+impl EpisodeWriter for SharedTableWriter {
     fn add(&mut self, mut episode: EpisodeData<'_>) -> Result<(), DatasetError> {
         let (index, demo, steps) = (episode.index, episode.demo, episode.rows.steps);
         let statistics = std::mem::take(&mut episode.statistics);
@@ -111,51 +131,14 @@ impl EpisodeWriter for Writer30 {
     fn finish(mut self: Box<Self>) -> Result<(), DatasetError> {
         self.table.take().map_or(Ok(()), ParquetTable::finish)?;
         for (file, episodes) in self.episodes.chunks(EPISODES_PER_TABLE).enumerate() {
-            write_episode_table(&self.dir, file, episodes)?;
+            self.write_episode_table(file, episodes)?;
         }
-        let stats: Map<String, Value> = self.total.iter().map(|f| json_entry(&f.figures(true))).collect();
+        let mut stats = Map::new();
+        for feature in &self.total {
+            let figures = feature.nested(true, NestedList::Number).into_iter();
+            let figures = figures.map(|(name, list)| (name.to_owned(), json!(list)));
+            stats.insert(feature.name.to_owned(), Value::Object(figures.collect()));
+        }
         Ok(files::write_json(&self.dir.join("meta/stats.json"), &stats)?)
     }
-}
-
-/// Entry of a feature in `stats.json`.
-fn json_entry(figures: &FeatureFigures) -> (String, Value) {
-    let named = figures.nested(NestedList::Number).into_iter();
-    let all: Map<String, Value> = named.map(|(name, list)| (name.to_owned(), json!(list))).collect();
-    (figures.name.to_owned(), Value::Object(all))
-}
-
-fn write_episode_table(dir: &Path, file: usize, episodes: &[EpisodeSummary]) -> Result<(), DatasetError> {
-    let integers = |name: &str, number: &dyn Fn(&EpisodeSummary) -> usize| {
-        let numbers = episodes.iter().map(|episode| number(episode) as i64).collect();
-        (ParquetColumn::new(name, ColumnType::I64, &[]), ColumnValues::I64(numbers))
-    };
-    let prompts = episodes.iter().map(|episode| episode.prompt.clone()).collect();
-    let mut all = vec![
-        integers("episode_index", &|e| e.index),
-        (ParquetColumn::new("tasks", ColumnType::Text, &[1]), ColumnValues::Text(prompts)),
-        integers("length", &|e| e.steps),
-        integers("data/chunk_index", &|e| e.file / CHUNK),
-        integers("data/file_index", &|e| e.file % CHUNK),
-        integers("dataset_from_index", &|e| e.first_frame),
-        integers("dataset_to_index", &|e| e.first_frame + e.steps),
-    ];
-    for (at, feature) in episodes.first().map_or(&[][..], |first| &first.figures).iter().enumerate() {
-        for (which, figure) in feature.figures.iter().enumerate() {
-            let name = format!("stats/{}/{}", feature.name, figure.name);
-            let column = ParquetColumn::new(name, ColumnType::F64, &feature.shape);
-            let numbers = episodes.iter().flat_map(|e| e.figures[at].figures[which].values.iter().copied());
-            all.push((column, ColumnValues::F64(numbers.collect())));
-        }
-        let counts = episodes.iter().map(|e| e.figures[at].steps as i64).collect();
-        let name = format!("stats/{}/count", feature.name);
-        all.push((ParquetColumn::new(name, ColumnType::I64, &[1]), ColumnValues::I64(counts)));
-    }
-    all.push(integers("meta/episodes/chunk_index", &|_| file / CHUNK));
-    all.push(integers("meta/episodes/file_index", &|_| file % CHUNK));
-    let (columns, values): (Vec<ParquetColumn>, Vec<ColumnValues>) = all.into_iter().unzip();
-    let path = numbered_path(dir, "meta/episodes", file)?;
-    let mut table = ParquetTable::create(path, &columns.into(), &[])?;
-    table.append(episodes.len(), values)?;
-    table.finish()
 }

@@ -9,7 +9,7 @@ pub use canvas::{Canvas, Rgb8};
 use image::{ImageBuffer, ImageError, Luma, RgbImage};
 
 use crate::{
-    benchmark::CONTROL_DT,
+    benchmark::{CONTROL_DT, CONTROL_HZ},
     dataset::video::{VideoError, VideoWriter},
     evaluation::{episode_id::EpisodeIndex, record::EpisodeRecord},
     files::{FileError, replace},
@@ -104,8 +104,7 @@ pub fn write_video(
     path: &Path,
     is_cancelled: impl Fn() -> bool,
 ) -> Result<(), EpisodeVideoError> {
-    let frames_per_second = (1.0 / CONTROL_DT).round() as u32;
-    let mut video = VideoWriter::new(WIDTH as usize, HEIGHT as usize, frames_per_second)?;
+    let mut video = VideoWriter::new(WIDTH as usize, HEIGHT as usize, CONTROL_HZ)?;
     for index in 0..recording.frames.len() {
         if is_cancelled() {
             return Err(EpisodeVideoError::Interrupted);

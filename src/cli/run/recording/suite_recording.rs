@@ -24,7 +24,7 @@ use crate::{
         },
     },
     dataset::{
-        DatasetError, Demonstration,
+        Demonstration,
         card::rejection_counts,
         demonstration_writer::DemonstrationWriter,
         layout::{self, TaskPaths, VIDEO_STREAMS},
@@ -34,7 +34,8 @@ use crate::{
         episode_id::Split,
         record::{EpisodeRecord, Origin},
     },
-    files, parallel,
+    files::{self, FileError},
+    parallel,
     policy::{ChunkedPolicy, builtin::RecordedPolicy},
     report::{
         actions,
@@ -318,7 +319,7 @@ impl<'a> SuiteRecording<'a> {
         }
         match std::fs::remove_dir_all(paths.parts()) {
             Err(error) if error.kind() != ErrorKind::NotFound => {
-                Err(dataset_error(DatasetError::io("remove", &paths.parts())(error)))
+                Err(dataset_error(FileError::io("remove", &paths.parts())(error)))
             }
             _ => Ok(()),
         }
@@ -329,9 +330,7 @@ impl<'a> SuiteRecording<'a> {
         if !part.is_file() && path.is_file() {
             return Ok(());
         }
-        files::create_folder(path.parent().unwrap_or(&self.root)).map_err(dataset_error)?;
-        std::fs::rename(part, path)
-            .map_err(|error| dataset_error(DatasetError::io("move into place", part)(error)))
+        files::create_parent(path).and_then(|()| files::rename(part, path)).map_err(dataset_error)
     }
 
     /// Checks that every task has its demonstrations.

@@ -4,11 +4,10 @@ use std::{collections::BTreeMap, fs, path::Path};
 
 use super::{RecordingConfig, SuiteRecording, dataset_error};
 use crate::{
-    benchmark::Task,
+    benchmark::{CONTROL_HZ, Task},
     cli::{error::CliError, output::print, run::demo_selection::rejection},
     dataset::{
         card::{Card, TaskCount, rejection_counts},
-        demonstration_writer::frame_rate,
         layout::{MANIFEST, PARTS},
         manifest::{self, ManifestEntry},
     },
@@ -53,7 +52,7 @@ pub(super) fn write(
     let _ = fs::remove_dir(root.join(PARTS));
     let card = Card {
         softvt: env!("CARGO_PKG_VERSION").to_owned(),
-        fps: frame_rate(),
+        fps: CONTROL_HZ,
         has_images: config.images_in_hdf5,
         has_privileged: config.with_privileged,
         imported: suites.first().map(|suite| suite.run.imported.clone()).unwrap_or_default(),
