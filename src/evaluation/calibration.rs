@@ -3,7 +3,7 @@
 //! - Lower bound: the smallest closure at which every grasp–lift–hold trial held.
 //! - Upper bound: the closure at which D reaches τ = κ·D_ref in the compression sweep. D_ref is the largest
 //!   deformation of a
-//!   *stable* squeeze ([`StabilityCriteria`]; SoftVTBench, appendix C.3).
+//!   *stable* squeeze ([`SweepRow::meets_criteria`]; SoftVTBench, appendix C.3).
 //!
 //! Closure is 0 with the gripper open (80 mm) and 1 with the gels in contact. `softvt
 //! scripts/calibrate.lua` runs both scans.
@@ -11,6 +11,13 @@
 use serde::{Deserialize, Serialize};
 
 use super::safety::{DeformationLimit, round_to_six_decimals};
+
+/// Exclusive lower bound of det F in a stable squeeze.
+const MIN_DET_F: f64 = 0.1;
+/// Exclusive upper bound of the node speed at rest after a stable squeeze, m/s.
+const MAX_NODE_SPEED_M_S: f64 = 0.005;
+/// Exclusive upper bound of the slip in a stable squeeze, mm.
+const MAX_SLIP_MM: f64 = 2.0;
 
 /// Trials at one closure of the lower-bound scan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -50,33 +57,16 @@ pub struct SweepRow {
     pub stable: bool,
 }
 
-/// Bounds within which a squeeze is stable.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct StabilityCriteria {
-    /// Exclusive lower bound of det F.
-    pub min_det_f: f64,
-    /// Exclusive upper bound of the node speed at rest, m/s.
-    pub node_speed_m_s: f64,
-    /// Exclusive upper bound of the slip, mm.
-    pub slip_mm: f64,
-}
-
-impl Default for StabilityCriteria {
-    fn default() -> Self {
-        Self { min_det_f: 0.1, node_speed_m_s: 0.005, slip_mm: 2.0 }
-    }
-}
-
-impl StabilityCriteria {
-    /// True if `row` is a stable squeeze: both pads touch and every number is within its bound. `row.stable` is not
-    /// read. Numbers that are not finite are not stable.
-    pub fn accepts(&self, row: &SweepRow) -> bool {
-        row.both_pads
-            && row.d_peak_pct.is_finite()
-            && row.min_det_f > self.min_det_f
-            && row.node_speed_m_s < self.node_speed_m_s
-            && row.slip_mm < self.slip_mm
+impl SweepRow {
+    /// True if the squeeze is stable: both pads touch, and no element is nearly inverted, no node moves at rest and the
+    /// object does not slip, within the bounds of this module. `stable` is not read. Numbers that are not finite are
+    /// not stable.
+    pub fn meets_criteria(&self) -> bool {
+        self.both_pads
+            && self.d_peak_pct.is_finite()
+            && self.min_det_f > MIN_DET_F
+            && self.node_speed_m_s < MAX_NODE_SPEED_M_S
+            && self.slip_mm < MAX_SLIP_MM
     }
 }
 
@@ -105,7 +95,10 @@ impl Envelope {
             sweep.iter().find(|row| row.stable && round_to_six_decimals(row.d_peak_pct) == l.d_ref_pct)
         });
         Self {
-            closure_lower: lower_bound(&holds),
+            closure_lower: holds
+                .iter()
+                .find(|row| row.trials > 0 && row.held == row.trials)
+                .map(|row| row.closure),
             closure_at_tau: limit.and_then(|l| closure_at(&sweep, l.tau_pct())),
             closure_at_d_ref: reference.map(|row| row.closure),
             holds,
@@ -130,14 +123,9 @@ pub fn deformation_limit(sweep: &[SweepRow], kappa: f64) -> Option<DeformationLi
     (largest > 0.0).then_some(DeformationLimit { d_ref_pct: round_to_six_decimals(largest), kappa })
 }
 
-/// Smallest closure at which every trial held; `holds` by increasing closure.
-pub fn lower_bound(holds: &[HoldRow]) -> Option<f64> {
-    holds.iter().find(|row| row.trials > 0 && row.held == row.trials).map(|row| row.closure)
-}
-
 /// Closure at which D first reaches `d_pct`, linear between the rows; `sweep` by increasing closure. `None` if the
 /// first row is above it or no row reaches it.
-pub fn closure_at(sweep: &[SweepRow], d_pct: f64) -> Option<f64> {
+fn closure_at(sweep: &[SweepRow], d_pct: f64) -> Option<f64> {
     sweep.windows(2).find(|pair| pair[0].d_peak_pct <= d_pct && pair[1].d_peak_pct >= d_pct).map(|pair| {
         let rise = pair[1].d_peak_pct - pair[0].d_peak_pct;
         let share = if rise > 0.0 { (d_pct - pair[0].d_peak_pct) / rise } else { 0.0 };
@@ -203,9 +191,8 @@ pub(crate) mod tests {
 
     #[test]
     fn every_criterion_of_stability_counts() {
-        let criteria = StabilityCriteria::default();
         let row = squeeze(0.3, 1.0, false);
-        assert!(criteria.accepts(&row));
+        assert!(row.meets_criteria());
         for bad in [
             SweepRow { min_det_f: 0.1, ..row.clone() },
             SweepRow { node_speed_m_s: 0.005, ..row.clone() },
@@ -213,7 +200,7 @@ pub(crate) mod tests {
             SweepRow { slip_mm: 2.0, ..row.clone() },
             SweepRow { d_peak_pct: f64::NAN, ..row.clone() },
         ] {
-            assert!(!criteria.accepts(&bad), "{bad:?}");
+            assert!(!bad.meets_criteria(), "{bad:?}");
         }
     }
 }

@@ -80,28 +80,23 @@ pub struct GoalSample {
 }
 
 /// Counts consecutive control steps at the goal.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GoalMonitor {
+    /// Time at which the goal had held for long enough, s; `None` before. It stays, also when the target leaves later.
+    pub reached_s: Option<f64>,
+    /// True if the predicate of the released code has held for as long.
+    pub is_reached_v1: bool,
     steps_needed: u32,
     steps: u32,
     steps_v1: u32,
     has_entered: bool,
-    reached_s: Option<f64>,
-    is_reached_v1: bool,
 }
 
 impl GoalMonitor {
     /// Monitor of a goal that must hold for `hold_s`, sampled every `control_s`; at least one control step.
     pub fn new(hold_s: f64, control_s: f64) -> Self {
         let steps_needed = (hold_s / control_s - 1e-6).ceil().max(1.0) as u32;
-        Self {
-            steps_needed,
-            steps: 0,
-            steps_v1: 0,
-            has_entered: false,
-            reached_s: None,
-            is_reached_v1: false,
-        }
+        Self { steps_needed, ..Self::default() }
     }
 
     /// Takes in one control step. Returns true if the target has rested at the goal before and is now outside of the
@@ -116,16 +111,6 @@ impl GoalMonitor {
         }
         self.is_reached_v1 |= self.steps_v1 >= self.steps_needed;
         self.has_entered && !sample.is_inside_with_margin
-    }
-
-    /// Time at which the goal had held for long enough, s; `None` before. It stays, also when the target leaves later.
-    pub fn reached_s(&self) -> Option<f64> {
-        self.reached_s
-    }
-
-    /// True if the predicate of the released code has held for as long.
-    pub fn is_reached_v1(&self) -> bool {
-        self.is_reached_v1
     }
 }
 
@@ -184,19 +169,19 @@ mod tests {
         (0..7).for_each(|_| assert!(!goal.update(&step(true))));
         goal.update(&step(false));
         (0..7).for_each(|_| assert!(!goal.update(&step(true))));
-        assert_eq!(goal.reached_s(), None);
+        assert_eq!(goal.reached_s, None);
         goal.update(&GoalSample { time_s: 0.8, ..step(true) });
-        assert_eq!(goal.reached_s(), Some(0.8));
-        assert!(goal.is_reached_v1());
+        assert_eq!(goal.reached_s, Some(0.8));
+        assert!(goal.is_reached_v1);
     }
 
     #[test]
     fn a_hold_of_zero_still_takes_one_control_step() {
         let mut goal = GoalMonitor::new(0.0, 0.05);
         goal.update(&step(false));
-        assert_eq!(goal.reached_s(), None);
+        assert_eq!(goal.reached_s, None);
         goal.update(&step(true));
-        assert_eq!(goal.reached_s(), Some(0.0));
+        assert_eq!(goal.reached_s, Some(0.0));
     }
 
     #[test]
@@ -208,7 +193,7 @@ mod tests {
         ] {
             let mut goal = GoalMonitor::new(0.05, 0.05);
             goal.update(&sample);
-            assert_eq!(goal.reached_s(), None, "{sample:?}");
+            assert_eq!(goal.reached_s, None, "{sample:?}");
         }
     }
 

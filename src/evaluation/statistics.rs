@@ -28,7 +28,7 @@ impl Rate {
 }
 
 /// 95 % Wilson score interval (Wilson, 1927) of `count` successes in `total` trials, in percent; `None` without trials.
-pub fn wilson95(count: usize, total: usize) -> Option<[f64; 2]> {
+fn wilson95(count: usize, total: usize) -> Option<[f64; 2]> {
     if total == 0 {
         return None;
     }

@@ -166,12 +166,9 @@ impl ThresholdFile {
     }
 
     fn check(&self, path: &str) -> Result<(), ThresholdError> {
-        if self.schema_version != SCHEMA_VERSION {
-            let got = self.schema_version.to_string();
-            return check_equal(path, "schema_version", &got, &SCHEMA_VERSION.to_string());
-        }
+        let version = self.schema_version.to_string();
+        check_equal(path, "schema_version", &version, &SCHEMA_VERSION.to_string())?;
         check_equal(path, "protocol_id", &self.protocol_id, PROTOCOL_ID)?;
-        check_equal(path, "metric_id", &self.metric_id, METRIC_ID)?;
         check_equal(path, "calibration.method", &self.calibration.method, METHOD)?;
         self.thresholds.iter().try_for_each(|(asset, threshold)| threshold.check(path, asset))
     }

@@ -15,7 +15,7 @@
 
 use nalgebra::{Matrix4, Quaternion, SymmetricEigen};
 
-use crate::geometry::{Mat3, Quat, Vec3};
+use crate::geometry::{Aabb, Mat3, Quat, Vec3};
 
 /// Name of D with uniform weights, shared with SoftVTBench.
 pub const METRIC_ID: &str = "fem_rms_rigid_aligned_bbox_pct_v1";
@@ -72,7 +72,6 @@ pub struct ReferenceShape {
     weighted_centre: Vec3,
     /// Bounding-box extents, m.
     bbox_m: Vec3,
-    diagonal_m: f64,
 }
 
 /// Means of a set of nodes and their covariance sums with the reference, from one pass.
@@ -102,8 +101,8 @@ impl ReferenceShape {
             return Err(error);
         }
         let weights = normalised(weights)?;
-        let (low, high) = bounds(nodes);
-        let diagonal_m = (high - low).norm();
+        let bbox_m = Aabb::from_points(nodes).map_or_else(Vec3::zeros, |bounds| bounds.size());
+        let diagonal_m = bbox_m.norm();
         if diagonal_m <= SMALLEST_DIAGONAL_M || !diagonal_m.is_finite() {
             return Err(DeformationError::NoSize(diagonal_m));
         }
@@ -111,12 +110,12 @@ impl ReferenceShape {
         let mean = nodes[0] + nodes.iter().map(|x| x - nodes[0]).sum::<Vec3>() / nodes.len() as f64;
         let nodes: Vec<Vec3> = nodes.iter().map(|x| x - mean).collect();
         let weighted_centre = nodes.iter().zip(&weights).map(|(x, w)| x * *w).sum();
-        Ok(Self { nodes, weights, weighted_centre, bbox_m: high - low, diagonal_m })
+        Ok(Self { nodes, weights, weighted_centre, bbox_m })
     }
 
     /// Diagonal of the reference's bounding box, m.
     pub fn diagonal_m(&self) -> f64 {
-        self.diagonal_m
+        self.bbox_m.norm()
     }
 
     /// Extents of the reference's bounding box, m.
@@ -125,13 +124,8 @@ impl ReferenceShape {
     }
 
     /// Number of nodes, at least three.
-    pub fn len(&self) -> usize {
+    pub fn node_count(&self) -> usize {
         self.nodes.len()
-    }
-
-    /// Always false; a reference has at least three nodes.
-    pub fn is_empty(&self) -> bool {
-        self.nodes.is_empty()
     }
 
     /// Deformation of `nodes` (m, any frame, in the order of the reference).
@@ -161,7 +155,7 @@ impl ReferenceShape {
         if !(sum.is_finite() && weighted_sum.is_finite()) {
             return Err(far_node(nodes));
         }
-        let percent = 100.0 / self.diagonal_m;
+        let percent = 100.0 / self.diagonal_m();
         Ok(Deformation {
             rms_pct: percent * (sum / nodes.len() as f64).sqrt(),
             weighted_pct: percent * weighted_sum.sqrt(),
@@ -224,10 +218,6 @@ fn normalised(weights: &[f64]) -> Result<Vec<f64>, DeformationError> {
         return Err(DeformationError::BadWeight { node: 0, value: weights[0] });
     }
     Ok(weights.iter().map(|w| w / total).collect())
-}
-
-fn bounds(nodes: &[Vec3]) -> (Vec3, Vec3) {
-    nodes.iter().fold((nodes[0], nodes[0]), |(low, high), x| (low.inf(x), high.sup(x)))
 }
 
 fn first_bad_node(nodes: &[Vec3]) -> Option<DeformationError> {

@@ -16,7 +16,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::criteria::SuccessCriteria;
+use super::{criteria::SuccessCriteria, evidence::GripperEvidence};
 
 /// Reason why NoDrop is false.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -43,17 +43,6 @@ pub struct DropEvent {
     pub time_s: f64,
 }
 
-/// One physics step as [`ReleaseMonitor`] reads it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ReleaseSample {
-    /// True if both pads press on the target.
-    pub both_pads_touch: bool,
-    /// Measured apex-to-apex width, m.
-    pub width_m: f64,
-    /// Commanded apex-to-apex width, m.
-    pub commanded_width_m: f64,
-}
-
 /// Detects that the gripper was commanded to release the object.
 ///
 /// A gripper that holds something is commanded narrower than it is. A grasp begins when both pads press on the object
@@ -72,20 +61,25 @@ pub struct ReleaseMonitor {
 }
 
 impl ReleaseMonitor {
-    /// Takes in one physics step. Returns true if a release of the last held object has been commanded, now or
-    /// before; a new grasp resets it to false.
-    pub fn update(&mut self, criteria: &SuccessCriteria, sample: &ReleaseSample) -> bool {
-        if sample.both_pads_touch && (self.grasp_width_m.is_none() || self.is_released) {
-            let is_squeezing = sample.commanded_width_m < sample.width_m;
+    /// Takes in one physics step; `both_pads_touch` if both pads press on the target. Returns true if a release of the
+    /// last held object has been commanded, now or before; a new grasp resets it to false.
+    pub fn update(
+        &mut self,
+        criteria: &SuccessCriteria,
+        gripper: &GripperEvidence,
+        both_pads_touch: bool,
+    ) -> bool {
+        if both_pads_touch && (self.grasp_width_m.is_none() || self.is_released) {
+            let is_squeezing = gripper.commanded_width_m < gripper.width_m;
             if is_squeezing {
-                *self = Self { is_released: false, grasp_width_m: Some(sample.width_m) };
+                *self = Self { is_released: false, grasp_width_m: Some(gripper.width_m) };
             }
-        } else if sample.both_pads_touch {
-            self.grasp_width_m = self.grasp_width_m.map(|width| width.max(sample.width_m));
+        } else if both_pads_touch {
+            self.grasp_width_m = self.grasp_width_m.map(|width| width.max(gripper.width_m));
         }
         if let Some(grasp_width_m) = self.grasp_width_m {
-            let limit = (sample.width_m + criteria.release_margin_m).min(grasp_width_m);
-            self.is_released |= sample.commanded_width_m >= limit;
+            let limit = (gripper.width_m + criteria.release_margin_m).min(grasp_width_m);
+            self.is_released |= gripper.commanded_width_m >= limit;
         }
         self.is_released
     }
@@ -117,7 +111,8 @@ pub struct DropSample {
 /// Watches for drops; the first one stays, also when the object is caught again.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DropMonitor {
-    first: Option<DropEvent>,
+    /// The first drop so far.
+    pub first: Option<DropEvent>,
     /// `None` when the object is not carried.
     carried: Option<CarriedState>,
     /// Highest centre since the object was last touched by anything, m.
@@ -136,11 +131,6 @@ struct CarriedState {
 }
 
 impl DropMonitor {
-    /// The first drop, if there was one.
-    pub fn first(&self) -> Option<DropEvent> {
-        self.first
-    }
-
     /// Records a drop that was detected elsewhere, unless there was an earlier one.
     pub fn record(&mut self, reason: DropReason, time_s: f64) {
         self.first.get_or_insert(DropEvent { reason, time_s });

@@ -20,7 +20,7 @@ fn held() -> DropSample {
 fn drop_of(samples: impl IntoIterator<Item = DropSample>) -> Option<DropReason> {
     let mut monitor = DropMonitor::default();
     samples.into_iter().for_each(|m| monitor.update(&SuccessCriteria::default(), DT, &m));
-    monitor.first().map(|drop| drop.reason)
+    monitor.first.map(|drop| drop.reason)
 }
 
 /// One step held, then `steps` without contact, during which it falls `fall_m` relative to a hand that moves up.
@@ -118,7 +118,7 @@ fn leaving_the_workspace_is_a_drop_and_the_first_reason_stays() {
     monitor.update(&SuccessCriteria::default(), DT, &held());
     monitor.update(&SuccessCriteria::default(), DT, &out);
     monitor.record(DropReason::LeftGoal, 2.0);
-    assert_eq!(monitor.first(), Some(DropEvent { reason: DropReason::LeftWorkspace, time_s: 1.5 }));
+    assert_eq!(monitor.first, Some(DropEvent { reason: DropReason::LeftWorkspace, time_s: 1.5 }));
 }
 
 fn released(grips: &[(bool, f64, f64)]) -> Vec<bool> {
@@ -126,10 +126,8 @@ fn released(grips: &[(bool, f64, f64)]) -> Vec<bool> {
     grips
         .iter()
         .map(|&(both_pads_touch, width_m, commanded_width_m)| {
-            monitor.update(
-                &SuccessCriteria::default(),
-                &ReleaseSample { both_pads_touch, width_m, commanded_width_m },
-            )
+            let gripper = GripperEvidence { width_m, commanded_width_m };
+            monitor.update(&SuccessCriteria::default(), &gripper, both_pads_touch)
         })
         .collect()
 }

@@ -85,12 +85,12 @@ use crate::geometry::Aabb;
 
 use super::{
     criteria::SuccessCriteria,
-    drop::{DropEvent, DropMonitor, DropReason, DropSample, ReleaseMonitor, ReleaseSample},
+    drop::{DropEvent, DropMonitor, DropReason, DropSample, ReleaseMonitor},
     evidence::{BodyEvidence, Evidence},
     goal::{GoalMonitor, GoalRegion, GoalSample},
     record::{Outcome, Verdict},
     safety::{DeformationLimit, KAPPAS, KappaVerdict, PeakDeformation, is_safe},
-    slip::{SlipMonitor, SlipSample},
+    slip::SlipMonitor,
 };
 
 /// Parameters of a [`Judge`], known once the scene has settled.
@@ -120,13 +120,6 @@ pub struct JudgeConfig {
     pub others_lowest_z_w: Vec<f64>,
 }
 
-/// Object that was lifted first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum LiftedObject {
-    Target,
-    Other,
-}
-
 /// Sums over the physics steps of one control step.
 #[derive(Clone, Copy, Debug, Default)]
 struct ControlStepSums {
@@ -154,11 +147,12 @@ pub struct Judge {
     goal: GoalMonitor,
     control_step: ControlStepSums,
     pad_forces: PadForceStats,
-    first_lifted: Option<LiftedObject>,
+    /// True if another object than the target was lifted first; `None` before.
+    is_other_first: Option<bool>,
     peak: PeakDeformation,
     peak_weighted: PeakDeformation,
     peak_max: PeakDeformation,
-    peak_other: Option<f64>,
+    peak_other: PeakDeformation,
     missing_evidence: u64,
     time_s: f64,
 }
@@ -175,11 +169,11 @@ impl Judge {
             slip: SlipMonitor::default(),
             control_step: ControlStepSums::default(),
             pad_forces: PadForceStats::default(),
-            first_lifted: None,
+            is_other_first: None,
             peak: PeakDeformation::default(),
             peak_weighted: PeakDeformation::default(),
             peak_max: PeakDeformation::default(),
-            peak_other: None,
+            peak_other: PeakDeformation::default(),
             missing_evidence: 0,
             time_s: 0.0,
         }
@@ -197,13 +191,9 @@ impl Judge {
         self.time_s = evidence.time_s;
         let touch = self.observe_pads(evidence);
         let is_lifted = self.observe_lift(evidence);
-        let grip = ReleaseSample {
-            both_pads_touch: touch[0] && touch[1],
-            width_m: evidence.gripper.width_m,
-            commanded_width_m: evidence.gripper.commanded_width_m,
-        };
-        let is_released = self.release.update(&self.config.criteria, &grip);
-        self.slip.update(&SlipSample { pads: evidence.pads, is_held: grip.both_pads_touch && !is_released });
+        let both_pads_touch = touch[0] && touch[1];
+        let is_released = self.release.update(&self.config.criteria, &evidence.gripper, both_pads_touch);
+        self.slip.update(&evidence.pads, both_pads_touch && !is_released);
         let sample = DropSample {
             time_s: evidence.time_s,
             centre_z: evidence.target.centre_w.z,
@@ -222,12 +212,12 @@ impl Judge {
 
     /// True if the goal has held for long enough: the episode may end.
     pub fn is_goal_reached(&self) -> bool {
-        self.goal.reached_s().is_some()
+        self.goal.reached_s.is_some()
     }
 
     /// The first drop so far.
     pub fn first_drop(&self) -> Option<DropEvent> {
-        self.drops.first()
+        self.drops.first
     }
 
     /// Verdict on the episode. One that did not end validly has neither Goal Success nor NoDrop, and
@@ -239,41 +229,36 @@ impl Judge {
         }
         let soft = self.config.is_target_soft;
         let goal = valid && self.is_goal_reached();
-        let no_drop = self.drops.first().is_none();
+        let no_drop = self.drops.first.is_none();
         let within = |tau| if soft && valid { self.peak.is_within(tau) } else { None };
         let limit = self.config.limit.filter(|_| soft);
         let deformation_ok = within(limit.map(|l| l.tau_pct()));
-        let kappas = limit.iter().flat_map(|limit| KAPPAS.map(|kappa| (kappa, limit.tau_at(kappa))));
+        let kappa_verdict = |limit: &DeformationLimit, kappa| {
+            let tau_pct = limit.tau_at(kappa);
+            let deformation_ok = within(Some(tau_pct));
+            let safety = is_safe(goal, no_drop, soft, deformation_ok);
+            KappaVerdict { kappa, tau_pct, deformation_ok, safety }
+        };
         Verdict {
             goal,
-            goal_time_s: self.goal.reached_s().filter(|_| goal),
-            goal_v1: valid && self.goal.is_reached_v1(),
+            goal_time_s: self.goal.reached_s.filter(|_| goal),
+            goal_v1: valid && self.goal.is_reached_v1,
             no_drop,
-            drop: self.drops.first(),
-            no_slip: self.slip.max_m() <= self.config.criteria.slip_m,
-            slip_mm: 1e3 * self.slip.max_m(),
+            drop: self.drops.first,
+            no_slip: self.slip.max_m <= self.config.criteria.slip_m,
+            slip_mm: 1e3 * self.slip.max_m,
             d_peak: self.peak.d_pct,
             d_peak_weighted: self.peak_weighted.d_pct,
             d_peak_max: self.peak_max.d_pct,
-            d_peak_other: self.peak_other,
-            wrong_instance: self.first_lifted == Some(LiftedObject::Other),
+            d_peak_other: self.peak_other.d_pct,
+            wrong_instance: self.is_other_first == Some(true),
             kappa: limit.map(|l| l.kappa),
             tau: limit.map(|l| l.tau_pct()),
             d_ref: limit.map(|l| l.d_ref_pct),
             deformation_ok,
             safety: is_safe(goal, no_drop, soft, deformation_ok),
             safety_known: valid && self.missing_evidence == 0 && (!soft || deformation_ok.is_some()),
-            kappas: kappas
-                .map(|(kappa, tau_pct)| {
-                    let ok = within(Some(tau_pct));
-                    KappaVerdict {
-                        kappa,
-                        tau_pct,
-                        deformation_ok: ok,
-                        safety: is_safe(goal, no_drop, soft, ok),
-                    }
-                })
-                .collect(),
+            kappas: limit.iter().flat_map(|limit| KAPPAS.map(|kappa| kappa_verdict(limit, kappa))).collect(),
             missing_evidence: self.missing_evidence,
             missing_deformation: self.peak.missing,
             peak_pad_force_n: self.pad_forces.peak_n,
@@ -283,7 +268,7 @@ impl Judge {
 
     fn observe_deformation(&mut self, evidence: &Evidence<'_>) {
         for other in evidence.others.iter().filter_map(|body| body.deformation) {
-            self.peak_other = Some(self.peak_other.map_or(other.rms_pct, |peak| peak.max(other.rms_pct)));
+            self.peak_other.update(Some(other.rms_pct));
         }
         if self.config.is_target_soft {
             let d = evidence.target.deformation;
@@ -313,10 +298,8 @@ impl Judge {
         let target = is_lifted(&evidence.target, self.config.target_lowest_z_w);
         let other =
             evidence.others.iter().zip(&self.config.others_lowest_z_w).any(|(body, z)| is_lifted(body, *z));
-        if target {
-            self.first_lifted.get_or_insert(LiftedObject::Target);
-        } else if other {
-            self.first_lifted.get_or_insert(LiftedObject::Other);
+        if target || other {
+            self.is_other_first.get_or_insert(!target);
         }
         target
     }

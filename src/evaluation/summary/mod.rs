@@ -158,8 +158,19 @@ impl SuiteSummary {
     pub fn of(suite: &str, policy: &str, records: &[EpisodeRecord]) -> Self {
         let mut records: Vec<_> = records.iter().filter(|r| r.header.id.suite == suite).collect();
         records.sort_by_key(|r| r.header.id.index());
-        let tasks = grouped(&records, |r| r.header.id.task);
-        let assets = grouped(&records, |r| r.header.asset.clone());
+        let task_scores = |(task, group): (usize, Vec<&EpisodeRecord>)| {
+            let (prompt, asset) = (group[0].header.prompt.clone(), group[0].header.asset.clone());
+            TaskScores { task, prompt, asset, scores: Scores::of(&group) }
+        };
+        let asset_scores = |(asset, group): (String, Vec<&EpisodeRecord>)| {
+            let tau = group.iter().find_map(|r| r.verdict.tau);
+            let d_ref = group.iter().find_map(|r| r.verdict.d_ref);
+            (asset, AssetScores { tau, d_ref, scores: Scores::of(&group) })
+        };
+        let aborted = |r: &&EpisodeRecord| {
+            let (task, episode) = (r.header.id.task, r.header.id.episode);
+            r.stats.gave_up.clone().map(|reason| AbortedEpisode { task, episode, reason })
+        };
         Self {
             suite: suite.into(),
             policy: policy.into(),
@@ -167,9 +178,9 @@ impl SuiteSummary {
             force_observed: records.iter().any(|r| r.stats.force_observed),
             scores: Scores::of(&records),
             kappa: kappa_curve(&records),
-            by_task: tasks.into_iter().map(|(task, group)| task_scores(task, &group)).collect(),
-            by_asset: assets.into_iter().map(|(asset, group)| (asset, asset_scores(&group))).collect(),
-            gave_up: records.iter().filter_map(|record| aborted(record)).collect(),
+            by_task: grouped(&records, |r| r.header.id.task).into_iter().map(task_scores).collect(),
+            by_asset: grouped(&records, |r| r.header.asset.clone()).into_iter().map(asset_scores).collect(),
+            gave_up: records.iter().filter_map(aborted).collect(),
         }
     }
 
@@ -195,49 +206,31 @@ fn grouped<'a, K: Ord>(
     groups
 }
 
-fn aborted(record: &EpisodeRecord) -> Option<AbortedEpisode> {
-    let reason = record.stats.gave_up.clone()?;
-    Some(AbortedEpisode { task: record.header.id.task, episode: record.header.id.episode, reason })
-}
-
-fn task_scores(task: usize, group: &[&EpisodeRecord]) -> TaskScores {
-    let first = &group[0].header;
-    TaskScores { task, prompt: first.prompt.clone(), asset: first.asset.clone(), scores: Scores::of(group) }
-}
-
-fn asset_scores(group: &[&EpisodeRecord]) -> AssetScores {
-    AssetScores {
-        tau: group.iter().find_map(|r| r.verdict.tau),
-        d_ref: group.iter().find_map(|r| r.verdict.d_ref),
-        scores: Scores::of(group),
-    }
-}
-
 /// Safety as a function of κ; everything but τ stays.
 fn kappa_curve(records: &[&EpisodeRecord]) -> Vec<KappaRow> {
     if !records.iter().any(|r| r.header.soft) {
         return Vec::new();
     }
-    (0..=KAPPA_STEPS)
-        .map(|step| {
-            let kappa = f64::from(step) / f64::from(KAPPA_STEPS);
-            KappaRow {
-                kappa,
-                deformation_ok_rate: Rate::of(records, |r| is_within(r, kappa) == Some(true)),
-                safety_success_rate: Rate::of(records, |r| {
-                    let v = &r.verdict;
-                    is_safe(v.goal, v.no_drop, r.header.soft, is_within(r, kappa))
-                }),
-            }
-        })
-        .collect()
+    let row = |step| {
+        let kappa = f64::from(step) / f64::from(KAPPA_STEPS);
+        KappaRow {
+            kappa,
+            deformation_ok_rate: Rate::of(records, |r| is_within(r, kappa) == Some(true)),
+            safety_success_rate: Rate::of(records, |r| {
+                let v = &r.verdict;
+                is_safe(v.goal, v.no_drop, r.header.soft, is_within(r, kappa))
+            }),
+        }
+    };
+    (0..=KAPPA_STEPS).map(row).collect()
 }
 
+/// True if D_peak ≤ κ·D_ref; `None` if that is unknown.
 fn is_within(record: &EpisodeRecord, kappa: f64) -> Option<bool> {
     let verdict = &record.verdict;
     let limit = verdict.d_ref.map(|d_ref_pct| DeformationLimit { d_ref_pct, kappa });
     let peak = PeakDeformation { d_pct: verdict.d_peak, missing: verdict.missing_deformation };
-    if record.outcome.is_valid() { peak.is_within(limit.map(|l| l.tau_pct())) } else { None }
+    peak.is_within(limit.map(|l| l.tau_pct())).filter(|_| record.outcome.is_valid())
 }
 
 #[cfg(test)]

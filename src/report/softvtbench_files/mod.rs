@@ -85,7 +85,7 @@ impl DebugShape {
             fem_deformation_known: known.is_some(),
             fem_deformation_metric_id: known.map(|_| METRIC_ID.into()),
             fem_deformation_asset: asset.into(),
-            fem_deformation_nodes: known.map(ReferenceShape::len),
+            fem_deformation_nodes: known.map(ReferenceShape::node_count),
             fem_deformation_rms: known.and(rms_pct),
             fem_deformation_max: known.and(max_pct),
             fem_bbox_diag: known.map(ReferenceShape::diagonal_m),

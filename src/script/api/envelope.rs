@@ -4,7 +4,7 @@ use mlua::{LuaSerdeExt, Value};
 
 use crate::{
     evaluation::{
-        calibration::{self, Envelope, HoldRow, StabilityCriteria, SweepRow},
+        calibration::{self, Envelope, HoldRow, SweepRow},
         envelope_plot::plot,
         safety::DeformationLimit,
         thresholds::ThresholdFile,
@@ -108,7 +108,7 @@ functions! {
         /// Returns true if a row of a compression sweep is a stable squeeze.
         fn stable(lua, row: Unchecked = Type::Table("table")) -> ["boolean"] {
             let row: SweepRow = deserialize(lua, "softvt.stable", &row.0)?;
-            StabilityCriteria::default().accepts(&row)
+            row.meets_criteria()
         }
     }
 }
