@@ -115,7 +115,7 @@ fn rms_by_svd(rest: &[Vec3], now: &[Vec3]) -> f64 {
     flip[(smallest, smallest)] = (&u * &vt).determinant().signum();
     let r = Mat3::from_column_slice((u * flip * vt).as_slice());
     let sum: f64 = now.iter().zip(rest).map(|(x, y)| (x - c - r * (y - cc)).norm_squared()).sum();
-    let (low, high) = bounds(rest);
+    let Aabb { min: low, max: high } = Aabb::from_points(rest).unwrap();
     100.0 * (sum / rest.len() as f64).sqrt() / (high - low).norm()
 }
 
