@@ -67,10 +67,9 @@ fn report(case: &Case, gel: &Gel, optics: &PolynomialOptics) {
     let contact = TactileContact { wrench: case.wrench, skins: &skins, friction: 1.5, substrate: None };
     let mut scratch = GelScratch::default();
     let field = GelField::solve(gel, &contact, &mut scratch).expect("a good contact").expect("a force");
-    let mut rgb = vec![0; 320 * 240 * 3];
     let solve = min_ms(|| drop(black_box(GelField::solve(gel, &contact, &mut scratch))));
-    let image = min_ms(|| optics.render(gel, Some(&field), false, &mut rgb));
-    let with_shadows = min_ms(|| optics.render(gel, Some(&field), true, &mut rgb));
+    let image = min_ms(|| drop(black_box(optics.render(gel, Some(&field), false))));
+    let with_shadows = min_ms(|| drop(black_box(optics.render(gel, Some(&field), true))));
     let markers = min_ms(|| {
         black_box(Markers::of(gel, &MarkerModel::Elastic, Some(&field)));
     });

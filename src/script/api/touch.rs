@@ -93,7 +93,7 @@ class! {
             present: "number[][]" { get(lua, this) { FieldValue::Fixed(positions(lua, &this.markers.current)?, MEASURED) } }
             /// Displacements.
             motion: "number[][]" {
-                get(lua, this) { fixed_list(lua, this.flow.displacements().iter().map(|pair| pair.to_vec()), MEASURED)? }
+                get(lua, this) { fixed_list(lua, this.flow.displacements.iter().map(|u| vec![u.x, u.y]), MEASURED)? }
             }
         }
         methods {

@@ -13,7 +13,6 @@
 pub mod elastic;
 pub mod image;
 pub mod markers;
-mod pinhole;
 mod sensor;
 mod skin;
 mod spec;

@@ -8,7 +8,7 @@ use super::{
     elastic::{ContactError, Gel, GelField, GelScratch, TactileContact},
     image::{OpticsError, PolynomialOptics, TaximOptics},
     markers::{MarkerStyle, Markers},
-    spec::{IMAGE_SIZE, MarkerModel, OpticsModel, TactileSpec},
+    spec::{MarkerModel, OpticsModel, TactileSpec},
 };
 use crate::{npy::NpzError, robot::PadSurface, text::RangeError};
 
@@ -93,13 +93,10 @@ pub struct TactileReading {
 
 impl OpticsBackend {
     fn render(&self, gel: &Gel, field: Option<&GelField>) -> RgbImage {
-        let [width, height] = IMAGE_SIZE;
-        let mut image = RgbImage::new(width as u32, height as u32);
         match self {
-            Self::Polynomial { optics, shadows } => optics.render(gel, field, *shadows, &mut image),
-            Self::Taxim(taxim) => taxim.render(gel, field, &mut image),
+            Self::Polynomial { optics, shadows } => optics.render(gel, field, *shadows),
+            Self::Taxim(taxim) => taxim.render(gel, field),
         }
-        image
     }
 }
 

@@ -12,16 +12,7 @@
 //! m changes its sign near α = 2: long waves of pressure squeeze a nearly incompressible layer outwards, where a half
 //! space is drawn inwards.
 
-/// Material and thickness of the layer.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct ElasticLayer {
-    /// Shear modulus μ, Pa.
-    pub(super) shear_modulus: f64,
-    /// Poisson's ratio ν.
-    pub(super) poisson: f64,
-    /// Thickness h, m.
-    pub(super) thickness: f64,
-}
+use super::super::spec::GelSpec;
 
 /// Displacement of the surface per unit of traction at one wave number k, m/Pa.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,13 +30,13 @@ pub(super) struct LayerResponse {
 /// α beyond which the base has no influence (e⁻⁴⁰) and the hyperbolic functions would overflow.
 const MAX_ALPHA: f64 = 20.0;
 
-impl ElasticLayer {
-    /// Response at wave number `k`, 1/m.
-    pub(super) fn response(&self, k: f64) -> LayerResponse {
-        let (nu, mu, h) = (self.poisson, self.shear_modulus, self.thickness);
+impl LayerResponse {
+    /// Response of a layer of this material and thickness h (m) at wave number `k`, 1/m.
+    pub(super) fn new(material: &GelSpec, thickness: f64, k: f64) -> Self {
+        let (nu, mu, h) = (material.poisson, material.shear_modulus, thickness);
         if k * h < 1e-6 {
             let normal = h * (1.0 - 2.0 * nu) / (2.0 * mu * (1.0 - nu));
-            return LayerResponse { normal, longitudinal: h / mu, transverse: h / mu, coupling: 0.0 };
+            return Self { normal, longitudinal: h / mu, transverse: h / mu, coupling: 0.0 };
         }
         let alpha = (k * h).min(MAX_ALPHA);
         let kappa = 3.0 - 4.0 * nu;
@@ -53,7 +44,7 @@ impl ElasticLayer {
         let sinh = (2.0 * alpha).sinh();
         let d = 2.0 * kappa * cosh + 4.0 * alpha * alpha + 1.0 + kappa * kappa;
         let scale = (1.0 - nu) / (mu * k);
-        LayerResponse {
+        Self {
             normal: scale * (2.0 * kappa * sinh - 4.0 * alpha) / d,
             longitudinal: scale * (2.0 * kappa * sinh + 4.0 * alpha) / d,
             transverse: alpha.tanh() / (mu * k),
@@ -82,8 +73,8 @@ mod tests {
     }
 
     /// (U, W) at the surface by solving the boundary conditions numerically.
-    fn solved(layer: &ElasticLayer, k: f64, shear: f64, normal: f64) -> [f64; 2] {
-        let (nu, mu, h) = (layer.poisson, layer.shear_modulus, layer.thickness);
+    fn solved(material: &GelSpec, h: f64, k: f64, shear: f64, normal: f64) -> [f64; 2] {
+        let (nu, mu) = (material.poisson, material.shear_modulus);
         let (kappa, lambda) = (3.0 - 4.0 * nu, 2.0 * mu * nu / (1.0 - 2.0 * nu));
         let mut matrix = Matrix4::zeros();
         for i in 0..4 {
@@ -100,10 +91,10 @@ mod tests {
 
     #[test]
     fn the_closed_form_solves_the_layers_boundary_value_problem() {
-        let layer = ElasticLayer { shear_modulus: 0.145, poisson: 0.475, thickness: 4.0 };
+        let material = GelSpec { shear_modulus: 0.145, poisson: 0.475, ..GelSpec::default() };
         for k in [0.02, 0.1, 0.3, 0.7, 1.0, 2.0, 3.0] {
-            let found = layer.response(k);
-            let (shear, normal) = (solved(&layer, k, 1.0, 0.0), solved(&layer, k, 0.0, 1.0));
+            let found = LayerResponse::new(&material, 4.0, k);
+            let (shear, normal) = (solved(&material, 4.0, k, 1.0, 0.0), solved(&material, 4.0, k, 0.0, 1.0));
             for (a, b) in [
                 (found.longitudinal, shear[0]),
                 (found.coupling, shear[1]),
@@ -117,8 +108,8 @@ mod tests {
 
     #[test]
     fn the_response_to_short_waves_is_that_of_a_half_space() {
-        let layer = ElasticLayer { shear_modulus: 1.0, poisson: 0.3, thickness: 1.0 };
-        let found = layer.response(200.0);
+        let material = GelSpec { shear_modulus: 1.0, poisson: 0.3, ..GelSpec::default() };
+        let found = LayerResponse::new(&material, 1.0, 200.0);
         let half_space = [0.7 / 200.0, 0.7 / 200.0, 1.0 / 200.0, -0.4 / 400.0];
         for (a, b) in
             [found.normal, found.longitudinal, found.transverse, found.coupling].into_iter().zip(half_space)

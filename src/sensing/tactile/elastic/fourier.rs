@@ -21,20 +21,11 @@ pub(super) struct PaddedFft {
 }
 
 /// Intermediate results of a transform.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct FftBuffers {
     row: Vec<f32>,
     row_spectrum: Vec<Complex32>,
     scratch: Vec<Complex32>,
-}
-
-/// Wave vector of one entry of a spectrum, 1/m.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct WaveVector {
-    /// Angular frequencies along x and y.
-    pub(super) k: [f64; 2],
-    /// The same with the Nyquist frequencies, whose sign is not defined, replaced by 0: for odd kernels.
-    pub(super) odd: [f64; 2],
 }
 
 /// Least multiple of 4 of at least `n` without prime factors above 5; FFTs of these lengths are fast.
@@ -86,13 +77,11 @@ impl PaddedFft {
         vec![Complex32::default(); self.half_width * self.height]
     }
 
-    /// Wave vector of the entry at index `ix` along x and `iy` along y, for cells of edge `cell` (m).
-    pub(super) fn wave_vector(&self, ix: usize, iy: usize, cell: f64) -> WaveVector {
+    /// Wave vector (1/m) of the entry at index `ix` along x and `iy` along y, for cells of edge `cell` (m).
+    pub(super) fn wave_vector(&self, ix: usize, iy: usize, cell: f64) -> [f64; 2] {
         let step = |n: usize| std::f64::consts::TAU / (n as f64 * cell);
         let signed = if iy > self.height / 2 { iy as f64 - self.height as f64 } else { iy as f64 };
-        let k = [ix as f64 * step(self.width), signed * step(self.height)];
-        let is_nyquist = [2 * ix == self.width, 2 * iy == self.height];
-        WaveVector { k, odd: [0, 1].map(|axis| if is_nyquist[axis] { 0.0 } else { k[axis] }) }
+        [ix as f64 * step(self.width), signed * step(self.height)]
     }
 
     /// Writes the spectrum of `field`. Rows of zeros cost nothing.

@@ -1,11 +1,12 @@
 //! The gel: grid over the pad and response of its surface to tractions, computed once for all fingers and frames.
 
+use nalgebra::Vector2;
 use rustfft::num_complex::Complex32;
 
 use super::{
-    super::spec::{Pinhole, TactileSpec},
-    elastic_layer::ElasticLayer,
-    fourier::{FftBuffers, PaddedFft, WaveVector},
+    super::spec::{GelSpec, Pinhole, TactileSpec},
+    elastic_layer::LayerResponse,
+    fourier::{FftBuffers, PaddedFft},
 };
 use crate::{robot::PadSurface, text::RangeError};
 
@@ -50,7 +51,7 @@ pub(super) struct LayerKernels {
 #[derive(Clone, Debug, Default)]
 pub struct GelScratch {
     pub(super) spectra: [Vec<Complex32>; 4],
-    pub(super) buffers: Option<FftBuffers>,
+    pub(super) buffers: FftBuffers,
     /// Spectrum of the compliance of gel and body in series.
     pub(super) compliance: Vec<f32>,
     /// Size of the transform for which the buffers are allocated.
@@ -70,22 +71,24 @@ impl Gel {
         // Periodic images of a contact act on each other only across the full width of the pad: there, one and a half
         // thicknesses away, a load moves the surface by less than 2 % of its displacement under the load.
         let fft = PaddedFft::new(columns, rows, (1.5 * pad.thickness / cell).ceil() as usize);
-        let layer = ElasticLayer {
-            shear_modulus: spec.gel.shear_modulus,
-            poisson: spec.gel.poisson,
-            thickness: pad.thickness,
-        };
-        let kernels = LayerKernels::new(&fft, &layer, cell);
+        let kernels = LayerKernels::new(&fft, &spec.gel, pad.thickness);
         let mut gel = Self { pad, view: spec.view, columns, rows, cell, dome: Vec::new(), fft, kernels };
-        let is_inside = |at: [f64; 2]| pad.edge_distance(at[0], at[1]) <= 0.0;
-        let height = |at: [f64; 2]| if is_inside(at) { pad.height(at[0], at[1]) as f32 } else { f32::NAN };
+        let height = |at: Vector2<f64>| {
+            let is_inside = pad.edge_distance(at.x, at.y) <= 0.0;
+            if is_inside { pad.height(at.x, at.y) as f32 } else { f32::NAN }
+        };
         gel.dome = (0..columns * rows).map(|c| height(gel.centre(c))).collect();
         Ok(gel)
     }
 
     /// Centre (x, y) of the cell at index `c`, m, pad frame.
-    pub fn centre(&self, c: usize) -> [f64; 2] {
-        [self.x(c % self.columns), self.y(c / self.columns)]
+    pub fn centre(&self, c: usize) -> Vector2<f64> {
+        Vector2::new(self.x(c % self.columns), self.y(c / self.columns))
+    }
+
+    /// Position of a point (m) in units of cells, with the centre of cell (0, 0) at 0.
+    pub(super) fn grid_position(&self, x: f64, y: f64) -> [f64; 2] {
+        [x / self.cell + 0.5 * (self.columns - 1) as f64, y / self.cell + 0.5 * (self.rows - 1) as f64]
     }
 
     /// x of the centres of column `i`, m.
@@ -100,7 +103,7 @@ impl Gel {
 }
 
 impl LayerKernels {
-    fn new(fft: &PaddedFft, layer: &ElasticLayer, cell: f64) -> Self {
+    fn new(fft: &PaddedFft, spec: &GelSpec, thickness: f64) -> Self {
         let size = fft.half_width * fft.height;
         let empty = || Vec::with_capacity(size);
         let mut kernels = Self {
@@ -112,11 +115,13 @@ impl LayerKernels {
         let scale = 1.0 / (fft.width * fft.height) as f64;
         for ix in 0..fft.half_width {
             for iy in 0..fft.height {
-                let WaveVector { k, odd } = fft.wave_vector(ix, iy, cell);
+                let k = fft.wave_vector(ix, iy, spec.cell);
                 let magnitude = k[0].hypot(k[1]);
-                let response = layer.response(magnitude);
+                let response = LayerResponse::new(spec, thickness, magnitude);
                 let unit = if magnitude > 0.0 { k.map(|k| k / magnitude) } else { [0.0; 2] };
-                let odd = if magnitude > 0.0 { odd.map(|k| k / magnitude) } else { [0.0; 2] };
+                // The sign of a Nyquist frequency is not defined; odd kernels leave it out.
+                let is_nyquist = [2 * ix == fft.width, 2 * iy == fft.height];
+                let odd = [0, 1].map(|axis| if is_nyquist[axis] { 0.0 } else { unit[axis] });
                 let difference = response.longitudinal - response.transverse;
                 let push = |to: &mut Vec<f32>, value: f64| to.push((scale * value) as f32);
                 push(&mut kernels.normal, response.normal);
@@ -136,9 +141,9 @@ impl GelScratch {
     /// Allocates the buffers for `gel`, unless they have its size already.
     pub(super) fn fit(&mut self, gel: &Gel) {
         let size = [gel.fft.width, gel.fft.height];
-        if self.buffers.is_none() || self.size != size {
+        if self.size != size {
             self.spectra = std::array::from_fn(|_| gel.fft.spectrum());
-            self.buffers = Some(gel.fft.buffers());
+            self.buffers = gel.fft.buffers();
             self.size = size;
         }
     }

@@ -1,5 +1,6 @@
 //! Gel field: pressure, shear and displacement of the gel's surface under a contact.
 
+use nalgebra::Vector2;
 use rustfft::num_complex::Complex32;
 
 use super::{
@@ -7,9 +8,7 @@ use super::{
     height_map::{HeightMap, SUBCELLS, SkinMesh},
     normal_contact::solve_normal_contact,
     pad_wrench::{PadWrench, Taxels},
-    tangential_contact::{
-        PlanarMotion, TangentialLoad, apply_shear_kernel, solve_tangential_contact, spring_stiffness,
-    },
+    tangential_contact::{PlanarMotion, apply_shear_kernel, solve_tangential_contact, spring_stiffness},
 };
 use crate::geometry::{Mat3, Vec3};
 
@@ -83,7 +82,7 @@ impl GelField {
         contact: &TactileContact,
         scratch: &mut GelScratch,
     ) -> Result<Option<Self>, ContactError> {
-        check(contact)?;
+        validate(contact)?;
         let TactileContact { wrench, skins, friction, substrate } = contact;
         if wrench.normal() <= 0.0 {
             return Ok(None);
@@ -93,7 +92,7 @@ impl GelField {
         let mut height_map = HeightMap::of(gel, skins);
         let normal = solve_normal_contact(gel, &gaps(gel, &height_map), wrench.normal(), scratch)
             .ok_or_else(|| ContactError::NoSkin { force: wrench.normal(), skins: skins.len() })?;
-        let load = TangentialLoad { force: [wrench.force.x, wrench.force.y], moment: wrench.moment.z };
+        let load = Vec3::new(wrench.force.x, wrench.force.y, wrench.moment.z);
         let tangential = solve_tangential_contact(gel, &normal.pressure, &load, *friction, scratch);
         let displacement = surface_displacement(gel, &normal.pressure, &tangential.traction, scratch);
         height_map.height.iter_mut().for_each(|z| *z -= normal.approach as f32);
@@ -115,9 +114,8 @@ impl GelField {
     pub fn wrench(&self, gel: &Gel) -> PadWrench {
         let area = gel.cell * gel.cell;
         self.pressed_cells().fold(PadWrench::default(), |sum, (c, p)| {
-            let [x, y] = gel.centre(c);
             let force = Vec3::new(self.shear[0][c], self.shear[1][c], -p) * area;
-            sum.plus(&Vec3::new(x, y, 0.0), force)
+            sum.plus(&gel.centre(c).push(0.0), force)
         })
     }
 
@@ -125,7 +123,7 @@ impl GelField {
     pub fn taxels(&self, gel: &Gel, shape: [usize; 2]) -> Taxels {
         let mut taxels = Taxels::empty(&gel.pad, shape);
         for (c, p) in self.pressed_cells() {
-            taxels.add(gel.centre(c), gel.cell * gel.cell, p, [self.shear[0][c], self.shear[1][c]]);
+            taxels.add(gel.centre(c).into(), gel.cell * gel.cell, p, [self.shear[0][c], self.shear[1][c]]);
         }
         taxels
     }
@@ -141,27 +139,21 @@ impl GelField {
     }
 
     /// Centre of pressure (x, y), m.
-    pub fn centre(&self, gel: &Gel) -> [f64; 2] {
-        let mut sum = [0.0; 3];
-        for (c, p) in self.pressed_cells() {
-            let [x, y] = gel.centre(c);
-            sum = [sum[0] + p * x, sum[1] + p * y, sum[2] + p];
-        }
-        [sum[0] / sum[2], sum[1] / sum[2]]
+    pub fn centre(&self, gel: &Gel) -> Vector2<f64> {
+        let sum = self.pressed_cells().fold(Vec3::zeros(), |sum, (c, p)| sum + p * gel.centre(c).push(1.0));
+        sum.xy() / sum.z
     }
 
     /// True if there is pressure on the cell at (x, y), m.
     pub fn touches(&self, gel: &Gel, x: f64, y: f64) -> bool {
-        let i = (x / gel.cell + 0.5 * (gel.columns - 1) as f64).round();
-        let j = (y / gel.cell + 0.5 * (gel.rows - 1) as f64).round();
+        let [i, j] = gel.grid_position(x, y).map(f64::round);
         let is_inside = i >= 0.0 && j >= 0.0 && i < gel.columns as f64 && j < gel.rows as f64;
         is_inside && self.pressure[j as usize * gel.columns + i as usize] > 0.0
     }
 
     /// Displacement (x, y, z) of the surface at (x, y), m: cubic between cells, zero outside the grid.
     pub fn displacement_at(&self, gel: &Gel, x: f64, y: f64) -> [f64; 3] {
-        let tx = cubic_taps(x / gel.cell + 0.5 * (gel.columns - 1) as f64);
-        let ty = cubic_taps(y / gel.cell + 0.5 * (gel.rows - 1) as f64);
+        let [tx, ty] = gel.grid_position(x, y).map(cubic_taps);
         let mut out = [0.0; 3];
         for (b, wy) in ty.weights.iter().enumerate() {
             for (a, wx) in tx.weights.iter().enumerate() {
@@ -198,29 +190,20 @@ pub(in super::super) fn cubic_taps(position: f64) -> CubicTaps {
     CubicTaps { first: base as isize - 1, weights }
 }
 
-fn check(contact: &TactileContact) -> Result<(), ContactError> {
-    let wrench = &contact.wrench;
-    let finite = [
-        ("force along x", wrench.force.x),
-        ("force along y", wrench.force.y),
-        ("force along z", wrench.force.z),
-        ("moment about z", wrench.moment.z),
-    ];
-    for (field, value) in finite {
-        if !value.is_finite() {
-            return Err(ContactError::BadNumber { field, value, condition: "" });
-        }
-    }
-    let value = contact.friction;
-    if !(value >= 0.0 && value.is_finite()) {
-        return Err(ContactError::BadNumber { field: "friction", value, condition: " of at least 0" });
-    }
-    let substrate = contact.substrate.iter();
-    let positive =
-        substrate.flat_map(|s| [("substrate.modulus", s.modulus), ("substrate.resolved", s.resolved)]);
-    for (field, value) in positive {
-        if !(value > 0.0 && value.is_finite()) {
-            return Err(ContactError::BadNumber { field, value, condition: " above 0" });
+fn validate(contact: &TactileContact) -> Result<(), ContactError> {
+    let TactileContact { wrench, friction, substrate, .. } = contact;
+    let substrate = substrate.unwrap_or(SubstrateCompliance { modulus: 1.0, resolved: 1.0 });
+    for (field, value, is_valid, condition) in [
+        ("force along x", wrench.force.x, true, ""),
+        ("force along y", wrench.force.y, true, ""),
+        ("force along z", wrench.force.z, true, ""),
+        ("moment about z", wrench.moment.z, true, ""),
+        ("friction", *friction, *friction >= 0.0, " of at least 0"),
+        ("substrate.modulus", substrate.modulus, substrate.modulus > 0.0, " above 0"),
+        ("substrate.resolved", substrate.resolved, substrate.resolved > 0.0, " above 0"),
+    ] {
+        if !(value.is_finite() && is_valid) {
+            return Err(ContactError::BadNumber { field, value, condition });
         }
     }
     Ok(())
@@ -257,7 +240,7 @@ pub(super) fn surface_displacement(
     scratch: &mut GelScratch,
 ) -> [Vec<f32>; 3] {
     let mut out = std::array::from_fn(|_| vec![0.0; pressure.len()]);
-    let GelScratch { spectra: [sx, sy, sp, sz], buffers: Some(buffers), .. } = scratch else { return out };
+    let GelScratch { spectra: [sx, sy, sp, sz], buffers, .. } = scratch;
     gel.fft.forward(pressure, sp, buffers);
     gel.fft.forward(&shear[0], sx, buffers);
     gel.fft.forward(&shear[1], sy, buffers);
@@ -289,28 +272,23 @@ fn balanced_pressure(gel: &Gel, pressure: &[f32], force: f64) -> Vec<f64> {
 }
 
 /// The shear in double precision, with a correction of rounding size so that it integrates to `load` exactly.
-fn balanced_shear(
-    gel: &Gel,
-    pressure: &[f64],
-    traction: &[Vec<f32>; 2],
-    load: &TangentialLoad,
-) -> [Vec<f64>; 2] {
+fn balanced_shear(gel: &Gel, pressure: &[f64], traction: &[Vec<f32>; 2], load: &Vec3) -> [Vec<f64>; 2] {
     let mut shear = [0, 1].map(|a| traction[a].iter().map(|&t| f64::from(t)).collect::<Vec<f64>>());
     let mut stiffness = Mat3::zeros();
-    let mut missing = load.over_area(gel.cell * gel.cell);
+    let mut missing = load / (gel.cell * gel.cell);
     let touching: Vec<usize> = (0..pressure.len()).filter(|&c| pressure[c] > 0.0).collect();
     for &c in &touching {
-        let [x, y] = gel.centre(c);
+        let at = gel.centre(c);
         let (tx, ty) = (shear[0][c], shear[1][c]);
-        missing -= Vec3::new(tx, ty, x * ty - y * tx);
-        stiffness += spring_stiffness([x, y], pressure[c]);
+        missing -= Vec3::new(tx, ty, at.x * ty - at.y * tx);
+        stiffness += spring_stiffness(&at, pressure[c]);
     }
     if let Some(inverse) = stiffness.try_inverse() {
         let motion = PlanarMotion::from(inverse * missing);
         for &c in &touching {
-            let [dx, dy] = motion.at(gel.centre(c));
-            shear[0][c] += pressure[c] * dx;
-            shear[1][c] += pressure[c] * dy;
+            let add = pressure[c] * motion.at(&gel.centre(c));
+            shear[0][c] += add.x;
+            shear[1][c] += add.y;
         }
     }
     shear

@@ -123,7 +123,7 @@ fn mean_of_touching(p: &[f32], values: impl Iterator<Item = f32>) -> f32 {
 
 /// Writes the displacement of the surface (into gel and body together) by a pressure, m.
 fn apply_compliance(gel: &Gel, pressure: &[f32], out: &mut [f32], scratch: &mut GelScratch) {
-    let GelScratch { spectra, buffers: Some(buffers), compliance, .. } = scratch else { return };
+    let GelScratch { spectra, buffers, compliance, .. } = scratch;
     let spectrum = &mut spectra[0];
     gel.fft.forward(pressure, spectrum, buffers);
     for (value, kernel) in spectrum.iter_mut().zip(compliance.iter()) {

@@ -8,7 +8,7 @@ use super::{
     ContactError, Gel, GelField, GelScratch, PadWrench, SkinMesh, TactileContact, cubic_taps,
     gel::LayerKernels,
     gel_field::surface_displacement,
-    tangential_contact::{TangentialLoad, TangentialSolution, solve_tangential_contact},
+    tangential_contact::{TangentialSolution, solve_tangential_contact},
 };
 use crate::{geometry::Vec3, robot::PadSurface};
 
@@ -78,10 +78,10 @@ fn the_surface_bulges_around_a_press_as_in_the_reference() {
 }
 
 /// Stuck disc of radius 1.5 mm under a tangential load, and the tangential displacement at a point.
-fn disc(gel: &Gel, load: TangentialLoad) -> (TangentialSolution, impl Fn(f64, f64) -> [f64; 2]) {
+fn disc(gel: &Gel, load: Vec3) -> (TangentialSolution, impl Fn(f64, f64) -> [f64; 2]) {
     let is_inside = |c: usize| {
-        let [x, y] = gel.centre(c);
-        x.hypot(y) < 1.5e-3
+        let centre = gel.centre(c);
+        centre.x.hypot(centre.y) < 1.5e-3
     };
     let pressure: Vec<f32> =
         (0..gel.columns * gel.rows).map(|c| if is_inside(c) { 1e5 } else { 0.0 }).collect();
@@ -114,7 +114,7 @@ fn fine() -> Gel {
 #[test]
 fn a_sheared_disc_moves_its_surroundings_as_in_the_reference() {
     let gel = fine();
-    let (solution, u) = disc(&gel, TangentialLoad { force: [1.3513814, 0.0], moment: 0.0 });
+    let (solution, u) = disc(&gel, Vec3::new(1.3513814, 0.0, 0.0));
     assert!((solution.motion.x / 1e-3 - 1.0).abs() < 0.02, "stiffness: moved {:e}", solution.motion.x);
     for (r, along, across) in
         [(2e-3, 0.585012, 0.34868), (4e-3, 0.225487, 0.059259), (6e-3, 0.123558, 0.013237)]
@@ -127,7 +127,7 @@ fn a_sheared_disc_moves_its_surroundings_as_in_the_reference() {
 #[test]
 fn a_twisted_disc_moves_its_surroundings_as_in_the_reference_and_antisymmetrically() {
     let gel = fine();
-    let (solution, u) = disc(&gel, TangentialLoad { force: [0.0; 2], moment: 2.6354775e-3 });
+    let (solution, u) = disc(&gel, Vec3::new(0.0, 0.0, 2.6354775e-3));
     assert!((solution.motion.angle - 1.0).abs() < 0.02, "stiffness: turned {}", solution.motion.angle);
     for (r, turn) in [(2e-3, 0.444175), (3e-3, 0.16291), (4e-3, 0.080892), (6e-3, 0.026719)] {
         let found = u(r, 0.0)[1] / 1e-3;

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use image::{Rgb, RgbImage};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -49,13 +50,14 @@ pub struct OpticsFile {
 /// the slope; see [`slope_monomials`].
 #[derive(Clone, Debug)]
 pub struct PolynomialOptics {
-    /// Untouched image, 320 × 240 RGB.
-    untouched: Vec<u8>,
+    /// Image without a contact, 320 × 240.
+    pub(super) untouched: RgbImage,
     /// The same before rounding to grey levels.
     background: Vec<f32>,
     steepest: f32,
     colour: [[f32; SLOPE_MONOMIALS]; 3],
-    leds: [Led; 3],
+    /// LEDs of the red, green and blue channel, as the fit implies them.
+    pub(super) leds: [Led; 3],
 }
 
 /// Reasons why coefficients cannot be used.
@@ -104,7 +106,10 @@ impl PolynomialOptics {
         }
         let background = cosine_series(&file.background);
         Ok(Self {
-            untouched: background.iter().map(|&value| grey_level(value)).collect(),
+            untouched: RgbImage::from_fn(IMAGE_SIZE[0] as u32, IMAGE_SIZE[1] as u32, |x, y| {
+                let at = 3 * (y as usize * IMAGE_SIZE[0] + x as usize);
+                Rgb([0, 1, 2].map(|channel| grey_level(background[at + channel])))
+            }),
             background,
             steepest: file.steepest as f32,
             leds: colour.map(|c| Led::from_linear_fit(c[1], c[0])),
@@ -112,26 +117,11 @@ impl PolynomialOptics {
         })
     }
 
-    /// Image without a contact, 320 × 240 RGB.
-    pub fn untouched(&self) -> &[u8] {
-        &self.untouched
-    }
-
-    /// LEDs of the red, green and blue channel, as the fit implies them.
-    pub fn leds(&self) -> &[Led; 3] {
-        &self.leds
-    }
-
-    /// Writes the image of a field into `rgb` (320 × 240 RGB; a shorter buffer gets the start of the untouched
-    /// image), with cast shadows if `shadows`. Without a field the image is the untouched one exactly, as is every
-    /// pixel without a slope.
-    pub fn render(&self, gel: &Gel, field: Option<&GelField>, shadows: bool, rgb: &mut [u8]) {
-        let n = rgb.len().min(self.untouched.len());
-        rgb[..n].copy_from_slice(&self.untouched[..n]);
-        let Some(field) = field else { return };
-        if n < self.untouched.len() {
-            return;
-        }
+    /// Image of a field, 320 × 240, with cast shadows if `shadows`. Without a field the image is the untouched one
+    /// exactly, as is every pixel without a slope.
+    pub fn render(&self, gel: &Gel, field: Option<&GelField>, shadows: bool) -> RgbImage {
+        let mut image = self.untouched.clone();
+        let Some(field) = field else { return image };
         let surface = VisibleSurface::of(gel, field);
         let pitch = gel.view.pitch as f32;
         let shadow_caster = shadows.then(|| ShadowCaster::new(&surface, pitch));
@@ -153,25 +143,15 @@ impl PolynomialOptics {
             let (from, to) = (at + 3 * range.start, at + 3 * range.end);
             let [red, green, blue] = &line.light;
             let light = red[range.clone()].iter().zip(&green[range.clone()]).zip(&blue[range]);
-            let pixels = rgb[from..to].chunks_exact_mut(3).zip(self.background[from..to].chunks_exact(3));
+            let pixels =
+                (*image)[from..to].chunks_exact_mut(3).zip(self.background[from..to].chunks_exact(3));
             for ((out, base), ((r, g), b)) in pixels.zip(light) {
                 out[0] = grey_level(base[0] * r);
                 out[1] = grey_level(base[1] * g);
                 out[2] = grey_level(base[2] * b);
             }
         }
-    }
-
-    /// Change of the colour (R, G, B, grey levels of 255) at a pixel (x, y) by a surface whose slope has the sines
-    /// (a, b). Pixels outside the image are clamped to its border.
-    pub fn colour_change(&self, a: f64, b: f64, pixel: [usize; 2]) -> [f64; 3] {
-        let scale = (f64::from(self.steepest) / a.hypot(b).max(1e-12)).min(1.0);
-        let slopes = slope_monomials(a * scale, b * scale);
-        let at = 3 * (pixel[1].min(IMAGE_SIZE[1] - 1) * IMAGE_SIZE[0] + pixel[0].min(IMAGE_SIZE[0] - 1));
-        [0, 1, 2].map(|channel| {
-            let share: f64 = self.colour[channel].iter().zip(&slopes).map(|(c, s)| f64::from(*c) * s).sum();
-            f64::from(self.background[at + channel]) * share
-        })
+        image
     }
 }
 
@@ -251,6 +231,21 @@ fn cosine_series(series: &[Vec<Vec<f64>>; 3]) -> Vec<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    impl PolynomialOptics {
+        /// Change of the colour (R, G, B, grey levels of 255) at a pixel (x, y) by a surface whose slope has the sines
+        /// (a, b). Pixels outside the image are clamped to its border.
+        pub(in super::super) fn colour_change(&self, a: f64, b: f64, pixel: [usize; 2]) -> [f64; 3] {
+            let scale = (f64::from(self.steepest) / a.hypot(b).max(1e-12)).min(1.0);
+            let slopes = slope_monomials(a * scale, b * scale);
+            let at = 3 * (pixel[1].min(IMAGE_SIZE[1] - 1) * IMAGE_SIZE[0] + pixel[0].min(IMAGE_SIZE[0] - 1));
+            [0, 1, 2].map(|channel| {
+                let share: f64 =
+                    self.colour[channel].iter().zip(&slopes).map(|(c, s)| f64::from(*c) * s).sum();
+                f64::from(self.background[at + channel]) * share
+            })
+        }
+    }
 
     #[test]
     fn a_row_of_pixels_follows_the_same_law_as_a_single_slope() {

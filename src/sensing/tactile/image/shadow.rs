@@ -149,7 +149,7 @@ mod tests {
 
     #[test]
     fn the_leds_of_the_mini_are_low_and_at_three_sides() {
-        let leds = *PolynomialOptics::gelsight_mini().expect("shipped").leds();
+        let leds = PolynomialOptics::gelsight_mini().expect("shipped").leds;
         for (led, degrees) in leds.iter().zip([-97.0_f32, 10.0, 84.0]) {
             let found = led.direction[1].atan2(led.direction[0]).to_degrees();
             let elevation = led.elevation_tangent.atan().to_degrees();

@@ -4,8 +4,10 @@
 //! lies on the skin, whose height map is finer than the grid, so that the two never overlap. Details of a soft skin
 //! below the size of a cell are left out: the gel presses them flat.
 
+use std::ops::Range;
+
 use super::super::{
-    elastic::{CubicTaps, Gel, GelField, cubic_taps},
+    elastic::{Gel, GelField, cubic_taps},
     spec::IMAGE_SIZE,
 };
 
@@ -23,10 +25,10 @@ pub(super) struct VisibleSurface {
 /// Slope above which a cell belongs to the window; smaller ones change no colour by half a grey level.
 pub(super) const MIN_SLOPE: f32 = 1e-3;
 
-/// Interpolation of a grid at the pixel centres along one axis: first neighbour and weights of the taps per pixel.
-struct AxisTaps {
-    first: Vec<isize>,
-    weights: Vec<[f32; 4]>,
+/// Taps of the cubic interpolation of the grid at one pixel along one axis.
+struct PixelTaps {
+    first: isize,
+    weights: [f32; 4],
 }
 
 /// Linear interpolation of the height map at one pixel along one axis.
@@ -43,43 +45,66 @@ struct LinearTap {
 impl VisibleSurface {
     /// Surface of a field; the window covers all that changes and a little more.
     pub(super) fn of(gel: &Gel, field: &GelField) -> Self {
-        let Some(Extent { from, size }) = extent(gel, &field.displacement[2]) else { return Self::default() };
-        let centre =
-            |axis: usize, p: usize| (p as f64 + 0.5 - 0.5 * IMAGE_SIZE[axis] as f64) * gel.view.pitch;
-        let count = [gel.columns, gel.rows];
-        let axis_taps = |axis: usize| {
-            let at = |p| centre(axis, p) / gel.cell + 0.5 * (count[axis] - 1) as f64;
-            let (first, weights) = (from[axis]..from[axis] + size[axis])
-                .map(|p| {
-                    let CubicTaps { first, weights } = cubic_taps(at(p));
-                    (first, weights.map(|w| w as f32))
-                })
-                .unzip();
-            AxisTaps { first, weights }
+        let Some(mut surface) = Self::flat_window(gel, &field.displacement[2]) else {
+            return Self::default();
         };
-        let (x, y) = (axis_taps(0), axis_taps(1));
-        let free = resample(&field.displacement[2], count, &x, &y);
-        let mut surface = Self { from, size, u: free };
+        let count = [gel.columns, gel.rows];
+        let [x, y] = [0, 1].map(|axis| -> Vec<PixelTaps> {
+            let at = |p| gel.view.pixel_centre(axis, p) / gel.cell + 0.5 * (count[axis] - 1) as f64;
+            let taps = surface.pixels(axis).map(|p| cubic_taps(at(p)));
+            taps.map(|t| PixelTaps { first: t.first, weights: t.weights.map(|w| w as f32) }).collect()
+        });
+        surface.u = resample(&field.displacement[2], count, &x, &y);
         if field.has_rigid_skin {
-            surface.lay_on_skin(gel, field, centre);
+            surface.lower_to_skin(gel, field);
         }
         surface.soften();
         surface
     }
 
+    /// Pixels of the window along an axis.
+    fn pixels(&self, axis: usize) -> Range<usize> {
+        self.from[axis]..self.from[axis] + self.size[axis]
+    }
+
+    /// Window around the cells of the grid that are steeper than [`MIN_SLOPE`], without its displacements.
+    fn flat_window(gel: &Gel, u: &[f32]) -> Option<Self> {
+        let (n, least) = (gel.columns, MIN_SLOPE * gel.cell as f32);
+        let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
+        for j in 1..gel.rows {
+            for i in 1..n {
+                let c = j * n + i;
+                if (u[c] - u[c - 1]).abs() > least || (u[c] - u[c - n]).abs() > least {
+                    low = [low[0].min(i - 1), low[1].min(j - 1)];
+                    high = [high[0].max(i), high[1].max(j)];
+                }
+            }
+        }
+        let place = [Gel::x, Gel::y];
+        let mut window = Self::default();
+        for axis in 0..2 {
+            let px = |at: f64| at / gel.view.pitch + 0.5 * IMAGE_SIZE[axis] as f64;
+            let from =
+                (px(place[axis](gel, low[axis].min(high[axis]))) - 2.0).clamp(0.0, IMAGE_SIZE[axis] as f64);
+            let to = (px(place[axis](gel, high[axis])) + 2.0).clamp(0.0, IMAGE_SIZE[axis] as f64);
+            window.from[axis] = from as usize;
+            window.size[axis] = to as usize - from as usize;
+        }
+        (low[0] <= high[0] && window.size[0] > 2 && window.size[1] > 2).then_some(window)
+    }
+
     /// Lowers the surface to the skin where they touch.
-    fn lay_on_skin(&mut self, gel: &Gel, field: &GelField, centre: impl Fn(usize, usize) -> f64) {
+    fn lower_to_skin(&mut self, gel: &Gel, field: &GelField) {
         let map = &field.height_map;
         let half = [map.columns, map.rows].map(|n| 0.5 * (n - 1) as f64);
         let interpolation = |axis: usize| -> Vec<LinearTap> {
             let last = [map.columns, map.rows][axis] - 2;
-            (self.from[axis]..self.from[axis] + self.size[axis])
-                .map(|p| {
-                    let metres = centre(axis, p);
-                    let at = (metres / map.cell + half[axis]).clamp(0.0, last as f64);
-                    LinearTap { index: at as usize, share: at.fract() as f32, metres }
-                })
-                .collect()
+            let tap = |p| {
+                let metres = gel.view.pixel_centre(axis, p);
+                let at = (metres / map.cell + half[axis]).clamp(0.0, last as f64);
+                LinearTap { index: at as usize, share: at.fract() as f32, metres }
+            };
+            self.pixels(axis).map(tap).collect()
         };
         let (xs, ys) = (interpolation(0), interpolation(1));
         let (curve_x, curve_y) = (0.5 / gel.pad.radius_x, 0.5 / gel.pad.radius_y);
@@ -156,44 +181,12 @@ fn blur([a, b, c, d, e]: [&[f32]; 5], out: &mut [f32]) {
     }
 }
 
-/// Part of the image, px.
-struct Extent {
-    from: [usize; 2],
-    size: [usize; 2],
-}
-
-/// Window around the cells of the grid that are steeper than [`MIN_SLOPE`].
-fn extent(gel: &Gel, u: &[f32]) -> Option<Extent> {
-    let (n, least) = (gel.columns, MIN_SLOPE * gel.cell as f32);
-    let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
-    for j in 1..gel.rows {
-        for i in 1..n {
-            let c = j * n + i;
-            if (u[c] - u[c - 1]).abs() > least || (u[c] - u[c - n]).abs() > least {
-                low = [low[0].min(i - 1), low[1].min(j - 1)];
-                high = [high[0].max(i), high[1].max(j)];
-            }
-        }
-    }
-    let place = [Gel::x, Gel::y];
-    let mut window = Extent { from: [0; 2], size: [0; 2] };
-    for axis in 0..2 {
-        let px = |at: f64| at / gel.view.pitch + 0.5 * IMAGE_SIZE[axis] as f64;
-        let from =
-            (px(place[axis](gel, low[axis].min(high[axis]))) - 2.0).clamp(0.0, IMAGE_SIZE[axis] as f64);
-        let to = (px(place[axis](gel, high[axis])) + 2.0).clamp(0.0, IMAGE_SIZE[axis] as f64);
-        window.from[axis] = from as usize;
-        window.size[axis] = to as usize - from as usize;
-    }
-    (low[0] <= high[0] && window.size[0] > 2 && window.size[1] > 2).then_some(window)
-}
-
 /// Interpolates a field of the grid at pixels, first along x, then along y; the field is 0 outside the grid.
-fn resample(field: &[f32], count: [usize; 2], x: &AxisTaps, y: &AxisTaps) -> Vec<f32> {
-    let (wide, n) = (x.first.len(), count[0]);
+fn resample(field: &[f32], count: [usize; 2], x: &[PixelTaps], y: &[PixelTaps]) -> Vec<f32> {
+    let (wide, n) = (x.len(), count[0]);
     let mut lines = vec![0.0_f32; wide * count[1]];
     for (line, row) in lines.chunks_exact_mut(wide).zip(field.chunks_exact(n)) {
-        for ((out, &first), weights) in line.iter_mut().zip(&x.first).zip(&x.weights) {
+        for (out, PixelTaps { first, weights }) in line.iter_mut().zip(x) {
             for (k, w) in weights.iter().enumerate() {
                 let i = first + k as isize;
                 if (0..n as isize).contains(&i) {
@@ -202,8 +195,8 @@ fn resample(field: &[f32], count: [usize; 2], x: &AxisTaps, y: &AxisTaps) -> Vec
             }
         }
     }
-    let mut out = vec![0.0; wide * y.first.len()];
-    for ((row, &first), weights) in out.chunks_exact_mut(wide).zip(&y.first).zip(&y.weights) {
+    let mut out = vec![0.0; wide * y.len()];
+    for (row, PixelTaps { first, weights }) in out.chunks_exact_mut(wide).zip(y) {
         for (k, &w) in weights.iter().enumerate() {
             let j = first + k as isize;
             if (0..count[1] as isize).contains(&j) {

@@ -8,6 +8,8 @@
 
 use std::{f64::consts::PI, path::Path};
 
+use image::{Rgb, RgbImage};
+
 use super::super::{
     elastic::{Gel, GelField},
     spec::IMAGE_SIZE,
@@ -44,65 +46,42 @@ impl TaximOptics {
     /// Names the file and the key that is missing, of a wrong shape or type, or not finite.
     pub fn load(folder: &Path) -> Result<Self, NpzError> {
         let path = folder.join("polycalib.npz");
-        let wrong_shape = |path: &Path, key: &str, expected: String, found: &[usize]| NpzError::Content {
-            path: path.into(),
-            what: format!("array \"{key}\": expected the shape {expected}, got {found:?}"),
-        };
-        let scalar = read_npz_of(&path, "bins", &["i4", "i8"])?;
-        let bins = match scalar.values()[..] {
-            [bins] if (2.0..=MAX_BINS).contains(&bins) => bins as usize,
-            [bins] => {
-                let what = format!("array \"bins\": expected 2..{MAX_BINS}, got {bins}");
-                return Err(NpzError::Content { path, what });
-            }
-            _ => return Err(wrong_shape(&path, "bins", "[] of one number".into(), &scalar.shape)),
-        };
+        let bins = read_shaped(&path, "bins", &["i4", "i8"], &[], "[] of one number")?[0];
+        if !(2.0..=MAX_BINS).contains(&bins) {
+            let what = format!("array \"bins\": expected 2..{MAX_BINS}, got {bins}");
+            return Err(NpzError::Content { path, what });
+        }
+        let bins = bins as usize;
         let channel = |key: &str| {
-            let array = read_npz_of(&path, key, &["f4", "f8"])?;
-            if array.shape != [bins, bins, 6] {
-                return Err(wrong_shape(
-                    &path,
-                    key,
-                    format!("[{bins}, {bins}, 6] of \"bins\""),
-                    &array.shape,
-                ));
-            }
-            Ok(array.values().into_iter().map(|v| v as f32).collect::<Vec<f32>>())
+            let expected = format!("[{bins}, {bins}, 6] of \"bins\"");
+            let values = read_shaped(&path, key, &["f4", "f8"], &[bins, bins, 6], &expected)?;
+            Ok(values.into_iter().map(|v| v as f32).collect::<Vec<f32>>())
         };
         let table = [channel("grad_b")?, channel("grad_g")?, channel("grad_r")?];
-        let path = folder.join("dataPack.npz");
-        let f0 = read_npz_of(&path, "f0", &["u1"])?;
-        let [width, height] = IMAGE_SIZE;
-        if f0.shape != [2 * height, 2 * width, 3] {
-            return Err(wrong_shape(&path, "f0", format!("[{}, {}, 3]", 2 * height, 2 * width), &f0.shape));
-        }
-        Ok(Self { bins, table, background: background(&f0.values()) })
+        let shape = [2 * IMAGE_SIZE[1], 2 * IMAGE_SIZE[0], 3];
+        let f0 = read_shaped(&folder.join("dataPack.npz"), "f0", &["u1"], &shape, &format!("{shape:?}"))?;
+        Ok(Self { bins, table, background: background(&f0) })
     }
 
-    /// Writes the image of a field into `rgb` (320 × 240 RGB; nothing is written if it is shorter). The image without
-    /// a field also differs from the untouched one, by the table's entry for a flat surface, as in Taxim.
-    pub fn render(&self, gel: &Gel, field: Option<&GelField>, rgb: &mut [u8]) {
+    /// Image of a field, 320 × 240. The image without a field also differs from the untouched one, by the table's
+    /// entry for a flat surface, as in Taxim.
+    pub fn render(&self, gel: &Gel, field: Option<&GelField>) -> RgbImage {
         let [width, height] = IMAGE_SIZE;
-        if rgb.len() < 3 * width * height {
-            return;
-        }
         let depth = field.map_or_else(|| vec![0.0; width * height], |field| dent(gel, field));
         let slope = 0.5 / gel.view.pitch as f32;
-        for y in 0..height {
-            for x in 0..width {
-                let at = |x: usize, y: usize| depth[y * width + x];
-                let gx = slope * (at((x + 1).min(width - 1), y) - at(x.saturating_sub(1), y));
-                let gy = slope * (at(x, (y + 1).min(height - 1)) - at(x, y.saturating_sub(1)));
-                let entry = 6 * self.entry(gx, gy);
-                let (u, v) = (2.0 * x as f32, 2.0 * y as f32);
-                for (channel, table) in self.table.iter().enumerate() {
-                    let t = &table[entry..entry + 6];
-                    let change = t[0] * u * u + t[1] * v * v + t[2] * u * v + t[3] * u + t[4] * v + t[5];
-                    let pixel = 3 * (y * width + x) + channel;
-                    rgb[pixel] = (self.background[pixel] + change + 0.5).clamp(0.0, 255.0) as u8;
-                }
-            }
-        }
+        RgbImage::from_fn(width as u32, height as u32, |x, y| {
+            let (x, y) = (x as usize, y as usize);
+            let at = |x: usize, y: usize| depth[y * width + x];
+            let gx = slope * (at((x + 1).min(width - 1), y) - at(x.saturating_sub(1), y));
+            let gy = slope * (at(x, (y + 1).min(height - 1)) - at(x, y.saturating_sub(1)));
+            let entry = 6 * self.entry(gx, gy);
+            let (u, v) = (2.0 * x as f32, 2.0 * y as f32);
+            Rgb([0, 1, 2].map(|channel| {
+                let t = &self.table[channel][entry..entry + 6];
+                let change = t[0] * u * u + t[1] * v * v + t[2] * u * v + t[3] * u + t[4] * v + t[5];
+                (self.background[3 * (y * width + x) + channel] + change + 0.5).clamp(0.0, 255.0) as u8
+            }))
+        })
     }
 
     /// Index of the bin of a slope.
@@ -115,17 +94,32 @@ impl TaximOptics {
     }
 }
 
+/// Numbers of an array that must have this shape, which `expected` describes.
+fn read_shaped(
+    path: &Path,
+    key: &str,
+    kinds: &[&str],
+    shape: &[usize],
+    expected: &str,
+) -> Result<Vec<f64>, NpzError> {
+    let array = read_npz_of(path, key, kinds)?;
+    if array.shape != shape {
+        let what = format!("array \"{key}\": expected the shape {expected}, got {:?}", array.shape);
+        return Err(NpzError::Content { path: path.into(), what });
+    }
+    Ok(array.values())
+}
+
 /// Depth of the dent at each pixel, m.
 fn dent(gel: &Gel, field: &GelField) -> Vec<f32> {
     let [width, height] = IMAGE_SIZE;
     let map = &field.height_map;
-    let centre = |axis: usize, p: usize| (p as f64 + 0.5 - 0.5 * IMAGE_SIZE[axis] as f64) * gel.view.pitch;
     let index = |metres: f64, count: usize| {
         (metres / map.cell + 0.5 * (count - 1) as f64).round().clamp(0.0, (count - 1) as f64) as usize
     };
     let mut shape = vec![0.0; width * height];
     for (p, value) in shape.iter_mut().enumerate() {
-        let (x, y) = (centre(0, p % width), centre(1, p / width));
+        let (x, y) = (gel.view.pixel_centre(0, p % width), gel.view.pixel_centre(1, p / width));
         let skin = map.height[index(y, map.rows) * map.columns + index(x, map.columns)];
         *value = (gel.pad.height(x, y) as f32 - skin).max(0.0);
     }

@@ -83,8 +83,7 @@ fn known_key(key: &str) -> &'static str {
 fn tables_of_the_package_are_read_with_its_order_of_red_and_blue() {
     let taxim = loaded("dataPack.npz", &data_pack()).expect("whole files");
     let gel = Gel::new(&TactileSpec::default(), PadSurface::default()).expect("default numbers");
-    let mut rgb = vec![0; 3 * IMAGE_SIZE[0] * IMAGE_SIZE[1]];
-    taxim.render(&gel, None, &mut rgb);
+    let rgb = taxim.render(&gel, None).into_raw();
     // The image is stored blue first; its tables are named the other way round.
     assert!(rgb.chunks_exact(3).all(|pixel| pixel == [30 + 3, 20 + 2, 10 + 1]), "{:?}", &rgb[..3]);
 }
@@ -201,13 +200,11 @@ fn the_table_is_read_at_size_and_direction_of_the_rise() {
     let gel = Gel::new(&TactileSpec::default(), PadSurface::default()).expect("default numbers");
     let ball = graph(8e-3, 2e-4, |x, y| (x * x + y * y) / 8e-3);
     let field = touch(&gel, &ball, PadWrench::new(1.5, [0.0; 2], 0.0, [0.0; 2]));
-    let mut rgb = vec![0; 3 * IMAGE_SIZE[0] * IMAGE_SIZE[1]];
-    painted().render(&gel, Some(&field), &mut rgb);
+    let rgb = painted().render(&gel, Some(&field)).into_raw();
     let red = |x: usize, y: usize| rgb[3 * (y * IMAGE_SIZE[0] + x)];
     // The dent rises towards its middle: to the right on its left side.
     assert_eq!((red(140, 120), red(180, 120), red(160, 100), red(10, 10)), (110, 10, 10, 10));
-    painted().render(&gel, None, &mut rgb);
-    assert!(rgb.iter().all(|&value| value == 10));
+    assert!(painted().render(&gel, None).iter().all(|&value| value == 10));
 }
 
 #[test]

@@ -5,54 +5,49 @@
 //! markers outwards), its antisymmetric part the twist, and its trace-free symmetric part the shear. All lengths are
 //! in px of the image (x right, y down).
 
-use super::marker_grid::{MARKER_COUNT, Markers};
+use nalgebra::{Matrix2, Vector2};
+
+use super::{MARKER_COUNT, Markers};
 
 /// Motion of the markers of one finger from their initial to their current positions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MarkerFlow {
     /// Initial positions from their mean, px.
-    arms: [[f64; 2]; MARKER_COUNT],
-    /// Displacements, px.
-    displacements: [[f64; 2]; MARKER_COUNT],
+    arms: [Vector2<f64>; MARKER_COUNT],
+    /// Displacement of each marker, row by row, px.
+    pub displacements: [Vector2<f64>; MARKER_COUNT],
 }
 
 impl MarkerFlow {
     /// Flow of `markers`.
     pub fn of(markers: &Markers) -> Self {
-        let Markers { initial, current } = markers;
-        let centre = mean(&initial.map(|position| position.map(f64::from)));
+        let [initial, current] =
+            markers.to_array().map(|positions| positions.map(|px| Vector2::from(px.map(f64::from))));
+        let centre = mean(&initial);
         Self {
-            arms: initial.map(|position| [0, 1].map(|axis| f64::from(position[axis]) - centre[axis])),
-            displacements: std::array::from_fn(|m| {
-                [0, 1].map(|axis| f64::from(current[m][axis]) - f64::from(initial[m][axis]))
-            }),
+            arms: initial.map(|position| position - centre),
+            displacements: std::array::from_fn(|m| current[m] - initial[m]),
         }
-    }
-
-    /// Displacement of each marker, row by row, px.
-    pub fn displacements(&self) -> &[[f64; 2]; MARKER_COUNT] {
-        &self.displacements
     }
 
     /// Mean displacement, px: the gel is sheared along its surface.
     pub fn mean(&self) -> [f64; 2] {
-        mean(&self.displacements)
+        mean(&self.displacements).into()
     }
 
     /// Gradient of the least-squares plane through the displacements, `[[∂u/∂x, ∂u/∂y], [∂v/∂x, ∂v/∂y]]`, px per px.
     pub fn gradient(&self) -> [[f64; 2]; 2] {
-        let mut square = [0.0; 3];
-        let mut cross = [[0.0; 2]; 2];
-        for ([x, y], displacement) in self.arms.iter().zip(&self.displacements) {
-            square = [square[0] + x * x, square[1] + x * y, square[2] + y * y];
-            for axis in 0..2 {
-                cross[axis][0] += displacement[axis] * x;
-                cross[axis][1] += displacement[axis] * y;
-            }
+        let (mut square, mut cross) = (Matrix2::zeros(), Matrix2::zeros());
+        for (arm, displacement) in self.arms.iter().zip(&self.displacements) {
+            square += arm * arm.transpose();
+            cross += displacement * arm.transpose();
         }
-        let [xx, xy, yy] = square;
+        let (xx, xy, yy) = (square.m11, square.m12, square.m22);
         let det = xx * yy - xy * xy;
-        cross.map(|[a, b]| [(a * yy - b * xy) / det, (b * xx - a * xy) / det])
+        [0, 1].map(|axis| {
+            let (a, b) = (cross[(axis, 0)], cross[(axis, 1)]);
+            [(a * yy - b * xy) / det, (b * xx - a * xy) / det]
+        })
     }
 
     /// Trace of the gradient; positive where a dent pushes the markers outwards.
@@ -75,12 +70,12 @@ impl MarkerFlow {
 
     /// Length of the longest displacement, px.
     pub fn max_displacement(&self) -> f64 {
-        self.displacements.iter().map(|[x, y]| x.hypot(*y)).fold(0.0, f64::max)
+        self.displacements.iter().map(|u| u.x.hypot(u.y)).fold(0.0, f64::max)
     }
 
     /// True for each marker that has moved by more than `px`.
     pub fn moved(&self, px: f64) -> [bool; MARKER_COUNT] {
-        self.displacements.map(|[x, y]| x.hypot(y) > px)
+        self.displacements.map(|u| u.x.hypot(u.y) > px)
     }
 
     /// Share of the markers that have moved by more than `px`, 0 to 1: about the share of the image in contact.
@@ -94,8 +89,8 @@ impl MarkerFlow {
     /// unaffected by shear along the surface. Converting it to N requires knowing the object.
     pub fn press(&self) -> f64 {
         let ([x, y], twist) = (self.mean(), self.twist());
-        let square = |([ax, ay], [u, v]): (&[f64; 2], &[f64; 2])| {
-            (u - x + twist * ay).powi(2) + (v - y - twist * ax).powi(2)
+        let square = |(arm, u): (&Vector2<f64>, &Vector2<f64>)| {
+            (u.x - x + twist * arm.y).powi(2) + (u.y - y - twist * arm.x).powi(2)
         };
         let sum: f64 = self.arms.iter().zip(&self.displacements).map(square).sum();
         (sum / MARKER_COUNT as f64).sqrt()
@@ -109,8 +104,8 @@ impl MarkerFlow {
     }
 }
 
-fn mean(all: &[[f64; 2]; MARKER_COUNT]) -> [f64; 2] {
-    all.iter().fold([0.0; 2], |sum, [x, y]| [sum[0] + x, sum[1] + y]).map(|sum| sum / MARKER_COUNT as f64)
+fn mean(all: &[Vector2<f64>; MARKER_COUNT]) -> Vector2<f64> {
+    all.iter().fold(Vector2::zeros(), |sum, x| sum + x) / MARKER_COUNT as f64
 }
 
 #[cfg(test)]
