@@ -17,7 +17,7 @@ pub(crate) enum Exit {
     Policy = 3,
     /// A `--require` condition does not hold.
     RequirementNotMet = 99,
-    /// Ctrl-C. FinishedEpisode episodes are on disk.
+    /// Ctrl-C. Finished episodes are on disk.
     Interrupted = 130,
 }
 
@@ -28,16 +28,23 @@ impl From<Exit> for ExitCode {
 }
 
 /// An error that ends a command: an exit code and a message for standard error.
-#[derive(Debug, thiserror::Error)]
-#[error("{message}")]
+///
+/// It is no [`std::error::Error`], so that every such error can become one by `?`: an error of the input.
+#[derive(Debug)]
 pub(crate) struct CliError {
     pub exit: Exit,
     /// Without the program's name. Nothing is printed if it is empty.
     pub message: String,
 }
 
+impl<E: std::error::Error> From<E> for CliError {
+    fn from(error: E) -> Self {
+        Self::input(error)
+    }
+}
+
 impl CliError {
-    fn new(exit: Exit, message: impl ToString) -> Self {
+    pub(crate) fn new(exit: Exit, message: impl ToString) -> Self {
         Self { exit, message: message.to_string() }
     }
 
@@ -45,19 +52,6 @@ impl CliError {
     pub(crate) fn input(message: impl ToString) -> Self {
         let exit = if cancel::requested() { Exit::Interrupted } else { Exit::Input };
         Self::new(exit, message)
-    }
-
-    pub(crate) fn policy(message: impl ToString) -> Self {
-        Self::new(Exit::Policy, message)
-    }
-
-    pub(crate) fn requirement_not_met(message: impl ToString) -> Self {
-        Self::new(Exit::RequirementNotMet, message)
-    }
-
-    /// A result that no input can explain.
-    pub(crate) fn internal(message: impl ToString) -> Self {
-        Self::new(Exit::Internal, message)
     }
 
     pub(crate) fn interrupted(message: impl ToString) -> Self {

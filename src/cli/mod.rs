@@ -1,22 +1,20 @@
 //! The `softvt` command.
 //!
-//! `args` defines the arguments as plain data, `parse` fills them in, `commands` has one file per command, and `run` is
-//! the engine that the commands share.
+//! `commands` has one file per command, with its arguments; `parse` fills them in from the command line; `run` is the
+//! engine that the commands share.
 
-mod args;
 mod commands;
 mod error;
 mod output;
 mod parse;
-#[cfg(test)]
-mod reference_page;
 mod run;
+#[cfg(test)]
+mod tests;
 
 use std::{panic, process::ExitCode, sync::Arc, thread, time::Duration};
 
-use args::Command;
 use error::{CliError, Exit};
-use output::notice;
+use output::eprint_notice;
 
 use crate::{rollout::cancel, text};
 
@@ -26,7 +24,7 @@ const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(3);
 /// Runs the command line of this process and returns its exit code.
 pub fn main() -> ExitCode {
     panic::set_hook(Box::new(|info| {
-        notice(format!(
+        eprint_notice(format!(
             "internal error: {info}\nThis is a bug of softvt; please report it with the command that caused it."
         ));
     }));
@@ -34,7 +32,7 @@ pub fn main() -> ExitCode {
         Ok(Ok(())) => Exit::Success,
         Ok(Err(error)) => {
             if !error.message.is_empty() {
-                notice(text::escape_control(&error.message));
+                eprint_notice(text::escape_control(&error.message));
             }
             error.exit
         }
@@ -56,26 +54,8 @@ fn run_process() -> Result<(), CliError> {
         })
         .collect::<Result<_, _>>()?;
     match parse::parse(&words)? {
-        Some(command) => dispatch(&command),
+        Some(command) => command.run(),
         None => Ok(()),
-    }
-}
-
-fn dispatch(command: &Command) -> Result<(), CliError> {
-    match command {
-        Command::Run(args) => commands::run::run(args),
-        Command::Check(args) => commands::check::run(args),
-        Command::View(args) => commands::view::run(args),
-        Command::Record(args) => commands::record::run(args),
-        Command::Replay(args) => commands::replay::run(args),
-        Command::Report(args) => commands::report::run(args),
-        Command::Compare(args) => commands::compare::run(args),
-        Command::Merge(args) => commands::merge::run(args),
-        Command::Serve(args) => commands::serve::run(args),
-        Command::Dataset(command) => commands::dataset::run(command),
-        Command::List(args) => commands::list::run(args),
-        Command::Init(args) => commands::init::run(args),
-        Command::Doctor => commands::doctor::run(),
     }
 }
 
@@ -86,10 +66,13 @@ fn handle_interrupts() {
         if cancel::request() {
             exit();
         }
-        notice("finishing the current step; press Ctrl-C again to quit");
+        eprint_notice("finishing the current step; press Ctrl-C again to quit");
         thread::spawn(move || {
             thread::sleep(SHUTDOWN_TIMEOUT);
-            notice(format!("interrupted; a step did not finish within {} s", SHUTDOWN_TIMEOUT.as_secs()));
+            eprint_notice(format!(
+                "interrupted; a step did not finish within {} s",
+                SHUTDOWN_TIMEOUT.as_secs()
+            ));
             exit();
         });
     };

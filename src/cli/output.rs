@@ -19,7 +19,7 @@ pub(crate) fn print_json(value: &impl serde::Serialize) {
 }
 
 /// Prints a message of the program to standard error, after `softvt: `.
-pub(crate) fn notice(message: impl std::fmt::Display) {
+pub(crate) fn eprint_notice(message: impl std::fmt::Display) {
     text::eprint_line(&format!("softvt: {message}"));
 }
 

@@ -7,7 +7,7 @@ use clap::{
 };
 
 use super::{
-    args::{Command, RunArgs},
+    commands::{Command, run::RunArgs},
     error::CliError,
     output::print,
 };
@@ -30,7 +30,7 @@ pub(super) fn parse(words: &[String]) -> Result<Option<Command>, CliError> {
         None => error,
     };
     let options = match file {
-        Some(file) => script::declared_options(Path::new(file)).map_err(CliError::input)?,
+        Some(file) => script::declared_options(Path::new(file))?,
         None => Vec::new(),
     };
     let command = with_script_options(clap_command(), &options).map_err(in_file)?;

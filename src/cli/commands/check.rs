@@ -5,16 +5,17 @@ use std::{
     sync::{Arc, Mutex},
 };
 
+use clap::Args;
+
 use crate::{
     benchmark::{Goal, GoalKind, Plan, Suite, Task},
     cli::{
-        args::CheckArgs,
         error::CliError,
         output::print,
         run::{
             conditions,
-            config::{RunConfig, thread_count},
-            policy::PolicyConfig,
+            config::{RunConfig, RunFlags, ScriptArgs},
+            policy::{PolicyArgs, PolicyConfig},
             selection::check_distinct_out_dirs,
             suite_run::SuiteRun,
         },
@@ -22,9 +23,19 @@ use crate::{
     parallel,
     rollout::{AssetCache, SensorAssets, cancel, target_asset},
     scene::Asset,
-    script::{self, LoadedScript, Scenes},
+    script::{LoadedScript, Scenes},
     text::{self, counted},
 };
+
+/// Check a script without running it
+#[derive(Args, Clone, Debug)]
+#[command(override_usage = "softvt check [OPTIONS] <FILE.lua>")]
+pub(crate) struct CheckArgs {
+    #[command(flatten)]
+    pub(super) script: ScriptArgs,
+    #[command(flatten)]
+    policy: PolicyArgs,
+}
 
 /// Assets that the checks of several suites share.
 struct SharedAssets {
@@ -36,10 +47,10 @@ struct SharedAssets {
 ///
 /// # Errors
 /// The first thing that is not valid.
-pub(crate) fn run(args: &CheckArgs) -> Result<(), CliError> {
-    let config = RunConfig::of_script(&args.script)?;
-    let config = &RunConfig { policy: PolicyConfig::load(&args.policy)?, ..config };
-    let loaded = script::load(&config.file, &config.script_options).map_err(CliError::input)?;
+pub(super) fn run(args: CheckArgs) -> Result<(), CliError> {
+    let config = RunConfig::new(args.script, RunFlags::default())?;
+    let config = &config.with_policy(PolicyConfig::load(&args.policy)?);
+    let loaded = config.load_script()?;
     let shared = SharedAssets { assets: AssetCache::approximate(), sensor_assets: SensorAssets::default() };
     match &loaded.plan {
         Plan::Suite(suite) => check_suite(config, &loaded, suite, &shared)?,
@@ -52,7 +63,7 @@ pub(crate) fn run(args: &CheckArgs) -> Result<(), CliError> {
             print(&format!("experiment {name}: {}, not run by this check\n", counted(*points, "point")));
         }
     }
-    print(&format!("{}: OK\n", config.file.display()));
+    print(&format!("{}: OK\n", config.script.file.display()));
     Ok(())
 }
 
@@ -73,8 +84,8 @@ fn check_suite(
     shared: &SharedAssets,
 ) -> Result<(), CliError> {
     let tasks: Vec<_> = suite.tasks.iter().collect();
-    let mut run = SuiteRun::new(config, loaded, suite, Vec::new(), PathBuf::new())?
-        .with_assets(&shared.assets, &shared.sensor_assets);
+    let mut run = SuiteRun::new(config, loaded, suite, Vec::new(), PathBuf::new())?;
+    (run.assets, run.sensor_assets) = (shared.assets.clone(), shared.sensor_assets.clone());
     let targets = check_first_scenes(loaded, &run, &tasks)?;
     targets.into_iter().try_for_each(|target| run.read_limit(target))?;
     print(&format!(
@@ -105,17 +116,16 @@ fn check_first_scenes(
     // Opening the scenes runs the whole script, so each thread takes idle ones before it opens others.
     let idle: Mutex<Vec<Scenes>> = Mutex::default();
     let mut targets = vec![None; tasks.len()];
-    let check = |job: usize| {
+    let check = |job: usize| -> Result<_, CliError> {
         let task = tasks[job];
         let taken = parallel::lock(&idle).pop();
-        let scenes = taken.map_or_else(|| Scenes::open(loaded), Ok).map_err(CliError::input)?;
-        let (nominal, scene) =
-            scenes.of(&run.episode_id(task, 0), &run.config.shifts).map_err(CliError::input)?;
+        let scenes = taken.map_or_else(|| Scenes::open(loaded), Ok)?;
+        let (nominal, scene) = scenes.of(&run.episode_id(task, 0), &run.config.shifts)?;
         parallel::lock(&idle).push(scenes);
         run.check_scene(task, scene)?;
         Ok(target_asset(&nominal, task).cloned())
     };
-    parallel::run(tasks.len(), thread_count(None), cancel::requested, check, |job, target| {
+    parallel::run(tasks.len(), run.config.threads(), cancel::requested, check, |job, target| {
         targets[job] = target;
         Ok(())
     })?;

@@ -7,11 +7,10 @@ use serde::Deserialize;
 use crate::{
     benchmark::Plan,
     cli::{
-        error::CliError,
+        error::{CliError, Exit},
         output::print,
         run::{
-            config::{RunConfig, thread_count},
-            policy::PolicyConfig,
+            config::{RunConfig, ScriptArgs, thread_count},
             selection::EpisodeJob,
             suite_run::SuiteRun,
         },
@@ -32,7 +31,7 @@ struct GoldenEpisode {
 ///
 /// # Errors
 /// The golden episode cannot be run, or ends in another state than the published one.
-pub(crate) fn run() -> Result<(), CliError> {
+pub(super) fn run() -> Result<(), CliError> {
     print(&format!(
         "softvt     {}\nplatform   {} {}, {} threads\nfeatures   {}\nlua        5.4, embedded\n",
         env!("CARGO_PKG_VERSION"),
@@ -45,7 +44,7 @@ pub(crate) fn run() -> Result<(), CliError> {
         print("golden     none in this build\n");
         return Ok(());
     };
-    let golden: GoldenEpisode = serde_json::from_slice(golden).map_err(CliError::input)?;
+    let golden: GoldenEpisode = serde_json::from_slice(golden)?;
     let hash = run_golden(&golden)?.stats.state_hash;
     let is_same = hash == golden.state_hash;
     let verdict = if is_same { "matches the published one" } else { "DIFFERS from the published one" };
@@ -55,8 +54,9 @@ pub(crate) fn run() -> Result<(), CliError> {
 
 /// Runs the golden episode and writes nothing.
 fn run_golden(golden: &GoldenEpisode) -> Result<EpisodeRecord, CliError> {
-    let config = RunConfig::new(golden.script.clone().into(), PolicyConfig::expert());
-    let loaded = script::load(&config.file, &[]).map_err(CliError::input)?;
+    let script = ScriptArgs { file: golden.script.clone().into(), ..ScriptArgs::default() };
+    let config = RunConfig { script, ..RunConfig::default() };
+    let loaded = config.load_script()?;
     let Plan::Suite(suite) = &loaded.plan else {
         return Err(CliError::input(format!("{} is not a suite", golden.script)));
     };
@@ -79,9 +79,12 @@ fn mismatch(golden: &GoldenEpisode) -> CliError {
             local.join(", ")
         ),
     };
-    CliError::internal(format!(
-        "the golden episode does not end in the published state {}: {cause}; results are not bitwise comparable with \
+    CliError::new(
+        Exit::Internal,
+        format!(
+            "the golden episode does not end in the published state {}: {cause}; results are not bitwise comparable with \
          published ones",
-        golden.state_hash
-    ))
+            golden.state_hash
+        ),
+    )
 }

@@ -2,18 +2,37 @@
 
 use std::path::{Path, PathBuf};
 
+use clap::{Args, Subcommand};
+
 use crate::{
-    cli::{
-        args::{InitArgs, InitCommand},
-        error::CliError,
-        output::print,
-    },
+    cli::{error::CliError, output::print},
     files,
     script::{
         embedded,
         stubs::{LUARC, STUB_FILE, stubs},
     },
 };
+
+/// Write editor stubs for Lua scripts; `init task` creates a project skeleton
+#[derive(Args, Debug)]
+#[command(args_conflicts_with_subcommands = true)]
+pub(crate) struct InitArgs {
+    /// Folder to write to
+    #[arg(default_value = ".")]
+    dir: PathBuf,
+    #[command(subcommand)]
+    command: Option<InitCommand>,
+}
+
+#[derive(Debug, Subcommand)]
+enum InitCommand {
+    /// Create a project skeleton: a commented suite, its object and the editor stubs
+    Task {
+        /// Folder to write to
+        #[arg(default_value = ".")]
+        dir: PathBuf,
+    },
+}
 
 /// A file of the project skeleton.
 struct TemplateFile {
@@ -27,7 +46,7 @@ const SUITE: TemplateFile =
 const OBJECT: TemplateFile =
     TemplateFile { path: "assets/my_object.lua", source: "scripts/templates/my_object.lua" };
 
-pub(crate) fn run(args: &InitArgs) -> Result<(), CliError> {
+pub(super) fn run(args: &InitArgs) -> Result<(), CliError> {
     match &args.command {
         None => write_stubs(&args.dir),
         Some(InitCommand::Task { dir }) => write_skeleton(dir),
@@ -63,7 +82,7 @@ fn write_skeleton(dir: &Path) -> Result<(), CliError> {
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
-    files::replace(path, bytes).map_err(CliError::input)?;
+    files::replace(path, bytes)?;
     print(&format!("wrote {}\n", path.display()));
     Ok(())
 }

@@ -2,27 +2,51 @@
 
 use std::{collections::BTreeSet, path::Path};
 
+use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
 use crate::{
     benchmark::{Plan, Task},
     cli::{
-        args::{ListArgs, ListKind, POLICIES},
         error::CliError,
         output::{print, print_json},
+        run::policy::BuiltinPolicy,
     },
     policy::profile::PROFILES,
     script,
 };
 
+/// List suites, tasks, assets, policies or profiles
+#[derive(Args, Debug)]
+pub(crate) struct ListArgs {
+    /// Kind of items to list
+    #[arg(value_name = "suites|tasks|assets|policies|profiles")]
+    what: ListKind,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum ListKind {
+    Suites,
+    Tasks,
+    Assets,
+    Policies,
+    Profiles,
+}
+
 /// Lists what the arguments ask for.
 ///
 /// # Errors
 /// A suite in the working folder cannot be loaded.
-pub(crate) fn run(args: &ListArgs) -> Result<(), CliError> {
+pub(super) fn run(args: &ListArgs) -> Result<(), CliError> {
     let rows = match args.what {
-        ListKind::Policies => named(&POLICIES, "scripts/policies"),
-        ListKind::Profiles => named(&PROFILES, "scripts/profiles"),
+        ListKind::Policies => named(BuiltinPolicy::descriptions(), "scripts/policies"),
+        ListKind::Profiles => {
+            let built_in = PROFILES.iter().map(|(name, about)| ((*name).to_owned(), (*about).to_owned()));
+            named(built_in, "scripts/profiles")
+        }
         ListKind::Assets => {
             scripts("assets").iter().map(|path| json!({ "name": stem(path), "file": path })).collect()
         }
@@ -70,10 +94,9 @@ fn table(rows: &[Value]) -> String {
 }
 
 /// Built-in entries, and Lua files, which are named by their paths.
-fn named(built_in: &[(&str, &str)], folder: &str) -> Vec<Value> {
-    let built_in = built_in.iter().map(|(name, about)| json!({ "name": name, "about": about }));
-    let files = scripts(folder).into_iter();
-    built_in.chain(files.map(|path| json!({ "name": path, "about": first_sentence(&path) }))).collect()
+fn named(built_in: impl Iterator<Item = (String, String)>, folder: &str) -> Vec<Value> {
+    let files = scripts(folder).into_iter().map(|path| (path.clone(), first_sentence(&path)));
+    built_in.chain(files).map(|(name, about)| json!({ "name": name, "about": about })).collect()
 }
 
 /// The first sentence of the comment at the top of a Lua file; empty without a comment.
@@ -139,7 +162,7 @@ fn scripts(folder: &str) -> BTreeSet<String> {
 
 fn plans() -> Result<Vec<(String, Plan)>, CliError> {
     let load = |path: String| {
-        let loaded = script::load(Path::new(&path), &[]).map_err(CliError::input)?;
+        let loaded = script::load(Path::new(&path), &[])?;
         Ok((path, loaded.plan))
     };
     scripts("suites").into_iter().map(load).collect()

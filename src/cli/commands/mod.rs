@@ -1,15 +1,75 @@
 //! One file per command. Commands do not use each other; what they share is in [`super::run`].
+//!
+//! The doc comments of the structs and fields of arguments are the help text that `--help` prints.
 
-pub(super) mod check;
-pub(super) mod compare;
-pub(super) mod dataset;
-pub(super) mod doctor;
-pub(super) mod init;
-pub(super) mod list;
-pub(super) mod merge;
-pub(super) mod record;
-pub(super) mod replay;
-pub(super) mod report;
+mod check;
+mod dataset;
+mod doctor;
+mod init;
+mod list;
+mod record;
+mod replay;
+mod report;
 pub(super) mod run;
-pub(super) mod serve;
-pub(super) mod view;
+mod serve;
+mod view;
+
+use clap::Subcommand;
+
+use super::{error::CliError, run::config::ScriptArgs};
+
+// A doc comment would replace the description of the program.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Without the name of a command: `softvt FILE.lua`.
+    #[command(skip)]
+    Run(Box<run::RunArgs>),
+    Check(Box<check::CheckArgs>),
+    View(Box<view::ViewArgs>),
+    Record(Box<record::RecordArgs>),
+    Replay(replay::ReplayArgs),
+    Report(report::ReportArgs),
+    Compare(report::CompareArgs),
+    Merge(report::MergeArgs),
+    Serve(Box<serve::ServeArgs>),
+    /// Inspect, export and import demonstrations
+    #[command(subcommand, arg_required_else_help = true)]
+    Dataset(dataset::DatasetCommand),
+    List(list::ListArgs),
+    Init(init::InitArgs),
+    /// Check the installation and run a golden episode
+    Doctor,
+}
+
+impl Command {
+    pub(crate) fn run(self) -> Result<(), CliError> {
+        match self {
+            Self::Run(args) => run::run(*args),
+            Self::Check(args) => check::run(*args),
+            Self::View(args) => view::run(*args),
+            Self::Record(args) => record::run(*args),
+            Self::Replay(args) => replay::run(&args),
+            Self::Report(args) => report::report(&args),
+            Self::Compare(args) => report::compare(&args),
+            Self::Merge(args) => report::merge(&args),
+            Self::Serve(args) => serve::run(*args),
+            Self::Dataset(command) => dataset::run(command),
+            Self::List(args) => list::run(&args),
+            Self::Init(args) => init::run(&args),
+            Self::Doctor => doctor::run(),
+        }
+    }
+
+    /// Arguments about the script, for commands that load one.
+    pub(crate) fn script_mut(&mut self) -> Option<&mut ScriptArgs> {
+        match self {
+            Self::Run(args) => Some(&mut args.script),
+            Self::Check(args) => Some(&mut args.script),
+            Self::View(args) => Some(&mut args.script),
+            Self::Record(args) => Some(&mut args.script),
+            Self::Serve(args) => Some(&mut args.script),
+            Self::Dataset(dataset::DatasetCommand::Import(args)) => Some(&mut args.script),
+            _ => None,
+        }
+    }
+}

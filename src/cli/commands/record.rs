@@ -1,19 +1,25 @@
 //! `softvt record`: demonstrations of the tasks of a suite that are safe and reach the goal.
 
+use clap::{Args, value_parser};
 use serde_json::json;
 
 use crate::{
     cli::{
-        args::RecordArgs,
         error::CliError,
         run::{
-            grip_recorder::record_grips,
-            policy::PolicyConfig,
-            recording::{self, AttemptPlan, RecordingConfig, SuiteRecording},
+            config::{RunConfig, ScriptArgs},
+            policy::{PolicyArgs, PolicyConfig, expert_controller},
+            recording::record_all,
             selection::{select_suites, select_tasks},
+            suite_recording::{AttemptPlan, GripLog, RecordingArgs, RecordingConfig, SuiteRecording},
+            suite_run::SuiteRun,
         },
     },
-    script,
+    evaluation::episode_id::EpisodeIndex,
+    parallel,
+    policy::{Action, Observation, SensorStreams},
+    rollout::{ControlError, Controller, Simulation},
+    script::ExpertController,
 };
 
 /// Attempts per demonstration, unless `--attempts` is given.
@@ -21,29 +27,50 @@ const ATTEMPTS_PER_DEMO: u32 = 4;
 /// Minimum number of attempts per task, unless `--attempts` is given.
 const MIN_ATTEMPTS: u32 = 20;
 
+/// Record demonstrations: HDF5 files, videos and a manifest
+#[derive(Args, Clone, Debug)]
+#[command(override_usage = "softvt record [OPTIONS] --out <DIR> <FILE.lua>")]
+pub(crate) struct RecordArgs {
+    #[command(flatten)]
+    pub(super) script: ScriptArgs,
+    #[command(flatten)]
+    policy: PolicyArgs,
+    #[command(flatten)]
+    recording: RecordingArgs,
+    /// Demonstrations per task
+    #[arg(long, value_name = "N", default_value = "50", value_parser = value_parser!(u32).range(1..=100_000))]
+    demos: u32,
+    /// Record only these tasks: indices or parts of prompts, separated by commas
+    #[arg(long = "task", value_name = "TASK", value_delimiter = ',')]
+    tasks: Vec<String>,
+    /// Maximum attempts per task, kept or not [default: 4 per demonstration, at least 20]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=1_000_000))]
+    attempts: Option<u32>,
+}
+
 /// Records the demonstrations that the arguments ask for.
 ///
 /// # Errors
 /// The script has no suite, the folder contains something else, an attempt or a file fails, or too
 /// few attempts are good.
-pub(crate) fn run(args: &RecordArgs) -> Result<(), CliError> {
-    let config = RecordingConfig::new(&args.script, &args.recording, &args.tasks)?
+pub(super) fn run(args: RecordArgs) -> Result<(), CliError> {
+    let config = RecordingConfig::new(args.script, args.recording, args.tasks)?
         .with_policy(PolicyConfig::load(&args.policy)?);
     let default_attempts = args.demos.saturating_mul(ATTEMPTS_PER_DEMO).max(MIN_ATTEMPTS);
     let plan =
         AttemptPlan::First { demos: args.demos, max_attempts: args.attempts.unwrap_or(default_attempts) };
     let run = &config.run;
-    let loaded = script::load(&run.file, &run.script_options).map_err(CliError::input)?;
+    let loaded = run.load_script()?;
     let suites = select_suites("record", run, &loaded.plan)?;
     let names: Vec<String> = suites.iter().map(|suite| run.suite_name(suite)).collect();
     let request = json!({
         "softvt": env!("CARGO_PKG_VERSION"),
         "demos": args.demos,
-        "pictures": config.images_in_hdf5,
-        "privileged": config.with_privileged,
+        "pictures": config.has_hdf5_images(),
+        "privileged": config.has_privileged(),
         "suites": names,
     });
-    recording::record_all(&config, &request, || {
+    record_all(&config, &request, || {
         let prepare = |suite| {
             let tasks = select_tasks(run, suite)?;
             SuiteRecording::new(&config, &loaded, suite, tasks, plan.clone(), |suite_run, log| {
@@ -51,6 +78,51 @@ pub(crate) fn run(args: &RecordArgs) -> Result<(), CliError> {
                 Ok(())
             })
         };
-        suites.iter().copied().map(prepare).collect()
+        suites.iter().map(prepare).collect()
     })
+}
+
+/// Makes the experts of a run record their intent into `log`. Other policies are left unchanged.
+fn record_grips(config: &RunConfig, run: &mut SuiteRun, log: &GripLog) {
+    let Some(policy) = config.policy.expert() else { return };
+    let log = log.clone();
+    run.controllers = Box::new(move |opened, brief| {
+        Ok(Box::new(GripRecorder {
+            expert: expert_controller(opened, policy)?,
+            is_holding: Vec::new(),
+            index: brief.index(),
+            log: log.clone(),
+        }))
+    });
+}
+
+/// An expert whose intent to hold is recorded.
+///
+/// The binary gripper code of a dataset needs this intent. The commanded closure does not show it: a hand around a wide
+/// object is nearly open while it holds.
+struct GripRecorder {
+    expert: ExpertController,
+    is_holding: Vec<bool>,
+    index: EpisodeIndex,
+    log: GripLog,
+}
+
+impl Controller for GripRecorder {
+    fn streams(&self) -> SensorStreams {
+        self.expert.streams()
+    }
+
+    fn gave_up(&self) -> Option<&str> {
+        self.expert.gave_up()
+    }
+
+    fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, ControlError> {
+        let action = self.expert.act(sim, observation)?;
+        self.is_holding.push(self.expert.gripping());
+        Ok(action)
+    }
+
+    fn finish(&mut self) {
+        parallel::lock(&self.log).insert(self.index, std::mem::take(&mut self.is_holding));
+    }
 }

@@ -1,16 +1,17 @@
 //! `softvt replay RUN EPISODE`: simulation of a recorded episode, compared with its record byte by byte.
 
-use std::path::Path;
+use std::{
+    path::{Path, PathBuf},
+    str::FromStr,
+};
+
+use clap::Args;
 
 use crate::{
     cli::{
-        args::{EpisodeSelector, ReplayArgs},
-        error::CliError,
+        error::{CliError, Exit},
         output::print,
-        run::{
-            demo_replay::{DemoRef, check_complete, demos_of, replay_demos},
-            resimulate, stored_episode,
-        },
+        run::replay::{DemoRef, StoredManifest, check_complete, demos_of, difference, replay_demos},
     },
     dataset::{
         layout::is_dataset,
@@ -24,17 +25,49 @@ use crate::{
     text::counted,
 };
 
+/// Simulate a recorded episode again; exit code 0 if the result is byte-identical
+#[derive(Args, Debug)]
+pub(crate) struct ReplayArgs {
+    /// Run folder, or a dataset
+    run: PathBuf,
+    /// TASK/EPISODE, or the line number in episodes.jsonl, from 0
+    episode: EpisodeSelector,
+}
+
+/// An episode of a run, or a demonstration of a dataset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum EpisodeSelector {
+    /// Line number in `episodes.jsonl` or in the manifest, from 0.
+    Line(usize),
+    /// `TASK/EPISODE`.
+    Episode { task: usize, episode: u32 },
+}
+
+impl FromStr for EpisodeSelector {
+    type Err = String;
+
+    fn from_str(word: &str) -> Result<Self, String> {
+        let pair = word.split_once('/').and_then(|(task, episode)| {
+            Some(Self::Episode { task: task.parse().ok()?, episode: episode.parse().ok()? })
+        });
+        let found = pair.or_else(|| word.parse().ok().map(Self::Line));
+        found.ok_or_else(|| {
+            "expected TASK/EPISODE such as 3/0, or a line number of episodes.jsonl, from 0".to_owned()
+        })
+    }
+}
+
 /// Simulates an episode of a run or a demonstration of a dataset again, by its recorded actions.
 ///
 /// # Errors
 /// The run cannot be read, its scripts have changed since, or (exit code 1) the result differs.
-pub(crate) fn run(args: &ReplayArgs) -> Result<(), CliError> {
+pub(super) fn run(args: &ReplayArgs) -> Result<(), CliError> {
     let dir = &args.run;
     if is_dataset(dir) {
         check_complete(dir)?;
         return replay_demos(&[find_demo(dir, args.episode)?]);
     }
-    let stored = stored_run::load(dir).map_err(CliError::input)?;
+    let stored = stored_run::load(dir)?;
     let [stored] = &stored[..] else {
         let names: Vec<String> = stored.iter().map(|run| run.dir.display().to_string()).collect();
         return Err(CliError::input(format!(
@@ -46,16 +79,19 @@ pub(crate) fn run(args: &ReplayArgs) -> Result<(), CliError> {
     let record = find_episode(stored, args.episode)?;
     let index = record.header.id.index();
     let path = actions::path(&stored.dir, index);
-    let recorded = actions::read(&path).map_err(CliError::input)?;
-    let simulated = stored_episode::simulate(stored, record, recorded)?;
-    match resimulate::difference(record, &simulated)? {
+    let manifest = StoredManifest { path: &stored.dir, manifest: &stored.manifest };
+    let simulated = manifest.simulate(record, actions::read(&path)?)?;
+    match difference(record, &simulated)? {
         None => {
             print(&format!("{index}: byte-identical, final state {}\n", simulated.stats.state_hash));
             Ok(())
         }
-        Some(difference) => Err(CliError::internal(format!(
-            "{index} differs: {difference}; softvt doctor checks whether this machine computes the published results"
-        ))),
+        Some(difference) => Err(CliError::new(
+            Exit::Internal,
+            format!(
+                "{index} differs: {difference}; softvt doctor checks whether this machine computes the published results"
+            ),
+        )),
     }
 }
 
@@ -88,7 +124,7 @@ fn find_demo(path: &Path, selector: EpisodeSelector) -> Result<DemoRef, CliError
     match selector {
         EpisodeSelector::Line(line) => demos.into_iter().nth(line).ok_or_else(not_found),
         EpisodeSelector::Episode { task, episode } if path.is_dir() => {
-            let entries = manifest::read(path).map_err(CliError::input)?;
+            let entries = manifest::read(path)?;
             let matches = |entry: &&ManifestEntry| entry.task_id == task && entry.demo_id == episode as usize;
             let found: Vec<&ManifestEntry> = entries.iter().filter(matches).collect();
             match found[..] {

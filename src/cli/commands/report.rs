@@ -1,13 +1,22 @@
-//! `softvt report RUN…`: an HTML page about runs, and its tables as Markdown and LaTeX.
+//! Commands about finished runs: `softvt report`, `softvt compare` and `softvt merge`.
+
+use std::path::PathBuf;
+
+use clap::Args;
 
 use crate::{
-    cli::{args::ReportArgs, error::CliError, output::notice},
+    cli::{
+        error::CliError,
+        output::{eprint_notice, print, print_json},
+        run::config::parse_folder,
+    },
     files,
     report::{
-        page,
+        comparison, page,
         run_summary::summarize_runs,
-        stored_run,
+        shard_merge, stored_run,
         tables::{ResultTable, all_tables},
+        terminal,
     },
 };
 
@@ -15,18 +24,54 @@ use crate::{
 const LATEX_HEADER: &str =
     "% Needs \\usepackage{booktabs}; of names in other alphabets, LuaLaTeX or XeLaTeX.\n";
 
+/// Write an HTML page about runs, and its tables as Markdown and LaTeX
+#[derive(Args, Debug)]
+pub(crate) struct ReportArgs {
+    /// Run folders, or folders that contain run folders
+    #[arg(value_name = "RUN", required = true)]
+    runs: Vec<PathBuf>,
+    /// Output folder
+    #[arg(long, value_name = "DIR", default_value = "report", value_parser = parse_folder)]
+    out: PathBuf,
+}
+
+/// Compare two runs of the same episodes, episode by episode
+#[derive(Args, Debug)]
+pub(crate) struct CompareArgs {
+    /// Run folder, or a folder that contains run folders
+    #[arg(value_name = "A")]
+    first: PathBuf,
+    /// The other run folder
+    #[arg(value_name = "B")]
+    second: PathBuf,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Merge the shards of a run into the folder that a single run would have written
+#[derive(Args, Debug)]
+pub(crate) struct MergeArgs {
+    /// New folder
+    #[arg(value_parser = parse_folder)]
+    out: PathBuf,
+    /// Folders of all shards
+    #[arg(value_name = "SHARD", required = true)]
+    shards: Vec<PathBuf>,
+}
+
 /// Writes `report.html`, `report.md` and `report.tex`.
 ///
 /// # Errors
 /// A folder without a run, or a file that cannot be written.
-pub(crate) fn run(args: &ReportArgs) -> Result<(), CliError> {
+pub(super) fn report(args: &ReportArgs) -> Result<(), CliError> {
     let mut stored = Vec::new();
     for dir in &args.runs {
-        stored.extend(stored_run::load(dir).map_err(CliError::input)?);
+        stored.extend(stored_run::load(dir)?);
     }
     let summaries = summarize_runs(stored);
     for warning in summaries.iter().flat_map(|summary| summary.run.warnings()) {
-        notice(warning);
+        eprint_notice(warning);
     }
     let tables = all_tables(&summaries);
     let joined =
@@ -36,8 +81,34 @@ pub(crate) fn run(args: &ReportArgs) -> Result<(), CliError> {
         ("report.md", joined(ResultTable::markdown)),
         ("report.tex", LATEX_HEADER.to_owned() + &joined(ResultTable::latex)),
     ] {
-        files::replace(&args.out.join(name), text).map_err(CliError::input)?;
+        files::replace(&args.out.join(name), text)?;
     }
-    notice(args.out.join("report.html").display());
+    eprint_notice(args.out.join("report.html").display());
+    Ok(())
+}
+
+/// Prints the paired differences of the runs in the second folder from those in the first.
+///
+/// # Errors
+/// A folder without a run or with two of one suite, or no common episode.
+pub(super) fn compare(args: &CompareArgs) -> Result<(), CliError> {
+    let first = stored_run::load(&args.first)?;
+    let second = stored_run::load(&args.second)?;
+    let compared = comparison::compare(&first, &second)?;
+    match args.json {
+        true => print_json(&compared),
+        false => print(&comparison::table(&compared)),
+    }
+    Ok(())
+}
+
+/// Merges shards into a new folder and prints the tables of the merged runs.
+///
+/// # Errors
+/// The shards do not belong to one run, or a file cannot be read or written.
+pub(super) fn merge(args: &MergeArgs) -> Result<(), CliError> {
+    let summaries = shard_merge::merge(&args.out, &args.shards)?;
+    summaries.iter().for_each(|summary| print(&terminal::table(summary)));
+    eprint_notice(args.out.display());
     Ok(())
 }

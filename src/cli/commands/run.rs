@@ -2,83 +2,107 @@
 
 use std::path::PathBuf;
 
+use clap::Parser;
+
 use crate::{
     benchmark::{Plan, Suite},
     cli::{
-        args::{RunArgs, VideoSelection},
         error::CliError,
         output::{print, print_json},
         run::{
             conditions,
-            config::RunConfig,
+            config::{RunConfig, RunFlags, ScriptArgs},
+            episode_artifacts::VideoSelection,
+            evaluate::run_suite,
             experiment,
-            recorded_policy::find_replay_source,
-            requirements,
+            policy::{PolicyArgs, PolicyConfig},
+            requirement,
             selection::{check_distinct_out_dirs, path_component, select_episodes, select_tasks},
-            suite_run::{SuiteRun, run_suite},
+            suite_run::{SuiteRun, find_replay_source},
         },
     },
     evaluation::summary::SuiteSummary,
     report::terminal,
-    script::{self, LoadedScript},
+    script::LoadedScript,
 };
+
+/// A safety-aware visuo-tactile manipulation benchmark for soft objects, on an ordinary CPU
+#[derive(Clone, Debug, Parser)]
+#[command(
+    name = "softvt",
+    version,
+    override_usage = "softvt [OPTIONS] <FILE.lua>\n       softvt <COMMAND>",
+    subcommand_negates_reqs = true,
+    args_conflicts_with_subcommands = true,
+    after_help = "softvt FILE.lua --help also lists the options of that script. docs/cli.md is the reference.\n\
+                  Exit codes: 0 success, 1 internal error (bug), 2 invalid input, 3 policy or connection failed, \
+                  99 --require not met, 130 interrupted."
+)]
+pub(crate) struct RunArgs {
+    #[command(flatten)]
+    pub script: ScriptArgs,
+    #[command(flatten)]
+    policy: PolicyArgs,
+    #[command(flatten)]
+    flags: RunFlags,
+}
 
 /// Runs the plan of a script: suites, conditions or an experiment.
 ///
 /// # Errors
 /// The script, a flag, the folder or the policy is not valid, or an episode fails.
-pub(crate) fn run(args: &RunArgs) -> Result<(), CliError> {
-    let config = &RunConfig::of_run(args)?;
-    let refuse = |message: String| Err(CliError::input(message).prefixed(config.file.display()));
-    let loaded = script::load(&config.file, &config.script_options).map_err(CliError::input)?;
+pub(super) fn run(args: RunArgs) -> Result<(), CliError> {
+    let config = RunConfig::new(args.script, args.flags)?.with_policy(PolicyConfig::load(&args.policy)?);
+    let (config, flags) = (&config, &config.flags);
+    let loaded = config.load_script()?;
     check_video_episodes(config, &loaded.plan)?;
     check_recorded_episodes(config, &loaded.plan)?;
     match &loaded.plan {
         Plan::Suite(suite) => {
-            let out = config.out.clone().unwrap_or_else(|| next_run_dir(config, &config.suite_name(suite)));
+            let out = flags.out.clone().unwrap_or_else(|| next_run_dir(config, &config.suite_name(suite)));
             let summary = evaluate(config, &loaded, suite, out)?;
-            match config.json {
+            match flags.json {
                 true => print_json(&summary),
                 false => print(&terminal::table(&summary)),
             }
-            requirements::check(&config.requirements, &[summary])
+            requirement::check(&flags.requirements, &[summary])
         }
         Plan::Suites { suites } => {
             check_distinct_out_dirs(config, suites)?;
             let mut summaries = Vec::new();
             for suite in suites {
                 let name = config.suite_name(suite);
-                let out = match &config.out {
+                let out = match &flags.out {
                     Some(dir) => dir.join(path_component(&name)),
                     None => next_run_dir(config, &name),
                 };
                 summaries.push(evaluate(config, &loaded, suite, out)?);
             }
-            match config.json {
+            match flags.json {
                 true => print_json(&summaries),
                 false => summaries.iter().for_each(|summary| print(&terminal::table(summary))),
             }
-            requirements::check(&config.requirements, &summaries)
+            requirement::check(&flags.requirements, &summaries)
         }
         Plan::Conditions { name, suites, conditions } => {
-            if !config.requirements.is_empty() {
-                return refuse(
-                    "--require: applies to suites, and this file compares conditions; read conditions.json"
-                        .to_owned(),
-                );
+            if !flags.requirements.is_empty() {
+                return Err(config.error(
+                    "--require: applies to suites, and this file compares conditions; read conditions.json",
+                ));
             }
             check_distinct_out_dirs(config, suites)?;
-            let out = config.out.clone().unwrap_or_else(|| next_run_dir(config, name));
+            let out = flags.out.clone().unwrap_or_else(|| next_run_dir(config, name));
             conditions::run(config, &loaded, suites, conditions, &out)
         }
         Plan::Experiment { name, points, columns } => {
             let suite_flags = [
-                ("--require", !config.requirements.is_empty()),
-                ("--shard", config.shard.is_some()),
-                ("--resume", config.resume),
+                ("--require", !flags.requirements.is_empty()),
+                ("--shard", flags.shard.is_some()),
+                ("--resume", flags.resume),
             ];
             if let Some((flag, _)) = suite_flags.iter().find(|(_, is_given)| *is_given) {
-                return refuse(format!("{flag}: applies to suites, and this file is an experiment"));
+                let message = format!("{flag}: applies to suites, and this file is an experiment");
+                return Err(config.error(message));
             }
             experiment::run(config, &loaded, name, *points, columns)
         }
@@ -87,17 +111,16 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), CliError> {
 
 /// Checks that every suite has the episodes that `--video` selects.
 fn check_video_episodes(config: &RunConfig, plan: &Plan) -> Result<(), CliError> {
-    let Some(VideoSelection::Episodes(selected)) = &config.video else { return Ok(()) };
+    let Some(VideoSelection::Episodes(selected)) = &config.flags.video else { return Ok(()) };
     for suite in plan.suites() {
-        let episodes = config.episodes.unwrap_or(suite.episodes);
+        let episodes = config.flags.episodes.unwrap_or(suite.episodes);
         if let Some(beyond) = selected.iter().find(|episode| **episode >= episodes) {
             let available = match episodes {
                 1 => "only episode 0".to_owned(),
                 count => format!("episodes 0 to {}", count.saturating_sub(1)),
             };
-            return Err(CliError::input(format!(
-                "{}: --video={beyond}: suite {} runs {available} of each task; select one of them, or raise --episodes",
-                config.file.display(),
+            return Err(config.error(format!(
+                "--video={beyond}: suite {} runs {available} of each task; select one of them, or raise --episodes",
                 suite.name
             )));
         }

@@ -2,40 +2,78 @@
 
 use std::{io::ErrorKind, path::PathBuf};
 
+use clap::{Args, value_parser};
 use serde_json::json;
 
 use crate::{
-    benchmark::{Plan, Suite},
     cli::{
-        args::ServeArgs,
         error::CliError,
         output::print,
         run::{
-            config::RunConfig,
-            policy::{PolicyConfig, load_profile_of},
+            config::{RunConfig, RunFlags, ScriptArgs},
+            policy::{PolicyArgs, PolicyConfig, load_profile_of},
+            selection::{needs_suites, suites_of},
             suite_run::SuiteRun,
         },
     },
-    evaluation::episode_id::EpisodeId,
+    evaluation::episode_id::{EpisodeId, Split},
     policy::Observation,
-    rollout::cancel,
+    rollout::{cancel, target_asset},
     script::{self, LoadedScript},
     serve::{self, RequestError, ServedSuite, Server, ServerConfig},
 };
+
+/// Serve episodes over a websocket for an external client: docs/serve.md
+#[derive(Args, Clone, Debug)]
+#[command(override_usage = "softvt serve [OPTIONS] <FILE.lua>")]
+pub(crate) struct ServeArgs {
+    #[command(flatten)]
+    pub(super) script: ScriptArgs,
+    /// Local address to listen on
+    #[arg(long, value_name = "HOST", default_value = "127.0.0.1")]
+    host: String,
+    /// Port to listen on; 0 for any free port, which the first line of output names
+    #[arg(long, value_name = "PORT", default_value = "8765")]
+    port: u16,
+    /// Maximum number of clients; each has a thread and an episode of its own
+    #[arg(long, value_name = "N", default_value = "8", value_parser = value_parser!(u16).range(1..=1024))]
+    threads: u16,
+    /// List of episodes for clients that do not name one
+    #[arg(long, value_name = "SPLIT", default_value = "validation")]
+    split: Split,
+    /// Send clients the true state: poses, deformation, contact forces, limits, verdict
+    #[arg(long)]
+    privileged: bool,
+    // Only the profile and the gripper mode apply: the client is the policy. The other flags are hidden and refused.
+    #[command(flatten)]
+    policy: PolicyArgs,
+}
 
 /// Serves the suites of a script until the process is interrupted.
 ///
 /// # Errors
 /// The script has no suite, its first episode cannot be rendered, or the address is not available; in
 /// the end, the interrupt.
-pub(crate) fn run(args: &ServeArgs) -> Result<(), CliError> {
-    let config =
-        RunConfig { policy: PolicyConfig::external("client"), ..RunConfig::of_script(&args.script)? };
+pub(super) fn run(args: ServeArgs) -> Result<(), CliError> {
+    let config = RunConfig::new(args.script.clone(), RunFlags::default())?;
+    let config = config.with_policy(PolicyConfig::external("client"));
     let (profile, _) = load_profile_of(&args.policy)?;
-    let loaded = script::load(&config.file, &config.script_options).map_err(CliError::input)?;
-    let suites = served_suites(&config, &loaded)?;
-    let server = open_server(args)?;
-    let runs = suite_runs(args, &config, &loaded, &suites)?;
+    let loaded = config.load_script()?;
+    let suites = suites_of(&loaded.plan);
+    if suites.iter().all(|suite| suite.tasks.is_empty()) {
+        return Err(needs_suites("serve", &config));
+    }
+    let server = open_server(&args)?;
+    let mut runs = Vec::new();
+    for suite in suites {
+        let mut run = SuiteRun::new(&config, &loaded, suite, Vec::new(), PathBuf::new())?;
+        // Only privileged clients receive the limits.
+        for task in suite.tasks.iter().filter(|_| args.privileged) {
+            let opened = run.open_episode(&run.episode_id(task, 0))?;
+            run.read_limit(target_asset(&opened.nominal, task).cloned())?;
+        }
+        runs.push(run);
+    }
     let served: Vec<ServedSuite> =
         suites.iter().map(|suite| ServedSuite { name: config.suite_name(suite), suite }).collect();
     let start_episode = |id: &EpisodeId| {
@@ -50,7 +88,7 @@ pub(crate) fn run(args: &ServeArgs) -> Result<(), CliError> {
         suites: served,
         profile,
         privileged: args.privileged,
-        seed: config.seed,
+        seed: config.script.seed,
         split: args.split,
         fingerprint: provenance_hash(&config, &loaded),
         start_episode: Box::new(start_episode),
@@ -60,21 +98,6 @@ pub(crate) fn run(args: &ServeArgs) -> Result<(), CliError> {
     print(&format!("ws://{address}\n"));
     serve::serve(&server, &server_config, hello, usize::from(args.threads), &cancel::FLAG);
     Err(CliError::interrupted("interrupted"))
-}
-
-fn served_suites<'a>(config: &RunConfig, loaded: &'a LoadedScript) -> Result<Vec<&'a Suite>, CliError> {
-    let suites: Vec<&Suite> = match &loaded.plan {
-        Plan::Suite(suite) => vec![suite],
-        Plan::Suites { suites } => suites.iter().collect(),
-        Plan::Conditions { .. } | Plan::Experiment { .. } => Vec::new(),
-    };
-    if suites.iter().any(|suite| !suite.tasks.is_empty()) {
-        return Ok(suites);
-    }
-    Err(CliError::input(format!(
-        "{}: softvt serve needs a suite or a list of suites; name a file that returns softvt.suite",
-        config.file.display()
-    )))
 }
 
 fn open_server(args: &ServeArgs) -> Result<Server, CliError> {
@@ -93,34 +116,15 @@ fn open_server(args: &ServeArgs) -> Result<Server, CliError> {
     })
 }
 
-/// A run of each suite without episodes, from which episodes are started on request.
-fn suite_runs<'a>(
-    args: &ServeArgs,
-    config: &'a RunConfig,
-    loaded: &'a LoadedScript,
-    suites: &[&'a Suite],
-) -> Result<Vec<SuiteRun<'a>>, CliError> {
-    let mut runs = Vec::new();
-    for suite in suites.iter().copied() {
-        let mut run = SuiteRun::new(config, loaded, suite, Vec::new(), PathBuf::new())?;
-        // Only privileged clients receive the limits.
-        if args.privileged {
-            run.read_limits(&suite.tasks)?;
-        }
-        runs.push(run);
-    }
-    Ok(runs)
-}
-
 /// Hash of all that determines an episode, except its index and the actions of the client.
 fn provenance_hash(config: &RunConfig, loaded: &LoadedScript) -> String {
     let all = json!([
         env!("CARGO_PKG_VERSION"),
         loaded.bundle.hashes(),
-        config.script_options,
+        config.script.options,
         config.shifts,
         config.settings,
-        config.is_rigid_twin
+        config.is_rigid_twin()
     ]);
     script::sha256(all.to_string().as_bytes())
 }
@@ -136,8 +140,8 @@ fn first_observation(config: &RunConfig, server: &ServerConfig) -> Result<Observ
         base_seed: server.seed,
         split: server.split,
     };
-    let mut episode = (server.start_episode)(&id).map_err(CliError::input)?;
+    let mut episode = (server.start_episode)(&id)?;
     let streams = server.profile.streams();
     episode.begin(streams.clone());
-    episode.observe(&streams).map_err(|error| CliError::input(error).prefixed(config.file.display()))
+    episode.observe(&streams).map_err(|error| config.error(error))
 }

@@ -8,11 +8,12 @@ use crate::{
     benchmark::{Condition, ObjectType, REFERENCE, ShiftValue, Suite, Task},
     cli::{
         error::CliError,
-        output::{notice, print},
+        output::{eprint_notice, print},
         run::{
             config::RunConfig,
+            evaluate::{is_finished, run_suite},
             selection::{path_component, select_episodes, select_tasks},
-            suite_run::{SuiteRun, is_finished, run_suite},
+            suite_run::SuiteRun,
         },
     },
     evaluation::summary::method_label,
@@ -76,7 +77,7 @@ pub(crate) fn run(
     let mut tables = Vec::new();
     for ((suite, cases), (runs, tasks)) in suites.iter().zip(&cases).zip(prepared) {
         let compared = compare_conditions(config, suite, cases, runs, &tasks)?;
-        if !config.json {
+        if !config.flags.json {
             print(&table(&compared));
         }
         tables.push(compared);
@@ -111,7 +112,7 @@ fn condition_cases(
     conditions: &[Condition],
     has_suite_folder: bool,
 ) -> Result<Vec<ConditionCase>, CliError> {
-    let object_type = if config.is_rigid_twin { ObjectType::Rigid } else { suite.object_type };
+    let object_type = if config.is_rigid_twin() { ObjectType::Rigid } else { suite.object_type };
     let parent = match has_suite_folder {
         true => format!("{}/", path_component(&config.suite_name(suite))),
         false => String::new(),
@@ -127,11 +128,9 @@ fn condition_cases(
     for condition in conditions {
         let folder = format!("{parent}{}", path_component(&condition.name));
         if let Some(same) = cases.iter().find(|case| case.folder == folder) {
-            return Err(CliError::input(format!(
-                "{}: the conditions {:?} and {:?} share the folder {folder}; rename one",
-                config.file.display(),
-                same.name,
-                condition.name
+            return Err(config.error(format!(
+                "the conditions {:?} and {:?} share the folder {folder}; rename one",
+                same.name, condition.name
             )));
         }
         let mut changed = config.clone();
@@ -177,9 +176,8 @@ fn prepare_runs<'a>(
         };
         let dir: PathBuf = out.join(&case.folder);
         // A finished run is left unchanged, and an interrupted one is continued on request.
-        if !(case.config.resume || is_finished(&dir)) {
-            RunFolder::check_vacant(&dir)
-                .map_err(|error| CliError::input(error).prefixed(case.config.file.display()))?;
+        if !(case.config.flags.resume || is_finished(&dir)) {
+            RunFolder::check_vacant(&dir).map_err(|error| case.config.error(error))?;
         }
         let jobs = select_episodes(&case.config, suite, tasks);
         let mut run = SuiteRun::new(&case.config, loaded, suite, jobs, dir).map_err(in_case)?;
@@ -205,7 +203,7 @@ fn compare_conditions(
         let mut outcome = None;
         if let Some(run) = run {
             let (name, number) = (text::escape_control(&case.name), rows.len() + 1);
-            notice(format!("{}, {name} ({number} of {})", suite.name, cases.len()));
+            eprint_notice(format!("{}, {name} ({number} of {})", suite.name, cases.len()));
             let result = run_suite(&run, tasks)?;
             outcome = Some(ConditionOutcome::new(case.folder.clone(), &result.records, reference.as_deref()));
             reference.get_or_insert(result.records);
@@ -219,7 +217,7 @@ fn compare_conditions(
             not_applicable: case.not_applicable.clone(),
         });
     }
-    let deformable = suite.object_type == ObjectType::Deformable && !config.is_rigid_twin;
+    let deformable = suite.object_type == ObjectType::Deformable && !config.is_rigid_twin();
     let policy = method_label(config.policy.name(), config.policy.is_privileged(), force_observed);
     Ok(ConditionTable { suite: config.suite_name(suite), policy, deformable, rows })
 }
@@ -234,15 +232,15 @@ fn write(
         softvt: env!("CARGO_PKG_VERSION"),
         script: &loaded.main,
         policy: config.policy.name(),
-        seed: config.seed,
+        seed: config.script.seed,
         suites: tables,
     };
     let text = format!("{:#}\n", serde_json::json!(document));
     let path = out.join(FILE);
-    replace(&path, &text).map_err(CliError::input)?;
-    if config.json {
+    replace(&path, &text)?;
+    if config.flags.json {
         print(&text);
     }
-    notice(path.display());
+    eprint_notice(path.display());
     Ok(())
 }

@@ -1,122 +1,178 @@
-//! Configuration of a run: the arguments of a command with their files read and their values checked.
+//! Flags of runs, and the configuration of a run: its flags with their values checked and its policy loaded.
 
-use std::path::PathBuf;
+use std::{fmt, path::PathBuf, str::FromStr};
+
+use clap::{Args, ValueEnum, value_parser};
 
 use crate::{
     benchmark::{ShiftValue, Suite},
     cli::{
-        args::{Requirement, RunArgs, ScriptArgs, Shard, TraceDetail, VideoSelection},
         error::CliError,
-        run::policy::PolicyConfig,
+        run::{episode_artifacts::VideoSelection, policy::PolicyConfig, requirement::Requirement},
     },
+    script::{self, LoadedScript},
 };
 
-/// Configuration of a run: script, suites, policy, settings and output.
-#[derive(Clone, Debug)]
-pub(crate) struct RunConfig {
-    /// The script.
+// The script, and changes of its scenes and their physics. A doc comment would replace the description of the commands
+// that this struct is flattened into.
+#[derive(Args, Clone, Debug, Default)]
+pub(crate) struct ScriptArgs {
+    /// Script that returns the plan: a suite, a list of suites, conditions or an experiment
+    #[arg(value_name = "FILE.lua")]
     pub file: PathBuf,
-    /// Values of the script's own options, as `--name=value`.
-    pub script_options: Vec<String>,
-    pub policy: PolicyConfig,
-    /// Tasks to run: indices or parts of prompts. All if empty.
-    pub tasks: Vec<String>,
-    /// Episodes per task. `None` for the number that the suite sets.
-    pub episodes: Option<u32>,
-    /// Base seed.
+    /// Values of the options that the script declares, as `--name=value`. Filled in after parsing.
+    #[arg(skip)]
+    pub options: Vec<String>,
+    /// Base seed
+    #[arg(long, value_name = "S", default_value = "0", allow_hyphen_values = true, value_parser = parse_seed)]
     pub seed: u64,
-    pub threads: usize,
-    /// Shifts by name and value.
-    pub shifts: Vec<ShiftValue>,
-    /// True if soft objects are made rigid.
-    pub is_rigid_twin: bool,
-    /// Changed settings by path and value.
-    pub settings: Vec<(String, String)>,
+    /// Scene changes that the suite declares, such as stiffness=0.5
+    #[arg(long = "shift", value_name = "NAME=VALUE", value_delimiter = ',')]
+    pub shifts: Vec<String>,
+    /// Make every soft object rigid, with the same shape, mass and appearance
+    #[arg(long, value_name = "KIND")]
+    pub twin: Option<Twin>,
+    /// Change a setting, such as robot.gripper.effort=20
+    #[arg(long = "set", value_name = "PATH=VALUE")]
+    pub settings: Vec<String>,
+}
+
+/// Variants of a suite.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Twin {
+    Rigid,
+}
+
+// The episodes of a run, and its output.
+#[derive(Args, Clone, Debug, Default)]
+pub(crate) struct RunFlags {
+    /// Run only these tasks: indices or parts of prompts, separated by commas
+    #[arg(long = "task", value_name = "TASK", value_delimiter = ',')]
+    pub tasks: Vec<String>,
+    /// Episodes per task [default: set by the suite]
+    #[arg(long, value_name = "N", value_parser = parse_count)]
+    pub episodes: Option<u32>,
+    /// Number of threads; results do not depend on it [default: number of processors]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Record every control step; =nodes adds node positions
+    #[arg(long, value_name = "DETAIL", num_args = 0..=1, require_equals = true, default_missing_value = "state")]
     pub trace: Option<TraceDetail>,
+    /// Render videos of unsafe episodes; =all for all, =0,3 for these episodes of each task
+    #[arg(long, value_name = "WHICH", num_args = 0..=1, require_equals = true, default_missing_value = "failed")]
     pub video: Option<VideoSelection>,
-    /// Output folder.
+    /// Output folder; must not already contain a run [default: the next runs/<suite>-<policy>-NNN]
+    #[arg(long, value_name = "DIR", value_parser = parse_folder)]
     pub out: Option<PathBuf>,
-    /// True if an interrupted run in `out` is continued.
+    /// Continue the interrupted run in --out, if there is one
+    #[arg(long, requires = "out")]
     pub resume: bool,
-    /// The part of the run to execute. `None` for all of it.
+    /// Run the I-th of N parts; softvt merge combines them
+    #[arg(long, value_name = "I/N")]
     pub shard: Option<Shard>,
+    /// Condition on the results of each suite, such as "safety>=0.9"; exit code 99 if it does not hold
+    #[arg(long = "require", value_name = "CONDITION")]
     pub requirements: Vec<Requirement>,
-    /// Print JSON instead of tables.
+    /// Print JSON: an object for a suite or for conditions, an array for a list of suites, one line per row of an experiment
+    #[arg(long)]
     pub json: bool,
 }
 
-impl RunConfig {
-    /// A script under a policy on one thread, with defaults for everything else.
-    pub(crate) fn new(file: PathBuf, policy: PolicyConfig) -> Self {
-        Self {
-            file,
-            policy,
-            script_options: Vec::new(),
-            tasks: Vec::new(),
-            episodes: None,
-            seed: 0,
-            threads: 1,
-            shifts: Vec::new(),
-            is_rigid_twin: false,
-            settings: Vec::new(),
-            trace: None,
-            video: None,
-            out: None,
-            resume: false,
-            shard: None,
-            requirements: Vec::new(),
-            json: false,
+/// Detail of `--trace`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum TraceDetail {
+    State,
+    Nodes,
+}
+
+/// One of `count` parts of a run, numbered from 1: every `count`-th episode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Shard {
+    index: usize,
+    count: usize,
+}
+
+impl Shard {
+    /// True if the shard contains the `job`-th episode of the whole run, counted from 0.
+    pub(crate) fn contains(&self, job: usize) -> bool {
+        job % self.count == self.index - 1
+    }
+}
+
+impl FromStr for Shard {
+    type Err = String;
+
+    fn from_str(word: &str) -> Result<Self, String> {
+        let parts = word.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
+        match parts {
+            Some((index, count)) if (1..=count).contains(&index) => Ok(Self { index, count }),
+            _ => Err("expected I/N with I in 1..N, such as 2/8".to_owned()),
         }
     }
+}
 
-    /// The scenes that the arguments ask for, under the expert.
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.index, self.count)
+    }
+}
+
+/// Configuration of a run.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct RunConfig {
+    pub script: ScriptArgs,
+    pub policy: PolicyConfig,
+    pub flags: RunFlags,
+    /// Shifts by name and value.
+    pub shifts: Vec<ShiftValue>,
+    /// Changed settings by path and value.
+    pub settings: Vec<(String, String)>,
+}
+
+impl RunConfig {
+    /// A run under the expert.
     ///
     /// # Errors
     /// A shift or setting that is not `NAME=VALUE`.
-    pub(crate) fn of_script(args: &ScriptArgs) -> Result<Self, CliError> {
-        let in_file = |error: CliError| error.prefixed(args.file.display());
-        let shifts = args.shifts.iter().map(|word| parse_shift(word)).collect::<Result<_, _>>();
-        let settings = args.settings.iter().map(|word| parse_pair("--set", word)).collect::<Result<_, _>>();
-        Ok(Self {
-            script_options: args.options.clone(),
-            seed: args.seed,
-            shifts: shifts.map_err(in_file)?,
-            is_rigid_twin: args.twin.is_some(),
-            settings: settings.map_err(in_file)?,
-            ..Self::new(args.file.clone(), PolicyConfig::expert())
-        })
+    pub(crate) fn new(script: ScriptArgs, flags: RunFlags) -> Result<Self, CliError> {
+        let in_file = |error: CliError| error.prefixed(script.file.display());
+        let shifts = script.shifts.iter().map(|word| parse_shift(word)).collect::<Result<_, _>>();
+        let shifts = shifts.map_err(in_file)?;
+        let settings = script.settings.iter().map(|word| parse_pair("--set", word)).collect::<Result<_, _>>();
+        let settings = settings.map_err(in_file)?;
+        Ok(Self { script, policy: PolicyConfig::default(), flags, shifts, settings })
     }
 
-    /// The run that `softvt FILE.lua` asks for.
+    pub(crate) fn with_policy(self, policy: PolicyConfig) -> Self {
+        Self { policy, ..self }
+    }
+
+    /// Loads the script with its options.
     ///
     /// # Errors
-    /// A value that is not valid, or a policy that cannot be loaded.
-    pub(crate) fn of_run(args: &RunArgs) -> Result<Self, CliError> {
-        let config = Self {
-            tasks: args.tasks.clone(),
-            episodes: args.episodes,
-            threads: thread_count(args.threads),
-            trace: args.trace,
-            video: args.video.clone(),
-            resume: args.resume,
-            shard: args.shard,
-            requirements: args.requirements.clone(),
-            json: args.json,
-            ..Self::of_script(&args.script)?
-        };
-        let config = config.with_out(args.out.clone());
-        Ok(Self { policy: PolicyConfig::load(&args.policy)?, ..config })
+    /// The script fails or returns no plan.
+    pub(crate) fn load_script(&self) -> Result<LoadedScript, CliError> {
+        Ok(script::load(&self.script.file, &self.script.options)?)
     }
 
-    /// Sets the output folder.
-    pub(crate) fn with_out(self, out: Option<PathBuf>) -> Self {
-        Self { out, ..self }
+    /// An error about the script.
+    pub(crate) fn error(&self, message: impl fmt::Display) -> CliError {
+        CliError::input(message).prefixed(self.script.file.display())
+    }
+
+    /// True if soft objects are made rigid.
+    pub(crate) fn is_rigid_twin(&self) -> bool {
+        self.script.twin.is_some()
+    }
+
+    pub(crate) fn threads(&self) -> usize {
+        thread_count(self.flags.threads)
     }
 
     /// Name of a suite in results. A rigid twin has a name of its own, though its initial states are
     /// those of the suite.
     pub(crate) fn suite_name(&self, suite: &Suite) -> String {
-        let twin = if self.is_rigid_twin { "_rigid_twin" } else { "" };
+        let twin = if self.is_rigid_twin() { "_rigid_twin" } else { "" };
         format!("{}{twin}", suite.name)
     }
 }
@@ -127,17 +183,54 @@ pub(crate) fn thread_count(requested: Option<u16>) -> usize {
     requested.map_or_else(available, usize::from)
 }
 
+/// Parses the path of an output folder.
+pub(crate) fn parse_folder(word: &str) -> Result<PathBuf, String> {
+    if word.trim().is_empty() {
+        return Err("expected a folder; \".\" is the working folder".to_owned());
+    }
+    Ok(word.into())
+}
+
+/// Parses a count of at least one.
+fn parse_count(word: &str) -> Result<u32, String> {
+    let count = word.parse().ok().filter(|count| *count > 0);
+    count.ok_or_else(|| format!("expected a whole number of at least 1 and at most {}", u32::MAX))
+}
+
+fn parse_seed(word: &str) -> Result<u64, String> {
+    word.parse().map_err(|_| format!("expected a whole number in 0..{}", u64::MAX))
+}
+
 fn parse_pair(flag: &str, word: &str) -> Result<(String, String), CliError> {
-    let pair = word.split_once('=').filter(|(name, value)| !name.is_empty() && !value.is_empty());
-    let (name, value) =
-        pair.ok_or_else(|| CliError::input(format!("{flag}: expected NAME=VALUE, got {word:?}")))?;
-    Ok((name.to_owned(), value.to_owned()))
+    match word.split_once('=') {
+        Some((name, value)) if !name.is_empty() && !value.is_empty() => {
+            Ok((name.to_owned(), value.to_owned()))
+        }
+        _ => Err(CliError::input(format!("{flag}: expected NAME=VALUE, got {word:?}"))),
+    }
 }
 
 fn parse_shift(word: &str) -> Result<ShiftValue, CliError> {
     let (name, value) = parse_pair("--shift", word)?;
-    let number = value.parse::<f64>().ok().filter(|n| n.is_finite());
-    let number =
-        number.ok_or_else(|| CliError::input(format!("--shift {name}: expected a number, got {value:?}")))?;
-    Ok(ShiftValue { name, value: number })
+    match value.parse::<f64>() {
+        Ok(number) if number.is_finite() => Ok(ShiftValue { name, value: number }),
+        _ => Err(CliError::input(format!("--shift {name}: expected a number, got {value:?}"))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shards_partition_the_episodes() {
+        let shards: Vec<Shard> = (1..=3).map(|i| format!("{i}/3").parse().unwrap()).collect();
+        for job in 0..20 {
+            assert_eq!(shards.iter().filter(|shard| shard.contains(job)).count(), 1);
+        }
+        for word in ["0/3", "4/3", "1", "a/b", "1/0", "-1/3"] {
+            assert!(word.parse::<Shard>().is_err(), "{word}");
+        }
+        assert_eq!(shards[1].to_string(), "2/3");
+    }
 }

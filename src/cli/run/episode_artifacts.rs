@@ -1,31 +1,57 @@
 //! Files of an episode other than its line: actions, the log for SoftVTBench's scorer, trace, video and still.
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    str::FromStr,
+};
 
 use crate::{
-    cli::{args::VideoSelection, error::CliError, run::config::RunConfig},
+    cli::error::CliError,
     evaluation::{episode_id::EpisodeIndex, record::EpisodeRecord},
     files,
     report::{
         actions,
         softvtbench_files::{self, DebugFrame, DebugShape},
-        video::{self, Caption, EpisodeVideoError},
+        video::{self, Caption},
     },
     rollout::{FinishedEpisode, ScoreFrame, cancel},
 };
 
-/// Paths of the files in a run folder, and which of them are requested.
-pub(crate) struct EpisodeArtifacts<'a> {
-    dir: &'a Path,
-    trace: bool,
-    video: Option<&'a VideoSelection>,
+/// Episodes of a run that become videos.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum VideoSelection {
+    /// All that are not safe.
+    Failed,
+    All,
+    /// These episodes of each task.
+    Episodes(Vec<u32>),
 }
 
-impl<'a> EpisodeArtifacts<'a> {
-    pub(crate) fn new(config: &'a RunConfig, dir: &'a Path) -> Self {
-        Self { dir, trace: config.trace.is_some(), video: config.video.as_ref() }
-    }
+impl FromStr for VideoSelection {
+    type Err = String;
 
+    fn from_str(word: &str) -> Result<Self, String> {
+        Ok(match word {
+            "failed" => Self::Failed,
+            "all" => Self::All,
+            list => {
+                let episodes: Result<_, _> = list.split(',').map(str::parse).collect();
+                Self::Episodes(
+                    episodes.map_err(|_| "expected failed, all, or episodes such as 0,3".to_owned())?,
+                )
+            }
+        })
+    }
+}
+
+/// Paths of the files in a run folder, and which of them are requested.
+pub(crate) struct EpisodeArtifacts<'a> {
+    pub dir: &'a Path,
+    pub trace: bool,
+    pub video: Option<&'a VideoSelection>,
+}
+
+impl EpisodeArtifacts<'_> {
     /// True if a video of the episode may be requested, before its outcome is known.
     pub(crate) fn may_render(&self, episode: u32) -> bool {
         match self.video {
@@ -67,13 +93,12 @@ impl<'a> EpisodeArtifacts<'a> {
         let header = &finished.record.header;
         let index = header.id.index();
         if self.trace {
-            files::write_json_lines(&self.trace_path(index), &finished.trace).map_err(CliError::input)?;
+            files::write_json_lines(&self.trace_path(index), &finished.trace)?;
         }
         let path = softvtbench_files::debug_log_path(self.dir, index);
-        softvtbench_files::write_debug_log(&path, header, &debug_frames(finished))
-            .map_err(CliError::input)?;
+        softvtbench_files::write_debug_log(&path, header, &debug_frames(finished))?;
         let path = actions::path(self.dir, index);
-        actions::write(&path, &finished.actions).map_err(CliError::input)
+        Ok(actions::write(&path, &finished.actions)?)
     }
 
     /// Renders the requested video, and for an unsafe episode a still of its worst moment.
@@ -88,13 +113,13 @@ impl<'a> EpisodeArtifacts<'a> {
         }
         let (index, caption) = (record.header.id.index(), Caption::new(record));
         let path = video::video_path(self.dir, index);
-        files::create_folder(path.parent().unwrap_or(self.dir)).map_err(CliError::input)?;
+        files::create_folder(path.parent().unwrap_or(self.dir))?;
         if !record.verdict.safety {
             let worst = video::worst_state(&states);
             let still = video::still_path(self.dir, index);
-            video::write_video_frame(&mut states, &caption, worst, &still).map_err(video_error)?;
+            video::write_video_frame(&mut states, &caption, worst, &still)?;
         }
-        video::write_video(&mut states, &caption, &path, cancel::requested).map_err(video_error)
+        Ok(video::write_video(&mut states, &caption, &path, cancel::requested)?)
     }
 
     fn trace_path(&self, index: EpisodeIndex) -> PathBuf {
@@ -129,12 +154,4 @@ fn aborted_frame(finished: &FinishedEpisode, step: usize) -> DebugFrame {
     let reference = finished.reference.as_ref();
     let shape = DebugShape::new(&header.asset, reference, peak, verdict.d_peak_max, None);
     DebugFrame::new(&header.id, step as u32, false, shape)
-}
-
-/// Converts the error of a video or still.
-pub(crate) fn video_error(error: EpisodeVideoError) -> CliError {
-    match error {
-        EpisodeVideoError::Interrupted => CliError::interrupted("interrupted"),
-        other => CliError::input(other),
-    }
 }

@@ -11,7 +11,7 @@ use serde_json::Value;
 use crate::{
     cli::{
         error::CliError,
-        output::{Progress, notice, print},
+        output::{Progress, eprint_notice, print},
         run::config::RunConfig,
     },
     files::replace,
@@ -36,17 +36,17 @@ pub(crate) fn run(
     let idle: Mutex<Vec<Experiment>> = Mutex::default();
     let take = || match parallel::lock(&idle).pop() {
         Some(experiment) => Ok(experiment),
-        None => Experiment::open(loaded).map_err(CliError::input),
+        None => Experiment::open(loaded),
     };
     let mut rows: Vec<Vec<ExperimentRow>> = vec![Vec::new(); points];
     let mut progress = Progress::new(points, name);
     let outcome = parallel::run(
         points,
-        config.threads,
+        config.threads(),
         cancel::requested,
         |point| {
             let experiment = take()?;
-            let rows = experiment.run(point).map_err(CliError::input)?;
+            let rows = experiment.run(point)?;
             // A script can catch the error of an interrupt and return a row that is not valid.
             if cancel::requested() {
                 return Err(CliError::interrupted("interrupted"));
@@ -70,12 +70,12 @@ pub(crate) fn run(
         )));
     }
     outcome?;
-    let finish = take()?.finish(&rows).map_err(CliError::input)?;
+    let finish = take()?.finish(&rows)?;
     print_rows(config, &rows, columns);
-    if let Some(text) = finish.text.filter(|_| !config.json) {
+    if let Some(text) = finish.text.filter(|_| !config.flags.json) {
         print(&format!("{text}\n"));
     }
-    let base = config.out.clone().unwrap_or_default();
+    let base = config.flags.out.clone().unwrap_or_default();
     finish.files.iter().try_for_each(|(relative, bytes)| write(&base, relative, bytes))
 }
 
@@ -90,14 +90,14 @@ fn write(base: &Path, relative: &str, bytes: &[u8]) -> Result<(), CliError> {
             PathBuf::from(link).display()
         )));
     }
-    replace(&path, bytes).map_err(CliError::input)?;
-    notice(format!("wrote {}", path.display()));
+    replace(&path, bytes)?;
+    eprint_notice(format!("wrote {}", path.display()));
     Ok(())
 }
 
 /// Prints rows as JSON lines or as a table.
 fn print_rows(config: &RunConfig, rows: &[ExperimentRow], columns: &[String]) {
-    if config.json {
+    if config.flags.json {
         rows.iter().for_each(|row| print(&format!("{}\n", serde_json::json!(row))));
         return;
     }

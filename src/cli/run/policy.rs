@@ -1,22 +1,27 @@
-//! Policies of a run: the arguments with their files read, and the controllers of the episodes.
+//! The policy of a run: its flags, the policy with its files read, and the controllers of the episodes.
 
-use std::{collections::BTreeMap, path::Path, sync::Arc, time::Duration};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::Duration,
+};
+
+use clap::{Args, ValueEnum, value_parser};
 
 use crate::{
     benchmark::seed::RandomStream,
-    cli::{
-        args::{DEFAULT_PROFILE, GripMode, GripperArg, PolicyArg, PolicyArgs, ProtocolArg},
-        error::CliError,
-        run::recorded_policy::RecordedRuns,
-    },
+    cli::{error::CliError, run::recorded_runs::RecordedRuns},
+    dataset::{layout::is_dataset, lerobot::GripperCoding},
     policy::{
-        ChunkedPolicy, Policy, PolicyError, SensorStreams, TaskBrief, builtin,
+        ChunkedPolicy, Policy, SensorStreams, TaskBrief, builtin,
         builtin::RecordedPolicy,
-        profile::Profile,
+        profile::{PROFILES, Profile},
         remote::{PolicyConnections, PolicyServer, Protocol, RemotePolicy},
     },
     rollout::{Controller, cancel},
     script::{EpisodeSetup, ExpertController, PolicyFile, load_profile},
+    text,
 };
 
 /// Environment variable with the key of a policy server. A flag would show it to other users of the machine.
@@ -25,37 +30,168 @@ const API_KEY: &str = "SOFTVT_API_KEY";
 const DEFAULT_REPLAN: usize = 10;
 /// Timeout of a policy server, unless `--policy-timeout` is given.
 const DEFAULT_TIMEOUT: Duration = Duration::from_secs(60);
+/// Profile of a policy server unless `--profile` names another.
+const DEFAULT_PROFILE: &str = "visuo_tactile";
+
+// The policy, and how it is connected. A doc comment would replace the description of the commands.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct PolicyArgs {
+    /// Policy that controls the robot: a name (softvt list policies), a Lua file, a server such as ws://host:8000, or a run folder whose actions are repeated
+    #[arg(long, value_name = "POLICY", default_value = "expert", value_parser = parse_policy)]
+    policy: PolicyArg,
+    /// Observations and action encoding of a policy server: a name (softvt list profiles) or a Lua file [default: visuo_tactile]
+    #[arg(long, value_name = "PROFILE", value_parser = parse_profile)]
+    profile: Option<String>,
+    /// Protocol of a policy server [default: openpi]
+    #[arg(long, value_name = "PROTOCOL")]
+    protocol: Option<Protocol>,
+    /// Override the gripper mode of the profile
+    #[arg(long, value_name = "MODE")]
+    gripper: Option<GripperCoding>,
+    /// Actions executed from each predicted chunk [default: 10 for servers]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..))]
+    replan: Option<u16>,
+    /// Timeout in seconds, for connecting and for each reply [default: 60]
+    #[arg(long, value_name = "SECONDS", value_parser = parse_timeout)]
+    policy_timeout: Option<Duration>,
+    /// Policy name shown in the results
+    #[arg(long, value_name = "NAME", value_parser = parse_name)]
+    name: Option<String>,
+}
+
+/// Value of `--policy`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum PolicyArg {
+    Builtin(BuiltinPolicy),
+    /// A policy in Lua.
+    Lua(PathBuf),
+    /// The address of a policy server.
+    Server(String),
+    /// A run folder, or a folder that contains run folders.
+    Run(PathBuf),
+}
+
+/// Policies that need no file. `softvt list policies` prints their descriptions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum BuiltinPolicy {
+    /// the scripted expert of the task (privileged: it has access to ground-truth state)
+    Expert,
+    /// the same expert with a gripper that is either open or closed (privileged)
+    ExpertBinary,
+    /// the same expert, closing until the tactile markers show a firm grasp (privileged)
+    TactileServo,
+    /// holds still with the gripper open
+    Noop,
+    /// moves at random
+    Random,
+}
+
+impl BuiltinPolicy {
+    /// Names and descriptions of all.
+    pub(crate) fn descriptions() -> impl Iterator<Item = (String, String)> {
+        let values = Self::value_variants().iter().filter_map(Self::to_possible_value);
+        values.map(|value| {
+            (value.get_name().to_owned(), value.get_help().map(ToString::to_string).unwrap_or_default())
+        })
+    }
+
+    /// Name, as `--policy` takes it.
+    fn name(self) -> String {
+        self.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
+    }
+
+    /// True for scripted experts, which have access to ground-truth state.
+    fn is_expert(self) -> bool {
+        matches!(self, Self::Expert | Self::ExpertBinary | Self::TactileServo)
+    }
+}
+
+impl PolicyArg {
+    /// As it was typed.
+    fn word(&self) -> String {
+        match self {
+            Self::Builtin(policy) => policy.name(),
+            Self::Lua(path) | Self::Run(path) => path.display().to_string(),
+            Self::Server(url) => url.clone(),
+        }
+    }
+}
+
+fn parse_policy(word: &str) -> Result<PolicyArg, String> {
+    if let Ok(policy) = BuiltinPolicy::from_str(word, false) {
+        return Ok(PolicyArg::Builtin(policy));
+    }
+    Ok(match word {
+        address if address.contains("://") => PolicyArg::Server(address.to_owned()),
+        file if file.ends_with(".lua") => PolicyArg::Lua(file.into()),
+        data if is_dataset(Path::new(data)) => {
+            return Err(format!(
+                "{data} is a dataset, not a policy; to simulate its demonstrations again: softvt replay {data} 0/0 for \
+                 one, softvt dataset check {data} --replay all for all; for demonstrations of another simulator: softvt \
+                 dataset import SUITE.lua FILE.hdf5 --out DIR"
+            ));
+        }
+        folder if Path::new(folder).is_dir() => PolicyArg::Run(folder.into()),
+        other => {
+            let known: Vec<String> = BuiltinPolicy::descriptions().map(|(name, _)| name).collect();
+            let hint = suggestion(other, known.iter().map(String::as_str));
+            return Err(format!(
+                "expected {}, a Lua file such as my_policy.lua, a server such as ws://host:8000, or a run folder{hint}",
+                known.join(", ")
+            ));
+        }
+    })
+}
+
+fn parse_profile(word: &str) -> Result<String, String> {
+    let known = PROFILES.map(|(name, _)| name);
+    if word.ends_with(".lua") || known.contains(&word) {
+        return Ok(word.to_owned());
+    }
+    let hint = suggestion(word, known.into_iter());
+    Err(format!("[possible values: {}, or a Lua file such as my_profile.lua]{hint}", known.join(", ")))
+}
+
+/// Returns the end of a message that suggests the closest known name; empty if none is close.
+fn suggestion<'a>(word: &str, known: impl Iterator<Item = &'a str>) -> String {
+    text::suggest(word, known).map_or(String::new(), |name| format!("; did you mean {name}?"))
+}
+
+fn parse_timeout(word: &str) -> Result<Duration, String> {
+    let seconds = word.parse().ok().filter(|seconds| (0.01..=86_400.0).contains(seconds));
+    seconds.map(Duration::from_secs_f64).ok_or_else(|| "expected seconds in 0.01..86400".to_owned())
+}
+
+fn parse_name(word: &str) -> Result<String, String> {
+    let is_valid = !word.trim().is_empty() && word.len() <= 80 && !word.chars().any(char::is_control);
+    if is_valid { Ok(word.to_owned()) } else { Err("expected a name of 1 to 80 characters".to_owned()) }
+}
 
 /// Makes the controller of an episode.
 pub(crate) type ControllerFactory =
     Box<dyn Fn(EpisodeSetup, TaskBrief) -> Result<Box<dyn Controller>, CliError> + Sync>;
 
-/// Configuration of a policy server.
+/// A policy on a server.
 #[derive(Debug)]
-pub(crate) struct RemotePolicyConfig {
-    pub url: String,
-    pub protocol: Protocol,
-    pub profile: Profile,
+struct ServerPolicy {
+    server: PolicyServer,
     /// The profile as `--profile` names it.
-    pub profile_name: String,
+    profile_name: String,
     /// SHA-256 of the files of the profile, by name.
-    pub sources: BTreeMap<String, String>,
+    sources: BTreeMap<String, String>,
     /// Actions executed from each chunk.
-    pub replan: usize,
-    pub timeout: Duration,
+    replan: usize,
 }
 
 #[derive(Clone, Debug)]
-pub(crate) enum PolicyKind {
-    Expert(GripMode),
-    Noop,
-    Random,
+enum PolicyKind {
+    Builtin(BuiltinPolicy),
     /// A policy in Lua, and the actions executed from each chunk if that is limited.
     Lua {
         file: Arc<PolicyFile>,
         replan: Option<usize>,
     },
-    Server(Arc<RemotePolicyConfig>),
+    Server(Arc<ServerPolicy>),
     /// Repeats the actions of recorded runs.
     Recorded(Arc<RecordedRuns>),
     /// The actions come from elsewhere: a client, a dataset or a single recorded episode.
@@ -69,6 +205,13 @@ pub(crate) struct PolicyConfig {
     name: String,
 }
 
+impl Default for PolicyConfig {
+    /// The scripted experts of the tasks.
+    fn default() -> Self {
+        Self { kind: PolicyKind::Builtin(BuiltinPolicy::Expert), name: BuiltinPolicy::Expert.name() }
+    }
+}
+
 impl PolicyConfig {
     /// Loads the policy that the arguments select.
     ///
@@ -77,11 +220,9 @@ impl PolicyConfig {
     pub(crate) fn load(args: &PolicyArgs) -> Result<Self, CliError> {
         refuse_flags_without_effect(args)?;
         let (kind, name) = match &args.policy {
-            PolicyArg::Expert(mode) => (PolicyKind::Expert(*mode), args.policy.word()),
-            PolicyArg::Noop => (PolicyKind::Noop, args.policy.word()),
-            PolicyArg::Random => (PolicyKind::Random, args.policy.word()),
+            PolicyArg::Builtin(policy) => (PolicyKind::Builtin(*policy), policy.name()),
             PolicyArg::Lua(path) => {
-                let file = PolicyFile::load(path).map_err(CliError::input)?;
+                let file = PolicyFile::load(path)?;
                 let replan = args.replan.map(usize::from).or(file.replan);
                 let name = file.name.clone();
                 (PolicyKind::Lua { file: Arc::new(file), replan }, name)
@@ -89,31 +230,23 @@ impl PolicyConfig {
             PolicyArg::Server(url) => {
                 let (profile, sources) = load_profile_of(args)?;
                 let name = profile.name.clone();
-                let server = RemotePolicyConfig {
+                let server = PolicyServer {
                     url: url.clone(),
-                    protocol: match args.protocol {
-                        Some(ProtocolArg::VlaEval) => Protocol::VlaEval,
-                        Some(ProtocolArg::Openpi) | None => Protocol::Openpi,
-                    },
+                    protocol: args.protocol.unwrap_or_default(),
                     profile,
-                    profile_name: args.profile.clone().unwrap_or_else(|| DEFAULT_PROFILE.to_owned()),
-                    sources,
-                    replan: args.replan.map_or(DEFAULT_REPLAN, usize::from),
                     timeout: args.policy_timeout.unwrap_or(DEFAULT_TIMEOUT),
+                    api_key: std::env::var(API_KEY).ok(),
+                    cancel: &cancel::FLAG,
                 };
-                (PolicyKind::Server(Arc::new(server)), name)
+                let profile_name = args.profile.clone().unwrap_or_else(|| DEFAULT_PROFILE.to_owned());
+                let replan = args.replan.map_or(DEFAULT_REPLAN, usize::from);
+                (PolicyKind::Server(Arc::new(ServerPolicy { server, profile_name, sources, replan })), name)
             }
             PolicyArg::Run(dir) => {
                 (PolicyKind::Recorded(Arc::new(RecordedRuns::load(dir)?)), "replay".to_owned())
             }
         };
         Ok(Self { kind, name: args.name.clone().unwrap_or(name) })
-    }
-
-    /// The scripted experts of the tasks.
-    pub(crate) fn expert() -> Self {
-        let mode = GripMode::Commanded;
-        Self { kind: PolicyKind::Expert(mode), name: mode.policy_name().to_owned() }
     }
 
     /// Actions that come from elsewhere, under a name such as `replay`.
@@ -126,17 +259,17 @@ impl PolicyConfig {
         &self.name
     }
 
-    /// Gripper control of the experts. `None` for other policies.
-    pub(crate) fn grip_mode(&self) -> Option<GripMode> {
+    /// The scripted expert. `None` for other policies.
+    pub(crate) fn expert(&self) -> Option<BuiltinPolicy> {
         match self.kind {
-            PolicyKind::Expert(mode) => Some(mode),
+            PolicyKind::Builtin(policy) if policy.is_expert() => Some(policy),
             _ => None,
         }
     }
 
     /// True if the policy has access to ground-truth state.
     pub(crate) fn is_privileged(&self) -> bool {
-        self.grip_mode().is_some()
+        self.expert().is_some()
     }
 
     pub(crate) fn is_remote(&self) -> bool {
@@ -146,7 +279,7 @@ impl PolicyConfig {
     /// Profile of a policy server.
     pub(crate) fn profile(&self) -> Option<&Profile> {
         match &self.kind {
-            PolicyKind::Server(server) => Some(&server.profile),
+            PolicyKind::Server(remote) => Some(&remote.server.profile),
             _ => None,
         }
     }
@@ -154,8 +287,8 @@ impl PolicyConfig {
     /// The sensors that a policy declares, and the source location of the declaration.
     pub(crate) fn declared_streams(&self) -> Option<(String, SensorStreams)> {
         match &self.kind {
-            PolicyKind::Server(server) => {
-                Some((format!("--profile {}: inputs", server.profile_name), server.profile.streams()))
+            PolicyKind::Server(remote) => {
+                Some((format!("--profile {}: inputs", remote.profile_name), remote.server.profile.streams()))
             }
             PolicyKind::Lua { file, .. } => {
                 Some((format!("{}: policy.observes", file.observes_at), file.streams.clone()))
@@ -167,7 +300,7 @@ impl PolicyConfig {
     /// Actions executed from each chunk, for policies that predict chunks.
     pub(crate) fn replan(&self) -> Option<usize> {
         match &self.kind {
-            PolicyKind::Server(server) => Some(server.replan),
+            PolicyKind::Server(remote) => Some(remote.replan),
             PolicyKind::Lua { replan, .. } => *replan,
             _ => None,
         }
@@ -185,7 +318,7 @@ impl PolicyConfig {
     pub(crate) fn sources(&self) -> BTreeMap<String, String> {
         match &self.kind {
             PolicyKind::Lua { file, .. } => file.hashes(),
-            PolicyKind::Server(server) => server.sources.clone(),
+            PolicyKind::Server(remote) => remote.sources.clone(),
             _ => BTreeMap::new(),
         }
     }
@@ -200,15 +333,8 @@ impl PolicyConfig {
 
     /// Connections to the policy server, if there is one. Nothing is connected yet.
     pub(crate) fn connections(&self) -> Option<Arc<PolicyConnections>> {
-        let PolicyKind::Server(server) = &self.kind else { return None };
-        Some(Arc::new(PolicyConnections::new(PolicyServer {
-            url: server.url.clone(),
-            protocol: server.protocol,
-            profile: server.profile.clone(),
-            timeout: server.timeout,
-            api_key: std::env::var(API_KEY).ok(),
-            cancel: &cancel::FLAG,
-        })))
+        let PolicyKind::Server(remote) = &self.kind else { return None };
+        Some(Arc::new(PolicyConnections::new(remote.server.clone())))
     }
 
     /// A factory of controllers for the episodes of a suite; `connections` are those of [`Self::connections`].
@@ -224,24 +350,26 @@ impl PolicyConfig {
                 Box::new(ChunkedPolicy::new(policy, brief.clone(), replan))
             };
             Ok(match (&kind, &connections) {
-                (PolicyKind::Server(server), Some(connections)) => {
-                    chunked(Box::new(RemotePolicy::new(connections.clone())), server.replan)
+                (PolicyKind::Server(remote), Some(connections)) => {
+                    chunked(Box::new(RemotePolicy::new(connections.clone())), remote.replan)
                 }
                 (PolicyKind::Recorded(runs), _) => {
                     let actions = runs.actions(&suite, is_rigid_twin, &brief)?;
                     chunked(Box::new(RecordedPolicy::from_actions(&actions, None)), 1)
                 }
                 (PolicyKind::Lua { file, replan }, _) => {
-                    let policy = file.start(&opened.seed).map_err(CliError::input)?;
+                    let policy = file.start(&opened.seed)?;
                     chunked(Box::new(policy), replan.unwrap_or(usize::MAX))
                 }
-                (PolicyKind::Noop, _) => chunked(Box::<builtin::NoopPolicy>::default(), 1),
-                (PolicyKind::Random, _) => {
+                (PolicyKind::Builtin(BuiltinPolicy::Noop), _) => {
+                    chunked(Box::<builtin::NoopPolicy>::default(), 1)
+                }
+                (PolicyKind::Builtin(BuiltinPolicy::Random), _) => {
                     let seed = rand::RngCore::next_u64(&mut opened.seed.stream(RandomStream::Script));
                     chunked(Box::new(builtin::RandomPolicy::new(seed)), 1)
                 }
-                (PolicyKind::Expert(mode), _) => Box::new(expert_controller(opened, *mode)?),
-                // Whoever provides the actions replaces this factory.
+                (PolicyKind::Builtin(expert), _) => Box::new(expert_controller(opened, *expert)?),
+                // The provider of the actions replaces this factory.
                 (PolicyKind::External | PolicyKind::Server(_), _) => {
                     chunked(Box::new(RecordedPolicy::new(Vec::new(), None)), 1)
                 }
@@ -254,12 +382,14 @@ impl PolicyConfig {
 ///
 /// # Errors
 /// The task has none, or its script fails.
-pub(crate) fn expert_controller(opened: EpisodeSetup, mode: GripMode) -> Result<ExpertController, CliError> {
-    let expert = opened.expert();
-    let expert = expert.ok_or_else(|| CliError::input("the task has no expert"))?;
-    Ok(match mode {
-        GripMode::TactileServo => ExpertController::servo(expert),
-        GripMode::Commanded | GripMode::Binary => ExpertController::new(expert, mode == GripMode::Binary),
+pub(crate) fn expert_controller(
+    opened: EpisodeSetup,
+    policy: BuiltinPolicy,
+) -> Result<ExpertController, CliError> {
+    let expert = opened.expert().ok_or_else(|| CliError::input("the task has no expert"))?;
+    Ok(match policy {
+        BuiltinPolicy::TactileServo => ExpertController::servo(expert),
+        _ => ExpertController::new(expert, policy == BuiltinPolicy::ExpertBinary),
     })
 }
 
@@ -271,10 +401,10 @@ pub(crate) fn load_profile_of(args: &PolicyArgs) -> Result<(Profile, BTreeMap<St
     let name = args.profile.as_deref().unwrap_or(DEFAULT_PROFILE);
     let (mut profile, sources) = match Profile::named(name) {
         Some(profile) => (profile, BTreeMap::new()),
-        None => load_profile(Path::new(name)).map_err(CliError::input)?,
+        None => load_profile(Path::new(name))?,
     };
     if let Some(mode) = args.gripper {
-        profile.actions.gripper.binary = mode == GripperArg::Binary;
+        profile.actions.gripper.binary = mode == GripperCoding::Binary;
     }
     Ok((profile, sources))
 }
@@ -296,19 +426,9 @@ fn refuse_flags_without_effect(args: &PolicyArgs) -> Result<(), CliError> {
     Err(CliError::input(format!("{flag}: applies to {kinds} only; --policy {policy} ignores it")))
 }
 
-/// Converts the error of a policy server.
-pub(crate) fn policy_failure(error: PolicyError) -> CliError {
-    match error {
-        PolicyError::Interrupted => CliError::interrupted("interrupted"),
-        PolicyError::Address(message) => CliError::input(message),
-        other => CliError::policy(other),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli::args::POLICIES;
 
     fn args(policy: PolicyArg) -> PolicyArgs {
         PolicyArgs {
@@ -324,31 +444,41 @@ mod tests {
 
     #[test]
     fn built_in_policies_have_the_names_that_are_listed() {
-        use GripMode::{Binary, Commanded, TactileServo};
-        let experts = [Commanded, Binary, TactileServo].map(PolicyArg::Expert);
-        let specs = experts.into_iter().chain([PolicyArg::Noop, PolicyArg::Random]);
-        for ((name, _), spec) in POLICIES.into_iter().zip(specs) {
-            let policy = PolicyConfig::load(&args(spec)).unwrap();
+        for (name, _) in BuiltinPolicy::descriptions() {
+            let policy = PolicyConfig::load(&args(parse_policy(&name).unwrap())).unwrap();
             assert_eq!(policy.name(), name);
             assert_eq!(policy.is_privileged(), name.starts_with("expert") || name == "tactile-servo");
         }
     }
 
     #[test]
+    fn the_form_of_a_word_decides_what_kind_of_policy_it_is() {
+        assert_eq!(parse_policy("ws://x:1"), Ok(PolicyArg::Server("ws://x:1".into())));
+        assert_eq!(parse_policy("a/b.lua"), Ok(PolicyArg::Lua("a/b.lua".into())));
+        assert_eq!(parse_policy("."), Ok(PolicyArg::Run(".".into())));
+        assert!(parse_policy("exprt").unwrap_err().ends_with("did you mean expert?"));
+        assert!(parse_profile("visoin").unwrap_err().ends_with("did you mean vision?"));
+        for (name, about) in BuiltinPolicy::descriptions() {
+            assert_eq!(parse_policy(&name).unwrap().word(), name);
+            assert!(!about.is_empty());
+        }
+    }
+
+    #[test]
     fn flags_without_effect_are_refused() {
         let message = |args: PolicyArgs| PolicyConfig::load(&args).unwrap_err().message;
-        let noop = || args(PolicyArg::Noop);
-        let servo = PolicyArg::Expert(GripMode::TactileServo);
+        let noop = || args(PolicyArg::Builtin(BuiltinPolicy::Noop));
+        let servo = PolicyArg::Builtin(BuiltinPolicy::TactileServo);
         assert_eq!(
             message(PolicyArgs { replan: Some(3), ..noop() }),
             "--replan: applies to policy servers and Lua policies only; --policy noop ignores it"
         );
         for (flag, args) in [
             ("--profile", PolicyArgs { profile: Some("vision".into()), ..noop() }),
-            ("--protocol", PolicyArgs { protocol: Some(ProtocolArg::VlaEval), ..noop() }),
+            ("--protocol", PolicyArgs { protocol: Some(Protocol::VlaEval), ..noop() }),
             (
                 "--gripper",
-                PolicyArgs { gripper: Some(GripperArg::Binary), ..args(PolicyArg::Lua("x.lua".into())) },
+                PolicyArgs { gripper: Some(GripperCoding::Binary), ..args(PolicyArg::Lua("x.lua".into())) },
             ),
             ("--policy-timeout", PolicyArgs { policy_timeout: Some(DEFAULT_TIMEOUT), ..args(servo) }),
         ] {

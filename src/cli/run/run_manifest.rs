@@ -12,7 +12,7 @@ use crate::{
     benchmark::{ShiftValue, Task, settings::Settings},
     cli::{
         error::CliError,
-        run::{recorded_policy::ReplaySource, suite_run::SuiteRun},
+        run::{recorded_runs::ReplaySource, suite_run::SuiteRun},
     },
     dataset::card::Imported,
     files,
@@ -80,7 +80,7 @@ impl<'a> RunManifest<'a> {
             softvt: env!("CARGO_PKG_VERSION"),
             script: run.loaded.main.clone(),
             suite: &run.suite.name,
-            twin: config.is_rigid_twin.then_some("rigid"),
+            twin: config.is_rigid_twin().then_some("rigid"),
             policy: config.policy.name(),
             profile: config.policy.profile(),
             policy_file: config.policy.file(),
@@ -88,14 +88,14 @@ impl<'a> RunManifest<'a> {
             imported: Some(&run.imported[..]).filter(|files| !files.is_empty()),
             replan: config.policy.replan(),
             privileged: run.is_privileged(),
-            seed: config.seed,
+            seed: config.script.seed,
             split: run.split.name(),
             tasks: tasks.iter().map(|task| task.id).collect(),
             episodes,
-            shard: config.shard.map(|shard| shard.to_string()),
+            shard: config.flags.shard.map(|shard| shard.to_string()),
             shifts: &config.shifts,
             options: options.map(|option| (option.name.clone(), format!("{:?}", option.value))).collect(),
-            arguments: &config.script_options,
+            arguments: &config.script.options,
             set: &config.settings,
             settings: &run.settings,
             sources: run.sources.clone(),
@@ -113,8 +113,8 @@ impl<'a> RunManifest<'a> {
 /// The file cannot be written, or belongs to another run.
 pub(crate) fn write(folder: &RunFolder, manifest: &impl Serialize) -> Result<(), CliError> {
     let path = folder.path().join(RUN);
-    let Some(stored) = folder.read(RUN).map_err(CliError::input)? else {
-        return files::write_json(&path, manifest).map_err(CliError::input);
+    let Some(stored) = folder.read(RUN)? else {
+        return Ok(files::write_json(&path, manifest)?);
     };
     let path = path.display();
     let stored: Value = serde_json::from_str(&stored)
@@ -132,7 +132,7 @@ pub(crate) fn write(folder: &RunFolder, manifest: &impl Serialize) -> Result<(),
 /// # Errors
 /// The file cannot be read.
 pub(crate) fn is_in(dir: &Path, manifest: &RunManifest) -> Result<bool, CliError> {
-    let text = files::read_text(&dir.join(RUN)).map_err(CliError::input)?;
+    let text = files::read_text(&dir.join(RUN))?;
     Ok(serde_json::from_str::<Value>(&text).is_ok_and(|stored| stored == json!(manifest)))
 }
 

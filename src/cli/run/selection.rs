@@ -21,7 +21,22 @@ impl EpisodeJob<'_> {
     }
 }
 
-/// The suites of a plan, for commands that need at least one.
+/// The suites of a plan that is a suite or a list of suites; empty for other plans.
+pub(crate) fn suites_of(plan: &Plan) -> &[Suite] {
+    match plan {
+        Plan::Suite(_) | Plan::Suites { .. } => plan.suites(),
+        Plan::Conditions { .. } | Plan::Experiment { .. } => &[],
+    }
+}
+
+/// An error about a plan without the suites that a command needs.
+pub(crate) fn needs_suites(command: &str, config: &RunConfig) -> CliError {
+    config.error(format!(
+        "softvt {command} needs a suite or a list of suites; name a file that returns softvt.suite"
+    ))
+}
+
+/// The suites of a plan, for commands that write a folder for each.
 ///
 /// # Errors
 /// The plan is neither a suite nor a list of suites with distinct folders.
@@ -29,17 +44,13 @@ pub(crate) fn select_suites<'a>(
     command: &str,
     config: &RunConfig,
     plan: &'a Plan,
-) -> Result<Vec<&'a Suite>, CliError> {
-    match plan {
-        Plan::Suite(suite) => Ok(vec![suite]),
-        Plan::Suites { suites } => {
-            check_distinct_out_dirs(config, suites)?;
-            Ok(suites.iter().collect())
-        }
-        Plan::Conditions { .. } | Plan::Experiment { .. } => Err(CliError::input(format!(
-            "{}: softvt {command} needs a suite or a list of suites; name a file that returns softvt.suite",
-            config.file.display()
-        ))),
+) -> Result<&'a [Suite], CliError> {
+    let suites = suites_of(plan);
+    check_distinct_out_dirs(config, suites)?;
+    if matches!(plan, Plan::Suite(_) | Plan::Suites { .. }) {
+        Ok(suites)
+    } else {
+        Err(needs_suites(command, config))
     }
 }
 
@@ -48,9 +59,9 @@ pub(crate) fn select_suites<'a>(
 /// # Errors
 /// A word that matches no task, or a task without an expert where the expert is the policy.
 pub(crate) fn select_tasks<'a>(config: &RunConfig, suite: &'a Suite) -> Result<Vec<&'a Task>, CliError> {
-    let refuse = |message: String| Err(CliError::input(message).prefixed(config.file.display()));
+    let refuse = |message: String| Err(config.error(message));
     let mut selected: Vec<&Task> = Vec::new();
-    for word in &config.tasks {
+    for word in &config.flags.tasks {
         if word.trim().is_empty() {
             return refuse(format!("--task: expected an index or part of a prompt, got {word:?}"));
         }
@@ -72,7 +83,7 @@ pub(crate) fn select_tasks<'a>(config: &RunConfig, suite: &'a Suite) -> Result<V
             ));
         }
     }
-    if config.tasks.is_empty() {
+    if config.flags.tasks.is_empty() {
         selected.extend(&suite.tasks);
     }
     selected.sort_by_key(|task| task.id);
@@ -89,11 +100,10 @@ pub(crate) fn select_episodes<'a>(
     suite: &Suite,
     tasks: &[&'a Task],
 ) -> Vec<EpisodeJob<'a>> {
-    let episodes = config.episodes.unwrap_or(suite.episodes);
+    let episodes = config.flags.episodes.unwrap_or(suite.episodes);
     let all = tasks.iter().flat_map(|task| (0..episodes).map(move |episode| EpisodeJob { task, episode }));
-    let selected =
-        all.enumerate().filter(|(number, _)| config.shard.is_none_or(|shard| shard.contains(*number)));
-    selected.map(|(_, job)| job).collect()
+    let is_selected = |job: usize| config.flags.shard.is_none_or(|shard| shard.contains(job));
+    all.enumerate().filter(|(number, _)| is_selected(*number)).map(|(_, job)| job).collect()
 }
 
 /// Checks that every suite gets an output folder of its own.
@@ -104,9 +114,8 @@ pub(crate) fn check_distinct_out_dirs(config: &RunConfig, suites: &[Suite]) -> R
     let mut folders = BTreeSet::new();
     let duplicate = suites.iter().find(|suite| !folders.insert(path_component(&suite.name)));
     duplicate.map_or(Ok(()), |suite| {
-        Err(CliError::input(format!(
-            "{}: suite {:?} and another suite share the folder {:?}; rename one",
-            config.file.display(),
+        Err(config.error(format!(
+            "suite {:?} and another suite share the folder {:?}; rename one",
             suite.name,
             path_component(&suite.name)
         )))

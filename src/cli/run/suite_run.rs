@@ -1,55 +1,49 @@
-//! A run of one suite: its deformation limits, its episodes and their files.
+//! A suite with everything that its episodes need: settings, deformation limits, assets and controllers.
 
 use std::{
-    collections::{BTreeMap, BTreeSet},
+    collections::BTreeMap,
     path::{Path, PathBuf},
     sync::Arc,
 };
 
 use crate::{
-    benchmark::{ShiftValue, Suite, Task, settings::Settings},
+    benchmark::{ObjectType, ShiftValue, Suite, Task, settings::Settings},
     cli::{
-        args::TraceDetail,
         error::{CliError, Exit},
-        output::{Progress, notice},
+        output::eprint_notice,
         run::{
-            calibration::{self, Calibration},
-            config::RunConfig,
+            config::{RunConfig, TraceDetail},
             episode_artifacts::EpisodeArtifacts,
             policy::ControllerFactory,
-            recorded_policy::{ReplaySource, find_replay_source},
-            resimulate,
-            run_manifest::{self, RunManifest},
+            recorded_runs::{RecordedRuns, ReplaySource},
             selection::EpisodeJob,
         },
     },
     dataset::card::Imported,
     evaluation::{
         episode_id::{EpisodeId, EpisodeIndex, Split},
-        record::{EpisodeRecord, Origin, Outcome},
+        record::Origin,
         safety::{DeformationLimit, NOMINAL_KAPPA},
-        summary::SuiteSummary,
         thresholds::ThresholdFile,
     },
-    files, parallel,
-    policy::{TaskBrief, remote::PolicyConnections},
-    report::{
-        run_folder::{EPISODES, RUN, RunFolder, SUMMARY},
-        softvtbench_files,
-    },
+    files,
+    policy::{PolicyError, SensorStreams, TaskBrief, remote::PolicyConnections},
     rollout::{
         AssetCache, BuildError, Cancellable, ControlError, Episode, EpisodeError, EpisodeSpec,
-        FinishedEpisode, SensorAssets, cancel, target_asset,
+        FinishedEpisode, SensorAssets, SensorSuite, Simulation, cancel, check_sensors, target_asset,
     },
-    scene::{Asset, Body},
+    scene::{Asset, Body, Scene},
     script::{self, EpisodeSetup, LoadedScript},
-    text::counted,
+    text::unknown_name,
 };
+
+/// Folders above a script in which its calibration files are searched, the script's own included.
+const MAX_PARENT_FOLDERS: usize = 3;
 
 /// A suite with everything that its episodes need.
 ///
-/// [`SuiteRun::prepare`] checks the scenes and reads the limits. [`run_suite`] then runs all episodes into the folder;
-/// other commands run single episodes with [`SuiteRun::run_episode`].
+/// [`SuiteRun::prepare`] checks the scenes and reads the limits. [`run_suite`](super::evaluate::run_suite) then runs all
+/// episodes into the folder; other commands run single episodes with [`SuiteRun::run_episode`].
 pub(crate) struct SuiteRun<'a> {
     pub config: &'a RunConfig,
     pub loaded: &'a LoadedScript,
@@ -61,7 +55,7 @@ pub(crate) struct SuiteRun<'a> {
     /// Deformation limits by asset. `None` if no squeeze of the calibration was stable, or without a calibration.
     pub limits: BTreeMap<String, Option<DeformationLimit>>,
     /// The calibrations in use, merged into a file in the format of SoftVTBench.
-    thresholds: ThresholdFile,
+    pub thresholds: ThresholdFile,
     /// SHA-256 of every file that the results depend on, by name.
     pub sources: BTreeMap<String, String>,
     /// The recorded run whose actions are repeated.
@@ -83,12 +77,6 @@ pub(crate) struct SuiteRun<'a> {
     pub controllers: ControllerFactory,
 }
 
-/// The episodes of a finished run, in order, with their summary.
-pub(crate) struct SuiteResult {
-    pub summary: SuiteSummary,
-    pub records: Vec<EpisodeRecord>,
-}
-
 impl<'a> SuiteRun<'a> {
     /// A run of `jobs` into the folder `out`. Nothing is run or written yet.
     ///
@@ -101,12 +89,11 @@ impl<'a> SuiteRun<'a> {
         jobs: Vec<EpisodeJob<'a>>,
         out: PathBuf,
     ) -> Result<Self, CliError> {
-        let refuse =
-            |flag: &str, error: String| CliError::input(error).prefixed(flag).prefixed(config.file.display());
-        let settings =
-            suite.settings.with_all(&config.settings).map_err(|e| refuse("--set", e.to_string()))?;
+        let settings = suite.settings.with_all(&config.settings);
+        let settings = settings.map_err(|error| config.error(format!("--set: {error}")))?;
         for ShiftValue { name, value } in &config.shifts {
-            script::check_shift(&suite.shifts, name, *value).map_err(|e| refuse("--shift", e.to_string()))?;
+            script::check_shift(&suite.shifts, name, *value)
+                .map_err(|error| config.error(format!("--shift: {error}")))?;
         }
         let replay_source = find_replay_source(config, suite, &jobs)?;
         let connections = config.policy.connections();
@@ -128,12 +115,12 @@ impl<'a> SuiteRun<'a> {
             assets: AssetCache::default(),
             sensor_assets: SensorAssets::default(),
             out,
-            renders_episodes: config.video.is_some(),
+            renders_episodes: config.flags.video.is_some(),
             split: Split::Validation,
             controllers: config.policy.controller_factory(
                 connections.clone(),
                 &suite.name,
-                config.is_rigid_twin,
+                config.is_rigid_twin(),
             ),
             connections,
             origins: BTreeMap::new(),
@@ -141,16 +128,10 @@ impl<'a> SuiteRun<'a> {
         })
     }
 
-    /// Shares prepared assets with runs of other suites.
-    pub(crate) fn with_assets(self, assets: &AssetCache, sensor_assets: &SensorAssets) -> Self {
-        Self { assets: assets.clone(), sensor_assets: sensor_assets.clone(), ..self }
-    }
-
     /// Builds the scene of an episode: its layout, the shifts, and the rigid twin if requested.
     pub(crate) fn open_episode(&self, id: &EpisodeId) -> Result<EpisodeSetup, CliError> {
-        let opened = EpisodeSetup::open(self.loaded, id, &self.config.shifts);
-        let mut opened = opened.map_err(CliError::input)?;
-        if self.config.is_rigid_twin {
+        let mut opened = EpisodeSetup::open(self.loaded, id, &self.config.shifts)?;
+        if self.config.is_rigid_twin() {
             (opened.scene, opened.nominal) = (opened.scene.rigid_twin(), opened.nominal.rigid_twin());
         }
         Ok(opened)
@@ -172,20 +153,9 @@ impl<'a> SuiteRun<'a> {
             suite: self.suite.name.clone(),
             task: task.id,
             episode,
-            base_seed: self.config.seed,
+            base_seed: self.config.script.seed,
             split: self.split,
         }
-    }
-
-    /// Reads the deformation limits of the targets of tasks, without any other preparation.
-    ///
-    /// # Errors
-    /// A layout or a calibration file that is not valid.
-    pub(crate) fn read_limits(&mut self, tasks: &[Task]) -> Result<(), CliError> {
-        tasks.iter().try_for_each(|task| {
-            let opened = self.open_episode(&self.episode_id(task, 0))?;
-            self.read_limit(target_asset(&opened.nominal, task).cloned())
-        })
     }
 
     /// Reads the deformation limit of a target, if it is soft and its limit is not known yet.
@@ -208,28 +178,28 @@ impl<'a> SuiteRun<'a> {
         self.sources.clone_from(&other.sources);
     }
 
+    /// Reads the limit from the calibration file of an asset. Warns if there is none for this version of the asset.
     fn calibrated_limit(&mut self, asset: &Asset) -> Result<Option<DeformationLimit>, CliError> {
         let name = &asset.name;
+        let relative_path = format!("assets/calibration/{name}.json");
         let fix =
             format!("its episodes cannot be judged safe; run: softvt scripts/calibrate.lua --asset {name}");
-        match calibration::find(&self.config.file, asset)? {
-            Calibration::Missing => {
-                notice(format!("{name} is not calibrated (no assets/calibration/{name}.json): {fix}"));
-                Ok(None)
-            }
-            Calibration::OtherVersion { path } => {
-                notice(format!(
-                    "{path} was computed for a different version of {name:?} (its shape, material or friction \
-                     differ): {fix}"
-                ));
-                Ok(None)
-            }
-            Calibration::Found { limit, file, relative_path, text } => {
-                self.sources.insert(relative_path, script::sha256(text.as_bytes()));
-                self.thresholds.merge(*file);
-                Ok(limit)
-            }
+        let Some(ProjectFile { text, path }) = find_file(&self.config.script.file, &relative_path)? else {
+            eprint_notice(format!("{name} is not calibrated (no {relative_path}): {fix}"));
+            return Ok(None);
+        };
+        let file = ThresholdFile::parse(&text, &path)?;
+        // The published files of SoftVTBench have no fingerprint; they are assumed to fit.
+        if file.fingerprints.get(name).is_some_and(|calibrated| *calibrated != asset.fingerprint()) {
+            eprint_notice(format!(
+                "{path} was computed for a different version of {name:?} (its shape, material or friction differ): {fix}"
+            ));
+            return Ok(None);
         }
+        let limit = file.limit(name);
+        self.sources.insert(relative_path, script::sha256(text.as_bytes()));
+        self.thresholds.merge(file);
+        Ok(limit)
     }
 
     /// The limit of an object as the layout of this episode made it, before any shift.
@@ -240,135 +210,10 @@ impl<'a> SuiteRun<'a> {
         calibrated.is_none_or(|calibrated| *calibrated == asset.fingerprint()).then_some(limit)
     }
 
-    /// Runs the episodes that are not in `records`, writes all files and summarizes.
-    ///
-    /// # Errors
-    /// A script, policy or file that fails, or an interrupt. Finished episodes are kept.
-    pub(crate) fn run_all(
-        &self,
-        mut folder: RunFolder,
-        mut records: Vec<EpisodeRecord>,
-    ) -> Result<SuiteResult, CliError> {
-        let remaining = self.remaining(&records);
-        let outcome = match resimulate::restore_artifacts(self, &records) {
-            Ok(()) => self.run_episodes(&remaining, &mut folder, &mut records),
-            failed => failed,
-        };
-        let out = self.out.display();
-        let kept = format!("{} of {} are in {out}", records.len(), counted(self.jobs.len(), "episode"));
-        let interrupted =
-            || CliError::interrupted(format!("interrupted; {kept}; continue with --resume --out {out}"));
-        match outcome {
-            // An error from before the interrupt has its own exit code and is reported as it is.
-            Err(error) if error.exit == Exit::Interrupted => return Err(interrupted()),
-            Err(error) if records.is_empty() => {
-                // The same command must work once the error is fixed, and there is nothing to keep.
-                folder.discard().map_err(CliError::input)?;
-                return Err(error);
-            }
-            Err(error) => return Err(error.with_line(&kept)),
-            Ok(()) if cancel::requested() => return Err(interrupted()),
-            Ok(()) => {}
-        }
-        records.sort_by_key(|record| record.header.id.index());
-        folder.write_in_order(&records).map_err(CliError::input)?;
-        softvtbench_files::write_scores(&self.out, &records, &self.thresholds).map_err(CliError::input)?;
-        let result = self.summarize(records);
-        // Last, since a folder with a summary counts as finished.
-        files::write_json(&self.out.join(SUMMARY), &result.summary).map_err(CliError::input)?;
-        notice(out);
-        Ok(result)
-    }
-
-    pub(crate) fn summarize(&self, records: Vec<EpisodeRecord>) -> SuiteResult {
-        let summary = SuiteSummary::of(&self.name, self.config.policy.name(), &records);
-        SuiteResult { summary, records }
-    }
-
-    /// True if a finished run lacks nothing: no episode, and no file of one.
-    fn is_complete(&self, records: &[EpisodeRecord]) -> bool {
-        let artifacts = self.artifacts();
-        self.remaining(records).is_empty()
-            && softvtbench_files::has_scores(&self.out)
-            && records.iter().all(|record| artifacts.missing(record).is_empty())
-    }
-
     /// Files of the episodes, other than their lines in `episodes.jsonl`.
     pub(crate) fn artifacts(&self) -> EpisodeArtifacts<'_> {
-        EpisodeArtifacts::new(self.config, &self.out)
-    }
-
-    /// Checks that all records are episodes of this run, each at most once.
-    ///
-    /// # Errors
-    /// The first line of `episodes.jsonl` that is not.
-    pub(crate) fn check_records(
-        &self,
-        folder: &RunFolder,
-        records: &[EpisodeRecord],
-    ) -> Result<(), CliError> {
-        let path = folder.path().join(EPISODES).display().to_string();
-        if !records.is_empty() && folder.read(RUN).map_err(CliError::input)?.is_none() {
-            return Err(CliError::input(format!(
-                "{path}: there is no {RUN} next to it, so its run is not known"
-            )));
-        }
-        let requested: BTreeSet<_> = self.jobs.iter().map(EpisodeJob::index).collect();
-        let mut seen = BTreeSet::new();
-        for (number, record) in records.iter().enumerate() {
-            let (config, header) = (self.config, &record.header);
-            let (id, index) = (&header.id, header.id.index());
-            let is_own =
-                id.suite == self.name && id.base_seed == config.seed && header.policy == config.policy.name();
-            let problem = if !is_own || !requested.contains(&index) {
-                "belongs to another run"
-            } else if !seen.insert(index) {
-                "occurs twice"
-            } else {
-                continue;
-            };
-            return Err(CliError::input(format!("{path}:{}: {index} {problem}", number + 1)));
-        }
-        Ok(())
-    }
-
-    /// Positions in `jobs` of the episodes that are not in `records`.
-    fn remaining(&self, records: &[EpisodeRecord]) -> Vec<usize> {
-        let finished: BTreeSet<_> = records.iter().map(|record| record.header.id.index()).collect();
-        (0..self.jobs.len()).filter(|&job| !finished.contains(&self.jobs[job].index())).collect()
-    }
-
-    fn run_episodes(
-        &self,
-        remaining: &[usize],
-        folder: &mut RunFolder,
-        records: &mut Vec<EpisodeRecord>,
-    ) -> Result<(), CliError> {
-        let artifacts = self.artifacts();
-        let mut progress = Progress::new(remaining.len(), &self.name);
-        let outcome = parallel::run(
-            remaining.len(),
-            self.config.threads,
-            cancel::requested,
-            |index| {
-                let job = self.jobs[remaining[index]];
-                let keep_states = artifacts.may_render(job.episode);
-                let mut finished = self.run_episode(job, keep_states, &self.controllers)?;
-                let rendered = artifacts.render(&mut finished);
-                Ok((finished, rendered))
-            },
-            |_, (finished, rendered)| {
-                // The line comes after all other files, so that every listed episode is complete.
-                artifacts.write(&finished)?;
-                folder.append(&finished.record).map_err(CliError::input)?;
-                progress.tick(&episode_line(&finished.record));
-                report_unrendered(&finished, rendered);
-                records.push(finished.record);
-                Ok(())
-            },
-        );
-        progress.finish();
-        outcome
+        let flags = &self.config.flags;
+        EpisodeArtifacts { dir: &self.out, trace: flags.trace.is_some(), video: flags.video.as_ref() }
     }
 
     /// Runs one episode, from the start of its foreign demonstration if it has one. With `keep_states` the
@@ -430,8 +275,8 @@ impl<'a> SuiteRun<'a> {
         let mut spec = EpisodeSpec::new(id, policy, task, &opened.nominal, scene, &self.settings);
         spec.header.privileged = self.is_privileged();
         spec.header.origin = origin.cloned().map(Box::new);
-        let record_trace = self.config.trace.is_some();
-        let trace_nodes = self.config.trace == Some(TraceDetail::Nodes);
+        let record_trace = self.config.flags.trace.is_some();
+        let trace_nodes = self.config.flags.trace == Some(TraceDetail::Nodes);
         Ok((EpisodeSpec { limit, record_trace, trace_nodes, ..spec }, opened))
     }
 
@@ -447,125 +292,148 @@ impl<'a> SuiteRun<'a> {
             // The message of this one begins with file and line.
             (EpisodeError::Build(BuildError::At { .. }), _) => error.to_string(),
             (_, Some(place)) => format!("{place}: {error}"),
-            (_, None) => format!("{}: {error}", self.config.file.display()),
+            (_, None) => format!("{}: {error}", self.config.script.file.display()),
         };
         CliError { exit, message }
     }
+
+    /// Reads the deformation limits of all targets, connects to the policy server, and renders once what the policy
+    /// observes at the start of the first episode of each task.
+    ///
+    /// # Errors
+    /// A layout, calibration file, camera, light or tactile sensor that is not valid; a server that cannot be reached.
+    pub(crate) fn prepare(&mut self, tasks: &[&Task]) -> Result<(), CliError> {
+        for task in tasks {
+            let first = self.jobs.iter().find(|job| job.task.id == task.id).map_or(0, |job| job.episode);
+            let opened = self.open_episode(&self.episode_id(task, first))?;
+            self.check_object_type(task, &opened.nominal)?;
+            self.read_limit(target_asset(&opened.nominal, task).cloned())?;
+            let scene = Arc::new(opened.scene.clone());
+            self.check_declared_cameras(&scene, task)?;
+            if let Some(connections) = &self.connections {
+                connections.check().map_err(policy_failure)?;
+            }
+            let streams = (self.controllers)(opened, self.brief(task, first))?.streams();
+            self.force_observed |= streams.force;
+            self.check_streams(scene, streams, task, first).map_err(|error| self.episode_error(&error))?;
+        }
+        Ok(())
+    }
+
+    /// Builds the first scene of a task and checks all that can be checked before anything moves.
+    ///
+    /// # Errors
+    /// A scene or sensor that is not valid.
+    pub(crate) fn check_scene(&self, task: &Task, scene: Scene) -> Result<(), CliError> {
+        self.check_object_type(task, &scene)?;
+        let scene = Arc::new(if self.config.is_rigid_twin() { scene.rigid_twin() } else { scene });
+        let settings = &self.settings;
+        let sense = |source| EpisodeError::Sense { task: task.id, episode: 0, source };
+        let check = || -> Result<(), EpisodeError> {
+            check_sensors(&scene, &settings.tactile, &self.sensor_assets).map_err(sense)?;
+            let sim = Simulation::new(scene.clone(), &settings.physics, &settings.robot, &self.assets)?;
+            sim.check_support()?;
+            let mut sensors = SensorSuite::new(&sim, &settings.tactile, &self.sensor_assets);
+            sensors.check_camera_positions(&SensorSuite::frame(&sim)).map_err(sense)
+        };
+        check().map_err(|error| self.episode_error(&error))
+    }
+
+    /// Checks that the scene has the cameras that the file of the policy declares.
+    fn check_declared_cameras(&self, scene: &Scene, task: &Task) -> Result<(), CliError> {
+        let Some((place, streams)) = self.config.policy.declared_streams() else { return Ok(()) };
+        let missing = streams.cameras.iter().find(|name| scene.camera(name).is_none());
+        missing.map_or(Ok(()), |name| {
+            let known = scene.cameras.iter().map(|camera| camera.name.as_str());
+            let unknown = unknown_name("camera", name, known);
+            Err(CliError::input(format!("{place}: {unknown} (scene of task {})", task.id)))
+        })
+    }
+
+    /// Checks that a suite of rigid objects, whose tables have no deformation, has no soft target.
+    fn check_object_type(&self, task: &Task, scene: &Scene) -> Result<(), CliError> {
+        if self.suite.object_type != ObjectType::Rigid || self.config.is_rigid_twin() {
+            return Ok(());
+        }
+        let name = &task.goal.object;
+        let target = scene.objects.iter().find(|object| object.name == *name);
+        match target.filter(|object| matches!(object.asset.body, Body::Soft(_))) {
+            None => Ok(()),
+            Some(target) => Err(CliError::input(format!(
+                "{}: the target of task {}, {name}, is soft, but suite {} has object_type = \"rigid\"; set \
+                 \"deformable\"",
+                target.placed_at, task.id, self.suite.name
+            ))),
+        }
+    }
+
+    /// Renders each stream of the policy and of videos once, in the initial scene.
+    fn check_streams(
+        &self,
+        scene: Arc<Scene>,
+        mut streams: SensorStreams,
+        task: &Task,
+        episode: u32,
+    ) -> Result<(), EpisodeError> {
+        let settings = &self.settings;
+        let sense = |source| EpisodeError::Sense { task: task.id, episode, source };
+        check_sensors(&scene, &settings.tactile, &self.sensor_assets).map_err(sense)?;
+        if self.renders_episodes {
+            streams.touch = true;
+            streams.cameras.extend(scene.cameras.iter().map(|camera| camera.name.clone()));
+        }
+        if streams.cameras.is_empty() && !streams.touch {
+            return Ok(());
+        }
+        let sim = Simulation::new(scene, &settings.physics, &settings.robot, &self.assets)?;
+        let mut sensors = SensorSuite::new(&sim, &settings.tactile, &self.sensor_assets);
+        sensors.validate(&SensorSuite::frame(&sim), &streams).map_err(sense)
+    }
 }
 
-/// Runs the episodes of a prepared suite into its folder. Episodes that are there already are kept.
+/// Returns the recorded run whose actions `--policy` repeats, if it names one.
 ///
 /// # Errors
-/// The folder contains another run, or one that may not be resumed; an episode fails.
-pub(crate) fn run_suite(run: &SuiteRun, tasks: &[&Task]) -> Result<SuiteResult, CliError> {
-    let config = run.config;
-    let manifest = RunManifest::new(run, tasks, config.episodes.unwrap_or(run.suite.episodes));
-    // The same command again on a finished folder changes nothing, even without --resume.
-    let finished = is_finished(&run.out) && run_manifest::is_in(&run.out, &manifest)?;
-    let opened = match config.resume || finished {
-        true => RunFolder::resume(&run.out),
-        false => RunFolder::create(&run.out).map(|folder| (folder, Vec::new())),
+/// The run is of another suite, seed, split or twin, or lacks episodes.
+pub(crate) fn find_replay_source(
+    config: &RunConfig,
+    suite: &Suite,
+    jobs: &[EpisodeJob],
+) -> Result<Option<ReplaySource>, CliError> {
+    let episodes: Vec<EpisodeIndex> = jobs.iter().map(EpisodeJob::index).collect();
+    let source = |recorded: &RecordedRuns| {
+        recorded.replay_source(&suite.name, config.is_rigid_twin(), config.script.seed, &episodes)
     };
-    let (folder, records) = opened.map_err(|error| CliError::input(error).prefixed(config.file.display()))?;
-    run.check_records(&folder, &records)?;
-    run_manifest::write(&folder, &manifest)?;
-    if finished && run.is_complete(&records) {
-        notice(format!("{} is already complete", run.out.display()));
-        return Ok(run.summarize(records));
-    }
-    run.run_all(folder, records)
+    config.policy.recorded().map(source).transpose()
 }
 
-/// True if a folder contains a finished run.
-pub(crate) fn is_finished(dir: &Path) -> bool {
-    dir.join(SUMMARY).is_file() && dir.join(RUN).is_file()
-}
-
-/// Reports an episode whose video could not be written. The episode counts nevertheless.
-pub(crate) fn report_unrendered(finished: &FinishedEpisode, rendered: Result<(), CliError>) {
-    if let Err(error) = rendered {
-        notice(format!("no video of {}: {error}", finished.record.header.id.index()));
+/// Converts the error of a policy server.
+fn policy_failure(error: PolicyError) -> CliError {
+    match error {
+        PolicyError::Interrupted | PolicyError::Address(_) => CliError::input(error),
+        other => CliError::new(Exit::Policy, other),
     }
 }
 
-/// Formats an episode as one line of progress.
-pub(crate) fn episode_line(record: &EpisodeRecord) -> String {
-    let verdict = &record.verdict;
-    let d = verdict.d_peak.map_or(String::new(), |d| format!(", D {d:.2} %"));
-    let outcome = match &record.outcome {
-        Outcome::Invalid { reason, .. } => format!("invalid ({reason}){d}"),
-        Outcome::Error { message } => format!("invalid ({message}){d}"),
-        _ if verdict.safety => format!("safe{d}"),
-        _ if verdict.goal => match (verdict.deformation_ok, verdict.d_peak, verdict.tau) {
-            (Some(false), Some(d), Some(tau)) => format!("goal reached, unsafe (D {d:.2} % > τ {tau:.2} %)"),
-            _ => format!("goal reached, unsafe{d}"),
-        },
-        _ => format!("failed{d}"),
-    };
-    let stats = &record.stats;
-    let reason = stats.gave_up.as_ref().map_or(String::new(), |reason| format!("; gave up: {reason}"));
-    format!("{}: {outcome}, {:.1} s{reason}", record.header.id.index(), stats.time_s)
+/// A file of a project, with its path as messages show it.
+struct ProjectFile {
+    text: String,
+    path: String,
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{
-        benchmark::Plan,
-        cli::run::policy::PolicyConfig,
-        policy::{Action, ActionChunk, ChunkedPolicy, Observation, Policy, PolicyError, SensorStreams},
-        rollout::Controller,
-    };
-
-    /// Requests the true forces, holds still, and fails without them.
-    struct ForceObserver;
-
-    impl Policy for ForceObserver {
-        fn name(&self) -> &str {
-            "force_observer"
-        }
-
-        fn streams(&self) -> SensorStreams {
-            SensorStreams { force: true, ..SensorStreams::default() }
-        }
-
-        fn act(&mut self, seen: &Observation) -> Result<ActionChunk, PolicyError> {
-            seen.forces.as_ref().ok_or(PolicyError::Action("no forces".to_owned()))?;
-            Ok(Action { position_b: seen.ee_position_b, axis_angle_b: seen.ee_axis_angle_b, closure: 0.0 }
-                .into())
+/// Reads a file from the folders above the script, the working folder or the embedded library, in this order.
+fn find_file(script: &Path, relative_path: &str) -> Result<Option<ProjectFile>, CliError> {
+    let parents = script.parent().into_iter().flat_map(Path::ancestors).take(MAX_PARENT_FOLDERS);
+    for root in parents.chain([Path::new("")]) {
+        let path = root.join(relative_path);
+        if path.is_file() {
+            return Ok(Some(ProjectFile {
+                text: files::read_text(&path)?,
+                path: path.display().to_string(),
+            }));
         }
     }
-
-    fn force_observer(_: EpisodeSetup, brief: TaskBrief) -> Result<Box<dyn Controller>, CliError> {
-        Ok(Box::new(ChunkedPolicy::new(Box::new(ForceObserver), brief, 1)))
-    }
-
-    #[test]
-    fn every_file_of_a_run_records_whether_the_policy_observed_true_forces() {
-        let config = RunConfig::new("suites/spatial_soft.lua".into(), PolicyConfig::expert());
-        let loaded = script::load(&config.file, &[]).expect("it loads");
-        let Plan::Suite(suite) = &loaded.plan else { panic!("a suite") };
-        let mut suite = suite.clone();
-        suite.tasks.truncate(1);
-        suite.tasks[0].budget_steps = 3;
-        let tasks: Vec<&Task> = suite.tasks.iter().collect();
-        let root = tempfile::tempdir().expect("a folder");
-        for (out, observed) in [("without", false), ("with", true)] {
-            let dir = root.path().join(out);
-            let jobs = vec![EpisodeJob { task: tasks[0], episode: 0 }];
-            let mut run = SuiteRun::new(&config, &loaded, &suite, jobs, dir.clone()).expect("valid");
-            if observed {
-                run.controllers = Box::new(force_observer);
-            }
-            run.prepare(&tasks).expect("the scenes are valid");
-            let folder = RunFolder::create(&dir).expect("a folder");
-            run_manifest::write(&folder, &RunManifest::new(&run, &tasks, 1)).expect("written");
-            run.run_all(folder, Vec::new()).expect("it runs");
-            for file in [RUN, EPISODES, SUMMARY] {
-                let text = std::fs::read_to_string(dir.join(file)).expect("written");
-                let value: serde_json::Value = serde_json::from_str(&text).expect("one document");
-                assert_eq!(value["force_observed"], observed, "{out}/{file}");
-            }
-        }
-    }
+    let embedded = script::embedded(relative_path).and_then(|bytes| std::str::from_utf8(bytes).ok());
+    Ok(embedded
+        .map(|text| ProjectFile { text: text.to_owned(), path: format!("{relative_path} (embedded)") }))
 }

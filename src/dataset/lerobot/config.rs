@@ -2,22 +2,28 @@
 
 use std::path::PathBuf;
 
+use clap::ValueEnum;
+
 /// Version of LeRobot's dataset layout.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum LeRobotVersion {
     /// One table per episode; used by openpi and SoftVTBench.
+    #[value(name = "lerobot-v2.1", help = None::<&str>)]
     V21,
     /// Many episodes per table; LeRobot's own since 0.4.
+    #[value(name = "lerobot-v3.0", help = None::<&str>)]
     V30,
 }
 
 /// Encoding of the gripper in the seventh number of an action.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum GripperCoding {
-    /// Closure, 0 open to 1 closed.
-    Continuous,
     /// 1 while the gripper is commanded to hold, else 0.
+    #[value(help = None::<&str>)]
     Binary,
+    /// Closure, 0 open to 1 closed.
+    #[value(help = None::<&str>)]
+    Continuous,
 }
 
 /// Options of an export.

@@ -34,12 +34,14 @@ const MAX_ERROR_CHARS: usize = 2000;
 const DEFAULT_PORT: u16 = 8000;
 
 /// Protocol of a policy server.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum Protocol {
     /// openpi: the server sends metadata first, then a chunk of actions per observation.
     #[default]
+    #[value(help = None::<&str>)]
     Openpi,
     /// The evaluation harness vla-eval: typed and numbered messages.
+    #[value(help = None::<&str>)]
     VlaEval,
 }
 

@@ -1,22 +1,26 @@
 //! `softvt dataset import`: demonstrations of other simulators, re-executed in a suite. Those that are safe and reach
 //! the goal are recorded.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::PathBuf,
+};
 
+use clap::{Args, value_parser};
 use serde_json::json;
 
 use super::task_matching::{MatchedDemo, match_demos};
 use crate::{
     benchmark::Task,
     cli::{
-        args::ImportArgs,
-        error::CliError,
-        output::notice,
+        error::{CliError, Exit},
+        output::eprint_notice,
         run::{
-            grip_recorder::GripLog,
+            config::ScriptArgs,
             policy::PolicyConfig,
-            recording::{self, AttemptPlan, RecordingConfig, SuiteRecording},
+            recording::record_all,
             selection::select_suites,
+            suite_recording::{AttemptPlan, GripLog, RecordingArgs, RecordingConfig, SuiteRecording},
             suite_run::SuiteRun,
         },
     },
@@ -29,45 +33,63 @@ use crate::{
     policy::{ChunkedPolicy, ToolCommand, builtin::RecordedPolicy},
     rollout::target_asset,
     scene::{Body, InitialState},
-    script,
     text::counted,
 };
+
+/// Re-execute demonstrations of robomimic, LIBERO, SoftVTBench or softvt in a suite, and record the safe ones that reach the goal
+#[derive(Args, Clone, Debug)]
+#[command(override_usage = "softvt dataset import [OPTIONS] --out <DIR> <FILE.lua> <FILE.hdf5>...")]
+pub(crate) struct ImportArgs {
+    #[command(flatten)]
+    pub script: ScriptArgs,
+    /// Files of demonstrations
+    #[arg(value_name = "FILE.hdf5", required = true)]
+    files: Vec<PathBuf>,
+    #[command(flatten)]
+    recording: RecordingArgs,
+    /// The task of all demonstrations, if the files do not name it: its index or part of its prompt
+    #[arg(long = "task", value_name = "TASK")]
+    tasks: Vec<String>,
+    /// Maximum demonstrations per task to re-execute, in order [default: all]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=1_000_000))]
+    attempts: Option<u32>,
+    /// Start objects where the layouts of the suite put them, not where the files do
+    #[arg(long)]
+    layout: bool,
+}
 
 /// Imports the demonstrations that the arguments name.
 ///
 /// # Errors
 /// The script has no suite, a file is not valid or matches no task, the folder contains something else, an attempt or a
 /// file fails, or no demonstration is kept.
-pub(super) fn run(args: &ImportArgs) -> Result<(), CliError> {
-    let config = RecordingConfig::new(&args.script, &args.recording, &args.tasks)?
+pub(super) fn run(args: ImportArgs) -> Result<(), CliError> {
+    let config = RecordingConfig::new(args.script, args.recording, args.tasks)?
         .with_policy(PolicyConfig::external("import"));
     let run = &config.run;
-    let loaded = script::load(&run.file, &run.script_options).map_err(CliError::input)?;
+    let loaded = run.load_script()?;
     let suites = select_suites("dataset import", run, &loaded.plan)?;
-    let files: Vec<ForeignFile> = args
-        .files
-        .iter()
-        .map(|path| import::read(path).map_err(CliError::input))
-        .collect::<Result<_, _>>()?;
+    let files: Vec<ForeignFile> =
+        args.files.iter().map(|path| import::read(path)).collect::<Result<_, _>>()?;
     let sources = describe_files(&files)?;
-    let matched = match_demos(run, &suites, &files, args.attempts.unwrap_or(u32::MAX))?;
-    let names: BTreeSet<String> = matched.iter().map(|demo| run.suite_name(suites[demo.suite])).collect();
+    let matched = match_demos(run, suites, &files, args.attempts.unwrap_or(u32::MAX))?;
+    let names: BTreeSet<String> = matched.iter().map(|demo| run.suite_name(&suites[demo.suite])).collect();
     let request = json!({
         "softvt": env!("CARGO_PKG_VERSION"),
         "imported": sources,
         "attempts": args.attempts,
         "layout": args.layout,
-        "task": run.tasks,
-        "pictures": config.images_in_hdf5,
-        "privileged": config.with_privileged,
+        "task": run.flags.tasks,
+        "pictures": config.has_hdf5_images(),
+        "privileged": config.has_privileged(),
         "suites": names,
     });
-    recording::record_all(&config, &request, || {
+    record_all(&config, &request, || {
         for Imported { file, layout, demos, commands, .. } in &sources {
-            notice(format!("{file}: {layout}, {}: {commands}", counted(*demos, "demonstration")));
+            eprint_notice(format!("{file}: {layout}, {}: {commands}", counted(*demos, "demonstration")));
         }
         let mut recordings = Vec::new();
-        for (index, suite) in suites.iter().copied().enumerate() {
+        for (index, suite) in suites.iter().enumerate() {
             let demos: Vec<&MatchedDemo> = matched.iter().filter(|demo| demo.suite == index).collect();
             if demos.is_empty() {
                 continue;
@@ -155,7 +177,7 @@ fn replay_demos(
         Ok(Box::new(ChunkedPolicy::new(Box::new(RecordedPolicy::new(commands, None)), brief, 1)))
     });
     if foreign > 0 {
-        notice(format!(
+        eprint_notice(format!(
             "{}: in {placed} of {foreign} demonstrations objects start where the file has them, in the others where the \
              layout puts them",
             run.suite.name
@@ -185,7 +207,8 @@ fn initial_state(
         return Ok((start, demo));
     }
     let task: Option<&Task> = run.suite.tasks.iter().find(|task| task.id == matched.task);
-    let task = task.ok_or_else(|| CliError::internal("matched a task that is not in the suite"))?;
+    let task =
+        task.ok_or_else(|| CliError::new(Exit::Internal, "matched a task that is not in the suite"))?;
     let opened = run.open_episode(&run.episode_id(task, matched.attempt))?;
     start.places = import::match_objects(&opened.scene, &task.goal.object, poses);
     if target_asset(&opened.scene, task).is_some_and(|asset| matches!(asset.body, Body::Rigid { .. })) {

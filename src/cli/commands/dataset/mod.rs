@@ -1,18 +1,202 @@
 //! `softvt dataset`: inspection, export and import of demonstrations.
 
-mod check;
-mod export;
 mod import;
-mod stats;
 mod task_matching;
 
-use crate::cli::{args::DatasetCommand, error::CliError};
+use std::path::PathBuf;
 
-pub(crate) fn run(command: &DatasetCommand) -> Result<(), CliError> {
+use clap::{Args, Subcommand, value_parser};
+
+use crate::{
+    cli::{
+        error::CliError,
+        output::{Progress, eprint_notice, print, print_json},
+        run::{
+            config::{parse_folder, thread_count},
+            replay::{DemoRef, check_complete, demos_of, replay_demos},
+        },
+    },
+    dataset::{
+        DatasetError, check,
+        lerobot::{self, ExportConfig, GripperCoding, LeRobotVersion},
+        stats,
+    },
+    files,
+    rollout::cancel,
+    text::counted,
+};
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum DatasetCommand {
+    Check(DatasetCheckArgs),
+    Export(ExportArgs),
+    Import(Box<import::ImportArgs>),
+    Stats(DatasetStatsArgs),
+}
+
+/// Check a dataset: counts, shapes, rates, numbers, videos, and that demonstrations can be reproduced
+#[derive(Args, Debug)]
+pub(crate) struct DatasetCheckArgs {
+    /// Dataset folder, or one of its HDF5 files
+    #[arg(value_name = "DATASET")]
+    path: PathBuf,
+    /// Demonstrations to simulate again, spread over the tasks: a number, or all
+    #[arg(long = "replay", value_name = "N", default_value = "1", value_parser = parse_replays)]
+    replays: usize,
+}
+
+/// Write a recording as a LeRobot dataset, for training: docs/train-openpi.md
+#[derive(Args, Clone, Debug)]
+pub(crate) struct ExportArgs {
+    /// Folder of a finished recording
+    #[arg(value_name = "DATASET")]
+    path: PathBuf,
+    /// Version of the layout: v2.1 for openpi, v3.0 for LeRobot itself
+    #[arg(long, value_name = "FORMAT")]
+    format: LeRobotVersion,
+    /// Output folder; must be new
+    #[arg(long, value_name = "DIR", value_parser = parse_folder)]
+    out: PathBuf,
+    /// Seventh number of an action: continuous closure, or binary: 1 to hold, 0 otherwise
+    #[arg(long, value_name = "MODE", default_value = "continuous")]
+    gripper: GripperCoding,
+    /// Export only these tasks: indices or parts of prompts, separated by commas
+    #[arg(long = "task", value_name = "TASK", value_delimiter = ',')]
+    tasks: Vec<String>,
+    /// Number of threads; the files do not depend on it [default: number of processors]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+}
+
+/// Print and plot the distributions of actions, lengths and deformations
+#[derive(Args, Debug)]
+pub(crate) struct DatasetStatsArgs {
+    /// Dataset folder, or one of its HDF5 files
+    #[arg(value_name = "DATASET")]
+    path: PathBuf,
+    /// File of the plot [default: stats.svg in the dataset folder]
+    #[arg(long, value_name = "FILE.svg")]
+    out: Option<PathBuf>,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(command: DatasetCommand) -> Result<(), CliError> {
     match command {
-        DatasetCommand::Check(args) => check::run(args),
-        DatasetCommand::Export(args) => export::run(args),
-        DatasetCommand::Import(args) => import::run(args),
-        DatasetCommand::Stats(args) => stats::run(args),
+        DatasetCommand::Check(args) => run_check(&args),
+        DatasetCommand::Export(args) => run_export(args),
+        DatasetCommand::Import(args) => import::run(*args),
+        DatasetCommand::Stats(args) => run_stats(&args),
+    }
+}
+
+fn parse_replays(word: &str) -> Result<usize, String> {
+    match word {
+        "all" => Ok(usize::MAX),
+        number => number.parse().map_err(|_| "expected a number, or all".to_owned()),
+    }
+}
+
+/// Validates a dataset folder or one HDF5 file.
+///
+/// # Errors
+/// Any problem of the dataset, or (exit code 1) a demonstration that is not reproduced.
+fn run_check(args: &DatasetCheckArgs) -> Result<(), CliError> {
+    let path = &args.path;
+    check_complete(path)?;
+    let findings = if path.is_dir() { check::folder(path) } else { check::file(path) };
+    let findings = findings?;
+    if !findings.problems.is_empty() {
+        return Err(CliError::input(format!(
+            "{}\n{}: {}",
+            findings.problems.join("\n"),
+            path.display(),
+            counted(findings.problems.len(), "problem")
+        )));
+    }
+    print(&format!(
+        "{}, {}, {}: OK\n",
+        counted(findings.demos, "demonstration"),
+        counted(findings.steps, "step"),
+        counted(findings.videos, "video")
+    ));
+    replay_demos(&sample(&demos_of(path)?, args.replays))
+}
+
+/// Selects `count` demonstrations, evenly spaced from the first.
+fn sample(demos: &[DemoRef], count: usize) -> Vec<DemoRef> {
+    let count = count.min(demos.len());
+    (0..count).map(|i| demos[i * demos.len() / count].clone()).collect()
+}
+
+/// Exports a recording.
+///
+/// # Errors
+/// As [`lerobot::export`]. No output remains then.
+fn run_export(args: ExportArgs) -> Result<(), CliError> {
+    check_complete(&args.path)?;
+    let config = ExportConfig {
+        data: args.path,
+        out: args.out,
+        version: args.format,
+        gripper: args.gripper,
+        tasks: args.tasks,
+        threads: thread_count(args.threads),
+    };
+    let mut progress: Option<Progress> = None;
+    let exported = lerobot::export(&config, cancel::requested, |total, episode| {
+        progress.get_or_insert_with(|| Progress::new(total, "export")).tick(episode);
+    });
+    if let Some(progress) = &progress {
+        progress.finish();
+    }
+    let exported = exported.map_err(|error| match error {
+        DatasetError::Interrupted => CliError::interrupted("interrupted; nothing was written"),
+        other => CliError::input(other),
+    })?;
+    print(&format!(
+        "{}, {}, {}: {}\n",
+        counted(exported.episodes, "episode"),
+        counted(exported.frames, "frame"),
+        counted(exported.tasks, "prompt"),
+        config.out.display()
+    ));
+    Ok(())
+}
+
+/// Prints and plots the distributions.
+///
+/// # Errors
+/// The dataset cannot be read, or the plot cannot be written.
+fn run_stats(args: &DatasetStatsArgs) -> Result<(), CliError> {
+    let path = &args.path;
+    check_complete(path)?;
+    let mut paths: Vec<PathBuf> = demos_of(path)?.into_iter().map(|demo| demo.file).collect();
+    paths.dedup();
+    let distributions = stats::column_statistics(&paths)?;
+    match args.json {
+        true => print_json(&distributions),
+        false => print(&stats::table(&distributions)),
+    }
+    let default = if path.is_dir() { path.join("stats.svg") } else { path.with_extension("stats.svg") };
+    let out = args.out.clone().unwrap_or(default);
+    files::replace(&out, stats::svg(&distributions).as_bytes())?;
+    eprint_notice(out.display());
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sample_is_evenly_spaced() {
+        let demos: Vec<DemoRef> = (0..10).map(|demo| DemoRef { file: "x".into(), demo }).collect();
+        let sampled = |count| sample(&demos, count).into_iter().map(|demo| demo.demo).collect::<Vec<_>>();
+        assert_eq!(sampled(1), [0]);
+        assert_eq!(sampled(2), [0, 5]);
+        assert_eq!(sampled(20).len(), 10);
+        assert_eq!(sampled(0), [0; 0]);
     }
 }

@@ -50,7 +50,7 @@ impl MatchedDemo<'_> {
 /// A demonstration matches no task or several, or has another seed; or two are the same attempt.
 pub(super) fn match_demos<'a>(
     config: &RunConfig,
-    suites: &[&Suite],
+    suites: &[Suite],
     files: &'a [ForeignFile],
     max: u32,
 ) -> Result<Vec<MatchedDemo<'a>>, CliError> {
@@ -72,7 +72,7 @@ pub(super) fn match_demos<'a>(
                         demo,
                         format!(
                             "--task {}: it was recorded by softvt and is of task{id}; leave --task out",
-                            config.tasks.join(",")
+                            config.flags.tasks.join(",")
                         ),
                     ));
                 }
@@ -99,8 +99,8 @@ fn refuse(file: &ForeignFile, demo: &ForeignDemo, message: String) -> CliError {
 ///
 /// # Errors
 /// It selects none or several.
-fn forced_task(config: &RunConfig, suites: &[&Suite]) -> Result<Option<TaskRef>, CliError> {
-    if config.tasks.is_empty() {
+fn forced_task(config: &RunConfig, suites: &[Suite]) -> Result<Option<TaskRef>, CliError> {
+    if config.flags.tasks.is_empty() {
         return Ok(None);
     }
     let mut found = Vec::new();
@@ -114,11 +114,10 @@ fn forced_task(config: &RunConfig, suites: &[&Suite]) -> Result<Option<TaskRef>,
     match (&found[..], error) {
         ([task], _) => Ok(Some(*task)),
         ([], Some(error)) => Err(error),
-        _ => Err(CliError::input(format!(
-            "{}: --task {}: matches {} tasks; select the one of the demonstrations, or leave --task out to match their \
+        _ => Err(config.error(format!(
+            "--task {}: matches {} tasks; select the one of the demonstrations, or leave --task out to match their \
              instructions",
-            config.file.display(),
-            config.tasks.join(","),
+            config.flags.tasks.join(","),
             found.len()
         ))),
     }
@@ -147,10 +146,12 @@ fn number_attempts(found: &mut [MatchedDemo], own_attempts: &[Option<u32>]) -> R
 fn own_attempt(config: &RunConfig, matched: &MatchedDemo) -> Result<Option<u32>, CliError> {
     match &matched.demo.initial_condition {
         InitialCondition::OtherSimulator { .. } => Ok(None),
-        InitialCondition::SoftvtEpisode { seed, attempt, .. } if *seed == config.seed => Ok(Some(*attempt)),
+        InitialCondition::SoftvtEpisode { seed, attempt, .. } if *seed == config.script.seed => {
+            Ok(Some(*attempt))
+        }
         InitialCondition::SoftvtEpisode { seed, .. } => Err(matched.refuse(format!(
             "it was recorded with the seed {seed}, and this import uses the seed {}; add --seed {seed}",
-            config.seed
+            config.script.seed
         ))),
     }
 }
@@ -164,14 +165,14 @@ fn normalized(text: &str) -> String {
 /// Finds the task of a demonstration: by its instructions, or by its index where it has no instruction.
 fn task_of(
     config: &RunConfig,
-    suites: &[&Suite],
+    suites: &[Suite],
     file: &ForeignFile,
     demo: &ForeignDemo,
 ) -> Result<TaskRef, CliError> {
     let ForeignTask { suite: named, id, prompts } = &demo.task;
     let is_named = |suite: usize| {
         named.as_ref().is_some_and(|name| {
-            normalized(&name.replace('-', "_")) == normalized(&config.suite_name(suites[suite]))
+            normalized(&name.replace('-', "_")) == normalized(&config.suite_name(&suites[suite]))
         })
     };
     let names_a_suite = (0..suites.len()).any(is_named);
@@ -225,14 +226,14 @@ fn task_of(
     }
 }
 
-fn no_task(config: &RunConfig, suites: &[&Suite], file: &ForeignFile, demo: &ForeignDemo) -> CliError {
+fn no_task(config: &RunConfig, suites: &[Suite], file: &ForeignFile, demo: &ForeignDemo) -> CliError {
     let ForeignTask { suite, id, prompts } = &demo.task;
     let task = match (prompts.first(), id) {
         (Some(prompt), _) => Some(format!("{prompt:?}")),
         (None, Some(id)) => Some(format!("task {id}")),
         (None, None) => None,
     };
-    let script = config.file.display();
+    let script = config.script.file.display();
     let problem = match (task, suite) {
         (Some(task), Some(suite)) => {
             format!("it is of {task} of the suite {suite}, and {script} has no such task")
@@ -241,7 +242,7 @@ fn no_task(config: &RunConfig, suites: &[&Suite], file: &ForeignFile, demo: &For
         (None, Some(suite)) => format!("it is of the suite {suite}, but does not name its task"),
         (None, None) => "it does not name its task, by an instruction or an index".to_owned(),
     };
-    let list = |suite: &&Suite| {
+    let list = |suite: &Suite| {
         let tasks = suite.tasks.iter().map(|task| format!("\n  {} {}: {}", suite.name, task.id, task.prompt));
         tasks.collect::<String>()
     };

@@ -4,9 +4,6 @@
 //! finish. All files of an attempt are complete before its line is in `attempts/<suite>/episodes.jsonl`, and the file
 //! of a task is merged from them, so an interrupted recording can be continued.
 
-mod suite_recording;
-mod summary;
-
 use std::{
     fs,
     io::ErrorKind,
@@ -16,71 +13,24 @@ use std::{
 use serde_json::Value;
 
 use crate::{
+    benchmark::CONTROL_HZ,
     cli::{
-        args::{ImageStorage, RecordingArgs, ScriptArgs, TraceDetail},
         error::CliError,
-        output::notice,
+        output::{eprint_notice, print},
         run::{
-            config::{RunConfig, thread_count},
-            policy::PolicyConfig,
             run_manifest,
+            suite_recording::{RecordingConfig, SuiteRecording, kept},
         },
     },
     dataset::{
-        DatasetError,
-        layout::{self, DATASET, PARTS, RECORDING},
+        card::{Card, TaskCount, rejection_counts},
+        layout::{self, DATASET, MANIFEST, PARTS, RECORDING},
+        manifest::{self, ManifestEntry},
     },
+    evaluation::record::EpisodeRecord,
     files,
+    text::counted,
 };
-
-pub(crate) use suite_recording::{AttemptPlan, SuiteRecording};
-
-/// Configuration of a recording.
-#[derive(Clone, Debug)]
-pub(crate) struct RecordingConfig {
-    /// Script, tasks, seed, threads, settings and output folder.
-    pub run: RunConfig,
-    /// True if images go into the HDF5 files too.
-    pub images_in_hdf5: bool,
-    /// True if the ground-truth streams are recorded.
-    pub with_privileged: bool,
-}
-
-impl RecordingConfig {
-    /// The recording that the arguments ask for, under the expert.
-    ///
-    /// # Errors
-    /// A value that is not valid.
-    pub(crate) fn new(
-        script: &ScriptArgs,
-        recording: &RecordingArgs,
-        tasks: &[String],
-    ) -> Result<Self, CliError> {
-        let run = RunConfig::of_script(script)?.with_out(Some(recording.out.clone()));
-        Ok(Self {
-            run: RunConfig {
-                tasks: tasks.to_vec(),
-                threads: thread_count(recording.threads),
-                resume: recording.resume,
-                // The contact streams of a demonstration come from the trace.
-                trace: Some(TraceDetail::State),
-                ..run
-            },
-            images_in_hdf5: recording.images == ImageStorage::Hdf5,
-            with_privileged: !recording.no_privileged,
-        })
-    }
-
-    /// The same recording under another policy.
-    pub(crate) fn with_policy(self, policy: PolicyConfig) -> Self {
-        Self { run: RunConfig { policy, ..self.run }, ..self }
-    }
-
-    /// Folder of the dataset.
-    fn root(&self) -> PathBuf {
-        self.run.out.clone().unwrap_or_default()
-    }
-}
 
 /// Records a dataset. `request` describes it in `recording.json`; `prepare` returns its prepared suites.
 ///
@@ -91,21 +41,21 @@ pub(crate) fn record_all<'a>(
     request: &Value,
     prepare: impl FnOnce() -> Result<Vec<SuiteRecording<'a>>, CliError>,
 ) -> Result<(), CliError> {
-    let root = config.root();
-    if check_folder(&root, config.run.resume, request)? {
-        notice(format!("{} is already complete", root.display()));
+    let root = &config.args.out;
+    if check_folder(root, config.args.resume, request)? {
+        eprint_notice(format!("{} is already complete", root.display()));
         return Ok(());
     }
-    let missing = files::missing_folders(&root);
+    let missing = files::missing_folders(root);
     // Preparation takes long, so a folder that cannot be written to is reported first.
-    let prepared = files::create_writable_folder(&root).map_err(dataset_error).and_then(|()| prepare());
-    let mut suites = prepared.inspect_err(|_| files::remove_empty_folders(&missing))?;
-    let text = format!("{request:#}\n");
-    files::replace(&root.join(RECORDING), text.as_bytes()).map_err(dataset_error)?;
-    for suite in &mut suites {
-        suite.record().inspect_err(|_| remove_if_empty(&root, &missing))?;
+    let prepared = files::create_writable_folder(root).map_err(CliError::from).and_then(|()| prepare());
+    let suites = prepared.inspect_err(|_| files::remove_empty_folders(&missing))?;
+    files::replace(&root.join(RECORDING), format!("{request:#}\n"))?;
+    let mut records = Vec::new();
+    for suite in &suites {
+        records.push(suite.record().inspect_err(|_| remove_if_empty(root, &missing))?);
     }
-    summary::write(config, &suites, &root)
+    write_summary(config, &suites, &records)
 }
 
 /// Checks that a dataset can be recorded into a folder. Returns true if it contains this very recording, complete.
@@ -128,7 +78,7 @@ fn check_folder(root: &Path, resume: bool, request: &Value) -> Result<bool, CliE
             )),
         };
     }
-    let stored: Value = serde_json::from_str(&files::read_text(&path).map_err(dataset_error)?)
+    let stored: Value = serde_json::from_str(&files::read_text(&path)?)
         .map_err(|e| CliError::input(format!("{} is not a softvt recording: {e}", path.display())))?;
     let command = |request: &Value| match request.get("imported") {
         Some(_) => "softvt dataset import",
@@ -165,9 +115,68 @@ fn remove_if_empty(root: &Path, missing: &[PathBuf]) {
     }
 }
 
-fn dataset_error(error: impl Into<DatasetError>) -> CliError {
-    match error.into() {
-        DatasetError::Interrupted => CliError::interrupted("interrupted"),
-        other => CliError::input(other),
+/// Writes manifest and card, and prints what the dataset contains.
+///
+/// # Errors
+/// No demonstration was kept, or a file cannot be written.
+fn write_summary(
+    config: &RecordingConfig,
+    suites: &[SuiteRecording],
+    records: &[Vec<EpisodeRecord>],
+) -> Result<(), CliError> {
+    let root = &config.args.out;
+    let (mut entries, mut tasks) = (Vec::new(), Vec::new());
+    let size = |path: &Path| fs::metadata(path).map_or(0, |metadata| metadata.len());
+    for (suite, records) in suites.iter().zip(records) {
+        for task in &suite.tasks {
+            let paths = suite.paths(task.id);
+            let kept = kept(records, task.id).into_iter().enumerate();
+            let new: Vec<ManifestEntry> =
+                kept.map(|(demo, record)| ManifestEntry::new(&paths, demo, record)).collect();
+            let videos = new.iter().flat_map(|entry| entry.video_files.values());
+            let video_bytes = videos.map(|file| size(&root.join(file))).sum();
+            tasks.push(TaskCount {
+                hdf5_bytes: size(&paths.hdf5()),
+                video_bytes,
+                ..suite.count(task, records)
+            });
+            entries.extend(new);
+        }
     }
+    if entries.is_empty() {
+        let reasons: Vec<String> = tasks
+            .iter()
+            .map(|task| format!("{} task {}: {}", task.suite, task.task, rejection_counts(&task.rejected)))
+            .collect();
+        return Err(CliError::input(format!(
+            "no demonstration was kept: {}; all attempts are in {}/attempts",
+            reasons.join("; "),
+            root.display()
+        )));
+    }
+    manifest::write(root, &entries)?;
+    let _ = fs::remove_dir(root.join(PARTS));
+    let card = Card {
+        softvt: env!("CARGO_PKG_VERSION").to_owned(),
+        fps: CONTROL_HZ,
+        has_images: config.has_hdf5_images(),
+        has_privileged: config.has_privileged(),
+        imported: suites.first().map(|suite| suite.run.imported.clone()).unwrap_or_default(),
+        tasks,
+    };
+    card.write(root)?;
+    for task in &card.tasks {
+        print(&format!(
+            "{} task {}: {} from {}, {}, {:.1} MB; not kept: {}\n",
+            task.suite,
+            task.task,
+            counted(task.demos, "demonstration"),
+            counted(task.attempts, "attempt"),
+            counted(task.samples, "step"),
+            (task.hdf5_bytes + task.video_bytes) as f64 / 1e6,
+            rejection_counts(&task.rejected)
+        ));
+    }
+    print(&format!("{}\n", root.join(MANIFEST).display()));
+    Ok(())
 }

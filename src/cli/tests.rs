@@ -7,8 +7,9 @@ use std::{collections::BTreeMap, fmt::Write, fs, path::Path};
 use clap::{Arg, Args, Command, Subcommand};
 
 use super::{
-    args::{self, PolicyArgs, ScriptArgs},
+    commands,
     parse::clap_command,
+    run::{config::ScriptArgs, policy::PolicyArgs},
 };
 
 const PAGE: &str = "docs/cli.md";
@@ -130,7 +131,7 @@ fn generated() -> String {
     ];
     let mut text = section("softvt", &mut command, &shared);
     // Commands that were changed after their definition are at the end of the list of `command`.
-    let defined = args::Command::augment_subcommands(Command::new("defined"));
+    let defined = commands::Command::augment_subcommands(Command::new("defined"));
     let subcommands: Vec<String> = defined.get_subcommands().map(|sub| sub.get_name().to_owned()).collect();
     for name in subcommands {
         if let Some(subcommand) = command.find_subcommand_mut(&name) {

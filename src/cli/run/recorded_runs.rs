@@ -6,11 +6,7 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use crate::{
-    benchmark::Suite,
-    cli::{
-        error::CliError,
-        run::{config::RunConfig, selection::EpisodeJob},
-    },
+    cli::error::CliError,
     evaluation::episode_id::{EpisodeIndex, Split},
     files::FileError,
     policy::{Action, TaskBrief},
@@ -46,64 +42,6 @@ pub(crate) struct ReplaySource {
     pub sha256: String,
 }
 
-/// Returns the recorded run whose actions `--policy` repeats, if it names one.
-///
-/// # Errors
-/// The run is of another suite, seed, split or twin, or lacks episodes.
-pub(crate) fn find_replay_source(
-    config: &RunConfig,
-    suite: &Suite,
-    jobs: &[EpisodeJob],
-) -> Result<Option<ReplaySource>, CliError> {
-    let Some(recorded) = config.policy.recorded() else { return Ok(None) };
-    let is_twin = config.is_rigid_twin;
-    let run = recorded.run_of(&suite.name, is_twin).ok_or_else(|| {
-        let available: Vec<String> =
-            recorded.runs.iter().map(|run| suite_label(run.text("suite"), is_rigid_twin(run))).collect();
-        CliError::input(format!(
-            "--policy {}: no run of suite {}; available: {}",
-            recorded.dir.display(),
-            suite_label(&suite.name, is_twin),
-            available.join(", ")
-        ))
-    })?;
-    let refuse = |message: String| CliError::input(format!("--policy {}: {message}", run.dir.display()));
-    let seed = run.manifest["seed"].as_u64();
-    if seed != Some(config.seed) {
-        let seed = seed.map_or("unknown".to_owned(), |seed| seed.to_string());
-        return Err(refuse(format!("its seed is {seed}, that of this run {}", config.seed)));
-    }
-    let (split, own) = (run.text("split"), Split::Validation.name());
-    if split != own {
-        return Err(refuse(format!("its split is {split}, that of this run {own}")));
-    }
-    let missing: Vec<String> = jobs
-        .iter()
-        .map(EpisodeJob::index)
-        .filter(|index| !has_actions(run, *index))
-        .map(|i| i.to_string())
-        .collect();
-    if !missing.is_empty() {
-        let listed = missing.iter().take(MAX_LISTED).map(String::as_str).collect::<Vec<_>>().join(", ");
-        let more = match missing.len().saturating_sub(MAX_LISTED) {
-            0 => String::new(),
-            more => format!(" and {more} more"),
-        };
-        return Err(refuse(format!(
-            "it lacks {} of the {} requested episodes: {listed}{more}; select available ones with --task and --episodes",
-            missing.len(),
-            jobs.len()
-        )));
-    }
-    Ok(Some(ReplaySource {
-        run: run.dir.display().to_string(),
-        policy: run.text("policy").to_owned(),
-        privileged: run.is_privileged(),
-        force_observed: run.observes_forces(),
-        sha256: digest(run).map_err(CliError::input)?,
-    }))
-}
-
 impl RecordedRuns {
     /// Reads a run folder, or all run folders in a folder.
     ///
@@ -118,6 +56,61 @@ impl RecordedRuns {
         self.runs.iter().find(|run| run.text("suite") == suite && is_rigid_twin(run) == is_twin)
     }
 
+    /// The run of a suite whose actions the policy repeats.
+    ///
+    /// # Errors
+    /// The run is of another suite, seed, split or twin, or lacks some of `episodes`.
+    pub(crate) fn replay_source(
+        &self,
+        suite: &str,
+        is_twin: bool,
+        base_seed: u64,
+        episodes: &[EpisodeIndex],
+    ) -> Result<ReplaySource, CliError> {
+        let run = self.run_of(suite, is_twin).ok_or_else(|| {
+            let available: Vec<String> =
+                self.runs.iter().map(|run| suite_label(run.text("suite"), is_rigid_twin(run))).collect();
+            CliError::input(format!(
+                "--policy {}: no run of suite {}; available: {}",
+                self.dir.display(),
+                suite_label(suite, is_twin),
+                available.join(", ")
+            ))
+        })?;
+        let refuse =
+            |message: String| Err(CliError::input(format!("--policy {}: {message}", run.dir.display())));
+        let seed = run.manifest["seed"].as_u64();
+        if seed != Some(base_seed) {
+            let seed = seed.map_or("unknown".to_owned(), |seed| seed.to_string());
+            return refuse(format!("its seed is {seed}, that of this run {base_seed}"));
+        }
+        let (split, own) = (run.text("split"), Split::Validation.name());
+        if split != own {
+            return refuse(format!("its split is {split}, that of this run {own}"));
+        }
+        let missing = episodes.iter().filter(|index| !has_actions(run, **index));
+        let missing: Vec<String> = missing.map(ToString::to_string).collect();
+        if !missing.is_empty() {
+            let listed = missing[..missing.len().min(MAX_LISTED)].join(", ");
+            let more = match missing.len().saturating_sub(MAX_LISTED) {
+                0 => String::new(),
+                more => format!(" and {more} more"),
+            };
+            return refuse(format!(
+                "it lacks {} of the {} requested episodes: {listed}{more}; select available ones with --task and --episodes",
+                missing.len(),
+                episodes.len()
+            ));
+        }
+        Ok(ReplaySource {
+            run: run.dir.display().to_string(),
+            policy: run.text("policy").to_owned(),
+            privileged: run.is_privileged(),
+            force_observed: run.observes_forces(),
+            sha256: digest(run)?,
+        })
+    }
+
     /// The recorded actions of an episode.
     ///
     /// # Errors
@@ -129,7 +122,7 @@ impl RecordedRuns {
         brief: &TaskBrief,
     ) -> Result<Vec<Action>, CliError> {
         let dir = self.run_of(suite, is_twin).map_or(&self.dir, |run| &run.dir);
-        actions::read(&actions::path(dir, brief.index())).map_err(CliError::input)
+        Ok(actions::read(&actions::path(dir, brief.index()))?)
     }
 }
 

@@ -1,0 +1,391 @@
+//! Evaluation of a policy on a suite: its episodes are run into a folder, which can be continued after an interrupt.
+
+use std::{collections::BTreeSet, path::Path};
+
+use serde::Serialize;
+
+use crate::{
+    benchmark::Task,
+    cli::{
+        error::{CliError, Exit},
+        output::{Progress, eprint_notice},
+        run::{
+            replay::{difference, replay_factory, with_policy_fields},
+            run_manifest::{self, RunManifest},
+            selection::EpisodeJob,
+            suite_run::SuiteRun,
+        },
+    },
+    evaluation::{
+        record::{EpisodeRecord, Outcome},
+        summary::SuiteSummary,
+    },
+    files, parallel,
+    report::{
+        actions,
+        run_folder::{EPISODES, RUN, RunFolder, SUMMARY},
+        softvtbench_files,
+    },
+    rollout::{FinishedEpisode, cancel},
+    text::counted,
+};
+
+/// The episodes of a finished run, in order, with their summary.
+pub(crate) struct SuiteResult {
+    pub summary: SuiteSummary,
+    pub records: Vec<EpisodeRecord>,
+}
+
+impl SuiteResult {
+    fn new(run: &SuiteRun, records: Vec<EpisodeRecord>) -> Self {
+        Self { summary: SuiteSummary::of(&run.name, run.config.policy.name(), &records), records }
+    }
+}
+
+/// A simulated episode, and the result of rendering it.
+pub(crate) struct SimulatedEpisode {
+    pub finished: FinishedEpisode,
+    pub rendered: Result<(), CliError>,
+}
+
+/// The folder of a run in progress, and the records of its finished episodes.
+pub(crate) struct RunLog<'a> {
+    run: &'a SuiteRun<'a>,
+    folder: RunFolder,
+    pub records: Vec<EpisodeRecord>,
+}
+
+impl<'a> RunLog<'a> {
+    /// Takes over an open folder and its records. Writes the manifest of the run.
+    ///
+    /// # Errors
+    /// The folder is of another run, or the manifest cannot be written.
+    pub(crate) fn new(
+        run: &'a SuiteRun,
+        (folder, records): (RunFolder, Vec<EpisodeRecord>),
+        manifest: &impl Serialize,
+    ) -> Result<Self, CliError> {
+        let log = Self { run, folder, records };
+        log.check_records()?;
+        run_manifest::write(&log.folder, manifest)?;
+        Ok(log)
+    }
+
+    /// Checks that all records are episodes of this run, each at most once.
+    fn check_records(&self) -> Result<(), CliError> {
+        let (run, config) = (self.run, self.run.config);
+        let path = run.out.join(EPISODES).display().to_string();
+        if !self.records.is_empty() && self.folder.read(RUN)?.is_none() {
+            return Err(CliError::input(format!(
+                "{path}: there is no {RUN} next to it, so its run is not known"
+            )));
+        }
+        let requested: BTreeSet<_> = run.jobs.iter().map(EpisodeJob::index).collect();
+        let mut seen = BTreeSet::new();
+        for (number, record) in self.records.iter().enumerate() {
+            let (header, id, index) = (&record.header, &record.header.id, record.header.id.index());
+            let is_own = id.suite == run.name
+                && id.base_seed == config.script.seed
+                && header.policy == config.policy.name();
+            let problem = if !is_own || !requested.contains(&index) {
+                "belongs to another run"
+            } else if !seen.insert(index) {
+                "occurs twice"
+            } else {
+                continue;
+            };
+            return Err(CliError::input(format!("{path}:{}: {index} {problem}", number + 1)));
+        }
+        Ok(())
+    }
+
+    /// Runs jobs. Writes the files of each finished episode, and then its line.
+    ///
+    /// # Errors
+    /// A script, policy or file that fails. Finished episodes are kept.
+    pub(crate) fn run_jobs<'j>(
+        &mut self,
+        name: &str,
+        jobs: &[EpisodeJob<'j>],
+        simulate: impl Fn(EpisodeJob<'j>) -> Result<SimulatedEpisode, CliError> + Sync,
+        write: impl Fn(&FinishedEpisode) -> Result<(), CliError>,
+        line: fn(&EpisodeRecord) -> String,
+    ) -> Result<(), CliError> {
+        let mut progress = Progress::new(jobs.len(), name);
+        let outcome = parallel::run(
+            jobs.len(),
+            self.run.config.threads(),
+            cancel::requested,
+            |index| simulate(jobs[index]),
+            |_, SimulatedEpisode { finished, rendered }| {
+                // The line comes after all other files, so that every listed episode is complete.
+                write(&finished)?;
+                self.folder.append(&finished.record)?;
+                progress.tick(&line(&finished.record));
+                report_unrendered(&finished, rendered);
+                self.records.push(finished.record);
+                Ok(())
+            },
+        );
+        progress.finish();
+        outcome
+    }
+
+    /// Sorts the records and the lines of the folder.
+    ///
+    /// # Errors
+    /// The folder cannot be written.
+    pub(crate) fn sort(&mut self) -> Result<(), CliError> {
+        self.records.sort_by_key(|record| record.header.id.index());
+        Ok(self.folder.write_in_order(&self.records)?)
+    }
+
+    /// Removes the folder. The same command must work once an error is fixed, if there is nothing to keep.
+    ///
+    /// # Errors
+    /// A file cannot be removed.
+    pub(crate) fn discard(self) -> Result<(), CliError> {
+        Ok(self.folder.discard()?)
+    }
+
+    /// Writes the summary. A folder with a summary counts as finished.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub(crate) fn finish(self) -> Result<SuiteResult, CliError> {
+        let result = SuiteResult::new(self.run, self.records);
+        files::write_json(&self.run.out.join(SUMMARY), &result.summary)?;
+        Ok(result)
+    }
+}
+
+/// Adds to the outcome of a run what it kept, and reports an interrupt with `hint` on how to continue.
+///
+/// # Errors
+/// The outcome is an error, or the run was interrupted.
+pub(crate) fn with_kept(outcome: Result<(), CliError>, kept: &str, hint: &str) -> Result<(), CliError> {
+    match outcome {
+        // An error from before the interrupt has its own exit code and is reported as it is.
+        Err(error) if error.exit != Exit::Interrupted => Err(error.with_line(kept)),
+        Ok(()) if !cancel::requested() => Ok(()),
+        _ => Err(CliError::interrupted(format!("interrupted; {kept}{hint}"))),
+    }
+}
+
+/// Runs the episodes of a prepared suite into its folder. Episodes that are there already are kept.
+///
+/// # Errors
+/// The folder contains another run, or one that may not be resumed; a script, policy or file fails; or the run is
+/// interrupted. Finished episodes are kept.
+pub(crate) fn run_suite(run: &SuiteRun, tasks: &[&Task]) -> Result<SuiteResult, CliError> {
+    let config = run.config;
+    let manifest = RunManifest::new(run, tasks, config.flags.episodes.unwrap_or(run.suite.episodes));
+    // The same command again on a finished folder changes nothing, even without --resume.
+    let finished = is_finished(&run.out) && run_manifest::is_in(&run.out, &manifest)?;
+    let opened = match config.flags.resume || finished {
+        true => RunFolder::resume(&run.out),
+        false => RunFolder::create(&run.out).map(|folder| (folder, Vec::new())),
+    };
+    let mut log = RunLog::new(run, opened.map_err(|error| config.error(error))?, &manifest)?;
+    let artifacts = run.artifacts();
+    let done: BTreeSet<_> = log.records.iter().map(|record| record.header.id.index()).collect();
+    let remaining: Vec<_> = run.jobs.iter().copied().filter(|job| !done.contains(&job.index())).collect();
+    let out = run.out.display();
+    if finished
+        && remaining.is_empty()
+        && softvtbench_files::has_scores(&run.out)
+        && log.records.iter().all(|record| artifacts.missing(record).is_empty())
+    {
+        eprint_notice(format!("{out} is already complete"));
+        return Ok(SuiteResult::new(run, log.records));
+    }
+    let simulate = |job: EpisodeJob| {
+        let mut finished = run.run_episode(job, artifacts.may_render(job.episode), &run.controllers)?;
+        let rendered = artifacts.render(&mut finished);
+        Ok(SimulatedEpisode { finished, rendered })
+    };
+    let outcome = restore_artifacts(run, &log.records).and_then(|()| {
+        log.run_jobs(&run.name, &remaining, simulate, |finished| artifacts.write(finished), episode_line)
+    });
+    match outcome {
+        Err(error) if error.exit != Exit::Interrupted && log.records.is_empty() => {
+            log.discard()?;
+            return Err(error);
+        }
+        outcome => {
+            let kept =
+                format!("{} of {} are in {out}", log.records.len(), counted(run.jobs.len(), "episode"));
+            with_kept(outcome, &kept, &format!("; continue with --resume --out {out}"))?;
+        }
+    }
+    log.sort()?;
+    softvtbench_files::write_scores(&run.out, &log.records, &run.thresholds)?;
+    let result = log.finish()?;
+    eprint_notice(out);
+    Ok(result)
+}
+
+/// True if a folder contains a finished run.
+pub(crate) fn is_finished(dir: &Path) -> bool {
+    dir.join(SUMMARY).is_file() && dir.join(RUN).is_file()
+}
+
+/// Reports an episode whose video could not be written. The episode counts nevertheless.
+fn report_unrendered(finished: &FinishedEpisode, rendered: Result<(), CliError>) {
+    if let Err(error) = rendered {
+        eprint_notice(format!("no video of {}: {}", finished.record.header.id.index(), error.message));
+    }
+}
+
+/// Formats an episode as one line of progress.
+fn episode_line(record: &EpisodeRecord) -> String {
+    let verdict = &record.verdict;
+    let d = verdict.d_peak.map_or(String::new(), |d| format!(", D {d:.2} %"));
+    let outcome = match &record.outcome {
+        Outcome::Invalid { reason, .. } => format!("invalid ({reason}){d}"),
+        Outcome::Error { message } => format!("invalid ({message}){d}"),
+        _ if verdict.safety => format!("safe{d}"),
+        _ if verdict.goal => match (verdict.deformation_ok, verdict.d_peak, verdict.tau) {
+            (Some(false), Some(d), Some(tau)) => format!("goal reached, unsafe (D {d:.2} % > τ {tau:.2} %)"),
+            _ => format!("goal reached, unsafe{d}"),
+        },
+        _ => format!("failed{d}"),
+    };
+    let stats = &record.stats;
+    let reason = stats.gave_up.as_ref().map_or(String::new(), |reason| format!("; gave up: {reason}"));
+    format!("{}: {outcome}, {:.1} s{reason}", record.header.id.index(), stats.time_s)
+}
+
+/// Restores requested files of finished episodes that are missing: by the recorded actions, or without these by the
+/// policy unless it is a server. Files that cannot be restored are reported; the results of their episodes stay.
+///
+/// # Errors
+/// An episode cannot be run, or a file cannot be written.
+fn restore_artifacts(run: &SuiteRun, records: &[EpisodeRecord]) -> Result<(), CliError> {
+    let artifacts = run.artifacts();
+    let incomplete = records.iter().filter(|record| !artifacts.missing(record).is_empty());
+    let has_actions = |record: &EpisodeRecord| actions::path(&run.out, record.header.id.index()).is_file();
+    let (restorable, lost): (Vec<_>, Vec<_>) =
+        incomplete.partition(|record| has_actions(record) || !run.config.policy.is_remote());
+    if let Some(first) = lost.first() {
+        eprint_notice(format!(
+            "{} finished episodes lack their actions, so their files cannot be restored (first: {}); their results stay",
+            lost.len(),
+            first.header.id.index()
+        ));
+    }
+    if let Some(path) = restorable.first().and_then(|record| artifacts.missing(record).into_iter().next()) {
+        eprint_notice(format!(
+            "restoring files of {} (first: {})",
+            counted(restorable.len(), "finished episode"),
+            path.display()
+        ));
+    }
+    parallel::run(
+        restorable.len(),
+        run.config.threads(),
+        cancel::requested,
+        |index| {
+            let record = restorable[index];
+            simulate_again(run, record, has_actions(record))
+        },
+        |_, simulated| {
+            let Some(SimulatedEpisode { finished, rendered }) = simulated else { return Ok(()) };
+            artifacts.write(&finished)?;
+            report_unrendered(&finished, rendered);
+            Ok(())
+        },
+    )
+}
+
+/// Simulates a finished episode again. Returns `None`, after a notice, if the result differs from its record.
+fn simulate_again(
+    run: &SuiteRun,
+    record: &EpisodeRecord,
+    has_actions: bool,
+) -> Result<Option<SimulatedEpisode>, CliError> {
+    let (index, artifacts) = (record.header.id.index(), run.artifacts());
+    let Some(job) = run.jobs.iter().find(|job| job.index() == index).copied() else { return Ok(None) };
+    let keep_states = artifacts.may_render(index.episode);
+    let mut finished = if has_actions {
+        let path = actions::path(&run.out, index);
+        let recorded = actions::read(&path)?;
+        run.run_episode(job, keep_states, &replay_factory(recorded, record))?
+    } else {
+        run.run_episode(job, keep_states, &run.controllers)?
+    };
+    finished.record = with_policy_fields(finished.record, record);
+    if let Some(difference) = difference(record, &finished.record)? {
+        eprint_notice(format!(
+            "files of {index} are not restored: the simulation differs from its record ({difference}); its results stay"
+        ));
+        return Ok(None);
+    }
+    let rendered = artifacts.render(&mut finished);
+    Ok(Some(SimulatedEpisode { finished, rendered }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        benchmark::Plan,
+        cli::run::config::{RunConfig, ScriptArgs},
+        policy::{
+            Action, ActionChunk, ChunkedPolicy, Observation, Policy, PolicyError, SensorStreams, TaskBrief,
+        },
+        rollout::Controller,
+        script::EpisodeSetup,
+    };
+
+    /// Requests the true forces, holds still, and fails without them.
+    struct ForceObserver;
+
+    impl Policy for ForceObserver {
+        fn name(&self) -> &str {
+            "force_observer"
+        }
+
+        fn streams(&self) -> SensorStreams {
+            SensorStreams { force: true, ..SensorStreams::default() }
+        }
+
+        fn act(&mut self, seen: &Observation) -> Result<ActionChunk, PolicyError> {
+            seen.forces.as_ref().ok_or(PolicyError::Action("no forces".to_owned()))?;
+            Ok(Action { position_b: seen.ee_position_b, axis_angle_b: seen.ee_axis_angle_b, closure: 0.0 }
+                .into())
+        }
+    }
+
+    fn force_observer(_: EpisodeSetup, brief: TaskBrief) -> Result<Box<dyn Controller>, CliError> {
+        Ok(Box::new(ChunkedPolicy::new(Box::new(ForceObserver), brief, 1)))
+    }
+
+    #[test]
+    fn every_file_of_a_run_records_whether_the_policy_observed_true_forces() {
+        let script = ScriptArgs { file: "suites/spatial_soft.lua".into(), ..ScriptArgs::default() };
+        let config = RunConfig { script, ..RunConfig::default() };
+        let loaded = config.load_script().expect("it loads");
+        let Plan::Suite(suite) = &loaded.plan else { panic!("a suite") };
+        let mut suite = suite.clone();
+        suite.tasks.truncate(1);
+        suite.tasks[0].budget_steps = 3;
+        let tasks: Vec<&Task> = suite.tasks.iter().collect();
+        let root = tempfile::tempdir().expect("a folder");
+        for (out, observed) in [("without", false), ("with", true)] {
+            let dir = root.path().join(out);
+            let jobs = vec![EpisodeJob { task: tasks[0], episode: 0 }];
+            let mut run = SuiteRun::new(&config, &loaded, &suite, jobs, dir.clone()).expect("valid");
+            if observed {
+                run.controllers = Box::new(force_observer);
+            }
+            run.prepare(&tasks).expect("the scenes are valid");
+            run_suite(&run, &tasks).expect("it runs");
+            for file in [RUN, EPISODES, SUMMARY] {
+                let text = std::fs::read_to_string(dir.join(file)).expect("written");
+                let value: serde_json::Value = serde_json::from_str(&text).expect("one document");
+                assert_eq!(value["force_observed"], observed, "{out}/{file}");
+            }
+        }
+    }
+}

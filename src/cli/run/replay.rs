@@ -1,0 +1,268 @@
+//! Re-simulation of recorded episodes and demonstrations by their actions, and comparison with their records.
+
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
+
+use serde::de::DeserializeOwned;
+use serde_json::{Value, json};
+
+use crate::{
+    benchmark::Suite,
+    cli::{
+        error::{CliError, Exit},
+        output::print,
+        run::{
+            config::{RunConfig, RunFlags, ScriptArgs, Twin, thread_count},
+            policy::{ControllerFactory, PolicyConfig},
+            run_manifest,
+            selection::{EpisodeJob, select_tasks, suites_of},
+            suite_run::SuiteRun,
+        },
+    },
+    dataset::{
+        TaskFile,
+        layout::{DATASET, RECORDING},
+        manifest,
+    },
+    evaluation::{
+        episode_id::Split,
+        record::{EpisodeRecord, Outcome},
+    },
+    parallel,
+    policy::{Action, ChunkedPolicy, builtin::RecordedPolicy},
+    rollout::cancel,
+    script::LoadedScript,
+    text::counted,
+};
+
+/// A controller factory that repeats the actions of a recorded episode, and its error if it ended with one.
+pub(crate) fn replay_factory(recorded: Vec<Action>, record: &EpisodeRecord) -> ControllerFactory {
+    let ending = match &record.outcome {
+        Outcome::Error { message } => Some(message.clone()),
+        _ => None,
+    };
+    Box::new(move |_, brief| {
+        let policy = RecordedPolicy::from_actions(&recorded, ending.clone());
+        Ok(Box::new(ChunkedPolicy::new(Box::new(policy), brief, 1)))
+    })
+}
+
+/// Copies from `record` what a re-simulation does not produce: the policy, what it observed, and why it gave up.
+pub(crate) fn with_policy_fields(mut simulated: EpisodeRecord, record: &EpisodeRecord) -> EpisodeRecord {
+    simulated.header.policy.clone_from(&record.header.policy);
+    simulated.header.privileged = record.header.privileged;
+    simulated.stats.force_observed = record.stats.force_observed;
+    simulated.stats.camera_inside = record.stats.camera_inside;
+    simulated.stats.gave_up.clone_from(&record.stats.gave_up);
+    simulated
+}
+
+/// Describes the first difference of two records. `None` if they are byte-identical.
+///
+/// # Errors
+/// A record cannot be written as JSON.
+pub(crate) fn difference(
+    recorded: &EpisodeRecord,
+    simulated: &EpisodeRecord,
+) -> Result<Option<String>, CliError> {
+    if serde_json::to_string(recorded)? == serde_json::to_string(simulated)? {
+        return Ok(None);
+    }
+    let json = |record: &EpisodeRecord| serde_json::json!(record);
+    Ok(Some(run_manifest::difference(&json(recorded), &json(simulated)).unwrap_or_default()))
+}
+
+/// A run or dataset file, and the content of its `run.json`.
+pub(crate) struct StoredManifest<'a> {
+    pub path: &'a Path,
+    pub manifest: &'a Value,
+}
+
+impl StoredManifest<'_> {
+    /// Simulates an episode again. The policy fields of the result are copied from `record`.
+    ///
+    /// # Errors
+    /// The scripts have changed since, or the episode cannot be run.
+    pub(crate) fn simulate(
+        &self,
+        record: &EpisodeRecord,
+        actions: Vec<Action>,
+    ) -> Result<EpisodeRecord, CliError> {
+        let index = record.header.id.index();
+        let config = self.config(index.task)?;
+        let loaded = config.load_script()?;
+        let suite = self.suite(&loaded)?;
+        let tasks = select_tasks(&config, suite)?;
+        let job = EpisodeJob { task: tasks[0], episode: index.episode };
+        let mut run = SuiteRun::new(&config, &loaded, suite, vec![job], PathBuf::new())?;
+        run.split = self.split()?;
+        run.controllers = replay_factory(actions, record);
+        run.origins.extend(record.header.origin.iter().map(|origin| (index, (**origin).clone())));
+        run.prepare(&tasks)?;
+        self.check_sources(&run)?;
+        Ok(with_policy_fields(run.run_episode(job, false, &run.controllers)?.record, record))
+    }
+
+    fn text(&self, field: &str) -> &str {
+        self.manifest[field].as_str().unwrap_or_default()
+    }
+
+    fn field<T: DeserializeOwned>(&self, field: &str) -> Result<T, CliError> {
+        serde_json::from_value(self.manifest[field].clone()).map_err(|_| {
+            let path = self.path.display();
+            CliError::input(format!("{path}/run.json has no valid field {field:?}; it is of another version"))
+        })
+    }
+
+    /// The configuration of the run, for one task and with a policy whose actions come from elsewhere.
+    fn config(&self, task: usize) -> Result<RunConfig, CliError> {
+        let script = ScriptArgs {
+            file: self.text("script").into(),
+            options: self.field("arguments")?,
+            seed: self.field("seed")?,
+            twin: self.manifest["twin"].is_string().then_some(Twin::Rigid),
+            ..ScriptArgs::default()
+        };
+        let flags = RunFlags { tasks: vec![task.to_string()], ..RunFlags::default() };
+        let policy = PolicyConfig::external("replay");
+        Ok(RunConfig { script, policy, flags, settings: self.field("set")?, shifts: self.field("shifts")? })
+    }
+
+    fn split(&self) -> Result<Split, CliError> {
+        let name = self.text("split");
+        name.parse().map_err(|_| CliError::input(format!("{}: unknown split {name:?}", self.path.display())))
+    }
+
+    fn suite<'a>(&self, loaded: &'a LoadedScript) -> Result<&'a Suite, CliError> {
+        let name = self.text("suite");
+        let suite = suites_of(&loaded.plan).iter().find(|suite| suite.name == name);
+        suite
+            .ok_or_else(|| CliError::input(format!("{} no longer has a suite {name:?}", self.text("script"))))
+    }
+
+    /// Checks that scripts and thresholds are those of the stored run.
+    fn check_sources(&self, run: &SuiteRun) -> Result<(), CliError> {
+        let now = json!(run.sources);
+        let before = self.manifest["sources"].as_object().into_iter().flatten();
+        let changed: Vec<&str> = before
+            .filter(|(name, hash)| now.get(name.as_str()).is_some_and(|current| current != *hash))
+            .map(|(name, _)| name.as_str())
+            .collect();
+        if changed.is_empty() {
+            return Ok(());
+        }
+        Err(CliError::input(format!(
+            "{}: {} changed since the run; restore the earlier version, or run again",
+            self.path.display(),
+            changed.join(", ")
+        )))
+    }
+}
+
+/// A demonstration: its file, and its number in the file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct DemoRef {
+    pub file: PathBuf,
+    pub demo: usize,
+}
+
+/// Result of the re-simulation of a demonstration.
+struct DemoReplay {
+    /// Hash of the final state.
+    state_hash: String,
+    /// First difference from the recording. `None` if they are byte-identical.
+    difference: Option<String>,
+    goal_reached: bool,
+}
+
+/// Checks that the recording in a folder is complete.
+///
+/// # Errors
+/// It was interrupted.
+pub(crate) fn check_complete(path: &Path) -> Result<(), CliError> {
+    if path.is_dir() && path.join(RECORDING).is_file() && !path.join(DATASET).is_file() {
+        return Err(CliError::input(format!(
+            "{}: the recording was interrupted; complete it with softvt record … --resume --out {0}",
+            path.display()
+        )));
+    }
+    Ok(())
+}
+
+/// All demonstrations of a dataset folder, or of one HDF5 file.
+///
+/// # Errors
+/// The manifest or file cannot be read.
+pub(crate) fn demos_of(path: &Path) -> Result<Vec<DemoRef>, CliError> {
+    if path.is_dir() {
+        let entries = manifest::read(path)?;
+        let demos =
+            entries.iter().map(|entry| DemoRef { file: path.join(&entry.hdf5_path), demo: entry.demo_id });
+        return Ok(demos.collect());
+    }
+    let file = TaskFile::open(path)?;
+    Ok(file.demos.iter().map(|demo| DemoRef { file: path.to_owned(), demo: *demo }).collect())
+}
+
+/// Simulates demonstrations again by their actions alone. Prints for each whether the result is byte-identical, and how
+/// many reach the goal.
+///
+/// # Errors
+/// A demonstration cannot be simulated, or (exit code 1) a result differs.
+pub(crate) fn replay_demos(demos: &[DemoRef]) -> Result<(), CliError> {
+    let mut replays: BTreeMap<usize, DemoReplay> = BTreeMap::new();
+    parallel::run(
+        demos.len(),
+        thread_count(None),
+        cancel::requested,
+        |index| replay_demo(&demos[index]),
+        |index, replay| {
+            replays.insert(index, replay);
+            Ok(())
+        },
+    )?;
+    if cancel::requested() {
+        return Err(CliError::interrupted("interrupted"));
+    }
+    for (DemoRef { file, demo }, replay) in demos.iter().zip(replays.values()) {
+        let result = match &replay.difference {
+            None => format!("byte-identical, final state {}", replay.state_hash),
+            Some(difference) => format!("differs: {difference}"),
+        };
+        print(&format!("{} demo_{demo}: {result}\n", file.display()));
+    }
+    let all = demos.len();
+    let identical = replays.values().filter(|replay| replay.difference.is_none()).count();
+    let reached = replays.values().filter(|replay| replay.goal_reached).count();
+    if all > 1 {
+        print(&format!(
+            "replayed by their actions alone: {identical} of {all} byte-identical, {reached} of {all} reach the goal\n"
+        ));
+    }
+    if identical == all {
+        return Ok(());
+    }
+    Err(CliError::new(
+        Exit::Internal,
+        format!(
+            "replaying {} gave another result; softvt doctor checks whether this machine computes the published results",
+            counted(all - identical, "demonstration")
+        ),
+    ))
+}
+
+fn replay_demo(demo: &DemoRef) -> Result<DemoReplay, CliError> {
+    let file = TaskFile::open(&demo.file)?;
+    let record = file.record(demo.demo)?;
+    let environment = file.environment()?;
+    let actions = file.actions(demo.demo)?;
+    let stored = StoredManifest { path: &demo.file, manifest: &environment["env_kwargs"] };
+    let simulated = stored.simulate(&record, actions)?;
+    Ok(DemoReplay {
+        difference: difference(&record, &simulated)?,
+        goal_reached: simulated.verdict.goal,
+        state_hash: simulated.stats.state_hash,
+    })
+}

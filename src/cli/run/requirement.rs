@@ -1,0 +1,161 @@
+//! `--require`: conditions on the results of suites.
+
+use std::str::FromStr;
+
+use crate::{
+    cli::error::{CliError, Exit},
+    evaluation::{
+        statistics::Rate,
+        summary::{Scores, SuiteSummary},
+    },
+};
+
+/// Slack of comparisons, so that a rate of 90 % meets 0.9 whatever its last bit.
+const TOLERANCE: f64 = 1e-12;
+
+/// A condition on the results of a suite, such as `safety>=0.9`.
+#[derive(Clone, Debug)]
+pub(crate) struct Requirement {
+    /// As it was typed.
+    text: String,
+    metric: &'static Metric,
+    comparison: &'static Comparison,
+    /// Rates are shares of 1.
+    bound: f64,
+}
+
+/// A result that `--require` can name.
+#[derive(Debug)]
+struct Metric {
+    name: &'static str,
+    /// True for shares of 1; false for deformations in percent and for counts.
+    is_rate: bool,
+    /// The value, if it is defined for the suite.
+    value: fn(&Scores) -> Option<f64>,
+}
+
+static METRICS: [Metric; 8] = [
+    Metric { name: "goal", is_rate: true, value: |scores| share(&scores.goal_success_rate) },
+    Metric { name: "no_drop", is_rate: true, value: |scores| share(&scores.no_drop_rate) },
+    Metric {
+        name: "deformation_ok",
+        is_rate: true,
+        value: |scores| share(scores.deformation_ok_rate.as_ref()?),
+    },
+    Metric { name: "safety", is_rate: true, value: |scores| share(&scores.safety_success_rate) },
+    Metric { name: "gap", is_rate: true, value: |scores| scores.goal_safe_gap.map(|points| points / 100.0) },
+    Metric { name: "d_median", is_rate: false, value: |scores| scores.deformation.median },
+    Metric { name: "d_p95", is_rate: false, value: |scores| scores.deformation.p95 },
+    Metric { name: "invalid", is_rate: false, value: |scores| Some(scores.invalid as f64) },
+];
+
+fn share(rate: &Rate) -> Option<f64> {
+    rate.rate.map(|percent| percent / 100.0)
+}
+
+#[derive(Debug)]
+struct Comparison {
+    sign: &'static str,
+    holds: fn(f64, f64) -> bool,
+}
+
+/// The longer signs first, since `>` is a prefix of `>=`.
+static COMPARISONS: [Comparison; 4] = [
+    Comparison { sign: ">=", holds: |value, bound| value >= bound - TOLERANCE },
+    Comparison { sign: "<=", holds: |value, bound| value <= bound + TOLERANCE },
+    Comparison { sign: ">", holds: |value, bound| value > bound + TOLERANCE },
+    Comparison { sign: "<", holds: |value, bound| value < bound - TOLERANCE },
+];
+
+impl FromStr for Requirement {
+    type Err = String;
+
+    fn from_str(word: &str) -> Result<Self, String> {
+        let names = || METRICS.each_ref().map(|metric| metric.name).join(", ");
+        let split = COMPARISONS.iter().find_map(|comparison| {
+            word.split_once(comparison.sign).map(|(name, bound)| (name, comparison, bound))
+        });
+        let (name, comparison, bound) = split.ok_or_else(|| {
+            format!("expected a comparison such as \"safety>=0.9\"; metrics are {}", names())
+        })?;
+        let (name, bound) = (name.trim(), bound.trim());
+        let metric = METRICS.iter().find(|metric| metric.name == name);
+        let metric = metric.ok_or_else(|| format!("unknown metric {name:?}; metrics are {}", names()))?;
+        let (number, unit) = bound.strip_suffix('%').map_or((bound, 1.0), |number| (number, 0.01));
+        let value: Option<f64> = number.trim().parse().ok().filter(|value: &f64| value.is_finite());
+        let value = value.ok_or_else(|| format!("expected a number after the sign, got {bound:?}"))?;
+        if metric.is_rate && !(-1.0..=1.0).contains(&(unit * value)) {
+            return Err(format!("{name} is a share of 1, got {bound}; write 0.9 or 90%"));
+        }
+        Ok(Self { text: word.to_owned(), metric, comparison, bound: unit * value })
+    }
+}
+
+/// Checks all requirements on all suites.
+///
+/// # Errors
+/// The requirements that are not met.
+pub(crate) fn check(requirements: &[Requirement], summaries: &[SuiteSummary]) -> Result<(), CliError> {
+    let unmet = summaries
+        .iter()
+        .flat_map(|summary| requirements.iter().filter_map(move |requirement| requirement.unmet(summary)));
+    let unmet: Vec<String> = unmet.collect();
+    if unmet.is_empty() { Ok(()) } else { Err(CliError::new(Exit::RequirementNotMet, unmet.join("\n"))) }
+}
+
+impl Requirement {
+    /// Describes how a suite violates the requirement. `None` if it does not.
+    fn unmet(&self, summary: &SuiteSummary) -> Option<String> {
+        let (suite, text, name) = (&summary.suite, &self.text, self.metric.name);
+        let Some(value) = (self.metric.value)(&summary.scores) else {
+            return Some(format!("{suite}: {text}: {name} is not defined for this suite"));
+        };
+        let is_met = (self.comparison.holds)(value, self.bound);
+        (!is_met).then(|| format!("{suite}: {text} is not met: {name} is {value:.4}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::evaluation::record::tests::sample;
+
+    fn summary(safe: usize, of: usize) -> SuiteSummary {
+        let records: Vec<_> = (0..of)
+            .map(|i| {
+                let mut record = sample();
+                record.header.id.episode = i as u32;
+                record.verdict.safety = i < safe;
+                record
+            })
+            .collect();
+        SuiteSummary::of("suite", "expert", &records)
+    }
+
+    #[test]
+    fn requirements_are_met_up_to_their_bounds() {
+        let unmet = |word: &str, summary: &SuiteSummary| word.parse::<Requirement>().unwrap().unmet(summary);
+        let nine = summary(9, 10);
+        for met in ["safety>=0.9", "safety >= 90 %", "goal>0.99", "gap<=0.1", "invalid<1", "d_p95<0.34"] {
+            assert_eq!(unmet(met, &nine), None, "{met}");
+        }
+        assert!(unmet("safety>0.9", &nine).is_some_and(|m| m.contains("safety is 0.9000")));
+        assert!(unmet("invalid>=1", &nine).is_some());
+        assert!(unmet("goal>=0.5", &summary(0, 0)).is_some_and(|m| m.contains("not defined")));
+    }
+
+    #[test]
+    fn unknown_metrics_and_numbers_are_refused() {
+        for (word, words) in [
+            ("saftey>=1", "unknown metric \"saftey\""),
+            ("safety", "expected a comparison"),
+            ("safety>=high", "expected a number"),
+            ("safety>=NaN", "got \"NaN\""),
+            ("safety>=", "got \"\""),
+            ("no_drop>=90", "a share of 1, got 90"),
+        ] {
+            let error = word.parse::<Requirement>().expect_err(words);
+            assert!(error.contains(words), "{error}");
+        }
+    }
+}
