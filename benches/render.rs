@@ -11,7 +11,7 @@ use std::path::PathBuf;
 
 use cpu_time::ThreadTime;
 use softvt::{
-    physics::world::Frame,
+    physics::world::WorldSnapshot,
     rollout::{AssetCache, Controller, Episode, SensorAssets, StateRecording},
     scene::Camera,
     script::LoadedScript,
@@ -31,7 +31,7 @@ fn record(loaded: &LoadedScript, task: usize) -> StateRecording {
 }
 
 /// States spread evenly over an episode.
-fn select_states(recording: &StateRecording) -> Vec<Frame> {
+fn select_states(recording: &StateRecording) -> Vec<WorldSnapshot> {
     let last = recording.frames.len() - 1;
     (0..IMAGES).map(|i| recording.frames[i * last / (IMAGES - 1)].clone()).collect()
 }

@@ -7,10 +7,11 @@
 use std::time::Instant;
 
 use softvt::{
-    geometry::{Pose, Vec3, shape::Shape},
+    geometry::{Pose, Vec3, mass::mass_properties, samples::SampleSpec, shape::Shape},
     physics::{
-        BodyId, ColliderId, KinematicId, PhysicsParams, SoftId, World, contact::Friction,
-        fem::ElasticMaterial, world::SoftBodyBuilder,
+        BodyId, ColliderId, KinematicId, PhysicsParams, SoftId, World,
+        contact::Friction,
+        fem::{ElasticMaterial, FemModel},
     },
 };
 
@@ -60,8 +61,9 @@ impl Scene {
     fn new(case: &Case, sleeping: bool) -> Self {
         let shape = Shape::Box { half: Vec3::repeat(0.5 * EDGE) };
         let material = ElasticMaterial { youngs_pa: 3e4, poisson: 0.4, density: 300.0 };
-        let builder = SoftBodyBuilder::new("cube", &shape, material).resolution(case.resolution);
-        let model = builder.model().expect("a cube has a mesh");
+        let volume = mass_properties(&shape, 1.0).mass;
+        let model = FemModel::from_shape(&shape, volume, material, case.resolution, &SampleSpec::default());
+        let model = model.expect("a cube has a mesh");
         let params =
             PhysicsParams { rayleigh_stiffness: 2e-3, sleeping, dt: case.dt, ..PhysicsParams::default() };
         let mut world = World::new(params, Vec3::new(0.0, 0.0, -9.81));
@@ -120,7 +122,7 @@ impl Scene {
             }
         }
         out.force_hold = self.force();
-        out.factorizations = self.world.soft(self.body).factorizations();
+        out.factorizations = self.world.soft(self.body).system.factorizations;
         out
     }
 }

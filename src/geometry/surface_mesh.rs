@@ -48,7 +48,7 @@ pub(super) fn surface_triangles(shape: &Shape, cell: f64) -> (Mesh, Vec<Vec3>) {
     }
     let grid = SamplingGrid::over(&shape.loose_bounds(), cell);
     let mut values = grid.sample(shape);
-    grid.compose_well(&mut values);
+    grid.make_well_composed(&mut values);
     let mut buffer = SurfaceNetsBuffer::default();
     let top = grid.count.map(|n| n as u32 - 1);
     let array = RuntimeShape::<u32, 3>::new(grid.count.map(|n| n as u32));
@@ -176,7 +176,7 @@ impl SamplingGrid {
     /// is *well composed* (Latecki 1997) if no cell face is a checkerboard and no cell has only two opposite
     /// corners on one side; only then is the surface a manifold. Wherever this is violated, the point with the
     /// smallest distance changes sides.
-    fn compose_well(&self, values: &mut [f32]) {
+    fn make_well_composed(&self, values: &mut [f32]) {
         let [nx, ny, nz] = self.count;
         let strides = [1, nx, nx * ny];
         for _ in 0..MAX_PASSES {

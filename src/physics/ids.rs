@@ -2,10 +2,10 @@
 //!
 //! Every `World::add_*` returns the identifier of what it added. Identifiers are dense indices in order of insertion
 //! and objects are never removed, so one stays valid for the life of its world and of every clone of it. They index
-//! the lists of a [`Frame`](super::world::Frame) as well ([`SoftId::index`]).
+//! the lists of a [`WorldSnapshot`](super::world::WorldSnapshot) as well ([`SoftId::index`]).
 
 macro_rules! typed_id {
-    ($(#[$doc:meta])* $name:ident) => {
+    ($(#[$doc:meta])* $name:ident $(, $body:ident)?) => {
         $(#[$doc])*
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
         pub struct $name(u32);
@@ -21,16 +21,22 @@ macro_rules! typed_id {
                 self.0 as usize
             }
         }
+
+        $(impl From<$name> for BodyId {
+            fn from(id: $name) -> Self {
+                Self::$body(id)
+            }
+        })?
     };
 }
 
 typed_id! {
     /// A finite-element soft body.
-    SoftId
+    SoftId, Soft
 }
 typed_id! {
     /// A free rigid body.
-    RigidId
+    RigidId, Rigid
 }
 typed_id! {
     /// An articulation: a fixed-base tree of links and joints.
@@ -38,7 +44,7 @@ typed_id! {
 }
 typed_id! {
     /// A kinematic frame, whose motion is prescribed.
-    KinematicId
+    KinematicId, Kinematic
 }
 typed_id! {
     /// A collider.
@@ -87,24 +93,6 @@ impl BodyId {
     /// True for the links of `articulation`.
     pub fn is_link_of(self, articulation: ArticulationId) -> bool {
         matches!(self, Self::Link(link) if link.articulation == articulation)
-    }
-}
-
-impl From<SoftId> for BodyId {
-    fn from(id: SoftId) -> Self {
-        Self::Soft(id)
-    }
-}
-
-impl From<RigidId> for BodyId {
-    fn from(id: RigidId) -> Self {
-        Self::Rigid(id)
-    }
-}
-
-impl From<KinematicId> for BodyId {
-    fn from(id: KinematicId) -> Self {
-        Self::Kinematic(id)
     }
 }
 

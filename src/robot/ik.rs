@@ -6,7 +6,7 @@
 //! (J Jᵀ + λ² I)⁻¹ e`, with `e` the position error and the rotation vector of the orientation error. A joint that the
 //! step would drive past its limit is set to the limit, and the step of the other joints is solved again.
 
-use nalgebra::{DMatrix, SMatrix, SVector, Vector6};
+use nalgebra::{SMatrix, SVector, Vector6};
 
 use super::{
     panda::{self, ARM_DOFS},
@@ -15,7 +15,7 @@ use super::{
 };
 use crate::{
     geometry::{Pose, Vec3},
-    physics::joints::{JointTree, Link, forward, forward_into, point_jacobian_into},
+    physics::joints::{JointTree, Link, forward, point_jacobian},
 };
 
 /// Joint angles of the arm, rad.
@@ -258,11 +258,9 @@ impl DiffIk {
 
     /// The pose error, scaled down to [`LINEARISATION_RANGE`], and the Jacobian of the tool.
     fn linearise(&self, q: &Joints, target_b: &Pose) -> (Vector6<f64>, Jacobian) {
-        let mut poses = Vec::with_capacity(ARM_DOFS);
-        forward_into(&self.chain, q.as_slice(), &mut poses);
+        let poses = forward(&self.chain, q.as_slice());
         let tool = poses[ARM_DOFS - 1] * self.tool;
-        let mut jacobian = DMatrix::zeros(6, ARM_DOFS);
-        point_jacobian_into(&self.chain, &poses, ARM_DOFS - 1, &tool.translation.vector, &mut jacobian);
+        let jacobian = point_jacobian(&self.chain, &poses, ARM_DOFS - 1, &tool.translation.vector);
         let error = PoseDifference::between(&tool, target_b);
         let range = LINEARISATION_RANGE;
         let share = (range.distance / error.distance()).min(range.angle / error.angle()).min(1.0);

@@ -28,7 +28,7 @@ use crate::{
     geometry::{Aabb, Pose, Vec3},
     physics::{
         BodyId,
-        world::{Frame, StepFailure},
+        world::{StepFailure, WorldSnapshot},
     },
     policy::{Action, Observation, SensorStreams},
     robot::{
@@ -174,7 +174,7 @@ struct NewtonCount {
 /// States recorded so far.
 #[derive(Clone, Default)]
 struct RecordedStates {
-    frames: Vec<Frame>,
+    frames: Vec<WorldSnapshot>,
     d_pct: Vec<Option<f64>>,
 }
 
@@ -390,7 +390,7 @@ impl Episode {
             self.newton.total += u64::from(stats.newton_steps);
             self.newton.max = self.newton.max.max(stats.max_newton_steps);
             if let BodyId::Soft(index) = self.sim.objects[self.target].body {
-                self.min_det_f = self.min_det_f.min(self.sim.world.soft(index).min_det_f().det_f);
+                self.min_det_f = self.min_det_f.min(self.sim.world.soft(index).min_det_f.det_f);
             }
             let time = self.time();
             let evidence = self.evidence.collect(&self.sim, time);

@@ -4,14 +4,14 @@ use std::{collections::VecDeque, sync::Arc};
 
 use super::{sensor_assets::SensingError, sensors::SensorSuite};
 use crate::{
-    physics::world::Frame,
+    physics::world::WorldSnapshot,
     policy::{CameraImage, Observation, SensorStreams, TactileFrame, TactileHistory},
     sensing::tactile::HISTORY_LENGTH,
 };
 
 #[derive(Clone, Debug)]
 struct HistoryEntry {
-    frame: Frame,
+    frame: WorldSnapshot,
     /// Tactile frames of both fingers, once they were requested.
     tactile: Option<Arc<[TactileFrame; 2]>>,
 }
@@ -26,7 +26,7 @@ pub(super) struct ObservationHistory {
 
 impl ObservationHistory {
     /// Appends the state after a control step.
-    pub(super) fn push(&mut self, frame: Frame) {
+    pub(super) fn push(&mut self, frame: WorldSnapshot) {
         if self.entries.len() == HISTORY_LENGTH {
             self.entries.pop_front();
         }

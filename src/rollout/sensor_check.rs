@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     geometry::Pose,
-    physics::world::Frame,
+    physics::world::WorldSnapshot,
     policy::SensorStreams,
     scene::{Camera, CameraMount, Scene},
     sensing::{
@@ -72,7 +72,7 @@ impl SensorSuite {
     ///
     /// # Errors
     /// As [`SensorSuite::render_unobstructed`] and [`SensorSuite::tactile_readings`].
-    pub fn validate(&mut self, frame: &Frame, streams: &SensorStreams) -> Result<(), SensingError> {
+    pub fn validate(&mut self, frame: &WorldSnapshot, streams: &SensorStreams) -> Result<(), SensingError> {
         for name in &streams.cameras {
             let camera = self.camera(name)?.clone().with_edge(TRIAL_EDGE);
             self.render_unobstructed(frame, &camera)?;
@@ -88,7 +88,7 @@ impl SensorSuite {
     ///
     /// # Errors
     /// A camera is inside an object, or the robot cannot be rendered.
-    pub fn check_camera_positions(&mut self, frame: &Frame) -> Result<(), SensingError> {
+    pub fn check_camera_positions(&mut self, frame: &WorldSnapshot) -> Result<(), SensingError> {
         let robot = self.robot_scene()?;
         let view = self.view(frame);
         for camera in self.cameras() {

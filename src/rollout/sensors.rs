@@ -1,5 +1,5 @@
 //! Sensors of a simulation: images, tactile readings, forces and proprioception. Each is a pure function of a
-//! [`Frame`] (a state of the world), so that it can be computed on demand, also after the episode.
+//! [`WorldSnapshot`] (a state of the world), so that it can be computed on demand, also after the episode.
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ use crate::{
     physics::{
         ArticulationId, BodyId, ColliderId, ContactPartner,
         fem::FemModel,
-        world::{ContactPatch, Frame},
+        world::{ContactPatch, WorldSnapshot},
     },
     policy::{PadForce, TactileFrame},
     robot::{
@@ -113,7 +113,7 @@ impl SensorSuite {
     }
 
     /// The current state, with all that sensors need of it.
-    pub fn frame(sim: &Simulation) -> Frame {
+    pub fn frame(sim: &Simulation) -> WorldSnapshot {
         sim.world.snapshot(&sim.robot.pads)
     }
 
@@ -139,7 +139,7 @@ impl SensorSuite {
     ///
     /// # Errors
     /// A parameter of the camera or the light is out of range, or an object cannot be rendered.
-    pub fn render(&mut self, frame: &Frame, camera: &Camera) -> Result<RenderedImage, SensingError> {
+    pub fn render(&mut self, frame: &WorldSnapshot, camera: &Camera) -> Result<RenderedImage, SensingError> {
         let render_scene = match self.render_scene.take() {
             Some(built) => built,
             None => Arc::new(self.build()?),
@@ -180,7 +180,7 @@ impl SensorSuite {
     }
 
     /// The parts of a state that images depend on.
-    pub fn view<'a>(&self, frame: &'a Frame) -> FrameView<'a> {
+    pub fn view<'a>(&self, frame: &'a WorldSnapshot) -> FrameView<'a> {
         let hand_w = frame.links[self.articulation.index()][panda::HAND_LINK] * panda::hand_in_link();
         FrameView::new(frame, Some(hand_w))
     }
@@ -191,7 +191,7 @@ impl SensorSuite {
     /// As [`SensorSuite::render`]; also if the camera is inside an object.
     pub fn render_unobstructed(
         &mut self,
-        frame: &Frame,
+        frame: &WorldSnapshot,
         camera: &Camera,
     ) -> Result<RenderedImage, SensingError> {
         let image = self.render(frame, camera)?;
@@ -208,7 +208,7 @@ impl SensorSuite {
     ///
     /// # Errors
     /// The sensor cannot be built, or a number of the state is not finite.
-    pub fn tactile_readings(&mut self, frame: &Frame) -> Result<[TactileReading; 2], SensingError> {
+    pub fn tactile_readings(&mut self, frame: &WorldSnapshot) -> Result<[TactileReading; 2], SensingError> {
         let left = self.tactile_reading(frame, Side::Left)?;
         Ok([left, self.tactile_reading(frame, Side::Right)?])
     }
@@ -217,14 +217,14 @@ impl SensorSuite {
     ///
     /// # Errors
     /// As [`SensorSuite::tactile_readings`].
-    pub fn tactile_frames(&mut self, frame: &Frame) -> Result<[TactileFrame; 2], SensingError> {
+    pub fn tactile_frames(&mut self, frame: &WorldSnapshot) -> Result<[TactileFrame; 2], SensingError> {
         let both = self.tactile_readings(frame)?;
         let untouched = self.assets.sensor(&self.spec)?.untouched_image.clone();
         Ok(both.map(|reading| TactileFrame::new(reading.image, untouched.clone(), reading.markers)))
     }
 
     /// True forces on the left and right gel.
-    pub fn pad_forces(frame: &Frame) -> [PadForce; 2] {
+    pub fn pad_forces(frame: &WorldSnapshot) -> [PadForce; 2] {
         let pad = pads::PadSurface::default();
         [0, 1].map(|side| match frame.patches.get(side) {
             Some(patch) => PadForce {
@@ -239,7 +239,11 @@ impl SensorSuite {
     ///
     /// # Errors
     /// As [`SensorSuite::tactile_readings`].
-    pub fn tactile_reading(&mut self, frame: &Frame, side: Side) -> Result<TactileReading, SensingError> {
+    pub fn tactile_reading(
+        &mut self,
+        frame: &WorldSnapshot,
+        side: Side,
+    ) -> Result<TactileReading, SensingError> {
         let sensor = self.assets.sensor(&self.spec)?;
         let index = side.index();
         let none = ContactPatch { collider: ColliderId::new(0), points: Vec::new() };
@@ -283,7 +287,7 @@ impl SensorSuite {
     }
 
     /// Proprioception in a state.
-    pub fn proprioception(&self, frame: &Frame) -> Proprioception {
+    pub fn proprioception(&self, frame: &WorldSnapshot) -> Proprioception {
         let q = &frame.joints[self.articulation.index()];
         let joints = std::array::from_fn(|i| q[i]);
         Proprioception {
@@ -296,7 +300,7 @@ impl SensorSuite {
     /// Names and configurations of all movable objects, in the order of the scene.
     pub fn body_configurations<'a>(
         &'a self,
-        frame: &'a Frame,
+        frame: &'a WorldSnapshot,
     ) -> impl Iterator<Item = (&'a str, BodyConfiguration<'a>)> {
         self.objects.iter().filter_map(|object| {
             let state = match object.body {
@@ -381,7 +385,7 @@ pub struct StateRecording {
     /// Sensors of the simulation.
     pub sensors: SensorSuite,
     /// The settled state and the state after each control step.
-    pub frames: Vec<Frame>,
+    pub frames: Vec<WorldSnapshot>,
     /// The target's deformation in each frame, % of the settled diagonal; `None` for a rigid target.
     pub d_pct: Vec<Option<f64>>,
 }

@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     benchmark::CONTROL_DT,
-    geometry::{Aabb, Pose, Quat, Vec3},
+    geometry::{Aabb, Pose, Vec3},
     physics::{
         BodyId, ContactPartner, PhysicsParams, World, joints,
         world::{ContactSummary, StepFailure},
@@ -134,14 +134,7 @@ impl Simulation {
     /// Pose of the object frame in the world. For a soft body: its mean rotation and translation.
     pub fn pose(&self, object: &ObjectInstance) -> Pose {
         match object.body {
-            BodyId::Soft(index) => {
-                let body = &self.world.soft(index).state;
-                let rotation = Quat::from_matrix(&body.frame);
-                let nodes = &body.model.mesh.nodes;
-                let rest_centre = nodes.iter().sum::<Vec3>() / nodes.len() as f64;
-                let translation = self.centre(object) - rotation * rest_centre;
-                Pose::from_parts(translation.into(), rotation)
-            }
+            BodyId::Soft(index) => self.world.soft(index).state.mean_pose(),
             BodyId::Rigid(index) => self.world.rigid(index).state.object_w(),
             BodyId::Link(link) => self.world.link_pose(link) * object.joint_frame_o().inverse(),
             BodyId::World | BodyId::Kinematic(_) => object.start_w,

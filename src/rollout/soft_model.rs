@@ -4,12 +4,7 @@ use std::sync::Arc;
 
 use super::build_error::BuildError;
 use crate::{
-    geometry::{
-        mass::mass_properties,
-        samples::{SampleSpec, surface_samples},
-        shape::Shape,
-        voxel::{VoxelSpec, voxel_mesh},
-    },
+    geometry::{mass::mass_properties, samples::SampleSpec, shape::Shape},
     physics::fem::{ElasticMaterial, FemModel},
     scene::SoftMaterial,
     text::format_number,
@@ -38,17 +33,14 @@ pub(super) fn meshed(
     material: &SoftMaterial,
     volume: f64,
 ) -> Result<Arc<FemModel>, BuildError> {
-    let spec = VoxelSpec { resolution: material.resolution };
-    let mesh =
-        voxel_mesh(shape, &spec).map_err(|source| BuildError::Geometry { asset: name.to_owned(), source })?;
     let spacing = SampleSpec { grasp_spacing: material.grasp_spacing, ..SampleSpec::default() };
-    let samples = surface_samples(shape, &mesh, &spacing);
     let law = ElasticMaterial {
         youngs_pa: material.youngs_pa,
         poisson: material.poisson,
         density: material.density,
     };
-    Ok(FemModel::new(mesh, law, volume, samples))
+    FemModel::from_shape(shape, volume, law, material.resolution, &spacing)
+        .map_err(|source| BuildError::Geometry { asset: name.to_owned(), source })
 }
 
 fn check_material(name: &str, m: &SoftMaterial) -> Result<(), BuildError> {

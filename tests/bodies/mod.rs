@@ -3,11 +3,8 @@
 use std::sync::Arc;
 
 use softvt::{
-    geometry::{samples::SampleSpec, shape::Shape},
-    physics::{
-        fem::{ElasticMaterial, FemModel},
-        world::SoftBodyBuilder,
-    },
+    geometry::{mass::mass_properties, samples::SampleSpec, shape::Shape},
+    physics::fem::{ElasticMaterial, FemModel},
 };
 
 /// Gravity, m/s².
@@ -20,6 +17,6 @@ pub fn fem_model(
     resolution: usize,
     spec: &SampleSpec,
 ) -> Arc<FemModel> {
-    let body = SoftBodyBuilder::new("body", shape, material).resolution(resolution).samples(*spec);
-    body.model().expect("a mesh")
+    let volume = mass_properties(shape, 1.0).mass;
+    FemModel::from_shape(shape, volume, material, resolution, spec).expect("a mesh")
 }

@@ -62,7 +62,7 @@ fn a_soft_collision_keeps_momentum() {
     let a = soft(&mut world, &cube, &rest, at(-0.03, 0.0, 0.0), bread());
     let b =
         soft(&mut world, &cube, &rest, turned(at(0.035, 0.012, 0.006), Vec3::new(0.2, 0.4, 0.3)), bread());
-    world.soft_mut(a).state.v.iter_mut().for_each(|v| *v = Vec3::new(1.0, 0.1, 0.0));
+    world.set_soft_motion(a, |_, v| *v = Vec3::new(1.0, 0.1, 0.0));
     let sums = |world: &World| {
         let mut sums = (Vec3::zeros(), Vec3::zeros());
         for body in [a, b].map(|i| &world.soft(i).state) {
@@ -135,7 +135,7 @@ fn soft_cubes_that_meet_at_two_metres_a_second_do_not_enter_each_other() {
     soft(&mut world, &cube, &rest, at(-0.06, 0.0, 0.0), bread());
     soft(&mut world, &cube, &rest, turned(at(0.06, 0.0, 0.0), Vec3::x() * 0.3), bread());
     for (index, speed) in [(0, 1.0), (1, -1.0)] {
-        world.soft_mut(SoftId::new(index)).state.v.iter_mut().for_each(|v| *v = Vec3::x() * speed);
+        world.set_soft_motion(SoftId::new(index), |_, v| *v = Vec3::x() * speed);
     }
     let mut nearest = f64::INFINITY;
     for _ in 0..40 {
@@ -169,7 +169,7 @@ fn drop_into(shape: &Shape, from: Pose) -> (f64, f64, Vec3) {
     let cube = cuboid(0.05, 0.05, 0.05);
     let rest = fem_model(&cube, SOFT, 6, 1.5e-3);
     soft(&mut world, &cube, &rest, from, bread());
-    world.soft_mut(SoftId::new(0)).state.v.iter_mut().for_each(|v| *v = Vec3::z() * -2.0);
+    world.set_soft_motion(SoftId::new(0), |_, v| *v = Vec3::z() * -2.0);
     let mut deepest = 0.0f64;
     for step in 0..45 {
         world.step().expect("a step that converges");
@@ -223,13 +223,11 @@ fn no_step_of_a_free_fall_gains_energy() {
     let rest = fem_model(&cube, SOFT, 4, 5e-3);
     soft(&mut world, &cube, &rest, at(0.0, 0.0, 1.0), bread());
     // Spinning, stretched and falling.
-    let body = &mut world.soft_mut(SoftId::new(0)).state;
-    for (x, v) in body.x.iter_mut().zip(body.v.iter_mut()) {
+    world.set_soft_motion(SoftId::new(0), |x, v| {
         let r = *x - Vec3::z();
         *v = Vec3::new(0.0, 5.0, 10.0).cross(&r);
         x.x += 0.1 * r.x;
-    }
-    body.update_elastic();
+    });
     let start = world.energy();
     let scale = start.kinetic + start.elastic;
     let mut before = start.total();

@@ -50,19 +50,18 @@ pub fn flight(throw: &Throw) -> Flight {
     let world = &mut scene.world;
     for (pad, away) in [-10.0, 10.0].into_iter().enumerate() {
         let pad = KinematicId::new(pad);
-        let mut pose = *world.kinematic(pad).pose();
+        let mut pose = world.kinematic(pad).pose;
         pose.translation.vector.x += away;
         world.place_kinematic(pad, pose);
     }
-    let body = &mut world.soft_mut(SoftId::new(0)).state;
-    let centre = body.centre();
+    let centre = world.soft(SoftId::new(0)).state.centre();
     let w = Vec3::new(0.3, 1.0, 0.2).normalize() * throw.spin;
-    for (x, v) in body.x.iter_mut().zip(&mut body.v) {
+    world.set_soft_motion(SoftId::new(0), |x, v| {
         let r = *x - centre;
         *x += Vec3::new(r.x, -r.y, 10.0 * r.x * r.y) * throw.stretch;
         *v = w.cross(&r) + Vec3::new(0.1, 0.0, 0.05);
-    }
-    body.update_elastic();
+    });
+    let body = &world.soft(SoftId::new(0)).state;
     let (drift, spin) = (body.velocity(), spin_of(body));
     let start = world.energy().total();
     let (mut last, mut largest_gain) = (start, f64::NEG_INFINITY);

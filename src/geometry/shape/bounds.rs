@@ -141,7 +141,7 @@ impl Shape {
         let mut found = Aabb { min: reach.centre(), max: reach.centre() };
         for (side, extreme) in extremes.into_iter().enumerate() {
             if let Some(start) = extreme {
-                let top = self.climb(start, &outward(side), cell);
+                let top = self.ascend(start, &outward(side), cell);
                 let corner = if side % 2 == 0 { &mut found.min } else { &mut found.max };
                 corner[side / 2] = top[side / 2];
             }
@@ -163,7 +163,7 @@ impl Shape {
     }
 
     /// Moves along the surface from `start` to a local maximum in `direction`.
-    fn climb(&self, start: Vec3, direction: &Vec3, cell: f64) -> Vec3 {
+    fn ascend(&self, start: Vec3, direction: &Vec3, cell: f64) -> Vec3 {
         let (mut at, mut step) = (start, cell);
         while step > 1e-7 {
             let normal = self.first_order(&at).normal;

@@ -59,7 +59,7 @@ impl DetectionLimits {
     pub const STEPS_AHEAD: f64 = 1.5;
 
     /// Approach within [`Self::STEPS_AHEAD`] steps at a speed (m/s), m.
-    pub(super) fn ahead(&self, speed: f64) -> f64 {
+    pub(super) fn approach_distance(&self, speed: f64) -> f64 {
         Self::STEPS_AHEAD * self.dt * speed
     }
 }
@@ -107,7 +107,7 @@ pub fn detect(
     let around = body_bounds.body.unwrap_or(bounds);
     let lever = (around.centre() - motion.origin).norm() + around.size().norm();
     let speed = body_bounds.max_speed + motion.linear.norm() + motion.angular.norm() * lever;
-    let near_collider = bounds.transformed(&motion.pose).loosened(reach.max(limits.ahead(speed)));
+    let near_collider = bounds.transformed(&motion.pose).loosened(reach.max(limits.approach_distance(speed)));
     if !around.intersects(&near_collider) {
         return;
     }
@@ -117,7 +117,7 @@ pub fn detect(
             continue;
         }
         let nodes = LocalNodeGroup::new(body, &group.nodes[..group.count], motion, &frame);
-        let ahead = limits.ahead(nodes.max_speed);
+        let ahead = limits.approach_distance(nodes.max_speed);
         let near_surface = bounds.loosened(reach.max(ahead));
         if !nodes.bounds.intersects(&near_surface) {
             continue;
@@ -129,7 +129,7 @@ pub fn detect(
             is_near |= candidate.gap < reach;
             let weights = &body.model.samples[sample].weights;
             if candidate.gap < margin
-                || (candidate.gap < ahead && candidate.gap < limits.ahead(nodes.speed(weights)))
+                || (candidate.gap < ahead && candidate.gap < limits.approach_distance(nodes.speed(weights)))
             {
                 out.push(candidate);
             }

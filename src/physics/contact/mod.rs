@@ -2,7 +2,7 @@
 //! contacts keep between steps.
 //!
 //! Soft bodies touch with the samples of their surface: colliders by [`detect`], other soft bodies by
-//! [`detect_soft`]. Colliders touch each other by [`CollisionGeometry::meet`]. The contacts become contact points of
+//! [`detect_soft`]. Colliders touch each other by [`CollisionGeometry::find_contacts`]. The contacts become contact points of
 //! the [solver](super::solver) in [`World`](super::World).
 
 mod collider;

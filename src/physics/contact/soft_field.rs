@@ -181,7 +181,7 @@ pub struct FieldCandidate {
 
 /// Distance within which a point of speed up to `speed` (m/s) is tested, m.
 fn search_distance(speed: f64, limits: DetectionLimits) -> f64 {
-    limits.reach.max(limits.margin).max(limits.ahead(speed))
+    limits.reach.max(limits.margin).max(limits.approach_distance(speed))
 }
 
 /// True if two bodies are close or fast enough for [`detect_soft`] to find anything.
@@ -215,7 +215,7 @@ pub fn detect_soft(
             let Some((candidate, speed)) = test_sample(body, field, &search_box, index, sample) else {
                 continue;
             };
-            let ahead = limits.margin.max(limits.ahead(speed));
+            let ahead = limits.margin.max(limits.approach_distance(speed));
             if candidate.contact.gap < ahead.max(limits.reach) {
                 near(index, candidate.contact.element);
             }

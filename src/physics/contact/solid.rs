@@ -15,14 +15,14 @@ use crate::geometry::{Aabb, Pose, Vec3, shape::Shape};
 #[derive(Debug)]
 pub enum CollisionGeometry {
     /// A hard shape.
-    Hard(Box<HardShape>),
+    Rigid(Box<RigidShape>),
     /// A compliant skin: it meets hard shapes at its samples, and no other skin.
     Gel(Vec<GelSample>),
 }
 
 /// A hard shape and the data derived from it.
 #[derive(Debug)]
-pub struct HardShape {
+pub struct RigidShape {
     shape: Shape,
     primitives: Option<Vec<(Primitive, Pose)>>,
     /// Computed on first use: it takes milliseconds, and most colliders never meet a general shape.
@@ -52,7 +52,7 @@ const MAX_FACING_COSINE: f64 = 0.3;
 impl CollisionGeometry {
     /// The geometry of a hard shape.
     pub fn new(shape: &Shape) -> Self {
-        Self::Hard(Box::new(HardShape {
+        Self::Rigid(Box::new(RigidShape {
             shape: shape.clone(),
             primitives: primitives(shape),
             features: OnceLock::new(),
@@ -61,7 +61,7 @@ impl CollisionGeometry {
     }
 
     /// Appends the contact points with `other` whose gap is below `margin` (m). Normals point from this to the other.
-    pub fn meet(
+    pub fn find_contacts(
         &self,
         pose: &Pose,
         other: &Self,
@@ -70,12 +70,12 @@ impl CollisionGeometry {
         out: &mut Vec<(PairId, ManifoldPoint)>,
     ) {
         match (self, other) {
-            (Self::Hard(own), Self::Hard(other)) => own.meet(pose, other, other_pose, margin, out),
-            (Self::Gel(gel), Self::Hard(hard)) => {
-                out.extend(hard.meet_gel(other_pose, gel, pose, margin).map(|point| (0, point)));
+            (Self::Rigid(own), Self::Rigid(other)) => own.find_contacts(pose, other, other_pose, margin, out),
+            (Self::Gel(gel), Self::Rigid(hard)) => {
+                out.extend(hard.gel_contacts(other_pose, gel, pose, margin).map(|point| (0, point)));
             }
-            (Self::Hard(hard), Self::Gel(gel)) => {
-                let points = hard.meet_gel(pose, gel, other_pose, margin);
+            (Self::Rigid(hard), Self::Gel(gel)) => {
+                let points = hard.gel_contacts(pose, gel, other_pose, margin);
                 out.extend(points.map(|point| (0, ManifoldPoint { n_w: -point.n_w, ..point })));
             }
             (Self::Gel(_), Self::Gel(_)) => {}
@@ -85,14 +85,14 @@ impl CollisionGeometry {
     /// Depth of the deepest point of two hard shapes under the other's surface, m; 0 if they do not overlap.
     /// Compliant skins are ignored.
     pub fn depth(&self, pose: &Pose, other: &Self, other_pose: &Pose) -> f64 {
-        let (Self::Hard(own), Self::Hard(other)) = (self, other) else { return 0.0 };
+        let (Self::Rigid(own), Self::Rigid(other)) = (self, other) else { return 0.0 };
         let mut found = Vec::new();
-        own.meet(pose, other, other_pose, 0.0, &mut found);
+        own.find_contacts(pose, other, other_pose, 0.0, &mut found);
         found.iter().map(|(_, point)| -point.phi).fold(own.seed_depth(pose, other, other_pose), f64::max)
     }
 }
 
-impl HardShape {
+impl RigidShape {
     /// Depth of the deepest surface seed of either shape in the other's field, m; 0 for primitives,
     /// whose manifold is exact.
     fn seed_depth(&self, pose: &Pose, other: &Self, other_pose: &Pose) -> f64 {
@@ -115,7 +115,7 @@ impl HardShape {
         self.features.get_or_init(|| surface_features(&self.shape))
     }
 
-    fn meet(
+    fn find_contacts(
         &self,
         pose: &Pose,
         other: &Self,
@@ -162,7 +162,7 @@ impl HardShape {
     /// A bed of springs, one at each sample, compressed by the depth of the sample in the shape (a Winkler
     /// foundation: Johnson, Contact Mechanics, 1985, 4.3). A sample at a sharp edge of the shape counts with its
     /// covered share. Normals point from the skin to the shape.
-    fn meet_gel(
+    fn gel_contacts(
         &self,
         pose: &Pose,
         gel: &[GelSample],

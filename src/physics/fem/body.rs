@@ -8,8 +8,12 @@ use super::{
     rotation::polar,
 };
 use crate::geometry::{
-    Mat3, Pose, Vec3, hex8,
-    voxel::{OccupancyMask, SUBCELLS, SurfaceSample, VoxelMesh},
+    Mat3, Pose, Quat, Vec3, hex8,
+    samples::{SampleSpec, surface_samples},
+    shape::Shape,
+    voxel::{
+        Embedding, OccupancyMask, SUBCELLS, SurfaceSample, VoxelMesh, VoxelMeshError, VoxelSpec, voxel_mesh,
+    },
 };
 
 /// Isotropic, linearly elastic material.
@@ -89,6 +93,25 @@ impl FemModel {
         own + (FACTOR_BYTES * (nodes as f64).powf(4.0 / 3.0)) as usize
     }
 
+    /// Builds the model of a shape with `resolution` voxels along its longest edge.
+    ///
+    /// `volume` (m³) is the mass of [`mass_properties`](crate::geometry::mass::mass_properties) at unit density. It is
+    /// a parameter because its computation may take longer than everything else.
+    ///
+    /// # Errors
+    /// The shape has no voxel mesh.
+    pub fn from_shape(
+        shape: &Shape,
+        volume: f64,
+        material: ElasticMaterial,
+        resolution: usize,
+        spacing: &SampleSpec,
+    ) -> Result<Arc<Self>, VoxelMeshError> {
+        let mesh = voxel_mesh(shape, &VoxelSpec { resolution })?;
+        let samples = surface_samples(shape, &mesh, spacing);
+        Ok(Self::new(mesh, material, volume, samples))
+    }
+
     /// Builds the model; `volume` (m³) is the true volume of the body, which determines its mass.
     pub fn new(
         mesh: VoxelMesh,
@@ -147,7 +170,7 @@ fn node_masses(mesh: &VoxelMesh, density: f64, volume: f64) -> Vec<f64> {
     let mut mass = vec![0.0; mesh.nodes.len()];
     for (nodes, fill) in mesh.elements.iter().zip(&mesh.occupancy) {
         for sub in (0..SUBCELLS * SUBCELLS * SUBCELLS).filter(|&sub| fill.contains(sub)) {
-            let at = crate::geometry::voxel::Embedding { element: 0, local: OccupancyMask::centre(sub) };
+            let at = Embedding { element: 0, local: OccupancyMask::centre(sub) };
             for (&node, w) in nodes.iter().zip(at.weights()) {
                 mass[node as usize] += density * cell * w;
             }
@@ -272,6 +295,13 @@ impl FemState {
             }
         }
         min
+    }
+
+    /// Object frame of the body as if it were rigid, world: its mean rotation and mean node position.
+    pub fn mean_pose(&self) -> Pose {
+        let mean = |nodes: &[Vec3]| nodes.iter().sum::<Vec3>() / nodes.len() as f64;
+        let rotation = Quat::from_matrix(&self.frame);
+        Pose::from_parts((mean(&self.x) - rotation * mean(&self.model.mesh.nodes)).into(), rotation)
     }
 
     /// Centre of mass, m.

@@ -74,85 +74,49 @@ impl Inertia {
     }
 }
 
-/// Buffers of the dynamics, kept by the caller so that a step allocates nothing.
-#[derive(Clone, Debug, Default)]
-pub struct Scratch {
-    axes: Vec<Spatial>,
-    inertias: Vec<Inertia>,
-    velocities: Vec<Spatial>,
-    accelerations: Vec<Spatial>,
-    forces: Vec<Spatial>,
-}
-
-impl Scratch {
-    fn load(&mut self, tree: &JointTree, poses: &[Pose]) {
-        self.axes.clear();
-        self.inertias.clear();
-        for index in 0..tree.dofs() {
-            let LinkVelocity { linear, angular } = unit_joint_velocity(tree, poses, index, &Vec3::zeros());
-            self.axes.push(Spatial { angular, linear });
-            self.inertias.push(Inertia::of(tree, poses, index));
-        }
-    }
+/// Motions of unit joint speed, and inertias of the links.
+fn axes_and_inertias(tree: &JointTree, poses: &[Pose]) -> (Vec<Spatial>, Vec<Inertia>) {
+    let axis = |index| {
+        let LinkVelocity { linear, angular } = unit_joint_velocity(tree, poses, index, &Vec3::zeros());
+        Spatial { angular, linear }
+    };
+    (0..tree.dofs()).map(|index| (axis(index), Inertia::of(tree, poses, index))).unzip()
 }
 
 /// The joint-space mass matrix `M(q)`, n×n (kg m², kg m, kg by kinds of joint), symmetric positive definite.
 pub fn mass_matrix(tree: &JointTree, poses: &[Pose]) -> DMatrix<f64> {
+    let (axes, mut inertias) = axes_and_inertias(tree, poses);
     let mut out = DMatrix::zeros(tree.dofs(), tree.dofs());
-    mass_matrix_into(tree, poses, &mut Scratch::default(), &mut out);
-    out
-}
-
-/// As [`mass_matrix`], into an n×n matrix.
-pub fn mass_matrix_into(tree: &JointTree, poses: &[Pose], scratch: &mut Scratch, out: &mut DMatrix<f64>) {
-    scratch.load(tree, poses);
-    out.fill(0.0);
     for index in (0..tree.dofs()).rev() {
-        let composite = scratch.inertias[index];
+        let composite = inertias[index];
         if let Some(parent) = tree.links[index].parent {
-            let carrier = &mut scratch.inertias[parent];
+            let carrier = &mut inertias[parent];
             carrier.mass += composite.mass;
             carrier.first += composite.first;
             carrier.second += composite.second;
         }
-        let momentum = composite.momentum(&scratch.axes[index]);
+        let momentum = composite.momentum(&axes[index]);
         let mut at = Some(index);
         while let Some(ancestor) = at {
-            let entry = scratch.axes[ancestor].dot(&momentum);
+            let entry = axes[ancestor].dot(&momentum);
             out[(index, ancestor)] = entry;
             out[(ancestor, index)] = entry;
             at = tree.links[ancestor].parent;
         }
     }
+    out
 }
 
 /// The effort that keeps the joints from accelerating at speeds `v` under `gravity` (world, m/s²): Coriolis,
 /// centrifugal and gravity terms, N m or N. With `v = 0` it is the gravity compensation.
 pub fn bias(tree: &JointTree, poses: &[Pose], v: &[f64], gravity: &Vec3) -> DVector<f64> {
-    let mut out = DVector::zeros(tree.dofs());
-    bias_into(tree, poses, v, gravity, &mut Scratch::default(), &mut out);
-    out
-}
-
-/// As [`bias`], into a vector of n entries.
-pub fn bias_into(
-    tree: &JointTree,
-    poses: &[Pose],
-    v: &[f64],
-    gravity: &Vec3,
-    scratch: &mut Scratch,
-    out: &mut DVector<f64>,
-) {
-    scratch.load(tree, poses);
-    let Scratch { axes, inertias, velocities, accelerations, forces } = scratch;
-    velocities.clear();
-    accelerations.clear();
-    forces.clear();
+    let (axes, inertias) = axes_and_inertias(tree, poses);
+    let (mut velocities, mut accelerations, mut forces) = (Vec::new(), Vec::new(), Vec::new());
     // Weight enters as an upward acceleration of the base.
     let base = (Spatial::default(), Spatial { angular: Vec3::zeros(), linear: -gravity });
     for (index, link) in tree.links.iter().enumerate() {
         let (velocity, acceleration) =
-            link.parent.map_or(base, |parent| (velocities[parent], accelerations[parent]));
+            link.parent.map_or(base, |parent: usize| (velocities[parent], accelerations[parent]));
         let velocity: Spatial = velocity.plus(&axes[index], v[index]);
         let acceleration: Spatial = acceleration.plus(&velocity.cross_motion(&axes[index]), v[index]);
         let inertia = &inertias[index];
@@ -162,12 +126,14 @@ pub fn bias_into(
         accelerations.push(acceleration);
         forces.push(force);
     }
+    let mut out = DVector::zeros(tree.dofs());
     for (index, link) in tree.links.iter().enumerate().rev() {
         out[index] = axes[index].dot(&forces[index]);
         if let Some(parent) = link.parent {
             forces[parent] = forces[parent].plus(&forces[index], 1.0);
         }
     }
+    out
 }
 
 /// Kinetic energy at joint speeds `v`, J: the sum over links, independent of [`mass_matrix`].

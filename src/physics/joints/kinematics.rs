@@ -23,14 +23,7 @@ impl LinkVelocity {
 
 /// Forward kinematics: link frames in the world at joint coordinates `q` (one per link).
 pub fn forward(tree: &JointTree, q: &[f64]) -> Vec<Pose> {
-    let mut poses = Vec::with_capacity(tree.dofs());
-    forward_into(tree, q, &mut poses);
-    poses
-}
-
-/// As [`forward`], into a buffer.
-pub fn forward_into(tree: &JointTree, q: &[f64], poses: &mut Vec<Pose>) {
-    poses.clear();
+    let mut poses: Vec<Pose> = Vec::with_capacity(tree.dofs());
     for (link, &q) in tree.links.iter().zip(q) {
         let parent = link.parent.map_or(tree.base_w, |parent| poses[parent]);
         let mut pose = parent * link.placement * link.kind.motion(q);
@@ -38,18 +31,12 @@ pub fn forward_into(tree: &JointTree, q: &[f64], poses: &mut Vec<Pose>) {
         pose.rotation.renormalize();
         poses.push(pose);
     }
+    poses
 }
 
 /// Velocities of all links at joint speeds `v`.
 pub fn velocities(tree: &JointTree, poses: &[Pose], v: &[f64]) -> Vec<LinkVelocity> {
-    let mut out = Vec::with_capacity(tree.dofs());
-    velocities_into(tree, poses, v, &mut out);
-    out
-}
-
-/// As [`velocities`], into a buffer.
-pub fn velocities_into(tree: &JointTree, poses: &[Pose], v: &[f64], out: &mut Vec<LinkVelocity>) {
-    out.clear();
+    let mut out: Vec<LinkVelocity> = Vec::with_capacity(tree.dofs());
     for (index, link) in tree.links.iter().enumerate() {
         let origin = poses[index].translation.vector;
         let (mut linear, mut angular) = match link.parent {
@@ -61,37 +48,18 @@ pub fn velocities_into(tree: &JointTree, poses: &[Pose], v: &[f64], out: &mut Ve
         angular += unit.angular * v[index];
         out.push(LinkVelocity { linear, angular });
     }
+    out
 }
 
 /// The 6×n Jacobian from joint speeds to the velocity of a link: three rows of the linear velocity of its origin,
 /// three of the angular velocity, world.
 pub fn jacobian(tree: &JointTree, poses: &[Pose], link: usize) -> DMatrix<f64> {
-    let mut out = DMatrix::zeros(6, tree.dofs());
-    jacobian_into(tree, poses, link, &mut out);
-    out
-}
-
-/// As [`jacobian`], into a 6×n matrix.
-pub fn jacobian_into(tree: &JointTree, poses: &[Pose], link: usize, out: &mut DMatrix<f64>) {
-    point_jacobian_into(tree, poses, link, &poses[link].translation.vector, out);
+    point_jacobian(tree, poses, link, &poses[link].translation.vector)
 }
 
 /// As [`jacobian`], but of the material point of `link` that is at `p_w` (world, m).
 pub fn point_jacobian(tree: &JointTree, poses: &[Pose], link: usize, p_w: &Vec3) -> DMatrix<f64> {
     let mut out = DMatrix::zeros(6, tree.dofs());
-    point_jacobian_into(tree, poses, link, p_w, &mut out);
-    out
-}
-
-/// As [`point_jacobian`], into a 6×n matrix.
-pub fn point_jacobian_into(
-    tree: &JointTree,
-    poses: &[Pose],
-    link: usize,
-    p_w: &Vec3,
-    out: &mut DMatrix<f64>,
-) {
-    out.fill(0.0);
     let mut at = Some(link);
     while let Some(index) = at {
         let unit = unit_joint_velocity(tree, poses, index, p_w);
@@ -99,6 +67,7 @@ pub fn point_jacobian_into(
         out.fixed_view_mut::<3, 1>(3, index).copy_from(&unit.angular);
         at = tree.links[index].parent;
     }
+    out
 }
 
 /// Velocity of the point at `p_w` (m, world) of link `index` for unit speed of its joint.

@@ -3,19 +3,13 @@
 //! The equation of motion is `M(q) v̇ + bias(q, v) = τ + Σ Jᵀ f`: [`mass_matrix`] gives `M`, [`bias`] the Coriolis,
 //! centrifugal and gravity terms, [`jacobian`] and [`point_jacobian`] the `J` of forces on a link. Everything is
 //! computed in world coordinates from the link poses of [`forward`], so that a step needs the kinematics only once.
-//! Each function has an `_into` variant that writes to a buffer of the caller.
 
 mod dynamics;
 mod kinematics;
 mod tree;
 
-pub use dynamics::{
-    Scratch, bias, bias_into, kinetic_energy, mass_matrix, mass_matrix_into, potential_energy,
-};
-pub use kinematics::{
-    LinkVelocity, forward, forward_into, jacobian, jacobian_into, point_jacobian, point_jacobian_into,
-    velocities, velocities_into,
-};
+pub use dynamics::{bias, kinetic_energy, mass_matrix, potential_energy};
+pub use kinematics::{LinkVelocity, forward, jacobian, point_jacobian, velocities};
 pub use tree::{JointKind, JointState, JointTree, JointTreeError, Link};
 
 #[cfg(test)]

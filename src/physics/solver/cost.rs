@@ -31,7 +31,7 @@ fn for_each_response(
 
 /// Normal impulses of an island after a pass, N s.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct PassChange {
+pub(super) struct PassResidual {
     /// Sum of the absolute changes against the previous pass.
     pub change: f64,
     /// Sum.
@@ -143,8 +143,8 @@ impl Solver {
     }
 
     /// Writes impulses and velocities into the points.
-    pub(super) fn record(&mut self, problem: &mut ContactProblem, island: &Island) -> PassChange {
-        let PassChange { mut change, mut total } = PassChange::default();
+    pub(super) fn record(&mut self, problem: &mut ContactProblem, island: &Island) -> PassResidual {
+        let PassResidual { mut change, mut total } = PassResidual::default();
         let mut points = std::mem::take(&mut self.solved);
         for &index in &island.clusters {
             let cluster = problem.clusters[index];
@@ -164,6 +164,6 @@ impl Solver {
             }
         }
         self.solved = points;
-        PassChange { change, total }
+        PassResidual { change, total }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{
     assemble::{ClusterHessian, DofMap},
-    cost::PassChange,
+    cost::PassResidual,
     island::{FactorCache, Island, islands},
     law::{ConstraintResponse, LinearSegment},
     options::{
@@ -107,7 +107,7 @@ impl Solver {
         let mut steps = 0;
         for pass in 0..MAX_PASSES {
             steps += self.newton(problem, island)?;
-            let PassChange { change, total } = self.record(problem, island);
+            let PassResidual { change, total } = self.record(problem, island);
             if change <= PASS_TOLERANCE * total {
                 break;
             }

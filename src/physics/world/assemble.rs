@@ -177,10 +177,9 @@ impl World {
                 self.blocks.articulations.push(None);
                 continue;
             }
-            let Articulation { tree, poses, state, scratch, .. } = articulation;
+            let Articulation { tree, poses, state, .. } = articulation;
             let n = tree.dofs();
-            let mut mass = nalgebra::DMatrix::zeros(n, n);
-            joints::mass_matrix_into(tree, poses, scratch, &mut mass);
+            let mut mass = joints::mass_matrix(tree, poses);
             let gravity = if articulation.has_gravity { self.gravity } else { Vec3::zeros() };
             let bias = joints::bias(tree, poses, state.v.as_slice(), &gravity);
             let rhs = &mass * &state.v - bias * dt;

@@ -7,24 +7,18 @@ use super::{
     state::{JointFriction, SleepState},
 };
 use crate::{
-    geometry::{
-        Pose,
-        mass::mass_properties,
-        samples::{SampleSpec, surface_samples},
-        shape::Shape,
-        voxel::{VoxelMeshError, VoxelSpec, voxel_mesh},
-    },
+    geometry::{Pose, shape::Shape},
     physics::{
         contact::{Collider, ContactHistory, ContactSurface, Friction, SurfaceStiffness},
-        fem::{ElasticMaterial, FemModel, FemState, system::VelocitySystem},
+        fem::{FemModel, FemState, system::VelocitySystem},
         ids::{ArticulationId, BodyId, ColliderId, KinematicId, RigidId, SoftId},
         joints::{self, JointState, JointTree},
-        rigid::{RigidError, RigidState},
+        rigid::RigidState,
     },
 };
 
 impl World {
-    /// Adds a soft body in its rest configuration at `pose`. See [`SoftBodyBuilder`] for the way from a shape.
+    /// Adds a soft body in its rest configuration at `pose`. [`FemModel::from_shape`] builds the model.
     ///
     /// `surface` is the body's surface at rest (object frame), on which the samples of other soft bodies press.
     /// Without one, two soft bodies touch only where the samples of this one meet the surface of the other.
@@ -56,7 +50,7 @@ impl World {
         SoftId::new(self.soft.len() - 1)
     }
 
-    /// Adds a free rigid body without colliders. See [`RigidBodyBuilder`] for the way from a shape.
+    /// Adds a free rigid body without colliders; [`World::add_shape`] adds them.
     pub fn add_rigid(&mut self, name: &str, state: RigidState) -> RigidId {
         self.rigid.push(RigidBody {
             name: name.to_owned(),
@@ -92,7 +86,6 @@ impl World {
             sleep: SleepState::default(),
             friction: q.iter().map(|&anchor| JointFriction { anchor, stiffness: 0.0 }).collect(),
             poses,
-            scratch: joints::Scratch::default(),
         });
         ArticulationId::new(self.articulations.len() - 1)
     }
@@ -155,145 +148,5 @@ impl World {
             normal: self.params.rigid_modulus,
             shear: self.params.shear_ratio * self.params.rigid_modulus,
         }
-    }
-}
-
-/// Why a body cannot be made from a shape.
-#[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "the messages say what the fields are")]
-pub enum BodyError {
-    #[error("{name}: {source}")]
-    Geometry { name: String, source: VoxelMeshError },
-    #[error("{name}: {source}")]
-    Rigid { name: String, source: RigidError },
-}
-
-/// A soft body made from a shape: voxel mesh, contact samples, finite-element model.
-///
-/// Defaults: resolution 6 (voxels along the longest edge), benchmark friction, sample spacing of
-/// [`SampleSpec::default`], at the origin.
-#[derive(Clone, Debug)]
-pub struct SoftBodyBuilder {
-    name: String,
-    shape: Shape,
-    material: ElasticMaterial,
-    resolution: usize,
-    samples: SampleSpec,
-    friction: Friction,
-    pose: Pose,
-}
-
-impl SoftBodyBuilder {
-    /// A body of `shape` (object frame) and `material`; `name` is used in messages.
-    pub fn new(name: &str, shape: &Shape, material: ElasticMaterial) -> Self {
-        Self {
-            name: name.to_owned(),
-            shape: shape.clone(),
-            material,
-            resolution: 6,
-            samples: SampleSpec::default(),
-            friction: Friction::default(),
-            pose: Pose::identity(),
-        }
-    }
-
-    /// Sets the number of voxels along the longest edge of the bounding box.
-    #[must_use]
-    pub fn resolution(mut self, resolution: usize) -> Self {
-        self.resolution = resolution;
-        self
-    }
-
-    /// Sets the spacing of the contact samples.
-    #[must_use]
-    pub fn samples(mut self, samples: SampleSpec) -> Self {
-        self.samples = samples;
-        self
-    }
-
-    /// Sets the friction of the surface.
-    #[must_use]
-    pub fn friction(mut self, friction: Friction) -> Self {
-        self.friction = friction;
-        self
-    }
-
-    /// Sets the initial pose of the object frame in the world.
-    #[must_use]
-    pub fn pose(mut self, pose: Pose) -> Self {
-        self.pose = pose;
-        self
-    }
-
-    /// The finite-element model alone, to be shared by several bodies.
-    ///
-    /// # Errors
-    /// The shape has no voxel mesh.
-    pub fn model(&self) -> Result<Arc<FemModel>, BodyError> {
-        let mesh = voxel_mesh(&self.shape, &VoxelSpec { resolution: self.resolution })
-            .map_err(|source| BodyError::Geometry { name: self.name.clone(), source })?;
-        let samples = surface_samples(&self.shape, &mesh, &self.samples);
-        Ok(FemModel::new(mesh, self.material, mass_properties(&self.shape, 1.0).mass, samples))
-    }
-
-    /// Adds the body to `world`.
-    ///
-    /// # Errors
-    /// The shape has no voxel mesh.
-    pub fn insert(self, world: &mut World) -> Result<SoftId, BodyError> {
-        let model = self.model()?;
-        Ok(world.add_soft(&self.name, model, Some(Arc::new(self.shape)), &self.pose, self.friction))
-    }
-}
-
-/// A free rigid body made from a shape of uniform density, with one collider.
-///
-/// Defaults: benchmark friction, at the origin.
-#[derive(Clone, Debug)]
-pub struct RigidBodyBuilder {
-    name: String,
-    shape: Shape,
-    density: f64,
-    friction: Friction,
-    pose: Pose,
-}
-
-impl RigidBodyBuilder {
-    /// A body of `shape` (object frame) and `density` (kg/m³); `name` is used in messages.
-    pub fn new(name: &str, shape: &Shape, density: f64) -> Self {
-        Self {
-            name: name.to_owned(),
-            shape: shape.clone(),
-            density,
-            friction: Friction::default(),
-            pose: Pose::identity(),
-        }
-    }
-
-    /// Sets the friction of the surface.
-    #[must_use]
-    pub fn friction(mut self, friction: Friction) -> Self {
-        self.friction = friction;
-        self
-    }
-
-    /// Sets the initial pose of the object frame in the world.
-    #[must_use]
-    pub fn pose(mut self, pose: Pose) -> Self {
-        self.pose = pose;
-        self
-    }
-
-    /// Adds the body and its collider to `world`.
-    ///
-    /// # Errors
-    /// Shape and density give no valid mass or inertia.
-    pub fn insert(self, world: &mut World) -> Result<RigidId, BodyError> {
-        let mass = mass_properties(&self.shape, self.density);
-        let state = RigidState::new(&self.pose, mass.com, mass.mass, mass.inertia)
-            .map_err(|source| BodyError::Rigid { name: self.name.clone(), source })?;
-        let id = world.add_rigid(&self.name, state);
-        world.add_shape(&self.name, id, Pose::identity(), &self.shape, self.friction);
-        Ok(id)
     }
 }

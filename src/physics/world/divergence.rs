@@ -85,12 +85,7 @@ fn force_limit(model: &FemModel, params: &PhysicsParams) -> f64 {
 mod tests {
     use super::*;
     use crate::{
-        geometry::{
-            Mat3, Pose, Vec3,
-            samples::{SampleSpec, surface_samples},
-            shape::Shape,
-            voxel::{VoxelSpec, voxel_mesh},
-        },
+        geometry::{Mat3, Pose, Vec3, samples::SampleSpec, shape::Shape},
         physics::{
             contact::Friction,
             fem::ElasticMaterial,
@@ -103,13 +98,11 @@ mod tests {
     /// A soft cube of 50 mm in free space.
     fn floating() -> World {
         let shape = Shape::cuboid(Vec3::repeat(0.05));
-        let mesh = voxel_mesh(&shape, &VoxelSpec { resolution: 2 }).expect("a mesh");
-        let samples = surface_samples(&shape, &mesh, &SampleSpec::default());
         let material = ElasticMaterial { youngs_pa: 3e4, poisson: 0.4, density: 300.0 };
-        let rest = FemModel::new(mesh, material, 0.05_f64.powi(3), samples);
+        let model = FemModel::from_shape(&shape, 0.05_f64.powi(3), material, 2, &SampleSpec::default());
         let mut world = World::new(PhysicsParams::default(), Vec3::zeros());
         let mu = Friction { static_mu: 0.6, dynamic_mu: 0.5 };
-        world.add_soft("bun", rest, None, &Pose::identity(), mu);
+        world.add_soft("bun", model.expect("a mesh"), None, &Pose::identity(), mu);
         world
     }
 

@@ -31,7 +31,7 @@ impl World {
             let state = &mut articulation.state;
             state.v.copy_from_slice(&self.problem.blocks[*block].v);
             state.q.axpy(dt, &state.v, 1.0);
-            joints::forward_into(&articulation.tree, state.q.as_slice(), &mut articulation.poses);
+            articulation.poses = joints::forward(&articulation.tree, state.q.as_slice());
         }
         self.record_joint_forces();
         self.kinematic.iter_mut().for_each(|k| k.pose = k.next);

@@ -1,16 +1,19 @@
 //! The world: all bodies and colliders, and the step that moves them.
 //!
 //! A [`World`] owns soft bodies, free rigid bodies, articulations, kinematic frames and colliders. `add_*` puts an
-//! object in and returns its [identifier](super::ids); [`SoftBodyBuilder`] and [`RigidBodyBuilder`] do so from a
-//! shape. [`World::step`] advances everything by [`PhysicsParams::dt`]. Units are SI; positions, velocities and
+//! object in and returns its [identifier](super::ids). [`World::step`] advances everything by [`PhysicsParams::dt`]. Units are SI; positions, velocities and
 //! forces are in the world frame unless a name says otherwise.
 //!
 //! A soft cube falls on a table and comes to rest:
 //!
 //! ```
 //! use softvt::{
-//!     geometry::{Pose, Vec3, shape::Shape},
-//!     physics::{BodyId, PhysicsParams, World, contact::Friction, fem::ElasticMaterial, world::SoftBodyBuilder},
+//!     geometry::{Pose, Vec3, samples::SampleSpec, shape::Shape},
+//!     physics::{
+//!         BodyId, PhysicsParams, World,
+//!         contact::Friction,
+//!         fem::{ElasticMaterial, FemModel},
+//!     },
 //! };
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -19,10 +22,9 @@
 //! world.add_shape("table", BodyId::World, Pose::translation(0.0, 0.0, -0.01), &table, Friction::default());
 //!
 //! let bread = ElasticMaterial { youngs_pa: 3e4, poisson: 0.3, density: 250.0 };
-//! let cube = SoftBodyBuilder::new("cube", &Shape::cuboid(Vec3::repeat(0.05)), bread)
-//!     .resolution(3)
-//!     .pose(Pose::translation(0.0, 0.0, 0.03))
-//!     .insert(&mut world)?;
+//! let shape = Shape::cuboid(Vec3::repeat(0.05));
+//! let model = FemModel::from_shape(&shape, 0.05f64.powi(3), bread, 3, &SampleSpec::default())?;
+//! let cube = world.add_soft("cube", model, None, &Pose::translation(0.0, 0.0, 0.03), Friction::default());
 //!
 //! for _ in 0..90 {
 //!     world.step()?;
@@ -38,17 +40,20 @@
 //!
 //! ```
 //! use softvt::{
-//!     geometry::{Pose, Vec3, shape::Shape},
-//!     physics::{PhysicsParams, World, contact::Friction, fem::ElasticMaterial, world::SoftBodyBuilder},
+//!     geometry::{Pose, Vec3, samples::SampleSpec, shape::Shape},
+//!     physics::{
+//!         PhysicsParams, World,
+//!         contact::Friction,
+//!         fem::{ElasticMaterial, FemModel},
+//!     },
 //! };
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let mut world = World::new(PhysicsParams::default(), Vec3::zeros());
 //! let bread = ElasticMaterial { youngs_pa: 3e4, poisson: 0.0, density: 250.0 };
-//! let cube = SoftBodyBuilder::new("cube", &Shape::cuboid(Vec3::repeat(0.05)), bread)
-//!     .resolution(3)
-//!     .friction(Friction::NONE)
-//!     .insert(&mut world)?;
+//! let shape = Shape::cuboid(Vec3::repeat(0.05));
+//! let model = FemModel::from_shape(&shape, 0.05f64.powi(3), bread, 3, &SampleSpec::default())?;
+//! let cube = world.add_soft("cube", model, None, &Pose::identity(), Friction::NONE);
 //! let plate = Shape::cuboid(Vec3::new(0.01, 0.08, 0.08));
 //! let plates = [-1.0, 1.0].map(|side| {
 //!     let frame = world.add_kinematic(Pose::translation(side * 0.031, 0.0, 0.0));
@@ -92,9 +97,8 @@ use crate::{
     },
 };
 
-pub use build::{BodyError, RigidBodyBuilder, SoftBodyBuilder};
 pub use penetration::Penetration;
-pub use snapshot::{ContactPatch, ContactSummary, Energy, Frame, PatchPoint, SampleFace};
+pub use snapshot::{ContactPatch, ContactSummary, Energy, PatchPoint, SampleFace, WorldSnapshot};
 pub use state::{Articulation, BodyContact, JointDrive, KinematicFrame, RigidBody, SoftBody};
 
 /// Why a step is invalid. The world must not be used afterwards; nothing is repaired silently.
@@ -279,9 +283,11 @@ impl World {
         &self.soft[id.index()]
     }
 
-    /// A soft body, to change its state or friction.
-    pub fn soft_mut(&mut self, id: SoftId) -> &mut SoftBody {
-        &mut self.soft[id.index()]
+    /// Changes the position (m) and velocity (m/s) of each node of a soft body, both in the world frame.
+    pub fn set_soft_motion(&mut self, id: SoftId, mut change: impl FnMut(&mut Vec3, &mut Vec3)) {
+        let body = &mut self.soft[id.index()].state;
+        body.x.iter_mut().zip(&mut body.v).for_each(|(x, v)| change(x, v));
+        body.update_elastic();
     }
 
     /// A free rigid body.

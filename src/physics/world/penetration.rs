@@ -2,7 +2,7 @@
 
 use super::{SoftBody, World, rigid_contacts::ColliderPair};
 use crate::{
-    geometry::{Aabb, Pose, Quat, Vec3},
+    geometry::{Aabb, Pose, Vec3},
     physics::{contact::Collider, fem::FemState},
 };
 
@@ -60,14 +60,7 @@ fn signed_distance(collider: &Collider, p: &Vec3) -> f64 {
 fn depth_in_soft(body: &FemState, other: &SoftBody) -> f64 {
     let Some(surface) = &other.surface else { return 0.0 };
     let field = |p: &Vec3| surface.contact(p, &Vec3::zeros(), 0.0).phi;
-    depth_in_field(body, &mean_object_frame(&other.state), &surface.bounds(), &field)
-}
-
-/// Object frame of a soft body, as if it were rigid, world.
-fn mean_object_frame(body: &FemState) -> Pose {
-    let mean = |nodes: &[Vec3]| nodes.iter().sum::<Vec3>() / nodes.len() as f64;
-    let turn = Quat::from_matrix(&body.frame);
-    Pose::from_parts((mean(&body.x) - turn * mean(&body.model.mesh.nodes)).into(), turn)
+    depth_in_field(body, &other.state.mean_pose(), &surface.bounds(), &field)
 }
 
 /// Depth of the deepest sample of `body` in a field within `bounds` in the frame `pose`, m; 0 if all are outside.

@@ -101,7 +101,7 @@ impl World {
             let (Some(solid_a), Some(solid_b)) = (&first.solid, &second.solid) else { continue };
             contacts.found.clear();
             let (pose_a, pose_b) = (&self.motions[a.index()].pose, &self.motions[b.index()].pose);
-            solid_b.meet(pose_b, solid_a, pose_a, margin, &mut contacts.found);
+            solid_b.find_contacts(pose_b, solid_a, pose_a, margin, &mut contacts.found);
             if contacts.found.is_empty() {
                 continue;
             }

@@ -20,7 +20,7 @@ struct Disturbance {
 
 /// Contacts of a body as far as sleep depends on them.
 #[derive(Clone, Copy, Default)]
-struct Support {
+struct RestingContact {
     /// True if the body touches anything.
     touches: bool,
     /// True if it touches something that keeps it awake.
@@ -131,11 +131,11 @@ impl World {
             if self.soft(id).is_asleep() {
                 continue;
             }
-            let support = self.soft_support(id);
-            let moved = support.is_disturbed || self.is_soft_moving(id);
+            let contact = self.soft_resting_contact(id);
+            let moved = contact.is_disturbed || self.is_soft_moving(id);
             let soft = &mut self.soft[id.index()];
             soft.sleep.slow_time = if moved { 0.0 } else { soft.sleep.slow_time + dt };
-            if soft.sleep.slow_time >= delay && support.touches {
+            if soft.sleep.slow_time >= delay && contact.touches {
                 soft.sleep.is_asleep = true;
                 soft.state.v.iter_mut().for_each(|v| *v = Vec3::zeros());
             }
@@ -144,12 +144,12 @@ impl World {
             if self.rigid(id).is_asleep() {
                 continue;
             }
-            let support = self.rigid_support(|body| body == BodyId::Rigid(id));
+            let contact = self.rigid_resting_contact(|body| body == BodyId::Rigid(id));
             let rigid = &mut self.rigid[id.index()];
             let moved =
-                support.is_disturbed || rigid.state.v.norm() + rigid.state.w.norm() > self.params.sleep_speed;
+                contact.is_disturbed || rigid.state.v.norm() + rigid.state.w.norm() > self.params.sleep_speed;
             rigid.sleep.slow_time = if moved { 0.0 } else { rigid.sleep.slow_time + dt };
-            if rigid.sleep.slow_time >= delay && support.touches {
+            if rigid.sleep.slow_time >= delay && contact.touches {
                 rigid.sleep.is_asleep = true;
                 (rigid.state.v, rigid.state.w) = (Vec3::zeros(), Vec3::zeros());
             }
@@ -158,9 +158,9 @@ impl World {
             if self.articulation(id).is_asleep() || self.articulation(id).is_driven() {
                 continue;
             }
-            let support = self.rigid_support(|body| body.is_link_of(id));
+            let contact = self.rigid_resting_contact(|body| body.is_link_of(id));
             let articulation = &mut self.articulations[id.index()];
-            let moved = support.is_disturbed || articulation.state.v.amax() > self.params.sleep_speed;
+            let moved = contact.is_disturbed || articulation.state.v.amax() > self.params.sleep_speed;
             articulation.sleep.slow_time = if moved { 0.0 } else { articulation.sleep.slow_time + dt };
             if articulation.sleep.slow_time >= delay {
                 articulation.sleep.is_asleep = true;
@@ -170,37 +170,37 @@ impl World {
     }
 
     /// Contacts of a soft body.
-    fn soft_support(&self, id: SoftId) -> Support {
-        let mut support = Support::default();
+    fn soft_resting_contact(&self, id: SoftId) -> RestingContact {
+        let mut contact = RestingContact::default();
         for row in &self.rows {
             let partner = match row.partner {
                 partner if row.soft == id => partner,
                 ContactPartner::Soft(other) if other == id => row.soft.into(),
                 _ => continue,
             };
-            support.touches = true;
-            support.is_disturbed |= match partner {
+            contact.touches = true;
+            contact.is_disturbed |= match partner {
                 ContactPartner::Collider(collider) => self.keeps_awake(collider),
                 ContactPartner::Soft(other) => self.is_soft_moving(other),
             };
         }
-        support
+        contact
     }
 
     /// Contacts of a rigid body or of the links of an articulation.
-    fn rigid_support(&self, own: impl Fn(BodyId) -> bool) -> Support {
-        let mut support = Support::default();
+    fn rigid_resting_contact(&self, own: impl Fn(BodyId) -> bool) -> RestingContact {
+        let mut contact = RestingContact::default();
         for id in self.touching_colliders(&own) {
-            support.touches = true;
-            support.is_disturbed |= self.keeps_awake(id);
+            contact.touches = true;
+            contact.is_disturbed |= self.keeps_awake(id);
         }
         for row in &self.rows {
             let ContactPartner::Collider(id) = row.partner else { continue };
             if own(self.collider(id).parent) {
-                support.touches = true;
-                support.is_disturbed |= self.is_soft_moving(row.soft);
+                contact.touches = true;
+                contact.is_disturbed |= self.is_soft_moving(row.soft);
             }
         }
-        support
+        contact
     }
 }

@@ -12,7 +12,7 @@ use crate::{
 
 /// An immutable copy of the state after a step: all that images and tactile sensors are computed from.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Frame {
+pub struct WorldSnapshot {
     /// Step, counted from 1.
     pub step: u64,
     /// Time, s.
@@ -29,7 +29,7 @@ pub struct Frame {
     pub patches: Vec<ContactPatch>,
 }
 
-impl Frame {
+impl WorldSnapshot {
     /// Node positions of a soft body, m, world.
     pub fn soft(&self, id: SoftId) -> &[Vec3] {
         &self.nodes[id.index()]
@@ -144,8 +144,8 @@ struct SidePoint<'a> {
 
 impl World {
     /// A copy of the state, with the contact patches of `colliders`.
-    pub fn snapshot(&self, colliders: &[ColliderId]) -> Frame {
-        Frame {
+    pub fn snapshot(&self, colliders: &[ColliderId]) -> WorldSnapshot {
+        WorldSnapshot {
             step: self.step,
             time: self.time(),
             nodes: self.soft.iter().map(|s| s.state.x.clone()).collect(),

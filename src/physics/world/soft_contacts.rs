@@ -118,7 +118,7 @@ impl World {
         }
         self.candidates.soft = candidates;
         for (id, node) in marked {
-            let soft = self.soft_mut(id);
+            let soft = &mut self.soft[id.index()];
             if !soft.sleep.is_asleep {
                 soft.system.mark(node, soft.steps_awake);
             }

@@ -8,7 +8,7 @@ use crate::{
         contact::{ContactHistory, ContactSurface, Friction, SurfaceStiffness},
         fem::{FemState, MinDetF, system::VelocitySystem},
         ids::ContactPartner,
-        joints::{self, JointState, JointTree},
+        joints::{JointState, JointTree},
         rigid::RigidState,
     },
 };
@@ -29,7 +29,7 @@ pub struct BodyContact {
 pub struct SoftBody {
     /// Name, for messages and logs.
     pub name: String,
-    /// Node positions and velocities. Writable between steps; their number must not change.
+    /// Node positions and velocities; [`World::set_soft_motion`](super::World::set_soft_motion) changes them.
     pub state: FemState,
     /// Friction of its surface.
     pub friction: Friction,
@@ -37,9 +37,11 @@ pub struct SoftBody {
     pub stiffness: SurfaceStiffness,
     pub(super) surface: Option<Arc<dyn ContactSurface>>,
     pub(super) sleep: SleepState,
-    pub(super) min_det_f: MinDetF,
+    /// Smallest det F of its filled elements after the last step.
+    pub min_det_f: MinDetF,
     pub(super) contacts: Vec<BodyContact>,
-    pub(super) system: VelocitySystem,
+    /// Factored velocity system, reduced to the nodes in contact.
+    pub system: VelocitySystem,
     pub(super) history: ContactHistory,
     /// Steps taken awake: the clock of `history` and of the retained nodes, which stops during sleep.
     pub(super) steps_awake: u64,
@@ -50,21 +52,6 @@ impl SoftBody {
     /// True while it sleeps: it is skipped until a nearby body moves.
     pub fn is_asleep(&self) -> bool {
         self.sleep.is_asleep
-    }
-
-    /// Smallest det F of its filled elements after the last step.
-    pub fn min_det_f(&self) -> MinDetF {
-        self.min_det_f
-    }
-
-    /// Number of nodes that the contact solve retains at present.
-    pub fn retained_nodes(&self) -> usize {
-        self.system.retained().len()
-    }
-
-    /// Number of times that its system matrix was factored.
-    pub fn factorizations(&self) -> u64 {
-        self.system.factorizations
     }
 }
 
@@ -142,7 +129,6 @@ pub struct Articulation {
     pub(super) sleep: SleepState,
     pub(super) friction: Vec<JointFriction>,
     pub(super) poses: Vec<Pose>,
-    pub(super) scratch: joints::Scratch,
 }
 
 impl Articulation {
@@ -181,18 +167,8 @@ impl Articulation {
 /// A frame whose motion is prescribed.
 #[derive(Clone, Copy, Debug)]
 pub struct KinematicFrame {
-    pub(super) pose: Pose,
-    pub(super) next: Pose,
-}
-
-impl KinematicFrame {
     /// Pose now, world.
-    pub fn pose(&self) -> &Pose {
-        &self.pose
-    }
-
+    pub pose: Pose,
     /// Pose after the next step, world.
-    pub fn next(&self) -> &Pose {
-        &self.next
-    }
+    pub next: Pose,
 }

@@ -13,7 +13,7 @@ use crate::{
     dataset::video::{VideoError, VideoWriter},
     evaluation::{episode_id::EpisodeIndex, record::EpisodeRecord},
     files::{FileError, replace},
-    physics::world::Frame,
+    physics::world::WorldSnapshot,
     rollout::{CAMERA_IMAGE_SUFFIXES, SensingError, StateRecording, TACTILE_IMAGE_SUFFIXES, TACTILE_IMAGES},
     scene::Camera,
     sensing::{
@@ -222,7 +222,7 @@ pub fn still_path(dir: &Path, index: EpisodeIndex) -> PathBuf {
 /// force on the pads.
 pub fn worst_state(recording: &StateRecording) -> usize {
     // Sum of the normal forces, N.
-    let pad_force = |frame: &Frame| -> f64 {
+    let pad_force = |frame: &WorldSnapshot| -> f64 {
         frame.patches.iter().flat_map(|patch| &patch.points).map(|point| point.pressure * point.area).sum()
     };
     let severity = |at: usize| recording.d_pct[at].unwrap_or_else(|| pad_force(&recording.frames[at]));

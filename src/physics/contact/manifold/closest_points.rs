@@ -101,15 +101,15 @@ impl Smooth<'_> {
         margin: f64,
         out: &mut Vec<ManifoldPoint>,
     ) -> [Vec3; 2] {
-        let lacking = lacking_share(&self.probe.contact(p, 0.0, feature), others);
+        let uncarried = uncarried_share(&self.probe.contact(p, 0.0, feature), others);
         let mut push = |p: &Vec3, share: f64, feature: u32| {
-            let area = POINT_AREA * lacking.min(self.distance_from_edges(p)) * share;
+            let area = POINT_AREA * uncarried.min(self.distance_from_edges(p)) * share;
             let point = self.probe.contact(p, area, feature);
             if point.phi < margin && area > 0.0 {
                 out.push(point);
             }
         };
-        if lacking == 0.0 {
+        if uncarried == 0.0 {
             return [*p; 2];
         }
         let rises = self.rises(p);
@@ -187,7 +187,7 @@ impl Smooth<'_> {
 }
 
 /// Share of a point contact that is not carried by other points as deep as `lowest` on its side.
-fn lacking_share(lowest: &ManifoldPoint, others: &[ManifoldPoint]) -> f64 {
+fn uncarried_share(lowest: &ManifoldPoint, others: &[ManifoldPoint]) -> f64 {
     let same_side = others.iter().filter(|point| point.n_w.dot(&lowest.n_w) > SAME_SIDE);
     let carried = same_side.map(|point| {
         let higher = (point.phi - lowest.phi - SAME_DEPTH_M[0]) / (SAME_DEPTH_M[1] - SAME_DEPTH_M[0]);

@@ -4,7 +4,7 @@ use super::{
     ManifoldPoint, NON_MATERIAL, POINT_AREA, Primitive,
     clip::{self, ClippedEnd, Corner},
     feature::{Face, FaceCorner, FacingFeatures, Line, facing_features},
-    separating_axis::{Axis, contact_axis, support},
+    separating_axis::{ContactNormal, contact_normal, support},
 };
 use crate::geometry::{Pose, Vec3, hex8, orthonormal_basis};
 
@@ -95,7 +95,7 @@ pub(super) fn features(
     margin: f64,
     out: &mut Vec<ManifoldPoint>,
 ) {
-    let Some(axis) = contact_axis(a, pose_a, b, pose_b, margin) else { return };
+    let Some(axis) = contact_normal(a, pose_a, b, pose_b, margin) else { return };
     let plane = ProjectionPlane::new(pose_b.translation.vector, axis.n_w);
     let (on_a, on_b) = (facing_features(a, pose_a, &axis.n_w), facing_features(b, pose_b, &-axis.n_w));
     let mut carried = 0.0;
@@ -109,14 +109,20 @@ pub(super) fn features(
             out.push(ManifoldPoint { p_w, n_w: axis.n_w, phi, area, feature });
         }
     }
-    let lacking = POINT_AREA - carried;
-    if lacking > 0.0 && (axis.closest.is_some() || carried == 0.0) && axis.is_attained {
-        out.push(ManifoldPoint { area: lacking, ..witness(a, pose_a, b, pose_b, &axis) });
+    let uncarried = POINT_AREA - carried;
+    if uncarried > 0.0 && (axis.closest.is_some() || carried == 0.0) && axis.is_attained {
+        out.push(ManifoldPoint { area: uncarried, ..witness(a, pose_a, b, pose_b, &axis) });
     }
 }
 
 /// The closest points, for contacts that no overlap of features represents (a rim against an edge, end against end).
-fn witness(a: &Primitive, pose_a: &Pose, b: &Primitive, pose_b: &Pose, axis: &Axis) -> ManifoldPoint {
+fn witness(
+    a: &Primitive,
+    pose_a: &Pose,
+    b: &Primitive,
+    pose_b: &Pose,
+    axis: &ContactNormal,
+) -> ManifoldPoint {
     let p_w = match axis.closest {
         Some(touch) => 0.5 * (touch.a_w + touch.b_w),
         None => 0.5 * (support(a, pose_a, &axis.n_w) + support(b, pose_b, &-axis.n_w)),

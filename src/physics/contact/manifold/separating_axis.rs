@@ -14,7 +14,7 @@ const PREFER_FACES_SHARE: f64 = 0.01;
 
 /// A contact normal.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Axis {
+pub(super) struct ContactNormal {
     /// Unit, from the first primitive to the second, world.
     pub n_w: Vec3,
     /// Gap along it, m.
@@ -26,13 +26,13 @@ pub(super) struct Axis {
 }
 
 /// The contact normal of `a` and `b` in rank order, or `None` if they are at least `margin` (m) apart.
-pub(super) fn contact_axis(
+pub(super) fn contact_normal(
     a: &Primitive,
     pose_a: &Pose,
     b: &Primitive,
     pose_b: &Pose,
     margin: f64,
-) -> Option<Axis> {
+) -> Option<ContactNormal> {
     let gap_along = |n_w: &Vec3| n_w.dot(&(support(b, pose_b, &-n_w) - support(a, pose_a, n_w)));
     let signed = |axis: &Vec3| {
         let (ahead, behind) = (gap_along(axis), gap_along(&-axis));
@@ -52,7 +52,7 @@ pub(super) fn contact_axis(
         return None;
     }
     if matches!(a, Primitive::Plane) {
-        return Some(Axis { n_w, gap, closest: None, is_attained: true });
+        return Some(ContactNormal { n_w, gap, closest: None, is_attained: true });
     }
     let mut to_beat = gap + PREFER_FACES_M + PREFER_FACES_SHARE * gap.abs();
     for edge_a in edges(a, pose_a) {
@@ -69,7 +69,7 @@ pub(super) fn contact_axis(
         return None;
     }
     if matches!((a, b), (Primitive::Box { .. }, Primitive::Box { .. })) {
-        return Some(Axis { n_w, gap, closest: None, is_attained: gap <= 0.0 });
+        return Some(ContactNormal { n_w, gap, closest: None, is_attained: gap <= 0.0 });
     }
     let closest = refine(a, pose_a, b, pose_b, margin);
     if let Some(found) = closest {
@@ -78,7 +78,7 @@ pub(super) fn contact_axis(
             (gap, n_w) = (refined, found.n_w);
         }
     }
-    (gap < margin).then_some(Axis { n_w, gap, closest, is_attained: true })
+    (gap < margin).then_some(ContactNormal { n_w, gap, closest, is_attained: true })
 }
 
 /// The closest points of the primitives, from those of their cores.

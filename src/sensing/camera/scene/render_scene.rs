@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::pose::PosedMesh;
 use crate::{
     geometry::{Pose, Vec3},
-    physics::{BodyId, world::Frame},
+    physics::{BodyId, world::WorldSnapshot},
     scene::Lighting,
     sensing::camera::{
         CameraError, RenderMesh,
@@ -85,7 +85,7 @@ pub struct FrameView<'a> {
 
 impl<'a> FrameView<'a> {
     /// Borrows the poses of `frame`.
-    pub fn new(frame: &'a Frame, hand_w: Option<Pose>) -> Self {
+    pub fn new(frame: &'a WorldSnapshot, hand_w: Option<Pose>) -> Self {
         Self { nodes: &frame.nodes, rigid: &frame.rigid, links: &frame.links, hand_w }
     }
 
