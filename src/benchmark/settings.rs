@@ -55,18 +55,11 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// The same with the field at a dotted path set: `robot.pads.static_mu`, `0`.
+    /// The same with the fields at dotted paths set, such as `robot.pads.static_mu` to `0`. Ranges that depend on each
+    /// other are checked once all fields are set.
     ///
     /// # Errors
-    /// The field does not exist, or the value has a wrong type or is out of range.
-    pub fn with(&self, path: &str, value: &str) -> Result<Self, SettingsError> {
-        self.with_all(&[(path.to_owned(), value.to_owned())])
-    }
-
-    /// The same with several fields set; ranges that depend on each other are checked once all of them are.
-    ///
-    /// # Errors
-    /// As [`Settings::with`].
+    /// A field does not exist, or its value has a wrong type or is out of range.
     pub fn with_all(&self, fields: &[(String, String)]) -> Result<Self, SettingsError> {
         let mut changed = self.clone();
         for (path, value) in fields {
@@ -180,6 +173,12 @@ fn refusal(path: &str, value: &str, error: &str) -> SettingsError {
 mod tests {
     use super::*;
     use crate::sensing::tactile::{FotsSpec, MarkerModel, OpticsModel};
+
+    impl Settings {
+        fn with(&self, path: &str, value: &str) -> Result<Self, SettingsError> {
+            self.with_all(&[(path.to_owned(), value.to_owned())])
+        }
+    }
 
     #[test]
     fn one_setting_changes_and_an_unknown_one_lists_the_known_ones() {

@@ -19,13 +19,6 @@ struct PlotAxis {
 }
 
 impl PlotAxis {
-    fn of(envelope: &Envelope) -> Option<Self> {
-        let sweep = envelope.sweep.iter().map(|row| row.closure);
-        let all = || sweep.clone().chain(envelope.holds.iter().map(|row| row.closure));
-        let (low, high) = (all().reduce(f64::min)?, all().reduce(f64::max)?);
-        Some(Self { low, high: if high > low { high } else { low + 0.01 } })
-    }
-
     fn column(&self, closure: f64) -> usize {
         let share = ((closure - self.low) / (self.high - self.low)).clamp(0.0, 1.0);
         (share * (WIDTH - 1) as f64).round() as usize
@@ -41,28 +34,27 @@ impl PlotAxis {
 /// Stable squeezes are `●`, unstable ones `○`, and τ is a dashed line. Below are the holds of the lower-bound scan
 /// (`+` all trials held, `~` some, `-` none) and the zones: too loose `░`, safe `█`, too tight `▓`.
 pub fn plot(asset: &str, envelope: &Envelope, limit: Option<DeformationLimit>) -> String {
-    let Some(axis) = PlotAxis::of(envelope) else {
+    let holds = envelope.holds.iter().map(|row| row.closure);
+    let closures = envelope.sweep.iter().map(|row| row.closure).chain(holds);
+    let (low, high) = closures.fold((f64::MAX, f64::MIN), |(low, high), c| (low.min(c), high.max(c)));
+    if low > high {
         return format!("{asset}: no rows, nothing to plot\n");
-    };
-    let mut lines = vec![heading(asset, limit)];
+    }
+    let axis = PlotAxis { low, high: if high > low { high } else { low + 0.01 } };
+    let heading = limit.map_or_else(
+        || format!("{asset} · no stable squeeze, no threshold"),
+        |limit| {
+            let DeformationLimit { d_ref_pct, kappa } = limit;
+            format!("{asset} · D_ref {d_ref_pct:.3} % · τ {:.3} % (κ {kappa})", limit.tau_pct())
+        },
+    );
+    let mut lines = vec![heading];
     lines.extend(curve(envelope, limit, &axis));
-    lines.push(labelled("hold", &holds(&envelope.holds, &axis)));
+    lines.push(labelled("hold", &hold_marks(&envelope.holds, &axis)));
     lines.push(labelled("zone", &zones(envelope, &axis)));
     lines.push(labelled("closure", &ticks(&axis)));
     lines.push(conclusion(envelope));
     lines.iter().map(|line| format!("{}\n", line.trim_end())).collect()
-}
-
-fn heading(asset: &str, limit: Option<DeformationLimit>) -> String {
-    match limit {
-        Some(limit) => format!(
-            "{asset} · D_ref {:.3} % · τ {:.3} % (κ {})",
-            limit.d_ref_pct,
-            limit.tau_pct(),
-            limit.kappa
-        ),
-        None => format!("{asset} · no stable squeeze, no threshold"),
-    }
 }
 
 fn curve(envelope: &Envelope, limit: Option<DeformationLimit>, axis: &PlotAxis) -> Vec<String> {
@@ -91,7 +83,7 @@ fn curve(envelope: &Envelope, limit: Option<DeformationLimit>, axis: &PlotAxis) 
     grid.iter().enumerate().map(|(i, row)| labelled(&label(i), &row.iter().collect::<String>())).collect()
 }
 
-fn holds(rows: &[HoldRow], axis: &PlotAxis) -> String {
+fn hold_marks(rows: &[HoldRow], axis: &PlotAxis) -> String {
     let mut line = vec![' '; WIDTH];
     for row in rows {
         line[axis.column(row.closure)] = match row.held {
@@ -142,8 +134,7 @@ fn conclusion(envelope: &Envelope) -> String {
 }
 
 fn labelled(label: &str, text: &str) -> String {
-    let pad = MARGIN.saturating_sub(label.chars().count());
-    format!("{}{label} │{text}", " ".repeat(pad))
+    format!("{label:>MARGIN$} │{text}")
 }
 
 #[cfg(test)]

@@ -69,27 +69,20 @@ pub struct Evidence<'a> {
     pub goal: GoalEvidence,
 }
 
-impl BodyEvidence {
-    fn is_finite(&self) -> bool {
-        self.centre_w.iter().all(|v| v.is_finite())
-            && self.lowest_z_w.is_finite()
-            && self.support_impulse_ns.is_finite()
-    }
-}
-
 impl Evidence<'_> {
     /// True if every number that the criteria read is finite. Deformations are not included: a missing
     /// one is counted apart.
     pub fn is_finite(&self) -> bool {
-        let pose = self.goal.pose_w.to_homogeneous();
-        self.time_s.is_finite()
-            && self.hand_w.iter().chain(pose.iter()).all(|v| v.is_finite())
-            && self.gripper.width_m.is_finite()
-            && self.gripper.commanded_width_m.is_finite()
-            && self.pads.iter().all(|pad| pad.normal_impulse_ns.is_finite() && pad.travel_m.is_finite())
-            && self.robot_impulse_ns.is_finite()
-            && self.target.is_finite()
-            && self.others.iter().all(BodyEvidence::is_finite)
-            && self.goal.support_impulse_ns.is_finite()
+        let bodies = self.others.iter().chain([&self.target]);
+        let bodies = bodies.flat_map(|body| {
+            let centre = body.centre_w;
+            [centre.x, centre.y, centre.z, body.lowest_z_w, body.support_impulse_ns]
+        });
+        let pads = self.pads.iter().flat_map(|pad| [pad.normal_impulse_ns, pad.travel_m]);
+        let (pose, gripper) = (self.goal.pose_w.to_homogeneous(), &self.gripper);
+        let impulses = [self.robot_impulse_ns, self.goal.support_impulse_ns];
+        let rest = [self.time_s, gripper.width_m, gripper.commanded_width_m].into_iter().chain(impulses);
+        let vectors = self.hand_w.iter().chain(pose.iter()).copied();
+        bodies.chain(pads).chain(rest).chain(vectors).all(f64::is_finite)
     }
 }

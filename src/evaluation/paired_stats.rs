@@ -27,15 +27,6 @@ pub struct EpisodePair<'a> {
     pub second: &'a EpisodeRecord,
 }
 
-/// A task of a suite.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct TaskKey<'a> {
-    /// Name of the suite.
-    pub suite: &'a str,
-    /// Index of the task in the suite.
-    pub task: usize,
-}
-
 /// Key by which the episodes of two runs are paired. In addition to the id it has the layout: two versions of a suite
 /// may give a task another layout, so that initial states of the same id differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -59,24 +50,20 @@ pub fn pair_episodes<'a>(
     first: impl IntoIterator<Item = &'a EpisodeRecord>,
     second: impl IntoIterator<Item = &'a EpisodeRecord>,
 ) -> Vec<EpisodePair<'a>> {
-    let by_key = |records: Vec<&'a EpisodeRecord>| -> BTreeMap<EpisodeKey<'a>, &'a EpisodeRecord> {
-        records.into_iter().map(|record| (EpisodeKey::of(record), record)).collect()
-    };
-    let second = by_key(second.into_iter().collect());
-    by_key(first.into_iter().collect())
-        .into_iter()
-        .filter_map(|(key, first)| Some(EpisodePair { first, second: second.get(&key)? }))
-        .collect()
+    let second: BTreeMap<_, _> = second.into_iter().map(|record| (EpisodeKey::of(record), record)).collect();
+    let pairs = first.into_iter().filter_map(|first| {
+        let key = EpisodeKey::of(first);
+        Some((key, EpisodePair { first, second: second.get(&key)? }))
+    });
+    BTreeMap::from_iter(pairs).into_values().collect()
 }
 
-/// Pairs of each task, in order.
-pub fn group_by_task<'a>(pairs: &[EpisodePair<'a>]) -> BTreeMap<TaskKey<'a>, Vec<EpisodePair<'a>>> {
-    let mut tasks: BTreeMap<TaskKey, Vec<EpisodePair>> = BTreeMap::new();
-    for pair in pairs {
-        let id = &pair.first.header.id;
-        tasks.entry(TaskKey { suite: &id.suite, task: id.task }).or_default().push(*pair);
-    }
-    tasks
+/// Splits pairs, in the order of [`pair_episodes`], by task.
+pub fn group_by_task<'p, 'a>(pairs: &'p [EpisodePair<'a>]) -> impl Iterator<Item = &'p [EpisodePair<'a>]> {
+    pairs.chunk_by(|a, b| {
+        let (a, b) = (&a.first.header.id, &b.first.header.id);
+        a.suite == b.suite && a.task == b.task
+    })
 }
 
 /// Peak D of a valid episode, % of the diagonal; `None` without a measurement.
@@ -316,10 +303,13 @@ mod tests {
         records[1].header.id.suite = "other".into();
         (records[2].header.id.task, records[2].header.id.episode) = (1, 0);
         let all = pair_episodes(&records, &records);
-        let tasks: Vec<_> =
-            group_by_task(&all).into_iter().map(|(task, pairs)| (task, pairs.len())).collect();
-        let key = |suite, task| TaskKey { suite, task };
-        assert_eq!(tasks, [(key("other", 0), 1), (key("suite", 0), 1), (key("suite", 1), 1)]);
+        let tasks: Vec<_> = group_by_task(&all)
+            .map(|pairs| {
+                let id = &pairs[0].first.header.id;
+                (id.suite.as_str(), id.task, pairs.len())
+            })
+            .collect();
+        assert_eq!(tasks, [("other", 0, 1), ("suite", 0, 1), ("suite", 1, 1)]);
     }
 
     #[test]

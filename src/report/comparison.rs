@@ -8,10 +8,9 @@ use super::stored_run::StoredRun;
 use crate::{
     evaluation::{
         paired_stats::{
-            EpisodeKey, EpisodePair, PairedComparison, PairedDifference, TaskKey, group_by_task,
-            pair_episodes,
+            EpisodeKey, EpisodePair, PairedComparison, PairedDifference, group_by_task, pair_episodes,
         },
-        record::EpisodeRecord,
+        record::{EpisodeHeader, EpisodeRecord},
         summary::method_label,
     },
     text::{TextColumn, TextTable, counted, decimal, shortened},
@@ -78,11 +77,10 @@ pub fn compare(first: &[StoredRun], second: &[StoredRun]) -> Result<Comparison, 
     if pairs.is_empty() {
         return Err(no_common_episode(first, second));
     }
-    let task = |(TaskKey { suite, task }, pairs): (TaskKey, Vec<EpisodePair>)| TaskDifferences {
-        suite: suite.to_owned(),
-        task,
-        prompt: pairs[0].first.header.prompt.clone(),
-        differences: PairedComparison::of(&pairs),
+    let task = |pairs: &[EpisodePair]| {
+        let EpisodeHeader { id, prompt, .. } = &pairs[0].first.header;
+        let differences = PairedComparison::of(pairs);
+        TaskDifferences { suite: id.suite.clone(), task: id.task, prompt: prompt.clone(), differences }
     };
     let all = || first.iter().chain(second);
     Ok(Comparison {
@@ -96,7 +94,7 @@ pub fn compare(first: &[StoredRun], second: &[StoredRun]) -> Result<Comparison, 
             .flat_map(|run| run.warnings().into_iter().take(1))
             .collect(),
         all: PairedComparison::of(&pairs),
-        by_task: group_by_task(&pairs).into_iter().map(task).collect(),
+        by_task: group_by_task(&pairs).map(task).collect(),
     })
 }
 

@@ -97,10 +97,13 @@ impl ReferenceShape {
         if nodes.len() != weights.len() {
             return Err(DeformationError::WeightCount { nodes: nodes.len(), weights: weights.len() });
         }
-        if let Some(error) = first_bad_node(nodes) {
-            return Err(error);
+        check_finite(nodes)?;
+        let total: f64 = weights.iter().sum();
+        let bad = weights.iter().position(|w| !w.is_finite() || *w < 0.0);
+        if let Some(node) = bad.or((total <= 0.0 || !total.is_finite()).then_some(0)) {
+            return Err(DeformationError::BadWeight { node, value: weights[node] });
         }
-        let weights = normalised(weights)?;
+        let weights: Vec<f64> = weights.iter().map(|w| w / total).collect();
         let bbox_m = Aabb::from_points(nodes).map_or_else(Vec3::zeros, |bounds| bounds.size());
         let diagonal_m = bbox_m.norm();
         if diagonal_m <= SMALLEST_DIAGONAL_M || !diagonal_m.is_finite() {
@@ -181,7 +184,8 @@ impl ReferenceShape {
         weighted_product -= weighted_sum * self.weighted_centre.transpose();
         // An eigenvector search must not be given a NaN.
         if !product.iter().chain(weighted_product.iter()).all(|v| v.is_finite()) {
-            return Err(first_bad_node(nodes).unwrap_or_else(|| far_node(nodes)));
+            check_finite(nodes)?;
+            return Err(far_node(nodes));
         }
         let mean = sum / nodes.len() as f64;
         Ok(AlignmentSums { mean, weighted_mean: weighted_sum, product, weighted_product, bbox_m: high - low })
@@ -209,20 +213,9 @@ fn best_rotation(product: &Mat3) -> Quat {
     Quat::from_quaternion(Quaternion::new(q[0], q[1], q[2], q[3]) * sign)
 }
 
-fn normalised(weights: &[f64]) -> Result<Vec<f64>, DeformationError> {
-    if let Some(node) = weights.iter().position(|w| !w.is_finite() || *w < 0.0) {
-        return Err(DeformationError::BadWeight { node, value: weights[node] });
-    }
-    let total: f64 = weights.iter().sum();
-    if total <= 0.0 || !total.is_finite() {
-        return Err(DeformationError::BadWeight { node: 0, value: weights[0] });
-    }
-    Ok(weights.iter().map(|w| w / total).collect())
-}
-
-fn first_bad_node(nodes: &[Vec3]) -> Option<DeformationError> {
-    let node = nodes.iter().position(|x| !x.iter().all(|v| v.is_finite()))?;
-    Some(non_finite(nodes, node))
+fn check_finite(nodes: &[Vec3]) -> Result<(), DeformationError> {
+    let bad = nodes.iter().position(|x| !x.iter().all(|v| v.is_finite()));
+    bad.map_or(Ok(()), |node| Err(non_finite(nodes, node)))
 }
 
 fn far_node(nodes: &[Vec3]) -> DeformationError {

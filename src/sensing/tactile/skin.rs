@@ -147,7 +147,13 @@ impl SplineEmbedding {
         for (index, p) in vertices.iter().enumerate() {
             let at = mesh.locate(p)?;
             let home = key(&mesh.nodes[mesh.elements[at.element as usize][0] as usize]);
-            let SplineWeights { nearest, weights } = spline_weights(&at.local);
+            // The corner of the voxel, 0 or 1 along each axis, to which the point is nearest.
+            let nearest: [i64; 3] = std::array::from_fn(|i| i64::from(at.local[i] >= 0.5));
+            let along: [[f64; 3]; 3] = std::array::from_fn(|i| {
+                let d = (at.local[i] - nearest[i] as f64).clamp(-0.5, 0.5);
+                [0.5 * (0.5 - d).powi(2), 0.75 - d * d, 0.5 * (0.5 + d).powi(2)]
+            });
+            let weights = std::array::from_fn(|c| along[0][c % 3] * along[1][c / 3 % 3] * along[2][c / 9]);
             let points = neighbour_steps().map(|step| {
                 let place = std::array::from_fn(|i| home[i] + nearest[i] + step[i]);
                 known.get(&place).copied().unwrap_or_default()
@@ -197,25 +203,6 @@ impl SplineEmbedding {
 /// Steps to a grid point and its 26 neighbours, x fastest.
 fn neighbour_steps() -> [[i64; 3]; 27] {
     std::array::from_fn(|c| [c as i64 % 3 - 1, c as i64 / 3 % 3 - 1, c as i64 / 9 - 1])
-}
-
-/// B-spline weights of a point in a voxel.
-struct SplineWeights {
-    /// Nearest corner of the voxel, 0 or 1 along each axis.
-    nearest: [i64; 3],
-    /// Weights of that corner and its neighbours, as [`neighbour_steps`].
-    weights: [f64; 27],
-}
-
-/// Weights at local coordinates of a voxel, 0 to 1 along each axis.
-fn spline_weights(local: &Vec3) -> SplineWeights {
-    let nearest: [i64; 3] = std::array::from_fn(|i| i64::from(local[i] >= 0.5));
-    let along: [[f64; 3]; 3] = std::array::from_fn(|i| {
-        let d = (local[i] - nearest[i] as f64).clamp(-0.5, 0.5);
-        [0.5 * (0.5 - d).powi(2), 0.75 - d * d, 0.5 * (0.5 + d).powi(2)]
-    });
-    let weights = std::array::from_fn(|c| along[0][c % 3] * along[1][c / 3 % 3] * along[2][c / 9]);
-    SplineWeights { nearest, weights }
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use rustfft::num_complex::Complex32;
 
 use super::{
     gel::{Gel, GelScratch},
-    height_map::{HeightMap, SUBCELLS, SkinMesh},
+    height_map::{HeightMap, SkinMesh},
     normal_contact::solve_normal_contact,
     pad_wrench::{PadWrench, Taxels},
     tangential_contact::{PlanarMotion, apply_shear_kernel, solve_tangential_contact, spring_stiffness},
@@ -90,13 +90,16 @@ impl GelField {
         scratch.fit(gel);
         set_compliance(gel, *substrate, scratch);
         let mut height_map = HeightMap::of(gel, skins);
-        let normal = solve_normal_contact(gel, &gaps(gel, &height_map), wrench.normal(), scratch)
+        let normal = solve_normal_contact(gel, &height_map.gaps(gel), wrench.normal(), scratch)
             .ok_or_else(|| ContactError::NoSkin { force: wrench.normal(), skins: skins.len() })?;
         let load = Vec3::new(wrench.force.x, wrench.force.y, wrench.moment.z);
         let tangential = solve_tangential_contact(gel, &normal.pressure, &load, *friction, scratch);
         let displacement = surface_displacement(gel, &normal.pressure, &tangential.traction, scratch);
         height_map.height.iter_mut().for_each(|z| *z -= normal.approach as f32);
-        let pressure = balanced_pressure(gel, &normal.pressure, wrench.normal());
+        // In double precision, and scaled so that it integrates to the force exactly.
+        let mut pressure: Vec<f64> = normal.pressure.iter().map(|&p| f64::from(p)).collect();
+        let scale = wrench.normal() / (gel.cell * gel.cell) / pressure.iter().sum::<f64>();
+        pressure.iter_mut().for_each(|p| *p *= scale);
         let shear = balanced_shear(gel, &pressure, &tangential.traction, &load);
         Ok(Some(Self {
             pressure,
@@ -222,16 +225,6 @@ fn set_compliance(gel: &Gel, substrate: Option<SubstrateCompliance>, scratch: &m
     }
 }
 
-/// Height of the skins above the undeformed gel at each cell, m; infinite where no skin is.
-fn gaps(gel: &Gel, map: &HeightMap) -> Vec<f32> {
-    let gap = |c: usize| {
-        let height = map.at_cell(c % gel.columns, c / gel.columns) - gel.dome[c];
-        if height.is_nan() { f32::INFINITY } else { height }
-    };
-    debug_assert_eq!(map.columns, SUBCELLS * gel.columns);
-    (0..gel.columns * gel.rows).map(gap).collect()
-}
-
 /// Displacement of the gel's surface by pressure and shear, m.
 pub(super) fn surface_displacement(
     gel: &Gel,
@@ -260,15 +253,6 @@ pub(super) fn surface_displacement(
         gel.fft.inverse(spectrum, field, buffers);
     }
     out
-}
-
-/// The pressure in double precision, scaled so that it integrates to `force` (N) exactly.
-fn balanced_pressure(gel: &Gel, pressure: &[f32], force: f64) -> Vec<f64> {
-    let area = gel.cell * gel.cell;
-    let mut pressure: Vec<f64> = pressure.iter().map(|&p| f64::from(p)).collect();
-    let scale = force / area / pressure.iter().sum::<f64>();
-    pressure.iter_mut().for_each(|p| *p *= scale);
-    pressure
 }
 
 /// The shear in double precision, with a correction of rounding size so that it integrates to `load` exactly.

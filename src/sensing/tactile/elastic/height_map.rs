@@ -15,7 +15,7 @@ pub struct SkinMesh<'a> {
 }
 
 /// Points of the height map per cell of the gel's grid along each axis; odd, so that one is the cell's centre.
-pub(super) const SUBCELLS: usize = 3;
+const SUBCELLS: usize = 3;
 /// Height above the apex beyond which triangles are skipped, m: no gripper pushes a pad in that far.
 const MAX_HEIGHT: f64 = 6e-3;
 
@@ -52,9 +52,14 @@ impl HeightMap {
         map
     }
 
-    /// Height at the centre of the gel's cell (i, j).
-    pub(super) fn at_cell(&self, i: usize, j: usize) -> f32 {
-        self.height[(SUBCELLS * j + SUBCELLS / 2) * self.columns + SUBCELLS * i + SUBCELLS / 2]
+    /// Height above the undeformed gel at the centre of each of its cells, m; infinite where no skin is.
+    pub(super) fn gaps(&self, gel: &Gel) -> Vec<f32> {
+        let gap = |(c, dome): (usize, &f32)| {
+            let [i, j] = [c % gel.columns, c / gel.columns].map(|cell| SUBCELLS * cell + SUBCELLS / 2);
+            let gap = self.height[j * self.columns + i] - dome;
+            if gap.is_nan() { f32::INFINITY } else { gap }
+        };
+        gel.dome.iter().enumerate().map(gap).collect()
     }
 
     /// Lowers the map to one triangle, unless its outer side faces away from the gel.

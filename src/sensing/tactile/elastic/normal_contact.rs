@@ -70,43 +70,30 @@ pub(super) fn solve_normal_contact(
             break;
         }
         let step = (descent / curvature) as f32;
-        let advance = advance(&mut p, &direction, &residual, step, total);
-        if advance.is_same_contact {
+        // Cells that would pull lose contact, cells that overlap gain it.
+        let (mut is_same_contact, mut sum) = (true, 0.0_f64);
+        for c in 0..n {
+            if p[c] > 0.0 {
+                p[c] += step * direction[c];
+                if p[c] <= 0.0 {
+                    (p[c], is_same_contact) = (0.0, false);
+                }
+            } else if residual[c] < 0.0 {
+                (p[c], is_same_contact) = (-step * residual[c], false);
+            }
+            sum += f64::from(p[c]);
+        }
+        let scale = total / sum as f32;
+        p.iter_mut().for_each(|p| *p *= scale);
+        if is_same_contact {
             conjugate = 1.0;
-            sunk.iter_mut().zip(&moved).for_each(|(u, m)| *u = advance.scale * (*u + step * m));
+            sunk.iter_mut().zip(&moved).for_each(|(u, m)| *u = scale * (*u + step * m));
         } else {
             conjugate = 0.0;
             apply_compliance(gel, &p, &mut sunk, scratch);
         }
     }
     Some(NormalSolution { pressure: p, approach })
-}
-
-/// Result of [`advance`].
-struct Advance {
-    /// True if the same cells touch as before.
-    is_same_contact: bool,
-    /// Factor that restored the sum of the pressure.
-    scale: f32,
-}
-
-/// Steps along `direction`. Cells that would pull lose contact, cells that overlap gain it.
-fn advance(p: &mut [f32], direction: &[f32], residual: &[f32], step: f32, total: f32) -> Advance {
-    let (mut is_same_contact, mut sum) = (true, 0.0_f64);
-    for c in 0..p.len() {
-        if p[c] > 0.0 {
-            p[c] += step * direction[c];
-            if p[c] <= 0.0 {
-                (p[c], is_same_contact) = (0.0, false);
-            }
-        } else if residual[c] < 0.0 {
-            (p[c], is_same_contact) = (-step * residual[c], false);
-        }
-        sum += f64::from(p[c]);
-    }
-    let scale = total / sum as f32;
-    p.iter_mut().for_each(|p| *p *= scale);
-    Advance { is_same_contact, scale }
 }
 
 /// Mean of `values` over the cells with pressure.

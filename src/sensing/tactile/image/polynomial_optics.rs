@@ -95,14 +95,10 @@ impl PolynomialOptics {
         let file: OpticsFile = serde_json::from_str(text).map_err(|e| OpticsError::Format(e.to_string()))?;
         let mut colour = [[0.0; SLOPE_MONOMIALS]; 3];
         for (to, from) in colour.iter_mut().zip(&file.colour) {
-            if from.len() != SLOPE_MONOMIALS {
-                return Err(OpticsError::Count {
-                    field: "colour",
-                    found: from.len(),
-                    expected: SLOPE_MONOMIALS,
-                });
-            }
-            to.iter_mut().zip(from).for_each(|(to, &from)| *to = from as f32);
+            let (found, expected) = (from.len(), SLOPE_MONOMIALS);
+            let from = <&[f64; SLOPE_MONOMIALS]>::try_from(&from[..]);
+            *to =
+                from.map_err(|_| OpticsError::Count { field: "colour", found, expected })?.map(|c| c as f32);
         }
         let background = cosine_series(&file.background);
         Ok(Self {
