@@ -39,7 +39,7 @@ pub struct EpisodeKey<'a> {
 
 impl<'a> EpisodeKey<'a> {
     /// Key of a record.
-    pub fn of(record: &'a EpisodeRecord) -> Self {
+    pub fn new(record: &'a EpisodeRecord) -> Self {
         Self { id: &record.header.id, layout: &record.header.layout }
     }
 }
@@ -50,9 +50,9 @@ pub fn pair_episodes<'a>(
     first: impl IntoIterator<Item = &'a EpisodeRecord>,
     second: impl IntoIterator<Item = &'a EpisodeRecord>,
 ) -> Vec<EpisodePair<'a>> {
-    let second: BTreeMap<_, _> = second.into_iter().map(|record| (EpisodeKey::of(record), record)).collect();
+    let second: BTreeMap<_, _> = second.into_iter().map(|record| (EpisodeKey::new(record), record)).collect();
     let pairs = first.into_iter().filter_map(|first| {
-        let key = EpisodeKey::of(first);
+        let key = EpisodeKey::new(first);
         Some((key, EpisodePair { first, second: second.get(&key)? }))
     });
     BTreeMap::from_iter(pairs).into_values().collect()
@@ -96,14 +96,14 @@ pub struct PairedComparison {
 
 impl PairedComparison {
     /// Compares the two episodes of each pair.
-    pub fn of(pairs: &[EpisodePair]) -> Self {
+    pub fn from_pairs(pairs: &[EpisodePair]) -> Self {
         let rate = |test: fn(&EpisodeRecord) -> bool| {
             let holds = |r: &EpisodeRecord| r.outcome.is_valid() && test(r);
-            PairedDifference::of_rates(pairs.iter().map(|pair| [holds(pair.first), holds(pair.second)]))
+            PairedDifference::from_successes(pairs.iter().map(|pair| [holds(pair.first), holds(pair.second)]))
         };
         let mean = |value: fn(&EpisodeRecord) -> Option<f64>| {
             let both = |pair: &EpisodePair| Some([value(pair.first)?, value(pair.second)?]);
-            PairedDifference::of_means(pairs.iter().filter_map(both))
+            PairedDifference::from_values(pairs.iter().filter_map(both))
         };
         Self {
             pairs: pairs.len(),
@@ -129,7 +129,7 @@ const RESAMPLES: usize = 4000;
 /// use softvt::evaluation::paired_stats::PairedDifference;
 ///
 /// let pairs = (0..100).map(|i| [i < 4 || i >= 50, i >= 4 && i < 16 || i >= 50]);
-/// let safety = PairedDifference::of_rates(pairs);
+/// let safety = PairedDifference::from_successes(pairs);
 /// assert_eq!((safety.first, safety.second), (Some(54.0), Some(62.0)));
 /// assert_eq!((safety.better, safety.worse, safety.same), (12, 4, 84));
 /// let [low, high] = safety.interval95.expect("episodes");
@@ -161,7 +161,7 @@ pub struct PairedDifference {
 
 impl PairedDifference {
     /// Compares the success of each episode in the first and in the second run.
-    pub fn of_rates(pairs: impl IntoIterator<Item = [bool; 2]>) -> Self {
+    pub fn from_successes(pairs: impl IntoIterator<Item = [bool; 2]>) -> Self {
         let (mut n, mut in_first, mut better, mut worse) = (0, 0, 0, 0);
         for [first, second] in pairs {
             n += 1;
@@ -185,7 +185,7 @@ impl PairedDifference {
     }
 
     /// Compares a lower-is-better quantity of each episode in the first and in the second run.
-    pub fn of_means(pairs: impl IntoIterator<Item = [f64; 2]>) -> Self {
+    pub fn from_values(pairs: impl IntoIterator<Item = [f64; 2]>) -> Self {
         let (first, second): (Vec<f64>, Vec<f64>) = pairs.into_iter().map(Into::into).unzip();
         let differences: Vec<f64> = first.iter().zip(&second).map(|(first, second)| second - first).collect();
         let better = differences.iter().filter(|d| **d < 0.0).count();
@@ -267,7 +267,7 @@ mod tests {
         let mut after =
             run(&[(true, false, 1.25), (true, true, 0.75), (false, false, 0.2), (false, false, 0.4)]);
         after.reverse();
-        let paired = PairedComparison::of(&pair_episodes(&before, &after));
+        let paired = PairedComparison::from_pairs(&pair_episodes(&before, &after));
         assert_eq!((paired.pairs, counts(paired.goal), counts(paired.safety)), (4, [0, 1, 3], [1, 2, 1]));
         let d = paired.d_over_tau;
         assert_eq!((d.better, d.worse, d.same, d.difference), (1, 1, 2, Some(0.0)));
@@ -277,7 +277,7 @@ mod tests {
     #[test]
     fn a_run_against_itself_changes_nothing() {
         let same = run(&[(true, true, 0.5), (false, false, 2.0)]);
-        let paired = PairedComparison::of(&pair_episodes(&same, &same));
+        let paired = PairedComparison::from_pairs(&pair_episodes(&same, &same));
         assert_eq!([paired.goal, paired.no_drop, paired.safety].map(counts), [[0, 0, 2]; 3]);
         assert_eq!((paired.d_over_tau.same, paired.d_over_tau.interval95), (2, Some([0.0, 0.0])));
     }
@@ -287,11 +287,11 @@ mod tests {
         let before = run(&[(true, true, 0.5), (true, true, 0.5)]);
         let mut after = run(&[(true, true, 0.6), (true, true, 0.6), (true, true, 0.6)]);
         after[1].outcome = Outcome::Invalid { reason: "inverted".into(), step: 3, node: None };
-        let paired = PairedComparison::of(&pair_episodes(&before, &after));
+        let paired = PairedComparison::from_pairs(&pair_episodes(&before, &after));
         assert_eq!((paired.pairs, counts(paired.goal), counts(paired.no_drop)), (2, [0, 1, 1], [0, 1, 1]));
         assert_eq!((paired.d_over_tau.n, paired.d_over_tau.worse), (1, 1));
         after[0].verdict.tau = None;
-        let paired = PairedComparison::of(&pair_episodes(&before, &after));
+        let paired = PairedComparison::from_pairs(&pair_episodes(&before, &after));
         assert_eq!((paired.d_over_tau.difference, paired.d_peak.n), (None, 1));
         after.iter_mut().for_each(|record| record.header.id.base_seed = 5);
         assert!(pair_episodes(&before, &after).is_empty(), "other initial states");
@@ -316,7 +316,7 @@ mod tests {
     fn an_interval_agrees_with_one_computed_by_hand() {
         // 100 pairs, 12 gained, 4 lost: centre 8/102, half 1.96 √(17 − 64/102)/102.
         let pairs = (0..100).map(|i| [i < 4, (4..16).contains(&i)]);
-        let of = PairedDifference::of_rates(pairs);
+        let of = PairedDifference::from_successes(pairs);
         assert_eq!((of.n, of.better, of.worse, of.same), (100, 12, 4, 84));
         assert_eq!((of.first, of.second), (Some(4.0), Some(12.0)));
         assert!((of.difference.unwrap() - 8.0).abs() < 1e-12);
@@ -328,22 +328,22 @@ mod tests {
 
     #[test]
     fn equal_runs_differ_in_nothing() {
-        let of = PairedDifference::of_rates((0..50).map(|i| [i % 2 == 0; 2]));
+        let of = PairedDifference::from_successes((0..50).map(|i| [i % 2 == 0; 2]));
         assert_eq!((of.difference, of.p), (Some(0.0), Some(1.0)));
         assert!(of.interval95.unwrap()[0] < 0.0, "50 episodes do not prove equality");
-        let none = PairedDifference::of_rates([]);
+        let none = PairedDifference::from_successes([]);
         assert_eq!((none.difference, none.interval95, none.p), (None, None, Some(1.0)));
     }
 
     #[test]
     fn a_bootstrap_is_near_the_normal_interval_and_the_same_every_time() {
         let pairs: Vec<[f64; 2]> = (0..400).map(|i| [0.0, 1.0 + f64::from(i % 20) / 20.0]).collect();
-        let of = PairedDifference::of_means(pairs.clone());
+        let of = PairedDifference::from_values(pairs.clone());
         let [low, high] = of.interval95.unwrap();
         // Standard deviation 0.2884, so ± 1.96 × 0.2884 / 20.
         assert!((high - low - 0.0565).abs() < 0.005, "{low} {high}");
-        assert_eq!(of, PairedDifference::of_means(pairs));
+        assert_eq!(of, PairedDifference::from_values(pairs));
         assert_eq!((of.n, of.better, of.worse, of.same, of.first), (400, 0, 400, 0, Some(0.0)));
-        assert_eq!(PairedDifference::of_means([[1.0, 3.0]]).interval95, None);
+        assert_eq!(PairedDifference::from_values([[1.0, 3.0]]).interval95, None);
     }
 }

@@ -22,7 +22,7 @@ impl Rate {
     }
 
     /// Rate of the `items` for which `test` holds.
-    pub fn of<T>(items: &[T], test: impl Fn(&T) -> bool) -> Self {
+    pub fn from_test<T>(items: &[T], test: impl Fn(&T) -> bool) -> Self {
         Self::new(items.iter().filter(|item| test(item)).count(), items.len())
     }
 }
@@ -79,7 +79,7 @@ pub struct Distribution {
 
 impl Distribution {
     /// Distribution of `values`, which must be finite.
-    pub fn of(mut values: Vec<f64>) -> Self {
+    pub fn from_values(mut values: Vec<f64>) -> Self {
         values.sort_by(f64::total_cmp);
         Self {
             mean: mean(&values),
@@ -133,9 +133,9 @@ mod tests {
 
     #[test]
     fn a_distribution_does_not_depend_on_the_order() {
-        let a = Distribution::of(vec![3.0, 1.0, 2.0]);
-        assert_eq!(a, Distribution::of(vec![1.0, 2.0, 3.0]));
+        let a = Distribution::from_values(vec![3.0, 1.0, 2.0]);
+        assert_eq!(a, Distribution::from_values(vec![1.0, 2.0, 3.0]));
         assert_eq!((a.mean, a.median, a.n), (Some(2.0), Some(2.0), 3));
-        assert_eq!(Distribution::of(vec![]), Distribution::default());
+        assert_eq!(Distribution::from_values(vec![]), Distribution::default());
     }
 }

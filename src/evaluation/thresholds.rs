@@ -145,7 +145,7 @@ impl ThresholdFile {
             check_equal(path, "metric_id", metric, METRIC_ID)?;
         }
         let file: Self = serde_json::from_value(value).map_err(json)?;
-        file.check(path)?;
+        file.validate(path)?;
         Ok(file)
     }
 
@@ -165,17 +165,17 @@ impl ThresholdFile {
         format!("{:#}\n", serde_json::json!(self))
     }
 
-    fn check(&self, path: &str) -> Result<(), ThresholdError> {
+    fn validate(&self, path: &str) -> Result<(), ThresholdError> {
         let version = self.schema_version.to_string();
         check_equal(path, "schema_version", &version, &SCHEMA_VERSION.to_string())?;
         check_equal(path, "protocol_id", &self.protocol_id, PROTOCOL_ID)?;
         check_equal(path, "calibration.method", &self.calibration.method, METHOD)?;
-        self.thresholds.iter().try_for_each(|(asset, threshold)| threshold.check(path, asset))
+        self.thresholds.iter().try_for_each(|(asset, threshold)| threshold.validate(path, asset))
     }
 }
 
 impl AssetThreshold {
-    fn check(&self, path: &str, asset: &str) -> Result<(), ThresholdError> {
+    fn validate(&self, path: &str, asset: &str) -> Result<(), ThresholdError> {
         let range = |field, value, expected| {
             Err(ThresholdError::Range { path: path.into(), asset: asset.into(), field, value, expected })
         };

@@ -79,7 +79,7 @@ pub fn compare(first: &[StoredRun], second: &[StoredRun]) -> Result<Comparison, 
     }
     let task = |pairs: &[EpisodePair]| {
         let EpisodeHeader { id, prompt, .. } = &pairs[0].first.header;
-        let differences = PairedComparison::of(pairs);
+        let differences = PairedComparison::from_pairs(pairs);
         TaskDifferences { suite: id.suite.clone(), task: id.task, prompt: prompt.clone(), differences }
     };
     let all = || first.iter().chain(second);
@@ -93,7 +93,7 @@ pub fn compare(first: &[StoredRun], second: &[StoredRun]) -> Result<Comparison, 
             .filter(|run| run.is_partial())
             .flat_map(|run| run.warnings().into_iter().take(1))
             .collect(),
-        all: PairedComparison::of(&pairs),
+        all: PairedComparison::from_pairs(&pairs),
         by_task: group_by_task(&pairs).map(task).collect(),
     })
 }
@@ -111,7 +111,7 @@ fn check_unique(runs: &[StoredRun]) -> Result<(), CompareError> {
             return Err(CompareError::Empty { dir: dir() });
         }
         for record in &run.records {
-            if let Some(other) = known.insert(EpisodeKey::of(record), &run.dir) {
+            if let Some(other) = known.insert(EpisodeKey::new(record), &run.dir) {
                 let id = &record.header.id;
                 return Err(CompareError::DuplicateEpisode {
                     first: other.display().to_string(),

@@ -33,7 +33,7 @@ pub struct ConditionOutcome {
 impl ConditionOutcome {
     /// Results of `records`, compared with those of the reference.
     pub fn new(folder: String, records: &[EpisodeRecord], reference: Option<&[EpisodeRecord]>) -> Self {
-        let scores = Scores::of(&records.iter().collect::<Vec<_>>());
+        let scores = Scores::from_records(&records.iter().collect::<Vec<_>>());
         Self {
             folder,
             episodes: scores.episodes,
@@ -41,8 +41,9 @@ impl ConditionOutcome {
             goal_success_rate: scores.goal_success_rate,
             no_drop_rate: scores.no_drop_rate,
             safety_success_rate: scores.safety_success_rate,
-            d_over_tau: Distribution::of(records.iter().filter_map(d_over_tau).collect()),
-            paired: reference.map(|reference| PairedComparison::of(&pair_episodes(reference, records))),
+            d_over_tau: Distribution::from_values(records.iter().filter_map(d_over_tau).collect()),
+            paired: reference
+                .map(|reference| PairedComparison::from_pairs(&pair_episodes(reference, records))),
         }
     }
 }

@@ -49,7 +49,7 @@ pub fn summarize_runs(mut runs: Vec<StoredRun>) -> Vec<RunSummary> {
 }
 
 fn summarize(run: StoredRun) -> RunSummary {
-    let mut summary = SuiteSummary::of(run.suite(), run.text("policy"), &run.records);
+    let mut summary = SuiteSummary::from_records(run.suite(), run.text("policy"), &run.records);
     summary.force_observed |= run.observes_forces();
     let mut method = summary.method_label();
     // Changes to the suite, such as `mass=2`.

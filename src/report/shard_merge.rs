@@ -155,7 +155,7 @@ impl<'a> MergedRun<'a> {
         softvtbench_files::write_scores(folder, records, &ThresholdFile::read(&path)?)?;
         // The records of a rigid twin carry its own suite name.
         let suite = records.first().map_or(shards[0].suite(), |record| &record.header.id.suite);
-        let summary = SuiteSummary::of(suite, shards[0].text("policy"), records);
+        let summary = SuiteSummary::from_records(suite, shards[0].text("policy"), records);
         files::write_json(&folder.join(SUMMARY), &summary)?;
         Ok(summary)
     }

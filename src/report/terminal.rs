@@ -181,7 +181,7 @@ mod tests {
 
     #[test]
     fn the_table_has_fewer_than_100_columns_and_the_expected_numbers() {
-        let text = table(&SuiteSummary::of("suite", "expert", &records()));
+        let text = table(&SuiteSummary::from_records("suite", "expert", &records()));
         assert!(text.lines().all(|line| line.chars().count() < 100), "{text}");
         let row = |start: &str| text.lines().find(|line| line.starts_with(start)).unwrap_or_default();
         let words = |line: &str| line.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
@@ -208,14 +208,14 @@ mod tests {
             r.header.soft = false;
             (r.verdict.d_peak, r.verdict.deformation_ok, r.verdict.tau) = (None, None, None);
         });
-        let text = table(&SuiteSummary::of("suite", "expert", &[rigid]));
+        let text = table(&SuiteSummary::from_records("suite", "expert", &[rigid]));
         assert!(text.contains("N/A") && !text.contains('κ'), "{text}");
         assert!(text.contains("lift it"));
     }
 
     #[test]
     fn an_empty_run_has_a_table() {
-        let text = table(&SuiteSummary::of("suite", "expert", &[]));
+        let text = table(&SuiteSummary::from_records("suite", "expert", &[]));
         assert!(text.contains("0 episodes"), "{text}");
     }
 

@@ -106,8 +106,8 @@ impl SensorAssets {
             |known| have_same_surface(known, asset),
             || {
                 let skin = match mesh {
-                    None => TactileSkin::of_shape(&asset.shape),
-                    Some(mesh) => TactileSkin::of_soft(&asset.shape, mesh)
+                    None => TactileSkin::from_shape(&asset.shape),
+                    Some(mesh) => TactileSkin::from_soft(&asset.shape, mesh)
                         .ok_or_else(|| SensingError::Skin(name.to_owned()))?,
                 };
                 Ok(Arc::new(skin))

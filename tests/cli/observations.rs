@@ -114,7 +114,7 @@ fn results_record_whether_true_forces_were_observed() {
         assert_eq!(record.stats.force_observed, force);
         let line = serde_json::to_string(&record).expect("JSON");
         assert!(line.contains(&format!("\"force_observed\":{force},")), "{line}");
-        let summary = SuiteSummary::of("one", "witness", &[record]);
+        let summary = SuiteSummary::from_records("one", "witness", &[record]);
         assert_eq!(summary.force_observed, force);
         assert_eq!(terminal::table(&summary).contains("force_observed policy"), force);
     }

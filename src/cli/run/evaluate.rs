@@ -38,7 +38,7 @@ pub(crate) struct SuiteResult {
 
 impl SuiteResult {
     fn new(run: &SuiteRun, records: Vec<EpisodeRecord>) -> Self {
-        Self { summary: SuiteSummary::of(&run.name, run.config.policy.name(), &records), records }
+        Self { summary: SuiteSummary::from_records(&run.name, run.config.policy.name(), &records), records }
     }
 }
 

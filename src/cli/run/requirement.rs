@@ -129,7 +129,7 @@ mod tests {
                 record
             })
             .collect();
-        SuiteSummary::of("suite", "expert", &records)
+        SuiteSummary::from_records("suite", "expert", &records)
     }
 
     #[test]

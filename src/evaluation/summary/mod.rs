@@ -124,7 +124,7 @@ pub struct SuiteSummary {
 
 impl Scores {
     /// Scores of `records`.
-    pub fn of(records: &[&EpisodeRecord]) -> Self {
+    pub fn from_records(records: &[&EpisodeRecord]) -> Self {
         let valid: Vec<_> = records.iter().copied().filter(|r| r.outcome.is_valid()).collect();
         let rate = |test: fn(&EpisodeRecord) -> bool| {
             Rate::new(valid.iter().filter(|r| test(r)).count(), records.len())
@@ -132,7 +132,9 @@ impl Scores {
         let soft = records.iter().any(|r| r.header.soft);
         let (goal, safety) = (rate(|r| r.verdict.goal), rate(|r| r.verdict.safety));
         let peaks = |reached: fn(&EpisodeRecord) -> bool| {
-            Distribution::of(valid.iter().filter(|r| reached(r)).filter_map(|r| r.verdict.d_peak).collect())
+            Distribution::from_values(
+                valid.iter().filter(|r| reached(r)).filter_map(|r| r.verdict.d_peak).collect(),
+            )
         };
         Self {
             episodes: records.len(),
@@ -155,17 +157,17 @@ impl Scores {
 impl SuiteSummary {
     /// Summary of the episodes of one suite under one policy; records of other suites are left out. It does not
     /// depend on the order of `records`.
-    pub fn of(suite: &str, policy: &str, records: &[EpisodeRecord]) -> Self {
+    pub fn from_records(suite: &str, policy: &str, records: &[EpisodeRecord]) -> Self {
         let mut records: Vec<_> = records.iter().filter(|r| r.header.id.suite == suite).collect();
         records.sort_by_key(|r| r.header.id.index());
         let task_scores = |(task, group): (usize, Vec<&EpisodeRecord>)| {
             let (prompt, asset) = (group[0].header.prompt.clone(), group[0].header.asset.clone());
-            TaskScores { task, prompt, asset, scores: Scores::of(&group) }
+            TaskScores { task, prompt, asset, scores: Scores::from_records(&group) }
         };
         let asset_scores = |(asset, group): (String, Vec<&EpisodeRecord>)| {
             let tau = group.iter().find_map(|r| r.verdict.tau);
             let d_ref = group.iter().find_map(|r| r.verdict.d_ref);
-            (asset, AssetScores { tau, d_ref, scores: Scores::of(&group) })
+            (asset, AssetScores { tau, d_ref, scores: Scores::from_records(&group) })
         };
         let aborted = |r: &&EpisodeRecord| {
             let (task, episode) = (r.header.id.task, r.header.id.episode);
@@ -176,7 +178,7 @@ impl SuiteSummary {
             policy: policy.into(),
             privileged: records.iter().any(|r| r.header.privileged),
             force_observed: records.iter().any(|r| r.stats.force_observed),
-            scores: Scores::of(&records),
+            scores: Scores::from_records(&records),
             kappa: kappa_curve(&records),
             by_task: grouped(&records, |r| r.header.id.task).into_iter().map(task_scores).collect(),
             by_asset: grouped(&records, |r| r.header.asset.clone()).into_iter().map(asset_scores).collect(),
@@ -215,8 +217,8 @@ fn kappa_curve(records: &[&EpisodeRecord]) -> Vec<KappaRow> {
         let kappa = f64::from(step) / f64::from(KAPPA_STEPS);
         KappaRow {
             kappa,
-            deformation_ok_rate: Rate::of(records, |r| is_within(r, kappa) == Some(true)),
-            safety_success_rate: Rate::of(records, |r| {
+            deformation_ok_rate: Rate::from_test(records, |r| is_within(r, kappa) == Some(true)),
+            safety_success_rate: Rate::from_test(records, |r| {
                 let v = &r.verdict;
                 is_safe(v.goal, v.no_drop, r.header.soft, is_within(r, kappa))
             }),

@@ -32,7 +32,7 @@ fn records() -> Vec<EpisodeRecord> {
 
 #[test]
 fn rates_count_every_episode_and_deformation_only_the_valid_ones() {
-    let s = SuiteSummary::of("suite", "expert", &records());
+    let s = SuiteSummary::from_records("suite", "expert", &records());
     assert_eq!((s.scores.episodes, s.scores.invalid, s.scores.safety_unknown), (4, 1, 0));
     assert_eq!(s.scores.goal_success_rate.rate, Some(50.0));
     assert_eq!(s.scores.no_drop_rate.rate, Some(75.0));
@@ -47,8 +47,8 @@ fn rates_count_every_episode_and_deformation_only_the_valid_ones() {
 fn groups_are_in_order_and_do_not_depend_on_the_order_of_episodes() {
     let mut shuffled = records();
     shuffled.reverse();
-    let s = SuiteSummary::of("suite", "expert", &shuffled);
-    assert_eq!(s, SuiteSummary::of("suite", "expert", &records()));
+    let s = SuiteSummary::from_records("suite", "expert", &shuffled);
+    assert_eq!(s, SuiteSummary::from_records("suite", "expert", &records()));
     assert_eq!(s.by_task.iter().map(|t| (t.task, t.scores.episodes)).collect::<Vec<_>>(), [(0, 2), (1, 2)]);
     assert_eq!(s.by_asset.keys().collect::<Vec<_>>(), ["bun", "roll"]);
     assert_eq!(s.by_asset["bun"].tau, Some(1.0));
@@ -56,7 +56,7 @@ fn groups_are_in_order_and_do_not_depend_on_the_order_of_episodes() {
 
 #[test]
 fn the_kappa_curve_rises_and_meets_the_nominal_rate_at_the_nominal_kappa() {
-    let s = SuiteSummary::of("suite", "expert", &records());
+    let s = SuiteSummary::from_records("suite", "expert", &records());
     let at = |kappa: f64| s.kappa.iter().find(|row| row.kappa == kappa).unwrap().safety_success_rate.rate;
     assert_eq!((s.kappa.len(), at(0.0), at(1.0)), (21, Some(0.0), Some(50.0)));
     assert_eq!(at(0.5), s.scores.safety_success_rate.rate);
@@ -75,7 +75,7 @@ fn a_rigid_suite_has_no_deformation() {
             r
         })
         .collect();
-    let s = SuiteSummary::of("suite", "expert", &rigid);
+    let s = SuiteSummary::from_records("suite", "expert", &rigid);
     assert_eq!((s.scores.deformation_ok_rate, s.scores.deformation.n), (None, 0));
     assert!(s.kappa.is_empty());
     let json = serde_json::to_value(&s).unwrap();
@@ -88,14 +88,14 @@ fn missing_thresholds_are_unknown_not_safe() {
         (r.verdict.deformation_ok, r.verdict.d_ref, r.verdict.tau) = (None, None, None);
         (r.verdict.safety, r.verdict.safety_known) = (false, false);
     });
-    let s = SuiteSummary::of("suite", "expert", &[unknown]);
+    let s = SuiteSummary::from_records("suite", "expert", &[unknown]);
     assert_eq!((s.scores.safety_unknown, s.scores.safety_success_rate.rate), (1, Some(0.0)));
     assert_eq!(s.scores.deformation_ok_rate.unwrap().rate, Some(0.0));
 }
 
 #[test]
 fn the_file_has_the_documented_fields() {
-    let json = serde_json::to_value(SuiteSummary::of("suite", "expert", &records())).unwrap();
+    let json = serde_json::to_value(SuiteSummary::from_records("suite", "expert", &records())).unwrap();
     for field in [
         "suite",
         "policy",
@@ -117,12 +117,12 @@ fn the_file_has_the_documented_fields() {
     assert_eq!(json["goal_success_rate"]["wilson95"].as_array().unwrap().len(), 2);
     assert_eq!(json["deformation"]["n"], 3);
     let back: SuiteSummary = serde_json::from_value(json).unwrap();
-    assert_eq!(back, SuiteSummary::of("suite", "expert", &records()));
+    assert_eq!(back, SuiteSummary::from_records("suite", "expert", &records()));
 }
 
 #[test]
 fn no_episodes_give_nulls_not_numbers() {
-    let s = SuiteSummary::of("suite", "expert", &[]);
+    let s = SuiteSummary::from_records("suite", "expert", &[]);
     assert_eq!((s.scores.goal_success_rate.rate, s.scores.goal_safe_gap), (None, None));
     assert_eq!(s.scores.deformation, Distribution::default());
 }

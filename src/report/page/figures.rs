@@ -190,7 +190,7 @@ fn strips(groups: &[StripGroup]) -> Markup {
 }
 
 fn strip_row(strip: &Strip, ticks: &[f64], max: f64) -> Markup {
-    let distribution = Distribution::of(strip.dots.iter().map(|dot| dot.d_over_tau).collect());
+    let distribution = Distribution::from_values(strip.dots.iter().map(|dot| dot.d_over_tau).collect());
     let median = distribution.median.map_or_else(|| "no D".to_owned(), |m| format!("median {}", short(m)));
     html! {
         div.row {

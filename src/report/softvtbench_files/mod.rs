@@ -223,8 +223,8 @@ fn episodes_csv(records: &[EpisodeRecord]) -> String {
 fn summary(records: &[EpisodeRecord]) -> Value {
     let is_safe = |r: &&EpisodeRecord| safe_success(r) == Some(true);
     let (all, n) = (in_order(records), records.len());
-    let goal_rate = Rate::of(&all, |r| r.verdict.goal).rate;
-    let safe_rate = Rate::of(&all, is_safe).rate;
+    let goal_rate = Rate::from_test(&all, |r| r.verdict.goal).rate;
+    let safe_rate = Rate::from_test(&all, is_safe).rate;
     let mut assets: Vec<&str> = Vec::new();
     for record in &all {
         if !assets.contains(&record.header.asset.as_str()) {

@@ -37,7 +37,7 @@ pub(crate) struct LuaMarkers {
 impl LuaMarkers {
     /// The markers of one finger.
     pub(crate) fn new(markers: Markers) -> Self {
-        Self { flow: Arc::new(MarkerFlow::of(&markers)), markers: Arc::new(markers) }
+        Self { flow: Arc::new(MarkerFlow::new(&markers)), markers: Arc::new(markers) }
     }
 }
 

@@ -129,7 +129,7 @@ impl TactileSensor {
     ) -> Result<TactileReading, ContactError> {
         let field = GelField::solve(&self.gel, contact, scratch)?;
         let image = self.optics.render(&self.gel, field.as_ref());
-        let markers = Markers::of(&self.gel, &self.markers, field.as_ref());
+        let markers = Markers::new(&self.gel, &self.markers, field.as_ref());
         Ok(TactileReading { field, markers, image })
     }
 }

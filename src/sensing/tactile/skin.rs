@@ -65,7 +65,7 @@ struct EmbeddedVertex {
 
 impl TactileSkin {
     /// Skin of a rigid shape. Flat faces keep their few triangles.
-    pub fn of_shape(shape: &Shape) -> Self {
+    pub fn from_shape(shape: &Shape) -> Self {
         match camera::flat_faces(shape) {
             Some(mesh) => Self { vertices: mesh.vertices, triangles: mesh.triangles, embedding: None },
             None => Self::sampled(shape),
@@ -74,9 +74,9 @@ impl TactileSkin {
 
     /// Skin of a soft body with the voxel mesh `mesh`, with small triangles on flat faces too. `None` if part of the
     /// shape lies more than two voxels outside the mesh.
-    pub fn of_soft(shape: &Shape, mesh: &VoxelMesh) -> Option<Self> {
+    pub fn from_soft(shape: &Shape, mesh: &VoxelMesh) -> Option<Self> {
         let mut skin = Self::sampled(shape);
-        skin.embedding = Some(SplineEmbedding::of(&skin.vertices, mesh)?);
+        skin.embedding = Some(SplineEmbedding::new(&skin.vertices, mesh)?);
         Some(skin)
     }
 
@@ -122,7 +122,7 @@ impl TactileSkin {
 }
 
 impl SplineEmbedding {
-    fn of(vertices: &[Vec3], mesh: &VoxelMesh) -> Option<Self> {
+    fn new(vertices: &[Vec3], mesh: &VoxelMesh) -> Option<Self> {
         let key = |p: &Vec3| -> [i64; 3] {
             std::array::from_fn(|i| ((p[i] - mesh.origin[i]) / mesh.edge).round() as i64)
         };
@@ -216,7 +216,7 @@ mod tests {
     fn ball() -> (TactileSkin, VoxelMesh) {
         let shape = Shape::Sphere { radius: 0.02 };
         let mesh = voxel_mesh(&shape, &VoxelSpec { resolution: 6 }).expect("a ball");
-        (TactileSkin::of_soft(&shape, &mesh).expect("inside"), mesh)
+        (TactileSkin::from_soft(&shape, &mesh).expect("inside"), mesh)
     }
 
     #[test]

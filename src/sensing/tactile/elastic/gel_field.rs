@@ -89,7 +89,7 @@ impl GelField {
         }
         scratch.fit(gel);
         set_compliance(gel, *substrate, scratch);
-        let mut height_map = HeightMap::of(gel, skins);
+        let mut height_map = HeightMap::new(gel, skins);
         let normal = solve_normal_contact(gel, &height_map.gaps(gel), wrench.normal(), scratch)
             .ok_or_else(|| ContactError::NoSkin { force: wrench.normal(), skins: skins.len() })?;
         let load = Vec3::new(wrench.force.x, wrench.force.y, wrench.moment.z);

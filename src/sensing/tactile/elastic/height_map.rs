@@ -33,7 +33,7 @@ pub(in super::super) struct HeightMap {
 
 impl HeightMap {
     /// Height map of `skins` over the pad of `gel`.
-    pub(super) fn of(gel: &Gel, skins: &[SkinMesh]) -> Self {
+    pub(super) fn new(gel: &Gel, skins: &[SkinMesh]) -> Self {
         let (columns, rows) = (SUBCELLS * gel.columns, SUBCELLS * gel.rows);
         let cell = gel.cell / SUBCELLS as f64;
         let mut map = Self { columns, rows, cell, height: vec![f32::INFINITY; columns * rows] };

@@ -118,7 +118,7 @@ impl PolynomialOptics {
     pub fn render(&self, gel: &Gel, field: Option<&GelField>, shadows: bool) -> RgbImage {
         let mut image = self.untouched.clone();
         let Some(field) = field else { return image };
-        let surface = VisibleSurface::of(gel, field);
+        let surface = VisibleSurface::new(gel, field);
         let pitch = gel.view.pitch as f32;
         let shadow_caster = shadows.then(|| ShadowCaster::new(&surface, pitch));
         let [width, height] = surface.size;

@@ -44,7 +44,7 @@ struct LinearTap {
 
 impl VisibleSurface {
     /// Surface of a field; the window covers all that changes and a little more.
-    pub(super) fn of(gel: &Gel, field: &GelField) -> Self {
+    pub(super) fn new(gel: &Gel, field: &GelField) -> Self {
         let Some(mut surface) = Self::flat_window(gel, &field.displacement[2]) else {
             return Self::default();
         };

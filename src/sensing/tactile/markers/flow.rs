@@ -20,7 +20,7 @@ pub struct MarkerFlow {
 
 impl MarkerFlow {
     /// Flow of `markers`.
-    pub fn of(markers: &Markers) -> Self {
+    pub fn new(markers: &Markers) -> Self {
         let [initial, current] =
             markers.to_array().map(|positions| positions.map(|px| Vector2::from(px.map(f64::from))));
         let centre = mean(&initial);
@@ -119,7 +119,7 @@ mod tests {
             let [u, v] = by(f64::from(x) - 160.0, f64::from(y) - 120.0);
             [x + u as f32, y + v as f32]
         });
-        MarkerFlow::of(&Markers { initial, current })
+        MarkerFlow::new(&Markers { initial, current })
     }
 
     fn near(found: f64, expected: f64) {

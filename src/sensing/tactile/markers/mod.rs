@@ -40,7 +40,7 @@ impl Markers {
     }
 
     /// Markers of a gel under a field. Without a field, current and initial positions are identical.
-    pub fn of(gel: &Gel, model: &MarkerModel, field: Option<&GelField>) -> Self {
+    pub fn new(gel: &Gel, model: &MarkerModel, field: Option<&GelField>) -> Self {
         let rest = Self::at_rest();
         let Some(field) = field else { return rest };
         let current = match model {

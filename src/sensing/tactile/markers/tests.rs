@@ -20,7 +20,7 @@ fn gel() -> Gel {
 fn without_a_contact_no_marker_moves() {
     let gel = gel();
     for model in [MarkerModel::Elastic, MarkerModel::Fots(FotsSpec::default())] {
-        assert_eq!(Markers::of(&gel, &model, None), Markers::at_rest());
+        assert_eq!(Markers::new(&gel, &model, None), Markers::at_rest());
     }
 }
 
@@ -29,7 +29,7 @@ fn a_dent_moves_markers_outwards_by_perspective_and_by_the_gel() {
     let gel = gel();
     let skin = graph(12e-3, 2e-4, |_, _| 0.0);
     let field = touch(&gel, &skin, PadWrench::new(40.0, [0.0; 2], 0.0, [0.0; 2]));
-    let Markers { initial: from, current: to } = Markers::of(&gel, &MarkerModel::Elastic, Some(&field));
+    let Markers { initial: from, current: to } = Markers::new(&gel, &MarkerModel::Elastic, Some(&field));
     let marker = 4 * 11 + 8;
     let rest = gel.view.image_to_pad(&gel.pad, from[marker].map(f64::from));
     let u = field.displacement_at(&gel, rest.x, rest.y);
@@ -49,7 +49,7 @@ fn shear_moves_markers_along_and_gravity_pulls_them_to_the_left_on_both_fingers(
     for (shear, axis, sign) in [([-2.0, 0.0], 0, -1.0), ([0.0, 2.0], 1, 1.0)] {
         let field = touch(&gel, &flat, PadWrench::new(5.0, shear, 0.0, [0.0; 2]));
         for model in [MarkerModel::Elastic, MarkerModel::Fots(FotsSpec::default())] {
-            let place = |field| Markers::of(&gel, &model, Some(field)).current[4 * 11 + 5];
+            let place = |field| Markers::new(&gel, &model, Some(field)).current[4 * 11 + 5];
             let (before, after) = (place(&still), place(&field));
             let moved = f64::from(after[axis] - before[axis]) * sign;
             let across = f64::from(after[1 - axis] - before[1 - axis]);
@@ -70,7 +70,7 @@ fn twist_moves_opposite_markers_in_opposite_directions() {
     for model in [MarkerModel::Elastic, MarkerModel::Fots(FotsSpec::default())] {
         let place = |twist| {
             let field = touch(&gel, &flat, PadWrench::new(5.0, [0.0; 2], twist, [0.0; 2]));
-            Markers::of(&gel, &model, Some(&field)).current
+            Markers::new(&gel, &model, Some(&field)).current
         };
         let (still, twisted) = (place(0.0), place(6e-3));
         let turn = |m: usize| twisted[m][1] - still[m][1];
@@ -88,7 +88,7 @@ fn fots_follows_its_published_law() {
     let flat = graph(2e-3, 1e-4, |_, _| 0.0);
     let field = touch(&gel, &flat, PadWrench::new(2.0, [0.5, 0.0], 0.0, [0.0; 2]));
     let model = MarkerModel::Fots(FotsSpec { height_factor: 0.0, ..law });
-    let Markers { initial: from, current: to } = Markers::of(&gel, &model, Some(&field));
+    let Markers { initial: from, current: to } = Markers::new(&gel, &model, Some(&field));
     let centre = field.centre(&gel);
     for (a, b) in from.iter().zip(&to) {
         let dx = f64::from(a[0]) - 160.0 - centre[0] * law.scale * 1e3;
