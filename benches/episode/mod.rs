@@ -4,7 +4,7 @@ use softvt::{
     benchmark::Plan,
     evaluation::episode_id::{EpisodeId, Split},
     rollout::EpisodeSpec,
-    script::{self, EpisodeSetup, ExpertController, LoadedScript},
+    script::{self, EpisodeSetup, ExpertController, GripMode, LoadedScript},
 };
 
 /// The suite.
@@ -34,6 +34,5 @@ pub fn open(loaded: &LoadedScript, task: usize, film: bool) -> (EpisodeSpec, Exp
         )
     };
     spec.header.privileged = true;
-    let expert = opened.expert().expect("an expert");
-    (spec, ExpertController::new(expert, false))
+    (spec, opened.expert(GripMode::Commanded).expect("an expert"))
 }

@@ -11,28 +11,24 @@ mod schema;
 pub mod stubs;
 mod vm;
 
-pub use api::{
-    expert_input::{ExpertCommand, ExpertView, ObjectView},
-    touch::FingerReadings,
-};
 pub use plan::{
-    LoadedScript, declared_options, load, load_with,
+    LoadedScript, ScriptSources, declared_options, load, load_with,
     options::{OptionSpec, OptionValue},
     policy_file::{LuaPolicy, PolicyFile},
     profile_file::load_profile,
 };
 pub use run::{
-    episode::{EpisodeSetup, Scenes, check_shift},
+    episode::{EpisodeSetup, InitialScenes, SceneBuilder, ShiftError, check_shift},
     experiment::{Experiment, ExperimentRow, ExperimentSummary},
-    expert::{Expert, ExpertController},
+    expert::{ExpertController, GripMode},
 };
 pub use schema::Range;
 pub use vm::{
     Limits, PrintSink,
     error::ScriptError,
-    library::{Bundle, Source, embedded, embedded_scripts, sha256},
+    library::{Bundle, embedded, embedded_scripts, sha256},
     set_stuck_handler,
-    watchdog::{Clock, Deadline, OnStuck, Pause},
+    watchdog::OnStuck,
 };
 
 #[cfg(test)]

@@ -23,7 +23,7 @@ use crate::{
     parallel,
     rollout::{AssetCache, SensorAssets, cancel, target_asset},
     scene::Asset,
-    script::{LoadedScript, Scenes},
+    script::{LoadedScript, SceneBuilder},
     text::{self, counted},
 };
 
@@ -114,16 +114,16 @@ fn check_first_scenes(
     tasks: &[&Task],
 ) -> Result<Vec<Option<Arc<Asset>>>, CliError> {
     // Opening the scenes runs the whole script, so each thread takes idle ones before it opens others.
-    let idle: Mutex<Vec<Scenes>> = Mutex::default();
+    let idle: Mutex<Vec<SceneBuilder>> = Mutex::default();
     let mut targets = vec![None; tasks.len()];
     let check = |job: usize| -> Result<_, CliError> {
         let task = tasks[job];
         let taken = parallel::lock(&idle).pop();
-        let scenes = taken.map_or_else(|| Scenes::open(loaded), Ok)?;
-        let (nominal, scene) = scenes.of(&run.episode_id(task, 0), &run.config.shifts)?;
-        parallel::lock(&idle).push(scenes);
-        run.check_scene(task, scene)?;
-        Ok(target_asset(&nominal, task).cloned())
+        let builder = taken.map_or_else(|| SceneBuilder::open(loaded), Ok)?;
+        let setup = builder.build(&run.episode_id(task, 0), &run.config.shifts)?;
+        parallel::lock(&idle).push(builder);
+        run.check_scene(task, setup.scene)?;
+        Ok(target_asset(&setup.nominal, task).cloned())
     };
     parallel::run(tasks.len(), run.config.threads(), cancel::requested, check, |job, target| {
         targets[job] = target;

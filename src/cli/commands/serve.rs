@@ -120,7 +120,7 @@ fn open_server(args: &ServeArgs) -> Result<Server, CliError> {
 fn provenance_hash(config: &RunConfig, loaded: &LoadedScript) -> String {
     let all = json!([
         env!("CARGO_PKG_VERSION"),
-        loaded.bundle.hashes(),
+        loaded.sources.bundle.hashes(),
         config.script.options,
         config.shifts,
         config.settings,

@@ -230,7 +230,7 @@ fn write(
 ) -> Result<(), CliError> {
     let document = ConditionsFile {
         softvt: env!("CARGO_PKG_VERSION"),
-        script: &loaded.main,
+        script: &loaded.sources.main,
         policy: config.policy.name(),
         seed: config.script.seed,
         suites: tables,

@@ -20,7 +20,7 @@ use crate::{
         remote::{PolicyConnections, PolicyServer, Protocol, RemotePolicy},
     },
     rollout::{Controller, cancel},
-    script::{EpisodeSetup, ExpertController, PolicyFile, load_profile},
+    script::{EpisodeSetup, ExpertController, GripMode, PolicyFile, load_profile},
     text,
 };
 
@@ -309,7 +309,7 @@ impl PolicyConfig {
     /// File of a policy in Lua, as messages name it.
     pub(crate) fn file(&self) -> Option<&str> {
         match &self.kind {
-            PolicyKind::Lua { file, .. } => Some(&file.main),
+            PolicyKind::Lua { file, .. } => Some(&file.sources.main),
             _ => None,
         }
     }
@@ -317,7 +317,7 @@ impl PolicyConfig {
     /// SHA-256 of the files of the policy or of its profile, by name.
     pub(crate) fn sources(&self) -> BTreeMap<String, String> {
         match &self.kind {
-            PolicyKind::Lua { file, .. } => file.hashes(),
+            PolicyKind::Lua { file, .. } => file.sources.bundle.hashes(),
             PolicyKind::Server(remote) => remote.sources.clone(),
             _ => BTreeMap::new(),
         }
@@ -386,11 +386,12 @@ pub(crate) fn expert_controller(
     opened: EpisodeSetup,
     policy: BuiltinPolicy,
 ) -> Result<ExpertController, CliError> {
-    let expert = opened.expert().ok_or_else(|| CliError::input("the task has no expert"))?;
-    Ok(match policy {
-        BuiltinPolicy::TactileServo => ExpertController::servo(expert),
-        _ => ExpertController::new(expert, policy == BuiltinPolicy::ExpertBinary),
-    })
+    let mode = match policy {
+        BuiltinPolicy::TactileServo => GripMode::TactileServo,
+        BuiltinPolicy::ExpertBinary => GripMode::Binary,
+        _ => GripMode::Commanded,
+    };
+    opened.expert(mode).ok_or_else(|| CliError::input("the task has no expert"))
 }
 
 /// Loads the profile that the arguments select, with SHA-256 of its files by name.

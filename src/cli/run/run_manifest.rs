@@ -78,7 +78,7 @@ impl<'a> RunManifest<'a> {
         let limits = run.limits.iter();
         Self {
             softvt: env!("CARGO_PKG_VERSION"),
-            script: run.loaded.main.clone(),
+            script: run.loaded.sources.main.clone(),
             suite: &run.suite.name,
             twin: config.is_rigid_twin().then_some("rigid"),
             policy: config.policy.name(),

@@ -97,7 +97,7 @@ impl<'a> SuiteRun<'a> {
         }
         let replay_source = find_replay_source(config, suite, &jobs)?;
         let connections = config.policy.connections();
-        let mut sources = loaded.bundle.hashes();
+        let mut sources = loaded.sources.bundle.hashes();
         sources.extend(config.policy.sources());
         let generated_by = format!("softvt {}", env!("CARGO_PKG_VERSION"));
         Ok(Self {

@@ -14,7 +14,7 @@ use crate::{
     scene::{Camera, CameraMount, Lighting, Scene},
     script::{
         schema::{Range, Type, choice, class, object::fixed_list, record},
-        vm::error::{fail, here_text},
+        vm::error::{current_line, fail},
     },
     text::unknown_name,
 };
@@ -229,7 +229,7 @@ impl LuaCamera {
             far_m: spec.far,
             width: spec.width,
             height: spec.height,
-            set_at: here_text(lua),
+            set_at: current_line(lua).map(|line| line.to_string()),
         });
         Ok(Self { scene: scene.clone(), index: inner.cameras.len() - 1 })
     }
@@ -241,7 +241,7 @@ impl LuaCamera {
     fn change(&self, lua: &Lua, change: impl FnOnce(&mut Camera)) {
         let mut scene = lock(&self.scene);
         let camera = &mut scene.cameras[self.index];
-        camera.set_at = here_text(lua);
+        camera.set_at = current_line(lua).map(|line| line.to_string());
         change(camera);
     }
 

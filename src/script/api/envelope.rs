@@ -13,7 +13,11 @@ use crate::{
     report::softvtbench_files::sweep_jsonl,
     script::{
         schema::{Range, Type, Unchecked, functions, output, record},
-        vm::{error::fail, json::deserialize, library},
+        vm::{
+            error::{app_data, fail},
+            json::deserialize,
+            library::{FoundFile, SharedLibrary},
+        },
     },
 };
 
@@ -85,16 +89,12 @@ functions! {
         /// Returns the content of assets/calibration/<asset>.json as softvt.envelope does; nil if there is no such file.
         fn calibration(lua, asset: String = Type::Name) -> ["softvt.Envelope?"] {
             let label = "softvt.calibration";
-            let file = {
-                let library = library::of(lua)?;
-                let mut library = lock(&library);
-                let path = format!("assets/calibration/{asset}.json");
-                let found = library.data_if_there(&path).map_err(|e| fail(lua, format!("{label}: {e}")))?;
-                found.and_then(|file| Some((library.bytes(&file)?, file)))
-            };
-            match file {
+            let path = format!("assets/calibration/{asset}.json");
+            let library = app_data::<SharedLibrary>(lua)?;
+            let found = lock(&library).optional_data(&path);
+            match found.map_err(|e| fail(lua, format!("{label}: {e}")))? {
                 None => None,
-                Some((bytes, path)) => {
+                Some(FoundFile { name: path, bytes }) => {
                     let file = ThresholdFile::parse(&String::from_utf8_lossy(&bytes), &path)
                         .map_err(|e| fail(lua, format!("{label}: {e}")))?;
                     let Some(envelope) = file.envelopes.get(&asset) else {

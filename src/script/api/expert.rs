@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 use mlua::{Function, Lua, MultiValue, Table, Thread, Value, chunk::ChunkMode};
 
 use super::{
-    expert_input::{ExpertCommand, ExpertView, ObjectView},
+    expert_input::{ExpertCommand, ExpertInput, ExpertView, ObjectView, TrackingErrorMonitor},
     pose::LuaPose,
     touch::{FingerReadings, fingers},
 };
@@ -64,14 +64,26 @@ impl Coroutine {
         Self { function, view, access, readings, wants_readings: false, thread: None, gave_up: None }
     }
 
-    /// Turns the expert, which has not started yet, into a tactile servo.
-    pub(crate) fn set_servo(&mut self) {
-        self.access = FingerAccess::Servo;
-    }
-
     /// Sets the finger readings of the next control step.
     pub(crate) fn set_readings(&mut self, readings: Option<FingerReadings>) {
         *lock(&self.readings) = readings;
+    }
+
+    /// Returns the next command, or an error if the arm could not follow the last one.
+    pub(crate) fn next_command(
+        &mut self,
+        lua: &Lua,
+        input: ExpertInput,
+        monitor: &mut TrackingErrorMonitor,
+    ) -> mlua::Result<Option<ExpertCommand>> {
+        if let Some(complaint) = input.complaint {
+            return Err(self.refuse(lua, &complaint));
+        }
+        let command = self.step(lua, &input.view)?;
+        if let Some(command) = &command {
+            monitor.command_b = Some(command.pose_b);
+        }
+        Ok(command)
     }
 
     /// Resumes the expert with `view` and returns its next command; `None` at its end.

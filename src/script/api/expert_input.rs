@@ -12,7 +12,7 @@ use crate::{
 
 /// True state of an object.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ObjectView {
+pub(crate) struct ObjectView {
     /// Name in the scene.
     pub name: String,
     pub asset: Arc<Asset>,
@@ -31,7 +31,7 @@ pub struct ObjectView {
 
 /// True state of the scene at a control step.
 #[derive(Clone, Debug, PartialEq)]
-pub struct ExpertView {
+pub(crate) struct ExpertView {
     /// Time since the start, s.
     pub time_s: f64,
     /// Length of a control step, s.
@@ -52,7 +52,7 @@ pub struct ExpertView {
 
 /// Command of an expert for one control step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ExpertCommand {
+pub(crate) struct ExpertCommand {
     /// Tool centre point in the robot base frame.
     pub pose_b: Pose,
     /// Closure: 0 is open, 1 is closed.
@@ -61,19 +61,10 @@ pub struct ExpertCommand {
     pub gripping: bool,
 }
 
-/// A source of one command per control step.
-pub(crate) trait Planner {
-    type Error;
-    /// The next command; `None` at the end.
-    fn step(&mut self, view: &ExpertView) -> Result<Option<ExpertCommand>, Self::Error>;
-    /// Ends the planner with an error that says `complaint`.
-    fn refuse(&mut self, complaint: &str) -> Self::Error;
-}
-
-/// Input of a planner at a control step, with a complaint about its last command if the arm cannot reach it.
+/// Input of an expert at a control step, with a complaint about its last command if the arm cannot reach it.
 pub(crate) struct ExpertInput {
-    view: ExpertView,
-    complaint: Option<String>,
+    pub view: ExpertView,
+    pub complaint: Option<String>,
 }
 
 impl ExpertInput {
@@ -81,22 +72,6 @@ impl ExpertInput {
     pub(crate) fn new(sim: &Simulation, time_s: f64, monitor: &mut TrackingErrorMonitor) -> Self {
         Self { view: expert_view(sim, time_s), complaint: monitor.complaint(sim) }
     }
-}
-
-/// Returns the next command of a planner, or an error if the arm could not follow the last one.
-pub(crate) fn next_command<P: Planner>(
-    planner: &mut P,
-    input: ExpertInput,
-    monitor: &mut TrackingErrorMonitor,
-) -> Result<Option<ExpertCommand>, P::Error> {
-    if let Some(complaint) = input.complaint {
-        return Err(planner.refuse(&complaint));
-    }
-    let command = planner.step(&input.view)?;
-    if let Some(command) = &command {
-        monitor.command_b = Some(command.pose_b);
-    }
-    Ok(command)
 }
 
 fn expert_view(sim: &Simulation, time_s: f64) -> ExpertView {
@@ -150,7 +125,7 @@ const MAX_LAG_STEPS: u32 = 20;
 #[derive(Debug, Default)]
 pub(crate) struct TrackingErrorMonitor {
     /// Last command, robot base frame.
-    command_b: Option<Pose>,
+    pub command_b: Option<Pose>,
     /// Control steps for which the tool has been away from its commands.
     steps: u32,
 }

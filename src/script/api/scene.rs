@@ -20,7 +20,7 @@ use crate::{
     scene::{Asset, Body, Camera, Lighting, Object, Scene, SoftMaterial},
     script::{
         schema::{Constructed, Range, Type, class, object::fixed_list, record},
-        vm::error::{fail, here_text},
+        vm::error::{current_line, fail},
     },
     text::{format_number, unknown_name},
 };
@@ -140,7 +140,7 @@ impl LuaScene {
         let at = position(lua, &scene, &spec)?;
         let rotation = Quat::from_axis_angle(&Vec3::z_axis(), spec.yaw);
         let joints = joints::start_values(lua, &asset, spec.joints.as_ref())?;
-        let placed_at = here_text(lua).unwrap_or_default();
+        let placed_at = current_line(lua).map(|line| line.to_string()).unwrap_or_default();
         let pose_w = Pose::from_parts(at.into(), rotation);
         scene.objects.push(Object { name, asset, pose_w, joints, placed_at });
         Ok(())

@@ -15,8 +15,8 @@ use crate::{
     script::{
         schema::{LuaType, Range, Type, choice, class, functions, record},
         vm::{
-            error::{fail, here},
-            library,
+            error::{app_data, current_line, fail},
+            library::SharedLibrary,
             memory_budget::{Reservation, reserve},
             value::describe,
         },
@@ -299,14 +299,10 @@ functions! {
         /// Reads a shape from a mesh file: `softvt.mesh { file = "mug.obj", scale = 0.001 }`. The surface must be closed.
         fn mesh(lua, spec: MeshSpec) -> ["softvt.Shape"] {
             let path = &spec.file;
-            let bytes = {
-                let library = library::of(lua)?;
-                let mut library = lock(&library);
-                let requester = here(lua).map(|(file, _)| file);
-                let file = library.data(path, requester.as_deref());
-                let file = file.map_err(|message| fail(lua, format!("mesh.file: {message}")))?;
-                library.bytes(&file).unwrap_or_default()
-            };
+            let requester = current_line(lua).map(|line| line.file);
+            let library = app_data::<SharedLibrary>(lua)?;
+            let file = lock(&library).data(path, requester.as_deref());
+            let bytes = file.map_err(|error| fail(lua, format!("mesh.file: {error}")))?.bytes;
             // Fails before the mesh is built if it would not fit.
             drop(reserve(lua, MESH_BYTES_PER_FILE_BYTE * bytes.len())?);
             let extension = path.rsplit_once('.').map_or("", |(_, extension)| extension);

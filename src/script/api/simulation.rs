@@ -7,7 +7,7 @@ use mlua::{Function, Lua, Table, Value};
 use super::{
     cameras::IMAGE_EDGE,
     expert::{Coroutine, FingerAccess},
-    expert_input::{ExpertCommand, ExpertInput, ExpertView, Planner, TrackingErrorMonitor, next_command},
+    expert_input::{ExpertCommand, ExpertInput, TrackingErrorMonitor},
     image::LuaImage,
     random::LuaRng,
     scene::{LuaScene, empty_scene},
@@ -29,8 +29,7 @@ use crate::{
     script::{
         schema::{Constructed, Range, Type, choice, class, functions, output, record},
         vm::{
-            clock,
-            error::fail,
+            error::{app_data, fail},
             json::deserialize,
             memory_budget::{Reservation, reserve_in_world},
             value::finite,
@@ -118,7 +117,7 @@ fn simulate(lua: &Lua, spec: SimulateSpec) -> mlua::Result<LuaSimulation> {
     let scene = LuaScene::new(empty_scene());
     spec.layout.build.call::<()>((scene.clone(), LuaRng::new(seed, RandomStream::Layout)))?;
     let scene = Arc::new(lock(&scene.scene).clone());
-    let clock = clock(lua);
+    let clock = app_data::<Clock>(lua)?;
     let _pause = clock.pause();
     if lua.app_data_ref::<Caches>().is_none() {
         lua.set_app_data(Caches::default());
@@ -215,24 +214,6 @@ impl SimulationState {
     }
 }
 
-/// An expert that runs in the virtual machine of its simulation.
-struct InPlace<'a> {
-    run: Coroutine,
-    lua: &'a Lua,
-}
-
-impl Planner for InPlace<'_> {
-    type Error = mlua::Error;
-
-    fn step(&mut self, view: &ExpertView) -> mlua::Result<Option<ExpertCommand>> {
-        self.run.step(self.lua, view)
-    }
-
-    fn refuse(&mut self, complaint: &str) -> mlua::Error {
-        self.run.refuse(self.lua, complaint)
-    }
-}
-
 /// `softvt.Simulation`.
 #[derive(Clone)]
 pub(crate) struct LuaSimulation(Arc<Mutex<SimulationState>>);
@@ -240,7 +221,7 @@ pub(crate) struct LuaSimulation(Arc<Mutex<SimulationState>>);
 impl LuaSimulation {
     /// Runs an expert to its end.
     fn drive(&self, lua: &Lua, expert: Function) -> mlua::Result<(bool, Option<String>)> {
-        let mut expert = InPlace { run: Coroutine::new(expert, FingerAccess::Readings), lua };
+        let mut expert = Coroutine::new(expert, FingerAccess::Readings);
         let mut monitor = TrackingErrorMonitor::default();
         loop {
             // The expert may call the simulation itself, so it must not be locked while the expert runs.
@@ -248,16 +229,16 @@ impl LuaSimulation {
                 let mut inner = lock(&self.0);
                 let clock = inner.clock.clone();
                 let _pause = clock.pause();
-                let readings = expert.run.wants_readings.then(|| inner.finger_readings(lua)).transpose()?;
-                expert.run.set_readings(readings);
+                let readings = expert.wants_readings.then(|| inner.finger_readings(lua)).transpose()?;
+                expert.set_readings(readings);
                 ExpertInput::new(&inner.sim, inner.time(), &mut monitor)
             };
-            let Some(command) = next_command(&mut expert, input, &mut monitor)? else { break };
+            let Some(command) = expert.next_command(lua, input, &mut monitor)? else { break };
             if !lock(&self.0).control_step(Some(&command)) {
                 break;
             }
         }
-        match &expert.run.gave_up {
+        match &expert.gave_up {
             Some(reason) => Ok((false, Some(format!("the expert gave up: {reason}")))),
             None => Ok(lock(&self.0).outcome()),
         }

@@ -16,7 +16,7 @@ use crate::{
 };
 
 /// Tactile frames of the left and the right finger at one control step.
-pub type FingerReadings = Arc<[TactileFrame; 2]>;
+pub(crate) type FingerReadings = Arc<[TactileFrame; 2]>;
 
 const PIXELS: Type = Type::Number("px", Range::closed(0.0, 1e3));
 

@@ -28,8 +28,7 @@ use crate::{
     script::{
         schema::{LuaType, Range, Type, class, functions, output, record},
         vm::{
-            clock,
-            error::fail,
+            error::{app_data, fail},
             memory_budget::{Reservation, reserve_in_world},
             value::{describe, finite},
             watchdog::Clock,
@@ -192,7 +191,7 @@ functions! {
                 newton_total: 0,
                 newton_max: 0,
                 timing: Timing::default(),
-                clock: clock(lua),
+                clock: app_data(lua)?,
                 reserved: vec![reserve_in_world(lua, BYTES_PER_WORLD)?],
             })))
         }

@@ -6,7 +6,7 @@ pub(crate) mod profile_file;
 
 use std::{path::Path, sync::Arc};
 
-use mlua::{Lua, MultiValue, Table, Value};
+use mlua::{Lua, Value};
 
 use crate::{
     benchmark::{Condition, Goal, GoalKind, Plan, Shift, ShiftValue, Suite, Task, Variation},
@@ -16,11 +16,9 @@ use crate::{
             self,
             policy::{PolicySpec, ProfileSpec},
             simulation::settings,
-            tasks::{
-                ConditionSpec, ConditionsSpec, ExperimentSpec, GoalSpec, ShiftSpec, SuiteSpec, TaskSpec,
-            },
+            tasks::{ConditionSpec, ConditionsSpec, ExperimentSpec, GoalSpec, SuiteSpec, TaskSpec},
         },
-        schema::{Constructed, HasTable, RecordType, is_constructed, strict_table},
+        schema::{Constructed, HasTable, Record, RecordType, is_constructed, strict_table},
         vm::{
             Limits, Vm,
             error::{ScriptError, fail},
@@ -34,30 +32,44 @@ use crate::{
 };
 use options::{OptionSession, OptionSpec, SharedOptions};
 
-/// A loaded script.
-#[derive(Clone)]
-pub struct LoadedScript {
+/// The files of a script and the command line that they ran with: enough to run it again without the disk.
+#[derive(Clone, Debug)]
+pub struct ScriptSources {
     /// The main file, as messages name it.
     pub main: String,
-    pub plan: Plan,
-    /// The declared options, with their values.
-    pub options: Vec<OptionSpec>,
-    /// Every file that was read; episodes run on these.
+    /// Every file that was read.
     pub bundle: Arc<Bundle>,
     argv: Vec<String>,
     limits: Limits,
 }
 
-impl std::fmt::Debug for LoadedScript {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("LoadedScript")
-            .field("main", &self.main)
-            .field("plan", &self.plan)
-            .finish_non_exhaustive()
+impl ScriptSources {
+    /// Runs the main file at `path`, and returns its virtual machine with the files that were read.
+    fn read(path: &Path, argv: &[String], limits: &Limits) -> Result<(Self, ScriptInstance), ScriptError> {
+        let (library, main) = Library::open(path)?;
+        let instance = ScriptInstance::open(&main, library, argv, limits)?;
+        let bundle = Arc::new(lock(&instance.vm.library).bundle.clone());
+        Ok((Self { main, bundle, argv: argv.to_vec(), limits: limits.clone() }, instance))
+    }
+
+    /// Runs the main file again in a new virtual machine.
+    pub(crate) fn instance(&self) -> Result<ScriptInstance, ScriptError> {
+        let library = Library::frozen((*self.bundle).clone());
+        ScriptInstance::open(&self.main, library, &self.argv, &self.limits)
     }
 }
 
-/// Loads the script at `path` with its own words of the command line, and makes its plan.
+/// A loaded script.
+#[derive(Clone, Debug)]
+pub struct LoadedScript {
+    /// The files; episodes run on these.
+    pub sources: ScriptSources,
+    pub plan: Plan,
+    /// The declared options, with their values.
+    pub options: Vec<OptionSpec>,
+}
+
+/// Loads the script at `path` with its own arguments of the command line, and makes its plan.
 ///
 /// # Errors
 /// If a file cannot be read, the script fails, or its options or its plan are invalid; the message names file and line.
@@ -70,12 +82,10 @@ pub fn load(path: &Path, argv: &[String]) -> Result<LoadedScript, ScriptError> {
 /// # Errors
 /// As [`load`].
 pub fn load_with(path: &Path, argv: &[String], limits: &Limits) -> Result<LoadedScript, ScriptError> {
-    let (library, main) = Library::open(path)?;
-    let (instance, values) = open(&main, library, argv, limits)?;
-    let options = lock(&instance.session).options.clone();
-    let plan = instance.plan(&values).map_err(|e| instance.vm.explain(&e))?;
-    let bundle = Arc::new(lock(instance.vm.library()).bundle().clone());
-    Ok(LoadedScript { main, plan, options, bundle, argv: argv.to_vec(), limits: limits.clone() })
+    let (sources, instance) = ScriptSources::read(path, argv, limits)?;
+    let options = lock(&instance.options).declared.clone();
+    let plan = instance.plan().map_err(|e| instance.vm.explain(&e))?;
+    Ok(LoadedScript { sources, plan, options })
 }
 
 /// The options that the script at `path` declares, for `--help`. If the script fails, those declared before.
@@ -86,147 +96,146 @@ pub fn declared_options(path: &Path) -> Result<Vec<OptionSpec>, ScriptError> {
     let (library, main) = Library::open(path)?;
     let instance = ScriptInstance::new(&main, library, &[], &Limits::default())?;
     let outcome = instance.vm.run_main();
-    let declared = lock(&instance.session).options.clone();
+    let declared = lock(&instance.options).declared.clone();
     if declared.is_empty() { outcome.map(|_| declared) } else { Ok(declared) }
 }
 
-/// A virtual machine with the whole Lua interface.
+/// A virtual machine with the whole Lua interface, in which a main file has run.
 pub(crate) struct ScriptInstance {
     pub vm: Vm,
-    session: SharedOptions,
-}
-
-/// Runs the main file in a new virtual machine, and returns both with the results of the file.
-pub(crate) fn open(
-    main: &str,
-    library: Library,
-    argv: &[String],
-    limits: &Limits,
-) -> Result<(ScriptInstance, MultiValue), ScriptError> {
-    let instance = ScriptInstance::new(main, library, argv, limits)?;
-    let values = instance.vm.run_main()?;
-    lock(&instance.session).check_all_consumed(main)?;
-    Ok((instance, values))
-}
-
-/// Runs the sources of `loaded` in a new virtual machine.
-pub(crate) fn reopen(loaded: &LoadedScript) -> Result<(ScriptInstance, MultiValue), ScriptError> {
-    open(&loaded.main, Library::frozen((*loaded.bundle).clone()), &loaded.argv, &loaded.limits)
-}
-
-/// The table of the constructor of `T` that a file returned; `file` names the file in messages.
-fn made<T: RecordType>(lua: &Lua, values: &MultiValue, file: &str) -> mlua::Result<Constructed<T>> {
-    match values.front() {
-        Some(Value::Table(table)) if is_constructed(lua, T::RECORD, table) => {
-            lua.unpack(Value::Table(table.clone()))
-        }
-        other => {
-            let got = other.map_or("nothing".to_owned(), describe_constructed);
-            Err(fail(lua, format!("{file} returns {}{{…}}, got {got}", T::RECORD.kind)))
-        }
-    }
+    options: SharedOptions,
+    /// First result of the main file.
+    result: Option<Value>,
 }
 
 impl ScriptInstance {
+    /// A virtual machine in which nothing has run yet.
     fn new(main: &str, library: Library, argv: &[String], limits: &Limits) -> Result<Self, ScriptError> {
         let vm = Vm::new(main, library, limits)?;
-        let session = OptionSession::new(argv);
-        install(&vm, &session).map_err(|e| vm.explain(&e))?;
-        Ok(Self { vm, session })
+        let options = OptionSession::new(argv);
+        install(&vm, &options).map_err(|e| vm.explain(&e))?;
+        Ok(Self { vm, options, result: None })
     }
 
-    fn plan(&self, values: &MultiValue) -> mlua::Result<Plan> {
+    fn open(main: &str, library: Library, argv: &[String], limits: &Limits) -> Result<Self, ScriptError> {
+        let mut instance = Self::new(main, library, argv, limits)?;
+        instance.result = instance.vm.run_main()?;
+        lock(&instance.options).check_all_consumed(main)?;
+        Ok(instance)
+    }
+
+    /// True if the main file returned the result of the constructor of `record`.
+    fn returned(&self, record: &Record) -> bool {
+        let table = self.result.as_ref().and_then(Value::as_table);
+        table.is_some_and(|table| is_constructed(&self.vm.lua, record, table))
+    }
+
+    /// The result of the main file if the constructor of `T` made it, checked again, since a script may have written to it.
+    pub(crate) fn result<T: RecordType>(&self) -> mlua::Result<Option<Constructed<T>>> {
+        match &self.result {
+            Some(table) if self.returned(T::RECORD) => self.vm.lua.unpack(table.clone()).map(Some),
+            _ => Ok(None),
+        }
+    }
+
+    /// The result of the main file, which must come from the constructor of `T`; `file` names the file in messages.
+    fn expected_result<T: RecordType>(&self, file: &str) -> mlua::Result<Constructed<T>> {
+        self.result()?.ok_or_else(|| {
+            let got = self.result.as_ref().map_or("nothing".to_owned(), describe_constructed);
+            fail(&self.vm.lua, format!("{file} returns {}{{…}}, got {got}", T::RECORD.kind))
+        })
+    }
+
+    fn plan(&self) -> mlua::Result<Plan> {
         let lua = &self.vm.lua;
-        let Some(Value::Table(table)) = values.front() else {
-            return Err(no_plan(lua, values));
-        };
         for (record, flag) in [(PolicySpec::RECORD, "--policy"), (ProfileSpec::RECORD, "--profile")] {
-            if is_constructed(lua, record, table) {
-                let message = format!(
-                    "returns {}{{…}}, which is not a plan; run softvt SUITE.lua {flag} {}",
-                    record.kind,
-                    self.vm.main()
-                );
+            if self.returned(record) {
+                let (kind, main) = (record.kind, self.vm.main());
+                let message =
+                    format!("returns {kind}{{…}}, which is not a plan; run softvt SUITE.lua {flag} {main}");
                 return Err(fail(lua, message));
             }
         }
-        if is_constructed(lua, ExperimentSpec::RECORD, table) {
-            let spec: Constructed<ExperimentSpec> = lua.unpack(Value::Table(table.clone()))?;
+        if let Some(spec) = self.result::<ExperimentSpec>()? {
             let _deadline = self.vm.call_deadline();
-            return Ok(Plan::Experiment {
-                name: spec.name.clone(),
-                points: points(lua, &spec)?.len(),
-                columns: spec.columns.clone().unwrap_or_default(),
-            });
+            let points = points(lua, &spec)?.len();
+            let columns = spec.spec.columns.unwrap_or_default();
+            return Ok(Plan::Experiment { name: spec.spec.name, points, columns });
         }
-        let Some(specs) = suites(lua, table)? else { return Err(no_plan(lua, values)) };
-        let mut suites: Vec<Suite> = Vec::new();
-        for spec in &specs {
-            let suite = suite(lua, spec)?;
-            if suites.iter().any(|known| known.name == suite.name)
-                && !is_constructed(lua, ConditionsSpec::RECORD, table)
-            {
-                let message = format!("two suites are named {:?}; rename one", suite.name);
-                return Err(fail_at_key(lua, &spec.table, "name", message));
-            }
-            suites.push(suite);
-        }
-        if is_constructed(lua, ConditionsSpec::RECORD, table) {
-            let spec: Constructed<ConditionsSpec> = lua.unpack(Value::Table(table.clone()))?;
+        let specs = self.suites()?.filter(|specs| !specs.is_empty()).ok_or_else(|| {
+            let got = self.result.as_ref().map_or("nothing".to_owned(), describe);
+            let plans = "softvt.suite{…}, softvt.experiment{…} or a list of suites";
+            fail(lua, format!("a script returns a plan ({plans}), got {got}"))
+        })?;
+        let mut suites = specs.iter().map(|spec| suite(lua, spec)).collect::<mlua::Result<Vec<_>>>()?;
+        if let Some(spec) = self.result::<ConditionsSpec>()? {
             let conditions = spec.conditions.iter().map(|condition| self::condition(lua, condition));
             let conditions = conditions.collect::<mlua::Result<_>>()?;
-            return Ok(Plan::Conditions { name: spec.name.clone(), suites, conditions });
+            return Ok(Plan::Conditions { name: spec.spec.name, suites, conditions });
         }
-        if is_constructed(lua, SuiteSpec::RECORD, table) {
-            return match suites.pop() {
-                Some(suite) => Ok(Plan::Suite(Box::new(suite))),
-                None => Err(no_plan(lua, values)),
-            };
-        }
-        match suites.is_empty() {
-            true => Err(no_plan(lua, values)),
-            false => Ok(Plan::Suites { suites }),
-        }
-    }
-}
-
-/// The suites of a plan's table: one suite, conditions, or a list of suites. `None` if it is something else.
-fn suites(lua: &Lua, table: &Table) -> mlua::Result<Option<Vec<Constructed<SuiteSpec>>>> {
-    if is_constructed(lua, SuiteSpec::RECORD, table) {
-        return Ok(Some(vec![lua.unpack(Value::Table(table.clone()))?]));
-    }
-    if is_constructed(lua, ConditionsSpec::RECORD, table) {
-        let spec: Constructed<ConditionsSpec> = lua.unpack(Value::Table(table.clone()))?;
-        return Ok(Some(spec.spec.suites));
-    }
-    let mut suites = Vec::new();
-    for entry in table.clone().sequence_values::<Value>() {
-        match entry? {
-            Value::Table(table) if is_constructed(lua, SuiteSpec::RECORD, &table) => {
-                suites.push(lua.unpack(Value::Table(table))?);
+        for (index, spec) in specs.iter().enumerate() {
+            if specs[..index].iter().any(|other| other.name == spec.name) {
+                let message = format!("two suites are named {:?}; rename one", spec.name);
+                return Err(fail_at_key(lua, &spec.table, "name", message));
             }
-            _ => return Ok(None),
+        }
+        Ok(match self.returned(SuiteSpec::RECORD) {
+            true => Plan::Suite(Box::new(suites.remove(0))),
+            false => Plan::Suites { suites },
+        })
+    }
+
+    /// The suites that the main file returned: one suite, conditions, or a list of suites. `None` if it is something else.
+    fn suites(&self) -> mlua::Result<Option<Vec<Constructed<SuiteSpec>>>> {
+        if let Some(suite) = self.result()? {
+            return Ok(Some(vec![suite]));
+        }
+        if let Some(spec) = self.result::<ConditionsSpec>()? {
+            return Ok(Some(spec.spec.suites));
+        }
+        let Some(Value::Table(list)) = &self.result else { return Ok(None) };
+        let entries = list.sequence_values::<Value>().collect::<mlua::Result<Vec<_>>>()?;
+        let is_suite = |entry: &Value| {
+            entry.as_table().is_some_and(|table| is_constructed(&self.vm.lua, SuiteSpec::RECORD, table))
+        };
+        match entries.iter().all(is_suite) {
+            true => entries.into_iter().map(|entry| self.vm.lua.unpack(entry)).collect::<mlua::Result<_>>().map(Some),
+            false => Ok(None),
         }
     }
-    Ok(Some(suites))
+
+    /// The declarations of a suite and a task.
+    pub(crate) fn find_task(&self, name: &str, id: usize) -> Result<FoundTask, ScriptError> {
+        let main = self.vm.main();
+        let suites = self.suites().map_err(|e| self.vm.explain(&e))?;
+        let suites = suites.ok_or_else(|| ScriptError::new(main, "the script did not return a suite"))?;
+        let Some(suite) = suites.iter().find(|suite| suite.name == name) else {
+            let names = suites.iter().map(|suite| suite.name.as_str());
+            return Err(ScriptError::new(main, unknown_name("suite", name, names)));
+        };
+        match suite.tasks.get(id) {
+            Some(task) => Ok(FoundTask { suite: suite.clone(), task: task.clone() }),
+            None => Err(ScriptError::new(main, format!("suite {name:?} has no task {id}"))
+                .hint(format!("its tasks are 0 to {}", suite.tasks.len().saturating_sub(1)))),
+        }
+    }
 }
 
-fn no_plan(lua: &Lua, values: &MultiValue) -> mlua::Error {
-    let got = values.front().map_or("nothing".to_string(), describe);
-    let plans = "softvt.suite{…}, softvt.experiment{…} or a list of suites";
-    fail(lua, format!("a script returns a plan ({plans}), got {got}"))
+/// The declarations of a task and its suite.
+pub(crate) struct FoundTask {
+    pub suite: Constructed<SuiteSpec>,
+    pub task: Constructed<TaskSpec>,
 }
 
 /// Adds the Lua interface to a new virtual machine.
-fn install(vm: &Vm, session: &SharedOptions) -> mlua::Result<()> {
+fn install(vm: &Vm, options: &SharedOptions) -> mlua::Result<()> {
     let lua = &vm.lua;
-    lua.set_app_data(session.clone());
+    lua.set_app_data(options.clone());
     vm.api.set("version", env!("CARGO_PKG_VERSION"))?;
     api::install(lua, &vm.api)?;
     options::FUNCTIONS.iter().try_for_each(|function| function.install(lua, &vm.api, "softvt."))?;
     let names = sorted_pairs(&vm.api).iter().filter_map(|(key, _)| key.to_string().ok()).collect();
-    strict_table(lua, "softvt", vm.api.clone(), names)?;
-    Ok(())
+    strict_table(lua, "softvt", vm.api.clone(), names).map(|_| ())
 }
 
 fn suite(lua: &Lua, spec: &Constructed<SuiteSpec>) -> mlua::Result<Suite> {
@@ -255,13 +264,20 @@ fn suite(lua: &Lua, spec: &Constructed<SuiteSpec>) -> mlua::Result<Suite> {
         }
         tasks.push(task);
     }
+    let shifts = spec.shifts.iter().flatten().map(|shift| Shift {
+        name: shift.name.clone(),
+        unit: shift.unit.clone(),
+        default: shift.default,
+        min: shift.min,
+        max: shift.max,
+    });
     Ok(Suite {
         name,
         object_type: spec.object_type,
         variation: spec.variation,
         episodes: spec.episodes,
         tasks,
-        shifts: spec.shifts.iter().flatten().map(|shift| self::shift(shift)).collect(),
+        shifts: shifts.collect(),
         settings: settings(lua, "suite.settings", spec.settings.as_ref())?,
     })
 }
@@ -286,16 +302,6 @@ fn task(lua: &Lua, id: usize, spec: &TaskSpec, budget: u32) -> mlua::Result<Task
     })
 }
 
-fn shift(spec: &ShiftSpec) -> Shift {
-    Shift {
-        name: spec.name.clone(),
-        unit: spec.unit.clone(),
-        default: spec.default,
-        min: spec.min,
-        max: spec.max,
-    }
-}
-
 fn condition(lua: &Lua, spec: &ConditionSpec) -> mlua::Result<Condition> {
     let shift = spec
         .shift
@@ -312,32 +318,6 @@ fn condition(lua: &Lua, spec: &ConditionSpec) -> mlua::Result<Condition> {
         set.push((key.to_string()?, text));
     }
     Ok(Condition { name: spec.name.clone(), shift, set, only: spec.only })
-}
-
-/// The declarations of a suite and a task.
-pub(crate) fn find_task(
-    instance: &ScriptInstance,
-    values: &MultiValue,
-    name: &str,
-    id: usize,
-) -> Result<(Constructed<SuiteSpec>, Constructed<TaskSpec>), ScriptError> {
-    let (vm, main) = (&instance.vm, instance.vm.main());
-    let suites = match values.front() {
-        Some(Value::Table(table)) => suites(&vm.lua, table).map_err(|e| vm.explain(&e))?,
-        _ => None,
-    };
-    let Some(suites) = suites else {
-        return Err(ScriptError::new(main, "the script did not return a suite"));
-    };
-    let Some(suite) = suites.iter().find(|suite| suite.name == name) else {
-        let names = suites.iter().map(|suite| suite.name.as_str());
-        return Err(ScriptError::new(main, unknown_name("suite", name, names)));
-    };
-    match suite.tasks.get(id) {
-        Some(task) => Ok((suite.clone(), task.clone())),
-        None => Err(ScriptError::new(main, format!("suite {name:?} has no task {id}"))
-            .hint(format!("its tasks are 0 to {}", suite.tasks.len().saturating_sub(1)))),
-    }
 }
 
 /// The points of an experiment: those of its function, or every combination of its grid.

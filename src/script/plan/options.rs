@@ -2,7 +2,8 @@
 
 use std::sync::{Arc, Mutex};
 
-use mlua::{Lua, Value};
+use mlua::{Lua, LuaSerdeExt, Value};
+use serde::Serialize;
 
 use crate::{
     parallel::lock,
@@ -11,7 +12,7 @@ use crate::{
             LuaType, Range, RecordType, Type, Unchecked, error_at_key, functions, record, strict_table,
         },
         vm::{
-            error::{ScriptError, fail},
+            error::{ScriptError, app_data, fail},
             value::{describe, number, sorted_pairs},
         },
     },
@@ -39,7 +40,8 @@ record! {
 }
 
 /// The value of an option.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
 pub enum OptionValue {
     /// A number in the option's unit.
     Number(f64),
@@ -124,28 +126,40 @@ impl OptionSpec {
 
 pub(crate) type SharedOptions = Arc<Mutex<OptionSession>>;
 
-/// The command line of a script, and the options declared so far.
-#[derive(Debug, Default)]
+/// The arguments of a script, and the options declared so far.
+#[derive(Debug)]
 pub(crate) struct OptionSession {
-    /// Words of the command line; `None` for those that an option has taken.
-    words: Vec<Option<String>>,
-    pub options: Vec<OptionSpec>,
+    /// Words of the command line; `None` for those that an option has consumed.
+    arguments: Vec<Option<String>>,
+    pub declared: Vec<OptionSpec>,
+}
+
+/// An argument is not a value of its option.
+#[derive(Debug, thiserror::Error)]
+enum ArgumentError {
+    #[error("option {flag}: expected {expected}, got nothing")]
+    Missing { flag: String, expected: String },
+    #[error("option {flag}: expected {expected}, got {text:?}")]
+    Invalid { flag: String, expected: String, text: String },
+    #[error("option {0} is given twice; give it once")]
+    Twice(String),
 }
 
 impl OptionSession {
     pub(crate) fn new(argv: &[String]) -> SharedOptions {
-        Arc::new(Mutex::new(Self { words: argv.iter().cloned().map(Some).collect(), options: Vec::new() }))
+        let arguments = argv.iter().cloned().map(Some).collect();
+        Arc::new(Mutex::new(Self { arguments, declared: Vec::new() }))
     }
 
-    /// Fails if there is a word that no option has taken.
+    /// Fails if there is an argument that no option has consumed.
     pub(crate) fn check_all_consumed(&self, main: &str) -> Result<(), ScriptError> {
-        let Some(word) = self.words.iter().flatten().next() else { return Ok(()) };
+        let Some(word) = self.arguments.iter().flatten().next() else { return Ok(()) };
         let name = word.split('=').next().unwrap_or(word);
         if !name.starts_with('-') {
             return Err(ScriptError::new(main, format!("unexpected argument {word:?}"))
                 .hint("options are given as --name value"));
         }
-        let flags: Vec<String> = self.options.iter().map(OptionSpec::flag).collect();
+        let flags: Vec<String> = self.declared.iter().map(OptionSpec::flag).collect();
         let error = ScriptError::new(main, format!("unknown option {name}"));
         Err(match suggest(name, flags.iter().map(String::as_str)) {
             Some(close) => error.hint(format!("did you mean {close}?")),
@@ -154,44 +168,36 @@ impl OptionSession {
         })
     }
 
-    /// Takes the words that set `spec` and returns its value, if any.
-    fn take(&mut self, spec: &OptionSpec) -> Result<Option<OptionValue>, String> {
+    /// Consumes the arguments that set `spec` and returns its value, if any.
+    fn consume(&mut self, spec: &OptionSpec) -> Result<Option<OptionValue>, ArgumentError> {
         let flag = spec.flag();
-        let underscored = format!("--{}", spec.name);
+        let (underscored, negated) = (format!("--{}", spec.name), format!("--no-{}", &flag[2..]));
         let is_flag = matches!(spec.default, OptionValue::Flag(_));
         let mut found = None;
-        let mut at = 0;
-        while at < self.words.len() {
-            let Some(word) = self.words[at].clone() else {
-                at += 1;
+        for at in 0..self.arguments.len() {
+            let Some(word) = self.arguments[at].clone() else { continue };
+            let (name, value) = match word.split_once('=') {
+                Some((name, value)) => (name, Some(value.to_owned())),
+                None => (word.as_str(), None),
+            };
+            let is_negated = is_flag && value.is_none() && name == negated;
+            if name != flag && name != underscored && !is_negated {
                 continue;
-            };
-            let (name, inline) = match word.split_once('=') {
-                Some((name, value)) => (name.to_string(), Some(value.to_string())),
-                None => (word, None),
-            };
-            let off = is_flag && inline.is_none() && name == format!("--no-{}", &flag[2..]);
-            if name == flag || name == underscored || off {
-                self.words[at] = None;
-                let text = match inline {
-                    Some(text) => text,
-                    None if is_flag => (if off { "off" } else { "on" }).into(),
-                    None => {
-                        at += 1;
-                        let next = self.words.get_mut(at).and_then(Option::take);
-                        let next = next.filter(|next| !next.starts_with("--"));
-                        next.ok_or_else(|| {
-                            format!("option {flag}: expected {}, got nothing", spec.expects())
-                        })?
-                    }
-                };
-                let wrong = || format!("option {flag}: expected {}, got {text:?}", spec.expects());
-                let value = spec.parse(&text).ok_or_else(wrong)?;
-                if found.replace(value).is_some() {
-                    return Err(format!("option {flag} is given twice; give it once"));
-                }
             }
-            at += 1;
+            self.arguments[at] = None;
+            let text = match value {
+                Some(value) => Some(value),
+                None if is_flag => Some(if is_negated { "off" } else { "on" }.to_owned()),
+                None => self.arguments.get_mut(at + 1).and_then(Option::take).filter(|text| !text.starts_with("--")),
+            };
+            let (flag, expected) = (flag.clone(), spec.expects());
+            let Some(text) = text else { return Err(ArgumentError::Missing { flag, expected }) };
+            let Some(value) = spec.parse(&text) else {
+                return Err(ArgumentError::Invalid { flag, expected, text });
+            };
+            if found.replace(value).is_some() {
+                return Err(ArgumentError::Twice(flag));
+            }
         }
         Ok(found)
     }
@@ -206,15 +212,16 @@ functions! {
                 let message = format!("options: expected a table of options, got {}", describe(&options.0));
                 return Err(fail(lua, message));
             };
-            let session = lua.app_data_ref::<SharedOptions>().map(|session| session.clone());
-            let session = session.ok_or_else(|| mlua::Error::runtime("there is no command line"))?;
+            let session = app_data::<SharedOptions>(lua)?;
             let values = lua.create_table()?;
             let mut names = Vec::new();
+            // No metatable, which a script could see.
+            let serialize = mlua::serde::ser::Options::new().set_array_metatable(false);
             for (key, value) in sorted_pairs(table) {
-                let spec = declare(lua, &session, &key, &value)?;
-                values.raw_set(spec.name.as_str(), to_lua(lua, &spec.value)?)?;
+                let spec = declare(lua, &mut lock(&session), &key, &value)?;
+                values.raw_set(spec.name.as_str(), lua.to_value_with(&spec.value, serialize)?)?;
                 names.push(spec.name.clone());
-                lock(&session).options.push(spec);
+                lock(&session).declared.push(spec);
             }
             strict_table(lua, "options", values, names)?
         }
@@ -222,13 +229,17 @@ functions! {
 }
 
 /// Reads the declaration of an option and its value on the command line.
-fn declare(lua: &Lua, session: &SharedOptions, key: &Value, value: &Value) -> mlua::Result<OptionSpec> {
+fn declare(
+    lua: &Lua,
+    session: &mut OptionSession,
+    key: &Value,
+    value: &Value,
+) -> mlua::Result<OptionSpec> {
     let mut spec = read_spec(lua, key, value)?;
-    let mut session = lock(session);
-    if session.options.iter().any(|known| known.name == spec.name) {
+    if session.declared.iter().any(|known| known.name == spec.name) {
         return Err(fail(lua, format!("options.{}: the option is declared twice", spec.name)));
     }
-    if let Some(value) = session.take(&spec).map_err(|message| fail(lua, message))? {
+    if let Some(value) = session.consume(&spec).map_err(|error| fail(lua, error.to_string()))? {
         spec.value = value;
     }
     Ok(spec)
@@ -305,15 +316,4 @@ impl std::fmt::Display for OptionValue {
             Self::Texts(list) => write!(f, "{}", list.join(",")),
         }
     }
-}
-
-fn to_lua(lua: &Lua, value: &OptionValue) -> mlua::Result<Value> {
-    Ok(match value {
-        OptionValue::Number(n) => Value::Number(*n),
-        OptionValue::Integer(n) => Value::Integer(*n),
-        OptionValue::Text(text) => Value::String(lua.create_string(text)?),
-        OptionValue::Flag(flag) => Value::Boolean(*flag),
-        OptionValue::Numbers(list) => Value::Table(lua.create_sequence_from(list.iter().copied())?),
-        OptionValue::Texts(list) => Value::Table(lua.create_sequence_from(list.iter().map(String::as_str))?),
-    })
 }

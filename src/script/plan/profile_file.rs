@@ -5,18 +5,17 @@ use std::{
     path::Path,
 };
 
-use mlua::{Lua, MultiValue};
+use mlua::Lua;
 
-use super::{made, open};
+use super::ScriptSources;
 use crate::{
-    parallel::lock,
     policy::profile::{
         ActionEncoding, ActionUnits, GripperValues, InputSource, PoseEncoding, Profile, ProfileInput,
     },
     script::{
         api::policy::{ActionEncodingSpec, InputKind, InputSpec, PoseKind, ProfileSpec},
         schema::Constructed,
-        vm::{Limits, error::ScriptError, library::Library, source_map::fail_at_key},
+        vm::{Limits, error::ScriptError, source_map::fail_at_key},
     },
 };
 
@@ -25,29 +24,10 @@ use crate::{
 /// # Errors
 /// If the file cannot be read or does not return a valid profile; the message names file and line.
 pub fn load_profile(path: &Path) -> Result<(Profile, BTreeMap<String, String>), ScriptError> {
-    let (library, main) = Library::open(path)?;
-    let (instance, values) = open(&main, library, &[], &Limits::default())?;
-    let profile = read(&instance.vm.lua, &values).map_err(|e| instance.vm.explain(&e))?;
-    let hashes = lock(instance.vm.library()).bundle().hashes();
-    Ok((profile, hashes))
-}
-
-fn read(lua: &Lua, values: &MultiValue) -> mlua::Result<Profile> {
-    let spec: Constructed<ProfileSpec> = made(lua, values, "a profile's file")?;
-    let reader = ProfileReader { lua, spec: &spec };
-    let (mut keys, mut inputs) = (BTreeSet::new(), Vec::new());
-    for (index, entry) in spec.inputs.iter().enumerate() {
-        let place = format!("inputs[{}]", index + 1);
-        let input = reader.input(&place, entry)?;
-        if let Some(key) = input.keys.iter().find(|key| !keys.insert((*key).clone())) {
-            return Err(reader.wrong("keys", format!("{place}.keys: {key:?} is sent twice")));
-        }
-        inputs.push(input);
-    }
-    if inputs.is_empty() {
-        return Err(reader.wrong("inputs", "inputs: nothing would be sent; give at least one".to_owned()));
-    }
-    Ok(Profile { name: spec.name.clone(), inputs, actions: reader.actions(&spec.actions)? })
+    let (sources, instance) = ScriptSources::read(path, &[], &Limits::default())?;
+    let spec = instance.expected_result("a profile's file");
+    let profile = spec.and_then(|spec| ProfileReader { lua: &instance.vm.lua, spec: &spec }.profile());
+    Ok((profile.map_err(|e| instance.vm.explain(&e))?, sources.bundle.hashes()))
 }
 
 /// Reads a profile and checks the relations between its fields.
@@ -59,6 +39,22 @@ struct ProfileReader<'a> {
 impl ProfileReader<'_> {
     fn wrong(&self, key: &str, message: String) -> mlua::Error {
         fail_at_key(self.lua, &self.spec.table, key, format!("profile.{message}"))
+    }
+
+    fn profile(&self) -> mlua::Result<Profile> {
+        let (mut keys, mut inputs) = (BTreeSet::new(), Vec::new());
+        for (index, entry) in self.spec.inputs.iter().enumerate() {
+            let place = format!("inputs[{}]", index + 1);
+            let input = self.input(&place, entry)?;
+            if let Some(key) = input.keys.iter().find(|key| !keys.insert((*key).clone())) {
+                return Err(self.wrong("keys", format!("{place}.keys: {key:?} is sent twice")));
+            }
+            inputs.push(input);
+        }
+        if inputs.is_empty() {
+            return Err(self.wrong("inputs", "inputs: nothing would be sent; give at least one".to_owned()));
+        }
+        Ok(Profile { name: self.spec.name.clone(), inputs, actions: self.actions(&self.spec.actions)? })
     }
 
     fn input(&self, place: &str, entry: &InputSpec) -> mlua::Result<ProfileInput> {
@@ -117,12 +113,12 @@ impl ProfileReader<'_> {
                 format!("actions.gripper.closed: is {} like open; nothing could close", spec.gripper.closed);
             return Err(self.wrong("closed", message));
         }
-        let steps = |pose: &str| -> mlua::Result<(f64, f64)> {
-            let missing =
-                |key: &str| self.wrong("pose", format!("actions.{key}: missing; pose = {pose:?} needs it"));
-            let translation_m = spec.translation_m.ok_or_else(|| missing("translation_m"))?;
-            Ok((translation_m, spec.rotation_rad.ok_or_else(|| missing("rotation_rad"))?))
+        let missing = |key: &str, pose: &str| {
+            self.wrong("pose", format!("actions.{key}: missing; pose = {pose:?} needs it"))
         };
+        let translation_m =
+            |pose| spec.translation_m.ok_or_else(|| missing("translation_m", pose));
+        let rotation_rad = |pose| spec.rotation_rad.ok_or_else(|| missing("rotation_rad", pose));
         let pose = match spec.pose {
             PoseKind::Absolute => {
                 let given = [("translation_m", spec.translation_m), ("rotation_rad", spec.rotation_rad)];
@@ -132,14 +128,14 @@ impl ProfileReader<'_> {
                 }
                 PoseEncoding::Absolute
             }
-            PoseKind::Delta => {
-                let (translation_m, rotation_rad) = steps("delta")?;
-                PoseEncoding::Delta { translation_m, rotation_rad }
-            }
-            PoseKind::DeltaOsc => {
-                let (translation_m, rotation_rad) = steps("delta_osc")?;
-                PoseEncoding::DeltaOsc { translation_m, rotation_rad }
-            }
+            PoseKind::Delta => PoseEncoding::Delta {
+                translation_m: translation_m("delta")?,
+                rotation_rad: rotation_rad("delta")?,
+            },
+            PoseKind::DeltaOsc => PoseEncoding::DeltaOsc {
+                translation_m: translation_m("delta_osc")?,
+                rotation_rad: rotation_rad("delta_osc")?,
+            },
         };
         let (scale, offset) = (spec.scale, spec.offset);
         if let Some(at) = scale.and_then(|scale| scale.iter().position(|factor| *factor == 0.0)) {

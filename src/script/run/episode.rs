@@ -1,7 +1,8 @@
 //! Episodes: the scene that a task's layout builds, and the task's expert.
 
-use mlua::{Function, Lua, MultiValue, Value};
+use mlua::{Function, Lua, Value};
 
+use super::expert::{ExpertController, GripMode};
 use crate::{
     benchmark::{
         Shift, ShiftValue,
@@ -14,11 +15,10 @@ use crate::{
         api::{
             random::LuaRng,
             scene::{LuaScene, empty_scene},
-            tasks::{GoalSpec, SuiteSpec},
+            tasks::GoalSpec,
         },
-        plan::{LoadedScript, ScriptInstance, find_task, reopen},
-        run::expert::Expert,
-        schema::{Constructed, HasTable, Range},
+        plan::{FoundTask, LoadedScript, ScriptInstance},
+        schema::{HasTable, Range},
         vm::{
             error::{ScriptError, fail},
             source_map::fail_at_key,
@@ -46,76 +46,85 @@ impl EpisodeSetup {
     /// # Errors
     /// If the suite, the task or a shift is unknown, or the script fails.
     pub fn open(loaded: &LoadedScript, id: &EpisodeId, shifts: &[ShiftValue]) -> Result<Self, ScriptError> {
-        let (instance, values) = reopen(loaded)?;
-        let Start { scene, nominal, seed, expert } = start(&instance, &values, id, shifts)?;
-        Ok(Self { scene, nominal, seed, instance, expert })
+        let builder = SceneBuilder::open(loaded)?;
+        let InitialScenes { scene, nominal, seed, expert } = builder.build(id, shifts)?;
+        Ok(Self { scene, nominal, seed, instance: builder.instance, expert })
     }
 
-    /// The expert of the task, ready to start; `None` if the task has no expert.
-    pub fn expert(self) -> Option<Expert> {
+    /// The controller that runs the expert of the task; `None` if the task has no expert.
+    pub fn expert(self, mode: GripMode) -> Option<ExpertController> {
         let function = self.expert?;
         self.instance.vm.random.reseed(self.seed.stream(RandomStream::Expert));
-        Some(Expert::start(self.instance, &function))
+        Some(ExpertController::new(self.instance, function, mode))
     }
+}
+
+/// The initial scenes of an episode.
+pub struct InitialScenes {
+    /// After the shifts.
+    pub scene: Scene,
+    /// Before the shifts.
+    pub nominal: Scene,
+    seed: EpisodeSeed,
+    expert: Option<Function>,
 }
 
 /// Builds many scenes in one virtual machine, for checks without a simulation. Global state that one layout changes is
 /// seen by the next.
-pub struct Scenes {
+pub struct SceneBuilder {
     instance: ScriptInstance,
-    values: MultiValue,
 }
 
-impl Scenes {
+impl SceneBuilder {
     /// Runs the sources of `loaded` in a new virtual machine.
     ///
     /// # Errors
     /// If the script fails.
     pub fn open(loaded: &LoadedScript) -> Result<Self, ScriptError> {
-        let (instance, values) = reopen(loaded)?;
-        Ok(Self { instance, values })
+        Ok(Self { instance: loaded.sources.instance()? })
     }
 
-    /// The initial scene of an episode, before and after the shifts.
+    /// Builds the initial scenes of an episode.
     ///
     /// # Errors
     /// As [`EpisodeSetup::open`].
-    pub fn of(&self, id: &EpisodeId, shifts: &[ShiftValue]) -> Result<(Scene, Scene), ScriptError> {
-        let Start { scene, nominal, .. } = start(&self.instance, &self.values, id, shifts)?;
-        Ok((nominal, scene))
+    pub fn build(&self, id: &EpisodeId, shifts: &[ShiftValue]) -> Result<InitialScenes, ScriptError> {
+        let vm = &self.instance.vm;
+        let FoundTask { suite, task } = self.instance.find_task(&id.suite, id.task)?;
+        let seed = EpisodeSeed::new(id, &task.layout.name);
+        vm.random.reseed(seed.stream(RandomStream::Script));
+        let mut current = LuaScene::new(empty_scene());
+        let rng = LuaRng::new(seed.clone(), RandomStream::Layout);
+        vm.call::<()>(&task.layout.build, (current.clone(), rng))?;
+        let nominal = lock(&current.scene).clone();
+        let declared = suite.shifts.as_deref().unwrap_or_default();
+        for ShiftValue { name, value } in shifts {
+            let Some(shift) = declared.iter().find(|shift| shift.name == *name) else {
+                let names = declared.iter().map(|shift| shift.name.as_str());
+                return Err(ScriptError::new(vm.main(), unknown_shift(name, names)));
+            };
+            current = self.shifted(&shift.apply, current, *value)?;
+        }
+        let scene = lock(&current.scene).clone();
+        check_goal(&vm.lua, &task.goal, &scene).map_err(|e| vm.explain(&e))?;
+        Ok(InitialScenes { scene, nominal, seed, expert: task.expert.clone() })
     }
-}
 
-/// Initial state of an episode.
-struct Start {
-    scene: Scene,
-    nominal: Scene,
-    seed: EpisodeSeed,
-    expert: Option<Function>,
-}
-
-fn start(
-    instance: &ScriptInstance,
-    values: &MultiValue,
-    id: &EpisodeId,
-    shifts: &[ShiftValue],
-) -> Result<Start, ScriptError> {
-    let vm = &instance.vm;
-    let (suite, task) = find_task(instance, values, &id.suite, id.task)?;
-    let seed = EpisodeSeed::new(id, &task.layout.name);
-    vm.random.reseed(seed.stream(RandomStream::Script));
-    let scene = LuaScene::new(empty_scene());
-    let userdata = vm.lua.create_userdata(scene.clone()).map_err(|e| vm.explain(&e))?;
-    vm.call::<()>(&task.layout.build, (&userdata, LuaRng::new(seed.clone(), RandomStream::Layout)))?;
-    let nominal = lock(&scene.scene).clone();
-    let mut current = scene;
-    for ShiftValue { name, value } in shifts {
-        let apply = find_shift(instance, &suite, name)?;
-        current = apply_shift(instance, &apply, current, *value)?;
+    /// The result of a shift's function: a scene, or nothing if it changed the given one.
+    fn shifted(&self, apply: &Function, scene: LuaScene, value: f64) -> Result<LuaScene, ScriptError> {
+        let vm = &self.instance.vm;
+        let wrong = |expected: &str| {
+            vm.explain(&fail(&vm.lua, format!("shift.apply: expected {expected} to be returned")))
+        };
+        match &vm.call::<Value>(apply, (scene.clone(), value))? {
+            Value::Nil => Ok(scene),
+            Value::UserData(data) => match data.borrow::<LuaScene>() {
+                Ok(other) => Ok(other.clone()),
+                Err(_) => Err(wrong("the scene")),
+            },
+            _ => Err(wrong("the scene or nothing")),
+        }
     }
-    let scene = lock(&current.scene).clone();
-    check_goal(&vm.lua, &task.goal, &scene).map_err(|e| vm.explain(&e))?;
-    Ok(Start { scene, nominal, seed, expert: task.expert.clone() })
 }
 
 /// Message about a shift that a suite does not declare.
@@ -126,58 +135,31 @@ fn unknown_shift<'a>(name: &str, known: impl Iterator<Item = &'a str> + Clone) -
     }
 }
 
-/// The function of a shift.
-fn find_shift(
-    instance: &ScriptInstance,
-    suite: &Constructed<SuiteSpec>,
-    name: &str,
-) -> Result<Function, ScriptError> {
-    let shifts = suite.shifts.as_deref().unwrap_or_default();
-    match shifts.iter().find(|shift| shift.name == name) {
-        Some(shift) => Ok(shift.apply.clone()),
-        None => {
-            let names = shifts.iter().map(|shift| shift.name.as_str());
-            Err(ScriptError::new(instance.vm.main(), unknown_shift(name, names)))
-        }
-    }
+/// The value of `--shift name=value` is invalid.
+#[derive(Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ShiftError {
+    #[error("{}", unknown_shift(name, known.iter().map(String::as_str)))]
+    Unknown { name: String, known: Vec<String> },
+    #[error("shift {name}: expected a number{range} ({unit}), got {value}")]
+    Value { name: String, range: String, unit: String, value: String },
 }
 
 /// Checks the value of `--shift name=value` against the declared shifts of a suite.
 ///
 /// # Errors
 /// If the shift is unknown or the value is out of its range; the message is a fragment.
-pub fn check_shift(shifts: &[Shift], name: &str, value: f64) -> Result<(), String> {
+pub fn check_shift(shifts: &[Shift], name: &str, value: f64) -> Result<(), ShiftError> {
+    let name = name.to_owned();
     let Some(shift) = shifts.iter().find(|shift| shift.name == name) else {
-        return Err(unknown_shift(name, shifts.iter().map(|shift| shift.name.as_str())));
+        let known = shifts.iter().map(|shift| shift.name.clone()).collect();
+        return Err(ShiftError::Unknown { name, known });
     };
     let range = Range::between(shift.min, shift.max);
-    match range.holds(value) {
-        true => Ok(()),
-        false => Err(format!(
-            "shift {name}: expected a number{} ({}), got {}",
-            range.describe(),
-            shift.unit,
-            format_number(value)
-        )),
+    if range.holds(value) {
+        return Ok(());
     }
-}
-
-fn apply_shift(
-    instance: &ScriptInstance,
-    apply: &Function,
-    scene: LuaScene,
-    value: f64,
-) -> Result<LuaScene, ScriptError> {
-    let vm = &instance.vm;
-    let result: Value = vm.call(apply, (scene.clone(), value))?;
-    match &result {
-        Value::Nil => Ok(scene),
-        Value::UserData(data) => match data.borrow::<LuaScene>() {
-            Ok(other) => Ok(other.clone()),
-            Err(_) => Err(vm.explain(&fail(&vm.lua, "shift.apply: expected the scene to be returned"))),
-        },
-        _ => Err(vm.explain(&fail(&vm.lua, "shift.apply: expected the scene or nothing to be returned"))),
-    }
+    let (range, unit, value) = (range.describe(), shift.unit.clone(), format_number(value));
+    Err(ShiftError::Value { name, range, unit, value })
 }
 
 /// Checks that the object and the target of a goal exist, and that the object can move.

@@ -8,8 +8,8 @@ use crate::script::{
         image::image_of,
         tasks::{ExperimentSpec, FinishSpec},
     },
-    plan::{LoadedScript, ScriptInstance, points, reopen},
-    schema::{Constructed, RecordType, is_constructed, validate},
+    plan::{LoadedScript, ScriptInstance, points},
+    schema::{Constructed, RecordType, validate},
     vm::{
         error::{ScriptError, fail},
         json::to_json,
@@ -33,7 +33,6 @@ pub struct ExperimentSummary {
 /// A virtual machine that runs points of an experiment; every thread needs its own.
 pub struct Experiment {
     instance: ScriptInstance,
-    table: Value,
     points: Vec<Value>,
 }
 
@@ -43,19 +42,15 @@ impl Experiment {
     /// # Errors
     /// If the script fails or does not return an experiment.
     pub fn open(loaded: &LoadedScript) -> Result<Self, ScriptError> {
-        let (instance, values) = reopen(loaded)?;
-        let lua = &instance.vm.lua;
-        let table = match values.front() {
-            Some(Value::Table(table)) if is_constructed(lua, ExperimentSpec::RECORD, table) => table,
-            _ => return Err(ScriptError::new(&loaded.main, "the script did not return an experiment")),
-        };
+        let mut experiment = Self { instance: loaded.sources.instance()?, points: Vec::new() };
+        let vm = &experiment.instance.vm;
         let points = {
-            let _deadline = instance.vm.call_deadline();
-            let spec = lua.unpack::<Constructed<ExperimentSpec>>(Value::Table(table.clone()));
-            spec.and_then(|spec| points(lua, &spec)).map_err(|e| instance.vm.explain(&e))?
+            let _deadline = vm.call_deadline();
+            let spec = experiment.spec()?;
+            points(&vm.lua, &spec).map_err(|e| vm.explain(&e))?
         };
-        let table = Value::Table(table.clone());
-        Ok(Self { instance, table, points })
+        experiment.points = points;
+        Ok(experiment)
     }
 
     /// Number of points.
@@ -73,14 +68,19 @@ impl Experiment {
     /// # Errors
     /// If it contains something other than data.
     pub fn point(&self, index: usize) -> Result<Json, ScriptError> {
-        let point = self.points.get(index).cloned().unwrap_or(Value::Nil);
-        to_json(&self.instance.vm.lua, &point, "point").map_err(|e| self.instance.vm.explain(&e))
+        let vm = &self.instance.vm;
+        to_json(&vm.lua, &self.value(index), "point").map_err(|e| vm.explain(&e))
+    }
+
+    fn value(&self, index: usize) -> Value {
+        self.points.get(index).cloned().unwrap_or(Value::Nil)
     }
 
     /// The declaration, checked again: the script may have changed its table.
     fn spec(&self) -> Result<Constructed<ExperimentSpec>, ScriptError> {
         let vm = &self.instance.vm;
-        vm.lua.unpack(self.table.clone()).map_err(|e| vm.explain(&e))
+        let spec = self.instance.result().map_err(|e| vm.explain(&e))?;
+        spec.ok_or_else(|| ScriptError::new(vm.main(), "the script did not return an experiment"))
     }
 
     /// The rows of point `index`. `math.random` is seeded by the index, so that the order of points does not matter.
@@ -91,8 +91,8 @@ impl Experiment {
         let vm = &self.instance.vm;
         vm.random.reseed(crate::benchmark::seed::keyed_rng(&["softvt point", &index.to_string()]));
         let spec = self.spec()?;
-        let point = self.points.get(index).cloned().unwrap_or(Value::Nil);
-        let result: Value = vm.call_point(&spec.run, (point, spec.options.clone()))?;
+        let _deadline = vm.point_deadline();
+        let result = vm.call(&spec.run, (self.value(index), spec.options.clone()))?;
         rows(&vm.lua, &result).map_err(|e| vm.explain(&e))
     }
 
@@ -104,20 +104,14 @@ impl Experiment {
         let vm = &self.instance.vm;
         let spec = self.spec()?;
         let Some(finish) = &spec.finish else { return Ok(ExperimentSummary::default()) };
-        let list = || {
-            let list = vm.lua.create_table()?;
-            for row in rows {
-                list.push(vm.lua.to_value(row)?)?;
-            }
-            Ok(list)
-        };
-        let list = list().map_err(|e| vm.explain(&e))?;
-        let value: Value = vm.call(finish, (list, spec.options.clone()))?;
-        read_finish(&vm.lua, &value).map_err(|e| vm.explain(&e))
+        let rows = rows.iter().map(|row| vm.lua.to_value(row)).collect::<mlua::Result<Vec<_>>>();
+        let rows = rows.and_then(|rows| vm.lua.create_sequence_from(rows)).map_err(|e| vm.explain(&e))?;
+        let value = vm.call(finish, (rows, spec.options.clone()))?;
+        read_summary(&vm.lua, &value).map_err(|e| vm.explain(&e))
     }
 }
 
-fn read_finish(lua: &Lua, value: &Value) -> mlua::Result<ExperimentSummary> {
+fn read_summary(lua: &Lua, value: &Value) -> mlua::Result<ExperimentSummary> {
     if value.is_nil() {
         return Ok(ExperimentSummary::default());
     }

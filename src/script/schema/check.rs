@@ -5,7 +5,7 @@ use mlua::{Lua, Table, Value};
 use super::{Field, FieldDefault, Range, Record, Type, ValidationError, joined};
 use crate::{
     script::vm::{
-        error::{ScriptError, fail, here},
+        error::{current_line, fail, fail_at},
         list::plain,
         source_map,
         value::{describe, number, sorted_pairs},
@@ -271,9 +271,7 @@ fn metatable(lua: &Lua, record: &'static Record) -> mlua::Result<Table> {
 /// The error of a script at the line of the offending key, as far as the source text shows it.
 pub(crate) fn error_at_key(lua: &Lua, label: &str, error: &ValidationError) -> mlua::Error {
     let message = error.describe(label);
-    let Some((file, line)) = here(lua) else { return fail(lua, message) };
-    let line = source_map::line_of_key(lua, &file, line, &error.path);
-    mlua::Error::external(ScriptError::new(file, message).at(Some(line)))
+    fail_at(lua, current_line(lua).map(|call| source_map::find_key(lua, call, &error.path)), message)
 }
 
 /// The error of a script about the field `key` of a table, for what a single field's type does not express.

@@ -5,8 +5,13 @@ use crate::{
     benchmark::{Plan, ShiftValue},
     evaluation::episode_id::{EpisodeId, Split},
     geometry::{Pose, Vec3, shape::Shape},
+    rollout::Controller,
     scene::{Asset, Body},
-    script::{EpisodeSetup, Expert, ExpertCommand, ExpertView, ObjectView, check_shift},
+    script::{
+        EpisodeSetup, ExpertController, GripMode,
+        api::expert_input::{ExpertCommand, ExpertView, ObjectView},
+        check_shift,
+    },
 };
 
 fn episode_id(episode: u32, base_seed: u64) -> EpisodeId {
@@ -51,11 +56,18 @@ fn view() -> ExpertView {
     }
 }
 
-fn expert(body: &str) -> (Project, Expert) {
+fn expert(body: &str) -> (Project, ExpertController) {
     let project = project(&format!("return suite(function(arm, scene) {body} end)"));
     let loaded = project.load("x.lua", &[]).unwrap();
-    let expert = EpisodeSetup::open(&loaded, &episode_id(0, 1), &[]).unwrap().expert().unwrap();
-    (project, expert)
+    let setup = EpisodeSetup::open(&loaded, &episode_id(0, 1), &[]).unwrap();
+    (project, setup.expert(GripMode::Commanded).unwrap())
+}
+
+/// The next command of an expert that sees [`view`].
+fn step(expert: &mut ExpertController) -> Result<Option<ExpertCommand>, ScriptError> {
+    let vm = &expert.instance.vm;
+    let _deadline = vm.call_deadline();
+    expert.coroutine.step(&vm.lua, &view()).map_err(|e| vm.explain(&e))
 }
 
 fn run(body: &str) -> Result<Vec<ExpertCommand>, String> {
@@ -63,7 +75,7 @@ fn run(body: &str) -> Result<Vec<ExpertCommand>, String> {
     let folder = format!("{}/", project.path("").display()).replace("//", "/");
     let mut commands = Vec::new();
     while commands.len() < 1000 {
-        match expert.step(&view()).map_err(|e| e.to_string().replace(&folder, ""))? {
+        match step(&mut expert).map_err(|e| e.to_string().replace(&folder, ""))? {
             Some(command) => commands.push(command),
             None => break,
         }
@@ -77,7 +89,7 @@ fn a_suite_becomes_plain_data() {
     let Plan::Suite(suite) = &loaded.plan else { panic!("{:?}", loaded.plan) };
     assert_eq!((suite.name.as_str(), suite.episodes, suite.tasks.len()), ("test", 5, 1));
     assert_eq!((suite.tasks[0].budget_steps, suite.tasks[0].expert), (500, false));
-    assert_eq!(loaded.bundle.files.len(), 1);
+    assert_eq!(loaded.sources.bundle.files.len(), 1);
 }
 
 #[test]
@@ -156,7 +168,7 @@ fn the_library_scales_stiffness_and_mass() {
     let project =
         project("local shifts = require 'shifts'\nreturn suite(nil, { shifts.stiffness, shifts.mass })");
     let loaded = project.load("x.lua", &[]).unwrap();
-    assert!(loaded.bundle.files.contains_key("scripts/shifts.lua"));
+    assert!(loaded.sources.bundle.files.contains_key("scripts/shifts.lua"));
     let shifts = [("stiffness", 0.5), ("mass", 2.0)].map(|(name, value)| (name.to_owned(), value).into());
     let scene = EpisodeSetup::open(&loaded, &episode_id(0, 1), &shifts).unwrap().scene;
     let Body::Soft(soft) = &scene.objects[0].asset.body else { panic!("the ball is soft") };
@@ -164,8 +176,8 @@ fn the_library_scales_stiffness_and_mass() {
     let Plan::Suite(suite) = &loaded.plan else { panic!("{:?}", loaded.plan) };
     assert!(check_shift(&suite.shifts, "mass", 2.0).is_ok());
     assert_eq!(
-        check_shift(&suite.shifts, "mass", 0.0),
-        Err("shift mass: expected a number in 0.01..100 (1), got 0".into())
+        check_shift(&suite.shifts, "mass", 0.0).map_err(|error| error.to_string()),
+        Err("shift mass: expected a number in 0.01..100 (1), got 0".to_owned())
     );
 }
 
@@ -250,13 +262,14 @@ fn the_arm_starts_within_its_joint_limits() {
 fn an_expert_that_gives_up_is_done_and_its_reason_is_kept() {
     let (_project, mut expert) = expert("arm:wait(0.1) pcall(arm.give_up, arm, 'too slippery') arm:wait(1)");
     let mut commands = 0;
-    while expert.step(&view()).unwrap().is_some() {
+    while step(&mut expert).unwrap().is_some() {
         assert_eq!(expert.gave_up(), None);
         commands += 1;
     }
     assert_eq!((commands, expert.gave_up()), (2, Some("too slippery")));
-    assert_eq!(expert.step(&view()).unwrap(), None, "it is not resumed");
-    assert_eq!(expert.refuse("unreachable").message, "unreachable");
+    assert_eq!(step(&mut expert).unwrap(), None, "it is not resumed");
+    let vm = &expert.instance.vm;
+    assert_eq!(vm.explain(&expert.coroutine.refuse(&vm.lua, "unreachable")).message, "unreachable");
     let message = run("arm:give_up()").unwrap_err();
     assert!(
         message.ends_with("arm:give_up: reason: expected a string that is not empty, got nil"),

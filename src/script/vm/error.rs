@@ -2,7 +2,29 @@
 
 use std::fmt;
 
-use mlua::Lua;
+use mlua::{Lua, debug::Debug};
+
+/// A line of a script.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct SourceLine {
+    pub file: String,
+    /// From 1.
+    pub line: usize,
+}
+
+impl fmt::Display for SourceLine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}", self.file, self.line)
+    }
+}
+
+impl SourceLine {
+    /// The current line of a function on the stack, if it is a script's.
+    pub(crate) fn running(function: &Debug<'_>) -> Option<Self> {
+        let file = function.source().source?.strip_prefix('@')?.to_owned();
+        Some(Self { file, line: function.current_line()? })
+    }
+}
 
 /// An error in a script or in its use; always names the file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -45,17 +67,11 @@ impl ScriptError {
         self
     }
 
-    /// The same error at another file and line, if they are known.
-    pub(crate) fn found_at(mut self, place: Option<(String, usize)>) -> Self {
-        if let Some((file, line)) = place {
+    /// The same error at a line, if that is known.
+    pub(crate) fn at(mut self, place: Option<SourceLine>) -> Self {
+        if let Some(SourceLine { file, line }) = place {
             (self.file, self.line) = (file, Some(line));
         }
-        self
-    }
-
-    /// The same error at `line` (from 1).
-    pub fn at(mut self, line: Option<usize>) -> Self {
-        self.line = line;
         self
     }
 }
@@ -64,11 +80,11 @@ impl ScriptError {
 #[derive(Clone, Debug)]
 pub(crate) struct RaisedObject {
     pub description: String,
-    pub file: Option<(String, usize)>,
+    pub place: Option<SourceLine>,
 }
 
 /// Translates errors of the virtual machine.
-pub(crate) struct Context<'a> {
+pub(crate) struct ErrorTranslator<'a> {
     /// The main file.
     pub main: &'a str,
     /// Every loaded file.
@@ -78,95 +94,81 @@ pub(crate) struct Context<'a> {
     pub memory_bytes: usize,
 }
 
-impl Context<'_> {
+impl ErrorTranslator<'_> {
     /// The error as a script author should read it: file, line and message, without the machine's internals.
     pub(crate) fn explain(&self, error: &mlua::Error) -> ScriptError {
-        if let Some(own) = own(error) {
-            return own;
-        }
-        let trace = traceback(error);
+        let trace = match error {
+            mlua::Error::CallbackError { traceback, .. } => traceback.as_str(),
+            _ => "",
+        };
         match root(error) {
-            mlua::Error::MemoryError(_) => self.memory(&trace),
-            mlua::Error::SyntaxError { message, .. } => self.located(&format!("syntax error: {message}"), ""),
-            mlua::Error::RuntimeError(message) if is_address(message) => self.object(&trace),
-            mlua::Error::RuntimeError(message) => self.located(message, &trace),
-            other => self.located(&other.to_string(), &trace),
-        }
-    }
-
-    fn memory(&self, trace: &str) -> ScriptError {
-        let mib = self.memory_bytes >> 20;
-        self.traced(format!("the script used more than its {mib} MiB of memory"), trace)
-            .hint("build smaller tables and strings, or keep fewer of them")
-    }
-
-    fn object(&self, trace: &str) -> ScriptError {
-        let Some(raised) = &self.raised else {
-            return self.traced("a value that is not a string was raised as an error".into(), trace);
-        };
-        let message = format!("error object {}", raised.description);
-        match &raised.file {
-            Some((file, line)) => ScriptError::new(file.clone(), message).at(Some(*line)),
-            None => self.traced(message, trace),
-        }
-    }
-
-    /// Reads `file:line: message` (after an optional `syntax error: `) as Lua writes it.
-    fn located(&self, text: &str, trace: &str) -> ScriptError {
-        let (prefix, rest) = match text.strip_prefix("syntax error: ") {
-            Some(rest) => ("syntax error: ", rest),
-            None => ("", text),
-        };
-        let rest = without_own_position(rest);
-        let (message, inner_trace) = rest.split_once("\nstack traceback:").unwrap_or((rest, ""));
-        match self.position(message) {
-            Some((file, line, mut text)) => {
-                // Every nested coroutine prepends its position.
-                while let Some((_, _, inner)) =
-                    self.position(text.trim()).filter(|(f, l, _)| *f == file && *l == line)
-                {
-                    text = inner;
-                }
-                ScriptError::new(file, format!("{prefix}{}", text.trim())).at(Some(line))
+            mlua::Error::ExternalError(inner) if let Some(raised) = inner.downcast_ref::<ScriptError>() => {
+                raised.clone()
             }
-            None => self.traced(format!("{prefix}{}", message.trim()), &format!("{inner_trace}\n{trace}")),
+            mlua::Error::MemoryError(_) => {
+                let mib = self.memory_bytes >> 20;
+                self.traced(format!("the script used more than its {mib} MiB of memory"), trace)
+                    .hint("build smaller tables and strings, or keep fewer of them")
+            }
+            mlua::Error::SyntaxError { message, .. } => self.located("syntax error: ", message, ""),
+            mlua::Error::RuntimeError(message) if is_address(message) => match &self.raised {
+                Some(RaisedObject { description, place }) => {
+                    self.traced(format!("error object {description}"), trace).at(place.clone())
+                }
+                None => self.traced("a value that is not a string was raised as an error".into(), trace),
+            },
+            mlua::Error::RuntimeError(message) => self.located("", message, trace),
+            other => self.located("", &other.to_string(), trace),
         }
+    }
+
+    /// Reads `file:line: message` as Lua writes it.
+    fn located(&self, prefix: &str, text: &str, trace: &str) -> ScriptError {
+        let text = without_own_position(text);
+        let (message, inner_trace) = text.split_once("\nstack traceback:").unwrap_or((text, ""));
+        let Some((place, mut text)) = self.split_position(message) else {
+            return self.traced(format!("{prefix}{}", message.trim()), &format!("{inner_trace}\n{trace}"));
+        };
+        // Every nested coroutine prepends its position.
+        while let Some((inner, rest)) = self.split_position(text.trim())
+            && inner == place
+        {
+            text = rest;
+        }
+        ScriptError::new(self.main, format!("{prefix}{}", text.trim())).at(Some(place))
     }
 
     /// An error without a position of its own gets that of the innermost loaded file in the traceback.
     fn traced(&self, message: String, trace: &str) -> ScriptError {
-        let place = trace.lines().find_map(|frame| self.position(frame.trim()));
-        match place {
-            Some((file, line, _)) => ScriptError::new(file, message).at(Some(line)),
-            None => ScriptError::new(self.main, message),
-        }
+        let place = trace.lines().find_map(|frame| self.split_position(frame.trim()));
+        ScriptError::new(self.main, message).at(place.map(|(place, _)| place))
     }
 
-    fn position<'t>(&self, text: &'t str) -> Option<(String, usize, &'t str)> {
+    /// Splits `file:line: rest` if the file is a loaded one.
+    fn split_position<'t>(&self, text: &'t str) -> Option<(SourceLine, &'t str)> {
         let (at, _) = text.match_indices(':').find(|(at, _)| {
             let digits = text[at + 1..].bytes().take_while(u8::is_ascii_digit).count();
             digits > 0 && text[at + 1 + digits..].starts_with(':')
         })?;
-        let (line, said) = text[at + 1..].split_once(':')?;
-        Some((self.file(&text[..at])?, line.parse().ok()?, said))
+        let (line, rest) = text[at + 1..].split_once(':')?;
+        Some((SourceLine { file: self.file(&text[..at])?, line: line.parse().ok()? }, rest))
     }
 
     /// The loaded file of a name, which Lua shortens to `...tail` if it is long.
     fn file(&self, name: &str) -> Option<String> {
-        let tail = name.strip_prefix("...");
-        let known = self.files.iter().find(|file| match tail {
+        let is_file = |file: &&String| match name.strip_prefix("...") {
             Some(tail) => file.ends_with(tail),
             None => *file == name,
-        });
-        known.cloned()
+        };
+        self.files.iter().find(is_file).cloned()
     }
 }
 
 /// The message without the position in this module's own Lua code.
 fn without_own_position(message: &str) -> &str {
     let inner = ["softvt:", "softvt.arm:"].iter().find_map(|name| message.strip_prefix(name));
-    let said = inner.and_then(|rest| rest.split_once(": ")).filter(|(line, _)| line.parse::<usize>().is_ok());
-    said.map_or(message, |(_, said)| said)
+    let split = inner.and_then(|rest| rest.split_once(": ")).filter(|(line, _)| line.parse::<usize>().is_ok());
+    split.map_or(message, |(_, rest)| rest)
 }
 
 /// True if Lua could only print an address for the error value.
@@ -178,14 +180,7 @@ fn is_address(message: &str) -> bool {
         })
 }
 
-/// An error raised by the host, however deeply it is wrapped.
-fn own(error: &mlua::Error) -> Option<ScriptError> {
-    match root(error) {
-        mlua::Error::ExternalError(inner) => inner.downcast_ref::<ScriptError>().cloned(),
-        _ => None,
-    }
-}
-
+/// The error itself, however deeply it is wrapped.
 fn root(error: &mlua::Error) -> &mlua::Error {
     match error {
         mlua::Error::CallbackError { cause, .. } | mlua::Error::WithContext { cause, .. } => root(cause),
@@ -196,46 +191,37 @@ fn root(error: &mlua::Error) -> &mlua::Error {
     }
 }
 
-fn traceback(error: &mlua::Error) -> String {
-    match error {
-        mlua::Error::CallbackError { traceback, .. } => traceback.clone(),
-        _ => String::new(),
-    }
-}
-
 /// Main file of a virtual machine: the place of errors that no script line raised.
+#[derive(Clone)]
 pub(crate) struct MainFile(pub String);
 
-/// File and line of the innermost script function on the stack.
-pub(crate) fn here(lua: &Lua) -> Option<(String, usize)> {
+/// Data of a virtual machine that was stored by `Lua::set_app_data`.
+pub(crate) fn app_data<T: Clone + 'static>(lua: &Lua) -> mlua::Result<T> {
+    let data = lua.app_data_ref::<T>().map(|data| data.clone());
+    data.ok_or_else(|| mlua::Error::runtime(format!("no {} is set", std::any::type_name::<T>())))
+}
+
+/// Line of the innermost script function on the stack.
+pub(crate) fn current_line(lua: &Lua) -> Option<SourceLine> {
     let mut level = 0;
     loop {
-        let frame = lua.inspect_stack(level, |frame| {
-            let source = frame.source().source?.strip_prefix('@')?.to_string();
-            Some((source, frame.current_line()?))
-        })?;
-        if frame.is_some() {
-            return frame;
+        let line = lua.inspect_stack(level, |function| SourceLine::running(&function))?;
+        if line.is_some() {
+            return line;
         }
         level += 1;
     }
 }
 
-/// [`here`] as messages name it: `file:line`.
-pub(crate) fn here_text(lua: &Lua) -> Option<String> {
-    here(lua).map(|(file, line)| format!("{file}:{line}"))
-}
-
 /// An error at the line of the script that is running.
 pub(crate) fn fail(lua: &Lua, message: impl Into<String>) -> mlua::Error {
-    let error = match here(lua) {
-        Some((file, line)) => ScriptError::new(file, message).at(Some(line)),
-        None => {
-            let main = lua.app_data_ref::<MainFile>().map(|main| main.0.clone());
-            ScriptError::new(main.unwrap_or_else(|| "script".into()), message)
-        }
-    };
-    mlua::Error::external(error)
+    fail_at(lua, current_line(lua), message)
+}
+
+/// An error at a line, or about the main file if the line is unknown.
+pub(crate) fn fail_at(lua: &Lua, place: Option<SourceLine>, message: impl Into<String>) -> mlua::Error {
+    let main = app_data::<MainFile>(lua).map_or("script".into(), |main| main.0);
+    mlua::Error::external(ScriptError::new(main, message).at(place))
 }
 
 #[cfg(test)]
@@ -244,8 +230,8 @@ mod tests {
 
     fn explain(error: mlua::Error) -> String {
         let files = ["suites/x.lua".to_string(), "/a/very/long/way/down/lib.lua".to_string()];
-        let context = Context { main: "suites/x.lua", files: &files, raised: None, memory_bytes: 1 << 20 };
-        context.explain(&error).to_string()
+        let translator = ErrorTranslator { main: "suites/x.lua", files: &files, raised: None, memory_bytes: 1 << 20 };
+        translator.explain(&error).to_string()
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! Lua values as plain data.
 
-use mlua::{Lua, Table, Value};
+use mlua::{Lua, Value};
 use serde::de::DeserializeOwned;
-use serde_json::{Map, Number, Value as Json};
+use serde_json::{Number, Value as Json};
 
 use super::{
     error::fail,
@@ -20,8 +20,7 @@ const MAX_VALUES: usize = 1_000_000;
 /// # Errors
 /// For values that are not data: functions, objects, non-finite numbers, keys that are not strings, endless tables.
 pub(crate) fn to_json(lua: &Lua, value: &Value, label: &str) -> mlua::Result<Json> {
-    let mut left = MAX_VALUES;
-    JsonReader { lua, left: &mut left }.read(value, label, 0)
+    read(lua, value, label, 0, &mut 0)
 }
 
 /// Converts a Lua value to a Rust type by way of JSON; messages speak of Lua's types.
@@ -47,55 +46,39 @@ pub(crate) fn deserialize<T: DeserializeOwned>(lua: &Lua, label: &str, value: &V
     })
 }
 
-struct JsonReader<'a> {
-    lua: &'a Lua,
-    left: &'a mut usize,
-}
-
-impl JsonReader<'_> {
-    fn wrong<T>(&self, label: &str, what: &str) -> mlua::Result<T> {
-        Err(fail(self.lua, format!("{label}: {what}")))
+/// `count` is the number of values read so far.
+fn read(lua: &Lua, value: &Value, label: &str, depth: usize, count: &mut usize) -> mlua::Result<Json> {
+    let wrong = |message: String| fail(lua, format!("{label}: {message}"));
+    if *count == MAX_VALUES {
+        return Err(wrong(format!("the data has more than {MAX_VALUES} values; give less")));
     }
-
-    fn read(&mut self, value: &Value, label: &str, depth: usize) -> mlua::Result<Json> {
-        if *self.left == 0 {
-            return self.wrong(label, &format!("the data has more than {MAX_VALUES} values; give less"));
-        }
-        *self.left -= 1;
-        let value = &plain(self.lua, value)?;
-        Ok(match value {
-            Value::Nil => Json::Null,
-            Value::Boolean(flag) => Json::Bool(*flag),
-            Value::Integer(n) => Json::Number((*n).into()),
-            Value::Number(n) => match Number::from_f64(*n) {
-                Some(number) => Json::Number(number),
-                None => {
-                    return self.wrong(label, &format!("expected a finite number, got {}", describe(value)));
-                }
-            },
-            Value::String(text) => Json::String(text.to_string_lossy()),
-            Value::Table(table) if depth < MAX_DEPTH => return self.table(table, label, depth),
-            Value::Table(_) => return self.wrong(label, "tables are nested too deeply"),
-            other => return self.wrong(label, &format!("expected data, got {}", describe(other))),
-        })
+    *count += 1;
+    let value = &plain(lua, value)?;
+    let table = match value {
+        Value::Nil => return Ok(Json::Null),
+        Value::Boolean(flag) => return Ok(Json::Bool(*flag)),
+        Value::Integer(n) => return Ok(Json::Number((*n).into())),
+        Value::Number(n) => match Number::from_f64(*n) {
+            Some(number) => return Ok(Json::Number(number)),
+            None => return Err(wrong(format!("expected a finite number, got {}", describe(value)))),
+        },
+        Value::String(text) => return Ok(Json::String(text.to_string_lossy())),
+        Value::Table(table) if depth < MAX_DEPTH => table,
+        Value::Table(_) => return Err(wrong("tables are nested too deeply".to_owned())),
+        other => return Err(wrong(format!("expected data, got {}", describe(other)))),
+    };
+    let length = table.raw_len();
+    if length > 0 && table.pairs::<Value, Value>().count() == length {
+        let item =
+            |index| read(lua, &table.raw_get(index)?, &format!("{label}[{index}]"), depth + 1, count);
+        return (1..=length).map(item).collect::<mlua::Result<_>>().map(Json::Array);
     }
-
-    fn table(&mut self, table: &Table, label: &str, depth: usize) -> mlua::Result<Json> {
-        let count = table.raw_len();
-        if count > 0 && table.pairs::<Value, Value>().count() == count {
-            let items = (1..=count)
-                .map(|index| self.read(&table.raw_get(index)?, &format!("{label}[{index}]"), depth + 1));
-            return items.collect::<mlua::Result<_>>().map(Json::Array);
-        }
-        let mut map = Map::new();
-        for (key, value) in sorted_pairs(table) {
-            let Value::String(name) = &key else {
-                return self.wrong(label, &format!("expected names as keys, got {}", describe(&key)));
-            };
+    let entries = sorted_pairs(table).into_iter().map(|(key, value)| match &key {
+        Value::String(name) => {
             let name = name.to_string_lossy();
-            let inner = self.read(&value, &format!("{label}.{name}"), depth + 1)?;
-            map.insert(name, inner);
+            Ok((name.clone(), read(lua, &value, &format!("{label}.{name}"), depth + 1, count)?))
         }
-        Ok(Json::Object(map))
-    }
+        key => Err(wrong(format!("expected names as keys, got {}", describe(key)))),
+    });
+    entries.collect::<mlua::Result<_>>().map(Json::Object)
 }

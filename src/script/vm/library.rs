@@ -3,45 +3,32 @@
 use std::{
     collections::{BTreeMap, BTreeSet},
     fs,
-    io::Read,
+    io::{self, Read},
     path::{Path, PathBuf},
     sync::{Arc, Mutex},
 };
 
 use include_dir::{Dir, include_dir};
-use mlua::Lua;
 use sha2::{Digest, Sha256};
 
-use crate::script::vm::error::ScriptError;
+use super::error::{ScriptError, SourceLine};
 use crate::text::suggest;
 
-static SCRIPTS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/scripts");
-static SUITES: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/suites");
-static ASSETS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/assets");
+/// The embedded folders, by their names in the repository.
+static EMBEDDED: [(&str, Dir<'_>); 3] = [
+    ("scripts", include_dir!("$CARGO_MANIFEST_DIR/scripts")),
+    ("suites", include_dir!("$CARGO_MANIFEST_DIR/suites")),
+    ("assets", include_dir!("$CARGO_MANIFEST_DIR/assets")),
+];
 
 /// Largest file that is read, bytes.
 const MAX_BYTES: u64 = 64 << 20;
 
-/// The content of a file.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Source {
-    pub bytes: Arc<[u8]>,
-    /// Lower-case hexadecimal SHA-256 of the bytes.
-    pub sha256: String,
-}
-
-impl Source {
-    fn new(bytes: Vec<u8>) -> Self {
-        let sha256 = sha256(&bytes);
-        Self { bytes: bytes.into(), sha256 }
-    }
-}
-
 /// Every file that a script has read. Episodes run on a bundle and never read the disk again.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Bundle {
-    /// Files by their name in messages.
-    pub files: BTreeMap<String, Source>,
+    /// Contents of the files by their name in messages.
+    pub files: BTreeMap<String, Arc<[u8]>>,
     /// The file found for each module or data file that was requested.
     pub served: BTreeMap<String, String>,
     /// Data files that were requested and not found.
@@ -56,9 +43,48 @@ pub fn sha256(bytes: &[u8]) -> String {
 impl Bundle {
     /// SHA-256 of every file by its name.
     pub fn hashes(&self) -> BTreeMap<String, String> {
-        self.files.iter().map(|(name, source)| (name.clone(), source.sha256.clone())).collect()
+        self.files.iter().map(|(name, bytes)| (name.clone(), sha256(bytes))).collect()
     }
 }
+
+/// A module or data file cannot be used. The text is a fragment without a position.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum LibraryError {
+    #[error(
+        "require {0:?}: a module is named by words joined with dots, such as \"experts.pick_place\", \
+         and lies inside the project; paths are refused"
+    )]
+    ModuleName(String),
+    #[error(
+        "require {0:?}: the module was not loaded when the plan was made; require it at the top of the file"
+    )]
+    LateModule(String),
+    #[error("require {module:?}: no {path} in {roots} nor in the standard library{suggestion}")]
+    NoModule { module: String, path: String, roots: String, suggestion: String },
+    #[error("require {module:?}: {source}")]
+    Module { module: String, source: Box<LibraryError> },
+    #[error("{0:?} leads out of the project; give a path inside of it without \"..\"")]
+    OutsidePath(String),
+    #[error("{path:?} was not read when the plan was made; {hint}")]
+    LateFile { path: String, hint: &'static str },
+    #[error("no file {path:?} {searched}")]
+    NoFile { path: String, searched: String },
+    #[error("{0} is a link that leads out of the project")]
+    OutsideLink(String),
+    #[error("{file}: {source}")]
+    Read { file: String, source: io::Error },
+}
+
+/// A file that was found.
+#[derive(Clone, Debug)]
+pub(crate) struct FoundFile {
+    /// Name in messages.
+    pub name: String,
+    pub bytes: Arc<[u8]>,
+}
+
+/// The library that a virtual machine reads from.
+pub(crate) type SharedLibrary = Arc<Mutex<Library>>;
 
 /// Finds files and keeps what it read.
 #[derive(Debug)]
@@ -66,248 +92,196 @@ pub(crate) struct Library {
     roots: Vec<PathBuf>,
     /// The main file, which cannot be required as a module.
     main: PathBuf,
-    bundle: Bundle,
-    frozen: bool,
-}
-
-/// The library of a virtual machine.
-pub(crate) fn of(lua: &Lua) -> mlua::Result<Arc<Mutex<Library>>> {
-    let library = lua.app_data_ref::<Arc<Mutex<Library>>>().map(|library| library.clone());
-    library.ok_or_else(|| mlua::Error::runtime("the virtual machine has no library"))
+    pub bundle: Bundle,
+    is_frozen: bool,
 }
 
 impl Library {
     /// Opens the library of the script at `main` and reads that file; also returns its name in messages.
     pub(crate) fn open(main: &Path) -> Result<(Self, String), ScriptError> {
         let name = display(main);
-        let folder = match main.parent() {
-            Some(parent) if parent != Path::new("") => parent.to_path_buf(),
-            _ => PathBuf::from("."),
-        };
-        let above = match folder.as_path() == Path::new(".") {
-            true => PathBuf::from(".."),
-            false => match folder.parent() {
-                Some(parent) if parent != Path::new("") => parent.to_path_buf(),
-                _ => PathBuf::from("."),
-            },
-        };
+        let folder = folder_of(main);
+        let above = if folder == Path::new(".") { PathBuf::from("..") } else { folder_of(&folder) };
         let mut roots = vec![folder, above, PathBuf::from(".")];
-        let mut seen = Vec::new();
-        roots.retain(|root| match root.canonicalize() {
-            Ok(real) if !seen.contains(&real) => {
-                seen.push(real);
-                true
-            }
-            _ => false,
-        });
-        let source = read_main(main, &name)?;
+        let mut seen = BTreeSet::new();
+        roots.retain(|root| root.canonicalize().is_ok_and(|real| seen.insert(real)));
         let mut bundle = Bundle::default();
-        bundle.files.insert(name.clone(), Source::new(source));
-        Ok((Self { roots, main: main.into(), bundle, frozen: false }, name))
+        bundle.files.insert(name.clone(), read_main(main, &name)?.into());
+        Ok((Self { roots, main: main.into(), bundle, is_frozen: false }, name))
     }
 
     /// A library of the files in `bundle` alone.
     pub(crate) fn frozen(bundle: Bundle) -> Self {
-        Self { roots: Vec::new(), main: PathBuf::new(), bundle, frozen: true }
-    }
-
-    pub(crate) fn bundle(&self) -> &Bundle {
-        &self.bundle
-    }
-
-    /// Names of the files read so far.
-    pub(crate) fn names(&self) -> Vec<String> {
-        self.bundle.files.keys().cloned().collect()
+        Self { roots: Vec::new(), main: PathBuf::new(), bundle, is_frozen: true }
     }
 
     /// Text of a file that was read before.
     pub(crate) fn text(&self, file: &str) -> Result<String, ScriptError> {
-        let source = self.bundle.files.get(file).ok_or_else(|| ScriptError::new(file, "was not read"))?;
-        lua_text(file, &source.bytes)
+        match self.bundle.files.get(file) {
+            Some(bytes) => lua_text(file, bytes),
+            None => Err(ScriptError::new(file, "was not read")),
+        }
     }
 
-    /// Bytes of a file that was read before.
-    pub(crate) fn bytes(&self, file: &str) -> Option<Arc<[u8]>> {
-        self.bundle.files.get(file).map(|source| source.bytes.clone())
-    }
-
-    /// Finds the file of a module (`experts.pick_place`). The message of an error is a fragment without a position.
-    pub(crate) fn module(&mut self, module: &str) -> Result<String, String> {
-        let plain = |part: &str| {
+    /// Finds the file of a module (`experts.pick_place`).
+    pub(crate) fn module(&mut self, module: &str) -> Result<FoundFile, LibraryError> {
+        let is_plain = |part: &str| {
             !part.is_empty() && part.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_' || b == b'-')
         };
-        if !module.split('.').all(plain) {
-            return Err(format!(
-                "require {module:?}: a module is named by words joined with dots, such as \"experts.pick_place\", \
-                 and lies inside the project; paths are refused"
-            ));
+        if !module.split('.').all(is_plain) {
+            return Err(LibraryError::ModuleName(module.into()));
         }
         let path = format!("{}.lua", module.replace('.', "/"));
-        self.find(module, None, &[format!("scripts/{path}"), format!("suites/{path}"), path.clone()]).map_err(
-            |problem| match problem {
-                Problem::Frozen => format!(
-                    "require {module:?}: the module was not loaded when the plan was made; \
-                     require it at the top of the file"
-                ),
-                Problem::Missing => format!(
-                    "require {module:?}: no {path} in {} nor in the standard library{}",
-                    self.places(),
-                    self.close_module(module).map(|m| format!("; did you mean {m:?}?")).unwrap_or_default()
-                ),
-                Problem::Other(text) => format!("require {module:?}: {text}"),
-            },
-        )
+        let candidates = [format!("scripts/{path}"), format!("suites/{path}"), path.clone()];
+        let late = || LibraryError::LateModule(module.into());
+        match self.find(module, None, &candidates, late) {
+            Ok(Some(file)) => Ok(file),
+            Ok(None) => {
+                let names: Vec<String> = ["scripts", "suites", "assets"].into_iter().flat_map(module_names).collect();
+                let close = suggest(module, names.iter().map(String::as_str));
+                let suggestion = close.map_or(String::new(), |close| format!("; did you mean {close:?}?"));
+                Err(LibraryError::NoModule { module: module.into(), path, roots: self.root_names(), suggestion })
+            }
+            Err(late @ LibraryError::LateModule(_)) => Err(late),
+            Err(source) => Err(LibraryError::Module { module: module.into(), source: source.into() }),
+        }
     }
 
     /// Finds a data file (a mesh) by its relative path: next to the Lua file `requester` first, then below the roots.
-    pub(crate) fn data(&mut self, path: &str, requester: Option<&str>) -> Result<String, String> {
-        let inside =
+    pub(crate) fn data(&mut self, path: &str, requester: Option<&str>) -> Result<FoundFile, LibraryError> {
+        let is_inside =
             |part: &str| !part.is_empty() && part != "." && part != ".." && !part.contains(['\\', '\0', ':']);
-        if !path.split('/').all(inside) {
-            return Err(format!(
-                "{path:?} leads out of the project; give a path inside of it without \"..\""
-            ));
+        if !path.split('/').all(is_inside) {
+            return Err(LibraryError::OutsidePath(path.into()));
         }
         let folder = requester.map(|file| file.rsplit_once('/').map_or("", |(folder, _)| folder));
         let sibling =
             folder.map(|folder| if folder.is_empty() { path.to_owned() } else { format!("{folder}/{path}") });
         // No path holds a colon, so one folder's file is never taken for another's.
         let key = format!("{}:{path}", folder.unwrap_or_default());
-        self.find(&key, sibling, &[path.to_string()]).map_err(|problem| match problem {
-            Problem::Frozen => {
-                format!("{path:?} was not read when the plan was made; build the shape in the file itself")
-            }
-            Problem::Missing => match requester {
-                Some(requester) => format!("no file {path:?} next to {requester}, nor in {}", self.places()),
-                None => format!("no file {path:?} in {}", self.places()),
-            },
-            Problem::Other(text) => text,
+        let hint = "build the shape in the file itself";
+        let late = || LibraryError::LateFile { path: path.into(), hint };
+        let found = self.find(&key, sibling, &[path.to_string()], late)?;
+        found.ok_or_else(|| {
+            let searched = match requester {
+                Some(requester) => format!("next to {requester}, nor in {}", self.root_names()),
+                None => format!("in {}", self.root_names()),
+            };
+            LibraryError::NoFile { path: path.into(), searched }
         })
     }
 
     /// Finds a data file by its path from the project's root; `None` if there is no such file.
-    pub(crate) fn data_if_there(&mut self, path: &str) -> Result<Option<String>, String> {
+    pub(crate) fn optional_data(&mut self, path: &str) -> Result<Option<FoundFile>, LibraryError> {
         if self.bundle.absent.contains(path) {
             return Ok(None);
         }
-        match self.find(path, None, &[path.to_string()]) {
-            Ok(file) => Ok(Some(file)),
-            Err(Problem::Missing) => {
-                self.bundle.absent.insert(path.to_string());
-                Ok(None)
-            }
-            Err(Problem::Frozen) => Err(format!(
-                "{path:?} was not read when the plan was made; request it at the top of the file"
-            )),
-            Err(Problem::Other(text)) => Err(text),
+        let late = || LibraryError::LateFile { path: path.into(), hint: "request it at the top of the file" };
+        let found = self.find(path, None, &[path.to_string()], late)?;
+        if found.is_none() {
+            self.bundle.absent.insert(path.to_string());
         }
+        Ok(found)
     }
 
     /// Finds the file of `key`: at the path `first`, else at the first of `candidates` below the roots, on disk or embedded.
-    fn find(&mut self, key: &str, first: Option<String>, candidates: &[String]) -> Result<String, Problem> {
-        if let Some(file) = self.bundle.served.get(key) {
-            return Ok(file.clone());
+    /// `late` is the error of a frozen library for a file that was not read before.
+    fn find(
+        &mut self,
+        key: &str,
+        first: Option<String>,
+        candidates: &[String],
+        late: impl FnOnce() -> LibraryError,
+    ) -> Result<Option<FoundFile>, LibraryError> {
+        if let Some(name) = self.bundle.served.get(key) {
+            let bytes = self.bundle.files.get(name).cloned().unwrap_or_default();
+            return Ok(Some(FoundFile { name: name.clone(), bytes }));
         }
-        if self.frozen {
-            return Err(Problem::Frozen);
+        if self.is_frozen {
+            return Err(late());
         }
         // The order of candidates counts more than that of roots: require "shifts" means scripts/shifts.lua, though
         // suites/shifts.lua may be nearer. A main file is never taken for the module of its name, which it may require.
         let on_disk = candidates.iter().flat_map(|c| self.roots.iter().map(move |root| root.join(c)));
         let main = self.main.canonicalize().ok();
-        let other = |path: &PathBuf| main.is_none() || path.canonicalize().ok() != main;
-        let on_disk = first.iter().map(PathBuf::from).chain(on_disk);
-        let found = match on_disk.into_iter().find(|path| path.is_file() && other(path)) {
+        let is_other = |path: &PathBuf| main.is_none() || path.canonicalize().ok() != main;
+        let mut on_disk = first.iter().map(PathBuf::from).chain(on_disk);
+        let (name, bytes) = match on_disk.find(|path| path.is_file() && is_other(path)) {
             Some(path) => (display(&path), self.read_inside(&path)?),
             None => {
-                let all = first.iter().chain(candidates);
-                let embedded = all.into_iter().find_map(|c| Some((c.clone(), embedded(c)?.to_vec())));
-                embedded.ok_or(Problem::Missing)?
+                let mut all = first.iter().chain(candidates);
+                let Some(found) = all.find_map(|path| Some((path.clone(), embedded(path)?.to_vec()))) else {
+                    return Ok(None);
+                };
+                found
             }
         };
-        self.bundle.served.insert(key.into(), found.0.clone());
-        self.bundle.files.entry(found.0.clone()).or_insert_with(|| Source::new(found.1));
-        Ok(found.0)
+        self.bundle.served.insert(key.into(), name.clone());
+        let bytes = self.bundle.files.entry(name.clone()).or_insert_with(|| bytes.into()).clone();
+        Ok(Some(FoundFile { name, bytes }))
     }
 
     /// Reads a file unless it is a link that leads out of the roots.
-    fn read_inside(&self, path: &Path) -> Result<Vec<u8>, Problem> {
-        let real = path.canonicalize().map_err(|e| Problem::Other(format!("{}: {e}", display(path))))?;
-        let inside =
-            self.roots.iter().filter_map(|root| root.canonicalize().ok()).any(|root| real.starts_with(root));
-        if !inside {
-            return Err(Problem::Other(format!("{} is a link that leads out of the project", display(path))));
+    fn read_inside(&self, path: &Path) -> Result<Vec<u8>, LibraryError> {
+        let error = |source| LibraryError::Read { file: display(path), source };
+        let real = path.canonicalize().map_err(error)?;
+        let is_inside = |root: &PathBuf| root.canonicalize().is_ok_and(|root| real.starts_with(root));
+        if !self.roots.iter().any(is_inside) {
+            return Err(LibraryError::OutsideLink(display(path)));
         }
-        read(path).map_err(|e| Problem::Other(format!("{}: {e}", display(path))))
+        read(path).map_err(error)
     }
 
-    fn places(&self) -> String {
+    fn root_names(&self) -> String {
         let names: Vec<_> = self.roots.iter().map(|root| format!("{:?}", display(root))).collect();
         names.join(", ")
     }
-
-    fn close_module(&self, module: &str) -> Option<String> {
-        let mut names = Vec::new();
-        for (dir, strip) in [(&SCRIPTS, true), (&SUITES, true), (&ASSETS, false)] {
-            collect(dir, &mut names);
-            if !strip {
-                names.iter_mut().filter(|n| !n.contains('.')).for_each(|n| *n = format!("assets.{n}"));
-            }
-        }
-        suggest(module, names.iter().map(String::as_str)).map(str::to_string)
-    }
 }
 
-enum Problem {
-    Frozen,
-    Missing,
-    Other(String),
-}
-
-fn collect(dir: &Dir<'_>, names: &mut Vec<String>) {
-    for file in dir.files() {
-        if let Some(stem) = file.path().to_str().and_then(|p| p.strip_suffix(".lua")) {
-            names.push(stem.replace('/', "."));
-        }
-    }
-    dir.dirs().for_each(|inner| collect(inner, names));
+/// The folder of a path; `.` if the path has none.
+fn folder_of(path: &Path) -> PathBuf {
+    path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new(".")).to_path_buf()
 }
 
 /// Text of a file of the embedded library by its path in the repository (`suites/…`, `scripts/…`, `assets/…`).
 pub fn embedded(path: &str) -> Option<&'static [u8]> {
     let (tree, rest) = path.split_once('/')?;
-    let dir = match tree {
-        "scripts" => &SCRIPTS,
-        "suites" => &SUITES,
-        "assets" => &ASSETS,
-        _ => return None,
-    };
+    let (_, dir) = EMBEDDED.iter().find(|(name, _)| *name == tree)?;
     dir.get_file(rest).map(include_dir::File::contents)
 }
 
 /// Paths of the embedded Lua files of a tree (`suites`, `scripts` or `assets`, or a folder of one), sorted.
 pub fn embedded_scripts(tree: &str) -> Vec<String> {
+    fn collect(root: &str, dir: &Dir<'_>, paths: &mut Vec<String>) {
+        let files = dir.files().filter_map(|file| file.path().to_str());
+        paths.extend(files.filter(|path| path.ends_with(".lua")).map(|path| format!("{root}/{path}")));
+        dir.dirs().for_each(|inner| collect(root, inner, paths));
+    }
     let (root, folder) = tree.split_once('/').map_or((tree, None), |(root, folder)| (root, Some(folder)));
-    let whole = match root {
-        "scripts" => &SCRIPTS,
-        "suites" => &SUITES,
-        "assets" => &ASSETS,
-        _ => return Vec::new(),
-    };
-    let Some(dir) = folder.map_or(Some(whole), |folder| whole.get_dir(folder)) else { return Vec::new() };
-    let mut names = Vec::new();
-    collect(dir, &mut names);
-    names.iter_mut().for_each(|name| *name = format!("{root}/{}.lua", name.replace('.', "/")));
-    names.sort();
-    names
+    let whole = EMBEDDED.iter().find(|(name, _)| *name == root).map(|(_, dir)| dir);
+    let mut paths = Vec::new();
+    if let Some(dir) = whole.and_then(|whole| folder.map_or(Some(whole), |folder| whole.get_dir(folder))) {
+        collect(root, dir, &mut paths);
+    }
+    paths.sort();
+    paths
 }
 
-fn read(path: &Path) -> std::io::Result<Vec<u8>> {
+/// Names by which the embedded Lua files of a tree are required.
+fn module_names(tree: &str) -> Vec<String> {
+    let name = |path: &String| {
+        let path = path.trim_end_matches(".lua");
+        path.strip_prefix("scripts/").or(path.strip_prefix("suites/")).unwrap_or(path).replace('/', ".")
+    };
+    embedded_scripts(tree).iter().map(name).collect()
+}
+
+fn read(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     // The size of a pipe or a device is only known once it is read.
     fs::File::open(path)?.take(MAX_BYTES + 1).read_to_end(&mut bytes)?;
     match bytes.len() as u64 > MAX_BYTES {
-        true => Err(std::io::Error::other(format!("is larger than {} MiB", MAX_BYTES >> 20))),
+        true => Err(io::Error::other(format!("is larger than {} MiB", MAX_BYTES >> 20))),
         false => Ok(bytes),
     }
 }
@@ -318,7 +292,7 @@ fn read_main(main: &Path, name: &str) -> Result<Vec<u8>, ScriptError> {
     }
     match read(main) {
         Ok(bytes) => Ok(bytes),
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => match embedded(name) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => match embedded(name) {
             Some(bytes) => Ok(bytes.to_vec()),
             None => Err(missing(main, name)),
         },
@@ -329,8 +303,7 @@ fn read_main(main: &Path, name: &str) -> Result<Vec<u8>, ScriptError> {
 fn missing(main: &Path, name: &str) -> ScriptError {
     let mut known: Vec<String> =
         ["scripts", "suites"].iter().flat_map(|tree| embedded_scripts(tree)).collect();
-    let folder = main.parent().filter(|p| *p != Path::new("")).unwrap_or(Path::new("."));
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let entries = fs::read_dir(folder_of(main)).into_iter().flatten().flatten();
     known.extend(entries.map(|e| display(&e.path())).filter(|n| n.ends_with(".lua")));
     let error = ScriptError::new(name, "no such file");
     match suggest(name, known.iter().map(String::as_str)) {
@@ -342,12 +315,13 @@ fn missing(main: &Path, name: &str) -> ScriptError {
 /// The source text of a file: UTF-8, not byte code, with a `#!` line turned into a comment.
 pub(crate) fn lua_text(file: &str, bytes: &[u8]) -> Result<String, ScriptError> {
     if bytes.first() == Some(&0x1b) {
-        return Err(ScriptError::new(file, "is compiled byte code; only Lua source text is run")
-            .hint("give the .lua file that it was compiled from"));
+        let error = ScriptError::new(file, "is compiled byte code; only Lua source text is run");
+        return Err(error.hint("give the .lua file that it was compiled from"));
     }
     let text = std::str::from_utf8(bytes).map_err(|e| {
         let line = bytes[..e.valid_up_to()].iter().filter(|b| **b == b'\n').count() + 1;
-        ScriptError::new(file, "is not UTF-8 text").at(Some(line)).hint("save the file as UTF-8")
+        let place = SourceLine { file: file.to_owned(), line };
+        ScriptError::new(file, "is not UTF-8 text").at(Some(place)).hint("save the file as UTF-8")
     })?;
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     Ok(if text.starts_with("#!") { format!("--{text}") } else { text.to_string() })

@@ -19,17 +19,21 @@ use std::{
 };
 
 use mlua::{
-    FromLuaMulti, Function, IntoLuaMulti, Lua, LuaOptions, MultiValue, StdLib, Table, Value, chunk::ChunkMode,
+    FromLuaMulti, Function, IntoLuaMulti, Lua, LuaOptions, LuaString, MultiValue, StdLib, Table, Value,
+    chunk::ChunkMode,
 };
 
-use error::{Context, MainFile, RaisedObject, ScriptError, fail, here};
-use library::Library;
-use memory_budget::Budgets;
+use error::{ErrorTranslator, MainFile, RaisedObject, ScriptError, app_data, current_line, fail};
+use library::{Library, SharedLibrary, lua_text};
+use memory_budget::MemoryUse;
 use random::MathRandom;
 use value::{describe, literal};
 use watchdog::{Clock, Deadline, OnStuck};
 
-use crate::parallel::lock;
+use crate::{
+    parallel::lock,
+    text::{eprint_line, escape_control},
+};
 
 /// Bytes that a virtual machine may print; later output is dropped.
 const MAX_PRINTED_BYTES: usize = 1 << 20;
@@ -58,6 +62,12 @@ pub struct Limits {
     pub print: PrintSink,
 }
 
+impl std::fmt::Debug for Limits {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Limits").field("memory_bytes", &self.memory_bytes).finish_non_exhaustive()
+    }
+}
+
 static STUCK_HANDLER: OnceLock<OnStuck> = OnceLock::new();
 
 /// Sets what happens if a library function of Lua (such as `string.find` with a hostile pattern) never returns. Nothing can
@@ -78,21 +88,31 @@ impl Default for Limits {
             grace: Duration::from_millis(1500),
             on_stuck: Arc::new(|message| match STUCK_HANDLER.get() {
                 Some(handler) => handler(message),
-                None => crate::text::eprint_line(message),
+                None => eprint_line(message),
             }),
-            print: Arc::new(|text| crate::text::eprint_line(&crate::text::escape_control(text))),
+            print: Arc::new(|text| eprint_line(&escape_control(text))),
         }
     }
 }
 
-/// State that callbacks of a virtual machine share.
+/// State that the callbacks of a virtual machine share.
 struct VmState {
     main: String,
-    library: Arc<Mutex<Library>>,
+    library: SharedLibrary,
     raised: Mutex<Option<RaisedObject>>,
     /// Bytes that `print` may still write.
     printable: AtomicUsize,
     limits: Limits,
+}
+
+impl VmState {
+    /// Translates an error of the virtual machine for the author of the script.
+    fn explain(&self, error: &mlua::Error) -> ScriptError {
+        let files: Vec<String> = lock(&self.library).bundle.files.keys().cloned().collect();
+        let raised = lock(&self.raised).clone();
+        let memory_bytes = self.limits.memory_bytes;
+        ErrorTranslator { main: &self.main, files: &files, raised, memory_bytes }.explain(error)
+    }
 }
 
 /// A sandboxed virtual machine.
@@ -101,75 +121,69 @@ pub(crate) struct Vm {
     pub random: MathRandom,
     /// The global table `softvt`.
     pub api: Table,
+    pub library: SharedLibrary,
     clock: Clock,
-    shared: Arc<VmState>,
+    state: Arc<VmState>,
 }
 
 impl Vm {
     /// A virtual machine that reads from `library`; errors without a position name the file `main`.
     pub(crate) fn new(main: &str, library: Library, limits: &Limits) -> Result<Self, ScriptError> {
-        let shared = Arc::new(VmState {
+        let state = Arc::new(VmState {
             main: main.into(),
             library: Arc::new(Mutex::new(library)),
             raised: Mutex::new(None),
             printable: AtomicUsize::new(MAX_PRINTED_BYTES),
             limits: limits.clone(),
         });
-        Self::build(&shared).map_err(|e| explain(&shared, &e))
+        Self::build(&state).map_err(|e| state.explain(&e))
     }
 
-    fn build(shared: &Arc<VmState>) -> mlua::Result<Self> {
+    fn build(state: &Arc<VmState>) -> mlua::Result<Self> {
         let libs = StdLib::COROUTINE | StdLib::TABLE | StdLib::STRING | StdLib::UTF8 | StdLib::MATH;
         let lua = Lua::new_with(libs, LuaOptions::default())?;
-        let clock = Clock::default();
-        lua.set_memory_limit(shared.limits.memory_bytes)?;
-        lua.set_app_data(shared.clone());
-        lua.set_app_data(MainFile(shared.main.clone()));
-        lua.set_app_data(shared.library.clone());
-        lua.set_app_data(Budgets::default());
+        let VmState { main, library, limits, .. } = &**state;
+        let clock = Clock::new(main, limits.grace, limits.on_stuck.clone());
+        lua.set_memory_limit(limits.memory_bytes)?;
+        lua.set_app_data(state.clone());
+        lua.set_app_data(MainFile(main.clone()));
+        lua.set_app_data(library.clone());
+        lua.set_app_data(MemoryUse::default());
         lua.set_app_data(clock.clone());
-        let api = lua.create_table()?;
-        let host = lua.create_table()?;
-        host.set("raised", lua.create_function(note_raised)?)?;
-        host.set("words", lua.create_function(error_text)?)?;
+        let (api, host, globals) = (lua.create_table()?, lua.create_table()?, lua.globals());
+        host.set("raised", lua.create_function(record_raised_object)?)?;
+        host.set("error_text", lua.create_function(error_text)?)?;
         host.set("list", lua.create_function(iterable)?)?;
-        lua.load(include_str!("prelude.lua"))
-            .set_name("=softvt")
-            .set_mode(ChunkMode::Text)
-            .call::<()>(&host)?;
+        let prelude = lua.load(include_str!("prelude.lua")).set_name("=softvt").set_mode(ChunkMode::Text);
+        prelude.call::<()>(&host)?;
         api.set("sorted", host.get::<Function>("sorted")?)?;
         withhold(&lua)?;
-        let tostring: Function = lua.globals().get("tostring")?;
-        let print = lua.create_function(move |lua, values: MultiValue| print(lua, &tostring, values))?;
-        lua.globals().set("print", print)?;
-        keep_base_library(&lua)?;
-        lua.globals().set("load", lua.create_function(load)?)?;
+        let tostring: Function = globals.get("tostring")?;
+        globals.set("print", lua.create_function(move |lua, values| print(lua, &tostring, values))?)?;
+        store_base_library(&lua)?;
+        globals.set("load", lua.create_function(load)?)?;
         let loaded = lua.create_table()?;
-        let require = lua.create_function(move |lua, name: Value| require(lua, &loaded, &name))?;
-        lua.globals().set("require", require)?;
+        globals.set("require", lua.create_function(move |lua, name| require(lua, &loaded, &name))?)?;
         let random = MathRandom::install(&lua)?;
-        lua.globals().set("softvt", &api)?;
+        globals.set("softvt", &api)?;
         clock.install(&lua)?;
-        Ok(Self { lua, clock, random, shared: shared.clone(), api })
+        Ok(Self { lua, clock, random, library: library.clone(), state: state.clone(), api })
     }
 
     /// The main file, as messages name it.
     pub(crate) fn main(&self) -> &str {
-        &self.shared.main
+        &self.state.main
     }
 
-    pub(crate) fn library(&self) -> &Mutex<Library> {
-        &self.shared.library
-    }
-
-    /// Runs the main file and returns its results.
-    pub(crate) fn run_main(&self) -> Result<MultiValue, ScriptError> {
+    /// Runs the main file and returns its first result.
+    pub(crate) fn run_main(&self) -> Result<Option<Value>, ScriptError> {
         let main = self.main();
-        let text = lock(self.library()).text(main)?;
-        let _deadline = self.deadline(self.shared.limits.load);
+        let text = lock(&self.library).text(main)?;
+        let _deadline = self.clock.start(self.state.limits.load);
         let chunk = self.lua.load(text).set_name(format!("@{main}")).set_mode(ChunkMode::Text);
         // Not `eval`, which would first try the text as an expression and lose the frame of `error(…)` in a tail call.
-        chunk.call(()).map_err(|e| self.explain(&e))
+        let results = chunk.call::<MultiValue>(()).map_err(|e| self.explain(&e))?;
+        Ok(results.into_iter().next())
     }
 
     /// Calls a function of the script within the time of one call.
@@ -182,48 +196,20 @@ impl Vm {
         function.call(args).map_err(|e| self.explain(&e))
     }
 
-    /// Calls a function of an experiment within the time of one point.
-    pub(crate) fn call_point<R: FromLuaMulti>(
-        &self,
-        function: &Function,
-        args: impl IntoLuaMulti,
-    ) -> Result<R, ScriptError> {
-        let _deadline = self.deadline(self.shared.limits.point);
-        function.call(args).map_err(|e| self.explain(&e))
-    }
-
     /// Starts the time of one call.
     pub(crate) fn call_deadline(&self) -> Deadline {
-        self.deadline(self.shared.limits.call)
+        self.clock.start(self.state.limits.call)
     }
 
-    fn deadline(&self, limit: Duration) -> Deadline {
-        let limits = &self.shared.limits;
-        self.clock.start(limit, limits.grace, &self.shared.main, limits.on_stuck.clone())
+    /// Starts the time of one point of an experiment.
+    pub(crate) fn point_deadline(&self) -> Deadline {
+        self.clock.start(self.state.limits.point)
     }
 
     /// Translates an error of the virtual machine for the author of the script.
     pub(crate) fn explain(&self, error: &mlua::Error) -> ScriptError {
-        explain(&self.shared, error)
+        self.state.explain(error)
     }
-}
-
-fn explain(shared: &VmState, error: &mlua::Error) -> ScriptError {
-    let files = lock(&shared.library).names();
-    let raised = lock(&shared.raised).clone();
-    let context =
-        Context { main: &shared.main, files: &files, raised, memory_bytes: shared.limits.memory_bytes };
-    context.explain(error)
-}
-
-fn shared(lua: &Lua) -> mlua::Result<Arc<VmState>> {
-    let shared = lua.app_data_ref::<Arc<VmState>>().map(|shared| Arc::clone(&shared));
-    shared.ok_or_else(|| mlua::Error::runtime("the virtual machine has no shared state"))
-}
-
-/// The clock of a virtual machine, which bindings pause while they work in Rust.
-pub(crate) fn clock(lua: &Lua) -> Clock {
-    lua.app_data_ref::<Clock>().map(|clock| clock.clone()).unwrap_or_default()
 }
 
 /// Removes functions that reach the outside or the machine's own state.
@@ -236,7 +222,7 @@ fn withhold(lua: &Lua) -> mlua::Result<()> {
 }
 
 /// Stores a copy of the base library out of the reach of scripts, for the library's own Lua code.
-fn keep_base_library(lua: &Lua) -> mlua::Result<()> {
+fn store_base_library(lua: &Lua) -> mlua::Result<()> {
     let base = lua.create_table()?;
     for entry in lua.globals().pairs::<Value, Value>() {
         let (name, value) = entry?;
@@ -257,20 +243,15 @@ pub(crate) fn base_library(lua: &Lua) -> mlua::Result<Table> {
 }
 
 fn print(lua: &Lua, tostring: &Function, values: MultiValue) -> mlua::Result<()> {
-    let shared = shared(lua)?;
-    let mut line = String::new();
-    for (index, value) in values.into_iter().enumerate() {
-        if index > 0 {
-            line.push('\t');
-        }
-        line.push_str(&tostring.call::<mlua::LuaString>(value)?.to_string_lossy());
-    }
-    let left = shared.printable.load(Ordering::Relaxed);
+    let state = app_data::<Arc<VmState>>(lua)?;
+    let texts = values.into_iter().map(|value| Ok(tostring.call::<LuaString>(value)?.to_string_lossy()));
+    let line = texts.collect::<mlua::Result<Vec<_>>>()?.join("\t");
+    let left = state.printable.load(Ordering::Relaxed);
     if line.len() < left {
-        shared.printable.store(left - line.len() - 1, Ordering::Relaxed);
-        (shared.limits.print)(&line);
-    } else if shared.printable.swap(0, Ordering::Relaxed) > 0 {
-        (shared.limits.print)(&format!(
+        state.printable.store(left - line.len() - 1, Ordering::Relaxed);
+        (state.limits.print)(&line);
+    } else if state.printable.swap(0, Ordering::Relaxed) > 0 {
+        (state.limits.print)(&format!(
             "… the script prints more than {} MiB; the rest is left out",
             MAX_PRINTED_BYTES >> 20
         ));
@@ -279,47 +260,44 @@ fn print(lua: &Lua, tostring: &Function, values: MultiValue) -> mlua::Result<()>
 }
 
 /// `load(chunk [, name [, mode [, env]]])` for text alone; as in Lua, a bad chunk gives nil and the message.
-fn load(lua: &Lua, (chunk, name, _mode, env): (Value, Value, Value, Value)) -> mlua::Result<(Value, Value)> {
+fn load(
+    lua: &Lua,
+    (chunk, name, _mode, env): (Value, Value, Value, Value),
+) -> mlua::Result<(Option<Function>, Option<String>)> {
+    let wrong = |expected: &str, value: &Value| {
+        Err(fail(lua, format!("load: expected {expected}, got {}", describe(value))))
+    };
+    let mut bytes = Vec::new();
     let name = match name {
         Value::Nil => "=(load)".to_owned(),
         Value::String(name) => name.to_string_lossy(),
-        other => {
-            return Err(fail(lua, format!("load: expected a string as name, got {}", describe(&other))));
-        }
+        other => return wrong("a string as name", &other),
     };
-    let env = match env {
-        Value::Nil => None,
-        Value::Table(env) => Some(env),
-        other => {
-            return Err(fail(lua, format!("load: expected a table as env, got {}", describe(&other))));
-        }
-    };
-    let mut bytes = Vec::new();
+    if !matches!(env, Value::Nil | Value::Table(_)) {
+        return wrong("a table as env", &env);
+    }
     match chunk {
         Value::String(text) => bytes.extend_from_slice(&text.as_bytes()),
-        Value::Function(pieces) => loop {
-            match pieces.call::<Value>(())? {
-                Value::String(piece) if !piece.as_bytes().is_empty() => {
-                    bytes.extend_from_slice(&piece.as_bytes())
-                }
-                _ => break,
+        Value::Function(pieces) => {
+            while let Value::String(piece) = pieces.call::<Value>(())?
+                && !piece.as_bytes().is_empty()
+            {
+                bytes.extend_from_slice(&piece.as_bytes());
             }
-        },
-        other => {
-            return Err(fail(lua, format!("load: expected a string or function, got {}", describe(&other))));
         }
+        other => return wrong("a string or function", &other),
     }
-    let refusal = |text: String| Ok((Value::Nil, Value::String(lua.create_string(text)?)));
     if bytes.first() == Some(&0x1b) {
-        return refusal("load: compiled byte code is refused; only Lua source text is run".into());
+        let message = "load: compiled byte code is refused; only Lua source text is run";
+        return Ok((None, Some(message.to_owned())));
     }
-    let mut built = lua.load(bytes).set_name(name).set_mode(ChunkMode::Text);
-    if let Some(env) = env {
-        built = built.set_environment(env);
+    let mut chunk = lua.load(bytes).set_name(name).set_mode(ChunkMode::Text);
+    if let Value::Table(env) = env {
+        chunk = chunk.set_environment(env);
     }
-    match built.into_function() {
-        Ok(function) => Ok((Value::Function(function), Value::Nil)),
-        Err(mlua::Error::SyntaxError { message, .. }) => refusal(message),
+    match chunk.into_function() {
+        Ok(function) => Ok((Some(function), None)),
+        Err(mlua::Error::SyntaxError { message, .. }) => Ok((None, Some(message))),
         Err(other) => Err(other),
     }
 }
@@ -329,32 +307,29 @@ fn require(lua: &Lua, loaded: &Table, name: &Value) -> mlua::Result<Value> {
         return Err(fail(lua, format!("require: expected a module name, got a {}", name.type_name())));
     };
     let name = name.to_string_lossy();
-    let (file, text) = {
-        let library = library::of(lua)?;
-        let mut library = lock(&library);
-        let file = library.module(&name).map_err(|message| fail(lua, message))?;
-        let text = library.text(&file).map_err(mlua::Error::external)?;
-        (file, text)
-    };
-    match loaded.get::<Value>(file.as_str())? {
+    let library = app_data::<SharedLibrary>(lua)?;
+    let file = lock(&library).module(&name).map_err(|error| fail(lua, error.to_string()))?;
+    let text = lua_text(&file.name, &file.bytes).map_err(mlua::Error::external)?;
+    let file = file.name.as_str();
+    match loaded.get::<Value>(file)? {
         Value::Nil => {}
         Value::Boolean(false) => {
             return Err(fail(lua, format!("require {name:?}: the modules require each other in a circle")));
         }
         value => return Ok(value),
     }
-    loaded.set(file.as_str(), false)?;
+    loaded.set(file, false)?;
     let chunk = lua.load(text).set_name(format!("@{file}")).set_mode(ChunkMode::Text);
     let value = match chunk.call::<Value>(name) {
         Ok(Value::Nil | Value::Boolean(false)) => Value::Boolean(true),
         Ok(value) => value,
         Err(error) => {
             // A second attempt (inside a pcall) must fail in the same way, not as a circle.
-            loaded.set(file.as_str(), Value::Nil)?;
+            loaded.set(file, Value::Nil)?;
             return Err(error);
         }
     };
-    loaded.set(file.as_str(), &value)?;
+    loaded.set(file, &value)?;
     Ok(value)
 }
 
@@ -369,13 +344,13 @@ fn iterable(lua: &Lua, (label, value): (String, Value)) -> mlua::Result<Value> {
 /// The text of an error of the host; any other value as it is.
 fn error_text(lua: &Lua, value: Value) -> mlua::Result<Value> {
     let Value::Error(error) = &value else { return Ok(value) };
-    let text = explain(&*shared(lua)?, error).to_string();
+    let text = app_data::<Arc<VmState>>(lua)?.explain(error).to_string();
     lua.create_string(text).map(Value::String)
 }
 
 /// Keeps a description of an error object, of which Lua would only keep the address.
-fn note_raised(lua: &Lua, object: Value) -> mlua::Result<()> {
-    let description = literal(&object, 0);
-    *lock(&shared(lua)?.raised) = Some(RaisedObject { description, file: here(lua) });
+fn record_raised_object(lua: &Lua, object: Value) -> mlua::Result<()> {
+    let raised = RaisedObject { description: literal(&object, 0), place: current_line(lua) };
+    *lock(&app_data::<Arc<VmState>>(lua)?.raised) = Some(raised);
     Ok(())
 }

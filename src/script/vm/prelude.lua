@@ -46,14 +46,14 @@ function error(object, level)
 end
 
 -- Errors of the host are objects; scripts get their text, as of any other error.
-local function answer(ok, ...)
+local function with_error_text(ok, ...)
   if ok then return true, ... end
-  return false, host.words((...))
+  return false, host.error_text((...))
 end
 
-function pcall(...) return answer(raw_pcall(...)) end
-function coroutine.resume(...) return answer(raw_resume(...)) end
-function coroutine.close(...) return answer(raw_close(...)) end
+function pcall(...) return with_error_text(raw_pcall(...)) end
+function coroutine.resume(...) return with_error_text(raw_resume(...)) end
+function coroutine.close(...) return with_error_text(raw_close(...)) end
 local pcall = pcall
 
 -- A handler that runs at the place of the error would run inside the hook that enforces the time limit, where no hook

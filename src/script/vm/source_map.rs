@@ -3,11 +3,13 @@
 //! Lua knows the line of a running call. The line of a single key, and the origin of a table whose call is over, are
 //! recovered here: by a note at every constructor call, and by a search in the source text.
 
+use std::sync::{Arc, Mutex};
+
 use mlua::{Lua, Table};
 
 use super::{
-    error::{ScriptError, fail, here},
-    library,
+    error::{SourceLine, app_data, current_line, fail_at},
+    library::Library,
 };
 use crate::parallel::lock;
 
@@ -16,7 +18,7 @@ const ORIGINS: &str = "softvt origins";
 
 /// Notes that the running call of the script makes `table`.
 pub(crate) fn record_origin(lua: &Lua, table: &Table) -> mlua::Result<()> {
-    let Some((file, line)) = here(lua) else { return Ok(()) };
+    let Some(line) = current_line(lua) else { return Ok(()) };
     let origins = match lua.named_registry_value::<Table>(ORIGINS) {
         Ok(origins) => origins,
         Err(_) => {
@@ -27,40 +29,34 @@ pub(crate) fn record_origin(lua: &Lua, table: &Table) -> mlua::Result<()> {
             origins
         }
     };
-    origins.raw_set(table, format!("{file}:{line}"))
+    origins.raw_set(table, line.to_string())
 }
 
-/// File and line of the key at `path` in the call that made `table`, or of that call.
-fn origin_of_key(lua: &Lua, table: &Table, path: &[&str]) -> Option<(String, usize)> {
+/// Line of the key at `path` in the call that made `table`, or of that call.
+pub(crate) fn origin_of_key(lua: &Lua, table: &Table, path: &[&str]) -> Option<SourceLine> {
     let origins = lua.named_registry_value::<Table>(ORIGINS).ok()?;
     let origin: String = origins.raw_get::<Option<String>>(table).ok()??;
     let (file, line) = origin.rsplit_once(':')?;
-    let path: Vec<String> = path.iter().map(|&key| key.to_owned()).collect();
-    Some((file.to_owned(), line_of_key(lua, file, line.parse().ok()?, &path)))
-}
-
-/// `file:line` of the key at `path` in the call that made `table`.
-pub(crate) fn place_of_key(lua: &Lua, table: &Table, path: &[&str]) -> Option<String> {
-    origin_of_key(lua, table, path).map(|(file, line)| format!("{file}:{line}"))
+    Some(find_key(lua, SourceLine { file: file.to_owned(), line: line.parse().ok()? }, path))
 }
 
 /// An error at the line of `key` in the call that made `table`.
 pub(crate) fn fail_at_key(lua: &Lua, table: &Table, key: &str, message: impl Into<String>) -> mlua::Error {
-    match origin_of_key(lua, table, &[key]) {
-        Some((file, line)) => mlua::Error::external(ScriptError::new(&file, message).at(Some(line))),
-        None => fail(lua, message),
+    fail_at(lua, origin_of_key(lua, table, &[key]).or_else(|| current_line(lua)), message)
+}
+
+/// The line of the key at `path` in the table of the call on `call`, or that line.
+pub(crate) fn find_key(lua: &Lua, call: SourceLine, path: &[impl AsRef<str>]) -> SourceLine {
+    let library = app_data::<Arc<Mutex<Library>>>(lua).ok();
+    match library.and_then(|library| lock(&library).text(&call.file).ok()) {
+        Some(text) => SourceLine { line: find_key_in_text(&text, call.line, path), ..call },
+        None => call,
     }
 }
 
-/// The line of the key at `path` in the table of the call on `line` of a file, or `line`.
-pub(crate) fn line_of_key(lua: &Lua, file: &str, line: usize, path: &[String]) -> usize {
-    let text = library::of(lua).ok().and_then(|library| lock(&library).text(file).ok());
-    text.map_or(line, |text| find_key(&text, line, path))
-}
-
 /// The line of the last key of `path` that the table opening on or after `line` has; `line` if it has none.
-fn find_key(text: &str, line: usize, path: &[String]) -> usize {
-    let mut keys = path.iter().filter(|key| !key.starts_with('[')).peekable();
+fn find_key_in_text(text: &str, line: usize, path: &[impl AsRef<str>]) -> usize {
+    let mut keys = path.iter().map(AsRef::as_ref).filter(|key: &&str| !key.starts_with('[')).peekable();
     let (mut depth, mut found) = (0usize, line);
     for (offset, row) in text.lines().skip(line.saturating_sub(1)).enumerate() {
         let row = without_strings(row);
@@ -77,7 +73,7 @@ fn find_key(text: &str, line: usize, path: &[String]) -> usize {
             if let Some(key) = keys.peek()
                 && depth > 0
                 && starts_word
-                && rest.strip_prefix(key.as_str()).is_some_and(is_assignment)
+                && rest.strip_prefix(*key).is_some_and(is_assignment)
             {
                 found = line + offset;
                 keys.next();
@@ -127,9 +123,8 @@ mod tests {
     fn nested_keys_are_found_past_strings_and_comments() {
         let text =
             "local x = 1\nreturn f {\n  a = \"} b = 2\", -- } c = 3\n  b = {\n    c = 4,\n  },\n}\nc = 5\n";
-        let path = |keys: &[&str]| keys.iter().map(|k| k.to_string()).collect::<Vec<_>>();
-        assert_eq!(find_key(text, 2, &path(&["b", "c"])), 5);
-        assert_eq!(find_key(text, 2, &path(&["a"])), 3);
-        assert_eq!(find_key(text, 2, &path(&["missing"])), 2);
+        assert_eq!(find_key_in_text(text, 2, &["b", "c"]), 5);
+        assert_eq!(find_key_in_text(text, 2, &["a"]), 3);
+        assert_eq!(find_key_in_text(text, 2, &["missing"]), 2);
     }
 }
