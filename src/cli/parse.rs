@@ -112,12 +112,8 @@ fn script_arg_id(option: &OptionSpec) -> String {
 
 fn script_arg(option: &OptionSpec) -> Arg {
     let default = match &option.default {
-        OptionValue::Number(n) => n.to_string(),
-        OptionValue::Integer(n) => n.to_string(),
         OptionValue::Text(text) => format!("{text:?}"),
-        OptionValue::Flag(on) => if *on { "on" } else { "off" }.to_owned(),
-        OptionValue::Numbers(list) => list.iter().map(f64::to_string).collect::<Vec<_>>().join(","),
-        OptionValue::Texts(list) => list.join(","),
+        other => other.to_string(),
     };
     let arg = Arg::new(script_arg_id(option))
         .long(option.flag().trim_start_matches("--").to_owned())

@@ -18,7 +18,7 @@ pub use plan::{
     profile_file::load_profile,
 };
 pub use run::{
-    episode::{EpisodeSetup, InitialScenes, SceneBuilder, ShiftError, check_shift},
+    episode::{EpisodeSetup, SceneBuilder, ShiftError, check_shift},
     experiment::{Experiment, ExperimentRow, ExperimentSummary},
     expert::{ExpertController, GripMode},
 };

@@ -3,8 +3,8 @@
 use rmpv::Value;
 
 use super::{
-    catalog::{RequestError, ServerConfig},
-    episode_state::{ActionRow, EpisodeState},
+    config::{RequestError, ServerConfig},
+    state::{ActionRow, EpisodeState},
 };
 use crate::{
     evaluation::episode_id::{EpisodeId, Split},
@@ -94,9 +94,8 @@ impl Request {
 const EPISODE_FIELDS: [&str; 5] = ["suite", "task", "episode", "seed", "split"];
 
 fn episode_id(fields: &RequestFields, config: &ServerConfig) -> Result<EpisodeId, RequestError> {
-    let prefixed = |error: RequestError| fields.error(&error.0);
     let suite = fields.text("suite")?;
-    let suite = config.suite(suite.as_deref()).map_err(prefixed)?.name.clone();
+    let suite = config.suite(suite.as_deref()).map_err(|error| fields.error(&error.to_string()))?;
     let task = fields.required("task", fields.integer("task", u64::from(u32::MAX))?)? as usize;
     let episode = fields.required("episode", fields.integer("episode", u64::from(u32::MAX))?)? as u32;
     let base_seed = fields.integer("seed", u64::MAX)?.unwrap_or(config.seed);
@@ -106,9 +105,12 @@ fn episode_id(fields: &RequestFields, config: &ServerConfig) -> Result<EpisodeId
             .parse::<Split>()
             .map_err(|error| fields.error(&format!("split is {:?}; {error}", shortened(&name))))?,
     };
-    let id = EpisodeId { suite, task, episode, base_seed, split };
-    config.task(&id).map_err(prefixed)?;
-    Ok(id)
+    if !suite.tasks.iter().any(|known| known.id == task) {
+        let last = suite.tasks.len().saturating_sub(1);
+        let message = format!("task {task}: suite {} has the tasks 0 to {last}", suite.name);
+        return Err(fields.error(&message));
+    }
+    Ok(EpisodeId { suite: suite.name.clone(), task, episode, base_seed, split })
 }
 
 fn step(fields: &RequestFields) -> Result<Request, RequestError> {
@@ -190,7 +192,7 @@ impl<'a> RequestFields<'a> {
     }
 
     fn error(&self, what: &str) -> RequestError {
-        RequestError(format!("{}: {what}", self.context))
+        RequestError::Invalid(format!("{}: {what}", self.context))
     }
 
     /// Value of a field, `None` if it is absent or nil.
@@ -220,7 +222,7 @@ impl<'a> RequestFields<'a> {
         });
         let fits = found.filter(|number| *number <= most);
         let error =
-            || self.error(&format!("{name} is {}; expected a whole number in 0..{most}", shown(value)));
+            || self.error(&format!("{name} is {}; expected a whole number in 0..{most}", quote(value)));
         fits.map(Some).ok_or_else(error)
     }
 }
@@ -241,7 +243,7 @@ fn shortened(text: &str) -> String {
 }
 
 /// A value, for messages.
-fn shown(value: &Value) -> String {
+fn quote(value: &Value) -> String {
     match value {
         Value::Integer(_) | Value::F32(_) | Value::F64(_) | Value::Boolean(_) => value.to_string(),
         Value::String(_) | Value::Binary(_) => format!("{:?}", shortened(&text(value).unwrap_or_default())),

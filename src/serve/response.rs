@@ -4,12 +4,12 @@ use rmpv::Value;
 use serde_json::{Map, json};
 
 use super::{
-    catalog::{RequestError, ServerConfig},
-    live_episode::LiveEpisode,
+    config::{RequestError, ServerConfig},
     spaces,
+    state::LiveEpisode,
 };
 use crate::{
-    benchmark::CONTROL_DT,
+    benchmark::{CONTROL_DT, Task},
     evaluation::record::Outcome,
     policy::{
         Observation,
@@ -37,16 +37,12 @@ pub(super) fn error(message: &str) -> Value {
 /// The first message to every client: suites, tasks, and the spaces of observations and actions. `first` is the first
 /// observation of the first episode; it gives the shapes.
 pub fn hello(config: &ServerConfig, first: &Observation) -> Value {
-    let suites = config.suites.iter().map(|served| {
-        let tasks =
-            served.suite.tasks.iter().map(
-                |task| json!({ "task": task.id, "prompt": task.prompt, "budget_steps": task.budget_steps }),
-            );
-        json!({
-            "name": served.name,
-            "episodes": served.suite.episodes,
-            "tasks": tasks.collect::<Vec<_>>(),
-        })
+    let suites = config.suites.iter().map(|suite| {
+        let task = |task: &Task| {
+            json!({ "task": task.id, "prompt": task.prompt, "budget_steps": task.budget_steps })
+        };
+        let tasks: Vec<_> = suite.tasks.iter().map(task).collect();
+        json!({ "name": suite.name, "episodes": suite.episodes, "tasks": tasks })
     });
     let about = json!({
         "softvt": env!("CARGO_PKG_VERSION"),
@@ -75,7 +71,7 @@ pub(super) fn transition(
     config: &ServerConfig,
     executed: Option<usize>,
 ) -> Result<Value, RequestError> {
-    let observation = live.observe(config).map_err(|e| RequestError(e.to_string()))?;
+    let observation = live.observe(config)?;
     let succeeded = live.has_succeeded();
     let reward = if executed.is_some() && succeeded { 1.0 } else { 0.0 };
     let truncated = live.episode.outcome().is_some() && !succeeded;

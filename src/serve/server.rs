@@ -2,7 +2,7 @@
 
 use std::{
     io::{self, Read, Write},
-    net::{Shutdown, SocketAddr, TcpListener, TcpStream},
+    net::{Shutdown, TcpListener, TcpStream},
     panic::{AssertUnwindSafe, catch_unwind},
     sync::atomic::{AtomicBool, AtomicUsize, Ordering},
     thread,
@@ -12,7 +12,7 @@ use std::{
 use rmpv::Value;
 
 use super::{
-    catalog::ServerConfig,
+    config::ServerConfig,
     connection::{Connection, HANDSHAKE_TIMEOUT, Incoming},
     request::Request,
     response,
@@ -31,30 +31,14 @@ const HEALTH_RESPONSE: &[u8] =
 /// Time for which incoming data is discarded after a health check.
 const HEALTH_DRAIN_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// A listening address.
-#[derive(Debug)]
-pub struct Server {
-    listener: TcpListener,
-}
-
-impl Server {
-    /// Listens at an address; port 0 means any free port.
-    ///
-    /// # Errors
-    /// The address is not local, or the port is in use.
-    pub fn open(host: &str, port: u16) -> io::Result<Self> {
-        let listener = TcpListener::bind((host, port))?;
-        listener.set_nonblocking(true)?;
-        Ok(Self { listener })
-    }
-
-    /// The address, with the port that was chosen.
-    ///
-    /// # Errors
-    /// The operating system does not return it.
-    pub fn address(&self) -> io::Result<SocketAddr> {
-        self.listener.local_addr()
-    }
+/// Listens at an address; port 0 means any free port.
+///
+/// # Errors
+/// The address is not local, or the port is in use.
+pub fn listen(host: &str, port: u16) -> io::Result<TcpListener> {
+    let listener = TcpListener::bind((host, port))?;
+    listener.set_nonblocking(true)?;
+    Ok(listener)
 }
 
 /// Data that the threads of all clients share.
@@ -67,13 +51,19 @@ struct ServerState<'a> {
 }
 
 /// Serves up to `max_clients` clients at a time until `cancel` is set. `hello` is the first message to each.
-pub fn serve(server: &Server, config: &ServerConfig, hello: Value, max_clients: usize, cancel: &AtomicBool) {
+pub fn serve(
+    listener: &TcpListener,
+    config: &ServerConfig,
+    hello: Value,
+    max_clients: usize,
+    cancel: &AtomicBool,
+) {
     let state = ServerState { config, hello, max_clients, clients: AtomicUsize::new(0), cancel };
     let connections = AtomicUsize::new(0);
     thread::scope(|scope| {
         while !cancel.load(Ordering::Relaxed) {
             // Errors are transient: the client has gone, or the process has too many open files.
-            let Ok((stream, _)) = server.listener.accept() else {
+            let Ok((stream, _)) = listener.accept() else {
                 thread::sleep(ACCEPT_POLL_INTERVAL);
                 continue;
             };
@@ -184,12 +174,12 @@ fn run_session(mut connection: Connection, state: &ServerState) {
 fn respond(session: &mut ClientSession, config: &ServerConfig, message: &Value) -> (Value, bool) {
     let request = match Request::read(message, config) {
         Ok(request) => request,
-        Err(error) => return (response::error(&error.0), false),
+        Err(error) => return (response::error(&error.to_string()), false),
     };
     let is_last = request == Request::Close;
     match catch_unwind(AssertUnwindSafe(|| session.execute(request))) {
         Ok(Ok(response)) => (response, is_last),
-        Ok(Err(error)) => (response::error(&error.0), false),
+        Ok(Err(error)) => (response::error(&error.to_string()), false),
         Err(_) => {
             session.discard_episode();
             (response::error("internal error of the server; the episode was discarded; send reset"), false)

@@ -8,11 +8,10 @@ use std::{
 use rmpv::Value;
 
 use super::{
-    catalog::{RequestError, ServerConfig},
-    episode_state::{ActionRow, EpisodeState},
-    live_episode::LiveEpisode,
+    config::{RequestError, ServerConfig},
     request::Request,
     response,
+    state::{ActionRow, EpisodeState, LiveEpisode},
 };
 use crate::{
     policy::{encode::image_array, msgpack::pack_array},
@@ -133,18 +132,17 @@ impl<'a> ClientSession<'a> {
         let live = self.live("render")?;
         let cameras = &live.episode.sim.scene.cameras;
         let camera = camera.or_else(|| cameras.first().map(|camera| camera.name.clone())).unwrap_or_default();
+        let is_camera = cameras.iter().any(|other| other.name == camera);
         let finger = match camera.as_str() {
-            name if cameras.iter().any(|camera| camera.name == name) => None,
-            "left" => Some(Side::Left),
-            "right" => Some(Side::Right),
+            "left" if !is_camera => Some(Side::Left),
+            "right" if !is_camera => Some(Side::Right),
             _ => None,
         };
+        if finger.is_some() && (width.is_some() || height.is_some()) {
+            let message = format!("render: {camera}: tactile images have one size; omit width and height");
+            return Err(message.into());
+        }
         let image = match finger {
-            Some(_) if width.is_some() || height.is_some() => {
-                let message =
-                    format!("render: {camera}: tactile images have one size; omit width and height");
-                return Err(message.into());
-            }
             Some(side) => live.episode.render_tactile(side),
             None => live.episode.render_camera(&camera, width, height),
         };

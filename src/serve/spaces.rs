@@ -1,11 +1,11 @@
 //! Spaces of observations and actions for clients: types, shapes and bounds. The bounds are those of possible values,
 //! not of likely ones.
 
-use std::f64::consts::PI;
+use std::{collections::BTreeSet, f64::consts::PI};
 
 use rmpv::Value;
 
-use super::catalog::ServerConfig;
+use super::config::ServerConfig;
 use crate::policy::{
     Observation,
     encode::{ObservationEntry, content},
@@ -54,14 +54,10 @@ pub(super) fn action(encoding: &ActionEncoding) -> Value {
 
 /// Space of the prompts: the length of the longest one and all characters in use.
 fn text(config: &ServerConfig) -> Value {
-    let prompts =
-        config.suites.iter().flat_map(|served| &served.suite.tasks).map(|task| task.prompt.as_str());
+    let prompts = config.suites.iter().flat_map(|suite| &suite.tasks).map(|task| task.prompt.as_str());
     let longest = prompts.clone().map(|prompt| prompt.chars().count()).max().unwrap_or(0);
-    let mut characters: Vec<char> = prompts.flat_map(str::chars).collect();
-    characters.sort_unstable();
-    characters.dedup();
-    let characters: String = characters.into_iter().collect();
-    map([("max_length", longest.into()), ("charset", characters.into())])
+    let characters: BTreeSet<char> = prompts.flat_map(str::chars).collect();
+    map([("max_length", longest.into()), ("charset", String::from_iter(characters).into())])
 }
 
 /// Bounds of an array: one number for all elements, or one per element.

@@ -118,7 +118,7 @@ impl Controller for GripRecorder {
 
     fn act(&mut self, sim: &Simulation, observation: &Observation) -> Result<Option<Action>, ControlError> {
         let action = self.expert.act(sim, observation)?;
-        self.is_holding.push(self.expert.gripping());
+        self.is_holding.push(self.expert.is_gripping);
         Ok(action)
     }
 

@@ -1,6 +1,6 @@
 //! `softvt serve`: episodes of suites for external clients.
 
-use std::{io::ErrorKind, path::PathBuf};
+use std::{io::ErrorKind, net::TcpListener, path::PathBuf};
 
 use clap::{Args, value_parser};
 use serde_json::json;
@@ -20,7 +20,7 @@ use crate::{
     policy::Observation,
     rollout::{cancel, target_asset},
     script::{self, LoadedScript},
-    serve::{self, RequestError, ServedSuite, Server, ServerConfig},
+    serve::{self, RequestError, ServerConfig},
 };
 
 /// Serve episodes over a websocket for an external client: docs/serve.md
@@ -63,7 +63,7 @@ pub(super) fn run(args: ServeArgs) -> Result<(), CliError> {
     if suites.iter().all(|suite| suite.tasks.is_empty()) {
         return Err(needs_suites("serve", &config));
     }
-    let server = open_server(&args)?;
+    let listener = listen(&args)?;
     let mut runs = Vec::new();
     for suite in suites {
         let mut run = SuiteRun::new(&config, &loaded, suite, Vec::new(), PathBuf::new())?;
@@ -74,18 +74,17 @@ pub(super) fn run(args: ServeArgs) -> Result<(), CliError> {
         }
         runs.push(run);
     }
-    let served: Vec<ServedSuite> =
-        suites.iter().map(|suite| ServedSuite { name: config.suite_name(suite), suite }).collect();
+    let named = |suite: &Suite| Suite { name: config.suite_name(suite), ..suite.clone() };
     let start_episode = |id: &EpisodeId| {
         let found = runs.iter().find(|run| run.name == id.suite);
         let run = found.ok_or_else(|| format!("unknown suite {:?}", id.suite))?;
         let task = run.suite.tasks.iter().find(|task| task.id == id.task);
         let task = task.ok_or_else(|| format!("unknown task {}", id.task))?;
         let id = EpisodeId { suite: run.suite.name.clone(), ..id.clone() };
-        run.start_episode(task, &id).map_err(|error| RequestError(error.message))
+        run.start_episode(task, &id).map_err(|error| RequestError::Invalid(error.message))
     };
     let server_config = ServerConfig {
-        suites: served,
+        suites: suites.iter().map(named).collect(),
         profile,
         privileged: args.privileged,
         seed: config.script.seed,
@@ -94,16 +93,16 @@ pub(super) fn run(args: ServeArgs) -> Result<(), CliError> {
         start_episode: Box::new(start_episode),
     };
     let hello = serve::hello(&server_config, &first_observation(&config, &server_config)?);
-    let address = server.address().map_err(|error| CliError::input(error).prefixed(&args.host))?;
+    let address = listener.local_addr().map_err(|error| CliError::input(error).prefixed(&args.host))?;
     print(&format!("ws://{address}\n"));
-    serve::serve(&server, &server_config, hello, usize::from(args.threads), &cancel::FLAG);
+    serve::serve(&listener, &server_config, hello, usize::from(args.threads), &cancel::FLAG);
     Err(CliError::interrupted("interrupted"))
 }
 
-fn open_server(args: &ServeArgs) -> Result<Server, CliError> {
+fn listen(args: &ServeArgs) -> Result<TcpListener, CliError> {
     let ServeArgs { host, port, .. } = args;
     let bare = host.trim_start_matches('[').trim_end_matches(']');
-    Server::open(bare, *port).map_err(|error| {
+    serve::listen(bare, *port).map_err(|error| {
         CliError::input(match error.kind() {
             ErrorKind::AddrInUse => {
                 format!("--port {port}: already in use at {host}; choose another, or 0 for any free port")
@@ -131,10 +130,10 @@ fn provenance_hash(config: &RunConfig, loaded: &LoadedScript) -> String {
 
 /// The first observation of the first episode. It reports invalid scenes and sensors before a client connects.
 fn first_observation(config: &RunConfig, server: &ServerConfig) -> Result<Observation, CliError> {
-    let first = server.suites.iter().find_map(|served| Some((served, served.suite.tasks.first()?)));
-    let (served, task) = first.ok_or_else(|| CliError::input("there is no task to serve"))?;
+    let first = server.suites.iter().find_map(|suite| Some((suite, suite.tasks.first()?)));
+    let (suite, task) = first.ok_or_else(|| CliError::input("there is no task to serve"))?;
     let id = EpisodeId {
-        suite: served.name.clone(),
+        suite: suite.name.clone(),
         task: task.id,
         episode: 0,
         base_seed: server.seed,

@@ -69,7 +69,18 @@ pub struct LoadedScript {
     pub options: Vec<OptionSpec>,
 }
 
-/// Loads the script at `path` with its own arguments of the command line, and makes its plan.
+/// Loads the script at `path` with its own arguments of the command line, and makes its plan. Standard scripts that are not
+/// on the disk are read from the library inside the binary.
+///
+/// ```
+/// use std::path::Path;
+/// use softvt::{benchmark::Plan, script};
+///
+/// let loaded = script::load(Path::new("suites/spatial_soft.lua"), &[])?;
+/// let Plan::Suite(suite) = &loaded.plan else { panic!("the file returns a suite") };
+/// assert_eq!(suite.tasks.len(), 10);
+/// # Ok::<(), script::ScriptError>(())
+/// ```
 ///
 /// # Errors
 /// If a file cannot be read, the script fails, or its options or its plan are invalid; the message names file and line.
@@ -199,7 +210,11 @@ impl ScriptInstance {
             entry.as_table().is_some_and(|table| is_constructed(&self.vm.lua, SuiteSpec::RECORD, table))
         };
         match entries.iter().all(is_suite) {
-            true => entries.into_iter().map(|entry| self.vm.lua.unpack(entry)).collect::<mlua::Result<_>>().map(Some),
+            true => entries
+                .into_iter()
+                .map(|entry| self.vm.lua.unpack(entry))
+                .collect::<mlua::Result<_>>()
+                .map(Some),
             false => Ok(None),
         }
     }

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex};
 
 use mlua::{Lua, LuaSerdeExt, Value};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     parallel::lock,
@@ -13,7 +13,7 @@ use crate::{
         },
         vm::{
             error::{ScriptError, app_data, fail},
-            value::{describe, number, sorted_pairs},
+            value::{describe, sorted_pairs},
         },
     },
     text::suggest,
@@ -40,7 +40,7 @@ record! {
 }
 
 /// The value of an option.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum OptionValue {
     /// A number in the option's unit.
@@ -100,27 +100,25 @@ impl OptionSpec {
     fn parse(&self, text: &str) -> Option<OptionValue> {
         let number = |text: &str| text.trim().parse::<f64>().ok().filter(|n| self.range.holds(*n));
         let allowed = |text: &str| self.choices.is_empty() || self.choices.iter().any(|c| c == text);
-        Some(match &self.default {
-            OptionValue::Number(_) => OptionValue::Number(number(text)?),
+        let entries = || text.split(',').map(str::trim);
+        match &self.default {
+            OptionValue::Number(_) => number(text).map(OptionValue::Number),
             OptionValue::Integer(_) => {
-                let n = text.trim().parse::<i64>().ok()?;
-                self.range.holds(n as f64).then_some(OptionValue::Integer(n))?
+                let integer = text.trim().parse::<i64>().ok().filter(|n| self.range.holds(*n as f64));
+                integer.map(OptionValue::Integer)
             }
-            OptionValue::Text(_) => OptionValue::Text(allowed(text).then(|| text.to_string())?),
+            OptionValue::Text(_) => allowed(text).then(|| OptionValue::Text(text.to_owned())),
             OptionValue::Flag(_) => match text {
-                "on" | "true" | "yes" | "1" => OptionValue::Flag(true),
-                "off" | "false" | "no" | "0" => OptionValue::Flag(false),
-                _ => return None,
+                "on" | "true" | "yes" | "1" => Some(OptionValue::Flag(true)),
+                "off" | "false" | "no" | "0" => Some(OptionValue::Flag(false)),
+                _ => None,
             },
-            OptionValue::Numbers(_) => {
-                OptionValue::Numbers(text.split(',').map(number).collect::<Option<_>>()?)
+            OptionValue::Numbers(_) => entries().map(number).collect::<Option<_>>().map(OptionValue::Numbers),
+            OptionValue::Texts(_) if entries().all(|entry| allowed(entry) && !entry.is_empty()) => {
+                Some(OptionValue::Texts(entries().map(str::to_owned).collect()))
             }
-            OptionValue::Texts(_) => {
-                let parts = text.split(',').map(str::trim);
-                let kept = parts.map(|part| (allowed(part) && !part.is_empty()).then(|| part.to_string()));
-                OptionValue::Texts(kept.collect::<Option<_>>()?)
-            }
-        })
+            OptionValue::Texts(_) => None,
+        }
     }
 }
 
@@ -188,7 +186,11 @@ impl OptionSession {
             let text = match value {
                 Some(value) => Some(value),
                 None if is_flag => Some(if is_negated { "off" } else { "on" }.to_owned()),
-                None => self.arguments.get_mut(at + 1).and_then(Option::take).filter(|text| !text.starts_with("--")),
+                None => self
+                    .arguments
+                    .get_mut(at + 1)
+                    .and_then(Option::take)
+                    .filter(|text| !text.starts_with("--")),
             };
             let (flag, expected) = (flag.clone(), spec.expects());
             let Some(text) = text else { return Err(ArgumentError::Missing { flag, expected }) };
@@ -229,23 +231,7 @@ functions! {
 }
 
 /// Reads the declaration of an option and its value on the command line.
-fn declare(
-    lua: &Lua,
-    session: &mut OptionSession,
-    key: &Value,
-    value: &Value,
-) -> mlua::Result<OptionSpec> {
-    let mut spec = read_spec(lua, key, value)?;
-    if session.declared.iter().any(|known| known.name == spec.name) {
-        return Err(fail(lua, format!("options.{}: the option is declared twice", spec.name)));
-    }
-    if let Some(value) = session.consume(&spec).map_err(|error| fail(lua, error.to_string()))? {
-        spec.value = value;
-    }
-    Ok(spec)
-}
-
-fn read_spec(lua: &Lua, key: &Value, value: &Value) -> mlua::Result<OptionSpec> {
+fn declare(lua: &Lua, session: &mut OptionSession, key: &Value, value: &Value) -> mlua::Result<OptionSpec> {
     let Value::String(name) = key else {
         return Err(fail(lua, format!("options: expected names as keys, got {}", describe(key))));
     };
@@ -261,11 +247,16 @@ fn read_spec(lua: &Lua, key: &Value, value: &Value) -> mlua::Result<OptionSpec> 
     let checked = OptionRecord::TYPE.check(lua, value);
     let checked = checked.map_err(|error| error_at_key(lua, "options", &error.inside(name.clone())))?;
     let record: OptionRecord = lua.unpack(checked)?;
-    let default = read_default(&record.default, record.integer).ok_or_else(|| {
+    let default = match record.default {
+        Value::Integer(n) if record.integer => Some(OptionValue::Integer(n)),
+        Value::Integer(_) | Value::Number(_) if record.integer => None,
+        default => lua.from_value(default).ok(),
+    };
+    let default = default.ok_or_else(|| {
         let expected = "a number, string, boolean or list of numbers or strings";
         fail(lua, format!("options.{name}.default: expected {expected}"))
     })?;
-    let spec = OptionSpec {
+    let mut spec = OptionSpec {
         unit: record.unit,
         help: record.help,
         value: default.clone(),
@@ -274,33 +265,16 @@ fn read_spec(lua: &Lua, key: &Value, value: &Value) -> mlua::Result<OptionSpec> 
         choices: record.choices.unwrap_or_default(),
         name,
     };
-    match spec.parse(&spec.default.to_string()) {
-        Some(_) => Ok(spec),
-        None => Err(fail(lua, format!("options.{}.default: expected {}", spec.name, spec.expects()))),
+    if spec.parse(&spec.default.to_string()).is_none() {
+        return Err(fail(lua, format!("options.{}.default: expected {}", spec.name, spec.expects())));
     }
-}
-
-fn read_default(value: &Value, integer: bool) -> Option<OptionValue> {
-    Some(match value {
-        Value::Boolean(flag) => OptionValue::Flag(*flag),
-        Value::String(text) => OptionValue::Text(text.to_string_lossy().to_string()),
-        Value::Integer(n) if integer => OptionValue::Integer(*n),
-        Value::Integer(_) | Value::Number(_) if !integer => OptionValue::Number(number(value)?),
-        Value::Table(list) => {
-            let items: Vec<Value> = list.clone().sequence_values().collect::<mlua::Result<_>>().ok()?;
-            match items.first()? {
-                Value::String(_) => {
-                    let texts = items.iter().map(|item| match item {
-                        Value::String(text) => Some(text.to_string_lossy().to_string()),
-                        _ => None,
-                    });
-                    OptionValue::Texts(texts.collect::<Option<_>>()?)
-                }
-                _ => OptionValue::Numbers(items.iter().map(number).collect::<Option<_>>()?),
-            }
-        }
-        _ => return None,
-    })
+    if session.declared.iter().any(|known| known.name == spec.name) {
+        return Err(fail(lua, format!("options.{}: the option is declared twice", spec.name)));
+    }
+    if let Some(value) = session.consume(&spec).map_err(|error| fail(lua, error.to_string()))? {
+        spec.value = value;
+    }
+    Ok(spec)
 }
 
 impl std::fmt::Display for OptionValue {

@@ -116,8 +116,7 @@ impl ProfileReader<'_> {
         let missing = |key: &str, pose: &str| {
             self.wrong("pose", format!("actions.{key}: missing; pose = {pose:?} needs it"))
         };
-        let translation_m =
-            |pose| spec.translation_m.ok_or_else(|| missing("translation_m", pose));
+        let translation_m = |pose| spec.translation_m.ok_or_else(|| missing("translation_m", pose));
         let rotation_rad = |pose| spec.rotation_rad.ok_or_else(|| missing("rotation_rad", pose));
         let pose = match spec.pose {
             PoseKind::Absolute => {

@@ -1,5 +1,7 @@
 //! Episodes: the scene that a task's layout builds, and the task's expert.
 
+use std::sync::Arc;
+
 use mlua::{Function, Lua, Value};
 
 use super::expert::{ExpertController, GripMode};
@@ -35,7 +37,7 @@ pub struct EpisodeSetup {
     pub nominal: Scene,
     /// Source of its random streams.
     pub seed: EpisodeSeed,
-    instance: ScriptInstance,
+    instance: Arc<ScriptInstance>,
     expert: Option<Function>,
 }
 
@@ -46,9 +48,7 @@ impl EpisodeSetup {
     /// # Errors
     /// If the suite, the task or a shift is unknown, or the script fails.
     pub fn open(loaded: &LoadedScript, id: &EpisodeId, shifts: &[ShiftValue]) -> Result<Self, ScriptError> {
-        let builder = SceneBuilder::open(loaded)?;
-        let InitialScenes { scene, nominal, seed, expert } = builder.build(id, shifts)?;
-        Ok(Self { scene, nominal, seed, instance: builder.instance, expert })
+        SceneBuilder::open(loaded)?.build(id, shifts)
     }
 
     /// The controller that runs the expert of the task; `None` if the task has no expert.
@@ -59,20 +59,10 @@ impl EpisodeSetup {
     }
 }
 
-/// The initial scenes of an episode.
-pub struct InitialScenes {
-    /// After the shifts.
-    pub scene: Scene,
-    /// Before the shifts.
-    pub nominal: Scene,
-    seed: EpisodeSeed,
-    expert: Option<Function>,
-}
-
-/// Builds many scenes in one virtual machine, for checks without a simulation. Global state that one layout changes is
-/// seen by the next.
+/// Builds the scenes of many episodes in one virtual machine, for checks without a simulation. Global state that one layout
+/// changes is seen by the next.
 pub struct SceneBuilder {
-    instance: ScriptInstance,
+    instance: Arc<ScriptInstance>,
 }
 
 impl SceneBuilder {
@@ -81,14 +71,14 @@ impl SceneBuilder {
     /// # Errors
     /// If the script fails.
     pub fn open(loaded: &LoadedScript) -> Result<Self, ScriptError> {
-        Ok(Self { instance: loaded.sources.instance()? })
+        Ok(Self { instance: Arc::new(loaded.sources.instance()?) })
     }
 
-    /// Builds the initial scenes of an episode.
+    /// Builds the initial scene of an episode.
     ///
     /// # Errors
     /// As [`EpisodeSetup::open`].
-    pub fn build(&self, id: &EpisodeId, shifts: &[ShiftValue]) -> Result<InitialScenes, ScriptError> {
+    pub fn build(&self, id: &EpisodeId, shifts: &[ShiftValue]) -> Result<EpisodeSetup, ScriptError> {
         let vm = &self.instance.vm;
         let FoundTask { suite, task } = self.instance.find_task(&id.suite, id.task)?;
         let seed = EpisodeSeed::new(id, &task.layout.name);
@@ -107,7 +97,8 @@ impl SceneBuilder {
         }
         let scene = lock(&current.scene).clone();
         check_goal(&vm.lua, &task.goal, &scene).map_err(|e| vm.explain(&e))?;
-        Ok(InitialScenes { scene, nominal, seed, expert: task.expert.clone() })
+        let (instance, expert) = (self.instance.clone(), task.expert.clone());
+        Ok(EpisodeSetup { scene, nominal, seed, instance, expert })
     }
 
     /// The result of a shift's function: a scene, or nothing if it changed the given one.

@@ -1,5 +1,7 @@
 //! Experts as controllers of a rollout.
 
+use std::sync::Arc;
+
 use crate::{
     policy::{Action, Observation, SensorStreams},
     robot::rotation,
@@ -28,7 +30,7 @@ pub enum GripMode {
 ///
 /// This is the only place where a rollout passes its true state to Lua.
 pub struct ExpertController {
-    pub(crate) instance: ScriptInstance,
+    pub(crate) instance: Arc<ScriptInstance>,
     pub(crate) coroutine: Coroutine,
     mode: GripMode,
     /// True while the gripper should hold an object, as last commanded.
@@ -37,7 +39,7 @@ pub struct ExpertController {
 }
 
 impl ExpertController {
-    pub(crate) fn new(instance: ScriptInstance, function: mlua::Function, mode: GripMode) -> Self {
+    pub(crate) fn new(instance: Arc<ScriptInstance>, function: mlua::Function, mode: GripMode) -> Self {
         let access = if mode == GripMode::TactileServo { FingerAccess::Servo } else { FingerAccess::None };
         let (coroutine, monitor) = (Coroutine::new(function, access), TrackingErrorMonitor::default());
         Self { instance, coroutine, mode, is_gripping: false, monitor }

@@ -47,11 +47,11 @@ fn an_error_object_is_described_without_its_address() {
 }
 
 #[test]
-fn endless_loops_are_stopped_wherever_they_hide() {
-    let said = "suites/x.lua:1: the script ran for more than 0.3 s; look for an endless loop";
+fn endless_loops_are_stopped_everywhere() {
+    let expected = "suites/x.lua:1: the script ran for more than 0.3 s; look for an endless loop";
     assert_eq!(
         error_of("local i = 0\n\nwhile true do\n  i = i + 1\nend").replace(":4:", ":3:"),
-        said.replace(":1:", ":3:")
+        expected.replace(":1:", ":3:")
     );
     for text in [
         "while true do end",
@@ -66,12 +66,12 @@ fn endless_loops_are_stopped_wherever_they_hide() {
         "for _ in pairs(setmetatable({}, { __pairs = function() return function() return 1 end end })) do end",
         "string.gsub(('x'):rep(10), 'x', function() while true do end end)",
     ] {
-        assert_eq!(error_of(text), said, "{text}");
+        assert_eq!(error_of(text), expected, "{text}");
     }
 }
 
 #[test]
-fn a_library_function_that_does_not_return_wakes_the_watchdog() {
+fn a_library_function_that_does_not_return_triggers_the_watchdog() {
     static BARKS: AtomicUsize = AtomicUsize::new(0);
     let project = Project::new(&[(
         "x.lua",
@@ -93,14 +93,14 @@ fn a_library_function_that_does_not_return_wakes_the_watchdog() {
 }
 
 #[test]
-fn a_memory_hog_is_stopped() {
-    let said = "the script used more than its 16 MiB of memory; build smaller tables and strings, or keep fewer of them";
+fn memory_is_limited() {
+    let expected = "the script used more than its 16 MiB of memory; build smaller tables and strings, or keep fewer of them";
     for text in [
         "local t = {} for i = 1, 1e9 do t[i] = { i } end",
         "local s = 'x' while true do s = s .. s end",
         "return ('x'):rep(1 << 30)",
     ] {
-        assert_eq!(error_of(text), format!("suites/x.lua: {said}"), "{text}");
+        assert_eq!(error_of(text), format!("suites/x.lua: {expected}"), "{text}");
     }
 }
 
@@ -121,7 +121,7 @@ fn byte_code_is_refused() {
 }
 
 #[test]
-fn the_outside_is_out_of_reach() {
+fn files_and_the_system_are_out_of_reach() {
     for name in
         ["io", "os", "debug", "package", "dofile", "loadfile", "collectgarbage", "string.dump", "warn"]
     {
@@ -171,7 +171,7 @@ fn modules_are_found_and_circles_are_named() {
 }
 
 #[test]
-fn a_wrong_table_is_named_by_key_and_line() {
+fn a_wrong_table_is_reported_with_key_and_line() {
     let on =
         |rest: &str| error_of(&format!("\nsoftvt.on {{\n  object = 'a',\n  target = 'b',\n  {rest}\n}}"));
     assert_eq!(
@@ -198,7 +198,7 @@ fn a_wrong_table_is_named_by_key_and_line() {
 }
 
 #[test]
-fn a_material_that_cannot_be_is_refused() {
+fn an_impossible_material_is_refused() {
     let soft = |rest: &str| error_of(&format!("softvt.soft {{ density = 200, {rest} }}"));
     assert_eq!(
         soft("youngs_pa = -1, poisson = 0.3"),
@@ -272,10 +272,10 @@ fn meshes_are_searched_next_to_the_requesting_file() {
 }
 
 #[test]
-fn a_list_of_numbers_is_told_which_of_them_is_wrong() {
+fn an_invalid_list_of_numbers_is_reported_with_the_wrong_entry() {
     let message = |list: &str| error_of(&format!("softvt.shape.box {{\n  size = {list}\n}}"));
     let at = "suites/x.lua:2: shape.box.size";
-    for (list, said) in [
+    for (list, expected) in [
         ("{ 1, 0 / 0, 1 }", "[2]: expected a number, got NaN, which is not a finite number"),
         ("{ 1, 1, 1 / 0 }", "[3]: expected a number, got inf, which is not a finite number"),
         ("{ 'a', 1, 1 }", "[1]: expected a number, got \"a\""),
@@ -284,12 +284,12 @@ fn a_list_of_numbers_is_told_which_of_them_is_wrong() {
         ("{ 1, 1, x = 1 }", ": expected a list of 3 numbers (m), got a table"),
         ("0 / 0", ": expected a list of 3 numbers (m), got NaN, which is not a finite number"),
     ] {
-        assert_eq!(message(list), format!("{at}{said}"), "{list}");
+        assert_eq!(message(list), format!("{at}{expected}"), "{list}");
     }
 }
 
 #[test]
-fn a_plan_that_makes_no_sense_is_told_at_the_line_that_made_it() {
+fn an_invalid_plan_is_reported_at_the_line_that_made_it() {
     let suite = |tasks: &str| {
         let project = Project::new(&[(
             "x.lua",
@@ -317,10 +317,10 @@ fn a_plan_that_makes_no_sense_is_told_at_the_line_that_made_it() {
 
 #[test]
 fn a_script_must_return_a_plan() {
-    let said = "a script returns a plan (softvt.suite{…}, softvt.experiment{…} or a list of suites), got";
-    assert_eq!(error_of("return 3"), format!("suites/x.lua: {said} 3"));
-    assert_eq!(error_of(""), format!("suites/x.lua: {said} nothing"));
-    assert_eq!(error_of("return {}"), format!("suites/x.lua: {said} a table"));
+    let expected = "a script returns a plan (softvt.suite{…}, softvt.experiment{…} or a list of suites), got";
+    assert_eq!(error_of("return 3"), format!("suites/x.lua: {expected} 3"));
+    assert_eq!(error_of(""), format!("suites/x.lua: {expected} nothing"));
+    assert_eq!(error_of("return {}"), format!("suites/x.lua: {expected} a table"));
 }
 
 #[test]

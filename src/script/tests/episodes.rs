@@ -121,7 +121,7 @@ fn an_episode_depends_on_its_seed_alone() {
 }
 
 #[test]
-fn an_episode_runs_on_what_the_plan_was_made_of() {
+fn an_episode_runs_on_the_files_of_its_plan() {
     let project = project("return suite()");
     let loaded = project.load("x.lua", &[]).unwrap();
     project.write("x.lua", b"error('changed')");
@@ -290,7 +290,7 @@ fn an_object_can_stand_on_another() {
 }
 
 #[test]
-fn a_motion_is_straight_and_never_faster_than_asked() {
+fn a_motion_is_straight_and_never_faster_than_requested() {
     let commands = run(
         "local ball = scene:object 'ball'\n\
          arm:move_to(softvt.pose { xyz = ball.xyz }, { speed = 0.2, turn = 100 })\narm:close_to(0.5, { rate = 1 })",
@@ -301,11 +301,11 @@ fn a_motion_is_straight_and_never_faster_than_asked() {
     let goal = Vec3::new(0.1 + 0.66, 0.0, 0.03 - 0.012);
     let moves = commands.len() - 10;
     assert!((at(&commands[moves - 1]) - goal).norm() < 1e-12);
-    let way = (goal - start).normalize();
+    let direction = (goal - start).normalize();
     let mut last = start;
     for command in &commands[..moves] {
         let off = at(command) - start;
-        assert!((off - way * off.dot(&way)).norm() < 1e-12);
+        assert!((off - direction * off.dot(&direction)).norm() < 1e-12);
         assert!((at(command) - last).norm() / 0.05 <= 0.2 + 1e-9);
         last = at(command);
     }
@@ -314,7 +314,7 @@ fn a_motion_is_straight_and_never_faster_than_asked() {
 }
 
 #[test]
-fn an_expert_that_goes_wrong_is_named_with_its_line() {
+fn an_expert_that_fails_is_reported_with_its_line() {
     let line = SUITE.lines().count() + 1;
     let error = |body: &str| run(body).unwrap_err();
     assert_eq!(error("local x = nil .. 1"), format!("x.lua:{line}: attempt to concatenate a nil value"));
@@ -346,7 +346,7 @@ fn an_expert_that_goes_wrong_is_named_with_its_line() {
 }
 
 #[test]
-fn an_expert_can_ask_how_far_a_hand_would_be_from_things() {
+fn an_expert_can_query_the_clearance_of_a_hand() {
     let found = run("local over = softvt.pose { xyz = { 0.1, 0, 0.5 }, yaw = 0 }
          local on = softvt.pose { xyz = { 0.1, 0, 0.06 }, yaw = 0 }
          local far, none = scene:clearance(over)

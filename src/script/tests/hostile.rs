@@ -24,9 +24,9 @@ fn run(text: &str) -> Result<String, String> {
     Ok(serde_json::to_string(&rows).unwrap())
 }
 
-fn refused(text: &str, said: &str) {
+fn refused(text: &str, expected: &str) {
     let message = run(text).expect_err(text);
-    assert!(message.starts_with("x.lua") && message.contains(said), "{text}\n{message}");
+    assert!(message.starts_with("x.lua") && message.contains(expected), "{text}\n{message}");
 }
 
 #[test]
@@ -69,9 +69,9 @@ fn doubling_is_stopped_before_memory_is() {
 fn memory_of_host_objects_is_limited_per_virtual_machine() {
     let hoard = |make: &str| format!("local kept = {{}}\nfor i = 1, 1e9 do kept[i] = {make} end");
     let full = "the script holds more than 512 MiB of images, shapes and masks; keep fewer or smaller ones";
-    let picture = "softvt.image { width = 4096, height = 4096, colour = { 0, 0, 0 } }";
-    refused(&hoard(picture), full);
-    refused(&format!("local big = {picture}\n{}", hoard("big:crop { 0, 0, 4096, 4096 }")), full);
+    let image = "softvt.image { width = 4096, height = 4096, colour = { 0, 0, 0 } }";
+    refused(&hoard(image), full);
+    refused(&format!("local big = {image}\n{}", hoard("big:crop { 0, 0, 4096, 4096 }")), full);
     refused(
         "return softvt.image { width = 8192, height = 8192, colour = { 0, 0, 0 } }:resize(8191, 8192)",
         full,
@@ -81,7 +81,7 @@ fn memory_of_host_objects_is_limited_per_virtual_machine() {
         full,
     );
     // Dropped objects release their memory, and virtual machines do not share a budget.
-    let churn = format!("for i = 1, 40 do local p = {picture} end return {{ a = 1 }}");
+    let churn = format!("for i = 1, 40 do local p = {image} end return {{ a = 1 }}");
     std::thread::scope(|scope| {
         (0..2).for_each(|_| drop(scope.spawn(|| assert_eq!(run(&churn), Ok("[{\"a\":1}]".into())))));
     });
@@ -107,7 +107,7 @@ fn memory_of_worlds_is_limited() {
 }
 
 #[test]
-fn data_without_end_is_refused() {
+fn endless_data_is_refused() {
     refused("local t = {} t.t = t return { a = t }", "tables are nested too deeply");
     refused(
         "local t = { 1 } for i = 1, 30 do t = { t, t } end return { a = t }",
@@ -130,7 +130,7 @@ fn data_without_end_is_refused() {
 }
 
 #[test]
-fn a_flood_of_text_is_cut_off() {
+fn printed_text_is_limited() {
     let printed = Arc::new(AtomicUsize::new(0));
     let (seen, project) = (
         printed.clone(),
@@ -156,7 +156,7 @@ fn changed_tables_are_checked_again() {
         let project = Project::new(&[("x.lua", &format!("{SUITE}\nlocal s = suite() {change}\nreturn s"))]);
         project.error("x.lua", &[])
     };
-    for (change, said) in [
+    for (change, expected) in [
         (
             "s.tasks = nil",
             "suite.tasks: missing; expected a list of results of softvt.task{…} (changed after it was made)",
@@ -178,7 +178,7 @@ fn changed_tables_are_checked_again() {
             "suite.tasks[1]: expected the result of softvt.task{…}, got a table (changed after it was made)",
         ),
     ] {
-        assert_eq!(suite(change), format!("x.lua: {said}"), "{change}");
+        assert_eq!(suite(change), format!("x.lua: {expected}"), "{change}");
     }
 }
 
@@ -196,7 +196,7 @@ fn changes_of_the_base_library_affect_only_the_script() {
 
 #[test]
 fn errors_of_every_kind_end_in_a_line_of_text() {
-    for (text, said) in [
+    for (text, expected) in [
         (
             "string.format('%99999d', 1)",
             "x.lua:2: string.format: invalid conversion specification: '%99999d'",
@@ -242,8 +242,8 @@ fn errors_of_every_kind_end_in_a_line_of_text() {
         let plain =
             !["::", "userdata", "traceback", "softvt:", "0x", "\n"].iter().any(|word| message.contains(word));
         // Either of two limits may be reached first.
-        let told = said.split('|').any(|said| message.contains(said));
-        assert!(message.starts_with("x.lua") && told && plain, "{text}\n{message}");
+        let is_expected = expected.split('|').any(|part| message.contains(part));
+        assert!(message.starts_with("x.lua") && is_expected && plain, "{text}\n{message}");
     }
 }
 

@@ -4,7 +4,7 @@ use super::*;
 use crate::script::Experiment;
 
 /// The message of a script that raises its result.
-fn said(text: &str) -> String {
+fn message_of(text: &str) -> String {
     Project::new(&[("suites/x.lua", text)]).load("suites/x.lua", &[]).expect_err("it raises").message
 }
 
@@ -14,7 +14,7 @@ fn volume_and_mass_are_those_of_closed_forms() {
         local box, ball = s.box { size = { 0.1, 0.04, 0.03 } }, s.sphere { radius = 0.03 }\n\
         error(('%.6f %.6f'):format(1e6 * box:volume(), 1e6 * ball:grounded():volume()), 0)";
     let ball = 4.0 / 3.0 * std::f64::consts::PI * 27.0;
-    assert_eq!(said(text), format!("120.000000 {ball:.6}"));
+    assert_eq!(message_of(text), format!("120.000000 {ball:.6}"));
     let chest = "local box = softvt.shape.box { size = { 0.1, 0.1, 0.03 } }
         local joint = softvt.slider { axis = { 0, -1, 0 }, lower = 0, upper = 0.1 }
         local function part(name, z, density) return { name = name, shape = box:translate(0, 0, z), density = density, joint = joint } end
@@ -26,21 +26,21 @@ fn volume_and_mass_are_those_of_closed_forms() {
           for i, asset in ipairs { chest, block, wall } do scene:add { name = asset.name, asset = asset, at = { i, 0 } } end
           local chest, block, wall = scene.objects[1], scene.objects[2], scene.objects[3]
           for _, object in ipairs { chest, block, wall } do object:scale_mass(2) end
-          local told = { chest:mass(), chest:mass 'low', block:mass(), tostring(wall:mass()) }
-          for i = 1, 3 do told[i] = ('%.3f'):format(told[i]) end
+          local results = { chest:mass(), chest:mass 'low', block:mass(), tostring(wall:mass()) }
+          for i = 1, 3 do results[i] = ('%.3f'):format(results[i]) end
           local ok, why = pcall(function() chest:mass 'lo' end)
-          told[5] = tostring(why):match 'unknown.*'
-          error(table.concat(told, ' '), 0)
+          results[5] = tostring(why):match 'unknown.*'
+          error(table.concat(results, ' '), 0)
         end)
         softvt.simulate { layout = layout }";
-    assert_eq!(said(chest), "0.900 0.300 0.060 nil unknown part \"lo\"; did you mean \"low\"?");
+    assert_eq!(message_of(chest), "0.900 0.300 0.060 nil unknown part \"lo\"; did you mean \"low\"?");
 }
 
 #[test]
 fn a_calibration_is_read_when_the_plan_is_made_and_no_later() {
     let library = "local c = softvt.calibration 'sphere'\n\
         error(('%s %.2f %.2f %s'):format(c.safe_window, c.lower, c.tau, softvt.calibration 'nothing_like_it'), 0)";
-    let text = said(library);
+    let text = message_of(library);
     assert!(text.starts_with("true ") && text.ends_with(" nil"), "{text}");
     let wrong = error_of("softvt.calibration '../x'");
     assert!(wrong.contains("softvt.calibration: asset: expected a name"), "{wrong}");
@@ -50,7 +50,7 @@ fn a_calibration_is_read_when_the_plan_is_made_and_no_later() {
 
     let late = "local none = softvt.calibration 'absent'\n\
         return softvt.experiment { name = 'e', grid = { a = { 1 } }, run = function()\n\
-        return { none = tostring(none), late = pcall(softvt.calibration, 'sphere') and 'given' or 'told' } end }";
+        return { none = tostring(none), late = pcall(softvt.calibration, 'sphere') and 'given' or 'refused' } end }";
     let project = Project::new(&[("x.lua", late)]);
     let loaded = project.load("x.lua", &[]).expect("loads");
     // A file that was absent stays absent in later virtual machines, even if it exists by then.
@@ -58,11 +58,11 @@ fn a_calibration_is_read_when_the_plan_is_made_and_no_later() {
     let rows = Experiment::open(&loaded).expect("opens").run(0).expect("a row");
     assert_eq!(rows[0]["none"], "nil");
     let early = Experiment::open(&loaded).expect("opens");
-    assert_eq!(early.run(0).expect("a row")[0]["late"], "told", "asked too late, it says so");
+    assert_eq!(early.run(0).expect("a row")[0]["late"], "refused", "requested too late");
 }
 
 #[test]
-fn a_main_file_of_a_modules_name_gets_the_module() {
+fn a_main_file_with_the_name_of_a_module_can_require_it() {
     let main = "local shifts = require 'shifts'\nerror(shifts.soft[1].name, 0)";
     let project = Project::new(&[("suites/shifts.lua", main)]);
     assert_eq!(project.load("suites/shifts.lua", &[]).expect_err("it raises").message, "mass");

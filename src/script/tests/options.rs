@@ -84,14 +84,14 @@ proptest::proptest! {
     }
 
     #[test]
-    fn whatever_is_said_is_answered_with_the_name_of_the_file(
+    fn errors_of_any_arguments_and_any_text_name_the_file(
         words in proptest::collection::vec("[-=a-z0-9_ .,{}()\"\n]{0,24}", 0..4),
         text in "([a-z]{1,3}|[ =.,:(){}\\[\\]\"'#+-]|[0-9]|softvt|\n|return|function|end){0,20}",
     ) {
         let words: Vec<&str> = words.iter().map(String::as_str).collect();
-        let said = Project::new(&[("x.lua", SCRIPT)]).load("x.lua", &words).map_err(|e| e.file);
-        proptest::prop_assert!(said.is_ok() || said.is_err_and(|file| file.ends_with("x.lua")));
-        let said = Project::new(&[("x.lua", &text)]).load("x.lua", &[]).expect_err("gibberish is not a plan");
-        proptest::prop_assert!(said.file.ends_with("x.lua"), "{}", said);
+        let result = Project::new(&[("x.lua", SCRIPT)]).load("x.lua", &words).map_err(|e| e.file);
+        proptest::prop_assert!(result.is_ok() || result.is_err_and(|file| file.ends_with("x.lua")));
+        let error = Project::new(&[("x.lua", &text)]).load("x.lua", &[]).expect_err("gibberish is not a plan");
+        proptest::prop_assert!(error.file.ends_with("x.lua"), "{}", error);
     }
 }

@@ -22,18 +22,18 @@ fn seed(episode: u32) -> EpisodeSeed {
     EpisodeSeed { suite, layout, episode, base_seed: 0, split: Split::Validation }
 }
 
-/// A finger whose markers have all moved by `by` px, with a picture that is `lit` brighter than the untouched one.
+/// A finger whose markers have all moved by `by` px, with an image that is `lit` brighter than the untouched one.
 fn finger(by: [f32; 2], lit: u8) -> TactileFrame {
     let rest = RgbImage::from_pixel(320, 240, Rgb([100, 100, 100]));
-    let picture = RgbImage::from_pixel(320, 240, Rgb([100 + lit, 100, 100 - lit]));
+    let image = RgbImage::from_pixel(320, 240, Rgb([100 + lit, 100, 100 - lit]));
     let initial = Markers::at_rest().initial;
     let markers = Markers { initial, current: initial.map(|[x, y]| [x + by[0], y + by[1]]) };
-    TactileFrame::new(picture, Arc::new(rest), markers)
+    TactileFrame::new(image, Arc::new(rest), markers)
 }
 
 fn observation() -> Observation {
-    let mut picture = RgbImage::from_pixel(8, 6, Rgb([0, 0, 0]));
-    picture.put_pixel(2, 1, Rgb([10, 20, 30]));
+    let mut image = RgbImage::from_pixel(8, 6, Rgb([0, 0, 0]));
+    image.put_pixel(2, 1, Rgb([10, 20, 30]));
     let before = Arc::new([finger([0.0, 0.0], 0), finger([0.0, 0.0], 0)]);
     let now = Arc::new([finger([-0.5, 0.25], 40), finger([0.5, 0.0], 0)]);
     Observation {
@@ -44,7 +44,7 @@ fn observation() -> Observation {
         gripper_width_m: 0.0625,
         closure: 0.25,
         prompt: "take it".into(),
-        cameras: vec![CameraImage { name: "wrist".into(), image: picture }],
+        cameras: vec![CameraImage { name: "wrist".into(), image }],
         touch: Some(TactileHistory { frames: vec![before, now] }),
         forces: None,
         force_history: Vec::new(),
@@ -87,7 +87,7 @@ fn refusal(body: &str) -> String {
 }
 
 #[test]
-fn observations_have_the_values_of_the_host() {
+fn observations_have_the_values_of_the_simulation() {
     let checks = [
         "assert(obs.time == 1.5 and obs.width == 0.0625 and obs.closure == 0.25 and obs.prompt == 'take it')",
         "assert(obs.position[2] == -0.125 and #obs.position == 3 and #obs.joints == 7 and obs.joints[4] == -2)",
@@ -110,7 +110,7 @@ fn observations_have_the_values_of_the_host() {
 }
 
 #[test]
-fn actions_come_alone_or_as_lists_with_either_way_to_say_a_turn() {
+fn actions_are_accepted_alone_or_as_lists_with_either_form_of_rotation() {
     let expected = Action {
         position_b: Vec3::new(0.5, 0.0, 0.25),
         axis_angle_b: Vec3::new(3.0, 0.0, 0.0),
@@ -130,7 +130,7 @@ fn actions_come_alone_or_as_lists_with_either_way_to_say_a_turn() {
 #[test]
 fn malformed_actions_end_the_run_at_the_line_of_act() {
     let at = "p.lua:1: policy.act";
-    for (body, said) in [
+    for (body, expected) in [
         ("return", format!("{at}: expected an action or a list of actions, got nil")),
         ("return 'left'", format!("{at}: expected an action or a list of actions, got \"left\"")),
         ("return {}", format!("{at}: expected 1 to 10000 actions, got 0")),
@@ -173,7 +173,7 @@ fn malformed_actions_end_the_run_at_the_line_of_act() {
         ),
     ] {
         let message = refusal(body);
-        assert!(message.starts_with(&said), "{body}\n{message}\n{said}");
+        assert!(message.starts_with(&expected), "{body}\n{message}\n{expected}");
     }
 }
 
@@ -194,8 +194,8 @@ fn non_finite_actions_fail_only_the_episode() {
 #[test]
 fn an_episode_is_a_function_of_its_seed_and_no_other_episode() {
     let text = format!(
-        "local count, told = 0\nreturn softvt.policy {{ name = 'p', reset = function(task) told = task end,\n\
-         act = function() count = count + 1 assert(told.task == 3 and told.episode == 7 and told.suite == 'one')\n\
+        "local count, task = 0\nreturn softvt.policy {{ name = 'p', reset = function(t) task = t end,\n\
+         act = function() count = count + 1 assert(task.task == 3 and task.episode == 7 and task.suite == 'one')\n\
          return {{ {POSE}, closure = count * math.random() / 8 }} end }}"
     );
     let project = Project::new(&[("p.lua", &text)]);
@@ -216,7 +216,7 @@ fn files_without_a_policy_are_reported() {
         let error = PolicyFile::load_with(&project.path("p.lua"), &limits()).unwrap_err();
         error.to_string().replace(&format!("{}/", project.path("").display()).replace("//", "/"), "")
     };
-    for (text, said) in [
+    for (text, expected) in [
         ("return 3", "p.lua: a policy's file returns softvt.policy{…}, got 3"),
         ("return softvt.policy { name = 'p' }", "p.lua:1: policy.act: missing"),
         (
@@ -230,7 +230,7 @@ fn files_without_a_policy_are_reported() {
         ("x = = 1", "p.lua:1: syntax error"),
     ] {
         let found = message(text);
-        assert!(found.starts_with(said), "{text}\n{found}");
+        assert!(found.starts_with(expected), "{text}\n{found}");
     }
 }
 
@@ -265,7 +265,7 @@ fn changed(name: &str, changes: &[(&str, &str)]) -> String {
 }
 
 #[test]
-fn the_built_in_profiles_can_be_said_in_lua() {
+fn the_built_in_profiles_can_be_written_in_lua() {
     let tactile = "{ keys = both \"tactile_image\", source = \"tactile_image\" },\n    { keys = both \"tactile_marker_motion\", source = \"marker_motion\" },";
     let vision = [
         ("name = \"visuo_tactile\"", "name = \"vision\""),
@@ -303,7 +303,7 @@ fn a_profile_may_name_other_cameras_units_and_paddings() {
 
 #[test]
 fn errors_in_profiles_are_reported_with_their_line() {
-    for (from, to, said) in [
+    for (from, to, expected) in [
         (
             "name = \"libero\"",
             "nam = \"libero\"",
@@ -342,6 +342,6 @@ fn errors_in_profiles_are_reported_with_their_line() {
         ),
     ] {
         let found = profile(&changed("libero", &[(from, to)])).unwrap_err();
-        assert!(found.starts_with("p.lua:") && found.contains(said), "{to}\n{found}\n{said}");
+        assert!(found.starts_with("p.lua:") && found.contains(expected), "{to}\n{found}\n{expected}");
     }
 }

@@ -1,7 +1,7 @@
 -- Makes an object of each class, calls everything with everything, and returns the messages. surface.rs prepends the names.
-local said = {}
+local errors = {}
 local function note(what, ok, message)
-  if not ok then said[#said + 1] = { what = what, said = tostring(message), kind = type(message) } end
+  if not ok then errors[#errors + 1] = { what = what, message = tostring(message), kind = type(message) } end
 end
 local wrong = {
   "abc", "", "\255", {}, { 1, 2 }, { "a", "b", "c" }, { 0/0, 0, 0 }, { 1e308, 1e308, 1e308 }, { x = 1 }, { [1.5] = {} }, true, 1e308, -1e308,
@@ -89,8 +89,8 @@ local function run()
     all("softvt.Markers", touch.markers)
   end)
   all("softvt.Simulation", simulation)
-  said[#said + 1] = { what = "seen", said = table.concat(SEEN, " "), kind = "string" }
-  return said
+  errors[#errors + 1] = { what = "seen", message = table.concat(SEEN, " "), kind = "string" }
+  return errors
 end
 SEEN = {}
 return softvt.experiment { name = "e", grid = { a = { 1 } }, run = run }

@@ -95,19 +95,19 @@ fn wrong_calls_get_messages_in_terms_of_the_lua_interface() {
     let mut wrong = Vec::new();
     for row in &rows {
         let text = |key: &str| row[key].as_str().unwrap_or_default();
-        let (what, said) = (text("what"), text("said").replace(&folder, ""));
+        let (what, message) = (text("what"), text("message").replace(&folder, ""));
         if ["seen", "enough"].contains(&what) {
             continue;
         }
-        let placed = said.strip_prefix("x.lua:").and_then(|rest| rest.split_once(": "));
+        let placed = message.strip_prefix("x.lua:").and_then(|rest| rest.split_once(": "));
         let placed = placed.is_some_and(|(line, _)| line.parse::<usize>().is_ok());
-        if !placed || leak(&said).is_some() || text("kind") != "string" {
-            wrong.push(format!("{what} → {said}"));
+        if !placed || leak(&message).is_some() || text("kind") != "string" {
+            wrong.push(format!("{what} → {message}"));
         }
     }
     assert!(wrong.is_empty(), "{} of {} are wrong:\n{}", wrong.len(), rows.len(), wrong.join("\n"));
     assert!(rows.len() > 2000, "{}", rows.len());
-    let seen: BTreeSet<&str> = rows.last().unwrap()["said"].as_str().unwrap().split(' ').collect();
+    let seen: BTreeSet<&str> = rows.last().unwrap()["message"].as_str().unwrap().split(' ').collect();
     let listed = api::CLASSES.iter().map(|class| class.name);
     let missing: Vec<&str> = listed.filter(|name| !seen.contains(name)).collect();
     assert_eq!(
@@ -162,9 +162,9 @@ fn lists_of_objects_are_live() {
 }
 
 #[test]
-fn read_only_lists_say_how_to_change_the_object() {
+fn errors_of_read_only_lists_name_the_way_to_change_the_object() {
     let line = super::SUITE.lines().position(|line| line.contains("scene:add")).unwrap() + 1;
-    for (text, said) in [
+    for (text, expected) in [
         ("scene.base[1] = 'a'", "scene.base[1]: expected a number, got \"a\""),
         ("scene.base[1] = 0/0", "scene.base[1]: expected a number, got NaN, which is not a finite number"),
         ("scene.base[4] = 1", "scene.base: has places 1 to 3, got 4"),
@@ -215,7 +215,7 @@ fn read_only_lists_say_how_to_change_the_object() {
             "scene.base: expected a place within 1000 m of the origin, got {1e300, 0, 0}",
         ),
     ] {
-        assert_eq!(in_layout(text), format!("x.lua:{line}: {said}"), "{text}");
+        assert_eq!(in_layout(text), format!("x.lua:{line}: {expected}"), "{text}");
     }
 }
 

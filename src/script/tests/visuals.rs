@@ -1,4 +1,4 @@
-//! Looks in Lua: what reaches the scene, and what is said where a table is wrong.
+//! Visuals in Lua: their values in the scene, and the messages about invalid tables.
 
 use std::sync::Arc;
 

@@ -167,7 +167,8 @@ impl ErrorTranslator<'_> {
 /// The message without the position in this module's own Lua code.
 fn without_own_position(message: &str) -> &str {
     let inner = ["softvt:", "softvt.arm:"].iter().find_map(|name| message.strip_prefix(name));
-    let split = inner.and_then(|rest| rest.split_once(": ")).filter(|(line, _)| line.parse::<usize>().is_ok());
+    let split =
+        inner.and_then(|rest| rest.split_once(": ")).filter(|(line, _)| line.parse::<usize>().is_ok());
     split.map_or(message, |(_, rest)| rest)
 }
 
@@ -198,7 +199,7 @@ pub(crate) struct MainFile(pub String);
 /// Data of a virtual machine that was stored by `Lua::set_app_data`.
 pub(crate) fn app_data<T: Clone + 'static>(lua: &Lua) -> mlua::Result<T> {
     let data = lua.app_data_ref::<T>().map(|data| data.clone());
-    data.ok_or_else(|| mlua::Error::runtime(format!("no {} is set", std::any::type_name::<T>())))
+    data.ok_or_else(|| mlua::Error::runtime("the virtual machine is incomplete"))
 }
 
 /// Line of the innermost script function on the stack.
@@ -230,7 +231,8 @@ mod tests {
 
     fn explain(error: mlua::Error) -> String {
         let files = ["suites/x.lua".to_string(), "/a/very/long/way/down/lib.lua".to_string()];
-        let translator = ErrorTranslator { main: "suites/x.lua", files: &files, raised: None, memory_bytes: 1 << 20 };
+        let translator =
+            ErrorTranslator { main: "suites/x.lua", files: &files, raised: None, memory_bytes: 1 << 20 };
         translator.explain(&error).to_string()
     }
 

@@ -69,8 +69,7 @@ fn read(lua: &Lua, value: &Value, label: &str, depth: usize, count: &mut usize) 
     };
     let length = table.raw_len();
     if length > 0 && table.pairs::<Value, Value>().count() == length {
-        let item =
-            |index| read(lua, &table.raw_get(index)?, &format!("{label}[{index}]"), depth + 1, count);
+        let item = |index| read(lua, &table.raw_get(index)?, &format!("{label}[{index}]"), depth + 1, count);
         return (1..=length).map(item).collect::<mlua::Result<_>>().map(Json::Array);
     }
     let entries = sorted_pairs(table).into_iter().map(|(key, value)| match &key {

@@ -137,10 +137,16 @@ impl Library {
         match self.find(module, None, &candidates, late) {
             Ok(Some(file)) => Ok(file),
             Ok(None) => {
-                let names: Vec<String> = ["scripts", "suites", "assets"].into_iter().flat_map(module_names).collect();
+                let names: Vec<String> =
+                    ["scripts", "suites", "assets"].into_iter().flat_map(module_names).collect();
                 let close = suggest(module, names.iter().map(String::as_str));
                 let suggestion = close.map_or(String::new(), |close| format!("; did you mean {close:?}?"));
-                Err(LibraryError::NoModule { module: module.into(), path, roots: self.root_names(), suggestion })
+                Err(LibraryError::NoModule {
+                    module: module.into(),
+                    path,
+                    roots: self.root_names(),
+                    suggestion,
+                })
             }
             Err(late @ LibraryError::LateModule(_)) => Err(late),
             Err(source) => Err(LibraryError::Module { module: module.into(), source: source.into() }),

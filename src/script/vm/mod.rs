@@ -5,7 +5,6 @@ pub(crate) mod json;
 pub(crate) mod library;
 pub(crate) mod list;
 pub(crate) mod memory_budget;
-pub(crate) mod random;
 pub(crate) mod source_map;
 pub(crate) mod value;
 pub(crate) mod watchdog;
@@ -22,15 +21,16 @@ use mlua::{
     FromLuaMulti, Function, IntoLuaMulti, Lua, LuaOptions, LuaString, MultiValue, StdLib, Table, Value,
     chunk::ChunkMode,
 };
+use rand_chacha::{ChaCha8Rng, rand_core::RngCore};
 
 use error::{ErrorTranslator, MainFile, RaisedObject, ScriptError, app_data, current_line, fail};
 use library::{Library, SharedLibrary, lua_text};
 use memory_budget::MemoryUse;
-use random::MathRandom;
 use value::{describe, literal};
 use watchdog::{Clock, Deadline, OnStuck};
 
 use crate::{
+    benchmark::seed,
     parallel::lock,
     text::{eprint_line, escape_control},
 };
@@ -157,7 +157,7 @@ impl Vm {
         let prelude = lua.load(include_str!("prelude.lua")).set_name("=softvt").set_mode(ChunkMode::Text);
         prelude.call::<()>(&host)?;
         api.set("sorted", host.get::<Function>("sorted")?)?;
-        withhold(&lua)?;
+        remove_unsafe_functions(&lua)?;
         let tostring: Function = globals.get("tostring")?;
         globals.set("print", lua.create_function(move |lua, values| print(lua, &tostring, values))?)?;
         store_base_library(&lua)?;
@@ -213,7 +213,7 @@ impl Vm {
 }
 
 /// Removes functions that reach the outside or the machine's own state.
-fn withhold(lua: &Lua) -> mlua::Result<()> {
+fn remove_unsafe_functions(lua: &Lua) -> mlua::Result<()> {
     for name in ["dofile", "loadfile", "collectgarbage", "warn", "io", "os", "debug", "package", "loadstring"]
     {
         lua.globals().set(name, Value::Nil)?;
@@ -353,4 +353,47 @@ fn record_raised_object(lua: &Lua, object: Value) -> mlua::Result<()> {
     let raised = RaisedObject { description: literal(&object, 0), place: current_line(lua) };
     *lock(&app_data::<Arc<VmState>>(lua)?.raised) = Some(raised);
     Ok(())
+}
+
+/// The generator of `math.random`, which the host reseeds between phases.
+#[derive(Clone)]
+pub(crate) struct MathRandom(Arc<Mutex<ChaCha8Rng>>);
+
+impl MathRandom {
+    /// Installs `math.random` with the same seed in every virtual machine, so that loading a script twice gives the same
+    /// plan.
+    pub(crate) fn install(lua: &Lua) -> mlua::Result<Self> {
+        let generator = Self(Arc::new(Mutex::new(seed::keyed_rng(&["softvt load"]))));
+        let rng = generator.clone();
+        let random = lua.create_function(move |lua, args: MultiValue| {
+            let mut rng = lock(&rng.0);
+            draw(lua, &mut rng, &args)
+        })?;
+        lua.globals().get::<Table>("math")?.set("random", random)?;
+        Ok(generator)
+    }
+
+    /// Continues with the numbers of `rng`.
+    pub(crate) fn reseed(&self, rng: ChaCha8Rng) {
+        *lock(&self.0) = rng;
+    }
+}
+
+/// `math.random()`, `math.random(m)`, `math.random(m, n)` as in Lua 5.4.
+fn draw(lua: &Lua, rng: &mut ChaCha8Rng, args: &MultiValue) -> mlua::Result<Value> {
+    let bound = |value: &Value| {
+        lua.coerce_integer(value.clone())?.ok_or_else(|| fail(lua, "math.random: bounds are integers"))
+    };
+    let (low, high) = match (args.front(), args.get(1)) {
+        (None, _) => return Ok(Value::Number(seed::uniform(rng))),
+        (Some(high), None) => (1, bound(high)?),
+        (Some(low), Some(high)) => (bound(low)?, bound(high)?),
+    };
+    if args.len() == 1 && high == 0 {
+        return Ok(Value::Integer(rng.next_u64() as i64));
+    }
+    if low > high {
+        return Err(fail(lua, format!("math.random: the range {low}..{high} is empty")));
+    }
+    Ok(Value::Integer(seed::uniform_integer(rng, low, high)))
 }

@@ -1,14 +1,18 @@
-//! State of an episode as data: its id and all actions so far. The simulation is deterministic,
-//! so they define it.
+//! An episode that a client controls, and its state as data: its id and all actions so far. The simulation is
+//! deterministic, so they define it.
 
 use rmpv::Value;
 
-use super::catalog::ServerConfig;
-use crate::evaluation::episode_id::EpisodeId;
-use crate::npy::NpyArray;
-use crate::policy::{
-    msgpack::{map, pack_array},
-    profile::ACTION_LEN,
+use super::config::{RequestError, ServerConfig};
+use crate::{
+    evaluation::{episode_id::EpisodeId, record::Outcome},
+    npy::NpyArray,
+    policy::{
+        CommandResolver, Observation, SensorStreams, decode,
+        msgpack::{map, pack_array},
+        profile::ACTION_LEN,
+    },
+    rollout::{Episode, EpisodeError},
 };
 
 /// The seven numbers of an action, in the encoding of the profile.
@@ -48,6 +52,59 @@ impl EpisodeState {
             ("code", config.action_code().into()),
             ("made_by", config.fingerprint.as_str().into()),
         ])
+    }
+}
+
+/// An episode in progress. A clone continues independently and gives byte-identical results.
+#[derive(Clone)]
+pub(super) struct LiveEpisode {
+    /// Its id and the actions so far.
+    pub state: EpisodeState,
+    /// The simulation.
+    pub episode: Episode,
+    resolver: CommandResolver,
+}
+
+impl LiveEpisode {
+    /// Starts the episode of `state`, without its actions.
+    ///
+    /// # Errors
+    /// The episode cannot be started.
+    pub(super) fn start(config: &ServerConfig, state: &EpisodeState) -> Result<Self, RequestError> {
+        let mut episode = (config.start_episode)(&state.id)?;
+        episode.begin(config.profile.streams());
+        let state = EpisodeState { id: state.id.clone(), actions: Vec::new() };
+        Ok(Self { state, episode, resolver: CommandResolver::default() })
+    }
+
+    /// The observation of the profile in the current state.
+    ///
+    /// # Errors
+    /// A sensor stream cannot be computed.
+    pub(super) fn observe(&mut self, config: &ServerConfig) -> Result<Observation, EpisodeError> {
+        self.episode.observe(&config.profile.streams())
+    }
+
+    /// Executes an action of finite numbers. Does nothing once the episode has ended.
+    ///
+    /// # Errors
+    /// The action cannot be decoded.
+    pub(super) fn advance(&mut self, config: &ServerConfig, row: &ActionRow) -> Result<(), RequestError> {
+        if self.episode.outcome().is_some() {
+            return Ok(());
+        }
+        let command = decode::command(row, &config.profile.actions)?;
+        // A displacement starts at the measured tool pose, which needs no images.
+        let observation = self.episode.observe(&SensorStreams::default())?;
+        let action = self.resolver.resolve(&observation, command);
+        self.episode.step(&action);
+        self.state.actions.push(*row);
+        Ok(())
+    }
+
+    /// True if the goal was reached.
+    pub(super) fn has_succeeded(&self) -> bool {
+        self.episode.outcome() == Some(&Outcome::Completed)
     }
 }
 

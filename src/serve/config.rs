@@ -1,30 +1,30 @@
 //! The suites and settings of a server.
 
 use crate::{
-    benchmark::{Suite, Task},
+    benchmark::Suite,
     evaluation::episode_id::{EpisodeId, Split},
-    policy::profile::Profile,
-    rollout::Episode,
+    policy::{PolicyError, profile::Profile},
+    rollout::{Episode, EpisodeError},
 };
 
 /// A request cannot be executed. The message is sent to the client.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{0}")]
-pub struct RequestError(pub String);
+#[derive(Debug, thiserror::Error)]
+pub enum RequestError {
+    /// The request is malformed, or does not fit the server or the episode.
+    #[error("{0}")]
+    Invalid(String),
+    /// An action cannot be decoded.
+    #[error(transparent)]
+    Action(#[from] PolicyError),
+    /// The episode cannot be simulated or observed.
+    #[error(transparent)]
+    Episode(#[from] EpisodeError),
+}
 
 impl From<String> for RequestError {
     fn from(message: String) -> Self {
-        Self(message)
+        Self::Invalid(message)
     }
-}
-
-/// A suite with the name under which it is served.
-#[derive(Clone, Debug)]
-pub struct ServedSuite<'a> {
-    /// Name, as in results.
-    pub name: String,
-    /// The suite.
-    pub suite: &'a Suite,
 }
 
 /// Starts an episode: builds its scene and lets it settle.
@@ -33,7 +33,7 @@ pub(super) type StartEpisode<'a> = Box<dyn Fn(&EpisodeId) -> Result<Episode, Req
 /// Suites and settings of a server.
 pub struct ServerConfig<'a> {
     /// The suites. Requests without a suite mean the first one.
-    pub suites: Vec<ServedSuite<'a>>,
+    pub suites: Vec<Suite>,
     /// Encoding of observations and actions.
     pub profile: Profile,
     /// True if clients receive the true state.
@@ -50,24 +50,15 @@ pub struct ServerConfig<'a> {
 
 impl ServerConfig<'_> {
     /// A suite by name, or the first suite.
-    pub(super) fn suite(&self, name: Option<&str>) -> Result<&ServedSuite<'_>, RequestError> {
+    pub(super) fn suite(&self, name: Option<&str>) -> Result<&Suite, RequestError> {
         let found = match name {
             None => self.suites.first(),
             Some(name) => self.suites.iter().find(|suite| suite.name == name),
         };
-        let names = || self.suites.iter().map(|suite| suite.name.as_str()).collect::<Vec<_>>().join(", ");
         found.ok_or_else(|| {
-            format!("suite {:?} is not served; available: {}", name.unwrap_or(""), names()).into()
-        })
-    }
-
-    /// The task of an episode.
-    pub(super) fn task(&self, id: &EpisodeId) -> Result<&Task, RequestError> {
-        let ServedSuite { suite, name } = self.suite(Some(&id.suite))?;
-        let found = suite.tasks.iter().find(|task| task.id == id.task);
-        found.ok_or_else(|| {
-            let last = suite.tasks.len().saturating_sub(1);
-            format!("task {}: suite {name} has the tasks 0 to {last}", id.task).into()
+            let names: Vec<&str> = self.suites.iter().map(|suite| suite.name.as_str()).collect();
+            let name = name.unwrap_or_default();
+            format!("suite {name:?} is not served; available: {}", names.join(", ")).into()
         })
     }
 
