@@ -6,6 +6,7 @@ use clap::{Args, value_parser};
 use serde_json::json;
 
 use crate::{
+    benchmark::Suite,
     cli::{
         error::CliError,
         output::print,
