@@ -4,6 +4,11 @@
 //! parents before children (MuJoCo, XML reference, "body"): a free joint has seven positions (position, quaternion w
 //! x y z) and six velocities, a ball joint four and three, any other joint one and one.
 
+use quick_xml::{
+    Reader,
+    events::{BytesStart, Event},
+};
+
 use super::{demo_reader::pose_from_row, foreign::ForeignObjectPose};
 use crate::geometry::Pose;
 
@@ -56,32 +61,42 @@ impl MujocoModel {
     /// Reads the bodies of an XML model; `None` if it has none.
     pub(super) fn read(xml: &str) -> Option<Self> {
         let mut model = Self::default();
-        let mut open: Vec<(String, Option<usize>)> = Vec::new();
-        for tag in tags(xml) {
-            if let Some(name) = tag.strip_prefix('/') {
-                while open.pop().is_some_and(|(known, _)| known != name.trim()) {}
-                continue;
-            }
-            let name = tag.split(|c: char| c.is_whitespace() || c == '/').next().unwrap_or_default();
-            let parent = open.iter().rev().find_map(|(_, body)| *body);
-            let direct = open.last().and_then(|(_, body)| *body);
-            let in_world = open.iter().any(|(name, _)| name == "worldbody");
-            let mut body = None;
-            match (name, direct) {
-                ("body", _) if in_world => {
-                    body = Some(model.bodies.len());
-                    model.bodies.push(MujocoBody::from_tag(tag, parent));
+        let mut reader = Reader::from_str(xml);
+        reader.config_mut().check_end_names = false;
+        // The open elements, with the index of each that is a body, and how many are outside of the worldbody.
+        let (mut open, mut outside): (Vec<Option<usize>>, _) = (Vec::new(), usize::MAX);
+        loop {
+            let (tag, is_empty) = match reader.read_event().ok()? {
+                Event::Start(tag) => (tag, false),
+                Event::Empty(tag) => (tag, true),
+                Event::End(_) => {
+                    open.pop();
+                    outside = if open.len() > outside { outside } else { usize::MAX };
+                    continue;
                 }
-                ("freejoint", Some(at)) => model.bodies[at].joints.push(MujocoJoint::Free),
-                ("joint", Some(at)) => model.bodies[at].joints.push(match attribute(tag, "type") {
-                    Some("free") => MujocoJoint::Free,
-                    Some("ball") => MujocoJoint::Ball,
-                    _ => MujocoJoint::Single,
-                }),
+                Event::Eof => break,
+                _ => continue,
+            };
+            let mut body = None;
+            match (tag.name().as_ref(), open.last().copied().flatten()) {
+                (b"worldbody", _) if !is_empty => outside = outside.min(open.len()),
+                (b"body", _) if open.len() > outside => {
+                    body = Some(model.bodies.len());
+                    let parent = open.iter().rev().find_map(|body| *body);
+                    model.bodies.push(MujocoBody::from_tag(&tag, parent));
+                }
+                (b"freejoint", Some(at)) => model.bodies[at].joints.push(MujocoJoint::Free),
+                (b"joint", Some(at)) => {
+                    model.bodies[at].joints.push(match attribute(&tag, "type").as_deref() {
+                        Some("free") => MujocoJoint::Free,
+                        Some("ball") => MujocoJoint::Ball,
+                        _ => MujocoJoint::Single,
+                    })
+                }
                 _ => {}
             }
-            if !tag.ends_with('/') {
-                open.push((name.to_owned(), body));
+            if !is_empty {
+                open.push(body);
             }
         }
         let base = model.bodies.iter().position(|body| body.name == BASE);
@@ -129,50 +144,22 @@ impl MujocoModel {
 }
 
 impl MujocoBody {
-    fn from_tag(tag: &str, parent: Option<usize>) -> Self {
-        let numbers = |name, or: &[f64]| -> Option<Vec<f64>> {
-            let Some(text) = attribute(tag, name) else { return Some(or.to_vec()) };
+    fn from_tag(tag: &BytesStart, parent: Option<usize>) -> Self {
+        let numbers = |name, default: &[f64]| -> Option<Vec<f64>> {
+            let Some(text) = attribute(tag, name) else { return Some(default.to_vec()) };
             let read: Option<Vec<f64>> = text.split_whitespace().map(|word| word.parse().ok()).collect();
-            read.filter(|read| read.len() == or.len())
+            read.filter(|read| read.len() == default.len())
         };
-        let (at, turn) = (numbers("pos", &[0.0; 3]), numbers("quat", &[1.0, 0.0, 0.0, 0.0]));
-        let other =
+        let (position, quaternion) = (numbers("pos", &[0.0; 3]), numbers("quat", &[1.0, 0.0, 0.0, 0.0]));
+        let has_other_rotation =
             ["euler", "axisangle", "xyaxes", "zaxis"].iter().any(|name| attribute(tag, name).is_some());
-        let pose = at.zip(turn).filter(|_| !other).and_then(|(at, turn)| pose_from_row(&[at, turn].concat()));
-        Self { name: attribute(tag, "name").unwrap_or_default().to_owned(), parent, pose, joints: Vec::new() }
+        let row = position.zip(quaternion).filter(|_| !has_other_rotation);
+        let pose = row.and_then(|(position, quaternion)| pose_from_row(&[position, quaternion].concat()));
+        Self { name: attribute(tag, "name").unwrap_or_default(), parent, pose, joints: Vec::new() }
     }
-}
-
-/// Contents of the tags of an XML document, without comments.
-fn tags(xml: &str) -> impl Iterator<Item = &str> {
-    let mut rest = xml;
-    std::iter::from_fn(move || {
-        loop {
-            rest = &rest[rest.find('<')? + 1..];
-            let (inside, end) = match rest.strip_prefix("!--") {
-                Some(_) => (None, rest.find("-->")?),
-                None => (Some(()), rest.find('>')?),
-            };
-            let tag = &rest[..end];
-            rest = &rest[end..];
-            if inside.is_some() {
-                return Some(tag);
-            }
-        }
-    })
 }
 
 /// Value of an attribute of a tag.
-fn attribute<'a>(tag: &'a str, name: &str) -> Option<&'a str> {
-    let mut rest = tag;
-    loop {
-        let (before, after) = rest.split_once('=')?;
-        let after = after.trim_start();
-        let quote = after.chars().next().filter(|c| matches!(c, '"' | '\''))?;
-        let (value, next) = after[1..].split_once(quote)?;
-        if before.split_whitespace().next_back() == Some(name) {
-            return Some(value);
-        }
-        rest = next;
-    }
+fn attribute(tag: &BytesStart, name: &str) -> Option<String> {
+    Some(tag.try_get_attribute(name).ok()??.unescape_value().ok()?.into_owned())
 }

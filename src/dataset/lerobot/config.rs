@@ -65,6 +65,14 @@ impl LeRobotVersion {
         }
     }
 
+    /// LeRobot's name of the image of a step.
+    pub(super) fn image_name(self, step: usize) -> String {
+        match self {
+            Self::V21 => format!("frame_{step:06}.png"),
+            Self::V30 => format!("frame-{step:06}.png"),
+        }
+    }
+
     /// Template of the paths of tables, as a Python format string.
     pub(super) fn data_path(self) -> &'static str {
         match self {

@@ -37,24 +37,10 @@ pub(super) trait EpisodeWriter: Send {
 pub(super) struct EpisodeData<'a> {
     pub index: usize,
     pub demo: &'a SelectedDemo,
-    pub rows: EpisodeRows,
+    /// Columns of its table, in the order of the features.
+    pub columns: Vec<ColumnValues>,
+    /// Statistics of the columns.
     pub statistics: Vec<FeatureStatistics>,
-}
-
-/// Rows of an episode.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct EpisodeRows {
-    pub steps: usize,
-    /// PNG files, by image feature and step.
-    pub images: [Vec<Vec<u8>>; 3],
-    /// `steps` × 7.
-    pub state: Vec<f32>,
-    /// `steps` × 7.
-    pub actions: Vec<f32>,
-    /// `steps` × (3, 198, 2).
-    pub markers: Vec<f32>,
-    /// Counts of the values of each channel, by image feature.
-    image_counts: [[ValueCounts; 3]; 3],
 }
 
 impl<'a> EpisodeData<'a> {
@@ -69,54 +55,78 @@ impl<'a> EpisodeData<'a> {
         is_cancelled: &impl Fn() -> bool,
     ) -> Result<Self, DatasetError> {
         let demo = &selection.demos[index];
-        let reader = DemoStreams {
-            file: &TaskFile::open(&demo.path)?,
-            demo: demo.entry.demo_id,
-            steps: demo.entry.num_samples,
+        let steps = demo.entry.num_samples;
+        let reader = DemoStreams { file: &TaskFile::open(&demo.path)?, demo: demo.entry.demo_id, steps };
+        let actions = match config.gripper {
+            GripperCoding::Continuous => "actions",
+            GripperCoding::Binary => "actions_binary",
         };
-        let rows = reader.rows(selection.image_sizes, config.gripper, is_cancelled)?;
-        let mut statistics = rows.statistics();
-        statistics.push(match config.version {
-            LeRobotVersion::V21 => rows.statistics_per_marker(),
-            LeRobotVersion::V30 => rows.statistics_of_all_markers(),
-        });
-        let timestamps = (0..rows.steps).map(|step| f64::from(timestamp(step))).collect();
-        statistics.push(rows.feature("timestamp", &[1], vec![ValueStatistics::of(timestamps)]));
-        for (name, numbers) in INDEX_FEATURES.into_iter().zip(index_columns(index, demo)) {
-            let numbers = numbers.into_iter().map(|number| number as f64).collect();
-            statistics.push(rows.feature(name, &[1], vec![ValueStatistics::of(numbers)]));
+        let state = reader.floats("obs/state", &[VECTOR_LENGTH])?;
+        let actions = reader.floats(actions, &[VECTOR_LENGTH])?;
+        let markers = marker_rows(&reader.floats("obs/gripper_marker_motion", &[2, 2, MARKER_COUNT, 2])?);
+        let images = reader.image_columns(config.version, selection.image_sizes, is_cancelled)?;
+        let timestamps: Vec<f32> =
+            (0..steps).map(|step| (step as f64 / f64::from(CONTROL_HZ)) as f32).collect();
+        let constant = |number: usize| vec![number as i64; steps];
+        let counted = |from: usize| (from..from + steps).map(|i| i as i64).collect();
+        let indices: [Vec<i64>; 4] =
+            [counted(0), constant(index), counted(demo.first_frame), constant(demo.prompt)];
+
+        let mut episode = Self { index, demo, columns: Vec::new(), statistics: Vec::new() };
+        for (name, ImageColumn { images, counts }) in IMAGE_FEATURES.into_iter().zip(images) {
+            let parts = counts.into_iter().map(ValueStatistics::counted).collect();
+            episode.push(name, &[3, 1, 1], parts, ColumnValues::Images(images));
         }
-        Ok(Self { index, demo, rows, statistics })
+        for (name, rows) in [("state", state), ("actions", actions)] {
+            let column = |i: usize| rows.iter().skip(i).step_by(VECTOR_LENGTH).map(|x| f64::from(*x));
+            let parts = (0..VECTOR_LENGTH).map(|i| ValueStatistics::of(column(i).collect())).collect();
+            episode.push(name, &[VECTOR_LENGTH], parts, ColumnValues::F32(rows));
+        }
+        let (shape, parts) = match config.version {
+            LeRobotVersion::V21 => (&MARKER_SHAPE[..], statistics_per_marker(&markers)),
+            LeRobotVersion::V30 => (&[2][..], statistics_of_all_markers(&markers)),
+        };
+        episode.push("tactile_marker_motion", shape, parts, ColumnValues::F32(markers));
+        let part = |numbers: Vec<f64>| vec![ValueStatistics::of(numbers)];
+        let seconds = timestamps.iter().map(|time| f64::from(*time)).collect();
+        episode.push("timestamp", &[1], part(seconds), ColumnValues::F32(timestamps));
+        for (name, numbers) in INDEX_FEATURES.into_iter().zip(indices) {
+            let parts = part(numbers.iter().map(|number| *number as f64).collect());
+            episode.push(name, &[1], parts, ColumnValues::I64(numbers));
+        }
+        Ok(episode)
     }
 
-    /// The columns of its table, in the order of the features. `image_name` names the image of a step.
-    pub(super) fn into_columns(self, image_name: fn(usize) -> String) -> Vec<ColumnValues> {
-        let Self { index, demo, rows, .. } = self;
-        let images = rows.images.into_iter().map(|files| {
-            let image = |(step, png)| EmbeddedImage { png, name: image_name(step) };
-            ColumnValues::Images(files.into_iter().enumerate().map(image).collect())
-        });
-        let rest = [
-            ColumnValues::F32(rows.state),
-            ColumnValues::F32(rows.actions),
-            ColumnValues::F32(rows.markers),
-            ColumnValues::F32((0..rows.steps).map(timestamp).collect()),
-        ];
-        images.chain(rest).chain(index_columns(index, demo).map(ColumnValues::I64)).collect()
+    fn push(
+        &mut self,
+        name: &'static str,
+        shape: &[usize],
+        parts: Vec<ValueStatistics>,
+        values: ColumnValues,
+    ) {
+        let steps = self.demo.entry.num_samples as u64;
+        self.statistics.push(FeatureStatistics { name, shape: shape.to_vec(), steps, parts });
+        self.columns.push(values);
     }
 }
 
-/// Time of a step, s.
-fn timestamp(step: usize) -> f32 {
-    (step as f64 / f64::from(CONTROL_HZ)) as f32
+/// Images of a feature.
+struct ImageColumn {
+    images: Vec<EmbeddedImage>,
+    /// Counts of the values of each channel.
+    counts: [ValueCounts; 3],
 }
 
-/// Values of [`INDEX_FEATURES`] in every row of an episode.
-fn index_columns(index: usize, demo: &SelectedDemo) -> [Vec<i64>; 4] {
-    let steps = demo.entry.num_samples;
-    let constant = |number: usize| vec![number as i64; steps];
-    let counted = |from: usize| (from..from + steps).map(|i| i as i64).collect();
-    [counted(0), constant(index), counted(demo.first_frame), constant(demo.prompt)]
+impl ImageColumn {
+    fn push(&mut self, image: &RgbImage, name: String) -> Result<(), ImageError> {
+        for pixel in image.pixels() {
+            for (counts, value) in self.counts.iter_mut().zip(pixel.0) {
+                counts.count(usize::from(value));
+            }
+        }
+        self.images.push(EmbeddedImage { png: encode_png(image)?, name });
+        Ok(())
+    }
 }
 
 /// Streams of a demonstration of known length.
@@ -127,30 +137,15 @@ struct DemoStreams<'a> {
 }
 
 impl DemoStreams<'_> {
-    fn error(&self, name: &str, what: String) -> DatasetError {
-        self.file.error(self.demo, name, what)
-    }
-
-    fn rows(
+    /// Images of every image feature. `sizes` are those of the cameras.
+    fn image_columns(
         &self,
+        version: LeRobotVersion,
         sizes: [ImageSize; 2],
-        gripper: GripperCoding,
         is_cancelled: &impl Fn() -> bool,
-    ) -> Result<EpisodeRows, DatasetError> {
-        let actions = match gripper {
-            GripperCoding::Continuous => "actions",
-            GripperCoding::Binary => "actions_binary",
-        };
-        let mut rows = EpisodeRows {
-            steps: self.steps,
-            images: Default::default(),
-            state: self.floats("obs/state", &[VECTOR_LENGTH])?,
-            actions: self.floats(actions, &[VECTOR_LENGTH])?,
-            markers: marker_rows(&self.floats("obs/gripper_marker_motion", &[2, 2, MARKER_COUNT, 2])?),
-            image_counts: std::array::from_fn(|_| {
-                std::array::from_fn(|_| ValueCounts::new(1.0 / 255.0, 256))
-            }),
-        };
+    ) -> Result<[ImageColumn; 3], DatasetError> {
+        let counts = || std::array::from_fn(|_| ValueCounts::new(1.0 / 255.0, 256));
+        let mut columns = IMAGE_FEATURES.map(|_| ImageColumn { images: Vec::new(), counts: counts() });
         // The last images of each finger, scaled to cells of the mosaic.
         let mut history: [Vec<RgbImage>; 2] = Default::default();
         for from in (0..self.steps).step_by(IMAGES_PER_BLOCK) {
@@ -169,15 +164,15 @@ impl DemoStreams<'_> {
                     cells.push(mosaic_cell(image));
                 }
                 let mosaic = mosaic([&history[0], &history[1]], MosaicLayout::Rows);
-                for (feature, image) in [third, wrist, mosaic].iter().enumerate() {
-                    rows.push_image(feature, image).map_err(|error| {
+                for (column, image) in columns.iter_mut().zip([third, wrist, mosaic]) {
+                    column.push(&image, version.image_name(step)).map_err(|error| {
                         let key = format!("/data/demo_{}, step {step}", self.demo);
                         DatasetError::content(&self.file.path, key, error.to_string())
                     })?;
                 }
             }
         }
-        Ok(rows)
+        Ok(columns)
     }
 
     fn check_shape(&self, name: &str, row_shape: &[usize]) -> Result<(), DatasetError> {
@@ -185,7 +180,7 @@ impl DemoStreams<'_> {
         if found == expected {
             return Ok(());
         }
-        Err(self.error(name, format!("expected the shape {expected:?}, got {found:?}")))
+        Err(self.file.error(self.demo, name, format!("expected the shape {expected:?}, got {found:?}")))
     }
 
     fn floats(&self, name: &str, row_shape: &[usize]) -> Result<Vec<f32>, DatasetError> {
@@ -212,7 +207,8 @@ impl DemoStreams<'_> {
             *images =
                 each.filter_map(|b| RgbImage::from_raw(width as u32, height as u32, b.to_vec())).collect();
             if images.len() != steps.len() {
-                return Err(self.error(&name, format!("{} images of steps {steps:?}", images.len())));
+                let what = format!("{} images of steps {steps:?}", images.len());
+                return Err(self.file.error(self.demo, &name, what));
             }
         }
         Ok(streams)
@@ -237,58 +233,27 @@ fn marker_rows(stored: &[f32]) -> Vec<f32> {
     rows
 }
 
-impl EpisodeRows {
-    fn push_image(&mut self, feature: usize, image: &RgbImage) -> Result<(), ImageError> {
-        for pixel in image.pixels() {
-            for (counts, value) in self.image_counts[feature].iter_mut().zip(pixel.0) {
-                counts.count(usize::from(value));
-            }
-        }
-        self.images[feature].push(encode_png(image)?);
-        Ok(())
-    }
+fn marker_moments(rows: &[f32]) -> Vec<ValueMoments> {
+    let column = |i: usize| rows.iter().skip(i).step_by(MARKER_ROW).map(|x| f64::from(*x));
+    (0..MARKER_ROW).map(|i| ValueMoments::of(column(i))).collect()
+}
 
-    fn feature(&self, name: &'static str, shape: &[usize], parts: Vec<ValueStatistics>) -> FeatureStatistics {
-        FeatureStatistics { name, shape: shape.to_vec(), steps: self.steps as u64, parts }
-    }
+/// Statistics of each marker coordinate, without quantiles.
+fn statistics_per_marker(rows: &[f32]) -> Vec<ValueStatistics> {
+    let part = |moments| ValueStatistics { moments, quantile_source: QuantileSource::None };
+    marker_moments(rows).into_iter().map(part).collect()
+}
 
-    /// Statistics of images, per channel, and of vectors, per number.
-    fn statistics(&self) -> Vec<FeatureStatistics> {
-        let images = IMAGE_FEATURES.iter().zip(&self.image_counts).map(|(name, channels)| {
-            self.feature(name, &[3, 1, 1], channels.iter().cloned().map(ValueStatistics::counted).collect())
-        });
-        let vectors = [("state", &self.state), ("actions", &self.actions)].map(|(name, values)| {
-            let column =
-                |i: usize| values.iter().skip(i).step_by(VECTOR_LENGTH).map(|x| f64::from(*x)).collect();
-            let parts = (0..VECTOR_LENGTH).map(|i| ValueStatistics::of(column(i))).collect();
-            self.feature(name, &[VECTOR_LENGTH], parts)
-        });
-        images.chain(vectors).collect()
-    }
-
-    /// Statistics of each marker coordinate, without quantiles.
-    fn statistics_per_marker(&self) -> FeatureStatistics {
-        let part = |moments| ValueStatistics { moments, quantile_source: QuantileSource::None };
-        let parts = self.marker_moments().into_iter().map(part).collect();
-        self.feature("tactile_marker_motion", &MARKER_SHAPE, parts)
-    }
-
-    /// Statistics of x and y over all markers.
-    fn statistics_of_all_markers(&self) -> FeatureStatistics {
-        let moments = self.marker_moments();
-        let parts = (0..2).map(|axis| {
-            let mut counts = ValueCounts::new(MARKER_STEP, (MARKER_RANGE / MARKER_STEP) as usize + 1);
-            self.markers.iter().skip(axis).step_by(2).for_each(|x| counts.count_nearest(f64::from(*x)));
-            let moments = ValueMoments::merged(moments.iter().skip(axis).step_by(2));
-            ValueStatistics { moments, quantile_source: QuantileSource::Counts(counts) }
-        });
-        self.feature("tactile_marker_motion", &[2], parts.collect())
-    }
-
-    fn marker_moments(&self) -> Vec<ValueMoments> {
-        let column = |i: usize| self.markers.iter().skip(i).step_by(MARKER_ROW).map(|x| f64::from(*x));
-        (0..MARKER_ROW).map(|i| ValueMoments::of(column(i))).collect()
-    }
+/// Statistics of x and y over all markers.
+fn statistics_of_all_markers(rows: &[f32]) -> Vec<ValueStatistics> {
+    let moments = marker_moments(rows);
+    let part = |axis| {
+        let mut counts = ValueCounts::new(MARKER_STEP, (MARKER_RANGE / MARKER_STEP) as usize + 1);
+        rows.iter().skip(axis).step_by(2).for_each(|x| counts.count_nearest(f64::from(*x)));
+        let moments = ValueMoments::merged(moments.iter().skip(axis).step_by(2));
+        ValueStatistics { moments, quantile_source: QuantileSource::Counts(counts) }
+    };
+    (0..2).map(part).collect()
 }
 
 #[cfg(test)]

@@ -72,14 +72,9 @@ impl EpisodeTableWriter {
     }
 }
 
-/// LeRobot's name of the image of a step.
-fn image_name(step: usize) -> String {
-    format!("frame_{step:06}.png")
-}
-
 impl EpisodeWriter for EpisodeTableWriter {
     fn add(&mut self, episode: EpisodeData<'_>) -> Result<(), DatasetError> {
-        let (index, steps) = (episode.index, episode.rows.steps);
+        let (index, steps) = (episode.index, episode.demo.entry.num_samples);
         let line = json!({ "episode_index": index, "tasks": [episode.demo.entry.language], "length": steps });
         // The values were measured in single precision, and LeRobot reads this file completely.
         let single = |x: f64| NestedList::Single(x as f32);
@@ -88,7 +83,7 @@ impl EpisodeWriter for EpisodeTableWriter {
         let path = self.dir.join(format!("data/chunk-{:03}/episode_{index:06}.parquet", index / CHUNK));
         files::create_parent(&path)?;
         let mut table = ParquetTable::create(path, &self.schema)?;
-        table.append(steps, episode.into_columns(image_name))?;
+        table.append(steps, episode.columns)?;
         table.finish()?;
         self.episodes.add(&line)?;
         Ok(self.stats.add(&StatisticsLine { episode_index: index, stats })?)

@@ -101,17 +101,16 @@ impl SharedTableWriter {
     }
 }
 
-/// LeRobot's name of the image of a step.
-fn image_name(step: usize) -> String {
-    format!("frame-{step:06}.png")
-}
-
 impl EpisodeWriter for SharedTableWriter {
-    fn add(&mut self, mut episode: EpisodeData<'_>) -> Result<(), DatasetError> {
-        let (index, demo, steps) = (episode.index, episode.demo, episode.rows.steps);
-        let statistics = std::mem::take(&mut episode.statistics);
-        let bytes = episode.rows.images.iter().flatten().map(Vec::len).sum();
-        self.table(bytes)?.append(steps, episode.into_columns(image_name))?;
+    fn add(&mut self, episode: EpisodeData<'_>) -> Result<(), DatasetError> {
+        let EpisodeData { index, demo, columns, statistics } = episode;
+        let steps = demo.entry.num_samples;
+        let image_bytes = |column: &ColumnValues| match column {
+            ColumnValues::Images(images) => images.iter().map(|image| image.png.len()).sum(),
+            _ => 0,
+        };
+        let bytes = columns.iter().map(image_bytes).sum();
+        self.table(bytes)?.append(steps, columns)?;
         self.episodes.push(EpisodeSummary {
             index,
             prompt: demo.entry.language.clone(),
