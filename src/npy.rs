@@ -139,14 +139,9 @@ impl NpyArray {
             return Err(NpyError::FortranOrder);
         }
         let dtype = between(header, "'descr': '", "'").unwrap_or_default();
-        let kind = dtype.trim_start_matches(['<', '|', '=']);
-        let size = match kind {
-            "u1" | "i1" => 1,
-            "u2" | "i2" => 2,
-            "i4" | "f4" => 4,
-            "i8" | "f8" => 8,
-            _ => return Err(NpyError::Dtype(kind.to_owned())),
-        };
+        let size = element_size(dtype).filter(|_| !dtype.starts_with('>'));
+        let size =
+            size.ok_or_else(|| NpyError::Dtype(dtype.trim_start_matches(['<', '|', '=']).to_owned()))?;
         let lengths = between(header, "'shape': (", ")").ok_or(NpyError::NoShape)?;
         let lengths = lengths.split(',').map(str::trim).filter(|n| !n.is_empty());
         let shape = lengths.map(|n| n.parse().ok()).collect::<Option<Vec<usize>>>();
@@ -177,23 +172,11 @@ fn decode(dtype: &str, bytes: &[u8]) -> f64 {
     let unsigned = u64::from_le_bytes(word);
     let unused = 64 - 8 * bytes.len() as u32;
     match (&dtype[1..2], bytes.len()) {
-        ("f", 2) => half_to_f64(unsigned as u16),
+        ("f", 2) => half::f16::from_bits(unsigned as u16).to_f64(),
         ("f", 4) => f64::from(f32::from_bits(unsigned as u32)),
         ("f", _) => f64::from_bits(unsigned),
         ("i", _) => ((unsigned << unused) as i64 >> unused) as f64,
         _ => unsigned as f64,
-    }
-}
-
-/// Value of an IEEE 754 binary16 number.
-fn half_to_f64(bits: u16) -> f64 {
-    let sign = if bits >> 15 == 1 { -1.0 } else { 1.0 };
-    let (exponent, fraction) = (i32::from(bits >> 10 & 31), f64::from(bits & 0x3FF));
-    sign * match exponent {
-        0 => fraction * 2.0_f64.powi(-24),
-        31 if fraction == 0.0 => f64::INFINITY,
-        31 => f64::NAN,
-        _ => (1.0 + fraction / 1024.0) * 2.0_f64.powi(exponent - 15),
     }
 }
 

@@ -55,20 +55,16 @@ fn failure_table(run: &RunSummary, episodes: &[UnsafeEpisode], out: &Path) -> Ma
     html! {
         div.scroll tabindex="0" role="group" aria-label=(format!("Unsafe episodes of {}", run.name())) {
             table.failures {
-                thead { (failure_header()) }
+                thead {
+                    tr {
+                        th.number scope="col" { "Task" }
+                        th.number scope="col" { "Episode" }
+                        th.text scope="col" { "Object" }
+                        th.text scope="col" { "Reason, and how to view it" }
+                    }
+                }
                 tbody { @for episode in episodes { (failure_row(run, episode, out)) } }
             }
-        }
-    }
-}
-
-fn failure_header() -> Markup {
-    html! {
-        tr {
-            th.number scope="col" { "Task" }
-            th.number scope="col" { "Episode" }
-            th.text scope="col" { "Object" }
-            th.text scope="col" { "Reason, and how to view it" }
         }
     }
 }
@@ -116,29 +112,25 @@ fn with_unbreakable_units(text: &str) -> String {
 
 /// Commands that render an episode without a video, and that replay it.
 fn view_commands(run: &RunSummary, id: &EpisodeId) -> [String; 2] {
-    let manifest = &run.run.manifest;
-    let text = |field: &str| manifest[field].as_str().unwrap_or_default().to_owned();
-    let SuiteScript { path, is_main } = suite_script(run);
-    let mut view = vec!["softvt".to_owned(), "view".to_owned(), path];
+    let (run, manifest) = (&run.run, &run.run.manifest);
+    // The script that returns the suite itself: `view` does not accept a list of suites, which may be what was run.
+    let main = run.text("script");
+    let sibling = Path::new(main).with_file_name(format!("{}.lua", run.text("suite"))).display().to_string();
+    let is_main = sibling == main || manifest["sources"].get(&sibling).is_none();
+    let mut view = if is_main { vec![main.to_owned()] } else { vec![sibling] };
     if is_main {
-        view.extend(
-            manifest["arguments"]
-                .as_array()
-                .into_iter()
-                .flatten()
-                .filter_map(Value::as_str)
-                .map(str::to_owned),
-        );
+        let arguments = manifest["arguments"].as_array().into_iter().flatten().filter_map(Value::as_str);
+        view.extend(arguments.map(str::to_owned));
     }
-    // The address of a remote policy is not stored in run.json.
-    let policy = if manifest["profile"].is_object() { "ws://HOST:PORT".to_owned() } else { text("policy") };
     let mut add = |flag: &str, value: String| view.extend([flag.to_owned(), value]);
     add("--task", id.task.to_string());
     // Defaults are omitted.
     if id.episode > 0 {
         add("--episode", id.episode.to_string());
     }
-    add("--policy", policy);
+    // The address of a remote policy is not stored in run.json.
+    let is_remote = manifest["profile"].is_object();
+    add("--policy", if is_remote { "ws://HOST:PORT" } else { run.text("policy") }.to_owned());
     if id.base_seed > 0 {
         add("--seed", id.base_seed.to_string());
     }
@@ -146,34 +138,15 @@ fn view_commands(run: &RunSummary, id: &EpisodeId) -> [String; 2] {
         add("--twin", twin.to_owned());
     }
     for (flag, field) in [("--shift", "shifts"), ("--set", "set")] {
-        run.run.changes(field).for_each(|change| add(flag, change));
+        run.changes(field).for_each(|change| add(flag, change));
     }
     add("--out", "seen".to_owned());
-    let replay = [
-        "softvt".to_owned(),
-        "replay".to_owned(),
-        run.run.dir.display().to_string(),
-        format!("{}/{}", id.task, id.episode),
-    ];
-    [view, replay.to_vec()].map(|words| words.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" "))
-}
-
-/// Script of a suite.
-struct SuiteScript {
-    path: String,
-    /// True if it is the script that was run, to which `arguments` belong.
-    is_main: bool,
-}
-
-/// The script that returns the suite itself: `view` does not accept a list of suites, which may be what was run.
-fn suite_script(run: &RunSummary) -> SuiteScript {
-    let main = run.run.text("script");
-    let sibling = Path::new(main).with_file_name(format!("{}.lua", run.run.text("suite")));
-    let sibling = sibling.display().to_string();
-    if sibling != main && run.run.manifest["sources"].get(&sibling).is_some() {
-        return SuiteScript { path: sibling, is_main: false };
-    }
-    SuiteScript { path: main.to_owned(), is_main: true }
+    let view: Vec<String> = view.iter().map(|word| quoted(word)).collect();
+    let replayed = quoted(&run.dir.display().to_string());
+    [
+        format!("softvt view {}", view.join(" ")),
+        format!("softvt replay {replayed} {}/{}", id.task, id.episode),
+    ]
 }
 
 /// Quotes a word for a shell where necessary.

@@ -2,9 +2,7 @@
 //! in percent of the width, so that text does not shrink on narrow screens. Colours come from the style sheet, for
 //! light and dark schemes.
 
-use std::collections::BTreeMap;
-
-use maud::{Markup, html};
+use maud::{Markup, Render, html};
 
 use crate::{
     evaluation::{
@@ -38,13 +36,6 @@ fn short(number: f64) -> String {
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-/// Runs by suite, in order.
-fn by_suite<'a>(runs: impl Iterator<Item = &'a RunSummary>) -> BTreeMap<&'a str, Vec<&'a RunSummary>> {
-    let mut suites: BTreeMap<&str, Vec<&RunSummary>> = BTreeMap::new();
-    runs.for_each(|run| suites.entry(&run.summary.suite).or_default().push(run));
-    suites
-}
-
 /// Goal and Safety Success: a pair of bars per run, with intervals.
 pub(super) fn goal_and_safety(runs: &[RunSummary]) -> Markup {
     html! {
@@ -53,8 +44,8 @@ pub(super) fn goal_and_safety(runs: &[RunSummary]) -> Markup {
             span.key { (swatch("safety")) "Safety Success" }
         }
         div.chart {
-            @for (suite, runs) in by_suite(runs.iter()) {
-                p.suite { (suite) }
+            @for runs in runs.chunk_by(|a, b| a.summary.suite == b.summary.suite) {
+                p.suite { (runs[0].summary.suite) }
                 @for run in runs { (bar_row(run)) }
             }
             (axis(&["0", "25", "50", "75", "100 %"]))
@@ -111,30 +102,35 @@ fn bar(class: &str, rate: Option<Rate>, top: f64) -> Markup {
 }
 
 /// Evenly spaced labels below a column of strips.
-fn axis(labels: &[&str]) -> Markup {
+fn axis(labels: &[impl Render]) -> Markup {
     let last = labels.len().saturating_sub(1);
     html! {
         div.row.axis {
             span.name {}
             svg width="100%" height="18" aria-hidden="true" {
-                @for (i, label) in labels.iter().enumerate() {
-                    @let anchor = if i == 0 { "start" } else if i == last { "end" } else { "middle" };
-                    text.tick x=(x(i as f64 / last.max(1) as f64)) y="13" text-anchor=(anchor) { (label) }
-                }
+                @for (i, label) in labels.iter().enumerate() { (tick(i, last, "13", label)) }
             }
             span.value {}
         }
     }
 }
 
-/// Strips of dots under a common name.
-struct StripGroup<'a> {
-    name: &'a str,
-    strips: Vec<Strip<'a>>,
+/// The i-th label of an axis from 0 to `last`.
+fn tick(i: usize, last: usize, y: &str, label: impl Render) -> Markup {
+    let anchor = if i == 0 {
+        "start"
+    } else if i == last {
+        "end"
+    } else {
+        "middle"
+    };
+    html! { text.tick x=(x(i as f64 / last.max(1) as f64)) y=(y) text-anchor=(anchor) { (label) } }
 }
 
 /// A strip of dots, one per episode.
 struct Strip<'a> {
+    /// Heading above the strips of one suite; empty for none.
+    suite: &'a str,
     name: &'a str,
     dots: Vec<Dot>,
 }
@@ -146,45 +142,40 @@ struct Dot {
 
 impl<'a> Strip<'a> {
     /// Episodes of a run, or only those with the target `asset`.
-    fn new(name: &'a str, run: &RunSummary, asset: Option<&str>) -> Self {
+    fn new(suite: &'a str, name: &'a str, run: &RunSummary, asset: Option<&str>) -> Self {
         let records = run.run.records.iter();
         let selected = records.filter(|r| asset.is_none_or(|asset| r.header.asset == asset));
         let dot = |r| Some(Dot { d_over_tau: d_over_tau(r)?, reached_goal: r.verdict.goal });
-        Self { name, dots: selected.filter_map(dot).collect() }
+        Self { suite, name, dots: selected.filter_map(dot).collect() }
     }
 }
 
 /// Peak deformation divided by its threshold: one strip per run.
 pub(super) fn distributions(runs: &[RunSummary]) -> Markup {
-    let mut groups = Vec::new();
-    for (name, runs) in by_suite(runs.iter().filter(|run| run.is_soft())) {
-        let strips = runs.into_iter().map(|run| Strip::new(&run.method, run, None)).collect();
-        groups.push(StripGroup { name, strips });
-    }
-    strips(&groups)
+    let soft = runs.iter().filter(|run| run.is_soft());
+    let strips = soft.map(|run| Strip::new(&run.summary.suite, &run.method, run, None));
+    strip_chart(&strips.collect::<Vec<_>>())
 }
 
 /// The same for one run: one strip per object.
 pub(super) fn by_asset(run: &RunSummary) -> Markup {
-    let assets = run.summary.by_asset.keys();
-    let strips_of_assets = assets.map(|asset| Strip::new(asset, run, Some(asset))).collect();
-    strips(&[StripGroup { name: "", strips: strips_of_assets }])
+    let strips = run.summary.by_asset.keys().map(|asset| Strip::new("", asset, run, Some(asset)));
+    strip_chart(&strips.collect::<Vec<_>>())
 }
 
-fn strips(groups: &[StripGroup]) -> Markup {
-    let dots = groups.iter().flat_map(|group| &group.strips).flat_map(|strip| &strip.dots);
+fn strip_chart(strips: &[Strip]) -> Markup {
+    let dots = strips.iter().flat_map(|strip| &strip.dots);
     let max = dots.map(|dot| dot.d_over_tau).fold(1.5, f64::max).min(MAX_D_OVER_TAU).ceil();
     let step = if max > 3.0 { 1.0 } else { 0.5 };
     let ticks: Vec<f64> = (0..).map(|i| f64::from(i) * step).take_while(|value| *value <= max).collect();
-    let labels: Vec<String> =
-        ticks.iter().map(|value| if *value == 1.0 { "τ".to_owned() } else { short(*value) }).collect();
+    let label = |value: &f64| if *value == 1.0 { "τ".to_owned() } else { short(*value) };
     html! {
         div.chart {
-            @for group in groups {
-                @if !group.name.is_empty() { p.suite { (group.name) } }
-                @for strip in &group.strips { (strip_row(strip, &ticks, max)) }
+            @for strips in strips.chunk_by(|a, b| a.suite == b.suite) {
+                @if !strips[0].suite.is_empty() { p.suite { (strips[0].suite) } }
+                @for strip in strips { (strip_row(strip, &ticks, max)) }
             }
-            (axis(&labels.iter().map(String::as_str).collect::<Vec<_>>()))
+            (axis(&ticks.iter().map(label).collect::<Vec<_>>()))
         }
     }
 }
@@ -228,10 +219,11 @@ fn distribution_mark(of: &Distribution, max: f64) -> Markup {
 
 /// Safety Success over the strictness of the thresholds: one plot per suite, one line per run.
 pub(super) fn kappa_curves(runs: &[RunSummary]) -> Markup {
+    let soft: Vec<&RunSummary> = runs.iter().filter(|run| run.is_soft()).collect();
     html! {
-        @for (suite, runs) in by_suite(runs.iter().filter(|run| run.is_soft())) {
-            p.suite { (suite) }
-            (kappa_plot(suite, &runs))
+        @for runs in soft.chunk_by(|a, b| a.summary.suite == b.summary.suite) {
+            p.suite { (runs[0].summary.suite) }
+            (kappa_plot(&runs[0].summary.suite, runs))
             p.legend { @for (i, run) in runs.iter().enumerate() { (curve_key(run, i)) } }
         }
     }
@@ -248,20 +240,11 @@ fn kappa_plot(suite: &str, runs: &[&RunSummary]) -> Markup {
             }
             line.limit x1="50%" x2="50%" y1=(y(level(100.0))) y2=(y(level(0.0))) {}
             @for (i, run) in runs.iter().enumerate() { (curve(run, i)) }
-            @for fifth in 0..=5 { (kappa_tick(fifth)) }
+            @for (i, label) in ["κ = 0", "0.2", "0.4", "0.6", "0.8", "1"].iter().enumerate() {
+                (tick(i, 5, &y(PLOT_HEIGHT + 16.0), label))
+            }
         }
     }
-}
-
-fn kappa_tick(fifth: i32) -> Markup {
-    let kappa = f64::from(fifth) / 5.0;
-    let anchor = match fifth {
-        0 => "start",
-        5 => "end",
-        _ => "middle",
-    };
-    let label = if fifth == 0 { "κ = 0".to_owned() } else { short(kappa) };
-    html! { text.tick x=(x(kappa)) y=(y(PLOT_HEIGHT + 16.0)) text-anchor=(anchor) { (label) } }
 }
 
 fn curve_key(run: &RunSummary, index: usize) -> Markup {

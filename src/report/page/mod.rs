@@ -4,11 +4,11 @@
 mod failures;
 mod figures;
 mod images;
-mod settings;
 
 use std::path::Path;
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
+use serde_json::Value;
 
 use crate::text::counted;
 
@@ -25,15 +25,28 @@ pub fn page(runs: &[RunSummary], out: &Path) -> String {
     let episodes: usize = runs.iter().map(|run| run.run.records.len()).sum();
     let title = format!("softvt: {}", suites(runs).join(", "));
     let lead = format!("{} in {}", counted(episodes, "episode"), counted(runs.len(), "run"));
+    let is_soft = runs.iter().any(RunSummary::is_soft);
     let markup = html! {
         (DOCTYPE)
         html lang="en" {
-            (head(&title))
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                title { (title) }
+                style { (PreEscaped(include_str!("page.css"))) }
+            }
             body {
                 header {
                     h1 { (title) }
                     p.lead { (lead) " · softvt " (env!("CARGO_PKG_VERSION")) }
-                    (contents(runs))
+                    nav aria-label="Contents" {
+                        a href="#results" { "Results" }
+                        @if is_soft { a href="#deformation" { "Deformation" } }
+                        a href="#tasks" { "Tasks" }
+                        a href="#failures" { "Unsafe episodes" }
+                        a href="#settings" { "Settings" }
+                    }
                 }
                 main { (sections(runs, out)) }
             }
@@ -42,27 +55,19 @@ pub fn page(runs: &[RunSummary], out: &Path) -> String {
     markup.into_string()
 }
 
-fn head(title: &str) -> Markup {
-    html! {
-        head {
-            meta charset="utf-8";
-            meta name="viewport" content="width=device-width, initial-scale=1";
-            meta name="color-scheme" content="light dark";
-            title { (title) }
-            style { (PreEscaped(include_str!("page.css"))) }
-        }
-    }
-}
-
 fn sections(runs: &[RunSummary], out: &Path) -> Markup {
-    let tasks = html! { @for run in runs { (collapsible(runs, run, &table(&task_table(run)))) } };
-    let settings = html! { @for run in runs { (settings::settings(run)) } };
+    // Collapsible, one per run.
+    let tasks = html! {
+        @for run in runs {
+            details open[runs.len() <= MAX_EXPANDED] { summary { (run.name()) } (table(&task_table(run))) }
+        }
+    };
     html! {
-        (results(runs))
-        (deformation(runs))
+        (section("results", "Results", &results(runs)))
+        @if let Some(deformation) = deformation(runs) { (section("deformation", "Deformation", &deformation)) }
         (section("tasks", "Tasks", &tasks))
         (section("failures", "Unsafe episodes", &failures::failures(runs, out)))
-        (section("settings", "Settings", &settings))
+        (section("settings", "Settings", &html! { @for run in runs { (settings(run)) } }))
     }
 }
 
@@ -73,31 +78,13 @@ fn suites(runs: &[RunSummary]) -> Vec<String> {
     names
 }
 
-fn contents(runs: &[RunSummary]) -> Markup {
-    let soft = runs.iter().any(RunSummary::is_soft);
-    html! {
-        nav aria-label="Contents" {
-            a href="#results" { "Results" }
-            @if soft { a href="#deformation" { "Deformation" } }
-            a href="#tasks" { "Tasks" }
-            a href="#failures" { "Unsafe episodes" }
-            a href="#settings" { "Settings" }
-        }
-    }
-}
-
 fn section(id: &str, heading: &str, content: &Markup) -> Markup {
     html! { section id=(id) { h2 { (heading) } (content) } }
 }
 
-/// Content about one run under its name, collapsible.
-fn collapsible(runs: &[RunSummary], run: &RunSummary, content: &Markup) -> Markup {
-    html! { details open[runs.len() <= MAX_EXPANDED] { summary { (run.name()) } (content) } }
-}
-
 fn results(runs: &[RunSummary]) -> Markup {
     let any = |test: fn(&RunSummary) -> bool| runs.iter().any(test);
-    let content = html! {
+    html! {
         (table(&main_table(runs)))
         @if any(|run| run.summary.privileged) {
             p.note { b { "privileged" } ": the policy has access to ground-truth state, which no robot has." }
@@ -110,15 +97,13 @@ fn results(runs: &[RunSummary]) -> Markup {
             (figures::goal_and_safety(runs))
             figcaption { "Goal Success and Safety Success. The gap between them is invisible in success rates alone. Whiskers are 95 % Wilson intervals." }
         }
-    };
-    section("results", "Results", &content)
+    }
 }
 
-fn deformation(runs: &[RunSummary]) -> Markup {
-    let (Some(deformations), Some(kappas)) = (deformation_table(runs), kappa_table(runs)) else {
-        return html! {};
-    };
-    let content = html! {
+/// `None` if all suites are rigid.
+fn deformation(runs: &[RunSummary]) -> Option<Markup> {
+    let (deformations, kappas) = (deformation_table(runs)?, kappa_table(runs)?);
+    Some(html! {
         (table(&deformations))
         figure {
             (figures::distributions(runs))
@@ -136,8 +121,7 @@ fn deformation(runs: &[RunSummary]) -> Markup {
             (figures::kappa_curves(runs))
             figcaption { "Safety Success for stricter (left) and looser (right) thresholds; κ = 0.5 is nominal." }
         }
-    };
-    section("deformation", "Deformation", &content)
+    })
 }
 
 /// A table that scrolls horizontally where it is too wide.
@@ -176,6 +160,63 @@ fn cell(text: &str, is_text: bool) -> Markup {
         Some((number, interval)) => html! { (number) " " span.interval { "[" (interval) } },
         None => html! { (text) },
     }
+}
+
+/// The main fields of `run.json`, followed by the whole file.
+fn settings(summary: &RunSummary) -> Markup {
+    let manifest = &summary.run.manifest;
+    let fields = [
+        ("Folder", summary.run.dir.display().to_string()),
+        ("Script", command_line(&manifest["script"], &manifest["arguments"])),
+        ("Policy", summary.summary.method_label()),
+        ("softvt", value_text(&manifest["softvt"])),
+        ("Seed, split", format!("{}, {}", value_text(&manifest["seed"]), value_text(&manifest["split"]))),
+        ("Episodes", format!("{} of {}", summary.run.records.len(), summary.run.requested_episodes())),
+        ("Shifts", pairs(&manifest["shifts"])),
+        ("Settings changed", pairs(&manifest["set"])),
+        ("Options", entries(&manifest["options"], "")),
+        ("Thresholds τ", entries(&manifest["thresholds"], " %")),
+    ];
+    html! {
+        details {
+            summary { (summary.name()) }
+            dl { @for (name, value) in fields { dt { (name) } dd { @if value.is_empty() { "none" } @else { (value) } } } }
+            details.inner { summary { "run.json" } pre { (format!("{manifest:#}")) } }
+        }
+    }
+}
+
+fn value_text(value: &Value) -> String {
+    match value {
+        Value::Null => "none".to_owned(),
+        Value::String(text) => text.clone(),
+        Value::Number(number) => number
+            .as_f64()
+            .filter(|x| x.fract() != 0.0)
+            .map_or_else(|| number.to_string(), |x| format!("{:.3}", x).trim_end_matches('0').to_owned()),
+        other => other.to_string(),
+    }
+}
+
+fn command_line(script: &Value, arguments: &Value) -> String {
+    let all = [script].into_iter().chain(arguments.as_array().into_iter().flatten());
+    all.map(value_text).collect::<Vec<_>>().join(" ")
+}
+
+fn pairs(list: &Value) -> String {
+    let all = list.as_array().into_iter().flatten();
+    all.map(|pair| format!("{}={}", value_text(&pair[0]), value_text(&pair[1])))
+        .collect::<Vec<_>>()
+        .join(", ")
+}
+
+fn entries(object: &Value, unit: &str) -> String {
+    let all = object.as_object().into_iter().flatten();
+    let shown = |(name, value): (&String, &Value)| match value {
+        Value::Null => format!("{name} none"),
+        value => format!("{name} {}{unit}", value_text(value)),
+    };
+    all.map(shown).collect::<Vec<_>>().join(", ")
 }
 
 #[cfg(test)]
